@@ -1,0 +1,247 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// reads a compute module by the SPIR-V specification 1.5: names, decorations, types, variables, constants
+#include "module.h"
+
+#include <algorithm>
+#include <cstring>
+#include <map>
+#include <stdexcept>
+
+namespace {
+
+enum Op : uint16_t {
+    kOpName = 5,
+    kOpMemberName = 6,
+    kOpExecutionMode = 16,
+    kOpCapability = 17,
+    kOpTypeInt = 21,
+    kOpTypeFloat = 22,
+    kOpTypeVector = 23,
+    kOpTypeImage = 25,
+    kOpTypeSampledImage = 27,
+    kOpTypeArray = 28,
+    kOpTypeStruct = 30,
+    kOpTypePointer = 32,
+    kOpConstant = 43,
+    kOpSpecConstantTrue = 48,
+    kOpSpecConstantFalse = 49,
+    kOpSpecConstant = 50,
+    kOpSpecConstantOp = 52,
+    kOpVariable = 59,
+    kOpDecorate = 71,
+    kOpMemberDecorate = 72,
+};
+enum Decoration : uint32_t { kSpecId = 1, kNonWritable = 24, kNonReadable = 25, kBinding = 33, kOffset = 35 };
+enum Storage : uint32_t { kUniformConstant = 0, kWorkgroup = 4, kPushConstant = 9, kStorageBuffer = 12 };
+
+struct Id {
+    uint16_t op = 0;
+    std::string name;
+    std::vector<uint32_t> operands; // of the defining instruction, result ids left out
+    std::vector<std::string> member_names;
+    std::map<uint32_t, uint32_t> member_offsets;
+    bool binding_set = false, spec_set = false, non_writable = false, non_readable = false;
+    uint32_t binding = 0, spec_id = 0;
+};
+
+std::string text(const uint32_t* words, size_t count)
+{
+    const char* s = reinterpret_cast<const char*>(words);
+    return std::string(s, strnlen(s, count * 4));
+}
+
+class Reader {
+  public:
+    explicit Reader(std::vector<uint32_t> code) { module_.code = std::move(code); }
+
+    Module run()
+    {
+        const auto& code = module_.code;
+        if (code.size() < 5 || code[0] != 0x07230203u)
+            throw std::runtime_error("not a SPIR-V module");
+        ids_.resize(code[3]);
+        for (size_t at = 5; at < code.size(); at += code[at] >> 16) {
+            if (code[at] >> 16 == 0)
+                throw std::runtime_error("zero-length instruction");
+            instruction(uint16_t(code[at] & 0xffff), &code[at + 1], (code[at] >> 16) - 1);
+        }
+        for (uint32_t v : variables_)
+            variable(ids_[v]);
+        constants();
+        std::sort(module_.bindings.begin(), module_.bindings.end(),
+                  [](const Binding& a, const Binding& b) { return a.binding < b.binding; });
+        return std::move(module_);
+    }
+
+  private:
+    void instruction(uint16_t op, const uint32_t* w, size_t n)
+    {
+        switch (op) {
+        case kOpName: ids_[w[0]].name = text(w + 1, n - 1); break;
+        case kOpMemberName: {
+            auto& names = ids_[w[0]].member_names;
+            names.resize(std::max<size_t>(names.size(), w[1] + 1));
+            names[w[1]] = text(w + 2, n - 2);
+            break;
+        }
+        case kOpExecutionMode:
+            if (w[1] == 17) // LocalSize
+                std::copy_n(w + 2, 3, module_.local_size);
+            break;
+        case kOpCapability: capability(w[0]); break;
+        case kOpDecorate: decorate(ids_[w[0]], w[1], n > 2 ? w[2] : 0); break;
+        case kOpMemberDecorate:
+            if (w[2] == kOffset)
+                ids_[w[0]].member_offsets[w[1]] = w[3];
+            else
+                decorate(ids_[w[0]], w[2], 0); // access qualifiers of a block's members hold for the block
+            break;
+        case kOpTypeInt:
+        case kOpTypeFloat:
+        case kOpTypeVector:
+        case kOpTypeImage:
+        case kOpTypeSampledImage:
+        case kOpTypeArray:
+        case kOpTypeStruct:
+        case kOpTypePointer: define(op, w[0], w + 1, n - 1); break;
+        case kOpConstant:
+        case kOpSpecConstant:
+        case kOpSpecConstantTrue:
+        case kOpSpecConstantFalse:
+        case kOpSpecConstantOp: define(op, w[1], w + 2, n - 2); break;
+        case kOpVariable:
+            define(op, w[1], w + 2, n - 2);
+            ids_[w[1]].operands = {w[0], w[2]}; // pointer type, storage class
+            variables_.push_back(w[1]);
+            break;
+        default: break;
+        }
+    }
+
+    void define(uint16_t op, uint32_t id, const uint32_t* w, size_t n)
+    {
+        ids_[id].op = op;
+        ids_[id].operands.assign(w, w + n);
+    }
+
+    void capability(uint32_t c)
+    {
+        if (c == 63) // GroupNonUniformArithmetic
+            module_.needs |= 1;
+        if (c == 64) // GroupNonUniformBallot
+            module_.needs |= 2;
+        if (c == 65 || c == 66) // GroupNonUniformShuffle, ShuffleRelative
+            module_.needs |= 4;
+        if (c == 9) // Float16
+            module_.needs |= 8;
+        if (c == 6022 || c == 5357) // CooperativeMatrixKHR, NV
+            module_.needs |= 16;
+    }
+
+    static void decorate(Id& id, uint32_t decoration, uint32_t value)
+    {
+        if (decoration == kBinding) {
+            id.binding_set = true;
+            id.binding = value;
+        } else if (decoration == kSpecId) {
+            id.spec_set = true;
+            id.spec_id = value;
+        } else if (decoration == kNonWritable) {
+            id.non_writable = true;
+        } else if (decoration == kNonReadable) {
+            id.non_readable = true;
+        }
+    }
+
+    void variable(const Id& v)
+    {
+        const Id& type = ids_[ids_[v.operands[0]].operands[1]]; // pointee
+        switch (v.operands[1]) {
+        case kStorageBuffer:
+            module_.bindings.push_back({type.name, v.binding, false, !(v.non_readable || type.non_readable),
+                                        !(v.non_writable || type.non_writable)});
+            break;
+        case kUniformConstant:
+            if (type.op != kOpTypeSampledImage || ids_[type.operands[0]].operands[1] != 5) // dim Buffer
+                throw std::runtime_error("'" + v.name + "': only texel buffers and storage buffers are supported");
+            module_.bindings.push_back({v.name, v.binding, true, true, false});
+            break;
+        case kPushConstant: push(type); break;
+        case kWorkgroup: module_.shared_bytes += bytes(type); break;
+        default: break;
+        }
+    }
+
+    // the block holds one struct (shared with C++) whose members are 32-bit scalars
+    void push(const Id& block)
+    {
+        const Id* s = &block;
+        while (s->op == kOpTypeStruct && s->operands.size() == 1 && ids_[s->operands[0]].op == kOpTypeStruct)
+            s = &ids_[s->operands[0]];
+        for (size_t i = 0; i < s->operands.size(); ++i) {
+            const Id& type = ids_[s->operands[i]];
+            if (type.op != kOpTypeInt && type.op != kOpTypeFloat)
+                throw std::runtime_error("push member '" + s->member_names[i] + "' is not a scalar");
+            module_.push.push_back({s->member_names[i], s->member_offsets.at(uint32_t(i))});
+            module_.push_bytes = std::max(module_.push_bytes, module_.push.back().offset + 4);
+        }
+    }
+
+    uint32_t bytes(const Id& type) const
+    {
+        switch (type.op) {
+        case kOpTypeInt:
+        case kOpTypeFloat: return type.operands[0] / 8;
+        case kOpTypeVector: return bytes(ids_[type.operands[0]]) * type.operands[1];
+        case kOpTypeArray: return bytes(ids_[type.operands[0]]) * length(ids_[type.operands[1]]);
+        case kOpTypeStruct: {
+            uint32_t sum = 0;
+            for (uint32_t member : type.operands)
+                sum += bytes(ids_[member]);
+            return sum;
+        }
+        default: return 4;
+        }
+    }
+
+    uint32_t length(const Id& constant) const
+    {
+        if (constant.op == kOpSpecConstantOp)
+            return folded(constant);
+        return constant.operands.at(0);
+    }
+
+    // sizes of shared arrays may be sums, products and quotients of constants
+    uint32_t folded(const Id& c) const
+    {
+        const uint32_t a = length(ids_[c.operands.at(1)]);
+        const uint32_t b = c.operands.size() > 2 ? length(ids_[c.operands[2]]) : 0;
+        switch (c.operands[0]) {
+        case 128: return a + b; // OpIAdd
+        case 130: return a - b; // OpISub
+        case 132: return a * b; // OpIMul
+        case 134:               // OpUDiv
+        case 135: return b ? a / b : 0;
+        default: throw std::runtime_error("a shared array's size uses an operation the reflector does not know");
+        }
+    }
+
+    void constants()
+    {
+        for (const Id& id : ids_) {
+            if (!id.spec_set || id.op == 0)
+                continue;
+            const uint32_t value = id.op == kOpSpecConstant ? id.operands[0] : id.op == kOpSpecConstantTrue;
+            module_.constants.push_back({id.name, id.spec_id, value});
+        }
+    }
+
+    Module module_;
+    std::vector<Id> ids_;
+    std::vector<uint32_t> variables_;
+};
+
+} // namespace
+
+Module reflect(std::vector<uint32_t> code) { return Reader(std::move(code)).run(); }

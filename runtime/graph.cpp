@@ -1,0 +1,56 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "runtime/graph.h"
+
+namespace semrover {
+
+Tensor Graph::matrix(uint32_t rows, uint32_t cols, DType dtype, std::string_view name)
+{
+    SR_ASSERT(rows > 0 && cols > 0, "tensor '{}' is empty: {} x {}", name, rows, cols);
+    Tensor t{uint32_t(desc_.resources.size()), dtype, rows, cols, round_up(cols, kRowPadding), 0};
+    desc_.resources.push_back({std::string(name), t.bytes(), false, {}});
+    return t;
+}
+
+Tensor Graph::array(uint32_t count, DType dtype, std::string_view name, uint32_t width)
+{
+    SR_ASSERT(count > 0 && width > 0, "array '{}' is empty", name);
+    Tensor t{uint32_t(desc_.resources.size()), dtype, count, width, width, 0};
+    desc_.resources.push_back({std::string(name), t.bytes(), false, {}});
+    return t;
+}
+
+Tensor Graph::external(const BufferSlice& memory, uint32_t rows, uint32_t cols, DType dtype, std::string_view name,
+                       uint32_t ld)
+{
+    Tensor t{uint32_t(desc_.resources.size()), dtype, rows, cols, ld ? ld : round_up(cols, kRowPadding), 0};
+    SR_ASSERT(memory.buffer && t.bytes() <= memory.bytes, "tensor '{}' of {} bytes in {} bytes of memory", name,
+              t.bytes(), memory.bytes);
+    desc_.resources.push_back({std::string(name), t.bytes(), true, memory});
+    return t;
+}
+
+void Graph::replace(uint32_t from, uint32_t to)
+{
+    SR_ASSERT(desc_.resources[to].bytes >= desc_.resources[from].bytes, "'{}' does not fit into '{}'",
+              desc_.resources[from].name, desc_.resources[to].name);
+    for (Node& node : desc_.nodes)
+        for (Tensor& t : node.tensors)
+            if (t.resource == from)
+                t.resource = to;
+}
+
+void Graph::add(const Kernel& kernel, std::initializer_list<Tensor> tensors, std::vector<uint8_t> push, Grid grid,
+                DispatchOptions options)
+{
+    const KernelVariant& any = kernel.variants.front();
+    SR_ASSERT(tensors.size() == any.bindings.size(), "{}: {} tensors for {} bindings", kernel.name, tensors.size(),
+              any.bindings.size());
+    SR_ASSERT(push.size() == any.push_bytes, "{}: push struct of {} bytes, the shader declares {}", kernel.name,
+              push.size(), any.push_bytes);
+    for (const Tensor& t : tensors)
+        SR_ASSERT(t.resource < desc_.resources.size(), "{}: a tensor of another graph, or none", kernel.name);
+    desc_.nodes.push_back({&kernel, tensors, std::move(push), grid, std::move(options)});
+}
+
+} // namespace semrover

@@ -1,0 +1,75 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+// What a shader declares, as reflected into <op>.spv.h by cmake/reflect: the shader is the only place where bindings,
+// access, constants and push members are written down.
+namespace semrover {
+
+enum class Access : uint8_t { read = 1, write = 2, read_write = 3 };
+enum class BindingKind : uint8_t { storage, texel }; // storage buffer; uniform texel buffer (RGBA32_UINT)
+
+struct BindingInfo {
+    std::string_view name; // the block's name, or the texel buffer's
+    uint32_t binding;
+    BindingKind kind;
+    Access access;
+};
+
+struct ConstantInfo {
+    std::string_view name; // kTileM, kHalfX, ...
+    uint32_t id;
+    uint32_t value; // default, as 32 bits
+};
+
+struct PushMember {
+    std::string_view name;
+    uint32_t offset; // bytes
+};
+
+enum KernelNeeds : uint32_t {
+    kNeedsSubgroupArithmetic = 1, // subgroup reductions and scans
+    kNeedsSubgroupBallot = 2,
+    kNeedsSubgroupShuffle = 4,
+    kNeedsFloat16 = 8, // fp16 arithmetic (storage is always packed into 32-bit words and needs nothing)
+    kNeedsCooperativeMatrix = 16,
+};
+
+struct KernelVariant {
+    std::string_view name; // "", "cpu", "simt", ...
+    std::span<const uint32_t> code;
+    std::span<const BindingInfo> bindings; // in binding order
+    std::span<const ConstantInfo> constants;
+    std::span<const PushMember> push;
+    uint32_t push_bytes;
+    uint32_t local_size[3];
+    uint32_t shared_bytes; // at the constants' default values
+    uint32_t needs;        // KernelNeeds
+
+    const ConstantInfo* constant(std::string_view constant_name) const
+    {
+        for (const auto& c : constants)
+            if (c.name == constant_name)
+                return &c;
+        return nullptr;
+    }
+    const PushMember* push_member(std::string_view member_name) const
+    {
+        for (const auto& m : push)
+            if (m.name == member_name)
+                return &m;
+        return nullptr;
+    }
+};
+
+// one op: all its variants take the same bindings (by name and order) and the same push struct
+struct Kernel {
+    std::string_view name;
+    std::span<const KernelVariant> variants;
+};
+
+} // namespace semrover

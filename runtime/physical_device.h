@@ -1,0 +1,15 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "runtime/device.h"
+
+namespace semrover {
+
+Result<VkInstance> create_instance(bool validation);
+Result<std::vector<VkPhysicalDevice>> physical_devices(VkInstance instance); // best first
+DeviceSummary summarize(VkPhysicalDevice physical, uint32_t index);
+bool has_extension(VkPhysicalDevice physical, const char* name);
+Result<uint32_t> compute_queue_family(VkPhysicalDevice physical);
+
+} // namespace semrover

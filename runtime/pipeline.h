@@ -1,0 +1,44 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "runtime/kernel.h"
+#include "runtime/vulkan.h"
+
+#include <map>
+#include <memory>
+#include <string>
+
+namespace semrover {
+
+class Device;
+
+struct Pipeline {
+    VkPipeline pipeline = VK_NULL_HANDLE;
+    VkPipelineLayout layout = VK_NULL_HANDLE;
+    VkDescriptorSetLayout set_layout = VK_NULL_HANDLE;
+};
+
+// Compute pipelines by (variant, constants), made on first use, over a VkPipelineCache kept on disk in
+// $XDG_CACHE_HOME/semrover (safe to delete; a file of another driver is ignored).
+class PipelineStore {
+  public:
+    static Result<std::unique_ptr<PipelineStore>> create(Device& device);
+    ~PipelineStore();
+
+    Result<const Pipeline*> get(const KernelVariant& variant, const std::map<uint32_t, uint32_t>& constants);
+
+  private:
+    explicit PipelineStore(Device& device) : device_(device) {}
+    Status make(const KernelVariant& variant, const std::map<uint32_t, uint32_t>& constants, Pipeline& out);
+    Status make_layout(const KernelVariant& variant, Pipeline& out);
+    void save();
+
+    Device& device_;
+    VkPipelineCache cache_ = VK_NULL_HANDLE;
+    std::string cache_path_; // empty: nowhere to keep it
+    bool changed_ = false;
+    std::map<std::pair<const KernelVariant*, std::map<uint32_t, uint32_t>>, Pipeline> pipelines_;
+};
+
+} // namespace semrover

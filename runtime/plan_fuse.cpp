@@ -1,0 +1,129 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// stage 2: a dispatch that says `absorbed_as = kName` moves into the epilogue of the pass that makes its input X, when
+// that kernel declares the constant kName. Bindings and push members move by name, so no op is known here.
+#include "runtime/plan.h"
+
+#include <cctype>
+#include <cstring>
+
+namespace semrover::stage {
+
+namespace {
+
+const BindingInfo* find_binding(const Kernel& kernel, std::string_view name, size_t& index)
+{
+    const auto& bindings = kernel.variants.front().bindings;
+    for (index = 0; index < bindings.size(); ++index)
+        if (bindings[index].name == name)
+            return &bindings[index];
+    return nullptr;
+}
+
+bool same(const Tensor& a, const Tensor& b)
+{
+    return a.resource == b.resource && a.offset == b.offset && a.rows == b.rows && a.cols == b.cols && a.ld == b.ld;
+}
+
+bool touches(const Pass& pass, uint32_t resource)
+{
+    for (const Tensor& t : pass.tensors)
+        if (t.resource == resource)
+            return true;
+    return false;
+}
+
+// the only pass that writes consumer's X, if consumer is also its only reader
+Pass* sole_producer(Plan& plan, size_t consumer)
+{
+    const Tensor& x = plan.passes[consumer].tensors.front();
+    if (plan.resources[x.resource].external)
+        return nullptr;
+    Pass* producer = nullptr;
+    for (size_t i = 0; i < plan.passes.size(); ++i) {
+        if (i == consumer || !touches(plan.passes[i], x.resource))
+            continue;
+        if (producer || i > consumer)
+            return nullptr;
+        producer = &plan.passes[i];
+    }
+    return producer;
+}
+
+// what the consumer reads besides X must exist before the producer runs, and what it writes must not be used between
+bool can_move_up(const Plan& plan, const Pass* producer, size_t consumer)
+{
+    const Pass& c = plan.passes[consumer];
+    const auto& declared = c.kernel->variants.front().bindings;
+    for (const Pass* p = producer + 1; p != &plan.passes[consumer]; ++p)
+        for (size_t b = 0; b < p->tensors.size(); ++b) {
+            const bool p_writes = uint8_t(p->kernel->variants.front().bindings[b].access) & uint8_t(Access::write);
+            for (size_t k = 1; k < c.tensors.size(); ++k) {
+                const bool c_writes = uint8_t(declared[k].access) & uint8_t(Access::write);
+                if ((p_writes || c_writes) && p->tensors[b].resource == c.tensors[k].resource)
+                    return false;
+            }
+        }
+    return true;
+}
+
+// push members named after a binding that moves ("gate_ld" of Gate, "y_ld" of Y) move with it
+void move_push(const Pass& from, Pass& to)
+{
+    const KernelVariant &source = from.kernel->variants.front(), &target = to.kernel->variants.front();
+    for (size_t b = 1; b < source.bindings.size(); ++b) {
+        std::string prefix(source.bindings[b].name);
+        prefix[0] = char(std::tolower(prefix[0]));
+        prefix += '_';
+        for (const PushMember& m : source.push)
+            if (const PushMember* same_name = target.push_member(m.name); same_name && m.name.starts_with(prefix))
+                std::memcpy(&to.push[same_name->offset], &from.push[m.offset], 4);
+    }
+}
+
+bool absorb(Plan& plan, size_t consumer)
+{
+    Pass& c = plan.passes[consumer];
+    const auto& declared = c.kernel->variants.front().bindings;
+    Pass* producer = sole_producer(plan, consumer);
+    if (!producer || !producer->kernel->variants.front().constant(c.options.absorbed_as))
+        return false;
+    size_t y;
+    if (!find_binding(*producer->kernel, "Y", y) || !same(producer->tensors[y], c.tensors.front()))
+        return false;
+    std::vector<size_t> slots(c.tensors.size());
+    for (size_t b = 1; b < c.tensors.size(); ++b)
+        if (!find_binding(*producer->kernel, declared[b].name, slots[b]))
+            return false;
+    for (const ConstantValue& constant : producer->options.constants)
+        if (constant.name == c.options.absorbed_as)
+            return false; // has that epilogue already
+    if (!can_move_up(plan, producer, consumer))
+        return false;
+    for (size_t b = 1; b < c.tensors.size(); ++b)
+        producer->tensors[slots[b]] = c.tensors[b];
+    move_push(c, *producer);
+    producer->options.constants.push_back({c.options.absorbed_as, 1});
+    for (std::string_view name : c.options.banded)
+        if (name != "X" && name != "Y")
+            producer->options.banded.push_back(name);
+    return true;
+}
+
+} // namespace
+
+Status fuse(Plan& plan)
+{
+    for (size_t i = 0; i < plan.passes.size();) {
+        const Pass& pass = plan.passes[i];
+        if (!pass.options.absorbed_as.empty() && absorb(plan, i)) {
+            plan.passes.erase(plan.passes.begin() + int64_t(i));
+            ++plan.fused;
+        } else {
+            ++i;
+        }
+    }
+    return {};
+}
+
+} // namespace semrover::stage

@@ -1,0 +1,150 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// stage 6: cuts passes into bands of rows where a binding exceeds what the device can bind or the work exceeds one
+// submit; then counts workgroups
+#include "runtime/plan.h"
+
+#include <algorithm>
+#include <cstring>
+#include <numeric>
+
+namespace semrover::stage {
+
+namespace {
+
+// a rate that no supported GPU falls short of by much; only used to keep one submit under the watchdog
+constexpr double kAssumedFlopsPerSecond = 5e11;
+
+uint64_t range_limit(const PassBinding& b, const DeviceLimits& limits)
+{
+    return b.kind == BindingKind::texel ? limits.max_texel_elements * 16 : limits.max_storage_range;
+}
+
+bool banded(const Pass& pass, std::string_view binding)
+{
+    return std::find(pass.options.banded.begin(), pass.options.banded.end(), binding) != pass.options.banded.end();
+}
+
+uint32_t rows_of(const Pass& pass)
+{
+    for (size_t b = 0; b < pass.bindings.size(); ++b)
+        if (banded(pass, pass.bindings[b].name))
+            return pass.tensors[b].rows;
+    return 0;
+}
+
+// rows per band that satisfy every limit; rows_of(pass) when nothing has to be cut
+Result<uint32_t> band_rows(const Plan& plan, const Pass& pass, const DeviceLimits& limits)
+{
+    const uint32_t rows = rows_of(pass);
+    uint64_t band = rows;
+    uint64_t step = 1; // band starts must be aligned in every banded binding
+    for (size_t b = 0; b < pass.bindings.size(); ++b) {
+        const PassBinding& binding = pass.bindings[b];
+        const uint64_t limit = range_limit(binding, limits);
+        if (!banded(pass, binding.name)) {
+            if (binding.bytes > limit)
+                return fail(ErrorCode::out_of_memory, "{}: binding {} ('{}') has {} bytes; this device binds at most {}",
+                            pass.kernel->name, binding.name, plan.resources[binding.resource].name, binding.bytes, limit);
+            continue;
+        }
+        const uint64_t row_bytes = pass.tensors[b].row_bytes();
+        band = std::min(band, limit / row_bytes);
+        step = std::lcm(step, limits.offset_alignment / std::gcd<uint64_t>(limits.offset_alignment, row_bytes));
+    }
+    if (limits.submit_seconds > 0 && pass.options.flops > limits.submit_seconds * kAssumedFlopsPerSecond && rows)
+        band = std::min<uint64_t>(band, uint64_t(rows * limits.submit_seconds * kAssumedFlopsPerSecond / pass.options.flops) + 1);
+    if (band >= rows)
+        return rows;
+    if (const uint32_t tile = pass.variant->constant("kTileM") ? pass.variant->constant("kTileM")->value : 1; band > tile)
+        step = std::lcm(step, uint64_t(tile));
+    band = std::max(band / step * step, step);
+    return uint32_t(band);
+}
+
+void set_push(Pass& pass, std::string_view name, uint32_t value)
+{
+    if (const PushMember* m = pass.variant->push_member(name))
+        std::memcpy(&pass.push[m->offset], &value, 4);
+}
+
+Pass band_of(const Pass& whole, uint32_t first, uint32_t count, uint32_t total)
+{
+    Pass pass = whole;
+    for (size_t b = 0; b < pass.bindings.size(); ++b) {
+        if (!banded(pass, pass.bindings[b].name))
+            continue;
+        pass.tensors[b] = pass.tensors[b].row_range(first, count);
+        pass.bindings[b].offset = pass.tensors[b].offset;
+        pass.bindings[b].bytes = pass.tensors[b].bytes();
+    }
+    set_push(pass, "rows", count);
+    set_push(pass, "first_row", first);
+    pass.grid.x = pass.grid.unit == Grid::Unit::tiles ? count : uint32_t(uint64_t(whole.grid.x) * count / total);
+    pass.options.flops = whole.options.flops * count / total;
+    return pass;
+}
+
+Status count_groups(Pass& pass, const DeviceLimits& limits)
+{
+    uint32_t* n = pass.group_count;
+    n[0] = pass.grid.x;
+    n[1] = pass.grid.y;
+    n[2] = pass.grid.z;
+    if (pass.grid.unit == Grid::Unit::tiles) {
+        const ConstantInfo *m = pass.variant->constant("kTileM"), *k = pass.variant->constant("kTileN");
+        SR_ASSERT(m && k, "{}: a grid of tiles needs kTileM and kTileN", pass.kernel->name);
+        n[0] = divide_up(pass.grid.x, m->value);
+        n[1] = divide_up(pass.grid.y, k->value);
+    } else if (pass.grid.unit == Grid::Unit::threads) {
+        n[0] = divide_up(pass.grid.x, pass.variant->local_size[0]);
+        n[1] = divide_up(n[0], limits.max_groups); // folded; the shader's linear_thread() undoes it
+        n[0] = divide_up(n[0], n[1]);
+    }
+    for (int i = 0; i < 3; ++i)
+        if (n[i] == 0 || n[i] > limits.max_groups)
+            return fail(ErrorCode::out_of_memory, "{}: {} workgroups in dimension {}, the device takes 1..{}",
+                        pass.kernel->name, n[i], i, limits.max_groups);
+    return {};
+}
+
+// consecutive passes share a submit until its estimated time is used up
+void assign_submits(Plan& plan, const DeviceLimits& limits)
+{
+    double seconds = 0;
+    uint32_t submit = 0;
+    for (Pass& pass : plan.passes) {
+        const double cost = pass.options.flops / kAssumedFlopsPerSecond;
+        if (limits.submit_seconds > 0 && seconds > 0 && seconds + cost > limits.submit_seconds) {
+            ++submit;
+            seconds = 0;
+        }
+        seconds += cost;
+        pass.submit = submit;
+    }
+    plan.submits = plan.passes.empty() ? 0 : submit + 1;
+}
+
+} // namespace
+
+Status slice(Plan& plan, const DeviceLimits& limits)
+{
+    std::vector<Pass> passes;
+    for (const Pass& pass : plan.passes) {
+        SR_TRY(const uint32_t band, band_rows(plan, pass, limits));
+        const uint32_t rows = rows_of(pass);
+        if (band == rows) {
+            passes.push_back(pass);
+            continue;
+        }
+        for (uint32_t first = 0; first < rows; first += band)
+            passes.push_back(band_of(pass, first, std::min(band, rows - first), rows));
+    }
+    for (Pass& pass : passes)
+        SR_CHECK(count_groups(pass, limits));
+    plan.passes = std::move(passes);
+    assign_submits(plan, limits);
+    return {};
+}
+
+} // namespace semrover::stage

@@ -1,0 +1,79 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// stage 3: which shader runs each pass on this device, with which constants
+#include "runtime/plan.h"
+
+namespace semrover {
+
+namespace {
+
+bool runs_on(const KernelVariant& v, const DeviceLimits& limits)
+{
+    const uint32_t group_threads = v.local_size[0] * v.local_size[1] * v.local_size[2];
+    return v.shared_bytes <= limits.max_shared_bytes && group_threads <= limits.max_group_threads &&
+           (v.needs & ~limits.needs_supported) == 0 && v.push_bytes <= limits.max_push_bytes;
+}
+
+// lower is better; kernels with one variant have an empty name
+int preference(std::string_view name, const DeviceLimits& limits)
+{
+    if (!limits.force_variant.empty() && name == limits.force_variant)
+        return 0;
+    const bool cpu = limits.type == DeviceType::cpu;
+    if (name == "cpu")
+        return cpu ? 1 : 4;
+    if (name == "coopmat")
+        return cpu ? 5 : 1;
+    return name.empty() ? 2 : 3; // "", "simt"
+}
+
+void set_constant(Pass& pass, std::string_view name, uint32_t value)
+{
+    const ConstantInfo* c = pass.variant->constant(name);
+    if (c && c->value != value)
+        pass.constants[c->id] = value;
+}
+
+Status bind(Pass& pass)
+{
+    const auto& declared = pass.variant->bindings;
+    const auto& first = pass.kernel->variants.front().bindings;
+    SR_ASSERT(declared.size() == first.size(), "{}.{}: binding count differs", pass.kernel->name, pass.variant->name);
+    for (size_t b = 0; b < declared.size(); ++b) {
+        const Tensor& t = pass.tensors[b];
+        SR_ASSERT(declared[b].name == first[b].name, "{}.{}: binding {} is called {}", pass.kernel->name,
+                  pass.variant->name, first[b].name, declared[b].name);
+        pass.bindings.push_back({t.resource, t.offset, t.bytes(), declared[b].access, declared[b].kind, declared[b].name});
+        const std::string half = "kHalf" + std::string(declared[b].name);
+        set_constant(pass, half, t.dtype == DType::f16);
+    }
+    return {};
+}
+
+} // namespace
+
+const KernelVariant* choose_variant(const Kernel& kernel, const DeviceLimits& limits)
+{
+    const KernelVariant* best = nullptr;
+    for (const KernelVariant& v : kernel.variants)
+        if (runs_on(v, limits) && (!best || preference(v.name, limits) < preference(best->name, limits)))
+            best = &v;
+    return best;
+}
+
+Status stage::pick_variants(Plan& plan, const DeviceLimits& limits)
+{
+    for (Pass& pass : plan.passes) {
+        pass.variant = choose_variant(*pass.kernel, limits);
+        if (!pass.variant)
+            return fail(ErrorCode::no_device,
+                        "no variant of kernel '{}' runs on this device ({} bytes of shared memory, {} threads a group)",
+                        pass.kernel->name, limits.max_shared_bytes, limits.max_group_threads);
+        for (const ConstantValue& c : pass.options.constants)
+            set_constant(pass, c.name, c.value);
+        SR_CHECK(bind(pass));
+    }
+    return {};
+}
+
+} // namespace semrover

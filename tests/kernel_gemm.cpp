@@ -1,0 +1,82 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/kernel_case.h"
+
+#include <cmath>
+
+namespace semrover {
+namespace {
+
+struct GemmCase {
+    uint32_t rows, cols, depth, groups;
+    bool bias, gelu, gate;
+};
+
+// one element; a row of one; aligned; odd tails everywhere; two groups; more than one tile of every variant
+const GemmCase kCases[] = {
+    {1, 1, 1, 1, false, false, false},    {1, 64, 8, 1, true, false, false},   {24, 64, 64, 1, true, false, false},
+    {25, 65, 9, 1, true, true, false},    {77, 41, 60, 1, true, false, true},  {50, 72, 48, 2, true, false, true},
+    {37, 120, 120, 2, true, true, false}, {131, 200, 264, 1, true, true, true},
+};
+
+double gelu_reference(double v) { return 0.5 * v * (1 + std::tanh(std::sqrt(2 / M_PI) * (v + 0.044715 * v * v * v))); }
+
+void check(Device& device, const GemmCase& c, DType dtype)
+{
+    SCOPED_TRACE(fmt::format("{}x{}x{} groups {} {}", c.rows, c.cols, c.depth, c.groups, dtype_name(dtype)));
+    KernelCase k(device);
+    const uint32_t rows = c.rows * c.groups;
+    const HostMatrix x = k.random(rows, c.depth, dtype), w = k.random(c.cols * c.groups, c.depth, dtype);
+    const HostMatrix bias = k.random(c.groups, c.cols, DType::f32), residual = k.random(rows, c.cols, dtype);
+    const uint32_t step = c.cols + 3, times = 3;
+    const HostMatrix table = k.random(times, 5 + step * c.groups + 8, DType::f32);
+    const std::vector<uint32_t> table_row = k.indices(rows, times);
+
+    Tensor y = gemm(k.graph, k.input(x), k.input(w), c.bias ? k.input(bias) : Tensor{}, {.groups = c.groups, .dtype = dtype});
+    if (c.gelu)
+        y = gelu(k.graph, y);
+    if (c.gate)
+        y = gated_add(k.graph, y, {k.input(table), k.input(table_row), 5, step}, k.input(residual), c.groups);
+    const HostMatrix got = k.run(y);
+
+    for (uint32_t r = 0; r < rows; ++r)
+        for (uint32_t n = 0; n < c.cols; ++n) {
+            const uint32_t group = r / c.rows;
+            double sum = 0, magnitude = 0;
+            for (uint32_t d = 0; d < c.depth; ++d) {
+                const double term = double(x.at(r, d)) * w.at(group * c.cols + n, d);
+                sum += term;
+                magnitude += std::abs(term);
+            }
+            double v = sum + (c.bias ? bias.at(group, n) : 0);
+            if (c.gelu)
+                v = gelu_reference(v);
+            if (c.gate)
+                v = residual.at(r, n) + table.at(table_row[r], 5 + group * step + n) * v;
+            const double tolerance = 1e-6 * (magnitude + 4) + (dtype == DType::f16 ? 6e-4 * std::abs(v) : 0);
+            ASSERT_NEAR(got.at(r, n), v, tolerance) << "row " << r << " column " << n;
+        }
+    k.expect_zero_padding(got);
+}
+
+TEST(kernel_gemm, matches_a_sum_in_double_with_every_epilogue)
+{
+    for (const GemmCase& c : kCases)
+        for (DType dtype : {DType::f32, DType::f16})
+            check(test_device(), c, dtype);
+}
+
+TEST(kernel_gemm, epilogues_are_fused_into_one_pass)
+{
+    KernelCase k(test_device());
+    const HostMatrix x = k.random(16, 16, DType::f32), w = k.random(16, 16, DType::f32);
+    const HostMatrix table = k.random(1, 16, DType::f32);
+    const Tensor h = gelu(k.graph, gemm(k.graph, k.input(x), k.input(w), {}, {.dtype = DType::f32}));
+    const Tensor y = gated_add(k.graph, h, {k.input(table), k.input(std::vector<uint32_t>(16, 0))}, k.input(x));
+    (void)k.run(y);
+    EXPECT_EQ(k.plan().passes.size(), 1u);
+    EXPECT_EQ(k.plan().fused, 2u);
+}
+
+} // namespace
+} // namespace semrover
