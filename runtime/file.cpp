@@ -51,12 +51,12 @@ Result<OpenFile> open_regular(const Path& path)
     // note: O_NONBLOCK so that a pipe without a writer is refused instead of waited for
     Descriptor descriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
     if (descriptor.get() < 0)
-        return fail(ErrorCode::bad_input, "cannot read {}: {}", quoted_path(path), system_message(errno));
+        return fail(ErrorCode::bad_input, "cannot read {}: {}", quote_path(path), system_message(errno));
     struct stat status;
     if (::fstat(descriptor.get(), &status) != 0)
-        return fail(ErrorCode::bad_input, "cannot read {}: {}", quoted_path(path), system_message(errno));
+        return fail(ErrorCode::bad_input, "cannot read {}: {}", quote_path(path), system_message(errno));
     if (!S_ISREG(status.st_mode))
-        return fail(ErrorCode::bad_input, "cannot read {}: expected a file, found {}", quoted_path(path),
+        return fail(ErrorCode::bad_input, "cannot read {}: expected a file, found {}", quote_path(path),
                     S_ISDIR(status.st_mode) ? "a folder" : "a device or pipe");
     return OpenFile{std::move(descriptor), static_cast<uint64_t>(status.st_size)};
 }
@@ -66,7 +66,7 @@ Result<Buffer> read_whole(const Path& path, uint64_t max_bytes)
 {
     SR_TRY(const OpenFile file, open_regular(path));
     if (file.size > max_bytes)
-        return fail(ErrorCode::bad_input, "cannot read {}: expected at most {} bytes, found {}", quoted_path(path),
+        return fail(ErrorCode::bad_input, "cannot read {}: expected at most {} bytes, found {}", quote_path(path),
                     max_bytes, file.size);
     Buffer buffer;
     buffer.resize(file.size);
@@ -75,10 +75,10 @@ Result<Buffer> read_whole(const Path& path, uint64_t max_bytes)
         if (n < 0 && errno == EINTR)
             continue;
         if (n < 0)
-            return fail(ErrorCode::bad_input, "cannot read {}: {}", quoted_path(path), system_message(errno));
+            return fail(ErrorCode::bad_input, "cannot read {}: {}", quote_path(path), system_message(errno));
         if (n == 0)
             return fail(ErrorCode::bad_input, "cannot read {}: it was cut from {} to {} bytes while being read",
-                        quoted_path(path), file.size, done);
+                        quote_path(path), file.size, done);
         done += static_cast<uint64_t>(n);
     }
     return buffer;
@@ -95,13 +95,13 @@ Status flush_folder(const Path& folder)
 {
     const Descriptor descriptor(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
     if (descriptor.get() < 0 || (::fsync(descriptor.get()) != 0 && errno != EINVAL))
-        return fail(ErrorCode::bad_input, "cannot flush folder {}: {}", quoted_path(folder), system_message(errno));
+        return fail(ErrorCode::bad_input, "cannot flush folder {}: {}", quote_path(folder), system_message(errno));
     return {};
 }
 
 tl::unexpected<Error> cannot_write(const Path& path, int error)
 {
-    return fail(ErrorCode::bad_input, "cannot write {}: {}", quoted_path(path), system_message(error));
+    return fail(ErrorCode::bad_input, "cannot write {}: {}", quote_path(path), system_message(error));
 }
 
 } // namespace
@@ -156,10 +156,10 @@ void AtomicFile::discard() noexcept
 Result<AtomicFile> AtomicFile::create(const Path& path)
 {
     if (path.filename().empty())
-        return fail(ErrorCode::bad_input, "cannot write {}: it names no file", quoted_path(path));
+        return fail(ErrorCode::bad_input, "cannot write {}: it names no file", quote_path(path));
     struct stat status;
     if (::stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode))
-        return fail(ErrorCode::bad_input, "cannot write {}: it is {}, not a file", quoted_path(path),
+        return fail(ErrorCode::bad_input, "cannot write {}: it is {}, not a file", quote_path(path),
                     S_ISDIR(status.st_mode) ? "a folder" : "a device or pipe");
     static std::atomic<unsigned> counter{0};
     for (int attempt = 0; attempt < 100; ++attempt) { // a killed run with the same pid may have left its name
@@ -227,7 +227,7 @@ Result<MappedFile> MappedFile::open(const Path& path)
         return mapped;
     void* data = ::mmap(nullptr, file.size, PROT_READ, MAP_PRIVATE, file.descriptor.get(), 0);
     if (data == MAP_FAILED)
-        return fail(ErrorCode::bad_input, "cannot map {} ({} bytes): {}", quoted_path(path), file.size,
+        return fail(ErrorCode::bad_input, "cannot map {} ({} bytes): {}", quote_path(path), file.size,
                     system_message(errno));
     mapped.data_ = static_cast<const std::byte*>(data);
     mapped.size_ = file.size;

@@ -63,14 +63,14 @@ std::string printable(std::string_view text, size_t limit)
     return out;
 }
 
-std::string quoted(std::string_view text, size_t limit)
+std::string quote(std::string_view text, size_t limit)
 {
     return "'" + printable(text, limit) + "'";
 }
 
-std::string quoted_path(const std::filesystem::path& path)
+std::string quote_path(const std::filesystem::path& path)
 {
-    return quoted(path.native(), 4096);
+    return quote(path.native(), 4096);
 }
 
 } // namespace semrover

@@ -14,7 +14,7 @@ namespace semrover {
 std::string printable(std::string_view text, size_t limit = 200);
 
 // the same between single quotes
-std::string quoted(std::string_view text, size_t limit = 200);
-std::string quoted_path(const std::filesystem::path& path); // never shortened below PATH_MAX
+std::string quote(std::string_view text, size_t limit = 200);
+std::string quote_path(const std::filesystem::path& path); // never shortened below PATH_MAX
 
 } // namespace semrover
