@@ -65,7 +65,7 @@ std::string printable(std::string_view text, size_t limit)
 
 std::string quote(std::string_view text, size_t limit)
 {
-    return "'" + printable(text, limit) + "'";
+    return fmt::format("'{}'", printable(text, limit));
 }
 
 std::string quote_path(const std::filesystem::path& path)

@@ -135,7 +135,7 @@ TEST(MappedFile, replacing_the_file_does_not_disturb_its_map)
 
 TEST(Quote, controls_and_broken_utf8_are_escaped_and_long_text_is_cut)
 {
-    EXPECT_EQ(quoted("gr\xc3\xbc\xc3\x9f"), "'gr\xc3\xbc\xc3\x9f'");
+    EXPECT_EQ(quote("gr\xc3\xbc\xc3\x9f"), "'gr\xc3\xbc\xc3\x9f'");
     EXPECT_EQ(printable("a\x1b[31m\n\xff\xc2\x9b"), "a\\x1b[31m\\x0a\\xff\\xc2\\x9b");
     EXPECT_EQ(printable("\xed\xa0\x80"), "\\xed\\xa0\\x80");
     EXPECT_EQ(printable("abcdef", 4), "abcd...");
