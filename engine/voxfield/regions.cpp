@@ -1,0 +1,162 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/voxfield/regions.h"
+
+#include "engine/voxfield/cell_tree.h"
+
+#include <algorithm>
+#include <queue>
+
+namespace semrover {
+
+namespace {
+
+using State = CellTree::State;
+
+constexpr int kMaxRegionSize = 4096; // the paper's sets hold 50 to 150; attention over a set is quadratic
+
+// The next seed is the smallest (distance to a covered cell, index) over the free cells. Each leaf of the tree keeps in
+// a queue the smallest such key seen from its own covered cells. Between two coverings free cells only disappear, so a
+// leaf's true key only grows and the queued one stays a lower bound: it is computed again only when it reaches the
+// front and the cell it names is gone. A leaf that gains a covered cell is queued again with key 0.
+class Frontier {
+  public:
+    explicit Frontier(const CellTree& tree) : tree_(tree), keys_(tree.leaf_count(), CellTree::kNoKey) {}
+
+    void touch(uint32_t leaf)
+    {
+        if (keys_[leaf] != 0)
+            push(0, leaf);
+    }
+
+    // the free cell nearest to the covered ones; there must be a free and a covered cell
+    uint32_t seed()
+    {
+        while (true) {
+            const auto [key, leaf] = queue_.top();
+            const bool current = key == keys_[leaf];
+            if (current && key != 0 && tree_.state(tree_.index_of(key)) == State::free)
+                return tree_.index_of(key);
+            queue_.pop();
+            if (current)
+                push(tree_.nearest_free(leaf), leaf);
+        }
+    }
+
+  private:
+    void push(uint64_t key, uint32_t leaf)
+    {
+        keys_[leaf] = key;
+        queue_.push({key, leaf});
+    }
+
+    using Entry = std::pair<uint64_t, uint32_t>; // key, leaf
+    const CellTree& tree_;
+    std::vector<uint64_t> keys_; // of each leaf's latest entry; older ones are skipped
+    std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue_;
+};
+
+class Cover {
+  public:
+    Cover(CellTree& tree, const RegionOptions& options)
+        : tree_(tree), frontier_(tree), size_(uint32_t(options.region_size)), threshold_(options.coverage_threshold)
+    {
+        regions_.offsets.push_back(0);
+    }
+
+    Regions run(const RegionOptions& options)
+    {
+        accept(uint32_t(options.first_seed));
+        std::vector<uint32_t> set_aside;
+        while (tree_.free_count() > 0) {
+            const uint32_t seed = frontier_.seed();
+            if (try_accept(seed))
+                continue;
+            if (options.strategy == RegionStrategy::paper)
+                break;
+            tree_.set_state(seed, State::set_aside);
+            set_aside.push_back(seed);
+        }
+        if (options.strategy == RegionStrategy::complete)
+            take_rest(set_aside);
+        for (uint32_t cell = 0; cell < tree_.size(); ++cell)
+            if (tree_.state(cell) != State::covered)
+                regions_.uncovered.push_back(cell);
+        return std::move(regions_);
+    }
+
+  private:
+    bool try_accept(uint32_t seed)
+    {
+        tree_.nearest(seed, size_, keys_);
+        const auto fresh = std::count_if(keys_.begin(), keys_.end(), [&](uint64_t key) {
+            return tree_.state(tree_.index_of(key)) != State::covered;
+        });
+        if (fresh < threshold_)
+            return false;
+        add(seed);
+        return true;
+    }
+
+    void accept(uint32_t seed)
+    {
+        tree_.nearest(seed, size_, keys_);
+        add(seed);
+    }
+
+    // the region in keys_
+    void add(uint32_t seed)
+    {
+        std::sort(keys_.begin(), keys_.end());
+        for (uint64_t key : keys_) {
+            const uint32_t cell = tree_.index_of(key);
+            regions_.members.push_back(cell);
+            if (tree_.state(cell) == State::covered)
+                continue;
+            tree_.set_state(cell, State::covered);
+            frontier_.touch(tree_.leaf_of(cell));
+        }
+        regions_.offsets.push_back(uint32_t(regions_.members.size()));
+        regions_.seeds.push_back(seed);
+    }
+
+    // seeds that were set aside and are still uncovered come back, so every leaf has to look again
+    void take_rest(std::span<const uint32_t> set_aside)
+    {
+        for (uint32_t cell : set_aside)
+            if (tree_.state(cell) == State::set_aside)
+                tree_.set_state(cell, State::free);
+        for (uint32_t leaf = 0; leaf < tree_.leaf_count(); ++leaf)
+            frontier_.touch(leaf);
+        while (tree_.free_count() > 0)
+            accept(frontier_.seed());
+    }
+
+    CellTree& tree_;
+    Frontier frontier_;
+    uint32_t size_;
+    int threshold_;
+    Regions regions_;
+    std::vector<uint64_t> keys_; // of the region being looked at
+};
+
+} // namespace
+
+Result<Regions> extract_regions(std::span<const std::array<int32_t, 3>> cells, const RegionOptions& options)
+{
+    if (options.region_size < 1 || options.region_size > kMaxRegionSize)
+        return fail(ErrorCode::bad_input, "region_size is {}, expected 1 to {}", options.region_size, kMaxRegionSize);
+    if (options.coverage_threshold < 1 || options.coverage_threshold > options.region_size)
+        return fail(ErrorCode::bad_input, "coverage_threshold is {}, expected 1 to region_size, {}",
+                    options.coverage_threshold, options.region_size);
+    if (cells.size() > UINT32_MAX / uint32_t(options.region_size))
+        return fail(ErrorCode::bad_input, "{} cells in regions of {} need more than 32-bit offsets: split the scene",
+                    cells.size(), options.region_size);
+    SR_TRY(CellTree tree, CellTree::build(cells));
+    if (options.first_seed < 0 || options.first_seed >= int64_t(cells.size()))
+        return fail(ErrorCode::bad_input, "first_seed is {}, but the cloud has {} cells", options.first_seed,
+                    cells.size());
+    return Cover(tree, options).run(options);
+}
+
+} // namespace semrover

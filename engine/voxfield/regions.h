@@ -1,0 +1,49 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "runtime/result.h"
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace semrover {
+
+// what happens to a seed whose region holds too few uncovered cells
+enum class RegionStrategy {
+    paper,    // stop there, as Algorithm 1 is printed; most of a scene may stay uncovered
+    complete, // set it aside; when no other seed is left, take the remaining cells nearest first, with their whole
+              // region
+};
+
+struct RegionOptions {
+    int region_size = 128;       // K, 1..4096: cells in a region, fewer only if the cloud has fewer
+    int coverage_threshold = 32; // T, 1..K: a region with fewer uncovered cells is not accepted
+    RegionStrategy strategy = RegionStrategy::complete;
+    int64_t first_seed = 0; // index of the cell the first region grows around
+};
+
+// regions in the order they were found; region r is members[offsets[r]] .. members[offsets[r + 1] - 1]
+struct Regions {
+    std::vector<uint32_t> offsets;   // [regions + 1]
+    std::vector<uint32_t> members;   // cell indices, per region nearest to its seed first, then lower index
+    std::vector<uint32_t> seeds;     // [regions] cell indices
+    std::vector<uint32_t> uncovered; // cells in no region, ascending; empty with strategy complete
+
+    size_t size() const { return seeds.size(); }
+    std::span<const uint32_t> region(size_t r) const
+    {
+        return {members.data() + offsets[r], members.data() + offsets[r + 1]};
+    }
+};
+
+// Algorithm 1 of SEM-ROVER's supplement: covers a cloud of cells with overlapping regions of nearest neighbours.
+// cells [n]: distinct integer indices (i, j, k). Each new seed is the uncovered cell nearest to the regions so far;
+// distances are exact squared integers, and ties go to the lower index. Near-linear: 1 M cells of a street take about
+// 1 s on one core of a 2-core Xeon, the slowest cloud tried (a solid lattice with T = K) 13 s.
+// Bad input: no cells, equal cells, options out of range, more than 2^32 / K cells, a cloud too wide for 64-bit keys.
+Result<Regions> extract_regions(std::span<const std::array<int32_t, 3>> cells, const RegionOptions& options);
+
+} // namespace semrover

@@ -1,0 +1,49 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <gtest/gtest.h>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+namespace semrover {
+
+// a golden case as stored: its params and its tensors by name. For trusted files only; the product reads safetensors
+// with runtime/safetensors.h, which this leaves out so that a fault there cannot hide one here.
+struct GoldenTensors {
+    nlohmann::json params;
+    nlohmann::json header;
+    std::string data;
+
+    explicit GoldenTensors(const std::string& name)
+    {
+        const std::string folder = std::string(SEMROVER_SOURCE_DIR) + "/tests/golden/" + name;
+        params = nlohmann::json::parse(std::ifstream(folder + "/case.json")).at("params");
+        std::ifstream file(folder + "/tensors.safetensors", std::ios::binary);
+        const std::string all{std::istreambuf_iterator<char>(file), {}};
+        uint64_t length = 0;
+        std::memcpy(&length, all.data(), sizeof(length));
+        header = nlohmann::json::parse(all.substr(8, length));
+        data = all.substr(8 + length);
+    }
+
+    template <typename T>
+    std::vector<T> get(const std::string& tensor) const
+    {
+        const auto& entry = header.at(tensor);
+        const std::string dtype = entry.at("dtype");
+        const char* expected = sizeof(T) == 1 ? "U8" : std::is_floating_point_v<T> ? "F32" : "I32";
+        EXPECT_EQ(dtype, expected) << tensor;
+        const size_t begin = entry.at("data_offsets").at(0), end = entry.at("data_offsets").at(1);
+        std::vector<T> values((end - begin) / sizeof(T));
+        std::memcpy(values.data(), data.data() + begin, end - begin);
+        return values;
+    }
+};
+
+} // namespace semrover
