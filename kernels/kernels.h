@@ -41,4 +41,68 @@ struct Modulation {
                                Tensor residual, // [groups * M, N]
                                uint32_t groups = 1);
 
+// y = x / (1 + exp(-x)); runs in the epilogue of the gemm that makes x
+[[nodiscard]] Tensor silu(Graph& g, Tensor x); // [M, N] -> [M, N]
+
+// y = residual + x; runs in the epilogue of the gemm that makes x
+Tensor add(Graph& g,
+           Tensor x,        // [M, N]
+           Tensor residual, // [M, N]
+           Tensor into = {});
+
+// y = LayerNorm(x) * (1 + scale) + shift, no affine part
+[[nodiscard]] Tensor modulate(Graph& g,
+                              Tensor x,            // [groups * M, N]
+                              Modulation shift,    // N columns, and as many from scale_col on
+                              uint32_t scale_col,
+                              float eps,
+                              uint32_t groups = 1);
+
+// -- embeddings ------------------------------------------------------------------------------------------------------
+
+// y = table[index] (+ x)
+Tensor embedding(Graph& g,
+                 Tensor index, // [M] u32; clamped to the table
+                 Tensor table, // [classes, N]
+                 Tensor x,     // [M, N], or none
+                 DType dtype,  // of y
+                 Tensor into = {});
+
+// y = per axis [sin(x w_0), .., cos(x w_0), ..], or cosines first
+[[nodiscard]] Tensor sinusoid(Graph& g,
+                              Tensor x,           // [M, A] fp32 array
+                              Tensor frequencies, // [F] fp32
+                              bool cos_first,
+                              DType dtype); // y: [M, A * 2F]
+
+// y[r] = x[r mod rows of x]
+[[nodiscard]] Tensor repeat_rows(Graph& g, Tensor x, uint32_t rows, DType dtype); // [R, N] -> [rows, N]
+
+// -- masked joint attention ------------------------------------------------------------------------------------------
+
+// Tokens of several sets, packed one after the other without padding; the semantic stream repeats the voxel stream's
+// order. A query sees the tokens of both streams in the cells of its own set that lie within the radius.
+constexpr uint32_t kAttentionTile = 32; // queries of a tile, at most; a tile stays within one set
+
+// bit j of row i: cell j of the set of i has di^2 + dj^2 + dk^2 <= radius2
+Tensor neighbor_mask(Graph& g,
+                     Tensor cells, // [M, 4] i32 array: i, j, k, unused
+                     Tensor sets,  // [M, 2] u32 array: first row and number of rows of the row's set
+                     uint32_t longest_set, int32_t radius2,
+                     Tensor into = {}); // y: [M, words] u32 array, words = ceil(longest_set / 32)
+
+// per head of q and k: y = x / sqrt(mean(x^2) + eps) * weight
+[[nodiscard]] Tensor head_rms_norm(Graph& g,
+                                   Tensor qkv,     // [groups * M, 3 * heads * head_dim]
+                                   Tensor weights, // [2 * groups, head_dim] fp32: q and k of each group
+                                   uint32_t heads, float eps, uint32_t groups);
+
+// y = softmax(q k^T / sqrt(head_dim) + mask) v
+[[nodiscard]] Tensor attention(Graph& g,
+                               Tensor qkv,   // [2M, 3 * heads * head_dim]: voxel stream, semantic stream; q, k, v
+                               Tensor tiles, // [T, 4] u32 array: first row, rows, first row and rows of the set
+                               Tensor mask,  // [M, words] u32 array
+                               uint32_t heads,
+                               uint32_t streams); // whose queries are answered: 1 voxel only, 2 both
+
 } // namespace semrover

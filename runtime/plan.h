@@ -31,6 +31,8 @@ struct Pass {
     Grid grid;
     uint32_t group_count[3] = {1, 1, 1};
     DispatchOptions options;
+    std::vector<uint32_t> absorbed; // ids of the constants of fused epilogues, and the bindings they took
+    std::vector<size_t> slots;
     uint32_t level = 0;  // passes of one level run without a barrier between them
     uint32_t submit = 0; // index of the command buffer it is recorded in
 };

@@ -4,6 +4,7 @@
 // that kernel declares the constant kName. Bindings and push members move by name, so no op is known here.
 #include "runtime/plan.h"
 
+#include <algorithm>
 #include <cctype>
 #include <cstring>
 
@@ -95,13 +96,19 @@ bool absorb(Plan& plan, size_t consumer)
     for (size_t b = 1; b < c.tensors.size(); ++b)
         if (!find_binding(*producer->kernel, declared[b].name, slots[b]))
             return false;
-    for (const ConstantValue& constant : producer->options.constants)
-        if (constant.name == c.options.absorbed_as)
-            return false; // has that epilogue already
+    const uint32_t id = producer->kernel->variants.front().constant(c.options.absorbed_as)->id;
+    if (!producer->absorbed.empty() && producer->absorbed.back() >= id)
+        return false; // the shader applies its epilogues in the order of their ids
+    for (size_t b = 1; b < c.tensors.size(); ++b)
+        if (slots[b] != y && std::count(producer->slots.begin(), producer->slots.end(), slots[b]))
+            return false; // another epilogue uses that binding
     if (!can_move_up(plan, producer, consumer))
         return false;
-    for (size_t b = 1; b < c.tensors.size(); ++b)
+    for (size_t b = 1; b < c.tensors.size(); ++b) {
         producer->tensors[slots[b]] = c.tensors[b];
+        producer->slots.push_back(slots[b]);
+    }
+    producer->absorbed.push_back(id);
     move_push(c, *producer);
     producer->options.constants.push_back({c.options.absorbed_as, 1});
     for (std::string_view name : c.options.banded)

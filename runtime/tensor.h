@@ -30,7 +30,12 @@ struct Tensor {
 
     bool valid() const { return resource != kNone; }
     uint64_t row_bytes() const { return uint64_t(ld) * dtype_bytes(dtype); }
-    uint64_t bytes() const { return rows * row_bytes(); }
+    // from the first element to the end of the last row, its padding included
+    uint64_t bytes() const
+    {
+        const uint32_t padded = round_up(cols, kRowPadding), last = padded < ld ? padded : ld;
+        return rows ? (rows - 1) * row_bytes() + uint64_t(last) * dtype_bytes(dtype) : 0;
+    }
 
     // rows [first, first + count) of this tensor
     Tensor row_range(uint32_t first, uint32_t count) const
@@ -38,6 +43,14 @@ struct Tensor {
         Tensor t = *this;
         t.rows = count;
         t.offset += first * row_bytes();
+        return t;
+    }
+    // columns [first, first + count); where they start must be aligned for the device
+    Tensor col_range(uint32_t first, uint32_t count) const
+    {
+        Tensor t = *this;
+        t.cols = count;
+        t.offset += uint64_t(first) * dtype_bytes(dtype);
         return t;
     }
 };

@@ -1,0 +1,30 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+
+// sin and cos to about 1 ulp for |x| <= 1e4: Vulkan only asks for an absolute error of 2^-11 within [-pi, pi].
+// Cody-Waite reduction by pi/2 in three parts, then minimax polynomials on [-pi/4, pi/4] (Cephes sinf, cosf).
+float sin_quarter(float r)
+{
+    const float z = r * r;
+    return r + r * z * (-1.6666654611e-1 + z * (8.3321608736e-3 + z * -1.9515295891e-4));
+}
+
+float cos_quarter(float r)
+{
+    const float z = r * r;
+    return 1.0 - 0.5 * z + z * z * (4.166664568298827e-2 + z * (-1.388731625493765e-3 + z * 2.443315711809948e-5));
+}
+
+float sin_quadrant(float x, int shift)
+{
+    const float n = floor(x * 0.63661977236758134 + 0.5);
+    precise float r = x - n * 1.5703125;
+    r = r - n * 4.837512969970703125e-4;
+    r = r - n * 7.549789948768648e-8;
+    const int quadrant = (int(n) + shift) & 3;
+    const float value = (quadrant & 1) == 0 ? sin_quarter(r) : cos_quarter(r);
+    return quadrant < 2 ? value : -value;
+}
+
+float accurate_sin(float x) { return sin_quadrant(x, 0); }
+float accurate_cos(float x) { return sin_quadrant(x, 1); }
