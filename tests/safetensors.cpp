@@ -25,20 +25,20 @@ TEST(Safetensors, files_that_the_reference_reader_accepts_open)
     const std::string a = entry("a", "U8", "4", "0,4");
     for (const std::string& file :
          {safetensors_bytes("{}"), safetensors_bytes("{\"__metadata__\":{}}"), safetensors_bytes("  \n\t{ }\r\n  "),
-          safetensors_bytes("{" + a + "}", "xxxx"), safetensors_bytes("{" + a + "}    ", "xxxx"),
-          safetensors_bytes("{" + entry("s", "F32", "", "0,4") + "}", "xxxx"), // scalar
-          safetensors_bytes("{" + entry("z", "F32", "0,5", "0,0") + "}"),      // no elements
-          safetensors_bytes("{" + entry("", "U8", "4", "0,4") + "}", "xxxx"),  // empty name
-          safetensors_bytes("{" + entry("gr\xc3\xbc\xc3\x9f", "U8", "4", "0,4") + "}", "xxxx"),
-          safetensors_bytes("{" + entry("a..b/..c", "U8", "4", "0,4") + "}", "xxxx"),
-          safetensors_bytes("{" + entry("a", "U8", "1,1,1,1,1,1,1,4", "0,4") + "}", "xxxx"), // rank 8
-          safetensors_bytes("{" + entry("a", "F4", "8", "0,4") + "}", "xxxx"),
-          safetensors_bytes("{" + entry("a", "F6_E3M2", "4", "0,3") + "}", "xxx"),
-          safetensors_bytes("{" + entry("a", "C64", "1", "0,8") + "}", "xxxxxxxx"),
+          safetensors_bytes(header_of(a), "xxxx"), safetensors_bytes(header_of(a) + "    ", "xxxx"),
+          safetensors_bytes(header_of(entry("s", "F32", "", "0,4")), "xxxx"), // scalar
+          safetensors_bytes(header_of(entry("z", "F32", "0,5", "0,0"))),      // no elements
+          safetensors_bytes(header_of(entry("", "U8", "4", "0,4")), "xxxx"),  // empty name
+          safetensors_bytes(header_of(entry("gr\xc3\xbc\xc3\x9f", "U8", "4", "0,4")), "xxxx"),
+          safetensors_bytes(header_of(entry("a..b/..c", "U8", "4", "0,4")), "xxxx"),
+          safetensors_bytes(header_of(entry("a", "U8", "1,1,1,1,1,1,1,4", "0,4")), "xxxx"), // rank 8
+          safetensors_bytes(header_of(entry("a", "F4", "8", "0,4")), "xxxx"),
+          safetensors_bytes(header_of(entry("a", "F6_E3M2", "4", "0,3")), "xxx"),
+          safetensors_bytes(header_of(entry("a", "C64", "1", "0,8")), "xxxxxxxx"),
           safetensors_bytes(R"({"__metadata__":{"note":"two\nlines"}})"),
           safetensors_bytes(R"({"a":{"data_offsets":[0,2],"dtype":"BF16","shape":[1]}})", "xx"),
-          safetensors_bytes("{" + entry("b", "U8", "4", "4,8") + "," + a + "}", "xxxxyyyy"),
-          safetensors_bytes("{" + a + "," + entry("z", "U8", "0", "4,4") + "}", "xxxx")}) {
+          safetensors_bytes(header_of(entry("b", "U8", "4", "4,8"), a), "xxxxyyyy"),
+          safetensors_bytes(header_of(a, entry("z", "U8", "0", "4,4")), "xxxx")}) {
         const auto result = Safetensors::open(folder.put("x", file));
         EXPECT_TRUE(result) << result.error().message;
     }

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <cstdint>
+#include <fmt/format.h>
+#include <initializer_list>
 #include <string>
 #include <string_view>
 
@@ -24,9 +26,14 @@ inline std::string safetensors_bytes(std::string_view header, std::string_view d
 inline std::string entry(std::string_view name, std::string_view dtype, std::string_view shape,
                          std::string_view offsets)
 {
-    std::string text = "\"";
-    text.append(name).append("\":{\"dtype\":\"").append(dtype).append("\",\"shape\":[").append(shape);
-    return text.append("],\"data_offsets\":[").append(offsets).append("]}");
+    return fmt::format(R"("{}":{{"dtype":"{}","shape":[{}],"data_offsets":[{}]}})", name, dtype, shape, offsets);
+}
+
+// {a,b,...}: a header of such entries
+template <typename... Entries>
+std::string header_of(const Entries&... entries)
+{
+    return fmt::format("{{{}}}", fmt::join(std::initializer_list<std::string_view>{entries...}, ","));
 }
 
 } // namespace semrover

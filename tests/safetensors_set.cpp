@@ -16,10 +16,9 @@ constexpr const char* kIndexName = "m.safetensors.index.json";
 // shards s1 (a: 1111) and s2 (b: 2222, c: 33)
 void put_shards(const ScratchFolder& folder)
 {
-    folder.put("s1.safetensors", safetensors_bytes("{" + entry("a", "U8", "4", "0,4") + "}", "1111"));
+    folder.put("s1.safetensors", safetensors_bytes(header_of(entry("a", "U8", "4", "0,4")), "1111"));
     folder.put("s2.safetensors",
-               safetensors_bytes("{" + entry("b", "U8", "4", "0,4") + "," + entry("c", "F8_E4M3", "2", "4,6") + "}",
-                                 "222233"));
+               safetensors_bytes(header_of(entry("b", "U8", "4", "0,4"), entry("c", "F8_E4M3", "2", "4,6")), "222233"));
 }
 
 Result<SafetensorsSet> open_index(const ScratchFolder& folder, std::string_view text)
@@ -30,7 +29,7 @@ Result<SafetensorsSet> open_index(const ScratchFolder& folder, std::string_view 
 
 std::string map_to(std::string_view shard)
 {
-    return R"({"weight_map":{"a":")" + std::string(shard) + R"("}})";
+    return fmt::format(R"({{"weight_map":{{"a":"{}"}}}})", shard);
 }
 
 TEST(SafetensorsSet, an_index_joins_its_shards)
@@ -71,9 +70,8 @@ TEST(SafetensorsSet, an_index_that_contradicts_its_shards_is_refused)
                      "expected total_size 5 bytes, found 4"));
     EXPECT_TRUE(says(open_index(folder, R"({"metadata":{"total_size":4.0},"weight_map":{"a":"s1.safetensors"}})"),
                      "expected total_size to be a whole number"));
-    folder.put(
-        "s3.safetensors",
-        safetensors_bytes("{" + entry("a", "U8", "4", "0,4") + "," + entry("d", "U8", "0", "4,4") + "}", "3333"));
+    folder.put("s3.safetensors",
+               safetensors_bytes(header_of(entry("a", "U8", "4", "0,4"), entry("d", "U8", "0", "4,4")), "3333"));
     EXPECT_TRUE(says(open_index(folder, R"({"weight_map":{"a":"s1.safetensors","d":"s3.safetensors"}})"),
                      "tensor 'a' belongs in shard 's1.safetensors', but is in 's3.safetensors' too"));
 }
@@ -87,7 +85,7 @@ TEST(SafetensorsSet, an_index_of_another_form_is_refused)
     EXPECT_TRUE(says(open_index(folder, "{"), "not valid JSON"));
     std::string many = "{\"weight_map\":{\"0\":\"0.safetensors\"";
     for (int i = 1; i <= 10'000; ++i)
-        many += ",\"" + std::to_string(i) + "\":\"" + std::to_string(i) + ".safetensors\"";
+        many += fmt::format(R"(,"{0}":"{0}.safetensors")", i);
     EXPECT_TRUE(says(open_index(folder, many + "}}"), "more than 10000 shards"));
 }
 
@@ -119,9 +117,9 @@ TEST(SafetensorsSet, a_pickle_is_refused_with_the_way_to_convert_it)
 TEST(SafetensorsSet, one_error_lists_everything_that_does_not_fit)
 {
     const ScratchFolder folder;
-    const std::string header = "{" + entry("bias", "F32", "1", "0,4") + "," + entry("extra", "F16", "2", "4,8") + "," +
-                               entry("good", "F16", "1,2", "8,12") + "," + entry("odd", "F8_E4M3", "4", "12,16") + "," +
-                               entry("whole", "I32", "1", "16,20") + "}";
+    const std::string header = header_of(entry("bias", "F32", "1", "0,4"), entry("extra", "F16", "2", "4,8"),
+                                         entry("good", "F16", "1,2", "8,12"), entry("odd", "F8_E4M3", "4", "12,16"),
+                                         entry("whole", "I32", "1", "16,20"));
     const auto set =
         SafetensorsSet::open(folder.put("x.safetensors", safetensors_bytes(header, std::string(20, '\0'))));
     ASSERT_TRUE(set) << set.error().message;
@@ -146,7 +144,7 @@ TEST(SafetensorsSet, the_default_model_is_finite_and_a_nan_is_found)
     EXPECT_TRUE(check_finite(*model));
     const ScratchFolder folder;
     const auto bad = SafetensorsSet::open(folder.put(
-        "x.safetensors", safetensors_bytes("{" + entry("w", "F16", "2", "0,4") + "}", std::string("\0\0\0\x7c", 4))));
+        "x.safetensors", safetensors_bytes(header_of(entry("w", "F16", "2", "0,4")), std::string("\0\0\0\x7c", 4))));
     EXPECT_TRUE(says(check_finite(*bad), "tensor 'w' holds NaN or infinity, first at element 1 of 2"));
 }
 

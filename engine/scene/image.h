@@ -1,0 +1,38 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "runtime/file.h"
+#include "runtime/result.h"
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace semrover {
+
+constexpr uint32_t kMaxImageSide = 16384; // pixels
+
+struct ImageRgb8 {
+    uint32_t width = 0, height = 0;
+    std::vector<uint8_t> pixels; // [height, width, 3] sRGB
+};
+
+// PNG files, written atomically, the same pixels always as the same bytes. Pixels are [height, width(, 3)], top row
+// first; another count is the caller's bug. A size of 0 or over kMaxImageSide is refused (bad_input).
+Status write_png_rgb8(const Path& path, uint32_t width, uint32_t height, std::span<const uint8_t> pixels);
+Status write_png_gray8(const Path& path, uint32_t width, uint32_t height, std::span<const uint8_t> pixels);
+Status write_png_gray16(const Path& path, uint32_t width, uint32_t height, std::span<const uint16_t> pixels);
+
+// any PNG as 8-bit RGB: palettes and gray are expanded, 16 bits cut to 8, alpha dropped. Untrusted input: the size is
+// limited, and nothing is allocated that the file is too short to fill.
+Result<ImageRgb8> read_png_rgb8(const Path& path);
+
+// 16-bit gray as it is (depth in millimetres); another kind of PNG is refused
+struct ImageGray16 {
+    uint32_t width = 0, height = 0;
+    std::vector<uint16_t> pixels; // [height, width]
+};
+Result<ImageGray16> read_png_gray16(const Path& path);
+
+} // namespace semrover

@@ -1,0 +1,138 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/scene/image.h"
+
+#include "tests/says.h"
+#include "tests/scratch_folder.h"
+
+#include <gtest/gtest.h>
+#include <random>
+
+namespace semrover {
+namespace {
+
+template <typename T>
+std::vector<T> noise(size_t count)
+{
+    std::mt19937 random(3);
+    std::vector<T> values(count);
+    for (T& v : values)
+        v = static_cast<T>(random());
+    return values;
+}
+
+TEST(Image, colour_pixels_read_back_the_same)
+{
+    const ScratchFolder folder;
+    for (const auto& [width, height] : std::vector<std::pair<uint32_t, uint32_t>>{{1, 1}, {7, 5}, {616, 424}}) {
+        const auto pixels = noise<uint8_t>(size_t(3) * width * height);
+        ASSERT_TRUE(write_png_rgb8(folder / "a.png", width, height, pixels));
+        const auto image = read_png_rgb8(folder / "a.png");
+        ASSERT_TRUE(image) << image.error().message;
+        EXPECT_EQ(image->width, width);
+        EXPECT_EQ(image->height, height);
+        EXPECT_EQ(image->pixels, pixels);
+    }
+}
+
+TEST(Image, gray_reads_back_as_three_equal_channels)
+{
+    const ScratchFolder folder;
+    const auto pixels = noise<uint8_t>(35);
+    ASSERT_TRUE(write_png_gray8(folder / "a.png", 7, 5, pixels));
+    const auto image = read_png_rgb8(folder / "a.png");
+    ASSERT_TRUE(image) << image.error().message;
+    for (size_t i = 0; i < pixels.size() * 3; ++i)
+        EXPECT_EQ(image->pixels[i], pixels[i / 3]);
+}
+
+TEST(Image, sixteen_bits_keep_every_value_and_are_big_endian_in_the_file)
+{
+    const ScratchFolder folder;
+    std::vector<uint16_t> pixels(65536);
+    for (size_t i = 0; i < pixels.size(); ++i)
+        pixels[i] = static_cast<uint16_t>(i);
+    ASSERT_TRUE(write_png_gray16(folder / "a.png", 256, 256, pixels));
+    const auto image = read_png_gray16(folder / "a.png");
+    ASSERT_TRUE(image) << image.error().message;
+    EXPECT_EQ(image->pixels, pixels);
+    // the same file as 8 bits: the value / 257; a swapped file would give the low one
+    EXPECT_EQ(read_png_rgb8(folder / "a.png")->pixels[3 * 0xab34], 0xab);
+    ASSERT_TRUE(write_png_gray8(folder / "b.png", 1, 1, std::vector<uint8_t>{1}));
+    EXPECT_TRUE(says(read_png_gray16(folder / "b.png"), "expected a PNG of 16-bit gray"));
+}
+
+TEST(Image, the_same_pixels_give_the_same_bytes)
+{
+    const ScratchFolder folder;
+    const auto pixels = noise<uint8_t>(300);
+    ASSERT_TRUE(write_png_rgb8(folder / "a.png", 10, 10, pixels));
+    ASSERT_TRUE(write_png_rgb8(folder / "b.png", 10, 10, pixels));
+    EXPECT_EQ(contents(folder / "a.png"), contents(folder / "b.png"));
+}
+
+TEST(Image, a_size_of_zero_or_beyond_the_limit_is_refused_and_nothing_is_written)
+{
+    const ScratchFolder folder;
+    EXPECT_TRUE(says(write_png_rgb8(folder / "a.png", 0, 5, {}), "an image of 0 x 5 pixels"));
+    EXPECT_TRUE(says(write_png_gray8(folder / "a.png", 5, 0, {}), "an image of 5 x 0 pixels"));
+    EXPECT_TRUE(says(write_png_gray16(folder / "a.png", 16385, 1, {}), "expected 1 to 16384"));
+    EXPECT_TRUE(says(write_png_gray8(folder / "no" / "a.png", 1, 1, std::vector<uint8_t>{1}), "cannot write"));
+    EXPECT_EQ(folder.entries(), 0u);
+}
+
+TEST(Image, what_is_no_png_is_refused)
+{
+    const ScratchFolder folder;
+    EXPECT_TRUE(says(read_png_rgb8(folder.put("a", "")), "expected a PNG file"));
+    EXPECT_TRUE(says(read_png_rgb8(folder.put("a", "\xff\xd8\xff\xe0JFIF....")), "expected a PNG file"));
+    EXPECT_TRUE(says(read_png_rgb8(folder.put("a", "\x89PNG\r\n\x1a\n")), "the file is cut"));
+    EXPECT_TRUE(says(read_png_rgb8(folder / "none"), "No such file"));
+}
+
+TEST(Image, a_png_cut_anywhere_or_with_changed_bytes_never_crashes)
+{
+    const ScratchFolder folder;
+    ASSERT_TRUE(write_png_rgb8(folder / "a.png", 9, 4, noise<uint8_t>(108)));
+    const std::string whole = contents(folder / "a.png");
+    for (size_t length = 0; length + 1 < whole.size(); ++length)
+        EXPECT_FALSE(read_png_rgb8(folder.put("b.png", whole.substr(0, length)))) << length;
+    std::mt19937 random(7);
+    for (int i = 0; i < 2000; ++i) {
+        std::string changed = whole;
+        changed[random() % changed.size()] = static_cast<char>(random());
+        if (const auto image = read_png_rgb8(folder.put("b.png", changed))) {
+            EXPECT_EQ(image->pixels.size(), size_t(3) * image->width * image->height);
+        }
+    }
+}
+
+TEST(Image, a_small_file_that_claims_a_huge_image_is_refused_before_it_is_allocated)
+{
+    const ScratchFolder folder;
+    // 16384 x 16384 RGB, valid check sums, no data
+    const std::string ihdr("\0\0\0\x0dIHDR\0\0\x40\0\0\0\x40\0\x08\x02\0\0\0\x26\xaa\x87\xd3", 25);
+    const std::string idat("\0\0\0\0IDAT\x35\xaf\x06\x1e", 12);
+    EXPECT_TRUE(says(read_png_rgb8(folder.put("a", "\x89PNG\r\n\x1a\n" + ihdr + idat)),
+                     "16384 x 16384 pixels cannot come from 45 bytes"));
+}
+
+TEST(Image, a_palette_with_transparency_becomes_rgb)
+{
+    const ScratchFolder folder;
+    // 4 x 2 pixels of 2 bits: colours 0 1 2 3, then 3 2 1 0; colour i is (3i, 3i + 1, 3i + 2); made with Python's zlib
+    static constexpr std::string_view kHex =
+        "89504e470d0a1a0a0000000d494844520000000400000002020300000002c695f00000000c504c5445000102030405060708090a0bdc4c"
+        "389c"
+        "0000000174524e5380ad5e5b460000000c49444154789c639066780200013901004564919b0000000049454e44ae426082";
+    std::string file;
+    for (size_t i = 0; i < kHex.size(); i += 2)
+        file += static_cast<char>(std::stoi(std::string(kHex.substr(i, 2)), nullptr, 16));
+    const auto image = read_png_rgb8(folder.put("a", file));
+    ASSERT_TRUE(image) << image.error().message;
+    EXPECT_EQ(image->pixels,
+              (std::vector<uint8_t>{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 9, 10, 11, 6, 7, 8, 3, 4, 5, 0, 1, 2}));
+}
+
+} // namespace
+} // namespace semrover
