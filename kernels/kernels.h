@@ -75,9 +75,6 @@ Tensor embedding(Graph& g,
                               bool cos_first,
                               DType dtype); // y: [M, A * 2F]
 
-// y[r] = x[r mod rows of x]
-[[nodiscard]] Tensor repeat_rows(Graph& g, Tensor x, uint32_t rows, DType dtype); // [R, N] -> [rows, N]
-
 // -- masked joint attention ------------------------------------------------------------------------------------------
 
 // Tokens of several sets, packed one after the other without padding; the semantic stream repeats the voxel stream's
@@ -104,5 +101,42 @@ Tensor neighbor_mask(Graph& g,
                                Tensor mask,  // [M, words] u32 array
                                uint32_t heads,
                                uint32_t streams); // whose queries are answered: 1 voxel only, 2 both
+
+// -- sampling: one table of steps, one clock, the same commands for every step -------------------------------------------
+
+// the state x, predictions and noise are fp32 matrices [M, N] with equal row lengths
+struct StepTable {
+    Tensor rows;  // [R, 16] words: StepRow (shaders/lib/step_row.h)
+    Tensor clock; // [2] u32: StepClock
+};
+constexpr uint32_t kNoiseChannels = 4096; // of a token, at most: ten bits of the noise counter, four channels each
+
+// clock.row += 1
+void step_advance(Graph& g, Tensor clock);
+
+// table_row[r] = row of the modulation table for the current step's timestep
+void step_timestep(Graph& g, StepTable steps, Tensor table_row); // [rows] u32
+
+// y[r] = in_scale x[r mod rows of x]
+[[nodiscard]] Tensor step_input(Graph& g, StepTable steps, Tensor x, uint32_t rows, DType dtype); // [M, N] -> [rows, N]
+
+// standard normals keyed by (seed, cell, draw, known or not, channel), Philox4x32-10
+[[nodiscard]] Tensor step_noise(Graph& g, StepTable steps,
+                                Tensor cells, // [M, 4] i32 array
+                                Tensor known, // [M] u32
+                                uint32_t cols, uint64_t seed); // -> [M, cols]
+
+// x' = c_x x + c_z z
+void step_renoise(Graph& g, StepTable steps, Tensor z, Tensor x);
+
+// guidance, prediction, next state; known tokens are put back at the level of the next state
+void step_update(Graph& g, StepTable steps,
+                 Tensor m,     // [M, N], or [2M, N] conditional then unconditional: network output
+                 Tensor z,     // [M, N]
+                 Tensor known, // [M] u32
+                 Tensor fixed, // [M, N] tokens of the known rows
+                 Tensor x,     // [M, N], in place
+                 Tensor x0,    // [M, N], in place: previous prediction, then this one
+                 float guidance, float clip);
 
 } // namespace semrover

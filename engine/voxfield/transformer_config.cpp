@@ -105,7 +105,7 @@ Result<TransformerConfig> parse_transformer_config(const Json& json)
     SR_CHECK(read(json, "num_layers", 1u, 1024u, c.num_layers));
     SR_CHECK(read(json, "num_attention_heads", 1u, 1024u, c.num_attention_heads));
     SR_CHECK(read(json, "attention_head_dim", 8u, 256u, c.attention_head_dim));
-    SR_CHECK(read(json, "points_per_voxel", 1u, 4096u, c.points_per_voxel));
+    SR_CHECK(read(json, "points_per_voxel", 1u, 682u, c.points_per_voxel));
     SR_CHECK(read(json, "num_classes", 1u, 65536u, c.num_classes));
     SR_CHECK(read(json, "pos_embed_dim", 2u, 65536u, c.pos_embed_dim));
     SR_CHECK(read(json, "voxel_size", 1e-4f, 1e4f, c.voxel_size));

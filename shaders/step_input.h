@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#ifndef SEMROVER_REPEAT_ROWS_H
-#define SEMROVER_REPEAT_ROWS_H
+#ifndef SEMROVER_STEP_INPUT_H
+#define SEMROVER_STEP_INPUT_H
 #include "lib/types.h"
 
-struct RepeatRowsPush {
+struct StepInputPush {
     uint rows; // of y
     uint cols;
     uint x_rows;

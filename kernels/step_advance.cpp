@@ -1,0 +1,12 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// clock.row += 1
+#include "kernels/kernels.h"
+
+#include "step_advance.spv.h"
+
+namespace semrover {
+
+void step_advance(Graph& g, Tensor clock) { g.dispatch(kernel::step_advance, {clock}, groups(1)); }
+
+} // namespace semrover
