@@ -51,10 +51,31 @@ class EvaluationMemory {
 
 struct EvaluationInput {
     TokenSets sets;
+    std::vector<uint32_t> mask;       // [M, words]
     std::vector<float> tokens;        // [M, C]
     std::vector<float> timesteps;     // [T]
     std::vector<uint32_t> table_row;  // [2M]
 };
+
+// The reference compares distances of centres that were rounded to float, up to 30 m from the origin: of two cells 3 m
+// apart some then lie beyond 3 m + 1e-6. Cells of the product are integers (neighbor_mask); here the given centres decide.
+std::vector<uint32_t> mask_of(const TokenSets& sets, const std::vector<float>& centers, float radius)
+{
+    const uint32_t words = divide_up(sets.longest, 32);
+    std::vector<uint32_t> mask(size_t(sets.rows()) * words, 0);
+    for (uint32_t r = 0; r < sets.rows(); ++r)
+        for (uint32_t j = 0; j < sets.sets[2 * r + 1]; ++j) {
+            const uint32_t other = sets.sets[2 * r] + j;
+            double squared = 0;
+            for (uint32_t a = 0; a < 3; ++a) {
+                const double d = double(centers[3 * r + a]) - double(centers[3 * other + a]);
+                squared += d * d;
+            }
+            if (std::sqrt(squared) <= double(radius) + 1e-6)
+                mask[size_t(r) * words + j / 32] |= 1u << j % 32;
+        }
+    return mask;
+}
 
 Result<std::vector<float>> evaluate(Device& device, const Transformer& t, const EvaluationInput& in)
 {
@@ -70,7 +91,7 @@ Result<std::vector<float>> evaluate(Device& device, const Transformer& t, const 
     const uint32_t tiles = memory.add(in.sets.tiles), coords = memory.add(in.sets.coords), rows = memory.add(in.table_row);
     const uint32_t timesteps = memory.add(in.timesteps);
     const uint32_t tokens = t.precision() == DType::f16 ? memory.add(halves) : memory.add(padded);
-    const uint32_t pos = memory.add_empty(uint64_t(m) * d * 4), mask = memory.add_empty(uint64_t(m) * words * 4);
+    const uint32_t pos = memory.add_empty(uint64_t(m) * d * 4), mask = memory.add(in.mask);
     const uint32_t table = memory.add_empty(uint64_t(times) * round_up(t.modulation_width(), kRowPadding) * 4);
     const uint32_t out = memory.add_empty(uint64_t(m) * ld * 4);
     SR_CHECK(memory.upload(device));
@@ -86,7 +107,7 @@ Result<std::vector<float>> evaluate(Device& device, const Transformer& t, const 
     context.mask = g.external(memory.slice(mask), m, words, DType::u32, "mask", words);
     context.longest = in.sets.longest;
     const Tensor modulations = g.external(memory.slice(table), times, t.modulation_width(), DType::f32, "modulations");
-    t.prepare(g, context);
+    t.embed_positions(g, context);
     t.modulations(g, g.external(memory.slice(timesteps), times, 1, DType::f32, "timesteps", 1), modulations);
     const Tensor y = t.forward(g, g.external(memory.slice(tokens), m, c, t.precision(), "tokens"), context, modulations,
                                g.external(memory.slice(rows), 2 * m, 1, DType::u32, "table_row", 1));
@@ -115,6 +136,7 @@ Result<GoldenOutputs> run_voxfield_transformer(Device& device, const GoldenCase&
     const size_t n = shape[1], channels = shape[2];
     EvaluationInput in;
     in.timesteps = times;
+    std::vector<float> packed_centers;
     std::vector<size_t> source; // row of the case for each packed row
     for (size_t b = 0; b < shape[0]; ++b) {
         std::vector<CellIndex> cells;
@@ -125,6 +147,7 @@ Result<GoldenOutputs> run_voxfield_transformer(Device& device, const GoldenCase&
             cells.push_back(cells_of(centers, i, 1, transformer->config().voxel_size)[0]);
             set_labels.push_back(uint32_t(labels[i]));
             in.tokens.insert(in.tokens.end(), &tokens[i * channels], &tokens[i * channels] + channels);
+            packed_centers.insert(packed_centers.end(), &centers[3 * i], &centers[3 * i] + 3);
             in.table_row.push_back(uint32_t(b));
             source.push_back(i);
         }
@@ -135,8 +158,10 @@ Result<GoldenOutputs> run_voxfield_transformer(Device& device, const GoldenCase&
     while (in.sets.rows() % 16) { // the semantic stream must start at an aligned byte
         in.sets.add({&nowhere, 1}, {&null_label, 1});
         in.tokens.resize(in.tokens.size() + channels);
+        packed_centers.resize(packed_centers.size() + 3);
         in.table_row.push_back(0);
     }
+    in.mask = mask_of(in.sets, packed_centers, transformer->config().attention_radius);
     in.table_row.insert(in.table_row.end(), in.table_row.begin(), in.table_row.begin() + in.sets.rows());
     SR_TRY(const std::vector<float> values, evaluate(device, *transformer, in));
     GoldenOutputs out;
