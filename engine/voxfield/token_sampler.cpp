@@ -225,12 +225,17 @@ Result<uint64_t> TokenSampler::planned_bytes(uint32_t regions, uint32_t cells) c
     b.tiles = uint32_t(sets.tiles.size() / 4);
     b.longest = sets.longest;
     b.lay_out(transformer_, halves_);
-    uint64_t bytes = arena_.planned_bytes(device_.limits()) + b.arena.planned_bytes(device_.limits()) + modulations_->plan().arena_bytes();
+    uint64_t bytes = table_bytes() + b.arena.planned_bytes(device_.limits());
     for (const Graph& g : {b.prepare_graph(transformer_, halves_), b.step_graph(*this), b.undo_graph(*this)}) {
         SR_TRY(const Plan plan, make_plan(g.desc(), device_.limits()));
         bytes += plan.arena_bytes();
     }
     return bytes;
+}
+
+uint64_t TokenSampler::table_bytes() const
+{
+    return arena_.planned_bytes(device_.limits()) + modulations_->plan().arena_bytes();
 }
 
 Status TokenSampler::upload(Batch& b, const TokenSets& sets, std::span<const RegionInput> regions)

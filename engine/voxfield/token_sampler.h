@@ -38,6 +38,7 @@ class TokenSampler {
 
     // device memory of the sampler for `regions` regions of `cells` cells, beside the transformer's own
     Result<uint64_t> planned_bytes(uint32_t regions, uint32_t cells) const;
+    uint64_t table_bytes() const; // the part of it that is allocated from the start
 
     // tokens [cells, C] of each region, region after region, known ones as given.
     // Errors: internal when the network returns NaN or infinity; interrupted; device errors
