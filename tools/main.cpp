@@ -88,6 +88,7 @@ int main(int argc, char** argv)
     Globals globals;
     add_globals(app, globals);
     Run run;
+    add_bench(app, globals, run);
     add_generate(app, globals, run);
     add_inspect(app, globals, run);
     try {

@@ -339,6 +339,13 @@ Result<std::vector<float>> TokenSampler::run(std::span<const RegionInput> region
 
 uint32_t TokenSampler::step_passes() const { return batch_ ? uint32_t(batch_->step->plan().passes.size()) : 0; }
 uint32_t TokenSampler::step_barriers() const { return batch_ ? batch_->step->plan().barriers() : 0; }
+double TokenSampler::step_flops() const
+{
+    double flops = 0;
+    for (const Pass& pass : batch_ ? batch_->step->plan().passes : std::vector<Pass>{})
+        flops += pass.options.flops;
+    return flops;
+}
 double TokenSampler::host_us_per_step() const { return batch_ ? batch_->step->host_us() : 0; }
 
 } // namespace semrover

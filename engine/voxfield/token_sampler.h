@@ -48,6 +48,7 @@ class TokenSampler {
     uint32_t step_passes() const;
     uint32_t step_barriers() const;
     double host_us_per_step() const;
+    double step_flops() const; // dense: masked attention counts in full
 
   private:
     struct Batch; // memory and programs of one batch shape
