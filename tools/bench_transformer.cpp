@@ -49,7 +49,7 @@ Status bench_transformer(const Options& o, const Globals& globals)
     scheduler.prediction = Prediction::sample;
     SR_TRY(const SamplingPlan plan, plan_sampling(scheduler, kSteps));
     const float guidance = o.unguided ? 1.f : 4.f;
-    SR_TRY(const auto sampler, TokenSampler::create(*device, *transformer, plan, {.guidance_scale = guidance, .seed = 1, .noise = {}}));
+    SR_TRY(const auto sampler, TokenSampler::create(*device, *transformer, plan, sampling_options(guidance, 1)));
     SR_TRY(const uint64_t planned, sampler->planned_bytes(o.batch, o.cells));
     const uint64_t predicted = transformer->device_bytes(device->limits()) + planned;
     const std::vector<RegionInput> regions = make_regions(o, config.num_classes);
