@@ -105,4 +105,18 @@ Tensor neighbor_mask(Graph& g,
                                uint32_t heads,
                                uint32_t streams); // whose queries are answered: 1 voxel only, 2 both
 
+// -- splats -----------------------------------------------------------------------------------------------------------
+
+// y[i] = x[0] + .. + x[i - 1]
+struct PrefixSumOptions {
+    Tensor count;          // [1] u32, or none: only the first count[0] elements of x are there; the rest of y is undefined
+    bool non_zero = false; // counts the elements that are not zero instead of adding them
+    Tensor total;          // [1] u32: where the total goes, instead of a new tensor
+};
+struct PrefixSum {
+    Tensor sums;  // [N] u32
+    Tensor total; // [1] u32; 2^32 - 1 if it does not fit
+};
+[[nodiscard]] PrefixSum prefix_sum(Graph& g, Tensor x, const PrefixSumOptions& options = {}); // [N] u32 array -> [N]
+
 } // namespace semrover
