@@ -107,6 +107,9 @@ Tensor neighbor_mask(Graph& g,
 
 // -- splats -----------------------------------------------------------------------------------------------------------
 
+// y[i] = value
+[[nodiscard]] Tensor fill(Graph& g, uint32_t size, uint32_t value); // [size] u32
+
 // y[i] = x[0] + .. + x[i - 1]
 struct PrefixSumOptions {
     Tensor count;          // [1] u32, or none: only the first count[0] elements of x are there; the rest of y is undefined
@@ -118,5 +121,19 @@ struct PrefixSum {
     Tensor total; // [1] u32; 2^32 - 1 if it does not fit
 };
 [[nodiscard]] PrefixSum prefix_sum(Graph& g, Tensor x, const PrefixSumOptions& options = {}); // [N] u32 array -> [N]
+
+// pairs sorted by the low bits of their keys; equal keys stay in their order
+struct RadixSortOptions {
+    uint32_t bits = 32; // only these low bits of the keys are compared
+    Tensor count;       // [1] u32, or none: only the first count[0] pairs are there; what follows them is undefined
+};
+struct SortedPairs {
+    Tensor keys;   // [N] u32
+    Tensor values; // [N] u32
+};
+[[nodiscard]] SortedPairs radix_sort(Graph& g,
+                                     Tensor keys,   // [N] u32 array
+                                     Tensor values, // [N] u32 array, or none: 0, 1, 2, ..
+                                     const RadixSortOptions& options = {});
 
 } // namespace semrover
