@@ -136,4 +136,23 @@ struct SortedPairs {
                                      Tensor values, // [N] u32 array, or none: 0, 1, 2, ..
                                      const RadixSortOptions& options = {});
 
+// starts[b] = how many of the sorted keys are below b: the pairs of bucket b are [starts[b], starts[b + 1])
+[[nodiscard]] Tensor bucket_starts(Graph& g,
+                                   Tensor keys, // [N] u32 array, sorted
+                                   uint32_t buckets,
+                                   Tensor count = {}); // [1] u32, or none: only the first count[0] keys are there
+
+// the k nearest points of every point, itself included, nearest first, ties by index; 2^32 - 1 where there is none
+constexpr uint32_t kMaxNeighbors = 32;
+struct KnnOptions {
+    uint32_t neighbors = 16;
+    float cell_size = 0.3f;      // metres, of the search grid: a few points per cell are best
+    float radius = 0;            // metres, no neighbour is further away; 0: no limit
+    Tensor labels;               // [P] u32, or none: prefer neighbours of the same label
+    uint32_t min_same_label = 4; // if there are fewer of those, neighbours of any label
+};
+[[nodiscard]] Tensor knn(Graph& g,
+                         Tensor points, // [P, 3 or more] fp32 array; one that is not finite has no neighbours
+                         const KnnOptions& options = {}); // [P, neighbors] u32 array
+
 } // namespace semrover
