@@ -155,4 +155,19 @@ struct KnnOptions {
                          Tensor points, // [P, 3 or more] fp32 array; one that is not finite has no neighbours
                          const KnnOptions& options = {}); // [P, neighbors] u32 array
 
+// the plane through a point's neighbours, by principal components; its normal's largest component is positive
+struct PcaNormalOptions {
+    bool fallbacks = false;   // where neighbours form a thin line, its outward direction; where there is no plane, +z
+    Tensor labels;            // [P] u32, or none
+    uint32_t line_labels = 0; // bit per label: things that count as lines more readily (poles)
+};
+struct PcaNormals {
+    Tensor normals;     // [P, 4] fp32: unit normal; 0 plane, 1 line, 2 neither
+    Tensor eigenvalues; // [P, 4] fp32: of the covariance, m^2, ascending; number of neighbours
+};
+[[nodiscard]] PcaNormals pca_normal(Graph& g,
+                                    Tensor points,    // [P, 3 or more] fp32 array
+                                    Tensor neighbors, // [P, k] u32 array, 2^32 - 1 for none
+                                    const PcaNormalOptions& options = {});
+
 } // namespace semrover
