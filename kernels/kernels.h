@@ -146,7 +146,7 @@ struct SortedPairs {
 constexpr uint32_t kMaxNeighbors = 32;
 struct KnnOptions {
     uint32_t neighbors = 16;
-    float cell_size = 0.3f;      // metres, of the search grid: a few points per cell are best
+    float cell_size = 0.45f;     // metres, of the search grid: about ten points per cell are best
     float radius = 0;            // metres, no neighbour is further away; 0: no limit
     Tensor labels;               // [P] u32, or none: prefer neighbours of the same label
     uint32_t min_same_label = 4; // if there are fewer of those, neighbours of any label
@@ -169,5 +169,37 @@ struct PcaNormals {
                                     Tensor points,    // [P, 3 or more] fp32 array
                                     Tensor neighbors, // [P, k] u32 array, 2^32 - 1 for none
                                     const PcaNormalOptions& options = {});
+
+// surfels: 2D Gaussians in the plane across a normal, axes t_u = normalize(e x n) with e the axis least aligned with n,
+// and t_v = n x t_u. One that is not finite, or without normal, size or opacity, is skipped.
+struct SplatScene {
+    Tensor positions; // [N, 4] fp32: metres, opacity
+    Tensor normals;   // [N, 4] fp32: unit normal, sigma_u in metres
+    Tensor colors;    // [N, 4] fp32: rgb, sigma_v in metres
+    Tensor labels;    // [N] u32
+    Tensor cells;     // [N] u32
+};
+// rules where references differ: spec/method.md, section 4
+struct SplatOptions {
+    uint32_t width = 0, height = 0; // pixels
+    uint32_t max_visible = 0;       // records of (camera, splat) that are kept; one too many and the image is wrong
+    uint32_t max_pairs = 0;         // pairs of a record and a tile that it touches; likewise
+    uint32_t tile = 16;             // pixels, a multiple of 16; the image does not depend on it
+    float near = 0.2f;              // metres
+    float alpha_min = 1.f / 255, alpha_max = 0.99f;
+    float transmittance_min = 1e-4f;
+    float screen_variance = 0.5f; // pixels^2, of the screen filter; 0: none
+    float cutoff = 0;             // sigmas; 0: as far as alpha_min
+    Tensor visible, pairs;        // [1] u32, or none: where the numbers go that had to fit the two maxima
+};
+struct SplatImages { // [cameras * height * width] rows; w = weight of a splat in a pixel
+    Tensor color;    // [.., 4] fp32: sum of w rgb; alpha = sum of w
+    Tensor surface;  // [.., 4] fp32: sum of w normal, camera frame, towards the camera; sum of w depth
+    Tensor depth;    // [.., 2] fp32: expected (sum of w depth / alpha), median (of the splat that passes one half)
+    Tensor ids;      // [.., 2] u32: label and cell of the splat with the largest w, 2^32 - 1 for none
+};
+[[nodiscard]] SplatImages splat(Graph& g, const SplatScene& scene,
+                                Tensor cameras, // [C, 16] fp32: fx fy cx cy, world to camera [3, 4]; fx = 0: sees nothing
+                                const SplatOptions& options);
 
 } // namespace semrover
