@@ -96,9 +96,10 @@ Status count_groups(Pass& pass, const DeviceLimits& limits)
         SR_ASSERT(m && k, "{}: a grid of tiles needs kTileM and kTileN", pass.kernel->name);
         n[0] = divide_up(pass.grid.x, m->value);
         n[1] = divide_up(pass.grid.y, k->value);
-    } else if (pass.grid.unit == Grid::Unit::threads) {
-        n[0] = divide_up(pass.grid.x, pass.variant->local_size[0]);
-        n[1] = divide_up(n[0], limits.max_groups); // folded; the shader's linear_thread() undoes it
+    } else if (pass.grid.unit == Grid::Unit::threads || pass.grid.unit == Grid::Unit::folded) {
+        if (pass.grid.unit == Grid::Unit::threads)
+            n[0] = divide_up(pass.grid.x, pass.variant->local_size[0]);
+        n[1] = divide_up(n[0], limits.max_groups); // the shader's linear_thread() or linear_group() undoes it
         n[0] = divide_up(n[0], n[1]);
     }
     for (int i = 0; i < 3; ++i)

@@ -6,6 +6,7 @@
 
 struct ModulatePush {
     uint rows; // of one group
+    uint groups;
     uint cols;
     uint x_ld; // elements
     uint y_ld;
