@@ -73,7 +73,7 @@ void check(const AttentionCase& c, DType dtype)
         for (uint32_t head = 0; head < c.heads; ++head) {
             const std::vector<double> y = reference(qkv, p, query, head, c.heads, c.head_dim);
             for (uint32_t d = 0; d < c.head_dim; ++d) {
-                const double tolerance = 3e-6 + (dtype == DType::f16 ? 6e-4 * std::abs(y[d]) : 0);
+                const double tolerance = 3e-6 + (dtype == DType::f16 ? 3e-8 + 6e-4 * std::abs(y[d]) : 0);
                 ASSERT_NEAR(got.at(query, head * c.head_dim + d), y[d], tolerance)
                     << "query " << query << " head " << head;
             }

@@ -33,7 +33,7 @@ void check(const HeadCase& c, DType dtype)
                 if (part < 2)
                     v *= inverse * w.at(r / c.rows * 2 + part, i);
                 const double tolerance =
-                    part == 2 ? 0 : 1e-6 * (1 + std::abs(v)) + (dtype == DType::f16 ? 6e-4 * std::abs(v) : 0);
+                    part == 2 ? 0 : 1e-6 * (1 + std::abs(v)) + (dtype == DType::f16 ? 3e-8 + 6e-4 * std::abs(v) : 0);
                 ASSERT_NEAR(got.at(r, first + i), v, tolerance) << "row " << r << " column " << first + i;
             }
         }
