@@ -117,8 +117,7 @@ Status Arena::allocate(Device& device, const char* name)
 BufferSlice Arena::slice(uint32_t id) const
 {
     const Item& item = items_.at(id);
-    SR_ASSERT(item.block < blocks_.size(), "the arena is not allocated yet");
-    return {blocks_[item.block].get(), item.offset, item.bytes};
+    return {blocks_.empty() ? nullptr : blocks_.at(item.block).get(), item.offset, item.bytes};
 }
 
 } // namespace semrover

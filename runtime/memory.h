@@ -47,6 +47,7 @@ class Arena {
     uint32_t add(uint64_t bytes); // id of the slice
     uint64_t planned_bytes(const DeviceLimits& limits) const;
     Status allocate(Device& device, const char* name);
+    // before allocate(), a slice without a buffer: good for planning graphs, not for running them
     BufferSlice slice(uint32_t id) const;
 
   private:

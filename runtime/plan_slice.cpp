@@ -110,15 +110,15 @@ Status count_groups(Pass& pass, const DeviceLimits& limits)
     n[0] = pass.grid.x;
     n[1] = pass.grid.y;
     n[2] = pass.grid.z;
+    const ConstantInfo *m = pass.variant->constant("kTileM"), *k = pass.variant->constant("kTileN");
     if (pass.grid.unit == Grid::Unit::tiles) {
-        const ConstantInfo *m = pass.variant->constant("kTileM"), *k = pass.variant->constant("kTileN");
         SR_ASSERT(m && k, "{}: a grid of tiles needs kTileM and kTileN", pass.kernel->name);
         n[0] = divide_up(pass.grid.x, m->value);
         n[1] = divide_up(pass.grid.y, k->value);
-    } else if (pass.grid.unit == Grid::Unit::threads || pass.grid.unit == Grid::Unit::folded) {
-        if (pass.grid.unit == Grid::Unit::threads)
-            n[0] = divide_up(pass.grid.x, pass.variant->local_size[0]);
-        n[1] = divide_up(n[0], limits.max_groups); // the shader's linear_thread() or linear_group() undoes it
+    } else if (pass.grid.unit != Grid::Unit::groups) {
+        SR_ASSERT(m || pass.grid.unit == Grid::Unit::threads, "{}: a grid of row tiles needs kTileM", pass.kernel->name);
+        n[0] = divide_up(pass.grid.x, pass.grid.unit == Grid::Unit::threads ? pass.variant->local_size[0] : m->value);
+        n[1] = divide_up(n[0], limits.max_groups); // the shader's linear_group() undoes it
         n[0] = divide_up(n[0], n[1]);
     }
     for (int i = 0; i < 3; ++i)

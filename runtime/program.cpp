@@ -50,6 +50,8 @@ Status Program::allocate()
 std::pair<VkBuffer, uint64_t> Program::locate(const PassBinding& b) const
 {
     const Resource& r = plan_.resources[b.resource];
+    if (r.external && !r.memory.buffer)
+        SR_ASSERT(false, "'{}' has no memory: the graph was only good for planning", r.name);
     if (r.external)
         return {r.memory.buffer->handle(), r.memory.offset + b.offset};
     const Placement& p = plan_.placements[b.resource];
@@ -96,8 +98,8 @@ Status Program::bind(const Pass& pass, VkDescriptorSet set)
     for (size_t i = 0; i < n; ++i) {
         const PassBinding& b = pass.bindings[i];
         const auto [buffer, offset] = locate(b);
-        SR_ASSERT(offset % device_.limits().offset_alignment == 0 || offset % 16 == 0, "{}: '{}' starts at byte {}",
-                  pass.kernel->name, b.name, offset);
+        SR_ASSERT(offset % device_.limits().offset_alignment == 0, "{}: '{}' starts at byte {}", pass.kernel->name, b.name,
+                  offset);
         writes[i].dstSet = set;
         writes[i].dstBinding = pass.variant->bindings[i].binding;
         writes[i].descriptorCount = 1;

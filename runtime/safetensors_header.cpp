@@ -315,13 +315,20 @@ std::vector<Extent> extents(const SafetensorsHeader& header)
     return list;
 }
 
-Status check_names(std::vector<Extent> list, std::string_view where)
+// both lists are sorted by name
+Status check_names(const SafetensorsHeader& header, std::string_view where)
 {
-    std::ranges::sort(list, {}, [](const Extent& e) -> const std::string& { return *e.name; });
-    const auto twice =
-        std::ranges::adjacent_find(list, {}, [](const Extent& e) -> const std::string& { return *e.name; });
-    if (twice != list.end())
-        return fail(ErrorCode::bad_input, "{}: tensor {} appears twice", where, quote(*twice->name));
+    const std::string* twice = nullptr;
+    if (const auto t = std::ranges::adjacent_find(header.tensors, {}, &TensorInfo::name); t != header.tensors.end())
+        twice = &t->name;
+    for (size_t i = 0; i < header.unsupported.size(); ++i) {
+        const std::string& name = header.unsupported[i].name;
+        if ((i > 0 && header.unsupported[i - 1].name == name) ||
+            std::ranges::binary_search(header.tensors, name, {}, &TensorInfo::name))
+            twice = &name;
+    }
+    if (twice)
+        return fail(ErrorCode::bad_input, "{}: tensor {} appears twice", where, quote(*twice));
     return {};
 }
 
@@ -419,11 +426,10 @@ Result<SafetensorsHeader> parse_safetensors_header(std::span<const std::byte> fi
     HeaderReader reader(header);
     SR_CHECK(parse_json_events(text, where, reader));
     header.data_begin = 8 + text.size();
-    const std::vector<Extent> list = extents(header);
-    SR_CHECK(check_names(list, where));
-    SR_CHECK(check_coverage(list, file.size() - header.data_begin, where));
     std::ranges::sort(header.tensors, {}, &TensorInfo::name);
     std::ranges::sort(header.unsupported, {}, &UnsupportedTensor::name);
+    SR_CHECK(check_names(header, where));
+    SR_CHECK(check_coverage(extents(header), file.size() - header.data_begin, where));
     return header;
 }
 

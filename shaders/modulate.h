@@ -6,8 +6,8 @@
 
 struct ModulatePush {
     uint rows; // of one group
-    uint groups;
     uint cols;
+    uint groups;
     uint x_ld; // elements
     uint y_ld;
     uint table_ld;

@@ -72,8 +72,13 @@ Tensor Transformer::frequencies(Graph& g, uint32_t slice, uint32_t count) const
 
 void Transformer::prepare(Graph& g, const TokenContext& context) const
 {
-    const auto weight = [&](const Weight& w, const char* name) { return weights_.tensor(g, w, name); };
     neighbor_mask(g, context.cells, context.sets, context.longest, config_.radius2(), context.mask);
+    embed_positions(g, context);
+}
+
+void Transformer::embed_positions(Graph& g, const TokenContext& context) const
+{
+    const auto weight = [&](const Weight& w, const char* name) { return weights_.tensor(g, w, name); };
     const Tensor angles = frequencies(g, position_frequencies_, config_.pos_embed_dim / 2);
     const Tensor waves = sinusoid(g, context.coords, angles, false, precision_); // [M, 3P]
     (void)gemm(g, waves, weight(weights_.pos_embed, "pos_embed"), weight(weights_.pos_embed_bias, "pos_embed.bias"),

@@ -37,6 +37,7 @@ class Transformer {
 
     // pos and mask of the context, from its other tensors; once per batch of sets
     void prepare(Graph& g, const TokenContext& context) const;
+    void embed_positions(Graph& g, const TokenContext& context) const; // pos alone
 
     // adaLN modulations of every block for a list of timesteps; once per schedule
     void modulations(Graph& g,

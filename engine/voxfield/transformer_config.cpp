@@ -2,15 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/voxfield/transformer_config.h"
 
+#include "runtime/json.h"
+
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <set>
 
 namespace semrover {
 
 namespace {
-
-using Json = nlohmann::json;
 
 Status read(const Json& json, const char* name, uint32_t low, uint32_t high, uint32_t& value)
 {
@@ -131,10 +130,7 @@ Result<TransformerConfig> parse_transformer_config(const Json& json)
 Result<TransformerConfig> read_transformer_config(const Path& folder)
 {
     const Path path = folder / "config.json";
-    SR_TRY(const std::string text, read_text_file(path, 1 << 20));
-    const Json json = Json::parse(text, nullptr, false);
-    if (json.is_discarded())
-        return fail(ErrorCode::bad_input, "{}: not valid JSON", path.string());
+    SR_TRY(const Json json, read_json(path));
     auto config = parse_transformer_config(json);
     if (!config)
         config.error().message = path.string() + ": " + config.error().message;

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 
-// index of this workgroup in a grid of folded_groups(n); the last ones may lie beyond n
+// index of this workgroup in a grid of row_tiles(n); the last ones may lie beyond n
 uint linear_group() { return gl_WorkGroupID.x + gl_WorkGroupID.y * gl_NumWorkGroups.x; }
 
 // index of this invocation in a grid of threads(n), which the runtime folds over y when there are too many groups

@@ -10,6 +10,7 @@
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const bool kHalfX = false;
 layout(constant_id = 1) const bool kHalfY = false;
+layout(constant_id = 2) const uint kTileM = 1;
 layout(push_constant) uniform Push { ModulatePush p; };
 layout(binding = 0) readonly buffer X { uvec4 x[]; };             // [groups * rows, cols]
 layout(binding = 1) readonly buffer Table { float table[]; };     // [timesteps, table_ld]

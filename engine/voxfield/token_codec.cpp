@@ -1,0 +1,78 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/voxfield/token_codec.h"
+
+#include "runtime/dtype.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <vector>
+
+namespace semrover {
+
+namespace {
+
+using Point = std::array<float, 3>;
+
+// order of a cell's points in its token
+std::vector<uint32_t> distance_order(const std::vector<Point>& points)
+{
+    std::vector<uint32_t> order(points.size());
+    std::iota(order.begin(), order.end(), 0);
+    const auto squared = [](const Point& p) { return double(p[0]) * p[0] + double(p[1]) * p[1] + double(p[2]) * p[2]; };
+    std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
+        const double da = squared(points[a]), db = squared(points[b]);
+        return da != db ? da < db : points[a] < points[b];
+    });
+    return order;
+}
+
+float normalized(const TransformerConfig& c, uint32_t channel, float v)
+{
+    return c.normalization ? (v - c.normalization->mean[channel]) / c.normalization->std[channel] : v;
+}
+
+float denormalized(const TransformerConfig& c, uint32_t channel, float v)
+{
+    return std::clamp(c.normalization ? v * c.normalization->std[channel] + c.normalization->mean[channel] : v, -1.f, 1.f);
+}
+
+} // namespace
+
+void encode_token(const TransformerConfig& config, std::span<const uint16_t> points, std::span<const uint8_t> colors,
+                  std::span<float> token)
+{
+    std::vector<Point> offsets(config.points_per_voxel);
+    for (size_t i = 0; i < offsets.size(); ++i)
+        for (size_t a = 0; a < 3; ++a)
+            offsets[i][a] = half_to_float(points[3 * i + a]);
+    const float half_voxel = config.voxel_size / 2;
+    float* out = token.data();
+    for (uint32_t i : distance_order(offsets)) {
+        for (uint32_t a = 0; a < 3; ++a)
+            *out++ = normalized(config, a, offsets[i][a] / half_voxel);
+        for (uint32_t a = 0; a < 3; ++a)
+            *out++ = normalized(config, 3 + a, 2 * float(colors[3 * i + a]) / 255 - 1);
+    }
+}
+
+void decode_token(const TransformerConfig& config, std::span<const float> token, std::span<uint16_t> points, std::span<uint8_t> colors)
+{
+    const float half_voxel = config.voxel_size / 2;
+    std::vector<Point> offsets(config.points_per_voxel);
+    for (size_t i = 0; i < offsets.size(); ++i)
+        for (uint32_t a = 0; a < 3; ++a) // rounded to storage before sorting, so that a stored token is in its own order
+            offsets[i][a] = half_to_float(float_to_half(denormalized(config, a, token[6 * i + a]) * half_voxel));
+    size_t to = 0;
+    for (uint32_t i : distance_order(offsets)) {
+        for (uint32_t a = 0; a < 3; ++a, ++to) {
+            points[to] = float_to_half(offsets[i][a]);
+            const float v = denormalized(config, 3 + a, token[6 * i + 3 + a]);
+            colors[to] = uint8_t(std::lround((v + 1) * 127.5f));
+        }
+    }
+}
+
+} // namespace semrover

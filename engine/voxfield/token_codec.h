@@ -1,0 +1,23 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/voxfield/transformer_config.h"
+
+#include <cstdint>
+#include <span>
+
+namespace semrover {
+
+// Stored points <-> model tokens (spec/method.md §1). A token is the cell's n points by increasing distance to its
+// centre (ties by x, y, z, then source order), each x, y, z, r, g, b; offsets / (voxel_size / 2), 2 * rgb - 1, then the
+// model's normalization. All known tokens are made from stored values, so a resumed run sees the same ones.
+
+// points [n, 3] f16 bits in metres, colors [n, 3] sRGB -> token [6n]
+void encode_token(const TransformerConfig& config, std::span<const uint16_t> points, std::span<const uint8_t> colors,
+                  std::span<float> token);
+
+// token [6n] -> points and colours in stored form, clamped to the cell and sorted as above
+void decode_token(const TransformerConfig& config, std::span<const float> token, std::span<uint16_t> points, std::span<uint8_t> colors);
+
+} // namespace semrover

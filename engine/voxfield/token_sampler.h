@@ -1,0 +1,90 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/diffusion/repaint.h"
+#include "engine/voxfield/transformer.h"
+#include "runtime/program.h"
+
+#include <functional>
+#include <memory>
+
+namespace semrover {
+
+// one region of a batch
+struct RegionInput {
+    std::vector<CellIndex> cells;
+    std::vector<uint32_t> labels;
+    std::vector<uint32_t> known; // 1: the token is given in `fixed`
+    std::vector<float> fixed;    // [cells, C]; read where known
+};
+
+struct SamplerOptions {
+    float guidance_scale = 4; // 1: no unconditional half
+    uint64_t seed = 0;
+    uint32_t modulation_window = 64; // timesteps whose modulations are kept at a time: 40 MB for the full-size model
+    // golden cases only: normals come from the caller, who fills [rows, C] before plan row r (0: the first noise)
+    std::function<void(size_t row, std::span<float> normals)> noise;
+};
+
+inline SamplerOptions sampling_options(float guidance_scale, uint64_t seed)
+{
+    SamplerOptions o;
+    o.guidance_scale = guidance_scale;
+    o.seed = seed;
+    return o;
+}
+
+// called after plan rows; returning false stops the run (ErrorCode::interrupted)
+using StepCallback = std::function<bool(size_t done, size_t total)>;
+
+// Denoises batches of regions with the transformer: the graphs are built once per batch shape and replayed for every
+// step, one submit a step. The result of a region depends on nothing but its own input, the plan and the seed.
+class TokenSampler {
+  public:
+    static Result<std::unique_ptr<TokenSampler>> create(Device& device, const Transformer& transformer, const SamplingPlan& plan,
+                                                        SamplerOptions options);
+
+    // device memory of the sampler for `regions` regions of `cells` cells, beside the transformer's own
+    Result<uint64_t> planned_bytes(uint32_t regions, uint32_t cells) const;
+    uint64_t table_bytes() const; // the part of it that is allocated from the start
+
+    // tokens [cells, C] of each region, region after region, known ones as given.
+    // Errors: internal when the network returns NaN or infinity; interrupted; device errors
+    Result<std::vector<float>> run(std::span<const RegionInput> regions, const StepCallback& callback = {});
+
+    // of the batch shape of the last run: passes and barriers of a step, host time of one submit
+    uint32_t step_passes() const;
+    uint32_t step_barriers() const;
+    double host_us_per_step() const;
+    double step_flops() const; // dense: masked attention counts in full
+
+  private:
+    struct Batch; // memory and programs of one batch shape
+    TokenSampler(Device& device, const Transformer& transformer, const SamplingPlan& plan, SamplerOptions options);
+    Status upload_steps();
+    Status make_modulations();
+    void add_tables(Graph& g, StepTable& steps, Tensor& table) const;
+    TokenSets pack(std::span<const RegionInput> regions) const;
+    Result<Batch*> batch_for(const TokenSets& sets);
+    Status upload(Batch& batch, const TokenSets& sets, std::span<const RegionInput> regions);
+    Status use_timestep(uint32_t index);
+    Status feed_noise(Batch& batch, size_t row);
+    Status run_rows(Batch& batch, const StepCallback& callback);
+
+    Device& device_;
+    const Transformer& transformer_;
+    SamplingPlan plan_;
+    SamplerOptions options_;
+    uint32_t halves_, window_; // window: timesteps that the modulation table holds at a time
+    uint32_t first_timestep_ = ~0u;
+    Arena arena_; // what does not depend on the batch
+    uint32_t steps_, clock_, timesteps_, table_;
+    std::unique_ptr<Program> modulations_;
+    std::unique_ptr<Batch> batch_;
+
+  public:
+    ~TokenSampler();
+};
+
+} // namespace semrover

@@ -1,0 +1,103 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/voxfield/voxfield_model.h"
+
+#include "runtime/hash.h"
+#include "runtime/json.h"
+
+#include <algorithm>
+
+namespace semrover {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+template <typename T>
+Status read(const Json& json, const char* name, double low, double high, T& value)
+{
+    if (!json.contains(name))
+        return {};
+    if (!json[name].is_number() || !(json[name].get<double>() >= low && json[name].get<double>() <= high))
+        return fail(ErrorCode::bad_input, "model_index.json: defaults.{} is {}, expected {}..{}", name, json[name].dump(), low, high);
+    value = json[name].get<T>();
+    return {};
+}
+
+Status read_defaults(const Json& index, VoxfieldDefaults& d)
+{
+    const Json json = index.value("defaults", Json::object());
+    if (!json.is_object())
+        return fail(ErrorCode::bad_input, "model_index.json: defaults must be an object");
+    SR_CHECK(read(json, "num_inference_steps", 1, kMaxInferenceSteps, d.num_inference_steps));
+    SR_CHECK(read(json, "guidance_scale", 0, 1000, d.guidance_scale));
+    SR_CHECK(read(json, "region_size", 1, 4096, d.regions.region_size));
+    SR_CHECK(read(json, "coverage_threshold", 1, 4096, d.regions.coverage_threshold));
+    SR_CHECK(read(json, "jump_length", 0, 10000, d.repaint.jump_length));
+    return read(json, "jump_n_sample", 1, 10000, d.repaint.jump_n_sample);
+}
+
+// no scheduler in the folder: the method's own, DDPM over x0
+SchedulerConfig method_scheduler(std::optional<Sampler> sampler)
+{
+    SchedulerConfig c;
+    c.sampler = sampler.value_or(Sampler::ddpm);
+    c.prediction = Prediction::sample;
+    return c;
+}
+
+} // namespace
+
+Result<VoxfieldModel> VoxfieldModel::open(const Path& folder, std::optional<Sampler> sampler)
+{
+    VoxfieldModel m;
+    m.folder = folder;
+    m.transformer = folder / "voxfield_transformer";
+    if (!fs::exists(m.transformer) && fs::exists(folder / "config.json"))
+        m.transformer = folder; // the component itself was given
+    if (!fs::exists(m.transformer / "config.json"))
+        return fail(ErrorCode::bad_input, "'{}' has no voxfield_transformer/config.json: a model is a folder in the diffusers layout",
+                    folder.string());
+    SR_TRY(m.config, read_transformer_config(m.transformer));
+    m.warnings = m.config.warnings;
+    if (fs::exists(folder / "model_index.json")) {
+        SR_TRY(const Json index, read_json(folder / "model_index.json"));
+        SR_CHECK(read_defaults(index, m.defaults));
+    }
+    const Path scheduler = folder / "voxfield_scheduler" / "scheduler_config.json";
+    m.scheduler = method_scheduler(sampler);
+    if (fs::exists(scheduler)) {
+        SR_TRY(const std::string text, read_text_file(scheduler, 1 << 20));
+        auto config = scheduler_config_from_text(text, m.warnings, sampler);
+        if (!config)
+            return fail(ErrorCode::bad_input, "{}: {}", scheduler.string(), config.error().message);
+        m.scheduler = *config;
+    }
+    if (m.scheduler.prediction != Prediction::sample)
+        return fail(ErrorCode::bad_input, "{}: the transformer predicts x0, so prediction_type must be \"sample\"", scheduler.string());
+    if (m.scheduler.sampler == Sampler::euler)
+        return fail(ErrorCode::bad_input, "the euler sampler cannot hold known tokens; use ddpm, ddim or dpm++2m");
+    m.scheduler.clip_sample = true; // the method clips x0 to [-1, 1] with every sampler
+    return m;
+}
+
+Result<uint64_t> hash_folder(const Path& folder)
+{
+    std::vector<Path> files;
+    std::error_code error;
+    for (const auto& entry : fs::directory_iterator(folder, error))
+        if (entry.is_regular_file())
+            files.push_back(entry.path());
+    if (error)
+        return fail(ErrorCode::bad_input, "cannot list '{}': {}", folder.string(), error.message());
+    std::sort(files.begin(), files.end());
+    Hash hash;
+    for (const Path& path : files) {
+        SR_TRY(const MappedFile file, MappedFile::open(path));
+        hash.add(path.filename().string());
+        hash.add(file.bytes());
+    }
+    return hash.value();
+}
+
+} // namespace semrover

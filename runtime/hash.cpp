@@ -1,0 +1,31 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "runtime/hash.h"
+
+#include <fmt/format.h>
+
+#include <xxhash.h>
+
+namespace semrover {
+
+struct Hash::State {
+    XXH64_state_t* xxh = XXH64_createState();
+    ~State() { XXH64_freeState(xxh); }
+};
+
+Hash::Hash() : state_(std::make_unique<State>()) { XXH64_reset(state_->xxh, 0); }
+Hash::~Hash() = default;
+
+void Hash::add(std::span<const std::byte> bytes)
+{
+    const uint64_t size = bytes.size();
+    XXH64_update(state_->xxh, &size, sizeof size);
+    if (size)
+        XXH64_update(state_->xxh, bytes.data(), bytes.size());
+}
+
+uint64_t Hash::value() const { return XXH64_digest(state_->xxh); }
+
+std::string hash_text(uint64_t hash) { return fmt::format("{:016x}", hash); }
+
+} // namespace semrover

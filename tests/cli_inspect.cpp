@@ -1,0 +1,117 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/program.h"
+#include "tests/safetensors_bytes.h"
+
+#include <algorithm>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+namespace semrover {
+namespace {
+
+const std::string kAssets = SEMROVER_SOURCE_DIR "/assets";
+
+void expect_error(const ProgramResult& result, int code, std::string_view text)
+{
+    EXPECT_EQ(result.code, code);
+    EXPECT_TRUE(result.err.starts_with("semrover: error: ")) << result.err;
+    EXPECT_NE(result.err.find(text), std::string::npos) << result.err;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    EXPECT_EQ(result.out, "");
+}
+
+TEST(CliInspect, a_grid_shows_its_cells_and_labels)
+{
+    const ProgramResult text = semrover_program("inspect " + kAssets + "/scenes/street.truth.sgrid");
+    EXPECT_EQ(text.code, 0);
+    EXPECT_EQ(text.err, "");
+    EXPECT_NE(text.out.find("vegetation  788"), std::string::npos) << text.out;
+    const ProgramResult result = semrover_program("inspect --json " + kAssets + "/scenes/street.semantic.sgrid");
+    const auto json = nlohmann::json::parse(result.out);
+    EXPECT_EQ(json["cells"], 3710);
+    EXPECT_EQ(json["voxel_size"], 0.6);
+    EXPECT_EQ(json["labels"]["road"], 416);
+    EXPECT_EQ(json["points"], 0);
+    EXPECT_EQ(json["extent"]["max_m"], nlohmann::json({30.6, 12.6, 9.6}));
+}
+
+TEST(CliInspect, a_model_shows_components_config_and_weights)
+{
+    const ProgramResult result = semrover_program("--json inspect " + kAssets + "/model");
+    ASSERT_EQ(result.code, 0) << result.err;
+    const auto json = nlohmann::json::parse(result.out);
+    const auto& transformer = json["components"]["voxfield_transformer"];
+    EXPECT_EQ(transformer["class"], "VoxfieldTransformer");
+    EXPECT_EQ(transformer["config"]["num_layers"], 6);
+    EXPECT_EQ(transformer["weights"]["dtypes"]["F16"], 175);
+    EXPECT_EQ(transformer["weights"]["list"].size(), 175u);
+    EXPECT_EQ(json["parameters"], 7764024);
+    EXPECT_EQ(json["bytes"], 2 * 7764024);
+    const ProgramResult text = semrover_program("inspect " + kAssets + "/model");
+    EXPECT_NE(text.out.find("parameters  7764024"), std::string::npos);
+    EXPECT_EQ(text.out.find("proj_in.weight"), std::string::npos); // the list needs -v
+    EXPECT_NE(semrover_program("inspect -v " + kAssets + "/model").out.find("proj_in.weight"), std::string::npos);
+}
+
+TEST(CliInspect, a_model_without_a_component_and_a_single_component_are_shown_too)
+{
+    const ScratchFolder folder;
+    folder.put("model_index.json", R"({"a":["x","Unet"],"b":[null,null],"c":false,"d":["x","Scheduler"]})");
+    std::filesystem::create_directory(folder / "d");
+    folder.put("d/scheduler_config.json", R"({"beta_end":1})");
+    const ProgramResult model = semrover_program("inspect --json " + folder.path().string());
+    ASSERT_EQ(model.code, 0) << model.err;
+    const auto json = nlohmann::json::parse(model.out);
+    EXPECT_TRUE(json["components"]["a"].contains("missing"));
+    EXPECT_EQ(json["components"].size(), 2u);
+    EXPECT_EQ(json["components"]["d"]["config"]["beta_end"], 1);
+    const ProgramResult part = semrover_program("inspect " + kAssets + "/model/voxfield_transformer");
+    EXPECT_NE(part.out.find("num_layers"), std::string::npos);
+}
+
+TEST(CliInspect, what_it_cannot_show_ends_with_one_line_and_code_3)
+{
+    const ScratchFolder folder;
+    expect_error(semrover_program("inspect " + (folder / "none").string()), 3, "No such file");
+    expect_error(semrover_program("inspect " + folder.path().string()), 3,
+                 "found neither model_index.json nor config.json");
+    expect_error(semrover_program("inspect " + folder.put("m.ckpt", "x").string()), 3, "convert it with Python");
+    expect_error(semrover_program("inspect " + folder.put("g.sgrid", safetensors_bytes("{}")).string()), 3,
+                 "2 missing: cells [0, 3], labels [0]");
+    expect_error(semrover_program("inspect " + folder.put("x.safetensors", "short").string()), 3, "found only 5 bytes");
+    folder.put("model_index.json", R"({"../up":["x","Unet"]})");
+    expect_error(semrover_program("inspect " + folder.path().string()), 3, "no name of a component's folder");
+    expect_error(semrover_program("inspect " + kAssets + "/scenes/street.truth.sgrid >/dev/full"), 3,
+                 "cannot write to standard output");
+}
+
+TEST(CliInspect, names_from_a_file_cannot_steer_the_terminal)
+{
+    const ScratchFolder folder;
+    const auto file = folder.put("x", safetensors_bytes(R"({"__metadata__":{"k":"a\u001b[31m\nb"}})"));
+    const ProgramResult result = semrover_program("inspect " + file.string());
+    EXPECT_EQ(result.out.find('\x1b'), std::string::npos);
+    EXPECT_NE(result.out.find("a\\x1b[31m\\x0ab"), std::string::npos) << result.out;
+}
+
+TEST(Cli, a_usage_error_ends_with_code_2)
+{
+    expect_error(semrover_program(""), 2, "no command given");
+    expect_error(semrover_program("dance"), 2, "dance");
+    expect_error(semrover_program("inspect"), 2, "FILE|DIR is required");
+    expect_error(semrover_program("inspect --sideways x"), 2, "sideways");
+    expect_error(semrover_program("inspect x --max-vram lots"), 2, "max-vram");
+}
+
+TEST(Cli, help_and_version_end_with_code_0)
+{
+    EXPECT_EQ(semrover_program("--version").code, 0);
+    const ProgramResult help = semrover_program("--help");
+    EXPECT_EQ(help.code, 0);
+    EXPECT_NE(help.out.find("inspect"), std::string::npos);
+    EXPECT_EQ(semrover_program("inspect --help").code, 0);
+}
+
+} // namespace
+} // namespace semrover

@@ -1,0 +1,306 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/scene/camera_path.h"
+#include "engine/scene/rig.h"
+#include "tests/says.h"
+#include "tests/scratch_folder.h"
+
+#include <cmath>
+#include <gtest/gtest.h>
+#include <random>
+
+namespace semrover {
+namespace {
+
+const Intrinsics kView = pinhole_from_fov(90, 616, 424);
+
+void expect_near(const Rigid& a, const Rigid& b, double tolerance)
+{
+    for (size_t i = 0; i < 16; ++i)
+        EXPECT_NEAR(a[i], b[i], tolerance) << "element " << i;
+}
+
+// a path of `count` arbitrary poses with times that are not round
+CameraPath random_path(size_t count)
+{
+    std::mt19937 random(11);
+    const auto number = [&] { return static_cast<double>(random()) / 2147483648.0 - 1; };
+    CameraPath path;
+    while (path.frames.size() < count) {
+        Quaternion q = {number(), number(), number(), number()};
+        const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+        for (double& v : q)
+            v /= norm;
+        const Rigid pose = rigid_from_quaternion({number() * 900, number() * 900, number()}, q, "t").value();
+        path.frames.push_back({0.1 * static_cast<double>(path.frames.size()), "", {pose}, kView});
+    }
+    return path;
+}
+
+// pixels of the corners of a cube of edge 2 around (3, 0, 0), seen from the origin along +x with 90 degrees and 8 x 8
+void expect_cube(const CameraFrame& frame)
+{
+    for (const double x : {2.0, 4.0})
+        for (const double y : {-1.0, 1.0})
+            for (const double z : {-1.0, 1.0}) {
+                const auto pixel = project(frame, {x, y, z});
+                ASSERT_TRUE(pixel);
+                EXPECT_NEAR(pixel->x, 4 - 4 * y / x, 1e-9); // left in the world is left in the picture
+                EXPECT_NEAR(pixel->y, 4 - 4 * z / x, 1e-9); // up is up
+                EXPECT_NEAR(pixel->depth, x, 1e-9);
+            }
+    EXPECT_FALSE(project(frame, {-1, 0, 0}));
+}
+
+TEST(Camera, a_known_cube_falls_on_known_pixels_from_every_format)
+{
+    const ScratchFolder folder;
+    const Intrinsics view = pinhole_from_fov(90, 8, 8);
+    EXPECT_DOUBLE_EQ(view.fx, 4);
+    EXPECT_DOUBLE_EQ(view.cx, 4);
+    expect_cube(read_tum(folder.put("a.tum", "0 0 0 0 -0.5 0.5 -0.5 0.5"), view)->frames[0]);
+    // right = -y, up = +z, back = -x
+    const auto transforms = read_transforms(folder.put("a.json", R"({"w":8,"h":8,"camera_angle_x":1.5707963267948966,
+        "frames":[{"transform_matrix":[[0,0,-1,0],[-1,0,0,0],[0,1,0,0],[0,0,0,1]]}]})"));
+    ASSERT_TRUE(transforms) << transforms.error().message;
+    expect_cube(transforms->frames[0]);
+}
+
+TEST(Camera, pixel_centres_are_at_one_half)
+{
+    const CameraFrame frame{0, "", {}, pinhole_from_fov(90, 2, 2)};
+    // the ray through the centre of pixel (0, 0) of 2 x 2 is halfway between the axis and the corner
+    const auto pixel = project(frame, {-0.5, -0.5, 1});
+    EXPECT_DOUBLE_EQ(pixel->x, 0.5);
+    EXPECT_DOUBLE_EQ(pixel->y, 0.5);
+    EXPECT_NEAR(project(frame, {-1, -1, 1})->x, 0, 1e-15);
+}
+
+TEST(Camera, a_scaled_view_sees_the_same_edges)
+{
+    const Intrinsics half = scaled_to(kView, 308, 106);
+    EXPECT_DOUBLE_EQ(half.fx, kView.fx / 2);
+    EXPECT_DOUBLE_EQ(half.cx, 154);
+    EXPECT_DOUBLE_EQ(half.fy, kView.fy / 4);
+    EXPECT_DOUBLE_EQ(half.cy, 53);
+    const Intrinsics back = scaled_to(half, 616, 424);
+    EXPECT_DOUBLE_EQ(back.fx, kView.fx);
+    EXPECT_DOUBLE_EQ(back.cy, kView.cy);
+}
+
+TEST(Camera, the_street_path_drives_along_the_road)
+{
+    const auto path = read_tum(SEMROVER_SOURCE_DIR "/assets/scenes/street.tum", kView);
+    ASSERT_TRUE(path) << path.error().message;
+    ASSERT_EQ(path->frames.size(), 24u);
+    const CameraFrame& first = path->frames[0];
+    EXPECT_EQ(first.intrinsics, kView);
+    const auto ahead = project(first, {11, 0, 1.7});
+    EXPECT_NEAR(ahead->x, 308, 1e-9);
+    EXPECT_NEAR(ahead->y, 212, 1e-9);
+    EXPECT_NEAR(ahead->depth, 10, 1e-9);
+    EXPECT_LT(project(first, {11, 2, 1.7})->x, 308); // left of the road
+    EXPECT_GT(project(first, {11, 0, 0})->y, 212);   // the road itself
+    for (const CameraFrame& frame : path->frames)
+        EXPECT_NEAR(translation_of(frame.pose.camera_to_world())[2], 1.7, 1e-9);
+    EXPECT_DOUBLE_EQ(path->frames[23].time, 2.3);
+}
+
+TEST(Camera, a_tum_path_reads_back_the_same)
+{
+    const ScratchFolder folder;
+    const CameraPath path = random_path(50);
+    ASSERT_TRUE(write_tum(folder / "a.tum", path));
+    const auto read = read_camera_path(folder / "a.tum", kView);
+    ASSERT_TRUE(read) << read.error().message;
+    ASSERT_EQ(read->frames.size(), 50u);
+    for (size_t i = 0; i < 50; ++i) {
+        EXPECT_EQ(read->frames[i].time, path.frames[i].time);
+        expect_near(read->frames[i].pose.world_to_camera, path.frames[i].pose.world_to_camera, 1e-11);
+    }
+}
+
+TEST(Camera, a_transforms_file_reads_back_the_same)
+{
+    const ScratchFolder folder;
+    CameraPath path = random_path(12);
+    for (size_t i = 0; i < 12; ++i)
+        path.frames[i].camera = i % 2 ? "left" : "front";
+    path.frames[5].intrinsics = {300, 310, 151.5, 99.25, 303, 201};
+    ASSERT_TRUE(write_transforms(folder / "a.json", path));
+    const auto read = read_camera_path(folder / "a.json", pinhole_from_fov(60, 10, 10));
+    ASSERT_TRUE(read) << read.error().message;
+    ASSERT_EQ(read->frames.size(), 12u);
+    for (size_t i = 0; i < 12; ++i) {
+        EXPECT_EQ(read->frames[i].time, path.frames[i].time);
+        EXPECT_EQ(read->frames[i].camera, path.frames[i].camera);
+        EXPECT_EQ(read->frames[i].intrinsics, path.frames[i].intrinsics);
+        expect_near(read->frames[i].pose.world_to_camera, path.frames[i].pose.world_to_camera, 1e-11);
+    }
+    EXPECT_NE(contents(folder / "a.json").find("\"left/color/000005.png\""), std::string::npos);
+}
+
+TEST(Camera, intrinsics_of_a_transforms_file_come_from_frame_then_file_then_fallback)
+{
+    const ScratchFolder folder;
+    const std::string pose = R"("transform_matrix":[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]])";
+    const auto read = [&](const std::string& file, const std::string& frame, std::optional<Intrinsics> fallback = {}) {
+        return read_transforms(folder.put("a.json", fmt::format("{{{}\"frames\":[{{{}{}}}]}}", file, frame, pose)),
+                               fallback);
+    };
+    EXPECT_EQ(read(R"("w":20,"h":10.0,"fl_x":7,"fl_y":8,"cx":9,"cy":4,)", "")->frames[0].intrinsics,
+              (Intrinsics{7, 8, 9, 4, 20, 10}));
+    EXPECT_EQ(read(R"("w":20,"h":10,"fl_x":7,)", "")->frames[0].intrinsics, (Intrinsics{7, 7, 10, 5, 20, 10}));
+    EXPECT_EQ(read(R"("w":20,"h":10,"fl_x":7,)", R"("w":40,"fl_x":14,)")->frames[0].intrinsics,
+              (Intrinsics{14, 14, 20, 5, 40, 10}));
+    EXPECT_NEAR(read(R"("camera_angle_x":1.5707963267948966,)", "", kView)->frames[0].intrinsics.fx, 308, 1e-9);
+    EXPECT_EQ(read("", "", kView)->frames[0].intrinsics, kView);
+    EXPECT_DOUBLE_EQ(read(R"("w":308,"h":212,)", "", kView)->frames[0].intrinsics.fx, kView.fx / 2);
+    EXPECT_TRUE(says(read(R"("fl_x":7,)", ""), "frame 0: no image size (w, h)"));
+    EXPECT_TRUE(says(read(R"("w":20,"h":10,)", ""), "frame 0: no focal length"));
+    EXPECT_TRUE(says(read(R"("w":0,"h":10,"fl_x":7,)", ""), "frame 0: w: expected an image size of 1 to 16384"));
+    EXPECT_TRUE(says(read(R"("w":1.5,"h":10,"fl_x":7,)", ""), "expected an image size"));
+    EXPECT_TRUE(says(read(R"("w":"20","h":10,"fl_x":7,)", ""), "frame 0: w: expected a number, found string"));
+    EXPECT_TRUE(says(read(R"("w":20,"h":10,"fl_x":-7,)", ""), "expected focal lengths above 0"));
+    EXPECT_TRUE(says(read(R"("w":20,"h":10,"fl_x":7,)", R"("k1":0.1,)"), "lens distortion k1 = 0.1 is not supported"));
+    EXPECT_TRUE(says(read(R"("camera_model":"OPENCV_FISHEYE","w":20,"h":10,"fl_x":7,)", ""),
+                     "camera_model 'OPENCV_FISHEYE' is not supported"));
+    EXPECT_TRUE(read(R"("camera_model":"PINHOLE","k1":0,"p2":0.0,"w":20,"h":10,"fl_x":7,)", ""));
+    EXPECT_TRUE(
+        says(read(R"("w":20,"h":10,"fl_x":7,)", R"("camera":"../../etc",)"), "camera: expected a name of letters"));
+    EXPECT_TRUE(says(read(R"("w":20,"h":10,"fl_x":7,)", R"("time":"x",)"), "time: expected a number"));
+}
+
+TEST(Camera, a_transforms_file_of_another_form_is_refused)
+{
+    const ScratchFolder folder;
+    const auto read = [&](const char* text) { return read_transforms(folder.put("a.json", text), kView); };
+    const auto pose = [&](const char* matrix) {
+        return read(fmt::format(R"({{"frames":[{{"transform_matrix":{}}}]}})", matrix).c_str());
+    };
+    EXPECT_TRUE(says(read("[]"), "expected an object with an array of frames"));
+    EXPECT_TRUE(says(read("{\"frames\":7}"), "expected an object with an array of frames"));
+    EXPECT_TRUE(says(read("{\"frames\":[]}"), "a camera path without poses"));
+    EXPECT_TRUE(says(read("{\"frames\":[7]}"), "frame 0: expected an object with a transform_matrix"));
+    EXPECT_TRUE(says(pose("7"), "transform_matrix: expected an array of numbers"));
+    EXPECT_TRUE(says(pose("[[1,0,0,0]]"), "expected a 4x4 or 3x4 matrix, found 4 numbers"));
+    EXPECT_TRUE(says(pose("[[1,0,0,\"x\"],[0,1,0,0],[0,0,1,0],[0,0,0,1]]"), "expected a number, found string"));
+    EXPECT_TRUE(says(pose("[[2,0,0,0],[0,2,0,0],[0,0,2,0],[0,0,0,1]]"), "expected a rotation without scale or mirror"));
+    EXPECT_TRUE(says(pose("[[-1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]"), "mirrored"));
+    EXPECT_TRUE(says(pose("[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,2]]"), "last row is 0 0 0 1"));
+    EXPECT_TRUE(pose("[[1,0,0,5],[0,1,0,0],[0,0,1,0]]"));
+}
+
+TEST(Camera, a_broken_tum_line_is_named)
+{
+    const ScratchFolder folder;
+    const auto read = [&](const char* text) { return read_tum(folder.put("a.tum", text), kView); };
+    EXPECT_TRUE(says(read(""), "a camera path without poses"));
+    EXPECT_TRUE(says(read("# only\n\n  # comments\n"), "a camera path without poses"));
+    EXPECT_TRUE(
+        says(read("# c\n0 0 0 0 0 0 0\n"), "a.tum' line 2: expected the 8 numbers t tx ty tz qx qy qz qw, found 7"));
+    EXPECT_TRUE(says(read("0 0 0 0 0 0 0 1 9\n"), "line 1: expected the 8 numbers t tx ty tz qx qy qz qw, found more"));
+    EXPECT_TRUE(says(read("0 0 0 0 0 0 0 one\n"), "line 1: expected a number, found 'one'"));
+    EXPECT_TRUE(says(read("0 0 0 0 0 0 0 1x\n"), "expected a number, found '1x'"));
+    EXPECT_TRUE(says(read("0 nan 0 0 0 0 0 1\n"), "a number that is not finite"));
+    EXPECT_TRUE(says(read("inf 0 0 0 0 0 0 1\n"), "a time that is not finite"));
+    EXPECT_TRUE(says(read("0 0 0 0 0 0 0 1e999\n"), "expected a number"));
+    EXPECT_TRUE(says(read("0 0 0 0 0 0 0 0\n"), "expected a quaternion of norm 1, found 0"));
+    EXPECT_TRUE(says(read("0 0 0 0 0 0 0 1.2\n"), "expected a quaternion of norm 1, found 1.2"));
+    EXPECT_TRUE(says(read_tum(folder / "none", kView), "No such file"));
+    EXPECT_TRUE(says(read_tum(folder.put("b", "0 0 0 0 0 0 0 1"), {}), "an image of 0 x 0 pixels"));
+    const auto good = read("0\t+1 0 0 0 0 0 1.05 # note\r\n\r\n1 0 0 0 0 0 0 -1");
+    ASSERT_TRUE(good) << good.error().message;
+    EXPECT_EQ(good->frames.size(), 2u);
+    expect_near(good->frames[1].pose.world_to_camera, kIdentity, 1e-15);
+    EXPECT_DOUBLE_EQ(translation_of(good->frames[0].pose.camera_to_world())[0], 1);
+}
+
+TEST(Camera, a_path_file_over_16_mib_is_refused)
+{
+    const ScratchFolder folder;
+    const auto file = folder.put("a.tum", std::string((16u << 20) + 1, '\n'));
+    EXPECT_TRUE(says(read_tum(file, kView), "expected at most 16777216 bytes"));
+    EXPECT_TRUE(says(read_transforms(file, kView), "expected at most 16777216 bytes"));
+}
+
+TEST(Rigid, an_inverse_undoes_and_a_quaternion_returns)
+{
+    for (const CameraFrame& frame : random_path(100).frames) {
+        const Rigid& a = frame.pose.world_to_camera;
+        expect_near(compose(a, inverse(a)), kIdentity, 1e-12);
+        expect_near(rigid_from_quaternion(translation_of(a), quaternion_of(a), "t").value(), a, 1e-13);
+        EXPECT_GE(quaternion_of(a)[3], 0);
+    }
+    for (const Quaternion& q : {Quaternion{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}) // half turns
+        expect_near(rigid_from_quaternion({}, quaternion_of(rigid_from_quaternion({}, q, "t").value()), "t").value(),
+                    rigid_from_quaternion({}, q, "t").value(), 1e-15);
+}
+
+constexpr const char* kRig = R"({"sensors":[
+    {"name":"front","model":"pinhole","width":8,"height":8,"fov":90,
+     "sensor_to_vehicle":{"translation":[1,0,0.5],"rotation":[-0.5,0.5,-0.5,0.5]}},
+    {"name":"left","width":8,"height":4,"fx":4,"fy":4,"cx":4,"cy":2,
+     "sensor_to_vehicle":[[1,0,0,0],[0,0,1,0],[0,-1,0,0],[0,0,0,1]]}]})";
+
+TEST(Rig, every_pose_of_the_path_gives_a_frame_of_every_sensor)
+{
+    const ScratchFolder folder;
+    const auto rig = read_rig(folder.put("rig.json", kRig));
+    ASSERT_TRUE(rig) << rig.error().message;
+    const auto drive = read_tum(folder.put("a.tum", "0 10 0 0 -0.5 0.5 -0.5 0.5\n1 20 0 0 -0.5 0.5 -0.5 0.5"), kView);
+    const CameraPath path = expand_rig(*rig, *drive);
+    ASSERT_EQ(path.frames.size(), 4u);
+    EXPECT_EQ(path.frames[2].camera, "front");
+    EXPECT_EQ(path.frames[2].time, 1);
+    EXPECT_EQ(path.frames[3].camera, "left");
+    EXPECT_EQ(path.frames[3].intrinsics, (Intrinsics{4, 4, 4, 2, 8, 4}));
+    // front: at x = 11, 0.5 m up; left: looks along +y
+    const auto front = project(path.frames[0], {13, 0, 0.5});
+    EXPECT_NEAR(front->x, 4, 1e-12);
+    EXPECT_NEAR(front->y, 4, 1e-12);
+    EXPECT_NEAR(front->depth, 2, 1e-12);
+    const auto left = project(path.frames[1], {11, 4, 1}); // ahead of the vehicle is right in the left picture
+    EXPECT_NEAR(left->x, 5, 1e-12);
+    EXPECT_NEAR(left->y, 1, 1e-12);
+    EXPECT_NEAR(left->depth, 4, 1e-12);
+}
+
+TEST(Rig, a_path_of_vehicle_poses_is_taken_as_such)
+{
+    const ScratchFolder folder;
+    std::string text = kRig;
+    text.insert(1, R"("path_axes":"vehicle",)");
+    const auto rig = read_rig(folder.put("rig.json", text));
+    ASSERT_TRUE(rig) << rig.error().message;
+    const auto drive = read_tum(folder.put("a.tum", "0 10 0 0 0 0 0 1"), kView);
+    EXPECT_NEAR(project(expand_rig(*rig, *drive).frames[0], {13, 0, 0.5})->depth, 2, 1e-12);
+}
+
+TEST(Rig, what_is_wrong_with_a_rig_is_named)
+{
+    const ScratchFolder folder;
+    const auto changed = [&](std::string_view from, std::string_view to) {
+        std::string text = kRig;
+        const size_t at = text.find(from);
+        EXPECT_NE(at, std::string::npos) << from;
+        return read_rig(folder.put("rig.json", text.replace(at, from.size(), to)));
+    };
+    EXPECT_TRUE(says(read_rig(folder.put("r", "{\"sensors\":[]}")), "expected 1 to 64 sensors, found 0"));
+    EXPECT_TRUE(says(read_rig(folder.put("r", "[]")), "expected an object with an array of sensors"));
+    EXPECT_TRUE(says(changed("\"left\"", "\"front\""), "two sensors are called 'front'"));
+    EXPECT_TRUE(says(changed("\"left\"", "\"a/b\""), "sensor 1: expected a name of letters"));
+    EXPECT_TRUE(says(changed("\"pinhole\"", "\"fisheye\""), "sensor 0: model \"fisheye\" is not supported"));
+    EXPECT_TRUE(says(changed("\"fov\":90", "\"fov\":180"), "expected a fov above 0 and below 180 degrees"));
+    EXPECT_TRUE(says(changed("\"fov\":90", "\"fov\":90,\"fx\":4"), "found both"));
+    EXPECT_TRUE(says(changed("\"fov\":90", "\"fovx\":90"), "unknown key 'fovx'"));
+    EXPECT_TRUE(says(changed("\"fy\":4,", ""), "sensor 1: fy is missing"));
+    EXPECT_TRUE(says(changed("\"width\":8", "\"width\":0"), "sensor 0: width: expected an image size"));
+    EXPECT_TRUE(says(changed("[1,0,0.5]", "[1,0]"), "expected a translation of 3"));
+    EXPECT_TRUE(says(changed("[-0.5,0.5,-0.5,0.5]", "[0,0,0,0]"), "expected a quaternion of norm 1"));
+    EXPECT_TRUE(says(changed("[1,0,0,0]", "[2,0,0,0]"), "sensor 1: sensor_to_vehicle: expected a rotation"));
+    EXPECT_TRUE(says(changed("{\"sensors\"", "{\"path_axes\":\"x\",\"sensors\""), "path_axes: expected"));
+}
+
+} // namespace
+} // namespace semrover

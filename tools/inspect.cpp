@@ -1,0 +1,278 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// semrover inspect FILE|DIR: what is in a model or a grid. The report is one JSON object; without --json it is printed
+// as indented text.
+#include "engine/scene/grid.h"
+#include "engine/scene/palette.h"
+#include "runtime/json.h"
+#include "runtime/quote.h"
+#include "runtime/safetensors.h"
+#include "tools/commands.h"
+#include "tools/progress.h"
+
+#include <algorithm>
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <set>
+
+namespace semrover {
+
+namespace {
+
+using Report = nlohmann::ordered_json;
+
+// "a: 1" lines; objects indent, arrays of objects are a line an entry
+void append_text(std::string& out, const Report& report, size_t indent)
+{
+    size_t width = 0;
+    for (const auto& item : report.items())
+        width = std::max(width, std::min<size_t>(item.key().size(), 40));
+    const auto scalar = [](const Report& value) {
+        return printable(value.is_string() ? value.get<std::string>() : value.dump(-1, ' ', true), 1000);
+    };
+    for (const auto& item : report.items()) {
+        const Report& value = item.value();
+        const std::string key = printable(item.key(), 1000);
+        out += fmt::format("{:{}}", "", indent);
+        if (value.is_object() && !value.empty()) {
+            out += key + "\n";
+            append_text(out, value, indent + 2);
+        } else if (value.is_array() && !value.empty() && value[0].is_object()) {
+            out += key + "\n";
+            for (const Report& entry : value) {
+                out += fmt::format("{:{}}", "", indent + 2);
+                for (const auto& field : entry.items())
+                    out += fmt::format("{}  ", scalar(field.value()));
+                out.resize(out.size() - 2);
+                out += "\n";
+            }
+        } else if (key == "bytes" && value.is_number_unsigned()) {
+            out += fmt::format("{:{}}  {} ({})\n", key, width, scalar(value), bytes_text(value.get<uint64_t>()));
+        } else {
+            out += fmt::format("{:{}}  {}\n", key, width, scalar(value));
+        }
+    }
+}
+
+// ---- weights
+
+struct Totals {
+    uint64_t parameters = 0, bytes = 0;
+};
+
+Report tensor_list(const SafetensorsSet& set)
+{
+    Report list = Report::array();
+    for (const TensorInfo& t : set.tensors())
+        list.push_back({{"name", t.name}, {"dtype", dtype_name(t.dtype)}, {"shape", t.shape}});
+    for (const UnsupportedTensor& t : set.unsupported())
+        list.push_back({{"name", t.name}, {"dtype", t.dtype}, {"shape", t.shape}, {"note", "not supported"}});
+    return list;
+}
+
+Report describe_weights(const SafetensorsSet& set, bool with_tensors, Totals& totals)
+{
+    Totals own;
+    std::map<std::string, uint64_t> dtypes;
+    for (const TensorInfo& t : set.tensors()) {
+        own.parameters += t.elements();
+        own.bytes += t.bytes();
+        ++dtypes[dtype_name(t.dtype)];
+    }
+    for (const UnsupportedTensor& t : set.unsupported()) {
+        own.bytes += t.end - t.begin;
+        ++dtypes[t.dtype];
+    }
+    totals.parameters += own.parameters;
+    totals.bytes += own.bytes;
+    Report report = {{"file", set.path().filename().string()}};
+    if (set.shards().size() > 1)
+        report["shards"] = set.shards().size();
+    report["tensors"] = set.tensors().size() + set.unsupported().size();
+    report["parameters"] = own.parameters;
+    report["bytes"] = own.bytes;
+    report["dtypes"] = dtypes;
+    const Status finite = check_finite(set);
+    report["finite"] = finite ? "yes" : finite.error().message;
+    if (set.shards().size() == 1 && !set.shards()[0].metadata().empty())
+        report["metadata"] = set.shards()[0].metadata();
+    if (with_tensors)
+        report["list"] = tensor_list(set);
+    return report;
+}
+
+// ---- a model's folder
+
+bool is_there(const Path& path)
+{
+    std::error_code ignored;
+    return std::filesystem::exists(path, ignored);
+}
+
+// the component's weights, whatever their base name; none for a folder without (a scheduler, a tokenizer)
+Result<std::optional<SafetensorsSet>> open_weights(const Path& folder)
+{
+    std::error_code ignored;
+    std::set<Path> files;
+    bool pickle = false;
+    for (const auto& entry : std::filesystem::directory_iterator(folder, ignored)) {
+        const Path extension = entry.path().extension();
+        if (extension == ".safetensors")
+            files.insert(entry.path());
+        pickle = pickle || extension == ".bin" || extension == ".pt" || extension == ".ckpt";
+    }
+    if (files.empty() && !pickle)
+        return std::optional<SafetensorsSet>();
+    const bool diffusers = std::ranges::any_of(
+        files, [](const Path& file) { return file.filename().native().starts_with("diffusion_pytorch_model"); });
+    if (files.empty() || diffusers) {
+        SR_TRY(SafetensorsSet set, SafetensorsSet::open_folder(folder));
+        return std::optional(std::move(set));
+    }
+    SR_TRY(SafetensorsSet set, is_there(folder / "model.safetensors.index.json")
+                                   ? SafetensorsSet::open(folder / "model.safetensors.index.json")
+                                   : SafetensorsSet::open(*files.begin()));
+    return std::optional(std::move(set));
+}
+
+Result<Report> describe_component(const Path& folder, bool with_tensors, Totals& totals)
+{
+    Report report = Report::object();
+    for (const char* name : {"config.json", "scheduler_config.json"})
+        if (is_there(folder / name)) {
+            SR_TRY(const Json config, read_json(folder / name));
+            report["config"] = config;
+        }
+    SR_TRY(const std::optional<SafetensorsSet> weights, open_weights(folder));
+    if (weights)
+        report["weights"] = describe_weights(*weights, with_tensors, totals);
+    return report;
+}
+
+// a component's name becomes a path
+bool is_folder_name(std::string_view name)
+{
+    return !name.empty() && name[0] != '.' && name.find_first_of("/\\") == std::string_view::npos;
+}
+
+Result<Report> describe_components(const Path& folder, const Json& index, bool with_tensors, Totals& totals)
+{
+    Report components = Report::object();
+    for (const auto& [name, value] : index.items()) {
+        // [library, class]; anything else is a setting, [null, null] a component that was left out
+        if (!value.is_array() || value.size() != 2 || !value[1].is_string())
+            continue;
+        if (!is_folder_name(name))
+            return fail(ErrorCode::bad_input, "{}: {} is no name of a component's folder",
+                        quote_path(folder / "model_index.json"), quote(name));
+        Report component = {{"class", value[1].get<std::string>()}};
+        if (is_there(folder / name)) {
+            SR_TRY(const Report found, describe_component(folder / name, with_tensors, totals));
+            component.update(found);
+        } else {
+            component["missing"] = fmt::format("there is no folder {}", quote_path(folder / name));
+        }
+        components[name] = std::move(component);
+    }
+    if (!components.contains("conditioning") && is_there(folder / "conditioning")) {
+        SR_TRY(components["conditioning"], describe_component(folder / "conditioning", with_tensors, totals));
+    }
+    return components;
+}
+
+Result<Report> describe_folder(const Path& folder, bool with_tensors)
+{
+    Totals totals;
+    Report report = {{"model", folder.string()}};
+    if (is_there(folder / "model_index.json")) {
+        SR_TRY(const Json index, read_json(folder / "model_index.json"));
+        if (!index.is_object())
+            return fail(ErrorCode::bad_input, "{}: expected an object, found {}",
+                        quote_path(folder / "model_index.json"), index.type_name());
+        report["class"] = index.value("_class_name", Json());
+        if (index.contains("defaults"))
+            report["defaults"] = index["defaults"];
+        SR_TRY(report["components"], describe_components(folder, index, with_tensors, totals));
+    } else if (is_there(folder / "config.json") || is_there(folder / "scheduler_config.json")) {
+        SR_TRY(const Report component, describe_component(folder, with_tensors, totals));
+        report.update(component);
+    } else {
+        return fail(ErrorCode::bad_input, "{}: expected a model, found neither model_index.json nor config.json",
+                    quote_path(folder));
+    }
+    report["parameters"] = totals.parameters;
+    report["bytes"] = totals.bytes;
+    return report;
+}
+
+// ---- a grid
+
+Result<Report> describe_grid(const Path& path)
+{
+    SR_TRY(const VoxelGrid grid, read_grid(path));
+    Cell low = grid.cells[0], high = grid.cells[0];
+    for (const Cell& cell : grid.cells)
+        for (size_t axis = 0; axis < 3; ++axis) {
+            low[axis] = std::min(low[axis], cell[axis]);
+            high[axis] = std::max(high[axis], cell[axis]);
+        }
+    const double edge = grid.voxel_size;
+    const auto metres = [&](const Cell& cell, int add) {
+        Report list = Report::array();
+        for (const int32_t c : cell)
+            list.push_back(std::round((c + add) * edge * 1e4) / 1e4);
+        return list;
+    };
+    std::array<uint64_t, kClassCount> counts{};
+    for (const uint8_t label : grid.labels)
+        ++counts[label];
+    Report labels = Report::object();
+    for (size_t i = 0; i < kClassCount; ++i)
+        if (counts[i])
+            labels[std::string(kPalette[i].name)] = counts[i];
+    Report report = {{"grid", path.string()}, {"cells", grid.cells.size()}};
+    report["voxel_size"] = std::round(edge * 1e6) / 1e6; // metres; the float's own digits mean nothing
+    report["points_per_voxel"] = grid.points_per_voxel;
+    report["points"] = grid.points.size() / 3;
+    report["generated"] = grid.generated.size() - static_cast<size_t>(std::ranges::count(grid.generated, 0));
+    report["extent"] = {{"min_m", metres(low, 0)}, {"max_m", metres(high, 1)}};
+    report["labels"] = labels;
+    report["metadata"] = grid.metadata;
+    return report;
+}
+
+Result<Report> describe(const Path& path, const Globals& globals)
+{
+    std::error_code ignored;
+    if (std::filesystem::is_directory(path, ignored))
+        return describe_folder(path, globals.verbose || globals.json);
+    if (path.extension() == ".sgrid")
+        return describe_grid(path);
+    SR_TRY(const SafetensorsSet set, SafetensorsSet::open(path));
+    Totals totals;
+    return describe_weights(set, true, totals);
+}
+
+Status inspect(const Path& path, const Globals& globals)
+{
+    SR_TRY(const Report report, describe(path, globals));
+    std::string text;
+    if (globals.json)
+        text = report.dump(-1, ' ', false, Report::error_handler_t::replace) + "\n";
+    else
+        append_text(text, report, 0);
+    fmt::print("{}", text);
+    return {};
+}
+
+} // namespace
+
+void add_inspect(CLI::App& app, const Globals& globals, Run& run)
+{
+    CLI::App* command = app.add_subcommand("inspect", "show the tensors and config of a model, or the cells of a grid");
+    const auto path = std::make_shared<std::string>();
+    command->add_option("FILE|DIR", *path, "a .safetensors file or index, a model's folder, or a .sgrid")->required();
+    command->callback([path, &globals, &run] { run = [path, &globals] { return inspect(*path, globals); }; });
+}
+
+} // namespace semrover
