@@ -27,7 +27,7 @@ Tensor modulate(Graph& g, Tensor x, Modulation shift, uint32_t scale_col, float 
     DispatchOptions options;
     if (groups == 1)
         options.banded = {"X", "TableRow", "Y"};
-    g.dispatch(kernel::modulate, {x, shift.table, shift.table_row, y}, push, tiles(x.rows, 1), std::move(options));
+    g.dispatch(kernel::modulate, {x, shift.table, shift.table_row, y}, push, row_tiles(x.rows), std::move(options));
     return y;
 }
 

@@ -6,12 +6,12 @@
 #extension GL_GOOGLE_include_directive : require
 #include "modulate.h"
 #include "lib/pack.glsl"
+#include "lib/thread.glsl"
 
 layout(local_size_x = 8) in;
 layout(constant_id = 0) const bool kHalfX = false;
 layout(constant_id = 1) const bool kHalfY = false;
 layout(constant_id = 2) const uint kTileM = 8;
-layout(constant_id = 3) const uint kTileN = 1;
 layout(push_constant) uniform Push { ModulatePush p; };
 layout(binding = 0) uniform usamplerBuffer X;                       // [groups * rows, cols]
 layout(binding = 1) uniform usamplerBuffer Table;                   // [timesteps, table_ld]
@@ -42,7 +42,7 @@ float sum4(vec4 v) { return (v.x + v.y) + (v.z + v.w); }
 
 void main()
 {
-    const uint row = gl_GlobalInvocationID.x;
+    const uint row = linear_thread();
     const uint in_row = row * p.x_ld;
     if (row >= p.rows * p.groups)
         return;
