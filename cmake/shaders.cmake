@@ -1,7 +1,8 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
 
-# shaders/<op>[.<variant>].comp -> SPIR-V -> <build>/generated/<op>.spv.h, one header per op with all its variants
+# shaders/<op>[.<variant>].comp -> SPIR-V -> <build>/generated/<op>.spv.h, one header per op with all its variants;
+# <build>/generated/catalogue.cpp lists them all for kernels/catalogue.h, its path is left in ${target}_catalogue
 find_program(GLSLANG glslangValidator REQUIRED)
 add_executable(reflect cmake/reflect/main.cpp cmake/reflect/module.cpp)
 target_link_libraries(reflect PRIVATE fmt::fmt)
@@ -25,12 +26,18 @@ function(add_shader_headers target)
     endforeach()
     list(REMOVE_DUPLICATES ops)
     set(headers)
+    set(catalogue_includes)
+    set(catalogue_entries)
     foreach(op ${ops})
+        string(APPEND catalogue_includes "#include \"${op}.spv.h\"\n")
+        string(APPEND catalogue_entries "        &kernel::${op},\n")
         set(header ${generated}/${op}.spv.h)
         add_custom_command(OUTPUT ${header} COMMAND reflect ${header} ${op} ${modules_${op}}
             DEPENDS reflect ${modules_${op}} COMMENT "reflect ${op}" VERBATIM)
         list(APPEND headers ${header})
     endforeach()
+    configure_file(${CMAKE_SOURCE_DIR}/cmake/catalogue.cpp.in ${generated}/catalogue.cpp @ONLY)
+    set(${target}_catalogue ${generated}/catalogue.cpp PARENT_SCOPE)
     add_custom_target(${target}_headers DEPENDS ${headers})
     add_library(${target} INTERFACE)
     add_dependencies(${target} ${target}_headers)

@@ -11,7 +11,6 @@ namespace semrover {
 
 namespace {
 
-constexpr const char* kValidationLayer = "VK_LAYER_KHRONOS_validation";
 // reported by `devices`; used where a kernel variant asks for them
 constexpr const char* kOptionalExtensions[] = {"VK_KHR_cooperative_matrix", "VK_NV_cooperative_matrix2",
                                                "VK_EXT_subgroup_size_control", "VK_EXT_memory_budget",
@@ -89,6 +88,11 @@ std::string refusal(VkPhysicalDevice physical, const VkPhysicalDeviceProperties&
 }
 
 } // namespace
+
+std::string api_version_text(uint32_t version)
+{
+    return fmt::format("{}.{}.{}", VK_API_VERSION_MAJOR(version), VK_API_VERSION_MINOR(version), VK_API_VERSION_PATCH(version));
+}
 
 Result<VkInstance> create_instance(bool validation)
 {
@@ -169,8 +173,7 @@ DeviceSummary summarize(VkPhysicalDevice physical, uint32_t index)
     s.name = p.properties.deviceName;
     s.driver = fmt::format("{} {}", p12.driverName, p12.driverInfo);
     s.type = kTypes[int(device_type(p.properties.deviceType))];
-    const uint32_t api = p.properties.apiVersion;
-    s.api = fmt::format("{}.{}.{}", VK_API_VERSION_MAJOR(api), VK_API_VERSION_MINOR(api), VK_API_VERSION_PATCH(api));
+    s.api = api_version_text(p.properties.apiVersion);
     s.refusal = refusal(physical, p.properties);
     s.limits = limits_of(physical, p.properties, p11);
     VkPhysicalDeviceMemoryProperties memory;

@@ -6,6 +6,9 @@
 
 namespace semrover {
 
+inline constexpr const char* kValidationLayer = "VK_LAYER_KHRONOS_validation";
+
+std::string api_version_text(uint32_t version); // "1.3.239"
 Result<VkInstance> create_instance(bool validation);
 Result<std::vector<VkPhysicalDevice>> physical_devices(VkInstance instance); // best first
 DeviceSummary summarize(VkPhysicalDevice physical, uint32_t index);

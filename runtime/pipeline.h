@@ -26,6 +26,8 @@ class PipelineStore {
     static Result<std::unique_ptr<PipelineStore>> create(Device& device);
     ~PipelineStore();
 
+    const std::string& file() const { return cache_path_; } // empty: neither HOME nor XDG_CACHE_HOME is set
+
     Result<const Pipeline*> get(const KernelVariant& variant, const std::map<uint32_t, uint32_t>& constants);
 
   private:
@@ -36,7 +38,7 @@ class PipelineStore {
 
     Device& device_;
     VkPipelineCache cache_ = VK_NULL_HANDLE;
-    std::string cache_path_; // empty: nowhere to keep it
+    std::string cache_path_;
     bool changed_ = false;
     std::map<std::pair<const KernelVariant*, std::map<uint32_t, uint32_t>>, Pipeline> pipelines_;
 };

@@ -11,6 +11,7 @@ namespace semrover {
 
 // what went wrong in the world (a file, a device, memory); values are the program's exit codes
 enum class ErrorCode : int {
+    verify_failed = 1, // a check that was asked for found a difference
     usage = 2,
     bad_input = 3,
     no_device = 4,

@@ -8,6 +8,7 @@
 #include "tools/commands.h"
 #include "tools/open_device.h"
 #include "tools/progress.h"
+#include "tools/version.h"
 
 #include <chrono>
 #include <CLI/CLI.hpp>
@@ -75,7 +76,7 @@ Result<Json> settings_json(const Options& o, const Settings& s, const Device& de
     grid_hash.add(grid.bytes());
     SR_TRY(const uint64_t model_hash, hash_folder(s.model.transformer));
     return Json{{"command", "generate"},
-                {"version", "0.1.0"},
+                {"version", kVersion},
                 {"device", device.name()},
                 {"driver", device.driver()},
                 {"grid", hash_text(grid_hash.value())},
@@ -185,7 +186,7 @@ Status prepare(Job& j)
 Status finish(Job& j, RunFolder& run, double seconds)
 {
     j.grid.metadata["seed"] = std::to_string(j.options.seed);
-    j.grid.metadata["tool"] = "semrover 0.1.0";
+    j.grid.metadata["tool"] = kProgram;
     SR_TRY(const uint64_t model_hash, hash_folder(j.settings.model.transformer));
     j.grid.metadata["model"] = hash_text(model_hash);
     SR_CHECK(write_grid(j.options.output, j.grid));

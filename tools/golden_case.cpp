@@ -21,6 +21,11 @@ Result<GoldenCase> GoldenCase::open(const Path& folder)
     c.kind_ = json["kind"];
     c.params_ = json.value("params", nlohmann::json::object());
     c.tolerance_ = json.value("tolerance", nlohmann::json::object());
+    if (!c.params_.is_object() || !c.tolerance_.is_object())
+        return fail(ErrorCode::bad_input, "{}: params and tolerance must be objects", (folder / "case.json").string());
+    for (const nlohmann::json& number : c.tolerance_)
+        if (!number.is_number())
+            return fail(ErrorCode::bad_input, "{}: tolerance must hold numbers", (folder / "case.json").string());
     return c;
 }
 

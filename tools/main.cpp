@@ -3,6 +3,7 @@
 #include "tools/commands.h"
 
 #include "runtime/quote.h"
+#include "tools/version.h"
 
 #include <CLI/CLI.hpp>
 #include <csignal>
@@ -83,14 +84,17 @@ int main(int argc, char** argv)
     install_signal_handlers();
     CLI::App app("turn a semantic voxel grid into a coloured 3D street scene, and drive a camera rig through it",
                  "semrover");
-    app.set_version_flag("--version", "semrover 0.1.0");
+    app.set_version_flag("--version", kProgram);
     app.fallthrough(); // global options may follow the subcommand
     Globals globals;
     add_globals(app, globals);
     Run run;
     add_bench(app, globals, run);
+    add_devices(app, globals, run);
+    add_doctor(app, globals, run);
     add_generate(app, globals, run);
     add_inspect(app, globals, run);
+    add_verify(app, globals, run);
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& e) {
