@@ -290,8 +290,16 @@ Status Device::clear(const BufferSlice& slice)
         std::memset(mapped + slice.offset, 0, slice.bytes);
         return {};
     }
+    // fills are whole words: the bytes before and after them are copied
+    static constexpr std::byte kZeros[4]{};
+    const uint64_t end = slice.offset + slice.bytes, begin = std::min(round_up64(slice.offset, 4), end);
+    const uint64_t tail = std::max(end / 4 * 4, begin);
+    SR_CHECK(write(slice.part(0, begin - slice.offset), {kZeros, begin - slice.offset}));
+    SR_CHECK(write(slice.part(tail - slice.offset, end - tail), {kZeros, end - tail}));
+    if (begin == tail)
+        return {};
     SR_CHECK(begin_commands(copy_commands_, true));
-    record_clear(copy_commands_, slice.buffer->handle(), slice.offset, slice.bytes);
+    record_clear(copy_commands_, slice.buffer->handle(), begin, tail - begin);
     SR_VK(vkEndCommandBuffer(copy_commands_));
     SR_TRY(const uint64_t ticket, submit({&copy_commands_, 1}));
     return wait(ticket);
