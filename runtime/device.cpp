@@ -3,6 +3,7 @@
 #include "runtime/device.h"
 
 #include "runtime/command.h"
+#include "runtime/kernel.h"
 #include "runtime/physical_device.h"
 #include "runtime/pipeline.h"
 #include "runtime/profile.h"
@@ -79,6 +80,10 @@ Result<std::unique_ptr<Device>> Device::adopt(const HostDevice& host, const Devi
 {
     if (!host.instance || !host.physical || !host.device || !host.queue)
         return fail(ErrorCode::usage, "a host device needs instance, physical device, device and queue");
+    if (!is_compute_family(host.physical, host.queue_family))
+        return fail(ErrorCode::usage, "queue family {} of the host device has no compute", host.queue_family);
+    if (bool(host.lock) != bool(host.unlock))
+        return fail(ErrorCode::usage, "a host device needs both of lock and unlock, or neither");
     std::unique_ptr<Device> d(new Device());
     d->owned_ = false;
     d->instance_ = host.instance;
@@ -89,6 +94,8 @@ Result<std::unique_ptr<Device>> Device::adopt(const HostDevice& host, const Devi
     d->lock_ = host.lock;
     d->unlock_ = host.unlock;
     SR_CHECK(d->finish(options));
+    if (!host.float16) // what the hardware could do is not what the host asked for
+        d->limits_.needs_supported &= ~uint32_t(kNeedsFloat16);
     return d;
 }
 
