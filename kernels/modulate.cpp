@@ -16,6 +16,7 @@ Tensor modulate(Graph& g, Tensor x, Modulation shift, uint32_t scale_col, float 
     ModulatePush push{};
     push.rows = x.rows / groups;
     push.cols = x.cols;
+    push.groups = groups;
     push.x_ld = x.ld;
     push.y_ld = y.ld;
     push.table_ld = shift.table.ld;
@@ -26,7 +27,7 @@ Tensor modulate(Graph& g, Tensor x, Modulation shift, uint32_t scale_col, float 
     DispatchOptions options;
     if (groups == 1)
         options.banded = {"X", "TableRow", "Y"};
-    g.dispatch(kernel::modulate, {x, shift.table, shift.table_row, y}, push, semrover::groups(x.rows), std::move(options));
+    g.dispatch(kernel::modulate, {x, shift.table, shift.table_row, y}, push, row_tiles(x.rows), std::move(options));
     return y;
 }
 

@@ -28,13 +28,15 @@ struct BufferSlice {
 };
 
 struct Grid {
-    enum class Unit : uint8_t { groups, threads, tiles } unit = Unit::groups;
+    enum class Unit : uint8_t { groups, threads, row_tiles, tiles } unit = Unit::groups;
     uint32_t x = 1, y = 1, z = 1;
 };
 // workgroups; invocations (divided by the local size, folded over y when there are too many: see lib/thread.glsl);
-// tiles of an output of rows x cols (divided by the variant's kTileM and kTileN: x runs over rows, y over columns)
+// tiles of rows (divided by the variant's kTileM and folded likewise); tiles of an output of rows x cols (divided by
+// kTileM and kTileN: x runs over rows, y over columns)
 constexpr Grid groups(uint32_t x, uint32_t y = 1, uint32_t z = 1) { return {Grid::Unit::groups, x, y, z}; }
 constexpr Grid threads(uint32_t x) { return {Grid::Unit::threads, x, 1, 1}; }
+constexpr Grid row_tiles(uint32_t rows) { return {Grid::Unit::row_tiles, rows, 1, 1}; }
 constexpr Grid tiles(uint32_t rows, uint32_t cols, uint32_t z = 1) { return {Grid::Unit::tiles, rows, cols, z}; }
 
 struct ConstantValue {

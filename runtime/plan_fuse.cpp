@@ -26,6 +26,21 @@ bool same(const Tensor& a, const Tensor& b)
     return a.resource == b.resource && a.offset == b.offset && a.rows == b.rows && a.cols == b.cols && a.ld == b.ld;
 }
 
+bool writes(const Pass& pass, size_t binding)
+{
+    return uint8_t(pass.kernel->variants.front().bindings[binding].access) & uint8_t(Access::write);
+}
+
+// could two tensors share bytes? by resource, and two externals by where their memory is
+bool may_share(const Plan& plan, const Tensor& a, const Tensor& b)
+{
+    const Resource &ra = plan.resources[a.resource], &rb = plan.resources[b.resource];
+    if (a.resource == b.resource)
+        return true;
+    return ra.external && rb.external && ra.memory.buffer == rb.memory.buffer &&
+           ra.memory.offset < rb.memory.offset + rb.bytes && rb.memory.offset < ra.memory.offset + ra.bytes;
+}
+
 bool touches(const Pass& pass, uint32_t resource)
 {
     for (const Tensor& t : pass.tensors)
@@ -34,11 +49,13 @@ bool touches(const Pass& pass, uint32_t resource)
     return false;
 }
 
-// the only pass that writes consumer's X, if consumer is also its only reader
+// the only pass that writes consumer's X, if consumer is also its only reader, and reads it once
 Pass* sole_producer(Plan& plan, size_t consumer)
 {
-    const Tensor& x = plan.passes[consumer].tensors.front();
-    if (plan.resources[x.resource].external)
+    const std::vector<Tensor>& read = plan.passes[consumer].tensors;
+    const Tensor& x = read.front();
+    if (plan.resources[x.resource].external ||
+        std::any_of(read.begin() + 1, read.end(), [&](const Tensor& t) { return t.resource == x.resource; }))
         return nullptr;
     Pass* producer = nullptr;
     for (size_t i = 0; i < plan.passes.size(); ++i) {
@@ -55,17 +72,22 @@ Pass* sole_producer(Plan& plan, size_t consumer)
 bool can_move_up(const Plan& plan, const Pass* producer, size_t consumer)
 {
     const Pass& c = plan.passes[consumer];
-    const auto& declared = c.kernel->variants.front().bindings;
-    for (const Pass* p = producer + 1; p != &plan.passes[consumer]; ++p)
-        for (size_t b = 0; b < p->tensors.size(); ++b) {
-            const bool p_writes = uint8_t(p->kernel->variants.front().bindings[b].access) & uint8_t(Access::write);
-            for (size_t k = 1; k < c.tensors.size(); ++k) {
-                const bool c_writes = uint8_t(declared[k].access) & uint8_t(Access::write);
-                if ((p_writes || c_writes) && p->tensors[b].resource == c.tensors[k].resource)
+    for (const Pass* p = producer + 1; p != &c; ++p)
+        for (size_t b = 0; b < p->tensors.size(); ++b)
+            for (size_t k = 1; k < c.tensors.size(); ++k)
+                if ((writes(*p, b) || writes(c, k)) && may_share(plan, p->tensors[b], c.tensors[k]))
                     return false;
-            }
-        }
     return true;
+}
+
+// does the consumer write what the producer reads? other workgroups of the producer may not have read it yet
+bool overwrites_input(const Plan& plan, const Pass& producer, const Pass& c)
+{
+    for (size_t k = 1; k < c.tensors.size(); ++k)
+        for (size_t b = 0; b < producer.tensors.size(); ++b)
+            if (writes(c, k) && !writes(producer, b) && may_share(plan, c.tensors[k], producer.tensors[b]))
+                return true;
+    return false;
 }
 
 // push members named after a binding that moves ("gate_ld" of Gate, "y_ld" of Y) move with it
@@ -102,7 +124,7 @@ bool absorb(Plan& plan, size_t consumer)
     for (size_t b = 1; b < c.tensors.size(); ++b)
         if (slots[b] != y && std::count(producer->slots.begin(), producer->slots.end(), slots[b]))
             return false; // another epilogue uses that binding
-    if (!can_move_up(plan, producer, consumer))
+    if (!can_move_up(plan, producer, consumer) || overwrites_input(plan, *producer, c))
         return false;
     for (size_t b = 1; b < c.tensors.size(); ++b) {
         producer->tensors[slots[b]] = c.tensors[b];
@@ -111,9 +133,10 @@ bool absorb(Plan& plan, size_t consumer)
     producer->absorbed.push_back(id);
     move_push(c, *producer);
     producer->options.constants.push_back({c.options.absorbed_as, 1});
-    for (std::string_view name : c.options.banded)
-        if (name != "X" && name != "Y")
-            producer->options.banded.push_back(name);
+    if (!producer->options.banded.empty()) // else its rows cannot be cut, and neither can these
+        for (std::string_view name : c.options.banded)
+            if (name != "X" && name != "Y")
+                producer->options.banded.push_back(name);
     return true;
 }
 

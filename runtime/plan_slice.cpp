@@ -33,33 +33,52 @@ uint32_t rows_of(const Pass& pass)
     return 0;
 }
 
+// rows of which every banded binding starts aligned
+uint64_t aligned_rows(const Pass& pass, const DeviceLimits& limits)
+{
+    uint64_t step = 1;
+    for (size_t b = 0; b < pass.bindings.size(); ++b)
+        if (banded(pass, pass.bindings[b].name))
+            step = std::lcm(step, limits.offset_alignment /
+                                      std::gcd<uint64_t>(limits.offset_alignment, pass.tensors[b].row_bytes()));
+    return step;
+}
+
+tl::unexpected<Error> too_large(const Plan& plan, const Pass& pass, size_t b, uint64_t rows, const DeviceLimits& limits)
+{
+    const PassBinding& binding = pass.bindings[b];
+    const std::string& tensor = plan.resources[binding.resource].name;
+    const uint64_t limit = range_limit(binding, limits);
+    if (!banded(pass, binding.name))
+        return fail(ErrorCode::out_of_memory, "{}: binding {} ('{}') has {} bytes; this device binds at most {}",
+                    pass.kernel->name, binding.name, tensor, binding.bytes, limit);
+    return fail(ErrorCode::out_of_memory, "{}: {} rows of binding {} ('{}') are {} bytes; this device binds at most {}",
+                pass.kernel->name, rows, binding.name, tensor, rows * pass.tensors[b].row_bytes(), limit);
+}
+
 // rows per band that satisfy every limit; rows_of(pass) when nothing has to be cut
 Result<uint32_t> band_rows(const Plan& plan, const Pass& pass, const DeviceLimits& limits)
 {
     const uint32_t rows = rows_of(pass);
+    const uint64_t step = aligned_rows(pass, limits);
     uint64_t band = rows;
-    uint64_t step = 1; // band starts must be aligned in every banded binding
     for (size_t b = 0; b < pass.bindings.size(); ++b) {
-        const PassBinding& binding = pass.bindings[b];
-        const uint64_t limit = range_limit(binding, limits);
-        if (!banded(pass, binding.name)) {
-            if (binding.bytes > limit)
-                return fail(ErrorCode::out_of_memory, "{}: binding {} ('{}') has {} bytes; this device binds at most {}",
-                            pass.kernel->name, binding.name, plan.resources[binding.resource].name, binding.bytes, limit);
+        const uint64_t limit = range_limit(pass.bindings[b], limits);
+        if (pass.bindings[b].bytes <= limit)
             continue;
-        }
-        const uint64_t row_bytes = pass.tensors[b].row_bytes();
-        band = std::min(band, limit / row_bytes);
-        step = std::lcm(step, limits.offset_alignment / std::gcd<uint64_t>(limits.offset_alignment, row_bytes));
+        band = std::min(band, limit / std::max<uint64_t>(pass.tensors[b].row_bytes(), 1));
+        if (!banded(pass, pass.bindings[b].name) || band < step)
+            return too_large(plan, pass, b, step, limits);
     }
-    if (limits.submit_seconds > 0 && pass.options.flops > limits.submit_seconds * kAssumedFlopsPerSecond && rows)
-        band = std::min<uint64_t>(band, uint64_t(rows * limits.submit_seconds * kAssumedFlopsPerSecond / pass.options.flops) + 1);
+    const double seconds = pass.options.flops / kAssumedFlopsPerSecond;
+    if (limits.submit_seconds > 0 && seconds > limits.submit_seconds && rows)
+        band = std::min<uint64_t>(band, uint64_t(rows * limits.submit_seconds / seconds) + 1);
     if (band >= rows)
         return rows;
-    if (const uint32_t tile = pass.variant->constant("kTileM") ? pass.variant->constant("kTileM")->value : 1; band > tile)
-        step = std::lcm(step, uint64_t(tile));
-    band = std::max(band / step * step, step);
-    return uint32_t(band);
+    const ConstantInfo* tile = pass.variant->constant("kTileM");
+    const uint64_t whole_tiles = std::lcm(step, uint64_t(tile ? tile->value : 1)); // no half-empty ones, if they fit
+    const uint64_t unit = whole_tiles <= band ? whole_tiles : step;
+    return uint32_t(std::max(band / unit * unit, unit));
 }
 
 void set_push(Pass& pass, std::string_view name, uint32_t value)
@@ -91,14 +110,15 @@ Status count_groups(Pass& pass, const DeviceLimits& limits)
     n[0] = pass.grid.x;
     n[1] = pass.grid.y;
     n[2] = pass.grid.z;
+    const ConstantInfo *m = pass.variant->constant("kTileM"), *k = pass.variant->constant("kTileN");
     if (pass.grid.unit == Grid::Unit::tiles) {
-        const ConstantInfo *m = pass.variant->constant("kTileM"), *k = pass.variant->constant("kTileN");
         SR_ASSERT(m && k, "{}: a grid of tiles needs kTileM and kTileN", pass.kernel->name);
         n[0] = divide_up(pass.grid.x, m->value);
         n[1] = divide_up(pass.grid.y, k->value);
-    } else if (pass.grid.unit == Grid::Unit::threads) {
-        n[0] = divide_up(pass.grid.x, pass.variant->local_size[0]);
-        n[1] = divide_up(n[0], limits.max_groups); // folded; the shader's linear_thread() undoes it
+    } else if (pass.grid.unit != Grid::Unit::groups) {
+        SR_ASSERT(m || pass.grid.unit == Grid::Unit::threads, "{}: a grid of row tiles needs kTileM", pass.kernel->name);
+        n[0] = divide_up(pass.grid.x, pass.grid.unit == Grid::Unit::threads ? pass.variant->local_size[0] : m->value);
+        n[1] = divide_up(n[0], limits.max_groups); // the shader's linear_group() undoes it
         n[0] = divide_up(n[0], n[1]);
     }
     for (int i = 0; i < 3; ++i)

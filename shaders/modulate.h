@@ -7,6 +7,7 @@
 struct ModulatePush {
     uint rows; // of one group
     uint cols;
+    uint groups;
     uint x_ld; // elements
     uint y_ld;
     uint table_ld;

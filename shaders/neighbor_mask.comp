@@ -12,6 +12,8 @@ layout(binding = 0) readonly buffer Cells { ivec4 cells[]; };   // [rows] i, j, 
 layout(binding = 1) readonly buffer Sets { uvec2 sets[]; };     // [rows] first row and number of rows of the row's set
 layout(binding = 2) writeonly buffer Mask { uint mask[]; };     // [rows, words]
 
+const int kFar = 26754; // 3 kFar^2 < 2^31: cells further apart must not wrap into the radius
+
 void main()
 {
     const uint row = linear_thread() / p.words, word = linear_thread() % p.words;
@@ -24,7 +26,7 @@ void main()
         const uint j = word * 32 + b;
         if (j >= set.y)
             break;
-        const ivec3 d = cells[set.x + j].xyz - own;
+        const ivec3 d = min(abs(cells[set.x + j].xyz - own), kFar);
         if (d.x * d.x + d.y * d.y + d.z * d.z <= p.radius2)
             bits |= 1u << b;
     }

@@ -105,7 +105,7 @@ uint32_t choose_batch(const Options& o, const Device& device)
 Result<double> measure_step(Device& device, const Transformer& transformer, const Settings& s, uint32_t batch, uint32_t cells)
 {
     SR_TRY(const SamplingPlan plan, plan_sampling(s.model.scheduler, 2));
-    SR_TRY(const auto sampler, TokenSampler::create(device, transformer, plan, {.guidance_scale = s.guidance, .seed = 0, .noise = {}}));
+    SR_TRY(const auto sampler, TokenSampler::create(device, transformer, plan, sampling_options(s.guidance, 0)));
     RegionInput region;
     for (uint32_t i = 0; i < cells; ++i)
         region.cells.push_back({int32_t(i % 12), int32_t(i / 12), 0});
@@ -184,7 +184,7 @@ Status prepare(Job& j)
         if (!j.globals.quiet)
             fmt::print(stderr, "semrover: warning: {}\n", warning);
     SR_TRY(j.transformer, Transformer::load(*j.device, j.settings.model.transformer, j.settings.precision));
-    const SamplerOptions sampling{.guidance_scale = j.settings.guidance, .seed = j.options.seed, .noise = {}};
+    const SamplerOptions sampling = sampling_options(j.settings.guidance, j.options.seed);
     SR_TRY(j.sampler, TokenSampler::create(*j.device, *j.transformer, j.settings.plan, sampling));
     return fit_batch(j);
 }

@@ -89,6 +89,7 @@ int main(int argc, char** argv)
     Globals globals;
     add_globals(app, globals);
     Run run;
+    add_bench(app, globals, run);
     add_devices(app, globals, run);
     add_doctor(app, globals, run);
     add_generate(app, globals, run);

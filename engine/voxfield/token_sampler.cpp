@@ -12,7 +12,6 @@ namespace semrover {
 
 namespace {
 
-constexpr uint32_t kWindow = 64;         // timesteps in the modulation table: 40 MB for the full-size model
 constexpr uint32_t kRowAlignment = 16;   // rows of a stream: the semantic stream then starts at an aligned byte
 constexpr uint32_t kFirstDraw = 0xfffff; // noise key of the first noise; plans have at most a million rows
 constexpr size_t kInFlight = 3;          // submits ahead of the device
@@ -129,7 +128,7 @@ TokenSampler::~TokenSampler() = default;
 
 TokenSampler::TokenSampler(Device& device, const Transformer& transformer, const SamplingPlan& plan, SamplerOptions options)
     : device_(device), transformer_(transformer), plan_(plan), options_(std::move(options)),
-      halves_(options_.guidance_scale == 1.f ? 1 : 2), window_(uint32_t(std::min<size_t>(kWindow, plan.timesteps.size())))
+      halves_(options_.guidance_scale == 1.f ? 1 : 2), window_(uint32_t(std::min<size_t>(options_.modulation_window, plan.timesteps.size())))
 {
     steps_ = arena_.add((plan.rows.size() + 1) * sizeof(StepRow));
     clock_ = arena_.add(sizeof(StepClock));
@@ -339,6 +338,13 @@ Result<std::vector<float>> TokenSampler::run(std::span<const RegionInput> region
 
 uint32_t TokenSampler::step_passes() const { return batch_ ? uint32_t(batch_->step->plan().passes.size()) : 0; }
 uint32_t TokenSampler::step_barriers() const { return batch_ ? batch_->step->plan().barriers() : 0; }
+double TokenSampler::step_flops() const
+{
+    double flops = 0;
+    for (const Pass& pass : batch_ ? batch_->step->plan().passes : std::vector<Pass>{})
+        flops += pass.options.flops;
+    return flops;
+}
 double TokenSampler::host_us_per_step() const { return batch_ ? batch_->step->host_us() : 0; }
 
 } // namespace semrover

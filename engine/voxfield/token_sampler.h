@@ -22,9 +22,18 @@ struct RegionInput {
 struct SamplerOptions {
     float guidance_scale = 4; // 1: no unconditional half
     uint64_t seed = 0;
+    uint32_t modulation_window = 64; // timesteps whose modulations are kept at a time: 40 MB for the full-size model
     // golden cases only: normals come from the caller, who fills [rows, C] before plan row r (0: the first noise)
     std::function<void(size_t row, std::span<float> normals)> noise;
 };
+
+inline SamplerOptions sampling_options(float guidance_scale, uint64_t seed)
+{
+    SamplerOptions o;
+    o.guidance_scale = guidance_scale;
+    o.seed = seed;
+    return o;
+}
 
 // called after plan rows; returning false stops the run (ErrorCode::interrupted)
 using StepCallback = std::function<bool(size_t done, size_t total)>;
@@ -48,6 +57,7 @@ class TokenSampler {
     uint32_t step_passes() const;
     uint32_t step_barriers() const;
     double host_us_per_step() const;
+    double step_flops() const; // dense: masked attention counts in full
 
   private:
     struct Batch; // memory and programs of one batch shape

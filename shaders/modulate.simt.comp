@@ -5,10 +5,12 @@
 #extension GL_GOOGLE_include_directive : require
 #include "modulate.h"
 #include "lib/pack.glsl"
+#include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const bool kHalfX = false;
 layout(constant_id = 1) const bool kHalfY = false;
+layout(constant_id = 2) const uint kTileM = 1;
 layout(push_constant) uniform Push { ModulatePush p; };
 layout(binding = 0) readonly buffer X { uvec4 x[]; };             // [groups * rows, cols]
 layout(binding = 1) readonly buffer Table { float table[]; };     // [timesteps, table_ld]
@@ -36,7 +38,9 @@ float sum4(vec4 v) { return (v.x + v.y) + (v.z + v.w); }
 
 void main()
 {
-    const uint row = gl_WorkGroupID.x + gl_WorkGroupID.y * gl_NumWorkGroups.x;
+    const uint row = linear_group();
+    if (row >= p.rows * p.groups)
+        return;
     const uint first = gl_LocalInvocationID.x * 8, stride = 64 * 8;
     const uint in_row = row * p.x_ld;
     vec4 lo, hi;

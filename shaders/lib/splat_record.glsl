@@ -1,0 +1,28 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+
+// four texels of a visible splat: pixel of the centre, bounds in x, bounds in y (first | last << 16);
+// m: (u, v) = m d / (1 + g . d), d from the centre in pixels; g, depth of the centre, opacity; colour, normal
+const uint kRecord = 4;
+
+float sign_of(float v) { return v < 0.0 ? -1.0 : 1.0; }
+
+// a unit vector in 32 bits, to about 1e-4: Cigolle et al. 2014, octahedral
+float pack_normal(vec3 n)
+{
+    n /= abs(n.x) + abs(n.y) + abs(n.z);
+    const vec2 folded = (1.0 - abs(n.yx)) * vec2(sign_of(n.x), sign_of(n.y));
+    return uintBitsToFloat(packSnorm2x16(n.z < 0.0 ? folded : n.xy));
+}
+
+vec3 unpack_normal(uint bits)
+{
+    const vec2 e = unpackSnorm2x16(bits);
+    vec3 n = vec3(e, 1.0 - abs(e.x) - abs(e.y));
+    const float t = max(-n.z, 0.0);
+    n.xy -= t * vec2(sign_of(n.x), sign_of(n.y));
+    return normalize(n);
+}
+
+// first and last tile in x, then in y, from the second half of a record's first texel
+uvec4 tile_range(uvec2 bounds, uint tile) { return uvec4(bounds.x & 0xffff, bounds.x >> 16, bounds.y & 0xffff, bounds.y >> 16) / tile; }

@@ -1,0 +1,117 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/voxfield/token_sampler.h"
+
+#include <gtest/gtest.h>
+
+namespace semrover {
+namespace {
+
+Device& device()
+{
+    static const std::unique_ptr<Device> d = std::move(*Device::create({}));
+    return *d;
+}
+
+const Transformer& transformer()
+{
+    static const std::unique_ptr<Transformer> t =
+        std::move(*Transformer::load(device(), SEMROVER_SOURCE_DIR "/tests/golden/sampling_ddpm/model", DType::f16));
+    return *t;
+}
+
+// a patch of ground whose first `known` cells are given
+RegionInput patch(int32_t x, uint32_t cells, uint32_t known)
+{
+    RegionInput r;
+    const size_t channels = transformer().config().channels();
+    r.fixed.assign(cells * channels, 0.f);
+    for (uint32_t i = 0; i < cells; ++i) {
+        r.cells.push_back({x + int32_t(i % 7), int32_t(i / 7), 0});
+        r.labels.push_back(i % 20);
+        r.known.push_back(i < known);
+        for (size_t k = 0; k < channels; ++k)
+            r.fixed[i * channels + k] = float((i * 7 + k * 3) % 201) / 100.f - 1;
+    }
+    return r;
+}
+
+SamplingPlan plan(Sampler sampler, int steps, RepaintOptions repaint)
+{
+    SchedulerConfig config;
+    config.sampler = sampler;
+    config.prediction = Prediction::sample;
+    config.spacing = TimestepSpacing::trailing;
+    return *plan_sampling(config, steps, repaint);
+}
+
+std::vector<float> run(const SamplingPlan& p, SamplerOptions options, const std::vector<RegionInput>& regions)
+{
+    auto sampler = TokenSampler::create(device(), transformer(), p, std::move(options));
+    EXPECT_TRUE(sampler) << sampler.error().message;
+    auto tokens = (*sampler)->run(regions);
+    EXPECT_TRUE(tokens) << tokens.error().message;
+    return *tokens;
+}
+
+TEST(engine_sampler, a_region_is_the_same_alone_and_in_any_batch)
+{
+    const SamplingPlan p = plan(Sampler::ddpm, 3, {2, 2});
+    const RegionInput a = patch(0, 50, 20), b = patch(40, 33, 0), c = patch(-90, 17, 5);
+    const std::vector<float> alone = run(p, sampling_options(2, 7), {b});
+    const std::vector<float> batched = run(p, sampling_options(2, 7), {a, b, c});
+    const size_t channels = transformer().config().channels();
+    const std::vector<float> part(batched.begin() + int64_t(50 * channels), batched.begin() + int64_t(83 * channels));
+    EXPECT_EQ(alone, part);
+}
+
+TEST(engine_sampler, known_tokens_leave_as_they_came_with_every_sampler)
+{
+    const RegionInput region = patch(3, 40, 25);
+    for (Sampler sampler : {Sampler::ddpm, Sampler::ddim, Sampler::dpmpp_2m}) {
+        const std::vector<float> tokens = run(plan(sampler, 4, {2, 2}), sampling_options(3, 1), {region});
+        for (size_t i = 0; i < 25 * size_t(transformer().config().channels()); ++i)
+            ASSERT_EQ(tokens[i], region.fixed[i]) << sampler_name(sampler) << " element " << i;
+    }
+}
+
+TEST(engine_sampler, a_small_window_of_modulations_changes_nothing)
+{
+    const SamplingPlan p = plan(Sampler::ddpm, 9, {3, 2});
+    const RegionInput region = patch(0, 30, 10);
+    SamplerOptions small = sampling_options(2, 5);
+    small.modulation_window = 2;
+    EXPECT_EQ(run(p, small, {region}), run(p, sampling_options(2, 5), {region}));
+}
+
+TEST(engine_sampler, the_seed_and_only_the_seed_changes_the_result)
+{
+    const SamplingPlan p = plan(Sampler::ddpm, 2, {});
+    const RegionInput region = patch(0, 20, 0);
+    const auto first = run(p, sampling_options(1, 5), {region});
+    EXPECT_EQ(first, run(p, sampling_options(1, 5), {region}));
+    EXPECT_NE(first, run(p, sampling_options(1, 6), {region}));
+    EXPECT_NE(first, run(p, sampling_options(1, 5ull << 32), {region}));
+}
+
+TEST(engine_sampler, planned_memory_is_the_memory_in_use)
+{
+    const SamplingPlan p = plan(Sampler::ddpm, 2, {});
+    const uint64_t before = device().allocated_bytes();
+    auto sampler = *TokenSampler::create(device(), transformer(), p, sampling_options(2, 5));
+    const uint64_t planned = *sampler->planned_bytes(2, 40);
+    ASSERT_TRUE(sampler->run(std::vector<RegionInput>{patch(0, 40, 0), patch(50, 40, 0)}));
+    EXPECT_EQ(device().allocated_bytes() - before, planned);
+}
+
+TEST(engine_sampler, stops_when_the_callback_says_so)
+{
+    const SamplingPlan p = plan(Sampler::ddpm, 6, {});
+    auto sampler = *TokenSampler::create(device(), transformer(), p, sampling_options(2, 5));
+    const auto result = sampler->run(std::vector<RegionInput>{patch(0, 10, 0)}, [](size_t done, size_t) { return done < 3; });
+    ASSERT_FALSE(result);
+    EXPECT_EQ(result.error().code, ErrorCode::interrupted);
+}
+
+} // namespace
+} // namespace semrover

@@ -1,0 +1,204 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/kernel_case.h"
+#include "tests/random_graph.h"
+
+namespace semrover {
+namespace {
+
+using Bytes = std::vector<std::byte>;
+
+// external memory that starts with the same numbers every time it is filled
+class ExternalMemory {
+  public:
+    Tensor add(Graph& g, uint32_t rows, uint32_t cols, DType dtype = DType::f32)
+    {
+        const uint64_t bytes = uint64_t(rows) * round_up(cols, kRowPadding) * dtype_bytes(dtype);
+        auto buffer = Buffer::create(test_device(), bytes, MemoryKind::device, "test");
+        SR_ASSERT(bool(buffer), "{}", buffer.error().message);
+        buffers_.push_back(std::move(*buffer));
+        dtypes_.push_back(dtype);
+        return g.external(buffers_.back()->slice(), rows, cols, dtype, "external");
+    }
+    void fill()
+    {
+        std::mt19937 random(4);
+        std::normal_distribution<float> normal(0, 0.2f);
+        for (size_t i = 0; i < buffers_.size(); ++i) {
+            Bytes bytes(buffers_[i]->bytes());
+            for (size_t at = 0; at < bytes.size(); at += dtype_bytes(dtypes_[i])) {
+                const float v = normal(random);
+                const uint16_t half = float_to_half(v);
+                if (dtypes_[i] == DType::f16)
+                    std::memcpy(&bytes[at], &half, 2);
+                else
+                    std::memcpy(&bytes[at], &v, 4);
+            }
+            const Status written = test_device().write(buffers_[i]->slice(), bytes);
+            ASSERT_TRUE(written) << written.error().message;
+        }
+    }
+    Bytes contents() // of all of it, what was read only included
+    {
+        Bytes all;
+        for (const auto& buffer : buffers_) {
+            Bytes bytes(buffer->bytes());
+            const Status read = test_device().read(buffer->slice(), bytes);
+            EXPECT_TRUE(read) << read.error().message;
+            all.insert(all.end(), bytes.begin(), bytes.end());
+        }
+        return all;
+    }
+
+  private:
+    std::vector<std::unique_ptr<Buffer>> buffers_;
+    std::vector<DType> dtypes_;
+};
+
+Plan plan_of(const Graph& g, const DeviceLimits& limits = test_device().limits())
+{
+    auto plan = make_plan(g.desc(), limits);
+    SR_ASSERT(bool(plan), "{}", plan.error().message);
+    return *plan;
+}
+
+Bytes run(ExternalMemory& memory, Plan plan, int times = 1)
+{
+    memory.fill();
+    auto program = Program::create(test_device(), std::move(plan));
+    EXPECT_TRUE(program) << program.error().message;
+    for (int i = 0; program && i < times; ++i) {
+        const Status status = (*program)->run();
+        EXPECT_TRUE(status) << status.error().message;
+    }
+    return memory.contents();
+}
+
+// no memory shared, no pass beside another: what the graph means
+Plan one_after_the_other(Plan plan)
+{
+    plan.blocks.clear();
+    for (size_t r = 0; r < plan.resources.size(); ++r) {
+        plan.placements[r].block = uint32_t(plan.blocks.size());
+        plan.placements[r].offset = 0;
+        plan.blocks.push_back(std::max<uint64_t>(plan.resources[r].bytes, 256));
+    }
+    for (uint32_t i = 0; i < plan.passes.size(); ++i)
+        plan.passes[i].submit = plan.passes[i].level = i;
+    plan.submits = plan.levels = uint32_t(plan.passes.size());
+    return plan;
+}
+
+TEST(graph_execute, gives_the_same_bytes_as_one_pass_per_submit_without_aliasing)
+{
+    for (uint32_t seed = 0; seed < 30; ++seed) {
+        SCOPED_TRACE(seed);
+        ExternalMemory memory;
+        Graph g;
+        const RandomGraph made(g, seed, [&](uint32_t rows, uint32_t cols) { return memory.add(g, rows, cols); });
+        const Plan plan = plan_of(g);
+        EXPECT_LT(plan.levels, plan.passes.size() + 1);
+        ASSERT_TRUE(run(memory, plan) == run(memory, one_after_the_other(plan)));
+    }
+}
+
+TEST(graph_execute, gives_the_same_bytes_in_bands_in_submits_and_in_folded_groups)
+{
+    DeviceLimits limits = test_device().limits();
+    limits.max_storage_range = 16384;
+    limits.max_texel_elements = 1024;
+    limits.submit_seconds = 1e-7;
+    limits.max_groups = 5;
+    uint32_t submits = 0, passes = 0;
+    for (uint32_t seed = 100; seed < 115; ++seed) {
+        SCOPED_TRACE(seed);
+        ExternalMemory memory;
+        Graph g;
+        const RandomGraph made(g, seed, [&](uint32_t rows, uint32_t cols) { return memory.add(g, rows, cols); });
+        const Plan cut = plan_of(g, limits);
+        submits += cut.submits - 1;
+        passes += uint32_t(cut.passes.size() - plan_of(g).passes.size());
+        ASSERT_TRUE(run(memory, plan_of(g)) == run(memory, cut));
+    }
+    EXPECT_GT(submits, 100u);
+    EXPECT_GT(passes, 30u);
+}
+
+TEST(graph_execute, slices_a_gemm_without_changing_a_bit)
+{
+    for (DType dtype : {DType::f32, DType::f16}) {
+        ExternalMemory memory;
+        Graph g;
+        const uint32_t rows = 333;
+        const Tensor x = memory.add(g, rows, 72, dtype), w = memory.add(g, 65, 72, dtype), bias = memory.add(g, 1, 65);
+        const Tensor residual = memory.add(g, rows, 65, dtype), out = memory.add(g, rows, 65, dtype);
+        const Tensor y = gelu(g, gemm(g, x, w, bias, {.dtype = dtype}));
+        g.replace(add(g, y, residual).resource, out.resource);
+        DeviceLimits limits = test_device().limits();
+        limits.max_storage_range = 32768;
+        limits.max_texel_elements = 32768 / 16;
+        const Plan whole = plan_of(g), cut = plan_of(g, limits);
+        ASSERT_EQ(whole.passes.size(), 1u);
+        ASSERT_GT(cut.passes.size(), 1u);
+        ASSERT_TRUE(run(memory, whole) == run(memory, cut));
+    }
+}
+
+TEST(graph_execute, replays_a_program_with_the_same_bytes)
+{
+    ExternalMemory memory;
+    Graph g;
+    Tensor t = memory.add(g, 64, 64);
+    const Tensor w = memory.add(g, 64, 64), out = memory.add(g, 64, 64);
+    for (int i = 0; i < 4; ++i)
+        t = add(g, gelu(g, gemm(g, t, w, {}, {.dtype = DType::f32})), t);
+    add(g, t, t, out);
+    memory.fill();
+    auto program = Program::create(test_device(), g);
+    ASSERT_TRUE(program) << program.error().message;
+    Bytes first;
+    for (int i = 0; i < 20; ++i) {
+        ASSERT_TRUE((*program)->run());
+        const Bytes now = memory.contents();
+        if (first.empty())
+            first = now;
+        ASSERT_TRUE(first == now) << "run " << i;
+    }
+}
+
+TEST(graph_execute, keeps_runs_in_order_that_nobody_waits_for)
+{
+    ExternalMemory memory;
+    Graph g;
+    const Tensor x = memory.add(g, 8, 64), sum = memory.add(g, 8, 64);
+    add(g, sum, x, sum); // each run reads what the last one wrote
+    memory.fill();
+    const Plan plan = plan_of(g);
+    auto program = Program::create(test_device(), plan);
+    ASSERT_TRUE(program) << program.error().message;
+    for (int i = 0; i < 50; ++i)
+        ASSERT_TRUE((*program)->submit());
+    ASSERT_TRUE(test_device().wait(test_device().last_ticket()));
+    const Bytes queued = memory.contents();
+    EXPECT_TRUE(queued == run(memory, plan, 50));
+}
+
+TEST(graph_execute, uses_exactly_the_memory_that_the_plan_predicts)
+{
+    for (uint32_t seed = 300; seed < 310; ++seed) {
+        ExternalMemory memory;
+        Graph g;
+        const RandomGraph made(g, seed, [&](uint32_t rows, uint32_t cols) { return memory.add(g, rows, cols); });
+        const Plan plan = plan_of(g);
+        const uint64_t before = test_device().allocated_bytes();
+        test_device().reset_peak();
+        auto program = Program::create(test_device(), plan);
+        ASSERT_TRUE(program) << program.error().message;
+        EXPECT_EQ(test_device().peak_bytes() - before, plan.arena_bytes());
+        program->reset();
+        EXPECT_EQ(test_device().allocated_bytes(), before);
+    }
+}
+
+} // namespace
+} // namespace semrover

@@ -1,0 +1,51 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "kernels/kernels.h"
+#include "runtime/plan.h"
+
+// what graph tests need when there is no device: limits, and external memory that nobody dereferences
+namespace semrover {
+
+// of a GPU without a watchdog; every kernel has a variant that runs on it
+inline DeviceLimits test_limits()
+{
+    DeviceLimits limits;
+    limits.type = DeviceType::discrete;
+    limits.submit_seconds = 0;
+    return limits;
+}
+
+inline BufferSlice fake_memory(uint64_t bytes)
+{
+    static uint64_t next = 0x1000;
+    const uint64_t address = next += 0x1000; // one buffer each
+    return {reinterpret_cast<const Buffer*>(address), 0, bytes};
+}
+
+inline Tensor fake_external(Graph& g, uint32_t rows, uint32_t cols, DType dtype = DType::f32,
+                            std::string_view name = "input")
+{
+    return g.external(fake_memory(uint64_t(rows) * round_up(cols, kRowPadding) * dtype_bytes(dtype)), rows, cols, dtype,
+                      name);
+}
+
+inline Tensor fake_array(Graph& g, uint32_t count, std::string_view name = "array")
+{
+    return g.external(fake_memory(uint64_t(count) * 4), count, 1, DType::u32, name, 1);
+}
+
+// kernels in the order they run, with a bar for every barrier: "gelu silu | add"
+inline std::string levels_text(const Plan& plan)
+{
+    std::string out;
+    for (size_t i = 0; i < plan.passes.size(); ++i) {
+        if (i)
+            out += plan.passes[i].level == plan.passes[i - 1].level ? " " : " | ";
+        out += plan.passes[i].kernel->name;
+    }
+    return out;
+}
+
+} // namespace semrover

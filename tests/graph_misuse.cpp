@@ -1,0 +1,127 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/graph_memory.h"
+
+#include <gtest/gtest.h>
+
+namespace semrover {
+namespace {
+
+// the error of a graph that must not compile
+Error error_of(const Graph& g, const DeviceLimits& limits = test_limits())
+{
+    auto plan = make_plan(g.desc(), limits);
+    EXPECT_FALSE(plan);
+    return plan ? Error{} : plan.error();
+}
+
+TEST(graph_misuse, names_pass_and_tensor_that_is_read_before_it_is_written)
+{
+    Graph g;
+    (void)gelu(g, fake_external(g, 16, 64));
+    (void)silu(g, g.matrix(16, 64, DType::f32, "nowhere"));
+    const Error e = error_of(g);
+    EXPECT_EQ(e.code, ErrorCode::internal);
+    EXPECT_EQ(e.message, "pass 1 (silu): binding X reads 'nowhere', which nothing has written");
+}
+
+TEST(graph_misuse, wants_every_byte_written_that_is_read)
+{
+    Graph g;
+    const Tensor x = fake_external(g, 16, 64), half = g.matrix(32, 64, DType::f32, "half");
+    add(g, x, x, half.row_range(16, 16));
+    (void)gelu(g, half);
+    EXPECT_EQ(error_of(g).message, "pass 1 (gelu): binding X reads 'half', which nothing has written");
+    Graph whole;
+    const Tensor y = fake_external(whole, 16, 64), both = whole.matrix(32, 64, DType::f32, "both");
+    add(whole, y, y, both.row_range(16, 16));
+    add(whole, y, y, both.row_range(0, 16));
+    (void)gelu(whole, both);
+    EXPECT_TRUE(make_plan(whole.desc(), test_limits()));
+}
+
+TEST(graph_misuse, names_a_range_that_leaves_its_tensor)
+{
+    Graph g;
+    const Tensor x = fake_external(g, 16, 64, DType::f32, "small");
+    (void)gelu(g, x.row_range(10, 16));
+    EXPECT_EQ(error_of(g).message, "pass 0 (gelu): binding X reaches byte 6656 of 'small', which has 4096");
+    Graph h;
+    const Tensor y = h.matrix(16, 64, DType::f32, "target"), z = fake_external(h, 16, 64);
+    add(h, z, z, y.row_range(1, 16));
+    EXPECT_EQ(error_of(h).message, "pass 0 (add): binding Y reaches byte 4352 of 'target', which has 4096");
+}
+
+TEST(graph_misuse, refuses_a_tensor_larger_than_an_allocation_with_numbers)
+{
+    Graph g;
+    (void)gelu(g, fake_external(g, 1 << 20, 512));
+    DeviceLimits limits = test_limits();
+    limits.max_allocation = 512 << 20;
+    const Error e = error_of(g, limits);
+    EXPECT_EQ(e.code, ErrorCode::out_of_memory);
+    EXPECT_EQ(e.message, "tensor 'gelu' of 2147483648 bytes exceeds the device's largest allocation of 536870912");
+}
+
+TEST(graph_misuse, refuses_a_binding_that_cannot_be_cut_with_numbers)
+{
+    Graph g;
+    const Tensor x = fake_external(g, 8, 64), w = fake_external(g, 4096, 64, DType::f32, "weight");
+    (void)gemm(g, x, w, {}, {.dtype = DType::f32});
+    DeviceLimits limits = test_limits();
+    limits.max_storage_range = 1 << 19;
+    const Error e = error_of(g, limits);
+    EXPECT_EQ(e.code, ErrorCode::out_of_memory);
+    EXPECT_EQ(e.message, "gemm: binding W ('weight') has 1048576 bytes; this device binds at most 524288");
+}
+
+TEST(graph_misuse, refuses_rows_that_do_not_fit_a_binding_one_by_one)
+{
+    Graph g;
+    (void)gelu(g, fake_external(g, 4, 40000, DType::f32, "wide"));
+    DeviceLimits limits = test_limits();
+    limits.max_storage_range = 1 << 16;
+    const Error e = error_of(g, limits);
+    EXPECT_EQ(e.code, ErrorCode::out_of_memory);
+    EXPECT_EQ(e.message, "gelu: 1 rows of binding X ('wide') are 160000 bytes; this device binds at most 65536");
+}
+
+TEST(graph_misuse, names_the_kernel_that_no_variant_of_runs)
+{
+    Graph g;
+    (void)gelu(g, fake_external(g, 4, 64));
+    DeviceLimits limits = test_limits();
+    limits.max_group_threads = 16;
+    const Error e = error_of(g, limits);
+    EXPECT_EQ(e.code, ErrorCode::no_device);
+    EXPECT_EQ(e.message,
+              "no variant of kernel 'gelu' runs on this device (16384 bytes of shared memory, 16 threads a group)");
+}
+
+TEST(graph_misuse, refuses_more_workgroups_than_both_dimensions_take)
+{
+    Graph g;
+    (void)gelu(g, fake_external(g, 1000, 64));
+    DeviceLimits limits = test_limits();
+    limits.max_groups = 8;
+    const Error e = error_of(g, limits);
+    EXPECT_EQ(e.code, ErrorCode::out_of_memory);
+    EXPECT_EQ(e.message, "gelu: 16 workgroups in dimension 1, the device takes 1..8");
+}
+
+using graph_misuse_death = testing::Test;
+
+TEST(graph_misuse_death, stops_at_shapes_that_do_not_meet)
+{
+    GTEST_FLAG_SET(death_test_style, "threadsafe");
+    Graph g;
+    const Tensor x = fake_external(g, 4, 64), y = fake_external(g, 5, 64), w = fake_external(g, 8, 32);
+    EXPECT_DEATH((void)add(g, x, y), "add: \\[4, 64\\] onto \\[5, 64\\]");
+    EXPECT_DEATH((void)gemm(g, x, w, {}), "gemm: x \\[4, 64\\] F32 and w \\[8, 32\\] F32");
+    EXPECT_DEATH((void)g.matrix(0, 4, DType::f32, "void"), "tensor 'void' is empty: 0 x 4");
+    EXPECT_DEATH((void)gelu(g, Tensor{77, DType::f32, 4, 64, 64}), "a tensor of another graph");
+    EXPECT_DEATH((void)g.external(fake_memory(100), 4, 64, DType::f32, "short"), "'short' of 1024 bytes in 100 bytes");
+}
+
+} // namespace
+} // namespace semrover

@@ -1,0 +1,185 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/graph_memory.h"
+#include "tests/random_graph.h"
+
+#include <gtest/gtest.h>
+
+namespace semrover {
+namespace {
+
+Plan plan_of(const Graph& g, const DeviceLimits& limits = test_limits())
+{
+    auto plan = make_plan(g.desc(), limits);
+    EXPECT_TRUE(plan) << plan.error().message;
+    return plan ? *plan : Plan{};
+}
+
+TEST(graph_plan, puts_no_barrier_between_passes_that_read_the_same)
+{
+    Graph g;
+    const Tensor x = fake_external(g, 16, 64);
+    const Tensor a = gelu(g, x), b = silu(g, x), c = gelu(g, x);
+    add(g, a, b, fake_external(g, 16, 64));
+    add(g, b, c, fake_external(g, 16, 64));
+    EXPECT_EQ(levels_text(plan_of(g)), "gelu silu gelu | add add");
+}
+
+TEST(graph_plan, lets_independent_branches_share_a_level)
+{
+    Graph g;
+    const Tensor x = fake_external(g, 16, 64), y = fake_external(g, 16, 64), z = fake_external(g, 16, 64);
+    const Tensor a = gelu(g, x), b = gelu(g, y), c = silu(g, x);
+    add(g, a, b, z);
+    add(g, b, c, x); // also after the reads of x
+    EXPECT_EQ(levels_text(plan_of(g)), "gelu gelu silu | add add");
+}
+
+TEST(graph_plan, orders_a_write_after_the_reads_before_it)
+{
+    Graph g;
+    const Tensor x = fake_external(g, 16, 64), y = fake_external(g, 16, 64);
+    (void)gelu(g, x);
+    add(g, y, y, x);
+    (void)silu(g, x);
+    EXPECT_EQ(levels_text(plan_of(g)), "gelu | add | silu");
+}
+
+TEST(graph_plan, orders_writes_to_the_same_bytes_and_not_to_different_rows)
+{
+    Graph g;
+    const Tensor x = fake_external(g, 16, 64), y = fake_external(g, 32, 64);
+    add(g, x, x, y.row_range(0, 16));
+    add(g, x, x, y.row_range(16, 16));
+    EXPECT_EQ(levels_text(plan_of(g)), "add add");
+    add(g, x, x, y.row_range(8, 16));
+    EXPECT_EQ(levels_text(plan_of(g)), "add add | add");
+}
+
+TEST(graph_plan, knows_two_tensors_in_the_same_memory)
+{
+    Graph g;
+    const BufferSlice memory = fake_memory(16 * 64 * 4);
+    const Tensor a = g.external(memory, 16, 64, DType::f32, "a"), b = g.external(memory, 16, 64, DType::f32, "b");
+    add(g, fake_external(g, 16, 64), fake_external(g, 16, 64), a);
+    (void)gelu(g, b);
+    EXPECT_EQ(levels_text(plan_of(g)), "add | gelu");
+}
+
+TEST(graph_plan, separates_passes_that_only_meet_in_aliased_memory)
+{
+    Graph g;
+    const Tensor x = fake_external(g, 16, 64);
+    Tensor t = x;
+    for (int i = 0; i < 5; ++i)
+        t = gelu(g, t);
+    const Plan plan = plan_of(g);
+    EXPECT_EQ(levels_text(plan), "gelu | gelu | gelu | gelu | gelu");
+    EXPECT_EQ(plan.arena_bytes(), 2 * 16 * 64 * 4u);
+    EXPECT_EQ(plan.transient_bytes(), 5 * 16 * 64 * 4u);
+}
+
+TEST(graph_plan, prints_passes_levels_bytes_and_places)
+{
+    Graph g;
+    const Tensor x = fake_external(g, 16, 64);
+    (void)silu(g, gelu(g, x));
+    EXPECT_EQ(plan_of(g).print(), "2 passes, 0 fused, 2 barriers, 1 submits; arena 8192 bytes (8192 without aliasing)\n"
+                                  "-- level 0\n"
+                                  "   0 gelu [2 1 1] X:r=input(ext +4096) Y:w=gelu(0@0 +4096)\n"
+                                  "-- level 1\n"
+                                  "   1 silu [2 1 1] X:r=gelu(0@0 +4096) Y:w=silu(0@4096 +4096)\n");
+}
+
+// Runs the plan over tags instead of numbers: whoever writes 16 bytes of the arena owns them, and whoever reads them
+// must find the owner that it asked for.
+void expect_owned_reads(const Plan& plan)
+{
+    std::vector<std::vector<uint32_t>> owner;
+    for (uint64_t bytes : plan.blocks)
+        owner.emplace_back(bytes / 16, ~0u);
+    for (size_t i = 0; i < plan.passes.size(); ++i)
+        for (Access wanted : {Access::read, Access::write}) // a pass reads before it writes
+            for (const PassBinding& b : plan.passes[i].bindings) {
+                if (plan.resources[b.resource].external || !(uint8_t(b.access) & uint8_t(wanted)))
+                    continue;
+                const Placement& p = plan.placements[b.resource];
+                for (uint64_t at = (p.offset + b.offset) / 16; at < (p.offset + b.offset + b.bytes) / 16; ++at) {
+                    uint32_t& tag = owner.at(p.block).at(at);
+                    ASSERT_TRUE(wanted == Access::write || tag == b.resource)
+                        << "pass " << i << " reads bytes that another tensor has overwritten";
+                    tag = b.resource;
+                }
+            }
+}
+
+void expect_no_hazard_within_a_level(const Plan& plan)
+{
+    for (const Pass& a : plan.passes)
+        for (const Pass& b : plan.passes) {
+            if (&a == &b || a.level != b.level)
+                continue;
+            for (const PassBinding& x : a.bindings)
+                for (const PassBinding& y : b.bindings)
+                    ASSERT_FALSE((uint8_t(x.access) & uint8_t(Access::write)) && overlaps(plan, x, y))
+                        << a.kernel->name << " and " << b.kernel->name;
+        }
+}
+
+// the most bytes that are alive at once, by the order in which the graph was written
+uint64_t most_alive(const Plan& plan)
+{
+    uint64_t most = 0;
+    for (uint32_t at = 0; at < 200; ++at) {
+        uint64_t sum = 0;
+        for (size_t r = 0; r < plan.resources.size(); ++r)
+            if (!plan.resources[r].external && plan.placements[r].first_use <= at && at <= plan.placements[r].last_use)
+                sum += plan.resources[r].bytes;
+        most = std::max(most, sum);
+    }
+    return most;
+}
+
+void check_random(uint32_t seed, const DeviceLimits& limits)
+{
+    SCOPED_TRACE(seed);
+    Graph g;
+    const RandomGraph made(g, seed, [&](uint32_t rows, uint32_t cols) { return fake_external(g, rows, cols); });
+    const Plan plan = plan_of(g, limits);
+    ASSERT_FALSE(plan.passes.empty());
+    expect_owned_reads(plan);
+    expect_no_hazard_within_a_level(plan);
+    EXPECT_GE(plan.arena_bytes(), most_alive(plan));
+    EXPECT_LE(plan.arena_bytes(), plan.transient_bytes());
+    for (uint64_t bytes : plan.blocks)
+        EXPECT_LE(bytes, limits.max_allocation);
+}
+
+TEST(graph_plan, never_gives_two_live_tensors_the_same_bytes)
+{
+    for (uint32_t seed = 0; seed < 400; ++seed)
+        check_random(seed, test_limits());
+}
+
+TEST(graph_plan, never_does_so_either_over_several_blocks_bands_and_submits)
+{
+    DeviceLimits limits = test_limits();
+    limits.max_allocation = 40000;
+    limits.max_storage_range = 16384;
+    limits.submit_seconds = 1e-6;
+    for (uint32_t seed = 1000; seed < 1200; ++seed)
+        check_random(seed, limits);
+}
+
+TEST(graph_plan, saves_memory_on_deep_graphs)
+{
+    Graph g;
+    Tensor t = fake_external(g, 256, 64);
+    for (int i = 0; i < 50; ++i)
+        t = silu(g, gelu(g, t));
+    const Plan plan = plan_of(g);
+    EXPECT_EQ(plan.arena_bytes(), plan.transient_bytes() / 50);
+}
+
+} // namespace
+} // namespace semrover

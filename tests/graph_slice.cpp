@@ -1,0 +1,164 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/graph_memory.h"
+
+#include <cstring>
+#include <gtest/gtest.h>
+
+namespace semrover {
+namespace {
+
+Plan plan_of(const Graph& g, const DeviceLimits& limits)
+{
+    auto plan = make_plan(g.desc(), limits);
+    EXPECT_TRUE(plan) << plan.error().message;
+    return plan ? *plan : Plan{};
+}
+
+uint32_t pushed(const Pass& pass, std::string_view member)
+{
+    uint32_t value = 0;
+    std::memcpy(&value, &pass.push.at(pass.variant->push_member(member)->offset), 4);
+    return value;
+}
+
+const PassBinding& binding(const Pass& pass, std::string_view name)
+{
+    for (const PassBinding& b : pass.bindings)
+        if (b.name == name)
+            return b;
+    ADD_FAILURE() << "no binding " << name;
+    return pass.bindings.front();
+}
+
+// bands of `rows` rows are aligned, within the range, and one after the other without a gap
+void expect_bands(const Plan& plan, std::string_view name, uint32_t rows, uint64_t row_bytes,
+                  const DeviceLimits& limits)
+{
+    uint64_t next = 0;
+    for (const Pass& pass : plan.passes) {
+        const PassBinding& b = binding(pass, name);
+        EXPECT_EQ(b.offset, next * row_bytes) << name;
+        EXPECT_EQ(b.offset % limits.offset_alignment, 0u) << name;
+        EXPECT_LE(b.bytes, limits.max_storage_range) << name;
+        EXPECT_EQ(b.bytes, pushed(pass, "rows") * row_bytes) << name;
+        next += pushed(pass, "rows");
+    }
+    EXPECT_EQ(next, rows) << name;
+}
+
+TEST(graph_slice, cuts_rows_into_aligned_bands_that_cover_each_row_once)
+{
+    for (auto [rows, cols] : {std::array{1000u, 64u}, {3001u, 8u}, {4099u, 24u}, {333u, 200u}, {70u, 1000u}}) {
+        SCOPED_TRACE(fmt::format("{} x {}", rows, cols));
+        Graph g;
+        (void)gelu(g, fake_external(g, rows, cols));
+        DeviceLimits limits = test_limits();
+        limits.max_storage_range = 1 << 15;
+        limits.offset_alignment = 256;
+        limits.max_storage_range = std::max<uint64_t>(limits.max_storage_range, 64 * cols * 4);
+        const Plan plan = plan_of(g, limits);
+        EXPECT_GT(plan.passes.size(), 1u);
+        EXPECT_EQ(plan.levels, 1u); // bands touch different rows
+        for (const char* name : {"X", "Y"})
+            expect_bands(plan, name, rows, uint64_t(cols) * 4, limits);
+    }
+}
+
+TEST(graph_slice, cuts_a_fused_gemm_in_every_operand_that_has_rows)
+{
+    Graph g;
+    const uint32_t rows = 1000;
+    const Tensor x = fake_external(g, rows, 64), w = fake_external(g, 64, 64), residual = fake_external(g, rows, 64);
+    const Modulation gate{fake_external(g, 3, 64), fake_array(g, rows)};
+    (void)gated_add(g, gelu(g, gemm(g, x, w, {}, {.dtype = DType::f32})), gate, residual);
+    DeviceLimits limits = test_limits();
+    limits.max_storage_range = 1 << 16;
+    const Plan plan = plan_of(g, limits);
+    EXPECT_EQ(plan.fused, 2u);
+    EXPECT_EQ(plan.passes.size(), 4u); // 256 rows each, whole tiles of 64
+    for (const char* name : {"X", "Residual", "Y"})
+        expect_bands(plan, name, rows, 256, limits);
+    expect_bands(plan, "GateRow", rows, 4, limits);
+    for (const Pass& pass : plan.passes) {
+        EXPECT_EQ(binding(pass, "W").offset, 0u);
+        EXPECT_EQ(pass.group_count[0], divide_up(pushed(pass, "rows"), 64));
+    }
+}
+
+TEST(graph_slice, takes_rows_that_fit_even_where_a_tile_of_them_does_not)
+{
+    Graph g;
+    const Tensor x = fake_external(g, 200, 1024), w = fake_external(g, 8, 1024);
+    (void)gemm(g, x, w, {}, {.dtype = DType::f32});
+    DeviceLimits limits = test_limits();
+    limits.max_storage_range = 40 * 1024 * 4; // less than one tile of 64 rows
+    const Plan plan = plan_of(g, limits);
+    EXPECT_EQ(plan.passes.size(), 5u);
+    expect_bands(plan, "X", 200, 4096, limits);
+    expect_bands(plan, "Y", 200, 32, limits);
+}
+
+TEST(graph_slice, counts_texels_as_the_cpu_variant_binds_them)
+{
+    Graph g;
+    const Tensor x = fake_external(g, 96, 64), w = fake_external(g, 24, 64);
+    (void)gemm(g, x, w, {}, {.dtype = DType::f32});
+    DeviceLimits limits = test_limits();
+    limits.type = DeviceType::cpu;
+    limits.max_texel_elements = 24 * 64 / 4; // w, and 24 rows of x
+    const Plan plan = plan_of(g, limits);
+    EXPECT_EQ(plan.passes.front().variant->name, "cpu");
+    EXPECT_EQ(plan.passes.size(), 4u);
+}
+
+TEST(graph_slice, cuts_long_work_into_bands_and_submits)
+{
+    Graph g;
+    const Tensor x = fake_external(g, 4096, 4096), w = fake_external(g, 4096, 4096);
+    (void)gemm(g, x, w, {}, {.dtype = DType::f32}); // 137 GFLOP, 0.27 s at the assumed rate
+    DeviceLimits limits = test_limits();
+    limits.submit_seconds = 0.1;
+    const Plan plan = plan_of(g, limits);
+    EXPECT_EQ(plan.passes.size(), 3u);
+    EXPECT_EQ(plan.submits, 3u);
+    for (uint32_t i = 0; i < plan.passes.size(); ++i) {
+        EXPECT_EQ(plan.passes[i].submit, i);
+        EXPECT_LE(plan.passes[i].options.flops / 5e11, limits.submit_seconds * 1.001);
+    }
+    EXPECT_EQ(plan_of(g, test_limits()).submits, 1u); // nothing is cut without a watchdog
+}
+
+TEST(graph_slice, fills_a_submit_with_short_passes)
+{
+    Graph g;
+    Tensor x = fake_external(g, 512, 512);
+    const Tensor w = fake_external(g, 512, 512);
+    for (int i = 0; i < 12; ++i)
+        x = gemm(g, x, w, {}, {.dtype = DType::f32}); // 0.54 ms each
+    DeviceLimits limits = test_limits();
+    limits.submit_seconds = 0.002;
+    const Plan plan = plan_of(g, limits);
+    EXPECT_EQ(plan.passes.size(), 12u);
+    EXPECT_EQ(plan.submits, 4u);
+    for (size_t i = 1; i < 12; ++i)
+        EXPECT_GE(plan.passes[i].submit, plan.passes[i - 1].submit);
+}
+
+TEST(graph_slice, folds_workgroups_beyond_a_dimension_over_y)
+{
+    Graph g;
+    const Tensor x = fake_external(g, 1000, 64); // 8000 threads of 8 elements, 125 groups
+    (void)gelu(g, x);
+    (void)modulate(g, x, {fake_external(g, 1, 128), fake_array(g, 1000)}, 64, 1e-6f); // 1000 groups
+    DeviceLimits limits = test_limits();
+    limits.max_groups = 60;
+    const Plan plan = plan_of(g, limits);
+    EXPECT_EQ(plan.passes[0].group_count[0], 42u);
+    EXPECT_EQ(plan.passes[0].group_count[1], 3u);
+    EXPECT_EQ(plan.passes[1].group_count[0], 59u);
+    EXPECT_EQ(plan.passes[1].group_count[1], 17u);
+}
+
+} // namespace
+} // namespace semrover

@@ -1,0 +1,100 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "tests/kernel_case.h"
+#include "tests/splat_reference.h"
+
+namespace semrover {
+
+struct SplatPixels {
+    std::vector<float> color, surface, depth;
+    std::vector<uint32_t> ids;
+    uint32_t visible = 0, pairs = 0;
+};
+
+// runs the op on splats of the host; label of splat i is i % 20, its cell 1000 + i
+inline SplatPixels run_splats(const std::vector<HostSplat>& splats, const std::vector<HostCamera>& cameras,
+                              SplatOptions options)
+{
+    KernelCase k(test_device());
+    std::vector<float> positions, normals, colors, table;
+    std::vector<uint32_t> labels, cells;
+    for (const HostSplat& s : splats) {
+        for (size_t a = 0; a < 3; ++a) {
+            positions.push_back(float(s.position[a]));
+            normals.push_back(float(s.normal[a]));
+            colors.push_back(float(s.color[a]));
+        }
+        positions.push_back(float(s.opacity));
+        normals.push_back(float(s.sigma_u));
+        colors.push_back(float(s.sigma_v));
+        cells.push_back(1000 + uint32_t(labels.size()));
+        labels.push_back(uint32_t(labels.size() % 20));
+    }
+    for (const HostCamera& c : cameras) {
+        for (double v : {c.fx, c.fy, c.cx, c.cy})
+            table.push_back(float(v));
+        for (double v : c.view)
+            table.push_back(float(v));
+    }
+    const SplatScene scene = {k.input(positions, 4), k.input(normals, 4), k.input(colors, 4), k.input(labels),
+                              k.input(cells)};
+    options.visible = k.output(1, 1, DType::u32, 1);
+    options.pairs = k.output(1, 1, DType::u32, 1);
+    if (!options.max_visible)
+        options.max_visible = uint32_t(splats.size() * cameras.size());
+    if (!options.max_pairs)
+        options.max_pairs = 1u << 18;
+    const SplatImages y = splat(k.graph, scene, k.input(table, 16), options);
+    const auto keep = [&](const Tensor& t) {
+        const Tensor out = k.output(t.rows, t.cols, t.dtype, t.ld);
+        k.graph.replace(t.resource, out.resource);
+        return out;
+    };
+    const Tensor color = keep(y.color), surface = keep(y.surface), depth = keep(y.depth), ids = keep(y.ids);
+    const Status status = k.compile_and_run();
+    EXPECT_TRUE(status) << status.error().message;
+    return {k.read_array<float>(color),
+            k.read_array<float>(surface),
+            k.read_array<float>(depth),
+            k.read_array<uint32_t>(ids),
+            k.read_array<uint32_t>(options.visible)[0],
+            k.read_array<uint32_t>(options.pairs)[0]};
+}
+
+// splats of all sizes in front of a camera that looks along +z, values as fp32 has them
+inline std::vector<HostSplat> random_splats(uint32_t n, uint32_t seed, double smallest = 0.01, double largest = 0.35)
+{
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> unit(0, 1);
+    std::normal_distribution<double> normal;
+    const auto f = [](double v) { return double(float(v)); };
+    std::vector<HostSplat> out;
+    for (uint32_t i = 0; i < n; ++i) {
+        HostSplat s;
+        s.position = {f(6 * unit(random) - 3), f(4 * unit(random) - 2), f(1.5 + 7.5 * unit(random))};
+        Vector v = {normal(random), normal(random), normal(random)};
+        const double length = std::sqrt(dot(v, v));
+        s.normal = {f(v[0] / length), f(v[1] / length), f(v[2] / length)};
+        s.color = {f(unit(random)), f(unit(random)), f(unit(random))};
+        s.sigma_u = f(smallest + (largest - smallest) * unit(random));
+        s.sigma_v = f(smallest + (largest - smallest) * unit(random));
+        s.opacity = f(0.3 + 0.7 * unit(random));
+        out.push_back(s);
+    }
+    return out;
+}
+
+// moved sideways and turned about y by `yaw`; the numbers as fp32 has them
+inline HostCamera camera_for(uint32_t width, uint32_t height, double yaw = 0, double shift = 0)
+{
+    const auto f = [](double v) { return double(float(v)); };
+    return {f(0.9 * width),
+            f(0.95 * width),
+            f(width / 2.0 + 1.3),
+            f(height / 2.0 - 0.7),
+            {f(std::cos(yaw)), 0, f(std::sin(yaw)), f(shift), 0, 1, 0, 0, f(-std::sin(yaw)), 0, f(std::cos(yaw)), 0}};
+}
+
+} // namespace semrover
