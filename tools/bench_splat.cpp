@@ -43,9 +43,9 @@ Status bench_sort(const SortOptions& o, const Globals& globals)
 }
 
 // a street: ground, two facades and blobs between them, in front of a camera at the origin that looks along x
-SurfelPoints street_points(uint32_t count)
+Surfels street_surfels(uint32_t count, float sigma)
 {
-    SurfelPoints points;
+    Surfels s;
     uint32_t state = 777;
     const auto random = [&] {
         state = state * 1664525u + 1013904223u;
@@ -53,33 +53,29 @@ SurfelPoints street_points(uint32_t count)
     };
     for (uint32_t i = 0; i < count; ++i) {
         const float along = 1 + 60 * random(), a = random(), b = random();
-        std::array<float, 3> p, n;
-        if (i % 4 == 0) {
-            p = {along, 16 * a - 8, -1.7f};
-            n = {0, 0, 1};
-        } else if (i % 4 == 3) {
+        std::array<float, 3> p{along, 16 * a - 8, -1.7f}, n{0, 0, 1};
+        if (i % 4 == 3) {
             p = {along, 10 * a - 5, 3 * b - 1.7f};
             n = {-1, 0, 0};
-        } else {
+        } else if (i % 4) {
             p = {along, i % 4 == 1 ? 8.f : -8.f, 12 * a - 1.7f};
             n = {0, i % 4 == 1 ? -1.f : 1.f, 0};
         }
-        points.positions.insert(points.positions.end(), p.begin(), p.end());
-        points.normals.insert(points.normals.end(), n.begin(), n.end());
-        points.colors.insert(points.colors.end(), {a, b, random()});
-        points.labels.push_back(uint8_t(i % 20));
-        points.cells.push_back(i / 20);
+        s.position.push_back(p);
+        s.normal.push_back(n);
+        s.color.push_back({a, b, random()});
+        s.sigma_u.push_back(sigma);
+        s.sigma_v.push_back(sigma);
+        s.opacity.push_back(1);
+        s.label.push_back(uint8_t(i % 20));
     }
-    return points;
+    return s;
 }
 
 Status bench_splat(const SplatBenchOptions& o, const Globals& globals)
 {
     SR_TRY(const auto device, open_device(globals));
-    SurfelPoints points = street_points(o.splats);
-    points.sigmas.assign(size_t(o.splats) * 2, o.sigma);
-    points.opacities.assign(o.splats, 1.f);
-    SR_TRY(const SurfelScene scene, SurfelScene::create(*device, points));
+    SR_TRY(const SurfelScene scene, SurfelScene::create(*device, street_surfels(o.splats, o.sigma)));
     SR_TRY(const auto rasterizer, Rasterizer::create(*device, scene, o.width, o.height, 1));
     SplatCamera camera;
     camera.fx = camera.fy = 0.68f * float(o.width);

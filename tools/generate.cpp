@@ -103,20 +103,6 @@ uint32_t choose_batch(const Options& o, const Device& device)
     return device.limits().type == DeviceType::cpu ? 2 : 16; // research/performance.md §3.6
 }
 
-// largest batch, from the wanted one down, that fits the budget
-Result<uint32_t> fit_batch(const TokenSampler& sampler, const Device& device, uint32_t batch, uint32_t cells, uint64_t& peak)
-{
-    for (;; --batch) {
-        SR_TRY(const uint64_t bytes, sampler.planned_bytes(batch, cells));
-        peak = device.allocated_bytes() - sampler.table_bytes() + bytes;
-        if (!device.budget() || peak <= device.budget())
-            return batch;
-        if (batch == 1)
-            return fail(ErrorCode::out_of_memory, "one region of {} cells needs {} in all, --max-vram allows {}", cells, bytes_text(peak),
-                        bytes_text(device.budget()));
-    }
-}
-
 // seconds of one step of a full batch, measured
 Result<double> measure_step(Device& device, const Transformer& transformer, const Settings& s, uint32_t batch, uint32_t cells)
 {
@@ -145,23 +131,45 @@ struct Job {
     VoxelGrid grid;
     std::unique_ptr<Outpainter> outpainter;
     std::unique_ptr<TokenSampler> sampler;
-    uint32_t batch = 1;
+    uint32_t batch = 1, widest_batch = 1;
     uint64_t planned_bytes = 0;
 };
 
+// The batch is the wanted one, or the largest that fits the budget; the plan is for the batch that dependencies between
+// regions really allow, so that the planned memory is the memory used.
+Status fit_batch(Job& j)
+{
+    const uint32_t cells = j.outpainter->largest_region();
+    for (j.batch = choose_batch(j.options, *j.device);; --j.batch) {
+        j.widest_batch = j.outpainter->widest_batch(j.batch);
+        uint64_t bytes = j.sampler->table_bytes();
+        if (j.widest_batch) {
+            SR_TRY(bytes, j.sampler->planned_bytes(j.widest_batch, cells));
+        }
+        j.planned_bytes = j.device->allocated_bytes() - j.sampler->table_bytes() + bytes;
+        if (!j.device->budget() || j.planned_bytes <= j.device->budget())
+            return {};
+        if (j.batch == 1)
+            return fail(ErrorCode::out_of_memory, "one region of {} cells needs {} in all, --max-vram allows {}", cells,
+                        bytes_text(j.planned_bytes), bytes_text(j.device->budget()));
+    }
+}
+
 Status dry_run(Job& j)
 {
-    SR_TRY(const double step, measure_step(*j.device, *j.transformer, j.settings, j.batch, j.outpainter->largest_region()));
+    const uint32_t batch = std::max(j.widest_batch, 1u);
+    j.sampler.reset(); // it has made its plan, and the measurement's own must fit the budget
+    SR_TRY(const double step, measure_step(*j.device, *j.transformer, j.settings, batch, j.outpainter->largest_region()));
     const size_t regions = j.outpainter->region_count(), evaluations = j.settings.plan.evaluations;
-    const double seconds = step * double(evaluations) * double(regions) / j.batch;
-    const Json report{{"regions", regions},   {"cells", j.outpainter->cells_to_do()},     {"batch", j.batch},
+    const double seconds = step * double(evaluations) * double(regions) / batch;
+    const Json report{{"regions", regions},   {"cells", j.outpainter->cells_to_do()},     {"batch", batch},
                       {"steps", evaluations}, {"peak_device_bytes", j.planned_bytes},      {"seconds", seconds},
                       {"device", j.device->name()}};
     if (j.globals.json)
         fmt::print("{}\n", report.dump());
     else
         fmt::print("{} cells in {} regions, {} at a time, {} network steps each\npeak device memory {}\nabout {} on {}\n",
-                   j.outpainter->cells_to_do(), regions, j.batch, evaluations, bytes_text(j.planned_bytes), duration_text(seconds),
+                   j.outpainter->cells_to_do(), regions, batch, evaluations, bytes_text(j.planned_bytes), duration_text(seconds),
                    j.device->name());
     return {};
 }
@@ -180,9 +188,7 @@ Status prepare(Job& j)
     SR_TRY(j.transformer, Transformer::load(*j.device, j.settings.model.transformer, j.settings.precision));
     const SamplerOptions sampling = sampling_options(j.settings.guidance, j.options.seed);
     SR_TRY(j.sampler, TokenSampler::create(*j.device, *j.transformer, j.settings.plan, sampling));
-    const uint32_t wanted = std::min<uint32_t>(choose_batch(j.options, *j.device), uint32_t(std::max<size_t>(1, j.outpainter->region_count())));
-    SR_TRY(j.batch, fit_batch(*j.sampler, *j.device, wanted, j.outpainter->largest_region(), j.planned_bytes));
-    return {};
+    return fit_batch(j);
 }
 
 Status finish(Job& j, RunFolder& run, double seconds)
@@ -215,14 +221,22 @@ Status finish(Job& j, RunFolder& run, double seconds)
     return {};
 }
 
-Status generate(const Options& o, const Globals& globals)
+// what cannot be written is refused now, not after an hour
+Status check_output(const Options& o, const Globals& globals)
 {
-    Job j{o, globals, {}, {}, {}, {}, {}, {}, 1, 0};
-    if (!o.dry_run && o.output.empty())
+    if (o.output.empty())
         return fail(ErrorCode::usage, "-o/--output is required");
     for (const std::string& path : {o.output, o.ply.points, o.ply.splats_3d, o.ply.splats_2d})
-        if (!o.dry_run && !globals.yes && !path.empty() && std::filesystem::exists(path))
+        if (!path.empty() && std::filesystem::exists(path) && !globals.yes)
             return fail(ErrorCode::usage, "'{}' exists; -y replaces it", path);
+    return AtomicFile::create(o.output).map([](const AtomicFile&) {});
+}
+
+Status generate(const Options& o, const Globals& globals)
+{
+    Job j{o, globals, {}, {}, {}, {}, {}, {}};
+    if (!o.dry_run)
+        SR_CHECK(check_output(o, globals));
     SR_CHECK(prepare(j));
     if (o.dry_run)
         return dry_run(j);
@@ -234,6 +248,8 @@ Status generate(const Options& o, const Globals& globals)
         SR_CHECK(j.outpainter->restore(region));
         restored += region.targets.size();
     }
+    if (restored)
+        SR_CHECK(fit_batch(j)); // what is left may come in smaller batches
     const auto begin = std::chrono::steady_clock::now();
     Progress progress(progress_to_stderr(globals), "generate", "cells", j.outpainter->cells_to_do(), restored);
     OutpaintCallbacks callbacks;

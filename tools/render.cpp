@@ -57,17 +57,17 @@ Result<std::array<uint8_t, 3>> background_of(const Options& o)
 }
 
 // points as generated; a grid without points, or --semantic, in label colours
-Result<SurfelPoints> load_points(const Options& o, const VoxelGrid& grid)
+Result<SurfelScene> load_scene(const Options& o, const VoxelGrid& grid, Device& device)
 {
-    SurfelPoints points = surfel_points(grid);
-    if (points.size() == 0) {
-        if (!o.semantic)
-            return fail(ErrorCode::bad_input, "{} has no points yet: generate them, or draw its labels with --semantic", quote_path(o.grid));
-        return block_points(grid);
-    }
+    SR_TRY(const SurfelOptions surfels, surfel_options(o));
+    ScenePoints points = points_of(grid);
+    if (points.size() == 0 && !o.semantic)
+        return fail(ErrorCode::bad_input, "{} has no points yet: generate them, or draw its labels with --semantic", quote_path(o.grid));
+    if (points.size() == 0)
+        return SurfelScene::create(device, block_surfels(grid));
     if (o.semantic)
         color_by_label(points);
-    return points;
+    return SurfelScene::create(device, points, surfels);
 }
 
 Result<CameraPath> load_cameras(const Options& o)
@@ -207,11 +207,10 @@ Status check_outputs(const Options& o, const Globals& globals)
 Status render(const Options& o, const Globals& globals)
 {
     SR_CHECK(check_outputs(o, globals));
-    SR_TRY(const SurfelOptions surfels, surfel_options(o));
+    SR_CHECK(surfel_options(o).map([](const auto&) {}));
     Output out{o.output, {}, {}, {}, {}};
     SR_TRY(out.background, background_of(o));
     SR_TRY(const VoxelGrid grid, read_grid(o.grid));
-    SR_TRY(const SurfelPoints points, load_points(o, grid));
     CameraPath path;
     if (!o.path.empty()) {
         SR_TRY(path, load_cameras(o));
@@ -219,7 +218,7 @@ Status render(const Options& o, const Globals& globals)
     SR_TRY(const auto device, open_device(globals));
     if (!o.profile.empty())
         device->set_profile(std::make_shared<Profile>());
-    SR_TRY(const SurfelScene scene, SurfelScene::create(*device, points, surfels));
+    SR_TRY(const SurfelScene scene, load_scene(o, grid, *device));
     if (scene.skipped() && !globals.quiet)
         fmt::print(stderr, "semrover: warning: {} of {} splats are degenerate and not drawn\n", scene.skipped(), scene.size());
     RasterizerOptions options;

@@ -54,7 +54,8 @@ Result<RunFolder> RunFolder::open(const Path& folder, const Json& settings, bool
         if (before.value("settings", Json()) != settings)
             return fail(ErrorCode::bad_input, "{} holds a run with other settings, model, input or device; finish that one, name another output, or start over with -y",
                         quote_path(folder));
-        SR_CHECK(run.read_journal());
+        // pieces of a finished run are gone: what is asked for now is made from the start
+        SR_CHECK(before.value("state", Json()) == "finished" ? run.start(settings) : run.read_journal());
     } else {
         SR_CHECK(run.start(settings));
     }

@@ -4,8 +4,6 @@
 
 #include "engine/scene/palette.h"
 
-#include <algorithm>
-
 namespace semrover {
 
 namespace {
@@ -13,16 +11,10 @@ namespace {
 constexpr int kPerSide = 5;        // surfels along an edge of a face
 constexpr float kOverlap = 0.7f;   // sigma over spacing: alpha stays above 0.98 between four surfels
 
-std::array<float, 3> label_color(uint8_t label)
-{
-    const auto& c = kPalette[std::min<size_t>(label, kClassCount - 1)].color;
-    return {float(c[0]) / 255, float(c[1]) / 255, float(c[2]) / 255};
-}
-
 // faces of different directions get different shades, so that blocks can be told apart
 float shade(int axis, int side) { return axis == 2 ? (side > 0 ? 1.f : 0.6f) : axis == 0 ? 0.8f : 0.9f; }
 
-void add_face(SurfelPoints& out, const VoxelGrid& grid, size_t cell, int axis, int side)
+void add_face(Surfels& out, const VoxelGrid& grid, size_t cell, int axis, int side)
 {
     const std::array<float, 3> center = cell_center(grid.cells[cell], grid.voxel_size), color = label_color(grid.labels[cell]);
     const float spacing = grid.voxel_size / kPerSide;
@@ -33,21 +25,22 @@ void add_face(SurfelPoints& out, const VoxelGrid& grid, size_t cell, int axis, i
             p[size_t(axis)] += float(side) * grid.voxel_size * 0.499f; // inside the cell: faces of neighbours do not tie
             p[size_t(axis + 1) % 3] += (float(u) - (kPerSide - 1) / 2.f) * spacing;
             p[size_t(axis + 2) % 3] += (float(v) - (kPerSide - 1) / 2.f) * spacing;
-            out.positions.insert(out.positions.end(), p.begin(), p.end());
-            out.normals.insert(out.normals.end(), n.begin(), n.end());
-            for (float c : color)
-                out.colors.push_back(c * shade(axis, side));
-            out.sigmas.insert(out.sigmas.end(), {kOverlap * spacing, kOverlap * spacing});
-            out.labels.push_back(grid.labels[cell]);
-            out.cells.push_back(uint32_t(cell));
+            out.position.push_back(p);
+            out.normal.push_back(n);
+            const float light = shade(axis, side);
+            out.color.push_back({color[0] * light, color[1] * light, color[2] * light});
+            out.sigma_u.push_back(kOverlap * spacing);
+            out.sigma_v.push_back(kOverlap * spacing);
+            out.opacity.push_back(1);
+            out.label.push_back(grid.labels[cell]);
         }
 }
 
 } // namespace
 
-SurfelPoints block_points(const VoxelGrid& grid)
+Surfels block_surfels(const VoxelGrid& grid)
 {
-    SurfelPoints out;
+    Surfels out;
     for (size_t cell = 0; cell < grid.cells.size(); ++cell)
         for (int axis = 0; axis < 3; ++axis)
             for (int side : {-1, 1}) {
@@ -57,14 +50,6 @@ SurfelPoints block_points(const VoxelGrid& grid)
                     add_face(out, grid, cell, axis, side);
             }
     return out;
-}
-
-void color_by_label(SurfelPoints& points)
-{
-    for (size_t i = 0; i < points.size(); ++i) {
-        const std::array<float, 3> c = label_color(points.labels[i]);
-        std::copy(c.begin(), c.end(), points.colors.begin() + int64_t(3 * i));
-    }
 }
 
 } // namespace semrover

@@ -2,15 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/splat/surfels.h"
+#include "engine/scene/grid.h"
+#include "engine/scene/ply.h"
 
 namespace semrover {
 
 // A semantic grid drawn as blocks: 5 x 5 surfels on every face of a cell that borders an empty cell, in label colours,
 // large enough to leave no hole.
-SurfelPoints block_points(const VoxelGrid& grid);
-
-// colours become those of the labels
-void color_by_label(SurfelPoints& points);
+Surfels block_surfels(const VoxelGrid& grid);
 
 } // namespace semrover

@@ -99,6 +99,22 @@ void Outpainter::store(const RegionResult& result)
     graph_->done(result.region);
 }
 
+uint32_t Outpainter::widest_batch(uint32_t limit) const
+{
+    RegionGraph graph = *graph_;
+    uint32_t widest = 0;
+    while (!graph.finished()) {
+        uint32_t fresh = 0;
+        const std::vector<uint32_t> taken = graph.take(limit);
+        for (uint32_t region : taken) {
+            fresh += restored_[region].targets.empty();
+            graph.done(region);
+        }
+        widest = std::max(widest, fresh);
+    }
+    return widest;
+}
+
 Status Outpainter::run(TokenSampler& sampler, uint32_t batch, const OutpaintCallbacks& callbacks)
 {
     while (!graph_->finished()) {

@@ -34,6 +34,10 @@ class Outpainter {
     uint32_t largest_region() const { return largest_; }
     const Regions& regions() const { return regions_; }
 
+    // regions of the largest batch that run() will make with this limit: dependencies may keep batches smaller. Of a run
+    // that has not begun; 0 when every region is restored.
+    uint32_t widest_batch(uint32_t limit) const;
+
     // takes over a region that an earlier run finished; its targets must be those of this run
     Status restore(const RegionResult& result);
 

@@ -1,0 +1,41 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/scene/scene_points.h"
+
+#include "engine/scene/palette.h"
+#include "runtime/dtype.h"
+
+#include <algorithm>
+
+namespace semrover {
+
+ScenePoints points_of(const VoxelGrid& grid)
+{
+    ScenePoints out;
+    const size_t n = size_t(grid.points_per_voxel);
+    for (size_t cell = 0; grid.has_points() && cell < grid.cells.size(); ++cell) {
+        if (!grid.generated[cell])
+            continue;
+        const std::array<float, 3> center = cell_center(grid.cells[cell], grid.voxel_size);
+        for (size_t i = cell * n; i < (cell + 1) * n; ++i) {
+            std::array<float, 3> p, c;
+            for (size_t a = 0; a < 3; ++a) {
+                p[a] = center[a] + half_to_float(grid.points[3 * i + a]);
+                c[a] = float(grid.colors[3 * i + a]) / 255;
+            }
+            out.positions.push_back(p);
+            out.colors.push_back(c);
+            out.labels.push_back(grid.labels[cell]);
+            out.cells.push_back(uint32_t(cell));
+        }
+    }
+    return out;
+}
+
+void color_by_label(ScenePoints& points)
+{
+    for (size_t i = 0; i < points.size(); ++i)
+        points.colors[i] = label_color(points.labels[i]);
+}
+
+} // namespace semrover

@@ -1,0 +1,25 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/scene/grid.h"
+
+namespace semrover {
+
+// a grid's points in world coordinates, one array entry a point
+struct ScenePoints {
+    std::vector<std::array<float, 3>> positions; // metres
+    std::vector<std::array<float, 3>> colors;    // sRGB, 0..1
+    std::vector<uint32_t> labels;
+    std::vector<uint32_t> cells; // index of the cell in the grid
+
+    size_t size() const { return positions.size(); }
+};
+
+// points of the cells that have them
+ScenePoints points_of(const VoxelGrid& grid);
+
+// colours become those of the labels
+void color_by_label(ScenePoints& points);
+
+} // namespace semrover
