@@ -204,6 +204,19 @@ struct PcaNormals {
                                     Tensor neighbors, // [P, k] u32 array, 2^32 - 1 for none
                                     const PcaNormalOptions& options = {});
 
+// normals and sizes of the surfels of points
+struct SurfelSize {
+    float sigma = 0.04f;                    // metres
+    float spacing = 0;                      // sigma = spacing times the rms distance of the nearest three points; 0: `sigma`
+    float smallest = 0.01f, largest = 0.3f; // of such a sigma, metres
+};
+[[nodiscard]] Tensor surfel(Graph& g,
+                            Tensor points,    // [P, 4] fp32 array
+                            Tensor colors,    // [P, 4] fp32 array: rgb; the fourth number becomes sigma
+                            Tensor neighbors, // [P, k] u32 array, nearest first
+                            Tensor planes,    // [P, 4] fp32 array: normal
+                            const SurfelSize& size = {}); // [P, 4] fp32: normal, sigma
+
 // surfels: 2D Gaussians in the plane across a normal, axes t_u = normalize(e x n) with e the axis least aligned with n,
 // and t_v = n x t_u. One that is not finite, or without normal, size or opacity, is skipped.
 struct SplatScene {

@@ -3,6 +3,7 @@
 #include "runtime/device.h"
 
 #include "runtime/command.h"
+#include "runtime/kernel.h"
 #include "runtime/physical_device.h"
 #include "runtime/pipeline.h"
 #include "runtime/profile.h"
@@ -79,6 +80,10 @@ Result<std::unique_ptr<Device>> Device::adopt(const HostDevice& host, const Devi
 {
     if (!host.instance || !host.physical || !host.device || !host.queue)
         return fail(ErrorCode::usage, "a host device needs instance, physical device, device and queue");
+    if (!is_compute_family(host.physical, host.queue_family))
+        return fail(ErrorCode::usage, "queue family {} of the host device has no compute", host.queue_family);
+    if (bool(host.lock) != bool(host.unlock))
+        return fail(ErrorCode::usage, "a host device needs both of lock and unlock, or neither");
     std::unique_ptr<Device> d(new Device());
     d->owned_ = false;
     d->instance_ = host.instance;
@@ -89,6 +94,8 @@ Result<std::unique_ptr<Device>> Device::adopt(const HostDevice& host, const Devi
     d->lock_ = host.lock;
     d->unlock_ = host.unlock;
     SR_CHECK(d->finish(options));
+    if (!host.float16) // what the hardware could do is not what the host asked for
+        d->limits_.needs_supported &= ~uint32_t(kNeedsFloat16);
     return d;
 }
 
@@ -290,8 +297,16 @@ Status Device::clear(const BufferSlice& slice)
         std::memset(mapped + slice.offset, 0, slice.bytes);
         return {};
     }
+    // fills are whole words: the bytes before and after them are copied
+    static constexpr std::byte kZeros[4]{};
+    const uint64_t end = slice.offset + slice.bytes, begin = std::min(round_up64(slice.offset, 4), end);
+    const uint64_t tail = std::max(end / 4 * 4, begin);
+    SR_CHECK(write(slice.part(0, begin - slice.offset), {kZeros, begin - slice.offset}));
+    SR_CHECK(write(slice.part(tail - slice.offset, end - tail), {kZeros, end - tail}));
+    if (begin == tail)
+        return {};
     SR_CHECK(begin_commands(copy_commands_, true));
-    record_clear(copy_commands_, slice.buffer->handle(), slice.offset, slice.bytes);
+    record_clear(copy_commands_, slice.buffer->handle(), begin, tail - begin);
     SR_VK(vkEndCommandBuffer(copy_commands_));
     SR_TRY(const uint64_t ticket, submit({&copy_commands_, 1}));
     return wait(ticket);

@@ -32,6 +32,7 @@ struct HostDevice {
     VkDevice device = VK_NULL_HANDLE; // Vulkan 1.2 with timelineSemaphore enabled
     VkQueue queue = VK_NULL_HANDLE;   // with compute
     uint32_t queue_family = 0;
+    bool float16 = false;               // shaderFloat16 is enabled too
     std::function<void()> lock, unlock; // around every use of the queue; may be empty
 };
 

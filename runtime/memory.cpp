@@ -34,6 +34,9 @@ int choose_type(const VkPhysicalDeviceMemoryProperties& memory, uint32_t allowed
 
 Result<std::unique_ptr<Buffer>> Buffer::create(Device& device, uint64_t bytes, MemoryKind kind, const char* name)
 {
+    if (bytes > device.limits().max_allocation)
+        return fail(ErrorCode::out_of_memory, "{}: {} bytes exceed the device's largest allocation of {} bytes", name,
+                    bytes, device.limits().max_allocation);
     std::unique_ptr<Buffer> b(new Buffer(device));
     b->bytes_ = round_up64(std::max<uint64_t>(bytes, 1), device.limits().offset_alignment);
     VkBufferCreateInfo info{VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO};

@@ -149,13 +149,29 @@ bool has_extension(VkPhysicalDevice physical, const char* name)
     return std::any_of(all.begin(), all.end(), [&](const auto& e) { return !std::strcmp(e.extensionName, name); });
 }
 
-Result<uint32_t> compute_queue_family(VkPhysicalDevice physical)
+namespace {
+
+std::vector<VkQueueFamilyProperties> queue_families(VkPhysicalDevice physical)
 {
     uint32_t count = 0;
     vkGetPhysicalDeviceQueueFamilyProperties(physical, &count, nullptr);
     std::vector<VkQueueFamilyProperties> families(count);
     vkGetPhysicalDeviceQueueFamilyProperties(physical, &count, families.data());
-    for (uint32_t i = 0; i < count; ++i)
+    return families;
+}
+
+} // namespace
+
+bool is_compute_family(VkPhysicalDevice physical, uint32_t family)
+{
+    const auto families = queue_families(physical);
+    return family < families.size() && (families[family].queueFlags & VK_QUEUE_COMPUTE_BIT);
+}
+
+Result<uint32_t> compute_queue_family(VkPhysicalDevice physical)
+{
+    const auto families = queue_families(physical);
+    for (uint32_t i = 0; i < families.size(); ++i)
         if (families[i].queueFlags & VK_QUEUE_COMPUTE_BIT)
             return i;
     return fail(ErrorCode::no_device, "the device has no compute queue");

@@ -14,5 +14,6 @@ Result<std::vector<VkPhysicalDevice>> physical_devices(VkInstance instance); // 
 DeviceSummary summarize(VkPhysicalDevice physical, uint32_t index);
 bool has_extension(VkPhysicalDevice physical, const char* name);
 Result<uint32_t> compute_queue_family(VkPhysicalDevice physical);
+bool is_compute_family(VkPhysicalDevice physical, uint32_t family);
 
 } // namespace semrover

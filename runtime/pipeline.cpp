@@ -3,7 +3,10 @@
 #include "runtime/pipeline.h"
 
 #include "runtime/device.h"
+#include "runtime/hash.h"
 
+#include <array>
+#include <bit>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
@@ -32,11 +35,23 @@ std::string cache_path(VkPhysicalDevice physical)
     return (root / "semrover" / (name + ".bin")).string();
 }
 
-// the driver checks the blob as well; this keeps a truncated or foreign file from reaching it
+std::array<char, 8> checksum(const std::vector<char>& blob)
+{
+    Hash hash;
+    hash.add(std::as_bytes(std::span(blob)));
+    return std::bit_cast<std::array<char, 8>>(hash.value());
+}
+
+// drivers trust what follows the header: a truncated, damaged or foreign file must not reach them.
+// the file is the checksum and the blob
 std::vector<char> load_blob(const std::string& path, VkPhysicalDevice physical)
 {
     std::ifstream in(path, std::ios::binary);
+    std::array<char, 8> expected{};
+    in.read(expected.data(), expected.size());
     std::vector<char> blob{std::istreambuf_iterator<char>(in), {}};
+    if (checksum(blob) != expected)
+        return {};
     VkPhysicalDeviceProperties p;
     vkGetPhysicalDeviceProperties(physical, &p);
     VkPipelineCacheHeaderVersionOne header;
@@ -58,6 +73,7 @@ Result<std::unique_ptr<PipelineStore>> PipelineStore::create(Device& device)
     VkPipelineCacheCreateInfo info{VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO};
     info.initialDataSize = blob.size();
     info.pInitialData = blob.data();
+    store->reused_bytes_ = blob.size();
     SR_VK(vkCreatePipelineCache(device.handle(), &info, nullptr, &store->cache_));
     return store;
 }
@@ -66,11 +82,8 @@ PipelineStore::~PipelineStore()
 {
     if (changed_)
         save();
-    for (auto& [key, p] : pipelines_) {
-        vkDestroyPipeline(device_.handle(), p.pipeline, nullptr);
-        vkDestroyPipelineLayout(device_.handle(), p.layout, nullptr);
-        vkDestroyDescriptorSetLayout(device_.handle(), p.set_layout, nullptr);
-    }
+    for (auto& [key, p] : pipelines_)
+        destroy(p);
     if (cache_)
         vkDestroyPipelineCache(device_.handle(), cache_, nullptr);
 }
@@ -89,7 +102,8 @@ void PipelineStore::save()
     const std::string temporary = fmt::format("{}.{}", cache_path_, getpid());
     {
         std::ofstream out(temporary, std::ios::binary);
-        out.write(blob.data(), std::streamsize(bytes));
+        blob.resize(bytes);
+        out.write(checksum(blob).data(), 8).write(blob.data(), std::streamsize(bytes));
     }
     fs::rename(temporary, cache_path_, ignored);
 }
@@ -100,13 +114,19 @@ Result<const Pipeline*> PipelineStore::get(const KernelVariant& variant, const s
     if (const auto it = pipelines_.find(key); it != pipelines_.end())
         return &it->second;
     Pipeline p;
-    const Status made = make(variant, constants, p);
-    const Pipeline* stored = &(pipelines_[key] = p); // stored also when half-made, so that it is destroyed
-    if (!made) {
-        return tl::make_unexpected(made.error());
+    if (Status made = make(variant, constants, p); !made) {
+        destroy(p);
+        return tl::make_unexpected(std::move(made).error());
     }
     changed_ = true;
-    return stored;
+    return &(pipelines_[key] = p);
+}
+
+void PipelineStore::destroy(const Pipeline& p)
+{
+    vkDestroyPipeline(device_.handle(), p.pipeline, nullptr);
+    vkDestroyPipelineLayout(device_.handle(), p.layout, nullptr);
+    vkDestroyDescriptorSetLayout(device_.handle(), p.set_layout, nullptr);
 }
 
 Status PipelineStore::make_layout(const KernelVariant& variant, Pipeline& out)

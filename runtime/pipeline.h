@@ -28,17 +28,21 @@ class PipelineStore {
 
     const std::string& file() const { return cache_path_; } // empty: neither HOME nor XDG_CACHE_HOME is set
 
+    // bytes of an earlier run's cache that this one started with; 0: no file, or none that is whole and this driver's
+    size_t reused_bytes() const { return reused_bytes_; }
     Result<const Pipeline*> get(const KernelVariant& variant, const std::map<uint32_t, uint32_t>& constants);
 
   private:
     explicit PipelineStore(Device& device) : device_(device) {}
     Status make(const KernelVariant& variant, const std::map<uint32_t, uint32_t>& constants, Pipeline& out);
     Status make_layout(const KernelVariant& variant, Pipeline& out);
+    void destroy(const Pipeline& pipeline);
     void save();
 
     Device& device_;
     VkPipelineCache cache_ = VK_NULL_HANDLE;
-    std::string cache_path_;
+    std::string cache_path_; // empty: nowhere to keep it
+    size_t reused_bytes_ = 0;
     bool changed_ = false;
     std::map<std::pair<const KernelVariant*, std::map<uint32_t, uint32_t>>, Pipeline> pipelines_;
 };

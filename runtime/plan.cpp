@@ -58,8 +58,8 @@ bool overlaps(const Plan& plan, const PassBinding& a, const PassBinding& b)
         return false;
     uint64_t start_a = a.offset, start_b = b.offset;
     if (ra.external) {
-        if (ra.memory.buffer != rb.memory.buffer)
-            return false;
+        if (a.resource != b.resource && (!ra.memory.buffer || ra.memory.buffer != rb.memory.buffer))
+            return false; // without memory, when only planning, names are all that tells them apart
         start_a += ra.memory.offset;
         start_b += rb.memory.offset;
     } else {

@@ -37,7 +37,7 @@ bool may_share(const Plan& plan, const Tensor& a, const Tensor& b)
     const Resource &ra = plan.resources[a.resource], &rb = plan.resources[b.resource];
     if (a.resource == b.resource)
         return true;
-    return ra.external && rb.external && ra.memory.buffer == rb.memory.buffer &&
+    return ra.external && rb.external && ra.memory.buffer && ra.memory.buffer == rb.memory.buffer &&
            ra.memory.offset < rb.memory.offset + rb.bytes && rb.memory.offset < ra.memory.offset + ra.bytes;
 }
 

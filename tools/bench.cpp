@@ -98,6 +98,8 @@ void add_bench(CLI::App& app, const Globals& globals, Run& run)
     add_bench_gemm(*bench, globals, run);
     add_bench_transformer(*bench, globals, run);
     add_bench_regions(*bench, globals, run);
+    add_bench_sort(*bench, globals, run);
+    add_bench_splat(*bench, globals, run);
 }
 
 } // namespace semrover

@@ -48,5 +48,7 @@ class BenchInputs {
 void add_bench_gemm(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_transformer(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_regions(CLI::App& bench, const Globals& globals, Run& run);
+void add_bench_sort(CLI::App& bench, const Globals& globals, Run& run);
+void add_bench_splat(CLI::App& bench, const Globals& globals, Run& run);
 
 } // namespace semrover

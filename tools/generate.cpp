@@ -6,6 +6,7 @@
 #include "runtime/hash.h"
 #include "runtime/profile.h"
 #include "tools/commands.h"
+#include "tools/export_ply.h"
 #include "tools/open_device.h"
 #include "tools/progress.h"
 #include "tools/version.h"
@@ -25,6 +26,7 @@ struct Options {
     uint64_t seed = 0;
     uint32_t batch = 0;
     int64_t first_cell = 0;
+    PlyExports ply;
     bool dry_run = false;
 };
 
@@ -191,10 +193,13 @@ Status prepare(Job& j)
 
 Status finish(Job& j, RunFolder& run, double seconds)
 {
+    const uint64_t peak = j.device->peak_bytes(); // of the generation itself
     j.grid.metadata["seed"] = std::to_string(j.options.seed);
     j.grid.metadata["tool"] = kProgram;
     SR_TRY(const uint64_t model_hash, hash_folder(j.settings.model.transformer));
     j.grid.metadata["model"] = hash_text(model_hash);
+    if (j.options.ply.any())
+        SR_CHECK(export_ply(*j.device, j.grid, j.options.ply));
     SR_CHECK(write_grid(j.options.output, j.grid));
     SR_TRY(const MappedFile written, MappedFile::open(j.options.output));
     Hash hash;
@@ -205,7 +210,7 @@ Status finish(Job& j, RunFolder& run, double seconds)
                        {"regions", j.outpainter->region_count()},
                        {"seconds", seconds},
                        {"planned_device_bytes", j.planned_bytes},
-                       {"peak_device_bytes", j.device->peak_bytes()}};
+                       {"peak_device_bytes", peak}};
     SR_CHECK(run.finish(results));
     if (j.device->profile())
         SR_CHECK(j.device->profile()->write(j.options.profile));
@@ -221,8 +226,9 @@ Status check_output(const Options& o, const Globals& globals)
 {
     if (o.output.empty())
         return fail(ErrorCode::usage, "-o/--output is required");
-    if (std::filesystem::exists(o.output) && !globals.yes)
-        return fail(ErrorCode::usage, "'{}' exists; -y replaces it", o.output);
+    for (const std::string& path : {o.output, o.ply.points, o.ply.splats_3d, o.ply.splats_2d})
+        if (!path.empty() && std::filesystem::exists(path) && !globals.yes)
+            return fail(ErrorCode::usage, "'{}' exists; -y replaces it", path);
     return AtomicFile::create(o.output).map([](const AtomicFile&) {});
 }
 
@@ -284,6 +290,9 @@ void add_generate(CLI::App& app, const Globals& globals, Run& run)
         ->check(CLI::IsMember({"complete", "paper"}));
     c->add_option("--first-cell", o->first_cell, "index of the cell to start from");
     c->add_option("--precision", o->precision, "storage of weights and activations")->check(CLI::IsMember({"fp16", "fp32"}));
+    c->add_option("--ply", o->ply.points, "also write the points with colour and label as PLY");
+    c->add_option("--ply-3dgs", o->ply.splats_3d, "also write the splats as a 3DGS PLY");
+    c->add_option("--ply-2dgs", o->ply.splats_2d, "also write the splats as a 2DGS PLY");
     c->add_option("--profile", o->profile, "write device times as a Chrome trace");
     c->add_flag("--dry-run", o->dry_run, "only say how many regions, how much memory, how long");
     c->callback([o, &globals, &run] { run = [o, &globals] { return generate(*o, globals); }; });

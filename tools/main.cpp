@@ -94,6 +94,7 @@ int main(int argc, char** argv)
     add_doctor(app, globals, run);
     add_generate(app, globals, run);
     add_inspect(app, globals, run);
+    add_render(app, globals, run);
     add_verify(app, globals, run);
     try {
         app.parse(argc, argv);

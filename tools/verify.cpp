@@ -35,6 +35,8 @@ constexpr Kind kKinds[] = {
     {"scheduler", run_scheduler},
     {"repaint_timesteps", run_repaint_timesteps},
     {"region_extraction", run_region_extraction},
+    {"splat_render", run_splat_render},
+    {"pca_normals", run_pca_normals},
 };
 
 enum class Outcome { pass, fail, skip };

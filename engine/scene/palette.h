@@ -41,6 +41,13 @@ constexpr std::array<SemanticClass, kClassCount> kPalette = {{
 }};
 
 // number of a class by its name, none if there is no such class
+// 0..1; an unknown label gets the last class's
+inline std::array<float, 3> label_color(uint32_t label)
+{
+    const auto& c = kPalette[label < kClassCount ? label : kClassCount - 1].color;
+    return {float(c[0]) / 255, float(c[1]) / 255, float(c[2]) / 255};
+}
+
 std::optional<uint8_t> class_of_name(std::string_view name);
 
 } // namespace semrover

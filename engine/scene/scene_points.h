@@ -19,15 +19,7 @@ struct ScenePoints {
 // points of the cells that have them
 ScenePoints points_of(const VoxelGrid& grid);
 
-// a semantic grid drawn as blocks: 3 x 3 points on every face of a cell that borders an empty cell, in label colours
-ScenePoints blocks_of(const VoxelGrid& grid);
-
 // colours become those of the labels
 void color_by_label(ScenePoints& points);
-
-struct Bounds {
-    std::array<double, 3> low, high; // metres
-};
-Bounds bounds_of(const VoxelGrid& grid);
 
 } // namespace semrover

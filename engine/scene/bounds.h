@@ -1,0 +1,16 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/scene/grid.h"
+
+namespace semrover {
+
+struct Bounds {
+    std::array<double, 3> low, high; // metres
+};
+
+// the box around all cells of a grid
+Bounds bounds_of(const VoxelGrid& grid);
+
+} // namespace semrover

@@ -1,0 +1,88 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/scene/camera.h"
+#include "engine/splat/surfels.h"
+#include "runtime/program.h"
+
+#include <array>
+#include <memory>
+#include <span>
+#include <vector>
+
+namespace semrover {
+
+// OpenCV: x right, y down, z forward; the centre of pixel (x, y) is at (x + 0.5, y + 0.5)
+struct SplatCamera {
+    float fx = 0, fy = 0, cx = 0, cy = 0;    // pixels
+    std::array<float, 12> world_to_camera{}; // [3, 4], row-major, metres
+};
+SplatCamera splat_camera(const Intrinsics& intrinsics, const Pose& pose);
+
+// what one camera sees; [height, width] row-major. w is the weight of a splat in a pixel, front to back.
+struct SplatImage {
+    uint32_t width = 0, height = 0;
+    std::vector<float> color;          // [.., 3] sum of w rgb, nothing behind it
+    std::vector<float> alpha;          // sum of w
+    std::vector<float> normal;         // [.., 3] sum of w normal; camera frame, towards the camera
+    std::vector<float> depth_sum;      // sum of w depth, metres along the axis
+    std::vector<float> depth_expected; // depth_sum / alpha, 0 where alpha is
+    std::vector<float> depth_median;   // of the splat with which alpha passes one half, else of the last; 0 for none
+    std::vector<uint32_t> label, cell; // of the splat with the largest w; kNothing for none
+    std::vector<uint8_t> visible;      // 1 where alpha reaches the threshold
+
+    static constexpr uint32_t kNothing = 0xffffffffu;
+};
+
+struct RasterizerOptions {
+    float visible_alpha = 0.5f;
+    float near = 0.2f; // metres
+    float alpha_min = 1.f / 255, alpha_max = 0.99f;
+    float transmittance_min = 1e-4f;
+    float screen_variance = 0.5f; // pixels^2; 0: no screen filter
+    float cutoff = 0;             // sigmas; 0: as far as alpha_min
+    uint32_t tile = 16;           // pixels, a multiple of 16
+    uint32_t max_pairs = 0;       // to begin with; 0: from the number of surfels
+};
+
+// Draws a scene from up to max_cameras cameras in one submit; more are drawn in turns. The graph is built once and
+// replayed; when a frame has more splats or tiles than it has room for, it is built again with more, and the frame
+// repeated. The scene must outlive it.
+class Rasterizer {
+  public:
+    // errors: usage for sizes that are not 1..65535; out_of_memory
+    static Result<std::unique_ptr<Rasterizer>> create(Device& device, const SurfelScene& scene, uint32_t width,
+                                                      uint32_t height, uint32_t max_cameras,
+                                                      const RasterizerOptions& options = {});
+
+    // errors: bad_input for a camera that is not finite or without focal length; out_of_memory, device_lost
+    Result<std::vector<SplatImage>> render(std::span<const SplatCamera> cameras);
+
+    const Program& program() const { return *program_; }
+    // device memory for what it has room for now, beside the scene's
+    uint64_t planned_bytes() const
+    {
+        return memory_->planned_bytes(device_.limits()) + program_->plan().arena_bytes();
+    }
+    uint32_t rebuilds() const { return rebuilds_; } // how often there was not enough room
+
+  private:
+    enum Slot { kCameras, kVisible, kPairs, kColor, kSurface, kDepth, kIds, kSlots };
+
+    Rasterizer(Device& device, const SurfelScene& scene) : device_(device), scene_(scene) {}
+    Status build();
+    Status make_room(uint32_t visible, uint32_t pairs);
+    Status draw(std::span<const SplatCamera> cameras);
+    Status read_images(uint32_t count, std::vector<SplatImage>& out);
+
+    Device& device_;
+    const SurfelScene& scene_;
+    RasterizerOptions options_;
+    uint32_t width_ = 0, height_ = 0, cameras_ = 0;
+    uint32_t max_visible_ = 0, max_pairs_ = 0, rebuilds_ = 0;
+    std::unique_ptr<Arena> memory_; // cameras, totals, images
+    std::unique_ptr<Program> program_;
+};
+
+} // namespace semrover

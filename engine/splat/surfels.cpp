@@ -1,0 +1,191 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/splat/surfels.h"
+
+#include "engine/scene/palette.h"
+#include "runtime/program.h"
+
+#include <cmath>
+
+namespace semrover {
+
+// rows as kernels.h, SplatScene, has them
+struct SurfelScene::Host {
+    using Row = std::array<float, 4>;
+    std::vector<Row> positions, normals, colors;
+    std::vector<uint32_t> labels, cells;
+    bool complete = false; // normals are known
+
+    size_t skipped() const
+    {
+        size_t n = 0;
+        for (size_t i = 0; i < positions.size(); ++i)
+            n += !drawable(i);
+        return n;
+    }
+    bool drawable(size_t i) const
+    {
+        for (const Row* row : {&positions[i], &normals[i], &colors[i]})
+            for (float v : *row)
+                if (!std::isfinite(v))
+                    return false;
+        const Row& n = normals[i];
+        const bool has_normal = !complete || n[0] * n[0] + n[1] * n[1] + n[2] * n[2] >= 1e-6f;
+        return has_normal && positions[i][3] >= 1.f / 255 && n[3] > 0 && colors[i][3] > 0;
+    }
+};
+
+namespace {
+
+constexpr float kSpacing =
+    0.75f; // alpha of a road of 20 points per 0.6 m cell: about 0.9 (research/splat.md, finding 2)
+constexpr size_t kMaxSurfels = 1u << 26; // 64 bytes of neighbours each in 32 bits
+
+std::array<float, 4> row_of(const std::array<float, 3>& v, float w)
+{
+    return {v[0], v[1], v[2], w};
+}
+
+Status check_count(size_t n, std::initializer_list<size_t> sizes)
+{
+    for (size_t size : sizes)
+        if (size != n)
+            return fail(ErrorCode::bad_input, "surfels: an array of {} entries for {} points", size, n);
+    if (n > kMaxSurfels)
+        return fail(ErrorCode::bad_input, "surfels: {} points, at most {} are supported", n, kMaxSurfels);
+    return {};
+}
+
+uint32_t label_bits(std::initializer_list<std::string_view> names)
+{
+    uint32_t bits = 0;
+    for (std::string_view name : names)
+        if (const auto label = class_of_name(name))
+            bits |= 1u << *label;
+    return bits;
+}
+
+} // namespace
+
+Result<SurfelScene> SurfelScene::create(Device& device, const ScenePoints& points, const SurfelOptions& options)
+{
+    const size_t n = points.size();
+    SR_CHECK(check_count(n, {points.colors.size(), points.labels.size(), points.cells.size()}));
+    if (options.neighbors < 1 || options.neighbors > kMaxNeighbors)
+        return fail(ErrorCode::usage, "surfels: {} neighbours, 1 to {} are supported", options.neighbors,
+                    kMaxNeighbors);
+    if (!(options.sigma > 0) || !std::isfinite(options.sigma))
+        return fail(ErrorCode::usage, "surfels: a splat radius of {} m", options.sigma);
+    Host host{.labels = points.labels, .cells = points.cells};
+    for (size_t i = 0; i < n; ++i) {
+        host.positions.push_back(row_of(points.positions[i], options.opacity));
+        host.normals.push_back({0, 0, 0, options.sigma});
+        host.colors.push_back(row_of(points.colors[i], options.sigma));
+    }
+    SurfelScene scene(device);
+    SR_CHECK(scene.upload(host));
+    if (n)
+        SR_CHECK(scene.derive(options));
+    return scene;
+}
+
+Result<SurfelScene> SurfelScene::create(Device& device, const Surfels& s)
+{
+    const size_t n = s.position.size();
+    SR_CHECK(check_count(
+        n, {s.normal.size(), s.color.size(), s.sigma_u.size(), s.sigma_v.size(), s.opacity.size(), s.label.size()}));
+    Host host{.labels = {s.label.begin(), s.label.end()}, .complete = true};
+    for (size_t i = 0; i < n; ++i) {
+        host.positions.push_back(row_of(s.position[i], s.opacity[i]));
+        host.normals.push_back(row_of(s.normal[i], s.sigma_u[i]));
+        host.colors.push_back(row_of(s.color[i], s.sigma_v[i]));
+        host.cells.push_back(uint32_t(i));
+    }
+    SurfelScene scene(device);
+    SR_CHECK(scene.upload(host));
+    return scene;
+}
+
+Status SurfelScene::upload(const Host& host)
+{
+    size_ = uint32_t(host.positions.size());
+    skipped_ = uint32_t(host.skipped());
+    for (uint64_t bytes : {16, 16, 16, 4, 4}) // in the order of Part
+        arena_.add(bytes * rows());
+    SR_CHECK(arena_.allocate(*device_, "surfels"));
+    if (!size_) {
+        for (uint32_t part = 0; part < kParts; ++part)
+            SR_CHECK(device_->clear(arena_.slice(part)));
+        return {};
+    }
+    SR_CHECK(device_->write(arena_.slice(kPositions), std::as_bytes(std::span(host.positions))));
+    SR_CHECK(device_->write(arena_.slice(kNormals), std::as_bytes(std::span(host.normals))));
+    SR_CHECK(device_->write(arena_.slice(kColors), std::as_bytes(std::span(host.colors))));
+    SR_CHECK(device_->write(arena_.slice(kLabels), std::as_bytes(std::span(host.labels))));
+    return device_->write(arena_.slice(kCells), std::as_bytes(std::span(host.cells)));
+}
+
+Tensor SurfelScene::floats(Graph& g, Part part, std::string_view name) const
+{
+    return g.external(arena_.slice(part), rows(), 4, DType::f32, name, 4);
+}
+
+// normals from the nearest points, and sigmas if they follow the spacing
+Status SurfelScene::derive(const SurfelOptions& options)
+{
+    Graph g;
+    const Tensor points = floats(g, kPositions, "surfel positions"), colors = floats(g, kColors, "surfel colours");
+    const Tensor labels = g.external(arena_.slice(kLabels), rows(), 1, DType::u32, "surfel labels", 1);
+    KnnOptions near{.neighbors = options.neighbors, .radius = options.neighbor_radius};
+    if (options.same_label)
+        near.labels = labels;
+    const Tensor neighbors = knn(g, points, near);
+    const uint32_t lines = label_bits({"pole", "traffic light", "traffic sign"});
+    const PcaNormals planes =
+        pca_normal(g, points, neighbors, {.fallbacks = options.fallbacks, .labels = labels, .line_labels = lines});
+    SurfelSize size{.sigma = options.sigma};
+    if (options.auto_sigma)
+        size.spacing = kSpacing;
+    const Tensor normals = surfel(g, points, colors, neighbors, planes.normals, size);
+    g.replace(normals.resource, floats(g, kNormals, "surfel normals").resource);
+    SR_TRY(const auto program, Program::create(*device_, g));
+    return program->run();
+}
+
+SplatScene SurfelScene::in(Graph& g) const
+{
+    return {floats(g, kPositions, "positions"), floats(g, kNormals, "normals"), floats(g, kColors, "colours"),
+            g.external(arena_.slice(kLabels), rows(), 1, DType::u32, "labels", 1),
+            g.external(arena_.slice(kCells), rows(), 1, DType::u32, "cells", 1)};
+}
+
+uint64_t SurfelScene::bytes() const
+{
+    return arena_.planned_bytes(device_->limits());
+}
+
+Result<Surfels> SurfelScene::read() const
+{
+    Host host;
+    for (const auto& [part, values] :
+         {std::pair{kPositions, &host.positions}, {kNormals, &host.normals}, {kColors, &host.colors}}) {
+        values->resize(rows());
+        SR_CHECK(device_->read(arena_.slice(part), std::as_writable_bytes(std::span(*values))));
+    }
+    host.labels.resize(rows());
+    SR_CHECK(device_->read(arena_.slice(kLabels), std::as_writable_bytes(std::span(host.labels))));
+    Surfels out;
+    for (size_t i = 0; i < size_; ++i) {
+        const auto &p = host.positions[i], &n = host.normals[i], &c = host.colors[i];
+        out.position.push_back({p[0], p[1], p[2]});
+        out.opacity.push_back(p[3]);
+        out.normal.push_back({n[0], n[1], n[2]});
+        out.sigma_u.push_back(n[3]);
+        out.color.push_back({c[0], c[1], c[2]});
+        out.sigma_v.push_back(c[3]);
+        out.label.push_back(uint8_t(host.labels[i]));
+    }
+    return out;
+}
+
+} // namespace semrover

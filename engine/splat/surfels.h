@@ -1,0 +1,55 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/scene/ply.h"
+#include "engine/scene/scene_points.h"
+#include "kernels/kernels.h"
+#include "runtime/device.h"
+
+namespace semrover {
+
+struct SurfelOptions {
+    float sigma = 0.04f;     // metres (the paper's splat radius)
+    bool auto_sigma = false; // sigma from the distance of the nearest points, which closes the holes
+    float opacity = 1;
+    uint32_t neighbors = 16;       // of a point, itself included, for its normal
+    float neighbor_radius = 0.45f; // metres; 0: no limit
+    bool same_label = true;        // neighbours of the same label first
+    bool fallbacks = true;         // normals of poles and of lonely points (research/splat.md, section 2)
+};
+
+// Surfels on the device, ready to be drawn: positions, normals, colours, sigmas, opacities, labels, cells.
+class SurfelScene {
+  public:
+    // of points: normals by PCA over the nearest ones, sigma and opacity by the options
+    // errors: bad_input when arrays disagree in size or there are too many points; usage; out_of_memory
+    static Result<SurfelScene> create(Device& device, const ScenePoints& points, const SurfelOptions& options = {});
+
+    // of surfels that are complete; the cell of each is its index
+    static Result<SurfelScene> create(Device& device, const Surfels& surfels);
+
+    uint32_t size() const { return size_; }       // surfels
+    uint32_t skipped() const { return skipped_; } // of these, not drawn: not finite, or without normal, size or opacity
+    uint64_t bytes() const;                       // on the device
+
+    SplatScene in(Graph& g) const; // its tensors in a graph; one surfel without opacity if there are none
+
+    Result<Surfels> read() const; // as they are drawn, for export
+
+  private:
+    enum Part { kPositions, kNormals, kColors, kLabels, kCells, kParts };
+    struct Host; // the parts, as they are uploaded
+
+    explicit SurfelScene(Device& device) : device_(&device) {}
+    Status upload(const Host& host);
+    Status derive(const SurfelOptions& options);
+    Tensor floats(Graph& g, Part part, std::string_view name) const;
+    uint32_t rows() const { return size_ ? size_ : 1; }
+
+    Device* device_;
+    uint32_t size_ = 0, skipped_ = 0;
+    Arena arena_;
+};
+
+} // namespace semrover

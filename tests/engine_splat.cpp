@@ -1,0 +1,285 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/splat/golden.h"
+#include "tests/golden_tensors.h"
+#include "tests/splat_case.h"
+
+namespace semrover {
+namespace {
+
+std::array<float, 3> floats(const Vector& v)
+{
+    return {float(v[0]), float(v[1]), float(v[2])};
+}
+
+Surfels surfels_of(const std::vector<HostSplat>& splats)
+{
+    Surfels out;
+    for (const HostSplat& s : splats) {
+        out.position.push_back(floats(s.position));
+        out.normal.push_back(floats(s.normal));
+        out.color.push_back(floats(s.color));
+        out.sigma_u.push_back(float(s.sigma_u));
+        out.sigma_v.push_back(float(s.sigma_v));
+        out.opacity.push_back(float(s.opacity));
+        out.label.push_back(uint8_t(out.label.size() % 20));
+    }
+    return out;
+}
+
+ScenePoints points_only(const std::vector<HostSplat>& splats)
+{
+    ScenePoints out;
+    for (const HostSplat& s : splats) {
+        out.positions.push_back(floats(s.position));
+        out.colors.push_back(floats(s.color));
+        out.labels.push_back(0);
+        out.cells.push_back(uint32_t(out.cells.size()));
+    }
+    return out;
+}
+
+SplatCamera device_camera(const HostCamera& c)
+{
+    SplatCamera out{float(c.fx), float(c.fy), float(c.cx), float(c.cy), {}};
+    for (size_t i = 0; i < 12; ++i)
+        out.world_to_camera[i] = float(c.view[i]);
+    return out;
+}
+
+template <typename... Args>
+SurfelScene make_scene(const Args&... args)
+{
+    auto scene = SurfelScene::create(test_device(), args...);
+    SR_ASSERT(bool(scene), "{}", scene.error().message);
+    return std::move(*scene);
+}
+
+std::vector<SplatImage> render(const SurfelScene& scene, uint32_t width, uint32_t height, uint32_t max_cameras,
+                               const std::vector<SplatCamera>& cameras, const RasterizerOptions& options = {})
+{
+    auto rasterizer = Rasterizer::create(test_device(), scene, width, height, max_cameras, options);
+    SR_ASSERT(bool(rasterizer), "{}", rasterizer.error().message);
+    auto images = (*rasterizer)->render(cameras);
+    SR_ASSERT(bool(images), "{}", images.error().message);
+    return std::move(*images);
+}
+
+// tests/golden/README.md: tolerance times max(1, max |expect|), four times that for a thousandth of the values
+void expect_close(const std::vector<float>& got, const std::vector<float>& expect, double tolerance, const char* what)
+{
+    ASSERT_EQ(got.size(), expect.size()) << what;
+    double scale = 1, worst = 0;
+    for (float e : expect)
+        scale = std::max(scale, double(std::abs(e)));
+    size_t outliers = 0;
+    for (size_t i = 0; i < got.size(); ++i) {
+        const double error = std::abs(double(got[i]) - expect[i]) / scale;
+        worst = std::max(worst, error);
+        outliers += error > tolerance;
+    }
+    EXPECT_LE(outliers, got.size() / 1000) << what << ": " << worst;
+    EXPECT_LE(worst, 4 * tolerance) << what;
+    testing::Test::RecordProperty(what, fmt::format("{:.2e}", worst));
+}
+
+TEST(engine_splat, golden_renders_come_out)
+{
+    for (const char* name : {"splat_dense", "splat_odd_size"}) {
+        SCOPED_TRACE(name);
+        const GoldenTensors file(name);
+        SplatRenderCase c;
+        c.positions = file.get<float>("input.positions");
+        c.normals = file.get<float>("input.normals");
+        c.colors = file.get<float>("input.colors");
+        c.opacities = file.get<float>("input.opacities");
+        c.scales = file.get<float>("input.scales");
+        c.view = file.get<float>("input.view");
+        c.intrinsics = file.get<float>("input.intrinsics");
+        c.width = file.params.at("width");
+        c.height = file.params.at("height");
+        c.cutoff_sigma = file.params.at("cutoff_sigma");
+        const auto image = run_splat_render(test_device(), c);
+        ASSERT_TRUE(image) << image.error().message;
+        expect_close(image->color, file.get<float>("expect.color"), 2e-3, "color");
+        expect_close(image->alpha, file.get<float>("expect.alpha"), 2e-3, "alpha");
+        expect_close(image->depth_sum, file.get<float>("expect.depth"), 2e-3, "depth");
+        expect_close(image->normal, file.get<float>("expect.normal"), 2e-3, "normal");
+    }
+}
+
+TEST(engine_splat, golden_normals_come_out)
+{
+    const GoldenTensors file("pca_normals");
+    const std::vector<float> positions = file.get<float>("input.positions"), expect = file.get<float>("expect.normals");
+    auto got = run_pca_normals(test_device(), positions, 16);
+    ASSERT_TRUE(got) << got.error().message;
+    double worst = 0, worst_value = 0;
+    for (size_t i = 0; i < expect.size(); i += 3) {
+        const double along =
+            got->normals[i] * expect[i] + got->normals[i + 1] * expect[i + 1] + got->normals[i + 2] * expect[i + 2];
+        for (size_t a = 0; a < 3; ++a)
+            worst = std::max(worst, std::abs(double(got->normals[i + a]) * (along < 0 ? -1 : 1) - expect[i + a]));
+    }
+    const std::vector<float> values = file.get<float>("expect.eigenvalues");
+    for (size_t i = 0; i < values.size(); ++i)
+        worst_value = std::max(worst_value, std::abs(double(got->eigenvalues[i]) - values[i]));
+    EXPECT_LE(worst, 1e-4);
+    EXPECT_LE(worst_value, 1e-4);
+    RecordProperty("normals", fmt::format("{:.2e}", worst));
+    RecordProperty("eigenvalues", fmt::format("{:.2e}", worst_value));
+}
+
+// research/splat.md, section 7.8: points at random on a road, as dense as a grid's, cover 1 - exp(-density 2 pi
+// sigma^2) of it; auto sigma closes the holes
+TEST(engine_splat, a_road_is_as_opaque_as_its_density_says)
+{
+    std::mt19937 random(5);
+    std::uniform_real_distribution<double> unit(0, 1);
+    const double density = 20 / 0.36, side = 8;
+    std::vector<HostSplat> splats(size_t(density * side * side));
+    for (HostSplat& s : splats)
+        s.position = {side * unit(random) - side / 2, side * unit(random) - side / 2, 0};
+    const ScenePoints points = points_only(splats);
+    // from 5 m above, straight down
+    const SplatCamera camera{300, 300, 100, 100, {1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 5}};
+    const auto mean_alpha = [&](const SurfelOptions& options) {
+        const auto images = render(make_scene(points, options), 200, 200, 1, {camera});
+        double sum = 0;
+        for (float a : images[0].alpha)
+            sum += a;
+        return sum / (200 * 200);
+    };
+    EXPECT_NEAR(mean_alpha(SurfelOptions{}), 1 - std::exp(-density * 2 * M_PI * 0.04 * 0.04), 0.03);
+    EXPECT_NEAR(mean_alpha({.sigma = 0.08f}), 1 - std::exp(-density * 2 * M_PI * 0.08 * 0.08), 0.03);
+    EXPECT_GT(mean_alpha({.auto_sigma = true}), 0.85);
+}
+
+TEST(engine_splat, cameras_in_turns_or_at_once_see_the_same)
+{
+    const SurfelScene scene = make_scene(surfels_of(random_splats(800, 4)));
+    std::vector<SplatCamera> cameras;
+    for (int i = 0; i < 5; ++i)
+        cameras.push_back(device_camera(camera_for(70, 50, 0.1 * i, 0.2 * i)));
+    const auto at_once = render(scene, 70, 50, 5, cameras), in_turns = render(scene, 70, 50, 2, cameras);
+    ASSERT_EQ(at_once.size(), 5u);
+    ASSERT_EQ(in_turns.size(), 5u);
+    for (size_t i = 0; i < 5; ++i) {
+        EXPECT_EQ(at_once[i].color, in_turns[i].color);
+        EXPECT_EQ(at_once[i].depth_median, in_turns[i].depth_median);
+        EXPECT_EQ(at_once[i].cell, in_turns[i].cell);
+    }
+}
+
+TEST(engine_splat, a_frame_that_needs_more_room_is_drawn_again)
+{
+    const SurfelScene scene = make_scene(surfels_of(random_splats(3000, 4)));
+    const std::vector<SplatCamera> cameras = {device_camera(camera_for(200, 100)),
+                                              device_camera(camera_for(200, 100, 0.2))};
+    auto rasterizer = Rasterizer::create(test_device(), scene, 200, 100, 2, {.max_pairs = 50});
+    ASSERT_TRUE(rasterizer) << rasterizer.error().message;
+    const auto grown = (*rasterizer)->render(cameras);
+    ASSERT_TRUE(grown) << grown.error().message;
+    EXPECT_GT((*rasterizer)->rebuilds(), 0u);
+    const uint32_t rebuilds = (*rasterizer)->rebuilds();
+    const auto again = (*rasterizer)->render(cameras),
+               roomy = Result<std::vector<SplatImage>>(render(scene, 200, 100, 2, cameras));
+    EXPECT_EQ((*rasterizer)->rebuilds(), rebuilds);
+    for (size_t i = 0; i < 2; ++i) {
+        EXPECT_EQ((*grown)[i].color, (*roomy)[i].color);
+        EXPECT_EQ((*again)[i].color, (*roomy)[i].color);
+    }
+}
+
+TEST(engine_splat, visible_pixels_are_those_that_reach_the_threshold)
+{
+    const SurfelScene scene = make_scene(surfels_of(random_splats(300, 9)));
+    const SplatImage image = render(scene, 60, 40, 1, {device_camera(camera_for(60, 40))}, {.visible_alpha = 0.3f})[0];
+    size_t count = 0;
+    for (size_t i = 0; i < image.alpha.size(); ++i) {
+        ASSERT_EQ(image.visible[i], image.alpha[i] >= 0.3f);
+        ASSERT_NEAR(image.depth_expected[i] * image.alpha[i], image.depth_sum[i], 1e-4);
+        ASSERT_EQ(image.cell[i] == SplatImage::kNothing, image.alpha[i] == 0);
+        count += image.visible[i];
+    }
+    EXPECT_GT(count, 0u);
+    EXPECT_LT(count, image.alpha.size());
+}
+
+TEST(engine_splat, a_scene_without_surfels_and_an_image_of_one_pixel_work)
+{
+    const SurfelScene nothing = make_scene(ScenePoints{});
+    EXPECT_EQ(nothing.size(), 0u);
+    const auto empty = render(nothing, 17, 3, 2, {device_camera(camera_for(17, 3)), device_camera(camera_for(17, 3))});
+    ASSERT_EQ(empty.size(), 2u);
+    EXPECT_EQ(empty[1].alpha, std::vector<float>(17 * 3, 0));
+    EXPECT_EQ(empty[1].label, std::vector<uint32_t>(17 * 3, SplatImage::kNothing));
+    HostSplat one = random_splats(1, 1)[0];
+    one.position = {0, 0, 2};
+    one.normal = {0, 0, 1};
+    const SplatCamera camera{1, 1, 0.5f, 0.5f, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
+    const auto pixel = render(make_scene(surfels_of({one})), 1, 1, 1, {camera});
+    EXPECT_NEAR(pixel[0].alpha[0], std::min(0.99, one.opacity), 1e-6);
+    EXPECT_NEAR(pixel[0].depth_median[0], 2, 1e-6);
+    EXPECT_EQ(pixel[0].cell[0], 0u);
+}
+
+TEST(engine_splat, what_is_not_a_splat_is_counted)
+{
+    std::vector<HostSplat> splats = random_splats(20, 2);
+    splats[3].position[0] = NAN;
+    splats[5].opacity = 0;
+    splats[7].sigma_v = 0;
+    splats[9].normal = {0, 0, 0};
+    splats[11].color[2] = INFINITY;
+    EXPECT_EQ(make_scene(surfels_of(splats)).skipped(), 5u);
+    EXPECT_EQ(make_scene(points_only(splats)).skipped(), 2u); // normals, sigmas and opacities are ours then
+}
+
+TEST(engine_splat, wrong_inputs_are_told)
+{
+    Surfels points = surfels_of(random_splats(4, 2));
+    points.color.pop_back();
+    EXPECT_EQ(SurfelScene::create(test_device(), points).error().code, ErrorCode::bad_input);
+    const SurfelScene scene = make_scene(surfels_of(random_splats(4, 2)));
+    EXPECT_EQ(Rasterizer::create(test_device(), scene, 0, 10, 1).error().code, ErrorCode::usage);
+    EXPECT_EQ(Rasterizer::create(test_device(), scene, 60000, 60000, 1).error().code, ErrorCode::out_of_memory);
+    auto rasterizer = Rasterizer::create(test_device(), scene, 10, 10, 1);
+    ASSERT_TRUE(rasterizer);
+    SplatCamera camera = device_camera(camera_for(10, 10));
+    camera.world_to_camera[3] = NAN;
+    EXPECT_EQ((*rasterizer)->render({&camera, 1}).error().code, ErrorCode::bad_input);
+    EXPECT_EQ((*rasterizer)->render({}).value().size(), 0u);
+}
+
+TEST(engine_splat, surfels_are_read_back_as_they_are_drawn)
+{
+    const Surfels made = surfels_of(random_splats(50, 6));
+    const auto complete = make_scene(made).read();
+    ASSERT_TRUE(complete) << complete.error().message;
+    EXPECT_EQ(complete->position, made.position);
+    EXPECT_EQ(complete->normal, made.normal);
+    EXPECT_EQ(complete->sigma_v, made.sigma_v);
+    EXPECT_EQ(complete->label, made.label);
+    ScenePoints wall; // x = 1
+    for (int i = 0; i < 400; ++i) {
+        wall.positions.push_back({1, 0.1f * float(i % 20), 0.1f * float(i / 20)});
+        wall.colors.push_back({0.5f, 0.25f, 1});
+        wall.labels.push_back(2);
+        wall.cells.push_back(0);
+    }
+    const auto derived = make_scene(wall, SurfelOptions{.opacity = 0.5f}).read(),
+               spaced = make_scene(wall, SurfelOptions{.auto_sigma = true}).read();
+    for (size_t i = 0; i < 400; ++i) {
+        ASSERT_NEAR(derived->normal[i][0], 1, 1e-5);
+        ASSERT_EQ(derived->sigma_u[i], 0.04f);
+        ASSERT_EQ(derived->opacity[i], 0.5f);
+        ASSERT_EQ(derived->color[i], wall.colors[i]);
+        if (i % 20 != 0 && i % 20 != 19) { // three of the nearest points are 0.1 m away
+            ASSERT_NEAR(spaced->sigma_v[i], 0.075, 1e-4) << i;
+        }
+    }
+}
+
+} // namespace
+} // namespace semrover
