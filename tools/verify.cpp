@@ -52,7 +52,8 @@ struct CaseReport {
 Result<std::vector<Path>> find_cases(const std::vector<std::string>& arguments)
 {
     std::vector<Path> cases;
-    for (const Path argument : arguments) {
+    for (const std::string& text : arguments) {
+        const Path given = text, argument = given.has_filename() ? given : given.parent_path(); // "case/" is "case"
         std::error_code error;
         if (fs::exists(argument / "case.json", error)) {
             cases.push_back(argument);
@@ -72,6 +73,16 @@ Result<std::vector<Path>> find_cases(const std::vector<std::string>& arguments)
     return cases;
 }
 
+// a parameter of the wrong type is the case's fault, not the program's
+Result<GoldenOutputs> run_kind(GoldenRunner run, Device& device, const GoldenCase& c, DType precision)
+{
+    try {
+        return run(device, c, precision);
+    } catch (const nlohmann::json::exception& e) {
+        return fail(ErrorCode::bad_input, "case.json: {}", printable(e.what()));
+    }
+}
+
 CaseReport run_case(Device& device, const Path& folder, const std::string& precision)
 {
     CaseReport r;
@@ -89,7 +100,7 @@ CaseReport run_case(Device& device, const Path& folder, const std::string& preci
         r.reason = "no runner for this kind";
         return r;
     }
-    const auto outputs = kind->run(device, *c, precision == "fp16" ? DType::f16 : DType::f32);
+    const auto outputs = run_kind(kind->run, device, *c, precision == "fp16" ? DType::f16 : DType::f32);
     if (!outputs) {
         r.reason = outputs.error().message;
         return r;

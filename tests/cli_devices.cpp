@@ -1,0 +1,77 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "kernels/catalogue.h"
+#include "tests/program.h"
+
+#include <algorithm>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <set>
+
+namespace semrover {
+namespace {
+
+using Json = nlohmann::json;
+
+TEST(Catalogue, has_every_op_of_the_shaders_once)
+{
+    std::set<std::string> ops;
+    for (const auto& entry : std::filesystem::directory_iterator(SEMROVER_SOURCE_DIR "/shaders")) {
+        const std::string file = entry.path().filename().string();
+        if (entry.path().extension() == ".comp")
+            ops.insert(file.substr(0, file.find('.')));
+    }
+    std::set<std::string> found;
+    for (const Kernel* kernel : kernel_catalogue())
+        EXPECT_TRUE(found.emplace(kernel->name).second) << kernel->name;
+    EXPECT_EQ(found, ops);
+}
+
+TEST(CliDevices, every_device_is_listed_with_limits_and_kernels)
+{
+    const ProgramResult text = semrover_program("devices");
+    ASSERT_EQ(text.code, 0) << text.err;
+    const Json devices = Json::parse(semrover_program("devices --json").out)["devices"];
+    ASSERT_FALSE(devices.empty());
+    for (size_t i = 0; i < devices.size(); ++i) {
+        EXPECT_EQ(devices[i]["index"], i);
+        EXPECT_GT(devices[i]["storage_range_bytes"], 0);
+        EXPECT_NE(text.out.find(devices[i]["name"]), std::string::npos) << text.out;
+        EXPECT_TRUE(devices[i]["kernels"]["gemm"].is_string());
+        EXPECT_TRUE(devices[i]["kernels"]["attention"].is_string());
+    }
+}
+
+TEST(CliDevices, limits_that_a_test_lowers_are_the_ones_shown)
+{
+    setenv("SEMROVER_LIMITS", "shared=16384,variant=simt", 1);
+    const Json device = Json::parse(semrover_program("devices --json").out)["devices"][0];
+    unsetenv("SEMROVER_LIMITS");
+    EXPECT_EQ(device["shared_bytes"], 16384);
+    EXPECT_EQ(device["kernels"]["gemm"], "simt");
+}
+
+TEST(CliDoctor, a_machine_that_runs_tests_has_all_it_needs)
+{
+    const ProgramResult result = semrover_program("doctor --json");
+    ASSERT_EQ(result.code, 0) << result.err;
+    const Json report = Json::parse(result.out);
+    for (const Json& finding : report["findings"])
+        EXPECT_TRUE(finding["ok"]) << finding;
+    EXPECT_EQ("semrover " + report["version"].get<std::string>() + "\n", semrover_program("--version").out);
+}
+
+TEST(CliDoctor, without_a_driver_it_says_what_to_install_and_exits_with_4)
+{
+    setenv("VK_ICD_FILENAMES", "/nonexistent.json", 1);
+    const ProgramResult doctor = semrover_program("doctor"), devices = semrover_program("devices");
+    unsetenv("VK_ICD_FILENAMES");
+    EXPECT_EQ(doctor.code, 4);
+    EXPECT_NE(doctor.out.find("apt-get install mesa-vulkan-drivers"), std::string::npos) << doctor.out;
+    EXPECT_EQ(std::ranges::count(doctor.err, '\n'), 1);
+    EXPECT_EQ(devices.code, 4);
+    EXPECT_EQ(devices.out, "");
+}
+
+} // namespace
+} // namespace semrover

@@ -1,0 +1,93 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "runtime/safetensors.h"
+#include "tests/program.h"
+
+#include <algorithm>
+#include <cstring>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+namespace semrover {
+namespace {
+
+const std::string kGolden = SEMROVER_SOURCE_DIR "/tests/golden";
+
+// a copy of the case whose first expected value is off by `error`
+void put_case(const std::filesystem::path& folder, const std::string& name, float error)
+{
+    std::filesystem::copy(kGolden + "/" + name, folder);
+    const auto file = Safetensors::open(folder / "tensors.safetensors");
+    ASSERT_TRUE(file) << file.error().message;
+    std::vector<TensorData> tensors;
+    std::vector<std::vector<std::byte>> changed;
+    for (const TensorInfo& t : file->tensors()) {
+        const auto bytes = file->bytes(t);
+        changed.emplace_back(bytes.begin(), bytes.end());
+        float first;
+        std::memcpy(&first, changed.back().data(), 4);
+        first += error;
+        if (t.name == "expect.states")
+            std::memcpy(changed.back().data(), &first, 4);
+        tensors.push_back({t.name, t.dtype, t.shape, changed.back()});
+    }
+    ASSERT_TRUE(write_safetensors(folder / "tensors.safetensors", tensors));
+}
+
+TEST(CliVerify, a_case_passes_with_its_error_and_tolerance_on_one_line)
+{
+    const ProgramResult result = semrover_program("verify " + kGolden + "/scheduler_ddim_sample/");
+    EXPECT_EQ(result.code, 0) << result.err;
+    EXPECT_TRUE(result.out.starts_with("PASS scheduler scheduler_ddim_sample ")) << result.out;
+    EXPECT_TRUE(result.out.ends_with(" 1e-05\n")) << result.out;
+}
+
+TEST(CliVerify, one_case_that_fails_makes_the_exit_code_1_and_the_rest_still_runs)
+{
+    const ScratchFolder folder;
+    put_case(folder / "a_wrong", "scheduler_ddim_sample", 1);
+    put_case(folder / "b_right", "scheduler_ddim_sample", 0);
+    std::filesystem::create_directory(folder / "c_broken");
+    folder.put("c_broken/case.json", R"({"kind":"scheduler","params":7})");
+    folder.put("not_a_case", "");
+    const ProgramResult result = semrover_program("verify " + folder.path().string());
+    EXPECT_EQ(result.code, 1);
+    EXPECT_EQ(result.err, "semrover: error: 2 of 3 cases failed\n");
+    EXPECT_NE(result.out.find("FAIL scheduler a_wrong "), std::string::npos) << result.out;
+    EXPECT_NE(result.out.find("PASS scheduler b_right "), std::string::npos) << result.out;
+    EXPECT_NE(result.out.find("FAIL ? c_broken "), std::string::npos) << result.out;
+}
+
+TEST(CliVerify, parameters_of_the_wrong_type_fail_their_case_only)
+{
+    const ScratchFolder folder;
+    put_case(folder / "typed", "scheduler_ddim_sample", 0);
+    folder.put("typed/case.json",
+               R"({"kind":"scheduler","params":{"type":[1],"num_inference_steps":4},"tolerance":{"fp32":1}})");
+    const ProgramResult result = semrover_program("verify " + (folder / "typed").string());
+    EXPECT_EQ(result.code, 1) << result.err;
+    EXPECT_TRUE(result.out.starts_with("FAIL scheduler typed ")) << result.out;
+}
+
+TEST(CliVerify, a_kind_without_a_runner_is_listed_and_fails_nothing)
+{
+    const ProgramResult result =
+        semrover_program("verify --json " + kGolden + "/vae_tiny " + kGolden + "/regions_paper");
+    EXPECT_EQ(result.code, 0) << result.err;
+    const auto report = nlohmann::json::parse(result.out);
+    EXPECT_EQ(report["passed"], 1);
+    EXPECT_EQ(report["skipped"], 1);
+    EXPECT_EQ(report["cases"][0]["outcome"], "SKIP");
+    EXPECT_EQ(report["cases"][1]["kind"], "region_extraction");
+}
+
+TEST(CliVerify, a_folder_without_cases_is_refused)
+{
+    const ScratchFolder folder;
+    EXPECT_EQ(semrover_program("verify " + folder.path().string()).code, 3);
+    EXPECT_EQ(semrover_program("verify " + (folder / "none").string()).code, 3);
+    EXPECT_EQ(semrover_program("verify").code, 2);
+}
+
+} // namespace
+} // namespace semrover
