@@ -69,8 +69,8 @@ Result<std::unique_ptr<Device>> Device::create(const DeviceOptions& options)
     std::vector<DeviceSummary> summaries;
     for (size_t i = 0; i < physical.size(); ++i)
         summaries.push_back(summarize(physical[i], uint32_t(i)));
-    SR_TRY(const uint32_t chosen, select_device(summaries, options.select));
-    d->physical_ = physical[chosen];
+    SR_TRY(d->index_, select_device(summaries, options.select));
+    d->physical_ = physical[d->index_];
     SR_CHECK(d->create_device(options));
     SR_CHECK(d->finish(options));
     return d;

@@ -56,6 +56,7 @@ class Device {
     const DeviceLimits& limits() const { return limits_; }
     const std::string& name() const { return name_; }
     const std::string& driver() const { return driver_; }
+    uint32_t index() const { return index_; } // in list_devices(); 0 for a host's
     VkDevice handle() const { return device_; }
     VkPhysicalDevice physical() const { return physical_; }
     uint32_t queue_family() const { return queue_family_; }
@@ -97,6 +98,7 @@ class Device {
     VkDevice device_ = VK_NULL_HANDLE;
     VkQueue queue_ = VK_NULL_HANDLE;
     uint32_t queue_family_ = 0;
+    uint32_t index_ = 0;
     bool owned_ = true;
     std::function<void()> lock_, unlock_;
     std::mutex queue_mutex_;

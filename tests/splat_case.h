@@ -13,12 +13,10 @@ struct SplatPixels {
     uint32_t visible = 0, pairs = 0;
 };
 
-// runs the op on splats of the host; label of splat i is i % 20, its cell 1000 + i
-inline SplatPixels run_splats(const std::vector<HostSplat>& splats, const std::vector<HostCamera>& cameras,
-                              SplatOptions options)
+// label of splat i is i % 20, its cell 1000 + i
+inline SplatScene scene_of(KernelCase& k, const std::vector<HostSplat>& splats)
 {
-    KernelCase k(test_device());
-    std::vector<float> positions, normals, colors, table;
+    std::vector<float> positions, normals, colors;
     std::vector<uint32_t> labels, cells;
     for (const HostSplat& s : splats) {
         for (size_t a = 0; a < 3; ++a) {
@@ -32,14 +30,22 @@ inline SplatPixels run_splats(const std::vector<HostSplat>& splats, const std::v
         cells.push_back(1000 + uint32_t(labels.size()));
         labels.push_back(uint32_t(labels.size() % 20));
     }
+    return {k.input(positions, 4), k.input(normals, 4), k.input(colors, 4), k.input(labels), k.input(cells)};
+}
+
+// runs the op on splats of the host; room for all of them unless the options say otherwise
+inline SplatPixels run_splats(const std::vector<HostSplat>& splats, const std::vector<HostCamera>& cameras,
+                              SplatOptions options)
+{
+    KernelCase k(test_device());
+    std::vector<float> table;
     for (const HostCamera& c : cameras) {
         for (double v : {c.fx, c.fy, c.cx, c.cy})
             table.push_back(float(v));
         for (double v : c.view)
             table.push_back(float(v));
     }
-    const SplatScene scene = {k.input(positions, 4), k.input(normals, 4), k.input(colors, 4), k.input(labels),
-                              k.input(cells)};
+    const SplatScene scene = scene_of(k, splats);
     options.visible = k.output(1, 1, DType::u32, 1);
     options.pairs = k.output(1, 1, DType::u32, 1);
     if (!options.max_visible)

@@ -1,0 +1,260 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// the C interface over the engine: copies structures within their sizes, turns errors and exceptions into statuses
+#include "engine/semrover.h"
+
+#include "runtime/device.h"
+#include "runtime/physical_device.h"
+
+#include <algorithm>
+#include <cstring>
+#include <new>
+
+using namespace semrover;
+
+struct sr_context {
+    std::unique_ptr<Device> device;
+    DeviceSummary summary;
+    std::string error;
+};
+
+namespace {
+
+// of calls without a context; a thread sees its own
+thread_local std::string thread_error;
+
+sr_status remember(sr_context* context, sr_status status, std::string message) noexcept
+{
+    (context ? context->error : thread_error) = std::move(message);
+    return status;
+}
+
+// calls f, which returns Status; nothing it throws gets past
+template <typename F>
+sr_status guarded(sr_context* context, F f) noexcept
+{
+    try {
+        if (Status status = f(); !status)
+            return remember(context, sr_status(status.error().code), std::move(status.error().message));
+        return SR_OK;
+    } catch (const std::bad_alloc&) {
+        return remember(context, SR_ERR_OUT_OF_MEMORY, ""); // a text might not fit either
+    } catch (...) {
+        return remember(context, SR_ERR_INTERNAL, "internal");
+    }
+}
+
+// the caller's structure as this library knows it
+template <typename T>
+Result<T> read_struct(const T* given, const char* name)
+{
+    T known{};
+    if (!given || given->struct_size < sizeof(uint32_t))
+        return fail(ErrorCode::usage, "{}: {}", name, given ? "struct_size is not set" : "NULL");
+    const auto* bytes = reinterpret_cast<const unsigned char*>(given);
+    std::memcpy(&known, bytes, std::min<size_t>(given->struct_size, sizeof(T)));
+    for (size_t i = sizeof(T); i < given->struct_size; ++i)
+        if (bytes[i])
+            return fail(ErrorCode::usage, "{}: byte {} asks for something that version {} does not know", name, i,
+                        SEMROVER_VERSION);
+    if constexpr (requires { known.next; })
+        if (known.next)
+            return fail(ErrorCode::usage, "{}: next is not NULL", name);
+    return known;
+}
+
+// `size` bytes of the caller's, of which the first four stay
+template <typename T>
+void write_struct(const T& known, void* to, uint32_t size)
+{
+    const size_t count = std::min<size_t>(size, sizeof(T));
+    std::memcpy(static_cast<char*>(to) + 4, reinterpret_cast<const char*>(&known) + 4, count > 4 ? count - 4 : 0);
+}
+
+template <size_t N>
+void copy_text(char (&to)[N], const std::string& text)
+{
+    std::memcpy(to, text.data(), std::min(text.size(), N - 1)); // the rest is zero
+}
+
+sr_device_info info_of(const DeviceSummary& d)
+{
+    sr_device_info info{};
+    info.index = d.index;
+    info.memory_bytes = d.memory_bytes;
+    copy_text(info.name, d.name);
+    copy_text(info.driver, d.driver);
+    copy_text(info.refusal, d.refusal);
+    copy_text(info.type, d.type);
+    copy_text(info.api, d.api);
+    return info;
+}
+
+Result<std::unique_ptr<Device>> adopt(const sr_vulkan_device& v, const DeviceOptions& options)
+{
+    HostDevice host;
+    host.instance = static_cast<VkInstance>(v.instance);
+    host.physical = static_cast<VkPhysicalDevice>(v.physical_device);
+    host.device = static_cast<VkDevice>(v.device);
+    host.queue = static_cast<VkQueue>(v.queue);
+    host.queue_family = v.queue_family;
+    host.float16 = v.shader_float16;
+    if (v.lock_queue)
+        host.lock = [=] { v.lock_queue(v.user); };
+    if (v.unlock_queue)
+        host.unlock = [=] { v.unlock_queue(v.user); };
+    return Device::adopt(host, options);
+}
+
+Result<std::unique_ptr<sr_context>> make_context(const sr_context_desc& desc)
+{
+    DeviceOptions options;
+    options.max_bytes = desc.max_bytes;
+    options.validation = desc.validation;
+    options.select = desc.device ? desc.device : "";
+    auto context = std::make_unique<sr_context>();
+    if (desc.vulkan) {
+        if (desc.device || desc.validation)
+            return fail(ErrorCode::usage, "sr_context_desc: device and validation do not go with a host's device");
+        SR_TRY(const sr_vulkan_device vulkan, read_struct(desc.vulkan, "sr_vulkan_device"));
+        SR_TRY(context->device, adopt(vulkan, options));
+    } else {
+        SR_TRY(context->device, Device::create(options));
+    }
+    context->summary = summarize(context->device->physical(), context->device->index());
+    return context;
+}
+
+Status list(sr_device_info* devices, uint32_t& count)
+{
+    SR_TRY(const auto all, list_devices());
+    const uint32_t room = count;
+    count = uint32_t(all.size());
+    if (!devices)
+        return {};
+    const uint32_t stride = devices->struct_size;
+    if (room && stride < 8)
+        return fail(ErrorCode::usage, "sr_list_devices: struct_size of the first element is not set");
+    count = std::min(room, count);
+    for (uint32_t i = 0; i < count; ++i) {
+        char* to = reinterpret_cast<char*>(devices) + size_t(i) * stride;
+        write_struct(info_of(all[i]), to, stride);
+        std::memcpy(to, &stride, 4);
+    }
+    if (count < all.size())
+        return fail(ErrorCode::partial, "sr_list_devices: {} devices, room for {}", all.size(), room);
+    return {};
+}
+
+} // namespace
+
+extern "C" {
+
+uint32_t sr_abi_version(void)
+{
+    return SR_ABI_VERSION;
+}
+
+const char* sr_version(void)
+{
+    return SEMROVER_VERSION;
+}
+
+const char* sr_status_name(sr_status status)
+{
+    switch (status) {
+    case SR_OK:
+        return "SR_OK";
+    case SR_ERR_USAGE:
+        return "SR_ERR_USAGE";
+    case SR_ERR_BAD_INPUT:
+        return "SR_ERR_BAD_INPUT";
+    case SR_ERR_NO_DEVICE:
+        return "SR_ERR_NO_DEVICE";
+    case SR_ERR_OUT_OF_MEMORY:
+        return "SR_ERR_OUT_OF_MEMORY";
+    case SR_ERR_DEVICE_LOST:
+        return "SR_ERR_DEVICE_LOST";
+    case SR_ERR_PARTIAL:
+        return "SR_ERR_PARTIAL";
+    case SR_ERR_INTERNAL:
+        return "SR_ERR_INTERNAL";
+    case SR_ERR_INTERRUPTED:
+        return "SR_ERR_INTERRUPTED";
+    default:
+        return "unknown";
+    }
+}
+
+size_t sr_last_error(const sr_context* context, char* buffer, size_t size)
+{
+    const std::string& text = context ? context->error : thread_error;
+    if (buffer && size) {
+        const size_t count = std::min(text.size(), size - 1);
+        std::memcpy(buffer, text.data(), count);
+        buffer[count] = 0;
+    }
+    return text.size();
+}
+
+sr_status sr_list_devices(sr_device_info* devices, uint32_t* count)
+{
+    return guarded(nullptr, [&]() -> Status {
+        if (!count)
+            return fail(ErrorCode::usage, "sr_list_devices: count is NULL");
+        return list(devices, *count);
+    });
+}
+
+sr_status sr_context_create(const sr_context_desc* desc, sr_context** context)
+{
+    return guarded(nullptr, [&]() -> Status {
+        if (!context)
+            return fail(ErrorCode::usage, "sr_context_create: context is NULL");
+        *context = nullptr;
+        sr_context_desc known{};
+        if (desc) {
+            SR_TRY(known, read_struct(desc, "sr_context_desc"));
+        }
+        SR_TRY(auto made, make_context(known));
+        *context = made.release();
+        return {};
+    });
+}
+
+void sr_context_destroy(sr_context* context)
+{
+    delete context;
+}
+
+sr_status sr_context_device(sr_context* context, sr_device_info* device)
+{
+    return guarded(context, [&]() -> Status {
+        if (!context || !device || device->struct_size < 8)
+            return fail(ErrorCode::usage, "sr_context_device: NULL, or struct_size is not set");
+        write_struct(info_of(context->summary), device, device->struct_size);
+        return {};
+    });
+}
+
+sr_status sr_context_memory(sr_context* context, sr_memory_info* memory)
+{
+    return guarded(context, [&]() -> Status {
+        if (!context || !memory || memory->struct_size < 8)
+            return fail(ErrorCode::usage, "sr_context_memory: NULL, or struct_size is not set");
+        sr_memory_info info{};
+        info.used_bytes = context->device->allocated_bytes();
+        info.peak_bytes = context->device->peak_bytes();
+        info.budget_bytes = context->device->budget();
+        write_struct(info, memory, memory->struct_size);
+        return {};
+    });
+}
+
+} // extern "C"
+
+// the layout that programs were built against: a change here is a new ABI
+static_assert(sizeof(sr_device_info) == 816 && offsetof(sr_device_info, memory_bytes) == 808);
+static_assert(sizeof(sr_vulkan_device) == 80 && offsetof(sr_vulkan_device, shader_float16) == 72);
+static_assert(sizeof(sr_context_desc) == 40 && offsetof(sr_context_desc, max_bytes) == 32);
+static_assert(sizeof(sr_memory_info) == 32);

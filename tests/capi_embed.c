@@ -1,0 +1,218 @@
+/* SPDX-FileCopyrightText: semrover authors
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * A host in C: what it may get wrong, a context of its own, and a context on a device that it made itself. */
+#include "engine/semrover.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <vulkan/vulkan.h>
+
+#define CHECK(condition)                                                                                               \
+    do {                                                                                                               \
+        if (!(condition)) {                                                                                            \
+            fprintf(stderr, "%s:%d: %s\n", __FILE__, __LINE__, #condition);                                            \
+            exit(1);                                                                                                   \
+        }                                                                                                              \
+    } while (0)
+
+/* the last error has this text in it */
+static int says(const sr_context* context, const char* text)
+{
+    char message[512];
+    const size_t length = sr_last_error(context, message, sizeof message);
+    if (length < sizeof message && strstr(message, text) && !strchr(message, '\n'))
+        return 1;
+    fprintf(stderr, "expected \"%s\", found \"%s\"\n", text, message);
+    return 0;
+}
+
+static void knows_its_version(void)
+{
+    CHECK(sr_abi_version() == SR_ABI_VERSION);
+    CHECK(strchr(sr_version(), '.'));
+    CHECK(!strcmp(sr_status_name(SR_ERR_OUT_OF_MEMORY), "SR_ERR_OUT_OF_MEMORY"));
+    CHECK(!strcmp(sr_status_name((sr_status)1234), "unknown"));
+}
+
+static void lists_devices(void)
+{
+    uint32_t count = 0, room = 0;
+    sr_device_info devices[8];
+    CHECK(sr_list_devices(NULL, NULL) == SR_ERR_USAGE && says(NULL, "count is NULL"));
+    CHECK(sr_list_devices(NULL, &count) == SR_OK && count > 0);
+    memset(devices, 0, sizeof devices);
+    room = 8;
+    CHECK(sr_list_devices(devices, &room) == SR_ERR_USAGE && says(NULL, "struct_size"));
+    devices[0].struct_size = sizeof devices[0];
+    room = 8;
+    CHECK(sr_list_devices(devices, &room) == (count > 8 ? SR_ERR_PARTIAL : SR_OK));
+    CHECK(devices[0].index == 0 && devices[0].name[0] && devices[0].memory_bytes > 0);
+    CHECK(devices[0].struct_size == sizeof devices[0]);
+    room = 0;
+    CHECK(sr_list_devices(devices, &room) == SR_ERR_PARTIAL && room == 0);
+}
+
+/* a program built against a header with less in sr_device_info: nothing behind its members is touched */
+static void writes_no_more_than_an_old_program_has(void)
+{
+    struct {
+        uint32_t struct_size, index;
+        char name[256];
+        unsigned char guard[64];
+    } old;
+    uint32_t room = 1;
+    size_t i;
+    memset(&old, 0x5a, sizeof old);
+    old.struct_size = 264;
+    sr_list_devices((sr_device_info*)(void*)&old, &room);
+    CHECK(room == 1 && old.index == 0 && old.struct_size == 264 && strlen(old.name) < 256);
+    for (i = 0; i < sizeof old.guard; ++i)
+        CHECK(old.guard[i] == 0x5a);
+}
+
+static void refuses_wrong_descriptions(void)
+{
+    struct {
+        sr_context_desc known;
+        uint64_t newer;
+    } future;
+    sr_context_desc desc;
+    sr_context* context = (sr_context*)&desc;
+    memset(&desc, 0, sizeof desc);
+    CHECK(sr_context_create(NULL, NULL) == SR_ERR_USAGE);
+    CHECK(sr_context_create(&desc, &context) == SR_ERR_USAGE && says(NULL, "struct_size is not set") && !context);
+    desc.struct_size = sizeof desc;
+    desc.next = &desc;
+    CHECK(sr_context_create(&desc, &context) == SR_ERR_USAGE && says(NULL, "next is not NULL"));
+    desc.next = NULL;
+    desc.device = "nonesuch";
+    CHECK(sr_context_create(&desc, &context) == SR_ERR_NO_DEVICE && says(NULL, "no usable device matches 'nonesuch'"));
+    memset(&future, 0, sizeof future);
+    future.known.struct_size = sizeof future;
+    future.newer = 1;
+    CHECK(sr_context_create(&future.known, &context) == SR_ERR_USAGE && says(NULL, "does not know"));
+    future.newer = 0;
+    CHECK(sr_context_create(&future.known, &context) == SR_OK && context);
+    sr_context_destroy(context);
+    sr_context_destroy(NULL);
+}
+
+static void makes_a_context_of_its_own(void)
+{
+    sr_context* context = NULL;
+    sr_device_info device;
+    sr_memory_info memory;
+    sr_context_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.struct_size = sizeof desc;
+    desc.max_bytes = 1 << 30;
+    CHECK(sr_context_create(&desc, &context) == SR_OK);
+    memset(&device, 0, sizeof device);
+    CHECK(sr_context_device(context, &device) == SR_ERR_USAGE && says(context, "struct_size is not set"));
+    device.struct_size = sizeof device;
+    CHECK(sr_context_device(context, &device) == SR_OK && device.name[0] && !device.refusal[0]);
+    memset(&memory, 0, sizeof memory);
+    memory.struct_size = sizeof memory;
+    CHECK(sr_context_memory(context, &memory) == SR_OK);
+    CHECK(memory.used_bytes == 0 && memory.budget_bytes == 1 << 30);
+    CHECK(sr_last_error(context, NULL, 0) > 0);
+    sr_context_destroy(context);
+    CHECK(sr_context_create(NULL, &context) == SR_OK);
+    sr_context_destroy(context);
+}
+
+static int locks, unlocks;
+static void lock_queue(void* user)
+{
+    locks += user == &locks;
+}
+static void unlock_queue(void* user)
+{
+    unlocks += user == &locks;
+}
+
+static VkInstance make_instance(void)
+{
+    VkApplicationInfo app = {0};
+    VkInstanceCreateInfo info = {0};
+    VkInstance instance;
+    app.sType = VK_STRUCTURE_TYPE_APPLICATION_INFO;
+    app.apiVersion = VK_API_VERSION_1_2;
+    info.sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO;
+    info.pApplicationInfo = &app;
+    CHECK(vkCreateInstance(&info, NULL, &instance) == VK_SUCCESS);
+    return instance;
+}
+
+static VkDevice make_device(VkPhysicalDevice physical)
+{
+    const float priority = 1;
+    VkPhysicalDeviceVulkan12Features features = {0};
+    VkDeviceQueueCreateInfo queue = {0};
+    VkDeviceCreateInfo info = {0};
+    VkDevice device;
+    features.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES;
+    features.timelineSemaphore = VK_TRUE;
+    queue.sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO;
+    queue.queueCount = 1;
+    queue.pQueuePriorities = &priority;
+    info.sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO;
+    info.pNext = &features;
+    info.queueCreateInfoCount = 1;
+    info.pQueueCreateInfos = &queue;
+    CHECK(vkCreateDevice(physical, &info, NULL, &device) == VK_SUCCESS);
+    return device;
+}
+
+static void lends_its_own_device(void)
+{
+    const VkInstance instance = make_instance();
+    VkPhysicalDevice physical;
+    VkDevice device;
+    VkQueue queue;
+    uint32_t count = 1;
+    sr_vulkan_device vulkan;
+    sr_context_desc desc;
+    sr_context* context = NULL;
+    vkEnumeratePhysicalDevices(instance, &count, &physical);
+    device = make_device(physical);
+    vkGetDeviceQueue(device, 0, 0, &queue);
+    memset(&vulkan, 0, sizeof vulkan);
+    vulkan.struct_size = sizeof vulkan;
+    vulkan.instance = instance;
+    vulkan.physical_device = physical;
+    vulkan.device = device;
+    vulkan.queue = queue;
+    vulkan.user = &locks;
+    vulkan.lock_queue = lock_queue;
+    memset(&desc, 0, sizeof desc);
+    desc.struct_size = sizeof desc;
+    desc.vulkan = &vulkan;
+    CHECK(sr_context_create(&desc, &context) == SR_ERR_USAGE && says(NULL, "both of lock and unlock"));
+    vulkan.unlock_queue = unlock_queue;
+    desc.device = "0";
+    CHECK(sr_context_create(&desc, &context) == SR_ERR_USAGE && says(NULL, "do not go with a host's device"));
+    desc.device = NULL;
+    vulkan.queue = NULL;
+    CHECK(sr_context_create(&desc, &context) == SR_ERR_USAGE && says(NULL, "needs instance, physical device"));
+    vulkan.queue = queue;
+    CHECK(sr_context_create(&desc, &context) == SR_OK);
+    sr_context_destroy(context);
+    CHECK(locks == unlocks);
+    CHECK(vkDeviceWaitIdle(device) == VK_SUCCESS); /* still the host's */
+    vkDestroyDevice(device, NULL);
+    vkDestroyInstance(instance, NULL);
+}
+
+int main(void)
+{
+    knows_its_version();
+    lists_devices();
+    writes_no_more_than_an_old_program_has();
+    refuses_wrong_descriptions();
+    makes_a_context_of_its_own();
+    lends_its_own_device();
+    return 0;
+}
