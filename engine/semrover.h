@@ -4,11 +4,12 @@
  * The C interface of semrover: C99, no other header of ours, no exception and no exit across it.
  *
  * Structures start with struct_size, which the caller sets to sizeof of the structure it was compiled with. The library
- * reads and writes no more than that; members that are missing are zero. Members that this library does not know must be
- * zero, or the call fails with SR_ERR_USAGE, so that nothing asked for is silently ignored. `next` is reserved: NULL.
+ * reads and writes no more than that; members that are missing are zero. Members that this library does not know must
+ * be zero, or the call fails with SR_ERR_USAGE, so that nothing asked for is silently ignored. `next` is reserved:
+ * NULL.
  *
- * Threads: different contexts may be used at the same time; one context by one thread at a time. Strings that the library
- * returns are static. Everything that a call is given is copied before it returns.
+ * Threads: different contexts may be used at the same time; one context by one thread at a time. Strings that the
+ * library returns are static. Everything that a call is given is copied before it returns.
  */
 #ifndef SEMROVER_H
 #define SEMROVER_H
@@ -31,25 +32,26 @@ typedef enum sr_status {
     SR_ERR_NO_DEVICE = 4,     /* no Vulkan device that can do it */
     SR_ERR_OUT_OF_MEMORY = 5, /* of the device, of the budget, or of the host */
     SR_ERR_DEVICE_LOST = 6,
-    SR_ERR_PARTIAL = 7,       /* there was more than fitted */
-    SR_ERR_INTERNAL = 70,     /* a bug of ours */
+    SR_ERR_PARTIAL = 7,   /* there was more than fitted */
+    SR_ERR_INTERNAL = 70, /* a bug of ours */
     SR_ERR_INTERRUPTED = 130,
     SR_STATUS_IS_32_BIT = 0x7fffffff
 } sr_status;
 
 typedef struct sr_context sr_context; /* one device and what lives on it */
 
-uint32_t sr_abi_version(void);                  /* of the library; compare with SR_ABI_VERSION */
-const char* sr_version(void);                   /* "0.1.0" */
-const char* sr_status_name(sr_status status);   /* "SR_ERR_USAGE"; "unknown" for others */
+uint32_t sr_abi_version(void);                /* of the library; compare with SR_ABI_VERSION */
+const char* sr_version(void);                 /* "0.1.0" */
+const char* sr_status_name(sr_status status); /* "SR_ERR_USAGE"; "unknown" for others */
 
-/* One line about the last call that failed: with this context, or, for NULL, in this thread without a context. Writes at
- * most `size` bytes with the terminating zero and returns the length that the whole line has. buffer may be NULL with 0. */
+/* One line about the last call that failed: with this context, or, for NULL, in this thread without a context. Writes
+ * at most `size` bytes with the terminating zero and returns the length that the whole line has. buffer may be NULL
+ * with 0. */
 size_t sr_last_error(const sr_context* context, char* buffer, size_t size);
 
 typedef struct sr_device_info {
     uint32_t struct_size;
-    uint32_t index;        /* for sr_context_desc.device */
+    uint32_t index; /* for sr_context_desc.device */
     char name[256];
     char driver[256];
     char refusal[256];     /* why it cannot be used; empty if it can */
@@ -69,11 +71,11 @@ typedef struct sr_vulkan_device {
     uint32_t struct_size;
     uint32_t queue_family; /* with compute */
     const void* next;
-    void* instance;        /* VkInstance */
-    void* physical_device; /* VkPhysicalDevice */
-    void* device;          /* VkDevice */
-    void* queue;           /* VkQueue */
-    void* user;            /* for the callbacks */
+    void* instance;                 /* VkInstance */
+    void* physical_device;          /* VkPhysicalDevice */
+    void* device;                   /* VkDevice */
+    void* queue;                    /* VkQueue */
+    void* user;                     /* for the callbacks */
     void (*lock_queue)(void* user); /* around every use of the queue, from the thread that calls; both or neither */
     void (*unlock_queue)(void* user);
     uint32_t shader_float16; /* 1: shaderFloat16 is enabled too */

@@ -10,8 +10,8 @@ namespace semrover {
 
 Tensor embedding(Graph& g, Tensor index, Tensor table, Tensor x, DType dtype, Tensor into)
 {
-    SR_ASSERT(!x.valid() || (x.rows == index.rows && x.cols == table.cols), "embedding: [{}, {}] onto [{}, {}]", index.rows,
-              table.cols, x.rows, x.cols);
+    SR_ASSERT(!x.valid() || (x.rows == index.rows && x.cols == table.cols), "embedding: [{}, {}] onto [{}, {}]",
+              index.rows, table.cols, x.rows, x.cols);
     const Tensor y = into.valid() ? into : g.matrix(index.rows, table.cols, dtype, "embedding");
     EmbeddingPush push{};
     push.rows = index.rows;

@@ -13,7 +13,8 @@ Tensor gemm(Graph& g, Tensor x, Tensor w, Tensor bias, const GemmOptions& option
     const uint32_t groups = options.groups;
     SR_ASSERT(x.cols == w.cols && x.dtype == w.dtype, "gemm: x [{}, {}] {} and w [{}, {}] {}", x.rows, x.cols,
               dtype_name(x.dtype), w.rows, w.cols, dtype_name(w.dtype));
-    SR_ASSERT(x.rows % groups == 0 && w.rows % groups == 0, "gemm: {} and {} rows in {} groups", x.rows, w.rows, groups);
+    SR_ASSERT(x.rows % groups == 0 && w.rows % groups == 0, "gemm: {} and {} rows in {} groups", x.rows, w.rows,
+              groups);
     GemmPush push{};
     push.rows = x.rows / groups;
     push.cols = w.rows / groups;
@@ -24,8 +25,8 @@ Tensor gemm(Graph& g, Tensor x, Tensor w, Tensor bias, const GemmOptions& option
               "gemm: bias [{}, {}] for {} columns in {} groups", bias.rows, bias.cols, push.cols, groups);
     push.bias_ld = bias.ld;
     const Tensor y = options.into.valid() ? options.into : g.matrix(x.rows, push.cols, options.dtype, "gemm");
-    SR_ASSERT(y.rows == x.rows && y.cols == push.cols, "gemm: [{}, {}] written into [{}, {}]", x.rows, push.cols, y.rows,
-              y.cols);
+    SR_ASSERT(y.rows == x.rows && y.cols == push.cols, "gemm: [{}, {}] written into [{}, {}]", x.rows, push.cols,
+              y.rows, y.cols);
     push.y_ld = y.ld;
     DispatchOptions dispatch;
     dispatch.flops = 2.0 * x.rows * push.cols * x.cols;

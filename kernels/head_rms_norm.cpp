@@ -11,8 +11,8 @@ namespace semrover {
 Tensor head_rms_norm(Graph& g, Tensor qkv, Tensor weights, uint32_t heads, float eps, uint32_t groups)
 {
     const uint32_t head_dim = qkv.cols / (3 * heads);
-    SR_ASSERT(head_dim % 8 == 0 && weights.rows == 2 * groups && weights.cols == head_dim, "head_rms_norm: weights [{}, {}]",
-              weights.rows, weights.cols);
+    SR_ASSERT(head_dim % 8 == 0 && weights.rows == 2 * groups && weights.cols == head_dim,
+              "head_rms_norm: weights [{}, {}]", weights.rows, weights.cols);
     const Tensor y = g.matrix(qkv.rows, qkv.cols, qkv.dtype, "head_rms_norm");
     HeadRmsNormPush push{};
     push.rows = qkv.rows / groups;

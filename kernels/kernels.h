@@ -52,11 +52,9 @@ Tensor add(Graph& g,
 
 // y = LayerNorm(x) * (1 + scale) + shift, no affine part
 [[nodiscard]] Tensor modulate(Graph& g,
-                              Tensor x,            // [groups * M, N]
-                              Modulation shift,    // N columns, and as many from scale_col on
-                              uint32_t scale_col,
-                              float eps,
-                              uint32_t groups = 1);
+                              Tensor x,         // [groups * M, N]
+                              Modulation shift, // N columns, and as many from scale_col on
+                              uint32_t scale_col, float eps, uint32_t groups = 1);
 
 // -- embeddings ------------------------------------------------------------------------------------------------------
 
@@ -102,7 +100,8 @@ Tensor neighbor_mask(Graph& g,
                                uint32_t heads,
                                uint32_t streams); // whose queries are answered: 1 voxel only, 2 both
 
-// -- sampling: one table of steps, one clock, the same commands for every step -------------------------------------------
+// -- sampling: one table of steps, one clock, the same commands for every step
+// -------------------------------------------
 
 // the state x, predictions and noise are fp32 matrices [M, N] with equal row lengths
 struct StepTable {
@@ -122,8 +121,8 @@ void step_timestep(Graph& g, StepTable steps, Tensor table_row); // [rows] u32
 
 // standard normals keyed by (seed, cell, draw, known or not, channel), Philox4x32-10
 [[nodiscard]] Tensor step_noise(Graph& g, StepTable steps,
-                                Tensor cells, // [M, 4] i32 array
-                                Tensor known, // [M] u32
+                                Tensor cells,                  // [M, 4] i32 array
+                                Tensor known,                  // [M] u32
                                 uint32_t cols, uint64_t seed); // -> [M, cols]
 
 // x' = c_x x + c_z z
@@ -146,7 +145,7 @@ void step_update(Graph& g, StepTable steps,
 
 // y[i] = x[0] + .. + x[i - 1]
 struct PrefixSumOptions {
-    Tensor count;          // [1] u32, or none: only the first count[0] elements of x are there; the rest of y is undefined
+    Tensor count; // [1] u32, or none: only the first count[0] elements of x are there; the rest of y is undefined
     bool non_zero = false; // counts the elements that are not zero instead of adding them
     Tensor total;          // [1] u32: where the total goes, instead of a new tensor
 };
@@ -206,15 +205,15 @@ struct PcaNormals {
 
 // normals and sizes of the surfels of points
 struct SurfelSize {
-    float sigma = 0.04f;                    // metres
-    float spacing = 0;                      // sigma = spacing times the rms distance of the nearest three points; 0: `sigma`
+    float sigma = 0.04f; // metres
+    float spacing = 0;   // sigma = spacing times the rms distance of the nearest three points; 0: `sigma`
     float smallest = 0.01f, largest = 0.3f; // of such a sigma, metres
 };
 [[nodiscard]] Tensor surfel(Graph& g,
-                            Tensor points,    // [P, 4] fp32 array
-                            Tensor colors,    // [P, 4] fp32 array: rgb; the fourth number becomes sigma
-                            Tensor neighbors, // [P, k] u32 array, nearest first
-                            Tensor planes,    // [P, 4] fp32 array: normal
+                            Tensor points,                // [P, 4] fp32 array
+                            Tensor colors,                // [P, 4] fp32 array: rgb; the fourth number becomes sigma
+                            Tensor neighbors,             // [P, k] u32 array, nearest first
+                            Tensor planes,                // [P, 4] fp32 array: normal
                             const SurfelSize& size = {}); // [P, 4] fp32: normal, sigma
 
 // surfels: 2D Gaussians in the plane across a normal, axes t_u = normalize(e x n) with e the axis least aligned with n,
@@ -245,8 +244,9 @@ struct SplatImages { // [cameras * height * width] rows; w = weight of a splat i
     Tensor depth;    // [.., 2] fp32: expected (sum of w depth / alpha), median (of the splat that passes one half)
     Tensor ids;      // [.., 2] u32: label and cell of the splat with the largest w, 2^32 - 1 for none
 };
-[[nodiscard]] SplatImages splat(Graph& g, const SplatScene& scene,
-                                Tensor cameras, // [C, 16] fp32: fx fy cx cy, world to camera [3, 4]; fx = 0: sees nothing
-                                const SplatOptions& options);
+[[nodiscard]] SplatImages
+splat(Graph& g, const SplatScene& scene,
+      Tensor cameras, // [C, 16] fp32: fx fy cx cy, world to camera [3, 4]; fx = 0: sees nothing
+      const SplatOptions& options);
 
 } // namespace semrover

@@ -10,8 +10,8 @@ namespace semrover {
 
 Tensor modulate(Graph& g, Tensor x, Modulation shift, uint32_t scale_col, float eps, uint32_t groups)
 {
-    SR_ASSERT(x.rows % groups == 0 && shift.table_row.rows == x.rows, "modulate: {} rows, {} groups, {} table rows", x.rows,
-              groups, shift.table_row.rows);
+    SR_ASSERT(x.rows % groups == 0 && shift.table_row.rows == x.rows, "modulate: {} rows, {} groups, {} table rows",
+              x.rows, groups, shift.table_row.rows);
     const Tensor y = g.matrix(x.rows, x.cols, x.dtype, "modulate");
     ModulatePush push{};
     push.rows = x.rows / groups;

@@ -3,8 +3,8 @@
 // y = x / (1 + exp(-x)): [M, N] -> [M, N]
 #include "kernels/kernels.h"
 
-#include "silu.spv.h"
 #include "shaders/silu.h"
+#include "silu.spv.h"
 
 namespace semrover {
 

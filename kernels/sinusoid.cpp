@@ -3,8 +3,8 @@
 // y = per axis [sin(x w_0), .., cos(x w_0), ..], or cosines first: [M, A], [F] -> [M, A * 2F]
 #include "kernels/kernels.h"
 
-#include "sinusoid.spv.h"
 #include "shaders/sinusoid.h"
+#include "sinusoid.spv.h"
 
 namespace semrover {
 

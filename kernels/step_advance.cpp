@@ -7,6 +7,9 @@
 
 namespace semrover {
 
-void step_advance(Graph& g, Tensor clock) { g.dispatch(kernel::step_advance, {clock}, groups(1)); }
+void step_advance(Graph& g, Tensor clock)
+{
+    g.dispatch(kernel::step_advance, {clock}, groups(1));
+}
 
 } // namespace semrover

@@ -3,8 +3,8 @@
 // y[r] = in_scale x[r mod x_rows]: [R, N] -> [rows, N]
 #include "kernels/kernels.h"
 
-#include "step_input.spv.h"
 #include "shaders/step_input.h"
+#include "step_input.spv.h"
 
 namespace semrover {
 

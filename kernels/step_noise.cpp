@@ -3,8 +3,8 @@
 // z = normals of Philox4x32-10, key (seed), counter (cell, draw | stream | channel / 4): -> [M, N]
 #include "kernels/kernels.h"
 
-#include "step_noise.spv.h"
 #include "shaders/step_noise.h"
+#include "step_noise.spv.h"
 
 namespace semrover {
 

@@ -3,8 +3,8 @@
 // x' = c_x x + c_z z: [M, N], in place
 #include "kernels/kernels.h"
 
-#include "step_renoise.spv.h"
 #include "shaders/step_renoise.h"
+#include "step_renoise.spv.h"
 
 namespace semrover {
 

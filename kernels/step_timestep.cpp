@@ -3,8 +3,8 @@
 // table_row[r] = steps[clock.row].timestep_index - clock.first_timestep: -> [rows]
 #include "kernels/kernels.h"
 
-#include "step_timestep.spv.h"
 #include "shaders/step_timestep.h"
+#include "step_timestep.spv.h"
 
 namespace semrover {
 

@@ -16,7 +16,8 @@ void record_barrier(VkCommandBuffer commands);
 // the same at the end of a submit, for whatever comes next: shaders, copies, the host
 void record_final_barrier(VkCommandBuffer commands);
 // with the barrier that lets shaders, copies and the host follow
-void record_copy(VkCommandBuffer commands, VkBuffer from, uint64_t from_at, VkBuffer to, uint64_t to_at, uint64_t bytes);
+void record_copy(VkCommandBuffer commands, VkBuffer from, uint64_t from_at, VkBuffer to, uint64_t to_at,
+                 uint64_t bytes);
 void record_clear(VkCommandBuffer commands, VkBuffer buffer, uint64_t at, uint64_t bytes);
 
 } // namespace semrover

@@ -43,8 +43,8 @@ Result<uint32_t> select_device(const std::vector<DeviceSummary>& all, const std:
                              d.refusal.empty() ? "" : " (" + d.refusal + ")");
     const bool numeric = !select.empty() && select.find_first_not_of("0123456789") == std::string::npos;
     for (const DeviceSummary& d : all) {
-        const bool match = select.empty() || (numeric ? std::to_string(d.index) == select
-                                                      : d.name.find(select) != std::string::npos);
+        const bool match =
+            select.empty() || (numeric ? std::to_string(d.index) == select : d.name.find(select) != std::string::npos);
         if (!match)
             continue;
         if (d.refusal.empty())
@@ -240,7 +240,8 @@ Status Device::wait(uint64_t ticket)
 Result<Buffer*> Device::staging()
 {
     if (!staging_) {
-        SR_TRY(staging_, Buffer::create(*this, std::min(kStagingBytes, limits_.max_allocation), MemoryKind::staging, "staging"));
+        SR_TRY(staging_,
+               Buffer::create(*this, std::min(kStagingBytes, limits_.max_allocation), MemoryKind::staging, "staging"));
     }
     return staging_.get();
 }

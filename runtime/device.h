@@ -19,10 +19,10 @@ class PipelineStore;
 class Profile;
 
 struct DeviceOptions {
-    std::string select;       // "", an index of list_devices(), or part of a name
-    std::string limits;       // override_limits(); also from SEMROVER_LIMITS
-    uint64_t max_bytes = 0;   // refuse to allocate more device memory than this; 0: no budget
-    bool validation = false;  // Khronos validation with synchronization checks; also SEMROVER_VALIDATION=1 or =fatal
+    std::string select;      // "", an index of list_devices(), or part of a name
+    std::string limits;      // override_limits(); also from SEMROVER_LIMITS
+    uint64_t max_bytes = 0;  // refuse to allocate more device memory than this; 0: no budget
+    bool validation = false; // Khronos validation with synchronization checks; also SEMROVER_VALIDATION=1 or =fatal
 };
 
 // a device that belongs to the host program; it outlives the engine
@@ -42,7 +42,7 @@ struct DeviceSummary {
     uint64_t memory_bytes; // largest device-local heap
     DeviceLimits limits;
     std::vector<std::string> extensions; // the optional ones that matter: cooperative matrices and the like
-    std::string refusal; // why the engine cannot run on it; empty if it can
+    std::string refusal;                 // why the engine cannot run on it; empty if it can
 };
 
 class Device {

@@ -24,8 +24,8 @@ Tensor Graph::external(const BufferSlice& memory, uint32_t rows, uint32_t cols, 
                        uint32_t ld)
 {
     Tensor t{uint32_t(desc_.resources.size()), dtype, rows, cols, ld ? ld : round_up(cols, kRowPadding), 0};
-    SR_ASSERT(t.bytes() <= memory.bytes, "tensor '{}' of {} bytes in {} bytes of memory", name,
-              t.bytes(), memory.bytes);
+    SR_ASSERT(t.bytes() <= memory.bytes, "tensor '{}' of {} bytes in {} bytes of memory", name, t.bytes(),
+              memory.bytes);
     desc_.resources.push_back({std::string(name), t.bytes(), true, memory});
     return t;
 }

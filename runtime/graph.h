@@ -34,10 +34,22 @@ struct Grid {
 // workgroups; invocations (divided by the local size, folded over y when there are too many: see lib/thread.glsl);
 // tiles of rows (divided by the variant's kTileM and folded likewise); tiles of an output of rows x cols (divided by
 // kTileM and kTileN: x runs over rows, y over columns)
-constexpr Grid groups(uint32_t x, uint32_t y = 1, uint32_t z = 1) { return {Grid::Unit::groups, x, y, z}; }
-constexpr Grid threads(uint32_t x) { return {Grid::Unit::threads, x, 1, 1}; }
-constexpr Grid row_tiles(uint32_t rows) { return {Grid::Unit::row_tiles, rows, 1, 1}; }
-constexpr Grid tiles(uint32_t rows, uint32_t cols, uint32_t z = 1) { return {Grid::Unit::tiles, rows, cols, z}; }
+constexpr Grid groups(uint32_t x, uint32_t y = 1, uint32_t z = 1)
+{
+    return {Grid::Unit::groups, x, y, z};
+}
+constexpr Grid threads(uint32_t x)
+{
+    return {Grid::Unit::threads, x, 1, 1};
+}
+constexpr Grid row_tiles(uint32_t rows)
+{
+    return {Grid::Unit::row_tiles, rows, 1, 1};
+}
+constexpr Grid tiles(uint32_t rows, uint32_t cols, uint32_t z = 1)
+{
+    return {Grid::Unit::tiles, rows, cols, z};
+}
 
 struct ConstantValue {
     std::string_view name;
@@ -97,7 +109,8 @@ class Graph {
         add(kernel, tensors, {}, grid, std::move(options));
     }
 
-    // every use of transient `from` becomes a use of external `to`, of the same size: results are read where they are made
+    // every use of transient `from` becomes a use of external `to`, of the same size: results are read where they are
+    // made
     void replace(uint32_t from, uint32_t to);
 
     const GraphDesc& desc() const { return desc_; }

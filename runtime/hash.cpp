@@ -13,7 +13,10 @@ struct Hash::State {
     ~State() { XXH64_freeState(xxh); }
 };
 
-Hash::Hash() : state_(std::make_unique<State>()) { XXH64_reset(state_->xxh, 0); }
+Hash::Hash() : state_(std::make_unique<State>())
+{
+    XXH64_reset(state_->xxh, 0);
+}
 Hash::~Hash() = default;
 
 void Hash::add(std::span<const std::byte> bytes)
@@ -24,8 +27,14 @@ void Hash::add(std::span<const std::byte> bytes)
         XXH64_update(state_->xxh, bytes.data(), bytes.size());
 }
 
-uint64_t Hash::value() const { return XXH64_digest(state_->xxh); }
+uint64_t Hash::value() const
+{
+    return XXH64_digest(state_->xxh);
+}
 
-std::string hash_text(uint64_t hash) { return fmt::format("{:016x}", hash); }
+std::string hash_text(uint64_t hash)
+{
+    return fmt::format("{:016x}", hash);
+}
 
 } // namespace semrover

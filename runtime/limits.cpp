@@ -47,7 +47,8 @@ Status apply(DeviceLimits& limits, const std::string& key, const std::string& te
     }
     if (key == "subgroups") {
         if (value == 0)
-            limits.needs_supported &= ~uint32_t(kNeedsSubgroupArithmetic | kNeedsSubgroupBallot | kNeedsSubgroupShuffle);
+            limits.needs_supported &=
+                ~uint32_t(kNeedsSubgroupArithmetic | kNeedsSubgroupBallot | kNeedsSubgroupShuffle);
         return {};
     }
     if (key == "staging") {
@@ -58,9 +59,10 @@ Status apply(DeviceLimits& limits, const std::string& key, const std::string& te
         limits.submit_seconds = value;
         return {};
     }
-    return fail(ErrorCode::usage,
-                "unknown limit '{}' (known: shared, range, texels, alloc, groups, fp16, subgroups, staging, submit, variant)",
-                key);
+    return fail(
+        ErrorCode::usage,
+        "unknown limit '{}' (known: shared, range, texels, alloc, groups, fp16, subgroups, staging, submit, variant)",
+        key);
 }
 
 } // namespace

@@ -19,20 +19,28 @@ constexpr const char* kOptionalExtensions[] = {"VK_KHR_cooperative_matrix", "VK_
 DeviceType device_type(VkPhysicalDeviceType type)
 {
     switch (type) {
-    case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU: return DeviceType::discrete;
-    case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU: return DeviceType::integrated;
-    case VK_PHYSICAL_DEVICE_TYPE_CPU: return DeviceType::cpu;
-    default: return DeviceType::other;
+    case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:
+        return DeviceType::discrete;
+    case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU:
+        return DeviceType::integrated;
+    case VK_PHYSICAL_DEVICE_TYPE_CPU:
+        return DeviceType::cpu;
+    default:
+        return DeviceType::other;
     }
 }
 
 int rank(DeviceType type)
 {
     switch (type) {
-    case DeviceType::discrete: return 0;
-    case DeviceType::integrated: return 1;
-    case DeviceType::other: return 2;
-    case DeviceType::cpu: return 3;
+    case DeviceType::discrete:
+        return 0;
+    case DeviceType::integrated:
+        return 1;
+    case DeviceType::other:
+        return 2;
+    case DeviceType::cpu:
+        return 3;
     }
     return 4;
 }
@@ -64,7 +72,8 @@ DeviceLimits limits_of(VkPhysicalDevice physical, const VkPhysicalDeviceProperti
     l.needs_supported = supported_needs(physical, p11);
     l.max_shared_bytes = v.maxComputeSharedMemorySize;
     l.max_group_threads = v.maxComputeWorkGroupInvocations;
-    l.max_groups = std::min({v.maxComputeWorkGroupCount[0], v.maxComputeWorkGroupCount[1], v.maxComputeWorkGroupCount[2]});
+    l.max_groups =
+        std::min({v.maxComputeWorkGroupCount[0], v.maxComputeWorkGroupCount[1], v.maxComputeWorkGroupCount[2]});
     l.max_storage_range = v.maxStorageBufferRange;
     l.max_texel_elements = v.maxTexelBufferElements;
     l.max_allocation = p11.maxMemoryAllocationSize;
@@ -78,7 +87,8 @@ DeviceLimits limits_of(VkPhysicalDevice physical, const VkPhysicalDeviceProperti
 std::string refusal(VkPhysicalDevice physical, const VkPhysicalDeviceProperties& p)
 {
     if (p.apiVersion < VK_API_VERSION_1_2)
-        return fmt::format("needs Vulkan 1.2, has {}.{}", VK_API_VERSION_MAJOR(p.apiVersion), VK_API_VERSION_MINOR(p.apiVersion));
+        return fmt::format("needs Vulkan 1.2, has {}.{}", VK_API_VERSION_MAJOR(p.apiVersion),
+                           VK_API_VERSION_MINOR(p.apiVersion));
     VkPhysicalDeviceVulkan12Features f12{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES};
     VkPhysicalDeviceFeatures2 features{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2, &f12, {}};
     vkGetPhysicalDeviceFeatures2(physical, &features);
@@ -91,7 +101,8 @@ std::string refusal(VkPhysicalDevice physical, const VkPhysicalDeviceProperties&
 
 std::string api_version_text(uint32_t version)
 {
-    return fmt::format("{}.{}.{}", VK_API_VERSION_MAJOR(version), VK_API_VERSION_MINOR(version), VK_API_VERSION_PATCH(version));
+    return fmt::format("{}.{}.{}", VK_API_VERSION_MAJOR(version), VK_API_VERSION_MINOR(version),
+                       VK_API_VERSION_PATCH(version));
 }
 
 Result<VkInstance> create_instance(bool validation)

@@ -69,7 +69,8 @@ Result<std::unique_ptr<PipelineStore>> PipelineStore::create(Device& device)
 {
     std::unique_ptr<PipelineStore> store(new PipelineStore(device));
     store->cache_path_ = cache_path(device.physical());
-    const std::vector<char> blob = store->cache_path_.empty() ? std::vector<char>{} : load_blob(store->cache_path_, device.physical());
+    const std::vector<char> blob =
+        store->cache_path_.empty() ? std::vector<char>{} : load_blob(store->cache_path_, device.physical());
     VkPipelineCacheCreateInfo info{VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO};
     info.initialDataSize = blob.size();
     info.pInitialData = blob.data();
@@ -133,10 +134,10 @@ Status PipelineStore::make_layout(const KernelVariant& variant, Pipeline& out)
 {
     std::vector<VkDescriptorSetLayoutBinding> bindings;
     for (const BindingInfo& b : variant.bindings)
-        bindings.push_back({b.binding,
-                            b.kind == BindingKind::texel ? VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER
-                                                         : VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
-                            1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr});
+        bindings.push_back(
+            {b.binding,
+             b.kind == BindingKind::texel ? VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER : VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
+             1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr});
     VkDescriptorSetLayoutCreateInfo set{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO};
     set.bindingCount = uint32_t(bindings.size());
     set.pBindings = bindings.data();
@@ -165,10 +166,16 @@ Status PipelineStore::make(const KernelVariant& variant, const std::map<uint32_t
         entries.push_back({id, uint32_t(values.size() * 4), 4});
         values.push_back(value);
     }
-    const VkSpecializationInfo specialization{uint32_t(entries.size()), entries.data(), values.size() * 4, values.data()};
+    const VkSpecializationInfo specialization{uint32_t(entries.size()), entries.data(), values.size() * 4,
+                                              values.data()};
     VkComputePipelineCreateInfo info{VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO};
-    info.stage = {VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO, nullptr, 0, VK_SHADER_STAGE_COMPUTE_BIT, module,
-                  "main", &specialization};
+    info.stage = {VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO,
+                  nullptr,
+                  0,
+                  VK_SHADER_STAGE_COMPUTE_BIT,
+                  module,
+                  "main",
+                  &specialization};
     info.layout = out.layout;
     const VkResult result = vkCreateComputePipelines(device_.handle(), cache_, 1, &info, nullptr, &out.pipeline);
     vkDestroyShaderModule(device_.handle(), module, nullptr);

@@ -40,7 +40,10 @@ Result<Plan> make_plan(const GraphDesc& graph, const DeviceLimits& limits)
     return plan;
 }
 
-uint64_t Plan::arena_bytes() const { return std::accumulate(blocks.begin(), blocks.end(), uint64_t(0)); }
+uint64_t Plan::arena_bytes() const
+{
+    return std::accumulate(blocks.begin(), blocks.end(), uint64_t(0));
+}
 
 uint64_t Plan::transient_bytes() const
 {
@@ -74,8 +77,9 @@ bool overlaps(const Plan& plan, const PassBinding& a, const PassBinding& b)
 
 std::string Plan::print() const
 {
-    std::string out = fmt::format("{} passes, {} fused, {} barriers, {} submits; arena {} bytes ({} without aliasing)\n",
-                                  passes.size(), fused, barriers(), submits, arena_bytes(), transient_bytes());
+    std::string out =
+        fmt::format("{} passes, {} fused, {} barriers, {} submits; arena {} bytes ({} without aliasing)\n",
+                    passes.size(), fused, barriers(), submits, arena_bytes(), transient_bytes());
     uint32_t level = ~0u;
     for (size_t i = 0; i < passes.size(); ++i) {
         const Pass& p = passes[i];

@@ -61,13 +61,13 @@ struct Plan {
 Result<Plan> make_plan(const GraphDesc& graph, const DeviceLimits& limits);
 
 namespace stage {
-Status check(Plan& plan);                                      // every transient is written before it is read, ranges fit
-Status fuse(Plan& plan);                                       // epilogues into their producers
-Status pick_variants(Plan& plan, const DeviceLimits& limits);  // a shader per pass, its constants and bindings
-Status lifetimes(Plan& plan);                                  // first and last pass of each transient
-Status place(Plan& plan, const DeviceLimits& limits);          // aliased arena
-Status slice(Plan& plan, const DeviceLimits& limits);          // row bands for limits, groups, submits
-Status order(Plan& plan);                                      // levels from access x byte range: the barriers
+Status check(Plan& plan); // every transient is written before it is read, ranges fit
+Status fuse(Plan& plan);  // epilogues into their producers
+Status pick_variants(Plan& plan, const DeviceLimits& limits); // a shader per pass, its constants and bindings
+Status lifetimes(Plan& plan);                                 // first and last pass of each transient
+Status place(Plan& plan, const DeviceLimits& limits);         // aliased arena
+Status slice(Plan& plan, const DeviceLimits& limits);         // row bands for limits, groups, submits
+Status order(Plan& plan);                                     // levels from access x byte range: the barriers
 } // namespace stage
 
 // do the memory ranges of two bindings overlap, after placement?

@@ -10,7 +10,10 @@ namespace semrover::stage {
 
 namespace {
 
-bool writes(Access a) { return uint8_t(a) & uint8_t(Access::write); }
+bool writes(Access a)
+{
+    return uint8_t(a) & uint8_t(Access::write);
+}
 
 bool conflict(const Plan& plan, const Pass& a, const Pass& b)
 {

@@ -60,8 +60,9 @@ Status place(Plan& plan, const DeviceLimits& limits)
         Placement& p = plan.placements[r];
         const uint64_t bytes = plan.resources[r].bytes;
         if (bytes > limits.max_allocation)
-            return fail(ErrorCode::out_of_memory, "tensor '{}' of {} bytes exceeds the device's largest allocation of {}",
-                        plan.resources[r].name, bytes, limits.max_allocation);
+            return fail(ErrorCode::out_of_memory,
+                        "tensor '{}' of {} bytes exceeds the device's largest allocation of {}", plan.resources[r].name,
+                        bytes, limits.max_allocation);
         for (p.block = 0;; ++p.block) {
             if (p.block == residents.size()) {
                 residents.emplace_back();

@@ -116,7 +116,8 @@ Status count_groups(Pass& pass, const DeviceLimits& limits)
         n[0] = divide_up(pass.grid.x, m->value);
         n[1] = divide_up(pass.grid.y, k->value);
     } else if (pass.grid.unit != Grid::Unit::groups) {
-        SR_ASSERT(m || pass.grid.unit == Grid::Unit::threads, "{}: a grid of row tiles needs kTileM", pass.kernel->name);
+        SR_ASSERT(m || pass.grid.unit == Grid::Unit::threads, "{}: a grid of row tiles needs kTileM",
+                  pass.kernel->name);
         n[0] = divide_up(pass.grid.x, pass.grid.unit == Grid::Unit::threads ? pass.variant->local_size[0] : m->value);
         n[1] = divide_up(n[0], limits.max_groups); // the shader's linear_group() undoes it
         n[0] = divide_up(n[0], n[1]);

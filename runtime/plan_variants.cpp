@@ -43,7 +43,8 @@ Status bind(Pass& pass)
         const Tensor& t = pass.tensors[b];
         SR_ASSERT(declared[b].name == first[b].name, "{}.{}: binding {} is called {}", pass.kernel->name,
                   pass.variant->name, first[b].name, declared[b].name);
-        pass.bindings.push_back({t.resource, t.offset, t.bytes(), declared[b].access, declared[b].kind, declared[b].name});
+        pass.bindings.push_back(
+            {t.resource, t.offset, t.bytes(), declared[b].access, declared[b].kind, declared[b].name});
         const std::string half = "kHalf" + std::string(declared[b].name);
         set_constant(pass, half, t.dtype == DType::f16);
     }

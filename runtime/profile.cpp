@@ -20,7 +20,8 @@ Status Profile::write(const std::string& path) const
 {
     nlohmann::json trace = nlohmann::json::array();
     for (const Event& e : events_)
-        trace.push_back({{"name", e.name}, {"ph", "X"}, {"pid", 1}, {"tid", 1}, {"ts", e.begin_us}, {"dur", e.duration_us}});
+        trace.push_back(
+            {{"name", e.name}, {"ph", "X"}, {"pid", 1}, {"tid", 1}, {"ts", e.begin_us}, {"dur", e.duration_us}});
     std::ofstream out(path);
     out << nlohmann::json{{"traceEvents", std::move(trace)}, {"displayTimeUnit", "ms"}}.dump();
     if (!out.flush())
@@ -38,10 +39,12 @@ std::string Profile::summary() const
         all += e.duration_us;
     }
     std::vector<std::pair<std::string, std::pair<double, size_t>>> sorted(totals.begin(), totals.end());
-    std::sort(sorted.begin(), sorted.end(), [](const auto& a, const auto& b) { return a.second.first > b.second.first; });
+    std::sort(sorted.begin(), sorted.end(),
+              [](const auto& a, const auto& b) { return a.second.first > b.second.first; });
     std::string out;
     for (const auto& [name, total] : sorted)
-        out += fmt::format("{:10.1f} ms {:5.1f} % {:6} x {}\n", total.first / 1e3, 100 * total.first / all, total.second, name);
+        out += fmt::format("{:10.1f} ms {:5.1f} % {:6} x {}\n", total.first / 1e3, 100 * total.first / all,
+                           total.second, name);
     return out;
 }
 

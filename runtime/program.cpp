@@ -98,8 +98,8 @@ Status Program::bind(const Pass& pass, VkDescriptorSet set)
     for (size_t i = 0; i < n; ++i) {
         const PassBinding& b = pass.bindings[i];
         const auto [buffer, offset] = locate(b);
-        SR_ASSERT(offset % device_.limits().offset_alignment == 0, "{}: '{}' starts at byte {}", pass.kernel->name, b.name,
-                  offset);
+        SR_ASSERT(offset % device_.limits().offset_alignment == 0, "{}: '{}' starts at byte {}", pass.kernel->name,
+                  b.name, offset);
         writes[i].dstSet = set;
         writes[i].dstBinding = pass.variant->bindings[i].binding;
         writes[i].descriptorCount = 1;
@@ -159,10 +159,11 @@ Status Program::record_submit(uint32_t index)
             record_barrier(commands);
         level = pass.level;
         vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipelines_[i]->pipeline);
-        vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipelines_[i]->layout, 0, 1, &sets_[i], 0, nullptr);
+        vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipelines_[i]->layout, 0, 1, &sets_[i], 0,
+                                nullptr);
         if (!pass.push.empty())
-            vkCmdPushConstants(commands, pipelines_[i]->layout, VK_SHADER_STAGE_COMPUTE_BIT, 0, uint32_t(pass.push.size()),
-                               pass.push.data());
+            vkCmdPushConstants(commands, pipelines_[i]->layout, VK_SHADER_STAGE_COMPUTE_BIT, 0,
+                               uint32_t(pass.push.size()), pass.push.data());
         const uint32_t query = uint32_t(i * 2);
         if (queries_) {
             vkCmdResetQueryPool(commands, queries_, query, 2);
@@ -201,8 +202,8 @@ Status Program::collect_profile()
     if (!queries_ || !device_.profile())
         return {};
     std::vector<uint64_t> stamps(plan_.passes.size() * 2);
-    SR_VK(vkGetQueryPoolResults(device_.handle(), queries_, 0, uint32_t(stamps.size()), stamps.size() * 8, stamps.data(), 8,
-                                VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT));
+    SR_VK(vkGetQueryPoolResults(device_.handle(), queries_, 0, uint32_t(stamps.size()), stamps.size() * 8,
+                                stamps.data(), 8, VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT));
     for (size_t i = 0; i < plan_.passes.size(); ++i) {
         const Pass& pass = plan_.passes[i];
         const double begin = double(stamps[2 * i]) * device_.timestamp_ns() / 1e3;

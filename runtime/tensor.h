@@ -8,9 +8,18 @@
 
 namespace semrover {
 
-constexpr uint32_t round_up(uint32_t value, uint32_t multiple) { return (value + multiple - 1) / multiple * multiple; }
-constexpr uint64_t round_up64(uint64_t value, uint64_t multiple) { return (value + multiple - 1) / multiple * multiple; }
-constexpr uint32_t divide_up(uint32_t value, uint32_t by) { return (value + by - 1) / by; }
+constexpr uint32_t round_up(uint32_t value, uint32_t multiple)
+{
+    return (value + multiple - 1) / multiple * multiple;
+}
+constexpr uint64_t round_up64(uint64_t value, uint64_t multiple)
+{
+    return (value + multiple - 1) / multiple * multiple;
+}
+constexpr uint32_t divide_up(uint32_t value, uint32_t by)
+{
+    return (value + by - 1) / by;
+}
 
 // rows of matrices start at multiples of this many elements, so that a 16-byte texel never straddles two rows;
 // kernels write zeros into the padding, because GEMM reads it

@@ -5,13 +5,13 @@
 #include "lib/types.h"
 
 struct AttentionPush {
-    uint rows; // tokens of one stream
+    uint rows;   // tokens of one stream
     uint qkv_ld; // elements
     uint y_ld;
     uint heads;
     uint head_dim; // a multiple of 8
-    uint words; // of a row of the mask
-    float scale; // 1 / sqrt(head_dim)
+    uint words;    // of a row of the mask
+    float scale;   // 1 / sqrt(head_dim)
 };
 
 #endif

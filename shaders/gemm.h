@@ -5,17 +5,17 @@
 #include "lib/types.h"
 
 struct GemmPush {
-    uint rows;        // M, of one group
-    uint cols;        // N, of one group
-    uint depth;       // K, padded: the padding of x and w is zero
-    uint x_ld;        // elements
+    uint rows;  // M, of one group
+    uint cols;  // N, of one group
+    uint depth; // K, padded: the padding of x and w is zero
+    uint x_ld;  // elements
     uint w_ld;
     uint y_ld;
-    uint bias_ld;     // from one group's bias to the next
+    uint bias_ld; // from one group's bias to the next
     uint residual_ld;
     uint gate_ld;
-    uint gate_col;    // first column of group 0 in the gate's rows
-    uint gate_step;   // columns from one group's gates to the next
+    uint gate_col;  // first column of group 0 in the gate's rows
+    uint gate_step; // columns from one group's gates to the next
 };
 
 #endif

@@ -9,7 +9,7 @@ struct HeadRmsNormPush {
     uint groups;
     uint heads;
     uint head_dim; // a multiple of 8
-    uint x_ld; // elements
+    uint x_ld;     // elements
     uint y_ld;
     uint weight_ld;
     float eps;

@@ -6,7 +6,7 @@
 
 struct NeighborMaskPush {
     uint rows;
-    uint words; // of a row of the mask
+    uint words;  // of a row of the mask
     int radius2; // largest squared distance, in cells
 };
 

@@ -6,10 +6,10 @@
 
 struct SinusoidPush {
     uint rows;
-    uint axes; // values of a row of x
+    uint axes;        // values of a row of x
     uint frequencies; // per axis
-    uint y_ld; // elements
-    uint cos_first; // 1: [cos, sin] per axis, 0: [sin, cos]
+    uint y_ld;        // elements
+    uint cos_first;   // 1: [cos, sin] per axis, 0: [sin, cos]
 };
 
 #endif

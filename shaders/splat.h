@@ -7,15 +7,15 @@
 struct SplatPush {
     uint splats;
     uint cameras;
-    uint width;  // pixels, at most 65535
+    uint width; // pixels, at most 65535
     uint height;
-    uint tile;   // pixels, a multiple of 16
+    uint tile; // pixels, a multiple of 16
     uint tiles_x;
     uint tiles_y;
     uint max_visible; // capacity in records
     uint max_pairs;   // capacity in pairs of a tile and a record
-    float near;              // metres
-    float alpha_min;         // contributions below are skipped
+    float near;       // metres
+    float alpha_min;  // contributions below are skipped
     float alpha_max;
     float transmittance_min; // a pixel is done before it falls below
     float cutoff2;           // square of the largest distance from the centre, in sigmas

@@ -6,7 +6,7 @@
 
 struct StepUpdatePush {
     uint rows;
-    uint ld; // elements, of every matrix
+    uint ld;     // elements, of every matrix
     uint guided; // 1: rows [rows, 2 rows) of m are the unconditional half
     float guidance;
     float clip;

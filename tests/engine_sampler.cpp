@@ -108,7 +108,8 @@ TEST(engine_sampler, stops_when_the_callback_says_so)
 {
     const SamplingPlan p = plan(Sampler::ddpm, 6, {});
     auto sampler = *TokenSampler::create(device(), transformer(), p, sampling_options(2, 5));
-    const auto result = sampler->run(std::vector<RegionInput>{patch(0, 10, 0)}, [](size_t done, size_t) { return done < 3; });
+    const auto result =
+        sampler->run(std::vector<RegionInput>{patch(0, 10, 0)}, [](size_t done, size_t) { return done < 3; });
     ASSERT_FALSE(result);
     EXPECT_EQ(result.error().code, ErrorCode::interrupted);
 }

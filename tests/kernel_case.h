@@ -33,7 +33,10 @@ struct HostMatrix {
     std::vector<float> values; // [rows, ld]
 
     HostMatrix() = default;
-    HostMatrix(uint32_t r, uint32_t c, DType t) : rows(r), cols(c), ld(round_up(c, kRowPadding)), dtype(t), values(size_t(r) * ld) {}
+    HostMatrix(uint32_t r, uint32_t c, DType t)
+        : rows(r), cols(c), ld(round_up(c, kRowPadding)), dtype(t), values(size_t(r) * ld)
+    {
+    }
     float at(uint32_t r, uint32_t c) const { return values[size_t(r) * ld + c]; }
     void set(uint32_t r, uint32_t c, float v)
     {
@@ -82,7 +85,8 @@ class KernelCase {
         static_assert(sizeof(T) == 4);
         const DType dtype = std::is_floating_point_v<T> ? DType::f32 : std::is_signed_v<T> ? DType::i32 : DType::u32;
         const auto* bytes = reinterpret_cast<const std::byte*>(v.data());
-        return graph.external(upload({bytes, bytes + v.size() * 4}), uint32_t(v.size() / width), width, dtype, "input", width);
+        return graph.external(upload({bytes, bytes + v.size() * 4}), uint32_t(v.size() / width), width, dtype, "input",
+                              width);
     }
     // memory that a kernel writes and the test reads
     Tensor output(uint32_t rows, uint32_t cols, DType dtype, uint32_t ld = 0)

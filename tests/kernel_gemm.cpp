@@ -14,12 +14,15 @@ struct GemmCase {
 
 // one element; a row of one; aligned; odd tails everywhere; two groups; more than one tile of every variant
 const GemmCase kCases[] = {
-    {1, 1, 1, 1, false, false, false},    {1, 64, 8, 1, true, false, false},   {24, 64, 64, 1, true, false, false},
-    {25, 65, 9, 1, true, true, false},    {77, 41, 60, 1, true, false, true},  {50, 72, 48, 2, true, false, true},
+    {1, 1, 1, 1, false, false, false},    {1, 64, 8, 1, true, false, false},    {24, 64, 64, 1, true, false, false},
+    {25, 65, 9, 1, true, true, false},    {77, 41, 60, 1, true, false, true},   {50, 72, 48, 2, true, false, true},
     {37, 120, 120, 2, true, true, false}, {131, 200, 264, 1, true, true, true},
 };
 
-double gelu_reference(double v) { return 0.5 * v * (1 + std::tanh(std::sqrt(2 / M_PI) * (v + 0.044715 * v * v * v))); }
+double gelu_reference(double v)
+{
+    return 0.5 * v * (1 + std::tanh(std::sqrt(2 / M_PI) * (v + 0.044715 * v * v * v)));
+}
 
 void check(Device& device, const GemmCase& c, DType dtype)
 {
@@ -32,7 +35,8 @@ void check(Device& device, const GemmCase& c, DType dtype)
     const HostMatrix table = k.random(times, 5 + step * c.groups + 8, DType::f32);
     const std::vector<uint32_t> table_row = k.indices(rows, times);
 
-    Tensor y = gemm(k.graph, k.input(x), k.input(w), c.bias ? k.input(bias) : Tensor{}, {.groups = c.groups, .dtype = dtype});
+    Tensor y =
+        gemm(k.graph, k.input(x), k.input(w), c.bias ? k.input(bias) : Tensor{}, {.groups = c.groups, .dtype = dtype});
     if (c.gelu)
         y = gelu(k.graph, y);
     if (c.gate)

@@ -26,7 +26,8 @@ Result<Timing> measure(const std::function<Status()>& work)
     return Timing{times[times.size() / 2], times.front(), times.size()};
 }
 
-Json bench_report(const char* kind, const Device& device, DType precision, const Timing& timing, uint64_t predicted_bytes)
+Json bench_report(const char* kind, const Device& device, DType precision, const Timing& timing,
+                  uint64_t predicted_bytes)
 {
     return {{"kind", kind},
             {"device", device.name()},

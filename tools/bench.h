@@ -21,7 +21,8 @@ struct Timing {
 Result<Timing> measure(const std::function<Status()>& work);
 
 // the fields that every benchmark has (spec/performance.md)
-Json bench_report(const char* kind, const Device& device, DType precision, const Timing& timing, uint64_t predicted_bytes);
+Json bench_report(const char* kind, const Device& device, DType precision, const Timing& timing,
+                  uint64_t predicted_bytes);
 void add_program(Json& report, const Program& program); // dispatches, barriers, host_us_per_step
 void print_report(const Json& report, const Globals& globals);
 

@@ -65,7 +65,8 @@ void add_bench_regions(CLI::App& bench, const Globals& globals, Run& run)
     CLI::App* c = bench.add_subcommand("regions", "region extraction and the dependency graph (host, one core)");
     c->add_option("--cells", o->cells, "cells of the cloud")->check(CLI::Range(1u, 20000000u));
     c->add_option("--region-size", o->region_size, "cells of a region")->check(CLI::Range(1, 4096));
-    c->add_option("--coverage-threshold", o->coverage_threshold, "new cells that a region must have")->check(CLI::Range(1, 4096));
+    c->add_option("--coverage-threshold", o->coverage_threshold, "new cells that a region must have")
+        ->check(CLI::Range(1, 4096));
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_regions(*o, globals); }; });
 }
 

@@ -11,7 +11,7 @@ namespace semrover {
 
 // where a grid's points go as PLY; empty paths are not written
 struct PlyExports {
-    std::string points;   // x y z, colour, label
+    std::string points;    // x y z, colour, label
     std::string splats_3d; // 3DGS
     std::string splats_2d; // 2DGS
     bool any() const { return !points.empty() || !splats_3d.empty() || !splats_2d.empty(); }

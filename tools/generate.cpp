@@ -62,7 +62,8 @@ Result<Settings> resolve(const Options& o)
     s.repaint.jump_n_sample = o.jump_n_sample.value_or(s.repaint.jump_n_sample);
     s.regions = d.regions;
     s.regions.region_size = o.region_size.value_or(d.regions.region_size);
-    s.regions.coverage_threshold = std::min(o.coverage_threshold.value_or(d.regions.coverage_threshold), s.regions.region_size);
+    s.regions.coverage_threshold =
+        std::min(o.coverage_threshold.value_or(d.regions.coverage_threshold), s.regions.region_size);
     s.regions.strategy = o.strategy == "paper" ? RegionStrategy::paper : RegionStrategy::complete;
     s.regions.first_seed = o.first_cell;
     s.precision = o.precision == "fp32" ? DType::f32 : DType::f16;
@@ -104,7 +105,8 @@ uint32_t choose_batch(const Options& o, const Device& device)
 }
 
 // seconds of one step of a full batch, measured
-Result<double> measure_step(Device& device, const Transformer& transformer, const Settings& s, uint32_t batch, uint32_t cells)
+Result<double> measure_step(Device& device, const Transformer& transformer, const Settings& s, uint32_t batch,
+                            uint32_t cells)
 {
     SR_TRY(const SamplingPlan plan, plan_sampling(s.model.scheduler, 2));
     SR_TRY(const auto sampler, TokenSampler::create(device, transformer, plan, sampling_options(s.guidance, 0)));
@@ -159,18 +161,20 @@ Status dry_run(Job& j)
 {
     const uint32_t batch = std::max(j.widest_batch, 1u);
     j.sampler.reset(); // it has made its plan, and the measurement's own must fit the budget
-    SR_TRY(const double step, measure_step(*j.device, *j.transformer, j.settings, batch, j.outpainter->largest_region()));
+    SR_TRY(const double step,
+           measure_step(*j.device, *j.transformer, j.settings, batch, j.outpainter->largest_region()));
     const size_t regions = j.outpainter->region_count(), evaluations = j.settings.plan.evaluations;
     const double seconds = step * double(evaluations) * double(regions) / batch;
-    const Json report{{"regions", regions},   {"cells", j.outpainter->cells_to_do()},     {"batch", batch},
-                      {"steps", evaluations}, {"peak_device_bytes", j.planned_bytes},      {"seconds", seconds},
+    const Json report{{"regions", regions},        {"cells", j.outpainter->cells_to_do()}, {"batch", batch},
+                      {"steps", evaluations},      {"peak_device_bytes", j.planned_bytes}, {"seconds", seconds},
                       {"device", j.device->name()}};
     if (j.globals.json)
         fmt::print("{}\n", report.dump());
     else
-        fmt::print("{} cells in {} regions, {} at a time, {} network steps each\npeak device memory {}\nabout {} on {}\n",
-                   j.outpainter->cells_to_do(), regions, batch, evaluations, bytes_text(j.planned_bytes), duration_text(seconds),
-                   j.device->name());
+        fmt::print(
+            "{} cells in {} regions, {} at a time, {} network steps each\npeak device memory {}\nabout {} on {}\n",
+            j.outpainter->cells_to_do(), regions, batch, evaluations, bytes_text(j.planned_bytes),
+            duration_text(seconds), j.device->name());
     return {};
 }
 
@@ -260,7 +264,8 @@ Status generate(const Options& o, const Globals& globals)
     };
     const Status status = j.outpainter->run(*j.sampler, j.batch, callbacks);
     if (!status && status.error().code == ErrorCode::interrupted)
-        return fail(ErrorCode::interrupted, "interrupted; what is done is in '{}.run', the same command goes on", o.output);
+        return fail(ErrorCode::interrupted, "interrupted; what is done is in '{}.run', the same command goes on",
+                    o.output);
     SR_CHECK(status);
     progress.update(j.outpainter->cells_to_do());
     progress.finish();
@@ -280,16 +285,19 @@ void add_generate(CLI::App& app, const Globals& globals, Run& run)
     c->add_option("--steps", o->steps, "denoising steps");
     c->add_option("--cfg-scale", o->cfg_scale, "guidance towards the labels; 1: none");
     c->add_option("--sampler", o->sampler, "ddpm, ddim or dpm++2m");
-    c->add_option("--preset", o->preset, "fast (20 steps), standard (50, RePaint 5/2), paper (250, RePaint 10/10, DDPM)");
+    c->add_option("--preset", o->preset,
+                  "fast (20 steps), standard (50, RePaint 5/2), paper (250, RePaint 10/10, DDPM)");
     c->add_option("--jump-length", o->jump_length, "RePaint: steps of a jump back");
     c->add_option("--jump-n-sample", o->jump_n_sample, "RePaint: passes over each jump");
-    c->add_option("--batch", o->batch, "regions at a time; any value gives the same bytes")->check(CLI::Range(1u, 1024u));
+    c->add_option("--batch", o->batch, "regions at a time; any value gives the same bytes")
+        ->check(CLI::Range(1u, 1024u));
     c->add_option("--region-size", o->region_size, "cells of a region");
     c->add_option("--coverage-threshold", o->coverage_threshold, "new cells that a region must have");
     c->add_option("--strategy", o->strategy, "complete, or paper (Algorithm 1 as printed: may leave cells empty)")
         ->check(CLI::IsMember({"complete", "paper"}));
     c->add_option("--first-cell", o->first_cell, "index of the cell to start from");
-    c->add_option("--precision", o->precision, "storage of weights and activations")->check(CLI::IsMember({"fp16", "fp32"}));
+    c->add_option("--precision", o->precision, "storage of weights and activations")
+        ->check(CLI::IsMember({"fp16", "fp32"}));
     c->add_option("--ply", o->ply.points, "also write the points with colour and label as PLY");
     c->add_option("--ply-3dgs", o->ply.splats_3d, "also write the splats as a 3DGS PLY");
     c->add_option("--ply-2dgs", o->ply.splats_2d, "also write the splats as a 2DGS PLY");

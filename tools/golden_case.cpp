@@ -57,22 +57,41 @@ std::vector<T> elements(const Safetensors& file, const std::string& name)
         return out;
     const auto bytes = file.bytes(*info);
     switch (info->dtype) {
-    case DType::f32: convert<T, float>(bytes, out); break;
-    case DType::f64: convert<T, double>(bytes, out); break;
-    case DType::i32: convert<T, int32_t>(bytes, out); break;
-    case DType::u32: convert<T, uint32_t>(bytes, out); break;
-    case DType::i64: convert<T, int64_t>(bytes, out); break;
+    case DType::f32:
+        convert<T, float>(bytes, out);
+        break;
+    case DType::f64:
+        convert<T, double>(bytes, out);
+        break;
+    case DType::i32:
+        convert<T, int32_t>(bytes, out);
+        break;
+    case DType::u32:
+        convert<T, uint32_t>(bytes, out);
+        break;
+    case DType::i64:
+        convert<T, int64_t>(bytes, out);
+        break;
     case DType::u8:
-    case DType::boolean: convert<T, uint8_t>(bytes, out); break;
-    default: break;
+    case DType::boolean:
+        convert<T, uint8_t>(bytes, out);
+        break;
+    default:
+        break;
     }
     return out;
 }
 
 } // namespace
 
-std::vector<float> GoldenCase::floats(const std::string& tensor) const { return elements<float>(tensors_, tensor); }
-std::vector<int64_t> GoldenCase::integers(const std::string& tensor) const { return elements<int64_t>(tensors_, tensor); }
+std::vector<float> GoldenCase::floats(const std::string& tensor) const
+{
+    return elements<float>(tensors_, tensor);
+}
+std::vector<int64_t> GoldenCase::integers(const std::string& tensor) const
+{
+    return elements<int64_t>(tensors_, tensor);
+}
 
 Result<double> GoldenCase::number(const char* param) const
 {
@@ -92,7 +111,8 @@ std::vector<std::string> GoldenCase::expected() const
 
 namespace {
 
-void compare_floats(const GoldenCase& c, const std::string& name, const GoldenOutputs& got, double tolerance, GoldenVerdict& v)
+void compare_floats(const GoldenCase& c, const std::string& name, const GoldenOutputs& got, double tolerance,
+                    GoldenVerdict& v)
 {
     const std::vector<float> expect = c.floats("expect." + name);
     const std::vector<float>& values = got.floats.at(name);

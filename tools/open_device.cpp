@@ -17,7 +17,8 @@ Result<RunFolder> open_run(const Path& folder, const Json& settings, bool replac
     if (!replace)
         return RunFolder::open(folder, settings, false);
     const auto before = read_json(folder / "run.json");
-    const bool same = before && before->is_object() && before->value("settings", Json()) == settings && before->value("state", "") == "running";
+    const bool same = before && before->is_object() && before->value("settings", Json()) == settings &&
+                      before->value("state", "") == "running";
     return RunFolder::open(folder, settings, !same);
 }
 

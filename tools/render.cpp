@@ -51,7 +51,8 @@ Result<std::array<uint8_t, 3>> background_of(const Options& o)
 {
     unsigned r, g, b;
     int used = 0;
-    if (std::sscanf(o.background.c_str(), "%u,%u,%u%n", &r, &g, &b, &used) != 3 || size_t(used) != o.background.size() || r > 255 || g > 255 || b > 255)
+    if (std::sscanf(o.background.c_str(), "%u,%u,%u%n", &r, &g, &b, &used) != 3 ||
+        size_t(used) != o.background.size() || r > 255 || g > 255 || b > 255)
         return fail(ErrorCode::usage, "--background takes R,G,B in 0..255, not '{}'", o.background);
     return std::array<uint8_t, 3>{uint8_t(r), uint8_t(g), uint8_t(b)};
 }
@@ -62,7 +63,8 @@ Result<SurfelScene> load_scene(const Options& o, const VoxelGrid& grid, Device& 
     SR_TRY(const SurfelOptions surfels, surfel_options(o));
     ScenePoints points = points_of(grid);
     if (points.size() == 0 && !o.semantic)
-        return fail(ErrorCode::bad_input, "{} has no points yet: generate them, or draw its labels with --semantic", quote_path(o.grid));
+        return fail(ErrorCode::bad_input, "{} has no points yet: generate them, or draw its labels with --semantic",
+                    quote_path(o.grid));
     if (points.size() == 0)
         return SurfelScene::create(device, block_surfels(grid));
     if (o.semantic)
@@ -82,7 +84,11 @@ Result<CameraPath> load_cameras(const Options& o)
 
 SplatCamera splat_camera(const CameraFrame& frame)
 {
-    SplatCamera c{float(frame.intrinsics.fx), float(frame.intrinsics.fy), float(frame.intrinsics.cx), float(frame.intrinsics.cy), {}};
+    SplatCamera c{float(frame.intrinsics.fx),
+                  float(frame.intrinsics.fy),
+                  float(frame.intrinsics.cx),
+                  float(frame.intrinsics.cy),
+                  {}};
     for (size_t i = 0; i < 12; ++i)
         c.world_to_camera[i] = float(frame.pose.world_to_camera[i]);
     return c;
@@ -105,14 +111,18 @@ CameraFrame overview_camera(const VoxelGrid& grid, uint32_t width, uint32_t heig
 // frames of one moment are drawn in one submit, with one rasterizer for each image size
 class PathRenderer {
   public:
-    PathRenderer(Device& device, const SurfelScene& scene, const RasterizerOptions& options) : device_(device), scene_(scene), options_(options) {}
+    PathRenderer(Device& device, const SurfelScene& scene, const RasterizerOptions& options)
+        : device_(device), scene_(scene), options_(options)
+    {
+    }
 
     Result<std::vector<SplatImage>> render(std::span<const CameraFrame> frames)
     {
         const Intrinsics& size = frames.front().intrinsics;
         auto& rasterizer = rasterizers_[{size.width, size.height}];
         if (!rasterizer) {
-            SR_TRY(rasterizer, Rasterizer::create(device_, scene_, size.width, size.height, uint32_t(frames.size()), options_));
+            SR_TRY(rasterizer,
+                   Rasterizer::create(device_, scene_, size.width, size.height, uint32_t(frames.size()), options_));
         }
         std::vector<SplatCamera> cameras;
         for (const CameraFrame& frame : frames)
@@ -134,7 +144,8 @@ size_t end_of_moment(const CameraPath& path, size_t first)
     size_t end = first + 1;
     for (; end < path.frames.size(); ++end) {
         const CameraFrame& b = path.frames[end];
-        if (b.time != a.time || b.camera == a.camera || b.intrinsics.width != a.intrinsics.width || b.intrinsics.height != a.intrinsics.height)
+        if (b.time != a.time || b.camera == a.camera || b.intrinsics.width != a.intrinsics.width ||
+            b.intrinsics.height != a.intrinsics.height)
             break;
     }
     return end;
@@ -157,18 +168,21 @@ Status write_frame(Output& out, const CameraFrame& frame, const SplatImage& imag
     return {};
 }
 
-Status render_path(const Options& o, const Globals& globals, Device& device, PathRenderer& renderer, const CameraPath& path, Output& out)
+Status render_path(const Options& o, const Globals& globals, Device& device, PathRenderer& renderer,
+                   const CameraPath& path, Output& out)
 {
     if (!o.video.empty()) {
         const CameraFrame& first = path.frames.front();
         out.video_camera = first.camera;
-        SR_TRY(Video video, Video::create(o.video, first.intrinsics.width, first.intrinsics.height, o.frames_per_second));
+        SR_TRY(Video video,
+               Video::create(o.video, first.intrinsics.width, first.intrinsics.height, o.frames_per_second));
         out.video.emplace(std::move(video));
     }
     Progress progress(progress_to_stderr(globals), "render", "frames", path.frames.size());
     for (size_t at = 0; at < path.frames.size();) {
         if (interrupt_requested())
-            return fail(ErrorCode::interrupted, "interrupted after {} frames; they are in {}", at, quote_path(out.folder));
+            return fail(ErrorCode::interrupted, "interrupted after {} frames; they are in {}", at,
+                        quote_path(out.folder));
         const size_t end = end_of_moment(path, at);
         SR_TRY(const auto images, renderer.render(std::span(path.frames).subspan(at, end - at)));
         for (size_t i = at; i < end; ++i)
@@ -220,7 +234,8 @@ Status render(const Options& o, const Globals& globals)
         device->set_profile(std::make_shared<Profile>());
     SR_TRY(const SurfelScene scene, load_scene(o, grid, *device));
     if (scene.skipped() && !globals.quiet)
-        fmt::print(stderr, "semrover: warning: {} of {} splats are degenerate and not drawn\n", scene.skipped(), scene.size());
+        fmt::print(stderr, "semrover: warning: {} of {} splats are degenerate and not drawn\n", scene.skipped(),
+                   scene.size());
     RasterizerOptions options;
     options.visible_alpha = o.visible_alpha;
     PathRenderer renderer(*device, scene, options);
@@ -233,7 +248,11 @@ Status render(const Options& o, const Globals& globals)
     if (device->profile() && globals.verbose)
         fmt::print(stderr, "{}", device->profile()->summary());
     if (globals.json)
-        fmt::print("{}\n", Json{{"frames", path.frames.size()}, {"splats", scene.size()}, {"skipped", scene.skipped()}, {"peak_device_bytes", device->peak_bytes()}}.dump());
+        fmt::print("{}\n", Json{{"frames", path.frames.size()},
+                                {"splats", scene.size()},
+                                {"skipped", scene.skipped()},
+                                {"peak_device_bytes", device->peak_bytes()}}
+                               .dump());
     return {};
 }
 
@@ -242,17 +261,21 @@ Status render(const Options& o, const Globals& globals)
 void add_render(CLI::App& app, const Globals& globals, Run& run)
 {
     auto o = std::make_shared<Options>();
-    CLI::App* c = app.add_subcommand("render", "splat buffers of a camera path: colour, depth, normal, label, visibility");
+    CLI::App* c =
+        app.add_subcommand("render", "splat buffers of a camera path: colour, depth, normal, label, visibility");
     c->add_option("GRID", o->grid, ".sgrid")->required();
     c->add_option("--path", o->path, "camera path: TUM, or nerfstudio transforms.json");
     c->add_option("-o,--output", o->output, "folder for {color,depth,normal,label,visible}/000000.png")->required();
     c->add_option("-W,--width", o->width, "pixels")->check(CLI::Range(1u, 16384u));
     c->add_option("-H,--height", o->height, "pixels")->check(CLI::Range(1u, 16384u));
-    c->add_option("--fov-x", o->fov, "horizontal field of view in degrees, where the path has no intrinsics")->check(CLI::Range(1.0, 170.0));
+    c->add_option("--fov-x", o->fov, "horizontal field of view in degrees, where the path has no intrinsics")
+        ->check(CLI::Range(1.0, 170.0));
     c->add_option("--rig", o->rig, "rig.json: every sensor at every pose, in folders of their names");
-    c->add_option("--splat-radius", o->splat_radius, "standard deviation of a splat in metres, or auto: from the spacing of the points");
+    c->add_option("--splat-radius", o->splat_radius,
+                  "standard deviation of a splat in metres, or auto: from the spacing of the points");
     c->add_option("--opacity", o->opacity, "of every splat")->check(CLI::Range(0.01f, 1.f));
-    c->add_option("--visible-alpha", o->visible_alpha, "alpha from which a pixel counts as visible")->check(CLI::Range(0.f, 1.f));
+    c->add_option("--visible-alpha", o->visible_alpha, "alpha from which a pixel counts as visible")
+        ->check(CLI::Range(0.f, 1.f));
     c->add_option("--background", o->background, "R,G,B behind the splats");
     c->add_flag("--semantic", o->semantic, "label colours; a grid without points is drawn as blocks");
     c->add_flag("--top", o->top, "also an overview from above, top.png");

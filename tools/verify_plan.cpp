@@ -26,8 +26,9 @@ class StepRunner {
         SR_CHECK(r->arena_.allocate(device, "golden case"));
         std::vector<StepRow> rows;
         for (const StepCoefficients& c : schedule.steps)
-            rows.push_back({float(c.in_scale), float(c.x0_x), float(c.x0_m), float(c.c_x0), float(c.c_x), float(c.c_m), float(c.c_prev),
-                            float(c.c_z), float(c.known_scale), float(c.known_noise), 0, 0, 0, 0, 0, 0});
+            rows.push_back({float(c.in_scale), float(c.x0_x), float(c.x0_m), float(c.c_x0), float(c.c_x), float(c.c_m),
+                            float(c.c_prev), float(c.c_z), float(c.known_scale), float(c.known_noise), 0, 0, 0, 0, 0,
+                            0});
         SR_CHECK(device.write(r->arena_.slice(r->steps_), std::as_bytes(std::span(rows))));
         for (uint32_t id : {r->clock_, r->known_, r->fixed_, r->x0_, r->z_})
             SR_CHECK(device.clear(r->arena_.slice(id)));
@@ -58,8 +59,8 @@ class StepRunner {
         const auto row = [&](uint32_t id) { return g.external(arena_.slice(id), 1, elements_, DType::f32); };
         const StepTable table{g.external(arena_.slice(steps_), steps, kWords, DType::u32, "steps", kWords),
                               g.external(arena_.slice(clock_), 1, 2, DType::u32, "clock", 2)};
-        step_update(g, table, row(m_), row(z_), g.external(arena_.slice(known_), 1, 1, DType::u32, "known", 1), row(fixed_), row(x_), row(x0_), 1,
-                    clip);
+        step_update(g, table, row(m_), row(z_), g.external(arena_.slice(known_), 1, 1, DType::u32, "known", 1),
+                    row(fixed_), row(x_), row(x0_), 1, clip);
         step_advance(g, table.clock);
         return Program::create(device_, g);
     }
@@ -87,7 +88,8 @@ Result<GoldenOutputs> run_scheduler(Device& device, const GoldenCase& c, DType)
     std::vector<float> x = c.floats("input.sample");
     const size_t n = x.size();
     if (n == 0 || outputs.size() != schedule.steps.size() * n || (!noise.empty() && noise.size() != outputs.size()))
-        return fail(ErrorCode::bad_input, "{}: {} outputs of {} elements for {} steps", c.name(), outputs.size(), n, schedule.steps.size());
+        return fail(ErrorCode::bad_input, "{}: {} outputs of {} elements for {} steps", c.name(), outputs.size(), n,
+                    schedule.steps.size());
     SR_TRY(const auto runner, StepRunner::create(device, schedule, uint32_t(n)));
     SR_CHECK(runner->set_state(x));
     GoldenOutputs out;

@@ -45,7 +45,8 @@ Result<GoldenOutputs> run_pca_normals(Device& device, const GoldenCase& c, DType
     // a normal is compared up to its sign
     const std::vector<float> expect = c.floats("expect.normals");
     for (size_t i = 0; i + 2 < result.normals.size() && i + 2 < expect.size(); i += 3) {
-        const float dot = result.normals[i] * expect[i] + result.normals[i + 1] * expect[i + 1] + result.normals[i + 2] * expect[i + 2];
+        const float dot = result.normals[i] * expect[i] + result.normals[i + 1] * expect[i + 1] +
+                          result.normals[i + 2] * expect[i + 2];
         for (size_t a = 0; a < 3 && dot < 0; ++a)
             result.normals[i + a] = -result.normals[i + a];
     }

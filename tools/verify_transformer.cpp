@@ -51,14 +51,15 @@ class EvaluationMemory {
 
 struct EvaluationInput {
     TokenSets sets;
-    std::vector<uint32_t> mask;       // [M, words]
-    std::vector<float> tokens;        // [M, C]
-    std::vector<float> timesteps;     // [T]
-    std::vector<uint32_t> table_row;  // [2M]
+    std::vector<uint32_t> mask;      // [M, words]
+    std::vector<float> tokens;       // [M, C]
+    std::vector<float> timesteps;    // [T]
+    std::vector<uint32_t> table_row; // [2M]
 };
 
 // The reference compares distances of centres that were rounded to float, up to 30 m from the origin: of two cells 3 m
-// apart some then lie beyond 3 m + 1e-6. Cells of the product are integers (neighbor_mask); here the given centres decide.
+// apart some then lie beyond 3 m + 1e-6. Cells of the product are integers (neighbor_mask); here the given centres
+// decide.
 std::vector<uint32_t> mask_of(const TokenSets& sets, const std::vector<float>& centers, float radius)
 {
     const uint32_t words = divide_up(sets.longest, 32);
@@ -79,7 +80,8 @@ std::vector<uint32_t> mask_of(const TokenSets& sets, const std::vector<float>& c
 
 Result<std::vector<float>> evaluate(Device& device, const Transformer& t, const EvaluationInput& in)
 {
-    const uint32_t m = in.sets.rows(), c = t.config().channels(), d = t.config().dim(), words = divide_up(in.sets.longest, 32);
+    const uint32_t m = in.sets.rows(), c = t.config().channels(), d = t.config().dim(),
+                   words = divide_up(in.sets.longest, 32);
     const uint32_t times = uint32_t(in.timesteps.size()), ld = round_up(c, kRowPadding);
     std::vector<float> padded(size_t(m) * ld);
     std::vector<uint16_t> halves(padded.size());
@@ -87,8 +89,10 @@ Result<std::vector<float>> evaluate(Device& device, const Transformer& t, const 
         std::copy_n(&in.tokens[size_t(r) * c], c, &padded[size_t(r) * ld]);
     std::transform(padded.begin(), padded.end(), halves.begin(), float_to_half);
     EvaluationMemory memory;
-    const uint32_t labels = memory.add(in.sets.labels), cells = memory.add(in.sets.cells), sets = memory.add(in.sets.sets);
-    const uint32_t tiles = memory.add(in.sets.tiles), coords = memory.add(in.sets.coords), rows = memory.add(in.table_row);
+    const uint32_t labels = memory.add(in.sets.labels), cells = memory.add(in.sets.cells),
+                   sets = memory.add(in.sets.sets);
+    const uint32_t tiles = memory.add(in.sets.tiles), coords = memory.add(in.sets.coords),
+                   rows = memory.add(in.table_row);
     const uint32_t timesteps = memory.add(in.timesteps);
     const uint32_t tokens = t.precision() == DType::f16 ? memory.add(halves) : memory.add(padded);
     const uint32_t pos = memory.add_empty(uint64_t(m) * d * 4), mask = memory.add(in.mask);
@@ -127,7 +131,8 @@ Result<std::vector<float>> evaluate(Device& device, const Transformer& t, const 
 Result<GoldenOutputs> run_voxfield_transformer(Device& device, const GoldenCase& c, DType precision)
 {
     SR_TRY(const auto transformer, Transformer::load(device, c.model(), precision));
-    const auto tokens = c.floats("input.tokens"), centers = c.floats("input.centers"), times = c.floats("input.timestep");
+    const auto tokens = c.floats("input.tokens"), centers = c.floats("input.centers"),
+               times = c.floats("input.timestep");
     const auto labels = c.integers("input.labels"), valid = c.integers("input.valid");
     const auto shape = c.shape("input.tokens"); // [B, N, C]
     if (shape.size() != 3 || shape[2] != transformer->config().channels() || valid.size() != shape[0] * shape[1] ||
@@ -195,7 +200,8 @@ Result<GoldenOutputs> run_voxfield_sampling(Device& device, const GoldenCase& c,
     SR_TRY(const SamplingPlan plan, plan_sampling(config, int(steps), repaint));
 
     const auto labels = c.integers("input.labels"), mask = c.integers("input.known_mask");
-    const auto first = c.floats("input.noise_initial"), noise = c.floats("input.noise"), fixed = c.floats("input.known_tokens");
+    const auto first = c.floats("input.noise_initial"), noise = c.floats("input.noise"),
+               fixed = c.floats("input.known_tokens");
     const size_t n = labels.size(), channels = transformer->config().channels();
     if (n == 0 || first.size() != n * channels || c.floats("input.centers").size() != 3 * n)
         return fail(ErrorCode::bad_input, "{}: inputs do not belong together", c.name());

@@ -51,8 +51,8 @@ Result<Video> Video::create(const Path& path, uint32_t width, uint32_t height, i
         "ffmpeg", "-loglevel", "error", "-y", "-f", "rawvideo", "-pixel_format", "rgb24", "-video_size",
         fmt::format("{}x{}", width, height), "-framerate", std::to_string(frames_per_second), "-i", "-",
         // H.264 in 4:2:0 wants even sides
-        "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-c:v", "libx264", "-crf", "18", "-pix_fmt", "yuv420p", "-f", "mp4", "-movflags", "+faststart",
-        v.temporary_.string()};
+        "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-c:v", "libx264", "-crf", "18", "-pix_fmt", "yuv420p", "-f", "mp4",
+        "-movflags", "+faststart", v.temporary_.string()};
     int ends[2];
     if (::pipe2(ends, O_CLOEXEC) != 0)
         return fail(ErrorCode::bad_input, "cannot make a pipe: {}", std::strerror(errno));
@@ -90,7 +90,8 @@ Status Video::add(std::span<const uint8_t> rgb)
     for (size_t at = 0; at < rgb.size();) {
         const ssize_t n = ::write(input_, rgb.data() + at, rgb.size() - at);
         if (n < 0 && errno != EINTR)
-            return fail(ErrorCode::bad_input, "ffmpeg stopped reading frames for {}: {}", quote_path(path_), std::strerror(errno));
+            return fail(ErrorCode::bad_input, "ffmpeg stopped reading frames for {}: {}", quote_path(path_),
+                        std::strerror(errno));
         at += n > 0 ? size_t(n) : 0;
     }
     return {};

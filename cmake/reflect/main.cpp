@@ -60,11 +60,12 @@ std::string header(const std::string& op, const std::vector<fs::path>& files)
         const Module m = reflect(read_words(file));
         const std::string id = op + (variant.empty() ? "" : "_" + variant);
         out += arrays(id, m);
-        table += fmt::format("    {{\"{}\", {}_code, {}_bindings, {}_constants, {}_push, {}, {{{}, {}, {}}}, {}, {}}},\n",
-                             variant, id, id, id, id, m.push_bytes, m.local_size[0], m.local_size[1], m.local_size[2],
-                             m.shared_bytes, m.needs);
+        table += fmt::format(
+            "    {{\"{}\", {}_code, {}_bindings, {}_constants, {}_push, {}, {{{}, {}, {}}}, {}, {}}},\n", variant, id,
+            id, id, id, m.push_bytes, m.local_size[0], m.local_size[1], m.local_size[2], m.shared_bytes, m.needs);
     }
-    out += fmt::format("inline constexpr KernelVariant {}_variants[] = {{\n{}}};\n}} // namespace generated\n", op, table);
+    out +=
+        fmt::format("inline constexpr KernelVariant {}_variants[] = {{\n{}}};\n}} // namespace generated\n", op, table);
     return out + fmt::format("inline constexpr Kernel {}{{\"{}\", generated::{}_variants}};\n"
                              "}} // namespace semrover::kernel\n",
                              op, op, op);

@@ -78,7 +78,9 @@ class Reader {
     void instruction(uint16_t op, const uint32_t* w, size_t n)
     {
         switch (op) {
-        case kOpName: ids_[w[0]].name = text(w + 1, n - 1); break;
+        case kOpName:
+            ids_[w[0]].name = text(w + 1, n - 1);
+            break;
         case kOpMemberName: {
             auto& names = ids_[w[0]].member_names;
             names.resize(std::max<size_t>(names.size(), w[1] + 1));
@@ -89,8 +91,12 @@ class Reader {
             if (w[1] == 17) // LocalSize
                 std::copy_n(w + 2, 3, module_.local_size);
             break;
-        case kOpCapability: capability(w[0]); break;
-        case kOpDecorate: decorate(ids_[w[0]], w[1], n > 2 ? w[2] : 0); break;
+        case kOpCapability:
+            capability(w[0]);
+            break;
+        case kOpDecorate:
+            decorate(ids_[w[0]], w[1], n > 2 ? w[2] : 0);
+            break;
         case kOpMemberDecorate:
             if (w[2] == kOffset)
                 ids_[w[0]].member_offsets[w[1]] = w[3];
@@ -104,18 +110,23 @@ class Reader {
         case kOpTypeSampledImage:
         case kOpTypeArray:
         case kOpTypeStruct:
-        case kOpTypePointer: define(op, w[0], w + 1, n - 1); break;
+        case kOpTypePointer:
+            define(op, w[0], w + 1, n - 1);
+            break;
         case kOpConstant:
         case kOpSpecConstant:
         case kOpSpecConstantTrue:
         case kOpSpecConstantFalse:
-        case kOpSpecConstantOp: define(op, w[1], w + 2, n - 2); break;
+        case kOpSpecConstantOp:
+            define(op, w[1], w + 2, n - 2);
+            break;
         case kOpVariable:
             define(op, w[1], w + 2, n - 2);
             ids_[w[1]].operands = {w[0], w[2]}; // pointer type, storage class
             variables_.push_back(w[1]);
             break;
-        default: break;
+        default:
+            break;
         }
     }
 
@@ -167,9 +178,14 @@ class Reader {
                 throw std::runtime_error("'" + v.name + "': only texel buffers and storage buffers are supported");
             module_.bindings.push_back({v.name, v.binding, true, true, false});
             break;
-        case kPushConstant: push(type); break;
-        case kWorkgroup: module_.shared_bytes += bytes(type); break;
-        default: break;
+        case kPushConstant:
+            push(type);
+            break;
+        case kWorkgroup:
+            module_.shared_bytes += bytes(type);
+            break;
+        default:
+            break;
         }
     }
 
@@ -192,16 +208,20 @@ class Reader {
     {
         switch (type.op) {
         case kOpTypeInt:
-        case kOpTypeFloat: return type.operands[0] / 8;
-        case kOpTypeVector: return bytes(ids_[type.operands[0]]) * type.operands[1];
-        case kOpTypeArray: return bytes(ids_[type.operands[0]]) * length(ids_[type.operands[1]]);
+        case kOpTypeFloat:
+            return type.operands[0] / 8;
+        case kOpTypeVector:
+            return bytes(ids_[type.operands[0]]) * type.operands[1];
+        case kOpTypeArray:
+            return bytes(ids_[type.operands[0]]) * length(ids_[type.operands[1]]);
         case kOpTypeStruct: {
             uint32_t sum = 0;
             for (uint32_t member : type.operands)
                 sum += bytes(ids_[member]);
             return sum;
         }
-        default: return 4;
+        default:
+            return 4;
         }
     }
 
@@ -218,12 +238,17 @@ class Reader {
         const uint32_t a = length(ids_[c.operands.at(1)]);
         const uint32_t b = c.operands.size() > 2 ? length(ids_[c.operands[2]]) : 0;
         switch (c.operands[0]) {
-        case 128: return a + b; // OpIAdd
-        case 130: return a - b; // OpISub
-        case 132: return a * b; // OpIMul
-        case 134:               // OpUDiv
-        case 135: return b ? a / b : 0;
-        default: throw std::runtime_error("a shared array's size uses an operation the reflector does not know");
+        case 128:
+            return a + b; // OpIAdd
+        case 130:
+            return a - b; // OpISub
+        case 132:
+            return a * b; // OpIMul
+        case 134:         // OpUDiv
+        case 135:
+            return b ? a / b : 0;
+        default:
+            throw std::runtime_error("a shared array's size uses an operation the reflector does not know");
         }
     }
 
@@ -244,4 +269,7 @@ class Reader {
 
 } // namespace
 
-Module reflect(std::vector<uint32_t> code) { return Reader(std::move(code)).run(); }
+Module reflect(std::vector<uint32_t> code)
+{
+    return Reader(std::move(code)).run();
+}

@@ -12,7 +12,10 @@ namespace semrover {
 
 namespace {
 
-uint8_t to_byte(float v) { return uint8_t(std::lround(std::clamp(v, 0.f, 1.f) * 255)); }
+uint8_t to_byte(float v)
+{
+    return uint8_t(std::lround(std::clamp(v, 0.f, 1.f) * 255));
+}
 
 Status make_folder(const Path& path)
 {
@@ -70,7 +73,8 @@ std::vector<uint8_t> visible_pixels(const SplatImage& image)
     return out;
 }
 
-Status write_frame_images(const Path& folder, uint32_t number, const SplatImage& image, const std::array<uint8_t, 3>& background)
+Status write_frame_images(const Path& folder, uint32_t number, const SplatImage& image,
+                          const std::array<uint8_t, 3>& background)
 {
     const std::string name = fmt::format("{:06}.png", number);
     for (const char* kind : {"color", "depth", "normal", "label", "visible"})

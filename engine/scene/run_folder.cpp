@@ -52,7 +52,9 @@ Result<RunFolder> RunFolder::open(const Path& folder, const Json& settings, bool
     if (fs::exists(folder / "run.json") && !restart) {
         SR_TRY(const Json before, read_json(folder / "run.json"));
         if (before.value("settings", Json()) != settings)
-            return fail(ErrorCode::bad_input, "{} holds a run with other settings, model, input or device; finish that one, name another output, or start over with -y",
+            return fail(ErrorCode::bad_input,
+                        "{} holds a run with other settings, model, input or device; finish that one, name another "
+                        "output, or start over with -y",
                         quote_path(folder));
         // pieces of a finished run are gone: what is asked for now is made from the start
         SR_CHECK(before.value("state", Json()) == "finished" ? run.start(settings) : run.read_journal());

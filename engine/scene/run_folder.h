@@ -8,8 +8,8 @@
 
 namespace semrover {
 
-// A run's folder: run.json (resolved settings, versions, device, hashes), journal.jsonl (one line per finished piece) and
-// the pieces' files. A process may be killed at any time; opening the folder again gives back every piece that was
+// A run's folder: run.json (resolved settings, versions, device, hashes), journal.jsonl (one line per finished piece)
+// and the pieces' files. A process may be killed at any time; opening the folder again gives back every piece that was
 // finished. One process at a time.
 class RunFolder {
   public:

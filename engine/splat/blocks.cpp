@@ -8,21 +8,26 @@ namespace semrover {
 
 namespace {
 
-constexpr int kPerSide = 5;        // surfels along an edge of a face
-constexpr float kOverlap = 0.7f;   // sigma over spacing: alpha stays above 0.98 between four surfels
+constexpr int kPerSide = 5;      // surfels along an edge of a face
+constexpr float kOverlap = 0.7f; // sigma over spacing: alpha stays above 0.98 between four surfels
 
 // faces of different directions get different shades, so that blocks can be told apart
-float shade(int axis, int side) { return axis == 2 ? (side > 0 ? 1.f : 0.6f) : axis == 0 ? 0.8f : 0.9f; }
+float shade(int axis, int side)
+{
+    return axis == 2 ? (side > 0 ? 1.f : 0.6f) : axis == 0 ? 0.8f : 0.9f;
+}
 
 void add_face(Surfels& out, const VoxelGrid& grid, size_t cell, int axis, int side)
 {
-    const std::array<float, 3> center = cell_center(grid.cells[cell], grid.voxel_size), color = label_color(grid.labels[cell]);
+    const std::array<float, 3> center = cell_center(grid.cells[cell], grid.voxel_size),
+                               color = label_color(grid.labels[cell]);
     const float spacing = grid.voxel_size / kPerSide;
     for (int u = 0; u < kPerSide; ++u)
         for (int v = 0; v < kPerSide; ++v) {
             std::array<float, 3> p = center, n{};
             n[size_t(axis)] = float(side);
-            p[size_t(axis)] += float(side) * grid.voxel_size * 0.499f; // inside the cell: faces of neighbours do not tie
+            p[size_t(axis)] +=
+                float(side) * grid.voxel_size * 0.499f; // inside the cell: faces of neighbours do not tie
             p[size_t(axis + 1) % 3] += (float(u) - (kPerSide - 1) / 2.f) * spacing;
             p[size_t(axis + 2) % 3] += (float(v) - (kPerSide - 1) / 2.f) * spacing;
             out.position.push_back(p);

@@ -61,10 +61,7 @@ class Rasterizer {
 
     const Program& program() const { return *program_; }
     // device memory for what it has room for now, beside the scene's
-    uint64_t planned_bytes() const
-    {
-        return memory_->planned_bytes(device_.limits()) + program_->plan().arena_bytes();
-    }
+    uint64_t planned_bytes() const { return memory_->planned_bytes(device_.limits()) + program_->plan().arena_bytes(); }
     uint32_t rebuilds() const { return rebuilds_; } // how often there was not enough room
 
   private:

@@ -8,13 +8,16 @@
 
 namespace semrover {
 
-Result<std::unique_ptr<Outpainter>> Outpainter::create(VoxelGrid& grid, const TransformerConfig& config, const RegionOptions& options)
+Result<std::unique_ptr<Outpainter>> Outpainter::create(VoxelGrid& grid, const TransformerConfig& config,
+                                                       const RegionOptions& options)
 {
     if (std::abs(grid.voxel_size - config.voxel_size) > 1e-4f * config.voxel_size)
-        return fail(ErrorCode::bad_input, "the grid has cells of {} m, the model was trained on {} m", grid.voxel_size, config.voxel_size);
+        return fail(ErrorCode::bad_input, "the grid has cells of {} m, the model was trained on {} m", grid.voxel_size,
+                    config.voxel_size);
     for (size_t i = 0; i < grid.labels.size(); ++i)
         if (grid.labels[i] >= config.num_classes)
-            return fail(ErrorCode::bad_input, "cell {} has label {}, the model knows {} classes", i, grid.labels[i], config.num_classes);
+            return fail(ErrorCode::bad_input, "cell {} has label {}, the model knows {} classes", i, grid.labels[i],
+                        config.num_classes);
     if (grid.has_points() && grid.points_per_voxel != int(config.points_per_voxel))
         return fail(ErrorCode::bad_input, "the grid has {} points a cell, the model makes {}", grid.points_per_voxel,
                     config.points_per_voxel);
@@ -59,7 +62,8 @@ RegionInput Outpainter::input(uint32_t region) const
         in.labels.push_back(grid_.labels[cell]);
         in.known.push_back(!graph_->is_target(region, cell));
         if (in.known.back())
-            encode_token(config_, std::span(grid_.points).subspan(cell * n * 3, n * 3), std::span(grid_.colors).subspan(cell * n * 3, n * 3),
+            encode_token(config_, std::span(grid_.points).subspan(cell * n * 3, n * 3),
+                         std::span(grid_.colors).subspan(cell * n * 3, n * 3),
                          std::span(in.fixed).subspan(i * channels, channels));
     }
     return in;

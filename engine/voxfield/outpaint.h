@@ -27,15 +27,16 @@ struct OutpaintCallbacks {
 class Outpainter {
   public:
     // grid: made ready for points (arrays allocated, n and voxel size of the model); errors: bad_input
-    static Result<std::unique_ptr<Outpainter>> create(VoxelGrid& grid, const TransformerConfig& config, const RegionOptions& options);
+    static Result<std::unique_ptr<Outpainter>> create(VoxelGrid& grid, const TransformerConfig& config,
+                                                      const RegionOptions& options);
 
     size_t region_count() const { return graph_->region_count(); }
     size_t cells_to_do() const { return cells_to_do_; }
     uint32_t largest_region() const { return largest_; }
     const Regions& regions() const { return regions_; }
 
-    // regions of the largest batch that run() will make with this limit: dependencies may keep batches smaller. Of a run
-    // that has not begun; 0 when every region is restored.
+    // regions of the largest batch that run() will make with this limit: dependencies may keep batches smaller. Of a
+    // run that has not begun; 0 when every region is restored.
     uint32_t widest_batch(uint32_t limit) const;
 
     // takes over a region that an earlier run finished; its targets must be those of this run

@@ -36,7 +36,8 @@ float normalized(const TransformerConfig& c, uint32_t channel, float v)
 
 float denormalized(const TransformerConfig& c, uint32_t channel, float v)
 {
-    return std::clamp(c.normalization ? v * c.normalization->std[channel] + c.normalization->mean[channel] : v, -1.f, 1.f);
+    return std::clamp(c.normalization ? v * c.normalization->std[channel] + c.normalization->mean[channel] : v, -1.f,
+                      1.f);
 }
 
 } // namespace
@@ -58,12 +59,14 @@ void encode_token(const TransformerConfig& config, std::span<const uint16_t> poi
     }
 }
 
-void decode_token(const TransformerConfig& config, std::span<const float> token, std::span<uint16_t> points, std::span<uint8_t> colors)
+void decode_token(const TransformerConfig& config, std::span<const float> token, std::span<uint16_t> points,
+                  std::span<uint8_t> colors)
 {
     const float half_voxel = config.voxel_size / 2;
     std::vector<Point> offsets(config.points_per_voxel);
     for (size_t i = 0; i < offsets.size(); ++i)
-        for (uint32_t a = 0; a < 3; ++a) // rounded to storage before sorting, so that a stored token is in its own order
+        for (uint32_t a = 0; a < 3;
+             ++a) // rounded to storage before sorting, so that a stored token is in its own order
             offsets[i][a] = half_to_float(float_to_half(denormalized(config, a, token[6 * i + a]) * half_voxel));
     size_t to = 0;
     for (uint32_t i : distance_order(offsets)) {

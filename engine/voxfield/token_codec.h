@@ -18,6 +18,7 @@ void encode_token(const TransformerConfig& config, std::span<const uint16_t> poi
                   std::span<float> token);
 
 // token [6n] -> points and colours in stored form, clamped to the cell and sorted as above
-void decode_token(const TransformerConfig& config, std::span<const float> token, std::span<uint16_t> points, std::span<uint8_t> colors);
+void decode_token(const TransformerConfig& config, std::span<const float> token, std::span<uint16_t> points,
+                  std::span<uint8_t> colors);
 
 } // namespace semrover

@@ -85,11 +85,13 @@ struct TokenSampler::Batch {
         t.prepare(g, context(g, t, halves));
         return g;
     }
-    Tensor noise(Graph& g, const TokenSampler& s, const StepTable& steps, const TokenContext& c, Tensor known_rows) const
+    Tensor noise(Graph& g, const TokenSampler& s, const StepTable& steps, const TokenContext& c,
+                 Tensor known_rows) const
     {
         if (s.options_.noise)
             return state(g, s.transformer_, z, "z");
-        return step_noise(g, steps, c.cells.row_range(0, rows), known_rows, s.transformer_.config().channels(), s.options_.seed);
+        return step_noise(g, steps, c.cells.row_range(0, rows), known_rows, s.transformer_.config().channels(),
+                          s.options_.seed);
     }
     Graph step_graph(const TokenSampler& s) const
     {
@@ -105,8 +107,8 @@ struct TokenSampler::Batch {
         step_timestep(g, steps, current);
         const Tensor in = step_input(g, steps, state_x, rows * s.halves_, t.precision());
         const Tensor m = t.forward(g, in, c, table, current);
-        step_update(g, steps, m, noise(g, s, steps, c, known_rows), known_rows, state(g, t, fixed, "fixed"), state_x, state(g, t, x0, "x0"),
-                    s.options_.guidance_scale, float(s.plan_.clip));
+        step_update(g, steps, m, noise(g, s, steps, c, known_rows), known_rows, state(g, t, fixed, "fixed"), state_x,
+                    state(g, t, x0, "x0"), s.options_.guidance_scale, float(s.plan_.clip));
         step_advance(g, steps.clock);
         return g;
     }
@@ -126,9 +128,11 @@ struct TokenSampler::Batch {
 
 TokenSampler::~TokenSampler() = default;
 
-TokenSampler::TokenSampler(Device& device, const Transformer& transformer, const SamplingPlan& plan, SamplerOptions options)
+TokenSampler::TokenSampler(Device& device, const Transformer& transformer, const SamplingPlan& plan,
+                           SamplerOptions options)
     : device_(device), transformer_(transformer), plan_(plan), options_(std::move(options)),
-      halves_(options_.guidance_scale == 1.f ? 1 : 2), window_(uint32_t(std::min<size_t>(options_.modulation_window, plan.timesteps.size())))
+      halves_(options_.guidance_scale == 1.f ? 1 : 2),
+      window_(uint32_t(std::min<size_t>(options_.modulation_window, plan.timesteps.size())))
 {
     steps_ = arena_.add((plan.rows.size() + 1) * sizeof(StepRow));
     clock_ = arena_.add(sizeof(StepClock));
@@ -136,8 +140,8 @@ TokenSampler::TokenSampler(Device& device, const Transformer& transformer, const
     table_ = arena_.add(uint64_t(window_) * round_up(transformer.modulation_width(), kRowPadding) * 4);
 }
 
-Result<std::unique_ptr<TokenSampler>> TokenSampler::create(Device& device, const Transformer& transformer, const SamplingPlan& plan,
-                                                           SamplerOptions options)
+Result<std::unique_ptr<TokenSampler>> TokenSampler::create(Device& device, const Transformer& transformer,
+                                                           const SamplingPlan& plan, SamplerOptions options)
 {
     if (!(options.guidance_scale >= 0 && options.guidance_scale <= 1000))
         return fail(ErrorCode::usage, "guidance scale {} is not in 0..1000", options.guidance_scale);
@@ -164,7 +168,8 @@ Status TokenSampler::make_modulations()
 {
     Graph g;
     const Tensor timesteps = g.external(arena_.slice(timesteps_), window_, 1, DType::f32, "timesteps", 1);
-    const Tensor table = g.external(arena_.slice(table_), window_, transformer_.modulation_width(), DType::f32, "modulations");
+    const Tensor table =
+        g.external(arena_.slice(table_), window_, transformer_.modulation_width(), DType::f32, "modulations");
     transformer_.modulations(g, timesteps, table);
     SR_TRY(modulations_, Program::create(device_, g));
     return {};
@@ -239,7 +244,9 @@ uint64_t TokenSampler::table_bytes() const
 
 Status TokenSampler::upload(Batch& b, const TokenSets& sets, std::span<const RegionInput> regions)
 {
-    const auto write = [&](uint32_t id, const auto& values) { return device_.write(b.arena.slice(id), std::as_bytes(std::span(values))); };
+    const auto write = [&](uint32_t id, const auto& values) {
+        return device_.write(b.arena.slice(id), std::as_bytes(std::span(values)));
+    };
     SR_CHECK(write(b.labels, sets.labels));
     SR_CHECK(write(b.cells, sets.cells));
     SR_CHECK(write(b.sets, sets.sets));
@@ -331,13 +338,20 @@ Result<std::vector<float>> TokenSampler::run(std::span<const RegionInput> region
             tokens.insert(tokens.end(), &padded[row * ld], &padded[row * ld] + channels);
     for (size_t i = 0; i < tokens.size(); ++i)
         if (!std::isfinite(tokens[i]))
-            return fail(ErrorCode::internal, "the network returned {} for channel {} of token {}: overflow; try --precision fp32", tokens[i],
+            return fail(ErrorCode::internal,
+                        "the network returned {} for channel {} of token {}: overflow; try --precision fp32", tokens[i],
                         i % channels, i / channels);
     return tokens;
 }
 
-uint32_t TokenSampler::step_passes() const { return batch_ ? uint32_t(batch_->step->plan().passes.size()) : 0; }
-uint32_t TokenSampler::step_barriers() const { return batch_ ? batch_->step->plan().barriers() : 0; }
+uint32_t TokenSampler::step_passes() const
+{
+    return batch_ ? uint32_t(batch_->step->plan().passes.size()) : 0;
+}
+uint32_t TokenSampler::step_barriers() const
+{
+    return batch_ ? batch_->step->plan().barriers() : 0;
+}
 double TokenSampler::step_flops() const
 {
     double flops = 0;
@@ -345,6 +359,9 @@ double TokenSampler::step_flops() const
         flops += pass.options.flops;
     return flops;
 }
-double TokenSampler::host_us_per_step() const { return batch_ ? batch_->step->host_us() : 0; }
+double TokenSampler::host_us_per_step() const
+{
+    return batch_ ? batch_->step->host_us() : 0;
+}
 
 } // namespace semrover

@@ -42,8 +42,8 @@ using StepCallback = std::function<bool(size_t done, size_t total)>;
 // step, one submit a step. The result of a region depends on nothing but its own input, the plan and the seed.
 class TokenSampler {
   public:
-    static Result<std::unique_ptr<TokenSampler>> create(Device& device, const Transformer& transformer, const SamplingPlan& plan,
-                                                        SamplerOptions options);
+    static Result<std::unique_ptr<TokenSampler>> create(Device& device, const Transformer& transformer,
+                                                        const SamplingPlan& plan, SamplerOptions options);
 
     // device memory of the sampler for `regions` regions of `cells` cells, beside the transformer's own
     Result<uint64_t> planned_bytes(uint32_t regions, uint32_t cells) const;

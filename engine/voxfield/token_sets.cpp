@@ -10,8 +10,8 @@ namespace semrover {
 
 void TokenSets::add(std::span<const CellIndex> set_cells, std::span<const uint32_t> set_labels)
 {
-    SR_ASSERT(!set_cells.empty() && set_cells.size() == set_labels.size(), "a set of {} cells with {} labels", set_cells.size(),
-              set_labels.size());
+    SR_ASSERT(!set_cells.empty() && set_cells.size() == set_labels.size(), "a set of {} cells with {} labels",
+              set_cells.size(), set_labels.size());
     const uint32_t first = rows(), count = uint32_t(set_cells.size());
     double mean[3] = {};
     for (const CellIndex& c : set_cells)

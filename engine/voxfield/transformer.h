@@ -25,7 +25,8 @@ class Transformer {
     // reads config.json and the weights of a voxfield_transformer folder
     static Result<std::unique_ptr<Transformer>> load(Device& device, const Path& folder, DType precision);
     // random weights of a config, for benchmarks
-    static Result<std::unique_ptr<Transformer>> random(Device& device, const TransformerConfig& config, DType precision);
+    static Result<std::unique_ptr<Transformer>> random(Device& device, const TransformerConfig& config,
+                                                       DType precision);
 
     const TransformerConfig& config() const { return config_; }
     DType precision() const { return precision_; }
@@ -41,7 +42,7 @@ class Transformer {
 
     // adaLN modulations of every block for a list of timesteps; once per schedule
     void modulations(Graph& g,
-                     Tensor timesteps, // [T, 1] fp32 array
+                     Tensor timesteps,    // [T, 1] fp32 array
                      Tensor table) const; // [T, modulation_width] fp32
 
     // one evaluation

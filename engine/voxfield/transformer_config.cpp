@@ -68,7 +68,8 @@ Status check_fixed(const Json& json)
 {
     const auto expect = [&](const char* name, const char* value) -> Status {
         if (json.contains(name) && json[name] != value)
-            return fail(ErrorCode::bad_input, "config: {} = {} is not implemented, only \"{}\"", name, json[name].dump(), value);
+            return fail(ErrorCode::bad_input, "config: {} = {} is not implemented, only \"{}\"", name,
+                        json[name].dump(), value);
         return {};
     };
     SR_CHECK(expect("_class_name", "VoxfieldTransformer"));
@@ -78,9 +79,10 @@ Status check_fixed(const Json& json)
 void collect_unknown(const Json& json, TransformerConfig& config)
 {
     static const std::set<std::string> kKnown = {
-        "_class_name",  "_diffusers_version", "num_layers",       "num_attention_heads", "attention_head_dim", "points_per_voxel",
-        "num_classes",  "voxel_size",         "attention_radius", "pos_embed_dim",       "context_pos_embed",  "prediction_type",
-        "qk_norm",      "normalization",      "in_channels",      "out_channels",        "_name_or_path"};
+        "_class_name",       "_diffusers_version", "num_layers", "num_attention_heads", "attention_head_dim",
+        "points_per_voxel",  "num_classes",        "voxel_size", "attention_radius",    "pos_embed_dim",
+        "context_pos_embed", "prediction_type",    "qk_norm",    "normalization",       "in_channels",
+        "out_channels",      "_name_or_path"};
     for (const auto& [name, value] : json.items())
         if (!kKnown.count(name))
             config.warnings.push_back(fmt::format("config: field '{}' is not known and has no effect", name));
@@ -112,17 +114,20 @@ Result<TransformerConfig> parse_transformer_config(const Json& json)
     SR_CHECK(read_bool(json, "context_pos_embed", c.context_pos_embed));
     SR_CHECK(read_normalization(json, c));
     if (c.attention_head_dim % 8)
-        return fail(ErrorCode::bad_input, "config: attention_head_dim {} is not implemented, only multiples of 8", c.attention_head_dim);
+        return fail(ErrorCode::bad_input, "config: attention_head_dim {} is not implemented, only multiples of 8",
+                    c.attention_head_dim);
     if (c.pos_embed_dim % 2)
         return fail(ErrorCode::bad_input, "config: pos_embed_dim {} must be even", c.pos_embed_dim);
     if (json.contains("qk_norm") && !json["qk_norm"].is_null()) {
         if (json["qk_norm"] != "rms_norm")
-            return fail(ErrorCode::bad_input, "config: qk_norm = {} is not implemented, only \"rms_norm\"", json["qk_norm"].dump());
+            return fail(ErrorCode::bad_input, "config: qk_norm = {} is not implemented, only \"rms_norm\"",
+                        json["qk_norm"].dump());
         c.qk_norm = true;
     }
     for (const char* name : {"in_channels", "out_channels"})
         if (json.contains(name) && json[name] != c.channels())
-            return fail(ErrorCode::bad_input, "config: {} is {}, but 6 * points_per_voxel is {}", name, json[name].dump(), c.channels());
+            return fail(ErrorCode::bad_input, "config: {} is {}, but 6 * points_per_voxel is {}", name,
+                        json[name].dump(), c.channels());
     collect_unknown(json, c);
     return c;
 }

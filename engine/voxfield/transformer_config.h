@@ -19,9 +19,9 @@ struct TransformerConfig {
     uint32_t num_layers = 12;
     uint32_t num_attention_heads = 8;
     uint32_t attention_head_dim = 128; // a multiple of 8
-    uint32_t points_per_voxel = 20; // 682 at most: the noise counter has room for 4096 channels
-    uint32_t num_classes = 20; // the embedding has one more row, the null label
-    float voxel_size = 0.6f;   // metres
+    uint32_t points_per_voxel = 20;    // 682 at most: the noise counter has room for 4096 channels
+    uint32_t num_classes = 20;         // the embedding has one more row, the null label
+    float voxel_size = 0.6f;           // metres
     float attention_radius = 3.0f;
     uint32_t pos_embed_dim = 128; // sinusoids per axis, even
     bool context_pos_embed = true;

@@ -23,7 +23,8 @@ TransformerWeights::TransformerWeights(const TransformerConfig& config, DType pr
     linear("time_embed.linear_2", d, d, DType::f32, time_out, time_out_bias);
     linear("proj_out", c, d, precision, proj_out, proj_out_bias);
     semantic_embed = matrix(config.num_classes + 1, d, precision);
-    parts_.push_back({"semantic_embed.weight", config.num_classes + 1, d, false, 0, config.num_classes + 1, semantic_embed, 0, 0});
+    parts_.push_back(
+        {"semantic_embed.weight", config.num_classes + 1, d, false, 0, config.num_classes + 1, semantic_embed, 0, 0});
     norm_out = matrix(2 * d, d, precision);
     norm_out_bias = matrix(1, 2 * d, DType::f32);
     place_swapped("norm_out.linear", norm_out, norm_out_bias, 0, 2 * d);
@@ -38,15 +39,16 @@ Weight TransformerWeights::matrix(uint32_t rows, uint32_t cols, DType dtype)
     return {arena_.add(bytes), rows, cols, dtype};
 }
 
-void TransformerWeights::place(const std::string& name, const Weight& weight, const Weight& bias, uint32_t row, uint32_t rows,
-                               uint32_t bias_row, uint32_t bias_col)
+void TransformerWeights::place(const std::string& name, const Weight& weight, const Weight& bias, uint32_t row,
+                               uint32_t rows, uint32_t bias_row, uint32_t bias_col)
 {
     parts_.push_back({name + ".weight", rows, weight.cols, false, 0, rows, weight, row, 0});
     parts_.push_back({name + ".bias", 1, rows, true, 0, rows, bias, bias_row, bias_col});
 }
 
 // AdaLayerNormContinuous stores scale before shift; the kernels want shift before scale
-void TransformerWeights::place_swapped(const std::string& name, const Weight& weight, const Weight& bias, uint32_t row, uint32_t rows)
+void TransformerWeights::place_swapped(const std::string& name, const Weight& weight, const Weight& bias, uint32_t row,
+                                       uint32_t rows)
 {
     const uint32_t half = rows / 2;
     for (uint32_t part = 0; part < 2; ++part) {
@@ -78,22 +80,23 @@ void TransformerWeights::add_block(uint32_t index, bool last)
     b.head_norms = matrix(4, config_.attention_head_dim, DType::f32);
     const char* norms[] = {"norm_q", "norm_k", "norm_added_q", "norm_added_k"};
     for (uint32_t i = 0; i < 4; ++i)
-        parts_.push_back({block + "attn." + norms[i] + ".weight", 1, config_.attention_head_dim, true, 0, config_.attention_head_dim,
-                          b.head_norms, i, 0});
+        parts_.push_back({block + "attn." + norms[i] + ".weight", 1, config_.attention_head_dim, true, 0,
+                          config_.attention_head_dim, b.head_norms, i, 0});
 }
 
 void TransformerWeights::add_stream(const std::string& block, const BlockWeights& b, uint32_t stream, bool last)
 {
     const uint32_t d = config_.dim();
-    static constexpr const char* kProjections[2][3] = {{"to_q", "to_k", "to_v"}, {"add_q_proj", "add_k_proj", "add_v_proj"}};
+    static constexpr const char* kProjections[2][3] = {{"to_q", "to_k", "to_v"},
+                                                       {"add_q_proj", "add_k_proj", "add_v_proj"}};
     for (uint32_t i = 0; i < 3; ++i)
         place(block + "attn." + kProjections[stream][i], b.qkv, b.qkv_bias, (stream * 3 + i) * d, d, stream, i * d);
     if (last && stream == 1) {
         place_swapped(block + "norm1_context.linear", b.modulation, b.modulation_bias, 6 * d, 2 * d);
         return;
     }
-    place(block + (stream ? "norm1_context.linear" : "norm1.linear"), b.modulation, b.modulation_bias, stream * 6 * d, 6 * d, 0,
-          stream * 6 * d);
+    place(block + (stream ? "norm1_context.linear" : "norm1.linear"), b.modulation, b.modulation_bias, stream * 6 * d,
+          6 * d, 0, stream * 6 * d);
     place(block + (stream ? "attn.to_add_out" : "attn.to_out.0"), b.out, b.out_bias, stream * d, d, stream);
     const std::string ff = block + (stream ? "ff_context" : "ff");
     place(ff + ".net.0.proj", b.ff_in, b.ff_in_bias, stream * 4 * d, 4 * d, stream);

@@ -17,12 +17,13 @@ struct Weight {
 
 // one joint block; streams (voxel, semantic) stacked as groups, but where the last block has only the voxel stream
 struct BlockWeights {
-    Weight qkv, qkv_bias;               // [2 * 3D, D], [2, 3D]
-    Weight out, out_bias;               // [streams * D, D]
-    Weight ff_in, ff_in_bias;           // [streams * 4D, D]
-    Weight ff_out, ff_out_bias;         // [streams * D, 4D]
-    Weight modulation, modulation_bias; // [12D, D]; last block [8D, D]. Per stream: shift, scale, gate of attention, of the mlp
-    Weight head_norms;                  // [4, head_dim]: q, k, added q, added k; only with qk_norm
+    Weight qkv, qkv_bias;       // [2 * 3D, D], [2, 3D]
+    Weight out, out_bias;       // [streams * D, D]
+    Weight ff_in, ff_in_bias;   // [streams * 4D, D]
+    Weight ff_out, ff_out_bias; // [streams * D, 4D]
+    Weight modulation,
+        modulation_bias; // [12D, D]; last block [8D, D]. Per stream: shift, scale, gate of attention, of the mlp
+    Weight head_norms;   // [4, head_dim]: q, k, added q, added k; only with qk_norm
 };
 
 // The transformer's parameters in device memory, in the packed layout that its kernels read.
@@ -52,15 +53,15 @@ class TransformerWeights {
     // rows of one file tensor and where they go
     struct Part {
         std::string name;
-        uint32_t file_rows, cols;       // the tensor in the file; a vector has one row
+        uint32_t file_rows, cols; // the tensor in the file; a vector has one row
         bool vector;
-        uint32_t first, count;          // rows (or elements of a vector) taken
+        uint32_t first, count; // rows (or elements of a vector) taken
         Weight target;
         uint32_t target_row, target_col;
     };
     Weight matrix(uint32_t rows, uint32_t cols, DType dtype);
-    void place(const std::string& name, const Weight& weight, const Weight& bias, uint32_t row, uint32_t rows, uint32_t bias_row = 0,
-               uint32_t bias_col = 0);
+    void place(const std::string& name, const Weight& weight, const Weight& bias, uint32_t row, uint32_t rows,
+               uint32_t bias_row = 0, uint32_t bias_col = 0);
     void place_swapped(const std::string& name, const Weight& weight, const Weight& bias, uint32_t row, uint32_t rows);
     void add_block(uint32_t index, bool last);
     void add_stream(const std::string& block, const BlockWeights& b, uint32_t stream, bool last);

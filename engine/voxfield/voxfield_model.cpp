@@ -19,7 +19,8 @@ Status read(const Json& json, const char* name, double low, double high, T& valu
     if (!json.contains(name))
         return {};
     if (!json[name].is_number() || !(json[name].get<double>() >= low && json[name].get<double>() <= high))
-        return fail(ErrorCode::bad_input, "model_index.json: defaults.{} is {}, expected {}..{}", name, json[name].dump(), low, high);
+        return fail(ErrorCode::bad_input, "model_index.json: defaults.{} is {}, expected {}..{}", name,
+                    json[name].dump(), low, high);
     value = json[name].get<T>();
     return {};
 }
@@ -56,7 +57,8 @@ Result<VoxfieldModel> VoxfieldModel::open(const Path& folder, std::optional<Samp
     if (!fs::exists(m.transformer) && fs::exists(folder / "config.json"))
         m.transformer = folder; // the component itself was given
     if (!fs::exists(m.transformer / "config.json"))
-        return fail(ErrorCode::bad_input, "'{}' has no voxfield_transformer/config.json: a model is a folder in the diffusers layout",
+        return fail(ErrorCode::bad_input,
+                    "'{}' has no voxfield_transformer/config.json: a model is a folder in the diffusers layout",
                     folder.string());
     SR_TRY(m.config, read_transformer_config(m.transformer));
     m.warnings = m.config.warnings;
@@ -74,7 +76,8 @@ Result<VoxfieldModel> VoxfieldModel::open(const Path& folder, std::optional<Samp
         m.scheduler = *config;
     }
     if (m.scheduler.prediction != Prediction::sample)
-        return fail(ErrorCode::bad_input, "{}: the transformer predicts x0, so prediction_type must be \"sample\"", scheduler.string());
+        return fail(ErrorCode::bad_input, "{}: the transformer predicts x0, so prediction_type must be \"sample\"",
+                    scheduler.string());
     if (m.scheduler.sampler == Sampler::euler)
         return fail(ErrorCode::bad_input, "the euler sampler cannot hold known tokens; use ddpm, ddim or dpm++2m");
     m.scheduler.clip_sample = true; // the method clips x0 to [-1, 1] with every sampler
