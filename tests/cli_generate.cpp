@@ -356,6 +356,7 @@ TEST_F(CliGenerateRefuses, outputs_that_cannot_be_written)
     expect_refusal(line + "-o " + path("in.sgrid/out.sgrid"), 3, "in.sgrid");
     expect_refusal(line + "-o " + path("no/such/folder/out.sgrid"), 3, "no/such/folder");
     expect_refusal(line + "-o /proc/out.sgrid", 3, "/proc");
+    expect_refusal(line + "-o " + path("out.sgrid") + " --ply-3dgs " + path("no/out.ply"), 3, "no/out.ply");
     expect_refusal(line + "-y -o " + folder_.path().string(), 3, folder_.path().string());
     EXPECT_FALSE(std::filesystem::exists(folder_.path().string() + ".run"));
 }

@@ -230,10 +230,14 @@ Status check_output(const Options& o, const Globals& globals)
 {
     if (o.output.empty())
         return fail(ErrorCode::usage, "-o/--output is required");
-    for (const std::string& path : {o.output, o.ply.points, o.ply.splats_3d, o.ply.splats_2d})
-        if (!path.empty() && std::filesystem::exists(path) && !globals.yes)
+    for (const std::string& path : {o.output, o.ply.points, o.ply.splats_3d, o.ply.splats_2d}) {
+        if (path.empty())
+            continue;
+        if (std::filesystem::exists(path) && !globals.yes)
             return fail(ErrorCode::usage, "'{}' exists; -y replaces it", path);
-    return AtomicFile::create(o.output).map([](const AtomicFile&) {});
+        SR_CHECK(AtomicFile::create(path).map([](const AtomicFile&) {}));
+    }
+    return {};
 }
 
 Status generate(const Options& o, const Globals& globals)
