@@ -32,6 +32,14 @@ uint64_t Hash::value() const
     return XXH64_digest(state_->xxh);
 }
 
+Result<uint64_t> hash_file(const Path& path)
+{
+    SR_TRY(const MappedFile file, MappedFile::open(path));
+    Hash hash;
+    hash.add(file.bytes());
+    return hash.value();
+}
+
 std::string hash_text(uint64_t hash)
 {
     return fmt::format("{:016x}", hash);

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "runtime/file.h"
+
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -28,6 +30,8 @@ class Hash {
     struct State;
     std::unique_ptr<State> state_;
 };
+
+Result<uint64_t> hash_file(const Path& path); // of its bytes, as one piece
 
 std::string hash_text(uint64_t hash); // 16 hexadecimal digits
 

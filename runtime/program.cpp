@@ -50,8 +50,7 @@ Status Program::allocate()
 std::pair<VkBuffer, uint64_t> Program::locate(const PassBinding& b) const
 {
     const Resource& r = plan_.resources[b.resource];
-    if (r.external && !r.memory.buffer)
-        SR_ASSERT(false, "'{}' has no memory: the graph was only good for planning", r.name);
+    SR_ASSERT(!r.external || r.memory.buffer, "'{}' has no memory: the graph was only good for planning", r.name);
     if (r.external)
         return {r.memory.buffer->handle(), r.memory.offset + b.offset};
     const Placement& p = plan_.placements[b.resource];

@@ -74,15 +74,13 @@ Result<Settings> resolve(const Options& o)
 // everything that decides the bytes of the result
 Result<Json> settings_json(const Options& o, const Settings& s, const Device& device)
 {
-    SR_TRY(const MappedFile grid, MappedFile::open(o.grid));
-    Hash grid_hash;
-    grid_hash.add(grid.bytes());
+    SR_TRY(const uint64_t grid_hash, hash_file(o.grid));
     SR_TRY(const uint64_t model_hash, hash_folder(s.model.transformer));
     return Json{{"command", "generate"},
                 {"version", kVersion},
                 {"device", device.name()},
                 {"driver", device.driver()},
-                {"grid", hash_text(grid_hash.value())},
+                {"grid", hash_text(grid_hash)},
                 {"model", hash_text(model_hash)},
                 {"precision", o.precision},
                 {"sampler", std::string(sampler_name(s.model.scheduler.sampler))},
@@ -195,21 +193,18 @@ Status prepare(Job& j)
     return fit_batch(j);
 }
 
-Status finish(Job& j, RunFolder& run, double seconds)
+Status finish(Job& j, RunFolder& run, const std::string& model_hash, double seconds)
 {
     const uint64_t peak = j.device->peak_bytes(); // of the generation itself
     j.grid.metadata["seed"] = std::to_string(j.options.seed);
     j.grid.metadata["tool"] = kProgram;
-    SR_TRY(const uint64_t model_hash, hash_folder(j.settings.model.transformer));
-    j.grid.metadata["model"] = hash_text(model_hash);
+    j.grid.metadata["model"] = model_hash;
     if (j.options.ply.any())
         SR_CHECK(export_ply(*j.device, j.grid, j.options.ply));
     SR_CHECK(write_grid(j.options.output, j.grid));
-    SR_TRY(const MappedFile written, MappedFile::open(j.options.output));
-    Hash hash;
-    hash.add(written.bytes());
+    SR_TRY(const uint64_t hash, hash_file(j.options.output));
     const Json results{{"output", Path(j.options.output).filename().string()},
-                       {"xxh64", hash_text(hash.value())},
+                       {"xxh64", hash_text(hash)},
                        {"cells", j.outpainter->cells_to_do()},
                        {"regions", j.outpainter->region_count()},
                        {"seconds", seconds},
@@ -273,7 +268,8 @@ Status generate(const Options& o, const Globals& globals)
     SR_CHECK(status);
     progress.update(j.outpainter->cells_to_do());
     progress.finish();
-    return finish(j, run, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+    return finish(j, run, settings["model"],
+                  std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
 }
 
 } // namespace

@@ -82,19 +82,7 @@ Result<CameraPath> load_cameras(const Options& o)
     return expand_rig(rig, path);
 }
 
-SplatCamera splat_camera(const CameraFrame& frame)
-{
-    SplatCamera c{float(frame.intrinsics.fx),
-                  float(frame.intrinsics.fy),
-                  float(frame.intrinsics.cx),
-                  float(frame.intrinsics.cy),
-                  {}};
-    for (size_t i = 0; i < 12; ++i)
-        c.world_to_camera[i] = float(frame.pose.world_to_camera[i]);
-    return c;
-}
-
-// straight down from above the middle, x up in the picture, with a narrow view so that heights hardly shift
+// straight down from above the middle, x to the right in the picture, with a narrow view so that heights hardly shift
 CameraFrame overview_camera(const VoxelGrid& grid, uint32_t width, uint32_t height)
 {
     const Bounds b = bounds_of(grid);
@@ -126,7 +114,7 @@ class PathRenderer {
         }
         std::vector<SplatCamera> cameras;
         for (const CameraFrame& frame : frames)
-            cameras.push_back(splat_camera(frame));
+            cameras.push_back(splat_camera(frame.intrinsics, frame.pose));
         return rasterizer->render(cameras);
     }
 

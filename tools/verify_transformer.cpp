@@ -158,14 +158,10 @@ Result<GoldenOutputs> run_voxfield_transformer(Device& device, const GoldenCase&
         }
         in.sets.add(cells, set_labels);
     }
-    const CellIndex nowhere{0, 0, 0};
-    const uint32_t null_label = transformer->config().num_classes;
-    while (in.sets.rows() % 16) { // the semantic stream must start at an aligned byte
-        in.sets.add({&nowhere, 1}, {&null_label, 1});
-        in.tokens.resize(in.tokens.size() + channels);
-        packed_centers.resize(packed_centers.size() + 3);
-        in.table_row.push_back(0);
-    }
+    in.sets.pad(transformer->config().num_classes);
+    in.tokens.resize(in.sets.rows() * channels);
+    in.table_row.resize(in.sets.rows());
+    packed_centers.resize(3 * in.sets.rows());
     in.mask = mask_of(in.sets, packed_centers, transformer->config().attention_radius);
     in.table_row.insert(in.table_row.end(), in.table_row.begin(), in.table_row.begin() + in.sets.rows());
     SR_TRY(const std::vector<float> values, evaluate(device, *transformer, in));

@@ -16,14 +16,6 @@ Path region_path(const RunFolder& run, uint32_t region)
     return run.path() / "regions" / fmt::format("{:06}.safetensors", region);
 }
 
-Result<uint64_t> hash_file(const Path& path)
-{
-    SR_TRY(const MappedFile file, MappedFile::open(path));
-    Hash hash;
-    hash.add(file.bytes());
-    return hash.value();
-}
-
 template <typename T>
 Result<std::vector<T>> read_array(const Safetensors& file, const char* name, DType dtype)
 {

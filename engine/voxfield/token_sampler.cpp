@@ -12,7 +12,6 @@ namespace semrover {
 
 namespace {
 
-constexpr uint32_t kRowAlignment = 16;   // rows of a stream: the semantic stream then starts at an aligned byte
 constexpr uint32_t kFirstDraw = 0xfffff; // noise key of the first noise; plans have at most a million rows
 constexpr size_t kInFlight = 3;          // submits ahead of the device
 
@@ -188,12 +187,10 @@ TokenSets TokenSampler::pack(std::span<const RegionInput> regions) const
 {
     TokenSets sets;
     const uint32_t null_label = transformer_.config().num_classes;
-    const CellIndex nowhere{0, 0, 0};
     for (uint32_t half = 0; half < halves_; ++half) {
         for (const RegionInput& r : regions)
             sets.add(r.cells, half == 0 ? r.labels : std::vector<uint32_t>(r.cells.size(), null_label));
-        while (sets.rows() % kRowAlignment)
-            sets.add({&nowhere, 1}, {&null_label, 1});
+        sets.pad(null_label);
     }
     return sets;
 }

@@ -29,4 +29,11 @@ void TokenSets::add(std::span<const CellIndex> set_cells, std::span<const uint32
     longest = std::max(longest, count);
 }
 
+void TokenSets::pad(uint32_t null_label)
+{
+    const CellIndex nowhere{0, 0, 0};
+    while (rows() % kRowAlignment)
+        add({&nowhere, 1}, {&null_label, 1});
+}
+
 } // namespace semrover

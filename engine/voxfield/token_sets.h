@@ -11,6 +11,9 @@ namespace semrover {
 
 using CellIndex = std::array<int32_t, 3>;
 
+// rows of a stream come in multiples of this, so that the semantic stream starts at an aligned byte
+constexpr uint32_t kRowAlignment = 16;
+
 // Local sets packed one after the other, without padding, as the kernels read them (kernels.h, masked joint attention).
 struct TokenSets {
     std::vector<uint32_t> labels; // [M]; num_classes is the null label
@@ -22,6 +25,8 @@ struct TokenSets {
 
     uint32_t rows() const { return uint32_t(labels.size()); }
     void add(std::span<const CellIndex> set_cells, std::span<const uint32_t> set_labels);
+    // sets of one cell up to a multiple of kRowAlignment rows
+    void pad(uint32_t null_label);
 };
 
 } // namespace semrover
