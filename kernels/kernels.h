@@ -100,6 +100,93 @@ Tensor neighbor_mask(Graph& g,
                                uint32_t heads,
                                uint32_t streams); // whose queries are answered: 1 voxel only, 2 both
 
+// -- images: convolution, norms, attention
+// -----------------------------------------------------------------------------
+
+// Images as NHWC matrices: pixel (y, x) of image b is row b * image_rows() + y * width + x. The rows of an image are
+// padded, so that no tile of a kernel holds two images; padding rows hold finite numbers that nothing depends on.
+constexpr uint32_t kImageRowPadding = 16;
+struct FeatureMap {
+    Tensor data; // [batch * image_rows(), channels]
+    uint32_t batch = 1, height = 0, width = 0;
+
+    bool valid() const { return data.valid(); }
+    uint32_t channels() const { return data.cols; }
+    uint32_t pixels() const { return height * width; }
+    uint32_t image_rows() const { return round_up(height * width, kImageRowPadding); }
+    FeatureMap with(Tensor other) const { return {other, batch, height, width}; } // the same images, other channels
+};
+[[nodiscard]] FeatureMap feature_map(Graph& g, uint32_t batch, uint32_t height, uint32_t width, uint32_t channels,
+                                     DType dtype, std::string_view name = "");
+
+// y[n] = bias[n] + sum over taps and channels of w[n, tap, c] x[c] at the tap's pixel, zeros outside the image. Runs as
+// an implicit GEMM. Two inputs stand for their concatenation along channels.
+struct ConvOptions {
+    uint32_t kernel = 3;      // 1 or 3, square
+    uint32_t stride = 1;      // 1 or 2
+    bool end_padding = false; // zeros to the right and below only, (0, 1, 0, 1), instead of all around
+    uint32_t upsampled_height = 0, upsampled_width = 0; // nearest x2 before the convolution, to 2n or 2n - 1; 0: none
+    DType dtype = DType::f16;                           // of y
+};
+[[nodiscard]] FeatureMap conv2d(Graph& g, FeatureMap x,
+                                FeatureMap x2, // channels after those of x, or none
+                                Tensor w,    // [N, kernel * kernel * (C + C2)], each of C and C2 padded to kRowPadding
+                                Tensor bias, // [1, N] fp32, or none
+                                const ConvOptions& options = {});
+
+// y = x + table[table_row[image]][col + channel]; runs in the epilogue of the convolution that makes x
+struct ChannelShift {
+    Tensor table;     // [T, width] fp32
+    Tensor table_row; // [batch] u32
+    uint32_t col = 0; // a multiple of 4
+};
+[[nodiscard]] FeatureMap channel_shift(Graph& g, FeatureMap x, const ChannelShift& shift);
+
+// mean and sum of squared differences from it, of every channel over every 16 rows; taken by the pass that makes x
+[[nodiscard]] Tensor channel_moments(Graph& g, FeatureMap x); // [batch * image_rows / 16, 2 * C] fp32: mean, m2 pairs
+
+// y = GroupNorm(x, x2) * weight + bias, then SiLU if asked; groups may span both inputs
+struct GroupNormOptions {
+    uint32_t groups = 32;
+    float eps = 1e-5f;
+    bool silu = false;
+    DType dtype = DType::f16; // of y
+};
+struct NormInput {
+    FeatureMap x;
+    Tensor moments; // channel_moments() of x
+};
+[[nodiscard]] FeatureMap group_norm(Graph& g, NormInput x,
+                                    NormInput x2,  // channels after those of x, or none
+                                    Tensor weight, // [1, C + C2] fp32
+                                    Tensor bias,   // [1, C + C2] fp32
+                                    const GroupNormOptions& options = {});
+
+// y = LayerNorm(x) * weight + bias
+[[nodiscard]] Tensor layer_norm(Graph& g,
+                                Tensor x,      // [M, N]
+                                Tensor weight, // [1, N] fp32
+                                Tensor bias,   // [1, N] fp32
+                                float eps);
+
+// y = h * gelu(gate), with the exact erf; h and gate alternate in blocks of eight columns: x = [h 0..7, gate 0..7,
+// h 8..15, ..]. Runs in the epilogue of the gemm that makes x.
+[[nodiscard]] Tensor geglu(Graph& g, Tensor x); // [M, 2N] -> [M, N], N a multiple of 8
+
+// y = softmax(q k^T scale) v, per image and head; thousands of queries and keys, nothing of their product is stored
+struct FlashAttentionOptions {
+    uint32_t heads = 1, head_dim = 0;         // head_dim a multiple of 8, as stored
+    float scale = 0;                          // of the scores; 0: 1 / sqrt(head_dim)
+    uint32_t batch = 1;                       // images
+    uint32_t queries = 0, query_rows = 0;     // of an image; rows from one image's queries to the next
+    uint32_t keys = 0, key_rows = 0;          // of an image, likewise; key_rows = 0: every image has the same keys
+    uint32_t q_col = 0, k_col = 0, v_col = 0; // first columns, multiples of 8
+};
+[[nodiscard]] Tensor flash_attention(Graph& g,
+                                     Tensor q,  // [batch * query_rows, q_col + heads * head_dim or more]
+                                     Tensor kv, // [(batch *) key_rows, ..] with keys and values; may be q itself
+                                     const FlashAttentionOptions& options); // [batch * query_rows, heads * head_dim]
+
 // -- sampling: one table of steps, one clock, the same commands for every step
 // -------------------------------------------
 
