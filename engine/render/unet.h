@@ -24,8 +24,6 @@ class Unet {
     DType precision() const;
     uint64_t parameters() const;
     uint64_t device_bytes(const DeviceLimits& limits) const; // of the weights
-    // names and shapes of the weights, as diffusers calls them
-    std::vector<TensorSpec> schema() const;
 
     // what depends on the timestep only: a row per timestep, once per schedule
     uint32_t time_width() const;

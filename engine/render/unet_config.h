@@ -4,6 +4,7 @@
 
 #include "runtime/file.h"
 #include "runtime/result.h"
+#include "runtime/safetensors.h"
 
 #include <cstdint>
 #include <nlohmann/json_fwd.hpp>
@@ -37,5 +38,8 @@ struct UnetConfig {
 
 // errors: bad_input; a value that the engine does not implement is refused by name
 Result<UnetConfig> parse_unet_config(const nlohmann::json& json);
+
+// names and shapes of the network's weights, as diffusers calls them
+std::vector<TensorSpec> unet_schema(const UnetConfig& config);
 
 } // namespace semrover

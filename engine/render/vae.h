@@ -25,7 +25,6 @@ class Vae {
     DType precision() const;
     uint64_t parameters() const;
     uint64_t device_bytes(const DeviceLimits& limits) const; // of the weights
-    std::vector<TensorSpec> schema() const;
 
     // image: in_channels, -1..1, fp32 or the network's precision -> 2 * latent_channels, fp32: mean, log-variance
     [[nodiscard]] FeatureMap encode(Graph& g, FeatureMap image) const;

@@ -4,6 +4,7 @@
 
 #include "runtime/file.h"
 #include "runtime/result.h"
+#include "runtime/safetensors.h"
 
 #include <cstdint>
 #include <nlohmann/json_fwd.hpp>
@@ -30,5 +31,8 @@ struct VaeConfig {
 
 // errors: bad_input; a value that the engine does not implement is refused by name
 Result<VaeConfig> parse_vae_config(const nlohmann::json& json);
+
+// names and shapes of the network's weights, as diffusers calls them
+std::vector<TensorSpec> vae_schema(const VaeConfig& config);
 
 } // namespace semrover
