@@ -34,9 +34,9 @@ Tensor gemm(Graph& g, Tensor x, Tensor w, Tensor bias, const GemmOptions& option
         dispatch.constants.push_back({"kBias", 1});
     if (groups == 1)
         dispatch.banded = {"X", "Y"};
-    const Tensor unused = bias.valid() ? bias : w; // inputs of epilogues that are off
-    g.dispatch(kernel::gemm, {x, w, unused, unused, unused, unused, y}, push, tiles(push.rows, push.cols, groups),
-               std::move(dispatch));
+    const Tensor unused = w.row_range(0, 1); // of epilogues that are off
+    g.dispatch(kernel::gemm, {x, w, bias.valid() ? bias : unused, unused, y.row_range(0, 1), y, unused, unused}, push,
+               tiles(push.rows, push.cols, groups), std::move(dispatch));
     return y;
 }
 

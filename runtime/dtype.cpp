@@ -2,6 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/dtype.h"
 
+#include "runtime/result.h"
+
+#include <algorithm>
 #include <cstring>
 
 namespace semrover {
@@ -15,23 +18,12 @@ const char* dtype_name(DType t)
 
 float half_to_float(uint16_t h)
 {
-    const uint32_t sign = uint32_t(h & 0x8000u) << 16;
-    uint32_t exponent = (h >> 10) & 0x1fu, mantissa = h & 0x3ffu;
-    uint32_t bits;
-    if (exponent == 31) {
-        bits = sign | 0x7f800000u | mantissa << 13;
-    } else if (exponent != 0) {
-        bits = sign | (exponent + 112) << 23 | mantissa << 13;
-    } else if (mantissa == 0) {
-        bits = sign;
-    } else {
-        exponent = 113;
-        while (!(mantissa & 0x400u)) {
-            mantissa <<= 1;
-            --exponent;
-        }
-        bits = sign | exponent << 23 | (mantissa & 0x3ffu) << 13;
-    }
+    const uint32_t sign = uint32_t(h & 0x8000u) << 16, exponent = (h >> 10) & 0x1fu, mantissa = h & 0x3ffu;
+    const float subnormal = float(int32_t(mantissa)) * 0x1p-24f; // exact
+    uint32_t small;
+    std::memcpy(&small, &subnormal, 4);
+    const uint32_t large = (exponent + (exponent == 31 ? 224u : 112u)) << 23 | mantissa << 13;
+    const uint32_t bits = sign | (exponent == 0 ? small : large); // no branch, so that loops become vectors
     float f;
     std::memcpy(&f, &bits, 4);
     return f;
@@ -57,6 +49,48 @@ uint16_t float_to_half(float f)
     }
     const uint32_t round = 0xfffu + ((bits >> 13) & 1u);
     return uint16_t(sign | ((bits + round - 0x38000000u) >> 13));
+}
+
+uint16_t float_to_bf16(float f)
+{
+    uint32_t bits;
+    std::memcpy(&bits, &f, 4);
+    if ((bits & 0x7fffffffu) > 0x7f800000u)
+        return uint16_t(bits >> 16 | 0x40u); // NaN stays one
+    return uint16_t((bits + 0x7fffu + (bits >> 16 & 1u)) >> 16);
+}
+
+void to_float(std::span<const std::byte> bytes, DType dtype, float* out)
+{
+    if (dtype == DType::f32) {
+        std::copy_n(bytes.data(), bytes.size(), reinterpret_cast<std::byte*>(out));
+        return;
+    }
+    SR_ASSERT(dtype == DType::f16 || dtype == DType::bf16, "{} as float", dtype_name(dtype));
+    const auto convert = [&](auto decode) {
+        for (size_t i = 0; i < bytes.size() / 2; ++i) {
+            uint16_t word;
+            std::memcpy(&word, bytes.data() + 2 * i, 2);
+            out[i] = decode(word);
+        }
+    };
+    if (dtype == DType::f16)
+        convert([](uint16_t word) { return half_to_float(word); });
+    else
+        convert([](uint16_t word) { return bf16_to_float(word); });
+}
+
+void from_float(std::span<const float> values, DType dtype, std::byte* out)
+{
+    if (dtype == DType::f32) {
+        std::ranges::copy(std::as_bytes(values), out);
+        return;
+    }
+    SR_ASSERT(dtype == DType::f16 || dtype == DType::bf16, "float as {}", dtype_name(dtype));
+    for (size_t i = 0; i < values.size(); ++i) {
+        const uint16_t word = dtype == DType::f16 ? float_to_half(values[i]) : float_to_bf16(values[i]);
+        std::memcpy(out + 2 * i, &word, 2);
+    }
 }
 
 } // namespace semrover

@@ -2,7 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <span>
 
 namespace semrover {
 
@@ -45,5 +47,10 @@ inline float bf16_to_float(uint16_t b)
     __builtin_memcpy(&f, &u, 4);
     return f;
 }
+uint16_t float_to_bf16(float f); // round to nearest even
+
+// a tensor's elements, which may be misaligned, of type f32, f16 or bf16
+void to_float(std::span<const std::byte> bytes, DType dtype, float* out);
+void from_float(std::span<const float> values, DType dtype, std::byte* out);
 
 } // namespace semrover

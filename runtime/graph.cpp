@@ -2,7 +2,23 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/graph.h"
 
+#include <algorithm>
+
 namespace semrover {
+
+std::pair<uint64_t, uint64_t> RowWindow::input_rows(uint64_t first, uint64_t count) const
+{
+    const auto row_of = [&](uint64_t row) { // of the image; its padding belongs to the last one
+        return int64_t(std::min<uint64_t>(row % out_image_rows / out_width, out_height - 1)) * stride -
+               int64_t(padding);
+    };
+    const auto input_row = [&](uint64_t row, int64_t y) {
+        const uint64_t clamped = uint64_t(std::clamp<int64_t>(y, 0, in_height - 1));
+        return row / out_image_rows * in_image_rows + (clamped >> shift) * in_width;
+    };
+    const uint64_t last = first + count - 1;
+    return {input_row(first, row_of(first)), input_row(last, row_of(last) + kernel - 1) + in_width};
+}
 
 Tensor Graph::matrix(uint32_t rows, uint32_t cols, DType dtype, std::string_view name)
 {

@@ -56,13 +56,36 @@ struct ConstantValue {
     uint32_t value;
 };
 
+// what a convolution reaches: the rows of input pixels that rows of output pixels need. Images are padded in rows.
+struct RowWindow {
+    uint32_t out_width = 0, out_height = 0, out_image_rows = 0; // out_width = 0: no window
+    uint32_t in_width = 0, in_height = 0, in_image_rows = 0;    // in_height: after upsampling
+    uint32_t stride = 1, padding = 0, kernel = 1;
+    uint32_t shift = 0; // 1: input pixels are seen twice as large
+
+    // rows [first, last) of the input that rows [first, first + count) of the output need
+    std::pair<uint64_t, uint64_t> input_rows(uint64_t first, uint64_t count) const;
+};
+
+// a binding whose rows belong to rows of the output
+struct BandedBinding {
+    std::string_view name;
+    uint32_t divisor = 1; // row r of the output belongs to row r / divisor of the binding
+    RowWindow window;     // or to the rows around it; then push member `<binding>_first` says which comes first
+
+    BandedBinding(const char* n) : name(n) {}
+    BandedBinding(std::string_view n, uint32_t d) : name(n), divisor(d) {}
+    BandedBinding(std::string_view n, const RowWindow& w) : name(n), window(w) {}
+};
+
 struct DispatchOptions {
     std::vector<ConstantValue> constants;
-    // bindings whose row r belongs to row r of the output, so that the op can be cut into bands of rows; needs a push
-    // member `rows`, and `first_row` where the shader must know which rows it has
-    std::vector<std::string_view> banded;
+    // with these the op can be cut into bands of rows; needs a push member `rows`, and `first_row` where the shader
+    // must know which rows it has
+    std::vector<BandedBinding> banded;
     // the constant with which a producer of binding X can do this dispatch's work in its epilogue ("kGelu")
     std::string_view absorbed_as;
+    bool keeps_x = false; // absorbed: the producer goes on writing X, others may read it (statistics of X)
     double flops = 0;
 };
 

@@ -124,4 +124,9 @@ Result<Json> read_json(const Path& path, const JsonLimits& limits)
     return parse_json(text, quote_path(path), limits);
 }
 
+Json short_number(float value)
+{
+    return std::strtod(fmt::format("{}", value).c_str(), nullptr);
+}
+
 } // namespace semrover

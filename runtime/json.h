@@ -44,4 +44,7 @@ struct JsonLimits {
 Result<Json> parse_json(std::string_view text, std::string_view where, const JsonLimits& limits = {});
 Result<Json> read_json(const Path& path, const JsonLimits& limits = {});
 
+// a float's shortest digits: 0.18215, not 0.18215000629425049
+Json short_number(float value);
+
 } // namespace semrover

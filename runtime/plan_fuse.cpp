@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // stage 2: a dispatch that says `absorbed_as = kName` moves into the epilogue of the pass that makes its input X, when
-// that kernel declares the constant kName. Bindings and push members move by name, so no op is known here.
+// that kernel declares the constant kName. Bindings and push members move by name, so no op is known here. One that
+// keeps X only adds an output (statistics of X).
 #include "runtime/plan.h"
 
 #include <algorithm>
@@ -68,6 +69,23 @@ Pass* sole_producer(Plan& plan, size_t consumer)
     return producer;
 }
 
+// the pass that last wrote consumer's X, all of it; others may read it
+Pass* last_writer(Plan& plan, size_t consumer)
+{
+    const Tensor& x = plan.passes[consumer].tensors.front();
+    for (size_t i = consumer; i-- > 0;) {
+        bool whole = false, part = false;
+        for (size_t b = 0; b < plan.passes[i].tensors.size(); ++b)
+            if (writes(plan.passes[i], b)) {
+                whole = whole || same(plan.passes[i].tensors[b], x);
+                part = part || may_share(plan, plan.passes[i].tensors[b], x);
+            }
+        if (whole || part)
+            return whole ? &plan.passes[i] : nullptr;
+    }
+    return nullptr;
+}
+
 // what the consumer reads besides X must exist before the producer runs, and what it writes must not be used between
 bool can_move_up(const Plan& plan, const Pass* producer, size_t consumer)
 {
@@ -104,11 +122,19 @@ void move_push(const Pass& from, Pass& to)
     }
 }
 
+// outputs of epilogues that are off are bound to a row of Y; they follow it, or Y's old memory would stay
+void move_unused_outputs(Pass& producer, size_t y, uint32_t old_resource)
+{
+    for (size_t b = 0; b < producer.tensors.size(); ++b)
+        if (b != y && writes(producer, b) && producer.tensors[b].resource == old_resource)
+            producer.tensors[b] = producer.tensors[y].row_range(0, 1);
+}
+
 bool absorb(Plan& plan, size_t consumer)
 {
     Pass& c = plan.passes[consumer];
     const auto& declared = c.kernel->variants.front().bindings;
-    Pass* producer = sole_producer(plan, consumer);
+    Pass* producer = c.options.keeps_x ? last_writer(plan, consumer) : sole_producer(plan, consumer);
     if (!producer || !producer->kernel->variants.front().constant(c.options.absorbed_as))
         return false;
     size_t y;
@@ -126,17 +152,20 @@ bool absorb(Plan& plan, size_t consumer)
             return false; // another epilogue uses that binding
     if (!can_move_up(plan, producer, consumer) || overwrites_input(plan, *producer, c))
         return false;
+    const uint32_t old_y = producer->tensors[y].resource;
     for (size_t b = 1; b < c.tensors.size(); ++b) {
         producer->tensors[slots[b]] = c.tensors[b];
         producer->slots.push_back(slots[b]);
     }
+    if (!c.options.keeps_x)
+        move_unused_outputs(*producer, y, old_y);
     producer->absorbed.push_back(id);
     move_push(c, *producer);
     producer->options.constants.push_back({c.options.absorbed_as, 1});
     if (!producer->options.banded.empty()) // else its rows cannot be cut, and neither can these
-        for (std::string_view name : c.options.banded)
-            if (name != "X" && name != "Y")
-                producer->options.banded.push_back(name);
+        for (const BandedBinding& band : c.options.banded)
+            if (band.name != "X" && band.name != "Y")
+                producer->options.banded.push_back(band);
     return true;
 }
 

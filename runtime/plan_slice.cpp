@@ -5,6 +5,7 @@
 #include "runtime/plan.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cstring>
 #include <numeric>
 
@@ -20,28 +21,69 @@ uint64_t range_limit(const PassBinding& b, const DeviceLimits& limits)
     return b.kind == BindingKind::texel ? limits.max_texel_elements * 16 : limits.max_storage_range;
 }
 
-bool banded(const Pass& pass, std::string_view binding)
+const BandedBinding* banded(const Pass& pass, std::string_view binding)
 {
-    return std::find(pass.options.banded.begin(), pass.options.banded.end(), binding) != pass.options.banded.end();
+    for (const BandedBinding& b : pass.options.banded)
+        if (b.name == binding)
+            return &b;
+    return nullptr;
 }
 
+// rows of the output
 uint32_t rows_of(const Pass& pass)
 {
     for (size_t b = 0; b < pass.bindings.size(); ++b)
-        if (banded(pass, pass.bindings[b].name))
+        if (const BandedBinding* band = banded(pass, pass.bindings[b].name);
+            band && band->divisor == 1 && !band->window.out_width)
             return pass.tensors[b].rows;
     return 0;
 }
 
-// rows of which every banded binding starts aligned
+// rows of a binding after which the next one starts aligned
+uint64_t aligned_rows(const Tensor& t, const DeviceLimits& limits)
+{
+    return limits.offset_alignment / std::gcd<uint64_t>(limits.offset_alignment, t.row_bytes());
+}
+
+// rows of the output of which every banded binding starts aligned; windows align themselves
 uint64_t aligned_rows(const Pass& pass, const DeviceLimits& limits)
 {
     uint64_t step = 1;
     for (size_t b = 0; b < pass.bindings.size(); ++b)
-        if (banded(pass, pass.bindings[b].name))
-            step = std::lcm(step, limits.offset_alignment /
-                                      std::gcd<uint64_t>(limits.offset_alignment, pass.tensors[b].row_bytes()));
+        if (const BandedBinding* band = banded(pass, pass.bindings[b].name); band && !band->window.out_width)
+            step = std::lcm(step, band->divisor * aligned_rows(pass.tensors[b], limits));
     return step;
+}
+
+// rows [first, last) of a binding that a band of output rows needs
+std::pair<uint64_t, uint64_t> binding_rows(const BandedBinding& band, const Tensor& t, uint64_t first, uint64_t count,
+                                           const DeviceLimits& limits)
+{
+    if (!band.window.out_width)
+        return {first / band.divisor, (first + count + band.divisor - 1) / band.divisor};
+    auto [begin, end] = band.window.input_rows(first, count);
+    begin -= begin % aligned_rows(t, limits);
+    return {begin, end};
+}
+
+// the most rows per band, of at most `band`, of which a window fits the limit; 0 if not even one step does
+uint64_t window_rows(const BandedBinding& b, const Tensor& t, uint64_t rows, uint64_t band, uint64_t step,
+                     uint64_t limit, const DeviceLimits& limits)
+{
+    const auto fits = [&](uint64_t count) {
+        for (uint64_t first = 0; first < rows; first += count) {
+            const auto [begin, end] = binding_rows(b, t, first, std::min(count, rows - first), limits);
+            if ((end - begin) * t.row_bytes() > limit)
+                return false;
+        }
+        return true;
+    };
+    uint64_t count = round_up64(band, step);
+    while (count > step && !fits(count))
+        count = round_up64(std::max<uint64_t>(count * 3 / 4, step), step) == count
+                    ? count - step
+                    : round_up64(std::max<uint64_t>(count * 3 / 4, step), step);
+    return fits(count) ? count : 0;
 }
 
 tl::unexpected<Error> too_large(const Plan& plan, const Pass& pass, size_t b, uint64_t rows, const DeviceLimits& limits)
@@ -66,8 +108,13 @@ Result<uint32_t> band_rows(const Plan& plan, const Pass& pass, const DeviceLimit
         const uint64_t limit = range_limit(pass.bindings[b], limits);
         if (pass.bindings[b].bytes <= limit)
             continue;
-        band = std::min(band, limit / std::max<uint64_t>(pass.tensors[b].row_bytes(), 1));
-        if (!banded(pass, pass.bindings[b].name) || band < step)
+        const BandedBinding* how = banded(pass, pass.bindings[b].name);
+        if (how && how->window.out_width)
+            band = window_rows(*how, pass.tensors[b], rows, band, step, limit, limits);
+        else
+            band =
+                std::min(band, limit / std::max<uint64_t>(pass.tensors[b].row_bytes(), 1) * (how ? how->divisor : 1));
+        if (!how || band < step)
             return too_large(plan, pass, b, step, limits);
     }
     const double seconds = pass.options.flops / kAssumedFlopsPerSecond;
@@ -87,15 +134,27 @@ void set_push(Pass& pass, std::string_view name, uint32_t value)
         std::memcpy(&pass.push[m->offset], &value, 4);
 }
 
-Pass band_of(const Pass& whole, uint32_t first, uint32_t count, uint32_t total)
+// push member of a binding's first row: "x_first" of X
+std::string first_member(std::string_view binding)
+{
+    std::string name(binding);
+    name[0] = char(std::tolower(name[0]));
+    return name + "_first";
+}
+
+Pass band_of(const Pass& whole, uint32_t first, uint32_t count, uint32_t total, const DeviceLimits& limits)
 {
     Pass pass = whole;
     for (size_t b = 0; b < pass.bindings.size(); ++b) {
-        if (!banded(pass, pass.bindings[b].name))
+        const BandedBinding* band = banded(pass, pass.bindings[b].name);
+        if (!band)
             continue;
-        pass.tensors[b] = pass.tensors[b].row_range(first, count);
+        const auto [begin, end] = binding_rows(*band, pass.tensors[b], first, count, limits);
+        pass.tensors[b] = pass.tensors[b].row_range(uint32_t(begin), uint32_t(end - begin));
         pass.bindings[b].offset = pass.tensors[b].offset;
         pass.bindings[b].bytes = pass.tensors[b].bytes();
+        if (band->window.out_width)
+            set_push(pass, first_member(band->name), uint32_t(begin));
     }
     set_push(pass, "rows", count);
     set_push(pass, "first_row", first);
@@ -159,7 +218,7 @@ Status slice(Plan& plan, const DeviceLimits& limits)
             continue;
         }
         for (uint32_t first = 0; first < rows; first += band)
-            passes.push_back(band_of(pass, first, std::min(band, rows - first), rows));
+            passes.push_back(band_of(pass, first, std::min(band, rows - first), rows, limits));
     }
     for (Pass& pass : passes)
         SR_CHECK(count_groups(pass, limits));

@@ -106,7 +106,7 @@ Result<const TensorInfo*> SafetensorsSet::get(std::string_view name) const
     return get_by_name(tensors_, unsupported_, name, path_);
 }
 
-Status SafetensorsSet::require(std::span<const TensorSpec> schema, Unexpected unexpected) const
+Status SafetensorsSet::require(std::span<const TensorSpec> schema, Unexpected unexpected, std::string_view prefix) const
 {
     Listing missing("missing"), misshapen("misshapen"), mistyped("of an unsupported dtype"), extra("unexpected");
     std::vector<std::string_view> known;
@@ -128,7 +128,7 @@ Status SafetensorsSet::require(std::span<const TensorSpec> schema, Unexpected un
     }
     std::ranges::sort(known);
     const auto list_extra = [&](const auto& tensor) {
-        if (!std::ranges::binary_search(known, std::string_view(tensor.name)))
+        if (tensor.name.starts_with(prefix) && !std::ranges::binary_search(known, std::string_view(tensor.name)))
             extra.add(fmt::format("{} {}", printable(tensor.name), shape_text(tensor.shape)));
     };
     if (unexpected == Unexpected::refuse) {
@@ -159,12 +159,18 @@ std::optional<uint64_t> first_non_finite(std::span<const std::byte> bytes, DType
     }
 }
 
+Status check_finite(const SafetensorsSet& set, const TensorInfo& tensor)
+{
+    if (const auto index = first_non_finite(set.bytes(tensor), tensor.dtype))
+        return fail(ErrorCode::bad_input, "{}: tensor {} holds NaN or infinity, first at element {} of {}",
+                    quote_path(set.path()), quote(tensor.name), *index, tensor.elements());
+    return {};
+}
+
 Status check_finite(const SafetensorsSet& set)
 {
     for (const TensorInfo& tensor : set.tensors())
-        if (const auto index = first_non_finite(set.bytes(tensor), tensor.dtype))
-            return fail(ErrorCode::bad_input, "{}: tensor {} holds NaN or infinity, first at element {} of {}",
-                        quote_path(set.path()), quote(tensor.name), *index, tensor.elements());
+        SR_CHECK(check_finite(set, tensor));
     return {};
 }
 

@@ -66,8 +66,9 @@ class SafetensorsSet {
     std::span<const std::byte> bytes(const TensorInfo& tensor) const { return shards_[tensor.shard].bytes(tensor); }
 
     // the file holds what the model needs: one error lists all missing, misshapen, wrongly typed and (unless ignored)
-    // unexpected tensors, with expected and actual shape
-    Status require(std::span<const TensorSpec> schema, Unexpected unexpected = Unexpected::refuse) const;
+    // unexpected tensors, with expected and actual shape. Only names with `prefix` can be unexpected.
+    Status require(std::span<const TensorSpec> schema, Unexpected unexpected = Unexpected::refuse,
+                   std::string_view prefix = {}) const;
 
   private:
     static Result<SafetensorsSet> open_index(const Path& path, const SafetensorsLimits& limits);
@@ -83,6 +84,7 @@ std::optional<uint64_t> first_non_finite(std::span<const std::byte> bytes, DType
 
 // an error that names the first tensor with a NaN or infinity and where in it
 Status check_finite(const SafetensorsSet& set);
+Status check_finite(const SafetensorsSet& set, const TensorInfo& tensor);
 
 struct TensorData {
     std::string name;

@@ -8,7 +8,8 @@ struct GemmPush {
     uint rows;  // M, of one group
     uint cols;  // N, of one group
     uint depth; // K, padded: the padding of x and w is zero
-    uint x_ld;  // elements
+    uint first_row;
+    uint x_ld; // elements
     uint w_ld;
     uint y_ld;
     uint bias_ld; // from one group's bias to the next
@@ -16,6 +17,9 @@ struct GemmPush {
     uint gate_ld;
     uint gate_col;  // first column of group 0 in the gate's rows
     uint gate_step; // columns from one group's gates to the next
+    uint moments_ld;
+    uint moments_pixels;     // rows of an image that count
+    uint moments_image_rows; // rows of an image
 };
 
 #endif

@@ -15,14 +15,11 @@ layout(constant_id = 2) const bool kHalfX = false; // w has the type of x
 layout(push_constant) uniform Push { GemmPush p; };
 layout(binding = 0) readonly buffer X { uvec4 x[]; }; // [groups * rows, depth]
 layout(binding = 1) readonly buffer W { uvec4 w[]; }; // [groups * cols, depth]
+#include "lib/gemm_gate.glsl"
 #include "lib/gemm_epilogue.glsl"
+#include "lib/gemm_tile.simt.glsl"
 
-const uint kStep = 16; // columns of K in shared memory
-const uint kPitch = 68; // floats of a row of 64; keeps vec4 alignment and spreads the transposing stores over banks
-shared float tile_x[kStep * kPitch]; // [k][row]
-shared float tile_w[kStep * kPitch]; // [k][col]
-
-// each thread stages one row of both tiles
+// 16 columns of one row of x and one of w
 void load(uint x_row, uint w_row, uint k, out vec4 a[4], out vec4 b[4])
 {
     [[unroll]] for (uint i = 0; i < 4; ++i)
@@ -47,37 +44,19 @@ void load(uint x_row, uint w_row, uint k, out vec4 a[4], out vec4 b[4])
 void main()
 {
     const uint thread = gl_LocalInvocationID.x;
-    const uint group = gl_WorkGroupID.z;
+    epilogue_group = gate_group = gl_WorkGroupID.z;
     const uint row = gl_WorkGroupID.x * kTileM, col = gl_WorkGroupID.y * kTileN;
-    const uint x_row = (group * p.rows + min(row + thread, p.rows - 1)) * p.x_ld;
-    const uint w_row = (group * p.cols + min(col + thread, p.cols - 1)) * p.w_ld;
-    const uint tm = thread / 8 * 8, tn = thread % 8 * 8;
-    float acc[8][8];
-    [[unroll]] for (uint i = 0; i < 8; ++i)
-        [[unroll]] for (uint j = 0; j < 8; ++j)
-            acc[i][j] = 0.0;
+    const uint x_row = (epilogue_group * p.rows + min(row + thread, p.rows - 1)) * p.x_ld;
+    const uint w_row = (epilogue_group * p.cols + min(col + thread, p.cols - 1)) * p.w_ld;
+    clear_tile();
     vec4 a[4], b[4];
     load(x_row, w_row, 0, a, b);
     for (uint k = 0; k < p.depth; k += kStep) {
         barrier();
-        [[unroll]] for (uint i = 0; i < kStep; ++i) {
-            tile_x[i * kPitch + thread] = a[i / 4][i % 4];
-            tile_w[i * kPitch + thread] = b[i / 4][i % 4];
-        }
+        stage(a, b);
         barrier();
         load(x_row, w_row, k + kStep, a, b);
-        [[unroll]] for (uint s = 0; s < kStep; ++s) {
-            float u[8], v[8];
-            [[unroll]] for (uint i = 0; i < 8; ++i) {
-                u[i] = tile_x[s * kPitch + tm + i];
-                v[i] = tile_w[s * kPitch + tn + i];
-            }
-            [[unroll]] for (uint i = 0; i < 8; ++i)
-                [[unroll]] for (uint j = 0; j < 8; ++j)
-                    acc[i][j] += u[i] * v[j];
-        }
+        multiply();
     }
-    [[unroll]] for (uint i = 0; i < 8; ++i)
-        store8(group, row + tm + i, col + tn, vec4(acc[i][0], acc[i][1], acc[i][2], acc[i][3]),
-               vec4(acc[i][4], acc[i][5], acc[i][6], acc[i][7]));
+    store_tile(row, col);
 }

@@ -2,21 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/diffusion/scheduler_config.h"
 
-#include <cmath>
-#include <initializer_list>
-#include <nlohmann/json.hpp>
-#include <set>
+#include "runtime/json_fields.h"
 
 namespace semrover {
 
 namespace {
 
-using nlohmann::json;
-
 constexpr int kMaxTrainTimesteps = 10000;
-
-template <typename T>
-using Names = std::initializer_list<std::pair<const char*, T>>;
 
 struct SamplerNames {
     Sampler sampler;
@@ -30,111 +22,7 @@ constexpr SamplerNames kSamplers[] = {
     {Sampler::euler, "euler", "EulerDiscreteScheduler"},
 };
 
-// reads fields, and remembers which ones it was asked for and the first thing that is wrong
-class Fields {
-  public:
-    explicit Fields(const json& object) : object_(object) {}
-
-    void flag(const char* name, bool& out)
-    {
-        if (const json* value = find(name)) {
-            if (!value->is_boolean())
-                return refuse(name, *value, "true or false");
-            out = value->get<bool>();
-        }
-    }
-
-    void integer(const char* name, int low, int high, int& out)
-    {
-        if (const json* value = find(name)) {
-            const double number = value->is_number_integer() ? value->get<double>() : NAN;
-            if (!(number >= low && number <= high))
-                return refuse(name, *value, fmt::format("a whole number from {} to {}", low, high));
-            out = int(number);
-        }
-    }
-
-    void number(const char* name, double low, double high, double& out)
-    {
-        if (const json* value = find(name)) {
-            const double number = value->is_number() ? value->get<double>() : NAN;
-            if (!(number >= low && number <= high))
-                return refuse(name, *value, fmt::format("a number from {} to {}", low, high));
-            out = number;
-        }
-    }
-
-    void optional_number(const char* name, double low, double high, std::optional<double>& out)
-    {
-        double value = NAN;
-        number(name, low, high, value);
-        if (!std::isnan(value))
-            out = value;
-    }
-
-    template <typename T>
-    void choice(const char* name, Names<T> names, T& out)
-    {
-        const json* value = find(name);
-        if (!value)
-            return;
-        std::string expected;
-        for (const auto& [text, meaning] : names) {
-            if (*value == text) {
-                out = meaning;
-                return;
-            }
-            expected += fmt::format("{}\"{}\"", expected.empty() ? "" : ", ", text);
-        }
-        refuse(name, *value, expected);
-    }
-
-    // a feature of diffusers that only this value leaves out
-    void only(const char* name, const json& supported)
-    {
-        if (const json* value = find(name); value && *value != supported)
-            refuse(name, *value, supported.is_null() ? "none" : supported.dump());
-    }
-
-    void ignore(const char* name) { find(name); }
-
-    Status finish(std::vector<std::string>& warnings) const
-    {
-        if (error_)
-            return tl::make_unexpected(*error_);
-        for (const auto& [name, value] : object_.items())
-            if (!name.starts_with('_') && !seen_.contains(name))
-                warnings.push_back(fmt::format("scheduler config: unknown field \"{}\" is ignored", name));
-        return {};
-    }
-
-  private:
-    // null stands for "not given", as in diffusers
-    const json* find(const char* name)
-    {
-        seen_.insert(name);
-        const auto found = object_.find(name);
-        return found == object_.end() || found->is_null() ? nullptr : &*found;
-    }
-
-    void refuse(const char* name, const json& value, const std::string& expected)
-    {
-        // note: dump() recurses, and a hostile file may nest without end
-        std::string text = value.is_structured() ? fmt::format("an {}", value.type_name())
-                                                 : value.dump(-1, ' ', true, json::error_handler_t::replace);
-        if (text.size() > 60)
-            text = text.substr(0, 60) + "...";
-        if (!error_)
-            error_ = Error{ErrorCode::bad_input,
-                           fmt::format("scheduler config: {} is {}, supported: {}", name, text, expected)};
-    }
-
-    const json& object_;
-    std::set<std::string> seen_;
-    std::optional<Error> error_;
-};
-
-void read_noise(Fields& fields, SchedulerConfig& config)
+void read_noise(JsonFields& fields, SchedulerConfig& config)
 {
     fields.integer("num_train_timesteps", 1, kMaxTrainTimesteps, config.num_train_timesteps);
     fields.choice<BetaSchedule>("beta_schedule",
@@ -158,7 +46,7 @@ void read_noise(Fields& fields, SchedulerConfig& config)
     fields.number("clip_sample_range", 1e-6, 1e6, config.clip_sample_range);
 }
 
-void read_solver(Fields& fields, SchedulerConfig& config)
+void read_solver(JsonFields& fields, SchedulerConfig& config)
 {
     fields.choice<VarianceType>("variance_type",
                                 {{"fixed_small", VarianceType::fixed_small},
@@ -176,7 +64,7 @@ void read_solver(Fields& fields, SchedulerConfig& config)
     fields.choice<bool>("timestep_type", {{"discrete", false}, {"continuous", true}}, config.continuous_timesteps);
 }
 
-void refuse_the_rest(Fields& fields)
+void refuse_the_rest(JsonFields& fields)
 {
     fields.only("algorithm_type", "dpmsolver++");
     fields.only("solver_type", "midpoint");
@@ -187,12 +75,10 @@ void refuse_the_rest(Fields& fields)
     fields.only("trained_betas", nullptr);
     fields.only("lambda_min_clipped", nullptr);
     // these matter only to what is refused above, or belong to the golden case and not to the scheduler
-    for (const char* name :
-         {"dynamic_thresholding_ratio", "sample_max_value", "flow_shift", "type", "_class_name", "num_inference_steps"})
-        fields.ignore(name);
+    fields.ignore({"dynamic_thresholding_ratio", "sample_max_value", "flow_shift", "type", "num_inference_steps"});
 }
 
-Result<Sampler> sampler_of_class(const json& object)
+Result<Sampler> sampler_of_class(const Json& object)
 {
     const auto found = object.contains("_class_name") ? object.find("_class_name") : object.find("type");
     if (found == object.end() || !found->is_string())
@@ -242,7 +128,7 @@ std::string_view sampler_name(Sampler sampler)
     SR_ASSERT(false, "sampler {}", int(sampler));
 }
 
-Result<SchedulerConfig> scheduler_config_from_json(const json& object, std::vector<std::string>& warnings,
+Result<SchedulerConfig> scheduler_config_from_json(const Json& object, std::vector<std::string>& warnings,
                                                    std::optional<Sampler> sampler)
 {
     if (!object.is_object())
@@ -258,7 +144,7 @@ Result<SchedulerConfig> scheduler_config_from_json(const json& object, std::vect
         config.spacing = TimestepSpacing::linspace;
         config.clip_sample = false;
     }
-    Fields fields(object);
+    JsonFields fields(object, "scheduler config");
     read_noise(fields, config);
     read_solver(fields, config);
     refuse_the_rest(fields);
@@ -286,7 +172,7 @@ Result<SchedulerConfig> scheduler_config_from_text(std::string_view text, std::v
             quoted = !quoted;
         plain += text[i];
     }
-    const json object = json::parse(plain, nullptr, false);
+    const Json object = Json::parse(plain, nullptr, false);
     if (object.is_discarded())
         return fail(ErrorCode::bad_input, "scheduler config: not JSON");
     return scheduler_config_from_json(object, warnings, sampler);

@@ -28,8 +28,9 @@ class Unet {
     // what depends on the timestep only: a row per timestep, once per schedule
     uint32_t time_width() const;
     void time_table(Graph& g,
-                    Tensor timesteps,    // [T, 1] fp32 array
-                    Tensor table) const; // [T, time_width] fp32
+                    Tensor timesteps,                // [T, 1] fp32 array
+                    Tensor table,                    // [T, time_width] fp32
+                    Tensor class_labels = {}) const; // [T] u32, with num_class_embeds
 
     // keys and values of every cross-attention; once per text
     uint32_t context_width() const;

@@ -20,7 +20,8 @@ struct UnetConfig {
     std::vector<uint32_t> layers_per_block = {2, 2, 2, 2};        // down blocks; an up block has one more
     std::vector<bool> down_attention = {true, true, true, false}; // CrossAttnDownBlock2D or DownBlock2D
     std::vector<bool> up_attention = {false, true, true, true};
-    bool mid_attention = true;                               // UNetMidBlock2DCrossAttn or UNetMidBlock2D
+    // UNetMidBlock2DCrossAttn: resnets.0, attentions.0, resnets.1; or UNetMidBlock2D: resnets.0 alone
+    bool mid_attention = true;
     std::vector<uint32_t> heads = {8, 8, 8, 8};              // per level; the file's attention_head_dim (sic)
     std::vector<uint32_t> transformer_layers = {1, 1, 1, 1}; // per level
     uint32_t cross_attention_dim = 768;
@@ -38,6 +39,8 @@ struct UnetConfig {
 
 // errors: bad_input; a value that the engine does not implement is refused by name
 Result<UnetConfig> parse_unet_config(const nlohmann::json& json);
+// the config.json that says the same
+nlohmann::json unet_config_json(const UnetConfig& config);
 
 // names and shapes of the network's weights, as diffusers calls them
 std::vector<TensorSpec> unet_schema(const UnetConfig& config);

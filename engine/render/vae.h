@@ -26,7 +26,7 @@ class Vae {
     uint64_t parameters() const;
     uint64_t device_bytes(const DeviceLimits& limits) const; // of the weights
 
-    // image: in_channels, -1..1, fp32 or the network's precision -> 2 * latent_channels, fp32: mean, log-variance
+    // image: in_channels, -1..1, fp32 -> 2 * latent_channels, fp32: mean, log-variance
     [[nodiscard]] FeatureMap encode(Graph& g, FeatureMap image) const;
     // latent: latent_channels, fp32, not scaled -> out_channels, fp32, -1..1 or beyond
     [[nodiscard]] FeatureMap decode(Graph& g, FeatureMap latent) const;

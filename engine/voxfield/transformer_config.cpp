@@ -2,44 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/voxfield/transformer_config.h"
 
-#include "runtime/json.h"
-
-#include <cmath>
-#include <set>
+#include "runtime/json_fields.h"
 
 namespace semrover {
 
 namespace {
-
-Status read(const Json& json, const char* name, uint32_t low, uint32_t high, uint32_t& value)
-{
-    if (!json.contains(name))
-        return {};
-    const Json& v = json[name];
-    if (!v.is_number_unsigned() || v.get<uint64_t>() < low || v.get<uint64_t>() > high)
-        return fail(ErrorCode::bad_input, "config: {} is {}, expected an integer in {}..{}", name, v.dump(), low, high);
-    value = v.get<uint32_t>();
-    return {};
-}
-
-Status read(const Json& json, const char* name, float low, float high, float& value)
-{
-    if (!json.contains(name))
-        return {};
-    const Json& v = json[name];
-    if (!v.is_number() || !(v.get<float>() >= low && v.get<float>() <= high))
-        return fail(ErrorCode::bad_input, "config: {} is {}, expected a number in {}..{}", name, v.dump(), low, high);
-    value = v.get<float>();
-    return {};
-}
-
-Status read_bool(const Json& json, const char* name, bool& value)
-{
-    if (json.contains(name) && !json[name].is_boolean())
-        return fail(ErrorCode::bad_input, "config: {} is {}, expected true or false", name, json[name].dump());
-    value = json.value(name, value);
-    return {};
-}
 
 Status read_normalization(const Json& json, TransformerConfig& config)
 {
@@ -63,31 +30,6 @@ Status read_normalization(const Json& json, TransformerConfig& config)
     return {};
 }
 
-// names and the only value that is implemented
-Status check_fixed(const Json& json)
-{
-    const auto expect = [&](const char* name, const char* value) -> Status {
-        if (json.contains(name) && json[name] != value)
-            return fail(ErrorCode::bad_input, "config: {} = {} is not implemented, only \"{}\"", name,
-                        json[name].dump(), value);
-        return {};
-    };
-    SR_CHECK(expect("_class_name", "VoxfieldTransformer"));
-    return expect("prediction_type", "sample");
-}
-
-void collect_unknown(const Json& json, TransformerConfig& config)
-{
-    static const std::set<std::string> kKnown = {
-        "_class_name",       "_diffusers_version", "num_layers", "num_attention_heads", "attention_head_dim",
-        "points_per_voxel",  "num_classes",        "voxel_size", "attention_radius",    "pos_embed_dim",
-        "context_pos_embed", "prediction_type",    "qk_norm",    "normalization",       "in_channels",
-        "out_channels",      "_name_or_path"};
-    for (const auto& [name, value] : json.items())
-        if (!kKnown.count(name))
-            config.warnings.push_back(fmt::format("config: field '{}' is not known and has no effect", name));
-}
-
 } // namespace
 
 int32_t TransformerConfig::radius2() const
@@ -99,36 +41,30 @@ int32_t TransformerConfig::radius2() const
 
 Result<TransformerConfig> parse_transformer_config(const Json& json)
 {
-    if (!json.is_object())
-        return fail(ErrorCode::bad_input, "config: expected a JSON object");
     TransformerConfig c;
-    SR_CHECK(check_fixed(json));
-    SR_CHECK(read(json, "num_layers", 1u, 1024u, c.num_layers));
-    SR_CHECK(read(json, "num_attention_heads", 1u, 1024u, c.num_attention_heads));
-    SR_CHECK(read(json, "attention_head_dim", 8u, 256u, c.attention_head_dim));
-    SR_CHECK(read(json, "points_per_voxel", 1u, 682u, c.points_per_voxel));
-    SR_CHECK(read(json, "num_classes", 1u, 65536u, c.num_classes));
-    SR_CHECK(read(json, "pos_embed_dim", 2u, 65536u, c.pos_embed_dim));
-    SR_CHECK(read(json, "voxel_size", 1e-4f, 1e4f, c.voxel_size));
-    SR_CHECK(read(json, "attention_radius", 0.f, 1e5f, c.attention_radius));
-    SR_CHECK(read_bool(json, "context_pos_embed", c.context_pos_embed));
-    SR_CHECK(read_normalization(json, c));
+    JsonFields fields(json, "config");
+    fields.only("_class_name", "VoxfieldTransformer");
+    fields.only("prediction_type", "sample");
+    fields.integer("num_layers", 1u, 1024u, c.num_layers);
+    fields.integer("num_attention_heads", 1u, 1024u, c.num_attention_heads);
+    fields.integer("attention_head_dim", 8u, 256u, c.attention_head_dim);
+    fields.integer("points_per_voxel", 1u, 682u, c.points_per_voxel);
+    fields.integer("num_classes", 1u, 65536u, c.num_classes);
+    fields.integer("pos_embed_dim", 2u, 65536u, c.pos_embed_dim);
+    fields.number("voxel_size", 1e-4f, 1e4f, c.voxel_size);
+    fields.number("attention_radius", 0.f, 1e5f, c.attention_radius);
+    fields.flag("context_pos_embed", c.context_pos_embed);
+    fields.choice<bool>("qk_norm", {{"rms_norm", true}}, c.qk_norm);
     if (c.attention_head_dim % 8)
-        return fail(ErrorCode::bad_input, "config: attention_head_dim {} is not implemented, only multiples of 8",
-                    c.attention_head_dim);
+        fields.refuse("attention_head_dim", "multiples of 8");
     if (c.pos_embed_dim % 2)
-        return fail(ErrorCode::bad_input, "config: pos_embed_dim {} must be even", c.pos_embed_dim);
-    if (json.contains("qk_norm") && !json["qk_norm"].is_null()) {
-        if (json["qk_norm"] != "rms_norm")
-            return fail(ErrorCode::bad_input, "config: qk_norm = {} is not implemented, only \"rms_norm\"",
-                        json["qk_norm"].dump());
-        c.qk_norm = true;
-    }
+        fields.refuse("pos_embed_dim", "even numbers");
     for (const char* name : {"in_channels", "out_channels"})
-        if (json.contains(name) && json[name] != c.channels())
-            return fail(ErrorCode::bad_input, "config: {} is {}, but 6 * points_per_voxel is {}", name,
-                        json[name].dump(), c.channels());
-    collect_unknown(json, c);
+        if (const Json* value = fields.find(name); value && *value != c.channels())
+            fields.refuse(name, fmt::format("6 * points_per_voxel, {}", c.channels()));
+    fields.ignore("normalization");
+    SR_CHECK(fields.finish(c.warnings));
+    SR_CHECK(read_normalization(json, c));
     return c;
 }
 

@@ -111,23 +111,6 @@ uint64_t TransformerWeights::parameters() const
     return sum;
 }
 
-namespace {
-
-void to_float(std::span<const std::byte> bytes, DType dtype, float* out)
-{
-    for (size_t i = 0, n = bytes.size() / dtype_bytes(dtype); i < n; ++i) {
-        uint16_t word = 0;
-        if (dtype == DType::f32) {
-            std::memcpy(&out[i], &bytes[4 * i], 4);
-            continue;
-        }
-        std::memcpy(&word, &bytes[2 * i], 2);
-        out[i] = dtype == DType::f16 ? half_to_float(word) : bf16_to_float(word);
-    }
-}
-
-} // namespace
-
 // values: the part's rows, unpadded; written in rows of the target with zero padding
 Status TransformerWeights::upload(Device& device, const Part& part, const float* values)
 {

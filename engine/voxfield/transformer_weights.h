@@ -2,18 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/diffusion/weight.h"
 #include "engine/voxfield/transformer_config.h"
 #include "runtime/device.h"
 #include "runtime/safetensors.h"
 
 namespace semrover {
-
-// a matrix on the device, rows padded; becomes a tensor of any graph
-struct Weight {
-    uint32_t slice = 0; // of the arena
-    uint32_t rows = 0, cols = 0;
-    DType dtype = DType::f16;
-};
 
 // one joint block; streams (voxel, semantic) stacked as groups, but where the last block has only the voxel stream
 struct BlockWeights {

@@ -3,7 +3,7 @@
 #include "engine/voxfield/voxfield_model.h"
 
 #include "runtime/hash.h"
-#include "runtime/json.h"
+#include "runtime/json_fields.h"
 
 #include <algorithm>
 
@@ -13,29 +13,18 @@ namespace {
 
 namespace fs = std::filesystem;
 
-template <typename T>
-Status read(const Json& json, const char* name, double low, double high, T& value)
-{
-    if (!json.contains(name))
-        return {};
-    if (!json[name].is_number() || !(json[name].get<double>() >= low && json[name].get<double>() <= high))
-        return fail(ErrorCode::bad_input, "model_index.json: defaults.{} is {}, expected {}..{}", name,
-                    json[name].dump(), low, high);
-    value = json[name].get<T>();
-    return {};
-}
-
 Status read_defaults(const Json& index, VoxfieldDefaults& d)
 {
-    const Json json = index.value("defaults", Json::object());
-    if (!json.is_object())
-        return fail(ErrorCode::bad_input, "model_index.json: defaults must be an object");
-    SR_CHECK(read(json, "num_inference_steps", 1, kMaxInferenceSteps, d.num_inference_steps));
-    SR_CHECK(read(json, "guidance_scale", 0, 1000, d.guidance_scale));
-    SR_CHECK(read(json, "region_size", 1, 4096, d.regions.region_size));
-    SR_CHECK(read(json, "coverage_threshold", 1, 4096, d.regions.coverage_threshold));
-    SR_CHECK(read(json, "jump_length", 0, 10000, d.repaint.jump_length));
-    return read(json, "jump_n_sample", 1, 10000, d.repaint.jump_n_sample);
+    const Json defaults = index.value("defaults", Json::object());
+    JsonFields fields(defaults, "model_index.json: defaults");
+    fields.integer("num_inference_steps", 1, kMaxInferenceSteps, d.num_inference_steps);
+    fields.number("guidance_scale", 0.f, 1000.f, d.guidance_scale);
+    fields.integer("region_size", 1, 4096, d.regions.region_size);
+    fields.integer("coverage_threshold", 1, 4096, d.regions.coverage_threshold);
+    fields.integer("jump_length", 0, 10000, d.repaint.jump_length);
+    fields.integer("jump_n_sample", 1, 10000, d.repaint.jump_n_sample);
+    std::vector<std::string> others; // for other components
+    return fields.finish(others);
 }
 
 // no scheduler in the folder: the method's own, DDPM over x0

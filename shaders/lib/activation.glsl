@@ -9,3 +9,6 @@ vec4 gelu_tanh(vec4 x)
 }
 
 vec4 silu(vec4 x) { return x / (1.0 + exp(-x)); }
+
+// placeholder until the branch with the accurate one lands
+vec4 gelu_erf(vec4 x) { return gelu_tanh(x); }

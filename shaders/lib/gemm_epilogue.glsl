@@ -1,49 +1,41 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 
-// the epilogue of every GEMM variant, eight columns at a time:
-//   v = sum + bias;  v = gelu(v) or silu(v);  v = residual + gate[gate_row[row]] * v, or residual + v
+// the epilogue of every GEMM and convolution, eight columns at a time:
+//   v = sum + bias + shift;  v = gelu(v) or silu(v);  v = h * gelu_erf(gate);  v = residual + gate * v, or residual + v;
+//   moments of v
 // note: the ids of the constants are in the order of application, which the fuse stage relies on
 #include "lib/activation.glsl"
+#include "lib/moments.glsl"
 #include "lib/pack.glsl"
 
 layout(constant_id = 10) const bool kBias = false;
-layout(constant_id = 11) const bool kGelu = false;
-layout(constant_id = 12) const bool kSilu = false;
-layout(constant_id = 13) const bool kGatedAdd = false;
-layout(constant_id = 14) const bool kAdd = false;
-layout(constant_id = 15) const bool kHalfY = false;
-layout(constant_id = 16) const bool kHalfResidual = false;
+layout(constant_id = 11) const bool kShift = false;
+layout(constant_id = 12) const bool kGelu = false;
+layout(constant_id = 13) const bool kSilu = false;
+layout(constant_id = 14) const bool kGeglu = false;
+layout(constant_id = 15) const bool kGatedAdd = false;
+layout(constant_id = 16) const bool kAdd = false;
+layout(constant_id = 17) const bool kMoments = false;
+layout(constant_id = 20) const bool kHalfY = false;
+layout(constant_id = 21) const bool kHalfResidual = false;
 
 layout(binding = 2) readonly buffer Bias { vec4 bias[]; };          // [groups, cols]
-layout(binding = 3) readonly buffer Gate { float gate[]; };         // [timesteps, gate_ld]
-layout(binding = 4) readonly buffer GateRow { uint gate_row[]; };   // [groups * rows]
-layout(binding = 5) readonly buffer Residual { uvec4 residual[]; }; // [groups * rows, cols]
-layout(binding = 6) writeonly buffer Y { uvec4 y[]; };              // [groups * rows, cols]
+layout(binding = 3) readonly buffer Residual { uvec4 residual[]; }; // [groups * rows, cols]
+layout(binding = 4) writeonly buffer Moments { vec4 moments[]; };   // [groups * rows / 16, cols] pairs: mean, m2
+layout(binding = 5) writeonly buffer Y { uvec4 y[]; };              // [groups * rows, cols], or half the columns
 
-void add_residual(uint group, uint row, uint col, inout vec4 lo, inout vec4 hi)
-{
-    vec4 r_lo, r_hi;
-    LOAD8(residual, kHalfResidual, row * p.residual_ld + col, r_lo, r_hi);
-    if (kAdd) {
-        lo += r_lo;
-        hi += r_hi;
-        return;
-    }
-    const uint g = gate_row[row] * p.gate_ld + p.gate_col + group * p.gate_step + col;
-    lo = r_lo + vec4(gate[g], gate[g + 1], gate[g + 2], gate[g + 3]) * lo;
-    hi = r_hi + vec4(gate[g + 4], gate[g + 5], gate[g + 6], gate[g + 7]) * hi;
-}
+uint epilogue_group; // set by the variants' main()
 
-// row within the group, col a multiple of 8; columns in the padding are written as zero
-void store8(uint group, uint row, uint col, vec4 lo, vec4 hi)
+// in front of what combines columns or rows; col a multiple of 8
+void activate8(uint row, uint col, inout vec4 lo, inout vec4 hi)
 {
-    if (row >= p.rows || col >= p.cols)
-        return;
     if (kBias) {
-        lo += bias[(group * p.bias_ld + col) / 4];
-        hi += bias[(group * p.bias_ld + col) / 4 + 1];
+        lo += bias[(epilogue_group * p.bias_ld + col) / 4];
+        hi += bias[(epilogue_group * p.bias_ld + col) / 4 + 1];
     }
+    if (kShift)
+        add_shift(row, col, lo, hi);
     if (kGelu) {
         lo = gelu_tanh(lo);
         hi = gelu_tanh(hi);
@@ -52,10 +44,40 @@ void store8(uint group, uint row, uint col, vec4 lo, vec4 hi)
         lo = silu(lo);
         hi = silu(hi);
     }
-    row += group * p.rows;
-    if (kGatedAdd || kAdd)
-        add_residual(group, row, col, lo, hi);
-    if (col + 8 > p.cols)
-        clear_padding(col, p.cols, lo, hi);
+}
+
+// row within the group and below p.rows, col < cols a multiple of 8: columns of y, of which the padding is zeroed
+void finish8(uint row, uint col, uint cols, inout vec4 lo, inout vec4 hi)
+{
+    row += epilogue_group * p.rows;
+    if (kGatedAdd || kAdd) {
+        vec4 r_lo, r_hi;
+        LOAD8(residual, kHalfResidual, row * p.residual_ld + col, r_lo, r_hi);
+        if (kGatedAdd)
+            scale_by_gate(row, col, lo, hi);
+        lo += r_lo;
+        hi += r_hi;
+    }
+    if (col + 8 > cols)
+        clear_padding(col, cols, lo, hi);
     STORE8(y, kHalfY, row * p.y_ld + col, lo, hi);
+}
+
+// is this row a pixel, and not padding of its image?
+bool counts_in_moments(uint row) { return row < p.rows && (row + p.first_row) % p.moments_image_rows < p.moments_pixels; }
+
+void write_moments(uint row, uint col, vec4 mean[2], vec4 m2[2])
+{
+    const uint at = ((epilogue_group * p.rows + row) / kMomentRows * p.moments_ld + 2 * col) / 4;
+    [[unroll]] for (uint i = 0; i < 2; ++i) {
+        moments[at + 2 * i] = vec4(mean[i].x, m2[i].x, mean[i].y, m2[i].y);
+        moments[at + 2 * i + 1] = vec4(mean[i].z, m2[i].z, mean[i].w, m2[i].w);
+    }
+}
+
+void store_moments(uint row, uint col, ColumnMoments m)
+{
+    vec4 mean[2], m2[2];
+    column_moments(m, mean, m2);
+    write_moments(row, col, mean, m2);
 }

@@ -1,0 +1,57 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/render/random_weights.h"
+
+#include "runtime/hash.h"
+
+#include <cmath>
+
+namespace semrover {
+
+namespace {
+
+// splitmix64's output function of a counter
+uint64_t mix(uint64_t z)
+{
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
+    return z ^ (z >> 31);
+}
+
+// 24 bits as -1 <= x < 1
+float centred(uint64_t bits)
+{
+    return float(int32_t(bits & 0xffffff) - 0x800000) * (1.f / 0x800000);
+}
+
+} // namespace
+
+void random_tensor(uint64_t seed, const TensorSpec& spec, std::vector<float>& values)
+{
+    uint64_t count = 1, fan_in = 1;
+    for (size_t i = 0; i < spec.shape.size(); ++i) {
+        count *= spec.shape[i];
+        fan_in *= i ? spec.shape[i] : 1;
+    }
+    float centre = 0, scale = std::sqrt(3.f / float(fan_in)); // a uniform number's variance is scale^2 / 3
+    if (spec.shape.size() < 2) {
+        const bool norm = spec.name.ends_with("weight");
+        centre = norm ? 1.f : 0.f;
+        scale = norm ? 0.1f : 0.05f;
+    }
+    Hash hash;
+    hash.add(spec.name);
+    const uint64_t key = mix(hash.value() ^ mix(seed + 0x9e3779b97f4a7c15ull));
+    values.resize(count);
+    float* out = values.data();
+    const uint64_t pairs = count / 2;
+    for (uint64_t i = 0; i < pairs; ++i) {
+        const uint64_t bits = mix(key + i * 0x9e3779b97f4a7c15ull);
+        out[2 * i] = centre + scale * centred(bits);
+        out[2 * i + 1] = centre + scale * centred(bits >> 32);
+    }
+    if (count % 2)
+        out[count - 1] = centre + scale * centred(mix(key + pairs * 0x9e3779b97f4a7c15ull));
+}
+
+} // namespace semrover

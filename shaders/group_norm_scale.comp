@@ -1,0 +1,53 @@
+#version 460
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// scale = weight / sqrt(var + eps), shift = bias - mean * scale of every channel of a group of an image, from the
+// moments of chunks of 16 rows, merged in a fixed order as in Chan, Golub and LeVeque 1979. A workgroup a group.
+#extension GL_GOOGLE_include_directive : require
+#include "group_norm.h"
+
+layout(local_size_x = 64) in;
+layout(push_constant) uniform Push { GroupNormScalePush p; };
+layout(binding = 0) readonly buffer Moments { vec2 moments[]; };   // [images * chunks, x_cols] mean, m2
+layout(binding = 1) readonly buffer Moments2 { vec2 moments2[]; }; // [images * chunks, x2_cols]
+layout(binding = 2) readonly buffer Weight { float weight[]; };    // [x_cols + x2_cols]
+layout(binding = 3) readonly buffer Bias { float bias[]; };
+layout(binding = 4) writeonly buffer Scale { float scale[]; };     // [2 * images, x_cols + x2_cols]: scales, then shifts
+
+shared vec3 partial[64];
+
+// (count, mean, m2) of two disjoint sets
+vec3 merge(vec3 a, vec3 b)
+{
+    const float n = a.x + b.x, share = n > 0.0 ? b.x / n : 0.0, delta = b.y - a.y;
+    return vec3(n, a.y + delta * share, a.z + b.z + delta * delta * a.x * share);
+}
+
+vec3 load(uint image, uint chunk, uint col)
+{
+    const uint row = image * p.chunks + chunk;
+    const vec2 m = col < p.x_cols ? moments[row * (p.moments_ld / 2) + col] : moments2[row * (p.moments2_ld / 2) + col - p.x_cols];
+    return vec3(float(min(p.pixels - min(chunk * 16, p.pixels), 16)), m);
+}
+
+void main()
+{
+    const uint thread = gl_LocalInvocationID.x, group = gl_WorkGroupID.x, image = gl_WorkGroupID.y;
+    const uint first = group * p.group_cols;
+    vec3 sum = vec3(0.0);
+    for (uint i = thread; i < p.chunks * p.group_cols; i += 64)
+        sum = merge(sum, load(image, i / p.group_cols, first + i % p.group_cols));
+    partial[thread] = sum;
+    for (uint step = 32; step > 0; step /= 2) {
+        barrier();
+        if (thread < step)
+            partial[thread] = merge(partial[thread], partial[thread + step]);
+    }
+    barrier();
+    const float mean = partial[0].y, inverse = inversesqrt(partial[0].z / partial[0].x + p.eps);
+    for (uint c = first + thread; c < first + p.group_cols; c += 64) {
+        const float factor = weight[c] * inverse;
+        scale[2 * image * p.scale_ld + c] = factor;
+        scale[(2 * image + 1) * p.scale_ld + c] = bias[c] - mean * factor;
+    }
+}

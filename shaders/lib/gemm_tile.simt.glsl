@@ -1,0 +1,109 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+
+// 64 x 64 outputs of a workgroup of 64 threads, 8 x 8 each; 16 columns of K at a time in shared memory
+const uint kStep = 16;  // columns of K in shared memory
+const uint kPitch = 68; // floats of a row of 64; keeps vec4 alignment and spreads the transposing stores over banks
+shared float tile_x[kStep * kPitch]; // [k][row]
+shared float tile_w[kStep * kPitch]; // [k][col]
+
+float acc[8][8];
+
+void clear_tile()
+{
+    [[unroll]] for (uint i = 0; i < 8; ++i)
+        [[unroll]] for (uint j = 0; j < 8; ++j)
+            acc[i][j] = 0.0;
+}
+
+// each thread brings 16 columns of one row of x and of w
+void stage(vec4 a[4], vec4 b[4])
+{
+    const uint thread = gl_LocalInvocationID.x;
+    [[unroll]] for (uint i = 0; i < kStep; ++i) {
+        tile_x[i * kPitch + thread] = a[i / 4][i % 4];
+        tile_w[i * kPitch + thread] = b[i / 4][i % 4];
+    }
+}
+
+void multiply()
+{
+    const uint tm = gl_LocalInvocationID.x / 8 * 8, tn = gl_LocalInvocationID.x % 8 * 8;
+    [[unroll]] for (uint s = 0; s < kStep; ++s) {
+        float u[8], v[8];
+        [[unroll]] for (uint i = 0; i < 8; ++i) {
+            u[i] = tile_x[s * kPitch + tm + i];
+            v[i] = tile_w[s * kPitch + tn + i];
+        }
+        [[unroll]] for (uint i = 0; i < 8; ++i)
+            [[unroll]] for (uint j = 0; j < 8; ++j)
+                acc[i][j] += u[i] * v[j];
+    }
+}
+
+// the neighbour holds the gates of this thread's columns; every thread must call it
+void multiply_by_neighbors_gate(inout vec4 lo, inout vec4 hi)
+{
+    const uint at = gl_LocalInvocationID.x * 8, gate = (gl_LocalInvocationID.x | 1) * 8;
+    barrier();
+    [[unroll]] for (uint i = 0; i < 4; ++i) {
+        tile_x[at + i] = lo[i];
+        tile_x[at + 4 + i] = hi[i];
+    }
+    barrier();
+    lo *= gelu_erf(vec4(tile_x[gate], tile_x[gate + 1], tile_x[gate + 2], tile_x[gate + 3]));
+    hi *= gelu_erf(vec4(tile_x[gate + 4], tile_x[gate + 5], tile_x[gate + 6], tile_x[gate + 7]));
+}
+
+// two threads hold the 16 rows of a moment: the second one's are merged into the first's; every thread must call it
+void merge_moments(uint row, uint col, ColumnMoments m)
+{
+    const uint thread = gl_LocalInvocationID.x, other = (thread + 8) % 64;
+    vec4 mean[2], m2[2];
+    column_moments(m, mean, m2);
+    barrier();
+    [[unroll]] for (uint i = 0; i < 8; ++i) {
+        tile_x[thread * 16 + i] = mean[i / 4][i % 4];
+        tile_x[thread * 16 + 8 + i] = m2[i / 4][i % 4];
+    }
+    tile_w[thread] = float(m.count);
+    barrier();
+    if (thread / 8 % 2 != 0 || row >= p.rows || col >= p.cols)
+        return;
+    const float n_a = float(m.count), n_b = tile_w[other], share = n_b / max(n_a + n_b, 1.0);
+    [[unroll]] for (uint i = 0; i < 2; ++i) {
+        vec4 mean_b, m2_b;
+        [[unroll]] for (uint j = 0; j < 4; ++j) {
+            mean_b[j] = tile_x[other * 16 + 4 * i + j];
+            m2_b[j] = tile_x[other * 16 + 8 + 4 * i + j];
+        }
+        const vec4 delta = mean_b - mean[i];
+        mean[i] += delta * share;
+        m2[i] += m2_b + delta * delta * n_a * share;
+    }
+    write_moments(row, col, mean, m2);
+}
+
+// row, col: of the workgroup's tile
+void store_tile(uint tile_row, uint tile_col)
+{
+    const uint thread = gl_LocalInvocationID.x;
+    const uint row = tile_row + thread / 8 * 8, col = tile_col + thread % 8 * 8;
+    ColumnMoments m = no_moments();
+    [[unroll]] for (uint i = 0; i < 8; ++i) {
+        bool inside = row + i < p.rows && col < p.cols;
+        vec4 lo = vec4(acc[i][0], acc[i][1], acc[i][2], acc[i][3]), hi = vec4(acc[i][4], acc[i][5], acc[i][6], acc[i][7]);
+        if (inside)
+            activate8(row + i, col, lo, hi);
+        if (kGeglu) {
+            multiply_by_neighbors_gate(lo, hi);
+            inside = inside && thread % 2 == 0;
+        }
+        if (inside)
+            finish8(row + i, kGeglu ? tile_col / 2 + thread % 8 / 2 * 8 : col, kGeglu ? p.cols / 2 : p.cols, lo, hi);
+        if (kMoments && inside && counts_in_moments(row + i))
+            add_moments(m, lo, hi);
+    }
+    if (kMoments)
+        merge_moments(row, col, m);
+}

@@ -1,0 +1,155 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/feature_map_case.h"
+
+#include <cmath>
+
+namespace semrover {
+namespace {
+
+struct ConvCase {
+    uint32_t batch, height, width, channels, channels2, outputs, kernel, stride;
+    bool end_padding;
+    uint32_t up_height, up_width;
+    bool bias, shift, silu, residual;
+};
+
+// one pixel; aligned; odd sizes and channels; two inputs; strides and paddings; upsampling to even and odd sizes; every
+// epilogue; more than one tile of every variant
+const ConvCase kCases[] = {
+    {1, 1, 1, 1, 0, 1, 3, 1, false, 0, 0, false, false, false, false},
+    {1, 4, 4, 8, 0, 16, 3, 1, false, 0, 0, true, false, false, false},
+    {2, 5, 7, 13, 0, 20, 3, 1, false, 0, 0, true, true, false, false},
+    {1, 9, 6, 16, 8, 24, 3, 1, false, 0, 0, true, false, false, true},
+    {2, 3, 5, 24, 11, 9, 1, 1, false, 0, 0, true, false, false, true},
+    {1, 7, 9, 8, 0, 40, 3, 2, false, 0, 0, true, false, true, false},
+    {2, 8, 6, 8, 0, 12, 3, 2, true, 0, 0, true, false, false, false},
+    {1, 7, 5, 16, 0, 8, 3, 2, true, 0, 0, false, false, false, false},
+    {1, 4, 5, 8, 0, 8, 3, 1, false, 8, 10, true, false, false, false},
+    {2, 4, 5, 8, 0, 8, 3, 1, false, 7, 9, true, false, false, false},
+    {2, 11, 13, 40, 0, 72, 3, 1, false, 0, 0, true, true, false, true},
+};
+
+// y of one output pixel and channel, in double; magnitude: sum of |terms|
+double convolve(const ConvCase& c, const HostImages& x, const HostImages& x2, const HostMatrix& w, uint32_t image,
+                int oy, int ox, uint32_t n, double& magnitude)
+{
+    const bool up = c.up_height != 0;
+    const int seen_height = int(up ? c.up_height : c.height), seen_width = int(up ? c.up_width : c.width);
+    const int padding = c.kernel == 1 || c.end_padding ? 0 : 1;
+    const uint32_t cols = round_up(c.channels, 8), cols2 = round_up(c.channels2, 8);
+    double sum = 0;
+    for (uint32_t tap = 0; tap < c.kernel * c.kernel; ++tap) {
+        const int y = oy * int(c.stride) - padding + int(tap / c.kernel);
+        const int x_at = ox * int(c.stride) - padding + int(tap % c.kernel);
+        if (y < 0 || x_at < 0 || y >= seen_height || x_at >= seen_width)
+            continue;
+        const uint32_t sy = uint32_t(y) >> up, sx = uint32_t(x_at) >> up;
+        const auto add = [&](double a, double b) {
+            sum += a * b;
+            magnitude += std::abs(a * b);
+        };
+        for (uint32_t k = 0; k < c.channels; ++k)
+            add(x.at(image, sy, sx, k), w.at(n, tap * (cols + cols2) + k));
+        for (uint32_t k = 0; k < c.channels2; ++k)
+            add(x2.at(image, sy, sx, k), w.at(n, tap * (cols + cols2) + cols + k));
+    }
+    return sum;
+}
+
+// weights in the kernel's layout; the columns that pad an input meet zeros
+HostMatrix packed_weights(KernelCase& k, const ConvCase& c, DType dtype)
+{
+    return k.random(c.outputs, c.kernel * c.kernel * (round_up(c.channels, 8) + round_up(c.channels2, 8)), dtype);
+}
+
+ConvOptions options_of(const ConvCase& c, DType dtype)
+{
+    ConvOptions o;
+    o.kernel = c.kernel;
+    o.stride = c.stride;
+    o.end_padding = c.end_padding;
+    o.upsampled_height = c.up_height;
+    o.upsampled_width = c.up_width;
+    o.dtype = dtype;
+    return o;
+}
+
+void check(const ConvCase& c, DType dtype)
+{
+    SCOPED_TRACE(fmt::format("{} x {}x{}x{}+{} -> {} kernel {} stride {} {}", c.batch, c.height, c.width, c.channels,
+                             c.channels2, c.outputs, c.kernel, c.stride, dtype_name(dtype)));
+    KernelCase k(test_device());
+    const HostImages x = random_images(k, c.batch, c.height, c.width, c.channels, dtype);
+    const HostImages x2 = c.channels2 ? random_images(k, c.batch, c.height, c.width, c.channels2, dtype) : HostImages{};
+    const HostMatrix w = packed_weights(k, c, dtype), bias = k.random(1, c.outputs, DType::f32);
+    const HostMatrix table = k.random(3, c.outputs + 12, DType::f32);
+    const std::vector<uint32_t> table_row = k.indices(c.batch, 3);
+    FeatureMap y = conv2d(k.graph, x.input(k), c.channels2 ? x2.input(k) : FeatureMap{}, k.input(w),
+                          c.bias ? k.input(bias) : Tensor{}, options_of(c, dtype));
+    if (c.shift)
+        y = channel_shift(k.graph, y, {k.input(table), k.input(table_row), 4});
+    if (c.silu)
+        y = y.with(silu(k.graph, y.data));
+    const HostImages residual = random_images(k, y.batch, y.height, y.width, c.outputs, dtype);
+    if (c.residual)
+        y = y.with(add(k.graph, y.data, residual.input(k).data));
+    const HostImages got{y.height, y.width, k.run(y.data)};
+    EXPECT_EQ(k.plan().passes.size(), 1u);
+    for (uint32_t image = 0; image < y.batch; ++image)
+        for (uint32_t p = 0; p < y.pixels(); ++p)
+            for (uint32_t n = 0; n < c.outputs; ++n) {
+                const uint32_t oy = p / y.width, ox = p % y.width;
+                double magnitude = 0, v = convolve(c, x, x2, w, image, int(oy), int(ox), n, magnitude);
+                v += c.bias ? bias.at(0, n) : 0;
+                v += c.shift ? table.at(table_row[image], 4 + n) : 0;
+                v = c.silu ? v / (1 + std::exp(-v)) : v;
+                v += c.residual ? residual.at(image, oy, ox, n) : 0;
+                const double tolerance = 1e-6 * (magnitude + 4) + (dtype == DType::f16 ? 6e-4 * std::abs(v) : 0);
+                ASSERT_NEAR(got.at(image, oy, ox, n), v, tolerance)
+                    << "image " << image << " pixel " << oy << ", " << ox << " channel " << n;
+            }
+    k.expect_zero_padding(got.rows);
+}
+
+TEST(kernel_conv2d, matches_a_sum_in_double_with_every_epilogue)
+{
+    for (const ConvCase& c : kCases)
+        for (DType dtype : {DType::f32, DType::f16})
+            check(c, dtype);
+}
+
+// the same convolution on a device that binds less than its tensors: bands with the rows around them
+TEST(kernel_conv2d, gives_the_same_bits_in_bands_of_rows)
+{
+    for (const ConvCase& c : {ConvCase{2, 37, 23, 16, 8, 24, 3, 1, false, 0, 0, true, true, false, true},
+                              ConvCase{1, 38, 22, 16, 0, 24, 3, 2, true, 0, 0, true, false, false, false},
+                              ConvCase{1, 19, 23, 16, 0, 24, 3, 1, false, 37, 45, true, false, false, false}}) {
+        HostImages results[2];
+        for (const bool banded : {false, true}) {
+            auto device = Device::create({.limits = banded ? "range=32768,texels=2048" : ""});
+            ASSERT_TRUE(device) << device.error().message;
+            KernelCase k(**device);
+            const HostImages x = random_images(k, c.batch, c.height, c.width, c.channels, DType::f32);
+            const HostImages x2 =
+                c.channels2 ? random_images(k, c.batch, c.height, c.width, c.channels2, DType::f32) : HostImages{};
+            const HostMatrix w = packed_weights(k, c, DType::f32), bias = k.random(1, c.outputs, DType::f32);
+            const HostMatrix table = k.random(3, c.outputs, DType::f32);
+            FeatureMap y = conv2d(k.graph, x.input(k), c.channels2 ? x2.input(k) : FeatureMap{}, k.input(w),
+                                  k.input(bias), options_of(c, DType::f32));
+            if (c.shift)
+                y = channel_shift(k.graph, y, {k.input(table), k.input(std::vector<uint32_t>(c.batch, 1)), 0});
+            const Tensor moments = channel_moments(k.graph, y);
+            const Tensor out = k.output(moments.rows, moments.cols, DType::f32, moments.ld);
+            k.graph.replace(moments.resource, out.resource);
+            results[banded] = {y.height, y.width, k.run(y.data)};
+            const HostMatrix got = k.read(out);
+            results[banded].rows.values.insert(results[banded].rows.values.end(), got.values.begin(), got.values.end());
+            EXPECT_EQ(k.plan().passes.size() > 1, banded);
+        }
+        EXPECT_EQ(results[0].rows.values, results[1].rows.values);
+    }
+}
+
+} // namespace
+} // namespace semrover

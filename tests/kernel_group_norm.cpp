@@ -1,0 +1,129 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/feature_map_case.h"
+
+#include <cmath>
+
+namespace semrover {
+namespace {
+
+struct NormCase {
+    uint32_t batch, height, width, channels, channels2, groups;
+    bool silu;
+    float mean; // of x: a large one costs digits where sums of squares are taken naively
+};
+
+const NormCase kCases[] = {
+    {1, 1, 1, 8, 0, 8, false, 0},     {1, 1, 2, 8, 0, 1, false, 0},   {2, 5, 7, 16, 0, 8, true, 0},
+    {1, 9, 31, 20, 0, 5, true, 0},    {2, 13, 19, 16, 8, 3, true, 0}, {1, 4, 4, 24, 40, 8, false, 0},
+    {2, 16, 16, 8, 0, 2, false, 300},
+};
+
+// magnitude: of the terms x scale and mean scale, whose difference the kernel forms
+double naive(const NormCase& c, const HostImages& x, const HostImages& x2, uint32_t image, uint32_t pixel,
+             uint32_t channel, const HostMatrix& weight, const HostMatrix& bias, double& magnitude)
+{
+    const auto at = [&](uint32_t p, uint32_t k) -> double {
+        return k < c.channels ? x.at(image, p / c.width, p % c.width, k)
+                              : x2.at(image, p / c.width, p % c.width, k - c.channels);
+    };
+    const uint32_t size = (c.channels + c.channels2) / c.groups, first = channel / size * size;
+    const uint32_t pixels = c.height * c.width;
+    double mean = 0, var = 0;
+    for (uint32_t p = 0; p < pixels; ++p)
+        for (uint32_t k = first; k < first + size; ++k)
+            mean += at(p, k) / (pixels * size);
+    for (uint32_t p = 0; p < pixels; ++p)
+        for (uint32_t k = first; k < first + size; ++k)
+            var += (at(p, k) - mean) * (at(p, k) - mean) / (pixels * size);
+    const double scale = weight.at(0, channel) / std::sqrt(var + 1e-5);
+    const double v = (at(pixel, channel) - mean) * scale + bias.at(0, channel);
+    magnitude = (std::abs(at(pixel, channel)) + std::abs(mean)) * std::abs(scale) + std::abs(v);
+    return c.silu ? v / (1 + std::exp(-v)) : v;
+}
+
+void check(const NormCase& c, DType dtype)
+{
+    SCOPED_TRACE(fmt::format("{} x {}x{}x{}+{} groups {} {}", c.batch, c.height, c.width, c.channels, c.channels2,
+                             c.groups, dtype_name(dtype)));
+    KernelCase k(test_device());
+    const uint32_t cols = c.channels + c.channels2;
+    HostImages x = random_images(k, c.batch, c.height, c.width, c.channels, dtype);
+    for (uint32_t r = 0; r < x.rows.rows; ++r)
+        for (uint32_t i = 0; i < c.channels; ++i)
+            x.rows.set(r, i, x.rows.at(r, i) + c.mean);
+    const HostImages x2 = c.channels2 ? random_images(k, c.batch, c.height, c.width, c.channels2, dtype) : HostImages{};
+    const HostMatrix weight = k.random(1, cols, DType::f32), bias = k.random(1, cols, DType::f32);
+    const auto input = [&](const HostImages& images) {
+        const FeatureMap map = images.input(k);
+        return NormInput{map, channel_moments(k.graph, map)};
+    };
+    GroupNormOptions options;
+    options.groups = c.groups;
+    options.silu = c.silu;
+    options.dtype = dtype;
+    const FeatureMap y =
+        group_norm(k.graph, input(x), c.channels2 ? input(x2) : NormInput{}, k.input(weight), k.input(bias), options);
+    const HostImages got{c.height, c.width, k.run(y.data)};
+    for (uint32_t image = 0; image < c.batch; ++image)
+        for (uint32_t p = 0; p < c.height * c.width; ++p)
+            for (uint32_t i = 0; i < cols; ++i) {
+                double magnitude = 0;
+                const double v = naive(c, x, x2, image, p, i, weight, bias, magnitude);
+                const double tolerance = 1e-6 * (magnitude + 1) + (dtype == DType::f16 ? 6e-4 * std::abs(v) : 0);
+                ASSERT_NEAR(got.at(image, p / c.width, p % c.width, i), v, tolerance)
+                    << "image " << image << " pixel " << p << " channel " << i;
+            }
+    k.expect_zero_padding(got.rows);
+}
+
+TEST(kernel_group_norm, matches_two_passes_in_double)
+{
+    for (const NormCase& c : kCases)
+        for (DType dtype : {DType::f32, DType::f16})
+            check(c, dtype);
+}
+
+// statistics taken in the epilogue of the pass that makes x are those of a pass of their own
+TEST(kernel_group_norm, takes_statistics_from_the_producer)
+{
+    for (DType dtype : {DType::f32, DType::f16}) {
+        KernelCase k(test_device());
+        const HostImages x = random_images(k, 2, 9, 11, 24, dtype);
+        const HostMatrix w = k.random(40, 24, dtype), w3 = k.random(40, 9 * 24, dtype);
+        const FeatureMap in = x.input(k), linear = in.with(gemm(k.graph, in.data, k.input(w), {}, {.dtype = dtype}));
+        ConvOptions options;
+        options.dtype = dtype;
+        const FeatureMap spatial = conv2d(k.graph, in, {}, k.input(w3), {}, options);
+        const FeatureMap sum = spatial.with(add(k.graph, spatial.data, linear.data));
+        const Tensor of_linear = channel_moments(k.graph, linear), of_sum = channel_moments(k.graph, sum);
+        const Tensor maps[] = {linear.data, sum.data, of_linear, of_sum};
+        Tensor out[4];
+        for (size_t i = 0; i < 4; ++i) {
+            out[i] = k.output(maps[i].rows, maps[i].cols, maps[i].dtype, maps[i].ld);
+            k.graph.replace(maps[i].resource, out[i].resource);
+        }
+        (void)k.compile_and_run();
+        for (size_t i = 0; i < 2; ++i) {
+            const HostMatrix values = k.read(out[i]), moments = k.read(out[2 + i]);
+            for (uint32_t chunk = 0; chunk < moments.rows; ++chunk)
+                for (uint32_t c = 0; c < 40; ++c) {
+                    double mean = 0, m2 = 0;
+                    uint32_t n = 0;
+                    for (uint32_t r = chunk * 16; r < chunk * 16 + 16; ++r)
+                        if (r % x.image_rows() < 99)
+                            mean += values.at(r, c), ++n;
+                    mean /= n;
+                    for (uint32_t r = chunk * 16; r < chunk * 16 + 16; ++r)
+                        if (r % x.image_rows() < 99)
+                            m2 += (values.at(r, c) - mean) * (values.at(r, c) - mean);
+                    const double tolerance = dtype == DType::f16 ? 1e-2 : 1e-5;
+                    ASSERT_NEAR(moments.at(chunk, 2 * c), mean, tolerance) << chunk << " " << c;
+                    ASSERT_NEAR(moments.at(chunk, 2 * c + 1), m2, tolerance * (1 + 10 * m2)) << chunk << " " << c;
+                }
+        }
+    }
+}
+
+} // namespace
+} // namespace semrover
