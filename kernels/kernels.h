@@ -225,6 +225,19 @@ void step_update(Graph& g, StepTable steps,
                  Tensor x0,    // [M, N], in place: previous prediction, then this one
                  float guidance, float clip);
 
+// what a deferred renderer's network sees beside the state x, [M, C]: pixels of one frame, at the size of its latent
+struct RendererFrame {
+    Tensor previous; // [M, C] fp32: latent of the frame before, with noise
+    Tensor buffer;   // [M, C] fp32: latent of the splat buffer
+    Tensor visible;  // [M, 1] fp32: share of the pixel that the splats cover
+};
+
+// y = [in_scale x, previous, buffer, visible]; with two halves [in_scale x, 0, buffer, 0] follows, for guidance
+[[nodiscard]] Tensor renderer_input(Graph& g, StepTable steps,
+                                    Tensor x, // [M, C] fp32
+                                    const RendererFrame& frame, uint32_t halves,
+                                    DType dtype); // of y: [halves * M, 3C + 1]
+
 // -- splats -----------------------------------------------------------------------------------------------------------
 
 // y[i] = value

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/voxfield/token_sampler.h"
 
-#include "shaders/lib/step_row.h"
+#include "engine/diffusion/step_rows.h"
 
 #include <cmath>
 #include <cstring>
@@ -12,28 +12,7 @@ namespace semrover {
 
 namespace {
 
-constexpr uint32_t kFirstDraw = 0xfffff; // noise key of the first noise; plans have at most a million rows
-constexpr size_t kInFlight = 3;          // submits ahead of the device
-
-StepRow to_row(const PlanRow& row)
-{
-    const StepCoefficients& c = row.coefficients;
-    StepRow r{};
-    r.in_scale = float(c.in_scale);
-    r.x0_x = float(c.x0_x);
-    r.x0_m = float(c.x0_m);
-    r.c_x0 = float(c.c_x0);
-    r.c_x = float(c.c_x);
-    r.c_m = float(c.c_m);
-    r.c_prev = float(c.c_prev);
-    r.c_z = float(c.c_z);
-    r.known_scale = float(c.known_scale);
-    r.known_noise = float(c.known_noise);
-    r.draw = row.draw;
-    r.timestep_index = row.timestep_index;
-    r.noise_stream = row.kind == PlanRowKind::undo ? 2 : 0;
-    return r;
-}
+constexpr size_t kInFlight = 3; // submits ahead of the device
 
 } // namespace
 
@@ -154,12 +133,9 @@ Result<std::unique_ptr<TokenSampler>> TokenSampler::create(Device& device, const
 // row 0 is the first noise, x = init_noise_sigma * z; the plan's rows follow
 Status TokenSampler::upload_steps()
 {
-    std::vector<StepRow> rows(1);
-    rows[0].c_z = float(plan_.init_noise_sigma);
-    rows[0].draw = kFirstDraw;
-    rows[0].noise_stream = 2;
+    std::vector<StepRow> rows{first_noise_row(plan_.init_noise_sigma, kFirstDraw)};
     for (const PlanRow& row : plan_.rows)
-        rows.push_back(to_row(row));
+        rows.push_back(step_row(row));
     return device_.write(arena_.slice(steps_), std::as_bytes(std::span(rows)));
 }
 

@@ -1,0 +1,60 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/render/frame_images.h"
+#include "engine/scene/camera_path.h"
+#include "engine/scene/grid.h"
+#include "engine/splat/rasterizer.h"
+
+#include <map>
+
+namespace CLI {
+class App;
+}
+
+namespace semrover {
+
+// how a grid is driven through and drawn: what `render` and `refine` share
+struct DriveOptions {
+    std::string path, rig, splat_radius = "0.04", background = "0,0,0";
+    uint32_t width = 616, height = 424;
+    double fov = 73.0; // degrees: the focal length of the reference pictures, 420 pixels at a width of 616
+    float opacity = 1, visible_alpha = 0.5f;
+    bool semantic = false;
+};
+void add_drive_options(CLI::App& command, DriveOptions& options);
+
+Status check_drive(const DriveOptions& options);                           // usage
+Result<std::array<uint8_t, 3>> background_of(const DriveOptions& options); // usage
+Result<CameraPath> load_cameras(const DriveOptions& options);              // the path, through the rig if any
+Result<SurfelScene> load_scene(const DriveOptions& options, const Path& grid_path, const VoxelGrid& grid,
+                               Device& device);
+
+// frames of one moment are drawn in one submit, with one rasterizer for each image size
+class PathRenderer {
+  public:
+    PathRenderer(Device& device, const SurfelScene& scene, const RasterizerOptions& options)
+        : device_(device), scene_(scene), options_(options)
+    {
+    }
+
+    Result<std::vector<SplatImage>> render(std::span<const CameraFrame> frames);
+
+  private:
+    Device& device_;
+    const SurfelScene& scene_;
+    RasterizerOptions options_;
+    std::map<std::pair<uint32_t, uint32_t>, std::unique_ptr<Rasterizer>> rasterizers_;
+};
+
+// draws a whole path in order; `drawn` gets every frame, `moved` how many there were after each moment and may stop the
+// run. The pictures of a camera without a name belong into the folder itself.
+struct PathCallbacks {
+    std::function<Status(const CameraFrame&, const SplatImage&)> drawn;
+    std::function<Status(size_t done)> moved;
+};
+Status render_path(PathRenderer& renderer, const CameraPath& path, const PathCallbacks& callbacks);
+Path camera_folder(const Path& folder, const std::string& camera);
+
+} // namespace semrover
