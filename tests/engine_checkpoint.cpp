@@ -95,7 +95,7 @@ TEST(Checkpoint, half_precision_is_read_exactly)
         w.write(folder / (kBase + ".safetensors"), dtype);
         const auto checkpoint = Checkpoint::open_folder(folder.path(), Network::unet);
         ASSERT_TRUE(checkpoint->read(spec, values));
-        EXPECT_EQ(checkpoint->dtype(spec), dtype);
+        EXPECT_EQ(checkpoint->stream(spec).dtype, dtype);
         from_float(w.values["w"], dtype, bytes.data());
         to_float(bytes, dtype, again.data());
         EXPECT_EQ(values, again);
