@@ -60,7 +60,7 @@ TEST(Checkpoint, a_folder_one_file_or_shards_and_an_ldm_file_give_the_same_numbe
     }
     for (size_t part = 0; part < 2; ++part)
         parts[part].write(folder / "shards" / fmt::format("{}-{}.safetensors", kBase, part));
-    write_json(folder / "shards" / (kBase + ".safetensors.index.json"), index);
+    EXPECT_TRUE(write_json(folder / "shards" / (kBase + ".safetensors.index.json"), index));
     Weights ldm = ldm_weights(unet, vae);
     ldm.add("model_ema.decay", {"model_ema.decay", {1}});
     ldm.add("betas", {"betas", {1000}});

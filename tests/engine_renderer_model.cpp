@@ -18,23 +18,24 @@ void put_model(const Path& folder, const UnetConfig& unet = small_unet(), const 
     Weights unet_weights, vae_weights, conditioning;
     unet_weights.add(unet_schema(unet));
     unet_weights.write(folder / renderer / kFile);
-    write_json(folder / renderer / "config.json", unet_config_json(unet));
+    EXPECT_TRUE(write_json(folder / renderer / "config.json", unet_config_json(unet)));
     vae_weights.add(vae_schema(small_vae()));
     vae_weights.write(folder / "vae" / kFile);
-    write_json(folder / "vae" / "config.json", vae_config_json(small_vae()));
+    EXPECT_TRUE(write_json(folder / "vae" / "config.json", vae_config_json(small_vae())));
     conditioning.add("encoder_hidden_states", {"c", {1, 5, unet.cross_attention_dim}});
     conditioning.write(folder / "conditioning" / "conditioning.safetensors", DType::f16);
-    write_json(folder / "scheduler" / "scheduler_config.json", stable_diffusion_scheduler_json());
+    EXPECT_TRUE(write_json(folder / "scheduler" / "scheduler_config.json", stable_diffusion_scheduler_json()));
 }
 
 TEST(RendererModel, a_folder_gives_configs_scheduler_text_and_defaults)
 {
     const ScratchFolder folder;
     put_model(folder.path());
-    write_json(folder / "model_index.json",
-               {{"_class_name", "SemRoverPipeline"},
-                {"defaults",
-                 {{"num_inference_steps", 99}, {"renderer", {{"num_inference_steps", 7}, {"previous_noise", 0.5}}}}}});
+    EXPECT_TRUE(write_json(
+        folder / "model_index.json",
+        {{"_class_name", "SemRoverPipeline"},
+         {"defaults",
+          {{"num_inference_steps", 99}, {"renderer", {{"num_inference_steps", 7}, {"previous_noise", 0.5}}}}}}));
     const auto m = RendererModel::open(folder.path());
     ASSERT_TRUE(m) << m.error().message;
     EXPECT_EQ(m->warnings, std::vector<std::string>());
@@ -52,7 +53,7 @@ TEST(RendererModel, a_folder_gives_configs_scheduler_text_and_defaults)
     EXPECT_EQ(RendererModel::open(folder.path(), Sampler::dpmpp_2m)->scheduler.sampler, Sampler::dpmpp_2m);
     const auto hash = m->hash();
     ASSERT_TRUE(hash);
-    write_json(folder / "scheduler" / "scheduler_config.json", {{"_class_name", "DDPMScheduler"}});
+    EXPECT_TRUE(write_json(folder / "scheduler" / "scheduler_config.json", {{"_class_name", "DDPMScheduler"}}));
     EXPECT_NE(*RendererModel::open(folder.path())->hash(), *hash);
 }
 
@@ -84,7 +85,7 @@ TEST(RendererModel, pndm_gives_way_to_ddim)
     put_model(folder.path());
     Json pndm = stable_diffusion_scheduler_json();
     pndm["_class_name"] = "PNDMScheduler";
-    write_json(folder / "scheduler" / "scheduler_config.json", pndm);
+    EXPECT_TRUE(write_json(folder / "scheduler" / "scheduler_config.json", pndm));
     const auto m = RendererModel::open(folder.path());
     ASSERT_TRUE(m) << m.error().message;
     EXPECT_EQ(m->scheduler.sampler, Sampler::ddim);
@@ -153,18 +154,18 @@ TEST(RendererModel, files_that_do_not_fit_are_refused_before_a_device_is_touched
     put_model(folder.path());
     UnetConfig wider = small_unet();
     wider.cross_attention_dim = 32;
-    write_json(folder / "renderer" / "config.json", unet_config_json(wider));
+    EXPECT_TRUE(write_json(folder / "renderer" / "config.json", unet_config_json(wider)));
     EXPECT_TRUE(
         says(RendererModel::open(folder.path()), "encoder_hidden_states is [1, 5, 24], expected [1, 1..4096, 32]"));
     fs::remove_all(folder / "conditioning");
     EXPECT_TRUE(says(RendererModel::open(folder.path()), "22 misshapen"));
-    write_json(folder / "renderer" / "config.json", {{"class_embed_type", "timestep"}});
+    EXPECT_TRUE(write_json(folder / "renderer" / "config.json", {{"class_embed_type", "timestep"}}));
     EXPECT_TRUE(
         says(RendererModel::open(folder.path()), "config.json': unet config: class_embed_type is \"timestep\""));
     put_model(folder.path());
-    write_json(folder / "model_index.json", {{"defaults", {{"renderer", {{"guidance_scale", -1}}}}}});
+    EXPECT_TRUE(write_json(folder / "model_index.json", {{"defaults", {{"renderer", {{"guidance_scale", -1}}}}}}));
     EXPECT_TRUE(says(RendererModel::open(folder.path()), "defaults.renderer: guidance_scale is -1"));
-    write_json(folder / "model_index.json", {{"defaults", 7}});
+    EXPECT_TRUE(write_json(folder / "model_index.json", {{"defaults", 7}}));
     EXPECT_TRUE(says(RendererModel::open(folder.path()), "expected a JSON object"));
 }
 
