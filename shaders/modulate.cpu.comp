@@ -5,7 +5,6 @@
 // texel buffers, no shared memory; the mean is taken out before squaring
 #extension GL_GOOGLE_include_directive : require
 #include "modulate.h"
-#include "lib/pack.glsl"
 #include "lib/thread.glsl"
 
 layout(local_size_x = 8) in;
@@ -17,16 +16,7 @@ layout(binding = 0) uniform usamplerBuffer X;                       // [groups *
 layout(binding = 1) uniform usamplerBuffer Table;                   // [timesteps, table_ld]
 layout(binding = 2) readonly buffer TableRow { uint table_row[]; }; // [groups * rows]
 layout(binding = 3) writeonly buffer Y { uvec4 y[]; };              // [groups * rows, cols]
-
-void load_x(uint at, out vec4 lo, out vec4 hi)
-{
-    if (kHalfX) {
-        unpack8(texelFetch(X, int(at / 8)), lo, hi);
-    } else {
-        lo = uintBitsToFloat(texelFetch(X, int(at / 4)));
-        hi = uintBitsToFloat(texelFetch(X, int(at / 4 + 1)));
-    }
-}
+#include "lib/row_moments_lane.glsl"
 
 // columns of the table start anywhere when N is not a multiple of 4
 vec4 load_table(uint at)
@@ -38,36 +28,19 @@ vec4 load_table(uint at)
     return at % 4 == 1 ? vec4(a.yzw, b.x) : at % 4 == 2 ? vec4(a.zw, b.xy) : vec4(a.w, b.xyz);
 }
 
-float sum4(vec4 v) { return (v.x + v.y) + (v.z + v.w); }
-
 void main()
 {
     const uint row = linear_thread();
-    const uint in_row = row * p.x_ld;
     if (row >= p.rows * p.groups)
         return;
-    vec4 lo, hi;
-    float sum = 0.0;
-    for (uint c = 0; c < p.cols; c += 8) { // padding is zero
-        load_x(in_row + c, lo, hi);
-        sum += sum4(lo) + sum4(hi);
-    }
-    const float mean = sum / float(p.cols);
-    sum = 0.0;
-    for (uint c = 0; c < p.cols; c += 8) {
-        load_x(in_row + c, lo, hi);
-        lo -= mean;
-        hi -= mean;
-        clear_padding(c, p.cols, lo, hi);
-        sum += sum4(lo * lo) + sum4(hi * hi);
-    }
-    const float inverse = inversesqrt(sum / float(p.cols) + p.eps);
+    const RowMoments m = row_moments(row);
     const uint modulation = table_row[row] * p.table_ld + row / p.rows * p.step;
     for (uint c = 0; c < p.cols; c += 8) {
-        load_x(in_row + c, lo, hi);
+        vec4 lo, hi;
+        load_x(row * p.x_ld + c, lo, hi);
         const uint scale = modulation + p.scale_col + c, shift = modulation + p.shift_col + c;
-        lo = (lo - mean) * inverse * (1.0 + load_table(scale)) + load_table(shift);
-        hi = (hi - mean) * inverse * (1.0 + load_table(scale + 4)) + load_table(shift + 4);
+        lo = (lo - m.mean) * m.inverse * (1.0 + load_table(scale)) + load_table(shift);
+        hi = (hi - m.mean) * m.inverse * (1.0 + load_table(scale + 4)) + load_table(shift + 4);
         clear_padding(c, p.cols, lo, hi);
         STORE8(y, kHalfY, row * p.y_ld + c, lo, hi);
     }

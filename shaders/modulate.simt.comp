@@ -4,7 +4,6 @@
 // y = (x - mean(x)) / sqrt(var(x) + eps) * (1 + scale) + shift, one workgroup a row; the mean is taken out before squaring
 #extension GL_GOOGLE_include_directive : require
 #include "modulate.h"
-#include "lib/pack.glsl"
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
@@ -16,56 +15,22 @@ layout(binding = 0) readonly buffer X { uvec4 x[]; };             // [groups * r
 layout(binding = 1) readonly buffer Table { float table[]; };     // [timesteps, table_ld]
 layout(binding = 2) readonly buffer TableRow { uint table_row[]; }; // [groups * rows]
 layout(binding = 3) writeonly buffer Y { uvec4 y[]; };            // [groups * rows, cols]
-
-shared float partial[64];
-
-float reduce(float v) // fixed tree: the same sum whatever the subgroup size
-{
-    const uint t = gl_LocalInvocationID.x;
-    partial[t] = v;
-    barrier();
-    for (uint half_size = 32; half_size > 0; half_size /= 2) {
-        if (t < half_size)
-            partial[t] += partial[t + half_size];
-        barrier();
-    }
-    const float sum = partial[0];
-    barrier();
-    return sum;
-}
-
-float sum4(vec4 v) { return (v.x + v.y) + (v.z + v.w); }
+#include "lib/row_moments_group.glsl"
 
 void main()
 {
     const uint row = linear_group();
     if (row >= p.rows * p.groups)
         return;
-    const uint first = gl_LocalInvocationID.x * 8, stride = 64 * 8;
-    const uint in_row = row * p.x_ld;
-    vec4 lo, hi;
-    float sum = 0.0;
-    for (uint c = first; c < p.cols; c += stride) { // padding is zero
-        LOAD8(x, kHalfX, in_row + c, lo, hi);
-        sum += sum4(lo) + sum4(hi);
-    }
-    const float mean = reduce(sum) / float(p.cols);
-    sum = 0.0;
-    for (uint c = first; c < p.cols; c += stride) {
-        LOAD8(x, kHalfX, in_row + c, lo, hi);
-        lo -= mean;
-        hi -= mean;
-        clear_padding(c, p.cols, lo, hi);
-        sum += sum4(lo * lo) + sum4(hi * hi);
-    }
-    const float inverse = inversesqrt(reduce(sum) / float(p.cols) + p.eps);
+    const RowMoments m = row_moments(row);
     const uint modulation = table_row[row] * p.table_ld + row / p.rows * p.step;
-    for (uint c = first; c < p.cols; c += stride) {
-        LOAD8(x, kHalfX, in_row + c, lo, hi);
+    for (uint c = gl_LocalInvocationID.x * 8; c < p.cols; c += kRowStride) {
+        vec4 lo, hi;
+        LOAD8(x, kHalfX, row * p.x_ld + c, lo, hi);
         const uint scale = modulation + p.scale_col + c, shift = modulation + p.shift_col + c;
-        lo = (lo - mean) * inverse * (1.0 + vec4(table[scale], table[scale + 1], table[scale + 2], table[scale + 3])) +
+        lo = (lo - m.mean) * m.inverse * (1.0 + vec4(table[scale], table[scale + 1], table[scale + 2], table[scale + 3])) +
              vec4(table[shift], table[shift + 1], table[shift + 2], table[shift + 3]);
-        hi = (hi - mean) * inverse * (1.0 + vec4(table[scale + 4], table[scale + 5], table[scale + 6], table[scale + 7])) +
+        hi = (hi - m.mean) * m.inverse * (1.0 + vec4(table[scale + 4], table[scale + 5], table[scale + 6], table[scale + 7])) +
              vec4(table[shift + 4], table[shift + 5], table[shift + 6], table[shift + 7]);
         clear_padding(c, p.cols, lo, hi);
         STORE8(y, kHalfY, row * p.y_ld + c, lo, hi);
