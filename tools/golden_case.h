@@ -69,5 +69,6 @@ Result<GoldenOutputs> run_repaint_timesteps(Device& device, const GoldenCase& c,
 Result<GoldenOutputs> run_region_extraction(Device& device, const GoldenCase& c, DType precision);
 Result<GoldenOutputs> run_splat_render(Device& device, const GoldenCase& c, DType precision);
 Result<GoldenOutputs> run_pca_normals(Device& device, const GoldenCase& c, DType precision);
+Result<GoldenOutputs> run_asd_rollout(Device& device, const GoldenCase& c, DType precision);
 
 } // namespace semrover
