@@ -262,12 +262,18 @@ void print_plan(const Job& j)
     std::fflush(stdout);
 }
 
-Status dry_run(Job& j)
+// as if nothing were done yet
+Status plan_whole_run(Job& j)
 {
     std::vector<RendererWork> work;
     for (const RefineChain& c : j.chains)
         work.push_back({c.size});
-    SR_CHECK(make_memory_plan(j, work));
+    return make_memory_plan(j, work);
+}
+
+Status dry_run(Job& j)
+{
+    SR_CHECK(plan_whole_run(j));
     print_plan(j);
     if (!j.globals.json)
         return {};
@@ -291,14 +297,18 @@ RefineVideos videos_of(const Options& o)
     return {o.video, o.side_by_side, o.frames_per_second};
 }
 
+bool was_stopped(const Options& o)
+{
+    const auto before = read_json(Path(o.output) / "run.json");
+    return before && before->is_object() && before->value("state", "") == "running";
+}
+
 // what would be replaced is refused now; a run that was stopped may go on
 Status check_outputs(const Job& j)
 {
     const Options& o = j.options;
     const Path out = o.output;
-    const auto before = read_json(out / "run.json");
-    const bool going_on = before && before->is_object() && before->value("state", "") == "running";
-    if (j.globals.yes || going_on)
+    if (j.globals.yes || was_stopped(o))
         return {};
     std::vector<Path> files{out / "run.json", out / "frames", out / "latents"};
     for (const std::string& video : {o.video, o.side_by_side})
@@ -375,6 +385,8 @@ Status refine(const Options& o, const Globals& globals)
     j.device->reset_peak();
     if (o.dry_run)
         return dry_run(j);
+    if (!was_stopped(o))
+        SR_CHECK(plan_whole_run(j)); // what does not fit is refused before anything is replaced
     SR_TRY(const Json settings, settings_json(j));
     RunContents contents{{"encoded"}, {"latents", "frames"}};
     if (o.from_grid())
@@ -384,6 +396,8 @@ Status refine(const Options& o, const Globals& globals)
     if (!status && status.error().code == ErrorCode::interrupted)
         return fail(ErrorCode::interrupted, "interrupted; what is done is in {}, the same command goes on",
                     quote_path(o.output));
+    if (!status)
+        run.drop_if_empty();
     return status;
 }
 

@@ -27,7 +27,7 @@ tl::unexpected<Error> system_failure(const char* what, const Path& path)
 
 RunFolder::RunFolder(RunFolder&& other) noexcept
     : path_(std::move(other.path_)), settings_(std::move(other.settings_)), contents_(std::move(other.contents_)),
-      entries_(std::move(other.entries_)), lock_(std::exchange(other.lock_, -1)),
+      entries_(std::move(other.entries_)), appended_(other.appended_), lock_(std::exchange(other.lock_, -1)),
       journal_(std::exchange(other.journal_, -1))
 {
 }
@@ -128,7 +128,18 @@ Status RunFolder::append(const Json& entry)
     }
     if (::fdatasync(journal_) != 0)
         return system_failure("write", path_ / "journal.jsonl");
+    appended_ = true;
     return {};
+}
+
+void RunFolder::drop_if_empty()
+{
+    if (appended_ || !entries_.empty())
+        return;
+    std::error_code ignored;
+    for (const char* name : {"run.json", "journal.jsonl", "lock"})
+        fs::remove(path_ / name, ignored);
+    fs::remove(path_, ignored); // stays if it holds anything else
 }
 
 Status RunFolder::finish(const Json& results)

@@ -34,6 +34,8 @@ class RunFolder {
     Status append(const Json& entry); // on the disk when it returns
     // run.json with `results` added; the pieces' files go
     Status finish(const Json& results);
+    // after an error: a run without a single piece leaves nothing behind
+    void drop_if_empty();
 
   private:
     RunFolder() = default;
@@ -45,6 +47,7 @@ class RunFolder {
     Json settings_;
     RunContents contents_;
     std::vector<Json> entries_;
+    bool appended_ = false;
     int lock_ = -1, journal_ = -1;
 };
 
