@@ -18,15 +18,7 @@ layout(binding = 1) uniform usamplerBuffer Table;                   // [timestep
 layout(binding = 2) readonly buffer TableRow { uint table_row[]; }; // [groups * rows]
 layout(binding = 3) writeonly buffer Y { uvec4 y[]; };              // [groups * rows, cols]
 
-void load_x(uint at, out vec4 lo, out vec4 hi)
-{
-    if (kHalfX) {
-        unpack8(texelFetch(X, int(at / 8)), lo, hi);
-    } else {
-        lo = uintBitsToFloat(texelFetch(X, int(at / 4)));
-        hi = uintBitsToFloat(texelFetch(X, int(at / 4 + 1)));
-    }
-}
+#include "lib/row_norm.cpu.glsl"
 
 // columns of the table start anywhere when N is not a multiple of 4
 vec4 load_table(uint at)
@@ -38,30 +30,15 @@ vec4 load_table(uint at)
     return at % 4 == 1 ? vec4(a.yzw, b.x) : at % 4 == 2 ? vec4(a.zw, b.xy) : vec4(a.w, b.xyz);
 }
 
-float sum4(vec4 v) { return (v.x + v.y) + (v.z + v.w); }
-
 void main()
 {
     const uint row = linear_thread();
     const uint in_row = row * p.x_ld;
     if (row >= p.rows * p.groups)
         return;
+    float mean, inverse;
+    row_statistics(in_row, mean, inverse);
     vec4 lo, hi;
-    float sum = 0.0;
-    for (uint c = 0; c < p.cols; c += 8) { // padding is zero
-        load_x(in_row + c, lo, hi);
-        sum += sum4(lo) + sum4(hi);
-    }
-    const float mean = sum / float(p.cols);
-    sum = 0.0;
-    for (uint c = 0; c < p.cols; c += 8) {
-        load_x(in_row + c, lo, hi);
-        lo -= mean;
-        hi -= mean;
-        clear_padding(c, p.cols, lo, hi);
-        sum += sum4(lo * lo) + sum4(hi * hi);
-    }
-    const float inverse = inversesqrt(sum / float(p.cols) + p.eps);
     const uint modulation = table_row[row] * p.table_ld + row / p.rows * p.step;
     for (uint c = 0; c < p.cols; c += 8) {
         load_x(in_row + c, lo, hi);

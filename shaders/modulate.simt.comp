@@ -17,24 +17,7 @@ layout(binding = 1) readonly buffer Table { float table[]; };     // [timesteps,
 layout(binding = 2) readonly buffer TableRow { uint table_row[]; }; // [groups * rows]
 layout(binding = 3) writeonly buffer Y { uvec4 y[]; };            // [groups * rows, cols]
 
-shared float partial[64];
-
-float reduce(float v) // fixed tree: the same sum whatever the subgroup size
-{
-    const uint t = gl_LocalInvocationID.x;
-    partial[t] = v;
-    barrier();
-    for (uint half_size = 32; half_size > 0; half_size /= 2) {
-        if (t < half_size)
-            partial[t] += partial[t + half_size];
-        barrier();
-    }
-    const float sum = partial[0];
-    barrier();
-    return sum;
-}
-
-float sum4(vec4 v) { return (v.x + v.y) + (v.z + v.w); }
+#include "lib/row_norm.simt.glsl"
 
 void main()
 {
@@ -43,22 +26,9 @@ void main()
         return;
     const uint first = gl_LocalInvocationID.x * 8, stride = 64 * 8;
     const uint in_row = row * p.x_ld;
+    float mean, inverse;
+    row_statistics(in_row, mean, inverse);
     vec4 lo, hi;
-    float sum = 0.0;
-    for (uint c = first; c < p.cols; c += stride) { // padding is zero
-        LOAD8(x, kHalfX, in_row + c, lo, hi);
-        sum += sum4(lo) + sum4(hi);
-    }
-    const float mean = reduce(sum) / float(p.cols);
-    sum = 0.0;
-    for (uint c = first; c < p.cols; c += stride) {
-        LOAD8(x, kHalfX, in_row + c, lo, hi);
-        lo -= mean;
-        hi -= mean;
-        clear_padding(c, p.cols, lo, hi);
-        sum += sum4(lo * lo) + sum4(hi * hi);
-    }
-    const float inverse = inversesqrt(reduce(sum) / float(p.cols) + p.eps);
     const uint modulation = table_row[row] * p.table_ld + row / p.rows * p.step;
     for (uint c = first; c < p.cols; c += stride) {
         LOAD8(x, kHalfX, in_row + c, lo, hi);

@@ -97,7 +97,10 @@ void add_bench(CLI::App& app, const Globals& globals, Run& run)
     bench->require_subcommand(1);
     bench->fallthrough();
     add_bench_gemm(*bench, globals, run);
+    add_bench_conv(*bench, globals, run);
     add_bench_transformer(*bench, globals, run);
+    add_bench_unet(*bench, globals, run);
+    add_bench_vae(*bench, globals, run);
     add_bench_regions(*bench, globals, run);
     add_bench_sort(*bench, globals, run);
     add_bench_splat(*bench, globals, run);

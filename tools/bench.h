@@ -47,7 +47,10 @@ class BenchInputs {
 };
 
 void add_bench_gemm(CLI::App& bench, const Globals& globals, Run& run);
+void add_bench_conv(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_transformer(CLI::App& bench, const Globals& globals, Run& run);
+void add_bench_unet(CLI::App& bench, const Globals& globals, Run& run);
+void add_bench_vae(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_regions(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_sort(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_splat(CLI::App& bench, const Globals& globals, Run& run);

@@ -10,5 +10,12 @@ vec4 gelu_tanh(vec4 x)
 
 vec4 silu(vec4 x) { return x / (1.0 + exp(-x)); }
 
-// placeholder until the branch with the accurate one lands
-vec4 gelu_erf(vec4 x) { return gelu_tanh(x); }
+// 0.5 x (1 + erf(x / sqrt(2))), with erf from Abramowitz and Stegun 7.1.26: 1.5e-7 absolute, and no cancellation where
+// x is negative
+vec4 gelu_erf(vec4 x)
+{
+    const vec4 z = abs(x) * 0.7071067811865476;
+    const vec4 t = 1.0 / (1.0 + 0.3275911 * z);
+    const vec4 tail = t * (0.254829592 + t * (-0.284496736 + t * (1.421413741 + t * (-1.453152027 + t * 1.061405429)))) * exp(-z * z);
+    return 0.5 * x * mix(tail, 2.0 - tail, greaterThanEqual(x, vec4(0.0)));
+}

@@ -1,0 +1,147 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/render/unet.h"
+#include "engine/render/vae.h"
+#include "tests/feature_map_case.h"
+
+#include <cmath>
+
+namespace semrover {
+namespace {
+
+VaeConfig small_vae()
+{
+    VaeConfig c;
+    c.block_out_channels = {16, 32};
+    c.layers_per_block = 1;
+    c.norm_num_groups = 8;
+    return c;
+}
+
+UnetConfig small_unet()
+{
+    UnetConfig c;
+    c.in_channels = 13;
+    c.block_out_channels = {16, 24, 32};
+    c.layers_per_block = {1, 1, 1};
+    c.down_attention = {true, true, false};
+    c.up_attention = {false, true, true};
+    c.heads = {2, 3, 2};
+    c.transformer_layers = {1, 2, 1};
+    c.cross_attention_dim = 20;
+    c.norm_num_groups = 8;
+    return c;
+}
+
+// a latent through the decoder of a device with these limits
+HostImages decode(const std::string& limits, DType precision, const VaeConfig& config, uint32_t height, uint32_t width,
+                  size_t& passes)
+{
+    auto device = Device::create({.limits = limits});
+    SR_ASSERT(bool(device), "{}", device.error().message);
+    auto vae = Vae::load(**device, config, Checkpoint::random(3), precision);
+    SR_ASSERT(bool(vae), "{}", vae.error().message);
+    KernelCase k(**device);
+    const HostImages latent = random_images(k, 1, height, width, config.latent_channels, DType::f32);
+    const FeatureMap y = (*vae)->decode(k.graph, latent.input(k));
+    HostImages image{y.height, y.width, k.run(y.data)};
+    passes = k.plan().passes.size();
+    return image;
+}
+
+double largest_difference(const HostImages& a, const HostImages& b)
+{
+    double largest = 0;
+    for (uint32_t y = 0; y < a.height; ++y)
+        for (uint32_t x = 0; x < a.width; ++x)
+            for (uint32_t c = 0; c < a.rows.cols; ++c)
+                largest = std::max(largest, std::abs(double(a.at(0, y, x, c)) - b.at(0, y, x, c)));
+    return largest;
+}
+
+TEST(engine_networks, have_the_parameters_of_stable_diffusion)
+{
+    UnetConfig unet;
+    EXPECT_EQ(Unet::plan(unet, DType::f16)->parameters(), 859520964u);
+    unet.in_channels = 13;
+    EXPECT_EQ(Unet::plan(unet, DType::f16)->parameters(), 859520964u + 9 * 9 * 320);
+    EXPECT_EQ(Vae::plan({}, DType::f16)->parameters(), 83653863u);
+}
+
+TEST(engine_networks, decode_the_same_image_in_bands_of_rows)
+{
+    size_t whole = 0, banded = 0;
+    for (DType precision : {DType::f32, DType::f16}) {
+        const HostImages a = decode("", precision, small_vae(), 21, 19, whole);
+        const HostImages b = decode("range=98304,texels=6144", precision, small_vae(), 21, 19, banded);
+        EXPECT_GT(banded, whole);
+        EXPECT_EQ(largest_difference(a, b), 0);
+        EXPECT_EQ(a.height, 42u);
+        EXPECT_EQ(a.width, 38u);
+    }
+}
+
+// force_upcast stores the residual stream divided by 32, which changes rounding and nothing else
+TEST(engine_networks, decode_the_same_image_with_a_scaled_stream)
+{
+    size_t passes;
+    VaeConfig config = small_vae();
+    const HostImages exact = decode("", DType::f32, config, 9, 7, passes);
+    const HostImages scaled = decode("", DType::f16, config, 9, 7, passes);
+    config.force_upcast = false;
+    const HostImages plain = decode("", DType::f16, config, 9, 7, passes);
+    EXPECT_LT(largest_difference(exact, scaled), 2e-2);
+    EXPECT_LT(largest_difference(exact, plain), 2e-2);
+    EXPECT_NE(largest_difference(plain, scaled), 0);
+}
+
+// one evaluation over `images` copies of a sample
+HostImages evaluate(const UnetConfig& config, DType precision, uint32_t images, uint32_t height, uint32_t width)
+{
+    Device& device = test_device();
+    auto unet = Unet::load(device, config, Checkpoint::random(4), precision);
+    SR_ASSERT(bool(unet), "{}", unet.error().message);
+    KernelCase k(device);
+    const HostImages one = random_images(k, 1, height, width, config.in_channels, precision);
+    HostImages x{height, width, HostMatrix(images * one.image_rows(), config.in_channels, precision)};
+    for (uint32_t r = 0; r < x.rows.rows; ++r)
+        for (uint32_t c = 0; c < config.in_channels; ++c)
+            x.rows.set(r, c, one.rows.at(r % one.image_rows(), c));
+    const Tensor text = k.input(k.random(5, config.cross_attention_dim, precision));
+    const Tensor table = k.graph.matrix(1, (*unet)->time_width(), DType::f32, "time");
+    (*unet)->time_table(k.graph, k.input(std::vector<float>{321}), table);
+    const Tensor context = k.graph.matrix(5, (*unet)->context_width(), precision, "context");
+    (*unet)->context_table(k.graph, text, context);
+    const FeatureMap y =
+        (*unet)->forward(k.graph, x.input(k), table, k.input(std::vector<uint32_t>(images, 0)), {context, 5, 0});
+    return {y.height, y.width, k.run(y.data)};
+}
+
+TEST(engine_networks, evaluate_every_image_of_a_batch_alike_at_odd_sizes)
+{
+    for (DType precision : {DType::f32, DType::f16})
+        for (const auto& [height, width] : {std::pair{9u, 7u}, std::pair{6u, 13u}, std::pair{8u, 8u}}) {
+            const HostImages one = evaluate(small_unet(), precision, 1, height, width);
+            const HostImages three = evaluate(small_unet(), precision, 3, height, width);
+            ASSERT_EQ(one.height, height);
+            ASSERT_EQ(one.width, width);
+            for (uint32_t i = 0; i < 3; ++i)
+                for (uint32_t p = 0; p < height * width; ++p)
+                    for (uint32_t c = 0; c < 4; ++c) {
+                        const float v = one.at(0, p / width, p % width, c);
+                        ASSERT_TRUE(std::isfinite(v));
+                        ASSERT_EQ(v, three.at(i, p / width, p % width, c)) << "image " << i << " pixel " << p;
+                    }
+        }
+}
+
+TEST(engine_networks, refuse_a_network_without_its_weights)
+{
+    const Path empty = ::testing::TempDir() + "semrover_no_weights";
+    std::filesystem::create_directories(empty);
+    EXPECT_FALSE(Checkpoint::open_folder(empty, Checkpoint::Network::unet));
+    std::filesystem::remove_all(empty);
+}
+
+} // namespace
+} // namespace semrover

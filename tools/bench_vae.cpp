@@ -1,0 +1,80 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// semrover bench vae: one picture through the decoder, or the encoder, of a VAE with random weights
+#include "engine/render/vae.h"
+#include "runtime/profile.h"
+#include "tools/bench.h"
+#include "tools/open_device.h"
+
+#include <CLI/CLI.hpp>
+
+namespace semrover {
+
+namespace {
+
+struct Options {
+    std::string config, precision = "fp16", profile;
+    uint32_t width = 616, height = 424;
+    bool encode = false;
+};
+
+Status bench_vae(const Options& o, const Globals& globals)
+{
+    VaeConfig config; // Stable Diffusion 1.5's
+    if (!o.config.empty()) {
+        SR_TRY(const Json json, read_json(o.config));
+        SR_TRY(config, parse_vae_config(json));
+    }
+    SR_TRY(const auto device, open_device(globals));
+    const DType dtype = o.precision == "fp32" ? DType::f32 : DType::f16;
+    SR_TRY(const auto vae, Vae::load(*device, config, Checkpoint::random(1), dtype));
+    const uint32_t scale = o.encode ? 1 : config.downscale();
+    FeatureMap x{{}, 1, divide_up(o.height, scale), divide_up(o.width, scale)};
+    BenchInputs inputs(*device);
+    const uint32_t in = inputs.add(x.image_rows(), o.encode ? config.in_channels : config.latent_channels, DType::f32);
+    SR_CHECK(inputs.allocate());
+    Graph g;
+    x.data = inputs.tensor(g, in);
+    (void)(o.encode ? vae->encode(g, x) : vae->decode(g, x));
+    SR_TRY(const auto program, Program::create(*device, g));
+    if (!o.profile.empty())
+        device->set_profile(std::make_shared<Profile>());
+    SR_TRY(const Timing timing, measure([&] { return program->run(); }));
+    const uint64_t weights = vae->device_bytes(device->limits());
+    Json report = bench_report("vae", *device, dtype, timing, weights + inputs.bytes() + program->plan().arena_bytes());
+    double flops = 0;
+    for (const Pass& pass : program->plan().passes)
+        flops += pass.options.flops;
+    report["direction"] = o.encode ? "encode" : "decode";
+    report["parameters"] = vae->parameters();
+    report["width"] = o.width;
+    report["height"] = o.height;
+    report["weight_bytes"] = weights;
+    report["bytes_beside_weights"] = device->peak_bytes() - weights;
+    report["gflop"] = flops / 1e9;
+    report["gflops"] = flops / timing.ms_median / 1e6;
+    add_program(report, *program);
+    print_report(report, globals);
+    if (device->profile()) {
+        fmt::print(stderr, "{}", device->profile()->summary());
+        return device->profile()->write(o.profile);
+    }
+    return {};
+}
+
+} // namespace
+
+void add_bench_vae(CLI::App& bench, const Globals& globals, Run& run)
+{
+    auto o = std::make_shared<Options>();
+    CLI::App* c = bench.add_subcommand("vae", "a picture through the decoder of a VAE");
+    c->add_option("--config", o->config, "config.json; default: Stable Diffusion 1.5");
+    c->add_option("-W,--width", o->width, "pixels")->check(CLI::Range(1u, 16384u));
+    c->add_option("-H,--height", o->height, "pixels")->check(CLI::Range(1u, 16384u));
+    c->add_option("--precision", o->precision, "storage")->check(CLI::IsMember({"fp16", "fp32"}));
+    c->add_flag("--encode", o->encode, "through the encoder instead");
+    c->add_option("--profile", o->profile, "write device times as a Chrome trace, and their sums to stderr");
+    c->callback([o, &globals, &run] { run = [o, &globals] { return bench_vae(*o, globals); }; });
+}
+
+} // namespace semrover
