@@ -42,6 +42,7 @@ struct Job {
     SamplingPlan plan;
     int steps = 0;
     AsdOptions asd;
+    float visible_alpha = 0.5f;
     CameraPath path; // where one was given
     std::vector<RefineChain> chains;
     std::unique_ptr<Device> device;
@@ -70,6 +71,7 @@ Status resolve_model(Job& j)
     j.asd.guidance_scale = o.cfg_scale.value_or(d.guidance_scale);
     j.asd.previous_noise = o.previous_noise.value_or(d.previous_noise);
     j.asd.seed = o.seed;
+    j.visible_alpha = o.drive.visible_alpha.value_or(d.visible_threshold);
     SR_TRY(j.plan, plan_sampling(j.model.scheduler, j.steps));
     return {};
 }
@@ -167,7 +169,7 @@ Result<Json> input_json(const Job& j)
     input["drive"] = {{"fov_x", o.drive.fov},
                       {"splat_radius", o.drive.splat_radius},
                       {"opacity", o.drive.opacity},
-                      {"visible_alpha", o.drive.visible_alpha},
+                      {"visible_alpha", j.visible_alpha},
                       {"background", o.drive.background}};
     return input;
 }
@@ -205,7 +207,7 @@ Status render_buffers(Job& j, RunFolder& run)
     SR_TRY(const auto background, background_of(o.drive));
     SR_TRY(const SurfelScene scene, load_scene(o.drive, o.input, grid, *j.device));
     RasterizerOptions options;
-    options.visible_alpha = o.drive.visible_alpha;
+    options.visible_alpha = j.visible_alpha;
     PathRenderer renderer(*j.device, scene, options);
     Progress progress(progress_to_stderr(j.globals), "render", "frames", j.path.frames.size());
     std::map<std::string, uint32_t> counts;
@@ -370,7 +372,7 @@ Status refine_in(Job& j, RunFolder& run)
 
 Status refine(const Options& o, const Globals& globals)
 {
-    Job j{o, globals, {}, {}, 0, {}, {}, {}, {}, 0, {}};
+    Job j{o, globals, {}, {}, 0, {}, 0.5f, {}, {}, {}, 0, {}};
     if (o.output.empty() && !o.dry_run)
         return fail(ErrorCode::usage, "-o/--output is required");
     SR_CHECK(check_drive(o.drive));

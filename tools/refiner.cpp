@@ -32,7 +32,7 @@ uint32_t chain_key(const std::string& camera)
 Refiner::Refiner(const RefineStore& store, std::span<const RefineChain> chains) : chains_(chains)
 {
     for (const RefineChain& c : chains) {
-        RendererWork& w = work_.emplace_back(c.size, false, false, false);
+        RendererWork w{c.size, false, false, false};
         for (uint32_t f = c.range.first; f <= c.range.last; ++f) {
             const bool latent = store.has(PieceKind::latent, c.camera, f);
             w.denoise |= !latent;
@@ -40,6 +40,7 @@ Refiner::Refiner(const RefineStore& store, std::span<const RefineChain> chains) 
             w.decode |= !store.has(PieceKind::frame, c.camera, f);
             ++latents_;
         }
+        work_.push_back(w);
     }
 }
 

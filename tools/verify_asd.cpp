@@ -5,6 +5,8 @@
 #include "runtime/json.h"
 #include "tools/golden_case.h"
 
+#include <algorithm>
+
 namespace semrover {
 
 namespace {
