@@ -54,9 +54,9 @@ Status bench_unet(const Options& o, const Globals& globals)
     const Tensor table_row = inputs.tensor(g, row);
     SR_CHECK(device->clear(g.desc().resources[table_row.resource].memory));
     (void)unet->forward(g, x, inputs.tensor(g, table), table_row, {inputs.tensor(g, text), o.tokens, 0});
-    SR_TRY(const auto program, Program::create(*device, g));
     if (!o.profile.empty())
         device->set_profile(std::make_shared<Profile>());
+    SR_TRY(const auto program, Program::create(*device, g));
     SR_TRY(const Timing timing, measure([&] { return program->run(); }));
     const uint64_t predicted = unet->device_bytes(device->limits()) + inputs.bytes() + program->plan().arena_bytes();
     Json report = bench_report("unet", *device, dtype, timing, predicted);

@@ -36,9 +36,9 @@ Status bench_vae(const Options& o, const Globals& globals)
     Graph g;
     x.data = inputs.tensor(g, in);
     (void)(o.encode ? vae->encode(g, x) : vae->decode(g, x));
-    SR_TRY(const auto program, Program::create(*device, g));
     if (!o.profile.empty())
         device->set_profile(std::make_shared<Profile>());
+    SR_TRY(const auto program, Program::create(*device, g));
     SR_TRY(const Timing timing, measure([&] { return program->run(); }));
     const uint64_t weights = vae->device_bytes(device->limits());
     Json report = bench_report("vae", *device, dtype, timing, weights + inputs.bytes() + program->plan().arena_bytes());
