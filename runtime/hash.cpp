@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/hash.h"
 
+#include <algorithm>
 #include <fmt/format.h>
-
 #include <xxhash.h>
 
 namespace semrover {
@@ -37,6 +37,25 @@ Result<uint64_t> hash_file(const Path& path)
     SR_TRY(const MappedFile file, MappedFile::open(path));
     Hash hash;
     hash.add(file.bytes());
+    return hash.value();
+}
+
+Result<uint64_t> hash_folder(const Path& folder)
+{
+    std::vector<Path> files;
+    std::error_code error;
+    for (const auto& entry : std::filesystem::directory_iterator(folder, error))
+        if (entry.is_regular_file())
+            files.push_back(entry.path());
+    if (error)
+        return fail(ErrorCode::bad_input, "cannot list '{}': {}", folder.string(), error.message());
+    std::sort(files.begin(), files.end());
+    Hash hash;
+    for (const Path& path : files) {
+        SR_TRY(const MappedFile file, MappedFile::open(path));
+        hash.add(path.filename().string());
+        hash.add(file.bytes());
+    }
     return hash.value();
 }
 

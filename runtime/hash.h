@@ -31,7 +31,8 @@ class Hash {
     std::unique_ptr<State> state_;
 };
 
-Result<uint64_t> hash_file(const Path& path); // of its bytes, as one piece
+Result<uint64_t> hash_file(const Path& path);     // of its bytes, as one piece
+Result<uint64_t> hash_folder(const Path& folder); // of the names and bytes of its files; folders in it do not count
 
 std::string hash_text(uint64_t hash); // 16 hexadecimal digits
 

@@ -5,6 +5,9 @@
 #include "runtime/file.h"
 #include "runtime/safetensors_header.h"
 
+#include <functional>
+#include <memory>
+
 namespace semrover {
 
 // one safetensors file, mapped and fully checked when it is opened. Errors are bad_input and name the file.
@@ -98,5 +101,24 @@ struct TensorData {
 // a name given twice or one that the reader would refuse is the caller's bug.
 Status write_safetensors(const Path& path, std::span<const TensorData> tensors,
                          const std::map<std::string, std::string>& metadata = {});
+
+// a tensor that makes its bytes when they are written, so that a file may be larger than memory
+struct TensorStream {
+    std::string name;
+    DType dtype;
+    std::vector<uint64_t> shape;
+    // what it returns is valid until the next tensor is asked for; it may lie in `scratch`
+    std::function<Result<std::span<const std::byte>>(std::vector<std::byte>& scratch)> bytes;
+};
+Status stream_safetensors(const Path& path, std::span<const TensorStream> tensors,
+                          const std::map<std::string, std::string>& metadata = {});
+
+// a file's tensor, as it is stored or as another of F32, F16 and BF16 (others stay what they are); bad_input when one
+// of its numbers is NaN or infinite, or becomes so as F16
+TensorStream stream_tensor(std::shared_ptr<const SafetensorsSet> set, const TensorInfo& tensor,
+                           std::optional<DType> dtype = {});
+// numbers as a file's F32, F16 or BF16, into `scratch`; bad_input as above, `what` names the tensor
+Result<std::span<const std::byte>> encode_floats(std::span<const float> values, DType dtype, std::string_view what,
+                                                 std::vector<std::byte>& scratch);
 
 } // namespace semrover

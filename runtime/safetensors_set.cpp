@@ -30,9 +30,10 @@ tl::unexpected<Error> refuse_pickle(const Path& path)
 {
     return fail(ErrorCode::bad_input,
                 "{}: a {} file can run code when it is read, so only safetensors are; convert it with Python: import "
-                "torch, safetensors.torch as s; s.save_file({{k: v.contiguous().clone() for k, v in torch.load(FILE, "
-                "weights_only=True).items()}}, 'diffusion_pytorch_model.safetensors')",
-                quote_path(path), path.extension().native());
+                "torch, safetensors.torch as s; d = torch.load(FILE, map_location='cpu', weights_only=True); "
+                "s.save_file({{k: v.contiguous().clone() for k, v in d.get('state_dict', d).items() if "
+                "torch.is_tensor(v)}}, '{}.safetensors')",
+                quote_path(path), path.extension().native(), printable(path.stem().native(), 100));
 }
 
 // [A-Za-z0-9._-]+\.safetensors, so that no shard lies outside the index's folder

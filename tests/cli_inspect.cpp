@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/program.h"
+#include "tests/renderer_weights.h"
 #include "tests/safetensors_bytes.h"
 
 #include <algorithm>
@@ -68,6 +69,40 @@ TEST(CliInspect, a_model_without_a_component_and_a_single_component_are_shown_to
     EXPECT_EQ(json["components"]["d"]["config"]["beta_end"], 1);
     const ProgramResult part = semrover_program("inspect " + kAssets + "/model/voxfield_transformer");
     EXPECT_NE(part.out.find("num_layers"), std::string::npos);
+}
+
+TEST(CliInspect, a_checkpoint_says_what_it_is_and_whether_it_can_render)
+{
+    const ScratchFolder folder;
+    UnetConfig unet = small_unet();
+    ldm_weights(unet, small_vae()).write(folder / "ldm.safetensors", DType::f16);
+    const ProgramResult ldm = semrover_program("inspect --json " + (folder / "ldm.safetensors").string());
+    ASSERT_EQ(ldm.code, 0) << ldm.err;
+    const auto json = nlohmann::json::parse(ldm.out);
+    EXPECT_EQ(json["kind"], "Stable Diffusion-like single file (LDM)");
+    EXPECT_EQ(json["unet"]["config"], unet_config_json(unet));
+    EXPECT_EQ(json["unet"]["deferred_renderer"], "ready (13 input channels)");
+    EXPECT_EQ(json["vae"]["config"], vae_config_json(small_vae()));
+    EXPECT_EQ(json["unet"]["parameters"].get<int>() + json["vae"]["parameters"].get<int>(), json["parameters"]);
+
+    unet.in_channels = 4;
+    unet.cross_attention_dim = 768;
+    Weights w = ldm_weights(unet, small_vae(), "none.");
+    w.write(folder / "plain.safetensors");
+    const ProgramResult plain = semrover_program("inspect " + (folder / "plain.safetensors").string());
+    EXPECT_NE(plain.out.find("Stable Diffusion 1.x single file (LDM)"), std::string::npos);
+    EXPECT_NE(plain.out.find("no: a plain UNet (4 input channels)"), std::string::npos);
+    EXPECT_NE(plain.out.find("vae         none"), std::string::npos) << plain.out.substr(0, 2000);
+
+    const std::string golden = SEMROVER_SOURCE_DIR "/tests/golden/";
+    for (const auto& [name, kind] : {std::pair{"unet_asd_tiny/model", "UNet2DConditionModel"},
+                                     std::pair{"unet_vsd_tiny/model", "UNetSpatioTemporalConditionModel"},
+                                     std::pair{"vae_tiny/model", "AutoencoderKL"},
+                                     std::pair{"vae_temporal_tiny/model", "AutoencoderKLTemporalDecoder"},
+                                     std::pair{"transformer_tiny/model", "VoxfieldTransformer"}}) {
+        const auto part = nlohmann::json::parse(semrover_program("inspect --json " + golden + name).out);
+        EXPECT_EQ(part["weights"]["kind"], kind);
+    }
 }
 
 TEST(CliInspect, what_it_cannot_show_ends_with_one_line_and_code_3)

@@ -3,10 +3,9 @@
 #pragma once
 
 #include "engine/render/ldm_names.h"
+#include "engine/render/model_writer.h"
 #include "engine/render/random_weights.h"
-#include "runtime/json.h"
 
-#include <fstream>
 #include <gtest/gtest.h>
 
 namespace semrover {
@@ -91,12 +90,6 @@ inline Weights ldm_weights(const UnetConfig& unet, const VaeConfig& vae, std::st
             w.specs[name].shape = {spec.shape[0], spec.shape[1], 1, 1};
     }
     return w;
-}
-
-inline void write_json(const Path& path, const Json& json)
-{
-    std::filesystem::create_directories(path.parent_path());
-    std::ofstream(path) << json;
 }
 
 } // namespace semrover

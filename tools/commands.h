@@ -35,6 +35,7 @@ bool interrupt_requested();
 // one a file: declares the subcommand's options and, when it is the one given, sets `run`. Options live in a
 // std::shared_ptr that the callback holds.
 void add_bench(CLI::App& app, const Globals& globals, Run& run);
+void add_convert(CLI::App& app, const Globals& globals, Run& run);
 void add_devices(CLI::App& app, const Globals& globals, Run& run);
 void add_doctor(CLI::App& app, const Globals& globals, Run& run);
 void add_generate(CLI::App& app, const Globals& globals, Run& run);

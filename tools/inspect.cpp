@@ -2,6 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // semrover inspect FILE|DIR: what is in a model or a grid. The report is one JSON object; without --json it is printed
 // as indented text.
+#include "engine/render/ldm_config.h"
+#include "engine/render/ldm_names.h"
+#include "engine/render/renderer_model.h"
 #include "engine/scene/grid.h"
 #include "engine/scene/palette.h"
 #include "runtime/json.h"
@@ -70,6 +73,73 @@ Report tensor_list(const SafetensorsSet& set)
     return list;
 }
 
+uint64_t parameters_of(const SafetensorsSet& set, std::string_view prefix)
+{
+    uint64_t sum = 0;
+    for (const TensorInfo& t : set.tensors())
+        if (t.name.starts_with(prefix))
+            sum += t.elements();
+    return sum;
+}
+
+// whether a UNet of so many input channels can render, and what to do if not
+std::string renderer_text(uint64_t in_channels)
+{
+    if (in_channels == renderer_channels({}))
+        return fmt::format("ready ({} input channels)", in_channels);
+    if (in_channels == VaeConfig().latent_channels)
+        return fmt::format("no: a plain UNet ({} input channels); semrover convert IN OUT --asd-init adds the others",
+                           in_channels);
+    return fmt::format("no: {} input channels, expected {}", in_channels, renderer_channels({}));
+}
+
+// both networks of a single file, with the configs that its shapes tell
+void describe_ldm(Report& report, const SafetensorsSet& set)
+{
+    const auto unet = ldm_unet_config(set);
+    const char* version = !unet                               ? ""
+                          : unet->cross_attention_dim == 768  ? " 1.x"
+                          : unet->cross_attention_dim == 1024 ? " 2.x"
+                                                              : "-like";
+    report["kind"] = fmt::format("Stable Diffusion{} single file (LDM)", version);
+    Report& u = report["unet"] = {{"parameters", parameters_of(set, kLdmUnet)}};
+    if (unet) {
+        u["deferred_renderer"] = renderer_text(unet->in_channels);
+        u["config"] = unet_config_json(*unet);
+    } else {
+        u["error"] = unet.error().message;
+    }
+    const std::string_view prefix = ldm_vae_prefix(set);
+    if (prefix.empty()) {
+        report["vae"] = "none";
+        return;
+    }
+    Report& v = report["vae"] = {{"parameters", parameters_of(set, prefix)}};
+    if (const auto vae = ldm_vae_config(set))
+        v["config"] = vae_config_json(*vae);
+    else
+        v["error"] = vae.error().message;
+}
+
+// what the tensors' names say that a file is
+void describe_kind(Report& report, const SafetensorsSet& set)
+{
+    if (is_ldm(set)) {
+        describe_ldm(report, set);
+    } else if (const TensorInfo* conv_in = set.find("conv_in.weight"); conv_in && conv_in->shape.size() == 4) {
+        const bool video = set.find("add_embedding.linear_1.weight") != nullptr;
+        report["kind"] = video ? "UNetSpatioTemporalConditionModel" : "UNet2DConditionModel";
+        if (!video)
+            report["deferred_renderer"] = renderer_text(conv_in->shape[1]);
+    } else if (set.find("encoder.conv_in.weight") && set.find("decoder.conv_in.weight")) {
+        report["kind"] = set.find("decoder.time_conv_out.weight") ? "AutoencoderKLTemporalDecoder" : "AutoencoderKL";
+    } else if (set.find("semantic_embed.weight") && set.find("proj_in.weight")) {
+        report["kind"] = "VoxfieldTransformer";
+    } else if (set.find("encoder_hidden_states")) {
+        report["kind"] = "text conditioning";
+    }
+}
+
 Report describe_weights(const SafetensorsSet& set, bool with_tensors, Totals& totals)
 {
     Totals own;
@@ -86,6 +156,7 @@ Report describe_weights(const SafetensorsSet& set, bool with_tensors, Totals& to
     totals.parameters += own.parameters;
     totals.bytes += own.bytes;
     Report report = {{"file", set.path().filename().string()}};
+    describe_kind(report, set);
     if (set.shards().size() > 1)
         report["shards"] = set.shards().size();
     report["tensors"] = set.tensors().size() + set.unsupported().size();

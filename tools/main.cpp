@@ -97,6 +97,7 @@ int main(int argc, char** argv)
     add_globals(app, globals);
     Run run;
     add_bench(app, globals, run);
+    add_convert(app, globals, run);
     add_devices(app, globals, run);
     add_doctor(app, globals, run);
     add_generate(app, globals, run);

@@ -178,4 +178,17 @@ Result<SchedulerConfig> scheduler_config_from_text(std::string_view text, std::v
     return scheduler_config_from_json(object, warnings, sampler);
 }
 
+Result<SchedulerConfig> read_scheduler_config(const Path& path, std::vector<std::string>& warnings,
+                                              std::optional<Sampler> sampler)
+{
+    SR_TRY(const std::string text, read_text_file(path, 1 << 20));
+    std::vector<std::string> own;
+    auto config = scheduler_config_from_text(text, own, sampler);
+    if (!config)
+        return fail(ErrorCode::bad_input, "{}: {}", path.string(), config.error().message);
+    for (const std::string& warning : own)
+        warnings.push_back(fmt::format("{}: {}", path.string(), warning));
+    return config;
+}
+
 } // namespace semrover

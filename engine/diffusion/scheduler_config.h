@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "runtime/file.h"
 #include "runtime/result.h"
 
 #include <nlohmann/json_fwd.hpp>
@@ -57,5 +58,8 @@ Result<SchedulerConfig> scheduler_config_from_json(const nlohmann::json& json, s
                                                    std::optional<Sampler> sampler = {});
 Result<SchedulerConfig> scheduler_config_from_text(std::string_view text, std::vector<std::string>& warnings,
                                                    std::optional<Sampler> sampler = {});
+// the file's name starts its errors and warnings
+Result<SchedulerConfig> read_scheduler_config(const Path& path, std::vector<std::string>& warnings,
+                                              std::optional<Sampler> sampler = {});
 
 } // namespace semrover

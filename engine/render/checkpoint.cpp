@@ -122,10 +122,24 @@ Status Checkpoint::read(const TensorSpec& spec, std::vector<float>& values) cons
     return {};
 }
 
-DType Checkpoint::dtype(const TensorSpec& spec) const
+TensorStream Checkpoint::stream(const TensorSpec& spec, std::optional<DType> dtype) const
 {
-    const TensorInfo* tensor = set_ ? find(spec) : nullptr;
-    return tensor ? tensor->dtype : DType::f32;
+    if (set_) {
+        const TensorInfo* tensor = find(spec);
+        SR_ASSERT(tensor && same_matrix(tensor->shape, spec.shape), "{} was not required", spec.name);
+        TensorStream stream = stream_tensor(set_, *tensor, dtype);
+        stream.name = spec.name;
+        stream.shape = spec.shape;
+        return stream;
+    }
+    const DType target = dtype.value_or(DType::f32);
+    const auto make = [seed = seed_, spec,
+                       target](std::vector<std::byte>& scratch) -> Result<std::span<const std::byte>> {
+        std::vector<float> values;
+        random_tensor(seed, spec, values);
+        return encode_floats(values, target, spec.name, scratch);
+    };
+    return {spec.name, target, spec.shape, make};
 }
 
 tl::unexpected<Error> refuse_plain_unet(const Path& path)

@@ -31,8 +31,8 @@ class Checkpoint {
     // the values of a tensor that require() accepted, as fp32, in the order of `shape`; bad_input if one is no number
     Status read(const TensorSpec& spec, std::vector<float>& values) const;
 
-    // as it is stored; random numbers count as F32
-    DType dtype(const TensorSpec& spec) const;
+    // the tensor for another file, under the spec's name and shape: as it is stored (random numbers: F32) or as `dtype`
+    TensorStream stream(const TensorSpec& spec, std::optional<DType> dtype = {}) const;
 
   private:
     const TensorInfo* find(const TensorSpec& spec) const; // null when the file has no such tensor

@@ -2,10 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/voxfield/voxfield_model.h"
 
-#include "runtime/hash.h"
 #include "runtime/json_fields.h"
-
-#include <algorithm>
 
 namespace semrover {
 
@@ -58,11 +55,7 @@ Result<VoxfieldModel> VoxfieldModel::open(const Path& folder, std::optional<Samp
     const Path scheduler = folder / "voxfield_scheduler" / "scheduler_config.json";
     m.scheduler = method_scheduler(sampler);
     if (fs::exists(scheduler)) {
-        SR_TRY(const std::string text, read_text_file(scheduler, 1 << 20));
-        auto config = scheduler_config_from_text(text, m.warnings, sampler);
-        if (!config)
-            return fail(ErrorCode::bad_input, "{}: {}", scheduler.string(), config.error().message);
-        m.scheduler = *config;
+        SR_TRY(m.scheduler, read_scheduler_config(scheduler, m.warnings, sampler));
     }
     if (m.scheduler.prediction != Prediction::sample)
         return fail(ErrorCode::bad_input, "{}: the transformer predicts x0, so prediction_type must be \"sample\"",
@@ -71,25 +64,6 @@ Result<VoxfieldModel> VoxfieldModel::open(const Path& folder, std::optional<Samp
         return fail(ErrorCode::bad_input, "the euler sampler cannot hold known tokens; use ddpm, ddim or dpm++2m");
     m.scheduler.clip_sample = true; // the method clips x0 to [-1, 1] with every sampler
     return m;
-}
-
-Result<uint64_t> hash_folder(const Path& folder)
-{
-    std::vector<Path> files;
-    std::error_code error;
-    for (const auto& entry : fs::directory_iterator(folder, error))
-        if (entry.is_regular_file())
-            files.push_back(entry.path());
-    if (error)
-        return fail(ErrorCode::bad_input, "cannot list '{}': {}", folder.string(), error.message());
-    std::sort(files.begin(), files.end());
-    Hash hash;
-    for (const Path& path : files) {
-        SR_TRY(const MappedFile file, MappedFile::open(path));
-        hash.add(path.filename().string());
-        hash.add(file.bytes());
-    }
-    return hash.value();
 }
 
 } // namespace semrover

@@ -29,7 +29,4 @@ struct VoxfieldModel {
     static Result<VoxfieldModel> open(const Path& folder, std::optional<Sampler> sampler = {});
 };
 
-// hash of all files of a component (names and bytes), to know a model again
-Result<uint64_t> hash_folder(const Path& folder);
-
 } // namespace semrover

@@ -1,0 +1,192 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/render/renderer_model.h"
+#include "tests/program.h"
+#include "tests/renderer_weights.h"
+
+namespace semrover {
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::string kFile = "diffusion_pytorch_model.safetensors";
+
+ProgramResult convert(const Path& in, const Path& out, const std::string& more = "")
+{
+    return semrover_program("convert " + in.string() + " " + out.string() + " -q " + more);
+}
+
+void expect_error(const ProgramResult& result, int code, std::string_view text)
+{
+    EXPECT_EQ(result.code, code) << result.err;
+    EXPECT_NE(result.err.find(text), std::string::npos) << result.err;
+}
+
+// every value is the seeded one, as `dtype` holds it
+void expect_seeded(const Checkpoint& checkpoint, std::span<const TensorSpec> schema, DType dtype)
+{
+    const Status status = checkpoint.require(schema);
+    ASSERT_TRUE(status) << status.error().message;
+    std::vector<float> expected, got;
+    std::vector<std::byte> bytes;
+    for (const TensorSpec& spec : schema) {
+        random_tensor(1, spec, expected);
+        ASSERT_TRUE(encode_floats(expected, dtype, spec.name, bytes));
+        to_float(bytes, dtype, expected.data());
+        ASSERT_TRUE(checkpoint.read(spec, got));
+        EXPECT_EQ(got, expected) << spec.name;
+        EXPECT_EQ(checkpoint.stream(spec).dtype, dtype) << spec.name;
+    }
+}
+
+void put_diffusers(const Path& folder, const UnetConfig& unet = small_unet())
+{
+    Weights unet_weights, vae_weights;
+    unet_weights.add(unet_schema(unet));
+    unet_weights.write(folder / "unet" / kFile);
+    Json config = unet_config_json(unet);
+    config["sample_size"] = 53; // one that the engine has no use for
+    ASSERT_TRUE(write_json(folder / "unet" / "config.json", config));
+    vae_weights.add(vae_schema(small_vae()));
+    vae_weights.write(folder / "vae" / kFile);
+    ASSERT_TRUE(write_json(folder / "vae" / "config.json", vae_config_json(small_vae())));
+}
+
+TEST(CliConvert, an_ldm_file_becomes_a_folder_that_opens_with_the_same_numbers)
+{
+    const ScratchFolder folder;
+    Weights w = ldm_weights(small_unet(), small_vae());
+    w.add("cond_stage_model.transformer.x", {"x", {3}});
+    w.write(folder / "in.safetensors");
+    const ProgramResult result = convert(folder / "in.safetensors", folder / "out/");
+    ASSERT_EQ(result.code, 0) << result.err;
+    EXPECT_NE(result.out.find("left out: cond_stage_model.*"), std::string::npos) << result.out;
+    const auto m = RendererModel::open(folder / "out");
+    ASSERT_TRUE(m) << m.error().message;
+    EXPECT_EQ(unet_config_json(m->unet), unet_config_json(small_unet()));
+    EXPECT_EQ(m->scheduler.steps_offset, 1);
+    expect_seeded(*m->open_unet(), unet_schema(m->unet), DType::f32);
+    expect_seeded(*m->open_vae(), vae_schema(m->vae), DType::f32);
+    EXPECT_EQ((*read_json(folder / "out/model_index.json"))["renderer"][1], "UNet2DConditionModel");
+    EXPECT_EQ(folder.entries(), 2u); // nothing temporary is left
+}
+
+TEST(CliConvert, a_folder_keeps_what_it_says_and_changes_precision)
+{
+    const ScratchFolder folder;
+    put_diffusers(folder / "in");
+    for (const char* name : {"text_encoder", "safety_checker"})
+        fs::create_directory(folder / "in" / name);
+    Json scheduler = stable_diffusion_scheduler_json();
+    scheduler["beta_end"] = 0.013;
+    ASSERT_TRUE(write_json(folder / "in/scheduler/scheduler_config.json", scheduler));
+    ASSERT_TRUE(write_json(folder / "in/model_index.json", {{"scheduler", {"diffusers", "DDIMScheduler"}},
+                                                            {"defaults", {{"renderer", {{"guidance_scale", 2}}}}}}));
+    Weights text;
+    text.add("encoder_hidden_states", {"c", {1, 5, 24}});
+    text.write(folder / "in/conditioning/conditioning.safetensors");
+    for (const auto& [option, dtype] : {std::pair{"f16", DType::f16}, std::pair{"bf16", DType::bf16}}) {
+        const Path out = folder / option;
+        const ProgramResult result = convert(folder / "in", out, fmt::format("--dtype {}", option));
+        ASSERT_EQ(result.code, 0) << result.err;
+        EXPECT_NE(result.out.find("left out: safety_checker, text_encoder ("), std::string::npos) << result.out;
+        const auto m = RendererModel::open(out);
+        ASSERT_TRUE(m) << m.error().message;
+        expect_seeded(*m->open_unet(), unet_schema(m->unet), dtype);
+        EXPECT_EQ(m->scheduler.beta_end, 0.013);
+        EXPECT_EQ(m->defaults.guidance_scale, 2);
+        EXPECT_EQ(m->conditioning_tokens, 5u);
+        EXPECT_EQ((*read_json(out / "renderer/config.json"))["sample_size"], 53);
+    }
+}
+
+TEST(CliConvert, asd_init_widens_the_input_with_zeros)
+{
+    const ScratchFolder folder;
+    UnetConfig unet = small_unet();
+    unet.in_channels = 4;
+    put_diffusers(folder / "in", unet);
+    ldm_weights(unet, small_vae()).write(folder / "in.safetensors");
+    for (const char* in : {"in", "in.safetensors"}) {
+        const ProgramResult result = convert(folder / in, folder / "out", "-y --asd-init --dtype f32");
+        ASSERT_EQ(result.code, 0) << result.err;
+        const auto m = RendererModel::open(folder / "out");
+        ASSERT_TRUE(m) << m.error().message;
+        EXPECT_EQ(m->unet.in_channels, 13u);
+        std::vector<float> plain, wide;
+        random_tensor(1, {"conv_in.weight", {32, 4, 3, 3}}, plain);
+        ASSERT_TRUE(m->open_unet()->read({"conv_in.weight", {32, 13, 3, 3}}, wide));
+        for (size_t i = 0; i < wide.size(); ++i) {
+            const size_t row = i / (13 * 9), column = i % (13 * 9);
+            ASSERT_EQ(wide[i], column < 4 * 9 ? plain[row * 4 * 9 + column] : 0.f) << i;
+        }
+    }
+    expect_error(convert(folder / "out", folder / "again", "--asd-init"), 3, "this one takes 13");
+}
+
+TEST(CliConvert, a_transformer_comes_along)
+{
+    const ScratchFolder folder;
+    const ProgramResult result = convert(SEMROVER_SOURCE_DIR "/assets/model", folder / "out", "--dtype f32 --json");
+    ASSERT_EQ(result.code, 0) << result.err;
+    EXPECT_EQ(Json::parse(result.out)["components"]["voxfield_transformer"]["tensors"], 175);
+    const Json index = *read_json(folder / "out/model_index.json");
+    EXPECT_EQ(index["voxfield_scheduler"][1], "DDPMScheduler");
+    EXPECT_EQ(index["defaults"]["num_inference_steps"], 20);
+    const auto set = SafetensorsSet::open_folder(folder / "out/voxfield_transformer");
+    ASSERT_TRUE(set) << set.error().message;
+    EXPECT_EQ(set->tensors()[0].dtype, DType::f32);
+}
+
+TEST(CliConvert, a_number_beyond_half_precision_is_an_error_that_names_the_tensor)
+{
+    const ScratchFolder folder;
+    Weights w = ldm_weights(small_unet(), small_vae());
+    w.values["model.diffusion_model.out.2.weight"][5] = 70000;
+    w.write(folder / "in.safetensors");
+    expect_error(convert(folder / "in.safetensors", folder / "out", "--dtype f16"), 3,
+                 "tensor 'model.diffusion_model.out.2.weight' holds 70000 at element 5, which F16 cannot hold");
+    EXPECT_FALSE(fs::exists(folder / "out"));
+    EXPECT_EQ(folder.entries(), 1u);
+    EXPECT_EQ(convert(folder / "in.safetensors", folder / "out", "--dtype bf16").code, 0);
+}
+
+TEST(CliConvert, what_exists_is_replaced_only_when_asked)
+{
+    const ScratchFolder folder;
+    put_diffusers(folder / "in");
+    const ProgramResult dry = convert(folder / "in", folder / "out", "--dry-run");
+    EXPECT_EQ(dry.code, 0) << dry.err;
+    EXPECT_NE(dry.out.find("renderer"), std::string::npos);
+    EXPECT_FALSE(fs::exists(folder / "out"));
+    fs::create_directories(folder / "out/renderer");
+    folder.put("out/notes.txt", "mine");
+    folder.put("out/renderer/diffusion_pytorch_model.fp16.safetensors", "stale, and preferred by every reader");
+    expect_error(convert(folder / "in", folder / "out"), 2, "-y replaces it");
+    ASSERT_EQ(convert(folder / "in", folder / "out", "-y").code, 0);
+    EXPECT_TRUE(RendererModel::open(folder / "out"));
+    EXPECT_EQ(contents(folder / "out/notes.txt"), "mine");
+    expect_error(convert(folder / "in", folder / "in", "-y"), 2, "IN and OUT are the same");
+    expect_error(convert(folder / "in", folder.put("file", "x"), "-y"), 3, "is a file");
+}
+
+TEST(CliConvert, what_is_no_model_is_bad_input)
+{
+    const ScratchFolder folder;
+    expect_error(convert(folder / "none", folder / "out"), 3, "No such file");
+    expect_error(convert(folder.path(), folder / "out"), 3, "has no renderer");
+    expect_error(convert(folder.put("x.ckpt", "x"), folder / "out"), 3, "convert it with Python");
+    expect_error(convert(folder.path(), folder / "out"), 3, "convert it with Python");
+    expect_error(convert(SEMROVER_SOURCE_DIR "/assets/model", folder / "out", "--asd-init"), 3, "has no renderer");
+    expect_error(convert(folder.path(), folder / "out", "--dtype int8"), 2, "dtype");
+    put_diffusers(folder / "in");
+    Weights bad;
+    bad.add(unet_schema(small_unet()));
+    bad.values["conv_in.bias"][0] = NAN;
+    bad.write(folder / "in/unet" / kFile);
+    expect_error(convert(folder / "in", folder / "out"), 3, "tensor 'conv_in.bias' holds NaN");
+    EXPECT_FALSE(fs::exists(folder / "out"));
+}
+
+} // namespace
+} // namespace semrover
