@@ -134,5 +134,44 @@ TEST(Image, a_palette_with_transparency_becomes_rgb)
               (std::vector<uint8_t>{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 9, 10, 11, 6, 7, 8, 3, 4, 5, 0, 1, 2}));
 }
 
+// ---- JPEG
+
+TEST(Image, jpeg_pixels_come_back_nearly_the_same_and_always_as_the_same_bytes)
+{
+    const ScratchFolder folder;
+    std::vector<uint8_t> pixels;
+    for (uint32_t y = 0; y < 53; ++y)
+        for (uint32_t x = 0; x < 77; ++x)
+            pixels.insert(pixels.end(), {uint8_t(3 * x), uint8_t(4 * y), uint8_t(x + y)});
+    ASSERT_TRUE(write_jpeg_rgb8(folder / "a.jpg", 77, 53, pixels, 95));
+    ASSERT_TRUE(write_jpeg_rgb8(folder / "b.jpg", 77, 53, pixels, 95));
+    EXPECT_EQ(contents(folder / "a.jpg"), contents(folder / "b.jpg"));
+    const auto image = read_jpeg_rgb8(folder / "a.jpg");
+    ASSERT_TRUE(image) << image.error().message;
+    ASSERT_EQ(image->pixels.size(), pixels.size());
+    for (size_t i = 0; i < pixels.size(); ++i)
+        ASSERT_NEAR(image->pixels[i], pixels[i], 8) << i; // chroma is halved: 5 at most here
+    ASSERT_TRUE(write_jpeg_rgb8(folder / "c.jpg", 77, 53, pixels, 20));
+    EXPECT_LT(std::filesystem::file_size(folder / "c.jpg"), std::filesystem::file_size(folder / "a.jpg"));
+}
+
+TEST(Image, what_is_not_a_jpeg_is_refused)
+{
+    const ScratchFolder folder;
+    EXPECT_TRUE(says(read_jpeg_rgb8(folder / "none.jpg"), "none.jpg"));
+    EXPECT_TRUE(says(read_jpeg_rgb8(folder.put("empty.jpg", "")), "empty"));
+    EXPECT_TRUE(says(read_jpeg_rgb8(folder.put("text.jpg", "no picture at all")), "not a valid JPEG"));
+    EXPECT_TRUE(says(write_jpeg_rgb8(folder / "a.jpg", 0, 0, {}, 90), "0 x 0"));
+}
+
+TEST(Image, the_size_of_a_png_is_read_without_its_pixels)
+{
+    const ScratchFolder folder;
+    ASSERT_TRUE(write_png_gray8(folder / "a.png", 7, 5, noise<uint8_t>(35)));
+    EXPECT_EQ(*read_png_size(folder / "a.png"), (ImageSize{7, 5}));
+    EXPECT_TRUE(says(read_png_size(folder.put("b.png", "no picture")), "expected a PNG file"));
+    EXPECT_TRUE(says(read_png_size(folder.put("c.png", contents(folder / "a.png").substr(0, 20))), "not a valid PNG"));
+}
+
 } // namespace
 } // namespace semrover

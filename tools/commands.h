@@ -40,6 +40,7 @@ void add_devices(CLI::App& app, const Globals& globals, Run& run);
 void add_doctor(CLI::App& app, const Globals& globals, Run& run);
 void add_generate(CLI::App& app, const Globals& globals, Run& run);
 void add_inspect(CLI::App& app, const Globals& globals, Run& run);
+void add_refine(CLI::App& app, const Globals& globals, Run& run);
 void add_render(CLI::App& app, const Globals& globals, Run& run);
 void add_verify(CLI::App& app, const Globals& globals, Run& run);
 

@@ -3,6 +3,7 @@
 #include "tools/commands.h"
 
 #include "runtime/quote.h"
+#include "tools/memory_size.h"
 #include "tools/version.h"
 
 #include <CLI/CLI.hpp>
@@ -35,8 +36,14 @@ void install_signal_handlers()
 void add_globals(CLI::App& app, Globals& globals)
 {
     app.add_option("--device", globals.device, "device name or index (see: semrover devices)");
-    app.add_option("--max-vram", globals.max_vram, "device memory to use at most, such as 6GiB")
-        ->transform(CLI::AsSizeValue(false));
+    const auto set_max_vram = [&globals](const std::string& text) {
+        const auto bytes = parse_memory_size(text);
+        if (!bytes)
+            throw CLI::ValidationError("--max-vram", bytes.error().message);
+        globals.max_vram = *bytes;
+    };
+    app.add_option_function<std::string>("--max-vram", set_max_vram,
+                                         "device memory to use at most, such as 6GiB, 500MB or 2.2 (GB)");
     app.add_flag("-y,--yes", globals.yes, "replace existing files");
     app.add_flag("-q,--quiet", globals.quiet, "no progress");
     app.add_flag("-v,--verbose", globals.verbose, "more detail");
@@ -95,6 +102,7 @@ int main(int argc, char** argv)
     add_doctor(app, globals, run);
     add_generate(app, globals, run);
     add_inspect(app, globals, run);
+    add_refine(app, globals, run);
     add_render(app, globals, run);
     add_verify(app, globals, run);
     try {

@@ -13,6 +13,6 @@ Result<std::unique_ptr<Device>> open_device(const Globals& globals);
 
 // the run folder of an output; with `replace` (-y) a finished or different run there is started over, while an
 // interrupted one with the same settings goes on
-Result<RunFolder> open_run(const Path& folder, const Json& settings, bool replace);
+Result<RunFolder> open_run(const Path& folder, const Json& settings, bool replace, const RunContents& contents = {});
 
 } // namespace semrover

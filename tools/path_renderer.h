@@ -7,7 +7,9 @@
 #include "engine/scene/grid.h"
 #include "engine/splat/rasterizer.h"
 
+#include <functional>
 #include <map>
+#include <optional>
 
 namespace CLI {
 class App;
@@ -20,7 +22,8 @@ struct DriveOptions {
     std::string path, rig, splat_radius = "0.04", background = "0,0,0";
     uint32_t width = 616, height = 424;
     double fov = 73.0; // degrees: the focal length of the reference pictures, 420 pixels at a width of 616
-    float opacity = 1, visible_alpha = 0.5f;
+    float opacity = 1;
+    std::optional<float> visible_alpha; // 0.5, or what a model says
     bool semantic = false;
 };
 void add_drive_options(CLI::App& command, DriveOptions& options);

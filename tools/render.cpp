@@ -125,7 +125,7 @@ Status render(const Options& o, const Globals& globals)
         fmt::print(stderr, "semrover: warning: {} of {} splats are degenerate and not drawn\n", scene.skipped(),
                    scene.size());
     RasterizerOptions options;
-    options.visible_alpha = o.drive.visible_alpha;
+    options.visible_alpha = o.drive.visible_alpha.value_or(options.visible_alpha);
     PathRenderer renderer(*device, scene, options);
     if (!path.frames.empty())
         SR_CHECK(render_drive(o, globals, *device, renderer, path, out));

@@ -164,6 +164,9 @@ Result<std::unique_ptr<AsdRenderer>> AsdRenderer::create(Device& device, const U
             "the UNet takes {} channels, the renderer gives it {}: noisy, previous and buffer latent of {} each, "
             "and visibility",
             c.in_channels, 3 * c.out_channels + 1, c.out_channels);
+    if (c.num_class_embeds)
+        return fail(ErrorCode::bad_input, "the UNet wants one of {} class labels, which a renderer does not have",
+                    c.num_class_embeds);
     std::unique_ptr<AsdRenderer> r(new AsdRenderer(device, unet, plan, std::move(options)));
     r->memory_ = std::make_unique<Memory>(unet, r->plan_, text.tokens, size, r->options_.guidance_scale,
                                           bool(r->options_.noise));

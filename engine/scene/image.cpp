@@ -228,6 +228,18 @@ Result<ImageRgb8> read_png_rgb8(const Path& path)
     return image;
 }
 
+Result<ImageSize> read_png_size(const Path& path)
+{
+    SR_TRY(const MappedFile file, MappedFile::open(path));
+    Png p;
+    p.input = file.bytes();
+    if (file.bytes().size() < 8 || png_sig_cmp(reinterpret_cast<png_const_bytep>(file.bytes().data()), 0, 8) != 0)
+        return fail(ErrorCode::bad_input, "{}: expected a PNG file, found something else", quote_path(path));
+    if (!read_header(p))
+        return fail(ErrorCode::bad_input, "{}: not a valid PNG: {}", quote_path(path), printable(p.message));
+    return ImageSize{png_get_image_width(p.png, p.info), png_get_image_height(p.png, p.info)};
+}
+
 Result<ImageGray16> read_png_gray16(const Path& path)
 {
     ImageGray16 image;

@@ -28,6 +28,17 @@ Status write_png_gray16(const Path& path, uint32_t width, uint32_t height, std::
 // limited, and nothing is allocated that the file is too short to fill.
 Result<ImageRgb8> read_png_rgb8(const Path& path);
 
+// baseline JPEG, 4:2:0, quality 1..100, likewise
+Status write_jpeg_rgb8(const Path& path, uint32_t width, uint32_t height, std::span<const uint8_t> pixels, int quality);
+Result<ImageRgb8> read_jpeg_rgb8(const Path& path);
+
+// a PNG's size without its pixels
+struct ImageSize {
+    uint32_t width = 0, height = 0;
+    bool operator==(const ImageSize&) const = default;
+};
+Result<ImageSize> read_png_size(const Path& path);
+
 // 16-bit gray as it is (depth in millimetres); another kind of PNG is refused
 struct ImageGray16 {
     uint32_t width = 0, height = 0;

@@ -26,8 +26,9 @@ tl::unexpected<Error> system_failure(const char* what, const Path& path)
 } // namespace
 
 RunFolder::RunFolder(RunFolder&& other) noexcept
-    : path_(std::move(other.path_)), settings_(std::move(other.settings_)), entries_(std::move(other.entries_)),
-      lock_(std::exchange(other.lock_, -1)), journal_(std::exchange(other.journal_, -1))
+    : path_(std::move(other.path_)), settings_(std::move(other.settings_)), contents_(std::move(other.contents_)),
+      entries_(std::move(other.entries_)), appended_(other.appended_), lock_(std::exchange(other.lock_, -1)),
+      journal_(std::exchange(other.journal_, -1))
 {
 }
 
@@ -39,11 +40,12 @@ RunFolder::~RunFolder()
         ::close(lock_); // the kernel drops the lock, also when the process is killed
 }
 
-Result<RunFolder> RunFolder::open(const Path& folder, const Json& settings, bool restart)
+Result<RunFolder> RunFolder::open(const Path& folder, const Json& settings, bool restart, const RunContents& contents)
 {
     RunFolder run;
     run.path_ = folder;
     run.settings_ = settings;
+    run.contents_ = contents;
     std::error_code error;
     fs::create_directories(folder, error);
     if (error)
@@ -83,7 +85,9 @@ Status RunFolder::lock()
 Status RunFolder::start(const Json& settings)
 {
     std::error_code ignored;
-    fs::remove_all(path_ / "regions", ignored);
+    for (const auto* names : {&contents_.pieces, &contents_.results})
+        for (const std::string& name : *names)
+            fs::remove_all(path_ / name, ignored);
     fs::remove(path_ / "journal.jsonl", ignored);
     fs::remove(path_ / "run.json", ignored);
     return write_file_atomically(path_ / "run.json", Json{{"settings", settings}, {"state", "running"}}.dump(1) + "\n");
@@ -124,7 +128,18 @@ Status RunFolder::append(const Json& entry)
     }
     if (::fdatasync(journal_) != 0)
         return system_failure("write", path_ / "journal.jsonl");
+    appended_ = true;
     return {};
+}
+
+void RunFolder::drop_if_empty()
+{
+    if (appended_ || !entries_.empty())
+        return;
+    std::error_code ignored;
+    for (const char* name : {"run.json", "journal.jsonl", "lock"})
+        fs::remove(path_ / name, ignored);
+    fs::remove(path_, ignored); // stays if it holds anything else
 }
 
 Status RunFolder::finish(const Json& results)
@@ -132,7 +147,8 @@ Status RunFolder::finish(const Json& results)
     const Json summary{{"settings", settings_}, {"state", "finished"}, {"results", results}};
     SR_CHECK(write_file_atomically(path_ / "run.json", summary.dump(1) + "\n"));
     std::error_code ignored; // what stays only costs space
-    fs::remove_all(path_ / "regions", ignored);
+    for (const std::string& name : contents_.pieces)
+        fs::remove_all(path_ / name, ignored);
     fs::remove(path_ / "lock", ignored);
     return {};
 }

@@ -8,6 +8,11 @@
 
 namespace semrover {
 
+// folders that a run keeps in its own: pieces go when it is finished, results stay; both go when it starts over
+struct RunContents {
+    std::vector<std::string> pieces = {"regions"}, results;
+};
+
 // A run's folder: run.json (resolved settings, versions, device, hashes), journal.jsonl (one line per finished piece)
 // and the pieces' files. A process may be killed at any time; opening the folder again gives back every piece that was
 // finished. One process at a time.
@@ -15,7 +20,8 @@ class RunFolder {
   public:
     // creates the folder, or reopens it when its run.json has the same `settings`; other settings are refused unless
     // `restart`, which empties the folder first. Errors: bad_input
-    static Result<RunFolder> open(const Path& folder, const Json& settings, bool restart);
+    static Result<RunFolder> open(const Path& folder, const Json& settings, bool restart,
+                                  const RunContents& contents = {});
     RunFolder(RunFolder&& other) noexcept;
     RunFolder& operator=(RunFolder&&) = delete;
     ~RunFolder();
@@ -28,6 +34,8 @@ class RunFolder {
     Status append(const Json& entry); // on the disk when it returns
     // run.json with `results` added; the pieces' files go
     Status finish(const Json& results);
+    // after an error: a run without a single piece leaves nothing behind
+    void drop_if_empty();
 
   private:
     RunFolder() = default;
@@ -37,7 +45,9 @@ class RunFolder {
 
     Path path_;
     Json settings_;
+    RunContents contents_;
     std::vector<Json> entries_;
+    bool appended_ = false;
     int lock_ = -1, journal_ = -1;
 };
 

@@ -1,0 +1,366 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/scene/grid.h"
+#include "tests/child_program.h"
+#include "tests/program.h"
+#include "tests/renderer_folders.h"
+
+#include <algorithm>
+#include <csignal>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+namespace semrover {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+constexpr uint32_t kWidth = 56, kHeight = 40, kFrames = 3;
+constexpr const char* kSettings = " --steps 3 ";
+
+class CliRefine : public testing::Test {
+  protected:
+    CliRefine()
+    {
+        put_renderer_model(folder_ / "model");
+        put_buffers(folder_ / "in", kFrames, kWidth, kHeight);
+    }
+
+    std::string path(std::string_view name) const { return (folder_ / name).string(); }
+    std::string arguments(std::string_view output, std::string_view input = "in") const
+    {
+        return "refine " + path(input) + " -m " + path("model") + " -o " + path(output) + " --quiet" + kSettings;
+    }
+    ProgramResult refine(std::string_view output, const std::string& more = "", std::string_view input = "in") const
+    {
+        return semrover_program(arguments(output, input) + more);
+    }
+    Json report(std::string_view output, const std::string& more = "", std::string_view input = "in") const
+    {
+        const ProgramResult result = refine(output, more + " --json", input);
+        EXPECT_EQ(result.code, 0) << result.err;
+        return Json::parse(result.out, nullptr, false);
+    }
+    // bytes of every frame and latent under `output`, by name
+    std::map<std::string, std::string> results(std::string_view output, std::string_view camera = "") const
+    {
+        std::map<std::string, std::string> files;
+        for (const char* kind : {"frames", "latents"})
+            for (const auto& entry : fs::directory_iterator(folder_ / output / kind / camera))
+                files[std::string(kind) + "/" + entry.path().filename().string()] = contents(entry.path());
+        return files;
+    }
+    std::map<std::string, std::string> refined(std::string_view output, const std::string& more = "",
+                                               std::string_view input = "in") const
+    {
+        const ProgramResult result = refine(output, more, input);
+        EXPECT_EQ(result.code, 0) << result.err;
+        return results(output);
+    }
+    size_t journal_lines(std::string_view output) const
+    {
+        return size_t(std::ranges::count(contents(folder_ / output / "journal.jsonl"), '\n'));
+    }
+    // starts a run, waits until `lines` pieces are saved and sends it `signal`; its exit status
+    int stop_after(std::string_view output, size_t lines, int signal, const std::string& more = "",
+                   std::string_view input = "in") const
+    {
+        ChildProgram child(arguments(output, input) + more);
+        while (journal_lines(output) < lines && child.running())
+            usleep(500);
+        return child.stop(signal);
+    }
+
+    ScratchFolder folder_;
+};
+
+TEST_F(CliRefine, a_run_writes_frames_and_latents_the_same_again_and_others_with_another_seed)
+{
+    const auto first = refined("a");
+    EXPECT_EQ(first.size(), 2 * kFrames);
+    EXPECT_EQ(read_png_size(folder_ / "a" / "frames" / "000002.png")->width, kWidth);
+    EXPECT_TRUE(first == refined("b"));
+    EXPECT_FALSE(first == refined("c", "--seed 8"));
+    EXPECT_FALSE(first == refined("d", "--sampler dpm++2m"));
+    EXPECT_FALSE(fs::exists(folder_ / "a" / "encoded"));
+    const Json run = Json::parse(contents(folder_ / "a" / "run.json"));
+    EXPECT_EQ(run["state"], "finished");
+    EXPECT_EQ(run["settings"]["steps"], 3);
+}
+
+TEST_F(CliRefine, a_run_that_was_killed_goes_on_to_the_same_bytes)
+{
+    const auto whole = refined("whole");
+    for (const size_t lines : {0, 1, 2, 3, 5}) {
+        const std::string output = fmt::format("killed{}", lines);
+        EXPECT_EQ(stop_after(output, lines, SIGKILL), 128 + SIGKILL) << lines;
+        EXPECT_TRUE(whole == refined(output)) << "killed after " << lines << " pieces";
+    }
+}
+
+TEST_F(CliRefine, an_interrupt_saves_what_is_done_and_exits_with_130)
+{
+    EXPECT_EQ(stop_after("out", 2, SIGINT), 130);
+    EXPECT_GE(journal_lines("out"), 2u);
+    EXPECT_TRUE(refined("whole") == refined("out"));
+}
+
+TEST_F(CliRefine, damaged_pieces_are_done_again)
+{
+    const auto whole = refined("whole");
+    ASSERT_EQ(stop_after("out", 4, SIGKILL), 128 + SIGKILL);
+    std::ofstream(path("out/journal.jsonl"), std::ios::app) << R"({"piece":"frames/0000)"; // died while writing
+    fs::resize_file(folder_ / "out" / "latents" / "000000.safetensors", 40);
+    fs::remove(folder_ / "out" / "frames" / "000000.png");
+    EXPECT_TRUE(whole == refined("out"));
+}
+
+TEST_F(CliRefine, a_chain_goes_on_at_a_frame_from_the_latent_of_another_run)
+{
+    const auto whole = refined("whole");
+    const auto part = refined("part", "--frames 1:2 --from " + path("whole"));
+    EXPECT_EQ(part.size(), 4u);
+    for (const auto& [name, bytes] : part)
+        EXPECT_TRUE(bytes == whole.at(name)) << name;
+    const auto fresh = refined("fresh", "--frames 1:"); // a first frame
+    EXPECT_EQ(fresh.size(), 4u);
+    EXPECT_FALSE(fresh.at("frames/000001.png") == whole.at("frames/000001.png"));
+    const auto head = refined("head", "--frames :0");
+    EXPECT_EQ(head.size(), 2u);
+    EXPECT_TRUE(head.at("frames/000000.png") == whole.at("frames/000000.png"));
+}
+
+TEST_F(CliRefine, cameras_are_chains_that_do_not_know_of_each_other)
+{
+    put_buffers(folder_ / "rig" / "front", 2, kWidth, kHeight);
+    put_buffers(folder_ / "rig" / "left", 2, 40, 32, 1); // of another size
+    const Json together = report("out", "", "rig");
+    EXPECT_EQ(together["frames"], 4);
+    EXPECT_EQ(together["planned_device_bytes"], together["peak_device_bytes"]);
+    for (const std::string name : {"front", "left"}) {
+        fs::create_directories(folder_ / ("only_" + name));
+        fs::copy(folder_ / "rig" / name, folder_ / ("only_" + name) / name, fs::copy_options::recursive);
+        ASSERT_EQ(refine("out_" + name, "", "only_" + name).code, 0);
+        EXPECT_TRUE(results("out", name) == results("out_" + name, name)) << name;
+    }
+    ASSERT_EQ(stop_after("killed", 5, SIGKILL, "", "rig"), 128 + SIGKILL);
+    ASSERT_EQ(refine("killed", "", "rig").code, 0);
+    for (const char* name : {"front", "left"})
+        EXPECT_TRUE(results("out", name) == results("killed", name)) << name;
+}
+
+TEST_F(CliRefine, less_memory_means_stages_and_the_same_bytes)
+{
+    const auto whole = refined("whole");
+    const Json plan = Json::parse(semrover_program(arguments("none") + "--dry-run --json").out);
+    EXPECT_FALSE(fs::exists(folder_ / "none"));
+    EXPECT_EQ(plan["policy"], "resident");
+    const uint64_t resident = plan["policies"]["resident"], staged = plan["policies"]["staged"];
+    ASSERT_LT(staged, resident);
+    for (const auto& [limit, policy] :
+         {std::pair{resident, "resident"}, {resident - 1, "staged"}, {staged, "staged"}}) {
+        const std::string output = fmt::format("limit{}", limit);
+        const Json run = report(output, fmt::format("--max-vram {}", limit));
+        EXPECT_EQ(run["policy"], policy);
+        EXPECT_EQ(run["planned_device_bytes"], run["peak_device_bytes"]);
+        EXPECT_EQ(run["planned_device_bytes"], limit == resident ? resident : staged);
+        EXPECT_TRUE(whole == results(output)) << policy;
+    }
+    const ProgramResult refused = refine("less", fmt::format("--max-vram {}", staged - 1));
+    EXPECT_EQ(refused.code, 5);
+    for (const uint64_t number : {resident, staged, staged - 1})
+        EXPECT_NE(refused.err.find(std::to_string(number)), std::string::npos) << refused.err;
+    const std::string limit = fmt::format("--max-vram {} ", staged);
+    for (const size_t lines : {1, 4, 7}) { // while encoding, denoising, decoding
+        const std::string output = fmt::format("staged{}", lines);
+        EXPECT_EQ(stop_after(output, lines, SIGKILL, limit), 128 + SIGKILL);
+        const Json run = report(output, lines == 4 ? "" : limit); // another policy goes on as well
+        EXPECT_EQ(run["planned_device_bytes"], run["peak_device_bytes"]);
+        EXPECT_TRUE(whole == results(output)) << lines;
+    }
+}
+
+TEST_F(CliRefine, the_planned_memory_is_the_memory_that_was_used)
+{
+    for (const char* more : {"", "--cfg-scale 1", "--cfg-scale 4", "--precision fp32", "--frames 0:0"}) {
+        const Json run = report("out", fmt::format("-y {}", more));
+        EXPECT_EQ(run["planned_device_bytes"], run["peak_device_bytes"]) << more;
+    }
+    const ProgramResult told =
+        semrover_program("refine " + path("in") + " -m " + path("model") + " -o " + path("told") + kSettings);
+    EXPECT_EQ(told.code, 0) << told.err;
+    EXPECT_NE(told.out.find("planned device memory "), std::string::npos) << told.out;
+    EXPECT_NE(told.out.find("peak device memory "), std::string::npos) << told.out;
+}
+
+TEST_F(CliRefine, frames_can_be_jpegs_and_videos)
+{
+    const ProgramResult result =
+        refine("out", "--format jpeg --quality 80 --video " + path("out.mp4") + " --side-by-side " + path("side.mp4"));
+    ASSERT_EQ(result.code, 0) << result.err;
+    const auto frame = read_jpeg_rgb8(folder_ / "out" / "frames" / "000001.jpg");
+    ASSERT_TRUE(frame) << frame.error().message;
+    EXPECT_EQ(frame->height, kHeight);
+    EXPECT_GT(fs::file_size(folder_ / "out.mp4"), 500u);
+    EXPECT_GT(fs::file_size(folder_ / "side.mp4"), fs::file_size(folder_ / "out.mp4"));
+}
+
+// a road of 12 x 20 cells, each with points
+VoxelGrid street()
+{
+    VoxelGrid grid;
+    grid.voxel_size = 0.6f;
+    grid.points_per_voxel = 20;
+    for (int32_t i = 0; i < 20; ++i)
+        for (int32_t j = 0; j < 12; ++j)
+            grid.cells.push_back({i, j, 0});
+    for (size_t i = 0; i < grid.cells.size(); ++i) {
+        grid.labels.push_back(0);
+        grid.generated.push_back(1);
+        for (uint32_t p = 0; p < 20; ++p) {
+            for (float offset : {float(p % 5) * 0.12f - 0.24f, float(p / 5) * 0.14f - 0.21f, 0.f})
+                grid.points.push_back(float_to_half(offset));
+            grid.colors.insert(grid.colors.end(), {uint8_t(10 * p), uint8_t(i), uint8_t(90)});
+        }
+    }
+    sort_cells(grid);
+    return grid;
+}
+
+TEST_F(CliRefine, straight_from_a_grid_is_render_and_refine)
+{
+    ASSERT_TRUE(write_grid(folder_ / "street.sgrid", street()));
+    folder_.put("path.tum", "0 0 3.6 1.6 -0.5 0.5 -0.5 0.5\n1 1 3.6 1.6 -0.5 0.5 -0.5 0.5\n");
+    const std::string drive = " --path " + path("path.tum") + " -W 56 -H 40 ";
+    const ProgramResult rendered =
+        semrover_program("render " + path("street.sgrid") + drive + "--quiet -o " + path("buffers"));
+    ASSERT_EQ(rendered.code, 0) << rendered.err;
+    const auto two_commands = refined("two", "", "buffers");
+    const Json one = report("one", drive, "street.sgrid");
+    EXPECT_TRUE(two_commands == results("one"));
+    EXPECT_EQ(one["planned_device_bytes"], one["peak_device_bytes"]);
+    EXPECT_TRUE(fs::exists(folder_ / "one" / "buffers" / "depth" / "000001.png"));
+    for (const size_t lines : {0, 1, 2}) {
+        const std::string output = fmt::format("killed{}", lines);
+        EXPECT_EQ(stop_after(output, lines, SIGKILL, drive, "street.sgrid"), 128 + SIGKILL);
+        EXPECT_EQ(refine(output, drive, "street.sgrid").code, 0);
+        EXPECT_TRUE(two_commands == results(output)) << lines;
+    }
+    // the folder against its path
+    EXPECT_EQ(refine("checked", drive, "buffers").code, 0);
+    const ProgramResult other = refine("other", " --path " + path("path.tum") + " -W 64 -H 40 ", "buffers");
+    EXPECT_EQ(other.code, 3);
+    EXPECT_NE(other.err.find("64 x 40 pixels in the path"), std::string::npos) << other.err;
+}
+
+// ---- bad input: one line, the exit code, nothing left behind
+
+class CliRefineRefuses : public CliRefine {
+  protected:
+    void expect_refusal(const std::string& line, int code, std::string_view text)
+    {
+        const size_t entries = folder_.entries();
+        const ProgramResult result = semrover_program(line);
+        EXPECT_EQ(result.code, code) << line << "\n" << result.err;
+        EXPECT_TRUE(result.err.starts_with("semrover: error: ")) << result.err;
+        EXPECT_NE(result.err.find(text), std::string::npos) << "expected \"" << text << "\", found: " << result.err;
+        EXPECT_EQ(std::ranges::count(result.err, '\n'), 1) << result.err;
+        EXPECT_EQ(folder_.entries(), entries) << line << ": something was left behind";
+    }
+};
+
+TEST_F(CliRefineRefuses, buffers_that_are_not_whole)
+{
+    put_buffers(folder_ / "gap", 3, kWidth, kHeight);
+    fs::remove(folder_ / "gap" / "color" / "000001.png");
+    expect_refusal(arguments("out", "gap"), 3, "000001.png' is missing");
+    put_buffers(folder_ / "blind", 2, kWidth, kHeight);
+    fs::remove(folder_ / "blind" / "visible" / "000001.png");
+    expect_refusal(arguments("out", "blind"), 3, "has no '");
+    put_buffers(folder_ / "mixed", 2, kWidth, kHeight);
+    put_buffers(folder_ / "wider", 2, 64, kHeight);
+    fs::copy(folder_ / "wider" / "color" / "000001.png", folder_ / "mixed" / "color" / "000001.png",
+             fs::copy_options::overwrite_existing);
+    expect_refusal(arguments("out", "mixed"), 3, "is 64 x 40 pixels, the first frame of its camera is 56 x 40");
+    expect_refusal(arguments("out") + "-W 64 -H 40", 3, "-W and -H say 64 x 40");
+    fs::create_directory(folder_ / "empty");
+    expect_refusal(arguments("out", "empty"), 3, "has no color/");
+    expect_refusal(arguments("out", "nowhere"), 3, "nowhere");
+    std::ofstream(path("in/color/000000.png")) << "no picture";
+    expect_refusal(arguments("out"), 3, "expected a PNG file");
+}
+
+TEST_F(CliRefineRefuses, models_that_cannot_render)
+{
+    fs::remove_all(folder_ / "model" / "vae");
+    expect_refusal(arguments("out"), 3, "vae");
+    expect_refusal("refine " + path("in") + " -o " + path("out") + " -m " + path("nowhere"), 3, "nowhere");
+}
+
+TEST_F(CliRefineRefuses, results_that_are_not_numbers)
+{
+    // finite weights whose products are not: the decoder's last layer
+    const fs::path weights = folder_ / "model" / "vae" / "diffusion_pytorch_model.safetensors";
+    const auto file = Safetensors::open(weights);
+    std::vector<TensorData> tensors;
+    std::vector<uint16_t> huge;
+    for (const TensorInfo& t : file->tensors()) {
+        tensors.push_back({t.name, t.dtype, t.shape, file->bytes(t)});
+        if (t.name == "decoder.conv_norm_out.weight") {
+            huge.assign(t.bytes() / 2, float_to_half(65000));
+            tensors.back().bytes = std::as_bytes(std::span(huge));
+        }
+    }
+    ASSERT_TRUE(write_safetensors(folder_ / "changed", tensors));
+    fs::rename(folder_ / "changed", weights);
+    const ProgramResult result = refine("out", "--frames 1:1");
+    EXPECT_EQ(result.code, 70);
+    EXPECT_NE(result.err.find("frame 1: the decoded frame holds "), std::string::npos) << result.err;
+    EXPECT_FALSE(fs::exists(folder_ / "out" / "frames"));
+}
+
+TEST_F(CliRefineRefuses, latents_that_are_not_numbers)
+{
+    refined("whole", "--frames 0:0");
+    const std::string line = arguments("out") + "--frames 1:2 --from " + path("whole");
+    std::vector<float> latent(7 * 5 * 4, 0.5f);
+    latent[17] = std::numeric_limits<float>::quiet_NaN();
+    const TensorData nan{"latent", DType::f32, {5, 7, 4}, std::as_bytes(std::span(latent))};
+    ASSERT_TRUE(write_safetensors(path("whole/latents/000000.safetensors"), {&nan, 1}));
+    expect_refusal(line, 3, "NaN or infinity at element 17");
+    const TensorData turned{"latent", DType::f32, {7, 5, 4}, std::as_bytes(std::span(latent))};
+    ASSERT_TRUE(write_safetensors(path("whole/latents/000000.safetensors"), {&turned, 1}));
+    expect_refusal(line, 3, "expected a latent F32 [5, 7, 4]");
+    fs::remove(folder_ / "whole" / "latents" / "000000.safetensors");
+    expect_refusal(line, 3, "000000.safetensors");
+}
+
+TEST_F(CliRefineRefuses, outputs_devices_and_options_that_cannot_be)
+{
+    const std::string line = arguments("out");
+    expect_refusal("refine " + path("in") + " -m " + path("model"), 2, "-o/--output is required");
+    expect_refusal(line + "--frames 2:1", 2, "--frames 2:1");
+    expect_refusal(line + "--frames 0:3", 2, "--frames 0:3 is not within 0:2");
+    expect_refusal(line + "--frames two", 2, "FIRST:LAST");
+    expect_refusal(line + "--sampler heun", 2, "heun");
+    expect_refusal("refine " + path("in") + " -m " + path("model") + " -o " + path("out") + " --steps 0", 3,
+                   "0 denoising steps");
+    expect_refusal(line + "--cfg-scale=-1", 2, "guidance");
+    expect_refusal(line + "--max-vram 100KiB", 5, "--max-vram");
+    expect_refusal(line + "--max-vram 0.001", 5, "--max-vram allows 1000000"); // GB
+    expect_refusal(line + "--max-vram lots", 2, "6GiB");
+    EXPECT_EQ(semrover_program(line + "--dry-run --max-vram 2.2").code, 0);
+    expect_refusal(line + "--device unobtainium", 4, "unobtainium");
+    expect_refusal(line + "--quality 0", 2, "quality");
+    ASSERT_TRUE(write_grid(folder_ / "street.sgrid", street()));
+    expect_refusal(arguments("out", "street.sgrid"), 2, "--path is required");
+    refined("done");
+    expect_refusal(arguments("done"), 2, "-y replaces it");
+    ASSERT_EQ(stop_after("stopped", 1, SIGKILL), 128 + SIGKILL);
+    expect_refusal(arguments("stopped") + "--seed 9", 3, "other settings");
+    EXPECT_TRUE(refined("stopped", "--seed 9 -y") == refined("other", "--seed 9"));
+}
+
+} // namespace
+} // namespace semrover

@@ -1,0 +1,52 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/scene/image.h"
+#include "runtime/safetensors.h"
+#include "tests/scratch_folder.h"
+
+#include <gtest/gtest.h>
+
+namespace semrover {
+
+const std::filesystem::path kRolloutCase = SEMROVER_SOURCE_DIR "/tests/golden/asd_rollout_tiny";
+
+// the networks of the golden rollout as a model's folder, with its conditioning
+inline void put_renderer_model(const std::filesystem::path& folder)
+{
+    namespace fs = std::filesystem;
+    fs::create_directories(folder / "conditioning");
+    fs::copy(kRolloutCase / "model" / "unet", folder / "renderer");
+    fs::copy(kRolloutCase / "model" / "vae", folder / "vae");
+    const auto file = Safetensors::open(kRolloutCase / "tensors.safetensors");
+    const TensorInfo& text = **file->get("input.encoder_hidden_states");
+    const TensorData tensor{"encoder_hidden_states", text.dtype, text.shape, file->bytes(text)};
+    ASSERT_TRUE(write_safetensors(folder / "conditioning" / "conditioning.safetensors", {&tensor, 1}));
+}
+
+// splat buffers of a drive towards a wall: stripes that grow, seen in the lower two thirds
+inline void put_buffers(const std::filesystem::path& folder, uint32_t frames, uint32_t width, uint32_t height,
+                        uint32_t hue = 0)
+{
+    for (const char* kind : {"color", "visible", "label"})
+        std::filesystem::create_directories(folder / kind);
+    for (uint32_t f = 0; f < frames; ++f) {
+        std::vector<uint8_t> color, visible, label;
+        for (uint32_t y = 0; y < height; ++y)
+            for (uint32_t x = 0; x < width; ++x) {
+                const bool seen = y > height / 3 && (x + y) % 7;
+                const uint32_t stripe = x / (3 + f) % 3;
+                for (uint32_t c = 0; c < 3; ++c)
+                    color.push_back(seen ? uint8_t(60 + 70 * ((stripe + c + hue) % 3) + y) : 0);
+                visible.push_back(seen ? 255 : 0);
+                label.push_back(seen ? uint8_t(stripe) : 255);
+            }
+        const std::string name = fmt::format("{:06}.png", f);
+        ASSERT_TRUE(write_png_rgb8(folder / "color" / name, width, height, color));
+        ASSERT_TRUE(write_png_gray8(folder / "visible" / name, width, height, visible));
+        ASSERT_TRUE(write_png_gray8(folder / "label" / name, width, height, label));
+    }
+}
+
+} // namespace semrover
