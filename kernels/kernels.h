@@ -142,6 +142,22 @@ struct ChannelShift {
 };
 [[nodiscard]] FeatureMap channel_shift(Graph& g, FeatureMap x, const ChannelShift& shift);
 
+// y = winograd(x) + bias + shift + residual: 3x3 taps at stride 1 with a quarter of the multiplications, in fp32:
+// F(4x4, 3x3). Takes 4 floats per weight of device memory, and 64 MiB for tiles.
+struct ConvAddends {
+    ChannelShift shift;  // or none
+    FeatureMap residual; // or none
+};
+[[nodiscard]] Tensor winograd_weight(Graph& g, Tensor w); // [N, 9 * C], as conv2d's -> [36 * N, C] fp32
+[[nodiscard]] FeatureMap winograd_conv2d(Graph& g, FeatureMap x,
+                                         Tensor u,    // winograd_weight()
+                                         Tensor bias, // [1, N] fp32, or none
+                                         const ConvOptions& options = {}, const ConvAddends& addends = {});
+// is it expected to be faster than conv2d on such a device, and does it fit its limits? Weights are transformed in
+// every run. Measured on lavapipe; GPUs, which have more multiplications for a byte, are left to conv2d.
+[[nodiscard]] bool prefers_winograd(const DeviceLimits& limits, const FeatureMap& x, uint32_t outputs,
+                                    const ConvOptions& options);
+
 // mean and sum of squared differences from it, of every channel over every 16 rows; taken by the pass that makes x
 [[nodiscard]] Tensor channel_moments(Graph& g, FeatureMap x); // [batch * image_rows / 16, 2 * C] fp32: mean, m2 pairs
 

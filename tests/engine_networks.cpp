@@ -62,10 +62,10 @@ double largest_difference(const HostImages& a, const HostImages& b)
 TEST(engine_networks, have_the_parameters_of_stable_diffusion)
 {
     UnetConfig unet;
-    EXPECT_EQ(Unet::plan(unet, DType::f16)->parameters(), 859520964u);
+    EXPECT_EQ(Unet::plan(unet, DType::f16, {})->parameters(), 859520964u);
     unet.in_channels = 13;
-    EXPECT_EQ(Unet::plan(unet, DType::f16)->parameters(), 859520964u + 9 * 9 * 320);
-    EXPECT_EQ(Vae::plan({}, DType::f16)->parameters(), 83653863u);
+    EXPECT_EQ(Unet::plan(unet, DType::f16, {})->parameters(), 859520964u + 9 * 9 * 320);
+    EXPECT_EQ(Vae::plan({}, DType::f16, {})->parameters(), 83653863u);
 }
 
 TEST(engine_networks, decode_the_same_image_in_bands_of_rows)

@@ -236,8 +236,8 @@ Status settle_device(Device& device)
 Status make_memory_plan(Job& j, std::span<const RendererWork> work)
 {
     const DType precision = precision_of(j.options);
-    const auto unet = Unet::plan(j.model.unet, precision);
-    const auto vae = Vae::plan(j.model.vae, precision);
+    const auto unet = Unet::plan(j.model.unet, precision, j.device->limits());
+    const auto vae = Vae::plan(j.model.vae, precision, j.device->limits());
     SR_TRY(RendererBytes parts,
            renderer_bytes(j.device->limits(), {*unet, *vae, j.plan, j.model.conditioning_tokens, j.asd.guidance_scale},
                           work));

@@ -41,22 +41,26 @@ FeatureMap resnet(Graph& g, const NetworkWeights& w, const ResnetBlock& b, NormI
     norm.dtype = w.precision();
     const FeatureMap n =
         group_norm(g, x, x2, w.tensor(g, b.norm1.weight, "norm1"), w.tensor(g, b.norm1.bias, "norm1"), norm);
-    FeatureMap h = convolve(g, w, b.conv1, n);
-    if (shift.table.valid())
-        h = channel_shift(g, h, shift);
+    const FeatureMap h = convolve(g, w, b.conv1, n, {}, {shift, {}});
     const FeatureMap m = norm_silu(g, w, b.norm2, with_moments(g, h), norm);
     FeatureMap residual = x.x;
     if (b.shortcut.weight.rows)
-        residual = convolve(g, w, b.shortcut, x.x, {.kernel = 1}, x2.x);
-    const FeatureMap y = convolve(g, w, b.conv2, m);
-    return y.with(add(g, y.data, residual.data));
+        residual = conv2d(g, x.x, x2.x, w.tensor(g, b.shortcut.weight, "shortcut"),
+                          w.tensor(g, b.shortcut.bias, "shortcut.bias"), {.kernel = 1, .dtype = w.precision()});
+    return convolve(g, w, b.conv2, m, {}, {{}, residual});
 }
 
 FeatureMap convolve(Graph& g, const NetworkWeights& w, const Layer& layer, FeatureMap x, ConvOptions options,
-                    FeatureMap x2)
+                    const ConvAddends& addends)
 {
     options.dtype = w.precision();
-    return conv2d(g, x, x2, w.tensor(g, layer.weight, "conv"), w.tensor(g, layer.bias, "conv.bias"), options);
+    const Tensor weight = w.tensor(g, layer.weight, "conv"), bias = w.tensor(g, layer.bias, "conv.bias");
+    if (prefers_winograd(w.limits(), x, weight.rows, options))
+        return winograd_conv2d(g, x, winograd_weight(g, weight), bias, options, addends);
+    FeatureMap y = conv2d(g, x, {}, weight, bias, options);
+    if (addends.shift.table.valid())
+        y = channel_shift(g, y, addends.shift);
+    return addends.residual.valid() ? y.with(add(g, y.data, addends.residual.data)) : y;
 }
 
 Tensor project(Graph& g, const NetworkWeights& w, const Layer& layer, Tensor x)

@@ -27,9 +27,9 @@ ResnetBlock declare_resnet(NetworkWeights& weights, const std::string& name, con
 [[nodiscard]] FeatureMap resnet(Graph& g, const NetworkWeights& weights, const ResnetBlock& block, NormInput x,
                                 NormInput x2, const ChannelShift& shift = {});
 
-// y = conv(x): [N, kernel^2 C]
+// y = conv(x) + shift + residual, in the way that the device likes best
 [[nodiscard]] FeatureMap convolve(Graph& g, const NetworkWeights& weights, const Layer& layer, FeatureMap x,
-                                  ConvOptions options = {}, FeatureMap x2 = {});
+                                  ConvOptions options = {}, const ConvAddends& addends = {});
 // y = x w^T + b
 [[nodiscard]] Tensor project(Graph& g, const NetworkWeights& weights, const Layer& layer, Tensor x);
 // y = silu(norm(x))

@@ -20,9 +20,11 @@ struct Layer {
 // are read from a checkpoint; what is declared decides the device bytes.
 class NetworkWeights {
   public:
-    explicit NetworkWeights(DType precision) : precision_(precision) {}
+    // limits: of the device that the graphs are for, which decide how they convolve
+    NetworkWeights(DType precision, const DeviceLimits& limits) : precision_(precision), limits_(limits) {}
 
     DType precision() const { return precision_; }
+    const DeviceLimits& limits() const { return limits_; }
 
     // convolution over C channels, or C and C2 that come as two inputs: [N, kernel^2 * (C + C2)], tap by tap, each
     // input padded to kRowPadding. `gain` multiplies weights, `bias_gain` biases. Without a dtype: the network's
@@ -76,6 +78,7 @@ class NetworkWeights {
     Status upload(Device& device, const Checkpoint& checkpoint, const Entry& entry) const;
 
     DType precision_;
+    DeviceLimits limits_;
     Arena arena_;
     std::vector<Entry> entries_;
 };

@@ -35,7 +35,7 @@ struct Unet::Impl {
     Arena constants;
     uint32_t frequencies = 0;
 
-    Impl(const UnetConfig& c, DType precision) : config(c), weights(precision)
+    Impl(const UnetConfig& c, DType precision, const DeviceLimits& limits) : config(c), weights(precision, limits)
     {
         std::vector<NetworkWeights::Part> shifts, context_parts;
         declare_ends();
@@ -194,15 +194,15 @@ struct Unet::Impl {
 Unet::Unet(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Unet::~Unet() = default;
 
-std::unique_ptr<Unet> Unet::plan(const UnetConfig& config, DType precision)
+std::unique_ptr<Unet> Unet::plan(const UnetConfig& config, DType precision, const DeviceLimits& limits)
 {
-    return std::unique_ptr<Unet>(new Unet(std::make_unique<Impl>(config, precision)));
+    return std::unique_ptr<Unet>(new Unet(std::make_unique<Impl>(config, precision, limits)));
 }
 
 Result<std::unique_ptr<Unet>> Unet::load(Device& device, const UnetConfig& config, const Checkpoint& weights,
                                          DType precision)
 {
-    std::unique_ptr<Unet> unet = plan(config, precision);
+    std::unique_ptr<Unet> unet = plan(config, precision, device.limits());
     SR_CHECK(unet->impl_->weights.load(device, weights, unet_schema(config)));
     SR_CHECK(unet->impl_->upload_frequencies(device));
     return unet;

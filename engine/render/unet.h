@@ -18,7 +18,7 @@ class Unet {
     static Result<std::unique_ptr<Unet>> load(Device& device, const UnetConfig& config, const Checkpoint& weights,
                                               DType precision);
     // lays out the weights without loading anything: for planning memory
-    static std::unique_ptr<Unet> plan(const UnetConfig& config, DType precision);
+    static std::unique_ptr<Unet> plan(const UnetConfig& config, DType precision, const DeviceLimits& limits);
 
     const UnetConfig& config() const;
     DType precision() const;

@@ -41,8 +41,8 @@ struct Vae::Impl {
     VaeHalf encoder, decoder;
     Layer quant_conv, post_quant_conv;
 
-    Impl(const VaeConfig& c, DType precision)
-        : config(c), weights(precision), stream(precision == DType::f16 && c.force_upcast ? kHalfStream : 1.f)
+    Impl(const VaeConfig& c, DType precision, const DeviceLimits& limits)
+        : config(c), weights(precision, limits), stream(precision == DType::f16 && c.force_upcast ? kHalfStream : 1.f)
     {
         const uint32_t latent = config.latent_channels;
         declare_encoder();
@@ -204,15 +204,15 @@ struct Vae::Impl {
 Vae::Vae(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Vae::~Vae() = default;
 
-std::unique_ptr<Vae> Vae::plan(const VaeConfig& config, DType precision)
+std::unique_ptr<Vae> Vae::plan(const VaeConfig& config, DType precision, const DeviceLimits& limits)
 {
-    return std::unique_ptr<Vae>(new Vae(std::make_unique<Impl>(config, precision)));
+    return std::unique_ptr<Vae>(new Vae(std::make_unique<Impl>(config, precision, limits)));
 }
 
 Result<std::unique_ptr<Vae>> Vae::load(Device& device, const VaeConfig& config, const Checkpoint& weights,
                                        DType precision)
 {
-    std::unique_ptr<Vae> vae = plan(config, precision);
+    std::unique_ptr<Vae> vae = plan(config, precision, device.limits());
     SR_CHECK(vae->impl_->weights.load(device, weights, vae_schema(config)));
     return vae;
 }

@@ -19,7 +19,7 @@ class Vae {
     static Result<std::unique_ptr<Vae>> load(Device& device, const VaeConfig& config, const Checkpoint& weights,
                                              DType precision);
     // lays out the weights without loading anything: for planning memory
-    static std::unique_ptr<Vae> plan(const VaeConfig& config, DType precision);
+    static std::unique_ptr<Vae> plan(const VaeConfig& config, DType precision, const DeviceLimits& limits);
 
     const VaeConfig& config() const;
     DType precision() const;

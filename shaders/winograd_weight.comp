@@ -1,0 +1,38 @@
+#version 460
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// U = G w G^T per output and channel, four channels a thread
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
+#include "winograd_weight.h"
+#include "lib/thread.glsl"
+#include "lib/winograd.glsl"
+
+layout(local_size_x = 64) in;
+layout(constant_id = 0) const bool kHalfW = false;
+layout(push_constant) uniform Push { WinogradWeightPush p; };
+layout(binding = 0) uniform usamplerBuffer W;         // [outputs, 9 * cols]
+layout(binding = 1) writeonly buffer U { vec4 u[]; }; // [36 * outputs, cols]
+
+void main()
+{
+    const uint per_row = p.cols / 4;
+    const uint n = linear_thread() / per_row, col = linear_thread() % per_row * 4;
+    if (n >= p.outputs)
+        return;
+    vec4 rows[kSamples][3];
+    [[unroll]] for (uint j = 0; j < 3; ++j) {
+        vec4 g[3], column[kSamples];
+        [[unroll]] for (uint i = 0; i < 3; ++i)
+            g[i] = FETCH4(W, kHalfW, n * p.w_ld + (i * 3 + j) * p.cols + col);
+        WINOGRAD_WEIGHT(g[0], g[1], g[2], column)
+        [[unroll]] for (uint i = 0; i < kSamples; ++i)
+            rows[i][j] = column[i];
+    }
+    [[unroll]] for (uint i = 0; i < kSamples; ++i) {
+        vec4 row[kSamples];
+        WINOGRAD_WEIGHT(rows[i][0], rows[i][1], rows[i][2], row)
+        [[unroll]] for (uint j = 0; j < kSamples; ++j)
+            u[(((i * kSamples + j) * p.outputs + n) * p.u_ld + col) / 4] = row[j];
+    }
+}
