@@ -1,8 +1,8 @@
 #version 460
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// y = softmax(q k^T scale) v, online over blocks of 32 keys; for devices that are CPUs: every lane owns 16 queries of its
-// own, so that nothing is exchanged; loads come through texel buffers; eight channels of a block are unrolled.
+// y = softmax(q k^T scale) v, online over blocks of 32 keys; for devices that are CPUs: every lane owns 16 queries, so
+// that nothing is exchanged; loads come through texel buffers; eight channels of a block are unrolled.
 // note: the sums of y are indexed by a loop and therefore live in memory, where lavapipe moves them lane by lane: 32
 // keys pay for one such move. With 16 it reaches 0.7 of the speed; unrolling the channels takes minutes to compile.
 #extension GL_GOOGLE_include_directive : require
@@ -130,9 +130,9 @@ void main()
         q_at[q] = (image * p.query_rows + min(first_query + q, last_query)) * p.q_ld + p.q_col + head;
         largest[q] = -1e30;
         total[q] = 0.0;
-        [[dont_unroll]] for (uint c = 0; c < p.chunks; ++c)
-            o_lo[c][q] = o_hi[c][q] = vec4(0.0);
     }
+    [[dont_unroll]] for (uint i = 0; i < kQueries * p.chunks; ++i)
+        o_lo[i / kQueries][i % kQueries] = o_hi[i / kQueries][i % kQueries] = vec4(0.0);
     for (uint first = 0; first < p.keys; first += kKeys) {
         uint k_at[kKeys], v_at[kKeys];
         [[unroll]] for (uint j = 0; j < kKeys; ++j) {
