@@ -100,6 +100,23 @@ TEST(CliConvert, a_folder_keeps_what_it_says_and_changes_precision)
     }
 }
 
+TEST(CliConvert, a_single_file_may_bring_its_text)
+{
+    const ScratchFolder folder;
+    Weights weights = ldm_weights(small_unet(), small_vae());
+    weights.add(std::string(kLdmConditioning), {"c", {1, 5, 24}});
+    weights.write(folder / "in.safetensors");
+    const auto in = RendererModel::open(folder / "in.safetensors");
+    ASSERT_TRUE(in) << in.error().message;
+    EXPECT_EQ(in->conditioning_tokens, 5u);
+    const ProgramResult result = convert(folder / "in.safetensors", folder / "out", "");
+    ASSERT_EQ(result.code, 0) << result.err;
+    const auto out = RendererModel::open(folder / "out");
+    ASSERT_TRUE(out) << out.error().message;
+    EXPECT_EQ(out->conditioning, in->conditioning);
+    EXPECT_NE(out->conditioning, std::vector<float>(5 * 24, 0.f));
+}
+
 TEST(CliConvert, asd_init_widens_the_input_with_zeros)
 {
     const ScratchFolder folder;

@@ -51,15 +51,23 @@ ComponentFiles component(const Json& config, std::span<const TensorSpec> schema,
     return files;
 }
 
+// the constant text, the same numbers under either layout's name
+TensorStream text_stream(const Options& o, const Networks& n, std::string_view name)
+{
+    const TensorSpec text{std::string(kConditioning), {1, o.tokens, n.unet.cross_attention_dim}};
+    TensorStream stream = Checkpoint::random(o.seed).stream(text, n.dtype);
+    stream.name = name;
+    return stream;
+}
+
 Status write_diffusers(const Options& o, const Networks& n)
 {
     const Path out = o.out;
     SR_CHECK(write_component(out / "renderer", component(n.unet_json, unet_schema(n.unet), o, n.dtype), o.shards));
     SR_CHECK(write_component(out / "vae", component(n.vae_json, vae_schema(n.vae), o, n.dtype)));
     SR_CHECK(write_json(out / "scheduler" / "scheduler_config.json", stable_diffusion_scheduler_json()));
-    const TensorSpec text{"encoder_hidden_states", {1, o.tokens, n.unet.cross_attention_dim}};
     std::filesystem::create_directories(out / "conditioning");
-    const TensorStream stream = Checkpoint::random(o.seed).stream(text, n.dtype);
+    const TensorStream stream = text_stream(o, n, kConditioning);
     SR_CHECK(stream_safetensors(out / "conditioning" / "conditioning.safetensors", std::span(&stream, 1)));
     return write_json(out / "model_index.json", {{"_class_name", "SemRoverPipeline"},
                                                  {"renderer", {"diffusers", "UNet2DConditionModel"}},
@@ -81,8 +89,10 @@ Status write_ldm(const Options& o, const Networks& n)
             tensors.back().shape.insert(tensors.back().shape.end(), {1, 1});
     }
     std::map<std::string, std::string> metadata;
-    if (!o.bare)
+    if (!o.bare) {
+        tensors.push_back(text_stream(o, n, kLdmConditioning));
         metadata["semrover.config"] = Json{{"unet", n.unet_json}, {"vae", n.vae_json}}.dump();
+    }
     return stream_safetensors(o.out, tensors, metadata);
 }
 
@@ -107,7 +117,7 @@ int main(int argc, char** argv)
     app.add_option("--shards", o.shards, "files of the UNet")->check(CLI::Range(1u, 1000u));
     app.add_option("--dtype", o.dtype, "f32, f16 or bf16")->check(CLI::IsMember({"f32", "f16", "bf16"}));
     app.add_option("--seed", o.seed, "of the weights");
-    app.add_flag("--bare", o.bare, "no config in the LDM file's metadata, as real files have none");
+    app.add_flag("--bare", o.bare, "an LDM file without config and text, as real ones are");
     app.add_option("--tokens", o.tokens, "of the constant text")->check(CLI::Range(1u, 4096u));
     CLI11_PARSE(app, argc, argv);
     if (const Status status = make(o); !status) {

@@ -101,6 +101,7 @@ void add_bench(CLI::App& app, const Globals& globals, Run& run)
     add_bench_transformer(*bench, globals, run);
     add_bench_unet(*bench, globals, run);
     add_bench_vae(*bench, globals, run);
+    add_bench_asd(*bench, globals, run);
     add_bench_regions(*bench, globals, run);
     add_bench_sort(*bench, globals, run);
     add_bench_splat(*bench, globals, run);

@@ -51,6 +51,7 @@ void add_bench_conv(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_transformer(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_unet(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_vae(CLI::App& bench, const Globals& globals, Run& run);
+void add_bench_asd(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_regions(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_sort(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_splat(CLI::App& bench, const Globals& globals, Run& run);

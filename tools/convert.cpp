@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <CLI/CLI.hpp>
+#include <optional>
 #include <unistd.h>
 
 namespace semrover {
@@ -28,6 +29,7 @@ struct Plan {
     std::map<std::string, ComponentFiles> components; // by folder
     std::map<std::string, Json> texts;                // by path in the model
     std::map<std::string, Path> copies;               // by path in the model: the file
+    std::optional<TensorStream> text;                 // the constant text, where it is not a file to copy
     Json index = {{"_class_name", "SemRoverPipeline"}};
     std::vector<std::string> left_out, warnings;
 };
@@ -145,9 +147,16 @@ Status plan_copies(const Path& in, Plan& plan)
     return {};
 }
 
-Status list_ldm_rest(const Path& in, Plan& plan)
+// the text, where the file holds one, and names of what is left out
+Status plan_ldm_rest(const Path& in, Plan& plan)
 {
-    SR_TRY(const SafetensorsSet set, SafetensorsSet::open(in));
+    SR_TRY(SafetensorsSet opened, SafetensorsSet::open(in));
+    const auto shared = std::make_shared<const SafetensorsSet>(std::move(opened));
+    const SafetensorsSet& set = *shared;
+    if (const TensorInfo* text = set.find(kLdmConditioning)) {
+        plan.text = stream_tensor(shared, *text, text->dtype);
+        plan.text->name = kConditioning;
+    }
     for (const char* prefix : {"cond_stage_model.", "model_ema."})
         if (std::ranges::any_of(set.tensors(), [&](const TensorInfo& t) { return t.name.starts_with(prefix); }))
             plan.left_out.push_back(std::string(prefix) + "*");
@@ -166,7 +175,7 @@ Result<Plan> make_plan(const Options& o)
         SR_CHECK(plan_renderer(o, plan));
     else if (o.asd_init)
         return fail(ErrorCode::bad_input, "{}: has no renderer for --asd-init", quote_path(in));
-    SR_CHECK(folder ? plan_copies(in, plan) : list_ldm_rest(in, plan));
+    SR_CHECK(folder ? plan_copies(in, plan) : plan_ldm_rest(in, plan));
     return plan;
 }
 
@@ -266,6 +275,12 @@ Status write_plan(Plan& plan, const Path& out, const Globals& globals)
         std::error_code error;
         fs::create_directories((staging.path() / name).parent_path(), error);
         SR_CHECK(write_file_atomically(staging.path() / name, file.bytes()));
+    }
+    if (plan.text) {
+        std::error_code error;
+        fs::create_directories(staging.path() / "conditioning", error);
+        SR_CHECK(stream_safetensors(staging.path() / "conditioning" / "conditioning.safetensors",
+                                    std::span(&*plan.text, 1)));
     }
     SR_CHECK(write_json(staging.path() / "model_index.json", plan.index));
     SR_CHECK(staging.commit());

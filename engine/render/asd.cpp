@@ -310,6 +310,10 @@ uint32_t AsdRenderer::step_passes() const
 {
     return step_ ? uint32_t(step_->plan().passes.size()) : 0;
 }
+uint32_t AsdRenderer::step_barriers() const
+{
+    return step_ ? step_->plan().barriers() : 0;
+}
 double AsdRenderer::host_us_per_step() const
 {
     return step_ ? step_->host_us() : 0;

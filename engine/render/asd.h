@@ -61,6 +61,7 @@ class AsdRenderer {
     void rest();
 
     uint32_t step_passes() const; // of a step, while there is a program
+    uint32_t step_barriers() const;
     double host_us_per_step() const;
     double step_flops() const;
 

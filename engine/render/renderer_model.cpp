@@ -59,14 +59,20 @@ Status read_conditioning(RendererModel& m)
 {
     const uint32_t width = m.unet.cross_attention_dim;
     const Path folder = m.folder / "conditioning";
-    if (m.ldm || !is_there(folder)) {
-        m.warnings.push_back(fmt::format("{}: has no conditioning/conditioning.safetensors; zeros stand for the text",
-                                         quote_path(m.folder)));
+    std::optional<SafetensorsSet> found;
+    if (m.ldm || is_there(folder)) {
+        SR_TRY(found, m.ldm ? SafetensorsSet::open(m.folder) : SafetensorsSet::open_folder(folder, "conditioning"));
+    }
+    const std::string_view name = m.ldm ? kLdmConditioning : kConditioning;
+    if (!found || (m.ldm && !found->find(name))) {
+        m.warnings.push_back(
+            fmt::format("{}: has no {}; zeros stand for the text", quote_path(m.folder),
+                        m.ldm ? fmt::format("tensor {}", name) : "conditioning/conditioning.safetensors"));
         m.conditioning.assign(size_t(m.conditioning_tokens) * width, 0.f);
         return {};
     }
-    SR_TRY(const SafetensorsSet set, SafetensorsSet::open_folder(folder, "conditioning"));
-    SR_TRY(const TensorInfo* tensor, set.get("encoder_hidden_states"));
+    const SafetensorsSet& set = *found;
+    SR_TRY(const TensorInfo* tensor, set.get(name));
     const auto& shape = tensor->shape;
     if (shape.size() != 3 || shape[0] != 1 || shape[1] < 1 || shape[1] > 4096 || shape[2] != width)
         return fail(ErrorCode::bad_input,

@@ -44,6 +44,11 @@ struct RendererModel {
     Result<uint64_t> hash() const; // of the files that the renderer reads
 };
 
+// the constant text [1, tokens, cross_attention_dim]: a tensor of conditioning/conditioning.safetensors, or of an LDM
+// file that semrover's own tools wrote (others have none)
+constexpr std::string_view kConditioning = "encoder_hidden_states";
+constexpr std::string_view kLdmConditioning = "conditioning.encoder_hidden_states";
+
 // noisy latent, previous latent, buffer latent, visibility
 inline uint32_t renderer_channels(const VaeConfig& vae)
 {
