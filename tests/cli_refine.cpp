@@ -348,7 +348,7 @@ TEST_F(CliRefineRefuses, outputs_devices_and_options_that_cannot_be)
                    "0 denoising steps");
     expect_refusal(line + "--cfg-scale=-1", 2, "guidance");
     expect_refusal(line + "--max-vram 100KiB", 5, "--max-vram");
-    expect_refusal(line + "--max-vram 0.001", 5, "--max-vram allows 1000000"); // GB
+    expect_refusal(line + "--max-vram 0.0001", 5, "--max-vram allows 100000"); // GB
     expect_refusal(line + "--max-vram lots", 2, "6GiB");
     EXPECT_EQ(semrover_program(line + "--dry-run --max-vram 2.2").code, 0);
     expect_refusal(line + "--device unobtainium", 4, "unobtainium");

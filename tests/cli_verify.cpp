@@ -72,7 +72,7 @@ TEST(CliVerify, parameters_of_the_wrong_type_fail_their_case_only)
 TEST(CliVerify, a_kind_without_a_runner_is_listed_and_fails_nothing)
 {
     const ProgramResult result =
-        semrover_program("verify --json " + kGolden + "/vae_tiny " + kGolden + "/regions_paper");
+        semrover_program("verify --json " + kGolden + "/vae_temporal_tiny " + kGolden + "/regions_paper");
     EXPECT_EQ(result.code, 0) << result.err;
     const auto report = nlohmann::json::parse(result.out);
     EXPECT_EQ(report["passed"], 1);
