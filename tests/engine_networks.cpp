@@ -82,6 +82,20 @@ TEST(engine_networks, decode_the_same_image_in_bands_of_rows)
     }
 }
 
+// wide enough for Winograd's algorithm, which a device with few texels does not have room for
+TEST(engine_networks, decode_the_same_image_by_either_way_to_convolve)
+{
+    VaeConfig wide = small_vae();
+    wide.block_out_channels = {96, 128};
+    size_t direct = 0, winograd = 0;
+    for (DType precision : {DType::f32, DType::f16}) {
+        const HostImages a = decode("texels=4096000", precision, wide, 18, 17, direct);
+        const HostImages b = decode("", precision, wide, 18, 17, winograd);
+        EXPECT_GT(winograd, direct);
+        EXPECT_LT(largest_difference(a, b), precision == DType::f32 ? 1e-4 : 3e-2);
+    }
+}
+
 // force_upcast stores the residual stream divided by 32, which changes rounding and nothing else
 TEST(engine_networks, decode_the_same_image_with_a_scaled_stream)
 {

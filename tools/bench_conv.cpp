@@ -14,6 +14,7 @@ namespace {
 struct Options {
     uint32_t width = 77, height = 53, channels = 320, outputs = 320;
     std::string precision = "fp16";
+    bool winograd = false;
 };
 
 Status bench_conv(const Options& o, const Globals& globals)
@@ -29,15 +30,18 @@ Status bench_conv(const Options& o, const Globals& globals)
     map.data = inputs.tensor(g, x);
     ConvOptions options;
     options.dtype = dtype;
-    (void)conv2d(g, map, {}, inputs.tensor(g, w), {}, options);
+    const Tensor weight = inputs.tensor(g, w);
+    (void)(o.winograd ? winograd_conv2d(g, map, winograd_weight(g, weight), {}, options)
+                      : conv2d(g, map, {}, weight, {}, options));
     SR_TRY(const auto program, Program::create(*device, g));
     SR_TRY(const Timing timing, measure([&] { return program->run(); }));
     Json report = bench_report("conv", *device, dtype, timing, inputs.bytes() + program->plan().arena_bytes());
-    const double flops = program->plan().passes[0].options.flops;
+    const double flops = 2.0 * 9 * o.channels * o.outputs * o.width * o.height; // of a direct convolution
     report["width"] = o.width;
     report["height"] = o.height;
     report["channels"] = o.channels;
     report["outputs"] = o.outputs;
+    report["algorithm"] = o.winograd ? "winograd" : "direct";
     report["variant"] = program->plan().passes[0].variant->name;
     report["gflop"] = flops / 1e9;
     report["gflops"] = flops / timing.ms_median / 1e6;
@@ -58,6 +62,7 @@ void add_bench_conv(CLI::App& bench, const Globals& globals, Run& run)
     c->add_option("-H,--height", o->height, "pixels")->check(size);
     c->add_option("--channels", o->channels, "of the input")->check(size);
     c->add_option("--outputs", o->outputs, "channels of the output")->check(size);
+    c->add_flag("--winograd", o->winograd, "by Winograd's algorithm, weights transformed in every run");
     c->add_option("--precision", o->precision, "storage")->check(CLI::IsMember({"fp16", "fp32"}));
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_conv(*o, globals); }; });
 }
