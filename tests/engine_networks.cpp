@@ -91,7 +91,8 @@ TEST(engine_networks, decode_the_same_image_by_either_way_to_convolve)
     for (DType precision : {DType::f32, DType::f16}) {
         const HostImages a = decode("texels=4096000", precision, wide, 18, 17, direct);
         const HostImages b = decode("", precision, wide, 18, 17, winograd);
-        EXPECT_GT(winograd, direct);
+        // with lowered limits (SEMROVER_LIMITS) there is no room for it at all
+        EXPECT_EQ(winograd > direct, test_device().limits().max_storage_range > 100u << 20);
         EXPECT_LT(largest_difference(a, b), precision == DType::f32 ? 1e-4 : 3e-2);
     }
 }

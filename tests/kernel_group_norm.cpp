@@ -103,7 +103,8 @@ TEST(kernel_group_norm, takes_statistics_from_the_producer)
             out[i] = k.output(maps[i].rows, maps[i].cols, maps[i].dtype, maps[i].ld);
             k.graph.replace(maps[i].resource, out[i].resource);
         }
-        (void)k.compile_and_run();
+        ASSERT_TRUE(k.compile_and_run());
+        EXPECT_EQ(k.plan().passes.size(), 2u); // the residual and both statistics are in the epilogues
         for (size_t i = 0; i < 2; ++i) {
             const HostMatrix values = k.read(out[i]), moments = k.read(out[2 + i]);
             for (uint32_t chunk = 0; chunk < moments.rows; ++chunk)

@@ -3,6 +3,8 @@
 // semrover bench KIND: one object of figures per kind, measured warm with synthetic data of real shapes
 #include "tools/bench.h"
 
+#include "runtime/profile.h"
+
 #include <algorithm>
 #include <chrono>
 #include <CLI/CLI.hpp>
@@ -45,6 +47,33 @@ void add_program(Json& report, const Program& program)
     report["dispatches"] = program.plan().passes.size();
     report["barriers"] = program.plan().barriers();
     report["host_us_per_step"] = program.host_us();
+}
+
+void add_network(Json& report, const Program& program, const Timing& timing, uint64_t parameters, uint64_t weight_bytes)
+{
+    double flops = 0;
+    for (const Pass& pass : program.plan().passes)
+        flops += pass.options.flops;
+    report["parameters"] = parameters;
+    report["weight_bytes"] = weight_bytes;
+    report["arena_bytes"] = program.plan().arena_bytes();
+    report["gflop"] = flops / 1e9;
+    report["gflops"] = flops / timing.ms_median / 1e6;
+    add_program(report, program);
+}
+
+void want_profile(Device& device, const std::string& path)
+{
+    if (!path.empty())
+        device.set_profile(std::make_shared<Profile>());
+}
+
+Status write_profile(Device& device, const std::string& path)
+{
+    if (!device.profile())
+        return {};
+    fmt::print(stderr, "{}", device.profile()->summary());
+    return device.profile()->write(path);
 }
 
 void print_report(const Json& report, const Globals& globals)

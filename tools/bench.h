@@ -24,6 +24,13 @@ Result<Timing> measure(const std::function<Status()>& work);
 Json bench_report(const char* kind, const Device& device, DType precision, const Timing& timing,
                   uint64_t predicted_bytes);
 void add_program(Json& report, const Program& program); // dispatches, barriers, host_us_per_step
+// the same of a network's evaluation, and gflop (what is computed: Winograd's algorithm counts as little as it does),
+// gflops, weight_bytes
+void add_network(Json& report, const Program& program, const Timing& timing, uint64_t parameters,
+                 uint64_t weight_bytes);
+// device times where --profile asked for them: a Chrome trace, and their sums to stderr
+void want_profile(Device& device, const std::string& path);
+Status write_profile(Device& device, const std::string& path);
 void print_report(const Json& report, const Globals& globals);
 
 // memory with seeded values on a device, for inputs of kernels

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // semrover bench unet: one evaluation of a renderer's UNet, random weights
 #include "engine/render/unet.h"
-#include "runtime/profile.h"
 #include "tools/bench.h"
 #include "tools/open_device.h"
 
@@ -23,14 +22,6 @@ UnetConfig default_config()
     UnetConfig c;
     c.in_channels = 13;
     return c;
-}
-
-double total_flops(const Plan& plan)
-{
-    double flops = 0;
-    for (const Pass& pass : plan.passes)
-        flops += pass.options.flops;
-    return flops;
 }
 
 Status bench_unet(const Options& o, const Globals& globals)
@@ -54,28 +45,17 @@ Status bench_unet(const Options& o, const Globals& globals)
     const Tensor table_row = inputs.tensor(g, row);
     SR_CHECK(device->clear(g.desc().resources[table_row.resource].memory));
     (void)unet->forward(g, x, inputs.tensor(g, table), table_row, {inputs.tensor(g, text), o.tokens, 0});
-    if (!o.profile.empty())
-        device->set_profile(std::make_shared<Profile>());
+    want_profile(*device, o.profile);
     SR_TRY(const auto program, Program::create(*device, g));
     SR_TRY(const Timing timing, measure([&] { return program->run(); }));
     const uint64_t predicted = unet->device_bytes(device->limits()) + inputs.bytes() + program->plan().arena_bytes();
     Json report = bench_report("unet", *device, dtype, timing, predicted);
-    const double flops = total_flops(program->plan());
-    report["parameters"] = unet->parameters();
     report["width"] = o.width;
     report["height"] = o.height;
     report["batch"] = o.batch;
-    report["weight_bytes"] = unet->device_bytes(device->limits());
-    report["arena_bytes"] = program->plan().arena_bytes();
-    report["gflop"] = flops / 1e9;
-    report["gflops"] = flops / timing.ms_median / 1e6;
-    add_program(report, *program);
+    add_network(report, *program, timing, unet->parameters(), unet->device_bytes(device->limits()));
     print_report(report, globals);
-    if (device->profile()) {
-        fmt::print(stderr, "{}", device->profile()->summary());
-        return device->profile()->write(o.profile);
-    }
-    return {};
+    return write_profile(*device, o.profile);
 }
 
 } // namespace

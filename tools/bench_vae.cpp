@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // semrover bench vae: one picture through the decoder, or the encoder, of a VAE with random weights
 #include "engine/render/vae.h"
-#include "runtime/profile.h"
 #include "tools/bench.h"
 #include "tools/open_device.h"
 
@@ -36,30 +35,18 @@ Status bench_vae(const Options& o, const Globals& globals)
     Graph g;
     x.data = inputs.tensor(g, in);
     (void)(o.encode ? vae->encode(g, x) : vae->decode(g, x));
-    if (!o.profile.empty())
-        device->set_profile(std::make_shared<Profile>());
+    want_profile(*device, o.profile);
     SR_TRY(const auto program, Program::create(*device, g));
     SR_TRY(const Timing timing, measure([&] { return program->run(); }));
     const uint64_t weights = vae->device_bytes(device->limits());
     Json report = bench_report("vae", *device, dtype, timing, weights + inputs.bytes() + program->plan().arena_bytes());
-    double flops = 0;
-    for (const Pass& pass : program->plan().passes)
-        flops += pass.options.flops;
     report["direction"] = o.encode ? "encode" : "decode";
-    report["parameters"] = vae->parameters();
     report["width"] = o.width;
     report["height"] = o.height;
-    report["weight_bytes"] = weights;
     report["bytes_beside_weights"] = device->peak_bytes() - weights;
-    report["gflop"] = flops / 1e9;
-    report["gflops"] = flops / timing.ms_median / 1e6;
-    add_program(report, *program);
+    add_network(report, *program, timing, vae->parameters(), weights);
     print_report(report, globals);
-    if (device->profile()) {
-        fmt::print(stderr, "{}", device->profile()->summary());
-        return device->profile()->write(o.profile);
-    }
-    return {};
+    return write_profile(*device, o.profile);
 }
 
 } // namespace
