@@ -83,7 +83,7 @@ Result<std::vector<float>> run_and_read(Device& device, Graph& g, const FeatureM
     return from_rows(rows, {y.batch, y.channels(), y.height, y.width});
 }
 
-Result<FeatureMap> input_map(Graph& g, const BufferSlice& memory, const Shape& s, DType dtype)
+FeatureMap input_map(Graph& g, const BufferSlice& memory, const Shape& s, DType dtype)
 {
     FeatureMap map{{}, s.images, s.height, s.width};
     map.data = g.external(memory, s.images * map.image_rows(), s.channels, dtype, "input");
@@ -95,6 +95,39 @@ Result<Json> read_config(const GoldenCase& c)
     return read_json(c.model() / "config.json");
 }
 
+// one evaluation: every image has a timestep and a text of its own
+struct UnetInput {
+    Shape shape;
+    uint32_t tokens = 0;
+    std::vector<float> sample, text; // rows as on the device
+    std::vector<float> timesteps;
+    std::vector<uint32_t> table_row;
+};
+
+Result<UnetInput> unet_input(const GoldenCase& c, const UnetConfig& config)
+{
+    UnetInput in;
+    SR_TRY(in.shape, shape_of(c, "input.sample"));
+    const uint32_t dim = config.cross_attention_dim, ld = round_up(dim, kRowPadding);
+    const std::vector<uint64_t> text = c.shape("input.encoder_hidden_states");
+    if (text.size() != 3 || text[0] != in.shape.images || text[1] > 4096 || text[2] != dim)
+        return fail(ErrorCode::bad_input, "input.encoder_hidden_states: expected [{}, tokens, {}]", in.shape.images,
+                    dim);
+    in.tokens = uint32_t(text[1]);
+    in.sample = to_rows(c.floats("input.sample"), in.shape);
+    const std::vector<float> given = c.floats("input.encoder_hidden_states");
+    in.text.assign(given.size() / dim * ld, 0.f);
+    for (size_t i = 0; i < given.size(); ++i)
+        in.text[i / dim * ld + i % dim] = given[i];
+    for (const int64_t t : c.integers("input.timestep"))
+        in.timesteps.push_back(float(t));
+    if (in.timesteps.size() != in.shape.images)
+        return fail(ErrorCode::bad_input, "input.timestep: expected {} of them", in.shape.images);
+    in.table_row.resize(in.shape.images);
+    std::iota(in.table_row.begin(), in.table_row.end(), 0u);
+    return in;
+}
+
 } // namespace
 
 Result<GoldenOutputs> run_unet_2d_condition(Device& device, const GoldenCase& c, DType precision)
@@ -103,46 +136,25 @@ Result<GoldenOutputs> run_unet_2d_condition(Device& device, const GoldenCase& c,
     SR_TRY(const UnetConfig config, parse_unet_config(json));
     SR_TRY(const Checkpoint weights, Checkpoint::open_folder(c.model(), Checkpoint::Network::unet));
     SR_TRY(const auto unet, Unet::load(device, config, weights, precision));
-    SR_TRY(const Shape sample, shape_of(c, "input.sample"));
-    const std::vector<uint64_t> text = c.shape("input.encoder_hidden_states");
-    if (text.size() != 3 || text[0] != sample.images || text[2] != config.cross_attention_dim)
-        return fail(ErrorCode::bad_input, "input.encoder_hidden_states: expected [{}, tokens, {}]", sample.images,
-                    config.cross_attention_dim);
-    const uint32_t tokens = uint32_t(text[1]), images = sample.images;
-
-    std::vector<float> timesteps;
-    for (const int64_t t : c.integers("input.timestep"))
-        timesteps.push_back(float(t));
-    if (timesteps.size() != images)
-        return fail(ErrorCode::bad_input, "input.timestep: expected {} of them", images);
-    std::vector<uint32_t> table_row(images);
-    std::iota(table_row.begin(), table_row.end(), 0u);
-    const Shape context_shape{1, config.cross_attention_dim, 1, images * tokens};
-    std::vector<float> context(size_t(images) * tokens * round_up(config.cross_attention_dim, kRowPadding), 0.f);
-    const std::vector<float> given = c.floats("input.encoder_hidden_states");
-    for (uint32_t r = 0; r < images * tokens; ++r)
-        std::copy_n(&given[size_t(r) * context_shape.channels], context_shape.channels,
-                    &context[size_t(r) * round_up(context_shape.channels, kRowPadding)]);
-
+    SR_TRY(const UnetInput input, unet_input(c, config));
     EvaluationMemory memory;
-    const uint32_t x = add_values(memory, to_rows(c.floats("input.sample"), sample), precision);
-    const uint32_t text_id = add_values(memory, context, precision);
-    const uint32_t steps = memory.add(timesteps), rows = memory.add(table_row);
+    const uint32_t x = add_values(memory, input.sample, precision), text_id = add_values(memory, input.text, precision);
+    const uint32_t steps = memory.add(input.timesteps), rows = memory.add(input.table_row);
     SR_CHECK(memory.upload(device));
+    const uint32_t images = input.shape.images, text_rows = images * input.tokens;
     Graph g;
     const Tensor table = g.matrix(images, unet->time_width(), DType::f32, "time table");
     unet->time_table(g, g.external(memory.slice(steps), images, 1, DType::f32, "timesteps", 1), table);
-    Unet::Context attended;
-    attended.tokens = attended.token_rows = tokens;
+    Unet::Context context{{}, input.tokens, input.tokens};
     if (unet->context_width()) {
-        attended.table = g.matrix(images * tokens, unet->context_width(), precision, "context table");
+        context.table = g.matrix(text_rows, unet->context_width(), precision, "context table");
         unet->context_table(
-            g, g.external(memory.slice(text_id), images * tokens, config.cross_attention_dim, precision, "context"),
-            attended.table);
+            g, g.external(memory.slice(text_id), text_rows, config.cross_attention_dim, precision, "context"),
+            context.table);
     }
-    SR_TRY(const FeatureMap in, input_map(g, memory.slice(x), sample, precision));
+    const FeatureMap in = input_map(g, memory.slice(x), input.shape, precision);
     const FeatureMap y =
-        unet->forward(g, in, table, g.external(memory.slice(rows), images, 1, DType::u32, "table_row", 1), attended);
+        unet->forward(g, in, table, g.external(memory.slice(rows), images, 1, DType::u32, "table_row", 1), context);
     GoldenOutputs out;
     SR_TRY(out.floats["sample"], run_and_read(device, g, y));
     return out;
@@ -162,7 +174,7 @@ Result<GoldenOutputs> run_autoencoder_kl(Device& device, const GoldenCase& c, DT
     SR_CHECK(memory.upload(device));
     GoldenOutputs out;
     Graph encode;
-    SR_TRY(const FeatureMap in, input_map(encode, memory.slice(image_id), image, DType::f32));
+    const FeatureMap in = input_map(encode, memory.slice(image_id), image, DType::f32);
     SR_TRY(const auto moments, run_and_read(device, encode, vae->encode(encode, in)));
     const size_t half = size_t(latent.channels) * latent.height * latent.width;
     for (size_t i = 0; i < latent.images; ++i) { // mean, log-variance, clamped as the reference does
@@ -172,7 +184,7 @@ Result<GoldenOutputs> run_autoencoder_kl(Device& device, const GoldenCase& c, DT
             out.floats["logvar"].push_back(std::clamp(first[half + k], -30.f, 20.f));
     }
     Graph decode;
-    SR_TRY(const FeatureMap z, input_map(decode, memory.slice(latent_id), latent, DType::f32));
+    const FeatureMap z = input_map(decode, memory.slice(latent_id), latent, DType::f32);
     SR_TRY(out.floats["image"], run_and_read(device, decode, vae->decode(decode, z)));
     return out;
 }

@@ -39,10 +39,9 @@ FeatureMap resnet(Graph& g, const NetworkWeights& w, const ResnetBlock& b, NormI
     norm.eps = b.eps * b.stream * b.stream; // the norm of stream * x is that of x
     norm.silu = true;
     norm.dtype = w.precision();
-    const FeatureMap n =
-        group_norm(g, x, x2, w.tensor(g, b.norm1.weight, "norm1"), w.tensor(g, b.norm1.bias, "norm1"), norm);
+    const FeatureMap n = normalize(g, w, b.norm1, norm, x, x2);
     const FeatureMap h = convolve(g, w, b.conv1, n, {}, {shift, {}});
-    const FeatureMap m = norm_silu(g, w, b.norm2, with_moments(g, h), norm);
+    const FeatureMap m = normalize(g, w, b.norm2, norm, with_moments(g, h));
     FeatureMap residual = x.x;
     if (b.shortcut.weight.rows)
         residual = conv2d(g, x.x, x2.x, w.tensor(g, b.shortcut.weight, "shortcut"),
@@ -69,9 +68,10 @@ Tensor project(Graph& g, const NetworkWeights& w, const Layer& layer, Tensor x)
                 {.dtype = w.precision()});
 }
 
-FeatureMap norm_silu(Graph& g, const NetworkWeights& w, const Layer& norm, NormInput x, const GroupNormOptions& options)
+FeatureMap normalize(Graph& g, const NetworkWeights& w, const Layer& norm, const GroupNormOptions& options, NormInput x,
+                     NormInput x2)
 {
-    return group_norm(g, x, {}, w.tensor(g, norm.weight, "norm"), w.tensor(g, norm.bias, "norm.bias"), options);
+    return group_norm(g, x, x2, w.tensor(g, norm.weight, "norm"), w.tensor(g, norm.bias, "norm.bias"), options);
 }
 
 } // namespace semrover

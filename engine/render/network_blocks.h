@@ -32,8 +32,8 @@ ResnetBlock declare_resnet(NetworkWeights& weights, const std::string& name, con
                                   ConvOptions options = {}, const ConvAddends& addends = {});
 // y = x w^T + b
 [[nodiscard]] Tensor project(Graph& g, const NetworkWeights& weights, const Layer& layer, Tensor x);
-// y = silu(norm(x))
-[[nodiscard]] FeatureMap norm_silu(Graph& g, const NetworkWeights& weights, const Layer& norm, NormInput x,
-                                   const GroupNormOptions& options);
+// y = norm(x, x2), as group_norm()
+[[nodiscard]] FeatureMap normalize(Graph& g, const NetworkWeights& weights, const Layer& norm,
+                                   const GroupNormOptions& options, NormInput x, NormInput x2 = {});
 
 } // namespace semrover

@@ -93,8 +93,7 @@ FeatureMap transformer_2d(Graph& g, const NetworkWeights& w, const Transformer2d
     norm.groups = t.groups;
     norm.eps = kInputNormEps;
     norm.dtype = w.precision();
-    FeatureMap h =
-        group_norm(g, x, {}, w.tensor(g, t.norm.weight, "norm"), w.tensor(g, t.norm.bias, "norm.bias"), norm);
+    FeatureMap h = normalize(g, w, t.norm, norm, x);
     h.data = project(g, w, t.proj_in, h.data);
     for (const Transformer2d::Block& b : t.blocks)
         h.data = block(g, w, t, b, h, context);

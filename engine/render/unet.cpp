@@ -2,8 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/render/unet.h"
 
-#include "engine/render/transformer_2d.h"
-
 #include <cmath>
 
 namespace semrover {
@@ -263,7 +261,7 @@ void Unet::context_table(Graph& g, Tensor context, Tensor table) const
 FeatureMap Unet::forward(Graph& g, FeatureMap x, Tensor table, Tensor table_row, const Context& context) const
 {
     const Impl& n = *impl_;
-    const Impl::Inputs in{table, table_row, {context.table, context.tokens, context.token_rows}};
+    const Impl::Inputs in{table, table_row, context};
     NormInput h = with_moments(g, convolve(g, n.weights, n.conv_in, x));
     std::vector<NormInput> skips{h};
     h = n.run_down(g, h, skips, in);
@@ -275,7 +273,7 @@ FeatureMap Unet::forward(Graph& g, FeatureMap x, Tensor table, Tensor table_row,
     norm.eps = n.config.norm_eps;
     norm.silu = true;
     norm.dtype = precision();
-    const FeatureMap last = norm_silu(g, n.weights, n.norm_out, h, norm);
+    const FeatureMap last = normalize(g, n.weights, n.norm_out, norm, h);
     return conv2d(g, last, {}, n.weights.tensor(g, n.conv_out.weight, "conv_out"),
                   n.weights.tensor(g, n.conv_out.bias, "conv_out.bias"), {.dtype = DType::f32});
 }

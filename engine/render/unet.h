@@ -3,6 +3,7 @@
 #pragma once
 
 #include "engine/render/checkpoint.h"
+#include "engine/render/transformer_2d.h"
 #include "engine/render/unet_config.h"
 #include "kernels/kernels.h"
 #include "runtime/device.h"
@@ -37,11 +38,7 @@ class Unet {
     void context_table(Graph& g,
                        Tensor context,      // [rows, cross_attention_dim] in the network's precision
                        Tensor table) const; // [rows, context_width] likewise
-    struct Context {
-        Tensor table;            // from context_table()
-        uint32_t tokens = 0;     // of an image
-        uint32_t token_rows = 0; // rows from one image's tokens to the next; 0: all images have the same
-    };
+    using Context = TextContext;            // the table, from context_table()
 
     // one evaluation
     [[nodiscard]] FeatureMap forward(Graph& g,

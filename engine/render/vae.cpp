@@ -144,8 +144,7 @@ struct Vae::Impl {
 
     FeatureMap attention(Graph& g, const MidBlock& m, NormInput x) const
     {
-        const FeatureMap n = group_norm(g, x, {}, weights.tensor(g, m.norm.weight, "norm"),
-                                        weights.tensor(g, m.norm.bias, "norm.bias"), norm_options(false));
+        const FeatureMap n = normalize(g, weights, m.norm, norm_options(false), x);
         const Tensor qkv = project(g, weights, m.qkv, n.data);
         FlashAttentionOptions o;
         o.head_dim = qkv.cols / 3;
@@ -188,7 +187,7 @@ struct Vae::Impl {
 
     FeatureMap finish(Graph& g, const VaeHalf& half, NormInput x) const
     {
-        const FeatureMap n = norm_silu(g, weights, half.norm_out, x, norm_options(true));
+        const FeatureMap n = normalize(g, weights, half.norm_out, norm_options(true), x);
         return conv2d(g, n, {}, weights.tensor(g, half.conv_out.weight, "conv_out"),
                       weights.tensor(g, half.conv_out.bias, "conv_out.bias"), {.dtype = DType::f32});
     }
