@@ -78,11 +78,9 @@ uint64_t window_rows(const BandedBinding& b, const Tensor& t, uint64_t rows, uin
         }
         return true;
     };
-    uint64_t count = round_up64(band, step);
+    uint64_t count = std::max(band / step * step, step); // never more than `band`: other bindings decided it
     while (count > step && !fits(count))
-        count = round_up64(std::max<uint64_t>(count * 3 / 4, step), step) == count
-                    ? count - step
-                    : round_up64(std::max<uint64_t>(count * 3 / 4, step), step);
+        count = std::max(count * 3 / 4 / step * step, step);
     return fits(count) ? count : 0;
 }
 

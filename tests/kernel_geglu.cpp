@@ -12,6 +12,18 @@ double gelu_exact(double v)
     return 0.5 * v * (1 + std::erf(v / std::sqrt(2.0)));
 }
 
+// got = h gelu(gate), of the blocks of x
+void expect_geglu(const HostMatrix& got, const HostMatrix& x, DType dtype)
+{
+    for (uint32_t r = 0; r < got.rows; ++r)
+        for (uint32_t c = 0; c < got.cols; ++c) {
+            const double h = x.at(r, c / 8 * 16 + c % 8), gate = x.at(r, c / 8 * 16 + 8 + c % 8);
+            const double v = h * gelu_exact(gate);
+            const double tolerance = 3e-7 * (std::abs(h * gate) + 1) + (dtype == DType::f16 ? 6e-4 * std::abs(v) : 0);
+            ASSERT_NEAR(got.at(r, c), v, tolerance) << "row " << r << " column " << c << " h " << h << " gate " << gate;
+        }
+}
+
 TEST(kernel_geglu, matches_the_exact_erf)
 {
     for (const auto& [rows, cols] : {std::pair{1u, 8u}, std::pair{25u, 72u}, std::pair{131u, 1280u}})
@@ -19,14 +31,7 @@ TEST(kernel_geglu, matches_the_exact_erf)
             KernelCase k(test_device());
             const HostMatrix x = k.random(rows, 2 * cols, dtype, 3);
             const HostMatrix got = k.run(geglu(k.graph, k.input(x)));
-            for (uint32_t r = 0; r < rows; ++r)
-                for (uint32_t c = 0; c < cols; ++c) {
-                    const double h = x.at(r, c / 8 * 16 + c % 8), gate = x.at(r, c / 8 * 16 + 8 + c % 8);
-                    const double v = h * gelu_exact(gate);
-                    const double tolerance =
-                        3e-7 * (std::abs(h * gate) + 1) + (dtype == DType::f16 ? 6e-4 * std::abs(v) : 0);
-                    ASSERT_NEAR(got.at(r, c), v, tolerance) << "h " << h << " gate " << gate;
-                }
+            expect_geglu(got, x, dtype);
         }
 }
 
@@ -44,14 +49,7 @@ TEST(kernel_geglu, runs_in_the_epilogue_of_a_gemm)
             const HostMatrix product =
                 apart.run(gemm(apart.graph, apart.input(x), apart.input(w), apart.input(bias), {.dtype = DType::f32}));
             ASSERT_EQ(got.cols, cols);
-            for (uint32_t r = 0; r < rows; ++r)
-                for (uint32_t c = 0; c < cols; ++c) {
-                    const double h = product.at(r, c / 8 * 16 + c % 8), gate = product.at(r, c / 8 * 16 + 8 + c % 8);
-                    const double v = h * gelu_exact(gate);
-                    const double tolerance =
-                        3e-7 * (std::abs(h * gate) + 1) + (dtype == DType::f16 ? 6e-4 * std::abs(v) : 0);
-                    ASSERT_NEAR(got.at(r, c), v, tolerance) << "row " << r << " column " << c;
-                }
+            expect_geglu(got, product, dtype);
         }
 }
 

@@ -23,7 +23,8 @@ Result<Timing> measure(const std::function<Status()>& work);
 // the fields that every benchmark has (spec/performance.md)
 Json bench_report(const char* kind, const Device& device, DType precision, const Timing& timing,
                   uint64_t predicted_bytes);
-void add_program(Json& report, const Program& program); // dispatches, barriers, host_us_per_step
+void add_program(Json& report, const Program& program);          // dispatches, barriers, host_us_per_step
+void add_rate(Json& report, double flops, const Timing& timing); // gflop, gflops, gflops_best
 // the same of a network's evaluation, and gflop (what is computed: Winograd's algorithm counts as little as it does),
 // gflops, weight_bytes
 void add_network(Json& report, const Program& program, const Timing& timing, uint64_t parameters,

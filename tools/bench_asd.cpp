@@ -78,8 +78,7 @@ Status bench_asd(const Options& o, const Globals& globals)
     report["guidance_scale"] = o.cfg_scale;
     report["encode_ms"] = encode.ms_median;
     report["decode_ms"] = decode.ms_median;
-    report["gflop"] = asd->step_flops() / 1e9;
-    report["gflops"] = asd->step_flops() / step.ms_median / 1e6;
+    add_rate(report, asd->step_flops(), step);
     report["dispatches"] = asd->step_passes();
     report["barriers"] = asd->step_barriers();
     report["host_us_per_step"] = asd->host_us_per_step();

@@ -36,16 +36,13 @@ Status bench_conv(const Options& o, const Globals& globals)
     SR_TRY(const auto program, Program::create(*device, g));
     SR_TRY(const Timing timing, measure([&] { return program->run(); }));
     Json report = bench_report("conv", *device, dtype, timing, inputs.bytes() + program->plan().arena_bytes());
-    const double flops = 2.0 * 9 * o.channels * o.outputs * o.width * o.height; // of a direct convolution
     report["width"] = o.width;
     report["height"] = o.height;
     report["channels"] = o.channels;
     report["outputs"] = o.outputs;
     report["algorithm"] = o.winograd ? "winograd" : "direct";
     report["variant"] = program->plan().passes[0].variant->name;
-    report["gflop"] = flops / 1e9;
-    report["gflops"] = flops / timing.ms_median / 1e6;
-    report["gflops_best"] = flops / timing.ms_min / 1e6;
+    add_rate(report, 2.0 * 9 * o.channels * o.outputs * o.width * o.height, timing); // as a direct convolution
     add_program(report, *program);
     print_report(report, globals);
     return {};

@@ -29,13 +29,11 @@ Status bench_gemm(const Options& o, const Globals& globals)
     SR_TRY(const auto program, Program::create(*device, g));
     SR_TRY(const Timing timing, measure([&] { return program->run(); }));
     Json report = bench_report("gemm", *device, dtype, timing, predicted + program->plan().arena_bytes());
-    const double flops = 2.0 * o.m * o.n * o.k;
     report["m"] = o.m;
     report["n"] = o.n;
     report["k"] = o.k;
     report["variant"] = program->plan().passes[0].variant->name;
-    report["gflops"] = flops / timing.ms_median / 1e6;
-    report["gflops_best"] = flops / timing.ms_min / 1e6;
+    add_rate(report, 2.0 * o.m * o.n * o.k, timing);
     add_program(report, *program);
     print_report(report, globals);
     return {};

@@ -64,17 +64,16 @@ struct Refiner::Session {
     const Device& device;
     const Globals& globals;
 
-    Result<std::vector<float>> encode(const RefineChain& c, uint32_t frame)
+    Result<std::vector<float>> encode(const RefineChain& c, uint32_t frame, const BufferFrame& buffer)
     {
         if (store.has(PieceKind::encoded, c.camera, frame))
             return store.load_latent(PieceKind::encoded, c.camera, frame, c.size);
-        SR_TRY(const BufferFrame buffer, read_buffer(c.camera, frame));
         return of_frame(c, frame, renderer.encode(floats_of_pixels(buffer.color)));
     }
     Status denoise(const RefineChain& c, uint32_t frame, const AsdRenderer::StepCallback& step)
     {
-        SR_TRY(const std::vector<float> latent, encode(c, frame));
         SR_TRY(const BufferFrame buffer, read_buffer(c.camera, frame));
+        SR_TRY(const std::vector<float> latent, encode(c, frame, buffer));
         const std::vector<float> visible = block_shares(c.size, buffer.visible);
         std::vector<float> previous = c.before;
         if (frame > c.range.first) {
@@ -139,7 +138,8 @@ struct Refiner::Session {
             return !store.has(PieceKind::latent, c.camera, f) && !store.has(PieceKind::encoded, c.camera, f);
         };
         return stage("encode", left, [&](const RefineChain& c, uint32_t f) -> Status {
-            SR_TRY(const std::vector<float> latent, encode(c, f));
+            SR_TRY(const BufferFrame buffer, read_buffer(c.camera, f));
+            SR_TRY(const std::vector<float> latent, encode(c, f, buffer));
             return store.save_latent(PieceKind::encoded, c.camera, f, c.size, latent);
         });
     }

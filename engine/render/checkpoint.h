@@ -4,7 +4,6 @@
 
 #include "runtime/safetensors.h"
 
-#include <functional>
 #include <map>
 #include <memory>
 
