@@ -1,0 +1,48 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/scene/image.h"
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace semrover {
+
+constexpr uint8_t kNoLabel = 255; // of a face whose class nobody has said
+
+enum class TextureWrap : uint8_t { repeat, mirror, clamp };
+
+struct Texture {
+    ImageRgb8 image; // sRGB
+    TextureWrap wrap_u = TextureWrap::repeat, wrap_v = TextureWrap::repeat;
+};
+
+struct Material {
+    std::string name;
+    std::array<float, 3> color = {1, 1, 1}; // linear, 0..1; multiplies the texture or the vertex colours (glTF)
+    int32_t texture = -1;                   // index into Mesh::textures; -1: none
+    int32_t label_texture = -1;             // likewise: pixels in palette colours, or label numbers as gray; nearest
+};
+
+// A triangle mesh in the world's frame: metres, x forward, y left, z up. Optional arrays are empty when absent.
+struct Mesh {
+    std::vector<std::array<float, 3>> positions; // [V]
+    std::vector<std::array<uint8_t, 3>> colors;  // [V] sRGB, or empty
+    std::vector<std::array<uint32_t, 3>> faces;  // [F] < V, counter-clockwise seen from outside
+    std::vector<std::array<std::array<float, 2>, 3>>
+        uvs;                              // [F] per corner, or empty; v = 0 is the image's top row (glTF)
+    std::vector<uint32_t> face_materials; // [F] < materials.size(), or empty
+    std::vector<uint8_t> face_labels;     // [F] class or kNoLabel, or empty
+    std::vector<Material> materials;
+    std::vector<Texture> textures;
+};
+
+// bad_input, with `where` in front, for: no faces, indices out of range, positions or texture coordinates that are not
+// finite or beyond 1e6 m, arrays that disagree in size, labels that are neither a class nor kNoLabel (listed with
+// counts). Degenerate faces are allowed: they have no area.
+Status check_mesh(const Mesh& mesh, std::string_view where);
+
+} // namespace semrover

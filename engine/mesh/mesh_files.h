@@ -1,0 +1,29 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/mesh/mesh.h"
+#include "runtime/file.h"
+
+namespace semrover {
+
+// how axes of a file become the world's (x forward, y left, z up)
+enum class UpAxis {
+    file, // as the format says: glTF is y up (-z forward), OBJ and PLY are taken as z up
+    y,    // y up, -z forward
+    z,
+};
+
+// .obj (with .mtl), .ply, .glb, .gltf by extension. Untrusted input: sizes are limited before anything is allocated.
+// bad_input names the file and what is wrong: a texture that is missing, indices out of range, numbers that are not
+// finite. The mesh passes check_mesh.
+Result<Mesh> read_mesh(const Path& path, UpAxis up = UpAxis::file);
+
+// binary glTF 2.0, y up as the format wants it; textures inside as PNG; a face's label goes into its material: name,
+// and extras {"label": n}. The same mesh gives the same bytes; atomic.
+Status write_glb(const Path& path, const Mesh& mesh);
+
+// binary little-endian PLY: x y z [red green blue]; faces with vertex_indices [label]. Textures are not written.
+Status write_mesh_ply(const Path& path, const Mesh& mesh);
+
+} // namespace semrover

@@ -1,0 +1,30 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/mesh/mesh.h"
+#include "engine/scene/grid.h"
+#include "runtime/device.h"
+
+namespace semrover {
+
+struct VoxelizeOptions {
+    float voxel_size = 0.6f;   // metres
+    int points_per_voxel = 20; // 1..4096
+    float min_area = 1e-4f;    // in squares of the voxel size: cells with less surface stay empty
+    uint64_t seed = 0;
+    uint8_t default_label = kNoLabel; // of faces without one; kNoLabel: such faces are bad_input, with their area
+};
+
+struct VoxelizedMesh {
+    VoxelGrid grid;          // points, colours, labels: of the largest area in the cell, ties to the lower label
+    std::vector<float> area; // [V] m^2 of surface in each cell
+};
+
+// A textured mesh as a Sigma-Voxfield grid (spec/method.md §1): every triangle is clipped to the cells it crosses, and
+// a cell's points are drawn uniformly over its clipped area, with random numbers keyed by (seed, cell, sample), so the
+// result depends on neither the order of the faces within a cell's reach nor on the device's threads.
+// Errors: bad_input, out_of_memory, device_lost
+Result<VoxelizedMesh> voxelize(Device& device, const Mesh& mesh, const VoxelizeOptions& options);
+
+} // namespace semrover
