@@ -22,7 +22,7 @@ struct Texture {
 
 struct Material {
     std::string name;
-    std::array<float, 3> color = {1, 1, 1}; // linear, 0..1; multiplies the texture or the vertex colours (glTF)
+    std::array<float, 3> color = {1, 1, 1}; // linear, 0..1; multiplies texture and vertex colours (glTF)
     int32_t texture = -1;                   // index into Mesh::textures; -1: none
     int32_t label_texture = -1;             // likewise: pixels in palette colours, or label numbers as gray; nearest
 };

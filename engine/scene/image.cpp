@@ -113,18 +113,26 @@ bool encode(Png& p, const Format& format, uint32_t width, uint32_t height, const
     return true;
 }
 
-Status write_png(const Path& path, const Format& format, uint32_t width, uint32_t height,
-                 std::span<const std::byte> pixels)
+// the bytes of a PNG file
+Result<std::vector<uint8_t>> encode_png(std::string_view where, const Format& format, uint32_t width, uint32_t height,
+                                        std::span<const std::byte> pixels)
 {
     if (width == 0 || height == 0 || width > kMaxImageSide || height > kMaxImageSide)
         return fail(ErrorCode::bad_input, "cannot write {}: an image of {} x {} pixels, expected 1 to {} each way",
-                    quote_path(path), width, height, kMaxImageSide);
+                    where, width, height, kMaxImageSide);
     SR_ASSERT(pixels.size() == format.row_bytes(width) * height, "{} x {} pixels given with {} bytes", width, height,
               pixels.size());
     Png p;
     if (!encode(p, format, width, height, reinterpret_cast<const uint8_t*>(pixels.data())))
-        return fail(ErrorCode::out_of_memory, "cannot write {}: {}", quote_path(path), p.message);
-    return write_file_atomically(path, std::as_bytes(std::span(p.output)));
+        return fail(ErrorCode::out_of_memory, "cannot write {}: {}", where, p.message);
+    return std::move(p.output);
+}
+
+Status write_png(const Path& path, const Format& format, uint32_t width, uint32_t height,
+                 std::span<const std::byte> pixels)
+{
+    SR_TRY(const std::vector<uint8_t> file, encode_png(quote_path(path), format, width, height, pixels));
+    return write_file_atomically(path, std::as_bytes(std::span(file)));
 }
 
 bool read_header(Png& p)
@@ -175,28 +183,46 @@ bool read_rows(Png& p, const Format& format, uint32_t width, uint32_t height)
 
 // the pixels go where `allocate(width, height)` says
 template <typename Allocate>
-Status read_png(const Path& path, const Format& format, Allocate&& allocate)
+Status decode_png(std::span<const std::byte> file, std::string_view where, const Format& format, Allocate&& allocate)
 {
-    SR_TRY(const std::vector<std::byte> file, read_file(path, kMaxPngBytes));
     if (file.size() < 8 || png_sig_cmp(reinterpret_cast<png_const_bytep>(file.data()), 0, 8) != 0)
-        return fail(ErrorCode::bad_input, "{}: expected a PNG file, found something else", quote_path(path));
+        return fail(ErrorCode::bad_input, "{}: expected a PNG file, found something else", where);
     Png p;
     p.input = file;
     if (!read_header(p))
-        return fail(ErrorCode::bad_input, "{}: not a valid PNG: {}", quote_path(path), printable(p.message));
+        return fail(ErrorCode::bad_input, "{}: not a valid PNG: {}", where, printable(p.message));
     const uint32_t width = png_get_image_width(p.png, p.info), height = png_get_image_height(p.png, p.info);
     const uint64_t stored = uint64_t(png_get_rowbytes(p.png, p.info)) * height;
     if (stored / kMaxInflation > file.size())
-        return fail(ErrorCode::bad_input, "{}: {} x {} pixels cannot come from {} bytes; the file is cut",
-                    quote_path(path), width, height, file.size());
+        return fail(ErrorCode::bad_input, "{}: {} x {} pixels cannot come from {} bytes; the file is cut", where, width,
+                    height, file.size());
     const bool is_gray16 =
         png_get_bit_depth(p.png, p.info) == 16 && png_get_color_type(p.png, p.info) == PNG_COLOR_TYPE_GRAY;
     if (format.bit_depth == 16 && !is_gray16)
-        return fail(ErrorCode::bad_input, "{}: expected a PNG of 16-bit gray, found another kind", quote_path(path));
+        return fail(ErrorCode::bad_input, "{}: expected a PNG of 16-bit gray, found another kind", where);
     p.pixels = allocate(width, height);
     if (!read_rows(p, format, width, height))
-        return fail(ErrorCode::bad_input, "{}: not a valid PNG: {}", quote_path(path), printable(p.message));
+        return fail(ErrorCode::bad_input, "{}: not a valid PNG: {}", where, printable(p.message));
     return {};
+}
+
+template <typename Allocate>
+Status read_png(const Path& path, const Format& format, Allocate&& allocate)
+{
+    SR_TRY(const std::vector<std::byte> file, read_file(path, kMaxPngBytes));
+    return decode_png(file, quote_path(path), format, std::forward<Allocate>(allocate));
+}
+
+Result<ImageRgb8> decode_png_rgb8(std::span<const std::byte> file, std::string_view where)
+{
+    ImageRgb8 image;
+    SR_CHECK(decode_png(file, where, kRgb8, [&](uint32_t width, uint32_t height) {
+        image.width = width;
+        image.height = height;
+        image.pixels.resize(kRgb8.row_bytes(width) * height);
+        return image.pixels.data();
+    }));
+    return image;
 }
 
 } // namespace
@@ -218,14 +244,33 @@ Status write_png_gray16(const Path& path, uint32_t width, uint32_t height, std::
 
 Result<ImageRgb8> read_png_rgb8(const Path& path)
 {
-    ImageRgb8 image;
-    SR_CHECK(read_png(path, kRgb8, [&](uint32_t width, uint32_t height) {
-        image.width = width;
-        image.height = height;
-        image.pixels.resize(kRgb8.row_bytes(width) * height);
-        return image.pixels.data();
-    }));
-    return image;
+    SR_TRY(const std::vector<std::byte> file, read_file(path, kMaxPngBytes));
+    return decode_png_rgb8(file, quote_path(path));
+}
+
+Result<std::vector<std::byte>> encode_png_rgb8(uint32_t width, uint32_t height, std::span<const uint8_t> pixels)
+{
+    SR_TRY(const std::vector<uint8_t> file, encode_png("a PNG", kRgb8, width, height, std::as_bytes(pixels)));
+    const auto bytes = std::as_bytes(std::span(file));
+    return std::vector<std::byte>(bytes.begin(), bytes.end());
+}
+
+Result<ImageRgb8> decode_image_rgb8(std::span<const std::byte> file, std::string_view where)
+{
+    const auto starts_with = [&](std::initializer_list<uint8_t> magic) {
+        return file.size() >= magic.size() && std::memcmp(file.data(), magic.begin(), magic.size()) == 0;
+    };
+    if (starts_with({0x89, 'P', 'N', 'G'}))
+        return decode_png_rgb8(file, where);
+    if (starts_with({0xff, 0xd8, 0xff}))
+        return decode_jpeg_rgb8(file, where);
+    return fail(ErrorCode::bad_input, "{}: expected a PNG or JPEG image, found something else", where);
+}
+
+Result<ImageRgb8> read_image_rgb8(const Path& path)
+{
+    SR_TRY(const std::vector<std::byte> file, read_file(path, kMaxPngBytes));
+    return decode_image_rgb8(file, quote_path(path));
 }
 
 Result<ImageSize> read_png_size(const Path& path)

@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <span>
+#include <string_view>
 #include <vector>
 
 namespace semrover {
@@ -31,6 +32,12 @@ Result<ImageRgb8> read_png_rgb8(const Path& path);
 // baseline JPEG, 4:2:0, quality 1..100, likewise
 Status write_jpeg_rgb8(const Path& path, uint32_t width, uint32_t height, std::span<const uint8_t> pixels, int quality);
 Result<ImageRgb8> read_jpeg_rgb8(const Path& path);
+
+// the bytes of a PNG file, and a PNG or JPEG file (told by its first bytes) that lies in memory; `where` names it
+Result<std::vector<std::byte>> encode_png_rgb8(uint32_t width, uint32_t height, std::span<const uint8_t> pixels);
+Result<ImageRgb8> decode_jpeg_rgb8(std::span<const std::byte> file, std::string_view where);
+Result<ImageRgb8> decode_image_rgb8(std::span<const std::byte> file, std::string_view where);
+Result<ImageRgb8> read_image_rgb8(const Path& path); // likewise, at most 1 GiB
 
 // a PNG's size without its pixels
 struct ImageSize {

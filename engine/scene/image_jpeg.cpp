@@ -126,19 +126,24 @@ Status write_jpeg_rgb8(const Path& path, uint32_t width, uint32_t height, std::s
 Result<ImageRgb8> read_jpeg_rgb8(const Path& path)
 {
     SR_TRY(const std::vector<std::byte> file, read_file(path, kMaxJpegBytes));
+    return decode_jpeg_rgb8(file, quote_path(path));
+}
+
+Result<ImageRgb8> decode_jpeg_rgb8(std::span<const std::byte> file, std::string_view where)
+{
     Decoder d;
     if (file.empty() || !read_header(d, file))
-        return fail(ErrorCode::bad_input, "{}: not a valid JPEG: {}", quote_path(path),
+        return fail(ErrorCode::bad_input, "{}: not a valid JPEG: {}", where,
                     file.empty() ? "the file is empty" : printable(d.errors.message));
     const uint64_t pixels = uint64_t(d.info.image_width) * d.info.image_height;
     if (d.info.image_width > kMaxImageSide || d.info.image_height > kMaxImageSide ||
         pixels / kMaxExpansion > file.size())
-        return fail(ErrorCode::bad_input, "{}: {} x {} pixels in {} bytes; the file is cut or too large",
-                    quote_path(path), d.info.image_width, d.info.image_height, file.size());
+        return fail(ErrorCode::bad_input, "{}: {} x {} pixels in {} bytes; the file is cut or too large", where,
+                    d.info.image_width, d.info.image_height, file.size());
     ImageRgb8 image{d.info.image_width, d.info.image_height, {}};
     image.pixels.resize(pixels * 3);
     if (!read_rows(d, image.pixels.data()))
-        return fail(ErrorCode::bad_input, "{}: not a valid JPEG: {}", quote_path(path), printable(d.errors.message));
+        return fail(ErrorCode::bad_input, "{}: not a valid JPEG: {}", where, printable(d.errors.message));
     return image;
 }
 
