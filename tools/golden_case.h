@@ -72,6 +72,7 @@ Result<GoldenOutputs> run_pca_normals(Device& device, const GoldenCase& c, DType
 Result<GoldenOutputs> run_asd_rollout(Device& device, const GoldenCase& c, DType precision);
 
 Result<GoldenOutputs> run_unet_2d_condition(Device& device, const GoldenCase& c, DType precision);
+Result<GoldenOutputs> run_mesh_voxelization(Device& device, const GoldenCase& c, DType precision);
 Result<GoldenOutputs> run_autoencoder_kl(Device& device, const GoldenCase& c, DType precision);
 
 } // namespace semrover

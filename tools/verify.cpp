@@ -37,6 +37,7 @@ constexpr Kind kKinds[] = {
     {"region_extraction", run_region_extraction},
     {"splat_render", run_splat_render},
     {"pca_normals", run_pca_normals},
+    {"mesh_voxelization", run_mesh_voxelization},
     {"asd_rollout", run_asd_rollout},
     {"unet_2d_condition", run_unet_2d_condition},
     {"autoencoder_kl", run_autoencoder_kl},

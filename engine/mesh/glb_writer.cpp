@@ -3,6 +3,7 @@
 // glTF 2.0, https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html: one mesh, one primitive per material and label
 #include "engine/mesh/labels.h"
 #include "engine/mesh/mesh_files.h"
+#include "engine/mesh/srgb.h"
 #include "engine/scene/palette.h"
 #include "runtime/json.h"
 #include "runtime/quote.h"
@@ -60,8 +61,7 @@ std::array<float, 3> to_y_up(const std::array<float, 3>& p)
 
 uint16_t linear16(uint8_t srgb)
 {
-    const double s = srgb / 255.0;
-    return uint16_t(std::lround(65535 * (s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4))));
+    return uint16_t(std::lround(65535 * kLinear[srgb]));
 }
 
 class GlbWriter {
@@ -88,7 +88,6 @@ class GlbWriter {
     std::string binary_;
     OrderedJson views_ = OrderedJson::array(), accessors_ = OrderedJson::array();
     OrderedJson images_ = OrderedJson::array(), samplers_ = OrderedJson::array(), textures_ = OrderedJson::array();
-    std::vector<uint16_t> linear_;
 };
 
 std::map<PrimitiveKey, std::vector<uint32_t>> GlbWriter::group_faces() const
@@ -120,7 +119,7 @@ Primitive GlbWriter::gather(const PrimitiveKey& key, const std::vector<uint32_t>
                 p.uvs.push_back(mesh_.uvs[f][corner]);
             if (!mesh_.colors.empty()) {
                 const auto& c = mesh_.colors[k.vertex];
-                p.colors.push_back({linear_[c[0]], linear_[c[1]], linear_[c[2]], 65535});
+                p.colors.push_back({linear16(c[0]), linear16(c[1]), linear16(c[2]), 65535});
             }
         }
     return p;
@@ -218,8 +217,6 @@ void append_chunk(std::string& file, const char* type, std::string data, char pa
 
 Result<std::string> GlbWriter::write()
 {
-    for (int v = 0; v < 256; ++v)
-        linear_.push_back(linear16(uint8_t(v)));
     OrderedJson primitives = OrderedJson::array(), materials = OrderedJson::array();
     for (const auto& [key, faces] : group_faces()) {
         OrderedJson primitive = write_primitive(gather(key, faces));

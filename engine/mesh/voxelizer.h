@@ -14,6 +14,8 @@ struct VoxelizeOptions {
     float min_area = 1e-4f;    // in squares of the voxel size: cells with less surface stay empty
     uint64_t seed = 0;
     uint8_t default_label = kNoLabel; // of faces without one; kNoLabel: such faces are bad_input, with their area
+    uint64_t max_pairs = 0; // triangles in cells that are on the device at once; 0: as many as suit it. No result
+                            // depends on it
 };
 
 struct VoxelizedMesh {
@@ -21,6 +23,10 @@ struct VoxelizedMesh {
     std::vector<float> area; // [V] m^2 of surface in each cell
 };
 
+// Cells are half-open: a triangle in the plane between two cells belongs to the upper one. Positions are rounded to
+// 2^-20 of a cell. A colour is the material's times the texture's (bilinear) times the vertices', in linear light, what
+// is absent being white; a label is the face's, or the label texture's at the middle of what a cell has of the face.
+// Points lie within their cell, in the order of a token.
 // A textured mesh as a Sigma-Voxfield grid (spec/method.md §1): every triangle is clipped to the cells it crosses, and
 // a cell's points are drawn uniformly over its clipped area, with random numbers keyed by (seed, cell, sample), so the
 // result depends on neither the order of the faces within a cell's reach nor on the device's threads.

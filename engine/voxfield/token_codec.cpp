@@ -42,6 +42,21 @@ float denormalized(const TransformerConfig& c, uint32_t channel, float v)
 
 } // namespace
 
+void sort_by_distance(std::span<uint16_t> points, std::span<uint8_t> colors)
+{
+    std::vector<Point> offsets(points.size() / 3);
+    for (size_t i = 0; i < points.size(); ++i)
+        offsets[i / 3][i % 3] = half_to_float(points[i]);
+    const std::vector<uint16_t> old_points(points.begin(), points.end());
+    const std::vector<uint8_t> old_colors(colors.begin(), colors.end());
+    size_t to = 0;
+    for (const uint32_t from : distance_order(offsets))
+        for (size_t a = 0; a < 3; ++a, ++to) {
+            points[to] = old_points[3 * from + a];
+            colors[to] = old_colors[3 * from + a];
+        }
+}
+
 void encode_token(const TransformerConfig& config, std::span<const uint16_t> points, std::span<const uint8_t> colors,
                   std::span<float> token)
 {

@@ -13,6 +13,9 @@ namespace semrover {
 // centre (ties by x, y, z, then source order), each x, y, z, r, g, b; offsets / (voxel_size / 2), 2 * rgb - 1, then the
 // model's normalization. All known tokens are made from stored values, so a resumed run sees the same ones.
 
+// stored points and their colours in the order of a token
+void sort_by_distance(std::span<uint16_t> points, std::span<uint8_t> colors);
+
 // points [n, 3] f16 bits in metres, colors [n, 3] sRGB -> token [6n]
 void encode_token(const TransformerConfig& config, std::span<const uint16_t> points, std::span<const uint8_t> colors,
                   std::span<float> token);

@@ -1,0 +1,146 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/mesh/texture_atlas.h"
+
+#include "engine/scene/palette.h"
+
+#include <algorithm>
+#include <bit>
+
+namespace semrover {
+
+namespace {
+
+constexpr uint32_t kNone = 0xffffffff;
+
+uint64_t texels_of(const Texture& t)
+{
+    return uint64_t(t.image.width) * t.image.height;
+}
+
+template <typename T>
+Result<std::unique_ptr<Buffer>> upload(Device& device, const std::vector<T>& rows, const char* name)
+{
+    SR_TRY(auto buffer, Buffer::create(device, rows.size() * sizeof(T), MemoryKind::device, name));
+    SR_CHECK(device.write(buffer->slice(), std::as_bytes(std::span(rows))));
+    return buffer;
+}
+
+} // namespace
+
+uint8_t label_of_pixel(const uint8_t* rgb)
+{
+    for (uint8_t i = 0; i < kClassCount; ++i)
+        if (std::equal(rgb, rgb + 3, kPalette[i].color.begin()))
+            return i;
+    return rgb[0] == rgb[1] && rgb[1] == rgb[2] && rgb[0] < kClassCount ? rgb[0] : kNoLabel;
+}
+
+Result<TextureAtlas> TextureAtlas::create(Device& device, const Mesh& mesh, uint8_t default_label)
+{
+    TextureAtlas atlas;
+    std::vector<int32_t> label_sources; // textures that hold labels, each once
+    for (const Material& m : mesh.materials)
+        if (m.label_texture >= 0 && std::ranges::find(label_sources, m.label_texture) == label_sources.end())
+            label_sources.push_back(m.label_texture);
+    atlas.has_labels_ = !label_sources.empty();
+    std::vector<std::array<uint32_t, 4>> rows;
+    uint64_t texels = 0;
+    const auto add = [&](const Texture& t) {
+        rows.push_back({t.image.width, t.image.height, uint32_t(texels), uint32_t(t.wrap_u) | uint32_t(t.wrap_v) << 2});
+        texels += texels_of(t);
+    };
+    for (const Texture& t : mesh.textures)
+        add(t);
+    for (const int32_t source : label_sources)
+        add(mesh.textures[size_t(source)]);
+    if (texels >= kNone)
+        return fail(ErrorCode::bad_input, "the textures have {} pixels, at most 2^32 are supported", texels);
+    SR_CHECK(atlas.upload_tables(device, mesh, rows, label_sources));
+    SR_CHECK(atlas.upload_texels(device, mesh, label_sources, default_label, texels));
+    return atlas;
+}
+
+Status TextureAtlas::upload_tables(Device& device, const Mesh& mesh,
+                                   const std::vector<std::array<uint32_t, 4>>& textures,
+                                   const std::vector<int32_t>& label_sources)
+{
+    std::vector<std::array<uint32_t, 8>> materials;
+    const bool has_uvs = !mesh.uvs.empty();
+    for (const Material& m : mesh.materials) {
+        std::array<uint32_t, 8> row = {0, 0, 0, kNone, kNone};
+        for (size_t a = 0; a < 3; ++a)
+            row[a] = std::bit_cast<uint32_t>(m.color[a]);
+        if (m.texture >= 0 && has_uvs)
+            row[3] = uint32_t(m.texture);
+        if (m.label_texture >= 0 && has_uvs)
+            row[4] = uint32_t(mesh.textures.size()) +
+                     uint32_t(std::ranges::find(label_sources, m.label_texture) - label_sources.begin());
+        materials.push_back(row);
+    }
+    if (materials.empty()) { // what faces without one have
+        const uint32_t one = std::bit_cast<uint32_t>(1.f);
+        materials.push_back({one, one, one, kNone, kNone});
+    }
+    auto rows = textures;
+    if (rows.empty())
+        rows.push_back({1, 1, 0, 0}); // a binding is never empty
+    material_rows_ = uint32_t(materials.size());
+    texture_rows_ = uint32_t(rows.size());
+    SR_TRY(materials_, upload(device, materials, "materials"));
+    SR_TRY(textures_, upload(device, rows, "textures"));
+    return {};
+}
+
+Status TextureAtlas::upload_texels(Device& device, const Mesh& mesh, const std::vector<int32_t>& label_sources,
+                                   uint8_t default_label, uint64_t texels)
+{
+    const DeviceLimits& limits = device.limits();
+    const uint64_t page_texels = std::min(limits.max_storage_range, limits.max_allocation) / 4;
+    const uint32_t unknown = default_label == kNoLabel ? kUnlabelled : default_label;
+    std::vector<uint32_t> page;
+    uint64_t written = 0;
+    const auto flush = [&]() -> Status {
+        SR_TRY(auto buffer, upload(device, page, "texels"));
+        pages_.push_back({std::move(buffer), uint32_t(written), uint32_t(page.size())});
+        written += page.size();
+        page.clear();
+        return {};
+    };
+    const auto add = [&](const ImageRgb8& image, bool labels) -> Status {
+        for (size_t i = 0; i < image.pixels.size(); i += 3) {
+            const uint8_t* p = &image.pixels[i];
+            const uint8_t label = labels ? label_of_pixel(p) : kNoLabel;
+            page.push_back(labels ? (label == kNoLabel ? unknown : label)
+                                  : uint32_t(p[0]) | uint32_t(p[1]) << 8 | uint32_t(p[2]) << 16);
+            if (page.size() == page_texels)
+                SR_CHECK(flush());
+        }
+        return {};
+    };
+    page.reserve(std::min(texels, page_texels));
+    for (const Texture& t : mesh.textures)
+        SR_CHECK(add(t.image, false));
+    for (const int32_t source : label_sources)
+        SR_CHECK(add(mesh.textures[size_t(source)].image, true));
+    return page.empty() ? Status{} : flush();
+}
+
+Tensor TextureAtlas::materials(Graph& g) const
+{
+    return g.external(materials_->slice(), material_rows_, 8, DType::u32, "materials", 8);
+}
+
+Tensor TextureAtlas::textures(Graph& g) const
+{
+    return g.external(textures_->slice(), texture_rows_, 4, DType::u32, "textures", 4);
+}
+
+void TextureAtlas::gather(Graph& g, Tensor addresses, Tensor y, Tensor count) const
+{
+    for (const Page& page : pages_)
+        gather_texels(g, addresses, g.external(page.buffer->slice(), page.texels, 1, DType::u32, "texels", 1),
+                      page.first, y, count);
+}
+
+} // namespace semrover

@@ -1,0 +1,45 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/mesh/mesh.h"
+#include "kernels/kernels.h"
+#include "runtime/device.h"
+
+namespace semrover {
+
+// A mesh's materials and textures on a device. Texels of all textures have one row of addresses, cut into pages that
+// the device can bind; label textures hold labels, with `default_label` where a pixel says none.
+class TextureAtlas {
+  public:
+    // errors: bad_input for more than 2^32 texels, out_of_memory, device_lost
+    static Result<TextureAtlas> create(Device& device, const Mesh& mesh, uint8_t default_label);
+
+    Tensor materials(Graph& g) const;
+    Tensor textures(Graph& g) const;
+    bool has_labels() const { return has_labels_; }
+
+    // y = texels where `addresses` points to one; the rest of y stays
+    void gather(Graph& g, Tensor addresses, Tensor y, Tensor count = {}) const;
+
+  private:
+    struct Page {
+        std::unique_ptr<Buffer> buffer;
+        uint32_t first, texels;
+    };
+    Status upload_tables(Device& device, const Mesh& mesh, const std::vector<std::array<uint32_t, 4>>& textures,
+                         const std::vector<int32_t>& label_rows);
+    Status upload_texels(Device& device, const Mesh& mesh, const std::vector<int32_t>& label_sources,
+                         uint8_t default_label, uint64_t texels);
+
+    std::unique_ptr<Buffer> materials_, textures_;
+    uint32_t material_rows_ = 0, texture_rows_ = 0;
+    std::vector<Page> pages_;
+    bool has_labels_ = false;
+};
+
+// the label that a pixel of a label texture stands for: its colour in the palette, else its number as gray;
+// kNoLabel if neither
+uint8_t label_of_pixel(const uint8_t* rgb);
+
+} // namespace semrover

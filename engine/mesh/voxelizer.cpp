@@ -1,0 +1,312 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/mesh/voxelizer.h"
+
+#include "engine/mesh/srgb.h"
+#include "engine/mesh/surface_blocks.h"
+#include "engine/mesh/texture_atlas.h"
+#include "engine/scene/palette.h"
+#include "engine/voxfield/token_codec.h"
+#include "runtime/program.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <numeric>
+
+namespace semrover {
+
+namespace {
+
+static_assert(kUnlabelled == kClassCount && sizeof(SurfaceRecord) == 48 && sizeof(SurfaceAttributes) == 64);
+
+constexpr uint64_t kMaxSamples = 1ull << 31; // of a grid: 18 GiB as it is stored
+constexpr uint64_t kMaxPairs = 1 << 21;      // at once: about 140 MB of device memory
+
+Status check_options(const VoxelizeOptions& o)
+{
+    if (!(o.voxel_size >= 1e-3f && o.voxel_size <= 1e3f))
+        return fail(ErrorCode::bad_input, "expected a voxel size of 0.001 to 1000 m, found {}", o.voxel_size);
+    if (o.points_per_voxel < 1 || o.points_per_voxel > 4096)
+        return fail(ErrorCode::bad_input, "expected 1 to 4096 points in a cell, found {}", o.points_per_voxel);
+    if (!(o.min_area >= 0 && o.min_area <= 1))
+        return fail(ErrorCode::bad_input, "expected a least area of 0 to 1 squares of the voxel size, found {}",
+                    o.min_area);
+    if (o.default_label >= kClassCount && o.default_label != kNoLabel)
+        return fail(ErrorCode::bad_input, "expected a default label of 0 to {}, found {}", kClassCount - 1,
+                    o.default_label);
+    return {};
+}
+
+double face_area(const Mesh& mesh, size_t face)
+{
+    std::array<double, 3> u, v;
+    const auto& f = mesh.faces[face];
+    for (size_t a = 0; a < 3; ++a) {
+        u[a] = double(mesh.positions[f[1]][a]) - mesh.positions[f[0]][a];
+        v[a] = double(mesh.positions[f[2]][a]) - mesh.positions[f[0]][a];
+    }
+    return std::hypot(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]) / 2;
+}
+
+tl::unexpected<Error> no_label(double area, std::string_view what)
+{
+    return fail(ErrorCode::bad_input, "{} have no label ({:.4g} m^2 of surface); give them one, or a default label",
+                what, area);
+}
+
+// kUnlabelled where a texture says the label
+Result<std::vector<uint8_t>> labels_of_faces(const Mesh& mesh, uint8_t default_label)
+{
+    std::vector<uint8_t> labels(mesh.faces.size());
+    size_t without = 0;
+    double area = 0;
+    for (size_t f = 0; f < labels.size(); ++f) {
+        labels[f] = mesh.face_labels.empty() ? kNoLabel : mesh.face_labels[f];
+        if (labels[f] != kNoLabel)
+            continue;
+        const bool textured = !mesh.face_materials.empty() && !mesh.uvs.empty() &&
+                              mesh.materials[mesh.face_materials[f]].label_texture >= 0;
+        labels[f] = textured ? uint8_t(kUnlabelled) : default_label;
+        if (!textured && default_label == kNoLabel) {
+            ++without;
+            area += face_area(mesh, f);
+        }
+    }
+    if (without)
+        return no_label(area, fmt::format("{} of {} faces", without, labels.size()));
+    return labels;
+}
+
+// half precision, on the cell's side of its border
+uint16_t half_within(float value, float limit)
+{
+    uint16_t half = float_to_half(value);
+    while (std::abs(half_to_float(half)) > limit)
+        --half; // the sign is the highest bit
+    return half;
+}
+
+class Voxelizer {
+  public:
+    Voxelizer(Device& device, const Mesh& mesh, const VoxelizeOptions& options, TextureAtlas atlas)
+        : device_(device), mesh_(mesh), options_(options), atlas_(std::move(atlas))
+    {
+    }
+
+    Result<VoxelizedMesh> run(std::span<const uint8_t> labels);
+
+  private:
+    // parts of the arena of a chunk
+    enum Part { kRecords, kAttributes, kTriangles, kSums, kStarts, kAreas, kLabels, kUnlabelledAreas, kParts };
+    struct ChunkMemory {
+        Arena arena;
+        uint32_t triangles, pairs, cells;
+
+        SurfaceTriangles in(Graph& g, const TextureAtlas& atlas) const;
+        Tensor words(Graph& g, Part part, uint32_t rows, DType dtype = DType::u32) const
+        {
+            return g.external(arena.slice(part), rows, 1, dtype, "", 1);
+        }
+    };
+    using CellRow = std::array<int32_t, 4>; // i, j, k, key
+
+    SurfaceLimits limits() const;
+    Result<ChunkMemory> upload(const SurfaceChunk& chunk);
+    Status measure(const ChunkMemory& memory);
+    Result<std::vector<CellRow>> keep_cells(const SurfaceChunk& chunk, const ChunkMemory& memory);
+    Status sample(const ChunkMemory& memory, std::span<const CellRow> cells);
+    void store(std::span<const std::array<uint32_t, 4>> samples, size_t cells);
+    VoxelizedMesh finish();
+
+    Device& device_;
+    const Mesh& mesh_;
+    const VoxelizeOptions& options_;
+    TextureAtlas atlas_;
+    std::unique_ptr<Buffer> linear_;
+    VoxelizedMesh out_;
+    double unlabelled_ = 0; // m^2
+};
+
+SurfaceTriangles Voxelizer::ChunkMemory::in(Graph& g, const TextureAtlas& atlas) const
+{
+    return {g.external(arena.slice(kRecords), triangles, 12, DType::u32, "triangles", 12),
+            g.external(arena.slice(kAttributes), triangles, 16, DType::u32, "attributes", 16), atlas.materials(g),
+            atlas.textures(g)};
+}
+
+SurfaceLimits Voxelizer::limits() const
+{
+    const DeviceLimits& device = device_.limits();
+    uint64_t pairs = options_.max_pairs ? options_.max_pairs : kMaxPairs;
+    if (device_.budget() && !options_.max_pairs) // half of it, at about 128 bytes a pair
+        pairs = std::clamp<uint64_t>(device_.budget() / 256, 1 << 14, pairs);
+    pairs = std::min(pairs, device.max_storage_range / 4);
+    const uint64_t triangles = std::min(pairs, device.max_storage_range / sizeof(SurfaceAttributes));
+    return {triangles, pairs, std::min<uint64_t>(4096, std::max<uint64_t>(1, pairs / 256))};
+}
+
+Result<Voxelizer::ChunkMemory> Voxelizer::upload(const SurfaceChunk& chunk)
+{
+    ChunkMemory m{
+        {}, uint32_t(chunk.records.size()), uint32_t(chunk.pairs), uint32_t(chunk.blocks.size() * kSurfaceBlockCells)};
+    const uint64_t bytes[kParts] = {m.triangles * 48ull, m.triangles * 64ull, m.pairs * 4ull, m.pairs * 4ull,
+                                    m.cells * 4ull + 4,  m.cells * 4ull,      m.cells * 4ull, m.cells * 4ull};
+    for (const uint64_t size : bytes)
+        m.arena.add(size);
+    SR_CHECK(m.arena.allocate(device_, "surface"));
+    SR_CHECK(device_.write(m.arena.slice(kRecords), std::as_bytes(std::span(chunk.records))));
+    SR_CHECK(device_.write(m.arena.slice(kAttributes), std::as_bytes(std::span(chunk.attributes))));
+    return m;
+}
+
+// pairs by cell, their areas, areas and labels of cells
+Status Voxelizer::measure(const ChunkMemory& m)
+{
+    Graph g;
+    const SurfaceTriangles surface = m.in(g, atlas_);
+    const SurfacePairs found = triangle_cells(g, surface.records, m.pairs);
+    const uint32_t bits = uint32_t(std::bit_width(m.cells - 1));
+    const SortedPairs sorted = radix_sort(g, found.keys, found.triangles, {.bits = bits, .count = found.count});
+    const SurfaceAreas pairs = clip_area(g, surface, {sorted.keys, sorted.values, found.count});
+    if (atlas_.has_labels())
+        atlas_.gather(g, pairs.label_addresses, pairs.labels, found.count);
+    const Tensor starts = bucket_starts(g, sorted.keys, m.cells, found.count);
+    const CellAreas cells = cell_area(g, pairs.areas, pairs.labels, starts, m.cells);
+    g.replace(sorted.values.resource, m.words(g, kTriangles, m.pairs).resource);
+    g.replace(cells.sums.resource, m.words(g, kSums, m.pairs, DType::f32).resource);
+    g.replace(starts.resource, m.words(g, kStarts, m.cells + 1).resource);
+    g.replace(cells.areas.resource, m.words(g, kAreas, m.cells, DType::f32).resource);
+    g.replace(cells.labels.resource, m.words(g, kLabels, m.cells).resource);
+    g.replace(cells.unlabelled.resource, m.words(g, kUnlabelledAreas, m.cells, DType::f32).resource);
+    SR_TRY(const auto program, Program::create(device_, g));
+    return program->run();
+}
+
+// those with enough area go into the grid
+Result<std::vector<Voxelizer::CellRow>> Voxelizer::keep_cells(const SurfaceChunk& chunk, const ChunkMemory& m)
+{
+    std::vector<float> areas(m.cells), unlabelled(m.cells);
+    std::vector<uint32_t> labels(m.cells);
+    SR_CHECK(device_.read(m.arena.slice(kAreas), std::as_writable_bytes(std::span(areas))));
+    SR_CHECK(device_.read(m.arena.slice(kLabels), std::as_writable_bytes(std::span(labels))));
+    SR_CHECK(device_.read(m.arena.slice(kUnlabelledAreas), std::as_writable_bytes(std::span(unlabelled))));
+    const double square = double(options_.voxel_size) * options_.voxel_size;
+    std::vector<CellRow> kept;
+    for (uint32_t key = 0; key < m.cells; ++key) {
+        unlabelled_ += unlabelled[key] * square;
+        if (!(areas[key] > options_.min_area))
+            continue;
+        const Cell& block = chunk.blocks[key / kSurfaceBlockCells];
+        const int32_t c = int32_t(key % kSurfaceBlockCells), edge = int32_t(kSurfaceBlock);
+        const Cell cell = {block[0] + c / (edge * edge), block[1] + c / edge % edge, block[2] + c % edge};
+        kept.push_back({cell[0], cell[1], cell[2], int32_t(key)});
+        out_.grid.cells.push_back(cell);
+        out_.grid.labels.push_back(uint8_t(labels[key]));
+        out_.area.push_back(float(areas[key] * square));
+    }
+    return kept;
+}
+
+Status Voxelizer::sample(const ChunkMemory& m, std::span<const CellRow> cells)
+{
+    const auto n = uint32_t(options_.points_per_voxel);
+    SR_TRY(const auto rows, Buffer::create(device_, cells.size_bytes(), MemoryKind::device, "cells"));
+    SR_CHECK(device_.write(rows->slice(), std::as_bytes(cells)));
+    std::vector<std::array<uint32_t, 4>> samples(cells.size() * n);
+    SR_TRY(const auto results, Buffer::create(device_, samples.size() * 16, MemoryKind::device, "samples"));
+    Graph g;
+    const SurfaceSamples points =
+        sample_surface(g, m.in(g, atlas_), m.words(g, kTriangles, m.pairs), m.words(g, kSums, m.pairs, DType::f32),
+                       m.words(g, kStarts, m.cells + 1),
+                       g.external(rows->slice(), uint32_t(cells.size()), 4, DType::i32, "cells", 4), n, options_.seed);
+    const Tensor texels = fill(g, uint32_t(samples.size() * 4), 0xffffffff);
+    atlas_.gather(g, points.addresses, texels);
+    const Tensor y =
+        surface_color(g, points, texels, g.external(linear_->slice(), 512, 1, DType::f32, "linear light", 1));
+    g.replace(y.resource, g.external(results->slice(), y.rows, 4, DType::u32, "samples", 4).resource);
+    SR_TRY(const auto program, Program::create(device_, g));
+    SR_CHECK(program->run());
+    SR_CHECK(device_.read(results->slice(), std::as_writable_bytes(std::span(samples))));
+    store(samples, cells.size());
+    return {};
+}
+
+void Voxelizer::store(std::span<const std::array<uint32_t, 4>> samples, size_t cells)
+{
+    const auto n = size_t(options_.points_per_voxel);
+    VoxelGrid& grid = out_.grid;
+    for (size_t cell = 0; cell < cells; ++cell) {
+        for (const auto& s : samples.subspan(cell * n, n))
+            for (size_t a = 0; a < 3; ++a) {
+                grid.points.push_back(
+                    half_within(std::bit_cast<float>(s[a]) * options_.voxel_size, options_.voxel_size / 2));
+                grid.colors.push_back(uint8_t(s[3] >> (8 * a)));
+            }
+        sort_by_distance(std::span(grid.points).last(3 * n), std::span(grid.colors).last(3 * n));
+    }
+}
+
+// cells in order
+VoxelizedMesh Voxelizer::finish()
+{
+    VoxelGrid& grid = out_.grid;
+    grid.voxel_size = options_.voxel_size;
+    grid.points_per_voxel = options_.points_per_voxel;
+    grid.generated.assign(grid.cells.size(), 1);
+    const std::vector<Cell> cells = grid.cells;
+    sort_cells(grid);
+    std::vector<float> area(cells.size());
+    for (size_t i = 0; i < cells.size(); ++i)
+        area[*find_cell(grid, cells[i])] = out_.area[i];
+    out_.area = std::move(area);
+    return std::move(out_);
+}
+
+Result<VoxelizedMesh> Voxelizer::run(std::span<const uint8_t> labels)
+{
+    std::array<float, 512> linear;
+    for (size_t i = 0; i < 256; ++i) {
+        linear[i] = float(kLinear[i]);
+        linear[256 + i] = float(linear_of_srgb((double(i) + 0.5) / 255));
+    }
+    SR_TRY(linear_, Buffer::create(device_, sizeof(linear), MemoryKind::device, "linear light"));
+    SR_CHECK(device_.write(linear_->slice(), std::as_bytes(std::span(linear))));
+    const SurfaceLimits limits = this->limits();
+    SR_TRY(SurfaceBlocks blocks, SurfaceBlocks::create(mesh_, labels, options_.voxel_size, "the mesh"));
+    const auto n = uint64_t(options_.points_per_voxel);
+    const uint64_t batch = std::max<uint64_t>(1, limits.pairs / 2 / n); // cells
+    while (true) {
+        SR_TRY(const auto chunk, blocks.next(limits));
+        if (!chunk)
+            break;
+        SR_TRY(const ChunkMemory memory, upload(*chunk));
+        SR_CHECK(measure(memory));
+        SR_TRY(const std::vector<CellRow> cells, keep_cells(*chunk, memory));
+        if (out_.grid.cells.size() * n > kMaxSamples)
+            return fail(ErrorCode::bad_input, "the mesh fills more than {} cells of {} points; take a larger voxel",
+                        kMaxSamples / n, n);
+        for (size_t first = 0; first < cells.size(); first += batch)
+            SR_CHECK(sample(memory, std::span(cells).subspan(first, std::min(batch, cells.size() - first))));
+    }
+    if (unlabelled_ > 0)
+        return no_label(unlabelled_, "pixels of label textures");
+    if (out_.grid.cells.empty())
+        return fail(ErrorCode::bad_input, "the mesh has no surface: {:.4g} m^2 in {} faces, at least {:.4g} in a cell",
+                    blocks.area(), mesh_.faces.size(),
+                    double(options_.min_area) * options_.voxel_size * options_.voxel_size);
+    return finish();
+}
+
+} // namespace
+
+Result<VoxelizedMesh> voxelize(Device& device, const Mesh& mesh, const VoxelizeOptions& options)
+{
+    SR_CHECK(check_options(options));
+    SR_CHECK(check_mesh(mesh, "the mesh"));
+    SR_TRY(const std::vector<uint8_t> labels, labels_of_faces(mesh, options.default_label));
+    SR_TRY(TextureAtlas atlas, TextureAtlas::create(device, mesh, options.default_label));
+    return Voxelizer(device, mesh, options, std::move(atlas)).run(labels);
+}
+
+} // namespace semrover

@@ -1,0 +1,62 @@
+#version 460
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// area[i] = area of a triangle within a cell, in squares of the cell's edge; label[i] = the triangle's, or where the
+// texel that says it lies: the nearest to the middle of the clipped polygon
+#extension GL_GOOGLE_include_directive : require
+#include "clip_area.h"
+#include "lib/clip_cell.glsl"
+#include "lib/surface_record.glsl"
+#include "lib/thread.glsl"
+
+layout(local_size_x = 64) in;
+layout(push_constant) uniform Push { ClipAreaPush p; };
+layout(binding = 0) readonly buffer Triangles { uint triangles[]; };      // [T, 12]
+layout(binding = 1) readonly buffer Attributes { uint attributes[]; };     // [T, 16]
+layout(binding = 2) readonly buffer Materials { uint materials[]; };       // [M, 8]
+layout(binding = 3) readonly buffer Textures { uint textures[]; };         // [textures, 4]
+layout(binding = 4) readonly buffer Count { uint count[]; };               // [1]
+layout(binding = 5) readonly buffer Keys { uint keys[]; };                 // [size]
+layout(binding = 6) readonly buffer Values { uint values[]; };             // [size]
+layout(binding = 7) writeonly buffer Areas { float areas[]; };             // [size]
+layout(binding = 8) writeonly buffer Labels { uint labels[]; };            // [size]
+layout(binding = 9) writeonly buffer Addresses { uint label_address[]; }; // [size], 2^32 - 1: none
+
+uint nearest_texel(uint texture, vec2 uv)
+{
+    const ivec2 size = ivec2(textures[4 * texture], textures[4 * texture + 1]);
+    const uint wraps = textures[4 * texture + 3];
+    const vec2 at = vec2(wrap_coordinate(uv.x, wraps & 3u), wrap_coordinate(uv.y, wraps >> 2)) * vec2(size);
+    const uvec2 texel = uvec2(min(ivec2(at), size - 1));
+    return textures[4 * texture + 2] + texel.y * uint(size.x) + texel.x;
+}
+
+uint address_of_label(uint t, vec3 a, vec3 b, vec3 c)
+{
+    const uint texture = materials[RECORD_MATERIAL(triangles, t) * 8 + 4];
+    if (RECORD_LABEL(triangles, t) != kUnlabelled || texture == kNoTexture || polygon_size < 3)
+        return kNoTexture;
+    vec3 middle = vec3(0);
+    for (uint i = 0; i < polygon_size; ++i)
+        middle += polygon[i];
+    const vec3 w = barycentric(middle / float(polygon_size), a, b, c);
+    vec2 uv = vec2(0);
+    for (uint corner = 0; corner < 3; ++corner)
+        uv += w[corner] * CORNER_UV(attributes, t, corner);
+    return nearest_texel(texture, uv);
+}
+
+void main()
+{
+    const uint i = linear_thread();
+    if (i >= min(count[0], p.size))
+        return;
+    const uint t = values[i];
+    const vec3 origin = vec3(cell_of_key(keys[i]));
+    const vec3 a = RECORD_CORNER(triangles, t, 0) - origin, b = RECORD_CORNER(triangles, t, 1) - origin,
+               c = RECORD_CORNER(triangles, t, 2) - origin;
+    clip_to_cell(a, b, c);
+    areas[i] = polygon_area();
+    labels[i] = RECORD_LABEL(triangles, t);
+    label_address[i] = address_of_label(t, a, b, c);
+}

@@ -1,0 +1,107 @@
+#version 460
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// a point drawn uniformly from the surface in a cell: a pair by its share of the area, a triangle of its polygon's fan,
+// a point in that; and what its colour is made of
+#extension GL_GOOGLE_include_directive : require
+#include "lib/clip_cell.glsl"
+#include "lib/philox.glsl"
+#include "lib/surface_record.glsl"
+#include "lib/thread.glsl"
+#include "sample_surface.h"
+
+layout(local_size_x = 64) in;
+layout(push_constant) uniform Push { SampleSurfacePush p; };
+layout(binding = 0) readonly buffer Triangles { uint triangles[]; };  // [T, 12]
+layout(binding = 1) readonly buffer Attributes { uint attributes[]; }; // [T, 16]
+layout(binding = 2) readonly buffer Materials { uint materials[]; };   // [M, 8]
+layout(binding = 3) readonly buffer Textures { uint textures[]; };     // [textures, 4]
+layout(binding = 4) readonly buffer Values { uint values[]; };         // [pairs]
+layout(binding = 5) readonly buffer Sums { float sums[]; };            // [pairs]
+layout(binding = 6) readonly buffer Starts { uint starts[]; };         // [keys + 1]
+layout(binding = 7) readonly buffer Cells { ivec4 cells[]; };          // [cells] i, j, k, key
+layout(binding = 8) writeonly buffer Samples { float samples[]; };     // [cells * samples, 8]
+layout(binding = 9) writeonly buffer Addresses { uvec4 addresses[]; }; // [cells * samples] of texels
+
+float unit(uint word) { return float(word >> 8) * (1.0 / 16777216.0); } // [0, 1)
+
+// the first pair of the cell whose sum exceeds a share of the whole; pairs without area are never that
+uint pick_pair(uint key, float share)
+{
+    uint low = starts[key], high = starts[key + 1] - 1;
+    const float all = sums[high];
+    // note: the product may round up to the whole, which no sum exceeds
+    const float target = min(share * all, uintBitsToFloat(floatBitsToUint(all) - 1));
+    while (low < high) {
+        const uint middle = (low + high) / 2;
+        if (sums[middle] > target)
+            high = middle;
+        else
+            low = middle + 1;
+    }
+    return low;
+}
+
+vec3 point_in_polygon(uvec4 random)
+{
+    const float target = unit(random.y) * polygon_area();
+    uint i = 1;
+    float sum = fan_area(1);
+    while (sum <= target && i + 2 < polygon_size)
+        sum += fan_area(++i);
+    const float r = sqrt(unit(random.z)), s = unit(random.w);
+    return (1.0 - r) * polygon[0] + (r * (1.0 - s)) * polygon[i] + (r * s) * polygon[i + 1];
+}
+
+// addresses of the four texels around a point of the texture, and where it lies between them
+uvec4 texels_around(uint texture, vec2 uv, out vec2 between)
+{
+    const ivec2 size = ivec2(textures[4 * texture], textures[4 * texture + 1]);
+    const uint wraps = textures[4 * texture + 3], u_mode = wraps & 3u, v_mode = wraps >> 2;
+    const vec2 at = vec2(wrap_coordinate(uv.x, u_mode), wrap_coordinate(uv.y, v_mode)) * vec2(size) - 0.5;
+    const ivec2 corner = ivec2(floor(at));
+    between = at - vec2(corner);
+    const uint x0 = wrap_texel(corner.x, size.x, u_mode), x1 = wrap_texel(corner.x + 1, size.x, u_mode);
+    const uint y0 = wrap_texel(corner.y, size.y, v_mode) * uint(size.x);
+    const uint y1 = wrap_texel(corner.y + 1, size.y, v_mode) * uint(size.x);
+    return textures[4 * texture + 2] + uvec4(y0 + x0, y0 + x1, y1 + x0, y1 + x1);
+}
+
+void write_color(uint to, uint t, vec3 weights)
+{
+    vec2 uv = vec2(0), between = vec2(0);
+    vec3 color = vec3(0);
+    for (uint corner = 0; corner < 3; ++corner) {
+        uv += weights[corner] * CORNER_UV(attributes, t, corner);
+        color += weights[corner] * CORNER_COLOR(attributes, t, corner);
+    }
+    const uint m = RECORD_MATERIAL(triangles, t) * 8, texture = materials[m + 3];
+    addresses[to] = texture == kNoTexture ? uvec4(kNoTexture) : texels_around(texture, uv, between);
+    const vec3 factor = vec3(uintBitsToFloat(materials[m]), uintBitsToFloat(materials[m + 1]),
+                             uintBitsToFloat(materials[m + 2])) * color;
+    samples[8 * to + 3] = between.x;
+    samples[8 * to + 4] = between.y;
+    samples[8 * to + 5] = factor.x;
+    samples[8 * to + 6] = factor.y;
+    samples[8 * to + 7] = factor.z;
+}
+
+void main()
+{
+    const uint to = linear_thread();
+    if (to >= p.cells * p.samples)
+        return;
+    const ivec4 cell = cells[to / p.samples];
+    const uint key = uint(cell.w);
+    const uvec4 random = philox(uvec4(uvec3(cell.xyz), to % p.samples), uvec2(p.seed_low, p.seed_high));
+    const uint t = values[pick_pair(key, unit(random.x))];
+    const vec3 origin = vec3(cell_of_key(key));
+    const vec3 a = RECORD_CORNER(triangles, t, 0) - origin, b = RECORD_CORNER(triangles, t, 1) - origin,
+               c = RECORD_CORNER(triangles, t, 2) - origin;
+    clip_to_cell(a, b, c);
+    const vec3 point = clamp(point_in_polygon(random), 0.0, 1.0);
+    samples[8 * to] = point.x - 0.5;
+    samples[8 * to + 1] = point.y - 0.5;
+    samples[8 * to + 2] = point.z - 0.5;
+    write_color(to, t, barycentric(point, a, b, c));
+}
