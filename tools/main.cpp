@@ -105,6 +105,7 @@ int main(int argc, char** argv)
     add_refine(app, globals, run);
     add_render(app, globals, run);
     add_verify(app, globals, run);
+    add_voxelize(app, globals, run);
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& e) {

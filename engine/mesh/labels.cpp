@@ -3,6 +3,12 @@
 #include "engine/mesh/labels.h"
 
 #include "engine/scene/palette.h"
+#include "runtime/json.h"
+#include "runtime/quote.h"
+
+#include <algorithm>
+#include <functional>
+#include <map>
 
 namespace semrover {
 
@@ -31,6 +37,45 @@ bool starts_with_word(std::string_view name, std::string_view prefix)
     return name.size() == prefix.size() || !is_letter(folded(name[prefix.size()]));
 }
 
+std::string folded_text(std::string_view text)
+{
+    std::string out;
+    for (const char c : text)
+        out += folded(c);
+    return out;
+}
+
+std::optional<uint8_t> exact_class(std::string_view name)
+{
+    for (uint8_t i = 0; i < kClassCount; ++i)
+        if (folded_text(name) == folded_text(kPalette[i].name))
+            return i;
+    return std::nullopt;
+}
+
+// '*' stands for any text; greedy with one point to come back to, so that it takes no more than size times size
+bool matches(std::string_view pattern, std::string_view text)
+{
+    size_t p = 0, t = 0, star = std::string_view::npos, resume = 0;
+    while (t < text.size()) {
+        if (p < pattern.size() && pattern[p] == '*') {
+            star = p++;
+            resume = t;
+        } else if (p < pattern.size() && pattern[p] == text[t]) {
+            ++p;
+            ++t;
+        } else if (star != std::string_view::npos) {
+            p = star + 1;
+            t = ++resume;
+        } else {
+            return false;
+        }
+    }
+    while (p < pattern.size() && pattern[p] == '*')
+        ++p;
+    return p == pattern.size();
+}
+
 } // namespace
 
 std::optional<uint8_t> class_of_material(std::string_view name)
@@ -41,6 +86,104 @@ std::optional<uint8_t> class_of_material(std::string_view name)
             (!found || kPalette[i].name.size() > kPalette[*found].name.size()))
             found = i;
     return found;
+}
+
+Result<LabelMap> LabelMap::read(const Path& path)
+{
+    const std::string where = quote_path(path);
+    SR_TRY(const Json json, read_json(path, {.bytes = 1 << 20, .depth = 2, .values = 100000}));
+    if (!json.is_object())
+        return fail(ErrorCode::bad_input, "{}: expected an object of names and classes, found {}", where,
+                    json.type_name());
+    LabelMap map;
+    for (const auto& [key, value] : json.items()) {
+        std::optional<uint8_t> label;
+        if (value.is_null())
+            label = kNoLabel;
+        else if (value.is_string())
+            label = exact_class(value.get<std::string>());
+        else if (value.is_number_integer() && value >= 0 && value < kClassCount)
+            label = value.get<uint8_t>();
+        if (!label)
+            return fail(ErrorCode::bad_input, "{}: {}: expected a class name, a number of 0 to {} or null, found {}",
+                        where, quote(key), kClassCount - 1, printable(value.dump(-1, ' ', true), 60));
+        map.entries_.push_back({folded_text(key), *label});
+    }
+    // an object's keys come sorted; exact names first
+    std::ranges::stable_partition(map.entries_,
+                                  [](const Entry& e) { return e.pattern.find('*') == std::string::npos; });
+    return map;
+}
+
+std::optional<uint8_t> LabelMap::find(std::string_view name) const
+{
+    const std::string text = folded_text(name);
+    for (const Entry& e : entries_)
+        if (matches(e.pattern, text))
+            return e.label;
+    return std::nullopt;
+}
+
+std::optional<uint8_t> LabelMap::find(int64_t number) const
+{
+    if (!entries_.empty())
+        if (const auto label = find(std::string_view(std::to_string(number))))
+            return label;
+    if (number >= 0 && number < int64_t(kClassCount))
+        return uint8_t(number);
+    return number == kNoLabel || number == -1 ? std::optional(kNoLabel) : std::nullopt;
+}
+
+std::vector<UnlabelledFaces> label_faces(Mesh& mesh, LabelSource source, const LabelMap& map)
+{
+    std::vector<uint8_t> by_material(mesh.materials.size(), kNoLabel);
+    for (size_t i = 0; i < by_material.size(); ++i) {
+        Material& m = mesh.materials[i];
+        if (source == LabelSource::texture && m.label_texture < 0)
+            m.label_texture = m.texture;
+        if (source == LabelSource::automatic || source == LabelSource::material) {
+            const auto mapped = map.find(m.name);
+            by_material[i] = mapped ? *mapped : class_of_material(m.name).value_or(kNoLabel);
+        }
+    }
+    const bool own = source == LabelSource::automatic || source == LabelSource::face;
+    const bool textures = (source == LabelSource::automatic || source == LabelSource::texture) && !mesh.uvs.empty();
+    std::vector<uint8_t> labels(mesh.faces.size(), kNoLabel);
+    std::map<std::string, UnlabelledFaces> without;
+    for (size_t f = 0; f < labels.size(); ++f) {
+        if (own && !mesh.face_labels.empty())
+            labels[f] = mesh.face_labels[f];
+        const Material* m = mesh.face_materials.empty() ? nullptr : &mesh.materials[mesh.face_materials[f]];
+        if (labels[f] == kNoLabel && m)
+            labels[f] = by_material[mesh.face_materials[f]];
+        if (labels[f] != kNoLabel || (textures && m && m->label_texture >= 0))
+            continue;
+        const std::string name = m && source != LabelSource::face ? m->name : "";
+        UnlabelledFaces& entry = without[name];
+        entry.name = name;
+        ++entry.faces;
+        entry.area += face_area(mesh, f);
+    }
+    if (!textures)
+        for (Material& m : mesh.materials)
+            m.label_texture = -1;
+    mesh.face_labels = std::move(labels);
+    std::vector<UnlabelledFaces> list;
+    for (auto& [name, entry] : without)
+        list.push_back(std::move(entry));
+    std::ranges::stable_sort(list, std::greater(), &UnlabelledFaces::area);
+    return list;
+}
+
+std::string unlabelled_text(std::span<const UnlabelledFaces> list)
+{
+    std::string text;
+    for (const UnlabelledFaces& e : list.first(std::min<size_t>(list.size(), 10)))
+        text += fmt::format("{}{} ({} faces, {:.4g} m^2)", text.empty() ? "" : ", ",
+                            e.name.empty() ? "without a material's name" : quote(e.name, 60), e.faces, e.area);
+    if (list.size() > 10)
+        text += fmt::format(" and {} more", list.size() - 10);
+    return text;
 }
 
 } // namespace semrover

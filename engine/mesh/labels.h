@@ -2,7 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstdint>
+#include "engine/mesh/mesh.h"
+#include "runtime/file.h"
+
 #include <optional>
 #include <string_view>
 
@@ -11,5 +13,45 @@ namespace semrover {
 // the class that a material's name stands for: a class name, in any case, with '_', '-' and ' ' alike, alone or in
 // front of something that is no letter ("Traffic_Light", "building.003", "road-lane 2"); the longest one that fits
 std::optional<uint8_t> class_of_material(std::string_view name);
+
+// what else names or numbers of a file stand for: a JSON object of "name", "na*e" (* is any text) or "number" to a
+// class name or number, or null for none. Names are compared as above; exact ones come first, then the first pattern.
+class LabelMap {
+  public:
+    LabelMap() = default;
+    static Result<LabelMap> read(const Path& path); // bad_input names the key
+
+    bool empty() const { return entries_.empty(); }
+    std::optional<uint8_t> find(std::string_view name) const; // kNoLabel where the map says null
+    // of a number in a file: the map's, else a class as it is, else kNoLabel for 255 and -1; none for other numbers
+    std::optional<uint8_t> find(int64_t number) const;
+
+  private:
+    struct Entry {
+        std::string pattern; // folded
+        uint8_t label;
+    };
+    std::vector<Entry> entries_;
+};
+
+enum class LabelSource {
+    automatic, // the face's own, else its material's name, else a label texture
+    material,
+    texture, // a label texture, or the material's texture as one
+    face,
+};
+
+// what has no label; one entry for a material, or for all faces without one
+struct UnlabelledFaces {
+    std::string name;
+    size_t faces = 0;
+    double area = 0; // m^2
+};
+
+// fills face_labels from `source`; faces that get none keep kNoLabel and are listed, the largest area first
+std::vector<UnlabelledFaces> label_faces(Mesh& mesh, LabelSource source, const LabelMap& map);
+
+// "'glass' (12 faces, 3.4 m^2), ..", ten at most
+std::string unlabelled_text(std::span<const UnlabelledFaces> list);
 
 } // namespace semrover

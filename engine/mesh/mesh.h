@@ -40,6 +40,8 @@ struct Mesh {
     std::vector<Texture> textures;
 };
 
+double face_area(const Mesh& mesh, size_t face); // m^2
+
 // bad_input, with `where` in front, for: no faces, indices out of range, positions or texture coordinates that are not
 // finite or beyond 1e6 m, arrays that disagree in size, labels that are neither a class nor kNoLabel (listed with
 // counts). Degenerate faces are allowed: they have no area.

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/mesh/labels.h"
 #include "engine/mesh/mesh.h"
 #include "runtime/file.h"
 
@@ -16,8 +17,10 @@ enum class UpAxis {
 
 // .obj (with .mtl), .ply, .glb, .gltf by extension. Untrusted input: sizes are limited before anything is allocated.
 // bad_input names the file and what is wrong: a texture that is missing, indices out of range, numbers that are not
-// finite. The mesh passes check_mesh.
-Result<Mesh> read_mesh(const Path& path, UpAxis up = UpAxis::file);
+// finite. Polygons become triangles. A PLY's per-face label, class, class_id, category or scalar_Classification goes
+// through `map`; a GLB's material may say {"label": n} in its extras. Vertex colours of an OBJ or PLY that has textures
+// are dropped. The mesh passes check_mesh.
+Result<Mesh> read_mesh(const Path& path, UpAxis up = UpAxis::file, const LabelMap& map = {});
 
 // binary glTF 2.0, y up as the format wants it; textures inside as PNG; a face's label goes into its material: name,
 // and extras {"label": n}. The same mesh gives the same bytes; atomic.

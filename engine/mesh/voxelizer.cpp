@@ -38,17 +38,6 @@ Status check_options(const VoxelizeOptions& o)
     return {};
 }
 
-double face_area(const Mesh& mesh, size_t face)
-{
-    std::array<double, 3> u, v;
-    const auto& f = mesh.faces[face];
-    for (size_t a = 0; a < 3; ++a) {
-        u[a] = double(mesh.positions[f[1]][a]) - mesh.positions[f[0]][a];
-        v[a] = double(mesh.positions[f[2]][a]) - mesh.positions[f[0]][a];
-    }
-    return std::hypot(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]) / 2;
-}
-
 tl::unexpected<Error> no_label(double area, std::string_view what)
 {
     return fail(ErrorCode::bad_input, "{} have no label ({:.4g} m^2 of surface); give them one, or a default label",

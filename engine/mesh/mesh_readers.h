@@ -1,0 +1,17 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/mesh/labels.h"
+#include "engine/mesh/mesh.h"
+
+namespace semrover {
+
+// one reader a format, in the file's own axes; read_mesh() turns and checks what they give
+Result<Mesh> read_obj(const Path& path);
+Result<Mesh> read_ply_mesh(const Path& path, const LabelMap& map);
+Result<Mesh> read_gltf(const Path& path); // .glb or .gltf
+
+constexpr size_t kMaxMeshElements = 1u << 28; // vertices, faces
+
+} // namespace semrover

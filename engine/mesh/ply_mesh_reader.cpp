@@ -1,0 +1,217 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// PLY meshes as MeshLab, CloudCompare, Open3D and OpenMVS write them
+#include "engine/mesh/asset_folder.h"
+#include "engine/mesh/mesh_readers.h"
+#include "engine/mesh/polygon.h"
+#include "engine/scene/ply_reader.h"
+#include "runtime/quote.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace semrover {
+
+namespace {
+
+using Column = const PlyProperty*;
+
+class PlyMesh {
+  public:
+    PlyMesh(const Path& path, const PlyFile& file, const LabelMap& map)
+        : where_(quote_path(path)), file_(file), map_(map), folder_(path)
+    {
+    }
+
+    Result<Mesh> read();
+
+  private:
+    static Column first(const PlyElement& e, std::initializer_list<std::string_view> names, bool list);
+    Status read_vertices(const PlyElement& vertices);
+    Status read_colors(const PlyElement& vertices);
+    Status read_faces(const PlyElement& vertices, const PlyElement& faces);
+    Status read_textures();
+    Status read_face(size_t row);
+    Result<uint8_t> label_of(size_t row);
+    Status check_labels() const;
+
+    std::string where_;
+    const PlyFile& file_;
+    const LabelMap& map_;
+    AssetFolder folder_;
+    Mesh mesh_;
+    Column indices_ = nullptr, labels_ = nullptr, texcoord_ = nullptr, texnumber_ = nullptr, u_ = nullptr, v_ = nullptr;
+    std::map<int64_t, size_t> unknown_; // labels and how many faces have them
+};
+
+Column PlyMesh::first(const PlyElement& e, std::initializer_list<std::string_view> names, bool list)
+{
+    for (const std::string_view name : names)
+        if (const PlyProperty* p = e.find(name); p && p->is_list == list)
+            return p;
+    return nullptr;
+}
+
+Status PlyMesh::read_vertices(const PlyElement& vertices)
+{
+    const Column axes[3] = {first(vertices, {"x"}, false), first(vertices, {"y"}, false),
+                            first(vertices, {"z"}, false)};
+    if (!axes[0] || !axes[1] || !axes[2])
+        return fail(ErrorCode::bad_input, "{}: the vertices have no x, y and z", where_);
+    mesh_.positions.resize(vertices.rows);
+    for (size_t i = 0; i < vertices.rows; ++i)
+        for (size_t a = 0; a < 3; ++a)
+            mesh_.positions[i][a] = float(axes[a]->values[i]);
+    return {};
+}
+
+Status PlyMesh::read_colors(const PlyElement& vertices)
+{
+    const Column channels[3] = {first(vertices, {"red", "r", "diffuse_red"}, false),
+                                first(vertices, {"green", "g", "diffuse_green"}, false),
+                                first(vertices, {"blue", "b", "diffuse_blue"}, false)};
+    if (!channels[0] || !channels[1] || !channels[2] || !mesh_.textures.empty())
+        return {};
+    mesh_.colors.resize(vertices.rows);
+    for (size_t i = 0; i < vertices.rows; ++i)
+        for (size_t a = 0; a < 3; ++a) {
+            const double value = channels[a]->values[i], scaled = channels[a]->is_float ? 255 * value : value;
+            if (!(scaled >= 0 && scaled <= 255.5))
+                return fail(ErrorCode::bad_input, "{}: vertex {} has the colour {}, expected 0 to {}", where_, i, value,
+                            channels[a]->is_float ? 1 : 255);
+            mesh_.colors[i][a] = uint8_t(std::min(255.0, std::round(scaled)));
+        }
+    return {};
+}
+
+// `comment TextureFile NAME`, one for each number that texnumber can have
+Status PlyMesh::read_textures()
+{
+    constexpr std::string_view kKey = "TextureFile ";
+    for (const std::string& comment : file_.comments) {
+        if (!comment.starts_with(kKey))
+            continue;
+        if (mesh_.materials.size() >= 4096)
+            return fail(ErrorCode::bad_input, "{}: more than 4096 textures", where_);
+        const std::string name = comment.substr(kKey.size());
+        SR_TRY(const int32_t texture, folder_.texture(mesh_, name, where_));
+        mesh_.materials.push_back({.name = "", .texture = texture});
+    }
+    return {};
+}
+
+Result<uint8_t> PlyMesh::label_of(size_t row)
+{
+    const double value = labels_->values[row];
+    const int64_t number = std::isfinite(value) && std::abs(value) < 1e15 ? std::llround(value) : -2;
+    const auto label = map_.find(number);
+    if (!label)
+        ++unknown_[number];
+    return label.value_or(kNoLabel);
+}
+
+Status PlyMesh::check_labels() const
+{
+    std::string text;
+    for (const auto& [number, count] : unknown_)
+        if (text.size() < 400)
+            text += fmt::format("{}{} ({} faces)", text.empty() ? "" : ", ", number, count);
+    if (text.empty())
+        return {};
+    return fail(ErrorCode::bad_input, "{}: unknown labels in '{}', expected 0 to 19 or a map: {}", where_,
+                printable(labels_->name, 40), text);
+}
+
+Status PlyMesh::read_face(size_t row)
+{
+    const uint64_t begin = indices_->starts[row], count = indices_->starts[row + 1] - begin;
+    if (count < 3)
+        return fail(ErrorCode::bad_input, "{}: face {} has {} corners, expected 3 or more", where_, row, count);
+    std::vector<std::array<float, 3>> corners;
+    for (uint64_t i = begin; i < begin + count; ++i) {
+        const double index = indices_->values[i];
+        if (!(index >= 0 && index < double(mesh_.positions.size())))
+            return fail(ErrorCode::bad_input, "{}: face {} refers to vertex {}, the mesh has {}", where_, row, index,
+                        mesh_.positions.size());
+        corners.push_back(mesh_.positions[size_t(index)]);
+    }
+    const uint64_t uv_begin = texcoord_ ? texcoord_->starts[row] : 0;
+    const uint64_t uv_count = texcoord_ ? texcoord_->starts[row + 1] - uv_begin : 0;
+    if (uv_count != 0 && uv_count != 2 * count)
+        return fail(ErrorCode::bad_input, "{}: face {} has {} texture coordinates for {} corners", where_, row,
+                    uv_count, count);
+    double number = texnumber_ ? texnumber_->values[row] : 0;
+    if (!mesh_.materials.empty() && !(number >= 0 && number < double(mesh_.materials.size())))
+        return fail(ErrorCode::bad_input, "{}: face {} refers to texture {}, the file names {}", where_, row, number,
+                    mesh_.materials.size());
+    uint8_t label = kNoLabel;
+    if (labels_) {
+        SR_TRY(label, label_of(row));
+    }
+    for (const auto& t : triangulated(corners)) {
+        std::array<uint32_t, 3> face;
+        std::array<std::array<float, 2>, 3> uv{};
+        for (size_t k = 0; k < 3; ++k) {
+            face[k] = uint32_t(indices_->values[begin + t[k]]);
+            if (uv_count) // v runs up in these files
+                uv[k] = {float(texcoord_->values[uv_begin + 2 * t[k]]),
+                         float(1 - texcoord_->values[uv_begin + 2 * t[k] + 1])};
+            else if (u_)
+                uv[k] = {float(u_->values[face[k]]), float(1 - v_->values[face[k]])};
+        }
+        mesh_.faces.push_back(face);
+        if (labels_)
+            mesh_.face_labels.push_back(label);
+        if (!mesh_.materials.empty()) {
+            mesh_.uvs.push_back(uv);
+            mesh_.face_materials.push_back(uint32_t(number));
+        }
+    }
+    return {};
+}
+
+Status PlyMesh::read_faces(const PlyElement& vertices, const PlyElement& faces)
+{
+    indices_ = first(faces, {"vertex_indices", "vertex_index"}, true);
+    if (!indices_)
+        return fail(ErrorCode::bad_input, "{}: the faces have no list vertex_indices", where_);
+    labels_ = first(
+        faces,
+        {"label", "class", "class_id", "semantic", "category", "category_id", "scalar_Classification", "scalar_label"},
+        false);
+    texcoord_ = first(faces, {"texcoord"}, true);
+    texnumber_ = first(faces, {"texnumber"}, false);
+    u_ = first(vertices, {"s", "u", "texture_u"}, false);
+    v_ = first(vertices, {"t", "v", "texture_v"}, false);
+    if (!u_ || !v_)
+        u_ = v_ = nullptr;
+    for (size_t row = 0; row < faces.rows; ++row)
+        SR_CHECK(read_face(row));
+    return check_labels();
+}
+
+Result<Mesh> PlyMesh::read()
+{
+    const PlyElement *vertices = file_.find("vertex"), *faces = file_.find("face");
+    if (!vertices || !faces || !faces->rows)
+        return fail(ErrorCode::bad_input, "{}: expected a mesh, found no {}", where_, vertices ? "faces" : "vertices");
+    if (vertices->rows > kMaxMeshElements || faces->rows > kMaxMeshElements)
+        return fail(ErrorCode::bad_input, "{}: {} vertices and {} faces, at most {} are supported", where_,
+                    vertices->rows, faces->rows, kMaxMeshElements);
+    SR_CHECK(read_vertices(*vertices));
+    SR_CHECK(read_textures());
+    SR_CHECK(read_colors(*vertices));
+    SR_CHECK(read_faces(*vertices, *faces));
+    return std::move(mesh_);
+}
+
+} // namespace
+
+Result<Mesh> read_ply_mesh(const Path& path, const LabelMap& map)
+{
+    SR_TRY(const PlyFile file, read_ply(path));
+    return PlyMesh(path, file, map).read();
+}
+
+} // namespace semrover
