@@ -130,8 +130,9 @@ Status split_into(DenseLabels& dense, const VoxelGrid& grid, std::string_view wh
                     dense.labels[(i * dense.shape[1] + j) * dense.shape[2] + k] = grid.labels[v];
     }
     if (outside)
-        return fail(ErrorCode::bad_input, "{}: {} of {} cells are outside its box of {:g} to {:g}, {:g} to {:g}, {:g} to "
-                                          "{:g} m",
+        return fail(ErrorCode::bad_input,
+                    "{}: {} of {} cells are outside its box of {:g} to {:g}, {:g} to {:g}, {:g} to "
+                    "{:g} m",
                     where, outside, grid.cells.size(), double(dense.origin[0]) / 1e4,
                     double(dense.origin[0] + dense.edge[0] * dense.shape[0]) / 1e4, double(dense.origin[1]) / 1e4,
                     double(dense.origin[1] + dense.edge[1] * dense.shape[1]) / 1e4, double(dense.origin[2]) / 1e4,

@@ -25,8 +25,8 @@ Result<int64_t> tenths_of(double metres, std::string_view where);
 // that is not whole tenths of a millimetre or above 100 m, and when nothing is occupied.
 Result<VoxelGrid> resample(const DenseLabels& dense, float voxel_size, double min_fill, std::string_view where);
 
-// a grid's labels in a box of smaller voxels, `dense` giving shape, edge (a divisor of the cell's) and origin: each cell
-// is split. Parts of cells outside the box are cut off; bad_input when a whole cell is outside, saying how many.
+// a grid's labels in a box of smaller voxels, `dense` giving shape, edge (a divisor of the cell's) and origin: each
+// cell is split. Parts of cells outside the box are cut off; bad_input when a whole cell is outside, saying how many.
 Status split_into(DenseLabels& dense, const VoxelGrid& grid, std::string_view where);
 
 } // namespace semrover

@@ -40,8 +40,8 @@ struct NpyHeader {
 };
 constexpr size_t kNpyHeaderBytes = 64 << 10; // at most
 
-// of the first bytes of a file; bad_input, with `where` in front, for anything but the above, and for data of 2^40 bytes
-// or more
+// of the first bytes of a file; bad_input, with `where` in front, for anything but the above, and for data of 2^40
+// bytes or more
 Result<NpyHeader> parse_npy_header(std::string_view bytes, std::string_view where);
 
 // the header's array from the bytes that follow it

@@ -214,7 +214,8 @@ Result<std::vector<std::byte>> zip_bytes(const Path& path, const std::map<std::s
     }
     for (const auto& [name, bytes] : entries) {
         zip_source_t* source = zip_source_buffer(zip.get(), bytes.data(), bytes.size(), 0);
-        const zip_int64_t index = source ? zip_file_add(zip.get(), (name + ".npy").c_str(), source, ZIP_FL_ENC_UTF_8) : -1;
+        const zip_int64_t index =
+            source ? zip_file_add(zip.get(), (name + ".npy").c_str(), source, ZIP_FL_ENC_UTF_8) : -1;
         if (index < 0 && source)
             zip_source_free(source);
         if (index < 0 || zip_set_file_compression(zip.get(), zip_uint64_t(index), ZIP_CM_STORE, 0) != 0 ||

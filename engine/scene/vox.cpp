@@ -121,7 +121,8 @@ Status place_all(const VoxFile& file, Placement& placement, std::string_view whe
             corner.translation[a] = file.models[0].size[a] / 2;
         SR_CHECK(placement.place(0, corner));
         if (file.models.size() > 1)
-            warnings.push_back(fmt::format("{} models without a place in a scene are left out", file.models.size() - 1));
+            warnings.push_back(
+                fmt::format("{} models without a place in a scene are left out", file.models.size() - 1));
     }
     if (placement.hidden)
         warnings.push_back(fmt::format("{} hidden nodes are left out", placement.hidden));

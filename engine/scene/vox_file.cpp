@@ -311,8 +311,7 @@ Result<VoxFile> Parser::parse()
         return head.refuse("version {}, expected 150 to 200", version);
     SR_TRY(const auto name, head.take(4));
     if (std::memcmp(name.data(), "MAIN", 4) != 0)
-        return head.refuse("expected the chunk MAIN, found {}",
-                           quote({reinterpret_cast<const char*>(name.data()), 4}));
+        return head.refuse("expected the chunk MAIN, found {}", quote({reinterpret_cast<const char*>(name.data()), 4}));
     SR_TRY(const uint32_t content, head.u32());
     SR_TRY(const uint32_t children, head.u32());
     SR_CHECK(head.take(content));
@@ -368,9 +367,9 @@ Bytes transform_node(size_t id, size_t child, const std::string& translation)
     b.u32(id);
     b.u32(0); // attributes
     b.u32(child);
-    b.u32(~0u);                        // reserved
+    b.u32(~0u);                           // reserved
     b.u32(translation.empty() ? ~0u : 0); // layer; the root has none
-    b.u32(1);                          // frames
+    b.u32(1);                             // frames
     b.u32(translation.empty() ? 0 : 1);
     if (!translation.empty()) {
         b.text("_t");
@@ -427,7 +426,8 @@ Result<VoxFile> parse_vox(std::span<const std::byte> bytes, std::string_view whe
     return Parser(bytes, where).parse();
 }
 
-std::vector<std::byte> encode_vox(std::span<const VoxModel> models, std::span<const std::array<int64_t, 3>> translations,
+std::vector<std::byte> encode_vox(std::span<const VoxModel> models,
+                                  std::span<const std::array<int64_t, 3>> translations,
                                   std::span<const std::array<uint8_t, 3>> palette)
 {
     Bytes main, group, colors;

@@ -49,7 +49,8 @@ struct VoxFile {
 Result<VoxFile> parse_vox(std::span<const std::byte> bytes, std::string_view where);
 
 // version 150, one transform and shape a model
-std::vector<std::byte> encode_vox(std::span<const VoxModel> models, std::span<const std::array<int64_t, 3>> translations,
+std::vector<std::byte> encode_vox(std::span<const VoxModel> models,
+                                  std::span<const std::array<int64_t, 3>> translations,
                                   std::span<const std::array<uint8_t, 3>> palette);
 
 } // namespace semrover
