@@ -124,6 +124,16 @@ Status read_voxel_size(const NpzFile& file, VoxelGrid& grid, const std::string& 
     return {};
 }
 
+// of a grid that has no points yet
+Status read_points_per_voxel(const NpzFile& file, VoxelGrid& grid, const std::string& where)
+{
+    SR_TRY(const std::vector<int32_t> n, integers<int32_t>(file, "points_per_voxel", where));
+    if (n.size() != 1 || n[0] < 0 || n[0] > int32_t(kMaxPoints))
+        return fail(ErrorCode::bad_input, "{}: points_per_voxel: expected one number from 0 to {}", where, kMaxPoints);
+    grid.points_per_voxel = n[0];
+    return {};
+}
+
 Status read_metadata(const NpzFile& file, VoxelGrid& grid, const std::string& where)
 {
     if (!file.has("metadata"))
@@ -184,6 +194,8 @@ Result<VoxelGrid> read_grid_npz(const Path& path, float voxel_size)
     SR_CHECK(read_metadata(file, grid, where));
     if (file.has("points") && !grid.cells.empty())
         SR_CHECK(read_points(file, grid, where));
+    else if (file.has("points_per_voxel"))
+        SR_CHECK(read_points_per_voxel(file, grid, where));
     sort_cells(grid);
     SR_CHECK(check_grid(grid, where));
     return grid;
@@ -199,6 +211,9 @@ Status write_grid_npz(const Path& path, const VoxelGrid& grid)
     arrays["labels"] = array_of(DType::u8, {v}, std::span(grid.labels));
     arrays["voxel_size"] = array_of(DType::f32, {}, std::span(&grid.voxel_size, 1));
     arrays["metadata"] = array_of(DType::u8, {metadata.size()}, std::span(metadata));
+    const int32_t per_voxel = grid.points_per_voxel;
+    if (per_voxel)
+        arrays["points_per_voxel"] = array_of(DType::i32, {}, std::span(&per_voxel, 1));
     if (grid.has_points()) {
         arrays["points"] = array_of(DType::f16, {v, n, 3}, std::span(grid.points));
         arrays["colors"] = array_of(DType::u8, {v, n, 3}, std::span(grid.colors));

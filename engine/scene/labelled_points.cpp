@@ -19,6 +19,7 @@ namespace {
 
 constexpr double kMaxCoordinate = 1 << 20; // cells, as check_grid has it
 constexpr size_t kMaxPoints = 1u << 30;
+constexpr double kFaceMargin = 1e-4; // of a cell; less than half of what 16 bits resolve at its face
 
 struct Points {
     std::vector<std::array<double, 3>> positions; // metres, in the world
@@ -183,6 +184,15 @@ void append_points(VoxelGrid& grid, const Points& points, std::span<const size_t
     grid.generated.push_back(1);
 }
 
+// points may lie on their cell's faces, and by rounding 1 mm beyond: a reader would find them in the next cell
+void move_inside(std::array<float, 3>& position, const Cell& cell, double voxel_size)
+{
+    for (size_t a = 0; a < 3; ++a) {
+        const double low = (cell[a] + kFaceMargin) * voxel_size, high = (cell[a] + 1 - kFaceMargin) * voxel_size;
+        position[a] = static_cast<float>(std::clamp(double(position[a]), low, high));
+    }
+}
+
 } // namespace
 
 Result<SceneGrid> read_labelled_points(const Path& path, const SceneGridOptions& o)
@@ -226,8 +236,10 @@ Status write_labelled_points(const Path& path, const VoxelGrid& grid)
     SR_CHECK(check_grid(grid, quote_path(path)));
     const ScenePoints points = points_of(grid);
     Surfels s{points.positions, {}, points.colors, {}, {}, {}, {}};
-    for (const uint32_t label : points.labels)
-        s.label.push_back(static_cast<uint8_t>(label));
+    for (size_t i = 0; i < points.size(); ++i) {
+        move_inside(s.position[i], grid.cells[points.cells[i]], grid.voxel_size);
+        s.label.push_back(static_cast<uint8_t>(points.labels[i]));
+    }
     for (size_t v = 0; v < grid.cells.size(); ++v) {
         if (grid.has_points() && grid.generated[v])
             continue;
