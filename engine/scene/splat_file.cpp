@@ -59,8 +59,8 @@ void EllipsoidFlattener::add(const Ellipsoid& e, bool flat)
         return;
     }
     const size_t axis = flat ? 2 : smallest_axis(e.scale), first = (axis + 1) % 3, second = (axis + 2) % 3;
-    if (!(float(e.scale[first]) > 0 && float(e.scale[second]) > 0) ||
-        std::isinf(float(e.scale[first] + e.scale[second]))) {
+    const bool sized = float(e.scale[first]) > 0 && float(e.scale[second]) > 0 && e.scale[axis] >= 0;
+    if (!sized || std::isinf(float(e.scale[first] + e.scale[second]))) {
         ++without_size_;
         return;
     }
