@@ -1,349 +1,42 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// semrover convert IN OUT: a model in the diffusers layout, from a single-file LDM checkpoint or from another folder,
-// with weights of another precision or with the deferred renderer's input channels
-#include "engine/render/model_writer.h"
-#include "engine/render/renderer_model.h"
-#include "runtime/quote.h"
-#include "tools/commands.h"
-#include "tools/progress.h"
+// semrover convert IN OUT: a model in another layout, or a scene in another format, by what IN is
+#include "tools/convert_model.h"
+#include "tools/convert_scene.h"
 
-#include <algorithm>
 #include <CLI/CLI.hpp>
-#include <optional>
-#include <unistd.h>
 
 namespace semrover {
 
 namespace {
 
-namespace fs = std::filesystem;
-
 struct Options {
-    std::string in, out, dtype;
-    bool asd_init = false, dry_run = false;
+    ConvertModelOptions model;
+    ConvertSceneOptions scene;
 };
 
-// what will be written
-struct Plan {
-    std::map<std::string, ComponentFiles> components; // by folder
-    std::map<std::string, Json> texts;                // by path in the model
-    std::map<std::string, Path> copies;               // by path in the model: the file
-    std::optional<TensorStream> text;                 // the constant text, where it is not a file to copy
-    Json index = {{"_class_name", "SemRoverPipeline"}};
-    std::vector<std::string> left_out, warnings;
-};
-
-bool is_there(const Path& path)
+// a .bin may be SemanticKITTI's, or a model's pickle
+bool is_scene(const Options& o)
 {
+    const Path in = o.model.in, out = o.model.out;
     std::error_code ignored;
-    return fs::exists(path, ignored);
+    if (!o.scene.input.from.empty() || !o.scene.to.empty())
+        return true;
+    if (std::filesystem::is_directory(in, ignored) || (in.extension() == ".bin" && !has_scene_extension(out)))
+        return false;
+    return has_scene_extension(in) || has_scene_extension(out);
 }
 
-std::optional<DType> dtype_option(const Options& o)
+Status convert(Options& o, const Globals& globals)
 {
-    if (o.dtype.empty())
-        return {};
-    return o.dtype == "f32" ? DType::f32 : o.dtype == "f16" ? DType::f16 : DType::bf16;
-}
-
-std::vector<TensorStream> streams_of(const Checkpoint& checkpoint, std::span<const TensorSpec> schema,
-                                     std::optional<DType> dtype)
-{
-    std::vector<TensorStream> streams;
-    for (const TensorSpec& spec : schema)
-        streams.push_back(checkpoint.stream(spec, dtype));
-    return streams;
-}
-
-Status plan_unet(const Options& o, const RendererModel& m, Plan& plan)
-{
-    SR_TRY(const Checkpoint checkpoint, m.open_unet());
-    const std::vector<TensorSpec> schema = unet_schema(m.unet);
-    SR_CHECK(checkpoint.require(schema));
-    ComponentFiles files{unet_config_json(m.unet), streams_of(checkpoint, schema, dtype_option(o))};
-    if (!m.ldm) {
-        SR_TRY(files.config, read_json(m.unet_folder / "config.json")); // with the fields that the engine ignores
-    }
-    if (o.asd_init) {
-        if (m.unet.in_channels != m.vae.latent_channels)
-            return fail(ErrorCode::bad_input, "{}: --asd-init adds channels to a plain UNet with {}, this one takes {}",
-                        quote_path(m.unet_folder), m.vae.latent_channels, m.unet.in_channels);
-        const auto conv_in = std::ranges::find(files.tensors, "conv_in.weight", &TensorStream::name);
-        *conv_in = widen_conv_in(*conv_in, renderer_channels(m.vae));
-        files.config["in_channels"] = renderer_channels(m.vae);
-    }
-    plan.index["renderer"] = {"diffusers", "UNet2DConditionModel"};
-    plan.components["renderer"] = std::move(files);
-    return {};
-}
-
-Status plan_vae(const Options& o, const RendererModel& m, Plan& plan)
-{
-    SR_TRY(const Checkpoint checkpoint, m.open_vae());
-    const std::vector<TensorSpec> schema = vae_schema(m.vae);
-    SR_CHECK(checkpoint.require(schema));
-    ComponentFiles files{vae_config_json(m.vae), streams_of(checkpoint, schema, dtype_option(o))};
-    if (!m.ldm) {
-        SR_TRY(files.config, read_json(m.vae_folder / "config.json"));
-    }
-    plan.index["vae"] = {"diffusers", "AutoencoderKL"};
-    plan.components["vae"] = std::move(files);
-    return {};
-}
-
-Status plan_renderer(const Options& o, Plan& plan)
-{
-    SR_TRY(const RendererModel m, RendererModel::read(o.in));
-    SR_CHECK(plan_unet(o, m, plan));
-    SR_CHECK(plan_vae(o, m, plan));
-    plan.warnings = m.warnings;
-    if (m.ldm || !is_there(m.folder / "scheduler")) {
-        plan.texts["scheduler/scheduler_config.json"] = stable_diffusion_scheduler_json();
-        plan.index["scheduler"] = {"diffusers", "DDIMScheduler"};
-    }
-    return {};
-}
-
-Status plan_transformer(const Options& o, const Path& folder, Plan& plan)
-{
-    SR_TRY(SafetensorsSet set, SafetensorsSet::open_folder(folder));
-    ComponentFiles files;
-    SR_TRY(files.config, read_json(folder / "config.json"));
-    const auto shared = std::make_shared<const SafetensorsSet>(std::move(set));
-    for (const TensorInfo& tensor : shared->tensors())
-        files.tensors.push_back(stream_tensor(shared, tensor, dtype_option(o)));
-    plan.index["voxfield_transformer"] = {"semrover", "VoxfieldTransformer"};
-    plan.components["voxfield_transformer"] = std::move(files);
-    return {};
-}
-
-// small files that go over as they are, what the old index says about them, and names of the rest
-Status plan_copies(const Path& in, Plan& plan)
-{
-    const std::string small[] = {"scheduler/scheduler_config.json", "voxfield_scheduler/scheduler_config.json",
-                                 "conditioning/conditioning.safetensors"};
-    Json index = Json::object();
-    if (is_there(in / "model_index.json")) {
-        SR_TRY(index, read_json(in / "model_index.json"));
-    }
-    for (const std::string& file : small) {
-        if (!is_there(in / file))
-            continue;
-        plan.copies[file] = in / file;
-        const std::string component = Path(file).parent_path().string();
-        if (index.is_object() && index.contains(component))
-            plan.index[component] = index[component];
-    }
-    if (index.is_object() && index.contains("defaults"))
-        plan.index["defaults"] = index["defaults"];
-    static constexpr const char* kKnown[] = {"renderer",           "unet",      "vae",         "voxfield_transformer",
-                                             "voxfield_scheduler", "scheduler", "conditioning"};
-    std::error_code ignored;
-    for (const auto& entry : fs::directory_iterator(in, ignored))
-        if (entry.is_directory() && std::ranges::find(kKnown, entry.path().filename()) == std::end(kKnown))
-            plan.left_out.push_back(entry.path().filename().string());
-    std::ranges::sort(plan.left_out);
-    return {};
-}
-
-// the text, where the file holds one, and names of what is left out
-Status plan_ldm_rest(const Path& in, Plan& plan)
-{
-    SR_TRY(SafetensorsSet opened, SafetensorsSet::open(in));
-    const auto shared = std::make_shared<const SafetensorsSet>(std::move(opened));
-    const SafetensorsSet& set = *shared;
-    if (const TensorInfo* text = set.find(kLdmConditioning)) {
-        plan.text = stream_tensor(shared, *text, text->dtype);
-        plan.text->name = kConditioning;
-    }
-    for (const char* prefix : {"cond_stage_model.", "model_ema."})
-        if (std::ranges::any_of(set.tensors(), [&](const TensorInfo& t) { return t.name.starts_with(prefix); }))
-            plan.left_out.push_back(std::string(prefix) + "*");
-    return {};
-}
-
-Result<Plan> make_plan(const Options& o)
-{
-    Plan plan;
-    const Path in = o.in;
-    std::error_code ignored;
-    const bool folder = fs::is_directory(in, ignored), transformer = folder && is_there(in / "voxfield_transformer");
-    if (transformer)
-        SR_CHECK(plan_transformer(o, in / "voxfield_transformer", plan));
-    if (!transformer || is_there(in / "renderer") || is_there(in / "unet"))
-        SR_CHECK(plan_renderer(o, plan));
-    else if (o.asd_init)
-        return fail(ErrorCode::bad_input, "{}: has no renderer for --asd-init", quote_path(in));
-    SR_CHECK(folder ? plan_copies(in, plan) : plan_ldm_rest(in, plan));
-    return plan;
-}
-
-// ---- writing
-
-// a folder beside the output that the results are written to, gone unless commit() renames it
-class Staging {
-  public:
-    explicit Staging(const Path& out)
-        : out_(out), path_(out.parent_path() / fmt::format(".semrover-{}-{}.tmp", out.filename().string(), getpid()))
-    {
-    }
-    Staging(const Staging&) = delete;
-    Staging& operator=(const Staging&) = delete;
-    ~Staging()
-    {
-        std::error_code ignored;
-        fs::remove_all(path_, ignored);
-    }
-
-    const Path& path() const { return path_; }
-
-    Status commit()
-    {
-        std::error_code error;
-        if (!is_there(out_))
-            fs::rename(path_, out_, error);
-        else
-            replace(error);
-        if (error)
-            return fail(ErrorCode::bad_input, "cannot write to {}: {}", quote_path(out_), error.message());
-        return {};
-    }
-
-  private:
-    // file by file: what else lies in the folder stays, but for weights that would hide the new ones
-    void replace(std::error_code& error)
-    {
-        std::vector<Path> files;
-        for (const auto& entry : fs::recursive_directory_iterator(path_, error))
-            if (entry.is_regular_file())
-                files.push_back(entry.path().lexically_relative(path_));
-        for (const Path& file : files)
-            if (!error && file.filename().native().starts_with("diffusion_pytorch_model"))
-                remove_weights(out_ / file.parent_path(), error);
-        for (const Path& file : files) {
-            if (!error)
-                fs::create_directories((out_ / file).parent_path(), error);
-            if (!error)
-                fs::rename(path_ / file, out_ / file, error);
-        }
-    }
-
-    static void remove_weights(const Path& folder, std::error_code& error)
-    {
-        std::vector<Path> old;
-        std::error_code ignored; // the folder need not exist
-        for (const auto& entry : fs::directory_iterator(folder, ignored))
-            if (entry.path().filename().native().starts_with("diffusion_pytorch_model"))
-                old.push_back(entry.path());
-        for (const Path& path : old)
-            if (!error)
-                fs::remove(path, error);
-    }
-
-    Path out_, path_;
-};
-
-// each tensor reports that it is done, and stops where the user wants
-void watch(Plan& plan, Progress& progress, uint64_t& done)
-{
-    for (auto& [name, files] : plan.components)
-        for (TensorStream& tensor : files.tensors)
-            tensor.bytes = [make = std::move(tensor.bytes), &progress,
-                            &done](std::vector<std::byte>& scratch) -> Result<std::span<const std::byte>> {
-                if (interrupt_requested())
-                    return fail(ErrorCode::interrupted, "interrupted; nothing was written");
-                progress.update(done++);
-                return make(scratch);
-            };
-}
-
-Status write_plan(Plan& plan, const Path& out, const Globals& globals)
-{
-    uint64_t total = 0, done = 0;
-    for (const auto& [name, files] : plan.components)
-        total += files.tensors.size();
-    Progress progress(progress_to_stderr(globals), "convert", "tensors", total);
-    watch(plan, progress, done);
-    Staging staging(out);
-    for (const auto& [name, files] : plan.components)
-        SR_CHECK(write_component(staging.path() / name, files));
-    for (const auto& [name, json] : plan.texts)
-        SR_CHECK(write_json(staging.path() / name, json));
-    for (const auto& [name, from] : plan.copies) {
-        SR_TRY(const MappedFile file, MappedFile::open(from));
-        std::error_code error;
-        fs::create_directories((staging.path() / name).parent_path(), error);
-        SR_CHECK(write_file_atomically(staging.path() / name, file.bytes()));
-    }
-    if (plan.text) {
-        std::error_code error;
-        fs::create_directories(staging.path() / "conditioning", error);
-        SR_CHECK(stream_safetensors(staging.path() / "conditioning" / "conditioning.safetensors",
-                                    std::span(&*plan.text, 1)));
-    }
-    SR_CHECK(write_json(staging.path() / "model_index.json", plan.index));
-    SR_CHECK(staging.commit());
-    progress.update(total);
-    progress.finish();
-    return {};
-}
-
-Status check_output(const Options& o, const Path& out, const Globals& globals)
-{
-    std::error_code ignored;
-    if (fs::equivalent(o.in, out, ignored))
-        return fail(ErrorCode::usage, "IN and OUT are the same, {}", quote_path(out));
-    if (!is_there(out) || (fs::is_directory(out, ignored) && fs::is_empty(out, ignored)))
-        return {};
-    if (!fs::is_directory(out, ignored))
-        return fail(ErrorCode::bad_input, "{} is a file; a model is written as a folder", quote_path(out));
-    if (!globals.yes)
-        return fail(ErrorCode::usage, "{} exists; -y replaces it", quote_path(out));
-    return {};
-}
-
-void report(const Plan& plan, const Options& o, const Globals& globals)
-{
-    Json components = Json::object();
-    for (const auto& [name, files] : plan.components) {
-        uint64_t parameters = 0, bytes = 0;
-        for (const TensorStream& tensor : files.tensors) {
-            uint64_t elements = 1;
-            for (const uint64_t dim : tensor.shape)
-                elements *= dim;
-            parameters += elements;
-            bytes += elements * dtype_bytes(tensor.dtype);
-        }
-        components[name] = {{"tensors", files.tensors.size()}, {"parameters", parameters}, {"bytes", bytes}};
-        if (!globals.json)
-            fmt::print("{:22}{} tensors, {} parameters, {}\n", name, files.tensors.size(), parameters,
-                       bytes_text(bytes));
-    }
-    if (globals.json) {
-        const Json all{{"output", o.out}, {"components", components}, {"left_out", plan.left_out}};
-        fmt::print("{}\n", all.dump(-1, ' ', false, Json::error_handler_t::replace));
-    } else if (!plan.left_out.empty()) {
-        fmt::print("left out: {} (the text is a constant: conditioning/)\n",
-                   printable(fmt::format("{}", fmt::join(plan.left_out, ", ")), 1000));
-    }
-}
-
-Status convert(const Options& o, const Globals& globals)
-{
-    Path out = fs::absolute(o.out).lexically_normal();
-    if (!out.has_filename())
-        out = out.parent_path(); // "model/"
-    if (!o.dry_run)
-        SR_CHECK(check_output(o, out, globals));
-    SR_TRY(Plan plan, make_plan(o));
-    for (const std::string& warning : plan.warnings)
-        if (!globals.quiet)
-            fmt::print(stderr, "semrover: warning: {}\n", warning);
-    if (!o.dry_run)
-        SR_CHECK(write_plan(plan, out, globals));
-    report(plan, o, globals);
-    return {};
+    if (!is_scene(o))
+        return convert_model(o.model, globals);
+    if (!o.model.dtype.empty() || o.model.asd_init)
+        return fail(ErrorCode::usage, "--dtype and --asd-init are for models");
+    o.scene.in = o.model.in;
+    o.scene.out = o.model.out;
+    o.scene.dry_run = o.model.dry_run;
+    return convert_scene(o.scene, globals);
 }
 
 } // namespace
@@ -351,15 +44,24 @@ Status convert(const Options& o, const Globals& globals)
 void add_convert(CLI::App& app, const Globals& globals, Run& run)
 {
     auto o = std::make_shared<Options>();
-    CLI::App* c = app.add_subcommand("convert", "write a model in the diffusers layout");
-    c->add_option("IN", o->in, "a single-file Stable Diffusion checkpoint (.safetensors), or a model folder")
+    CLI::App* c = app.add_subcommand("convert", "write a model in the diffusers layout, or a scene in another format");
+    c->add_option(
+         "IN", o->model.in,
+         "a single-file Stable Diffusion checkpoint (.safetensors) or a model folder; or a grid (.sgrid, .npz, "
+         ".label, .vox, .ply) or splats (.ply, .glb, .splat)")
         ->required();
-    c->add_option("OUT", o->out, "folder to write")->required();
-    c->add_option("--dtype", o->dtype, "precision of the weights; by default as in IN")
+    c->add_option("OUT", o->model.out, "folder to write; or the scene's file, its format by the extension")->required();
+    c->add_option("--dtype", o->model.dtype, "precision of the weights; by default as in IN")
         ->check(CLI::IsMember({"f32", "f16", "bf16"}));
-    c->add_flag("--asd-init", o->asd_init,
+    c->add_flag("--asd-init", o->model.asd_init,
                 "make a plain UNet the start of a deferred renderer: 9 more input channels, with zero weights");
-    c->add_flag("--dry-run", o->dry_run, "check IN and say what would be written");
+    c->add_flag("--dry-run", o->model.dry_run, "check IN and say what would be written");
+    c->add_option("--to", o->scene.to, "format of a scene's OUT: 3dgs, 2dgs, inria62 or points-ply for a .ply, ...");
+    add_all_scene_input_options(*c, o->scene.input);
+    c->add_option("--splat-radius", o->scene.splat_radius,
+                  "grid to splats: standard deviation in metres, or auto: from the spacing of the points");
+    c->add_option("--opacity", o->scene.opacity, "grid to splats: of every splat")->check(CLI::Range(0.01f, 1.f));
+    c->add_flag("--splat-labels", o->scene.splat_labels, "a property label in .ply splats");
     c->callback([o, &globals, &run] { run = [o, &globals] { return convert(*o, globals); }; });
 }
 

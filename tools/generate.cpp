@@ -9,6 +9,7 @@
 #include "tools/export_ply.h"
 #include "tools/open_device.h"
 #include "tools/progress.h"
+#include "tools/scene_input.h"
 #include "tools/version.h"
 
 #include <chrono>
@@ -27,6 +28,7 @@ struct Options {
     uint32_t batch = 0;
     int64_t first_cell = 0;
     PlyExports ply;
+    SceneInputOptions input;
     bool dry_run = false;
 };
 
@@ -72,9 +74,24 @@ Result<Settings> resolve(const Options& o)
 }
 
 // everything that decides the bytes of the result
-Result<Json> settings_json(const Options& o, const Settings& s, const Device& device)
+// of the file, or of what another program's file became: that depends on options and on other files
+Result<uint64_t> hash_grid(const Options& o, const VoxelGrid& grid)
 {
-    SR_TRY(const uint64_t grid_hash, hash_file(o.grid));
+    if (o.input.from.empty() && Path(o.grid).extension() == ".sgrid")
+        return hash_file(o.grid);
+    Hash hash;
+    hash.add(fmt::format("{}", grid.voxel_size));
+    hash.add(std::as_bytes(std::span(grid.cells)));
+    hash.add(std::as_bytes(std::span(grid.labels)));
+    hash.add(std::as_bytes(std::span(grid.points)));
+    hash.add(std::as_bytes(std::span(grid.colors)));
+    hash.add(std::as_bytes(std::span(grid.generated)));
+    return hash.value();
+}
+
+Result<Json> settings_json(const Options& o, const VoxelGrid& grid, const Settings& s, const Device& device)
+{
+    SR_TRY(const uint64_t grid_hash, hash_grid(o, grid));
     SR_TRY(const uint64_t model_hash, hash_folder(s.model.transformer));
     return Json{{"command", "generate"},
                 {"version", kVersion},
@@ -179,7 +196,7 @@ Status dry_run(Job& j)
 Status prepare(Job& j)
 {
     SR_TRY(j.settings, resolve(j.options));
-    SR_TRY(j.grid, read_grid(j.options.grid));
+    SR_TRY(j.grid, load_grid(j.options.grid, j.options.input, j.globals));
     SR_TRY(j.device, open_device(j.globals));
     if (!j.options.profile.empty())
         j.device->set_profile(std::make_shared<Profile>());
@@ -243,7 +260,7 @@ Status generate(const Options& o, const Globals& globals)
     SR_CHECK(prepare(j));
     if (o.dry_run)
         return dry_run(j);
-    SR_TRY(const Json settings, settings_json(o, j.settings, *j.device));
+    SR_TRY(const Json settings, settings_json(o, j.grid, j.settings, *j.device));
     // -y starts over only what is finished: an interrupted run with these settings goes on
     SR_TRY(RunFolder run, open_run(o.output + ".run", settings, globals.yes));
     size_t restored = 0;
@@ -278,7 +295,9 @@ void add_generate(CLI::App& app, const Globals& globals, Run& run)
 {
     auto o = std::make_shared<Options>();
     CLI::App* c = app.add_subcommand("generate", "semantic grid to coloured points, region by region");
-    c->add_option("GRID", o->grid, ".sgrid; cells that have points already are kept as they are")->required();
+    c->add_option("GRID", o->grid, ".sgrid, .npz, .label, .vox or .ply; cells that have points are kept as they are")
+        ->required();
+    add_scene_input_options(*c, o->input);
     c->add_option("-m,--model", o->model, "model folder")->required();
     c->add_option("-o,--output", o->output, ".sgrid to write; OUTPUT.run beside it keeps the run's state");
     c->add_option("-s,--seed", o->seed, "noise seed");

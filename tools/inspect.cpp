@@ -1,17 +1,18 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// semrover inspect FILE|DIR: what is in a model or a grid. The report is one JSON object; without --json it is printed
+// semrover inspect FILE|DIR: what is in a model or a scene. The report is one JSON object; without --json it is printed
 // as indented text.
 #include "engine/render/ldm_config.h"
 #include "engine/render/ldm_names.h"
 #include "engine/render/renderer_model.h"
-#include "engine/scene/grid.h"
+#include "engine/scene/bounds.h"
 #include "engine/scene/palette.h"
 #include "runtime/json.h"
 #include "runtime/quote.h"
 #include "runtime/safetensors.h"
 #include "tools/commands.h"
 #include "tools/progress.h"
+#include "tools/scene_input.h"
 
 #include <algorithm>
 #include <CLI/CLI.hpp>
@@ -278,22 +279,39 @@ Result<Report> describe_folder(const Path& folder, bool with_tensors)
 
 // ---- a grid
 
-Result<Report> describe_grid(const Path& path)
+Report metres(const std::array<double, 3>& position)
 {
-    SR_TRY(const VoxelGrid grid, read_grid(path));
-    Cell low = grid.cells[0], high = grid.cells[0];
-    for (const Cell& cell : grid.cells)
-        for (size_t axis = 0; axis < 3; ++axis) {
-            low[axis] = std::min(low[axis], cell[axis]);
-            high[axis] = std::max(high[axis], cell[axis]);
-        }
+    Report list = Report::array();
+    for (const double c : position)
+        list.push_back(std::round(c * 1e4) / 1e4);
+    return list;
+}
+
+void add_input(Report& report, const SceneInput& input)
+{
+    if (input.format == SceneFormat::sgrid)
+        return;
+    report["format"] = facts_of(input.format).name;
+    for (const std::string& warning : input.warnings)
+        report["warnings"].push_back({{"warning", warning}});
+}
+
+Report describe_splats(const Path& path, const SceneInput& input)
+{
+    const Surfels& s = *input.splats;
+    const Bounds bounds = bounds_of(s);
+    Report report = {{"splats", path.string()}, {"count", s.position.size()}};
+    report["labelled"] = s.label.size() - static_cast<size_t>(std::ranges::count(s.label, kUnlabelled));
+    report["extent"] = {{"min_m", metres(bounds.low)}, {"max_m", metres(bounds.high)}};
+    add_input(report, input);
+    return report;
+}
+
+Report describe_grid(const Path& path, const SceneInput& input)
+{
+    const VoxelGrid& grid = *input.grid;
+    const Bounds bounds = bounds_of(grid);
     const double edge = grid.voxel_size;
-    const auto metres = [&](const Cell& cell, int add) {
-        Report list = Report::array();
-        for (const int32_t c : cell)
-            list.push_back(std::round((c + add) * edge * 1e4) / 1e4);
-        return list;
-    };
     std::array<uint64_t, kClassCount> counts{};
     for (const uint8_t label : grid.labels)
         ++counts[label];
@@ -306,27 +324,34 @@ Result<Report> describe_grid(const Path& path)
     report["points_per_voxel"] = grid.points_per_voxel;
     report["points"] = grid.points.size() / 3;
     report["generated"] = grid.generated.size() - static_cast<size_t>(std::ranges::count(grid.generated, 0));
-    report["extent"] = {{"min_m", metres(low, 0)}, {"max_m", metres(high, 1)}};
+    report["extent"] = {{"min_m", metres(bounds.low)}, {"max_m", metres(bounds.high)}};
     report["labels"] = labels;
     report["metadata"] = grid.metadata;
+    add_input(report, input);
     return report;
 }
 
-Result<Report> describe(const Path& path, const Globals& globals)
+Result<Report> describe_scene(const Path& path, const SceneInputOptions& options)
+{
+    SR_TRY(const SceneInput input, read_scene_input(path, options));
+    return input.grid ? describe_grid(path, input) : describe_splats(path, input);
+}
+
+Result<Report> describe(const Path& path, const SceneInputOptions& input, const Globals& globals)
 {
     std::error_code ignored;
     if (std::filesystem::is_directory(path, ignored))
         return describe_folder(path, globals.verbose || globals.json);
-    if (path.extension() == ".sgrid")
-        return describe_grid(path);
+    if (!input.from.empty() || has_scene_extension(path))
+        return describe_scene(path, input);
     SR_TRY(const SafetensorsSet set, SafetensorsSet::open(path));
     Totals totals;
     return describe_weights(set, true, totals);
 }
 
-Status inspect(const Path& path, const Globals& globals)
+Status inspect(const Path& path, const SceneInputOptions& input, const Globals& globals)
 {
-    SR_TRY(const Report report, describe(path, globals));
+    SR_TRY(const Report report, describe(path, input, globals));
     std::string text;
     if (globals.json)
         text = report.dump(-1, ' ', false, Report::error_handler_t::replace) + "\n";
@@ -340,10 +365,14 @@ Status inspect(const Path& path, const Globals& globals)
 
 void add_inspect(CLI::App& app, const Globals& globals, Run& run)
 {
-    CLI::App* command = app.add_subcommand("inspect", "show the tensors and config of a model, or the cells of a grid");
+    CLI::App* command = app.add_subcommand(
+        "inspect", "show the tensors and config of a model, or what is in a grid or a file of splats");
     const auto path = std::make_shared<std::string>();
-    command->add_option("FILE|DIR", *path, "a .safetensors file or index, a model's folder, or a .sgrid")->required();
-    command->callback([path, &globals, &run] { run = [path, &globals] { return inspect(*path, globals); }; });
+    const auto input = std::make_shared<SceneInputOptions>();
+    command->add_option("FILE|DIR", *path, "a .safetensors file or index, a model's folder, or a scene in any format")
+        ->required();
+    add_scene_input_options(*command, *input);
+    command->callback([=, &globals, &run] { run = [=, &globals] { return inspect(*path, *input, globals); }; });
 }
 
 } // namespace semrover

@@ -12,20 +12,6 @@ namespace semrover {
 
 namespace {
 
-Result<SurfelOptions> surfel_options(const DriveOptions& o)
-{
-    SurfelOptions s;
-    s.opacity = o.opacity;
-    s.auto_sigma = o.splat_radius == "auto";
-    if (s.auto_sigma)
-        return s;
-    char* end = nullptr;
-    s.sigma = std::strtof(o.splat_radius.c_str(), &end);
-    if (*end || !(s.sigma > 0 && s.sigma < 100))
-        return fail(ErrorCode::usage, "--splat-radius takes metres (0..100) or auto, not '{}'", o.splat_radius);
-    return s;
-}
-
 // end of the run of frames from `first` with the same time and size
 size_t end_of_moment(const CameraPath& path, size_t first)
 {
@@ -41,6 +27,20 @@ size_t end_of_moment(const CameraPath& path, size_t first)
 }
 
 } // namespace
+
+Result<SurfelOptions> surfel_options(const std::string& splat_radius, float opacity)
+{
+    SurfelOptions s;
+    s.opacity = opacity;
+    s.auto_sigma = splat_radius == "auto";
+    if (s.auto_sigma)
+        return s;
+    char* end = nullptr;
+    s.sigma = std::strtof(splat_radius.c_str(), &end);
+    if (*end || !(s.sigma > 0 && s.sigma < 100))
+        return fail(ErrorCode::usage, "--splat-radius takes metres (0..100) or auto, not '{}'", splat_radius);
+    return s;
+}
 
 void add_drive_options(CLI::App& c, DriveOptions& o)
 {
@@ -60,7 +60,7 @@ void add_drive_options(CLI::App& c, DriveOptions& o)
 
 Status check_drive(const DriveOptions& o)
 {
-    SR_CHECK(surfel_options(o).map([](const auto&) {}));
+    SR_CHECK(surfel_options(o.splat_radius, o.opacity).map([](const auto&) {}));
     return background_of(o).map([](const auto&) {});
 }
 
@@ -77,7 +77,7 @@ Result<std::array<uint8_t, 3>> background_of(const DriveOptions& o)
 // points as generated; a grid without points, or --semantic, in label colours
 Result<SurfelScene> load_scene(const DriveOptions& o, const Path& grid_path, const VoxelGrid& grid, Device& device)
 {
-    SR_TRY(const SurfelOptions surfels, surfel_options(o));
+    SR_TRY(const SurfelOptions surfels, surfel_options(o.splat_radius, o.opacity));
     ScenePoints points = points_of(grid);
     if (points.size() == 0 && !o.semantic)
         return fail(ErrorCode::bad_input, "{} has no points yet: generate them, or draw its labels with --semantic",

@@ -28,6 +28,8 @@ struct DriveOptions {
 };
 void add_drive_options(CLI::App& command, DriveOptions& options);
 
+// of `--splat-radius` and `--opacity`; usage
+Result<SurfelOptions> surfel_options(const std::string& splat_radius, float opacity);
 Status check_drive(const DriveOptions& options);                           // usage
 Result<std::array<uint8_t, 3>> background_of(const DriveOptions& options); // usage
 Result<CameraPath> load_cameras(const DriveOptions& options);              // the path, through the rig if any

@@ -7,6 +7,7 @@
 #include "tools/open_device.h"
 #include "tools/path_renderer.h"
 #include "tools/progress.h"
+#include "tools/scene_input.h"
 #include "tools/refine_video.h"
 #include "tools/version.h"
 
@@ -203,7 +204,7 @@ Status render_buffers(Job& j, RunFolder& run)
     for (const Json& entry : run.entries())
         if (entry.is_object() && entry.value("rendered", Json()) == j.path.frames.size())
             return {};
-    SR_TRY(const VoxelGrid grid, read_grid(o.input));
+    SR_TRY(const VoxelGrid grid, load_grid(o.input, {}, j.globals));
     SR_TRY(const auto background, background_of(o.drive));
     SR_TRY(const SurfelScene scene, load_scene(o.drive, o.input, grid, *j.device));
     RasterizerOptions options;
@@ -405,7 +406,7 @@ Status refine(const Options& o, const Globals& globals)
 
 void add_options(CLI::App* c, Options& o)
 {
-    c->add_option("DIR|GRID", o.input, "folder that `semrover render` wrote, or an .sgrid with --path")->required();
+    c->add_option("DIR|GRID", o.input, "folder that `semrover render` wrote, or a grid with --path")->required();
     c->add_option("-m,--model", o.model, "model with a renderer: folder, or LDM file")->required();
     c->add_option("-o,--output", o.output, "folder for frames/, latents/ and the run's state");
     c->add_option("-s,--seed", o.seed, "noise seed");

@@ -3,12 +3,14 @@
 // semrover render GRID --path FILE -o DIR: splat buffers of a camera path: colour, depth, normal, label, visibility
 #include "engine/scene/bounds.h"
 #include "engine/scene/image.h"
+#include "engine/scene/palette.h"
 #include "runtime/profile.h"
 #include "runtime/quote.h"
 #include "tools/commands.h"
 #include "tools/open_device.h"
 #include "tools/path_renderer.h"
 #include "tools/progress.h"
+#include "tools/scene_input.h"
 #include "tools/video.h"
 
 #include <CLI/CLI.hpp>
@@ -21,14 +23,14 @@ namespace {
 struct Options {
     std::string grid, output, video, profile;
     DriveOptions drive;
+    SceneInputOptions input;
     int frames_per_second = 10;
     bool top = false;
 };
 
 // straight down from above the middle, x to the right in the picture, with a narrow view so that heights hardly shift
-CameraFrame overview_camera(const VoxelGrid& grid, uint32_t width, uint32_t height)
+CameraFrame overview_camera(const Bounds& b, uint32_t width, uint32_t height)
 {
-    const Bounds b = bounds_of(grid);
     const double x = (b.low[0] + b.high[0]) / 2, y = (b.low[1] + b.high[1]) / 2;
     CameraFrame frame;
     frame.intrinsics = pinhole_from_fov(20, width, height);
@@ -81,9 +83,9 @@ Status render_drive(const Options& o, const Globals& globals, Device& device, Pa
     return out.video ? out.video->finish() : Status{};
 }
 
-Status render_overview(const Options& o, const VoxelGrid& grid, PathRenderer& renderer, const Output& out)
+Status render_overview(const Options& o, const Bounds& bounds, PathRenderer& renderer, const Output& out)
 {
-    const CameraFrame camera = overview_camera(grid, o.drive.width, o.drive.height);
+    const CameraFrame camera = overview_camera(bounds, o.drive.width, o.drive.height);
     SR_TRY(const auto images, renderer.render({&camera, 1}));
     std::error_code error;
     std::filesystem::create_directories(out.folder, error);
@@ -106,13 +108,25 @@ Status check_outputs(const Options& o, const Globals& globals)
     return {};
 }
 
+// splats are drawn as they are
+Result<SurfelScene> load_scene(const DriveOptions& o, const Path& path, SceneInput& input, Device& device)
+{
+    if (input.grid)
+        return load_scene(o, path, *input.grid, device);
+    Surfels& splats = *input.splats;
+    for (size_t i = 0; o.semantic && i < splats.label.size(); ++i)
+        splats.color[i] = label_color(splats.label[i]);
+    return SurfelScene::create(device, splats);
+}
+
 Status render(const Options& o, const Globals& globals)
 {
     SR_CHECK(check_outputs(o, globals));
     SR_CHECK(check_drive(o.drive));
     Output out{o.output, {}, {}, {}, {}};
     SR_TRY(out.background, background_of(o.drive));
-    SR_TRY(const VoxelGrid grid, read_grid(o.grid));
+    SR_TRY(SceneInput input, read_scene_input(o.grid, o.input));
+    print_warnings(input.warnings, globals);
     CameraPath path;
     if (!o.drive.path.empty()) {
         SR_TRY(path, load_cameras(o.drive));
@@ -120,7 +134,7 @@ Status render(const Options& o, const Globals& globals)
     SR_TRY(const auto device, open_device(globals));
     if (!o.profile.empty())
         device->set_profile(std::make_shared<Profile>());
-    SR_TRY(const SurfelScene scene, load_scene(o.drive, o.grid, grid, *device));
+    SR_TRY(const SurfelScene scene, load_scene(o.drive, o.grid, input, *device));
     if (scene.skipped() && !globals.quiet)
         fmt::print(stderr, "semrover: warning: {} of {} splats are degenerate and not drawn\n", scene.skipped(),
                    scene.size());
@@ -130,7 +144,7 @@ Status render(const Options& o, const Globals& globals)
     if (!path.frames.empty())
         SR_CHECK(render_drive(o, globals, *device, renderer, path, out));
     if (o.top)
-        SR_CHECK(render_overview(o, grid, renderer, out));
+        SR_CHECK(render_overview(o, input.grid ? bounds_of(*input.grid) : bounds_of(*input.splats), renderer, out));
     if (device->profile())
         SR_CHECK(device->profile()->write(o.profile));
     if (device->profile() && globals.verbose)
@@ -151,9 +165,11 @@ void add_render(CLI::App& app, const Globals& globals, Run& run)
     auto o = std::make_shared<Options>();
     CLI::App* c =
         app.add_subcommand("render", "splat buffers of a camera path: colour, depth, normal, label, visibility");
-    c->add_option("GRID", o->grid, ".sgrid")->required();
+    c->add_option("GRID", o->grid, "a grid (.sgrid, .npz, .label, .vox, .ply) or splats (.ply, .glb, .splat)")
+        ->required();
     c->add_option("-o,--output", o->output, "folder for {color,depth,normal,label,visible}/000000.png")->required();
     add_drive_options(*c, o->drive);
+    add_scene_input_options(*c, o->input);
     c->add_flag("--semantic", o->drive.semantic, "label colours; a grid without points is drawn as blocks");
     c->add_flag("--top", o->top, "also an overview from above, top.png");
     c->add_option("--video", o->video, "also an MP4 of the colour frames (of the first camera), through ffmpeg");

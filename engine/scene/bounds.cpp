@@ -17,4 +17,18 @@ Bounds bounds_of(const VoxelGrid& grid)
     return b;
 }
 
+Bounds bounds_of(const Surfels& splats)
+{
+    SR_ASSERT(!splats.position.empty(), "no splats");
+    Bounds b;
+    for (size_t a = 0; a < 3; ++a) {
+        b.low[a] = b.high[a] = splats.position[0][a];
+        for (const auto& p : splats.position) {
+            b.low[a] = std::min(b.low[a], double(p[a]));
+            b.high[a] = std::max(b.high[a], double(p[a]));
+        }
+    }
+    return b;
+}
+
 } // namespace semrover

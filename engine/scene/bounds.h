@@ -3,6 +3,7 @@
 #pragma once
 
 #include "engine/scene/grid.h"
+#include "engine/scene/ply.h"
 
 namespace semrover {
 
@@ -12,5 +13,8 @@ struct Bounds {
 
 // the box around all cells of a grid
 Bounds bounds_of(const VoxelGrid& grid);
+
+// the box around the centres of splats, at least one
+Bounds bounds_of(const Surfels& splats);
 
 } // namespace semrover

@@ -18,9 +18,8 @@ namespace {
 
 using Float3 = std::array<float, 3>;
 
-constexpr float kHarmonic0 = 0.28209479177387814f; // sqrt(1 / (4 pi))
-constexpr float kThinScale = 1e-4f;                // metres
-constexpr float kMinOpacity = 1e-6f;               // keeps the logit finite: -13.8 to 13.8
+constexpr float kMinOpacity = 1e-6f; // keeps the logit finite: -13.8 to 13.8
+constexpr size_t kRestCoefficients = 45;
 
 Float3 cross(const Float3& a, const Float3& b)
 {
@@ -72,6 +71,8 @@ Status check_points(const Path& path, const Surfels& s)
     return {};
 }
 
+} // namespace
+
 Status check_splats(const Path& path, const Surfels& s)
 {
     SR_CHECK(check_points(path, s));
@@ -93,8 +94,6 @@ Status check_splats(const Path& path, const Surfels& s)
     }
     return {};
 }
-
-} // namespace
 
 Tangents tangents_of(const Float3& normal)
 {
@@ -132,28 +131,37 @@ Status write_points_ply(const Path& path, const Surfels& s)
     return write_file_atomically(path, bytes);
 }
 
-Status write_splats_ply(const Path& path, const Surfels& s, SplatPly variant)
+Status write_splats_ply(const Path& path, const Surfels& s, SplatPly variant, bool labels)
 {
     SR_CHECK(check_splats(path, s));
     const bool flat = variant == SplatPly::gaussian_2d;
+    const size_t rest = variant == SplatPly::inria_62 ? kRestCoefficients : 0;
     std::string properties;
-    for (const char* name : {"x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0",
-                             "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"})
+    for (const char* name : {"x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2"})
+        properties += fmt::format("property float {}\n", name);
+    for (size_t i = 0; i < rest; ++i)
+        properties += fmt::format("property float f_rest_{}\n", i);
+    for (const char* name : {"opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"})
         if (!flat || std::string_view(name) != "scale_2")
             properties += fmt::format("property float {}\n", name);
+    if (labels)
+        properties += "property uchar label\n";
     const size_t n = s.position.size();
     std::vector<std::byte> bytes = header(flat ? "comment SplatRenderMode: 2dgs\n" : "", n, properties);
-    bytes.reserve(bytes.size() + n * 17 * sizeof(float));
+    bytes.reserve(bytes.size() + n * ((17 + rest) * sizeof(float) + labels));
     for (size_t i = 0; i < n; ++i) {
         append(bytes, s.position[i].data(), 12);
         append(bytes, s.normal[i].data(), 12);
         for (const float c : s.color[i])
             append(bytes, {(c - 0.5f) / kHarmonic0});
+        bytes.insert(bytes.end(), rest * sizeof(float), std::byte(0));
         const float opacity = std::clamp(s.opacity[i], kMinOpacity, 1 - kMinOpacity);
         append(bytes, {std::log(opacity / (1 - opacity)), std::log(s.sigma_u[i]), std::log(s.sigma_v[i])});
         if (!flat)
             append(bytes, {std::log(kThinScale)});
         append(bytes, surfel_rotation(s.normal[i]).data(), 16);
+        if (labels)
+            bytes.push_back(static_cast<std::byte>(s.label[i]));
     }
     return write_file_atomically(path, bytes);
 }

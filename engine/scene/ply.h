@@ -38,11 +38,20 @@ std::array<float, 4> surfel_rotation(const std::array<float, 3>& normal);
 // x y z (float), red green blue label (uchar): CloudCompare, MeshLab, Open3D
 Status write_points_ply(const Path& path, const Surfels& surfels);
 
+// bad_input as above: what every writer of splats refuses
+Status check_splats(const Path& path, const Surfels& surfels);
+
 // what splat viewers read: x y z nx ny nz f_dc_0..2 opacity scale_* rot_0..3, all float, colour as the degree 0
 // harmonic (rgb - 0.5) / 0.28209479, opacity as a logit, scales as logarithms, the quaternion w first. 3DGS readers
 // know three scales, so a thin third one, ln(1e-4), follows scale_1; 2DGS files stop at scale_1 and say
-// `SplatRenderMode: 2dgs`. Source: graphdeco-inria/gaussian-splatting and hbb1/2d-gaussian-splatting, save_ply
-enum class SplatPly { gaussian_3d, gaussian_2d };
-Status write_splats_ply(const Path& path, const Surfels& surfels, SplatPly variant);
+// `SplatRenderMode: 2dgs`; inria_62 is 3DGS with f_rest_0..44, all 0, after f_dc_2, for readers that expect the 62
+// floats of the first program's files. Source: graphdeco-inria/gaussian-splatting and hbb1/2d-gaussian-splatting,
+// save_ply
+enum class SplatPly { gaussian_3d, gaussian_2d, inria_62 };
+constexpr float kHarmonic0 = 0.28209479177387814f; // sqrt(1 / (4 pi))
+constexpr float kThinScale = 1e-4f;                // metres: what a surfel's third scale is in formats that want one
+constexpr uint8_t kUnlabelled = 255;               // of a surfel whose class nobody has said
+// `labels`: a last property, uchar label, which rigid readers do not expect
+Status write_splats_ply(const Path& path, const Surfels& surfels, SplatPly variant, bool labels = false);
 
 } // namespace semrover

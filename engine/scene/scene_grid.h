@@ -1,0 +1,32 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/scene/grid.h"
+
+#include <array>
+#include <optional>
+
+namespace semrover {
+
+// how files of other programs become a grid; a format takes what concerns it
+struct SceneGridOptions {
+    Path map;                             // JSON that says what source labels are (label_map.h)
+    float voxel_size = 0.6f;              // metres, of the grid
+    std::array<double, 3> origin{};       // metres: where the file's origin lies in the world
+    double min_fill = 0;                  // dense labels: share of a cell's volume that makes it a cell; 0: any
+    std::string mask;                     // .npz: an array of 0 and 1 that says which voxels count
+    int points_per_voxel = 20;            // of points with colours
+    uint64_t seed = 0;                    // which points stay where a cell has more
+    bool semantic = false;                // labels only, whatever the points' colours
+    bool nearest_color = false;           // .vox: a colour of no class counts as the nearest class's
+    std::optional<uint8_t> default_label; // of points without one
+};
+
+struct SceneGrid {
+    VoxelGrid grid;
+    std::vector<std::string> warnings; // a line each
+    uint64_t dropped = 0;              // voxels or points of the file that are not in the grid
+};
+
+} // namespace semrover

@@ -1,0 +1,392 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// SemanticKITTI's files by hand from its README, Occ3D's by numpy 1.24.2 (tests/data/numpy)
+#include "engine/scene/dense_labels.h"
+#include "engine/scene/occ3d.h"
+#include "engine/scene/semantic_kitti.h"
+
+#include "tests/says.h"
+#include "tests/scratch_folder.h"
+#include "tests/zip_bytes.h"
+
+#include <cmath>
+#include <random>
+
+namespace semrover {
+namespace {
+
+const std::string kNumpy = SEMROVER_SOURCE_DIR "/tests/data/numpy/";
+constexpr size_t kVoxels = 256 * 256 * 32;
+
+size_t voxel(size_t x, size_t y, size_t z)
+{
+    return (x * 256 + y) * 32 + z;
+}
+
+std::optional<uint8_t> label_at(const VoxelGrid& grid, const Cell& cell)
+{
+    const auto found = find_cell(grid, cell);
+    return found ? std::optional(grid.labels[*found]) : std::nullopt;
+}
+
+// ---- voxels to cells
+
+DenseLabels random_labels(std::array<uint32_t, 3> shape, std::array<int64_t, 3> edge, std::array<int64_t, 3> origin)
+{
+    std::mt19937 random(11);
+    DenseLabels dense{shape, edge, origin, {}};
+    for (size_t i = 0; i < size_t(shape[0]) * shape[1] * shape[2]; ++i) {
+        const uint32_t r = random() % 12;
+        dense.labels.push_back(r < 4 ? uint8_t(r * 3) : r < 6 ? kLeftOut : kEmpty);
+    }
+    return dense;
+}
+
+// the rule, voxel by voxel: every voxel gives its overlap with every cell, in cubic metres
+std::map<Cell, std::map<uint8_t, double>> votes_of(const DenseLabels& dense, double size)
+{
+    std::map<Cell, std::map<uint8_t, double>> votes;
+    size_t at = 0;
+    for (uint32_t x = 0; x < dense.shape[0]; ++x)
+        for (uint32_t y = 0; y < dense.shape[1]; ++y)
+            for (uint32_t z = 0; z < dense.shape[2]; ++z, ++at) {
+                if (dense.labels[at] >= kClassCount)
+                    continue;
+                const uint32_t index[3] = {x, y, z};
+                std::array<std::map<int32_t, double>, 3> lengths;
+                for (size_t a = 0; a < 3; ++a) {
+                    const double low = double(dense.origin[a] + index[a] * dense.edge[a]) * 1e-4;
+                    const double high = low + double(dense.edge[a]) * 1e-4;
+                    for (int32_t c = int32_t(std::floor(low / size)) - 1; c * size < high; ++c) {
+                        const double l = std::min(high, (c + 1) * size) - std::max(low, c * size);
+                        if (l > 1e-9)
+                            lengths[a][c] = l;
+                    }
+                }
+                for (const auto& [i, li] : lengths[0])
+                    for (const auto& [j, lj] : lengths[1])
+                        for (const auto& [k, lk] : lengths[2])
+                            votes[{i, j, k}][dense.labels[at]] += li * lj * lk;
+            }
+    return votes;
+}
+
+TEST(DenseLabels, a_cell_takes_the_label_of_the_largest_volume)
+{
+    const struct {
+        std::array<int64_t, 3> edge, origin;
+        float size;
+    } cases[] = {
+        {{2000, 2000, 2000}, {0, -256000, -20000}, 0.6f},       // SemanticKITTI: 3 x 3 x 3
+        {{4000, 4000, 4000}, {-400000, -400000, -10000}, 0.6f}, // Occ3D
+        {{1000, 1000, 2000}, {-800000, -800000, -50000}, 0.6f}, // Occ3D-Waymo: 6 x 6 x 3
+        {{6000, 6000, 6000}, {0, 0, 0}, 0.6f},
+        {{10000, 7000, 3333}, {12345, -6789, 1}, 0.25f}, // cells smaller than voxels
+    };
+    for (const auto& c : cases)
+        for (const double fill : {0.0, 0.25}) {
+            const DenseLabels dense = random_labels({13, 10, 7}, c.edge, c.origin);
+            const auto grid = resample(dense, c.size, fill, "here");
+            ASSERT_TRUE(grid) << grid.error().message;
+            EXPECT_TRUE(check_grid(*grid, "here"));
+            size_t cells = 0;
+            for (const auto& [cell, labels] : votes_of(dense, double(std::lround(c.size * 1e4)) * 1e-4)) {
+                double volume = 0, best = 0;
+                for (const auto& [label, v] : labels) {
+                    volume += v;
+                    best = std::max(best, v);
+                }
+                const double share = volume / std::pow(c.size, 3);
+                if (share < fill - 1e-6) {
+                    EXPECT_FALSE(find_cell(*grid, cell));
+                    continue;
+                }
+                ++cells;
+                uint8_t expected = kEmpty; // the lowest of those that are as large
+                for (const auto& [label, v] : labels)
+                    if (v > best - 1e-9 && expected == kEmpty)
+                        expected = label;
+                EXPECT_EQ(label_at(*grid, cell), expected);
+            }
+            EXPECT_EQ(grid->cells.size(), cells);
+        }
+}
+
+TEST(DenseLabels, sizes_that_are_not_tenths_of_a_millimetre_are_refused)
+{
+    const DenseLabels dense = random_labels({2, 2, 2}, {2000, 2000, 2000}, {0, 0, 0});
+    EXPECT_TRUE(says(resample(dense, 0.33333f, 0, "here"), "here: voxel size: 0.3333"));
+    EXPECT_TRUE(says(resample(dense, 200.f, 0, "here"), "expected a voxel size of 0.001 to 100 m, found 200"));
+    EXPECT_TRUE(says(resample(dense, 1e-5f, 0, "here"), "voxel size"));
+    EXPECT_TRUE(says(tenths_of(NAN, "origin"), "origin: nan m"));
+    EXPECT_EQ(*tenths_of(-25.6f, "x"), -256000);
+    DenseLabels empty = dense;
+    empty.labels.assign(8, kLeftOut);
+    EXPECT_TRUE(says(resample(empty, 0.6f, 0, "here"), "here: no voxel is occupied"));
+}
+
+// ---- label maps
+
+TEST(LabelMap, a_file_says_what_labels_are)
+{
+    const ScratchFolder folder;
+    constexpr SourceLabel labels[] = {{7, "lamp", kLeftOut}, {8, "cat", kEmpty}};
+    const auto apply = [&](const char* json) {
+        LabelMap map{std::span<const SourceLabel>(labels)};
+        const Status status = map.apply(folder.put("map.json", json));
+        return status ? Result<LabelMap>(map) : Result<LabelMap>(tl::make_unexpected(status.error()));
+    };
+    LabelMap map = *apply(R"({"lamp": "pole", "9": 3, "10": null})");
+    EXPECT_EQ(map(7), 5);
+    EXPECT_EQ(map(8), kEmpty);
+    EXPECT_EQ(map(9), 3);
+    EXPECT_EQ(map(10, 4), kLeftOut);
+    EXPECT_TRUE(map.check("here", "voxels"));
+    EXPECT_EQ(map.dropped(), 4u);
+    EXPECT_EQ(map.left_out("voxels"), std::vector<std::string>{"4 voxels of label 10 are left out"});
+    EXPECT_EQ(map(77, 3), kLeftOut);
+    EXPECT_EQ(map(99999), kLeftOut);
+    EXPECT_TRUE(says(map.check("here", "voxels"), "here: unknown labels: 77 (3 voxels), 99999 (1 voxels); --map FILE"));
+    EXPECT_TRUE(says(apply("[]"), "expected an object of source label to class, found array"));
+    EXPECT_TRUE(
+        says(apply(R"({"lamp": "lamp"})"), "'lamp': expected a class (name or 0 to 19) or null, found \"lamp\""));
+    EXPECT_TRUE(says(apply(R"({"lamp": 20})"), "found 20"));
+    EXPECT_TRUE(says(apply(R"({"lamp": -1})"), "found -1"));
+    EXPECT_TRUE(says(apply(R"({"dog": 1})"), "'dog': the source has no label of that name"));
+    EXPECT_TRUE(says(apply(R"({"lamp": 1)"), "map.json"));
+    EXPECT_TRUE(says(LabelMap().apply(folder / "none.json"), "none.json"));
+}
+
+// ---- SemanticKITTI
+
+struct Kitti {
+    std::string labels = std::string(kVoxels * 2, '\0'), bits = std::string(kVoxels / 8, '\0');
+
+    void set(size_t x, size_t y, size_t z, uint16_t raw)
+    {
+        labels[2 * voxel(x, y, z)] = static_cast<char>(raw & 255);
+        labels[2 * voxel(x, y, z) + 1] = static_cast<char>(raw >> 8);
+    }
+};
+
+TEST(SemanticKitti, voxels_become_cells_in_the_lidars_frame)
+{
+    const ScratchFolder folder;
+    Kitti k;
+    // voxel (0, 128, 10) begins at the lidar: cell (0, 0, 0) is voxels 0..2, 128..130, 10..12
+    k.set(0, 128, 10, 40);
+    k.set(1, 129, 11, 60);
+    k.set(2, 130, 12, 60);
+    k.set(3, 128, 10, 252);  // the next cell: a moving car
+    k.set(0, 127, 10, 70);   // y -1: one voxel of cell -1
+    k.set(0, 126, 9, 81);    // a tie in cell (0, -1, -1) ...
+    k.set(0, 125, 9, 80);    // ... goes to the lower class: pole 5, traffic sign 7
+    k.set(255, 0, 31, 99);   // other-object is left out
+    k.set(255, 255, 31, 50); // the far corner: x 51.0..51.2, y 25.4..25.6, z 4.2..4.4
+    const auto out = read_semantic_kitti(folder.put("000000.label", k.labels), {});
+    ASSERT_TRUE(out) << out.error().message;
+    EXPECT_EQ(out->grid.cells, (std::vector<Cell>{{0, -1, -1}, {0, -1, 0}, {0, 0, 0}, {1, 0, 0}, {85, 42, 7}}));
+    EXPECT_EQ(out->grid.labels, (std::vector<uint8_t>{5, 8, 19, 13, 2}));
+    EXPECT_EQ(out->warnings, std::vector<std::string>{"1 voxels of label 99 (other-object) are left out"});
+    EXPECT_EQ(out->dropped, 1u);
+
+    SceneGridOptions o;
+    o.map = folder.put("map.json", R"({"other-object": "fence", "40": null})");
+    o.origin = {10.2, 0, 1.8};
+    o.min_fill = 2 / 27.0;
+    const auto mapped = read_semantic_kitti(folder / "000000.label", o);
+    ASSERT_TRUE(mapped) << mapped.error().message;
+    EXPECT_EQ(mapped->grid.cells, (std::vector<Cell>{{17, -1, 2}, {17, 0, 3}})); // those with two voxels
+    EXPECT_EQ(mapped->dropped, 1u);
+}
+
+TEST(SemanticKitti, bits_say_what_was_hit_and_what_could_be_seen)
+{
+    const ScratchFolder folder;
+    Kitti k;
+    for (size_t i = 0; i < 16; ++i)
+        k.set(10 * (i / 8), 100, i % 8 * 4, 40); // eight voxels each in two rows, each a cell of its own
+    folder.put("1.label", k.labels);
+    std::string bits = k.bits;
+    // voxels 0..7 of a row of 32 are one byte, the most significant bit first: 0x84 is voxels 0 and 5
+    bits[voxel(0, 100, 0) / 8] = static_cast<char>(0x84);
+    bits[voxel(10, 100, 24) / 8] = 0x08; // voxel 28
+    const auto out = read_semantic_kitti(folder.put("1.bin", bits), {});
+    ASSERT_TRUE(out) << out.error().message;
+    // z of voxel 0 is -2 m, of voxel 28 3.6 m
+    EXPECT_EQ(out->grid.cells, (std::vector<Cell>{{0, -10, -4}, {3, -10, 6}}));
+    folder.put("1.invalid", bits);
+    const auto valid = read_semantic_kitti(folder / "1.label", {});
+    ASSERT_TRUE(valid) << valid.error().message;
+    EXPECT_EQ(valid->grid.cells.size(), 14u);
+    EXPECT_FALSE(find_cell(valid->grid, {3, -10, 6}));
+}
+
+TEST(SemanticKitti, a_grid_comes_back_the_same)
+{
+    const ScratchFolder folder;
+    VoxelGrid grid;
+    grid.voxel_size = 0.6f;
+    for (int32_t x = 0; x < 86; x += 5)
+        for (int32_t y = -43; y < 43; y += 3)
+            for (int32_t z = -4; z < 8; ++z) {
+                const auto label = static_cast<uint8_t>((x + y + z + 100) % 20);
+                if (label == 10 || label == 6) // there is neither sky nor traffic light
+                    continue;
+                grid.cells.push_back({x, y, z});
+                grid.labels.push_back(label);
+            }
+    std::vector<std::string> warnings;
+    ASSERT_TRUE(write_semantic_kitti(folder / "2.bin", grid, warnings));
+    EXPECT_TRUE(warnings.empty());
+    for (const char* name : {"2.label", "2.bin"}) {
+        const auto out = read_semantic_kitti(folder / name, {});
+        ASSERT_TRUE(out) << out.error().message;
+        EXPECT_EQ(out->grid.cells, grid.cells);
+        EXPECT_EQ(out->grid.labels, grid.labels);
+    }
+    // a cell is 27 voxels
+    const std::string labels = contents(folder / "2.label"), bits = contents(folder / "2.bin");
+    ASSERT_EQ(labels.size(), kVoxels * 2);
+    const size_t first = voxel(5, 128, 10); // cell 1 is empty, cell 5 begins at voxel 15
+    EXPECT_EQ(labels[2 * first], 0);
+    const auto expected = label_at(grid, {5, -1, 0}); // voxels 15..17, 125..127, 10..12
+    ASSERT_EQ(expected, uint8_t(104 % 20));
+    EXPECT_EQ(labels[2 * voxel(15, 127, 12)], 51); // 4: fence
+    EXPECT_EQ(labels[2 * voxel(17, 125, 10)], 51);
+    // voxels 10, 11, 12 of a column, and 13, 14, 15 of the cell above (label 5): bits 2..7 of the second byte
+    EXPECT_EQ(static_cast<unsigned char>(bits[voxel(15, 127, 8) / 8]), 0xffu);
+}
+
+TEST(SemanticKitti, what_it_cannot_hold_is_refused_or_said)
+{
+    const ScratchFolder folder;
+    std::vector<std::string> warnings;
+    VoxelGrid grid;
+    grid.voxel_size = 0.6f;
+    grid.cells = {{0, 0, 0}, {0, 0, 1}, {0, 0, 8}};
+    grid.labels = {6, 10, 0};
+    EXPECT_TRUE(says(write_semantic_kitti(folder / "x.label", grid, warnings),
+                     "1 of 3 cells are outside its box of 0 to 51.2, -25.6 to 25.6, -2 to 4.4 m"));
+    grid.voxel_size = 0.5f;
+    EXPECT_TRUE(says(write_semantic_kitti(folder / "x.label", grid, warnings), "cells of 0.5 m cannot be split"));
+    EXPECT_EQ(folder.entries(), 0u);
+    grid.voxel_size = 0.4f;
+    EXPECT_TRUE(write_semantic_kitti(folder / "x.label", grid, warnings));
+    EXPECT_EQ(warnings, (std::vector<std::string>{"1 cells of traffic light become traffic-sign",
+                                                  "1 cells of sky are left out"}));
+}
+
+TEST(SemanticKitti, refuses_malformed_files)
+{
+    const ScratchFolder folder;
+    const auto read = [&](const std::string& labels, const SceneGridOptions& o = {}) {
+        return read_semantic_kitti(folder.put("m.label", labels), o);
+    };
+    const Kitti empty;
+    EXPECT_TRUE(says(read_semantic_kitti(folder / "none.label", {}), "none.label"));
+    EXPECT_TRUE(says(read(""), "expected 4194304 bytes for 256 x 256 x 32 voxels, found 0"));
+    EXPECT_TRUE(says(read(empty.labels.substr(1)), "found 4194303"));
+    EXPECT_TRUE(says(read(empty.labels + "x"), "m.label"));
+    EXPECT_TRUE(says(read(empty.labels), "no voxel is occupied"));
+    Kitti unknown;
+    unknown.set(0, 0, 0, 1000);
+    unknown.set(0, 0, 1, 1000);
+    unknown.set(0, 0, 2, 41);
+    EXPECT_TRUE(says(read(unknown.labels), "unknown labels: 41 (1 voxels), 1000 (2 voxels); --map FILE"));
+    Kitti good;
+    good.set(0, 0, 0, 40);
+    EXPECT_TRUE(read(good.labels));
+    SceneGridOptions o;
+    o.map = folder.put("bad.json", "{");
+    EXPECT_TRUE(says(read(good.labels, o), "bad.json"));
+    o.map = folder.put("bad.json", R"({"street": 0})");
+    EXPECT_TRUE(says(read(good.labels, o), "'street': the source has no label of that name"));
+    o = {};
+    o.origin = {0.00005, 0, 0};
+    EXPECT_TRUE(says(read(good.labels, o), "origin: 5e-05 m: expected whole tenths"));
+    o = {};
+    o.voxel_size = 0.12345f;
+    EXPECT_TRUE(says(read(good.labels, o), "voxel size"));
+    o = {};
+    o.min_fill = 0.5;
+    EXPECT_TRUE(says(read(good.labels, o), "no voxel is occupied"));
+    EXPECT_TRUE(says(read_semantic_kitti(folder.put("alone.bin", empty.bits), {}), "occupancy without labels"));
+    EXPECT_TRUE(says(read_semantic_kitti(folder.put("m.bin", "short"), {}), "m.bin': expected 262144 bytes"));
+    folder.put("m.invalid", "short");
+    EXPECT_TRUE(says(read(good.labels), "m.invalid': expected 262144 bytes"));
+}
+
+// ---- Occ3D
+
+TEST(Occ3d, nuscenes_voxels_vote_with_their_volume)
+{
+    const auto out = read_occ3d(kNumpy + "occ3d_nuscenes.npz", Occ3dKind::nuscenes, {});
+    ASSERT_TRUE(out) << out.error().message;
+    // the road is x, y from -40 to -36.4, z from -1 to -0.2: cells -67 to -61, and -2 to -1
+    EXPECT_EQ(label_at(out->grid, {-67, -67, -2}), 0);
+    EXPECT_EQ(label_at(out->grid, {-61, -61, -1}), 0);
+    EXPECT_EQ(label_at(out->grid, {-60, -61, -1}), std::nullopt);
+    // the car is x, y from -38.8 to -37.6, z from -0.2 to 0.2: cell 0 has nothing else, cell -1 more road
+    EXPECT_EQ(label_at(out->grid, {-64, -64, 0}), 13);
+    EXPECT_EQ(label_at(out->grid, {-64, -64, -1}), 0);
+    EXPECT_EQ(out->grid.cells.size(), 7u * 7 * 2 + 3 * 3);
+    EXPECT_EQ(out->warnings, std::vector<std::string>{"1 voxels of label 0 (others) are left out"});
+    SceneGridOptions o;
+    o.mask = "mask_lidar"; // the road only
+    const auto masked = read_occ3d(kNumpy + "occ3d_nuscenes.npz", Occ3dKind::nuscenes, o);
+    ASSERT_TRUE(masked) << masked.error().message;
+    EXPECT_EQ(masked->grid.cells.size(), 7u * 7 * 2);
+    o.mask = "mask_radar";
+    EXPECT_TRUE(says(read_occ3d(kNumpy + "occ3d_nuscenes.npz", Occ3dKind::nuscenes, o), "has no array 'mask_radar'"));
+}
+
+TEST(Occ3d, waymo_has_classes_of_its_own)
+{
+    SceneGridOptions o;
+    o.voxel_size = 0.4f;
+    o.origin = {0, 0, 0.2}; // -1 m is no multiple of 0.4
+    const auto out = read_occ3d(kNumpy + "occ3d_waymo.npz", Occ3dKind::waymo, o);
+    ASSERT_TRUE(out) << out.error().message;
+    EXPECT_EQ(out->grid.cells.size(), 10u);
+    EXPECT_EQ(label_at(out->grid, {-100, -100, -2}), 0);
+    EXPECT_EQ(label_at(out->grid, {-100, -100, -1}), 5);
+    EXPECT_EQ(label_at(out->grid, {-98, -98, -2}), 0);
+}
+
+TEST(Occ3d, refuses_malformed_files)
+{
+    const ScratchFolder folder;
+    const auto read = [&](const std::string& name, const std::string& npy, Occ3dKind kind = Occ3dKind::nuscenes) {
+        return read_occ3d(folder.put("m.npz", zip_bytes({{name + ".npy", npy}})), kind, {});
+    };
+    const std::string free(200 * 200 * 16, '\x11');
+    EXPECT_TRUE(says(read_occ3d(folder / "none.npz", Occ3dKind::nuscenes, {}), "none.npz"));
+    EXPECT_TRUE(says(read_occ3d(folder.put("m.npz", "text"), Occ3dKind::nuscenes, {}), "no .npz archive"));
+    EXPECT_TRUE(says(read("labels", ""), "has no array 'semantics', found labels"));
+    EXPECT_TRUE(says(read("semantics", npy_bytes("|u1", "(2, 2, 2)", "abcdefgh")),
+                     "semantics: expected shape [200, 200, 16], found [2, 2, 2]"));
+    EXPECT_TRUE(says(read("semantics", npy_bytes("|u1", "(640000,)", free)), "expected shape [200, 200, 16]"));
+    EXPECT_TRUE(
+        says(read("semantics", npy_bytes("<i8", "(200, 200, 16)", free)), "an array of 5120000 bytes, at most"));
+    EXPECT_TRUE(says(read("semantics", npy_bytes("|i1", "(200, 200, 16)", free)), "expected u8, found I8"));
+    EXPECT_TRUE(says(read("semantics", npy_bytes("|u1", "(200, 200, 16)", free.substr(1))), "the zip says"));
+    EXPECT_TRUE(says(read("semantics", npy_bytes("|u1", "(200, 200, 16)", free)), "no voxel is occupied"));
+    std::string unknown = free;
+    unknown[5] = unknown[6] = '\xff';
+    unknown[7] = 18;
+    EXPECT_TRUE(says(read("semantics", npy_bytes("|u1", "(200, 200, 16)", unknown)),
+                     "unknown labels: 18 (1 voxels), 255 (2 voxels)"));
+    EXPECT_TRUE(says(read("voxel_label", npy_bytes("|u1", "(200, 200, 16)", free), Occ3dKind::waymo),
+                     "unknown labels: 17 (640000 voxels)"));
+    EXPECT_TRUE(
+        says(read("voxel_label", npy_bytes("|u1", "(1600, 1600, 64)", "abc"), Occ3dKind::waymo), "the zip says"));
+    const std::string wrong_mask = npy_bytes("|u1", "(2,)", "ab");
+    SceneGridOptions o;
+    o.mask = "m";
+    const auto masked = zip_bytes({{"semantics.npy", npy_bytes("|u1", "(200, 200, 16)", free)}, {"m.npy", wrong_mask}});
+    EXPECT_TRUE(says(read_occ3d(folder.put("m.npz", masked), Occ3dKind::nuscenes, o), "'m': expected shape [200"));
+}
+
+} // namespace
+} // namespace semrover

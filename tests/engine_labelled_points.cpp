@@ -1,0 +1,220 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/scene/labelled_points.h"
+
+#include "engine/scene/palette.h"
+#include "engine/scene/ply_reader.h"
+#include "runtime/dtype.h"
+#include "tests/says.h"
+#include "tests/scratch_folder.h"
+
+#include <cmath>
+#include <set>
+
+namespace semrover {
+namespace {
+
+std::string ply(const std::string& properties, const std::vector<std::string>& rows)
+{
+    std::string text = fmt::format("ply\nformat ascii 1.0\nelement vertex {}\n{}end_header\n", rows.size(), properties);
+    for (const std::string& row : rows)
+        text += row + "\n";
+    return text;
+}
+
+constexpr const char* kXyz = "property float x\nproperty float y\nproperty float z\n";
+
+TEST(LabelledPoints, a_cells_label_is_that_of_most_points)
+{
+    const ScratchFolder folder;
+    const auto path = folder.put("p.ply", ply(std::string(kXyz) + "property int label\n",
+                                              {"0.1 0.1 0.1 8", "0.5 0.5 0.5 8", "0.3 0.3 0.3 0", // vegetation
+                                               "-0.1 0.1 0.1 5", "-0.5 0.1 0.1 3",                // a tie
+                                               "0.61 -0.01 1.25 19", "nan 0 0 1", "0 inf 0 1"}));
+    const auto out = read_labelled_points(path, {});
+    ASSERT_TRUE(out) << out.error().message;
+    EXPECT_EQ(out->grid.cells, (std::vector<Cell>{{-1, 0, 0}, {0, 0, 0}, {1, -1, 2}}));
+    EXPECT_EQ(out->grid.labels, (std::vector<uint8_t>{3, 8, 19}));
+    EXPECT_FALSE(out->grid.has_points());
+    EXPECT_EQ(out->warnings, std::vector<std::string>{"2 points that are not finite are left out"});
+    EXPECT_EQ(out->dropped, 2u);
+    SceneGridOptions o;
+    o.voxel_size = 0.25f;
+    o.origin = {10, 0, 0};
+    const auto finer = read_labelled_points(path, o);
+    ASSERT_TRUE(finer) << finer.error().message;
+    EXPECT_EQ(finer->grid.cells[0], (Cell{38, 0, 0})); // 9.5
+}
+
+TEST(LabelledPoints, any_order_of_properties_any_of_the_names_and_both_byte_orders)
+{
+    const ScratchFolder folder;
+    for (const char* name : {"label", "class", "semantic", "classification", "scalar_label"})
+        for (const bool big : {false, true}) {
+            std::string bytes = fmt::format(
+                "ply\nformat binary_{}_endian 1.0\nelement face 0\nproperty list uchar int i\n"
+                "element vertex 1\nproperty uchar blue\nproperty double z\n"
+                "property {} {}\nproperty uchar red\nproperty float x\nproperty uchar green\n"
+                "property short y\nend_header\n",
+                big ? "big" : "little", std::string_view(name).starts_with("scalar") ? "float" : "ushort", name);
+            const auto put = [&](auto value) {
+                std::string raw(reinterpret_cast<const char*>(&value), sizeof(value));
+                if (big)
+                    std::reverse(raw.begin(), raw.end());
+                bytes += raw;
+            };
+            put(uint8_t(3));
+            put(-1.25);
+            if (std::string_view(name).starts_with("scalar"))
+                put(13.f);
+            else
+                put(uint16_t(13));
+            put(uint8_t(1));
+            put(0.75f);
+            put(uint8_t(2));
+            put(int16_t(-2));
+            SceneGridOptions o;
+            o.points_per_voxel = 1;
+            const auto out = read_labelled_points(folder.put("b.ply", bytes), o);
+            ASSERT_TRUE(out) << out.error().message;
+            EXPECT_EQ(out->grid.cells, (std::vector<Cell>{{1, -4, -3}}));
+            EXPECT_EQ(out->grid.labels, std::vector<uint8_t>{13});
+            EXPECT_EQ(out->grid.colors, (std::vector<uint8_t>{1, 2, 3}));
+            EXPECT_NEAR(half_to_float(out->grid.points[1]), -2 - (-3.5 * 0.6), 1e-3);
+        }
+}
+
+TEST(LabelledPoints, n_points_of_a_cell_are_drawn_and_too_few_repeated)
+{
+    const ScratchFolder folder;
+    std::vector<std::string> rows;
+    for (int i = 0; i < 100; ++i) // 60 of road, 40 of sidewalk; the colour is the point's number
+        rows.push_back(fmt::format("{} 0.3 0.3 {} {} 0 0", 0.005 * i + 0.01, i < 60 ? 0 : 1, i));
+    rows.push_back("1.0 0.3 0.3 2 201 0 0");
+    rows.push_back("1.1 0.3 0.3 2 202 0 0");
+    const std::string properties =
+        std::string(kXyz) + "property uchar label\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n";
+    const auto path = folder.put("p.ply", ply(properties, rows));
+    SceneGridOptions o;
+    o.points_per_voxel = 5;
+    const auto numbers = [&](size_t cell) { // of the points that were drawn, by their red
+        const auto out = read_labelled_points(path, o);
+        EXPECT_TRUE(out) << out.error().message;
+        std::vector<int> n;
+        for (size_t i = 0; i < size_t(o.points_per_voxel); ++i)
+            n.push_back(out->grid.colors[(cell * size_t(o.points_per_voxel) + i) * 3]);
+        return n;
+    };
+    EXPECT_EQ(numbers(1), (std::vector<int>{201, 202, 201, 202, 201}));
+    const std::vector<int> first = numbers(0);
+    EXPECT_TRUE(std::is_sorted(first.begin(), first.end())); // the file's order
+    EXPECT_LT(first.back(), 60);                             // of the cell's label
+    EXPECT_EQ(std::set<int>(first.begin(), first.end()).size(), 5u);
+    EXPECT_EQ(numbers(0), first); // the same on every run
+    // every point of the label is drawn about as often
+    std::vector<int> counts(100);
+    for (o.seed = 0; o.seed < 240; ++o.seed)
+        for (const int n : numbers(0))
+            ++counts[size_t(n)];
+    for (int i = 0; i < 60; ++i) // binomial, mean 20, deviation 4.3: five deviations
+        EXPECT_NEAR(counts[size_t(i)], 20, 22) << i;
+    EXPECT_EQ(std::count(counts.begin(), counts.begin() + 60, 0), 0);
+    EXPECT_EQ(std::count(counts.begin() + 60, counts.end(), 0), 40);
+    o.points_per_voxel = 80; // all of the label, and 20 others
+    const std::vector<int> all = numbers(0);
+    EXPECT_EQ(all[59], 59);
+    EXPECT_GE(all[60], 60);
+    o.semantic = true;
+    EXPECT_FALSE(read_labelled_points(path, o)->grid.has_points());
+}
+
+TEST(LabelledPoints, a_grid_comes_back_the_same)
+{
+    const ScratchFolder folder;
+    VoxelGrid grid;
+    grid.voxel_size = 0.6f;
+    grid.points_per_voxel = 4;
+    for (int32_t i = -3; i < 40; ++i) {
+        grid.cells.push_back({i, 7 * i, -i});
+        grid.labels.push_back(static_cast<uint8_t>((i + 3) % 20));
+        for (int k = 0; k < 12; ++k) {
+            // also on the faces, as 16 bits have them: 0.30005
+            const float offset = k % 4 == 0 ? 0.3f : k % 4 == 1 ? -0.3f : 0.01f * static_cast<float>(k + i % 7);
+            grid.points.push_back(float_to_half(offset));
+            grid.colors.push_back(static_cast<uint8_t>(i * 5 + k));
+        }
+        grid.generated.push_back(1);
+    }
+    ASSERT_TRUE(write_labelled_points(folder / "p.ply", grid));
+    SceneGridOptions o;
+    o.points_per_voxel = 4;
+    const auto out = read_labelled_points(folder / "p.ply", o);
+    ASSERT_TRUE(out) << out.error().message;
+    sort_cells(grid);
+    EXPECT_EQ(out->grid.cells, grid.cells);
+    EXPECT_EQ(out->grid.labels, grid.labels);
+    EXPECT_EQ(out->grid.colors, grid.colors);
+    for (size_t i = 0; i < grid.points.size(); ++i) // positions of 150 m as floats: 8e-6 m
+        EXPECT_NEAR(half_to_float(out->grid.points[i]), half_to_float(grid.points[i]), 3e-4) << i;
+    // without points: centres in the labels' colours
+    grid.points.clear();
+    grid.colors.clear();
+    grid.generated.clear();
+    ASSERT_TRUE(write_labelled_points(folder / "s.ply", grid));
+    o.semantic = true;
+    const auto semantic = read_labelled_points(folder / "s.ply", o);
+    ASSERT_TRUE(semantic) << semantic.error().message;
+    EXPECT_EQ(semantic->grid.cells, grid.cells);
+    EXPECT_EQ(semantic->grid.labels, grid.labels);
+    const auto file = read_ply(folder / "s.ply");
+    EXPECT_EQ(file->find("vertex")->find("red")->values[0], kPalette[grid.labels[0]].color[0]);
+}
+
+TEST(LabelledPoints, refuses_what_is_no_labelled_cloud)
+{
+    const ScratchFolder folder;
+    const auto read = [&](const std::string& text, const SceneGridOptions& o = {}) {
+        return read_labelled_points(folder.put("m.ply", text), o);
+    };
+    const std::string labelled = std::string(kXyz) + "property int label\n";
+    EXPECT_TRUE(says(read_labelled_points(folder / "none.ply", {}), "none.ply"));
+    EXPECT_TRUE(says(read("text"), "expected 'ply'"));
+    EXPECT_TRUE(says(read("ply\nformat ascii 1.0\nelement face 0\nproperty int i\nend_header\n"), "no element vertex"));
+    EXPECT_TRUE(says(read(ply("property float x\nproperty float y\n", {"1 2"})), "its vertices have no property z"));
+    EXPECT_TRUE(says(read(ply("property list uchar float x\nproperty float y\nproperty float z\n", {"1 2 3 4"})),
+                     "its vertices have no property x"));
+    EXPECT_TRUE(says(read(ply(kXyz, {"1 2 3"})), "its vertices have no label; --label CLASS"));
+    EXPECT_TRUE(says(read(ply(labelled, {})), "there are no points"));
+    EXPECT_TRUE(says(read(ply(labelled, {"nan 0 0 1"})), "there are no points"));
+    EXPECT_TRUE(says(read(ply(labelled, {"0 0 0 25", "0 0 0 25", "0 0 0 77"})),
+                     "unknown labels: 25 (2 points), 77 (1 points); --map FILE"));
+    EXPECT_TRUE(says(read(ply(labelled, {"0 0 0 -1"})), "vertex 0: 'label': expected a whole number, found -1"));
+    EXPECT_TRUE(says(read(ply(std::string(kXyz) + "property float label\n", {"0 0 0 1.5"})), "found 1.5"));
+    EXPECT_TRUE(says(read(ply(labelled, {"0 0 0 1", "1e9 0 0 1"})), "vertex 1: (1000000000, 0, 0) m is absurd"));
+    EXPECT_TRUE(says(read(ply(labelled, {"0.25 0.25 0.25"})), "the row ends before 'label'"));
+    SceneGridOptions o;
+    o.map = folder.put("map.json", R"({"25": "car", "77": null, "road": "sidewalk"})");
+    const auto mapped = read(ply(labelled, {"0 0 0 25", "0 0 0 77", "1 0 0 0"}), o);
+    ASSERT_TRUE(mapped) << mapped.error().message;
+    EXPECT_EQ(mapped->grid.labels, (std::vector<uint8_t>{13, 1}));
+    EXPECT_EQ(mapped->dropped, 1u);
+    o = {};
+    o.default_label = 8;
+    EXPECT_EQ(read(ply(kXyz, {"1 2 3"}), o)->grid.labels, std::vector<uint8_t>{8});
+}
+
+TEST(LabelledPoints, no_prefix_of_a_file_reads_or_crashes)
+{
+    const ScratchFolder folder;
+    VoxelGrid grid;
+    grid.voxel_size = 0.6f;
+    grid.cells = {{0, 0, 0}, {1, 0, 0}};
+    grid.labels = {1, 2};
+    ASSERT_TRUE(write_labelled_points(folder / "p.ply", grid));
+    const std::string bytes = contents(folder / "p.ply");
+    for (size_t n = 0; n < bytes.size(); ++n)
+        EXPECT_FALSE(read_labelled_points(folder.put("t.ply", bytes.substr(0, n)), {})) << n;
+}
+
+} // namespace
+} // namespace semrover

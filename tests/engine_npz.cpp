@@ -1,0 +1,283 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// files by numpy 1.24.2 (tests/data/numpy), and by hand from the formats' specifications
+#include "engine/scene/grid_npz.h"
+#include "engine/scene/npz.h"
+
+#include "tests/says.h"
+#include "tests/scratch_folder.h"
+#include "tests/zip_bytes.h"
+
+#include <numeric>
+
+namespace semrover {
+namespace {
+
+const std::string kNumpy = SEMROVER_SOURCE_DIR "/tests/data/numpy/";
+
+NpyArray read(const NpzFile& file, std::string_view name)
+{
+    const Result<NpyArray> array = file.read(name);
+    if (!array)
+        throw std::runtime_error(array.error().message);
+    return *array;
+}
+
+std::string text_of(const std::vector<std::byte>& bytes)
+{
+    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+TEST(Npz, reads_every_header_that_numpy_writes)
+{
+    const auto file = NpzFile::open(kNumpy + "arrays.npz");
+    ASSERT_TRUE(file) << file.error().message;
+    EXPECT_EQ(file->names().size(), 8u);
+    std::vector<int32_t> expected(24);
+    std::iota(expected.begin(), expected.end(), 0);
+    const std::vector<uint64_t> shape = {2, 3, 4};
+    EXPECT_EQ(read(*file, "big").values<int32_t>(), expected);
+    EXPECT_EQ(read(*file, "big").shape, shape);
+    EXPECT_EQ(read(*file, "fortran").values<int16_t>(), std::vector<int16_t>(expected.begin(), expected.end()));
+    EXPECT_EQ(read(*file, "both").values<double>(), std::vector<double>(expected.begin(), expected.end()));
+    EXPECT_EQ(read(*file, "both").shape, shape);
+    EXPECT_EQ(read(*file, "scalar").dtype, DType::f16);
+    EXPECT_TRUE(read(*file, "scalar").shape.empty());
+    EXPECT_EQ(half_to_float(read(*file, "scalar").values<uint16_t>()[0]), 0.25f);
+    EXPECT_EQ(read(*file, "empty").shape, (std::vector<uint64_t>{0, 3}));
+    EXPECT_EQ(read(*file, "empty").data.size(), 0u);
+    EXPECT_EQ(read(*file, "flags").values<uint8_t>(), (std::vector<uint8_t>{1, 0}));
+    EXPECT_TRUE(says(file->read("text"), "'text': .npy header: a type '<U2'"));
+    EXPECT_TRUE(says(file->read("record"), "'record': .npy header: a structured type"));
+    EXPECT_TRUE(says(file->read("none"), "has no array 'none', found big, both, "));
+}
+
+TEST(Npz, writes_what_the_specifications_say)
+{
+    const ScratchFolder folder;
+    NpyArray array{DType::u8, {2, 1}, {std::byte(7), std::byte(8)}};
+    ASSERT_TRUE(write_npz(folder / "a.npz", {{"x", array}}));
+    const std::string npy = text_of(encode_npy(array));
+    ASSERT_EQ(npy.size(), 64u * 2 + 2);
+    EXPECT_EQ(npy.substr(0, 10), std::string("\x93NUMPY\1\0\x76\0", 10));
+    EXPECT_TRUE(npy.substr(10).starts_with("{'descr': '|u1', 'fortran_order': False, 'shape': (2, 1), }"));
+    EXPECT_EQ(npy[127], '\n');
+    EXPECT_EQ(text_of(encode_npy({DType::f32, {5}, {}})).find("(5,)"), 60u);
+    EXPECT_NE(text_of(encode_npy({DType::f32, {}, {}})).find("'<f4', 'fortran_order': False, 'shape': ()"),
+              std::string::npos);
+    // the archive is the one made by hand, but for the versions of the program that libzip writes into it
+    const std::string zip = contents(folder / "a.npz"), expected = zip_bytes({{"x.npy", npy}});
+    ASSERT_EQ(zip.size(), expected.size());
+    size_t differing = 0;
+    for (size_t i = 0; i < zip.size(); ++i)
+        differing += zip[i] != expected[i];
+    EXPECT_LE(differing, 16u);
+    EXPECT_EQ(zip.find(npy), expected.find(npy));
+    ASSERT_TRUE(write_npz(folder / "b.npz", {{"x", array}}));
+    EXPECT_EQ(contents(folder / "b.npz"), zip); // the same bytes, whenever it is written
+}
+
+TEST(Npz, refuses_malformed_archives)
+{
+    const ScratchFolder folder;
+    const auto read = [&](const std::string& bytes) {
+        const auto file = NpzFile::open(folder.put("m.npz", bytes));
+        return file ? file->read("a") : Result<NpyArray>(tl::make_unexpected(file.error()));
+    };
+    const auto npy = [&](const std::string& bytes) { return read(zip_bytes({{"a.npy", bytes}})); };
+    const std::string good = npy_bytes("|u1", "(4,)", "abcd");
+    ASSERT_TRUE(npy(good)) << npy(good).error().message;
+    EXPECT_TRUE(says(NpzFile::open(folder / "none.npz"), "none.npz"));
+    EXPECT_TRUE(says(read("PK"), "no .npz archive"));
+    EXPECT_TRUE(says(read(""), "found none"));
+    EXPECT_TRUE(says(read(zip_bytes({{"b.npy", good}, {"c.txt", ""}})), "has no array 'a', found b"));
+    EXPECT_TRUE(says(read(zip_bytes({})), "found none"));
+    EXPECT_TRUE(says(read(zip_bytes({{"a.npy", good}, {"a.npy", good}})), "two entries 'a.npy'"));
+    std::vector<std::pair<std::string, std::string>> many(1025);
+    for (size_t i = 0; i < many.size(); ++i)
+        many[i].first = std::to_string(i) + ".npy";
+    EXPECT_TRUE(says(read(zip_bytes(many)), "1025 entries, at most 1024 are allowed"));
+    EXPECT_TRUE(says(read(zip_bytes({{"a.npy", good}}, 8)), "cannot inflate 'a'")); // stored, but said to be deflated
+    EXPECT_TRUE(says(read(zip_bytes({{"a.npy", good}}, 97)), "cannot read the entry 'a'"));
+    std::string bad_crc = zip_bytes({{"a.npy", good}});
+    bad_crc[bad_crc.find("abcd")] = 'x';
+    EXPECT_TRUE(says(read(bad_crc), "cannot inflate 'a': CRC error"));
+    EXPECT_TRUE(says(npy(npy_bytes("|u1", "(5,)", "abcd")), "the zip says"));
+    EXPECT_TRUE(says(npy(npy_bytes("|u1", "(3,)", "abcd")), "the zip says"));
+}
+
+TEST(Npz, refuses_malformed_arrays)
+{
+    const ScratchFolder folder;
+    const auto npy = [&](const std::string& bytes) {
+        return NpzFile::open(folder.put("m.npz", zip_bytes({{"a.npy", bytes}})))->read("a");
+    };
+    const auto header = [&](const std::string& text) { return npy(npy_bytes(text, "abcd")); };
+    EXPECT_TRUE(says(npy("garbage and more"), "no .npy array: it starts with 'garbage '"));
+    EXPECT_TRUE(says(npy(""), "no .npy array"));
+    EXPECT_TRUE(says(npy("\x93NUMPY\4" + std::string(9, '\0')), ".npy version 4.0"));
+    EXPECT_TRUE(says(npy("\x93NUMPY\1" + std::string("\0\xff\x7f", 3)), "the .npy header is cut short"));
+    EXPECT_TRUE(says(npy("\x93NUMPY\2" + std::string("\0\xff\xff\xff\x7f", 5)), "a .npy header of 2147483647 bytes"));
+    EXPECT_TRUE(says(header("hello"), "expected '{' at byte 0"));
+    EXPECT_TRUE(says(header("{'descr' '<f4'}"), "expected ':'"));
+    EXPECT_TRUE(says(header("{'descr': '<f4', 'descr': '<f4'}"), "a field 'descr' twice"));
+    EXPECT_TRUE(says(header("{'color': 1}"), "a field 'color'"));
+    EXPECT_TRUE(says(header("{'descr': '<c8'}"), "a type '<c8'"));
+    EXPECT_TRUE(says(header("{'descr': ''}"), "a type ''"));
+    EXPECT_TRUE(says(header("{'descr': [('a', '<f4')]}"), "a structured type"));
+    EXPECT_TRUE(says(header("{'descr': '|O'}"), "a type '|O'")); // pickled objects
+    EXPECT_TRUE(says(header("{'descr': '<f4'}"), "expected descr, fortran_order and shape"));
+    EXPECT_TRUE(says(header("{'fortran_order': yes}"), "expected True or False"));
+    EXPECT_TRUE(says(header("{'shape': (-1,)}"), "shape: expected a number"));
+    EXPECT_TRUE(says(header("{'shape': (1 2)}"), "shape: expected ',' or ')'"));
+    EXPECT_TRUE(says(header("{'shape': (1,1,1,1,1,1,1,1,1)}"), "more than 8 dimensions"));
+    EXPECT_TRUE(says(header("{'shape': (99999999999999999999,)}"), "shape: expected a number"));
+    EXPECT_TRUE(says(header("{'descr': '<f8', 'fortran_order': False, 'shape': (4294967296, 4294967296)}"),
+                     "an absurd .npy shape"));
+    EXPECT_TRUE(says(header("{'descr': '<f8', 'fortran_order': False, 'shape': (0, 4294967296, 4294967296)}"),
+                     "an absurd .npy shape"));
+    EXPECT_TRUE(says(header("{'descr': '|u1', 'fortran_order': False, 'shape': (4,)} x"), "text follows"));
+}
+
+TEST(Npz, a_bomb_is_refused_before_it_is_inflated)
+{
+    const auto bomb = NpzFile::open(kNumpy + "bomb.npz");
+    ASSERT_TRUE(bomb) << bomb.error().message;
+    EXPECT_TRUE(says(bomb->read("cells"), "the zip says 67109000 bytes, the array's header 136"));
+    EXPECT_TRUE(says(read_grid_npz(kNumpy + "bomb.npz", 0.6f), "cells: expected shape [V, 3], found [8]"));
+    const ScratchFolder folder;
+    // an array of a terabyte in a few bytes, and one beyond what the reader expects
+    const auto read = [&](const std::string& shape, uint64_t most) {
+        const std::string npy = npy_bytes("|u1", shape, "abcd");
+        return NpzFile::open(folder.put("m.npz", zip_bytes({{"a.npy", npy}})))->read("a", most);
+    };
+    EXPECT_TRUE(
+        says(read("(1099511627776,)", kMaxNpzArrayBytes), "an array of 1099511627776 bytes, at most 4294967296"));
+    EXPECT_TRUE(says(read("(4,)", 3), "an array of 4 bytes, at most 3 are expected"));
+    // the directory lies about the size: what is inflated is more than it says
+    std::string lies = contents(kNumpy + "bomb.npz");
+    const std::string real("\x88\x00\x00\x04", 4), small("\x88\x00\x00\x00", 4);
+    for (size_t at = lies.find(real); at != std::string::npos; at = lies.find(real))
+        lies.replace(at, 4, small);
+    const auto file = NpzFile::open(folder.put("l.npz", lies));
+    ASSERT_TRUE(file) << file.error().message;
+    EXPECT_TRUE(says(file->read("cells"), "'cells': expected 8 bytes of data, found more"));
+}
+
+TEST(Npz, no_prefix_of_an_archive_reads_or_crashes)
+{
+    const ScratchFolder folder;
+    const std::string npy = npy_bytes("<u2", "(2, 3)", "abcdefghijkl");
+    const std::string zip = zip_bytes({{"a.npy", npy}});
+    for (size_t n = 0; n < zip.size(); ++n) {
+        const auto file = NpzFile::open(folder.put("p.npz", zip.substr(0, n)));
+        EXPECT_FALSE(file && file->read("a")) << n;
+    }
+    for (size_t n = 0; n < npy.size(); ++n) {
+        const auto file = NpzFile::open(folder.put("p.npz", zip_bytes({{"a.npy", npy.substr(0, n)}})));
+        ASSERT_TRUE(file);
+        EXPECT_FALSE(file->read("a")) << n;
+    }
+}
+
+// ---- the mirror of a .sgrid
+
+VoxelGrid small_grid()
+{
+    VoxelGrid grid;
+    grid.voxel_size = 0.6f;
+    grid.points_per_voxel = 2;
+    grid.cells = {{-1, 0, 2}, {0, -5, 0}, {0, 0, 0}};
+    grid.labels = {0, 19, 8};
+    for (int i = 0; i < 18; ++i)
+        grid.points.push_back(float_to_half(0.3f - 0.03f * static_cast<float>(i)));
+    for (uint8_t i = 0; i < 18; ++i)
+        grid.colors.push_back(i);
+    grid.generated = {1, 0, 1};
+    grid.metadata = {{"name", "small \"one\""}, {"seed", "7"}};
+    return grid;
+}
+
+void expect_same(const VoxelGrid& a, const VoxelGrid& b)
+{
+    EXPECT_EQ(a.voxel_size, b.voxel_size);
+    EXPECT_EQ(a.points_per_voxel, b.points_per_voxel);
+    EXPECT_EQ(a.cells, b.cells);
+    EXPECT_EQ(a.labels, b.labels);
+    EXPECT_EQ(a.points, b.points);
+    EXPECT_EQ(a.colors, b.colors);
+    EXPECT_EQ(a.generated, b.generated);
+    EXPECT_EQ(a.metadata, b.metadata);
+}
+
+TEST(GridNpz, a_grid_comes_back_the_same)
+{
+    const ScratchFolder folder;
+    VoxelGrid grid = small_grid();
+    for (int i = 0; i < 2; ++i) {
+        ASSERT_TRUE(write_grid_npz(folder / "g.npz", grid));
+        const auto read = read_grid_npz(folder / "g.npz", 1);
+        ASSERT_TRUE(read) << read.error().message;
+        expect_same(*read, grid);
+        grid.points.clear();
+        grid.colors.clear();
+        grid.generated.clear();
+    }
+}
+
+TEST(GridNpz, numpys_default_types_are_taken)
+{
+    const auto grid = read_grid_npz(kNumpy + "grid.npz", 1);
+    ASSERT_TRUE(grid) << grid.error().message;
+    EXPECT_EQ(grid->voxel_size, 0.6f);
+    EXPECT_EQ(grid->cells, (std::vector<Cell>{{0, -5, 3}, {2, 0, -1}})); // sorted
+    EXPECT_EQ(grid->labels, (std::vector<uint8_t>{4, 19}));
+    EXPECT_EQ(grid->points_per_voxel, 3);
+    EXPECT_EQ(half_to_float(grid->points[0]), 0.f);
+    EXPECT_EQ(half_to_float(grid->points[9]), -9 / 32.f);
+    EXPECT_EQ(grid->colors[0], 9);
+    EXPECT_EQ(grid->generated, (std::vector<uint8_t>{1, 1}));
+}
+
+TEST(GridNpz, refuses_malformed_grids)
+{
+    const ScratchFolder folder;
+    using Entries = std::vector<std::pair<std::string, std::string>>;
+    const auto read = [&](const Entries& entries) {
+        return read_grid_npz(folder.put("m.npz", zip_bytes(entries)), 0.6f);
+    };
+    const std::string cell = std::string("\1\0\0\0\2\0\0\0\3\0\0\0", 12);
+    const std::pair<std::string, std::string> cells = {"cells.npy", npy_bytes("<i4", "(1, 3)", cell)},
+                                              labels = {"labels.npy", npy_bytes("|u1", "(1,)", "\3")};
+    ASSERT_TRUE(read({cells, labels})) << read({cells, labels}).error().message;
+    EXPECT_TRUE(says(read({labels}), "has no array 'cells'"));
+    EXPECT_TRUE(says(read({cells}), "has no array 'labels'"));
+    EXPECT_TRUE(
+        says(read({{"cells.npy", npy_bytes("<i4", "(3,)", cell)}, labels}), "expected shape [V, 3], found [3]"));
+    EXPECT_TRUE(says(read({{"cells.npy", npy_bytes("<i4", "(3, 1)", cell)}, labels}), "expected shape [3, 3]"));
+    EXPECT_TRUE(says(read({{"cells.npy", npy_bytes("<f4", "(1, 3)", cell)}, labels}), "cells: expected integers"));
+    EXPECT_TRUE(says(read({{"cells.npy", npy_bytes("<i8", "(1, 3)", std::string(24, '\x7f'))}, labels}),
+                     "cells: a number that does not fit 4 bytes"));
+    EXPECT_TRUE(says(read({cells, {"labels.npy", npy_bytes("|i1", "(1,)", "\xff")}}), "does not fit 1 bytes"));
+    EXPECT_TRUE(says(read({cells, {"labels.npy", npy_bytes("|u1", "(1,)", "\x40")}}), "unknown labels"));
+    EXPECT_TRUE(says(read({cells, {"labels.npy", npy_bytes("|u1", "(2,)", "\1\2")}}), "labels: expected shape [1]"));
+    EXPECT_TRUE(
+        says(read({cells, labels, {"voxel_size.npy", npy_bytes("|u1", "(1,)", "\1")}}), "voxel_size: expected"));
+    EXPECT_TRUE(says(read({cells, labels, {"metadata.npy", npy_bytes("|u1", "(2,)", "[]")}}), "metadata: expected an"));
+    EXPECT_TRUE(
+        says(read({cells, labels, {"metadata.npy", npy_bytes("|u1", "(7,)", "{\"a\":1}")}}), "expected a text"));
+    const std::string six = "abcdef";
+    EXPECT_TRUE(says(read({cells, labels, {"points.npy", npy_bytes("<f2", "(1, 3)", six)}}), "points: expected shape"));
+    EXPECT_TRUE(says(read({cells, labels, {"points.npy", npy_bytes("<f2", "(1, 1, 3)", six)}}), "no array 'colors'"));
+    EXPECT_TRUE(says(read({cells,
+                           labels,
+                           {"points.npy", npy_bytes("<u2", "(1, 1, 3)", six)},
+                           {"colors.npy", npy_bytes("|u1", "(1, 1, 3)", "abc")}}),
+                     "points: expected floats"));
+    EXPECT_TRUE(
+        says(read({{"cells.npy", npy_bytes("<i4", "(0, 3)", "")}, {"labels.npy", npy_bytes("|u1", "(0,)", "")}}),
+             "the grid is empty"));
+}
+
+} // namespace
+} // namespace semrover

@@ -1,0 +1,17 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "tools/commands.h"
+
+namespace semrover {
+
+// a model in the diffusers layout, from a single-file LDM checkpoint or from another folder, with weights of another
+// precision or with the deferred renderer's input channels
+struct ConvertModelOptions {
+    std::string in, out, dtype;
+    bool asd_init = false, dry_run = false;
+};
+Status convert_model(const ConvertModelOptions& options, const Globals& globals);
+
+} // namespace semrover

@@ -1,0 +1,19 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "tools/scene_input.h"
+
+namespace semrover {
+
+// a scene in another format: grids to grids and splats, splats to splats and points
+struct ConvertSceneOptions {
+    std::string in, out, to;
+    SceneInputOptions input;
+    std::string splat_radius = "0.04";
+    float opacity = 1;
+    bool splat_labels = false, dry_run = false;
+};
+Status convert_scene(const ConvertSceneOptions& options, const Globals& globals);
+
+} // namespace semrover

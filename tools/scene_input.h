@@ -1,0 +1,39 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/scene/scene_file.h"
+#include "tools/commands.h"
+
+#include <optional>
+
+namespace semrover {
+
+// how a command reads grids and splats of any format: what `convert`, `render`, `generate` and `inspect` share
+struct SceneInputOptions {
+    std::string from, map, origin, mask, label;
+    float voxel_size = 0.6f;
+    double min_fill = 0;
+    int points_per_voxel = 20;
+    uint64_t seed = 0;
+    bool labels_only = false, nearest_color = false;
+};
+void add_scene_input_options(CLI::App& command, SceneInputOptions& options); // the ones that most files need
+void add_all_scene_input_options(CLI::App& command, SceneInputOptions& options);
+
+// what a file holds: one of the two
+struct SceneInput {
+    SceneFormat format = SceneFormat::sgrid;
+    std::optional<VoxelGrid> grid;
+    std::optional<Surfels> splats;
+    std::vector<std::string> warnings;
+    uint64_t dropped = 0;
+};
+Result<SceneInput> read_scene_input(const Path& path, const SceneInputOptions& options);
+
+void print_warnings(const std::vector<std::string>& warnings, const Globals& globals);
+
+// a grid, with warnings printed; bad_input for splats
+Result<VoxelGrid> load_grid(const Path& path, const SceneInputOptions& options, const Globals& globals);
+
+} // namespace semrover
