@@ -325,6 +325,8 @@ TEST(Rig, the_examples_look_where_their_names_say)
             const Rigid m = path.frames[i].pose.camera_to_world();
             const Point3 forward = {m[2], m[6], m[10]}, down = {m[1], m[5], m[9]}, where = translation_of(m);
             EXPECT_LT(down[2], -0.95) << camera;
+            EXPECT_LT(std::hypot(where[0] - at[0], where[1] - at[1]), 1.5) << camera;
+            EXPECT_LT(std::abs(where[2] - at[2]), 0.5) << camera;
             const Intrinsics& k = path.frames[i].intrinsics;
             const Lens lens(k);
             EXPECT_TRUE(lens.ray(0, k.cy) && lens.ray(k.width, k.cy) && lens.ray(k.cx, 0) && lens.ray(k.cx, k.height));

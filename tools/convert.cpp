@@ -6,6 +6,7 @@
 #include "engine/render/renderer_model.h"
 #include "runtime/quote.h"
 #include "tools/commands.h"
+#include "tools/convert_path.h"
 #include "tools/progress.h"
 
 #include <algorithm>
@@ -22,6 +23,7 @@ namespace fs = std::filesystem;
 struct Options {
     std::string in, out, dtype;
     bool asd_init = false, dry_run = false;
+    ConvertPathOptions path;
 };
 
 // what will be written
@@ -331,6 +333,8 @@ void report(const Plan& plan, const Options& o, const Globals& globals)
 
 Status convert(const Options& o, const Globals& globals)
 {
+    if (is_camera_path(o.in))
+        return convert_path(o.in, o.out, o.path, globals);
     Path out = fs::absolute(o.out).lexically_normal();
     if (!out.has_filename())
         out = out.parent_path(); // "model/"
@@ -360,6 +364,7 @@ void add_convert(CLI::App& app, const Globals& globals, Run& run)
     c->add_flag("--asd-init", o->asd_init,
                 "make a plain UNet the start of a deferred renderer: 9 more input channels, with zero weights");
     c->add_flag("--dry-run", o->dry_run, "check IN and say what would be written");
+    add_path_options(*c, o->path);
     c->callback([o, &globals, &run] { run = [o, &globals] { return convert(*o, globals); }; });
 }
 

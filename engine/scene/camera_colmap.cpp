@@ -234,10 +234,24 @@ Status write_colmap(const Path& folder, const CameraPath& cameras)
                        frame.camera.empty() ? "" : "/", counts[frame.camera]++);
     }
     std::error_code error;
-    std::filesystem::create_directories(folder, error);
-    SR_CHECK(write_file_atomically(folder / "points3D.txt", "# none\n")); // readers ask for it
-    SR_CHECK(write_file_atomically(folder / "cameras.txt", camera_text));
-    return write_file_atomically(folder / "images.txt", image_text);
+    const bool made = std::filesystem::create_directories(folder, error);
+    std::vector<Path> written;
+    for (const auto& [file, text] : {std::pair{"points3D.txt", std::string("# none\n")}, // readers ask for it
+                                     {"cameras.txt", camera_text},
+                                     {"images.txt", image_text}}) {
+        const bool there = std::filesystem::exists(folder / file, error);
+        const Status status = write_file_atomically(folder / file, text);
+        if (!there && status)
+            written.push_back(folder / file);
+        if (status)
+            continue;
+        for (const Path& path : written) // all or nothing
+            std::filesystem::remove(path, error);
+        if (made)
+            std::filesystem::remove(folder, error);
+        return status;
+    }
+    return {};
 }
 
 } // namespace semrover
