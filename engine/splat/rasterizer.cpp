@@ -221,9 +221,16 @@ Result<std::vector<SplatImage>> Rasterizer::render(std::span<const SplatCamera> 
     for (size_t i = 0; i < cameras.size(); ++i)
         SR_CHECK(check_camera(cameras[i], i));
     std::vector<SplatImage> out;
-    for (size_t first = 0; first < cameras.size(); first += cameras_) {
-        const auto some = cameras.subspan(first, std::min<size_t>(cameras_, cameras.size() - first));
-        SR_CHECK(draw(some));
+    while (out.size() < cameras.size()) {
+        const auto some = cameras.subspan(out.size(), std::min<size_t>(cameras_, cameras.size() - out.size()));
+        const Status status = draw(some);
+        if (!status && status.error().code == ErrorCode::out_of_memory && some.size() > 1) {
+            cameras_ = uint32_t(some.size() + 1) / 2; // together they are too many for this device
+            ++rebuilds_;
+            SR_CHECK(build());
+            continue;
+        }
+        SR_CHECK(status);
         SR_CHECK(read_images(uint32_t(some.size()), out));
     }
     return out;

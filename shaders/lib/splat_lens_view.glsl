@@ -1,8 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 
-// a surfel as a camera with a lens sees it, and the pixels that it can reach (research/splat.md, section 1.8): the disc
-// lies in a sphere, that in a cone of rays, the cone in a box of pixels
+// a surfel as a camera with a lens sees it, and the pixels that it can reach (research/splat.md, section 1.8)
 #include "lib/lens.glsl"
 #include "lib/splat_surfel.glsl"
 
@@ -48,55 +47,84 @@ float sector_end(float angle, float spread, float inner, float outer)
     return along * (along > 0.0 ? outer : inner);
 }
 
-// low x and y, high x and y of the cone on the image of a lens around the z axis; false: wholly beyond its limit
-bool sector_bounds(Lens l, LensView s, float half_angle, out vec4 box)
+// the part of a sphere that holds all rays to the disc: angles from an axis, and around it from that of the centre
+struct Cap {
+    float inner, outer, spread;
+};
+
+// both of the sphere around the disc, seen at `half_angle`, and of the disc's extents outwards, around and along the
+// axis; `reach` is the disc's half axes
+Cap find_cap(LensView s, vec3 axis, vec2 reach, float half_angle)
 {
-    const float across = length(s.center.xy), angle = accurate_atan2(across, s.center.z);
-    float inner = max(angle - half_angle, 0.0), outer = angle + half_angle;
-    float spread = kPi; // all around, when the axis lies in the cone
-    if (angle > half_angle && outer < kPi)
-        spread = accurate_asin(min(accurate_sin(half_angle) / accurate_sin(angle), 1.0)) + 1e-4;
+    const float along = dot(s.center, axis);
+    const vec3 from_axis = s.center - along * axis;
+    const float ring = length(from_axis), angle = accurate_atan2(ring, along);
+    Cap cap = Cap(angle - half_angle, angle + half_angle, kPi);
+    if (angle > half_angle && angle + half_angle < kPi)
+        cap.spread = accurate_asin(min(accurate_sin(half_angle) / accurate_sin(angle), 1.0));
+    const vec3 outwards = from_axis / max(ring, 1e-20), around = cross(axis, outwards);
+    const float out_by = length(reach * vec2(dot(s.t_u, outwards), dot(s.t_v, outwards)));
+    if (ring > 1e-5 * s.away && ring > out_by) {
+        const float around_by = length(reach * vec2(dot(s.t_u, around), dot(s.t_v, around)));
+        const float along_by = length(reach * vec2(dot(s.t_u, axis), dot(s.t_v, axis)));
+        const float close = ring - out_by, far = length(vec2(ring + out_by, around_by));
+        const float low = along - along_by, high = along + along_by;
+        cap.spread = min(cap.spread, accurate_atan2(around_by, close));
+        cap.inner = max(cap.inner, accurate_atan2(high > 0.0 ? close : far, high));
+        cap.outer = min(cap.outer, accurate_atan2(low > 0.0 ? far : close, low));
+    }
+    return Cap(max(cap.inner - 2e-6, 0.0), min(cap.outer + 2e-6, kPi), min(1.0001 * cap.spread + 1e-5, kPi));
+}
+
+// low x and y, high x and y of a cap around z on the image; false: wholly beyond the lens
+bool sector_bounds(Lens l, LensView s, Cap cap, out vec4 box)
+{
+    float inner = cap.inner, outer = cap.outer;
     if (kModel == kOpencv) {
         inner = inner < 1.57 ? accurate_sin(inner) / accurate_cos(inner) : l.limit;
         outer = outer < 1.57 ? accurate_sin(outer) / accurate_cos(outer) : l.limit;
     }
-    if (inner >= l.limit * 1.0001)
+    if (inner > l.limit * 1.0001)
         return false;
     inner = lens_distance(kModel, l, min(inner, l.limit)).x;
     outer = min(outer, l.limit);
     // p1 and p2 move a pixel by at most this much (|2 a b| <= r^2, r^2 + 2 a^2 <= 3 r^2)
-    const vec2 tangential = abs(l.first.zw);
-    const vec2 moved = kModel == kOpencv ? outer * outer * (tangential + 3.0 * tangential.yx) : vec2(0.0);
+    vec2 moved = vec2(0.0);
+    if (kModel == kOpencv)
+        moved = outer * outer * (abs(l.first.zw) + 3.0 * abs(l.first.wz));
     outer = lens_distance(kModel, l, outer).x;
-    const float direction = accurate_atan2(s.center.y, s.center.x);
-    const vec2 high = vec2(sector_end(direction, spread, inner, outer), sector_end(direction - 0.5 * kPi, spread, inner, outer));
-    const vec2 low = -vec2(sector_end(direction - kPi, spread, inner, outer), sector_end(direction + 0.5 * kPi, spread, inner, outer));
+    const float to = accurate_atan2(s.center.y, s.center.x), spread = cap.spread;
+    const vec2 high = vec2(sector_end(to, spread, inner, outer), sector_end(to - 0.5 * kPi, spread, inner, outer));
+    const vec2 low = -vec2(sector_end(to - kPi, spread, inner, outer), sector_end(to + 0.5 * kPi, spread, inner, outer));
     box = vec4(low - moved, high + moved) * l.focal.xyxy + l.focal.zwzw;
     return true;
 }
 
-vec4 panorama_bounds(Lens l, LensView s, float half_angle)
+// of a cap around y
+vec4 panorama_bounds(Lens l, LensView s, Cap cap)
 {
-    const float ring = length(s.center.xz), up = accurate_atan2(s.center.y, ring), around = accurate_atan2(s.center.x, s.center.z);
-    const float spread = abs(up) + half_angle < 1.5707 ? accurate_asin(min(accurate_sin(half_angle) * s.away / ring, 1.0)) : kPi;
-    return vec4(around - spread, up - half_angle, around + spread, up + half_angle) * l.focal.xyxy + l.focal.zwzw;
+    const float to = accurate_atan2(s.center.x, s.center.z);
+    return vec4(to - cap.spread, 0.5 * kPi - cap.outer, to + cap.spread, 0.5 * kPi - cap.inner) * l.focal.xyxy + l.focal.zwzw;
 }
 
-bool find_bounds(inout LensView s, Lens l, float opacity, float sigma)
+bool find_bounds(inout LensView s, Lens l, float opacity, vec2 sigmas)
 {
-    const float c2 = min(p.cutoff2, 2.0 * log(opacity / p.alpha_min)), reach = 1.0001 * sqrt(c2) * sigma / s.away;
+    const float c = sqrt(min(p.cutoff2, 2.0 * log(opacity / p.alpha_min)));
+    const vec2 reach = 1.0001 * c * sigmas;
+    const float sphere = max(reach.x, reach.y) / s.away; // 1 and more: the camera is within
     const bool panorama = kModel == kEquirectangular;
-    vec4 box = vec4(0.0, 0.0, float(p.width), float(p.height)); // the camera is within the sphere: anywhere
+    vec3 axis = vec3(0.0, 0.0, 1.0); // note: Mesa 22 gets a choice of vectors wrong where the condition is a constant
+    if (panorama)
+        axis = vec3(0.0, 1.0, 0.0);
+    const Cap cap = find_cap(s, axis, reach, sphere < 0.999 ? accurate_asin(sphere) : kPi);
+    vec4 box = vec4(0.0);
     bool disc = true;
-    if (reach < 0.999) {
-        const float half_angle = accurate_asin(reach) + 1e-6;
-        if (panorama)
-            box = panorama_bounds(l, s, half_angle);
-        else
-            disc = sector_bounds(l, s, half_angle, box);
-    }
+    if (panorama)
+        box = panorama_bounds(l, s, cap);
+    else
+        disc = sector_bounds(l, s, cap, box);
     if (s.pixel.x > kNowhere) { // the screen filter's dot
-        const float dot_radius = sqrt(c2 / p.filter_scale);
+        const float dot_radius = c / sqrt(p.filter_scale);
         box = disc ? vec4(min(box.xy, s.pixel - dot_radius), max(box.zw, s.pixel + dot_radius))
                    : vec4(s.pixel - dot_radius, s.pixel + dot_radius);
     } else if (!disc) {
@@ -128,5 +156,5 @@ bool view_splat(uint splat, uint camera, out LensView s)
         s.normal = -s.normal;
     if (!lens_project(kModel, lens, s.center, s.pixel))
         s.pixel = vec2(kNowhere);
-    return is_finite(vec4(s.pixel, s.away, 0.0)) && find_bounds(s, lens, position.w, max(normal.w, color.w));
+    return is_finite(vec4(s.pixel, s.away, 0.0)) && find_bounds(s, lens, position.w, vec2(normal.w, color.w));
 }
