@@ -413,13 +413,25 @@ struct SplatScene {
     Tensor labels;    // [N] u32
     Tensor cells;     // [N] u32
 };
-// rules where references differ: spec/method.md, section 4
+// how rays become pixels, of all cameras of one call: engine/scene/lens.h
+enum class SplatLens : uint32_t { pinhole, opencv, fisheye, equirectangular };
+constexpr uint32_t splat_camera_floats(SplatLens lens)
+{
+    return lens == SplatLens::pinhole ? 16 : 28;
+}
+constexpr uint32_t splat_record_bytes(SplatLens lens)
+{
+    return lens == SplatLens::pinhole ? 64 : 80;
+}
+
+// rules where references differ: spec/method.md, section 4. Lenses but the pinhole: research/splat.md, section 1.8
 struct SplatOptions {
     uint32_t width = 0, height = 0; // pixels
-    uint32_t max_visible = 0;       // records of (camera, splat) that are kept; one too many and the image is wrong
-    uint32_t max_pairs = 0;         // pairs of a record and a tile that it touches; likewise
-    uint32_t tile = 16;             // pixels, a multiple of 16; the image does not depend on it
-    float near = 0.2f;              // metres
+    SplatLens lens = SplatLens::pinhole;
+    uint32_t max_visible = 0; // records of (camera, splat) that are kept; one too many and the image is wrong
+    uint32_t max_pairs = 0;   // pairs of a record and a tile that it touches; likewise
+    uint32_t tile = 16;       // pixels, a multiple of 16; the image does not depend on it
+    float near = 0.2f;        // metres
     float alpha_min = 1.f / 255, alpha_max = 0.99f;
     float transmittance_min = 1e-4f;
     float screen_variance = 0.5f; // pixels^2, of the screen filter; 0: none
@@ -434,7 +446,8 @@ struct SplatImages { // [cameras * height * width] rows; w = weight of a splat i
 };
 [[nodiscard]] SplatImages
 splat(Graph& g, const SplatScene& scene,
-      Tensor cameras, // [C, 16] fp32: fx fy cx cy, world to camera [3, 4]; fx = 0: sees nothing
-      const SplatOptions& options);
+      // [C, 16] fp32: fx fy cx cy, world to camera [3, 4]; fx = 0: sees nothing. With another lens [C, 28], then
+      // 8 numbers of distortion, limit of the lens, 1 where depth is from the camera instead of along z, 0, 0
+      Tensor cameras, const SplatOptions& options);
 
 } // namespace semrover

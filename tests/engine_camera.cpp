@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/scene/camera_path.h"
+#include "engine/scene/lens.h"
 #include "engine/scene/rig.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
@@ -162,9 +163,17 @@ TEST(Camera, intrinsics_of_a_transforms_file_come_from_frame_then_file_then_fall
     EXPECT_TRUE(says(read(R"("w":1.5,"h":10,"fl_x":7,)", ""), "expected an image size"));
     EXPECT_TRUE(says(read(R"("w":"20","h":10,"fl_x":7,)", ""), "frame 0: w: expected a number, found string"));
     EXPECT_TRUE(says(read(R"("w":20,"h":10,"fl_x":-7,)", ""), "expected focal lengths above 0"));
-    EXPECT_TRUE(says(read(R"("w":20,"h":10,"fl_x":7,)", R"("k1":0.1,)"), "lens distortion k1 = 0.1 is not supported"));
-    EXPECT_TRUE(says(read(R"("camera_model":"OPENCV_FISHEYE","w":20,"h":10,"fl_x":7,)", ""),
-                     "camera_model 'OPENCV_FISHEYE' is not supported"));
+    EXPECT_TRUE(says(read(R"("camera_model":"PINHOLE","w":20,"h":10,"fl_x":7,)", R"("k1":0.1,)"),
+                     "lens distortion k1 = 0.1 is not one of camera_model PINHOLE"));
+    EXPECT_TRUE(says(read(R"("w":20,"h":10,"fl_x":7,)", R"("k4":0.1,)"), // r^8 to nerfstudio, another thing to OpenCV
+                     "lens distortion k4 = 0.1 is not one of camera_model OPENCV"));
+    EXPECT_TRUE(says(read(R"("camera_model":"FISHEYE624","w":20,"h":10,"fl_x":7,)", ""),
+                     "camera_model 'FISHEYE624' is not supported"));
+    EXPECT_TRUE(says(read(R"("camera_model":7,"w":20,"h":10,"fl_x":7,)", ""), "camera_model '7' is not supported"));
+    EXPECT_TRUE(says(read(R"("camera_model":"EQUIRECTANGULAR","w":20,"h":10,"fl_x":7,)", ""),
+                     "fl_x: expected 10 of a panorama of the whole sphere, found 7"));
+    EXPECT_TRUE(says(read(R"("w":20,"h":10,"fl_x":7,)", R"("k1":1e7,)"), "distortion coefficients of at most"));
+    EXPECT_TRUE(says(read(R"("w":20,"h":10,"fl_x":7,)", R"("p1":"x",)"), "p1: expected a number, found string"));
     EXPECT_TRUE(read(R"("camera_model":"PINHOLE","k1":0,"p2":0.0,"w":20,"h":10,"fl_x":7,)", ""));
     EXPECT_TRUE(
         says(read(R"("w":20,"h":10,"fl_x":7,)", R"("camera":"../../etc",)"), "camera: expected a name of letters"));
@@ -277,6 +286,60 @@ TEST(Rig, a_path_of_vehicle_poses_is_taken_as_such)
     EXPECT_NEAR(project(expand_rig(*rig, *drive).frames[0], {13, 0, 0.5})->depth, 2, 1e-12);
 }
 
+TEST(Rig, sensors_may_have_any_lens)
+{
+    const ScratchFolder folder;
+    const auto rig = read_rig(folder.put("rig.json", R"({"comment":"three lenses","sensors":[
+        {"name":"a","model":"fisheye","width":100,"height":80,"fov":180,"distortion":[0.1,0,0,0.2],
+         "sensor_to_vehicle":[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]},
+        {"name":"b","model":"opencv","width":100,"height":80,"fov":90,"distortion":[0.1,0.2,0.3,0.4,0.5],
+         "sensor_to_vehicle":[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]},
+        {"name":"c","model":"equirectangular","width":100,"height":50,
+         "sensor_to_vehicle":[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]},
+        {"name":"d","model":"opencv","width":100,"height":80,"fov":90,"distortion":[0,0,0,0],
+         "sensor_to_vehicle":[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}]})"));
+    ASSERT_TRUE(rig) << rig.error().message;
+    Intrinsics a = fisheye_from_fov(180, 100, 80), b = pinhole_from_fov(90, 100, 80);
+    a.distortion = {0.1, 0, 0, 0.2};
+    b.model = CameraModel::opencv;
+    b.distortion = {0.1, 0.2, 0.3, 0.4, 0.5};
+    EXPECT_NEAR(a.fx, 100 / M_PI, 1e-12);
+    EXPECT_EQ(rig->sensors[0].intrinsics, a);
+    EXPECT_EQ(rig->sensors[1].intrinsics, b);
+    EXPECT_EQ(rig->sensors[2].intrinsics, whole_sphere(100, 50));
+    EXPECT_EQ(rig->sensors[3].intrinsics, pinhole_from_fov(90, 100, 80)); // without distortion
+}
+
+TEST(Rig, the_examples_look_where_their_names_say)
+{
+    const auto drive = read_tum(SEMROVER_SOURCE_DIR "/assets/scenes/street.tum", kView); // along +x, +y to the left
+    for (const char* name : {"waymo", "pandaset"}) {
+        SCOPED_TRACE(name);
+        const auto rig = read_rig(fmt::format("{}/assets/rigs/{}.json", SEMROVER_SOURCE_DIR, name));
+        ASSERT_TRUE(rig) << rig.error().message;
+        EXPECT_EQ(rig->sensors.size(), std::string_view(name) == "waymo" ? 5u : 6u);
+        const CameraPath path = expand_rig(*rig, *drive);
+        const Point3 at = translation_of(drive->frames[0].pose.camera_to_world());
+        for (size_t i = 0; i < rig->sensors.size(); ++i) {
+            const std::string& camera = path.frames[i].camera;
+            const Rigid m = path.frames[i].pose.camera_to_world();
+            const Point3 forward = {m[2], m[6], m[10]}, down = {m[1], m[5], m[9]}, where = translation_of(m);
+            EXPECT_LT(down[2], -0.95) << camera;
+            EXPECT_LT(std::hypot(where[0] - at[0], where[1] - at[1]), 1.5) << camera;
+            EXPECT_LT(std::abs(where[2] - at[2]), 0.5) << camera;
+            const Intrinsics& k = path.frames[i].intrinsics;
+            const Lens lens(k);
+            EXPECT_TRUE(lens.ray(0, k.cy) && lens.ray(k.width, k.cy) && lens.ray(k.cx, 0) && lens.ray(k.cx, k.height));
+            const double sideways = camera.find("left") != std::string::npos    ? 1
+                                    : camera.find("right") != std::string::npos ? -1
+                                                                                : 0;
+            const double ahead = camera == "back" ? -1 : camera.starts_with("front") ? 1 : 0;
+            const double expected = std::atan2(sideways, ahead);
+            EXPECT_NEAR(std::remainder(std::atan2(forward[1], forward[0]) - expected, 2 * M_PI), 0, 0.3) << camera;
+        }
+    }
+}
+
 TEST(Rig, what_is_wrong_with_a_rig_is_named)
 {
     const ScratchFolder folder;
@@ -290,7 +353,15 @@ TEST(Rig, what_is_wrong_with_a_rig_is_named)
     EXPECT_TRUE(says(read_rig(folder.put("r", "[]")), "expected an object with an array of sensors"));
     EXPECT_TRUE(says(changed("\"left\"", "\"front\""), "two sensors are called 'front'"));
     EXPECT_TRUE(says(changed("\"left\"", "\"a/b\""), "sensor 1: expected a name of letters"));
-    EXPECT_TRUE(says(changed("\"pinhole\"", "\"fisheye\""), "sensor 0: model \"fisheye\" is not supported"));
+    EXPECT_TRUE(says(changed("\"pinhole\"", "\"ftheta\""), "sensor 0: model \"ftheta\" is not supported"));
+    EXPECT_TRUE(says(changed("\"pinhole\"", "\"pinhole\",\"distortion\":[0.1,0,0,0]"),
+                     "sensor 0: distortion: expected no numbers of model pinhole, found 4"));
+    EXPECT_TRUE(says(changed("\"pinhole\"", "\"opencv\",\"distortion\":[0.1,0,0]"), "expected 4, 5 or 8 numbers"));
+    EXPECT_TRUE(says(changed("\"pinhole\"", "\"fisheye\",\"distortion\":[0.1,0,0,0,0]"), "expected 4 numbers"));
+    EXPECT_TRUE(says(changed("\"pinhole\"", "\"equirectangular\""), "an equirectangular sensor sees the whole sphere"));
+    EXPECT_TRUE(
+        says(changed(R"("pinhole","width":8,"height":8,"fov":90)", R"("fisheye","width":8,"height":8,"fov":361)"),
+             "expected a fov above 0 and at most 360 degrees, found 361"));
     EXPECT_TRUE(says(changed("\"fov\":90", "\"fov\":180"), "expected a fov above 0 and below 180 degrees"));
     EXPECT_TRUE(says(changed("\"fov\":90", "\"fov\":90,\"fx\":4"), "found both"));
     EXPECT_TRUE(says(changed("\"fov\":90", "\"fovx\":90"), "unknown key 'fovx'"));

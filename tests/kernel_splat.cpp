@@ -5,44 +5,6 @@
 namespace semrover {
 namespace {
 
-// how many of the values are further off than tolerance, and than four times it
-struct Misses {
-    size_t some = 0, gross = 0;
-    void add(double got, double expect, double tolerance)
-    {
-        some += !(std::abs(got - expect) <= tolerance);
-        gross += !(std::abs(got - expect) <= 4 * tolerance);
-    }
-};
-
-// research/splat.md, sections 1.4 and 7.3: 2e-3, but for a thousandth of the values, where a threshold may flip
-void compare(const SplatPixels& got, const std::vector<ReferencePixel>& expect, size_t camera)
-{
-    Misses misses;
-    size_t ids_differ = 0;
-    double deepest = 1;
-    for (const ReferencePixel& e : expect)
-        deepest = std::max(deepest, e.depth);
-    for (size_t i = 0; i < expect.size(); ++i) {
-        const ReferencePixel& e = expect[i];
-        const size_t at = camera * expect.size() + i;
-        for (size_t a = 0; a < 3; ++a) {
-            misses.add(got.color[at * 4 + a], e.color[a], 2e-3);
-            misses.add(got.surface[at * 4 + a], e.normal[a], 2e-3);
-        }
-        misses.add(got.color[at * 4 + 3], e.alpha, 2e-3);
-        misses.add(got.surface[at * 4 + 3], e.depth, 2e-3 * deepest);
-        misses.add(got.depth[at * 2], e.alpha > 0 ? e.depth / e.alpha : 0, 2e-3 * deepest);
-        misses.add(got.depth[at * 2 + 1], e.median, 2e-3 * deepest);
-        const uint32_t cell = e.splat < 0 ? ~0u : 1000 + uint32_t(e.splat),
-                       label = e.splat < 0 ? ~0u : uint32_t(e.splat % 20);
-        ids_differ += got.ids[at * 2] != label || got.ids[at * 2 + 1] != cell;
-    }
-    EXPECT_LE(misses.some, expect.size() * 10 / 1000);
-    EXPECT_LE(misses.gross, expect.size() * 10 / 10000);
-    EXPECT_LE(ids_differ, expect.size() / 200 + 1);
-}
-
 struct SplatCase {
     uint32_t splats, width, height, cameras;
     double smallest, largest; // sigmas, metres
@@ -66,11 +28,6 @@ TEST(kernel_splat, matches_a_rasterizer_in_double)
         for (uint32_t i = 0; i < c.cameras; ++i)
             compare(got, render_reference(splats, cameras[i], c.width, c.height), i);
     }
-}
-
-bool same(const SplatPixels& a, const SplatPixels& b)
-{
-    return a.color == b.color && a.surface == b.surface && a.depth == b.depth && a.ids == b.ids;
 }
 
 TEST(kernel_splat, the_image_does_not_depend_on_tiles_nor_on_the_run)

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "tests/kernel_case.h"
-#include "tests/splat_reference.h"
+#include "tests/splat_lens_reference.h"
 
 namespace semrover {
 
@@ -33,26 +33,20 @@ inline SplatScene scene_of(KernelCase& k, const std::vector<HostSplat>& splats)
     return {k.input(positions, 4), k.input(normals, 4), k.input(colors, 4), k.input(labels), k.input(cells)};
 }
 
-// runs the op on splats of the host; room for all of them unless the options say otherwise
-inline SplatPixels run_splats(const std::vector<HostSplat>& splats, const std::vector<HostCamera>& cameras,
+// runs the op on splats of the host and a table of cameras; room for all unless the options say otherwise
+inline SplatPixels run_splats(const std::vector<HostSplat>& splats, const std::vector<float>& table,
                               SplatOptions options)
 {
     KernelCase k(test_device());
-    std::vector<float> table;
-    for (const HostCamera& c : cameras) {
-        for (double v : {c.fx, c.fy, c.cx, c.cy})
-            table.push_back(float(v));
-        for (double v : c.view)
-            table.push_back(float(v));
-    }
+    const uint32_t floats = splat_camera_floats(options.lens);
     const SplatScene scene = scene_of(k, splats);
     options.visible = k.output(1, 1, DType::u32, 1);
     options.pairs = k.output(1, 1, DType::u32, 1);
     if (!options.max_visible)
-        options.max_visible = uint32_t(splats.size() * cameras.size());
+        options.max_visible = uint32_t(splats.size() * table.size() / floats);
     if (!options.max_pairs)
         options.max_pairs = 1u << 18;
-    const SplatImages y = splat(k.graph, scene, k.input(table, 16), options);
+    const SplatImages y = splat(k.graph, scene, k.input(table, floats), options);
     const auto keep = [&](const Tensor& t) {
         const Tensor out = k.output(t.rows, t.cols, t.dtype, t.ld);
         k.graph.replace(t.resource, out.resource);
@@ -67,6 +61,42 @@ inline SplatPixels run_splats(const std::vector<HostSplat>& splats, const std::v
             k.read_array<uint32_t>(ids),
             k.read_array<uint32_t>(options.visible)[0],
             k.read_array<uint32_t>(options.pairs)[0]};
+}
+
+inline SplatPixels run_splats(const std::vector<HostSplat>& splats, const std::vector<HostCamera>& cameras,
+                              const SplatOptions& options)
+{
+    std::vector<float> table;
+    for (const HostCamera& c : cameras) {
+        for (double v : {c.fx, c.fy, c.cx, c.cy})
+            table.push_back(float(v));
+        for (double v : c.view)
+            table.push_back(float(v));
+    }
+    return run_splats(splats, table, options);
+}
+
+// cameras with lenses, all of one model and size
+inline SplatPixels run_splats(const std::vector<HostSplat>& splats, const std::vector<LensCamera>& cameras,
+                              SplatOptions options = {})
+{
+    std::vector<float> table;
+    for (const LensCamera& c : cameras) {
+        const Lens lens(c.intrinsics);
+        for (double v : {c.intrinsics.fx, c.intrinsics.fy, c.intrinsics.cx, c.intrinsics.cy})
+            table.push_back(float(v));
+        for (double v : c.view)
+            table.push_back(float(v));
+        for (double v : c.intrinsics.distortion)
+            table.push_back(float(v));
+        for (double v : {lens.limit(), lens.radial_depth() ? 1.0 : 0.0, 0.0, 0.0})
+            table.push_back(float(v));
+    }
+    const Intrinsics& k = cameras[0].intrinsics;
+    options.width = k.width;
+    options.height = k.height;
+    options.lens = SplatLens(uint32_t(k.model));
+    return run_splats(splats, table, options);
 }
 
 // splats of all sizes in front of a camera that looks along +z, values as fp32 has them
@@ -101,6 +131,49 @@ inline HostCamera camera_for(uint32_t width, uint32_t height, double yaw = 0, do
             f(width / 2.0 + 1.3),
             f(height / 2.0 - 0.7),
             {f(std::cos(yaw)), 0, f(std::sin(yaw)), f(shift), 0, 1, 0, 0, f(-std::sin(yaw)), 0, f(std::cos(yaw)), 0}};
+}
+
+// how many of the values are further off than tolerance, and than four times it
+struct Misses {
+    size_t some = 0, gross = 0;
+    void add(double got, double expect, double tolerance)
+    {
+        some += !(std::abs(got - expect) <= tolerance);
+        gross += !(std::abs(got - expect) <= 4 * tolerance);
+    }
+};
+
+// research/splat.md, sections 1.4 and 7.3: 2e-3, but for a thousandth of the values, where a threshold may flip
+inline void compare(const SplatPixels& got, const std::vector<ReferencePixel>& expect, size_t camera)
+{
+    Misses misses;
+    size_t ids_differ = 0;
+    double deepest = 1;
+    for (const ReferencePixel& e : expect)
+        deepest = std::max(deepest, e.depth);
+    for (size_t i = 0; i < expect.size(); ++i) {
+        const ReferencePixel& e = expect[i];
+        const size_t at = camera * expect.size() + i;
+        for (size_t a = 0; a < 3; ++a) {
+            misses.add(got.color[at * 4 + a], e.color[a], 2e-3);
+            misses.add(got.surface[at * 4 + a], e.normal[a], 2e-3);
+        }
+        misses.add(got.color[at * 4 + 3], e.alpha, 2e-3);
+        misses.add(got.surface[at * 4 + 3], e.depth, 2e-3 * deepest);
+        misses.add(got.depth[at * 2], e.alpha > 0 ? e.depth / e.alpha : 0, 2e-3 * deepest);
+        misses.add(got.depth[at * 2 + 1], e.median, 2e-3 * deepest);
+        const uint32_t cell = e.splat < 0 ? ~0u : 1000 + uint32_t(e.splat),
+                       label = e.splat < 0 ? ~0u : uint32_t(e.splat % 20);
+        ids_differ += got.ids[at * 2] != label || got.ids[at * 2 + 1] != cell;
+    }
+    EXPECT_LE(misses.some, expect.size() * 10 / 1000);
+    EXPECT_LE(misses.gross, expect.size() * 10 / 10000);
+    EXPECT_LE(ids_differ, expect.size() / 200 + 1);
+}
+
+inline bool same(const SplatPixels& a, const SplatPixels& b)
+{
+    return a.color == b.color && a.surface == b.surface && a.depth == b.depth && a.ids == b.ids;
 }
 
 } // namespace semrover

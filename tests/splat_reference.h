@@ -51,6 +51,22 @@ struct ReferenceSplat {
     std::array<double, 2> center;
 };
 
+// t_u = normalize(e x n), e the axis least aligned with n, and t_v = n x t_u
+inline std::array<Vector, 2> tangents(const Vector& normal)
+{
+    size_t least = 0;
+    for (size_t a = 1; a < 3; ++a)
+        if (std::abs(normal[a]) < std::abs(normal[least]))
+            least = a;
+    Vector e{};
+    e[least] = 1;
+    Vector u = cross(e, normal);
+    const double length = std::sqrt(dot(u, u));
+    for (double& x : u)
+        x /= length;
+    return {u, cross(normal, u)};
+}
+
 inline ReferenceSplat place(const HostSplat& s, const HostCamera& c)
 {
     const auto turn = [&](const Vector& v) {
@@ -58,17 +74,8 @@ inline ReferenceSplat place(const HostSplat& s, const HostCamera& c)
                       c.view[4] * v[0] + c.view[5] * v[1] + c.view[6] * v[2],
                       c.view[8] * v[0] + c.view[9] * v[1] + c.view[10] * v[2]};
     };
-    size_t least = 0;
-    for (size_t a = 1; a < 3; ++a)
-        if (std::abs(s.normal[a]) < std::abs(s.normal[least]))
-            least = a;
-    Vector e{};
-    e[least] = 1;
-    Vector u = cross(e, s.normal);
-    const double length = std::sqrt(dot(u, u));
-    for (double& x : u)
-        x /= length;
-    Vector v = cross(s.normal, u), center = turn(s.position);
+    auto [u, v] = tangents(s.normal);
+    Vector center = turn(s.position);
     for (size_t a = 0; a < 3; ++a) {
         u[a] *= s.sigma_u;
         v[a] *= s.sigma_v;
@@ -104,6 +111,29 @@ inline double alpha_at(const ReferenceSplat& s, double opacity, double x, double
     return alpha < rules.alpha_min || z < rules.near || r > rules.cutoff * rules.cutoff ? 0 : alpha;
 }
 
+// a splat over a pixel with the transmittance t; false when the pixel is done
+inline bool cover(ReferencePixel& pixel, double& t, const HostSplat& s, const Vector& normal, double alpha, double z,
+                  size_t index, const SplatRules& rules)
+{
+    if (alpha == 0)
+        return true;
+    if (t * (1 - alpha) < rules.transmittance_min)
+        return false;
+    const double w = alpha * t;
+    for (size_t a = 0; a < 3; ++a) {
+        pixel.color[a] += w * s.color[a];
+        pixel.normal[a] += w * normal[a];
+    }
+    pixel.depth += w * z;
+    pixel.median = t > 0.5 ? z : pixel.median;
+    if (w > pixel.largest) {
+        pixel.largest = w;
+        pixel.splat = int64_t(index);
+    }
+    t *= 1 - alpha;
+    return true;
+}
+
 inline std::vector<ReferencePixel> render_reference(const std::vector<HostSplat>& splats, const HostCamera& camera,
                                                     uint32_t width, uint32_t height, const SplatRules& rules = {})
 {
@@ -123,22 +153,8 @@ inline std::vector<ReferencePixel> render_reference(const std::vector<HostSplat>
                 continue;
             const double alpha =
                 alpha_at(placed[j], splats[j].opacity, double(i % width) + 0.5, double(i / width) + 0.5, rules, z);
-            if (alpha == 0)
-                continue;
-            if (t * (1 - alpha) < rules.transmittance_min)
+            if (!cover(pixel, t, splats[j], placed[j].normal, alpha, z, j, rules))
                 break;
-            const double w = alpha * t;
-            for (size_t a = 0; a < 3; ++a) {
-                pixel.color[a] += w * splats[j].color[a];
-                pixel.normal[a] += w * placed[j].normal[a];
-            }
-            pixel.depth += w * z;
-            pixel.median = t > 0.5 ? z : pixel.median;
-            if (w > pixel.largest) {
-                pixel.largest = w;
-                pixel.splat = int64_t(j);
-            }
-            t *= 1 - alpha;
         }
         pixel.alpha = 1 - t;
     }

@@ -18,6 +18,7 @@ struct SortOptions {
 struct SplatBenchOptions {
     uint32_t splats = 200000, width = 616, height = 424;
     float sigma = 0.04f;
+    std::string model = "pinhole";
 };
 
 Status bench_sort(const SortOptions& o, const Globals& globals)
@@ -72,21 +73,30 @@ Surfels street_surfels(uint32_t count, float sigma)
     return s;
 }
 
+Intrinsics bench_camera(CameraModel model, uint32_t width, uint32_t height)
+{
+    if (model == CameraModel::equirectangular)
+        return whole_sphere(width, height);
+    Intrinsics k{0.68 * width, 0.68 * width, width / 2.0, height / 2.0, width, height, model};
+    if (model == CameraModel::opencv)
+        k.distortion = {-0.2, 0.05, 0.001, -0.001};
+    return k;
+}
+
 Status bench_splat(const SplatBenchOptions& o, const Globals& globals)
 {
     SR_TRY(const auto device, open_device(globals));
     SR_TRY(const SurfelScene scene, SurfelScene::create(*device, street_surfels(o.splats, o.sigma)));
-    SR_TRY(const auto rasterizer, Rasterizer::create(*device, scene, o.width, o.height, 1));
-    SplatCamera camera;
-    camera.fx = camera.fy = 0.68f * float(o.width);
-    camera.cx = float(o.width) / 2;
-    camera.cy = float(o.height) / 2;
-    camera.world_to_camera = {0, -1, 0, 0, 0, 0, -1, 0, 1, 0, 0, 0};
+    const CameraModel model = camera_model_of(o.model).value_or(CameraModel::pinhole);
+    SR_TRY(const auto rasterizer, Rasterizer::create(*device, scene, o.width, o.height, 1, {.model = model}));
+    const SplatCamera camera =
+        splat_camera(bench_camera(model, o.width, o.height), {{0, -1, 0, 0, 0, 0, -1, 0, 1, 0, 0, 0, 0, 0, 0, 1}});
     SR_CHECK(rasterizer->render({&camera, 1}).map([](const auto&) {})); // finds how much room the pairs need
     device->reset_peak();
     SR_TRY(const Timing timing, measure([&] { return rasterizer->render({&camera, 1}).map([](const auto&) {}); }));
     Json report = bench_report("splat", *device, DType::f32, timing, scene.bytes() + rasterizer->planned_bytes());
     report["splats"] = o.splats;
+    report["camera_model"] = o.model;
     report["width"] = o.width;
     report["height"] = o.height;
     report["msplats_per_second"] = o.splats / timing.ms_median / 1e3;
@@ -115,6 +125,8 @@ void add_bench_splat(CLI::App& bench, const Globals& globals, Run& run)
     c->add_option("-W,--width", o->width, "pixels")->check(CLI::Range(1u, 16384u));
     c->add_option("-H,--height", o->height, "pixels")->check(CLI::Range(1u, 16384u));
     c->add_option("--splat-radius", o->sigma, "metres")->check(CLI::Range(0.001f, 10.f));
+    c->add_option("--camera-model", o->model, "lens")
+        ->check(CLI::IsMember({"pinhole", "opencv", "fisheye", "equirectangular"}));
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_splat(*o, globals); }; });
 }
 

@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// semrover convert IN OUT: a model in another layout, or a scene in another format, by what IN is
+// semrover convert IN OUT: a model in another layout, or a scene or a camera path in another format, by what IN is
 #include "tools/convert_model.h"
+#include "tools/convert_path.h"
 #include "tools/convert_scene.h"
 
 #include <CLI/CLI.hpp>
@@ -13,6 +14,7 @@ namespace {
 struct Options {
     ConvertModelOptions model;
     ConvertSceneOptions scene;
+    ConvertPathOptions path;
 };
 
 // a .bin may be SemanticKITTI's, or a model's pickle
@@ -29,6 +31,8 @@ bool is_scene(const Options& o)
 
 Status convert(Options& o, const Globals& globals)
 {
+    if (is_camera_path(o.model.in))
+        return convert_path(o.model.in, o.model.out, o.path, globals);
     if (!is_scene(o))
         return convert_model(o.model, globals);
     if (!o.model.dtype.empty() || o.model.asd_init)
@@ -62,6 +66,7 @@ void add_convert(CLI::App& app, const Globals& globals, Run& run)
                   "grid to splats: standard deviation in metres, or auto: from the spacing of the points");
     c->add_option("--opacity", o->scene.opacity, "grid to splats: of every splat")->check(CLI::Range(0.01f, 1.f));
     c->add_flag("--splat-labels", o->scene.splat_labels, "a property label in .ply splats");
+    add_path_options(*c, o->path);
     c->callback([o, &globals, &run] { run = [o, &globals] { return convert(*o, globals); }; });
 }
 

@@ -4,6 +4,7 @@
 
 #include "engine/scene/rig.h"
 #include "engine/splat/blocks.h"
+#include "runtime/hash.h"
 #include "runtime/quote.h"
 
 #include <CLI/CLI.hpp>
@@ -12,7 +13,7 @@ namespace semrover {
 
 namespace {
 
-// end of the run of frames from `first` with the same time and size
+// end of the run of frames from `first` with the same time, size and camera model
 size_t end_of_moment(const CameraPath& path, size_t first)
 {
     const CameraFrame& a = path.frames[first];
@@ -20,7 +21,7 @@ size_t end_of_moment(const CameraPath& path, size_t first)
     for (; end < path.frames.size(); ++end) {
         const CameraFrame& b = path.frames[end];
         if (b.time != a.time || b.camera == a.camera || b.intrinsics.width != a.intrinsics.width ||
-            b.intrinsics.height != a.intrinsics.height)
+            b.intrinsics.height != a.intrinsics.height || b.intrinsics.model != a.intrinsics.model)
             break;
     }
     return end;
@@ -44,11 +45,11 @@ Result<SurfelOptions> surfel_options(const std::string& splat_radius, float opac
 
 void add_drive_options(CLI::App& c, DriveOptions& o)
 {
-    c.add_option("--path", o.path, "camera path: TUM, or nerfstudio transforms.json");
-    c.add_option("-W,--width", o.width, "pixels")->check(CLI::Range(1u, 16384u));
-    c.add_option("-H,--height", o.height, "pixels")->check(CLI::Range(1u, 16384u));
-    c.add_option("--fov-x", o.fov, "horizontal field of view in degrees, where the path has no intrinsics")
-        ->check(CLI::Range(1.0, 170.0));
+    c.add_option(
+        "--path", o.path,
+        "camera path: TUM, KITTI, nerfstudio transforms.json or camera_path.json, or a folder of COLMAP's text");
+    add_lens_options(c, o);
+    c.add_flag("--equirect", o.equirect, "panoramas of W x W/2 in place of the path's cameras");
     c.add_option("--rig", o.rig, "rig.json: every sensor at every pose, in folders of their names");
     c.add_option("--splat-radius", o.splat_radius,
                  "standard deviation of a splat in metres, or auto: from the spacing of the points");
@@ -61,6 +62,11 @@ void add_drive_options(CLI::App& c, DriveOptions& o)
 Status check_drive(const DriveOptions& o)
 {
     SR_CHECK(surfel_options(o.splat_radius, o.opacity).map([](const auto&) {}));
+    SR_CHECK(intrinsics_of(o).map([](const auto&) {}));
+    if (o.equirect && !o.rig.empty())
+        return fail(ErrorCode::usage, "--equirect or --rig; a rig.json may have an equirectangular sensor");
+    if (o.equirect && o.width % 2)
+        return fail(ErrorCode::usage, "--equirect draws W x W/2 pixels, and {} is odd", o.width);
     return background_of(o).map([](const auto&) {});
 }
 
@@ -91,21 +97,40 @@ Result<SurfelScene> load_scene(const DriveOptions& o, const Path& grid_path, con
 
 Result<CameraPath> load_cameras(const DriveOptions& o)
 {
-    const Intrinsics intrinsics = pinhole_from_fov(o.fov, o.width, o.height);
-    SR_TRY(const CameraPath path, read_camera_path(o.path, intrinsics));
+    SR_TRY(const Intrinsics intrinsics, intrinsics_of(o));
+    SR_TRY(CameraPath path, read_camera_path(o.path, intrinsics));
+    if (o.equirect)
+        for (CameraFrame& frame : path.frames)
+            frame.intrinsics = whole_sphere(o.width, o.width / 2);
     if (o.rig.empty())
         return path;
     SR_TRY(const Rig rig, read_rig(o.rig));
     return expand_rig(rig, path);
 }
 
+uint64_t hash_cameras(const CameraPath& path)
+{
+    Hash hash;
+    for (const CameraFrame& f : path.frames) {
+        const Intrinsics& k = f.intrinsics;
+        const double view[] = {f.time, k.fx, k.fy, k.cx, k.cy, double(k.width), double(k.height), double(k.model)};
+        hash.add(f.camera);
+        hash.add(std::as_bytes(std::span(view)));
+        hash.add(std::as_bytes(std::span(k.distortion)));
+        hash.add(std::as_bytes(std::span(f.pose.world_to_camera)));
+    }
+    return hash.value();
+}
+
 Result<std::vector<SplatImage>> PathRenderer::render(std::span<const CameraFrame> frames)
 {
     const Intrinsics& size = frames.front().intrinsics;
-    auto& rasterizer = rasterizers_[{size.width, size.height}];
+    auto& rasterizer = rasterizers_[{size.width, size.height, size.model}];
     if (!rasterizer) {
+        RasterizerOptions options = options_;
+        options.model = size.model;
         SR_TRY(rasterizer,
-               Rasterizer::create(device_, scene_, size.width, size.height, uint32_t(frames.size()), options_));
+               Rasterizer::create(device_, scene_, size.width, size.height, uint32_t(frames.size()), options));
     }
     std::vector<SplatCamera> cameras;
     for (const CameraFrame& frame : frames)

@@ -6,10 +6,12 @@
 #include "engine/scene/camera_path.h"
 #include "engine/scene/grid.h"
 #include "engine/splat/rasterizer.h"
+#include "tools/lens_options.h"
 
 #include <functional>
 #include <map>
 #include <optional>
+#include <tuple>
 
 namespace CLI {
 class App;
@@ -18,10 +20,9 @@ class App;
 namespace semrover {
 
 // how a grid is driven through and drawn: what `render` and `refine` share
-struct DriveOptions {
+struct DriveOptions : LensOptions {
     std::string path, rig, splat_radius = "0.04", background = "0,0,0";
-    uint32_t width = 616, height = 424;
-    double fov = 73.0; // degrees: the focal length of the reference pictures, 420 pixels at a width of 616
+    bool equirect = false; // panoramas of width x width / 2 in place of the path's cameras
     float opacity = 1;
     std::optional<float> visible_alpha; // 0.5, or what a model says
     bool semantic = false;
@@ -33,10 +34,11 @@ Result<SurfelOptions> surfel_options(const std::string& splat_radius, float opac
 Status check_drive(const DriveOptions& options);                           // usage
 Result<std::array<uint8_t, 3>> background_of(const DriveOptions& options); // usage
 Result<CameraPath> load_cameras(const DriveOptions& options);              // the path, through the rig if any
+uint64_t hash_cameras(const CameraPath& path);
 Result<SurfelScene> load_scene(const DriveOptions& options, const Path& grid_path, const VoxelGrid& grid,
                                Device& device);
 
-// frames of one moment are drawn in one submit, with one rasterizer for each image size
+// frames of one moment are drawn in one submit, with one rasterizer for each image size and camera model
 class PathRenderer {
   public:
     PathRenderer(Device& device, const SurfelScene& scene, const RasterizerOptions& options)
@@ -50,7 +52,7 @@ class PathRenderer {
     Device& device_;
     const SurfelScene& scene_;
     RasterizerOptions options_;
-    std::map<std::pair<uint32_t, uint32_t>, std::unique_ptr<Rasterizer>> rasterizers_;
+    std::map<std::tuple<uint32_t, uint32_t, CameraModel>, std::unique_ptr<Rasterizer>> rasterizers_;
 };
 
 // draws a whole path in order; `drawn` gets every frame, `moved` how many there were after each moment and may stop the

@@ -160,15 +160,9 @@ Result<Json> input_json(const Job& j)
     if (!o.from_grid())
         return input;
     SR_TRY(const uint64_t grid, hash_file(o.input));
-    SR_TRY(const uint64_t path, hash_file(o.drive.path));
     input["grid"] = hash_text(grid);
-    input["path"] = hash_text(path);
-    if (!o.drive.rig.empty()) {
-        SR_TRY(const uint64_t rig, hash_file(o.drive.rig));
-        input["rig"] = hash_text(rig);
-    }
-    input["drive"] = {{"fov_x", o.drive.fov},
-                      {"splat_radius", o.drive.splat_radius},
+    input["path"] = hash_text(hash_cameras(j.path)); // as read, whatever files and options it came from
+    input["drive"] = {{"splat_radius", o.drive.splat_radius},
                       {"opacity", o.drive.opacity},
                       {"visible_alpha", j.visible_alpha},
                       {"background", o.drive.background}};

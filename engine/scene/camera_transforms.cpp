@@ -4,6 +4,7 @@
 #include "engine/scene/json_numbers.h"
 #include "runtime/quote.h"
 
+#include <algorithm>
 #include <map>
 
 namespace semrover {
@@ -37,21 +38,51 @@ class Settings {
     std::string_view where_;
 };
 
-Status check_lens(const Settings& settings)
+struct TransformsModel {
+    const char* name;
+    CameraModel model;
+    std::vector<const char*> coefficients; // in the order of Intrinsics::distortion; nullptr: none
+};
+
+// nerfstudio's names; its OPENCV has a k4 of r^8, which no OpenCV lens has. FULL_OPENCV is COLMAP's name.
+const TransformsModel kModels[] = {
+    {"OPENCV", CameraModel::opencv, {"k1", "k2", "p1", "p2", "k3"}},
+    {"PINHOLE", CameraModel::pinhole, {}},
+    {"SIMPLE_PINHOLE", CameraModel::pinhole, {}},
+    {"SIMPLE_RADIAL", CameraModel::opencv, {"k1"}},
+    {"RADIAL", CameraModel::opencv, {"k1", "k2"}},
+    {"FULL_OPENCV", CameraModel::opencv, {"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"}},
+    {"OPENCV_FISHEYE", CameraModel::fisheye, {"k1", "k2", "k3", "k4"}},
+    {"EQUIRECTANGULAR", CameraModel::equirectangular, {}},
+};
+
+Result<const TransformsModel*> read_model(const Settings& settings)
 {
-    if (const Json* model = settings.find("camera_model")) {
-        const std::string name = model->is_string() ? model->get<std::string>() : model->dump(-1, ' ', true);
-        if (name != "OPENCV" && name != "PINHOLE" && name != "SIMPLE_PINHOLE")
-            return fail(ErrorCode::bad_input, "{}: camera_model {} is not supported, expected OPENCV or PINHOLE",
-                        settings.where(), quote(name, 60));
-    }
-    for (const char* key : {"k1", "k2", "k3", "k4", "p1", "p2"}) {
+    const Json* model = settings.find("camera_model");
+    if (!model)
+        return &kModels[0];
+    const std::string name = model->is_string() ? model->get<std::string>() : model->dump(-1, ' ', true);
+    const auto found = std::ranges::find(kModels, name, &TransformsModel::name);
+    if (found != std::end(kModels))
+        return found;
+    std::vector<const char*> names;
+    for (const TransformsModel& m : kModels)
+        names.push_back(m.name);
+    return fail(ErrorCode::bad_input, "{}: camera_model {} is not supported, expected one of {}", settings.where(),
+                quote(name, 60), fmt::join(names, ", "));
+}
+
+Status read_lens(const Settings& settings, const TransformsModel& model, Intrinsics& k)
+{
+    k.model = model.model;
+    for (const char* key : {"k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"}) {
         SR_TRY(const std::optional<double> value, settings.number(key));
-        if (value.value_or(0) != 0)
-            return fail(
-                ErrorCode::bad_input,
-                "{}: lens distortion {} = {} is not supported; set k1 to k4, p1 and p2 to 0 to render a pinhole",
-                settings.where(), key, *value);
+        const auto at = std::ranges::find(model.coefficients, std::string_view(key));
+        if (at != model.coefficients.end())
+            k.distortion[size_t(at - model.coefficients.begin())] = value.value_or(0);
+        else if (value.value_or(0) != 0)
+            return fail(ErrorCode::bad_input, "{}: lens distortion {} = {} is not one of camera_model {}",
+                        settings.where(), key, *value, model.name);
     }
     return {};
 }
@@ -73,19 +104,38 @@ Result<Intrinsics> read_size(const Settings& settings, const std::optional<Intri
     return k;
 }
 
+// nerfstudio's focal lengths of a panorama are w / 2 and h, and its centre is the picture's
+Result<Intrinsics> read_panorama(const Settings& settings, const Intrinsics& size)
+{
+    const std::pair<const char*, double> whole[] = {
+        {"fl_x", size.width / 2.0}, {"fl_y", double(size.height)}, {"cx", size.width / 2.0}, {"cy", size.height / 2.0}};
+    for (const auto& [key, expected] : whole) {
+        SR_TRY(const std::optional<double> value, settings.number(key));
+        if (value && std::abs(*value - expected) > 1e-6 * expected)
+            return fail(ErrorCode::bad_input, "{}: {}: expected {} of a panorama of the whole sphere, found {}",
+                        settings.where(), key, expected, *value);
+    }
+    return whole_sphere(size.width, size.height);
+}
+
 Result<Intrinsics> read_intrinsics(const Settings& settings, const std::optional<Intrinsics>& fallback)
 {
-    SR_CHECK(check_lens(settings));
     SR_TRY(Intrinsics k, read_size(settings, fallback));
+    SR_TRY(const TransformsModel* model, read_model(settings));
+    SR_CHECK(read_lens(settings, *model, k));
+    if (k.model == CameraModel::equirectangular)
+        return read_panorama(settings, k);
     SR_TRY(const std::optional<double> fl_x, settings.number("fl_x"));
     SR_TRY(const std::optional<double> fl_y, settings.number("fl_y"));
     SR_TRY(const std::optional<double> angle_x, settings.number("camera_angle_x"));
     SR_TRY(const std::optional<double> cx, settings.number("cx"));
     SR_TRY(const std::optional<double> cy, settings.number("cy"));
+    if (!fl_x && !angle_x && fallback && fallback->model != CameraModel::pinhole && !settings.find("camera_model"))
+        return scaled_to(*fallback, k.width, k.height); // a file of poses
     if (fl_x)
         k.fx = *fl_x;
-    else if (angle_x)
-        k.fx = k.width / 2.0 / std::tan(*angle_x / 2); // radians across the width
+    else if (angle_x) // radians across the width
+        k.fx = k.model == CameraModel::fisheye ? k.width / *angle_x : k.width / 2.0 / std::tan(*angle_x / 2);
     else if (fallback)
         k.fx = scaled_to(*fallback, k.width, k.height).fx;
     else
@@ -94,7 +144,7 @@ Result<Intrinsics> read_intrinsics(const Settings& settings, const std::optional
     k.cx = cx.value_or(k.width / 2.0);
     k.cy = cy.value_or(k.height / 2.0);
     SR_CHECK(check_intrinsics(k, settings.where()));
-    return k;
+    return simplified(k);
 }
 
 Result<CameraFrame> read_frame(const Json& file, const Json& json, size_t index, std::string_view where,
@@ -120,22 +170,51 @@ Result<CameraFrame> read_frame(const Json& file, const Json& json, size_t index,
     return frame;
 }
 
-void put_intrinsics(nlohmann::ordered_json& object, const Intrinsics& k)
+const TransformsModel& model_for(const Intrinsics& k)
 {
+    switch (k.model) {
+    case CameraModel::opencv:
+        return k.distortion[5] != 0 || k.distortion[6] != 0 || k.distortion[7] != 0 ? kModels[5] : kModels[0];
+    case CameraModel::fisheye:
+        return kModels[6];
+    case CameraModel::equirectangular:
+        return kModels[7];
+    case CameraModel::pinhole:
+        break;
+    }
+    return kModels[0]; // without distortion
+}
+
+// with all coefficients, so that a frame's hide the file's
+void put_intrinsics(nlohmann::ordered_json& object, const Intrinsics& k, bool with_lens)
+{
+    const bool panorama = k.model == CameraModel::equirectangular;
     object["w"] = k.width;
     object["h"] = k.height;
-    object["fl_x"] = k.fx;
-    object["fl_y"] = k.fy;
+    object["fl_x"] = panorama ? k.width / 2.0 : k.fx;
+    object["fl_y"] = panorama ? double(k.height) : k.fy;
     object["cx"] = k.cx;
     object["cy"] = k.cy;
+    if (!with_lens)
+        return;
+    const TransformsModel& model = model_for(k);
+    object["camera_model"] = model.name;
+    for (const char* key : {"k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"}) {
+        const auto at = std::ranges::find(model.coefficients, std::string_view(key));
+        object[key] = at == model.coefficients.end() ? 0.0 : k.distortion[size_t(at - model.coefficients.begin())];
+    }
 }
 
 } // namespace
 
 Result<CameraPath> read_transforms(const Path& path, const std::optional<Intrinsics>& fallback)
 {
-    const std::string name = quote_path(path);
     SR_TRY(const Json file, read_json(path));
+    return parse_transforms(file, quote_path(path), fallback);
+}
+
+Result<CameraPath> parse_transforms(const Json& file, std::string_view name, const std::optional<Intrinsics>& fallback)
+{
     const auto frames = file.is_object() ? file.find("frames") : file.end();
     if (!file.is_object() || frames == file.end() || !frames->is_array())
         return fail(ErrorCode::bad_input, "{}: expected an object with an array of frames", name);
@@ -153,9 +232,12 @@ Status write_transforms(const Path& path, const CameraPath& cameras)
 {
     SR_ASSERT(!cameras.frames.empty(), "a camera path without frames");
     nlohmann::ordered_json file;
-    file["camera_model"] = "OPENCV";
     const Intrinsics& shared = cameras.frames[0].intrinsics;
-    put_intrinsics(file, shared);
+    const bool lenses = std::ranges::any_of(
+        cameras.frames, [](const CameraFrame& f) { return f.intrinsics.model != CameraModel::pinhole; });
+    if (!lenses)
+        file["camera_model"] = "OPENCV";
+    put_intrinsics(file, shared, lenses);
     file["frames"] = nlohmann::ordered_json::array();
     std::map<std::string, size_t> counts;
     for (const CameraFrame& frame : cameras.frames) {
@@ -166,7 +248,7 @@ Status write_transforms(const Path& path, const CameraPath& cameras)
             entry["camera"] = frame.camera;
         entry["time"] = frame.time;
         if (frame.intrinsics != shared)
-            put_intrinsics(entry, frame.intrinsics);
+            put_intrinsics(entry, frame.intrinsics, lenses);
         const Rigid m = compose(frame.pose.camera_to_world(), kFlipYZ);
         for (size_t row = 0; row < 4; ++row)
             entry["transform_matrix"].push_back({m[row * 4], m[row * 4 + 1], m[row * 4 + 2], m[row * 4 + 3]});

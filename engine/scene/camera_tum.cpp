@@ -1,44 +1,33 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/scene/camera_path.h"
+#include "engine/scene/camera_text.h"
 #include "runtime/quote.h"
 
-#include <charconv>
+#include <cmath>
 #include <iterator>
 
 namespace semrover {
 
 namespace {
 
-constexpr uint64_t kMaxPathBytes = 16u << 20;
-constexpr std::string_view kBlanks = " \t\r";
 constexpr std::string_view kFields = "t tx ty tz qx qy qz qw";
 
-// the numbers of one line, none for a blank line or a comment
-Result<std::vector<double>> line_numbers(std::string_view line, std::string_view where)
+// none for a blank line or a comment
+Result<std::optional<CameraFrame>> read_line(std::string_view line, std::string_view where,
+                                             const Intrinsics& intrinsics)
 {
-    std::vector<double> numbers;
-    line = line.substr(0, line.find('#'));
-    while (true) {
-        const size_t begin = line.find_first_not_of(kBlanks);
-        if (begin == std::string_view::npos)
-            break;
-        line.remove_prefix(begin);
-        const std::string_view word = line.substr(0, line.find_first_of(kBlanks));
-        double value = 0;
-        const std::string_view digits = word.starts_with('+') ? word.substr(1) : word;
-        const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-        if (error != std::errc() || end != digits.data() + digits.size())
-            return fail(ErrorCode::bad_input, "{}: expected a number, found {}", where, quote(word, 40));
-        numbers.push_back(value);
-        if (numbers.size() > 8)
-            break;
-        line.remove_prefix(word.size());
-    }
-    if (!numbers.empty() && numbers.size() != 8)
+    const std::vector<std::string_view> words = words_of(line, 8);
+    SR_TRY(const std::vector<double> v, numbers_of_words(words, where));
+    if (v.empty())
+        return std::optional<CameraFrame>();
+    if (v.size() != 8)
         return fail(ErrorCode::bad_input, "{}: expected the 8 numbers {}, found {}", where, kFields,
-                    numbers.size() > 8 ? "more" : fmt::format("{}", numbers.size()));
-    return numbers;
+                    v.size() > 8 ? "more" : fmt::format("{}", v.size()));
+    SR_TRY(const Rigid camera_to_world, rigid_from_quaternion({v[1], v[2], v[3]}, {v[4], v[5], v[6], v[7]}, where));
+    if (!std::isfinite(v[0]))
+        return fail(ErrorCode::bad_input, "{}: a time that is not finite", where);
+    return std::optional(CameraFrame{v[0], "", {inverse(camera_to_world)}, intrinsics});
 }
 
 } // namespace
@@ -49,19 +38,10 @@ Result<CameraPath> read_tum(const Path& path, const Intrinsics& intrinsics)
     SR_CHECK(check_intrinsics(intrinsics, name));
     SR_TRY(const std::string text, read_text_file(path, kMaxPathBytes));
     CameraPath cameras;
-    size_t number = 0;
-    for (std::string_view rest = text; !rest.empty();) {
-        const size_t length = rest.find('\n');
-        const std::string_view line = rest.substr(0, length);
-        rest.remove_prefix(length == std::string_view::npos ? rest.size() : length + 1);
-        const std::string where = fmt::format("{} line {}", name, ++number);
-        SR_TRY(const std::vector<double> v, line_numbers(line, where));
-        if (v.empty())
-            continue;
-        SR_TRY(const Rigid camera_to_world, rigid_from_quaternion({v[1], v[2], v[3]}, {v[4], v[5], v[6], v[7]}, where));
-        if (!(v[0] - v[0] == 0)) // infinite or NaN
-            return fail(ErrorCode::bad_input, "{}: a time that is not finite", where);
-        cameras.frames.push_back({v[0], "", {inverse(camera_to_world)}, intrinsics});
+    for (TextLines lines(text); lines.next();) {
+        SR_TRY(const auto frame, read_line(lines.line(), fmt::format("{} line {}", name, lines.number()), intrinsics));
+        if (frame)
+            cameras.frames.push_back(*frame);
     }
     if (cameras.frames.empty())
         return fail(ErrorCode::bad_input, "{}: a camera path without poses, expected lines of {}", name, kFields);
@@ -79,11 +59,6 @@ Status write_tum(const Path& path, const CameraPath& cameras)
                        fmt::join(translation_of(camera_to_world), " "), fmt::join(quaternion_of(camera_to_world), " "));
     }
     return write_file_atomically(path, text);
-}
-
-Result<CameraPath> read_camera_path(const Path& path, const Intrinsics& fallback)
-{
-    return path.extension() == ".json" ? read_transforms(path, fallback) : read_tum(path, fallback);
 }
 
 } // namespace semrover

@@ -33,6 +33,52 @@ Result<double> required_number(const Json& object, const char* key, std::string_
     return *value;
 }
 
+Result<CameraModel> read_model(const Json& json, std::string_view where)
+{
+    if (!json.contains("model"))
+        return CameraModel::pinhole;
+    const Json& model = json["model"];
+    const auto found = model.is_string() ? camera_model_of(model.get_ref<const std::string&>()) : std::nullopt;
+    if (!found)
+        return fail(ErrorCode::bad_input,
+                    "{}: model {} is not supported, expected \"pinhole\", \"opencv\", \"fisheye\" or "
+                    "\"equirectangular\"",
+                    where, printable(model.dump(-1, ' ', true), 60));
+    return *found;
+}
+
+Result<Intrinsics> from_fov(double fov, const Intrinsics& size, std::string_view where)
+{
+    const bool fisheye = size.model == CameraModel::fisheye;
+    if (!(fov > 0 && (fisheye ? fov <= 360 : fov < 180)))
+        return fail(ErrorCode::bad_input, "{}: expected a fov above 0 and {} degrees, found {}", where,
+                    fisheye ? "at most 360" : "below 180", fov);
+    Intrinsics k =
+        fisheye ? fisheye_from_fov(fov, size.width, size.height) : pinhole_from_fov(fov, size.width, size.height);
+    k.model = size.model;
+    return k;
+}
+
+Status read_distortion(const Json& json, Intrinsics& k, std::string_view where)
+{
+    if (!json.contains("distortion"))
+        return {};
+    const std::string what = fmt::format("{}: distortion", where);
+    SR_TRY(const std::vector<double> values, numbers_of(json["distortion"], what));
+    const size_t n = values.size();
+    const bool fits = k.model == CameraModel::opencv    ? n == 4 || n == 5 || n == 8
+                      : k.model == CameraModel::fisheye ? n == 4
+                                                        : n == 0;
+    if (!fits)
+        return fail(ErrorCode::bad_input, "{}: expected {} of model {}, found {}", what,
+                    k.model == CameraModel::opencv    ? "4, 5 or 8 numbers"
+                    : k.model == CameraModel::fisheye ? "4 numbers"
+                                                      : "no numbers",
+                    name_of(k.model), n);
+    std::ranges::copy(values, k.distortion.begin());
+    return {};
+}
+
 Result<Intrinsics> read_intrinsics(const Json& json, std::string_view where)
 {
     SR_TRY(const double width, required_number(json, "width", where));
@@ -40,22 +86,27 @@ Result<Intrinsics> read_intrinsics(const Json& json, std::string_view where)
     Intrinsics k;
     SR_TRY(k.width, image_side(width, fmt::format("{}: width", where)));
     SR_TRY(k.height, image_side(height, fmt::format("{}: height", where)));
+    SR_TRY(k.model, read_model(json, where));
     SR_TRY(const std::optional<double> fov, optional_number(json, "fov", where));
-    if (fov) {
-        if (json.contains("fx") || json.contains("fy") || json.contains("cx") || json.contains("cy"))
+    const bool focal = json.contains("fx") || json.contains("fy") || json.contains("cx") || json.contains("cy");
+    if (k.model == CameraModel::equirectangular) {
+        if (fov || focal)
+            return fail(ErrorCode::bad_input, "{}: an equirectangular sensor sees the whole sphere, without fov or fx",
+                        where);
+        k = whole_sphere(k.width, k.height);
+    } else if (fov) {
+        if (focal)
             return fail(ErrorCode::bad_input, "{}: expected fov or fx, fy, cx, cy, found both", where);
-        if (!(*fov > 0 && *fov < 180))
-            return fail(ErrorCode::bad_input, "{}: expected a fov above 0 and below 180 degrees, found {}", where,
-                        *fov);
-        k = pinhole_from_fov(*fov, k.width, k.height);
+        SR_TRY(k, from_fov(*fov, k, where));
     } else {
         SR_TRY(k.fx, required_number(json, "fx", where));
         SR_TRY(k.fy, required_number(json, "fy", where));
         SR_TRY(k.cx, required_number(json, "cx", where));
         SR_TRY(k.cy, required_number(json, "cy", where));
     }
+    SR_CHECK(read_distortion(json, k, where));
     SR_CHECK(check_intrinsics(k, where));
-    return k;
+    return simplified(k);
 }
 
 Result<Rigid> read_mounting(const Json& json, std::string_view where)
@@ -83,11 +134,10 @@ Result<Sensor> read_sensor(const Json& json, std::string_view where)
 {
     if (!json.is_object())
         return fail(ErrorCode::bad_input, "{}: expected an object, found {}", where, json.type_name());
-    SR_CHECK(check_keys(json, {"name", "model", "width", "height", "fov", "fx", "fy", "cx", "cy", "sensor_to_vehicle"},
+    SR_CHECK(check_keys(json,
+                        {"name", "model", "width", "height", "fov", "fx", "fy", "cx", "cy", "distortion",
+                         "sensor_to_vehicle", "comment"},
                         where));
-    if (json.contains("model") && json["model"] != "pinhole")
-        return fail(ErrorCode::bad_input, "{}: model {} is not supported, expected \"pinhole\"", where,
-                    printable(json["model"].dump(-1, ' ', true), 60));
     if (!json.contains("name") || !json["name"].is_string() ||
         !is_camera_name(json["name"].get_ref<const std::string&>()))
         return fail(ErrorCode::bad_input, "{}: expected a name of letters, digits, '.', '_' and '-'", where);
@@ -119,7 +169,7 @@ Result<Rig> read_rig(const Path& path)
     SR_TRY(const Json file, read_json(path));
     if (!file.is_object() || !file.contains("sensors") || !file["sensors"].is_array())
         return fail(ErrorCode::bad_input, "{}: expected an object with an array of sensors", name);
-    SR_CHECK(check_keys(file, {"path_axes", "sensors"}, name));
+    SR_CHECK(check_keys(file, {"path_axes", "sensors", "comment"}, name));
     const Json& sensors = file["sensors"];
     if (sensors.empty() || sensors.size() > kMaxSensors)
         return fail(ErrorCode::bad_input, "{}: expected 1 to {} sensors, found {}", name, kMaxSensors, sensors.size());

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/splat/rasterizer.h"
 
+#include "engine/scene/lens.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -9,18 +11,47 @@ namespace semrover {
 
 namespace {
 
-constexpr uint32_t kRecordBytes = 64, kPairBytes = 4;
-constexpr uint32_t kCameraFloats = 16;
+constexpr uint32_t kPairBytes = 4;
+
+SplatLens lens_of(CameraModel model)
+{
+    switch (model) {
+    case CameraModel::opencv:
+        return SplatLens::opencv;
+    case CameraModel::fisheye:
+        return SplatLens::fisheye;
+    case CameraModel::equirectangular:
+        return SplatLens::equirectangular;
+    case CameraModel::pinhole:
+        break;
+    }
+    return SplatLens::pinhole;
+}
 
 Status check_camera(const SplatCamera& c, size_t index)
 {
     bool finite = std::isfinite(c.fx) && std::isfinite(c.fy) && std::isfinite(c.cx) && std::isfinite(c.cy);
     for (float v : c.world_to_camera)
         finite = finite && std::isfinite(v);
+    for (float v : c.distortion)
+        finite = finite && std::isfinite(v);
     if (!finite || c.fx == 0 || c.fy == 0)
         return fail(ErrorCode::bad_input, "camera {}: {}", index,
                     finite ? "no focal length" : "a number is not finite");
     return {};
+}
+
+// a camera as the kernels take it
+void write_row(const SplatCamera& c, std::span<float> row)
+{
+    const float focal[] = {c.fx, c.fy, c.cx, c.cy};
+    std::copy_n(focal, 4, row.begin());
+    std::copy_n(c.world_to_camera.data(), 12, row.begin() + 4);
+    if (row.size() == 16)
+        return;
+    std::copy_n(c.distortion.data(), 8, row.begin() + 16);
+    row[24] = c.limit;
+    row[25] = c.radial_depth;
 }
 
 // room for `need` and a quarter more, if the device can bind it
@@ -36,9 +67,16 @@ Result<uint32_t> room_for(uint32_t need, uint32_t bytes_each, const DeviceLimits
 
 SplatCamera splat_camera(const Intrinsics& i, const Pose& pose)
 {
-    SplatCamera c{float(i.fx), float(i.fy), float(i.cx), float(i.cy), {}};
+    SplatCamera c{float(i.fx), float(i.fy), float(i.cx), float(i.cy)};
+    const auto narrowed = [](double v) { return float(v); };
     std::transform(pose.world_to_camera.begin(), pose.world_to_camera.begin() + 12, c.world_to_camera.begin(),
-                   [](double v) { return float(v); });
+                   narrowed);
+    if (i.model != CameraModel::pinhole) {
+        const Lens lens(i);
+        std::ranges::transform(i.distortion, c.distortion.begin(), narrowed);
+        c.limit = float(lens.limit());
+        c.radial_depth = lens.radial_depth();
+    }
     return c;
 }
 
@@ -62,7 +100,8 @@ Result<std::unique_ptr<Rasterizer>> Rasterizer::create(Device& device, const Sur
                     "{} x {} pixels of {} splats need {} bytes in one tensor; this device takes {}", width, height,
                     scene.size(), per_camera, limit);
     r->cameras_ = uint32_t(std::min<uint64_t>(max_cameras, limit / per_camera));
-    r->max_visible_ = uint32_t(std::min<uint64_t>(std::max(scene.size(), 1024u), limit / kRecordBytes));
+    r->max_visible_ =
+        uint32_t(std::min<uint64_t>(std::max(scene.size(), 1024u), limit / splat_record_bytes(lens_of(options.model))));
     const uint64_t pairs = options.max_pairs ? options.max_pairs : std::max<uint64_t>(8ull * scene.size(), 65536);
     r->max_pairs_ = uint32_t(std::min(pairs, limit / kPairBytes));
     SR_CHECK(r->build());
@@ -74,13 +113,16 @@ Status Rasterizer::build()
     program_.reset();
     memory_ = std::make_unique<Arena>();
     const uint64_t pixels = uint64_t(width_) * height_ * cameras_;
-    for (uint64_t bytes : {uint64_t(cameras_) * kCameraFloats * 4, uint64_t(4), uint64_t(4), pixels * 16, pixels * 16,
+    const SplatLens lens = lens_of(options_.model);
+    const uint32_t camera_floats = splat_camera_floats(lens);
+    for (uint64_t bytes : {uint64_t(cameras_) * camera_floats * 4, uint64_t(4), uint64_t(4), pixels * 16, pixels * 16,
                            pixels * 8, pixels * 8})
         memory_->add(bytes); // in the order of Slot
     SR_CHECK(memory_->allocate(device_, "splat images"));
     Graph g;
     SplatOptions o{.width = width_,
                    .height = height_,
+                   .lens = lens,
                    .max_visible = max_visible_,
                    .max_pairs = max_pairs_,
                    .tile = options_.tile};
@@ -93,7 +135,7 @@ Status Rasterizer::build()
     o.visible = g.external(memory_->slice(kVisible), 1, 1, DType::u32, "visible splats", 1);
     o.pairs = g.external(memory_->slice(kPairs), 1, 1, DType::u32, "splat pairs", 1);
     const Tensor cameras =
-        g.external(memory_->slice(kCameras), cameras_, kCameraFloats, DType::f32, "cameras", kCameraFloats);
+        g.external(memory_->slice(kCameras), cameras_, camera_floats, DType::f32, "cameras", camera_floats);
     const SplatImages y = splat(g, scene_.in(g), cameras, o);
     for (const auto& [slot, made] :
          {std::pair{kColor, y.color}, {kSurface, y.surface}, {kDepth, y.depth}, {kIds, y.ids}}) {
@@ -107,7 +149,8 @@ Status Rasterizer::build()
 Status Rasterizer::make_room(uint32_t visible, uint32_t pairs)
 {
     if (visible > max_visible_) {
-        SR_TRY(max_visible_, room_for(visible, kRecordBytes, device_.limits(), "visible splats"));
+        SR_TRY(max_visible_,
+               room_for(visible, splat_record_bytes(lens_of(options_.model)), device_.limits(), "visible splats"));
     }
     if (pairs > max_pairs_) {
         SR_TRY(max_pairs_, room_for(pairs, kPairBytes, device_.limits(), "pairs of splat and tile"));
@@ -119,13 +162,10 @@ Status Rasterizer::make_room(uint32_t visible, uint32_t pairs)
 // the frames of at most cameras_ cameras, into memory_
 Status Rasterizer::draw(std::span<const SplatCamera> cameras)
 {
-    std::vector<float> table(size_t(cameras_) * kCameraFloats);
-    for (size_t i = 0; i < cameras.size(); ++i) {
-        const SplatCamera& c = cameras[i];
-        const float lens[] = {c.fx, c.fy, c.cx, c.cy};
-        std::copy_n(lens, 4, &table[i * kCameraFloats]);
-        std::copy_n(c.world_to_camera.data(), 12, &table[i * kCameraFloats + 4]);
-    }
+    const uint32_t floats = splat_camera_floats(lens_of(options_.model));
+    std::vector<float> table(size_t(cameras_) * floats);
+    for (size_t i = 0; i < cameras.size(); ++i)
+        write_row(cameras[i], std::span(table).subspan(i * floats, floats));
     for (;;) {
         SR_CHECK(device_.write(memory_->slice(kCameras), std::as_bytes(std::span(table))));
         SR_CHECK(program_->run());
@@ -181,9 +221,16 @@ Result<std::vector<SplatImage>> Rasterizer::render(std::span<const SplatCamera> 
     for (size_t i = 0; i < cameras.size(); ++i)
         SR_CHECK(check_camera(cameras[i], i));
     std::vector<SplatImage> out;
-    for (size_t first = 0; first < cameras.size(); first += cameras_) {
-        const auto some = cameras.subspan(first, std::min<size_t>(cameras_, cameras.size() - first));
-        SR_CHECK(draw(some));
+    while (out.size() < cameras.size()) {
+        const auto some = cameras.subspan(out.size(), std::min<size_t>(cameras_, cameras.size() - out.size()));
+        const Status status = draw(some);
+        if (!status && status.error().code == ErrorCode::out_of_memory && some.size() > 1) {
+            cameras_ = uint32_t(some.size() + 1) / 2; // together they are too many for this device
+            ++rebuilds_;
+            SR_CHECK(build());
+            continue;
+        }
+        SR_CHECK(status);
         SR_CHECK(read_images(uint32_t(some.size()), out));
     }
     return out;

@@ -17,6 +17,10 @@ namespace semrover {
 struct SplatCamera {
     float fx = 0, fy = 0, cx = 0, cy = 0;    // pixels
     std::array<float, 12> world_to_camera{}; // [3, 4], row-major, metres
+    // of a lens that is no pinhole: engine/scene/lens.h
+    std::array<float, 8> distortion{};
+    float limit = 0;
+    bool radial_depth = false; // depth is the distance from the camera, not along z
 };
 SplatCamera splat_camera(const Intrinsics& intrinsics, const Pose& pose);
 
@@ -26,7 +30,7 @@ struct SplatImage {
     std::vector<float> color;          // [.., 3] sum of w rgb, nothing behind it
     std::vector<float> alpha;          // sum of w
     std::vector<float> normal;         // [.., 3] sum of w normal; camera frame, towards the camera
-    std::vector<float> depth_sum;      // sum of w depth, metres along the axis
+    std::vector<float> depth_sum;      // sum of w depth, metres along the axis (or as SplatCamera::radial_depth says)
     std::vector<float> depth_expected; // depth_sum / alpha, 0 where alpha is
     std::vector<float> depth_median;   // of the splat with which alpha passes one half, else of the last; 0 for none
     std::vector<uint32_t> label, cell; // of the splat with the largest w; kNothing for none
@@ -40,10 +44,11 @@ struct RasterizerOptions {
     float near = 0.2f; // metres
     float alpha_min = 1.f / 255, alpha_max = 0.99f;
     float transmittance_min = 1e-4f;
-    float screen_variance = 0.5f; // pixels^2; 0: no screen filter
-    float cutoff = 0;             // sigmas; 0: as far as alpha_min
-    uint32_t tile = 16;           // pixels, a multiple of 16
-    uint32_t max_pairs = 0;       // to begin with; 0: from the number of surfels
+    float screen_variance = 0.5f;             // pixels^2; 0: no screen filter
+    float cutoff = 0;                         // sigmas; 0: as far as alpha_min
+    uint32_t tile = 16;                       // pixels, a multiple of 16
+    uint32_t max_pairs = 0;                   // to begin with; 0: from the number of surfels
+    CameraModel model = CameraModel::pinhole; // of all cameras
 };
 
 // Draws a scene from up to max_cameras cameras in one submit; more are drawn in turns. The graph is built once and

@@ -5,6 +5,10 @@
 // m: (u, v) = m d / (1 + g . d), d from the centre in pixels; g, depth of the centre, opacity; colour, normal
 const uint kRecord = 4;
 
+// five texels of one that a camera with a lens sees: pixel of the centre, bounds; a, opacity; b, normal . centre;
+// normal, depth of the centre; colour. Bounds in x whose first is beyond their last run around a panorama's seam.
+const uint kRayRecord = 5;
+
 float sign_of(float v) { return v < 0.0 ? -1.0 : 1.0; }
 
 // a unit vector in 32 bits, to about 1e-4: Cigolle et al. 2014, octahedral
@@ -26,3 +30,12 @@ vec3 unpack_normal(uint bits)
 
 // first and last tile in x, then in y, from the second half of a record's first texel
 uvec4 tile_range(uvec2 bounds, uint tile) { return uvec4(bounds.x & 0xffff, bounds.x >> 16, bounds.y & 0xffff, bounds.y >> 16) / tile; }
+
+// first tile and number of tiles in x, then in y; in x they may run around the seam
+uvec4 tile_span(uvec2 bounds, uint tile, uint tiles_x)
+{
+    const uvec4 range = tile_range(bounds, tile);
+    const bool around = (bounds.x & 0xffff) > bounds.x >> 16;
+    const uint across = around ? min(tiles_x - range.x + range.y + 1, tiles_x) : range.y - range.x + 1;
+    return uvec4(range.x, across, range.z, range.w - range.z + 1);
+}

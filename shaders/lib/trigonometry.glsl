@@ -28,3 +28,24 @@ float sin_quadrant(float x, int shift)
 
 float accurate_sin(float x) { return sin_quadrant(x, 0); }
 float accurate_cos(float x) { return sin_quadrant(x, 1); }
+
+// atan of 0 <= x <= 1, to about 1 ulp (Cephes atanf)
+float atan_octant(float x)
+{
+    const bool upper = x > 0.41421356;
+    const float t = upper ? (x - 1.0) / (x + 1.0) : x, z = t * t;
+    const float value = t + t * z * (-3.33329491539e-1 + z * (1.99777106478e-1 + z * (-1.38776856032e-1 + z * 8.05374449538e-2)));
+    return upper ? 0.78539816339 + value : value;
+}
+
+// Vulkan only asks for 4096 ulp of atan; 0 at the origin
+float accurate_atan2(float y, float x)
+{
+    const float ax = abs(x), ay = abs(y), high = max(ax, ay);
+    const float octant = atan_octant(high > 0.0 ? min(ax, ay) / high : 0.0);
+    const float quadrant = ay > ax ? 1.57079632679 - octant : octant;
+    const float upper = x < 0.0 ? 3.14159265359 - quadrant : quadrant;
+    return y < 0.0 ? -upper : upper;
+}
+
+float accurate_asin(float x) { return accurate_atan2(x, sqrt(max((1.0 - x) * (1.0 + x), 0.0))); }

@@ -1,0 +1,160 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+
+// a surfel as a camera with a lens sees it, and the pixels that it can reach (research/splat.md, section 1.8)
+#include "lib/lens.glsl"
+#include "lib/splat_surfel.glsl"
+
+layout(constant_id = 0) const uint kModel = 1;
+layout(push_constant) uniform Push { SplatPush p; };
+layout(binding = 0) readonly buffer Cameras { vec4 cameras[]; };     // [cameras, kCameraVectors]
+layout(binding = 1) readonly buffer Positions { vec4 positions[]; }; // [splats] xyz, opacity
+layout(binding = 2) readonly buffer Normals { vec4 normals[]; };     // [splats] xyz, sigma_u
+layout(binding = 3) readonly buffer Colors { vec4 colors[]; };       // [splats] rgb, sigma_v
+
+#include "lib/splat_camera.glsl"
+
+struct LensView {
+    vec3 center;   // camera frame, metres
+    float away;    // |center|
+    vec3 t_u, t_v; // unit
+    vec3 normal;   // towards the camera
+    vec2 pixel;    // of the centre; far off where the lens does not see it
+    ivec4 bounds;  // first and last pixel in x, then in y; in a panorama first > last: from there on around to here
+};
+
+const float kNowhere = -1e9;
+
+// pixels across a panorama whose centres lie within [low, high], which may run over its sides
+ivec2 wrapped_range(float low, float high)
+{
+    const int width = int(p.width);
+    const float margin = 0.05 + 1e-3 * (high - low);
+    const int first = int(ceil(low - margin - 0.5)), last = int(floor(high + margin - 0.5));
+    if (last - first + 1 >= width)
+        return ivec2(0, width - 1);
+    if (last < first)
+        return ivec2(0, -1);
+    return ivec2(first < 0 ? first + width : first >= width ? first - width : first,
+                 last < 0 ? last + width : last >= width ? last - width : last);
+}
+
+// the largest x of radii [inner, outer] and directions within `spread` of `angle`
+float sector_end(float angle, float spread, float inner, float outer)
+{
+    const float around = abs(angle - 2.0 * kPi * floor(angle / (2.0 * kPi) + 0.5)); // to the x axis
+    const float along = accurate_cos(max(around - spread, 0.0));
+    return along * (along > 0.0 ? outer : inner);
+}
+
+// the part of a sphere that holds all rays to the disc: angles from an axis, and around it from that of the centre
+struct Cap {
+    float inner, outer, spread;
+};
+
+// both of the sphere around the disc, seen at `half_angle`, and of the disc's extents outwards, around and along the
+// axis; `reach` is the disc's half axes
+Cap find_cap(LensView s, vec3 axis, vec2 reach, float half_angle)
+{
+    const float along = dot(s.center, axis);
+    const vec3 from_axis = s.center - along * axis;
+    const float ring = length(from_axis), angle = accurate_atan2(ring, along);
+    Cap cap = Cap(angle - half_angle, angle + half_angle, kPi);
+    if (angle > half_angle && angle + half_angle < kPi)
+        cap.spread = accurate_asin(min(accurate_sin(half_angle) / accurate_sin(angle), 1.0));
+    const vec3 outwards = from_axis / max(ring, 1e-20), around = cross(axis, outwards);
+    const float out_by = length(reach * vec2(dot(s.t_u, outwards), dot(s.t_v, outwards)));
+    if (ring > 1e-5 * s.away && ring > out_by) {
+        const float around_by = length(reach * vec2(dot(s.t_u, around), dot(s.t_v, around)));
+        const float along_by = length(reach * vec2(dot(s.t_u, axis), dot(s.t_v, axis)));
+        const float close = ring - out_by, far = length(vec2(ring + out_by, around_by));
+        const float low = along - along_by, high = along + along_by;
+        cap.spread = min(cap.spread, accurate_atan2(around_by, close));
+        cap.inner = max(cap.inner, accurate_atan2(high > 0.0 ? close : far, high));
+        cap.outer = min(cap.outer, accurate_atan2(low > 0.0 ? far : close, low));
+    }
+    return Cap(max(cap.inner - 2e-6, 0.0), min(cap.outer + 2e-6, kPi), min(1.0001 * cap.spread + 1e-5, kPi));
+}
+
+// low x and y, high x and y of a cap around z on the image; false: wholly beyond the lens
+bool sector_bounds(Lens l, LensView s, Cap cap, out vec4 box)
+{
+    float inner = cap.inner, outer = cap.outer;
+    if (kModel == kOpencv) {
+        inner = inner < 1.57 ? accurate_sin(inner) / accurate_cos(inner) : l.limit;
+        outer = outer < 1.57 ? accurate_sin(outer) / accurate_cos(outer) : l.limit;
+    }
+    if (inner > l.limit * 1.0001)
+        return false;
+    inner = lens_distance(kModel, l, min(inner, l.limit)).x;
+    outer = min(outer, l.limit);
+    // p1 and p2 move a pixel by at most this much (|2 a b| <= r^2, r^2 + 2 a^2 <= 3 r^2)
+    vec2 moved = vec2(0.0);
+    if (kModel == kOpencv)
+        moved = outer * outer * (abs(l.first.zw) + 3.0 * abs(l.first.wz));
+    outer = lens_distance(kModel, l, outer).x;
+    const float to = accurate_atan2(s.center.y, s.center.x), spread = cap.spread;
+    const vec2 high = vec2(sector_end(to, spread, inner, outer), sector_end(to - 0.5 * kPi, spread, inner, outer));
+    const vec2 low = -vec2(sector_end(to - kPi, spread, inner, outer), sector_end(to + 0.5 * kPi, spread, inner, outer));
+    box = vec4(low - moved, high + moved) * l.focal.xyxy + l.focal.zwzw;
+    return true;
+}
+
+// of a cap around y
+vec4 panorama_bounds(Lens l, LensView s, Cap cap)
+{
+    const float to = accurate_atan2(s.center.x, s.center.z);
+    return vec4(to - cap.spread, 0.5 * kPi - cap.outer, to + cap.spread, 0.5 * kPi - cap.inner) * l.focal.xyxy + l.focal.zwzw;
+}
+
+bool find_bounds(inout LensView s, Lens l, float opacity, vec2 sigmas)
+{
+    const float c = sqrt(min(p.cutoff2, 2.0 * log(opacity / p.alpha_min)));
+    const vec2 reach = 1.0001 * c * sigmas;
+    const float sphere = max(reach.x, reach.y) / s.away; // 1 and more: the camera is within
+    const bool panorama = kModel == kEquirectangular;
+    vec3 axis = vec3(0.0, 0.0, 1.0); // note: Mesa 22 gets a choice of vectors wrong where the condition is a constant
+    if (panorama)
+        axis = vec3(0.0, 1.0, 0.0);
+    const Cap cap = find_cap(s, axis, reach, sphere < 0.999 ? accurate_asin(sphere) : kPi);
+    vec4 box = vec4(0.0);
+    bool disc = true;
+    if (panorama)
+        box = panorama_bounds(l, s, cap);
+    else
+        disc = sector_bounds(l, s, cap, box);
+    if (s.pixel.x > kNowhere) { // the screen filter's dot
+        const float dot_radius = c / sqrt(p.filter_scale);
+        box = disc ? vec4(min(box.xy, s.pixel - dot_radius), max(box.zw, s.pixel + dot_radius))
+                   : vec4(s.pixel - dot_radius, s.pixel + dot_radius);
+    } else if (!disc) {
+        return false;
+    }
+    s.bounds = ivec4(panorama ? wrapped_range(box.x, box.z) : pixel_range(box.x, box.z, p.width), pixel_range(box.y, box.w, p.height));
+    return (panorama ? s.bounds.y >= 0 : s.bounds.x <= s.bounds.y) && s.bounds.z <= s.bounds.w;
+}
+
+// false: nothing of it can be seen, or it is not a splat
+bool view_splat(uint splat, uint camera, out LensView s)
+{
+    const vec4 position = positions[splat], normal = normals[splat], color = colors[splat];
+    const Lens lens = camera_lens(camera);
+    if (lens.focal.x == 0.0 || !is_finite(position) || !is_finite(normal) || !is_finite(color) ||
+        dot(normal.xyz, normal.xyz) < 1e-6 || !(position.w >= p.alpha_min) || !(normal.w > 0.0) || !(color.w > 0.0))
+        return false;
+    const mat4x3 view = camera_view(camera);
+    s.center = view * vec4(position.xyz, 1.0);
+    s.away = length(s.center);
+    if (!((kModel == kOpencv ? s.center.z : s.away) > p.near))
+        return false;
+    vec3 t_u, t_v;
+    tangents(normal.xyz, t_u, t_v);
+    s.t_u = mat3(view) * t_u;
+    s.t_v = mat3(view) * t_v;
+    s.normal = mat3(view) * normal.xyz;
+    if (dot(s.normal, s.center) > 0.0)
+        s.normal = -s.normal;
+    if (!lens_project(kModel, lens, s.center, s.pixel))
+        s.pixel = vec2(kNowhere);
+    return is_finite(vec4(s.pixel, s.away, 0.0)) && find_bounds(s, lens, position.w, vec2(normal.w, color.w));
+}

@@ -1,0 +1,28 @@
+#version 460
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// rays[camera][y][x] = unit ray through the centre of a pixel, and the depth of a hit at a distance of 1; a depth of 0
+// where the lens does not look
+#extension GL_GOOGLE_include_directive : require
+#include "splat.h"
+#include "lib/lens.glsl"
+#include "lib/thread.glsl"
+
+layout(local_size_x = 64) in;
+layout(constant_id = 0) const uint kModel = 1;
+layout(push_constant) uniform Push { SplatPush p; };
+layout(binding = 0) readonly buffer Cameras { vec4 cameras[]; }; // [cameras, kCameraVectors]
+layout(binding = 1) writeonly buffer Rays { vec4 rays[]; };      // [cameras, height, width]
+#include "lib/splat_camera.glsl"
+
+void main()
+{
+    const uint i = linear_thread(), image = p.width * p.height;
+    if (i >= p.cameras * image)
+        return;
+    const uint camera = i / image, at = i % image;
+    const Lens lens = camera_lens(camera);
+    vec3 ray = vec3(0.0);
+    const bool seen = lens.focal.x != 0.0 && lens_unproject(kModel, lens, vec2(at % p.width, at / p.width) + 0.5, ray);
+    rays[i] = seen ? vec4(ray, camera_depth_is_radial(camera) ? 1.0 : ray.z) : vec4(0.0);
+}

@@ -1,0 +1,391 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/scene/camera_path.h"
+#include "tests/says.h"
+#include "tests/scratch_folder.h"
+
+#include <cmath>
+#include <filesystem>
+#include <gtest/gtest.h>
+#include <random>
+
+namespace semrover {
+namespace {
+
+const Intrinsics kView = pinhole_from_fov(90, 616, 424);
+
+void expect_near(const Rigid& a, const Rigid& b, double tolerance)
+{
+    for (size_t i = 0; i < 16; ++i)
+        EXPECT_NEAR(a[i], b[i], tolerance) << "element " << i;
+}
+
+void expect_near(const Intrinsics& a, const Intrinsics& b, double tolerance)
+{
+    EXPECT_EQ(a.model, b.model);
+    EXPECT_EQ(a.width, b.width);
+    EXPECT_EQ(a.height, b.height);
+    for (const auto& [x, y] : {std::pair{a.fx, b.fx}, {a.fy, b.fy}, {a.cx, b.cx}, {a.cy, b.cy}})
+        EXPECT_NEAR(x, y, tolerance);
+    for (size_t i = 0; i < 8; ++i)
+        EXPECT_NEAR(a.distortion[i], b.distortion[i], tolerance);
+}
+
+// `count` arbitrary poses, a second apart
+CameraPath random_path(size_t count, const Intrinsics& intrinsics = kView)
+{
+    std::mt19937 random(17);
+    const auto number = [&] { return double(random()) / 2147483648.0 - 1; };
+    CameraPath path;
+    while (path.frames.size() < count) {
+        Quaternion q = {number(), number(), number(), number()};
+        const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+        for (double& v : q)
+            v /= norm;
+        const Rigid pose = rigid_from_quaternion({number() * 900, number() * 900, number()}, q, "t").value();
+        path.frames.push_back({double(path.frames.size()), "", {pose}, intrinsics});
+    }
+    return path;
+}
+
+void expect_same(const CameraPath& a, const CameraPath& b)
+{
+    ASSERT_EQ(a.frames.size(), b.frames.size());
+    for (size_t i = 0; i < a.frames.size(); ++i) {
+        SCOPED_TRACE(i);
+        EXPECT_NEAR(a.frames[i].time, b.frames[i].time, 1e-6);
+        EXPECT_EQ(a.frames[i].camera, b.frames[i].camera);
+        expect_near(a.frames[i].pose.world_to_camera, b.frames[i].pose.world_to_camera, 1e-6);
+        expect_near(a.frames[i].intrinsics, b.frames[i].intrinsics, 1e-6);
+    }
+}
+
+Status write(PathFormat format, const Path& path, const CameraPath& cameras)
+{
+    switch (format) {
+    case PathFormat::tum:
+        return write_tum(path, cameras);
+    case PathFormat::kitti:
+        return write_kitti(path, cameras);
+    case PathFormat::transforms:
+        return write_transforms(path, cameras);
+    case PathFormat::camera_path:
+        return write_camera_path_json(path, cameras);
+    case PathFormat::colmap:
+        break;
+    }
+    return write_colmap(path, cameras);
+}
+
+// research/splat.md, section 7.9
+TEST(CameraFiles, a_path_that_goes_through_all_five_formats_is_the_same)
+{
+    const ScratchFolder folder;
+    const CameraPath path = random_path(20);
+    CameraPath now = path;
+    for (const auto& [format, file] : {std::pair{PathFormat::kitti, "poses.txt"},
+                                       {PathFormat::transforms, "transforms.json"},
+                                       {PathFormat::camera_path, "camera_path.json"},
+                                       {PathFormat::colmap, "sparse"},
+                                       {PathFormat::tum, "path.tum"}}) {
+        SCOPED_TRACE(file);
+        ASSERT_TRUE(write(format, folder / file, now));
+        auto read = read_camera_path(folder / file, kView);
+        ASSERT_TRUE(read) << read.error().message;
+        now = std::move(*read);
+        expect_same(now, path);
+    }
+}
+
+// every lens through every format that has a place for it
+TEST(CameraFiles, lenses_come_back)
+{
+    const ScratchFolder folder;
+    Intrinsics plain{300, 310, 150.5, 99.25, 303, 201, CameraModel::opencv, {-0.1, 0.02, 0.003, -0.004}},
+        third = plain, rational = plain,
+        fisheye{200, 201, 160, 120, 320, 240, CameraModel::fisheye, {0.1, -0.02, 0.003, -0.0004}};
+    third.distortion[4] = 0.05;
+    rational.distortion = {-0.1, 0.02, 0.003, -0.004, 0.05, 0.06, 0.07, 0.08};
+    for (const Intrinsics& k : {plain, third, rational, fisheye, whole_sphere(64, 32)})
+        for (const auto& [format, file] : {std::pair{PathFormat::transforms, "a.json"}, {PathFormat::colmap, "a"}}) {
+            SCOPED_TRACE(fmt::format("{} {}", name_of(k.model), file));
+            const CameraPath path = random_path(3, k);
+            ASSERT_TRUE(write(format, folder / file, path));
+            const auto read = read_camera_path(folder / file, kView);
+            ASSERT_TRUE(read) << read.error().message;
+            expect_same(*read, path);
+        }
+    for (const Intrinsics& k : {fisheye_from_fov(100, 64, 48), whole_sphere(64, 32), pinhole_from_fov(80, 50, 40)}) {
+        const CameraPath path = random_path(3, k);
+        ASSERT_TRUE(write_camera_path_json(folder / "b.json", path));
+        const auto read = read_camera_path(folder / "b.json", kView);
+        ASSERT_TRUE(read) << read.error().message;
+        expect_same(*read, path);
+    }
+    CameraPath mixed = random_path(4, plain);
+    mixed.frames[1].intrinsics = pinhole_from_fov(80, 50, 40);
+    mixed.frames[2].intrinsics = fisheye;
+    mixed.frames[3].intrinsics = whole_sphere(64, 32);
+    for (const char* file : {"mixed.json", "mixed"}) {
+        ASSERT_TRUE(write(file[5] ? PathFormat::transforms : PathFormat::colmap, folder / file, mixed));
+        const auto read = read_camera_path(folder / file, kView);
+        ASSERT_TRUE(read) << read.error().message;
+        expect_same(*read, mixed);
+    }
+}
+
+TEST(CameraFiles, cameras_of_a_rig_come_back_moment_by_moment)
+{
+    const ScratchFolder folder;
+    CameraPath path = random_path(6);
+    for (size_t i = 0; i < 6; ++i) {
+        path.frames[i].camera = i % 2 ? "left" : "front";
+        path.frames[i].time = double(i / 2);
+    }
+    for (const auto& [format, file] : {std::pair{PathFormat::transforms, "a.json"}, {PathFormat::colmap, "a"}}) {
+        ASSERT_TRUE(write(format, folder / file, path));
+        const auto read = read_camera_path(folder / file, kView);
+        ASSERT_TRUE(read) << read.error().message;
+        expect_same(*read, path);
+    }
+}
+
+// pixels of the corners of a cube of edge 2 around (3, 0, 0), seen from the origin along +x, z up
+void expect_cube(const Result<CameraPath>& path, double focal, double cx, double cy)
+{
+    ASSERT_TRUE(path) << path.error().message;
+    for (const double x : {2.0, 4.0})
+        for (const double y : {-1.0, 1.0})
+            for (const double z : {-1.0, 1.0}) {
+                const auto pixel = project(path->frames[0], {x, y, z});
+                ASSERT_TRUE(pixel);
+                EXPECT_NEAR(pixel->x, cx - focal * y / x, 1e-9);
+                EXPECT_NEAR(pixel->y, cy - focal * z / x, 1e-9);
+                EXPECT_NEAR(pixel->depth, x, 1e-9);
+            }
+}
+
+// files by hand, from the specification of each
+TEST(CameraFiles, a_known_cube_falls_on_known_pixels_from_every_format)
+{
+    const ScratchFolder folder;
+    const Intrinsics view = pinhole_from_fov(90, 8, 8);
+    // right = -y, down = -z, forward = +x
+    expect_cube(read_camera_path(folder.put("poses.txt", "0 0 1 0 -1 0 0 0 0 -1 0 0\n"), view), 4, 4, 4);
+    // right = -y, up = +z, back = -x
+    expect_cube(read_camera_path(folder.put("camera_path.json", R"({"camera_type":"perspective","render_height":8,
+        "render_width":8,"seconds":1,"fps":24,"keyframes":[],"crop":null,"camera_path":[{"fov":90,"aspect":1,
+        "camera_to_world":[0,0,-1,0, -1,0,0,0, 0,1,0,0, 0,0,0,1]}]})"),
+                                 kView),
+                4, 4, 4);
+    // of COLMAP's format.rst, but for the pose: world to camera
+    std::filesystem::create_directory(folder / "sparse");
+    folder.put("sparse/cameras.txt", "# Camera list with one line of data per camera:\n#   CAMERA_ID, MODEL, WIDTH, "
+                                     "HEIGHT, PARAMS[]\n# Number of cameras: 2\n3 SIMPLE_PINHOLE 8 8 4 4 4\n"
+                                     "1 PINHOLE 10 10 7 7 5 5\n");
+    folder.put("sparse/images.txt",
+               "# Image list with two lines of data per image:\n2 0.5 0.5 -0.5 0.5 0 0 0 3 P1180141.JPG\n"
+               "2362.39 248.498 58396 1784.7 268.254 59027 1784.7 268.254 -1\n1 1 0 0 0 5 6 7 1 P1180142.JPG\n\n");
+    const auto colmap = read_camera_path(folder / "sparse", kView);
+    expect_cube(colmap, 4, 4, 4);
+    ASSERT_EQ(colmap->frames.size(), 2u);
+    EXPECT_EQ(colmap->frames[1].intrinsics, (Intrinsics{7, 7, 5, 5, 10, 10}));
+    EXPECT_EQ(colmap->frames[1].pose.world_to_camera[7], 6);
+    EXPECT_EQ(colmap->frames[1].time, 1);
+}
+
+TEST(CameraFiles, kitti_takes_times_and_calibration_from_beside_the_poses)
+{
+    const ScratchFolder folder;
+    const std::string pose = "1 0 0 0 0 1 0 0 0 0 1 0\n";
+    folder.put("times.txt", "0.000000e+00\n1.037223e-01\n");
+    folder.put("calib.txt", "P0: 7.188560e+02 0 6.071928e+02 0 0 7.188560e+02 1.852157e+02 0 0 0 1 0\nTr: 1 2 3\n");
+    const auto path = read_camera_path(folder.put("00.txt", pose + pose), pinhole_from_fov(90, 1241, 376));
+    ASSERT_TRUE(path) << path.error().message;
+    EXPECT_DOUBLE_EQ(path->frames[1].time, 0.1037223);
+    expect_near(path->frames[1].intrinsics, {718.856, 718.856, 607.6928, 185.7157, 1241, 376}, 1e-9); // + 0.5
+    const auto read = [&](const char* name, std::string_view text) {
+        return read_kitti(folder / "00.txt", pinhole_from_fov(90, 1241, 376),
+                          name[0] == 't' ? KittiFiles{folder.put("t", text), {}}
+                                         : KittiFiles{{}, folder.put("c", text)});
+    };
+    EXPECT_TRUE(says(read_kitti(folder / "00.txt", kView, {{}, folder / "calib.txt"}),
+                     "far from the middle of 616 x 424 pixels; give the size of the calibrated pictures"));
+    EXPECT_TRUE(says(read("t", "0\n"), "expected a time for each of the 2 poses, found 1"));
+    EXPECT_TRUE(says(read("t", "0 1\n1\n"), "line 1: expected one time in seconds, found '0 1'"));
+    EXPECT_TRUE(says(read("t", "0\nnan\n"), "line 2: expected one time in seconds, found 'nan'"));
+    EXPECT_TRUE(says(read("t", "0\nx\n"), "line 2: expected a number, found 'x'"));
+    EXPECT_TRUE(says(read("c", "P1: 1 0 1\n"), "no line P0: with the projection"));
+    EXPECT_TRUE(says(read("c", "P0: 1 0 1\n"), "P0: expected 12 numbers, found 3"));
+    EXPECT_TRUE(says(read("c", "P0: 1 0 1 0 0 1 1 0 0 0 1 0 9\n"), "P0: expected 12 numbers, found more"));
+    EXPECT_TRUE(says(read("c", "P0: 1 0.1 1 0 0 1 1 0 0 0 1 0\n"), "expected a projection without skew"));
+    EXPECT_TRUE(says(read("c", "P0: -1 0 600 0 0 1 180 0 0 0 1 0\n"), "expected focal lengths above 0"));
+    EXPECT_TRUE(says(read_kitti(folder / "00.txt", kView, {folder / "none", {}}), "No such file"));
+}
+
+TEST(CameraFiles, a_broken_kitti_file_is_named)
+{
+    const ScratchFolder folder;
+    const auto read = [&](std::string_view text) { return read_kitti(folder.put("poses.txt", text), kView); };
+    EXPECT_TRUE(says(read(""), "a camera path without poses"));
+    EXPECT_TRUE(says(read("\n\n# nothing\n"), "a camera path without poses"));
+    EXPECT_TRUE(
+        says(read("1 0 0 0 0 1 0 0 0 0 1\n"), "poses.txt' line 1: expected the 12 numbers of a 3x4 matrix, found 11"));
+    EXPECT_TRUE(says(read("1 0 0 0 0 1 0 0 0 0 1 0 0\n"), "found more"));
+    EXPECT_TRUE(
+        says(read("1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 z\n"), "line 2: expected a number, found 'z'"));
+    EXPECT_TRUE(says(read("1 0 0 nan 0 1 0 0 0 0 1 0\n"), "a matrix with a number that is not finite"));
+    EXPECT_TRUE(says(read("2 0 0 0 0 2 0 0 0 0 2 0\n"), "expected a rotation without scale or mirror"));
+    EXPECT_TRUE(says(read("-1 0 0 0 0 1 0 0 0 0 1 0\n"), "mirrored"));
+    EXPECT_TRUE(says(read("0 0 0 0 0 0 0 0 0 0 0 0\n"), "expected a rotation"));
+    EXPECT_TRUE(says(read("1 0 0 1e999 0 1 0 0 0 0 1 0\n"), "expected a number, found '1e999'"));
+    EXPECT_TRUE(says(read_kitti(folder / "none", kView), "No such file"));
+    EXPECT_TRUE(says(read_kitti(folder.put("p", "1 0 0 0 0 1 0 0 0 0 1 0"), {}), "an image of 0 x 0 pixels"));
+    EXPECT_TRUE(says(read(std::string((16u << 20) + 1, '\n')), "expected at most 16777216 bytes"));
+}
+
+TEST(CameraFiles, a_broken_camera_path_is_named)
+{
+    const ScratchFolder folder;
+    const auto whole = [&](std::string_view text) { return read_camera_path_json(folder.put("a.json", text)); };
+    const auto read = [&](const std::string& file, const std::string& frame) {
+        return whole(fmt::format(R"({{{}"camera_path":[{{{}}}]}})", file, frame));
+    };
+    const std::string size = R"("render_width":8,"render_height":6,)";
+    const std::string pose = R"("camera_to_world":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],)";
+    EXPECT_TRUE(read(size, pose + R"("fov":50)"));
+    EXPECT_TRUE(says(whole("[]"), "expected an object with an array camera_path"));
+    EXPECT_TRUE(says(whole(R"({"camera_path":5})"), "expected an object with an array camera_path"));
+    EXPECT_TRUE(says(whole(R"({"camera_path":[]})"), "a camera path without poses, camera_path is empty"));
+    EXPECT_TRUE(says(whole(R"({"camera_path":[)"), "a.json"));
+    EXPECT_TRUE(says(read("", pose + R"("fov":50)"), "render_width is missing"));
+    EXPECT_TRUE(says(read(R"("render_width":8,)", pose + R"("fov":50)"), "render_height is missing"));
+    EXPECT_TRUE(says(read(R"("render_width":8,"render_height":0,)", pose + R"("fov":50)"),
+                     "render_height: expected an image size"));
+    EXPECT_TRUE(says(read(size + R"("camera_type":"vr180",)", pose + R"("fov":50)"),
+                     "camera_type: expected perspective, fisheye or equirectangular, found '\"vr180\"'"));
+    EXPECT_TRUE(says(read(size, R"("fov":50)"), "frame 0: expected an object with a camera_to_world"));
+    EXPECT_TRUE(
+        says(read(size, R"("camera_to_world":[1,0,0],"fov":50)"), "expected a 4x4 or 3x4 matrix, found 3 numbers"));
+    EXPECT_TRUE(
+        says(read(size, R"("camera_to_world":[3,0,0,0,0,3,0,0,0,0,3,0,0,0,0,1],"fov":50)"), "expected a rotation"));
+    EXPECT_TRUE(says(read(size, R"("camera_to_world":"x","fov":50)"), "expected an array of numbers, found string"));
+    EXPECT_TRUE(says(read(size, pose + R"("aspect":1)"), "frame 0: fov is missing"));
+    EXPECT_TRUE(says(read(size, pose + R"("fov":180)"), "expected a fov above 0 and below 180 degrees, found 180"));
+    EXPECT_TRUE(says(read(size, pose + R"("fov":"wide")"), "fov: expected a number, found string"));
+    EXPECT_TRUE(says(read(size + R"("fps":0,)", pose + R"("fov":50)"), "expected fps above 0, found 0"));
+    EXPECT_TRUE(says(read(size, pose + R"("fov":50,"render_time":"x")"), "render_time: expected a number"));
+    EXPECT_TRUE(says(read_camera_path_json(folder / "none.json"), "No such file"));
+    EXPECT_EQ(read(size + R"("camera_type":"equirectangular",)", pose + R"("fov":50)")->frames[0].intrinsics,
+              whole_sphere(8, 6));
+    const auto timed = whole(R"({"fps":10,"render_width":8,"render_height":6,"camera_path":[{)" + pose +
+                             R"("fov":50},{)" + pose + R"("fov":40}]})");
+    EXPECT_DOUBLE_EQ(timed->frames[1].time, 0.1);
+    EXPECT_NEAR(timed->frames[1].intrinsics.fy, 3 / std::tan(20 * M_PI / 180), 1e-12);
+}
+
+TEST(CameraFiles, a_camera_path_is_not_written_for_what_it_has_no_place_for)
+{
+    const ScratchFolder folder;
+    const auto write = [&](const CameraPath& path) { return write_camera_path_json(folder / "a.json", path); };
+    Intrinsics k = kView;
+    k.cx += 1;
+    EXPECT_TRUE(says(write(random_path(1, k)), "with square pixels and the centre in the middle"));
+    k = kView;
+    k.fy *= 1.1;
+    EXPECT_TRUE(says(write(random_path(1, k)), "with square pixels"));
+    k = kView;
+    k.model = CameraModel::opencv;
+    k.distortion[0] = 0.1;
+    EXPECT_TRUE(says(write(random_path(1, k)), "frame 0 has lens distortion"));
+    CameraPath sizes = random_path(2);
+    sizes.frames[1].intrinsics = pinhole_from_fov(90, 10, 10);
+    EXPECT_TRUE(says(write(sizes), "frame 1 has another camera model or size than the first"));
+    EXPECT_EQ(folder.entries(), 0u);
+}
+
+TEST(CameraFiles, a_broken_colmap_folder_is_named)
+{
+    const ScratchFolder folder;
+    const auto read = [&](std::string_view cameras, std::string_view images) {
+        folder.put("cameras.txt", cameras);
+        folder.put("images.txt", images);
+        return read_colmap(folder.path());
+    };
+    const std::string good = "1 PINHOLE 8 6 4 4 4 3\n", image = "1 1 0 0 0 0 0 0 1 a.png\n\n";
+    EXPECT_TRUE(read(good, image));
+    EXPECT_TRUE(read(good, "# c\n\n1 1 0 0 0 0 0 0 1 a.png")); // the last line of points may be missing
+    EXPECT_TRUE(says(read("", image), "cameras.txt': no cameras"));
+    EXPECT_TRUE(says(read("1 PINHOLE 8 6\n", image),
+                     "cameras.txt' line 1: expected CAMERA_ID MODEL WIDTH HEIGHT PARAMS, found 4 words"));
+    EXPECT_TRUE(says(read("1 FOV 8 6 4 4 4 3 1\n", image),
+                     "camera model 'FOV' is not supported, expected one of SIMPLE_PINHOLE, PINHOLE"));
+    EXPECT_TRUE(says(read("1 PINHOLE 8 6 4 4 3\n", image), "expected 4 parameters of PINHOLE, found 3"));
+    EXPECT_TRUE(says(read("1 OPENCV 8 6 4 4 4 3 0.1\n", image), "expected 8 parameters of OPENCV, found 5"));
+    EXPECT_TRUE(says(read("1 PINHOLE 8 0 4 4 4 3\n", image), "height: expected an image size"));
+    EXPECT_TRUE(says(read("1 PINHOLE 8 6 0 4 4 3\n", image), "expected focal lengths above 0"));
+    EXPECT_TRUE(says(read("1 PINHOLE 8 6 x 4 4 3\n", image), "expected a number, found 'x'"));
+    EXPECT_TRUE(says(read("1 EQUIRECTANGULAR 8 4 16 8\n", image), "a panorama of 16 x 8 in a picture of 8 x 4"));
+    EXPECT_TRUE(says(read(good + good, image), "line 2: a second camera '1'"));
+    EXPECT_TRUE(says(read(good, ""), "images.txt': a camera path without poses"));
+    EXPECT_TRUE(says(read(good, "1 1 0 0 0 0 0 0 1\n"), "images.txt' line 1: expected the 10 words IMAGE_ID QW"));
+    EXPECT_TRUE(says(read(good, "1 1 0 0 0 0 0 0 1 a b.png\n"), "found more"));
+    EXPECT_TRUE(says(read(good, "1 1 0 0 0 0 0 0 2 a.png\n"), "no camera '2' in cameras.txt"));
+    EXPECT_TRUE(says(read(good, "1 2 0 0 0 0 0 0 1 a.png\n"),
+                     "expected a quaternion of norm 1, found 2; the order is w x y z"));
+    EXPECT_TRUE(says(read(good, "1 1 0 0 0 nan 0 0 1 a.png\n"), "a number that is not finite"));
+    EXPECT_TRUE(says(read(good, "1 nan 0 0 0 0 0 0 1 a.png\n"), "a number that is not finite"));
+    EXPECT_TRUE(says(read(good, "1 1 0 0 0 0 0 0 1 a.png\n2 1 0 0 0 0 0 0 1 b.png\n"),
+                     "line 2: expected the points of the picture (X Y POINT3D_ID each; the line may be empty)"));
+    std::filesystem::remove(folder / "images.txt");
+    EXPECT_TRUE(says(read_colmap(folder.path()), "No such file"));
+    std::filesystem::remove(folder / "cameras.txt");
+    EXPECT_TRUE(says(read_colmap(folder.path()), "No such file"));
+    EXPECT_TRUE(says(read_camera_path(folder.path(), kView), "a folder without cameras.txt"));
+}
+
+TEST(CameraFiles, pictures_of_colmap_give_order_and_cameras)
+{
+    const ScratchFolder folder;
+    folder.put("cameras.txt",
+               "1 SIMPLE_RADIAL 8 6 4 4 3 0.1\n2 RADIAL 8 6 4 4 3 0.1 0.2\n7 OPENCV 8 6 4 5 4 3 0 0 0 0\n");
+    folder.put(
+        "images.txt",
+        "1 1 0 0 0 0 0 0 1 images/b.png\n\n5 1 0 0 0 9 0 0 2 images/a.png\n\n6 1 0 0 0 0 0 0 7 images/c.png\n\n");
+    const auto path = read_colmap(folder.path());
+    ASSERT_TRUE(path) << path.error().message;
+    EXPECT_EQ(path->frames[0].pose.world_to_camera[3], 9); // a.png
+    EXPECT_EQ(path->frames[0].camera, "");
+    EXPECT_EQ(path->frames[0].intrinsics, (Intrinsics{4, 4, 4, 3, 8, 6, CameraModel::opencv, {0.1, 0.2}}));
+    EXPECT_EQ(path->frames[1].intrinsics, (Intrinsics{4, 4, 4, 3, 8, 6, CameraModel::opencv, {0.1}}));
+    EXPECT_EQ(path->frames[2].intrinsics, (Intrinsics{4, 5, 4, 3, 8, 6})); // without distortion
+    folder.put("images.txt",
+               "1 1 0 0 0 0 0 0 1 left/1.png\n\n5 1 0 0 0 9 0 0 1 front/1.png\n\n6 1 0 0 0 0 0 0 1 front/2.png\n\n");
+    const auto rig = read_colmap(folder.path());
+    EXPECT_EQ(rig->frames[0].camera, "front");
+    EXPECT_EQ(rig->frames[1].camera, "left");
+    EXPECT_EQ(rig->frames[1].time, 0);
+    EXPECT_EQ(rig->frames[2].camera, "front");
+    EXPECT_EQ(rig->frames[2].time, 1);
+}
+
+TEST(CameraFiles, formats_have_names)
+{
+    for (const PathFormat format :
+         {PathFormat::tum, PathFormat::kitti, PathFormat::transforms, PathFormat::camera_path, PathFormat::colmap})
+        EXPECT_EQ(path_format_of(name_of(format)), format);
+    EXPECT_FALSE(path_format_of("euroc"));
+}
+
+// a file of poses alone takes the lens that was asked for
+TEST(CameraFiles, a_transforms_file_without_intrinsics_takes_a_lens)
+{
+    const ScratchFolder folder;
+    const auto file =
+        folder.put("a.json", R"({"frames":[{"transform_matrix":[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}]})");
+    for (const Intrinsics& k : {fisheye_from_fov(190, 60, 50), whole_sphere(60, 30), pinhole_from_fov(70, 60, 50)})
+        EXPECT_EQ(read_camera_path(file, k)->frames[0].intrinsics, k);
+}
+
+} // namespace
+} // namespace semrover

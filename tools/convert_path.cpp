@@ -1,0 +1,171 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/convert_path.h"
+
+#include "engine/scene/camera_path.h"
+#include "engine/scene/camera_text.h"
+#include "engine/scene/rig.h"
+#include "runtime/json.h"
+#include "runtime/quote.h"
+
+#include <algorithm>
+#include <CLI/CLI.hpp>
+#include <fstream>
+#include <set>
+
+namespace semrover {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_there(const Path& path)
+{
+    std::error_code ignored;
+    return fs::exists(path, ignored);
+}
+
+// 8 numbers (TUM) or 12 (KITTI) on the first line that has any
+bool starts_with_a_pose(const Path& path)
+{
+    std::error_code ignored;
+    if (!fs::is_regular_file(path, ignored))
+        return false;
+    std::string text(4096, '\0');
+    std::ifstream file(path, std::ios::binary);
+    file.read(text.data(), std::streamsize(text.size()));
+    text.resize(size_t(file.gcount()));
+    for (TextLines lines(text); lines.next();) {
+        const auto words = words_of(lines.line(), 12);
+        if (!words.empty())
+            return (words.size() == 8 || words.size() == 12) && numbers_of_words(words, "");
+    }
+    return false;
+}
+
+Result<PathFormat> output_format(const Path& out, const ConvertPathOptions& o)
+{
+    if (!o.format.empty())
+        return path_format_of(o.format).value();
+    const std::string name = out.filename().string(), stem = out.stem().string();
+    if (out.extension() == ".json")
+        return name.find("camera_path") == std::string::npos ? PathFormat::transforms : PathFormat::camera_path;
+    if (out.extension() == ".tum")
+        return PathFormat::tum;
+    if (out.extension() == ".kitti" || name == "poses.txt" ||
+        (out.extension() == ".txt" && std::ranges::all_of(stem, ::isdigit)))
+        return PathFormat::kitti;
+    if (!out.has_extension())
+        return PathFormat::colmap;
+    return fail(
+        ErrorCode::usage,
+        "{} does not tell which format is meant: say it with --path-format, or write to .tum, poses.txt (KITTI), "
+        "transforms.json, camera_path.json or a folder (COLMAP)",
+        quote_path(out));
+}
+
+Status check_output(const Path& in, const Path& out, PathFormat format, const Globals& globals)
+{
+    std::error_code ignored;
+    if (fs::equivalent(in, out, ignored))
+        return fail(ErrorCode::usage, "IN and OUT are the same, {}", quote_path(out));
+    const bool folder = fs::is_directory(out, ignored);
+    if (format == PathFormat::colmap && is_there(out) && !folder)
+        return fail(ErrorCode::bad_input, "{} is a file; COLMAP's model is a folder", quote_path(out));
+    if (format != PathFormat::colmap && folder)
+        return fail(ErrorCode::bad_input, "{} is a folder, expected a file to write", quote_path(out));
+    const Path existing = format == PathFormat::colmap ? out / "cameras.txt" : out;
+    for (const Path& path : {existing, format == PathFormat::colmap ? out / "images.txt" : out})
+        if (is_there(path) && !globals.yes)
+            return fail(ErrorCode::usage, "{} exists; -y replaces it", quote_path(path));
+    return {};
+}
+
+// the frames that go into the file
+Status choose_camera(CameraPath& path, const Path& in, const ConvertPathOptions& o, PathFormat format)
+{
+    std::set<std::string> names;
+    for (const CameraFrame& frame : path.frames)
+        names.insert(frame.camera);
+    if (!o.camera.empty()) {
+        std::erase_if(path.frames, [&](const CameraFrame& f) { return f.camera != o.camera; });
+        if (path.frames.empty())
+            return fail(ErrorCode::bad_input, "{} has no camera {}, only {}", quote_path(in), quote(o.camera),
+                        fmt::join(names, ", "));
+    } else if (names.size() > 1 && format != PathFormat::transforms && format != PathFormat::colmap) {
+        return fail(ErrorCode::bad_input, "{} has the cameras {}; a {} file holds one, choose it with --camera",
+                    quote_path(in), fmt::join(names, ", "), name_of(format));
+    }
+    return {};
+}
+
+Result<CameraPath> read_input(const Path& in, const ConvertPathOptions& o)
+{
+    SR_TRY(const Intrinsics lens, intrinsics_of(o.lens));
+    SR_TRY(CameraPath path, read_camera_path(in, lens));
+    if (o.rig.empty())
+        return path;
+    SR_TRY(const Rig rig, read_rig(o.rig));
+    return expand_rig(rig, path);
+}
+
+Status write_output(const Path& out, const CameraPath& path, PathFormat format)
+{
+    switch (format) {
+    case PathFormat::tum:
+        return write_tum(out, path);
+    case PathFormat::kitti:
+        return write_kitti(out, path);
+    case PathFormat::transforms:
+        return write_transforms(out, path);
+    case PathFormat::camera_path:
+        return write_camera_path_json(out, path);
+    case PathFormat::colmap:
+        break;
+    }
+    return write_colmap(out, path);
+}
+
+} // namespace
+
+void add_path_options(CLI::App& c, ConvertPathOptions& o)
+{
+    c.add_option("--path-format", o.format, "of a camera path that is written; by default OUT's name tells")
+        ->check(CLI::IsMember({"tum", "kitti", "transforms", "camera_path", "colmap"}));
+    c.add_option("--camera", o.camera, "of a camera path: only the frames of this camera");
+    c.add_option("--rig", o.rig, "of a camera path: every sensor of a rig.json at every pose");
+    add_lens_options(c, o.lens);
+}
+
+bool is_camera_path(const Path& path)
+{
+    std::error_code ignored;
+    if (fs::is_directory(path, ignored))
+        return is_there(path / "cameras.txt") || is_there(path / "images.txt");
+    const Path extension = path.extension();
+    return extension == ".json" || extension == ".tum" || extension == ".kitti" ||
+           ((extension == ".txt" || extension.empty()) && starts_with_a_pose(path));
+}
+
+Status convert_path(const Path& in, const Path& out, const ConvertPathOptions& o, const Globals& globals)
+{
+    const Path to = out.has_filename() ? out : out.parent_path(); // "sparse/"
+    SR_TRY(const PathFormat format, output_format(to, o));
+    SR_CHECK(check_output(in, to, format, globals));
+    SR_TRY(CameraPath path, read_input(in, o));
+    SR_CHECK(choose_camera(path, in, o, format));
+    SR_CHECK(write_output(to, path, format));
+    if (globals.json)
+        fmt::print("{}\n", Json{{"output", printable(to.string())},
+                                {"format", std::string(name_of(format))},
+                                {"frames", path.frames.size()}}
+                               .dump());
+    else if (!globals.quiet)
+        fmt::print("{} frames as {}{}\n", path.frames.size(), name_of(format),
+                   format == PathFormat::tum     ? ", without intrinsics"
+                   : format == PathFormat::kitti ? ", without times and intrinsics"
+                                                 : "");
+    return {};
+}
+
+} // namespace semrover

@@ -1,0 +1,26 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "runtime/file.h"
+#include "tools/commands.h"
+#include "tools/lens_options.h"
+
+namespace semrover {
+
+// camera paths between TUM, KITTI, nerfstudio's two and COLMAP's text model
+struct ConvertPathOptions {
+    LensOptions lens;   // where the path has none
+    std::string format; // of the result; empty: by its name
+    std::string camera; // only this one's frames
+    std::string rig;    // every sensor at every pose
+};
+void add_path_options(CLI::App& command, ConvertPathOptions& options);
+
+// is this a camera path, and not a scene or a model? By its name, and where that does not tell, by its first line
+bool is_camera_path(const Path& path);
+
+// errors: usage; bad_input, and then nothing was written
+Status convert_path(const Path& in, const Path& out, const ConvertPathOptions& options, const Globals& globals);
+
+} // namespace semrover
