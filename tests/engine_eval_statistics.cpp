@@ -17,7 +17,7 @@ Features random_features(uint32_t rows, uint32_t cols, uint32_t seed, double sca
 {
     std::mt19937 random(seed);
     std::normal_distribution<double> normal(shift, scale);
-    Features f{rows, cols, {}};
+    Features f{rows, cols, {}, {}};
     for (size_t i = 0; i < size_t(rows) * cols; ++i)
         f.values.push_back(normal(random));
     return f;
@@ -111,7 +111,7 @@ TEST(engine_eval_statistics, frechet_distance_of_covariances_of_rank_one_is_exac
 
 TEST(engine_eval_statistics, moments_match_their_definition_and_a_shift_moves_the_mean_only)
 {
-    const Features f{3, 2, {1, 10, 2, 30, 6, 20}};
+    const Features f{3, 2, {1, 10, 2, 30, 6, 20}, {}};
     const auto g = gaussian_of(f);
     ASSERT_TRUE(g) << g.error().message;
     EXPECT_EQ(g->mean, (std::vector<double>{3, 20}));
@@ -197,7 +197,7 @@ TEST(engine_eval_statistics, discrepancies_match_their_definition_in_long_double
 // by hand, D = 1, k = x y + 1: A = {0, 2}, B = {1, 3}: (1 + 1) / 2 + (4 + 4) / 2 - 2 (1 + 1 + 3 + 7) / 4 = 1 + 4 - 6
 TEST(engine_eval_statistics, the_linear_kernel_is_the_distance_of_the_means)
 {
-    const auto d = discrepancy({2, 1, {0, 2}}, {2, 1, {1, 3}}, {.degree = 1});
+    const auto d = discrepancy({2, 1, {0, 2}, {}}, {2, 1, {1, 3}, {}}, {.degree = 1});
     ASSERT_TRUE(d);
     EXPECT_DOUBLE_EQ(d->unbiased, -1);
     EXPECT_DOUBLE_EQ(d->biased, 1); // (1 - 2)^2
@@ -247,7 +247,7 @@ Features chosen(const Features& f, uint32_t count, std::mt19937_64& random)
 {
     std::vector<uint32_t> index(f.rows);
     std::iota(index.begin(), index.end(), 0);
-    Features y{count, f.cols, {}};
+    Features y{count, f.cols, {}, {}};
     for (uint32_t i = 0; i < count; ++i) {
         std::swap(index[i], index[i + random() % (f.rows - i)]);
         y.values.insert(y.values.end(), f.row(index[i]), f.row(index[i]) + f.cols);
@@ -277,10 +277,10 @@ TEST(engine_eval_statistics, subset_means_and_deviations_match_their_definition_
 
 TEST(engine_eval_statistics, the_median_distance_is_that_of_all_pairs)
 {
-    const auto m = median_distance({2, 1, {0, 1}}, {2, 1, {3, 10}}); // 1 3 10 2 9 7: sorted 1 2 3 7 9 10
+    const auto m = median_distance({2, 1, {0, 1}, {}}, {2, 1, {3, 10}, {}}); // 1 3 10 2 9 7: sorted 1 2 3 7 9 10
     ASSERT_TRUE(m);
     EXPECT_DOUBLE_EQ(*m, 7);
-    EXPECT_TRUE(says(median_distance({2, 1, {1, 1}}, {2, 1, {1, 1}}), "median distance is 0"));
+    EXPECT_TRUE(says(median_distance({2, 1, {1, 1}, {}}, {2, 1, {1, 1}, {}}), "median distance is 0"));
 }
 
 TEST(engine_eval_statistics, sets_that_cannot_be_compared_are_refused)
@@ -310,12 +310,13 @@ Path put(const ScratchFolder& folder,
 TEST(engine_eval_statistics, feature_files_come_back_as_they_were_written)
 {
     const ScratchFolder folder;
-    const Features f{2, 3, {1, -2, 0.5, 1e-3f, 7, 8}};
-    ASSERT_TRUE(write_features(folder / "f.safetensors", f, {{"network", "test"}}));
+    const Features f{2, 3, {1, -2, 0.5, 1e-3f, 7, 8}, "a network"};
+    ASSERT_TRUE(write_features(folder / "f.safetensors", f));
     EXPECT_EQ(*feature_file_kind(folder / "f.safetensors"), FeatureFile::features);
     const auto back = read_features(folder / "f.safetensors");
     ASSERT_TRUE(back) << back.error().message;
     EXPECT_EQ(back->values, f.values);
+    EXPECT_EQ(back->network, "a network");
     const Path moments = put(folder, {{"mu", {{2}, {1, 1.0 / 3}}}, {"sigma", {{2, 2}, {4, 1, 1, 0.1}}}});
     EXPECT_EQ(*feature_file_kind(moments), FeatureFile::gaussian);
     const auto g = read_gaussian(moments);

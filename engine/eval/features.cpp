@@ -76,15 +76,21 @@ Result<Features> read_features(const Path& path)
     SR_CHECK(check_size(file, shape[1]));
     if (shape[0] < 1 || shape[0] > UINT32_MAX)
         return fail(ErrorCode::bad_input, "{}: features of {} samples", quote_path(path), shape[0]);
-    Features f{uint32_t(shape[0]), uint32_t(shape[1]), {}};
+    Features f{uint32_t(shape[0]), uint32_t(shape[1]), {}, {}};
+    const auto& metadata = file.shards().front().metadata();
+    if (const auto network = metadata.find("network"); network != metadata.end())
+        f.network = network->second;
     SR_TRY(f.values, read_numbers(file, *t));
     return f;
 }
 
-Status write_features(const Path& path, const Features& features, const std::map<std::string, std::string>& metadata)
+Status write_features(const Path& path, const Features& features)
 {
     const std::vector<float> values(features.values.begin(), features.values.end());
     const TensorData data{"features", DType::f32, {features.rows, features.cols}, std::as_bytes(std::span(values))};
+    std::map<std::string, std::string> metadata;
+    if (!features.network.empty())
+        metadata["network"] = features.network;
     return write_safetensors(path, {&data, 1}, metadata);
 }
 

@@ -6,7 +6,6 @@
 #include "runtime/result.h"
 
 #include <cstdint>
-#include <map>
 #include <string>
 #include <vector>
 
@@ -16,6 +15,7 @@ namespace semrover {
 struct Features {
     uint32_t rows = 0, cols = 0;
     std::vector<double> values; // [rows, cols]
+    std::string network;        // what made them: metadata "network" of the file, or empty
 
     const double* row(size_t i) const { return &values[i * cols]; }
 };
@@ -32,8 +32,8 @@ constexpr uint32_t kMaxFeatures = 8192; // D, at most
 // A .safetensors file with `features` [N, D] (F16, BF16, F32 or F64). Errors, bad_input: another shape, fewer than one
 // row, more than kMaxFeatures columns, NaN or infinity (where it is), other tensors.
 Result<Features> read_features(const Path& path);
-// as F32, atomically
-Status write_features(const Path& path, const Features& features, const std::map<std::string, std::string>& metadata);
+// as F32, atomically, with `network`
+Status write_features(const Path& path, const Features& features);
 
 // A .safetensors file with `mu` [D] and `sigma` [D, D] (F16, BF16, F32 or F64). Errors, bad_input: likewise, and a
 // sigma that is not symmetric (by more than 1e-3 of its largest number) or has a negative variance
