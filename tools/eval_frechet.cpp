@@ -6,9 +6,31 @@
 
 namespace semrover {
 
+namespace {
+
+void warn_of_small_sets(const EvalSets& sets)
+{
+    uint32_t fewest = UINT32_MAX, features = 0;
+    for (const EvalSet& set : sets.set)
+        if (set.features) {
+            fewest = std::min(fewest, set.features->rows);
+            features = set.features->cols;
+        }
+    if (fewest <= features)
+        fmt::print(
+            stderr,
+            "semrover: warning: {} samples of {} features: the covariance is singular and the distance too large; "
+            "compare only with as many samples\n",
+            fewest, features);
+}
+
+} // namespace
+
 Status eval_frechet(const EvalOptions& o, std::string_view metric, EvalNetwork network, const Globals& globals)
 {
     SR_TRY(EvalSets sets, load_eval_sets(o, network, globals));
+    if (!globals.quiet)
+        warn_of_small_sets(sets);
     std::array<Gaussian, 2> moments;
     for (size_t side = 0; side < 2; ++side) {
         EvalSet& set = sets.set[side];
@@ -16,11 +38,6 @@ Status eval_frechet(const EvalOptions& o, std::string_view metric, EvalNetwork n
             moments[side] = std::move(*set.moments);
             continue;
         }
-        if (set.features->rows <= set.features->cols && !globals.quiet)
-            fmt::print(stderr,
-                       "semrover: warning: {} samples of {} features: the covariance is singular and the distance too "
-                       "large; compare only with as many samples\n",
-                       set.features->rows, set.features->cols);
         SR_TRY(moments[side], gaussian_of(*set.features));
     }
     SR_TRY(const FrechetDistance d, frechet_distance(moments[0], moments[1]));

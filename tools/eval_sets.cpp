@@ -109,21 +109,26 @@ Status chunk_features(const EvalOptions& o, size_t side, Device& device, const P
     Features& features = set.features.emplace();
     features.cols = network.features();
     uint32_t left_out = 0;
-    Progress progress(progress_to_stderr(globals), fmt::format("features of {}", kNames[side]), "grids", files.size());
+    std::optional<Progress> progress; // of a single grid, in chunks
     for (size_t i = 0; i < files.size(); ++i) {
         SR_TRY(const VoxelGrid grid, read_grid(files[i]));
         if (!grid.has_points())
             return fail(ErrorCode::bad_input, "{}: a semantic grid without points", quote_path(files[i]));
         SR_TRY(const PointChunks chunks, cut_chunks(points_of(grid), network.config(), o.seed));
         left_out += chunks.left_out;
+        const bool single = files.size() == 1;
+        if (!progress)
+            progress.emplace(progress_to_stderr(globals), fmt::format("features of {}", kNames[side]),
+                             single ? "chunks" : "grids", single ? chunks.count : files.size());
         for (uint32_t first = 0; first < chunks.count; first += extractor->batch()) {
             SR_CHECK(extractor->append(chunks, first, std::min(extractor->batch(), chunks.count - first), features));
-            progress.update(i, device.allocated_bytes());
+            progress->update(single ? features.rows : i, device.allocated_bytes());
             if (interrupt_requested())
                 return interrupted();
         }
+        progress->update(single ? features.rows : i + 1, device.allocated_bytes());
     }
-    progress.finish();
+    progress->finish();
     if (features.rows < 2)
         return too_few(
             o.sets[side], features.rows,
