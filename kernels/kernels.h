@@ -44,6 +44,13 @@ struct Modulation {
 // y = x / (1 + exp(-x)); runs in the epilogue of the gemm that makes x
 [[nodiscard]] Tensor silu(Graph& g, Tensor x); // [M, N] -> [M, N]
 
+// y = max(x, 0); runs in the epilogue of the gemm or convolution that makes x
+struct ColumnRange {
+    Tensor tensor;    // of as many rows as x, or none: a new tensor
+    uint32_t col = 0; // where to write, a multiple of 8; zeros fill the last 8 columns
+};
+Tensor relu(Graph& g, Tensor x, const ColumnRange& into = {}); // [M, N] -> [M, N], or a wider tensor
+
 // y = residual + x; runs in the epilogue of the gemm that makes x
 Tensor add(Graph& g,
            Tensor x,        // [M, N]
@@ -122,17 +129,22 @@ struct FeatureMap {
 // y[n] = bias[n] + sum over taps and channels of w[n, tap, c] x[c] at the tap's pixel, zeros outside the image. Runs as
 // an implicit GEMM. Two inputs stand for their concatenation along channels.
 struct ConvOptions {
-    uint32_t kernel = 3;      // 1 or 3, square
+    uint32_t kernel = 3;      // square; 1 has no padding, others as below
     uint32_t stride = 1;      // 1 or 2
     bool end_padding = false; // zeros to the right and below only, (0, 1, 0, 1), instead of all around
     uint32_t upsampled_height = 0, upsampled_width = 0; // nearest x2 before the convolution, to 2n or 2n - 1; 0: none
     DType dtype = DType::f16;                           // of y
+    struct Taps {
+        uint32_t height = 0, width = 0;
+        uint32_t padding_y = 0, padding_x = 0; // on both sides
+    } taps;                                    // any rectangle instead of `kernel` and its padding
 };
-[[nodiscard]] FeatureMap conv2d(Graph& g, FeatureMap x,
-                                FeatureMap x2, // channels after those of x, or none
-                                Tensor w,    // [N, kernel * kernel * (C + C2)], each of C and C2 padded to kRowPadding
-                                Tensor bias, // [1, N] fp32, or none
-                                const ConvOptions& options = {});
+[[nodiscard]] FeatureMap
+conv2d(Graph& g, FeatureMap x,
+       FeatureMap x2, // channels after those of x, or none
+       Tensor w,      // [N, taps * (C + C2)], row by row of taps, each of C and C2 padded to kRowPadding
+       Tensor bias,   // [1, N] fp32, or none
+       const ConvOptions& options = {});
 
 // y = x + table[table_row[image]][col + channel]; runs in the epilogue of the convolution that makes x
 struct ChannelShift {

@@ -25,8 +25,8 @@ struct Tiling {
 
 void check(const FeatureMap& x, const Tensor& u, const Tensor& bias, const ConvOptions& o)
 {
-    SR_ASSERT(o.kernel == 3 && o.stride == 1 && !o.end_padding, "winograd_conv2d: kernel {} stride {}", o.kernel,
-              o.stride);
+    SR_ASSERT(o.kernel == 3 && o.stride == 1 && !o.end_padding && !o.taps.height,
+              "winograd_conv2d: kernel {} stride {}", o.kernel, o.stride);
     SR_ASSERT(u.rows % 36 == 0 && u.cols == round_up(x.channels(), kRowPadding) && u.dtype == DType::f32,
               "winograd_conv2d: u [{}, {}] {} for {} channels", u.rows, u.cols, dtype_name(u.dtype), x.channels());
     SR_ASSERT(!bias.valid() || (bias.cols == u.rows / 36 && bias.dtype == DType::f32),
@@ -129,7 +129,7 @@ FeatureMap winograd_conv2d(Graph& g, FeatureMap x, Tensor u, Tensor bias, const 
 
 bool prefers_winograd(const DeviceLimits& limits, const FeatureMap& x, uint32_t outputs, const ConvOptions& o)
 {
-    if (limits.type != DeviceType::cpu || o.kernel != 3 || o.stride != 1)
+    if (limits.type != DeviceType::cpu || o.kernel != 3 || o.stride != 1 || o.taps.height)
         return false;
     const FeatureMap y = seen_image(x, o);
     const uint64_t n = outputs, c = round_up(x.channels(), kRowPadding), rows = uint64_t(y.batch) * y.image_rows();

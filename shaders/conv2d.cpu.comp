@@ -11,11 +11,12 @@ layout(local_size_x = 8) in;
 layout(constant_id = 0) const uint kTileM = 32;
 layout(constant_id = 1) const uint kTileN = 64;
 layout(constant_id = 2) const bool kHalfX = false; // w and x2 have the type of x
-layout(constant_id = 3) const uint kKernel = 3;
+layout(constant_id = 3) const uint kKernelHeight = 3;
+layout(constant_id = 5) const uint kKernelWidth = 3;
 layout(constant_id = 4) const bool kTwoInputs = false;
 layout(push_constant) uniform Push { Conv2dPush p; };
 layout(binding = 0) uniform usamplerBuffer X;  // [images * in_image_rows, x_cols]
-layout(binding = 1) uniform usamplerBuffer W;  // [cols, kKernel^2 * (x_cols + x2_cols)]
+layout(binding = 1) uniform usamplerBuffer W;  // [cols, taps * (x_cols + x2_cols)]
 layout(binding = 8) uniform usamplerBuffer X2; // as x, x2_cols
 #include "lib/conv_shift.glsl"
 #include "lib/gemm_epilogue.glsl"
@@ -60,10 +61,10 @@ void main()
         w_at[j] = min(col + j, p.cols - 1) * (p.w_ld / width);
     clear_tile();
     const uint texels = (p.x_cols + p.x2_cols) / width;
-    for (uint tap = 0; tap < kKernel * kKernel; ++tap) {
+    for (uint tap = 0; tap < kKernelHeight * kKernelWidth; ++tap) {
         uint row[kRows], inside[kRows]; // inside: all ones, or zero
         [[unroll]] for (uint i = 0; i < kRows; ++i)
-            inside[i] = conv_tap(pixel[i], tap / kKernel, tap % kKernel, row[i]) ? 0xffffffffu : 0;
+            inside[i] = conv_tap(pixel[i], tap / kKernelWidth, tap % kKernelWidth, row[i]) ? 0xffffffffu : 0;
         MULTIPLY(X, p.x_ld, p.x_first, p.x_cols, tap * texels)
         if (kTwoInputs)
             MULTIPLY(X2, p.x2_ld, p.x2_first, p.x2_cols, tap * texels + p.x_cols / width)

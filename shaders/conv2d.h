@@ -18,7 +18,8 @@ struct Conv2dPush {
     uint seen_width; // of x after upsampling
     uint seen_height;
     uint stride;
-    uint padding; // to the left and above
+    uint padding_y; // above
+    uint padding_x; // to the left
     uint shift;   // 1: nearest x2
     uint x_ld;
     uint x2_ld;
@@ -26,6 +27,7 @@ struct Conv2dPush {
     uint x2_cols;
     uint w_ld;
     uint y_ld;
+    uint y_col; // first column written, a multiple of 8
     uint bias_ld;
     uint residual_ld;
     uint shift_ld;

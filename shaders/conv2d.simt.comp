@@ -12,11 +12,12 @@ layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint kTileM = 64;
 layout(constant_id = 1) const uint kTileN = 64;
 layout(constant_id = 2) const bool kHalfX = false; // w and x2 have the type of x
-layout(constant_id = 3) const uint kKernel = 3;
+layout(constant_id = 3) const uint kKernelHeight = 3;
+layout(constant_id = 5) const uint kKernelWidth = 3;
 layout(constant_id = 4) const bool kTwoInputs = false;
 layout(push_constant) uniform Push { Conv2dPush p; };
 layout(binding = 0) readonly buffer X { uvec4 x[]; };   // [images * in_image_rows, x_cols]
-layout(binding = 1) readonly buffer W { uvec4 w[]; };   // [cols, kKernel^2 * (x_cols + x2_cols)]
+layout(binding = 1) readonly buffer W { uvec4 w[]; };   // [cols, taps * (x_cols + x2_cols)]
 layout(binding = 8) readonly buffer X2 { uvec4 x2[]; }; // as x, x2_cols
 #include "lib/conv_shift.glsl"
 #include "lib/gemm_epilogue.glsl"
@@ -44,10 +45,10 @@ void load(ConvPixel pixel, uint w_row, Cursor c, out vec4 a[4], out vec4 b[4])
 {
     [[unroll]] for (uint i = 0; i < 4; ++i)
         a[i] = b[i] = vec4(0.0);
-    if (c.tap >= kKernel * kKernel)
+    if (c.tap >= kKernelHeight * kKernelWidth)
         return;
     uint row;
-    const bool inside = conv_tap(pixel, c.tap / kKernel, c.tap % kKernel, row);
+    const bool inside = conv_tap(pixel, c.tap / kKernelWidth, c.tap % kKernelWidth, row);
     const uint first = (p.x_cols + kStep - 1) / kStep * kStep;
     const bool second = kTwoInputs && c.channel >= first;
     const uint channel = second ? c.channel - first : c.channel, cols = second ? p.x2_cols : p.x_cols;
@@ -79,7 +80,7 @@ void main()
     Cursor cursor = Cursor(0, 0);
     vec4 a[4], b[4];
     load(pixel, w_row, cursor, a, b);
-    while (cursor.tap < kKernel * kKernel) {
+    while (cursor.tap < kKernelHeight * kKernelWidth) {
         barrier();
         stage(a, b);
         barrier();

@@ -38,6 +38,7 @@ void add_bench(CLI::App& app, const Globals& globals, Run& run);
 void add_convert(CLI::App& app, const Globals& globals, Run& run);
 void add_devices(CLI::App& app, const Globals& globals, Run& run);
 void add_doctor(CLI::App& app, const Globals& globals, Run& run);
+void add_eval(CLI::App& app, const Globals& globals, Run& run);
 void add_generate(CLI::App& app, const Globals& globals, Run& run);
 void add_inspect(CLI::App& app, const Globals& globals, Run& run);
 void add_refine(CLI::App& app, const Globals& globals, Run& run);

@@ -11,7 +11,7 @@ ConvPixel conv_pixel(uint row)
 {
     const uint at = min(row, p.rows - 1) + p.first_row;
     const uint image = at / p.image_rows, pixel = at % p.image_rows;
-    const ivec2 first = ivec2(pixel / p.out_width, pixel % p.out_width) * int(p.stride) - int(p.padding);
+    const ivec2 first = ivec2(pixel / p.out_width, pixel % p.out_width) * int(p.stride) - ivec2(p.padding_y, p.padding_x);
     return ConvPixel(pixel < p.out_pixels ? first.x : -1000000, first.y, image * p.in_image_rows);
 }
 

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // the epilogue of every GEMM and convolution, eight columns at a time:
-//   v = sum + bias + shift;  v = gelu(v) or silu(v);  v = h * gelu_erf(gate);  v = residual + gate * v, or residual + v;
+//   v = sum + bias + shift;  v = gelu(v), silu(v) or relu(v);  v = h * gelu_erf(gate);  v = residual + gate * v, or residual + v;
 //   moments of v
 // note: the ids of the constants are in the order of application, which the fuse stage relies on
 #include "lib/activation.glsl"
@@ -13,10 +13,11 @@ layout(constant_id = 10) const bool kBias = false;
 layout(constant_id = 11) const bool kShift = false;
 layout(constant_id = 12) const bool kGelu = false;
 layout(constant_id = 13) const bool kSilu = false;
-layout(constant_id = 14) const bool kGeglu = false;
-layout(constant_id = 15) const bool kGatedAdd = false;
-layout(constant_id = 16) const bool kAdd = false;
-layout(constant_id = 17) const bool kMoments = false;
+layout(constant_id = 14) const bool kRelu = false;
+layout(constant_id = 15) const bool kGeglu = false;
+layout(constant_id = 16) const bool kGatedAdd = false;
+layout(constant_id = 17) const bool kAdd = false;
+layout(constant_id = 18) const bool kMoments = false;
 layout(constant_id = 20) const bool kHalfY = false;
 layout(constant_id = 21) const bool kHalfResidual = false;
 
@@ -44,6 +45,10 @@ void activate8(uint row, uint col, inout vec4 lo, inout vec4 hi)
         lo = silu(lo);
         hi = silu(hi);
     }
+    if (kRelu) {
+        lo = max(lo, 0.0);
+        hi = max(hi, 0.0);
+    }
 }
 
 // row within the group and below p.rows, col < cols a multiple of 8: columns of y, of which the padding is zeroed
@@ -60,7 +65,7 @@ void finish8(uint row, uint col, uint cols, inout vec4 lo, inout vec4 hi)
     }
     if (col + 8 > cols)
         clear_padding(col, cols, lo, hi);
-    STORE8(y, kHalfY, row * p.y_ld + col, lo, hi);
+    STORE8(y, kHalfY, row * p.y_ld + p.y_col + col, lo, hi);
 }
 
 // is this row a pixel, and not padding of its image?

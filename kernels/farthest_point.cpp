@@ -1,0 +1,24 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// s_0 = 0, s_j = argmax_i min_{k < j} |p_i - p_{s_k}|^2 per set of points: points [sets * N, 4] -> [sets * samples]
+#include "kernels/recognition.h"
+
+#include "farthest_point.spv.h"
+#include "shaders/point_groups.h"
+
+namespace semrover {
+
+PointSamples farthest_point(Graph& g, Tensor points, uint32_t sets, uint32_t samples)
+{
+    SR_ASSERT(points.dtype == DType::f32 && points.cols == 4 && points.ld == 4 && sets && points.rows % sets == 0,
+              "farthest_point: points [{}, {}] in {} sets", points.rows, points.cols, sets);
+    const FarthestPointPush push{.count = points.rows / sets, .samples = samples};
+    SR_ASSERT(samples && samples <= push.count, "farthest_point: {} of {} points", samples, push.count);
+    const Tensor distances = fill(g, points.rows, 0x7f7fffff); // the largest float
+    const PointSamples y{g.array(sets * samples, DType::u32, "farthest points"),
+                         g.array(sets * samples, DType::f32, "group centers", 4)};
+    g.dispatch(kernel::farthest_point, {points, distances, y.index, y.points}, push, groups(sets));
+    return y;
+}
+
+} // namespace semrover

@@ -1,0 +1,55 @@
+#version 460
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// point 0 of a set, then again and again the point that is farthest from those chosen, ties to the lower index. A
+// workgroup has a set; every thread keeps the distances of every 64th point.
+#extension GL_GOOGLE_include_directive : require
+#include "point_groups.h"
+
+layout(local_size_x = 64) in;
+layout(push_constant) uniform Push { FarthestPointPush p; };
+layout(binding = 0) readonly buffer Points { vec4 points[]; };      // [sets * count] xyz
+layout(binding = 1) buffer Distances { uint distances[]; };         // [sets * count] squared, bits of floats
+layout(binding = 2) writeonly buffer Index { uint chosen_index[]; }; // [sets * samples] within the set
+layout(binding = 3) writeonly buffer Centers { vec4 centers[]; };   // [sets * samples] their points
+
+shared float best_distance[64];
+shared uint best_index[64];
+
+void main()
+{
+    const uint set = gl_WorkGroupID.x, thread = gl_LocalInvocationID.x;
+    const uint first = set * p.count;
+    uint chosen = 0;
+    for (uint s = 0; s < p.samples; ++s) {
+        const vec4 center = points[first + chosen];
+        if (thread == 0) {
+            chosen_index[set * p.samples + s] = chosen;
+            centers[set * p.samples + s] = center;
+        }
+        float own = -1.0;
+        uint own_index = 0;
+        for (uint i = thread; i < p.count; i += 64) {
+            const vec3 d = points[first + i].xyz - center.xyz;
+            const float distance2 = min(uintBitsToFloat(distances[first + i]), dot(d, d));
+            distances[first + i] = floatBitsToUint(distance2);
+            if (distance2 > own) {
+                own = distance2;
+                own_index = i;
+            }
+        }
+        best_distance[thread] = own;
+        best_index[thread] = own_index;
+        barrier();
+        own = best_distance[0];
+        chosen = best_index[0];
+        for (uint t = 1; t < 64; ++t) {
+            const float other = best_distance[t];
+            if (other > own || (other == own && best_index[t] < chosen)) {
+                own = other;
+                chosen = best_index[t];
+            }
+        }
+        barrier();
+    }
+}
