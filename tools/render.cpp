@@ -3,6 +3,7 @@
 // semrover render GRID --path FILE -o DIR: splat buffers of a camera path: colour, depth, normal, label, visibility
 #include "engine/scene/bounds.h"
 #include "engine/scene/image.h"
+#include "engine/scene/tiles.h"
 #include "runtime/profile.h"
 #include "runtime/quote.h"
 #include "tools/commands.h"
@@ -112,7 +113,7 @@ Status render(const Options& o, const Globals& globals)
     SR_CHECK(check_drive(o.drive));
     Output out{o.output, {}, {}, {}, {}};
     SR_TRY(out.background, background_of(o.drive));
-    SR_TRY(const VoxelGrid grid, read_grid(o.grid));
+    SR_TRY(const VoxelGrid grid, read_grid_or_tiles(o.grid));
     CameraPath path;
     if (!o.drive.path.empty()) {
         SR_TRY(path, load_cameras(o.drive));
@@ -151,7 +152,7 @@ void add_render(CLI::App& app, const Globals& globals, Run& run)
     auto o = std::make_shared<Options>();
     CLI::App* c =
         app.add_subcommand("render", "splat buffers of a camera path: colour, depth, normal, label, visibility");
-    c->add_option("GRID", o->grid, ".sgrid")->required();
+    c->add_option("GRID", o->grid, ".sgrid, or a folder of tiles")->required();
     c->add_option("-o,--output", o->output, "folder for {color,depth,normal,label,visible}/000000.png")->required();
     add_drive_options(*c, o->drive);
     c->add_flag("--semantic", o->drive.semantic, "label colours; a grid without points is drawn as blocks");
