@@ -330,9 +330,9 @@ Status AlongRun::dry_run()
         regions_ += generation_.outpainter().region_count();
         SR_CHECK(cache_->mark(grown_cells(part_, targets_)));
     }
-    const Json report{{"metres", windows_->length()}, {"windows", windows_->count()},
-                      {"cells", cells_},              {"regions", regions_},
-                      {"peak_device_bytes", bound_},  {"device", generation_.device().name()}};
+    const Json report{
+        {"metres", windows_->length()}, {"windows", windows_->count()}, {"cells", cells_},
+        {"regions", regions_},          {"peak_device_bytes", bound_},  {"device", generation_.device().name()}};
     if (globals_.json)
         fmt::print("{}\n", report.dump());
     else

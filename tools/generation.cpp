@@ -196,8 +196,8 @@ Status Generation::report_dry_run(size_t runs)
            measure_step(*device_, *transformer_, settings_, batch, std::max(outpainter_->largest_region(), 1u)));
     const size_t regions = outpainter_->region_count(), evaluations = settings_.plan.evaluations;
     const double seconds = step * double(evaluations) * double(regions) * double(runs) / batch;
-    Json report{{"regions", regions},      {"cells", outpainter_->cells_to_do()},   {"batch", batch},
-                {"steps", evaluations},    {"peak_device_bytes", planned_bytes_}, {"seconds", seconds},
+    Json report{{"regions", regions},       {"cells", outpainter_->cells_to_do()}, {"batch", batch},
+                {"steps", evaluations},     {"peak_device_bytes", planned_bytes_}, {"seconds", seconds},
                 {"device", device_->name()}};
     if (runs > 1)
         report["seeds"] = runs;
@@ -265,8 +265,7 @@ void add_generation_options(CLI::App& c, GenerationOptions& o)
     c.add_option("--steps", o.steps, "denoising steps");
     c.add_option("--cfg-scale", o.cfg_scale, "guidance towards the labels; 1: none");
     c.add_option("--sampler", o.sampler, "ddpm, ddim or dpm++2m");
-    c.add_option("--preset", o.preset,
-                 "fast (20 steps), standard (50, RePaint 5/2), paper (250, RePaint 10/10, DDPM)");
+    c.add_option("--preset", o.preset, "fast (20 steps), standard (50, RePaint 5/2), paper (250, RePaint 10/10, DDPM)");
     c.add_option("--jump-length", o.jump_length, "RePaint: steps of a jump back");
     c.add_option("--jump-n-sample", o.jump_n_sample, "RePaint: passes over each jump");
     c.add_option("--batch", o.batch, "regions at a time; any value gives the same bytes")->check(CLI::Range(1u, 1024u));

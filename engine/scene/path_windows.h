@@ -9,8 +9,8 @@ namespace semrover {
 
 using GroundPoint = std::array<double, 2>; // metres
 
-// A camera path seen from above, cut into windows of equal length: what `generate --along` works through. Frames that do
-// not move are left out; cameras of one moment count one after the other.
+// A camera path seen from above, cut into windows of equal length: what `generate --along` works through. Frames that
+// do not move are left out; cameras of one moment count one after the other.
 class PathWindows {
   public:
     // window: metres, above 0. bad_input for more than 2^20 windows

@@ -48,8 +48,8 @@ class TileCache {
 
     // the cells of a window, sorted, with room for points; tiles that it does not touch are dropped
     Result<VoxelGrid> window(const CellWindow& window);
-    // sets points, generated = 1, for cells of tiles that are in memory, and writes these tiles. Doing it twice gives the
-    // same files. note: only after `grown` is safe on the disk, or a killed run would not know it is there.
+    // sets points, generated = 1, for cells of tiles that are in memory, and writes these tiles. Doing it twice gives
+    // the same files. note: only after `grown` is safe on the disk, or a killed run would not know it is there.
     Status store(const GrownCells& grown);
     // the tiles that hold these cells, into memory
     Status bring(const std::vector<Cell>& cells);

@@ -47,8 +47,8 @@ struct Regions {
 // distances are exact squared integers, and ties go to the lower index. Near-linear: 1 M cells of a street take about
 // 1 s on one core of a 2-core Xeon, the slowest cloud tried (a solid lattice with T = K) 13 s.
 // Bad input: no cells, equal cells, options out of range, more than 2^32 / K cells, a cloud too wide for 64-bit keys.
-// known [n], read with options.from_known only: cells with a value other than 0 are covered from the start, and the first
-// seed is the cell nearest to them; without any, first_seed.
+// known [n], read with options.from_known only: cells with a value other than 0 are covered from the start, and the
+// first seed is the cell nearest to them; without any, first_seed.
 Result<Regions> extract_regions(std::span<const std::array<int32_t, 3>> cells, const RegionOptions& options,
                                 std::span<const uint8_t> known = {});
 
