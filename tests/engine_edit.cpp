@@ -54,8 +54,8 @@ std::map<Cell, uint8_t> labels_of(const VoxelGrid& grid)
     return labels;
 }
 
-// a road of 8 x 6 cells with a pavement along its last row; on it a car whose body, at k = 1, lies over the road but for
-// its wheels at k = 0, where there is no road
+// a road of 8 x 6 cells with a pavement along its last row; on it a car whose body, at k = 1, lies over the road but
+// for its wheels at k = 0, where there is no road
 std::map<Cell, uint8_t> street()
 {
     std::map<Cell, uint8_t> labels;
@@ -170,8 +170,8 @@ TEST(engine_edit, what_stood_high_above_no_ground_invents_none)
 TEST(engine_edit, an_object_is_its_connected_cells_of_one_label)
 {
     std::map<Cell, uint8_t> labels = street();
-    labels[{7, 2, 1}] = kCar;  // another car
-    labels[{5, 4, 2}] = kCar;  // touches the first at an edge: the same object
+    labels[{7, 2, 1}] = kCar; // another car
+    labels[{5, 4, 2}] = kCar; // touches the first at an edge: the same object
     labels[{1, 1, 1}] = kBuilding;
     const VoxelGrid grid = grid_of(labels);
     CellSelection s;
@@ -196,7 +196,8 @@ TEST(engine_edit, boxes_and_spheres_take_cells_by_their_centres)
     s.box.reset();
     s.sphere = WorldSphere{{0.3, 0.3, 0.3}, 0.6};
     Cells found;
-    for (const uint32_t c : *select_cells(grid, s))
+    const std::vector<uint32_t> in_sphere = *select_cells(grid, s);
+    for (const uint32_t c : in_sphere)
         found.push_back(grid.cells[c]);
     EXPECT_EQ(found, (Cells{{0, 0, 0}, {0, 1, 0}, {1, 0, 0}}));
     EXPECT_EQ(places_in(s, 0.6f)->size(), 7u);
@@ -333,7 +334,8 @@ TEST(engine_edit, stamps_that_do_not_fit_are_refused)
     VoxelGrid three = grid;
     three.points_per_voxel = 20; // what the grid will have
     EXPECT_TRUE(says(GridEditor(three).apply(o), "2 points a cell, the grid 20"));
-    EXPECT_TRUE(says(GridEditor(grid).apply(remove_class(kBuilding)), "no cell of the grid is selected (class building)"));
+    EXPECT_TRUE(
+        says(GridEditor(grid).apply(remove_class(kBuilding)), "no cell of the grid is selected (class building)"));
 }
 
 TEST(engine_edit, a_moved_car_leaves_road_and_stands_elsewhere_with_its_points)
@@ -445,8 +447,7 @@ class EngineUndo : public testing::Test {
                 }
         out.grid.metadata["tool"] = "another";
         EXPECT_TRUE(write_grid(folder_ / "after.sgrid", out.grid));
-        EXPECT_TRUE(
-            write_undo(folder_ / "undo", before_path, *before, folder_ / "after.sgrid", out.grid));
+        EXPECT_TRUE(write_undo(folder_ / "undo", before_path, *before, folder_ / "after.sgrid", out.grid));
         const Status status = undo_edit(folder_ / "undo", folder_ / "after.sgrid", folder_ / "back.sgrid");
         EXPECT_TRUE(status) << status.error().message;
         return contents(folder_ / "back.sgrid") == contents(before_path);

@@ -192,8 +192,8 @@ TEST(engine_tiles, what_grows_in_a_window_lies_within_the_horizon_of_it)
         const GroundPoint p = {(grid.cells[c][0] + 0.5) * 0.6, (grid.cells[c][1] + 0.5) * 0.6};
         double nearest = 1e9; // of many places along the piece
         for (int i = 0; i <= 3000; ++i)
-            nearest = std::min({nearest, std::hypot(p[0] - (-2 + i * 0.001), p[1]),
-                                std::hypot(p[0] - 1, p[1] - i * 0.001)});
+            nearest =
+                std::min({nearest, std::hypot(p[0] - (-2 + i * 0.001), p[1]), std::hypot(p[0] - 1, p[1] - i * 0.001)});
         if (nearest <= 2.5) {
             expected.push_back(c);
             EXPECT_TRUE(around.holds(grid.cells[c]));
