@@ -38,11 +38,14 @@ void add_bench(CLI::App& app, const Globals& globals, Run& run);
 void add_convert(CLI::App& app, const Globals& globals, Run& run);
 void add_devices(CLI::App& app, const Globals& globals, Run& run);
 void add_doctor(CLI::App& app, const Globals& globals, Run& run);
+void add_edit(CLI::App& app, const Globals& globals, Run& run);
 void add_eval(CLI::App& app, const Globals& globals, Run& run);
 void add_generate(CLI::App& app, const Globals& globals, Run& run);
+void add_inpaint(CLI::App& app, const Globals& globals, Run& run);
 void add_inspect(CLI::App& app, const Globals& globals, Run& run);
 void add_refine(CLI::App& app, const Globals& globals, Run& run);
 void add_render(CLI::App& app, const Globals& globals, Run& run);
+void add_tile(CLI::App& app, const Globals& globals, Run& run);
 void add_verify(CLI::App& app, const Globals& globals, Run& run);
 void add_voxelize(CLI::App& app, const Globals& globals, Run& run);
 

@@ -100,11 +100,14 @@ int main(int argc, char** argv)
     add_convert(app, globals, run);
     add_devices(app, globals, run);
     add_doctor(app, globals, run);
+    add_edit(app, globals, run);
     add_eval(app, globals, run);
     add_generate(app, globals, run);
+    add_inpaint(app, globals, run);
     add_inspect(app, globals, run);
     add_refine(app, globals, run);
     add_render(app, globals, run);
+    add_tile(app, globals, run);
     add_verify(app, globals, run);
     add_voxelize(app, globals, run);
     try {

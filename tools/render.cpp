@@ -165,7 +165,8 @@ void add_render(CLI::App& app, const Globals& globals, Run& run)
     auto o = std::make_shared<Options>();
     CLI::App* c =
         app.add_subcommand("render", "splat buffers of a camera path: colour, depth, normal, label, visibility");
-    c->add_option("GRID", o->grid, "a grid (.sgrid, .npz, .label, .vox, .ply) or splats (.ply, .glb, .splat)")
+    c->add_option("GRID", o->grid,
+                  "a grid (.sgrid, a folder of tiles, .npz, .label, .vox, .ply) or splats (.ply, .glb, .splat)")
         ->required();
     c->add_option("-o,--output", o->output, "folder for {color,depth,normal,label,visible}/000000.png")->required();
     add_drive_options(*c, o->drive);

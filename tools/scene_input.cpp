@@ -3,6 +3,7 @@
 #include "tools/scene_input.h"
 
 #include "engine/scene/palette.h"
+#include "engine/scene/tiles.h"
 #include "runtime/quote.h"
 
 #include <CLI/CLI.hpp>
@@ -81,6 +82,11 @@ Result<SceneInput> read_scene_input(const Path& path, const SceneInputOptions& o
 {
     SceneInput input;
     SR_TRY(const SceneGridOptions options, grid_options(o));
+    std::error_code ignored;
+    if (std::filesystem::is_directory(path, ignored)) {
+        SR_TRY(input.grid, read_grid_or_tiles(path));
+        return input;
+    }
     if (!o.from.empty()) {
         const auto format = scene_format_of_name(o.from);
         if (!format)

@@ -27,7 +27,7 @@ Result<std::unique_ptr<Outpainter>> Outpainter::create(VoxelGrid& grid, const Tr
     grid.points.resize(v * n * 3);
     grid.colors.resize(v * n * 3);
     grid.generated.resize(v);
-    SR_TRY(o->regions_, extract_regions(grid.cells, options));
+    SR_TRY(o->regions_, extract_regions(grid.cells, options, grid.generated));
     o->graph_ = std::make_unique<RegionGraph>(o->regions_, v, grid.generated);
     o->restored_.resize(o->regions_.size());
     for (uint32_t r = 0; r < o->regions_.size(); ++r) {

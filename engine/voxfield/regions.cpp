@@ -64,9 +64,17 @@ class Cover {
         regions_.offsets.push_back(0);
     }
 
+    void cover(std::span<const uint8_t> known)
+    {
+        for (uint32_t cell = 0; cell < known.size(); ++cell)
+            if (known[cell])
+                cover(cell);
+    }
+
     Regions run(const RegionOptions& options)
     {
-        accept(uint32_t(options.first_seed));
+        if (tree_.free_count() == tree_.size())
+            accept(uint32_t(options.first_seed));
         std::vector<uint32_t> set_aside;
         while (tree_.free_count() > 0) {
             const uint32_t seed = frontier_.seed();
@@ -113,11 +121,16 @@ class Cover {
             regions_.members.push_back(cell);
             if (tree_.state(cell) == State::covered)
                 continue;
-            tree_.set_state(cell, State::covered);
-            frontier_.touch(tree_.leaf_of(cell));
+            cover(cell);
         }
         regions_.offsets.push_back(uint32_t(regions_.members.size()));
         regions_.seeds.push_back(seed);
+    }
+
+    void cover(uint32_t cell)
+    {
+        tree_.set_state(cell, State::covered);
+        frontier_.touch(tree_.leaf_of(cell));
     }
 
     // seeds that were set aside and are still uncovered come back, so every leaf has to look again
@@ -142,7 +155,8 @@ class Cover {
 
 } // namespace
 
-Result<Regions> extract_regions(std::span<const std::array<int32_t, 3>> cells, const RegionOptions& options)
+Result<Regions> extract_regions(std::span<const std::array<int32_t, 3>> cells, const RegionOptions& options,
+                                std::span<const uint8_t> known)
 {
     if (options.region_size < 1 || options.region_size > kMaxRegionSize)
         return fail(ErrorCode::bad_input, "region_size is {}, expected 1 to {}", options.region_size, kMaxRegionSize);
@@ -156,7 +170,11 @@ Result<Regions> extract_regions(std::span<const std::array<int32_t, 3>> cells, c
     if (options.first_seed < 0 || options.first_seed >= int64_t(cells.size()))
         return fail(ErrorCode::bad_input, "first_seed is {}, but the cloud has {} cells", options.first_seed,
                     cells.size());
-    return Cover(tree, options).run(options);
+    SR_ASSERT(!options.from_known || known.size() == cells.size(), "{} flags for {} cells", known.size(), cells.size());
+    Cover cover(tree, options);
+    if (options.from_known)
+        cover.cover(known);
+    return cover.run(options);
 }
 
 } // namespace semrover

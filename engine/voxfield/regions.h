@@ -23,6 +23,9 @@ struct RegionOptions {
     int coverage_threshold = 32; // T, 1..K: a region with fewer uncovered cells is not accepted
     RegionStrategy strategy = RegionStrategy::complete;
     int64_t first_seed = 0; // index of the cell the first region grows around
+    // cells that have points already count as covered: regions grow from them into what is missing, and none is made
+    // where nothing is. extract_regions needs the cells' flags for it.
+    bool from_known = false;
 };
 
 // regions in the order they were found; region r is members[offsets[r]] .. members[offsets[r + 1] - 1]
@@ -44,6 +47,9 @@ struct Regions {
 // distances are exact squared integers, and ties go to the lower index. Near-linear: 1 M cells of a street take about
 // 1 s on one core of a 2-core Xeon, the slowest cloud tried (a solid lattice with T = K) 13 s.
 // Bad input: no cells, equal cells, options out of range, more than 2^32 / K cells, a cloud too wide for 64-bit keys.
-Result<Regions> extract_regions(std::span<const std::array<int32_t, 3>> cells, const RegionOptions& options);
+// known [n], read with options.from_known only: cells with a value other than 0 are covered from the start, and the
+// first seed is the cell nearest to them; without any, first_seed.
+Result<Regions> extract_regions(std::span<const std::array<int32_t, 3>> cells, const RegionOptions& options,
+                                std::span<const uint8_t> known = {});
 
 } // namespace semrover

@@ -1,0 +1,82 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/scene/cell_selection.h"
+
+#include <map>
+
+namespace semrover {
+
+// one step of an edit
+struct EditOperation {
+    enum class Kind {
+        remove, // cells go, and the ground under them closes: what a car stood on is road again
+        erase,  // cells go, nothing else
+        paint,  // cells get a label; with `fill` empty places of the selection become cells too
+        insert, // a stamp's cells replace what is at their places
+        copy,   // the selection once more, elsewhere
+        move,   // the same, and the selection is removed where it was
+    };
+    Kind kind = Kind::remove;
+    CellSelection where; // all but insert
+    uint8_t label = 0;   // paint
+    bool fill = false;
+    Path stamp;                              // insert
+    std::optional<std::array<double, 3>> at; // insert: metres; the cell there gets the stamp's lowest corner
+    std::optional<std::array<double, 3>> by; // copy and move: metres, rounded to whole cells
+    int quarter_turns = 0;                   // counterclockwise seen from above
+    bool keep_points = false;                // of the stamp or the copy; else they are generated anew
+};
+std::string_view operation_name(EditOperation::Kind kind); // erase is called "delete"
+// usage: what the operation needs is missing, or something has no meaning for it; `where` says which operation it is
+Status check_operation(const EditOperation& operation, std::string_view where);
+
+// road, sidewalk, terrain and road-lane: what things stand on
+bool is_ground(uint8_t label);
+
+// what operations made of a grid. Cells that are `touched` have another label, other occupancy, or points that came
+// with a stamp; `kept` are those with such points. All sorted. Cells that changed, and came without points, have
+// generated = 0 and zeros for points.
+struct EditedGrid {
+    VoxelGrid grid;
+    std::vector<Cell> touched, kept;
+};
+
+// Applies operations in order, each to what the one before left. The ground closes thus: a column of removed cells that
+// has no ground within three cells of its lowest removed cell, and stood at most a cell above the level of the nearest
+// ground (6 cells away at most, 2 up or down; the most frequent label of the nearest, the lower one of equals), gets
+// one cell of that ground at that level.
+class GridEditor {
+  public:
+    explicit GridEditor(const VoxelGrid& grid); // kept by reference
+
+    // errors: bad_input (a stamp that cannot be read or has other cells, a selection without cells, places beyond all
+    // bounds)
+    Status apply(const EditOperation& operation);
+
+    EditedGrid finish() const;
+
+  private:
+    struct Content {
+        std::vector<uint16_t> points;
+        std::vector<uint8_t> colors;
+    };
+    Result<std::vector<uint32_t>> selected(const EditOperation& operation) const;
+    Status paint(const EditOperation& operation);
+    Status insert(const VoxelGrid& stamp, const EditOperation& operation, const Cell& at);
+    Status copy(const EditOperation& operation);
+    void drop(std::span<const uint32_t> cells);
+    void put(const std::map<Cell, uint8_t>& labels);
+    void close_ground(std::span<const Cell> removed);
+    std::optional<std::pair<Cell, uint8_t>> ground_for(const Cell& lowest) const;
+    VoxelGrid with_points(std::span<const uint32_t> cells) const;
+    const Content* kept_content(const Cell& cell) const;
+
+    const VoxelGrid& base_;
+    VoxelGrid view_; // cells and labels as they are now
+    std::map<Cell, Content> kept_;
+    int points_per_voxel_;
+};
+
+} // namespace semrover

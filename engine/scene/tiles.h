@@ -1,0 +1,88 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/scene/grid.h"
+
+#include <map>
+
+namespace semrover {
+
+// A scene that is larger than memory: a folder with index.json and one .sgrid a tile. Tile (X, Y) is tile_X_Y.sgrid and
+// holds the cells with floor(i / edge) = X and floor(j / edge) = Y, all k, at their places in the whole scene. Every
+// tile has the index's voxel size; either all have points or none.
+//   {"format": "semrover.tiles", "version": 1, "voxel_size": 0.6, "tile_cells": 64, "points_per_voxel": 20,
+//    "has_points": true, "metadata": {...}, "tiles": [[X, Y, cells], ...]}
+using TileIndex = std::array<int32_t, 2>;
+
+// the edge of a tile in cells for one in metres, rounded; bad_input for less than a cell or more than 65536
+Result<int32_t> tile_cells_of(double metres, float voxel_size);
+
+TileIndex tile_of(const Cell& cell, int32_t edge);
+std::string tile_name(const TileIndex& tile); // "tile_-1_3.sgrid"
+
+// cells low <= (i, j) <= high
+struct CellWindow {
+    std::array<int32_t, 2> low, high;
+    bool holds(const Cell& cell) const
+    {
+        return cell[0] >= low[0] && cell[1] >= low[1] && cell[0] <= high[0] && cell[1] <= high[1];
+    }
+};
+
+class TileFolder {
+  public:
+    // reads and checks index.json, and that each tile is there; tiles are read when they are asked for. Errors:
+    // bad_input
+    static Result<TileFolder> open(const Path& folder);
+    static bool is_one(const Path& path); // a folder with an index.json
+
+    const Path& path() const { return path_; }
+    float voxel_size() const { return voxel_size_; }
+    int32_t tile_cells() const { return tile_cells_; }
+    int points_per_voxel() const { return points_per_voxel_; }
+    bool has_points() const { return has_points_; }
+    const std::map<std::string, std::string>& metadata() const { return metadata_; }
+    const std::map<TileIndex, uint64_t>& tiles() const { return tiles_; } // and their number of cells
+    uint64_t cell_count() const;
+
+    // one tile, checked against the index
+    Result<VoxelGrid> read(const TileIndex& tile) const;
+    // the cells in a window, reading only the tiles that it touches; no cells when it is empty
+    Result<VoxelGrid> read(const CellWindow& window) const;
+    Result<VoxelGrid> read_all() const;
+
+  private:
+    Path path_;
+    float voxel_size_ = 0;
+    int32_t tile_cells_ = 0;
+    int points_per_voxel_ = 0;
+    bool has_points_ = false;
+    std::map<std::string, std::string> metadata_;
+    std::map<TileIndex, uint64_t> tiles_;
+};
+
+// what index.json says beside the list; written last, so that a folder without it is not whole
+struct TileFolderInfo {
+    float voxel_size = 0;
+    int32_t tile_cells = 0;
+    int points_per_voxel = 0;
+    bool has_points = false;
+    std::map<std::string, std::string> metadata;
+};
+Status write_tile_index(const Path& folder, const TileFolderInfo& info, const std::map<TileIndex, uint64_t>& tiles);
+
+// cuts a grid into tiles and writes the folder, which must not exist or be empty
+Status write_tiles(const Path& folder, const VoxelGrid& grid, int32_t tile_cells);
+std::map<TileIndex, VoxelGrid> cut_tiles(const VoxelGrid& grid, int32_t tile_cells);
+
+// cells of `part` behind those of `grid`, whose voxel size and points fit; sort_cells puts them in order
+void append_cells(VoxelGrid& grid, const VoxelGrid& part);
+
+// number of cells of a .sgrid, from its header
+Result<uint64_t> cells_in_file(const Path& path);
+
+// a .sgrid, or all tiles of a folder
+Result<VoxelGrid> read_grid_or_tiles(const Path& path);
+
+} // namespace semrover
