@@ -326,6 +326,20 @@ struct SurfaceSamples {
                                    Tensor linear); // [512] fp32: linear value of sRGB bytes v, then of v + 0.5
                                                    // -> [cells * samples, 4] u32
 
+// Boxes around triangles. A node is eight words: least x, y, z (floats), link; largest x, y, z (floats), count. With a
+// count, a leaf: link is the first of so many triangles; without, the left child is the next node, link the right one.
+// At most 40 levels.
+struct SurfaceTree {
+    Tensor nodes;     // [nodes, 8]
+    Tensor triangles; // [T, 9] fp32: three corners
+};
+
+// y = the distance of points from the nearest triangle, where that is less than y
+void surface_distance(Graph& g,
+                      Tensor points, // [P, 3 or more] fp32 array
+                      const SurfaceTree& tree,
+                      Tensor y); // [P] u32 array: bits of floats >= 0 whose squares are finite, in place
+
 // -- splats -----------------------------------------------------------------------------------------------------------
 
 // y[i] = value
@@ -371,6 +385,7 @@ struct KnnOptions {
     float radius = 0;            // metres, no neighbour is further away; 0: no limit
     Tensor labels;               // [P] u32, or none: prefer neighbours of the same label
     uint32_t min_same_label = 4; // if there are fewer of those, neighbours of any label
+    Tensor queries;              // [Q, 3 or more] fp32 array, or none: of these instead, [Q, neighbors]; no labels
 };
 [[nodiscard]] Tensor knn(Graph& g,
                          Tensor points, // [P, 3 or more] fp32 array; one that is not finite has no neighbours

@@ -3,6 +3,7 @@
 #include "tools/commands.h"
 
 #include "runtime/quote.h"
+#include "tools/eval.h"
 #include "tools/memory_size.h"
 #include "tools/version.h"
 
@@ -100,6 +101,7 @@ int main(int argc, char** argv)
     add_convert(app, globals, run);
     add_devices(app, globals, run);
     add_doctor(app, globals, run);
+    add_eval(app, globals, run);
     add_generate(app, globals, run);
     add_inspect(app, globals, run);
     add_refine(app, globals, run);
