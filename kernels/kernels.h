@@ -271,7 +271,7 @@ struct RendererFrame {
 
 // Triangles are given for each block of 8^3 cells that they touch; a slot is a block, or a range of its cells. The key
 // of cell (x, y, z) of a slot is slot * 512 + (x * 8 + y) * 8 + z. A cell spans [x, x + 1) x [y, y + 1) x [z, z + 1).
-constexpr uint32_t kSurfaceBlock = 8, kSurfaceBlockCells = 512, kUnlabelled = 20;
+constexpr uint32_t kSurfaceBlock = 8, kSurfaceBlockCells = 512, kNoSurfaceLabel = 20;
 struct SurfaceTriangles { // words: u32, or the bits of a float
     Tensor records;    // [T, 12]: three corners in cells from the block's corner (floats within +-16); slot; its range
                        // of cells (four bits each: first x, y, z, end x, y, z); material | label << 24
@@ -293,7 +293,7 @@ struct SurfacePairs {
 // the area of each pair's triangle within its cell, by exact clipping
 struct SurfaceAreas {
     Tensor areas;           // [capacity] fp32, in squares of a cell's edge
-    Tensor labels;          // [capacity] u32, of the triangles; kUnlabelled: none
+    Tensor labels;          // [capacity] u32, of the triangles; kNoSurfaceLabel: none
     Tensor label_addresses; // [capacity] u32: of the texel that says the label; 2^32 - 1: none
 };
 [[nodiscard]] SurfaceAreas clip_area(Graph& g, const SurfaceTriangles& surface, const SurfacePairs& pairs);
@@ -310,7 +310,7 @@ void gather_texels(Graph& g,
 struct CellAreas {
     Tensor sums;       // [pairs] fp32: area of the cell up to and with this pair, never falling
     Tensor areas;      // [cells] fp32, in squares of a cell's edge
-    Tensor labels;     // [cells] u32: of the largest area, ties to the lower one; kUnlabelled where none has any
+    Tensor labels;     // [cells] u32: of the largest area, ties to the lower one; kNoSurfaceLabel where none has any
     Tensor unlabelled; // [cells] fp32: area without a label
 };
 [[nodiscard]] CellAreas cell_area(Graph& g,
@@ -337,6 +337,20 @@ struct SurfaceSamples {
                                    Tensor texels,  // [cells * samples, 4] u32: sRGB bytes, r lowest
                                    Tensor linear); // [512] fp32: linear value of sRGB bytes v, then of v + 0.5
                                                    // -> [cells * samples, 4] u32
+
+// Boxes around triangles. A node is eight words: least x, y, z (floats), link; largest x, y, z (floats), count. With a
+// count, a leaf: link is the first of so many triangles; without, the left child is the next node, link the right one.
+// At most 40 levels.
+struct SurfaceTree {
+    Tensor nodes;     // [nodes, 8]
+    Tensor triangles; // [T, 9] fp32: three corners
+};
+
+// y = the distance of points from the nearest triangle, where that is less than y
+void surface_distance(Graph& g,
+                      Tensor points, // [P, 3 or more] fp32 array
+                      const SurfaceTree& tree,
+                      Tensor y); // [P] u32 array: bits of floats >= 0 whose squares are finite, in place
 
 // -- splats -----------------------------------------------------------------------------------------------------------
 
@@ -383,6 +397,7 @@ struct KnnOptions {
     float radius = 0;            // metres, no neighbour is further away; 0: no limit
     Tensor labels;               // [P] u32, or none: prefer neighbours of the same label
     uint32_t min_same_label = 4; // if there are fewer of those, neighbours of any label
+    Tensor queries;              // [Q, 3 or more] fp32 array, or none: of these instead, [Q, neighbors]; no labels
 };
 [[nodiscard]] Tensor knn(Graph& g,
                          Tensor points, // [P, 3 or more] fp32 array; one that is not finite has no neighbours

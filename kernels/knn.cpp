@@ -22,10 +22,15 @@ Tensor knn(Graph& g, Tensor points, const KnnOptions& options)
     const bool labelled = options.labels.valid();
     SR_ASSERT(!labelled || (options.labels.rows == rows && options.labels.ld == 1), "knn: {} labels for {} points",
               options.labels.rows, rows);
+    const bool others = options.queries.valid();
+    SR_ASSERT(!others || (options.queries.dtype == DType::f32 && options.queries.cols >= 3 && !labelled),
+              "knn: queries [{}, {}]{}", options.queries.rows, options.queries.cols, labelled ? " with labels" : "");
     const uint32_t bits = std::clamp<uint32_t>(uint32_t(std::bit_width(rows / 2)), 6, 22);
     KnnPush push{.rows = rows, .points_ld = points.ld, .mask = (1u << bits) - 1, .cell_size = options.cell_size};
     push.radius2 = options.radius > 0 ? options.radius * options.radius : 1e38f;
     push.min_same_label = labelled ? options.min_same_label : 0;
+    push.queries = others ? options.queries.rows : 0;
+    push.queries_ld = others ? options.queries.ld : 0;
     const ConstantValue has_labels{"kLabels", labelled};
     const Tensor keys = g.array(rows, DType::u32, "cell hashes");
     g.dispatch(kernel::knn_hash, {points, keys}, push, threads(rows));
@@ -36,9 +41,10 @@ Tensor knn(Graph& g, Tensor points, const KnnOptions& options)
     g.dispatch(kernel::knn_gather,
                {points, labelled ? options.labels : order.values, order.values, sorted, sorted_labels}, push,
                threads(rows), {.constants = {has_labels}});
-    const Tensor neighbors = g.array(rows, DType::u32, "neighbours", options.neighbors);
-    g.dispatch(kernel::knn_search, {sorted, sorted_labels, starts, neighbors}, push, threads(rows),
-               {.constants = {{"kNeighbors", options.neighbors}, has_labels}});
+    const uint32_t sought = others ? push.queries : rows;
+    const Tensor neighbors = g.array(sought, DType::u32, "neighbours", options.neighbors);
+    g.dispatch(kernel::knn_search, {sorted, sorted_labels, starts, others ? options.queries : sorted, neighbors}, push,
+               threads(sought), {.constants = {{"kNeighbors", options.neighbors}, has_labels, {"kQueries", others}}});
     return neighbors;
 }
 

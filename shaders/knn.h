@@ -10,6 +10,8 @@ struct KnnPush {
     uint mask;           // buckets - 1, buckets a power of two
     float cell_size;     // of the grid
     float radius2;       // square of the largest distance of a neighbour
+    uint queries;        // points whose neighbours are sought, if they are others
+    uint queries_ld;
     uint min_same_label; // fewer neighbours of the same label than this: neighbours of any label
 };
 

@@ -12,11 +12,13 @@
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint kNeighbors = 16;
 layout(constant_id = 1) const bool kLabels = false;
+layout(constant_id = 2) const bool kQueries = false; // neighbours of other points, which have no labels
 layout(push_constant) uniform Push { KnnPush p; };
 layout(binding = 0) readonly buffer Sorted { vec4 sorted_points[]; };        // [rows] xyz, index as bits
 layout(binding = 1) readonly buffer SortedLabels { uint sorted_labels[]; }; // [rows]
 layout(binding = 2) readonly buffer Starts { uint starts[]; };              // [buckets + 1]
-layout(binding = 3) writeonly buffer Neighbors { uint neighbors[]; };       // [rows, kNeighbors]
+layout(binding = 3) readonly buffer Queries { float queries[]; };           // [queries, queries_ld]
+layout(binding = 4) writeonly buffer Neighbors { uint neighbors[]; };       // [rows or queries, kNeighbors]
 
 const uint kNone = 0xffffffffu;
 const int kMaxShell = 4;
@@ -96,11 +98,18 @@ void search()
 void main()
 {
     const uint i = linear_thread();
-    if (i >= p.rows)
+    if (i >= (kQueries ? p.queries : p.rows))
         return;
-    const vec4 point = sorted_points[i];
-    own = point.xyz;
-    own_label = sorted_labels[i];
+    uint to = i;
+    if (kQueries) {
+        const uint at = i * p.queries_ld;
+        own = vec3(queries[at], queries[at + 1], queries[at + 2]);
+    } else {
+        const vec4 point = sorted_points[i];
+        own = point.xyz;
+        own_label = sorted_labels[i];
+        to = floatBitsToUint(point.w);
+    }
     same_label_only = kLabels;
     for (uint attempt = 0; attempt < (kLabels ? 2 : 1); ++attempt) {
         search();
@@ -111,7 +120,6 @@ void main()
             break;
         same_label_only = false;
     }
-    const uint to = floatBitsToUint(point.w) * kNeighbors;
     [[unroll]] for (uint q = 0; q < kNeighbors; ++q)
-        neighbors[to + q] = found[q];
+        neighbors[to * kNeighbors + q] = found[q];
 }

@@ -73,6 +73,38 @@ TEST(kernel_knn, matches_brute_force_with_ties_by_index)
         check(c);
 }
 
+TEST(kernel_knn, the_nearest_of_other_points_match_brute_force)
+{
+    for (const auto& [points, queries, spread] : {std::tuple{1u, 3u, 1.f}, {900u, 701u, 2.f}, {300u, 65u, 30.f}}) {
+        KernelCase k(test_device());
+        std::mt19937 random(8);
+        std::vector<float> p, q;
+        for (uint32_t i = 0; i < 3 * points; ++i)
+            p.push_back(float(random() % 4096) / 4096 * spread);
+        for (uint32_t i = 0; i < 4 * queries; ++i)
+            q.push_back(float(random() % 4096) / 4096 * 1.5f * spread - spread / 4);
+        KnnOptions options{.neighbors = 1, .cell_size = 0.3f};
+        options.queries = k.input(q, 4);
+        const Tensor y = knn(k.graph, k.input(p, 3), options);
+        ASSERT_EQ(y.rows, queries);
+        const Tensor out = k.output(y.rows, y.cols, y.dtype, y.ld);
+        k.graph.replace(y.resource, out.resource);
+        ASSERT_TRUE(k.compile_and_run());
+        const auto got = k.read_array<uint32_t>(out);
+        const auto distance = [&](uint32_t i, uint32_t j) {
+            return std::hypot(double(p[3 * j]) - q[4 * i], double(p[3 * j + 1]) - q[4 * i + 1],
+                              double(p[3 * j + 2]) - q[4 * i + 2]);
+        };
+        for (uint32_t i = 0; i < queries; ++i) {
+            double best = 1e9;
+            for (uint32_t j = 0; j < points; ++j)
+                best = std::min(best, distance(i, j));
+            ASSERT_LT(got[i], points);
+            ASSERT_NEAR(distance(i, got[i]), best, 1e-5) << "query " << i;
+        }
+    }
+}
+
 TEST(kernel_knn, points_that_are_not_finite_have_no_neighbours_and_are_none)
 {
     KernelCase k(test_device());

@@ -97,7 +97,7 @@ Status TextureAtlas::upload_texels(Device& device, const Mesh& mesh, const std::
 {
     const DeviceLimits& limits = device.limits();
     const uint64_t page_texels = std::min(limits.max_storage_range, limits.max_allocation) / 4;
-    const uint32_t unknown = default_label == kNoLabel ? kUnlabelled : default_label;
+    const uint32_t unknown = default_label == kNoLabel ? kNoSurfaceLabel : default_label;
     std::vector<uint32_t> page;
     uint64_t written = 0;
     const auto flush = [&]() -> Status {

@@ -18,7 +18,7 @@ namespace semrover {
 
 namespace {
 
-static_assert(kUnlabelled == kClassCount && sizeof(SurfaceRecord) == 48 && sizeof(SurfaceAttributes) == 64);
+static_assert(kNoSurfaceLabel == kClassCount && sizeof(SurfaceRecord) == 48 && sizeof(SurfaceAttributes) == 64);
 
 constexpr uint64_t kMaxSamples = 1ull << 31; // of a grid: 18 GiB as it is stored
 constexpr uint64_t kMaxPairs = 1 << 21;      // at once: about 140 MB of device memory
@@ -44,7 +44,7 @@ tl::unexpected<Error> no_label(double area, std::string_view what)
                 what, area);
 }
 
-// kUnlabelled where a texture says the label
+// kNoSurfaceLabel where a texture says the label
 Result<std::vector<uint8_t>> labels_of_faces(const Mesh& mesh, uint8_t default_label)
 {
     std::vector<uint8_t> labels(mesh.faces.size());
@@ -56,7 +56,7 @@ Result<std::vector<uint8_t>> labels_of_faces(const Mesh& mesh, uint8_t default_l
             continue;
         const bool textured = !mesh.face_materials.empty() && !mesh.uvs.empty() &&
                               mesh.materials[mesh.face_materials[f]].label_texture >= 0;
-        labels[f] = textured ? uint8_t(kUnlabelled) : default_label;
+        labels[f] = textured ? uint8_t(kNoSurfaceLabel) : default_label;
         if (!textured && default_label == kNoLabel) {
             ++without;
             area += face_area(mesh, f);

@@ -1,0 +1,28 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+namespace semrover {
+
+using TriangleCorners = std::array<std::array<float, 3>, 3>;
+
+// boxes around boxes around triangles, as kernels.h, SurfaceTree, has them: halves by the median of centres along the
+// longest axis, at most four triangles in a leaf, the left child behind its parent
+struct TriangleTree {
+    struct Node {
+        std::array<float, 3> low;
+        uint32_t link; // first triangle of a leaf, else the right child
+        std::array<float, 3> high;
+        uint32_t count; // triangles; 0: no leaf
+    };
+    std::vector<Node> nodes;
+    std::vector<TriangleCorners> triangles; // in the order of leaves
+};
+
+TriangleTree triangle_tree(std::vector<TriangleCorners> triangles); // at least one
+
+} // namespace semrover

@@ -1,0 +1,385 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/mesh/mesh_files.h"
+
+#include "tests/says.h"
+#include "tests/scratch_folder.h"
+
+#include <cmath>
+#include <cstring>
+
+namespace semrover {
+namespace {
+
+const ImageRgb8 kImage{2, 2, {255, 0, 0, 0, 255, 0, 0, 0, 255, 9, 8, 7}};
+
+Mesh two_faces()
+{
+    Mesh m;
+    m.positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0.5f}, {0, 1, 2}};
+    m.colors = {{255, 0, 0}, {0, 255, 0}, {1, 2, 255}, {9, 8, 7}};
+    m.faces = {{0, 1, 2}, {0, 2, 3}};
+    m.face_labels = {0, 13};
+    m.face_materials = {0, 1};
+    m.materials = {{"asphalt", {1, 1, 1}, 0}, {"", {0.5f, 0.25f, 0.125f}}};
+    m.uvs = {{{{0, 0.25f}, {1, 0}, {2, 1}}}, {}};
+    m.textures = {{kImage, TextureWrap::clamp, TextureWrap::mirror}};
+    return m;
+}
+
+std::array<std::array<float, 3>, 3> corners(const Mesh& m, size_t face)
+{
+    return {m.positions[m.faces[face][0]], m.positions[m.faces[face][1]], m.positions[m.faces[face][2]]};
+}
+
+Mesh readable(const Path& path, UpAxis up = UpAxis::file)
+{
+    auto m = read_mesh(path, up);
+    EXPECT_TRUE(m) << m.error().message;
+    return m ? std::move(*m) : Mesh{};
+}
+
+TEST(MeshFiles, a_glb_brings_back_geometry_colours_materials_textures_and_labels)
+{
+    const ScratchFolder folder;
+    const Mesh m = two_faces();
+    ASSERT_TRUE(write_glb(folder / "m.glb", m));
+    const Mesh r = readable(folder / "m.glb");
+    ASSERT_EQ(r.faces.size(), 2u);
+    for (size_t f = 0; f < 2; ++f) {
+        EXPECT_EQ(corners(r, f), corners(m, f));
+        for (size_t c = 0; c < 3; ++c)
+            EXPECT_EQ(r.colors[r.faces[f][c]], m.colors[m.faces[f][c]]);
+        EXPECT_EQ(r.materials[r.face_materials[f]].color, m.materials[f].color);
+    }
+    EXPECT_EQ(r.face_labels, m.face_labels);
+    EXPECT_EQ(r.uvs[0], m.uvs[0]);
+    EXPECT_EQ(r.materials[0].name, "road.asphalt");
+    EXPECT_EQ(r.materials[1].name, "car");
+    ASSERT_EQ(r.textures.size(), 1u);
+    EXPECT_EQ(r.textures[0].image.pixels, kImage.pixels);
+    EXPECT_EQ(r.textures[0].wrap_u, TextureWrap::clamp);
+    EXPECT_EQ(r.textures[0].wrap_v, TextureWrap::mirror);
+    const std::string bytes = contents(folder / "m.glb");
+    ASSERT_TRUE(write_glb(folder / "m.glb", m));
+    EXPECT_EQ(contents(folder / "m.glb"), bytes);
+}
+
+TEST(MeshFiles, a_ply_brings_back_geometry_colours_and_labels)
+{
+    const ScratchFolder folder;
+    const Mesh m = two_faces();
+    ASSERT_TRUE(write_mesh_ply(folder / "m.ply", m));
+    const Mesh r = readable(folder / "m.ply");
+    EXPECT_EQ(r.positions, m.positions);
+    EXPECT_EQ(r.colors, m.colors);
+    EXPECT_EQ(r.faces, m.faces);
+    EXPECT_EQ(r.face_labels, m.face_labels);
+}
+
+TEST(MeshFiles, a_broken_mesh_is_not_written)
+{
+    const ScratchFolder folder;
+    Mesh m = two_faces();
+    m.faces[1][2] = 4;
+    EXPECT_TRUE(says(write_glb(folder / "m.glb", m), "face 1 refers to vertex 4, the mesh has 4"));
+    EXPECT_TRUE(says(write_mesh_ply(folder / "m.ply", Mesh{}), "no faces"));
+    m = two_faces();
+    m.face_labels = {0, 77};
+    EXPECT_TRUE(says(check_mesh(m, "x"), "x: unknown labels, expected 0 to 19: 77 (1 faces)"));
+    m = two_faces();
+    m.uvs[0][1][0] = INFINITY;
+    EXPECT_TRUE(says(check_mesh(m, "x"), "face 0 has the texture coordinates"));
+    m = two_faces();
+    m.colors.pop_back();
+    EXPECT_TRUE(says(check_mesh(m, "x"), "arrays disagree: 3 vertex colours, expected 4"));
+    m = two_faces();
+    m.materials[1].texture = 1;
+    EXPECT_TRUE(says(check_mesh(m, "x"), "material 1 refers to texture 1, the mesh has 1"));
+    m = two_faces();
+    m.textures[0].image.pixels.pop_back();
+    EXPECT_TRUE(says(check_mesh(m, "x"), "texture 0 has 2 x 2 pixels in 11 bytes"));
+    EXPECT_EQ(folder.entries(), 0u);
+}
+
+TEST(MeshFiles, obj_polygons_indices_colours_and_materials_are_read)
+{
+    const ScratchFolder folder;
+    ASSERT_TRUE(write_png_rgb8(folder / "wall paint.png", 2, 2, kImage.pixels));
+    folder.put("m.mtl", "newmtl building.001\nKd 1 1 1\nmap_Kd -s 1 1 1 -clamp on wall paint.png\n\nnewmtl grass\n"
+                        "Kd 0 1 0\nmap_Ka missing.png\n");
+    const Path path = folder.put("m.obj", "# a comment\r\nmtllib m.mtl\r\no thing\nv 0 0 0\nv 2 0 0\nv 2 2 0 1.0\n"
+                                          "v 0 2 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\nusemtl building.001\n"
+                                          "f 1/1/1 2/2/1 \\\n3/3/1 4/4/1\nusemtl grass\nf -4 -3 -2\nl 1 2\n");
+    const Mesh m = readable(path);
+    ASSERT_EQ(m.faces.size(), 3u);
+    EXPECT_EQ(m.faces[2], (std::array<uint32_t, 3>{0, 1, 2}));
+    EXPECT_EQ(m.face_materials, (std::vector<uint32_t>{0, 0, 1}));
+    EXPECT_EQ(m.materials[0].texture, 0);
+    EXPECT_EQ(m.materials[1].texture, -1);
+    EXPECT_EQ(m.materials[1].color, (std::array<float, 3>{0, 1, 0}));
+    EXPECT_EQ(m.textures[0].wrap_u, TextureWrap::clamp);
+    EXPECT_EQ(m.uvs[0][0], (std::array<float, 2>{0, 1})); // v runs up in the file
+    const Mesh up = readable(path, UpAxis::y);
+    EXPECT_EQ(up.positions[1], (std::array<float, 3>{0, -2, 0}));
+    EXPECT_EQ(up.positions[3], (std::array<float, 3>{0, 0, 2}));
+    const Mesh colored = readable(folder.put("c.obj", "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 0.5\nf 1 2 3\n"));
+    EXPECT_EQ(colored.colors, (std::vector<std::array<uint8_t, 3>>{{255, 0, 0}, {0, 255, 0}, {0, 0, 128}}));
+    EXPECT_TRUE(colored.face_materials.empty());
+}
+
+TEST(MeshFiles, concave_polygons_cover_their_own_area)
+{
+    const ScratchFolder folder;
+    // an L of three unit squares, from the corner where a fan would leave it
+    const Mesh m =
+        readable(folder.put("l.obj", "v 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nv 0 0 0\nf 1 2 3 4 5 6\n"));
+    double sum = 0;
+    for (size_t f = 0; f < m.faces.size(); ++f) {
+        const auto t = corners(m, f);
+        sum += ((t[1][0] - t[0][0]) * (t[2][1] - t[0][1]) - (t[1][1] - t[0][1]) * (t[2][0] - t[0][0])) / 2;
+        EXPECT_GT(face_area(m, f), 0);
+    }
+    EXPECT_EQ(m.faces.size(), 4u);
+    EXPECT_NEAR(sum, 3, 1e-6);
+}
+
+TEST(MeshFiles, broken_obj_files_are_one_line_that_says_where)
+{
+    const ScratchFolder folder;
+    const std::string v = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+    folder.put("bad.mtl", "newmtl a\nmap_Kd none.png\n");
+    folder.put("text.png", "no picture");
+    folder.put("text.mtl", "newmtl a\nmap_Kd text.png\n");
+    folder.put("out.mtl", "newmtl a\nmap_Kd ../x.png\n");
+    folder.put("kd.mtl", "newmtl a\nKd 1 2 0\n");
+    folder.put("early.mtl", "Kd 1 1 0\n");
+    std::filesystem::create_symlink("/etc/hostname", folder / "link.mtl");
+    for (const auto& [text, error] : std::initializer_list<std::pair<std::string, const char*>>{
+             {"", "no faces"},
+             {v, "no faces"},
+             {v + "f 1 2 4\n", "line 4: refers to vertex 4, there are 3 so far"},
+             {v + "f 1 2 -4\n", "line 4: refers to vertex -4"},
+             {v + "f 0 1 2\n", "line 4: refers to vertex 0"},
+             {v + "f 1 2\n", "line 4: a face of 2 corners"},
+             {v + "f 1/1 2/1 3/1\n", "refers to texture coordinate 1, there are 0"},
+             {v + "f 1 2 x\n", "expected the number of a vertex, found 'x'"},
+             {v + "f 1 2 99999999999999999999\n", "expected the number of a vertex"},
+             {"v 0 0\n", "line 1: a vertex of 2 numbers"},
+             {"v 0 0 zero\n", "line 1: expected a number, found 'zero'"},
+             {"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "vertex 0 is at (0, 0, nan)"},
+             {"v 0 0 1e39\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "vertex 0 is at (0, 0, inf)"},
+             {"v 0 0 2e6\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "expected numbers within 1e6"},
+             {"v 0 0 0 1 1 7\n", "the colour 7"},
+             {"mtllib none.mtl\n", "refers to 'none.mtl', which is missing"},
+             {"mtllib /etc/passwd\n", "refers to '/etc/passwd', expected a file within its own folder"},
+             {"mtllib ..\\x.mtl\n", "expected a file within its own folder"},
+             {"mtllib link.mtl\n", "leads out of its folder"},
+             {"mtllib bad.mtl\n", "bad.mtl': line 2: refers to 'none.png', which is missing"},
+             {"mtllib text.mtl\n", "expected a PNG or JPEG image"},
+             {"mtllib out.mtl\n", "refers to '../x.png'"},
+             {"mtllib kd.mtl\n", "the colour 2"},
+             {"mtllib early.mtl\n", "in front of the first newmtl"}})
+        EXPECT_TRUE(says(read_mesh(folder.put("m.obj", text)), error)) << text;
+    EXPECT_TRUE(says(read_mesh(folder / "none.obj"), "none.obj"));
+    EXPECT_TRUE(says(read_mesh(folder.put("m.stl", "solid")), "expected a mesh: .obj, .ply, .glb or .gltf"));
+}
+
+const std::string kPlyVertices =
+    "ply\nformat ascii 1.0\ncomment TextureFile t.png\nelement vertex 4\nproperty float x\n"
+    "property float y\nproperty float z\n";
+const std::string kSquare = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
+
+TEST(MeshFiles, ply_polygons_textures_and_labels_are_read)
+{
+    const ScratchFolder folder;
+    ASSERT_TRUE(write_png_rgb8(folder / "t.png", 2, 2, kImage.pixels));
+    const Mesh m = readable(folder.put("m.ply", kPlyVertices +
+                                                    "element face 1\nproperty list uchar int vertex_index\n"
+                                                    "property list uchar float texcoord\nproperty int class_id\n"
+                                                    "end_header\n" +
+                                                    kSquare + "4 0 1 2 3 8 0 0 1 0 1 1 0 1 8\n"));
+    ASSERT_EQ(m.faces.size(), 2u);
+    EXPECT_EQ(m.face_labels, (std::vector<uint8_t>{8, 8}));
+    EXPECT_EQ(m.uvs[1][2], (std::array<float, 2>{0, 0}));
+    EXPECT_EQ(m.materials.at(m.face_materials[0]).texture, 0);
+    const Path other = folder.put("n.ply", kPlyVertices + "property float s\nproperty float t\nelement face 1\n"
+                                                          "property list uchar int vertex_indices\nproperty int label\n"
+                                                          "end_header\n0 0 0 0 0\n1 0 0 1 0\n1 1 0 1 1\n0 1 0 0 1\n"
+                                                          "3 0 1 2 77\n");
+    EXPECT_TRUE(says(read_mesh(other), "unknown labels in 'label', expected 0 to 19 or a map: 77 (1 faces)"));
+    const auto map = LabelMap::read(folder.put("map.json", R"({"77": "Terrain", "glass*": null})"));
+    ASSERT_TRUE(map) << map.error().message;
+    const auto mapped = read_mesh(other, UpAxis::file, *map);
+    ASSERT_TRUE(mapped) << mapped.error().message;
+    EXPECT_EQ(mapped->face_labels, std::vector<uint8_t>{9});
+    EXPECT_EQ(mapped->uvs[0][2], (std::array<float, 2>{1, 0}));
+}
+
+TEST(MeshFiles, broken_ply_meshes_are_one_line_that_says_where)
+{
+    const ScratchFolder folder;
+    const std::string faces = "element face 1\nproperty list uchar int vertex_indices\n";
+    std::string plain = kPlyVertices;
+    plain.erase(plain.find("comment"), std::strlen("comment TextureFile t.png\n"));
+    for (const auto& [text, error] : std::initializer_list<std::pair<std::string, const char*>>{
+             {"", "m.ply"},
+             {"ply\nformat ascii 1.0\nend_header\n", "no vertices"},
+             {plain + "end_header\n" + kSquare, "no faces"},
+             {plain + "element face 0\nproperty list uchar int vertex_indices\nend_header\n" + kSquare, "no faces"},
+             {plain + "element face 1\nproperty int a\nend_header\n" + kSquare + "1\n", "no list vertex_indices"},
+             {plain + faces + "end_header\n" + kSquare + "3 0 1 4\n", "face 0 refers to vertex 4, the mesh has 4"},
+             {plain + faces + "end_header\n" + kSquare + "3 0 1 -1\n", "face 0 refers to vertex -1"},
+             {plain + faces + "end_header\n" + kSquare + "2 0 1\n", "face 0 has 2 corners"},
+             {plain + faces + "end_header\n" + kSquare, "m.ply"},
+             {plain + faces + "end_header\nnan 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n", "nan"},
+             {plain + "property float red\nproperty float green\nproperty float blue\n" + faces +
+                  "end_header\n0 0 0 0 0 3\n1 0 0 0 0 0\n1 1 0 0 0 0\n0 1 0 0 0 0\n3 0 1 2\n",
+              "vertex 0 has the colour 3, expected 0 to 1"},
+             {plain + faces + "property list uchar float texcoord\nend_header\n" + kSquare + "3 0 1 2 5 0 0 0 0 0\n",
+              "face 0 has 5 texture coordinates for 3 corners"},
+             {kPlyVertices + faces + "end_header\n" + kSquare + "3 0 1 2\n", "refers to 't.png', which is missing"}})
+        EXPECT_TRUE(says(read_mesh(folder.put("m.ply", text)), error)) << text;
+}
+
+// a triangle strip of four vertices, as text with its buffer inside: 48 bytes of positions
+std::string gltf(const std::string& primitive, const std::string& more = "", const std::string& accessor = "",
+                 const std::string& node = R"("mesh":0)")
+{
+    // (0,0,0) (1,0,0) (0,1,0) (1,1,0)
+    return R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{)" + node +
+           R"(}],"meshes":[{"primitives":[)" + primitive +
+           R"(]}],"buffers":[{"byteLength":48,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAACAPwAAgD8AAAAA"}],"bufferViews":[{"buffer":0,"byteLength":48}],"accessors":[{)" +
+           (accessor.empty() ? R"("bufferView":0,"componentType":5126,"count":4,"type":"VEC3")" : accessor) + "}]" +
+           more + "}";
+}
+const std::string kStrip = R"({"attributes":{"POSITION":0},"mode":5})";
+
+TEST(MeshFiles, gltf_strips_fans_and_nodes_are_read)
+{
+    const ScratchFolder folder;
+    const Mesh strip = readable(folder.put("m.gltf", gltf(kStrip)));
+    ASSERT_EQ(strip.faces.size(), 2u);
+    EXPECT_EQ(strip.positions[1], (std::array<float, 3>{0, -1, 0})); // x right -> y left
+    EXPECT_EQ(strip.positions[2], (std::array<float, 3>{0, 0, 1}));
+    EXPECT_EQ(strip.faces[1],
+              (std::array<uint32_t, 3>{1, 3, 2})); // every second triangle of a strip turns the other way
+    const Mesh fan = readable(folder.put("m.gltf", gltf(R"({"attributes":{"POSITION":0},"mode":6})")), UpAxis::z);
+    EXPECT_EQ(fan.faces[1], (std::array<uint32_t, 3>{0, 2, 3}));
+    EXPECT_EQ(fan.positions[1], (std::array<float, 3>{1, 0, 0}));
+    const Mesh list = readable(folder.put("m.gltf", gltf(R"({"attributes":{"POSITION":0}})")));
+    EXPECT_EQ(list.faces.size(), 1u);
+    const std::string node = R"("children":[1],"translation":[1,2,3]},{"mesh":0,"scale":[-2,1,1],"rotation":[0,0,1,0])";
+    const Mesh moved = readable(folder.put("m.gltf", gltf(kStrip, "", "", node)), UpAxis::z);
+    EXPECT_NEAR(moved.positions[1][0], 3, 1e-6); // scaled by -2, turned by 180 degrees, moved by 1
+    EXPECT_NEAR(moved.positions[2][1], 1, 1e-6);
+    EXPECT_EQ(moved.faces[0], (std::array<uint32_t, 3>{0, 2, 1})); // mirrored
+    const Mesh labelled = readable(folder.put(
+        "m.gltf",
+        gltf(
+            R"({"attributes":{"POSITION":0},"material":0})",
+            R"(,"materials":[{"name":"x","extras":{"label":5},"pbrMetallicRoughness":{"baseColorFactor":[0.5,0.25,1,1]}}])")));
+    EXPECT_EQ(labelled.face_labels, std::vector<uint8_t>{5});
+    EXPECT_EQ(labelled.materials[0].color, (std::array<float, 3>{0.5f, 0.25f, 1}));
+}
+
+TEST(MeshFiles, broken_gltf_files_are_one_line_that_says_where)
+{
+    const ScratchFolder folder;
+    const auto with = [](const std::string& attributes) { return R"({"attributes":)" + attributes + "}"; };
+    const std::string textured = R"({"attributes":{"POSITION":0},"material":0})";
+    const std::string material = R"(,"materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}])";
+    const std::string texture = material + R"(,"textures":[{"source":0}])";
+    for (const auto& [text, error] : std::initializer_list<std::pair<std::string, const char*>>{
+             {"", "m.gltf"},
+             {"{}", "expected glTF of version 2"},
+             {R"({"asset":{"version":"1.0"}})", "expected glTF of version 2"},
+             {R"({"asset":{"version":"2.0"}})", "no faces"},
+             {R"({"asset":{"version":"2.0"},"extensionsRequired":["KHR_draco_mesh_compression"]})",
+              "needs the extension 'KHR_draco_mesh_compression'"},
+             {gltf(with("{}")), "refers to accessors[-1], there are 1"},
+             {gltf(with(R"({"POSITION":7})")), "refers to accessors[7], there are 1"},
+             {gltf(R"({"attributes":{"POSITION":0},"mode":9})"), "expected triangles, strips or fans"},
+             {gltf(R"({"attributes":{"POSITION":0},"indices":0})"), "indices: expected unsigned numbers"},
+             {gltf(R"({"attributes":{"POSITION":0},"material":3})"), "refers to materials[3], there are 0"},
+             {gltf(kStrip, "", R"("bufferView":0,"componentType":5126,"count":5,"type":"VEC3")"),
+              "5 elements of 12 bytes, 12 apart, from 0 on, in a bufferView of 48"},
+             {gltf(kStrip, "", R"("bufferView":0,"componentType":5126,"count":9007199254740993,"type":"VEC3")"),
+              "count: expected a whole number"},
+             {gltf(kStrip, "", R"("bufferView":0,"byteOffset":-4,"componentType":5126,"count":1,"type":"VEC3")"),
+              "from -4 on"},
+             {gltf(kStrip, "", R"("bufferView":3,"componentType":5126,"count":4,"type":"VEC3")"),
+              "refers to bufferViews[3], there are 1"},
+             {gltf(kStrip, "", R"("bufferView":0,"componentType":5126,"count":4,"type":"MAT4")"), "not supported"},
+             {gltf(kStrip, "", R"("bufferView":0,"componentType":5126,"count":4,"type":"VEC3","sparse":{})"),
+              "accessors[0]: is sparse"},
+             {gltf(kStrip, "", R"("componentType":5126,"count":4,"type":"VEC3")"), "has no bufferView"},
+             {gltf(kStrip, "", "", R"("mesh":0,"children":[0])"), "nodes[0]: is the child of two nodes, or of itself"},
+             {gltf(kStrip, "", "", R"("mesh":0,"rotation":[0,0,0,9])"), "a quaternion of length 9"},
+             {gltf(kStrip, "", "", R"("mesh":1)"), "refers to meshes[1], there are 1"},
+             {gltf(textured, material), "refers to textures[0], there are 0"},
+             {gltf(textured, texture), "refers to images[0], there are 0"},
+             {gltf(textured, texture + R"(,"images":[{"uri":"none.png"}])"),
+              "images[0]: refers to 'none.png', which is missing"},
+             {gltf(textured, texture + R"(,"images":[{"uri":"/etc/passwd"}])"),
+              "expected a file within its own folder"},
+             {gltf(textured, texture + R"(,"images":[{"uri":"%2e%2e/x.png"}])"),
+              "expected a file within its own folder"},
+             {gltf(textured, texture + R"(,"images":[{"uri":"http://example.org/x.png"}])"), "which is missing"},
+             {gltf(textured, texture + R"(,"images":[{"bufferView":0}])"), "images[0]: expected a PNG or JPEG image"},
+             {std::string(100000, '['), "m.gltf"}})
+        EXPECT_TRUE(says(read_mesh(folder.put("m.gltf", text)), error)) << text.substr(0, 400);
+}
+
+TEST(MeshFiles, a_cut_glb_is_refused_at_every_length)
+{
+    const ScratchFolder folder;
+    ASSERT_TRUE(write_glb(folder / "m.glb", two_faces()));
+    const std::string bytes = contents(folder / "m.glb");
+    for (size_t length = 0; length < bytes.size(); length += length < 40 ? 1 : 97) {
+        const auto m = read_mesh(folder.put("cut.glb", bytes.substr(0, length)));
+        ASSERT_FALSE(m) << length;
+        EXPECT_EQ(m.error().code, ErrorCode::bad_input);
+    }
+    // every byte of the JSON's start and of both headers changed: an error or a mesh, never a crash
+    for (size_t at = 0; at < bytes.size(); at += at < 60 ? 1 : 13) {
+        std::string changed = bytes;
+        changed[at] = char(changed[at] ^ 0x15);
+        (void)read_mesh(folder.put("changed.glb", changed));
+    }
+}
+
+TEST(MeshFiles, labels_come_from_names_maps_and_faces)
+{
+    EXPECT_EQ(class_of_material("Traffic_Light"), 6);
+    EXPECT_EQ(class_of_material("building.003"), 2);
+    EXPECT_EQ(class_of_material("ROAD LANE 7"), 19);
+    EXPECT_EQ(class_of_material("road-3"), 0);
+    EXPECT_EQ(class_of_material("trainers"), std::nullopt);
+    EXPECT_EQ(class_of_material(""), std::nullopt);
+    const ScratchFolder folder;
+    const auto map = LabelMap::read(folder.put("map.json", R"({"glass*": "building", "glass door": 3, "*tree*": 8})"));
+    ASSERT_TRUE(map) << map.error().message;
+    Mesh m = two_faces();
+    m.faces.push_back({1, 2, 3});
+    m.uvs.clear();
+    m.face_labels.clear();
+    m.face_materials = {0, 1, 2};
+    m.materials = {{"Glass_Door"}, {"oak tree 4"}, {"paint"}};
+    const auto unknown = label_faces(m, LabelSource::automatic, *map);
+    EXPECT_EQ(m.face_labels, (std::vector<uint8_t>{3, 8, kNoLabel}));
+    ASSERT_EQ(unknown.size(), 1u);
+    EXPECT_EQ(unknown[0].faces, 1u);
+    EXPECT_EQ(unlabelled_text(unknown), fmt::format("'paint' (1 faces, {:.4g} m^2)", face_area(m, 2)));
+    for (const auto& [text, error] : std::initializer_list<std::pair<const char*, const char*>>{
+             {"[]", "expected an object"},
+             {R"({"a": "grass"})", "'a': expected a class name, a number of 0 to 19 or null, found \"grass\""},
+             {R"({"a": 20})", "found 20"},
+             {R"({"a": -1})", "found -1"},
+             {R"({"a": 1.5})", "found 1.5"},
+             {R"({"a": [1]})", "found [1]"}})
+        EXPECT_TRUE(says(LabelMap::read(folder.put("map.json", text)), error)) << text;
+}
+
+} // namespace
+} // namespace semrover
