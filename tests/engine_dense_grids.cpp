@@ -303,11 +303,15 @@ TEST(SemanticKitti, refuses_malformed_files)
     o.map = folder.put("bad.json", R"({"street": 0})");
     EXPECT_TRUE(says(read(good.labels, o), "'street': the source has no label of that name"));
     o = {};
+    o.origin = {0, -1e7, 0};
+    EXPECT_TRUE(says(read(good.labels, o), "cell -16666710 is absurd: expected coordinates within 2^20"));
     o.origin = {0.00005, 0, 0};
     EXPECT_TRUE(says(read(good.labels, o), "origin: 5e-05 m: expected whole tenths"));
     o = {};
     o.voxel_size = 0.12345f;
     EXPECT_TRUE(says(read(good.labels, o), "voxel size"));
+    o.voxel_size = 0.001f;
+    EXPECT_TRUE(says(read(good.labels, o), "a voxel size of 0.001 m makes 1.68e+13 cells of its box"));
     o = {};
     o.min_fill = 0.5;
     EXPECT_TRUE(says(read(good.labels, o), "no voxel is occupied"));

@@ -203,6 +203,26 @@ TEST(LabelledPoints, refuses_what_is_no_labelled_cloud)
     EXPECT_EQ(read(ply(kXyz, {"1 2 3"}), o)->grid.labels, std::vector<uint8_t>{8});
 }
 
+TEST(LabelledPoints, carlas_tags_have_a_map)
+{
+    const ScratchFolder folder;
+    std::vector<std::string> rows;
+    for (int tag = 1; tag <= 19; ++tag)
+        rows.push_back(fmt::format("{} 0 0 {}", tag, tag));
+    rows.push_back("20 0 0 24");
+    rows.push_back("21 0 0 0");
+    SceneGridOptions o;
+    o.map = SEMROVER_SOURCE_DIR "/assets/label_maps/carla.json";
+    o.voxel_size = 1;
+    const auto out =
+        read_labelled_points(folder.put("c.ply", ply(std::string(kXyz) + "property uint ObjTag\n", rows)), o);
+    ASSERT_TRUE(out) << out.error().message;
+    ASSERT_EQ(out->grid.labels.size(), 20u);
+    for (uint8_t i = 0; i < 20; ++i)
+        EXPECT_EQ(out->grid.labels[i], i);
+    EXPECT_EQ(out->dropped, 1u);
+}
+
 TEST(LabelledPoints, no_prefix_of_a_file_reads_or_crashes)
 {
     const ScratchFolder folder;

@@ -342,7 +342,9 @@ Result<Report> describe(const Path& path, const SceneInputOptions& input, const 
     std::error_code ignored;
     if (std::filesystem::is_directory(path, ignored))
         return describe_folder(path, globals.verbose || globals.json);
-    if (!input.from.empty() || has_scene_extension(path))
+    // a .bin without labels beside it is a pickle
+    const bool pickle = path.extension() == ".bin" && !is_there(Path(path).replace_extension(".label"));
+    if (!input.from.empty() || (has_scene_extension(path) && !pickle))
         return describe_scene(path, input);
     SR_TRY(const SafetensorsSet set, SafetensorsSet::open(path));
     Totals totals;

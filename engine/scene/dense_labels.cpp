@@ -9,7 +9,9 @@ namespace semrover {
 
 namespace {
 
-constexpr int64_t kMaxEdge = 1'000'000; // 100 m: a cell's volume stays within 64 bits
+constexpr int64_t kMaxEdge = 1'000'000;     // 100 m: a cell's volume stays within 64 bits
+constexpr int64_t kMaxCoordinate = 1 << 20; // as check_grid has it
+constexpr double kMaxCells = 1 << 28;       // of the box, empty ones too
 
 int64_t floor_div(int64_t a, int64_t b)
 {
@@ -90,7 +92,19 @@ Result<VoxelGrid> resample(const DenseLabels& dense, float voxel_size, double mi
     SR_TRY(const int64_t size, tenths_of(voxel_size, fmt::format("{}: voxel size", where)));
     if (size < 10 || size > kMaxEdge)
         return fail(ErrorCode::bad_input, "{}: expected a voxel size of 0.001 to 100 m, found {}", where, voxel_size);
+    double cells = 1;
+    for (size_t a = 0; a < 3; ++a)
+        cells *= double(dense.edge[a] * dense.shape[a]) / double(size) + 1;
+    if (cells > kMaxCells)
+        return fail(ErrorCode::bad_input,
+                    "{}: a voxel size of {} m makes {:.3g} cells of its box, at most {:g} are "
+                    "supported",
+                    where, voxel_size, cells, kMaxCells);
     const Axis x = axis_of(dense, 0, size), y = axis_of(dense, 1, size), z = axis_of(dense, 2, size);
+    for (const Axis* axis : {&x, &y, &z})
+        if (axis->first < -kMaxCoordinate || axis->first + int64_t(axis->cells.size()) > kMaxCoordinate)
+            return fail(ErrorCode::bad_input, "{}: cell {} is absurd: expected coordinates within 2^20", where,
+                        axis->first);
     const double least = min_fill * double(size) * double(size) * double(size) * (1 - 1e-9);
     VoxelGrid grid;
     grid.voxel_size = voxel_size;

@@ -74,51 +74,66 @@ Result<uint32_t> label_number(const PlyProperty& column, size_t row, const std::
     return static_cast<uint32_t>(value);
 }
 
+struct CloudColumns {
+    Columns position, color;
+    bool colored = false;
+    const PlyProperty* label = nullptr; // none: all points have the default one
+};
+
+Result<CloudColumns> columns_of(const PlyElement& vertices, const SceneGridOptions& o, const std::string& where)
+{
+    CloudColumns c;
+    SR_TRY(c.position, position_columns(vertices, where));
+    c.label = label_column(vertices);
+    if (!c.label && !o.default_label)
+        return fail(ErrorCode::bad_input, "{}: its vertices have no label; --label CLASS gives them one", where);
+    c.color = {first_of(vertices, {"red", "r", "diffuse_red"}), first_of(vertices, {"green", "g", "diffuse_green"}),
+               first_of(vertices, {"blue", "b", "diffuse_blue"})};
+    c.colored = c.color[0] && c.color[1] && c.color[2] && !o.semantic;
+    return c;
+}
+
+// the cell of a point, none if it is not finite
+Result<std::optional<Cell>> cell_of(const std::array<double, 3>& p, size_t row, double voxel_size,
+                                    const std::string& where)
+{
+    std::array<double, 3> c;
+    for (size_t a = 0; a < 3; ++a)
+        c[a] = std::floor(p[a] / voxel_size);
+    if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2]))
+        return std::optional<Cell>();
+    if (!std::ranges::all_of(c, [](double v) { return std::abs(v) <= kMaxCoordinate; }))
+        return fail(ErrorCode::bad_input, "{}: vertex {}: ({}, {}, {}) m is absurd: expected within 2^20 cells", where,
+                    row, p[0], p[1], p[2]);
+    return std::optional<Cell>({int32_t(c[0]), int32_t(c[1]), int32_t(c[2])});
+}
+
 Status take_points(const PlyElement& vertices, const SceneGridOptions& o, const std::string& where, Points& points,
                    SceneGrid& out)
 {
-    SR_TRY(const Columns xyz, position_columns(vertices, where));
-    const PlyProperty* label = label_column(vertices);
-    if (!label && !o.default_label)
-        return fail(ErrorCode::bad_input, "{}: its vertices have no label; --label CLASS gives them one", where);
-    const Columns rgb = {first_of(vertices, {"red", "r", "diffuse_red"}),
-                         first_of(vertices, {"green", "g", "diffuse_green"}),
-                         first_of(vertices, {"blue", "b", "diffuse_blue"})};
-    const bool colored = rgb[0] && rgb[1] && rgb[2] && !o.semantic;
+    SR_TRY(const CloudColumns columns, columns_of(vertices, o, where));
     LabelMap map = LabelMap::identity();
     if (!o.map.empty())
         SR_CHECK(map.apply(o.map));
     uint64_t not_finite = 0;
     for (size_t row = 0; row < vertices.rows; ++row) {
         std::array<double, 3> p;
-        Cell cell{};
-        bool finite = true, near = true;
-        for (size_t a = 0; a < 3; ++a) {
-            p[a] = xyz[a]->values[row] + o.origin[a];
-            finite = finite && std::isfinite(p[a]);
-            const double c = std::floor(p[a] / double(o.voxel_size));
-            near = near && std::abs(c) <= kMaxCoordinate;
-            cell[a] = near && finite ? static_cast<int32_t>(c) : 0;
-        }
-        if (!finite) {
-            ++not_finite;
-            continue;
-        }
-        if (!near)
-            return fail(ErrorCode::bad_input, "{}: vertex {}: ({}, {}, {}) m is absurd: expected within 2^20 cells",
-                        where, row, p[0], p[1], p[2]);
+        for (size_t a = 0; a < 3; ++a)
+            p[a] = columns.position[a]->values[row] + o.origin[a];
+        SR_TRY(const std::optional<Cell> cell, cell_of(p, row, double(o.voxel_size), where));
         uint8_t target = o.default_label.value_or(0);
-        if (label) {
-            SR_TRY(const uint32_t number, label_number(*label, row, where));
+        if (cell && columns.label) {
+            SR_TRY(const uint32_t number, label_number(*columns.label, row, where));
             target = map(number);
         }
-        if (target >= kClassCount)
+        not_finite += !cell;
+        if (!cell || target >= kClassCount)
             continue;
         points.positions.push_back(p);
-        points.cells.push_back(cell);
+        points.cells.push_back(*cell);
         points.labels.push_back(target);
-        if (colored)
-            points.colors.push_back(color_of(rgb, row));
+        if (columns.colored)
+            points.colors.push_back(color_of(columns.color, row));
     }
     SR_CHECK(map.check(where, "points"));
     out.warnings = map.left_out("points");

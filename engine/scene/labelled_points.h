@@ -12,7 +12,9 @@ namespace semrover {
 // With colours (unless `options.semantic`) the result is a Sigma-Voxfield grid of options.points_per_voxel = n: where a
 // cell has more points, n are drawn by random numbers keyed by (seed, cell, place in the file), those of the cell's
 // label first; where it has fewer, they are repeated in turn. Points keep the file's order. Points that are not finite
-// are dropped with a warning. bad_input for files without these properties, and unknown labels (listed with counts).
+// are dropped with a warning. CARLA's semantic lidar (ObjTag) goes through assets/label_maps/carla.json: its tags since
+// 0.9.14 are Cityscapes' train ids + 1, and 24 for lane markings. bad_input for files without these properties, and
+// unknown labels (listed with counts).
 Result<SceneGrid> read_labelled_points(const Path& path, const SceneGridOptions& options);
 
 // the grid's points with colours and labels, those on a cell's faces moved inside by 1e-4 of its size, so that reading

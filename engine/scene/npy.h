@@ -5,8 +5,9 @@
 #include "runtime/dtype.h"
 #include "runtime/result.h"
 
+#include <algorithm>
 #include <cstddef>
-#include <cstring>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -24,7 +25,7 @@ struct NpyArray {
     std::vector<T> values() const // T is the dtype's own type, or its bits
     {
         std::vector<T> out(data.size() / sizeof(T));
-        std::memcpy(out.data(), data.data(), out.size() * sizeof(T));
+        std::copy_n(data.begin(), out.size() * sizeof(T), std::as_writable_bytes(std::span(out)).begin());
         return out;
     }
 };

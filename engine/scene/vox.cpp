@@ -146,6 +146,28 @@ Result<Cell> whole_cells(const SceneGridOptions& o)
     return shift;
 }
 
+// how many voxels a later one covers
+size_t take_cells(std::vector<Placed>& voxels, const Cell& shift, LabelMap& map, VoxelGrid& grid)
+{
+    size_t covered = 0;
+    std::ranges::sort(voxels, {}, [](const Placed& v) { return std::pair(v.cell, v.order); });
+    for (size_t i = 0; i < voxels.size(); ++i) {
+        if (i + 1 < voxels.size() && voxels[i + 1].cell == voxels[i].cell) {
+            ++covered;
+            continue;
+        }
+        const uint8_t label = map(voxels[i].color);
+        if (label >= kClassCount)
+            continue;
+        Cell cell = voxels[i].cell;
+        for (size_t a = 0; a < 3; ++a)
+            cell[a] += shift[a];
+        grid.cells.push_back(cell);
+        grid.labels.push_back(label);
+    }
+    return covered;
+}
+
 } // namespace
 
 Result<SceneGrid> read_vox(const Path& path, const SceneGridOptions& o)
@@ -160,30 +182,14 @@ Result<SceneGrid> read_vox(const Path& path, const SceneGridOptions& o)
     LabelMap map = palette_map(file, o.nearest_color);
     if (!o.map.empty())
         SR_CHECK(map.apply(o.map));
-    std::vector<Placed>& voxels = placement.voxels;
-    std::ranges::sort(voxels, {}, [](const Placed& v) { return std::pair(v.cell, v.order); });
-    size_t overlapping = 0;
-    out.grid.voxel_size = o.voxel_size;
-    for (size_t i = 0; i < voxels.size(); ++i) {
-        if (i + 1 < voxels.size() && voxels[i + 1].cell == voxels[i].cell) {
-            ++overlapping;
-            continue;
-        }
-        const uint8_t label = map(voxels[i].color);
-        if (label >= kClassCount)
-            continue;
-        Cell cell = voxels[i].cell;
-        for (size_t a = 0; a < 3; ++a)
-            cell[a] += shift[a];
-        out.grid.cells.push_back(cell);
-        out.grid.labels.push_back(label);
-    }
+    const size_t covered = take_cells(placement.voxels, shift, map, out.grid);
     SR_CHECK(map.check(where, "voxels", "--map FILE says what they are, --nearest-color takes the nearest class's"));
     for (const std::string& line : map.left_out("voxels"))
         out.warnings.push_back(line);
-    if (overlapping)
-        out.warnings.push_back(fmt::format("{} voxels under those of a later model are left out", overlapping));
-    out.dropped = map.dropped() + overlapping;
+    if (covered)
+        out.warnings.push_back(fmt::format("{} voxels under those of a later model are left out", covered));
+    out.dropped = map.dropped() + covered;
+    out.grid.voxel_size = o.voxel_size;
     out.grid.metadata["source"] = "MagicaVoxel";
     SR_CHECK(check_grid(out.grid, where));
     return out;
