@@ -208,12 +208,14 @@ TEST(CliEval, what_cannot_be_compared_is_one_clear_line)
                  "subsets of 3 out of 3 and 2 samples");
     put_tensors(a, {{"features", {{3, 2}, {0, 1, 0, 1, 0, 1}}}});
     expect_error(with_b("mmd"), 3, "their median distance is 0");
+    put_grid(folder / "one.sgrid", 1, 0.1f);
     std::filesystem::create_directory(folder / "empty");
     const std::string empty = (folder / "empty").string();
     expect_error(eval("fid " + empty + " " + b.string()), 2, "--features NETWORK.safetensors is needed");
     InceptionWeights(64).weights.write(folder / "net.safetensors");
     const std::string net = " -q --features " + (folder / "net.safetensors").string();
     expect_error(eval("fid " + empty + " " + b.string() + net), 3, "no PNG or JPEG images in it");
+    expect_error(eval("fid " + (folder / "one.sgrid").string() + " " + b.string() + net), 3, "expected a folder");
     put_image(folder / "empty/one.png", 8, 8, 1);
     expect_error(eval("fid " + empty + " " + b.string() + net), 3, "1 image, a comparison needs two or more");
     expect_error(eval("fid " + empty + " " + b.string() + " --features " + a.string()), 3, "neither Inception v3");

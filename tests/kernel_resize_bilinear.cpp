@@ -37,30 +37,36 @@ double resized(const ResizeCase& c, const std::vector<uint8_t>& bytes, uint32_t 
     return 2 * ((1 - b) * top + b * bottom) / 255 - 1;
 }
 
+void check(const ResizeCase& c, DType dtype)
+{
+    SCOPED_TRACE(fmt::format("{} x {}x{} -> {}x{} {}", c.images, c.height, c.width, c.out_height, c.out_width,
+                             dtype_name(dtype)));
+    KernelCase k(test_device());
+    const size_t image_bytes = size_t(c.height) * c.width * 3;
+    std::vector<uint8_t> bytes;
+    for (uint32_t v : k.indices(uint32_t(c.images * image_bytes), 256))
+        bytes.push_back(uint8_t(v));
+    const uint32_t words = rgb_words(c.height, c.width);
+    std::vector<uint32_t> packed(c.images * words, 0xffffffffu);
+    for (uint32_t i = 0; i < c.images; ++i)
+        std::memcpy(&packed[i * words], &bytes[i * image_bytes], image_bytes);
+    const FeatureMap y =
+        resize_bilinear(k.graph, k.input(packed, words), {c.height, c.width, c.out_height, c.out_width, dtype});
+    const HostImages got{y.height, y.width, k.run(y.data)};
+    for (uint32_t i = 0; i < c.images; ++i)
+        for (uint32_t p = 0; p < y.pixels(); ++p)
+            for (uint32_t n = 0; n < 3; ++n)
+                ASSERT_NEAR(got.at(i, p / y.width, p % y.width, n), resized(c, bytes, i, p / y.width, p % y.width, n),
+                            dtype == DType::f16 ? 5e-4 : 1e-6)
+                    << "image " << i << " pixel " << p;
+    k.expect_zero_padding(got.rows);
+}
+
 TEST(kernel_resize_bilinear, matches_interpolation_in_double)
 {
-    for (const ResizeCase& c : kCases) {
-        SCOPED_TRACE(fmt::format("{} x {}x{} -> {}x{}", c.images, c.height, c.width, c.out_height, c.out_width));
-        KernelCase k(test_device());
-        const size_t image_bytes = size_t(c.height) * c.width * 3;
-        std::vector<uint8_t> bytes;
-        for (uint32_t v : k.indices(uint32_t(c.images * image_bytes), 256))
-            bytes.push_back(uint8_t(v));
-        const uint32_t words = rgb_words(c.height, c.width);
-        std::vector<uint32_t> packed(c.images * words, 0xffffffffu);
-        for (uint32_t i = 0; i < c.images; ++i)
-            std::memcpy(&packed[i * words], &bytes[i * image_bytes], image_bytes);
-        const FeatureMap y = resize_bilinear(k.graph, k.input(packed, words),
-                                             {c.height, c.width, c.out_height, c.out_width, DType::f32});
-        const HostImages got{y.height, y.width, k.run(y.data)};
-        for (uint32_t i = 0; i < c.images; ++i)
-            for (uint32_t p = 0; p < y.pixels(); ++p)
-                for (uint32_t n = 0; n < 3; ++n)
-                    ASSERT_NEAR(got.at(i, p / y.width, p % y.width, n),
-                                resized(c, bytes, i, p / y.width, p % y.width, n), 1e-6)
-                        << "image " << i << " pixel " << p;
-        k.expect_zero_padding(got.rows);
-    }
+    for (const ResizeCase& c : kCases)
+        for (DType dtype : {DType::f32, DType::f16})
+            check(c, dtype);
 }
 
 } // namespace

@@ -29,7 +29,7 @@ Result<std::vector<Path>> files_below(const Path& folder, std::initializer_list<
 {
     std::error_code error;
     if (!fs::is_directory(folder, error))
-        return fail(ErrorCode::bad_input, "{}: no such folder", quote_path(folder));
+        return fail(ErrorCode::bad_input, "{}: expected a folder, this is none", quote_path(folder));
     std::vector<Path> files;
     for (fs::recursive_directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
         std::error_code unreadable;
