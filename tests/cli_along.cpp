@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <gtest/gtest.h>
 
 namespace semrover {
@@ -51,12 +52,12 @@ class CliAlong : public testing::Test {
         EXPECT_EQ(result.code, 0) << result.err;
         return result.code ? Json() : Json::parse(result.out);
     }
-    // all files of a folder of tiles, by name
+    // hashes of all files of a folder of tiles, by name
     std::map<std::string, std::string> bytes(std::string_view name) const
     {
         std::map<std::string, std::string> files;
         for (const auto& entry : std::filesystem::directory_iterator(folder_ / name))
-            files[entry.path().filename().string()] = contents(entry.path());
+            files[entry.path().filename().string()] = hash_text(*hash_file(entry.path()));
         return files;
     }
     int64_t journal_lines(std::string_view output) const
@@ -138,37 +139,69 @@ TEST_F(CliAlong, a_run_that_was_killed_goes_on_to_the_same_bytes)
     EXPECT_EQ(bytes("whole"), bytes("stopped"));
 }
 
+// cells with points, as a run keeps them for its tiles
+struct Made {
+    std::vector<Cell> cells;
+    std::vector<uint16_t> points;
+    std::vector<uint8_t> colors;
+
+    void add(const Cell& cell, const uint16_t* p, const uint8_t* c)
+    {
+        if (std::ranges::find(cells, cell) != cells.end())
+            return;
+        cells.push_back(cell);
+        points.insert(points.end(), p, p + 60);
+        colors.insert(colors.end(), c, c + 60);
+    }
+    void add_tile(const Path& path)
+    {
+        const auto tile = read_grid(path);
+        ASSERT_TRUE(tile) << tile.error().message;
+        for (size_t c = 0; c < tile->cells.size(); ++c)
+            if (tile->generated[c])
+                add(tile->cells[c], &tile->points[c * 60], &tile->colors[c * 60]);
+    }
+    void add_piece(const Path& path)
+    {
+        const auto file = Safetensors::open(path);
+        ASSERT_TRUE(file) << file.error().message;
+        const auto from = [&](const char* name) { return file->bytes(**file->get(name)); };
+        std::vector<Cell> all(from("cells").size() / sizeof(Cell));
+        std::vector<uint16_t> p(from("points").size() / 2);
+        std::memcpy(all.data(), from("cells").data(), from("cells").size());
+        std::memcpy(p.data(), from("points").data(), from("points").size());
+        for (size_t i = 0; i < all.size(); ++i)
+            add(all[i], &p[i * 60], reinterpret_cast<const uint8_t*>(from("colors").data()) + i * 60);
+    }
+    void write(const Path& path) const
+    {
+        const TensorData tensors[] = {{"cells", DType::i32, {cells.size(), 3}, std::as_bytes(std::span(cells))},
+                                      {"points", DType::f16, {points.size()}, std::as_bytes(std::span(points))},
+                                      {"colors", DType::u8, {colors.size()}, std::as_bytes(std::span(colors))}};
+        ASSERT_TRUE(write_safetensors(path, tensors));
+    }
+};
+
 TEST_F(CliAlong, tiles_that_a_killed_run_had_no_time_to_write_are_written)
 {
     run(line("whole"));
     ASSERT_EQ(stop_after("out", 3, SIGKILL), 128 + SIGKILL);
-    // as if it had died between the journal and the tiles: what was made is in the piece alone
-    std::vector<Cell> cells;
-    std::vector<uint16_t> points;
-    std::vector<uint8_t> colors;
-    for (const auto& [name, text] : bytes("out")) {
-        if (!name.ends_with(".sgrid"))
-            continue;
-        const auto tile = read_grid(folder_ / "out" / name);
-        ASSERT_TRUE(tile) << tile.error().message;
-        for (size_t c = 0; c < tile->cells.size(); ++c) {
-            if (!tile->generated[c])
-                continue;
-            cells.push_back(tile->cells[c]);
-            points.insert(points.end(), &tile->points[c * 60], &tile->points[c * 60] + 60);
-            colors.insert(colors.end(), &tile->colors[c * 60], &tile->colors[c * 60] + 60);
-        }
-        std::filesystem::remove(folder_ / "out" / name);
-    }
-    const TensorData tensors[] = {{"cells", DType::i32, {cells.size(), 3}, std::as_bytes(std::span(cells))},
-                                  {"points", DType::f16, {points.size()}, std::as_bytes(std::span(points))},
-                                  {"colors", DType::u8, {colors.size()}, std::as_bytes(std::span(colors))}};
     std::string journal = contents(path("out.run/journal.jsonl"));
     journal = journal.substr(0, journal.rfind('\n') + 1); // the last line may be half written
     const size_t last = journal.rfind('\n', journal.size() - 2) + 1;
     Json entry = Json::parse(journal.substr(last));
     const Path piece = folder_ / fmt::format("out.run/windows/{:06}.safetensors", size_t(entry["window"]));
-    ASSERT_TRUE(write_safetensors(piece, tensors));
+    // as if it had died between the journal and the tiles: what was made is in the piece alone
+    Made made;
+    if (std::filesystem::exists(piece)) // it did
+        made.add_piece(piece);
+    for (const auto& [name, hash] : bytes("out")) {
+        if (!name.ends_with(".sgrid"))
+            continue;
+        made.add_tile(folder_ / "out" / name);
+        std::filesystem::remove(folder_ / "out" / name);
+    }
+    made.write(piece);
     entry["xxh64"] = hash_text(*hash_file(piece));
     folder_.put("out.run/journal.jsonl", journal.substr(0, last) + entry.dump() + "\n");
     run(line("out"));

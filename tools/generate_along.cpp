@@ -20,6 +20,7 @@
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstring>
+#include <ctime>
 
 namespace semrover {
 
@@ -124,6 +125,7 @@ class AlongRun {
     Status begin_window(size_t window);
     Status load();
     Status grow(RunFolder& run, size_t window, Progress& progress);
+    Status grow_all(RunFolder& run);
     void note_leg(size_t window);
     Status dry_run();
     Status finish(RunFolder& run);
@@ -142,7 +144,7 @@ class AlongRun {
     size_t first_ = 0;              // window to go on with
     size_t cells_ = 0, regions_ = 0;
     uint64_t bound_ = 0; // device bytes that no window exceeds
-    double begun_ = 0, leg_begun_ = 0;
+    double begun_ = 0, leg_begun_ = 0, leg_cpu_ = 0;
     Json legs_ = Json::array();
 };
 
@@ -212,6 +214,17 @@ Status AlongRun::clear_output() const
     return {};
 }
 
+// what a killed process was writing
+void remove_temporaries(const Path& folder)
+{
+    std::error_code ignored;
+    for (const auto& entry : fs::directory_iterator(folder, ignored)) {
+        const std::string name = entry.path().filename().string();
+        if (name.starts_with(".semrover-") && name.ends_with(".tmp"))
+            fs::remove(entry.path(), ignored);
+    }
+}
+
 // windows that are in the journal are done; the last one's tiles may not have been written
 Status AlongRun::take_up(const RunFolder& run)
 {
@@ -226,6 +239,7 @@ Status AlongRun::take_up(const RunFolder& run)
     }
     if (first_ == 0)
         return clear_output();
+    remove_temporaries(files_.output);
     const Path piece = piece_path(run, first_ - 1);
     if (!fs::exists(piece))
         return {}; // it goes when the tiles are written
@@ -297,9 +311,11 @@ void AlongRun::note_leg(size_t window)
     if (!last && std::floor(end / kLegMetres) == std::floor(windows_->begin(window) / kLegMetres))
         return;
     const double now = seconds_now();
+    const double cpu = double(std::clock()) / CLOCKS_PER_SEC; // of all threads: what other programs do not change
     const HostMemory host = host_memory();
     const Json leg{{"metres", end},
                    {"seconds", now - leg_begun_},
+                   {"cpu_seconds", cpu - leg_cpu_},
                    {"cells", cells_},
                    {"regions", regions_},
                    {"cells_in_memory", cache_->cells_in_memory()},
@@ -308,6 +324,7 @@ void AlongRun::note_leg(size_t window)
                    {"peak_host_bytes", host.peak}};
     legs_.push_back(leg);
     leg_begun_ = now;
+    leg_cpu_ = cpu;
     if (globals_.verbose && !globals_.quiet)
         fmt::print(stderr, "{:6.0f} m {:8.1f} s, {} cells so far, device {} at most, host {} ({} at most)\n", end,
                    double(leg["seconds"]), cells_, bytes_text(generation_.device().peak_bytes()),
@@ -346,9 +363,13 @@ Status AlongRun::finish(RunFolder& run)
             continue;
         SR_TRY(written[tile], cells_in_file(path));
     }
-    if (written.empty())
+    if (written.empty()) {
+        std::error_code ignored;
+        fs::remove_all(run.path(), ignored);
+        fs::remove(files_.output, ignored); // empty
         return fail(ErrorCode::bad_input, "no cell of {} lies within {} m of the path", quote(files_.scaffold),
                     along_.horizon);
+    }
     TileFolderInfo info{source_->voxel_size(), source_->tile_cells(),
                         int(generation_.settings().model.config.points_per_voxel), true, source_->metadata()};
     info.metadata["seed"] = std::to_string(files_.seed);
@@ -381,6 +402,18 @@ Status AlongRun::run()
     SR_TRY(RunFolder run, open_run(files_.output + ".run", wanted, globals_.yes, {{"windows"}, {}}));
     SR_CHECK(take_up(run));
     begun_ = leg_begun_ = seconds_now();
+    leg_cpu_ = double(std::clock()) / CLOCKS_PER_SEC;
+    if (const Status grown = grow_all(run); !grown) {
+        run.drop_if_empty();
+        std::error_code ignored;
+        fs::remove(files_.output, ignored); // only when nothing is in it
+        return grown;
+    }
+    return finish(run);
+}
+
+Status AlongRun::grow_all(RunFolder& run)
+{
     Progress progress(progress_to_stderr(globals_), "generate", "windows", windows_->count(), first_);
     for (size_t window = first_; window < windows_->count(); ++window) {
         if (interrupt_requested())
@@ -391,7 +424,7 @@ Status AlongRun::run()
         note_leg(window);
     }
     progress.finish();
-    return finish(run);
+    return {};
 }
 
 } // namespace
