@@ -54,7 +54,7 @@ Status check_outputs(const Options& o, const Globals& globals)
 }
 
 // what says no label: an error, or a warning where there is a default
-Status label_mesh(Mesh& mesh, const Options& o, const LabelMap& map, const Globals& globals)
+Status label_mesh(Mesh& mesh, const Options& o, const MeshLabelMap& map, const Globals& globals)
 {
     const std::vector<UnlabelledFaces> unknown = label_faces(mesh, source_of(o.labels), map);
     if (unknown.empty())
@@ -72,9 +72,9 @@ Status label_mesh(Mesh& mesh, const Options& o, const LabelMap& map, const Globa
 
 Result<Mesh> load_mesh(const Options& o, const Globals& globals)
 {
-    LabelMap map;
+    MeshLabelMap map;
     if (!o.map.empty()) {
-        SR_TRY(map, LabelMap::read(o.map));
+        SR_TRY(map, MeshLabelMap::read(o.map));
     }
     const UpAxis up = o.up == "y" ? UpAxis::y : o.up == "z" ? UpAxis::z : UpAxis::file;
     SR_TRY(Mesh mesh, read_mesh(o.mesh, up, map));

@@ -88,14 +88,14 @@ std::optional<uint8_t> class_of_material(std::string_view name)
     return found;
 }
 
-Result<LabelMap> LabelMap::read(const Path& path)
+Result<MeshLabelMap> MeshLabelMap::read(const Path& path)
 {
     const std::string where = quote_path(path);
     SR_TRY(const Json json, read_json(path, {.bytes = 1 << 20, .depth = 2, .values = 100000}));
     if (!json.is_object())
         return fail(ErrorCode::bad_input, "{}: expected an object of names and classes, found {}", where,
                     json.type_name());
-    LabelMap map;
+    MeshLabelMap map;
     for (const auto& [key, value] : json.items()) {
         std::optional<uint8_t> label;
         if (value.is_null())
@@ -115,7 +115,7 @@ Result<LabelMap> LabelMap::read(const Path& path)
     return map;
 }
 
-std::optional<uint8_t> LabelMap::find(std::string_view name) const
+std::optional<uint8_t> MeshLabelMap::find(std::string_view name) const
 {
     const std::string text = folded_text(name);
     for (const Entry& e : entries_)
@@ -124,7 +124,7 @@ std::optional<uint8_t> LabelMap::find(std::string_view name) const
     return std::nullopt;
 }
 
-std::optional<uint8_t> LabelMap::find(int64_t number) const
+std::optional<uint8_t> MeshLabelMap::find(int64_t number) const
 {
     if (!entries_.empty())
         if (const auto label = find(std::string_view(std::to_string(number))))
@@ -134,7 +134,7 @@ std::optional<uint8_t> LabelMap::find(int64_t number) const
     return number == kNoLabel || number == -1 ? std::optional(kNoLabel) : std::nullopt;
 }
 
-std::vector<UnlabelledFaces> label_faces(Mesh& mesh, LabelSource source, const LabelMap& map)
+std::vector<UnlabelledFaces> label_faces(Mesh& mesh, LabelSource source, const MeshLabelMap& map)
 {
     std::vector<uint8_t> by_material(mesh.materials.size(), kNoLabel);
     for (size_t i = 0; i < by_material.size(); ++i) {

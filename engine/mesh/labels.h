@@ -16,10 +16,10 @@ std::optional<uint8_t> class_of_material(std::string_view name);
 
 // what else names or numbers of a file stand for: a JSON object of "name", "na*e" (* is any text) or "number" to a
 // class name or number, or null for none. Names are compared as above; exact ones come first, then the first pattern.
-class LabelMap {
+class MeshLabelMap {
   public:
-    LabelMap() = default;
-    static Result<LabelMap> read(const Path& path); // bad_input names the key
+    MeshLabelMap() = default;
+    static Result<MeshLabelMap> read(const Path& path); // bad_input names the key
 
     bool empty() const { return entries_.empty(); }
     std::optional<uint8_t> find(std::string_view name) const; // kNoLabel where the map says null
@@ -49,7 +49,7 @@ struct UnlabelledFaces {
 };
 
 // fills face_labels from `source`; faces that get none keep kNoLabel and are listed, the largest area first
-std::vector<UnlabelledFaces> label_faces(Mesh& mesh, LabelSource source, const LabelMap& map);
+std::vector<UnlabelledFaces> label_faces(Mesh& mesh, LabelSource source, const MeshLabelMap& map);
 
 // "'glass' (12 faces, 3.4 m^2), ..", ten at most
 std::string unlabelled_text(std::span<const UnlabelledFaces> list);

@@ -20,7 +20,7 @@ enum class UpAxis {
 // finite. Polygons become triangles. A PLY's per-face label, class, class_id, category or scalar_Classification goes
 // through `map`; a GLB's material may say {"label": n} in its extras. Vertex colours of an OBJ or PLY that has textures
 // are dropped. The mesh passes check_mesh.
-Result<Mesh> read_mesh(const Path& path, UpAxis up = UpAxis::file, const LabelMap& map = {});
+Result<Mesh> read_mesh(const Path& path, UpAxis up = UpAxis::file, const MeshLabelMap& map = {});
 
 // binary glTF 2.0, y up as the format wants it; textures inside as PNG; a face's label goes into its material: name,
 // and extras {"label": n}. The same mesh gives the same bytes; atomic.

@@ -10,7 +10,7 @@ namespace semrover {
 
 namespace {
 
-Result<Mesh> read_by_extension(const Path& path, const std::string& extension, const LabelMap& map)
+Result<Mesh> read_by_extension(const Path& path, const std::string& extension, const MeshLabelMap& map)
 {
     if (extension == ".obj")
         return read_obj(path);
@@ -23,7 +23,7 @@ Result<Mesh> read_by_extension(const Path& path, const std::string& extension, c
 
 } // namespace
 
-Result<Mesh> read_mesh(const Path& path, UpAxis up, const LabelMap& map)
+Result<Mesh> read_mesh(const Path& path, UpAxis up, const MeshLabelMap& map)
 {
     std::string extension = path.extension().string();
     std::ranges::transform(extension, extension.begin(),

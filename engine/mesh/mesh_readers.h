@@ -9,7 +9,7 @@ namespace semrover {
 
 // one reader a format, in the file's own axes; read_mesh() turns and checks what they give
 Result<Mesh> read_obj(const Path& path);
-Result<Mesh> read_ply_mesh(const Path& path, const LabelMap& map);
+Result<Mesh> read_ply_mesh(const Path& path, const MeshLabelMap& map);
 Result<Mesh> read_gltf(const Path& path); // .glb or .gltf
 
 constexpr size_t kMaxMeshElements = 1u << 28; // vertices, faces

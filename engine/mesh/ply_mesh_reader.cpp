@@ -19,7 +19,7 @@ using Column = const PlyProperty*;
 
 class PlyMesh {
   public:
-    PlyMesh(const Path& path, const PlyFile& file, const LabelMap& map)
+    PlyMesh(const Path& path, const PlyFile& file, const MeshLabelMap& map)
         : where_(quote_path(path)), file_(file), map_(map), folder_(path)
     {
     }
@@ -38,7 +38,7 @@ class PlyMesh {
 
     std::string where_;
     const PlyFile& file_;
-    const LabelMap& map_;
+    const MeshLabelMap& map_;
     AssetFolder folder_;
     Mesh mesh_;
     Column indices_ = nullptr, labels_ = nullptr, texcoord_ = nullptr, texnumber_ = nullptr, u_ = nullptr, v_ = nullptr;
@@ -208,7 +208,7 @@ Result<Mesh> PlyMesh::read()
 
 } // namespace
 
-Result<Mesh> read_ply_mesh(const Path& path, const LabelMap& map)
+Result<Mesh> read_ply_mesh(const Path& path, const MeshLabelMap& map)
 {
     SR_TRY(const PlyFile file, read_ply(path));
     return PlyMesh(path, file, map).read();
