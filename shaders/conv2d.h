@@ -20,7 +20,7 @@ struct Conv2dPush {
     uint stride;
     uint padding_y; // above
     uint padding_x; // to the left
-    uint shift;   // 1: nearest x2
+    uint shift;     // 1: nearest x2
     uint x_ld;
     uint x2_ld;
     uint x_cols; // padded

@@ -12,7 +12,7 @@ struct GemmPush {
     uint x_ld; // elements
     uint w_ld;
     uint y_ld;
-    uint y_col; // first column written, a multiple of 8
+    uint y_col;   // first column written, a multiple of 8
     uint bias_ld; // from one group's bias to the next
     uint residual_ld;
     uint gate_ld;
