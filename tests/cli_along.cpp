@@ -256,6 +256,7 @@ TEST_F(CliAlong, what_makes_no_sense_is_refused)
     refused(line("x", "--window=-1"), 2, "--window");
     refused(line("x", "--tile-size 0.1", "road.sgrid"), 3, "expected 1 to");
     refused(line("x", "--ply " + path("x.ply")), 2, "--ply");
+    refused(line("x", "--max-vram 600KiB"), 5, "--max-vram");
     refused(line("x", "", "nowhere"), 3, "nowhere");
     refused(line("x", "", "."), 3, "index.json");
     refused(line("road.sgrid"), 3, "is a file");

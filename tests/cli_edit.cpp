@@ -256,6 +256,7 @@ TEST_F(CliEdit, what_makes_no_sense_is_refused_in_one_line)
     expect_refusal(edit("--remove-object 1,1,9"), 3, "no cell (1, 1, 9)");
     expect_refusal(edit("--box 0,0,0:1,1,1 --remove car"), 2, "comes after the operation");
     expect_refusal(edit("--remove all --box 0,0,0:1,1"), 2, "expected a box");
+    expect_refusal(line("edit", "--remove car -y", "in.sgrid"), 2, "input and output are the same");
     expect_refusal(edit("--remove all --box 1,0,0:0,1,1"), 2, "ends before it begins");
     expect_refusal(edit("--remove all --box 0,0,0:nan,1,1"), 2, "absurd");
     expect_refusal(edit("--remove all --sphere 0,0,0,0"), 2, "radius above 0");
@@ -279,6 +280,8 @@ TEST_F(CliEdit, what_makes_no_sense_is_refused_in_one_line)
     expect_refusal(line("inpaint", "--class car", "out.sgrid"), 2, "--model");
     expect_refusal(line("inpaint", "--class truck" + kSettings, "out.sgrid"), 3, "no cell of");
     expect_refusal(line("inpaint", "--mask " + path("none.sgrid") + kSettings, "out.sgrid"), 3, "none.sgrid");
+    folder_.put("out.sgrid.undo", "of another time");
+    expect_refusal(edit("--remove car"), 2, "out.sgrid.undo' exists; -y replaces it");
 }
 
 TEST_F(CliEdit, a_grid_is_cut_into_tiles_and_joined_again)

@@ -211,7 +211,7 @@ Status edit(const Options& o, const Globals& globals)
         return fail(ErrorCode::usage, "--halo: expected 0 to {} m, found {}", kWidestHalo, o.halo);
     for (const EditOperation& operation : o.operations)
         SR_CHECK(check_operation(operation, fmt::format("--{}", operation_name(operation.kind))));
-    SR_CHECK(check_outputs(o.out, globals));
+    SR_CHECK(check_outputs(o.grid, o.out, globals));
     Regeneration what;
     what.command = "edit";
     what.input = o.grid;

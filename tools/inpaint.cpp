@@ -53,7 +53,7 @@ Status inpaint(const Options& o, const Globals& globals)
     SR_TRY(const CellSelection where, selection_of(o));
     if (!where.any() && o.mask.empty())
         return fail(ErrorCode::usage, "say which cells: --box, --sphere, --class, --object or --mask");
-    SR_CHECK(check_outputs(o.out, globals));
+    SR_CHECK(check_outputs(o.grid, o.out, globals));
     Regeneration what;
     what.command = "inpaint";
     what.input = o.grid;

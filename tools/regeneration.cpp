@@ -164,7 +164,7 @@ Path output_of(const RegenerationOptions& options, uint64_t seed)
     return named;
 }
 
-Status check_outputs(const RegenerationOptions& o, const Globals& globals)
+Status check_outputs(const Path& input, const RegenerationOptions& o, const Globals& globals)
 {
     if (!o.seeds.empty() && o.seed)
         return fail(ErrorCode::usage, "--seed and --seeds exclude each other");
@@ -179,9 +179,13 @@ Status check_outputs(const RegenerationOptions& o, const Globals& globals)
         return fail(ErrorCode::usage, "-o/--output is required");
     for (const uint64_t seed : seeds_of(o)) {
         const Path output = output_of(o, seed);
+        std::error_code ignored;
+        if (fs::equivalent(input, output, ignored)) // the record of what was there is made from it at the end
+            return fail(ErrorCode::usage, "input and output are the same, '{}'", output.string());
         if (o.seeds.size() < 2 || !finished_before(output, Json()))
             SR_CHECK(check_writable(output, globals));
-        SR_CHECK(AtomicFile::create(undo_of(output)).map([](const AtomicFile&) {}));
+        if (!fs::exists(run_folder_of(output))) // the record is not of a run of ours that goes on
+            SR_CHECK(check_writable(undo_of(output), globals));
     }
     return {};
 }

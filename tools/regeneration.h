@@ -29,8 +29,8 @@ std::vector<uint64_t> seeds_of(const RegenerationOptions& options);
 // OUT.sgrid, or OUT-seedN.sgrid where there are several seeds
 Path output_of(const RegenerationOptions& options, uint64_t seed);
 
-// usage, bad_input: an output that is missing, exists or cannot be written; before any work
-Status check_outputs(const RegenerationOptions& options, const Globals& globals);
+// usage, bad_input: an output that is missing, exists, is the input or cannot be written; before any work
+Status check_outputs(const Path& input, const RegenerationOptions& options, const Globals& globals);
 
 // writes each seed's grid, OUTPUT.undo beside it, and keeps the state of its run in OUTPUT.run
 Status regenerate(const Regeneration& what, const RegenerationOptions& options, const Globals& globals);
