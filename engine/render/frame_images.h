@@ -7,8 +7,9 @@
 
 namespace semrover {
 
-// A splat image as files. color: sRGB, over a background where the splats leave room; depth: 16-bit millimetres, 0 for
-// nothing; normal: camera frame, 128 + 127 n; label: class number, 255 for nothing; visible: 0 or 255.
+// A splat image as files. color: sRGB, over a background where the splats leave room; depth: 16-bit millimetres along
+// z, or from the camera where Lens::radial_depth says so, 0 for nothing; normal: camera frame, 128 + 127 n; label:
+// class number, 255 for nothing; visible: 0 or 255.
 std::vector<uint8_t> color_pixels(const SplatImage& image,
                                   const std::array<uint8_t, 3>& background); // [height, width, 3]
 std::vector<uint16_t> depth_pixels(const SplatImage& image);                 // [height, width]
