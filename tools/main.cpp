@@ -108,6 +108,7 @@ int main(int argc, char** argv)
     add_refine(app, globals, run);
     add_render(app, globals, run);
     add_tile(app, globals, run);
+    add_streets(app, globals, run);
     add_verify(app, globals, run);
     add_voxelize(app, globals, run);
     try {

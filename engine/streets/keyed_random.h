@@ -1,0 +1,45 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <initializer_list>
+
+namespace semrover {
+
+// Counter-based random numbers: the n-th draw of an object depends on the seed, the object's key and n only, so that
+// objects never disturb each other. The mixer is SplitMix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number
+// generators", 2014).
+class KeyedRandom {
+  public:
+    KeyedRandom(uint64_t seed, std::initializer_list<uint64_t> key) : state_(mix(seed + 0x9e3779b97f4a7c15u))
+    {
+        for (uint64_t k : key)
+            state_ = mix(state_ ^ mix(k + 0x632be59bd9b4e019u));
+    }
+
+    uint32_t bits() { return uint32_t(mix(state_ + 0x9e3779b97f4a7c15u * ++count_) >> 32); }
+    double uniform() { return bits() * (1.0 / 4294967296.0); } // [0, 1)
+    double uniform(double low, double high) { return low + (high - low) * uniform(); }
+    uint32_t below(uint32_t n) { return uint32_t((uint64_t(bits()) * n) >> 32); }
+    bool chance(double p) { return uniform() < p; }
+    // about normal: the sum of four uniform numbers, with mean 0 and deviation 1
+    double spread() { return (uniform() + uniform() + uniform() + uniform() - 2) * 1.7320508075688772; }
+    template <typename T, std::size_t N>
+    const T& pick(const T (&values)[N])
+    {
+        return values[below(uint32_t(N))];
+    }
+
+  private:
+    static uint64_t mix(uint64_t z)
+    {
+        z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+        z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+        return z ^ (z >> 31);
+    }
+
+    uint64_t state_, count_ = 0;
+};
+
+} // namespace semrover

@@ -1,0 +1,20 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/streets/street.h"
+#include "engine/trace/tracer.h"
+#include "tools/commands.h"
+
+namespace semrover {
+
+struct StreetImages {
+    uint32_t width = 616, height = 424;
+    uint32_t samples = 4, ambient_rays = 2;
+};
+
+// pictures of a drive through a street, FOLDER/{color,depth,normal,label,visible}/NNNNNN.png, in daylight of the seed
+Status draw_street(Device& device, const Street& street, const CameraPath& path, uint64_t seed,
+                   const StreetImages& images, const Path& folder, const Globals& globals);
+
+} // namespace semrover

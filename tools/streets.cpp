@@ -1,0 +1,110 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// semrover streets -o DIR: makes up a street: a textured, labelled mesh, its grids, a drive, and with --images pictures
+#include "engine/mesh/mesh_files.h"
+#include "engine/scene/palette.h"
+#include "engine/streets/camera_drive.h"
+#include "engine/streets/street.h"
+#include "runtime/json.h"
+#include "tools/commands.h"
+#include "tools/open_device.h"
+#include "tools/output_folder.h"
+#include "tools/street_images.h"
+
+#include <CLI/CLI.hpp>
+
+namespace semrover {
+
+namespace {
+
+struct Options {
+    std::string output;
+    StreetOptions street;
+    DriveShape drive;
+    double fov = 73, shift = 1.5;
+    StreetImages images;
+    bool pictures = false, no_grids = false;
+};
+
+Json street_json(const Options& o, const Street& street, const CameraPath& path)
+{
+    const CrossSection& c = street.road.section();
+    Json classes = Json::object();
+    const std::vector<ClassShare> shares = class_shares(street.mesh);
+    for (size_t i = 0; i < shares.size(); ++i)
+        classes[std::string(kPalette[i].name)] = {{"faces", shares[i].faces}, {"square_metres", shares[i].area}};
+    return {{"seed", o.street.seed},
+            {"length", o.street.length},
+            {"faces", street.mesh.faces.size()},
+            {"materials", street.mesh.materials.size()},
+            {"textures", street.mesh.textures.size()},
+            {"objects", street.objects},
+            {"classes", classes},
+            {"section",
+             {{"lane", c.lane},
+              {"cycle_lane", c.cycle},
+              {"parking", c.parking},
+              {"sidewalk", c.sidewalk},
+              {"kerb_height", c.kerb_height},
+              {"rails", c.rails}}},
+            {"frames", path.frames.size()},
+            {"shift", o.shift}};
+}
+
+Status streets(const Options& o, const Globals& globals)
+{
+    SR_TRY(OutputFolder out, OutputFolder::create(o.output, globals.yes));
+    const Street street = make_street(o.street);
+    const Intrinsics lens = pinhole_from_fov(o.fov, o.images.width, o.images.height);
+    const CameraPath path = drive_along(street.road, o.drive, lens);
+    DriveShape beside = o.drive;
+    beside.offset += o.shift;
+    const CameraPath shifted = drive_along(street.road, beside, lens);
+    SR_CHECK(write_glb(out / "mesh.glb", street.mesh));
+    SR_CHECK(write_tum(out / "drive.tum", path));
+    SR_CHECK(write_transforms(out / "transforms.json", path));
+    std::error_code error;
+    std::filesystem::create_directory(out / "shifted", error);
+    SR_CHECK(write_transforms(out / "shifted/transforms.json", shifted));
+    const Json about = street_json(o, street, path);
+    SR_CHECK(write_file_atomically(out / "street.json", about.dump(2) + "\n"));
+    if (o.pictures) {
+        SR_TRY(const auto device, open_device(globals));
+        SR_CHECK(draw_street(*device, street, path, o.street.seed, o.images, out.path(), globals));
+        if (o.shift != 0)
+            SR_CHECK(draw_street(*device, street, shifted, o.street.seed, o.images, out / "shifted", globals));
+    }
+    SR_CHECK(out.commit());
+    if (globals.json)
+        fmt::print("{}\n", about.dump());
+    else if (!globals.quiet)
+        fmt::print("{} m of street, {} faces, {} frames\n", o.street.length, street.mesh.faces.size(),
+                   path.frames.size());
+    return {};
+}
+
+} // namespace
+
+void add_streets(CLI::App& app, const Globals& globals, Run& run)
+{
+    auto o = std::make_shared<Options>();
+    CLI::App* c = app.add_subcommand("streets", "make up a street: mesh, grids, a drive, and pictures to train with");
+    c->add_option("-o,--output", o->output, "folder")->required();
+    c->add_option("--seed", o->street.seed, "another seed, another street");
+    c->add_option("--length", o->street.length, "metres")->check(CLI::Range(30.0, 20000.0));
+    c->add_option("--spacing", o->drive.spacing, "metres between the frames of the drive")->check(CLI::Range(0.01, 1000.0));
+    c->add_option("--first", o->drive.first, "metres along the street where the drive begins");
+    c->add_option("--end-margin", o->drive.end_margin, "metres before the end where it stops")->check(CLI::Range(0.0, 20000.0));
+    c->add_option("--height", o->drive.height, "of the camera, metres")->check(CLI::Range(0.2, 50.0));
+    c->add_option("--yaw", o->drive.yaw, "radians to the left of the street");
+    c->add_option("--shift", o->shift, "metres to the left of the second, novel drive");
+    c->add_flag("--images", o->pictures, "also pictures of both drives: {color,depth,normal,label,visible}/000000.png");
+    c->add_option("--samples", o->images.samples, "rays a pixel")->check(CLI::Range(1u, 256u));
+    c->add_option("--ambient-rays", o->images.ambient_rays, "rays for the light from around, a sample")->check(CLI::Range(1u, 64u));
+    c->add_option("-W,--width", o->images.width, "pixels")->check(CLI::Range(1u, 4096u));
+    c->add_option("-H,--height-pixels", o->images.height, "pixels")->check(CLI::Range(1u, 4096u));
+    c->add_option("--fov-x", o->fov, "horizontal field of view in degrees")->check(CLI::Range(1.0, 170.0));
+    c->callback([o, &globals, &run] { run = [o, &globals] { return streets(*o, globals); }; });
+}
+
+} // namespace semrover
