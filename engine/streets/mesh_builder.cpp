@@ -105,6 +105,14 @@ void MeshBuilder::quad(Finish f, const Vector3& a, const Vector3& b, const Vecto
     picture(f, a, b, c, d, {u / size, v / size, (u + wide) / size, (v + high) / size});
 }
 
+void MeshBuilder::pictured(Finish f, const std::array<Vector3, 3>& p, const std::array<std::array<double, 2>, 3>& uv)
+{
+    const uint32_t i = vertex(p[0]);
+    vertex(p[1]);
+    vertex(p[2]);
+    face(f, {i, i + 1, i + 2}, uv);
+}
+
 void MeshBuilder::triangle(Finish f, const Vector3& a, const Vector3& b, const Vector3& c)
 {
     const double size = size_[f.material], along = length(b - a);

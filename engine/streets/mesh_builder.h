@@ -40,6 +40,7 @@ class MeshBuilder {
     // likewise; the corners take this part of the picture (0..1)
     void picture(Finish f, const Vector3& a, const Vector3& b, const Vector3& c, const Vector3& d,
                  const Span& part = {});
+    void pictured(Finish f, const std::array<Vector3, 3>& corners, const std::array<std::array<double, 2>, 3>& uv);
     void triangle(Finish f, const Vector3& a, const Vector3& b, const Vector3& c);
     void polygon(Finish f, const std::vector<Vector3>& corners); // convex, flat, texture along the ground
 

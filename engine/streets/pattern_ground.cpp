@@ -20,7 +20,7 @@ void asphalt(PatternCanvas& canvas)
 {
     canvas.each([](double u, double v, const Rgb&) {
         const double stone = hash_unit(int(u * 512), int(v * 512), 11) - 0.5;
-        double value = 0.375 + 0.05 * (cloud_noise(u, v, 4, 1) - 0.5) + 0.035 * (cloud_noise(u, v, 40, 2) - 0.5);
+        double value = 0.44 + 0.05 * (cloud_noise(u, v, 4, 1) - 0.5) + 0.035 * (cloud_noise(u, v, 40, 2) - 0.5);
         value += 0.07 * stone * (0.6 + hash_unit(int(u * 256), int(v * 256), 12));
         if (u > 0.12 && u < 0.31 && v > 0.55 && v < 0.83) // a patch, newer and darker, with a seam of tar
             value -= 0.045 + (u < 0.126 || u > 0.304 || v < 0.556 || v > 0.824 ? 0.07 : 0);

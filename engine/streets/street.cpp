@@ -3,6 +3,7 @@
 #include "engine/streets/street.h"
 
 #include "engine/scene/palette.h"
+#include "engine/streets/furnishing.h"
 #include "engine/streets/plot.h"
 #include "engine/streets/road_surface.h"
 
@@ -15,6 +16,8 @@ Street make_street(const StreetOptions& options)
     Site site{mesh, street.road, options.seed, street.objects};
     add_road_surface(mesh, street.road, options.seed);
     add_plots(site);
+    add_furnishing(site);
+    add_traffic(site);
     street.gloss = mesh.gloss();
     street.mesh = std::move(mesh).take();
     return street;

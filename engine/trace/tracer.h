@@ -15,7 +15,7 @@ struct Daylight {
     double sun_elevation = 0.8; // radians, above 0
     double cloud_cover = 0.4;   // 0..1
     double cloud_seed = 0;
-    double exposure = 1;
+    double exposure = 1.35;
     double haze = 1500; // metres after which 1/e of a thing's light is left
 };
 
