@@ -61,7 +61,7 @@ vec3 glance(Ray ray, float spread, bool clouds)
         return clouds ? sky_light(ray.direction) : clear_sky(ray.direction);
     const Surface s = surface_of(ray, hit, spread);
     const float sunny = max(dot(s.normal, sun_direction()), 0.0) * 0.45;
-    return s.albedo * (sun_light() * sunny * 0.318 + vec3(0.3, 0.34, 0.4) * sky_level() * (0.6 + 0.4 * s.normal.z));
+    return s.albedo * (sun_light() * sunny * 0.318 + vec3(0.42, 0.44, 0.48) * sky_level() * (0.6 + 0.4 * s.normal.z));
 }
 
 // over pi, of the light from all around; directions are stratified over the samples of the pixel
@@ -95,7 +95,7 @@ void add_hit(inout Sum sum, Ray ray, Hit hit, Surface s, float spread, uint inde
         const float away2 = away * away, mirrored = s.gloss + (1.0 - s.gloss) * away2 * away2 * away;
         const vec3 d = reflect(ray.direction, s.normal);
         if (dot(d, s.facing) > 0.0)
-            light += mirrored * glance(Ray(point + s.facing * kLift, d, 0.0, kFar), spread * 4.0, true);
+            light += 0.8 * mirrored * glance(Ray(point + s.facing * kLift, d, 0.0, kFar), spread * 4.0, true);
     }
     const float clear = exp(-hit.t / haze_distance());
     const vec3 haze = clear_sky(normalize(vec3(ray.direction.xy, 0.03))) * 0.9;

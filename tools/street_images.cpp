@@ -39,10 +39,8 @@ Status draw_street(Device& device, const Street& street, const CameraPath& path,
 {
     Progress progress(progress_to_stderr(globals), "trace", "frames", path.frames.size());
     const Daylight light = daylight_of_seed(seed);
-    const ShadeOptions options{.width = images.width,
-                               .height = images.height,
-                               .samples = images.samples,
-                               .ambient_rays = images.ambient_rays};
+    const ShadeOptions options{
+        .width = images.width, .height = images.height, .samples = images.samples, .ambient_rays = images.ambient_rays};
     const bool whole = street.mesh.faces.size() <= kWholeScene;
     for (size_t i = 0; i < path.frames.size();) {
         const CameraFrame& first = path.frames[i];

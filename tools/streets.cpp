@@ -4,7 +4,7 @@
 #include "engine/mesh/mesh_files.h"
 #include "engine/scene/palette.h"
 #include "engine/streets/camera_drive.h"
-#include "engine/streets/street.h"
+#include "engine/streets/street_grid.h"
 #include "runtime/json.h"
 #include "tools/commands.h"
 #include "tools/open_device.h"
@@ -23,6 +23,7 @@ struct Options {
     DriveShape drive;
     double fov = 73, shift = 1.5;
     StreetImages images;
+    VoxelizeOptions voxels;
     bool pictures = false, no_grids = false;
 };
 
@@ -51,6 +52,32 @@ Json street_json(const Options& o, const Street& street, const CameraPath& path)
             {"shift", o.shift}};
 }
 
+Status write_grids(const Options& o, Device& device, const Street& street, const OutputFolder& out)
+{
+    VoxelizeOptions voxels = o.voxels;
+    voxels.seed = o.street.seed;
+    SR_TRY(StreetGrids grids, street_grids(device, street, voxels));
+    for (VoxelGrid* grid : {&grids.truth, &grids.semantic}) {
+        grid->metadata["name"] = fmt::format("street {}", o.street.seed);
+        grid->metadata["seed"] = std::to_string(o.street.seed);
+    }
+    SR_CHECK(write_grid(out / "truth.sgrid", grids.truth));
+    return write_grid(out / "semantic.sgrid", grids.semantic);
+}
+
+Status draw(const Options& o, const Globals& globals, Device& device, const Street& street, const CameraPath& path,
+            const CameraPath& shifted, const OutputFolder& out)
+{
+    if (!o.no_grids)
+        SR_CHECK(write_grids(o, device, street, out));
+    if (!o.pictures)
+        return {};
+    SR_CHECK(draw_street(device, street, path, o.street.seed, o.images, out.path(), globals));
+    if (o.shift != 0)
+        SR_CHECK(draw_street(device, street, shifted, o.street.seed, o.images, out / "shifted", globals));
+    return {};
+}
+
 Status streets(const Options& o, const Globals& globals)
 {
     SR_TRY(OutputFolder out, OutputFolder::create(o.output, globals.yes));
@@ -68,11 +95,9 @@ Status streets(const Options& o, const Globals& globals)
     SR_CHECK(write_transforms(out / "shifted/transforms.json", shifted));
     const Json about = street_json(o, street, path);
     SR_CHECK(write_file_atomically(out / "street.json", about.dump(2) + "\n"));
-    if (o.pictures) {
+    if (o.pictures || !o.no_grids) {
         SR_TRY(const auto device, open_device(globals));
-        SR_CHECK(draw_street(*device, street, path, o.street.seed, o.images, out.path(), globals));
-        if (o.shift != 0)
-            SR_CHECK(draw_street(*device, street, shifted, o.street.seed, o.images, out / "shifted", globals));
+        SR_CHECK(draw(o, globals, *device, street, path, shifted, out));
     }
     SR_CHECK(out.commit());
     if (globals.json)
@@ -92,17 +117,23 @@ void add_streets(CLI::App& app, const Globals& globals, Run& run)
     c->add_option("-o,--output", o->output, "folder")->required();
     c->add_option("--seed", o->street.seed, "another seed, another street");
     c->add_option("--length", o->street.length, "metres")->check(CLI::Range(30.0, 20000.0));
-    c->add_option("--spacing", o->drive.spacing, "metres between the frames of the drive")->check(CLI::Range(0.01, 1000.0));
+    c->add_option("--spacing", o->drive.spacing, "metres between the frames of the drive")
+        ->check(CLI::Range(0.01, 1000.0));
     c->add_option("--first", o->drive.first, "metres along the street where the drive begins");
-    c->add_option("--end-margin", o->drive.end_margin, "metres before the end where it stops")->check(CLI::Range(0.0, 20000.0));
-    c->add_option("--height", o->drive.height, "of the camera, metres")->check(CLI::Range(0.2, 50.0));
+    c->add_option("--end-margin", o->drive.end_margin, "metres before the end where it stops")
+        ->check(CLI::Range(0.0, 20000.0));
+    c->add_option("--camera-height", o->drive.height, "of the camera, metres")->check(CLI::Range(0.2, 50.0));
     c->add_option("--yaw", o->drive.yaw, "radians to the left of the street");
     c->add_option("--shift", o->shift, "metres to the left of the second, novel drive");
+    c->add_flag("--no-grids", o->no_grids, "without truth.sgrid and semantic.sgrid");
+    c->add_option("--voxel-size", o->voxels.voxel_size, "metres")->check(CLI::Range(0.05f, 10.f));
+    c->add_option("--points", o->voxels.points_per_voxel, "points of a cell")->check(CLI::Range(1, 4096));
     c->add_flag("--images", o->pictures, "also pictures of both drives: {color,depth,normal,label,visible}/000000.png");
     c->add_option("--samples", o->images.samples, "rays a pixel")->check(CLI::Range(1u, 256u));
-    c->add_option("--ambient-rays", o->images.ambient_rays, "rays for the light from around, a sample")->check(CLI::Range(1u, 64u));
+    c->add_option("--ambient-rays", o->images.ambient_rays, "rays for the light from around, a sample")
+        ->check(CLI::Range(1u, 64u));
     c->add_option("-W,--width", o->images.width, "pixels")->check(CLI::Range(1u, 4096u));
-    c->add_option("-H,--height-pixels", o->images.height, "pixels")->check(CLI::Range(1u, 4096u));
+    c->add_option("-H,--height", o->images.height, "pixels")->check(CLI::Range(1u, 4096u));
     c->add_option("--fov-x", o->fov, "horizontal field of view in degrees")->check(CLI::Range(1.0, 170.0));
     c->callback([o, &globals, &run] { run = [o, &globals] { return streets(*o, globals); }; });
 }

@@ -116,9 +116,11 @@ class Roof {
             m_.picture(f, at(x0, depth, a), at(x1, depth, a), at(x1, depth, b), at(x0, depth, b));
         };
         face(s_.frame, x - half, z0, x + half, z1, y);
-        face(s_.panes[r_.below(uint32_t(s_.panes.size()))], x - half + 0.12, z0 + 0.12, x + half - 0.12, z1 - 0.14, y - 0.01);
+        face(s_.panes[r_.below(uint32_t(s_.panes.size()))], x - half + 0.12, z0 + 0.12, x + half - 0.12, z1 - 0.14,
+             y - 0.01);
         face(s_.frame, x - 0.03, z0 + 0.12, x + 0.03, z1 - 0.14, y - 0.015);
-        m_.box(gutter_, p_.frame, {x - half - 0.1, y - 0.15, z1}, {x + half + 0.1, 1.0, z1 + 0.1}, MeshBuilder::kAllSides);
+        m_.box(gutter_, p_.frame, {x - half - 0.1, y - 0.15, z1}, {x + half + 0.1, 1.0, z1 + 0.1},
+               MeshBuilder::kAllSides);
     }
 
     void chimney(double z)

@@ -11,7 +11,7 @@ namespace semrover {
 struct BuildingPlot {
     Frame frame;
     double width = 10, depth = 11;
-    double below = 0.3;                        // how far walls go down under the origin, where the street slopes
+    double below = 0.3;                         // how far walls go down under the origin, where the street slopes
     bool open_left = false, open_right = false; // sides that streets or gardens see
 };
 

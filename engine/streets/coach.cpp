@@ -23,7 +23,8 @@ void add_hull(MeshBuilder& m, const Frame& f, const Hull& h, Finish flank, Finis
     const auto p = [&](double x, double py, double z) { return f.at(x, py, z); };
     const Span ahead{0, 0, 1, 1}, back{1, 0, 0, 1}; // the picture's left end is the front
     m.picture(flank, p(h.x1, y, h.low), p(h.x0, y, h.low), p(h.x0, y, top), p(h.x1, y, top), mirrored ? back : ahead);
-    m.picture(flank, p(h.x0, -y, h.low), p(h.x1, -y, h.low), p(h.x1, -y, top), p(h.x0, -y, top), mirrored ? ahead : back);
+    m.picture(flank, p(h.x0, -y, h.low), p(h.x1, -y, h.low), p(h.x1, -y, top), p(h.x0, -y, top),
+              mirrored ? ahead : back);
     std::vector<std::vector<Vector3>> rings;
     for (double x : {h.x0, h.x1}) {
         auto& ring = rings.emplace_back();
@@ -52,7 +53,8 @@ void add_end(MeshBuilder& m, const Frame& f, const Hull& h, int way, Finish pain
     const Finish lamp = m.finish(way > 0 ? Pattern::headlight : Pattern::taillight, glass.label);
     for (double s : {-1.0, 1.0}) {
         const double a = s * (y - 0.12) - 0.19 * (s > 0), b = a + 0.19;
-        m.picture(lamp, p(a, h.low + 0.3, lean), p(b, h.low + 0.3, lean), p(b, h.low + 0.55, lean), p(a, h.low + 0.55, lean));
+        m.picture(lamp, p(a, h.low + 0.3, lean), p(b, h.low + 0.3, lean), p(b, h.low + 0.55, lean),
+                  p(a, h.low + 0.55, lean));
     }
 }
 
@@ -60,8 +62,8 @@ void add_wheels(MeshBuilder& m, const Frame& f, double at, double width, double 
 {
     for (int side : {1, -1}) {
         Frame axle = f.moved(at, side * (width / 2 + 0.002), radius);
-        m.disc(m.finish(Pattern::rubber, l, {0.8, 0.8, 0.8}), axle.at(0, side * 0.003, 0.03), axle.y * double(side), radius + 0.09,
-               16);
+        m.disc(m.finish(Pattern::rubber, l, {0.8, 0.8, 0.8}), axle.at(0, side * 0.003, 0.03), axle.y * double(side),
+               radius + 0.09, 16);
         if (side < 0)
             axle = axle.turned(kPi);
         add_wheel(m, axle.moved(0, 0.012, 0), radius, 0.28, l);
@@ -79,11 +81,13 @@ void add_underside(MeshBuilder& m, const Frame& f, const Hull& h, uint8_t l)
 
 void add_truck(MeshBuilder& m, const Frame& f, KeyedRandom& r)
 {
-    constexpr Color cabs[] = {{0.85, 0.85, 0.84}, {0.2, 0.28, 0.42}, {0.5, 0.15, 0.12}, {0.62, 0.6, 0.3}, {0.25, 0.36, 0.3}};
+    constexpr Color cabs[] = {
+        {0.85, 0.85, 0.84}, {0.2, 0.28, 0.42}, {0.5, 0.15, 0.12}, {0.62, 0.6, 0.3}, {0.25, 0.36, 0.3}};
     constexpr Color boxes[] = {{0.84, 0.84, 0.82}, {0.74, 0.73, 0.7}, {0.42, 0.47, 0.52}, {0.7, 0.62, 0.5}};
     const uint8_t l = label::kTruck;
     const Finish paint = m.finish(Pattern::car_paint, l, r.pick(cabs)), glass = m.finish(Pattern::car_glass, l);
-    const Finish cargo = m.finish(Pattern::cargo, l, r.pick(boxes)), metal = m.finish(Pattern::metal, l, {0.3, 0.3, 0.3});
+    const Finish cargo = m.finish(Pattern::cargo, l, r.pick(boxes)),
+                 metal = m.finish(Pattern::metal, l, {0.3, 0.3, 0.3});
     const Hull cab{1.9, 3.8, 2.3, 0.55, 2.6, 0.2};
     add_hull(m, f, cab, paint, paint, false);
     add_end(m, f, cab, 1, paint, glass, 1.45);
@@ -97,14 +101,16 @@ void add_truck(MeshBuilder& m, const Frame& f, KeyedRandom& r)
     m.box(metal, f, {-3.75, -0.45, 0.55}, {1.9, 0.45, 0.95}, MeshBuilder::kAllSides);
     const Finish tail = m.finish(Pattern::taillight, l);
     for (double y : {-1.0, 0.75})
-        m.picture(tail, f.at(-3.81, y + 0.25, 0.8), f.at(-3.81, y, 0.8), f.at(-3.81, y, 0.95), f.at(-3.81, y + 0.25, 0.95));
+        m.picture(tail, f.at(-3.81, y + 0.25, 0.8), f.at(-3.81, y, 0.8), f.at(-3.81, y, 0.95),
+                  f.at(-3.81, y + 0.25, 0.95));
     for (double x : {2.75, -2.1, -3.05})
         add_wheels(m, f, x, 2.3, 0.46, l);
 }
 
 void add_bus(MeshBuilder& m, const Frame& f, KeyedRandom& r)
 {
-    constexpr Color paints[] = {{0.72, 0.2, 0.16}, {0.83, 0.8, 0.72}, {0.2, 0.36, 0.55}, {0.3, 0.5, 0.36}, {0.85, 0.66, 0.2}};
+    constexpr Color paints[] = {
+        {0.72, 0.2, 0.16}, {0.83, 0.8, 0.72}, {0.2, 0.36, 0.55}, {0.3, 0.5, 0.36}, {0.85, 0.66, 0.2}};
     const uint8_t l = label::kBus;
     const Color c = r.pick(paints);
     const Finish paint = m.finish(Pattern::car_paint, l, c), flank = m.finish(Pattern::bus_side, l, c);
@@ -115,7 +121,8 @@ void add_bus(MeshBuilder& m, const Frame& f, KeyedRandom& r)
     const Finish sign = m.finish(Pattern::shop_sign_2, l, {0.12, 0.12, 0.12});
     m.picture(sign, f.at(5.935, -0.8, 2.62), f.at(5.935, 0.8, 2.62), f.at(5.935, 0.8, 2.86), f.at(5.935, -0.8, 2.86));
     for (double side : {1.0, -1.0})
-        m.box(m.finish(Pattern::rubber, l), f, {5.85, side * 1.42 - 0.1, 1.9}, {5.98, side * 1.42 + 0.1, 2.5}, MeshBuilder::kAllSides);
+        m.box(m.finish(Pattern::rubber, l), f, {5.85, side * 1.42 - 0.1, 1.9}, {5.98, side * 1.42 + 0.1, 2.5},
+              MeshBuilder::kAllSides);
     m.box(m.finish(Pattern::metal, l, {0.7, 0.7, 0.7}), f, {-2.2, -0.8, 3.08}, {0.6, 0.8, 3.28});
     add_underside(m, f, h, l);
     for (double x : {3.1, -2.9})
@@ -136,7 +143,8 @@ void add_tram(MeshBuilder& m, const Frame& f, KeyedRandom& r)
             if (way == car)
                 add_end(m, f, h, way, paint, glass, 1.15);
         if (car < 1) // bellows
-            m.box(dark, f, {h.x1 - 0.05, -1.05, 0.5}, {h.x1 + 0.55, 1.05, 3.2}, MeshBuilder::kLeft | MeshBuilder::kRight | MeshBuilder::kTop);
+            m.box(dark, f, {h.x1 - 0.05, -1.05, 0.5}, {h.x1 + 0.55, 1.05, 3.2},
+                  MeshBuilder::kLeft | MeshBuilder::kRight | MeshBuilder::kTop);
         m.box(m.finish(Pattern::metal, l, {0.55, 0.56, 0.57}), f, {h.x0 + 1.5, -0.7, 3.38}, {h.x1 - 1.5, 0.7, 3.62});
         m.box(dark, f, {h.x0 + 0.4, -1.0, 0.08}, {h.x1 - 0.4, 1.0, 0.34});
     }

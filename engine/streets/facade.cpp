@@ -110,7 +110,9 @@ class Facade {
         const double out = 1.05, high = 1.02;
         slab(s_.trim, {x0, z - 0.16, x1, z}, out);
         const Finish rail = s_.metal;
-        const auto bar = [&](const Vector3& low, const Vector3& top) { m_.box(rail, w_, low, top, MeshBuilder::kAllSides); };
+        const auto bar = [&](const Vector3& low, const Vector3& top) {
+            m_.box(rail, w_, low, top, MeshBuilder::kAllSides);
+        };
         bar({x0 + 0.03, -out + 0.02, z + high - 0.04}, {x1 - 0.03, -out + 0.06, z + high});
         for (double x : {x0 + 0.03, x1 - 0.07})
             bar({x, -out + 0.06, z + high - 0.04}, {x + 0.04, 0, z + high});
@@ -189,7 +191,8 @@ class Facade {
     {
         for (int b = 0; b < bays_; ++b) {
             const double middle = (b + 0.5) * bay_, half = std::min(s_.window_width, bay_ - 0.5) / 2;
-            const Field hole{middle - half, 1.0, middle + half, std::min(1.0 + s_.window_height, s_.ground_height - 0.4)};
+            const Field hole{middle - half, 1.0, middle + half,
+                             std::min(1.0 + s_.window_height, s_.ground_height - 0.4)};
             wall_around(s_.base, {b * bay_, 0, (b + 1) * bay_, s_.ground_height}, hole);
             window(hole);
         }
@@ -257,7 +260,8 @@ class Facade {
                     display.width() > 2.6 ? WindowKind::casement : WindowKind::sash,
                     s_.ground == GroundFloor::lobby ? s_.panes[0] : s_.shop_panes[r_.below(2)]);
             if (i == door)
-                picture(s_.glass_door, left ? Field{hole.x0, 0.02, split, head} : Field{split, 0.02, hole.x1, head}, 0.22);
+                picture(s_.glass_door, left ? Field{hole.x0, 0.02, split, head} : Field{split, 0.02, hole.x1, head},
+                        0.22);
         }
         if (s_.ground == GroundFloor::shops)
             shop_front(head);

@@ -15,8 +15,8 @@ constexpr Color kBrick[] = {{0.6, 0.36, 0.28}, {0.52, 0.32, 0.27}, {0.66, 0.45, 
                             {0.7, 0.58, 0.44}, {0.46, 0.34, 0.3},  {0.62, 0.42, 0.36}};
 constexpr Color kStone[] = {{0.78, 0.74, 0.66}, {0.72, 0.7, 0.66}, {0.8, 0.75, 0.64}, {0.64, 0.62, 0.58}};
 constexpr Color kConcrete[] = {{0.72, 0.71, 0.69}, {0.64, 0.64, 0.63}, {0.78, 0.76, 0.72}};
-constexpr Color kDoor[] = {{0.32, 0.2, 0.13}, {0.15, 0.24, 0.2}, {0.16, 0.2, 0.3}, {0.4, 0.13, 0.11}, {0.18, 0.18, 0.18},
-                           {0.45, 0.32, 0.2}};
+constexpr Color kDoor[] = {{0.32, 0.2, 0.13}, {0.15, 0.24, 0.2},  {0.16, 0.2, 0.3},
+                           {0.4, 0.13, 0.11}, {0.18, 0.18, 0.18}, {0.45, 0.32, 0.2}};
 constexpr Color kSign[] = {{0.17, 0.27, 0.24}, {0.2, 0.22, 0.32}, {0.44, 0.15, 0.13}, {0.16, 0.16, 0.17},
                            {0.5, 0.4, 0.24},   {0.14, 0.33, 0.4}, {0.4, 0.27, 0.32}};
 constexpr Color kAwning[] = {{0.5, 0.17, 0.15}, {0.2, 0.32, 0.24}, {0.22, 0.27, 0.38}, {0.58, 0.5, 0.36}};
@@ -78,9 +78,12 @@ FacadeStyle random_style(MeshBuilder& m, KeyedRandom& r, uint32_t district)
     s.recess = r.uniform(0.1, 0.22);
     constexpr WindowKind kinds[] = {WindowKind::casement, WindowKind::cross, WindowKind::sash, WindowKind::french};
     s.window = r.pick(kinds);
-    s.ground = r.chance(district == 0 ? 0.62 : district == 1 ? 0.18 : 0.3) ? GroundFloor::shops
-               : s.curtain_wall                                              ? GroundFloor::lobby
-                                                                             : GroundFloor::homes;
+    s.ground = r.chance(district == 0   ? 0.62
+                        : district == 1 ? 0.18
+                                        : 0.3)
+                   ? GroundFloor::shops
+               : s.curtain_wall ? GroundFloor::lobby
+                                : GroundFloor::homes;
     s.shutters = s.window != WindowKind::french && !s.curtain_wall && r.chance(0.22) && s.bay > s.window_width * 2;
     s.balconies = !s.curtain_wall && r.chance(district == 1 ? 0.6 : 0.3);
     s.courses = r.chance(0.5);

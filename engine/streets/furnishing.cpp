@@ -107,21 +107,40 @@ class Furnishing {
         const Frame kerb = place(s + 1.7, side, 0.5), wall = place(s, side, c_.sidewalk - 0.5);
         const auto count = [&](const char* name) { ++site_.objects[name]; };
         switch (kind) {
-        case 0: add_bin(m_, kerb, r); return count("bin");
-        case 1: add_bin(m_, wall, r); return count("bin");
-        case 2: add_bench(m_, place(s, side, c_.sidewalk - 0.55)); return count("bench");
-        case 3: add_cabinet(m_, wall); return count("cabinet");
-        case 4: case 5: add_bike_rack(m_, place(s, side, 1.0), 3, r); return count("bicycle rack");
-        case 6: add_sign(m_, kerb, r.chance(0.5) ? SignKind::parking : SignKind::no_entry); return count("sign");
-        case 7: add_planter(m_, wall, r); return count("planter");
-        case 8: add_sign(m_, kerb, SignKind::speed); return count("sign");
+        case 0:
+            add_bin(m_, kerb, r);
+            return count("bin");
+        case 1:
+            add_bin(m_, wall, r);
+            return count("bin");
+        case 2:
+            add_bench(m_, place(s, side, c_.sidewalk - 0.55));
+            return count("bench");
+        case 3:
+            add_cabinet(m_, wall);
+            return count("cabinet");
+        case 4:
+        case 5:
+            add_bike_rack(m_, place(s, side, 1.0), 3, r);
+            return count("bicycle rack");
+        case 6:
+            add_sign(m_, kerb, r.chance(0.5) ? SignKind::parking : SignKind::no_entry);
+            return count("sign");
+        case 7:
+            add_planter(m_, wall, r);
+            return count("planter");
+        case 8:
+            add_sign(m_, kerb, SignKind::speed);
+            return count("sign");
         case 9:
             if (c_.sidewalk > 3.1) {
                 add_bus_stop(m_, place(s, side, 1.55));
                 count("bus stop");
             }
             return;
-        default: add_bollard(m_, kerb); return count("bollard");
+        default:
+            add_bollard(m_, kerb);
+            return count("bollard");
         }
     }
 
@@ -184,7 +203,8 @@ class Furnishing {
         else
             add_sign(m_, f, r.chance(0.5) ? SignKind::stop : SignKind::yield);
         ++site_.objects[j.lights ? "traffic light" : "sign"];
-        add_sign(m_, road_.frame(j.middle + j.half + 0.6, side * (c_.kerb() + 1.9), c_.kerb_height), SignKind::street_name);
+        add_sign(m_, road_.frame(j.middle + j.half + 0.6, side * (c_.kerb() + 1.9), c_.kerb_height),
+                 SignKind::street_name);
         ++site_.objects["sign"];
         for (int way : {-1, 1})
             for (double x : {0.4, 1.8}) {

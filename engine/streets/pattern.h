@@ -14,27 +14,27 @@ namespace semrover {
 enum class Pattern : uint8_t {
     asphalt,
     road_paint,
-    slabs,  // *
-    setts,  // * small stones
-    kerb,   //
-    grass,  //
-    earth,  //
-    gravel, // * flat roofs
-    brick,  // *
-    plaster,  // *
-    concrete, // *
-    ashlar,   // *
-    planks,   // *
-    roof_tiles, // *
-    slate,      // *
-    trim,       // * frames, cornices, painted smooth things
-    metal,      // *
-    pane_dark,    // +
-    pane_curtain, // +
-    pane_blind,   // +
-    pane_lit,     // +
-    office_glass, // +
-    shop_window,  // +
+    slabs,         // *
+    setts,         // * small stones
+    kerb,          //
+    grass,         //
+    earth,         //
+    gravel,        // * flat roofs
+    brick,         // *
+    plaster,       // *
+    concrete,      // *
+    ashlar,        // *
+    planks,        // *
+    roof_tiles,    // *
+    slate,         // *
+    trim,          // * frames, cornices, painted smooth things
+    metal,         // *
+    pane_dark,     // +
+    pane_curtain,  // +
+    pane_blind,    // +
+    pane_lit,      // +
+    office_glass,  // +
+    shop_window,   // +
     shop_window_2, // +
     door,          // *+
     glass_door,    // *+
@@ -53,16 +53,16 @@ enum class Pattern : uint8_t {
     car_side,      // *+
     car_glass,
     rubber,
-    rim,        // +
-    headlight,  // +
-    taillight,  // +
-    grille,     // +
-    plate,      // +
-    bus_side,   // *+
-    train_side, // *+
-    cargo,      // *
-    fabric,     // *
-    skin,       // *
+    rim,           // +
+    headlight,     // +
+    taillight,     // +
+    grille,        // +
+    plate,         // +
+    bus_side,      // *+
+    train_side,    // *+
+    cargo,         // *
+    fabric,        // *
+    skin,          // *
     sign_stop,     // +
     sign_yield,    // +
     sign_speed,    // +

@@ -111,13 +111,21 @@ void PatternCanvas::sign_text(std::string_view text, double u0, double v0, doubl
     // segments of a letter on a grid of 2 x 4 half cells: pairs of points "xy", x 0..2, y 0..4
     const auto strokes = [](char c) -> std::string_view {
         switch (c) {
-        case 'S': return "2000 0002 0222 2224 2404";
-        case 'T': return "0020 1014";
-        case 'O': case '0': return "0020 2024 2404 0400";
-        case 'P': return "0400 0020 2022 2202";
-        case '3': return "0020 2024 2404 0222";
-        case '5': return "2000 0002 0222 2224 2404";
-        default: return "";
+        case 'S':
+            return "2000 0002 0222 2224 2404";
+        case 'T':
+            return "0020 1014";
+        case 'O':
+        case '0':
+            return "0020 2024 2404 0400";
+        case 'P':
+            return "0400 0020 2022 2202";
+        case '3':
+            return "0020 2024 2404 0222";
+        case '5':
+            return "2000 0002 0222 2224 2404";
+        default:
+            return "";
         }
     };
     const double step = (u1 - u0) / double(text.size()), wide = step * 0.68, stroke = wide * 0.26;
@@ -125,8 +133,8 @@ void PatternCanvas::sign_text(std::string_view text, double u0, double v0, doubl
         const std::string_view s = strokes(text[i]);
         const double left = u0 + step * (double(i) + 0.16);
         for (size_t k = 0; k + 4 <= s.size(); k += 5)
-            line(left + wide * (s[k] - '0') / 2, v0 + (v1 - v0) * (s[k + 1] - '0') / 4, left + wide * (s[k + 2] - '0') / 2,
-                 v0 + (v1 - v0) * (s[k + 3] - '0') / 4, stroke, color);
+            line(left + wide * (s[k] - '0') / 2, v0 + (v1 - v0) * (s[k + 1] - '0') / 4,
+                 left + wide * (s[k + 2] - '0') / 2, v0 + (v1 - v0) * (s[k + 3] - '0') / 4, stroke, color);
     }
 }
 

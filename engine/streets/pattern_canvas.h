@@ -26,9 +26,9 @@ inline Rgb blend(const Rgb& a, const Rgb& b, double t)
 double smooth_step(double low, double high, double x); // 0 below low, 1 above high
 
 // Noise over the unit square that repeats without a seam, 0..1.
-double noise(double u, double v, int cells, uint32_t seed);              // about 0.5 in the mean
-double cloud_noise(double u, double v, int cells, uint32_t seed);        // four octaves of it
-double hash_unit(int32_t i, int32_t j, uint32_t seed);                   // of a lattice point, 0..1
+double noise(double u, double v, int cells, uint32_t seed);                     // about 0.5 in the mean
+double cloud_noise(double u, double v, int cells, uint32_t seed);               // four octaves of it
+double hash_unit(int32_t i, int32_t j, uint32_t seed);                          // of a lattice point, 0..1
 std::array<double, 2> cell_noise(double u, double v, int cells, uint32_t seed); // distance to the nearest two seeds
 
 // A picture while it is painted: u to the right, v down, both 0..1.

@@ -23,9 +23,9 @@ void asphalt(PatternCanvas& canvas)
         double value = 0.44 + 0.05 * (cloud_noise(u, v, 4, 1) - 0.5) + 0.035 * (cloud_noise(u, v, 40, 2) - 0.5);
         value += 0.07 * stone * (0.6 + hash_unit(int(u * 256), int(v * 256), 12));
         if (u > 0.12 && u < 0.31 && v > 0.55 && v < 0.83) // a patch, newer and darker, with a seam of tar
-            value -= 0.045 + (u < 0.126 || u > 0.304 || v < 0.556 || v > 0.824 ? 0.07 : 0);
+            value -= 0.02 + (u < 0.126 || u > 0.304 || v < 0.556 || v > 0.824 ? 0.04 : 0);
         const double open = smooth_step(0.52, 0.62, noise(u, v, 3, 5)); // cracks only here and there
-        value -= 0.13 * crack(u, v, 3, 21, 0.006) * open;
+        value -= 0.07 * crack(u, v, 3, 21, 0.005) * open;
         return Rgb{value * 1.0, value * 0.995, value * 0.985};
     });
 }
@@ -60,19 +60,23 @@ void grass(PatternCanvas& canvas)
 void ground(PatternCanvas& canvas, Pattern pattern)
 {
     switch (pattern) {
-    case Pattern::asphalt: return asphalt(canvas);
-    case Pattern::slabs: return slabs(canvas, 4, 8, true, 0.035, 0.11);
-    case Pattern::setts: return slabs(canvas, 10, 12, true, 0.1, 0.22);
-    case Pattern::grass: return grass(canvas);
+    case Pattern::asphalt:
+        return asphalt(canvas);
+    case Pattern::slabs:
+        return slabs(canvas, 4, 8, true, 0.035, 0.11);
+    case Pattern::setts:
+        return slabs(canvas, 10, 12, true, 0.1, 0.22);
+    case Pattern::grass:
+        return grass(canvas);
     case Pattern::kerb:
         return canvas.each([](double u, double v, const Rgb&) {
             const double joint = u < 0.012 || std::abs(u - 0.5) < 0.006 ? 0.18 : 0;
-            return gray(0.64 + 0.08 * (cloud_noise(u, v, 8, 2) - 0.5) - joint) ;
+            return gray(0.64 + 0.08 * (cloud_noise(u, v, 8, 2) - 0.5) - joint);
         });
     case Pattern::road_paint:
         return canvas.each([](double u, double v, const Rgb&) {
             const double worn = smooth_step(0.56, 0.7, cloud_noise(u, v, 6, 6));
-            return blend(gray(0.86 + 0.05 * (noise(u, v, 32, 1) - 0.5)), gray(0.5), 0.6 * worn);
+            return blend(gray(0.86 + 0.05 * (noise(u, v, 32, 1) - 0.5)), gray(0.55), 0.4 * worn);
         });
     case Pattern::earth:
         return canvas.each([](double u, double v, const Rgb&) {

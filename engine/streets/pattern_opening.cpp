@@ -112,17 +112,28 @@ void slats(PatternCanvas& canvas, int count, double dark)
 void opening(PatternCanvas& canvas, Pattern pattern)
 {
     switch (pattern) {
-    case Pattern::pane_dark: return room(canvas, {0.17, 0.19, 0.21}, 1);
-    case Pattern::pane_curtain: return curtain(canvas);
-    case Pattern::pane_blind: return blind(canvas);
-    case Pattern::pane_lit: return room(canvas, {0.5, 0.44, 0.35}, 9);
-    case Pattern::office_glass: return office(canvas);
-    case Pattern::shop_window: return shop(canvas, 4, {0.5, 0.46, 0.4}, 3);
-    case Pattern::shop_window_2: return shop(canvas, 17, {0.36, 0.37, 0.38}, 2);
-    case Pattern::door: return door(canvas);
-    case Pattern::glass_door: return glass_door(canvas);
-    case Pattern::garage_door: return slats(canvas, 7, 0.55);
-    case Pattern::shutter: return slats(canvas, 12, 0.5);
+    case Pattern::pane_dark:
+        return room(canvas, {0.17, 0.19, 0.21}, 1);
+    case Pattern::pane_curtain:
+        return curtain(canvas);
+    case Pattern::pane_blind:
+        return blind(canvas);
+    case Pattern::pane_lit:
+        return room(canvas, {0.5, 0.44, 0.35}, 9);
+    case Pattern::office_glass:
+        return office(canvas);
+    case Pattern::shop_window:
+        return shop(canvas, 4, {0.5, 0.46, 0.4}, 3);
+    case Pattern::shop_window_2:
+        return shop(canvas, 17, {0.36, 0.37, 0.38}, 2);
+    case Pattern::door:
+        return door(canvas);
+    case Pattern::glass_door:
+        return glass_door(canvas);
+    case Pattern::garage_door:
+        return slats(canvas, 7, 0.55);
+    case Pattern::shutter:
+        return slats(canvas, 12, 0.5);
     default: // awning: stripes
         return canvas.each([](double u, double v, const Rgb&) {
             return (u * 2 - std::floor(u * 2) < 0.5 ? gray(1.0) : Rgb{2.0, 2.0, 2.0}) *

@@ -36,9 +36,12 @@ void bark(PatternCanvas& canvas)
 void plant(PatternCanvas& canvas, Pattern pattern)
 {
     switch (pattern) {
-    case Pattern::leaves: return leaves(canvas, 14, 0.55);
-    case Pattern::hedge: return leaves(canvas, 26, 0.72);
-    default: return bark(canvas);
+    case Pattern::leaves:
+        return leaves(canvas, 14, 0.55);
+    case Pattern::hedge:
+        return leaves(canvas, 26, 0.72);
+    default:
+        return bark(canvas);
     }
 }
 

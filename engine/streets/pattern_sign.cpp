@@ -86,21 +86,30 @@ void sign(PatternCanvas& canvas, Pattern pattern)
     case Pattern::sign_parking:
         canvas.rectangle(0, 0, 1, 1, kBlue);
         return canvas.sign_text("P", 0.28, 0.2, 0.82, 0.8, kWhite);
-    case Pattern::sign_crossing: return crossing(canvas);
+    case Pattern::sign_crossing:
+        return crossing(canvas);
     case Pattern::sign_priority:
         canvas.rectangle(0, 0, 1, 1, kWhite);
         return canvas.rectangle(0.18, 0.18, 0.82, 0.82, {0.88, 0.68, 0.12});
     case Pattern::street_name:
         canvas.rectangle(0, 0, 1, 1, {0.1, 0.22, 0.45});
         return canvas.letters(0.08, 0.28, 0.94, 0.74, 9, 77, kWhite);
-    case Pattern::lamp_red: return lamp(canvas, {0.9, 0.12, 0.1});
-    case Pattern::lamp_amber: return lamp(canvas, {0.35, 0.24, 0.06});
-    case Pattern::lamp_green: return lamp(canvas, {0.06, 0.3, 0.2});
-    case Pattern::shop_sign: return shop_sign(canvas, 31, 7, 0.19, false);
-    case Pattern::shop_sign_2: return shop_sign(canvas, 47, 9, 0.1, false);
-    case Pattern::shop_sign_3: return shop_sign(canvas, 59, 6, 0.3, true);
-    case Pattern::poster: return poster(canvas, 5, {0.35, 0.55, 0.75}, {0.3, 0.42, 0.25});
-    default: return poster(canvas, 12, {0.75, 0.5, 0.35}, {0.35, 0.3, 0.4});
+    case Pattern::lamp_red:
+        return lamp(canvas, {0.9, 0.12, 0.1});
+    case Pattern::lamp_amber:
+        return lamp(canvas, {0.35, 0.24, 0.06});
+    case Pattern::lamp_green:
+        return lamp(canvas, {0.06, 0.3, 0.2});
+    case Pattern::shop_sign:
+        return shop_sign(canvas, 31, 7, 0.19, false);
+    case Pattern::shop_sign_2:
+        return shop_sign(canvas, 47, 9, 0.1, false);
+    case Pattern::shop_sign_3:
+        return shop_sign(canvas, 59, 6, 0.3, true);
+    case Pattern::poster:
+        return poster(canvas, 5, {0.35, 0.55, 0.75}, {0.3, 0.42, 0.25});
+    default:
+        return poster(canvas, 12, {0.75, 0.5, 0.35}, {0.35, 0.3, 0.4});
     }
 }
 

@@ -41,7 +41,8 @@ void rim(PatternCanvas& canvas)
 // a row of big windows with posts, doors to the ground, a skirt; the front to the left
 void coach_side(PatternCanvas& canvas, int windows, int doors, double top, double low)
 {
-    canvas.each([](double u, double v, const Rgb&) { return gray(0.97 - 0.12 * smooth_step(0.8, 1, v) * noise(u, v, 8, 1)); });
+    canvas.each(
+        [](double u, double v, const Rgb&) { return gray(0.97 - 0.12 * smooth_step(0.8, 1, v) * noise(u, v, 8, 1)); });
     canvas.rectangle(0, 0.9, 1, 1, gray(0.3));
     canvas.rectangle(0, low + 0.05, 1, low + 0.075, gray(0.62));
     canvas.rectangle(0.0, top - 0.02, 1, low + 0.02, gray(0.13));
@@ -81,14 +82,20 @@ void plate(PatternCanvas& canvas)
 void vehicle(PatternCanvas& canvas, Pattern pattern)
 {
     const auto flat = [&](const Rgb& color, double change, uint32_t seed) {
-        canvas.each([&](double u, double v, const Rgb&) { return color * (1 + change * (cloud_noise(u, v, 4, seed) - 0.5)); });
+        canvas.each(
+            [&](double u, double v, const Rgb&) { return color * (1 + change * (cloud_noise(u, v, 4, seed) - 0.5)); });
     };
     switch (pattern) {
-    case Pattern::car_paint: return flat(gray(0.97), 0.03, 2);
-    case Pattern::car_side: return car_side(canvas);
-    case Pattern::car_glass: return flat({0.1, 0.115, 0.125}, 0.5, 3);
-    case Pattern::rubber: return flat(gray(0.13), 0.4, 4);
-    case Pattern::rim: return rim(canvas);
+    case Pattern::car_paint:
+        return flat(gray(0.97), 0.03, 2);
+    case Pattern::car_side:
+        return car_side(canvas);
+    case Pattern::car_glass:
+        return flat({0.1, 0.115, 0.125}, 0.5, 3);
+    case Pattern::rubber:
+        return flat(gray(0.13), 0.4, 4);
+    case Pattern::rim:
+        return rim(canvas);
     case Pattern::headlight:
         flat({0.72, 0.75, 0.78}, 0.3, 1);
         canvas.disc(0.35, 0.5, 0.2, 0.3, gray(0.95));
@@ -96,18 +103,24 @@ void vehicle(PatternCanvas& canvas, Pattern pattern)
     case Pattern::taillight:
         flat({0.5, 0.06, 0.05}, 0.4, 1);
         return canvas.rectangle(0, 0.62, 1, 0.82, {0.75, 0.62, 0.55});
-    case Pattern::grille: return grille(canvas);
-    case Pattern::plate: return plate(canvas);
-    case Pattern::bus_side: return coach_side(canvas, 7, 2, 0.14, 0.56);
-    case Pattern::train_side: return coach_side(canvas, 8, 2, 0.16, 0.58);
+    case Pattern::grille:
+        return grille(canvas);
+    case Pattern::plate:
+        return plate(canvas);
+    case Pattern::bus_side:
+        return coach_side(canvas, 7, 2, 0.14, 0.56);
+    case Pattern::train_side:
+        return coach_side(canvas, 8, 2, 0.16, 0.58);
     case Pattern::cargo:
         return canvas.each([](double u, double v, const Rgb&) {
             const double f = u * 5 - std::floor(u * 5);
             return gray(0.93 + 0.05 * (cloud_noise(u, v * 0.3, 8, 3) - 0.5) - (f < 0.03 ? 0.16 : 0));
         });
     case Pattern::fabric:
-        return canvas.each([](double u, double v, const Rgb&) { return gray(0.88 + 0.3 * (cloud_noise(u, v * 0.4, 5, 6) - 0.5)); });
-    default: return flat(gray(0.95), 0.08, 5);
+        return canvas.each(
+            [](double u, double v, const Rgb&) { return gray(0.88 + 0.3 * (cloud_noise(u, v * 0.4, 5, 6) - 0.5)); });
+    default:
+        return flat(gray(0.95), 0.08, 5);
     }
 }
 

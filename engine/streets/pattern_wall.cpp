@@ -77,21 +77,26 @@ void tiles(PatternCanvas& canvas, int columns, int rows, bool round)
 void wall(PatternCanvas& canvas, Pattern pattern)
 {
     switch (pattern) {
-    case Pattern::brick: return courses(canvas, 8, 24, 0.009, {1.02, 1.02, 0.98}, 0.3);
-    case Pattern::ashlar: return courses(canvas, 4, 6, 0.008, {0.66, 0.64, 0.6}, 0.1);
-    case Pattern::plaster: return plaster(canvas);
-    case Pattern::concrete: return concrete(canvas);
-    case Pattern::planks: return planks(canvas);
-    case Pattern::roof_tiles: return tiles(canvas, 8, 6, true);
-    case Pattern::slate: return tiles(canvas, 6, 8, false);
+    case Pattern::brick:
+        return courses(canvas, 8, 24, 0.009, {1.02, 1.02, 0.98}, 0.3);
+    case Pattern::ashlar:
+        return courses(canvas, 4, 6, 0.008, {0.66, 0.64, 0.6}, 0.1);
+    case Pattern::plaster:
+        return plaster(canvas);
+    case Pattern::concrete:
+        return concrete(canvas);
+    case Pattern::planks:
+        return planks(canvas);
+    case Pattern::roof_tiles:
+        return tiles(canvas, 8, 6, true);
+    case Pattern::slate:
+        return tiles(canvas, 6, 8, false);
     case Pattern::metal:
-        return canvas.each([](double u, double v, const Rgb&) {
-            return gray(0.93 + 0.08 * (cloud_noise(u, v, 4, 2) - 0.5));
-        });
+        return canvas.each(
+            [](double u, double v, const Rgb&) { return gray(0.93 + 0.08 * (cloud_noise(u, v, 4, 2) - 0.5)); });
     default:
-        return canvas.each([](double u, double v, const Rgb&) {
-            return gray(0.97 + 0.05 * (cloud_noise(u, v, 4, 8) - 0.5));
-        });
+        return canvas.each(
+            [](double u, double v, const Rgb&) { return gray(0.97 + 0.05 * (cloud_noise(u, v, 4, 8) - 0.5)); });
     }
 }
 

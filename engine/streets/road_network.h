@@ -11,9 +11,9 @@ namespace semrover {
 
 // Widths across the street, the same on both sides, all along it; metres
 struct CrossSection {
-    double lane = 3.2;       // one in each direction
-    double cycle = 0;        // cycle lane, 0: none
-    double parking = 2.1;    // bay, 0: none
+    double lane = 3.2;    // one in each direction
+    double cycle = 0;     // cycle lane, 0: none
+    double parking = 2.1; // bay, 0: none
     double sidewalk = 3.2;
     double kerb_height = 0.13;
     bool rails = false; // a tram runs in the lanes
@@ -25,9 +25,9 @@ struct CrossSection {
 
 // where a side street joins, on one side (T) or both
 struct Junction {
-    double middle = 0;      // along the street
-    double half = 3.2;      // half the width of the side street's carriageway
-    double walk = 2.4;      // width of its sidewalks
+    double middle = 0; // along the street
+    double half = 3.2; // half the width of the side street's carriageway
+    double walk = 2.4; // width of its sidewalks
     bool left = true, right = true;
     bool lights = false;
     uint32_t index = 0;

@@ -246,6 +246,19 @@ class Layer {
             row(s[i], s[i + 1], d, paint, flat);
         for (int way : {-1, 1})
             corner(j, side, way);
+        seam(j, side);
+    }
+
+    // the carriageway and the side street are cut at different places: where the street bends up or down, their common
+    // edge gapes by a millimetre, which this strip below closes
+    void seam(const Junction& j, int side)
+    {
+        const double a = side * (c_.kerb() - 0.1), b = side * (c_.kerb() + 0.1);
+        std::vector<double> d{std::min(a, b), std::max(a, b)};
+        const auto low = [](double, double) { return -0.005; };
+        const auto paint = [this](double, double) { return s_.asphalt; };
+        for (double s = j.first(); s < j.last() - 0.01; s += 2)
+            row(s, std::min(s + 2, j.last()), d, paint, low);
     }
 
     // sidewalk along the side street and its rounded corner; way: -1 before, +1 behind the side street

@@ -106,25 +106,36 @@ void add_sign(MeshBuilder& m, const Frame& f, SignKind kind)
     post(m, f, 2.85, 0.035, kSteel);
     const double z = 2.45;
     switch (kind) {
-    case SignKind::stop: return plate(m, f, Pattern::sign_stop, z, 0.76, 8, kPi / 8);
-    case SignKind::yield: return plate(m, f, Pattern::sign_yield, z, 0.9, 3, -kPi / 2);
-    case SignKind::speed: return plate(m, f, Pattern::sign_speed, z, 0.62, 20, 0);
-    case SignKind::no_entry: return plate(m, f, Pattern::sign_no_entry, z, 0.62, 20, 0);
-    case SignKind::parking: return plate(m, f, Pattern::sign_parking, z, 0.8, 4, kPi / 4);
-    case SignKind::crossing: return plate(m, f, Pattern::sign_crossing, z, 0.85, 4, kPi / 4);
-    case SignKind::priority: return plate(m, f, Pattern::sign_priority, z, 0.7, 4, 0);
-    default: break;
+    case SignKind::stop:
+        return plate(m, f, Pattern::sign_stop, z, 0.76, 8, kPi / 8);
+    case SignKind::yield:
+        return plate(m, f, Pattern::sign_yield, z, 0.9, 3, -kPi / 2);
+    case SignKind::speed:
+        return plate(m, f, Pattern::sign_speed, z, 0.62, 20, 0);
+    case SignKind::no_entry:
+        return plate(m, f, Pattern::sign_no_entry, z, 0.62, 20, 0);
+    case SignKind::parking:
+        return plate(m, f, Pattern::sign_parking, z, 0.8, 4, kPi / 4);
+    case SignKind::crossing:
+        return plate(m, f, Pattern::sign_crossing, z, 0.85, 4, kPi / 4);
+    case SignKind::priority:
+        return plate(m, f, Pattern::sign_priority, z, 0.7, 4, 0);
+    default:
+        break;
     }
     const Finish face = m.finish(Pattern::street_name, label::kTrafficSign);
-    m.picture(face, f.at(-0.05, 0.45, 2.5), f.at(-0.05, -0.45, 2.5), f.at(-0.05, -0.45, 2.75), f.at(-0.05, 0.45, 2.75), {0, 0.25, 1, 0.75});
-    m.picture(face, f.at(-0.03, -0.45, 2.5), f.at(-0.03, 0.45, 2.5), f.at(-0.03, 0.45, 2.75), f.at(-0.03, -0.45, 2.75), {0, 0.25, 1, 0.75});
+    m.picture(face, f.at(-0.05, 0.45, 2.5), f.at(-0.05, -0.45, 2.5), f.at(-0.05, -0.45, 2.75), f.at(-0.05, 0.45, 2.75),
+              {0, 0.25, 1, 0.75});
+    m.picture(face, f.at(-0.03, -0.45, 2.5), f.at(-0.03, 0.45, 2.5), f.at(-0.03, 0.45, 2.75), f.at(-0.03, -0.45, 2.75),
+              {0, 0.25, 1, 0.75});
 }
 
 void add_bollard(MeshBuilder& m, const Frame& f)
 {
     const Finish metal = m.finish(Pattern::metal, label::kPole, kAnthracite);
     m.tube(metal, f.at(0, 0, -0.02), 0.06, f.at(0, 0, 0.85), 0.05, 9, 0);
-    m.tube(m.finish(Pattern::trim, label::kPole, {0.85, 0.85, 0.83}), f.at(0, 0, 0.68), 0.058, f.at(0, 0, 0.76), 0.058, 9, 0);
+    m.tube(m.finish(Pattern::trim, label::kPole, {0.85, 0.85, 0.83}), f.at(0, 0, 0.68), 0.058, f.at(0, 0, 0.76), 0.058,
+           9, 0);
     m.blob(metal, f.moved(0, 0, 0.87), {0.06, 0.06, 0.06}, 4, 9);
 }
 
@@ -183,14 +194,18 @@ void add_bike_rack(MeshBuilder& m, const Frame& f, int bicycles, KeyedRandom& r)
             m.tube(metal, g.at(0, y, 0), 0.025, g.at(0, y, 0.78), 0.025, 6, 0);
         m.tube(metal, g.at(0, -0.4, 0.78), 0.025, g.at(0, 0.4, 0.78), 0.025, 6, 3);
         if (r.chance(0.75))
-            add_bicycle(m, g.moved(0.14, r.uniform(-0.1, 0.1), 0).turned(kPi / 2 * (r.chance(0.5) ? 1 : -1) + r.uniform(-0.1, 0.1)), r);
+            add_bicycle(m,
+                        g.moved(0.14, r.uniform(-0.1, 0.1), 0)
+                            .turned(kPi / 2 * (r.chance(0.5) ? 1 : -1) + r.uniform(-0.1, 0.1)),
+                        r);
     }
 }
 
 void add_bus_stop(MeshBuilder& m, const Frame& f)
 {
     const uint8_t l = label::kBuilding;
-    const Finish metal = m.finish(Pattern::metal, l, kAnthracite), glass = m.finish(Pattern::office_glass, l, {0.95, 1, 1});
+    const Finish metal = m.finish(Pattern::metal, l, kAnthracite),
+                 glass = m.finish(Pattern::office_glass, l, {0.95, 1, 1});
     for (double x : {-2.0, -0.03, 1.94})
         m.box(metal, f, {x, -0.75, 0}, {x + 0.06, -0.69, 2.4});
     m.box(metal, f, {-2.1, -0.85, 2.4}, {2.1, 0.75, 2.52}, MeshBuilder::kAllSides);
@@ -203,7 +218,8 @@ void add_bus_stop(MeshBuilder& m, const Frame& f)
     m.box(metal, f, {1.94, -0.7, 0.3}, {2.06, 0.5, 2.2}, MeshBuilder::kAllSides);
     m.picture(ad, f.at(1.93, 0.42, 0.4), f.at(1.93, -0.62, 0.4), f.at(1.93, -0.62, 2.1), f.at(1.93, 0.42, 2.1));
     m.picture(ad_2, f.at(2.07, -0.62, 0.4), f.at(2.07, 0.42, 0.4), f.at(2.07, 0.42, 2.1), f.at(2.07, -0.62, 2.1));
-    m.box(m.finish(Pattern::planks, l, {0.55, 0.42, 0.3}), f, {-1.6, -0.6, 0.42}, {1.2, -0.25, 0.47}, MeshBuilder::kAllSides);
+    m.box(m.finish(Pattern::planks, l, {0.55, 0.42, 0.3}), f, {-1.6, -0.6, 0.42}, {1.2, -0.25, 0.47},
+          MeshBuilder::kAllSides);
     for (double x : {-1.5, 1.0})
         m.box(metal, f, {x, -0.5, 0}, {x + 0.06, -0.4, 0.42});
 }

@@ -31,43 +31,43 @@ struct Body {
 };
 
 using enum Cover;
-constexpr Cut kSedan[] = {{0, 0.62, 0.8, paint, paint},       {0.02, 0.72, 0.93, paint, paint},
-                          {0.1, 0.79, 1, paint, paint},       {0.275, 0.95, 1, glass, glass},
-                          {0.42, 1.4, 1, paint, glass},       {0.53, 1.45, 1, paint, dark},
-                          {0.55, 1.45, 1, paint, glass},      {0.7, 1.4, 1, glass, glass},
-                          {0.84, 1.06, 0.99, paint, paint},   {0.97, 1.02, 0.94, paint, paint},
-                          {1, 0.72, 0.86, paint, paint}};
-constexpr Cut kHatchback[] = {{0, 0.64, 0.8, paint, paint},     {0.02, 0.75, 0.93, paint, paint},
-                              {0.1, 0.84, 1, paint, paint},     {0.25, 0.98, 1, glass, glass},
-                              {0.41, 1.44, 1, paint, glass},    {0.55, 1.49, 1, paint, dark},
-                              {0.575, 1.49, 1, paint, glass},   {0.84, 1.43, 0.98, glass, paint},
+constexpr Cut kSedan[] = {
+    {0, 0.62, 0.8, paint, paint},     {0.02, 0.72, 0.93, paint, paint}, {0.1, 0.79, 1, paint, paint},
+    {0.275, 0.95, 1, glass, glass},   {0.42, 1.4, 1, paint, glass},     {0.53, 1.45, 1, paint, dark},
+    {0.55, 1.45, 1, paint, glass},    {0.7, 1.4, 1, glass, glass},      {0.84, 1.06, 0.99, paint, paint},
+    {0.97, 1.02, 0.94, paint, paint}, {1, 0.72, 0.86, paint, paint}};
+constexpr Cut kHatchback[] = {{0, 0.64, 0.8, paint, paint},      {0.02, 0.75, 0.93, paint, paint},
+                              {0.1, 0.84, 1, paint, paint},      {0.25, 0.98, 1, glass, glass},
+                              {0.41, 1.44, 1, paint, glass},     {0.55, 1.49, 1, paint, dark},
+                              {0.575, 1.49, 1, paint, glass},    {0.84, 1.43, 0.98, glass, paint},
                               {0.965, 1.02, 0.95, paint, paint}, {1, 0.74, 0.88, paint, paint}};
-constexpr Cut kEstate[] = {{0, 0.62, 0.8, paint, paint},     {0.02, 0.73, 0.93, paint, paint},
-                           {0.1, 0.8, 1, paint, paint},      {0.27, 0.96, 1, glass, glass},
-                           {0.41, 1.42, 1, paint, glass},    {0.53, 1.48, 1, paint, dark},
-                           {0.55, 1.48, 1, paint, glass},    {0.73, 1.47, 1, paint, dark},
-                           {0.75, 1.46, 1, paint, glass},    {0.91, 1.4, 0.98, glass, paint},
-                           {0.98, 1.0, 0.95, paint, paint},  {1, 0.72, 0.88, paint, paint}};
-constexpr Cut kSuv[] = {{0, 0.78, 0.84, paint, paint},     {0.02, 0.9, 0.95, paint, paint},
-                        {0.1, 1.0, 1, paint, paint},       {0.27, 1.1, 1, glass, glass},
-                        {0.4, 1.62, 1, paint, glass},      {0.53, 1.69, 1, paint, dark},
-                        {0.555, 1.69, 1, paint, glass},    {0.74, 1.68, 1, paint, dark},
-                        {0.76, 1.67, 1, paint, glass},     {0.91, 1.6, 0.98, glass, paint},
-                        {0.98, 1.12, 0.96, paint, paint},  {1, 0.8, 0.9, paint, paint}};
-constexpr Cut kVan[] = {{0, 0.8, 0.84, paint, paint},     {0.02, 0.95, 0.95, paint, paint},
-                        {0.08, 1.08, 1, paint, paint},    {0.16, 1.2, 1, glass, glass},
-                        {0.3, 2.05, 1, paint, glass},     {0.36, 2.18, 1, paint, paint},
-                        {0.7, 2.2, 1, paint, paint},      {0.985, 2.16, 0.97, paint, paint},
-                        {1, 0.75, 0.95, paint, paint}};
+constexpr Cut kEstate[] = {
+    {0, 0.62, 0.8, paint, paint},    {0.02, 0.73, 0.93, paint, paint}, {0.1, 0.8, 1, paint, paint},
+    {0.27, 0.96, 1, glass, glass},   {0.41, 1.42, 1, paint, glass},    {0.53, 1.48, 1, paint, dark},
+    {0.55, 1.48, 1, paint, glass},   {0.73, 1.47, 1, paint, dark},     {0.75, 1.46, 1, paint, glass},
+    {0.91, 1.4, 0.98, glass, paint}, {0.98, 1.0, 0.95, paint, paint},  {1, 0.72, 0.88, paint, paint}};
+constexpr Cut kSuv[] = {
+    {0, 0.78, 0.84, paint, paint},   {0.02, 0.9, 0.95, paint, paint},  {0.1, 1.0, 1, paint, paint},
+    {0.27, 1.1, 1, glass, glass},    {0.4, 1.62, 1, paint, glass},     {0.53, 1.69, 1, paint, dark},
+    {0.555, 1.69, 1, paint, glass},  {0.74, 1.68, 1, paint, dark},     {0.76, 1.67, 1, paint, glass},
+    {0.91, 1.6, 0.98, glass, paint}, {0.98, 1.12, 0.96, paint, paint}, {1, 0.8, 0.9, paint, paint}};
+constexpr Cut kVan[] = {{0, 0.8, 0.84, paint, paint}, {0.02, 0.95, 0.95, paint, paint},  {0.08, 1.08, 1, paint, paint},
+                        {0.16, 1.2, 1, glass, glass}, {0.3, 2.05, 1, paint, glass},      {0.36, 2.18, 1, paint, paint},
+                        {0.7, 2.2, 1, paint, paint},  {0.985, 2.16, 0.97, paint, paint}, {1, 0.75, 0.95, paint, paint}};
 
 Body body_of(CarBody b)
 {
     switch (b) {
-    case CarBody::sedan: return {{4.62, 1.81, 1.45}, 0.93, 0.7, kSedan};
-    case CarBody::estate: return {{4.6, 1.8, 1.48}, 0.93, 0.74, kEstate};
-    case CarBody::suv: return {{4.55, 1.88, 1.69}, 1.07, 0.76, kSuv};
-    case CarBody::van: return {{5.2, 1.96, 2.2}, 1.15, 0.86, kVan};
-    default: return {{4.1, 1.76, 1.49}, 0.95, 0.72, kHatchback};
+    case CarBody::sedan:
+        return {{4.62, 1.81, 1.45}, 0.93, 0.7, kSedan};
+    case CarBody::estate:
+        return {{4.6, 1.8, 1.48}, 0.93, 0.74, kEstate};
+    case CarBody::suv:
+        return {{4.55, 1.88, 1.69}, 1.07, 0.76, kSuv};
+    case CarBody::van:
+        return {{5.2, 1.96, 2.2}, 1.15, 0.86, kVan};
+    default:
+        return {{4.1, 1.76, 1.49}, 0.95, 0.72, kHatchback};
     }
 }
 
@@ -105,11 +105,16 @@ class CarShell {
     {
         const double w = half(c), x = x_of(c);
         switch (level) {
-        case 0: return f_.at(x, side * w * 0.95, 0.24);
-        case 1: return f_.at(x, side * w, std::min(0.58, c.top - 0.05));
-        case 2: return f_.at(x, side * w * 0.965, belt(c));
-        case 3: return cabin(c) ? f_.at(x, side * w * b_.roof_width, c.top - 0.05) : point(c, side, 2);
-        default: return f_.at(x, 0, c.top + (cabin(c) ? 0 : 0.035));
+        case 0:
+            return f_.at(x, side * w * 0.95, 0.24);
+        case 1:
+            return f_.at(x, side * w, std::min(0.58, c.top - 0.05));
+        case 2:
+            return f_.at(x, side * w * 0.965, belt(c));
+        case 3:
+            return cabin(c) ? f_.at(x, side * w * b_.roof_width, c.top - 0.05) : point(c, side, 2);
+        default:
+            return f_.at(x, 0, c.top + (cabin(c) ? 0 : 0.035));
         }
     }
     Finish finish(Cover c) const { return c == Cover::paint ? paint_ : c == Cover::glass ? glass_ : dark_; }
@@ -156,7 +161,8 @@ class CarShell {
             for (int level : {0, 1}) {
                 const Vector3 l0 = point(c, 1, level), r0 = point(c, -1, level);
                 const Vector3 l1 = point(c, 1, level + 1), r1 = point(c, -1, level + 1);
-                front ? m_.quad(level ? paint_ : dark_, r0, l0, l1, r1) : m_.quad(level ? paint_ : dark_, l0, r0, r1, l1);
+                front ? m_.quad(level ? paint_ : dark_, r0, l0, l1, r1)
+                      : m_.quad(level ? paint_ : dark_, l0, r0, r1, l1);
             }
             const Vector3 l = point(c, 1, 2), r = point(c, -1, 2), top = point(c, 1, 4);
             front ? m_.triangle(paint_, r, l, top) : m_.triangle(paint_, l, r, top);

@@ -18,7 +18,7 @@ VehicleSize car_size(CarBody body);
 void add_car(MeshBuilder& mesh, const Frame& middle, CarBody body, KeyedRandom& random);
 void add_truck(MeshBuilder& mesh, const Frame& middle, KeyedRandom& random); // 7.6 x 2.4 x 3.3 m
 void add_bus(MeshBuilder& mesh, const Frame& middle, KeyedRandom& random);   // 11.8 x 2.5 x 3.1 m
-void add_tram(MeshBuilder& mesh, const Frame& middle, KeyedRandom& random);  // three cars, 27 x 2.4 x 3.5 m; label train
+void add_tram(MeshBuilder& mesh, const Frame& middle, KeyedRandom& random); // three cars, 27 x 2.4 x 3.5 m; label train
 
 // a wheel whose outer face looks along +y of the frame at its axle
 void add_wheel(MeshBuilder& mesh, const Frame& axle, double radius, double width, uint8_t label);

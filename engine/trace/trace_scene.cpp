@@ -12,7 +12,7 @@ namespace semrover {
 namespace {
 
 using Float3 = std::array<float, 3>;
-constexpr float kCrease = 0.5f; // cosine
+constexpr float kCrease = 0.72f; // cosine
 
 Float3 minus(const Float3& a, const Float3& b)
 {
@@ -61,19 +61,45 @@ Float3 area_normal(const Mesh& m, size_t face)
     return cross(minus(m.positions[f[1]], m.positions[f[0]]), minus(m.positions[f[2]], m.positions[f[0]]));
 }
 
-std::vector<Float3> vertex_normals(const Mesh& m)
-{
-    std::vector<Float3> sum(m.positions.size(), Float3{});
-    for (size_t f = 0; f < m.faces.size(); ++f) {
-        const Float3 n = area_normal(m, f);
-        for (uint32_t v : m.faces[f])
-            for (size_t a = 0; a < 3; ++a)
-                sum[v][a] += n[a];
+// faces that meet at a place, whatever the vertices are called there
+class Neighbours {
+  public:
+    explicit Neighbours(const Mesh& m) : place_(m.positions.size())
+    {
+        std::vector<uint32_t> order(m.positions.size());
+        std::iota(order.begin(), order.end(), 0u);
+        std::ranges::sort(
+            order, [&](uint32_t a, uint32_t b) { return std::pair(m.positions[a], a) < std::pair(m.positions[b], b); });
+        uint32_t places = 0;
+        for (size_t i = 0; i < order.size(); ++i)
+            place_[order[i]] = i && m.positions[order[i]] == m.positions[order[i - 1]] ? places - 1 : places++;
+        starts_.resize(places + 1);
+        for (const auto& f : m.faces)
+            for (uint32_t v : f)
+                ++starts_[place_[v] + 1];
+        std::partial_sum(starts_.begin(), starts_.end(), starts_.begin());
+        std::vector<uint32_t> next(starts_.begin(), starts_.end() - 1);
+        normals_.resize(m.faces.size() * 3);
+        for (size_t f = 0; f < m.faces.size(); ++f)
+            for (uint32_t v : m.faces[f])
+                normals_[next[place_[v]]++] = area_normal(m, f);
     }
-    for (Float3& n : sum)
-        n = unit(n);
-    return sum;
-}
+
+    // mean by area of those that bend little against `flat`
+    Float3 normal(uint32_t vertex, const Float3& flat) const
+    {
+        Float3 sum{};
+        for (uint32_t i = starts_[place_[vertex]]; i < starts_[place_[vertex] + 1]; ++i)
+            if (dot(unit(normals_[i]), flat) > kCrease)
+                for (size_t a = 0; a < 3; ++a)
+                    sum[a] += normals_[i][a];
+        return dot(sum, sum) > 0 ? unit(sum) : flat;
+    }
+
+  private:
+    std::vector<uint32_t> place_, starts_;
+    std::vector<Float3> normals_; // of faces, by place
+};
 
 // pictures a metre: root of the ratio of the areas
 float texture_density(const std::array<std::array<float, 2>, 3>& uv, float area2)
@@ -82,7 +108,7 @@ float texture_density(const std::array<std::array<float, 2>, 3>& uv, float area2
     return area2 > 0 ? std::sqrt(std::abs(u1 * v2 - u2 * v1) / area2) : 0;
 }
 
-void add_triangle(TraceTables& t, const Mesh& m, const std::vector<Float3>& normals, uint32_t face)
+void add_triangle(TraceTables& t, const Mesh& m, const Neighbours& around, uint32_t face)
 {
     const auto& f = m.faces[face];
     const Float3 a = m.positions[f[0]], e1 = minus(m.positions[f[1]], a), e2 = minus(m.positions[f[2]], a);
@@ -96,7 +122,7 @@ void add_triangle(TraceTables& t, const Mesh& m, const std::vector<Float3>& norm
         uv = m.uvs[face];
     std::array<uint32_t, 3> n;
     for (size_t c = 0; c < 3; ++c)
-        n[c] = pack_normal(dot(normals[f[c]], flat) > kCrease ? normals[f[c]] : flat);
+        n[c] = pack_normal(around.normal(f[c], flat));
     t.corners.push_back({bits(uv[0][0]), bits(uv[0][1]), bits(uv[1][0]), bits(uv[1][1]), bits(uv[2][0]), bits(uv[2][1]),
                          n[0], n[1], n[2], bits(texture_density(uv, std::sqrt(dot(area, area)))), 0, 0});
 }
@@ -186,12 +212,12 @@ TraceTables trace_tables(const Mesh& mesh, std::span<const float> gloss, std::sp
     for (uint32_t f : chosen)
         corners.push_back(mesh.faces[f]);
     Bvh bvh = build_bvh(mesh.positions, corners);
-    const std::vector<Float3> normals = vertex_normals(mesh);
+    const Neighbours around(mesh);
     TraceTables t{.nodes = std::move(bvh.nodes)};
     t.triangles.reserve(chosen.size());
     t.corners.reserve(chosen.size());
     for (uint32_t i : bvh.order)
-        add_triangle(t, mesh, normals, chosen[i]);
+        add_triangle(t, mesh, around, chosen[i]);
     add_materials(t, mesh, gloss);
     return t;
 }
@@ -224,8 +250,9 @@ TraceScene DeviceTraceScene::in(Graph& g) const
     const auto table = [&](uint32_t i, uint32_t width, DType dtype, std::string_view name) {
         return g.external(arena_.slice(i), std::max(counts_[i], 1u), width, dtype, name, width);
     };
-    return {table(0, 16, DType::u32, "tree"), table(1, 12, DType::f32, "triangles"), table(2, 12, DType::u32, "corners"),
-            table(3, 8, DType::u32, "materials"), table(4, 1, DType::u32, "texels")};
+    return {table(0, 16, DType::u32, "tree"), table(1, 12, DType::f32, "triangles"),
+            table(2, 12, DType::u32, "corners"), table(3, 8, DType::u32, "materials"),
+            table(4, 1, DType::u32, "texels")};
 }
 
 } // namespace semrover

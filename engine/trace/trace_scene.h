@@ -11,8 +11,8 @@
 
 namespace semrover {
 
-// A mesh as rays see it, on the host: the tables of TraceScene (kernels.h). Vertices that faces share are smooth where
-// the faces bend by less than 60 degrees.
+// A mesh as rays see it, on the host: the tables of TraceScene (kernels.h). Where faces meet they are smooth if they
+// bend by less than 44 degrees.
 struct TraceTables {
     std::vector<std::array<uint32_t, 16>> nodes;
     std::vector<std::array<uint32_t, 12>> triangles, corners;

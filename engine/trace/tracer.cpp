@@ -25,12 +25,12 @@ View view_of(const CameraFrame& frame, const Daylight& light)
     for (size_t a = 0; a < 3; ++a)
         v[1 + a] = {float(m[4 * a]), float(m[4 * a + 1]), float(m[4 * a + 2]), float(origin[a])};
     const double flat = std::cos(light.sun_elevation), up = std::sin(light.sun_elevation);
-    v[4] = {float(flat * std::cos(light.sun_azimuth)), float(flat * std::sin(light.sun_azimuth)), float(up), 0.0047f};
+    v[4] = {float(flat * std::cos(light.sun_azimuth)), float(flat * std::sin(light.sun_azimuth)), float(up), 0.0025f};
     // lower suns are redder and weaker: one air mass takes 1/e^0.1 of red, more of blue
-    const double air = 1 / std::max(up, 0.1), level = 5.6 * (1 - 0.35 * light.cloud_cover);
+    const double air = 1 / std::max(up, 0.1), level = 4.6 * (1 - 0.35 * light.cloud_cover);
     v[5] = {float(level * std::exp(-0.10 * air)), float(level * 0.97 * std::exp(-0.13 * air)),
             float(level * 0.93 * std::exp(-0.19 * air)), float(light.cloud_cover)};
-    v[6] = {float(light.exposure), 0.95f, float(light.cloud_seed), float(light.haze)};
+    v[6] = {float(light.exposure), 1.12f, float(light.cloud_seed), float(light.haze)};
     return v;
 }
 

@@ -33,7 +33,7 @@ float cloud_noise(vec2 p)
 vec3 clear_sky(vec3 d)
 {
     const float up = max(d.z, 0.0), toward = max(dot(d, sun_direction()), 0.0);
-    const vec3 zenith = vec3(0.16, 0.31, 0.66), horizon = vec3(0.66, 0.78, 0.93);
+    const vec3 zenith = vec3(0.2, 0.34, 0.62), horizon = vec3(0.74, 0.82, 0.92);
     vec3 sky = mix(horizon, zenith, 1.0 - exp(-3.2 * up));
     const float toward2 = toward * toward, toward8 = toward2 * toward2 * toward2 * toward2;
     sky += vec3(0.42, 0.34, 0.22) * toward8 * (0.5 + 0.5 * toward8 * toward8);

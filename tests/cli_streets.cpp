@@ -1,0 +1,110 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/mesh/mesh_files.h"
+#include "engine/scene/camera_path.h"
+#include "engine/scene/grid.h"
+#include "engine/scene/image.h"
+#include "runtime/json.h"
+#include "tests/program.h"
+
+#include <algorithm>
+#include <gtest/gtest.h>
+
+namespace semrover {
+namespace {
+
+namespace fs = std::filesystem;
+
+ProgramResult streets(const Path& out, const std::string& more)
+{
+    return semrover_program("streets -q --length 40 --spacing 100 -o " + out.string() + " " + more);
+}
+
+TEST(CliStreets, a_street_comes_with_mesh_grids_drive_and_pictures_that_agree)
+{
+    const ScratchFolder folder;
+    const Path out = folder / "street";
+    const ProgramResult result = streets(out, "--seed 5 --images --samples 1 --ambient-rays 1 -W 48 -H 32 --json");
+    ASSERT_EQ(result.code, 0) << result.err;
+    EXPECT_EQ(folder.entries(), 1u); // nothing temporary
+    const Json about = Json::parse(result.out);
+    EXPECT_EQ(about["seed"], 5);
+    EXPECT_EQ(about["frames"], 1);
+    EXPECT_EQ(about["classes"]["sky"]["faces"], 0);
+    EXPECT_GT(about["classes"]["building"]["faces"], 1000);
+    EXPECT_GT(about["objects"]["building"], 3);
+    EXPECT_EQ(Json::parse(contents(out / "street.json")), about);
+    EXPECT_GT(fs::file_size(out / "mesh.glb"), 1000000u);
+    const auto semantic = read_grid(out / "semantic.sgrid"), truth = read_grid(out / "truth.sgrid");
+    ASSERT_TRUE(semantic && truth);
+    EXPECT_EQ(semantic->cells, truth->cells);
+    EXPECT_EQ(semantic->labels, truth->labels);
+    EXPECT_FALSE(semantic->has_points());
+    EXPECT_EQ(truth->points.size(), truth->cells.size() * 60);
+    EXPECT_GT(std::ranges::count(truth->labels, 19), 10); // thin lines are not lost
+    const auto path = read_transforms(out / "transforms.json"), tum = read_tum(out / "drive.tum", {});
+    ASSERT_TRUE(path) << path.error().message;
+    ASSERT_TRUE(tum) << tum.error().message;
+    EXPECT_EQ(path->frames[0].intrinsics.width, 48u);
+    for (const char* drive : {"", "shifted"}) {
+        const Path at = out / drive;
+        ASSERT_TRUE(read_transforms(at / "transforms.json"));
+        const auto color = read_png_rgb8(at / "color/000000.png");
+        const auto depth = read_png_gray16(at / "depth/000000.png");
+        const auto label = read_png_rgb8(at / "label/000000.png"), visible = read_png_rgb8(at / "visible/000000.png");
+        ASSERT_TRUE(color && depth && label && visible && read_png_rgb8(at / "normal/000000.png"));
+        EXPECT_EQ(color->width, 48u);
+        size_t road = 0;
+        for (size_t i = 0; i < depth->pixels.size(); ++i) {
+            EXPECT_EQ(visible->pixels[3 * i] == 0, label->pixels[3 * i] == 10);
+            EXPECT_TRUE(visible->pixels[3 * i] || depth->pixels[i] == 0);
+            road += label->pixels[3 * i] == 0;
+        }
+        EXPECT_GT(road, 100u);
+    }
+}
+
+TEST(CliStreets, the_same_seed_gives_the_same_files)
+{
+    const ScratchFolder folder;
+    for (const char* name : {"a", "b"})
+        ASSERT_EQ(streets(folder / name, "--seed 2").code, 0);
+    for (const char* file :
+         {"mesh.glb", "truth.sgrid", "semantic.sgrid", "drive.tum", "transforms.json", "street.json"})
+        EXPECT_TRUE(contents(folder / "a" / file) == contents(folder / "b" / file)) << file;
+}
+
+TEST(CliStreets, what_exists_is_replaced_only_when_asked_and_other_files_stay)
+{
+    const ScratchFolder folder;
+    const Path out = folder / "street";
+    fs::create_directory(out);
+    folder.put("street/notes.txt", "mine");
+    const ProgramResult refused = streets(out, "--no-grids");
+    EXPECT_EQ(refused.code, 2);
+    EXPECT_NE(refused.err.find("-y replaces"), std::string::npos) << refused.err;
+    EXPECT_FALSE(fs::exists(out / "mesh.glb"));
+    ASSERT_EQ(streets(out, "--no-grids -y").code, 0);
+    EXPECT_TRUE(fs::exists(out / "mesh.glb"));
+    EXPECT_FALSE(fs::exists(out / "truth.sgrid"));
+    EXPECT_EQ(contents(out / "notes.txt"), "mine");
+    EXPECT_EQ(folder.entries(), 1u);
+}
+
+TEST(CliStreets, what_cannot_be_is_refused_and_leaves_nothing)
+{
+    const ScratchFolder folder;
+    EXPECT_EQ(streets(folder / "x", "--voxel-size 0").code, 2);
+    EXPECT_EQ(semrover_program("streets --length 5 -o " + (folder / "x").string()).code, 2);
+    EXPECT_EQ(semrover_program("streets").code, 2);
+    const ProgramResult missing = streets(folder / "no/such/folder", "");
+    EXPECT_EQ(missing.code, 3);
+    EXPECT_NE(missing.err.find("cannot create a folder in"), std::string::npos) << missing.err;
+    const ProgramResult file = streets(folder.put("file", "x"), "-y");
+    EXPECT_EQ(file.code, 3);
+    EXPECT_NE(file.err.find("is a file"), std::string::npos) << file.err;
+    EXPECT_EQ(folder.entries(), 1u);
+}
+
+} // namespace
+} // namespace semrover

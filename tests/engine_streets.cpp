@@ -1,0 +1,245 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/scene/palette.h"
+#include "engine/streets/camera_drive.h"
+#include "engine/streets/class_label.h"
+#include "engine/streets/road_surface.h"
+#include "engine/streets/street.h"
+#include "engine/streets/vehicle.h"
+#include "runtime/hash.h"
+
+#include <algorithm>
+#include <functional>
+#include <gtest/gtest.h>
+#include <set>
+
+namespace semrover {
+namespace {
+
+template <typename T>
+void add_all(Hash& hash, const std::vector<T>& values)
+{
+    hash.add(std::as_bytes(std::span(values)));
+}
+
+uint64_t hash_of(const Street& street)
+{
+    Hash hash;
+    add_all(hash, street.mesh.positions);
+    add_all(hash, street.mesh.faces);
+    add_all(hash, street.mesh.uvs);
+    add_all(hash, street.mesh.face_labels);
+    add_all(hash, street.mesh.face_materials);
+    for (const Texture& t : street.mesh.textures)
+        add_all(hash, t.image.pixels);
+    return hash.value();
+}
+
+double face_area(const Mesh& m, size_t f)
+{
+    const auto at = [&](size_t c) {
+        const auto& p = m.positions[m.faces[f][c]];
+        return Vector3{p[0], p[1], p[2]};
+    };
+    return length(cross(at(1) - at(0), at(2) - at(0))) / 2;
+}
+
+TEST(engine_streets, the_same_seed_gives_the_same_bytes_and_another_seed_another_street)
+{
+    EXPECT_EQ(hash_of(make_street({.seed = 3, .length = 60})), hash_of(make_street({.seed = 3, .length = 60})));
+    EXPECT_NE(hash_of(make_street({.seed = 3, .length = 60})), hash_of(make_street({.seed = 4, .length = 60})));
+}
+
+TEST(engine_streets, meshes_are_whole_labelled_textured_and_within_bounds)
+{
+    for (uint64_t seed : {1, 6}) {
+        const Street street = make_street({.seed = seed, .length = 90});
+        const Mesh& m = street.mesh;
+        const Status status = check_mesh(m, "street");
+        ASSERT_TRUE(status) << status.error().message;
+        ASSERT_EQ(m.face_labels.size(), m.faces.size());
+        ASSERT_EQ(m.uvs.size(), m.faces.size());
+        ASSERT_EQ(m.face_materials.size(), m.faces.size());
+        ASSERT_EQ(street.gloss.size(), m.materials.size());
+        for (const Material& material : m.materials)
+            EXPECT_GE(material.texture, 0) << material.name;
+        size_t tiny = 0;
+        for (size_t f = 0; f < m.faces.size(); ++f) {
+            ASSERT_LT(m.face_labels[f], kClassCount);
+            ASSERT_NE(m.face_labels[f], label::kSky);
+            tiny += face_area(m, f) < 1e-8;
+        }
+        EXPECT_LT(double(tiny), 0.001 * double(m.faces.size()));
+        for (const auto& p : m.positions) {
+            ASSERT_LT(std::abs(p[0]), 200) << "x";
+            ASSERT_LT(std::abs(p[1]), 120) << "y";
+            ASSERT_GT(p[2], -12) << "z";
+            ASSERT_LT(p[2], 50) << "z";
+        }
+    }
+}
+
+TEST(engine_streets, some_streets_together_have_every_class_but_sky)
+{
+    std::set<std::string> missing;
+    for (const SemanticClass& c : kPalette)
+        missing.insert(std::string(c.name));
+    for (uint64_t seed : {1, 2, 3, 4}) {
+        const std::vector<ClassShare> shares = class_shares(make_street({.seed = seed, .length = 220}).mesh);
+        for (size_t i = 0; i < kClassCount; ++i)
+            if (shares[i].area > 0.5)
+                missing.erase(std::string(kPalette[i].name));
+        EXPECT_EQ(shares[label::kSky].faces, 0u);
+    }
+    EXPECT_EQ(missing, std::set<std::string>{"sky"});
+}
+
+// corners and label of every face whose middle lies in the first metres
+std::multiset<std::array<float, 10>> beginning(const Mesh& m, float reach)
+{
+    std::multiset<std::array<float, 10>> faces;
+    for (size_t f = 0; f < m.faces.size(); ++f) {
+        std::array<float, 10> row{};
+        for (size_t c = 0; c < 3; ++c)
+            std::ranges::copy(m.positions[m.faces[f][c]], row.begin() + int64_t(3 * c));
+        row[9] = m.face_labels[f];
+        if ((row[0] + row[3] + row[6]) / 3 < reach)
+            faces.insert(row);
+    }
+    return faces;
+}
+
+TEST(engine_streets, a_longer_street_begins_like_a_shorter_one)
+{
+    for (uint64_t seed : {2, 5}) {
+        const auto shorter = beginning(make_street({.seed = seed, .length = 95}).mesh, 30);
+        const auto longer = beginning(make_street({.seed = seed, .length = 170}).mesh, 30);
+        EXPECT_GT(shorter.size(), 5000u);
+        EXPECT_TRUE(shorter == longer) << shorter.size() << " and " << longer.size() << " faces";
+    }
+}
+
+TEST(engine_streets, kerbs_are_12_to_15_cm_high_and_lowered_at_crossings)
+{
+    for (uint64_t seed : {1, 7}) {
+        const RoadNetwork road(seed, 120);
+        const CrossSection& c = road.section();
+        EXPECT_GE(c.kerb_height, 0.12);
+        EXPECT_LE(c.kerb_height, 0.15);
+        EXPECT_GE(c.lane, 3.0);
+        EXPECT_LE(c.lane, 3.5);
+        MeshBuilder mesh;
+        add_road_surface(mesh, road, seed);
+        const Mesh m = std::move(mesh).take();
+        const auto crossings = crossings_of(road);
+        ASSERT_FALSE(crossings.empty());
+        const double middle = (crossings[0].first + crossings[0].last) / 2; // in the first block, which is straight
+        double highest = 0, at_crossing = 1;
+        for (size_t f = 0; f < m.faces.size(); ++f)
+            if (m.face_labels[f] == label::kSidewalk)
+                for (uint32_t v : m.faces[f]) {
+                    const auto& p = m.positions[v];
+                    if (p[0] < 1 || p[0] > crossings[0].last || std::abs(p[1]) > c.facade() + 0.01)
+                        continue;
+                    const double h = p[2] - road.at(p[0], 0).z;
+                    highest = std::max(highest, h);
+                    if (std::abs(p[0] - middle) < 1.5 && std::abs(std::abs(p[1]) - c.kerb()) < 1e-3 && h > 1e-3)
+                        at_crossing = std::min(at_crossing, h);
+                }
+        EXPECT_NEAR(highest, c.kerb_height, 2e-3);
+        EXPECT_NEAR(at_crossing, 0.025, 2e-3);
+    }
+}
+
+TEST(engine_streets, vehicles_have_their_size)
+{
+    const auto check = [](const VehicleSize& size, double mirrors, const std::function<void(MeshBuilder&)>& add) {
+        MeshBuilder builder;
+        add(builder);
+        const Mesh m = std::move(builder).take();
+        std::array<float, 3> low{99, 99, 99}, high{-99, -99, -99};
+        for (const auto& p : m.positions)
+            for (size_t a = 0; a < 3; ++a) {
+                low[a] = std::min(low[a], p[a]);
+                high[a] = std::max(high[a], p[a]);
+            }
+        EXPECT_NEAR(high[0] - low[0], size.length, 0.1);
+        EXPECT_NEAR(high[1] - low[1], size.width, mirrors);
+        EXPECT_NEAR(high[2], size.height, 0.1);
+        EXPECT_NEAR(low[2], 0, 0.03);
+    };
+    for (CarBody body : {CarBody::hatchback, CarBody::sedan, CarBody::estate, CarBody::suv, CarBody::van}) {
+        const VehicleSize size = car_size(body);
+        EXPECT_GE(size.length, 4);
+        EXPECT_LE(size.length, 5.3);
+        check(size, 0.4, [&](MeshBuilder& m) {
+            KeyedRandom r(1, {uint64_t(body)});
+            add_car(m, {}, body, r);
+        });
+    }
+    check({7.6, 2.4, 3.3}, 0.4, [](MeshBuilder& m) {
+        KeyedRandom r(1, {9});
+        add_truck(m, {}, r);
+    });
+    check({11.8, 2.5, 3.28}, 0.6, [](MeshBuilder& m) {
+        KeyedRandom r(1, {9});
+        add_bus(m, {}, r);
+    });
+}
+
+TEST(engine_streets, solids_look_outwards)
+{
+    // the volume that faces enclose, by the divergence theorem, is that of the shape
+    const auto volume = [](const std::function<void(MeshBuilder&, Finish)>& add) {
+        MeshBuilder builder;
+        add(builder, builder.finish(Pattern::trim, 2));
+        const Mesh m = std::move(builder).take();
+        double sum = 0;
+        for (const auto& f : m.faces) {
+            const auto at = [&](size_t c) {
+                const auto& p = m.positions[f[c]];
+                return Vector3{p[0], p[1], p[2]};
+            };
+            sum += dot(at(0), cross(at(1), at(2))) / 6;
+        }
+        return sum;
+    };
+    const Frame turned = upright_frame({3, 2, 1}, 0.7);
+    EXPECT_NEAR(volume([&](MeshBuilder& m, Finish f) {
+                    m.box(f, turned, {-1, -2, 0}, {1, 2, 3}, MeshBuilder::kAllSides);
+                }),
+                24, 1e-4);
+    EXPECT_NEAR(volume([&](MeshBuilder& m, Finish f) { m.tube(f, {1, 1, 0}, 1, {1, 1, 2}, 1, 64, 3); }), 6.283, 0.02);
+    EXPECT_NEAR(volume([&](MeshBuilder& m, Finish f) { m.blob(f, turned, {1, 2, 0.5}, 40, 60); }), 4.189, 0.04);
+    EXPECT_NEAR(volume([&](MeshBuilder& m, Finish f) {
+                    m.torus(f, {0, 1, 0}, {0, 1, 0}, 1, 0.2, 80, 30);
+                }),
+                0.7896, 0.01);
+}
+
+TEST(engine_streets, the_drive_keeps_to_the_right_lane_and_its_twin_beside_it)
+{
+    const RoadNetwork road(2, 150);
+    const Intrinsics lens = pinhole_from_fov(73, 64, 48);
+    DriveShape shape, beside;
+    beside.offset = 1.5;
+    const CameraPath path = drive_along(road, shape, lens), shifted = drive_along(road, beside, lens);
+    ASSERT_EQ(path.frames.size(), 56u); // every 2 m from 6 to 116
+    ASSERT_EQ(shifted.frames.size(), path.frames.size());
+    for (size_t i = 0; i < path.frames.size(); ++i) {
+        const double s = 6 + 2.0 * double(i);
+        const Point3 p = translation_of(path.frames[i].pose.camera_to_world());
+        const Point3 q = translation_of(shifted.frames[i].pose.camera_to_world());
+        const Vector3 middle = road.at(s, 0);
+        EXPECT_NEAR(p[2] - middle.z, 1.7, 1e-6);
+        EXPECT_NEAR(std::hypot(p[0] - middle.x, p[1] - middle.y), road.section().lane / 2, 1e-6);
+        EXPECT_NEAR(std::hypot(p[0] - q[0], p[1] - q[1]), 1.5, 1e-6);
+        const auto ahead = project(path.frames[i], {road.at(s + 9, -road.section().lane / 2).x,
+                                                    road.at(s + 9, -road.section().lane / 2).y, p[2]});
+        ASSERT_TRUE(ahead);
+        EXPECT_NEAR(ahead->x, 32, 1e-6);
+    }
+}
+
+} // namespace
+} // namespace semrover

@@ -1,0 +1,203 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/trace/trace_scene.h"
+#include "tests/kernel_case.h"
+
+#include <bit>
+#include <cmath>
+
+namespace semrover {
+namespace {
+
+using Vec = std::array<double, 3>;
+
+Vec minus(const Vec& a, const Vec& b)
+{
+    return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+Vec cross(const Vec& a, const Vec& b)
+{
+    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+double dot(const Vec& a, const Vec& b)
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+struct RayCase {
+    std::array<float, 3> origin;
+    float near;
+    std::array<float, 3> direction;
+    float far;
+};
+
+// where a ray meets a triangle's plane, and by how much it is inside: below 0 outside, in weights of corners
+struct Meeting {
+    double t = 0, inside = -1;
+};
+Meeting meet(const Mesh& m, size_t face, const RayCase& ray)
+{
+    const auto at = [&](size_t c) {
+        const auto& p = m.positions[m.faces[face][c]];
+        return Vec{p[0], p[1], p[2]};
+    };
+    const Vec o = {ray.origin[0], ray.origin[1], ray.origin[2]},
+              d = {ray.direction[0], ray.direction[1], ray.direction[2]};
+    const Vec a = at(0), e1 = minus(at(1), a), e2 = minus(at(2), a), p = cross(d, e2);
+    const double det = dot(e1, p);
+    if (std::abs(det) < 1e-12)
+        return {};
+    const Vec s = minus(o, a), q = cross(s, e1);
+    const double u = dot(s, p) / det, v = dot(d, q) / det;
+    return {dot(e2, q) / det, std::min({u, v, 1 - u - v})};
+}
+
+Mesh soup(uint32_t count, float size, uint32_t seed)
+{
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<float> at(-5, 5), off(-size, size);
+    Mesh m;
+    for (uint32_t i = 0; i < count; ++i) {
+        const std::array<float, 3> a = {at(random), at(random), at(random)};
+        m.positions.push_back(a);
+        for (int c = 0; c < 2; ++c)
+            m.positions.push_back({a[0] + off(random), a[1] + off(random), a[2] + off(random)});
+        if (i % 17 == 3) // without area
+            m.positions.back() = m.positions[m.positions.size() - 2];
+        m.faces.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+    }
+    return m;
+}
+
+std::vector<RayCase> rays(uint32_t count, uint32_t seed)
+{
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<float> at(-6, 6), way(-1, 1);
+    std::vector<RayCase> list;
+    for (uint32_t i = 0; i < count; ++i) {
+        RayCase r{{at(random), at(random), at(random)}, 0, {way(random), way(random), way(random)}, 1e4f};
+        if (i % 5 == 1) // along an axis
+            r.direction = {i % 3 == 0 ? 1.f : 0.f, i % 3 == 1 ? -1.f : 0.f, i % 3 == 2 ? 1.f : 0.f};
+        if (i % 7 == 2)
+            r.far = 4;
+        if (i % 11 == 4)
+            r.near = 2;
+        list.push_back(r);
+    }
+    return list;
+}
+
+struct Traced {
+    std::vector<std::array<uint32_t, 4>> hits;
+    TraceTables tables;
+};
+
+Traced trace(const Mesh& mesh, const std::vector<RayCase>& list, bool any)
+{
+    KernelCase k(test_device());
+    Traced out{{}, trace_tables(mesh, {})};
+    const auto scene = DeviceTraceScene::create(test_device(), out.tables);
+    EXPECT_TRUE(scene);
+    std::vector<float> table;
+    for (const RayCase& r : list)
+        table.insert(table.end(), {r.origin[0], r.origin[1], r.origin[2], r.near, r.direction[0], r.direction[1],
+                                   r.direction[2], r.far});
+    const Tensor hits = trace_rays(k.graph, scene->in(k.graph), k.input(table, 8), any);
+    const Tensor read = k.output(hits.rows, 4, DType::u32, 4);
+    k.graph.replace(hits.resource, read.resource);
+    const Status status = k.compile_and_run();
+    EXPECT_TRUE(status) << status.error().message;
+    out.hits = k.read_array<std::array<uint32_t, 4>>(read);
+    return out;
+}
+
+// the nearest meeting that is certainly inside, and the nearest that may be (by rounding)
+struct Expected {
+    double certain, possible;
+};
+Expected expected(const Mesh& m, const RayCase& ray)
+{
+    Expected e{double(ray.far), double(ray.far)};
+    for (size_t f = 0; f < m.faces.size(); ++f) {
+        const Meeting x = meet(m, f, ray);
+        const double slack = 1e-4;
+        if (x.inside > slack && x.t > ray.near + slack && x.t < ray.far - slack)
+            e.certain = std::min(e.certain, x.t);
+        if (x.inside > -slack && x.t > ray.near - slack && x.t < ray.far + slack)
+            e.possible = std::min(e.possible, x.t);
+    }
+    return e;
+}
+
+TEST(kernel_trace_rays, finds_the_nearest_triangle_as_brute_force_does)
+{
+    size_t hit_count = 0;
+    for (const auto& [count, size, number] :
+         {std::tuple{1u, 6.f, 64u}, {5u, 5.f, 333u}, {300u, 1.f, 1001u}, {5000u, 0.4f, 700u}}) {
+        const Mesh mesh = soup(count, size, count);
+        const std::vector<RayCase> list = rays(number, count + 1);
+        const Traced traced = trace(mesh, list, false), any = trace(mesh, list, true);
+        for (size_t i = 0; i < list.size(); ++i) {
+            SCOPED_TRACE(fmt::format("{} triangles, ray {}", count, i));
+            const Expected e = expected(mesh, list[i]);
+            const double t = std::bit_cast<float>(traced.hits[i][0]);
+            ASSERT_LE(t, e.certain + 1e-3);
+            ASSERT_GE(t, e.possible - 1e-3);
+            const bool hit = traced.hits[i][3] != ~0u;
+            ASSERT_EQ(hit, any.hits[i][3] != ~0u);
+            ASSERT_EQ(hit, t < list[i].far);
+            if (!hit)
+                continue;
+            ++hit_count;
+            const Meeting m = meet(mesh, traced.tables.triangles.at(traced.hits[i][3])[3], list[i]);
+            ASSERT_NEAR(m.t, t, 1e-3 * std::max(1.0, t));
+            ASSERT_GT(m.inside, -1e-3);
+        }
+    }
+    EXPECT_GT(hit_count, 300u); // of 2098
+}
+
+TEST(kernel_trace_rays, edges_and_corners_of_a_closed_surface_let_nothing_through)
+{
+    Mesh box; // a fan of triangles around the middle of each side: rays aim at shared edges and corners
+    for (int axis = 0; axis < 3; ++axis)
+        for (float side : {-1.f, 1.f}) {
+            const uint32_t first = uint32_t(box.positions.size());
+            const auto at = [&](float u, float v) {
+                std::array<float, 3> p{};
+                p[size_t(axis)] = side;
+                p[size_t(axis + 1) % 3] = u;
+                p[size_t(axis + 2) % 3] = v;
+                box.positions.push_back(p);
+            };
+            at(0, 0);
+            for (const auto& [u, v] : {std::pair{-1.f, -1.f}, {0.f, -1.f}, {1.f, -1.f}, {1.f, 1.f}, {-1.f, 1.f}})
+                at(u, v);
+            for (uint32_t i = 1; i <= 5; ++i)
+                box.faces.push_back({first, first + i, first + (i % 5) + 1});
+        }
+    std::vector<RayCase> list;
+    for (int x = -4; x <= 4; ++x)
+        for (int y = -4; y <= 4; ++y)
+            for (int z = -4; z <= 4; ++z)
+                if (x || y || z)
+                    list.push_back({{0, 0, 0}, 0, {float(x) / 4, float(y) / 4, float(z) / 4}, 1e4f});
+    const Traced traced = trace(box, list, false);
+    for (size_t i = 0; i < list.size(); ++i) {
+        const auto& d = list[i].direction;
+        const double expect = 1 / std::max({std::abs(d[0]), std::abs(d[1]), std::abs(d[2])});
+        ASSERT_NEAR(std::bit_cast<float>(traced.hits[i][0]), expect, 1e-5) << i;
+    }
+}
+
+TEST(kernel_trace_rays, an_empty_scene_is_missed)
+{
+    Mesh empty;
+    const std::vector<RayCase> list = rays(65, 3);
+    for (bool any : {false, true})
+        for (const auto& hit : trace(empty, list, any).hits)
+            ASSERT_EQ(hit[3], ~0u);
+}
+
+} // namespace
+} // namespace semrover
