@@ -109,7 +109,8 @@ TEST(engine_bvh, stays_shallow_when_triangles_coincide_or_crowd)
     for (int i = 0; i < 3000; ++i, x *= 0.93f)
         crowd.add({x, 0, 0}, {x, x, 0}, {x, 0, x});
     for (const Soup* soup : {&same, &crowd}) {
-        Walk walk(*soup, build_bvh(soup->positions, soup->faces));
+        const Bvh bvh = build_bvh(soup->positions, soup->faces);
+        Walk walk(*soup, bvh);
         walk.run();
         EXPECT_LE(walk.deepest, kBvhDepth);
     }

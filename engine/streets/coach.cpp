@@ -62,7 +62,7 @@ void add_wheels(MeshBuilder& m, const Frame& f, double at, double width, double 
 {
     for (int side : {1, -1}) {
         Frame axle = f.moved(at, side * (width / 2 + 0.002), radius);
-        m.disc(m.finish(Pattern::rubber, l, {0.8, 0.8, 0.8}), axle.at(0, side * 0.003, 0.03), axle.y * double(side),
+        m.disc(m.finish(Pattern::rubber, l, {0.8, 0.8, 0.8}), axle.at(0, side * 0.003, 0.095), axle.y * double(side),
                radius + 0.09, 16);
         if (side < 0)
             axle = axle.turned(kPi);

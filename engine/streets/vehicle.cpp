@@ -197,7 +197,7 @@ class CarShell {
         for (int side : {1, -1})
             for (double at : {l * 0.5 - 0.82, -l * 0.5 + 0.8}) {
                 Frame axle = f_.moved(at, side * (y + 0.002), r);
-                m_.disc(dark_, axle.at(0, side * 0.002, 0.02), axle.y * double(side), r + 0.065, 16);
+                m_.disc(dark_, axle.at(0, side * 0.002, 0.07), axle.y * double(side), r + 0.065, 16);
                 if (side < 0)
                     axle = axle.turned(3.14159265358979323846);
                 add_wheel(m_, axle.moved(0, 0.012, 0), r, 0.2, label::kCar);
