@@ -1,8 +1,8 @@
 #version 460
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// A pixel's light in two parts: what comes straight (sun with shadow, mirrored sky and street), and what the sky and the
-// street around shine onto it, kept apart from the surface's colour so that shade_resolve can smooth it.
+// A pixel's light in two parts: what comes straight (sun with shadow, mirrored sky and street), and what the sky and
+// the street around shine onto it, kept apart from the surface's colour so that shade_resolve can smooth it.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/thread.glsl"
 #include "shade.h"

@@ -32,8 +32,9 @@ vec3 smoothed(ivec2 at, float depth, vec3 normal)
             if (other <= 0.0)
                 continue;
             const float alike = max(dot(unpackSnorm4x8(surface_in[j].y).xyz, normal), 0.0), alike2 = alike * alike;
-            const float far = abs(other - depth) / (0.02 * depth + 0.03 * float(abs(dx) + abs(dy)) * depth * 0.2 + 0.02);
-            sum += vec4(ambient_in[j].rgb, 1.0) * (alike2 * alike2 * exp(-far) * exp(-0.08 * float(dx * dx + dy * dy)));
+            const float slack = 0.02 * depth + 0.006 * float(abs(dx) + abs(dy)) * depth + 0.02; // slopes are alike
+            const float far = abs(other - depth) / slack + 0.08 * float(dx * dx + dy * dy);
+            sum += vec4(ambient_in[j].rgb, 1.0) * (alike2 * alike2 * exp(-far));
         }
     return sum.w > 0.0 ? sum.rgb / sum.w : vec3(0.0);
 }
@@ -46,7 +47,11 @@ vec3 shoulder(vec3 c)
     return min(c, knee) + (1.0 - knee) * (1.0 - exp(-over / (1.0 - knee)));
 }
 
-vec3 to_srgb(vec3 c) { return mix(12.92 * c, 1.055 * pow(max(c, 1e-6), vec3(1.0 / 2.4)) - 0.055, greaterThan(c, vec3(0.0031308))); }
+vec3 to_srgb(vec3 c)
+{
+    const vec3 curve = 1.055 * pow(max(c, vec3(1e-6)), vec3(1.0 / 2.4)) - 0.055;
+    return mix(12.92 * c, curve, greaterThan(c, vec3(0.0031308)));
+}
 
 void main()
 {

@@ -42,7 +42,8 @@ TEST(CliStreets, a_street_comes_with_mesh_grids_drive_and_pictures_that_agree)
     EXPECT_FALSE(semantic->has_points());
     EXPECT_EQ(truth->points.size(), truth->cells.size() * 60);
     EXPECT_GT(std::ranges::count(truth->labels, 19), 10); // thin lines are not lost
-    const auto path = read_transforms(out / "transforms.json"), tum = read_tum(out / "drive.tum", {});
+    const auto path = read_transforms(out / "transforms.json"),
+               tum = read_tum(out / "drive.tum", pinhole_from_fov(73, 48, 32));
     ASSERT_TRUE(path) << path.error().message;
     ASSERT_TRUE(tum) << tum.error().message;
     EXPECT_EQ(path->frames[0].intrinsics.width, 48u);
