@@ -1,0 +1,24 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/scene/camera.h"
+
+#include <functional>
+
+namespace semrover {
+
+// pictures of one frame, [height, width], top row first
+struct DepthImages {
+    std::vector<uint16_t> depth; // along the optical axis, in units of FusionOptions::depth_scale; 0, 65535: nothing
+    std::vector<uint8_t> labels; // class or kNoLabel; empty: no labels
+    std::vector<uint8_t> colors; // [.., 3] sRGB; empty: gray
+};
+
+// what is fused: cameras, and pictures that are read when they are needed (more than once)
+struct DepthFrames {
+    std::vector<CameraFrame> cameras;
+    std::function<Result<DepthImages>(size_t)> load;
+};
+
+} // namespace semrover

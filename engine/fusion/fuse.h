@@ -1,0 +1,28 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/fusion/marching_cubes.h"
+#include "engine/mesh/mesh.h"
+
+namespace semrover {
+
+struct FusionFigures {
+    size_t blocks = 0;   // of 8^3 voxels
+    uint32_t chunks = 0; // that their votes were kept in
+    size_t unlabelled_faces = 0;
+};
+
+struct FusedMesh {
+    Mesh mesh;                  // vertex colours; face labels, kNoLabel where no pixel had one; a material a class
+    std::vector<uint8_t> views; // [V] frames that saw a vertex; 7: or more
+    FusionFigures figures;
+};
+
+// Depth images to a mesh: truncated signed distance, 20 counters of votes per voxel, marching cubes. A face has the
+// label that most of its corners have, ties to the lower one.
+// Errors: what TsdfVolume::create says; bad_input when there is no surface
+Result<FusedMesh> fuse(Device& device, const DepthFrames& frames, const FusionOptions& options,
+                       const FusionProgress& progress = {});
+
+} // namespace semrover

@@ -1,0 +1,166 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/fusion/marching_cubes.h"
+
+#include "engine/mesh/mesh.h"
+#include "runtime/program.h"
+
+#include <algorithm>
+#include <bit>
+
+namespace semrover {
+
+namespace {
+
+constexpr uint64_t kRangeBytes = 128u << 20; // of vertices and of faces that are read at a time
+constexpr uint32_t kUnlabelled = 31;         // in attributes
+
+enum Part : uint32_t { kTable, kCases, kEdges, kFirstVertex, kFirstFace, kVertices, kFaces };
+
+class Extraction {
+  public:
+    Extraction(Device& device, const TsdfVolume& volume) : device_(device), volume_(volume) {}
+
+    Status count();
+    Status write(FusedSurface& surface);
+
+  private:
+    uint32_t blocks() const { return uint32_t(volume_.blocks().size()); }
+    MarchingCubesCounts counts_in(Graph& g) const;
+    Tensor table_in(Graph& g) const { return g.external(memory_.slice(kTable), 256 * 16, 1, DType::u32, "table", 1); }
+    Result<std::vector<uint32_t>> starts(Part first, Part total) const; // of blocks, and the total
+    uint32_t range_end(uint32_t first, uint64_t bytes) const;
+    Status write_range(uint32_t first, uint32_t last, FusedSurface& surface);
+    void append(uint32_t first, uint32_t last, std::span<const std::array<float, 4>> rows, FusedSurface& surface) const;
+
+    Device& device_;
+    const TsdfVolume& volume_;
+    Arena memory_;
+    std::vector<uint32_t> vertex_starts_, face_starts_; // [blocks + 1]
+};
+
+MarchingCubesCounts Extraction::counts_in(Graph& g) const
+{
+    const auto array = [&](Part part, uint32_t rows, const char* name) {
+        return g.external(memory_.slice(part), rows, 1, DType::u32, name, 1);
+    };
+    const uint32_t voxels = blocks() * kTsdfBlockVoxels;
+    return {array(kCases, voxels, "cases"),
+            array(kEdges, voxels, "edges"),
+            array(kFirstVertex, blocks(), "first vertices"),
+            array(kFirstFace, blocks(), "first faces"),
+            array(kVertices, 1, "vertices"),
+            array(kFaces, 1, "faces")};
+}
+
+Result<std::vector<uint32_t>> Extraction::starts(Part first, Part total) const
+{
+    std::vector<uint32_t> values(blocks() + 1);
+    const auto bytes = std::as_writable_bytes(std::span(values));
+    SR_CHECK(device_.read(memory_.slice(first).part(0, bytes.size() - 4), bytes.first(bytes.size() - 4)));
+    SR_CHECK(device_.read(memory_.slice(total).part(0, 4), bytes.last(4)));
+    if (values.back() == ~0u)
+        return fail(ErrorCode::out_of_memory, "the surface has more than 2^32 vertices or faces");
+    return values;
+}
+
+Status Extraction::count()
+{
+    const uint64_t voxels = uint64_t(blocks()) * kTsdfBlockVoxels;
+    const std::vector<uint32_t> table = marching_cubes_table();
+    const uint64_t starts_bytes = blocks() * 4ull, table_bytes = table.size() * 4ull;
+    for (const uint64_t bytes : {table_bytes, voxels * 4, voxels * 4, starts_bytes, starts_bytes, uint64_t(4),
+                                 uint64_t(4)}) // in order of Part
+        memory_.add(bytes);
+    SR_CHECK(memory_.allocate(device_, "marching cubes"));
+    SR_CHECK(device_.write(memory_.slice(kTable).part(0, table_bytes), std::as_bytes(std::span(table))));
+    Graph g;
+    marching_cubes_count(g, volume_.in(g), table_in(g), counts_in(g));
+    SR_TRY(const auto program, Program::create(device_, g));
+    SR_CHECK(program->run());
+    SR_TRY(vertex_starts_, starts(kFirstVertex, kVertices));
+    SR_TRY(face_starts_, starts(kFirstFace, kFaces));
+    return {};
+}
+
+// as many blocks from `first` on as make at most `bytes` of vertices or faces, one at least
+uint32_t Extraction::range_end(uint32_t first, uint64_t bytes) const
+{
+    uint32_t last = first + 1;
+    while (last < blocks() && (vertex_starts_[last + 1] - vertex_starts_[first]) * 16ull <= bytes &&
+           (face_starts_[last + 1] - face_starts_[first]) * 12ull <= bytes)
+        ++last;
+    return last;
+}
+
+Status Extraction::write(FusedSurface& surface)
+{
+    const uint64_t bytes = std::min({kRangeBytes, device_.limits().max_storage_range, device_.limits().max_allocation});
+    for (uint32_t first = 0; first < blocks();) {
+        const uint32_t last = range_end(first, bytes);
+        if (face_starts_[last] > face_starts_[first] || vertex_starts_[last] > vertex_starts_[first])
+            SR_CHECK(write_range(first, last, surface));
+        first = last;
+    }
+    return {};
+}
+
+Status Extraction::write_range(uint32_t first, uint32_t last, FusedSurface& surface)
+{
+    const MarchingCubesRange range{first, last - first, vertex_starts_[first], face_starts_[first]};
+    // a block may have faces whose vertices are its neighbours' only
+    const uint32_t vertices = vertex_starts_[last] - range.first_vertex, faces = face_starts_[last] - range.first_face;
+    Arena out;
+    out.add(std::max(vertices, 1u) * 16ull);
+    out.add(std::max(faces, 1u) * 12ull);
+    SR_CHECK(out.allocate(device_, "surface"));
+    Graph g;
+    const MarchingCubesField field = volume_.in(g);
+    const MarchingCubesCounts counts = counts_in(g);
+    marching_cubes_vertices(g, field, counts, range,
+                            g.external(out.slice(0), std::max(vertices, 1u), 4, DType::f32, "vertices", 4));
+    marching_cubes_faces(g, field, counts, table_in(g), range,
+                         g.external(out.slice(1), std::max(faces, 1u), 3, DType::u32, "faces", 3));
+    SR_TRY(const auto program, Program::create(device_, g));
+    SR_CHECK(program->run());
+    std::vector<std::array<float, 4>> rows(vertices);
+    SR_CHECK(device_.read(out.slice(0).part(0, rows.size() * 16), std::as_writable_bytes(std::span(rows))));
+    append(first, last, rows, surface);
+    const size_t before = surface.faces.size();
+    surface.faces.resize(before + faces);
+    return device_.read(out.slice(1).part(0, faces * 12ull),
+                        std::as_writable_bytes(std::span(surface.faces).subspan(before)));
+}
+
+void Extraction::append(uint32_t first, uint32_t last, std::span<const std::array<float, 4>> rows,
+                        FusedSurface& surface) const
+{
+    const FusionBox& box = volume_.box();
+    for (uint32_t b = first; b < last; ++b) {
+        const uint32_t id = volume_.blocks()[b], x = box.blocks[0], y = box.blocks[1];
+        const std::array<uint32_t, 3> block = {id % x, id / x % y, id / (x * y)};
+        for (uint32_t v = vertex_starts_[b]; v < vertex_starts_[b + 1]; ++v) {
+            const auto& row = rows[v - vertex_starts_[first]];
+            std::array<float, 3>& p = surface.positions.emplace_back();
+            for (size_t axis = 0; axis < 3; ++axis)
+                p[axis] = float((double(box.low[axis]) + 8.0 * block[axis] + double(row[axis]) + 0.5) * box.voxel);
+            const uint32_t a = std::bit_cast<uint32_t>(row[3]), label = a >> 24 & 31;
+            surface.colors.push_back({uint8_t(a), uint8_t(a >> 8), uint8_t(a >> 16)});
+            surface.labels.push_back(label == kUnlabelled ? kNoLabel : uint8_t(label));
+            surface.views.push_back(uint8_t(a >> 29));
+        }
+    }
+}
+
+} // namespace
+
+Result<FusedSurface> extract_surface(Device& device, const TsdfVolume& volume)
+{
+    Extraction extraction(device, volume);
+    SR_CHECK(extraction.count());
+    FusedSurface surface;
+    SR_CHECK(extraction.write(surface));
+    return surface;
+}
+
+} // namespace semrover
