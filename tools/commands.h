@@ -40,6 +40,7 @@ void add_devices(CLI::App& app, const Globals& globals, Run& run);
 void add_doctor(CLI::App& app, const Globals& globals, Run& run);
 void add_edit(CLI::App& app, const Globals& globals, Run& run);
 void add_eval(CLI::App& app, const Globals& globals, Run& run);
+void add_fuse(CLI::App& app, const Globals& globals, Run& run);
 void add_generate(CLI::App& app, const Globals& globals, Run& run);
 void add_inpaint(CLI::App& app, const Globals& globals, Run& run);
 void add_inspect(CLI::App& app, const Globals& globals, Run& run);

@@ -102,6 +102,7 @@ int main(int argc, char** argv)
     add_doctor(app, globals, run);
     add_edit(app, globals, run);
     add_eval(app, globals, run);
+    add_fuse(app, globals, run);
     add_generate(app, globals, run);
     add_inpaint(app, globals, run);
     add_inspect(app, globals, run);
