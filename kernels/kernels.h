@@ -4,6 +4,8 @@
 
 #include "runtime/graph.h"
 
+#include <array>
+
 // Every op, in pipeline order. Ops are functions on lazy values: they add dispatches to the graph and return what will
 // be computed. Matrices are row-major with rows padded to kRowPadding elements; the padding is always zero. Storage is
 // fp32 or fp16, arithmetic and statistics fp32.
@@ -552,6 +554,20 @@ void tsdf_integrate(Graph& g, Tensor frames, Tensor planes, const TsdfOptions& o
 void tsdf_finish(Graph& g, const TsdfState& state, const TsdfOptions& options,
                  Tensor distances,   // [B * 512] fp32: in truncations, 2 where nothing was observed
                  Tensor attributes); // [B * 512] u32: rgb | label << 24 (31: none) | views << 29 (7: or more)
+
+// the nearest triangle of every point; ties go to the lower index
+struct FaceGrid {
+    Tensor corners;                // [F * 3, 4] fp32 array: metres, unused
+    Tensor starts;                 // [cells + 1] u32, x fastest
+    Tensor members;                // [..] u32: triangles that reach into each cell
+    std::array<uint32_t, 3> cells; // of the grid, which holds all triangles
+    std::array<float, 3> low;      // its corner, metres
+    float cell_size = 0;           // metres
+};
+[[nodiscard]] Tensor nearest_face(Graph& g,
+                                  Tensor points,                       // [N, 4] fp32 array: metres, unused
+                                  const FaceGrid& grid, float radius); // [N, 2] u32: distance as bits (the radius
+                                                                       // where there is none), face (2^32 - 1: none)
 
 // The surface where the distance is 0, without cracks: on faces that are ambiguous, inside corners are cut off one by
 // one in both cells. One vertex per crossed edge, kept by the edge's lower voxel; cells with an unobserved corner have

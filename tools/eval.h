@@ -12,5 +12,6 @@ void add_eval_f3d(CLI::App& eval, const Globals& globals, Run& run);
 void add_eval_fid(CLI::App& eval, const Globals& globals, Run& run);
 void add_eval_kid(CLI::App& eval, const Globals& globals, Run& run);
 void add_eval_mmd(CLI::App& eval, const Globals& globals, Run& run);
+void add_eval_surface(CLI::App& eval, const Globals& globals, Run& run);
 
 } // namespace semrover

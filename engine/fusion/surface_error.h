@@ -1,0 +1,36 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/fusion/depth_frames.h"
+#include "engine/mesh/mesh.h"
+#include "runtime/device.h"
+
+namespace semrover {
+
+// how many frames saw each vertex of a mesh: it projects to a pixel, and its depth lies within the depths of that pixel
+// and its neighbours, give or take 0.1 m or 2 % of the depth
+struct ViewOptions {
+    double depth_scale = 0.001; // metres of one unit of depth
+};
+Result<std::vector<uint32_t>> count_views(const Mesh& mesh, const DepthFrames& frames, const ViewOptions& options = {});
+
+struct SurfaceError {
+    std::vector<float> distances; // [vertices that are measured] metres to the nearest true face, or the radius
+    size_t vertices = 0;          // of the mesh
+    size_t beyond = 0;            // with no true face within the radius
+    size_t labelled = 0;          // measured ones whose nearest true face has a label
+    size_t right = 0;             // of these, with the same label
+    std::array<std::array<uint64_t, 256>, 256> confusion{}; // [true label][label]
+
+    double percentile(double share) const; // of the distances
+};
+
+// Distances from the vertices of a mesh that `views` says at least `min_views` frames saw (empty: all) to the surface
+// of the true mesh, exact on the device; a vertex has the label that most of its faces have, ties to the lower one.
+// Errors: bad_input, out_of_memory, device_lost
+Result<SurfaceError> measure_surface(Device& device, const Mesh& mesh, const Mesh& truth,
+                                     const std::vector<uint32_t>& views = {}, uint32_t min_views = 2,
+                                     double radius = 5);
+
+} // namespace semrover
