@@ -2,9 +2,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // one thread a voxel, frames in order: with P the voxel's sample in camera coordinates and N the plane of the pixel
-// that it projects to, d = (1 - N P) / |N|, D += w min(d / t, 1), W += w for d >= -t, where
-// w = max(cosine, 0.1) / (1 + z), and behind the surface also times 1 + 0.9 d / t. Within the band the pixel that the
-// nearest point of the surface projects to colours and votes.
+// that it projects to, d = (1 - N P) / |N|, D += w min(d / t, 1), W += w for d >= -band, where
+// w = max(cosine, 0.1) / (1 + z), and behind the surface also times 1 + 0.9 d / band. Within the band the pixel that
+// the nearest point of the surface projects to colours and votes, as often as pixels fit on the voxel's face:
+// f^2 v^2 cosine / z^2, 1 to 16, so that who saw it well decides.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/thread.glsl"
 #include "lib/tsdf_frame.glsl"
@@ -39,13 +40,12 @@ vec3 pixel_ray(vec3 q)
     return vec3((floor(q.xy / q.z * f.focal + f.center) + 0.5 - f.center) / f.focal, 1);
 }
 
-void vote(uint at, uint label)
+void vote(uint at, uint label, uint count)
 {
     if (label >= kClasses)
         return;
     const uint word = at + label / 2 * 512, shift = label % 2 * 16;
-    if ((votes[word] >> shift & 0xffffu) != 0xffffu)
-        votes[word] += 1u << shift;
+    votes[word] += min(count, 0xffffu - (votes[word] >> shift & 0xffffu)) << shift;
 }
 
 void main()
@@ -74,7 +74,8 @@ void main()
         const float d = (1.0 - dot(n, q)) / scale;
         if (!(d >= -p.band && q.z - 1.0 / along <= 2.0 * p.truncation))
             continue; // too far behind the surface: across it, or along the ray
-        float w = max(along / (scale * length(ray)), 0.1) / (1.0 + 1.0 / along);
+        const float cosine = along / (scale * length(ray)), size = p.voxel * along;
+        float w = max(cosine, 0.1) / (1.0 + 1.0 / along);
         if (d < 0.0)
             w *= 1.0 + 0.9 * d / p.band;
         sums[0] += w * min(d / p.truncation, 1.0);
@@ -91,7 +92,8 @@ void main()
         sums[4] += w * float(plane.w >> 16 & 0xffu);
         sums[5] += w;
         sums[6] += 1.0;
-        vote(block * kVoteWords * 512 + l, plane.w >> 24 & 31);
+        const float pixels = f.focal.x * f.focal.y * size * size * cosine;
+        vote(block * kVoteWords * 512 + l, plane.w >> 24 & 31, uint(clamp(ceil(pixels), 1.0, 16.0)));
     }
     for (uint k = 0; k < kFields; ++k)
         state[(block * kFields + k) * 512 + l] = sums[k];

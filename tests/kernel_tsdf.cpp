@@ -353,8 +353,10 @@ class Integration {
             s.fields[2 + channel] += w * (plane.rgb >> (8 * channel) & 255);
         s.fields[5] += w;
         s.fields[6] += 1;
+        const double size = voxel * along, pixels = c.fx * c.fy * size * size * along / (scale * length(ray));
+        decide(pixels, std::max(std::round(pixels), 1.0), s);
         if (plane.label < 20)
-            ++s.votes[plane.label];
+            s.votes[plane.label] += uint32_t(std::clamp(std::ceil(pixels), 1.0, 16.0));
     }
 
     const Pictures& pictures_;

@@ -28,6 +28,19 @@ std::string label_name(size_t label)
     return label < kClassCount ? std::string(kPalette[label].name) : "none";
 }
 
+// by class of the true surface
+Json classes_of(const SurfaceError& error)
+{
+    Json list = Json::object();
+    for (size_t label = 0; label < kClassCount; ++label)
+        if (const auto count = std::ranges::count(error.classes, uint8_t(label)))
+            list[label_name(label)] = {{"vertices", count},
+                                       {"right", error.confusion[label][label]},
+                                       {"p50", error.percentile(0.5, uint8_t(label))},
+                                       {"p95", error.percentile(0.95, uint8_t(label))}};
+    return list;
+}
+
 // the commonest mistakes: {"truth", "found", "vertices"}, most first
 Json mistakes_of(const SurfaceError& error)
 {
@@ -68,6 +81,11 @@ void print(const SurfaceError& error, const Options& o)
     if (error.labelled)
         fmt::print("labels right: {:.2f} % of {}\n", 100.0 * double(error.right) / double(error.labelled),
                    error.labelled);
+    const Json classes = classes_of(error);
+    for (const auto& [name, c] : classes.items())
+        fmt::print("  {:13} {:8} vertices, 95 % within {:.4f} m, labels right: {:.2f} %\n", name,
+                   c["vertices"].get<uint64_t>(), c["p95"].get<double>(),
+                   100.0 * c["right"].get<double>() / c["vertices"].get<double>());
     for (const Json& m : mistakes_of(error))
         fmt::print("  {} taken for {}: {}\n", m["truth"].get<std::string>(), m["found"].get<std::string>(),
                    m["vertices"].get<uint64_t>());

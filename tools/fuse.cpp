@@ -28,6 +28,7 @@ struct Options {
     std::vector<std::string> exclude;
     FusionFolderOptions input;
     FusionOptions fusion;
+    std::optional<double> max_depth;
     VoxelizeOptions voxels;
 };
 
@@ -221,6 +222,7 @@ Status run_fuse(Options o, const Globals& globals)
     SR_CHECK(resolve(o, globals));
     SR_TRY(FusionFolder folder, FusionFolder::open(o.folder, o.input));
     SR_CHECK(folder.check_labels());
+    o.fusion.max_depth = o.max_depth.value_or(suitable_max_depth(folder.cameras(), o.fusion.voxel));
     SR_TRY(const auto device, open_device(globals));
     FuseProgress progress(globals, *device);
     SR_TRY(const FusedMesh fused, fuse(*device, folder.frames(), o.fusion, std::ref(progress)));
@@ -256,8 +258,6 @@ void add_camera_options(CLI::App& c, FusionFolderOptions& o)
 void add_fusion_options(CLI::App& c, FusionOptions& o)
 {
     c.add_option("--depth-scale", o.depth_scale, "metres of one unit of depth; 0.001")->check(CLI::Range(1e-6, 10.0));
-    c.add_option("--max-depth", o.max_depth, "metres; depths beyond it are not used; 30")
-        ->check(CLI::Range(0.1, 1000.0));
     c.add_option("--tsdf-voxel", o.voxel, "metres, of the distance field; 0.1")->check(CLI::Range(0.005, 10.0));
     c.add_option("--truncation", o.truncation, "voxels, of the distance field; 4")->check(CLI::Range(3.5, 32.0));
     c.add_option("--min-weight", o.min_weight, "of a voxel; a frame adds at most 1 / (1 + depth); 0")
@@ -278,6 +278,8 @@ void add_fuse(CLI::App& app, const Globals& globals, Run& run)
     c->add_option("--poses", o->poses, "a camera path; DIR/transforms.json");
     add_camera_options(*c, o->input);
     add_fusion_options(*c, o->fusion);
+    c->add_option("--max-depth", o->max_depth, "metres; where a pixel is 0.55 voxels wide, 30 at most")
+        ->check(CLI::Range(0.1, 1000.0));
     c->add_option("--map", o->map, "JSON: label number or name to class, or null for pixels to leave out");
     c->add_option("--exclude", o->exclude, "classes whose pixels are left out, such as car,person; sky always is")
         ->delimiter(',');

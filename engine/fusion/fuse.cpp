@@ -38,6 +38,14 @@ void add_materials(Mesh& mesh)
 
 } // namespace
 
+double suitable_max_depth(const std::vector<CameraFrame>& cameras, double voxel)
+{
+    double depth = 30;
+    for (const CameraFrame& camera : cameras)
+        depth = std::min(depth, 0.55 * voxel * std::min(camera.intrinsics.fx, camera.intrinsics.fy));
+    return depth;
+}
+
 Result<FusedMesh> fuse(Device& device, const DepthFrames& frames, const FusionOptions& options,
                        const FusionProgress& progress)
 {

@@ -201,16 +201,29 @@ bool seen_at(const DepthImages& images, const Intrinsics& k, const Projection& a
     return at.depth >= low - slack && at.depth <= high + slack;
 }
 
+double percentile_of(std::vector<float> values, double share)
+{
+    if (values.empty())
+        return 0;
+    const auto at = values.begin() + std::ptrdiff_t(double(values.size() - 1) * share);
+    std::nth_element(values.begin(), at, values.end());
+    return *at;
+}
+
 } // namespace
 
 double SurfaceError::percentile(double share) const
 {
-    std::vector<float> sorted = distances;
-    if (sorted.empty())
-        return 0;
-    const auto at = sorted.begin() + std::ptrdiff_t(double(sorted.size() - 1) * share);
-    std::nth_element(sorted.begin(), at, sorted.end());
-    return *at;
+    return percentile_of(distances, share);
+}
+
+double SurfaceError::percentile(double share, uint8_t label) const
+{
+    std::vector<float> of_class;
+    for (size_t i = 0; i < distances.size(); ++i)
+        if (classes[i] == label)
+            of_class.push_back(distances[i]);
+    return percentile_of(std::move(of_class), share);
 }
 
 Result<std::vector<uint32_t>> count_views(const Mesh& mesh, const DepthFrames& frames, const ViewOptions& options)
@@ -254,9 +267,11 @@ Result<SurfaceError> measure_surface(Device& device, const Mesh& mesh, const Mes
     for (size_t i = 0; i < nearest.size(); ++i) {
         error.distances.push_back(nearest[i].distance);
         error.beyond += nearest[i].face == ~0u;
-        if (nearest[i].face == ~0u || truth.face_labels.empty() || truth.face_labels[nearest[i].face] == kNoLabel)
+        const bool known = nearest[i].face != ~0u && !truth.face_labels.empty();
+        const uint8_t expected = known ? truth.face_labels[nearest[i].face] : kNoLabel, found = labels[vertices[i]];
+        error.classes.push_back(expected);
+        if (expected == kNoLabel)
             continue;
-        const uint8_t expected = truth.face_labels[nearest[i].face], found = labels[vertices[i]];
         ++error.labelled;
         error.right += expected == found;
         ++error.confusion[expected][found];

@@ -17,13 +17,15 @@ Result<std::vector<uint32_t>> count_views(const Mesh& mesh, const DepthFrames& f
 
 struct SurfaceError {
     std::vector<float> distances; // [vertices that are measured] metres to the nearest true face, or the radius
+    std::vector<uint8_t> classes; // of these nearest faces, kNoLabel for none
     size_t vertices = 0;          // of the mesh
     size_t beyond = 0;            // with no true face within the radius
     size_t labelled = 0;          // measured ones whose nearest true face has a label
     size_t right = 0;             // of these, with the same label
     std::array<std::array<uint64_t, 256>, 256> confusion{}; // [true label][label]
 
-    double percentile(double share) const; // of the distances
+    double percentile(double share) const;                // of the distances
+    double percentile(double share, uint8_t label) const; // where the true face has this class
 };
 
 // Distances from the vertices of a mesh that `views` says at least `min_views` frames saw (empty: all) to the surface

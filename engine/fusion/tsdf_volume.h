@@ -6,10 +6,11 @@
 
 namespace semrover {
 
-// The truncated signed distance of depth images, in sparse blocks of 8^3 voxels in device memory. Every frame that
-// sees a voxel in front of its surface counts as evidence for free space (in blocks that exist), at most one truncation
-// of it; behind the surface evidence ends after one truncation. The result depends neither on how blocks are divided
-// into chunks nor on how frames are divided into batches.
+// The truncated signed distance of depth images, in sparse blocks of 8^3 voxels in device memory. Distances are taken
+// to the plane through a pixel. A voxel in front of the surface counts as free space however far in front it lies (in
+// blocks that exist), with the distance cut at one truncation; behind the surface evidence ends after half a
+// truncation, and after two truncations along the ray. The result depends neither on how blocks are divided into chunks
+// nor on how frames are divided into batches.
 class TsdfVolume {
   public:
     // Errors: bad_input for cameras more than 10 km apart or 1000 km from the origin, or when no pixel saw anything;
