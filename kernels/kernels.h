@@ -576,6 +576,7 @@ struct MarchingCubesField {
     uint32_t blocks_x = 1, blocks_y = 1, blocks_z = 1; // of the box
     Tensor bitmap, ranks, blocks, distances, attributes;
     uint32_t min_views = 0; // cells whose corners were all seen by fewer frames make no surface
+    float max_jump = 4;     // nor do cells whose corners' distances, in truncations, are further apart
 };
 struct MarchingCubesCounts {
     Tensor cases;                    // [B * 512] u32

@@ -24,6 +24,7 @@ MarchingCubesPush make_push(const MarchingCubesField& f, uint32_t rows, const Ma
             .blocks_y = f.blocks_y,
             .blocks_z = f.blocks_z,
             .min_views = f.min_views,
+            .max_jump = f.max_jump,
             .first_row = range.first,
             .first_vertex = range.first_vertex,
             .first_face = range.first_face};

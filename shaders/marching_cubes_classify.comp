@@ -2,7 +2,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // cases[i] = signs of the eight corners of the cell above voxel i (bit: inside), bit 8 where the cell makes surface:
-// all corners observed, signs mixed, one corner seen by enough frames
+// all corners observed, signs mixed, one corner seen by enough frames, distances no further apart than a surface that
+// was seen can make them
 #extension GL_GOOGLE_include_directive : require
 #include "lib/thread.glsl"
 #include "marching_cubes.h"
@@ -25,6 +26,7 @@ void main()
         return;
     const uvec3 box = uvec3(p.blocks_x, p.blocks_y, p.blocks_z);
     const ivec3 voxel = 8 * ivec3(block_at(blocks[i / 512], box)) + local_at(i % 512);
+    float least = 2.0, most = -2.0;
     uint signs = 0, views = 0;
     bool observed = true;
     for (uint c = 0; c < 8 && observed; ++c) {
@@ -33,8 +35,10 @@ void main()
         observed = d <= 1.5;
         if (observed)
             views = max(views, attributes[at] >> 29);
+        least = min(least, d);
+        most = max(most, d);
         signs |= uint(d < 0.0) << c;
     }
-    const bool surface = observed && signs != 0 && signs != 255 && views >= p.min_views;
+    const bool surface = observed && signs != 0 && signs != 255 && views >= p.min_views && most - least <= p.max_jump;
     cases[i] = surface ? signs | 256 : 0;
 }

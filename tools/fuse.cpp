@@ -163,6 +163,7 @@ Json settings_of(const Options& o)
             {"truncation", o.fusion.truncation},
             {"max_depth", o.fusion.max_depth},
             {"depth_scale", o.fusion.depth_scale},
+            {"max_jump", o.fusion.max_jump},
             {"min_weight", o.fusion.min_weight},
             {"min_views", o.fusion.min_views},
             {"excluded", excluded},
@@ -260,6 +261,9 @@ void add_fusion_options(CLI::App& c, FusionOptions& o)
     c.add_option("--depth-scale", o.depth_scale, "metres of one unit of depth; 0.001")->check(CLI::Range(1e-6, 10.0));
     c.add_option("--tsdf-voxel", o.voxel, "metres, of the distance field; 0.1")->check(CLI::Range(0.005, 10.0));
     c.add_option("--truncation", o.truncation, "voxels, of the distance field; 4")->check(CLI::Range(3.5, 32.0));
+    c.add_option("--max-jump", o.max_jump,
+                 "voxels between distances in a cell: more is the edge of a shadow, not a surface; 3.2 (16: keep all)")
+        ->check(CLI::Range(1.8, 1000.0));
     c.add_option("--min-weight", o.min_weight, "of a voxel; a frame adds at most 1 / (1 + depth); 0")
         ->check(CLI::Range(0.0, 1e6));
     c.add_option("--min-views", o.min_views, "frames that must have seen a piece of surface; 2")

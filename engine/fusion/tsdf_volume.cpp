@@ -302,7 +302,8 @@ MarchingCubesField TsdfVolume::in(Graph& g) const
             .blocks = g.external(field_->slice(kBlocks), blocks, 1, DType::u32, "blocks", 1),
             .distances = g.external(field_->slice(kDistances), voxels, 1, DType::f32, "distances", 1),
             .attributes = g.external(field_->slice(kAttributes), voxels, 1, DType::u32, "attributes", 1),
-            .min_views = options_.min_views};
+            .min_views = options_.min_views,
+            .max_jump = float(options_.max_jump / options_.truncation)};
 }
 
 Result<std::vector<float>> TsdfVolume::read_distances() const
