@@ -150,16 +150,19 @@ void add_building(MeshBuilder& m, const FacadeStyle& s, const BuildingPlot& p, u
     const double w = p.width, d = p.depth, top = s.height();
     add_facade(m, s, f, w, true, r);
     m.box(s.base, f, {0, -0.05, -p.below}, {w, 0, 0.35}, MeshBuilder::kRight | MeshBuilder::kTop | 3); // plinth
-    const auto side = [&](const Frame& wall, double width, bool open) {
+    const auto side = [&](const Frame& wall, double width, bool open, double hidden) {
+        const double z = std::clamp(hidden, 0.0, top);
         if (open)
             add_facade(m, s, wall, width, false, r);
         else
-            m.quad(s.wall, wall.at(0, 0, 0), wall.at(width, 0, 0), wall.at(width, 0, top), wall.at(0, 0, top));
-        m.quad(s.base, wall.at(0, 0, -p.below), wall.at(width, 0, -p.below), wall.at(width, 0, 0), wall.at(0, 0, 0));
+            m.quad(s.wall, wall.at(0, 0, z), wall.at(width, 0, z), wall.at(width, 0, top), wall.at(0, 0, top));
+        if (z == 0)
+            m.quad(s.base, wall.at(0, 0, -p.below), wall.at(width, 0, -p.below), wall.at(width, 0, 0),
+                   wall.at(0, 0, 0));
     };
-    side({f.at(w, 0, 0), f.y, f.x * -1, f.z}, d, p.open_right);
-    side({f.at(0, d, 0), f.y * -1, f.x, f.z}, d, p.open_left);
-    side({f.at(w, d, 0), f.x * -1, f.y * -1, f.z}, w, false);
+    side({f.at(w, 0, 0), f.y, f.x * -1, f.z}, d, p.open_right, p.hidden_right);
+    side({f.at(0, d, 0), f.y * -1, f.x, f.z}, d, p.open_left, p.hidden_left);
+    side({f.at(w, d, 0), f.x * -1, f.y * -1, f.z}, w, false, 0);
     const Finish pipe = m.finish(Pattern::metal, label::kBuilding, {0.5, 0.51, 0.5});
     m.tube(pipe, f.at(0.12, -0.1, 0), 0.05, f.at(0.12, -0.1, top - 0.4), 0.05, 6, 0);
     Roof(m, s, p, r).add();

@@ -13,6 +13,7 @@ struct BuildingPlot {
     double width = 10, depth = 11;
     double below = 0.3;                         // how far walls go down under the origin, where the street slopes
     bool open_left = false, open_right = false; // sides that streets or gardens see
+    double hidden_left = 0, hidden_right = 0;   // how high a neighbour's house covers the other sides; there is no wall
 };
 
 // walls and roof; the style's walls may be its own (random_style)

@@ -62,6 +62,7 @@ class Plots {
         const double first = before && before->opens(side) ? b.first : before ? before->middle : b.first;
         double last = next && !next->opens(side) ? next->middle : b.last;
         last = std::min(last, road_.length());
+        std::vector<Lot> lots;
         double s = first;
         KeyedRandom r(site_.seed, {kPlot, b.index, uint64_t(side > 0)});
         for (uint64_t i = 0; s < last - 0.5; ++i) {
@@ -75,15 +76,48 @@ class Plots {
             const bool opens_before = i == 0 && before && before->opens(side);
             const bool opens_after = s + wide > last - 0.1 && next && next->opens(side);
             const bool corner = opens_before || opens_after;
-            const uint64_t key = key_of(kPlot, b.index, side, i);
-            if (kind < 0.84 || corner || wide < 6)
-                house(s, s + wide, side, key, district_of(b.index), i == 0 || open_, true);
-            else
-                garden(s, s + wide, side, key, district_of(b.index));
-            open_ = !(kind < 0.84 || corner || wide < 6);
+            Lot lot{s, s + wide, key_of(kPlot, b.index, side, i), kind < 0.84 || corner || wide < 6};
+            lot.open_first = opens_before || (i == 0 && !before);
+            lot.open_last = opens_after;
+            lots.push_back(lot);
             s += wide;
         }
-        open_ = true;
+        build(lots, side, district_of(b.index));
+    }
+
+    struct Lot {
+        double first, last; // along the street
+        uint64_t key;
+        bool house, open_first = false, open_last = false;
+        FacadeStyle style;
+        double top = 0; // of the house, in the world
+    };
+
+    // houses side by side have no walls between them as high as both are
+    void build(std::vector<Lot>& lots, int side, uint32_t district)
+    {
+        for (Lot& lot : lots)
+            if (lot.house) {
+                KeyedRandom r(site_.seed, {kStyle, lot.key});
+                lot.style = random_style(m_, r, district);
+                lot.top = plot_between(lot.first, lot.last, side, 0).frame.origin.z + lot.style.height();
+            }
+        for (size_t i = 0; i < lots.size(); ++i) {
+            const Lot& lot = lots[i];
+            if (!lot.house) {
+                garden(lot.first, lot.last, side, lot.key, district);
+                continue;
+            }
+            BuildingPlot p = plot_between(lot.first, lot.last, side, 0);
+            const double before = i && lots[i - 1].house ? lots[i - 1].top - p.frame.origin.z : 0;
+            const double after = i + 1 < lots.size() && lots[i + 1].house ? lots[i + 1].top - p.frame.origin.z : 0;
+            (side > 0 ? p.hidden_left : p.hidden_right) = before;
+            (side > 0 ? p.hidden_right : p.hidden_left) = after;
+            (side > 0 ? p.open_left : p.open_right) = lot.open_first;
+            (side > 0 ? p.open_right : p.open_left) = lot.open_last;
+            add_building(m_, lot.style, p, site_.seed, lot.key);
+            ++site_.objects["building"];
+        }
     }
 
     // seen from the street, the left corner of the front: the farther one on the right side
@@ -101,17 +135,6 @@ class Plots {
         p.depth = kDepth;
         p.below = high - low + 0.15;
         return p;
-    }
-
-    void house(double s0, double s1, int side, uint64_t key, uint32_t district, bool open_first, bool open_last)
-    {
-        BuildingPlot p = plot_between(s0, s1, side, 0);
-        (side > 0 ? p.open_left : p.open_right) = open_first;
-        (side > 0 ? p.open_right : p.open_left) = open_last;
-        KeyedRandom r(site_.seed, {kStyle, key});
-        const FacadeStyle style = random_style(m_, r, district);
-        add_building(m_, style, p, site_.seed, key);
-        ++site_.objects["building"];
     }
 
     void ground(double s0, double s1, int side, double from, double to, Finish f)
@@ -259,7 +282,6 @@ class Plots {
     const RoadNetwork& road_;
     CrossSection c_;
     Finish lawn_;
-    bool open_ = true; // the neighbour to the left is no house
 };
 
 } // namespace
