@@ -156,16 +156,16 @@ Result<double> mean_to_surface(Device& device, const std::vector<Row>& points, s
     return sum / double(points.size());
 }
 
-// lowers `best` to the distances of samples from the nearest of some points
+// lowers `best` to the distances of samples from the nearest of some points within `radius`; 0: however far
 Status nearest_points(Device& device, std::span<const Row> samples, std::span<const Row> batch, float cell_size,
-                      std::span<double> best)
+                      float radius, std::span<double> best)
 {
     SR_TRY(const auto points, upload(device, batch, "points"));
     SR_TRY(const auto queries, upload(device, samples, "samples"));
     SR_TRY(const auto results, Buffer::create(device, samples.size() * 4, MemoryKind::device, "nearest"));
     const auto rows = uint32_t(samples.size());
     Graph g;
-    KnnOptions options{.neighbors = 1, .cell_size = cell_size};
+    KnnOptions options{.neighbors = 1, .cell_size = cell_size, .radius = radius};
     options.queries = g.external(queries->slice(), rows, 4, DType::f32, "samples", 4);
     const Tensor nearest =
         knn(g, g.external(points->slice(), uint32_t(batch.size()), 4, DType::f32, "points", 4), options);
@@ -175,10 +175,41 @@ Status nearest_points(Device& device, std::span<const Row> samples, std::span<co
     std::vector<uint32_t> index(rows);
     SR_CHECK(device.read(results->slice(), std::as_writable_bytes(std::span(index))));
     for (size_t i = 0; i < rows; ++i) {
+        if (index[i] >= batch.size())
+            continue;
         const Row &a = samples[i], &b = batch[index[i]];
         best[i] = std::min(best[i], std::hypot(double(a[0]) - b[0], double(a[1]) - b[1], double(a[2]) - b[2]));
     }
     return {};
+}
+
+Result<double> mean_to_points(Device& device, const std::vector<Row>& samples, const std::vector<Row>& points,
+                              float voxel_size)
+{
+    constexpr double kFar = std::numeric_limits<double>::infinity();
+    std::vector<double> best(samples.size(), kFar);
+    const auto search = [&](std::span<const Row> queries, std::span<double> found, float radius) -> Status {
+        for (size_t q = 0; q < queries.size(); q += kBatch)
+            for (size_t p = 0; p < points.size(); p += kBatch) {
+                const size_t count = std::min(kBatch, queries.size() - q);
+                SR_CHECK(nearest_points(device, queries.subspan(q, count),
+                                        std::span(points).subspan(p, std::min(kBatch, points.size() - p)),
+                                        voxel_size / 2, radius, found.subspan(q, count)));
+            }
+        return {};
+    };
+    // within a radius the search ends after a few cells; the few samples that have no point there see all points
+    SR_CHECK(search(samples, best, 1.5f * voxel_size));
+    std::vector<Row> lonely;
+    for (size_t i = 0; i < samples.size(); ++i)
+        if (best[i] == kFar)
+            lonely.push_back(samples[i]);
+    std::vector<double> far(lonely.size(), kFar);
+    SR_CHECK(search(lonely, far, 0));
+    double sum = 0;
+    for (size_t i = 0, next = 0; i < best.size(); ++i)
+        sum += best[i] == kFar ? far[next++] : best[i];
+    return sum / double(best.size());
 }
 
 } // namespace
@@ -197,17 +228,7 @@ Result<Chamfer> chamfer(Device& device, const Mesh& mesh, const VoxelGrid& grid,
     SR_TRY(const std::vector<Row> samples, surface_samples(mesh, origin, options));
     Chamfer result;
     SR_TRY(result.to_surface, mean_to_surface(device, points, triangles_from(mesh, origin)));
-    std::vector<double> best(samples.size(), std::numeric_limits<double>::infinity());
-    const float cell_size = grid.voxel_size / 2;
-    for (size_t s = 0; s < samples.size(); s += kBatch)
-        for (size_t p = 0; p < points.size(); p += kBatch) {
-            const size_t count = std::min(kBatch, samples.size() - s);
-            SR_CHECK(nearest_points(device, std::span(samples).subspan(s, count),
-                                    std::span(points).subspan(p, std::min(kBatch, points.size() - p)), cell_size,
-                                    std::span(best).subspan(s, count)));
-        }
-    for (const double d : best)
-        result.to_points += d / double(best.size());
+    SR_TRY(result.to_points, mean_to_points(device, samples, points, grid.voxel_size));
     return result;
 }
 

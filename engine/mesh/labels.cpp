@@ -180,7 +180,7 @@ std::string unlabelled_text(std::span<const UnlabelledFaces> list)
     std::string text;
     for (const UnlabelledFaces& e : list.first(std::min<size_t>(list.size(), 10)))
         text += fmt::format("{}{} ({} faces, {:.4g} m^2)", text.empty() ? "" : ", ",
-                            e.name.empty() ? "without a material's name" : quote(e.name, 60), e.faces, e.area);
+                            e.name.empty() ? "faces without a named material" : quote(e.name, 60), e.faces, e.area);
     if (list.size() > 10)
         text += fmt::format(" and {} more", list.size() - 10);
     return text;

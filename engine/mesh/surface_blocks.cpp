@@ -99,20 +99,30 @@ SurfaceBlocks::Corners SurfaceBlocks::corners_of(uint32_t face) const
     return corners;
 }
 
-// a number that stands for all that the face is, but not for its place in the file
+// a number that stands for where the face is, but not for its place in the file
 uint64_t SurfaceBlocks::order_of(uint32_t face) const
 {
     const uint32_t rotation = rotation_of(face);
+    uint64_t h = 0;
+    for (uint32_t i = 0; i < 3; ++i)
+        for (const float x : mesh_->positions[mesh_->faces[face][(i + rotation) % 3]])
+            h = mixed(h, std::bit_cast<uint32_t>(x));
+    return h;
+}
+
+// and one for what else it is, which only faces in the same place need
+uint64_t SurfaceBlocks::looks_of(uint32_t item) const
+{
+    const uint32_t face = item < mesh_->faces.size() ? item : pieces_[item - mesh_->faces.size()].face;
+    const uint32_t rotation = rotation_of(face);
     uint64_t h = mixed(labels_[face], mesh_->face_materials.empty() ? 0 : mesh_->face_materials[face]);
     for (uint32_t i = 0; i < 3; ++i) {
-        const uint32_t corner = (i + rotation) % 3, v = mesh_->faces[face][corner];
-        for (const float x : mesh_->positions[v])
-            h = mixed(h, std::bit_cast<uint32_t>(x));
+        const uint32_t corner = (i + rotation) % 3;
         if (!mesh_->uvs.empty())
             for (const float x : mesh_->uvs[face][corner])
                 h = mixed(h, std::bit_cast<uint32_t>(x));
         if (!mesh_->colors.empty())
-            for (const uint8_t x : mesh_->colors[v])
+            for (const uint8_t x : mesh_->colors[mesh_->faces[face][corner]])
                 h = mixed(h, x);
     }
     return h;
@@ -209,7 +219,12 @@ Result<SurfaceBlocks> SurfaceBlocks::create(const Mesh& mesh, std::span<const ui
     SR_CHECK(blocks.check_extent(where));
     for (uint32_t f = 0; f < mesh.faces.size(); ++f)
         blocks.add_face(f);
-    std::ranges::sort(blocks.instances_, {}, [](const Instance& i) { return std::tuple(i.block, i.order, i.item); });
+    std::ranges::sort(blocks.instances_, [&](const Instance& a, const Instance& b) {
+        if (a.block != b.block || a.order != b.order)
+            return std::tie(a.block, a.order) < std::tie(b.block, b.order);
+        const uint64_t looks_a = blocks.looks_of(a.item), looks_b = blocks.looks_of(b.item);
+        return looks_a != looks_b ? looks_a < looks_b : a.item < b.item;
+    });
     return blocks;
 }
 

@@ -76,6 +76,7 @@ class SurfaceBlocks {
     Corners corners_of(uint32_t face) const;
     uint32_t rotation_of(uint32_t face) const;
     uint64_t order_of(uint32_t face) const;
+    uint64_t looks_of(uint32_t item) const;
     Status check_extent(std::string_view where);
     void add_face(uint32_t face);
     void split(const Corners& whole, const Piece& piece, uint64_t order);
