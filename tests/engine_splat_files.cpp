@@ -57,7 +57,7 @@ void expect_near(const Surfels& a, const Surfels& b, const Tolerance& t, bool la
         EXPECT_NEAR(a.sigma_u[i] / b.sigma_u[i], 1, t.sigma);
         EXPECT_NEAR(a.sigma_v[i] / b.sigma_v[i], 1, t.sigma);
         EXPECT_NEAR(a.opacity[i], b.opacity[i], t.opacity);
-        EXPECT_EQ(a.label[i], labels ? b.label[i] : kUnlabelled);
+        EXPECT_EQ(a.label[i], labels ? b.label[i] : kNoLabel);
     }
 }
 
@@ -134,7 +134,7 @@ TEST(SplatPly, properties_in_any_order_mean_what_the_first_program_wrote)
     EXPECT_EQ(s.opacity[0], 0.5f);
     EXPECT_NEAR(s.color[0][0], 0.5 - 0.28209479, 1e-6);
     EXPECT_EQ(s.color[0][1], 0.5f);
-    EXPECT_EQ(s.label[0], kUnlabelled);
+    EXPECT_EQ(s.label[0], kNoLabel);
     EXPECT_TRUE(file->warnings.empty());
 }
 
@@ -351,7 +351,7 @@ TEST(GltfSplats, a_file_by_hand_means_what_the_extension_says)
     EXPECT_NEAR(s.sigma_v[0], 0.2, 1e-6);
     EXPECT_NEAR(s.opacity[0], 128 / 255.0, 1e-6);
     EXPECT_NEAR(s.color[0][1], 0.5 + 0.28209479, 1e-6);
-    EXPECT_EQ(s.label[0], kUnlabelled);
+    EXPECT_EQ(s.label[0], kNoLabel);
     // without harmonics the fallback colour, which is linear: 0, 1, and 0 for what is below
     Json json = hand_made();
     Json& attributes = json["meshes"][0]["primitives"][0]["attributes"];
@@ -378,7 +378,7 @@ TEST(GltfSplats, splats_come_back)
     EXPECT_EQ(json["accessors"][0]["max"][1], std::ranges::max(s.position, {}, [](auto& p) { return p[2]; })[2]);
     EXPECT_EQ(json["meshes"][0]["primitives"][0]["extensions"]["KHR_gaussian_splatting"]["kernel"], "ellipse");
     EXPECT_EQ(json["buffers"][0]["byteLength"], 200 * 4 * (3 + 4 + 4 + 3 + 1 + 3 + 1));
-    std::ranges::fill(s.label, kUnlabelled);
+    std::ranges::fill(s.label, kNoLabel);
     ASSERT_TRUE(write_splats_glb(folder / "s.glb", s));
     EXPECT_EQ(contents(folder / "s.glb").find("_LABEL"), std::string::npos);
 }

@@ -301,7 +301,7 @@ Report describe_splats(const Path& path, const SceneInput& input)
     const Surfels& s = *input.splats;
     const Bounds bounds = bounds_of(s);
     Report report = {{"splats", path.string()}, {"count", s.position.size()}};
-    report["labelled"] = s.label.size() - static_cast<size_t>(std::ranges::count(s.label, kUnlabelled));
+    report["labelled"] = s.label.size() - static_cast<size_t>(std::ranges::count(s.label, kNoLabel));
     report["extent"] = {{"min_m", metres(bounds.low)}, {"max_m", metres(bounds.high)}};
     add_input(report, input);
     return report;

@@ -13,7 +13,7 @@ namespace semrover {
 namespace {
 
 constexpr uint64_t kRangeBytes = 128u << 20; // of vertices and of faces that are read at a time
-constexpr uint32_t kUnlabelled = 31;         // in attributes
+constexpr uint32_t kNoVote = 31;         // in attributes
 
 enum Part : uint32_t { kTable, kCases, kEdges, kFirstVertex, kFirstFace, kVertices, kFaces };
 
@@ -146,7 +146,7 @@ void Extraction::append(uint32_t first, uint32_t last, std::span<const std::arra
                 p[axis] = float((double(box.low[axis]) + 8.0 * block[axis] + double(row[axis]) + 0.5) * box.voxel);
             const uint32_t a = std::bit_cast<uint32_t>(row[3]), label = a >> 24 & 31;
             surface.colors.push_back({uint8_t(a), uint8_t(a >> 8), uint8_t(a >> 16)});
-            surface.labels.push_back(label == kUnlabelled ? kNoLabel : uint8_t(label));
+            surface.labels.push_back(label == kNoVote ? kNoLabel : uint8_t(label));
             surface.views.push_back(uint8_t(a >> 29));
         }
     }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "engine/scene/image.h"
+#include "engine/scene/palette.h"
 
 #include <array>
 #include <cstdint>
@@ -10,8 +11,6 @@
 #include <vector>
 
 namespace semrover {
-
-constexpr uint8_t kNoLabel = 255; // of a face whose class nobody has said
 
 enum class TextureWrap : uint8_t { repeat, mirror, clamp };
 

@@ -248,7 +248,7 @@ AttributeWriter attributes_of(const Surfels& s)
     w.add(prefix + "SCALE", "VEC3", scales, n);
     w.add(prefix + "OPACITY", "SCALAR", opacities, n);
     w.add(prefix + "SH_DEGREE_0_COEF_0", "VEC3", harmonics, n);
-    if (std::ranges::any_of(s.label, [](uint8_t label) { return label != kUnlabelled; }))
+    if (std::ranges::any_of(s.label, [](uint8_t label) { return label != kNoLabel; }))
         w.add("_LABEL", "SCALAR", labels, n);
     return w;
 }

@@ -15,6 +15,7 @@ struct SemanticClass {
 };
 
 constexpr size_t kClassCount = 20;
+constexpr uint8_t kNoLabel = 255; // of what nobody has said the class of
 
 // the labels of a grid, by number: Cityscapes' train ids and colours (0-18), and lane markings
 constexpr std::array<SemanticClass, kClassCount> kPalette = {{

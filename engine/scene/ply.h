@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/scene/palette.h"
 #include "runtime/file.h"
 #include "runtime/result.h"
 
@@ -50,7 +51,6 @@ Status check_splats(const Path& path, const Surfels& surfels);
 enum class SplatPly { gaussian_3d, gaussian_2d, inria_62 };
 constexpr float kHarmonic0 = 0.28209479177387814f; // sqrt(1 / (4 pi))
 constexpr float kThinScale = 1e-4f;                // metres: what a surfel's third scale is in formats that want one
-constexpr uint8_t kUnlabelled = 255;               // of a surfel whose class nobody has said
 // `labels`: a last property, uchar label, which rigid readers do not expect
 Status write_splats_ply(const Path& path, const Surfels& surfels, SplatPly variant, bool labels = false);
 

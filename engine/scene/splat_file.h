@@ -24,7 +24,7 @@ struct Ellipsoid {
     std::array<double, 4> rotation{}; // x, y, z, w: from its axes to the world's; of any length but 0
     std::array<double, 3> color{};    // sRGB, 0..1
     double opacity = 0;               // 0..1
-    uint8_t label = kUnlabelled;
+    uint8_t label = kNoLabel;
 };
 
 // Makes surfels of ellipsoids: the axis of the smallest scale (of equal ones the last) is the normal. The tangents of a
