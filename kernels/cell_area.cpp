@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // areas and labels of cells from those of their pairs, one thread per cell, in the order of the pairs
-#include "kernels/kernels.h"
+#include "kernels/meshes.h"
 
 #include "cell_area.spv.h"
 #include "shaders/cell_area.h"

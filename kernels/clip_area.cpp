@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // area of triangles within cells, and where the texels that say their labels are
-#include "kernels/kernels.h"
+#include "kernels/meshes.h"
 
 #include "clip_area.spv.h"
 #include "shaders/clip_area.h"

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // the surface distance = 0 in sparse blocks: cases of cells, vertices of edges, their numbers by prefix sums
-#include "kernels/kernels.h"
+#include "kernels/fusion.h"
 
 #include "marching_cubes_classify.spv.h"
 #include "marching_cubes_count.spv.h"

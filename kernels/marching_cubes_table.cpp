@@ -5,7 +5,7 @@
 // where it ends. Both cells of a face see the same segments, so there are no cracks. Segments chain to loops of 3 to 7
 // edges; a loop is cut into triangles without a diagonal in a face of the cube, where the neighbour might have the
 // same.
-#include "kernels/kernels.h"
+#include "kernels/fusion.h"
 
 #include <array>
 #include <optional>

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // the nearest triangle of every point, exact, through a grid of cells with the triangles that reach into them
-#include "kernels/kernels.h"
+#include "kernels/fusion.h"
 
 #include "nearest_face.spv.h"
 #include "shaders/nearest_face.h"

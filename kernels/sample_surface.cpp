@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // points drawn uniformly from the surface in cells: the point first, its texels from whichever page holds them, then
 // the colour
-#include "kernels/kernels.h"
+#include "kernels/meshes.h"
 
 #include "gather_texels.spv.h"
 #include "sample_surface.spv.h"

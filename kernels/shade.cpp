@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // pictures of a textured scene in daylight, by rays: scene, view [8, 4] -> light, ambient, surfaces [pixels, 4] ->
 // picture [pixels, 4]
-#include "kernels/kernels.h"
+#include "kernels/tracing.h"
 
 #include "shade.spv.h"
 #include "shade_resolve.spv.h"

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // the distance of points from the nearest triangle, exact, through a tree of boxes
-#include "kernels/kernels.h"
+#include "kernels/meshes.h"
 
 #include "shaders/surface_distance.h"
 #include "surface_distance.spv.h"

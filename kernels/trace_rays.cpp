@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // the nearest triangle along each ray, by descent of a tree of boxes: rays [R, 8] -> hits [R, 4]
-#include "kernels/kernels.h"
+#include "kernels/tracing.h"
 
 #include "shaders/trace_rays.h"
 #include "trace_rays.spv.h"

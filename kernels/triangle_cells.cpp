@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // the cells that triangles may have area in: counted per triangle, then written where the prefix sum of counts says
-#include "kernels/kernels.h"
+#include "kernels/meshes.h"
 
 #include "shaders/triangle_cells.h"
 #include "triangle_cells_count.spv.h"

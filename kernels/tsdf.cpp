@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // truncated signed distance of depth images in sparse blocks of 8^3 voxels: planes through pixels, blocks they touch,
 // D = sum of w min(d / t, 1), W = sum of w, d = (1 - N p) / |N|, in order of frames, one thread a voxel
-#include "kernels/kernels.h"
+#include "kernels/fusion.h"
 
 #include "shaders/tsdf.h"
 #include "tsdf_count.spv.h"

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/fusion/surface_error.h"
+#include "kernels/fusion.h"
 #include "tests/kernel_case.h"
 #include "tests/says.h"
 

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/trace/trace_scene.h"
+#include "kernels/tracing.h"
 #include "tests/kernel_case.h"
 
 #include <bit>

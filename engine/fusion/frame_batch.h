@@ -4,6 +4,7 @@
 
 #include "engine/fusion/depth_frames.h"
 #include "engine/fusion/fusion_options.h"
+#include "kernels/fusion.h"
 #include "kernels/kernels.h"
 #include "runtime/device.h"
 

@@ -112,15 +112,6 @@ Status apply_options(const FusionFolderOptions& o, Intrinsics& k)
     return check_intrinsics(k, "--fx, --fy, --cx, --cy");
 }
 
-// fusion projects straight lines; intrinsics may come to name a lens
-template <typename K>
-bool is_pinhole(const K& k)
-{
-    if constexpr (requires { k.model; })
-        return k.model == decltype(k.model)();
-    return true;
-}
-
 // the size of the first depth picture that there is
 Result<ImageSize> first_depth_size(const Path& folder)
 {
@@ -184,7 +175,7 @@ Status FusionFolder::read_poses(const Path& poses, const FusionFolderOptions& o)
     cameras_ = std::move(path.frames);
     for (size_t i = 0; i < cameras_.size(); ++i) {
         SR_CHECK(apply_options(o, cameras_[i].intrinsics));
-        if (!is_pinhole(cameras_[i].intrinsics))
+        if (cameras_[i].intrinsics.model != CameraModel::pinhole)
             return fail(ErrorCode::bad_input,
                         "{}: {} has a lens with distortion, expected a pinhole: undistort its "
                         "pictures first",

@@ -13,7 +13,7 @@ namespace semrover {
 namespace {
 
 constexpr uint64_t kRangeBytes = 128u << 20; // of vertices and of faces that are read at a time
-constexpr uint32_t kNoVote = 31;         // in attributes
+constexpr uint32_t kNoVote = 31;             // in attributes
 
 enum Part : uint32_t { kTable, kCases, kEdges, kFirstVertex, kFirstFace, kVertices, kFaces };
 

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/fusion/surface_error.h"
 
+#include "kernels/fusion.h"
 #include "kernels/kernels.h"
 #include "runtime/program.h"
 

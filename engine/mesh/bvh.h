@@ -12,7 +12,8 @@ namespace semrover {
 // A binary tree of boxes over triangles, flat for the GPU. A node holds the boxes of its two children:
 //   left low xyz, left reference; left high xyz, right reference; right low xyz, 0; right high xyz, 0
 // A reference is the number of an inner node, or kBvhLeaf | count << 28 | first, of triangles in `order`; a leaf
-// without triangles may be entered and holds nothing. Node 0 is the root and always there. No path is longer than kBvhDepth.
+// without triangles may be entered and holds nothing. Node 0 is the root and always there. No path is longer than
+// kBvhDepth.
 struct Bvh {
     std::vector<std::array<uint32_t, 16>> nodes; // floats as bits, and references
     std::vector<uint32_t> order;                 // [T] triangles by leaf

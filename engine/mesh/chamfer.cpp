@@ -4,6 +4,7 @@
 
 #include "engine/mesh/triangle_tree.h"
 #include "kernels/kernels.h"
+#include "kernels/meshes.h"
 #include "runtime/program.h"
 
 #include <algorithm>

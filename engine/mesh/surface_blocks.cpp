@@ -4,6 +4,7 @@
 
 #include "engine/mesh/srgb.h"
 #include "kernels/kernels.h"
+#include "kernels/meshes.h"
 
 #include <algorithm>
 #include <bit>

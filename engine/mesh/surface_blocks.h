@@ -14,7 +14,7 @@ namespace semrover {
 // A mesh's triangles by the blocks of 8^3 cells that they touch, in portions that fit a device. What a cell gets, and
 // in which order, depends on neither the order of the mesh's faces nor the size of the portions.
 
-// the words of kernels.h, SurfaceTriangles
+// the words of kernels/meshes.h, SurfaceTriangles
 struct SurfaceRecord {
     std::array<std::array<float, 3>, 3> corners; // cells from the block's corner
     uint32_t slot, range, material_label;
@@ -38,8 +38,8 @@ struct SurfaceLimits { // of a portion
 
 class SurfaceBlocks {
   public:
-    // labels [F]: a class or kNoSurfaceLabel. bad_input, with `where` in front, for vertices beyond 2^20 cells and for a
-    // surface of more than 2^28 cells. The mesh outlives this.
+    // labels [F]: a class or kNoSurfaceLabel. bad_input, with `where` in front, for vertices beyond 2^20 cells and for
+    // a surface of more than 2^28 cells. The mesh outlives this.
     static Result<SurfaceBlocks> create(const Mesh& mesh, std::span<const uint8_t> labels, float voxel_size,
                                         std::string_view where);
 

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "engine/mesh/mesh.h"
-#include "kernels/kernels.h"
+#include "kernels/meshes.h"
 #include "runtime/device.h"
 
 namespace semrover {

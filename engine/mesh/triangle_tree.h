@@ -10,8 +10,8 @@ namespace semrover {
 
 using TriangleCorners = std::array<std::array<float, 3>, 3>;
 
-// boxes around boxes around triangles, as kernels.h, SurfaceTree, has them: halves by the median of centres along the
-// longest axis, at most four triangles in a leaf, the left child behind its parent
+// boxes around boxes around triangles, as kernels/meshes.h, SurfaceTree, has them: halves by the median of centres
+// along the longest axis, at most four triangles in a leaf, the left child behind its parent
 struct TriangleTree {
     struct Node {
         std::array<float, 3> low;

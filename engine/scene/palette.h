@@ -41,7 +41,6 @@ constexpr std::array<SemanticClass, kClassCount> kPalette = {{
     {"road-lane", {255, 255, 0}},
 }};
 
-// number of a class by its name, none if there is no such class
 // 0..1; an unknown label gets the last class's
 inline std::array<float, 3> label_color(uint32_t label)
 {
@@ -49,6 +48,7 @@ inline std::array<float, 3> label_color(uint32_t label)
     return {float(c[0]) / 255, float(c[1]) / 255, float(c[2]) / 255};
 }
 
+// number of a class by its name, none if there is no such class
 std::optional<uint8_t> class_of_name(std::string_view name);
 
 } // namespace semrover

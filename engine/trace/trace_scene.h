@@ -5,6 +5,7 @@
 #include "engine/mesh/bvh.h"
 #include "engine/mesh/mesh.h"
 #include "kernels/kernels.h"
+#include "kernels/tracing.h"
 #include "runtime/device.h"
 
 #include <span>
