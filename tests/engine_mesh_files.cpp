@@ -208,7 +208,7 @@ TEST(MeshFiles, ply_polygons_textures_and_labels_are_read)
                                                           "end_header\n0 0 0 0 0\n1 0 0 1 0\n1 1 0 1 1\n0 1 0 0 1\n"
                                                           "3 0 1 2 77\n");
     EXPECT_TRUE(says(read_mesh(other), "unknown labels in 'label', expected 0 to 19 or a map: 77 (1 faces)"));
-    const auto map = LabelMap::read(folder.put("map.json", R"({"77": "Terrain", "glass*": null})"));
+    const auto map = MeshLabelMap::read(folder.put("map.json", R"({"77": "Terrain", "glass*": null})"));
     ASSERT_TRUE(map) << map.error().message;
     const auto mapped = read_mesh(other, UpAxis::file, *map);
     ASSERT_TRUE(mapped) << mapped.error().message;
@@ -358,7 +358,7 @@ TEST(MeshFiles, labels_come_from_names_maps_and_faces)
     EXPECT_EQ(class_of_material("trainers"), std::nullopt);
     EXPECT_EQ(class_of_material(""), std::nullopt);
     const ScratchFolder folder;
-    const auto map = LabelMap::read(folder.put("map.json", R"({"glass*": "building", "glass door": 3, "*tree*": 8})"));
+    const auto map = MeshLabelMap::read(folder.put("map.json", R"({"glass*": "building", "glass door": 3, "*tree*": 8})"));
     ASSERT_TRUE(map) << map.error().message;
     Mesh m = two_faces();
     m.faces.push_back({1, 2, 3});
@@ -378,7 +378,7 @@ TEST(MeshFiles, labels_come_from_names_maps_and_faces)
              {R"({"a": -1})", "found -1"},
              {R"({"a": 1.5})", "found 1.5"},
              {R"({"a": [1]})", "found [1]"}})
-        EXPECT_TRUE(says(LabelMap::read(folder.put("map.json", text)), error)) << text;
+        EXPECT_TRUE(says(MeshLabelMap::read(folder.put("map.json", text)), error)) << text;
 }
 
 } // namespace

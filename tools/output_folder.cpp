@@ -21,7 +21,7 @@ Result<OutputFolder> OutputFolder::create(const Path& path, bool replace)
         return fail(ErrorCode::bad_input, "{} is a file; a folder is needed", quote_path(path));
     if (fs::exists(f.path_, error) && !replace)
         return fail(ErrorCode::usage, "{} exists; -y replaces what is written there", quote_path(path));
-    std::string name = (f.path_.parent_path() / ".semrover-XXXXXX").string();
+    std::string name = (f.path_.parent_path() / ".semrover-").string() + std::string(6, 'X'); // as mkdtemp wants it
     if (!mkdtemp(name.data()))
         return fail(ErrorCode::bad_input, "cannot create a folder in {}: {}", quote_path(f.path_.parent_path()),
                     std::error_code(errno, std::generic_category()).message());
