@@ -35,15 +35,6 @@ uint64_t hash_of(const Street& street)
     return hash.value();
 }
 
-double face_area(const Mesh& m, size_t f)
-{
-    const auto at = [&](size_t c) {
-        const auto& p = m.positions[m.faces[f][c]];
-        return Vector3{p[0], p[1], p[2]};
-    };
-    return length(cross(at(1) - at(0), at(2) - at(0))) / 2;
-}
-
 TEST(engine_streets, the_same_seed_gives_the_same_bytes_and_another_seed_another_street)
 {
     EXPECT_EQ(hash_of(make_street({.seed = 3, .length = 60})), hash_of(make_street({.seed = 3, .length = 60})));

@@ -98,7 +98,7 @@ TEST(kernel_nearest_face, distances_match_all_triangles_one_by_one)
     }
 }
 
-TEST(kernel_nearest_face, labels_are_compared_with_the_nearest_face_where_enough_frames_saw_the_vertex)
+TEST(kernel_nearest_face, labels_of_faces_are_compared_by_area_where_enough_frames_saw_all_corners)
 {
     Mesh truth;
     truth.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}};
@@ -110,15 +110,17 @@ TEST(kernel_nearest_face, labels_are_compared_with_the_nearest_face_where_enough
     mesh.face_labels = {0, 13, 0};
     const auto all = measure_surface(test_device(), mesh, truth);
     ASSERT_TRUE(all) << all.error().message;
-    EXPECT_EQ(all->labelled, 4u);
-    EXPECT_EQ(all->right, 3u); // 0 and 2 have most of class 0, 1 a tie; 3 a tie, which the lower one wins
-    EXPECT_EQ(all->confusion[13][0], 1u);
+    const double first = 0.5 * std::hypot(0.05, 0.25); // areas: first, 0.2, 0.2; all middles are nearest to the ground
+    EXPECT_NEAR(all->labelled, first + 0.4, 1e-6);
+    EXPECT_NEAR(all->right, first + 0.2, 1e-6);
+    EXPECT_NEAR(all->confusion[0][13], 0.2, 1e-6);
     EXPECT_NEAR(all->percentile(1), 0.2, 1e-6);
     EXPECT_NEAR(all->percentile(0), 0.1, 1e-6);
-    const auto seen = measure_surface(test_device(), mesh, truth, {2, 1, 0, 5});
+    const auto seen = measure_surface(test_device(), mesh, truth, {2, 1, 3, 5});
     ASSERT_TRUE(seen) << seen.error().message;
-    EXPECT_EQ(seen->distances.size(), 2u);
-    EXPECT_EQ(seen->right, 1u);
+    EXPECT_EQ(seen->distances.size(), 3u);
+    EXPECT_NEAR(seen->labelled, 0.2, 1e-6); // the face of 0, 2 and 3
+    EXPECT_NEAR(seen->right, 0.2, 1e-6);
     EXPECT_TRUE(says(measure_surface(test_device(), mesh, truth, {1, 1, 0, 1}), "none of 4 vertices was seen by 2"));
 }
 

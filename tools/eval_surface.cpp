@@ -9,6 +9,7 @@
 #include "tools/open_device.h"
 
 #include <CLI/CLI.hpp>
+#include <numeric>
 
 namespace semrover {
 
@@ -33,27 +34,30 @@ Json classes_of(const SurfaceError& error)
 {
     Json list = Json::object();
     for (size_t label = 0; label < kClassCount; ++label)
-        if (const auto count = std::ranges::count(error.classes, uint8_t(label)))
+        if (const auto count = std::ranges::count(error.classes, uint8_t(label))) {
+            const auto& found = error.confusion[label];
             list[label_name(label)] = {{"vertices", count},
-                                       {"right", error.confusion[label][label]},
+                                       {"area", std::accumulate(found.begin(), found.end(), 0.0)},
+                                       {"right", found[label]},
                                        {"p50", error.percentile(0.5, uint8_t(label))},
                                        {"p95", error.percentile(0.95, uint8_t(label))}};
+        }
     return list;
 }
 
-// the commonest mistakes: {"truth", "found", "vertices"}, most first
+// the commonest mistakes, most first
 Json mistakes_of(const SurfaceError& error)
 {
-    std::vector<std::tuple<uint64_t, size_t, size_t>> mistakes;
+    std::vector<std::tuple<double, size_t, size_t>> mistakes;
     for (size_t truth = 0; truth < error.confusion.size(); ++truth)
         for (size_t found = 0; found < error.confusion.size(); ++found)
-            if (truth != found && error.confusion[truth][found])
+            if (truth != found && error.confusion[truth][found] > 0)
                 mistakes.emplace_back(error.confusion[truth][found], truth, found);
     std::ranges::sort(mistakes, std::greater());
     Json list = Json::array();
     for (size_t i = 0; i < std::min<size_t>(mistakes.size(), 10); ++i) {
-        const auto& [count, truth, found] = mistakes[i];
-        list.push_back({{"truth", label_name(truth)}, {"found", label_name(found)}, {"vertices", count}});
+        const auto& [area, truth, found] = mistakes[i];
+        list.push_back({{"truth", label_name(truth)}, {"found", label_name(found)}, {"area", area}});
     }
     return list;
 }
@@ -61,11 +65,11 @@ Json mistakes_of(const SurfaceError& error)
 Json report_of(const SurfaceError& error)
 {
     Json report = {{"vertices", error.vertices},    {"measured", error.distances.size()},
-                   {"beyond_radius", error.beyond}, {"labelled", error.labelled},
-                   {"labels_right", error.right},   {"mistakes", mistakes_of(error)}};
+                   {"beyond_radius", error.beyond}, {"labelled_area", error.labelled},
+                   {"right_area", error.right},     {"mistakes", mistakes_of(error)}};
     for (const auto& [name, share] : {std::pair{"p50", 0.5}, {"p90", 0.9}, {"p95", 0.95}, {"p99", 0.99}, {"max", 1.0}})
         report["distance"][name] = error.percentile(share);
-    report["label_accuracy"] = error.labelled ? double(error.right) / double(error.labelled) : 0.0;
+    report["label_accuracy"] = error.labelled > 0 ? error.right / error.labelled : 0.0;
     return report;
 }
 
@@ -78,17 +82,16 @@ void print(const SurfaceError& error, const Options& o)
                error.percentile(0.5), error.percentile(0.9), error.percentile(0.95), error.percentile(0.99));
     if (error.beyond)
         fmt::print("{} are further than {} m\n", error.beyond, o.radius);
-    if (error.labelled)
-        fmt::print("labels right: {:.2f} % of {}\n", 100.0 * double(error.right) / double(error.labelled),
-                   error.labelled);
+    if (error.labelled > 0)
+        fmt::print("labels right: {:.2f} % of {:.1f} m2\n", 100 * error.right / error.labelled, error.labelled);
     const Json classes = classes_of(error);
     for (const auto& [name, c] : classes.items())
         fmt::print("  {:13} {:8} vertices, 95 % within {:.4f} m, labels right: {:.2f} %\n", name,
                    c["vertices"].get<uint64_t>(), c["p95"].get<double>(),
-                   100.0 * c["right"].get<double>() / c["vertices"].get<double>());
+                   100 * c["right"].get<double>() / std::max(c["area"].get<double>(), 1e-12));
     for (const Json& m : mistakes_of(error))
-        fmt::print("  {} taken for {}: {}\n", m["truth"].get<std::string>(), m["found"].get<std::string>(),
-                   m["vertices"].get<uint64_t>());
+        fmt::print("  {} taken for {}: {:.1f} m2\n", m["truth"].get<std::string>(), m["found"].get<std::string>(),
+                   m["area"].get<double>());
 }
 
 Status run_surface(Options o, const Globals& globals)

@@ -121,22 +121,6 @@ HostFaceGrid make_grid(const Mesh& truth)
     return g;
 }
 
-// the label that most faces of a vertex have, ties to the lower one
-std::vector<uint8_t> vertex_labels(const Mesh& mesh)
-{
-    std::vector<std::array<uint16_t, 21>> votes(mesh.positions.size());
-    for (size_t f = 0; f < mesh.faces.size() && !mesh.face_labels.empty(); ++f)
-        for (const uint32_t v : mesh.faces[f])
-            if (mesh.face_labels[f] < 20)
-                ++votes[v][mesh.face_labels[f]];
-    std::vector<uint8_t> labels;
-    for (const auto& counts : votes) {
-        const auto most = std::ranges::max_element(counts);
-        labels.push_back(*most ? uint8_t(most - counts.begin()) : kNoLabel);
-    }
-    return labels;
-}
-
 struct Nearest {
     float distance;
     uint32_t face;
@@ -202,6 +186,30 @@ bool seen_at(const DepthImages& images, const Intrinsics& k, const Projection& a
     return at.depth >= low - slack && at.depth <= high + slack;
 }
 
+// the middle of some vertices, relative to the grid's origin
+std::array<float, 4> point_of(const Mesh& mesh, std::span<const uint32_t> vertices, const std::array<double, 3>& origin)
+{
+    std::array<float, 4> point{};
+    for (size_t axis = 0; axis < 3; ++axis) {
+        double sum = 0;
+        for (const uint32_t v : vertices)
+            sum += mesh.positions[v][axis];
+        point[axis] = float(sum / double(vertices.size()) - origin[axis]);
+    }
+    return point;
+}
+
+// those whose corners were all seen
+std::vector<uint32_t> labelled_faces(const Mesh& mesh, const std::vector<uint32_t>& views, uint32_t min_views)
+{
+    std::vector<uint32_t> faces;
+    const auto seen = [&](uint32_t v) { return views.empty() || views[v] >= min_views; };
+    for (uint32_t f = 0; f < mesh.face_labels.size(); ++f)
+        if (std::ranges::all_of(mesh.faces[f], seen))
+            faces.push_back(f);
+    return faces;
+}
+
 double percentile_of(std::vector<float> values, double share)
 {
     if (values.empty())
@@ -248,34 +256,39 @@ Result<SurfaceError> measure_surface(Device& device, const Mesh& mesh, const Mes
     SR_ASSERT(views.empty() || views.size() == mesh.positions.size(), "views of {} vertices for {}", views.size(),
               mesh.positions.size());
     const HostFaceGrid grid = make_grid(truth);
-    const std::vector<uint8_t> labels = vertex_labels(mesh);
     std::vector<uint32_t> vertices;
-    std::vector<std::array<float, 4>> points;
-    for (uint32_t v = 0; v < mesh.positions.size(); ++v) {
-        if (!views.empty() && views[v] < min_views)
-            continue;
-        vertices.push_back(v);
-        auto& point = points.emplace_back();
-        for (size_t axis = 0; axis < 3; ++axis)
-            point[axis] = float(double(mesh.positions[v][axis]) - grid.origin[axis]);
-    }
-    if (points.empty())
+    for (uint32_t v = 0; v < mesh.positions.size(); ++v)
+        if (views.empty() || views[v] >= min_views)
+            vertices.push_back(v);
+    if (vertices.empty())
         return fail(ErrorCode::bad_input, "none of {} vertices was seen by {} frames", mesh.positions.size(),
                     min_views);
+    std::vector<std::array<float, 4>> points;
+    for (const uint32_t v : vertices)
+        points.push_back(point_of(mesh, {&v, 1}, grid.origin));
+    const std::vector<uint32_t> faces = labelled_faces(mesh, views, min_views);
+    for (const uint32_t f : faces)
+        points.push_back(point_of(mesh, mesh.faces[f], grid.origin));
     SR_TRY(const std::vector<Nearest> nearest, find_nearest(device, grid, points, float(radius)));
+    const auto label_at = [&](size_t i) {
+        const bool known = nearest[i].face != ~0u && !truth.face_labels.empty();
+        return known ? truth.face_labels[nearest[i].face] : kNoLabel;
+    };
     SurfaceError error;
     error.vertices = mesh.positions.size();
-    for (size_t i = 0; i < nearest.size(); ++i) {
+    for (size_t i = 0; i < vertices.size(); ++i) {
         error.distances.push_back(nearest[i].distance);
         error.beyond += nearest[i].face == ~0u;
-        const bool known = nearest[i].face != ~0u && !truth.face_labels.empty();
-        const uint8_t expected = known ? truth.face_labels[nearest[i].face] : kNoLabel, found = labels[vertices[i]];
-        error.classes.push_back(expected);
+        error.classes.push_back(label_at(i));
+    }
+    for (size_t i = 0; i < faces.size(); ++i) {
+        const uint8_t expected = label_at(vertices.size() + i), found = mesh.face_labels[faces[i]];
         if (expected == kNoLabel)
             continue;
-        ++error.labelled;
-        error.right += expected == found;
-        ++error.confusion[expected][found];
+        const double area = face_area(mesh, faces[i]);
+        error.labelled += area;
+        error.right += expected == found ? area : 0;
+        error.confusion[expected][found] += area;
     }
     return error;
 }

@@ -20,16 +20,16 @@ struct SurfaceError {
     std::vector<uint8_t> classes; // of these nearest faces, kNoLabel for none
     size_t vertices = 0;          // of the mesh
     size_t beyond = 0;            // with no true face within the radius
-    size_t labelled = 0;          // measured ones whose nearest true face has a label
-    size_t right = 0;             // of these, with the same label
-    std::array<std::array<uint64_t, 256>, 256> confusion{}; // [true label][label]
+    double labelled = 0;          // m^2 of faces whose nearest true face (to the face's middle) has a label
+    double right = 0;             // of these, with the same label
+    std::array<std::array<double, 256>, 256> confusion{}; // [true label][label] m^2
 
     double percentile(double share) const;                // of the distances
     double percentile(double share, uint8_t label) const; // where the true face has this class
 };
 
 // Distances from the vertices of a mesh that `views` says at least `min_views` frames saw (empty: all) to the surface
-// of the true mesh, exact on the device; a vertex has the label that most of its faces have, ties to the lower one.
+// of the true mesh, exact on the device; labels of the faces between such vertices, by area.
 // Errors: bad_input, out_of_memory, device_lost
 Result<SurfaceError> measure_surface(Device& device, const Mesh& mesh, const Mesh& truth,
                                      const std::vector<uint32_t>& views = {}, uint32_t min_views = 2,
