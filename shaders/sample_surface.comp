@@ -1,8 +1,11 @@
 #version 460
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// a point drawn uniformly from the surface in a cell: a pair by its share of the area, a triangle of its polygon's fan,
-// a point in that; and what its colour is made of
+// points drawn uniformly from the surface in a cell, evenly: sample k of n of a cell is (x + k / n, y + k / phi) modulo 1,
+// a lattice (Kronecker's, with the golden ratio phi) that two random words of the cell shift (Cranley and Patterson
+// 1976). x is the share of the area before the point, across pairs and the fans of their polygons; the root of y how far
+// it lies from the fan's corner. Each point by itself is uniform; together they leave smaller gaps than independent
+// ones. And what a point's colour is made of.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/clip_cell.glsl"
 #include "lib/philox.glsl"
@@ -25,10 +28,12 @@ layout(binding = 9) writeonly buffer Addresses { uvec4 addresses[]; }; // [cells
 
 float unit(uint word) { return float(word >> 8) * (1.0 / 16777216.0); } // [0, 1)
 
-// the first pair of the cell whose sum exceeds a share of the whole; pairs without area are never that
-uint pick_pair(uint key, float share)
+// the first pair of the cell whose sum exceeds a share of the whole, and how far into its area that is, 0..1; pairs
+// without area are never that
+uint pick_pair(uint key, float share, out float into)
 {
-    uint low = starts[key], high = starts[key + 1] - 1;
+    const uint first = starts[key];
+    uint low = first, high = starts[key + 1] - 1;
     const float all = sums[high];
     // note: the product may round up to the whole, which no sum exceeds
     const float target = min(share * all, uintBitsToFloat(floatBitsToUint(all) - 1));
@@ -39,17 +44,22 @@ uint pick_pair(uint key, float share)
         else
             low = middle + 1;
     }
+    const float before = low > first ? sums[low - 1] : 0.0;
+    into = (target - before) / (sums[low] - before);
     return low;
 }
 
-vec3 point_in_polygon(uvec4 random)
+// where `into` of the polygon's area is behind, seen from its first corner
+vec3 point_in_polygon(float into, float outward)
 {
-    const float target = unit(random.y) * polygon_area();
+    const float target = into * polygon_area();
     uint i = 1;
-    float sum = fan_area(1);
-    while (sum <= target && i + 2 < polygon_size)
-        sum += fan_area(++i);
-    const float r = sqrt(unit(random.z)), s = unit(random.w);
+    float before = 0.0, area = fan_area(1);
+    while (before + area <= target && i + 2 < polygon_size) {
+        before += area;
+        area = fan_area(++i);
+    }
+    const float r = sqrt(outward), s = area > 0.0 ? clamp((target - before) / area, 0.0, 1.0) : 0.0;
     return (1.0 - r) * polygon[0] + (r * (1.0 - s)) * polygon[i] + (r * s) * polygon[i + 1];
 }
 
@@ -93,13 +103,15 @@ void main()
         return;
     const ivec4 cell = cells[to / p.samples];
     const uint key = uint(cell.w);
-    const uvec4 random = philox(uvec4(uvec3(cell.xyz), to % p.samples), uvec2(p.seed_low, p.seed_high));
-    const uint t = values[pick_pair(key, unit(random.x))];
+    const uint k = to % p.samples;
+    const uvec4 random = philox(uvec4(uvec3(cell.xyz), 0), uvec2(p.seed_low, p.seed_high));
+    float into;
+    const uint t = values[pick_pair(key, unit(random.x + k * (0xffffffffu / p.samples)), into)];
     const vec3 origin = vec3(cell_of_key(key));
     const vec3 a = RECORD_CORNER(triangles, t, 0) - origin, b = RECORD_CORNER(triangles, t, 1) - origin,
                c = RECORD_CORNER(triangles, t, 2) - origin;
     clip_to_cell(a, b, c);
-    const vec3 point = clamp(point_in_polygon(random), 0.0, 1.0);
+    const vec3 point = clamp(point_in_polygon(into, unit(random.y + k * 0x9E3779B9u)), 0.0, 1.0);
     samples[8 * to] = point.x - 0.5;
     samples[8 * to + 1] = point.y - 0.5;
     samples[8 * to + 2] = point.z - 0.5;

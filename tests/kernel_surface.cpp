@@ -275,18 +275,20 @@ struct Drawn {
     Point3d point;
     uint32_t triangle;
     bool near_threshold; // of a choice, where float and double may differ
+    double slack;        // of the point, because of rounding
 };
 
-// the point that the words choose among triangles in a cell
+// the point of sample k of n of the lattice that the cell's words shift, among triangles in a cell
 Drawn draw(const std::vector<Triangle>& triangles, const std::vector<uint32_t>& in_cell, const std::array<int, 3>& cell,
-           const Words4& words)
+           const Words4& words, uint32_t k, uint32_t n)
 {
+    const double x = unit(words[0] + k * (0xffffffffu / n)), y = unit(words[1] + k * 0x9E3779B9u);
     Drawn d{};
     std::vector<double> sums;
     double all = 0;
     for (const uint32_t t : in_cell)
         sums.push_back(all += polygon_area(clipped(triangles[t].corners, cell, 1)));
-    const double target = unit(words[0]) * all;
+    const double target = x * all;
     size_t at = 0;
     while (sums[at] <= target)
         ++at;
@@ -294,16 +296,20 @@ Drawn draw(const std::vector<Triangle>& triangles, const std::vector<uint32_t>& 
         d.near_threshold |= std::abs(s - target) < 1e-5;
     d.triangle = in_cell[at];
     const std::vector<Point3d> p = clipped(triangles[d.triangle].corners, cell, 1);
-    const double fan_target = unit(words[1]) * polygon_area(p);
-    double sum = triangle_area(p[0], p[1], p[2]);
+    const double before_pair = at ? sums[at - 1] : 0, into = (target - before_pair) / (sums[at] - before_pair);
+    const double fan_target = into * polygon_area(p);
+    double before = 0, area = triangle_area(p[0], p[1], p[2]);
     size_t i = 1;
-    d.near_threshold |= std::abs(sum - fan_target) < 1e-5;
-    while (sum <= fan_target && i + 2 < p.size()) {
+    d.near_threshold |= std::abs(area - fan_target) < 1e-5;
+    while (before + area <= fan_target && i + 2 < p.size()) {
         ++i;
-        sum += triangle_area(p[0], p[i], p[i + 1]);
-        d.near_threshold |= std::abs(sum - fan_target) < 1e-5;
+        before += area;
+        area = triangle_area(p[0], p[i], p[i + 1]);
+        d.near_threshold |= std::abs(before + area - fan_target) < 1e-5;
     }
-    const double r = std::sqrt(unit(words[2])), s = unit(words[3]);
+    // note: float sums place the point within a sliver only to about their rounding over its area
+    d.slack = 1e-6 / std::max(std::min(area, sums[at] - before_pair), 1e-6);
+    const double r = std::sqrt(y), s = std::min((fan_target - before) / area, 1.0);
     for (size_t a = 0; a < 3; ++a)
         d.point[a] = (1 - r) * p[0][a] + r * (1 - s) * p[i][a] + r * s * p[i + 1][a];
     return d;
@@ -348,16 +354,16 @@ TEST(kernel_surface, sample_surface_draws_what_its_random_words_choose)
     size_t skipped = 0;
     for (uint32_t i = 0; i < in_cells.size() * kSamples; ++i) {
         const int32_t* c = &cells[i / kSamples * 4];
-        const Words4 words = philox_reference({uint32_t(c[0]), uint32_t(c[1]), uint32_t(c[2]), i % kSamples},
+        const Words4 words = philox_reference({uint32_t(c[0]), uint32_t(c[1]), uint32_t(c[2]), 0},
                                               {uint32_t(kSeed), uint32_t(kSeed >> 32)});
         const auto cell = cell_of(uint32_t(c[3]));
-        const Drawn expected = draw(triangles, in_cells[i / kSamples], cell, words);
+        const Drawn expected = draw(triangles, in_cells[i / kSamples], cell, words, i % kSamples, kSamples);
         if (expected.near_threshold) {
             ++skipped;
             continue;
         }
         for (size_t a = 0; a < 3; ++a) {
-            ASSERT_NEAR(got[8 * i + a], expected.point[a] - cell[a] - 0.5, 4e-6) << "sample " << i;
+            ASSERT_NEAR(got[8 * i + a], expected.point[a] - cell[a] - 0.5, 4e-6 + expected.slack) << "sample " << i;
             ASSERT_NEAR(got[8 * i + 5 + a], 1, 2e-7); // weights that add up to 1
         }
         ASSERT_EQ(texels[4 * i], kNone);
