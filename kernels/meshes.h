@@ -9,7 +9,7 @@ namespace semrover {
 
 // Triangles are given for each block of 8^3 cells that they touch; a slot is a block, or a range of its cells. The key
 // of cell (x, y, z) of a slot is slot * 512 + (x * 8 + y) * 8 + z. A cell spans [x, x + 1) x [y, y + 1) x [z, z + 1).
-constexpr uint32_t kSurfaceBlock = 8, kSurfaceBlockCells = 512, kNoSurfaceLabel = 20;
+constexpr uint32_t kSurfaceBlock = 8, kSurfaceBlockCells = 512, kNoSurfaceLabel = 20, kSurfacePlaceBits = 9;
 struct SurfaceTriangles { // words: u32, or the bits of a float
     Tensor records;    // [T, 12]: three corners in cells from the block's corner (floats within +-16); slot; its range
                        // of cells (four bits each: first x, y, z, end x, y, z); material | label << 24
@@ -20,13 +20,17 @@ struct SurfaceTriangles { // words: u32, or the bits of a float
 
 // the cells that a triangle may have area in: those that its box and its plane touch
 struct SurfacePairs {
-    Tensor keys;      // [capacity] u32, of cells
+    Tensor keys;      // [capacity] u32, of cells; as triangle_cells() makes them, << kSurfacePlaceBits with the Morton
+                      // code of where in the cell the triangle lies below
     Tensor triangles; // [capacity] u32
     Tensor count;     // [1] u32
 };
 [[nodiscard]] SurfacePairs triangle_cells(Graph& g,
                                           Tensor records,     // [T, 12], as above
                                           uint32_t capacity); // pairs; the caller knows that they fit
+
+// y[i] = x[i] >> kSurfacePlaceBits: the cells alone, once pairs are sorted
+[[nodiscard]] Tensor pair_cells(Graph& g, Tensor keys); // [N] u32 -> [N] u32
 
 // the area of each pair's triangle within its cell, by exact clipping
 struct SurfaceAreas {

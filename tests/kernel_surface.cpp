@@ -106,7 +106,10 @@ TEST(kernel_surface, triangle_cells_finds_every_cell_with_area_once_and_none_out
         const SurfacePairs pairs = triangle_cells(k.graph, k.input(records_of(triangles), 12), capacity);
         const Tensor keys = kept(k, pairs.keys), values = kept(k, pairs.triangles), total = kept(k, pairs.count);
         ASSERT_TRUE(k.compile_and_run());
-        const auto got_keys = k.read_array<uint32_t>(keys), got_values = k.read_array<uint32_t>(values);
+        const auto got_codes = k.read_array<uint32_t>(keys), got_values = k.read_array<uint32_t>(values);
+        std::vector<uint32_t> got_keys;
+        for (const uint32_t code : got_codes)
+            got_keys.push_back(code >> kSurfacePlaceBits);
         const uint32_t found = k.read_array<uint32_t>(total)[0];
         ASSERT_LE(found, capacity);
         std::set<std::pair<uint32_t, uint32_t>> seen;
@@ -116,12 +119,16 @@ TEST(kernel_surface, triangle_cells_finds_every_cell_with_area_once_and_none_out
             ASSERT_EQ(got_keys[i] / 512, t.slot);
             ASSERT_TRUE(i == 0 || got_values[i - 1] <= got_values[i]);
             const auto cell = cell_of(got_keys[i]);
-            for (size_t a = 0; a < 3; ++a) {
+            uint32_t place = got_codes[i] & 511;
+            for (size_t a = 0; a < 3; ++a, place >>= 1) {
+                const uint32_t along = (place & 1) | (place >> 3 & 1) << 1 | (place >> 6 & 1) << 2;
                 const auto [low, high] = std::minmax({t.corners[0][a], t.corners[1][a], t.corners[2][a]});
                 ASSERT_LE(std::floor(low), cell[a]);
                 ASSERT_GE(std::floor(high), cell[a]);
                 ASSERT_GE(cell[a], int(t.range >> (4 * a) & 15));
                 ASSERT_LT(cell[a], int(t.range >> (12 + 4 * a) & 15));
+                const double middle = (std::max(low, double(cell[a])) + std::min(high, cell[a] + 1.0)) / 2 - cell[a];
+                ASSERT_NEAR(along + 0.5, std::clamp(8 * middle, 0.0, 8.0), 0.5 + 1e-5);
             }
         }
         for (uint32_t i = 0; i < count; ++i)
@@ -165,6 +172,15 @@ Clipped clip(const std::vector<Triangle>& triangles, const std::vector<uint32_t>
     const Tensor areas = kept(k, y.areas), labels = kept(k, y.labels), addresses = kept(k, y.label_addresses);
     EXPECT_TRUE(k.compile_and_run());
     return {k.read_array<float>(areas), k.read_array<uint32_t>(labels), k.read_array<uint32_t>(addresses)};
+}
+
+TEST(kernel_surface, pair_cells_leaves_what_lies_above_the_place)
+{
+    KernelCase k(test_device());
+    const std::vector<uint32_t> codes = {0, 511, 512, 1023, 0xffffffff, 77u << 9 | 5};
+    const Tensor cells = kept(k, pair_cells(k.graph, k.input(codes)));
+    ASSERT_TRUE(k.compile_and_run());
+    EXPECT_EQ(k.read_array<uint32_t>(cells), (std::vector<uint32_t>{0, 0, 1, 1, 0x7fffff, 77}));
 }
 
 TEST(kernel_surface, clip_area_matches_clipping_in_double)

@@ -155,12 +155,14 @@ Status Voxelizer::measure(const ChunkMemory& m)
     Graph g;
     const SurfaceTriangles surface = m.in(g, atlas_);
     const SurfacePairs found = triangle_cells(g, surface.records, m.pairs);
-    const uint32_t bits = uint32_t(std::bit_width(m.cells - 1));
+    // within a cell along a curve, so that samples that follow each other in area lie beside each other
+    const uint32_t bits = uint32_t(std::bit_width(m.cells - 1)) + kSurfacePlaceBits;
     const SortedPairs sorted = radix_sort(g, found.keys, found.triangles, {.bits = bits, .count = found.count});
-    const SurfaceAreas pairs = clip_area(g, surface, {sorted.keys, sorted.values, found.count});
+    const Tensor keys = pair_cells(g, sorted.keys);
+    const SurfaceAreas pairs = clip_area(g, surface, {keys, sorted.values, found.count});
     if (atlas_.has_labels())
         atlas_.gather(g, pairs.label_addresses, pairs.labels, found.count);
-    const Tensor starts = bucket_starts(g, sorted.keys, m.cells, found.count);
+    const Tensor starts = bucket_starts(g, keys, m.cells, found.count);
     const CellAreas cells = cell_area(g, pairs.areas, pairs.labels, starts, m.cells);
     g.replace(sorted.values.resource, m.words(g, kTriangles, m.pairs).resource);
     g.replace(cells.sums.resource, m.words(g, kSums, m.pairs, DType::f32).resource);
