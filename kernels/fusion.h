@@ -51,20 +51,6 @@ void tsdf_finish(Graph& g, const TsdfState& state, const TsdfOptions& options,
                  Tensor distances,   // [B * 512] fp32: in truncations, 2 where nothing was observed
                  Tensor attributes); // [B * 512] u32: rgb | label << 24 (31: none) | views << 29 (7: or more)
 
-// the nearest triangle of every point; ties go to the lower index
-struct FaceGrid {
-    Tensor corners;                // [F * 3, 4] fp32 array: metres, unused
-    Tensor starts;                 // [cells + 1] u32, x fastest
-    Tensor members;                // [..] u32: triangles that reach into each cell
-    std::array<uint32_t, 3> cells; // of the grid, which holds all triangles
-    std::array<float, 3> low;      // its corner, metres
-    float cell_size = 0;           // metres
-};
-[[nodiscard]] Tensor nearest_face(Graph& g,
-                                  Tensor points,                       // [N, 4] fp32 array: metres, unused
-                                  const FaceGrid& grid, float radius); // [N, 2] u32: distance as bits (the radius
-                                                                       // where there is none), face (2^32 - 1: none)
-
 // The surface where the distance is 0, without cracks: on faces that are ambiguous, inside corners are cut off one by
 // one in both cells. One vertex per crossed edge, kept by the edge's lower voxel; cells with an unobserved corner have
 // none.

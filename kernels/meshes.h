@@ -85,13 +85,14 @@ struct SurfaceSamples {
 // At most 40 levels.
 struct SurfaceTree {
     Tensor nodes;     // [nodes, 8]
-    Tensor triangles; // [T, 9] fp32: three corners
+    Tensor triangles; // [T, 10] u32: three corners (floats as bits), face
 };
 
-// y = the distance of points from the nearest triangle, where that is less than y
+// y = the nearest triangle of points, where it is nearer than y; ties to the lower face
 void surface_distance(Graph& g,
                       Tensor points, // [P, 3 or more] fp32 array
                       const SurfaceTree& tree,
-                      Tensor y); // [P] u32 array: bits of floats >= 0 whose squares are finite, in place
+                      Tensor y); // [P, 2] u32 array, in place: distance (bits of a float >= 0 whose square is finite),
+                                 // face
 
 } // namespace semrover

@@ -106,6 +106,24 @@ tl::unexpected<Error> cannot_write(const Path& path, int error)
 
 } // namespace
 
+bool is_there(const Path& path)
+{
+    std::error_code ignored;
+    return std::filesystem::exists(path, ignored);
+}
+
+bool is_file(const Path& path)
+{
+    std::error_code ignored;
+    return std::filesystem::is_regular_file(path, ignored);
+}
+
+bool is_folder(const Path& path)
+{
+    std::error_code ignored;
+    return std::filesystem::is_directory(path, ignored);
+}
+
 Result<std::vector<std::byte>> read_file(const Path& path, uint64_t max_bytes)
 {
     return read_whole<std::vector<std::byte>>(path, max_bytes);

@@ -1,7 +1,8 @@
 #version 460
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// the distance of points from the nearest triangle of a tree of boxes, and y's if that is less; the nearer child first
+// the nearest triangle of points in a tree of boxes, and y's if that is nearer, ties to the lower face; the nearer
+// child first
 #extension GL_GOOGLE_include_directive : require
 #include "lib/thread.glsl"
 #include "surface_distance.h"
@@ -10,15 +11,15 @@ layout(local_size_x = 64) in;
 layout(push_constant) uniform Push { SurfaceDistancePush p; };
 layout(binding = 0) readonly buffer Points { float points[]; };       // [size, points_ld]
 layout(binding = 1) readonly buffer Nodes { uvec4 nodes[]; };         // [2 * nodes] as kernels.h, SurfaceTree
-layout(binding = 2) readonly buffer Triangles { float triangles[]; }; // [T, 9]
-layout(binding = 3) buffer Y { uint y[]; };                           // [size] bits of a float
+layout(binding = 2) readonly buffer Triangles { uint triangles[]; };  // [T, 10]
+layout(binding = 3) buffer Y { uvec2 y[]; };                          // [size] distance as bits, face
 
 const uint kStack = 48; // levels of the tree
 
 vec3 corner(uint t, uint c)
 {
-    const uint at = 9 * t + 3 * c;
-    return vec3(triangles[at], triangles[at + 1], triangles[at + 2]);
+    const uint at = 10 * t + 3 * c;
+    return uintBitsToFloat(uvec3(triangles[at], triangles[at + 1], triangles[at + 2]));
 }
 
 float square(vec3 v) { return dot(v, v); }
@@ -57,8 +58,10 @@ void main()
     if (i >= p.size)
         return;
     const vec3 point = vec3(points[i * p.points_ld], points[i * p.points_ld + 1], points[i * p.points_ld + 2]);
-    float best = uintBitsToFloat(y[i]);
+    uint face = y[i].y;
+    float best = uintBitsToFloat(y[i].x);
     best *= best;
+    bool found = false;
     uint stack[kStack];
     uint top = 0;
     stack[top++] = 0;
@@ -67,13 +70,21 @@ void main()
         if (box2(node, point) > best)
             continue;
         const uint link = nodes[2 * node].w, count = nodes[2 * node + 1].w;
-        for (uint t = link; t < link + count; ++t)
-            best = min(best, triangle2(point, corner(t, 0), corner(t, 1), corner(t, 2)));
+        for (uint t = link; t < link + count; ++t) {
+            const float square = triangle2(point, corner(t, 0), corner(t, 1), corner(t, 2));
+            const uint own = triangles[10 * t + 9];
+            if (square > best || (square == best && own >= face))
+                continue;
+            best = square;
+            face = own;
+            found = true;
+        }
         if (count > 0 || top + 2 > kStack)
             continue;
         const bool left_first = box2(node + 1, point) <= box2(link, point);
         stack[top++] = left_first ? link : node + 1;
         stack[top++] = left_first ? node + 1 : link;
     }
-    y[i] = min(y[i], floatBitsToUint(sqrt(best))); // bits of positive floats compare as they do
+    if (found)
+        y[i] = uvec2(floatBitsToUint(sqrt(best)), face);
 }

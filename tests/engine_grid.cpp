@@ -5,6 +5,7 @@
 #include "engine/scene/palette.h"
 #include "runtime/dtype.h"
 #include "runtime/safetensors.h"
+#include "tests/grid_case.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
 
@@ -15,22 +16,6 @@
 namespace semrover {
 namespace {
 
-VoxelGrid small_grid()
-{
-    VoxelGrid grid;
-    grid.voxel_size = 0.6f;
-    grid.points_per_voxel = 2;
-    grid.cells = {{-1, 0, 2}, {0, -5, 0}, {0, 0, 0}};
-    grid.labels = {0, 19, 8};
-    for (int i = 0; i < 18; ++i)
-        grid.points.push_back(float_to_half(0.3f - 0.03f * static_cast<float>(i)));
-    for (uint8_t i = 0; i < 18; ++i)
-        grid.colors.push_back(i);
-    grid.generated = {1, 0, 1};
-    grid.metadata = {{"name", "small"}, {"seed", "7"}};
-    return grid;
-}
-
 VoxelGrid semantic_grid()
 {
     VoxelGrid grid = small_grid();
@@ -38,18 +23,6 @@ VoxelGrid semantic_grid()
     grid.colors.clear();
     grid.generated.clear();
     return grid;
-}
-
-void expect_same(const VoxelGrid& a, const VoxelGrid& b)
-{
-    EXPECT_EQ(a.voxel_size, b.voxel_size);
-    EXPECT_EQ(a.points_per_voxel, b.points_per_voxel);
-    EXPECT_EQ(a.cells, b.cells);
-    EXPECT_EQ(a.labels, b.labels);
-    EXPECT_EQ(a.points, b.points);
-    EXPECT_EQ(a.colors, b.colors);
-    EXPECT_EQ(a.generated, b.generated);
-    EXPECT_EQ(a.metadata, b.metadata);
 }
 
 // writes a grid file without the checks of write_grid

@@ -4,6 +4,7 @@
 #include "engine/scene/tile_cache.h"
 #include "runtime/dtype.h"
 #include "runtime/json.h"
+#include "tests/grid_case.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
 
@@ -37,18 +38,6 @@ VoxelGrid plain(int32_t low, int32_t high, bool points)
     return grid;
 }
 
-void expect_equal(const VoxelGrid& a, const VoxelGrid& b)
-{
-    EXPECT_EQ(a.voxel_size, b.voxel_size);
-    EXPECT_EQ(a.points_per_voxel, b.points_per_voxel);
-    EXPECT_EQ(a.cells, b.cells);
-    EXPECT_EQ(a.labels, b.labels);
-    EXPECT_EQ(a.points, b.points);
-    EXPECT_EQ(a.colors, b.colors);
-    EXPECT_EQ(a.generated, b.generated);
-    EXPECT_EQ(a.metadata, b.metadata);
-}
-
 TEST(engine_tiles, a_scene_comes_back_from_its_tiles)
 {
     for (const bool points : {false, true})
@@ -62,7 +51,7 @@ TEST(engine_tiles, a_scene_comes_back_from_its_tiles)
             EXPECT_EQ(tiles->cell_count(), grid.cells.size());
             const auto back = read_grid_or_tiles(folder / "tiles");
             ASSERT_TRUE(back) << back.error().message;
-            expect_equal(*back, grid);
+            expect_same(*back, grid);
         }
 }
 

@@ -512,22 +512,33 @@ TEST(kernel_surface, surface_distance_matches_all_triangles_in_double)
         const TriangleTree tree = triangle_tree(corners);
         std::vector<uint32_t> nodes(tree.nodes.size() * 8);
         std::memcpy(nodes.data(), tree.nodes.data(), nodes.size() * 4);
-        std::vector<float> triangles(corners.size() * 9), points;
+        std::vector<uint32_t> triangles(corners.size() * 10);
+        std::vector<float> points;
         std::memcpy(triangles.data(), tree.triangles.data(), triangles.size() * 4);
         std::mt19937 random(4);
         std::uniform_real_distribution<float> place(-8, 16);
         for (int i = 0; i < 3 * 501; ++i)
             points.push_back(place(random));
-        const Tensor y = k.input(std::vector<uint32_t>(501, bits_of(6.5)));
-        surface_distance(k.graph, k.input(points, 3), {k.input(nodes, 8), k.input(triangles, 9)}, y);
+        std::vector<uint32_t> held;
+        for (int i = 0; i < 501; ++i)
+            held.insert(held.end(), {bits_of(6.5), kNone});
+        const Tensor y = k.input(held, 2);
+        surface_distance(k.graph, k.input(points, 3), {k.input(nodes, 8), k.input(triangles, 10)}, y);
         ASSERT_TRUE(k.compile_and_run());
         const auto got = k.read_array<uint32_t>(y);
-        for (size_t i = 0; i < got.size(); ++i) {
+        ASSERT_EQ(got.size(), 1002u);
+        for (size_t i = 0; i < got.size() / 2; ++i) {
             double best = 6.5; // what y held
             for (const Triangle& t : list)
                 best =
                     std::min(best, triangle_distance({points[3 * i], points[3 * i + 1], points[3 * i + 2]}, t.corners));
-            ASSERT_NEAR(std::bit_cast<float>(got[i]), best, 2e-5) << "point " << i;
+            ASSERT_NEAR(std::bit_cast<float>(got[2 * i]), best, 2e-5) << "point " << i;
+            if (got[2 * i + 1] == kNone) {
+                ASSERT_GT(best, 6.5 - 2e-5);
+            } else {
+                const Point3d p = {points[3 * i], points[3 * i + 1], points[3 * i + 2]};
+                ASSERT_NEAR(triangle_distance(p, list.at(got[2 * i + 1]).corners), best, 2e-5) << "face of point " << i;
+            }
         }
     }
 }

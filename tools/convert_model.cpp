@@ -29,12 +29,6 @@ struct Plan {
     std::vector<std::string> left_out, warnings;
 };
 
-bool is_there(const Path& path)
-{
-    std::error_code ignored;
-    return fs::exists(path, ignored);
-}
-
 std::optional<DType> dtype_option(const Options& o)
 {
     if (o.dtype.empty())

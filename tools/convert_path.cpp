@@ -19,12 +19,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_there(const Path& path)
-{
-    std::error_code ignored;
-    return fs::exists(path, ignored);
-}
-
 // 8 numbers (TUM) or 12 (KITTI) on the first line that has any
 bool starts_with_a_pose(const Path& path)
 {

@@ -192,12 +192,6 @@ std::vector<uint32_t> targets_of(const EditedGrid& edited, double halo)
     return targets;
 }
 
-// without a model nothing around the change is thrown away: only cells that changed wait for points
-std::vector<uint32_t> waiting_of(const EditedGrid& edited)
-{
-    return targets_of(edited, 0);
-}
-
 Status edit(const Options& o, const Globals& globals)
 {
     if (!o.undo.empty())
@@ -223,7 +217,8 @@ Status edit(const Options& o, const Globals& globals)
     if (edited.grid.cells.empty())
         return fail(ErrorCode::bad_input, "the edit leaves no cell in {}", quote(o.grid));
     const bool model = !o.out.generation.model.empty();
-    what.targets = model ? targets_of(edited, o.halo) : waiting_of(edited);
+    // without a model nothing around the change is thrown away: only cells that changed wait for points
+    what.targets = targets_of(edited, model ? o.halo : 0);
     SR_TRY(what.request, request_json(o));
     const size_t left = present(edited.grid, edited.touched).size();
     what.counts = {{"cells", edited.grid.cells.size()},

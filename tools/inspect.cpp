@@ -175,12 +175,6 @@ Report describe_weights(const SafetensorsSet& set, bool with_tensors, Totals& to
 
 // ---- a model's folder
 
-bool is_there(const Path& path)
-{
-    std::error_code ignored;
-    return std::filesystem::exists(path, ignored);
-}
-
 // the component's weights, whatever their base name; none for a folder without (a scheduler, a tokenizer)
 Result<std::optional<SafetensorsSet>> open_weights(const Path& folder)
 {

@@ -95,7 +95,6 @@ Status SeedRuns::prepare()
     SR_TRY(part_, cut_sub_grid(what_.grid, what_.targets, regions_.region_size));
     part_grid_ = part_.grid;
     regions_.from_known = true;
-    SR_CHECK(generation_.begin(part_.grid, regions_));
     SR_TRY(const uint64_t grid, hash_file(what_.input));
     SR_TRY(settings_, generation_.settings_json(what_.command, grid));
     settings_["request"] = what_.request;
@@ -134,6 +133,7 @@ Status SeedRuns::run()
     SR_CHECK(prepare());
     const std::vector<uint64_t> seeds = seeds_of(options_);
     if (options_.generation.dry_run) {
+        SR_CHECK(generation_.begin(part_.grid, regions_));
         SR_CHECK(generation_.load(seeds.front()));
         return generation_.report_dry_run(seeds.size());
     }

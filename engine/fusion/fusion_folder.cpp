@@ -17,18 +17,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_file(const Path& path)
-{
-    std::error_code error;
-    return fs::is_regular_file(path, error);
-}
-
-bool is_folder(const Path& path)
-{
-    std::error_code error;
-    return fs::is_directory(path, error);
-}
-
 // a path of a file, kept inside the folder
 Result<Path> inside(const Path& folder, const Json& name, std::string_view where)
 {

@@ -2,13 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/mesh/chamfer.h"
 
-#include "engine/mesh/triangle_tree.h"
+#include "engine/mesh/nearest_surface.h"
 #include "kernels/kernels.h"
-#include "kernels/meshes.h"
 #include "runtime/program.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -19,25 +17,8 @@ namespace {
 using Row = std::array<float, 4>;
 using Origin = std::array<double, 3>;
 
-constexpr size_t kBatch = 1 << 20; // points or queries at once
-
-// the middle of the mesh, from which floats are exact enough
-Origin origin_of(const Mesh& mesh)
-{
-    Origin low, high;
-    low.fill(std::numeric_limits<double>::max());
-    high.fill(std::numeric_limits<double>::lowest());
-    for (const auto& f : mesh.faces)
-        for (const uint32_t v : f)
-            for (size_t a = 0; a < 3; ++a) {
-                low[a] = std::min(low[a], double(mesh.positions[v][a]));
-                high[a] = std::max(high[a], double(mesh.positions[v][a]));
-            }
-    Origin origin;
-    for (size_t a = 0; a < 3; ++a)
-        origin[a] = std::round((low[a] + high[a]) / 2);
-    return origin;
-}
+constexpr size_t kBatch = 1 << 20;   // points or queries at once
+constexpr float kEverywhere = 1e18f; // metres; its square is a float too
 
 std::vector<Row> points_from(const VoxelGrid& grid, const Origin& origin)
 {
@@ -55,19 +36,6 @@ std::vector<Row> points_from(const VoxelGrid& grid, const Origin& origin)
         }
     }
     return rows;
-}
-
-std::vector<TriangleCorners> triangles_from(const Mesh& mesh, const Origin& origin)
-{
-    std::vector<TriangleCorners> triangles;
-    for (const auto& f : mesh.faces) {
-        TriangleCorners t;
-        for (size_t c = 0; c < 3; ++c)
-            for (size_t a = 0; a < 3; ++a)
-                t[c][a] = float(mesh.positions[f[c]][a] - origin[a]);
-        triangles.push_back(t);
-    }
-    return triangles;
 }
 
 // uniform in [0, 1), keyed by (seed, sample, which): splitmix64
@@ -110,50 +78,12 @@ Result<std::unique_ptr<Buffer>> upload(Device& device, std::span<const T> values
     return buffer;
 }
 
-// distances of a batch of points from all triangles, in trees that the device can bind
-Result<double> sum_to_surface(Device& device, std::span<const Row> batch,
-                              std::span<const std::pair<std::unique_ptr<Buffer>, std::unique_ptr<Buffer>>> trees)
+Result<double> mean_to_surface(const NearestSurface& surface, const std::vector<Row>& points)
 {
-    SR_TRY(const auto points, upload(device, batch, "points"));
-    SR_TRY(const auto results, Buffer::create(device, batch.size() * 4, MemoryKind::device, "distances"));
-    const auto rows = uint32_t(batch.size());
-    Graph g;
-    const Tensor queries = g.external(points->slice(), rows, 4, DType::f32, "points", 4);
-    const Tensor y = fill(g, rows, std::bit_cast<uint32_t>(1e18f)); // its square is a float too
-    for (const auto& [nodes, triangles] : trees) {
-        const SurfaceTree tree{
-            g.external(nodes->slice(), uint32_t(nodes->bytes() / 32), 8, DType::u32, "nodes", 8),
-            g.external(triangles->slice(), uint32_t(triangles->bytes() / 36), 9, DType::f32, "triangles", 9)};
-        surface_distance(g, queries, tree, y);
-    }
-    g.replace(y.resource, g.external(results->slice(), rows, 1, DType::u32, "distances", 1).resource);
-    SR_TRY(const auto program, Program::create(device, g));
-    SR_CHECK(program->run());
-    std::vector<float> distances(rows);
-    SR_CHECK(device.read(results->slice(), std::as_writable_bytes(std::span(distances))));
+    SR_TRY(const std::vector<NearestFace> nearest, surface.find(points, kEverywhere));
     double sum = 0;
-    for (const float d : distances)
-        sum += d;
-    return sum;
-}
-
-Result<double> mean_to_surface(Device& device, const std::vector<Row>& points, std::vector<TriangleCorners> triangles)
-{
-    const size_t most = std::min<uint64_t>(1 << 20, device.limits().max_storage_range / sizeof(TriangleCorners));
-    std::vector<std::pair<std::unique_ptr<Buffer>, std::unique_ptr<Buffer>>> trees;
-    for (size_t first = 0; first < triangles.size(); first += most) {
-        const auto begin = triangles.begin() + ptrdiff_t(first);
-        const TriangleTree tree = triangle_tree({begin, begin + ptrdiff_t(std::min(most, triangles.size() - first))});
-        SR_TRY(auto nodes, upload<TriangleTree::Node>(device, tree.nodes, "nodes"));
-        SR_TRY(auto leaves, upload<TriangleCorners>(device, tree.triangles, "triangles"));
-        trees.emplace_back(std::move(nodes), std::move(leaves));
-    }
-    double sum = 0;
-    for (size_t first = 0; first < points.size(); first += kBatch) {
-        const auto batch = std::span(points).subspan(first, std::min(kBatch, points.size() - first));
-        SR_TRY(const double part, sum_to_surface(device, batch, trees));
-        sum += part;
-    }
+    for (const NearestFace& n : nearest)
+        sum += n.distance;
     return sum / double(points.size());
 }
 
@@ -222,13 +152,13 @@ Result<Chamfer> chamfer(Device& device, const Mesh& mesh, const VoxelGrid& grid,
         return fail(ErrorCode::bad_input, "the grid has no points");
     if (options.samples < 1 || options.samples > 1u << 26)
         return fail(ErrorCode::bad_input, "expected 1 to 2^26 samples of the surface, found {}", options.samples);
-    const Origin origin = origin_of(mesh);
-    const std::vector<Row> points = points_from(grid, origin);
+    SR_TRY(const NearestSurface surface, NearestSurface::create(device, mesh));
+    const std::vector<Row> points = points_from(grid, surface.origin());
     if (points.empty())
         return fail(ErrorCode::bad_input, "no cell of the grid has points yet");
-    SR_TRY(const std::vector<Row> samples, surface_samples(mesh, origin, options));
+    SR_TRY(const std::vector<Row> samples, surface_samples(mesh, surface.origin(), options));
     Chamfer result;
-    SR_TRY(result.to_surface, mean_to_surface(device, points, triangles_from(mesh, origin)));
+    SR_TRY(result.to_surface, mean_to_surface(surface, points));
     SR_TRY(result.to_points, mean_to_points(device, samples, points, grid.voxel_size));
     return result;
 }

@@ -3,7 +3,7 @@
 // glTF 2.0, https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html: one mesh, one primitive per material and label
 #include "engine/mesh/labels.h"
 #include "engine/mesh/mesh_files.h"
-#include "engine/mesh/srgb.h"
+#include "engine/scene/srgb.h"
 #include "engine/scene/palette.h"
 #include "runtime/json.h"
 #include "runtime/quote.h"

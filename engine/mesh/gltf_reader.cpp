@@ -3,7 +3,7 @@
 // meshes of a glTF scene: nodes composed, triangles, strips and fans, base colours and their textures
 #include "engine/mesh/gltf_file.h"
 #include "engine/mesh/mesh_readers.h"
-#include "engine/mesh/srgb.h"
+#include "engine/scene/srgb.h"
 #include "engine/scene/json_numbers.h"
 #include "runtime/quote.h"
 

@@ -4,7 +4,7 @@
 #include "engine/mesh/asset_folder.h"
 #include "engine/mesh/mesh_readers.h"
 #include "engine/mesh/polygon.h"
-#include "engine/mesh/srgb.h"
+#include "engine/scene/srgb.h"
 #include "runtime/quote.h"
 
 #include <algorithm>

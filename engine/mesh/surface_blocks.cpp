@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/mesh/surface_blocks.h"
 
-#include "engine/mesh/srgb.h"
+#include "engine/scene/srgb.h"
 #include "kernels/kernels.h"
 #include "kernels/meshes.h"
 

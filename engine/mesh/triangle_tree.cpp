@@ -13,9 +13,9 @@ namespace {
 constexpr size_t kLeaf = 4;
 
 // three times the centre: its order is all that matters
-float center_of(const TriangleCorners& t, size_t axis)
+float center_of(const TreeTriangle& t, size_t axis)
 {
-    return t[0][axis] + t[1][axis] + t[2][axis];
+    return t.corners[0][axis] + t.corners[1][axis] + t.corners[2][axis];
 }
 
 struct Span {
@@ -23,12 +23,12 @@ struct Span {
     bool is_right;
 };
 
-TriangleTree::Node box_of(const std::vector<TriangleCorners>& triangles, const Span& s)
+TriangleTree::Node box_of(const std::vector<TreeTriangle>& triangles, const Span& s)
 {
-    TriangleTree::Node node{triangles[s.first][0], uint32_t(s.first), triangles[s.first][0],
-                            uint32_t(s.last - s.first)};
+    const std::array<float, 3>& any = triangles[s.first].corners[0];
+    TriangleTree::Node node{any, uint32_t(s.first), any, uint32_t(s.last - s.first)};
     for (size_t i = s.first; i < s.last; ++i)
-        for (const auto& corner : triangles[i])
+        for (const auto& corner : triangles[i].corners)
             for (size_t a = 0; a < 3; ++a) {
                 node.low[a] = std::min(node.low[a], corner[a]);
                 node.high[a] = std::max(node.high[a], corner[a]);
@@ -47,10 +47,13 @@ size_t longest_axis(const TriangleTree::Node& node)
 
 } // namespace
 
-TriangleTree triangle_tree(std::vector<TriangleCorners> triangles)
+TriangleTree triangle_tree(const std::vector<TriangleCorners>& corners, uint32_t first_face)
 {
-    SR_ASSERT(!triangles.empty(), "a tree of no triangles");
+    SR_ASSERT(!corners.empty(), "a tree of no triangles");
     TriangleTree tree;
+    std::vector<TreeTriangle>& triangles = tree.triangles;
+    for (const TriangleCorners& c : corners)
+        triangles.push_back({c, first_face + uint32_t(triangles.size())});
     std::vector<Span> pending = {{0, triangles.size(), 0, false}};
     while (!pending.empty()) {
         const Span s = pending.back();
@@ -69,7 +72,6 @@ TriangleTree triangle_tree(std::vector<TriangleCorners> triangles)
         pending.push_back({middle, s.last, at, true});
         pending.push_back({s.first, middle, at, false});
     }
-    tree.triangles = std::move(triangles);
     return tree;
 }
 

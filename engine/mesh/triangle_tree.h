@@ -9,6 +9,10 @@
 namespace semrover {
 
 using TriangleCorners = std::array<std::array<float, 3>, 3>;
+struct TreeTriangle {
+    TriangleCorners corners;
+    uint32_t face;
+};
 
 // boxes around boxes around triangles, as kernels/meshes.h, SurfaceTree, has them: halves by the median of centres
 // along the longest axis, at most four triangles in a leaf, the left child behind its parent
@@ -20,9 +24,10 @@ struct TriangleTree {
         uint32_t count; // triangles; 0: no leaf
     };
     std::vector<Node> nodes;
-    std::vector<TriangleCorners> triangles; // in the order of leaves
+    std::vector<TreeTriangle> triangles; // in the order of leaves
 };
 
-TriangleTree triangle_tree(std::vector<TriangleCorners> triangles); // at least one
+// at least one; its face is `first_face`, the next one's one more
+TriangleTree triangle_tree(const std::vector<TriangleCorners>& corners, uint32_t first_face = 0);
 
 } // namespace semrover

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/mesh/voxelizer.h"
 
-#include "engine/mesh/srgb.h"
+#include "engine/scene/srgb.h"
 #include "engine/mesh/surface_blocks.h"
 #include "engine/mesh/texture_atlas.h"
 #include "engine/scene/palette.h"

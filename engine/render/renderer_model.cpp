@@ -16,12 +16,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_there(const Path& path)
-{
-    std::error_code ignored;
-    return fs::exists(path, ignored);
-}
-
 template <typename Config>
 Result<Config> read_config(const Path& path, Result<Config> (*parse)(const Json&))
 {

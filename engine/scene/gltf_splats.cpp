@@ -3,6 +3,7 @@
 #include "engine/scene/gltf_splats.h"
 
 #include "engine/scene/gltf_document.h"
+#include "engine/scene/srgb.h"
 #include "runtime/quote.h"
 
 #include <algorithm>
@@ -23,16 +24,6 @@ std::array<double, 4> product(const std::array<double, 4>& a, const std::array<d
     return {
         a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1], a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0],
         a[3] * b[2] + a[0] * b[1] - a[1] * b[0] + a[2] * b[3], a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2]};
-}
-
-double linear_of(double srgb)
-{
-    return srgb <= 0.04045 ? srgb / 12.92 : std::pow((srgb + 0.055) / 1.055, 2.4);
-}
-
-double srgb_of(double linear)
-{
-    return linear <= 0.0031308 ? linear * 12.92 : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
 }
 
 // ---- reading
@@ -120,7 +111,7 @@ Ellipsoid ellipsoid_of(const Attributes& a, size_t i, const Placement& p)
     for (size_t c = 0; c < 3; ++c) {
         e.scale[c] = p.scale * a.scale.data[3 * i + c];
         e.color[c] = a.harmonic.components ? 0.5 + double(kHarmonic0) * a.harmonic.data[3 * i + c]
-                                           : srgb_of(a.color.data[a.color.components * i + c]);
+                                           : srgb_of_linear(a.color.data[a.color.components * i + c]);
     }
     e.opacity = a.opacity.data[i];
     if (a.label.components && a.label.data[i] >= 0 && a.label.data[i] <= 255)
@@ -231,7 +222,7 @@ AttributeWriter attributes_of(const Surfels& s)
         scales.insert(scales.end(), {s.sigma_u[i], s.sigma_v[i], kThinScale});
         for (const float c : s.color[i]) {
             harmonics.push_back((c - 0.5f) / kHarmonic0);
-            colors.push_back(static_cast<float>(linear_of(std::clamp(c, 0.f, 1.f))));
+            colors.push_back(static_cast<float>(linear_of_srgb(std::clamp(c, 0.f, 1.f))));
         }
         colors.push_back(std::clamp(s.opacity[i], 0.f, 1.f));
         labels.push_back(s.label[i]);

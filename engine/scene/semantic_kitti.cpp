@@ -60,12 +60,6 @@ DenseLabels empty_box()
     return {{256, 256, 32}, {2000, 2000, 2000}, {0, -256000, -20000}, {}};
 }
 
-bool is_there(const Path& path)
-{
-    std::error_code ignored;
-    return std::filesystem::exists(path, ignored);
-}
-
 Result<std::vector<std::byte>> read_exactly(const Path& path, size_t bytes)
 {
     SR_TRY(std::vector<std::byte> data, read_file(path, bytes));

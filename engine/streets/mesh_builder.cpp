@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/streets/mesh_builder.h"
 
+#include "engine/scene/srgb.h"
+
 #include <algorithm>
 
 namespace semrover {
@@ -10,11 +12,6 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kSmallestArea = 1e-9; // square metres
-
-double linear_of(double srgb)
-{
-    return srgb <= 0.04045 ? srgb / 12.92 : std::pow((srgb + 0.055) / 1.055, 2.4);
-}
 
 // two directions across an axis, so that (a, b, axis) is right-handed
 std::pair<Vector3, Vector3> across(const Vector3& axis)
@@ -54,7 +51,7 @@ Finish MeshBuilder::finish(Pattern pattern, uint8_t label, const Color& tint)
     if (fresh) {
         Material m{.name = std::string(pattern_info(pattern).name)};
         for (size_t c = 0; c < 3; ++c)
-            m.color[c] = float(linear_of(key[c] / 63.0));
+            m.color[c] = float(linear_of_srgb(key[c] / 63.0));
         m.texture = int32_t(texture_of(pattern));
         mesh_.materials.push_back(std::move(m));
         gloss_.push_back(pattern_info(pattern).gloss);

@@ -1,7 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/fusion/surface_error.h"
-#include "kernels/fusion.h"
 #include "tests/kernel_case.h"
 #include "tests/says.h"
 
@@ -67,7 +66,7 @@ Mesh random_mesh(const NearestCase& c, std::mt19937& random)
     return mesh;
 }
 
-TEST(kernel_nearest_face, distances_match_all_triangles_one_by_one)
+TEST(engine_surface_error, distances_match_all_triangles_one_by_one)
 {
     // one triangle; small ones; ones much longer than a cell; points far outside; a radius
     for (const NearestCase& c :
@@ -98,7 +97,7 @@ TEST(kernel_nearest_face, distances_match_all_triangles_one_by_one)
     }
 }
 
-TEST(kernel_nearest_face, labels_of_faces_are_compared_by_area_where_enough_frames_saw_all_corners)
+TEST(engine_surface_error, labels_of_faces_are_compared_by_area_where_enough_frames_saw_all_corners)
 {
     Mesh truth;
     truth.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}};
@@ -124,7 +123,7 @@ TEST(kernel_nearest_face, labels_of_faces_are_compared_by_area_where_enough_fram
     EXPECT_TRUE(says(measure_surface(test_device(), mesh, truth, {1, 1, 0, 1}), "none of 4 vertices was seen by 2"));
 }
 
-TEST(kernel_nearest_face, views_are_counted_where_the_depth_agrees)
+TEST(engine_surface_error, views_are_counted_where_the_depth_agrees)
 {
     Mesh mesh;
     mesh.positions = {{0, 0, 5}, {0, 0, 4}, {0, 0, -5}, {4, 0, 5}, {9, 0, 5}, {0, 0, 5.05f}};

@@ -1,0 +1,101 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/mesh/nearest_surface.h"
+
+#include "engine/mesh/triangle_tree.h"
+#include "kernels/meshes.h"
+#include "runtime/program.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace semrover {
+
+namespace {
+
+constexpr size_t kBatch = 1 << 20;     // points at once
+constexpr size_t kMostFaces = 1 << 20; // of a tree
+
+std::array<double, 3> middle_of(const Mesh& mesh)
+{
+    std::array<double, 3> low, high, middle;
+    low.fill(std::numeric_limits<double>::max());
+    high.fill(std::numeric_limits<double>::lowest());
+    for (const auto& f : mesh.faces)
+        for (const uint32_t v : f)
+            for (size_t a = 0; a < 3; ++a) {
+                low[a] = std::min(low[a], double(mesh.positions[v][a]));
+                high[a] = std::max(high[a], double(mesh.positions[v][a]));
+            }
+    for (size_t a = 0; a < 3; ++a)
+        middle[a] = std::round((low[a] + high[a]) / 2);
+    return middle;
+}
+
+std::vector<TriangleCorners> corners_of(const Mesh& mesh, size_t first, size_t count,
+                                        const std::array<double, 3>& origin)
+{
+    std::vector<TriangleCorners> corners(count);
+    for (size_t f = 0; f < count; ++f)
+        for (size_t c = 0; c < 3; ++c)
+            for (size_t a = 0; a < 3; ++a)
+                corners[f][c][a] = float(mesh.positions[mesh.faces[first + f][c]][a] - origin[a]);
+    return corners;
+}
+
+template <typename T>
+Result<std::unique_ptr<Buffer>> upload(Device& device, std::span<const T> values, const char* name)
+{
+    SR_TRY(auto buffer, Buffer::create(device, values.size_bytes(), MemoryKind::device, name));
+    SR_CHECK(device.write(buffer->slice(), std::as_bytes(values)));
+    return buffer;
+}
+
+} // namespace
+
+Result<NearestSurface> NearestSurface::create(Device& device, const Mesh& mesh)
+{
+    NearestSurface s(device);
+    s.origin_ = middle_of(mesh);
+    const size_t most = std::min<uint64_t>(kMostFaces, device.limits().max_storage_range / sizeof(TreeTriangle));
+    for (size_t first = 0; first < mesh.faces.size(); first += most) {
+        const size_t count = std::min(most, mesh.faces.size() - first);
+        const TriangleTree tree = triangle_tree(corners_of(mesh, first, count, s.origin_), uint32_t(first));
+        Tree& t = s.trees_.emplace_back();
+        SR_TRY(t.nodes, upload<TriangleTree::Node>(device, tree.nodes, "nodes"));
+        SR_TRY(t.triangles, upload<TreeTriangle>(device, tree.triangles, "triangles"));
+    }
+    return s;
+}
+
+Status NearestSurface::search(std::span<const std::array<float, 4>> points, std::span<NearestFace> nearest) const
+{
+    SR_TRY(const auto queries, upload(*device_, points, "points"));
+    SR_TRY(const auto results, upload<NearestFace>(*device_, nearest, "nearest faces"));
+    const auto rows = uint32_t(points.size());
+    Graph g;
+    const Tensor x = g.external(queries->slice(), rows, 4, DType::f32, "points", 4);
+    const Tensor y = g.external(results->slice(), rows, 2, DType::u32, "nearest faces", 2);
+    for (const auto& [nodes, triangles] : trees_)
+        surface_distance(
+            g, x,
+            {g.external(nodes->slice(), uint32_t(nodes->bytes() / 32), 8, DType::u32, "nodes", 8),
+             g.external(triangles->slice(), uint32_t(triangles->bytes() / 40), 10, DType::u32, "triangles", 10)},
+            y);
+    SR_TRY(const auto program, Program::create(*device_, g));
+    SR_CHECK(program->run());
+    return device_->read(results->slice(), std::as_writable_bytes(nearest));
+}
+
+Result<std::vector<NearestFace>> NearestSurface::find(std::span<const std::array<float, 4>> points, float radius) const
+{
+    std::vector<NearestFace> nearest(points.size(), {radius, ~0u});
+    for (size_t first = 0; first < points.size(); first += kBatch) {
+        const size_t count = std::min(kBatch, points.size() - first);
+        SR_CHECK(search(points.subspan(first, count), std::span(nearest).subspan(first, count)));
+    }
+    return nearest;
+}
+
+} // namespace semrover
