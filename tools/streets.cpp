@@ -4,6 +4,7 @@
 #include "engine/mesh/mesh_files.h"
 #include "engine/scene/palette.h"
 #include "engine/streets/camera_drive.h"
+#include "engine/streets/seen_cells.h"
 #include "engine/streets/street_grid.h"
 #include "runtime/json.h"
 #include "tools/commands.h"
@@ -24,7 +25,7 @@ struct Options {
     double fov = 73, shift = 1.5;
     StreetImages images;
     VoxelizeOptions voxels;
-    bool pictures = false, no_grids = false;
+    bool pictures = false, no_grids = false, seen = false;
 };
 
 Json street_json(const Options& o, const Street& street, const CameraPath& path)
@@ -52,11 +53,16 @@ Json street_json(const Options& o, const Street& street, const CameraPath& path)
             {"shift", o.shift}};
 }
 
-Status write_grids(const Options& o, Device& device, const Street& street, const OutputFolder& out)
+Status write_grids(const Options& o, Device& device, const Street& street, std::span<const CameraPath> drives,
+                   const OutputFolder& out)
 {
     VoxelizeOptions voxels = o.voxels;
     voxels.seed = o.street.seed;
     SR_TRY(StreetGrids grids, street_grids(device, street, voxels));
+    if (o.seen) {
+        SR_TRY(const std::vector<uint32_t> seen, seen_cells(device, street.mesh, grids.truth, drives));
+        grids = part_of(grids, seen);
+    }
     for (VoxelGrid* grid : {&grids.truth, &grids.semantic}) {
         grid->metadata["name"] = fmt::format("street {}", o.street.seed);
         grid->metadata["seed"] = std::to_string(o.street.seed);
@@ -69,7 +75,7 @@ Status draw(const Options& o, const Globals& globals, Device& device, const Stre
             const CameraPath& shifted, const OutputFolder& out)
 {
     if (!o.no_grids)
-        SR_CHECK(write_grids(o, device, street, out));
+        SR_CHECK(write_grids(o, device, street, std::array{path, shifted}, out));
     if (!o.pictures)
         return {};
     SR_CHECK(draw_street(device, street, path, o.street.seed, o.images, out.path(), globals));
@@ -126,6 +132,7 @@ void add_streets(CLI::App& app, const Globals& globals, Run& run)
     c->add_option("--yaw", o->drive.yaw, "radians to the left of the street");
     c->add_option("--shift", o->shift, "metres to the left of the second, novel drive");
     c->add_flag("--no-grids", o->no_grids, "without truth.sgrid and semantic.sgrid");
+    c->add_flag("--seen", o->seen, "of the grids only what the drives see, as a recording would");
     c->add_option("--voxel-size", o->voxels.voxel_size, "metres")->check(CLI::Range(0.05f, 10.f));
     c->add_option("--points", o->voxels.points_per_voxel, "points of a cell")->check(CLI::Range(1, 4096));
     c->add_flag("--images", o->pictures, "also pictures of both drives: {color,depth,normal,label,visible}/000000.png");

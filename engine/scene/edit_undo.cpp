@@ -78,17 +78,8 @@ Difference difference(const VoxelGrid& before, const VoxelGrid& after)
 VoxelGrid part_of(const VoxelGrid& grid, const std::vector<size_t>& cells)
 {
     VoxelGrid part;
-    const size_t width = width_of(grid);
-    for (const size_t c : cells) {
-        part.cells.push_back(grid.cells[c]);
-        part.labels.push_back(grid.labels[c]);
-        if (!width)
-            continue;
-        const auto at = ptrdiff_t(c * width), end = ptrdiff_t((c + 1) * width);
-        part.points.insert(part.points.end(), grid.points.begin() + at, grid.points.begin() + end);
-        part.colors.insert(part.colors.end(), grid.colors.begin() + at, grid.colors.begin() + end);
-        part.generated.push_back(grid.generated[c]);
-    }
+    for (const size_t c : cells)
+        append_cell(part, grid, c);
     return part;
 }
 

@@ -191,6 +191,19 @@ std::optional<size_t> find_cell(const VoxelGrid& grid, const Cell& cell)
     return static_cast<size_t>(found - grid.cells.begin());
 }
 
+void append_cell(VoxelGrid& to, const VoxelGrid& from, size_t index)
+{
+    to.cells.push_back(from.cells[index]);
+    to.labels.push_back(from.labels[index]);
+    if (!from.has_points())
+        return;
+    const size_t width = size_t(from.points_per_voxel) * 3;
+    const auto at = ptrdiff_t(index * width), end = ptrdiff_t((index + 1) * width);
+    to.points.insert(to.points.end(), from.points.begin() + at, from.points.begin() + end);
+    to.colors.insert(to.colors.end(), from.colors.begin() + at, from.colors.begin() + end);
+    to.generated.push_back(from.generated[index]);
+}
+
 void sort_cells(VoxelGrid& grid)
 {
     const size_t v = grid.cells.size();

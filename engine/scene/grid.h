@@ -37,6 +37,9 @@ std::array<float, 3> cell_center(const Cell& cell, float voxel_size);
 // index of a cell, by binary search; none if the grid does not have it
 std::optional<size_t> find_cell(const VoxelGrid& grid, const Cell& cell);
 
+// one more cell at the end of `to`: cell `index` of `from` with what belongs to it; both have points or both have none
+void append_cell(VoxelGrid& to, const VoxelGrid& from, size_t index);
+
 // puts cells (and what belongs to them) in order; for grids that were just read or made. Array sizes must agree.
 void sort_cells(VoxelGrid& grid);
 

@@ -33,17 +33,8 @@ VoxelGrid cut_stamp(const VoxelGrid& grid, std::span<const uint32_t> cells)
     VoxelGrid stamp;
     stamp.voxel_size = grid.voxel_size;
     stamp.points_per_voxel = grid.points_per_voxel;
-    const size_t per_cell = grid.has_points() ? size_t(grid.points_per_voxel) * 3 : 0;
-    for (const uint32_t c : cells) {
-        const ptrdiff_t at = ptrdiff_t(c * per_cell), end = at + ptrdiff_t(per_cell);
-        stamp.cells.push_back(grid.cells[c]);
-        stamp.labels.push_back(grid.labels[c]);
-        if (!per_cell)
-            continue;
-        stamp.points.insert(stamp.points.end(), grid.points.begin() + at, grid.points.begin() + end);
-        stamp.colors.insert(stamp.colors.end(), grid.colors.begin() + at, grid.colors.begin() + end);
-        stamp.generated.push_back(grid.generated[c]);
-    }
+    for (const uint32_t c : cells)
+        append_cell(stamp, grid, c);
     const Cell low = lowest_corner(stamp.cells);
     stamp.metadata["stamp_origin"] = fmt::format("{},{},{}", low[0], low[1], low[2]);
     move_to_origin(stamp);

@@ -108,20 +108,12 @@ Result<VoxelGrid> TileCache::window(const CellWindow& window)
     VoxelGrid out;
     out.voxel_size = source_.voxel_size();
     out.points_per_voxel = points_per_voxel_;
-    const size_t width = size_t(points_per_voxel_) * 3;
     for (const TileIndex& index : needed) {
         SR_CHECK(bring(index));
         const VoxelGrid& tile = tiles_.at(index);
-        for (size_t c = 0; c < tile.cells.size(); ++c) {
-            if (!window.holds(tile.cells[c]))
-                continue;
-            out.cells.push_back(tile.cells[c]);
-            out.labels.push_back(tile.labels[c]);
-            const auto at = ptrdiff_t(c * width), end = ptrdiff_t((c + 1) * width);
-            out.points.insert(out.points.end(), tile.points.begin() + at, tile.points.begin() + end);
-            out.colors.insert(out.colors.end(), tile.colors.begin() + at, tile.colors.begin() + end);
-            out.generated.push_back(tile.generated[c]);
-        }
+        for (size_t c = 0; c < tile.cells.size(); ++c)
+            if (window.holds(tile.cells[c]))
+                append_cell(out, tile, c);
     }
     sort_cells(out);
     return out;

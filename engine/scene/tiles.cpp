@@ -186,18 +186,9 @@ Result<VoxelGrid> TileFolder::read(const CellWindow& window) const
     inside.voxel_size = out.voxel_size;
     inside.points_per_voxel = out.points_per_voxel;
     inside.metadata = out.metadata;
-    const size_t width = has_points_ ? size_t(points_per_voxel_) * 3 : 0;
-    for (size_t c = 0; c < out.cells.size(); ++c) {
-        if (!window.holds(out.cells[c]))
-            continue;
-        inside.cells.push_back(out.cells[c]);
-        inside.labels.push_back(out.labels[c]);
-        const auto at = ptrdiff_t(c * width), end = ptrdiff_t((c + 1) * width);
-        inside.points.insert(inside.points.end(), out.points.begin() + at, out.points.begin() + end);
-        inside.colors.insert(inside.colors.end(), out.colors.begin() + at, out.colors.begin() + end);
-        if (width)
-            inside.generated.push_back(out.generated[c]);
-    }
+    for (size_t c = 0; c < out.cells.size(); ++c)
+        if (window.holds(out.cells[c]))
+            append_cell(inside, out, c);
     sort_cells(inside);
     return inside;
 }
@@ -247,17 +238,8 @@ Status write_tile_index(const Path& folder, const TileFolderInfo& info, const st
 std::map<TileIndex, VoxelGrid> cut_tiles(const VoxelGrid& grid, int32_t edge)
 {
     std::map<TileIndex, VoxelGrid> tiles;
-    const size_t width = grid.has_points() ? size_t(grid.points_per_voxel) * 3 : 0;
-    for (size_t c = 0; c < grid.cells.size(); ++c) {
-        VoxelGrid& tile = tiles[tile_of(grid.cells[c], edge)];
-        tile.cells.push_back(grid.cells[c]);
-        tile.labels.push_back(grid.labels[c]);
-        const auto at = ptrdiff_t(c * width), end = ptrdiff_t((c + 1) * width);
-        tile.points.insert(tile.points.end(), grid.points.begin() + at, grid.points.begin() + end);
-        tile.colors.insert(tile.colors.end(), grid.colors.begin() + at, grid.colors.begin() + end);
-        if (width)
-            tile.generated.push_back(grid.generated[c]);
-    }
+    for (size_t c = 0; c < grid.cells.size(); ++c)
+        append_cell(tiles[tile_of(grid.cells[c], edge)], grid, c);
     for (auto& [index, tile] : tiles) {
         tile.voxel_size = grid.voxel_size;
         tile.points_per_voxel = grid.points_per_voxel;

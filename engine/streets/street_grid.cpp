@@ -47,4 +47,17 @@ Result<StreetGrids> street_grids(Device& device, const Street& street, const Vox
     return grids;
 }
 
+StreetGrids part_of(const StreetGrids& grids, std::span<const uint32_t> cells)
+{
+    StreetGrids part;
+    for (const auto& [from, to] : {std::pair(&grids.truth, &part.truth), {&grids.semantic, &part.semantic}}) {
+        to->voxel_size = from->voxel_size;
+        to->points_per_voxel = from->points_per_voxel;
+        to->metadata = from->metadata;
+        for (const uint32_t c : cells)
+            append_cell(*to, *from, c);
+    }
+    return part;
+}
+
 } // namespace semrover

@@ -5,6 +5,8 @@
 #include "engine/mesh/voxelizer.h"
 #include "engine/streets/street.h"
 
+#include <span>
+
 namespace semrover {
 
 struct StreetGrids {
@@ -15,5 +17,8 @@ struct StreetGrids {
 // road covers more of it: a line of 14 cm never wins against the 60 cm of a cell. Errors: those of voxelize()
 Result<StreetGrids> street_grids(Device& device, const Street& street, const VoxelizeOptions& options,
                                  float lane_share = 0.08f);
+
+// those of the `cells` (indices, ascending)
+StreetGrids part_of(const StreetGrids& grids, std::span<const uint32_t> cells);
 
 } // namespace semrover

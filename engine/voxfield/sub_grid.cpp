@@ -67,14 +67,9 @@ SubGrid take(const VoxelGrid& whole, std::span<const uint32_t> cells, std::span<
     part.grid.points.reserve(cells.size() * width);
     part.grid.colors.reserve(cells.size() * width);
     for (const uint32_t c : cells) {
-        part.grid.cells.push_back(whole.cells[c]);
-        part.grid.labels.push_back(whole.labels[c]);
-        if (!width)
-            continue;
-        const auto at = ptrdiff_t(c * width), end = ptrdiff_t((c + 1) * width);
-        part.grid.points.insert(part.grid.points.end(), whole.points.begin() + at, whole.points.begin() + end);
-        part.grid.colors.insert(part.grid.colors.end(), whole.colors.begin() + at, whole.colors.begin() + end);
-        part.grid.generated.push_back(!std::ranges::binary_search(targets, c));
+        append_cell(part.grid, whole, c);
+        if (width)
+            part.grid.generated.back() = !std::ranges::binary_search(targets, c);
     }
     return part;
 }
