@@ -1,0 +1,40 @@
+# SPDX-FileCopyrightText: semrover authors
+# SPDX-License-Identifier: Apache-2.0
+"""Settings of a recipe: configs/RECIPE.NAME.json, overridden on the command line by --set key=value."""
+import argparse
+import json
+import os
+
+import torch
+
+CONFIGS = os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "configs")
+COMMON = {"seed": 1, "precision": "bf16", "device": "cuda" if torch.cuda.is_available() else "cpu", "minutes": 0.0,
+          "save_minutes": 10.0, "warmup": 200, "decay": 0.3, "ema": 0.999, "clip": 1.0}
+
+
+def parser(recipe, about):
+    p = argparse.ArgumentParser(prog=f"tools/train/run {recipe}", description=about)
+    p.add_argument("-o", "--output", required=True, help="folder of the run; one that exists is continued")
+    p.add_argument("--config", default="paper", help=f"configs/{recipe}.NAME.json: paper, small, or a file")
+    p.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="a setting in place of the file's")
+    p.add_argument("--threads", type=int, default=0, help="of the CPU; 0: all")
+    return p
+
+
+def resolve(recipe, options):
+    """the settings of a run: COMMON, then the file, then --set. A misspelt key is an error."""
+    path = options.config
+    if not path.endswith(".json"):
+        path = os.path.join(CONFIGS, f"{recipe}.{options.config}.json")
+    with open(path) as file:
+        config = {**COMMON, **json.load(file)}
+    for item in options.set:
+        key, _, text = item.partition("=")
+        if key not in config:
+            raise SystemExit(f"--set {item}: {recipe} has no setting {key}; it has {', '.join(sorted(config))}")
+        try:
+            config[key] = json.loads(text)
+        except json.JSONDecodeError:
+            config[key] = text
+    torch.set_num_threads(options.threads or os.cpu_count())
+    return config

@@ -1,0 +1,135 @@
+# SPDX-FileCopyrightText: semrover authors
+# SPDX-License-Identifier: Apache-2.0
+"""The loop that all recipes share: Adam, warm-up and decay, EMA, checkpoints that a later run continues, loss curves."""
+import contextlib
+import json
+import os
+import signal
+import time
+
+import torch
+
+from . import safetensors_file
+from .curve import draw_curve
+
+CHECKPOINT = "checkpoint.safetensors"
+LOG = "log.jsonl"
+
+
+def learning_rate(config, step):
+    """constant after `warmup` steps, falling linearly to 0 over the last `decay` of `steps`"""
+    left = (config["steps"] - step) / max(1.0, config["decay"] * config["steps"])
+    return config["learning_rate"] * min(1.0, (step + 1) / max(1, config["warmup"]), max(left, 0.0))
+
+
+def generator(config, step, stream=0):
+    """random numbers of a step: a run that is continued draws what one that was not interrupted would"""
+    return torch.Generator().manual_seed((config["seed"] * 1000003 + step) * 16 + stream)
+
+
+def autocast(config):
+    if config["precision"] == "fp32":
+        return contextlib.nullcontext()
+    return torch.autocast(config["device"], dtype=torch.bfloat16)
+
+
+class Trainer:
+    """A model and a folder. `config` has steps, learning_rate, warmup, decay, ema, clip, seed, precision (bf16, fp32),
+    device, minutes (0: no limit), save_minutes; `export(state)` writes the engine's files from the averaged weights."""
+
+    def __init__(self, folder, model, config, export):
+        self.folder, self.config, self.export = folder, config, export
+        self.model = model.to(config["device"])
+        self.parameters = dict(self.model.named_parameters())
+        self.average = {name: p.detach().clone() for name, p in self.parameters.items()}
+        self.adam = torch.optim.Adam(self.model.parameters(), lr=config["learning_rate"], betas=(0.9, 0.99))
+        self.step = 0
+        self.stopped = False
+        os.makedirs(folder, exist_ok=True)
+        self._resume()
+        with open(os.path.join(folder, "config.json"), "w") as file:
+            json.dump(config, file, indent=1)
+
+    def start_from(self, state):
+        """weights to begin with; nothing when the run has begun before"""
+        if self.step == 0:
+            self.model.load_state_dict({name: t.float() for name, t in state.items()})
+            self.average = {name: p.detach().clone() for name, p in self.parameters.items()}
+
+    def run(self, loss_of_step):
+        """loss_of_step(model, step) -> (loss, {name: number} for the log); until `steps`, `minutes` or a signal"""
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._stop)
+        begin = saved = told = time.time()
+        recent = []
+        while self.step < self.config["steps"] and not self.stopped:
+            recent.append(self._advance(loss_of_step))
+            now = time.time()
+            if now - told > 20 or self.step == self.config["steps"]:
+                self._tell(recent, (now - told) / len(recent))
+                recent, told = [], now
+            if now - saved > 60 * self.config["save_minutes"]:
+                self.save()
+                saved = time.time()
+            if self.config["minutes"] and now - begin > 60 * self.config["minutes"]:
+                break
+        self.save()
+
+    def save(self):
+        tensors = {f"model.{name}": p for name, p in self.parameters.items()}
+        tensors.update({f"average.{name}": p for name, p in self.average.items()})
+        for name, p in self.parameters.items():
+            state = self.adam.state.get(p, {})
+            if state:
+                tensors[f"adam.exp_avg.{name}"] = state["exp_avg"]
+                tensors[f"adam.exp_avg_sq.{name}"] = state["exp_avg_sq"]
+        safetensors_file.write(os.path.join(self.folder, CHECKPOINT), tensors, {"step": self.step})
+        self.export({name: p.detach().cpu() for name, p in self.average.items()})
+        draw_curve(os.path.join(self.folder, LOG), os.path.join(self.folder, "curve.png"))
+
+    def _advance(self, loss_of_step):
+        for group in self.adam.param_groups:
+            group["lr"] = learning_rate(self.config, self.step)
+        with autocast(self.config):
+            loss, about = loss_of_step(self.model, self.step)
+        if not torch.isfinite(loss):
+            raise RuntimeError(f"the loss is {loss.item()} at step {self.step}; the last checkpoint is in {self.folder}")
+        self.adam.zero_grad(set_to_none=True)
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(self.model.parameters(), self.config["clip"])
+        self.adam.step()
+        self.step += 1
+        keep = min(self.config["ema"], (self.step + 1) / (self.step + 10))
+        names = list(self.parameters)
+        with torch.no_grad():
+            torch._foreach_mul_([self.average[n] for n in names], keep)
+            torch._foreach_add_([self.average[n] for n in names], [self.parameters[n] for n in names], alpha=1 - keep)
+        return {"loss": float(loss.detach()), **about}
+
+    def _tell(self, recent, seconds):
+        row = {"step": self.step, "lr": learning_rate(self.config, self.step - 1), "seconds_per_step": round(seconds, 3)}
+        for name in recent[0]:
+            row[name] = sum(r[name] for r in recent) / len(recent)
+        with open(os.path.join(self.folder, LOG), "a") as file:
+            file.write(json.dumps(row) + "\n")
+        print(" ".join(f"{k} {v:.5g}" for k, v in row.items()), flush=True)
+
+    def _resume(self):
+        path = os.path.join(self.folder, CHECKPOINT)
+        if not os.path.exists(path):
+            return
+        tensors = safetensors_file.read(path)
+        self.step = int(safetensors_file.read_header(path)[1]["step"])
+        with torch.no_grad():
+            for name, p in self.parameters.items():
+                p.copy_(tensors[f"model.{name}"])
+                self.average[name].copy_(tensors[f"average.{name}"])
+                if f"adam.exp_avg.{name}" in tensors:
+                    self.adam.state[p] = {
+                        "step": torch.tensor(float(self.step)),
+                        "exp_avg": tensors[f"adam.exp_avg.{name}"].to(p.device),
+                        "exp_avg_sq": tensors[f"adam.exp_avg_sq.{name}"].to(p.device)}
+        print(f"continuing {self.folder} at step {self.step}", flush=True)
+
+    def _stop(self, *_):
+        self.stopped = True
