@@ -46,6 +46,12 @@ class Attention(nn.Module):
         return self.to_out[0](y[:, :n]), self.to_add_out(y[:, n:]) if self.to_add_out else None
 
 
+def gelu_tanh(x):
+    """x (1 + tanh(sqrt(2/pi) (x + 0.044715 x^3))) / 2 by a sigmoid of twice the argument: on CPUs PyTorch's own takes
+    ten times as long in bf16"""
+    return x * torch.sigmoid(x * (1.5957691216057308 + 0.07135481282636 * x * x))
+
+
 class FeedForward(nn.Module):
     """GELU-tanh; diffusers' names net.0.proj and net.2"""
 
@@ -56,7 +62,7 @@ class FeedForward(nn.Module):
         self.net = nn.ModuleList([first, nn.Identity(), nn.Linear(4 * width, width)])
 
     def forward(self, x):
-        return self.net[2](F.gelu(self.net[0].proj(x), approximate="tanh"))
+        return self.net[2](gelu_tanh(self.net[0].proj(x)))
 
 
 class Modulation(nn.Module):

@@ -1,0 +1,108 @@
+# SPDX-FileCopyrightText: semrover authors
+# SPDX-License-Identifier: Apache-2.0
+"""Σ-Voxfield grids (.sgrid) as training data: tokens of all cells of many grids in one array, and local sets of them."""
+import glob
+import json
+import os
+
+import numpy as np
+
+from . import safetensors_file
+
+
+def find_grids(sources):
+    """.sgrid files; of a folder all below it but semantic ones"""
+    files = []
+    for source in sources:
+        found = sorted(glob.glob(os.path.join(source, "**", "*.sgrid"), recursive=True)) if os.path.isdir(source) else [source]
+        files += [f for f in found if "semantic" not in os.path.basename(f)]
+    if not files:
+        raise SystemExit(f"no grids with points in {', '.join(sources)}; tools/train/run streets makes some")
+    return files
+
+
+def read_tokens(path):
+    """-> cells i32 [V, 3], labels u8 [V], tokens f16 [V, 6n] in [-1, 1], the point nearest the cell's centre first
+    (ties by x, y, z); only cells that have points"""
+    t = {name: tensor.numpy() for name, tensor in safetensors_file.read(path).items()}
+    if "points" not in t:
+        raise SystemExit(f"{path}: a semantic grid; training needs points and colours")
+    size = float(safetensors_file.read_header(path)[1]["voxel_size"])
+    has = t["generated"].astype(bool) if "generated" in t else np.ones(len(t["cells"]), bool)
+    points, colors = t["points"][has].astype(np.float32), t["colors"][has].astype(np.float32)
+    x, y, z = points[..., 0], points[..., 1], points[..., 2]
+    order = np.lexsort((z, y, x, (points ** 2).sum(-1)), axis=-1)[..., None]
+    points, colors = np.take_along_axis(points, order, 1), np.take_along_axis(colors, order, 1)
+    tokens = np.concatenate([points / (size / 2), colors / 127.5 - 1], -1).reshape(len(points), -1)
+    return t["cells"][has], t["labels"][has], tokens.clip(-1, 1).astype(np.float16)
+
+
+class Grids:
+    """All grids of some sources, kept as one file each of cells, labels and tokens under `cache`, mapped to memory."""
+
+    def __init__(self, sources, cache):
+        files = find_grids(sources)
+        os.makedirs(cache, exist_ok=True)
+        about = os.path.join(cache, "grids.json")
+        if not (os.path.exists(about) and json.load(open(about))["files"] == files):
+            self._fill(files, cache, about)
+        self.offsets = json.load(open(about))["offsets"]
+        self.cells = np.load(os.path.join(cache, "cells.npy"), mmap_mode="r")
+        self.labels = np.load(os.path.join(cache, "labels.npy"))
+        self.tokens = np.load(os.path.join(cache, "tokens.npy"), mmap_mode="r")
+
+    @staticmethod
+    def _fill(files, cache, about):
+        parts = [read_tokens(f) for f in files]
+        for i, name in enumerate(("cells", "labels", "tokens")):
+            np.save(os.path.join(cache, f"{name}.npy"), np.concatenate([p[i] for p in parts]))
+        offsets = np.cumsum([0] + [len(p[1]) for p in parts]).tolist()
+        with open(about, "w") as file:
+            json.dump({"files": files, "offsets": offsets}, file)
+
+    def balance(self, power):
+        """for each grid, how likely its cells are the middle of a set: frequency of the class to -power"""
+        counts = np.bincount(self.labels, minlength=256).astype(np.float64)
+        weights = np.where(counts > 0, np.maximum(counts, 1) ** -power, 0)
+        sums = []
+        for a, b in zip(self.offsets, self.offsets[1:]):
+            w = np.cumsum(weights[self.labels[a:b]])
+            sums.append(w / w[-1])
+        return sums
+
+
+class LocalSets:
+    """Batches of sets of neighbouring cells: the `size` cells that are nearest to one that is drawn."""
+
+    def __init__(self, grids, config):
+        self.grids, self.config = grids, config
+        self.sums = grids.balance(config["class_balance"])
+        self.near = [np.array(grids.cells[a:b], np.float32) for a, b in zip(grids.offsets, grids.offsets[1:])]
+
+    def batch(self, step):
+        """of one size: centers [B, N, 3] metres, labels [B, N], tokens [B, N, 6n]; fp32, i64, fp32 arrays"""
+        c = self.config
+        random = np.random.default_rng([c["seed"], step])
+        size = int(random.integers(c["set_size"][0], c["set_size"][1] + 1))
+        size = min(size, min(len(n) for n in self.near))
+        sets = [self._set(random, size) for _ in range(c["batch"])]
+        centers, labels, tokens = (np.stack(part) for part in zip(*sets))
+        labels = labels.astype(np.int64)
+        labels[random.random(c["batch"]) < c["label_dropout"]] = c["network"]["num_classes"]
+        return centers, labels, tokens
+
+    def _set(self, random, size):
+        g = int(random.integers(len(self.near)))
+        cells, first = self.near[g], self.grids.offsets[g]
+        middle = min(int(np.searchsorted(self.sums[g], random.random())), len(cells) - 1)
+        apart = ((cells - cells[middle]) ** 2).sum(1)
+        chosen = np.argpartition(apart, size - 1)[:size]
+        centers = (cells[chosen] + 0.5) * self.config["network"]["voxel_size"]
+        tokens = self.grids.tokens[first + chosen].astype(np.float32).reshape(size, -1, 6)
+        for axis in range(2):  # streets mirrored in either direction are streets
+            if self.config["mirror"] and random.random() < 0.5:
+                centers[:, axis] *= -1
+                tokens[..., axis] *= -1
+        if not self.config["ordered_points"]:
+            tokens = np.take_along_axis(tokens, random.random(tokens.shape[:2]).argsort(1)[..., None], 1)
+        return centers, self.grids.labels[first + chosen], tokens.reshape(size, -1)

@@ -1,0 +1,71 @@
+# SPDX-FileCopyrightText: semrover authors
+# SPDX-License-Identifier: Apache-2.0
+"""Trains the Σ-Voxfield transformer (spec: method.md §2): x0-prediction, L2, sets of 50 to 150 cells, labels dropped in
+one set of ten."""
+import os
+
+import torch
+
+from .grids import Grids, LocalSets
+from .model_folder import add_to_index, read_component, write_component, write_scheduler
+from .nets.transformer import VoxfieldTransformer
+from .settings import parser, resolve
+from .trainer import Trainer, generator
+
+
+def linear_alphas(config):
+    """[T] running products of 1 - beta"""
+    beta = torch.linspace(config["beta_start"], config["beta_end"], config["num_train_timesteps"], dtype=torch.float64)
+    return torch.cumprod(1 - beta, 0).float()
+
+
+def loss_of(sets, config):
+    alphas, device = linear_alphas(config).to(config["device"]), config["device"]
+
+    def loss(model, step):
+        centers, labels, x0 = (torch.from_numpy(a).to(device) for a in sets.batch(step))
+        random = generator(config, step)
+        t = torch.randint(0, len(alphas), (len(x0),), generator=random).to(device)
+        noise = torch.randn(x0.shape, generator=random).to(device)
+        a = alphas[t][:, None, None]
+        noisy = a.sqrt() * x0 + (1 - a).sqrt() * noise
+        valid = torch.ones(labels.shape, dtype=torch.bool, device=device)
+        error = (model(noisy, labels, centers, valid, t).float() - x0).square().unflatten(2, (-1, 6))
+        return error.mean(), {"places": float(error[..., :3].mean()), "colors": float(error[..., 3:].mean())}
+    return loss
+
+
+def exporter(folder, config):
+    def export(state):
+        write_component(os.path.join(folder, "model", "voxfield_transformer"),
+                        {"_class_name": "VoxfieldTransformer", **config["network"], "prediction_type": "sample"}, state)
+        write_scheduler(os.path.join(folder, "model", "voxfield_scheduler"), {
+            "_class_name": "DDPMScheduler", "num_train_timesteps": config["num_train_timesteps"],
+            "beta_start": config["beta_start"], "beta_end": config["beta_end"], "beta_schedule": "linear",
+            "prediction_type": "sample", "clip_sample": True, "variance_type": "fixed_small",
+            "timestep_spacing": "trailing"})
+        add_to_index(os.path.join(folder, "model"), {"voxfield_transformer": ["semrover", "VoxfieldTransformer"],
+                                                     "voxfield_scheduler": ["semrover", "DDPMScheduler"]},
+                     config["defaults"])
+    return export
+
+
+def main():
+    p = parser("transformer", __doc__)
+    p.add_argument("--grids", nargs="+", required=True, help=".sgrid files with points, or folders of them")
+    p.add_argument("--init", help="a voxfield_transformer folder to start from")
+    options = p.parse_args()
+    config = resolve("transformer", options)
+    sets = LocalSets(Grids(options.grids, os.path.join(options.output, "cache")), config)
+    torch.manual_seed(config["seed"])
+    model = VoxfieldTransformer(**config["network"])
+    model.start_at_zero()
+    trainer = Trainer(options.output, model, config, exporter(options.output, config))
+    if options.init:
+        trainer.start_from(read_component(options.init)[1])
+    print(f"{sum(p.numel() for p in model.parameters())} parameters, {len(sets.grids.labels)} cells", flush=True)
+    trainer.run(loss_of(sets, config))
+
+
+if __name__ == "__main__":
+    main()
