@@ -25,6 +25,7 @@ struct Options {
     double fov = 73, shift = 1.5;
     StreetImages images;
     VoxelizeOptions voxels;
+    SeenOptions sight;
     bool pictures = false, no_grids = false, seen = false;
 };
 
@@ -60,7 +61,7 @@ Status write_grids(const Options& o, Device& device, const Street& street, std::
     voxels.seed = o.street.seed;
     SR_TRY(StreetGrids grids, street_grids(device, street, voxels));
     if (o.seen) {
-        SR_TRY(const std::vector<uint32_t> seen, seen_cells(device, street.mesh, grids.truth, drives));
+        SR_TRY(const std::vector<uint32_t> seen, seen_cells(device, street.mesh, grids.truth, drives, o.sight));
         grids = part_of(grids, seen);
     }
     for (VoxelGrid* grid : {&grids.truth, &grids.semantic}) {
@@ -133,6 +134,7 @@ void add_streets(CLI::App& app, const Globals& globals, Run& run)
     c->add_option("--shift", o->shift, "metres to the left of the second, novel drive");
     c->add_flag("--no-grids", o->no_grids, "without truth.sgrid and semantic.sgrid");
     c->add_flag("--seen", o->seen, "of the grids only what the drives see, as a recording would");
+    c->add_option("--reach", o->sight.reach, "metres that --seen looks")->check(CLI::Range(1.0, 1000.0));
     c->add_option("--voxel-size", o->voxels.voxel_size, "metres")->check(CLI::Range(0.05f, 10.f));
     c->add_option("--points", o->voxels.points_per_voxel, "points of a cell")->check(CLI::Range(1, 4096));
     c->add_flag("--images", o->pictures, "also pictures of both drives: {color,depth,normal,label,visible}/000000.png");

@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Σ-Voxfield grids (.sgrid) as training data: tokens of all cells of many grids in one array, and local sets of them."""
 import glob
-import json
 import os
 
 import numpy as np
 
 from . import safetensors_file
+from .model_folder import read_json, write_json
 
 
 def find_grids(sources):
@@ -44,9 +44,10 @@ class Grids:
         files = find_grids(sources)
         os.makedirs(cache, exist_ok=True)
         about = os.path.join(cache, "grids.json")
-        if not (os.path.exists(about) and json.load(open(about))["files"] == files):
+        known = read_json(about) if os.path.exists(about) else {}
+        if known.get("files") != files:
             self._fill(files, cache, about)
-        self.offsets = json.load(open(about))["offsets"]
+        self.offsets = read_json(about)["offsets"]
         self.cells = np.load(os.path.join(cache, "cells.npy"), mmap_mode="r")
         self.labels = np.load(os.path.join(cache, "labels.npy"))
         self.tokens = np.load(os.path.join(cache, "tokens.npy"), mmap_mode="r")
@@ -57,8 +58,7 @@ class Grids:
         for i, name in enumerate(("cells", "labels", "tokens")):
             np.save(os.path.join(cache, f"{name}.npy"), np.concatenate([p[i] for p in parts]))
         offsets = np.cumsum([0] + [len(p[1]) for p in parts]).tolist()
-        with open(about, "w") as file:
-            json.dump({"files": files, "offsets": offsets}, file)
+        write_json(about, {"files": files, "offsets": offsets})
 
     def balance(self, power):
         """for each grid, how likely its cells are the middle of a set: frequency of the class to -power"""

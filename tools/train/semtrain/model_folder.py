@@ -27,8 +27,7 @@ def add_to_index(folder, components, defaults=None):
     path = os.path.join(folder, "model_index.json")
     index = {"_class_name": "SemRoverPipeline"}
     if os.path.exists(path):
-        with open(path) as file:
-            index = json.load(file)
+        index = read_json(path)
     index.update(components)
     if defaults:
         index["defaults"] = {**index.get("defaults", {}), **defaults}
@@ -37,9 +36,12 @@ def add_to_index(folder, components, defaults=None):
 
 def read_component(folder):
     """-> (config, {name: tensor})"""
-    with open(os.path.join(folder, "config.json")) as file:
-        config = json.load(file)
-    return config, safetensors_file.read(os.path.join(folder, "diffusion_pytorch_model.safetensors"))
+    return read_json(os.path.join(folder, "config.json")), safetensors_file.read(os.path.join(folder, "diffusion_pytorch_model.safetensors"))
+
+
+def read_json(path):
+    with open(path) as file:
+        return json.load(file)
 
 
 def write_json(path, value):

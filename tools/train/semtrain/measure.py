@@ -1,0 +1,81 @@
+# SPDX-FileCopyrightText: semrover authors
+# SPDX-License-Identifier: Apache-2.0
+"""Generates held-back streets with several models, samplers, steps and guidance scales, and compares the points with the
+true ones (semrover eval points): a table in Markdown, and all figures as JSON. Whatever is there already is kept."""
+import argparse
+import itertools
+import json
+import os
+import time
+
+from .model_folder import write_json
+from .program import semrover
+
+CLASSES = ("road", "sidewalk", "building", "vegetation", "car", "road-lane")
+
+
+def generate(cuts, model, sampler, steps, guidance, folder):
+    """all of CUTS/semantic -> FOLDER; seconds"""
+    os.makedirs(folder, exist_ok=True)
+    begin = time.time()
+    for name in sorted(os.listdir(os.path.join(cuts, "semantic"))):
+        made = os.path.join(folder, name)
+        if not os.path.exists(made):
+            semrover("generate", os.path.join(cuts, "semantic", name), "-m", model, "-o", made, "--sampler", sampler,
+                     "--steps", steps, "--cfg-scale", guidance, "--seed", 1, "--quiet", "-y")
+    return time.time() - begin
+
+
+def measure(cuts, models, samplers, steps, guidances, output):
+    rows = []
+    for (name, model), sampler, n, guidance in itertools.product(models, samplers, steps, guidances):
+        setting = f"{name}-{sampler}-{n}-{guidance:g}"
+        result = os.path.join(output, setting + ".json")
+        if not os.path.exists(result):
+            seconds = generate(cuts, model, sampler, n, guidance, os.path.join(output, setting))
+            scores = json.loads(semrover("eval", "points", os.path.join(output, setting), os.path.join(cuts, "truth"),
+                                         "--json"))
+            write_json(result, {"model": name, "sampler": sampler, "steps": n, "guidance": guidance,
+                                "seconds": seconds, "scores": scores})
+        with open(result) as file:
+            rows.append(json.load(file))
+        print(line_of(rows[-1]), flush=True)
+    return rows
+
+
+def line_of(row):
+    """| model | sampler | steps | guidance | mean colour error of CLASSES | all: cell colour error | Chamfer |
+    sharpness of windows and markings against the truth's | ms a cell |"""
+    classes, every = row["scores"]["classes"], row["scores"]["all"]
+
+    def ratio(name):
+        value = classes.get(name, {}).get("sharpness", {}).get("ratio")
+        return "-" if value is None else f"{value:.2f}"
+    cells = [row["model"], row["sampler"], str(row["steps"]), f"{row['guidance']:g}"]
+    cells += [f"{classes[c]['color_error']:.3f}" if c in classes else "-" for c in CLASSES]
+    cells += [f"{every['cell_color_error']:.3f}", f"{every['chamfer']:.4f}", ratio("building"), ratio("road-lane"),
+              f"{1000 * row['seconds'] / every['cells']:.1f}"]
+    return "| " + " | ".join(cells) + " |"
+
+
+def main():
+    p = argparse.ArgumentParser(prog="tools/train/run measure", description=__doc__)
+    p.add_argument("cuts", help="folder with truth/ and semantic/, as `run cuts` writes it")
+    p.add_argument("-o", "--output", required=True, help="folder")
+    p.add_argument("--model", action="append", required=True, metavar="NAME=FOLDER")
+    p.add_argument("--sampler", nargs="+", default=["ddpm"])
+    p.add_argument("--steps", type=int, nargs="+", default=[5, 10, 20, 50, 250])
+    p.add_argument("--guidance", type=float, nargs="+", default=[1.0, 1.5])
+    options = p.parse_args()
+    models = [item.split("=", 1) for item in options.model]
+    head = ["model", "sampler", "steps", "guidance", *CLASSES, "cell colour", "Chamfer m", "windows", "markings",
+            "ms a cell"]
+    print("| " + " | ".join(head) + " |\n|" + "---|" * len(head))
+    rows = measure(options.cuts, models, options.sampler, options.steps, options.guidance, options.output)
+    table = "| " + " | ".join(head) + " |\n|" + "---|" * len(head) + "\n" + "\n".join(map(line_of, rows)) + "\n"
+    with open(os.path.join(options.output, "table.md"), "w") as file:
+        file.write(table)
+
+
+if __name__ == "__main__":
+    main()

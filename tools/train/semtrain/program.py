@@ -1,0 +1,24 @@
+# SPDX-FileCopyrightText: semrover authors
+# SPDX-License-Identifier: Apache-2.0
+"""The built `semrover`, which makes the data that the recipes train on."""
+import os
+import subprocess
+
+REPOSITORY = os.path.dirname(os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))))
+
+
+def semrover_path():
+    """$SEMROVER, or what tools/demo builds"""
+    path = os.environ.get("SEMROVER") or os.path.join(REPOSITORY, "build", "release", "semrover")
+    if not os.access(path, os.X_OK):
+        raise SystemExit(f"{path} is not there: build it (cmake --preset release && cmake --build --preset release "
+                         "--target semrover), or name one in $SEMROVER")
+    return path
+
+
+def semrover(*arguments):
+    """runs a subcommand; its standard output. An error ends the recipe with the program's own message."""
+    done = subprocess.run([semrover_path(), *map(str, arguments)], stdout=subprocess.PIPE, text=True)
+    if done.returncode:
+        raise SystemExit(f"semrover {arguments[0]} ended with exit code {done.returncode}")
+    return done.stdout

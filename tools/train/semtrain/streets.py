@@ -1,0 +1,32 @@
+# SPDX-FileCopyrightText: semrover authors
+# SPDX-License-Identifier: Apache-2.0
+"""Makes procedural streets to train on: FOLDER/SEED/truth.sgrid and semantic.sgrid, a drive, the mesh. A street that is
+there is left as it is."""
+import argparse
+import os
+
+from .program import semrover
+
+
+def main():
+    p = argparse.ArgumentParser(prog="tools/train/run streets", description=__doc__)
+    p.add_argument("-o", "--output", required=True, help="folder")
+    p.add_argument("--first-seed", type=int, default=2000)
+    p.add_argument("--count", type=int, default=110)
+    p.add_argument("--length", type=float, default=60, help="metres of each street")
+    p.add_argument("--keep-mesh", action="store_true", help="keep mesh.glb too: 8 MB a street")
+    options = p.parse_args()
+    for seed in range(options.first_seed, options.first_seed + options.count):
+        folder = os.path.join(options.output, str(seed))
+        if os.path.exists(os.path.join(folder, "truth.sgrid")):
+            continue
+        os.makedirs(options.output, exist_ok=True)
+        semrover("streets", "--seed", seed, "--length", options.length, "--end-margin", 12, "--spacing", 2, "--seen",
+                 "-o", folder, "--quiet")
+        if not options.keep_mesh:
+            os.remove(os.path.join(folder, "mesh.glb"))
+        print(folder, flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,118 @@
+# SPDX-FileCopyrightText: semrover authors
+# SPDX-License-Identifier: Apache-2.0
+"""The transformer's module against the golden cases, and its recipe from grids to a model that the engine generates
+with."""
+import os
+import subprocess
+import tempfile
+import unittest
+
+import numpy as np
+import torch
+
+from golden import GoldenCase, ints
+from semtrain import safetensors_file
+from semtrain.grids import Grids, LocalSets, read_tokens
+from semtrain.nets.transformer import CONFIG_FIELDS, VoxfieldTransformer
+from semtrain.program import REPOSITORY, semrover_path
+
+RUN = os.path.join(REPOSITORY, "tools", "train", "run")
+TINY = ["--set", 'network={"num_layers": 2, "num_attention_heads": 2, "attention_head_dim": 16, "points_per_voxel": 4,'
+        ' "num_classes": 20, "voxel_size": 0.6, "attention_radius": 3.0, "pos_embed_dim": 8, "context_pos_embed": true}',
+        "--set", "batch=4", "--set", "set_size=[8,12]", "--set", "warmup=2", "--set", "precision=fp32", "--threads", "1"]
+
+
+def write_street(path, seed=0):
+    """a floor of 6 x 6 cells under a wall of 6 x 3, four points a cell, one colour a class"""
+    random = np.random.default_rng(seed)
+    floor = [(i, j, 0) for i in range(6) for j in range(6)]
+    wall = [(i, 6, k) for i in range(6) for k in range(3)]
+    cells = np.array(sorted(floor + wall), np.int32)
+    labels = np.where(cells[:, 1] == 6, 2, 0).astype(np.uint8)
+    points = random.uniform(-0.3, 0.3, (len(cells), 4, 3)).astype(np.float16)
+    colors = np.where(labels[:, None, None] == 2, 200, 60) + np.zeros((len(cells), 4, 3))
+    safetensors_file.write(path, {"cells": torch.from_numpy(cells), "labels": torch.from_numpy(labels),
+                                  "points": torch.from_numpy(points),
+                                  "colors": torch.from_numpy(colors.astype(np.uint8)),
+                                  "generated": torch.ones(len(cells), dtype=torch.uint8)},
+                           {"voxel_size": "0.6", "points_per_voxel": "4"})
+
+
+def train(grids, output, steps, *more):
+    done = subprocess.run([RUN, "transformer", "--config", "small", "--grids", grids, "-o", output, *TINY, "--set",
+                           f"steps={steps}", *more], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                          env={**os.environ, "PYTHON": os.environ.get("PYTHON", "/usr/bin/python3")})
+    if done.returncode:
+        raise AssertionError(done.stdout)
+    return safetensors_file.read(os.path.join(output, "checkpoint.safetensors"))
+
+
+class TheModule(unittest.TestCase):
+    def test_gives_what_the_golden_cases_expect(self):
+        for name in ("transformer_tiny", "transformer_wide"):
+            g = GoldenCase(name)
+            model = VoxfieldTransformer(**{k: v for k, v in g.config.items() if k in CONFIG_FIELDS})
+            model.load_state_dict(g.weights)
+            t = g.tensors
+            valid = t["input.valid"].bool()
+            with torch.no_grad():
+                got = model(t["input.tokens"], ints(t["input.labels"]), t["input.centers"], valid, t["input.timestep"])
+            self.assertLess(g.worst("sample", got, valid), 1, name)
+
+
+class TheRecipe(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.grid = os.path.join(self.folder.name, "a.sgrid")
+        write_street(self.grid)
+
+    def tearDown(self):
+        self.folder.cleanup()
+
+    def path(self, name):
+        return os.path.join(self.folder.name, name)
+
+    def test_orders_the_points_of_a_token_by_their_distance(self):
+        _, labels, tokens = read_tokens(self.grid)
+        points = tokens.astype(np.float32).reshape(len(labels), 4, 6)
+        apart = (points[..., :3] ** 2).sum(-1)
+        self.assertTrue((np.diff(apart, axis=1) >= -1e-3).all())
+        self.assertLess(np.abs(points[labels == 2][..., 3:] - (200 / 127.5 - 1)).max(), 1e-3)
+
+    def test_draws_sets_of_neighbours_and_drops_the_labels_of_some(self):
+        config = {"seed": 3, "set_size": [8, 12], "batch": 64, "label_dropout": 0.25, "class_balance": 0.5,
+                  "mirror": False, "ordered_points": True, "network": {"num_classes": 20, "voxel_size": 0.6}}
+        sets = LocalSets(Grids([self.grid], self.path("cache")), config)
+        centers, labels, tokens = sets.batch(5)
+        self.assertEqual(tokens.shape, labels.shape + (24,))
+        dropped = (labels == 20).all(1)
+        self.assertTrue(5 < dropped.sum() < 30, dropped.sum())
+        self.assertFalse((labels[~dropped] == 20).any())
+        self.assertLess(np.linalg.norm(centers - centers.mean(1, keepdims=True), axis=-1).max(), 3)
+        again = sets.batch(5)
+        self.assertTrue((again[2] == tokens).all())
+
+    def test_learns_and_goes_on_where_it_stopped(self):
+        train(self.grid, self.path("whole"), 30)
+        whole = safetensors_file.read(self.path("whole/checkpoint.safetensors"))
+        # the decay of the learning rate looks at the last step: the first part is given the same one
+        train(self.grid, self.path("parts"), 30, "--set", "minutes=0.000001")
+        self.assertEqual(safetensors_file.read_header(self.path("parts/checkpoint.safetensors"))[1]["step"], "1")
+        parts = train(self.grid, self.path("parts"), 30)
+        for name, tensor in whole.items():
+            self.assertTrue(torch.equal(tensor, parts[name]), name)
+
+    def test_writes_a_model_that_the_engine_generates_with(self):
+        train(self.grid, self.path("run"), 250, "--set", "learning_rate=0.01", "--set", "ema=0.9")
+        semantic = {name: t for name, t in safetensors_file.read(self.grid).items() if name in ("cells", "labels")}
+        safetensors_file.write(self.path("semantic.sgrid"), semantic, {"voxel_size": "0.6", "points_per_voxel": "4"})
+        subprocess.run([semrover_path(), "generate", self.path("semantic.sgrid"), "-m", self.path("run/model"), "-o",
+                        self.path("made.sgrid"), "--steps", "10", "--quiet"], check=True)
+        made = safetensors_file.read(self.path("made.sgrid"))
+        colors = made["colors"].float().mean((1, 2))
+        floor, wall = colors[made["labels"] == 0].mean(), colors[made["labels"] == 2].mean()
+        self.assertGreater(float(wall - floor), 40)  # it has learnt that walls are bright
+
+
+if __name__ == "__main__":
+    unittest.main()
