@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 namespace semrover {
 
@@ -139,18 +138,20 @@ double best_step(std::span<const std::array<double, 3>> positions, std::span<con
     SR_ASSERT(brightness.size() == n, "{} positions, {} brightnesses", n, brightness.size());
     if (n < 4)
         return 0;
-    const double mean = std::accumulate(brightness.begin(), brightness.end(), 0.0) / double(n);
+    double mean = 0; // above the first, so that nothing is left of equal ones
+    for (const double y : brightness)
+        mean += (y - brightness[0]) / double(n);
     std::array<double, 3> direction{};
     for (size_t i = 0; i < n; ++i) // from the first point: the differences sum to 0, so any origin gives the same
         for (size_t a = 0; a < 3; ++a)
-            direction[a] += (brightness[i] - mean) * (positions[i][a] - positions[0][a]);
+            direction[a] += (brightness[i] - brightness[0] - mean) * (positions[i][a] - positions[0][a]);
     thread_local std::vector<std::pair<double, double>> along; // how far, brightness above the mean
     along.clear();
     for (size_t i = 0; i < n; ++i) {
         double far = 0;
         for (size_t a = 0; a < 3; ++a)
             far += direction[a] * (positions[i][a] - positions[0][a]);
-        along.emplace_back(far, brightness[i] - mean);
+        along.emplace_back(far, brightness[i] - brightness[0] - mean);
     }
     std::ranges::sort(along);
     double best = 0, sum = 0; // of the near side
