@@ -46,16 +46,22 @@ Result<std::vector<Path>> files_below(const Path& folder, std::initializer_list<
 
 } // namespace
 
+Result<std::vector<Path>> list_all_images(const Path& folder)
+{
+    SR_TRY(std::vector<Path> files, files_below(folder, {".png", ".jpg", ".jpeg"}));
+    if (files.empty())
+        return fail(ErrorCode::bad_input, "{}: no PNG or JPEG images in it", quote_path(folder));
+    return files;
+}
+
 Result<std::vector<Path>> list_images(const Path& folder)
 {
     std::error_code error;
     const bool refined = fs::is_directory(folder / "frames", error);
-    SR_TRY(std::vector<Path> files, files_below(refined ? folder / "frames" : folder, {".png", ".jpg", ".jpeg"}));
+    SR_TRY(std::vector<Path> files, list_all_images(refined ? folder / "frames" : folder));
     const auto is_color = [](const Path& path) { return path.parent_path().filename() == "color"; };
     if (!refined && std::ranges::any_of(files, is_color))
         std::erase_if(files, [&](const Path& path) { return !is_color(path); });
-    if (files.empty())
-        return fail(ErrorCode::bad_input, "{}: no PNG or JPEG images in it", quote_path(folder));
     return files;
 }
 

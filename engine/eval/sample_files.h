@@ -10,6 +10,7 @@ namespace semrover {
 // wrote only those in frames/, of one that `render` wrote only those in color/ (of every camera), since depth, labels
 // and the like are no pictures. Errors, bad_input: no such folder, none in it
 Result<std::vector<Path>> list_images(const Path& folder);
+Result<std::vector<Path>> list_all_images(const Path& folder); // whatever the names of folders
 
 // a PNG or JPEG by its name's ending; bad_input as read_png_rgb8() and read_jpeg_rgb8()
 Result<ImageRgb8> read_image(const Path& path);

@@ -1,0 +1,87 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/mesh/nearest_points.h"
+
+#include "kernels/kernels.h"
+#include "runtime/program.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace semrover {
+
+namespace {
+
+constexpr size_t kBatch = 1 << 20; // points or queries at once
+constexpr double kFar = std::numeric_limits<double>::infinity();
+
+Result<std::unique_ptr<Buffer>> upload(Device& device, std::span<const PointRow> values, const char* name)
+{
+    SR_TRY(auto buffer, Buffer::create(device, values.size_bytes(), MemoryKind::device, name));
+    SR_CHECK(device.write(buffer->slice(), std::as_bytes(values)));
+    return buffer;
+}
+
+// lowers `best` to the distances of queries from the nearest of some points within `radius`; 0: however far
+Status search_batch(Device& device, std::span<const PointRow> queries, std::span<const PointRow> batch, float cell_size,
+                    float radius, std::span<double> best)
+{
+    SR_TRY(const auto points, upload(device, batch, "points"));
+    SR_TRY(const auto samples, upload(device, queries, "queries"));
+    SR_TRY(const auto results, Buffer::create(device, queries.size() * 4, MemoryKind::device, "nearest"));
+    const auto rows = uint32_t(queries.size());
+    Graph g;
+    KnnOptions options{.neighbors = 1, .cell_size = cell_size, .radius = radius};
+    options.queries = g.external(samples->slice(), rows, 4, DType::f32, "queries", 4);
+    const Tensor nearest =
+        knn(g, g.external(points->slice(), uint32_t(batch.size()), 4, DType::f32, "points", 4), options);
+    g.replace(nearest.resource, g.external(results->slice(), rows, 1, DType::u32, "nearest", 1).resource);
+    SR_TRY(const auto program, Program::create(device, g));
+    SR_CHECK(program->run());
+    std::vector<uint32_t> index(rows);
+    SR_CHECK(device.read(results->slice(), std::as_writable_bytes(std::span(index))));
+    for (size_t i = 0; i < rows; ++i) {
+        if (index[i] >= batch.size())
+            continue;
+        const PointRow &a = queries[i], &b = batch[index[i]];
+        best[i] = std::min(best[i], std::hypot(double(a[0]) - b[0], double(a[1]) - b[1], double(a[2]) - b[2]));
+    }
+    return {};
+}
+
+Status search(Device& device, std::span<const PointRow> queries, std::span<const PointRow> points, float cell_size,
+              float radius, std::span<double> best)
+{
+    for (size_t q = 0; q < queries.size(); q += kBatch)
+        for (size_t p = 0; p < points.size(); p += kBatch) {
+            const size_t count = std::min(kBatch, queries.size() - q);
+            SR_CHECK(search_batch(device, queries.subspan(q, count),
+                                  points.subspan(p, std::min(kBatch, points.size() - p)), cell_size, radius,
+                                  best.subspan(q, count)));
+        }
+    return {};
+}
+
+} // namespace
+
+Result<std::vector<double>> nearest_distances(Device& device, std::span<const PointRow> queries,
+                                              std::span<const PointRow> points, const NearestPointsOptions& options)
+{
+    SR_ASSERT(!points.empty(), "distances from no points");
+    std::vector<double> best(queries.size(), kFar);
+    // within a radius the search ends after a few cells
+    SR_CHECK(search(device, queries, points, options.cell_size, options.first_radius, best));
+    std::vector<PointRow> lonely;
+    for (size_t i = 0; i < queries.size(); ++i)
+        if (best[i] == kFar)
+            lonely.push_back(queries[i]);
+    std::vector<double> far(lonely.size(), kFar);
+    SR_CHECK(search(device, lonely, points, options.cell_size, 0, far));
+    for (size_t i = 0, next = 0; i < best.size(); ++i)
+        if (best[i] == kFar)
+            best[i] = far[next++];
+    return best;
+}
+
+} // namespace semrover

@@ -1,0 +1,232 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/scene/camera_path.h"
+#include "engine/scene/image.h"
+#include "runtime/json.h"
+#include "tests/program.h"
+
+#include <algorithm>
+#include <cmath>
+#include <gtest/gtest.h>
+
+namespace semrover {
+namespace {
+
+constexpr uint32_t kWidth = 24, kHeight = 16;
+
+ProgramResult eval(const std::string& arguments)
+{
+    return semrover_program("eval " + arguments);
+}
+
+void expect_error(const ProgramResult& result, int code, std::string_view text)
+{
+    EXPECT_EQ(result.code, code) << result.err;
+    EXPECT_TRUE(result.err.starts_with("semrover: error: ")) << result.err;
+    EXPECT_NE(result.err.find(text), std::string::npos) << result.err;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    EXPECT_EQ(result.out, "");
+}
+
+struct Pictures {
+    ScratchFolder folder;
+
+    std::string operator/(std::string_view name) const { return (folder / name).string(); }
+    // `left` up to column 12, `right` from there on
+    void put(std::string_view name, uint8_t left, uint8_t right, uint32_t width = kWidth, bool gray = false) const
+    {
+        const Path path = folder / name;
+        std::filesystem::create_directories(path.parent_path());
+        std::vector<uint8_t> pixels;
+        for (uint32_t i = 0; i < width * kHeight; ++i)
+            pixels.insert(pixels.end(), gray ? 1 : 3, i % width < 12 ? left : right);
+        EXPECT_TRUE(gray                         ? write_png_gray8(path, width, kHeight, pixels)
+                    : path.extension() == ".jpg" ? write_jpeg_rgb8(path, width, kHeight, pixels, 95)
+                                                 : write_png_rgb8(path, width, kHeight, pixels));
+    }
+    void put_depth(std::string_view name, uint16_t value, uint32_t width = kWidth) const
+    {
+        const Path path = folder / name;
+        std::filesystem::create_directories(path.parent_path());
+        EXPECT_TRUE(write_png_gray16(path, width, kHeight, std::vector<uint16_t>(size_t(width) * kHeight, value)));
+    }
+};
+
+TEST(CliEvalFrames, psnr_and_ssim_by_hand)
+{
+    const Pictures p;
+    p.put("made/frames/000000.png", 110, 100); // as `refine` leaves them
+    p.put("made/frames/000001.png", 100, 100);
+    p.put("made/latents/000000.png", 1, 2);
+    p.put("true/color/000000.png", 100, 100); // as `streets` does
+    p.put("true/color/000001.png", 100, 100);
+    p.put("true/normal/000000.png", 5, 5);
+    p.put("true/shifted/color/000000.png", 5, 5);
+    for (const char* name : {"000000", "000001", "000002"}) {
+        p.put(fmt::format("true/visible/{}.png", name), 0, 255, kWidth, true);
+        p.put(fmt::format("true/label/{}.png", name), 2, 255, kWidth, true);
+    }
+    const std::string folders = (p / "made") + " " + (p / "true");
+    const ProgramResult result =
+        eval("frames --json -q " + folders + " --visible " + (p / "true") + " --labels " + (p / "true/label"));
+    ASSERT_EQ(result.code, 0) << result.err;
+    const Json report = Json::parse(result.out);
+    EXPECT_NEAR(report["psnr"].get<double>(), 10 * std::log10(65025. / 25), 1e-9); // a quarter of all pixels by 10
+    EXPECT_NEAR(report["mean_psnr"].get<double>(), 10 * std::log10(65025. / 50), 1e-9);
+    EXPECT_EQ(report["equal_frames"], 1);
+    EXPECT_EQ(report["pixels"], 2 * kWidth * kHeight);
+    EXPECT_TRUE(report["visible"]["psnr"].is_null()); // equal
+    EXPECT_NEAR(report["hidden"]["psnr"].get<double>(), 10 * std::log10(65025. / 50), 1e-9);
+    EXPECT_EQ(report["labels"]["building"], report["hidden"]);
+    EXPECT_EQ(report["labels"]["none"], report["visible"]);
+    ASSERT_EQ(report["frames"].size(), 2u);
+    EXPECT_EQ(report["frames"][0]["name"], "000000");
+    EXPECT_LT(report["frames"][0]["ssim"], 0.999);
+    EXPECT_NEAR(report["frames"][1]["ssim"].get<double>(), 1, 1e-12);
+    EXPECT_TRUE(report["frames"][1]["psnr"].is_null());
+    const ProgramResult table = eval("frames -q " + folders);
+    ASSERT_EQ(table.code, 0) << table.err;
+    EXPECT_TRUE(table.out.starts_with("2 frames, PSNR 31.141 dB in the mean of 1 frames, 1 equal\n")) << table.out;
+}
+
+TEST(CliEvalFrames, cameras_are_matched_across_the_layouts_of_refine_and_render)
+{
+    const Pictures p;
+    p.put("made/frames/front/000000.jpg", 90, 90);
+    p.put("made/frames/left/000000.jpg", 90, 90);
+    p.put("true/front/color/000000.png", 100, 100);
+    p.put("true/left/color/000000.png", 90, 90);
+    p.put("true/left/label/000000.png", 1, 1, kWidth, true);
+    const ProgramResult result = eval("frames --json -q " + (p / "made") + " " + (p / "true"));
+    ASSERT_EQ(result.code, 0) << result.err;
+    const Json report = Json::parse(result.out);
+    EXPECT_EQ(report["frames"][0]["name"], "front/000000");
+    EXPECT_NEAR(report["frames"][0]["psnr"].get<double>(), 20 * std::log10(25.5), 0.5);
+    EXPECT_EQ(report["frames"][1]["name"], "left/000000");
+}
+
+TEST(CliEvalFrames, what_cannot_be_compared_is_one_clear_line)
+{
+    const Pictures p;
+    p.put("a/000000.png", 1, 2);
+    p.put("b/000000.png", 1, 2, kWidth + 1);
+    const std::string a = p / "a", b = p / "b";
+    expect_error(eval("frames -q " + a + " " + b), 3, "000000.png' is 25 x 16 pixels, expected 24 x 16");
+    expect_error(eval("frames -q " + a + " " + (p / "none")), 3, "none': expected a folder, this is none");
+    std::filesystem::create_directory(p.folder / "empty");
+    expect_error(eval("frames -q " + (p / "empty") + " " + b), 3, "no PNG or JPEG images in it");
+    p.put("b/000001.png", 1, 2);
+    expect_error(eval("frames -q " + a + " " + b), 3, "a' has no picture '000001', which '");
+    p.put("a/000002.png", 1, 2);
+    expect_error(eval("frames -q " + a + " " + b), 3, "b' has no picture '000002', which '");
+    p.put("c/000000.png", 1, 2);
+    p.put("c/000000.jpg", 1, 2);
+    expect_error(eval("frames -q " + (p / "c") + " " + a), 3, "are one frame: expected one picture of each name");
+    p.put("small/000000.png", 1, 2, 10);
+    expect_error(eval("frames -q " + (p / "small") + " " + (p / "small")), 3,
+                 "is 10 x 16 pixels, expected 11 x 11 or more");
+    std::filesystem::create_directory(p.folder / "broken");
+    p.folder.put("broken/000000.png", "no picture");
+    p.put("one/000000.png", 1, 2);
+    const std::string one = p / "one";
+    expect_error(eval("frames -q " + (p / "broken") + " " + one), 3, "expected a PNG or JPEG image");
+    expect_error(eval("frames -q " + one + " " + one + " --visible " + (p / "empty")), 3, "no PNG or JPEG images");
+    p.put("masks/000007.png", 255, 255, kWidth, true);
+    expect_error(eval("frames -q " + one + " " + one + " --visible " + (p / "masks")), 3,
+                 "masks' has no picture '000000'");
+    p.put("masks/000000.png", 255, 255, kWidth + 3, true);
+    expect_error(eval("frames -q " + one + " " + one + " --labels " + (p / "masks")), 3,
+                 "is 27 x 16 pixels, expected 24 x 16");
+    expect_error(eval("frames " + one), 2, "TRUTH is required");
+}
+
+// three frames, 0.1 m apart to the right, before a wall at 2 m with a focal length of 20: a pixel each
+void put_drive(const Pictures& p, uint8_t change)
+{
+    CameraPath path;
+    for (uint32_t i = 0; i < 3; ++i) {
+        CameraFrame frame;
+        frame.time = i;
+        frame.intrinsics = {20, 20, 12, 8, kWidth, kHeight};
+        frame.pose.world_to_camera[3] = -0.1 * i;
+        path.frames.push_back(frame);
+        const std::string name = fmt::format("{:06}.png", i);
+        p.put_depth("drive/depth/" + name, 2000);
+        p.put("made/" + name, uint8_t(100 + change * i), uint8_t(100 + change * i));
+        p.put("drive/color/" + name, 100, 100);
+    }
+    EXPECT_TRUE(write_transforms(p.folder / "drive/transforms.json", path));
+    EXPECT_TRUE(write_tum(p.folder / "drive/drive.tum", path));
+}
+
+TEST(CliEvalFlicker, change_without_cause_is_measured_and_the_truth_beside_it)
+{
+    const Pictures p;
+    put_drive(p, 4);
+    const std::string drive = p / "drive";
+    const ProgramResult result = eval("flicker --json -q " + (p / "made") + " --depth " + drive + " --path " + drive +
+                                      "/transforms.json --truth " + drive);
+    ASSERT_EQ(result.code, 0) << result.err;
+    const Json report = Json::parse(result.out);
+    EXPECT_NEAR(report["mean"].get<double>(), 4, 1e-9);
+    EXPECT_NEAR(report["rms"].get<double>(), 4, 1e-9);
+    EXPECT_NEAR(report["share"].get<double>(), 23. / 24, 1e-9); // a column has left the picture
+    EXPECT_NEAR(report["truth"]["mean"].get<double>(), 0, 1e-9);
+    ASSERT_EQ(report["pairs"].size(), 2u);
+    EXPECT_EQ(report["pairs"][1]["from"], "000001");
+    EXPECT_EQ(report["pairs"][1]["valid"], 23 * kHeight);
+    // a path without intrinsics: --fov-x, and the size of the pictures
+    const double fov = 2 * std::atan(12. / 20) * 180 / 3.14159265358979323846;
+    const ProgramResult tum = eval(fmt::format("flicker --json -q {} --depth {}/depth --path {}/drive.tum --fov-x {}",
+                                               p / "made", drive, drive, fov));
+    ASSERT_EQ(tum.code, 0) << tum.err;
+    EXPECT_NEAR(Json::parse(tum.out)["mean"].get<double>(), 4, 1e-9);
+    const ProgramResult table =
+        eval("flicker -q " + (p / "made") + " --depth " + drive + " --path " + drive + "/transforms.json");
+    EXPECT_TRUE(table.out.starts_with("2 pairs of frames, 95.8 % of pixels can be compared\n")) << table.out;
+    // part of a drive: only neighbours of the path are pairs
+    std::filesystem::remove(p.folder / "made/000002.png");
+    const ProgramResult part =
+        eval("flicker --json -q " + (p / "made") + " --depth " + drive + " --path " + drive + "/transforms.json");
+    ASSERT_EQ(part.code, 0) << part.err;
+    EXPECT_EQ(Json::parse(part.out)["pairs"].size(), 1u);
+}
+
+TEST(CliEvalFlicker, what_does_not_fit_together_is_one_clear_line)
+{
+    const Pictures p;
+    put_drive(p, 0);
+    const std::string drive = p / "drive", path = " --path " + drive + "/transforms.json", made = p / "made";
+    const auto flicker = [&](const std::string& rest) { return eval("flicker -q " + rest); };
+    expect_error(flicker(made + path), 2, "--depth is required");
+    expect_error(flicker(made + " --depth " + drive), 2, "--path is required");
+    expect_error(flicker(made + " --depth " + drive + " --path " + (p / "none.json")), 3, "none.json");
+    expect_error(flicker(made + " --depth " + (p / "none") + path), 3, "expected a folder");
+    expect_error(flicker(made + " --depth " + drive + "/color" + path), 3, "expected a PNG of 16-bit gray");
+    expect_error(flicker(made + " --depth " + drive + path + " --tolerance 0"), 2, "--tolerance");
+    p.put("one/000001.png", 1, 2);
+    expect_error(flicker((p / "one") + " --depth " + drive + path), 3, "expected two or more, one after the other");
+    p.put("one/000009.png", 1, 2);
+    p.put_depth("depth9/000001.png", 2000);
+    expect_error(flicker((p / "one") + " --depth " + (p / "depth9") + path), 3, "has no picture '000009'");
+    p.put_depth("depth9/000009.png", 2000);
+    expect_error(flicker((p / "one") + " --depth " + (p / "depth9") + path), 3,
+                 "holds 2 pictures, 1 of them frames of");
+    p.put_depth("wide/000000.png", 2000, kWidth + 2);
+    p.put_depth("wide/000001.png", 2000, kWidth + 2);
+    p.put_depth("wide/000002.png", 2000, kWidth + 2);
+    expect_error(flicker(made + " --depth " + (p / "wide") + path), 3,
+                 "000000.png' is 26 x 16 pixels, the camera of the path has 24 x 16");
+    p.put("made/000001.png", 1, 2, kWidth + 1);
+    expect_error(flicker(made + " --depth " + drive + path), 3, "000001.png' is 25 x 16 pixels, expected 24 x 16");
+    p.put("made/000001.png", 100, 100);
+    expect_error(flicker(made + " --depth " + drive + path + " --truth " + (p / "one")), 3, "has no picture '000000'");
+    for (const char* name : {"empty/000000.png", "empty/000001.png", "empty/000002.png"})
+        p.put_depth(name, 0);
+    expect_error(flicker(made + " --depth " + (p / "empty") + path), 3, "no pixel of 2 pairs can be compared");
+    p.folder.put("short.json", "{\"frames\": []}");
+    expect_error(flicker(made + " --depth " + drive + " --path " + (p / "short.json")), 3, "short.json");
+}
+
+} // namespace
+} // namespace semrover
