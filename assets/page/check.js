@@ -1,0 +1,95 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// the page tries itself when its address ends in #check, and adds what it found to the report
+function differing(a, b) {
+    let count = 0;
+    for (let i = 0; i < a.length; i += 4)
+        if (a[i] !== b[i] || a[i + 1] !== b[i + 1] || a[i + 2] !== b[i + 2] || a[i + 3] !== b[i + 3])
+            ++count;
+    return count;
+}
+
+function visible(pixels) {
+    let count = 0;
+    for (let i = 3; i < pixels.length; i += 4)
+        count += pixels[i] > 0;
+    return count;
+}
+
+function point(node, kind, x, y, more = {}) {
+    const box = node.getBoundingClientRect();
+    const at = { clientX: box.left + x * box.width, clientY: box.top + y * box.height };
+    const make = kind === "wheel" ? WheelEvent : kind === "dblclick" ? MouseEvent : PointerEvent;
+    node.dispatchEvent(new make(kind, { pointerId: 7, bubbles: true, cancelable: true, ...at, ...more }));
+}
+
+function drag(node, from, to, more) {
+    point(node, "pointerdown", ...from, more);
+    point(node, "pointermove", ...to, more);
+    point(node, "pointerup", ...to, more);
+}
+
+const stagePixels = (id) => $(id).getContext("2d").getImageData(0, 0, $(id).width, $(id).height).data;
+
+async function checkPlayer(player) {
+    const moments = player.moments.length;
+    for (let moment = 0; moment < moments; ++moment)
+        await player.show(moment);
+    await player.show(0);
+    const found = { pictures: moments * player.sets.length, moments, visible: visible(stagePixels("stage-left")) };
+    const first = stagePixels("stage-right");
+    found.sets_differ = differing(first, stagePixels("stage-left"));
+    document.body.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowRight", bubbles: true }));
+    await player.show(player.wanted);
+    found.moment_after_key = player.moment;
+    found.moments_differ = differing(first, stagePixels("stage-right"));
+    drag($("stage"), [0.5, 0.5], [0.25, 0.5]);
+    found.border_after_drag = player.border;
+    $("divider").dispatchEvent(new KeyboardEvent("keydown", { key: "End", bubbles: true }));
+    found.border_after_end = player.border;
+    player.setBorder(0.5);
+    await player.show(0);
+    return found;
+}
+
+function checkOrbit(orbit) {
+    orbit.canvas.scrollIntoView({ block: "center" });
+    const pixels = () => {
+        orbit.moving = false;
+        orbit.draw();
+        return orbit.drawer.pixels();
+    };
+    // how many samples an action changes; everything is as before afterwards
+    const changes = (act) => {
+        const camera = orbit.camera.copy(), look = { ...orbit.look }, before = pixels();
+        act();
+        const count = differing(before, pixels());
+        orbit.stop();
+        Object.assign(orbit, { camera });
+        Object.assign(orbit.look, look);
+        return count;
+    };
+    const first = pixels(), { canvas } = orbit, target = [...orbit.camera.target], view = orbit.camera.copy();
+    const found = { samples: first.length / 4, visible: visible(first) };
+    found.still = changes(() => 0);
+    found.orbit = changes(() => drag(canvas, [0.5, 0.5], [0.6, 0.45]));
+    found.pan = changes(() => drag(canvas, [0.5, 0.5], [0.6, 0.5], { button: 2 }));
+    found.wheel = changes(() => point(canvas, "wheel", 0.5, 0.5, { deltaY: -240 }));
+    found.key = changes(() => canvas.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowLeft", bubbles: true })));
+    found.labels = changes(() => orbit.look.labelled = !orbit.look.labelled);
+    found.hidden = changes(() => orbit.look.shown = 0);
+    found.drive = changes(() => orbit.path.length > 1 && (orbit.camera = orbit.onPath(0.5)));
+    found.scenes = orbit.scenes.length;
+    found.view = [view.target, view.yaw, view.pitch, view.distance].flat().map((x) => Number(x.toFixed(4)));
+    found.target_kept = minus(target, orbit.camera.target).every((d) => d === 0);
+    pixels();
+    return found;
+}
+
+async function check(player, orbit) {
+    report.player = player ? await checkPlayer(player) : null;
+    report.orbit = orbit ? checkOrbit(orbit) : null;
+    report.layout = { width: window.innerWidth, content: document.documentElement.scrollWidth };
+    report.finished = true;
+    publish();
+}
