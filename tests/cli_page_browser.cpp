@@ -78,14 +78,18 @@ class CliPageBrowser : public testing::Test {
         EXPECT_EQ(player["moment_after_key"], 1);
         EXPECT_NEAR(player["border_after_drag"], 0.25, 0.01);
         EXPECT_EQ(player["border_after_end"], 1);
+        EXPECT_EQ(player["playing"], "true");
+        EXPECT_NE(player["moment_after_play"], player["moment_after_key"]);
         const Json& orbit = report["orbit"];
         EXPECT_GT(orbit["visible"], double(orbit["samples"]) / 20); // the street fills a good part of the view
         EXPECT_LT(orbit["visible"], double(orbit["samples"]) * 0.95);
         EXPECT_EQ(orbit["still"], 0); // the same view twice is the same picture
-        for (const char* act : {"orbit", "pan", "wheel", "key", "labels", "drive"})
+        for (const char* act : {"orbit", "pan", "pinch", "wheel", "key", "labels", "drive"})
             EXPECT_GT(orbit[act], double(orbit["visible"]) / 10) << act;
         EXPECT_EQ(orbit["hidden"], orbit["visible"]); // without classes nothing is left
+        EXPECT_GT(orbit["closer"], 1.2);              // a double click
         EXPECT_EQ(orbit["scenes"], 2);
+        EXPECT_EQ(orbit["parts"].size(), 144u);
         EXPECT_LE(report["layout"]["content"], report["layout"]["width"]); // no scrolling sideways
     }
 
@@ -109,6 +113,10 @@ TEST_F(CliPageBrowser, pictures_play_and_points_turn_with_webgl_as_on_a_canvas)
         return double(report["orbit"]["visible"]) / double(report["orbit"]["samples"]);
     };
     EXPECT_NEAR(share(drawn), share(canvas), 0.02);
+    double off = 0;
+    for (size_t i = 0; i < 144; ++i)
+        off += std::abs(double(drawn["orbit"]["parts"][i]) - double(canvas["orbit"]["parts"][i])) / 144;
+    EXPECT_LT(off, 4) << drawn["orbit"]["parts"] << canvas["orbit"]["parts"];
 }
 
 TEST_F(CliPageBrowser, a_phone_without_webgl_shows_all_of_it)

@@ -52,7 +52,7 @@ inline ImageRgb8 test_picture(const std::string& name, uint32_t moment, uint32_t
             state = state * 1664525 + 1013904223;
             for (uint32_t c = 0; c < 3; ++c) {
                 const uint32_t flat = (x < width / 2 ? 40 * c : 200 - 30 * c) + moment;
-                const uint32_t noisy = 40 + 7 * moment + 2 * y + 10 * c + (state >> 26);
+                const uint32_t noisy = 20 + 3 * moment + y + 10 * c + (state >> 25);
                 image.pixels.push_back(uint8_t(name == "labels" ? flat : noisy));
             }
         }

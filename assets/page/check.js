@@ -16,6 +16,19 @@ function visible(pixels) {
     return count;
 }
 
+// mean colours of 8 x 6 parts, from the top left
+function parts(pixels, width, bottomUp) {
+    const sums = new Float64Array(4 * 48), height = pixels.length / 4 / width;
+    for (let i = 0; i < pixels.length / 4; ++i) {
+        const row = Math.floor(Math.floor(i / width) * 6 / height), column = Math.floor(i % width * 8 / width);
+        const part = 4 * (8 * (bottomUp ? 5 - row : row) + column);
+        for (let c = 0; c < 3; ++c)
+            sums[part + c] += pixels[4 * i + c];
+        ++sums[part + 3];
+    }
+    return [...sums].filter((_, i) => i % 4 < 3).map((sum, i) => Math.round(sum / sums[4 * Math.floor(i / 3) + 3]));
+}
+
 function point(node, kind, x, y, more = {}) {
     const box = node.getBoundingClientRect();
     const at = { clientX: box.left + x * box.width, clientY: box.top + y * box.height };
@@ -29,6 +42,7 @@ function drag(node, from, to, more) {
     point(node, "pointerup", ...to, more);
 }
 
+const wait = (milliseconds) => new Promise((done) => setTimeout(done, milliseconds));
 const stagePixels = (id) => $(id).getContext("2d").getImageData(0, 0, $(id).width, $(id).height).data;
 
 async function checkPlayer(player) {
@@ -48,8 +62,19 @@ async function checkPlayer(player) {
     $("divider").dispatchEvent(new KeyboardEvent("keydown", { key: "End", bubbles: true }));
     found.border_after_end = player.border;
     player.setBorder(0.5);
+    $("play").click();
+    await wait(1.5 * kMomentMilliseconds);
+    found.playing = $("play").getAttribute("aria-pressed");
+    found.moment_after_play = player.moment; // two further on
+    $("play").click();
     await player.show(0);
     return found;
+}
+
+function pinch(node) {
+    for (const [kind, reach] of [["pointerdown", 0.1], ["pointermove", 0.2], ["pointerup", 0.2]])
+        for (const side of [-1, 1])
+            point(node, kind, 0.5 + side * reach, 0.5, { pointerId: 8 + side });
 }
 
 function checkOrbit(orbit) {
@@ -71,9 +96,11 @@ function checkOrbit(orbit) {
     };
     const first = pixels(), { canvas } = orbit, target = [...orbit.camera.target], view = orbit.camera.copy();
     const found = { samples: first.length / 4, visible: visible(first) };
+    found.parts = parts(first, canvas.width, orbit.drawer.name === "webgl2");
     found.still = changes(() => 0);
     found.orbit = changes(() => drag(canvas, [0.5, 0.5], [0.6, 0.45]));
     found.pan = changes(() => drag(canvas, [0.5, 0.5], [0.6, 0.5], { button: 2 }));
+    found.pinch = changes(() => pinch(canvas));
     found.wheel = changes(() => point(canvas, "wheel", 0.5, 0.5, { deltaY: -240 }));
     found.key = changes(() => canvas.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowLeft", bubbles: true })));
     found.labels = changes(() => orbit.look.labelled = !orbit.look.labelled);
@@ -82,6 +109,10 @@ function checkOrbit(orbit) {
     found.scenes = orbit.scenes.length;
     found.view = [view.target, view.yaw, view.pitch, view.distance].flat().map((x) => Number(x.toFixed(4)));
     found.target_kept = minus(target, orbit.camera.target).every((d) => d === 0);
+    point(canvas, "dblclick", 0.5, 0.6);
+    found.closer = orbit.goal ? view.distance / orbit.goal.distance : 0;
+    orbit.stop();
+    orbit.camera = view;
     pixels();
     return found;
 }

@@ -90,6 +90,7 @@ class Orbit {
     flyTo(camera) {
         const from = this.camera.copy(), begin = performance.now(), time = quietMotion ? 0 : 450;
         this.stop();
+        this.goal = camera;
         const step = () => {
             const t = time ? clamp((performance.now() - begin) / time, 0, 1) : 1;
             this.camera = Camera.between(from, camera, t * t * (3 - 2 * t));

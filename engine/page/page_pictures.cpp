@@ -21,6 +21,8 @@ namespace fs = std::filesystem;
 using Files = std::map<uint32_t, Path>;
 
 constexpr double kPngMayBe = 1.25; // times as large as a JPEG: edges of labels are worth that
+constexpr size_t kFewColors = 64;
+constexpr double kFlat = 0.65; // share of the pixels: drawn labels have 0.8, pictures and splats 0.25 to 0.5
 constexpr double kSameShape = 0.01;
 
 std::optional<uint32_t> number_of(const Path& file)
@@ -86,11 +88,30 @@ std::vector<uint32_t> spread(const std::vector<uint32_t>& all, size_t limit)
     return chosen;
 }
 
+// drawn rather than seen: nearly all of it in a few colours, whose edges JPEG would smear
+bool is_flat(const ImageRgb8& image)
+{
+    std::vector<uint32_t> colors, counts;
+    for (size_t i = 0; i < image.pixels.size(); i += 3)
+        colors.push_back(uint32_t(image.pixels[i]) << 16 | uint32_t(image.pixels[i + 1]) << 8 | image.pixels[i + 2]);
+    std::ranges::sort(colors);
+    for (size_t i = 0, begin = 0; i < colors.size(); ++i)
+        if (i + 1 == colors.size() || colors[i + 1] != colors[i]) {
+            counts.push_back(uint32_t(i + 1 - begin));
+            begin = i + 1;
+        }
+    std::ranges::sort(counts, std::greater());
+    uint64_t most = 0;
+    for (size_t i = 0; i < std::min(counts.size(), kFewColors); ++i)
+        most += counts[i];
+    return double(most) >= kFlat * double(colors.size());
+}
+
 Result<Picture> encode(const ImageRgb8& image, int quality)
 {
     SR_TRY(std::vector<std::byte> png, encode_png_rgb8(image.width, image.height, image.pixels));
     SR_TRY(std::vector<std::byte> jpeg, encode_jpeg_rgb8(image.width, image.height, image.pixels, quality));
-    if (double(png.size()) <= kPngMayBe * double(jpeg.size()))
+    if (is_flat(image) || double(png.size()) <= kPngMayBe * double(jpeg.size()))
         return Picture{"image/png", std::move(png)};
     return Picture{"image/jpeg", std::move(jpeg)};
 }

@@ -37,7 +37,8 @@ struct PictureTable {
     std::vector<std::string> warnings;                // a line each
 };
 
-// Pictures are encoded anew: as JPEG, or as PNG where that is hardly larger (labels), so that nothing of the files but
+// Pictures are encoded anew: as JPEG, or as PNG where that is hardly larger or the picture is drawn in few
+// colours (labels), so that nothing of the files but
 // their pixels gets in. Moments that a set lacks are left out, with a warning. bad_input: no pictures, two of one
 // number, no moment that all sets have, another size within a set, another shape than the first set's.
 // `done` hears how many pictures there are after each one and may stop.
