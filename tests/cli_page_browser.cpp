@@ -87,7 +87,14 @@ class CliPageBrowser : public testing::Test {
         for (const char* act : {"orbit", "pan", "pinch", "wheel", "key", "labels", "drive"})
             EXPECT_GT(orbit[act], double(orbit["visible"]) / 10) << act;
         EXPECT_EQ(orbit["hidden"], orbit["visible"]); // without classes nothing is left
-        EXPECT_GT(orbit["closer"], 1.2);              // a double click
+        const std::array<float, 3> center = cell_center(grid.cells.back(), grid.voxel_size);
+        for (size_t a = 0; a < 3; ++a) {
+            const size_t from = grid.points.size() - 3 + a;
+            EXPECT_NEAR(orbit["last_point"][a], center[a] + half_to_float(grid.points[from]), 1e-3);
+            EXPECT_EQ(orbit["last_point"][3 + a], grid.colors[from]);
+        }
+        EXPECT_EQ(orbit["last_point"][6], grid.labels.back());
+        EXPECT_GT(orbit["closer"], 1.2); // a double click
         EXPECT_EQ(orbit["scenes"], 2);
         EXPECT_EQ(orbit["parts"].size(), 144u);
         EXPECT_LE(report["layout"]["content"], report["layout"]["width"]); // no scrolling sideways

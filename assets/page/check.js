@@ -96,6 +96,8 @@ function checkOrbit(orbit) {
     };
     const first = pixels(), { canvas } = orbit, target = [...orbit.camera.target], view = orbit.camera.copy();
     const found = { samples: first.length / 4, visible: visible(first) };
+    const { low, positions, colors, labels, count } = orbit.scene;
+    found.last_point = [...add(low, positions.slice(3 * count - 3), 1), ...colors.slice(-3), labels[count - 1]];
     found.parts = parts(first, canvas.width, orbit.drawer.name === "webgl2");
     found.still = changes(() => 0);
     found.orbit = changes(() => drag(canvas, [0.5, 0.5], [0.6, 0.45]));
