@@ -44,6 +44,7 @@ void add_fuse(CLI::App& app, const Globals& globals, Run& run);
 void add_generate(CLI::App& app, const Globals& globals, Run& run);
 void add_inpaint(CLI::App& app, const Globals& globals, Run& run);
 void add_inspect(CLI::App& app, const Globals& globals, Run& run);
+void add_page(CLI::App& app, const Globals& globals, Run& run);
 void add_refine(CLI::App& app, const Globals& globals, Run& run);
 void add_render(CLI::App& app, const Globals& globals, Run& run);
 void add_tile(CLI::App& app, const Globals& globals, Run& run);

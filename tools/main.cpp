@@ -106,6 +106,7 @@ int main(int argc, char** argv)
     add_generate(app, globals, run);
     add_inpaint(app, globals, run);
     add_inspect(app, globals, run);
+    add_page(app, globals, run);
     add_refine(app, globals, run);
     add_render(app, globals, run);
     add_tile(app, globals, run);

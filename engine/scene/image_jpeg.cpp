@@ -1,5 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+#include "engine/scene/image_jpeg.h"
+
 #include "engine/scene/image.h"
 #include "runtime/quote.h"
 
@@ -42,6 +44,7 @@ struct Encoder {
     unsigned long size = 0;
 
     Encoder() { info.err = errors.install(); }
+    std::span<const std::byte> file() const { return std::as_bytes(std::span(bytes, size)); }
     Encoder(const Encoder&) = delete;
     Encoder& operator=(const Encoder&) = delete;
     ~Encoder()
@@ -51,7 +54,7 @@ struct Encoder {
     }
 };
 
-bool encode(Encoder& e, uint32_t width, uint32_t height, const uint8_t* pixels, int quality)
+bool encode_rows(Encoder& e, uint32_t width, uint32_t height, const uint8_t* pixels, int quality)
 {
     if (setjmp(e.errors.jump))
         return false;
@@ -71,6 +74,19 @@ bool encode(Encoder& e, uint32_t width, uint32_t height, const uint8_t* pixels, 
     }
     jpeg_finish_compress(&e.info);
     return true;
+}
+
+Status encode(Encoder& e, std::string_view where, uint32_t width, uint32_t height, std::span<const uint8_t> pixels,
+              int quality)
+{
+    SR_ASSERT(pixels.size() == size_t(width) * height * 3 && quality >= 1 && quality <= 100,
+              "{} x {} pixels given with {} bytes, quality {}", width, height, pixels.size(), quality);
+    if (width == 0 || height == 0 || width > kMaxImageSide || height > kMaxImageSide)
+        return fail(ErrorCode::bad_input, "cannot write {}: an image of {} x {} pixels, expected 1 to {} each way",
+                    where, width, height, kMaxImageSide);
+    if (!encode_rows(e, width, height, pixels.data(), quality))
+        return fail(ErrorCode::out_of_memory, "cannot write {}: {}", where, printable(e.errors.message));
+    return {};
 }
 
 struct Decoder {
@@ -112,15 +128,17 @@ bool read_rows(Decoder& d, uint8_t* pixels)
 
 Status write_jpeg_rgb8(const Path& path, uint32_t width, uint32_t height, std::span<const uint8_t> pixels, int quality)
 {
-    SR_ASSERT(pixels.size() == size_t(width) * height * 3 && quality >= 1 && quality <= 100,
-              "{} x {} pixels given with {} bytes, quality {}", width, height, pixels.size(), quality);
-    if (width == 0 || height == 0 || width > kMaxImageSide || height > kMaxImageSide)
-        return fail(ErrorCode::bad_input, "cannot write {}: an image of {} x {} pixels, expected 1 to {} each way",
-                    quote_path(path), width, height, kMaxImageSide);
     Encoder e;
-    if (!encode(e, width, height, pixels.data(), quality))
-        return fail(ErrorCode::out_of_memory, "cannot write {}: {}", quote_path(path), printable(e.errors.message));
-    return write_file_atomically(path, std::as_bytes(std::span(e.bytes, e.size)));
+    SR_CHECK(encode(e, quote_path(path), width, height, pixels, quality));
+    return write_file_atomically(path, e.file());
+}
+
+Result<std::vector<std::byte>> encode_jpeg_rgb8(uint32_t width, uint32_t height, std::span<const uint8_t> pixels,
+                                                int quality)
+{
+    Encoder e;
+    SR_CHECK(encode(e, "a JPEG", width, height, pixels, quality));
+    return std::vector<std::byte>(e.file().begin(), e.file().end());
 }
 
 Result<ImageRgb8> read_jpeg_rgb8(const Path& path)
