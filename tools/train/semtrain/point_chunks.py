@@ -57,8 +57,8 @@ def inputs_of(network, positions, colors, origin, limits):
 
 
 def cut_chunks(path, network, seed=0):
-    """what the engine feeds its network -> positions [C, N, 3], inputs [C, N, W], labels [C, N], different [C]: how many
-    points of a chunk are not repeated"""
+    """what the engine feeds its network -> positions [C, N, 3], inputs [C, N, W], labels [C, N], different [C]: how
+    many points of a chunk are not repeated"""
     positions, colors, labels = read_points(path)
     limits = np.stack([positions.min(0), positions.max(0)])
     rank = scatter(scatter(np.uint64(seed)) ^ np.arange(len(positions), dtype=np.uint64))
@@ -124,7 +124,7 @@ class ChunkBatches:
             np.save(os.path.join(cache, f"{name}.npy"), np.stack(columns[name]))
 
     def class_weights(self, power):
-        """[num_classes] frequency to -power, such that the mean over all points is 1; 1 for classes that do not occur"""
+        """[num_classes] frequency to -power, so that the mean over all points is 1; 1 for classes that do not occur"""
         counts = np.bincount(self.labels, minlength=self.network["num_classes"]).astype(np.float64)
         share = counts / counts.sum()
         weights = np.where(counts > 0, np.maximum(share, 1e-12) ** -power, 0)
@@ -141,7 +141,8 @@ class ChunkBatches:
         first, count = (int(self.ends[c - 1]) if c else 0), self.network["points"]
         order = random.permutation(int(self.ends[c]) - first)
         drawn = first + order[np.arange(count) % len(order)]
-        own, inputs = inputs_of(self.network, self.positions[drawn], self.colors[drawn], self.origins[c], self.limits[c])
+        own, inputs = inputs_of(self.network, self.positions[drawn], self.colors[drawn], self.origins[c],
+                                self.limits[c])
         for axis in range(2):  # streets mirrored in either direction are streets
             if self.config["mirror"] and random.random() < 0.5:
                 own[:, axis] *= -1

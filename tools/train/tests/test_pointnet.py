@@ -25,15 +25,16 @@ TINY = {"inputs": ["xyz", "rgb", "normalized"], "chunk": 2.4, "points": 100, "mi
 
 
 def write_street(path, seed=0):
-    """a floor of 16 x 12 cells before a wall of 16 x 3, and sixteen poles in front of it; six points a cell on multiples
-    of 1/64 m, so that equal distances are equal in fp32; a colour a class, with noise"""
+    """a floor of 16 x 12 cells before a wall of 16 x 3, and poles in front of it; six points a cell, a colour a class
+    with noise"""
     random = np.random.default_rng(seed)
     floor = [(i, j, 0, 0) for i in range(-4, 12) for j in range(12)]
     wall = [(i, 12, k, 2) for i in range(-4, 12) for k in range(3)]
-    poles = [(i, 4 * j + 2, 1, 5) for i in range(-4, 12, 4) for j in range(3)] + [(i, 2, 2, 5) for i in range(-4, 12, 4)]
+    poles = [(i, 4 * j + 2, 1, 5) for i in range(-4, 12, 4) for j in range(3)]
+    poles += [(i, 2, 2, 5) for i in range(-4, 12, 4)]
     cells = np.array(floor + wall + poles, np.int32)
     cells = cells[random.permutation(len(cells))]  # in any order: who reads them sorts them
-    points = random.integers(-16, 17, (len(cells), 6, 3)) / 64
+    points = random.uniform(-0.25, 0.25, (len(cells), 6, 3))
     points[cells[:, 3] == 0, :, 2] = 0
     points[cells[:, 3] == 2, :, 1] = 0
     points[cells[:, 3] == 5, :, :2] /= 4
@@ -136,8 +137,9 @@ class TheRecipe(unittest.TestCase):
         self.assertEqual(shapes, {("x", True), ("x", False), ("y", True), ("y", False)})
 
     def test_learns_a_street_by_heart_and_says_how_well(self):
-        train(self.grid, self.path("run"), 60, "--heldout", self.grid, "--set", "learning_rate=0.01", "--set", "ema=0.8")
-        self.assertLess(log_of(self.path("run"))[-1]["loss"], 1.5)  # the mean of the steps, the first of which is at ln 20
+        train(self.grid, self.path("run"), 60, "--heldout", self.grid, "--set", "learning_rate=0.01",
+              "--set", "ema=0.8")
+        self.assertLess(log_of(self.path("run"))[-1]["loss"], 1.5)  # the mean of all steps; the first are at ln 20
         with open(self.path("run/heldout.json")) as file:
             report = json.load(file)
         self.assertGreater(report["mean_iou"], 0.85)

@@ -1,7 +1,8 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""PointNet++ with single-scale grouping for segmentation (Qi et al. 2017), tensors named as in models/pointnet2_sem_seg.py
-of github.com/yanx27/Pointnet_Pointnet2_pytorch. Points are chosen and grouped by the rules of the engine (docs/eval.md)."""
+"""PointNet++ with single-scale grouping for segmentation (Qi et al. 2017), tensors named as in
+models/pointnet2_sem_seg.py of github.com/yanx27/Pointnet_Pointnet2_pytorch. Points are chosen and grouped by the rules
+of the engine (docs/eval.md)."""
 import torch
 from torch import nn
 from torch.nn import functional as F
@@ -28,8 +29,8 @@ def farthest_points(points, count):
 
 
 def ball_query(points, centers, radius, count):
-    """[B, N, 3], [B, S, 3] -> [B, S, count]: the first points with d^2 <= radius^2; too few: the first of them again; none:
-    point 0"""
+    """[B, N, 3], [B, S, 3] -> [B, S, count]: the first points with d^2 <= radius^2; too few: the first of them again;
+    none: point 0"""
     squared = torch.tensor(radius, dtype=torch.float32) ** 2
     groups = []
     for own, middle in zip(points, centers):
@@ -171,8 +172,8 @@ def batch_norms(model):
 
 @torch.no_grad()
 def measure_norms(model, batches, first=None):
-    """running statistics of the batch norms := those of these batches, [(positions, inputs)], all weighing the same; the
-    decoder's of the `first` points of every set"""
+    """running statistics of the batch norms := those of these batches, [(positions, inputs)], all weighing the same;
+    the decoder's of the `first` points of every set"""
     norms = batch_norms(model)
     for norm in norms:
         norm.reset_running_stats()
