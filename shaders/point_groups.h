@@ -7,6 +7,8 @@
 struct FarthestPointPush {
     uint count;   // points of a set
     uint samples; // of a set, to choose
+    uint first;   // of the samples, those of this dispatch
+    uint end;
 };
 
 struct BallQueryPush {

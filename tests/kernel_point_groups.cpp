@@ -12,10 +12,11 @@ struct PointCase {
     uint32_t sets, points, samples, neighbors;
     float spread, radius; // points lie on multiples of 1/64 within [0, spread): exact distances, many ties
 };
-// one point; every point chosen, many at one place; fewer in the ball than wanted; more; several sets; large
+// one point; every point chosen, many at one place; fewer in the ball than wanted; more; several sets; large; more
+// rounds of its loops than lavapipe grants an invocation (65535)
 const PointCase kCases[] = {{1, 1, 1, 3, 1, 0.5f},       {1, 40, 40, 8, 0.06f, 0.02f}, {2, 50, 7, 16, 4, 0.3f},
                             {3, 129, 20, 8, 0.5f, 0.3f}, {5, 200, 64, 32, 1, 0.25f},   {1, 63, 10, 4, 1, 100},
-                            {2, 4099, 300, 32, 2, 0.2f}, {1, 65, 2, 70, 0.2f, 0.1f}};
+                            {2, 4099, 300, 32, 2, 0.2f}, {1, 65, 2, 70, 0.2f, 0.1f},   {2, 3001, 1100, 4, 4, 0.2f}};
 
 std::vector<float> lattice_points(KernelCase& k, const PointCase& c)
 {
