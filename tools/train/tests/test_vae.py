@@ -26,6 +26,21 @@ class VaeGivesWhatTheReferenceGives(unittest.TestCase):
         self.assertEqual(tuple(mean.shape), (2, 4, 5, 7))
         self.assertEqual(tuple(model.decode(mean).shape), (2, 3, 10, 14))
 
+    def test_in_bf16_with_channels_last_it_gives_nearly_the_same(self):
+        torch.manual_seed(1)
+        model = AutoencoderKL({"block_out_channels": [16, 32], "norm_num_groups": 8, "layers_per_block": 1})
+        image = torch.rand(2, 3, 64, 64)
+        expected = model.decode(model.moments(image)[0])
+        expected.square().mean().backward()
+        gradient = model.encoder.conv_in.weight.grad.clone()
+        model.zero_grad()
+        model.to(memory_format=torch.channels_last)
+        with torch.autocast("cpu", dtype=torch.bfloat16):
+            result = model.decode(model.moments(image.contiguous(memory_format=torch.channels_last))[0])
+        result.float().square().mean().backward()
+        self.assertLess(float((result - expected).norm() / expected.norm()), 0.1)
+        self.assertLess(float((model.encoder.conv_in.weight.grad - gradient).norm() / gradient.norm()), 0.2)
+
 
 if __name__ == "__main__":
     unittest.main()
