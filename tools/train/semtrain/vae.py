@@ -3,7 +3,8 @@
 """The VAE of the renderer: pictures of 8x8 blocks <-> latents of 4 channels (spec: method.md §5, models.md).
 
 The paper takes that of Stable Diffusion 1.5 as it is. This recipe trains a small one on shaded frames and splat buffers
-of streets: L1 + L1 of a Laplacian pyramid + a little KL, on random crops.
+of streets: L1 + L1 of a Laplacian pyramid + a little KL, on random crops. With --init and "train": "decoder" the encoder
+stays as it is, and with it every latent: the decoder may go on learning while a renderer trains on the latents.
 """
 import json
 import os
@@ -53,10 +54,11 @@ def laplacian_loss(a, b, levels):
 
 
 def step_loss(model, image, config, noise):
-    """-> loss, {rec, kl}; noise [B, 4, h, w]: of the posterior's sample"""
-    mean, logvar = model.moments(image)
-    mean, logvar = mean.float(), logvar.float()
-    made = model.decode(mean + (0.5 * logvar).exp() * noise).float()
+    """-> loss, {rec, kl}; noise [B, 4, h, w]: of the posterior's sample, and latent_noise of the latents' deviation"""
+    with torch.set_grad_enabled(config["train"] == "both"):
+        mean, logvar = (m.float() for m in model.moments(image))
+    more = config["latent_noise"] / model.config["scaling_factor"]
+    made = model.decode(mean + (logvar.exp() + more ** 2).sqrt() * noise).float()
     rec = (made - image).abs().mean()
     detail = laplacian_loss(made, image, 3)
     kl = 0.5 * (mean.square() + logvar.exp() - 1 - logvar).mean()
@@ -83,17 +85,28 @@ def measure(model, drives, picture):
     return sum(values) / len(values)
 
 
+def freeze_encoder(model, state):
+    """-> the weights, {name: tensor}, that must stay as they are"""
+    if state is None:
+        raise SystemExit('"train": "decoder" needs --init VAE: its encoder and scaling_factor are kept')
+    for part in (model.encoder, model.quant_conv):
+        part.requires_grad_(False)
+    return {name: t.float() for name, t in state.items() if name.startswith(("encoder.", "quant_conv."))}
+
+
 class Export:
     """writes OUT/vae from averaged weights, and what held-out drives say of them"""
 
-    def __init__(self, folder, config, drives, held):
-        self.folder, self.config, self.drives, self.held = folder, config, drives, held
+    def __init__(self, folder, config, drives, held, frozen):
+        self.folder, self.config, self.drives, self.held, self.frozen = folder, config, drives, held, frozen
 
     @torch.no_grad()
     def __call__(self, state):
         model = AutoencoderKL(self.config).eval()
+        state = {**state, **self.frozen}
         model.load_state_dict(state)
-        normalize(model, self.drives)
+        if not self.frozen:
+            normalize(model, self.drives)
         model_folder.write_component(os.path.join(self.folder, "vae"), model.config_json(), state)
         model_folder.add_to_index(self.folder, LIBRARY)
         if self.held:
@@ -132,7 +145,8 @@ def main(arguments=None):
     pictures = Pictures(drives)
     print(f"{len(pictures.truths)} frames of {len(drives)} drives", flush=True)
     model = AutoencoderKL(config).to(memory_format=torch.channels_last)
-    trainer = Trainer(options.output, model, config, Export(options.output, config, drives, held))
+    frozen = freeze_encoder(model, state) if config["train"] == "decoder" else {}
+    trainer = Trainer(options.output, model, config, Export(options.output, config, drives, held, frozen))
     if state:
         trainer.start_from(state)
 

@@ -13,7 +13,7 @@ import numpy as np
 import torch
 from PIL import Image
 
-from semtrain import asd, safetensors_file, vae
+from semtrain import asd, model_folder, safetensors_file, vae
 from semtrain.denoising import alphas_cumprod
 from semtrain.frames import find_drives
 from semtrain.latents import sequences
@@ -23,7 +23,8 @@ COMMON = {"steps": 4, "learning_rate": 3e-3, "warmup": 1, "decay": 0.0, "ema": 0
           "seed": 1, "device": "cpu"}
 VAE = {**COMMON, "latent_channels": 4, "block_out_channels": [8, 8, 16, 16], "layers_per_block": 1,
        "norm_num_groups": 4, "mid_block_add_attention": False, "use_quant_conv": False, "use_post_quant_conv": False,
-       "force_upcast": False, "crop": 32, "batch": 4, "buffer_share": 0.25, "detail_weight": 1.0, "kl_weight": 1e-4}
+       "force_upcast": False, "crop": 32, "batch": 4, "buffer_share": 0.25, "detail_weight": 1.0, "kl_weight": 1e-4,
+       "train": "both", "latent_noise": 0.0}
 ASD = {**COMMON, "in_channels": 13, "out_channels": 4, "block_out_channels": [16, 16], "layers_per_block": 1,
        "down_block_types": ["DownBlock2D", "CrossAttnDownBlock2D"], "mid_block_type": "UNetMidBlock2DCrossAttn",
        "up_block_types": ["CrossAttnUpBlock2D", "UpBlock2D"], "attention_head_dim": 2, "cross_attention_dim": 8,
@@ -106,6 +107,17 @@ class Recipes(unittest.TestCase):
         before = vae.step_loss(model, images, VAE, noise)[1]["rec"]
         model.load_state_dict(self.weights("of_vae"))
         self.assertLess(vae.step_loss(model, images, VAE, noise)[1]["rec"], 0.6 * before)
+
+    def test_a_decoder_trained_alone_leaves_every_latent_as_it_was(self):
+        before = self.path("of_vae", "vae")
+        self.train(vae, "vae", "decoder", "--init", before, "--set", "train=decoder", "--set", "latent_noise=0.1")
+        after = self.path("decoder", "vae")
+        (config, old), (now, new) = (model_folder.read_component(folder) for folder in (before, after))
+        self.assertEqual(config, now)
+        same = {name for name in old if torch.equal(old[name], new[name])}
+        self.assertEqual({name for name in old if name.startswith("encoder.")},
+                         {name for name in same if name.startswith("encoder.")})
+        self.assertTrue({name for name in old if name.startswith("decoder.")} - same)
 
     def test_latents_have_mean_zero_and_deviation_one(self):
         drives = find_drives(self.path("frames"))
