@@ -3,8 +3,9 @@
 """The VAE of the renderer: pictures of 8x8 blocks <-> latents of 4 channels (spec: method.md §5, models.md).
 
 The paper takes that of Stable Diffusion 1.5 as it is. This recipe trains a small one on shaded frames and splat buffers
-of streets: L1 + L1 of a Laplacian pyramid + a little KL, on random crops. With --init and "train": "decoder" the encoder
-stays as it is, and with it every latent: the decoder may go on learning while a renderer trains on the latents.
+of streets: L1 of the picture, of a Laplacian pyramid and of colours, and a little KL, on random crops. With --init and
+"train": "decoder" the encoder stays as it is, and with it every latent: the decoder may go on learning while a renderer
+trains on the latents.
 """
 import json
 import os
@@ -53,6 +54,12 @@ def laplacian_loss(a, b, levels):
     return total / levels
 
 
+def color_loss(a, b, block=4):
+    """L1 distance of colours without their grey, in means of 4 x 4 pixels: else a small VAE spends all on brightness"""
+    d = F.avg_pool2d(a - b, block)
+    return (d - d.mean(1, keepdim=True)).abs().mean()
+
+
 def step_loss(model, image, config, noise):
     """-> loss, {rec, kl}; noise [B, 4, h, w]: of the posterior's sample, and latent_noise of the latents' deviation"""
     with torch.set_grad_enabled(config["train"] == "both"):
@@ -62,7 +69,9 @@ def step_loss(model, image, config, noise):
     rec = (made - image).abs().mean()
     detail = laplacian_loss(made, image, 3)
     kl = 0.5 * (mean.square() + logvar.exp() - 1 - logvar).mean()
-    return rec + config["detail_weight"] * detail + config["kl_weight"] * kl, {"rec": float(rec), "kl": float(kl)}
+    color = color_loss(made, image)
+    loss = rec + config["detail_weight"] * detail + config["color_weight"] * color + config["kl_weight"] * kl
+    return loss, {"rec": float(rec), "color": float(color), "kl": float(kl)}
 
 
 def normalize(model, drives):

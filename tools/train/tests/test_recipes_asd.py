@@ -23,8 +23,8 @@ COMMON = {"steps": 4, "learning_rate": 3e-3, "warmup": 1, "decay": 0.0, "ema": 0
           "seed": 1, "device": "cpu"}
 VAE = {**COMMON, "latent_channels": 4, "block_out_channels": [8, 8, 16, 16], "layers_per_block": 1,
        "norm_num_groups": 4, "mid_block_add_attention": False, "use_quant_conv": False, "use_post_quant_conv": False,
-       "force_upcast": False, "crop": 32, "batch": 4, "buffer_share": 0.25, "detail_weight": 1.0, "kl_weight": 1e-4,
-       "train": "both", "latent_noise": 0.0}
+       "force_upcast": False, "crop": 32, "batch": 4, "buffer_share": 0.25, "detail_weight": 1.0, "color_weight": 1.0,
+       "kl_weight": 1e-4, "train": "both", "latent_noise": 0.0}
 ASD = {**COMMON, "in_channels": 13, "out_channels": 4, "block_out_channels": [16, 16], "layers_per_block": 1,
        "down_block_types": ["DownBlock2D", "CrossAttnDownBlock2D"], "mid_block_type": "UNetMidBlock2DCrossAttn",
        "up_block_types": ["CrossAttnUpBlock2D", "UpBlock2D"], "attention_head_dim": 2, "cross_attention_dim": 8,
