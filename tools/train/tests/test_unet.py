@@ -41,6 +41,24 @@ class UnetGivesWhatTheReferenceGives(unittest.TestCase):
         out = model(torch.zeros(2, 13, 7, 9), torch.tensor([3, 900]), torch.zeros(1, 1, 8))
         self.assertEqual(tuple(out.shape), (2, 4, 7, 9))
 
+    def test_in_bf16_with_channels_last_it_gives_nearly_the_same(self):
+        torch.manual_seed(1)
+        model = UNet2DConditionModel({
+            "block_out_channels": [16, 32], "layers_per_block": 1, "norm_num_groups": 8, "attention_head_dim": 2,
+            "down_block_types": ["DownBlock2D", "CrossAttnDownBlock2D"], "cross_attention_dim": 8,
+            "up_block_types": ["CrossAttnUpBlock2D", "UpBlock2D"]})
+        sample, time, text = torch.randn(2, 4, 20, 30), torch.tensor([10, 600]), torch.randn(1, 1, 8)
+        expected = model(sample, time, text)
+        expected.square().mean().backward()
+        gradient = model.conv_in.weight.grad.clone()
+        model.zero_grad()
+        model.to(memory_format=torch.channels_last)
+        with torch.autocast("cpu", dtype=torch.bfloat16):
+            result = model(sample.contiguous(memory_format=torch.channels_last), time, text)
+        result.float().square().mean().backward()
+        self.assertLess(float((result - expected).norm() / expected.norm()), 0.1)
+        self.assertLess(float((model.conv_in.weight.grad - gradient).norm() / gradient.norm()), 0.2)
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -12,6 +12,13 @@ class GroupNorm(nn.GroupNorm):
         return super().forward(x.float()).to(x.dtype)
 
 
+class LayerNorm(nn.LayerNorm):
+    """in fp32 at any precision: that of PyTorch 1.13 on a CPU refuses bf16 with weights of fp32"""
+
+    def forward(self, x):
+        return super().forward(x.float()).to(x.dtype)
+
+
 class ResnetBlock(nn.Module):
     """norm1, conv1, (time_emb_proj,) norm2, conv2, conv_shortcut where the channels change"""
 

@@ -7,7 +7,7 @@ import torch
 from torch import nn
 from torch.nn import functional as F
 
-from .image_blocks import Downsampler, GroupNorm, ResnetBlock, Upsampler, per_level
+from .image_blocks import Downsampler, GroupNorm, LayerNorm, ResnetBlock, Upsampler, per_level
 
 DEFAULTS = {"in_channels": 4, "out_channels": 4, "block_out_channels": [320, 640, 1280, 1280], "layers_per_block": 2,
             "down_block_types": ["CrossAttnDownBlock2D"] * 3 + ["DownBlock2D"],
@@ -55,7 +55,7 @@ class FeedForward(nn.Module):
 class TransformerBlock(nn.Module):
     def __init__(self, channels, context, heads):
         super().__init__()
-        self.norm1, self.norm2, self.norm3 = (nn.LayerNorm(channels) for _ in range(3))
+        self.norm1, self.norm2, self.norm3 = (LayerNorm(channels) for _ in range(3))
         self.attn1 = Attention(channels, channels, heads)
         self.attn2 = Attention(channels, context, heads)
         self.ff = FeedForward(channels)
