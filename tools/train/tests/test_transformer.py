@@ -10,7 +10,7 @@ import unittest
 import numpy as np
 import torch
 
-from golden import GoldenCase, ints
+import golden
 from semtrain import safetensors_file
 from semtrain.grids import Grids, LocalSets, read_tokens
 from semtrain.nets.transformer import CONFIG_FIELDS, VoxfieldTransformer
@@ -20,6 +20,10 @@ RUN = os.path.join(REPOSITORY, "tools", "train", "run")
 TINY = ["--set", 'network={"num_layers": 2, "num_attention_heads": 2, "attention_head_dim": 16, "points_per_voxel": 4,'
         ' "num_classes": 20, "voxel_size": 0.6, "attention_radius": 3.0, "pos_embed_dim": 8, "context_pos_embed": true}',
         "--set", "batch=4", "--set", "set_size=[8,12]", "--set", "warmup=2", "--set", "precision=fp32", "--threads", "1"]
+
+
+def from_config(config):
+    return VoxfieldTransformer(**{name: value for name, value in config.items() if name in CONFIG_FIELDS})
 
 
 def write_street(path, seed=0):
@@ -50,14 +54,13 @@ def train(grids, output, steps, *more):
 class TheModule(unittest.TestCase):
     def test_gives_what_the_golden_cases_expect(self):
         for name in ("transformer_tiny", "transformer_wide"):
-            g = GoldenCase(name)
-            model = VoxfieldTransformer(**{k: v for k, v in g.config.items() if k in CONFIG_FIELDS})
-            model.load_state_dict(g.weights)
-            t = g.tensors
+            case, t = golden.read_case(name)
+            model = golden.load_network(from_config, name)
             valid = t["input.valid"].bool()
             with torch.no_grad():
-                got = model(t["input.tokens"], ints(t["input.labels"]), t["input.centers"], valid, t["input.timestep"])
-            self.assertLess(g.worst("sample", got, valid), 1, name)
+                got = model(t["input.tokens"], t["input.labels"].long(), t["input.centers"], valid, t["input.timestep"])
+            apart = golden.apart(got[valid], t["expect.sample"][valid])
+            self.assertLess(apart, case["tolerance"]["fp32"], name)
 
 
 class TheRecipe(unittest.TestCase):

@@ -1,0 +1,167 @@
+# SPDX-FileCopyrightText: semrover authors
+# SPDX-License-Identifier: Apache-2.0
+"""The renderer ASD: a Stable Diffusion UNet that draws a frame over its splat buffer (spec: method.md §5).
+
+Its input is the noisy latent, the previous frame's latent with noise on it, the buffer's latent and the visibility; it
+predicts the noise. The paper fine-tunes Stable Diffusion 1.5: --config paper --init FOLDER.
+"""
+import os
+import shutil
+
+import torch
+from torch import nn
+
+from . import model_folder, safetensors_file, settings
+from .denoising import SCHEDULER, alphas_cumprod, denoise, input_of
+from .frames import find_drives, to_pixels, write_beside
+from .latents import load_vae, sequences
+from .nets.unet import UNet2DConditionModel
+from .trainer import Trainer, generator
+
+INDEX = {"renderer": ["diffusers", "UNet2DConditionModel"], "vae": ["diffusers", "AutoencoderKL"],
+         "scheduler": ["diffusers", "DDIMScheduler"]}
+
+
+class Renderer(nn.Module):
+    """the UNet, and the text that stands for every frame [1, text_tokens, cross_attention_dim]"""
+
+    def __init__(self, config):
+        super().__init__()
+        self.unet = UNet2DConditionModel(config)
+        width = self.unet.config["cross_attention_dim"]
+        self.text = nn.Parameter(torch.zeros(1, config["text_tokens"], width), requires_grad=config["train_text"])
+
+    def forward(self, noisy, previous, buffer, visible, timestep):
+        return self.unet(input_of(noisy, previous, buffer, visible), timestep, self.text)
+
+
+class Batches:
+    """what a step trains on: crops of latents, each from a frame of its own"""
+
+    def __init__(self, all_sequences, config):
+        self.config = config
+        self.frames = [(s, i) for s in all_sequences for i in range(len(s))]
+        h, w = self.frames[0][0].truth.shape[2:]
+        self.crop = (min(config["crop"][0], h), min(config["crop"][1], w))
+
+    def make(self, step):
+        """-> truth, previous (with noise on it, zeros where there is none), buffer [B, 4, h, w], visible [B, 1, h, w]"""
+        draw, rows = generator(self.config, step), []
+        for _ in range(self.config["batch"]):
+            sequence, i = self.frames[_number(len(self.frames), draw)]
+            rows.append(self._frame(sequence, i, draw))
+        return [torch.stack(parts).to(self.config["device"]) for parts in zip(*rows)]
+
+    def _frame(self, s, i, draw):
+        top = _number(s.truth.shape[2] - self.crop[0] + 1, draw)
+        left = _number(s.truth.shape[3] - self.crop[1] + 1, draw)
+        place = (slice(None), slice(top, top + self.crop[0]), slice(left, left + self.crop[1]))
+        low, high = self.config["previous_noise"]
+        chance, scale = torch.rand(2, generator=draw).tolist()
+        noise = torch.randn(s.truth[0][place].shape, generator=draw)
+        previous, visible = torch.zeros_like(noise), s.visible[i][place]
+        if chance < self.config["dropout"]:
+            visible = torch.zeros_like(visible)
+        elif chance >= self.config["dropout"] + self.config["first_share"] and not s.first[i]:
+            previous = s.truth[i - 1][place] + (low + (high - low) * scale) * noise
+        return s.truth[i][place], previous, s.buffer[i][place], visible
+
+
+def step_loss(model, batch, alphas, config, draw):
+    """-> loss, {eps: the plain error of the noise}; timesteps are spread evenly over the batch"""
+    truth, previous, buffer, visible = batch
+    n = len(truth)
+    spread = (torch.arange(n) + torch.rand(1, generator=draw)) / n
+    t = (spread * 1000).long().clamp(max=999)
+    noise = torch.randn(truth.shape, generator=draw).to(truth.device)
+    a = alphas[t].view(n, 1, 1, 1).to(truth.device)
+    made = model(a.sqrt() * truth + (1 - a).sqrt() * noise, previous, buffer, visible, t.to(truth.device))
+    error = (made.float() - noise).square().mean((1, 2, 3))
+    weight = 1 / a.flatten() if config["weighting"] == "v" else torch.ones_like(error)
+    return (weight * error).mean(), {"eps": float(error.mean())}
+
+
+class Export:
+    """writes OUT as a model folder that `semrover refine -m` loads, and one held-out frame as it draws it"""
+
+    def __init__(self, folder, config, vae_folder, held):
+        self.folder, self.config, self.vae_folder, self.held = folder, config, vae_folder, held
+
+    @torch.no_grad()
+    def __call__(self, state):
+        unet = {name[5:]: t for name, t in state.items() if name.startswith("unet.")}
+        model = Renderer(self.config).eval()
+        model.load_state_dict(state)
+        model_folder.write_component(os.path.join(self.folder, "renderer"), model.unet.config_json(), unet)
+        os.makedirs(os.path.join(self.folder, "conditioning"), exist_ok=True)
+        safetensors_file.write(os.path.join(self.folder, "conditioning", "conditioning.safetensors"),
+                               {"encoder_hidden_states": state["text"].half()})
+        model_folder.write_scheduler(os.path.join(self.folder, "scheduler"), SCHEDULER)
+        shutil.copytree(self.vae_folder, os.path.join(self.folder, "vae"), dirs_exist_ok=True)
+        model_folder.add_to_index(self.folder, INDEX, {"renderer": self.config["defaults"]})
+        if self.held:
+            self._draw(model)
+
+    def _draw(self, model):
+        """buffer | drawn as a first frame | truth"""
+        s, drive = self.held
+        i, vae = len(s) // 2, load_vae(self.vae_folder)
+        noise = torch.randn(s.truth[i:i + 1].shape, generator=torch.Generator().manual_seed(1))
+        steps, scale = self.config["defaults"]["num_inference_steps"], self.config["defaults"]["guidance_scale"]
+        made = denoise(model.unet, model.text, noise, torch.zeros_like(noise), s.buffer[i:i + 1], s.visible[i:i + 1],
+                       steps, scale)
+        truth = drive.truth(drive.numbers[i])
+        picture = to_pixels(vae.decode_scaled(made))[0, :, :truth.shape[1], :truth.shape[2]]
+        write_beside(os.path.join(self.folder, "held_out.png"), [drive.buffer(drive.numbers[i]), picture, truth])
+
+
+def read_init(folder, config):
+    """weights of a renderer, or of a plain Stable Diffusion 1.5 folder, whose UNet gets the new channels with zeros
+    (as `semrover convert --asd-init` does) -> state of a Renderer; the UNet's shape goes to config"""
+    part = "renderer" if os.path.isdir(os.path.join(folder, "renderer")) else "unet"
+    of_init, state = model_folder.read_component(os.path.join(folder, part))
+    config.update({k: v for k, v in UNet2DConditionModel(of_init).config.items() if k in of_init})
+    conv = state["conv_in.weight"].float()
+    config["in_channels"] = 3 * config["out_channels"] + 1
+    more = conv.new_zeros(conv.shape[0], config["in_channels"] - conv.shape[1], *conv.shape[2:])
+    out = {f"unet.{name}": t for name, t in state.items()}
+    out["unet.conv_in.weight"] = torch.cat([conv, more], 1)
+    path = os.path.join(folder, "conditioning", "conditioning.safetensors")
+    if os.path.exists(path):
+        out["text"] = safetensors_file.read(path)["encoder_hidden_states"].float()
+        config["text_tokens"] = out["text"].shape[1]
+    else:
+        out["text"] = torch.zeros(1, config["text_tokens"], config["cross_attention_dim"])
+    return out
+
+
+def _number(below, draw):
+    return int(torch.randint(below, (1,), generator=draw))
+
+
+def main(arguments=None):
+    p = settings.parser("asd", __doc__.splitlines()[0])
+    p.add_argument("--frames", required=True, help="folder of drives (see semtrain/frames.py)")
+    p.add_argument("--vae", required=True, help="folder of the VAE (config.json, safetensors); it stays as it is")
+    p.add_argument("--held-out", help="folder of drives; the first is drawn at each checkpoint")
+    p.add_argument("--init", help="model folder to start from: a renderer, or Stable Diffusion 1.5")
+    p.add_argument("--cache", help="folder for the frames' latents; default: OUT/latents")
+    options = p.parse_args(arguments)
+    config = settings.resolve("asd", options)
+    state = read_init(options.init, config) if options.init else None
+    cache = options.cache or os.path.join(options.output, "latents")
+    torch.manual_seed(config["seed"])
+    batches = Batches(sequences(options.vae, find_drives(options.frames), cache, config["mirror"]), config)
+    held = find_drives(options.held_out)[:1] if options.held_out else []
+    held = (sequences(options.vae, held, cache, False)[0], held[0]) if held else None
+    print(f"{len(batches.frames)} frames, mirror images counted", flush=True)
+    model = Renderer(config).to(memory_format=torch.channels_last)
+    trainer = Trainer(options.output, model, config, Export(options.output, config, options.vae, held))
+    if state:
+        trainer.start_from(state)
+    alphas = alphas_cumprod()
+    trainer.run(lambda m, step: step_loss(m, batches.make(step), alphas, config, generator(config, step, 1)))
+
+
+if __name__ == "__main__":
+    main()

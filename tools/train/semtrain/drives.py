@@ -1,0 +1,81 @@
+# SPDX-FileCopyrightText: semrover authors
+# SPDX-License-Identifier: Apache-2.0
+"""Makes frames to train the renderer with: streets, drives through them, traced pictures and splat buffers.
+
+Calls the engine: `streets` (grids, then pictures of a short drive at a place that varies with the seed) and `render`.
+OUT/SEED is laid out as semtrain/frames.py says; a seed whose folder is complete is left alone.
+"""
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+
+DONE = "done"
+YAWS = {1: 0.3, 6: -0.3}  # of seeds by their last digit: looking to the side
+BESIDE = (3, 8)           # likewise: half of the frames, and as many from 1.5 m to the left
+
+
+def drive_of(seed, frames, length):
+    """where the drive of a seed runs -> {first, end margin, yaw, shift} in metres and radians; frames are 1 m apart"""
+    shift = 1.5 if seed % 10 in BESIDE else 0
+    count = max(1, frames // 2) if shift else frames
+    first = 8 + seed * 7 % max(1, int(length) - 31)
+    return {"first": first, "end-margin": length - first - count + 1, "yaw": YAWS.get(seed % 10, 0), "shift": shift}
+
+
+def run_engine(engine, *arguments):
+    subprocess.run([engine, *(str(a) for a in arguments), "-q"], check=True)
+
+
+def make_grids(engine, folder, seed, length):
+    """FOLDER/truth.sgrid: what drives along the whole street see"""
+    if not os.path.exists(os.path.join(folder, "truth.sgrid")):
+        run_engine(engine, "streets", "--seed", seed, "--length", length, "--end-margin", 12, "--spacing", 2, "--seen",
+                   "-o", folder, "-y")
+
+
+def make_frames(engine, grid, folder, seed, options):
+    """pictures of the drive, and the splat buffers of the same cameras"""
+    where = drive_of(seed, options.frames, options.length)
+    if options.shift is not None:
+        where["shift"], where["yaw"] = options.shift, 0
+    run_engine(engine, "streets", "--seed", seed, "--length", options.length, "--spacing", 1, "--no-grids", "--images",
+               "--samples", options.samples, "-W", options.width, "-H", options.height,
+               *(word for name, value in where.items() for word in (f"--{name}", value)), "-o", folder, "-y")
+    for drive in [folder] + ([os.path.join(folder, "shifted")] if where["shift"] else []):
+        shutil.rmtree(os.path.join(drive, "buffer"), ignore_errors=True)
+        run_engine(engine, "render", grid, "--path", os.path.join(drive, "transforms.json"), "-W", options.width, "-H",
+                   options.height, "-o", os.path.join(drive, "buffer"))
+    with open(os.path.join(folder, DONE), "w"):
+        pass
+
+
+def main(arguments=None):
+    p = argparse.ArgumentParser(prog="tools/train/run drives", description=__doc__.splitlines()[0])
+    p.add_argument("-o", "--output", required=True, help="folder for SEED/{color,buffer,...}")
+    p.add_argument("--streets", required=True, help="folder for SEED/truth.sgrid; those that are there are used")
+    p.add_argument("--semrover", default="build/release/semrover", help="the engine")
+    p.add_argument("--seeds", required=True, help="FIRST:LAST, both included")
+    p.add_argument("--frames", type=int, default=8, help="of a street")
+    p.add_argument("--length", type=int, default=60, help="of a street, metres")
+    p.add_argument("--samples", type=int, default=2, help="rays a pixel")
+    p.add_argument("--shift", type=float, help="metres to the left of a second drive, in place of what the seed says")
+    p.add_argument("-W", "--width", type=int, default=616)
+    p.add_argument("-H", "--height", type=int, default=424)
+    options = p.parse_args(arguments)
+    first, _, last = options.seeds.partition(":")
+    for seed in range(int(first), int(last or first) + 1):
+        street, folder = (os.path.join(root, str(seed)) for root in (options.streets, options.output))
+        if os.path.exists(os.path.join(folder, DONE)):
+            continue
+        try:
+            make_grids(options.semrover, street, seed, options.length)
+            make_frames(options.semrover, os.path.join(street, "truth.sgrid"), folder, seed, options)
+        except subprocess.CalledProcessError as error:
+            sys.exit(f"seed {seed}: {options.semrover} exited with {error.returncode}")
+        print(f"{folder}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

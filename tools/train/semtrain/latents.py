@@ -1,0 +1,71 @@
+# SPDX-FileCopyrightText: semrover authors
+# SPDX-License-Identifier: Apache-2.0
+"""Latents of drives, encoded once by a trained VAE and kept in a folder."""
+import hashlib
+import os
+
+import torch
+
+from . import model_folder, safetensors_file
+from .denoising import block_shares
+from .frames import fill_blocks, to_floats
+from .nets.vae import AutoencoderKL
+
+
+def load_vae(folder):
+    """-> AutoencoderKL with the weights of a vae folder, evaluating"""
+    config, state = model_folder.read_component(folder)
+    vae = AutoencoderKL(config)
+    vae.load_state_dict({name: t.float() for name, t in state.items()})
+    return vae.eval().requires_grad_(False)
+
+
+def identity(folder):
+    """of a VAE: a digest of its files"""
+    digest = hashlib.sha256()
+    for name in ("config.json", "diffusion_pytorch_model.safetensors"):
+        with open(os.path.join(folder, name), "rb") as file:
+            digest.update(file.read())
+    return digest.hexdigest()[:16]
+
+
+class Sequence:
+    """a drive as the denoiser sees it: truth, buffer [F, 4, h, w], visible [F, 1, h, w], first [F] (1: nothing before)"""
+
+    def __init__(self, tensors):
+        self.truth, self.buffer, self.visible = (tensors[n].float() for n in ("truth", "buffer", "visible"))
+        self.first = tensors["first"].bool().tolist()
+
+    def __len__(self):
+        return len(self.first)
+
+
+@torch.no_grad()
+def encode_drive(vae, drive, flip):
+    """-> {truth, buffer, visible, first} of a drive, or of its mirror image"""
+    rows = {"truth": [], "buffer": [], "visible": []}
+    for number in drive.numbers:
+        pictures = {"truth": to_floats(drive.truth(number)), "buffer": to_floats(drive.buffer(number)),
+                    "visible": drive.visible(number)}
+        for name, picture in pictures.items():
+            filled = fill_blocks(picture[None], vae.downscale)  # before it is mirrored: blocks begin at the left
+            filled = filled.flip(3) if flip else filled
+            rows[name].append(block_shares(filled, vae.downscale) if name == "visible" else vae.encode_scaled(filled))
+    out = {name: torch.cat(values) for name, values in rows.items()}
+    out["first"] = torch.tensor([not drive.has_previous(n) for n in drive.numbers], dtype=torch.uint8)
+    return out
+
+
+def sequences(vae_folder, drives, cache, mirrored=True):
+    """-> [Sequence] of the drives, then of their mirror images; what `cache` does not hold yet is encoded"""
+    os.makedirs(cache, exist_ok=True)
+    vae, name_of_vae, out = None, identity(vae_folder), []
+    for flip in (False, True) if mirrored else (False,):
+        for drive in drives:
+            about = f"{name_of_vae} {os.path.abspath(drive.folder)} {drive.numbers} {flip}"
+            path = os.path.join(cache, hashlib.sha256(about.encode()).hexdigest()[:24] + ".safetensors")
+            if not os.path.exists(path):
+                vae = vae or load_vae(vae_folder)
+                safetensors_file.write(path, encode_drive(vae, drive, flip), {"drive": drive.folder, "flip": flip})
+            out.append(Sequence(safetensors_file.read(path)))
+    return out

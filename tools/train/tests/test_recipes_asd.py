@@ -1,0 +1,196 @@
+# SPDX-FileCopyrightText: semrover authors
+# SPDX-License-Identifier: Apache-2.0
+"""The recipes vae and asd on two made drives of three frames of 64 x 48."""
+import contextlib
+import io
+import json
+import os
+import subprocess
+import tempfile
+import unittest
+
+import numpy as np
+import torch
+from PIL import Image
+
+from semtrain import asd, model_folder, safetensors_file, vae
+from semtrain.denoising import alphas_cumprod
+from semtrain.frames import find_drives
+from semtrain.latents import sequences
+from semtrain.trainer import CHECKPOINT, generator
+
+COMMON = {"steps": 4, "learning_rate": 3e-3, "warmup": 1, "decay": 0.0, "ema": 0.5, "precision": "fp32",
+          "seed": 1, "device": "cpu"}
+VAE = {**COMMON, "latent_channels": 4, "block_out_channels": [8, 8, 16, 16], "layers_per_block": 1,
+       "norm_num_groups": 4, "mid_block_add_attention": False, "use_quant_conv": False, "use_post_quant_conv": False,
+       "force_upcast": False, "crop": 32, "batch": 4, "buffer_share": 0.25, "detail_weight": 1.0, "color_weight": 1.0,
+       "kl_weight": 1e-4, "train": "both", "latent_noise": 0.0}
+ASD = {**COMMON, "in_channels": 13, "out_channels": 4, "block_out_channels": [16, 16], "layers_per_block": 1,
+       "down_block_types": ["DownBlock2D", "CrossAttnDownBlock2D"], "mid_block_type": "UNetMidBlock2DCrossAttn",
+       "up_block_types": ["CrossAttnUpBlock2D", "UpBlock2D"], "attention_head_dim": 2, "cross_attention_dim": 8,
+       "norm_num_groups": 4, "text_tokens": 1, "train_text": True, "crop": [6, 6], "batch": 4, "mirror": True,
+       "dropout": 0.3, "first_share": 0.1, "previous_noise": [0.3, 0.7], "weighting": "v",
+       "defaults": {"num_inference_steps": 2, "guidance_scale": 1.5, "previous_noise": 0.3}}
+
+
+def draw_drive(folder, seed):
+    """a slope of colours that moves from frame to frame; its buffer has holes"""
+    random = np.random.default_rng(seed)
+    for part in ("color", "buffer/color", "buffer/visible"):
+        os.makedirs(os.path.join(folder, part))
+    y, x = np.mgrid[0:48, 0:64]
+    for number in range(3):
+        truth = np.stack([4 * x, 5 * y, 2 * (x + y) + 20 * number], -1).clip(0, 255).astype(np.uint8)
+        seen = random.random((48, 64)) < 0.7
+        pictures = {"color": truth, "buffer/color": truth * seen[..., None], "buffer/visible": seen * np.uint8(255)}
+        for part, picture in pictures.items():
+            Image.fromarray(picture).save(os.path.join(folder, part, f"{number:06d}.png"))
+
+
+class Recipes(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.holder = tempfile.TemporaryDirectory()
+        cls.folder = cls.holder.name
+        for i in range(2):
+            draw_drive(cls.path("frames", str(i)), i)
+        for name, config in (("vae", VAE), ("asd", ASD)):
+            with open(cls.path(name + ".json"), "w") as file:
+                json.dump(config, file)
+        cls.train(vae, "vae", "of_vae", "--set", "steps=60")
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.holder.cleanup()
+
+    @classmethod
+    def path(cls, *parts):
+        return os.path.join(cls.folder, *parts)
+
+    @classmethod
+    def train(cls, recipe, name, output, *more):
+        with contextlib.redirect_stdout(io.StringIO()):
+            recipe.main(["-o", cls.path(output), "--config", cls.path(name + ".json"), "--threads", "1", "--frames",
+                         cls.path("frames"), *more])
+
+    def train_asd(self, output, *more):
+        self.train(asd, "asd", output, "--vae", self.path("of_vae", "vae"), *more)
+
+    def state(self, output):
+        return safetensors_file.read(self.path(output, CHECKPOINT))
+
+    def weights(self, output):
+        return {name[6:]: t for name, t in self.state(output).items() if name.startswith("model.")}
+
+    def check_that_continuing_changes_nothing(self, train, name):
+        train(name + "_whole", "--set", "steps=4")
+        train(name + "_parts", "--set", "steps=2")
+        train(name + "_parts", "--set", "steps=4")
+        whole, parts = self.state(name + "_whole"), self.state(name + "_parts")
+        self.assertEqual(set(whole), set(parts))
+        self.assertEqual([n for n in whole if not torch.equal(whole[n], parts[n])], [])
+
+    def run_engine(self, *arguments):
+        engine = os.environ.get("SEMROVER")
+        if not engine:
+            self.skipTest("SEMROVER names no engine")
+        done = subprocess.run([engine, *arguments], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return done.stdout
+
+    def test_vae_learns_what_it_sees(self):
+        with contextlib.redirect_stdout(io.StringIO()):
+            pictures = vae.Pictures(find_drives(self.path("frames")))
+        images, noise = pictures.crops(VAE, 1000), torch.zeros(4, 4, 4, 4)
+        torch.manual_seed(1)
+        model = vae.AutoencoderKL(VAE)
+        before = vae.step_loss(model, images, VAE, noise)[1]["rec"]
+        model.load_state_dict(self.weights("of_vae"))
+        self.assertLess(vae.step_loss(model, images, VAE, noise)[1]["rec"], 0.6 * before)
+
+    def test_a_decoder_trained_alone_leaves_every_latent_as_it_was(self):
+        before = self.path("of_vae", "vae")
+        self.train(vae, "vae", "decoder", "--init", before, "--set", "train=decoder", "--set", "latent_noise=0.1")
+        after = self.path("decoder", "vae")
+        (config, old), (now, new) = (model_folder.read_component(folder) for folder in (before, after))
+        self.assertEqual(config, now)
+        same = {name for name in old if torch.equal(old[name], new[name])}
+        self.assertEqual({name for name in old if name.startswith("encoder.")},
+                         {name for name in same if name.startswith("encoder.")})
+        self.assertTrue({name for name in old if name.startswith("decoder.")} - same)
+
+    def test_latents_have_mean_zero_and_deviation_one(self):
+        drives = find_drives(self.path("frames"))
+        all_sequences = sequences(self.path("of_vae", "vae"), drives, self.path("measured"))
+        self.assertEqual(len(all_sequences), 4)
+        self.assertEqual(all_sequences[0].first, [True, False, False])
+        first = torch.cat([s.truth[:1].flatten() for s in all_sequences[:2]])
+        self.assertAlmostEqual(float(first.mean()), 0, places=2)
+        self.assertAlmostEqual(float(first.std()), 1, places=2)
+
+    def test_asd_learns_what_it_sees(self):
+        self.train_asd("learned", "--set", "steps=80")
+        batches = asd.Batches(sequences(self.path("of_vae", "vae"), find_drives(self.path("frames")),
+                                        self.path("learned", "latents")), ASD)
+        torch.manual_seed(1)
+        model = asd.Renderer(ASD)
+
+        def error():
+            return sum(asd.step_loss(model, batches.make(s), alphas_cumprod(), ASD, generator(ASD, s, 1))[1]["eps"]
+                       for s in range(1000, 1008))
+        with torch.no_grad():
+            before = error()
+            model.load_state_dict(self.weights("learned"))
+            self.assertLess(error(), 0.6 * before)
+
+    def test_a_batch_hides_previous_and_visibility_together(self):
+        config = {**ASD, "batch": 64}
+        batches = asd.Batches(sequences(self.path("of_vae", "vae"), find_drives(self.path("frames")),
+                                        self.path("measured")), config)
+        _, previous, buffer, visible = batches.make(0)
+        hidden = visible.flatten(1).abs().sum(1) == 0
+        self.assertEqual(float(previous[hidden].abs().max()), 0)
+        self.assertTrue(0.15 < hidden.float().mean() < 0.45)
+        self.assertGreater(float(buffer[hidden].abs().max()), 0)
+        alone = (previous.flatten(1).abs().sum(1) == 0) & ~hidden  # first frames of drives and the share of others
+        self.assertTrue(0.1 < alone.float().mean() < 0.5)
+
+    def test_vae_that_is_continued_has_the_weights_of_one_that_was_not_interrupted(self):
+        self.check_that_continuing_changes_nothing(lambda *a: self.train(vae, "vae", *a), "vae")
+
+    def test_asd_that_is_continued_has_the_weights_of_one_that_was_not_interrupted(self):
+        self.check_that_continuing_changes_nothing(self.train_asd, "asd")
+
+    def test_asd_starts_from_another_renderer(self):
+        self.train_asd("begin", "--set", "steps=2")
+        self.train_asd("onward", "--init", self.path("begin"), "--set", "steps=1", "--set", "learning_rate=0")
+        begin = safetensors_file.read(self.path("begin", "renderer", "diffusion_pytorch_model.safetensors"))
+        for name, tensor in self.weights("onward").items():
+            if name.startswith("unet."):
+                self.assertTrue(torch.equal(tensor.half(), begin[name[5:]]), name)
+
+    def test_asd_widens_a_plain_stable_diffusion_unet_with_zeros(self):
+        self.train_asd("plain", "--set", "steps=1")
+        os.rename(self.path("plain", "renderer"), self.path("plain", "unet"))
+        file = self.path("plain", "unet", "diffusion_pytorch_model.safetensors")
+        narrow = safetensors_file.read(file)
+        narrow["conv_in.weight"] = narrow["conv_in.weight"][:, :4]
+        safetensors_file.write(file, narrow)
+        config = dict(ASD)
+        wide = asd.read_init(self.path("plain"), config)["unet.conv_in.weight"]
+        self.assertEqual(tuple(wide.shape), (16, 13, 3, 3))
+        self.assertTrue(torch.equal(wide[:, :4], narrow["conv_in.weight"].float()))
+        self.assertEqual(float(wide[:, 4:].abs().max()), 0)
+
+    def test_the_engine_loads_the_folder_and_draws_a_frame_with_it(self):
+        self.train_asd("model", "--held-out", self.path("frames"))
+        self.assertTrue(os.path.exists(self.path("model", "held_out.png")))
+        self.run_engine("inspect", self.path("model"))
+        self.run_engine("refine", self.path("frames", "0", "buffer"), "-m", self.path("model"), "-o",
+                        self.path("refined"), "--frames", "0:0")
+        with Image.open(self.path("refined", "frames", "000000.png")) as picture:
+            self.assertEqual(picture.size, (64, 48))
+
+
+if __name__ == "__main__":
+    unittest.main()
