@@ -45,7 +45,7 @@ class Batches:
         self.crop = (min(config["crop"][0], h), min(config["crop"][1], w))
 
     def make(self, step):
-        """-> truth, previous (with noise on it, zeros where there is none), buffer [B, 4, h, w], visible [B, 1, h, w]"""
+        """-> truth, previous (with noise on it, or zeros), buffer [B, 4, h, w], visible [B, 1, h, w]"""
         draw, rows = generator(self.config, step), []
         for _ in range(self.config["batch"]):
             sequence, i = self.frames[_number(len(self.frames), draw)]

@@ -64,6 +64,8 @@ def main(arguments=None):
     p.add_argument("-W", "--width", type=int, default=616)
     p.add_argument("-H", "--height", type=int, default=424)
     options = p.parse_args(arguments)
+    for root in (options.streets, options.output):
+        os.makedirs(root, exist_ok=True)
     first, _, last = options.seeds.partition(":")
     for seed in range(int(first), int(last or first) + 1):
         street, folder = (os.path.join(root, str(seed)) for root in (options.streets, options.output))

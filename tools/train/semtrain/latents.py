@@ -30,7 +30,7 @@ def identity(folder):
 
 
 class Sequence:
-    """a drive as the denoiser sees it: truth, buffer [F, 4, h, w], visible [F, 1, h, w], first [F] (1: nothing before)"""
+    """a drive as the denoiser sees it: truth, buffer [F, 4, h, w], visible [F, 1, h, w], first [F]: nothing before"""
 
     def __init__(self, tensors):
         self.truth, self.buffer, self.visible = (tensors[n].float() for n in ("truth", "buffer", "visible"))

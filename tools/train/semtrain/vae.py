@@ -76,8 +76,8 @@ def step_loss(model, image, config, noise):
 
 def normalize(model, drives):
     """scaling_factor and shift_factor such that the latents of truths have mean 0 and standard deviation 1"""
-    latents = [model.moments(_filled(d.truth(d.numbers[0]), model))[0].flatten() for d in drives[::max(1, len(drives) // 12)]]
-    values = torch.cat(latents)
+    some = drives[::max(1, len(drives) // 12)]
+    values = torch.cat([model.moments(_filled(d.truth(d.numbers[0]), model))[0].flatten() for d in some])
     model.config["shift_factor"] = round(float(values.mean()), 6)
     model.config["scaling_factor"] = round(1 / float(values.std()), 6)
 
@@ -162,7 +162,8 @@ def main(arguments=None):
     def loss_of_step(network, step):
         image = pictures.crops(config, step).to(config["device"])
         side = config["crop"] // network.downscale
-        noise = torch.randn(config["batch"], config["latent_channels"], side, side, generator=generator(config, step, 1))
+        shape = (config["batch"], config["latent_channels"], side, side)
+        noise = torch.randn(shape, generator=generator(config, step, 1))
         return step_loss(network, image, config, noise.to(config["device"]))
 
     trainer.run(loss_of_step)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""UNet2DConditionModel of Stable Diffusion 1.5, with diffusers' tensor names and fields (spec: models.md; mission B2)."""
+"""UNet2DConditionModel of Stable Diffusion 1.5, with diffusers' tensor names and fields (models.md; mission.md B2)."""
 import math
 
 import torch
