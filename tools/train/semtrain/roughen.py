@@ -1,0 +1,67 @@
+# SPDX-FileCopyrightText: semrover authors
+# SPDX-License-Identifier: Apache-2.0
+"""Drives once more with rougher buffers: points off their surfaces and colours washed out, as a transformer places them.
+A renderer that has seen only buffers of true points keeps every flaw of generated ones."""
+import argparse
+import os
+
+import numpy as np
+import torch
+
+from . import safetensors_file
+from .frames import find_drives
+from .program import semrover
+
+
+def roughened(tensors, half, random):
+    """points moved by up to 2.5 cm (standard deviation) and kept inside their cells of half size `half`; colours drawn
+    towards their cell's mean; cells, and points, a little off in colour. How much of all that is drawn at random."""
+    points, colors = tensors["points"].numpy().astype(np.float32), tensors["colors"].numpy().astype(np.float32)
+    cells = len(points)
+    strength = random.random()
+    points = points + random.normal(size=points.shape) * 0.025 * strength
+    mean = colors.mean(1, keepdims=True)
+    colors = mean + (colors - mean) * (1 - 0.7 * strength * random.random((cells, 1, 1)))
+    colors += random.normal(size=(cells, 1, 3)) * 8 * strength + random.normal(size=colors.shape) * 10 * strength
+    return {**tensors, "points": torch.from_numpy(points.clip(-half, half).astype(np.float16)),
+            "colors": torch.from_numpy(colors.round().clip(0, 255).astype(np.uint8))}
+
+
+def write_rough(path, output, seed):
+    metadata = safetensors_file.read_header(path)[1]
+    tensors = roughened(safetensors_file.read(path), float(metadata["voxel_size"]) / 2, np.random.default_rng(seed))
+    safetensors_file.write(output, tensors, metadata)
+
+
+def render_rough(drive, grid, folder):
+    """FOLDER/buffer as in DRIVE but of another grid, FOLDER/color a link to DRIVE's"""
+    os.makedirs(folder, exist_ok=True)
+    link = os.path.join(folder, "color")
+    if not os.path.islink(link):
+        os.symlink(os.path.abspath(os.path.join(drive.folder, "color")), link)
+    height, width = drive.truth(drive.numbers[0]).shape[1:]
+    semrover("render", grid, "--path", os.path.join(drive.folder, "transforms.json"), "-W", width, "-H", height, "-o",
+             os.path.join(folder, "buffer"), "--quiet", "-y")
+
+
+def main():
+    p = argparse.ArgumentParser(prog="tools/train/run roughen", description=__doc__)
+    p.add_argument("-o", "--output", required=True, help="folder; its drives go to `run asd --frames` beside the others")
+    p.add_argument("--frames", required=True, help="folder of SEED/..., as `run drives` writes it")
+    p.add_argument("--streets", required=True, help="folder of SEED/truth.sgrid")
+    options = p.parse_args()
+    for drive in find_drives(options.frames):
+        name = os.path.relpath(drive.folder, options.frames)
+        folder, seed = os.path.join(options.output, name), name.split(os.sep)[0]
+        if os.path.exists(os.path.join(folder, "buffer", "color")):
+            continue
+        grid = os.path.join(options.output, seed + ".sgrid")
+        os.makedirs(options.output, exist_ok=True)
+        write_rough(os.path.join(options.streets, seed, "truth.sgrid"), grid, int(seed))
+        render_rough(drive, grid, folder)
+        os.remove(grid)
+        print(folder, flush=True)
+
+
+if __name__ == "__main__":
+    main()
