@@ -23,6 +23,7 @@ layout(binding = 4) writeonly buffer Neighbors { uint neighbors[]; };       // [
 const uint kNone = 0xffffffffu;
 const int kMaxShell = 4;
 const float kFar = 3e38;
+const uint kAtOnce = 64;
 
 float distance2[kNeighbors]; // of what was found so far, nearest first
 uint found[kNeighbors];
@@ -77,6 +78,25 @@ void search_shell(ivec3 center, int shell)
     }
 }
 
+// note: lavapipe ends the loops of an invocation after 65535 rounds, all loops together, and says nothing. So a round
+// looks at kAtOnce points, and few of them are looked at again.
+void search_all()
+{
+    for (uint base = 0; base < p.rows; base += kAtOnce) {
+        float nearest = kFar;
+        [[unroll]] for (uint u = 0; u < kAtOnce; ++u) {
+            const uint at = min(base + u, p.rows - 1);
+            const vec3 d = sorted_points[at].xyz - own;
+            const bool counts = !(kLabels && same_label_only) || sorted_labels[at] == own_label;
+            nearest = counts && dot(d, d) < nearest ? dot(d, d) : nearest;
+        }
+        if (nearest > distance2[kNeighbors - 1])
+            continue;
+        for (uint j = base; j < min(base + kAtOnce, p.rows); ++j)
+            offer(j, sorted_points[j]);
+    }
+}
+
 void search()
 {
     clear();
@@ -91,8 +111,7 @@ void search()
             return;
     }
     clear();
-    for (uint j = 0; j < p.rows; ++j)
-        offer(j, sorted_points[j]);
+    search_all();
 }
 
 void main()

@@ -105,6 +105,40 @@ TEST(kernel_knn, the_nearest_of_other_points_match_brute_force)
     }
 }
 
+// more of them than the 65535 rounds that lavapipe grants the loops of an invocation
+TEST(kernel_knn, what_is_far_from_everything_finds_its_nearest_among_all_points)
+{
+    constexpr uint32_t kPoints = 150000, kQueries = 11, kNeighbors = 3;
+    KernelCase k(test_device());
+    std::mt19937 random(9);
+    std::vector<float> p, q;
+    for (uint32_t i = 0; i < 3 * kPoints; ++i)
+        p.push_back(float(random() % 65536) / 65536 * 6);
+    for (uint32_t i = 0; i < 4 * kQueries; ++i)
+        q.push_back(30 + float(random() % 4096) / 64);
+    KnnOptions options{.neighbors = kNeighbors, .cell_size = 0.3f};
+    options.queries = k.input(q, 4);
+    const Tensor y = knn(k.graph, k.input(p, 3), options);
+    const Tensor out = k.output(y.rows, y.cols, y.dtype, y.ld);
+    k.graph.replace(y.resource, out.resource);
+    ASSERT_TRUE(k.compile_and_run());
+    const auto got = k.read_array<uint32_t>(out);
+    for (uint32_t i = 0; i < kQueries; ++i) {
+        const auto distance = [&](uint32_t j) {
+            return std::hypot(double(p[3 * j]) - q[4 * i], double(p[3 * j + 1]) - q[4 * i + 1],
+                              double(p[3 * j + 2]) - q[4 * i + 2]);
+        };
+        std::vector<double> all(kPoints);
+        for (uint32_t j = 0; j < kPoints; ++j)
+            all[j] = distance(j);
+        std::partial_sort(all.begin(), all.begin() + kNeighbors, all.end());
+        for (uint32_t n = 0; n < kNeighbors; ++n) {
+            ASSERT_LT(got[i * kNeighbors + n], kPoints);
+            EXPECT_NEAR(distance(got[i * kNeighbors + n]), all[n], 2e-5) << "query " << i << ", neighbour " << n;
+        }
+    }
+}
+
 TEST(kernel_knn, points_that_are_not_finite_have_no_neighbours_and_are_none)
 {
     KernelCase k(test_device());
