@@ -19,13 +19,6 @@ ProgramResult convert(const std::string& in, const Path& out, const std::string&
     return semrover_program("convert " + in + " " + out.string() + " " + more);
 }
 
-void expect_error(const ProgramResult& result, int code, std::string_view text)
-{
-    EXPECT_EQ(result.code, code) << result.err;
-    EXPECT_NE(result.err.find(text), std::string::npos) << result.err;
-    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
-}
-
 TEST(CliCamera, a_drive_goes_through_every_format_and_comes_back)
 {
     const ScratchFolder folder;

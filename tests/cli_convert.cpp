@@ -16,12 +16,6 @@ ProgramResult convert(const Path& in, const Path& out, const std::string& more =
     return semrover_program("convert " + in.string() + " " + out.string() + " -q " + more);
 }
 
-void expect_error(const ProgramResult& result, int code, std::string_view text)
-{
-    EXPECT_EQ(result.code, code) << result.err;
-    EXPECT_NE(result.err.find(text), std::string::npos) << result.err;
-}
-
 // every value is the seeded one, as `dtype` holds it
 void expect_seeded(const Checkpoint& checkpoint, std::span<const TensorSpec> schema, DType dtype)
 {

@@ -27,16 +27,6 @@ ProgramResult convert(const std::string& in, const std::string& out, const std::
     return semrover_program(line(in, out, more));
 }
 
-// one line, the code, and nothing written
-void expect_error(const ProgramResult& result, int code, std::string_view text)
-{
-    EXPECT_EQ(result.code, code) << result.err;
-    EXPECT_TRUE(result.err.starts_with("semrover: error: ")) << result.err;
-    EXPECT_NE(result.err.find(text), std::string::npos) << result.err;
-    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
-    EXPECT_EQ(result.out, "");
-}
-
 VoxelGrid grid_of(const std::filesystem::path& path)
 {
     const auto grid = read_grid(path);

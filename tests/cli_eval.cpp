@@ -16,15 +16,6 @@ ProgramResult eval(const std::string& arguments)
     return semrover_program("eval " + arguments);
 }
 
-void expect_error(const ProgramResult& result, int code, std::string_view text)
-{
-    EXPECT_EQ(result.code, code) << result.err;
-    EXPECT_TRUE(result.err.starts_with("semrover: error: ")) << result.err;
-    EXPECT_NE(result.err.find(text), std::string::npos) << result.err;
-    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
-    EXPECT_EQ(result.out, "");
-}
-
 void put_tensors(const Path& path, const std::map<std::string, std::pair<std::vector<uint64_t>, std::vector<float>>>& t,
                  const std::map<std::string, std::string>& metadata = {})
 {

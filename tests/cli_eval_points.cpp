@@ -17,15 +17,6 @@ ProgramResult eval_points(const std::string& arguments)
     return semrover_program("eval points -q " + arguments);
 }
 
-void expect_error(const ProgramResult& result, int code, std::string_view text)
-{
-    EXPECT_EQ(result.code, code) << result.err;
-    EXPECT_TRUE(result.err.starts_with("semrover: error: ")) << result.err;
-    EXPECT_NE(result.err.find(text), std::string::npos) << result.err;
-    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
-    EXPECT_EQ(result.out, "");
-}
-
 // a road with markings; `gray` takes this much of the colour's contrast away
 VoxelGrid road(uint32_t seed, double gray)
 {

@@ -13,15 +13,6 @@ namespace {
 
 const std::string kAssets = SEMROVER_SOURCE_DIR "/assets";
 
-void expect_error(const ProgramResult& result, int code, std::string_view text)
-{
-    EXPECT_EQ(result.code, code);
-    EXPECT_TRUE(result.err.starts_with("semrover: error: ")) << result.err;
-    EXPECT_NE(result.err.find(text), std::string::npos) << result.err;
-    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
-    EXPECT_EQ(result.out, "");
-}
-
 TEST(CliInspect, a_grid_shows_its_cells_and_labels)
 {
     const ProgramResult text = semrover_program("inspect " + kAssets + "/scenes/street.truth.sgrid");

@@ -18,13 +18,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void expect_error(const ProgramResult& result, int code, std::string_view text)
-{
-    EXPECT_EQ(result.code, code) << result.err;
-    EXPECT_NE(result.err.find(text), std::string::npos) << result.err;
-    EXPECT_EQ(std::ranges::count(result.err, '\n'), 1) << result.err;
-}
-
 // what lies between the tags of the script with this id
 std::string script(const std::string& html, const std::string& id)
 {

@@ -9,13 +9,6 @@
 namespace semrover {
 namespace {
 
-void expect_error(const ProgramResult& result, int code, std::string_view text)
-{
-    EXPECT_EQ(result.code, code) << result.err;
-    EXPECT_NE(result.err.find(text), std::string::npos) << result.err;
-    EXPECT_EQ(result.err.find('\n'), result.err.size() - 1) << "one line: " << result.err;
-}
-
 // a road of 4 m by 4 m and a pane beside it
 std::string scene(const ScratchFolder& folder)
 {

@@ -4,8 +4,11 @@
 
 #include "tests/scratch_folder.h"
 
+#include <algorithm>
 #include <cstdlib>
+#include <gtest/gtest.h>
 #include <string>
+#include <string_view>
 #include <sys/wait.h>
 
 namespace semrover {
@@ -25,6 +28,16 @@ inline ProgramResult semrover_program(const std::string& arguments)
     const int status = std::system(line.c_str());
     const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
     return {code, contents(folder / "out"), contents(folder / "err")};
+}
+
+// an error of the program: its code, one line that says the text, and nothing else
+inline void expect_error(const ProgramResult& result, int code, std::string_view text)
+{
+    EXPECT_EQ(result.code, code) << result.err;
+    EXPECT_TRUE(result.err.starts_with("semrover: error: ")) << result.err;
+    EXPECT_NE(result.err.find(text), std::string::npos) << result.err;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    EXPECT_EQ(result.out, "");
 }
 
 } // namespace semrover

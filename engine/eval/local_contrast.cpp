@@ -3,6 +3,7 @@
 #include "engine/eval/local_contrast.h"
 
 #include "runtime/dtype.h"
+#include "runtime/mix64.h"
 
 #include <algorithm>
 #include <cmath>
@@ -56,18 +57,10 @@ void collect(const VoxelGrid& grid, std::span<const uint8_t> used, size_t cell, 
     std::ranges::sort(points);
 }
 
-uint64_t mixed(uint64_t h) // splitmix64
-{
-    h += 0x9E3779B97F4A7C15ull;
-    h = (h ^ (h >> 30)) * 0xBF58476D1CE4E5B9ull;
-    h = (h ^ (h >> 27)) * 0x94D049BB133111EBull;
-    return h ^ (h >> 31);
-}
-
 void shuffle(std::vector<double>& values, uint64_t key)
 {
     for (size_t i = values.size(); i > 1; --i)
-        std::swap(values[i - 1], values[(key = mixed(key)) % i]);
+        std::swap(values[i - 1], values[(key = mix64(key + kMixStep)) % i]);
 }
 
 struct Neighborhood {

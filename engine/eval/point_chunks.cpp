@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/eval/point_chunks.h"
+#include "runtime/mix64.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,13 +14,9 @@ namespace {
 using Column = std::pair<int32_t, int32_t>;
 using Point = std::array<float, 3>;
 
-// splitmix64's output function (Steele, Lea, Flood 2014): one to one
-uint64_t scatter(uint64_t x)
+uint64_t scatter(uint64_t x) // one to one
 {
-    x += 0x9e3779b97f4a7c15ull;
-    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ull;
-    x = (x ^ (x >> 27)) * 0x94d049bb133111ebull;
-    return x ^ (x >> 31);
+    return mix64(x + kMixStep);
 }
 
 Result<std::map<Column, std::vector<uint32_t>>> columns_of(const ScenePoints& scene, double chunk)

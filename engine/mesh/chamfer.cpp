@@ -5,6 +5,7 @@
 #include "engine/mesh/nearest_points.h"
 #include "engine/mesh/nearest_surface.h"
 #include "runtime/dtype.h"
+#include "runtime/mix64.h"
 
 #include <algorithm>
 #include <cmath>
@@ -36,13 +37,11 @@ std::vector<PointRow> points_from(const VoxelGrid& grid, const Origin& origin)
     return rows;
 }
 
-// uniform in [0, 1), keyed by (seed, sample, which): splitmix64
+// uniform in [0, 1), keyed by (seed, sample, which)
 double uniform(uint64_t seed, uint64_t sample, uint64_t which)
 {
-    uint64_t h = seed * 0xD1342543DE82EF95ull + (sample * 4 + which + 1) * 0x9E3779B97F4A7C15ull;
-    h = (h ^ (h >> 30)) * 0xBF58476D1CE4E5B9ull;
-    h = (h ^ (h >> 27)) * 0x94D049BB133111EBull;
-    return double((h ^ (h >> 31)) >> 11) * 0x1p-53;
+    const uint64_t h = mix64(seed * 0xD1342543DE82EF95ull + (sample * 4 + which + 1) * kMixStep);
+    return double(h >> 11) * 0x1p-53;
 }
 
 Result<std::vector<PointRow>> surface_samples(const Mesh& mesh, const Origin& origin, const ChamferOptions& o)

@@ -5,6 +5,7 @@
 #include "engine/scene/srgb.h"
 #include "kernels/kernels.h"
 #include "kernels/meshes.h"
+#include "runtime/mix64.h"
 
 #include <algorithm>
 #include <bit>
@@ -41,13 +42,10 @@ double extent_of(const std::array<Vector, 3>& p)
     return extent;
 }
 
-// splitmix64's finalizer, over a running value
+// over a running value
 uint64_t mixed(uint64_t h, uint64_t v)
 {
-    h = (h ^ v) + 0x9E3779B97F4A7C15ull;
-    h = (h ^ (h >> 30)) * 0xBF58476D1CE4E5B9ull;
-    h = (h ^ (h >> 27)) * 0x94D049BB133111EBull;
-    return h ^ (h >> 31);
+    return mix64((h ^ v) + kMixStep);
 }
 
 // blocks lie within +-2^17, so that an index fits 20 bits

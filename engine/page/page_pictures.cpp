@@ -110,8 +110,10 @@ bool is_flat(const ImageRgb8& image)
 Result<Picture> encode(const ImageRgb8& image, int quality)
 {
     SR_TRY(std::vector<std::byte> png, encode_png_rgb8(image.width, image.height, image.pixels));
+    if (is_flat(image))
+        return Picture{"image/png", std::move(png)};
     SR_TRY(std::vector<std::byte> jpeg, encode_jpeg_rgb8(image.width, image.height, image.pixels, quality));
-    if (is_flat(image) || double(png.size()) <= kPngMayBe * double(jpeg.size()))
+    if (double(png.size()) <= kPngMayBe * double(jpeg.size()))
         return Picture{"image/png", std::move(png)};
     return Picture{"image/jpeg", std::move(jpeg)};
 }

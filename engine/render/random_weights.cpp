@@ -3,20 +3,13 @@
 #include "engine/render/random_weights.h"
 
 #include "runtime/hash.h"
+#include "runtime/mix64.h"
 
 #include <cmath>
 
 namespace semrover {
 
 namespace {
-
-// splitmix64's output function of a counter
-uint64_t mix(uint64_t z)
-{
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
-    return z ^ (z >> 31);
-}
 
 // 24 bits as -1 <= x < 1
 float centred(uint64_t bits)
@@ -41,17 +34,17 @@ void random_tensor(uint64_t seed, const TensorSpec& spec, std::vector<float>& va
     }
     Hash hash;
     hash.add(spec.name);
-    const uint64_t key = mix(hash.value() ^ mix(seed + 0x9e3779b97f4a7c15ull));
+    const uint64_t key = mix64(hash.value() ^ mix64(seed + 0x9e3779b97f4a7c15ull));
     values.resize(count);
     float* out = values.data();
     const uint64_t pairs = count / 2;
     for (uint64_t i = 0; i < pairs; ++i) {
-        const uint64_t bits = mix(key + i * 0x9e3779b97f4a7c15ull);
+        const uint64_t bits = mix64(key + i * 0x9e3779b97f4a7c15ull);
         out[2 * i] = centre + scale * centred(bits);
         out[2 * i + 1] = centre + scale * centred(bits >> 32);
     }
     if (count % 2)
-        out[count - 1] = centre + scale * centred(mix(key + pairs * 0x9e3779b97f4a7c15ull));
+        out[count - 1] = centre + scale * centred(mix64(key + pairs * 0x9e3779b97f4a7c15ull));
 }
 
 } // namespace semrover

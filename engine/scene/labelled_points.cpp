@@ -7,6 +7,7 @@
 #include "engine/scene/ply_reader.h"
 #include "engine/scene/scene_points.h"
 #include "runtime/dtype.h"
+#include "runtime/mix64.h"
 #include "runtime/quote.h"
 
 #include <algorithm>
@@ -145,19 +146,12 @@ Status take_points(const PlyElement& vertices, const SceneGridOptions& o, const 
     return {};
 }
 
-uint64_t mixed(uint64_t x) // splitmix64's finalizer
-{
-    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-    x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-    return x ^ (x >> 31);
-}
-
 uint64_t random_key(uint64_t seed, const Cell& cell, uint64_t place)
 {
-    uint64_t key = mixed(seed + 0x9e3779b97f4a7c15u);
+    uint64_t key = mix64(seed + kMixStep);
     for (const int32_t c : cell)
-        key = mixed(key ^ static_cast<uint32_t>(c)) + 0x9e3779b97f4a7c15u;
-    return mixed(key ^ place);
+        key = mix64(key ^ static_cast<uint32_t>(c)) + kMixStep;
+    return mix64(key ^ place);
 }
 
 uint8_t majority(const Points& points, std::span<const size_t> members)
