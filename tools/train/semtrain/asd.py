@@ -3,7 +3,8 @@
 """The renderer ASD: a Stable Diffusion UNet that draws a frame over its splat buffer (spec: method.md §5).
 
 Its input is the noisy latent, the previous frame's latent with noise on it, the buffer's latent and the visibility; it
-predicts the noise. The paper fine-tunes Stable Diffusion 1.5: --config paper --init FOLDER.
+predicts the noise (or the velocity, in the small config: with few steps trained, noise predicted at high levels says little
+about the picture). The paper fine-tunes Stable Diffusion 1.5: --config paper --init FOLDER.
 """
 import os
 import shutil
@@ -12,7 +13,7 @@ import torch
 from torch import nn
 
 from . import model_folder, safetensors_file, settings
-from .denoising import SCHEDULER, alphas_cumprod, denoise, input_of
+from .denoising import alphas_cumprod, denoise, input_of, noise_of, scheduler_of
 from .frames import find_drives, to_pixels, write_beside
 from .latents import load_vae, sequences
 from .nets.unet import UNet2DConditionModel
@@ -75,8 +76,9 @@ def step_loss(model, batch, alphas, config, draw):
     t = (spread * 1000).long().clamp(max=999)
     noise = torch.randn(truth.shape, generator=draw).to(truth.device)
     a = alphas[t].view(n, 1, 1, 1).to(truth.device)
-    made = model(a.sqrt() * truth + (1 - a).sqrt() * noise, previous, buffer, visible, t.to(truth.device))
-    error = (made.float() - noise).square().mean((1, 2, 3))
+    noisy = a.sqrt() * truth + (1 - a).sqrt() * noise
+    made = model(noisy, previous, buffer, visible, t.to(truth.device)).float()
+    error = (noise_of(made, noisy, a, config["prediction_type"]) - noise).square().mean((1, 2, 3))
     weight = 1 / a.flatten() if config["weighting"] == "v" else torch.ones_like(error)
     return (weight * error).mean(), {"eps": float(error.mean())}
 
@@ -96,7 +98,7 @@ class Export:
         os.makedirs(os.path.join(self.folder, "conditioning"), exist_ok=True)
         safetensors_file.write(os.path.join(self.folder, "conditioning", "conditioning.safetensors"),
                                {"encoder_hidden_states": state["text"].half()})
-        model_folder.write_scheduler(os.path.join(self.folder, "scheduler"), SCHEDULER)
+        model_folder.write_scheduler(os.path.join(self.folder, "scheduler"), scheduler_of(self.config))
         shutil.copytree(self.vae_folder, os.path.join(self.folder, "vae"), dirs_exist_ok=True)
         model_folder.add_to_index(self.folder, INDEX, {"renderer": self.config["defaults"]})
         if self.held:
@@ -109,7 +111,7 @@ class Export:
         noise = torch.randn(s.truth[i:i + 1].shape, generator=torch.Generator().manual_seed(1))
         steps, scale = self.config["defaults"]["num_inference_steps"], self.config["defaults"]["guidance_scale"]
         made = denoise(model.unet, model.text, noise, torch.zeros_like(noise), s.buffer[i:i + 1], s.visible[i:i + 1],
-                       steps, scale)
+                       steps, scale, scheduler_of(self.config))
         truth = drive.truth(drive.numbers[i])
         picture = to_pixels(vae.decode_scaled(made))[0, :, :truth.shape[1], :truth.shape[2]]
         write_beside(os.path.join(self.folder, "held_out.png"), [drive.buffer(drive.numbers[i]), picture, truth])

@@ -25,9 +25,27 @@ def input_of(noisy, previous, buffer, visible):
     return torch.cat([noisy, previous, buffer, visible], 1)
 
 
-def ddim_timesteps(steps):
+def scheduler_of(config):
+    """the fields that a recipe's config may change: what is predicted, and which timesteps a sampler takes"""
+    return {**SCHEDULER, **{name: config[name] for name in ("prediction_type", "timestep_spacing") if name in config}}
+
+
+def ddim_timesteps(steps, spacing="leading"):
+    """falling, as diffusers spaces them"""
+    if spacing == "trailing":
+        return [round(1000 - i * 1000 / steps) - 1 for i in range(steps)]
     ratio = 1000 // steps
     return [i * ratio + SCHEDULER["steps_offset"] for i in range(steps)][::-1]
+
+
+def velocity(clean, noise, a):
+    """what a network of `v_prediction` learns (Salimans and Ho 2022); a: share of the signal's variance"""
+    return a.sqrt() * noise - (1 - a).sqrt() * clean
+
+
+def noise_of(made, noisy, a, prediction):
+    """what a network said of `noisy` -> the noise in it"""
+    return a.sqrt() * made + (1 - a).sqrt() * noisy if prediction == "v_prediction" else made
 
 
 def ddim_step(predicted, t, steps, x, alphas):
@@ -38,17 +56,17 @@ def ddim_step(predicted, t, steps, x, alphas):
     return b.sqrt() * clean + (1 - b).sqrt() * predicted
 
 
-def denoise(unet, text, noise, previous, buffer, visible, steps, guidance=1.0):
+def denoise(unet, text, noise, previous, buffer, visible, steps, guidance=1.0, scheduler=SCHEDULER):
     """one frame (or a batch of unrelated ones); shapes as in `input_of` -> latent [B, 4, h, w].
     previous: with its noise already on it, zeros for a first frame"""
     alphas, x = alphas_cumprod().to(noise.device), noise
-    for t in ddim_timesteps(steps):
+    for t in ddim_timesteps(steps, scheduler["timestep_spacing"]):
         time = torch.tensor(t, device=noise.device)
         made = unet(input_of(x, previous, buffer, visible), time, text)
         if guidance != 1:
             free = unet(input_of(x, torch.zeros_like(previous), buffer, torch.zeros_like(visible)), time, text)
             made = free + guidance * (made - free)
-        x = ddim_step(made, t, steps, x, alphas)
+        x = ddim_step(noise_of(made, x, alphas[t], scheduler["prediction_type"]), t, steps, x, alphas)
     return x
 
 

@@ -43,7 +43,7 @@ class Drive:
 def find_drives(root):
     """all drives below root that have frames, sorted by path"""
     drives = []
-    for folder, folders, _ in os.walk(root):
+    for folder, folders, _ in os.walk(root, followlinks=True):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
         if "color" in folders and os.path.isdir(os.path.join(folder, "buffer", "color")):
             drive = Drive(folder)

@@ -62,7 +62,7 @@ def sequences(vae_folder, drives, cache, mirrored=True):
     vae, name_of_vae, out = None, identity(vae_folder), []
     for flip in (False, True) if mirrored else (False,):
         for drive in drives:
-            about = f"{name_of_vae} {os.path.abspath(drive.folder)} {drive.numbers} {flip}"
+            about = f"{name_of_vae} {os.path.realpath(drive.folder)} {drive.numbers} {flip}"
             path = os.path.join(cache, hashlib.sha256(about.encode()).hexdigest()[:24] + ".safetensors")
             if not os.path.exists(path):
                 vae = vae or load_vae(vae_folder)
