@@ -8,8 +8,9 @@ OUT/SEED is laid out as semtrain/frames.py says; a seed whose folder is complete
 import argparse
 import os
 import shutil
-import subprocess
-import sys
+
+from .program import semrover
+from .streets import make_street
 
 DONE = "done"
 YAWS = {1: 0.3, 6: -0.3}  # of seeds by their last digit: looking to the side
@@ -24,29 +25,20 @@ def drive_of(seed, frames, length):
     return {"first": first, "end-margin": length - first - count + 1, "yaw": YAWS.get(seed % 10, 0), "shift": shift}
 
 
-def run_engine(engine, *arguments):
-    subprocess.run([engine, *(str(a) for a in arguments), "-q"], check=True)
-
-
-def make_grids(engine, folder, seed, length):
-    """FOLDER/truth.sgrid: what drives along the whole street see"""
-    if not os.path.exists(os.path.join(folder, "truth.sgrid")):
-        run_engine(engine, "streets", "--seed", seed, "--length", length, "--end-margin", 12, "--spacing", 2, "--seen",
-                   "-o", folder, "-y")
-
-
-def make_frames(engine, grid, folder, seed, options):
+def make_frames(grid, folder, seed, options):
     """pictures of the drive, and the splat buffers of the same cameras"""
     where = drive_of(seed, options.frames, options.length)
     if options.shift is not None:
         where["shift"], where["yaw"] = options.shift, 0
-    run_engine(engine, "streets", "--seed", seed, "--length", options.length, "--spacing", 1, "--no-grids", "--images",
-               "--samples", options.samples, "-W", options.width, "-H", options.height,
-               *(word for name, value in where.items() for word in (f"--{name}", value)), "-o", folder, "-y")
+    size = ("-W", options.width, "-H", options.height)
+    semrover("streets", "--seed", seed, "--length", options.length, "--spacing", 1, "--no-grids", "--images", "--samples",
+             options.samples, *size, *(word for name, value in where.items() for word in (f"--{name}", value)), "-o",
+             folder, "-y", "--quiet")
+    os.remove(os.path.join(folder, "mesh.glb"))
     for drive in [folder] + ([os.path.join(folder, "shifted")] if where["shift"] else []):
         shutil.rmtree(os.path.join(drive, "buffer"), ignore_errors=True)
-        run_engine(engine, "render", grid, "--path", os.path.join(drive, "transforms.json"), "-W", options.width, "-H",
-                   options.height, "-o", os.path.join(drive, "buffer"))
+        semrover("render", grid, "--path", os.path.join(drive, "transforms.json"), *size, "-o",
+                 os.path.join(drive, "buffer"), "--quiet")
     with open(os.path.join(folder, DONE), "w"):
         pass
 
@@ -55,7 +47,6 @@ def main(arguments=None):
     p = argparse.ArgumentParser(prog="tools/train/run drives", description=__doc__.splitlines()[0])
     p.add_argument("-o", "--output", required=True, help="folder for SEED/{color,buffer,...}")
     p.add_argument("--streets", required=True, help="folder for SEED/truth.sgrid; those that are there are used")
-    p.add_argument("--semrover", default="build/release/semrover", help="the engine")
     p.add_argument("--seeds", required=True, help="FIRST:LAST, both included")
     p.add_argument("--frames", type=int, default=8, help="of a street")
     p.add_argument("--length", type=int, default=60, help="of a street, metres")
@@ -64,19 +55,15 @@ def main(arguments=None):
     p.add_argument("-W", "--width", type=int, default=616)
     p.add_argument("-H", "--height", type=int, default=424)
     options = p.parse_args(arguments)
-    for root in (options.streets, options.output):
-        os.makedirs(root, exist_ok=True)
+    os.makedirs(options.output, exist_ok=True)
     first, _, last = options.seeds.partition(":")
     for seed in range(int(first), int(last or first) + 1):
         street, folder = (os.path.join(root, str(seed)) for root in (options.streets, options.output))
         if os.path.exists(os.path.join(folder, DONE)):
             continue
-        try:
-            make_grids(options.semrover, street, seed, options.length)
-            make_frames(options.semrover, os.path.join(street, "truth.sgrid"), folder, seed, options)
-        except subprocess.CalledProcessError as error:
-            sys.exit(f"seed {seed}: {options.semrover} exited with {error.returncode}")
-        print(f"{folder}", flush=True)
+        make_street(street, seed, options.length)
+        make_frames(os.path.join(street, "truth.sgrid"), folder, seed, options)
+        print(folder, flush=True)
 
 
 if __name__ == "__main__":

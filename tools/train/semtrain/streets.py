@@ -8,6 +8,18 @@ import os
 from .program import semrover
 
 
+def make_street(folder, seed, length, keep_mesh=False):
+    """FOLDER/truth.sgrid holds what drives along the whole street see. -> whether it was made now"""
+    if os.path.exists(os.path.join(folder, "truth.sgrid")):
+        return False
+    os.makedirs(os.path.dirname(os.path.abspath(folder)), exist_ok=True)
+    semrover("streets", "--seed", seed, "--length", length, "--end-margin", 12, "--spacing", 2, "--seen", "-o", folder,
+             "--quiet", "-y")
+    if not keep_mesh:
+        os.remove(os.path.join(folder, "mesh.glb"))
+    return True
+
+
 def main():
     p = argparse.ArgumentParser(prog="tools/train/run streets", description=__doc__)
     p.add_argument("-o", "--output", required=True, help="folder")
@@ -18,14 +30,8 @@ def main():
     options = p.parse_args()
     for seed in range(options.first_seed, options.first_seed + options.count):
         folder = os.path.join(options.output, str(seed))
-        if os.path.exists(os.path.join(folder, "truth.sgrid")):
-            continue
-        os.makedirs(options.output, exist_ok=True)
-        semrover("streets", "--seed", seed, "--length", options.length, "--end-margin", 12, "--spacing", 2, "--seen",
-                 "-o", folder, "--quiet")
-        if not options.keep_mesh:
-            os.remove(os.path.join(folder, "mesh.glb"))
-        print(folder, flush=True)
+        if make_street(folder, seed, options.length, options.keep_mesh):
+            print(folder, flush=True)
 
 
 if __name__ == "__main__":
