@@ -254,6 +254,23 @@ TEST_F(CliRefine, straight_from_a_grid_is_render_and_refine)
     EXPECT_NE(other.err.find("64 x 40 pixels in the path"), std::string::npos) << other.err;
 }
 
+TEST_F(CliRefine, splats_are_as_wide_as_the_model_says_unless_the_option_says_otherwise)
+{
+    ASSERT_TRUE(write_grid(folder_ / "street.sgrid", street()));
+    folder_.put("path.tum", "0 0 3.6 1.6 -0.5 0.5 -0.5 0.5\n");
+    const std::string drive = " --path " + path("path.tum") + " -W 56 -H 40 ";
+    const auto narrow = refined("narrow", drive, "street.sgrid");
+    const auto wide = refined("wide", drive + "--splat-radius auto", "street.sgrid");
+    EXPECT_FALSE(narrow == wide);
+    Json index = Json::parse(contents(folder_ / "model" / "model_index.json"), nullptr, false);
+    if (!index.is_object())
+        index = Json::object();
+    index["defaults"]["renderer"]["splat_radius"] = "auto";
+    folder_.put("model/model_index.json", index.dump());
+    EXPECT_TRUE(wide == refined("said", drive, "street.sgrid"));
+    EXPECT_TRUE(narrow == refined("overruled", drive + "--splat-radius 0.04", "street.sgrid"));
+}
+
 // ---- bad input: one line, the exit code, nothing left behind
 
 class CliRefineRefuses : public CliRefine {

@@ -48,6 +48,7 @@ TEST(RendererModel, a_folder_gives_configs_scheduler_text_and_defaults)
     EXPECT_EQ(m->defaults.num_inference_steps, 7);
     EXPECT_EQ(m->defaults.guidance_scale, 1.5f);
     EXPECT_EQ(m->defaults.previous_noise, 0.5f);
+    EXPECT_EQ(m->defaults.splat_radius, 0.04f);
     EXPECT_TRUE(m->open_unet()->require(unet_schema(m->unet)));
     EXPECT_TRUE(m->open_vae()->require(vae_schema(m->vae)));
     EXPECT_EQ(RendererModel::open(folder.path(), Sampler::dpmpp_2m)->scheduler.sampler, Sampler::dpmpp_2m);
@@ -55,6 +56,21 @@ TEST(RendererModel, a_folder_gives_configs_scheduler_text_and_defaults)
     ASSERT_TRUE(hash);
     EXPECT_TRUE(write_json(folder / "scheduler" / "scheduler_config.json", {{"_class_name", "DDPMScheduler"}}));
     EXPECT_NE(*RendererModel::open(folder.path())->hash(), *hash);
+}
+
+TEST(RendererModel, says_how_wide_the_splats_of_its_buffers_are)
+{
+    const ScratchFolder folder;
+    put_model(folder.path());
+    const auto radius = [&](const nlohmann::json& value) {
+        EXPECT_TRUE(write_json(folder / "model_index.json", {{"defaults", {{"renderer", {{"splat_radius", value}}}}}}));
+        return RendererModel::open(folder.path());
+    };
+    EXPECT_EQ(radius(0.1)->defaults.splat_radius, 0.1f);
+    EXPECT_EQ(radius("auto")->defaults.splat_radius, std::nullopt);
+    for (const nlohmann::json& wrong :
+         {nlohmann::json(0), nlohmann::json(-1), nlohmann::json(100), nlohmann::json("wide"), nlohmann::json(true)})
+        EXPECT_TRUE(says(radius(wrong), "supported: metres (0..100) or \"auto\"")) << wrong;
 }
 
 TEST(RendererModel, without_scheduler_and_text_stable_diffusions_stand_in)

@@ -34,7 +34,7 @@ Result<SurfelOptions> surfel_options(const std::string& splat_radius, float opac
     SurfelOptions s;
     s.opacity = opacity;
     s.auto_sigma = splat_radius == "auto";
-    if (s.auto_sigma)
+    if (s.auto_sigma || splat_radius.empty())
         return s;
     char* end = nullptr;
     s.sigma = std::strtof(splat_radius.c_str(), &end);
@@ -51,8 +51,10 @@ void add_drive_options(CLI::App& c, DriveOptions& o)
     add_lens_options(c, o);
     c.add_flag("--equirect", o.equirect, "panoramas of W x W/2 in place of the path's cameras");
     c.add_option("--rig", o.rig, "rig.json: every sensor at every pose, in folders of their names");
-    c.add_option("--splat-radius", o.splat_radius,
-                 "standard deviation of a splat in metres, or auto: from the spacing of the points");
+    c.add_option(
+        "--splat-radius", o.splat_radius,
+        "standard deviation of a splat in metres (0.04, or what the renderer says), or auto: from the spacing of "
+        "the points");
     c.add_option("--opacity", o.opacity, "of every splat")->check(CLI::Range(0.01f, 1.f));
     c.add_option("--visible-alpha", o.visible_alpha, "alpha from which a pixel counts as visible")
         ->check(CLI::Range(0.f, 1.f));

@@ -21,15 +21,16 @@ namespace semrover {
 
 // how a grid is driven through and drawn: what `render` and `refine` share
 struct DriveOptions : LensOptions {
-    std::string path, rig, splat_radius = "0.04", background = "0,0,0";
-    bool equirect = false; // panoramas of width x width / 2 in place of the path's cameras
+    std::string path, rig, background = "0,0,0";
+    std::string splat_radius; // empty: not given
+    bool equirect = false;    // panoramas of width x width / 2 in place of the path's cameras
     float opacity = 1;
     std::optional<float> visible_alpha; // 0.5, or what a model says
     bool semantic = false;
 };
 void add_drive_options(CLI::App& command, DriveOptions& options);
 
-// of `--splat-radius` and `--opacity`; usage
+// of `--splat-radius` (empty: 0.04) and `--opacity`; usage
 Result<SurfelOptions> surfel_options(const std::string& splat_radius, float opacity);
 Status check_drive(const DriveOptions& options);                           // usage
 Result<std::array<uint8_t, 3>> background_of(const DriveOptions& options); // usage

@@ -7,8 +7,8 @@
 #include "tools/open_device.h"
 #include "tools/path_renderer.h"
 #include "tools/progress.h"
-#include "tools/scene_input.h"
 #include "tools/refine_video.h"
+#include "tools/scene_input.h"
 #include "tools/version.h"
 
 #include <chrono>
@@ -44,7 +44,8 @@ struct Job {
     int steps = 0;
     AsdOptions asd;
     float visible_alpha = 0.5f;
-    CameraPath path; // where one was given
+    std::string splat_radius; // as the option takes it
+    CameraPath path;          // where one was given
     std::vector<RefineChain> chains;
     std::unique_ptr<Device> device;
     uint64_t render_bytes = 0; // device memory at most while buffers were rendered
@@ -73,6 +74,9 @@ Status resolve_model(Job& j)
     j.asd.previous_noise = o.previous_noise.value_or(d.previous_noise);
     j.asd.seed = o.seed;
     j.visible_alpha = o.drive.visible_alpha.value_or(d.visible_threshold);
+    j.splat_radius = o.drive.splat_radius;
+    if (j.splat_radius.empty())
+        j.splat_radius = d.splat_radius ? fmt::format("{}", *d.splat_radius) : "auto";
     SR_TRY(j.plan, plan_sampling(j.model.scheduler, j.steps));
     return {};
 }
@@ -162,7 +166,7 @@ Result<Json> input_json(const Job& j)
     SR_TRY(const uint64_t grid, hash_file(o.input));
     input["grid"] = hash_text(grid);
     input["path"] = hash_text(hash_cameras(j.path)); // as read, whatever files and options it came from
-    input["drive"] = {{"splat_radius", o.drive.splat_radius},
+    input["drive"] = {{"splat_radius", j.splat_radius},
                       {"opacity", o.drive.opacity},
                       {"visible_alpha", j.visible_alpha},
                       {"background", o.drive.background}};
@@ -200,7 +204,9 @@ Status render_buffers(Job& j, RunFolder& run)
             return {};
     SR_TRY(const VoxelGrid grid, load_grid(o.input, {}, j.globals));
     SR_TRY(const auto background, background_of(o.drive));
-    SR_TRY(const SurfelScene scene, load_scene(o.drive, o.input, grid, *j.device));
+    DriveOptions drive = o.drive;
+    drive.splat_radius = j.splat_radius;
+    SR_TRY(const SurfelScene scene, load_scene(drive, o.input, grid, *j.device));
     RasterizerOptions options;
     options.visible_alpha = j.visible_alpha;
     PathRenderer renderer(*j.device, scene, options);

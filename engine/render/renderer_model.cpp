@@ -9,6 +9,7 @@
 #include "runtime/quote.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace semrover {
 
@@ -82,6 +83,20 @@ Status read_conditioning(RendererModel& m)
     return {};
 }
 
+void read_splat_radius(JsonFields& fields, RendererDefaults& d)
+{
+    const Json* value = fields.find("splat_radius");
+    if (!value)
+        return;
+    const double number = value->is_number() ? value->get<double>() : NAN;
+    if (*value == "auto")
+        d.splat_radius.reset();
+    else if (number > 0 && number < 100)
+        d.splat_radius = float(number);
+    else
+        fields.refuse("splat_radius", "metres (0..100) or \"auto\"");
+}
+
 Status read_defaults(const Path& path, RendererDefaults& d, std::vector<std::string>& warnings)
 {
     SR_TRY(const Json index, read_json(path));
@@ -93,6 +108,7 @@ Status read_defaults(const Path& path, RendererDefaults& d, std::vector<std::str
     fields.number("guidance_scale", 0.f, 1000.f, d.guidance_scale);
     fields.number("previous_noise", 0.f, 100.f, d.previous_noise);
     fields.number("visible_threshold", 0.f, 1.f, d.visible_threshold);
+    read_splat_radius(fields, d);
     return fields.finish(warnings);
 }
 

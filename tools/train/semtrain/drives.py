@@ -37,8 +37,8 @@ def make_frames(grid, folder, seed, options):
     os.remove(os.path.join(folder, "mesh.glb"))
     for drive in [folder] + ([os.path.join(folder, "shifted")] if where["shift"] else []):
         shutil.rmtree(os.path.join(drive, "buffer"), ignore_errors=True)
-        semrover("render", grid, "--path", os.path.join(drive, "transforms.json"), *size, "-o",
-                 os.path.join(drive, "buffer"), "--quiet")
+        semrover("render", grid, "--path", os.path.join(drive, "transforms.json"), *size, "--splat-radius",
+                 options.splat_radius, "-o", os.path.join(drive, "buffer"), "--quiet")
     with open(os.path.join(folder, DONE), "w"):
         pass
 
@@ -52,6 +52,7 @@ def main(arguments=None):
     p.add_argument("--length", type=int, default=60, help="of a street, metres")
     p.add_argument("--samples", type=int, default=2, help="rays a pixel")
     p.add_argument("--shift", type=float, help="metres to the left of a second drive, in place of what the seed says")
+    p.add_argument("--splat-radius", default="auto", help="of the buffers, as `semrover render` takes it")
     p.add_argument("-W", "--width", type=int, default=616)
     p.add_argument("-H", "--height", type=int, default=424)
     options = p.parse_args(arguments)

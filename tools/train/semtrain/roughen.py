@@ -33,15 +33,15 @@ def write_rough(path, output, seed):
     safetensors_file.write(output, tensors, metadata)
 
 
-def render_rough(drive, grid, folder):
+def render_rough(drive, grid, folder, splat_radius):
     """FOLDER/buffer as in DRIVE but of another grid, FOLDER/color a link to DRIVE's"""
     os.makedirs(folder, exist_ok=True)
     link = os.path.join(folder, "color")
     if not os.path.islink(link):
         os.symlink(os.path.abspath(os.path.join(drive.folder, "color")), link)
     height, width = drive.truth(drive.numbers[0]).shape[1:]
-    semrover("render", grid, "--path", os.path.join(drive.folder, "transforms.json"), "-W", width, "-H", height, "-o",
-             os.path.join(folder, "buffer"), "--quiet", "-y")
+    semrover("render", grid, "--path", os.path.join(drive.folder, "transforms.json"), "-W", width, "-H", height,
+             "--splat-radius", splat_radius, "-o", os.path.join(folder, "buffer"), "--quiet", "-y")
 
 
 def main():
@@ -49,6 +49,7 @@ def main():
     p.add_argument("-o", "--output", required=True, help="folder; its drives go to `run asd --frames` beside the others")
     p.add_argument("--frames", required=True, help="folder of SEED/..., as `run drives` writes it")
     p.add_argument("--streets", required=True, help="folder of SEED/truth.sgrid")
+    p.add_argument("--splat-radius", default="auto", help="of the buffers, as `semrover render` takes it")
     options = p.parse_args()
     for drive in find_drives(options.frames):
         name = os.path.relpath(drive.folder, options.frames)
@@ -58,7 +59,7 @@ def main():
         grid = os.path.join(options.output, seed + ".sgrid")
         os.makedirs(options.output, exist_ok=True)
         write_rough(os.path.join(options.streets, seed, "truth.sgrid"), grid, int(seed))
-        render_rough(drive, grid, folder)
+        render_rough(drive, grid, folder, options.splat_radius)
         os.remove(grid)
         print(folder, flush=True)
 
