@@ -13,7 +13,7 @@ import numpy as np
 import torch
 from PIL import Image
 
-from semtrain import asd, model_folder, safetensors_file, vae
+from semtrain import asd, measure_frames, model_folder, safetensors_file, vae
 from semtrain.denoising import alphas_cumprod
 from semtrain.frames import find_drives
 from semtrain.latents import sequences
@@ -46,6 +46,20 @@ def draw_drive(folder, seed):
         pictures = {"color": truth, "buffer/color": truth * seen[..., None], "buffer/visible": seen * np.uint8(255)}
         for part, picture in pictures.items():
             Image.fromarray(picture).save(os.path.join(folder, part, f"{number:06d}.png"))
+
+
+def put_path(folder):
+    """a camera that moves 0.1 m a frame, and a wall 5 m ahead of it"""
+    os.makedirs(os.path.join(folder, "depth"))
+    frames = []
+    for number in range(3):
+        Image.fromarray(np.full((48, 64), 5000 - 100 * number, np.uint16)).save(
+            os.path.join(folder, "depth", f"{number:06d}.png"))
+        pose = np.diag([1.0, -1, -1, 1])
+        pose[2, 3] = 0.1 * number
+        frames.append({"file_path": f"color/{number:06d}.png", "transform_matrix": pose.tolist()})
+    with open(os.path.join(folder, "transforms.json"), "w") as file:
+        json.dump({"w": 64, "h": 48, "fl_x": 40, "fl_y": 40, "cx": 32, "cy": 24, "frames": frames}, file)
 
 
 class Recipes(unittest.TestCase):
@@ -191,6 +205,25 @@ class Recipes(unittest.TestCase):
                         self.path("refined"), "--frames", "0:0")
         with Image.open(self.path("refined", "frames", "000000.png")) as picture:
             self.assertEqual(picture.size, (64, 48))
+
+    def test_frames_are_measured_seen_and_beside_from_one_before_and_alone(self):
+        self.train_asd("measured_model", "--set", "steps=1")
+        self.run_engine("--version")
+        for folder in (("held", "0"), ("held", "0", "shifted")):
+            draw_drive(self.path(*folder), 7)
+            put_path(self.path(*folder))
+        with contextlib.redirect_stdout(io.StringIO()) as out:
+            measure_frames.main([self.path("held"), "-m", self.path("measured_model"), "-o", self.path("measures")])
+        rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in out.getvalue().splitlines()[2:]]
+        self.assertEqual([row[:2] for row in rows],
+                         [[pose, how] for pose in ("seen", "shifted") for how in ("splats", "refined", "alone")])
+        self.assertEqual(rows[0][2:4], rows[3][2:4])  # the same pictures
+        self.assertNotEqual(rows[1][2:], rows[2][2:])
+        self.assertEqual(len({row[6] for row in rows[:3]}), 1)
+        first, alone = (self.path("measures", f"seen-{how}.frames", "0", "color", "000000.png")
+                        for how in ("refined", "alone"))
+        with open(first, "rb") as a, open(alone, "rb") as b:
+            self.assertEqual(a.read(), b.read())
 
 
 if __name__ == "__main__":

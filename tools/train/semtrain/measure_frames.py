@@ -1,0 +1,139 @@
+# SPDX-FileCopyrightText: semrover authors
+# SPDX-License-Identifier: Apache-2.0
+"""Refines drives that a renderer was not trained on, each frame from the one before and each alone, along the drive and
+beside it, and compares the frames with the true ones (semrover eval frames, flicker, kid): a table in Markdown, and all
+figures as JSON. What is there already is kept."""
+import argparse
+import json
+import os
+import shutil
+
+from .frames import find_drives
+from .model_folder import write_json
+from .program import semrover
+
+BESIDE = "shifted"  # of a drive: the folder of the same street from beside it (semrover streets --shift)
+
+
+class Pose:
+    """the drives of one kind, and OUT/truth-NAME/DRIVE/color: their true frames as `eval` wants them"""
+
+    def __init__(self, name, drives, output):
+        self.name, self.drives, self.truth = name, drives, os.path.join(output, "truth-" + name)
+        for key, drive in drives.items():
+            gather(os.path.join(drive.folder, "color"), os.path.join(self.truth, key, "color"), drive.numbers)
+
+
+def gather(source, target, numbers):
+    """the pictures of these numbers in a folder of their own"""
+    os.makedirs(target, exist_ok=True)
+    for number in numbers:
+        name = f"{number:06d}.png"
+        if not os.path.exists(os.path.join(target, name)):
+            shutil.copy(os.path.join(source, name), target)
+
+
+def poses_of(root, output):
+    """-> [Pose]: seen, and shifted where there are such drives"""
+    kinds = {"seen": {}, "shifted": {}}
+    for drive in find_drives(root):
+        name = os.path.relpath(drive.folder, root)
+        kind = "shifted" if os.path.basename(name) == BESIDE else "seen"
+        kinds[kind][name.split(os.sep)[0]] = drive
+    return [Pose(kind, drives, output) for kind, drives in kinds.items() if drives]
+
+
+def splats(pose, folder, options):
+    for key, drive in pose.drives.items():
+        gather(os.path.join(drive.folder, "buffer", "color"), os.path.join(folder, key, "color"), drive.numbers)
+
+
+def refined(pose, folder, options):
+    """each frame from the one before it"""
+    for key, drive in pose.drives.items():
+        refine(drive, os.path.join(folder, key), options)
+
+
+def alone(pose, folder, options):
+    """each frame as if it were the first, with the noise that it has in `refined`"""
+    for key, drive in pose.drives.items():
+        for number in drive.numbers:
+            run = os.path.join(folder + ".runs", key, str(number))
+            refine(drive, run, options, "--frames", f"{number}:{number}")
+            gather(os.path.join(run, "frames"), os.path.join(folder, key, "color"), [number])
+
+
+def refine(drive, folder, options, *more):
+    if os.path.exists(os.path.join(folder, "frames")):
+        return
+    if options.steps:
+        more += ("--steps", options.steps)
+    os.makedirs(os.path.dirname(folder), exist_ok=True)
+    semrover("refine", os.path.join(drive.folder, "buffer"), "-m", options.model, "-o", folder, "--seed", 1, "--quiet",
+             *more)
+
+
+def colors_of(folder, key):
+    """where a drive's pictures lie: `refine` calls them frames"""
+    frames = os.path.join(folder, key, "frames")
+    return frames if os.path.isdir(frames) else os.path.join(folder, key, "color")
+
+
+def judge(pose, folder, options):
+    """-> figures over all drives of the pose"""
+    whole = folder + ".frames"
+    for key, drive in pose.drives.items():
+        gather(colors_of(folder, key), os.path.join(whole, key, "color"), drive.numbers)
+    out = {"frames": json.loads(semrover("eval", "frames", whole, pose.truth, "--json", "--quiet")), "flicker": {}}
+    for key, drive in pose.drives.items():
+        out["flicker"][key] = json.loads(semrover(
+            "eval", "flicker", os.path.join(whole, key), "--depth", os.path.join(drive.folder, "depth"), "--path",
+            os.path.join(drive.folder, "transforms.json"), "--truth", os.path.join(pose.truth, key), "--json",
+            "--quiet"))
+    if options.features:
+        out["kid"] = json.loads(semrover("eval", "kid", whole, pose.truth, "--features", options.features, "--full",
+                                         "--json", "--quiet"))
+    return out
+
+
+def flicker_of(figures):
+    """-> mean over the pixels of all drives, and the truth's"""
+    pairs = [pair for one in figures.values() for pair in one["pairs"]]
+    valid = sum(pair["valid"] for pair in pairs)
+    return [sum(of(pair) * pair["valid"] for pair in pairs) / valid
+            for of in (lambda p: p["mean"], lambda p: p["truth"]["mean"])]
+
+
+def line_of(pose, name, figures):
+    """| poses | frames | PSNR dB | SSIM | KID x 1000 | flicker | truth's |"""
+    made, truth = flicker_of(figures["flicker"])
+    kid = f"{1000 * figures['kid']['full']:.1f}" if "kid" in figures else "-"
+    return (f"| {pose} | {name} | {figures['frames']['psnr']:.2f} | {figures['frames']['ssim']:.3f} | {kid} | {made:.2f} | "
+            f"{truth:.2f} |")
+
+
+def main(arguments=None):
+    p = argparse.ArgumentParser(prog="tools/train/run measure_frames", description=__doc__)
+    p.add_argument("frames", help="folder of drives, as `run drives` writes it, with SEED/shifted or without")
+    p.add_argument("-m", "--model", required=True, help="model with a renderer")
+    p.add_argument("-o", "--output", required=True, help="folder")
+    p.add_argument("--steps", type=int, default=0, help="denoising steps of a frame; 0: as the model says")
+    p.add_argument("--features", help="network for KID (docs/eval.md)")
+    options = p.parse_args(arguments)
+    lines = ["| poses | frames | PSNR dB | SSIM | KID x 1000 | flicker | truth's |", "|" + "---|" * 7]
+    for pose in poses_of(options.frames, options.output):
+        for make in (splats, refined, alone):
+            folder = os.path.join(options.output, f"{pose.name}-{make.__name__}")
+            result = folder + ".json"
+            if not os.path.exists(result):
+                make(pose, folder, options)
+                write_json(result, judge(pose, folder, options))
+            with open(result) as file:
+                lines.append(line_of(pose.name, make.__name__, json.load(file)))
+    with open(os.path.join(options.output, "table.md"), "w") as file:
+        file.write("\n".join(lines) + "\n")
+    print("\n".join(lines))
+
+
+if __name__ == "__main__":
+    main()
