@@ -69,11 +69,12 @@ class Batches:
 
 
 def step_loss(model, batch, alphas, config, draw):
-    """-> loss, {eps: the plain error of the noise}; timesteps are spread evenly over the batch"""
+    """-> loss, {eps: the plain error of the noise}; timesteps are spread evenly over the batch, raised to
+    timestep_power of their range: below 1, few are near 0, which change nothing that one can see"""
     truth, previous, buffer, visible = batch
     n = len(truth)
     spread = (torch.arange(n) + torch.rand(1, generator=draw)) / n
-    t = (spread * 1000).long().clamp(max=999)
+    t = (spread ** config["timestep_power"] * 1000).long().clamp(max=999)
     noise = torch.randn(truth.shape, generator=draw).to(truth.device)
     a = alphas[t].view(n, 1, 1, 1).to(truth.device)
     noisy = a.sqrt() * truth + (1 - a).sqrt() * noise

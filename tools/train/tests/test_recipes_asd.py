@@ -30,7 +30,7 @@ ASD = {**COMMON, "in_channels": 13, "out_channels": 4, "block_out_channels": [16
        "up_block_types": ["CrossAttnUpBlock2D", "UpBlock2D"], "attention_head_dim": 2, "cross_attention_dim": 8,
        "norm_num_groups": 4, "text_tokens": 1, "train_text": True, "crop": [6, 6], "batch": 4, "mirror": True,
        "dropout": 0.3, "first_share": 0.1, "previous_noise": [0.3, 0.7], "weighting": "v", "prediction_type": "v_prediction",
-       "timestep_spacing": "trailing",
+       "timestep_spacing": "trailing", "timestep_power": 0.8,
        "defaults": {"num_inference_steps": 2, "guidance_scale": 1.5, "previous_noise": 0.3}}
 
 
