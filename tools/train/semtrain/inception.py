@@ -109,9 +109,9 @@ def loss_of(frames, config):
         shows, spoilt = model(images)
         of_classes = F.cross_entropy(shows, shares)
         of_damage = F.binary_cross_entropy_with_logits(spoilt, strengths)
-        with torch.no_grad():  # what is left when the answers' own uncertainty is taken off
+        with torch.no_grad():  # what perfect answers would cost is taken off
             about = {"classes": of_classes - F.cross_entropy((shares + 1e-9).log(), shares),
-                     "damage": (spoilt.sigmoid() - strengths).abs().mean()}
+                     "damage": of_damage - F.binary_cross_entropy(strengths, strengths)}
         return of_classes + config["damage_weight"] * of_damage, {name: float(v) for name, v in about.items()}
     return loss
 

@@ -23,7 +23,7 @@ REPOSITORY = os.path.dirname(os.path.dirname(os.path.dirname(os.path.dirname(os.
 SEMROVER = os.environ.get("SEMROVER") or os.path.join(REPOSITORY, "build", "release", "semrover")
 RUN = os.path.join(REPOSITORY, "tools", "train", "run")
 TINY = {"seed": 1, "device": "cpu", "width": 1 / 32, "least": 4, "crop": 0.6, "clean": 0.25, "twice": 0.25, "batch": 4,
-        "norm_batches": 2, "judged_batches": 2}
+        "norm_batches": 4, "judged_batches": 2}
 
 
 def write_drive(folder, count=2, size=(72, 100), seed=0):
@@ -209,13 +209,14 @@ class TheRecipe(unittest.TestCase):
         self.assertEqual(idle["damage"]["kinds"]["splats"], {"found": 0, "invented": 0, "error": 0.5})
 
     def test_learns_to_tell_two_streets_apart_and_reports_it(self):
-        train(self.path("drives"), self.path("run"), 40, "--heldout", self.path("drives"), "--set", "ema=0.8",
-              "--set", "learning_rate=0.01", "--set", "norm_batches=6")
+        train(self.path("drives"), self.path("run"), 30, "--heldout", self.path("drives"), "--set", "ema=0.8",
+              "--set", "learning_rate=0.01", "--set", "clean=1", "--set", "twice=0")
         with open(self.path("run/held_out.json")) as file:
             report = json.load(file)
         self.assertEqual(report["crops"], 8)
-        self.assertGreater(report["classes"]["overlap"], 0.8)
-        self.assertEqual(set(report["damage"]), {"all_right", "each_right", "kinds"})
+        self.assertGreater(report["classes"]["overlap"], 0.7)  # the same answer to all has 0.67 at most
+        self.assertGreater(report["damage"]["each_right"], 0.9)  # nothing is spoilt
+        self.assertEqual(report["damage"]["kinds"], {})
 
     def test_goes_on_where_it_stopped_and_exports_no_heads(self):
         whole = train(self.path("drives"), self.path("whole"), 4)
