@@ -147,7 +147,8 @@ def answers(model, frames, config):
 
 
 def judge(shares, said_shares, strengths, said_strengths):
-    """what held-out crops say: right, share of crops; error, mean difference"""
+    """what held-out crops say: right, share of crops; error, mean difference; overlap_of_mean, of who answers always the
+    same"""
     there, said = strengths > 0, said_strengths >= PRESENT
     kinds = {}
     for k, name in enumerate(KINDS):
@@ -157,7 +158,8 @@ def judge(shares, said_shares, strengths, said_strengths):
                            "error": float((said_strengths - strengths)[own, k].abs().mean())}
     report = {"crops": len(shares),
               "classes": {"largest_right": float((shares.argmax(1) == said_shares.argmax(1)).float().mean()),
-                          "overlap": float(torch.minimum(shares, said_shares).sum(1).mean())},
+                          "overlap": float(torch.minimum(shares, said_shares).sum(1).mean()),
+                          "overlap_of_mean": float(torch.minimum(shares, shares.mean(0)).sum(1).mean())},
               "damage": {"all_right": float((there == said).all(1).float().mean()),
                          "each_right": float((there == said).float().mean()), "kinds": kinds}}
     return json.loads(json.dumps(report), parse_float=lambda text: round(float(text), 4))

@@ -203,6 +203,7 @@ class TheRecipe(unittest.TestCase):
         self.assertEqual((right["classes"]["overlap"], right["damage"]["all_right"]), (1, 1))
         self.assertEqual(right["damage"]["kinds"],
                          {kind: {"found": 1, "invented": 0, "error": 0} for kind in ("splats", "color")})
+        self.assertAlmostEqual(right["classes"]["overlap_of_mean"], 1 / 3, places=3)
         idle = judge(shares, torch.full_like(shares, 1 / 21), strengths, torch.zeros_like(strengths))
         self.assertAlmostEqual(idle["classes"]["overlap"], 1 / 21, places=3)
         self.assertAlmostEqual(idle["damage"]["all_right"], 1 / 3, places=3)
