@@ -13,7 +13,8 @@ from torch.nn import functional as F
 from . import safetensors_file
 from .grids import find_grids
 from .model_folder import write_json
-from .nets.pointnet import Pointnet, measure_norms
+from .nets.norms import measure_norms
+from .nets.pointnet import Pointnet
 from .point_chunks import ChunkBatches, cut_chunks
 from .settings import parser, resolve
 from .trainer import Trainer
@@ -55,8 +56,7 @@ def exporter(folder, model, batches, config):
         own = copy.deepcopy(model).cpu()
         own.load_state_dict(state, strict=False)
         measured = (batches.batch(i, NORM_STREAM)[:2] for i in range(config["norm_batches"]))
-        measure_norms(own, ((torch.from_numpy(a), torch.from_numpy(b)) for a, b in measured),
-                      config["loss_points"])
+        measure_norms(own, ((torch.from_numpy(a), torch.from_numpy(b), config["loss_points"]) for a, b in measured))
         write_network(os.path.join(folder, "pointnet"), config["network"], own.state_dict())
     return export
 

@@ -11,7 +11,8 @@ import numpy as np
 import torch
 
 from semtrain import safetensors_file
-from semtrain.nets.pointnet import Pointnet, ball_query, batch_norms, farthest_points, measure_norms
+from semtrain.nets.norms import batch_norms, measure_norms
+from semtrain.nets.pointnet import Pointnet, ball_query, farthest_points
 from semtrain.point_chunks import ChunkBatches, cut_chunks, read_points
 from semtrain.pointnet import confusion, judge, read_network, write_network
 

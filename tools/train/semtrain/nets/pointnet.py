@@ -164,21 +164,3 @@ class Pointnet(nn.Module):
         rows = F.linear(y.flatten(0, 1), self.conv1.weight.flatten(1), self.conv1.bias)
         rows = F.relu(over_rows(self.bn1, rows))
         return F.linear(rows, self.conv2.weight.flatten(1), self.conv2.bias).view(*y.shape[:2], -1)
-
-
-def batch_norms(model):
-    return [m for m in model.modules() if isinstance(m, nn.BatchNorm1d)]
-
-
-@torch.no_grad()
-def measure_norms(model, batches, first=None):
-    """running statistics of the batch norms := those of these batches, [(positions, inputs)], all weighing the same;
-    the decoder's of the `first` points of every set"""
-    norms = batch_norms(model)
-    for norm in norms:
-        norm.reset_running_stats()
-        norm.momentum = None
-    model.train()
-    for positions, inputs in batches:
-        model(positions, inputs, first)
-    model.eval()
