@@ -7,7 +7,7 @@ import os
 import numpy as np
 
 from . import safetensors_file
-from .model_folder import read_json, write_json
+from .json_file import read_json, write_json
 
 
 def find_grids(sources):
@@ -21,20 +21,26 @@ def find_grids(sources):
     return files
 
 
+def read_grid(path):
+    """-> {cells i32 [V, 3], labels u8 [V], points f16 [V, n, 3], colors u8 [V, n, 3]} of the cells that have points, and
+    voxel size in metres"""
+    t = {name: tensor.numpy() for name, tensor in safetensors_file.read(path).items()}
+    if "points" not in t:
+        raise SystemExit(f"{path}: a semantic grid; points and colours are needed")
+    has = t.pop("generated").astype(bool) if "generated" in t else np.ones(len(t["cells"]), bool)
+    return {name: values[has] for name, values in t.items()}, float(safetensors_file.read_header(path)[1]["voxel_size"])
+
+
 def read_tokens(path):
     """-> cells i32 [V, 3], labels u8 [V], tokens f16 [V, 6n] in [-1, 1], the point nearest the cell's centre first
     (ties by x, y, z); only cells that have points"""
-    t = {name: tensor.numpy() for name, tensor in safetensors_file.read(path).items()}
-    if "points" not in t:
-        raise SystemExit(f"{path}: a semantic grid; training needs points and colours")
-    size = float(safetensors_file.read_header(path)[1]["voxel_size"])
-    has = t["generated"].astype(bool) if "generated" in t else np.ones(len(t["cells"]), bool)
-    points, colors = t["points"][has].astype(np.float32), t["colors"][has].astype(np.float32)
+    t, size = read_grid(path)
+    points, colors = t["points"].astype(np.float32), t["colors"].astype(np.float32)
     x, y, z = points[..., 0], points[..., 1], points[..., 2]
     order = np.lexsort((z, y, x, (points ** 2).sum(-1)), axis=-1)[..., None]
     points, colors = np.take_along_axis(points, order, 1), np.take_along_axis(colors, order, 1)
     tokens = np.concatenate([points / (size / 2), colors / 127.5 - 1], -1).reshape(len(points), -1)
-    return t["cells"][has], t["labels"][has], tokens.clip(-1, 1).astype(np.float16)
+    return t["cells"], t["labels"], tokens.clip(-1, 1).astype(np.float16)
 
 
 class Grids:

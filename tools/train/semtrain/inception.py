@@ -19,7 +19,7 @@ from torch.nn import functional as F
 from . import safetensors_file, settings
 from .damage import KINDS, LEAST, spoil
 from .frames import find_drives
-from .model_folder import write_json
+from .json_file import write_json
 from .nets.inception import Inception, resized
 from .nets.norms import measure_norms
 from .trainer import Trainer, generator

@@ -8,7 +8,7 @@ import json
 import os
 import time
 
-from .model_folder import write_json
+from .json_file import read_json, write_json
 from .program import semrover
 
 CLASSES = ("road", "sidewalk", "building", "vegetation", "car", "road-lane")
@@ -37,8 +37,7 @@ def measure(cuts, models, samplers, steps, guidances, output):
                                          "--json"))
             write_json(result, {"model": name, "sampler": sampler, "steps": n, "guidance": guidance,
                                 "seconds": seconds, "scores": scores})
-        with open(result) as file:
-            rows.append(json.load(file))
+        rows.append(read_json(result))
         print(line_of(rows[-1]), flush=True)
     return rows
 

@@ -9,7 +9,7 @@ import os
 import shutil
 
 from .frames import find_drives
-from .model_folder import write_json
+from .json_file import read_json, write_json
 from .program import semrover
 
 BESIDE = "shifted"  # of a drive: the folder of the same street from beside it (semrover streets --shift)
@@ -128,8 +128,7 @@ def main(arguments=None):
             if not os.path.exists(result):
                 make(pose, folder, options)
                 write_json(result, judge(pose, folder, options))
-            with open(result) as file:
-                lines.append(line_of(pose.name, make.__name__, json.load(file)))
+            lines.append(line_of(pose.name, make.__name__, read_json(result)))
     with open(os.path.join(options.output, "table.md"), "w") as file:
         file.write("\n".join(lines) + "\n")
     print("\n".join(lines))

@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
 """Components of a model folder, in the diffusers layout that the engine reads (spec: models.md)."""
-import json
 import os
 
 import torch
 
 from . import safetensors_file
+from .json_file import read_json, write_json
 
 
 def write_component(folder, config, state):
@@ -36,16 +36,5 @@ def add_to_index(folder, components, defaults=None):
 
 def read_component(folder):
     """-> (config, {name: tensor})"""
-    return read_json(os.path.join(folder, "config.json")), safetensors_file.read(os.path.join(folder, "diffusion_pytorch_model.safetensors"))
-
-
-def read_json(path):
-    with open(path) as file:
-        return json.load(file)
-
-
-def write_json(path, value):
-    with open(path + ".part", "w") as file:
-        json.dump(value, file, indent=1)
-        file.write("\n")
-    os.replace(path + ".part", path)
+    weights = os.path.join(folder, "diffusion_pytorch_model.safetensors")
+    return read_json(os.path.join(folder, "config.json")), safetensors_file.read(weights)

@@ -2,25 +2,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """Columns of Σ-Voxfield grids as sets of equally many labelled points: as the engine's cut_chunks cuts them
 (engine/eval/point_chunks.h), and as batches to train on."""
-import json
 import os
 
 import numpy as np
 
-from . import safetensors_file
-from .grids import find_grids
+from .grids import find_grids, read_grid
+from .json_file import read_json, write_json
 
 
 def read_points(path):
     """-> positions f32 [P, 3] metres, colors u8 [P, 3], labels u8 [P], in the engine's order: by cell"""
-    t = {name: tensor.numpy() for name, tensor in safetensors_file.read(path).items()}
-    if "points" not in t:
-        raise SystemExit(f"{path}: a semantic grid; points and colours are needed")
+    t, size = read_grid(path)
     order = np.lexsort(t["cells"].T[::-1])
-    if "generated" in t:
-        order = order[t["generated"][order] != 0]
-    size = np.float64(np.float32(safetensors_file.read_header(path)[1]["voxel_size"]))
-    centers = ((t["cells"][order] + 0.5) * size).astype(np.float32)
+    centers = ((t["cells"][order] + 0.5) * np.float64(np.float32(size))).astype(np.float32)
     points = centers[:, None] + t["points"][order].astype(np.float32)
     return points.reshape(-1, 3), t["colors"][order].reshape(-1, 3), np.repeat(t["labels"][order], points.shape[1])
 
@@ -86,10 +80,9 @@ class ChunkBatches:
         key = {"files": files, "chunk": self.network["chunk"], "min_points": self.network["min_points"]}
         os.makedirs(cache, exist_ok=True)
         about = os.path.join(cache, "chunks.json")
-        if self._read(about) != key:
+        if not os.path.exists(about) or read_json(about) != key:
             self._fill(files, cache)
-            with open(about, "w") as file:
-                json.dump(key, file)
+            write_json(about, key)
         self.positions, self.colors = (np.load(os.path.join(cache, f"{name}.npy"), mmap_mode="r")
                                        for name in ("positions", "colors"))
         self.labels, self.ends, self.origins, self.limits = (
@@ -97,13 +90,6 @@ class ChunkBatches:
 
     def __len__(self):
         return len(self.ends)
-
-    @staticmethod
-    def _read(about):
-        if not os.path.exists(about):
-            return None
-        with open(about) as file:
-            return json.load(file)
 
     def _fill(self, files, cache):
         columns = {name: [] for name in ("positions", "colors", "labels", "origins", "limits")}

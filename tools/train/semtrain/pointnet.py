@@ -12,7 +12,7 @@ from torch.nn import functional as F
 
 from . import safetensors_file
 from .grids import find_grids
-from .model_folder import write_json
+from .json_file import write_json
 from .nets.norms import measure_norms
 from .nets.pointnet import Pointnet
 from .point_chunks import ChunkBatches, cut_chunks
