@@ -190,7 +190,12 @@ TEST(CliConvert, what_is_no_model_is_bad_input)
     expect_error(convert(folder.path(), folder / "out"), 3, "has no renderer");
     expect_error(convert(folder.put("x.ckpt", "x"), folder / "out"), 3, "convert it with Python");
     expect_error(convert(folder.path(), folder / "out"), 3, "convert it with Python");
-    expect_error(convert(SEMROVER_SOURCE_DIR "/assets/model", folder / "out", "--asd-init"), 3, "has no renderer");
+    const Path plain = folder / "transformer";
+    for (const char* part : {"voxfield_transformer", "voxfield_scheduler"}) {
+        fs::create_directories(plain / part);
+        fs::copy(Path(SEMROVER_SOURCE_DIR) / "assets/model" / part, plain / part);
+    }
+    expect_error(convert(plain, folder / "out", "--asd-init"), 3, "has no renderer");
     expect_error(convert(folder.path(), folder / "out", "--dtype int8"), 2, "dtype");
     put_diffusers(folder / "in");
     Weights bad;

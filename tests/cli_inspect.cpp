@@ -38,11 +38,14 @@ TEST(CliInspect, a_model_shows_components_config_and_weights)
     EXPECT_EQ(transformer["config"]["num_layers"], 6);
     EXPECT_EQ(transformer["weights"]["dtypes"]["F16"], 175);
     EXPECT_EQ(transformer["weights"]["list"].size(), 175u);
-    EXPECT_EQ(json["parameters"], 7764024);
-    EXPECT_EQ(json["bytes"], 2 * 7764024);
-    const ProgramResult text = semrover_program("inspect " + kAssets + "/model");
-    EXPECT_NE(text.out.find("parameters  7764024"), std::string::npos);
-    EXPECT_EQ(text.out.find("proj_in.weight"), std::string::npos); // the list needs -v
+    EXPECT_EQ(transformer["weights"]["parameters"], 7764024);
+    EXPECT_EQ(transformer["weights"]["bytes"], 2 * 7764024);
+    const int renderer = 12738180, vae = 1424155, text = 32;
+    EXPECT_EQ(json["parameters"], 7764024 + renderer + vae + text);
+    EXPECT_EQ(json["bytes"], 2 * (7764024 + renderer + vae + text));
+    const ProgramResult shown = semrover_program("inspect " + kAssets + "/model");
+    EXPECT_NE(shown.out.find("parameters  7764024"), std::string::npos);
+    EXPECT_EQ(shown.out.find("proj_in.weight"), std::string::npos); // the list needs -v
     EXPECT_NE(semrover_program("inspect -v " + kAssets + "/model").out.find("proj_in.weight"), std::string::npos);
 }
 

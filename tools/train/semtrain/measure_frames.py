@@ -16,12 +16,16 @@ BESIDE = "shifted"  # of a drive: the folder of the same street from beside it (
 
 
 class Pose:
-    """the drives of one kind, and OUT/truth-NAME/DRIVE/color: their true frames as `eval` wants them"""
+    """the drives of one kind; their true frames and masks as `eval` wants them: OUT/truth-NAME/DRIVE/color,
+    OUT/visible-NAME/DRIVE/visible"""
 
     def __init__(self, name, drives, output):
-        self.name, self.drives, self.truth = name, drives, os.path.join(output, "truth-" + name)
+        self.name, self.drives = name, drives
+        self.truth, self.visible = (os.path.join(output, f"{what}-{name}") for what in ("truth", "visible"))
         for key, drive in drives.items():
             gather(os.path.join(drive.folder, "color"), os.path.join(self.truth, key, "color"), drive.numbers)
+            gather(os.path.join(drive.folder, "buffer", "visible"), os.path.join(self.visible, key, "visible"),
+                   drive.numbers)
 
 
 def gather(source, target, numbers):
@@ -84,7 +88,8 @@ def judge(pose, folder, options):
     whole = folder + ".frames"
     for key, drive in pose.drives.items():
         gather(colors_of(folder, key), os.path.join(whole, key, "color"), drive.numbers)
-    out = {"frames": json.loads(semrover("eval", "frames", whole, pose.truth, "--json", "--quiet")), "flicker": {}}
+    out = {"frames": json.loads(semrover("eval", "frames", whole, pose.truth, "--visible", pose.visible, "--json",
+                                         "--quiet")), "flicker": {}}
     for key, drive in pose.drives.items():
         out["flicker"][key] = json.loads(semrover(
             "eval", "flicker", os.path.join(whole, key), "--depth", os.path.join(drive.folder, "depth"), "--path",
@@ -105,11 +110,12 @@ def flicker_of(figures):
 
 
 def line_of(pose, name, figures):
-    """| poses | frames | PSNR dB | SSIM | KID x 1000 | flicker | truth's |"""
+    """| poses | frames | PSNR dB | where splats are | SSIM | KID x 1000 | flicker | truth's |"""
     made, truth = flicker_of(figures["flicker"])
     kid = f"{1000 * figures['kid']['full']:.1f}" if "kid" in figures else "-"
-    return (f"| {pose} | {name} | {figures['frames']['psnr']:.2f} | {figures['frames']['ssim']:.3f} | {kid} | {made:.2f} | "
-            f"{truth:.2f} |")
+    frames = figures["frames"]
+    decibels = ["equal" if of["psnr"] is None else f"{of['psnr']:.2f}" for of in (frames, frames["visible"])]
+    return (f"| {pose} | {name} | {' | '.join(decibels)} | {frames['ssim']:.3f} | {kid} | {made:.2f} | {truth:.2f} |")
 
 
 def main(arguments=None):
@@ -120,7 +126,7 @@ def main(arguments=None):
     p.add_argument("--steps", type=int, default=0, help="denoising steps of a frame; 0: as the model says")
     p.add_argument("--features", help="network for KID (docs/eval.md)")
     options = p.parse_args(arguments)
-    lines = ["| poses | frames | PSNR dB | SSIM | KID x 1000 | flicker | truth's |", "|" + "---|" * 7]
+    lines = ["| poses | frames | PSNR dB | where splats are | SSIM | KID x 1000 | flicker | truth's |", "|" + "---|" * 8]
     for pose in poses_of(options.frames, options.output):
         for make in (splats, refined, alone):
             folder = os.path.join(options.output, f"{pose.name}-{make.__name__}")

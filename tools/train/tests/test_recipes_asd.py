@@ -219,7 +219,7 @@ class Recipes(unittest.TestCase):
                          [[pose, how] for pose in ("seen", "shifted") for how in ("splats", "refined", "alone")])
         self.assertEqual(rows[0][2:4], rows[3][2:4])  # the same pictures
         self.assertNotEqual(rows[1][2:], rows[2][2:])
-        self.assertEqual(len({row[6] for row in rows[:3]}), 1)
+        self.assertEqual(len({row[7] for row in rows[:3]}), 1)
         first, alone = (self.path("measures", f"seen-{how}.frames", "0", "color", "000000.png")
                         for how in ("refined", "alone"))
         with open(first, "rb") as a, open(alone, "rb") as b:
