@@ -262,11 +262,7 @@ TEST_F(CliRefine, splats_are_as_wide_as_the_model_says_unless_the_option_says_ot
     const auto narrow = refined("narrow", drive, "street.sgrid");
     const auto wide = refined("wide", drive + "--splat-radius auto", "street.sgrid");
     EXPECT_FALSE(narrow == wide);
-    Json index = Json::parse(contents(folder_ / "model" / "model_index.json"), nullptr, false);
-    if (!index.is_object())
-        index = Json::object();
-    index["defaults"]["renderer"]["splat_radius"] = "auto";
-    folder_.put("model/model_index.json", index.dump());
+    folder_.put("model/model_index.json", R"({"defaults": {"renderer": {"splat_radius": "auto"}}})");
     EXPECT_TRUE(wide == refined("said", drive, "street.sgrid"));
     EXPECT_TRUE(narrow == refined("overruled", drive + "--splat-radius 0.04", "street.sgrid"));
 }

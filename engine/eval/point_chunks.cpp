@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/eval/point_chunks.h"
+
 #include "runtime/mix64.h"
 
 #include <algorithm>

@@ -34,17 +34,17 @@ void random_tensor(uint64_t seed, const TensorSpec& spec, std::vector<float>& va
     }
     Hash hash;
     hash.add(spec.name);
-    const uint64_t key = mix64(hash.value() ^ mix64(seed + 0x9e3779b97f4a7c15ull));
+    const uint64_t key = mix64(hash.value() ^ mix64(seed + kMixStep));
     values.resize(count);
     float* out = values.data();
     const uint64_t pairs = count / 2;
     for (uint64_t i = 0; i < pairs; ++i) {
-        const uint64_t bits = mix64(key + i * 0x9e3779b97f4a7c15ull);
+        const uint64_t bits = mix64(key + i * kMixStep);
         out[2 * i] = centre + scale * centred(bits);
         out[2 * i + 1] = centre + scale * centred(bits >> 32);
     }
     if (count % 2)
-        out[count - 1] = centre + scale * centred(mix64(key + pairs * 0x9e3779b97f4a7c15ull));
+        out[count - 1] = centre + scale * centred(mix64(key + pairs * kMixStep));
 }
 
 } // namespace semrover

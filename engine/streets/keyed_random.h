@@ -14,13 +14,13 @@ namespace semrover {
 // generators", 2014).
 class KeyedRandom {
   public:
-    KeyedRandom(uint64_t seed, std::initializer_list<uint64_t> key) : state_(mix64(seed + 0x9e3779b97f4a7c15u))
+    KeyedRandom(uint64_t seed, std::initializer_list<uint64_t> key) : state_(mix64(seed + kMixStep))
     {
         for (uint64_t k : key)
             state_ = mix64(state_ ^ mix64(k + 0x632be59bd9b4e019u));
     }
 
-    uint32_t bits() { return uint32_t(mix64(state_ + 0x9e3779b97f4a7c15u * ++count_) >> 32); }
+    uint32_t bits() { return uint32_t(mix64(state_ + kMixStep * ++count_) >> 32); }
     double uniform() { return bits() * (1.0 / 4294967296.0); } // [0, 1)
     double uniform(double low, double high) { return low + (high - low) * uniform(); }
     uint32_t below(uint32_t n) { return uint32_t((uint64_t(bits()) * n) >> 32); }

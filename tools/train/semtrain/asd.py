@@ -17,7 +17,7 @@ from .denoising import alphas_cumprod, denoise, input_of, noise_of, scheduler_of
 from .frames import find_drives, to_pixels, write_beside
 from .latents import load_vae, sequences
 from .nets.unet import UNet2DConditionModel
-from .trainer import Trainer, generator
+from .trainer import Trainer, generator, number_below
 
 INDEX = {"renderer": ["diffusers", "UNet2DConditionModel"], "vae": ["diffusers", "AutoencoderKL"],
          "scheduler": ["diffusers", "DDIMScheduler"]}
@@ -49,13 +49,13 @@ class Batches:
         """-> truth, previous (with noise on it, or zeros), buffer [B, 4, h, w], visible [B, 1, h, w]"""
         draw, rows = generator(self.config, step), []
         for _ in range(self.config["batch"]):
-            sequence, i = self.frames[_number(len(self.frames), draw)]
+            sequence, i = self.frames[number_below(len(self.frames), draw)]
             rows.append(self._frame(sequence, i, draw))
         return [torch.stack(parts).to(self.config["device"]) for parts in zip(*rows)]
 
     def _frame(self, s, i, draw):
-        top = _number(s.truth.shape[2] - self.crop[0] + 1, draw)
-        left = _number(s.truth.shape[3] - self.crop[1] + 1, draw)
+        top = number_below(s.truth.shape[2] - self.crop[0] + 1, draw)
+        left = number_below(s.truth.shape[3] - self.crop[1] + 1, draw)
         place = (slice(None), slice(top, top + self.crop[0]), slice(left, left + self.crop[1]))
         low, high = self.config["previous_noise"]
         chance, scale = torch.rand(2, generator=draw).tolist()
@@ -136,10 +136,6 @@ def read_init(folder, config):
     else:
         out["text"] = torch.zeros(1, config["text_tokens"], config["cross_attention_dim"])
     return out
-
-
-def _number(below, draw):
-    return int(torch.randint(below, (1,), generator=draw))
 
 
 def main(arguments=None):

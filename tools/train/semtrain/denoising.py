@@ -27,7 +27,7 @@ def input_of(noisy, previous, buffer, visible):
 
 def scheduler_of(config):
     """the fields that a recipe's config may change: what is predicted, and which timesteps a sampler takes"""
-    return {**SCHEDULER, **{name: config[name] for name in ("prediction_type", "timestep_spacing") if name in config}}
+    return {**SCHEDULER, **{name: config[name] for name in ("prediction_type", "timestep_spacing")}}
 
 
 def ddim_timesteps(steps, spacing="leading"):

@@ -25,20 +25,26 @@ def drive_of(seed, frames, length):
     return {"first": first, "end-margin": length - first - count + 1, "yaw": YAWS.get(seed % 10, 0), "shift": shift}
 
 
+def make_buffers(grid, drive, folder, size, splat_radius):
+    """FOLDER/buffer: splats of the grid as the cameras of DRIVE see them; size: width and height"""
+    buffer = os.path.join(folder, "buffer")
+    shutil.rmtree(buffer, ignore_errors=True)
+    semrover("render", grid, "--path", os.path.join(drive, "transforms.json"), "-W", size[0], "-H", size[1],
+             "--splat-radius", splat_radius, "-o", buffer, "--quiet")
+
+
 def make_frames(grid, folder, seed, options):
     """pictures of the drive, and the splat buffers of the same cameras"""
     where = drive_of(seed, options.frames, options.length)
     if options.shift is not None:
         where["shift"], where["yaw"] = options.shift, 0
-    size = ("-W", options.width, "-H", options.height)
+    size = (options.width, options.height)
     semrover("streets", "--seed", seed, "--length", options.length, "--spacing", 1, "--no-grids", "--images", "--samples",
-             options.samples, *size, *(word for name, value in where.items() for word in (f"--{name}", value)), "-o",
+             options.samples, "-W", size[0], "-H", size[1], *(word for name, value in where.items() for word in (f"--{name}", value)), "-o",
              folder, "-y", "--quiet")
     os.remove(os.path.join(folder, "mesh.glb"))
     for drive in [folder] + ([os.path.join(folder, "shifted")] if where["shift"] else []):
-        shutil.rmtree(os.path.join(drive, "buffer"), ignore_errors=True)
-        semrover("render", grid, "--path", os.path.join(drive, "transforms.json"), *size, "--splat-radius",
-                 options.splat_radius, "-o", os.path.join(drive, "buffer"), "--quiet")
+        make_buffers(grid, drive, drive, size, options.splat_radius)
     with open(os.path.join(folder, DONE), "w"):
         pass
 

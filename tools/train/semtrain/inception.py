@@ -6,7 +6,6 @@ Its features are trained for two questions at once, each asked by a linear layer
 the 20 classes and of nothing: cross entropy), and how it was spoilt (the strength, 0..1, of every kind in
 semtrain/damage.py: binary cross entropy). So they know both what streets look like and how well one is drawn.
 """
-import copy
 import json
 import os
 
@@ -21,8 +20,8 @@ from .damage import KINDS, LEAST, spoil
 from .frames import find_drives
 from .json_file import write_json
 from .nets.inception import Inception, resized
-from .nets.norms import measure_norms
-from .trainer import Trainer, generator
+from .nets.norms import averaged
+from .trainer import Trainer, generator, number_below
 
 CLASSES = 20
 NORM_STREAM, JUDGED_STREAM = 1, 2  # of crops that batch norms are measured on, and that held-out drives are judged on
@@ -44,11 +43,11 @@ class Frames:
 
     def crop(self, config, draw):
         """-> truth and buffer, float [3, H, W], and labels, of the same part of a frame, mirrored or not"""
-        frame = self.frames[_number(len(self.frames), draw)]
+        frame = self.frames[number_below(len(self.frames), draw)]
         share = config["crop"] + (1 - config["crop"]) * float(torch.rand(1, generator=draw))
         height, width = (max(1, round(share * n)) for n in frame[2].shape)
-        top, left = (_number(n - part + 1, draw) for n, part in zip(frame[2].shape, (height, width)))
-        mirrored = _number(2, draw)
+        top, left = (number_below(n - part + 1, draw) for n, part in zip(frame[2].shape, (height, width)))
+        mirrored = number_below(2, draw)
         parts = [plane[..., top:top + height, left:left + width] for plane in frame]
         parts = [plane.flip(-1) if mirrored else plane for plane in parts]
         return parts[0].float(), parts[1].float(), parts[2]
@@ -116,12 +115,9 @@ def loss_of(frames, config):
     return loss
 
 
-def averaged(model, state, frames, config):
-    """a copy with averaged weights, on the CPU, ready to be asked"""
-    own = copy.deepcopy(model).cpu()
-    own.load_state_dict(state, strict=False)
-    measure_norms(own, (frames.batch(config, i, NORM_STREAM)[:1] for i in range(config["norm_batches"])))
-    return own
+def ready(model, state, frames, config):
+    """-> the averaged model, its norms measured"""
+    return averaged(model, state, (frames.batch(config, i, NORM_STREAM)[:1] for i in range(config["norm_batches"])))
 
 
 def write_network(path, network):
@@ -165,10 +161,6 @@ def judge(shares, said_shares, strengths, said_strengths):
     return json.loads(json.dumps(report), parse_float=lambda text: round(float(text), 4))
 
 
-def _number(below, draw):
-    return int(torch.randint(below, (1,), generator=draw))
-
-
 def main(arguments=None):
     p = settings.parser("inception", __doc__.splitlines()[0])
     p.add_argument("--frames", required=True, help="folder of drives (see semtrain/frames.py) with label/000000.png")
@@ -180,7 +172,7 @@ def main(arguments=None):
     model = Asked(config).to(memory_format=torch.channels_last)
 
     def export(state):
-        own = averaged(model, state, frames, config)
+        own = ready(model, state, frames, config)
         write_network(os.path.join(options.output, "inception.safetensors"), own.network)
     trainer = Trainer(options.output, model, config, export)
     print(f"{sum(p.numel() for p in model.network.parameters())} parameters, {model.network.features} features, "
@@ -188,7 +180,7 @@ def main(arguments=None):
     trainer.run(loss_of(frames, config))
     if options.heldout:
         state = {name: t.detach().cpu() for name, t in trainer.average.items()}
-        own = averaged(model, state, frames, config)
+        own = ready(model, state, frames, config)
         report = judge(*answers(own, Frames(options.heldout), config))
         write_json(os.path.join(options.output, "held_out.json"), report)
         print(json.dumps(report))

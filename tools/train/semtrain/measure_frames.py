@@ -48,6 +48,7 @@ def poses_of(root, output):
 
 
 def splats(pose, folder, options):
+    """as the renderer gets them -> FOLDER/DRIVE/color, like the two below"""
     for key, drive in pose.drives.items():
         gather(os.path.join(drive.folder, "buffer", "color"), os.path.join(folder, key, "color"), drive.numbers)
 
@@ -55,7 +56,9 @@ def splats(pose, folder, options):
 def refined(pose, folder, options):
     """each frame from the one before it"""
     for key, drive in pose.drives.items():
-        refine(drive, os.path.join(folder, key), options)
+        run = os.path.join(folder + ".runs", key)
+        refine(drive, run, options)
+        gather(os.path.join(run, "frames"), os.path.join(folder, key, "color"), drive.numbers)
 
 
 def alone(pose, folder, options):
@@ -77,26 +80,17 @@ def refine(drive, folder, options, *more):
              *more)
 
 
-def colors_of(folder, key):
-    """where a drive's pictures lie: `refine` calls them frames"""
-    frames = os.path.join(folder, key, "frames")
-    return frames if os.path.isdir(frames) else os.path.join(folder, key, "color")
-
-
 def judge(pose, folder, options):
     """-> figures over all drives of the pose"""
-    whole = folder + ".frames"
-    for key, drive in pose.drives.items():
-        gather(colors_of(folder, key), os.path.join(whole, key, "color"), drive.numbers)
-    out = {"frames": json.loads(semrover("eval", "frames", whole, pose.truth, "--visible", pose.visible, "--json",
+    out = {"frames": json.loads(semrover("eval", "frames", folder, pose.truth, "--visible", pose.visible, "--json",
                                          "--quiet")), "flicker": {}}
     for key, drive in pose.drives.items():
         out["flicker"][key] = json.loads(semrover(
-            "eval", "flicker", os.path.join(whole, key), "--depth", os.path.join(drive.folder, "depth"), "--path",
+            "eval", "flicker", os.path.join(folder, key), "--depth", os.path.join(drive.folder, "depth"), "--path",
             os.path.join(drive.folder, "transforms.json"), "--truth", os.path.join(pose.truth, key), "--json",
             "--quiet"))
     if options.features:
-        out["kid"] = json.loads(semrover("eval", "kid", whole, pose.truth, "--features", options.features, "--full",
+        out["kid"] = json.loads(semrover("eval", "kid", folder, pose.truth, "--features", options.features, "--full",
                                          "--json", "--quiet"))
     return out
 

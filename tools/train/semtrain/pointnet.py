@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Trains a PointNet++ to tell the classes of a street's points; `semrover eval f3d` and `mmd` take its encoder as
 --features (docs/eval.md)."""
-import copy
 import json
 import os
 
@@ -13,7 +12,7 @@ from torch.nn import functional as F
 from . import safetensors_file
 from .grids import find_grids
 from .json_file import write_json
-from .nets.norms import measure_norms
+from .nets.norms import averaged
 from .nets.pointnet import Pointnet
 from .point_chunks import ChunkBatches, cut_chunks
 from .settings import parser, resolve
@@ -52,11 +51,9 @@ def read_network(path, network):
 
 def exporter(folder, model, batches, config):
     def export(state):
-        """averaged weights have other statistics than those that were trained: they are measured"""
-        own = copy.deepcopy(model).cpu()
-        own.load_state_dict(state, strict=False)
         measured = (batches.batch(i, NORM_STREAM)[:2] for i in range(config["norm_batches"]))
-        measure_norms(own, ((torch.from_numpy(a), torch.from_numpy(b), config["loss_points"]) for a, b in measured))
+        own = averaged(model, state, ((torch.from_numpy(a), torch.from_numpy(b), config["loss_points"])
+                                      for a, b in measured))
         write_network(os.path.join(folder, "pointnet"), config["network"], own.state_dict())
     return export
 

@@ -7,9 +7,13 @@ import subprocess
 REPOSITORY = os.path.dirname(os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))))
 
 
+def engine_path():
+    """$SEMROVER, or what tools/demo builds, whether it is there or not"""
+    return os.environ.get("SEMROVER") or os.path.join(REPOSITORY, "build", "release", "semrover")
+
+
 def semrover_path():
-    """$SEMROVER, or what tools/demo builds"""
-    path = os.environ.get("SEMROVER") or os.path.join(REPOSITORY, "build", "release", "semrover")
+    path = engine_path()
     if not os.access(path, os.X_OK):
         raise SystemExit(f"{path} is not there: build it (cmake --preset release && cmake --build --preset release "
                          "--target semrover), or name one in $SEMROVER")

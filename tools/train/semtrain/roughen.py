@@ -9,8 +9,8 @@ import numpy as np
 import torch
 
 from . import safetensors_file
+from .drives import make_buffers
 from .frames import find_drives
-from .program import semrover
 
 
 def roughened(tensors, half, random):
@@ -40,8 +40,7 @@ def render_rough(drive, grid, folder, splat_radius):
     if not os.path.islink(link):
         os.symlink(os.path.abspath(os.path.join(drive.folder, "color")), link)
     height, width = drive.truth(drive.numbers[0]).shape[1:]
-    semrover("render", grid, "--path", os.path.join(drive.folder, "transforms.json"), "-W", width, "-H", height,
-             "--splat-radius", splat_radius, "-o", os.path.join(folder, "buffer"), "--quiet", "-y")
+    make_buffers(grid, drive.folder, folder, (width, height), splat_radius)
 
 
 def main():

@@ -27,6 +27,11 @@ def generator(config, step, stream=0):
     return torch.Generator().manual_seed((config["seed"] * 1000003 + step) * 16 + stream)
 
 
+def number_below(n, draw):
+    """0..n - 1, from a generator"""
+    return int(torch.randint(n, (1,), generator=draw))
+
+
 def autocast(config):
     if config["precision"] == "fp32":
         return contextlib.nullcontext()

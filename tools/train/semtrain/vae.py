@@ -18,7 +18,7 @@ from torch.nn import functional as F
 from . import model_folder, settings
 from .frames import fill_blocks, find_drives, psnr, to_floats, to_pixels, write_beside
 from .nets.vae import AutoencoderKL
-from .trainer import Trainer, generator
+from .trainer import Trainer, generator, number_below
 
 LIBRARY = {"vae": ["diffusers", "AutoencoderKL"]}
 
@@ -39,10 +39,10 @@ class Pictures:
             picture = _pick(self.buffers if of_buffers else self.truths, draw)
             if min(picture.shape[1:]) < size:
                 raise SystemExit(f"a picture is {picture.shape[2]} x {picture.shape[1]}, smaller than crop {size}")
-            top = _number(picture.shape[1] - size + 1, draw)
-            left = _number(picture.shape[2] - size + 1, draw)
+            top = number_below(picture.shape[1] - size + 1, draw)
+            left = number_below(picture.shape[2] - size + 1, draw)
             crop = picture[:, top:top + size, left:left + size]
-            out.append(crop.flip(2) if _number(2, draw) else crop)
+            out.append(crop.flip(2) if number_below(2, draw) else crop)
         return to_floats(torch.stack(out)).contiguous(memory_format=torch.channels_last)
 
 
@@ -131,12 +131,8 @@ def _filled(picture, model):
     return fill_blocks(to_floats(picture)[None], model.downscale)
 
 
-def _number(below, draw):
-    return int(torch.randint(below, (1,), generator=draw))
-
-
 def _pick(values, draw):
-    return values[_number(len(values), draw)]
+    return values[number_below(len(values), draw)]
 
 
 def main(arguments=None):

@@ -11,17 +11,17 @@ import numpy as np
 import torch
 from PIL import Image
 
+from recipe import run_recipe
 from semtrain import safetensors_file
 from semtrain.damage import KINDS, gaussian_blur, spoil
 from semtrain.frames import read_rgb
 from semtrain.inception import Frames, draw_strengths, judge, loss_of, read_network, write_network
 from semtrain.nets.inception import Inception, pool_of, resized
 from semtrain.nets.norms import measure_norms
+from semtrain.program import engine_path
 from semtrain.trainer import generator
 
-REPOSITORY = os.path.dirname(os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))))
-SEMROVER = os.environ.get("SEMROVER") or os.path.join(REPOSITORY, "build", "release", "semrover")
-RUN = os.path.join(REPOSITORY, "tools", "train", "run")
+SEMROVER = engine_path()
 TINY = {"seed": 1, "device": "cpu", "width": 1 / 32, "least": 4, "crop": 0.6, "clean": 0.25, "twice": 0.25, "batch": 4,
         "norm_batches": 4, "judged_batches": 2}
 
@@ -44,13 +44,8 @@ def write_drive(folder, count=2, size=(72, 100), seed=0):
 def train(frames, output, steps, *more):
     settings = [word for name in ("width", "least", "batch", "norm_batches", "judged_batches")
                 for word in ("--set", f"{name}={TINY[name]}")]
-    done = subprocess.run([RUN, "inception", "--config", "small", "--frames", frames, "-o", output, "--threads", "1",
-                           *settings, "--set", "warmup=2", "--set", f"steps={steps}", *more],
-                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-                          env={**os.environ, "PYTHON": os.environ.get("PYTHON", "/usr/bin/python3")})
-    if done.returncode:
-        raise AssertionError(done.stdout)
-    return safetensors_file.read(os.path.join(output, "checkpoint.safetensors"))
+    return run_recipe("inception", output, "--frames", frames, *settings, "--set", "warmup=2", "--set",
+                      f"steps={steps}", *more)
 
 
 def random_network():

@@ -10,15 +10,15 @@ import unittest
 import numpy as np
 import torch
 
+from recipe import run_recipe
 from semtrain import safetensors_file
 from semtrain.nets.norms import batch_norms, measure_norms
 from semtrain.nets.pointnet import Pointnet, ball_query, farthest_points
 from semtrain.point_chunks import ChunkBatches, cut_chunks, read_points
 from semtrain.pointnet import confusion, judge, read_network, write_network
+from semtrain.program import engine_path
 
-REPOSITORY = os.path.dirname(os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))))
-SEMROVER = os.environ.get("SEMROVER") or os.path.join(REPOSITORY, "build", "release", "semrover")
-RUN = os.path.join(REPOSITORY, "tools", "train", "run")
+SEMROVER = engine_path()
 TINY = {"inputs": ["xyz", "rgb", "normalized"], "chunk": 2.4, "points": 100, "min_points": 20, "pool": "max",
         "num_classes": 20, "layers": [{"npoint": 48, "radius": 0.4, "nsample": 8, "mlp": [16, 16]},
                                       {"npoint": 12, "radius": 0.9, "nsample": 8, "mlp": [16, 24]}],
@@ -49,15 +49,9 @@ def write_street(path, seed=0):
 
 
 def train(grid, output, steps, *more):
-    done = subprocess.run([RUN, "pointnet", "--config", "small", "--grids", grid, "-o", output, "--threads", "1",
-                           "--set", "network=" + json.dumps(TINY), "--set", "batch=4", "--set", "loss_points=100",
-                           "--set", "warmup=2", "--set", "precision=fp32", "--set", "norm_batches=4",
-                           "--set", f"steps={steps}", *more],
-                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-                          env={**os.environ, "PYTHON": os.environ.get("PYTHON", "/usr/bin/python3")})
-    if done.returncode:
-        raise AssertionError(done.stdout)
-    return safetensors_file.read(os.path.join(output, "checkpoint.safetensors"))
+    return run_recipe("pointnet", output, "--grids", grid, "--set", "network=" + json.dumps(TINY), "--set", "batch=4",
+                      "--set", "loss_points=100", "--set", "warmup=2", "--set", "precision=fp32", "--set",
+                      "norm_batches=4", "--set", f"steps={steps}", *more)
 
 
 def log_of(output):

@@ -220,7 +220,7 @@ class Recipes(unittest.TestCase):
         self.assertEqual(rows[0][2:4], rows[3][2:4])  # the same pictures
         self.assertNotEqual(rows[1][2:], rows[2][2:])
         self.assertEqual(len({row[7] for row in rows[:3]}), 1)
-        first, alone = (self.path("measures", f"seen-{how}.frames", "0", "color", "000000.png")
+        first, alone = (self.path("measures", f"seen-{how}", "0", "color", "000000.png")
                         for how in ("refined", "alone"))
         with open(first, "rb") as a, open(alone, "rb") as b:
             self.assertEqual(a.read(), b.read())

@@ -11,15 +11,15 @@ import numpy as np
 import torch
 
 import golden
+from recipe import run_recipe
 from semtrain import safetensors_file
 from semtrain.grids import Grids, LocalSets, read_tokens
 from semtrain.nets.transformer import CONFIG_FIELDS, VoxfieldTransformer
-from semtrain.program import REPOSITORY, semrover_path
+from semtrain.program import semrover_path
 
-RUN = os.path.join(REPOSITORY, "tools", "train", "run")
 TINY = ["--set", 'network={"num_layers": 2, "num_attention_heads": 2, "attention_head_dim": 16, "points_per_voxel": 4,'
         ' "num_classes": 20, "voxel_size": 0.6, "attention_radius": 3.0, "pos_embed_dim": 8, "context_pos_embed": true}',
-        "--set", "batch=4", "--set", "set_size=[8,12]", "--set", "warmup=2", "--set", "precision=fp32", "--threads", "1"]
+        "--set", "batch=4", "--set", "set_size=[8,12]", "--set", "warmup=2", "--set", "precision=fp32"]
 
 
 def from_config(config):
@@ -43,12 +43,7 @@ def write_street(path, seed=0):
 
 
 def train(grids, output, steps, *more):
-    done = subprocess.run([RUN, "transformer", "--config", "small", "--grids", grids, "-o", output, *TINY, "--set",
-                           f"steps={steps}", *more], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-                          env={**os.environ, "PYTHON": os.environ.get("PYTHON", "/usr/bin/python3")})
-    if done.returncode:
-        raise AssertionError(done.stdout)
-    return safetensors_file.read(os.path.join(output, "checkpoint.safetensors"))
+    return run_recipe("transformer", output, "--grids", grids, *TINY, "--set", f"steps={steps}", *more)
 
 
 class TheModule(unittest.TestCase):

@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
 """Statistics of batch norms: averaged weights have others than those that were trained."""
+import copy
+
 import torch
 from torch.nn.modules.batchnorm import _BatchNorm
 
@@ -20,3 +22,11 @@ def measure_norms(model, batches):
     for arguments in batches:
         model(*arguments)
     model.eval()
+
+
+def averaged(model, state, batches):
+    """a copy on the CPU with the averaged weights `state`, its norms measured on the batches, ready to be asked"""
+    own = copy.deepcopy(model).cpu()
+    own.load_state_dict(state, strict=False)
+    measure_norms(own, batches)
+    return own

@@ -1,0 +1,68 @@
+# SPDX-FileCopyrightText: semrover authors
+# SPDX-License-Identifier: Apache-2.0
+"""Pieces of held-back streets, generated in the engine with several settings and measured against the truth."""
+import contextlib
+import io
+import math
+import os
+import tempfile
+import unittest
+from unittest import mock
+
+import numpy as np
+
+from semtrain import cuts, measure, safetensors_file
+from semtrain.json_file import read_json
+from test_transformer import train, write_street
+
+
+def cells_of(path):
+    return safetensors_file.read(path)["cells"].numpy()
+
+
+class Pieces(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.street = self.path("streets", "7", "truth.sgrid")
+        os.makedirs(os.path.dirname(self.street))
+        write_street(self.street)
+        self.addCleanup(self.folder.cleanup)
+
+    def path(self, *names):
+        return os.path.join(self.folder.name, *names)
+
+    def test_hold_the_cells_whose_centres_lie_between_the_bounds(self):
+        # cells of 0.6 m have their centres at 0.3, 0.9, 1.5, ...
+        self.assertEqual(cuts.cut_grid(self.street, self.path("pieces"), (0.85, 2.05), (-math.inf, 1.2)), 4)
+        for kind in ("truth", "semantic"):
+            cells = cells_of(self.path("pieces", kind, "7.sgrid"))
+            self.assertEqual(cells.tolist(), [[1, 0, 0], [1, 1, 0], [2, 0, 0], [2, 1, 0]])
+        truth, whole = (safetensors_file.read(p) for p in (self.path("pieces", "truth", "7.sgrid"), self.street))
+        at = [np.flatnonzero((whole["cells"].numpy() == c).all(1))[0] for c in truth["cells"].numpy()]
+        np.testing.assert_array_equal(truth["points"].numpy(), whole["points"].numpy()[at])
+        self.assertNotIn("points", safetensors_file.read(self.path("pieces", "semantic", "7.sgrid")))
+
+    def measure(self):
+        arguments = ["measure", self.path("pieces"), "-o", self.path("table"), "--model",
+                     "tiny=" + self.path("run", "model"), "--steps", "2", "3", "--guidance", "1"]
+        with mock.patch("sys.argv", arguments), contextlib.redirect_stdout(io.StringIO()):
+            measure.main()
+        with open(self.path("table", "table.md")) as file:
+            return file.read().splitlines()
+
+    def test_are_generated_with_every_setting_and_measured_once(self):
+        train(self.street, self.path("run"), 2)
+        cuts.cut_grid(self.street, self.path("pieces"), (0, 2.4), (0, 4.2))
+        head, _, *rows = self.measure()
+        self.assertEqual([row.split(" | ")[:4] for row in rows],
+                         [["| tiny", "ddpm", "2", "1"], ["| tiny", "ddpm", "3", "1"]])
+        self.assertEqual(len(rows[0].split("|")), len(head.split("|")))
+        result = read_json(self.path("table", "tiny-ddpm-2-1.json"))
+        self.assertEqual(result["scores"]["all"]["cells"], len(cells_of(self.path("pieces", "truth", "7.sgrid"))))
+        made = os.stat(self.path("table", "tiny-ddpm-2-1", "7.sgrid")).st_mtime_ns
+        self.assertEqual(self.measure()[2:], rows)
+        self.assertEqual(os.stat(self.path("table", "tiny-ddpm-2-1", "7.sgrid")).st_mtime_ns, made)
+
+
+if __name__ == "__main__":
+    unittest.main()
