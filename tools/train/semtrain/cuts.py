@@ -1,23 +1,24 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""Pieces of streets: the cells of a grid in a slab across it, as a true and as a semantic grid. Small enough to generate
-with many settings."""
+"""Pieces of streets: the cells of a grid in a slab across it, or in a part of one, as a true and as a semantic grid.
+Small enough to generate with many settings."""
 import argparse
+import math
 import os
 
-import numpy as np
 import torch
 
 from . import safetensors_file
 from .grids import find_grids
 
 
-def cut_grid(path, folder, low, high):
-    """cells whose centres have low <= x < high metres -> FOLDER/truth/NAME.sgrid, FOLDER/semantic/NAME.sgrid; NAME is
-    that of the grid's folder"""
+def cut_grid(path, folder, along, across):
+    """cells whose centres lie within along = (low, high) metres of x, and within across of y
+    -> FOLDER/truth/NAME.sgrid, FOLDER/semantic/NAME.sgrid; NAME is that of the grid's folder"""
     tensors, metadata = safetensors_file.read(path), safetensors_file.read_header(path)[1]
-    x = (tensors["cells"][:, 0].double() + 0.5) * float(metadata["voxel_size"])
-    chosen = torch.from_numpy(np.flatnonzero(((x >= low) & (x < high)).numpy()))
+    centers = (tensors["cells"][:, :2].double() + 0.5) * float(metadata["voxel_size"])
+    low, high = torch.tensor([along, across], dtype=torch.float64).T
+    chosen = ((centers >= low) & (centers < high)).all(1).nonzero()[:, 0]
     name = os.path.basename(os.path.dirname(os.path.abspath(path))) + ".sgrid"
     for kind, names in (("truth", list(tensors)), ("semantic", ["cells", "labels"])):
         os.makedirs(os.path.join(folder, kind), exist_ok=True)
@@ -31,9 +32,12 @@ def main():
     p.add_argument("-o", "--output", required=True, help="folder")
     p.add_argument("--low", type=float, required=True, help="metres, where the slab begins along x")
     p.add_argument("--high", type=float, required=True, help="metres, where it ends")
+    p.add_argument("--right", type=float, default=-math.inf, help="metres, where it begins along y")
+    p.add_argument("--left", type=float, default=math.inf, help="metres, where it ends")
     options = p.parse_args()
     for path in find_grids(options.grids):
-        print(path, cut_grid(path, options.output, options.low, options.high), "cells", flush=True)
+        count = cut_grid(path, options.output, (options.low, options.high), (options.right, options.left))
+        print(path, count, "cells", flush=True)
 
 
 if __name__ == "__main__":
