@@ -57,7 +57,7 @@ def refined(pose, folder, options):
     """each frame from the one before it"""
     for key, drive in pose.drives.items():
         run = os.path.join(folder + ".runs", key)
-        refine(drive, run, options)
+        refine(drive, run, drive.numbers, options)
         gather(os.path.join(run, "frames"), os.path.join(folder, key, "color"), drive.numbers)
 
 
@@ -66,12 +66,13 @@ def alone(pose, folder, options):
     for key, drive in pose.drives.items():
         for number in drive.numbers:
             run = os.path.join(folder + ".runs", key, str(number))
-            refine(drive, run, options, "--frames", f"{number}:{number}")
+            refine(drive, run, [number], options, "--frames", f"{number}:{number}")
             gather(os.path.join(run, "frames"), os.path.join(folder, key, "color"), [number])
 
 
-def refine(drive, folder, options, *more):
-    if os.path.exists(os.path.join(folder, "frames")):
+def refine(drive, folder, numbers, options, *more):
+    """nothing where the frames of these numbers are there; a run that was stopped goes on"""
+    if all(os.path.exists(os.path.join(folder, "frames", f"{number:06d}.png")) for number in numbers):
         return
     if options.steps:
         more += ("--steps", options.steps)

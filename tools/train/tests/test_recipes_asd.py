@@ -16,6 +16,7 @@ from PIL import Image
 from semtrain import asd, measure_frames, model_folder, safetensors_file, vae
 from semtrain.denoising import alphas_cumprod
 from semtrain.frames import find_drives
+from semtrain.json_file import read_json, write_json
 from semtrain.latents import sequences
 from semtrain.trainer import CHECKPOINT, generator
 
@@ -212,6 +213,13 @@ class Recipes(unittest.TestCase):
         for folder in (("held", "0"), ("held", "0", "shifted")):
             draw_drive(self.path(*folder), 7)
             put_path(self.path(*folder))
+        # a run that was stopped before its last frame
+        stopped = self.path("measures", "seen-refined.runs", "0")
+        self.run_engine("refine", self.path("held", "0", "buffer"), "-m", self.path("measured_model"), "-o", stopped,
+                        "--seed", "1", "--quiet")
+        write_json(os.path.join(stopped, "run.json"),
+                   {**read_json(os.path.join(stopped, "run.json")), "state": "running"})
+        os.remove(os.path.join(stopped, "frames", "000002.png"))
         with contextlib.redirect_stdout(io.StringIO()) as out:
             measure_frames.main([self.path("held"), "-m", self.path("measured_model"), "-o", self.path("measures")])
         rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in out.getvalue().splitlines()[2:]]
