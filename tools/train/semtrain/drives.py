@@ -40,8 +40,8 @@ def make_frames(grid, folder, seed, options):
         where["shift"], where["yaw"] = options.shift, 0
     size = (options.width, options.height)
     semrover("streets", "--seed", seed, "--length", options.length, "--spacing", 1, "--no-grids", "--images", "--samples",
-             options.samples, "-W", size[0], "-H", size[1], *(word for name, value in where.items() for word in (f"--{name}", value)), "-o",
-             folder, "-y", "--quiet")
+             options.samples, "-W", size[0], "-H", size[1],
+             *(word for name, value in where.items() for word in (f"--{name}", value)), "-o", folder, "-y", "--quiet")
     os.remove(os.path.join(folder, "mesh.glb"))
     for drive in [folder] + ([os.path.join(folder, "shifted")] if where["shift"] else []):
         make_buffers(grid, drive, drive, size, options.splat_radius)

@@ -15,6 +15,10 @@ import torch
 from PIL import Image
 
 
+def picture_name(number):
+    return f"{number:06d}.png"
+
+
 class Drive:
     """A folder as above; a frame that lacks one of the three pictures is left out, and begins a new sequence."""
 
@@ -25,15 +29,15 @@ class Drive:
 
     def truth(self, number):
         """-> uint8 [3, H, W]"""
-        return read_rgb(os.path.join(self.folder, "color", f"{number:06d}.png"))
+        return read_rgb(os.path.join(self.folder, "color", picture_name(number)))
 
     def buffer(self, number):
         """-> uint8 [3, H, W]"""
-        return read_rgb(os.path.join(self.folder, "buffer", "color", f"{number:06d}.png"))
+        return read_rgb(os.path.join(self.folder, "buffer", "color", picture_name(number)))
 
     def visible(self, number):
         """-> float [1, H, W], 0 or 1"""
-        with Image.open(os.path.join(self.folder, "buffer", "visible", f"{number:06d}.png")) as image:
+        with Image.open(os.path.join(self.folder, "buffer", "visible", picture_name(number))) as image:
             return torch.from_numpy(np.array(image.convert("L")) != 0).float()[None]
 
     def has_previous(self, number):

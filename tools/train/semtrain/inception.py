@@ -17,7 +17,7 @@ from torch.nn import functional as F
 
 from . import safetensors_file, settings
 from .damage import KINDS, LEAST, spoil
-from .frames import find_drives
+from .frames import find_drives, picture_name
 from .json_file import write_json
 from .nets.inception import Inception, resized
 from .nets.norms import averaged
@@ -35,7 +35,7 @@ class Frames:
         self.frames = []
         for drive in find_drives(root):
             for number in drive.numbers:
-                labels = os.path.join(drive.folder, "label", f"{number:06d}.png")
+                labels = os.path.join(drive.folder, "label", picture_name(number))
                 if os.path.exists(labels):
                     self.frames.append((drive.truth(number), drive.buffer(number), read_labels(labels)))
         if not self.frames:

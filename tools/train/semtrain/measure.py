@@ -57,7 +57,7 @@ def line_of(row):
     return "| " + " | ".join(cells) + " |"
 
 
-def main():
+def main(arguments=None):
     p = argparse.ArgumentParser(prog="tools/train/run measure", description=__doc__)
     p.add_argument("cuts", help="folder with truth/ and semantic/, as `run cuts` writes it")
     p.add_argument("-o", "--output", required=True, help="folder")
@@ -65,7 +65,7 @@ def main():
     p.add_argument("--sampler", nargs="+", default=["ddpm"])
     p.add_argument("--steps", type=int, nargs="+", default=[5, 10, 20, 50, 250])
     p.add_argument("--guidance", type=float, nargs="+", default=[1.0, 1.5])
-    options = p.parse_args()
+    options = p.parse_args(arguments)
     models = [item.split("=", 1) for item in options.model]
     head = ["model", "sampler", "steps", "guidance", *CLASSES, "cell colour", "Chamfer m", "windows", "markings",
             "ms a cell"]

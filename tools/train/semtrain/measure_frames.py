@@ -8,7 +8,7 @@ import json
 import os
 import shutil
 
-from .frames import find_drives
+from .frames import find_drives, picture_name
 from .json_file import read_json, write_json
 from .program import semrover
 
@@ -32,7 +32,7 @@ def gather(source, target, numbers):
     """the pictures of these numbers in a folder of their own"""
     os.makedirs(target, exist_ok=True)
     for number in numbers:
-        name = f"{number:06d}.png"
+        name = picture_name(number)
         if not os.path.exists(os.path.join(target, name)):
             shutil.copy(os.path.join(source, name), target)
 
@@ -72,7 +72,7 @@ def alone(pose, folder, options):
 
 def refine(drive, folder, numbers, options, *more):
     """nothing where the frames of these numbers are there; a run that was stopped goes on"""
-    if all(os.path.exists(os.path.join(folder, "frames", f"{number:06d}.png")) for number in numbers):
+    if all(os.path.exists(os.path.join(folder, "frames", picture_name(number))) for number in numbers):
         return
     if options.steps:
         more += ("--steps", options.steps)

@@ -7,7 +7,6 @@ import math
 import os
 import tempfile
 import unittest
-from unittest import mock
 
 import numpy as np
 
@@ -43,10 +42,9 @@ class Pieces(unittest.TestCase):
         self.assertNotIn("points", safetensors_file.read(self.path("pieces", "semantic", "7.sgrid")))
 
     def measure(self):
-        arguments = ["measure", self.path("pieces"), "-o", self.path("table"), "--model",
-                     "tiny=" + self.path("run", "model"), "--steps", "2", "3", "--guidance", "1"]
-        with mock.patch("sys.argv", arguments), contextlib.redirect_stdout(io.StringIO()):
-            measure.main()
+        with contextlib.redirect_stdout(io.StringIO()):
+            measure.main([self.path("pieces"), "-o", self.path("table"), "--model",
+                          "tiny=" + self.path("run", "model"), "--steps", "2", "3", "--guidance", "1"])
         with open(self.path("table", "table.md")) as file:
             return file.read().splitlines()
 
