@@ -245,6 +245,11 @@ void step_timestep(Graph& g, StepTable steps, Tensor table_row); // [rows] u32
 // x' = c_x x + c_z z
 void step_renoise(Graph& g, StepTable steps, Tensor z, Tensor x);
 
+// x = fixed where a token is known
+void step_hold(Graph& g,
+               Tensor known,            // [M] u32
+               Tensor fixed, Tensor x); // [M, N] fp32; x in place
+
 // guidance, prediction, next state; known tokens are put back at the level of the next state
 void step_update(Graph& g, StepTable steps,
                  Tensor m,     // [M, N], or [2M, N] conditional then unconditional: network output

@@ -89,6 +89,26 @@ TEST_F(CliGenerate, any_batch_and_a_second_run_give_the_same_bytes)
     EXPECT_EQ(grid->labels, street().labels);
 }
 
+TEST_F(CliGenerate, the_model_says_how_known_cells_are_seen_and_an_option_says_otherwise)
+{
+    std::filesystem::create_directory(folder_ / "model");
+    std::filesystem::copy(kModel, folder_ / "model/voxfield_transformer");
+    const auto bytes = [&](std::string_view output, const std::string& defaults, const std::string& more = "") {
+        std::ofstream(folder_ / "model/model_index.json") << R"({"defaults": {)" + defaults + "}}";
+        const ProgramResult result = semrover_program("generate " + path("in.sgrid") + " -m " + path("model") + " -o " +
+                                                      path(output) + " --quiet" + kSettings + more);
+        EXPECT_EQ(result.code, 0) << result.err;
+        return contents(path(output));
+    };
+    const std::string noised = bytes("a.sgrid", ""), clean = bytes("b.sgrid", R"("known_tokens": "clean")");
+    EXPECT_TRUE(noised != clean);
+    EXPECT_TRUE(noised == bytes("c.sgrid", R"("known_tokens": "clean")", "--known-tokens noised"));
+    EXPECT_TRUE(clean == bytes("d.sgrid", R"("known_tokens": "noised")", "--known-tokens clean"));
+    EXPECT_TRUE(clean != bytes("e.sgrid", R"("known_tokens": "clean")", "--jump-length 1 --jump-n-sample 2"));
+    EXPECT_EQ(bytes("f.sgrid", R"("known_tokens": "clean")", "--jump-length 1 --jump-n-sample 2 --batch 4"),
+              contents(path("e.sgrid")));
+}
+
 TEST_F(CliGenerate, a_run_that_was_killed_goes_on_to_the_same_bytes)
 {
     const std::string whole = bytes_of("whole.sgrid");
@@ -369,6 +389,7 @@ TEST_F(CliGenerateRefuses, devices_and_options_that_cannot_be)
     expect_refusal(line + "--device unobtainium", 4, "unobtainium");
     expect_refusal(line + "--sampler heun", 2, "heun");
     expect_refusal(line + "--preset slow", 2, "slow");
+    expect_refusal(line + "--known-tokens fuzzy", 2, "fuzzy");
     expect_refusal(line + "--steps 0", 3, "0 denoising steps");
     expect_refusal(line + "--batch 0", 2, "batch");
     expect_refusal(line + "--cfg-scale=-1", 2, "guidance");

@@ -192,6 +192,22 @@ TEST(Repaint, KnownTokensLeaveWithTheirOwnBits)
         }
 }
 
+TEST(Repaint, CleanKnownTokensHaveNoNoiseInAnyStep)
+{
+    const RepaintOptions options{4, 3, KnownTokens::clean};
+    const auto clean = plan_of(ddpm(), 20, options), noised = plan_of(ddpm(), 20, {4, 3});
+    ASSERT_EQ(clean.rows.size(), noised.rows.size());
+    EXPECT_EQ(clean.known, KnownTokens::clean);
+    for (size_t i = 0; i < clean.rows.size(); ++i) {
+        const StepCoefficients &c = clean.rows[i].coefficients, &n = noised.rows[i].coefficients;
+        EXPECT_EQ(c.c_z, n.c_z); // the others are denoised alike
+        if (clean.rows[i].kind == PlanRowKind::step) {
+            EXPECT_EQ(c.known_scale, 1);
+            EXPECT_EQ(c.known_noise, 0);
+        }
+    }
+}
+
 TEST(Repaint, WithoutJumpsThePlanIsTheSchedule)
 {
     const auto schedule = make_schedule(ddpm(), 20).value();

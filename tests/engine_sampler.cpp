@@ -75,6 +75,38 @@ TEST(engine_sampler, known_tokens_leave_as_they_came_with_every_sampler)
     }
 }
 
+// what a network makes of noise is not what it makes of the tokens themselves, so the others see how known ones come
+TEST(engine_sampler, clean_known_tokens_leave_as_they_came_and_are_seen_without_noise)
+{
+    const RegionInput region = patch(3, 40, 25);
+    const size_t given = 25 * size_t(transformer().config().channels());
+    for (const RepaintOptions& repaint : {RepaintOptions{0, 1, KnownTokens::clean}, {2, 2, KnownTokens::clean}}) {
+        const std::vector<float> clean = run(plan(Sampler::ddpm, 4, repaint), sampling_options(3, 1), {region});
+        for (size_t i = 0; i < given; ++i)
+            ASSERT_EQ(clean[i], region.fixed[i]);
+        RepaintOptions other = repaint;
+        other.known = KnownTokens::noised;
+        EXPECT_NE(clean, run(plan(Sampler::ddpm, 4, other), sampling_options(3, 1), {region}));
+    }
+}
+
+// one step from pure noise: with all tokens but one known, its x0 is the network's answer to the clean tokens
+TEST(engine_sampler, from_the_first_step_on_clean_tokens_have_no_noise)
+{
+    const RegionInput region = patch(0, 12, 11);
+    const auto one = [&](uint64_t seed, KnownTokens known) {
+        SamplerOptions options = sampling_options(1, seed);
+        const size_t channels = transformer().config().channels();
+        options.noise = [=](size_t, std::span<float> normals) {
+            for (size_t i = 0; i < normals.size(); ++i) // only the noise of known tokens depends on the seed
+                normals[i] = i < 11 * channels ? float((i * (seed + 3)) % 17) / 8.5f - 1 : 0.25f;
+        };
+        return run(plan(Sampler::ddpm, 1, {0, 1, known}), options, {region});
+    };
+    EXPECT_EQ(one(1, KnownTokens::clean), one(2, KnownTokens::clean));
+    EXPECT_NE(one(1, KnownTokens::noised), one(2, KnownTokens::noised));
+}
+
 TEST(engine_sampler, a_small_window_of_modulations_changes_nothing)
 {
     const SamplingPlan p = plan(Sampler::ddpm, 9, {3, 2});

@@ -211,6 +211,25 @@ TEST(kernel_step_renoise, mixes_the_state_with_noise_in_place)
     }
 }
 
+TEST(kernel_step_hold, puts_known_tokens_back_and_leaves_the_others)
+{
+    for (auto [rows, cols] : {std::array{1u, 1u}, {24u, 64u}, {25u, 13u}}) {
+        KernelCase k(test_device());
+        const HostMatrix x = k.random(rows, cols, DType::f32), fixed = k.random(rows, cols, DType::f32);
+        std::vector<uint32_t> known(rows);
+        for (uint32_t r = 0; r < rows; ++r)
+            known[r] = r % 3 == 0;
+        const Tensor state = k.input(x);
+        step_hold(k.graph, k.input(known), k.input(fixed), state);
+        run(k);
+        const HostMatrix got = k.read(state);
+        for (uint32_t r = 0; r < rows; ++r)
+            for (uint32_t c = 0; c < cols; ++c)
+                ASSERT_EQ(got.at(r, c), known[r] ? fixed.at(r, c) : x.at(r, c));
+        k.expect_zero_padding(got);
+    }
+}
+
 struct UpdateCase {
     uint32_t rows, cols;
     bool guided;

@@ -63,6 +63,9 @@ Status Generation::resolve()
     s.repaint = preset.steps ? preset.repaint : d.repaint;
     s.repaint.jump_length = o.jump_length.value_or(s.repaint.jump_length);
     s.repaint.jump_n_sample = o.jump_n_sample.value_or(s.repaint.jump_n_sample);
+    s.repaint.known = d.repaint.known;
+    if (!o.known.empty())
+        s.repaint.known = o.known == "clean" ? KnownTokens::clean : KnownTokens::noised;
     s.regions = d.regions;
     s.regions.region_size = o.region_size.value_or(d.regions.region_size);
     s.regions.coverage_threshold =
@@ -230,7 +233,8 @@ Result<Json> Generation::settings_json(std::string_view command, uint64_t grid_h
                 {"strategy", options_.strategy},
                 {"first_cell", options_.first_cell},
                 {"jump_length", s.repaint.jump_length},
-                {"jump_n_sample", s.repaint.jump_n_sample}};
+                {"jump_n_sample", s.repaint.jump_n_sample},
+                {"known_tokens", s.repaint.known == KnownTokens::clean ? "clean" : "noised"}};
 }
 
 Json Generation::results_json() const
@@ -267,6 +271,8 @@ void add_generation_options(CLI::App& c, GenerationOptions& o)
     c.add_option("--preset", o.preset, "fast (20 steps), standard (50, RePaint 5/2), paper (250, RePaint 10/10, DDPM)");
     c.add_option("--jump-length", o.jump_length, "RePaint: steps of a jump back");
     c.add_option("--jump-n-sample", o.jump_n_sample, "RePaint: passes over each jump");
+    c.add_option("--known-tokens", o.known, "how the network sees cells that are there: as the model says, or")
+        ->check(CLI::IsMember({"noised", "clean"}));
     c.add_option("--batch", o.batch, "regions at a time; any value gives the same bytes")->check(CLI::Range(1u, 1024u));
     c.add_option("--region-size", o.region_size, "cells of a region");
     c.add_option("--coverage-threshold", o.coverage_threshold, "new cells that a region must have");

@@ -14,7 +14,7 @@ namespace semrover {
 
 // what generate, edit and inpaint share: a model, how it samples, how a grid is cut into regions
 struct GenerationOptions {
-    std::string model, sampler, preset, strategy = "complete", precision = "fp16", profile;
+    std::string model, sampler, preset, known, strategy = "complete", precision = "fp16", profile;
     std::optional<int> steps, region_size, coverage_threshold, jump_length, jump_n_sample;
     std::optional<float> cfg_scale;
     uint32_t batch = 0; // 0: what suits the device

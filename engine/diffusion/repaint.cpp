@@ -37,7 +37,7 @@ Result<RepaintPreset> repaint_preset(std::string_view name)
 
 Result<std::vector<int>> repaint_levels(int steps, const RepaintOptions& options)
 {
-    const auto [length, count] = options;
+    const int length = options.jump_length, count = options.jump_n_sample;
     if (steps < 1 || steps > kMaxInferenceSteps)
         return fail(ErrorCode::bad_input, "{} denoising steps, expected 1 to {}", steps, kMaxInferenceSteps);
     if (length < 0 || length > kMaxJump)
@@ -77,6 +77,7 @@ Result<SamplingPlan> plan_sampling(const SchedulerConfig& config, int steps, con
     plan.init_noise_sigma = schedule.init_noise_sigma;
     plan.clip = schedule.clip;
     plan.can_hold_known = schedule.can_hold_known();
+    plan.known = repaint.known;
     std::map<double, uint32_t> index_of; // of a timestep
     PlanRowKind before = PlanRowKind::step;
     for (size_t i = 0; i < levels.size(); ++i) {
@@ -87,6 +88,10 @@ Result<SamplingPlan> plan_sampling(const SchedulerConfig& config, int steps, con
             row.coefficients = undo_step(schedule.steps[at + 1], schedule.steps[at]);
         } else {
             row.coefficients = before == PlanRowKind::undo ? schedule.restarts[at] : schedule.steps[at];
+            if (repaint.known == KnownTokens::clean) {
+                row.coefficients.known_scale = 1;
+                row.coefficients.known_noise = 0;
+            }
             ++plan.evaluations;
         }
         before = row.kind;

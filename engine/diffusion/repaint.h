@@ -10,11 +10,18 @@
 
 namespace semrover {
 
+// how the network sees tokens that are given, at each step
+enum class KnownTokens {
+    noised, // with noise of the level that the others have, as in RePaint
+    clean,  // as they are: for a network that was trained to go on from such (tools/train, known_share)
+};
+
 // RePaint, arXiv 2201.09865: every jump_length steps, go back up jump_length steps by adding noise and come down again,
 // jump_n_sample times in all. jump_length 0 or jump_n_sample 1 never goes back.
 struct RepaintOptions {
     int jump_length = 0;   // 0..10000
     int jump_n_sample = 1; // 1..10000
+    KnownTokens known = KnownTokens::noised;
 };
 
 struct RepaintPreset {
@@ -52,7 +59,8 @@ struct SamplingPlan {
     size_t evaluations = 0;        // rows of kind step: how often the network runs
     double init_noise_sigma = 1;   // the first x is this times a standard normal
     double clip = Schedule::kNoClip;
-    bool can_hold_known = true; // false with euler
+    bool can_hold_known = true;              // false with euler
+    KnownTokens known = KnownTokens::noised; // clean: after rows of kind undo, too, known tokens take `fixed`
 };
 
 // The plan of `steps` denoising steps with RePaint's jumps over them. A jump moves along the schedule's own timesteps

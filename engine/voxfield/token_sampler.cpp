@@ -98,7 +98,10 @@ struct TokenSampler::Batch {
         s.add_tables(g, steps, table);
         const TokenContext c = context(g, s.transformer_, s.halves_);
         const Tensor known_rows = g.external(arena.slice(known), rows, 1, DType::u32, "known", 1);
-        step_renoise(g, steps, noise(g, s, steps, c, known_rows), state(g, s.transformer_, x, "x"));
+        const Tensor state_x = state(g, s.transformer_, x, "x");
+        step_renoise(g, steps, noise(g, s, steps, c, known_rows), state_x);
+        if (s.plan_.known == KnownTokens::clean)
+            step_hold(g, known_rows, state(g, s.transformer_, fixed, "fixed"), state_x);
         step_advance(g, steps.clock);
         return g;
     }

@@ -20,6 +20,7 @@ Status read_defaults(const Json& index, VoxfieldDefaults& d)
     fields.integer("coverage_threshold", 1, 4096, d.regions.coverage_threshold);
     fields.integer("jump_length", 0, 10000, d.repaint.jump_length);
     fields.integer("jump_n_sample", 1, 10000, d.repaint.jump_n_sample);
+    fields.choice("known_tokens", {{"noised", KnownTokens::noised}, {"clean", KnownTokens::clean}}, d.repaint.known);
     std::vector<std::string> others; // for other components
     return fields.finish(others);
 }

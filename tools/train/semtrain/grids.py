@@ -8,6 +8,7 @@ import numpy as np
 
 from . import safetensors_file
 from .json_file import read_json, write_json
+from .known_cells import draw_known
 
 
 def find_grids(sources):
@@ -86,7 +87,7 @@ class LocalSets:
         self.near = [np.array(grids.cells[a:b], np.float32) for a, b in zip(grids.offsets, grids.offsets[1:])]
 
     def batch(self, step):
-        """of one size: centers [B, N, 3] metres, labels [B, N], tokens [B, N, 6n]; fp32, i64, fp32 arrays"""
+        """of one size: centers [B, N, 3] metres, labels [B, N], tokens [B, N, 6n], known [B, N]; fp32, i64, fp32, bool"""
         c = self.config
         random = np.random.default_rng([c["seed"], step])
         size = int(random.integers(c["set_size"][0], c["set_size"][1] + 1))
@@ -95,7 +96,8 @@ class LocalSets:
         centers, labels, tokens = (np.stack(part) for part in zip(*sets))
         labels = labels.astype(np.int64)
         labels[random.random(c["batch"]) < c["label_dropout"]] = c["network"]["num_classes"]
-        return centers, labels, tokens
+        known = np.stack([draw_known(random, set_centers, c["known_share"]) for set_centers in centers])
+        return centers, labels, tokens, known
 
     def _set(self, random, size):
         g = int(random.integers(len(self.near)))

@@ -26,21 +26,42 @@ def weights_of(alphas, gamma):
     return 1 + torch.clamp(alphas / (1 - alphas), max=gamma)
 
 
+def noised(x0, alphas, t, random):
+    """x0 [B, N, C] at the noise levels t [B]"""
+    noise = torch.randn(x0.shape, generator=random).to(x0.device)
+    a = alphas[t][:, None, None]
+    return a.sqrt() * x0 + (1 - a).sqrt() * noise
+
+
+def with_known(noisy, x0, known, alphas, top, random):
+    """noisy, but cells that are known [B, N] have the noise of a level below `top` only: what was generated before is a
+    little worse than the truth"""
+    if not known.any():
+        return noisy
+    t = torch.randint(0, top, (len(x0),), generator=random).to(x0.device)
+    return torch.where(known[..., None], noised(x0, alphas, t, random), noisy)
+
+
+def mean_error(made, x0, target):
+    """squared error [B, N, 6n] of the cells that are targets [B, N] -> of places and of colours, [B] each"""
+    error = (made - x0).square().unflatten(2, (-1, 6))
+    of_sets = (error.mean(2) * target[..., None]).sum(1) / target.sum(1, keepdim=True)
+    return of_sets[:, :3].mean(1), of_sets[:, 3:].mean(1)
+
+
 def loss_of(sets, config):
     alphas, device = linear_alphas(config).to(config["device"]), config["device"]
-    weights = weights_of(alphas, config["snr_gamma"])
+    weights, of_colors = weights_of(alphas, config["snr_gamma"]), config["color_weight"]
 
     def loss(model, step):
-        centers, labels, x0 = (torch.from_numpy(a).to(device) for a in sets.batch(step))
+        centers, labels, x0, known = (torch.from_numpy(a).to(device) for a in sets.batch(step))
         random = generator(config, step)
         t = torch.randint(0, len(alphas), (len(x0),), generator=random).to(device)
-        noise = torch.randn(x0.shape, generator=random).to(device)
-        a = alphas[t][:, None, None]
-        noisy = a.sqrt() * x0 + (1 - a).sqrt() * noise
+        noisy = with_known(noised(x0, alphas, t, random), x0, known, alphas, config["known_levels"], random)
         valid = torch.ones(labels.shape, dtype=torch.bool, device=device)
-        error = (model(noisy, labels, centers, valid, t).float() - x0).square().unflatten(2, (-1, 6))
-        loss = (error.mean((1, 2, 3)) * weights[t]).mean()
-        return loss, {"places": float(error[..., :3].mean()), "colors": float(error[..., 3:].mean())}
+        places, colors = mean_error(model(noisy, labels, centers, valid, t).float(), x0, ~known)
+        loss = ((places + of_colors * colors) / (1 + of_colors) * weights[t]).mean()
+        return loss, {"places": float(places.mean()), "colors": float(colors.mean())}
     return loss
 
 

@@ -12,10 +12,12 @@ import torch
 
 import golden
 from recipe import run_recipe
-from semtrain import safetensors_file
+from semtrain import safetensors_file, settings
 from semtrain.grids import Grids, LocalSets, read_tokens
+from semtrain.known_cells import draw_known
 from semtrain.nets.transformer import CONFIG_FIELDS, VoxfieldTransformer
 from semtrain.program import semrover_path
+from semtrain.transformer import loss_of
 
 TINY = ["--set", 'network={"num_layers": 2, "num_attention_heads": 2, "attention_head_dim": 16, "points_per_voxel": 4,'
         ' "num_classes": 20, "voxel_size": 0.6, "attention_radius": 3.0, "pos_embed_dim": 8, "context_pos_embed": true}',
@@ -79,9 +81,11 @@ class TheRecipe(unittest.TestCase):
 
     def test_draws_sets_of_neighbours_and_drops_the_labels_of_some(self):
         config = {"seed": 3, "set_size": [8, 12], "batch": 64, "label_dropout": 0.25, "class_balance": 0.5,
-                  "mirror": False, "ordered_points": True, "network": {"num_classes": 20, "voxel_size": 0.6}}
+                  "mirror": False, "ordered_points": True, "known_share": 0,
+                  "network": {"num_classes": 20, "voxel_size": 0.6}}
         sets = LocalSets(Grids([self.grid], self.path("cache")), config)
-        centers, labels, tokens = sets.batch(5)
+        centers, labels, tokens, known = sets.batch(5)
+        self.assertFalse(known.any())
         self.assertEqual(tokens.shape, labels.shape + (24,))
         dropped = (labels == 20).all(1)
         self.assertTrue(5 < dropped.sum() < 30, dropped.sum())
@@ -89,6 +93,44 @@ class TheRecipe(unittest.TestCase):
         self.assertLess(np.linalg.norm(centers - centers.mean(1, keepdims=True), axis=-1).max(), 3)
         again = sets.batch(5)
         self.assertTrue((again[2] == tokens).all())
+
+    def test_gives_a_part_of_some_sets_and_leaves_it_out_of_the_loss(self):
+        words = ["-o", self.path("unused"), "--config", "small", *TINY, "--set", "set_size=[20,20]", "--set", "batch=64",
+                 "--set", "known_share=0.5", "--set", "snr_gamma=0"]
+        config = settings.resolve("transformer", settings.parser("transformer", "").parse_args(words))
+        sets = LocalSets(Grids([self.grid], self.path("cache")), config)
+        known = sets.batch(1)[3]
+        shares = known.mean(1)
+        self.assertTrue(20 < (shares > 0).sum() < 44, shares)
+        self.assertTrue((shares < 1).all())
+        seen = []
+
+        def blank(noisy, labels, centers, valid, t):
+            seen.append((noisy, t))
+            return torch.zeros_like(noisy)
+
+        tokens = torch.from_numpy(sets.batch(1)[2])
+        loss, about = loss_of(sets, config)(blank, 1)
+        squares = torch.stack([row[~given].square().unflatten(1, (-1, 6)).mean((0, 1)) for row, given in
+                               zip(tokens, torch.from_numpy(known))]).mean(0)
+        self.assertAlmostEqual(about["places"], float(squares[:3].mean()), 5)
+        self.assertAlmostEqual(about["colors"], float(squares[3:].mean()), 5)
+        noisy, t = seen[0]
+        late = (t > 500)[:, None] & torch.from_numpy(known)  # by then others are mostly noise
+        self.assertTrue(late.any())
+        self.assertLess(float((noisy - tokens)[late].square().mean()), 0.03)
+        self.assertGreater(float((noisy - tokens)[(t > 500)[:, None] & ~torch.from_numpy(known)].square().mean()), 0.5)
+
+    def test_gives_one_side_of_a_plane_or_what_is_outside_of_a_ball(self):
+        cells = np.stack(np.meshgrid(*[np.arange(6.0)] * 3), -1).reshape(-1, 3)
+        random, touching = np.random.default_rng(1), []
+        for _ in range(50):
+            known = draw_known(random, cells, 1)
+            self.assertTrue(0.05 < known.mean() < 0.95)
+            near = np.abs(cells[:, None] - cells[None]).sum(-1) == 1
+            touching.append((near & (known[:, None] == known)).sum() / near.sum())
+        self.assertGreater(np.mean(touching), 0.7)  # half of them, if cells were drawn one by one
+        self.assertFalse(draw_known(random, cells, 0).any())
 
     def test_learns_and_goes_on_where_it_stopped(self):
         train(self.grid, self.path("whole"), 30)

@@ -20,7 +20,8 @@ def sinusoids(x, width, max_period=10000.0):
 
 
 def layer_norm(x):
-    return F.layer_norm(x, x.shape[-1:], eps=1e-6)
+    """in fp32: on CPUs PyTorch's own takes ten times as long in bf16"""
+    return F.layer_norm(x.float(), x.shape[-1:], eps=1e-6)
 
 
 class Attention(nn.Module):
@@ -48,7 +49,10 @@ class Attention(nn.Module):
 
 def gelu_tanh(x):
     """x (1 + tanh(sqrt(2/pi) (x + 0.044715 x^3))) / 2 by a sigmoid of twice the argument: on CPUs PyTorch's own takes
-    ten times as long in bf16"""
+    ten times as long in bf16. There the exact GELU stands in for it: 5e-4 apart at most, less than bf16 rounds by where
+    that is felt, and a quarter of a step is saved"""
+    if x.dtype == torch.bfloat16 and x.device.type == "cpu":
+        return F.gelu(x)
     return x * torch.sigmoid(x * (1.5957691216057308 + 0.07135481282636 * x * x))
 
 
