@@ -8,7 +8,7 @@ def draw_known(random, cells, share):
     """cells [N, 3] -> bool [N]: in `share` of the sets those on one side of a plane or, in every third of these, those
     outside of a ball; a tenth of the set at least and nine tenths at most. In the others none."""
     known = np.zeros(len(cells), bool)
-    if share <= 0 or random.random() >= share:
+    if random.random() >= share:
         return known
     if random.random() < 1 / 3:
         distance = np.linalg.norm(cells - cells[random.integers(len(cells))], axis=1)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""Trains the Σ-Voxfield transformer (spec: method.md §2): x0-prediction, L2, sets of 50 to 150 cells, labels dropped in
-one set of ten."""
+"""Trains the Σ-Voxfield transformer (spec: method.md §2): x0-prediction, L2, sets of neighbouring cells, of which a part
+may be known; labels dropped in one set of ten."""
 import os
 
 import torch
