@@ -217,62 +217,6 @@ struct FlashAttentionOptions {
                                      Tensor kv, // [(batch *) key_rows, ..] with keys and values; may be q itself
                                      const FlashAttentionOptions& options); // [batch * query_rows, heads * head_dim]
 
-// -- sampling: one table of steps, one clock, the same commands for every step
-// -------------------------------------------
-
-// the state x, predictions and noise are fp32 matrices [M, N] with equal row lengths
-struct StepTable {
-    Tensor rows;  // [R, 16] words: StepRow (shaders/lib/step_row.h)
-    Tensor clock; // [2] u32: StepClock
-};
-constexpr uint32_t kNoiseChannels = 4096; // of a token, at most: ten bits of the noise counter, four channels each
-
-// clock.row += 1
-void step_advance(Graph& g, Tensor clock);
-
-// table_row[r] = row of the modulation table for the current step's timestep
-void step_timestep(Graph& g, StepTable steps, Tensor table_row); // [rows] u32
-
-// y[r] = in_scale x[r mod rows of x]
-[[nodiscard]] Tensor step_input(Graph& g, StepTable steps, Tensor x, uint32_t rows, DType dtype); // [M, N] -> [rows, N]
-
-// standard normals keyed by (seed, cell, draw, known or not, channel), Philox4x32-10
-[[nodiscard]] Tensor step_noise(Graph& g, StepTable steps,
-                                Tensor cells,                  // [M, 4] i32 array
-                                Tensor known,                  // [M] u32
-                                uint32_t cols, uint64_t seed); // -> [M, cols]
-
-// x' = c_x x + c_z z
-void step_renoise(Graph& g, StepTable steps, Tensor z, Tensor x);
-
-// x = fixed where a token is known
-void step_hold(Graph& g,
-               Tensor known,            // [M] u32
-               Tensor fixed, Tensor x); // [M, N] fp32; x in place
-
-// guidance, prediction, next state; known tokens are put back at the level of the next state
-void step_update(Graph& g, StepTable steps,
-                 Tensor m,     // [M, N], or [2M, N] conditional then unconditional: network output
-                 Tensor z,     // [M, N]
-                 Tensor known, // [M] u32
-                 Tensor fixed, // [M, N] tokens of the known rows
-                 Tensor x,     // [M, N], in place
-                 Tensor x0,    // [M, N], in place: previous prediction, then this one
-                 float guidance, float clip);
-
-// what a deferred renderer's network sees beside the state x, [M, C]: pixels of one frame, at the size of its latent
-struct RendererFrame {
-    Tensor previous; // [M, C] fp32: latent of the frame before, with noise
-    Tensor buffer;   // [M, C] fp32: latent of the splat buffer
-    Tensor visible;  // [M, 1] fp32: share of the pixel that the splats cover
-};
-
-// y = [in_scale x, previous, buffer, visible]; with two halves [in_scale x, 0, buffer, 0] follows, for guidance
-[[nodiscard]] Tensor renderer_input(Graph& g, StepTable steps,
-                                    Tensor x, // [M, C] fp32
-                                    const RendererFrame& frame, uint32_t halves,
-                                    DType dtype); // of y: [halves * M, 3C + 1]
-
 // -- splats -----------------------------------------------------------------------------------------------------------
 
 // y[i] = value

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // y = [in_scale x, previous, buffer, visible], then, with two halves, [in_scale x, 0, buffer, 0]: -> [halves * M, 3C +
 // 1]
-#include "kernels/kernels.h"
+#include "kernels/sampling.h"
 
 #include "renderer_input.spv.h"
 #include "shaders/renderer_input.h"

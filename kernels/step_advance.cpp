@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // clock.row += 1
-#include "kernels/kernels.h"
+#include "kernels/sampling.h"
 
 #include "step_advance.spv.h"
 

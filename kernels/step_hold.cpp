@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // x = fixed where known: [M, N], in place
-#include "kernels/kernels.h"
+#include "kernels/sampling.h"
 
 #include "shaders/step_hold.h"
 #include "step_hold.spv.h"

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // y[r] = in_scale x[r mod x_rows]: [R, N] -> [rows, N]
-#include "kernels/kernels.h"
+#include "kernels/sampling.h"
 
 #include "shaders/step_input.h"
 #include "step_input.spv.h"

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // z = normals of Philox4x32-10, key (seed), counter (cell, draw | stream | channel / 4): -> [M, N]
-#include "kernels/kernels.h"
+#include "kernels/sampling.h"
 
 #include "shaders/step_noise.h"
 #include "step_noise.spv.h"

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // x' = c_x x + c_z z: [M, N], in place
-#include "kernels/kernels.h"
+#include "kernels/sampling.h"
 
 #include "shaders/step_renoise.h"
 #include "step_renoise.spv.h"

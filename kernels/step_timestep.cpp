@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // table_row[r] = steps[clock.row].timestep_index - clock.first_timestep: -> [rows]
-#include "kernels/kernels.h"
+#include "kernels/sampling.h"
 
 #include "shaders/step_timestep.h"
 #include "step_timestep.spv.h"

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // m = u + guidance (c - u);  x0 = clamp(x0_x x + x0_m m, -clip, clip)
 // x' = c_x0 x0 + c_x x + c_m m + c_prev x0_prev + c_z z;  known tokens: x' = known_scale fixed + known_noise z
-#include "kernels/kernels.h"
+#include "kernels/sampling.h"
 
 #include "shaders/step_update.h"
 #include "step_update.spv.h"

@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+#include "kernels/sampling.h"
 #include "shaders/lib/step_row.h"
 #include "tests/kernel_case.h"
 

@@ -3,7 +3,7 @@
 // golden kinds scheduler, repaint_timesteps and region_extraction
 #include "engine/diffusion/repaint.h"
 #include "engine/voxfield/regions.h"
-#include "kernels/kernels.h"
+#include "kernels/sampling.h"
 #include "runtime/program.h"
 #include "shaders/lib/step_row.h"
 #include "tools/golden_case.h"

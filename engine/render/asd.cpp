@@ -3,6 +3,7 @@
 #include "engine/render/asd.h"
 
 #include "engine/diffusion/step_rows.h"
+#include "kernels/sampling.h"
 
 #include <algorithm>
 #include <deque>

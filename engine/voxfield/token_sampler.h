@@ -4,6 +4,7 @@
 
 #include "engine/diffusion/repaint.h"
 #include "engine/voxfield/transformer.h"
+#include "kernels/sampling.h"
 #include "runtime/program.h"
 
 #include <functional>
