@@ -267,6 +267,35 @@ TEST_F(CliRefine, splats_are_as_wide_as_the_model_says_unless_the_option_says_ot
     EXPECT_TRUE(narrow == refined("overruled", drive + "--splat-radius 0.04", "street.sgrid"));
 }
 
+TEST_F(CliRefine, noise_stays_on_surfaces_where_the_model_or_the_option_says_so)
+{
+    ASSERT_TRUE(write_grid(folder_ / "street.sgrid", street()));
+    folder_.put("path.tum", "0 0 3.6 1.6 -0.5 0.5 -0.5 0.5\n1 0.5 3.6 1.6 -0.5 0.5 -0.5 0.5\n"
+                            "2 1 3.6 1.6 -0.5 0.5 -0.5 0.5\n");
+    const std::string drive = " --path " + path("path.tum") + " -W 56 -H 40 ", warped = "--frame-noise warped ";
+    const auto fresh = refined("fresh", drive, "street.sgrid");
+    const auto whole = refined("whole", drive + warped, "street.sgrid");
+    EXPECT_TRUE(fresh.at("latents/000000.safetensors") == whole.at("latents/000000.safetensors"));
+    EXPECT_FALSE(fresh.at("latents/000001.safetensors") == whole.at("latents/000001.safetensors"));
+    EXPECT_EQ(Json::parse(contents(folder_ / "whole" / "run.json"))["settings"]["frame_noise"], "warped");
+    // from buffers, from a frame on, and after a kill it is the same
+    const std::string buffers = "whole/buffers";
+    EXPECT_TRUE(whole == refined("again", drive + warped, buffers));
+    const auto last = refined("last", drive + warped + "--frames 2: --from " + path("whole"), buffers);
+    EXPECT_TRUE(last.at("latents/000002.safetensors") == whole.at("latents/000002.safetensors"));
+    ASSERT_EQ(stop_after("killed", 3, SIGKILL, drive + warped, buffers), 128 + SIGKILL);
+    EXPECT_TRUE(whole == refined("killed", drive + warped, buffers));
+    // a model that asks for it, with cameras and without
+    folder_.put("model/model_index.json", R"({"defaults": {"renderer": {"frame_noise": "warped"}}})");
+    EXPECT_TRUE(whole == refined("said", drive, buffers));
+    EXPECT_TRUE(fresh == refined("overruled", drive + "--frame-noise fresh", buffers));
+    const ProgramResult without =
+        semrover_program("refine " + path(buffers) + " -m " + path("model") + " -o " + path("without") + kSettings);
+    EXPECT_EQ(without.code, 0);
+    EXPECT_NE(without.err.find("without --path the noise does not stay on surfaces"), std::string::npos) << without.err;
+    EXPECT_TRUE(fresh == results("without"));
+}
+
 // ---- bad input: one line, the exit code, nothing left behind
 
 class CliRefineRefuses : public CliRefine {
@@ -353,6 +382,7 @@ TEST_F(CliRefineRefuses, outputs_devices_and_options_that_cannot_be)
 {
     const std::string line = arguments("out");
     expect_refusal("refine " + path("in") + " -m " + path("model"), 2, "-o/--output is required");
+    expect_refusal(line + "--frame-noise warped", 2, "--path");
     expect_refusal(line + "--frames 2:1", 2, "--frames 2:1");
     expect_refusal(line + "--frames 0:3", 2, "--frames 0:3 is not within 0:2");
     expect_refusal(line + "--frames two", 2, "FIRST:LAST");

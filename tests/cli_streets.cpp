@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <gtest/gtest.h>
+#include <numeric>
 
 namespace semrover {
 namespace {
@@ -63,6 +64,33 @@ TEST(CliStreets, a_street_comes_with_mesh_grids_drive_and_pictures_that_agree)
         }
         EXPECT_GT(road, 100u);
     }
+}
+
+double mean_level(const Path& picture)
+{
+    const auto image = read_png_rgb8(picture);
+    EXPECT_TRUE(image);
+    return image ? std::accumulate(image->pixels.begin(), image->pixels.end(), 0.0) / double(image->pixels.size()) : 0;
+}
+
+TEST(CliStreets, the_sun_stands_where_it_is_asked_to)
+{
+    const ScratchFolder folder;
+    const std::string common = "--seed 5 --no-grids --images --samples 1 --ambient-rays 1 -W 48 -H 32 --sun-elevation ";
+    const std::vector<std::string> skies = {"60 --sun-azimuth 180", "4 --sun-azimuth 180", "60 --sun-azimuth 0",
+                                            "60 --sun-azimuth 180 --clouds 1"};
+    std::vector<double> levels;
+    for (const std::string& sky : skies) {
+        const Path out = folder / std::to_string(levels.size());
+        const ProgramResult result = streets(out, common + sky);
+        ASSERT_EQ(result.code, 0) << result.err;
+        levels.push_back(mean_level(out / "color/000000.png"));
+    }
+    EXPECT_GT(levels[0], levels[1] * 1.1);  // a low sun is weak and throws shade on the road
+    EXPECT_GT(levels[0], levels[2] * 1.01); // from behind it lights what the camera sees
+    EXPECT_NE(levels[0], levels[3]);
+    EXPECT_EQ(streets(folder / "x", "--sun-elevation 95").code, 2);
+    EXPECT_EQ(streets(folder / "x", "--clouds 1.5").code, 2);
 }
 
 TEST(CliStreets, the_same_seed_gives_the_same_files)

@@ -126,6 +126,23 @@ TEST(engine_asd, frames_chains_seeds_and_what_came_before_change_the_latent)
     EXPECT_EQ(base, render(*renderer(quiet), 3, Latent(base.size(), 0.f)));
 }
 
+TEST(engine_asd, noise_follows_its_keys)
+{
+    const auto r = renderer();
+    const Latent before = render(*r, 2);
+    const Scene scene(3);
+    std::vector<NoiseKey> keys(kSize.pixels());
+    const auto with_keys = [&](uint32_t number) {
+        return *r->render({number, 0, scene.buffer, scene.visible, before, keys});
+    };
+    for (uint32_t i = 0; i < keys.size(); ++i)
+        keys[i] = {i, 3};
+    EXPECT_EQ(with_keys(3), render(*r, 3, before)); // each pixel its own
+    EXPECT_EQ(with_keys(4), render(*r, 3, before)); // nothing else of a frame decides its noise
+    std::swap(keys[0], keys[20]);
+    EXPECT_NE(with_keys(3), render(*r, 3, before));
+}
+
 TEST(engine_asd, guidance_of_one_is_the_conditional_half_alone)
 {
     // just above 1 both halves run, and the unconditional one counts for nearly nothing

@@ -35,7 +35,8 @@ TEST(RendererModel, a_folder_gives_configs_scheduler_text_and_defaults)
         folder / "model_index.json",
         {{"_class_name", "SemRoverPipeline"},
          {"defaults",
-          {{"num_inference_steps", 99}, {"renderer", {{"num_inference_steps", 7}, {"previous_noise", 0.5}}}}}}));
+          {{"num_inference_steps", 99},
+           {"renderer", {{"num_inference_steps", 7}, {"previous_noise", 0.5}, {"frame_noise", "warped"}}}}}}));
     const auto m = RendererModel::open(folder.path());
     ASSERT_TRUE(m) << m.error().message;
     EXPECT_EQ(m->warnings, std::vector<std::string>());
@@ -48,6 +49,7 @@ TEST(RendererModel, a_folder_gives_configs_scheduler_text_and_defaults)
     EXPECT_EQ(m->defaults.num_inference_steps, 7);
     EXPECT_EQ(m->defaults.guidance_scale, 1.5f);
     EXPECT_EQ(m->defaults.previous_noise, 0.5f);
+    EXPECT_EQ(m->defaults.frame_noise, FrameNoise::warped);
     EXPECT_EQ(m->defaults.splat_radius, 0.04f);
     EXPECT_TRUE(m->open_unet()->require(unet_schema(m->unet)));
     EXPECT_TRUE(m->open_vae()->require(vae_schema(m->vae)));

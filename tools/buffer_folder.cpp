@@ -155,6 +155,16 @@ Result<BufferFrame> read_buffer(const BufferCamera& camera, uint32_t frame)
     return b;
 }
 
+Result<ImageGray16> read_depth(const BufferCamera& camera, uint32_t frame)
+{
+    const Path path = frame_path(camera.folder, "depth", frame);
+    SR_TRY(ImageGray16 depth, read_png_gray16(path));
+    if (ImageSize{depth.width, depth.height} != camera.size)
+        return fail(ErrorCode::bad_input, "{} is {} x {} pixels, the frames of its camera are {} x {}",
+                    quote_path(path), depth.width, depth.height, camera.size.width, camera.size.height);
+    return depth;
+}
+
 Result<std::vector<uint8_t>> read_label_picture(const BufferCamera& camera, uint32_t frame)
 {
     const Path path = frame_path(camera.folder, "label", frame);
@@ -168,6 +178,16 @@ Result<std::vector<uint8_t>> read_label_picture(const BufferCamera& camera, uint
         std::ranges::copy(color, &labels.pixels[i]);
     }
     return std::move(labels.pixels);
+}
+
+Result<uint64_t> hash_depth(const BufferCamera& camera, uint32_t last)
+{
+    Hash hash;
+    for (uint32_t i = 0; i <= last; ++i) {
+        SR_TRY(const MappedFile file, MappedFile::open(frame_path(camera.folder, "depth", i)));
+        hash.add(file.bytes());
+    }
+    return hash.value();
 }
 
 Result<uint64_t> hash_buffers(const BufferCamera& camera, uint32_t first, uint32_t last)

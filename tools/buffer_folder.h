@@ -36,8 +36,14 @@ Status check_against_path(std::span<const BufferCamera> cameras, const CameraPat
 
 Result<BufferFrame> read_buffer(const BufferCamera& camera, uint32_t frame);
 
+// millimetres; bad_input where it is not there or has another size
+Result<ImageGray16> read_depth(const BufferCamera& camera, uint32_t frame);
+
 // label colours, black where there is nothing: [height, width, 3]
 Result<std::vector<uint8_t>> read_label_picture(const BufferCamera& camera, uint32_t frame);
+
+// hash of the depth of all frames up to `last`
+Result<uint64_t> hash_depth(const BufferCamera& camera, uint32_t last);
 
 // hash of the files of frames [first, last]
 Result<uint64_t> hash_buffers(const BufferCamera& camera, uint32_t first, uint32_t last);

@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 
 struct Options {
     std::string input, model, output, sampler, precision = "fp16", frames, from, format = "png", profile;
-    std::string video, side_by_side;
+    std::string video, side_by_side, frame_noise;
     std::optional<int> steps;
     std::optional<float> cfg_scale, previous_noise;
     uint64_t seed = 0;
@@ -43,6 +43,7 @@ struct Job {
     SamplingPlan plan;
     int steps = 0;
     AsdOptions asd;
+    FrameNoise frame_noise = FrameNoise::fresh;
     float visible_alpha = 0.5f;
     std::string splat_radius; // as the option takes it
     CameraPath path;          // where one was given
@@ -139,6 +140,31 @@ Status find_chains(Job& j)
     return {};
 }
 
+// Noise stays on surfaces where it is known where the cameras were: a model that asks for it gets fresh noise without a
+// path, an option is refused
+Status find_motion(Job& j)
+{
+    const Options& o = j.options;
+    j.frame_noise = j.model.defaults.frame_noise;
+    if (!o.frame_noise.empty())
+        j.frame_noise = o.frame_noise == "warped" ? FrameNoise::warped : FrameNoise::fresh;
+    if (j.frame_noise == FrameNoise::fresh)
+        return {};
+    if (o.drive.path.empty()) {
+        if (!o.frame_noise.empty())
+            return fail(ErrorCode::usage, "--frame-noise warped needs the cameras of the buffers: --path");
+        j.frame_noise = FrameNoise::fresh;
+        if (!j.globals.quiet)
+            fmt::print(stderr, "semrover: warning: without --path the noise does not stay on surfaces, as this model "
+                               "wants it: frames will flicker more\n");
+        return {};
+    }
+    for (RefineChain& c : j.chains)
+        std::ranges::copy_if(j.path.frames, std::back_inserter(c.cameras),
+                             [&](const CameraFrame& f) { return f.camera == c.camera.name; });
+    return {};
+}
+
 // what the buffers come from
 Result<Json> input_json(const Job& j)
 {
@@ -159,13 +185,18 @@ Result<Json> input_json(const Job& j)
             SR_TRY(const uint64_t hash, hash_buffers(c.camera, c.range.first, c.range.last));
             camera["buffers"] = hash_text(hash);
         }
+        if (!o.from_grid() && j.frame_noise == FrameNoise::warped) {
+            SR_TRY(const uint64_t hash, hash_depth(c.camera, c.range.last));
+            camera["depth"] = hash_text(hash);
+        }
     }
     Json input{{"cameras", cameras}};
+    if (o.from_grid() || j.frame_noise == FrameNoise::warped)
+        input["path"] = hash_text(hash_cameras(j.path)); // as read, whatever files and options it came from
     if (!o.from_grid())
         return input;
     SR_TRY(const uint64_t grid, hash_file(o.input));
     input["grid"] = hash_text(grid);
-    input["path"] = hash_text(hash_cameras(j.path)); // as read, whatever files and options it came from
     input["drive"] = {{"splat_radius", j.splat_radius},
                       {"opacity", o.drive.opacity},
                       {"visible_alpha", j.visible_alpha},
@@ -190,6 +221,7 @@ Result<Json> settings_json(const Job& j)
                 {"steps", j.steps},
                 {"guidance_scale", j.asd.guidance_scale},
                 {"previous_noise", j.asd.previous_noise},
+                {"frame_noise", j.frame_noise == FrameNoise::warped ? "warped" : "fresh"},
                 {"seed", o.seed},
                 {"format", o.format},
                 {"quality", o.format == "jpeg" ? o.quality : 0}};
@@ -373,12 +405,13 @@ Status refine_in(Job& j, RunFolder& run)
 
 Status refine(const Options& o, const Globals& globals)
 {
-    Job j{o, globals, {}, {}, 0, {}, 0.5f, {}, {}, {}, 0, {}};
+    Job j{o, globals, {}, {}, 0, {}, {}, 0.5f, {}, {}, {}, 0, {}};
     if (o.output.empty() && !o.dry_run)
         return fail(ErrorCode::usage, "-o/--output is required");
     SR_CHECK(check_drive(o.drive));
     SR_CHECK(resolve_model(j));
     SR_CHECK(find_chains(j));
+    SR_CHECK(find_motion(j));
     if (!o.dry_run)
         SR_CHECK(check_outputs(j));
     SR_TRY(j.device, open_device(globals));
@@ -414,6 +447,9 @@ void add_options(CLI::App* c, Options& o)
     c->add_option("--cfg-scale", o.cfg_scale, "guidance towards the previous frame and what is visible; 1: none");
     c->add_option("--sampler", o.sampler, "ddim or dpm++2m")->check(CLI::IsMember({"ddim", "dpm++2m"}));
     c->add_option("--previous-noise", o.previous_noise, "noise on the previous frame's latent");
+    c->add_option("--frame-noise", o.frame_noise,
+                  "of a frame: fresh, or warped, as it was on the surfaces of the frame before (wants --path)")
+        ->check(CLI::IsMember({"fresh", "warped"}));
     c->add_option("--precision", o.precision, "storage of weights and activations")
         ->check(CLI::IsMember({"fp16", "fp32"}));
     c->add_option("--frames", o.frames, "FIRST:LAST, both included, either may be left out; FIRST is a first frame");

@@ -63,7 +63,24 @@ struct Refiner::Session {
     RendererWork run_work;
     const Device& device;
     const Globals& globals;
+    const RefineChain* trail_of = nullptr;
+    std::optional<NoiseTrail> trail; // of that chain
 
+    // noise of a frame, followed from the camera's first frame on, whichever frames are refined
+    Result<std::span<const NoiseKey>> keys(const RefineChain& c, uint32_t frame)
+    {
+        if (c.cameras.empty())
+            return std::span<const NoiseKey>{};
+        if (trail_of != &c || trail->frames() > frame + 1) {
+            trail.emplace(c.size);
+            trail_of = &c;
+        }
+        while (trail->frames() <= frame) {
+            SR_TRY(const ImageGray16 depth, read_depth(c.camera, trail->frames()));
+            trail->follow(c.cameras[trail->frames()], depth);
+        }
+        return trail->keys();
+    }
     Result<std::vector<float>> encode(const RefineChain& c, uint32_t frame, const BufferFrame& buffer)
     {
         if (store.has(PieceKind::encoded, c.camera, frame))
@@ -79,7 +96,8 @@ struct Refiner::Session {
         if (frame > c.range.first) {
             SR_TRY(previous, store.load_latent(PieceKind::latent, c.camera, frame - 1, c.size));
         }
-        const AsdFrame input{frame, chain_key(c.camera.name), latent, visible, previous};
+        SR_TRY(const std::span<const NoiseKey> noise, keys(c, frame));
+        const AsdFrame input{frame, chain_key(c.camera.name), latent, visible, previous, noise};
         SR_TRY(const std::vector<float> result, of_frame(c, frame, renderer.denoise(input, step)));
         return store.save_latent(PieceKind::latent, c.camera, frame, c.size, result);
     }
@@ -178,7 +196,7 @@ struct Refiner::Session {
 Status Refiner::run(FrameRenderer& renderer, RefineStore& store, MemoryPolicy policy, size_t steps,
                     const Device& device, const Globals& globals)
 {
-    Session s{renderer, store, chains_, work_, total(), device, globals};
+    Session s{renderer, store, chains_, work_, total(), device, globals, nullptr, {}};
     if (policy == MemoryPolicy::resident)
         return s.denoise_all(steps, latents_, true);
     SR_CHECK(s.encode_all());

@@ -20,7 +20,8 @@ struct RefineChain {
     BufferCamera camera;
     FrameRange range;
     LatentSize size;
-    std::vector<float> before; // latent of frame range.first - 1; empty: the first frame has none before it
+    std::vector<float> before;        // latent of frame range.first - 1; empty: the first frame has none before it
+    std::vector<CameraFrame> cameras; // of all frames, for noise that stays on surfaces; empty: each frame has its own
 };
 
 // noise key of a camera, from its name: the same whichever cameras are refined beside it

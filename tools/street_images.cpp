@@ -5,6 +5,7 @@
 #include "tools/progress.h"
 
 #include <cmath>
+#include <numbers>
 
 namespace semrover {
 
@@ -13,6 +14,18 @@ namespace {
 constexpr double kReach = 260;          // metres that a picture shows
 constexpr size_t kWholeScene = 1500000; // faces up to which the street is traced in one piece
 constexpr double kStretch = 80;         // metres of drive that share a piece of a longer one
+
+Daylight daylight(const StreetImages& images, uint64_t seed)
+{
+    constexpr double kDegree = std::numbers::pi / 180;
+    Daylight d = daylight_of_seed(seed);
+    if (images.sun_azimuth)
+        d.sun_azimuth = *images.sun_azimuth * kDegree;
+    if (images.sun_elevation)
+        d.sun_elevation = *images.sun_elevation * kDegree;
+    d.cloud_cover = images.cloud_cover.value_or(d.cloud_cover);
+    return d;
+}
 
 double apart(const CameraFrame& a, const CameraFrame& b)
 {
@@ -38,7 +51,7 @@ Status draw_street(Device& device, const Street& street, const CameraPath& path,
                    const StreetImages& images, const Path& folder, const Globals& globals)
 {
     Progress progress(progress_to_stderr(globals), "trace", "frames", path.frames.size());
-    const Daylight light = daylight_of_seed(seed);
+    const Daylight light = daylight(images, seed);
     const ShadeOptions options{
         .width = images.width, .height = images.height, .samples = images.samples, .ambient_rays = images.ambient_rays};
     const bool whole = street.mesh.faces.size() <= kWholeScene;

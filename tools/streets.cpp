@@ -141,6 +141,13 @@ void add_streets(CLI::App& app, const Globals& globals, Run& run)
     c->add_option("--samples", o->images.samples, "rays a pixel")->check(CLI::Range(1u, 256u));
     c->add_option("--ambient-rays", o->images.ambient_rays, "rays for the light from around, a sample")
         ->check(CLI::Range(1u, 64u));
+    c->add_option(
+         "--sun-azimuth", o->images.sun_azimuth,
+         "where the sun stands, degrees to the left of the street's direction; the sky is the seed's otherwise")
+        ->check(CLI::Range(-360.0, 360.0));
+    c->add_option("--sun-elevation", o->images.sun_elevation, "degrees above the horizon")
+        ->check(CLI::Range(1.0, 90.0));
+    c->add_option("--clouds", o->images.cloud_cover, "share of the sky that they cover")->check(CLI::Range(0.0, 1.0));
     c->add_option("-W,--width", o->images.width, "pixels")->check(CLI::Range(1u, 4096u));
     c->add_option("-H,--height", o->images.height, "pixels")->check(CLI::Range(1u, 4096u));
     c->add_option("--fov-x", o->fov, "horizontal field of view in degrees")->check(CLI::Range(1.0, 170.0));

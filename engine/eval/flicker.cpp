@@ -56,11 +56,6 @@ double inverse_depth(const Taps& taps, const ImageGray16& depth, const FlowOptio
     return sum;
 }
 
-double depth_of(const Lens& lens, const Point3& p)
-{
-    return lens.radial_depth() ? std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) : p[2];
-}
-
 } // namespace
 
 Flow flow_between(const CameraFrame& from, const ImageGray16& from_depth, const CameraFrame& to,
@@ -80,15 +75,15 @@ Flow flow_between(const CameraFrame& from, const ImageGray16& from_depth, const 
             continue;
         ++flow.with_depth;
         const std::optional<Point3> ray = to_lens.ray(double(i % width) + 0.5, double(i / width) + 0.5);
-        if (!ray || !(depth_of(to_lens, *ray) > 0))
+        if (!ray || !(to_lens.depth(*ray) > 0))
             continue;
-        const double far = depth / depth_of(to_lens, *ray);
+        const double far = depth / to_lens.depth(*ray);
         const Point3 point = transform(move, {(*ray)[0] * far, (*ray)[1] * far, (*ray)[2] * far});
         const std::optional<Projection> seen = from_lens.project(point);
         if (!seen)
             continue;
         const auto taps = taps_at(seen->x, seen->y, from_depth.width, from_depth.height);
-        if (taps && std::abs(depth_of(from_lens, point) * inverse_depth(*taps, from_depth, o) - 1) <= o.tolerance)
+        if (taps && std::abs(from_lens.depth(point) * inverse_depth(*taps, from_depth, o) - 1) <= o.tolerance)
             flow.sources[i] = {seen->x, seen->y};
     }
     return flow;

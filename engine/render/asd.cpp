@@ -235,15 +235,17 @@ Status AsdRenderer::upload(const AsdFrame& frame)
     const Memory& m = *memory_;
     const size_t values = size_t(m.pixels) * m.channels;
     SR_ASSERT(frame.buffer.size() == values && frame.visible.size() == m.pixels &&
-                  (frame.previous.empty() || frame.previous.size() == values),
+                  (frame.previous.empty() || frame.previous.size() == values) &&
+                  (frame.keys.empty() || frame.keys.size() == m.pixels),
               "a frame of {} values for {} pixels", frame.buffer.size(), m.pixels);
     const auto write = [&](uint32_t id, const auto& array) {
         return device_.write(m.arena.slice(id), std::as_bytes(std::span(array)));
     };
     std::vector<int32_t> cells(m.rows * 4ull, 0);
     for (uint32_t r = 0; r < m.rows; ++r) {
-        cells[4 * r] = int32_t(r);
-        cells[4 * r + 1] = int32_t(frame.number);
+        const NoiseKey key = r < frame.keys.size() ? frame.keys[r] : NoiseKey{r, frame.number};
+        cells[4 * r] = int32_t(key.pixel);
+        cells[4 * r + 1] = int32_t(key.frame);
         cells[4 * r + 2] = int32_t(frame.chain);
     }
     std::vector<float> visible(frame.visible.begin(), frame.visible.end());

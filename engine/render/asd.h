@@ -4,6 +4,7 @@
 
 #include "engine/diffusion/repaint.h"
 #include "engine/render/latent_codec.h"
+#include "engine/render/noise_trail.h"
 #include "engine/render/unet.h"
 
 #include <functional>
@@ -20,11 +21,12 @@ struct AsdOptions {
 
 // one frame of a chain; pixels are those of the latent
 struct AsdFrame {
-    uint32_t number = 0;             // of the frame, part of the noise key
-    uint32_t chain = 0;              // of the camera, likewise
-    std::span<const float> buffer;   // [pixels, C] latent of the splat buffer
-    std::span<const float> visible;  // [pixels] 0..1
-    std::span<const float> previous; // [pixels, C] latent of the frame before; empty: the first frame
+    uint32_t number = 0;              // of the frame, part of the noise key
+    uint32_t chain = 0;               // of the camera, likewise
+    std::span<const float> buffer;    // [pixels, C] latent of the splat buffer
+    std::span<const float> visible;   // [pixels] 0..1
+    std::span<const float> previous;  // [pixels, C] latent of the frame before; empty: the first frame
+    std::span<const NoiseKey> keys{}; // [pixels]; empty: each pixel's own, of this frame
 };
 
 // The text of a renderer, the same for every frame

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/render/latent_size.h"
 #include "engine/render/vae.h"
 #include "runtime/program.h"
 
@@ -10,18 +11,6 @@
 #include <vector>
 
 namespace semrover {
-
-// A picture and its latent. The latent's pixels are blocks of downscale x downscale; a picture that does not fill the
-// last blocks is continued by repeating its last column and row, and cut again after decoding.
-struct LatentSize {
-    uint32_t image_width = 0, image_height = 0; // pixels
-    uint32_t downscale = 8;
-
-    uint32_t width() const { return divide_up(image_width, downscale); }
-    uint32_t height() const { return divide_up(image_height, downscale); }
-    uint32_t pixels() const { return width() * height(); }
-    bool operator==(const LatentSize&) const = default;
-};
 
 // [image_height, image_width], 0 or not -> [height, width]: share of each block that is not 0
 std::vector<float> block_shares(const LatentSize& size, std::span<const uint8_t> visible);

@@ -107,6 +107,7 @@ Status read_defaults(const Path& path, RendererDefaults& d, std::vector<std::str
     fields.integer("num_inference_steps", 1, kMaxInferenceSteps, d.num_inference_steps);
     fields.number("guidance_scale", 0.f, 1000.f, d.guidance_scale);
     fields.number("previous_noise", 0.f, 100.f, d.previous_noise);
+    fields.choice("frame_noise", {{"fresh", FrameNoise::fresh}, {"warped", FrameNoise::warped}}, d.frame_noise);
     fields.number("visible_threshold", 0.f, 1.f, d.visible_threshold);
     read_splat_radius(fields, d);
     return fields.finish(warnings);

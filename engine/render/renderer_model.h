@@ -4,6 +4,7 @@
 
 #include "engine/diffusion/scheduler_config.h"
 #include "engine/render/checkpoint.h"
+#include "engine/render/noise_trail.h"
 #include "engine/render/unet_config.h"
 #include "engine/render/vae_config.h"
 
@@ -12,12 +13,13 @@
 namespace semrover {
 
 // model_index.json's "defaults": {"renderer": {"num_inference_steps": 20, "guidance_scale": 1.5, "previous_noise": 0.3,
-// "visible_threshold": 0.5, "splat_radius": 0.04}}: what a command uses when no option says otherwise. Fields of
-// "defaults" beside "renderer" are the transformer's.
+// "frame_noise": "fresh", "visible_threshold": 0.5, "splat_radius": 0.04}}: what a command uses when no option says
+// otherwise. Fields of "defaults" beside "renderer" are the transformer's.
 struct RendererDefaults {
     int num_inference_steps = 20;
     float guidance_scale = 1.5f;
-    float previous_noise = 0.3f;    // scale of the noise on the previous frame's latent
+    float previous_noise = 0.3f; // scale of the noise on the previous frame's latent
+    FrameNoise frame_noise = FrameNoise::fresh;
     float visible_threshold = 0.5f; // alpha from which splats cover a pixel
     // standard deviation of the splats in its buffers, metres; none ("auto"): from the spacing of the points. A
     // renderer wants what it was trained on

@@ -150,6 +150,12 @@ bool Lens::sees_sideways() const
     return farthest > edge;
 }
 
+double Lens::depth(const Point3& point) const
+{
+    const auto [x, y, z] = point;
+    return radial_depth_ ? std::sqrt(x * x + y * y + z * z) : z;
+}
+
 std::optional<Projection> Lens::project(const Point3& point) const
 {
     const Intrinsics& k = intrinsics_;
@@ -188,7 +194,7 @@ std::optional<Projection> Lens::project(const Point3& point) const
         b = std::atan2(y, std::hypot(x, z));
         break;
     }
-    return Projection{k.fx * a + k.cx, k.fy * b + k.cy, radial_depth_ ? away : z};
+    return Projection{k.fx * a + k.cx, k.fy * b + k.cy, depth(point)};
 }
 
 std::optional<Point3> Lens::ray(double x, double y) const

@@ -31,6 +31,8 @@ class Lens {
     // what a depth of this camera is: false: along z; true: from the camera. True for a panorama, and for a fisheye
     // that sees more than 90 degrees away from its axis somewhere in its image.
     bool radial_depth() const { return radial_depth_; }
+    // of a point in the camera's frame, whether the lens sees it or not
+    double depth(const Point3& point) const;
 
   private:
     std::optional<Point3> opencv_ray(double a, double b) const;

@@ -33,6 +33,12 @@ def make_buffers(grid, drive, folder, size, splat_radius):
              "--splat-radius", splat_radius, "-o", buffer, "--quiet")
 
 
+def daylight(options):
+    """the sky's options of `semrover streets`, for those that are given"""
+    given = {"--sun-azimuth": options.sun_azimuth, "--sun-elevation": options.sun_elevation, "--clouds": options.clouds}
+    return [word for name, value in given.items() if value is not None for word in (name, value)]
+
+
 def make_frames(grid, folder, seed, options):
     """pictures of the drive, and the splat buffers of the same cameras"""
     where = drive_of(seed, options.frames, options.length)
@@ -40,7 +46,7 @@ def make_frames(grid, folder, seed, options):
         where["shift"], where["yaw"] = options.shift, 0
     size = (options.width, options.height)
     semrover("streets", "--seed", seed, "--length", options.length, "--spacing", 1, "--no-grids", "--images", "--samples",
-             options.samples, "-W", size[0], "-H", size[1],
+             options.samples, "-W", size[0], "-H", size[1], *daylight(options),
              *(word for name, value in where.items() for word in (f"--{name}", value)), "-o", folder, "-y", "--quiet")
     os.remove(os.path.join(folder, "mesh.glb"))
     for drive in [folder] + ([os.path.join(folder, "shifted")] if where["shift"] else []):
@@ -58,6 +64,9 @@ def main(arguments=None):
     p.add_argument("--length", type=int, default=60, help="of a street, metres")
     p.add_argument("--samples", type=int, default=2, help="rays a pixel")
     p.add_argument("--shift", type=float, help="metres to the left of a second drive, in place of what the seed says")
+    p.add_argument("--sun-azimuth", type=float, help="degrees to the left of the street; default: as the seed has it")
+    p.add_argument("--sun-elevation", type=float, help="degrees")
+    p.add_argument("--clouds", type=float, help="0 to 1")
     p.add_argument("--splat-radius", default="auto", help="of the buffers, as `semrover render` takes it")
     p.add_argument("-W", "--width", type=int, default=616)
     p.add_argument("-H", "--height", type=int, default=424)

@@ -78,7 +78,7 @@ def refine(drive, folder, numbers, options, *more):
         more += ("--steps", options.steps)
     os.makedirs(os.path.dirname(folder), exist_ok=True)
     semrover("refine", os.path.join(drive.folder, "buffer"), "-m", options.model, "-o", folder, "--seed", 1, "--quiet",
-             *more)
+             "--path", os.path.join(drive.folder, "transforms.json"), *more)
 
 
 def judge(pose, folder, options):

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""Drives once more with rougher buffers: points off their surfaces and colours washed out, as a transformer places them.
-A renderer that has seen only buffers of true points keeps every flaw of generated ones."""
+"""Drives once more with rougher buffers: of points as a trained transformer places them (--transformer), or off their
+surfaces and washed out at random. A renderer that has seen only buffers of true points keeps every flaw of generated ones."""
 import argparse
 import os
 
@@ -11,6 +11,7 @@ import torch
 from . import safetensors_file
 from .drives import make_buffers
 from .frames import find_drives
+from .regenerate import load_transformer, regenerate
 
 
 def roughened(tensors, half, random):
@@ -27,9 +28,12 @@ def roughened(tensors, half, random):
             "colors": torch.from_numpy(colors.round().clip(0, 255).astype(np.uint8))}
 
 
-def write_rough(path, output, seed):
+def write_rough(path, output, seed, transformer=None):
     metadata = safetensors_file.read_header(path)[1]
-    tensors = roughened(safetensors_file.read(path), float(metadata["voxel_size"]) / 2, np.random.default_rng(seed))
+    if transformer:
+        tensors = regenerate(transformer, path, seed)
+    else:
+        tensors = roughened(safetensors_file.read(path), float(metadata["voxel_size"]) / 2, np.random.default_rng(seed))
     safetensors_file.write(output, tensors, metadata)
 
 
@@ -48,8 +52,10 @@ def main():
     p.add_argument("-o", "--output", required=True, help="folder; its drives go to `run asd --frames` beside the others")
     p.add_argument("--frames", required=True, help="folder of SEED/..., as `run drives` writes it")
     p.add_argument("--streets", required=True, help="folder of SEED/truth.sgrid")
+    p.add_argument("--transformer", help="voxfield_transformer folder whose points these should be like")
     p.add_argument("--splat-radius", default="auto", help="of the buffers, as `semrover render` takes it")
     options = p.parse_args()
+    transformer = load_transformer(options.transformer) if options.transformer else None
     for drive in find_drives(options.frames):
         name = os.path.relpath(drive.folder, options.frames)
         folder, seed = os.path.join(options.output, name), name.split(os.sep)[0]
@@ -57,7 +63,7 @@ def main():
             continue
         grid = os.path.join(options.output, seed + ".sgrid")
         os.makedirs(options.output, exist_ok=True)
-        write_rough(os.path.join(options.streets, seed, "truth.sgrid"), grid, int(seed))
+        write_rough(os.path.join(options.streets, seed, "truth.sgrid"), grid, int(seed), transformer)
         render_rough(drive, grid, folder, options.splat_radius)
         os.remove(grid)
         print(folder, flush=True)

@@ -1,0 +1,83 @@
+# SPDX-FileCopyrightText: semrover authors
+# SPDX-License-Identifier: Apache-2.0
+"""A street as a trained transformer would have placed it: noise on the truth's tokens, up to a level at which the street
+can still be told, and denoised from there. What the transformer cannot draw is then wrong as it is in generated streets."""
+import numpy as np
+import torch
+
+from .grids import read_tokens
+from .model_folder import read_component
+from .nets.transformer import VoxfieldTransformer
+from .transformer import linear_alphas
+
+LEVELS = (250, 600)  # of 1000 timesteps, between which the noise of a street is drawn
+STEPS = 6
+MOST_CELLS = 160     # of a set
+SETS = 8             # of a batch
+
+
+def load_transformer(folder):
+    """-> VoxfieldTransformer of a voxfield_transformer folder, evaluating"""
+    config, state = read_component(folder)
+    model = VoxfieldTransformer(**{k: v for k, v in config.items() if not k.startswith("_") and k != "prediction_type"})
+    model.load_state_dict({name: t.float() for name, t in state.items()})
+    return model.eval().requires_grad_(False)
+
+
+def bisected(cells, most):
+    """cells [V, 3] -> [indices] of sets of at most `most` neighbours, halved across their longest side"""
+    def halves(chosen):
+        if len(chosen) <= most:
+            return [chosen]
+        of_these = cells[chosen]
+        along = of_these[:, np.argmax(of_these.max(0) - of_these.min(0))]
+        order = np.argsort(along, kind="stable")
+        return halves(chosen[order[:len(order) // 2]]) + halves(chosen[order[len(order) // 2:]])
+    return halves(np.arange(len(cells)))
+
+
+def levels_between(first, steps):
+    """falling timesteps from `first`, -1 (no noise) after the last"""
+    return [round(first * (steps - i) / steps) for i in range(steps)] + [-1]
+
+
+def ancestral_step(x, x0, a, b, random):
+    """DDPM's step (Ho et al. 2020) between any two levels: x at the share a of the signal's variance -> at b"""
+    noise = (x - a.sqrt() * x0) / (1 - a).sqrt()
+    fresh = (1 - b) / (1 - a) * (1 - a / b)
+    return b.sqrt() * x0 + (1 - b - fresh).clamp(min=0).sqrt() * noise + fresh.sqrt() * torch.randn(x.shape, generator=random)
+
+
+@torch.no_grad()
+def regenerate(model, path, seed):
+    """the .sgrid's cells that have points -> {cells, labels, points, colors}, as the file has them"""
+    cells, labels, tokens = read_tokens(path)
+    size, n = model.config["voxel_size"], model.config["points_per_voxel"]
+    random = torch.Generator().manual_seed(seed)
+    first = int(torch.randint(*LEVELS, (1,), generator=random))
+    out, sets = np.empty(tokens.shape, np.float32), bisected(cells, MOST_CELLS)
+    for i in range(0, len(sets), SETS):
+        denoise_sets(model, sets[i:i + SETS], cells, labels, tokens, out, first, random)
+    out = torch.from_numpy(out).reshape(len(cells), n, 6).clamp(-1, 1)
+    return {"cells": torch.from_numpy(cells), "labels": torch.from_numpy(labels),
+            "points": (out[..., :3] * (size / 2)).half(),
+            "colors": ((out[..., 3:] + 1) * 127.5).round().to(torch.uint8)}
+
+
+def denoise_sets(model, sets, cells, labels, tokens, out, first, random):
+    """one batch of sets, from timestep `first` on -> written to out"""
+    rows = np.stack([np.resize(s, MOST_CELLS) for s in sets])  # what fills a row is marked as not there
+    valid = torch.stack([torch.arange(MOST_CELLS) < len(s) for s in sets])
+    x0 = torch.from_numpy(tokens[rows].astype(np.float32))
+    centers = torch.from_numpy((cells[rows] + 0.5).astype(np.float32) * model.config["voxel_size"])
+    of_rows = torch.from_numpy(labels[rows].astype(np.int64))
+    alphas = linear_alphas({"beta_start": 1e-4, "beta_end": 0.02, "num_train_timesteps": 1000})
+    levels = levels_between(first, STEPS)
+    a = alphas[levels[0]]
+    x = a.sqrt() * x0 + (1 - a).sqrt() * torch.randn(x0.shape, generator=random)
+    for t, after in zip(levels, levels[1:]):
+        with torch.autocast("cpu", dtype=torch.bfloat16):
+            made = model(x, of_rows, centers, valid, torch.full((len(x),), t)).float().clamp(-1, 1)
+        x = made if after < 0 else ancestral_step(x, made, alphas[t], alphas[after], random)
+    for s, made in zip(sets, x.numpy()):
+        out[s] = made[:len(s)]
