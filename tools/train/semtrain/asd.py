@@ -13,7 +13,7 @@ import torch
 from torch import nn
 
 from . import model_folder, safetensors_file, settings
-from .denoising import alphas_cumprod, denoise, input_of, noise_of, scheduler_of
+from .denoising import alphas_cumprod, ddim_timesteps, denoise, input_of, noise_of, scheduler_of
 from .frames import find_drives, to_pixels, write_beside
 from .latents import load_vae, sequences
 from .nets.unet import UNet2DConditionModel
@@ -68,13 +68,25 @@ class Batches:
         return s.truth[i][place], previous, s.buffer[i][place], visible
 
 
-def step_loss(model, batch, alphas, config, draw):
-    """-> loss, {eps: the plain error of the noise}; timesteps are spread evenly over the batch, raised to
-    timestep_power of their range: below 1, few are near 0, which change nothing that one can see"""
-    truth, previous, buffer, visible = batch
-    n = len(truth)
+def draw_timesteps(n, config, draw):
+    """[n]: spread evenly over the batch, raised to timestep_power of their range: below 1, few are near 0, which change
+    nothing that one can see. sampler_share of them are instead of those where samplers of few_steps steps look: a small
+    network has none to waste on others"""
     spread = (torch.arange(n) + torch.rand(1, generator=draw)) / n
     t = (spread ** config["timestep_power"] * 1000).long().clamp(max=999)
+    samplers = [ddim_timesteps(steps, config["timestep_spacing"]) for steps in config["few_steps"]]
+    for i in range(n):
+        if samplers and float(torch.rand(1, generator=draw)) < config["sampler_share"]:
+            of_one = samplers[number_below(len(samplers), draw)]
+            t[i] = of_one[number_below(len(of_one), draw)]
+    return t
+
+
+def step_loss(model, batch, alphas, config, draw):
+    """-> loss, {eps: the plain error of the noise}"""
+    truth, previous, buffer, visible = batch
+    n = len(truth)
+    t = draw_timesteps(n, config, draw)
     noise = torch.randn(truth.shape, generator=draw).to(truth.device)
     a = alphas[t].view(n, 1, 1, 1).to(truth.device)
     noisy = a.sqrt() * truth + (1 - a).sqrt() * noise

@@ -76,6 +76,8 @@ def refine(drive, folder, numbers, options, *more):
         return
     if options.steps:
         more += ("--steps", options.steps)
+    if options.frame_noise:
+        more += ("--frame-noise", options.frame_noise)
     os.makedirs(os.path.dirname(folder), exist_ok=True)
     semrover("refine", os.path.join(drive.folder, "buffer"), "-m", options.model, "-o", folder, "--seed", 1, "--quiet",
              "--path", os.path.join(drive.folder, "transforms.json"), *more)
@@ -119,6 +121,7 @@ def main(arguments=None):
     p.add_argument("-m", "--model", required=True, help="model with a renderer")
     p.add_argument("-o", "--output", required=True, help="folder")
     p.add_argument("--steps", type=int, default=0, help="denoising steps of a frame; 0: as the model says")
+    p.add_argument("--frame-noise", choices=("fresh", "warped"), help="default: as the model says")
     p.add_argument("--features", help="network for KID (docs/eval.md)")
     options = p.parse_args(arguments)
     lines = ["| poses | frames | PSNR dB | where splats are | SSIM | KID x 1000 | flicker | truth's |", "|" + "---|" * 8]

@@ -31,7 +31,7 @@ ASD = {**COMMON, "in_channels": 13, "out_channels": 4, "block_out_channels": [16
        "up_block_types": ["CrossAttnUpBlock2D", "UpBlock2D"], "attention_head_dim": 2, "cross_attention_dim": 8,
        "norm_num_groups": 4, "text_tokens": 1, "train_text": True, "crop": [6, 6], "batch": 4, "mirror": True,
        "dropout": 0.3, "first_share": 0.1, "previous_noise": [0.3, 0.7], "weighting": "v", "prediction_type": "v_prediction",
-       "timestep_spacing": "trailing", "timestep_power": 0.8,
+       "timestep_spacing": "trailing", "timestep_power": 0.8, "few_steps": [2], "sampler_share": 0.5,
        "defaults": {"num_inference_steps": 2, "guidance_scale": 1.5, "previous_noise": 0.3}}
 
 
@@ -158,6 +158,15 @@ class Recipes(unittest.TestCase):
             before = error()
             model.load_state_dict(self.weights("learned"))
             self.assertLess(error(), 0.6 * before)
+
+    def test_timesteps_are_those_of_short_samplers_in_their_share_and_spread_otherwise(self):
+        config = {**ASD, "few_steps": [2, 3], "sampler_share": 0.75}
+        t = asd.draw_timesteps(4000, config, generator(config, 1)).tolist()
+        self.assertAlmostEqual(t.count(999) / 4000, 0.75 * (1 / 2 + 1 / 3) / 2, delta=0.03)
+        self.assertAlmostEqual(t.count(499) / 4000, 0.75 / 4, delta=0.03)
+        self.assertGreater(len(set(t)), 500)
+        spread = asd.draw_timesteps(4000, {**config, "sampler_share": 0.0}, generator(config, 1))
+        self.assertAlmostEqual(float((spread < 1000 * 0.5 ** 0.8).float().mean()), 0.5, delta=0.01)
 
     def test_a_batch_hides_previous_and_visibility_together(self):
         config = {**ASD, "batch": 64}
