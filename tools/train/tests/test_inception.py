@@ -205,12 +205,12 @@ class TheRecipe(unittest.TestCase):
         self.assertEqual(idle["damage"]["kinds"]["splats"], {"found": 0, "invented": 0, "error": 0.5})
 
     def test_learns_to_tell_two_streets_apart_and_reports_it(self):
-        train(self.path("drives"), self.path("run"), 30, "--heldout", self.path("drives"), "--set", "ema=0.8",
+        train(self.path("drives"), self.path("run"), 60, "--heldout", self.path("drives"), "--set", "ema=0.8",
               "--set", "learning_rate=0.01", "--set", "clean=1", "--set", "twice=0")
         with open(self.path("run/held_out.json")) as file:
             report = json.load(file)
         self.assertEqual(report["crops"], 8)
-        self.assertGreater(report["classes"]["overlap"], 0.7)  # the same answer to all has 0.67 at most
+        self.assertGreater(report["classes"]["overlap"], 0.8)  # measured 0.89 to 0.91; the same answer to all has 0.67 at most
         self.assertGreater(report["damage"]["each_right"], 0.9)  # nothing is spoilt
         self.assertEqual(report["damage"]["kinds"], {})
 
