@@ -180,21 +180,12 @@ Result<std::vector<uint8_t>> read_label_picture(const BufferCamera& camera, uint
     return std::move(labels.pixels);
 }
 
-Result<uint64_t> hash_depth(const BufferCamera& camera, uint32_t last)
-{
-    Hash hash;
-    for (uint32_t i = 0; i <= last; ++i) {
-        SR_TRY(const MappedFile file, MappedFile::open(frame_path(camera.folder, "depth", i)));
-        hash.add(file.bytes());
-    }
-    return hash.value();
-}
-
-Result<uint64_t> hash_buffers(const BufferCamera& camera, uint32_t first, uint32_t last)
+Result<uint64_t> hash_pictures(const BufferCamera& camera, std::initializer_list<const char*> kinds, uint32_t first,
+                               uint32_t last)
 {
     Hash hash;
     for (uint32_t i = first; i <= last; ++i)
-        for (const char* kind : {"color", "visible"}) {
+        for (const char* kind : kinds) {
             SR_TRY(const MappedFile file, MappedFile::open(frame_path(camera.folder, kind, i)));
             hash.add(file.bytes());
         }

@@ -42,11 +42,9 @@ Result<ImageGray16> read_depth(const BufferCamera& camera, uint32_t frame);
 // label colours, black where there is nothing: [height, width, 3]
 Result<std::vector<uint8_t>> read_label_picture(const BufferCamera& camera, uint32_t frame);
 
-// hash of the depth of all frames up to `last`
-Result<uint64_t> hash_depth(const BufferCamera& camera, uint32_t last);
-
-// hash of the files of frames [first, last]
-Result<uint64_t> hash_buffers(const BufferCamera& camera, uint32_t first, uint32_t last);
+// hash of the files of frames [first, last], of these kinds: "color", "visible", "depth"
+Result<uint64_t> hash_pictures(const BufferCamera& camera, std::initializer_list<const char*> kinds, uint32_t first,
+                               uint32_t last);
 
 // "frame 3" or "frame 3 of camera 'front'"
 std::string frame_text(const std::string& camera, uint32_t frame);

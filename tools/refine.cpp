@@ -182,11 +182,11 @@ Result<Json> input_json(const Job& j)
             camera["before"] = hash_text(hash.value());
         }
         if (!o.from_grid()) {
-            SR_TRY(const uint64_t hash, hash_buffers(c.camera, c.range.first, c.range.last));
+            SR_TRY(const uint64_t hash, hash_pictures(c.camera, {"color", "visible"}, c.range.first, c.range.last));
             camera["buffers"] = hash_text(hash);
         }
         if (!o.from_grid() && j.frame_noise == FrameNoise::warped) {
-            SR_TRY(const uint64_t hash, hash_depth(c.camera, c.range.last));
+            SR_TRY(const uint64_t hash, hash_pictures(c.camera, {"depth"}, 0, c.range.last));
             camera["depth"] = hash_text(hash);
         }
     }

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/eval/flicker.h"
 
-#include "engine/scene/lens.h"
+#include "engine/scene/reprojection.h"
 
 #include <algorithm>
 #include <cmath>
@@ -65,8 +65,7 @@ Flow flow_between(const CameraFrame& from, const ImageGray16& from_depth, const 
     SR_ASSERT(to_depth.width == width && to_depth.height == height && from_depth.width == from.intrinsics.width &&
                   from_depth.height == from.intrinsics.height,
               "depth of {}x{} pixels, a camera of {}x{}", to_depth.width, to_depth.height, width, height);
-    const Lens to_lens(to.intrinsics), from_lens(from.intrinsics);
-    const Rigid move = compose(from.pose.world_to_camera, to.pose.camera_to_world());
+    const Reprojection motion(from, to);
     Flow flow;
     flow.sources.resize(size_t(width) * height);
     for (size_t i = 0; i < flow.sources.size(); ++i) {
@@ -74,16 +73,11 @@ Flow flow_between(const CameraFrame& from, const ImageGray16& from_depth, const 
         if (!(depth > 0))
             continue;
         ++flow.with_depth;
-        const std::optional<Point3> ray = to_lens.ray(double(i % width) + 0.5, double(i / width) + 0.5);
-        if (!ray || !(to_lens.depth(*ray) > 0))
-            continue;
-        const double far = depth / to_lens.depth(*ray);
-        const Point3 point = transform(move, {(*ray)[0] * far, (*ray)[1] * far, (*ray)[2] * far});
-        const std::optional<Projection> seen = from_lens.project(point);
+        const auto seen = motion.source(double(i % width) + 0.5, double(i / width) + 0.5, depth);
         if (!seen)
             continue;
         const auto taps = taps_at(seen->x, seen->y, from_depth.width, from_depth.height);
-        if (taps && std::abs(from_lens.depth(point) * inverse_depth(*taps, from_depth, o) - 1) <= o.tolerance)
+        if (taps && std::abs(seen->depth * inverse_depth(*taps, from_depth, o) - 1) <= o.tolerance)
             flow.sources[i] = {seen->x, seen->y};
     }
     return flow;

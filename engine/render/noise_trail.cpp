@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/render/noise_trail.h"
 
-#include "engine/scene/lens.h"
+#include "engine/scene/reprojection.h"
 
 #include <algorithm>
 #include <limits>
@@ -18,46 +18,29 @@ struct Source {
     double distance = 0; // squared, pixels of the latent, from its centre
 };
 
-// where in the frame `from` the pixels of the frame `to` were
-class Motion {
-  public:
-    Motion(const LatentSize& size, const CameraFrame& from, const CameraFrame& to)
-        : size_(size), from_(from.intrinsics), to_(to.intrinsics),
-          move_(compose(from.pose.world_to_camera, to.pose.camera_to_world()))
-    {
-    }
+double metres(const ImageGray16& depth, double x, double y)
+{
+    const uint32_t column = std::min(uint32_t(x), depth.width - 1), row = std::min(uint32_t(y), depth.height - 1);
+    const uint16_t d = depth.pixels[size_t(row) * depth.width + column];
+    return d == 0 || d == 65535 ? kInfinity : d * 1e-3;
+}
 
-    std::optional<Source> source(uint32_t pixel, const ImageGray16& depth) const
-    {
-        const double block = size_.downscale;
-        const double x = (pixel % size_.width() + 0.5) * block, y = (pixel / size_.width() + 0.5) * block;
-        const std::optional<Point3> ray = to_.ray(x, y);
-        if (!ray || !(to_.depth(*ray) > 0))
-            return {};
-        const double far = metres(depth, x, y) / to_.depth(*ray);
-        const auto seen = from_.project(transform(move_, {(*ray)[0] * far, (*ray)[1] * far, (*ray)[2] * far}));
-        if (!seen)
-            return {};
-        const double u = seen->x / block, v = seen->y / block;
-        if (!(u >= 0 && v >= 0 && u < size_.width() && v < size_.height()))
-            return {};
-        const auto column = uint32_t(u), row = uint32_t(v);
-        const double dx = u - column - 0.5, dy = v - row - 0.5;
-        return Source{row * size_.width() + column, dx * dx + dy * dy};
-    }
-
-  private:
-    double metres(const ImageGray16& depth, double x, double y) const
-    {
-        const uint32_t column = std::min(uint32_t(x), depth.width - 1), row = std::min(uint32_t(y), depth.height - 1);
-        const uint16_t d = depth.pixels[size_t(row) * depth.width + column];
-        return d == 0 || d == 65535 ? kInfinity : d * 1e-3;
-    }
-
-    LatentSize size_;
-    Lens from_, to_;
-    Rigid move_;
-};
+// where the surface of a pixel of the latent was
+std::optional<Source> source_of(uint32_t pixel, const LatentSize& size, const Reprojection& motion,
+                                const ImageGray16& depth)
+{
+    const double block = size.downscale;
+    const double x = (pixel % size.width() + 0.5) * block, y = (pixel / size.width() + 0.5) * block;
+    const auto seen = motion.source(x, y, metres(depth, x, y));
+    if (!seen)
+        return {};
+    const double u = seen->x / block, v = seen->y / block;
+    if (!(u >= 0 && v >= 0 && u < size.width() && v < size.height()))
+        return {};
+    const auto column = uint32_t(u), row = uint32_t(v);
+    const double dx = u - column - 0.5, dy = v - row - 0.5;
+    return Source{row * size.width() + column, dx * dx + dy * dy};
+}
 
 } // namespace
 
@@ -70,12 +53,12 @@ void NoiseTrail::follow(const CameraFrame& camera, const ImageGray16& depth)
     for (uint32_t i = 0; i < next.size(); ++i)
         next[i] = {i, frames_};
     if (frames_ > 0) {
-        const Motion motion(size_, camera_, camera);
+        const Reprojection motion(camera_, camera);
         constexpr uint32_t kNobody = std::numeric_limits<uint32_t>::max();
         std::vector<uint32_t> heir(keys_.size(), kNobody); // of a pixel's key
         std::vector<double> distance(keys_.size(), std::numeric_limits<double>::infinity());
         for (uint32_t i = 0; i < next.size(); ++i) {
-            const auto source = motion.source(i, depth);
+            const auto source = source_of(i, size_, motion, depth);
             if (source && source->distance < distance[source->pixel]) {
                 distance[source->pixel] = source->distance;
                 heir[source->pixel] = i;

@@ -8,7 +8,7 @@ import torch
 from .grids import read_tokens
 from .model_folder import read_component
 from .nets.transformer import VoxfieldTransformer
-from .transformer import linear_alphas
+from .transformer import linear_alphas, noised
 
 LEVELS = (250, 600)  # of 1000 timesteps, between which the noise of a street is drawn
 STEPS = 6
@@ -73,8 +73,7 @@ def denoise_sets(model, sets, cells, labels, tokens, out, first, random):
     of_rows = torch.from_numpy(labels[rows].astype(np.int64))
     alphas = linear_alphas({"beta_start": 1e-4, "beta_end": 0.02, "num_train_timesteps": 1000})
     levels = levels_between(first, STEPS)
-    a = alphas[levels[0]]
-    x = a.sqrt() * x0 + (1 - a).sqrt() * torch.randn(x0.shape, generator=random)
+    x = noised(x0, alphas, torch.full((len(x0),), first), random)
     for t, after in zip(levels, levels[1:]):
         with torch.autocast("cpu", dtype=torch.bfloat16):
             made = model(x, of_rows, centers, valid, torch.full((len(x),), t)).float().clamp(-1, 1)

@@ -3,6 +3,7 @@
 """Drives once more with rougher buffers: of points as a trained transformer places them (--transformer), or off their
 surfaces and washed out at random. A renderer that has seen only buffers of true points keeps every flaw of generated ones."""
 import argparse
+import itertools
 import os
 
 import numpy as np
@@ -56,17 +57,23 @@ def main():
     p.add_argument("--splat-radius", default="auto", help="of the buffers, as `semrover render` takes it")
     options = p.parse_args()
     transformer = load_transformer(options.transformer) if options.transformer else None
-    for drive in find_drives(options.frames):
-        name = os.path.relpath(drive.folder, options.frames)
-        folder, seed = os.path.join(options.output, name), name.split(os.sep)[0]
-        if os.path.exists(os.path.join(folder, "buffer", "color")):
-            continue
-        grid = os.path.join(options.output, seed + ".sgrid")
-        os.makedirs(options.output, exist_ok=True)
+    os.makedirs(options.output, exist_ok=True)
+
+    def name_of(drive):
+        return os.path.relpath(drive.folder, options.frames)
+
+    def is_left(drive):
+        return not os.path.exists(os.path.join(options.output, name_of(drive), "buffer", "color"))
+
+    left = filter(is_left, find_drives(options.frames))
+    for seed, drives in itertools.groupby(left, lambda drive: name_of(drive).split(os.sep)[0]):
+        grid = os.path.join(options.output, seed + ".sgrid")  # for all drives of the street
         write_rough(os.path.join(options.streets, seed, "truth.sgrid"), grid, int(seed), transformer)
-        render_rough(drive, grid, folder, options.splat_radius)
+        for drive in drives:
+            folder = os.path.join(options.output, name_of(drive))
+            render_rough(drive, grid, folder, options.splat_radius)
+            print(folder, flush=True)
         os.remove(grid)
-        print(folder, flush=True)
 
 
 if __name__ == "__main__":
