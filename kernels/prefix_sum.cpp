@@ -15,7 +15,7 @@ namespace semrover {
 
 namespace {
 
-constexpr uint32_t kChunk = 1024, kMaxWorkers = 1024; // elements a worker should have at least; chunks
+constexpr uint32_t kSumChunk = 1024, kMaxSumWorkers = 1024; // elements a worker should have at least; chunks
 
 } // namespace
 
@@ -23,7 +23,7 @@ PrefixSum prefix_sum(Graph& g, Tensor x, const PrefixSumOptions& options)
 {
     SR_ASSERT(x.dtype == DType::u32 && x.cols == 1 && x.ld == 1, "prefix_sum: x [{}, {}] {}", x.rows, x.cols,
               dtype_name(x.dtype));
-    const PrefixSumPush push{.size = x.rows, .workers = std::min(divide_up(x.rows, kChunk), kMaxWorkers)};
+    const PrefixSumPush push{.size = x.rows, .workers = std::min(divide_up(x.rows, kSumChunk), kMaxSumWorkers)};
     const Tensor partial = g.array(push.workers, DType::u32, "partial sums");
     const Tensor first = g.array(push.workers, DType::u32, "sums before chunks");
     const Tensor total = options.total.valid() ? options.total : g.array(1, DType::u32, "total");

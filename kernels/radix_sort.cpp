@@ -15,13 +15,13 @@ namespace semrover {
 namespace {
 
 constexpr uint32_t kDigitBits = 8;
-constexpr uint32_t kChunk = 1024, kMaxWorkers = 2048; // pairs a worker should have at least; chunks
+constexpr uint32_t kSortChunk = 1024, kMaxSortWorkers = 2048; // pairs a worker should have at least; chunks
 
 // an odd multiple of 8: whole workgroups of the CPU variant, and columns of counters that do not fall into one cache
 // set
 uint32_t workers_for(uint32_t size)
 {
-    const uint32_t groups = divide_up(std::min(divide_up(size, kChunk), kMaxWorkers), 8);
+    const uint32_t groups = divide_up(std::min(divide_up(size, kSortChunk), kMaxSortWorkers), 8);
     return 8 * (groups | 1);
 }
 

@@ -124,6 +124,15 @@ bool is_folder(const Path& path)
     return std::filesystem::is_directory(path, ignored);
 }
 
+Status make_folder(const Path& path)
+{
+    std::error_code error;
+    std::filesystem::create_directories(path, error);
+    if (error)
+        return fail(ErrorCode::bad_input, "cannot create {}: {}", quote_path(path), error.message());
+    return {};
+}
+
 Result<std::vector<std::byte>> read_file(const Path& path, uint64_t max_bytes)
 {
     return read_whole<std::vector<std::byte>>(path, max_bytes);

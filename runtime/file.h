@@ -21,6 +21,9 @@ bool is_there(const Path& path);
 bool is_file(const Path& path); // a regular one, or a link to one
 bool is_folder(const Path& path);
 
+// with those above it; nothing to do where it is there
+Status make_folder(const Path& path);
+
 // the whole of a regular file; bad_input when it is missing, unreadable, a directory, a device or a pipe, or longer
 // than max_bytes. Nothing is allocated before the length is known to fit.
 Result<std::vector<std::byte>> read_file(const Path& path, uint64_t max_bytes);

@@ -5,6 +5,7 @@
 #include "runtime/graph.h"
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,8 +34,11 @@ struct Pass {
     DispatchOptions options;
     std::vector<uint32_t> absorbed; // ids of the constants of fused epilogues, and the bindings they took
     std::vector<size_t> slots;
-    uint32_t level = 0;  // passes of one level run without a barrier between them
-    uint32_t submit = 0; // index of the command buffer it is recorded in
+    uint32_t level = 0;                           // passes of one level run without a barrier between them
+    uint32_t submit = 0;                          // index of the command buffer it is recorded in
+    std::optional<uint32_t> tile_rows, tile_cols; // of the output, that a workgroup makes; where its shader says so
+
+    void set_push(std::string_view name, uint32_t value); // where the shader has such a member
 };
 
 struct Placement {

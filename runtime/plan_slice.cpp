@@ -120,16 +120,9 @@ Result<uint32_t> band_rows(const Plan& plan, const Pass& pass, const DeviceLimit
         band = std::min<uint64_t>(band, uint64_t(rows * limits.submit_seconds / seconds) + 1);
     if (band >= rows)
         return rows;
-    const ConstantInfo* tile = pass.variant->constant("kTileM");
-    const uint64_t whole_tiles = std::lcm(step, uint64_t(tile ? tile->value : 1)); // no half-empty ones, if they fit
+    const uint64_t whole_tiles = std::lcm(step, uint64_t(pass.tile_rows.value_or(1))); // no half-empty ones
     const uint64_t unit = whole_tiles <= band ? whole_tiles : step;
     return uint32_t(std::max(band / unit * unit, unit));
-}
-
-void set_push(Pass& pass, std::string_view name, uint32_t value)
-{
-    if (const PushMember* m = pass.variant->push_member(name))
-        std::memcpy(&pass.push[m->offset], &value, 4);
 }
 
 // push member of a binding's first row: "x_first" of X
@@ -152,10 +145,10 @@ Pass band_of(const Pass& whole, uint32_t first, uint32_t count, uint32_t total, 
         pass.bindings[b].offset = pass.tensors[b].offset;
         pass.bindings[b].bytes = pass.tensors[b].bytes();
         if (band->window.out_width)
-            set_push(pass, first_member(band->name), uint32_t(begin));
+            pass.set_push(first_member(band->name), uint32_t(begin));
     }
-    set_push(pass, "rows", count);
-    set_push(pass, "first_row", first);
+    pass.set_push("rows", count);
+    pass.set_push("first_row", first);
     pass.grid.x = pass.grid.unit == Grid::Unit::tiles ? count : uint32_t(uint64_t(whole.grid.x) * count / total);
     pass.options.flops = whole.options.flops * count / total;
     return pass;
@@ -167,15 +160,15 @@ Status count_groups(Pass& pass, const DeviceLimits& limits)
     n[0] = pass.grid.x;
     n[1] = pass.grid.y;
     n[2] = pass.grid.z;
-    const ConstantInfo *m = pass.variant->constant("kTileM"), *k = pass.variant->constant("kTileN");
+    const auto &m = pass.tile_rows, &k = pass.tile_cols;
     if (pass.grid.unit == Grid::Unit::tiles) {
         SR_ASSERT(m && k, "{}: a grid of tiles needs kTileM and kTileN", pass.kernel->name);
-        n[0] = divide_up(pass.grid.x, m->value);
-        n[1] = divide_up(pass.grid.y, k->value);
+        n[0] = divide_up(pass.grid.x, *m);
+        n[1] = divide_up(pass.grid.y, *k);
     } else if (pass.grid.unit != Grid::Unit::groups) {
         SR_ASSERT(m || pass.grid.unit == Grid::Unit::threads, "{}: a grid of row tiles needs kTileM",
                   pass.kernel->name);
-        n[0] = divide_up(pass.grid.x, pass.grid.unit == Grid::Unit::threads ? pass.variant->local_size[0] : m->value);
+        n[0] = divide_up(pass.grid.x, pass.grid.unit == Grid::Unit::threads ? pass.variant->local_size[0] : *m);
         n[1] = divide_up(n[0], limits.max_groups); // the shader's linear_group() undoes it
         n[0] = divide_up(n[0], n[1]);
     }

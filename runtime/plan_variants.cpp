@@ -3,6 +3,8 @@
 // stage 3: which shader runs each pass on this device, with which constants
 #include "runtime/plan.h"
 
+#include <cstring>
+
 namespace semrover {
 
 namespace {
@@ -34,6 +36,32 @@ void set_constant(Pass& pass, std::string_view name, uint32_t value)
         pass.constants[c->id] = value;
 }
 
+// The tile of a workgroup. Where its lanes may lie otherwise (col_lanes of them side by side), as few outputs as can be
+// are computed beyond the last row and column.
+void fit_tile(Pass& pass)
+{
+    const ConstantInfo *lanes = pass.variant->constant("kColLanes"), *m = pass.variant->constant("kTileM"),
+                       *n = pass.variant->constant("kTileN");
+    if (m)
+        pass.tile_rows = m->value;
+    if (n)
+        pass.tile_cols = n->value;
+    if (!lanes || pass.grid.unit != Grid::Unit::tiles)
+        return;
+    const uint32_t all = pass.variant->local_size[0];
+    const uint32_t lane_rows = m->value * lanes->value / all, lane_cols = n->value / lanes->value;
+    const auto outputs = [&](uint32_t across) {
+        return uint64_t(round_up(pass.grid.x, lane_rows * (all / across))) * round_up(pass.grid.y, lane_cols * across);
+    };
+    uint32_t best = lanes->value;
+    for (uint32_t across = all; across >= 1; across /= 2)
+        if (outputs(across) < outputs(best))
+            best = across;
+    pass.tile_rows = lane_rows * (all / best);
+    pass.tile_cols = lane_cols * best;
+    pass.set_push("col_lanes", best);
+}
+
 Status bind(Pass& pass)
 {
     const auto& declared = pass.variant->bindings;
@@ -52,6 +80,12 @@ Status bind(Pass& pass)
 }
 
 } // namespace
+
+void Pass::set_push(std::string_view name, uint32_t value)
+{
+    if (const PushMember* m = variant->push_member(name))
+        std::memcpy(&push[m->offset], &value, 4);
+}
 
 const KernelVariant* choose_variant(const Kernel& kernel, const DeviceLimits& limits)
 {
@@ -72,6 +106,7 @@ Status stage::pick_variants(Plan& plan, const DeviceLimits& limits)
                         pass.kernel->name, limits.max_shared_bytes, limits.max_group_threads);
         for (const ConstantValue& c : pass.options.constants)
             set_constant(pass, c.name, c.value);
+        fit_tile(pass);
         SR_CHECK(bind(pass));
     }
     return {};

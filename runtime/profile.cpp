@@ -11,17 +11,17 @@
 
 namespace semrover {
 
-void Profile::add(std::string name, double begin_us, double duration_us)
-{
-    events_.push_back({std::move(name), begin_us, duration_us});
-}
-
 Status Profile::write(const std::string& path) const
 {
     nlohmann::json trace = nlohmann::json::array();
     for (const Event& e : events_)
-        trace.push_back(
-            {{"name", e.name}, {"ph", "X"}, {"pid", 1}, {"tid", 1}, {"ts", e.begin_us}, {"dur", e.duration_us}});
+        trace.push_back({{"name", e.name},
+                         {"ph", "X"},
+                         {"pid", 1},
+                         {"tid", 1},
+                         {"ts", e.begin_us},
+                         {"dur", e.duration_us},
+                         {"args", {{"groups", e.groups}, {"gflop", e.flops / 1e9}}}});
     std::ofstream out(path);
     out << nlohmann::json{{"traceEvents", std::move(trace)}, {"displayTimeUnit", "ms"}}.dump();
     if (!out.flush())

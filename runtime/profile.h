@@ -4,6 +4,7 @@
 
 #include "runtime/result.h"
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -13,16 +14,18 @@ namespace semrover {
 // device time of every pass, written as a Chrome trace (chrome://tracing, Perfetto)
 class Profile {
   public:
-    void add(std::string name, double begin_us, double duration_us);
+    struct Event {
+        std::string name;
+        double begin_us, duration_us;
+        std::array<uint32_t, 3> groups = {}; // workgroups
+        double flops = 0;                    // as its op counts them, 0 where it does not
+    };
+    void add(Event event) { events_.push_back(std::move(event)); }
     Status write(const std::string& path) const;
     // total microseconds and count per name, longest first
     std::string summary() const;
 
   private:
-    struct Event {
-        std::string name;
-        double begin_us, duration_us;
-    };
     std::vector<Event> events_;
 };
 

@@ -210,7 +210,8 @@ Status Program::collect_profile()
         std::string name(pass.kernel->name);
         if (!pass.variant->name.empty())
             name += fmt::format(".{}", pass.variant->name);
-        device_.profile()->add(std::move(name), begin, end - begin);
+        device_.profile()->add(
+            {std::move(name), begin, end - begin, std::to_array(pass.group_count), pass.options.flops});
     }
     return {};
 }

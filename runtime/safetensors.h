@@ -5,6 +5,7 @@
 #include "runtime/file.h"
 #include "runtime/safetensors_header.h"
 
+#include <cstring>
 #include <functional>
 #include <memory>
 
@@ -81,6 +82,18 @@ class SafetensorsSet {
     std::vector<TensorInfo> tensors_;
     std::vector<UnsupportedTensor> unsupported_;
 };
+
+// the elements of a tensor, copied out because the file may not align them; none when it is absent
+template <typename T>
+std::vector<T> elements(const SafetensorsSet& file, std::string_view name)
+{
+    const TensorInfo* tensor = file.find(name);
+    if (!tensor || tensor->bytes() == 0)
+        return {};
+    std::vector<T> values(tensor->bytes() / sizeof(T));
+    std::memcpy(values.data(), file.bytes(*tensor).data(), values.size() * sizeof(T));
+    return values;
+}
 
 // index of the first element that is NaN or infinite; none for integers. `bytes` may be misaligned.
 std::optional<uint64_t> first_non_finite(std::span<const std::byte> bytes, DType dtype);

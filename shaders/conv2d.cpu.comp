@@ -2,7 +2,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // y[n] = epilogue(sum over taps and channels of w[n, tap, c] x[pixel at tap, c]), an implicit GEMM with the same tiles as
-// gemm.cpu.comp: 16 pixels x 16 channels a lane, texel loads, no shared memory. Taps outside the image load zeros.
+// gemm.cpu.comp: 16 pixels x 16 channels a lane, p.col_lanes side by side, texel loads, no shared memory. Taps outside the
+// image load zeros.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 #include "conv2d.h"
@@ -14,6 +15,7 @@ layout(constant_id = 2) const bool kHalfX = false; // w and x2 have the type of 
 layout(constant_id = 3) const uint kKernelHeight = 3;
 layout(constant_id = 5) const uint kKernelWidth = 3;
 layout(constant_id = 4) const bool kTwoInputs = false;
+layout(constant_id = 6) const uint kColLanes = 4; // of that tile; p.col_lanes is what runs
 layout(push_constant) uniform Push { Conv2dPush p; };
 layout(binding = 0) uniform usamplerBuffer X;  // [images * in_image_rows, x_cols]
 layout(binding = 1) uniform usamplerBuffer W;  // [cols, taps * (x_cols + x2_cols)]
@@ -50,8 +52,8 @@ void main()
 {
     const uint lane = gl_LocalInvocationID.x;
     epilogue_group = 0;
-    const uint first_row = gl_WorkGroupID.x * kTileM + lane / 4 * kRows;
-    const uint col = gl_WorkGroupID.y * kTileN + lane % 4 * kCols;
+    const uint first_row = gl_WorkGroupID.x * (8 / p.col_lanes * kRows) + lane / p.col_lanes * kRows;
+    const uint col = gl_WorkGroupID.y * (p.col_lanes * kCols) + lane % p.col_lanes * kCols;
     const uint width = kHalfX ? 8 : 4; // elements of a texel
     ConvPixel pixel[kRows];
     uint w_at[kCols];

@@ -2,10 +2,13 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // splats over pixels, front to back, for devices that are CPUs: a workgroup of 8 threads owns 8 x 8 pixels, a column
-// each, and walks the list of its tile; records come through a texel buffer, and those whose bounds miss the block are
-// skipped in a loop of their own, because there a branch that nobody takes still costs. No shared memory.
+// each, and walks the list of its tile; records come through a texel buffer. No shared memory. Correct at any subgroup
+// size.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
+#extension GL_KHR_shader_subgroup_ballot : require
+#extension GL_KHR_shader_subgroup_shuffle : require
+#extension GL_KHR_shader_subgroup_vote : require
 #include "splat.h"
 
 layout(local_size_x = 8) in;
@@ -14,7 +17,7 @@ layout(constant_id = 1) const uint kTileN = 8; // and columns
 layout(binding = 0) uniform usamplerBuffer Records; // [max_visible, kRecord]
 #include "lib/splat_blend.glsl"
 
-const uint kRows = 8;
+const uint kRows = 8, kStride = kRecord;
 
 Pixel pixels[kRows];
 
@@ -24,35 +27,28 @@ bool overlaps(uvec2 bounds, uvec2 corner)
            bounds.y >> 16 >= corner.y;
 }
 
+#include "lib/splat_walk.cpu.glsl"
+
 void main()
 {
-    const uint camera = gl_WorkGroupID.z, lane = gl_LocalInvocationID.x;
+    const uint camera = gl_WorkGroupID.z, column = gl_LocalInvocationID.x;
     const uvec2 corner = gl_WorkGroupID.yx * 8, tile_at = corner / p.tile;
-    const uint tile = (camera * p.tiles_y + tile_at.y) * p.tiles_x + tile_at.x, end = starts[tile + 1];
     [[unroll]] for (uint y = 0; y < kRows; ++y)
         pixels[y] = empty_pixel();
-    uint i = starts[tile];
-    bool going = true;
-    while (going) {
-        uint record = kNone;
-        vec4 t0;
-        while (i < end && record == kNone) {
-            const uint next = pairs[i++];
-            const uvec4 texel = texelFetch(Records, int(next * kRecord));
-            t0 = uintBitsToFloat(texel);
-            record = overlaps(texel.zw, corner) ? next : kNone;
-        }
-        if (record == kNone)
+    Walk walk = walk_of((camera * p.tiles_y + tile_at.y) * p.tiles_x + tile_at.x);
+    while (walk.first < walk.end) {
+        if (!find_hits(walk, corner))
             break;
-        const Splat s = read_splat(t0, uintBitsToFloat(texelFetch(Records, int(record * kRecord + 1))),
-                                   uintBitsToFloat(texelFetch(Records, int(record * kRecord + 2))),
-                                   uintBitsToFloat(texelFetch(Records, int(record * kRecord + 3))));
-        going = false;
-        [[unroll]] for (uint y = 0; y < kRows; ++y) {
-            blend(pixels[y], s, vec2(corner + uvec2(lane, y)) + 0.5, record);
-            going = going || pixels[y].transmittance > 0.0;
-        }
+        do {
+            const uint record = take_hit(walk);
+            const Splat s =
+                read_splat(texel_of(record, 0), texel_of(record, 1), texel_of(record, 2), texel_of(record, 3));
+            [[unroll]] for (uint y = 0; y < kRows; ++y)
+                blend(pixels[y], s, vec2(corner + uvec2(column, y)) + 0.5, record);
+        } while (walk.hits != 0);
+        if (!any_left())
+            break;
     }
     [[unroll]] for (uint y = 0; y < kRows; ++y)
-        store(pixels[y], corner + uvec2(lane, y), camera);
+        store(pixels[y], corner + uvec2(column, y), camera);
 }

@@ -4,6 +4,9 @@
 // splats over pixels of cameras with lenses, front to back, for devices that are CPUs: as splat_blend.cpu.comp
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
+#extension GL_KHR_shader_subgroup_ballot : require
+#extension GL_KHR_shader_subgroup_shuffle : require
+#extension GL_KHR_shader_subgroup_vote : require
 #include "splat.h"
 
 layout(local_size_x = 8) in;
@@ -12,7 +15,7 @@ layout(constant_id = 1) const uint kTileN = 8; // and columns
 layout(binding = 0) uniform usamplerBuffer Records; // [max_visible, kRayRecord]
 #include "lib/splat_ray.glsl"
 
-const uint kRows = 8;
+const uint kRows = 8, kStride = kRayRecord;
 
 Pixel pixels[kRows];
 
@@ -23,39 +26,32 @@ bool overlaps(uvec2 bounds, uvec2 corner)
     return across && (bounds.y & 0xffff) < corner.y + 8 && bounds.y >> 16 >= corner.y;
 }
 
+#include "lib/splat_walk.cpu.glsl"
+
 void main()
 {
-    const uint camera = gl_WorkGroupID.z, lane = gl_LocalInvocationID.x;
+    const uint camera = gl_WorkGroupID.z, column = gl_LocalInvocationID.x;
     const uvec2 corner = gl_WorkGroupID.yx * 8, tile_at = corner / p.tile;
-    const uint tile = (camera * p.tiles_y + tile_at.y) * p.tiles_x + tile_at.x, end = starts[tile + 1];
     vec4 ray[kRows];
-    bool going = false;
     [[unroll]] for (uint y = 0; y < kRows; ++y) {
-        ray[y] = pixel_ray(corner + uvec2(lane, y), camera);
+        ray[y] = pixel_ray(corner + uvec2(column, y), camera);
         pixels[y] = pixel_of_ray(ray[y]);
-        going = going || ray[y].w != 0.0;
     }
-    uint i = starts[tile];
-    while (going) {
-        uint record = kNone;
-        vec4 t0;
-        while (i < end && record == kNone) {
-            const uint next = pairs[i++];
-            const uvec4 texel = texelFetch(Records, int(next * kRayRecord));
-            t0 = uintBitsToFloat(texel);
-            record = overlaps(texel.zw, corner) ? next : kNone;
-        }
-        if (record == kNone)
+    Walk walk = walk_of((camera * p.tiles_y + tile_at.y) * p.tiles_x + tile_at.x);
+    walk.end = any_left() ? walk.end : walk.first; // no pixel is within the lens
+    while (walk.first < walk.end) {
+        if (!find_hits(walk, corner))
             break;
-        const int at = int(record * kRayRecord);
-        const RaySplat s = read_splat(t0, uintBitsToFloat(texelFetch(Records, at + 1)), uintBitsToFloat(texelFetch(Records, at + 2)),
-                                      uintBitsToFloat(texelFetch(Records, at + 3)), uintBitsToFloat(texelFetch(Records, at + 4)));
-        going = false;
-        [[unroll]] for (uint y = 0; y < kRows; ++y) {
-            blend(pixels[y], s, ray[y], vec2(corner + uvec2(lane, y)) + 0.5, record);
-            going = going || pixels[y].transmittance > 0.0;
-        }
+        do {
+            const uint record = take_hit(walk);
+            const RaySplat s = read_splat(texel_of(record, 0), texel_of(record, 1), texel_of(record, 2), texel_of(record, 3),
+                                          texel_of(record, 4));
+            [[unroll]] for (uint y = 0; y < kRows; ++y)
+                blend(pixels[y], s, ray[y], vec2(corner + uvec2(column, y)) + 0.5, record);
+        } while (walk.hits != 0);
+        if (!any_left())
+            break;
     }
     [[unroll]] for (uint y = 0; y < kRows; ++y)
-        store(pixels[y], corner + uvec2(lane, y), camera);
+        store(pixels[y], corner + uvec2(column, y), camera);
 }

@@ -14,7 +14,7 @@ namespace semrover {
 
 namespace {
 
-struct Options {
+struct BenchAsdArguments {
     std::string unet, vae, precision = "fp16";
     uint32_t width = 616, height = 424, tokens = 77;
     float cfg_scale = 1.5f;
@@ -25,7 +25,7 @@ struct Networks {
     VaeConfig vae;
 };
 
-Result<Networks> read_networks(const Options& o)
+Result<Networks> read_networks(const BenchAsdArguments& o)
 {
     Networks n;
     n.unet.in_channels = renderer_channels(n.vae);
@@ -50,7 +50,7 @@ Result<Timing> time_codec(Device& device, const Vae& vae, const LatentSize& size
     return measure([&] { return (encode ? codec->encode(image) : codec->decode(latent)).map([](const auto&) {}); });
 }
 
-Status bench_asd(const Options& o, const Globals& globals)
+Status bench_asd(const BenchAsdArguments& o, const Globals& globals)
 {
     SR_TRY(const Networks n, read_networks(o));
     SR_TRY(const auto device, open_device(globals));
@@ -90,7 +90,7 @@ Status bench_asd(const Options& o, const Globals& globals)
 
 void add_bench_asd(CLI::App& bench, const Globals& globals, Run& run)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<BenchAsdArguments>();
     CLI::App* c = bench.add_subcommand("asd", "a denoising step of the autoregressive renderer, and its VAE");
     c->add_option("--config", o->unet, "the UNet's config.json; default: Stable Diffusion 1.5 with 13 input channels");
     c->add_option("--vae-config", o->vae, "the VAE's; default: Stable Diffusion 1.5's");

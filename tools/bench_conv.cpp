@@ -11,13 +11,13 @@ namespace semrover {
 
 namespace {
 
-struct Options {
+struct BenchConvArguments {
     uint32_t width = 77, height = 53, channels = 320, outputs = 320;
     std::string precision = "fp16";
     bool winograd = false;
 };
 
-Status bench_conv(const Options& o, const Globals& globals)
+Status bench_conv(const BenchConvArguments& o, const Globals& globals)
 {
     SR_TRY(const auto device, open_device(globals));
     const DType dtype = o.precision == "fp32" ? DType::f32 : DType::f16;
@@ -52,7 +52,7 @@ Status bench_conv(const Options& o, const Globals& globals)
 
 void add_bench_conv(CLI::App& bench, const Globals& globals, Run& run)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<BenchConvArguments>();
     CLI::App* c = bench.add_subcommand("conv", "3x3 convolution of an image, zeros around it");
     const auto size = CLI::Range(1u, 16384u);
     c->add_option("-W,--width", o->width, "pixels")->check(size);

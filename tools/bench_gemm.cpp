@@ -11,12 +11,12 @@ namespace semrover {
 
 namespace {
 
-struct Options {
+struct BenchGemmArguments {
     uint32_t m = 384, n = 4096, k = 1024;
     std::string precision = "fp16";
 };
 
-Status bench_gemm(const Options& o, const Globals& globals)
+Status bench_gemm(const BenchGemmArguments& o, const Globals& globals)
 {
     SR_TRY(const auto device, open_device(globals));
     const DType dtype = o.precision == "fp32" ? DType::f32 : DType::f16;
@@ -43,7 +43,7 @@ Status bench_gemm(const Options& o, const Globals& globals)
 
 void add_bench_gemm(CLI::App& bench, const Globals& globals, Run& run)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<BenchGemmArguments>();
     CLI::App* c = bench.add_subcommand("gemm", "dense layer: y [m, n] = x [m, k] w [n, k]^T");
     const auto size = CLI::Range(1u, 65536u);
     c->add_option("--m", o->m, "rows of x")->check(size);

@@ -12,7 +12,7 @@ namespace semrover {
 
 namespace {
 
-struct Options {
+struct BenchRegionsArguments {
     uint32_t cells = 1000000;
     int region_size = 128, coverage_threshold = 32;
 };
@@ -33,7 +33,7 @@ std::vector<std::array<int32_t, 3>> street_cloud(uint32_t count)
     return cells;
 }
 
-Status bench_regions(const Options& o, const Globals& globals)
+Status bench_regions(const BenchRegionsArguments& o, const Globals& globals)
 {
     const auto cells = street_cloud(o.cells);
     RegionOptions options;
@@ -61,7 +61,7 @@ Status bench_regions(const Options& o, const Globals& globals)
 
 void add_bench_regions(CLI::App& bench, const Globals& globals, Run& run)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<BenchRegionsArguments>();
     CLI::App* c = bench.add_subcommand("regions", "region extraction and the dependency graph (host, one core)");
     c->add_option("--cells", o->cells, "cells of the cloud")->check(CLI::Range(1u, 20000000u));
     c->add_option("--region-size", o->region_size, "cells of a region")->check(CLI::Range(1, 4096));

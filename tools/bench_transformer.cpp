@@ -14,14 +14,14 @@ namespace {
 
 constexpr int kSteps = 2; // per measured run
 
-struct Options {
+struct BenchTransformerArguments {
     std::string config, precision = "fp16";
     uint32_t cells = 128, batch = 1;
     bool unguided = false;
 };
 
 // a street-like patch: a square of ground and a wall
-std::vector<RegionInput> make_regions(const Options& o, uint32_t classes)
+std::vector<RegionInput> make_regions(const BenchTransformerArguments& o, uint32_t classes)
 {
     RegionInput region;
     const int32_t side = int32_t(std::ceil(std::sqrt(o.cells * 0.6)));
@@ -35,7 +35,7 @@ std::vector<RegionInput> make_regions(const Options& o, uint32_t classes)
     return std::vector<RegionInput>(o.batch, region);
 }
 
-Status bench_transformer(const Options& o, const Globals& globals)
+Status bench_transformer(const BenchTransformerArguments& o, const Globals& globals)
 {
     TransformerConfig config;
     if (!o.config.empty()) {
@@ -74,7 +74,7 @@ Status bench_transformer(const Options& o, const Globals& globals)
 
 void add_bench_transformer(CLI::App& bench, const Globals& globals, Run& run)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<BenchTransformerArguments>();
     CLI::App* c = bench.add_subcommand("transformer", "one denoising step of the Σ-Voxfield transformer");
     c->add_option("--config", o->config, "config.json; default: the full-size model, 12 layers of 8 heads of 128");
     c->add_option("--cells", o->cells, "cells of a region")->check(CLI::Range(1u, 4096u));

@@ -11,7 +11,7 @@ namespace semrover {
 
 namespace {
 
-struct Options {
+struct BenchUnetArguments {
     std::string config, precision = "fp16", profile;
     uint32_t width = 77, height = 53, batch = 1, tokens = 77;
 };
@@ -24,7 +24,7 @@ UnetConfig default_config()
     return c;
 }
 
-Status bench_unet(const Options& o, const Globals& globals)
+Status bench_unet(const BenchUnetArguments& o, const Globals& globals)
 {
     UnetConfig config = default_config();
     if (!o.config.empty()) {
@@ -62,7 +62,7 @@ Status bench_unet(const Options& o, const Globals& globals)
 
 void add_bench_unet(CLI::App& bench, const Globals& globals, Run& run)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<BenchUnetArguments>();
     CLI::App* c = bench.add_subcommand("unet", "one evaluation of a renderer's UNet");
     c->add_option("--config", o->config, "config.json; default: Stable Diffusion 1.5 with 13 input channels");
     c->add_option("-W,--width", o->width, "latent pixels")->check(CLI::Range(1u, 4096u));

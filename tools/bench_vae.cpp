@@ -11,13 +11,13 @@ namespace semrover {
 
 namespace {
 
-struct Options {
+struct BenchVaeArguments {
     std::string config, precision = "fp16", profile;
     uint32_t width = 616, height = 424;
     bool encode = false;
 };
 
-Status bench_vae(const Options& o, const Globals& globals)
+Status bench_vae(const BenchVaeArguments& o, const Globals& globals)
 {
     VaeConfig config; // Stable Diffusion 1.5's
     if (!o.config.empty()) {
@@ -53,7 +53,7 @@ Status bench_vae(const Options& o, const Globals& globals)
 
 void add_bench_vae(CLI::App& bench, const Globals& globals, Run& run)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<BenchVaeArguments>();
     CLI::App* c = bench.add_subcommand("vae", "a picture through the decoder of a VAE");
     c->add_option("--config", o->config, "config.json; default: Stable Diffusion 1.5");
     c->add_option("-W,--width", o->width, "pixels")->check(CLI::Range(1u, 16384u));

@@ -11,14 +11,14 @@ namespace semrover {
 
 namespace {
 
-struct Options {
+struct ConvertArguments {
     ConvertModelOptions model;
     ConvertSceneOptions scene;
     ConvertPathOptions path;
 };
 
 // a .bin may be SemanticKITTI's, or a model's pickle
-bool is_scene(const Options& o)
+bool is_scene(const ConvertArguments& o)
 {
     const Path in = o.model.in, out = o.model.out;
     std::error_code ignored;
@@ -29,7 +29,7 @@ bool is_scene(const Options& o)
     return has_scene_extension(in) || has_scene_extension(out);
 }
 
-Status convert(Options& o, const Globals& globals)
+Status convert(ConvertArguments& o, const Globals& globals)
 {
     if (is_camera_path(o.model.in))
         return convert_path(o.model.in, o.model.out, o.path, globals);
@@ -47,7 +47,7 @@ Status convert(Options& o, const Globals& globals)
 
 void add_convert(CLI::App& app, const Globals& globals, Run& run)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<ConvertArguments>();
     CLI::App* c = app.add_subcommand("convert", "write a model in the diffusers layout, or a scene in another format");
     c->add_option(
          "IN", o->model.in,

@@ -17,10 +17,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-using Options = ConvertModelOptions;
-
 // what will be written
-struct Plan {
+struct Conversion {
     std::map<std::string, ComponentFiles> components; // by folder
     std::map<std::string, Json> texts;                // by path in the model
     std::map<std::string, Path> copies;               // by path in the model: the file
@@ -29,7 +27,7 @@ struct Plan {
     std::vector<std::string> left_out, warnings;
 };
 
-std::optional<DType> dtype_option(const Options& o)
+std::optional<DType> dtype_option(const ConvertModelOptions& o)
 {
     if (o.dtype.empty())
         return {};
@@ -45,7 +43,7 @@ std::vector<TensorStream> streams_of(const Checkpoint& checkpoint, std::span<con
     return streams;
 }
 
-Status plan_unet(const Options& o, const RendererModel& m, Plan& plan)
+Status plan_unet(const ConvertModelOptions& o, const RendererModel& m, Conversion& plan)
 {
     SR_TRY(const Checkpoint checkpoint, m.open_unet());
     const std::vector<TensorSpec> schema = unet_schema(m.unet);
@@ -67,7 +65,7 @@ Status plan_unet(const Options& o, const RendererModel& m, Plan& plan)
     return {};
 }
 
-Status plan_vae(const Options& o, const RendererModel& m, Plan& plan)
+Status plan_vae(const ConvertModelOptions& o, const RendererModel& m, Conversion& plan)
 {
     SR_TRY(const Checkpoint checkpoint, m.open_vae());
     const std::vector<TensorSpec> schema = vae_schema(m.vae);
@@ -81,7 +79,7 @@ Status plan_vae(const Options& o, const RendererModel& m, Plan& plan)
     return {};
 }
 
-Status plan_renderer(const Options& o, Plan& plan)
+Status plan_renderer(const ConvertModelOptions& o, Conversion& plan)
 {
     SR_TRY(const RendererModel m, RendererModel::read(o.in));
     SR_CHECK(plan_unet(o, m, plan));
@@ -94,7 +92,7 @@ Status plan_renderer(const Options& o, Plan& plan)
     return {};
 }
 
-Status plan_transformer(const Options& o, const Path& folder, Plan& plan)
+Status plan_transformer(const ConvertModelOptions& o, const Path& folder, Conversion& plan)
 {
     SR_TRY(SafetensorsSet set, SafetensorsSet::open_folder(folder));
     ComponentFiles files;
@@ -108,7 +106,7 @@ Status plan_transformer(const Options& o, const Path& folder, Plan& plan)
 }
 
 // small files that go over as they are, what the old index says about them, and names of the rest
-Status plan_copies(const Path& in, Plan& plan)
+Status plan_copies(const Path& in, Conversion& plan)
 {
     const std::string small[] = {"scheduler/scheduler_config.json", "voxfield_scheduler/scheduler_config.json",
                                  "conditioning/conditioning.safetensors"};
@@ -137,7 +135,7 @@ Status plan_copies(const Path& in, Plan& plan)
 }
 
 // the text, where the file holds one, and names of what is left out
-Status plan_ldm_rest(const Path& in, Plan& plan)
+Status plan_ldm_rest(const Path& in, Conversion& plan)
 {
     SR_TRY(SafetensorsSet opened, SafetensorsSet::open(in));
     const auto shared = std::make_shared<const SafetensorsSet>(std::move(opened));
@@ -152,9 +150,9 @@ Status plan_ldm_rest(const Path& in, Plan& plan)
     return {};
 }
 
-Result<Plan> make_plan(const Options& o)
+Result<Conversion> plan_conversion(const ConvertModelOptions& o)
 {
-    Plan plan;
+    Conversion plan;
     const Path in = o.in;
     std::error_code ignored;
     const bool folder = fs::is_directory(in, ignored), transformer = folder && is_there(in / "voxfield_transformer");
@@ -234,7 +232,7 @@ class Staging {
 };
 
 // each tensor reports that it is done, and stops where the user wants
-void watch(Plan& plan, Progress& progress, uint64_t& done)
+void watch(Conversion& plan, Progress& progress, uint64_t& done)
 {
     for (auto& [name, files] : plan.components)
         for (TensorStream& tensor : files.tensors)
@@ -247,7 +245,7 @@ void watch(Plan& plan, Progress& progress, uint64_t& done)
             };
 }
 
-Status write_plan(Plan& plan, const Path& out, const Globals& globals)
+Status write_conversion(Conversion& plan, const Path& out, const Globals& globals)
 {
     uint64_t total = 0, done = 0;
     for (const auto& [name, files] : plan.components)
@@ -278,7 +276,7 @@ Status write_plan(Plan& plan, const Path& out, const Globals& globals)
     return {};
 }
 
-Status check_output(const Options& o, const Path& out, const Globals& globals)
+Status check_output(const ConvertModelOptions& o, const Path& out, const Globals& globals)
 {
     std::error_code ignored;
     if (fs::equivalent(o.in, out, ignored))
@@ -292,7 +290,7 @@ Status check_output(const Options& o, const Path& out, const Globals& globals)
     return {};
 }
 
-void report(const Plan& plan, const Options& o, const Globals& globals)
+void report(const Conversion& plan, const ConvertModelOptions& o, const Globals& globals)
 {
     Json components = Json::object();
     for (const auto& [name, files] : plan.components) {
@@ -327,12 +325,12 @@ Status convert_model(const ConvertModelOptions& o, const Globals& globals)
         out = out.parent_path(); // "model/"
     if (!o.dry_run)
         SR_CHECK(check_output(o, out, globals));
-    SR_TRY(Plan plan, make_plan(o));
+    SR_TRY(Conversion plan, plan_conversion(o));
     for (const std::string& warning : plan.warnings)
         if (!globals.quiet)
             fmt::print(stderr, "semrover: warning: {}\n", warning);
     if (!o.dry_run)
-        SR_CHECK(write_plan(plan, out, globals));
+        SR_CHECK(write_conversion(plan, out, globals));
     report(plan, o, globals);
     return {};
 }

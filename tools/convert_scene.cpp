@@ -13,9 +13,8 @@ namespace semrover {
 namespace {
 
 namespace fs = std::filesystem;
-using Options = ConvertSceneOptions;
 
-Result<SceneFormat> output_format(const Options& o, const SceneInput& input)
+Result<SceneFormat> output_format(const ConvertSceneOptions& o, const SceneInput& input)
 {
     if (o.to.empty()) {
         SR_TRY(const SceneFormat format, scene_format_to_write(o.out));
@@ -41,7 +40,7 @@ std::vector<Path> files_of(const Path& out, SceneFormat format)
 }
 
 // what cannot be written is refused before anything is computed
-Status check_output(const Options& o, SceneFormat format, const Globals& globals)
+Status check_output(const ConvertSceneOptions& o, SceneFormat format, const Globals& globals)
 {
     for (const Path& file : files_of(o.out, format)) {
         std::error_code ignored;
@@ -55,7 +54,7 @@ Status check_output(const Options& o, SceneFormat format, const Globals& globals
 }
 
 // normals come from the device; the blocks of a grid without points need none
-Result<Surfels> splats_of(const Options& o, const VoxelGrid& grid, const Globals& globals)
+Result<Surfels> splats_of(const ConvertSceneOptions& o, const VoxelGrid& grid, const Globals& globals)
 {
     const ScenePoints points = points_of(grid);
     if (points.size() == 0)
@@ -78,7 +77,7 @@ Json labels_of(std::span<const uint8_t> labels)
     return counts;
 }
 
-Json summary(const Options& o, const SceneInput& input, SceneFormat to)
+Json summary(const ConvertSceneOptions& o, const SceneInput& input, SceneFormat to)
 {
     Json json{{"input", o.in},           {"output", o.out},          {"from", facts_of(input.format).name},
               {"to", facts_of(to).name}, {"dropped", input.dropped}, {"warnings", input.warnings}};
@@ -93,7 +92,7 @@ Json summary(const Options& o, const SceneInput& input, SceneFormat to)
     return json;
 }
 
-Status write_output(const Options& o, SceneInput& input, SceneFormat to, const Globals& globals)
+Status write_output(const ConvertSceneOptions& o, SceneInput& input, SceneFormat to, const Globals& globals)
 {
     const bool as_splats = facts_of(to).splats;
     if (input.grid && !as_splats)
@@ -106,7 +105,7 @@ Status write_output(const Options& o, SceneInput& input, SceneFormat to, const G
 
 } // namespace
 
-Status convert_scene(const Options& o, const Globals& globals)
+Status convert_scene(const ConvertSceneOptions& o, const Globals& globals)
 {
     SR_CHECK(surfel_options(o.splat_radius, o.opacity).map([](const SurfelOptions&) {}));
     SR_TRY(SceneInput input, read_scene_input(o.in, o.input));

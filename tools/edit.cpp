@@ -22,7 +22,7 @@ using Kind = EditOperation::Kind;
 
 constexpr double kWidestHalo = 30; // metres
 
-struct Options {
+struct EditArguments {
     std::string grid, undo;
     RegenerationOptions out;
     std::vector<EditOperation> operations; // as they come on the command line, scripts in their place
@@ -39,7 +39,7 @@ T parsed(Result<T> result, const char* option)
     return std::move(*result);
 }
 
-CellSelection& selection(Options& o, const char* option)
+CellSelection& selection(EditArguments& o, const char* option)
 {
     if (o.cut)
         return o.cut_where;
@@ -48,14 +48,14 @@ CellSelection& selection(Options& o, const char* option)
     return o.operations.back().where;
 }
 
-EditOperation& operation(Options& o, const char* option)
+EditOperation& operation(EditArguments& o, const char* option)
 {
     if (o.cut || o.operations.empty())
         throw CLI::ValidationError(option, "comes after the operation that it belongs to");
     return o.operations.back();
 }
 
-EditOperation& add(Options& o, Kind kind)
+EditOperation& add(EditArguments& o, Kind kind)
 {
     o.operations.emplace_back();
     o.operations.back().kind = kind;
@@ -80,7 +80,7 @@ std::optional<uint8_t> class_or_all(const std::string& text, const char* option)
     return text == "all" ? std::nullopt : std::optional(parsed(parse_class(text), option));
 }
 
-void add_operations(CLI::App& c, Options* o)
+void add_operations(CLI::App& c, EditArguments* o)
 {
     add_text(c, "--remove", "class or all: cells go, and the ground under them closes",
              [o](const std::string& t) { add(*o, Kind::remove).where.label = class_or_all(t, "--remove"); });
@@ -102,7 +102,7 @@ void add_operations(CLI::App& c, Options* o)
     });
 }
 
-void add_modifiers(CLI::App& c, Options* o)
+void add_modifiers(CLI::App& c, EditArguments* o)
 {
     add_text(c, "--class", "of the operation before it: only cells of this class",
              [o](const std::string& t) { selection(*o, "--class").label = class_or_all(t, "--class"); });
@@ -128,7 +128,7 @@ void add_modifiers(CLI::App& c, Options* o)
         [o](const std::string& t) { operation(*o, "--points").keep_points = parsed(keeps_points(t), "--points"); });
 }
 
-Status undo(const Options& o, const Globals& globals)
+Status undo(const EditArguments& o, const Globals& globals)
 {
     if (!o.operations.empty() || o.cut || !o.out.generation.model.empty())
         return fail(ErrorCode::usage, "--undo stands alone: it takes back a whole edit");
@@ -138,7 +138,7 @@ Status undo(const Options& o, const Globals& globals)
     return undo_edit(o.undo, o.grid, o.out.output);
 }
 
-Status cut(const Options& o, const Globals& globals)
+Status cut(const EditArguments& o, const Globals& globals)
 {
     if (!o.operations.empty() || !o.out.generation.model.empty())
         return fail(ErrorCode::usage, "--cut stands alone: it writes a stamp and changes nothing");
@@ -160,7 +160,7 @@ Status cut(const Options& o, const Globals& globals)
 }
 
 // everything that decides the bytes, stamps by their content
-Result<Json> request_json(const Options& o)
+Result<Json> request_json(const EditArguments& o)
 {
     Json operations = Json::array();
     for (const EditOperation& operation : o.operations) {
@@ -192,7 +192,7 @@ std::vector<uint32_t> targets_of(const EditedGrid& edited, double halo)
     return targets;
 }
 
-Status edit(const Options& o, const Globals& globals)
+Status edit(const EditArguments& o, const Globals& globals)
 {
     if (!o.undo.empty())
         return undo(o, globals);
@@ -233,7 +233,7 @@ Status edit(const Options& o, const Globals& globals)
 
 void add_edit(CLI::App& app, const Globals& globals, Run& run)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<EditArguments>();
     CLI::App* c = app.add_subcommand("edit", "change labels or occupancy, regenerate only that and a halo around it");
     c->add_option("GRID", o->grid, ".sgrid")->required();
     add_operations(*c, o.get());

@@ -17,7 +17,7 @@ namespace semrover {
 
 namespace {
 
-struct Options {
+struct EvalChamferArguments {
     std::string mesh, grid, sweep, csv, up;
     VoxelizeOptions voxelize;
     ChamferOptions chamfer;
@@ -60,7 +60,7 @@ Result<std::vector<int>> points_of_sweep(const std::string& text)
     return list;
 }
 
-Result<Mesh> load_surface(const Options& o)
+Result<Mesh> load_surface(const EvalChamferArguments& o)
 {
     const UpAxis up = o.up == "y" ? UpAxis::y : o.up == "z" ? UpAxis::z : UpAxis::file;
     SR_TRY(const Mesh mesh, read_mesh(o.mesh, up));
@@ -73,7 +73,7 @@ Result<Mesh> load_surface(const Options& o)
     return surface;
 }
 
-Result<std::vector<Measure>> measure_all(const Options& o, const Globals& globals, Device& device)
+Result<std::vector<Measure>> measure_all(const EvalChamferArguments& o, const Globals& globals, Device& device)
 {
     std::vector<Measure> measures;
     SR_TRY(const Mesh mesh, load_surface(o));
@@ -103,7 +103,7 @@ Result<std::vector<Measure>> measure_all(const Options& o, const Globals& global
     return measures;
 }
 
-void report(const Options& o, const Globals& globals, const std::vector<Measure>& measures)
+void report(const EvalChamferArguments& o, const Globals& globals, const std::vector<Measure>& measures)
 {
     if (globals.json) {
         Json list = Json::array();
@@ -132,7 +132,7 @@ Status write_csv(const std::string& path, const std::vector<Measure>& measures)
     return write_file_atomically(path, text);
 }
 
-Status eval_chamfer(const Options& o, const Globals& globals)
+Status eval_chamfer(const EvalChamferArguments& o, const Globals& globals)
 {
     if (!o.grid.empty() && !o.sweep.empty())
         return fail(ErrorCode::usage, "--sweep makes its own grids; give either a GRID or --sweep");
@@ -153,7 +153,7 @@ Status eval_chamfer(const Options& o, const Globals& globals)
 
 void add_eval_chamfer(CLI::App& eval, const Globals& globals, Run& run)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<EvalChamferArguments>();
     CLI::App* c = eval.add_subcommand("chamfer", "how far a grid's points and a mesh are from each other, in metres");
     c->add_option("MESH", o->mesh, ".obj, .ply, .glb or .gltf")->required();
     c->add_option("GRID", o->grid, ".sgrid; without one the mesh is voxelized");

@@ -17,7 +17,7 @@ namespace semrover {
 
 namespace {
 
-struct Options {
+struct EvalFlickerArguments {
     std::string frames, depth, path, truth;
     LensOptions lens;
     FlowOptions flow;
@@ -32,13 +32,13 @@ struct Step {
     NamedCamera from, to;
 };
 
-struct Inputs {
+struct FlickerInputs {
     FrameFiles frames, depth, truth; // the last may be empty
     std::vector<Step> steps;
 };
 
 // the path's frames that have pictures, next to the ones before them
-Result<std::vector<Step>> steps_of(const CameraPath& path, const FrameFiles& frames, const Options& o)
+Result<std::vector<Step>> steps_of(const CameraPath& path, const FrameFiles& frames, const EvalFlickerArguments& o)
 {
     std::map<std::string, uint32_t> counts;
     std::map<std::string, NamedCamera> last; // of each camera
@@ -67,9 +67,9 @@ Result<std::vector<Step>> steps_of(const CameraPath& path, const FrameFiles& fra
     return steps;
 }
 
-Result<Inputs> read_inputs(const Options& o)
+Result<FlickerInputs> read_inputs(const EvalFlickerArguments& o)
 {
-    Inputs in;
+    FlickerInputs in;
     SR_TRY(in.frames, list_frames(o.frames, "color"));
     SR_TRY(in.depth, list_frames(o.depth, "depth"));
     SR_CHECK(check_names(in.frames, o.frames, in.depth, o.depth, false));
@@ -96,7 +96,7 @@ struct Pictures {
     ImageRgb8 frame, truth;
 };
 
-Result<Pictures> read_pictures(const Inputs& in, const NamedCamera& camera)
+Result<Pictures> read_pictures(const FlickerInputs& in, const NamedCamera& camera)
 {
     const ImageSize size{camera.camera.intrinsics.width, camera.camera.intrinsics.height};
     Pictures p;
@@ -119,7 +119,7 @@ struct Flicker {
 
 class StepReader {
   public:
-    StepReader(const Inputs& in, const FlowOptions& flow) : in_(in), flow_(flow) {}
+    StepReader(const FlickerInputs& in, const FlowOptions& flow) : in_(in), flow_(flow) {}
 
     Result<Flicker> measure(const Step& step)
     {
@@ -137,7 +137,7 @@ class StepReader {
     }
 
   private:
-    const Inputs& in_;
+    const FlickerInputs& in_;
     FlowOptions flow_;
     std::map<std::string, Pictures> last_; // of each camera
 };
@@ -161,9 +161,9 @@ void print(const Flicker& f, size_t steps, bool with_truth)
                    f.truth.rms());
 }
 
-Status eval_flicker(const Options& o, const Globals& globals)
+Status eval_flicker(const EvalFlickerArguments& o, const Globals& globals)
 {
-    SR_TRY(const Inputs in, read_inputs(o));
+    SR_TRY(const FlickerInputs in, read_inputs(o));
     const bool with_truth = !in.truth.empty();
     StepReader reader(in, o.flow);
     Flicker total;
@@ -201,7 +201,7 @@ Status eval_flicker(const Options& o, const Globals& globals)
 
 void add_eval_flicker(CLI::App& eval, const Globals& globals, Run& run)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<EvalFlickerArguments>();
     o->lens.width = o->lens.height = 0; // those of the depth pictures
     CLI::App* c = eval.add_subcommand("flicker", "change from frame to frame that depth and poses do not explain");
     c->add_option("FRAMES", o->frames, "a folder of pictures 000000 and so on, or what `refine` or `render` wrote")

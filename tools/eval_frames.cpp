@@ -15,17 +15,17 @@ namespace semrover {
 
 namespace {
 
-struct Options {
+struct EvalFramesArguments {
     std::string frames, truth, visible, labels;
 };
 
-struct Inputs {
+struct FrameInputs {
     FrameFiles frames, truth, visible, labels; // the last two may be empty
 };
 
-Result<Inputs> list_inputs(const Options& o)
+Result<FrameInputs> list_inputs(const EvalFramesArguments& o)
 {
-    Inputs in;
+    FrameInputs in;
     SR_TRY(in.frames, list_frames(o.frames, "color"));
     SR_TRY(in.truth, list_frames(o.truth, "color"));
     SR_CHECK(check_names(in.frames, o.frames, in.truth, o.truth, true));
@@ -39,7 +39,7 @@ Result<Inputs> list_inputs(const Options& o)
     return in;
 }
 
-Result<FrameSimilarity> measure_frame(const Inputs& in, const std::string& name)
+Result<FrameSimilarity> measure_frame(const FrameInputs& in, const std::string& name)
 {
     SR_TRY(const ImageRgb8 frame, read_color_frame(in.frames.at(name), {}));
     const ImageSize size{frame.width, frame.height};
@@ -70,12 +70,7 @@ Json sums_json(const SimilaritySums& s)
             {"ssim", s.windows ? Json(s.ssim()) : Json()}};
 }
 
-std::string label_name(size_t label)
-{
-    return label < kClassCount ? std::string(kPalette[label].name) : "none";
-}
-
-void add_parts(const Inputs& in, const FrameSimilarity& s, Json& report)
+void add_parts(const FrameInputs& in, const FrameSimilarity& s, Json& report)
 {
     if (!in.visible.empty()) {
         report["visible"] = sums_json(s.visible);
@@ -101,7 +96,7 @@ struct FrameMean { // of the frames that are not equal to their truth
     size_t frames = 0;
 };
 
-void print(const Inputs& in, const FrameSimilarity& s, const FrameMean& mean)
+void print(const FrameInputs& in, const FrameSimilarity& s, const FrameMean& mean)
 {
     fmt::print("{} frames, PSNR", in.frames.size());
     if (mean.frames)
@@ -118,9 +113,9 @@ void print(const Inputs& in, const FrameSimilarity& s, const FrameMean& mean)
             print_row(label_name(i), s.labels[i]);
 }
 
-Status eval_frames(const Options& o, const Globals& globals)
+Status eval_frames(const EvalFramesArguments& o, const Globals& globals)
 {
-    SR_TRY(const Inputs in, list_inputs(o));
+    SR_TRY(const FrameInputs in, list_inputs(o));
     FrameSimilarity total;
     FrameMean mean;
     Json rows = Json::array();
@@ -159,7 +154,7 @@ Status eval_frames(const Options& o, const Globals& globals)
 
 void add_eval_frames(CLI::App& eval, const Globals& globals, Run& run)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<EvalFramesArguments>();
     CLI::App* c = eval.add_subcommand("frames", "PSNR and SSIM of pictures against true ones of the same names");
     c->add_option("FRAMES", o->frames, "a folder of pictures, or what `refine`, `render` or `streets` wrote")
         ->required();

@@ -14,13 +14,13 @@ namespace {
 
 constexpr uint32_t kSubsetSize = 1000;
 
-struct Options {
+struct EvalKidArguments {
     EvalOptions sets;
     uint32_t subsets = 100, size = 0; // 0: kSubsetSize, or fewer where a set has fewer
     bool full = false;
 };
 
-Status eval_kid(const Options& o, const Globals& globals)
+Status eval_kid(const EvalKidArguments& o, const Globals& globals)
 {
     SR_TRY(EvalSets sets, load_eval_sets(o.sets, EvalNetwork::images, globals));
     SR_CHECK(require_features(sets, "kid"));
@@ -63,7 +63,7 @@ Status eval_kid(const Options& o, const Globals& globals)
 
 void add_eval_kid(CLI::App& eval, const Globals& globals, Run& run)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<EvalKidArguments>();
     CLI::App* c = eval.add_subcommand("kid", "kernel Inception distance of two sets of images");
     add_eval_options(*c, o->sets);
     c->add_option("--subsets", o->subsets, "random subsets to average over")

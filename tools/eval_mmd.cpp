@@ -12,7 +12,7 @@ namespace semrover {
 
 namespace {
 
-struct Options {
+struct EvalMmdArguments {
     EvalOptions sets;
     std::string kernel = "rbf";
     double bandwidth = 0; // 0: median distance
@@ -20,7 +20,7 @@ struct Options {
     double gamma = 0, coefficient = 1;
 };
 
-Status eval_mmd(const Options& o, const Globals& globals)
+Status eval_mmd(const EvalMmdArguments& o, const Globals& globals)
 {
     SR_TRY(EvalSets sets, load_eval_sets(o.sets, {}, globals));
     SR_CHECK(require_features(sets, "mmd"));
@@ -61,7 +61,7 @@ Status eval_mmd(const Options& o, const Globals& globals)
 
 void add_eval_mmd(CLI::App& eval, const Globals& globals, Run& run)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<EvalMmdArguments>();
     CLI::App* c = eval.add_subcommand("mmd", "maximum mean discrepancy of features of two sets of grids or images");
     add_eval_options(*c, o->sets);
     c->add_option("--kernel", o->kernel, "rbf or polynomial")

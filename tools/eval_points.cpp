@@ -16,7 +16,7 @@ namespace semrover {
 
 namespace {
 
-struct Options {
+struct EvalPointsArguments {
     std::string generated, truth;
     ContrastOptions contrast;
 };
@@ -52,7 +52,7 @@ Result<std::vector<Pair>> pairs_of_folders(const Path& generated, const Path& tr
     return pairs;
 }
 
-Result<std::vector<Pair>> pairs_of(const Options& o)
+Result<std::vector<Pair>> pairs_of(const EvalPointsArguments& o)
 {
     for (const std::string& path : {o.generated, o.truth})
         if (!is_there(path))
@@ -140,7 +140,7 @@ void print(const PointScores& s, size_t pairs)
     print_row("all", s.all);
 }
 
-Status eval_points(const Options& o, const Globals& globals)
+Status eval_points(const EvalPointsArguments& o, const Globals& globals)
 {
     SR_TRY(const std::vector<Pair> pairs, pairs_of(o));
     SR_TRY(const auto device, open_device(globals));
@@ -175,7 +175,7 @@ Status eval_points(const Options& o, const Globals& globals)
 
 void add_eval_points(CLI::App& eval, const Globals& globals, Run& run)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<EvalPointsArguments>();
     CLI::App* c =
         eval.add_subcommand("points", "generated points against true ones, by class: colour, distance, sharpness");
     c->add_option("GENERATED", o->generated, ".sgrid, a folder of them, or a .txt that names one a line")->required();

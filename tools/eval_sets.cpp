@@ -174,10 +174,7 @@ Status check_outputs(const EvalOptions& o, const Globals& globals)
 
 Status save(const EvalOptions& o, size_t side, const EvalSet& set)
 {
-    std::error_code error;
-    fs::create_directories(o.save, error);
-    if (error)
-        return fail(ErrorCode::bad_input, "cannot create {}: {}", quote_path(o.save), printable(error.message()));
+    SR_CHECK(make_folder(o.save));
     return write_features(saved_path(o, side), *set.features);
 }
 

@@ -15,7 +15,7 @@ namespace semrover {
 
 namespace {
 
-struct Options {
+struct EvalSurfaceArguments {
     std::string mesh, truth;
     std::string frames;
     FusionFolderOptions input;
@@ -23,11 +23,6 @@ struct Options {
     double depth_scale = 0.001, radius = 5;
     uint32_t min_views = 2;
 };
-
-std::string label_name(size_t label)
-{
-    return label < kClassCount ? std::string(kPalette[label].name) : "none";
-}
 
 // by class of the true surface
 Json classes_of(const SurfaceError& error)
@@ -73,7 +68,7 @@ Json report_of(const SurfaceError& error)
     return report;
 }
 
-void print(const SurfaceError& error, const Options& o)
+void print(const SurfaceError& error, const EvalSurfaceArguments& o)
 {
     fmt::print("{} of {} vertices", error.distances.size(), error.vertices);
     if (!o.frames.empty())
@@ -94,7 +89,7 @@ void print(const SurfaceError& error, const Options& o)
                    m["area"].get<double>());
 }
 
-Status run_surface(Options o, const Globals& globals)
+Status run_surface(EvalSurfaceArguments o, const Globals& globals)
 {
     SR_TRY(const Mesh mesh, read_mesh(o.mesh));
     SR_TRY(const Mesh truth, read_mesh(o.truth));
@@ -118,7 +113,7 @@ Status run_surface(Options o, const Globals& globals)
 
 void add_eval_surface(CLI::App& eval, const Globals& globals, Run& run)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<EvalSurfaceArguments>();
     CLI::App* c = eval.add_subcommand("surface", "distance of a mesh's vertices from the true surface, and labels");
     c->add_option("MESH", o->mesh, "what was made: .glb, .ply or .obj")->required();
     c->add_option("TRUTH", o->truth, "the true mesh, likewise")->required();

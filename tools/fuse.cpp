@@ -23,7 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct FuseArguments {
     std::string folder, output, poses, map, default_label, mesh_format = "glb";
     std::vector<std::string> exclude;
     FusionFolderOptions input;
@@ -35,7 +35,7 @@ struct Options {
 struct Outputs {
     Path mesh, semantic, voxfield, run;
 
-    explicit Outputs(const Options& o)
+    explicit Outputs(const FuseArguments& o)
         : mesh(Path(o.output) / ("mesh." + o.mesh_format)), semantic(Path(o.output) / "semantic.sgrid"),
           voxfield(Path(o.output) / "voxfield.sgrid"), run(Path(o.output) / "run.json")
     {
@@ -56,7 +56,7 @@ Result<uint8_t> class_option(const char* option, const std::string& text)
                 quote(text), kClassCount - 1);
 }
 
-Status resolve(Options& o, const Globals& globals)
+Status resolve(FuseArguments& o, const Globals& globals)
 {
     for (const std::string& text : o.exclude) {
         SR_TRY(const uint8_t label, class_option("--exclude", text));
@@ -129,7 +129,7 @@ struct Grids {
     VoxelGrid semantic, voxfield;
 };
 
-Result<Grids> make_grids(const Options& o, const FusedMesh& fused, Device& device)
+Result<Grids> make_grids(const FuseArguments& o, const FusedMesh& fused, Device& device)
 {
     const Mesh mesh = labelled_part(fused.mesh, o.voxels.default_label);
     if (mesh.faces.empty())
@@ -149,7 +149,7 @@ Result<Grids> make_grids(const Options& o, const FusedMesh& fused, Device& devic
     return grids;
 }
 
-Json settings_of(const Options& o)
+Json settings_of(const FuseArguments& o)
 {
     Json excluded = Json::array();
     for (size_t label = 0; label < kClassCount; ++label)
@@ -182,7 +182,7 @@ Json figures_of(const FusionFolder& folder, const FusedMesh& fused, const Grids&
             {"cells", grids.semantic.cells.size()}, {"peak_device_bytes", device.peak_bytes()}};
 }
 
-Status write_outputs(const Options& o, const FusedMesh& fused, const Grids& grids, const Json& run)
+Status write_outputs(const FuseArguments& o, const FusedMesh& fused, const Grids& grids, const Json& run)
 {
     const Outputs out(o);
     SR_CHECK(o.mesh_format == "ply" ? write_mesh_ply(out.mesh, fused.mesh) : write_glb(out.mesh, fused.mesh));
@@ -192,7 +192,7 @@ Status write_outputs(const Options& o, const FusedMesh& fused, const Grids& grid
 }
 
 // all of them or none; a folder that was there before stays
-Status write_all(const Options& o, const FusedMesh& fused, const Grids& grids, const Json& run)
+Status write_all(const FuseArguments& o, const FusedMesh& fused, const Grids& grids, const Json& run)
 {
     std::error_code error;
     const bool made = fs::create_directories(o.output, error);
@@ -218,7 +218,7 @@ void print_warnings(const FusionFolder& folder, const FusedMesh& fused)
                    fused.mesh.faces.size());
 }
 
-Status run_fuse(Options o, const Globals& globals)
+Status run_fuse(FuseArguments o, const Globals& globals)
 {
     SR_CHECK(resolve(o, globals));
     SR_TRY(FusionFolder folder, FusionFolder::open(o.folder, o.input));
@@ -274,7 +274,7 @@ void add_fusion_options(CLI::App& c, FusionOptions& o)
 
 void add_fuse(CLI::App& app, const Globals& globals, Run& run)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<FuseArguments>();
     CLI::App* c = app.add_subcommand("fuse", "depth, poses, labels and colours of frames to a mesh and grids");
     c->add_option("DIR", o->folder, "[CAMERA/]{depth,label,color}/000000.png and transforms.json")->required();
     c->add_option("-o,--output", o->output, "folder for mesh.glb, semantic.sgrid, voxfield.sgrid, run.json")

@@ -16,7 +16,7 @@ namespace semrover {
 
 namespace {
 
-struct Options {
+struct GenerateArguments {
     std::string grid, output;
     uint64_t seed = 0;
     GenerationOptions generation;
@@ -26,7 +26,7 @@ struct Options {
 };
 
 // of the file, or of what another program's file became: that depends on options and on other files
-Result<uint64_t> hash_input(const Options& o, const VoxelGrid& grid)
+Result<uint64_t> hash_input(const GenerateArguments& o, const VoxelGrid& grid)
 {
     if (o.input.from.empty() && Path(o.grid).extension() == ".sgrid")
         return hash_file(o.grid);
@@ -40,7 +40,7 @@ Result<uint64_t> hash_input(const Options& o, const VoxelGrid& grid)
     return hash.value();
 }
 
-Status finish(const Options& o, Generation& g, VoxelGrid& grid, RunFolder& run, const std::string& model_hash,
+Status finish(const GenerateArguments& o, Generation& g, VoxelGrid& grid, RunFolder& run, const std::string& model_hash,
               const Globals& globals)
 {
     grid.metadata["seed"] = std::to_string(o.seed);
@@ -60,7 +60,7 @@ Status finish(const Options& o, Generation& g, VoxelGrid& grid, RunFolder& run, 
     return {};
 }
 
-Status check_output(const Options& o, const Globals& globals)
+Status check_output(const GenerateArguments& o, const Globals& globals)
 {
     if (o.output.empty())
         return fail(ErrorCode::usage, "-o/--output is required");
@@ -70,7 +70,7 @@ Status check_output(const Options& o, const Globals& globals)
     return {};
 }
 
-Status generate(const Options& o, const Globals& globals)
+Status generate(const GenerateArguments& o, const Globals& globals)
 {
     if (!o.along.path.empty()) {
         if (o.ply.any())
@@ -100,7 +100,7 @@ Status generate(const Options& o, const Globals& globals)
 
 void add_generate(CLI::App& app, const Globals& globals, Run& run)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<GenerateArguments>();
     CLI::App* c = app.add_subcommand("generate", "semantic grid to coloured points, region by region");
     c->add_option(
          "GRID", o->grid,

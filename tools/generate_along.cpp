@@ -200,10 +200,8 @@ Result<Json> AlongRun::settings() const
 // a run that begins finds no tiles of another
 Status AlongRun::clear_output() const
 {
+    SR_CHECK(make_folder(files_.output));
     std::error_code error;
-    fs::create_directories(files_.output, error);
-    if (error)
-        return fail(ErrorCode::bad_input, "cannot create {}: {}", quote(files_.output), error.message());
     for (const auto& entry : fs::directory_iterator(files_.output, error)) {
         if (!globals_.yes)
             return fail(ErrorCode::usage, "'{}' is not empty; -y replaces the tiles in it", files_.output);

@@ -14,12 +14,12 @@ namespace semrover {
 
 namespace {
 
-struct Options {
+struct InpaintArguments {
     std::string grid, label, box, sphere, object, mask;
     RegenerationOptions out;
 };
 
-Result<CellSelection> selection_of(const Options& o)
+Result<CellSelection> selection_of(const InpaintArguments& o)
 {
     CellSelection s;
     if (!o.label.empty()) {
@@ -48,7 +48,7 @@ Status keep_masked(std::vector<uint32_t>& cells, const VoxelGrid& grid, const Pa
     return {};
 }
 
-Status inpaint(const Options& o, const Globals& globals)
+Status inpaint(const InpaintArguments& o, const Globals& globals)
 {
     SR_TRY(const CellSelection where, selection_of(o));
     if (!where.any() && o.mask.empty())
@@ -76,7 +76,7 @@ Status inpaint(const Options& o, const Globals& globals)
 
 void add_inpaint(CLI::App& app, const Globals& globals, Run& run)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<InpaintArguments>();
     CLI::App* c = app.add_subcommand("inpaint", "regenerate chosen cells, all others staying as they are");
     c->add_option("GRID", o->grid, ".sgrid")->required();
     c->add_option("--class", o->label, "cells of this class");

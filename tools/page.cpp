@@ -20,7 +20,7 @@ namespace {
 
 constexpr size_t kMaxSets = 8; // more do not fit side by side
 
-struct Options {
+struct PageArguments {
     std::string output, grid, truth, title, about, path;
     std::vector<std::string> frames, runs, figures;
     PictureOptions pictures;
@@ -40,7 +40,7 @@ std::string shell_word(std::string_view word)
 }
 
 // the command line that makes this page, options in one order
-std::string command_line(const Options& o)
+std::string command_line(const PageArguments& o)
 {
     std::string out = "semrover page";
     const auto add = [&](std::string_view option, std::string_view value) {
@@ -57,7 +57,7 @@ std::string command_line(const Options& o)
         for (const std::string& value : *values)
             add(option, value);
     add("--path", o.path);
-    const Options defaults;
+    const PageArguments defaults;
     if (o.pictures.limit != defaults.pictures.limit)
         add("--max-frames", std::to_string(o.pictures.limit));
     if (o.pictures.quality != defaults.pictures.quality)
@@ -67,7 +67,7 @@ std::string command_line(const Options& o)
     return out;
 }
 
-Result<std::vector<PictureSet>> picture_sets(const Options& o)
+Result<std::vector<PictureSet>> picture_sets(const PageArguments& o)
 {
     std::vector<PictureSet> sets;
     for (const std::string& text : o.frames) {
@@ -92,7 +92,7 @@ Result<PageScene> load_scene(const std::string& name, const Path& path, uint64_t
     return PageScene{name, std::move(grid), hash_text(hash), std::move(points)};
 }
 
-Result<PictureTable> load_pictures(const Options& o, const Globals& globals)
+Result<PictureTable> load_pictures(const PageArguments& o, const Globals& globals)
 {
     SR_TRY(const std::vector<PictureSet> sets, picture_sets(o));
     std::optional<Progress> progress;
@@ -113,7 +113,7 @@ Result<PictureTable> load_pictures(const Options& o, const Globals& globals)
     return table;
 }
 
-Result<PageContent> load_content(const Options& o, const Globals& globals)
+Result<PageContent> load_content(const PageArguments& o, const Globals& globals)
 {
     PageContent c;
     c.program = kProgram;
@@ -139,7 +139,7 @@ Result<PageContent> load_content(const Options& o, const Globals& globals)
     return c;
 }
 
-Status page(const Options& o, const Globals& globals)
+Status page(const PageArguments& o, const Globals& globals)
 {
     SR_CHECK(check_writable(o.output, globals));
     SR_TRY(const PageContent content, load_content(o, globals));
@@ -164,7 +164,7 @@ Status page(const Options& o, const Globals& globals)
 
 void add_page(CLI::App& app, const Globals& globals, Run& run)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<PageArguments>();
     CLI::App* c = app.add_subcommand("page", "one HTML file that shows a finished run: pictures, points, figures");
     c->add_option("-o,--output", o->output, "the file, such as index.html")->required();
     c->add_option("--grid", o->grid, "a .sgrid file: the scene")->required();

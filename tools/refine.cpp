@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct RefineArguments {
     std::string input, model, output, sampler, precision = "fp16", frames, from, format = "png", profile;
     std::string video, side_by_side, frame_noise;
     std::optional<int> steps;
@@ -37,7 +37,7 @@ struct Options {
 
 // everything a run needs before its folder is opened
 struct Job {
-    const Options& options;
+    const RefineArguments& options;
     const Globals& globals;
     RendererModel model;
     SamplingPlan plan;
@@ -53,14 +53,14 @@ struct Job {
     MemoryPlan memory;
 };
 
-DType precision_of(const Options& o)
+DType precision_of(const RefineArguments& o)
 {
     return o.precision == "fp32" ? DType::f32 : DType::f16;
 }
 
 Status resolve_model(Job& j)
 {
-    const Options& o = j.options;
+    const RefineArguments& o = j.options;
     std::optional<Sampler> sampler;
     if (!o.sampler.empty()) {
         SR_TRY(sampler, sampler_from_name(o.sampler));
@@ -107,7 +107,7 @@ Result<FrameRange> range_of(const std::string& text, const BufferCamera& camera)
 // the cameras, their frames and, with --from, what came before those
 Status find_chains(Job& j)
 {
-    const Options& o = j.options;
+    const RefineArguments& o = j.options;
     std::vector<BufferCamera> cameras;
     if (!o.drive.path.empty()) {
         SR_TRY(j.path, load_cameras(o.drive));
@@ -144,7 +144,7 @@ Status find_chains(Job& j)
 // path, an option is refused
 Status find_motion(Job& j)
 {
-    const Options& o = j.options;
+    const RefineArguments& o = j.options;
     j.frame_noise = j.model.defaults.frame_noise;
     if (!o.frame_noise.empty())
         j.frame_noise = o.frame_noise == "warped" ? FrameNoise::warped : FrameNoise::fresh;
@@ -168,7 +168,7 @@ Status find_motion(Job& j)
 // what the buffers come from
 Result<Json> input_json(const Job& j)
 {
-    const Options& o = j.options;
+    const RefineArguments& o = j.options;
     Json cameras = Json::array();
     for (const RefineChain& c : j.chains) {
         Json& camera = cameras.emplace_back(Json{{"name", c.camera.name},
@@ -207,7 +207,7 @@ Result<Json> input_json(const Job& j)
 // everything that decides the bytes of the frames
 Result<Json> settings_json(const Job& j)
 {
-    const Options& o = j.options;
+    const RefineArguments& o = j.options;
     SR_TRY(const Json input, input_json(j));
     SR_TRY(const uint64_t model, j.model.hash());
     return Json{{"command", "refine"},
@@ -230,7 +230,7 @@ Result<Json> settings_json(const Job& j)
 // OUT/buffers, as `semrover render` would write them, unless an earlier start of this run did
 Status render_buffers(Job& j, RunFolder& run)
 {
-    const Options& o = j.options;
+    const RefineArguments& o = j.options;
     for (const Json& entry : run.entries())
         if (entry.is_object() && entry.value("rendered", Json()) == j.path.frames.size())
             return {};
@@ -327,12 +327,12 @@ Status dry_run(Job& j)
     return {};
 }
 
-RefineVideos videos_of(const Options& o)
+RefineVideos videos_of(const RefineArguments& o)
 {
     return {o.video, o.side_by_side, o.frames_per_second};
 }
 
-bool was_stopped(const Options& o)
+bool was_stopped(const RefineArguments& o)
 {
     const auto before = read_json(Path(o.output) / "run.json");
     return before && before->is_object() && before->value("state", "") == "running";
@@ -341,7 +341,7 @@ bool was_stopped(const Options& o)
 // what would be replaced is refused now; a run that was stopped may go on
 Status check_outputs(const Job& j)
 {
-    const Options& o = j.options;
+    const RefineArguments& o = j.options;
     const Path out = o.output;
     if (j.globals.yes || was_stopped(o))
         return {};
@@ -403,7 +403,7 @@ Status refine_in(Job& j, RunFolder& run)
     return finish(j, run, store, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
 }
 
-Status refine(const Options& o, const Globals& globals)
+Status refine(const RefineArguments& o, const Globals& globals)
 {
     Job j{o, globals, {}, {}, 0, {}, {}, 0.5f, {}, {}, {}, 0, {}};
     if (o.output.empty() && !o.dry_run)
@@ -437,7 +437,7 @@ Status refine(const Options& o, const Globals& globals)
     return status;
 }
 
-void add_options(CLI::App* c, Options& o)
+void add_options(CLI::App* c, RefineArguments& o)
 {
     c->add_option("DIR|GRID", o.input, "folder that `semrover render` wrote, or a grid with --path")->required();
     c->add_option("-m,--model", o.model, "model with a renderer: folder, or LDM file")->required();
@@ -468,7 +468,7 @@ void add_options(CLI::App* c, Options& o)
 
 void add_refine(CLI::App& app, const Globals& globals, Run& run)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<RefineArguments>();
     CLI::App* c = app.add_subcommand("refine", "splat buffers to frames, each from the one before");
     add_options(c, *o);
     c->callback([o, c, &globals, &run] {

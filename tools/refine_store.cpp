@@ -14,15 +14,6 @@ namespace {
 
 constexpr const char* kFolders[] = {"encoded", "latents", "frames"};
 
-Status make_folder_of(const Path& path)
-{
-    std::error_code error;
-    std::filesystem::create_directories(path.parent_path(), error);
-    if (error)
-        return fail(ErrorCode::bad_input, "cannot create {}: {}", quote_path(path.parent_path()), error.message());
-    return {};
-}
-
 } // namespace
 
 Status write_latent(const Path& path, const LatentSize& size, std::span<const float> latent)
@@ -89,7 +80,7 @@ Status RefineStore::save_latent(PieceKind kind, const BufferCamera& camera, uint
                                 std::span<const float> latent)
 {
     const Path to = path(kind, camera, frame);
-    SR_CHECK(make_folder_of(to));
+    SR_CHECK(make_folder(to.parent_path()));
     SR_CHECK(write_latent(to, size, latent));
     return record(name(kind, camera, frame));
 }
@@ -103,7 +94,7 @@ Result<std::vector<float>> RefineStore::load_latent(PieceKind kind, const Buffer
 Status RefineStore::save_frame(const BufferCamera& camera, uint32_t frame, std::span<const uint8_t> pixels)
 {
     const Path to = path(PieceKind::frame, camera, frame);
-    SR_CHECK(make_folder_of(to));
+    SR_CHECK(make_folder(to.parent_path()));
     SR_CHECK(format_.jpeg ? write_jpeg_rgb8(to, camera.size.width, camera.size.height, pixels, format_.quality)
                           : write_png_rgb8(to, camera.size.width, camera.size.height, pixels));
     return record(name(PieceKind::frame, camera, frame));

@@ -20,7 +20,7 @@ namespace semrover {
 
 namespace {
 
-struct Options {
+struct RenderArguments {
     std::string grid, output, video, profile;
     DriveOptions drive;
     SceneInputOptions input;
@@ -58,7 +58,7 @@ Status write_frame(Output& out, const CameraFrame& frame, const SplatImage& imag
     return {};
 }
 
-Status render_drive(const Options& o, const Globals& globals, Device& device, PathRenderer& renderer,
+Status render_drive(const RenderArguments& o, const Globals& globals, Device& device, PathRenderer& renderer,
                     const CameraPath& path, Output& out)
 {
     if (!o.video.empty()) {
@@ -83,7 +83,7 @@ Status render_drive(const Options& o, const Globals& globals, Device& device, Pa
     return out.video ? out.video->finish() : Status{};
 }
 
-Status render_overview(const Options& o, const Bounds& bounds, PathRenderer& renderer, const Output& out)
+Status render_overview(const RenderArguments& o, const Bounds& bounds, PathRenderer& renderer, const Output& out)
 {
     const CameraFrame camera = overview_camera(bounds, o.drive.width, o.drive.height);
     SR_TRY(const auto images, renderer.render({&camera, 1}));
@@ -93,7 +93,7 @@ Status render_overview(const Options& o, const Bounds& bounds, PathRenderer& ren
                           color_pixels(images[0], out.background));
 }
 
-Status check_outputs(const Options& o, const Globals& globals)
+Status check_outputs(const RenderArguments& o, const Globals& globals)
 {
     if (o.drive.path.empty() && !o.top)
         return fail(ErrorCode::usage, "--path (a camera path) or --top is required");
@@ -119,7 +119,7 @@ Result<SurfelScene> load_scene(const DriveOptions& o, const Path& path, SceneInp
     return SurfelScene::create(device, splats);
 }
 
-Status render(const Options& o, const Globals& globals)
+Status render(const RenderArguments& o, const Globals& globals)
 {
     SR_CHECK(check_outputs(o, globals));
     SR_CHECK(check_drive(o.drive));
@@ -162,7 +162,7 @@ Status render(const Options& o, const Globals& globals)
 
 void add_render(CLI::App& app, const Globals& globals, Run& run)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<RenderArguments>();
     CLI::App* c =
         app.add_subcommand("render", "splat buffers of a camera path: colour, depth, normal, label, visibility");
     c->add_option("GRID", o->grid,

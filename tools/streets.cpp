@@ -18,7 +18,7 @@ namespace semrover {
 
 namespace {
 
-struct Options {
+struct StreetsArguments {
     std::string output;
     StreetOptions street;
     DriveShape drive;
@@ -29,7 +29,7 @@ struct Options {
     bool pictures = false, no_grids = false, seen = false;
 };
 
-Json street_json(const Options& o, const Street& street, const CameraPath& path)
+Json street_json(const StreetsArguments& o, const Street& street, const CameraPath& path)
 {
     const CrossSection& c = street.road.section();
     Json classes = Json::object();
@@ -54,7 +54,7 @@ Json street_json(const Options& o, const Street& street, const CameraPath& path)
             {"shift", o.shift}};
 }
 
-Status write_grids(const Options& o, Device& device, const Street& street, std::span<const CameraPath> drives,
+Status write_grids(const StreetsArguments& o, Device& device, const Street& street, std::span<const CameraPath> drives,
                    const OutputFolder& out)
 {
     VoxelizeOptions voxels = o.voxels;
@@ -72,8 +72,8 @@ Status write_grids(const Options& o, Device& device, const Street& street, std::
     return write_grid(out / "semantic.sgrid", grids.semantic);
 }
 
-Status draw(const Options& o, const Globals& globals, Device& device, const Street& street, const CameraPath& path,
-            const CameraPath& shifted, const OutputFolder& out)
+Status draw(const StreetsArguments& o, const Globals& globals, Device& device, const Street& street,
+            const CameraPath& path, const CameraPath& shifted, const OutputFolder& out)
 {
     if (!o.no_grids)
         SR_CHECK(write_grids(o, device, street, std::array{path, shifted}, out));
@@ -85,7 +85,7 @@ Status draw(const Options& o, const Globals& globals, Device& device, const Stre
     return {};
 }
 
-Status streets(const Options& o, const Globals& globals)
+Status streets(const StreetsArguments& o, const Globals& globals)
 {
     SR_TRY(OutputFolder out, OutputFolder::create(o.output, globals.yes));
     const Street street = make_street(o.street);
@@ -119,7 +119,7 @@ Status streets(const Options& o, const Globals& globals)
 
 void add_streets(CLI::App& app, const Globals& globals, Run& run)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<StreetsArguments>();
     CLI::App* c = app.add_subcommand("streets", "make up a street: mesh, grids, a drive, and pictures to train with");
     c->add_option("-o,--output", o->output, "folder")->required();
     c->add_option("--seed", o->street.seed, "another seed, another street");

@@ -12,13 +12,13 @@ namespace semrover {
 
 namespace {
 
-struct Options {
+struct TileArguments {
     std::string input, output;
     double tile_size = 38.4;
     bool join = false;
 };
 
-Status join(const Options& o, const Globals& globals)
+Status join(const TileArguments& o, const Globals& globals)
 {
     SR_CHECK(check_writable(o.output, globals));
     SR_TRY(const TileFolder folder, TileFolder::open(o.input));
@@ -29,7 +29,7 @@ Status join(const Options& o, const Globals& globals)
     return {};
 }
 
-Status cut(const Options& o, const Globals& globals)
+Status cut(const TileArguments& o, const Globals& globals)
 {
     namespace fs = std::filesystem;
     std::error_code error;
@@ -54,7 +54,7 @@ Status cut(const Options& o, const Globals& globals)
 
 void add_tile(CLI::App& app, const Globals& globals, Run& run)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<TileArguments>();
     CLI::App* c = app.add_subcommand("tile", "cut a grid into a folder of tiles, or join one");
     c->add_option("INPUT", o->input, ".sgrid, or with --join a folder of tiles")->required();
     c->add_option("-o,--output", o->output, "folder, or with --join a .sgrid")->required();

@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct VerifyArguments {
     std::vector<std::string> cases;
     std::string precision = "fp32";
 };
@@ -138,7 +138,7 @@ nlohmann::ordered_json to_json(const CaseReport& r)
     return json;
 }
 
-Status verify(const Options& o, const Globals& globals)
+Status verify(const VerifyArguments& o, const Globals& globals)
 {
     SR_TRY(const std::vector<Path> cases, find_cases(o.cases));
     SR_TRY(const auto device, open_device(globals));
@@ -172,7 +172,7 @@ Status verify(const Options& o, const Globals& globals)
 
 void add_verify(CLI::App& app, const Globals& globals, Run& run)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<VerifyArguments>();
     CLI::App* c = app.add_subcommand("verify", "run golden cases: what public reference code gives for known inputs");
     c->add_option("CASE", o->cases, "folder of a case, or of cases (tests/golden)")->required();
     c->add_option("--precision", o->precision, "storage of weights and activations")

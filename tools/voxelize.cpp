@@ -19,7 +19,7 @@ namespace semrover {
 
 namespace {
 
-struct Options {
+struct VoxelizeArguments {
     std::string mesh, output, labels = "auto", map, default_label, up, ply;
     VoxelizeOptions voxelize;
     double scale = 1;
@@ -45,7 +45,7 @@ LabelSource source_of(const std::string& name)
                                : LabelSource::automatic;
 }
 
-Status check_outputs(const Options& o, const Globals& globals)
+Status check_outputs(const VoxelizeArguments& o, const Globals& globals)
 {
     for (const std::string& path : {o.output, o.ply})
         if (!path.empty() && std::filesystem::exists(path) && !globals.yes)
@@ -54,7 +54,7 @@ Status check_outputs(const Options& o, const Globals& globals)
 }
 
 // what says no label: an error, or a warning where there is a default
-Status label_mesh(Mesh& mesh, const Options& o, const MeshLabelMap& map, const Globals& globals)
+Status label_mesh(Mesh& mesh, const VoxelizeArguments& o, const MeshLabelMap& map, const Globals& globals)
 {
     const std::vector<UnlabelledFaces> unknown = label_faces(mesh, source_of(o.labels), map);
     if (unknown.empty())
@@ -70,7 +70,7 @@ Status label_mesh(Mesh& mesh, const Options& o, const MeshLabelMap& map, const G
     return {};
 }
 
-Result<Mesh> load_mesh(const Options& o, const Globals& globals)
+Result<Mesh> load_mesh(const VoxelizeArguments& o, const Globals& globals)
 {
     MeshLabelMap map;
     if (!o.map.empty()) {
@@ -95,7 +95,7 @@ Status write_points(const std::string& path, const VoxelGrid& grid)
     return write_points_ply(path, s);
 }
 
-void report(const Options& o, const Globals& globals, const VoxelizedMesh& v, const Mesh& mesh)
+void report(const VoxelizeArguments& o, const Globals& globals, const VoxelizedMesh& v, const Mesh& mesh)
 {
     std::array<size_t, kClassCount> counts{};
     for (const uint8_t label : v.grid.labels)
@@ -123,7 +123,7 @@ void report(const Options& o, const Globals& globals, const VoxelizedMesh& v, co
     }
 }
 
-Status run_voxelize(Options o, const Globals& globals)
+Status run_voxelize(VoxelizeArguments o, const Globals& globals)
 {
     SR_CHECK(check_outputs(o, globals));
     if (!o.default_label.empty()) {
@@ -147,7 +147,7 @@ Status run_voxelize(Options o, const Globals& globals)
 
 void add_voxelize(CLI::App& app, const Globals& globals, Run& run)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<VoxelizeArguments>();
     CLI::App* c = app.add_subcommand("voxelize", "a textured mesh as a grid of labelled cells and coloured points");
     c->add_option("MESH", o->mesh, ".obj, .ply, .glb or .gltf")->required();
     c->add_option("-o,--output", o->output, ".sgrid")->required();

@@ -14,8 +14,8 @@ namespace semrover {
 
 namespace {
 
-constexpr size_t kBatch = 1 << 20;     // points at once
-constexpr size_t kMostFaces = 1 << 20; // of a tree
+constexpr size_t kPointBatch = 1 << 20; // points at once
+constexpr size_t kMostFaces = 1 << 20;  // of a tree
 
 std::array<double, 3> middle_of(const Mesh& mesh)
 {
@@ -91,8 +91,8 @@ Status NearestSurface::search(std::span<const std::array<float, 4>> points, std:
 Result<std::vector<NearestFace>> NearestSurface::find(std::span<const std::array<float, 4>> points, float radius) const
 {
     std::vector<NearestFace> nearest(points.size(), {radius, ~0u});
-    for (size_t first = 0; first < points.size(); first += kBatch) {
-        const size_t count = std::min(kBatch, points.size() - first);
+    for (size_t first = 0; first < points.size(); first += kPointBatch) {
+        const size_t count = std::min(kPointBatch, points.size() - first);
         SR_CHECK(search(points.subspan(first, count), std::span(nearest).subspan(first, count)));
     }
     return nearest;

@@ -17,15 +17,6 @@ uint8_t to_byte(float v)
     return uint8_t(std::lround(std::clamp(v, 0.f, 1.f) * 255));
 }
 
-Status make_folder(const Path& path)
-{
-    std::error_code error;
-    std::filesystem::create_directories(path, error);
-    if (error)
-        return fail(ErrorCode::bad_input, "cannot create {}: {}", quote_path(path), error.message());
-    return {};
-}
-
 } // namespace
 
 std::vector<uint8_t> color_pixels(const SplatImage& image, const std::array<uint8_t, 3>& background)

@@ -20,15 +20,6 @@ uint64_t bytes_of(const TensorStream& tensor)
     return bytes;
 }
 
-Status make_folder(const Path& folder)
-{
-    std::error_code error;
-    std::filesystem::create_directories(folder, error);
-    if (error)
-        return fail(ErrorCode::bad_input, "cannot make the folder {}: {}", quote_path(folder), error.message());
-    return {};
-}
-
 // in the order of the schema, each about as large as the others
 Status write_shards(const Path& folder, std::span<const TensorStream> tensors, uint32_t shards)
 {

@@ -6,6 +6,10 @@
 
 namespace semrover {
 
+// the most that a configuration may ask for
+constexpr size_t kMaxLevels = 8;
+constexpr uint32_t kMaxChannels = 65536;
+
 // the weights of a network, collected layer by layer under PyTorch's names
 struct Schema {
     std::vector<TensorSpec> specs;

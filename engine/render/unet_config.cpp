@@ -11,9 +11,6 @@ namespace semrover {
 
 namespace {
 
-constexpr size_t kMaxLevels = 8;
-constexpr uint32_t kMaxChannels = 65536;
-
 void read_blocks(JsonFields& fields, UnetConfig& c)
 {
     fields.list("block_out_channels", kMaxLevels, 1, kMaxChannels, c.block_out_channels);

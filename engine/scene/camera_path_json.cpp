@@ -11,8 +11,6 @@ namespace semrover {
 
 namespace {
 
-// OpenGL camera axes in OpenCV's: y and z turn over; its own inverse
-constexpr Rigid kFlipYZ = {1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1};
 constexpr double kDegree = std::numbers::pi / 180;
 
 Result<CameraModel> read_type(const Json& file, std::string_view where)

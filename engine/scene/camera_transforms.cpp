@@ -11,9 +11,6 @@ namespace semrover {
 
 namespace {
 
-// OpenGL camera axes in OpenCV's: y and z turn over; its own inverse
-constexpr Rigid kFlipYZ = {1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1};
-
 // a frame's own value of a key, else the file's
 class Settings {
   public:

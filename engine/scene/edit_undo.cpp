@@ -92,17 +92,6 @@ Result<bool> is_as_we_write(const Path& file, const VoxelGrid& grid, const Path&
     return ours == theirs;
 }
 
-template <typename T>
-std::vector<T> elements(const SafetensorsSet& file, std::string_view name)
-{
-    const TensorInfo* tensor = file.find(name);
-    if (!tensor || tensor->bytes() == 0)
-        return {};
-    std::vector<T> values(tensor->bytes() / sizeof(T));
-    std::memcpy(values.data(), file.bytes(*tensor).data(), values.size() * sizeof(T));
-    return values;
-}
-
 struct Record {
     std::string before, after; // hashes
     VoxelGrid part;            // its voxel size, points per voxel and metadata are those of the whole grid before

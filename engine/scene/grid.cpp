@@ -16,26 +16,13 @@ namespace semrover {
 
 namespace {
 
-constexpr int32_t kMaxCoordinate = 1 << 20; // 629 km of 0.6 m cells; products of differences stay within 64 bits
-constexpr float kPointSlack = 1e-3f;        // metres; f16 at 0.3 m is exact to 0.12 mm
+constexpr float kPointSlack = 1e-3f; // metres; f16 at 0.3 m is exact to 0.12 mm
 constexpr uint64_t kGridHeaderBytes = 1u << 20;
 constexpr int kMaxPointsPerVoxel = 4096;
 
 std::string cell_text(const Cell& cell)
 {
     return fmt::format("({}, {}, {})", cell[0], cell[1], cell[2]);
-}
-
-// the elements of a tensor, copied out because the file may not align them; none when it is absent
-template <typename T>
-std::vector<T> elements(const SafetensorsSet& file, std::string_view name)
-{
-    const TensorInfo* tensor = file.find(name);
-    if (!tensor || tensor->bytes() == 0)
-        return {};
-    std::vector<T> values(tensor->bytes() / sizeof(T));
-    std::memcpy(values.data(), file.bytes(*tensor).data(), values.size() * sizeof(T));
-    return values;
 }
 
 template <typename T>

@@ -18,7 +18,6 @@ namespace semrover {
 
 namespace {
 
-constexpr double kMaxCoordinate = 1 << 20; // cells, as check_grid has it
 constexpr size_t kMaxPoints = 1u << 30;
 constexpr double kFaceMargin = 1e-4; // of a cell; less than half of what 16 bits resolve at its face
 

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <string_view>
 
 namespace semrover {
@@ -46,6 +47,11 @@ inline std::array<float, 3> label_color(uint32_t label)
 {
     const auto& c = kPalette[label < kClassCount ? label : kClassCount - 1].color;
     return {float(c[0]) / 255, float(c[1]) / 255, float(c[2]) / 255};
+}
+
+inline std::string label_name(size_t label)
+{
+    return label < kClassCount ? std::string(kPalette[label].name) : "none";
 }
 
 // number of a class by its name, none if there is no such class

@@ -26,7 +26,7 @@ Point3 cross(const Point3& a, const Point3& b)
     return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
-Point3 normalized(const Point3& a)
+Point3 unit_vector(const Point3& a)
 {
     const double length = std::sqrt(dot(a, a));
     return {a[0] / length, a[1] / length, a[2] / length};
@@ -130,9 +130,9 @@ Result<Rigid> rigid_from_matrix(std::span<const double> values, std::string_view
         return fail(ErrorCode::bad_input,
                     "{}: expected a rotation without scale or mirror, found one that is off by {:.3g}{}", where, off,
                     dot(cross(x, y), z) < 0 ? " and mirrored" : "");
-    const Point3 x1 = normalized(x);
+    const Point3 x1 = unit_vector(x);
     const double along = dot(x1, y);
-    const Point3 y1 = normalized({y[0] - along * x1[0], y[1] - along * x1[1], y[2] - along * x1[2]});
+    const Point3 y1 = unit_vector({y[0] - along * x1[0], y[1] - along * x1[1], y[2] - along * x1[2]});
     return from_columns(x1, y1, cross(x1, y1), column(values, 3));
 }
 

@@ -16,6 +16,8 @@ using Point3 = std::array<double, 3>;
 using Quaternion = std::array<double, 4>; // x, y, z, w
 
 constexpr Rigid kIdentity = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+// OpenGL camera axes in OpenCV's: y and z turn over; its own inverse
+constexpr Rigid kFlipYZ = {1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1};
 
 Rigid compose(const Rigid& a, const Rigid& b); // a after b
 Rigid inverse(const Rigid& a);

@@ -46,10 +46,7 @@ Result<RunFolder> RunFolder::open(const Path& folder, const Json& settings, bool
     run.path_ = folder;
     run.settings_ = settings;
     run.contents_ = contents;
-    std::error_code error;
-    fs::create_directories(folder, error);
-    if (error)
-        return fail(ErrorCode::bad_input, "cannot create {}: {}", quote_path(folder), error.message());
+    SR_CHECK(make_folder(folder));
     SR_CHECK(run.lock());
     if (fs::exists(folder / "run.json") && !restart) {
         SR_TRY(const Json before, read_json(folder / "run.json"));

@@ -250,10 +250,7 @@ std::map<TileIndex, VoxelGrid> cut_tiles(const VoxelGrid& grid, int32_t edge)
 Status write_tiles(const Path& folder, const VoxelGrid& grid, int32_t edge)
 {
     SR_ASSERT(edge >= 1 && edge <= kMostTileCells, "tiles of {} cells", edge);
-    std::error_code error;
-    fs::create_directories(folder, error);
-    if (error)
-        return fail(ErrorCode::bad_input, "cannot create {}: {}", quote_path(folder), error.message());
+    SR_CHECK(make_folder(folder));
     std::map<TileIndex, uint64_t> counts;
     for (const auto& [index, tile] : cut_tiles(grid, edge)) {
         SR_CHECK(write_grid(folder / tile_name(index), tile));

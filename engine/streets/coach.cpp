@@ -5,12 +5,11 @@
 #include "engine/streets/vehicle.h"
 
 #include <algorithm>
+#include <numbers>
 
 namespace semrover {
 
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 // a box from x0 to x1 with rounded edges along it; a picture on each flank; open ends
 struct Hull {
@@ -29,7 +28,7 @@ void add_hull(MeshBuilder& m, const Frame& f, const Hull& h, Finish flank, Finis
     for (double x : {h.x0, h.x1}) {
         auto& ring = rings.emplace_back();
         for (int i = 0; i <= 8; ++i) { // a quarter circle, the roof, a quarter circle
-            const double t = kPi / 2 * (i <= 4 ? i / 4.0 : (i - 5) / 3.0 + 1);
+            const double t = std::numbers::pi / 2 * (i <= 4 ? i / 4.0 : (i - 5) / 3.0 + 1);
             const double side = i <= 4 ? y - h.round : -y + h.round;
             ring.push_back(p(x, side + h.round * std::cos(t), top + h.round * std::sin(t)));
         }
@@ -65,7 +64,7 @@ void add_wheels(MeshBuilder& m, const Frame& f, double at, double width, double 
         m.disc(m.finish(Pattern::rubber, l, {0.8, 0.8, 0.8}), axle.at(0, side * 0.003, 0.095), axle.y * double(side),
                radius + 0.09, 16);
         if (side < 0)
-            axle = axle.turned(kPi);
+            axle = axle.turned(std::numbers::pi);
         add_wheel(m, axle.moved(0, 0.012, 0), radius, 0.28, l);
     }
 }

@@ -8,14 +8,13 @@
 #include "engine/streets/tree.h"
 
 #include <algorithm>
+#include <numbers>
 
 namespace semrover {
 
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-
-enum Key : uint64_t { kTrees = 40, kLights, kThings, kPeople, kSigns, kBollards };
+enum FurnishingKey : uint64_t { kTrees = 40, kLights, kThings, kPeople, kSigns, kBollards };
 
 class Furnishing {
   public:
@@ -42,7 +41,7 @@ class Furnishing {
     Frame place(double s, int side, double in) const
     {
         const Frame f = road_.frame(s, side * (c_.kerb() + in), c_.kerb_height);
-        return side < 0 ? f : f.turned(kPi);
+        return side < 0 ? f : f.turned(std::numbers::pi);
     }
     bool free(double s, double margin) const
     {
@@ -148,7 +147,8 @@ class Furnishing {
     {
         KeyedRandom r = random(kPeople, b, side);
         for (double s = b.first + r.uniform(1, 8); s < b.last; s += r.uniform(4, 17)) {
-            const double in = r.uniform(1.5, std::max(1.6, c_.sidewalk - 0.9)), turn = r.chance(0.5) ? 0 : kPi;
+            const double in = r.uniform(1.5, std::max(1.6, c_.sidewalk - 0.9)),
+                         turn = r.chance(0.5) ? 0 : std::numbers::pi;
             KeyedRandom own(site_.seed, {kPeople, b.index, uint64_t(side > 0), uint64_t(s * 16)});
             if (!free(s, 0.5))
                 continue;
@@ -197,7 +197,8 @@ class Furnishing {
     {
         // they drive towards the street: along -y on the left side, and their right hand is at greater s there
         const double s = j.middle - side * (j.half + 0.5), d = c_.facade() + 0.4;
-        const Frame f = road_.frame(s, side * d, c_.kerb_height).turned(side > 0 ? -kPi / 2 : kPi / 2);
+        const Frame f =
+            road_.frame(s, side * d, c_.kerb_height).turned(side > 0 ? -std::numbers::pi / 2 : std::numbers::pi / 2);
         if (j.lights)
             add_traffic_light(m_, f, false, !red);
         else

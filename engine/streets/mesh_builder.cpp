@@ -5,12 +5,12 @@
 #include "engine/scene/srgb.h"
 
 #include <algorithm>
+#include <numbers>
 
 namespace semrover {
 
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kSmallestArea = 1e-9; // square metres
 
 // two directions across an axis, so that (a, b, axis) is right-handed
@@ -26,7 +26,7 @@ std::vector<Vector3> circle(const Vector3& center, const Vector3& a, const Vecto
 {
     std::vector<Vector3> points;
     for (int i = 0; i < corners; ++i) {
-        const double t = 2 * kPi * i / corners;
+        const double t = 2 * std::numbers::pi * i / corners;
         points.push_back(center + a * (radius * std::cos(t)) + b * (radius * std::sin(t)));
     }
     return points;
@@ -195,7 +195,7 @@ void MeshBuilder::disc(Finish f, const Vector3& center, const Vector3& normal, d
     for (const Vector3& p : circle(center, x, y, radius, corners))
         vertex(p);
     for (int i = 1; i + 1 < corners; ++i) {
-        const double step = 2 * kPi / corners;
+        const double step = 2 * std::numbers::pi / corners;
         face(f, {first, first + uint32_t(i), first + uint32_t(i) + 1}, {uv(0), uv(step * i), uv(step * (i + 1))});
     }
 }
@@ -204,10 +204,10 @@ void MeshBuilder::blob(Finish f, const Frame& m, const Vector3& r, int rings, in
 {
     std::vector<std::vector<Vector3>> points;
     for (int i = 0; i <= rings; ++i) {
-        const double t = kPi * i / rings - kPi / 2, wide = std::max(std::cos(t), 1e-3);
+        const double t = std::numbers::pi * i / rings - std::numbers::pi / 2, wide = std::max(std::cos(t), 1e-3);
         auto& ring = points.emplace_back();
         for (int k = 0; k < corners; ++k) {
-            const double a = 2 * kPi * k / corners;
+            const double a = 2 * std::numbers::pi * k / corners;
             ring.push_back(m.at(r.x * wide * std::cos(a), r.y * wide * std::sin(a), r.z * std::sin(t)));
         }
     }
@@ -221,7 +221,7 @@ void MeshBuilder::torus(Finish f, const Vector3& center, const Vector3& axis, do
     const Vector3 z = normalized(axis);
     std::vector<std::vector<Vector3>> rings;
     for (int i = 0; i <= corners; ++i) {
-        const double t = 2 * kPi * i / corners;
+        const double t = 2 * std::numbers::pi * i / corners;
         const Vector3 out = x * std::cos(t) + y * std::sin(t);
         rings.push_back(circle(center + out * radius, out * -1, z, thickness, section));
     }

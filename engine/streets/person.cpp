@@ -29,15 +29,15 @@ struct Clothes {
 };
 
 // joints of a body, in its frame; left, right
-struct Pose {
+struct Posture {
     Vector3 hip, neck, head;
     Vector3 knees[2], feet[2], shoulders[2], elbows[2], hands[2];
 };
 
-Pose standing_pose(KeyedRandom& r)
+Posture standing_posture(KeyedRandom& r)
 {
     const double step = r.chance(0.6) ? r.uniform(0.12, 0.3) : 0.03, bend = r.uniform(0, 0.12);
-    Pose p;
+    Posture p;
     p.hip = {0, 0, 0.94};
     p.neck = {0.02, 0, 1.47};
     p.head = {0.05, 0, 1.64};
@@ -52,9 +52,9 @@ Pose standing_pose(KeyedRandom& r)
     return p;
 }
 
-Pose riding_pose(bool motorcycle)
+Posture riding_posture(bool motorcycle)
 {
-    Pose p;
+    Posture p;
     const double seat = motorcycle ? 0.82 : 0.95, lean = motorcycle ? 0.2 : 0.26;
     p.hip = {-0.22, 0, seat};
     p.neck = {-0.22 + lean, 0, seat + 0.5};
@@ -82,7 +82,7 @@ std::vector<Vector3> oval(const Frame& f, const Vector3& c, double x, double y)
     return ring;
 }
 
-void add_body(MeshBuilder& m, const Frame& f, const Pose& p, const Clothes& c, bool helmet)
+void add_body(MeshBuilder& m, const Frame& f, const Posture& p, const Clothes& c, bool helmet)
 {
     const auto at = [&](const Vector3& v) { return f.at(v); };
     const Vector3 up = p.neck - p.hip;
@@ -114,14 +114,14 @@ void add_person(MeshBuilder& m, const Frame& foot, KeyedRandom& r)
     const double size = r.uniform(0.92, 1.05);
     const Frame f{foot.origin, foot.x * size, foot.y * size, foot.z * size};
     const Clothes c(m, label::kPerson, r);
-    add_body(m, f, standing_pose(r), c, false);
+    add_body(m, f, standing_posture(r), c, false);
     if (r.chance(0.35)) // a bag
         m.box(c.shoes, f, {-0.24, -0.15, 1.0}, {-0.11, 0.15, 1.4}, MeshBuilder::kAllSides);
 }
 
 void add_rider(MeshBuilder& m, const Frame& middle, bool motorcycle, KeyedRandom& r)
 {
-    add_body(m, middle, riding_pose(motorcycle), Clothes(m, label::kRider, r), motorcycle || r.chance(0.5));
+    add_body(m, middle, riding_posture(motorcycle), Clothes(m, label::kRider, r), motorcycle || r.chance(0.5));
 }
 
 void add_bicycle(MeshBuilder& m, const Frame& f, KeyedRandom& r)

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kDepth = 11; // of houses
 
-enum Key : uint64_t { kPlot = 20, kStyle, kSide, kClosing };
+enum PlotKey : uint64_t { kPlot = 20, kStyle, kSide, kClosing };
 
 uint64_t key_of(uint64_t what, uint64_t block, int side, uint64_t index)
 {

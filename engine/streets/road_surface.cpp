@@ -16,7 +16,6 @@ constexpr double kCrossing = 3.4;       // length along the street
 constexpr double kBefore = 1.9;         // from the end of the rounded kerb to the crossing
 constexpr double kDash = 3, kGap = 4.5; // of the middle line
 constexpr double kLine = 0.07;          // half the width of a line
-constexpr double kBay = 5.6;            // length of a parking bay
 constexpr double kLowered = 0.025;      // kerb at crossings
 
 struct Surfaces {
@@ -113,7 +112,7 @@ class Layer {
         for (double x = 0; x < road_.length(); x += kDash + kGap)
             s.insert(s.end(), {x, x + kDash});
         if (c_.parking > 0)
-            for (double x = 0; x < road_.length(); x += kBay)
+            for (double x = 0; x < road_.length(); x += kParkingBay)
                 s.insert(s.end(), {x, x + 0.1});
         for (const Crossing& c : crossings_) {
             const double stop = c.before ? c.first - 1 : c.last + 0.7;
@@ -159,7 +158,7 @@ class Layer {
             return true;
         const double bays = c_.lane + c_.cycle;
         if (c_.parking > 0 && (std::abs(a - bays) < 0.05 || (a > bays && a < c_.kerb() - 0.3 && !j)))
-            return s - std::floor(s / kBay) * kBay < 0.1;
+            return s - std::floor(s / kParkingBay) * kParkingBay < 0.1;
         return false;
     }
 

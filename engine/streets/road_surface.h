@@ -7,6 +7,8 @@
 
 namespace semrover {
 
+constexpr double kParkingBay = 5.6; // length of a bay, metres
+
 // where pedestrians cross the carriageway, along the street
 struct Crossing {
     double first, last;

@@ -7,12 +7,12 @@
 #include "engine/streets/tree.h"
 
 #include <algorithm>
+#include <numbers>
 
 namespace semrover {
 
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr Color kSteel = {0.5, 0.51, 0.51}, kDarkGreen = {0.2, 0.24, 0.22}, kAnthracite = {0.24, 0.25, 0.26};
 
 void post(MeshBuilder& m, const Frame& f, double height, double radius, const Color& c)
@@ -38,7 +38,7 @@ void signal_head(MeshBuilder& m, const Frame& f, double y, double z, bool red)
         for (double x : {-0.125, -0.27}) {
             auto& ring = visor.emplace_back();
             for (int k = 0; k <= 6; ++k) {
-                const double t = kPi * k / 6;
+                const double t = std::numbers::pi * k / 6;
                 ring.push_back(f.at(x, y + 0.115 * std::cos(t), at + 0.115 * std::sin(t)));
             }
         }
@@ -55,7 +55,7 @@ void plate(MeshBuilder& m, const Frame& f, Pattern face, double z, double size, 
     std::vector<Vector3> edge, behind;
     std::vector<std::array<double, 2>> uv;
     for (int i = 0; i < corners; ++i) {
-        const double t = turn + 2 * kPi * i / corners, u = std::cos(t), v = std::sin(t);
+        const double t = turn + 2 * std::numbers::pi * i / corners, u = std::cos(t), v = std::sin(t);
         // seen against x, the left hand is +y
         edge.push_back(c + f.y * (-u * size / 2) + f.z * (v * size / 2));
         behind.push_back(edge.back() + f.x * 0.02);
@@ -107,17 +107,17 @@ void add_sign(MeshBuilder& m, const Frame& f, SignKind kind)
     const double z = 2.45;
     switch (kind) {
     case SignKind::stop:
-        return plate(m, f, Pattern::sign_stop, z, 0.76, 8, kPi / 8);
+        return plate(m, f, Pattern::sign_stop, z, 0.76, 8, std::numbers::pi / 8);
     case SignKind::yield:
-        return plate(m, f, Pattern::sign_yield, z, 0.9, 3, -kPi / 2);
+        return plate(m, f, Pattern::sign_yield, z, 0.9, 3, -std::numbers::pi / 2);
     case SignKind::speed:
         return plate(m, f, Pattern::sign_speed, z, 0.62, 20, 0);
     case SignKind::no_entry:
         return plate(m, f, Pattern::sign_no_entry, z, 0.62, 20, 0);
     case SignKind::parking:
-        return plate(m, f, Pattern::sign_parking, z, 0.8, 4, kPi / 4);
+        return plate(m, f, Pattern::sign_parking, z, 0.8, 4, std::numbers::pi / 4);
     case SignKind::crossing:
-        return plate(m, f, Pattern::sign_crossing, z, 0.85, 4, kPi / 4);
+        return plate(m, f, Pattern::sign_crossing, z, 0.85, 4, std::numbers::pi / 4);
     case SignKind::priority:
         return plate(m, f, Pattern::sign_priority, z, 0.7, 4, 0);
     default:
@@ -196,7 +196,7 @@ void add_bike_rack(MeshBuilder& m, const Frame& f, int bicycles, KeyedRandom& r)
         if (r.chance(0.75))
             add_bicycle(m,
                         g.moved(0.14, r.uniform(-0.1, 0.1), 0)
-                            .turned(kPi / 2 * (r.chance(0.5) ? 1 : -1) + r.uniform(-0.1, 0.1)),
+                            .turned(std::numbers::pi / 2 * (r.chance(0.5) ? 1 : -1) + r.uniform(-0.1, 0.1)),
                         r);
     }
 }

@@ -6,15 +6,13 @@
 #include "engine/streets/vehicle.h"
 
 #include <algorithm>
+#include <numbers>
 
 namespace semrover {
 
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-constexpr double kBay = 5.6; // as road_surface.cpp paints them
-
-enum Key : uint64_t { kParked = 60, kOncoming, kSideCars, kTram };
+enum TrafficKey : uint64_t { kParked = 60, kOncoming, kSideCars, kTram };
 
 class Traffic {
   public:
@@ -65,21 +63,21 @@ class Traffic {
     void parked(int side)
     {
         const double d = side * (c_.lane + c_.cycle + c_.parking / 2);
-        for (uint64_t bay = 0; bay * kBay < road_.length(); ++bay) {
+        for (uint64_t bay = 0; bay * kParkingBay < road_.length(); ++bay) {
             KeyedRandom r(site_.seed, {kParked, uint64_t(side > 0), bay});
             r.uniform(); // decides whether it is taken
-            const double s0 = double(bay) * kBay, middle = s0 + kBay / 2 + r.uniform(-0.25, 0.25);
+            const double s0 = double(bay) * kParkingBay, middle = s0 + kParkingBay / 2 + r.uniform(-0.25, 0.25);
             const uint32_t kind = r.below(100);
             const bool against = (side > 0) != r.chance(0.1);
-            if (!taken(bay, side) || !free(s0, s0 + kBay))
+            if (!taken(bay, side) || !free(s0, s0 + kParkingBay))
                 continue;
             const Frame f = place(middle, d + r.uniform(-0.06, 0.06), against);
             if (kind < 88)
                 car(f, r);
             else if (kind < 94)
                 motorcycles(f, r);
-            else if (!taken(bay + 1, side) && free(s0, s0 + 2 * kBay))
-                truck(place(s0 + kBay, d, against), r);
+            else if (!taken(bay + 1, side) && free(s0, s0 + 2 * kParkingBay))
+                truck(place(s0 + kParkingBay, d, against), r);
             else
                 car(f, r);
         }
@@ -107,7 +105,7 @@ class Traffic {
     void motorcycles(const Frame& f, KeyedRandom& r)
     {
         for (double x : {-1.2, 0.0, 1.2}) {
-            add_motorcycle(m_, f.moved(x, 0, 0).turned(kPi / 2 + r.uniform(-0.15, 0.15)), r);
+            add_motorcycle(m_, f.moved(x, 0, 0).turned(std::numbers::pi / 2 + r.uniform(-0.15, 0.15)), r);
             ++site_.objects["motorcycle"];
         }
     }
@@ -173,7 +171,7 @@ class Traffic {
         const double half = j.half / 2;
         const auto at = [&](double way, double out, bool towards) {
             Frame f = road_.frame(j.middle + way * half, side * (c_.facade() + out));
-            return f.turned((side > 0) != towards ? kPi / 2 : -kPi / 2);
+            return f.turned((side > 0) != towards ? std::numbers::pi / 2 : -std::numbers::pi / 2);
         };
         const double own = -side; // the lane of those who come out
         if (r.chance(0.5))

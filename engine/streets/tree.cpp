@@ -5,19 +5,19 @@
 #include "engine/streets/class_label.h"
 
 #include <algorithm>
+#include <numbers>
 
 namespace semrover {
 
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr Color kGreens[] = {{0.34, 0.43, 0.17}, {0.28, 0.39, 0.16}, {0.4, 0.46, 0.19},
                              {0.3, 0.4, 0.2},    {0.44, 0.46, 0.18}, {0.25, 0.35, 0.17}};
 constexpr Color kBarks[] = {{0.5, 0.44, 0.37}, {0.4, 0.34, 0.28}, {0.6, 0.57, 0.5}};
 
 Vector3 direction(KeyedRandom& r)
 {
-    const double z = r.uniform(-1, 1), t = r.uniform(0, 2 * kPi), w = std::sqrt(1 - z * z);
+    const double z = r.uniform(-1, 1), t = r.uniform(0, 2 * std::numbers::pi), w = std::sqrt(1 - z * z);
     return {w * std::cos(t), w * std::sin(t), z};
 }
 

@@ -61,12 +61,8 @@ Daylight daylight_of_seed(uint64_t seed)
 Status write_traced_image(const Path& folder, uint32_t number, const TracedImage& t)
 {
     const std::string name = fmt::format("{:06}.png", number);
-    for (const char* kind : {"color", "depth", "normal", "label", "visible"}) {
-        std::error_code error;
-        std::filesystem::create_directories(folder / kind, error);
-        if (error)
-            return fail(ErrorCode::bad_input, "cannot create {}: {}", quote_path(folder / kind), error.message());
-    }
+    for (const char* kind : {"color", "depth", "normal", "label", "visible"})
+        SR_CHECK(make_folder(folder / kind));
     SR_CHECK(write_png_rgb8(folder / "color" / name, t.width, t.height, t.color));
     SR_CHECK(write_png_gray16(folder / "depth" / name, t.width, t.height, t.depth));
     SR_CHECK(write_png_rgb8(folder / "normal" / name, t.width, t.height, t.normal));
