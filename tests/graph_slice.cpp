@@ -47,6 +47,33 @@ void expect_bands(const Plan& plan, std::string_view name, uint32_t rows, uint64
     EXPECT_EQ(next, rows) << name;
 }
 
+TEST(graph_slice, lays_the_lanes_of_a_tile_where_fewest_outputs_are_computed_for_nothing)
+{
+    struct Case {
+        uint32_t rows, cols, across, groups_x, groups_y;
+    };
+    for (const Case c : {Case{4096, 16, 1, 32, 1},
+                         {4096, 24, 2, 64, 1},
+                         {4096, 48, 1, 32, 3},
+                         {4096, 96, 2, 64, 3},
+                         {4096, 192, 4, 128, 3},
+                         {1, 384, 8, 1, 3},
+                         {32, 64, 4, 1, 1}}) {
+        SCOPED_TRACE(fmt::format("{} x {}", c.rows, c.cols));
+        Graph g;
+        (void)gemm(g, fake_external(g, c.rows, 64), fake_external(g, c.cols, 64), {});
+        DeviceLimits limits = test_limits();
+        limits.type = DeviceType::cpu;
+        const Plan plan = plan_of(g, limits);
+        ASSERT_EQ(plan.passes.size(), 1u);
+        const Pass& pass = plan.passes[0];
+        ASSERT_EQ(pass.variant->name, "cpu");
+        EXPECT_EQ(pushed(pass, "col_lanes"), c.across);
+        EXPECT_EQ(pass.group_count[0], c.groups_x);
+        EXPECT_EQ(pass.group_count[1], c.groups_y);
+    }
+}
+
 TEST(graph_slice, cuts_rows_into_aligned_bands_that_cover_each_row_once)
 {
     for (auto [rows, cols] : {std::array{1000u, 64u}, {3001u, 8u}, {4099u, 24u}, {333u, 200u}, {70u, 1000u}}) {
