@@ -36,7 +36,7 @@ const DTypeName* find_dtype(std::string_view name)
     return found == std::end(kDTypeNames) ? nullptr : found;
 }
 
-bool is_control(char c)
+bool is_control_character(char c)
 {
     return static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
 }
@@ -155,7 +155,7 @@ bool HeaderReader::key(string_t& name)
     if (name.size() > kMaxTensorName)
         return refuse(
             fmt::format("name {} has {} bytes, at most {} are allowed", quote(name, 40), name.size(), kMaxTensorName));
-    if (std::ranges::any_of(name, is_control))
+    if (std::ranges::any_of(name, is_control_character))
         return refuse(fmt::format("name {} holds a control character", quote(name)));
     return next_ == Next::name ? tensor_key(name) : metadata_key(name);
 }
@@ -216,7 +216,7 @@ bool HeaderReader::string(string_t& value)
     }
     if (next_ != Next::dtype)
         return unexpected(quote(value, 40));
-    if (value.empty() || value.size() > 32 || std::ranges::any_of(value, is_control))
+    if (value.empty() || value.size() > 32 || std::ranges::any_of(value, is_control_character))
         return refuse(fmt::format("tensor {}: {} is no dtype", quote(key_), quote(value, 40)));
     dtype_ = std::move(value);
     next_ = Next::field;

@@ -42,7 +42,7 @@ struct TransformsModel {
 };
 
 // nerfstudio's names; its OPENCV has a k4 of r^8, which no OpenCV lens has. FULL_OPENCV is COLMAP's name.
-const TransformsModel kModels[] = {
+const TransformsModel kTransformsModels[] = {
     {"OPENCV", CameraModel::opencv, {"k1", "k2", "p1", "p2", "k3"}},
     {"PINHOLE", CameraModel::pinhole, {}},
     {"SIMPLE_PINHOLE", CameraModel::pinhole, {}},
@@ -57,13 +57,13 @@ Result<const TransformsModel*> read_model(const Settings& settings)
 {
     const Json* model = settings.find("camera_model");
     if (!model)
-        return &kModels[0];
+        return &kTransformsModels[0];
     const std::string name = model->is_string() ? model->get<std::string>() : model->dump(-1, ' ', true);
-    const auto found = std::ranges::find(kModels, name, &TransformsModel::name);
-    if (found != std::end(kModels))
+    const auto found = std::ranges::find(kTransformsModels, name, &TransformsModel::name);
+    if (found != std::end(kTransformsModels))
         return found;
     std::vector<const char*> names;
-    for (const TransformsModel& m : kModels)
+    for (const TransformsModel& m : kTransformsModels)
         names.push_back(m.name);
     return fail(ErrorCode::bad_input, "{}: camera_model {} is not supported, expected one of {}", settings.where(),
                 quote(name, 60), fmt::join(names, ", "));
@@ -167,19 +167,20 @@ Result<CameraFrame> read_frame(const Json& file, const Json& json, size_t index,
     return frame;
 }
 
-const TransformsModel& model_for(const Intrinsics& k)
+const TransformsModel& transforms_model_of(const Intrinsics& k)
 {
     switch (k.model) {
     case CameraModel::opencv:
-        return k.distortion[5] != 0 || k.distortion[6] != 0 || k.distortion[7] != 0 ? kModels[5] : kModels[0];
+        return k.distortion[5] != 0 || k.distortion[6] != 0 || k.distortion[7] != 0 ? kTransformsModels[5]
+                                                                                    : kTransformsModels[0];
     case CameraModel::fisheye:
-        return kModels[6];
+        return kTransformsModels[6];
     case CameraModel::equirectangular:
-        return kModels[7];
+        return kTransformsModels[7];
     case CameraModel::pinhole:
         break;
     }
-    return kModels[0]; // without distortion
+    return kTransformsModels[0]; // without distortion
 }
 
 // with all coefficients, so that a frame's hide the file's
@@ -194,7 +195,7 @@ void put_intrinsics(nlohmann::ordered_json& object, const Intrinsics& k, bool wi
     object["cy"] = k.cy;
     if (!with_lens)
         return;
-    const TransformsModel& model = model_for(k);
+    const TransformsModel& model = transforms_model_of(k);
     object["camera_model"] = model.name;
     for (const char* key : {"k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"}) {
         const auto at = std::ranges::find(model.coefficients, std::string_view(key));
