@@ -34,8 +34,8 @@ struct Conv2dPush {
     uint shift_col;
     uint moments_ld;
     uint moments_pixels;
-    uint col_lanes; // CPU variant: lanes side by side, set by the plan
     uint moments_image_rows;
+    uint col_lanes; // CPU variant: lanes side by side, set by the plan
 };
 
 #endif

@@ -20,8 +20,8 @@ struct GemmPush {
     uint gate_step; // columns from one group's gates to the next
     uint moments_ld;
     uint moments_pixels;     // rows of an image that count
-    uint col_lanes; // CPU variant: lanes side by side, set by the plan
     uint moments_image_rows; // rows of an image
+    uint col_lanes;          // CPU variant: lanes side by side, set by the plan
 };
 
 #endif

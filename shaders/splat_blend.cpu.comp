@@ -36,9 +36,7 @@ void main()
     [[unroll]] for (uint y = 0; y < kRows; ++y)
         pixels[y] = empty_pixel();
     Walk walk = walk_of((camera * p.tiles_y + tile_at.y) * p.tiles_x + tile_at.x);
-    while (walk.first < walk.end) {
-        if (!find_hits(walk, corner))
-            break;
+    while (any_left() && find_hits(walk, corner)) {
         do {
             const uint record = take_hit(walk);
             const Splat s =
@@ -46,8 +44,6 @@ void main()
             [[unroll]] for (uint y = 0; y < kRows; ++y)
                 blend(pixels[y], s, vec2(corner + uvec2(column, y)) + 0.5, record);
         } while (walk.hits != 0);
-        if (!any_left())
-            break;
     }
     [[unroll]] for (uint y = 0; y < kRows; ++y)
         store(pixels[y], corner + uvec2(column, y), camera);

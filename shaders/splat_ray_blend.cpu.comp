@@ -38,10 +38,7 @@ void main()
         pixels[y] = pixel_of_ray(ray[y]);
     }
     Walk walk = walk_of((camera * p.tiles_y + tile_at.y) * p.tiles_x + tile_at.x);
-    walk.end = any_left() ? walk.end : walk.first; // no pixel is within the lens
-    while (walk.first < walk.end) {
-        if (!find_hits(walk, corner))
-            break;
+    while (any_left() && find_hits(walk, corner)) {
         do {
             const uint record = take_hit(walk);
             const RaySplat s = read_splat(texel_of(record, 0), texel_of(record, 1), texel_of(record, 2), texel_of(record, 3),
@@ -49,8 +46,6 @@ void main()
             [[unroll]] for (uint y = 0; y < kRows; ++y)
                 blend(pixels[y], s, ray[y], vec2(corner + uvec2(column, y)) + 0.5, record);
         } while (walk.hits != 0);
-        if (!any_left())
-            break;
     }
     [[unroll]] for (uint y = 0; y < kRows; ++y)
         store(pixels[y], corner + uvec2(column, y), camera);

@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <cstring>
 #include <numeric>
 
 namespace semrover {
@@ -18,7 +17,6 @@ namespace {
 
 constexpr float kPointSlack = 1e-3f; // metres; f16 at 0.3 m is exact to 0.12 mm
 constexpr uint64_t kGridHeaderBytes = 1u << 20;
-constexpr int kMaxPointsPerVoxel = 4096;
 
 std::string cell_text(const Cell& cell)
 {

@@ -16,6 +16,7 @@ namespace semrover {
 
 using Cell = std::array<int32_t, 3>;        // (i, j, k): spans [i, i+1) x [j, j+1) x [k, k+1) voxel sizes
 constexpr int32_t kMaxCoordinate = 1 << 20; // 629 km of 0.6 m cells; products of differences stay within 64 bits
+constexpr int kMaxPointsPerVoxel = 4096;
 
 // a scene of V labelled cells, each with n coloured surface points or none (spec: models.md, "Scenes and grids").
 // World frame: metres, x forward, y left, z up. Arrays are row-major.

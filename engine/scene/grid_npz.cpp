@@ -14,7 +14,6 @@ namespace semrover {
 namespace {
 
 constexpr uint64_t kMetadataBytes = 1u << 20;
-constexpr uint64_t kMaxCellPoints = 4096; // in a cell
 
 template <typename T>
 NpyArray array_of(DType dtype, std::vector<uint64_t> shape, std::span<T> values)
@@ -128,9 +127,9 @@ Status read_voxel_size(const NpzFile& file, VoxelGrid& grid, const std::string& 
 Status read_points_per_voxel(const NpzFile& file, VoxelGrid& grid, const std::string& where)
 {
     SR_TRY(const std::vector<int32_t> n, integers<int32_t>(file, "points_per_voxel", where));
-    if (n.size() != 1 || n[0] < 0 || n[0] > int32_t(kMaxCellPoints))
+    if (n.size() != 1 || n[0] < 0 || n[0] > kMaxPointsPerVoxel)
         return fail(ErrorCode::bad_input, "{}: points_per_voxel: expected one number from 0 to {}", where,
-                    kMaxCellPoints);
+                    kMaxPointsPerVoxel);
     grid.points_per_voxel = n[0];
     return {};
 }
@@ -157,9 +156,9 @@ Status read_points(const NpzFile& file, VoxelGrid& grid, const std::string& wher
 {
     SR_TRY(const NpyHeader header, file.header("points"));
     const uint64_t v = grid.cells.size(), n = header.shape.size() == 3 ? header.shape[1] : 0;
-    if (n < 1 || n > kMaxCellPoints)
-        return fail(ErrorCode::bad_input, "{}: points: expected shape [V, 1 to {}, 3], found {}", where, kMaxCellPoints,
-                    shape_of(header.shape));
+    if (n < 1 || n > kMaxPointsPerVoxel)
+        return fail(ErrorCode::bad_input, "{}: points: expected shape [V, 1 to {}, 3], found {}", where,
+                    kMaxPointsPerVoxel, shape_of(header.shape));
     SR_CHECK(expect_shape(file, "points", {v, n, 3}, where));
     SR_CHECK(expect_shape(file, "colors", {v, n, 3}, where));
     grid.points_per_voxel = static_cast<int>(n);

@@ -15,6 +15,8 @@ Walk walk_of(uint tile) { return Walk(starts[tile], starts[tile + 1], 0, 0); }
 // goes on to the next lanes with hits; false: there are none
 bool find_hits(inout Walk w, uvec2 corner)
 {
+    if (w.first >= w.end)
+        return false;
     do {
         const uint at = w.first + gl_SubgroupInvocationID;
         w.candidate = pairs[min(at, w.end - 1)];
