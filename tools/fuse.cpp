@@ -6,11 +6,11 @@
 #include "engine/mesh/mesh_files.h"
 #include "engine/mesh/voxelizer.h"
 #include "engine/scene/palette.h"
+#include "engine/version.h"
 #include "runtime/quote.h"
 #include "tools/commands.h"
 #include "tools/open_device.h"
 #include "tools/progress.h"
-#include "tools/version.h"
 
 #include <algorithm>
 #include <charconv>

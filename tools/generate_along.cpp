@@ -6,14 +6,14 @@
 #include "engine/scene/cell_reach.h"
 #include "engine/scene/path_windows.h"
 #include "engine/scene/tile_cache.h"
+#include "engine/version.h"
 #include "engine/voxfield/sub_grid.h"
 #include "runtime/hash.h"
+#include "runtime/host_memory.h"
 #include "runtime/quote.h"
 #include "runtime/safetensors.h"
-#include "tools/host_memory.h"
 #include "tools/open_device.h"
 #include "tools/progress.h"
-#include "tools/version.h"
 
 #include <algorithm>
 #include <chrono>

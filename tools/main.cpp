@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/commands.h"
 
+#include "engine/version.h"
 #include "runtime/quote.h"
 #include "tools/memory_size.h"
-#include "tools/version.h"
 
 #include <CLI/CLI.hpp>
 #include <csignal>

@@ -1,6 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover refine DIR|GRID -m MODEL -o OUT: splat buffers to frames, each from the one before
+#include "engine/job/outputs.h"
+#include "engine/version.h"
 #include "runtime/hash.h"
 #include "runtime/profile.h"
 #include "runtime/quote.h"
@@ -9,7 +11,6 @@
 #include "tools/progress.h"
 #include "tools/refine_video.h"
 #include "tools/scene_input.h"
-#include "tools/version.h"
 
 #include <chrono>
 #include <CLI/CLI.hpp>

@@ -3,10 +3,10 @@
 #include "tools/regeneration.h"
 
 #include "engine/scene/edit_undo.h"
+#include "engine/version.h"
 #include "engine/voxfield/sub_grid.h"
 #include "runtime/hash.h"
 #include "tools/open_device.h"
-#include "tools/version.h"
 
 #include <algorithm>
 #include <CLI/CLI.hpp>

@@ -6,11 +6,11 @@
 #include "engine/scene/palette.h"
 #include "engine/scene/ply.h"
 #include "engine/scene/scene_points.h"
+#include "engine/version.h"
 #include "runtime/json.h"
 #include "runtime/quote.h"
 #include "tools/commands.h"
 #include "tools/open_device.h"
-#include "tools/version.h"
 
 #include <charconv>
 #include <CLI/CLI.hpp>

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/export_ply.h"
+#include "engine/job/export_ply.h"
 
 #include "engine/scene/ply.h"
 #include "engine/splat/surfels.h"

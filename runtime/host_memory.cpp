@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/host_memory.h"
+#include "runtime/host_memory.h"
 
 #include <fstream>
 #include <string>
