@@ -5,8 +5,8 @@
 #include "engine/scene/palette.h"
 #include "engine/splat/blocks.h"
 #include "runtime/quote.h"
+#include "tools/drive_options.h"
 #include "tools/open_device.h"
-#include "tools/path_renderer.h"
 
 namespace semrover {
 

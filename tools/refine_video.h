@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "tools/refiner.h"
+#include "engine/render/refine_chain.h"
+#include "engine/render/refine_store.h"
 
 namespace semrover {
 

@@ -6,6 +6,7 @@
 
 namespace semrover {
 
+JobDisplay::JobDisplay(const Globals& globals) : globals_(globals) {}
 JobDisplay::~JobDisplay() = default;
 
 JobCallbacks JobDisplay::callbacks()

@@ -15,7 +15,7 @@ using BeginJob = std::function<Result<std::unique_ptr<Job>>(const JobCallbacks&)
 // what a job says, on stderr as the globals ask: warnings, progress, and details with --verbose
 class JobDisplay {
   public:
-    explicit JobDisplay(const Globals& globals) : globals_(globals) {}
+    explicit JobDisplay(const Globals& globals);
     JobCallbacks callbacks(); // the display outlives the job
 
   private:

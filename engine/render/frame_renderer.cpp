@@ -94,12 +94,28 @@ Result<std::vector<float>> FrameRenderer::encode(std::span<const float> image)
     return c->encode(image);
 }
 
-Result<std::vector<float>> FrameRenderer::denoise(const AsdFrame& frame, const AsdRenderer::StepCallback& callback)
+Status FrameRenderer::begin(const AsdFrame& frame)
 {
     SR_CHECK(make_way(Part::denoise));
     SR_CHECK(load_unet());
     SR_CHECK(make_asd());
-    return asd_->render(frame, callback);
+    SR_TRY(latent_, asd_->render(frame));
+    return {};
+}
+
+Result<bool> FrameRenderer::step(size_t)
+{
+    return true;
+}
+
+Result<std::vector<float>> FrameRenderer::finish()
+{
+    return std::move(latent_);
+}
+
+Status FrameRenderer::cancel()
+{
+    return {};
 }
 
 Result<std::vector<float>> FrameRenderer::decode(std::span<const float> latent)

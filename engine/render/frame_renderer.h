@@ -20,10 +20,14 @@ class FrameRenderer {
     // run's work) needs them. Errors: bad_input for weights that do not fit the model; device errors
     Status start(const RendererWork& work, const RendererWork& run);
 
-    // as LatentCodec and AsdRenderer do it
+    // as LatentCodec does it; not between begin and finish of a frame
     Result<std::vector<float>> encode(std::span<const float> image);
-    Result<std::vector<float>> denoise(const AsdFrame& frame, const AsdRenderer::StepCallback& callback);
     Result<std::vector<float>> decode(std::span<const float> latent);
+    // as AsdRenderer does it
+    Status begin(const AsdFrame& frame);
+    Result<bool> step(size_t submits);
+    Result<std::vector<float>> finish();
+    Status cancel();
 
   private:
     enum class Part { encode, denoise, decode };
@@ -44,6 +48,7 @@ class FrameRenderer {
     std::unique_ptr<Vae> vae_;
     std::unique_ptr<AsdRenderer> asd_;
     std::unique_ptr<LatentCodec> codec_;
+    std::vector<float> latent_;                         // seam
     CodecDirection direction_ = CodecDirection::encode; // of codec_
 };
 

@@ -16,12 +16,12 @@ constexpr Color kPaints[] = {{0.86, 0.87, 0.87}, {0.12, 0.12, 0.13}, {0.55, 0.56
                              {0.9, 0.9, 0.88},   {0.2, 0.3, 0.25},   {0.55, 0.48, 0.38}, {0.2, 0.21, 0.22}};
 
 // what covers a stretch of roof line, and of the flank above the belt
-enum class Cover : uint8_t { paint, glass, dark };
+enum class Skin : uint8_t { paint, glass, dark };
 
 // a cut across the car, from the front: place 0..1, height of its top in metres, half width in parts of the whole
 struct Cut {
     double at, top, wide;
-    Cover over, beside; // up to the next cut
+    Skin over, beside; // up to the next cut
 };
 
 struct Body {
@@ -30,7 +30,7 @@ struct Body {
     std::span<const Cut> cuts;
 };
 
-using enum Cover;
+using enum Skin;
 constexpr Cut kSedan[] = {
     {0, 0.62, 0.8, paint, paint},     {0.02, 0.72, 0.93, paint, paint}, {0.1, 0.79, 1, paint, paint},
     {0.275, 0.95, 1, glass, glass},   {0.42, 1.4, 1, paint, glass},     {0.53, 1.45, 1, paint, dark},
@@ -117,7 +117,7 @@ class CarShell {
             return f_.at(x, 0, c.top + (cabin(c) ? 0 : 0.035));
         }
     }
-    Finish finish(Cover c) const { return c == Cover::paint ? paint_ : c == Cover::glass ? glass_ : dark_; }
+    Finish finish(Skin c) const { return c == Skin::paint ? paint_ : c == Skin::glass ? glass_ : dark_; }
 
     // corners as seen from outside on the left; mirrored on the right
     void face(Finish f, int side, const Vector3& a, const Vector3& b, const Vector3& c, const Vector3& d)

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/buffer_folder.h"
+#include "engine/scene/buffer_folder.h"
 
 #include "engine/scene/camera_path.h"
 #include "engine/scene/palette.h"

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/refine_store.h"
+#include "engine/render/refine_store.h"
 
 #include "runtime/hash.h"
 #include "runtime/quote.h"

@@ -3,8 +3,8 @@
 #pragma once
 
 #include "engine/render/latent_codec.h"
+#include "engine/scene/buffer_folder.h"
 #include "engine/scene/run_folder.h"
-#include "tools/buffer_folder.h"
 
 #include <map>
 
