@@ -2,14 +2,29 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/open_device.h"
 
+#include "runtime/profile.h"
+
 namespace semrover {
 
-Result<std::unique_ptr<Device>> open_device(const Globals& globals)
+Result<std::unique_ptr<Device>> open_device(const Globals& globals, const std::string& profile)
 {
     DeviceOptions options;
     options.select = globals.device;
     options.max_bytes = globals.max_vram;
-    return Device::create(options);
+    SR_TRY(auto device, Device::create(options));
+    if (!profile.empty())
+        device->set_profile(std::make_shared<Profile>());
+    return device;
+}
+
+Status write_profile(Device& device, const std::string& path, const Globals& globals)
+{
+    if (path.empty())
+        return {};
+    SR_CHECK(device.profile()->write(path));
+    if (globals.verbose)
+        fmt::print(stderr, "{}", device.profile()->summary());
+    return {};
 }
 
 } // namespace semrover
