@@ -22,6 +22,7 @@ namespace fs = std::filesystem;
 struct VerifyArguments {
     std::vector<std::string> cases;
     std::string precision = "fp32";
+    bool allow_skip = false;
 };
 
 struct Kind {
@@ -163,8 +164,14 @@ Status verify(const VerifyArguments& o, const Globals& globals)
                                                   {"skipped", counts[2]},
                                                   {"cases", list}}
                                .dump(-1, ' ', true));
+    else if (cases.size() > 1)
+        fmt::print("{} passed, {} failed, {} skipped\n", counts[0], counts[1], counts[2]);
     if (counts[1])
         return fail(ErrorCode::verify_failed, "{} of {} cases failed", counts[1], cases.size());
+    if (counts[2] && !o.allow_skip)
+        return fail(ErrorCode::partial,
+                    "{} of {} cases were skipped, as nothing runs their kind; --allow-skip accepts that", counts[2],
+                    cases.size());
     return {};
 }
 
@@ -177,6 +184,7 @@ void add_verify(CLI::App& app, const Globals& globals, Run& run)
     c->add_option("CASE", o->cases, "folder of a case, or of cases (tests/golden)")->required();
     c->add_option("--precision", o->precision, "storage of weights and activations")
         ->check(CLI::IsMember({"fp32", "fp16"}));
+    c->add_flag("--allow-skip", o->allow_skip, "exit 0 although cases of unknown kinds were skipped");
     c->callback([o, &globals, &run] { run = [o, &globals] { return verify(*o, globals); }; });
 }
 
