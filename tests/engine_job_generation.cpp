@@ -5,7 +5,7 @@
 
 #include "engine/job/editing.h"
 #include "engine/job/growth.h"
-#include "runtime/hash.h"
+#include "runtime/base/hash.h"
 #include "tests/scratch_folder.h"
 
 #include <algorithm>

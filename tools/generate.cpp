@@ -4,7 +4,7 @@
 // grows it along a camera path into a folder of tiles
 #include "engine/job/generation.h"
 #include "engine/job/growth.h"
-#include "runtime/hash.h"
+#include "runtime/base/hash.h"
 #include "tools/generation_options.h"
 #include "tools/scene_input.h"
 

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/generation_options.h"
 
-#include "tools/open_device.h"
-#include "tools/progress.h"
-#include "tools/run_job.h"
+#include "tools/cli/open_device.h"
+#include "tools/cli/progress.h"
+#include "tools/cli/run_job.h"
 
 #include <CLI/CLI.hpp>
 

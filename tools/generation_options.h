@@ -3,7 +3,7 @@
 #pragma once
 
 #include "engine/job/regeneration.h"
-#include "tools/commands.h"
+#include "tools/cli/commands.h"
 
 namespace semrover {
 

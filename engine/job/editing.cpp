@@ -2,12 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/editing.h"
 
+#include "engine/job/version.h"
 #include "engine/scene/cell_reach.h"
 #include "engine/scene/edit_script.h"
 #include "engine/scene/stamp.h"
-#include "engine/version.h"
-#include "runtime/hash.h"
-#include "runtime/quote.h"
+#include "runtime/base/hash.h"
+#include "runtime/base/quote.h"
 
 #include <algorithm>
 

@@ -4,8 +4,8 @@
 
 #include "engine/job/grid_filling.h"
 #include "engine/job/outputs.h"
-#include "engine/version.h"
-#include "runtime/hash.h"
+#include "engine/job/version.h"
+#include "runtime/base/hash.h"
 
 namespace semrover {
 

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/generation_settings.h"
 
-#include "engine/version.h"
-#include "runtime/hash.h"
+#include "engine/job/version.h"
+#include "runtime/base/hash.h"
 
 namespace semrover {
 

@@ -3,9 +3,9 @@
 #pragma once
 
 #include "engine/voxfield/voxfield_model.h"
-#include "runtime/device.h"
-#include "runtime/dtype.h"
-#include "runtime/json.h"
+#include "runtime/base/dtype.h"
+#include "runtime/base/json.h"
+#include "runtime/device/device.h"
 
 #include <optional>
 

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/grid_filling.h"
 
-#include "engine/voxfield/region_store.h"
-#include "runtime/bytes_text.h"
+#include "engine/job/region_store.h"
+#include "runtime/base/bytes_text.h"
 
 #include <chrono>
 

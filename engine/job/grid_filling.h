@@ -4,7 +4,7 @@
 
 #include "engine/job/budget_meter.h"
 #include "engine/job/generation_settings.h"
-#include "engine/scene/run_folder.h"
+#include "engine/job/run_folder.h"
 #include "engine/voxfield/outpaint.h"
 
 namespace semrover {

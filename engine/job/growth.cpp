@@ -5,11 +5,11 @@
 #include "engine/job/grid_filling.h"
 #include "engine/job/growth_pieces.h"
 #include "engine/job/outputs.h"
-#include "engine/version.h"
-#include "runtime/bytes_text.h"
-#include "runtime/hash.h"
-#include "runtime/host_memory.h"
-#include "runtime/quote.h"
+#include "engine/job/version.h"
+#include "runtime/base/bytes_text.h"
+#include "runtime/base/hash.h"
+#include "runtime/base/host_memory.h"
+#include "runtime/base/quote.h"
 
 #include <algorithm>
 #include <chrono>

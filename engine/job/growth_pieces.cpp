@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/growth_pieces.h"
 
-#include "runtime/quote.h"
-#include "runtime/safetensors.h"
+#include "runtime/base/quote.h"
+#include "runtime/base/safetensors.h"
 
 #include <algorithm>
 #include <cstring>

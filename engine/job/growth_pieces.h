@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/scene/run_folder.h"
+#include "engine/job/run_folder.h"
 #include "engine/scene/tile_cache.h"
 #include "engine/voxfield/sub_grid.h"
 

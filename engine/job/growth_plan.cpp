@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/growth.h"
 
-#include "engine/scene/camera_path.h"
-#include "runtime/quote.h"
+#include "engine/format/camera_path.h"
+#include "runtime/base/quote.h"
 
 namespace semrover {
 

@@ -4,10 +4,10 @@
 
 #include "engine/job/grid_filling.h"
 #include "engine/job/outputs.h"
+#include "engine/job/version.h"
 #include "engine/scene/edit_undo.h"
-#include "engine/version.h"
 #include "engine/voxfield/sub_grid.h"
-#include "runtime/hash.h"
+#include "runtime/base/hash.h"
 
 #include <algorithm>
 
