@@ -5,6 +5,7 @@
 #include "engine/render/latent_size.h"
 #include "engine/render/vae.h"
 #include "runtime/program.h"
+#include "runtime/state.h"
 
 #include <memory>
 #include <span>

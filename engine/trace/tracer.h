@@ -5,6 +5,7 @@
 #include "engine/scene/camera.h"
 #include "engine/trace/trace_scene.h"
 #include "runtime/program.h"
+#include "runtime/state.h"
 
 #include <memory>
 
@@ -46,7 +47,8 @@ class Tracer {
 
     Device& device_;
     ShadeOptions options_;
-    Arena memory_; // view, picture
+    State memory_;
+    Slot view_, picture_;
     std::unique_ptr<Program> program_;
 };
 
