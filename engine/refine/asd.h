@@ -6,8 +6,10 @@
 #include "engine/refine/latent_codec.h"
 #include "engine/refine/noise_trail.h"
 #include "engine/sampling/repaint.h"
+#include "engine/sampling/replay.h"
 
 #include <functional>
+#include <optional>
 
 namespace semrover {
 
@@ -38,7 +40,7 @@ struct Conditioning {
 // Autoregressive renderer: the UNet sees the noisy latent, the previous frame's latent with noise on it, the splat
 // buffer's latent and its visibility. The graph is built once per picture size and replayed for every step, one submit
 // a step; embeddings of the timesteps and keys and values of the text are computed once. The result depends on nothing
-// but the frame, the plan and the seed.
+// but the frame, the plan and the seed: not on where it stopped and was taken up again.
 class AsdRenderer {
   public:
     // errors: usage for a guidance scale or noise out of range; bad_input for a UNet of other channels; device errors
@@ -59,7 +61,22 @@ class AsdRenderer {
     // -> [pixels, C] latent. Errors: internal when the network returns NaN or infinity; interrupted; device errors
     Result<std::vector<float>> render(const AsdFrame& frame, const StepCallback& callback = {});
 
-    // drops the programs and their memory until the next frame
+    // the same, piecewise: begin, step until it says true, finish. A frame that has begun ends with finish, cancel, or
+    // the next begin. One row of the plan is one submit. What the frame's spans show is copied by begin.
+    Status begin(const AsdFrame& frame);
+    Result<bool> step(size_t submits);
+    Result<std::vector<float>> finish();
+    Status cancel();
+    size_t steps_done() const { return replay_ ? replay_->row() : 0; }
+    size_t steps() const { return plan_.rows.size(); }
+
+    // between two steps: what another renderer with the same network, text, plan and options needs to go on, to the
+    // same bytes
+    Result<std::vector<std::byte>> save();
+    // in place of begin. Errors: bad_input for what was saved of another frame, plan, seed or options
+    Status resume(const AsdFrame& frame, std::span<const std::byte> saved);
+
+    // drops the programs and their memory until the next frame; between frames only
     void rest();
 
     uint32_t step_passes() const; // of a step, while there is a program
@@ -73,8 +90,7 @@ class AsdRenderer {
     Status make_tables(const Conditioning& text);
     Status make_programs();
     Status upload(const AsdFrame& frame);
-    Status begin(const AsdFrame& frame);
-    Status run_steps(const StepCallback& callback);
+    uint64_t key_of(const AsdFrame& frame) const;
 
     Device& device_;
     const Unet& unet_;
@@ -82,6 +98,8 @@ class AsdRenderer {
     AsdOptions options_;
     std::unique_ptr<Memory> memory_;
     std::unique_ptr<Program> begin_, step_;
+    std::optional<Replay> replay_;
+    uint64_t key_ = 0; // what the frame is
 
   public:
     ~AsdRenderer();

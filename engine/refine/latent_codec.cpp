@@ -7,42 +7,37 @@
 
 namespace semrover {
 
+// memory of what goes in and what comes out: matrices of a picture or a latent, a row a pixel
 struct LatentCodec::Ends {
-    struct End {
-        uint32_t width = 0, height = 0, channels = 0, slice = 0;
-
-        uint32_t ld() const { return round_up(channels, kRowPadding); }
-        uint32_t rows() const { return round_up(width * height, kImageRowPadding); }
-        uint64_t bytes() const { return uint64_t(rows()) * ld() * 4; }
-    };
     CodecDirection direction;
-    End in, out;
-    Arena arena;
+    uint32_t in_width, in_height, out_width, out_height;
+    State state;
+    Slot in, out;
 
     Ends(const Vae& vae, const LatentSize& size, CodecDirection which) : direction(which)
     {
         const VaeConfig& c = vae.config();
-        const uint32_t w = size.width(), h = size.height();
-        const End image{w * size.downscale, h * size.downscale, 0}, latent{w, h, 0};
-        in = which == CodecDirection::encode ? image : latent;
-        out = which == CodecDirection::encode ? latent : image;
-        in.channels = which == CodecDirection::encode ? c.in_channels : c.latent_channels;
-        out.channels = which == CodecDirection::encode ? 2 * c.latent_channels : c.out_channels;
-        in.slice = arena.add(in.bytes());
-        out.slice = arena.add(out.bytes());
+        const bool encodes = which == CodecDirection::encode;
+        const uint32_t n = size.downscale;
+        in_width = size.width() * (encodes ? n : 1);
+        in_height = size.height() * (encodes ? n : 1);
+        out_width = size.width() * (encodes ? 1 : n);
+        out_height = size.height() * (encodes ? 1 : n);
+        const auto end = [&](uint32_t width, uint32_t height, uint32_t channels, const char* name) {
+            return state.slot(round_up(width * height, kImageRowPadding), channels, DType::f32, name);
+        };
+        in = end(in_width, in_height, encodes ? c.in_channels : c.latent_channels, "codec input");
+        out = end(out_width, out_height, encodes ? 2 * c.latent_channels : c.out_channels, "codec output");
     }
     Graph graph(const Vae& vae) const
     {
         Graph g;
-        const Tensor x = g.external(arena.slice(in.slice), in.rows(), in.channels, DType::f32, "codec input");
-        const FeatureMap from{x, 1, in.height, in.width};
+        const FeatureMap from{in.in(g), 1, in_height, in_width};
         const FeatureMap y = direction == CodecDirection::encode ? vae.encode(g, from) : vae.decode(g, from);
-        SR_ASSERT(y.height == out.height && y.width == out.width && y.channels() == out.channels &&
-                      y.data.ld == out.ld(),
-                  "the VAE gives {} x {} x {}, expected {} x {} x {}", y.height, y.width, y.channels(), out.height,
-                  out.width, out.channels);
-        const Tensor to = g.external(arena.slice(out.slice), out.rows(), out.channels, DType::f32, "codec output");
-        g.replace(y.data.resource, to.resource);
+        SR_ASSERT(y.height == out_height && y.width == out_width && y.channels() == out.cols(),
+                  "the VAE gives {} x {} x {}, expected {} x {} x {}", y.height, y.width, y.channels(), out_height,
+                  out_width, out.cols());
+        g.keep(y.data, out);
         return g;
     }
 };
@@ -58,7 +53,7 @@ Result<std::unique_ptr<LatentCodec>> LatentCodec::create(Device& device, const V
 {
     std::unique_ptr<LatentCodec> c(new LatentCodec(device, vae, size));
     c->ends_ = std::make_unique<Ends>(vae, size, direction);
-    SR_CHECK(c->ends_->arena.allocate(device, "pictures and latents"));
+    SR_CHECK(c->ends_->state.allocate(device, "pictures and latents"));
     SR_TRY(c->program_, Program::create(device, c->ends_->graph(vae)));
     return c;
 }
@@ -68,37 +63,35 @@ Result<uint64_t> LatentCodec::planned_bytes(const DeviceLimits& limits, const Va
 {
     const Ends ends(vae, size, direction);
     SR_TRY(const Plan plan, make_plan(ends.graph(vae).desc(), limits));
-    return ends.arena.planned_bytes(limits) + plan.arena_bytes();
+    return ends.state.planned_bytes(limits) + plan.arena_bytes();
 }
 
-// rows as on the device, in and out
-Result<std::vector<float>> LatentCodec::run(std::span<const float> padded)
+// pixels without padding, in and out
+Result<std::vector<float>> LatentCodec::run(std::span<const float> pixels)
 {
-    SR_CHECK(device_.write(ends_->arena.slice(ends_->in.slice), std::as_bytes(padded)));
+    SR_CHECK(ends_->in.write_rows(device_, pixels));
     SR_CHECK(program_->run());
-    std::vector<float> out(ends_->out.bytes() / 4);
-    SR_CHECK(device_.read(ends_->arena.slice(ends_->out.slice), std::as_writable_bytes(std::span(out))));
-    return out;
+    return ends_->out.read_rows(device_, ends_->out_width * ends_->out_height);
 }
 
 Result<std::vector<float>> LatentCodec::encode(std::span<const float> image)
 {
-    const uint32_t channels = ends_->in.channels, ld = ends_->in.ld();
+    const uint32_t channels = ends_->in.cols(), width = ends_->in_width, height = ends_->in_height;
     SR_ASSERT(ends_->direction == CodecDirection::encode &&
                   image.size() == size_t(size_.image_width) * size_.image_height * channels,
               "{} numbers to encode", image.size());
-    std::vector<float> padded(ends_->in.bytes() / 4, 0.f);
-    for (uint32_t y = 0; y < ends_->in.height; ++y)
-        for (uint32_t x = 0; x < ends_->in.width; ++x) {
+    std::vector<float> continued;
+    for (uint32_t y = 0; y < height; ++y)
+        for (uint32_t x = 0; x < width; ++x) {
             const size_t from =
                 size_t(std::min(y, size_.image_height - 1)) * size_.image_width + std::min(x, size_.image_width - 1);
-            std::copy_n(&image[from * channels], channels, &padded[(size_t(y) * ends_->in.width + x) * ld]);
+            continued.insert(continued.end(), &image[from * channels], &image[from * channels] + channels);
         }
-    SR_TRY(const std::vector<float> moments, run(padded));
+    SR_TRY(const std::vector<float> moments, run(continued));
     const VaeConfig& c = vae_.config();
     std::vector<float> latent(size_t(size_.pixels()) * c.latent_channels);
     for (size_t i = 0; i < latent.size(); ++i) {
-        const float mean = moments[i / c.latent_channels * ends_->out.ld() + i % c.latent_channels];
+        const float mean = moments[i / c.latent_channels * ends_->out.cols() + i % c.latent_channels];
         latent[i] = (mean - c.shift_factor) * c.scaling_factor;
     }
     SR_CHECK(check_finite(latent, "the encoded buffer"));
@@ -110,18 +103,16 @@ Result<std::vector<float>> LatentCodec::decode(std::span<const float> latent)
     const VaeConfig& c = vae_.config();
     SR_ASSERT(ends_->direction == CodecDirection::decode && latent.size() == size_t(size_.pixels()) * c.latent_channels,
               "{} numbers to decode", latent.size());
-    std::vector<float> padded(ends_->in.bytes() / 4, 0.f);
+    std::vector<float> scaled(latent.size());
     for (size_t i = 0; i < latent.size(); ++i)
-        padded[i / c.latent_channels * ends_->in.ld() + i % c.latent_channels] =
-            latent[i] / c.scaling_factor + c.shift_factor;
-    SR_TRY(const std::vector<float> rows, run(padded));
+        scaled[i] = latent[i] / c.scaling_factor + c.shift_factor;
+    SR_TRY(const std::vector<float> pixels, run(scaled));
     std::vector<float> image;
     image.reserve(size_t(size_.image_width) * size_.image_height * c.out_channels);
-    for (uint32_t y = 0; y < size_.image_height; ++y)
-        for (uint32_t x = 0; x < size_.image_width; ++x) {
-            const float* pixel = &rows[(size_t(y) * ends_->out.width + x) * ends_->out.ld()];
-            image.insert(image.end(), pixel, pixel + c.out_channels);
-        }
+    for (uint32_t y = 0; y < size_.image_height; ++y) {
+        const float* row = &pixels[size_t(y) * ends_->out_width * c.out_channels];
+        image.insert(image.end(), row, row + size_t(size_.image_width) * c.out_channels);
+    }
     SR_CHECK(check_finite(image, "the decoded frame"));
     return image;
 }

@@ -5,6 +5,7 @@
 #include "engine/network/vae.h"
 #include "engine/refine/latent_size.h"
 #include "runtime/device/program.h"
+#include "runtime/device/state.h"
 
 #include <memory>
 #include <span>

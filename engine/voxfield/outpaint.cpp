@@ -8,35 +8,12 @@
 
 namespace semrover {
 
-// note: a seam, until TokenSampler itself can be stepped: its first step does all
-class SteppedSampler {
-  public:
-    explicit SteppedSampler(TokenSampler& sampler) : sampler_(sampler) {}
-    Status begin(std::vector<RegionInput> regions)
-    {
-        regions_ = std::move(regions);
-        return {};
-    }
-    Status resume(std::vector<RegionInput> regions, std::span<const std::byte>) { return begin(std::move(regions)); }
-    Result<bool> step(size_t)
-    {
-        SR_TRY(tokens_, sampler_.run(regions_));
-        return true;
-    }
-    Result<std::vector<float>> finish() { return std::move(tokens_); }
-    Status cancel() { return {}; }
-    Result<std::vector<std::byte>> save() { return std::vector<std::byte>(); }
-    size_t rows_done() const { return 0; }
-    size_t rows() const { return 1; }
-
-  private:
-    TokenSampler& sampler_;
-    std::vector<RegionInput> regions_;
-    std::vector<float> tokens_;
-};
-
-Outpainter::Outpainter(VoxelGrid& grid, const TransformerConfig& config) : grid_(grid), config_(config) {}
-Outpainter::~Outpainter() = default;
+// the device does not go on with what nobody waits for
+Outpainter::~Outpainter()
+{
+    if (sampler_ && !flight_.empty())
+        (void)sampler_->cancel();
+}
 
 Result<std::unique_ptr<Outpainter>> Outpainter::create(VoxelGrid& grid, const TransformerConfig& config,
                                                        const RegionOptions& options)
@@ -199,7 +176,7 @@ Status Outpainter::resume(OutpaintState state)
 
 Status Outpainter::begin(TokenSampler& sampler, uint32_t batch, FinishedRegion finished)
 {
-    sampler_ = std::make_unique<SteppedSampler>(sampler);
+    sampler_ = &sampler;
     batch_ = batch;
     finished_ = std::move(finished);
     if (flight_.size() > batch)

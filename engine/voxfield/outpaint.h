@@ -10,8 +10,6 @@
 
 namespace semrover {
 
-class SteppedSampler;
-
 // what a finished region hands over: stored points and colours of its target cells
 struct RegionResult {
     uint32_t region = 0;
@@ -65,7 +63,7 @@ class Outpainter {
     Result<OutpaintState> save(); // between two steps
 
   private:
-    Outpainter(VoxelGrid& grid, const TransformerConfig& config);
+    Outpainter(VoxelGrid& grid, const TransformerConfig& config) : grid_(grid), config_(config) {}
     RegionInput input(uint32_t region) const;
     RegionResult result(uint32_t region, const float* tokens) const;
     RegionResult stored(uint32_t region) const;
@@ -81,7 +79,7 @@ class Outpainter {
     std::vector<RegionResult> restored_; // by region; empty targets: not restored
     size_t cells_to_do_ = 0, cells_done_ = 0;
     uint32_t largest_ = 0;
-    std::unique_ptr<SteppedSampler> sampler_;
+    TokenSampler* sampler_ = nullptr; // from begin() on
     uint32_t batch_ = 1;
     FinishedRegion finished_;
     std::vector<uint32_t> flight_;   // regions of the batch at work

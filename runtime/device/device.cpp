@@ -237,6 +237,13 @@ Status Device::wait(uint64_t ticket)
     return {};
 }
 
+Result<bool> Device::finished(uint64_t ticket) const
+{
+    uint64_t value = 0;
+    SR_VK(vkGetSemaphoreCounterValue(device_, timeline_, &value));
+    return value >= ticket;
+}
+
 Result<Buffer*> Device::staging()
 {
     if (!staging_) {

@@ -71,6 +71,7 @@ class Device {
     // queue: a ticket is a value of one timeline semaphore
     Result<uint64_t> submit(std::span<const VkCommandBuffer> commands);
     Status wait(uint64_t ticket);
+    Result<bool> finished(uint64_t ticket) const; // without waiting
     uint64_t last_ticket() const { return ticket_; }
 
     // device memory in use, counted at allocation
