@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+#include "engine/format/camera_path.h"
 #include "engine/job/drawing.h"
 #include "engine/job/refinement.h"
-#include "engine/scene/camera_path.h"
 #include "tests/renderer_folders.h"
 
 #include <nlohmann/json.hpp>

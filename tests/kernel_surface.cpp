@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/mesh/triangle_tree.h"
-#include "kernels/meshes.h"
+#include "kernels/mesh.h"
 #include "tests/clip_reference.h"
 #include "tests/kernel_case.h"
 #include "tests/philox_reference.h"
@@ -91,7 +91,7 @@ std::array<int, 3> cell_of(uint32_t key)
 Tensor kept(KernelCase& k, Tensor y)
 {
     const Tensor out = k.output(y.rows, y.cols, y.dtype, y.ld);
-    k.graph.replace(y.resource, out.resource);
+    k.graph.keep(y, out);
     return out;
 }
 

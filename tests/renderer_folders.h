@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/format/image.h"
 #include "engine/scene/grid.h"
-#include "engine/scene/image.h"
-#include "runtime/safetensors.h"
+#include "runtime/base/safetensors.h"
 #include "tests/scratch_folder.h"
 
 #include <gtest/gtest.h>

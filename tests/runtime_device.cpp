@@ -1,10 +1,11 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "kernels/kernels.h"
-#include "runtime/device.h"
-#include "runtime/pipeline.h"
-#include "runtime/profile.h"
-#include "runtime/program.h"
+#include "kernels/network.h"
+#include "runtime/device/device.h"
+#include "runtime/device/pipeline.h"
+#include "runtime/device/profile.h"
+#include "runtime/device/program.h"
+#include "runtime/device/state.h"
 #include "tests/host_vulkan.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
@@ -173,11 +174,11 @@ TEST(runtime_device, refuses_one_allocation_that_is_too_large_with_numbers)
         EXPECT_EQ(buffer.error().code, ErrorCode::out_of_memory);
     }
     EXPECT_EQ(device->allocated_bytes(), 0u);
-    Arena arena;
+    State state;
     for (int i = 0; i < 5; ++i)
-        arena.add(400000); // two a block
-    EXPECT_EQ(arena.planned_bytes(device->limits()), 5 * 400128u);
-    ASSERT_TRUE(arena.allocate(*device, "arena"));
+        (void)state.slot(100000, 1, DType::u32, "slot", 1); // two a block
+    EXPECT_EQ(state.planned_bytes(device->limits()), 5 * 400128u);
+    ASSERT_TRUE(state.allocate(*device, "state"));
     EXPECT_EQ(device->allocated_bytes(), 5 * 400128u);
 }
 

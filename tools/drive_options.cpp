@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/drive_options.h"
 
-#include "engine/scene/camera_path.h"
-#include "engine/scene/rig.h"
+#include "engine/camera/rig.h"
+#include "engine/format/camera_path.h"
 
 #include <CLI/CLI.hpp>
 

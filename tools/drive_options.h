@@ -3,7 +3,7 @@
 #pragma once
 
 #include "engine/job/path_drawing.h"
-#include "tools/lens_options.h"
+#include "tools/cli/lens_options.h"
 
 namespace semrover {
 

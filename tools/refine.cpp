@@ -2,13 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // semrover refine DIR|GRID -m MODEL -o OUT: splat buffers to frames, each from the one before
 #include "engine/job/refinement.h"
-#include "runtime/bytes_text.h"
-#include "runtime/profile.h"
-#include "runtime/quote.h"
+#include "runtime/base/bytes_text.h"
+#include "runtime/base/quote.h"
+#include "runtime/device/profile.h"
+#include "tools/cli/open_device.h"
+#include "tools/cli/run_job.h"
 #include "tools/drive_options.h"
-#include "tools/open_device.h"
 #include "tools/refine_video.h"
-#include "tools/run_job.h"
 #include "tools/scene_input.h"
 
 #include <CLI/CLI.hpp>

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/render/refine_chain.h"
-#include "engine/render/refine_store.h"
+#include "engine/job/refine_store.h"
+#include "engine/refine/refine_chain.h"
 
 namespace semrover {
 

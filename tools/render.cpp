@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // semrover render GRID --path FILE -o DIR: splat buffers of a camera path: colour, depth, normal, label, visibility
 #include "engine/job/drawing.h"
-#include "runtime/profile.h"
-#include "runtime/quote.h"
+#include "runtime/base/quote.h"
+#include "runtime/device/profile.h"
+#include "tools/cli/open_device.h"
+#include "tools/cli/run_job.h"
 #include "tools/drive_options.h"
-#include "tools/open_device.h"
-#include "tools/run_job.h"
 #include "tools/scene_input.h"
 #include "tools/video.h"
 

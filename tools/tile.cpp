@@ -3,8 +3,8 @@
 // semrover tile GRID -o DIR: cuts a grid into tiles; semrover tile DIR --join -o GRID: puts them together again
 #include "engine/job/outputs.h"
 #include "engine/scene/tiles.h"
-#include "runtime/quote.h"
-#include "tools/commands.h"
+#include "runtime/base/quote.h"
+#include "tools/cli/commands.h"
 
 #include <CLI/CLI.hpp>
 

@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/drawing.h"
 
+#include "engine/format/image.h"
 #include "engine/job/budget_meter.h"
-#include "engine/scene/bounds.h"
-#include "engine/scene/image.h"
 #include "engine/scene/palette.h"
+#include "engine/splat/bounds.h"
 
 namespace semrover {
 

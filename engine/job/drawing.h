@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/format/image.h"
+#include "engine/format/ply.h"
 #include "engine/job/job.h"
 #include "engine/job/path_drawing.h"
-#include "engine/scene/image.h"
-#include "engine/scene/ply.h"
 
 #include <variant>
 

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "runtime/json.h"
-#include "runtime/result.h"
+#include "runtime/base/json.h"
+#include "runtime/base/result.h"
 
 #include <cstdint>
 #include <functional>

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/scene/run_folder.h"
+#include "engine/job/run_folder.h"
 
 namespace semrover {
 

@@ -3,7 +3,7 @@
 #include "engine/job/path_drawing.h"
 
 #include "engine/splat/blocks.h"
-#include "runtime/quote.h"
+#include "runtime/base/quote.h"
 
 namespace semrover {
 

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/render/frame_images.h"
-#include "engine/scene/camera.h"
+#include "engine/camera/camera.h"
+#include "engine/refine/frame_images.h"
 #include "engine/scene/grid.h"
 #include "engine/splat/rasterizer.h"
 

@@ -4,10 +4,10 @@
 
 #include "engine/job/job.h"
 #include "engine/job/path_drawing.h"
-#include "engine/render/memory_plan.h"
-#include "engine/render/refine_chain.h"
-#include "engine/render/refine_store.h"
-#include "engine/render/renderer_model.h"
+#include "engine/job/refine_store.h"
+#include "engine/model/renderer_model.h"
+#include "engine/refine/memory_plan.h"
+#include "engine/refine/refine_chain.h"
 
 namespace semrover {
 

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/refinement.h"
-#include "engine/version.h"
-#include "runtime/hash.h"
-#include "runtime/quote.h"
+#include "engine/job/version.h"
+#include "runtime/base/hash.h"
+#include "runtime/base/quote.h"
 
 #include <algorithm>
 

@@ -3,9 +3,9 @@
 #pragma once
 
 #include "engine/job/job.h"
-#include "engine/render/frame_renderer.h"
-#include "engine/render/refine_chain.h"
-#include "engine/render/refine_store.h"
+#include "engine/job/refine_store.h"
+#include "engine/refine/frame_renderer.h"
+#include "engine/refine/refine_chain.h"
 
 namespace semrover {
 

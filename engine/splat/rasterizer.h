@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/scene/camera.h"
+#include "engine/camera/camera.h"
 #include "engine/splat/surfels.h"
-#include "runtime/program.h"
+#include "runtime/device/program.h"
 
 #include <array>
 #include <memory>
@@ -17,7 +17,7 @@ namespace semrover {
 struct SplatCamera {
     float fx = 0, fy = 0, cx = 0, cy = 0;    // pixels
     std::array<float, 12> world_to_camera{}; // [3, 4], row-major, metres
-    // of a lens that is no pinhole: engine/scene/lens.h
+    // of a lens that is no pinhole: engine/camera/lens.h
     std::array<float, 8> distortion{};
     float limit = 0;
     bool radial_depth = false; // depth is the distance from the camera, not along z
@@ -51,6 +51,11 @@ struct RasterizerOptions {
     CameraModel model = CameraModel::pinhole; // of all cameras
 };
 
+// what one camera sees, on the device: as SplatImages (kernels.h) has it, a row a pixel
+struct SplatSlots {
+    Slot color, surface, depth, ids;
+};
+
 // Draws a scene from up to max_cameras cameras in one submit; more are drawn in turns. The graph is built once and
 // replayed; when a frame has more splats or tiles than it has room for, it is built again with more, and the frame
 // repeated. The scene must outlive it.
@@ -66,16 +71,15 @@ class Rasterizer {
 
     const Program& program() const { return *program_; }
     // device memory for what it has room for now, beside the scene's
-    uint64_t planned_bytes() const { return memory_->planned_bytes(device_.limits()) + program_->plan().arena_bytes(); }
+    uint64_t planned_bytes() const { return state_.planned_bytes(device_.limits()) + program_->plan().arena_bytes(); }
     uint32_t rebuilds() const { return rebuilds_; } // how often there was not enough room
 
   private:
-    enum Slot { kCameras, kVisible, kPairs, kColor, kSurface, kDepth, kIds, kSlots };
-
     Rasterizer(Device& device, const SurfelScene& scene) : device_(device), scene_(scene) {}
     Status build();
     Status make_room(uint32_t visible, uint32_t pairs);
     Status draw(std::span<const SplatCamera> cameras);
+    SplatSlots images(uint32_t camera) const;
     Status read_images(uint32_t count, std::vector<SplatImage>& out);
 
     Device& device_;
@@ -83,7 +87,9 @@ class Rasterizer {
     RasterizerOptions options_;
     uint32_t width_ = 0, height_ = 0, cameras_ = 0;
     uint32_t max_visible_ = 0, max_pairs_ = 0, rebuilds_ = 0;
-    std::unique_ptr<Arena> memory_; // cameras, totals, images
+    State state_;
+    Slot camera_table_, visible_, pairs_;
+    SplatSlots images_; // of all cameras
     std::unique_ptr<Program> program_;
 };
 
