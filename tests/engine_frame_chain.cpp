@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // a chain of frames whose pixels and latents stay on the device: the bytes are those of one that goes through the host
-#include "engine/render/asd.h"
+#include "engine/render/frame_renderer.h"
 #include "runtime/json.h"
 #include "runtime/readback_ring.h"
 
@@ -122,6 +122,78 @@ TEST(engine_frame_chain, on_the_device_has_the_bytes_of_one_through_the_host)
         ASSERT_EQ(host.size(), kFrames);
         EXPECT_NE(host[0], host[1]);
         EXPECT_EQ(host, there) << dtype_name(precision);
+    }
+}
+
+// as a run of `refine` has it: networks and codecs come and go, latents stay
+struct Job {
+    RendererModel model;
+    SamplingPlan plan;
+    RendererWork work{kSize};
+
+    Job()
+    {
+        model.unet_folder = kModel / "unet";
+        model.vae_folder = kModel / "vae";
+        model.unet = *parse_unet_config(*read_json(kModel / "unet" / "config.json"));
+        model.vae = *parse_vae_config(*read_json(kModel / "vae" / "config.json"));
+        model.conditioning_tokens = 5;
+        for (size_t i = 0; i < 5 * model.unet.cross_attention_dim; ++i)
+            model.conditioning.push_back(std::sin(float(i)));
+        SchedulerConfig config;
+        config.sampler = Sampler::ddim;
+        config.clip_sample = false;
+        plan = *plan_sampling(config, 3);
+    }
+    std::unique_ptr<FrameRenderer> renderer() const
+    {
+        AsdOptions options;
+        options.guidance_scale = 2;
+        auto r = std::make_unique<FrameRenderer>(device(), model, plan, DType::f16, options, MemoryPolicy::resident);
+        EXPECT_TRUE(r->start(work, work));
+        return r;
+    }
+};
+
+// frame `f`, after the frame before it in the same renderer or a latent of it
+Picture frame_of(FrameRenderer& r, uint32_t f)
+{
+    EXPECT_TRUE(r.begin_frame({f, 0, f == 0}));
+    while (!*r.step(2)) {
+    }
+    EXPECT_TRUE(r.end_frame());
+    const auto bytes = r.decode_latent();
+    EXPECT_TRUE(bytes) << bytes.error().message;
+    Picture picture = *bytes->read<uint8_t>(device());
+    picture.resize(size_t(kSize.image_width) * kSize.image_height * 3);
+    return picture;
+}
+
+TEST(engine_frame_chain, a_frame_renderer_keeps_latents_between_its_stages_and_frames)
+{
+    const Job job;
+    const auto host = job.renderer(), there = job.renderer();
+    std::vector<float> previous;
+    for (uint32_t f = 0; f < kFrames; ++f) {
+        Picture color, visible;
+        for (const uint32_t word : seen(f)) {
+            color.insert(color.end(), {uint8_t(word), uint8_t(word >> 8), uint8_t(word >> 16)});
+            visible.push_back(uint8_t(word >> 24));
+        }
+        const std::vector<float> buffer = *host->encode(floats_of_pixels(color)), before = previous,
+                                 shares = block_shares(kSize, visible);
+        previous = *host->denoise({f, 0, buffer, shares, before}, {});
+        const Picture expected = pixels_of_floats(*host->decode(previous));
+        ASSERT_TRUE(there->encode_seen(seen(f)));
+        EXPECT_EQ(frame_of(*there, f), expected) << "frame " << f;
+        EXPECT_EQ(*there->denoiser()->slots().latent.read_rows(device(), kSize.pixels()), previous);
+        // taken up by another, from what a folder holds
+        const auto later = job.renderer();
+        if (f > 0) {
+            ASSERT_TRUE(later->use_previous(before));
+        }
+        ASSERT_TRUE(later->use_latent(buffer, shares));
+        EXPECT_EQ(frame_of(*later, f), expected) << "frame " << f << ", taken up";
     }
 }
 
