@@ -4,6 +4,7 @@
 
 #include "engine/format/image.h"
 #include "engine/job/budget_meter.h"
+#include "engine/job/outgoing.h"
 #include "engine/scene/palette.h"
 #include "engine/splat/bounds.h"
 
@@ -37,9 +38,10 @@ Result<SurfelScene> load_scene(Device& device, DrawingOptions& o)
 
 class DrawingJob : public Job {
   public:
-    DrawingJob(Device& device, DrawingOptions options, SurfelScene scene, const JobCallbacks& callbacks)
+    DrawingJob(Device& device, DrawingOptions options, SurfelScene scene, std::unique_ptr<Outgoing> out,
+               const JobCallbacks& callbacks)
         : device_(device), o_(std::move(options)), scene_(std::move(scene)), callbacks_(callbacks),
-          drawing_(device, scene_, o_.path, o_.draw.rasterizer())
+          drawing_(device, scene_, o_.path, o_.draw.rasterizer()), out_(std::move(out))
     {
         say(false);
     }
@@ -49,15 +51,19 @@ class DrawingJob : public Job {
         BudgetMeter meter(budget, cost_);
         bool done = drawing_.total() == 0;
         while (!done) {
-            const auto drawn = [this](const CameraFrame& f, const SplatImage& i) { return write(f, i); };
-            SR_TRY(done, drawing_.step(drawn));
+            SR_CHECK(out_->poll());
+            SR_TRY(done, drawing_.step([this](const CameraFrame& frame, const SplatPixelSlots& pixels) {
+                return take(frame, pixels);
+            }));
             say(done);
             meter.submitted();
             if (!meter.room())
                 break;
         }
         if (done && o_.top.width)
-            SR_CHECK(write_overview());
+            SR_CHECK(draw_overview());
+        if (done)
+            SR_CHECK(out_->drain());
         return done;
     }
 
@@ -69,7 +75,8 @@ class DrawingJob : public Job {
                     {"peak_device_bytes", device_.peak_bytes()}};
     }
 
-    void cancel() override {} // a step waits for what it submits
+    // what was drawn is written
+    void cancel() override { (void)out_->drain(); }
 
   private:
     void say(bool ended)
@@ -82,21 +89,34 @@ class DrawingJob : public Job {
                                  .device_bytes = device_.allocated_bytes(),
                                  .ended = ended});
     }
-    Status write(const CameraFrame& frame, const SplatImage& image)
+    Status take(const CameraFrame& frame, const SplatPixelSlots& slots)
     {
         const Path folder = camera_folder(o_.folder, frame.camera);
-        SR_CHECK(write_frame_images(folder, counts_[frame.camera]++, image, o_.draw.background));
-        return o_.picture ? o_.picture(frame, color_pixels(image, o_.draw.background)) : Status{};
+        const ImageSize size{frame.intrinsics.width, frame.intrinsics.height};
+        return out_->read(slots, size,
+                          [this, frame, folder, number = counts_[frame.camera]++](FramePixels pixels) -> Status {
+                              if (o_.picture)
+                                  SR_CHECK(o_.picture(frame, color_pixels(pixels)));
+                              return out_->write([folder, number, pixels = std::move(pixels)] {
+                                  return write_frame_images(folder, number, pixels);
+                              });
+                          });
     }
-    Status write_overview()
+    Status draw_overview()
     {
         const CameraFrame camera =
             overview_camera(std::visit([](const auto& s) { return bounds_of(s); }, o_.scene), o_.top);
-        SR_TRY(const auto images, drawing_.draw({&camera, 1}));
+        return drawing_.draw({&camera, 1}, [this](const CameraFrame&, const SplatPixelSlots& slots) {
+            return out_->read(slots, o_.top, [this](const FramePixels& pixels) {
+                return out_->write([this, color = color_pixels(pixels)] { return write_overview(color); });
+            });
+        });
+    }
+    Status write_overview(std::span<const uint8_t> color) const
+    {
         std::error_code error;
         std::filesystem::create_directories(o_.folder, error);
-        return write_png_rgb8(o_.folder / "top.png", o_.top.width, o_.top.height,
-                              color_pixels(images[0], o_.draw.background));
+        return write_png_rgb8(o_.folder / "top.png", o_.top.width, o_.top.height, color);
     }
 
     Device& device_;
@@ -106,7 +126,16 @@ class DrawingJob : public Job {
     PathDrawing drawing_;
     SubmitCost cost_;
     std::map<std::string, uint32_t> counts_; // frames so far, per camera
+    std::unique_ptr<Outgoing> out_;          // last: what it writes is of the others
 };
+
+uint64_t largest_read(const DrawingOptions& o)
+{
+    uint64_t pixels = uint64_t(o.top.width) * o.top.height;
+    for (const CameraFrame& f : o.path.frames)
+        pixels = std::max(pixels, uint64_t(f.intrinsics.width) * f.intrinsics.height);
+    return pixels * 4;
+}
 
 } // namespace
 
@@ -115,7 +144,8 @@ Result<std::unique_ptr<Job>> begin_drawing(Device& device, DrawingOptions option
     SR_TRY(SurfelScene scene, load_scene(device, options));
     if (scene.skipped() && callbacks.warning)
         callbacks.warning(fmt::format("{} of {} splats are degenerate and not drawn", scene.skipped(), scene.size()));
-    return std::make_unique<DrawingJob>(device, std::move(options), std::move(scene), callbacks);
+    SR_TRY(auto out, Outgoing::create(device, largest_read(options)));
+    return std::make_unique<DrawingJob>(device, std::move(options), std::move(scene), std::move(out), callbacks);
 }
 
 } // namespace semrover

@@ -19,7 +19,7 @@ struct DrawingOptions {
     ImageSize top;   // of top.png; 0 x 0: none
     Path folder;     // gets {color,depth,normal,label,visible}/000000.png, in folders of the cameras' names
     DrawOptions draw;
-    // gets the colours of every frame of the path, [height, width, 3], once its files are written; may be empty
+    // gets the colours of every frame of the path, [height, width, 3], when they arrive from the device; may be empty
     std::function<Status(const CameraFrame&, std::span<const uint8_t>)> picture;
 };
 

@@ -29,6 +29,7 @@ RasterizerOptions DrawOptions::rasterizer() const
 {
     RasterizerOptions options;
     options.visible_alpha = visible_alpha.value_or(options.visible_alpha);
+    options.pixels_over = background;
     return options;
 }
 
@@ -45,7 +46,7 @@ Result<SurfelScene> splats_of(Device& device, const VoxelGrid& grid, const Path&
     return SurfelScene::create(device, points, o.surfels);
 }
 
-Result<std::vector<SplatImage>> PathDrawing::draw(std::span<const CameraFrame> frames)
+Status PathDrawing::draw(std::span<const CameraFrame> frames, const Drawn& drawn)
 {
     const Intrinsics& size = frames.front().intrinsics;
     auto& rasterizer = rasterizers_[{size.width, size.height, size.model}];
@@ -58,16 +59,20 @@ Result<std::vector<SplatImage>> PathDrawing::draw(std::span<const CameraFrame> f
     std::vector<SplatCamera> cameras;
     for (const CameraFrame& frame : frames)
         cameras.push_back(splat_camera(frame.intrinsics, frame.pose));
-    return rasterizer->render(cameras);
+    for (size_t at = 0; at < cameras.size();) {
+        SR_TRY(const uint32_t together, rasterizer->draw(std::span(cameras).subspan(at)));
+        for (uint32_t i = 0; i < together; ++i, ++at)
+            SR_CHECK(drawn(frames[at], rasterizer->pixels(i)));
+    }
+    return {};
 }
 
 Result<bool> PathDrawing::step(const Drawn& drawn)
 {
     SR_ASSERT(done_ < total(), "all {} frames are drawn", total());
     const size_t end = end_of_moment(path_, done_);
-    SR_TRY(const auto images, draw(std::span(path_.frames).subspan(done_, end - done_)));
-    for (; done_ < end; ++done_)
-        SR_CHECK(drawn(path_.frames[done_], images[done_ + images.size() - end]));
+    SR_CHECK(draw(std::span(path_.frames).subspan(done_, end - done_), drawn));
+    done_ = end;
     return done_ == total();
 }
 

@@ -21,7 +21,7 @@ struct DrawOptions {
     std::optional<float> visible_alpha; // alpha from which a pixel counts as visible; 0.5, or what a model says
     bool semantic = false;              // in label colours; a grid without points as blocks
 
-    RasterizerOptions rasterizer() const;
+    RasterizerOptions rasterizer() const; // that keeps pixels as files have them
 };
 
 // Splats of a grid: points as generated, or as DrawOptions::semantic says. `name` is the grid's, for errors: bad_input
@@ -29,10 +29,11 @@ struct DrawOptions {
 Result<SurfelScene> splats_of(Device& device, const VoxelGrid& grid, const Path& name, const DrawOptions& options);
 
 // Draws a camera path in order, a moment a step: what the cameras of a rig see at one time is drawn in one submit, with
-// one rasterizer for each image size and camera model.
+// one rasterizer for each image size and camera model. Pictures stay on the device, as files have them.
 class PathDrawing {
   public:
-    using Drawn = std::function<Status(const CameraFrame&, const SplatImage&)>;
+    // the pixels are there until it returns; a read of a ring that it starts is in time
+    using Drawn = std::function<Status(const CameraFrame&, const SplatPixelSlots&)>;
 
     // the scene must outlive it
     PathDrawing(Device& device, const SurfelScene& scene, CameraPath path, const RasterizerOptions& options)
@@ -46,7 +47,7 @@ class PathDrawing {
     size_t total() const { return path_.frames.size(); }
 
     // frames of one size and camera model, apart from the path
-    Result<std::vector<SplatImage>> draw(std::span<const CameraFrame> frames);
+    Status draw(std::span<const CameraFrame> frames, const Drawn& drawn);
 
   private:
     Device& device_;

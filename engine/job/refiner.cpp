@@ -2,174 +2,157 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/refiner.h"
 
+#include <algorithm>
+#include <cstring>
+
 namespace semrover {
 
 namespace {
 
 // says which frame an error is about
 template <typename T>
-T of_frame(const RefineChain& chain, uint32_t frame, T result)
+T of_frame(const RefineTask& task, T result)
 {
     if (!result && result.error().code == ErrorCode::internal)
-        result.error().message = fmt::format("{}: {}", frame_text(chain.camera.name, frame), result.error().message);
+        result.error().message =
+            fmt::format("{}: {}", frame_text(task.chain->camera.name, task.frame), result.error().message);
     return result;
+}
+
+// a buffer's files as splat_pixels() would make them
+std::vector<uint32_t> seen_words(const BufferFrame& buffer)
+{
+    std::vector<uint32_t> words(buffer.visible.size());
+    for (size_t i = 0; i < words.size(); ++i)
+        words[i] = buffer.color[3 * i] | uint32_t(buffer.color[3 * i + 1]) << 8 |
+                   uint32_t(buffer.color[3 * i + 2]) << 16 | (buffer.visible[i] ? 255u << 24 : 0u);
+    return words;
+}
+
+// [pixels, channels] of a slot's bytes
+std::vector<float> rows_of(const Slot& slot, uint32_t pixels, std::span<const std::byte> bytes)
+{
+    std::vector<float> values(size_t(pixels) * slot.cols());
+    for (uint32_t i = 0; i < pixels; ++i)
+        std::memcpy(&values[size_t(i) * slot.cols()], &bytes[size_t(i) * slot.ld() * 4], slot.cols() * 4ull);
+    return values;
 }
 
 } // namespace
 
-struct Refiner::Stage {
-    std::string_view name, unit;
-    size_t total = 0, before = 0; // of the unit
-    std::vector<Task> tasks;
-};
-
-Refiner::Refiner(RefineStore& store, std::span<const RefineChain> chains) : store_(store), chains_(chains)
+Refiner::Refiner(const Parts& parts, const RefineOrder& order, const JobCallbacks& callbacks)
+    : p_(parts), order_(order), schedule_(parts.store, parts.chains, order, callbacks, parts.device)
 {
-    for (const RefineChain& c : chains) {
-        RendererWork w{c.size, false, false, false};
-        for (uint32_t f = c.range.first; f <= c.range.last; ++f) {
-            w.encode |= left(Part::encode, c, f);
-            w.denoise |= left(Part::denoise, c, f);
-            w.decode |= left(Part::decode, c, f);
-        }
-        work_.push_back(w);
+    for (const RefineChain& c : p_.chains) {
+        const RendererWork w = work_[&c] = work_left(p_.store, c);
+        total_.encode |= w.encode;
+        total_.denoise |= w.denoise;
+        total_.decode |= w.decode;
     }
 }
-Refiner::~Refiner() = default;
 
-bool Refiner::left(Part part, const RefineChain& chain, uint32_t frame) const
+const RefineChain* Refiner::chain_of(const std::string& camera) const
 {
-    if (part == Part::decode)
-        return !store_.has(PieceKind::frame, chain.camera, frame);
-    const bool latent = store_.has(PieceKind::latent, chain.camera, frame);
-    return !latent && (part == Part::denoise || !store_.has(PieceKind::encoded, chain.camera, frame));
+    for (const RefineChain& c : p_.chains)
+        if (c.camera.name == camera)
+            return &c;
+    return nullptr;
 }
 
-RendererWork Refiner::total() const
+void Refiner::give_buffer(const std::string& camera, const Slot& seen)
 {
-    RendererWork all{{}, false, false, false};
-    for (const RendererWork& w : work_) {
-        all.encode |= w.encode;
-        all.denoise |= w.denoise;
-        all.decode |= w.decode;
+    Trail& t = trails_[chain_of(camera)];
+    t.seen = seen;
+    ++t.given;
+}
+
+void Refiner::give_depth(const std::string& camera, const ImageGray16& depth)
+{
+    const RefineChain* chain = chain_of(camera);
+    if (chain->cameras.empty())
+        return;
+    auto& noise = trails_[chain].noise;
+    if (!noise)
+        noise.emplace(chain->size);
+    noise->follow(chain->cameras[noise->frames()], depth);
+}
+
+bool Refiner::waits() const
+{
+    const RefineTask* t = order_.drawn ? schedule_.task() : nullptr;
+    if (!t || t->part == RefinePart::decode)
+        return false;
+    const auto found = trails_.find(t->chain);
+    return found == trails_.end() || found->second.given <= t->frame;
+}
+
+Result<bool> Refiner::settle()
+{
+    for (;;) {
+        schedule_.enter();
+        if (!schedule_.at_end_of_stage())
+            return !schedule_.task();
+        SR_CHECK(p_.out.drain()); // the next stage reads what this one wrote
+        schedule_.leave();
     }
-    return all;
-}
-
-void Refiner::begin(FrameRenderer& renderer, MemoryPolicy policy, size_t steps, const JobCallbacks& callbacks,
-                    const Device& device)
-{
-    renderer_ = &renderer;
-    device_ = &device;
-    callbacks_ = callbacks;
-    steps_ = steps;
-    keep_encoded_ = policy == MemoryPolicy::staged;
-    plan(policy);
-}
-
-void Refiner::add_frames_stage(std::string_view name, Part part)
-{
-    Stage s{name, "frames", 0, 0, {}};
-    for (const RefineChain& c : chains_)
-        for (uint32_t f = c.range.first; f <= c.range.last; ++f)
-            if (left(part, c, f))
-                s.tasks.push_back({part, &c, f});
-    s.total = s.tasks.size();
-    if (s.total)
-        stages_.push_back(std::move(s));
-}
-
-// chain by chain: all of a frame before the next where both networks are there, else stage by stage
-void Refiner::plan(MemoryPolicy policy)
-{
-    const bool staged = policy == MemoryPolicy::staged;
-    if (staged)
-        add_frames_stage("encode", Part::encode);
-    Stage s{"refine", "steps", 0, 0, {}};
-    for (const RefineChain& c : chains_)
-        for (uint32_t f = c.range.first; f <= c.range.last; ++f) {
-            s.total += steps_;
-            s.before += left(Part::denoise, c, f) ? 0 : steps_;
-            for (Part part : {Part::encode, Part::denoise, Part::decode})
-                if (left(part, c, f) && (part == Part::denoise || !staged))
-                    s.tasks.push_back({part, &c, f});
-        }
-    stages_.push_back(std::move(s));
-    if (staged)
-        add_frames_stage("decode", Part::decode);
-}
-
-void Refiner::say(bool ended) const
-{
-    const Stage& s = stages_[stage_];
-    if (callbacks_.progress)
-        callbacks_.progress({.stage = s.name,
-                             .unit = s.unit,
-                             .done = counted_,
-                             .total = s.total,
-                             .done_before = s.before,
-                             .device_bytes = device_->allocated_bytes(),
-                             .ended = ended});
-}
-
-bool Refiner::settle()
-{
-    while (stage_ < stages_.size()) {
-        if (!announced_) {
-            counted_ = stages_[stage_].before;
-            say(false);
-            announced_ = true;
-        }
-        if (task_ < stages_[stage_].tasks.size())
-            return false;
-        say(true);
-        ++stage_;
-        task_ = 0;
-        announced_ = false;
-    }
-    return true;
 }
 
 Result<bool> Refiner::step()
 {
-    SR_ASSERT(renderer_, "a refiner that has not begun");
-    if (settle())
+    SR_CHECK(p_.out.poll());
+    SR_TRY(const bool over, settle());
+    if (over)
         return true;
-    const Stage& s = stages_[stage_];
-    const Task task = s.tasks[task_];
-    SR_CHECK(renderer_->start(work_[size_t(task.chain - chains_.data())], total()));
+    const RefineTask task = *schedule_.task();
+    const RendererWork& work = work_[task.chain];
+    SR_CHECK(p_.renderer.start(work, total_));
     SR_TRY(const bool done, act(task));
-    task_ += done ? 1 : 0;
-    if (s.unit == "frames" || task.part == Part::denoise) {
-        ++counted_;
-        say(false);
-    }
+    schedule_.count(done);
     return settle();
 }
 
 Status Refiner::cancel()
 {
-    if (!begun_)
-        return {};
-    begun_ = false;
-    return renderer_->cancel();
+    return std::exchange(begun_, false) ? p_.renderer.cancel() : Status{};
 }
 
-Result<bool> Refiner::act(const Task& task)
+void Refiner::close()
 {
-    if (task.part == Part::denoise)
-        return of_frame(*task.chain, task.frame, denoise(task));
-    SR_CHECK(of_frame(*task.chain, task.frame, task.part == Part::encode ? encode(task) : decode(task)));
+    if (schedule_.task())
+        schedule_.leave();
+}
+
+Result<bool> Refiner::act(const RefineTask& task)
+{
+    if (task.part == RefinePart::denoise)
+        return of_frame(task, denoise(task));
+    SR_CHECK(of_frame(task, task.part == RefinePart::encode ? encode(task) : decode(task)));
     return true;
 }
 
-Status Refiner::encode(const Task& t)
+Status Refiner::save(PieceKind kind, const RefineTask& t, std::vector<float> latent)
 {
+    return p_.out.write([&store = p_.store, kind, t, values = std::move(latent)] {
+        return store.save_latent(kind, t.chain->camera, t.frame, t.chain->size, values);
+    });
+}
+
+Status Refiner::save_frame(const RefineTask& t, std::vector<uint8_t> pixels)
+{
+    return p_.out.write([&store = p_.store, t, bytes = std::move(pixels)] {
+        return store.save_frame(t.chain->camera, t.frame, bytes);
+    });
+}
+
+Status Refiner::encode(const RefineTask& t)
+{
+    if (order_.drawn)
+        return p_.renderer.encode_seen(trails_[t.chain].seen);
     SR_TRY(const BufferFrame buffer, read_buffer(t.chain->camera, t.frame));
-    SR_TRY(encoded_, renderer_->encode(floats_of_pixels(buffer.color)));
-    if (!keep_encoded_)
-        return {};
-    return store_.save_latent(PieceKind::encoded, t.chain->camera, t.frame, t.chain->size, encoded_);
+    if (!staged())
+        return p_.renderer.encode_seen(seen_words(buffer));
+    SR_TRY(std::vector<float> latent, p_.renderer.encode(floats_of_pixels(buffer.color)));
+    return save(PieceKind::encoded, t, std::move(latent));
 }
 
 // noise of a frame, followed from the camera's first frame on, whichever frames are refined
@@ -177,54 +160,116 @@ Result<std::span<const NoiseKey>> Refiner::keys(const RefineChain& c, uint32_t f
 {
     if (c.cameras.empty())
         return std::span<const NoiseKey>{};
-    if (trail_of_ != &c || trail_->frames() > frame + 1) {
-        trail_.emplace(c.size);
-        trail_of_ = &c;
+    if (order_.drawn)
+        SR_CHECK(p_.out.arrive()); // with what was drawn
+    auto& noise = trails_[&c].noise;
+    if (!noise || noise->frames() > frame + 1)
+        noise.emplace(c.size);
+    while (noise->frames() <= frame) {
+        SR_TRY(const ImageGray16 depth, read_depth(c.camera, noise->frames()));
+        noise->follow(c.cameras[noise->frames()], depth);
     }
-    while (trail_->frames() <= frame) {
-        SR_TRY(const ImageGray16 depth, read_depth(c.camera, trail_->frames()));
-        trail_->follow(c.cameras[trail_->frames()], depth);
-    }
-    return trail_->keys();
+    return noise->keys();
 }
 
-Status Refiner::begin_frame(const Task& t)
+// of this start of the run, or from an earlier one's file
+Result<std::vector<float>> Refiner::latent(const RefineChain& c, uint32_t frame)
 {
-    const RefineChain& c = *t.chain;
-    if (keep_encoded_ || store_.has(PieceKind::encoded, c.camera, t.frame)) {
-        SR_TRY(encoded_, store_.load_latent(PieceKind::encoded, c.camera, t.frame, c.size));
-    }
-    SR_TRY(const BufferFrame buffer, read_buffer(c.camera, t.frame));
-    const std::vector<float> visible = block_shares(c.size, buffer.visible);
-    std::vector<float> previous = c.before;
-    if (t.frame > c.range.first) {
-        SR_TRY(previous, store_.load_latent(PieceKind::latent, c.camera, t.frame - 1, c.size));
-    }
-    SR_TRY(const std::span<const NoiseKey> noise, keys(c, t.frame));
-    SR_CHECK(renderer_->begin({t.frame, chain_key(c.camera.name), encoded_, visible, previous, noise}));
+    SR_CHECK(p_.out.arrive());
+    const Trail& t = trails_[&c];
+    if (t.frame == frame && !t.latent.empty())
+        return t.latent;
+    return p_.store.load_latent(PieceKind::latent, c.camera, frame, c.size);
+}
+
+Result<std::vector<float>> Refiner::latent_before(const RefineTask& t)
+{
+    if (t.frame == t.chain->range.first)
+        return t.chain->before;
+    return latent(*t.chain, t.frame - 1);
+}
+
+Status Refiner::begin_frame(const RefineTask& t)
+{
+    SR_TRY(const std::span<const NoiseKey> noise, keys(*t.chain, t.frame));
+    SR_CHECK(staged() ? begin_staged(t, noise) : begin_resident(t, noise));
     begun_ = true;
     return {};
 }
 
-Result<bool> Refiner::denoise(const Task& t)
+Status Refiner::begin_staged(const RefineTask& t, std::span<const NoiseKey> noise)
+{
+    const RefineChain& c = *t.chain;
+    SR_TRY(const BufferFrame buffer, read_buffer(c.camera, t.frame));
+    SR_TRY(const std::vector<float> encoded, p_.store.load_latent(PieceKind::encoded, c.camera, t.frame, c.size));
+    const std::vector<float> visible = block_shares(c.size, buffer.visible);
+    SR_TRY(const std::vector<float> before, latent_before(t));
+    return p_.renderer.begin({t.frame, chain_key(c.camera.name), encoded, visible, before, noise});
+}
+
+Status Refiner::begin_resident(const RefineTask& t, std::span<const NoiseKey> noise)
+{
+    const RefineChain& c = *t.chain;
+    if (!schedule_.follows_encode()) { // a staged start of the run did that
+        SR_TRY(const BufferFrame buffer, read_buffer(c.camera, t.frame));
+        SR_TRY(const std::vector<float> encoded, p_.store.load_latent(PieceKind::encoded, c.camera, t.frame, c.size));
+        SR_CHECK(p_.renderer.use_latent(encoded, block_shares(c.size, buffer.visible)));
+    }
+    const bool first = t.frame == c.range.first && c.before.empty();
+    if (!first && (on_device_ != &c || frame_on_device_ + 1 != t.frame)) {
+        SR_TRY(const std::vector<float> before, latent_before(t));
+        SR_CHECK(p_.renderer.use_previous(before));
+    }
+    on_device_ = nullptr;
+    return p_.renderer.begin_frame({t.frame, chain_key(c.camera.name), first, noise});
+}
+
+Result<bool> Refiner::denoise(const RefineTask& t)
 {
     if (!begun_)
         SR_CHECK(begin_frame(t));
-    SR_TRY(const bool done, renderer_->step(1));
+    SR_TRY(const bool done, p_.renderer.step(1));
     if (!done)
         return false;
     begun_ = false;
-    SR_TRY(const std::vector<float> latent, renderer_->finish());
-    SR_CHECK(store_.save_latent(PieceKind::latent, t.chain->camera, t.frame, t.chain->size, latent));
+    SR_CHECK(end_frame(t));
     return true;
 }
 
-Status Refiner::decode(const Task& t)
+Status Refiner::end_frame(const RefineTask& t)
 {
-    SR_TRY(const std::vector<float> latent,
-           store_.load_latent(PieceKind::latent, t.chain->camera, t.frame, t.chain->size));
-    SR_TRY(const std::vector<float> image, renderer_->decode(latent));
-    return store_.save_frame(t.chain->camera, t.frame, pixels_of_floats(image));
+    const auto keep = [this, t](std::vector<float> latent) {
+        Trail& trail = trails_[t.chain];
+        trail.frame = t.frame;
+        trail.latent = latent;
+        return save(PieceKind::latent, t, std::move(latent));
+    };
+    if (staged()) {
+        SR_TRY(std::vector<float> latent, p_.renderer.finish());
+        return keep(std::move(latent));
+    }
+    SR_CHECK(p_.renderer.end_frame());
+    on_device_ = t.chain;
+    frame_on_device_ = t.frame;
+    const Slot& slot = p_.renderer.denoiser()->slots().latent;
+    return p_.out.read(slot, [slot, keep, pixels = t.chain->size.pixels()](std::span<const std::byte> bytes) {
+        return keep(rows_of(slot, pixels, bytes));
+    });
+}
+
+Status Refiner::decode(const RefineTask& t)
+{
+    if (on_device_ != t.chain || frame_on_device_ != t.frame) {
+        SR_TRY(const std::vector<float> values, latent(*t.chain, t.frame));
+        SR_TRY(const std::vector<float> image, p_.renderer.decode(values));
+        return save_frame(t, pixels_of_floats(image));
+    }
+    SR_TRY(const Slot bytes, p_.renderer.decode_latent());
+    return p_.out.read(bytes, [this, t](std::span<const std::byte> read) {
+        const auto* first = reinterpret_cast<const uint8_t*>(read.data());
+        const size_t count = size_t(t.chain->size.image_width) * t.chain->size.image_height * 3;
+        return save_frame(t, {first, first + count});
+    });
 }
 
 } // namespace semrover

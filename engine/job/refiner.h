@@ -2,72 +2,76 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/job/job.h"
-#include "engine/job/refine_store.h"
+#include "engine/job/outgoing.h"
+#include "engine/job/refine_schedule.h"
 #include "engine/refine/frame_renderer.h"
-#include "engine/refine/refine_chain.h"
+
+#include <map>
 
 namespace semrover {
 
-// Brings every frame of every chain to the end: what the store has is taken from there. The order of the work is the
-// memory policy's; the frames do not depend on it, nor on where it was stopped.
+// Brings every frame of every chain to the end: what the store has is taken from there. With the resident policy pixels
+// and latents stay on the device, and files only leave it; with the staged one a stage reads what the one before wrote.
+// The frames depend neither on that nor on where the work was stopped.
 class Refiner {
   public:
-    // store and chains must outlive it
-    Refiner(RefineStore& store, std::span<const RefineChain> chains);
-    ~Refiner();
+    // all of it must outlive the refiner; nothing is on its way through `out`
+    struct Parts {
+        Device& device;
+        FrameRenderer& renderer;
+        RefineStore& store;
+        Outgoing& out;
+        std::span<const RefineChain> chains;
+    };
+    Refiner(const Parts& parts, const RefineOrder& order, const JobCallbacks& callbacks);
 
-    // what is left to do, one per chain
-    std::span<const RendererWork> work() const { return work_; }
+    // Where frames are refined while they are drawn: the buffer of the next frame of a camera, from the first on. Its
+    // pixels (SplatPixelSlots::seen) stay until the next one's; its depth may come later, in order, too.
+    void give_buffer(const std::string& camera, const Slot& seen);
+    void give_depth(const std::string& camera, const ImageGray16& depth);
+    bool waits() const; // step() wants a buffer that was not given yet
 
-    // `steps` of denoising a frame; stages "encode", "refine" and "decode" are told to `progress`
-    void begin(FrameRenderer& renderer, MemoryPolicy policy, size_t steps, const JobCallbacks& callbacks,
-               const Device& device);
     // one submit: a step of denoising, or a picture through the VAE; true: all is done.
     // Errors: internal for NaN, with frame and stage
     Result<bool> step();
     Status cancel(); // waits for what was submitted
+    void close();    // tells that the stage ends, unfinished
 
   private:
-    enum class Part { encode, denoise, decode };
-    struct Task {
-        Part part;
-        const RefineChain* chain;
-        uint32_t frame;
+    // of a chain, while it is at work
+    struct Trail {
+        Slot seen;                 // of the last buffer that was given
+        uint32_t given = 0;        // buffers so far
+        uint32_t frame = 0;        // of `latent`
+        std::vector<float> latent; // empty: none yet
+        std::optional<NoiseTrail> noise;
     };
-    struct Stage;
-
-    void plan(MemoryPolicy policy);
-    void add_frames_stage(std::string_view name, Part part);
-    bool left(Part part, const RefineChain& chain, uint32_t frame) const;
-    RendererWork total() const; // size apart
-
-    bool settle(); // tells of stages that end and begin; true: no task is left
-    void say(bool ended) const;
-    Result<bool> act(const Task& task); // true: the task is done
-    Status encode(const Task& task);
-    Result<bool> denoise(const Task& task);
-    Status begin_frame(const Task& task);
-    Status decode(const Task& task);
+    const RefineChain* chain_of(const std::string& camera) const;
+    bool staged() const { return order_.policy == MemoryPolicy::staged; }
+    Result<bool> settle();                    // at the next task; true: none is left
+    Result<bool> act(const RefineTask& task); // true: the task is done
+    Status encode(const RefineTask& task);
+    Result<bool> denoise(const RefineTask& task);
+    Status begin_frame(const RefineTask& task);
+    Status begin_staged(const RefineTask& task, std::span<const NoiseKey> noise);
+    Status begin_resident(const RefineTask& task, std::span<const NoiseKey> noise);
+    Status end_frame(const RefineTask& task);
+    Status decode(const RefineTask& task);
     Result<std::span<const NoiseKey>> keys(const RefineChain& chain, uint32_t frame);
+    Result<std::vector<float>> latent(const RefineChain& chain, uint32_t frame);
+    Result<std::vector<float>> latent_before(const RefineTask& task); // empty: it is a first frame
+    Status save(PieceKind kind, const RefineTask& task, std::vector<float> latent);
+    Status save_frame(const RefineTask& task, std::vector<uint8_t> pixels);
 
-    RefineStore& store_;
-    std::span<const RefineChain> chains_;
-    std::vector<RendererWork> work_;
-    FrameRenderer* renderer_ = nullptr;
-    const Device* device_ = nullptr;
-    JobCallbacks callbacks_;
-    size_t steps_ = 0;
-
-    std::vector<Stage> stages_;
-    size_t stage_ = 0, task_ = 0;
-    size_t counted_ = 0;         // of the stage's unit
-    bool announced_ = false;     // the stage is known to `progress`
-    bool begun_ = false;         // the frame of the task is being denoised
-    bool keep_encoded_ = false;  // in the store; else in encoded_, for the task after
-    std::vector<float> encoded_; // latent of the next frame's buffer
-    const RefineChain* trail_of_ = nullptr;
-    std::optional<NoiseTrail> trail_; // of that chain
+    Parts p_;
+    RefineOrder order_;
+    std::map<const RefineChain*, RendererWork> work_;
+    RendererWork total_{{}, false, false, false}; // of all chains, size apart
+    RefineSchedule schedule_;
+    bool begun_ = false;                     // the frame of the task is being denoised
+    const RefineChain* on_device_ = nullptr; // whose latent lies in the denoiser's slot
+    uint32_t frame_on_device_ = 0;
+    std::map<const RefineChain*, Trail> trails_;
 };
 
 } // namespace semrover

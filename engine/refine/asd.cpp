@@ -3,6 +3,7 @@
 #include "engine/refine/asd.h"
 
 #include "engine/sampling/step_rows.h"
+#include "kernels/picture.h"
 #include "kernels/sampling.h"
 #include "runtime/base/hash.h"
 
@@ -28,7 +29,8 @@ struct AsdRenderer::Memory {
     uint32_t width, height, pixels, rows, channels, halves, tokens;
     State state;
     Slot steps, clock, timesteps, times, context, text, table_row; // times, text: tables that are computed once
-    Slot cells, known, x, x0, previous, buffer, visible;
+    Slot cells, known, x0;
+    AsdSlots ends;                    // latent: the state x
     Slot first_noise, previous_noise; // where noise comes from the host
 
     Memory(const Unet& u, const SamplingPlan& p, uint32_t text_tokens, const LatentSize& size, float guidance_scale,
@@ -50,11 +52,12 @@ struct AsdRenderer::Memory {
         table_row = state.slot(halves, 1, DType::u32, "table_row", 1);
         cells = state.slot(rows, 4, DType::i32, "cells", 4);
         known = state.slot(rows, 1, DType::u32, "known", 1);
-        x = latent("x");
+        ends.latent = latent("x");
         x0 = latent("x0");
-        previous = latent("previous");
-        buffer = latent("buffer");
-        visible = state.slot(rows, 1, DType::f32, "visible", 1);
+        ends.previous = latent("previous");
+        ends.buffer = latent("buffer");
+        ends.visible = state.slot(rows, 1, DType::f32, "visible", 1);
+        ends.bad = state.slot(1, 1, DType::u32, "first number that is none", 1);
         if (fed) {
             first_noise = latent("first noise");
             previous_noise = latent("previous noise");
@@ -81,9 +84,9 @@ struct AsdRenderer::Memory {
     {
         Graph g;
         const StepTable s = step_table(g);
-        step_renoise(g, s, first_noise.valid() ? first_noise.in(g) : noise(g, s, seed), x.in(g));
+        step_renoise(g, s, first_noise.valid() ? first_noise.in(g) : noise(g, s, seed), ends.latent.in(g));
         step_advance(g, s.clock);
-        step_renoise(g, s, previous_noise.valid() ? previous_noise.in(g) : noise(g, s, seed), previous.in(g));
+        step_renoise(g, s, previous_noise.valid() ? previous_noise.in(g) : noise(g, s, seed), ends.previous.in(g));
         step_advance(g, s.clock);
         return g;
     }
@@ -91,16 +94,23 @@ struct AsdRenderer::Memory {
     {
         Graph g;
         const StepTable s = step_table(g);
-        const RendererFrame frame{previous.in(g), buffer.in(g), visible.in(g)};
+        const Tensor x = ends.latent.in(g);
+        const RendererFrame frame{ends.previous.in(g), ends.buffer.in(g), ends.visible.in(g)};
         step_timestep(g, s, table_row.in(g));
-        const Tensor in = renderer_input(g, s, x.in(g), frame, halves, unet.precision());
+        const Tensor in = renderer_input(g, s, x, frame, halves, unet.precision());
         const FeatureMap m =
             unet.forward(g, {in, halves, height, width}, times.in(g), table_row.in(g), {text.in(g), tokens, 0});
         // samplers without noise take any finite numbers for it
         const bool noisy = std::ranges::any_of(plan.rows, [](const PlanRow& r) { return r.coefficients.c_z != 0; });
         const Tensor z = noisy ? noise(g, s, seed) : frame.buffer;
-        step_update(g, s, m.data, z, known.in(g), frame.buffer, x.in(g), x0.in(g), guidance_scale, float(plan.clip));
+        step_update(g, s, m.data, z, known.in(g), frame.buffer, x, x0.in(g), guidance_scale, float(plan.clip));
         step_advance(g, s.clock);
+        return g;
+    }
+    Graph check_graph() const
+    {
+        Graph g;
+        g.keep(first_non_finite(g, ends.latent.in(g), {width, height, width, height}), ends.bad);
         return g;
     }
 };
@@ -145,8 +155,9 @@ Result<AsdRenderer::Bytes> AsdRenderer::planned_bytes(const DeviceLimits& limits
     SR_TRY(const Plan tables, make_plan(m.tables_graph().desc(), limits));
     SR_TRY(const Plan begin, make_plan(m.begin_graph(0).desc(), limits));
     SR_TRY(const Plan step, make_plan(m.step_graph(guidance_scale, 0).desc(), limits));
+    SR_TRY(const Plan check, make_plan(m.check_graph().desc(), limits));
     return Bytes{m.state.planned_bytes(limits),
-                 std::max(tables.arena_bytes(), begin.arena_bytes() + step.arena_bytes())};
+                 std::max(tables.arena_bytes(), begin.arena_bytes() + step.arena_bytes() + check.arena_bytes())};
 }
 
 Status AsdRenderer::make_tables(const Conditioning& text)
@@ -174,7 +185,8 @@ Status AsdRenderer::make_programs()
         return {};
     SR_TRY(begin_, Program::create(device_, memory_->begin_graph(options_.seed)));
     SR_TRY(step_, Program::create(device_, memory_->step_graph(options_.guidance_scale, options_.seed)));
-    replay_.emplace(device_, ReplayMemory{memory_->clock, memory_->x, memory_->x0}, plan_.rows.size(),
+    SR_TRY(check_, Program::create(device_, memory_->check_graph()));
+    replay_.emplace(device_, ReplayMemory{memory_->clock, memory_->ends.latent, memory_->x0}, plan_.rows.size(),
                     [this](size_t) -> Result<Program*> { return step_.get(); });
     return {};
 }
@@ -184,6 +196,7 @@ void AsdRenderer::rest()
     replay_.reset();
     begin_.reset();
     step_.reset();
+    check_.reset();
 }
 
 Status AsdRenderer::upload(const AsdFrame& frame)
@@ -191,31 +204,37 @@ Status AsdRenderer::upload(const AsdFrame& frame)
     const Memory& m = *memory_;
     const size_t values = size_t(m.pixels) * m.channels;
     SR_ASSERT(frame.buffer.size() == values && frame.visible.size() == m.pixels &&
-                  (frame.previous.empty() || frame.previous.size() == values) &&
-                  (frame.keys.empty() || frame.keys.size() == m.pixels),
+                  (frame.previous.empty() || frame.previous.size() == values),
               "a frame of {} values for {} pixels", frame.buffer.size(), m.pixels);
+    SR_CHECK(m.ends.visible.write_rows(device_, frame.visible));
+    SR_CHECK(m.ends.buffer.write_rows(device_, frame.buffer));
+    return m.ends.previous.write_rows(device_, frame.previous);
+}
+
+// where noise comes from
+Status AsdRenderer::upload_keys(const AsdStart& start)
+{
+    const Memory& m = *memory_;
+    SR_ASSERT(start.keys.empty() || start.keys.size() == m.pixels, "{} keys for {} pixels", start.keys.size(),
+              m.pixels);
     std::vector<int32_t> cells(m.rows * 4ull, 0);
     for (uint32_t r = 0; r < m.rows; ++r) {
-        const NoiseKey key = r < frame.keys.size() ? frame.keys[r] : NoiseKey{r, frame.number};
+        const NoiseKey key = r < start.keys.size() ? start.keys[r] : NoiseKey{r, start.number};
         cells[4 * r] = int32_t(key.pixel);
         cells[4 * r + 1] = int32_t(key.frame);
-        cells[4 * r + 2] = int32_t(frame.chain);
+        cells[4 * r + 2] = int32_t(start.chain);
     }
     SR_CHECK(m.cells.write(device_, cells));
-    SR_CHECK(m.visible.write_rows(device_, frame.visible));
-    SR_CHECK(m.buffer.write_rows(device_, frame.buffer));
-    SR_CHECK(m.previous.write_rows(device_, frame.previous));
-    if (m.first_noise.valid()) {
-        std::vector<float> initial(values), previous(values);
-        options_.noise(frame.number, initial, previous);
-        SR_CHECK(m.first_noise.write_rows(device_, initial));
-        SR_CHECK(m.previous_noise.write_rows(device_, previous));
-    }
-    return {};
+    if (!m.first_noise.valid())
+        return {};
+    std::vector<float> initial(size_t(m.pixels) * m.channels), previous(initial.size());
+    options_.noise(start.number, initial, previous);
+    SR_CHECK(m.first_noise.write_rows(device_, initial));
+    return m.previous_noise.write_rows(device_, previous);
 }
 
 // of everything but the network and the latents that decides the result
-uint64_t AsdRenderer::key_of(const AsdFrame& frame) const
+uint64_t AsdRenderer::key_of(const AsdStart& start) const
 {
     Hash hash;
     const auto add = [&](const auto& values) { hash.add(std::as_bytes(std::span(values))); };
@@ -226,20 +245,40 @@ uint64_t AsdRenderer::key_of(const AsdFrame& frame) const
     add(plan_.timesteps);
     const double settings[] = {plan_.init_noise_sigma, plan_.clip, options_.guidance_scale, options_.previous_noise};
     add(settings);
-    const uint64_t what[] = {options_.seed, frame.number, frame.chain, frame.previous.empty()};
+    const uint64_t what[] = {options_.seed, start.number, start.chain, start.first};
     add(what);
     return hash.value();
 }
 
+namespace {
+
+AsdStart start_of(const AsdFrame& frame)
+{
+    return {frame.number, frame.chain, frame.previous.empty(), frame.keys};
+}
+
+} // namespace
+
 Status AsdRenderer::begin(const AsdFrame& frame)
 {
-    SR_CHECK(make_programs());
-    key_ = key_of(frame);
-    SR_CHECK(replay_->begin(kNoiseRows));
     SR_CHECK(upload(frame));
+    return begin(start_of(frame));
+}
+
+Status AsdRenderer::begin(const AsdStart& start)
+{
+    SR_CHECK(make_programs());
+    key_ = key_of(start);
+    SR_CHECK(replay_->begin(kNoiseRows));
+    SR_CHECK(upload_keys(start));
     SR_CHECK(begin_->run());
     // note: the first frame has nothing before it, not even noise
-    return frame.previous.empty() ? memory_->previous.clear(device_) : Status{};
+    return start.first ? memory_->ends.previous.clear(device_) : Status{};
+}
+
+const AsdSlots& AsdRenderer::slots() const
+{
+    return memory_->ends;
 }
 
 Result<bool> AsdRenderer::step(size_t submits)
@@ -261,18 +300,34 @@ Result<std::vector<std::byte>> AsdRenderer::save()
 
 Status AsdRenderer::resume(const AsdFrame& frame, std::span<const std::byte> saved)
 {
-    SR_CHECK(begin(frame));
+    SR_CHECK(upload(frame));
+    return resume(start_of(frame), saved);
+}
+
+Status AsdRenderer::resume(const AsdStart& start, std::span<const std::byte> saved)
+{
+    SR_CHECK(begin(start));
     return replay_->resume(saved, key_);
 }
 
-Result<std::vector<float>> AsdRenderer::finish()
+Status AsdRenderer::end()
 {
     SR_ASSERT(replay_ && replay_->active() && replay_->row() == steps(), "a frame is finished after {} of {} steps",
               steps_done(), steps());
     replay_->end();
-    SR_TRY(std::vector<float> latent, memory_->x.read_rows(device_, memory_->pixels));
-    SR_CHECK(check_finite(latent, "the denoised latent"));
-    return latent;
+    SR_CHECK(check_->run());
+    SR_TRY(const std::vector<uint32_t> bad, memory_->ends.bad.read<uint32_t>(device_));
+    if (bad.front() == ~0u)
+        return {};
+    const Slot pixel = memory_->ends.latent.row_range(bad.front() / memory_->channels, 1);
+    SR_TRY(const std::vector<float> values, pixel.read_rows(device_, 1));
+    return not_finite(values[bad.front() % memory_->channels], bad.front(), "the denoised latent");
+}
+
+Result<std::vector<float>> AsdRenderer::finish()
+{
+    SR_CHECK(end());
+    return memory_->ends.latent.read_rows(device_, memory_->pixels);
 }
 
 Result<std::vector<float>> AsdRenderer::render(const AsdFrame& frame, const StepCallback& callback)

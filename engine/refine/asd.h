@@ -31,6 +31,21 @@ struct AsdFrame {
     std::span<const NoiseKey> keys{}; // [pixels]; empty: each pixel's own, of this frame
 };
 
+// a frame whose latents lie in the renderer's slots already
+struct AsdStart {
+    uint32_t number = 0, chain = 0;   // as of AsdFrame
+    bool first = true;                // no frame before it
+    std::span<const NoiseKey> keys{}; // [pixels]; empty: each pixel's own, of this frame
+};
+
+// the ends of a renderer on the device, of the shapes that LatentCodec's have
+struct AsdSlots {
+    Slot buffer, visible; // latent of the splat buffer, visible share of each pixel
+    Slot previous;        // latent of the frame before; begin() puts noise on it
+    Slot latent;          // of the frame, when it has ended
+    Slot bad;             // [1] u32: first_non_finite() of it
+};
+
 // The text of a renderer, the same for every frame
 struct Conditioning {
     uint32_t tokens = 0;
@@ -67,6 +82,14 @@ class AsdRenderer {
     Result<bool> step(size_t submits);
     Result<std::vector<float>> finish();
     Status cancel();
+
+    // the same with latents that stay on the device: the caller copies them to slots().buffer, visible and (but for a
+    // first frame) previous, then begin, step until it says true, end; the result is slots().latent until the next
+    // begin
+    const AsdSlots& slots() const;
+    Status begin(const AsdStart& start);
+    Status end(); // errors: internal when the network returned NaN or infinity
+
     size_t steps_done() const { return replay_ ? replay_->row() : 0; }
     size_t steps() const { return plan_.rows.size(); }
 
@@ -75,6 +98,7 @@ class AsdRenderer {
     Result<std::vector<std::byte>> save();
     // in place of begin. Errors: bad_input for what was saved of another frame, plan, seed or options
     Status resume(const AsdFrame& frame, std::span<const std::byte> saved);
+    Status resume(const AsdStart& start, std::span<const std::byte> saved);
 
     // drops the programs and their memory until the next frame; between frames only
     void rest();
@@ -90,14 +114,15 @@ class AsdRenderer {
     Status make_tables(const Conditioning& text);
     Status make_programs();
     Status upload(const AsdFrame& frame);
-    uint64_t key_of(const AsdFrame& frame) const;
+    Status upload_keys(const AsdStart& start);
+    uint64_t key_of(const AsdStart& start) const;
 
     Device& device_;
     const Unet& unet_;
     SamplingPlan plan_;
     AsdOptions options_;
     std::unique_ptr<Memory> memory_;
-    std::unique_ptr<Program> begin_, step_;
+    std::unique_ptr<Program> begin_, step_, check_;
     std::optional<Replay> replay_;
     uint64_t key_ = 0; // what the frame is
 

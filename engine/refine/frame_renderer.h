@@ -4,6 +4,7 @@
 
 #include "engine/model/renderer_model.h"
 #include "engine/refine/memory_plan.h"
+#include "runtime/device/copy_ring.h"
 
 namespace semrover {
 
@@ -23,11 +24,23 @@ class FrameRenderer {
     // as LatentCodec does it; not between begin and finish of a frame
     Result<std::vector<float>> encode(std::span<const float> image);
     Result<std::vector<float>> decode(std::span<const float> latent);
-    // as AsdRenderer does it
+    // as AsdRenderer does it, with step() between them
     Status begin(const AsdFrame& frame);
-    Result<bool> step(size_t submits);
     Result<std::vector<float>> finish();
-    Status cancel();
+    Status cancel(); // of a frame that has begun, either way
+
+    // The same with latents that stay on the device from the splats' pixels to the frame's bytes: under the resident
+    // policy, and for work that denoises. Nothing is read back but a word of each: are all numbers finite?
+    // Errors: internal where they are not; device errors
+    Status encode_seen(const Slot& seen);                                             // as splat_pixels() makes it
+    Status encode_seen(std::span<const uint32_t> seen);                               // the same from the host
+    Status use_latent(std::span<const float> buffer, std::span<const float> visible); // or what was encoded before
+    Status use_previous(std::span<const float> latent); // of the frame before, where this run did not make it
+    Status begin_frame(const AsdStart& frame);          // after the frame before: its latent is the previous one
+    Result<bool> step(size_t submits);                  // true when the latent is done
+    Status end_frame();                                 // slots().latent of denoiser() is the frame's
+    Result<Slot> decode_latent();                       // of the frame that has ended -> its bytes
+    AsdRenderer* denoiser() { return asd_.get(); }      // while there is one
 
   private:
     enum class Part { encode, denoise, decode };
@@ -36,6 +49,9 @@ class FrameRenderer {
     Status load_vae();
     Status make_asd();
     Result<LatentCodec*> codec(CodecDirection direction);
+    Status make_denoiser();
+    Status copy(const Slot& from, const Slot& to);
+    Status encoded(const LatentCodec& codec);
 
     Device& device_;
     const RendererModel& model_;
@@ -48,8 +64,8 @@ class FrameRenderer {
     std::unique_ptr<Vae> vae_;
     std::unique_ptr<AsdRenderer> asd_;
     std::unique_ptr<LatentCodec> codec_;
-    std::vector<float> latent_;                         // seam
     CodecDirection direction_ = CodecDirection::encode; // of codec_
+    std::unique_ptr<CopyRing> copies_;
 };
 
 } // namespace semrover

@@ -3,6 +3,7 @@
 #include "engine/splat/rasterizer.h"
 
 #include "engine/camera/lens.h"
+#include "kernels/picture.h"
 #include "kernels/splat.h"
 
 #include <algorithm>
@@ -119,9 +120,14 @@ Status Rasterizer::build()
     camera_table_ = state_.slot(cameras_, camera_floats, DType::f32, "cameras", camera_floats);
     visible_ = state_.slot(1, 1, DType::u32, "visible splats", 1);
     pairs_ = state_.slot(1, 1, DType::u32, "splat pairs", 1);
-    images_ = {
-        state_.slot(pixels, 4, DType::f32, "splat colour", 4), state_.slot(pixels, 4, DType::f32, "splat surface", 4),
-        state_.slot(pixels, 2, DType::f32, "splat depth", 2), state_.slot(pixels, 2, DType::u32, "splat ids", 2)};
+    if (options_.pixels_over)
+        pixels_ = {state_.slot(pixels, 1, DType::u32, "seen", 1), state_.slot(pixels, 1, DType::u32, "ranges", 1),
+                   state_.slot(pixels, 1, DType::u32, "normals", 1)};
+    else
+        images_ = {state_.slot(pixels, 4, DType::f32, "splat colour", 4),
+                   state_.slot(pixels, 4, DType::f32, "splat surface", 4),
+                   state_.slot(pixels, 2, DType::f32, "splat depth", 2),
+                   state_.slot(pixels, 2, DType::u32, "splat ids", 2)};
     SR_CHECK(state_.allocate(device_, "splat images"));
     Graph g;
     SplatOptions o{.width = width_,
@@ -137,10 +143,17 @@ Status Rasterizer::build()
     o.screen_variance = options_.screen_variance;
     o.cutoff = options_.cutoff;
     const SplatImages y = splat(g, scene_.in(g), camera_table_.in(g), o);
-    g.keep(y.color, images_.color);
-    g.keep(y.surface, images_.surface);
-    g.keep(y.depth, images_.depth);
-    g.keep(y.ids, images_.ids);
+    if (options_.pixels_over) {
+        const PixelWords pixels_of_files = splat_pixels(g, y, {*options_.pixels_over, options_.visible_alpha});
+        g.keep(pixels_of_files.seen, pixels_.seen);
+        g.keep(pixels_of_files.ranges, pixels_.ranges);
+        g.keep(pixels_of_files.normals, pixels_.normals);
+    } else {
+        g.keep(y.color, images_.color);
+        g.keep(y.surface, images_.surface);
+        g.keep(y.depth, images_.depth);
+        g.keep(y.ids, images_.ids);
+    }
     g.keep(y.visible, visible_);
     g.keep(y.pairs, pairs_);
     SR_TRY(program_, Program::create(device_, g));
@@ -160,8 +173,8 @@ Status Rasterizer::make_room(uint32_t visible, uint32_t pairs)
     return build();
 }
 
-// the frames of at most cameras_ cameras, into images_
-Status Rasterizer::draw(std::span<const SplatCamera> cameras)
+// the frames of at most cameras_ cameras
+Status Rasterizer::draw_together(std::span<const SplatCamera> cameras)
 {
     const uint32_t floats = splat_camera_floats(lens_of(options_.model));
     std::vector<float> table(size_t(cameras_) * floats);
@@ -176,6 +189,36 @@ Status Rasterizer::draw(std::span<const SplatCamera> cameras)
             return {};
         SR_CHECK(make_room(visible[0], pairs[0])); // pairs of what was visible; with more room there may be more
     }
+}
+
+Result<uint32_t> Rasterizer::draw_some(std::span<const SplatCamera> cameras)
+{
+    for (;;) {
+        const auto some = cameras.first(std::min<size_t>(cameras_, cameras.size()));
+        const Status status = draw_together(some);
+        if (status)
+            return uint32_t(some.size());
+        if (status.error().code != ErrorCode::out_of_memory || some.size() == 1)
+            return tl::make_unexpected(status.error());
+        cameras_ = uint32_t(some.size() + 1) / 2; // together they are too many for this device
+        ++rebuilds_;
+        SR_CHECK(build());
+    }
+}
+
+Result<uint32_t> Rasterizer::draw(std::span<const SplatCamera> cameras)
+{
+    SR_ASSERT(!cameras.empty(), "no camera to draw");
+    for (size_t i = 0; i < cameras.size(); ++i)
+        SR_CHECK(check_camera(cameras[i], i));
+    return draw_some(cameras);
+}
+
+SplatPixelSlots Rasterizer::pixels(uint32_t camera) const
+{
+    const uint32_t pixels = width_ * height_, first = camera * pixels;
+    return {pixels_.seen.row_range(first, pixels), pixels_.ranges.row_range(first, pixels),
+            pixels_.normals.row_range(first, pixels)};
 }
 
 SplatSlots Rasterizer::images(uint32_t camera) const
@@ -220,20 +263,13 @@ Status Rasterizer::read_images(uint32_t count, std::vector<SplatImage>& out)
 
 Result<std::vector<SplatImage>> Rasterizer::render(std::span<const SplatCamera> cameras)
 {
+    SR_ASSERT(!options_.pixels_over, "this rasterizer keeps pixels, not images");
     for (size_t i = 0; i < cameras.size(); ++i)
         SR_CHECK(check_camera(cameras[i], i));
     std::vector<SplatImage> out;
     while (out.size() < cameras.size()) {
-        const auto some = cameras.subspan(out.size(), std::min<size_t>(cameras_, cameras.size() - out.size()));
-        const Status status = draw(some);
-        if (!status && status.error().code == ErrorCode::out_of_memory && some.size() > 1) {
-            cameras_ = uint32_t(some.size() + 1) / 2; // together they are too many for this device
-            ++rebuilds_;
-            SR_CHECK(build());
-            continue;
-        }
-        SR_CHECK(status);
-        SR_CHECK(read_images(uint32_t(some.size()), out));
+        SR_TRY(const uint32_t drawn, draw_some(cameras.subspan(out.size())));
+        SR_CHECK(read_images(drawn, out));
     }
     return out;
 }

@@ -266,6 +266,7 @@ Status Device::write(const BufferSlice& to, std::span<const std::byte> bytes)
 {
     SR_ASSERT(bytes.size() <= to.bytes, "{} bytes written to a slice of {}", bytes.size(), to.bytes);
     SR_CHECK(wait(ticket_));
+    host_bytes_.written += bytes.size();
     if (std::byte* mapped = to.buffer->mapped()) {
         if (!bytes.empty())
             std::memcpy(mapped + to.offset, bytes.data(), bytes.size());
@@ -284,6 +285,7 @@ Status Device::read(const BufferSlice& from, std::span<std::byte> bytes)
 {
     SR_ASSERT(bytes.size() <= from.bytes, "{} bytes read from a slice of {}", bytes.size(), from.bytes);
     SR_CHECK(wait(ticket_));
+    host_bytes_.read += bytes.size();
     if (const std::byte* mapped = from.buffer->mapped()) {
         if (!bytes.empty())
             std::memcpy(bytes.data(), mapped + from.offset, bytes.size());
