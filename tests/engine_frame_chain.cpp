@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // a chain of frames whose pixels and latents stay on the device: the bytes are those of one that goes through the host
-#include "engine/render/frame_renderer.h"
-#include "runtime/json.h"
-#include "runtime/readback_ring.h"
+#include "engine/refine/frame_renderer.h"
+#include "runtime/base/json.h"
+#include "runtime/device/readback_ring.h"
 
 #include <cmath>
 #include <cstring>

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // runs of tokens and of frames, stopped between rows: the bytes are those of the uninterrupted run
-#include "engine/render/asd.h"
+#include "engine/refine/asd.h"
 #include "engine/voxfield/token_sampler.h"
-#include "runtime/json.h"
+#include "runtime/base/json.h"
 
 #include <cmath>
 #include <cstring>

@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/render/frame_images.h"
-#include "engine/splat/golden.h"
+#include "engine/refine/frame_images.h"
 #include "tests/golden_tensors.h"
 #include "tests/splat_case.h"
+#include "tools/verify/splat_cases.h"
+#include "tools/verify/splat_cases.cpp"
 
 namespace semrover {
 namespace {

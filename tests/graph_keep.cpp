@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/state.h"
+#include "runtime/device/state.h"
 #include "tests/graph_memory.h"
 
 #include <gtest/gtest.h>

@@ -4,9 +4,9 @@
 
 #include "engine/scene/palette.h"
 #include "engine/splat/blocks.h"
-#include "runtime/quote.h"
-#include "tools/open_device.h"
-#include "tools/path_renderer.h"
+#include "runtime/base/quote.h"
+#include "tools/cli/open_device.h"
+#include "tools/drive_options.h"
 
 namespace semrover {
 

@@ -5,9 +5,9 @@
 #include "engine/fusion/depth_frames.h"
 #include "engine/fusion/fusion_options.h"
 #include "kernels/fusion.h"
-#include "kernels/kernels.h"
-#include "runtime/device.h"
-#include "runtime/state.h"
+#include "kernels/network.h"
+#include "runtime/device/device.h"
+#include "runtime/device/state.h"
 
 #include <memory>
 #include <span>

@@ -2,9 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/mesh/nearest_points.h"
 
-#include "kernels/kernels.h"
-#include "runtime/program.h"
-#include "runtime/state.h"
+#include "kernels/network.h"
+#include "kernels/splat.h"
+#include "runtime/device/program.h"
+#include "runtime/device/state.h"
 
 #include <algorithm>
 #include <cmath>

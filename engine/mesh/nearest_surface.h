@@ -3,8 +3,8 @@
 #pragma once
 
 #include "engine/mesh/mesh.h"
-#include "runtime/device.h"
-#include "runtime/state.h"
+#include "runtime/device/device.h"
+#include "runtime/device/state.h"
 
 #include <memory>
 #include <span>

@@ -3,9 +3,9 @@
 #pragma once
 
 #include "engine/mesh/mesh.h"
-#include "kernels/meshes.h"
-#include "runtime/device.h"
-#include "runtime/state.h"
+#include "kernels/mesh.h"
+#include "runtime/device/device.h"
+#include "runtime/device/state.h"
 
 namespace semrover {
 

@@ -7,8 +7,9 @@
 #include "engine/scene/palette.h"
 #include "engine/scene/srgb.h"
 #include "engine/voxfield/token_codec.h"
-#include "runtime/program.h"
-#include "runtime/state.h"
+#include "kernels/sort.h"
+#include "runtime/device/program.h"
+#include "runtime/device/state.h"
 
 #include <algorithm>
 #include <bit>

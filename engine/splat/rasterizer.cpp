@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/splat/rasterizer.h"
 
-#include "engine/scene/lens.h"
-#include "kernels/pictures.h"
+#include "engine/camera/lens.h"
+#include "kernels/picture.h"
 
 #include <algorithm>
 #include <cmath>

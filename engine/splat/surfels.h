@@ -2,11 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/scene/ply.h"
+#include "engine/format/ply.h"
 #include "engine/scene/scene_points.h"
-#include "kernels/kernels.h"
-#include "runtime/device.h"
-#include "runtime/state.h"
+#include "kernels/network.h"
+#include "kernels/splat.h"
+#include "runtime/device/device.h"
+#include "runtime/device/state.h"
 
 namespace semrover {
 

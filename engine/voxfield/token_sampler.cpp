@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/voxfield/token_sampler.h"
 
-#include "engine/diffusion/step_rows.h"
-#include "runtime/hash.h"
+#include "engine/sampling/step_rows.h"
+#include "runtime/base/hash.h"
 
 #include <cmath>
 #include <numeric>

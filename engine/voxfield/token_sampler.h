@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/diffusion/repaint.h"
-#include "engine/diffusion/replay.h"
-#include "engine/voxfield/transformer.h"
+#include "engine/network/transformer.h"
+#include "engine/sampling/repaint.h"
+#include "engine/sampling/replay.h"
 #include "kernels/sampling.h"
-#include "runtime/program.h"
+#include "runtime/device/program.h"
 
 #include <functional>
 #include <memory>

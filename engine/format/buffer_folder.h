@@ -1,0 +1,52 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/camera/camera.h"
+#include "engine/format/image.h"
+
+#include <string>
+
+namespace semrover {
+
+// the splat buffers of one camera: FOLDER/{color,visible}/000000.png and so on, as `render` writes them. The colour is
+// over the background that `render` was given, black by default; where visible is 0 the renderer is not to trust it.
+struct BufferCamera {
+    std::string name; // empty: the folder's own pictures
+    Path folder;
+    ImageSize size;
+    uint32_t frames = 0; // 0 .. frames - 1
+};
+
+struct BufferFrame {
+    std::vector<uint8_t> color;   // [height, width, 3]
+    std::vector<uint8_t> visible; // [height, width] 0: not
+};
+
+Path frame_path(const Path& folder, const char* kind, uint32_t number, std::string_view extension = "png");
+
+// the cameras of a folder: itself when it has color/, else its sub-folders that have, by name. Errors: bad_input for a
+// gap in the numbers, for colour without visibility, for pictures of another size than the first
+Result<std::vector<BufferCamera>> open_buffers(const Path& folder);
+
+// the cameras of a path, before their buffers exist
+std::vector<BufferCamera> path_buffers(const Path& folder, const CameraPath& path);
+// bad_input where a folder's cameras, frames or sizes are not those of a path
+Status check_against_path(std::span<const BufferCamera> cameras, const CameraPath& path);
+
+Result<BufferFrame> read_buffer(const BufferCamera& camera, uint32_t frame);
+
+// millimetres; bad_input where it is not there or has another size
+Result<ImageGray16> read_depth(const BufferCamera& camera, uint32_t frame);
+
+// label colours, black where there is nothing: [height, width, 3]
+Result<std::vector<uint8_t>> read_label_picture(const BufferCamera& camera, uint32_t frame);
+
+// hash of the files of frames [first, last], of these kinds: "color", "visible", "depth"
+Result<uint64_t> hash_pictures(const BufferCamera& camera, std::initializer_list<const char*> kinds, uint32_t first,
+                               uint32_t last);
+
+// "frame 3" or "frame 3 of camera 'front'"
+std::string frame_text(const std::string& camera, uint32_t frame);
+
+} // namespace semrover

@@ -1,0 +1,207 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/refine/frame_renderer.h"
+
+namespace semrover {
+
+FrameRenderer::FrameRenderer(Device& device, const RendererModel& model, const SamplingPlan& plan, DType precision,
+                             AsdOptions options, MemoryPolicy policy)
+    : device_(device), model_(model), plan_(plan), precision_(precision), options_(std::move(options)), policy_(policy)
+{
+}
+FrameRenderer::~FrameRenderer() = default;
+
+Status FrameRenderer::start(const RendererWork& work, const RendererWork& run)
+{
+    if (size_ != work.size) {
+        asd_.reset();
+        codec_.reset();
+        size_ = work.size;
+    }
+    if (policy_ == MemoryPolicy::staged)
+        return {};
+    if (run.encode || run.decode)
+        SR_CHECK(load_vae());
+    if (run.denoise)
+        SR_CHECK(load_unet());
+    if (!work.denoise || asd_)
+        return {};
+    codec_.reset();
+    SR_CHECK(make_asd());
+    return {};
+}
+
+Status FrameRenderer::make_way(Part part)
+{
+    const bool coding = part != Part::denoise;
+    const CodecDirection wanted = part == Part::decode ? CodecDirection::decode : CodecDirection::encode;
+    if (codec_ && (!coding || direction_ != wanted))
+        codec_.reset();
+    if (coding && asd_)
+        asd_->rest();
+    if (policy_ == MemoryPolicy::resident)
+        return {};
+    if (coding) {
+        asd_.reset();
+        unet_.reset();
+    } else {
+        vae_.reset();
+    }
+    return {};
+}
+
+Status FrameRenderer::load_unet()
+{
+    if (unet_)
+        return {};
+    SR_TRY(const Checkpoint weights, model_.open_unet());
+    SR_TRY(unet_, Unet::load(device_, model_.unet, weights, precision_));
+    return {};
+}
+
+Status FrameRenderer::load_vae()
+{
+    if (vae_)
+        return {};
+    SR_TRY(const Checkpoint weights, model_.open_vae());
+    SR_TRY(vae_, Vae::load(device_, model_.vae, weights, precision_));
+    return {};
+}
+
+Status FrameRenderer::make_asd()
+{
+    if (asd_)
+        return {};
+    const Conditioning text{model_.conditioning_tokens, model_.conditioning};
+    SR_TRY(asd_, AsdRenderer::create(device_, *unet_, plan_, text, size_, options_));
+    return {};
+}
+
+Result<LatentCodec*> FrameRenderer::codec(CodecDirection direction)
+{
+    SR_CHECK(make_way(direction == CodecDirection::encode ? Part::encode : Part::decode));
+    SR_CHECK(load_vae());
+    if (!codec_) {
+        SR_TRY(codec_, LatentCodec::create(device_, *vae_, size_, direction));
+        direction_ = direction;
+    }
+    return codec_.get();
+}
+
+Result<std::vector<float>> FrameRenderer::encode(std::span<const float> image)
+{
+    SR_TRY(LatentCodec * c, codec(CodecDirection::encode));
+    return c->encode(image);
+}
+
+Status FrameRenderer::begin(const AsdFrame& frame)
+{
+    SR_CHECK(make_way(Part::denoise));
+    SR_CHECK(load_unet());
+    SR_CHECK(make_asd());
+    return asd_->begin(frame);
+}
+
+Result<bool> FrameRenderer::step(size_t submits)
+{
+    SR_ASSERT(asd_, "a step of a frame that has not begun");
+    return asd_->step(submits);
+}
+
+Result<std::vector<float>> FrameRenderer::finish()
+{
+    SR_ASSERT(asd_, "a frame is finished that has not begun");
+    return asd_->finish();
+}
+
+Status FrameRenderer::cancel()
+{
+    return asd_ ? asd_->cancel() : Status{};
+}
+
+Result<std::vector<float>> FrameRenderer::decode(std::span<const float> latent)
+{
+    SR_TRY(LatentCodec * c, codec(CodecDirection::decode));
+    return c->decode(latent);
+}
+
+Status FrameRenderer::copy(const Slot& from, const Slot& to)
+{
+    if (!copies_) {
+        SR_TRY(copies_, CopyRing::create(device_));
+    }
+    return copies_->copy(from, to).map([](uint64_t) {});
+}
+
+// where the latents lie, before there is anything to denoise
+Status FrameRenderer::make_denoiser()
+{
+    SR_ASSERT(policy_ == MemoryPolicy::resident, "latents stay on the device under the resident policy only");
+    SR_CHECK(load_unet());
+    return make_asd();
+}
+
+// to the denoiser, with what is visible
+Status FrameRenderer::encoded(const LatentCodec& codec)
+{
+    SR_CHECK(codec.check());
+    SR_CHECK(copy(codec.slots().latent, asd_->slots().buffer));
+    return copy(codec.slots().shares, asd_->slots().visible);
+}
+
+Status FrameRenderer::encode_seen(const Slot& seen)
+{
+    SR_CHECK(make_denoiser());
+    SR_TRY(LatentCodec * c, codec(CodecDirection::encode));
+    SR_CHECK(copy(seen, c->slots().seen));
+    SR_CHECK(c->encode_seen());
+    return encoded(*c);
+}
+
+Status FrameRenderer::encode_seen(std::span<const uint32_t> seen)
+{
+    SR_CHECK(make_denoiser());
+    SR_TRY(LatentCodec * c, codec(CodecDirection::encode));
+    SR_CHECK(c->slots().seen.write(device_, seen));
+    SR_CHECK(c->encode_seen());
+    return encoded(*c);
+}
+
+Status FrameRenderer::use_latent(std::span<const float> buffer, std::span<const float> visible)
+{
+    SR_CHECK(make_denoiser());
+    SR_CHECK(asd_->slots().buffer.write_rows(device_, buffer));
+    return asd_->slots().visible.write_rows(device_, visible);
+}
+
+Status FrameRenderer::use_previous(std::span<const float> latent)
+{
+    SR_CHECK(make_denoiser());
+    return asd_->slots().latent.write_rows(device_, latent);
+}
+
+Status FrameRenderer::begin_frame(const AsdStart& frame)
+{
+    SR_CHECK(make_way(Part::denoise));
+    SR_CHECK(make_denoiser());
+    if (!frame.first)
+        SR_CHECK(copy(asd_->slots().latent, asd_->slots().previous));
+    return asd_->begin(frame);
+}
+
+Status FrameRenderer::end_frame()
+{
+    return asd_->end();
+}
+
+Result<Slot> FrameRenderer::decode_latent()
+{
+    const AsdSlots& made = asd_->slots();
+    SR_TRY(LatentCodec * c, codec(CodecDirection::decode));
+    SR_CHECK(copy(made.latent, c->slots().latent));
+    SR_CHECK(c->decode_latent());
+    SR_CHECK(c->check());
+    return c->slots().bytes;
+}
+
+} // namespace semrover

@@ -1,0 +1,30 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/cli/open_device.h"
+
+#include "runtime/device/profile.h"
+
+namespace semrover {
+
+Result<std::unique_ptr<Device>> open_device(const Globals& globals, const std::string& profile)
+{
+    DeviceOptions options;
+    options.select = globals.device;
+    options.max_bytes = globals.max_vram;
+    SR_TRY(auto device, Device::create(options));
+    if (!profile.empty())
+        device->set_profile(std::make_shared<Profile>());
+    return device;
+}
+
+Status write_profile(Device& device, const std::string& path, const Globals& globals)
+{
+    if (path.empty())
+        return {};
+    SR_CHECK(device.profile()->write(path));
+    if (globals.verbose)
+        fmt::print(stderr, "{}", device.profile()->summary());
+    return {};
+}
+
+} // namespace semrover
