@@ -1,6 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/device/readback_ring.h"
+
+#include "kernels/sort.h"
 #include "tests/kernel_case.h"
 
 #include <numeric>

@@ -43,7 +43,6 @@ class GridGeneration : public GenerationJob {
 
   private:
     Path run_folder() const { return request_.output.string() + ".run"; }
-    void say(bool ended = false) const;
 
     const GenerationRequest request_;
     const JobCallbacks callbacks_;
@@ -73,24 +72,15 @@ Status GridGeneration::start(std::optional<GenerationState> saved)
     if (saved && saved->settings != settings_)
         return fail(ErrorCode::bad_input, "the saved state is of a run with other settings, model, input or device");
     SR_CHECK(saved ? filling_.start(std::move(saved->work)) : filling_.start(run_ ? &*run_ : nullptr));
-    say();
+    filling_.say(callbacks_);
     return {};
-}
-
-void GridGeneration::say(bool ended) const
-{
-    if (!callbacks_.progress)
-        return;
-    JobProgress p = filling_.progress();
-    p.ended = ended;
-    callbacks_.progress(p);
 }
 
 Result<bool> GridGeneration::step(const JobBudget& budget)
 {
-    SR_TRY(const bool filled, filling_.step(budget, [this] { say(); }));
+    SR_TRY(const bool filled, filling_.step(budget, [this] { filling_.say(callbacks_); }));
     if (filled)
-        say(true);
+        filling_.say(callbacks_, true);
     return filled;
 }
 

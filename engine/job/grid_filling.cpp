@@ -168,15 +168,18 @@ Json GridFilling::results() const
             {"peak_device_bytes", peak_bytes_}};
 }
 
-JobProgress GridFilling::progress() const
+void GridFilling::say(const JobCallbacks& callbacks, bool ended) const
 {
+    if (!callbacks.progress)
+        return;
     JobProgress p{.stage = "generate", .unit = "cells"};
     p.done = std::max(outpainter_->cells_done(), restored_);
     p.total = outpainter_->cells_to_do();
     p.done_before = restored_;
     p.part = outpainter_->part();
-    p.device_bytes = device_.allocated_bytes();
-    return p;
+    p.device_bytes = ended ? 0 : device_.allocated_bytes();
+    p.ended = ended;
+    callbacks.progress(p);
 }
 
 } // namespace semrover

@@ -40,7 +40,7 @@ class GridFilling {
     // cells, regions, seconds and memory of the last filling
     Json results() const;
     // how many cells are done, in the stage "generate"
-    JobProgress progress() const;
+    void say(const JobCallbacks& callbacks, bool ended = false) const;
     const Outpainter& outpainter() const { return *outpainter_; }
     Device& device() const { return device_; }
 

@@ -76,7 +76,6 @@ class SeedRuns : public Job {
     bool all_done() const { return at_ == outputs_.seeds.size(); }
     Status begin_seed();
     Status finish_seed();
-    void say(bool ended = false) const;
 
     const Regeneration what_;
     const RegenerationOutputs outputs_;
@@ -127,19 +126,8 @@ Status SeedRuns::begin_seed()
     SR_TRY(RunFolder run, open_run(run_folder_of(output()), settings_, outputs_.replace));
     run_.emplace(std::move(run));
     SR_CHECK(filling_.start(&*run_));
-    say();
+    filling_.say(callbacks_);
     return {};
-}
-
-void SeedRuns::say(bool ended) const
-{
-    if (!callbacks_.progress)
-        return;
-    JobProgress p = filling_.progress();
-    if (ended)
-        p.device_bytes = 0;
-    p.ended = ended;
-    callbacks_.progress(p);
 }
 
 Result<bool> SeedRuns::step(const JobBudget& budget)
@@ -147,10 +135,10 @@ Result<bool> SeedRuns::step(const JobBudget& budget)
     if (all_done())
         return true;
     if (run_) {
-        SR_TRY(const bool filled, filling_.step(budget, [this] { say(); }));
+        SR_TRY(const bool filled, filling_.step(budget, [this] { filling_.say(callbacks_); }));
         if (!filled)
             return false;
-        say(true);
+        filling_.say(callbacks_, true);
         SR_CHECK(finish_seed());
     }
     run_.reset();

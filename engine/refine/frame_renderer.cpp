@@ -102,8 +102,15 @@ Status FrameRenderer::begin(const AsdFrame& frame)
     return asd_->begin(frame);
 }
 
+Result<bool> FrameRenderer::step(size_t submits)
+{
+    SR_ASSERT(asd_, "a step of a frame that has not begun");
+    return asd_->step(submits);
+}
+
 Result<std::vector<float>> FrameRenderer::finish()
 {
+    SR_ASSERT(asd_, "a frame is finished that has not begun");
     return asd_->finish();
 }
 
@@ -180,11 +187,6 @@ Status FrameRenderer::begin_frame(const AsdStart& frame)
     if (!frame.first)
         SR_CHECK(copy(asd_->slots().latent, asd_->slots().previous));
     return asd_->begin(frame);
-}
-
-Result<bool> FrameRenderer::step(size_t submits)
-{
-    return asd_->step(submits);
 }
 
 Status FrameRenderer::end_frame()

@@ -24,10 +24,11 @@ class FrameRenderer {
     // as LatentCodec does it; not between begin and finish of a frame
     Result<std::vector<float>> encode(std::span<const float> image);
     Result<std::vector<float>> decode(std::span<const float> latent);
-    // as AsdRenderer does it, with step() between them
+    // as AsdRenderer does it
     Status begin(const AsdFrame& frame);
+    Result<bool> step(size_t submits); // true when the latent is done
     Result<std::vector<float>> finish();
-    Status cancel(); // of a frame that has begun, either way
+    Status cancel();
 
     // The same with latents that stay on the device from the splats' pixels to the frame's bytes: under the resident
     // policy, and for work that denoises. Nothing is read back but a word of each: are all numbers finite?
@@ -36,11 +37,10 @@ class FrameRenderer {
     Status encode_seen(std::span<const uint32_t> seen);                               // the same from the host
     Status use_latent(std::span<const float> buffer, std::span<const float> visible); // or what was encoded before
     Status use_previous(std::span<const float> latent); // of the frame before, where this run did not make it
-    Status begin_frame(const AsdStart& frame);          // after the frame before: its latent is the previous one
-    Result<bool> step(size_t submits);                  // true when the latent is done
-    Status end_frame();                                 // slots().latent of denoiser() is the frame's
-    Result<Slot> decode_latent();                       // of the frame that has ended -> its bytes
-    AsdRenderer* denoiser() { return asd_.get(); }      // while there is one
+    Status begin_frame(const AsdStart& frame);     // then step; after the frame before: its latent is the previous one
+    Status end_frame();                            // slots().latent of denoiser() is the frame's
+    Result<Slot> decode_latent();                  // of the frame that has ended -> its bytes
+    AsdRenderer* denoiser() { return asd_.get(); } // while there is one
 
   private:
     enum class Part { encode, denoise, decode };

@@ -4,7 +4,6 @@
 
 #include "engine/camera/lens.h"
 #include "kernels/picture.h"
-#include "kernels/splat.h"
 
 #include <algorithm>
 #include <cmath>

@@ -54,8 +54,8 @@ struct RasterizerOptions {
     std::optional<std::array<uint8_t, 3>> pixels_over;
 };
 
-// what one camera sees, on the device, a row a pixel: as SplatImages (kernels/kernels.h) has it, or as files have it
-// (PixelWords, kernels/pictures.h)
+// what one camera sees, on the device, a row a pixel: as SplatImages (kernels/splat.h) has it, or as files have it
+// (PixelWords, kernels/picture.h)
 struct SplatSlots {
     Slot color, surface, depth, ids;
 };

@@ -4,7 +4,7 @@
 #include "kernels/picture.h"
 
 #include "block_shares.spv.h"
-#include "shaders/block_shares.h"
+#include "shaders/picture/block_shares.h"
 
 namespace semrover {
 

@@ -4,7 +4,8 @@
 #include "kernels/picture.h"
 
 #include "first_non_finite.spv.h"
-#include "shaders/first_non_finite.h"
+#include "kernels/sort.h"
+#include "shaders/picture/first_non_finite.h"
 
 namespace semrover {
 

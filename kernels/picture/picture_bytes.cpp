@@ -4,7 +4,7 @@
 #include "kernels/picture.h"
 
 #include "picture_bytes.spv.h"
-#include "shaders/picture_bytes.h"
+#include "shaders/picture/picture_bytes.h"
 
 namespace semrover {
 

@@ -4,7 +4,7 @@
 #include "kernels/picture.h"
 
 #include "scale_latent.spv.h"
-#include "shaders/scale_latent.h"
+#include "shaders/picture/scale_latent.h"
 
 namespace semrover {
 

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #ifndef SEMROVER_BLOCK_SHARES_H
 #define SEMROVER_BLOCK_SHARES_H
-#include "lib/types.h"
+#include "shaders/lib/types.h"
 
 struct BlockSharesPush {
     uint rows;          // of y

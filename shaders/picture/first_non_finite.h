@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #ifndef SEMROVER_FIRST_NON_FINITE_H
 #define SEMROVER_FIRST_NON_FINITE_H
-#include "lib/types.h"
+#include "shaders/lib/types.h"
 
 struct FirstNonFinitePush {
     uint elements; // of the pixels that count

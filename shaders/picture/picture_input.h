@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #ifndef SEMROVER_PICTURE_INPUT_H
 #define SEMROVER_PICTURE_INPUT_H
-#include "lib/types.h"
+#include "shaders/lib/types.h"
 
 struct PictureInputPush {
     uint rows;          // of y

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #ifndef SEMROVER_SCALE_LATENT_H
 #define SEMROVER_SCALE_LATENT_H
-#include "lib/types.h"
+#include "shaders/lib/types.h"
 
 struct ScaleLatentPush {
     uint rows;   // of y

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #ifndef SEMROVER_SPLAT_PIXELS_H
 #define SEMROVER_SPLAT_PIXELS_H
-#include "lib/types.h"
+#include "shaders/lib/types.h"
 
 struct SplatPixelsPush {
     uint pixels;

@@ -8,6 +8,7 @@
 #include "engine/mesh/voxelizer.h"
 #include "engine/scene/palette.h"
 #include "runtime/base/quote.h"
+#include "runtime/base/json.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/progress.h"

@@ -53,7 +53,7 @@ SplatImages on_device(KernelCase& k, const SplatImage& image)
     return {k.input(color, 4), k.input(surface, 4), k.input(depth, 2), k.input(ids, 2), {}, {}};
 }
 
-TEST(kernel_pictures, splats_become_the_bytes_that_files_of_them_hold)
+TEST(kernel_picture, splats_become_the_bytes_that_files_of_them_hold)
 {
     for (const std::array<uint8_t, 3> background : {std::array<uint8_t, 3>{0, 0, 0}, {255, 128, 3}}) {
         KernelCase k(test_device());
@@ -81,7 +81,7 @@ TEST(kernel_pictures, splats_become_the_bytes_that_files_of_them_hold)
     }
 }
 
-TEST(kernel_pictures, bytes_become_the_numbers_that_a_network_is_given)
+TEST(kernel_picture, bytes_become_the_numbers_that_a_network_is_given)
 {
     for (const PictureShape& s : kShapes) {
         KernelCase k(test_device());
@@ -104,7 +104,7 @@ TEST(kernel_pictures, bytes_become_the_numbers_that_a_network_is_given)
     }
 }
 
-TEST(kernel_pictures, a_block_counts_its_visible_pixels)
+TEST(kernel_picture, a_block_counts_its_visible_pixels)
 {
     for (const PictureShape& s : kShapes)
         for (const uint32_t block : {4u, 1u, 2u}) {
@@ -130,7 +130,7 @@ TEST(kernel_pictures, a_block_counts_its_visible_pixels)
         }
 }
 
-TEST(kernel_pictures, latents_are_scaled_and_back_as_on_the_host)
+TEST(kernel_picture, latents_are_scaled_and_back_as_on_the_host)
 {
     for (const auto& [factor, shift] : {std::pair{0.18215f, 0.f}, {0.3611f, 0.1159f}, {1.f, -3.f}, {13.7f, 0.5f}})
         for (const bool back : {false, true}) {
@@ -147,7 +147,7 @@ TEST(kernel_pictures, latents_are_scaled_and_back_as_on_the_host)
         }
 }
 
-TEST(kernel_pictures, numbers_become_the_bytes_of_a_picture)
+TEST(kernel_picture, numbers_become_the_bytes_of_a_picture)
 {
     for (const PictureShape& s : kShapes) {
         KernelCase k(test_device());
@@ -168,7 +168,7 @@ TEST(kernel_pictures, numbers_become_the_bytes_of_a_picture)
     }
 }
 
-TEST(kernel_pictures, finds_the_first_number_that_is_none)
+TEST(kernel_picture, finds_the_first_number_that_is_none)
 {
     const PictureShape s{51, 38, 56, 40};
     for (const auto& [at, wrong] : {std::pair{~0u, 0.f},
