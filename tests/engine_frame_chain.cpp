@@ -182,7 +182,10 @@ TEST(engine_frame_chain, a_frame_renderer_keeps_latents_between_its_stages_and_f
         }
         const std::vector<float> buffer = *host->encode(floats_of_pixels(color)), before = previous,
                                  shares = block_shares(kSize, visible);
-        previous = *host->denoise({f, 0, buffer, shares, before}, {});
+        ASSERT_TRUE(host->begin({f, 0, buffer, shares, before}));
+        while (!*host->step(1)) {
+        }
+        previous = *host->finish();
         const Picture expected = pixels_of_floats(*host->decode(previous));
         ASSERT_TRUE(there->encode_seen(seen(f)));
         EXPECT_EQ(frame_of(*there, f), expected) << "frame " << f;
