@@ -23,7 +23,7 @@ struct OutpaintCallbacks {
     std::function<bool(size_t cells_done, double part)> progress; // part: of the batch at work, 0..1; false stops
 };
 
-// Fills a grid region by region (spec/method.md §3): cells with generated = 1 are known and never change.
+// Fills a grid region by region (docs/method.md §4): cells with generated = 1 are known and never change.
 class Outpainter {
   public:
     // grid: made ready for points (arrays allocated, n and voxel size of the model); errors: bad_input
