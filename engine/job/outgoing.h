@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/camera/image_size.h"
 #include "engine/job/file_queue.h"
 #include "engine/refine/frame_images.h"
 #include "runtime/device/readback_ring.h"
