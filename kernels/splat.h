@@ -69,7 +69,7 @@ constexpr uint32_t splat_record_bytes(SplatLens lens)
     return lens == SplatLens::pinhole ? 64 : 80;
 }
 
-// rules where references differ: spec/method.md, section 4. Lenses but the pinhole: research/splat.md, section 1.8
+// rules where published rasterizers differ: docs/method.md §5.3; lenses but the pinhole: §5.4
 struct SplatOptions {
     uint32_t width = 0, height = 0; // pixels
     SplatLens lens = SplatLens::pinhole;

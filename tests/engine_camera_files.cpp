@@ -77,7 +77,7 @@ Status write(PathFormat format, const Path& path, const CameraPath& cameras)
     return write_colmap(path, cameras);
 }
 
-// research/splat.md, section 7.9
+// docs/formats.md §7.1: a path means the same in every format
 TEST(CameraFiles, a_path_that_goes_through_all_five_formats_is_the_same)
 {
     const ScratchFolder folder;

@@ -254,7 +254,7 @@ TEST(Repaint, AMultistepSamplerForgetsItsPreviousPredictionAfterAJump)
 TEST(Repaint, EveryRowHasItsOwnDrawAndEveryTimestepIsListedOnce)
 {
     const auto plan = plan_of(ddpm(), 250, {10, 10});
-    EXPECT_EQ(plan.evaluations, 2410u); // as counted in research/mission.md
+    EXPECT_EQ(plan.evaluations, 2410u); // docs/method.md §3.3
     EXPECT_EQ(plan.rows.size() - plan.evaluations, 2160u);
     EXPECT_EQ(plan.timesteps.size(), 250u);
     EXPECT_EQ(std::set<double>(plan.timesteps.begin(), plan.timesteps.end()).size(), 250u);

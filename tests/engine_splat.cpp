@@ -132,7 +132,7 @@ TEST(engine_splat, golden_normals_come_out)
     RecordProperty("eigenvalues", fmt::format("{:.2e}", worst_value));
 }
 
-// research/splat.md, section 7.8: points at random on a road, as dense as a grid's, cover 1 - exp(-density 2 pi
+// docs/method.md §5.2: points at random on a road, as dense as a grid's, cover 1 - exp(-density 2 pi
 // sigma^2) of it; auto sigma closes the holes
 TEST(engine_splat, a_road_is_as_opaque_as_its_density_says)
 {

@@ -78,7 +78,7 @@ std::array<int64_t, 2> sampled_tiles(const ReferenceSplat& s, const Vector& row,
     return {int64_t(std::max(low, 0.0) / 16), int64_t(std::min(high, size - 1.0) / 16)};
 }
 
-// research/splat.md, section 7.1: one splat, seen from anywhere, no pixel with alpha >= 1/255 is lost, and no tile is
+// docs/method.md §5.3, bounds: one splat, seen from anywhere, no pixel with alpha >= 1/255 is lost, and no tile is
 // listed beyond a ring around its outline, unless that reaches the camera's plane
 TEST(kernel_splat, bounds_hold_every_pixel_and_little_more)
 {

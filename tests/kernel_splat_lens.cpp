@@ -93,7 +93,7 @@ TEST(kernel_splat_lens, matches_a_ray_caster_in_double)
     }
 }
 
-// research/splat.md, section 7.1: one splat, seen from anywhere, no pixel with alpha >= 1/255 is lost
+// docs/method.md §5.4, bounds: one splat, seen from anywhere, no pixel with alpha >= 1/255 is lost
 TEST(kernel_splat_lens, bounds_hold_every_pixel)
 {
     const Intrinsics models[] = {

@@ -139,7 +139,7 @@ struct Misses {
     }
 };
 
-// research/splat.md, sections 1.4 and 7.3: 2e-3, but for a thousandth of the values, where a threshold may flip
+// docs/numerics.md §6.1: 2e-3, but for a thousandth of the values, where a threshold may flip
 inline void compare(const SplatPixels& got, const std::vector<ReferencePixel>& expect, size_t camera)
 {
     Misses misses;

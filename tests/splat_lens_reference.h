@@ -6,7 +6,7 @@
 #include "tests/splat_reference.h"
 
 // the splat rasteriser of cameras with lenses in double, every splat against the ray of every pixel, after
-// research/splat.md section 1.8; engine_lens tests the lenses themselves
+// docs/method.md §5.4; engine_lens tests the lenses themselves
 namespace semrover {
 
 struct LensCamera {

@@ -10,7 +10,7 @@
 #include <random>
 #include <vector>
 
-// the splat rasteriser in double, every splat against every pixel, after spec/method.md section 4
+// the splat rasteriser in double, every splat against every pixel, after docs/method.md §5.3
 namespace semrover {
 
 struct HostSplat {

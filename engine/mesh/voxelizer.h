@@ -27,8 +27,8 @@ struct VoxelizedMesh {
 // 2^-20 of a cell. A colour is the material's times the texture's (bilinear) times the vertices', in linear light, what
 // is absent being white; a label is the face's, or the label texture's at the middle of what a cell has of the face.
 // Points lie within their cell, in the order of a token.
-// A textured mesh as a Sigma-Voxfield grid (spec/method.md §1): every triangle is clipped to the cells it crosses, and
-// a cell's points are drawn uniformly and evenly over its clipped area (a randomly shifted lattice), with random
+// A textured mesh as a Sigma-Voxfield grid (docs/method.md §1.3): every triangle is clipped to the cells it crosses,
+// and a cell's points are drawn uniformly and evenly over its clipped area (a randomly shifted lattice), with random
 // numbers keyed by (seed, cell, sample), so the result depends on neither the order of the faces within a cell's reach
 // nor on the device's threads. Errors: bad_input, out_of_memory, device_lost
 Result<VoxelizedMesh> voxelize(Device& device, const Mesh& mesh, const VoxelizeOptions& options);

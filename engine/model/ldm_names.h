@@ -10,7 +10,7 @@
 namespace semrover {
 
 // what a single-file LDM checkpoint calls the tensor that diffusers calls `name`, one of the network's schema; without
-// the file's prefix (source: research/mission.md B5)
+// the file's prefix (docs/models.md §9)
 std::string ldm_unet_name(const UnetConfig& config, std::string_view name);
 std::string ldm_vae_name(const VaeConfig& config, std::string_view name);
 

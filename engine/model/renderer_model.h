@@ -67,7 +67,7 @@ inline uint32_t renderer_channels(const VaeConfig& vae)
     return 3 * vae.latent_channels + 1;
 }
 
-// Stable Diffusion's noise schedule (spec/method.md 5), and the scheduler_config.json that says so
+// Stable Diffusion's noise schedule (docs/method.md §6.1), and the scheduler_config.json that says so
 SchedulerConfig stable_diffusion_scheduler(std::optional<Sampler> sampler = {});
 nlohmann::json stable_diffusion_scheduler_json();
 

@@ -14,7 +14,7 @@
 
 namespace semrover {
 
-// config.json of a VoxfieldTransformer (spec/models.md); nothing assumes the defaults
+// config.json of a VoxfieldTransformer (docs/models.md §3); nothing assumes the defaults
 struct TransformerConfig {
     uint32_t num_layers = 12;
     uint32_t num_attention_heads = 8;

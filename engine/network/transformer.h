@@ -18,7 +18,7 @@ struct TokenContext {
     uint32_t longest = 0;
 };
 
-// The Σ-Voxfield transformer (spec/method.md §2): SD3's joint blocks over voxel and semantic tokens. Its functions add
+// The Σ-Voxfield transformer (docs/method.md §2): SD3's joint blocks over voxel and semantic tokens. Its functions add
 // to a graph; D = heads * head_dim, C = 6 * points, M tokens of all sets.
 class Transformer {
   public:

@@ -12,7 +12,7 @@
 
 namespace semrover {
 
-// UNet2DConditionModel, shaped like Stable Diffusion 1.5's (research/mission.md B2). Its functions add to a graph.
+// UNet2DConditionModel, shaped like Stable Diffusion 1.5's (docs/models.md §4). Its functions add to a graph.
 class Unet {
   public:
     ~Unet();

@@ -11,7 +11,7 @@
 
 namespace semrover {
 
-// AutoencoderKL (research/mission.md B3). Its functions add to a graph. Where the config asks for force_upcast and the
+// AutoencoderKL (docs/models.md §5). Its functions add to a graph. Where the config asks for force_upcast and the
 // precision is fp16, the residual stream is stored divided by a power of two, which group norms undo exactly.
 class Vae {
   public:

@@ -18,7 +18,7 @@ using Cell = std::array<int32_t, 3>;        // (i, j, k): spans [i, i+1) x [j, j
 constexpr int32_t kMaxCoordinate = 1 << 20; // 629 km of 0.6 m cells; products of differences stay within 64 bits
 constexpr int kMaxPointsPerVoxel = 4096;
 
-// a scene of V labelled cells, each with n coloured surface points or none (spec: models.md, "Scenes and grids").
+// a scene of V labelled cells, each with n coloured surface points or none (docs/formats.md §2.1).
 // World frame: metres, x forward, y left, z up. Arrays are row-major.
 struct VoxelGrid {
     float voxel_size = 0;           // metres, edge of a cell

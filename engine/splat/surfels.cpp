@@ -38,7 +38,7 @@ struct SurfelScene::Host {
 namespace {
 
 // of the rms distance to the nearest three points: sigma is about 0.1 m on a road of 20 points per 0.6 m cell, and
-// alpha 0.98 (research/splat.md, finding 2); at 0.75 a bright background still shines through
+// alpha 0.98 (docs/method.md §5.2); at 0.75 a bright background still shines through
 constexpr float kSpacing = 0.95f;
 constexpr size_t kMaxSurfels = 1u << 26; // 64 bytes of neighbours each in 32 bits
 

@@ -18,7 +18,7 @@ struct SurfelOptions {
     uint32_t neighbors = 16;       // of a point, itself included, for its normal
     float neighbor_radius = 0.45f; // metres; 0: no limit
     bool same_label = true;        // neighbours of the same label first
-    bool fallbacks = true;         // normals of poles and of lonely points (research/splat.md, section 2)
+    bool fallbacks = true;         // normals of poles and of lonely points (docs/method.md §5.1)
 };
 
 // Surfels on the device, ready to be drawn: positions, normals, colours, sigmas, opacities, labels, cells.

@@ -28,7 +28,7 @@ struct OutpaintState {
 // called before dependents start: the place to save
 using FinishedRegion = std::function<Status(const RegionResult&)>;
 
-// Fills a grid region by region (spec/method.md §3): cells with generated = 1 are known and never change. In order:
+// Fills a grid region by region (docs/method.md §4): cells with generated = 1 are known and never change. In order:
 // restore or resume what is done already, begin, then step until it says true.
 class Outpainter {
   public:

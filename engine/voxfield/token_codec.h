@@ -9,7 +9,7 @@
 
 namespace semrover {
 
-// Stored points <-> model tokens (spec/method.md §1). A token is the cell's n points by increasing distance to its
+// Stored points <-> model tokens (docs/method.md §1.2). A token is the cell's n points by increasing distance to its
 // centre (ties by x, y, z, then source order), each x, y, z, r, g, b; offsets / (voxel_size / 2), 2 * rgb - 1, then the
 // model's normalization. All known tokens are made from stored values, so a resumed run sees the same ones.
 

@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// 2D Gaussian splats to images (research/splat.md, section 1.7): keep what a camera can see, write records without
+// 2D Gaussian splats to images (docs/method.md §5.3): keep what a camera can see, write records without
 // gaps, sort them by depth (equal depths by camera and splat), make a pair for every tile that a record touches, sort
 // those by tile, blend every pixel front to back:
 //   alpha = min(alpha_max, o exp(-r^2 / 2)), w = alpha T, T' = T (1 - alpha)
-// Cameras with a lens take other records and meet every surfel with the ray of a pixel (section 1.8).
+// Cameras with a lens take other records and meet every surfel with the ray of a pixel (docs/method.md §5.4).
 #include "kernels/splat.h"
 
 #include "kernels/sort.h"

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 
-// a surfel as a camera with a lens sees it, and the pixels that it can reach (research/splat.md, section 1.8)
+// a surfel as a camera with a lens sees it, and the pixels that it can reach (docs/method.md §5.4)
 #include "lib/lens.glsl"
 #include "lib/splat_surfel.glsl"
 

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // what both variants of the blending of cameras with lenses share: one splat over one pixel, whose ray is known
-// (research/splat.md, section 1.8)
+// (docs/method.md §5.4)
 #include "lib/splat_pixel.glsl"
 
 layout(constant_id = 2) const uint kModel = 1;                 // CameraModel

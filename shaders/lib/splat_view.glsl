@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 
-// a surfel as a camera sees it, and the pixels that it can reach (research/splat.md, sections 1.2 and 1.4)
+// a surfel as a camera sees it, and the pixels that it can reach (docs/method.md §5.3)
 #include "lib/splat_surfel.glsl"
 
 layout(push_constant) uniform Push { SplatPush p; };

@@ -2,7 +2,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // normal = eigenvector of the smallest eigenvalue of the covariance of the neighbours, its largest component positive.
-// With fallbacks (research/splat.md, section 2): along thin lines the part of p - mean that is across the line; without
+// With fallbacks (docs/method.md §5.1): along thin lines the part of p - mean that is across the line; without
 // a plane, up.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require

@@ -21,7 +21,7 @@ struct Timing {
 // runs `work` once to warm up, then until 5 runs and a second have passed, or 30 s
 Result<Timing> measure(const std::function<Status()>& work);
 
-// the fields that every benchmark has (spec/performance.md)
+// the fields that every benchmark's JSON has
 Json bench_report(const char* kind, const Device& device, DType precision, const Timing& timing,
                   uint64_t predicted_bytes);
 void add_program(Json& report, const Program& program);          // dispatches, barriers, host_us_per_step

@@ -37,7 +37,7 @@ Status bench_sort(const SortOptions& o, const Globals& globals)
     report["precision"] = "u32";
     report["pairs"] = o.pairs;
     report["mpairs_per_second"] = o.pairs / timing.ms_median / 1e3;
-    // four passes over 8-bit digits read keys twice and values once and write both (research/performance.md §1)
+    // four passes over 8-bit digits read keys twice and values once and write both
     report["gbps"] = 80.0 * o.pairs / timing.ms_median / 1e6;
     add_program(report, *program);
     print_report(report, globals);

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""The renderer ASD: a Stable Diffusion UNet that draws a frame over its splat buffer (spec: method.md §5).
+"""The renderer ASD: a Stable Diffusion UNet that draws a frame over its splat buffer (docs/method.md §6.1).
 
 Its input is the noisy latent, the previous frame's latent with noise on it, the buffer's latent and the visibility; it
 predicts the noise (or the velocity, in the small config: with few steps trained, noise predicted at high levels says little

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""The renderer's noise schedule, its DDIM sampler and the rollout over frames (spec: method.md §5)."""
+"""The renderer's noise schedule, its DDIM sampler and the rollout over frames (docs/method.md §6.1)."""
 import torch
 from torch.nn import functional as F
 

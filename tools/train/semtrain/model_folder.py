@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""Components of a model folder, in the diffusers layout that the engine reads (spec: models.md)."""
+"""Components of a model folder, in the diffusers layout that the engine reads (docs/models.md §1)."""
 import os
 
 import torch

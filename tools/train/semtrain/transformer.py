@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""Trains the Σ-Voxfield transformer (spec: method.md §2): x0-prediction, L2, sets of neighbouring cells, of which a part
+"""Trains the Σ-Voxfield transformer (docs/method.md §2): x0-prediction, L2, sets of neighbouring cells, of which a part
 may be known; labels dropped in one set of ten."""
 import os
 

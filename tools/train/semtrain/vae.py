@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""The VAE of the renderer: blocks of pixels <-> latents of 4 channels (spec: method.md §5, models.md). As many levels as
-`block_out_channels` has: four make blocks of 8x8, as the paper's. The small config has three, 4x4, which learn sooner:
-27.4 dB on held-out frames after 3000 steps; 8x8 had 22.3 dB, nearly without colour, after some 1500.
+"""The VAE of the renderer: blocks of pixels <-> latents of 4 channels (docs/method.md §6.1, docs/models.md §5). As many
+levels as `block_out_channels` has: four make blocks of 8x8, as the paper's. The small config has three, 4x4, which learn
+sooner: 27.4 dB on held-out frames after 3000 steps; 8x8 had 22.3 dB, nearly without colour, after some 1500.
 
 The paper takes that of Stable Diffusion 1.5 as it is. This recipe trains a small one on shaded frames and splat buffers
 of streets: L1 of the picture, of a Laplacian pyramid and of colours, and a little KL, on random crops. With --init and

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the UNet and the VAE are both made of, with the tensor names of diffusers (spec: models.md)."""
+"""What the UNet and the VAE are both made of, with the tensor names of diffusers (docs/models.md §4, §5)."""
 from torch import nn
 from torch.nn import functional as F
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""The Σ-Voxfield transformer: SD3's joint blocks over voxel tokens and semantic tokens (spec: method.md §2)."""
+"""The Σ-Voxfield transformer: SD3's joint blocks over voxel tokens and semantic tokens (docs/method.md §2)."""
 import math
 
 import torch

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""UNet2DConditionModel of Stable Diffusion 1.5, with diffusers' tensor names and fields (models.md; mission.md B2)."""
+"""UNet2DConditionModel of Stable Diffusion 1.5, with diffusers' tensor names and fields (docs/models.md §4)."""
 import math
 
 import torch

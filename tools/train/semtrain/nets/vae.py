@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""AutoencoderKL of Stable Diffusion, with diffusers' tensor names and fields (spec: models.md; mission.md B3)."""
+"""AutoencoderKL of Stable Diffusion, with diffusers' tensor names and fields (docs/models.md §5)."""
 from torch import nn
 from torch.nn import functional as F
 
