@@ -60,11 +60,12 @@ class JobRefinement : public testing::Test {
         o.frame_noise = FrameNoise::warped;
         return o;
     }
-    std::unique_ptr<Job> begin(const RefinementOptions& o, const RefinementCallbacks& callbacks = {})
+    std::unique_ptr<Job> begin(const RefinementOptions& o, const RefinementCallbacks& callbacks = {},
+                               Device& on = device())
     {
         auto resolved = resolve_refinement(o, callbacks);
         EXPECT_TRUE(resolved) << resolved.error().message;
-        auto job = begin_refinement(device(), std::move(*resolved), callbacks);
+        auto job = begin_refinement(on, std::move(*resolved), callbacks);
         EXPECT_TRUE(job) << job.error().message;
         return std::move(*job);
     }
@@ -159,6 +160,59 @@ TEST_F(JobRefinement, a_job_that_is_given_up_at_any_step_is_begun_again_and_give
         run(*begin(options_of_grid(output)), JobBudget{2, ~0ull});
         EXPECT_TRUE(expected == results(output)) << at;
     }
+}
+
+TEST_F(JobRefinement, frames_of_a_rig_are_refined_as_they_are_drawn_like_those_of_its_buffers)
+{
+    RefinementOptions o = options_of_grid("drawn");
+    CameraPath rig;
+    for (const CameraFrame& frame : o.path->frames)
+        for (const char* camera : {"left", "right"}) {
+            rig.frames.push_back(frame);
+            rig.frames.back().camera = camera;
+            rig.frames.back().pose.world_to_camera[3] += camera[0] == 'l' ? 0.3 : -0.3;
+        }
+    o.path = rig;
+    const auto kinds = {"frames/left", "frames/right", "latents/left", "latents/right"};
+    EXPECT_EQ(run(*begin(o), JobBudget::one_submit()), 2 * kFrames * (kSteps + 2) + kFrames);
+    const auto drawn = files_in(folder_ / "drawn", kinds);
+    EXPECT_EQ(drawn.size(), 4 * kFrames);
+    RefinementOptions of_files = o;
+    of_files.input = folder_ / "drawn" / "buffers";
+    of_files.output = folder_ / "files";
+    run(*begin(of_files));
+    EXPECT_TRUE(drawn == files_in(folder_ / "files", kinds));
+    RefinementOptions stopped = o;
+    stopped.output = folder_ / "stopped";
+    {
+        const auto job = begin(stopped);
+        for (size_t i = 0; i < 2 * (kSteps + 2) + 4; ++i)
+            ASSERT_FALSE(*job->step(JobBudget::one_submit()));
+    }
+    run(*begin(stopped));
+    EXPECT_TRUE(drawn == files_in(folder_ / "stopped", kinds));
+}
+
+TEST_F(JobRefinement, where_memory_is_short_everything_is_drawn_before_and_the_bytes_are_the_same)
+{
+    Json roomy, tight;
+    run(*begin(options_of_grid("roomy")), JobBudget::unlimited(), &roomy);
+    DeviceOptions limited; // as much as drawing takes alone, which is enough to refine alone
+    limited.max_bytes = roomy["render_device_bytes"];
+    ASSERT_LT(limited.max_bytes, roomy["planned_device_bytes"]);
+    const auto small = std::move(*Device::create(limited));
+    std::vector<std::string> stages;
+    RefinementCallbacks callbacks;
+    callbacks.progress = [&](const JobProgress& p) {
+        if (p.ended)
+            stages.emplace_back(p.stage);
+    };
+    run(*begin(options_of_grid("tight"), callbacks, *small), JobBudget::one_submit(), &tight);
+    EXPECT_EQ(tight["policy"], "resident");
+    EXPECT_EQ(tight["planned_device_bytes"], tight["peak_device_bytes"]);
+    EXPECT_LT(tight["planned_device_bytes"], roomy["planned_device_bytes"]);
+    EXPECT_EQ(stages, (std::vector<std::string>{"render", "refine"}));
+    EXPECT_TRUE(results("roomy") == results("tight"));
 }
 
 TEST_F(JobRefinement, callbacks_tell_stages_counts_and_the_plan_and_may_refuse_the_end)

@@ -209,7 +209,8 @@ class RefinementJob : public Job {
         if (!std::ranges::all_of(r_.chains, same_size))
             return {}; // what depends on the size would be made again and again
         SR_CHECK(out_->drain());
-        SR_CHECK(plan());
+        if (const Status planned = plan(); !planned) // with the splats beside it nothing fits: without them it may
+            return planned.error().code == ErrorCode::out_of_memory ? Status{} : planned;
         if (memory_.policy != MemoryPolicy::resident)
             return {};
         SR_CHECK(begin_planned(&*r_.options.path));
