@@ -112,6 +112,7 @@ TEST_F(CliRefine, damaged_pieces_are_done_again)
     std::ofstream(path("out/journal.jsonl"), std::ios::app) << R"({"piece":"frames/0000)"; // died while writing
     fs::resize_file(folder_ / "out" / "latents" / "000000.safetensors", 40);
     fs::remove(folder_ / "out" / "frames" / "000000.png");
+    folder_.put("out/frames/.semrover-1-2.tmp", "half a picture");
     EXPECT_TRUE(whole == refined("out"));
 }
 
@@ -221,7 +222,8 @@ TEST_F(CliRefine, straight_from_a_grid_is_render_and_refine)
     for (const size_t lines : {0, 1, 2}) {
         const std::string output = fmt::format("killed{}", lines);
         EXPECT_EQ(stop_after(output, lines, SIGKILL, drive, "street.sgrid"), 128 + SIGKILL);
-        EXPECT_EQ(refine(output, drive, "street.sgrid").code, 0);
+        const ProgramResult resumed = refine(output, drive, "street.sgrid");
+        EXPECT_EQ(resumed.code, 0) << resumed.err;
         EXPECT_TRUE(two_commands == results(output)) << lines;
     }
     // the folder against its path

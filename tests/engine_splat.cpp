@@ -1,10 +1,11 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/refine/frame_images.h"
+#include "tests/frame_pixels_reference.h"
 #include "tests/golden_tensors.h"
 #include "tests/splat_case.h"
-#include "tools/verify/splat_cases.h"
 #include "tools/verify/splat_cases.cpp"
+#include "tools/verify/splat_cases.h"
 
 namespace semrover {
 namespace {

@@ -100,6 +100,22 @@ TEST(AtomicFile, a_place_that_cannot_hold_a_file_is_refused_before_anything_is_w
     EXPECT_TRUE(says(AtomicFile::create("/dev/full"), "a device"));
 }
 
+TEST(AtomicFile, what_a_killed_process_left_can_be_swept_away)
+{
+    ScratchFolder folder;
+    std::filesystem::create_directories(folder / "a" / "b");
+    folder.put("a/b/.semrover-17-0.tmp", "half");
+    folder.put("a/.semrover-17-1.tmp", "half");
+    folder.put("a/b/whole.tmp", "kept");
+    folder.put(".semrover-17-2.tmp", "elsewhere");
+    remove_temporary_files(folder / "a");
+    remove_temporary_files(folder / "missing");
+    for (const char* kept : {"a/b/whole.tmp", ".semrover-17-2.tmp"})
+        EXPECT_TRUE(std::filesystem::exists(folder / kept)) << kept;
+    for (const char* gone : {"a/b/.semrover-17-0.tmp", "a/.semrover-17-1.tmp"})
+        EXPECT_FALSE(std::filesystem::exists(folder / gone)) << gone;
+}
+
 TEST(AtomicFile, a_name_of_255_bytes_works)
 {
     const ScratchFolder folder;

@@ -5,6 +5,7 @@
 
 #include "engine/refine/frame_images.h"
 #include "engine/refine/latent_codec.h"
+#include "tests/frame_pixels_reference.h"
 #include "tests/kernel_case.h"
 
 #include <bit>

@@ -57,6 +57,30 @@ TEST(runtime_copies, a_copy_takes_its_place_among_what_is_submitted)
     EXPECT_DEATH((void)copies->copy(c.x, c.one.row_range(0, 3)), "20000 bytes copied to 12");
 }
 
+TEST(runtime_copies, what_is_freed_while_it_is_copied_is_freed_afterwards)
+{
+    constexpr uint32_t kWords = 1 << 22; // a copy takes longer than to free it
+    const auto copies = std::move(*CopyRing::create(test_device()));
+    const auto state_of = [](State& state) {
+        const Slot slot = state.slot(kWords, 1, DType::u32, "words", 1);
+        EXPECT_TRUE(state.allocate(test_device(), "words"));
+        return slot;
+    };
+    State kept;
+    const Slot to = state_of(kept);
+    for (uint32_t i = 1; i <= 5; ++i) {
+        const std::vector<uint32_t> numbers(kWords, i);
+        {
+            State from;
+            const Slot slot = state_of(from);
+            ASSERT_TRUE(slot.write(test_device(), numbers));
+            for (int k = 0; k < 3; ++k)
+                ASSERT_TRUE(copies->copy(slot, to));
+        }
+        EXPECT_TRUE(*to.read<uint32_t>(test_device()) == numbers);
+    }
+}
+
 TEST(runtime_copies, a_read_has_what_the_slot_held_then_and_comes_in_order)
 {
     Counter c;

@@ -40,7 +40,7 @@ uint32_t GridFilling::wanted_batch() const
 {
     if (settings_.batch)
         return settings_.batch;
-    return device_.limits().type == DeviceType::cpu ? 2 : 16; // enough rows to fill a GPU; a CPU gains nothing from more
+    return device_.limits().type == DeviceType::cpu ? 2 : 16; // GPUs want more rows at once; not measured
 }
 
 Result<uint64_t> GridFilling::bytes_of(uint32_t batch, uint32_t cells) const

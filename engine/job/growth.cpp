@@ -35,17 +35,6 @@ double cpu_seconds_now() // of all threads: what other programs do not change
     return double(std::clock()) / CLOCKS_PER_SEC;
 }
 
-// what a killed process was writing
-void remove_temporaries(const Path& folder)
-{
-    std::error_code ignored;
-    for (const auto& entry : fs::directory_iterator(folder, ignored)) {
-        const std::string name = entry.path().filename().string();
-        if (name.starts_with(".semrover-") && name.ends_with(".tmp"))
-            fs::remove(entry.path(), ignored);
-    }
-}
-
 class Growth : public Job {
   public:
     Growth(Device& device, GrowthPlan plan, const JobCallbacks& callbacks)
@@ -138,7 +127,7 @@ Status Growth::take_up()
     window_ = first_;
     if (first_ == 0)
         return clear_output();
-    remove_temporaries(plan_.request.output);
+    remove_temporary_files(plan_.request.output);
     const Path piece = piece_path(*run_, first_ - 1);
     if (!fs::exists(piece))
         return {}; // it goes when the tiles are written

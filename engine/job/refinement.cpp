@@ -44,9 +44,9 @@ uint64_t largest_read(const Refinement& r)
 struct BufferDrawing {
     SurfelScene scene;
     PathDrawing drawing;
-    std::unique_ptr<CopyRing> copies;
     State state;
-    std::map<std::string, Slot> seen;       // SplatPixelSlots::seen of each camera's last frame
+    std::map<std::string, Slot> seen; // SplatPixelSlots::seen of each camera's last frame
+    std::unique_ptr<CopyRing> copies;
     std::map<std::string, uint32_t> counts; // frames so far, per camera
     std::vector<std::string> first_moment;  // its cameras, and what they see
     std::vector<std::pair<std::string, ImageGray16>> first_depths;
@@ -155,7 +155,9 @@ class RefinementJob : public Job {
             SR_CHECK(try_to_refine_while_drawing());
         if (!refiner_)
             say_drawn(last);
-        return last ? end_drawing() : Status{};
+        if (last)
+            end_drawing();
+        return {};
     }
     Status take(const CameraFrame& frame, const SplatPixelSlots& slots)
     {
@@ -167,22 +169,25 @@ class RefinementJob : public Job {
             drawing_->first_moment.push_back(camera);
         const ImageSize size{frame.intrinsics.width, frame.intrinsics.height};
         const uint32_t number = drawing_->counts[camera]++;
-        return out_->read(slots, size, [this, camera, number](FramePixels pixels) {
+        return out_->read(slots, size, [this, camera, number](FramePixels pixels) -> Status {
             const ImageGray16 depth{pixels.width, pixels.height, depth_pixels(pixels)};
             if (refiner_)
                 refiner_->give_depth(camera, depth);
             else if (drawing_ && number == 0)
                 drawing_->first_depths.emplace_back(camera, depth);
-            return out_->write([folder = camera_folder(run_.path() / "buffers", camera), number,
-                                pixels = std::move(pixels)] { return write_frame_images(folder, number, pixels); });
+            SR_CHECK(out_->write([folder = camera_folder(run_.path() / "buffers", camera), number,
+                                  pixels = std::move(pixels)] { return write_frame_images(folder, number, pixels); }));
+            const size_t total = r_.options.path->frames.size();
+            if (++drawn_frames_ < total)
+                return {};
+            return out_->write([this, total] { return run_.append({{"rendered", total}}); });
         });
     }
-    Status end_drawing()
+    void end_drawing()
     {
         drawn_ = true;
         if (!refiner_)
             drawing_.reset(); // else it stays as it was planned
-        return out_->write([this] { return run_.append({{"rendered", r_.options.path->frames.size()}}); });
     }
     void say_drawn(bool ended)
     {
@@ -297,6 +302,7 @@ class RefinementJob : public Job {
     std::unique_ptr<BufferDrawing> drawing_; // while there is something to draw
     bool drawn_ = false, refined_ = false;   // all of it
     bool said_drawn_ = false;
+    size_t drawn_frames_ = 0;   // that arrived
     HostBytes host_bytes_;      // of the device, before this job
     uint64_t render_bytes_ = 0; // device memory at most while buffers were rendered
 

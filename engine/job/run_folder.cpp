@@ -60,6 +60,9 @@ Result<RunFolder> RunFolder::open(const Path& folder, const Json& settings, bool
     } else {
         SR_CHECK(run.start(settings));
     }
+    for (const auto* names : {&contents.pieces, &contents.results})
+        for (const std::string& name : *names)
+            remove_temporary_files(folder / name);
     const Path journal = folder / "journal.jsonl";
     run.journal_ = ::open(journal.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, 0644);
     if (run.journal_ < 0)

@@ -238,12 +238,8 @@ uint64_t AsdRenderer::key_of(const AsdStart& start) const
 {
     Hash hash;
     const auto add = [&](const auto& values) { hash.add(std::as_bytes(std::span(values))); };
-    for (const PlanRow& row : plan_.rows) {
-        const StepRow values = step_row(row);
-        add(std::span(&values, 1));
-    }
-    add(plan_.timesteps);
-    const double settings[] = {plan_.init_noise_sigma, plan_.clip, options_.guidance_scale, options_.previous_noise};
+    add_plan(hash, plan_);
+    const float settings[] = {options_.guidance_scale, options_.previous_noise};
     add(settings);
     const uint64_t what[] = {options_.seed, start.number, start.chain, start.first};
     add(what);

@@ -7,26 +7,19 @@
 
 namespace semrover {
 
-// A splat image as files. color: sRGB, over a background where the splats leave room; depth: 16-bit millimetres along
-// z, or from the camera where Lens::radial_depth says so, 0 for nothing; normal: camera frame, 128 + 127 n; label:
-// class number, 255 for nothing; visible: 0 or 255.
-std::vector<uint8_t> color_pixels(const SplatImage& image,
-                                  const std::array<uint8_t, 3>& background); // [height, width, 3]
-std::vector<uint16_t> depth_pixels(const SplatImage& image);                 // [height, width]
-std::vector<uint8_t> normal_pixels(const SplatImage& image);                 // [height, width, 3]
-std::vector<uint8_t> label_pixels(const SplatImage& image);                  // [height, width]
-std::vector<uint8_t> visible_pixels(const SplatImage& image);                // [height, width]
-
-// the same as the device makes it of a splat image: PixelWords (kernels/picture.h)
+// What splats look like in files, as the device makes it: PixelWords (kernels/picture.h). color: sRGB, over a
+// background where the splats leave room; depth: 16-bit millimetres along z, or from the camera where
+// Lens::radial_depth says so, 0 for nothing; normal: camera frame, 128 + 127 n; label: class number, 255 for nothing;
+// visible: 0 or 255.
 struct FramePixels {
     uint32_t width = 0, height = 0;
     std::vector<uint32_t> seen, ranges, normals;
 };
-std::vector<uint8_t> color_pixels(const FramePixels& pixels);
-std::vector<uint16_t> depth_pixels(const FramePixels& pixels);
-std::vector<uint8_t> normal_pixels(const FramePixels& pixels);
-std::vector<uint8_t> label_pixels(const FramePixels& pixels);
-std::vector<uint8_t> visible_pixels(const FramePixels& pixels);
+std::vector<uint8_t> color_pixels(const FramePixels& pixels);   // [height, width, 3]
+std::vector<uint16_t> depth_pixels(const FramePixels& pixels);  // [height, width]
+std::vector<uint8_t> normal_pixels(const FramePixels& pixels);  // [height, width, 3]
+std::vector<uint8_t> label_pixels(const FramePixels& pixels);   // [height, width]
+std::vector<uint8_t> visible_pixels(const FramePixels& pixels); // [height, width]
 
 // FOLDER/{color,depth,normal,label,visible}/NNNNNN.png; folders are made. Errors: bad_input
 Status write_frame_images(const Path& folder, uint32_t number, const FramePixels& pixels);

@@ -154,6 +154,7 @@ Result<std::vector<float>> LatentCodec::encode(std::span<const float> image)
     SR_ASSERT(ends_->encodes() && image.size() == size_t(p.width) * p.height * channels, "{} numbers to encode",
               image.size());
     std::vector<float> continued;
+    continued.reserve(size_t(p.padded_width) * p.padded_height * channels);
     for (uint32_t y = 0; y < p.padded_height; ++y)
         for (uint32_t x = 0; x < p.padded_width; ++x) {
             const size_t from = size_t(std::min(y, p.height - 1)) * p.width + std::min(x, p.width - 1);
@@ -219,14 +220,6 @@ std::vector<uint8_t> pixels_of_floats(std::span<const float> values)
 tl::unexpected<Error> not_finite(float value, size_t element, std::string_view what)
 {
     return fail(ErrorCode::internal, "{} holds {} at element {}: overflow; try --precision fp32", what, value, element);
-}
-
-Status check_finite(std::span<const float> values, std::string_view what)
-{
-    for (size_t i = 0; i < values.size(); ++i)
-        if (!std::isfinite(values[i]))
-            return not_finite(values[i], i, what);
-    return {};
 }
 
 } // namespace semrover

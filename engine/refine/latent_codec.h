@@ -71,8 +71,7 @@ class LatentCodec {
 std::vector<float> floats_of_pixels(std::span<const uint8_t> pixels); // 0..255 -> -1..1
 std::vector<uint8_t> pixels_of_floats(std::span<const float> values); // rounded, cut to 0..255
 
-// internal, with the index and the value, when one is NaN or infinite
-Status check_finite(std::span<const float> values, std::string_view what);
-tl::unexpected<Error> not_finite(float value, size_t element, std::string_view what); // that error
+// internal: a number that is NaN or infinite, and its index
+tl::unexpected<Error> not_finite(float value, size_t element, std::string_view what);
 
 } // namespace semrover

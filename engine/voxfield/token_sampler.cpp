@@ -252,13 +252,8 @@ uint64_t TokenSampler::key_of(std::span<const RegionInput> regions) const
 {
     Hash hash;
     const auto add = [&](const auto& values) { hash.add(std::as_bytes(std::span(values))); };
-    for (const PlanRow& row : plan_.rows) {
-        const StepRow values = step_row(row);
-        add(std::span(&values, 1));
-    }
-    add(plan_.timesteps);
-    const double settings[] = {plan_.init_noise_sigma, plan_.clip, double(plan_.known), options_.guidance_scale};
-    add(settings);
+    add_plan(hash, plan_);
+    add(std::span(&options_.guidance_scale, 1));
     add(std::span(&options_.seed, 1));
     for (const RegionInput& r : regions) {
         add(r.cells);

@@ -246,6 +246,16 @@ Status write_file_atomically(const Path& path, std::string_view text)
     return write_file_atomically(path, std::as_bytes(std::span(text.data(), text.size())));
 }
 
+void remove_temporary_files(const Path& folder)
+{
+    std::error_code error;
+    for (std::filesystem::recursive_directory_iterator i(folder, error), end; !error && i != end; i.increment(error)) {
+        const std::string name = i->path().filename().string();
+        if (name.starts_with(".semrover-") && name.ends_with(".tmp"))
+            ::unlink(i->path().c_str());
+    }
+}
+
 Result<MappedFile> MappedFile::open(const Path& path)
 {
     SR_TRY(const OpenFile file, open_regular(path));

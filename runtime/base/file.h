@@ -60,6 +60,9 @@ class AtomicFile {
 Status write_file_atomically(const Path& path, std::span<const std::byte> bytes);
 Status write_file_atomically(const Path& path, std::string_view text);
 
+// below `folder`: what processes that were killed were writing. For folders in which nobody else writes meanwhile
+void remove_temporary_files(const Path& folder);
+
 // a regular file mapped for reading. Its length is fixed when it is opened.
 // note: another process that truncates the file makes an access past the new end raise SIGBUS, so files are mapped
 // only from storage that others do not write to; replace a file by renaming, as AtomicFile does.

@@ -8,7 +8,7 @@
 namespace semrover {
 
 // Copies that nobody waits for, each in its place in the queue: after everything submitted before it, before everything
-// that follows. What is copied must live until the device has done it.
+// that follows. A buffer that is freed meanwhile waits for it.
 class CopyRing {
   public:
     static Result<std::unique_ptr<CopyRing>> create(Device& device, size_t count = 8);

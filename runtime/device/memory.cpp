@@ -71,6 +71,8 @@ Result<std::unique_ptr<Buffer>> Buffer::create(Device& device, uint64_t bytes, M
 
 Buffer::~Buffer()
 {
+    if (memory_)
+        (void)device_.wait(device_.last_ticket()); // commands in flight may use it; a lost device is told elsewhere
     if (buffer_)
         vkDestroyBuffer(device_.handle(), buffer_, nullptr);
     if (memory_)

@@ -18,7 +18,7 @@ enum class MemoryKind : uint8_t { device, staging };
 // one VkBuffer with memory of its own; usable as storage, texel buffer, and transfer source and target
 class Buffer {
   public:
-    ~Buffer();
+    ~Buffer(); // after everything submitted so far
     Buffer(const Buffer&) = delete;
     Buffer& operator=(const Buffer&) = delete;
 

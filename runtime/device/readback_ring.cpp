@@ -15,12 +15,6 @@ Result<std::unique_ptr<ReadbackRing>> ReadbackRing::create(Device& device, uint6
     return r;
 }
 
-// what was dropped may still be on its way
-ReadbackRing::~ReadbackRing()
-{
-    copies_.reset();
-}
-
 uint64_t ReadbackRing::planned_bytes(const DeviceLimits& limits, uint64_t bytes, size_t count)
 {
     return count * round_up64(std::max<uint64_t>(bytes, 1), limits.offset_alignment);

@@ -17,7 +17,6 @@ class ReadbackRing {
 
     // `count` reads of `bytes` each are under way at a time at most
     static Result<std::unique_ptr<ReadbackRing>> create(Device& device, uint64_t bytes, size_t count = 3);
-    ~ReadbackRing();
     static uint64_t planned_bytes(const DeviceLimits& limits, uint64_t bytes, size_t count = 3);
 
     // as the slot is after everything submitted so far; waits for the oldest read if there is no room

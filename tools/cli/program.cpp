@@ -88,8 +88,10 @@ Status run_neighbour(const Command& command, char** argv)
     Path program = std::filesystem::read_symlink("/proc/self/exe", error);
     program.replace_filename(command.program);
     execv(program.c_str(), argv);
-    return fail(ErrorCode::bad_input, "{} is part of {}, which cannot be started: {}", command.name,
-                quote_path(program), std::strerror(errno));
+    return fail(
+        ErrorCode::bad_input,
+        "{} is run by {}, which cannot be started ({}): cmake --build --preset release --target programs builds it",
+        command.name, quote_path(program), std::strerror(errno));
 }
 
 void add_neighbour(CLI::App& app, const Command& command, char** argv, Run& run)

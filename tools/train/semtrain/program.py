@@ -16,7 +16,7 @@ def semrover_path():
     path = engine_path()
     if not os.access(path, os.X_OK):
         raise SystemExit(f"{path} is not there: build it (cmake --preset release && cmake --build --preset release "
-                         "--target semrover), or name one in $SEMROVER")
+                         "--target programs), or name one in $SEMROVER")
     return path
 
 
