@@ -3,8 +3,8 @@
 // the C interface over the engine: copies structures within their sizes, turns errors and exceptions into statuses
 #include "engine/semrover.h"
 
-#include "runtime/device.h"
-#include "runtime/physical_device.h"
+#include "runtime/device/device.h"
+#include "runtime/device/physical_device.h"
 
 #include <algorithm>
 #include <cstring>

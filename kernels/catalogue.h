@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "runtime/kernel.h"
+#include "runtime/graph/kernel.h"
 
 namespace semrover {
 

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "kernels/kernels.h"
+#include "kernels/sort.h"
 
-// Ops that fuse depth images and take surfaces out of what they make, as those in kernels.h
+// Ops that fuse depth images and take surfaces out of what they make, as those of kernels/network.h
 namespace semrover {
 
 // A truncated signed distance in blocks of 8 x 8 x 8 voxels of a box. Blocks are numbered x fastest; those that exist

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "kernels/kernels.h"
+#include "kernels/network.h"
 
-// Ops of networks that recognise what is in images and point clouds, as those in kernels.h
+// Ops of networks that recognise what is in images and point clouds, as those of kernels/network.h
 namespace semrover {
 
 // -- images ----------------------------------------------------------------------------------------------------------

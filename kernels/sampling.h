@@ -2,9 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "kernels/kernels.h"
+#include "runtime/graph/graph.h"
 
-// Ops of a sampling step, as those in kernels.h: one table of steps, one clock, the same commands for every step
+// Ops of a sampling step, as those of kernels/network.h: one table of steps, one clock, the same commands for every
+// step
 namespace semrover {
 
 // the state x, predictions and noise are fp32 matrices [M, N] with equal row lengths

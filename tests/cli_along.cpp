@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/scene/tiles.h"
-#include "runtime/hash.h"
-#include "runtime/json.h"
-#include "runtime/safetensors.h"
+#include "runtime/base/hash.h"
+#include "runtime/base/json.h"
+#include "runtime/base/safetensors.h"
 #include "tests/child_program.h"
 #include "tests/program.h"
 

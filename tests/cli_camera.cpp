@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/scene/camera_path.h"
-#include "engine/scene/image.h"
+#include "engine/format/camera_path.h"
+#include "engine/format/image.h"
 #include "tests/program.h"
 
 #include <gtest/gtest.h>

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+#include "engine/format/image.h"
 #include "engine/scene/grid.h"
-#include "engine/scene/image.h"
 #include "tests/program.h"
 #include "tests/zip_bytes.h"
 

@@ -16,7 +16,7 @@ using Json = nlohmann::json;
 TEST(Catalogue, has_every_op_of_the_shaders_once)
 {
     std::set<std::string> ops;
-    for (const auto& entry : std::filesystem::directory_iterator(SEMROVER_SOURCE_DIR "/shaders")) {
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(SEMROVER_SOURCE_DIR "/shaders")) {
         const std::string file = entry.path().filename().string();
         if (entry.path().extension() == ".comp")
             ops.insert(file.substr(0, file.find('.')));

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+#include "engine/format/image.h"
 #include "engine/scene/grid.h"
-#include "engine/scene/image.h"
 #include "tests/inception_reference.h"
 #include "tests/pointnet_files.h"
 #include "tests/program.h"

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/scene/camera_path.h"
-#include "engine/scene/image.h"
-#include "runtime/json.h"
+#include "engine/format/camera_path.h"
+#include "engine/format/image.h"
+#include "runtime/base/json.h"
 #include "tests/program.h"
 
 #include <algorithm>

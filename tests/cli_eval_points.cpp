@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/scene/grid.h"
-#include "runtime/dtype.h"
-#include "runtime/json.h"
+#include "runtime/base/dtype.h"
+#include "runtime/base/json.h"
 #include "tests/program.h"
 
 #include <algorithm>

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/scene/grid.h"
-#include "runtime/safetensors.h"
+#include "runtime/base/safetensors.h"
 #include "tests/child_program.h"
 #include "tests/program.h"
 

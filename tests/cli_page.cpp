@@ -1,12 +1,12 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // what `semrover page` writes: one file with everything in it, whatever the inputs say
-#include "engine/page/page.h"
-#include "engine/page/page_text.h"
 #include "engine/scene/palette.h"
-#include "runtime/dtype.h"
+#include "runtime/base/dtype.h"
 #include "tests/page_inputs.h"
 #include "tests/program.h"
+#include "tools/page/page.h"
+#include "tools/page/page_text.h"
 
 #include <algorithm>
 #include <cstring>

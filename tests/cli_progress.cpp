@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/progress.h"
+#include "tools/cli/progress.h"
 
 // note: the program's own files are in no library that a test could link
-#include "tools/progress.cpp"
+#include "tools/cli/progress.cpp"
 
 #include <gtest/gtest.h>
 #include <sstream>

@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+#include "engine/format/camera_path.h"
+#include "engine/format/image.h"
 #include "engine/mesh/mesh_files.h"
-#include "engine/scene/camera_path.h"
 #include "engine/scene/grid.h"
-#include "engine/scene/image.h"
-#include "runtime/json.h"
+#include "runtime/base/json.h"
 #include "tests/program.h"
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/safetensors.h"
+#include "runtime/base/safetensors.h"
 #include "tests/program.h"
 
 #include <algorithm>
@@ -69,16 +69,22 @@ TEST(CliVerify, parameters_of_the_wrong_type_fail_their_case_only)
     EXPECT_TRUE(result.out.starts_with("FAIL scheduler typed ")) << result.out;
 }
 
-TEST(CliVerify, a_kind_without_a_runner_is_listed_and_fails_nothing)
+TEST(CliVerify, a_kind_without_a_runner_is_skipped_and_said_in_summary_and_exit_code)
 {
-    const ProgramResult result =
-        semrover_program("verify --json " + kGolden + "/vae_temporal_tiny " + kGolden + "/regions_paper");
+    const std::string cases = kGolden + "/vae_temporal_tiny " + kGolden + "/regions_paper";
+    const ProgramResult result = semrover_program("verify --json --allow-skip " + cases);
     EXPECT_EQ(result.code, 0) << result.err;
     const auto report = nlohmann::json::parse(result.out);
     EXPECT_EQ(report["passed"], 1);
     EXPECT_EQ(report["skipped"], 1);
     EXPECT_EQ(report["cases"][0]["outcome"], "SKIP");
     EXPECT_EQ(report["cases"][1]["kind"], "region_extraction");
+
+    const ProgramResult strict = semrover_program("verify " + cases);
+    EXPECT_EQ(strict.code, 7) << strict.err;
+    EXPECT_TRUE(strict.out.ends_with("1 passed, 0 failed, 1 skipped\n")) << strict.out;
+    EXPECT_NE(strict.err.find("1 of 2 cases were skipped"), std::string::npos) << strict.err;
+    EXPECT_EQ(semrover_program("verify " + kGolden + "/regions_paper").code, 0);
 }
 
 TEST(CliVerify, a_folder_without_cases_is_refused)

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/scene/grid.h"
-#include "runtime/json.h"
+#include "runtime/base/json.h"
 #include "tests/program.h"
 
 #include <gtest/gtest.h>

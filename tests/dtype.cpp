@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/dtype.h"
+#include "runtime/base/dtype.h"
 
 #include <cmath>
 #include <cstring>

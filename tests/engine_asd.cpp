@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/render/asd.h"
-#include "engine/render/memory_plan.h"
-#include "runtime/json.h"
+#include "engine/refine/asd.h"
+#include "engine/refine/memory_plan.h"
+#include "runtime/base/json.h"
 
 #include <cmath>
 #include <gtest/gtest.h>

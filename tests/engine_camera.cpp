@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/scene/camera_path.h"
-#include "engine/scene/lens.h"
-#include "engine/scene/rig.h"
+#include "engine/camera/lens.h"
+#include "engine/camera/rig.h"
+#include "engine/format/camera_path.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/scene/camera_path.h"
-#include "engine/scene/lens.h"
+#include "engine/camera/lens.h"
+#include "engine/format/camera_path.h"
 #include "engine/splat/rasterizer.h"
 #include "tests/kernel_case.h"
 #include "tests/scratch_folder.h"

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/render/checkpoint.h"
-#include "engine/render/ldm_config.h"
+#include "engine/model/checkpoint.h"
+#include "engine/model/ldm_config.h"
 #include "tests/renderer_weights.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"

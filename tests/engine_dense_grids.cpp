@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // SemanticKITTI's files by hand from its README, Occ3D's by numpy 1.24.2 (tests/data/numpy)
-#include "engine/scene/dense_labels.h"
-#include "engine/scene/occ3d.h"
-#include "engine/scene/semantic_kitti.h"
+#include "engine/format/dense_labels.h"
+#include "engine/format/occ3d.h"
+#include "engine/format/semantic_kitti.h"
 
 #include "tests/says.h"
 #include "tests/scratch_folder.h"

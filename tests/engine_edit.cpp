@@ -4,9 +4,9 @@
 #include "engine/scene/edit_script.h"
 #include "engine/scene/edit_undo.h"
 #include "engine/scene/stamp.h"
-#include "runtime/dtype.h"
-#include "runtime/hash.h"
-#include "runtime/safetensors.h"
+#include "runtime/base/dtype.h"
+#include "runtime/base/hash.h"
+#include "runtime/base/safetensors.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
 

@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/eval/frechet.h"
-#include "engine/eval/kernel_distance.h"
-#include "runtime/safetensors.h"
+#include "runtime/base/safetensors.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
+#include "tools/eval/frechet.h"
+#include "tools/eval/kernel_distance.h"
 
 #include <cmath>
 #include <numeric>

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/eval/flicker.h"
+#include "tools/eval/flicker.h"
 
 #include <cmath>
 #include <gtest/gtest.h>

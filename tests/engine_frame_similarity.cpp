@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/eval/frame_similarity.h"
+#include "tools/eval/frame_similarity.h"
 
 #include <algorithm>
 #include <cmath>

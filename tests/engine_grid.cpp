@@ -3,8 +3,8 @@
 #include "engine/scene/grid.h"
 
 #include "engine/scene/palette.h"
-#include "runtime/dtype.h"
-#include "runtime/safetensors.h"
+#include "runtime/base/dtype.h"
+#include "runtime/base/safetensors.h"
 #include "tests/grid_case.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"

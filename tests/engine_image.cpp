@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/scene/image.h"
+#include "engine/format/image.h"
 
 #include "tests/says.h"
 #include "tests/scratch_folder.h"

@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/eval/inception.h"
 #include "tests/inception_reference.h"
 #include "tests/kernel_case.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
+#include "tools/eval/inception.h"
 
 namespace semrover {
 namespace {

@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/scene/labelled_points.h"
+#include "engine/format/labelled_points.h"
 
+#include "engine/format/ply_reader.h"
 #include "engine/scene/palette.h"
-#include "engine/scene/ply_reader.h"
-#include "runtime/dtype.h"
+#include "runtime/base/dtype.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
 

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/scene/lens.h"
+#include "engine/camera/lens.h"
 #include "tests/says.h"
 
 #include <cmath>

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/eval/local_contrast.h"
-#include "runtime/dtype.h"
+#include "runtime/base/dtype.h"
+#include "tools/eval/local_contrast.h"
 
 #include <algorithm>
 #include <cmath>

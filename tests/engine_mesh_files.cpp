@@ -358,7 +358,8 @@ TEST(MeshFiles, labels_come_from_names_maps_and_faces)
     EXPECT_EQ(class_of_material("trainers"), std::nullopt);
     EXPECT_EQ(class_of_material(""), std::nullopt);
     const ScratchFolder folder;
-    const auto map = MeshLabelMap::read(folder.put("map.json", R"({"glass*": "building", "glass door": 3, "*tree*": 8})"));
+    const auto map =
+        MeshLabelMap::read(folder.put("map.json", R"({"glass*": "building", "glass door": 3, "*tree*": 8})"));
     ASSERT_TRUE(map) << map.error().message;
     Mesh m = two_faces();
     m.faces.push_back({1, 2, 3});

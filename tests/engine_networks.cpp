@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/render/unet.h"
-#include "engine/render/vae.h"
+#include "engine/network/unet.h"
+#include "engine/network/vae.h"
 #include "tests/feature_map_case.h"
 
 #include <cmath>

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // files by numpy 1.24.2 (tests/data/numpy), and by hand from the formats' specifications
-#include "engine/scene/grid_npz.h"
-#include "engine/scene/npz.h"
+#include "engine/format/grid_npz.h"
+#include "engine/format/npz.h"
 
 #include "tests/grid_case.h"
 #include "tests/says.h"

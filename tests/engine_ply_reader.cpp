@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // files written by hand from Greg Turk's description of the format
-#include "engine/scene/ply.h"
-#include "engine/scene/ply_reader.h"
+#include "engine/format/ply.h"
+#include "engine/format/ply_reader.h"
 
 #include "tests/says.h"
 #include "tests/scratch_folder.h"

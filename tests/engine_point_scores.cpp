@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/eval/point_scores.h"
 #include "engine/mesh/nearest_points.h"
 #include "tests/kernel_case.h"
 #include "tests/says.h"
+#include "tools/eval/point_scores.h"
 
 #include <algorithm>
 #include <cmath>

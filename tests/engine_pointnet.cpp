@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/eval/pointnet.h"
 #include "tests/kernel_case.h"
 #include "tests/pointnet_files.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
+#include "tools/eval/pointnet.h"
 
 #include <algorithm>
 #include <set>

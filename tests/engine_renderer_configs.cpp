@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/render/random_weights.h"
-#include "engine/render/unet_config.h"
-#include "engine/render/vae_config.h"
-#include "runtime/json.h"
+#include "engine/model/random_weights.h"
+#include "engine/model/unet_config.h"
+#include "engine/model/vae_config.h"
+#include "runtime/base/json.h"
 #include "tests/says.h"
 
 #include <map>

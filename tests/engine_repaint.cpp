@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/diffusion/repaint.h"
+#include "engine/sampling/repaint.h"
 #include "tests/golden_tensors.h"
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/diffusion/schedule.h"
+#include "engine/sampling/schedule.h"
 #include "tests/golden_tensors.h"
 
 #include <algorithm>

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/mesh/voxelizer.h"
-#include "engine/streets/seen_cells.h"
 #include "tests/kernel_case.h"
+#include "tools/streets/seen_cells.h"
 
 #include <gtest/gtest.h>
 

@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/splat/golden.h"
 #include "tests/golden_tensors.h"
 #include "tests/splat_case.h"
+#include "tools/verify/splat_cases.h"
+#include "tools/verify/splat_cases.cpp"
 
 namespace semrover {
 namespace {

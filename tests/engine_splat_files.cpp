@@ -1,12 +1,12 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // splats of .ply, .glb and .splat files: written by hand from the formats' descriptions, and by this program
-#include "engine/scene/gltf_splats.h"
-#include "engine/scene/ply_reader.h"
-#include "engine/scene/rigid.h"
-#include "engine/scene/splat_file.h"
+#include "engine/camera/rigid.h"
+#include "engine/format/gltf_splats.h"
+#include "engine/format/ply_reader.h"
+#include "engine/format/splat_file.h"
 
-#include "runtime/json.h"
+#include "runtime/base/json.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
 #include "tests/zip_bytes.h"

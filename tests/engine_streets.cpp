@@ -1,12 +1,12 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/scene/palette.h"
-#include "engine/streets/camera_drive.h"
-#include "engine/streets/class_label.h"
-#include "engine/streets/road_surface.h"
-#include "engine/streets/street.h"
-#include "engine/streets/vehicle.h"
-#include "runtime/hash.h"
+#include "runtime/base/hash.h"
+#include "tools/streets/camera_drive.h"
+#include "tools/streets/class_label.h"
+#include "tools/streets/road_surface.h"
+#include "tools/streets/street.h"
+#include "tools/streets/vehicle.h"
 
 #include <algorithm>
 #include <functional>

@@ -4,7 +4,7 @@
 
 #include "engine/scene/cell_reach.h"
 #include "engine/voxfield/outpaint.h"
-#include "runtime/dtype.h"
+#include "runtime/base/dtype.h"
 
 #include <algorithm>
 #include <gtest/gtest.h>

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/scene/path_windows.h"
 #include "engine/scene/tile_cache.h"
-#include "runtime/dtype.h"
-#include "runtime/json.h"
+#include "runtime/base/dtype.h"
+#include "runtime/base/json.h"
 #include "tests/grid_case.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"

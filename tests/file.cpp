@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/file.h"
+#include "runtime/base/file.h"
 
-#include "runtime/quote.h"
+#include "runtime/base/quote.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
 

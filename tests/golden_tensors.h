@@ -14,7 +14,7 @@
 namespace semrover {
 
 // a golden case as stored: its params and its tensors by name. For trusted files only; the product reads safetensors
-// with runtime/safetensors.h, which this leaves out so that a fault there cannot hide one here.
+// with runtime/base/safetensors.h, which this leaves out so that a fault there cannot hide one here.
 struct GoldenTensors {
     nlohmann::json params;
     nlohmann::json header;

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "kernels/kernels.h"
-#include "runtime/plan.h"
+#include "kernels/network.h"
+#include "runtime/graph/plan.h"
 
 // what graph tests need when there is no device: limits, and external memory that nobody dereferences
 namespace semrover {

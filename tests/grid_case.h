@@ -3,7 +3,7 @@
 #pragma once
 
 #include "engine/scene/grid.h"
-#include "runtime/dtype.h"
+#include "runtime/base/dtype.h"
 
 #include <gtest/gtest.h>
 

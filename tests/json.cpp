@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/json.h"
+#include "runtime/base/json.h"
 
 #include "tests/says.h"
 #include "tests/scratch_folder.h"

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "kernels/kernels.h"
-#include "runtime/program.h"
+#include "kernels/network.h"
+#include "runtime/device/program.h"
 
 #include <cstring>
 #include <gtest/gtest.h>

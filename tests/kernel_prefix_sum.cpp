@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+#include "kernels/sort.h"
 #include "tests/kernel_case.h"
 
 namespace semrover {

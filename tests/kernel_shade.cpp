@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/trace/trace_scene.h"
-#include "kernels/tracing.h"
+#include "kernels/trace.h"
 #include "tests/kernel_case.h"
+#include "tools/trace/trace_scene.h"
 
 #include <bit>
 #include <cmath>

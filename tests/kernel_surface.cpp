@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/mesh/triangle_tree.h"
-#include "kernels/meshes.h"
+#include "kernels/mesh.h"
 #include "tests/clip_reference.h"
 #include "tests/kernel_case.h"
 #include "tests/philox_reference.h"

@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/format/image.h"
 #include "engine/scene/grid.h"
-#include "engine/scene/image.h"
-#include "runtime/dtype.h"
-#include "runtime/json.h"
+#include "runtime/base/dtype.h"
+#include "runtime/base/json.h"
 #include "tests/program.h"
 
 #include <gtest/gtest.h>

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/eval/pointnet_config.h"
-#include "runtime/json.h"
+#include "runtime/base/json.h"
 #include "tests/state_dict.h"
+#include "tools/eval/pointnet_config.h"
 
 #include <fstream>
 

@@ -2,32 +2,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "tests/scratch_folder.h"
+#include "tests/program_result.h"
 
 #include <algorithm>
-#include <cstdlib>
 #include <gtest/gtest.h>
 #include <string>
 #include <string_view>
-#include <sys/wait.h>
 
 namespace semrover {
-
-struct ProgramResult {
-    int code; // exit status, 128 + signal when killed
-    std::string out, err;
-};
 
 // runs `semrover ARGUMENTS` (a line for the shell) and waits
 inline ProgramResult semrover_program(const std::string& arguments)
 {
-    const ScratchFolder folder;
-    std::string line = SEMROVER_BINARY;
-    line.append(" </dev/null >").append(folder / "out").append(" 2>").append(folder / "err");
-    line.append(" ").append(arguments); // last, so that they may redirect
-    const int status = std::system(line.c_str());
-    const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-    return {code, contents(folder / "out"), contents(folder / "err")};
+    return run_program_line(SEMROVER_BINARY, arguments);
 }
 
 // an error of the program: its code, one line that says the text, and nothing else

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "kernels/kernels.h"
+#include "kernels/network.h"
 
 #include <functional>
 #include <random>

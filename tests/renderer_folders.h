@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/scene/image.h"
-#include "runtime/safetensors.h"
+#include "engine/format/image.h"
+#include "runtime/base/safetensors.h"
 #include "tests/scratch_folder.h"
 
 #include <gtest/gtest.h>

@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "kernels/kernels.h"
-#include "runtime/device.h"
-#include "runtime/pipeline.h"
-#include "runtime/profile.h"
-#include "runtime/program.h"
+#include "kernels/network.h"
+#include "runtime/device/device.h"
+#include "runtime/device/pipeline.h"
+#include "runtime/device/profile.h"
+#include "runtime/device/program.h"
 #include "tests/host_vulkan.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"

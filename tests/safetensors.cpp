@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/safetensors.h"
+#include "runtime/base/safetensors.h"
 
 #include "tests/safetensors_bytes.h"
 #include "tests/says.h"

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // what the reader must refuse, each with its own words; the list is that of the faults found in other readers
-#include "runtime/safetensors.h"
+#include "runtime/base/safetensors.h"
 #include "tests/safetensors_bytes.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"

@@ -4,7 +4,7 @@
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
 
-#include "runtime/safetensors.h"
+#include "runtime/base/safetensors.h"
 
 #include <gtest/gtest.h>
 

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "kernels/splat.h"
 #include "tests/kernel_case.h"
 #include "tests/splat_lens_reference.h"
 

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/scene/lens.h"
+#include "engine/camera/lens.h"
 #include "tests/splat_reference.h"
 
 // the splat rasteriser of cameras with lenses in double, every splat against the ray of every pixel, after

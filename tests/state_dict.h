@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "runtime/safetensors.h"
+#include "runtime/base/safetensors.h"
 
 #include <cmath>
 #include <gtest/gtest.h>

@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/buffer_folder.h"
 
-#include "engine/scene/camera_path.h"
+#include "engine/format/camera_path.h"
 #include "engine/scene/palette.h"
-#include "runtime/hash.h"
-#include "runtime/quote.h"
+#include "runtime/base/hash.h"
+#include "runtime/base/quote.h"
 
 #include <algorithm>
 #include <map>

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/scene/camera.h"
-#include "engine/scene/image.h"
+#include "engine/camera/camera.h"
+#include "engine/format/image.h"
 
 #include <string>
 

@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/convert_model.h"
 
-#include "engine/render/model_writer.h"
-#include "engine/render/renderer_model.h"
-#include "runtime/quote.h"
-#include "tools/progress.h"
+#include "engine/model/model_writer.h"
+#include "engine/model/renderer_model.h"
+#include "runtime/base/quote.h"
+#include "tools/cli/progress.h"
 
 #include <algorithm>
 #include <optional>

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "tools/commands.h"
+#include "tools/cli/commands.h"
 
 namespace semrover {
 

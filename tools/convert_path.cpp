@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/convert_path.h"
 
-#include "engine/scene/camera_path.h"
-#include "engine/scene/camera_text.h"
-#include "engine/scene/rig.h"
-#include "runtime/json.h"
-#include "runtime/quote.h"
+#include "engine/camera/rig.h"
+#include "engine/format/camera_path.h"
+#include "engine/format/camera_text.h"
+#include "runtime/base/json.h"
+#include "runtime/base/quote.h"
 
 #include <algorithm>
 #include <CLI/CLI.hpp>

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "runtime/file.h"
-#include "tools/commands.h"
-#include "tools/lens_options.h"
+#include "runtime/base/file.h"
+#include "tools/cli/commands.h"
+#include "tools/cli/lens_options.h"
 
 namespace semrover {
 

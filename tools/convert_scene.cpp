@@ -4,8 +4,8 @@
 
 #include "engine/scene/palette.h"
 #include "engine/splat/blocks.h"
-#include "runtime/quote.h"
-#include "tools/open_device.h"
+#include "runtime/base/quote.h"
+#include "tools/cli/open_device.h"
 #include "tools/path_renderer.h"
 
 namespace semrover {

@@ -5,11 +5,11 @@
 #include "engine/scene/edit_script.h"
 #include "engine/scene/edit_undo.h"
 #include "engine/scene/stamp.h"
-#include "runtime/hash.h"
-#include "runtime/quote.h"
-#include "tools/commands.h"
+#include "runtime/base/hash.h"
+#include "runtime/base/quote.h"
+#include "tools/cli/commands.h"
+#include "tools/cli/version.h"
 #include "tools/regeneration.h"
-#include "tools/version.h"
 
 #include <algorithm>
 #include <CLI/CLI.hpp>

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/export_ply.h"
 
-#include "engine/scene/ply.h"
+#include "engine/format/ply.h"
 #include "engine/splat/surfels.h"
 
 namespace semrover {

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "engine/scene/grid.h"
-#include "runtime/device.h"
+#include "runtime/device/device.h"
 
 #include <string>
 

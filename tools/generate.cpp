@@ -1,14 +1,14 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover generate GRID -m MODEL -o OUT.sgrid: fills a semantic grid with points, region by region
-#include "runtime/hash.h"
-#include "tools/commands.h"
+#include "runtime/base/hash.h"
+#include "tools/cli/commands.h"
+#include "tools/cli/open_device.h"
+#include "tools/cli/version.h"
 #include "tools/export_ply.h"
 #include "tools/generate_along.h"
 #include "tools/generation.h"
-#include "tools/open_device.h"
 #include "tools/scene_input.h"
-#include "tools/version.h"
 
 #include <CLI/CLI.hpp>
 

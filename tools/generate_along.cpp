@@ -2,18 +2,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/generate_along.h"
 
-#include "engine/scene/camera_path.h"
+#include "engine/format/camera_path.h"
 #include "engine/scene/cell_reach.h"
 #include "engine/scene/path_windows.h"
 #include "engine/scene/tile_cache.h"
 #include "engine/voxfield/sub_grid.h"
-#include "runtime/hash.h"
-#include "runtime/quote.h"
-#include "runtime/safetensors.h"
+#include "runtime/base/hash.h"
+#include "runtime/base/quote.h"
+#include "runtime/base/safetensors.h"
+#include "tools/cli/open_device.h"
+#include "tools/cli/progress.h"
+#include "tools/cli/version.h"
 #include "tools/host_memory.h"
-#include "tools/open_device.h"
-#include "tools/progress.h"
-#include "tools/version.h"
 
 #include <algorithm>
 #include <chrono>

@@ -2,12 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/generation.h"
 
-#include "engine/voxfield/region_store.h"
-#include "runtime/hash.h"
-#include "runtime/profile.h"
-#include "tools/open_device.h"
-#include "tools/progress.h"
-#include "tools/version.h"
+#include "engine/job/region_store.h"
+#include "runtime/base/hash.h"
+#include "runtime/device/profile.h"
+#include "tools/cli/open_device.h"
+#include "tools/cli/progress.h"
+#include "tools/cli/version.h"
 
 #include <chrono>
 #include <CLI/CLI.hpp>

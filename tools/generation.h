@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/scene/run_folder.h"
+#include "engine/job/run_folder.h"
 #include "engine/voxfield/outpaint.h"
 #include "engine/voxfield/voxfield_model.h"
-#include "runtime/device.h"
-#include "tools/commands.h"
+#include "runtime/device/device.h"
+#include "tools/cli/commands.h"
 
 #include <optional>
 

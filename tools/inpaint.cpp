@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // semrover inpaint GRID -m MODEL -o OUT --box ...: regenerates chosen cells, the rest staying byte for byte
 #include "engine/scene/edit_script.h"
-#include "runtime/hash.h"
-#include "runtime/quote.h"
-#include "tools/commands.h"
+#include "runtime/base/hash.h"
+#include "runtime/base/quote.h"
+#include "tools/cli/commands.h"
 #include "tools/regeneration.h"
 
 #include <algorithm>

@@ -2,16 +2,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // semrover inspect FILE|DIR: what is in a model or a scene. The report is one JSON object; without --json it is printed
 // as indented text.
-#include "engine/render/ldm_config.h"
-#include "engine/render/ldm_names.h"
-#include "engine/render/renderer_model.h"
-#include "engine/scene/bounds.h"
+#include "engine/model/ldm_config.h"
+#include "engine/model/ldm_names.h"
+#include "engine/model/renderer_model.h"
 #include "engine/scene/palette.h"
-#include "runtime/json.h"
-#include "runtime/quote.h"
-#include "runtime/safetensors.h"
-#include "tools/commands.h"
-#include "tools/progress.h"
+#include "engine/splat/bounds.h"
+#include "runtime/base/json.h"
+#include "runtime/base/quote.h"
+#include "runtime/base/safetensors.h"
+#include "tools/cli/commands.h"
+#include "tools/cli/progress.h"
 #include "tools/scene_input.h"
 
 #include <algorithm>

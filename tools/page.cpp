@@ -1,15 +1,15 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover page -o index.html --grid GRID: one HTML file that shows a finished run
-#include "engine/page/page.h"
-#include "engine/scene/camera_path.h"
-#include "runtime/hash.h"
-#include "runtime/quote.h"
-#include "tools/commands.h"
+#include "tools/page/page.h"
+#include "engine/format/camera_path.h"
+#include "runtime/base/hash.h"
+#include "runtime/base/quote.h"
+#include "tools/cli/commands.h"
+#include "tools/cli/lens_options.h"
+#include "tools/cli/progress.h"
+#include "tools/cli/version.h"
 #include "tools/generation.h"
-#include "tools/lens_options.h"
-#include "tools/progress.h"
-#include "tools/version.h"
 
 #include <algorithm>
 #include <CLI/CLI.hpp>

@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/path_renderer.h"
 
-#include "engine/scene/rig.h"
+#include "engine/camera/rig.h"
 #include "engine/splat/blocks.h"
-#include "runtime/hash.h"
-#include "runtime/quote.h"
+#include "runtime/base/hash.h"
+#include "runtime/base/quote.h"
 
 #include <CLI/CLI.hpp>
 

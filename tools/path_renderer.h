@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/render/frame_images.h"
-#include "engine/scene/camera_path.h"
+#include "engine/format/camera_path.h"
+#include "engine/refine/frame_images.h"
 #include "engine/scene/grid.h"
 #include "engine/splat/rasterizer.h"
-#include "tools/lens_options.h"
+#include "tools/cli/lens_options.h"
 
 #include <functional>
 #include <map>

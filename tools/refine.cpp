@@ -1,15 +1,15 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover refine DIR|GRID -m MODEL -o OUT: splat buffers to frames, each from the one before
-#include "runtime/hash.h"
-#include "runtime/profile.h"
-#include "runtime/quote.h"
-#include "tools/open_device.h"
+#include "runtime/base/hash.h"
+#include "runtime/base/quote.h"
+#include "runtime/device/profile.h"
+#include "tools/cli/open_device.h"
+#include "tools/cli/progress.h"
+#include "tools/cli/version.h"
 #include "tools/path_renderer.h"
-#include "tools/progress.h"
 #include "tools/refine_video.h"
 #include "tools/scene_input.h"
-#include "tools/version.h"
 
 #include <chrono>
 #include <CLI/CLI.hpp>

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/refine_store.h"
 
-#include "runtime/hash.h"
-#include "runtime/quote.h"
-#include "runtime/safetensors.h"
+#include "runtime/base/hash.h"
+#include "runtime/base/quote.h"
+#include "runtime/base/safetensors.h"
 
 #include <cstring>
 

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/render/latent_codec.h"
-#include "engine/scene/run_folder.h"
+#include "engine/job/run_folder.h"
+#include "engine/refine/latent_codec.h"
 #include "tools/buffer_folder.h"
 
 #include <map>

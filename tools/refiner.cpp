@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/refiner.h"
 
-#include "runtime/hash.h"
-#include "tools/progress.h"
+#include "runtime/base/hash.h"
+#include "tools/cli/progress.h"
 
 namespace semrover {
 

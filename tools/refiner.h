@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/render/frame_renderer.h"
-#include "tools/commands.h"
+#include "engine/refine/frame_renderer.h"
+#include "tools/cli/commands.h"
 #include "tools/refine_store.h"
 
 namespace semrover {

@@ -4,9 +4,9 @@
 
 #include "engine/scene/edit_undo.h"
 #include "engine/voxfield/sub_grid.h"
-#include "runtime/hash.h"
-#include "tools/open_device.h"
-#include "tools/version.h"
+#include "runtime/base/hash.h"
+#include "tools/cli/open_device.h"
+#include "tools/cli/version.h"
 
 #include <algorithm>
 #include <CLI/CLI.hpp>

@@ -1,15 +1,15 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover render GRID --path FILE -o DIR: splat buffers of a camera path: colour, depth, normal, label, visibility
-#include "engine/scene/bounds.h"
-#include "engine/scene/image.h"
+#include "engine/format/image.h"
 #include "engine/scene/palette.h"
-#include "runtime/profile.h"
-#include "runtime/quote.h"
-#include "tools/commands.h"
-#include "tools/open_device.h"
+#include "engine/splat/bounds.h"
+#include "runtime/base/quote.h"
+#include "runtime/device/profile.h"
+#include "tools/cli/commands.h"
+#include "tools/cli/open_device.h"
+#include "tools/cli/progress.h"
 #include "tools/path_renderer.h"
-#include "tools/progress.h"
 #include "tools/scene_input.h"
 #include "tools/video.h"
 

@@ -4,7 +4,7 @@
 
 #include "engine/scene/palette.h"
 #include "engine/scene/tiles.h"
-#include "runtime/quote.h"
+#include "runtime/base/quote.h"
 
 #include <CLI/CLI.hpp>
 #include <cmath>

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/scene/scene_file.h"
-#include "tools/commands.h"
+#include "engine/format/scene_file.h"
+#include "tools/cli/commands.h"
 
 #include <optional>
 

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // semrover tile GRID -o DIR: cuts a grid into tiles; semrover tile DIR --join -o GRID: puts them together again
 #include "engine/scene/tiles.h"
-#include "runtime/quote.h"
-#include "tools/commands.h"
+#include "runtime/base/quote.h"
+#include "tools/cli/commands.h"
 #include "tools/generation.h"
 
 #include <CLI/CLI.hpp>

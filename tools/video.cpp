@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/video.h"
 
-#include "runtime/quote.h"
+#include "runtime/base/quote.h"
 
 #include <cerrno>
 #include <csignal>

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "runtime/file.h"
+#include "runtime/base/file.h"
 
 #include <cstdio>
 #include <span>

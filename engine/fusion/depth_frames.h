@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/scene/camera.h"
+#include "engine/camera/camera.h"
 
 #include <functional>
 

@@ -5,8 +5,8 @@
 #include "engine/fusion/depth_frames.h"
 #include "engine/fusion/fusion_options.h"
 #include "kernels/fusion.h"
-#include "kernels/kernels.h"
-#include "runtime/device.h"
+#include "kernels/network.h"
+#include "runtime/device/device.h"
 
 #include <memory>
 #include <span>

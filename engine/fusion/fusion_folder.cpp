@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/fusion/fusion_folder.h"
 
+#include "engine/format/camera_path.h"
+#include "engine/format/image.h"
 #include "engine/mesh/mesh.h"
-#include "engine/scene/camera_path.h"
-#include "engine/scene/image.h"
-#include "engine/scene/json_numbers.h"
-#include "runtime/quote.h"
+#include "runtime/base/json_numbers.h"
+#include "runtime/base/quote.h"
 
 #include <algorithm>
 #include <map>

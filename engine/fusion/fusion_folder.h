@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/format/label_map.h"
 #include "engine/fusion/depth_frames.h"
-#include "engine/scene/label_map.h"
-#include "runtime/file.h"
+#include "runtime/base/file.h"
 
 #include <array>
 

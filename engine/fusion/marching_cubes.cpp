@@ -3,7 +3,7 @@
 #include "engine/fusion/marching_cubes.h"
 
 #include "engine/mesh/mesh.h"
-#include "runtime/program.h"
+#include "runtime/device/program.h"
 
 #include <algorithm>
 #include <bit>

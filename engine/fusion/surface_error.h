@@ -4,7 +4,7 @@
 
 #include "engine/fusion/depth_frames.h"
 #include "engine/mesh/mesh.h"
-#include "runtime/device.h"
+#include "runtime/device/device.h"
 
 namespace semrover {
 

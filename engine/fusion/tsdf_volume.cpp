@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/fusion/tsdf_volume.h"
 
-#include "runtime/program.h"
+#include "runtime/device/program.h"
 
 #include <algorithm>
 #include <cmath>

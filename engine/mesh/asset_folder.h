@@ -3,7 +3,7 @@
 #pragma once
 
 #include "engine/mesh/mesh.h"
-#include "runtime/file.h"
+#include "runtime/base/file.h"
 
 #include <map>
 

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/mesh/bvh.h"
 
-#include "runtime/result.h"
+#include "runtime/base/result.h"
 
 #include <algorithm>
 #include <bit>

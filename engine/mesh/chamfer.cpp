@@ -4,8 +4,8 @@
 
 #include "engine/mesh/nearest_points.h"
 #include "engine/mesh/nearest_surface.h"
-#include "runtime/dtype.h"
-#include "runtime/mix64.h"
+#include "runtime/base/dtype.h"
+#include "runtime/base/mix64.h"
 
 #include <algorithm>
 #include <cmath>

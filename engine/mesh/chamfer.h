@@ -4,7 +4,7 @@
 
 #include "engine/mesh/mesh.h"
 #include "engine/scene/grid.h"
-#include "runtime/device.h"
+#include "runtime/device/device.h"
 
 namespace semrover {
 

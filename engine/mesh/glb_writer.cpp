@@ -3,11 +3,11 @@
 // glTF 2.0, https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html: one mesh, one primitive per material and label
 #include "engine/mesh/labels.h"
 #include "engine/mesh/mesh_files.h"
-#include "engine/scene/srgb.h"
 #include "engine/scene/palette.h"
-#include "runtime/json.h"
-#include "runtime/quote.h"
-#include "runtime/tensor.h"
+#include "engine/scene/srgb.h"
+#include "runtime/base/json.h"
+#include "runtime/base/quote.h"
+#include "runtime/graph/tensor.h"
 
 #include <algorithm>
 #include <bit>

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/mesh/gltf_file.h"
 
-#include "runtime/quote.h"
+#include "runtime/base/quote.h"
 
 #include <algorithm>
 #include <bit>

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "engine/mesh/asset_folder.h"
-#include "runtime/json.h"
+#include "runtime/base/json.h"
 
 #include <optional>
 #include <span>

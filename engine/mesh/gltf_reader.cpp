@@ -4,8 +4,8 @@
 #include "engine/mesh/gltf_file.h"
 #include "engine/mesh/mesh_readers.h"
 #include "engine/scene/srgb.h"
-#include "engine/scene/json_numbers.h"
-#include "runtime/quote.h"
+#include "runtime/base/json_numbers.h"
+#include "runtime/base/quote.h"
 
 #include <algorithm>
 

@@ -3,8 +3,8 @@
 #include "engine/mesh/labels.h"
 
 #include "engine/scene/palette.h"
-#include "runtime/json.h"
-#include "runtime/quote.h"
+#include "runtime/base/json.h"
+#include "runtime/base/quote.h"
 
 #include <algorithm>
 #include <functional>

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/scene/image.h"
+#include "engine/format/image.h"
 #include "engine/scene/palette.h"
 
 #include <array>

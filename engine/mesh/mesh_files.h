@@ -4,7 +4,7 @@
 
 #include "engine/mesh/labels.h"
 #include "engine/mesh/mesh.h"
-#include "runtime/file.h"
+#include "runtime/base/file.h"
 
 namespace semrover {
 

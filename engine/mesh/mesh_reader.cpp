@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/mesh/mesh_files.h"
 #include "engine/mesh/mesh_readers.h"
-#include "runtime/quote.h"
+#include "runtime/base/quote.h"
 
 #include <algorithm>
 

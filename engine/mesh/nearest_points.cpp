@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/mesh/nearest_points.h"
 
-#include "kernels/kernels.h"
-#include "runtime/program.h"
+#include "kernels/network.h"
+#include "kernels/splat.h"
+#include "runtime/device/program.h"
 
 #include <algorithm>
 #include <cmath>

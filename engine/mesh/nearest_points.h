@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "runtime/device.h"
+#include "runtime/device/device.h"
 
 #include <array>
 #include <span>

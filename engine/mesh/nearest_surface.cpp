@@ -3,8 +3,8 @@
 #include "engine/mesh/nearest_surface.h"
 
 #include "engine/mesh/triangle_tree.h"
-#include "kernels/meshes.h"
-#include "runtime/program.h"
+#include "kernels/mesh.h"
+#include "runtime/device/program.h"
 
 #include <algorithm>
 #include <cmath>

@@ -3,8 +3,8 @@
 #pragma once
 
 #include "engine/mesh/mesh.h"
-#include "runtime/device.h"
-#include "runtime/memory.h"
+#include "runtime/device/device.h"
+#include "runtime/device/memory.h"
 
 #include <memory>
 #include <span>

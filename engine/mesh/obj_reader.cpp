@@ -5,7 +5,7 @@
 #include "engine/mesh/mesh_readers.h"
 #include "engine/mesh/polygon.h"
 #include "engine/scene/srgb.h"
-#include "runtime/quote.h"
+#include "runtime/base/quote.h"
 
 #include <algorithm>
 #include <charconv>

@@ -1,11 +1,11 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // PLY meshes as MeshLab, CloudCompare, Open3D and OpenMVS write them
+#include "engine/format/ply_reader.h"
 #include "engine/mesh/asset_folder.h"
 #include "engine/mesh/mesh_readers.h"
 #include "engine/mesh/polygon.h"
-#include "engine/scene/ply_reader.h"
-#include "runtime/quote.h"
+#include "runtime/base/quote.h"
 
 #include <algorithm>
 #include <cmath>

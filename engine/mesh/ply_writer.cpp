@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/mesh/mesh_files.h"
-#include "runtime/quote.h"
+#include "runtime/base/quote.h"
 
 #include <bit>
 

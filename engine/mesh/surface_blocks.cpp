@@ -3,9 +3,9 @@
 #include "engine/mesh/surface_blocks.h"
 
 #include "engine/scene/srgb.h"
-#include "kernels/kernels.h"
-#include "kernels/meshes.h"
-#include "runtime/mix64.h"
+#include "kernels/mesh.h"
+#include "kernels/network.h"
+#include "runtime/base/mix64.h"
 
 #include <algorithm>
 #include <bit>

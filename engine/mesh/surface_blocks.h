@@ -4,7 +4,7 @@
 
 #include "engine/mesh/mesh.h"
 #include "engine/scene/grid.h"
-#include "runtime/result.h"
+#include "runtime/base/result.h"
 
 #include <optional>
 #include <span>
@@ -14,7 +14,7 @@ namespace semrover {
 // A mesh's triangles by the blocks of 8^3 cells that they touch, in portions that fit a device. What a cell gets, and
 // in which order, depends on neither the order of the mesh's faces nor the size of the portions.
 
-// the words of kernels/meshes.h, SurfaceTriangles
+// the words of kernels/mesh.h, SurfaceTriangles
 struct SurfaceRecord {
     std::array<std::array<float, 3>, 3> corners; // cells from the block's corner
     uint32_t slot, range, material_label;

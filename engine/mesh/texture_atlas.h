@@ -3,8 +3,8 @@
 #pragma once
 
 #include "engine/mesh/mesh.h"
-#include "kernels/meshes.h"
-#include "runtime/device.h"
+#include "kernels/mesh.h"
+#include "runtime/device/device.h"
 
 namespace semrover {
 

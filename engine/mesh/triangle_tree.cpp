@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/mesh/triangle_tree.h"
 
-#include "runtime/result.h"
+#include "runtime/base/result.h"
 
 #include <algorithm>
 

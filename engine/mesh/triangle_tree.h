@@ -14,7 +14,7 @@ struct TreeTriangle {
     uint32_t face;
 };
 
-// boxes around boxes around triangles, as kernels/meshes.h, SurfaceTree, has them: halves by the median of centres
+// boxes around boxes around triangles, as kernels/mesh.h, SurfaceTree, has them: halves by the median of centres
 // along the longest axis, at most four triangles in a leaf, the left child behind its parent
 struct TriangleTree {
     struct Node {

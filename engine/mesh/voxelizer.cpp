@@ -2,12 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/mesh/voxelizer.h"
 
-#include "engine/scene/srgb.h"
 #include "engine/mesh/surface_blocks.h"
 #include "engine/mesh/texture_atlas.h"
 #include "engine/scene/palette.h"
+#include "engine/scene/srgb.h"
 #include "engine/voxfield/token_codec.h"
-#include "runtime/program.h"
+#include "kernels/sort.h"
+#include "runtime/device/program.h"
 
 #include <algorithm>
 #include <bit>

@@ -4,7 +4,7 @@
 
 #include "engine/scene/cell_reach.h"
 #include "engine/scene/palette.h"
-#include "runtime/quote.h"
+#include "runtime/base/quote.h"
 
 #include <algorithm>
 #include <charconv>

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/scene/edit_script.h"
 
-#include "engine/scene/json_numbers.h"
 #include "engine/scene/palette.h"
-#include "runtime/quote.h"
+#include "runtime/base/json_numbers.h"
+#include "runtime/base/quote.h"
 
 #include <algorithm>
 

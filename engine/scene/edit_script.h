@@ -3,7 +3,7 @@
 #pragma once
 
 #include "engine/scene/grid_editor.h"
-#include "runtime/json.h"
+#include "runtime/base/json.h"
 
 namespace semrover {
 

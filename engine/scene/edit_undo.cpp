@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/scene/edit_undo.h"
 
-#include "runtime/hash.h"
-#include "runtime/json.h"
-#include "runtime/quote.h"
-#include "runtime/safetensors.h"
+#include "runtime/base/hash.h"
+#include "runtime/base/json.h"
+#include "runtime/base/quote.h"
+#include "runtime/base/safetensors.h"
 
 #include <algorithm>
 #include <charconv>

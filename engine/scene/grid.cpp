@@ -3,8 +3,8 @@
 #include "engine/scene/grid.h"
 
 #include "engine/scene/palette.h"
-#include "runtime/quote.h"
-#include "runtime/safetensors.h"
+#include "runtime/base/quote.h"
+#include "runtime/base/safetensors.h"
 
 #include <algorithm>
 #include <charconv>

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "runtime/file.h"
-#include "runtime/result.h"
+#include "runtime/base/file.h"
+#include "runtime/base/result.h"
 
 #include <array>
 #include <cstdint>

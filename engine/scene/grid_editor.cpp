@@ -5,7 +5,7 @@
 #include "engine/scene/cell_reach.h"
 #include "engine/scene/palette.h"
 #include "engine/scene/stamp.h"
-#include "runtime/quote.h"
+#include "runtime/base/quote.h"
 
 #include <algorithm>
 #include <array>

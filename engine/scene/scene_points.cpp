@@ -3,7 +3,7 @@
 #include "engine/scene/scene_points.h"
 
 #include "engine/scene/palette.h"
-#include "runtime/dtype.h"
+#include "runtime/base/dtype.h"
 
 #include <algorithm>
 

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/scene/tile_cache.h"
 
-#include "runtime/quote.h"
+#include "runtime/base/quote.h"
 
 #include <algorithm>
 

@@ -3,10 +3,10 @@
 #include "engine/scene/tiles.h"
 
 #include "engine/scene/cell_reach.h"
-#include "engine/scene/json_numbers.h"
-#include "runtime/json.h"
-#include "runtime/quote.h"
-#include "runtime/safetensors.h"
+#include "runtime/base/json.h"
+#include "runtime/base/json_numbers.h"
+#include "runtime/base/quote.h"
+#include "runtime/base/safetensors.h"
 
 #include <algorithm>
 

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/format/ply.h"
 #include "engine/scene/grid.h"
-#include "engine/scene/ply.h"
 
 namespace semrover {
 

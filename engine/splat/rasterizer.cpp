@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/splat/rasterizer.h"
 
-#include "engine/scene/lens.h"
+#include "engine/camera/lens.h"
+#include "kernels/splat.h"
 
 #include <algorithm>
 #include <cmath>

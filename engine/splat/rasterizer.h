@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/scene/camera.h"
+#include "engine/camera/camera.h"
 #include "engine/splat/surfels.h"
-#include "runtime/program.h"
+#include "runtime/device/program.h"
 
 #include <array>
 #include <memory>
@@ -17,7 +17,7 @@ namespace semrover {
 struct SplatCamera {
     float fx = 0, fy = 0, cx = 0, cy = 0;    // pixels
     std::array<float, 12> world_to_camera{}; // [3, 4], row-major, metres
-    // of a lens that is no pinhole: engine/scene/lens.h
+    // of a lens that is no pinhole: engine/camera/lens.h
     std::array<float, 8> distortion{};
     float limit = 0;
     bool radial_depth = false; // depth is the distance from the camera, not along z

@@ -3,13 +3,13 @@
 #include "engine/splat/surfels.h"
 
 #include "engine/scene/palette.h"
-#include "runtime/program.h"
+#include "runtime/device/program.h"
 
 #include <cmath>
 
 namespace semrover {
 
-// rows as kernels.h, SplatScene, has them
+// rows as SplatScene of kernels/splat.h has them
 struct SurfelScene::Host {
     using Row = std::array<float, 4>;
     std::vector<Row> positions, normals, colors;

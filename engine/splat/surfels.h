@@ -2,10 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/scene/ply.h"
+#include "engine/format/ply.h"
 #include "engine/scene/scene_points.h"
-#include "kernels/kernels.h"
-#include "runtime/device.h"
+#include "kernels/network.h"
+#include "kernels/splat.h"
+#include "runtime/device/device.h"
 
 namespace semrover {
 

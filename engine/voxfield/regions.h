@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "runtime/result.h"
+#include "runtime/base/result.h"
 
 #include <array>
 #include <cstdint>

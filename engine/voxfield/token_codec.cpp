@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/voxfield/token_codec.h"
 
-#include "runtime/dtype.h"
+#include "runtime/base/dtype.h"
 
 #include <algorithm>
 #include <array>

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/voxfield/transformer_config.h"
+#include "engine/model/transformer_config.h"
 
 #include <cstdint>
 #include <span>

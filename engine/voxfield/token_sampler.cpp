@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/voxfield/token_sampler.h"
 
-#include "engine/diffusion/step_rows.h"
+#include "engine/sampling/step_rows.h"
 
 #include <cmath>
 #include <cstring>

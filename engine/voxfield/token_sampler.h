@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/diffusion/repaint.h"
-#include "engine/voxfield/transformer.h"
+#include "engine/network/transformer.h"
+#include "engine/sampling/repaint.h"
 #include "kernels/sampling.h"
-#include "runtime/program.h"
+#include "runtime/device/program.h"
 
 #include <functional>
 #include <memory>

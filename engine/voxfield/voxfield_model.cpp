@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/voxfield/voxfield_model.h"
 
-#include "runtime/json_fields.h"
+#include "runtime/base/json_fields.h"
 
 namespace semrover {
 

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/diffusion/repaint.h"
+#include "engine/model/transformer_config.h"
+#include "engine/sampling/repaint.h"
 #include "engine/voxfield/regions.h"
-#include "engine/voxfield/transformer_config.h"
 
 namespace semrover {
 

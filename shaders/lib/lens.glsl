@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // rays in a camera's frame (x right, y down, z forward) to pixels and back: formulas and limits as in
-// engine/scene/lens.h. The model is an argument so that a constant of the shader can choose it.
+// engine/camera/lens.h. The model is an argument so that a constant of the shader can choose it.
 #include "lib/trigonometry.glsl"
 
 const uint kOpencv = 1, kFisheye = 2, kEquirectangular = 3; // CameraModel; 0: pinhole

@@ -4,7 +4,7 @@
 #define SEMROVER_STEP_ROW_H
 #include "types.h"
 
-// one row of the step table: engine/diffusion/schedule.h, StepCoefficients; read by the kernel that StepClock.row names
+// one row of the step table: engine/sampling/schedule.h, StepCoefficients; read by the kernel that StepClock.row names
 struct StepRow {
     float in_scale;
     float x0_x, x0_m;

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 
-// What kernels/meshes.h says of SurfaceTriangles, taken apart.
+// What kernels/mesh.h says of SurfaceTriangles, taken apart.
 
 const uint kRecord = 12;     // words of a triangle
 const uint kAttributes = 16; // and of its corners' attributes

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 
-// the camera and the light of a picture, as ViewTable of kernels.h has them: View is vec4[8]
+// the camera and the light of a picture, as ViewTable of kernels/trace.h has them: View is vec4[8]
 vec3 view_axis(uint row) { return view[1 + row].xyz; } // x, y, z of the camera in the world: OpenCV axes
 vec3 view_origin() { return vec3(view[1].w, view[2].w, view[3].w); }
 vec3 sun_direction() { return view[4].xyz; } // towards the sun

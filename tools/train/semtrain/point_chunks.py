@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
 """Columns of Σ-Voxfield grids as sets of equally many labelled points: as the engine's cut_chunks cuts them
-(engine/eval/point_chunks.h), and as batches to train on."""
+(tools/eval/point_chunks.h), and as batches to train on."""
 import os
 
 import numpy as np

@@ -8,6 +8,7 @@ import torch
 from .grids import read_tokens
 from .model_folder import read_component
 from .nets.transformer import VoxfieldTransformer
+from .precision import autocast
 from .transformer import linear_alphas, noised
 
 LEVELS = (250, 600)  # of 1000 timesteps, between which the noise of a street is drawn
@@ -75,7 +76,7 @@ def denoise_sets(model, sets, cells, labels, tokens, out, first, random):
     levels = levels_between(first, STEPS)
     x = noised(x0, alphas, torch.full((len(x0),), first), random)
     for t, after in zip(levels, levels[1:]):
-        with torch.autocast("cpu", dtype=torch.bfloat16):
+        with autocast("bf16", "cpu"):
             made = model(x, of_rows, centers, valid, torch.full((len(x),), t)).float().clamp(-1, 1)
         x = made if after < 0 else ancestral_step(x, made, alphas[t], alphas[after], random)
     for s, made in zip(sets, x.numpy()):

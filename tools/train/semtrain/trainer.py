@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
 """The loop that all recipes share: Adam, warm-up and decay, EMA, checkpoints that a later run continues, loss curves."""
-import contextlib
 import json
 import os
 import signal
@@ -9,7 +8,7 @@ import time
 
 import torch
 
-from . import safetensors_file
+from . import precision, safetensors_file
 from .curve import draw_curve
 
 CHECKPOINT = "checkpoint.safetensors"
@@ -30,12 +29,6 @@ def generator(config, step, stream=0):
 def number_below(n, draw):
     """0..n - 1, from a generator"""
     return int(torch.randint(n, (1,), generator=draw))
-
-
-def autocast(config):
-    if config["precision"] == "fp32":
-        return contextlib.nullcontext()
-    return torch.autocast(config["device"], dtype=torch.bfloat16)
 
 
 class Trainer:
@@ -65,6 +58,9 @@ class Trainer:
         """loss_of_step(model, step) -> (loss, {name: number} for the log); until `steps`, `minutes` or a signal"""
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._stop)
+        instead = precision.why_not(self.config["precision"], self.config["device"])
+        if instead:
+            print(instead, flush=True)
         begin = saved = told = time.time()
         recent = []
         while self.step < self.config["steps"] and not self.stopped:
@@ -95,7 +91,7 @@ class Trainer:
     def _advance(self, loss_of_step):
         for group in self.adam.param_groups:
             group["lr"] = learning_rate(self.config, self.step)
-        with autocast(self.config):
+        with precision.autocast(self.config["precision"], self.config["device"]):
             loss, about = loss_of_step(self.model, self.step)
         if not torch.isfinite(loss):
             raise RuntimeError(f"the loss is {loss.item()} at step {self.step}; the last checkpoint is in {self.folder}")

@@ -7,6 +7,8 @@ import torch
 from torch import nn
 from torch.nn import functional as F
 
+from .attention import attend
+
 CONFIG_FIELDS = ("num_layers", "num_attention_heads", "attention_head_dim", "points_per_voxel", "num_classes",
                  "voxel_size", "attention_radius", "pos_embed_dim", "context_pos_embed")
 
@@ -35,15 +37,14 @@ class Attention(nn.Module):
 
     def forward(self, x, c, mask):
         """x, c [B, N, D]; mask [B, 1, 2N, 2N], 0 or a large negative number -> the same shapes; c None in the last"""
-        n, d = x.shape[1], x.shape[2]
+        n = x.shape[1]
 
         def heads(a, b):
             return torch.cat([a, b], 1).unflatten(2, (self.heads, -1)).transpose(1, 2)
-        q = heads(self.to_q(x), self.add_q_proj(c)) * (d // self.heads) ** -0.5
+        q = heads(self.to_q(x), self.add_q_proj(c))
         k = heads(self.to_k(x), self.add_k_proj(c))
         v = heads(self.to_v(x), self.add_v_proj(c))
-        p = torch.softmax(q @ k.transpose(-1, -2) + mask.to(q.dtype), -1)
-        y = (p.to(v.dtype) @ v).transpose(1, 2).flatten(2)
+        y = attend(q, k, v, mask).transpose(1, 2).flatten(2)
         return self.to_out[0](y[:, :n]), self.to_add_out(y[:, n:]) if self.to_add_out else None
 
 

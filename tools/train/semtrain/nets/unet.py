@@ -7,6 +7,7 @@ import torch
 from torch import nn
 from torch.nn import functional as F
 
+from .attention import attend
 from .image_blocks import Downsampler, GroupNorm, LayerNorm, ResnetBlock, Upsampler, per_level
 
 DEFAULTS = {"in_channels": 4, "out_channels": 4, "block_out_channels": [320, 640, 1280, 1280], "layers_per_block": 2,
@@ -34,8 +35,7 @@ class Attention(nn.Module):
         def heads(y):
             return y.unflatten(2, (self.heads, -1)).transpose(1, 2)
         q, k, v = heads(self.to_q(x)), heads(self.to_k(context)), heads(self.to_v(context))
-        p = torch.softmax((q * q.shape[-1] ** -0.5) @ k.transpose(-1, -2), -1)
-        return self.to_out[0]((p.to(v.dtype) @ v).transpose(1, 2).flatten(2))
+        return self.to_out[0](attend(q, k, v).transpose(1, 2).flatten(2))
 
 
 class FeedForward(nn.Module):

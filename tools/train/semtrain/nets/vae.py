@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
 """AutoencoderKL of Stable Diffusion, with diffusers' tensor names and fields (docs/models.md §5)."""
-import torch
 from torch import nn
 from torch.nn import functional as F
 
+from .attention import attend
 from .image_blocks import Downsampler, GroupNorm, ResnetBlock, Upsampler
 
 EPS = 1e-6
@@ -26,8 +26,7 @@ class SingleHeadAttention(nn.Module):
     def forward(self, x):
         """[B, C, H, W] -> the same"""
         y = self.group_norm(x).flatten(2).transpose(1, 2)
-        p = torch.softmax(self.to_q(y) @ self.to_k(y).transpose(1, 2) * x.shape[1] ** -0.5, -1)
-        y = self.to_out[0](p.to(y.dtype) @ self.to_v(y))
+        y = self.to_out[0](attend(self.to_q(y), self.to_k(y), self.to_v(y)))
         return x + y.transpose(1, 2).unflatten(2, x.shape[2:])
 
 

@@ -1,0 +1,80 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/camera/rigid.h"
+#include "runtime/base/file.h"
+#include "runtime/base/result.h"
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace semrover {
+
+// the one convention inside: OpenCV camera axes (x right, y down, z forward), world to camera, metres, double; pixel
+// (column c, row r) covers [c, c+1) x [r, r+1), its centre is at (c + 0.5, r + 0.5)
+// how a ray becomes a pixel; the formulas are in engine/camera/lens.h
+enum class CameraModel : uint8_t { pinhole, opencv, fisheye, equirectangular };
+
+struct Intrinsics {
+    double fx = 0, fy = 0; // pixels; equirectangular: pixels a radian
+    double cx = 0, cy = 0; // pixels from the top left corner of the image
+    uint32_t width = 0, height = 0;
+    CameraModel model = CameraModel::pinhole;
+    std::array<double, 8> distortion{}; // opencv: k1 k2 p1 p2 k3 k4 k5 k6, in OpenCV's order; fisheye: k1 k2 k3 k4
+
+    bool operator==(const Intrinsics&) const = default;
+};
+
+struct Pose {
+    Rigid world_to_camera = kIdentity;
+
+    Rigid camera_to_world() const { return inverse(world_to_camera); }
+};
+
+struct CameraFrame {
+    double time = 0;    // seconds
+    std::string camera; // name of the sensor; empty when there is one without a name
+    Pose pose;
+    Intrinsics intrinsics;
+};
+
+// what a run renders, in order; a reader returns at least one frame
+struct CameraPath {
+    std::vector<CameraFrame> frames;
+};
+
+// the same view with another number of pixels
+Intrinsics scaled_to(const Intrinsics& intrinsics, uint32_t width, uint32_t height);
+
+// square pixels, centred; the field of view across the width, in degrees, above 0 and below 180
+Intrinsics pinhole_from_fov(double horizontal_degrees, uint32_t width, uint32_t height);
+// likewise, distance from the centre = focal length times angle; above 0, at most 360
+Intrinsics fisheye_from_fov(double horizontal_degrees, uint32_t width, uint32_t height);
+// the whole sphere: 360 degrees across the width, 180 across the height, forward in the middle
+Intrinsics whole_sphere(uint32_t width, uint32_t height);
+
+// a lens without distortion is a pinhole, for which there is a faster renderer
+Intrinsics simplified(Intrinsics intrinsics);
+
+// bad_input unless sizes are 1..16384, focal lengths finite and above 0, the centre finite, the distortion finite and
+// of a model that has one, a panorama the whole sphere
+Status check_intrinsics(const Intrinsics& intrinsics, std::string_view where);
+
+std::string_view name_of(CameraModel model);
+std::optional<CameraModel> camera_model_of(std::string_view name);
+
+struct Projection {
+    double x, y;  // pixels
+    double depth; // metres along z; equirectangular: from the camera
+};
+// none where the lens does not look: behind a pinhole, or where its formula no longer holds
+std::optional<Projection> project(const CameraFrame& frame, const Point3& world);
+
+// a name that can be a folder: 1 to 64 of [A-Za-z0-9._-], not starting with a dot
+bool is_camera_name(std::string_view name);
+
+} // namespace semrover

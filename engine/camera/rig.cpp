@@ -1,0 +1,203 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/camera/rig.h"
+
+#include "runtime/base/json_numbers.h"
+#include "runtime/base/quote.h"
+
+#include <algorithm>
+
+namespace semrover {
+
+namespace {
+
+constexpr size_t kMaxSensors = 64;
+
+// vehicle axes (forward, left, up) to those of a camera that looks forward (right, down, forward)
+constexpr Rigid kVehicleToForwardCamera = {0, -1, 0, 0, 0, 0, -1, 0, 1, 0, 0, 0, 0, 0, 0, 1};
+
+Status check_keys(const Json& object, std::initializer_list<std::string_view> known, std::string_view where)
+{
+    for (const auto& entry : object.items())
+        if (std::ranges::find(known, entry.key()) == known.end())
+            return fail(ErrorCode::bad_input, "{}: unknown key {}, expected one of {}", where, quote(entry.key(), 60),
+                        fmt::join(known, ", "));
+    return {};
+}
+
+Result<double> required_number(const Json& object, const char* key, std::string_view where)
+{
+    SR_TRY(const std::optional<double> value, optional_number(object, key, where));
+    if (!value)
+        return fail(ErrorCode::bad_input, "{}: {} is missing", where, key);
+    return *value;
+}
+
+Result<CameraModel> read_model(const Json& json, std::string_view where)
+{
+    if (!json.contains("model"))
+        return CameraModel::pinhole;
+    const Json& model = json["model"];
+    const auto found = model.is_string() ? camera_model_of(model.get_ref<const std::string&>()) : std::nullopt;
+    if (!found)
+        return fail(ErrorCode::bad_input,
+                    "{}: model {} is not supported, expected \"pinhole\", \"opencv\", \"fisheye\" or "
+                    "\"equirectangular\"",
+                    where, printable(model.dump(-1, ' ', true), 60));
+    return *found;
+}
+
+Result<Intrinsics> from_fov(double fov, const Intrinsics& size, std::string_view where)
+{
+    const bool fisheye = size.model == CameraModel::fisheye;
+    if (!(fov > 0 && (fisheye ? fov <= 360 : fov < 180)))
+        return fail(ErrorCode::bad_input, "{}: expected a fov above 0 and {} degrees, found {}", where,
+                    fisheye ? "at most 360" : "below 180", fov);
+    Intrinsics k =
+        fisheye ? fisheye_from_fov(fov, size.width, size.height) : pinhole_from_fov(fov, size.width, size.height);
+    k.model = size.model;
+    return k;
+}
+
+Status read_distortion(const Json& json, Intrinsics& k, std::string_view where)
+{
+    if (!json.contains("distortion"))
+        return {};
+    const std::string what = fmt::format("{}: distortion", where);
+    SR_TRY(const std::vector<double> values, numbers_of(json["distortion"], what));
+    const size_t n = values.size();
+    const bool fits = k.model == CameraModel::opencv    ? n == 4 || n == 5 || n == 8
+                      : k.model == CameraModel::fisheye ? n == 4
+                                                        : n == 0;
+    if (!fits)
+        return fail(ErrorCode::bad_input, "{}: expected {} of model {}, found {}", what,
+                    k.model == CameraModel::opencv    ? "4, 5 or 8 numbers"
+                    : k.model == CameraModel::fisheye ? "4 numbers"
+                                                      : "no numbers",
+                    name_of(k.model), n);
+    std::ranges::copy(values, k.distortion.begin());
+    return {};
+}
+
+Result<Intrinsics> read_intrinsics(const Json& json, std::string_view where)
+{
+    SR_TRY(const double width, required_number(json, "width", where));
+    SR_TRY(const double height, required_number(json, "height", where));
+    Intrinsics k;
+    SR_TRY(k.width, image_side(width, fmt::format("{}: width", where)));
+    SR_TRY(k.height, image_side(height, fmt::format("{}: height", where)));
+    SR_TRY(k.model, read_model(json, where));
+    SR_TRY(const std::optional<double> fov, optional_number(json, "fov", where));
+    const bool focal = json.contains("fx") || json.contains("fy") || json.contains("cx") || json.contains("cy");
+    if (k.model == CameraModel::equirectangular) {
+        if (fov || focal)
+            return fail(ErrorCode::bad_input, "{}: an equirectangular sensor sees the whole sphere, without fov or fx",
+                        where);
+        k = whole_sphere(k.width, k.height);
+    } else if (fov) {
+        if (focal)
+            return fail(ErrorCode::bad_input, "{}: expected fov or fx, fy, cx, cy, found both", where);
+        SR_TRY(k, from_fov(*fov, k, where));
+    } else {
+        SR_TRY(k.fx, required_number(json, "fx", where));
+        SR_TRY(k.fy, required_number(json, "fy", where));
+        SR_TRY(k.cx, required_number(json, "cx", where));
+        SR_TRY(k.cy, required_number(json, "cy", where));
+    }
+    SR_CHECK(read_distortion(json, k, where));
+    SR_CHECK(check_intrinsics(k, where));
+    return simplified(k);
+}
+
+Result<Rigid> read_mounting(const Json& json, std::string_view where)
+{
+    if (!json.is_object()) {
+        SR_TRY(const std::vector<double> values, numbers_of(json, where));
+        return rigid_from_matrix(values, where);
+    }
+    SR_CHECK(check_keys(json, {"translation", "rotation"}, where));
+    std::vector<double> t(3, 0.0), q;
+    if (json.contains("translation")) {
+        SR_TRY(t, numbers_of(json["translation"], fmt::format("{}: translation", where)));
+    }
+    if (!json.contains("rotation"))
+        return fail(ErrorCode::bad_input, "{}: rotation is missing", where);
+    SR_TRY(q, numbers_of(json["rotation"], fmt::format("{}: rotation", where)));
+    if (t.size() != 3 || q.size() != 4)
+        return fail(ErrorCode::bad_input,
+                    "{}: expected a translation of 3 and a rotation of 4 numbers, found {} and {}", where, t.size(),
+                    q.size());
+    return rigid_from_quaternion({t[0], t[1], t[2]}, {q[0], q[1], q[2], q[3]}, where);
+}
+
+Result<Sensor> read_sensor(const Json& json, std::string_view where)
+{
+    if (!json.is_object())
+        return fail(ErrorCode::bad_input, "{}: expected an object, found {}", where, json.type_name());
+    SR_CHECK(check_keys(json,
+                        {"name", "model", "width", "height", "fov", "fx", "fy", "cx", "cy", "distortion",
+                         "sensor_to_vehicle", "comment"},
+                        where));
+    if (!json.contains("name") || !json["name"].is_string() ||
+        !is_camera_name(json["name"].get_ref<const std::string&>()))
+        return fail(ErrorCode::bad_input, "{}: expected a name of letters, digits, '.', '_' and '-'", where);
+    if (!json.contains("sensor_to_vehicle"))
+        return fail(ErrorCode::bad_input, "{}: sensor_to_vehicle is missing", where);
+    Sensor sensor;
+    sensor.name = json["name"].get<std::string>();
+    SR_TRY(sensor.intrinsics, read_intrinsics(json, where));
+    SR_TRY(sensor.sensor_to_vehicle,
+           read_mounting(json["sensor_to_vehicle"], fmt::format("{}: sensor_to_vehicle", where)));
+    return sensor;
+}
+
+Result<PathAxes> read_path_axes(const Json& file, std::string_view where)
+{
+    if (!file.contains("path_axes") || file["path_axes"] == "camera")
+        return PathAxes::camera;
+    if (file["path_axes"] == "vehicle")
+        return PathAxes::vehicle;
+    return fail(ErrorCode::bad_input, "{}: path_axes: expected \"camera\" or \"vehicle\", found {}", where,
+                printable(file["path_axes"].dump(-1, ' ', true), 60));
+}
+
+} // namespace
+
+Result<Rig> read_rig(const Path& path)
+{
+    const std::string name = quote_path(path);
+    SR_TRY(const Json file, read_json(path));
+    if (!file.is_object() || !file.contains("sensors") || !file["sensors"].is_array())
+        return fail(ErrorCode::bad_input, "{}: expected an object with an array of sensors", name);
+    SR_CHECK(check_keys(file, {"path_axes", "sensors", "comment"}, name));
+    const Json& sensors = file["sensors"];
+    if (sensors.empty() || sensors.size() > kMaxSensors)
+        return fail(ErrorCode::bad_input, "{}: expected 1 to {} sensors, found {}", name, kMaxSensors, sensors.size());
+    Rig rig;
+    SR_TRY(rig.path_axes, read_path_axes(file, name));
+    for (size_t i = 0; i < sensors.size(); ++i) {
+        SR_TRY(Sensor sensor, read_sensor(sensors[i], fmt::format("{} sensor {}", name, i)));
+        if (std::ranges::find(rig.sensors, sensor.name, &Sensor::name) != rig.sensors.end())
+            return fail(ErrorCode::bad_input, "{}: two sensors are called {}", name, quote(sensor.name));
+        rig.sensors.push_back(std::move(sensor));
+    }
+    return rig;
+}
+
+CameraPath expand_rig(const Rig& rig, const CameraPath& vehicle)
+{
+    CameraPath cameras;
+    for (const CameraFrame& pose : vehicle.frames) {
+        Rigid world_to_vehicle = pose.pose.world_to_camera;
+        if (rig.path_axes == PathAxes::camera)
+            world_to_vehicle = compose(inverse(kVehicleToForwardCamera), world_to_vehicle);
+        for (const Sensor& sensor : rig.sensors)
+            cameras.frames.push_back({pose.time,
+                                      sensor.name,
+                                      {compose(inverse(sensor.sensor_to_vehicle), world_to_vehicle)},
+                                      sensor.intrinsics});
+    }
+    return cameras;
+}
+
+} // namespace semrover

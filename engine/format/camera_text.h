@@ -1,0 +1,41 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "runtime/base/result.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+namespace semrover {
+
+// lines and words of camera path files in text; views into the text that they were cut from
+
+constexpr uint64_t kMaxPathBytes = 16u << 20;
+
+// the lines of a text one after the other, without their ends; a last line without an end counts
+class TextLines {
+  public:
+    explicit TextLines(std::string_view text) : rest_(text) {}
+
+    bool next(); // to the first line, and on; false at the end
+    std::string_view line() const { return line_; }
+    size_t number() const { return number_; } // from 1
+
+  private:
+    std::string_view rest_, line_;
+    size_t number_ = 0;
+};
+
+// separated by blanks; from '#' on it is a comment. At most `most`, a word more when there are more.
+std::vector<std::string_view> words_of(std::string_view line, size_t most);
+
+size_t count_words(std::string_view line);
+
+// bad_input, with `where` in front, for what is not a number
+Result<double> number_of(std::string_view word, std::string_view where);
+Result<std::vector<double>> numbers_of_words(const std::vector<std::string_view>& words, std::string_view where);
+
+} // namespace semrover

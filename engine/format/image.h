@@ -1,0 +1,50 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/camera/image_size.h"
+#include "runtime/base/file.h"
+#include "runtime/base/result.h"
+
+#include <cstdint>
+#include <span>
+#include <string_view>
+#include <vector>
+
+namespace semrover {
+
+struct ImageRgb8 {
+    uint32_t width = 0, height = 0;
+    std::vector<uint8_t> pixels; // [height, width, 3] sRGB
+};
+
+// PNG files, written atomically, the same pixels always as the same bytes. Pixels are [height, width(, 3)], top row
+// first; another count is the caller's bug. A size of 0 or over kMaxImageSide is refused (bad_input).
+Status write_png_rgb8(const Path& path, uint32_t width, uint32_t height, std::span<const uint8_t> pixels);
+Status write_png_gray8(const Path& path, uint32_t width, uint32_t height, std::span<const uint8_t> pixels);
+Status write_png_gray16(const Path& path, uint32_t width, uint32_t height, std::span<const uint16_t> pixels);
+
+// any PNG as 8-bit RGB: palettes and gray are expanded, 16 bits cut to 8, alpha dropped. Untrusted input: the size is
+// limited, and nothing is allocated that the file is too short to fill.
+Result<ImageRgb8> read_png_rgb8(const Path& path);
+
+// baseline JPEG, 4:2:0, quality 1..100, likewise
+Status write_jpeg_rgb8(const Path& path, uint32_t width, uint32_t height, std::span<const uint8_t> pixels, int quality);
+Result<ImageRgb8> read_jpeg_rgb8(const Path& path);
+
+// the bytes of a PNG file, and a PNG or JPEG file (told by its first bytes) that lies in memory; `where` names it
+Result<std::vector<std::byte>> encode_png_rgb8(uint32_t width, uint32_t height, std::span<const uint8_t> pixels);
+Result<ImageRgb8> decode_jpeg_rgb8(std::span<const std::byte> file, std::string_view where);
+Result<ImageRgb8> decode_image_rgb8(std::span<const std::byte> file, std::string_view where);
+Result<ImageRgb8> read_image_rgb8(const Path& path); // likewise, at most 1 GiB
+
+Result<ImageSize> read_png_size(const Path& path);
+
+// 16-bit gray as it is (depth in millimetres); another kind of PNG is refused
+struct ImageGray16 {
+    uint32_t width = 0, height = 0;
+    std::vector<uint16_t> pixels; // [height, width]
+};
+Result<ImageGray16> read_png_gray16(const Path& path);
+
+} // namespace semrover

@@ -1,0 +1,168 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/format/image_jpeg.h"
+
+#include "engine/format/image.h"
+#include "runtime/base/quote.h"
+
+#include <csetjmp>
+#include <cstdio>
+#include <cstdlib>
+#include <jpeglib.h>
+
+namespace semrover {
+
+namespace {
+
+constexpr uint64_t kMaxJpegBytes = 1u << 30;
+constexpr uint64_t kMaxExpansion = 8192; // a block of 64 pixels takes a bit or more of each channel
+
+// libjpeg reports errors by a callback that must not return: it keeps the message and jumps back. No object with a
+// destructor lives in a frame that is jumped over.
+struct Errors {
+    jpeg_error_mgr manager; // first: libjpeg hands back its address
+    std::jmp_buf jump;
+    char message[JMSG_LENGTH_MAX] = "";
+
+    jpeg_error_mgr* install()
+    {
+        jpeg_std_error(&manager);
+        manager.error_exit = [](j_common_ptr info) {
+            auto* self = reinterpret_cast<Errors*>(info->err);
+            info->err->format_message(info, self->message);
+            std::longjmp(self->jump, 1);
+        };
+        manager.output_message = [](j_common_ptr) {}; // warnings do not go to the terminal
+        return &manager;
+    }
+};
+
+struct Encoder {
+    jpeg_compress_struct info{};
+    Errors errors;
+    unsigned char* bytes = nullptr; // malloc'ed by libjpeg
+    unsigned long size = 0;
+
+    Encoder() { info.err = errors.install(); }
+    std::span<const std::byte> file() const { return std::as_bytes(std::span(bytes, size)); }
+    Encoder(const Encoder&) = delete;
+    Encoder& operator=(const Encoder&) = delete;
+    ~Encoder()
+    {
+        jpeg_destroy_compress(&info);
+        std::free(bytes);
+    }
+};
+
+bool encode_rows(Encoder& e, uint32_t width, uint32_t height, const uint8_t* pixels, int quality)
+{
+    if (setjmp(e.errors.jump))
+        return false;
+    jpeg_create_compress(&e.info);
+    jpeg_mem_dest(&e.info, &e.bytes, &e.size);
+    e.info.image_width = width;
+    e.info.image_height = height;
+    e.info.input_components = 3;
+    e.info.in_color_space = JCS_RGB;
+    jpeg_set_defaults(&e.info);
+    jpeg_set_quality(&e.info, quality, TRUE);
+    e.info.dct_method = JDCT_ISLOW; // the same bytes on every CPU
+    jpeg_start_compress(&e.info, TRUE);
+    while (e.info.next_scanline < height) {
+        auto* row = const_cast<uint8_t*>(pixels + size_t(e.info.next_scanline) * width * 3);
+        jpeg_write_scanlines(&e.info, &row, 1);
+    }
+    jpeg_finish_compress(&e.info);
+    return true;
+}
+
+Status encode(Encoder& e, std::string_view where, uint32_t width, uint32_t height, std::span<const uint8_t> pixels,
+              int quality)
+{
+    SR_ASSERT(pixels.size() == size_t(width) * height * 3 && quality >= 1 && quality <= 100,
+              "{} x {} pixels given with {} bytes, quality {}", width, height, pixels.size(), quality);
+    if (width == 0 || height == 0 || width > kMaxImageSide || height > kMaxImageSide)
+        return fail(ErrorCode::bad_input, "cannot write {}: an image of {} x {} pixels, expected 1 to {} each way",
+                    where, width, height, kMaxImageSide);
+    if (!encode_rows(e, width, height, pixels.data(), quality))
+        return fail(ErrorCode::out_of_memory, "cannot write {}: {}", where, printable(e.errors.message));
+    return {};
+}
+
+struct Decoder {
+    jpeg_decompress_struct info{};
+    Errors errors;
+
+    Decoder() { info.err = errors.install(); }
+    Decoder(const Decoder&) = delete;
+    Decoder& operator=(const Decoder&) = delete;
+    ~Decoder() { jpeg_destroy_decompress(&info); }
+};
+
+bool read_header(Decoder& d, std::span<const std::byte> file)
+{
+    if (setjmp(d.errors.jump))
+        return false;
+    jpeg_create_decompress(&d.info);
+    jpeg_mem_src(&d.info, reinterpret_cast<const unsigned char*>(file.data()), static_cast<unsigned long>(file.size()));
+    jpeg_read_header(&d.info, TRUE);
+    return true;
+}
+
+bool read_rows(Decoder& d, uint8_t* pixels)
+{
+    if (setjmp(d.errors.jump))
+        return false;
+    d.info.out_color_space = JCS_RGB;
+    d.info.dct_method = JDCT_ISLOW;
+    jpeg_start_decompress(&d.info);
+    while (d.info.output_scanline < d.info.output_height) {
+        uint8_t* row = pixels + size_t(d.info.output_scanline) * d.info.output_width * 3;
+        jpeg_read_scanlines(&d.info, &row, 1);
+    }
+    jpeg_finish_decompress(&d.info);
+    return true;
+}
+
+} // namespace
+
+Status write_jpeg_rgb8(const Path& path, uint32_t width, uint32_t height, std::span<const uint8_t> pixels, int quality)
+{
+    Encoder e;
+    SR_CHECK(encode(e, quote_path(path), width, height, pixels, quality));
+    return write_file_atomically(path, e.file());
+}
+
+Result<std::vector<std::byte>> encode_jpeg_rgb8(uint32_t width, uint32_t height, std::span<const uint8_t> pixels,
+                                                int quality)
+{
+    Encoder e;
+    SR_CHECK(encode(e, "a JPEG", width, height, pixels, quality));
+    return std::vector<std::byte>(e.file().begin(), e.file().end());
+}
+
+Result<ImageRgb8> read_jpeg_rgb8(const Path& path)
+{
+    SR_TRY(const std::vector<std::byte> file, read_file(path, kMaxJpegBytes));
+    return decode_jpeg_rgb8(file, quote_path(path));
+}
+
+Result<ImageRgb8> decode_jpeg_rgb8(std::span<const std::byte> file, std::string_view where)
+{
+    Decoder d;
+    if (file.empty() || !read_header(d, file))
+        return fail(ErrorCode::bad_input, "{}: not a valid JPEG: {}", where,
+                    file.empty() ? "the file is empty" : printable(d.errors.message));
+    const uint64_t pixels = uint64_t(d.info.image_width) * d.info.image_height;
+    if (d.info.image_width > kMaxImageSide || d.info.image_height > kMaxImageSide ||
+        pixels / kMaxExpansion > file.size())
+        return fail(ErrorCode::bad_input, "{}: {} x {} pixels in {} bytes; the file is cut or too large", where,
+                    d.info.image_width, d.info.image_height, file.size());
+    ImageRgb8 image{d.info.image_width, d.info.image_height, {}};
+    image.pixels.resize(pixels * 3);
+    if (!read_rows(d, image.pixels.data()))
+        return fail(ErrorCode::bad_input, "{}: not a valid JPEG: {}", where, printable(d.errors.message));
+    return image;
+}
+
+} // namespace semrover

@@ -1,0 +1,261 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/format/labelled_points.h"
+
+#include "engine/format/label_map.h"
+#include "engine/format/ply.h"
+#include "engine/format/ply_reader.h"
+#include "engine/scene/scene_points.h"
+#include "runtime/base/dtype.h"
+#include "runtime/base/mix64.h"
+#include "runtime/base/quote.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace semrover {
+
+namespace {
+
+constexpr size_t kMaxPoints = 1u << 30;
+constexpr double kFaceMargin = 1e-4; // of a cell; less than half of what 16 bits resolve at its face
+
+struct Points {
+    std::vector<std::array<double, 3>> positions; // metres, in the world
+    std::vector<std::array<uint8_t, 3>> colors;   // empty when there are none
+    std::vector<uint8_t> labels;
+    std::vector<Cell> cells;
+};
+
+const PlyProperty* first_of(const PlyElement& element, std::initializer_list<const char*> names)
+{
+    for (const char* name : names)
+        if (const PlyProperty* property = element.find(name); property && !property->is_list)
+            return property;
+    return nullptr;
+}
+
+using Columns = std::array<const PlyProperty*, 3>;
+
+Result<Columns> position_columns(const PlyElement& element, const std::string& where)
+{
+    const Columns columns = {first_of(element, {"x"}), first_of(element, {"y"}), first_of(element, {"z"})};
+    for (size_t a = 0; a < 3; ++a)
+        if (!columns[a])
+            return fail(ErrorCode::bad_input, "{}: its vertices have no property {}", where, "xyz"[a]);
+    return columns;
+}
+
+// sRGB
+std::array<uint8_t, 3> color_of(const Columns& columns, size_t row)
+{
+    std::array<uint8_t, 3> color;
+    for (size_t a = 0; a < 3; ++a) {
+        const double value = columns[a]->values[row] * (columns[a]->is_float ? 255 : 1);
+        color[a] = value > 0 ? static_cast<uint8_t>(std::lround(std::min(value, 255.0))) : uint8_t(0);
+    }
+    return color;
+}
+
+const PlyProperty* label_column(const PlyElement& element)
+{
+    return first_of(element, {"label", "class", "semantic", "semantic_label", "class_id", "classification", "category",
+                              "objtag", "ObjTag", "scalar_label", "scalar_Classification"});
+}
+
+// CloudCompare writes labels as floats
+Result<uint32_t> label_number(const PlyProperty& column, size_t row, const std::string& where)
+{
+    const double value = column.values[row];
+    if (!(value >= 0 && value < 4294967296.0) || value != std::floor(value))
+        return fail(ErrorCode::bad_input, "{}: vertex {}: {}: expected a whole number, found {}", where, row,
+                    quote(column.name, 60), value);
+    return static_cast<uint32_t>(value);
+}
+
+struct CloudColumns {
+    Columns position, color;
+    bool colored = false;
+    const PlyProperty* label = nullptr; // none: all points have the default one
+};
+
+Result<CloudColumns> columns_of(const PlyElement& vertices, const SceneGridOptions& o, const std::string& where)
+{
+    CloudColumns c;
+    SR_TRY(c.position, position_columns(vertices, where));
+    c.label = label_column(vertices);
+    if (!c.label && !o.default_label)
+        return fail(ErrorCode::bad_input, "{}: its vertices have no label; --label CLASS gives them one", where);
+    c.color = {first_of(vertices, {"red", "r", "diffuse_red"}), first_of(vertices, {"green", "g", "diffuse_green"}),
+               first_of(vertices, {"blue", "b", "diffuse_blue"})};
+    c.colored = c.color[0] && c.color[1] && c.color[2] && !o.semantic;
+    return c;
+}
+
+// the cell of a point, none if it is not finite
+Result<std::optional<Cell>> cell_of(const std::array<double, 3>& p, size_t row, double voxel_size,
+                                    const std::string& where)
+{
+    std::array<double, 3> c;
+    for (size_t a = 0; a < 3; ++a)
+        c[a] = std::floor(p[a] / voxel_size);
+    if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2]))
+        return std::optional<Cell>();
+    if (!std::ranges::all_of(c, [](double v) { return std::abs(v) <= kMaxCoordinate; }))
+        return fail(ErrorCode::bad_input, "{}: vertex {}: ({}, {}, {}) m is absurd: expected within 2^20 cells", where,
+                    row, p[0], p[1], p[2]);
+    return std::optional<Cell>({int32_t(c[0]), int32_t(c[1]), int32_t(c[2])});
+}
+
+Status take_points(const PlyElement& vertices, const SceneGridOptions& o, const std::string& where, Points& points,
+                   SceneGrid& out)
+{
+    SR_TRY(const CloudColumns columns, columns_of(vertices, o, where));
+    LabelMap map = LabelMap::identity();
+    if (!o.map.empty())
+        SR_CHECK(map.apply(o.map));
+    uint64_t not_finite = 0;
+    for (size_t row = 0; row < vertices.rows; ++row) {
+        std::array<double, 3> p;
+        for (size_t a = 0; a < 3; ++a)
+            p[a] = columns.position[a]->values[row] + o.origin[a];
+        SR_TRY(const std::optional<Cell> cell, cell_of(p, row, double(o.voxel_size), where));
+        uint8_t target = o.default_label.value_or(0);
+        if (cell && columns.label) {
+            SR_TRY(const uint32_t number, label_number(*columns.label, row, where));
+            target = map(number);
+        }
+        not_finite += !cell;
+        if (!cell || target >= kClassCount)
+            continue;
+        points.positions.push_back(p);
+        points.cells.push_back(*cell);
+        points.labels.push_back(target);
+        if (columns.colored)
+            points.colors.push_back(color_of(columns.color, row));
+    }
+    SR_CHECK(map.check(where, "points"));
+    out.warnings = map.left_out("points");
+    out.dropped = map.dropped() + not_finite;
+    if (not_finite)
+        out.warnings.push_back(fmt::format("{} points that are not finite are left out", not_finite));
+    if (points.positions.empty())
+        return fail(ErrorCode::bad_input, "{}: there are no points", where);
+    return {};
+}
+
+uint64_t random_key(uint64_t seed, const Cell& cell, uint64_t place)
+{
+    uint64_t key = mix64(seed + kMixStep);
+    for (const int32_t c : cell)
+        key = mix64(key ^ static_cast<uint32_t>(c)) + kMixStep;
+    return mix64(key ^ place);
+}
+
+uint8_t majority(const Points& points, std::span<const size_t> members)
+{
+    std::array<size_t, kClassCount> votes{};
+    for (const size_t i : members)
+        ++votes[points.labels[i]];
+    return static_cast<uint8_t>(std::ranges::max_element(votes) - votes.begin()); // the first of the largest
+}
+
+// n of a cell's points, in the file's order
+std::vector<size_t> chosen(const Points& points, std::span<const size_t> members, uint8_t label, size_t n,
+                           uint64_t seed)
+{
+    std::vector<size_t> all(members.begin(), members.end());
+    if (all.size() > n) {
+        const auto rank = [&](size_t i) {
+            return std::tuple(points.labels[i] != label, random_key(seed, points.cells[i], i), i);
+        };
+        std::ranges::nth_element(all, all.begin() + static_cast<ptrdiff_t>(n), {}, rank);
+        all.resize(n);
+        std::ranges::sort(all);
+    }
+    for (size_t i = 0; all.size() < n; ++i)
+        all.push_back(all[i]);
+    return all;
+}
+
+void append_points(VoxelGrid& grid, const Points& points, std::span<const size_t> chosen)
+{
+    const std::array<float, 3> center = cell_center(grid.cells.back(), grid.voxel_size);
+    const double half = double(grid.voxel_size) / 2;
+    for (const size_t i : chosen)
+        for (size_t a = 0; a < 3; ++a) {
+            const double offset = std::clamp(points.positions[i][a] - double(center[a]), -half, half);
+            grid.points.push_back(float_to_half(static_cast<float>(offset)));
+            grid.colors.push_back(points.colors[i][a]);
+        }
+    grid.generated.push_back(1);
+}
+
+// points may lie on their cell's faces, and by rounding 1 mm beyond: a reader would find them in the next cell
+void move_inside(std::array<float, 3>& position, const Cell& cell, double voxel_size)
+{
+    for (size_t a = 0; a < 3; ++a) {
+        const double low = (cell[a] + kFaceMargin) * voxel_size, high = (cell[a] + 1 - kFaceMargin) * voxel_size;
+        position[a] = static_cast<float>(std::clamp(double(position[a]), low, high));
+    }
+}
+
+} // namespace
+
+Result<SceneGrid> read_labelled_points(const Path& path, const SceneGridOptions& o)
+{
+    const std::string where = quote_path(path);
+    SceneGrid out;
+    Points points;
+    {
+        SR_TRY(const PlyFile file, read_ply(path));
+        const PlyElement* vertices = file.find("vertex");
+        if (!vertices)
+            return fail(ErrorCode::bad_input, "{}: has no element vertex", where);
+        if (vertices->rows > kMaxPoints)
+            return fail(ErrorCode::bad_input, "{}: {} vertices, at most {} are supported", where, vertices->rows,
+                        kMaxPoints);
+        SR_CHECK(take_points(*vertices, o, where, points, out));
+    }
+    std::vector<size_t> order(points.cells.size());
+    std::iota(order.begin(), order.end(), size_t(0));
+    std::ranges::stable_sort(order, {}, [&](size_t i) { return points.cells[i]; });
+    VoxelGrid& grid = out.grid;
+    grid.voxel_size = o.voxel_size;
+    grid.points_per_voxel = points.colors.empty() ? 0 : o.points_per_voxel;
+    for (size_t begin = 0, end = 0; begin < order.size(); begin = end) {
+        while (end < order.size() && points.cells[order[end]] == points.cells[order[begin]])
+            ++end;
+        const std::span<const size_t> members = std::span(order).subspan(begin, end - begin);
+        grid.cells.push_back(points.cells[order[begin]]);
+        grid.labels.push_back(majority(points, members));
+        if (grid.points_per_voxel)
+            append_points(grid, points,
+                          chosen(points, members, grid.labels.back(), size_t(grid.points_per_voxel), o.seed));
+    }
+    grid.metadata["source"] = "labelled points";
+    SR_CHECK(check_grid(grid, where));
+    return out;
+}
+
+Status write_labelled_points(const Path& path, const VoxelGrid& grid)
+{
+    SR_CHECK(check_grid(grid, quote_path(path)));
+    const ScenePoints points = points_of(grid);
+    Surfels s{points.positions, {}, points.colors, {}, {}, {}, {}};
+    for (size_t i = 0; i < points.size(); ++i) {
+        move_inside(s.position[i], grid.cells[points.cells[i]], grid.voxel_size);
+        s.label.push_back(static_cast<uint8_t>(points.labels[i]));
+    }
+    for (size_t v = 0; v < grid.cells.size(); ++v) {
+        if (grid.has_points() && grid.generated[v])
+            continue;
+        s.position.push_back(cell_center(grid.cells[v], grid.voxel_size));
+        s.color.push_back(label_color(grid.labels[v]));
+        s.label.push_back(grid.labels[v]);
+    }
+    return write_points_ply(path, s);
+}
+
+} // namespace semrover

@@ -1,0 +1,153 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/format/semantic_kitti.h"
+
+#include "engine/format/dense_labels.h"
+#include "runtime/base/quote.h"
+
+#include <algorithm>
+
+namespace semrover {
+
+namespace {
+
+constexpr size_t kVoxels = 256 * 256 * 32;
+
+constexpr SourceLabel kLabels[] = {
+    {0, "unlabeled", kEmpty},
+    {1, "outlier", kLeftOut},
+    {10, "car", 13},
+    {11, "bicycle", 18},
+    {13, "bus", 15},
+    {15, "motorcycle", 17},
+    {16, "on-rails", 16},
+    {18, "truck", 14},
+    {20, "other-vehicle", 14},
+    {30, "person", 11},
+    {31, "bicyclist", 12},
+    {32, "motorcyclist", 12},
+    {40, "road", 0},
+    {44, "parking", 0},
+    {48, "sidewalk", 1},
+    {49, "other-ground", 9},
+    {50, "building", 2},
+    {51, "fence", 4},
+    {52, "other-structure", 3},
+    {60, "lane-marking", 19},
+    {70, "vegetation", 8},
+    {71, "trunk", 8},
+    {72, "terrain", 9},
+    {80, "pole", 5},
+    {81, "traffic-sign", 7},
+    {99, "other-object", kLeftOut},
+    {252, "moving-car", 13},
+    {253, "moving-bicyclist", 12},
+    {254, "moving-person", 11},
+    {255, "moving-motorcyclist", 12},
+    {256, "moving-on-rails", 16},
+    {257, "moving-bus", 15},
+    {258, "moving-truck", 14},
+    {259, "moving-other-vehicle", 14},
+};
+
+// by class; 0 has no entry
+constexpr std::array<uint16_t, kClassCount> kRaw = {40, 48, 50, 52, 51, 80, 81, 81, 70, 72,
+                                                    0,  30, 31, 10, 18, 13, 16, 15, 11, 60};
+constexpr uint8_t kTrafficLight = 6, kSky = 10;
+
+DenseLabels empty_box()
+{
+    return {{256, 256, 32}, {2000, 2000, 2000}, {0, -256000, -20000}, {}};
+}
+
+Result<std::vector<std::byte>> read_exactly(const Path& path, size_t bytes)
+{
+    SR_TRY(std::vector<std::byte> data, read_file(path, bytes));
+    if (data.size() != bytes)
+        return fail(ErrorCode::bad_input, "{}: expected {} bytes for 256 x 256 x 32 voxels, found {}", quote_path(path),
+                    bytes, data.size());
+    return data;
+}
+
+bool bit(const std::vector<std::byte>& bits, size_t i)
+{
+    return (std::to_integer<unsigned>(bits[i / 8]) >> (7 - i % 8)) & 1;
+}
+
+// kEmpty for voxels without the bit (or with it)
+Status keep_bits(std::vector<uint16_t>& raw, const Path& path, bool keep)
+{
+    SR_TRY(const std::vector<std::byte> bits, read_exactly(path, kVoxels / 8));
+    for (size_t i = 0; i < kVoxels; ++i)
+        if (bit(bits, i) != keep)
+            raw[i] = 0;
+    return {};
+}
+
+Path sibling(Path path, const char* extension)
+{
+    return path.replace_extension(extension);
+}
+
+} // namespace
+
+Result<SceneGrid> read_semantic_kitti(const Path& path, const SceneGridOptions& options)
+{
+    const std::string where = quote_path(path);
+    const Path labels = sibling(path, ".label"), invalid = sibling(path, ".invalid");
+    if (!is_there(labels) && is_there(path))
+        return fail(ErrorCode::bad_input, "{}: occupancy without labels: there is no {}", where, quote_path(labels));
+    SR_TRY(const std::vector<std::byte> bytes, read_exactly(labels, kVoxels * 2));
+    std::vector<uint16_t> raw(kVoxels);
+    for (size_t i = 0; i < kVoxels; ++i)
+        raw[i] = uint16_t(std::to_integer<unsigned>(bytes[2 * i]) | std::to_integer<unsigned>(bytes[2 * i + 1]) << 8);
+    if (path.extension() == ".bin")
+        SR_CHECK(keep_bits(raw, path, true));
+    if (is_there(invalid))
+        SR_CHECK(keep_bits(raw, invalid, false));
+    LabelMap map{std::span<const SourceLabel>(kLabels)};
+    if (!options.map.empty())
+        SR_CHECK(map.apply(options.map));
+    DenseLabels dense = empty_box();
+    dense.labels.resize(kVoxels);
+    for (size_t i = 0; i < kVoxels; ++i)
+        dense.labels[i] = map(raw[i]);
+    SR_CHECK(map.check(where, "voxels"));
+    for (size_t a = 0; a < 3; ++a) {
+        SR_TRY(const int64_t shift, tenths_of(options.origin[a], "origin"));
+        dense.origin[a] += shift;
+    }
+    SceneGrid out;
+    SR_TRY(out.grid, resample(dense, options.voxel_size, options.min_fill, where));
+    out.grid.metadata["source"] = "SemanticKITTI";
+    out.warnings = map.left_out("voxels");
+    out.dropped = map.dropped();
+    return out;
+}
+
+Status write_semantic_kitti(const Path& path, const VoxelGrid& grid, std::vector<std::string>& warnings)
+{
+    DenseLabels dense = empty_box();
+    SR_CHECK(split_into(dense, grid, quote_path(path)));
+    std::vector<std::byte> labels(kVoxels * 2), bits(kVoxels / 8);
+    for (size_t i = 0; i < kVoxels; ++i) {
+        const uint16_t raw = dense.labels[i] < kClassCount ? kRaw[dense.labels[i]] : uint16_t(0);
+        labels[2 * i] = std::byte(raw & 255);
+        labels[2 * i + 1] = std::byte(raw >> 8);
+        if (raw)
+            bits[i / 8] |= std::byte(128u >> (i % 8));
+    }
+    const auto cells = [&](uint8_t label) { return std::ranges::count(grid.labels, label); };
+    if (cells(kTrafficLight))
+        warnings.push_back(fmt::format("{} cells of traffic light become traffic-sign", cells(kTrafficLight)));
+    if (cells(kSky))
+        warnings.push_back(fmt::format("{} cells of sky are left out", cells(kSky)));
+    SR_TRY(AtomicFile label_file, AtomicFile::create(sibling(path, ".label")));
+    SR_TRY(AtomicFile bit_file, AtomicFile::create(sibling(path, ".bin")));
+    SR_CHECK(label_file.write(labels));
+    SR_CHECK(bit_file.write(bits));
+    SR_CHECK(label_file.commit());
+    return bit_file.commit();
+}
+
+} // namespace semrover

@@ -1,0 +1,58 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/format/ply.h"
+
+#include <array>
+#include <string>
+#include <vector>
+
+namespace semrover {
+
+// splats of a file as flat ones
+struct SplatFile {
+    Surfels surfels;
+    std::vector<std::string> warnings; // a line each
+    uint64_t dropped = 0;
+};
+
+// a 3D Gaussian as files have it
+struct Ellipsoid {
+    std::array<double, 3> position{}; // metres
+    std::array<double, 3> scale{};    // metres, standard deviations along its own axes
+    std::array<double, 4> rotation{}; // x, y, z, w: from its axes to the world's; of any length but 0
+    std::array<double, 3> color{};    // sRGB, 0..1
+    double opacity = 0;               // 0..1
+    uint8_t label = kNoLabel;
+};
+
+// Makes surfels of ellipsoids: the axis of the smallest scale (of equal ones the last) is the normal. The tangents of a
+// surfel follow from its normal (tangents_of), so the variances along them are kept, and the correlation between them
+// is lost: splats that are longer than wide and lie across the tangents are counted. So are thick ones (third scale
+// above half the second). Splats that are not finite, or without a rotation or a size, are dropped and counted.
+class EllipsoidFlattener {
+  public:
+    explicit EllipsoidFlattener(std::string where) : where_(std::move(where)) {}
+
+    void add(const Ellipsoid& ellipsoid, bool flat = false); // flat: the third axis is the normal, whatever its scale
+    void count_view_dependent() { ++view_dependent_; }       // a splat with harmonics above degree 0, which are lost
+    Result<SplatFile> finish() &&;                           // bad_input when nothing is left
+
+  private:
+    std::string where_;
+    SplatFile out_;
+    uint64_t not_finite_ = 0, without_size_ = 0, across_ = 0, thick_ = 0, view_dependent_ = 0;
+};
+
+// 3DGS or 2DGS, by property name in any order, ascii or binary: x y z, scale_0 scale_1 (scale_2) as logarithms,
+// rot_0..3 (w first), opacity as a logit, f_dc_0..2 or red green blue, an integer label if there. Without scale_2 the
+// splats are flat (2DGS). bad_input for files without these
+Result<SplatFile> read_splats_ply(const Path& path);
+
+// antimatter15's .splat: 32 bytes a splat: position 3 f32, scale 3 f32 in metres, RGBA u8, quaternion u8 (w first,
+// 128 q + 128). Source: https://github.com/antimatter15/splat, README.md and convert.py
+Result<SplatFile> read_dot_splat(const Path& path);
+Status write_dot_splat(const Path& path, const Surfels& surfels);
+
+} // namespace semrover

@@ -1,0 +1,153 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/job/run_folder.h"
+
+#include "runtime/base/quote.h"
+
+#include <cerrno>
+#include <cstring>
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+namespace semrover {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr uint64_t kMaxJournalBytes = 1ull << 30;
+
+tl::unexpected<Error> system_failure(const char* what, const Path& path)
+{
+    return fail(ErrorCode::bad_input, "cannot {} {}: {}", what, quote_path(path), std::strerror(errno));
+}
+
+} // namespace
+
+RunFolder::RunFolder(RunFolder&& other) noexcept
+    : path_(std::move(other.path_)), settings_(std::move(other.settings_)), contents_(std::move(other.contents_)),
+      entries_(std::move(other.entries_)), appended_(other.appended_), lock_(std::exchange(other.lock_, -1)),
+      journal_(std::exchange(other.journal_, -1))
+{
+}
+
+RunFolder::~RunFolder()
+{
+    if (journal_ >= 0)
+        ::close(journal_);
+    if (lock_ >= 0)
+        ::close(lock_); // the kernel drops the lock, also when the process is killed
+}
+
+Result<RunFolder> RunFolder::open(const Path& folder, const Json& settings, bool restart, const RunContents& contents)
+{
+    RunFolder run;
+    run.path_ = folder;
+    run.settings_ = settings;
+    run.contents_ = contents;
+    SR_CHECK(make_folder(folder));
+    SR_CHECK(run.lock());
+    if (fs::exists(folder / "run.json") && !restart) {
+        SR_TRY(const Json before, read_json(folder / "run.json"));
+        if (before.value("settings", Json()) != settings)
+            return fail(ErrorCode::bad_input,
+                        "{} holds a run with other settings, model, input or device; finish that one, name another "
+                        "output, or start over with -y",
+                        quote_path(folder));
+        // pieces of a finished run are gone: what is asked for now is made from the start
+        SR_CHECK(before.value("state", Json()) == "finished" ? run.start(settings) : run.read_journal());
+    } else {
+        SR_CHECK(run.start(settings));
+    }
+    const Path journal = folder / "journal.jsonl";
+    run.journal_ = ::open(journal.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, 0644);
+    if (run.journal_ < 0)
+        return system_failure("open", journal);
+    return run;
+}
+
+Status RunFolder::lock()
+{
+    const Path path = path_ / "lock";
+    lock_ = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+    if (lock_ < 0)
+        return system_failure("open", path);
+    if (::flock(lock_, LOCK_EX | LOCK_NB) != 0)
+        return fail(ErrorCode::bad_input, "another process works in {}", quote_path(path_));
+    return {};
+}
+
+// removes what an earlier run left: only names that runs make
+Status RunFolder::start(const Json& settings)
+{
+    std::error_code ignored;
+    for (const auto* names : {&contents_.pieces, &contents_.results})
+        for (const std::string& name : *names)
+            fs::remove_all(path_ / name, ignored);
+    fs::remove(path_ / "journal.jsonl", ignored);
+    fs::remove(path_ / "run.json", ignored);
+    return write_file_atomically(path_ / "run.json", Json{{"settings", settings}, {"state", "running"}}.dump(1) + "\n");
+}
+
+// a line that is not whole (the process died while writing it) ends the journal; the file is cut there
+Status RunFolder::read_journal()
+{
+    const Path path = path_ / "journal.jsonl";
+    if (!fs::exists(path))
+        return {};
+    SR_TRY(const std::string text, read_text_file(path, kMaxJournalBytes));
+    size_t at = 0;
+    while (at < text.size()) {
+        const size_t end = text.find('\n', at);
+        if (end == std::string::npos)
+            break;
+        auto entry = parse_json(std::string_view(text).substr(at, end - at), "journal");
+        if (!entry)
+            break;
+        entries_.push_back(std::move(*entry));
+        at = end + 1;
+    }
+    if (at < text.size() && ::truncate(path.c_str(), off_t(at)) != 0)
+        return system_failure("cut", path);
+    return {};
+}
+
+Status RunFolder::append(const Json& entry)
+{
+    const std::string line = entry.dump() + "\n";
+    size_t written = 0;
+    while (written < line.size()) {
+        const ssize_t n = ::write(journal_, line.data() + written, line.size() - written);
+        if (n < 0 && errno != EINTR)
+            return system_failure("write", path_ / "journal.jsonl");
+        written += n > 0 ? size_t(n) : 0;
+    }
+    if (::fdatasync(journal_) != 0)
+        return system_failure("write", path_ / "journal.jsonl");
+    appended_ = true;
+    return {};
+}
+
+void RunFolder::drop_if_empty()
+{
+    if (appended_ || !entries_.empty())
+        return;
+    std::error_code ignored;
+    for (const char* name : {"run.json", "journal.jsonl", "lock"})
+        fs::remove(path_ / name, ignored);
+    fs::remove(path_, ignored); // stays if it holds anything else
+}
+
+Status RunFolder::finish(const Json& results)
+{
+    const Json summary{{"settings", settings_}, {"state", "finished"}, {"results", results}};
+    SR_CHECK(write_file_atomically(path_ / "run.json", summary.dump(1) + "\n"));
+    std::error_code ignored; // what stays only costs space
+    for (const std::string& name : contents_.pieces)
+        fs::remove_all(path_ / name, ignored);
+    fs::remove(path_ / "lock", ignored);
+    return {};
+}
+
+} // namespace semrover

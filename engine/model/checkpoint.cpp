@@ -1,0 +1,155 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/model/checkpoint.h"
+
+#include "engine/model/ldm_config.h"
+#include "engine/model/ldm_names.h"
+#include "engine/model/random_weights.h"
+#include "runtime/base/quote.h"
+
+#include <algorithm>
+
+namespace semrover {
+
+namespace {
+
+constexpr uint64_t kPlainChannels = 4, kRendererChannels = 13;
+
+// what diffusers called the parts of VAE attention until 0.16
+constexpr std::pair<std::string_view, std::string_view> kOldAttention[] = {
+    {".query.", ".to_q."}, {".key.", ".to_k."}, {".value.", ".to_v."}, {".proj_attn.", ".to_out.0."}};
+
+std::string modern_name(const std::string& name)
+{
+    if (name.find("mid_block.attentions.") == std::string::npos)
+        return name;
+    for (const auto& [old_part, new_part] : kOldAttention)
+        if (const size_t at = name.find(old_part); at != std::string::npos)
+            return std::string(name).replace(at, old_part.size(), new_part);
+    return name;
+}
+
+// [N, K] and [N, K, 1, 1] hold the same numbers in the same order
+bool same_matrix(std::span<const uint64_t> a, std::span<const uint64_t> b)
+{
+    if (a.size() > b.size())
+        std::swap(a, b);
+    return std::ranges::equal(a, b) ||
+           (a.size() == 2 && b.size() == 4 && std::ranges::equal(a, b.first(2)) && b[2] == 1 && b[3] == 1);
+}
+
+} // namespace
+
+Result<Checkpoint> Checkpoint::open_folder(const Path& folder, Network network)
+{
+    Checkpoint c;
+    SR_TRY(SafetensorsSet set, SafetensorsSet::open_folder(folder));
+    if (network == Network::vae)
+        for (const TensorInfo& tensor : set.tensors())
+            if (const std::string name = modern_name(tensor.name); name != tensor.name && !set.find(name))
+                c.names_.emplace(name, tensor.name);
+    c.set_ = std::make_shared<const SafetensorsSet>(std::move(set));
+    return c;
+}
+
+Result<Checkpoint> Checkpoint::open_ldm(const Path& file, Network network, const UnetConfig* unet, const VaeConfig* vae)
+{
+    Checkpoint c;
+    SR_TRY(SafetensorsSet set, SafetensorsSet::open(file));
+    c.prefix_ = network == Network::unet ? kLdmUnet : ldm_vae_prefix(set);
+    if (c.prefix_.empty())
+        return fail(ErrorCode::bad_input, "{}: has no VAE: expected tensors {}* or {}*", quote_path(file), kLdmVae[0],
+                    kLdmVae[1]);
+    if (network == Network::unet) {
+        SR_ASSERT(unet, "the UNet's config says where its tensors are");
+        for (const TensorSpec& spec : unet_schema(*unet))
+            c.names_.emplace(spec.name, c.prefix_ + ldm_unet_name(*unet, spec.name));
+    } else {
+        SR_ASSERT(vae, "the VAE's config says where its tensors are");
+        for (const TensorSpec& spec : vae_schema(*vae))
+            c.names_.emplace(spec.name, c.prefix_ + ldm_vae_name(*vae, spec.name));
+    }
+    c.set_ = std::make_shared<const SafetensorsSet>(std::move(set));
+    return c;
+}
+
+Checkpoint Checkpoint::random(uint64_t seed)
+{
+    Checkpoint c;
+    c.seed_ = seed;
+    return c;
+}
+
+const std::string& Checkpoint::file_name(const std::string& name) const
+{
+    const auto found = names_.find(name);
+    return found == names_.end() ? name : found->second;
+}
+
+const TensorInfo* Checkpoint::find(const TensorSpec& spec) const
+{
+    return set_->find(file_name(spec.name));
+}
+
+Status Checkpoint::require(std::span<const TensorSpec> schema) const
+{
+    if (!set_)
+        return {};
+    std::vector<TensorSpec> in_file(schema.begin(), schema.end());
+    for (TensorSpec& spec : in_file) {
+        const TensorInfo* tensor = find(spec);
+        if (tensor && spec.name == "conv_in.weight" && spec.shape.size() == 4 && spec.shape[1] == kRendererChannels &&
+            tensor->shape.size() == 4 && tensor->shape[1] == kPlainChannels)
+            return refuse_plain_unet(set_->path());
+        if (tensor && same_matrix(tensor->shape, spec.shape))
+            spec.shape = tensor->shape;
+        spec.name = file_name(spec.name);
+    }
+    return set_->require(in_file, Unexpected::refuse, prefix_);
+}
+
+Status Checkpoint::read(const TensorSpec& spec, std::vector<float>& values) const
+{
+    if (!set_) {
+        random_tensor(seed_, spec, values);
+        return {};
+    }
+    const TensorInfo* tensor = find(spec);
+    SR_ASSERT(tensor && same_matrix(tensor->shape, spec.shape), "{} was not required", spec.name);
+    SR_CHECK(check_finite(*set_, *tensor));
+    values.resize(tensor->elements());
+    to_float(set_->bytes(*tensor), tensor->dtype, values.data());
+    return {};
+}
+
+TensorStream Checkpoint::stream(const TensorSpec& spec, std::optional<DType> dtype) const
+{
+    if (set_) {
+        const TensorInfo* tensor = find(spec);
+        SR_ASSERT(tensor && same_matrix(tensor->shape, spec.shape), "{} was not required", spec.name);
+        TensorStream stream = stream_tensor(set_, *tensor, dtype);
+        stream.name = spec.name;
+        stream.shape = spec.shape;
+        return stream;
+    }
+    const DType target = dtype.value_or(DType::f32);
+    const auto make = [seed = seed_, spec,
+                       target](std::vector<std::byte>& scratch) -> Result<std::span<const std::byte>> {
+        std::vector<float> values;
+        random_tensor(seed, spec, values);
+        return encode_floats(values, target, spec.name, scratch);
+    };
+    return {spec.name, target, spec.shape, make};
+}
+
+tl::unexpected<Error> refuse_plain_unet(const Path& path)
+{
+    return fail(
+        ErrorCode::bad_input,
+        "{}: conv_in takes {} channels, a plain Stable Diffusion UNet; the deferred renderer needs {}: the noisy "
+        "latent (4) and 9 more: previous latent (4), buffer latent (4), visibility (1). 'semrover convert IN OUT "
+        "--asd-init' adds them with zero weights, to be trained",
+        quote_path(path), kPlainChannels, kRendererChannels);
+}
+
+} // namespace semrover

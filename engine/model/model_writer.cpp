@@ -1,0 +1,83 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/model/model_writer.h"
+
+#include "runtime/base/quote.h"
+
+#include <algorithm>
+
+namespace semrover {
+
+namespace {
+
+constexpr const char* kWeights = "diffusion_pytorch_model";
+
+uint64_t bytes_of(const TensorStream& tensor)
+{
+    uint64_t bytes = dtype_bytes(tensor.dtype);
+    for (const uint64_t dim : tensor.shape)
+        bytes *= dim;
+    return bytes;
+}
+
+// in the order of the schema, each about as large as the others
+Status write_shards(const Path& folder, std::span<const TensorStream> tensors, uint32_t shards)
+{
+    uint64_t total = 0, done = 0;
+    for (const TensorStream& tensor : tensors)
+        total += bytes_of(tensor);
+    Json map = Json::object();
+    size_t next = 0;
+    for (uint32_t i = 0; i < shards; ++i) {
+        const std::string file = fmt::format("{}-{:05}-of-{:05}.safetensors", kWeights, i + 1, shards);
+        const size_t first = next;
+        for (; next < tensors.size() && (i + 1 == shards || done < total / shards * (i + 1)); ++next) {
+            done += bytes_of(tensors[next]);
+            map[tensors[next].name] = file;
+        }
+        SR_CHECK(stream_safetensors(folder / file, tensors.subspan(first, next - first), {{"format", "pt"}}));
+    }
+    return write_json(folder / fmt::format("{}.safetensors.index.json", kWeights),
+                      {{"metadata", {{"total_size", total}}}, {"weight_map", map}});
+}
+
+} // namespace
+
+Status write_json(const Path& path, const Json& json)
+{
+    SR_CHECK(make_folder(path.parent_path()));
+    return write_file_atomically(path, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+}
+
+Status write_component(const Path& folder, const ComponentFiles& files, uint32_t shards)
+{
+    SR_CHECK(make_folder(folder));
+    if (shards > 1)
+        SR_CHECK(write_shards(folder, files.tensors, shards));
+    else
+        SR_CHECK(
+            stream_safetensors(folder / fmt::format("{}.safetensors", kWeights), files.tensors, {{"format", "pt"}}));
+    return write_json(folder / "config.json", files.config);
+}
+
+TensorStream widen_conv_in(TensorStream conv_in, uint32_t channels)
+{
+    SR_ASSERT(conv_in.shape.size() == 4 && conv_in.shape[1] <= channels, "conv_in is {}", shape_text(conv_in.shape));
+    const uint64_t rows = conv_in.shape[0], pixels = conv_in.shape[2] * conv_in.shape[3];
+    const uint64_t from = conv_in.shape[1] * pixels * dtype_bytes(conv_in.dtype);
+    const uint64_t to = channels * pixels * dtype_bytes(conv_in.dtype);
+    const auto make = [source = conv_in.bytes, rows, from,
+                       to](std::vector<std::byte>& scratch) -> Result<std::span<const std::byte>> {
+        std::vector<std::byte> inner;
+        SR_TRY(const std::span<const std::byte> bytes, source(inner));
+        scratch.assign(rows * to, std::byte{0});
+        for (uint64_t row = 0; row < rows; ++row)
+            std::ranges::copy(bytes.subspan(row * from, from), scratch.begin() + std::ptrdiff_t(row * to));
+        return std::span<const std::byte>(scratch);
+    };
+    conv_in.shape[1] = channels;
+    conv_in.bytes = make;
+    return conv_in;
+}
+
+} // namespace semrover

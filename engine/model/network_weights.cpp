@@ -1,0 +1,184 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/model/network_weights.h"
+
+#include <cstring>
+
+namespace semrover {
+
+namespace {
+
+// where a row of the file goes in its part
+uint32_t packed_row(uint32_t row, uint32_t rows, uint32_t heads, bool geglu)
+{
+    if (geglu) {
+        const uint32_t half = rows / 2, in_half = row % half;
+        return in_half / 8 * 16 + in_half % 8 + (row >= half ? 8 : 0);
+    }
+    if (!heads)
+        return row;
+    const uint32_t size = rows / heads;
+    return row / size * round_up(size, kRowPadding) + row % size;
+}
+
+uint32_t packed_rows(uint32_t rows, uint32_t heads, bool geglu)
+{
+    return geglu ? 2 * round_up(rows / 2, kRowPadding) : heads ? padded_heads(rows, heads) : rows;
+}
+
+// errors: a value that fp16 cannot hold
+Result<std::vector<std::byte>> to_dtype(const std::vector<float>& values, DType dtype, const std::string& name)
+{
+    std::vector<std::byte> bytes(values.size() * dtype_bytes(dtype));
+    if (dtype == DType::f32) {
+        std::memcpy(bytes.data(), values.data(), bytes.size());
+        return bytes;
+    }
+    auto* halves = reinterpret_cast<uint16_t*>(bytes.data());
+    for (size_t i = 0; i < values.size(); ++i) {
+        halves[i] = float_to_half(values[i]);
+        if ((halves[i] & 0x7c00) == 0x7c00)
+            return fail(ErrorCode::bad_input, "tensor '{}' holds {}, which fp16 cannot: use --precision fp32", name,
+                        values[i]);
+    }
+    return bytes;
+}
+
+} // namespace
+
+NetworkWeights::Entry& NetworkWeights::add(uint32_t rows, uint32_t cols, DType dtype)
+{
+    const uint64_t bytes = uint64_t(rows) * round_up(cols, kRowPadding) * dtype_bytes(dtype);
+    entries_.push_back({{arena_.add(bytes), rows, cols, dtype}, {}});
+    return entries_.back();
+}
+
+void NetworkWeights::add_vector(Entry& entry, const std::string& name, uint32_t size, uint32_t first, uint32_t heads,
+                                bool geglu, float gain)
+{
+    entry.sources.push_back({{name, {size}}, [=](std::span<const float> values, float* row, uint32_t) {
+                                 for (uint32_t i = 0; i < size; ++i)
+                                     row[first + packed_row(i, size, heads, geglu)] = gain * values[i];
+                             }});
+}
+
+Layer NetworkWeights::conv(const std::string& name, const ConvShape& s)
+{
+    const uint32_t taps = s.kernel * s.kernel, channels = s.channels + s.channels2;
+    const uint32_t first = round_up(s.channels, kRowPadding), width = first + round_up(s.channels2, kRowPadding);
+    Layer layer;
+    Entry& weight = add(s.outputs, taps * width, s.dtype.value_or(precision_));
+    layer.weight = weight.weight;
+    const auto pack = [=](std::span<const float> values, float* rows, uint32_t ld) {
+        for (uint32_t n = 0; n < s.outputs; ++n)
+            for (uint32_t c = 0; c < channels; ++c) {
+                const float* from = &values[(size_t(n) * channels + c) * taps];
+                float* to = rows + size_t(n) * ld + (c < s.channels ? c : first + c - s.channels);
+                for (uint32_t tap = 0; tap < taps; ++tap)
+                    to[tap * width] = s.gain * from[tap];
+            }
+    };
+    weight.sources.push_back({{name + ".weight", {s.outputs, channels, s.kernel, s.kernel}}, pack});
+    Entry& bias = add(1, s.outputs, DType::f32);
+    layer.bias = bias.weight;
+    add_vector(bias, name + ".bias", s.outputs, 0, 0, false, s.bias_gain);
+    return layer;
+}
+
+Layer NetworkWeights::linear(const std::vector<Part>& parts, const LinearShape& s)
+{
+    uint32_t rows = 0;
+    for (const Part& p : parts)
+        rows += packed_rows(p.rows, p.heads, p.geglu);
+    Layer layer;
+    Entry& weight = add(rows, s.col_heads ? padded_heads(s.cols, s.col_heads) : s.cols, s.dtype.value_or(precision_));
+    layer.weight = weight.weight;
+    uint32_t first = 0;
+    for (const Part& p : parts) {
+        const auto pack = [=](std::span<const float> values, float* to, uint32_t ld) {
+            for (uint32_t r = 0; r < p.rows; ++r) {
+                float* row = to + size_t(first + packed_row(r, p.rows, p.heads, p.geglu)) * ld;
+                for (uint32_t c = 0; c < s.cols; ++c)
+                    row[packed_row(c, s.cols, s.col_heads, false)] = s.gain * values[size_t(r) * s.cols + c];
+            }
+        };
+        std::vector<uint64_t> shape{p.rows, s.cols};
+        if (p.conv)
+            shape.insert(shape.end(), {1, 1});
+        weight.sources.push_back({{p.name + ".weight", shape}, pack});
+        first += packed_rows(p.rows, p.heads, p.geglu);
+    }
+    if (!s.bias)
+        return layer;
+    Entry& bias = add(1, rows, DType::f32);
+    layer.bias = bias.weight;
+    first = 0;
+    for (const Part& p : parts) {
+        add_vector(bias, p.name + ".bias", p.rows, first, p.heads, p.geglu, s.gain);
+        first += packed_rows(p.rows, p.heads, p.geglu);
+    }
+    return layer;
+}
+
+Layer NetworkWeights::norm(const std::string& name, uint32_t channels)
+{
+    Layer layer;
+    for (auto [weight, suffix] : {std::pair{&layer.weight, ".weight"}, std::pair{&layer.bias, ".bias"}}) {
+        Entry& entry = add(1, channels, DType::f32);
+        *weight = entry.weight;
+        add_vector(entry, name + suffix, channels, 0, 0, false, 1);
+    }
+    return layer;
+}
+
+Weight NetworkWeights::table(const std::string& name, uint32_t rows, uint32_t cols)
+{
+    Entry& entry = add(rows, cols, DType::f32);
+    const auto pack = [=](std::span<const float> values, float* to, uint32_t ld) {
+        for (uint32_t r = 0; r < rows; ++r)
+            std::copy_n(&values[size_t(r) * cols], cols, to + size_t(r) * ld);
+    };
+    entry.sources.push_back({{name + ".weight", {rows, cols}}, pack});
+    return entry.weight;
+}
+
+uint64_t NetworkWeights::parameters() const
+{
+    uint64_t sum = 0;
+    for (const Entry& entry : entries_)
+        for (const Source& source : entry.sources) {
+            uint64_t size = 1;
+            for (uint64_t n : source.spec.shape)
+                size *= n;
+            sum += size;
+        }
+    return sum;
+}
+
+Status NetworkWeights::upload(Device& device, const Checkpoint& checkpoint, const Entry& entry) const
+{
+    const uint32_t ld = round_up(entry.weight.cols, kRowPadding);
+    std::vector<float> rows(size_t(entry.weight.rows) * ld, 0.f), values;
+    for (const Source& source : entry.sources) {
+        SR_CHECK(checkpoint.read(source.spec, values));
+        source.pack(values, rows.data(), ld);
+    }
+    SR_TRY(const auto bytes, to_dtype(rows, entry.weight.dtype, entry.sources.front().spec.name));
+    return device.write(arena_.slice(entry.weight.slice), bytes);
+}
+
+Status NetworkWeights::load(Device& device, const Checkpoint& checkpoint, std::span<const TensorSpec> schema)
+{
+    SR_CHECK(checkpoint.require(schema));
+    SR_CHECK(arena_.allocate(device, "network weights"));
+    for (const Entry& entry : entries_)
+        SR_CHECK(upload(device, checkpoint, entry));
+    return {};
+}
+
+Tensor NetworkWeights::tensor(Graph& g, const Weight& w, std::string_view name) const
+{
+    return w.rows ? g.external(arena_.slice(w.slice), w.rows, w.cols, w.dtype, name) : Tensor{};
+}
+
+} // namespace semrover

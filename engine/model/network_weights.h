@@ -1,0 +1,92 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/model/checkpoint.h"
+#include "engine/model/weight.h"
+#include "runtime/device/device.h"
+#include "runtime/graph/graph.h"
+
+#include <functional>
+
+namespace semrover {
+
+// a layer of a network: its packed weight, and its bias in fp32 (rows = 0: none)
+struct Layer {
+    Weight weight, bias;
+};
+
+// Parameters in device memory, in the layouts that the kernels read. First every layer is declared, then all of them
+// are read from a checkpoint; what is declared decides the device bytes.
+class NetworkWeights {
+  public:
+    // limits: of the device that the graphs are for, which decide how they convolve
+    NetworkWeights(DType precision, const DeviceLimits& limits) : precision_(precision), limits_(limits) {}
+
+    DType precision() const { return precision_; }
+    const DeviceLimits& limits() const { return limits_; }
+
+    // convolution over C channels, or C and C2 that come as two inputs: [N, kernel^2 * (C + C2)], tap by tap, each
+    // input padded to kRowPadding. `gain` multiplies weights, `bias_gain` biases. Without a dtype: the network's
+    // precision.
+    struct ConvShape {
+        uint32_t outputs, channels, channels2 = 0, kernel = 3;
+        float gain = 1, bias_gain = 1;
+        std::optional<DType> dtype = {};
+    };
+    Layer conv(const std::string& name, const ConvShape& shape);
+
+    // matrices stacked in rows: [sum of N, K], each part with rows or columns spread over padded heads
+    struct Part {
+        std::string name;   // without .weight and .bias
+        uint32_t rows;      // N, as in the file
+        uint32_t heads = 0; // rows are that many heads, each padded to kRowPadding; 0: rows as they are
+        bool geglu = false; // rows are values, then gates: interleaved in blocks of eight
+        bool conv = false;  // stored as a 1x1 convolution [N, K, 1, 1]
+    };
+    struct LinearShape {
+        uint32_t cols; // K, as in the file
+        bool bias = true;
+        uint32_t col_heads = 0; // columns are heads, padded likewise
+        float gain = 1;         // of weights and biases
+        std::optional<DType> dtype = {};
+    };
+    Layer linear(const std::vector<Part>& parts, const LinearShape& shape);
+
+    Layer norm(const std::string& name, uint32_t channels);              // weight and bias, [1, channels] fp32
+    Weight table(const std::string& name, uint32_t rows, uint32_t cols); // an embedding, fp32
+
+    uint64_t parameters() const; // as in the file
+    uint64_t device_bytes(const DeviceLimits& limits) const { return arena_.planned_bytes(limits); }
+    Status load(Device& device, const Checkpoint& checkpoint, std::span<const TensorSpec> schema);
+
+    Tensor tensor(Graph& g, const Weight& w, std::string_view name) const; // none for rows = 0
+
+  private:
+    // one tensor of the checkpoint and its way into a weight's rows
+    struct Source {
+        TensorSpec spec;
+        std::function<void(std::span<const float> values, float* rows, uint32_t ld)> pack;
+    };
+    struct Entry {
+        Weight weight;
+        std::vector<Source> sources;
+    };
+    Entry& add(uint32_t rows, uint32_t cols, DType dtype);
+    void add_vector(Entry& entry, const std::string& name, uint32_t size, uint32_t first, uint32_t heads, bool geglu,
+                    float gain);
+    Status upload(Device& device, const Checkpoint& checkpoint, const Entry& entry) const;
+
+    DType precision_;
+    DeviceLimits limits_;
+    Arena arena_;
+    std::vector<Entry> entries_;
+};
+
+// rows of heads after padding each
+constexpr uint32_t padded_heads(uint32_t rows, uint32_t heads)
+{
+    return heads * round_up(rows / heads, kRowPadding);
+}
+
+} // namespace semrover

@@ -1,0 +1,249 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/model/renderer_model.h"
+
+#include "engine/model/ldm_config.h"
+#include "engine/sampling/schedule.h"
+#include "runtime/base/hash.h"
+#include "runtime/base/json_fields.h"
+#include "runtime/base/quote.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace semrover {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+template <typename Config>
+Result<Config> read_config(const Path& path, Result<Config> (*parse)(const Json&))
+{
+    SR_TRY(const Json json, read_json(path));
+    auto config = parse(json);
+    if (!config)
+        return fail(ErrorCode::bad_input, "{}: {}", quote_path(path), config.error().message);
+    for (std::string& warning : config->warnings)
+        warning = quote_path(path) + ": " + warning;
+    return config;
+}
+
+// a folder without the component: what else lies there may say what was meant
+tl::unexpected<Error> missing_component(const Path& folder, std::string_view what, std::string_view expected)
+{
+    std::vector<Path> files;
+    std::error_code ignored;
+    for (const auto& entry : fs::directory_iterator(folder, ignored))
+        files.push_back(entry.path());
+    std::ranges::sort(files);
+    for (const Path& file : files)
+        for (const char* pickle : {".ckpt", ".bin", ".pt", ".pth"})
+            if (file.extension() == pickle)
+                return tl::make_unexpected(SafetensorsSet::open(file).error()); // says how to convert it
+    for (const Path& file : files)
+        if (file.extension() == ".safetensors")
+            return fail(ErrorCode::bad_input,
+                        "{}: has no {}: expected {}; if {} is a single-file checkpoint, give the file itself",
+                        quote_path(folder), what, expected, quote_path(file.filename()));
+    return fail(ErrorCode::bad_input, "{}: has no {}: expected {} in the diffusers layout", quote_path(folder), what,
+                expected);
+}
+
+Status read_conditioning(RendererModel& m)
+{
+    const uint32_t width = m.unet.cross_attention_dim;
+    const Path folder = m.folder / "conditioning";
+    std::optional<SafetensorsSet> found;
+    if (m.ldm || is_there(folder)) {
+        SR_TRY(found, m.ldm ? SafetensorsSet::open(m.folder) : SafetensorsSet::open_folder(folder, "conditioning"));
+    }
+    const std::string_view name = m.ldm ? kLdmConditioning : kConditioning;
+    if (!found || (m.ldm && !found->find(name))) {
+        m.warnings.push_back(
+            fmt::format("{}: has no {}; zeros stand for the text", quote_path(m.folder),
+                        m.ldm ? fmt::format("tensor {}", name) : "conditioning/conditioning.safetensors"));
+        m.conditioning.assign(size_t(m.conditioning_tokens) * width, 0.f);
+        return {};
+    }
+    const SafetensorsSet& set = *found;
+    SR_TRY(const TensorInfo* tensor, set.get(name));
+    const auto& shape = tensor->shape;
+    if (shape.size() != 3 || shape[0] != 1 || shape[1] < 1 || shape[1] > 4096 || shape[2] != width)
+        return fail(ErrorCode::bad_input,
+                    "{}: encoder_hidden_states is {}, expected [1, 1..4096, {}] as the UNet's cross_attention_dim says",
+                    quote_path(set.path()), shape_text(shape), width);
+    if (tensor->dtype != DType::f32 && tensor->dtype != DType::f16 && tensor->dtype != DType::bf16)
+        return fail(ErrorCode::bad_input, "{}: encoder_hidden_states is {}, expected F32, F16 or BF16",
+                    quote_path(set.path()), dtype_name(tensor->dtype));
+    SR_CHECK(check_finite(set, *tensor));
+    m.conditioning_tokens = uint32_t(shape[1]);
+    m.conditioning.resize(tensor->elements());
+    to_float(set.bytes(*tensor), tensor->dtype, m.conditioning.data());
+    return {};
+}
+
+void read_splat_radius(JsonFields& fields, RendererDefaults& d)
+{
+    const Json* value = fields.find("splat_radius");
+    if (!value)
+        return;
+    const double number = value->is_number() ? value->get<double>() : NAN;
+    if (*value == "auto")
+        d.splat_radius.reset();
+    else if (number > 0 && number < 100)
+        d.splat_radius = float(number);
+    else
+        fields.refuse("splat_radius", "metres (0..100) or \"auto\"");
+}
+
+Status read_defaults(const Path& path, RendererDefaults& d, std::vector<std::string>& warnings)
+{
+    SR_TRY(const Json index, read_json(path));
+    const std::string where = quote_path(path) + ": defaults.renderer";
+    const Json all = index.is_object() ? index.value("defaults", Json::object()) : Json::object();
+    const Json defaults = all.is_object() ? all.value("renderer", Json::object()) : all;
+    JsonFields fields(defaults, where);
+    fields.integer("num_inference_steps", 1, kMaxInferenceSteps, d.num_inference_steps);
+    fields.number("guidance_scale", 0.f, 1000.f, d.guidance_scale);
+    fields.number("previous_noise", 0.f, 100.f, d.previous_noise);
+    fields.choice("frame_noise", {{"fresh", FrameNoise::fresh}, {"warped", FrameNoise::warped}}, d.frame_noise);
+    fields.number("visible_threshold", 0.f, 1.f, d.visible_threshold);
+    read_splat_radius(fields, d);
+    return fields.finish(warnings);
+}
+
+Status read_scheduler(RendererModel& m, std::optional<Sampler> sampler)
+{
+    const Path path = m.folder / "scheduler" / "scheduler_config.json";
+    if (!is_there(path))
+        return {};
+    // Stable Diffusion's own folders name PNDM
+    const auto json = read_json(path);
+    if (!sampler && json && json->is_object() && json->value("_class_name", Json()) == "PNDMScheduler") {
+        m.warnings.push_back(quote_path(path) + ": PNDMScheduler is replaced by DDIM over its noise schedule");
+        sampler = Sampler::ddim;
+    }
+    SR_TRY(m.scheduler, read_scheduler_config(path, m.warnings, sampler));
+    return {};
+}
+
+Status read_folder(RendererModel& m, std::optional<Sampler> sampler)
+{
+    m.unet_folder = m.folder / (is_there(m.folder / "renderer") ? "renderer" : "unet");
+    m.vae_folder = m.folder / "vae";
+    if (!is_there(m.unet_folder / "config.json"))
+        return missing_component(m.folder, "renderer", "renderer/config.json or unet/config.json");
+    if (!is_there(m.vae_folder / "config.json"))
+        return missing_component(m.folder, "VAE", "vae/config.json");
+    SR_TRY(m.unet, read_config(m.unet_folder / "config.json", parse_unet_config));
+    SR_TRY(m.vae, read_config(m.vae_folder / "config.json", parse_vae_config));
+    if (is_there(m.folder / "model_index.json"))
+        SR_CHECK(read_defaults(m.folder / "model_index.json", m.defaults, m.warnings));
+    return read_scheduler(m, sampler);
+}
+
+Status read_ldm(RendererModel& m)
+{
+    m.ldm = true;
+    m.unet_folder = m.vae_folder = m.folder;
+    SR_TRY(const SafetensorsSet set, SafetensorsSet::open(m.folder));
+    if (!is_ldm(set))
+        return fail(ErrorCode::bad_input,
+                    "{}: has no renderer: expected a single-file Stable Diffusion checkpoint with tensors "
+                    "model.diffusion_model.*, or a folder in the diffusers layout",
+                    quote_path(m.folder));
+    if (ldm_vae_prefix(set).empty())
+        return fail(ErrorCode::bad_input, "{}: has no VAE: expected tensors first_stage_model.* or vae.*",
+                    quote_path(m.folder));
+    SR_TRY(m.unet, ldm_unet_config(set));
+    SR_TRY(m.vae, ldm_vae_config(set));
+    return {};
+}
+
+Status check_renderer(const RendererModel& m)
+{
+    if (m.unet.in_channels == m.vae.latent_channels)
+        return refuse_plain_unet(m.unet_folder);
+    if (m.unet.in_channels != renderer_channels(m.vae))
+        return fail(ErrorCode::bad_input,
+                    "{}: in_channels is {}, expected {}: noisy, previous and buffer latent of {} channels each, and "
+                    "visibility",
+                    quote_path(m.unet_folder), m.unet.in_channels, renderer_channels(m.vae), m.vae.latent_channels);
+    if (m.unet.out_channels != m.vae.latent_channels)
+        return fail(ErrorCode::bad_input, "{}: out_channels is {}, expected the VAE's latent_channels, {}",
+                    quote_path(m.unet_folder), m.unet.out_channels, m.vae.latent_channels);
+    SR_TRY(const Checkpoint unet, m.open_unet());
+    SR_CHECK(unet.require(unet_schema(m.unet)));
+    SR_TRY(const Checkpoint vae, m.open_vae());
+    return vae.require(vae_schema(m.vae));
+}
+
+} // namespace
+
+SchedulerConfig stable_diffusion_scheduler(std::optional<Sampler> sampler)
+{
+    std::vector<std::string> none;
+    const auto config = scheduler_config_from_json(stable_diffusion_scheduler_json(), none, sampler);
+    SR_ASSERT(config, "{}", config.error().message);
+    return *config;
+}
+
+Json stable_diffusion_scheduler_json()
+{
+    return {{"_class_name", "DDIMScheduler"}, {"num_train_timesteps", 1000}, {"beta_schedule", "scaled_linear"},
+            {"beta_start", 0.00085},          {"beta_end", 0.012},           {"prediction_type", "epsilon"},
+            {"clip_sample", false},           {"set_alpha_to_one", false},   {"steps_offset", 1},
+            {"timestep_spacing", "leading"}};
+}
+
+Result<RendererModel> RendererModel::read(const Path& path, std::optional<Sampler> sampler)
+{
+    RendererModel m;
+    m.folder = path;
+    m.scheduler = stable_diffusion_scheduler(sampler);
+    std::error_code ignored;
+    if (fs::is_directory(path, ignored))
+        SR_CHECK(read_folder(m, sampler));
+    else
+        SR_CHECK(read_ldm(m));
+    m.warnings.insert(m.warnings.end(), m.unet.warnings.begin(), m.unet.warnings.end());
+    m.warnings.insert(m.warnings.end(), m.vae.warnings.begin(), m.vae.warnings.end());
+    SR_CHECK(read_conditioning(m));
+    return m;
+}
+
+Result<RendererModel> RendererModel::open(const Path& path, std::optional<Sampler> sampler)
+{
+    SR_TRY(RendererModel m, read(path, sampler));
+    SR_CHECK(check_renderer(m));
+    return m;
+}
+
+Result<Checkpoint> RendererModel::open_unet() const
+{
+    return ldm ? Checkpoint::open_ldm(folder, Checkpoint::Network::unet, &unet, &vae)
+               : Checkpoint::open_folder(unet_folder, Checkpoint::Network::unet);
+}
+
+Result<Checkpoint> RendererModel::open_vae() const
+{
+    return ldm ? Checkpoint::open_ldm(folder, Checkpoint::Network::vae, &unet, &vae)
+               : Checkpoint::open_folder(vae_folder, Checkpoint::Network::vae);
+}
+
+Result<uint64_t> RendererModel::hash() const
+{
+    if (ldm)
+        return hash_file(folder);
+    Hash all;
+    for (const Path& part : {unet_folder, vae_folder, folder / "scheduler", folder / "conditioning"}) {
+        if (!is_there(part))
+            continue;
+        SR_TRY(const uint64_t one, hash_folder(part));
+        all.add(hash_text(one));
+    }
+    return all.value();
+}
+
+} // namespace semrover

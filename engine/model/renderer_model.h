@@ -1,0 +1,74 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/model/checkpoint.h"
+#include "engine/model/unet_config.h"
+#include "engine/model/vae_config.h"
+#include "engine/sampling/scheduler_config.h"
+
+#include <optional>
+
+namespace semrover {
+
+// how the noise of a frame has to do with that of the frame before
+enum class FrameNoise {
+    fresh,  // not at all
+    warped, // it stays on the surfaces that both show
+};
+
+// model_index.json's "defaults": {"renderer": {"num_inference_steps": 20, "guidance_scale": 1.5, "previous_noise": 0.3,
+// "frame_noise": "fresh", "visible_threshold": 0.5, "splat_radius": 0.04}}: what a command uses when no option says
+// otherwise. Fields of "defaults" beside "renderer" are the transformer's.
+struct RendererDefaults {
+    int num_inference_steps = 20;
+    float guidance_scale = 1.5f;
+    float previous_noise = 0.3f; // scale of the noise on the previous frame's latent
+    FrameNoise frame_noise = FrameNoise::fresh;
+    float visible_threshold = 0.5f; // alpha from which splats cover a pixel
+    // standard deviation of the splats in its buffers, metres; none ("auto"): from the spacing of the points. A
+    // renderer wants what it was trained on
+    std::optional<float> splat_radius = 0.04f;
+};
+
+// A deferred renderer's description; weights are read by Unet::load and Vae::load. On disk: a folder in the diffusers
+// layout (renderer/ or unet/, vae/, scheduler/, conditioning/), or a single-file LDM checkpoint.
+struct RendererModel {
+    Path folder; // or the LDM file
+    bool ldm = false;
+    Path unet_folder, vae_folder; // with ldm: the file
+    UnetConfig unet;
+    VaeConfig vae;
+    SchedulerConfig scheduler;       // none on disk: Stable Diffusion's, with DDIM
+    std::vector<float> conditioning; // [conditioning_tokens, unet.cross_attention_dim]: the constant text
+    uint32_t conditioning_tokens = 77;
+    RendererDefaults defaults;
+    std::vector<std::string> warnings;
+
+    // a model that can render: its UNet takes noisy, previous and buffer latents and visibility, its weights fit its
+    // configs. errors: bad_input, with what is missing and where it should be
+    static Result<RendererModel> open(const Path& path, std::optional<Sampler> sampler = {});
+    // the same for any Stable Diffusion 1.5-shaped model, whatever its UNet's input, without a look at the weights
+    static Result<RendererModel> read(const Path& path, std::optional<Sampler> sampler = {});
+
+    Result<Checkpoint> open_unet() const;
+    Result<Checkpoint> open_vae() const;
+    Result<uint64_t> hash() const; // of the files that the renderer reads
+};
+
+// the constant text [1, tokens, cross_attention_dim]: a tensor of conditioning/conditioning.safetensors, or of an LDM
+// file that semrover's own tools wrote (others have none)
+constexpr std::string_view kConditioning = "encoder_hidden_states";
+constexpr std::string_view kLdmConditioning = "conditioning.encoder_hidden_states";
+
+// noisy latent, previous latent, buffer latent, visibility
+inline uint32_t renderer_channels(const VaeConfig& vae)
+{
+    return 3 * vae.latent_channels + 1;
+}
+
+// Stable Diffusion's noise schedule (docs/method.md §6.1), and the scheduler_config.json that says so
+SchedulerConfig stable_diffusion_scheduler(std::optional<Sampler> sampler = {});
+nlohmann::json stable_diffusion_scheduler_json();
+
+} // namespace semrover

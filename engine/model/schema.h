@@ -1,0 +1,35 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "runtime/base/safetensors.h"
+
+namespace semrover {
+
+// the most that a configuration may ask for
+constexpr size_t kMaxLevels = 8;
+constexpr uint32_t kMaxChannels = 65536;
+
+// the weights of a network, collected layer by layer under PyTorch's names
+struct Schema {
+    std::vector<TensorSpec> specs;
+
+    void norm(const std::string& name, uint32_t channels)
+    {
+        specs.push_back({name + ".weight", {channels}});
+        specs.push_back({name + ".bias", {channels}});
+    }
+    void matrix(const std::string& name, uint32_t out, uint32_t in) { specs.push_back({name, {out, in}}); }
+    void linear(const std::string& name, uint32_t out, uint32_t in)
+    {
+        matrix(name + ".weight", out, in);
+        specs.push_back({name + ".bias", {out}});
+    }
+    void conv(const std::string& name, uint32_t out, uint32_t in, uint32_t side)
+    {
+        specs.push_back({name + ".weight", {out, in, side, side}});
+        specs.push_back({name + ".bias", {out}});
+    }
+};
+
+} // namespace semrover

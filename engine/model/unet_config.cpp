@@ -1,0 +1,255 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/model/unet_config.h"
+
+#include "engine/model/schema.h"
+#include "runtime/base/json_fields.h"
+
+#include <algorithm>
+
+namespace semrover {
+
+namespace {
+
+void read_blocks(JsonFields& fields, UnetConfig& c)
+{
+    fields.list("block_out_channels", kMaxLevels, 1, kMaxChannels, c.block_out_channels);
+    fields.choices<bool>("down_block_types", {{"CrossAttnDownBlock2D", true}, {"DownBlock2D", false}},
+                         c.down_attention);
+    fields.choices<bool>("up_block_types", {{"CrossAttnUpBlock2D", true}, {"UpBlock2D", false}}, c.up_attention);
+    fields.refuse_null("mid_block_type", "\"UNetMidBlock2DCrossAttn\", \"UNetMidBlock2D\"");
+    fields.choice<bool>("mid_block_type", {{"UNetMidBlock2DCrossAttn", true}, {"UNetMidBlock2D", false}},
+                        c.mid_attention);
+    const std::string count = fmt::format("as many as block_out_channels, {}", c.levels());
+    if (c.down_attention.size() != c.levels())
+        fields.refuse("down_block_types", count);
+    if (c.up_attention.size() != c.levels())
+        fields.refuse("up_block_types", count);
+    c.layers_per_block.assign(c.levels(), 2);
+    fields.integers("layers_per_block", c.levels(), 1, 64, c.layers_per_block);
+}
+
+// one number: lists of other networks differ per level
+void read_context_width(JsonFields& fields, UnetConfig& c)
+{
+    std::vector<uint32_t> widths(c.levels(), c.cross_attention_dim);
+    fields.integers("cross_attention_dim", c.levels(), 1, kMaxChannels, widths);
+    if (std::ranges::adjacent_find(widths, std::ranges::not_equal_to()) != widths.end())
+        fields.refuse("cross_attention_dim", "the same number at every level");
+    c.cross_attention_dim = widths[0];
+}
+
+void read_attention(JsonFields& fields, UnetConfig& c)
+{
+    c.heads.assign(c.levels(), 8);
+    fields.integers("attention_head_dim", c.levels(), 1, 1024, c.heads);
+    fields.integers("num_attention_heads", c.levels(), 1, 1024, c.heads);
+    c.transformer_layers.assign(c.levels(), 1);
+    fields.integers("transformer_layers_per_block", c.levels(), 1, 64, c.transformer_layers);
+    read_context_width(fields, c);
+    fields.flag("use_linear_projection", c.use_linear_projection);
+}
+
+void refuse_the_rest(JsonFields& fields)
+{
+    fields.only("_class_name", "UNet2DConditionModel");
+    fields.only("resnet_time_scale_shift", "default");
+    fields.only("time_embedding_type", "positional");
+    fields.only("attention_type", "default");
+    bool silu = true;
+    fields.choice<bool>("act_fn", {{"silu", true}, {"swish", true}}, silu);
+    for (const char* name : {"center_input_sample", "only_cross_attention", "dual_cross_attention",
+                             "resnet_skip_time_act", "class_embeddings_concat", "mid_block_only_cross_attention"})
+        fields.only(name, false);
+    for (const char* name : {"downsample_padding", "mid_block_scale_factor", "resnet_out_scale_factor"})
+        fields.only(name, 1);
+    for (const char* name : {"conv_in_kernel", "conv_out_kernel"})
+        fields.only(name, 3);
+    for (const char* name :
+         {"class_embed_type", "addition_embed_type", "addition_time_embed_dim", "encoder_hid_dim",
+          "encoder_hid_dim_type", "reverse_transformer_layers_per_block", "time_embedding_dim", "time_embedding_act_fn",
+          "timestep_post_act", "time_cond_proj_dim", "projection_class_embeddings_input_dim", "cross_attention_norm"})
+        fields.only(name, nullptr);
+    // training's, a hint for callers, or what only matters with something refused above; sums are always fp32
+    fields.ignore({"sample_size", "dropout", "addition_embed_type_num_heads", "upcast_attention"});
+}
+
+bool has_attention(const UnetConfig& c, size_t level)
+{
+    return c.down_attention[level] || c.up_attention[c.levels() - 1 - level] ||
+           (level + 1 == c.levels() && c.mid_attention);
+}
+
+Status check_together(const UnetConfig& c)
+{
+    for (size_t i = 0; i < c.levels(); ++i) {
+        const uint32_t channels = c.block_out_channels[i];
+        if (channels % c.norm_num_groups)
+            return fail(ErrorCode::bad_input, "unet config: {} channels at level {} do not divide into {} groups",
+                        channels, i, c.norm_num_groups);
+        if (has_attention(c, i) && channels % c.heads[i])
+            return fail(ErrorCode::bad_input,
+                        "unet config: {} channels at level {} do not divide into {} heads (attention_head_dim is "
+                        "their number)",
+                        channels, i, c.heads[i]);
+    }
+    if (c.block_out_channels[0] % 2)
+        return fail(ErrorCode::bad_input, "unet config: block_out_channels[0] {} must be even",
+                    c.block_out_channels[0]);
+    return {};
+}
+
+// ---- the weights
+
+void add_resnet(Schema& s, const std::string& name, uint32_t in, uint32_t out, uint32_t time)
+{
+    s.norm(name + ".norm1", in);
+    s.conv(name + ".conv1", out, in, 3);
+    s.linear(name + ".time_emb_proj", out, time);
+    s.norm(name + ".norm2", out);
+    s.conv(name + ".conv2", out, out, 3);
+    if (in != out)
+        s.conv(name + ".conv_shortcut", out, in, 1);
+}
+
+void add_attention(Schema& s, const std::string& name, uint32_t channels, uint32_t context)
+{
+    s.matrix(name + ".to_q.weight", channels, channels);
+    s.matrix(name + ".to_k.weight", channels, context);
+    s.matrix(name + ".to_v.weight", channels, context);
+    s.linear(name + ".to_out.0", channels, channels);
+}
+
+void add_transformer(Schema& s, const std::string& name, const UnetConfig& c, size_t level)
+{
+    const uint32_t channels = c.block_out_channels[level];
+    const auto projection = [&](const char* which) {
+        if (c.use_linear_projection)
+            s.linear(name + which, channels, channels);
+        else
+            s.conv(name + which, channels, channels, 1);
+    };
+    s.norm(name + ".norm", channels);
+    projection(".proj_in");
+    for (uint32_t k = 0; k < c.transformer_layers[level]; ++k) {
+        const std::string block = fmt::format("{}.transformer_blocks.{}", name, k);
+        for (const char* norm : {".norm1", ".norm2", ".norm3"})
+            s.norm(block + norm, channels);
+        add_attention(s, block + ".attn1", channels, channels);
+        add_attention(s, block + ".attn2", channels, c.cross_attention_dim);
+        s.linear(block + ".ff.net.0.proj", 8 * channels, channels); // values and gates, 4 C each
+        s.linear(block + ".ff.net.2", channels, 4 * channels);
+    }
+    projection(".proj_out");
+}
+
+void add_down_block(Schema& s, const UnetConfig& c, size_t level)
+{
+    const uint32_t out = c.block_out_channels[level];
+    uint32_t in = c.block_out_channels[level ? level - 1 : 0];
+    const std::string block = fmt::format("down_blocks.{}", level);
+    for (uint32_t j = 0; j < c.layers_per_block[level]; ++j) {
+        add_resnet(s, fmt::format("{}.resnets.{}", block, j), in, out, c.time_embed_dim());
+        if (c.down_attention[level])
+            add_transformer(s, fmt::format("{}.attentions.{}", block, j), c, level);
+        in = out;
+    }
+    if (level + 1 < c.levels())
+        s.conv(block + ".downsamplers.0.conv", out, out, 3);
+}
+
+// an up block's last layer gets the skip of the level above, with that level's channels
+void add_up_block(Schema& s, const UnetConfig& c, size_t index)
+{
+    const size_t level = c.levels() - 1 - index;
+    const uint32_t out = c.block_out_channels[level], layers = c.layers_per_block[level] + 1;
+    uint32_t in = c.block_out_channels[std::min(level + 1, c.levels() - 1)];
+    const std::string block = fmt::format("up_blocks.{}", index);
+    for (uint32_t j = 0; j < layers; ++j) {
+        const uint32_t skip = j + 1 < layers ? out : c.block_out_channels[level ? level - 1 : 0];
+        add_resnet(s, fmt::format("{}.resnets.{}", block, j), in + skip, out, c.time_embed_dim());
+        if (c.up_attention[index])
+            add_transformer(s, fmt::format("{}.attentions.{}", block, j), c, level);
+        in = out;
+    }
+    if (level > 0)
+        s.conv(block + ".upsamplers.0.conv", out, out, 3);
+}
+
+} // namespace
+
+Result<UnetConfig> parse_unet_config(const Json& json)
+{
+    UnetConfig c;
+    JsonFields fields(json, "unet config");
+    refuse_the_rest(fields);
+    fields.integer("in_channels", 1u, 4096u, c.in_channels);
+    fields.integer("out_channels", 1u, 4096u, c.out_channels);
+    read_blocks(fields, c);
+    read_attention(fields, c);
+    fields.refuse_null("norm_num_groups", "a whole number");
+    fields.integer("norm_num_groups", 1u, kMaxChannels, c.norm_num_groups);
+    fields.number("norm_eps", 1e-12f, 1.f, c.norm_eps);
+    fields.flag("flip_sin_to_cos", c.flip_sin_to_cos);
+    fields.number("freq_shift", -16.f, 16.f, c.freq_shift);
+    fields.integer("num_class_embeds", 0u, kMaxChannels, c.num_class_embeds);
+    SR_CHECK(fields.finish(c.warnings));
+    SR_CHECK(check_together(c));
+    return c;
+}
+
+Json unet_config_json(const UnetConfig& c)
+{
+    const auto per_level = [](const std::vector<uint32_t>& values) { // one number where they are all the same
+        const bool same = std::ranges::count(values, values[0]) == std::ptrdiff_t(values.size());
+        return same ? Json(values[0]) : Json(values);
+    };
+    const auto types = [](const std::vector<bool>& attention, const char* name) {
+        Json list = Json::array();
+        for (const bool a : attention)
+            list.push_back((a ? "CrossAttn" : "") + std::string(name));
+        return list;
+    };
+    return {{"_class_name", "UNet2DConditionModel"},
+            {"in_channels", c.in_channels},
+            {"out_channels", c.out_channels},
+            {"block_out_channels", c.block_out_channels},
+            {"layers_per_block", per_level(c.layers_per_block)},
+            {"down_block_types", types(c.down_attention, "DownBlock2D")},
+            {"mid_block_type", c.mid_attention ? "UNetMidBlock2DCrossAttn" : "UNetMidBlock2D"},
+            {"up_block_types", types(c.up_attention, "UpBlock2D")},
+            {"attention_head_dim", per_level(c.heads)},
+            {"transformer_layers_per_block", per_level(c.transformer_layers)},
+            {"cross_attention_dim", c.cross_attention_dim},
+            {"norm_num_groups", c.norm_num_groups},
+            {"norm_eps", short_number(c.norm_eps)},
+            {"use_linear_projection", c.use_linear_projection},
+            {"flip_sin_to_cos", c.flip_sin_to_cos},
+            {"freq_shift", short_number(c.freq_shift)},
+            {"num_class_embeds", c.num_class_embeds ? Json(c.num_class_embeds) : Json()}};
+}
+
+std::vector<TensorSpec> unet_schema(const UnetConfig& c)
+{
+    Schema s;
+    const uint32_t first = c.block_out_channels.front(), last = c.block_out_channels.back();
+    s.conv("conv_in", first, c.in_channels, 3);
+    s.linear("time_embedding.linear_1", c.time_embed_dim(), first);
+    s.linear("time_embedding.linear_2", c.time_embed_dim(), c.time_embed_dim());
+    if (c.num_class_embeds)
+        s.matrix("class_embedding.weight", c.num_class_embeds, c.time_embed_dim());
+    for (size_t i = 0; i < c.levels(); ++i)
+        add_down_block(s, c, i);
+    add_resnet(s, "mid_block.resnets.0", last, last, c.time_embed_dim());
+    if (c.mid_attention) {
+        add_transformer(s, "mid_block.attentions.0", c, c.levels() - 1);
+        add_resnet(s, "mid_block.resnets.1", last, last, c.time_embed_dim());
+    }
+    for (size_t i = 0; i < c.levels(); ++i)
+        add_up_block(s, c, i);
+    s.norm("conv_norm_out", first);
+    s.conv("conv_out", c.out_channels, first, 3);
+    return std::move(s.specs);
+}
+
+} // namespace semrover

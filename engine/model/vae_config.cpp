@@ -1,0 +1,153 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/model/vae_config.h"
+
+#include "engine/model/schema.h"
+#include "runtime/base/json_fields.h"
+
+namespace semrover {
+
+namespace {
+
+void read_blocks(JsonFields& fields, VaeConfig& c)
+{
+    fields.list("block_out_channels", kMaxLevels, 1, kMaxChannels, c.block_out_channels);
+    for (const auto& [name, type] :
+         {std::pair{"down_block_types", "DownEncoderBlock2D"}, std::pair{"up_block_types", "UpDecoderBlock2D"}}) {
+        std::vector<bool> blocks(c.block_out_channels.size());
+        fields.choices<bool>(name, {{type, true}}, blocks);
+        if (blocks.size() != c.block_out_channels.size())
+            fields.refuse(name, fmt::format("as many as block_out_channels, {}", c.block_out_channels.size()));
+    }
+    std::vector<uint32_t> layers(c.block_out_channels.size(), c.layers_per_block);
+    fields.integers("layers_per_block", layers.size(), 1, 64, layers);
+    for (const uint32_t n : layers)
+        if (n != layers[0])
+            fields.refuse("layers_per_block", "the same number at every level");
+    c.layers_per_block = layers[0];
+}
+
+void add_resnet(Schema& s, const std::string& name, uint32_t in, uint32_t out)
+{
+    s.norm(name + ".norm1", in);
+    s.conv(name + ".conv1", out, in, 3);
+    s.norm(name + ".norm2", out);
+    s.conv(name + ".conv2", out, out, 3);
+    if (in != out)
+        s.conv(name + ".conv_shortcut", out, in, 1);
+}
+
+void add_mid_block(Schema& s, const std::string& name, const VaeConfig& c)
+{
+    const uint32_t channels = c.block_out_channels.back();
+    add_resnet(s, name + ".resnets.0", channels, channels);
+    if (c.mid_block_add_attention) {
+        const std::string attention = name + ".attentions.0";
+        s.norm(attention + ".group_norm", channels);
+        for (const char* part : {".to_q", ".to_k", ".to_v", ".to_out.0"})
+            s.linear(attention + part, channels, channels);
+    }
+    add_resnet(s, name + ".resnets.1", channels, channels);
+}
+
+void add_encoder(Schema& s, const VaeConfig& c)
+{
+    const size_t levels = c.block_out_channels.size();
+    uint32_t in = c.block_out_channels[0];
+    s.conv("encoder.conv_in", in, c.in_channels, 3);
+    for (size_t i = 0; i < levels; ++i) {
+        const std::string block = fmt::format("encoder.down_blocks.{}", i);
+        const uint32_t out = c.block_out_channels[i];
+        for (uint32_t j = 0; j < c.layers_per_block; ++j, in = out)
+            add_resnet(s, fmt::format("{}.resnets.{}", block, j), in, out);
+        if (i + 1 < levels)
+            s.conv(block + ".downsamplers.0.conv", out, out, 3);
+    }
+    add_mid_block(s, "encoder.mid_block", c);
+    s.norm("encoder.conv_norm_out", in);
+    s.conv("encoder.conv_out", 2 * c.latent_channels, in, 3);
+}
+
+void add_decoder(Schema& s, const VaeConfig& c)
+{
+    const size_t levels = c.block_out_channels.size();
+    uint32_t in = c.block_out_channels.back();
+    s.conv("decoder.conv_in", in, c.latent_channels, 3);
+    add_mid_block(s, "decoder.mid_block", c);
+    for (size_t i = 0; i < levels; ++i) {
+        const std::string block = fmt::format("decoder.up_blocks.{}", i);
+        const uint32_t out = c.block_out_channels[levels - 1 - i];
+        for (uint32_t j = 0; j < c.layers_per_block + 1; ++j, in = out)
+            add_resnet(s, fmt::format("{}.resnets.{}", block, j), in, out);
+        if (i + 1 < levels)
+            s.conv(block + ".upsamplers.0.conv", out, out, 3);
+    }
+    s.norm("decoder.conv_norm_out", in);
+    s.conv("decoder.conv_out", c.out_channels, in, 3);
+}
+
+} // namespace
+
+Result<VaeConfig> parse_vae_config(const Json& json)
+{
+    VaeConfig c;
+    JsonFields fields(json, "vae config");
+    fields.only("_class_name", "AutoencoderKL");
+    fields.integer("in_channels", 1u, 4096u, c.in_channels);
+    fields.integer("out_channels", 1u, 4096u, c.out_channels);
+    fields.integer("latent_channels", 1u, 4096u, c.latent_channels);
+    read_blocks(fields, c);
+    fields.integer("norm_num_groups", 1u, kMaxChannels, c.norm_num_groups);
+    fields.number("scaling_factor", 1e-6f, 1e6f, c.scaling_factor);
+    fields.number("shift_factor", -1e6f, 1e6f, c.shift_factor);
+    fields.flag("force_upcast", c.force_upcast);
+    fields.flag("use_quant_conv", c.use_quant_conv);
+    fields.flag("use_post_quant_conv", c.use_post_quant_conv);
+    fields.flag("mid_block_add_attention", c.mid_block_add_attention);
+    bool silu = true;
+    fields.choice<bool>("act_fn", {{"silu", true}, {"swish", true}}, silu);
+    fields.only("latents_mean", nullptr);
+    fields.only("latents_std", nullptr);
+    fields.ignore("sample_size");
+    SR_CHECK(fields.finish(c.warnings));
+    for (const uint32_t channels : c.block_out_channels)
+        if (channels % c.norm_num_groups)
+            return fail(ErrorCode::bad_input, "vae config: {} channels do not divide into {} groups", channels,
+                        c.norm_num_groups);
+    return c;
+}
+
+Json vae_config_json(const VaeConfig& c)
+{
+    const size_t levels = c.block_out_channels.size();
+    return {{"_class_name", "AutoencoderKL"},
+            {"in_channels", c.in_channels},
+            {"out_channels", c.out_channels},
+            {"latent_channels", c.latent_channels},
+            {"block_out_channels", c.block_out_channels},
+            {"layers_per_block", c.layers_per_block},
+            {"down_block_types", std::vector<std::string>(levels, "DownEncoderBlock2D")},
+            {"up_block_types", std::vector<std::string>(levels, "UpDecoderBlock2D")},
+            {"act_fn", "silu"},
+            {"norm_num_groups", c.norm_num_groups},
+            {"scaling_factor", short_number(c.scaling_factor)},
+            {"shift_factor", c.shift_factor != 0 ? short_number(c.shift_factor) : Json()},
+            {"force_upcast", c.force_upcast},
+            {"use_quant_conv", c.use_quant_conv},
+            {"use_post_quant_conv", c.use_post_quant_conv},
+            {"mid_block_add_attention", c.mid_block_add_attention}};
+}
+
+std::vector<TensorSpec> vae_schema(const VaeConfig& c)
+{
+    Schema s;
+    add_encoder(s, c);
+    add_decoder(s, c);
+    if (c.use_quant_conv)
+        s.conv("quant_conv", 2 * c.latent_channels, 2 * c.latent_channels, 1);
+    if (c.use_post_quant_conv)
+        s.conv("post_quant_conv", c.latent_channels, c.latent_channels, 1);
+    return std::move(s.specs);
+}
+
+} // namespace semrover

@@ -1,0 +1,77 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/network/network_blocks.h"
+
+namespace semrover {
+
+NormInput with_moments(Graph& g, FeatureMap x)
+{
+    return {x, channel_moments(g, x)};
+}
+
+ResnetBlock declare_resnet(NetworkWeights& w, const std::string& name, const ResnetShape& s)
+{
+    const uint32_t channels = s.channels + s.channels2;
+    ResnetBlock b;
+    b.groups = s.groups;
+    b.eps = s.eps;
+    b.stream = s.stream;
+    b.norm1 = w.norm(name + ".norm1", channels);
+    b.conv1 =
+        w.conv(name + ".conv1", {.outputs = s.outputs, .channels = channels, .gain = s.stream, .bias_gain = s.stream});
+    b.norm2 = w.norm(name + ".norm2", s.outputs);
+    b.conv2 =
+        w.conv(name + ".conv2", {.outputs = s.outputs, .channels = s.outputs, .gain = s.stream, .bias_gain = s.stream});
+    if (channels != s.outputs)
+        b.shortcut = w.conv(name + ".conv_shortcut", {.outputs = s.outputs,
+                                                      .channels = s.channels,
+                                                      .channels2 = s.channels2,
+                                                      .kernel = 1,
+                                                      .bias_gain = s.stream});
+    return b;
+}
+
+FeatureMap resnet(Graph& g, const NetworkWeights& w, const ResnetBlock& b, NormInput x, NormInput x2,
+                  const ChannelShift& shift)
+{
+    GroupNormOptions norm;
+    norm.groups = b.groups;
+    norm.eps = b.eps * b.stream * b.stream; // the norm of stream * x is that of x
+    norm.silu = true;
+    norm.dtype = w.precision();
+    const FeatureMap n = normalize(g, w, b.norm1, norm, x, x2);
+    const FeatureMap h = convolve(g, w, b.conv1, n, {}, {shift, {}});
+    const FeatureMap m = normalize(g, w, b.norm2, norm, with_moments(g, h));
+    FeatureMap residual = x.x;
+    if (b.shortcut.weight.rows)
+        residual = conv2d(g, x.x, x2.x, w.tensor(g, b.shortcut.weight, "shortcut"),
+                          w.tensor(g, b.shortcut.bias, "shortcut.bias"), {.kernel = 1, .dtype = w.precision()});
+    return convolve(g, w, b.conv2, m, {}, {{}, residual});
+}
+
+FeatureMap convolve(Graph& g, const NetworkWeights& w, const Layer& layer, FeatureMap x, ConvOptions options,
+                    const ConvAddends& addends)
+{
+    options.dtype = w.precision();
+    const Tensor weight = w.tensor(g, layer.weight, "conv"), bias = w.tensor(g, layer.bias, "conv.bias");
+    if (prefers_winograd(w.limits(), x, weight.rows, options))
+        return winograd_conv2d(g, x, winograd_weight(g, weight), bias, options, addends);
+    FeatureMap y = conv2d(g, x, {}, weight, bias, options);
+    if (addends.shift.table.valid())
+        y = channel_shift(g, y, addends.shift);
+    return addends.residual.valid() ? y.with(add(g, y.data, addends.residual.data)) : y;
+}
+
+Tensor project(Graph& g, const NetworkWeights& w, const Layer& layer, Tensor x)
+{
+    return gemm(g, x, w.tensor(g, layer.weight, "linear"), w.tensor(g, layer.bias, "linear.bias"),
+                {.dtype = w.precision()});
+}
+
+FeatureMap normalize(Graph& g, const NetworkWeights& w, const Layer& norm, const GroupNormOptions& options, NormInput x,
+                     NormInput x2)
+{
+    return group_norm(g, x, x2, w.tensor(g, norm.weight, "norm"), w.tensor(g, norm.bias, "norm.bias"), options);
+}
+
+} // namespace semrover

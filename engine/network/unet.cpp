@@ -1,0 +1,281 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/network/unet.h"
+
+#include <cmath>
+
+namespace semrover {
+
+namespace {
+
+// a resnet block with what follows it on its level
+struct UnetLayer {
+    ResnetBlock resnet;
+    uint32_t shift_col = 0; // of its time embedding, in the table
+    std::optional<Transformer2d> attention;
+};
+
+struct UnetLevel {
+    std::vector<UnetLayer> layers;
+    std::optional<Layer> resample; // to the next level
+};
+
+} // namespace
+
+struct Unet::Impl {
+    UnetConfig config;
+    NetworkWeights weights;
+    Layer conv_in, time_in, time_out, time_shifts, context, norm_out, conv_out;
+    Weight class_embedding;
+    std::vector<UnetLevel> down, up;
+    std::vector<UnetLayer> mid;
+    uint32_t time_width = 0, context_width = 0;
+    Arena constants;
+    uint32_t frequencies = 0;
+
+    Impl(const UnetConfig& c, DType precision, const DeviceLimits& limits) : config(c), weights(precision, limits)
+    {
+        std::vector<NetworkWeights::Part> shifts, context_parts;
+        declare_ends();
+        declare_down(shifts, context_parts);
+        declare_mid(shifts, context_parts);
+        declare_up(shifts, context_parts);
+        time_shifts = weights.linear(shifts, {.cols = config.time_embed_dim()});
+        if (!context_parts.empty())
+            context = weights.linear(context_parts, {.cols = config.cross_attention_dim, .bias = false});
+        frequencies = constants.add(config.block_out_channels[0] / 2 * 4);
+    }
+
+    // first and last layers, and the time embedding: fp32, its input is up to 1000 radians
+    void declare_ends()
+    {
+        const uint32_t first = config.block_out_channels[0], d = config.time_embed_dim();
+        conv_in = weights.conv("conv_in", {.outputs = first, .channels = config.in_channels});
+        time_in = weights.linear({{"time_embedding.linear_1", d}}, {.cols = first, .dtype = DType::f32});
+        time_out = weights.linear({{"time_embedding.linear_2", d}}, {.cols = d, .dtype = DType::f32});
+        if (config.num_class_embeds)
+            class_embedding = weights.table("class_embedding", config.num_class_embeds, d);
+        norm_out = weights.norm("conv_norm_out", first);
+        conv_out = weights.conv("conv_out", {.outputs = config.out_channels, .channels = first});
+    }
+
+    UnetLayer declare_layer(const std::string& block, size_t index, size_t level, const ResnetShape& shape,
+                            bool attention, std::vector<NetworkWeights::Part>& shifts,
+                            std::vector<NetworkWeights::Part>& context_parts)
+    {
+        UnetLayer layer;
+        const std::string name = fmt::format("{}.resnets.{}", block, index);
+        layer.resnet = declare_resnet(weights, name, shape);
+        layer.shift_col = time_width;
+        // heads = 1: each block's columns start at a multiple of kRowPadding
+        shifts.push_back({name + ".time_emb_proj", shape.outputs, 1});
+        time_width += round_up(shape.outputs, kRowPadding);
+        if (attention)
+            layer.attention =
+                declare_transformer_2d(weights, fmt::format("{}.attentions.{}", block, index),
+                                       {shape.outputs, config.heads[level], config.transformer_layers[level],
+                                        config.norm_num_groups, config.use_linear_projection},
+                                       context_parts, context_width);
+        return layer;
+    }
+
+    ResnetShape resnet_shape(uint32_t channels, uint32_t channels2, uint32_t outputs) const
+    {
+        return {channels, channels2, outputs, config.norm_num_groups, config.norm_eps};
+    }
+
+    void declare_down(std::vector<NetworkWeights::Part>& shifts, std::vector<NetworkWeights::Part>& context_parts)
+    {
+        uint32_t channels = config.block_out_channels[0];
+        for (size_t level = 0; level < config.levels(); ++level) {
+            const std::string block = fmt::format("down_blocks.{}", level);
+            const uint32_t outputs = config.block_out_channels[level];
+            UnetLevel l;
+            for (size_t i = 0; i < config.layers_per_block[level]; ++i) {
+                l.layers.push_back(declare_layer(block, i, level, resnet_shape(channels, 0, outputs),
+                                                 config.down_attention[level], shifts, context_parts));
+                channels = outputs;
+            }
+            if (level + 1 < config.levels())
+                l.resample = weights.conv(block + ".downsamplers.0.conv", {.outputs = outputs, .channels = outputs});
+            down.push_back(std::move(l));
+        }
+    }
+
+    void declare_mid(std::vector<NetworkWeights::Part>& shifts, std::vector<NetworkWeights::Part>& context_parts)
+    {
+        const size_t last = config.levels() - 1;
+        const ResnetShape shape = resnet_shape(config.block_out_channels[last], 0, config.block_out_channels[last]);
+        mid.push_back(declare_layer("mid_block", 0, last, shape, config.mid_attention, shifts, context_parts));
+        if (config.mid_attention)
+            mid.push_back(declare_layer("mid_block", 1, last, shape, false, shifts, context_parts));
+    }
+
+    // channels of the skip connections, in the order in which the down blocks make them
+    std::vector<uint32_t> skip_channels() const
+    {
+        std::vector<uint32_t> channels{config.block_out_channels[0]};
+        for (size_t level = 0; level < config.levels(); ++level)
+            channels.insert(channels.end(), config.layers_per_block[level] + (level + 1 < config.levels()),
+                            config.block_out_channels[level]);
+        return channels;
+    }
+
+    void declare_up(std::vector<NetworkWeights::Part>& shifts, std::vector<NetworkWeights::Part>& context_parts)
+    {
+        std::vector<uint32_t> skips = skip_channels();
+        uint32_t channels = config.block_out_channels.back();
+        for (size_t i = 0; i < config.levels(); ++i) {
+            const size_t level = config.levels() - 1 - i;
+            const std::string block = fmt::format("up_blocks.{}", i);
+            const uint32_t outputs = config.block_out_channels[level];
+            UnetLevel l;
+            for (size_t k = 0; k <= config.layers_per_block[level]; ++k) {
+                l.layers.push_back(declare_layer(block, k, level, resnet_shape(channels, skips.back(), outputs),
+                                                 config.up_attention[i], shifts, context_parts));
+                skips.pop_back();
+                channels = outputs;
+            }
+            if (level > 0)
+                l.resample = weights.conv(block + ".upsamplers.0.conv", {.outputs = outputs, .channels = outputs});
+            up.push_back(std::move(l));
+        }
+    }
+
+    Status upload_frequencies(Device& device)
+    {
+        SR_CHECK(constants.allocate(device, "frequencies"));
+        std::vector<float> w(config.block_out_channels[0] / 2);
+        for (size_t i = 0; i < w.size(); ++i)
+            w[i] = float(std::exp(-std::log(10000.0) * double(i) / (double(w.size()) - config.freq_shift)));
+        return device.write(constants.slice(frequencies), std::as_bytes(std::span(w)));
+    }
+
+    struct Inputs {
+        Tensor table, table_row;
+        TextContext context;
+    };
+    FeatureMap layer(Graph& g, const UnetLayer& l, NormInput x, NormInput skip, const Inputs& in) const
+    {
+        const FeatureMap y = resnet(g, weights, l.resnet, x, skip, {in.table, in.table_row, l.shift_col});
+        return l.attention ? transformer_2d(g, weights, *l.attention, with_moments(g, y), in.context) : y;
+    }
+    NormInput run_down(Graph& g, NormInput x, std::vector<NormInput>& skips, const Inputs& in) const
+    {
+        for (const UnetLevel& level : down) {
+            for (const UnetLayer& l : level.layers)
+                skips.push_back(x = with_moments(g, layer(g, l, x, {}, in)));
+            if (level.resample)
+                skips.push_back(x = with_moments(g, convolve(g, weights, *level.resample, x.x, {.stride = 2})));
+        }
+        return x;
+    }
+    NormInput run_up(Graph& g, NormInput x, std::vector<NormInput>& skips, const Inputs& in) const
+    {
+        for (const UnetLevel& level : up) {
+            for (size_t i = 0; i < level.layers.size(); ++i) {
+                const FeatureMap y = layer(g, level.layers[i], x, skips.back(), in);
+                skips.pop_back();
+                x = i + 1 == level.layers.size() && level.resample ? NormInput{y, {}} : with_moments(g, y);
+            }
+            if (!level.resample)
+                continue;
+            ConvOptions options; // to the size of the skip connection, which may be odd
+            options.upsampled_height = skips.back().x.height;
+            options.upsampled_width = skips.back().x.width;
+            x = with_moments(g, convolve(g, weights, *level.resample, x.x, options));
+        }
+        return x;
+    }
+};
+
+Unet::Unet(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Unet::~Unet() = default;
+
+std::unique_ptr<Unet> Unet::plan(const UnetConfig& config, DType precision, const DeviceLimits& limits)
+{
+    return std::unique_ptr<Unet>(new Unet(std::make_unique<Impl>(config, precision, limits)));
+}
+
+Result<std::unique_ptr<Unet>> Unet::load(Device& device, const UnetConfig& config, const Checkpoint& weights,
+                                         DType precision)
+{
+    std::unique_ptr<Unet> unet = plan(config, precision, device.limits());
+    SR_CHECK(unet->impl_->weights.load(device, weights, unet_schema(config)));
+    SR_CHECK(unet->impl_->upload_frequencies(device));
+    return unet;
+}
+
+const UnetConfig& Unet::config() const
+{
+    return impl_->config;
+}
+DType Unet::precision() const
+{
+    return impl_->weights.precision();
+}
+uint64_t Unet::parameters() const
+{
+    return impl_->weights.parameters();
+}
+uint64_t Unet::device_bytes(const DeviceLimits& limits) const
+{
+    return impl_->weights.device_bytes(limits) + impl_->constants.planned_bytes(limits);
+}
+uint32_t Unet::time_width() const
+{
+    return impl_->time_width;
+}
+uint32_t Unet::context_width() const
+{
+    return impl_->context_width;
+}
+
+void Unet::time_table(Graph& g, Tensor timesteps, Tensor table, Tensor class_labels) const
+{
+    const Impl& n = *impl_;
+    const auto linear = [&](const Layer& layer, Tensor x, DType dtype, Tensor into = {}) {
+        return gemm(g, x, n.weights.tensor(g, layer.weight, "time"), n.weights.tensor(g, layer.bias, "time.bias"),
+                    {.dtype = dtype, .into = into});
+    };
+    const uint32_t count = n.config.block_out_channels[0] / 2;
+    const Tensor frequencies = g.external(n.constants.slice(n.frequencies), count, 1, DType::f32, "frequencies", 1);
+    const Tensor waves = sinusoid(g, timesteps, frequencies, n.config.flip_sin_to_cos, DType::f32);
+    Tensor embedded = linear(n.time_out, silu(g, linear(n.time_in, waves, DType::f32)), precision());
+    if (n.config.num_class_embeds) {
+        SR_ASSERT(class_labels.valid(), "this network wants class labels");
+        embedded = embedding(g, class_labels, n.weights.tensor(g, n.class_embedding, "class_embedding"), embedded,
+                             precision());
+    }
+    const Tensor active = silu(g, embedded); // every block's projection begins with it
+    (void)linear(n.time_shifts, active, DType::f32, table);
+}
+
+void Unet::context_table(Graph& g, Tensor context, Tensor table) const
+{
+    if (impl_->context_width)
+        (void)gemm(g, context, impl_->weights.tensor(g, impl_->context.weight, "context"), {},
+                   {.dtype = precision(), .into = table});
+}
+
+FeatureMap Unet::forward(Graph& g, FeatureMap x, Tensor table, Tensor table_row, const Context& context) const
+{
+    const Impl& n = *impl_;
+    const Impl::Inputs in{table, table_row, context};
+    NormInput h = with_moments(g, convolve(g, n.weights, n.conv_in, x));
+    std::vector<NormInput> skips{h};
+    h = n.run_down(g, h, skips, in);
+    for (const UnetLayer& l : n.mid)
+        h = with_moments(g, n.layer(g, l, h, {}, in));
+    h = n.run_up(g, h, skips, in);
+    GroupNormOptions norm;
+    norm.groups = n.config.norm_num_groups;
+    norm.eps = n.config.norm_eps;
+    norm.silu = true;
+    norm.dtype = precision();
+    const FeatureMap last = normalize(g, n.weights, n.norm_out, norm, h);
+    return conv2d(g, last, {}, n.weights.tensor(g, n.conv_out.weight, "conv_out"),
+                  n.weights.tensor(g, n.conv_out.bias, "conv_out.bias"), {.dtype = DType::f32});
+}
+
+} // namespace semrover

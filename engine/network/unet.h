@@ -1,0 +1,55 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/model/checkpoint.h"
+#include "engine/model/unet_config.h"
+#include "engine/network/transformer_2d.h"
+#include "kernels/network.h"
+#include "runtime/device/device.h"
+
+#include <memory>
+
+namespace semrover {
+
+// UNet2DConditionModel, shaped like Stable Diffusion 1.5's (docs/models.md §4). Its functions add to a graph.
+class Unet {
+  public:
+    ~Unet();
+    static Result<std::unique_ptr<Unet>> load(Device& device, const UnetConfig& config, const Checkpoint& weights,
+                                              DType precision);
+    // lays out the weights without loading anything: for planning memory
+    static std::unique_ptr<Unet> plan(const UnetConfig& config, DType precision, const DeviceLimits& limits);
+
+    const UnetConfig& config() const;
+    DType precision() const;
+    uint64_t parameters() const;
+    uint64_t device_bytes(const DeviceLimits& limits) const; // of the weights
+
+    // what depends on the timestep only: a row per timestep, once per schedule
+    uint32_t time_width() const;
+    void time_table(Graph& g,
+                    Tensor timesteps,                // [T, 1] fp32 array
+                    Tensor table,                    // [T, time_width] fp32
+                    Tensor class_labels = {}) const; // [T] u32, with num_class_embeds
+
+    // keys and values of every cross-attention; once per text
+    uint32_t context_width() const;
+    void context_table(Graph& g,
+                       Tensor context,      // [rows, cross_attention_dim] in the network's precision
+                       Tensor table) const; // [rows, context_width] likewise
+    using Context = TextContext;            // the table, from context_table()
+
+    // one evaluation
+    [[nodiscard]] FeatureMap forward(Graph& g,
+                                     FeatureMap x,                  // in_channels, in the network's precision
+                                     Tensor table,                  // [T, time_width]
+                                     Tensor table_row,              // [batch] u32: row of the table for each image
+                                     const Context& context) const; // out_channels, fp32
+  private:
+    struct Impl;
+    explicit Unet(std::unique_ptr<Impl> impl);
+    std::unique_ptr<Impl> impl_;
+};
+
+} // namespace semrover

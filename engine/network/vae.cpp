@@ -1,0 +1,258 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/network/vae.h"
+
+#include "engine/network/network_blocks.h"
+
+#include <cmath>
+
+namespace semrover {
+
+namespace {
+
+constexpr float kVaeNormEps = 1e-6f;
+// what the residual stream is stored multiplied by where it may exceed fp16 (force_upcast): up to 2e6 fits
+constexpr float kHalfStream = 1.f / 32;
+
+// resnet, attention over all pixels with one head, resnet
+struct MidBlock {
+    ResnetBlock first, second;
+    bool attention = false;
+    Layer norm, qkv, out;
+};
+
+struct VaeLevel {
+    std::vector<ResnetBlock> layers;
+    std::optional<Layer> resample;
+};
+
+struct VaeHalf {
+    Layer conv_in, norm_out, conv_out;
+    MidBlock mid;
+    std::vector<VaeLevel> levels; // in the order in which they run
+};
+
+} // namespace
+
+struct Vae::Impl {
+    VaeConfig config;
+    NetworkWeights weights;
+    float stream;
+    VaeHalf encoder, decoder;
+    Layer quant_conv, post_quant_conv;
+
+    Impl(const VaeConfig& c, DType precision, const DeviceLimits& limits)
+        : config(c), weights(precision, limits), stream(precision == DType::f16 && c.force_upcast ? kHalfStream : 1.f)
+    {
+        const uint32_t latent = config.latent_channels;
+        declare_encoder();
+        if (config.use_quant_conv)
+            quant_conv = weights.conv(
+                "quant_conv", {.outputs = 2 * latent, .channels = 2 * latent, .kernel = 1, .dtype = DType::f32});
+        if (config.use_post_quant_conv)
+            post_quant_conv = weights.conv("post_quant_conv",
+                                           {.outputs = latent, .channels = latent, .kernel = 1, .dtype = DType::f32});
+        declare_decoder();
+    }
+
+    ResnetShape resnet_shape(uint32_t channels, uint32_t outputs) const
+    {
+        return {channels, 0, outputs, config.norm_num_groups, kVaeNormEps, stream};
+    }
+
+    MidBlock declare_mid(const std::string& name)
+    {
+        const uint32_t c = config.block_out_channels.back();
+        MidBlock m;
+        m.first = declare_resnet(weights, name + ".resnets.0", resnet_shape(c, c));
+        m.attention = config.mid_block_add_attention;
+        if (m.attention) {
+            const std::string a = name + ".attentions.0";
+            m.norm = weights.norm(a + ".group_norm", c);
+            m.qkv = weights.linear({{a + ".to_q", c, 1}, {a + ".to_k", c, 1}, {a + ".to_v", c, 1}}, {.cols = c});
+            m.out = weights.linear({{a + ".to_out.0", c}}, {.cols = c, .col_heads = 1, .gain = stream});
+        }
+        m.second = declare_resnet(weights, name + ".resnets.1", resnet_shape(c, c));
+        return m;
+    }
+
+    Layer declare_resample(const std::string& name, uint32_t channels)
+    {
+        return weights.conv(name, {.outputs = channels, .channels = channels, .bias_gain = stream});
+    }
+
+    // both ends of each half read and write fp32
+    void declare_encoder()
+    {
+        uint32_t channels = config.block_out_channels[0];
+        encoder.conv_in = weights.conv("encoder.conv_in", {.outputs = channels,
+                                                           .channels = config.in_channels,
+                                                           .gain = stream,
+                                                           .bias_gain = stream,
+                                                           .dtype = DType::f32});
+        for (size_t i = 0; i < config.block_out_channels.size(); ++i) {
+            const std::string block = fmt::format("encoder.down_blocks.{}", i);
+            const uint32_t outputs = config.block_out_channels[i];
+            VaeLevel level;
+            for (uint32_t k = 0; k < config.layers_per_block; ++k, channels = outputs)
+                level.layers.push_back(
+                    declare_resnet(weights, fmt::format("{}.resnets.{}", block, k), resnet_shape(channels, outputs)));
+            if (i + 1 < config.block_out_channels.size())
+                level.resample = declare_resample(block + ".downsamplers.0.conv", outputs);
+            encoder.levels.push_back(std::move(level));
+        }
+        encoder.mid = declare_mid("encoder.mid_block");
+        encoder.norm_out = weights.norm("encoder.conv_norm_out", channels);
+        encoder.conv_out =
+            weights.conv("encoder.conv_out", {.outputs = 2 * config.latent_channels, .channels = channels});
+    }
+
+    void declare_decoder()
+    {
+        const size_t levels = config.block_out_channels.size();
+        uint32_t channels = config.block_out_channels.back();
+        decoder.conv_in = weights.conv("decoder.conv_in", {.outputs = channels,
+                                                           .channels = config.latent_channels,
+                                                           .gain = stream,
+                                                           .bias_gain = stream,
+                                                           .dtype = DType::f32});
+        decoder.mid = declare_mid("decoder.mid_block");
+        for (size_t i = 0; i < levels; ++i) {
+            const std::string block = fmt::format("decoder.up_blocks.{}", i);
+            const uint32_t outputs = config.block_out_channels[levels - 1 - i];
+            VaeLevel level;
+            for (uint32_t k = 0; k <= config.layers_per_block; ++k, channels = outputs)
+                level.layers.push_back(
+                    declare_resnet(weights, fmt::format("{}.resnets.{}", block, k), resnet_shape(channels, outputs)));
+            if (i + 1 < levels)
+                level.resample = declare_resample(block + ".upsamplers.0.conv", outputs);
+            decoder.levels.push_back(std::move(level));
+        }
+        decoder.norm_out = weights.norm("decoder.conv_norm_out", channels);
+        decoder.conv_out = weights.conv("decoder.conv_out", {.outputs = config.out_channels, .channels = channels});
+    }
+
+    GroupNormOptions norm_options(bool with_silu) const
+    {
+        GroupNormOptions o;
+        o.groups = config.norm_num_groups;
+        o.eps = kVaeNormEps * stream * stream;
+        o.silu = with_silu;
+        o.dtype = weights.precision();
+        return o;
+    }
+
+    FeatureMap attention(Graph& g, const MidBlock& m, NormInput x) const
+    {
+        const FeatureMap n = normalize(g, weights, m.norm, norm_options(false), x);
+        const Tensor qkv = project(g, weights, m.qkv, n.data);
+        FlashAttentionOptions o;
+        o.head_dim = qkv.cols / 3;
+        o.scale = 1 / std::sqrt(float(config.block_out_channels.back()));
+        o.batch = x.x.batch;
+        o.queries = o.keys = x.x.pixels();
+        o.query_rows = o.key_rows = x.x.image_rows();
+        o.k_col = o.head_dim;
+        o.v_col = 2 * o.head_dim;
+        return x.x.with(add(g, project(g, weights, m.out, flash_attention(g, qkv, qkv, o)), x.x.data));
+    }
+
+    NormInput mid(Graph& g, const MidBlock& m, NormInput x) const
+    {
+        NormInput h = with_moments(g, resnet(g, weights, m.first, x, {}));
+        if (m.attention)
+            h = with_moments(g, attention(g, m, h));
+        return with_moments(g, resnet(g, weights, m.second, h, {}));
+    }
+
+    // what a level hands to the next one; statistics are not wanted in front of a resampling convolution
+    NormInput run_level(Graph& g, const VaeLevel& level, NormInput x, bool upwards) const
+    {
+        for (size_t i = 0; i < level.layers.size(); ++i) {
+            const FeatureMap y = resnet(g, weights, level.layers[i], x, {});
+            x = i + 1 == level.layers.size() && level.resample ? NormInput{y, {}} : with_moments(g, y);
+        }
+        if (!level.resample)
+            return x;
+        ConvOptions options;
+        if (upwards) {
+            options.upsampled_height = 2 * x.x.height;
+            options.upsampled_width = 2 * x.x.width;
+        } else {
+            options.stride = 2;
+            options.end_padding = true;
+        }
+        return with_moments(g, convolve(g, weights, *level.resample, x.x, options));
+    }
+
+    FeatureMap finish(Graph& g, const VaeHalf& half, NormInput x) const
+    {
+        const FeatureMap n = normalize(g, weights, half.norm_out, norm_options(true), x);
+        return conv2d(g, n, {}, weights.tensor(g, half.conv_out.weight, "conv_out"),
+                      weights.tensor(g, half.conv_out.bias, "conv_out.bias"), {.dtype = DType::f32});
+    }
+
+    // a 1x1 convolution in fp32
+    FeatureMap quantize(Graph& g, const Layer& layer, FeatureMap x) const
+    {
+        return conv2d(g, x, {}, weights.tensor(g, layer.weight, "quant_conv"), weights.tensor(g, layer.bias, "bias"),
+                      {.kernel = 1, .dtype = DType::f32});
+    }
+};
+
+Vae::Vae(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Vae::~Vae() = default;
+
+std::unique_ptr<Vae> Vae::plan(const VaeConfig& config, DType precision, const DeviceLimits& limits)
+{
+    return std::unique_ptr<Vae>(new Vae(std::make_unique<Impl>(config, precision, limits)));
+}
+
+Result<std::unique_ptr<Vae>> Vae::load(Device& device, const VaeConfig& config, const Checkpoint& weights,
+                                       DType precision)
+{
+    std::unique_ptr<Vae> vae = plan(config, precision, device.limits());
+    SR_CHECK(vae->impl_->weights.load(device, weights, vae_schema(config)));
+    return vae;
+}
+
+const VaeConfig& Vae::config() const
+{
+    return impl_->config;
+}
+DType Vae::precision() const
+{
+    return impl_->weights.precision();
+}
+uint64_t Vae::parameters() const
+{
+    return impl_->weights.parameters();
+}
+uint64_t Vae::device_bytes(const DeviceLimits& limits) const
+{
+    return impl_->weights.device_bytes(limits);
+}
+
+FeatureMap Vae::encode(Graph& g, FeatureMap image) const
+{
+    const Impl& n = *impl_;
+    NormInput h = with_moments(g, convolve(g, n.weights, n.encoder.conv_in, image));
+    for (const VaeLevel& level : n.encoder.levels)
+        h = n.run_level(g, level, h, false);
+    const FeatureMap moments = n.finish(g, n.encoder, n.mid(g, n.encoder.mid, h));
+    return n.config.use_quant_conv ? n.quantize(g, n.quant_conv, moments) : moments;
+}
+
+FeatureMap Vae::decode(Graph& g, FeatureMap latent) const
+{
+    const Impl& n = *impl_;
+    if (n.config.use_post_quant_conv)
+        latent = n.quantize(g, n.post_quant_conv, latent);
+    NormInput h = with_moments(g, convolve(g, n.weights, n.decoder.conv_in, latent));
+    h = n.mid(g, n.decoder.mid, h);
+    for (const VaeLevel& level : n.decoder.levels)
+        h = n.run_level(g, level, h, true);
+    return n.finish(g, n.decoder, h);
+}
+
+} // namespace semrover

@@ -1,0 +1,40 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/model/checkpoint.h"
+#include "engine/model/vae_config.h"
+#include "kernels/network.h"
+#include "runtime/device/device.h"
+
+#include <memory>
+
+namespace semrover {
+
+// AutoencoderKL (docs/models.md §5). Its functions add to a graph. Where the config asks for force_upcast and the
+// precision is fp16, the residual stream is stored divided by a power of two, which group norms undo exactly.
+class Vae {
+  public:
+    ~Vae();
+    static Result<std::unique_ptr<Vae>> load(Device& device, const VaeConfig& config, const Checkpoint& weights,
+                                             DType precision);
+    // lays out the weights without loading anything: for planning memory
+    static std::unique_ptr<Vae> plan(const VaeConfig& config, DType precision, const DeviceLimits& limits);
+
+    const VaeConfig& config() const;
+    DType precision() const;
+    uint64_t parameters() const;
+    uint64_t device_bytes(const DeviceLimits& limits) const; // of the weights
+
+    // image: in_channels, -1..1, fp32 -> 2 * latent_channels, fp32: mean, log-variance
+    [[nodiscard]] FeatureMap encode(Graph& g, FeatureMap image) const;
+    // latent: latent_channels, fp32, not scaled -> out_channels, fp32, -1..1 or beyond
+    [[nodiscard]] FeatureMap decode(Graph& g, FeatureMap latent) const;
+
+  private:
+    struct Impl;
+    explicit Vae(std::unique_ptr<Impl> impl);
+    std::unique_ptr<Impl> impl_;
+};
+
+} // namespace semrover

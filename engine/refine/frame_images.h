@@ -1,0 +1,24 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/splat/rasterizer.h"
+#include "runtime/base/file.h"
+
+namespace semrover {
+
+// A splat image as files. color: sRGB, over a background where the splats leave room; depth: 16-bit millimetres along
+// z, or from the camera where Lens::radial_depth says so, 0 for nothing; normal: camera frame, 128 + 127 n; label:
+// class number, 255 for nothing; visible: 0 or 255.
+std::vector<uint8_t> color_pixels(const SplatImage& image,
+                                  const std::array<uint8_t, 3>& background); // [height, width, 3]
+std::vector<uint16_t> depth_pixels(const SplatImage& image);                 // [height, width]
+std::vector<uint8_t> normal_pixels(const SplatImage& image);                 // [height, width, 3]
+std::vector<uint8_t> label_pixels(const SplatImage& image);                  // [height, width]
+std::vector<uint8_t> visible_pixels(const SplatImage& image);                // [height, width]
+
+// FOLDER/{color,depth,normal,label,visible}/NNNNNN.png; folders are made. Errors: bad_input
+Status write_frame_images(const Path& folder, uint32_t number, const SplatImage& image,
+                          const std::array<uint8_t, 3>& background);
+
+} // namespace semrover

@@ -1,0 +1,54 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/refine/asd.h"
+
+namespace semrover {
+
+// which networks are on the device at a time
+enum class MemoryPolicy {
+    resident, // both for the whole run, and the memory of one kind of work at a time; frames are ready one by one
+    staged,   // the VAE encodes every buffer, then the UNet denoises every frame, then the VAE decodes every latent
+};
+std::string_view policy_name(MemoryPolicy policy);
+
+// what a run has to do with the pictures of one size
+struct RendererWork {
+    LatentSize size;
+    bool encode = true, denoise = true, decode = true;
+};
+
+// device bytes of a renderer's parts; 0 where a run has no work for them
+struct RendererBytes {
+    uint64_t unet = 0, vae = 0; // weights
+    struct Size {
+        uint64_t state = 0, denoise = 0, encode = 0, decode = 0;
+    };
+    std::vector<Size> sizes; // one per RendererWork
+
+    uint64_t peak(MemoryPolicy policy) const;
+};
+
+// what the parts will take, from graphs without memory. The networks may have been made by Unet::plan and Vae::plan.
+struct RendererNetworks {
+    const Unet& unet;
+    const Vae& vae;
+    const SamplingPlan& plan;
+    uint32_t text_tokens = 0;
+    float guidance_scale = 1;
+};
+Result<RendererBytes> renderer_bytes(const DeviceLimits& limits, const RendererNetworks& networks,
+                                     std::span<const RendererWork> work);
+
+struct MemoryPlan {
+    MemoryPolicy policy = MemoryPolicy::resident;
+    uint64_t bytes = 0; // of the whole run, with what is allocated before it
+    RendererBytes parts;
+};
+
+// the first policy that fits `budget` (0: any does) beside what is allocated already.
+// Errors: out_of_memory, with what each policy would take
+Result<MemoryPlan> plan_memory(RendererBytes parts, uint64_t allocated, uint64_t budget);
+
+} // namespace semrover

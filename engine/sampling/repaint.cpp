@@ -1,0 +1,108 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/sampling/repaint.h"
+
+#include <cmath>
+#include <map>
+
+namespace semrover {
+
+namespace {
+
+constexpr int kMaxJump = 10000;
+
+// x' at the level of `to`, from x at the level of `from`, which is less noisy
+StepCoefficients undo_step(const StepCoefficients& from, const StepCoefficients& to)
+{
+    StepCoefficients step;
+    step.timestep = to.timestep;
+    step.c_x = std::sqrt(to.abar / from.abar);
+    step.c_z = std::sqrt(1 - to.abar / from.abar);
+    step.abar = from.abar;
+    return step;
+}
+
+} // namespace
+
+Result<RepaintPreset> repaint_preset(std::string_view name)
+{
+    if (name == "fast")
+        return RepaintPreset{20, {1, 1}, {}};
+    if (name == "standard")
+        return RepaintPreset{50, {5, 2}, {}};
+    if (name == "paper")
+        return RepaintPreset{250, {10, 10}, Sampler::ddpm};
+    return fail(ErrorCode::usage, "no preset is called \"{}\", choose from fast, standard, paper", name);
+}
+
+Result<std::vector<int>> repaint_levels(int steps, const RepaintOptions& options)
+{
+    const int length = options.jump_length, count = options.jump_n_sample;
+    if (steps < 1 || steps > kMaxInferenceSteps)
+        return fail(ErrorCode::bad_input, "{} denoising steps, expected 1 to {}", steps, kMaxInferenceSteps);
+    if (length < 0 || length > kMaxJump)
+        return fail(ErrorCode::bad_input, "jump_length is {}, expected 0 to {}", length, kMaxJump);
+    if (count < 1 || count > kMaxJump)
+        return fail(ErrorCode::bad_input, "jump_n_sample is {}, expected 1 to {}", count, kMaxJump);
+    // jumps start at levels 0, length, 2 length, ... below steps - length
+    const int64_t starts = length == 0 || steps <= length ? 0 : (steps - 1) / length;
+    const int64_t total = steps + starts * (count - 1) * 2 * length;
+    if (total > int64_t(kMaxPlanRows))
+        return fail(ErrorCode::bad_input, "{} steps with jump_length {} and jump_n_sample {} make {} rows, at most {}",
+                    steps, length, count, total, kMaxPlanRows);
+    std::vector<int> jumps_left(steps, 0);
+    for (int64_t i = 0; i < starts; ++i)
+        jumps_left[i * length] = count - 1;
+    std::vector<int> levels;
+    levels.reserve(total);
+    for (int level = steps - 1; level >= 0; --level) {
+        levels.push_back(level);
+        if (jumps_left[level] == 0)
+            continue;
+        --jumps_left[level];
+        for (int i = 0; i < length; ++i)
+            levels.push_back(++level);
+    }
+    return levels;
+}
+
+Result<SamplingPlan> plan_sampling(const SchedulerConfig& config, int steps, const RepaintOptions& repaint)
+{
+    SR_TRY(const Schedule schedule, make_schedule(config, steps));
+    SR_TRY(const std::vector<int> levels, repaint_levels(steps, repaint));
+    if (!schedule.can_hold_known() && levels.size() > schedule.steps.size())
+        return fail(ErrorCode::bad_input, "sampler {} cannot jump back, choose another or jump_n_sample 1",
+                    sampler_name(schedule.sampler));
+    SamplingPlan plan;
+    plan.init_noise_sigma = schedule.init_noise_sigma;
+    plan.clip = schedule.clip;
+    plan.can_hold_known = schedule.can_hold_known();
+    plan.known = repaint.known;
+    std::map<double, uint32_t> index_of; // of a timestep
+    PlanRowKind before = PlanRowKind::step;
+    for (size_t i = 0; i < levels.size(); ++i) {
+        const size_t at = size_t(steps - 1 - levels[i]); // levels count up from the end of the schedule
+        PlanRow row;
+        if (i > 0 && levels[i] > levels[i - 1]) {
+            row.kind = PlanRowKind::undo;
+            row.coefficients = undo_step(schedule.steps[at + 1], schedule.steps[at]);
+        } else {
+            row.coefficients = before == PlanRowKind::undo ? schedule.restarts[at] : schedule.steps[at];
+            if (repaint.known == KnownTokens::clean) {
+                row.coefficients.known_scale = 1;
+                row.coefficients.known_noise = 0;
+            }
+            ++plan.evaluations;
+        }
+        before = row.kind;
+        const auto [found, is_new] = index_of.emplace(row.coefficients.timestep, uint32_t(plan.timesteps.size()));
+        if (is_new)
+            plan.timesteps.push_back(row.coefficients.timestep);
+        row.timestep_index = found->second;
+        row.draw = uint32_t(i);
+        plan.rows.push_back(row);
+    }
+    return plan;
+}
+
+} // namespace semrover

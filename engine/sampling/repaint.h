@@ -1,0 +1,72 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/sampling/schedule.h"
+
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+namespace semrover {
+
+// how the network sees tokens that are given, at each step
+enum class KnownTokens {
+    noised, // with noise of the level that the others have, as in RePaint
+    clean,  // as they are: for a network that was trained to go on from such (tools/train, known_share)
+};
+
+// RePaint, arXiv 2201.09865: every jump_length steps, go back up jump_length steps by adding noise and come down again,
+// jump_n_sample times in all. jump_length 0 or jump_n_sample 1 never goes back.
+struct RepaintOptions {
+    int jump_length = 0;   // 0..10000
+    int jump_n_sample = 1; // 1..10000
+    KnownTokens known = KnownTokens::noised;
+};
+
+struct RepaintPreset {
+    int steps = 0;
+    RepaintOptions repaint;
+    std::optional<Sampler> sampler; // none: the model's own
+};
+
+// "fast" 20 steps 1/1, "standard" 50 steps 5/2, "paper" 250 steps 10/10 with DDPM; another name is a usage error
+Result<RepaintPreset> repaint_preset(std::string_view name);
+
+constexpr size_t kMaxPlanRows = 1'000'000;
+
+// Levels visited by RePaint, `steps` - 1 the noisiest and 0 the last, as in diffusers' RePaintScheduler (which
+// multiplies them by num_train_timesteps / steps). A level below the one before it is a denoising step at that level,
+// a level above it a step back up. Bad input: options out of range, or more than kMaxPlanRows levels.
+Result<std::vector<int>> repaint_levels(int steps, const RepaintOptions& options);
+
+enum class PlanRowKind : uint32_t {
+    step, // network, then the step; known tokens take known_scale * fixed + known_noise * z
+    undo, // no network: x' = c_x * x + c_z * z for every token, the known ones too; all other coefficients are 0
+};
+
+struct PlanRow {
+    PlanRowKind kind = PlanRowKind::step;
+    StepCoefficients coefficients;
+    uint32_t draw = 0;           // index of the row in the plan: the part of the noise key that changes between rows
+    uint32_t timestep_index = 0; // into SamplingPlan::timesteps; in an undo row, of the timestep gone up to
+};
+
+// everything a sampling run does, row by row; one plan serves any number of cells
+struct SamplingPlan {
+    std::vector<PlanRow> rows;
+    std::vector<double> timesteps; // distinct ones, in the order they are first visited
+    size_t evaluations = 0;        // rows of kind step: how often the network runs
+    double init_noise_sigma = 1;   // the first x is this times a standard normal
+    double clip = Schedule::kNoClip;
+    bool can_hold_known = true;              // false with euler
+    KnownTokens known = KnownTokens::noised; // clean: after rows of kind undo, too, known tokens take `fixed`
+};
+
+// The plan of `steps` denoising steps with RePaint's jumps over them. A jump moves along the schedule's own timesteps
+// whatever their spacing, from abar to abar': x' = sqrt(abar' / abar) x + sqrt(1 - abar' / abar) z, where abar is that
+// of the timestep just denoised, as in diffusers. After a jump a multistep sampler starts again at first order.
+// Bad input: what make_schedule and repaint_levels refuse, and jumps with euler.
+Result<SamplingPlan> plan_sampling(const SchedulerConfig& config, int steps, const RepaintOptions& repaint = {});
+
+} // namespace semrover

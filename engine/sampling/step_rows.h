@@ -1,0 +1,20 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/sampling/repaint.h"
+#include "shaders/lib/step_row.h"
+
+namespace semrover {
+
+// noise keys of what comes before a plan's rows, whose draws count from 0 up to kMaxPlanRows
+constexpr uint32_t kFirstDraw = 0xfffff;         // the first noise
+constexpr uint32_t kPreviousFrameDraw = 0xffffe; // the noise on the frame before
+
+StepRow step_row(const PlanRow& row); // of a plan, for the device
+
+// x = scale z, and x += scale z: rows for step_renoise, with noise of the stream of all tokens
+StepRow first_noise_row(double scale, uint32_t draw);
+StepRow more_noise_row(double scale, uint32_t draw);
+
+} // namespace semrover

@@ -1,0 +1,98 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "runtime/graph/graph.h"
+
+// Ops on triangle meshes in cells, as those of kernels/network.h
+namespace semrover {
+
+// Triangles are given for each block of 8^3 cells that they touch; a slot is a block, or a range of its cells. The key
+// of cell (x, y, z) of a slot is slot * 512 + (x * 8 + y) * 8 + z. A cell spans [x, x + 1) x [y, y + 1) x [z, z + 1).
+constexpr uint32_t kSurfaceBlock = 8, kSurfaceBlockCells = 512, kNoSurfaceLabel = 20, kSurfacePlaceBits = 9;
+struct SurfaceTriangles { // words: u32, or the bits of a float
+    Tensor records;    // [T, 12]: three corners in cells from the block's corner (floats within +-16); slot; its range
+                       // of cells (four bits each: first x, y, z, end x, y, z); material | label << 24
+    Tensor attributes; // [T, 16]: u, v of the corners (floats); their linear r, g, b (floats); unused
+    Tensor materials;  // [M, 8]: linear r, g, b (floats); texture, label texture (2^32 - 1: none); unused
+    Tensor textures;   // [X, 4]: width, height, address of the first texel, wrap of u | wrap of v << 2 (TextureWrap)
+};
+
+// the cells that a triangle may have area in: those that its box and its plane touch
+struct SurfacePairs {
+    Tensor keys;      // [capacity] u32, of cells; as triangle_cells() makes them, << kSurfacePlaceBits with the Morton
+                      // code of where in the cell the triangle lies below
+    Tensor triangles; // [capacity] u32
+    Tensor count;     // [1] u32
+};
+[[nodiscard]] SurfacePairs triangle_cells(Graph& g,
+                                          Tensor records,     // [T, 12], as above
+                                          uint32_t capacity); // pairs; the caller knows that they fit
+
+// y[i] = x[i] >> kSurfacePlaceBits: the cells alone, once pairs are sorted
+[[nodiscard]] Tensor pair_cells(Graph& g, Tensor keys); // [N] u32 -> [N] u32
+
+// the area of each pair's triangle within its cell, by exact clipping
+struct SurfaceAreas {
+    Tensor areas;           // [capacity] fp32, in squares of a cell's edge
+    Tensor labels;          // [capacity] u32, of the triangles; kNoSurfaceLabel: none
+    Tensor label_addresses; // [capacity] u32: of the texel that says the label; 2^32 - 1: none
+};
+[[nodiscard]] SurfaceAreas clip_area(Graph& g, const SurfaceTriangles& surface, const SurfacePairs& pairs);
+
+// y[i] = page[address[i] - first] where that is in the page; else y[i] stays
+void gather_texels(Graph& g,
+                   Tensor addresses, // [N] u32
+                   Tensor page,      // [texels] u32
+                   uint32_t first,
+                   Tensor y,           // [N] u32, in place
+                   Tensor count = {}); // [1] u32, or none: only the first count[0] addresses are there
+
+// area and label of cells, in the order of their pairs
+struct CellAreas {
+    Tensor sums;       // [pairs] fp32: area of the cell up to and with this pair, never falling
+    Tensor areas;      // [cells] fp32, in squares of a cell's edge
+    Tensor labels;     // [cells] u32: of the largest area, ties to the lower one; kNoSurfaceLabel where none has any
+    Tensor unlabelled; // [cells] fp32: area without a label
+};
+[[nodiscard]] CellAreas cell_area(Graph& g,
+                                  Tensor areas,  // [pairs] fp32, sorted by cell
+                                  Tensor labels, // [pairs] u32
+                                  Tensor starts, // [cells + 1] u32: bucket_starts() of the keys
+                                  uint32_t cells);
+
+// points drawn uniformly from the surface in cells, Philox4x32-10 keyed by (seed, cell, sample)
+struct SurfaceSamples {
+    Tensor points;    // [cells * samples, 8] fp32: offset from the cell's centre in cells; where the point lies between
+                      // its four texels, right and down; linear factor of the colour, r g b
+    Tensor addresses; // [cells * samples, 4] u32: of the texels; 2^32 - 1: none
+};
+[[nodiscard]] SurfaceSamples sample_surface(Graph& g, const SurfaceTriangles& surface,
+                                            Tensor triangles, // [pairs] u32, sorted by cell
+                                            Tensor sums,      // [pairs] fp32: of cell_area()
+                                            Tensor starts,    // [keys + 1] u32
+                                            Tensor cells,     // [cells, 4] i32: i, j, k, key; each has area
+                                            uint32_t samples, uint64_t seed);
+
+// y = offset (bits of three floats); the colour: texels bilinearly in linear light times the factor, as sRGB bytes
+[[nodiscard]] Tensor surface_color(Graph& g, const SurfaceSamples& samples,
+                                   Tensor texels,  // [cells * samples, 4] u32: sRGB bytes, r lowest
+                                   Tensor linear); // [512] fp32: linear value of sRGB bytes v, then of v + 0.5
+                                                   // -> [cells * samples, 4] u32
+
+// Boxes around triangles. A node is eight words: least x, y, z (floats), link; largest x, y, z (floats), count. With a
+// count, a leaf: link is the first of so many triangles; without, the left child is the next node, link the right one.
+// At most 40 levels.
+struct SurfaceTree {
+    Tensor nodes;     // [nodes, 8]
+    Tensor triangles; // [T, 10] u32: three corners (floats as bits), face
+};
+
+// y = the nearest triangle of points, where it is nearer than y; ties to the lower face
+void surface_distance(Graph& g,
+                      Tensor points, // [P, 3 or more] fp32 array
+                      const SurfaceTree& tree,
+                      Tensor y); // [P, 2] u32 array, in place: distance (bits of a float >= 0 whose square is finite),
+                                 // face
+
+} // namespace semrover

@@ -1,0 +1,27 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// area of triangles within cells, and where the texels that say their labels are
+#include "kernels/mesh.h"
+
+#include "clip_area.spv.h"
+#include "shaders/mesh/clip_area.h"
+
+namespace semrover {
+
+SurfaceAreas clip_area(Graph& g, const SurfaceTriangles& s, const SurfacePairs& pairs)
+{
+    SR_ASSERT(s.records.ld == 12 && s.attributes.ld == 16 && s.attributes.rows == s.records.rows &&
+                  s.materials.ld == 8 && s.textures.ld == 4,
+              "clip_area: {} records of {} words, {} attributes of {}", s.records.rows, s.records.ld, s.attributes.rows,
+              s.attributes.ld);
+    const uint32_t size = pairs.keys.rows;
+    const SurfaceAreas y{g.array(size, DType::f32, "pair areas"), g.array(size, DType::u32, "pair labels"),
+                         g.array(size, DType::u32, "label addresses")};
+    g.dispatch(kernel::clip_area,
+               {s.records, s.attributes, s.materials, s.textures, pairs.count, pairs.keys, pairs.triangles, y.areas,
+                y.labels, y.label_addresses},
+               ClipAreaPush{.size = size}, threads(size));
+    return y;
+}
+
+} // namespace semrover

@@ -1,0 +1,20 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// the nearest triangle of points and its distance, exact, through a tree of boxes
+#include "kernels/mesh.h"
+
+#include "shaders/mesh/surface_distance.h"
+#include "surface_distance.spv.h"
+
+namespace semrover {
+
+void surface_distance(Graph& g, Tensor points, const SurfaceTree& tree, Tensor y)
+{
+    SR_ASSERT(points.dtype == DType::f32 && points.cols >= 3 && y.rows == points.rows && tree.nodes.ld == 8 &&
+                  tree.triangles.ld == 10 && y.ld == 2,
+              "surface_distance: points [{}, {}], {} results", points.rows, points.cols, y.rows);
+    g.dispatch(kernel::surface_distance, {points, tree.nodes, tree.triangles, y},
+               SurfaceDistancePush{.size = points.rows, .points_ld = points.ld}, threads(points.rows));
+}
+
+} // namespace semrover

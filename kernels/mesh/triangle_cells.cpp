@@ -1,0 +1,28 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// the cells that triangles may have area in: counted per triangle, then written where the prefix sum of counts says
+#include "kernels/mesh.h"
+
+#include "kernels/sort.h"
+#include "shaders/mesh/triangle_cells.h"
+#include "triangle_cells_count.spv.h"
+#include "triangle_cells_emit.spv.h"
+
+namespace semrover {
+
+SurfacePairs triangle_cells(Graph& g, Tensor records, uint32_t capacity)
+{
+    SR_ASSERT(records.dtype == DType::u32 && records.ld == 12 && capacity, "triangle_cells: records [{}, {}] {}",
+              records.rows, records.ld, dtype_name(records.dtype));
+    const TriangleCellsPush push{.size = records.rows, .capacity = capacity};
+    const Tensor counts = g.array(records.rows, DType::u32, "cells of triangles");
+    g.dispatch(kernel::triangle_cells_count, {records, counts}, push, threads(records.rows));
+    const PrefixSum first = prefix_sum(g, counts);
+    SurfacePairs pairs{g.array(capacity, DType::u32, "pair cells"), g.array(capacity, DType::u32, "pair triangles"),
+                       first.total};
+    g.dispatch(kernel::triangle_cells_emit, {records, first.sums, pairs.keys, pairs.triangles}, push,
+               threads(records.rows));
+    return pairs;
+}
+
+} // namespace semrover

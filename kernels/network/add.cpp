@@ -1,0 +1,24 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// y = residual + x: [M, N] -> [M, N]
+#include "kernels/network.h"
+
+#include "add.spv.h"
+#include "shaders/network/add.h"
+
+namespace semrover {
+
+Tensor add(Graph& g, Tensor x, Tensor residual, Tensor into)
+{
+    SR_ASSERT(residual.rows == x.rows && residual.cols == x.cols, "add: [{}, {}] onto [{}, {}]", x.rows, x.cols,
+              residual.rows, residual.cols);
+    const Tensor y = into.valid() ? into : g.matrix(x.rows, x.cols, residual.dtype, "add");
+    const AddPush push{.rows = x.rows, .cols = x.cols, .x_ld = x.ld, .y_ld = y.ld, .residual_ld = residual.ld};
+    DispatchOptions options;
+    options.absorbed_as = "kAdd";
+    options.banded = {"X", "Residual", "Y"};
+    g.dispatch(kernel::add, {x, residual, y}, push, threads(x.rows * divide_up(x.cols, 8)), std::move(options));
+    return y;
+}
+
+} // namespace semrover

@@ -1,0 +1,114 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// y[n] = bias[n] + sum over taps and channels of w[n, tap, c] x[pixel at tap, c]:
+// x [images, H, W, C], w [N, taps * (C + C2)] -> y [images, H', W', N]
+#include "kernels/network.h"
+
+#include "conv2d.spv.h"
+#include "shaders/network/conv2d.h"
+
+namespace semrover {
+
+namespace {
+
+// the taps of a square kernel: zeros all around, or to the right and below only
+ConvOptions::Taps taps_of(const ConvOptions& o)
+{
+    if (o.taps.height)
+        return o.taps;
+    const uint32_t around = o.kernel == 1 || o.end_padding ? 0 : 1;
+    return {o.kernel, o.kernel, around, around};
+}
+
+// how the output lies over the input
+RowWindow window_of(FeatureMap x, const ConvOptions& o)
+{
+    const bool upsampled = o.upsampled_height != 0;
+    const uint32_t height = upsampled ? o.upsampled_height : x.height;
+    const uint32_t width = upsampled ? o.upsampled_width : x.width;
+    SR_ASSERT(!upsampled || ((height + 1) / 2 == x.height && (width + 1) / 2 == x.width),
+              "conv2d: {}x{} is not {}x{} times two", height, width, x.height, x.width);
+    SR_ASSERT(!o.taps.height || (o.taps.width && !o.end_padding), "conv2d: {}x{} taps", o.taps.height, o.taps.width);
+    const ConvOptions::Taps taps = taps_of(o);
+    const uint32_t end = o.end_padding && o.kernel != 1;
+    const uint32_t seen_height = height + 2 * taps.padding_y + end, seen_width = width + 2 * taps.padding_x + end;
+    RowWindow w;
+    w.stride = o.stride;
+    w.kernel = taps.height;
+    w.padding = taps.padding_y;
+    w.shift = upsampled;
+    w.in_height = height;
+    w.in_width = x.width;
+    w.in_image_rows = x.image_rows();
+    SR_ASSERT(seen_height >= taps.height && seen_width >= taps.width, "conv2d: {}x{} image for {}x{} taps", height,
+              width, taps.height, taps.width);
+    w.out_height = (seen_height - taps.height) / o.stride + 1;
+    w.out_width = (seen_width - taps.width) / o.stride + 1;
+    w.out_image_rows = round_up(w.out_height * w.out_width, kImageRowPadding);
+    return w;
+}
+
+} // namespace
+
+FeatureMap feature_map(Graph& g, uint32_t batch, uint32_t height, uint32_t width, uint32_t channels, DType dtype,
+                       std::string_view name)
+{
+    FeatureMap map{{}, batch, height, width};
+    map.data = g.matrix(batch * map.image_rows(), channels, dtype, name);
+    return map;
+}
+
+FeatureMap conv2d(Graph& g, FeatureMap x, FeatureMap x2, Tensor w, Tensor bias, const ConvOptions& options)
+{
+    const RowWindow window = window_of(x, options);
+    const ConvOptions::Taps taps = taps_of(options);
+    const FeatureMap y = feature_map(g, x.batch, window.out_height, window.out_width, w.rows, options.dtype, "conv2d");
+    Conv2dPush push{};
+    push.rows = y.data.rows;
+    push.cols = w.rows;
+    push.out_width = y.width;
+    push.out_pixels = y.pixels();
+    push.image_rows = y.image_rows();
+    push.in_width = x.width;
+    push.in_image_rows = x.image_rows();
+    push.seen_width = window.shift ? options.upsampled_width : x.width;
+    push.seen_height = window.in_height;
+    push.stride = options.stride;
+    push.padding_y = taps.padding_y;
+    push.padding_x = taps.padding_x;
+    push.shift = window.shift;
+    push.x_ld = x.data.ld;
+    push.x_cols = round_up(x.channels(), kRowPadding);
+    push.w_ld = w.ld;
+    push.y_ld = y.data.ld;
+    if (x2.valid()) {
+        SR_ASSERT(x2.batch == x.batch && x2.height == x.height && x2.width == x.width && x2.data.dtype == x.data.dtype,
+                  "conv2d: inputs of {} x {}x{} and {} x {}x{}", x.batch, x.height, x.width, x2.batch, x2.height,
+                  x2.width);
+        push.x2_ld = x2.data.ld;
+        push.x2_cols = round_up(x2.channels(), kRowPadding);
+    }
+    const uint32_t depth = taps.height * taps.width * (push.x_cols + push.x2_cols);
+    SR_ASSERT(w.cols == depth && w.dtype == x.data.dtype, "conv2d: w [{}, {}] {} for {} columns {}", w.rows, w.cols,
+              dtype_name(w.dtype), depth, dtype_name(x.data.dtype));
+    SR_ASSERT(!bias.valid() || (bias.cols == w.rows && bias.dtype == DType::f32), "conv2d: bias [{}, {}] for {}",
+              bias.rows, bias.cols, w.rows);
+    DispatchOptions dispatch;
+    dispatch.flops = 2.0 * x.batch * y.pixels() * w.rows * taps.height * taps.width *
+                     (x.channels() + (x2.valid() ? x2.channels() : 0));
+    dispatch.constants = {{"kKernelHeight", taps.height},
+                          {"kKernelWidth", taps.width},
+                          {"kTwoInputs", x2.valid()},
+                          {"kBias", bias.valid()}};
+    dispatch.banded = {{"X", window}, "Y"};
+    if (x2.valid())
+        dispatch.banded.push_back({"X2", window});
+    const Tensor unused = w.row_range(0, 1), second = x2.valid() ? x2.data : x.data.row_range(0, 1);
+    g.dispatch(
+        kernel::conv2d,
+        {x.data, w, bias.valid() ? bias : unused, unused, y.data.row_range(0, 1), y.data, unused, unused, second}, push,
+        tiles(push.rows, push.cols), std::move(dispatch));
+    return y;
+}
+
+} // namespace semrover

@@ -1,0 +1,43 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// y = epilogue(x w^T): x [groups * M, K], w [groups * N, K] -> y [groups * M, N]
+#include "kernels/network.h"
+
+#include "gemm.spv.h"
+#include "shaders/network/gemm.h"
+
+namespace semrover {
+
+Tensor gemm(Graph& g, Tensor x, Tensor w, Tensor bias, const GemmOptions& options)
+{
+    const uint32_t groups = options.groups;
+    SR_ASSERT(x.cols == w.cols && x.dtype == w.dtype, "gemm: x [{}, {}] {} and w [{}, {}] {}", x.rows, x.cols,
+              dtype_name(x.dtype), w.rows, w.cols, dtype_name(w.dtype));
+    SR_ASSERT(x.rows % groups == 0 && w.rows % groups == 0, "gemm: {} and {} rows in {} groups", x.rows, w.rows,
+              groups);
+    GemmPush push{};
+    push.rows = x.rows / groups;
+    push.cols = w.rows / groups;
+    push.depth = round_up(x.cols, kRowPadding);
+    push.x_ld = x.ld;
+    push.w_ld = w.ld;
+    SR_ASSERT(!bias.valid() || (bias.rows == groups && bias.cols == push.cols && bias.dtype == DType::f32),
+              "gemm: bias [{}, {}] for {} columns in {} groups", bias.rows, bias.cols, push.cols, groups);
+    push.bias_ld = bias.ld;
+    const Tensor y = options.into.valid() ? options.into : g.matrix(x.rows, push.cols, options.dtype, "gemm");
+    SR_ASSERT(y.rows == x.rows && y.cols == push.cols, "gemm: [{}, {}] written into [{}, {}]", x.rows, push.cols,
+              y.rows, y.cols);
+    push.y_ld = y.ld;
+    DispatchOptions dispatch;
+    dispatch.flops = 2.0 * x.rows * push.cols * x.cols;
+    if (bias.valid())
+        dispatch.constants.push_back({"kBias", 1});
+    if (groups == 1)
+        dispatch.banded = {"X", "Y"};
+    const Tensor unused = w.row_range(0, 1); // of epilogues that are off
+    g.dispatch(kernel::gemm, {x, w, bias.valid() ? bias : unused, unused, y.row_range(0, 1), y, unused, unused}, push,
+               tiles(push.rows, push.cols, groups), std::move(dispatch));
+    return y;
+}
+
+} // namespace semrover

@@ -1,0 +1,23 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// y = (x - mean(x)) / sqrt(var(x) + eps) * weight + bias: [M, N] -> [M, N]
+#include "kernels/network.h"
+
+#include "layer_norm.spv.h"
+#include "shaders/network/layer_norm.h"
+
+namespace semrover {
+
+Tensor layer_norm(Graph& g, Tensor x, Tensor weight, Tensor bias, float eps)
+{
+    SR_ASSERT(weight.cols == x.cols && bias.cols == x.cols && weight.dtype == DType::f32 && bias.dtype == DType::f32,
+              "layer_norm: rows of {}, weight of {}, bias of {}", x.cols, weight.cols, bias.cols);
+    const Tensor y = g.matrix(x.rows, x.cols, x.dtype, "layer_norm");
+    const LayerNormPush push{.rows = x.rows, .cols = x.cols, .x_ld = x.ld, .y_ld = y.ld, .eps = eps};
+    DispatchOptions options;
+    options.banded = {"X", "Y"};
+    g.dispatch(kernel::layer_norm, {x, weight, bias, y}, push, row_tiles(x.rows), std::move(options));
+    return y;
+}
+
+} // namespace semrover

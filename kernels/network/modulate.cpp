@@ -1,0 +1,34 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// y = (x - mean(x)) / sqrt(var(x) + eps) * (1 + scale) + shift: [groups * M, N] -> [groups * M, N]
+#include "kernels/network.h"
+
+#include "modulate.spv.h"
+#include "shaders/network/modulate.h"
+
+namespace semrover {
+
+Tensor modulate(Graph& g, Tensor x, Modulation shift, uint32_t scale_col, float eps, uint32_t groups)
+{
+    SR_ASSERT(x.rows % groups == 0 && shift.table_row.rows == x.rows, "modulate: {} rows, {} groups, {} table rows",
+              x.rows, groups, shift.table_row.rows);
+    const Tensor y = g.matrix(x.rows, x.cols, x.dtype, "modulate");
+    ModulatePush push{};
+    push.rows = x.rows / groups;
+    push.cols = x.cols;
+    push.groups = groups;
+    push.x_ld = x.ld;
+    push.y_ld = y.ld;
+    push.table_ld = shift.table.ld;
+    push.shift_col = shift.col;
+    push.scale_col = scale_col;
+    push.step = shift.step;
+    push.eps = eps;
+    DispatchOptions options;
+    if (groups == 1)
+        options.banded = {"X", "TableRow", "Y"};
+    g.dispatch(kernel::modulate, {x, shift.table, shift.table_row, y}, push, row_tiles(x.rows), std::move(options));
+    return y;
+}
+
+} // namespace semrover

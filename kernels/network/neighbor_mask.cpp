@@ -1,0 +1,22 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// bit j of row i: cell j of the set of i lies within the radius: cells [M, 4] -> [M, words]
+#include "kernels/network.h"
+
+#include "neighbor_mask.spv.h"
+#include "shaders/network/neighbor_mask.h"
+
+namespace semrover {
+
+Tensor neighbor_mask(Graph& g, Tensor cells, Tensor sets, uint32_t longest_set, int32_t radius2, Tensor into)
+{
+    const uint32_t words = divide_up(longest_set, 32);
+    const Tensor mask = into.valid() ? into : g.array(cells.rows, DType::u32, "mask", words);
+    SR_ASSERT(mask.rows == cells.rows && mask.cols == words, "neighbor_mask: [{}, {}] for {} words", mask.rows,
+              mask.cols, words);
+    const NeighborMaskPush push{.rows = cells.rows, .words = words, .radius2 = radius2};
+    g.dispatch(kernel::neighbor_mask, {cells, sets, mask}, push, threads(cells.rows * words));
+    return mask;
+}
+
+} // namespace semrover

@@ -1,0 +1,25 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// y = max(x, 0): [M, N] -> [M, N], or columns of a wider tensor
+#include "kernels/network.h"
+
+#include "relu.spv.h"
+#include "shaders/recognition/relu.h"
+
+namespace semrover {
+
+Tensor relu(Graph& g, Tensor x, const ColumnRange& into)
+{
+    const uint32_t width = round_up(x.cols, kRowPadding);
+    const Tensor y = into.tensor.valid() ? into.tensor : g.matrix(x.rows, x.cols, x.dtype, "relu");
+    SR_ASSERT(y.rows == x.rows && into.col % 8 == 0 && into.col + width <= round_up(y.cols, kRowPadding),
+              "relu: [{}, {}] written into [{}, {}] from column {}", x.rows, x.cols, y.rows, y.cols, into.col);
+    const ReluPush push{.rows = x.rows, .x_ld = x.ld, .y_ld = y.ld, .y_col = into.col, .width = width};
+    DispatchOptions options;
+    options.absorbed_as = "kRelu";
+    options.banded = {"X", "Y"};
+    g.dispatch(kernel::relu, {x, y}, push, threads(x.rows * (width / 8)), std::move(options));
+    return y;
+}
+
+} // namespace semrover

@@ -1,0 +1,40 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// y[i] = x[0] + .. + x[i - 1], reduce then scan: sums of chunks, their prefix sums, then every chunk again. No
+// workgroup waits for another, so it needs no forward progress guarantee.
+#include "kernels/sort.h"
+
+#include "prefix_sum_apply.spv.h"
+#include "prefix_sum_reduce.spv.h"
+#include "prefix_sum_spine.spv.h"
+#include "shaders/sort/prefix_sum.h"
+
+#include <algorithm>
+
+namespace semrover {
+
+namespace {
+
+constexpr uint32_t kSumChunk = 1024, kMaxSumWorkers = 1024; // elements a worker should have at least; chunks
+
+} // namespace
+
+PrefixSum prefix_sum(Graph& g, Tensor x, const PrefixSumOptions& options)
+{
+    SR_ASSERT(x.dtype == DType::u32 && x.cols == 1 && x.ld == 1, "prefix_sum: x [{}, {}] {}", x.rows, x.cols,
+              dtype_name(x.dtype));
+    const PrefixSumPush push{.size = x.rows, .workers = std::min(divide_up(x.rows, kSumChunk), kMaxSumWorkers)};
+    const Tensor partial = g.array(push.workers, DType::u32, "partial sums");
+    const Tensor first = g.array(push.workers, DType::u32, "sums before chunks");
+    const Tensor total = options.total.valid() ? options.total : g.array(1, DType::u32, "total");
+    const Tensor y = g.array(x.rows, DType::u32, "prefix sums");
+    const Tensor count = options.count.valid() ? options.count : x;
+    DispatchOptions dispatch;
+    dispatch.constants = {{"kCounted", options.count.valid()}, {"kNonZero", options.non_zero}};
+    g.dispatch(kernel::prefix_sum_reduce, {x, count, partial}, push, tiles(push.workers, 1), dispatch);
+    g.dispatch(kernel::prefix_sum_spine, {partial, first, total}, push, groups(1));
+    g.dispatch(kernel::prefix_sum_apply, {x, count, first, y}, push, tiles(push.workers, 1), dispatch);
+    return {y, total};
+}
+
+} // namespace semrover

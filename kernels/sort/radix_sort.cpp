@@ -1,0 +1,57 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// pairs sorted by key, stably, a digit of at most 8 bits at a time from the lowest: digits are counted per chunk, the
+// prefix sum over [digit][chunk] says where each chunk's pairs of a digit go, and every chunk moves its pairs there
+#include "kernels/sort.h"
+
+#include "radix_sort_count.spv.h"
+#include "radix_sort_scatter.spv.h"
+#include "shaders/sort/radix_sort.h"
+
+#include <algorithm>
+
+namespace semrover {
+
+namespace {
+
+constexpr uint32_t kDigitBits = 8;
+constexpr uint32_t kSortChunk = 1024, kMaxSortWorkers = 2048; // pairs a worker should have at least; chunks
+
+// an odd multiple of 8: whole workgroups of the CPU variant, and columns of counters that do not fall into one cache
+// set
+uint32_t workers_for(uint32_t size)
+{
+    const uint32_t groups = divide_up(std::min(divide_up(size, kSortChunk), kMaxSortWorkers), 8);
+    return 8 * (groups | 1);
+}
+
+} // namespace
+
+SortedPairs radix_sort(Graph& g, Tensor keys, Tensor values, const RadixSortOptions& options)
+{
+    SR_ASSERT(keys.dtype == DType::u32 && keys.ld == 1 && options.bits >= 1 && options.bits <= 32,
+              "radix_sort: keys [{}, {}] {}, {} bits", keys.rows, keys.cols, dtype_name(keys.dtype), options.bits);
+    SR_ASSERT(!values.valid() || (values.rows == keys.rows && values.ld == 1), "radix_sort: {} values for {} keys",
+              values.rows, keys.rows);
+    const uint32_t passes = divide_up(options.bits, kDigitBits), digit = divide_up(options.bits, passes);
+    RadixSortPush push{.size = keys.rows, .workers = workers_for(keys.rows)};
+    const Tensor count = options.count.valid() ? options.count : keys;
+    for (uint32_t pass = 0; pass < passes; ++pass) {
+        push.shift = pass * digit;
+        push.buckets = 1u << std::min(digit, options.bits - push.shift);
+        const Tensor counters = fill(g, push.buckets * push.workers, 0);
+        const SortedPairs to = {g.array(keys.rows, DType::u32, "sorted keys"),
+                                g.array(keys.rows, DType::u32, "sorted values")};
+        DispatchOptions dispatch;
+        dispatch.constants = {{"kCounted", options.count.valid()}, {"kIota", !values.valid()}};
+        g.dispatch(kernel::radix_sort_count, {keys, count, counters}, push, tiles(push.workers, 1), dispatch);
+        const Tensor first = prefix_sum(g, counters).sums;
+        g.dispatch(kernel::radix_sort_scatter, {keys, count, values.valid() ? values : keys, first, to.keys, to.values},
+                   push, tiles(push.workers, 1), dispatch);
+        keys = to.keys;
+        values = to.values;
+    }
+    return {keys, values};
+}
+
+} // namespace semrover

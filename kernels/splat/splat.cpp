@@ -1,0 +1,145 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// 2D Gaussian splats to images (docs/method.md §5.3): keep what a camera can see, write records without
+// gaps, sort them by depth (equal depths by camera and splat), make a pair for every tile that a record touches, sort
+// those by tile, blend every pixel front to back:
+//   alpha = min(alpha_max, o exp(-r^2 / 2)), w = alpha T, T' = T (1 - alpha)
+// Cameras with a lens take other records and meet every surfel with the ray of a pixel (docs/method.md §5.4).
+#include "kernels/splat.h"
+
+#include "kernels/sort.h"
+#include "shaders/splat/splat.h"
+#include "splat_blend.spv.h"
+#include "splat_count.spv.h"
+#include "splat_cull.spv.h"
+#include "splat_emit.spv.h"
+#include "splat_lens_cull.spv.h"
+#include "splat_lens_project.spv.h"
+#include "splat_project.spv.h"
+#include "splat_ray_blend.spv.h"
+#include "splat_rays.spv.h"
+
+#include <bit>
+
+namespace semrover {
+
+namespace {
+
+SplatPush make_push(const SplatScene& scene, Tensor cameras, const SplatOptions& o)
+{
+    SplatPush push{};
+    push.splats = scene.positions.rows;
+    push.cameras = cameras.rows;
+    push.width = o.width;
+    push.height = o.height;
+    push.tile = o.tile;
+    push.tiles_x = divide_up(o.width, o.tile);
+    push.tiles_y = divide_up(o.height, o.tile);
+    push.max_visible = o.max_visible;
+    push.max_pairs = o.max_pairs;
+    push.near = o.near;
+    push.alpha_min = o.alpha_min;
+    push.alpha_max = o.alpha_max;
+    push.transmittance_min = o.transmittance_min;
+    push.cutoff2 = o.cutoff > 0 ? o.cutoff * o.cutoff : 1e30f;
+    push.filter_scale = o.screen_variance > 0 ? 1 / o.screen_variance : 1e30f;
+    return push;
+}
+
+void check(const SplatScene& scene, Tensor cameras, const SplatOptions& o)
+{
+    const uint32_t n = scene.positions.rows;
+    SR_ASSERT(scene.positions.ld == 4 && scene.normals.ld == 4 && scene.colors.ld == 4 && scene.normals.rows == n &&
+                  scene.colors.rows == n && scene.labels.rows == n && scene.cells.rows == n,
+              "splat: scene of {} splats with arrays of other sizes", n);
+    SR_ASSERT(cameras.ld == splat_camera_floats(o.lens) && o.width >= 1 && o.width <= 65535 && o.height >= 1 &&
+                  o.height <= 65535,
+              "splat: {} x {} pixels, cameras of {} floats", o.width, o.height, cameras.ld);
+    SR_ASSERT(o.tile % 16 == 0 && o.tile > 0 && o.max_visible > 0 && o.max_pairs > 0,
+              "splat: tiles of {}, {} splats, {} pairs", o.tile, o.max_visible, o.max_pairs);
+    SR_ASSERT(uint64_t(n) * cameras.rows < 1ull << 32, "splat: {} splats in {} cameras", n, cameras.rows);
+}
+
+// what cameras can see
+struct Seen {
+    Tensor records, sources, depths, count;
+};
+
+Seen project(Graph& g, const SplatScene& scene, Tensor cameras, const SplatOptions& o, const SplatPush& push)
+{
+    const bool pinhole = o.lens == SplatLens::pinhole;
+    const uint32_t views = push.splats * push.cameras;
+    DispatchOptions lens;
+    if (!pinhole)
+        lens.constants = {{"kModel", uint32_t(o.lens)}};
+    const Tensor keep = g.array(views, DType::u32, "keep");
+    g.dispatch(pinhole ? kernel::splat_cull : kernel::splat_lens_cull,
+               {cameras, scene.positions, scene.normals, scene.colors, keep}, push, threads(views), lens);
+    const PrefixSum slots = prefix_sum(g, keep, {.non_zero = true, .total = o.visible});
+    const uint32_t texels = splat_record_bytes(o.lens) / 16;
+    const Tensor records = g.array(push.max_visible * texels, DType::u32, "splat records", 4);
+    const Tensor sources = g.array(push.max_visible, DType::u32, "splat sources");
+    const Tensor depths = g.array(push.max_visible, DType::u32, "splat depths");
+    g.dispatch(pinhole ? kernel::splat_project : kernel::splat_lens_project,
+               {cameras, scene.positions, scene.normals, scene.colors, keep, slots.sums, records, sources, depths},
+               push, threads(views), lens);
+    return {records, sources, depths, slots.total};
+}
+
+// records by tile, nearest first, and the first pair of each tile
+struct Tiled {
+    Tensor records, starts;
+};
+
+Tiled sort_into_tiles(Graph& g, const Seen& seen, const SplatOptions& o, const SplatPush& push)
+{
+    const uint32_t tiles_all = push.tiles_x * push.tiles_y * push.cameras;
+    DispatchOptions lens;
+    lens.constants = {{"kRays", o.lens != SplatLens::pinhole}};
+    const Tensor order = radix_sort(g, seen.depths, {}, {.count = seen.count}).values;
+    const Tensor touched = g.array(push.max_visible, DType::u32, "tiles touched");
+    g.dispatch(kernel::splat_count, {seen.records, order, seen.count, touched}, push, threads(push.max_visible), lens);
+    const PrefixSum first = prefix_sum(g, touched, {.count = seen.count, .total = o.pairs});
+    const SortedPairs pairs = {g.array(push.max_pairs, DType::u32, "pair tiles"),
+                               g.array(push.max_pairs, DType::u32, "pair records")};
+    g.dispatch(kernel::splat_emit,
+               {seen.records, seen.sources, order, seen.count, first.sums, pairs.keys, pairs.values}, push,
+               threads(push.max_visible), lens);
+    const uint32_t bits = std::max(1, int(std::bit_width(tiles_all - 1)));
+    const SortedPairs by_tile = radix_sort(g, pairs.keys, pairs.values, {.bits = bits, .count = first.total});
+    return {by_tile.values, bucket_starts(g, by_tile.keys, tiles_all, first.total)};
+}
+
+} // namespace
+
+SplatImages splat(Graph& g, const SplatScene& scene, Tensor cameras, const SplatOptions& options)
+{
+    check(scene, cameras, options);
+    const SplatPush push = make_push(scene, cameras, options);
+    const uint32_t pixels = options.width * options.height * push.cameras;
+    const Seen seen = project(g, scene, cameras, options, push);
+    const Tiled by_tile = sort_into_tiles(g, seen, options, push);
+    const SplatImages y = {g.array(pixels, DType::f32, "splat colour", 4),
+                           g.array(pixels, DType::f32, "splat surface", 4),
+                           g.array(pixels, DType::f32, "splat depth", 2), g.array(pixels, DType::u32, "splat ids", 2)};
+    DispatchOptions blend;
+    blend.flops = 40.0 * push.max_pairs * options.tile * options.tile; // an upper bound: pixels are done early
+    const Grid grid = tiles(options.height, options.width, push.cameras);
+    if (options.lens == SplatLens::pinhole) {
+        g.dispatch(kernel::splat_blend,
+                   {seen.records, by_tile.records, by_tile.starts, seen.sources, scene.labels, scene.cells, y.color,
+                    y.surface, y.depth, y.ids},
+                   push, grid, std::move(blend));
+        return y;
+    }
+    blend.constants = {{"kModel", uint32_t(options.lens)}};
+    const Tensor rays = g.array(pixels, DType::f32, "rays", 4);
+    g.dispatch(kernel::splat_rays, {cameras, rays}, push, threads(pixels), {.constants = blend.constants});
+    g.dispatch(kernel::splat_ray_blend,
+               {seen.records, by_tile.records, by_tile.starts, seen.sources, scene.labels, scene.cells, y.color,
+                y.surface, y.depth, y.ids, rays},
+               push, grid, std::move(blend));
+    return y;
+}
+
+} // namespace semrover

@@ -1,0 +1,50 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "runtime/base/file.h"
+#include "runtime/base/result.h"
+
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+
+namespace semrover {
+
+using Json = nlohmann::json;
+
+// what a strict reader of events derives from: the first refusal is kept and stops the parser. nlohmann's events; its
+// parser keeps no call stack, so depth costs nothing until a handler allows it.
+class JsonEvents : public nlohmann::json_sax<Json> {
+  public:
+    bool binary(binary_t&) override { return refuse("found binary data"); } // never in text
+    bool parse_error(size_t position, const std::string& last_token, const nlohmann::detail::exception& e) override;
+
+    const std::string& refusal() const { return refusal_; }
+
+  protected:
+    bool refuse(std::string reason); // always false
+
+  private:
+    std::string refusal_;
+};
+
+// runs the events of `text` (a whole document: nothing but white space around one value) through `events`; bad_input
+// with `where` in front for a byte order mark, a NUL byte, broken UTF-8 or syntax, and for what `events` refuses
+Status parse_json_events(std::string_view text, std::string_view where, JsonEvents& events);
+
+struct JsonLimits {
+    uint64_t bytes = 16u << 20;
+    uint32_t depth = 32;
+    uint32_t values = 2u << 20; // arrays, objects, strings, numbers, ... together
+};
+
+// a document as a value. On top of the syntax: duplicate keys at any level and numbers beyond double are refused.
+Result<Json> parse_json(std::string_view text, std::string_view where, const JsonLimits& limits = {});
+Result<Json> read_json(const Path& path, const JsonLimits& limits = {});
+
+// a float's shortest digits: 0.18215, not 0.18215000629425049
+Json short_number(float value);
+
+} // namespace semrover

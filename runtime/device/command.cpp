@@ -1,0 +1,60 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "runtime/device/command.h"
+
+namespace semrover {
+
+namespace {
+
+constexpr VkPipelineStageFlags kCompute = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT;
+constexpr VkPipelineStageFlags kTransfer = VK_PIPELINE_STAGE_TRANSFER_BIT;
+constexpr VkPipelineStageFlags kHost = VK_PIPELINE_STAGE_HOST_BIT;
+constexpr VkAccessFlags kShader = VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT;
+constexpr VkAccessFlags kCopy = VK_ACCESS_TRANSFER_READ_BIT | VK_ACCESS_TRANSFER_WRITE_BIT;
+
+void barrier(VkCommandBuffer commands, VkPipelineStageFlags from, VkAccessFlags written, VkPipelineStageFlags to,
+             VkAccessFlags access)
+{
+    VkMemoryBarrier memory{VK_STRUCTURE_TYPE_MEMORY_BARRIER};
+    memory.srcAccessMask = written;
+    memory.dstAccessMask = access;
+    vkCmdPipelineBarrier(commands, from, to, 0, 1, &memory, 0, nullptr, 0, nullptr);
+}
+
+} // namespace
+
+Status begin_commands(VkCommandBuffer commands, bool once)
+{
+    VkCommandBufferBeginInfo info{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO};
+    info.flags = once ? VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT : VK_COMMAND_BUFFER_USAGE_SIMULTANEOUS_USE_BIT;
+    SR_VK(vkBeginCommandBuffer(commands, &info));
+    return {};
+}
+
+void record_barrier(VkCommandBuffer commands)
+{
+    barrier(commands, kCompute, VK_ACCESS_SHADER_WRITE_BIT, kCompute, kShader);
+}
+
+void record_final_barrier(VkCommandBuffer commands)
+{
+    barrier(commands, kCompute, VK_ACCESS_SHADER_WRITE_BIT, kCompute | kTransfer | kHost,
+            kShader | kCopy | VK_ACCESS_HOST_READ_BIT);
+}
+
+void record_copy(VkCommandBuffer commands, VkBuffer from, uint64_t from_at, VkBuffer to, uint64_t to_at, uint64_t bytes)
+{
+    const VkBufferCopy region{from_at, to_at, bytes};
+    vkCmdCopyBuffer(commands, from, to, 1, &region);
+    barrier(commands, kTransfer, VK_ACCESS_TRANSFER_WRITE_BIT, kCompute | kTransfer | kHost,
+            kShader | kCopy | VK_ACCESS_HOST_READ_BIT);
+}
+
+void record_clear(VkCommandBuffer commands, VkBuffer buffer, uint64_t at, uint64_t bytes)
+{
+    vkCmdFillBuffer(commands, buffer, at, bytes, 0);
+    barrier(commands, kTransfer, VK_ACCESS_TRANSFER_WRITE_BIT, kCompute | kTransfer | kHost,
+            kShader | kCopy | VK_ACCESS_HOST_READ_BIT);
+}
+
+} // namespace semrover

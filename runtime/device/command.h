@@ -1,0 +1,23 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "runtime/device/vulkan.h"
+
+#include <cstdint>
+
+// recording; the only file that emits barriers
+namespace semrover {
+
+Status begin_commands(VkCommandBuffer commands, bool once);
+
+// every shader write before is visible to every shader access after
+void record_barrier(VkCommandBuffer commands);
+// the same at the end of a submit, for whatever comes next: shaders, copies, the host
+void record_final_barrier(VkCommandBuffer commands);
+// with the barrier that lets shaders, copies and the host follow
+void record_copy(VkCommandBuffer commands, VkBuffer from, uint64_t from_at, VkBuffer to, uint64_t to_at,
+                 uint64_t bytes);
+void record_clear(VkCommandBuffer commands, VkBuffer buffer, uint64_t at, uint64_t bytes);
+
+} // namespace semrover

@@ -1,0 +1,316 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "runtime/device/device.h"
+
+#include "runtime/device/command.h"
+#include "runtime/device/physical_device.h"
+#include "runtime/device/pipeline.h"
+#include "runtime/device/profile.h"
+#include "runtime/graph/kernel.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+
+namespace semrover {
+
+namespace {
+
+constexpr uint64_t kStagingBytes = 16ull << 20;
+constexpr uint64_t kWaitNanoseconds = 600ull * 1000000000; // beyond any submit that the slicer makes
+
+std::string environment(const char* name)
+{
+    const char* value = std::getenv(name);
+    return value ? value : "";
+}
+
+VKAPI_ATTR VkBool32 VKAPI_CALL on_validation(VkDebugUtilsMessageSeverityFlagBitsEXT, VkDebugUtilsMessageTypeFlagsEXT,
+                                             const VkDebugUtilsMessengerCallbackDataEXT* data, void*)
+{
+    std::fprintf(stderr, "validation: %s\n", data->pMessage);
+    if (environment("SEMROVER_VALIDATION") == "fatal")
+        std::abort();
+    return VK_FALSE;
+}
+
+Result<uint32_t> select_device(const std::vector<DeviceSummary>& all, const std::string& select)
+{
+    std::string names;
+    for (const DeviceSummary& d : all)
+        names += fmt::format("{}{}: {}{}", names.empty() ? "" : ", ", d.index, d.name,
+                             d.refusal.empty() ? "" : " (" + d.refusal + ")");
+    const bool numeric = !select.empty() && select.find_first_not_of("0123456789") == std::string::npos;
+    for (const DeviceSummary& d : all) {
+        const bool match =
+            select.empty() || (numeric ? std::to_string(d.index) == select : d.name.find(select) != std::string::npos);
+        if (!match)
+            continue;
+        if (d.refusal.empty())
+            return d.index;
+        if (!select.empty())
+            return fail(ErrorCode::no_device, "device '{}' cannot be used: {}", d.name, d.refusal);
+    }
+    if (all.empty())
+        return fail(ErrorCode::no_device, "no Vulkan device found; install a driver (Debian: mesa-vulkan-drivers)");
+    return fail(ErrorCode::no_device, "no usable device matches '{}'; there are: {}", select, names);
+}
+
+} // namespace
+
+Device::Device() = default;
+
+Result<std::unique_ptr<Device>> Device::create(const DeviceOptions& options)
+{
+    std::unique_ptr<Device> d(new Device());
+    SR_CHECK(d->create_instance(options));
+    SR_TRY(const auto physical, physical_devices(d->instance_));
+    std::vector<DeviceSummary> summaries;
+    for (size_t i = 0; i < physical.size(); ++i)
+        summaries.push_back(summarize(physical[i], uint32_t(i)));
+    SR_TRY(d->index_, select_device(summaries, options.select));
+    d->physical_ = physical[d->index_];
+    SR_CHECK(d->create_device(options));
+    SR_CHECK(d->finish(options));
+    return d;
+}
+
+Result<std::unique_ptr<Device>> Device::adopt(const HostDevice& host, const DeviceOptions& options)
+{
+    if (!host.instance || !host.physical || !host.device || !host.queue)
+        return fail(ErrorCode::usage, "a host device needs instance, physical device, device and queue");
+    if (!is_compute_family(host.physical, host.queue_family))
+        return fail(ErrorCode::usage, "queue family {} of the host device has no compute", host.queue_family);
+    if (bool(host.lock) != bool(host.unlock))
+        return fail(ErrorCode::usage, "a host device needs both of lock and unlock, or neither");
+    std::unique_ptr<Device> d(new Device());
+    d->owned_ = false;
+    d->instance_ = host.instance;
+    d->physical_ = host.physical;
+    d->device_ = host.device;
+    d->queue_ = host.queue;
+    d->queue_family_ = host.queue_family;
+    d->lock_ = host.lock;
+    d->unlock_ = host.unlock;
+    SR_CHECK(d->finish(options));
+    if (!host.float16) // what the hardware could do is not what the host asked for
+        d->limits_.needs_supported &= ~uint32_t(kNeedsFloat16);
+    return d;
+}
+
+Status Device::create_instance(const DeviceOptions& options)
+{
+    const bool validation = options.validation || !environment("SEMROVER_VALIDATION").empty();
+    SR_TRY(instance_, semrover::create_instance(validation));
+    if (!validation)
+        return {};
+    VkDebugUtilsMessengerCreateInfoEXT info{VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT};
+    info.messageSeverity =
+        VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT;
+    info.messageType = VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT;
+    info.pfnUserCallback = on_validation;
+    const auto create = reinterpret_cast<PFN_vkCreateDebugUtilsMessengerEXT>(
+        vkGetInstanceProcAddr(instance_, "vkCreateDebugUtilsMessengerEXT"));
+    SR_VK(create(instance_, &info, nullptr, &messenger_));
+    return {};
+}
+
+Status Device::create_device(const DeviceOptions&)
+{
+    SR_TRY(queue_family_, compute_queue_family(physical_));
+    const float priority = 1;
+    VkDeviceQueueCreateInfo queue{VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO};
+    queue.queueFamilyIndex = queue_family_;
+    queue.queueCount = 1;
+    queue.pQueuePriorities = &priority;
+    VkPhysicalDeviceVulkan12Features have{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES};
+    VkPhysicalDeviceFeatures2 available{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2, &have, {}};
+    vkGetPhysicalDeviceFeatures2(physical_, &available);
+    VkPhysicalDeviceVulkan12Features f12{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES};
+    f12.timelineSemaphore = VK_TRUE;
+    f12.shaderFloat16 = have.shaderFloat16;
+    VkPhysicalDeviceFeatures2 features{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2, &f12, {}};
+    // gathers use indices that came from files: out of bounds must not leave the buffer
+    features.features.robustBufferAccess = available.features.robustBufferAccess;
+    VkDeviceCreateInfo info{VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO, &features};
+    info.queueCreateInfoCount = 1;
+    info.pQueueCreateInfos = &queue;
+    SR_VK(vkCreateDevice(physical_, &info, nullptr, &device_));
+    vkGetDeviceQueue(device_, queue_family_, 0, &queue_);
+    return {};
+}
+
+Status Device::finish(const DeviceOptions& options)
+{
+    const DeviceSummary summary = summarize(physical_, 0);
+    if (!summary.refusal.empty())
+        return fail(ErrorCode::no_device, "device '{}' cannot be used: {}", summary.name, summary.refusal);
+    name_ = summary.name;
+    driver_ = summary.driver;
+    limits_ = summary.limits;
+    budget_ = options.max_bytes;
+    SR_CHECK(override_limits(limits_, environment("SEMROVER_LIMITS")));
+    SR_CHECK(override_limits(limits_, options.limits));
+    VkPhysicalDeviceProperties properties;
+    vkGetPhysicalDeviceProperties(physical_, &properties);
+    timestamp_ns_ = properties.limits.timestampPeriod;
+    VkSemaphoreTypeCreateInfo type{VK_STRUCTURE_TYPE_SEMAPHORE_TYPE_CREATE_INFO};
+    type.semaphoreType = VK_SEMAPHORE_TYPE_TIMELINE;
+    VkSemaphoreCreateInfo semaphore{VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO, &type, 0};
+    SR_VK(vkCreateSemaphore(device_, &semaphore, nullptr, &timeline_));
+    VkCommandPoolCreateInfo pool{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO};
+    pool.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
+    pool.queueFamilyIndex = queue_family_;
+    SR_VK(vkCreateCommandPool(device_, &pool, nullptr, &copy_pool_));
+    VkCommandBufferAllocateInfo commands{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO};
+    commands.commandPool = copy_pool_;
+    commands.commandBufferCount = 1;
+    SR_VK(vkAllocateCommandBuffers(device_, &commands, &copy_commands_));
+    SR_TRY(pipelines_, PipelineStore::create(*this));
+    return {};
+}
+
+Device::~Device()
+{
+    if (device_ && timeline_)
+        (void)wait(ticket_); // a lost device has nothing left to wait for
+    pipelines_.reset();
+    staging_.reset();
+    if (copy_pool_)
+        vkDestroyCommandPool(device_, copy_pool_, nullptr);
+    if (timeline_)
+        vkDestroySemaphore(device_, timeline_, nullptr);
+    if (!owned_)
+        return;
+    if (device_)
+        vkDestroyDevice(device_, nullptr);
+    if (messenger_)
+        reinterpret_cast<PFN_vkDestroyDebugUtilsMessengerEXT>(
+            vkGetInstanceProcAddr(instance_, "vkDestroyDebugUtilsMessengerEXT"))(instance_, messenger_, nullptr);
+    if (instance_)
+        vkDestroyInstance(instance_, nullptr);
+}
+
+Status Device::account(int64_t bytes, const char* what)
+{
+    if (budget_ && allocated_ + uint64_t(bytes) > budget_)
+        return fail(ErrorCode::out_of_memory, "{}: {} bytes do not fit: {} in use, budget (--max-vram) {}", what, bytes,
+                    allocated_, budget_);
+    allocated_ += uint64_t(bytes);
+    peak_ = std::max(peak_, allocated_);
+    return {};
+}
+
+Result<uint64_t> Device::submit(std::span<const VkCommandBuffer> commands)
+{
+    const std::lock_guard guard(queue_mutex_);
+    const uint64_t value = ticket_ + 1;
+    VkTimelineSemaphoreSubmitInfo timeline{VK_STRUCTURE_TYPE_TIMELINE_SEMAPHORE_SUBMIT_INFO};
+    timeline.signalSemaphoreValueCount = 1;
+    timeline.pSignalSemaphoreValues = &value;
+    VkSubmitInfo info{VK_STRUCTURE_TYPE_SUBMIT_INFO, &timeline};
+    info.commandBufferCount = uint32_t(commands.size());
+    info.pCommandBuffers = commands.data();
+    info.signalSemaphoreCount = 1;
+    info.pSignalSemaphores = &timeline_;
+    if (lock_)
+        lock_();
+    const VkResult result = vkQueueSubmit(queue_, 1, &info, VK_NULL_HANDLE);
+    if (unlock_)
+        unlock_();
+    SR_VK(result);
+    return ticket_ = value;
+}
+
+Status Device::wait(uint64_t ticket)
+{
+    VkSemaphoreWaitInfo info{VK_STRUCTURE_TYPE_SEMAPHORE_WAIT_INFO};
+    info.semaphoreCount = 1;
+    info.pSemaphores = &timeline_;
+    info.pValues = &ticket;
+    const VkResult result = vkWaitSemaphores(device_, &info, kWaitNanoseconds);
+    if (result == VK_TIMEOUT)
+        return fail(ErrorCode::device_lost, "device '{}' did not finish a submit within {} s", name_,
+                    kWaitNanoseconds / 1000000000);
+    SR_VK(result);
+    return {};
+}
+
+Result<Buffer*> Device::staging()
+{
+    if (!staging_) {
+        SR_TRY(staging_,
+               Buffer::create(*this, std::min(kStagingBytes, limits_.max_allocation), MemoryKind::staging, "staging"));
+    }
+    return staging_.get();
+}
+
+Status Device::copy(VkBuffer from, uint64_t from_at, VkBuffer to, uint64_t to_at, uint64_t bytes)
+{
+    SR_CHECK(begin_commands(copy_commands_, true));
+    record_copy(copy_commands_, from, from_at, to, to_at, bytes);
+    SR_VK(vkEndCommandBuffer(copy_commands_));
+    SR_TRY(const uint64_t ticket, submit({&copy_commands_, 1}));
+    return wait(ticket);
+}
+
+Status Device::write(const BufferSlice& to, std::span<const std::byte> bytes)
+{
+    SR_ASSERT(bytes.size() <= to.bytes, "{} bytes written to a slice of {}", bytes.size(), to.bytes);
+    SR_CHECK(wait(ticket_));
+    if (std::byte* mapped = to.buffer->mapped()) {
+        if (!bytes.empty())
+            std::memcpy(mapped + to.offset, bytes.data(), bytes.size());
+        return {};
+    }
+    SR_TRY(Buffer * stage, staging());
+    for (uint64_t at = 0; at < bytes.size(); at += stage->bytes()) {
+        const uint64_t count = std::min<uint64_t>(stage->bytes(), bytes.size() - at);
+        std::memcpy(stage->mapped(), bytes.data() + at, count);
+        SR_CHECK(copy(stage->handle(), 0, to.buffer->handle(), to.offset + at, count));
+    }
+    return {};
+}
+
+Status Device::read(const BufferSlice& from, std::span<std::byte> bytes)
+{
+    SR_ASSERT(bytes.size() <= from.bytes, "{} bytes read from a slice of {}", bytes.size(), from.bytes);
+    SR_CHECK(wait(ticket_));
+    if (const std::byte* mapped = from.buffer->mapped()) {
+        if (!bytes.empty())
+            std::memcpy(bytes.data(), mapped + from.offset, bytes.size());
+        return {};
+    }
+    SR_TRY(Buffer * stage, staging());
+    for (uint64_t at = 0; at < bytes.size(); at += stage->bytes()) {
+        const uint64_t count = std::min<uint64_t>(stage->bytes(), bytes.size() - at);
+        SR_CHECK(copy(from.buffer->handle(), from.offset + at, stage->handle(), 0, count));
+        std::memcpy(bytes.data() + at, stage->mapped(), count);
+    }
+    return {};
+}
+
+Status Device::clear(const BufferSlice& slice)
+{
+    SR_CHECK(wait(ticket_));
+    if (std::byte* mapped = slice.buffer->mapped()) {
+        std::memset(mapped + slice.offset, 0, slice.bytes);
+        return {};
+    }
+    // fills are whole words: the bytes before and after them are copied
+    static constexpr std::byte kZeros[4]{};
+    const uint64_t end = slice.offset + slice.bytes, begin = std::min(round_up64(slice.offset, 4), end);
+    const uint64_t tail = std::max(end / 4 * 4, begin);
+    SR_CHECK(write(slice.part(0, begin - slice.offset), {kZeros, begin - slice.offset}));
+    SR_CHECK(write(slice.part(tail - slice.offset, end - tail), {kZeros, end - tail}));
+    if (begin == tail)
+        return {};
+    SR_CHECK(begin_commands(copy_commands_, true));
+    record_clear(copy_commands_, slice.buffer->handle(), begin, tail - begin);
+    SR_VK(vkEndCommandBuffer(copy_commands_));
+    SR_TRY(const uint64_t ticket, submit({&copy_commands_, 1}));
+    return wait(ticket);
+}
+
+} // namespace semrover

@@ -1,0 +1,121 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "runtime/device/memory.h"
+#include "runtime/device/vulkan.h"
+#include "runtime/graph/limits.h"
+
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace semrover {
+
+class PipelineStore;
+class Profile;
+
+struct DeviceOptions {
+    std::string select;      // "", an index of list_devices(), or part of a name
+    std::string limits;      // override_limits(); also from SEMROVER_LIMITS
+    uint64_t max_bytes = 0;  // refuse to allocate more device memory than this; 0: no budget
+    bool validation = false; // Khronos validation with synchronization checks; also SEMROVER_VALIDATION=1 or =fatal
+};
+
+// a device that belongs to the host program; it outlives the engine
+struct HostDevice {
+    VkInstance instance = VK_NULL_HANDLE;
+    VkPhysicalDevice physical = VK_NULL_HANDLE;
+    VkDevice device = VK_NULL_HANDLE; // Vulkan 1.2 with timelineSemaphore enabled
+    VkQueue queue = VK_NULL_HANDLE;   // with compute
+    uint32_t queue_family = 0;
+    bool float16 = false;               // shaderFloat16 is enabled too
+    std::function<void()> lock, unlock; // around every use of the queue; may be empty
+};
+
+struct DeviceSummary {
+    uint32_t index;
+    std::string name, driver, type, api;
+    uint64_t memory_bytes; // largest device-local heap
+    DeviceLimits limits;
+    std::vector<std::string> extensions; // the optional ones that matter: cooperative matrices and the like
+    std::string refusal;                 // why the engine cannot run on it; empty if it can
+};
+
+class Device {
+  public:
+    static Result<std::unique_ptr<Device>> create(const DeviceOptions& options);
+    static Result<std::unique_ptr<Device>> adopt(const HostDevice& host, const DeviceOptions& options);
+    ~Device();
+    Device(const Device&) = delete;
+    Device& operator=(const Device&) = delete;
+
+    const DeviceLimits& limits() const { return limits_; }
+    const std::string& name() const { return name_; }
+    const std::string& driver() const { return driver_; }
+    uint32_t index() const { return index_; } // in list_devices(); 0 for a host's
+    VkDevice handle() const { return device_; }
+    VkPhysicalDevice physical() const { return physical_; }
+    uint32_t queue_family() const { return queue_family_; }
+    double timestamp_ns() const { return timestamp_ns_; }
+    PipelineStore& pipelines() { return *pipelines_; }
+
+    // synchronous copies, after everything submitted so far; through staging where the host cannot see the memory
+    Status write(const BufferSlice& to, std::span<const std::byte> bytes);
+    Status read(const BufferSlice& from, std::span<std::byte> bytes);
+    Status clear(const BufferSlice& slice);
+
+    // queue: a ticket is a value of one timeline semaphore
+    Result<uint64_t> submit(std::span<const VkCommandBuffer> commands);
+    Status wait(uint64_t ticket);
+    uint64_t last_ticket() const { return ticket_; }
+
+    // device memory in use, counted at allocation
+    Status account(int64_t bytes, const char* what);
+    void release(uint64_t bytes) { allocated_ -= bytes; }
+    uint64_t allocated_bytes() const { return allocated_; }
+    uint64_t peak_bytes() const { return peak_; }
+    void reset_peak() { peak_ = allocated_; }
+    uint64_t budget() const { return budget_; }
+
+    void set_profile(std::shared_ptr<Profile> profile) { profile_ = std::move(profile); }
+    Profile* profile() { return profile_.get(); }
+
+  private:
+    Device();
+    Status create_instance(const DeviceOptions& options);
+    Status create_device(const DeviceOptions& options);
+    Status finish(const DeviceOptions& options);
+    Status copy(VkBuffer from, uint64_t from_at, VkBuffer to, uint64_t to_at, uint64_t bytes);
+    Result<Buffer*> staging();
+
+    VkInstance instance_ = VK_NULL_HANDLE;
+    VkDebugUtilsMessengerEXT messenger_ = VK_NULL_HANDLE;
+    VkPhysicalDevice physical_ = VK_NULL_HANDLE;
+    VkDevice device_ = VK_NULL_HANDLE;
+    VkQueue queue_ = VK_NULL_HANDLE;
+    uint32_t queue_family_ = 0;
+    uint32_t index_ = 0;
+    bool owned_ = true;
+    std::function<void()> lock_, unlock_;
+    std::mutex queue_mutex_;
+    VkSemaphore timeline_ = VK_NULL_HANDLE;
+    uint64_t ticket_ = 0;
+    VkCommandPool copy_pool_ = VK_NULL_HANDLE;
+    VkCommandBuffer copy_commands_ = VK_NULL_HANDLE;
+    std::unique_ptr<Buffer> staging_;
+    std::unique_ptr<PipelineStore> pipelines_;
+    std::shared_ptr<Profile> profile_;
+    DeviceLimits limits_;
+    std::string name_, driver_;
+    double timestamp_ns_ = 1;
+    uint64_t allocated_ = 0, peak_ = 0, budget_ = 0;
+};
+
+// all physical devices, best first (discrete > integrated > other > CPU, then the loader's order)
+Result<std::vector<DeviceSummary>> list_devices();
+
+} // namespace semrover

@@ -1,0 +1,126 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "runtime/device/memory.h"
+
+#include "runtime/device/device.h"
+
+#include <numeric>
+
+namespace semrover {
+
+namespace {
+
+// first type that has all of `wanted`; Vulkan lists the better of two equal types first
+int find_type(const VkPhysicalDeviceMemoryProperties& memory, uint32_t allowed, VkMemoryPropertyFlags wanted)
+{
+    for (uint32_t i = 0; i < memory.memoryTypeCount; ++i)
+        if ((allowed >> i & 1) && (memory.memoryTypes[i].propertyFlags & wanted) == wanted)
+            return int(i);
+    return -1;
+}
+
+int choose_type(const VkPhysicalDeviceMemoryProperties& memory, uint32_t allowed, MemoryKind kind)
+{
+    constexpr VkMemoryPropertyFlags kHost = VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
+    if (kind == MemoryKind::staging) {
+        const int cached = find_type(memory, allowed, kHost | VK_MEMORY_PROPERTY_HOST_CACHED_BIT);
+        return cached >= 0 ? cached : find_type(memory, allowed, kHost);
+    }
+    const int local = find_type(memory, allowed, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT);
+    return local >= 0 ? local : find_type(memory, allowed, 0);
+}
+
+} // namespace
+
+Result<std::unique_ptr<Buffer>> Buffer::create(Device& device, uint64_t bytes, MemoryKind kind, const char* name)
+{
+    if (bytes > device.limits().max_allocation)
+        return fail(ErrorCode::out_of_memory, "{}: {} bytes exceed the device's largest allocation of {} bytes", name,
+                    bytes, device.limits().max_allocation);
+    std::unique_ptr<Buffer> b(new Buffer(device));
+    b->bytes_ = round_up64(std::max<uint64_t>(bytes, 1), device.limits().offset_alignment);
+    VkBufferCreateInfo info{VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO};
+    info.size = b->bytes_;
+    info.usage = VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
+    if (kind == MemoryKind::device)
+        info.usage |= VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT;
+    SR_VK(vkCreateBuffer(device.handle(), &info, nullptr, &b->buffer_));
+    VkMemoryRequirements needs;
+    vkGetBufferMemoryRequirements(device.handle(), b->buffer_, &needs);
+    if (needs.size > device.limits().max_allocation)
+        return fail(ErrorCode::out_of_memory, "{}: {} bytes exceed the device's largest allocation of {} bytes", name,
+                    needs.size, device.limits().max_allocation);
+    SR_CHECK(device.account(int64_t(needs.size), name));
+    b->accounted_ = needs.size;
+    VkPhysicalDeviceMemoryProperties memory;
+    vkGetPhysicalDeviceMemoryProperties(device.physical(), &memory);
+    const int type = choose_type(memory, needs.memoryTypeBits, kind);
+    if (type < 0)
+        return fail(ErrorCode::no_device, "{}: the device has no memory type for it", name);
+    VkMemoryAllocateInfo allocate{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO};
+    allocate.allocationSize = needs.size;
+    allocate.memoryTypeIndex = uint32_t(type);
+    if (vkAllocateMemory(device.handle(), &allocate, nullptr, &b->memory_) != VK_SUCCESS)
+        return fail(ErrorCode::out_of_memory, "{}: the device refused {} bytes; {} bytes are in use", name, needs.size,
+                    device.allocated_bytes() - needs.size);
+    SR_VK(vkBindBufferMemory(device.handle(), b->buffer_, b->memory_, 0));
+    constexpr VkMemoryPropertyFlags kHost = VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
+    const bool direct = kind == MemoryKind::staging || !device.limits().force_staging;
+    if (direct && (memory.memoryTypes[type].propertyFlags & kHost) == kHost)
+        SR_VK(vkMapMemory(device.handle(), b->memory_, 0, VK_WHOLE_SIZE, 0, reinterpret_cast<void**>(&b->mapped_)));
+    return b;
+}
+
+Buffer::~Buffer()
+{
+    if (buffer_)
+        vkDestroyBuffer(device_.handle(), buffer_, nullptr);
+    if (memory_)
+        vkFreeMemory(device_.handle(), memory_, nullptr);
+    device_.release(accounted_);
+}
+
+uint32_t Arena::add(uint64_t bytes)
+{
+    SR_ASSERT(blocks_.empty(), "the arena is allocated already");
+    items_.push_back({bytes});
+    return uint32_t(items_.size() - 1);
+}
+
+std::vector<uint64_t> Arena::layout(const DeviceLimits& limits, std::vector<Item>& items) const
+{
+    std::vector<uint64_t> blocks;
+    for (Item& item : items) {
+        const uint64_t bytes = round_up64(std::max<uint64_t>(item.bytes, 1), limits.offset_alignment);
+        if (blocks.empty() || blocks.back() + bytes > limits.max_allocation)
+            blocks.push_back(0);
+        item.block = uint32_t(blocks.size() - 1);
+        item.offset = blocks.back();
+        blocks.back() += bytes;
+    }
+    return blocks;
+}
+
+uint64_t Arena::planned_bytes(const DeviceLimits& limits) const
+{
+    std::vector<Item> items = items_;
+    const std::vector<uint64_t> blocks = layout(limits, items);
+    return std::accumulate(blocks.begin(), blocks.end(), uint64_t(0));
+}
+
+Status Arena::allocate(Device& device, const char* name)
+{
+    for (uint64_t bytes : layout(device.limits(), items_)) {
+        SR_TRY(auto block, Buffer::create(device, bytes, MemoryKind::device, name));
+        blocks_.push_back(std::move(block));
+    }
+    return {};
+}
+
+BufferSlice Arena::slice(uint32_t id) const
+{
+    const Item& item = items_.at(id);
+    return {blocks_.empty() ? nullptr : blocks_.at(item.block).get(), item.offset, item.bytes};
+}
+
+} // namespace semrover

@@ -1,0 +1,64 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "runtime/device/vulkan.h"
+#include "runtime/graph/graph.h"
+
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+namespace semrover {
+
+class Device;
+
+enum class MemoryKind : uint8_t { device, staging };
+
+// one VkBuffer with memory of its own; usable as storage, texel buffer, and transfer source and target
+class Buffer {
+  public:
+    ~Buffer();
+    Buffer(const Buffer&) = delete;
+    Buffer& operator=(const Buffer&) = delete;
+
+    // errors: out_of_memory when the device, its largest allocation, or the budget (--max-vram) refuses
+    static Result<std::unique_ptr<Buffer>> create(Device& device, uint64_t bytes, MemoryKind kind, const char* name);
+
+    VkBuffer handle() const { return buffer_; }
+    uint64_t bytes() const { return bytes_; }
+    std::byte* mapped() const { return mapped_; } // null where the host cannot see it
+    BufferSlice slice() const { return {this, 0, bytes_}; }
+
+  private:
+    Buffer(Device& device) : device_(device) {}
+
+    Device& device_;
+    VkBuffer buffer_ = VK_NULL_HANDLE;
+    VkDeviceMemory memory_ = VK_NULL_HANDLE;
+    uint64_t bytes_ = 0, accounted_ = 0;
+    std::byte* mapped_ = nullptr;
+};
+
+// Memory for things that live as long as a model or a run: first every size is added, then all of it is allocated in
+// blocks of at most the device's largest allocation, so that the sum is known before anything exists.
+class Arena {
+  public:
+    uint32_t add(uint64_t bytes); // id of the slice
+    uint64_t planned_bytes(const DeviceLimits& limits) const;
+    Status allocate(Device& device, const char* name);
+    // before allocate(), a slice without a buffer: good for planning graphs, not for running them
+    BufferSlice slice(uint32_t id) const;
+
+  private:
+    struct Item {
+        uint64_t bytes, offset = 0;
+        uint32_t block = 0;
+    };
+    std::vector<uint64_t> layout(const DeviceLimits& limits, std::vector<Item>& items) const;
+
+    std::vector<Item> items_;
+    std::vector<std::unique_ptr<Buffer>> blocks_;
+};
+
+} // namespace semrover

@@ -1,0 +1,232 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "runtime/device/physical_device.h"
+
+#include "runtime/graph/kernel.h"
+
+#include <algorithm>
+#include <cstring>
+
+namespace semrover {
+
+namespace {
+
+// reported by `devices`; used where a kernel variant asks for them
+constexpr const char* kOptionalExtensions[] = {"VK_KHR_cooperative_matrix", "VK_NV_cooperative_matrix2",
+                                               "VK_EXT_subgroup_size_control", "VK_EXT_memory_budget",
+                                               "VK_EXT_device_fault"};
+
+DeviceType device_type(VkPhysicalDeviceType type)
+{
+    switch (type) {
+    case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:
+        return DeviceType::discrete;
+    case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU:
+        return DeviceType::integrated;
+    case VK_PHYSICAL_DEVICE_TYPE_CPU:
+        return DeviceType::cpu;
+    default:
+        return DeviceType::other;
+    }
+}
+
+int rank(DeviceType type)
+{
+    switch (type) {
+    case DeviceType::discrete:
+        return 0;
+    case DeviceType::integrated:
+        return 1;
+    case DeviceType::other:
+        return 2;
+    case DeviceType::cpu:
+        return 3;
+    }
+    return 4;
+}
+
+uint32_t supported_needs(VkPhysicalDevice physical, const VkPhysicalDeviceVulkan11Properties& p11)
+{
+    VkPhysicalDeviceVulkan12Features f12{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES};
+    VkPhysicalDeviceFeatures2 features{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2, &f12, {}};
+    vkGetPhysicalDeviceFeatures2(physical, &features);
+    uint32_t needs = 0;
+    if (p11.subgroupSupportedStages & VK_SHADER_STAGE_COMPUTE_BIT) {
+        if (p11.subgroupSupportedOperations & VK_SUBGROUP_FEATURE_ARITHMETIC_BIT)
+            needs |= kNeedsSubgroupArithmetic;
+        if (p11.subgroupSupportedOperations & VK_SUBGROUP_FEATURE_BALLOT_BIT)
+            needs |= kNeedsSubgroupBallot;
+        if (p11.subgroupSupportedOperations & VK_SUBGROUP_FEATURE_SHUFFLE_BIT)
+            needs |= kNeedsSubgroupShuffle;
+    }
+    return f12.shaderFloat16 ? needs | kNeedsFloat16 : needs;
+}
+
+DeviceLimits limits_of(VkPhysicalDevice physical, const VkPhysicalDeviceProperties& p,
+                       const VkPhysicalDeviceVulkan11Properties& p11)
+{
+    const VkPhysicalDeviceLimits& v = p.limits;
+    DeviceLimits l;
+    l.type = device_type(p.deviceType);
+    l.subgroup_size = p11.subgroupSize;
+    l.needs_supported = supported_needs(physical, p11);
+    l.max_shared_bytes = v.maxComputeSharedMemorySize;
+    l.max_group_threads = v.maxComputeWorkGroupInvocations;
+    l.max_groups =
+        std::min({v.maxComputeWorkGroupCount[0], v.maxComputeWorkGroupCount[1], v.maxComputeWorkGroupCount[2]});
+    l.max_storage_range = v.maxStorageBufferRange;
+    l.max_texel_elements = v.maxTexelBufferElements;
+    l.max_allocation = p11.maxMemoryAllocationSize;
+    l.offset_alignment = uint32_t(std::max<uint64_t>(
+        {256, v.minStorageBufferOffsetAlignment, v.minTexelBufferOffsetAlignment, v.nonCoherentAtomSize}));
+    l.max_push_bytes = v.maxPushConstantsSize;
+    l.submit_seconds = l.type == DeviceType::cpu ? 0 : 0.1;
+    return l;
+}
+
+std::string refusal(VkPhysicalDevice physical, const VkPhysicalDeviceProperties& p)
+{
+    if (p.apiVersion < VK_API_VERSION_1_2)
+        return fmt::format("needs Vulkan 1.2, has {}.{}", VK_API_VERSION_MAJOR(p.apiVersion),
+                           VK_API_VERSION_MINOR(p.apiVersion));
+    VkPhysicalDeviceVulkan12Features f12{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES};
+    VkPhysicalDeviceFeatures2 features{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2, &f12, {}};
+    vkGetPhysicalDeviceFeatures2(physical, &features);
+    if (!f12.timelineSemaphore)
+        return "has no timeline semaphores";
+    return compute_queue_family(physical) ? "" : "has no compute queue";
+}
+
+} // namespace
+
+std::string api_version_text(uint32_t version)
+{
+    return fmt::format("{}.{}.{}", VK_API_VERSION_MAJOR(version), VK_API_VERSION_MINOR(version),
+                       VK_API_VERSION_PATCH(version));
+}
+
+Result<VkInstance> create_instance(bool validation)
+{
+    VkApplicationInfo app{VK_STRUCTURE_TYPE_APPLICATION_INFO};
+    app.pApplicationName = app.pEngineName = "semrover";
+    app.apiVersion = VK_API_VERSION_1_2;
+    VkInstanceCreateInfo info{VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO};
+    info.pApplicationInfo = &app;
+    const VkValidationFeatureEnableEXT enables[] = {VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT};
+    VkValidationFeaturesEXT features{VK_STRUCTURE_TYPE_VALIDATION_FEATURES_EXT};
+    features.enabledValidationFeatureCount = 1;
+    features.pEnabledValidationFeatures = enables;
+    const char* extensions[] = {VK_EXT_DEBUG_UTILS_EXTENSION_NAME, VK_EXT_VALIDATION_FEATURES_EXTENSION_NAME};
+    if (validation) {
+        info.pNext = &features;
+        info.enabledLayerCount = 1;
+        info.ppEnabledLayerNames = &kValidationLayer;
+        info.enabledExtensionCount = 2;
+        info.ppEnabledExtensionNames = extensions;
+    }
+    VkInstance instance;
+    const VkResult result = vkCreateInstance(&info, nullptr, &instance);
+    if (result == VK_ERROR_LAYER_NOT_PRESENT)
+        return fail(ErrorCode::no_device, "{} is not installed (Debian: vulkan-validationlayers)", kValidationLayer);
+    if (result != VK_SUCCESS)
+        return fail(ErrorCode::no_device, "no Vulkan driver: {}; install one (Debian: mesa-vulkan-drivers)",
+                    vk_result_name(result));
+    return instance;
+}
+
+Result<std::vector<VkPhysicalDevice>> physical_devices(VkInstance instance)
+{
+    uint32_t count = 0;
+    SR_VK(vkEnumeratePhysicalDevices(instance, &count, nullptr));
+    std::vector<VkPhysicalDevice> all(count);
+    SR_VK(vkEnumeratePhysicalDevices(instance, &count, all.data()));
+    std::stable_sort(all.begin(), all.end(), [](VkPhysicalDevice a, VkPhysicalDevice b) {
+        VkPhysicalDeviceProperties pa, pb;
+        vkGetPhysicalDeviceProperties(a, &pa);
+        vkGetPhysicalDeviceProperties(b, &pb);
+        return rank(device_type(pa.deviceType)) < rank(device_type(pb.deviceType));
+    });
+    return all;
+}
+
+bool has_extension(VkPhysicalDevice physical, const char* name)
+{
+    uint32_t count = 0;
+    if (vkEnumerateDeviceExtensionProperties(physical, nullptr, &count, nullptr) != VK_SUCCESS)
+        return false;
+    std::vector<VkExtensionProperties> all(count);
+    if (vkEnumerateDeviceExtensionProperties(physical, nullptr, &count, all.data()) != VK_SUCCESS)
+        return false;
+    return std::any_of(all.begin(), all.end(), [&](const auto& e) { return !std::strcmp(e.extensionName, name); });
+}
+
+namespace {
+
+std::vector<VkQueueFamilyProperties> queue_families(VkPhysicalDevice physical)
+{
+    uint32_t count = 0;
+    vkGetPhysicalDeviceQueueFamilyProperties(physical, &count, nullptr);
+    std::vector<VkQueueFamilyProperties> families(count);
+    vkGetPhysicalDeviceQueueFamilyProperties(physical, &count, families.data());
+    return families;
+}
+
+} // namespace
+
+bool is_compute_family(VkPhysicalDevice physical, uint32_t family)
+{
+    const auto families = queue_families(physical);
+    return family < families.size() && (families[family].queueFlags & VK_QUEUE_COMPUTE_BIT);
+}
+
+Result<uint32_t> compute_queue_family(VkPhysicalDevice physical)
+{
+    const auto families = queue_families(physical);
+    for (uint32_t i = 0; i < families.size(); ++i)
+        if (families[i].queueFlags & VK_QUEUE_COMPUTE_BIT)
+            return i;
+    return fail(ErrorCode::no_device, "the device has no compute queue");
+}
+
+DeviceSummary summarize(VkPhysicalDevice physical, uint32_t index)
+{
+    VkPhysicalDeviceVulkan12Properties p12{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_PROPERTIES};
+    VkPhysicalDeviceVulkan11Properties p11{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_PROPERTIES, &p12};
+    VkPhysicalDeviceProperties2 p{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2, &p11, {}};
+    vkGetPhysicalDeviceProperties2(physical, &p);
+    static constexpr const char* kTypes[] = {"cpu", "integrated", "discrete", "other"};
+    DeviceSummary s;
+    s.index = index;
+    s.name = p.properties.deviceName;
+    s.driver = fmt::format("{} {}", p12.driverName, p12.driverInfo);
+    s.type = kTypes[int(device_type(p.properties.deviceType))];
+    s.api = api_version_text(p.properties.apiVersion);
+    s.refusal = refusal(physical, p.properties);
+    s.limits = limits_of(physical, p.properties, p11);
+    VkPhysicalDeviceMemoryProperties memory;
+    vkGetPhysicalDeviceMemoryProperties(physical, &memory);
+    s.memory_bytes = 0;
+    for (uint32_t i = 0; i < memory.memoryHeapCount; ++i)
+        if (memory.memoryHeaps[i].flags & VK_MEMORY_HEAP_DEVICE_LOCAL_BIT)
+            s.memory_bytes = std::max<uint64_t>(s.memory_bytes, memory.memoryHeaps[i].size);
+    for (const char* extension : kOptionalExtensions)
+        if (has_extension(physical, extension))
+            s.extensions.push_back(extension);
+    return s;
+}
+
+Result<std::vector<DeviceSummary>> list_devices()
+{
+    SR_TRY(const VkInstance instance, create_instance(false));
+    auto all = physical_devices(instance);
+    std::vector<DeviceSummary> out;
+    if (all)
+        for (size_t i = 0; i < all->size(); ++i)
+            out.push_back(summarize((*all)[i], uint32_t(i)));
+    vkDestroyInstance(instance, nullptr);
+    if (!all)
+        return tl::make_unexpected(all.error());
+    return out;
+}
+
+} // namespace semrover

@@ -1,0 +1,186 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "runtime/device/pipeline.h"
+
+#include "runtime/base/hash.h"
+#include "runtime/device/device.h"
+
+#include <array>
+#include <bit>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <unistd.h>
+#include <vector>
+
+namespace fs = std::filesystem;
+
+namespace semrover {
+
+namespace {
+
+std::string cache_path(VkPhysicalDevice physical)
+{
+    const char *cache = std::getenv("XDG_CACHE_HOME"), *home = std::getenv("HOME");
+    if (!(cache && *cache) && !(home && *home))
+        return "";
+    const fs::path root = cache && *cache ? fs::path(cache) : fs::path(home) / ".cache";
+    VkPhysicalDeviceProperties p;
+    vkGetPhysicalDeviceProperties(physical, &p);
+    std::string name = fmt::format("pipelines-{:x}-{:x}-{:x}-", p.vendorID, p.deviceID, p.driverVersion);
+    for (uint8_t byte : p.pipelineCacheUUID)
+        name += fmt::format("{:02x}", byte);
+    return (root / "semrover" / (name + ".bin")).string();
+}
+
+std::array<char, 8> checksum(const std::vector<char>& blob)
+{
+    Hash hash;
+    hash.add(std::as_bytes(std::span(blob)));
+    return std::bit_cast<std::array<char, 8>>(hash.value());
+}
+
+// drivers trust what follows the header: a truncated, damaged or foreign file must not reach them.
+// the file is the checksum and the blob
+std::vector<char> load_blob(const std::string& path, VkPhysicalDevice physical)
+{
+    std::ifstream in(path, std::ios::binary);
+    std::array<char, 8> expected{};
+    in.read(expected.data(), expected.size());
+    std::vector<char> blob{std::istreambuf_iterator<char>(in), {}};
+    if (checksum(blob) != expected)
+        return {};
+    VkPhysicalDeviceProperties p;
+    vkGetPhysicalDeviceProperties(physical, &p);
+    VkPipelineCacheHeaderVersionOne header;
+    if (blob.size() < sizeof header)
+        return {};
+    std::memcpy(&header, blob.data(), sizeof header);
+    const bool ours = header.vendorID == p.vendorID && header.deviceID == p.deviceID &&
+                      !std::memcmp(header.pipelineCacheUUID, p.pipelineCacheUUID, VK_UUID_SIZE);
+    return ours ? blob : std::vector<char>{};
+}
+
+} // namespace
+
+Result<std::unique_ptr<PipelineStore>> PipelineStore::create(Device& device)
+{
+    std::unique_ptr<PipelineStore> store(new PipelineStore(device));
+    store->cache_path_ = cache_path(device.physical());
+    const std::vector<char> blob =
+        store->cache_path_.empty() ? std::vector<char>{} : load_blob(store->cache_path_, device.physical());
+    VkPipelineCacheCreateInfo info{VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO};
+    info.initialDataSize = blob.size();
+    info.pInitialData = blob.data();
+    store->reused_bytes_ = blob.size();
+    SR_VK(vkCreatePipelineCache(device.handle(), &info, nullptr, &store->cache_));
+    return store;
+}
+
+PipelineStore::~PipelineStore()
+{
+    if (changed_)
+        save();
+    for (auto& [key, p] : pipelines_)
+        destroy(p);
+    if (cache_)
+        vkDestroyPipelineCache(device_.handle(), cache_, nullptr);
+}
+
+// best effort: a cache that cannot be written costs time at the next start, nothing else
+void PipelineStore::save()
+{
+    size_t bytes = 0;
+    if (cache_path_.empty() || vkGetPipelineCacheData(device_.handle(), cache_, &bytes, nullptr) != VK_SUCCESS)
+        return;
+    std::vector<char> blob(bytes);
+    if (vkGetPipelineCacheData(device_.handle(), cache_, &bytes, blob.data()) != VK_SUCCESS)
+        return;
+    std::error_code ignored;
+    fs::create_directories(fs::path(cache_path_).parent_path(), ignored);
+    const std::string temporary = fmt::format("{}.{}", cache_path_, getpid());
+    {
+        std::ofstream out(temporary, std::ios::binary);
+        blob.resize(bytes);
+        out.write(checksum(blob).data(), 8).write(blob.data(), std::streamsize(bytes));
+    }
+    fs::rename(temporary, cache_path_, ignored);
+}
+
+Result<const Pipeline*> PipelineStore::get(const KernelVariant& variant, const std::map<uint32_t, uint32_t>& constants)
+{
+    const auto key = std::make_pair(&variant, constants);
+    if (const auto it = pipelines_.find(key); it != pipelines_.end())
+        return &it->second;
+    Pipeline p;
+    if (Status made = make(variant, constants, p); !made) {
+        destroy(p);
+        return tl::make_unexpected(std::move(made).error());
+    }
+    changed_ = true;
+    return &(pipelines_[key] = p);
+}
+
+void PipelineStore::destroy(const Pipeline& p)
+{
+    vkDestroyPipeline(device_.handle(), p.pipeline, nullptr);
+    vkDestroyPipelineLayout(device_.handle(), p.layout, nullptr);
+    vkDestroyDescriptorSetLayout(device_.handle(), p.set_layout, nullptr);
+}
+
+Status PipelineStore::make_layout(const KernelVariant& variant, Pipeline& out)
+{
+    std::vector<VkDescriptorSetLayoutBinding> bindings;
+    for (const BindingInfo& b : variant.bindings)
+        bindings.push_back(
+            {b.binding,
+             b.kind == BindingKind::texel ? VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER : VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
+             1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr});
+    VkDescriptorSetLayoutCreateInfo set{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO};
+    set.bindingCount = uint32_t(bindings.size());
+    set.pBindings = bindings.data();
+    SR_VK(vkCreateDescriptorSetLayout(device_.handle(), &set, nullptr, &out.set_layout));
+    const VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, variant.push_bytes};
+    VkPipelineLayoutCreateInfo layout{VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO};
+    layout.setLayoutCount = 1;
+    layout.pSetLayouts = &out.set_layout;
+    layout.pushConstantRangeCount = variant.push_bytes ? 1 : 0;
+    layout.pPushConstantRanges = &range;
+    SR_VK(vkCreatePipelineLayout(device_.handle(), &layout, nullptr, &out.layout));
+    return {};
+}
+
+Status PipelineStore::make(const KernelVariant& variant, const std::map<uint32_t, uint32_t>& constants, Pipeline& out)
+{
+    SR_CHECK(make_layout(variant, out));
+    VkShaderModuleCreateInfo code{VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO};
+    code.codeSize = variant.code.size_bytes();
+    code.pCode = variant.code.data();
+    VkShaderModule module;
+    SR_VK(vkCreateShaderModule(device_.handle(), &code, nullptr, &module));
+    std::vector<VkSpecializationMapEntry> entries;
+    std::vector<uint32_t> values;
+    for (const auto& [id, value] : constants) {
+        entries.push_back({id, uint32_t(values.size() * 4), 4});
+        values.push_back(value);
+    }
+    const VkSpecializationInfo specialization{uint32_t(entries.size()), entries.data(), values.size() * 4,
+                                              values.data()};
+    VkComputePipelineCreateInfo info{VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO};
+    info.stage = {VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO,
+                  nullptr,
+                  0,
+                  VK_SHADER_STAGE_COMPUTE_BIT,
+                  module,
+                  "main",
+                  &specialization};
+    info.layout = out.layout;
+    const VkResult result = vkCreateComputePipelines(device_.handle(), cache_, 1, &info, nullptr, &out.pipeline);
+    vkDestroyShaderModule(device_.handle(), module, nullptr);
+    SR_VK(result);
+    return {};
+}
+
+} // namespace semrover

@@ -1,0 +1,50 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "runtime/device/vulkan.h"
+#include "runtime/graph/kernel.h"
+
+#include <map>
+#include <memory>
+#include <string>
+
+namespace semrover {
+
+class Device;
+
+struct Pipeline {
+    VkPipeline pipeline = VK_NULL_HANDLE;
+    VkPipelineLayout layout = VK_NULL_HANDLE;
+    VkDescriptorSetLayout set_layout = VK_NULL_HANDLE;
+};
+
+// Compute pipelines by (variant, constants), made on first use, over a VkPipelineCache kept on disk in
+// $XDG_CACHE_HOME/semrover (safe to delete; a file of another driver is ignored).
+class PipelineStore {
+  public:
+    static Result<std::unique_ptr<PipelineStore>> create(Device& device);
+    ~PipelineStore();
+
+    const std::string& file() const { return cache_path_; } // empty: neither HOME nor XDG_CACHE_HOME is set
+
+    // bytes of an earlier run's cache that this one started with; 0: no file, or none that is whole and this driver's
+    size_t reused_bytes() const { return reused_bytes_; }
+    Result<const Pipeline*> get(const KernelVariant& variant, const std::map<uint32_t, uint32_t>& constants);
+
+  private:
+    explicit PipelineStore(Device& device) : device_(device) {}
+    Status make(const KernelVariant& variant, const std::map<uint32_t, uint32_t>& constants, Pipeline& out);
+    Status make_layout(const KernelVariant& variant, Pipeline& out);
+    void destroy(const Pipeline& pipeline);
+    void save();
+
+    Device& device_;
+    VkPipelineCache cache_ = VK_NULL_HANDLE;
+    std::string cache_path_; // empty: nowhere to keep it
+    size_t reused_bytes_ = 0;
+    bool changed_ = false;
+    std::map<std::pair<const KernelVariant*, std::map<uint32_t, uint32_t>>, Pipeline> pipelines_;
+};
+
+} // namespace semrover

@@ -1,0 +1,219 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "runtime/device/program.h"
+
+#include "runtime/device/command.h"
+#include "runtime/device/pipeline.h"
+#include "runtime/device/profile.h"
+
+#include <chrono>
+
+namespace semrover {
+
+Result<std::unique_ptr<Program>> Program::create(Device& device, const Graph& graph)
+{
+    SR_TRY(Plan plan, make_plan(graph.desc(), device.limits()));
+    return create(device, std::move(plan));
+}
+
+Result<std::unique_ptr<Program>> Program::create(Device& device, Plan plan)
+{
+    std::unique_ptr<Program> p(new Program(device, std::move(plan)));
+    SR_CHECK(p->allocate());
+    SR_CHECK(p->make_sets());
+    SR_CHECK(p->record());
+    return p;
+}
+
+Program::~Program()
+{
+    (void)device_.wait(device_.last_ticket()); // command buffers may be in flight; a lost device is told elsewhere
+    for (VkBufferView view : views_)
+        vkDestroyBufferView(device_.handle(), view, nullptr);
+    if (queries_)
+        vkDestroyQueryPool(device_.handle(), queries_, nullptr);
+    if (descriptors_)
+        vkDestroyDescriptorPool(device_.handle(), descriptors_, nullptr);
+    if (commands_pool_)
+        vkDestroyCommandPool(device_.handle(), commands_pool_, nullptr);
+}
+
+Status Program::allocate()
+{
+    for (uint64_t bytes : plan_.blocks) {
+        SR_TRY(auto block, Buffer::create(device_, bytes, MemoryKind::device, "graph arena"));
+        blocks_.push_back(std::move(block));
+    }
+    return {};
+}
+
+std::pair<VkBuffer, uint64_t> Program::locate(const PassBinding& b) const
+{
+    const Resource& r = plan_.resources[b.resource];
+    SR_ASSERT(!r.external || r.memory.buffer, "'{}' has no memory: the graph was only good for planning", r.name);
+    if (r.external)
+        return {r.memory.buffer->handle(), r.memory.offset + b.offset};
+    const Placement& p = plan_.placements[b.resource];
+    return {blocks_[p.block]->handle(), p.offset + b.offset};
+}
+
+Status Program::make_sets()
+{
+    uint32_t storage = 0, texel = 0;
+    std::vector<VkDescriptorSetLayout> layouts;
+    for (const Pass& pass : plan_.passes) {
+        SR_TRY(const Pipeline* pipeline, device_.pipelines().get(*pass.variant, pass.constants));
+        pipelines_.push_back(pipeline);
+        layouts.push_back(pipeline->set_layout);
+        for (const PassBinding& b : pass.bindings)
+            ++(b.kind == BindingKind::texel ? texel : storage);
+    }
+    if (plan_.passes.empty())
+        return {};
+    const VkDescriptorPoolSize sizes[] = {{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, std::max(storage, 1u)},
+                                          {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, std::max(texel, 1u)}};
+    VkDescriptorPoolCreateInfo pool{VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO};
+    pool.maxSets = uint32_t(layouts.size());
+    pool.poolSizeCount = 2;
+    pool.pPoolSizes = sizes;
+    SR_VK(vkCreateDescriptorPool(device_.handle(), &pool, nullptr, &descriptors_));
+    VkDescriptorSetAllocateInfo allocate{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO};
+    allocate.descriptorPool = descriptors_;
+    allocate.descriptorSetCount = uint32_t(layouts.size());
+    allocate.pSetLayouts = layouts.data();
+    sets_.resize(layouts.size());
+    SR_VK(vkAllocateDescriptorSets(device_.handle(), &allocate, sets_.data()));
+    for (size_t i = 0; i < plan_.passes.size(); ++i)
+        SR_CHECK(bind(plan_.passes[i], sets_[i]));
+    return {};
+}
+
+Status Program::bind(const Pass& pass, VkDescriptorSet set)
+{
+    const size_t n = pass.bindings.size();
+    std::vector<VkWriteDescriptorSet> writes(n, {VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET});
+    std::vector<VkDescriptorBufferInfo> buffers(n);
+    std::vector<VkBufferView> views(n);
+    for (size_t i = 0; i < n; ++i) {
+        const PassBinding& b = pass.bindings[i];
+        const auto [buffer, offset] = locate(b);
+        SR_ASSERT(offset % device_.limits().offset_alignment == 0, "{}: '{}' starts at byte {}", pass.kernel->name,
+                  b.name, offset);
+        writes[i].dstSet = set;
+        writes[i].dstBinding = pass.variant->bindings[i].binding;
+        writes[i].descriptorCount = 1;
+        if (b.kind == BindingKind::texel) {
+            VkBufferViewCreateInfo info{VK_STRUCTURE_TYPE_BUFFER_VIEW_CREATE_INFO};
+            info.buffer = buffer;
+            info.format = VK_FORMAT_R32G32B32A32_UINT;
+            info.offset = offset;
+            info.range = b.bytes / 16 * 16;
+            SR_VK(vkCreateBufferView(device_.handle(), &info, nullptr, &views[i]));
+            views_.push_back(views[i]);
+            writes[i].descriptorType = VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER;
+            writes[i].pTexelBufferView = &views[i];
+        } else {
+            buffers[i] = {buffer, offset, b.bytes};
+            writes[i].descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
+            writes[i].pBufferInfo = &buffers[i];
+        }
+    }
+    vkUpdateDescriptorSets(device_.handle(), uint32_t(n), writes.data(), 0, nullptr);
+    return {};
+}
+
+Status Program::record()
+{
+    VkCommandPoolCreateInfo pool{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO};
+    pool.queueFamilyIndex = device_.queue_family();
+    SR_VK(vkCreateCommandPool(device_.handle(), &pool, nullptr, &commands_pool_));
+    commands_.resize(plan_.submits);
+    if (commands_.empty())
+        return {};
+    VkCommandBufferAllocateInfo allocate{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO};
+    allocate.commandPool = commands_pool_;
+    allocate.commandBufferCount = plan_.submits;
+    SR_VK(vkAllocateCommandBuffers(device_.handle(), &allocate, commands_.data()));
+    if (device_.profile()) {
+        VkQueryPoolCreateInfo queries{VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO};
+        queries.queryType = VK_QUERY_TYPE_TIMESTAMP;
+        queries.queryCount = uint32_t(plan_.passes.size() * 2);
+        SR_VK(vkCreateQueryPool(device_.handle(), &queries, nullptr, &queries_));
+    }
+    for (uint32_t i = 0; i < plan_.submits; ++i)
+        SR_CHECK(record_submit(i));
+    return {};
+}
+
+Status Program::record_submit(uint32_t index)
+{
+    const VkCommandBuffer commands = commands_[index];
+    SR_CHECK(begin_commands(commands, false));
+    uint32_t level = ~0u;
+    for (size_t i = 0; i < plan_.passes.size(); ++i) {
+        const Pass& pass = plan_.passes[i];
+        if (pass.submit != index)
+            continue;
+        if (level != ~0u && pass.level != level)
+            record_barrier(commands);
+        level = pass.level;
+        vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipelines_[i]->pipeline);
+        vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipelines_[i]->layout, 0, 1, &sets_[i], 0,
+                                nullptr);
+        if (!pass.push.empty())
+            vkCmdPushConstants(commands, pipelines_[i]->layout, VK_SHADER_STAGE_COMPUTE_BIT, 0,
+                               uint32_t(pass.push.size()), pass.push.data());
+        const uint32_t query = uint32_t(i * 2);
+        if (queries_) {
+            vkCmdResetQueryPool(commands, queries_, query, 2);
+            vkCmdWriteTimestamp(commands, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, queries_, query);
+        }
+        vkCmdDispatch(commands, pass.group_count[0], pass.group_count[1], pass.group_count[2]);
+        if (queries_)
+            vkCmdWriteTimestamp(commands, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, queries_, query + 1);
+    }
+    record_final_barrier(commands);
+    SR_VK(vkEndCommandBuffer(commands));
+    return {};
+}
+
+Result<uint64_t> Program::submit()
+{
+    const auto begin = std::chrono::steady_clock::now();
+    uint64_t ticket = device_.last_ticket();
+    for (const VkCommandBuffer& commands : commands_) {
+        SR_TRY(ticket, device_.submit({&commands, 1}));
+    }
+    host_us_ += std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begin).count();
+    ++runs_;
+    return ticket;
+}
+
+Status Program::run()
+{
+    SR_TRY(const uint64_t ticket, submit());
+    SR_CHECK(device_.wait(ticket));
+    return queries_ ? collect_profile() : Status{};
+}
+
+Status Program::collect_profile()
+{
+    if (!queries_ || !device_.profile())
+        return {};
+    std::vector<uint64_t> stamps(plan_.passes.size() * 2);
+    SR_VK(vkGetQueryPoolResults(device_.handle(), queries_, 0, uint32_t(stamps.size()), stamps.size() * 8,
+                                stamps.data(), 8, VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT));
+    for (size_t i = 0; i < plan_.passes.size(); ++i) {
+        const Pass& pass = plan_.passes[i];
+        const double begin = double(stamps[2 * i]) * device_.timestamp_ns() / 1e3;
+        const double end = double(stamps[2 * i + 1]) * device_.timestamp_ns() / 1e3;
+        std::string name(pass.kernel->name);
+        if (!pass.variant->name.empty())
+            name += fmt::format(".{}", pass.variant->name);
+        device_.profile()->add(
+            {std::move(name), begin, end - begin, std::to_array(pass.group_count), pass.options.flops});
+    }
+    return {};
+}
+
+} // namespace semrover

@@ -1,0 +1,53 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "runtime/device/device.h"
+#include "runtime/graph/plan.h"
+
+#include <memory>
+#include <vector>
+
+namespace semrover {
+
+// A compiled graph on a device: arena, pipelines, descriptor sets and recorded command buffers; run any number of
+// times, each run one submit (one per slice where the plan cut it).
+class Program {
+  public:
+    static Result<std::unique_ptr<Program>> create(Device& device, const Graph& graph);
+    static Result<std::unique_ptr<Program>> create(Device& device, Plan plan);
+    ~Program();
+    Program(const Program&) = delete;
+    Program& operator=(const Program&) = delete;
+
+    Status run();              // submits and waits
+    Result<uint64_t> submit(); // ticket for Device::wait
+    Status collect_profile();  // after a wait, when the device has a profile
+
+    const Plan& plan() const { return plan_; }
+    double host_us() const { return runs_ ? host_us_ / double(runs_) : 0; } // host time of one submit, mean
+
+  private:
+    Program(Device& device, Plan plan) : device_(device), plan_(std::move(plan)) {}
+    Status allocate();
+    Status make_sets();
+    Status bind(const Pass& pass, VkDescriptorSet set);
+    Status record();
+    Status record_submit(uint32_t index);
+    std::pair<VkBuffer, uint64_t> locate(const PassBinding& binding) const;
+
+    Device& device_;
+    Plan plan_;
+    std::vector<std::unique_ptr<Buffer>> blocks_;
+    VkDescriptorPool descriptors_ = VK_NULL_HANDLE;
+    VkCommandPool commands_pool_ = VK_NULL_HANDLE;
+    VkQueryPool queries_ = VK_NULL_HANDLE;
+    std::vector<const struct Pipeline*> pipelines_; // one per pass
+    std::vector<VkDescriptorSet> sets_;             // one per pass
+    std::vector<VkBufferView> views_;
+    std::vector<VkCommandBuffer> commands_; // one per submit
+    double host_us_ = 0;
+    uint64_t runs_ = 0;
+};
+
+} // namespace semrover

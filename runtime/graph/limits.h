@@ -1,0 +1,36 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "runtime/base/result.h"
+
+#include <cstdint>
+#include <string>
+
+namespace semrover {
+
+enum class DeviceType { cpu, integrated, discrete, other };
+
+// what the graph compiler must know of a device; plain data, so that it can be tested without one
+struct DeviceLimits {
+    DeviceType type = DeviceType::cpu;
+    uint32_t subgroup_size = 8;
+    uint32_t needs_supported = 0; // KernelNeeds
+    uint32_t max_shared_bytes = 16384;
+    uint32_t max_group_threads = 128;
+    uint32_t max_groups = 65535; // per dimension
+    uint64_t max_storage_range = 128ull << 20;
+    uint64_t max_texel_elements = 65536;
+    uint64_t max_allocation = 1ull << 30;
+    uint32_t offset_alignment = 256; // of storage ranges and texel views
+    uint32_t max_push_bytes = 128;
+    double submit_seconds = 0.1; // work of one submit; zero: no limit (CPU devices have no watchdog)
+    std::string force_variant;   // "", or a kernel variant to prefer wherever it exists
+    bool force_staging = false;  // upload through staging even where memory is host-visible
+};
+
+// Lowers limits for tests: "shared=16384,range=67108864,alloc=536870912,fp16=0,variant=simt,staging=1,submit=0.001".
+// Raising one above what the device has is refused.
+Status override_limits(DeviceLimits& limits, const std::string& text);
+
+} // namespace semrover

@@ -1,0 +1,102 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "runtime/graph/plan.h"
+
+#include <numeric>
+
+namespace semrover {
+
+namespace {
+
+Plan from_desc(const GraphDesc& graph)
+{
+    Plan plan;
+    plan.resources = graph.resources;
+    plan.placements.resize(graph.resources.size());
+    for (const Node& node : graph.nodes) {
+        Pass pass;
+        pass.kernel = node.kernel;
+        pass.tensors = node.tensors;
+        pass.push = node.push;
+        pass.grid = node.grid;
+        pass.options = node.options;
+        plan.passes.push_back(std::move(pass));
+    }
+    return plan;
+}
+
+} // namespace
+
+Result<Plan> make_plan(const GraphDesc& graph, const DeviceLimits& limits)
+{
+    Plan plan = from_desc(graph);
+    SR_CHECK(stage::check(plan));
+    SR_CHECK(stage::fuse(plan));
+    SR_CHECK(stage::pick_variants(plan, limits));
+    SR_CHECK(stage::lifetimes(plan));
+    SR_CHECK(stage::place(plan, limits));
+    SR_CHECK(stage::slice(plan, limits));
+    SR_CHECK(stage::order(plan));
+    return plan;
+}
+
+uint64_t Plan::arena_bytes() const
+{
+    return std::accumulate(blocks.begin(), blocks.end(), uint64_t(0));
+}
+
+uint64_t Plan::transient_bytes() const
+{
+    uint64_t sum = 0;
+    for (size_t i = 0; i < resources.size(); ++i)
+        if (!resources[i].external && placements[i].first_use != ~0u)
+            sum += resources[i].bytes;
+    return sum;
+}
+
+bool overlaps(const Plan& plan, const PassBinding& a, const PassBinding& b)
+{
+    const Resource &ra = plan.resources[a.resource], &rb = plan.resources[b.resource];
+    if (ra.external != rb.external)
+        return false;
+    uint64_t start_a = a.offset, start_b = b.offset;
+    if (ra.external) {
+        if (a.resource != b.resource && (!ra.memory.buffer || ra.memory.buffer != rb.memory.buffer))
+            return false; // without memory, when only planning, names are all that tells them apart
+        start_a += ra.memory.offset;
+        start_b += rb.memory.offset;
+    } else {
+        const Placement &pa = plan.placements[a.resource], &pb = plan.placements[b.resource];
+        if (pa.block != pb.block)
+            return false;
+        start_a += pa.offset;
+        start_b += pb.offset;
+    }
+    return start_a < start_b + b.bytes && start_b < start_a + a.bytes;
+}
+
+std::string Plan::print() const
+{
+    std::string out =
+        fmt::format("{} passes, {} fused, {} barriers, {} submits; arena {} bytes ({} without aliasing)\n",
+                    passes.size(), fused, barriers(), submits, arena_bytes(), transient_bytes());
+    uint32_t level = ~0u;
+    for (size_t i = 0; i < passes.size(); ++i) {
+        const Pass& p = passes[i];
+        if (p.level != level)
+            out += fmt::format("-- level {}\n", level = p.level);
+        out += fmt::format("{:4} {}{}{} [{} {} {}]", i, p.kernel->name, p.variant->name.empty() ? "" : ".",
+                           p.variant->name, p.group_count[0], p.group_count[1], p.group_count[2]);
+        for (const PassBinding& b : p.bindings) {
+            const Resource& r = resources[b.resource];
+            const Placement& where = placements[b.resource];
+            const char* mark = b.access == Access::read ? "r" : b.access == Access::write ? "w" : "rw";
+            const std::string place = r.external ? "ext" : fmt::format("{}@{}", where.block, where.offset + b.offset);
+            out += fmt::format(" {}:{}={}({} +{})", b.name, mark, r.name.empty() ? "_" : r.name, place, b.bytes);
+        }
+        out += "\n";
+    }
+    return out;
+}
+
+} // namespace semrover

@@ -1,0 +1,83 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "runtime/graph/graph.h"
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+// What compiling a graph decides, before anything is allocated. The stages run in this order; each is a function over
+// this data in a file of its own, testable without a device.
+namespace semrover {
+
+struct PassBinding {
+    uint32_t resource = 0;
+    uint64_t offset = 0; // bytes from the resource's start
+    uint64_t bytes = 0;
+    Access access = Access::read;
+    BindingKind kind = BindingKind::storage;
+    std::string_view name;
+};
+
+struct Pass {
+    const Kernel* kernel = nullptr;
+    const KernelVariant* variant = nullptr;
+    std::vector<Tensor> tensors;
+    std::vector<PassBinding> bindings;
+    std::map<uint32_t, uint32_t> constants; // id -> value, those that differ from the default
+    std::vector<uint8_t> push;
+    Grid grid;
+    uint32_t group_count[3] = {1, 1, 1};
+    DispatchOptions options;
+    std::vector<uint32_t> absorbed; // ids of the constants of fused epilogues, and the bindings they took
+    std::vector<size_t> slots;
+    uint32_t level = 0;                           // passes of one level run without a barrier between them
+    uint32_t submit = 0;                          // index of the command buffer it is recorded in
+    std::optional<uint32_t> tile_rows, tile_cols; // of the output, that a workgroup makes; where its shader says so
+
+    void set_push(std::string_view name, uint32_t value); // the shader has such a member
+};
+
+struct Placement {
+    uint32_t block = 0; // transients: block of the arena
+    uint64_t offset = 0;
+    uint32_t first_use = ~0u, last_use = 0; // pass indices
+};
+
+struct Plan {
+    std::vector<Resource> resources;
+    std::vector<Pass> passes;
+    std::vector<Placement> placements; // one per resource
+    std::vector<uint64_t> blocks;      // bytes of the arena's blocks
+    uint32_t levels = 0;
+    uint32_t submits = 0;
+    uint32_t fused = 0; // nodes absorbed by their producers
+
+    uint64_t arena_bytes() const;
+    uint64_t transient_bytes() const; // what it would be without aliasing
+    uint32_t barriers() const { return levels; }
+    std::string print() const;
+};
+
+Result<Plan> make_plan(const GraphDesc& graph, const DeviceLimits& limits);
+
+namespace stage {
+Status check(Plan& plan); // every transient is written before it is read, ranges fit
+Status fuse(Plan& plan);  // epilogues into their producers
+Status pick_variants(Plan& plan, const DeviceLimits& limits); // a shader per pass, its constants and bindings
+Status lifetimes(Plan& plan);                                 // first and last pass of each transient
+Status place(Plan& plan, const DeviceLimits& limits);         // aliased arena
+Status slice(Plan& plan, const DeviceLimits& limits);         // row bands for limits, groups, submits
+Status order(Plan& plan);                                     // levels from access x byte range: the barriers
+} // namespace stage
+
+// do the memory ranges of two bindings overlap, after placement?
+bool overlaps(const Plan& plan, const PassBinding& a, const PassBinding& b);
+
+// variant of `kernel` that the device should run: forced, else cpu / simt by device type, among those its limits allow
+const KernelVariant* choose_variant(const Kernel& kernel, const DeviceLimits& limits);
+
+} // namespace semrover

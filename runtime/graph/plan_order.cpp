@@ -1,0 +1,48 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// stage 7: hazards from access x byte range, after aliasing. A pass runs one level after the last pass that it
+// conflicts with; one barrier stands between levels, none for read after read.
+#include "runtime/graph/plan.h"
+
+#include <algorithm>
+
+namespace semrover::stage {
+
+namespace {
+
+bool writes(Access a)
+{
+    return uint8_t(a) & uint8_t(Access::write);
+}
+
+bool conflict(const Plan& plan, const Pass& a, const Pass& b)
+{
+    for (const PassBinding& x : a.bindings)
+        for (const PassBinding& y : b.bindings)
+            if ((writes(x.access) || writes(y.access)) && overlaps(plan, x, y))
+                return true;
+    return false;
+}
+
+} // namespace
+
+Status order(Plan& plan)
+{
+    for (size_t i = 0; i < plan.passes.size(); ++i) {
+        uint32_t level = 0;
+        for (size_t k = 0; k < i; ++k) {
+            const Pass& before = plan.passes[k];
+            if (before.submit != plan.passes[i].submit)
+                level = std::max(level, before.level + 1); // submits stay in order
+            else if (before.level >= level && conflict(plan, before, plan.passes[i]))
+                level = before.level + 1;
+        }
+        plan.passes[i].level = level;
+        plan.levels = std::max(plan.levels, level + 1);
+    }
+    std::stable_sort(plan.passes.begin(), plan.passes.end(),
+                     [](const Pass& a, const Pass& b) { return a.level < b.level; });
+    return {};
+}
+
+} // namespace semrover::stage

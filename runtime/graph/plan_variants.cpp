@@ -1,0 +1,114 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// stage 3: which shader runs each pass on this device, with which constants
+#include "runtime/graph/plan.h"
+
+#include "runtime/graph/protocol.h"
+
+#include <cstring>
+
+namespace semrover {
+
+namespace {
+
+bool runs_on(const KernelVariant& v, const DeviceLimits& limits)
+{
+    const uint32_t group_threads = v.local_size[0] * v.local_size[1] * v.local_size[2];
+    return v.shared_bytes <= limits.max_shared_bytes && group_threads <= limits.max_group_threads &&
+           (v.needs & ~limits.needs_supported) == 0 && v.push_bytes <= limits.max_push_bytes;
+}
+
+// lower is better; kernels with one variant have an empty name
+int preference(std::string_view name, const DeviceLimits& limits)
+{
+    if (!limits.force_variant.empty() && name == limits.force_variant)
+        return 0;
+    const bool cpu = limits.type == DeviceType::cpu;
+    if (name == "cpu")
+        return cpu ? 1 : 4;
+    if (name == "coopmat")
+        return cpu ? 5 : 1;
+    return name.empty() ? 2 : 3; // "", "simt"
+}
+
+void set_constant(Pass& pass, std::string_view name, uint32_t value)
+{
+    const ConstantInfo* c = pass.variant->constant(name);
+    if (c && c->value != value)
+        pass.constants[c->id] = value;
+}
+
+// The tile of a workgroup. Where its lanes may lie otherwise (col_lanes of them side by side), as few outputs as can be
+// are computed beyond the last row and column.
+void fit_tile(Pass& pass)
+{
+    const ConstantInfo *lanes = pass.variant->constant(protocol::kColLanes),
+                       *m = pass.variant->constant(protocol::kTileRows),
+                       *n = pass.variant->constant(protocol::kTileCols);
+    if (m)
+        pass.tile_rows = m->value;
+    if (n)
+        pass.tile_cols = n->value;
+    if (!lanes || pass.grid.unit != Grid::Unit::tiles)
+        return;
+    const uint32_t all = pass.variant->local_size[0];
+    const uint32_t lane_rows = m->value * lanes->value / all, lane_cols = n->value / lanes->value;
+    const auto outputs = [&](uint32_t across) {
+        return uint64_t(round_up(pass.grid.x, lane_rows * (all / across))) * round_up(pass.grid.y, lane_cols * across);
+    };
+    uint32_t best = lanes->value;
+    for (uint32_t across = all; across >= 1; across /= 2)
+        if (outputs(across) < outputs(best))
+            best = across;
+    pass.tile_rows = lane_rows * (all / best);
+    pass.tile_cols = lane_cols * best;
+    pass.set_push(protocol::kColLanesMember, best);
+}
+
+Status bind(Pass& pass)
+{
+    const auto& declared = pass.variant->bindings;
+    for (size_t b = 0; b < declared.size(); ++b) {
+        const Tensor& t = pass.tensors[b];
+        pass.bindings.push_back(
+            {t.resource, t.offset, t.bytes(), declared[b].access, declared[b].kind, declared[b].name});
+        set_constant(pass, protocol::half_constant(declared[b].name), t.dtype == DType::f16);
+    }
+    return {};
+}
+
+} // namespace
+
+void Pass::set_push(std::string_view name, uint32_t value)
+{
+    const PushMember* m = variant->push_member(name);
+    SR_ASSERT(m, "{}.{}: no push member {}", kernel->name, variant->name, name);
+    std::memcpy(&push[m->offset], &value, 4);
+}
+
+const KernelVariant* choose_variant(const Kernel& kernel, const DeviceLimits& limits)
+{
+    const KernelVariant* best = nullptr;
+    for (const KernelVariant& v : kernel.variants)
+        if (runs_on(v, limits) && (!best || preference(v.name, limits) < preference(best->name, limits)))
+            best = &v;
+    return best;
+}
+
+Status stage::pick_variants(Plan& plan, const DeviceLimits& limits)
+{
+    for (Pass& pass : plan.passes) {
+        pass.variant = choose_variant(*pass.kernel, limits);
+        if (!pass.variant)
+            return fail(ErrorCode::no_device,
+                        "no variant of kernel '{}' runs on this device ({} bytes of shared memory, {} threads a group)",
+                        pass.kernel->name, limits.max_shared_bytes, limits.max_group_threads);
+        for (const ConstantValue& c : pass.options.constants)
+            set_constant(pass, c.name, c.value);
+        fit_tile(pass);
+        SR_CHECK(bind(pass));
+    }
+    return {};
+}
+
+} // namespace semrover

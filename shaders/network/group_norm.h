@@ -1,0 +1,31 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#ifndef SEMROVER_GROUP_NORM_H
+#define SEMROVER_GROUP_NORM_H
+#include "shaders/lib/types.h"
+
+struct GroupNormScalePush {
+    uint pixels; // of an image
+    uint chunks; // of 16 rows, of an image
+    uint x_cols;
+    uint x2_cols;
+    uint moments_ld;
+    uint moments2_ld;
+    uint scale_ld;
+    uint group_cols;
+    float eps;
+};
+
+struct GroupNormApplyPush {
+    uint rows;
+    uint x_cols;
+    uint x2_cols;
+    uint first_row;
+    uint image_rows;
+    uint x_ld;
+    uint x2_ld;
+    uint y_ld;
+    uint scale_ld;
+};
+
+#endif

@@ -1,0 +1,15 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#ifndef SEMROVER_STEP_UPDATE_H
+#define SEMROVER_STEP_UPDATE_H
+#include "shaders/lib/types.h"
+
+struct StepUpdatePush {
+    uint rows;
+    uint ld;     // elements, of every matrix
+    uint guided; // 1: rows [rows, 2 rows) of m are the unconditional half
+    float guidance;
+    float clip;
+};
+
+#endif

@@ -1,0 +1,94 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// the build tool that reads shaders refuses those that break runtime/graph/protocol.h
+#include "tests/program_result.h"
+
+#include <gtest/gtest.h>
+
+namespace semrover {
+namespace {
+
+struct Declarations {
+    std::string constants, push = "uint rows;", y = "writeonly buffer Y { uint y[]; }";
+};
+
+std::string shader(const Declarations& d)
+{
+    return "#version 460\nlayout(local_size_x = 64) in;\n" + d.constants + "\nlayout(push_constant) uniform Push { " +
+           d.push + " } p;\nlayout(binding = 0) readonly buffer X { uint x[]; };\nlayout(binding = 1) " + d.y +
+           ";\nvoid main() { " + (d.y.starts_with("readonly") ? "uint v = x[0] + y[0];" : "y[0] = x[0];") +
+           " }\n";
+}
+
+// what the reflector says of an op of these variants; empty: it took them
+std::string fault_of(const std::vector<std::pair<std::string, Declarations>>& variants)
+{
+    const ScratchFolder folder;
+    std::string arguments = (folder / "op.spv.h").string() + " op";
+    for (const auto& [name, declarations] : variants) {
+        const std::string file = name.empty() ? "op" : "op." + name;
+        folder.put(file + ".comp", shader(declarations));
+        const std::string spirv = (folder / (file + ".spv")).string();
+        const ProgramResult compiled =
+            run_program_line(SEMROVER_GLSLANG, "-V --quiet --target-env vulkan1.2 -o " + spirv + " " +
+                                                   (folder / (file + ".comp")).string());
+        EXPECT_EQ(compiled.code, 0) << compiled.out << compiled.err;
+        arguments += " " + spirv;
+    }
+    const ProgramResult result = run_program_line(SEMROVER_REFLECT, arguments);
+    EXPECT_EQ(result.code == 0, result.err.empty()) << result.err;
+    return result.err;
+}
+
+std::string fault(const Declarations& declarations)
+{
+    return fault_of({{"", declarations}});
+}
+
+bool says(const std::string& text, std::string_view part)
+{
+    return text.find(part) != std::string::npos;
+}
+
+TEST(Protocol, a_shader_that_keeps_it_is_taken)
+{
+    EXPECT_EQ(fault(Declarations{}), "");
+    EXPECT_EQ(fault({.constants = "layout(constant_id = 0) const bool kHalfX = false;\n"
+                                  "layout(constant_id = 1) const uint kTileM = 16;",
+                     .push = "uint rows; uint first_row; uint x_first; uint x_ld;"}),
+              "");
+}
+
+TEST(Protocol, names_that_belong_to_no_binding_are_refused)
+{
+    EXPECT_TRUE(says(fault({.constants = "layout(constant_id = 0) const bool kHalfZ = false;"}),
+                     "constant kHalfZ belongs to no binding"));
+    EXPECT_TRUE(says(fault({.push = "uint rows; uint z_first;"}), "push member z_first belongs to no binding"));
+}
+
+TEST(Protocol, what_the_planner_needs_together_is_declared_together)
+{
+    EXPECT_TRUE(says(fault({.push = "uint first_row;"}), "first_row without rows"));
+    const std::string lanes = "layout(constant_id = 0) const uint kColLanes = 4;\n";
+    const std::string tile = "layout(constant_id = 1) const uint kTileM = 16;\n"
+                             "layout(constant_id = 2) const uint kTileN = 16;\n";
+    EXPECT_TRUE(says(fault({.constants = lanes}), "kColLanes without kTileM"));
+    EXPECT_TRUE(says(fault({.constants = lanes + tile}), "kColLanes without push member col_lanes"));
+    EXPECT_EQ(fault({.constants = lanes + tile, .push = "uint rows; uint col_lanes;"}), "");
+}
+
+TEST(Protocol, variants_of_an_op_declare_the_same)
+{
+    const Declarations plain;
+    EXPECT_TRUE(says(fault_of({{"cpu", plain}, {"simt", {.push = "uint rows; uint more;"}}}),
+                     "variant simt: a push struct of 8 bytes, in the first variant 4"));
+    EXPECT_TRUE(says(fault_of({{"cpu", plain}, {"simt", {.y = "writeonly buffer Z { uint y[]; }"}}}),
+                     "variant simt: binding 1 is called Z, in the first variant Y"));
+    const Declarations first{.constants = "layout(constant_id = 0) const uint kTileM = 16;"},
+        second{.constants = "layout(constant_id = 1) const uint kTileM = 16;"};
+    EXPECT_TRUE(says(fault_of({{"cpu", first}, {"simt", second}}),
+                     "variant simt: constant kTileM has id 1, in the first variant 0"));
+}
+
+} // namespace
+} // namespace semrover

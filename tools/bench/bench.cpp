@@ -1,0 +1,145 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// semrover bench KIND: one object of figures per kind, measured warm with synthetic data of real shapes
+#include "tools/bench/bench.h"
+
+#include "runtime/device/profile.h"
+
+#include <algorithm>
+#include <chrono>
+#include <CLI/CLI.hpp>
+
+namespace semrover {
+
+Result<Timing> measure(const std::function<Status()>& work)
+{
+    using Clock = std::chrono::steady_clock;
+    SR_CHECK(work());
+    const auto start = Clock::now();
+    std::vector<double> times;
+    for (double total = 0; (times.size() < 5 || total < 1) && total < 30;) {
+        const auto begin = Clock::now();
+        SR_CHECK(work());
+        const auto end = Clock::now();
+        times.push_back(std::chrono::duration<double, std::milli>(end - begin).count());
+        total = std::chrono::duration<double>(end - start).count();
+    }
+    std::sort(times.begin(), times.end());
+    return Timing{times[times.size() / 2], times.front(), times.size()};
+}
+
+Json bench_report(const char* kind, const Device& device, DType precision, const Timing& timing,
+                  uint64_t predicted_bytes)
+{
+    return {{"kind", kind},
+            {"device", device.name()},
+            {"driver", device.driver()},
+            {"precision", precision == DType::f16 ? "fp16" : "fp32"},
+            {"ms_median", timing.ms_median},
+            {"ms_min", timing.ms_min},
+            {"runs", timing.runs},
+            {"predicted_bytes", predicted_bytes},
+            {"peak_bytes", device.peak_bytes()}};
+}
+
+void add_program(Json& report, const Program& program)
+{
+    report["dispatches"] = program.plan().passes.size();
+    report["barriers"] = program.plan().barriers();
+    report["host_us_per_step"] = program.host_us();
+}
+
+void add_rate(Json& report, double flops, const Timing& timing)
+{
+    report["gflop"] = flops / 1e9;
+    report["gflops"] = flops / timing.ms_median / 1e6;
+    report["gflops_best"] = flops / timing.ms_min / 1e6;
+}
+
+void add_network(Json& report, const Program& program, const Timing& timing, uint64_t parameters, uint64_t weight_bytes)
+{
+    double flops = 0;
+    for (const Pass& pass : program.plan().passes)
+        flops += pass.options.flops;
+    report["parameters"] = parameters;
+    report["weight_bytes"] = weight_bytes;
+    report["arena_bytes"] = program.plan().arena_bytes();
+    add_rate(report, flops, timing);
+    add_program(report, program);
+}
+
+void want_profile(Device& device, const std::string& path)
+{
+    if (!path.empty())
+        device.set_profile(std::make_shared<Profile>());
+}
+
+Status write_profile(Device& device, const std::string& path)
+{
+    if (!device.profile())
+        return {};
+    fmt::print(stderr, "{}", device.profile()->summary());
+    return device.profile()->write(path);
+}
+
+void print_report(const Json& report, const Globals& globals)
+{
+    if (globals.json) {
+        fmt::print("{}\n", report.dump());
+        return;
+    }
+    for (const auto& [name, value] : report.items())
+        fmt::print("{:18} {}\n", name, value.is_string() ? value.get<std::string>() : value.dump());
+}
+
+uint32_t BenchInputs::add(uint32_t rows, uint32_t cols, DType dtype)
+{
+    const uint64_t ld = dtype == DType::u32 ? cols : round_up(cols, kRowPadding);
+    items_.push_back({arena_.add(rows * ld * dtype_bytes(dtype)), rows, cols, dtype});
+    return uint32_t(items_.size() - 1);
+}
+
+Status BenchInputs::allocate()
+{
+    SR_CHECK(arena_.allocate(device_, "benchmark inputs"));
+    uint32_t state = 12345;
+    const auto random = [&] { return state = state * 1664525u + 1013904223u; };
+    for (const Item& item : items_) {
+        const BufferSlice memory = arena_.slice(item.slice);
+        std::vector<uint32_t> words(memory.bytes / 4);
+        for (uint32_t& w : words) {
+            const float v = float(random() >> 8) / 8388608.f - 1;
+            w = random();
+            if (item.dtype == DType::f32)
+                __builtin_memcpy(&w, &v, 4);
+            else if (item.dtype == DType::f16)
+                w = uint32_t(float_to_half(v)) | uint32_t(float_to_half(v * 0.5f)) << 16;
+        }
+        SR_CHECK(device_.write(memory, std::as_bytes(std::span(words))));
+    }
+    return {};
+}
+
+Tensor BenchInputs::tensor(Graph& g, uint32_t id) const
+{
+    const Item& i = items_.at(id);
+    return g.external(arena_.slice(i.slice), i.rows, i.cols, i.dtype, "input", i.dtype == DType::u32 ? i.cols : 0);
+}
+
+void add_bench(CLI::App& app, const Globals& globals, Run& run)
+{
+    CLI::App* bench = app.add_subcommand("bench", "measure kernels and stages on this device");
+    bench->require_subcommand(1);
+    bench->fallthrough();
+    add_bench_gemm(*bench, globals, run);
+    add_bench_conv(*bench, globals, run);
+    add_bench_transformer(*bench, globals, run);
+    add_bench_unet(*bench, globals, run);
+    add_bench_vae(*bench, globals, run);
+    add_bench_asd(*bench, globals, run);
+    add_bench_regions(*bench, globals, run);
+    add_bench_sort(*bench, globals, run);
+    add_bench_splat(*bench, globals, run);
+}
+
+} // namespace semrover

@@ -1,0 +1,67 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "runtime/base/json.h"
+#include "runtime/device/program.h"
+#include "tools/cli/commands.h"
+
+#include <functional>
+#include <span>
+
+namespace semrover {
+
+// times of a measured piece of work, warm
+struct Timing {
+    double ms_median = 0, ms_min = 0;
+    size_t runs = 0;
+};
+
+// runs `work` once to warm up, then until 5 runs and a second have passed, or 30 s
+Result<Timing> measure(const std::function<Status()>& work);
+
+// the fields that every benchmark's JSON has
+Json bench_report(const char* kind, const Device& device, DType precision, const Timing& timing,
+                  uint64_t predicted_bytes);
+void add_program(Json& report, const Program& program);          // dispatches, barriers, host_us_per_step
+void add_rate(Json& report, double flops, const Timing& timing); // gflop, gflops, gflops_best
+// the same of a network's evaluation, and gflop (what is computed: Winograd's algorithm counts as little as it does),
+// gflops, weight_bytes
+void add_network(Json& report, const Program& program, const Timing& timing, uint64_t parameters,
+                 uint64_t weight_bytes);
+// device times where --profile asked for them: a Chrome trace, and their sums to stderr
+void want_profile(Device& device, const std::string& path);
+Status write_profile(Device& device, const std::string& path);
+void print_report(const Json& report, const Globals& globals);
+
+// memory with seeded values on a device, for inputs of kernels
+class BenchInputs {
+  public:
+    explicit BenchInputs(Device& device) : device_(device) {}
+    // normal-ish values as fp32 or fp16 matrices, or uniform words for u32
+    uint32_t add(uint32_t rows, uint32_t cols, DType dtype);
+    Status allocate();
+    Tensor tensor(Graph& g, uint32_t id) const;
+    uint64_t bytes() const { return arena_.planned_bytes(device_.limits()); }
+
+  private:
+    struct Item {
+        uint32_t slice, rows, cols;
+        DType dtype;
+    };
+    Device& device_;
+    Arena arena_;
+    std::vector<Item> items_;
+};
+
+void add_bench_gemm(CLI::App& bench, const Globals& globals, Run& run);
+void add_bench_conv(CLI::App& bench, const Globals& globals, Run& run);
+void add_bench_transformer(CLI::App& bench, const Globals& globals, Run& run);
+void add_bench_unet(CLI::App& bench, const Globals& globals, Run& run);
+void add_bench_vae(CLI::App& bench, const Globals& globals, Run& run);
+void add_bench_asd(CLI::App& bench, const Globals& globals, Run& run);
+void add_bench_regions(CLI::App& bench, const Globals& globals, Run& run);
+void add_bench_sort(CLI::App& bench, const Globals& globals, Run& run);
+void add_bench_splat(CLI::App& bench, const Globals& globals, Run& run);
+
+} // namespace semrover

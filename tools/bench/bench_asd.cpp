@@ -1,0 +1,105 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// semrover bench asd: one frame of the autoregressive renderer, random weights: a denoising step with guidance, and the
+// encoding and decoding around the steps
+#include "engine/model/renderer_model.h"
+#include "engine/refine/asd.h"
+#include "runtime/base/json.h"
+#include "tools/bench/bench.h"
+#include "tools/cli/open_device.h"
+
+#include <CLI/CLI.hpp>
+
+namespace semrover {
+
+namespace {
+
+struct BenchAsdArguments {
+    std::string unet, vae, precision = "fp16";
+    uint32_t width = 616, height = 424, tokens = 77;
+    float cfg_scale = 1.5f;
+};
+
+struct Networks {
+    UnetConfig unet;
+    VaeConfig vae;
+};
+
+Result<Networks> read_networks(const BenchAsdArguments& o)
+{
+    Networks n;
+    n.unet.in_channels = renderer_channels(n.vae);
+    if (!o.unet.empty()) {
+        SR_TRY(const Json json, read_json(o.unet));
+        SR_TRY(n.unet, parse_unet_config(json));
+    }
+    if (!o.vae.empty()) {
+        SR_TRY(const Json json, read_json(o.vae));
+        SR_TRY(n.vae, parse_vae_config(json));
+    }
+    return n;
+}
+
+// a picture through one direction of the VAE, whose memory is gone afterwards
+Result<Timing> time_codec(Device& device, const Vae& vae, const LatentSize& size, CodecDirection direction)
+{
+    SR_TRY(const auto codec, LatentCodec::create(device, vae, size, direction));
+    const bool encode = direction == CodecDirection::encode;
+    const std::vector<float> image(size_t(size.image_width) * size.image_height * vae.config().in_channels, 0.25f);
+    const std::vector<float> latent(size_t(size.pixels()) * vae.config().latent_channels, 0.25f);
+    return measure([&] { return (encode ? codec->encode(image) : codec->decode(latent)).map([](const auto&) {}); });
+}
+
+Status bench_asd(const BenchAsdArguments& o, const Globals& globals)
+{
+    SR_TRY(const Networks n, read_networks(o));
+    SR_TRY(const auto device, open_device(globals));
+    const DType dtype = o.precision == "fp32" ? DType::f32 : DType::f16;
+    const LatentSize size{o.width, o.height, n.vae.downscale()};
+    SR_TRY(const auto vae, Vae::load(*device, n.vae, Checkpoint::random(1), dtype));
+    SR_TRY(const Timing encode, time_codec(*device, *vae, size, CodecDirection::encode));
+    SR_TRY(const Timing decode, time_codec(*device, *vae, size, CodecDirection::decode));
+    device->reset_peak();
+    SR_TRY(const auto unet, Unet::load(*device, n.unet, Checkpoint::random(1), dtype));
+    SR_TRY(const SamplingPlan plan, plan_sampling(stable_diffusion_scheduler(), 1));
+    const std::vector<float> text(size_t(o.tokens) * n.unet.cross_attention_dim, 0.f);
+    AsdOptions options;
+    options.guidance_scale = o.cfg_scale;
+    SR_TRY(const auto asd, AsdRenderer::create(*device, *unet, plan, {o.tokens, text}, size, options));
+    const std::vector<float> latent(size_t(size.pixels()) * n.unet.out_channels, 0.25f), visible(size.pixels(), 1.f);
+    const AsdFrame frame{1, 0, latent, visible, latent};
+    SR_TRY(const Timing step, measure([&] { return asd->render(frame).map([](const auto&) {}); }));
+    SR_TRY(const AsdRenderer::Bytes planned,
+           AsdRenderer::planned_bytes(device->limits(), *unet, plan, o.tokens, size, o.cfg_scale));
+    const uint64_t weights = vae->device_bytes(device->limits()) + unet->device_bytes(device->limits());
+    Json report = bench_report("asd", *device, dtype, step, weights + planned.state + planned.programs);
+    report["width"] = o.width;
+    report["height"] = o.height;
+    report["guidance_scale"] = o.cfg_scale;
+    report["encode_ms"] = encode.ms_median;
+    report["decode_ms"] = decode.ms_median;
+    add_rate(report, asd->step_flops(), step);
+    report["dispatches"] = asd->step_passes();
+    report["barriers"] = asd->step_barriers();
+    report["host_us_per_step"] = asd->host_us_per_step();
+    print_report(report, globals);
+    return {};
+}
+
+} // namespace
+
+void add_bench_asd(CLI::App& bench, const Globals& globals, Run& run)
+{
+    auto o = std::make_shared<BenchAsdArguments>();
+    CLI::App* c = bench.add_subcommand("asd", "a denoising step of the autoregressive renderer, and its VAE");
+    c->add_option("--config", o->unet, "the UNet's config.json; default: Stable Diffusion 1.5 with 13 input channels");
+    c->add_option("--vae-config", o->vae, "the VAE's; default: Stable Diffusion 1.5's");
+    c->add_option("-W,--width", o->width, "pixels")->check(CLI::Range(1u, 16384u));
+    c->add_option("-H,--height", o->height, "pixels")->check(CLI::Range(1u, 16384u));
+    c->add_option("--tokens", o->tokens, "tokens of the text")->check(CLI::Range(1u, 4096u));
+    c->add_option("--cfg-scale", o->cfg_scale, "guidance; 1: no unconditional half");
+    c->add_option("--precision", o->precision, "storage")->check(CLI::IsMember({"fp16", "fp32"}));
+    c->callback([o, &globals, &run] { run = [o, &globals] { return bench_asd(*o, globals); }; });
+}
+
+} // namespace semrover

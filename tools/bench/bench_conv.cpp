@@ -1,0 +1,67 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// semrover bench conv: one 3x3 convolution
+#include "kernels/network.h"
+#include "tools/bench/bench.h"
+#include "tools/cli/open_device.h"
+
+#include <CLI/CLI.hpp>
+
+namespace semrover {
+
+namespace {
+
+struct BenchConvArguments {
+    uint32_t width = 77, height = 53, channels = 320, outputs = 320;
+    std::string precision = "fp16";
+    bool winograd = false;
+};
+
+Status bench_conv(const BenchConvArguments& o, const Globals& globals)
+{
+    SR_TRY(const auto device, open_device(globals));
+    const DType dtype = o.precision == "fp32" ? DType::f32 : DType::f16;
+    BenchInputs inputs(*device);
+    FeatureMap map{{}, 1, o.height, o.width};
+    const uint32_t x = inputs.add(map.image_rows(), o.channels, dtype);
+    const uint32_t w = inputs.add(o.outputs, 9 * round_up(o.channels, kRowPadding), dtype);
+    SR_CHECK(inputs.allocate());
+    Graph g;
+    map.data = inputs.tensor(g, x);
+    ConvOptions options;
+    options.dtype = dtype;
+    const Tensor weight = inputs.tensor(g, w);
+    (void)(o.winograd ? winograd_conv2d(g, map, winograd_weight(g, weight), {}, options)
+                      : conv2d(g, map, {}, weight, {}, options));
+    SR_TRY(const auto program, Program::create(*device, g));
+    SR_TRY(const Timing timing, measure([&] { return program->run(); }));
+    Json report = bench_report("conv", *device, dtype, timing, inputs.bytes() + program->plan().arena_bytes());
+    report["width"] = o.width;
+    report["height"] = o.height;
+    report["channels"] = o.channels;
+    report["outputs"] = o.outputs;
+    report["algorithm"] = o.winograd ? "winograd" : "direct";
+    report["variant"] = program->plan().passes[0].variant->name;
+    add_rate(report, 2.0 * 9 * o.channels * o.outputs * o.width * o.height, timing); // as a direct convolution
+    add_program(report, *program);
+    print_report(report, globals);
+    return {};
+}
+
+} // namespace
+
+void add_bench_conv(CLI::App& bench, const Globals& globals, Run& run)
+{
+    auto o = std::make_shared<BenchConvArguments>();
+    CLI::App* c = bench.add_subcommand("conv", "3x3 convolution of an image, zeros around it");
+    const auto size = CLI::Range(1u, 16384u);
+    c->add_option("-W,--width", o->width, "pixels")->check(size);
+    c->add_option("-H,--height", o->height, "pixels")->check(size);
+    c->add_option("--channels", o->channels, "of the input")->check(size);
+    c->add_option("--outputs", o->outputs, "channels of the output")->check(size);
+    c->add_flag("--winograd", o->winograd, "by Winograd's algorithm, weights transformed in every run");
+    c->add_option("--precision", o->precision, "storage")->check(CLI::IsMember({"fp16", "fp32"}));
+    c->callback([o, &globals, &run] { run = [o, &globals] { return bench_conv(*o, globals); }; });
+}
+
+} // namespace semrover

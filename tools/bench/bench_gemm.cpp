@@ -1,0 +1,56 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// semrover bench gemm: y = x w^T, x [m, k], w [n, k]
+#include "kernels/network.h"
+#include "tools/bench/bench.h"
+#include "tools/cli/open_device.h"
+
+#include <CLI/CLI.hpp>
+
+namespace semrover {
+
+namespace {
+
+struct BenchGemmArguments {
+    uint32_t m = 384, n = 4096, k = 1024;
+    std::string precision = "fp16";
+};
+
+Status bench_gemm(const BenchGemmArguments& o, const Globals& globals)
+{
+    SR_TRY(const auto device, open_device(globals));
+    const DType dtype = o.precision == "fp32" ? DType::f32 : DType::f16;
+    BenchInputs inputs(*device);
+    const uint32_t x = inputs.add(o.m, o.k, dtype), w = inputs.add(o.n, o.k, dtype), y = inputs.add(o.m, o.n, dtype);
+    const uint64_t predicted = inputs.bytes();
+    SR_CHECK(inputs.allocate());
+    Graph g;
+    (void)gemm(g, inputs.tensor(g, x), inputs.tensor(g, w), {}, {.dtype = dtype, .into = inputs.tensor(g, y)});
+    SR_TRY(const auto program, Program::create(*device, g));
+    SR_TRY(const Timing timing, measure([&] { return program->run(); }));
+    Json report = bench_report("gemm", *device, dtype, timing, predicted + program->plan().arena_bytes());
+    report["m"] = o.m;
+    report["n"] = o.n;
+    report["k"] = o.k;
+    report["variant"] = program->plan().passes[0].variant->name;
+    add_rate(report, 2.0 * o.m * o.n * o.k, timing);
+    add_program(report, *program);
+    print_report(report, globals);
+    return {};
+}
+
+} // namespace
+
+void add_bench_gemm(CLI::App& bench, const Globals& globals, Run& run)
+{
+    auto o = std::make_shared<BenchGemmArguments>();
+    CLI::App* c = bench.add_subcommand("gemm", "dense layer: y [m, n] = x [m, k] w [n, k]^T");
+    const auto size = CLI::Range(1u, 65536u);
+    c->add_option("--m", o->m, "rows of x")->check(size);
+    c->add_option("--n", o->n, "rows of w")->check(size);
+    c->add_option("--k", o->k, "columns of both")->check(size);
+    c->add_option("--precision", o->precision, "storage")->check(CLI::IsMember({"fp16", "fp32"}));
+    c->callback([o, &globals, &run] { run = [o, &globals] { return bench_gemm(*o, globals); }; });
+}
+
+} // namespace semrover

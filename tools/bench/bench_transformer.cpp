@@ -1,0 +1,87 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// semrover bench transformer: one denoising step of a batch of regions, both guidance halves, random weights
+#include "engine/voxfield/token_sampler.h"
+#include "tools/bench/bench.h"
+#include "tools/cli/open_device.h"
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+
+namespace semrover {
+
+namespace {
+
+constexpr int kSteps = 2; // per measured run
+
+struct BenchTransformerArguments {
+    std::string config, precision = "fp16";
+    uint32_t cells = 128, batch = 1;
+    bool unguided = false;
+};
+
+// a street-like patch: a square of ground and a wall
+std::vector<RegionInput> make_regions(const BenchTransformerArguments& o, uint32_t classes)
+{
+    RegionInput region;
+    const int32_t side = int32_t(std::ceil(std::sqrt(o.cells * 0.6)));
+    for (int32_t i = 0; region.cells.size() < o.cells; ++i) {
+        if (i < side * side)
+            region.cells.push_back({i % side, i / side, 0});
+        else
+            region.cells.push_back({(i - side * side) % side, side, (i - side * side) / side});
+        region.labels.push_back(uint32_t(i) % classes);
+    }
+    return std::vector<RegionInput>(o.batch, region);
+}
+
+Status bench_transformer(const BenchTransformerArguments& o, const Globals& globals)
+{
+    TransformerConfig config;
+    if (!o.config.empty()) {
+        SR_TRY(const Json json, read_json(o.config));
+        SR_TRY(config, parse_transformer_config(json));
+    }
+    SR_TRY(const auto device, open_device(globals));
+    const DType dtype = o.precision == "fp32" ? DType::f32 : DType::f16;
+    SR_TRY(const auto transformer, Transformer::random(*device, config, dtype));
+    SchedulerConfig scheduler;
+    scheduler.prediction = Prediction::sample;
+    SR_TRY(const SamplingPlan plan, plan_sampling(scheduler, kSteps));
+    const float guidance = o.unguided ? 1.f : 4.f;
+    SR_TRY(const auto sampler, TokenSampler::create(*device, *transformer, plan, sampling_options(guidance, 1)));
+    SR_TRY(const uint64_t planned, sampler->planned_bytes(o.batch, o.cells));
+    const uint64_t predicted = transformer->device_bytes(device->limits()) + planned;
+    const std::vector<RegionInput> regions = make_regions(o, config.num_classes);
+    SR_TRY(Timing timing, measure([&] { return sampler->run(regions).map([](const auto&) {}); }));
+    timing.ms_median /= kSteps;
+    timing.ms_min /= kSteps;
+    Json report = bench_report("transformer", *device, dtype, timing, predicted);
+    report["parameters"] = transformer->weights().parameters();
+    report["cells"] = o.cells;
+    report["batch"] = o.batch;
+    report["guided"] = !o.unguided;
+    report["gflop"] = sampler->step_flops() / 1e9;
+    report["gflops"] = sampler->step_flops() / timing.ms_median / 1e6;
+    report["dispatches"] = sampler->step_passes();
+    report["barriers"] = sampler->step_barriers();
+    report["host_us_per_step"] = sampler->host_us_per_step();
+    print_report(report, globals);
+    return {};
+}
+
+} // namespace
+
+void add_bench_transformer(CLI::App& bench, const Globals& globals, Run& run)
+{
+    auto o = std::make_shared<BenchTransformerArguments>();
+    CLI::App* c = bench.add_subcommand("transformer", "one denoising step of the Σ-Voxfield transformer");
+    c->add_option("--config", o->config, "config.json; default: the full-size model, 12 layers of 8 heads of 128");
+    c->add_option("--cells", o->cells, "cells of a region")->check(CLI::Range(1u, 4096u));
+    c->add_option("--batch", o->batch, "regions")->check(CLI::Range(1u, 1024u));
+    c->add_option("--precision", o->precision, "storage")->check(CLI::IsMember({"fp16", "fp32"}));
+    c->add_flag("--unguided", o->unguided, "without the unconditional half");
+    c->callback([o, &globals, &run] { run = [o, &globals] { return bench_transformer(*o, globals); }; });
+}
+
+} // namespace semrover

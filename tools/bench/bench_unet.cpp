@@ -1,0 +1,77 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// semrover bench unet: one evaluation of a renderer's UNet, random weights
+#include "engine/network/unet.h"
+#include "tools/bench/bench.h"
+#include "tools/cli/open_device.h"
+
+#include <CLI/CLI.hpp>
+
+namespace semrover {
+
+namespace {
+
+struct BenchUnetArguments {
+    std::string config, precision = "fp16", profile;
+    uint32_t width = 77, height = 53, batch = 1, tokens = 77;
+};
+
+// Stable Diffusion 1.5's, with the channels of the deferred renderer
+UnetConfig default_config()
+{
+    UnetConfig c;
+    c.in_channels = 13;
+    return c;
+}
+
+Status bench_unet(const BenchUnetArguments& o, const Globals& globals)
+{
+    UnetConfig config = default_config();
+    if (!o.config.empty()) {
+        SR_TRY(const Json json, read_json(o.config));
+        SR_TRY(config, parse_unet_config(json));
+    }
+    SR_TRY(const auto device, open_device(globals));
+    const DType dtype = o.precision == "fp32" ? DType::f32 : DType::f16;
+    SR_TRY(const auto unet, Unet::load(*device, config, Checkpoint::random(1), dtype));
+    FeatureMap x{{}, o.batch, o.height, o.width};
+    BenchInputs inputs(*device);
+    const uint32_t rows = x.image_rows() * o.batch, sample = inputs.add(rows, config.in_channels, dtype);
+    const uint32_t table = inputs.add(1, unet->time_width(), DType::f32), row = inputs.add(o.batch, 1, DType::u32);
+    const uint32_t text = inputs.add(o.tokens, std::max(unet->context_width(), 1u), dtype);
+    SR_CHECK(inputs.allocate());
+    Graph g;
+    x.data = inputs.tensor(g, sample);
+    const Tensor table_row = inputs.tensor(g, row);
+    SR_CHECK(device->clear(g.desc().resources[table_row.resource].memory));
+    (void)unet->forward(g, x, inputs.tensor(g, table), table_row, {inputs.tensor(g, text), o.tokens, 0});
+    want_profile(*device, o.profile);
+    SR_TRY(const auto program, Program::create(*device, g));
+    SR_TRY(const Timing timing, measure([&] { return program->run(); }));
+    const uint64_t predicted = unet->device_bytes(device->limits()) + inputs.bytes() + program->plan().arena_bytes();
+    Json report = bench_report("unet", *device, dtype, timing, predicted);
+    report["width"] = o.width;
+    report["height"] = o.height;
+    report["batch"] = o.batch;
+    add_network(report, *program, timing, unet->parameters(), unet->device_bytes(device->limits()));
+    print_report(report, globals);
+    return write_profile(*device, o.profile);
+}
+
+} // namespace
+
+void add_bench_unet(CLI::App& bench, const Globals& globals, Run& run)
+{
+    auto o = std::make_shared<BenchUnetArguments>();
+    CLI::App* c = bench.add_subcommand("unet", "one evaluation of a renderer's UNet");
+    c->add_option("--config", o->config, "config.json; default: Stable Diffusion 1.5 with 13 input channels");
+    c->add_option("-W,--width", o->width, "latent pixels")->check(CLI::Range(1u, 4096u));
+    c->add_option("-H,--height", o->height, "latent pixels")->check(CLI::Range(1u, 4096u));
+    c->add_option("--batch", o->batch, "images; 2 is one step with guidance")->check(CLI::Range(1u, 64u));
+    c->add_option("--tokens", o->tokens, "tokens of the text")->check(CLI::Range(1u, 4096u));
+    c->add_option("--precision", o->precision, "storage")->check(CLI::IsMember({"fp16", "fp32"}));
+    c->add_option("--profile", o->profile, "write device times as a Chrome trace, and their sums to stderr");
+    c->callback([o, &globals, &run] { run = [o, &globals] { return bench_unet(*o, globals); }; });
+}
+
+} // namespace semrover

@@ -1,0 +1,55 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "runtime/base/result.h"
+
+#include <cstdint>
+#include <functional>
+#include <string>
+
+namespace CLI {
+class App;
+}
+
+namespace semrover {
+
+// options that every subcommand takes, before or after its name
+struct Globals {
+    std::string device;    // name or index; empty: the best there is
+    uint64_t max_vram = 0; // bytes; 0: what the device has
+    bool yes = false;      // replace existing files
+    bool quiet = false;    // no progress
+    bool verbose = false;
+    bool json = false;     // results as one JSON object on standard output
+    bool log_json = false; // progress as JSON lines on standard error
+};
+
+// what main runs once the command line is understood; an error becomes one line and the exit code of its ErrorCode
+using Run = std::function<Status()>;
+
+// true once the user has pressed Ctrl-C (SIGINT) or the system asks to stop (SIGTERM): save and return
+// ErrorCode::interrupted. A second one ends the program at once.
+bool interrupt_requested();
+
+// one a file: declares the subcommand's options and, when it is the one given, sets `run`. Options live in a
+// std::shared_ptr that the callback holds.
+void add_bench(CLI::App& app, const Globals& globals, Run& run);
+void add_convert(CLI::App& app, const Globals& globals, Run& run);
+void add_devices(CLI::App& app, const Globals& globals, Run& run);
+void add_doctor(CLI::App& app, const Globals& globals, Run& run);
+void add_edit(CLI::App& app, const Globals& globals, Run& run);
+void add_eval(CLI::App& app, const Globals& globals, Run& run);
+void add_fuse(CLI::App& app, const Globals& globals, Run& run);
+void add_generate(CLI::App& app, const Globals& globals, Run& run);
+void add_inpaint(CLI::App& app, const Globals& globals, Run& run);
+void add_inspect(CLI::App& app, const Globals& globals, Run& run);
+void add_page(CLI::App& app, const Globals& globals, Run& run);
+void add_refine(CLI::App& app, const Globals& globals, Run& run);
+void add_render(CLI::App& app, const Globals& globals, Run& run);
+void add_tile(CLI::App& app, const Globals& globals, Run& run);
+void add_streets(CLI::App& app, const Globals& globals, Run& run);
+void add_verify(CLI::App& app, const Globals& globals, Run& run);
+void add_voxelize(CLI::App& app, const Globals& globals, Run& run);
+
+} // namespace semrover

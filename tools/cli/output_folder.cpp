@@ -1,0 +1,66 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/cli/output_folder.h"
+
+#include "runtime/base/quote.h"
+
+#include <cstdlib>
+
+namespace semrover {
+
+namespace fs = std::filesystem;
+
+Result<OutputFolder> OutputFolder::create(const Path& path, bool replace)
+{
+    OutputFolder f;
+    std::error_code error;
+    f.path_ = fs::absolute(path, error);
+    if (!f.path_.has_filename())
+        f.path_ = f.path_.parent_path(); // "name/"
+    if (fs::exists(f.path_, error) && !fs::is_directory(f.path_, error))
+        return fail(ErrorCode::bad_input, "{} is a file; a folder is needed", quote_path(path));
+    if (fs::exists(f.path_, error) && !replace)
+        return fail(ErrorCode::usage, "{} exists; -y replaces what is written there", quote_path(path));
+    std::string name = (f.path_.parent_path() / ".semrover-").string() + std::string(6, 'X'); // as mkdtemp wants it
+    if (!mkdtemp(name.data()))
+        return fail(ErrorCode::bad_input, "cannot create a folder in {}: {}", quote_path(f.path_.parent_path()),
+                    std::error_code(errno, std::generic_category()).message());
+    f.temporary_ = name;
+    fs::permissions(f.temporary_, fs::perms(0755), error);
+    return f;
+}
+
+OutputFolder::OutputFolder(OutputFolder&& other) noexcept
+    : path_(std::move(other.path_)), temporary_(std::exchange(other.temporary_, {}))
+{
+}
+
+OutputFolder::~OutputFolder()
+{
+    std::error_code error;
+    if (!temporary_.empty())
+        fs::remove_all(temporary_, error);
+}
+
+Status OutputFolder::commit()
+{
+    std::error_code error;
+    if (!fs::exists(path_, error)) {
+        fs::rename(temporary_, path_, error);
+        if (!error)
+            temporary_.clear();
+    } else {
+        for (const auto& entry : fs::directory_iterator(temporary_, error)) {
+            const Path to = path_ / entry.path().filename();
+            fs::remove_all(to, error);
+            fs::rename(entry.path(), to, error);
+            if (error)
+                break;
+        }
+    }
+    if (error)
+        return fail(ErrorCode::bad_input, "cannot write {}: {}", quote_path(path_), error.message());
+    return {};
+}
+
+} // namespace semrover

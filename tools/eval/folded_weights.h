@@ -1,0 +1,55 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/model/weight.h"
+#include "kernels/network.h"
+#include "runtime/base/safetensors.h"
+#include "runtime/device/device.h"
+
+namespace semrover {
+
+// Convolutions with batch norms of a PyTorch state dict, each folded into one convolution in double when they are
+// loaded:  w' = w g / sqrt(v + eps), b' = (b - m) g / sqrt(v + eps) + beta. The file says how many outputs a layer has.
+class FoldedWeights {
+  public:
+    explicit FoldedWeights(SafetensorsSet file) : file_(std::move(file)) {}
+
+    struct Shape {
+        ConvOptions::Taps taps = {1, 1, 0, 0};
+        std::vector<uint32_t> inputs; // channels of each branch that is concatenated, each padded to kRowPadding
+        uint32_t outputs = 0;         // of the usual network: what an error expects when the file has no such layer
+        bool bias = false;            // of the convolution, in front of the norm
+        double eps = 1e-5;            // of the norm
+    };
+    // the layer's number; `convolution` and `norm` are names without .weight
+    uint32_t add(const std::string& convolution, const std::string& norm, const Shape& shape);
+    uint32_t outputs(uint32_t layer) const { return layers_[layer].shape.outputs; }
+    // a tensor that is not used and may be there
+    void allow(const std::string& name);
+
+    uint64_t device_bytes(const DeviceLimits& limits) const { return arena_.planned_bytes(limits); }
+    uint64_t parameters() const;
+    // Errors, bad_input: missing, misshapen and unexpected tensors (of those with `prefix`) in one line; NaN or
+    // infinity; a variance below zero
+    Status load(Device& device, std::string_view prefix = {});
+
+    Tensor weight(Graph& g, uint32_t layer) const; // [outputs, taps * padded inputs] fp32
+    Tensor bias(Graph& g, uint32_t layer) const;   // [1, outputs] fp32
+
+  private:
+    struct Layer {
+        std::string convolution, norm;
+        Shape shape;
+        Weight weight, bias;
+    };
+    Result<std::vector<double>> read(const std::string& name) const;
+    Status upload(Device& device, const Layer& layer) const;
+
+    SafetensorsSet file_;
+    std::vector<Layer> layers_;
+    std::vector<TensorSpec> schema_;
+    Arena arena_;
+};
+
+} // namespace semrover

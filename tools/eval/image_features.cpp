@@ -1,0 +1,112 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/eval/inception.h"
+
+#include "kernels/recognition.h"
+#include "runtime/device/program.h"
+
+#include <cmath>
+#include <cstring>
+
+namespace semrover {
+
+struct ImageFeatures::Impl {
+    Device& device;
+    const Inception& network;
+    ImageSize size;
+    uint32_t batch, pixels = 0, features = 0; // slices
+    uint32_t rows = 0, ld = 0;                // of the result
+    Arena arena;
+    Graph graph;
+    std::unique_ptr<Program> program;
+
+    Impl(Device& d, const Inception& n, ImageSize s, uint32_t b) : device(d), network(n), size(s), batch(b)
+    {
+        Graph sizes; // once without memory, to know how large the ends are
+        build(sizes, {}, {});
+        pixels = arena.add(uint64_t(batch) * words() * 4);
+        features = arena.add(uint64_t(rows) * ld * 4);
+        build(graph, arena.slice(pixels), arena.slice(features));
+    }
+    uint32_t words() const { return rgb_words(size.height, size.width); }
+
+    void build(Graph& g, const BufferSlice& in, const BufferSlice& out)
+    {
+        BufferSlice memory = in;
+        memory.bytes = uint64_t(batch) * words() * 4;
+        const Tensor bytes = g.external(memory, batch, words(), DType::u32, "images", words());
+        const ResizeOptions resize{size.height, size.width, kInceptionSide, kInceptionSide, DType::f32};
+        const FeatureMap y = network.forward(g, resize_bilinear(g, bytes, resize));
+        rows = y.data.rows;
+        ld = y.data.ld;
+        if (out.bytes)
+            g.replace(y.data.resource, g.external(out, y.data.rows, y.data.cols, DType::f32, "features").resource);
+    }
+    // arrays and transients; nothing is allocated yet
+    Result<uint64_t> planned_bytes() const
+    {
+        SR_TRY(const Plan plan, make_plan(graph.desc(), device.limits()));
+        return arena.planned_bytes(device.limits()) + plan.arena_bytes();
+    }
+    Status allocate()
+    {
+        SR_CHECK(arena.allocate(device, "images and features"));
+        Graph g;
+        build(g, arena.slice(pixels), arena.slice(features));
+        SR_TRY(program, Program::create(device, g));
+        return {};
+    }
+};
+
+ImageFeatures::ImageFeatures(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+ImageFeatures::~ImageFeatures() = default;
+
+Result<std::unique_ptr<ImageFeatures>> ImageFeatures::create(Device& device, const Inception& network, ImageSize size,
+                                                             uint32_t batch)
+{
+    SR_ASSERT(batch >= 1 && size.width && size.height, "{} images of {}x{}", batch, size.width, size.height);
+    for (;; batch = (batch + 1) / 2) {
+        auto impl = std::make_unique<Impl>(device, network, size, batch);
+        const auto bytes = impl->planned_bytes();
+        const bool fits = bytes && (!device.budget() || device.allocated_bytes() + *bytes <= device.budget());
+        if (!fits && batch > 1)
+            continue;
+        SR_CHECK(impl->allocate());
+        return std::unique_ptr<ImageFeatures>(new ImageFeatures(std::move(impl)));
+    }
+}
+
+uint32_t ImageFeatures::batch() const
+{
+    return impl_->batch;
+}
+
+Status ImageFeatures::append(std::span<const ImageRgb8> images, Features& features)
+{
+    Impl& m = *impl_;
+    SR_ASSERT(!images.empty() && images.size() <= m.batch, "{} images for a batch of {}", images.size(), m.batch);
+    std::vector<uint32_t> words(size_t(m.batch) * m.words());
+    for (size_t i = 0; i < m.batch; ++i) { // a batch that is not full repeats its last image
+        const ImageRgb8& image = images[std::min(i, images.size() - 1)];
+        SR_ASSERT(image.width == m.size.width && image.height == m.size.height, "an image of {}x{}", image.width,
+                  image.height);
+        std::memcpy(&words[i * m.words()], image.pixels.data(), image.pixels.size());
+    }
+    SR_CHECK(m.device.write(m.arena.slice(m.pixels), std::as_bytes(std::span(words))));
+    SR_CHECK(m.program->run());
+    std::vector<float> rows(size_t(m.rows) * m.ld);
+    SR_CHECK(m.device.read(m.arena.slice(m.features), std::as_writable_bytes(std::span(rows))));
+    for (size_t i = 0; i < images.size(); ++i) {
+        const std::span<const float> row(&rows[i * (m.rows / m.batch) * m.ld], m.ld);
+        const std::vector<double> values = m.network.unpadded(row);
+        for (const double v : values)
+            if (!std::isfinite(v))
+                return fail(ErrorCode::internal, "a feature of image {} of the batch is {}", i, v);
+        features.values.insert(features.values.end(), values.begin(), values.end());
+        features.cols = uint32_t(values.size());
+        ++features.rows;
+    }
+    return {};
+}
+
+} // namespace semrover

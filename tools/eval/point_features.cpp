@@ -1,0 +1,104 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/eval/pointnet.h"
+
+#include "runtime/device/program.h"
+
+#include <cmath>
+
+namespace semrover {
+
+struct PointFeatures::Impl {
+    Device& device;
+    const Pointnet& network;
+    uint32_t batch, positions, inputs, features; // slices
+    uint32_t input_ld, ld, rows;                 // of what goes in and out
+    Arena arena;
+    std::unique_ptr<Program> program;
+
+    Impl(Device& d, const Pointnet& n, uint32_t b) : device(d), network(n), batch(b)
+    {
+        const PointnetConfig& c = network.config();
+        input_ld = round_up(c.input_width(), kRowPadding);
+        ld = round_up(network.features(), kRowPadding);
+        rows = round_up(batch, kImageRowPadding);
+        positions = arena.add(uint64_t(batch) * c.points * 16);
+        inputs = arena.add(uint64_t(batch) * c.points * input_ld * 4);
+        features = arena.add(uint64_t(rows) * ld * 4);
+    }
+    Graph graph() const
+    {
+        const PointnetConfig& c = network.config();
+        Graph g;
+        const Tensor xyz = g.external(arena.slice(positions), batch * c.points, 4, DType::f32, "points", 4);
+        const Tensor x = g.external(arena.slice(inputs), batch * c.points, c.input_width(), DType::f32, "inputs");
+        const Tensor y = network.forward(g, xyz, x, batch);
+        SR_ASSERT(y.rows == rows && y.ld == ld, "features [{}, {}]", y.rows, y.ld);
+        g.replace(y.resource, g.external(arena.slice(features), y.rows, y.cols, DType::f32, "features").resource);
+        return g;
+    }
+    Result<uint64_t> planned_bytes() const
+    {
+        SR_TRY(const Plan plan, make_plan(graph().desc(), device.limits()));
+        return arena.planned_bytes(device.limits()) + plan.arena_bytes();
+    }
+    Status allocate()
+    {
+        SR_CHECK(arena.allocate(device, "points and features"));
+        SR_TRY(program, Program::create(device, graph()));
+        return {};
+    }
+};
+
+PointFeatures::PointFeatures(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+PointFeatures::~PointFeatures() = default;
+
+Result<std::unique_ptr<PointFeatures>> PointFeatures::create(Device& device, const Pointnet& network, uint32_t batch)
+{
+    for (;; batch = (batch + 1) / 2) {
+        auto impl = std::make_unique<Impl>(device, network, batch);
+        const auto bytes = impl->planned_bytes();
+        const bool fits = bytes && (!device.budget() || device.allocated_bytes() + *bytes <= device.budget());
+        if (!fits && batch > 1)
+            continue;
+        SR_CHECK(impl->allocate());
+        return std::unique_ptr<PointFeatures>(new PointFeatures(std::move(impl)));
+    }
+}
+
+uint32_t PointFeatures::batch() const
+{
+    return impl_->batch;
+}
+
+Status PointFeatures::append(const PointChunks& chunks, uint32_t first, uint32_t count, Features& features)
+{
+    Impl& m = *impl_;
+    const uint32_t points = m.network.config().points, width = m.network.config().input_width();
+    SR_ASSERT(count >= 1 && count <= m.batch && first + count <= chunks.count && chunks.points == points &&
+                  chunks.width == width,
+              "chunks {} to {} of {} for a batch of {}", first, first + count, chunks.count, m.batch);
+    std::vector<float> positions(size_t(m.batch) * points * 4), inputs(size_t(m.batch) * points * m.input_ld);
+    for (size_t i = 0; i < size_t(m.batch) * points; ++i) { // a batch that is not full repeats its last chunk
+        const size_t from = (first + std::min<size_t>(i / points, count - 1)) * points + i % points;
+        std::copy_n(&chunks.positions[from * 4], 4, &positions[i * 4]);
+        std::copy_n(&chunks.inputs[from * width], width, &inputs[i * m.input_ld]);
+    }
+    SR_CHECK(m.device.write(m.arena.slice(m.positions), std::as_bytes(std::span(positions))));
+    SR_CHECK(m.device.write(m.arena.slice(m.inputs), std::as_bytes(std::span(inputs))));
+    SR_CHECK(m.program->run());
+    std::vector<float> rows(size_t(m.rows) * m.ld);
+    SR_CHECK(m.device.read(m.arena.slice(m.features), std::as_writable_bytes(std::span(rows))));
+    features.cols = m.network.features();
+    for (uint32_t i = 0; i < count; ++i) {
+        const float* row = &rows[size_t(i) * m.ld];
+        for (uint32_t n = 0; n < features.cols; ++n)
+            if (!std::isfinite(row[n]))
+                return fail(ErrorCode::internal, "a feature of chunk {} is {}", first + i, row[n]);
+        features.values.insert(features.values.end(), row, row + features.cols);
+        ++features.rows;
+    }
+    return {};
+}
+
+} // namespace semrover

@@ -1,0 +1,172 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// semrover eval chamfer MESH [GRID]: how far a grid's points and the mesh are from each other
+#include "engine/mesh/chamfer.h"
+#include "engine/mesh/mesh_files.h"
+#include "engine/mesh/voxelizer.h"
+#include "runtime/base/json.h"
+#include "runtime/base/quote.h"
+#include "tools/cli/open_device.h"
+#include "tools/cli/progress.h"
+#include "tools/measure/eval.h"
+
+#include <charconv>
+#include <CLI/CLI.hpp>
+
+namespace semrover {
+
+namespace {
+
+struct EvalChamferArguments {
+    std::string mesh, grid, sweep, csv, up;
+    VoxelizeOptions voxelize;
+    ChamferOptions chamfer;
+    double scale = 1;
+};
+
+struct Measure {
+    int points; // of a cell
+    size_t cells;
+    Chamfer chamfer;
+};
+
+constexpr int kPaperPoints = 20;
+
+// "2..64": doubled from 2 on, and the paper's 20; "2..64:2": every second one
+Result<std::vector<int>> points_of_sweep(const std::string& text)
+{
+    int low = 0, high = 0, step = 0;
+    const char *at = text.data(), *end = at + text.size();
+    const auto number = [&](int& value) {
+        const auto [next, error] = std::from_chars(at, end, value);
+        at = next;
+        return error == std::errc();
+    };
+    bool good = number(low) && end - at > 2 && at[0] == '.' && at[1] == '.';
+    if (good) {
+        at += 2;
+        good = number(high) && (at == end || (*at++ == ':' && number(step) && step > 0 && at == end));
+    }
+    if (!good || low < 1 || high < low || high > 4096)
+        return fail(ErrorCode::usage, "--sweep: expected FIRST..LAST or FIRST..LAST:STEP within 1 to 4096, found {}",
+                    quote(text, 40));
+    std::vector<int> list;
+    for (int n = low; n <= high; n = step ? n + step : 2 * n)
+        list.push_back(n);
+    if (!step && low < kPaperPoints && kPaperPoints < high)
+        list.push_back(kPaperPoints);
+    std::ranges::sort(list);
+    list.erase(std::unique(list.begin(), list.end()), list.end());
+    return list;
+}
+
+Result<Mesh> load_surface(const EvalChamferArguments& o)
+{
+    const UpAxis up = o.up == "y" ? UpAxis::y : o.up == "z" ? UpAxis::z : UpAxis::file;
+    SR_TRY(const Mesh mesh, read_mesh(o.mesh, up));
+    Mesh surface; // colours and labels do not matter here
+    surface.positions = mesh.positions;
+    surface.faces = mesh.faces;
+    for (auto& p : surface.positions)
+        for (float& x : p)
+            x = float(x * o.scale);
+    return surface;
+}
+
+Result<std::vector<Measure>> measure_all(const EvalChamferArguments& o, const Globals& globals, Device& device)
+{
+    std::vector<Measure> measures;
+    SR_TRY(const Mesh mesh, load_surface(o));
+    if (!o.grid.empty()) {
+        SR_TRY(const VoxelGrid grid, read_grid(o.grid));
+        SR_TRY(const Chamfer c, chamfer(device, mesh, grid, o.chamfer));
+        measures.push_back({grid.points_per_voxel, grid.cells.size(), c});
+        return measures;
+    }
+    std::vector<int> list = {o.voxelize.points_per_voxel};
+    if (!o.sweep.empty()) {
+        SR_TRY(list, points_of_sweep(o.sweep));
+    }
+    Progress progress(progress_to_stderr(globals), "chamfer", "grids", list.size());
+    for (const int n : list) {
+        if (interrupt_requested())
+            return fail(ErrorCode::interrupted, "interrupted after {} of {} grids", measures.size(), list.size());
+        VoxelizeOptions options = o.voxelize;
+        options.points_per_voxel = n;
+        options.default_label = 0;
+        SR_TRY(const VoxelizedMesh v, voxelize(device, mesh, options));
+        SR_TRY(const Chamfer c, chamfer(device, mesh, v.grid, o.chamfer));
+        measures.push_back({n, v.grid.cells.size(), c});
+        progress.update(measures.size(), device.allocated_bytes());
+    }
+    progress.finish();
+    return measures;
+}
+
+void report(const EvalChamferArguments& o, const Globals& globals, const std::vector<Measure>& measures)
+{
+    if (globals.json) {
+        Json list = Json::array();
+        for (const Measure& m : measures)
+            list.push_back({{"points", m.points},
+                            {"cells", m.cells},
+                            {"chamfer", m.chamfer.mean()},
+                            {"points_to_surface", m.chamfer.to_surface},
+                            {"surface_to_points", m.chamfer.to_points}});
+        fmt::print("{}\n", Json{{"samples", o.chamfer.samples}, {"grids", list}}.dump());
+        return;
+    }
+    fmt::print("{:>6} {:>9} {:>11} {:>19} {:>19}\n", "points", "cells", "chamfer (m)", "points to surface",
+               "surface to points");
+    for (const Measure& m : measures)
+        fmt::print("{:>6} {:>9} {:>11.5f} {:>19.6f} {:>19.5f}\n", m.points, m.cells, m.chamfer.mean(),
+                   m.chamfer.to_surface, m.chamfer.to_points);
+}
+
+Status write_csv(const std::string& path, const std::vector<Measure>& measures)
+{
+    std::string text = "points,cells,chamfer_m,points_to_surface_m,surface_to_points_m\n";
+    for (const Measure& m : measures)
+        text += fmt::format("{},{},{:.7g},{:.7g},{:.7g}\n", m.points, m.cells, m.chamfer.mean(), m.chamfer.to_surface,
+                            m.chamfer.to_points);
+    return write_file_atomically(path, text);
+}
+
+Status eval_chamfer(const EvalChamferArguments& o, const Globals& globals)
+{
+    if (!o.grid.empty() && !o.sweep.empty())
+        return fail(ErrorCode::usage, "--sweep makes its own grids; give either a GRID or --sweep");
+    if (!o.csv.empty() && std::filesystem::exists(o.csv) && !globals.yes)
+        return fail(ErrorCode::usage, "{} exists; -y replaces it", quote_path(o.csv));
+    if (!o.sweep.empty()) {
+        SR_CHECK(points_of_sweep(o.sweep));
+    }
+    SR_TRY(const auto device, open_device(globals));
+    SR_TRY(const std::vector<Measure> measures, measure_all(o, globals, *device));
+    if (!o.csv.empty())
+        SR_CHECK(write_csv(o.csv, measures));
+    report(o, globals, measures);
+    return {};
+}
+
+} // namespace
+
+void add_eval_chamfer(CLI::App& eval, const Globals& globals, Run& run)
+{
+    auto o = std::make_shared<EvalChamferArguments>();
+    CLI::App* c = eval.add_subcommand("chamfer", "how far a grid's points and a mesh are from each other, in metres");
+    c->add_option("MESH", o->mesh, ".obj, .ply, .glb or .gltf")->required();
+    c->add_option("GRID", o->grid, ".sgrid; without one the mesh is voxelized");
+    c->add_option("--sweep", o->sweep, "grids of FIRST..LAST points a cell, doubled each time (and 20), or ..:STEP");
+    c->add_option("--points", o->voxelize.points_per_voxel, "of a cell (20)")->check(CLI::Range(1, 4096));
+    c->add_option("--voxel-size", o->voxelize.voxel_size, "metres (0.6)")->check(CLI::Range(0.001, 1000.0));
+    c->add_option("--samples", o->chamfer.samples, "of the surface (200000)")->check(CLI::Range(1, 1 << 26));
+    c->add_option_function<uint64_t>(
+        "--seed", [o](uint64_t seed) { o->voxelize.seed = o->chamfer.seed = seed; }, "of points and samples (0)");
+    c->add_option("--up", o->up, "axis of the file that points up")->check(CLI::IsMember({"y", "z"}));
+    c->add_option("--scale", o->scale, "metres in a unit of the file (1)")->check(CLI::Range(1e-6, 1e6));
+    c->add_option("--csv", o->csv, "also write the table there");
+    c->callback([o, &globals, &run] { run = [o, &globals] { return eval_chamfer(*o, globals); }; });
+}
+
+} // namespace semrover

@@ -1,0 +1,292 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/measure/eval_sets.h"
+
+#include "engine/scene/grid.h"
+#include "runtime/base/hash.h"
+#include "runtime/base/quote.h"
+#include "runtime/base/safetensors.h"
+#include "tools/cli/open_device.h"
+#include "tools/cli/progress.h"
+#include "tools/eval/inception.h"
+#include "tools/eval/pointnet.h"
+#include "tools/eval/sample_files.h"
+
+#include <CLI/CLI.hpp>
+
+namespace semrover {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr uint32_t kImageBatch = 8, kChunkBatch = 4;
+constexpr const char* kNames[] = {"A", "B"};
+
+bool is_feature_file(const Path& path)
+{
+    return path.extension() == ".safetensors";
+}
+
+Result<EvalNetwork> network_kind(const Path& path)
+{
+    SR_TRY(const SafetensorsSet file, SafetensorsSet::open(path));
+    if (file.find("Conv2d_1a_3x3.conv.weight"))
+        return EvalNetwork::images;
+    if (file.find("sa1.mlp_convs.0.weight"))
+        return EvalNetwork::points;
+    return fail(ErrorCode::bad_input,
+                "{}: neither Inception v3 (Conv2d_1a_3x3.conv.weight) nor PointNet++ (sa1.mlp_convs.0.weight)",
+                quote_path(path));
+}
+
+Status too_few(const std::string& set, uint64_t found, std::string_view what)
+{
+    return fail(ErrorCode::bad_input, "{}: {} {}, a comparison needs two or more", quote_path(set), found, what);
+}
+
+Status interrupted()
+{
+    return fail(ErrorCode::interrupted, "interrupted; nothing was written");
+}
+
+// ---- images
+
+Result<ImageRgb8> read_image_of_size(const Path& path, const Path& first, ImageSize size)
+{
+    SR_TRY(ImageRgb8 image, read_image(path));
+    if (size.width && (image.width != size.width || image.height != size.height))
+        return fail(ErrorCode::bad_input, "{} has {}x{} pixels, {} has {}x{}: images of a set have one size",
+                    quote_path(path), image.width, image.height, quote_path(first), size.width, size.height);
+    return image;
+}
+
+Status image_features(const EvalOptions& o, size_t side, Device& device, const Inception& network,
+                      const Globals& globals, EvalSet& set)
+{
+    SR_TRY(const std::vector<Path> files, list_images(o.sets[side]));
+    if (files.size() < 2)
+        return too_few(o.sets[side], files.size(), "image");
+    std::unique_ptr<ImageFeatures> extractor;
+    ImageSize size;
+    Features& features = set.features.emplace();
+    Progress progress(progress_to_stderr(globals), fmt::format("features of {}", kNames[side]), "images", files.size());
+    for (size_t first = 0; first < files.size();) {
+        std::vector<ImageRgb8> images;
+        const size_t wanted = extractor ? extractor->batch() : 1;
+        for (size_t i = first; i < std::min(first + wanted, files.size()); ++i) {
+            SR_TRY(ImageRgb8 image, read_image_of_size(files[i], files[0], size));
+            images.push_back(std::move(image));
+        }
+        if (!extractor) { // the first image tells the size; it is read again with its batch
+            size = {images[0].width, images[0].height};
+            const uint32_t batch = std::min<uint32_t>(o.batch ? o.batch : kImageBatch, uint32_t(files.size()));
+            SR_TRY(extractor, ImageFeatures::create(device, network, size, batch));
+            continue;
+        }
+        SR_CHECK(extractor->append(images, features));
+        first += images.size();
+        progress.update(first, device.allocated_bytes());
+        if (interrupt_requested())
+            return interrupted();
+    }
+    progress.finish();
+    set.description = {{"path", o.sets[side]},
+                       {"kind", "images"},
+                       {"samples", files.size()},
+                       {"width", size.width},
+                       {"height", size.height}};
+    return {};
+}
+
+// ---- grids
+
+Status chunk_features(const EvalOptions& o, size_t side, Device& device, const Pointnet& network,
+                      const Globals& globals, EvalSet& set)
+{
+    SR_TRY(const std::vector<Path> files, list_grids(o.sets[side]));
+    SR_TRY(const auto extractor, PointFeatures::create(device, network, o.batch ? o.batch : kChunkBatch));
+    Features& features = set.features.emplace();
+    features.cols = network.features();
+    uint32_t left_out = 0;
+    std::optional<Progress> progress; // of a single grid, in chunks
+    for (size_t i = 0; i < files.size(); ++i) {
+        SR_TRY(const VoxelGrid grid, read_grid(files[i]));
+        if (!grid.has_points())
+            return fail(ErrorCode::bad_input, "{}: a semantic grid without points", quote_path(files[i]));
+        SR_TRY(const PointChunks chunks, cut_chunks(points_of(grid), network.config(), o.seed));
+        left_out += chunks.left_out;
+        const bool single = files.size() == 1;
+        if (!progress)
+            progress.emplace(progress_to_stderr(globals), fmt::format("features of {}", kNames[side]),
+                             single ? "chunks" : "grids", single ? chunks.count : files.size());
+        for (uint32_t first = 0; first < chunks.count; first += extractor->batch()) {
+            SR_CHECK(extractor->append(chunks, first, std::min(extractor->batch(), chunks.count - first), features));
+            progress->update(single ? features.rows : i, device.allocated_bytes());
+            if (interrupt_requested())
+                return interrupted();
+        }
+        progress->update(single ? features.rows : i + 1, device.allocated_bytes());
+    }
+    progress->finish();
+    if (features.rows < 2)
+        return too_few(
+            o.sets[side], features.rows,
+            fmt::format("chunk with {} points or more ({} with fewer)", network.config().min_points, left_out));
+    set.description = {{"path", o.sets[side]},
+                       {"kind", "chunks"},
+                       {"samples", features.rows},
+                       {"grids", files.size()},
+                       {"left_out", left_out}};
+    return {};
+}
+
+// ---- both
+
+Status read_feature_file(const std::string& path, EvalSet& set)
+{
+    SR_TRY(const FeatureFile kind, feature_file_kind(path));
+    if (kind == FeatureFile::gaussian) {
+        SR_TRY(set.moments, read_gaussian(path));
+        set.description = {{"path", path}, {"kind", "moments"}};
+        return {};
+    }
+    SR_TRY(set.features, read_features(path));
+    if (set.features->rows < 2)
+        return too_few(path, set.features->rows, "sample");
+    set.description = {{"path", path}, {"kind", "features"}, {"samples", set.features->rows}};
+    return {};
+}
+
+Path saved_path(const EvalOptions& o, size_t side)
+{
+    return Path(o.save) / (side ? "b.safetensors" : "a.safetensors");
+}
+
+Status check_outputs(const EvalOptions& o, const Globals& globals)
+{
+    std::error_code error;
+    for (size_t side = 0; side < 2 && !o.save.empty(); ++side)
+        if (fs::exists(saved_path(o, side), error) && !globals.yes)
+            return fail(ErrorCode::usage, "{} exists; -y replaces it", quote_path(saved_path(o, side)));
+    return {};
+}
+
+Status save(const EvalOptions& o, size_t side, const EvalSet& set)
+{
+    SR_CHECK(make_folder(o.save));
+    return write_features(saved_path(o, side), *set.features);
+}
+
+Status compute_features(const EvalOptions& o, std::optional<EvalNetwork> only, const Globals& globals, EvalSets& y)
+{
+    SR_TRY(const EvalNetwork kind, network_kind(o.network));
+    if (only && kind != *only)
+        return fail(ErrorCode::bad_input, "{}: {} is needed here, this is {}", quote_path(o.network),
+                    *only == EvalNetwork::images ? "an Inception v3 network" : "a PointNet++",
+                    kind == EvalNetwork::images ? "an Inception v3 network" : "a PointNet++");
+    SR_TRY(const uint64_t hash, hash_file(o.network));
+    SR_TRY(const auto device, open_device(globals));
+    std::unique_ptr<Inception> inception;
+    std::unique_ptr<Pointnet> pointnet;
+    std::vector<std::string> warnings;
+    if (kind == EvalNetwork::images) {
+        SR_TRY(inception, Inception::load(*device, o.network));
+    } else {
+        SR_TRY(pointnet, Pointnet::load(*device, o.network, warnings));
+    }
+    for (const std::string& warning : warnings)
+        fmt::print(stderr, "semrover: warning: {}\n", warning);
+    for (size_t side = 0; side < 2; ++side) {
+        if (is_feature_file(o.sets[side]))
+            continue;
+        SR_CHECK(inception ? image_features(o, side, *device, *inception, globals, y.set[side])
+                           : chunk_features(o, side, *device, *pointnet, globals, y.set[side]));
+        y.set[side].features->network = hash_text(hash);
+    }
+    for (size_t side = 0; side < 2 && !o.save.empty(); ++side)
+        if (!is_feature_file(o.sets[side]))
+            SR_CHECK(save(o, side, y.set[side]));
+    y.report["network"] = {
+        {"path", o.network}, {"kind", inception ? "inception_v3" : "pointnet2"}, {"hash", hash_text(hash)}};
+    y.report["device"] = device->name();
+    y.report["peak_bytes"] = device->peak_bytes();
+    return {};
+}
+
+uint32_t width_of(const EvalSet& set)
+{
+    return set.features ? set.features->cols : set.moments->size;
+}
+
+} // namespace
+
+void add_eval_options(CLI::App& command, EvalOptions& o)
+{
+    command.add_option("A", o.sets[0], "images, grids, or a .safetensors file of features or moments")->required();
+    command.add_option("B", o.sets[1], "the set to compare with, of the same kind")->required();
+    command.add_option("--features", o.network, "the network: safetensors (docs/eval.md has the layouts)");
+    command.add_option("--save-features", o.save, "a folder to write a.safetensors and b.safetensors to");
+    command.add_option("--batch", o.batch, "images or chunks at a time (default: 8 images, 4 chunks)")
+        ->check(CLI::Range(1u, 1024u));
+    command.add_option("--seed", o.seed, "of what is drawn at random")->capture_default_str();
+}
+
+Result<EvalSets> load_eval_sets(const EvalOptions& o, std::optional<EvalNetwork> only, const Globals& globals)
+{
+    SR_CHECK(check_outputs(o, globals));
+    EvalSets y;
+    bool compute = false;
+    for (size_t side = 0; side < 2; ++side) {
+        const std::string& path = o.sets[side];
+        std::error_code error;
+        if (!fs::exists(path, error))
+            return fail(ErrorCode::bad_input, "{}: no such file or folder", quote_path(path));
+        if (is_feature_file(path))
+            SR_CHECK(read_feature_file(path, y.set[side]));
+        else
+            compute = true;
+        if (!is_feature_file(path) && o.network.empty())
+            return fail(ErrorCode::usage, "{} has no features yet: --features NETWORK.safetensors is needed",
+                        quote_path(path));
+    }
+    if (compute)
+        SR_CHECK(compute_features(o, only, globals, y));
+    const uint32_t a = width_of(y.set[0]), b = width_of(y.set[1]);
+    if (a != b)
+        return fail(ErrorCode::bad_input, "{} has {} features a sample, {} has {}: of different networks",
+                    quote_path(o.sets[0]), a, quote_path(o.sets[1]), b);
+    if (y.set[0].features && y.set[1].features) {
+        const std::string &first = y.set[0].features->network, &second = y.set[1].features->network;
+        if (!first.empty() && !second.empty() && first != second)
+            return fail(ErrorCode::bad_input, "features of different networks: {} of {}, {} of {}",
+                        quote_path(o.sets[0]), quote(first), quote_path(o.sets[1]), quote(second));
+    }
+    y.report["a"] = y.set[0].description;
+    y.report["b"] = y.set[1].description;
+    y.report["features"] = a;
+    return y;
+}
+
+Status require_features(const EvalSets& sets, std::string_view metric)
+{
+    for (const EvalSet& set : sets.set)
+        if (!set.features)
+            return fail(ErrorCode::bad_input, "{}: moments are not enough for {}, which needs features",
+                        quote_path(set.description["path"].get<std::string>()), metric);
+    return {};
+}
+
+std::string sets_text(const EvalSets& sets)
+{
+    std::string text;
+    for (const EvalSet& set : sets.set)
+        text += set.features
+                    ? fmt::format("{} {}, ", set.features->rows,
+                                  set.description["kind"] == "features" ? "samples"
+                                                                        : set.description["kind"].get<std::string>())
+                    : "moments, ";
+    return text + fmt::format("{} features", sets.report["features"].get<uint32_t>());
+}
+
+} // namespace semrover

@@ -1,0 +1,10 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// semrover-eval: what measures and verifies
+#include "tools/cli/program.h"
+
+int main(int argc, char** argv)
+{
+    using namespace semrover;
+    return run_program(argc, argv, {add_bench, add_devices, add_eval, add_verify});
+}

@@ -1,0 +1,157 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// semrover streets -o DIR: makes up a street: a textured, labelled mesh, its grids, a drive, and with --images pictures
+#include "engine/mesh/mesh_files.h"
+#include "engine/scene/palette.h"
+#include "runtime/base/json.h"
+#include "tools/cli/commands.h"
+#include "tools/cli/open_device.h"
+#include "tools/cli/output_folder.h"
+#include "tools/scenes/street_images.h"
+#include "tools/streets/camera_drive.h"
+#include "tools/streets/seen_cells.h"
+#include "tools/streets/street_grid.h"
+
+#include <CLI/CLI.hpp>
+
+namespace semrover {
+
+namespace {
+
+struct StreetsArguments {
+    std::string output;
+    StreetOptions street;
+    DriveShape drive;
+    double fov = 73, shift = 1.5;
+    StreetImages images;
+    VoxelizeOptions voxels;
+    SeenOptions sight;
+    bool pictures = false, no_grids = false, seen = false;
+};
+
+Json street_json(const StreetsArguments& o, const Street& street, const CameraPath& path)
+{
+    const CrossSection& c = street.road.section();
+    Json classes = Json::object();
+    const std::vector<ClassShare> shares = class_shares(street.mesh);
+    for (size_t i = 0; i < shares.size(); ++i)
+        classes[std::string(kPalette[i].name)] = {{"faces", shares[i].faces}, {"square_metres", shares[i].area}};
+    return {{"seed", o.street.seed},
+            {"length", o.street.length},
+            {"faces", street.mesh.faces.size()},
+            {"materials", street.mesh.materials.size()},
+            {"textures", street.mesh.textures.size()},
+            {"objects", street.objects},
+            {"classes", classes},
+            {"section",
+             {{"lane", c.lane},
+              {"cycle_lane", c.cycle},
+              {"parking", c.parking},
+              {"sidewalk", c.sidewalk},
+              {"kerb_height", c.kerb_height},
+              {"rails", c.rails}}},
+            {"frames", path.frames.size()},
+            {"shift", o.shift}};
+}
+
+Status write_grids(const StreetsArguments& o, Device& device, const Street& street, std::span<const CameraPath> drives,
+                   const OutputFolder& out)
+{
+    VoxelizeOptions voxels = o.voxels;
+    voxels.seed = o.street.seed;
+    SR_TRY(StreetGrids grids, street_grids(device, street, voxels));
+    if (o.seen) {
+        SR_TRY(const std::vector<uint32_t> seen, seen_cells(device, street.mesh, grids.truth, drives, o.sight));
+        grids = part_of(grids, seen);
+    }
+    for (VoxelGrid* grid : {&grids.truth, &grids.semantic}) {
+        grid->metadata["name"] = fmt::format("street {}", o.street.seed);
+        grid->metadata["seed"] = std::to_string(o.street.seed);
+    }
+    SR_CHECK(write_grid(out / "truth.sgrid", grids.truth));
+    return write_grid(out / "semantic.sgrid", grids.semantic);
+}
+
+Status draw(const StreetsArguments& o, const Globals& globals, Device& device, const Street& street,
+            const CameraPath& path, const CameraPath& shifted, const OutputFolder& out)
+{
+    if (!o.no_grids)
+        SR_CHECK(write_grids(o, device, street, std::array{path, shifted}, out));
+    if (!o.pictures)
+        return {};
+    SR_CHECK(draw_street(device, street, path, o.street.seed, o.images, out.path(), globals));
+    if (o.shift != 0)
+        SR_CHECK(draw_street(device, street, shifted, o.street.seed, o.images, out / "shifted", globals));
+    return {};
+}
+
+Status streets(const StreetsArguments& o, const Globals& globals)
+{
+    SR_TRY(OutputFolder out, OutputFolder::create(o.output, globals.yes));
+    const Street street = make_street(o.street);
+    const Intrinsics lens = pinhole_from_fov(o.fov, o.images.width, o.images.height);
+    const CameraPath path = drive_along(street.road, o.drive, lens);
+    DriveShape beside = o.drive;
+    beside.offset += o.shift;
+    const CameraPath shifted = drive_along(street.road, beside, lens);
+    SR_CHECK(write_glb(out / "mesh.glb", street.mesh));
+    SR_CHECK(write_tum(out / "drive.tum", path));
+    SR_CHECK(write_transforms(out / "transforms.json", path));
+    std::error_code error;
+    std::filesystem::create_directory(out / "shifted", error);
+    SR_CHECK(write_transforms(out / "shifted/transforms.json", shifted));
+    const Json about = street_json(o, street, path);
+    SR_CHECK(write_file_atomically(out / "street.json", about.dump(2) + "\n"));
+    if (o.pictures || !o.no_grids) {
+        SR_TRY(const auto device, open_device(globals));
+        SR_CHECK(draw(o, globals, *device, street, path, shifted, out));
+    }
+    SR_CHECK(out.commit());
+    if (globals.json)
+        fmt::print("{}\n", about.dump());
+    else if (!globals.quiet)
+        fmt::print("{} m of street, {} faces, {} frames\n", o.street.length, street.mesh.faces.size(),
+                   path.frames.size());
+    return {};
+}
+
+} // namespace
+
+void add_streets(CLI::App& app, const Globals& globals, Run& run)
+{
+    auto o = std::make_shared<StreetsArguments>();
+    CLI::App* c = app.add_subcommand("streets", "make up a street: mesh, grids, a drive, and pictures to train with");
+    c->add_option("-o,--output", o->output, "folder")->required();
+    c->add_option("--seed", o->street.seed, "another seed, another street");
+    c->add_option("--length", o->street.length, "metres")->check(CLI::Range(30.0, 20000.0));
+    c->add_option("--spacing", o->drive.spacing, "metres between the frames of the drive")
+        ->check(CLI::Range(0.01, 1000.0));
+    c->add_option("--first", o->drive.first, "metres along the street where the drive begins");
+    c->add_option("--end-margin", o->drive.end_margin, "metres before the end where it stops")
+        ->check(CLI::Range(0.0, 20000.0));
+    c->add_option("--camera-height", o->drive.height, "of the camera, metres")->check(CLI::Range(0.2, 50.0));
+    c->add_option("--yaw", o->drive.yaw, "radians to the left of the street");
+    c->add_option("--shift", o->shift, "metres to the left of the second, novel drive");
+    c->add_flag("--no-grids", o->no_grids, "without truth.sgrid and semantic.sgrid");
+    c->add_flag("--seen", o->seen, "of the grids only what the drives see, as a recording would");
+    c->add_option("--reach", o->sight.reach, "metres that --seen looks")->check(CLI::Range(1.0, 1000.0));
+    c->add_option("--voxel-size", o->voxels.voxel_size, "metres")->check(CLI::Range(0.05f, 10.f));
+    c->add_option("--points", o->voxels.points_per_voxel, "points of a cell")->check(CLI::Range(1, 4096));
+    c->add_flag("--images", o->pictures, "also pictures of both drives: {color,depth,normal,label,visible}/000000.png");
+    c->add_option("--samples", o->images.samples, "rays a pixel")->check(CLI::Range(1u, 256u));
+    c->add_option("--ambient-rays", o->images.ambient_rays, "rays for the light from around, a sample")
+        ->check(CLI::Range(1u, 64u));
+    c->add_option(
+         "--sun-azimuth", o->images.sun_azimuth,
+         "where the sun stands, degrees to the left of the street's direction; the sky is the seed's otherwise")
+        ->check(CLI::Range(-360.0, 360.0));
+    c->add_option("--sun-elevation", o->images.sun_elevation, "degrees above the horizon")
+        ->check(CLI::Range(1.0, 90.0));
+    c->add_option("--clouds", o->images.cloud_cover, "share of the sky that they cover")->check(CLI::Range(0.0, 1.0));
+    c->add_option("-W,--width", o->images.width, "pixels")->check(CLI::Range(1u, 4096u));
+    c->add_option("-H,--height", o->images.height, "pixels")->check(CLI::Range(1u, 4096u));
+    c->add_option("--fov-x", o->fov, "horizontal field of view in degrees")->check(CLI::Range(1.0, 170.0));
+    c->callback([o, &globals, &run] { run = [o, &globals] { return streets(*o, globals); }; });
+}
+
+} // namespace semrover

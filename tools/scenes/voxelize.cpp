@@ -1,0 +1,171 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// semrover voxelize MESH -o OUT.sgrid: a textured mesh as a grid of labelled cells and points
+#include "engine/format/ply.h"
+#include "engine/mesh/mesh_files.h"
+#include "engine/mesh/voxelizer.h"
+#include "engine/scene/palette.h"
+#include "engine/scene/scene_points.h"
+#include "runtime/base/json.h"
+#include "runtime/base/quote.h"
+#include "tools/cli/commands.h"
+#include "tools/cli/open_device.h"
+#include "tools/cli/version.h"
+
+#include <charconv>
+#include <CLI/CLI.hpp>
+
+namespace semrover {
+
+namespace {
+
+struct VoxelizeArguments {
+    std::string mesh, output, labels = "auto", map, default_label, up, ply;
+    VoxelizeOptions voxelize;
+    double scale = 1;
+};
+
+Result<uint8_t> parse_label(const std::string& text)
+{
+    int number = -1;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    if (error == std::errc() && end == text.data() + text.size() && number >= 0 && number < int(kClassCount))
+        return uint8_t(number);
+    if (const auto label = class_of_material(text))
+        return *label;
+    return fail(ErrorCode::usage, "--default-label: {} is no class; their names are road, sidewalk, building, ...",
+                quote(text, 60));
+}
+
+LabelSource source_of(const std::string& name)
+{
+    return name == "material"  ? LabelSource::material
+           : name == "texture" ? LabelSource::texture
+           : name == "face"    ? LabelSource::face
+                               : LabelSource::automatic;
+}
+
+Status check_outputs(const VoxelizeArguments& o, const Globals& globals)
+{
+    for (const std::string& path : {o.output, o.ply})
+        if (!path.empty() && std::filesystem::exists(path) && !globals.yes)
+            return fail(ErrorCode::usage, "{} exists; -y replaces it", quote_path(path));
+    return {};
+}
+
+// what says no label: an error, or a warning where there is a default
+Status label_mesh(Mesh& mesh, const VoxelizeArguments& o, const MeshLabelMap& map, const Globals& globals)
+{
+    const std::vector<UnlabelledFaces> unknown = label_faces(mesh, source_of(o.labels), map);
+    if (unknown.empty())
+        return {};
+    if (o.voxelize.default_label == kNoLabel)
+        return fail(ErrorCode::bad_input,
+                    "{}: no class is known for {}; --map gives classes to names, --default-label "
+                    "to the rest",
+                    quote_path(o.mesh), unlabelled_text(unknown));
+    if (!globals.quiet)
+        fmt::print(stderr, "semrover: warning: labelled {}: {}\n", kPalette[o.voxelize.default_label].name,
+                   unlabelled_text(unknown));
+    return {};
+}
+
+Result<Mesh> load_mesh(const VoxelizeArguments& o, const Globals& globals)
+{
+    MeshLabelMap map;
+    if (!o.map.empty()) {
+        SR_TRY(map, MeshLabelMap::read(o.map));
+    }
+    const UpAxis up = o.up == "y" ? UpAxis::y : o.up == "z" ? UpAxis::z : UpAxis::file;
+    SR_TRY(Mesh mesh, read_mesh(o.mesh, up, map));
+    for (auto& p : mesh.positions)
+        for (float& x : p)
+            x = float(x * o.scale);
+    SR_CHECK(label_mesh(mesh, o, map, globals));
+    return mesh;
+}
+
+Status write_points(const std::string& path, const VoxelGrid& grid)
+{
+    const ScenePoints points = points_of(grid);
+    Surfels s;
+    s.position = points.positions;
+    s.color = points.colors;
+    s.label.assign(points.labels.begin(), points.labels.end());
+    return write_points_ply(path, s);
+}
+
+void report(const VoxelizeArguments& o, const Globals& globals, const VoxelizedMesh& v, const Mesh& mesh)
+{
+    std::array<size_t, kClassCount> counts{};
+    for (const uint8_t label : v.grid.labels)
+        ++counts[label];
+    double area = 0;
+    for (const float a : v.area)
+        area += a;
+    if (globals.json) {
+        Json labels = Json::object();
+        for (size_t i = 0; i < kClassCount; ++i)
+            if (counts[i])
+                labels[std::string(kPalette[i].name)] = counts[i];
+        fmt::print("{}\n", Json{{"cells", v.grid.cells.size()},
+                                {"points", v.grid.cells.size() * size_t(v.grid.points_per_voxel)},
+                                {"faces", mesh.faces.size()},
+                                {"area", area},
+                                {"labels", labels}}
+                               .dump());
+    } else if (!globals.quiet) {
+        fmt::print("{}: {} cells of {} m, {} points each, {:.6g} m^2 of {} faces\n", printable(o.output),
+                   v.grid.cells.size(), v.grid.voxel_size, v.grid.points_per_voxel, area, mesh.faces.size());
+        for (size_t i = 0; i < kClassCount; ++i)
+            if (counts[i])
+                fmt::print("  {:<14}{:>9}\n", kPalette[i].name, counts[i]);
+    }
+}
+
+Status run_voxelize(VoxelizeArguments o, const Globals& globals)
+{
+    SR_CHECK(check_outputs(o, globals));
+    if (!o.default_label.empty()) {
+        SR_TRY(o.voxelize.default_label, parse_label(o.default_label));
+    }
+    SR_TRY(const Mesh mesh, load_mesh(o, globals));
+    SR_TRY(const auto device, open_device(globals));
+    SR_TRY(VoxelizedMesh v, voxelize(*device, mesh, o.voxelize));
+    v.grid.metadata["frame"] = "x forward, y left, z up, metres";
+    v.grid.metadata["source"] = printable(Path(o.mesh).filename().string());
+    v.grid.metadata["seed"] = std::to_string(o.voxelize.seed);
+    v.grid.metadata["tool"] = kProgram;
+    SR_CHECK(write_grid(o.output, v.grid));
+    if (!o.ply.empty())
+        SR_CHECK(write_points(o.ply, v.grid));
+    report(o, globals, v, mesh);
+    return {};
+}
+
+} // namespace
+
+void add_voxelize(CLI::App& app, const Globals& globals, Run& run)
+{
+    auto o = std::make_shared<VoxelizeArguments>();
+    CLI::App* c = app.add_subcommand("voxelize", "a textured mesh as a grid of labelled cells and coloured points");
+    c->add_option("MESH", o->mesh, ".obj, .ply, .glb or .gltf")->required();
+    c->add_option("-o,--output", o->output, ".sgrid")->required();
+    c->add_option("--voxel-size", o->voxelize.voxel_size, "metres (0.6)")->check(CLI::Range(0.001, 1000.0));
+    c->add_option("--points", o->voxelize.points_per_voxel, "of a cell (20)")->check(CLI::Range(1, 4096));
+    c->add_option("--seed", o->voxelize.seed, "of the points (0)");
+    c->add_option("--min-area", o->voxelize.min_area,
+                  "surface of an occupied cell, in squares of the voxel size (0.0001)")
+        ->check(CLI::Range(0.0, 1.0));
+    c->add_option("--up", o->up, "axis of the file that points up (glTF: y, others: z)")
+        ->check(CLI::IsMember({"y", "z"}));
+    c->add_option("--scale", o->scale, "metres in a unit of the file (1)")->check(CLI::Range(1e-6, 1e6));
+    c->add_option("--labels", o->labels, "where labels come from (auto: faces, material names, label textures)")
+        ->check(CLI::IsMember({"auto", "material", "texture", "face"}));
+    c->add_option("--map", o->map, "JSON object: material name, pattern with * or number -> class name or number");
+    c->add_option("--default-label", o->default_label, "class of what has none");
+    c->add_option("--ply", o->ply, "also the points, as PLY");
+    c->callback([o, &globals, &run] { run = [o, &globals] { return run_voxelize(*o, globals); }; });
+}
+
+} // namespace semrover

@@ -1,0 +1,40 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "runtime/base/mix64.h"
+
+#include <cstdint>
+#include <initializer_list>
+
+namespace semrover {
+
+// Counter-based random numbers: the n-th draw of an object depends on the seed, the object's key and n only, so that
+// objects never disturb each other. The mixer is SplitMix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number
+// generators", 2014).
+class KeyedRandom {
+  public:
+    KeyedRandom(uint64_t seed, std::initializer_list<uint64_t> key) : state_(mix64(seed + kMixStep))
+    {
+        for (uint64_t k : key)
+            state_ = mix64(state_ ^ mix64(k + 0x632be59bd9b4e019u));
+    }
+
+    uint32_t bits() { return uint32_t(mix64(state_ + kMixStep * ++count_) >> 32); }
+    double uniform() { return bits() * (1.0 / 4294967296.0); } // [0, 1)
+    double uniform(double low, double high) { return low + (high - low) * uniform(); }
+    uint32_t below(uint32_t n) { return uint32_t((uint64_t(bits()) * n) >> 32); }
+    bool chance(double p) { return uniform() < p; }
+    // about normal: the sum of four uniform numbers, with mean 0 and deviation 1
+    double spread() { return (uniform() + uniform() + uniform() + uniform() - 2) * 1.7320508075688772; }
+    template <typename T, std::size_t N>
+    const T& pick(const T (&values)[N])
+    {
+        return values[below(uint32_t(N))];
+    }
+
+  private:
+    uint64_t state_, count_ = 0;
+};
+
+} // namespace semrover

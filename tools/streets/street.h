@@ -1,0 +1,39 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/format/camera_path.h"
+#include "engine/mesh/mesh.h"
+#include "engine/scene/grid.h"
+#include "tools/streets/road_network.h"
+
+#include <map>
+#include <string>
+
+namespace semrover {
+
+struct StreetOptions {
+    uint64_t seed = 0;
+    double length = 120; // metres, 30..20000
+};
+
+// A street that was made up: the world's origin is where its centre line begins, x along it.
+struct Street {
+    RoadNetwork road;
+    Mesh mesh;                             // every face has a label and a textured material
+    std::vector<float> gloss;              // of each material, 0..1 (engine/trace)
+    std::map<std::string, size_t> objects; // how many of each kind stand in it
+};
+
+// The same seed gives the same street on every run; a longer one begins like a shorter one, as far as 60 m before the
+// shorter one's end. Objects never share random numbers.
+Street make_street(const StreetOptions& options);
+
+// faces and square metres of each class
+struct ClassShare {
+    size_t faces = 0;
+    double area = 0;
+};
+std::vector<ClassShare> class_shares(const Mesh& mesh); // [kClassCount]
+
+} // namespace semrover

@@ -1,0 +1,63 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/streets/street_grid.h"
+
+#include "tools/streets/class_label.h"
+
+namespace semrover {
+
+namespace {
+
+// faces of one class
+Mesh part_of(const Mesh& mesh, uint8_t wanted)
+{
+    Mesh part;
+    for (size_t f = 0; f < mesh.faces.size(); ++f) {
+        if (mesh.face_labels[f] != wanted)
+            continue;
+        const uint32_t first = uint32_t(part.positions.size());
+        for (uint32_t v : mesh.faces[f])
+            part.positions.push_back(mesh.positions[v]);
+        part.faces.push_back({first, first + 1, first + 2});
+        part.face_labels.push_back(wanted);
+    }
+    return part;
+}
+
+} // namespace
+
+Result<StreetGrids> street_grids(Device& device, const Street& street, const VoxelizeOptions& options, float lane_share)
+{
+    SR_TRY(VoxelizedMesh all, voxelize(device, street.mesh, options));
+    StreetGrids grids{std::move(all.grid), {}};
+    const Mesh lanes = part_of(street.mesh, label::kRoadLane);
+    if (!lanes.faces.empty()) {
+        VoxelizeOptions coarse = options;
+        coarse.points_per_voxel = 1;
+        coarse.min_area = lane_share;
+        SR_TRY(const VoxelizedMesh marked, voxelize(device, lanes, coarse));
+        for (const Cell& cell : marked.grid.cells)
+            if (const auto at = find_cell(grids.truth, cell))
+                grids.truth.labels[*at] = label::kRoadLane;
+    }
+    grids.semantic = grids.truth;
+    grids.semantic.points.clear();
+    grids.semantic.colors.clear();
+    grids.semantic.generated.clear();
+    return grids;
+}
+
+StreetGrids part_of(const StreetGrids& grids, std::span<const uint32_t> cells)
+{
+    StreetGrids part;
+    for (const auto& [from, to] : {std::pair(&grids.truth, &part.truth), {&grids.semantic, &part.semantic}}) {
+        to->voxel_size = from->voxel_size;
+        to->points_per_voxel = from->points_per_voxel;
+        to->metadata = from->metadata;
+        for (const uint32_t c : cells)
+            append_cell(*to, *from, c);
+    }
+    return part;
+}
+
+} // namespace semrover

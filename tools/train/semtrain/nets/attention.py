@@ -1,0 +1,23 @@
+# SPDX-FileCopyrightText: semrover authors
+# SPDX-License-Identifier: Apache-2.0
+"""The attention of all networks."""
+import torch
+
+from ..precision import sums_in_fp32
+
+
+def attend(q, k, v, mask=None):
+    """softmax(q k^T / sqrt(d) + mask) v: q [.., N, d], k and v [.., M, d], mask [.., N, M] -> [.., N, d].
+    In fp32 where bf16 products go wrong, even if the caller's autocast says bf16."""
+    dtype = v.dtype
+    if dtype == torch.float32 or sums_in_fp32(v.device):
+        return _attend(q, k, v, mask)
+    with torch.autocast(v.device.type, enabled=False):
+        return _attend(q.float(), k.float(), v.float(), mask).to(dtype)
+
+
+def _attend(q, k, v, mask):
+    scores = (q * q.shape[-1] ** -0.5) @ k.transpose(-1, -2)
+    if mask is not None:
+        scores = scores + mask.to(scores.dtype)
+    return torch.softmax(scores, -1).to(v.dtype) @ v

@@ -1,0 +1,142 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// golden kinds scheduler, repaint_timesteps and region_extraction
+#include "engine/sampling/repaint.h"
+#include "engine/voxfield/regions.h"
+#include "kernels/sampling.h"
+#include "runtime/device/program.h"
+#include "shaders/lib/step_row.h"
+#include "tools/verify/golden_case.h"
+
+namespace semrover {
+
+namespace {
+
+// runs the step kernel on given model outputs; state [elements] as one row
+class StepRunner {
+  public:
+    static Result<std::unique_ptr<StepRunner>> create(Device& device, const Schedule& schedule, uint32_t elements)
+    {
+        auto r = std::unique_ptr<StepRunner>(new StepRunner(device, elements));
+        r->steps_ = r->arena_.add(schedule.steps.size() * sizeof(StepRow));
+        r->clock_ = r->arena_.add(sizeof(StepClock));
+        for (uint32_t* id : {&r->m_, &r->z_, &r->fixed_, &r->x_, &r->x0_})
+            *id = r->arena_.add(r->row_bytes());
+        r->known_ = r->arena_.add(4);
+        SR_CHECK(r->arena_.allocate(device, "golden case"));
+        std::vector<StepRow> rows;
+        for (const StepCoefficients& c : schedule.steps)
+            rows.push_back({float(c.in_scale), float(c.x0_x), float(c.x0_m), float(c.c_x0), float(c.c_x), float(c.c_m),
+                            float(c.c_prev), float(c.c_z), float(c.known_scale), float(c.known_noise), 0, 0, 0, 0, 0,
+                            0});
+        SR_CHECK(device.write(r->arena_.slice(r->steps_), std::as_bytes(std::span(rows))));
+        for (uint32_t id : {r->clock_, r->known_, r->fixed_, r->x0_, r->z_})
+            SR_CHECK(device.clear(r->arena_.slice(id)));
+        SR_TRY(r->program_, r->build(uint32_t(rows.size()), float(schedule.clip)));
+        return r;
+    }
+    Status set_state(std::span<const float> x) { return write(x_, x); }
+    Result<std::vector<float>> step(std::span<const float> m, std::span<const float> z)
+    {
+        SR_CHECK(write(m_, m));
+        if (!z.empty())
+            SR_CHECK(write(z_, z));
+        SR_CHECK(program_->run());
+        std::vector<float> x(round_up(elements_, kRowPadding));
+        SR_CHECK(device_.read(arena_.slice(x_), std::as_writable_bytes(std::span(x))));
+        x.resize(elements_);
+        return x;
+    }
+
+  private:
+    StepRunner(Device& device, uint32_t elements) : device_(device), elements_(elements) {}
+    uint64_t row_bytes() const { return round_up(elements_, kRowPadding) * 4ull; }
+    Status write(uint32_t id, std::span<const float> v) { return device_.write(arena_.slice(id), std::as_bytes(v)); }
+    Result<std::unique_ptr<Program>> build(uint32_t steps, float clip)
+    {
+        Graph g;
+        constexpr uint32_t kWords = sizeof(StepRow) / 4;
+        const auto row = [&](uint32_t id) { return g.external(arena_.slice(id), 1, elements_, DType::f32); };
+        const StepTable table{g.external(arena_.slice(steps_), steps, kWords, DType::u32, "steps", kWords),
+                              g.external(arena_.slice(clock_), 1, 2, DType::u32, "clock", 2)};
+        step_update(g, table, row(m_), row(z_), g.external(arena_.slice(known_), 1, 1, DType::u32, "known", 1),
+                    row(fixed_), row(x_), row(x0_), 1, clip);
+        step_advance(g, table.clock);
+        return Program::create(device_, g);
+    }
+
+    Device& device_;
+    uint32_t elements_;
+    Arena arena_;
+    uint32_t steps_, clock_, m_, z_, fixed_, x_, x0_, known_;
+    std::unique_ptr<Program> program_;
+};
+
+} // namespace
+
+Result<GoldenOutputs> run_scheduler(Device& device, const GoldenCase& c, DType)
+{
+    nlohmann::json json = c.params();
+    json["_class_name"] = json.value("type", "");
+    json.erase("type");
+    json.erase("num_inference_steps");
+    std::vector<std::string> warnings;
+    SR_TRY(const SchedulerConfig config, scheduler_config_from_json(json, warnings));
+    SR_TRY(const double steps, c.number("num_inference_steps"));
+    SR_TRY(const Schedule schedule, make_schedule(config, int(steps)));
+    const auto outputs = c.floats("input.model_outputs"), noise = c.floats("input.noise");
+    std::vector<float> x = c.floats("input.sample");
+    const size_t n = x.size();
+    if (n == 0 || outputs.size() != schedule.steps.size() * n || (!noise.empty() && noise.size() != outputs.size()))
+        return fail(ErrorCode::bad_input, "{}: {} outputs of {} elements for {} steps", c.name(), outputs.size(), n,
+                    schedule.steps.size());
+    SR_TRY(const auto runner, StepRunner::create(device, schedule, uint32_t(n)));
+    SR_CHECK(runner->set_state(x));
+    GoldenOutputs out;
+    auto& states = out.floats["states"];
+    states = x;
+    for (size_t i = 0; i < schedule.steps.size(); ++i) {
+        const std::span<const float> z = noise.empty() ? std::span<const float>() : std::span(noise).subspan(i * n, n);
+        SR_TRY(x, runner->step(std::span(outputs).subspan(i * n, n), z));
+        states.insert(states.end(), x.begin(), x.end());
+        out.floats["timesteps"].push_back(float(schedule.steps[i].timestep));
+    }
+    return out;
+}
+
+Result<GoldenOutputs> run_repaint_timesteps(Device&, const GoldenCase& c, DType)
+{
+    SR_TRY(const double steps, c.number("steps"));
+    SR_TRY(const double length, c.number("jump_length"));
+    SR_TRY(const double samples, c.number("jump_n_sample"));
+    SR_TRY(const double train, c.number("num_train_timesteps"));
+    SR_TRY(const std::vector<int> levels, repaint_levels(int(steps), {int(length), int(samples)}));
+    GoldenOutputs out;
+    for (int level : levels)
+        out.integers["timesteps"].push_back(int64_t(level) * (int64_t(train) / int64_t(steps)));
+    return out;
+}
+
+Result<GoldenOutputs> run_region_extraction(Device&, const GoldenCase& c, DType)
+{
+    RegionOptions options;
+    SR_TRY(const double size, c.number("region_size"));
+    SR_TRY(const double threshold, c.number("coverage_threshold"));
+    SR_TRY(const double seed, c.number("first_seed"));
+    options.region_size = int(size);
+    options.coverage_threshold = int(threshold);
+    options.first_seed = int64_t(seed);
+    options.strategy = c.params().value("strategy", "") == "paper" ? RegionStrategy::paper : RegionStrategy::complete;
+    const auto flat = c.integers("input.cells");
+    std::vector<std::array<int32_t, 3>> cells(flat.size() / 3);
+    for (size_t i = 0; i < flat.size(); ++i)
+        cells[i / 3][i % 3] = int32_t(flat[i]);
+    SR_TRY(const Regions regions, extract_regions(cells, options));
+    GoldenOutputs out;
+    out.integers["offsets"].assign(regions.offsets.begin(), regions.offsets.end());
+    out.integers["members"].assign(regions.members.begin(), regions.members.end());
+    out.integers["uncovered"].assign(regions.uncovered.begin(), regions.uncovered.end());
+    return out;
+}
+
+} // namespace semrover

@@ -1,0 +1,209 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// golden kinds voxfield_transformer and voxfield_sampling
+#include "engine/voxfield/token_sampler.h"
+#include "tools/measure/evaluation_memory.h"
+#include "tools/verify/golden_case.h"
+
+#include <cmath>
+
+namespace semrover {
+
+namespace {
+
+// cell indices from the centres of the cases: (index + 0.5) * voxel_size
+std::vector<CellIndex> cells_of(const std::vector<float>& centers, size_t first, size_t count, float voxel_size)
+{
+    std::vector<CellIndex> cells(count);
+    for (size_t i = 0; i < count; ++i)
+        for (size_t a = 0; a < 3; ++a)
+            cells[i][a] = int32_t(std::lround(centers[(first + i) * 3 + a] / voxel_size - 0.5f));
+    return cells;
+}
+
+struct EvaluationInput {
+    TokenSets sets;
+    std::vector<uint32_t> mask;      // [M, words]
+    std::vector<float> tokens;       // [M, C]
+    std::vector<float> timesteps;    // [T]
+    std::vector<uint32_t> table_row; // [2M]
+};
+
+// The reference compares distances of centres that were rounded to float, up to 30 m from the origin: of two cells 3 m
+// apart some then lie beyond 3 m + 1e-6. Cells of the product are integers (neighbor_mask); here the given centres
+// decide.
+std::vector<uint32_t> mask_of(const TokenSets& sets, const std::vector<float>& centers, float radius)
+{
+    const uint32_t words = divide_up(sets.longest, 32);
+    std::vector<uint32_t> mask(size_t(sets.rows()) * words, 0);
+    for (uint32_t r = 0; r < sets.rows(); ++r)
+        for (uint32_t j = 0; j < sets.sets[2 * r + 1]; ++j) {
+            const uint32_t other = sets.sets[2 * r] + j;
+            double squared = 0;
+            for (uint32_t a = 0; a < 3; ++a) {
+                const double d = double(centers[3 * r + a]) - double(centers[3 * other + a]);
+                squared += d * d;
+            }
+            if (std::sqrt(squared) <= double(radius) + 1e-6)
+                mask[size_t(r) * words + j / 32] |= 1u << j % 32;
+        }
+    return mask;
+}
+
+Result<std::vector<float>> evaluate(Device& device, const Transformer& t, const EvaluationInput& in)
+{
+    const uint32_t m = in.sets.rows(), c = t.config().channels(), d = t.config().dim(),
+                   words = divide_up(in.sets.longest, 32);
+    const uint32_t times = uint32_t(in.timesteps.size()), ld = round_up(c, kRowPadding);
+    std::vector<float> padded(size_t(m) * ld);
+    std::vector<uint16_t> halves(padded.size());
+    for (uint32_t r = 0; r < m; ++r)
+        std::copy_n(&in.tokens[size_t(r) * c], c, &padded[size_t(r) * ld]);
+    std::transform(padded.begin(), padded.end(), halves.begin(), float_to_half);
+    EvaluationMemory memory;
+    const uint32_t labels = memory.add(in.sets.labels), cells = memory.add(in.sets.cells),
+                   sets = memory.add(in.sets.sets);
+    const uint32_t tiles = memory.add(in.sets.tiles), coords = memory.add(in.sets.coords),
+                   rows = memory.add(in.table_row);
+    const uint32_t timesteps = memory.add(in.timesteps);
+    const uint32_t tokens = t.precision() == DType::f16 ? memory.add(halves) : memory.add(padded);
+    const uint32_t pos = memory.add_empty(uint64_t(m) * d * 4), mask = memory.add(in.mask);
+    const uint32_t table = memory.add_empty(uint64_t(times) * round_up(t.modulation_width(), kRowPadding) * 4);
+    const uint32_t out = memory.add_empty(uint64_t(m) * ld * 4);
+    SR_CHECK(memory.upload(device));
+
+    Graph g;
+    TokenContext context;
+    context.labels = g.external(memory.slice(labels), m, 1, DType::u32, "labels", 1);
+    context.cells = g.external(memory.slice(cells), m, 4, DType::i32, "cells", 4);
+    context.sets = g.external(memory.slice(sets), m, 2, DType::u32, "sets", 2);
+    context.tiles = g.external(memory.slice(tiles), uint32_t(in.sets.tiles.size() / 4), 4, DType::u32, "tiles", 4);
+    context.coords = g.external(memory.slice(coords), m, 3, DType::f32, "coords", 3);
+    context.pos = g.external(memory.slice(pos), m, d, t.precision(), "pos");
+    context.mask = g.external(memory.slice(mask), m, words, DType::u32, "mask", words);
+    context.longest = in.sets.longest;
+    const Tensor modulations = g.external(memory.slice(table), times, t.modulation_width(), DType::f32, "modulations");
+    t.embed_positions(g, context);
+    t.modulations(g, g.external(memory.slice(timesteps), times, 1, DType::f32, "timesteps", 1), modulations);
+    const Tensor y = t.forward(g, g.external(memory.slice(tokens), m, c, t.precision(), "tokens"), context, modulations,
+                               g.external(memory.slice(rows), 2 * m, 1, DType::u32, "table_row", 1));
+    const Tensor result = g.external(memory.slice(out), m, c, DType::f32, "out");
+    g.replace(y.resource, result.resource);
+    SR_TRY(const auto program, Program::create(device, g));
+    SR_CHECK(program->run());
+    SR_CHECK(device.read(memory.slice(out), std::as_writable_bytes(std::span(padded))));
+    std::vector<float> values(size_t(m) * c);
+    for (uint32_t r = 0; r < m; ++r)
+        std::copy_n(&padded[size_t(r) * ld], c, &values[size_t(r) * c]);
+    return values;
+}
+
+} // namespace
+
+Result<GoldenOutputs> run_voxfield_transformer(Device& device, const GoldenCase& c, DType precision)
+{
+    SR_TRY(const auto transformer, Transformer::load(device, c.model(), precision));
+    const auto tokens = c.floats("input.tokens"), centers = c.floats("input.centers"),
+               times = c.floats("input.timestep");
+    const auto labels = c.integers("input.labels"), valid = c.integers("input.valid");
+    const auto shape = c.shape("input.tokens"); // [B, N, C]
+    if (shape.size() != 3 || shape[2] != transformer->config().channels() || valid.size() != shape[0] * shape[1] ||
+        labels.size() != valid.size() || centers.size() != 3 * valid.size() || times.size() != shape[0])
+        return fail(ErrorCode::bad_input, "{}: inputs do not belong together", c.name());
+    const size_t n = shape[1], channels = shape[2];
+    EvaluationInput in;
+    in.timesteps = times;
+    std::vector<float> packed_centers;
+    std::vector<size_t> source; // row of the case for each packed row
+    for (size_t b = 0; b < shape[0]; ++b) {
+        std::vector<CellIndex> cells;
+        std::vector<uint32_t> set_labels;
+        for (size_t i = b * n; i < (b + 1) * n; ++i) {
+            if (!valid[i])
+                continue;
+            cells.push_back(cells_of(centers, i, 1, transformer->config().voxel_size)[0]);
+            set_labels.push_back(uint32_t(labels[i]));
+            in.tokens.insert(in.tokens.end(), &tokens[i * channels], &tokens[i * channels] + channels);
+            packed_centers.insert(packed_centers.end(), &centers[3 * i], &centers[3 * i] + 3);
+            in.table_row.push_back(uint32_t(b));
+            source.push_back(i);
+        }
+        in.sets.add(cells, set_labels);
+    }
+    in.sets.pad(transformer->config().num_classes);
+    in.tokens.resize(in.sets.rows() * channels);
+    in.table_row.resize(in.sets.rows());
+    packed_centers.resize(3 * in.sets.rows());
+    in.mask = mask_of(in.sets, packed_centers, transformer->config().attention_radius);
+    in.table_row.insert(in.table_row.end(), in.table_row.begin(), in.table_row.begin() + in.sets.rows());
+    SR_TRY(const std::vector<float> values, evaluate(device, *transformer, in));
+    GoldenOutputs out;
+    auto& sample = out.floats["sample"];
+    auto& ignored = out.ignored["sample"];
+    sample.assign(tokens.size(), 0.f);
+    ignored.assign(tokens.size(), 1);
+    for (size_t r = 0; r < source.size(); ++r)
+        for (size_t k = 0; k < channels; ++k) {
+            sample[source[r] * channels + k] = values[r * channels + k];
+            ignored[source[r] * channels + k] = 0;
+        }
+    return out;
+}
+
+Result<GoldenOutputs> run_voxfield_sampling(Device& device, const GoldenCase& c, DType precision)
+{
+    SR_TRY(const auto transformer, Transformer::load(device, c.model(), precision));
+    nlohmann::json scheduler = c.params();
+    scheduler["_class_name"] = "DDPMScheduler";
+    scheduler["prediction_type"] = "sample";
+    scheduler["timestep_spacing"] = "leading";
+    scheduler["variance_type"] = "fixed_small";
+    std::vector<std::string> warnings;
+    SR_TRY(const SchedulerConfig config, scheduler_config_from_json(scheduler, warnings));
+    SR_TRY(const double steps, c.number("steps"));
+    SR_TRY(const double guidance, c.number("guidance_scale"));
+    RepaintOptions repaint;
+    repaint.jump_length = c.params().value("jump_length", 0);
+    repaint.jump_n_sample = std::max(1, c.params().value("jump_n_sample", 1));
+    SR_TRY(const SamplingPlan plan, plan_sampling(config, int(steps), repaint));
+
+    const auto labels = c.integers("input.labels"), mask = c.integers("input.known_mask");
+    const auto first = c.floats("input.noise_initial"), noise = c.floats("input.noise"),
+               fixed = c.floats("input.known_tokens");
+    const size_t n = labels.size(), channels = transformer->config().channels();
+    if (n == 0 || first.size() != n * channels || c.floats("input.centers").size() != 3 * n)
+        return fail(ErrorCode::bad_input, "{}: inputs do not belong together", c.name());
+    RegionInput region;
+    region.cells = cells_of(c.floats("input.centers"), 0, n, transformer->config().voxel_size);
+    region.labels.assign(labels.begin(), labels.end());
+    region.known.assign(mask.begin(), mask.end());
+    region.fixed = fixed;
+
+    // normals in the order of the file: per step one for the targets, then, with known tokens, one for those
+    size_t next = 0;
+    const auto take = [&](std::span<float> out, bool known_rows) {
+        for (size_t i = 0; i < n * channels && next + i < noise.size(); ++i)
+            if (!known_rows || mask[i / channels])
+                out[i] = noise[next + i];
+        next += n * channels;
+    };
+    SamplerOptions options;
+    options.guidance_scale = float(guidance);
+    options.noise = [&](size_t row, std::span<float> out) {
+        if (row == 0) {
+            std::copy(first.begin(), first.end(), out.begin());
+            return;
+        }
+        take(out, false);
+        if (plan.rows[row - 1].kind == PlanRowKind::step && !mask.empty())
+            take(out, true);
+    };
+    SR_TRY(const auto sampler, TokenSampler::create(device, *transformer, plan, std::move(options)));
+    GoldenOutputs out;
+    SR_TRY(out.floats["sample"], sampler->run({&region, 1}));
+    if (next != noise.size())
+        return fail(ErrorCode::bad_input, "{}: {} normals used of {}", c.name(), next, noise.size());
+    return out;
+}
+
+} // namespace semrover
