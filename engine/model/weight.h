@@ -8,7 +8,7 @@
 
 namespace semrover {
 
-// a matrix of a network's parameters on the device, rows padded; becomes a tensor of any graph
+// A matrix of a network's parameters in an arena, rows padded. Any graph can take it as a tensor.
 struct Weight {
     uint32_t slice = 0; // of the arena
     uint32_t rows = 0, cols = 0;
