@@ -61,8 +61,8 @@ std::string_view name_of(PathFormat format);
 std::optional<PathFormat> path_format_of(std::string_view name);
 
 // Reads a path in the format that its content shows: a folder with cameras.txt, JSON with camera_path or frames, text
-// with 12 or else 8 numbers a line. KITTI's times.txt and calib.txt are read if they are beside the poses. `fallback` is
-// used only for formats without intrinsics (TUM, KITTI, a transforms.json of poses).
+// with 12 or else 8 numbers a line. KITTI's times.txt and calib.txt are read if they are beside the poses. `fallback`
+// is used only for formats without intrinsics (TUM, KITTI, a transforms.json of poses).
 Result<CameraPath> read_camera_path(const Path& path, const Intrinsics& fallback);
 
 } // namespace semrover

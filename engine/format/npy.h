@@ -30,8 +30,8 @@ struct NpyArray {
     }
 };
 
-// The header of a .npy file: versions 1.0, 2.0 and 3.0; bool, integers and floats of 1 to 8 bytes of either byte order; up
-// to 8 dimensions. Source: numpy.lib.format
+// The header of a .npy file: versions 1.0, 2.0 and 3.0; bool, integers and floats of 1 to 8 bytes of either byte order;
+// up to 8 dimensions. Source: numpy.lib.format
 struct NpyHeader {
     DType dtype = DType::u8;
     bool big_endian = false, fortran_order = false;

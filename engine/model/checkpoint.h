@@ -11,7 +11,8 @@ namespace semrover {
 
 // Gives access to the weights of one network by diffusers' names. The weights are in a component's folder (one file or
 // shards) or in a single-file LDM checkpoint, whose names it maps. It also maps old names of VAE attention, and takes
-// 1x1 convolutions stored as matrices and the reverse. random() needs no file: seeded numbers, for benchmarks and tests.
+// 1x1 convolutions stored as matrices and the reverse. random() needs no file: seeded numbers, for benchmarks and
+// tests.
 class Checkpoint {
   public:
     enum class Network { unet, vae };

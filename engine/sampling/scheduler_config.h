@@ -51,8 +51,9 @@ std::string_view sampler_name(Sampler sampler);
 
 // Reads a scheduler_config.json: parsed, or as text, in which diffusers may write -Infinity for lambda_min_clipped.
 // Defaults are those of its diffusers class, "_class_name" ("type" in golden cases). `sampler` overrides the class and
-// keeps the noise schedule (SD 1.5 folders name PNDM). `warnings` gets a line for each unknown field. Bad input, by field name: a wrong type, a value out of bounds, or one
-// that the engine does not implement (trained_betas, thresholding, rescale_betas_zero_snr, other classes, ...).
+// keeps the noise schedule (SD 1.5 folders name PNDM). `warnings` gets a line for each unknown field. Bad input, by
+// field name: a wrong type, a value out of bounds, or one that the engine does not implement (trained_betas,
+// thresholding, rescale_betas_zero_snr, other classes, ...).
 Result<SchedulerConfig> scheduler_config_from_json(const nlohmann::json& json, std::vector<std::string>& warnings,
                                                    std::optional<Sampler> sampler = {});
 Result<SchedulerConfig> scheduler_config_from_text(std::string_view text, std::vector<std::string>& warnings,
