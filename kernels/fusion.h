@@ -36,9 +36,9 @@ struct TsdfFrames {
                                  const TsdfOptions& options); // [P, 4] u32: N (0: nothing), rgb | label << 24
 // sets the bits of the blocks within the truncation of a pixel's surface
 void tsdf_touch(Graph& g, Tensor frames, Tensor planes, const TsdfOptions& options,
-                Tensor bitmap);                                                // [bitmap_words] u32
-[[nodiscard]] PrefixSum tsdf_rank(Graph& g, Tensor bitmap, Tensor total = {}); // bits before each word, and all
-void tsdf_list(Graph& g, Tensor bitmap, Tensor ranks, Tensor blocks);          // blocks: [bits] u32, ascending
+                Tensor bitmap);                                       // [bitmap_words] u32
+[[nodiscard]] PrefixSum tsdf_rank(Graph& g, Tensor bitmap);           // bits before each word, and all
+void tsdf_list(Graph& g, Tensor bitmap, Tensor ranks, Tensor blocks); // blocks: [bits] u32, ascending
 
 // adds frames in order: projective distance to the pixel's plane, weighted; colour; one of 20 counters per voxel
 struct TsdfState {

@@ -11,13 +11,23 @@
 // Storage is fp32 or fp16, arithmetic and statistics fp32.
 namespace semrover {
 
+// Where an op writes that joins tensors: rows or columns of a larger matrix, in place of a new one. A whole output that
+// outlives the graph is kept with Graph::keep.
+struct PartOf {
+    Tensor whole;              // none: a new tensor
+    uint32_t row = 0, col = 0; // where the part begins; col a multiple of 8
+
+    bool valid() const { return whole.valid(); }
+    Tensor of(uint32_t rows, uint32_t cols) const { return whole.row_range(row, rows).col_range(col, cols); }
+};
+
 // -- dense layers ----------------------------------------------------------------------------------------------------
 
 // y = x w^T + bias, per group: rows [i * M, (i + 1) * M) of x meet rows [i * N, (i + 1) * N) of w
 struct GemmOptions {
     uint32_t groups = 1;
     DType dtype = DType::f16; // of y
-    Tensor into;              // where to write, instead of a new tensor
+    PartOf part;
 };
 [[nodiscard]] Tensor gemm(Graph& g,
                           Tensor x,    // [groups * M, K] fp32 or fp16
@@ -47,17 +57,13 @@ struct Modulation {
 [[nodiscard]] Tensor silu(Graph& g, Tensor x); // [M, N] -> [M, N]
 
 // y = max(x, 0); runs in the epilogue of the gemm or convolution that makes x
-struct ColumnRange {
-    Tensor tensor;    // of as many rows as x, or none: a new tensor
-    uint32_t col = 0; // where to write, a multiple of 8; zeros fill the last 8 columns
-};
-Tensor relu(Graph& g, Tensor x, const ColumnRange& into = {}); // [M, N] -> [M, N], or a wider tensor
+Tensor relu(Graph& g, Tensor x, const PartOf& part = {}); // [M, N] -> [M, N]; of a part, zeros fill the last 8 columns
 
 // y = residual + x; runs in the epilogue of the gemm that makes x
 Tensor add(Graph& g,
            Tensor x,        // [M, N]
            Tensor residual, // [M, N]
-           Tensor into = {});
+           const PartOf& part = {});
 
 // y = LayerNorm(x) * (1 + scale) + shift, no affine part
 [[nodiscard]] Tensor modulate(Graph& g,
@@ -73,7 +79,7 @@ Tensor embedding(Graph& g,
                  Tensor table, // [classes, N]
                  Tensor x,     // [M, N], or none
                  DType dtype,  // of y
-                 Tensor into = {});
+                 const PartOf& part = {});
 
 // y = per axis [sin(x w_0), .., cos(x w_0), ..], or cosines first
 [[nodiscard]] Tensor sinusoid(Graph& g,
@@ -89,11 +95,11 @@ Tensor embedding(Graph& g,
 constexpr uint32_t kAttentionTile = 32; // queries of a tile, at most; a tile stays within one set
 
 // bit j of row i: cell j of the set of i has di^2 + dj^2 + dk^2 <= radius2
-Tensor neighbor_mask(Graph& g,
-                     Tensor cells, // [M, 4] i32 array: i, j, k, unused
-                     Tensor sets,  // [M, 2] u32 array: first row and number of rows of the row's set
-                     uint32_t longest_set, int32_t radius2,
-                     Tensor into = {}); // y: [M, words] u32 array, words = ceil(longest_set / 32)
+[[nodiscard]] Tensor neighbor_mask(Graph& g,
+                                   Tensor cells, // [M, 4] i32 array: i, j, k, unused
+                                   Tensor sets,  // [M, 2] u32 array: first row and number of rows of the row's set
+                                   uint32_t longest_set,
+                                   int32_t radius2); // y: [M, words] u32 array, words = ceil(longest_set / 32)
 
 // per head of q and k: y = x / sqrt(mean(x^2) + eps) * weight
 [[nodiscard]] Tensor head_rms_norm(Graph& g,

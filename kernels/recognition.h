@@ -16,7 +16,7 @@ struct PoolOptions {
     uint32_t stride_y = 1, stride_x = 1;
     uint32_t padding_y = 0, padding_x = 0; // less than the kernel
 };
-FeatureMap pool2d(Graph& g, FeatureMap x, const PoolOptions& options, const ColumnRange& into = {});
+FeatureMap pool2d(Graph& g, FeatureMap x, const PoolOptions& options, const PartOf& part = {});
 
 // y = 2 / 255 image - 1 at another size, bilinear between the two nearest pixels each way, with pixels as squares
 // (align_corners = False) and no antialiasing

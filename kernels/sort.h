@@ -14,7 +14,6 @@ namespace semrover {
 struct PrefixSumOptions {
     Tensor count; // [1] u32, or none: only the first count[0] elements of x are there; the rest of y is undefined
     bool non_zero = false; // counts the elements that are not zero instead of adding them
-    Tensor total;          // [1] u32: where the total goes, instead of a new tensor
 };
 struct PrefixSum {
     Tensor sums;  // [N] u32

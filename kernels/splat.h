@@ -81,13 +81,13 @@ struct SplatOptions {
     float transmittance_min = 1e-4f;
     float screen_variance = 0.5f; // pixels^2, of the screen filter; 0: none
     float cutoff = 0;             // sigmas; 0: as far as alpha_min
-    Tensor visible, pairs;        // [1] u32, or none: where the numbers go that had to fit the two maxima
 };
 struct SplatImages { // [cameras * height * width] rows; w = weight of a splat in a pixel
     Tensor color;    // [.., 4] fp32: sum of w rgb; alpha = sum of w
     Tensor surface;  // [.., 4] fp32: sum of w normal, camera frame, towards the camera; sum of w depth
     Tensor depth;    // [.., 2] fp32: expected (sum of w depth / alpha), median (of the splat that passes one half)
     Tensor ids;      // [.., 2] u32: label and cell of the splat with the largest w, 2^32 - 1 for none
+    Tensor visible, pairs; // [1] u32: the numbers that had to fit the two maxima
 };
 [[nodiscard]] SplatImages
 splat(Graph& g, const SplatScene& scene,

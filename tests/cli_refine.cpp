@@ -1,6 +1,5 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/scene/grid.h"
 #include "tests/child_program.h"
 #include "tests/program.h"
 #include "tests/renderer_folders.h"
@@ -204,28 +203,6 @@ TEST_F(CliRefine, frames_can_be_jpegs_and_videos)
     EXPECT_EQ(frame->height, kHeight);
     EXPECT_GT(fs::file_size(folder_ / "out.mp4"), 500u);
     EXPECT_GT(fs::file_size(folder_ / "side.mp4"), fs::file_size(folder_ / "out.mp4"));
-}
-
-// a road of 12 x 20 cells, each with points
-VoxelGrid street()
-{
-    VoxelGrid grid;
-    grid.voxel_size = 0.6f;
-    grid.points_per_voxel = 20;
-    for (int32_t i = 0; i < 20; ++i)
-        for (int32_t j = 0; j < 12; ++j)
-            grid.cells.push_back({i, j, 0});
-    for (size_t i = 0; i < grid.cells.size(); ++i) {
-        grid.labels.push_back(0);
-        grid.generated.push_back(1);
-        for (uint32_t p = 0; p < 20; ++p) {
-            for (float offset : {float(p % 5) * 0.12f - 0.24f, float(p / 5) * 0.14f - 0.21f, 0.f})
-                grid.points.push_back(float_to_half(offset));
-            grid.colors.insert(grid.colors.end(), {uint8_t(10 * p), uint8_t(i), uint8_t(90)});
-        }
-    }
-    sort_cells(grid);
-    return grid;
 }
 
 TEST_F(CliRefine, straight_from_a_grid_is_render_and_refine)

@@ -124,10 +124,8 @@ HostImages evaluate(const UnetConfig& config, DType precision, uint32_t images, 
         for (uint32_t c = 0; c < config.in_channels; ++c)
             x.rows.set(r, c, one.rows.at(r % one.image_rows(), c));
     const Tensor text = k.input(k.random(5, config.cross_attention_dim, precision));
-    const Tensor table = k.graph.matrix(1, (*unet)->time_width(), DType::f32, "time");
-    (*unet)->time_table(k.graph, k.input(std::vector<float>{321}), table);
-    const Tensor context = k.graph.matrix(5, (*unet)->context_width(), precision, "context");
-    (*unet)->context_table(k.graph, text, context);
+    const Tensor table = (*unet)->time_table(k.graph, k.input(std::vector<float>{321}));
+    const Tensor context = (*unet)->context_table(k.graph, text);
     const FeatureMap y =
         (*unet)->forward(k.graph, x.input(k), table, k.input(std::vector<uint32_t>(images, 0)), {context, 5, 0});
     return {y.height, y.width, k.run(y.data)};

@@ -39,6 +39,18 @@ std::vector<uint32_t> list(std::span<const uint32_t> values)
 
 using List = std::vector<uint32_t>;
 
+TEST(RegionGraph, ARegionThatIsGivenBackIsReadyAgain)
+{
+    RegionGraph graph(make_regions({{0, 1}, {2, 3}, {4, 5}, {1, 6}}), 7);
+    EXPECT_EQ(graph.take(2), (List{0, 1}));
+    graph.give_back(0);
+    EXPECT_FALSE(graph.is_done(0));
+    EXPECT_EQ(graph.take(8), (List{0, 2}));
+    graph.done(0);
+    EXPECT_TRUE(graph.is_done(0));
+    EXPECT_EQ(graph.take(8), (List{3}));
+}
+
 TEST(RegionGraph, ARegionWaitsForThoseWhoseTargetsItKnows)
 {
     // 2 knows cells of 0 and of 1; 3 shares with 2 only a cell both know, so it waits for 1 alone; 4 adds nothing

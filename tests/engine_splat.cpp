@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+#include "engine/refine/frame_images.h"
 #include "tests/golden_tensors.h"
 #include "tests/splat_case.h"
 #include "tools/verify/splat_cases.h"
@@ -192,6 +193,42 @@ TEST(engine_splat, a_frame_that_needs_more_room_is_drawn_again)
         EXPECT_EQ((*grown)[i].color, (*roomy)[i].color);
         EXPECT_EQ((*again)[i].color, (*roomy)[i].color);
     }
+}
+
+TEST(engine_splat, pixels_on_the_device_are_those_that_files_of_the_images_hold)
+{
+    const SurfelScene scene = make_scene(surfels_of(random_splats(400, 9)));
+    std::vector<SplatCamera> cameras;
+    for (int i = 0; i < 3; ++i)
+        cameras.push_back(device_camera(camera_for(75, 41, 0.1 * i, 0.2 * i)));
+    const std::array<uint8_t, 3> background{9, 200, 77};
+    const std::vector<SplatImage> images = render(scene, 75, 41, 2, cameras);
+    const auto rasterizer =
+        *Rasterizer::create(test_device(), scene, 75, 41, 2, {.max_pairs = 100, .pixels_over = background});
+    size_t next = 0;
+    while (next < cameras.size()) {
+        const uint32_t drawn = *rasterizer->draw(std::span(cameras).subspan(next));
+        ASSERT_LE(drawn, 2u);
+        for (uint32_t i = 0; i < drawn; ++i, ++next) {
+            const SplatPixelSlots slots = rasterizer->pixels(i);
+            const auto seen = *slots.seen.read<uint32_t>(test_device()),
+                       ranges = *slots.ranges.read<uint32_t>(test_device()),
+                       normals = *slots.normals.read<uint32_t>(test_device());
+            const auto color = color_pixels(images[next], background), normal = normal_pixels(images[next]),
+                       label = label_pixels(images[next]), visible = visible_pixels(images[next]);
+            const auto depth = depth_pixels(images[next]);
+            for (size_t p = 0; p < seen.size(); ++p) {
+                for (size_t c = 0; c < 3; ++c) {
+                    ASSERT_EQ(seen[p] >> 8 * c & 255, color[3 * p + c]);
+                    ASSERT_EQ(normals[p] >> 8 * c & 255, normal[3 * p + c]);
+                }
+                ASSERT_EQ(seen[p] >> 24, visible[p]);
+                ASSERT_EQ(ranges[p] & 0xffff, depth[p]);
+                ASSERT_EQ(ranges[p] >> 16, label[p]);
+            }
+        }
+    }
+    EXPECT_EQ(next, 3u);
 }
 
 TEST(engine_splat, visible_pixels_are_those_that_reach_the_threshold)

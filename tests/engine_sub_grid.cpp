@@ -70,7 +70,12 @@ void generate(VoxelGrid& grid, uint32_t batch)
     ASSERT_TRUE(outpainter) << outpainter.error().message;
     auto sampler = TokenSampler::create(device(), transformer(), *plan, sampling_options(2, 5));
     ASSERT_TRUE(sampler) << sampler.error().message;
-    ASSERT_TRUE((*outpainter)->run(**sampler, batch, {}));
+    ASSERT_TRUE((*outpainter)->begin(**sampler, batch));
+    for (bool filled = false; !filled;) {
+        const auto step = (*outpainter)->step(~size_t(0));
+        ASSERT_TRUE(step) << step.error().message;
+        filled = *step;
+    }
 }
 
 TEST(engine_sub_grid, filling_a_part_gives_the_bytes_of_filling_the_whole_and_changes_nothing_else)

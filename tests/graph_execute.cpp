@@ -133,7 +133,7 @@ TEST(graph_execute, slices_a_gemm_without_changing_a_bit)
         const Tensor x = memory.add(g, rows, 72, dtype), w = memory.add(g, 65, 72, dtype), bias = memory.add(g, 1, 65);
         const Tensor residual = memory.add(g, rows, 65, dtype), out = memory.add(g, rows, 65, dtype);
         const Tensor y = gelu(g, gemm(g, x, w, bias, {.dtype = dtype}));
-        g.replace(add(g, y, residual).resource, out.resource);
+        g.keep(add(g, y, residual), out);
         DeviceLimits limits = test_device().limits();
         limits.max_storage_range = 32768;
         limits.max_texel_elements = 32768 / 16;
@@ -152,7 +152,7 @@ TEST(graph_execute, replays_a_program_with_the_same_bytes)
     const Tensor w = memory.add(g, 64, 64), out = memory.add(g, 64, 64);
     for (int i = 0; i < 4; ++i)
         t = add(g, gelu(g, gemm(g, t, w, {}, {.dtype = DType::f32})), t);
-    add(g, t, t, out);
+    add(g, t, t, {out});
     memory.fill();
     auto program = Program::create(test_device(), g);
     ASSERT_TRUE(program) << program.error().message;
@@ -171,7 +171,7 @@ TEST(graph_execute, keeps_runs_in_order_that_nobody_waits_for)
     ExternalMemory memory;
     Graph g;
     const Tensor x = memory.add(g, 8, 64), sum = memory.add(g, 8, 64);
-    add(g, sum, x, sum); // each run reads what the last one wrote
+    add(g, sum, x, {sum}); // each run reads what the last one wrote
     memory.fill();
     const Plan plan = plan_of(g);
     auto program = Program::create(test_device(), plan);

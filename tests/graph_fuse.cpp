@@ -82,7 +82,7 @@ TEST(graph_fuse, keeps_a_value_that_the_consumer_reads_twice)
 TEST(graph_fuse, keeps_a_value_that_is_an_output)
 {
     FuseCase c;
-    (void)gelu(c.g, gemm(c.g, c.x, c.w, {}, {.dtype = DType::f32, .into = c.residual}));
+    (void)gelu(c.g, c.g.keep(gemm(c.g, c.x, c.w, {}, {.dtype = DType::f32}), c.residual));
     EXPECT_EQ(c.levels(), "gemm | gelu");
 }
 
@@ -104,7 +104,7 @@ TEST(graph_fuse, does_not_move_a_read_before_its_write)
     const Tensor written = d.g.external(memory, 16, 64, DType::f32, "a"),
                  read = d.g.external(memory, 16, 64, DType::f32, "b");
     const Tensor u = d.product();
-    add(d.g, d.x, d.x, written);
+    add(d.g, d.x, d.x, {written});
     (void)add(d.g, u, read);
     EXPECT_EQ(d.levels(), "gemm add | add");
 }
@@ -112,10 +112,10 @@ TEST(graph_fuse, does_not_move_a_read_before_its_write)
 TEST(graph_fuse, does_not_let_a_gemm_overwrite_what_its_other_tiles_still_read)
 {
     FuseCase c;
-    add(c.g, c.product(), c.residual, c.x);
+    add(c.g, c.product(), c.residual, {c.x});
     EXPECT_EQ(c.levels(), "gemm | add");
     FuseCase d;
-    add(d.g, d.product(), d.residual, d.residual); // element by element in place: that is fine
+    add(d.g, d.product(), d.residual, {d.residual}); // element by element in place: that is fine
     EXPECT_EQ(d.levels(), "gemm");
 }
 

@@ -29,13 +29,13 @@ TEST(graph_misuse, wants_every_byte_written_that_is_read)
 {
     Graph g;
     const Tensor x = fake_external(g, 16, 64), half = g.matrix(32, 64, DType::f32, "half");
-    add(g, x, x, half.row_range(16, 16));
+    add(g, x, x, {half, 16});
     (void)gelu(g, half);
     EXPECT_EQ(error_of(g).message, "pass 1 (gelu): binding X reads 'half', which nothing has written");
     Graph whole;
     const Tensor y = fake_external(whole, 16, 64), both = whole.matrix(32, 64, DType::f32, "both");
-    add(whole, y, y, both.row_range(16, 16));
-    add(whole, y, y, both.row_range(0, 16));
+    add(whole, y, y, {both, 16});
+    add(whole, y, y, {both, 0});
     (void)gelu(whole, both);
     EXPECT_TRUE(make_plan(whole.desc(), test_limits()));
 }
@@ -48,7 +48,7 @@ TEST(graph_misuse, names_a_range_that_leaves_its_tensor)
     EXPECT_EQ(error_of(g).message, "pass 0 (gelu): binding X reaches byte 6656 of 'small', which has 4096");
     Graph h;
     const Tensor y = h.matrix(16, 64, DType::f32, "target"), z = fake_external(h, 16, 64);
-    add(h, z, z, y.row_range(1, 16));
+    add(h, z, z, {y, 1});
     EXPECT_EQ(error_of(h).message, "pass 0 (add): binding Y reaches byte 4352 of 'target', which has 4096");
 }
 

@@ -20,8 +20,8 @@ TEST(graph_plan, puts_no_barrier_between_passes_that_read_the_same)
     Graph g;
     const Tensor x = fake_external(g, 16, 64);
     const Tensor a = gelu(g, x), b = silu(g, x), c = gelu(g, x);
-    add(g, a, b, fake_external(g, 16, 64));
-    add(g, b, c, fake_external(g, 16, 64));
+    add(g, a, b, {fake_external(g, 16, 64)});
+    add(g, b, c, {fake_external(g, 16, 64)});
     EXPECT_EQ(levels_text(plan_of(g)), "gelu silu gelu | add add");
 }
 
@@ -30,8 +30,8 @@ TEST(graph_plan, lets_independent_branches_share_a_level)
     Graph g;
     const Tensor x = fake_external(g, 16, 64), y = fake_external(g, 16, 64), z = fake_external(g, 16, 64);
     const Tensor a = gelu(g, x), b = gelu(g, y), c = silu(g, x);
-    add(g, a, b, z);
-    add(g, b, c, x); // also after the reads of x
+    add(g, a, b, {z});
+    add(g, b, c, {x}); // also after the reads of x
     EXPECT_EQ(levels_text(plan_of(g)), "gelu gelu silu | add add");
 }
 
@@ -40,7 +40,7 @@ TEST(graph_plan, orders_a_write_after_the_reads_before_it)
     Graph g;
     const Tensor x = fake_external(g, 16, 64), y = fake_external(g, 16, 64);
     (void)gelu(g, x);
-    add(g, y, y, x);
+    add(g, y, y, {x});
     (void)silu(g, x);
     EXPECT_EQ(levels_text(plan_of(g)), "gelu | add | silu");
 }
@@ -49,10 +49,10 @@ TEST(graph_plan, orders_writes_to_the_same_bytes_and_not_to_different_rows)
 {
     Graph g;
     const Tensor x = fake_external(g, 16, 64), y = fake_external(g, 32, 64);
-    add(g, x, x, y.row_range(0, 16));
-    add(g, x, x, y.row_range(16, 16));
+    add(g, x, x, {y, 0});
+    add(g, x, x, {y, 16});
     EXPECT_EQ(levels_text(plan_of(g)), "add add");
-    add(g, x, x, y.row_range(8, 16));
+    add(g, x, x, {y, 8});
     EXPECT_EQ(levels_text(plan_of(g)), "add add | add");
 }
 
@@ -61,7 +61,7 @@ TEST(graph_plan, knows_two_tensors_in_the_same_memory)
     Graph g;
     const BufferSlice memory = fake_memory(16 * 64 * 4);
     const Tensor a = g.external(memory, 16, 64, DType::f32, "a"), b = g.external(memory, 16, 64, DType::f32, "b");
-    add(g, fake_external(g, 16, 64), fake_external(g, 16, 64), a);
+    add(g, fake_external(g, 16, 64), fake_external(g, 16, 64), {a});
     (void)gelu(g, b);
     EXPECT_EQ(levels_text(plan_of(g)), "add | gelu");
 }

@@ -163,7 +163,7 @@ class KernelCase {
         EXPECT_TRUE(status) << status.error().message;
         return bytes;
     }
-    void redirect(const Tensor& from, const Tensor& to) { graph.replace(from.resource, to.resource); }
+    void redirect(const Tensor& from, const Tensor& to) { graph.keep(from, to); }
 
     Device& device_;
     std::mt19937 random_;

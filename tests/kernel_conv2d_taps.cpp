@@ -56,7 +56,7 @@ TEST(kernel_conv2d_taps, takes_rectangles_of_taps_and_writes_relu_into_columns_o
             ASSERT_EQ(y.height, (c.height + 2 * c.taps.padding_y - c.taps.height) / c.stride + 1);
             ASSERT_EQ(y.width, (c.width + 2 * c.taps.padding_x - c.taps.width) / c.stride + 1);
             const Tensor wide = k.output(y.data.rows, 16 + c.outputs + 24, dtype);
-            relu(k.graph, y.data, {wide, 16});
+            relu(k.graph, y.data, {.whole = wide, .col = 16});
             const Status status = k.compile_and_run();
             ASSERT_TRUE(status) << status.error().message;
             EXPECT_EQ(k.plan().passes.size(), 1u);

@@ -177,7 +177,7 @@ TEST(kernel_flash_attention, gives_the_same_bits_in_bands)
     const HostMatrix q = k.random(o.query_rows, 40, DType::f16), kv = k.random(64, 72, DType::f16);
     const Tensor y = flash_attention(k.graph, k.input(q), k.input(kv), o);
     const Tensor out = k.output(y.rows, y.cols, y.dtype);
-    k.graph.replace(y.resource, out.resource);
+    k.graph.keep(y, out);
     DeviceLimits limits = test_device().limits();
     limits.submit_seconds = 2 * 4.0 * 64 * 32 * 150 / 5e11;
     auto plan = make_plan(k.graph.desc(), limits);

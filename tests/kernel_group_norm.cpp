@@ -101,7 +101,7 @@ TEST(kernel_group_norm, takes_statistics_from_the_producer)
         Tensor out[4];
         for (size_t i = 0; i < 4; ++i) {
             out[i] = k.output(maps[i].rows, maps[i].cols, maps[i].dtype, maps[i].ld);
-            k.graph.replace(maps[i].resource, out[i].resource);
+            k.graph.keep(maps[i], out[i]);
         }
         ASSERT_TRUE(k.compile_and_run());
         EXPECT_EQ(k.plan().passes.size(), 2u); // the residual and both statistics are in the epilogues

@@ -55,7 +55,7 @@ void check(const KnnCase& c)
         options.labels = k.input(labels);
     const Tensor y = knn(k.graph, k.input(p, c.width), options);
     const Tensor out = k.output(y.rows, y.cols, y.dtype, y.ld);
-    k.graph.replace(y.resource, out.resource);
+    k.graph.keep(y, out);
     const Status status = k.compile_and_run();
     ASSERT_TRUE(status) << status.error().message;
     const auto got = k.read_array<uint32_t>(out);
@@ -89,7 +89,7 @@ TEST(kernel_knn, the_nearest_of_other_points_match_brute_force)
         const Tensor y = knn(k.graph, k.input(p, 3), options);
         ASSERT_EQ(y.rows, queries);
         const Tensor out = k.output(y.rows, y.cols, y.dtype, y.ld);
-        k.graph.replace(y.resource, out.resource);
+        k.graph.keep(y, out);
         ASSERT_TRUE(k.compile_and_run());
         const auto got = k.read_array<uint32_t>(out);
         const auto distance = [&](uint32_t i, uint32_t j) {
@@ -121,7 +121,7 @@ TEST(kernel_knn, what_is_far_from_everything_finds_its_nearest_among_all_points)
     options.queries = k.input(q, 4);
     const Tensor y = knn(k.graph, k.input(p, 3), options);
     const Tensor out = k.output(y.rows, y.cols, y.dtype, y.ld);
-    k.graph.replace(y.resource, out.resource);
+    k.graph.keep(y, out);
     ASSERT_TRUE(k.compile_and_run());
     const auto got = k.read_array<uint32_t>(out);
     for (uint32_t i = 0; i < kQueries; ++i) {
@@ -148,7 +148,7 @@ TEST(kernel_knn, points_that_are_not_finite_have_no_neighbours_and_are_none)
         p.insert(p.end(), {float(i) * 0.1f, i == 7 ? NAN : 0.f, i == 9 ? INFINITY : 0.f});
     const Tensor y = knn(k.graph, k.input(p, 3), {.neighbors = 3});
     const Tensor out = k.output(y.rows, y.cols, y.dtype, y.ld);
-    k.graph.replace(y.resource, out.resource);
+    k.graph.keep(y, out);
     ASSERT_TRUE(k.compile_and_run());
     const auto got = k.read_array<uint32_t>(out);
     EXPECT_EQ(std::vector<uint32_t>(got.begin() + 21, got.begin() + 24), std::vector<uint32_t>(3, ~0u));

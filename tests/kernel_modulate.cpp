@@ -146,7 +146,7 @@ TEST(kernel_add, adds_in_either_precision_and_writes_where_it_is_told)
         KernelCase k(test_device());
         const HostMatrix x = k.random(c.rows, c.cols, DType::f32), residual = k.random(c.rows, c.cols, dtype);
         const Tensor out = k.output(c.rows, c.cols, dtype);
-        add(k.graph, k.input(x), k.input(residual), out);
+        add(k.graph, k.input(x), k.input(residual), {.whole = out});
         const Status status = k.compile_and_run();
         ASSERT_TRUE(status) << status.error().message;
         const HostMatrix got = k.read(out);

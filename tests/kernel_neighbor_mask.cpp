@@ -12,7 +12,8 @@ void check(const std::vector<CellSet>& sets, int32_t radius2)
     KernelCase k(test_device());
     const uint32_t words = divide_up(packed.longest, 32);
     const Tensor out = k.output(packed.rows, words, DType::u32, words);
-    (void)neighbor_mask(k.graph, k.input(packed.cells, 4), k.input(packed.sets, 2), packed.longest, radius2, out);
+    k.graph.keep(neighbor_mask(k.graph, k.input(packed.cells, 4), k.input(packed.sets, 2), packed.longest, radius2),
+                 out);
     const Status status = k.compile_and_run();
     ASSERT_TRUE(status) << status.error().message;
     const std::vector<uint32_t> mask = k.read_array<uint32_t>(out);

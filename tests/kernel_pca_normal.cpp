@@ -72,8 +72,8 @@ Output run(const std::vector<float>& p, const std::vector<uint32_t>& neighbors, 
     const PcaNormals y = pca_normal(c.graph, c.input(p, 3), c.input(neighbors, k), with_labels);
     const uint32_t rows = uint32_t(p.size() / 3);
     const Tensor n = c.output(rows, 4, DType::f32, 4), e = c.output(rows, 4, DType::f32, 4);
-    c.graph.replace(y.normals.resource, n.resource);
-    c.graph.replace(y.eigenvalues.resource, e.resource);
+    c.graph.keep(y.normals, n);
+    c.graph.keep(y.eigenvalues, e);
     const Status status = c.compile_and_run();
     EXPECT_TRUE(status) << status.error().message;
     return {c.read_array<float>(n), c.read_array<float>(e)};

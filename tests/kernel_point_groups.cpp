@@ -60,8 +60,8 @@ TEST(kernel_point_groups, farthest_points_match_brute_force_with_ties_to_the_low
         const PointSamples y = farthest_point(k.graph, k.input(p, 4), c.sets, c.samples);
         const Tensor index = k.output(y.index.rows, 1, DType::u32, 1),
                      points = k.output(y.points.rows, 4, DType::f32, 4);
-        k.graph.replace(y.index.resource, index.resource);
-        k.graph.replace(y.points.resource, points.resource);
+        k.graph.keep(y.index, index);
+        k.graph.keep(y.points, points);
         const Status status = k.compile_and_run();
         ASSERT_TRUE(status) << status.error().message;
         const auto got = k.read_array<uint32_t>(index);
@@ -89,7 +89,7 @@ TEST(kernel_point_groups, balls_hold_the_first_points_within_the_radius_and_repe
         centers[0] = 1000; // a center that is no point and has none
         const Tensor y = ball_query(k.graph, k.input(p, 4), k.input(centers, 4), {c.sets, c.radius, c.neighbors});
         const Tensor out = k.output(y.rows, 1, DType::u32, 1);
-        k.graph.replace(y.resource, out.resource);
+        k.graph.keep(y, out);
         const Status status = k.compile_and_run();
         ASSERT_TRUE(status) << status.error().message;
         const auto got = k.read_array<uint32_t>(out);

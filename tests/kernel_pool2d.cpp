@@ -73,7 +73,7 @@ TEST(kernel_pool2d, writes_columns_of_a_wider_tensor_and_no_others)
     KernelCase k(test_device());
     const HostImages x = random_images(k, 1, 6, 5, 11, DType::f32);
     const Tensor wide = k.output(round_up(30, kImageRowPadding), 40, DType::f32);
-    pool2d(k.graph, x.input(k), {.padding_y = 1, .padding_x = 1}, {wide, 8});
+    pool2d(k.graph, x.input(k), {.padding_y = 1, .padding_x = 1}, {.whole = wide, .col = 8});
     ASSERT_TRUE(k.compile_and_run());
     const HostMatrix got = k.read(wide);
     for (uint32_t r = 0; r < 30; ++r) {

@@ -27,10 +27,10 @@ TEST(kernel_prefix_sum, matches_a_sum_in_integers)
         options.non_zero = c.non_zero;
         if (c.counted)
             options.count = k.input(std::vector<uint32_t>{c.present});
-        options.total = k.output(1, 1, DType::u32, 1);
         const PrefixSum y = prefix_sum(k.graph, k.input(x), options);
         const Tensor sums = k.output(c.size, 1, DType::u32, 1);
-        k.graph.replace(y.sums.resource, sums.resource);
+        k.graph.keep(y.sums, sums);
+        const Tensor total = k.graph.keep(y.total, k.output(1, 1, DType::u32, 1));
         const Status status = k.compile_and_run();
         ASSERT_TRUE(status) << status.error().message;
         const std::vector<uint32_t> got = k.read_array<uint32_t>(sums);
@@ -39,18 +39,18 @@ TEST(kernel_prefix_sum, matches_a_sum_in_integers)
             ASSERT_EQ(got[i], sum) << i;
             sum += c.non_zero ? x[i] != 0 : x[i];
         }
-        EXPECT_EQ(k.read_array<uint32_t>(y.total)[0], sum);
+        EXPECT_EQ(k.read_array<uint32_t>(total)[0], sum);
     }
 }
 
 TEST(kernel_prefix_sum, says_when_the_total_does_not_fit)
 {
     KernelCase k(test_device());
-    const PrefixSum y =
-        prefix_sum(k.graph, k.input(std::vector<uint32_t>(70000, 100000)), {.total = k.output(1, 1, DType::u32, 1)});
+    const PrefixSum y = prefix_sum(k.graph, k.input(std::vector<uint32_t>(70000, 100000)));
+    const Tensor total = k.graph.keep(y.total, k.output(1, 1, DType::u32, 1));
     const Status status = k.compile_and_run();
     ASSERT_TRUE(status) << status.error().message;
-    EXPECT_EQ(k.read_array<uint32_t>(y.total)[0], 0xffffffffu);
+    EXPECT_EQ(k.read_array<uint32_t>(total)[0], 0xffffffffu);
 }
 
 } // namespace

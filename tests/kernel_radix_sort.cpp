@@ -44,8 +44,8 @@ void check(const SortCase& c)
         options.count = k.input(std::vector<uint32_t>{c.present});
     const SortedPairs y = radix_sort(k.graph, k.input(keys), c.iota ? Tensor{} : k.input(values), options);
     const Tensor out_keys = k.output(c.size, 1, DType::u32, 1), out_values = k.output(c.size, 1, DType::u32, 1);
-    k.graph.replace(y.keys.resource, out_keys.resource);
-    k.graph.replace(y.values.resource, out_values.resource);
+    k.graph.keep(y.keys, out_keys);
+    k.graph.keep(y.values, out_values);
     const Status status = k.compile_and_run();
     ASSERT_TRUE(status) << status.error().message;
 

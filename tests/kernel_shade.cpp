@@ -78,7 +78,7 @@ std::vector<Pixel> picture(float sky, uint32_t samples)
     const Tensor y = shade(k.graph, scene->in(k.graph), k.input(view, 4),
                            {.width = kWidth, .height = kHeight, .samples = samples, .ambient_rays = 2});
     const Tensor out = k.output(y.rows, 4, DType::u32, 4);
-    k.graph.replace(y.resource, out.resource);
+    k.graph.keep(y, out);
     const Status status = k.compile_and_run();
     EXPECT_TRUE(status) << status.error().message;
     return k.read_array<Pixel>(out);

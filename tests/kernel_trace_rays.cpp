@@ -105,7 +105,7 @@ Traced trace(const Mesh& mesh, const std::vector<RayCase>& list, bool any)
                                    r.direction[2], r.far});
     const Tensor hits = trace_rays(k.graph, scene->in(k.graph), k.input(table, 8), any);
     const Tensor read = k.output(hits.rows, 4, DType::u32, 4);
-    k.graph.replace(hits.resource, read.resource);
+    k.graph.keep(hits, read);
     const Status status = k.compile_and_run();
     EXPECT_TRUE(status) << status.error().message;
     out.hits = k.read_array<std::array<uint32_t, 4>>(read);

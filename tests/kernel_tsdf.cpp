@@ -168,7 +168,7 @@ TEST(kernel_tsdf, planes_match_the_formula)
     const Tensor y =
         tsdf_planes(k.graph, {k.input(pictures.table, kTsdfFrameWords), k.input(pictures.pixels, 2)}, kOptions);
     const Tensor out = k.output(y.rows, 4, DType::u32, 4);
-    k.graph.replace(y.resource, out.resource);
+    k.graph.keep(y, out);
     ASSERT_TRUE(k.compile_and_run());
     const auto got = k.read_array<uint32_t>(out);
     size_t nothing = 0, edges = 0;
@@ -206,7 +206,9 @@ TEST(kernel_tsdf, bits_are_ranked_and_listed)
             }
             const Tensor bits = k.input(bitmap), total = k.output(1, 1, DType::u32, 1);
             const Tensor out = k.output(words, 1, DType::u32, 1), blocks = k.output(32 * words, 1, DType::u32, 1);
-            k.graph.replace(tsdf_rank(k.graph, bits, total).sums.resource, out.resource);
+            const PrefixSum ranked = tsdf_rank(k.graph, bits);
+            k.graph.keep(ranked.sums, out);
+            k.graph.keep(ranked.total, total);
             tsdf_list(k.graph, bits, out, blocks);
             ASSERT_TRUE(k.compile_and_run());
             EXPECT_EQ(k.read_array<uint32_t>(out), ranks);

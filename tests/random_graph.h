@@ -27,7 +27,7 @@ class RandomGraph {
         for (uint32_t i = 0; i < passes; ++i)
             grow();
         for (const Tensor& out : outputs_) // whatever was made last is seen
-            add(g_, pick(out.rows), pick(out.rows), out);
+            add(g_, pick(out.rows), pick(out.rows), {out});
     }
     const std::vector<Tensor>& outputs() const { return outputs_; }
 
@@ -47,8 +47,8 @@ class RandomGraph {
     void stack() // two writers of the parts of one tensor
     {
         const Tensor a = pick(), b = pick(a.rows), whole = g_.matrix(2 * a.rows, kCols, DType::f32, "stack");
-        add(g_, a, b, whole.row_range(0, a.rows));
-        add(g_, b, b, whole.row_range(a.rows, a.rows));
+        add(g_, a, b, {whole});
+        add(g_, b, b, {whole, a.rows});
         const Tensor folded = gelu(g_, whole);
         values_.push_back(folded.row_range(a.rows, a.rows));
     }
@@ -76,13 +76,13 @@ class RandomGraph {
             break;
         case 6: { // in place
             const Tensor t = add(g_, x, y);
-            add(g_, x, t, t);
+            add(g_, x, t, {t});
             values_.push_back(t);
             break;
         }
         default: { // an output that others read
             const Tensor out = outputs_[below(uint32_t(outputs_.size()))];
-            add(g_, pick(out.rows), pick(out.rows), out);
+            add(g_, pick(out.rows), pick(out.rows), {out});
             values_.push_back(gelu(g_, out));
         }
         }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "engine/format/image.h"
+#include "engine/scene/grid.h"
 #include "runtime/base/safetensors.h"
 #include "tests/scratch_folder.h"
 
@@ -47,6 +48,28 @@ inline void put_buffers(const std::filesystem::path& folder, uint32_t frames, ui
         ASSERT_TRUE(write_png_gray8(folder / "visible" / name, width, height, visible));
         ASSERT_TRUE(write_png_gray8(folder / "label" / name, width, height, label));
     }
+}
+
+// a road of 12 x 20 cells, each with points
+inline VoxelGrid street()
+{
+    VoxelGrid grid;
+    grid.voxel_size = 0.6f;
+    grid.points_per_voxel = 20;
+    for (int32_t i = 0; i < 20; ++i)
+        for (int32_t j = 0; j < 12; ++j)
+            grid.cells.push_back({i, j, 0});
+    for (size_t i = 0; i < grid.cells.size(); ++i) {
+        grid.labels.push_back(0);
+        grid.generated.push_back(1);
+        for (uint32_t p = 0; p < 20; ++p) {
+            for (float offset : {float(p % 5) * 0.12f - 0.24f, float(p / 5) * 0.14f - 0.21f, 0.f})
+                grid.points.push_back(float_to_half(offset));
+            grid.colors.insert(grid.colors.end(), {uint8_t(10 * p), uint8_t(i), uint8_t(90)});
+        }
+    }
+    sort_cells(grid);
+    return grid;
 }
 
 } // namespace semrover

@@ -5,6 +5,7 @@
 #include "runtime/device/pipeline.h"
 #include "runtime/device/profile.h"
 #include "runtime/device/program.h"
+#include "runtime/device/state.h"
 #include "tests/host_vulkan.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
@@ -45,7 +46,7 @@ Graph small_graph(const Buffer& x, const Buffer& out)
     Graph g;
     const Tensor a = g.external(x.slice(), 16, 64, DType::f32, "x"),
                  b = g.external(out.slice(), 16, 64, DType::f32, "out");
-    add(g, gelu(g, add(g, a, a)), a, b);
+    add(g, gelu(g, add(g, a, a)), a, {.whole = b});
     return g;
 }
 
@@ -173,11 +174,11 @@ TEST(runtime_device, refuses_one_allocation_that_is_too_large_with_numbers)
         EXPECT_EQ(buffer.error().code, ErrorCode::out_of_memory);
     }
     EXPECT_EQ(device->allocated_bytes(), 0u);
-    Arena arena;
+    State state;
     for (int i = 0; i < 5; ++i)
-        arena.add(400000); // two a block
-    EXPECT_EQ(arena.planned_bytes(device->limits()), 5 * 400128u);
-    ASSERT_TRUE(arena.allocate(*device, "arena"));
+        (void)state.slot(100000, 1, DType::u32, "slot", 1); // two a block
+    EXPECT_EQ(state.planned_bytes(device->limits()), 5 * 400128u);
+    ASSERT_TRUE(state.allocate(*device, "state"));
     EXPECT_EQ(device->allocated_bytes(), 5 * 400128u);
 }
 

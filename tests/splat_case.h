@@ -41,8 +41,6 @@ inline SplatPixels run_splats(const std::vector<HostSplat>& splats, const std::v
     KernelCase k(test_device());
     const uint32_t floats = splat_camera_floats(options.lens);
     const SplatScene scene = scene_of(k, splats);
-    options.visible = k.output(1, 1, DType::u32, 1);
-    options.pairs = k.output(1, 1, DType::u32, 1);
     if (!options.max_visible)
         options.max_visible = uint32_t(splats.size() * table.size() / floats);
     if (!options.max_pairs)
@@ -50,18 +48,15 @@ inline SplatPixels run_splats(const std::vector<HostSplat>& splats, const std::v
     const SplatImages y = splat(k.graph, scene, k.input(table, floats), options);
     const auto keep = [&](const Tensor& t) {
         const Tensor out = k.output(t.rows, t.cols, t.dtype, t.ld);
-        k.graph.replace(t.resource, out.resource);
+        k.graph.keep(t, out);
         return out;
     };
-    const Tensor color = keep(y.color), surface = keep(y.surface), depth = keep(y.depth), ids = keep(y.ids);
+    const Tensor color = keep(y.color), surface = keep(y.surface), depth = keep(y.depth), ids = keep(y.ids),
+                 visible = keep(y.visible), pairs = keep(y.pairs);
     const Status status = k.compile_and_run();
     EXPECT_TRUE(status) << status.error().message;
-    return {k.read_array<float>(color),
-            k.read_array<float>(surface),
-            k.read_array<float>(depth),
-            k.read_array<uint32_t>(ids),
-            k.read_array<uint32_t>(options.visible)[0],
-            k.read_array<uint32_t>(options.pairs)[0]};
+    return {k.read_array<float>(color),  k.read_array<float>(surface),       k.read_array<float>(depth),
+            k.read_array<uint32_t>(ids), k.read_array<uint32_t>(visible)[0], k.read_array<uint32_t>(pairs)[0]};
 }
 
 inline SplatPixels run_splats(const std::vector<HostSplat>& splats, const std::vector<HostCamera>& cameras,

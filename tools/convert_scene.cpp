@@ -6,7 +6,7 @@
 #include "engine/splat/blocks.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/open_device.h"
-#include "tools/path_renderer.h"
+#include "tools/drive_options.h"
 
 namespace semrover {
 

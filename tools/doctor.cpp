@@ -1,13 +1,13 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover doctor: one page on what works here, what is missing and how to get it
+#include "engine/job/version.h"
 #include "runtime/base/json.h"
 #include "runtime/device/loader.h"
 #include "runtime/device/pipeline.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/progress.h"
-#include "tools/cli/version.h"
 
 #include <CLI/CLI.hpp>
 #include <cstdlib>

@@ -1,17 +1,12 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover edit GRID -o OUT [-m MODEL] OPERATION...: changes labels or occupancy and regenerates only that and a halo
-#include "engine/scene/cell_reach.h"
+#include "engine/job/editing.h"
+#include "engine/job/outputs.h"
 #include "engine/scene/edit_script.h"
 #include "engine/scene/edit_undo.h"
-#include "engine/scene/stamp.h"
-#include "runtime/base/hash.h"
-#include "runtime/base/quote.h"
-#include "tools/cli/commands.h"
-#include "tools/cli/version.h"
-#include "tools/regeneration.h"
+#include "tools/generation_options.h"
 
-#include <algorithm>
 #include <CLI/CLI.hpp>
 
 namespace semrover {
@@ -20,15 +15,12 @@ namespace {
 
 using Kind = EditOperation::Kind;
 
-constexpr double kWidestHalo = 30; // metres
-
 struct EditArguments {
     std::string grid, undo;
-    RegenerationOptions out;
-    std::vector<EditOperation> operations; // as they come on the command line, scripts in their place
+    RegenerationArguments out;
+    EditRequest edit; // its operations as they come on the command line, scripts in their place
     bool cut = false;
     CellSelection cut_where;
-    double halo = 3;
 };
 
 template <typename T>
@@ -39,40 +31,22 @@ T parsed(Result<T> result, const char* option)
     return std::move(*result);
 }
 
-CellSelection& selection(EditArguments& o, const char* option)
+EditOperation& last(EditArguments& o, const char* option)
 {
-    if (o.cut)
-        return o.cut_where;
-    if (o.operations.empty())
+    if (o.cut || o.edit.operations.empty())
         throw CLI::ValidationError(option, "comes after the operation that it belongs to");
-    return o.operations.back().where;
+    return o.edit.operations.back();
 }
 
-EditOperation& operation(EditArguments& o, const char* option)
+CellSelection& where(EditArguments& o, const char* option)
 {
-    if (o.cut || o.operations.empty())
-        throw CLI::ValidationError(option, "comes after the operation that it belongs to");
-    return o.operations.back();
+    return o.cut ? o.cut_where : last(o, option).where;
 }
 
 EditOperation& add(EditArguments& o, Kind kind)
 {
-    o.operations.emplace_back();
-    o.operations.back().kind = kind;
-    return o.operations.back();
-}
-
-using TextHandler = std::function<void(const std::string&)>;
-
-// options whose order counts are handled as they are met
-void add_text(CLI::App& c, const char* name, const char* help, TextHandler handler)
-{
-    c.add_option_function<std::string>(name, std::move(handler), help)->trigger_on_parse();
-}
-
-void add_word(CLI::App& c, const char* name, const char* help, std::function<void()> handler)
-{
-    c.add_flag_callback(name, std::move(handler), help)->trigger_on_parse();
+    o.edit.operations.emplace_back().kind = kind;
+    return o.edit.operations.back();
 }
 
 std::optional<uint8_t> class_or_all(const std::string& text, const char* option)
@@ -80,116 +54,91 @@ std::optional<uint8_t> class_or_all(const std::string& text, const char* option)
     return text == "all" ? std::nullopt : std::optional(parsed(parse_class(text), option));
 }
 
-void add_operations(CLI::App& c, EditArguments* o)
+// an option whose place on the command line counts: handled as it is met
+struct OrderedOption {
+    const char *name, *help;
+    void (*handle)(EditArguments& o, const std::string& text, const char* name);
+    bool flag = false;
+};
+using A = EditArguments;
+using Text = const std::string;
+using Name = const char*;
+
+constexpr bool kFlag = true;
+constexpr OrderedOption kOperations[] = {
+    {"--remove", "class or all: cells go, and the ground under them closes",
+     [](A& o, Text& t, Name n) { add(o, Kind::remove).where.label = class_or_all(t, n); }},
+    {"--remove-object", "i,j,k: removes the connected cells of one label that hold this cell",
+     [](A& o, Text& t, Name n) { add(o, Kind::remove).where.object = parsed(parse_cell(t), n); }},
+    {"--delete", "class or all: cells go, nothing else",
+     [](A& o, Text& t, Name n) { add(o, Kind::erase).where.label = class_or_all(t, n); }},
+    {"--paint", "class that the selected cells get",
+     [](A& o, Text& t, Name n) { add(o, Kind::paint).label = parsed(parse_class(t), n); }},
+    {"--insert", "stamp (.sgrid) that is set --at x,y,z", [](A& o, Text& t, Name) { add(o, Kind::insert).stamp = t; }},
+    {"--copy", "the selected cells once more, moved --by x,y,z", [](A& o, Text&, Name) { add(o, Kind::copy); }, kFlag},
+    {"--move", "the same, and they are removed where they were", [](A& o, Text&, Name) { add(o, Kind::move); }, kFlag},
+    {"--cut", "write the selected cells as a stamp instead", [](A& o, Text&, Name) { o.cut = true; }, kFlag},
+    {"--script", "operations as JSON",
+     [](A& o, Text& t, Name n) {
+         std::ranges::move(parsed(read_edit_script(t), n), std::back_inserter(o.edit.operations));
+     }},
+    {"--class", "of the operation before it: only cells of this class",
+     [](A& o, Text& t, Name n) { where(o, n).label = class_or_all(t, n); }},
+    {"--box", "x0,y0,z0:x1,y1,z1 in metres: only cells whose centres lie inside",
+     [](A& o, Text& t, Name n) { where(o, n).box = parsed(parse_box(t), n); }},
+    {"--sphere", "x,y,z,radius in metres, likewise",
+     [](A& o, Text& t, Name n) { where(o, n).sphere = parsed(parse_sphere(t), n); }},
+    {"--object", "i,j,k: only the connected cells of one label that hold this cell",
+     [](A& o, Text& t, Name n) { where(o, n).object = parsed(parse_cell(t), n); }},
+    {"--fill", "of paint: empty places of the box or sphere become cells too",
+     [](A& o, Text&, Name n) { last(o, n).fill = true; }, kFlag},
+    {"--at", "of insert: the cell there (metres) gets the stamp's lowest corner",
+     [](A& o, Text& t, Name n) { last(o, n).at = parsed(parse_point(t), n); }},
+    {"--by", "of copy and move: metres, rounded to whole cells",
+     [](A& o, Text& t, Name n) { last(o, n).by = parsed(parse_point(t), n); }},
+};
+constexpr OrderedOption kPoints = {"--points",
+                                   "of insert, copy and move: keep the points that come along, or regenerate (default)",
+                                   [](A& o, Text& t, Name n) { last(o, n).keep_points = parsed(keeps_points(t), n); }};
+
+void add_ordered(CLI::App& c, EditArguments* o, const OrderedOption& option)
 {
-    add_text(c, "--remove", "class or all: cells go, and the ground under them closes",
-             [o](const std::string& t) { add(*o, Kind::remove).where.label = class_or_all(t, "--remove"); });
-    add_text(
-        c, "--remove-object", "i,j,k: removes the connected cells of one label that hold this cell",
-        [o](const std::string& t) { add(*o, Kind::remove).where.object = parsed(parse_cell(t), "--remove-object"); });
-    add_text(c, "--delete", "class or all: cells go, nothing else",
-             [o](const std::string& t) { add(*o, Kind::erase).where.label = class_or_all(t, "--delete"); });
-    add_text(c, "--paint", "class that the selected cells get",
-             [o](const std::string& t) { add(*o, Kind::paint).label = parsed(parse_class(t), "--paint"); });
-    add_text(c, "--insert", "stamp (.sgrid) that is set --at x,y,z",
-             [o](const std::string& t) { add(*o, Kind::insert).stamp = t; });
-    add_word(c, "--copy", "the selected cells once more, moved --by x,y,z", [o] { add(*o, Kind::copy); });
-    add_word(c, "--move", "the same, and they are removed where they were", [o] { add(*o, Kind::move); });
-    add_word(c, "--cut", "write the selected cells as a stamp instead", [o] { o->cut = true; });
-    add_text(c, "--script", "operations as JSON", [o](const std::string& t) {
-        for (EditOperation& operation : parsed(read_edit_script(t), "--script"))
-            o->operations.push_back(std::move(operation));
-    });
+    const auto handle = [o, option](const std::string& text) { option.handle(*o, text, option.name); };
+    if (option.flag)
+        c.add_flag_callback(
+             option.name, [handle] { handle(""); }, option.help)
+            ->trigger_on_parse();
+    else
+        c.add_option_function<std::string>(option.name, handle, option.help)->trigger_on_parse();
 }
 
-void add_modifiers(CLI::App& c, EditArguments* o)
+// what --undo and --cut ask before they look at their own
+Status check_alone(const EditArguments& o, bool other, const char* refusal)
 {
-    add_text(c, "--class", "of the operation before it: only cells of this class",
-             [o](const std::string& t) { selection(*o, "--class").label = class_or_all(t, "--class"); });
-    add_text(c, "--box", "x0,y0,z0:x1,y1,z1 in metres: only cells whose centres lie inside",
-             [o](const std::string& t) { selection(*o, "--box").box = parsed(parse_box(t), "--box"); });
-    add_text(c, "--sphere", "x,y,z,radius in metres, likewise",
-             [o](const std::string& t) { selection(*o, "--sphere").sphere = parsed(parse_sphere(t), "--sphere"); });
-    add_text(c, "--object", "i,j,k: only the connected cells of one label that hold this cell",
-             [o](const std::string& t) { selection(*o, "--object").object = parsed(parse_cell(t), "--object"); });
-    add_word(c, "--fill", "of paint: empty places of the box or sphere become cells too",
-             [o] { operation(*o, "--fill").fill = true; });
-    add_text(c, "--at", "of insert: the cell there (metres) gets the stamp's lowest corner",
-             [o](const std::string& t) { operation(*o, "--at").at = parsed(parse_point(t), "--at"); });
-    add_text(c, "--by", "of copy and move: metres, rounded to whole cells",
-             [o](const std::string& t) { operation(*o, "--by").by = parsed(parse_point(t), "--by"); });
-    c.add_option_function<double>(
-         "--rotate",
-         [o](const double& t) { operation(*o, "--rotate").quarter_turns = parsed(quarter_turns(t), "--rotate"); },
-         "of insert, copy and move: 0, 90, 180 or 270 degrees, counterclockwise seen from above")
-        ->trigger_on_parse();
-    add_text(
-        c, "--points", "of insert, copy and move: keep the points that come along, or regenerate (default)",
-        [o](const std::string& t) { operation(*o, "--points").keep_points = parsed(keeps_points(t), "--points"); });
+    if (!o.edit.operations.empty() || other || !o.out.generation.options.model.empty())
+        return fail(ErrorCode::usage, "{}", refusal);
+    if (o.out.output.empty())
+        return fail(ErrorCode::usage, "-o/--output is required");
+    return {};
 }
 
 Status undo(const EditArguments& o, const Globals& globals)
 {
-    if (!o.operations.empty() || o.cut || !o.out.generation.model.empty())
-        return fail(ErrorCode::usage, "--undo stands alone: it takes back a whole edit");
-    if (o.out.output.empty())
-        return fail(ErrorCode::usage, "-o/--output is required");
-    SR_CHECK(check_writable(o.out.output, globals));
+    SR_CHECK(check_alone(o, o.cut, "--undo stands alone: it takes back a whole edit"));
+    SR_CHECK(check_writable(o.out.output, globals.yes));
     return undo_edit(o.undo, o.grid, o.out.output);
 }
 
 Status cut(const EditArguments& o, const Globals& globals)
 {
-    if (!o.operations.empty() || !o.out.generation.model.empty())
-        return fail(ErrorCode::usage, "--cut stands alone: it writes a stamp and changes nothing");
-    if (o.out.output.empty())
-        return fail(ErrorCode::usage, "-o/--output is required");
+    SR_CHECK(check_alone(o, false, "--cut stands alone: it writes a stamp and changes nothing"));
     if (!o.cut_where.any())
         return fail(ErrorCode::usage, "--cut: say which cells: a class, a box, a sphere or an object");
-    SR_CHECK(check_writable(o.out.output, globals));
-    SR_TRY(const VoxelGrid grid, read_grid(o.grid));
-    SR_TRY(const std::vector<uint32_t> cells, select_cells(grid, o.cut_where));
-    if (cells.empty())
-        return fail(ErrorCode::bad_input, "cut: no cell of the grid is selected");
-    VoxelGrid stamp = cut_stamp(grid, cells);
-    stamp.metadata["tool"] = kProgram;
-    SR_CHECK(write_grid(o.out.output, stamp));
+    SR_CHECK(check_writable(o.out.output, globals.yes));
+    SR_TRY(const Json stamp, write_stamp(o.grid, o.cut_where, o.out.output));
     if (globals.json)
-        fmt::print("{}\n", Json{{"cells", cells.size()}, {"origin", stamp.metadata["stamp_origin"]}}.dump());
+        fmt::print("{}\n", stamp.dump());
     return {};
-}
-
-// everything that decides the bytes, stamps by their content
-Result<Json> request_json(const EditArguments& o)
-{
-    Json operations = Json::array();
-    for (const EditOperation& operation : o.operations) {
-        Json json = operation_json(operation);
-        if (operation.kind == Kind::insert) {
-            SR_TRY(const uint64_t hash, hash_file(operation.stamp));
-            json["stamp"] = hash_text(hash);
-        }
-        operations.push_back(json);
-    }
-    return Json{{"operations", operations}, {"halo", o.halo}};
-}
-
-std::vector<Cell> present(const VoxelGrid& grid, const std::vector<Cell>& cells)
-{
-    std::vector<Cell> out;
-    for (const Cell& cell : cells)
-        if (find_cell(grid, cell))
-            out.push_back(cell);
-    return out;
-}
-
-// what changed and what lies around it, but for points that came with a stamp
-std::vector<uint32_t> targets_of(const EditedGrid& edited, double halo)
-{
-    std::vector<uint32_t> targets =
-        cells_within(edited.grid.cells, edited.touched, reach_squared(halo, edited.grid.voxel_size));
-    std::erase_if(targets, [&](uint32_t c) { return std::ranges::binary_search(edited.kept, edited.grid.cells[c]); });
-    return targets;
 }
 
 Status edit(const EditArguments& o, const Globals& globals)
@@ -198,35 +147,16 @@ Status edit(const EditArguments& o, const Globals& globals)
         return undo(o, globals);
     if (o.cut)
         return cut(o, globals);
-    if (o.operations.empty())
+    if (o.edit.operations.empty())
         return fail(ErrorCode::usage, "no operation given (--remove, --delete, --paint, --insert, --copy, --move, "
                                       "--script; or --cut, --undo)");
-    if (!(o.halo >= 0 && o.halo <= kWidestHalo))
-        return fail(ErrorCode::usage, "--halo: expected 0 to {} m, found {}", kWidestHalo, o.halo);
-    for (const EditOperation& operation : o.operations)
-        SR_CHECK(check_operation(operation, fmt::format("--{}", operation_name(operation.kind))));
+    EditRequest request = o.edit;
+    request.grid = o.grid;
+    request.generates = !o.out.generation.options.model.empty();
+    SR_CHECK(check_edit(request));
     SR_CHECK(check_outputs(o.grid, o.out, globals));
-    Regeneration what;
-    what.command = "edit";
-    what.input = o.grid;
-    SR_TRY(what.before, read_grid(o.grid));
-    GridEditor editor(what.before);
-    for (const EditOperation& operation : o.operations)
-        SR_CHECK(editor.apply(operation));
-    EditedGrid edited = editor.finish();
-    if (edited.grid.cells.empty())
-        return fail(ErrorCode::bad_input, "the edit leaves no cell in {}", quote(o.grid));
-    const bool model = !o.out.generation.model.empty();
-    // without a model nothing around the change is thrown away: only cells that changed wait for points
-    what.targets = targets_of(edited, model ? o.halo : 0);
-    SR_TRY(what.request, request_json(o));
-    const size_t left = present(edited.grid, edited.touched).size();
-    what.counts = {{"cells", edited.grid.cells.size()},
-                   {"changed", edited.touched.size()},
-                   {"removed", edited.touched.size() - left},
-                   {"regenerated", model ? what.targets.size() : 0}};
-    what.grid = std::move(edited.grid);
-    return regenerate(what, o.out, globals);
+    SR_TRY(Regeneration what, edit_grid(request));
+    return regenerate(std::move(what), o.out, globals);
 }
 
 } // namespace
@@ -236,9 +166,16 @@ void add_edit(CLI::App& app, const Globals& globals, Run& run)
     auto o = std::make_shared<EditArguments>();
     CLI::App* c = app.add_subcommand("edit", "change labels or occupancy, regenerate only that and a halo around it");
     c->add_option("GRID", o->grid, ".sgrid")->required();
-    add_operations(*c, o.get());
-    add_modifiers(*c, o.get());
-    c->add_option("--halo", o->halo, "metres around what changed that are generated anew (with -m)");
+    for (const OrderedOption& option : kOperations)
+        add_ordered(*c, o.get(), option);
+    const auto rotate = [o = o.get()](double t) {
+        last(*o, "--rotate").quarter_turns = parsed(quarter_turns(t), "--rotate");
+    };
+    c->add_option_function<double>(
+         "--rotate", rotate, "of insert, copy and move: 0, 90, 180 or 270 degrees, counterclockwise seen from above")
+        ->trigger_on_parse();
+    add_ordered(*c, o.get(), kPoints);
+    c->add_option("--halo", o->edit.halo, "metres around what changed that are generated anew (with -m)");
     c->add_option("--undo", o->undo, "OUTPUT.undo of an edit: gives back the file that was edited");
     add_regeneration_options(*c, o->out);
     c->callback([o, &globals, &run] { run = [o, &globals] { return edit(*o, globals); }; });

@@ -1,13 +1,11 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// semrover generate GRID -m MODEL -o OUT.sgrid: fills a semantic grid with points, region by region
+// semrover generate GRID -m MODEL -o OUT.sgrid: fills a semantic grid with points, region by region; with --along,
+// grows it along a camera path into a folder of tiles
+#include "engine/job/generation.h"
+#include "engine/job/growth.h"
 #include "runtime/base/hash.h"
-#include "tools/cli/commands.h"
-#include "tools/cli/open_device.h"
-#include "tools/cli/version.h"
-#include "tools/export_ply.h"
-#include "tools/generate_along.h"
-#include "tools/generation.h"
+#include "tools/generation_options.h"
 #include "tools/scene_input.h"
 
 #include <CLI/CLI.hpp>
@@ -19,81 +17,50 @@ namespace {
 struct GenerateArguments {
     std::string grid, output;
     uint64_t seed = 0;
-    GenerationOptions generation;
+    GenerationArguments generation;
     PlyExports ply;
     SceneInputOptions input;
-    AlongOptions along;
+    GrowthRequest along; // with a path: --along
 };
 
-// of the file, or of what another program's file became: that depends on options and on other files
-Result<uint64_t> hash_input(const GenerateArguments& o, const VoxelGrid& grid)
+Status generate_along(const GenerateArguments& o, const Globals& globals)
 {
-    if (o.input.from.empty() && Path(o.grid).extension() == ".sgrid")
-        return hash_file(o.grid);
-    Hash hash;
-    hash.add(fmt::format("{}", grid.voxel_size));
-    hash.add(std::as_bytes(std::span(grid.cells)));
-    hash.add(std::as_bytes(std::span(grid.labels)));
-    hash.add(std::as_bytes(std::span(grid.points)));
-    hash.add(std::as_bytes(std::span(grid.colors)));
-    hash.add(std::as_bytes(std::span(grid.generated)));
-    return hash.value();
-}
-
-Status finish(const GenerateArguments& o, Generation& g, VoxelGrid& grid, RunFolder& run, const std::string& model_hash,
-              const Globals& globals)
-{
-    grid.metadata["seed"] = std::to_string(o.seed);
-    grid.metadata["tool"] = kProgram;
-    grid.metadata["model"] = model_hash;
     if (o.ply.any())
-        SR_CHECK(export_ply(g.device(), grid, o.ply));
-    SR_CHECK(write_grid(o.output, grid));
-    SR_TRY(const uint64_t hash, hash_file(o.output));
-    Json results = g.results_json();
-    results["output"] = Path(o.output).filename().string();
-    results["xxh64"] = hash_text(hash);
-    SR_CHECK(run.finish(results));
-    SR_CHECK(g.write_profile());
-    if (globals.json)
-        fmt::print("{}\n", results.dump());
-    return {};
-}
-
-Status check_output(const GenerateArguments& o, const Globals& globals)
-{
-    if (o.output.empty())
+        return fail(ErrorCode::usage, "--ply and its like have no meaning with --along: convert what it writes");
+    if (o.output.empty() && !o.generation.dry_run)
         return fail(ErrorCode::usage, "-o/--output is required");
-    for (const std::string& path : {o.output, o.ply.points, o.ply.splats_3d, o.ply.splats_2d})
-        if (!path.empty())
-            SR_CHECK(check_writable(path, globals));
-    return {};
+    GrowthRequest request = o.along;
+    request.generation = o.generation.options;
+    request.scaffold = o.grid;
+    request.output = o.output;
+    request.seed = o.seed;
+    request.replace = globals.yes;
+    SR_TRY(GrowthPlan plan, plan_growth(request, !o.generation.dry_run));
+    return run_on_device(
+        o.generation, globals, [&](Device& d, const JobCallbacks& c) { return begin_growth(d, std::move(plan), c); },
+        [&](Device& d, const JobCallbacks& c) { return estimate_growth(d, std::move(plan), c); });
 }
 
 Status generate(const GenerateArguments& o, const Globals& globals)
 {
-    if (!o.along.path.empty()) {
-        if (o.ply.any())
-            return fail(ErrorCode::usage, "--ply and its like have no meaning with --along: convert what it writes");
-        return generate_along({o.grid, o.output, o.seed}, o.along, o.generation, globals);
+    if (!o.along.path.empty())
+        return generate_along(o, globals);
+    GenerationRequest request{.settings = {}, .seed = o.seed, .output = o.output, .ply = o.ply, .replace = globals.yes};
+    if (!o.generation.dry_run) {
+        if (o.output.empty())
+            return fail(ErrorCode::usage, "-o/--output is required");
+        SR_CHECK(check_generation_outputs(request));
     }
-    if (!o.generation.dry_run)
-        SR_CHECK(check_output(o, globals));
-    Generation g(o.generation, globals);
-    SR_CHECK(g.resolve());
+    SR_TRY(request.settings, resolve_generation(o.generation.options));
     SR_TRY(VoxelGrid grid, load_grid(o.grid, o.input, globals));
-    SR_TRY(const uint64_t grid_hash, hash_input(o, grid));
-    SR_CHECK(g.open());
-    SR_CHECK(g.begin(grid, g.settings().regions));
-    SR_CHECK(g.load(o.seed));
-    if (o.generation.dry_run)
-        return g.report_dry_run();
-    SR_TRY(Json settings, g.settings_json("generate", grid_hash));
-    settings["seed"] = o.seed;
-    // -y starts over only what is finished: an interrupted run with these settings goes on
-    SR_TRY(RunFolder run, open_run(o.output + ".run", settings, globals.yes));
-    SR_CHECK(g.fill(run, o.output));
-    return finish(o, g, grid, run, settings["model"], globals);
+    // what another program's file became depends on options and on other files
+    if (o.input.from.empty() && Path(o.grid).extension() == ".sgrid") {
+        SR_TRY(request.grid_hash, hash_file(o.grid));
+    }
+    return run_on_device(
+        o.generation, globals,
+        [&](Device& d, const JobCallbacks& c) { return begin_generation(d, std::move(grid), request, c); },
+        [&](Device& d, const JobCallbacks& c) { return estimate_generation(d, std::move(grid), request, c); });
 }
 
 } // namespace
@@ -107,18 +74,27 @@ void add_generate(CLI::App& app, const Globals& globals, Run& run)
          ".sgrid, .npz, .label, .vox or .ply (cells that have points are kept as they are), or a folder of tiles")
         ->required();
     add_scene_input_options(*c, o->input);
-    c->add_option("-m,--model", o->generation.model, "model folder")->required();
+    c->add_option("-m,--model", o->generation.options.model, "model folder")->required();
     c->add_option("-o,--output", o->output, ".sgrid to write; OUTPUT.run beside it keeps the run's state");
     c->add_option("-s,--seed", o->seed, "noise seed");
     add_generation_options(*c, o->generation);
-    c->add_option("--strategy", o->generation.strategy,
-                  "complete, or paper (Algorithm 1 as printed: may leave cells empty)")
+    c->add_option_function<std::string>(
+         "--strategy",
+         [o](const std::string& text) {
+             o->generation.options.strategy = text == "paper" ? RegionStrategy::paper : RegionStrategy::complete;
+         },
+         "complete, or paper (Algorithm 1 as printed: may leave cells empty)")
         ->check(CLI::IsMember({"complete", "paper"}));
-    c->add_option("--first-cell", o->generation.first_cell, "index of the cell to start from");
+    c->add_option("--first-cell", o->generation.options.first_cell, "index of the cell to start from");
     c->add_option("--ply", o->ply.points, "also write the points with colour and label as PLY");
     c->add_option("--ply-3dgs", o->ply.splats_3d, "also write the splats as a 3DGS PLY");
     c->add_option("--ply-2dgs", o->ply.splats_2d, "also write the splats as a 2DGS PLY");
-    add_along_options(*c, o->along);
+    c->add_option("--along", o->along.path,
+                  "camera path: grow the scaffold along it into a folder of tiles, with memory that does not grow");
+    c->add_option("--horizon", o->along.horizon, "--along: metres from the path, seen from above, that are generated");
+    c->add_option("--window", o->along.window, "--along: metres of path at a time; another value gives another world");
+    c->add_option("--tile-size", o->along.tile_size,
+                  "--along: metres of a tile's edge, when the scaffold is one .sgrid");
     c->callback([o, &globals, &run] { run = [o, &globals] { return generate(*o, globals); }; });
 }
 

@@ -1,13 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover inpaint GRID -m MODEL -o OUT --box ...: regenerates chosen cells, the rest staying byte for byte
-#include "engine/scene/edit_script.h"
-#include "runtime/base/hash.h"
-#include "runtime/base/quote.h"
-#include "tools/cli/commands.h"
-#include "tools/regeneration.h"
+#include "engine/job/editing.h"
+#include "tools/generation_options.h"
 
-#include <algorithm>
 #include <CLI/CLI.hpp>
 
 namespace semrover {
@@ -16,60 +12,30 @@ namespace {
 
 struct InpaintArguments {
     std::string grid, label, box, sphere, object, mask;
-    RegenerationOptions out;
+    RegenerationArguments out;
 };
 
-Result<CellSelection> selection_of(const InpaintArguments& o)
+template <typename T, typename Parse>
+Status parse_into(std::optional<T>& value, const std::string& text, Parse parse)
 {
-    CellSelection s;
-    if (!o.label.empty()) {
-        SR_TRY(s.label, parse_class(o.label));
-    }
-    if (!o.box.empty()) {
-        SR_TRY(s.box, parse_box(o.box));
-    }
-    if (!o.sphere.empty()) {
-        SR_TRY(s.sphere, parse_sphere(o.sphere));
-    }
-    if (!o.object.empty()) {
-        SR_TRY(s.object, parse_cell(o.object));
-    }
-    return s;
-}
-
-// the cells that a second grid has, too
-Status keep_masked(std::vector<uint32_t>& cells, const VoxelGrid& grid, const Path& path)
-{
-    SR_TRY(const VoxelGrid mask, read_grid(path));
-    if (mask.voxel_size != grid.voxel_size)
-        return fail(ErrorCode::bad_input, "{} has cells of {} m, the grid has cells of {} m", quote_path(path),
-                    mask.voxel_size, grid.voxel_size);
-    std::erase_if(cells, [&](uint32_t c) { return !find_cell(mask, grid.cells[c]); });
+    if (text.empty())
+        return {};
+    SR_TRY(value, parse(text));
     return {};
 }
 
 Status inpaint(const InpaintArguments& o, const Globals& globals)
 {
-    SR_TRY(const CellSelection where, selection_of(o));
-    if (!where.any() && o.mask.empty())
+    InpaintRequest request{.grid = o.grid, .where = {}, .mask = o.mask};
+    SR_CHECK(parse_into(request.where.label, o.label, parse_class));
+    SR_CHECK(parse_into(request.where.box, o.box, parse_box));
+    SR_CHECK(parse_into(request.where.sphere, o.sphere, parse_sphere));
+    SR_CHECK(parse_into(request.where.object, o.object, parse_cell));
+    if (!request.where.any() && o.mask.empty())
         return fail(ErrorCode::usage, "say which cells: --box, --sphere, --class, --object or --mask");
     SR_CHECK(check_outputs(o.grid, o.out, globals));
-    Regeneration what;
-    what.command = "inpaint";
-    what.input = o.grid;
-    SR_TRY(what.before, read_grid(o.grid));
-    SR_TRY(what.targets, select_cells(what.before, where));
-    what.request = {{"where", selection_json(where)}};
-    if (!o.mask.empty()) {
-        SR_CHECK(keep_masked(what.targets, what.before, o.mask));
-        SR_TRY(const uint64_t hash, hash_file(o.mask));
-        what.request["mask"] = hash_text(hash);
-    }
-    if (what.targets.empty())
-        return fail(ErrorCode::bad_input, "no cell of {} is selected", quote(o.grid));
-    what.grid = what.before;
-    what.counts = {{"cells", what.grid.cells.size()}, {"regenerated", what.targets.size()}};
-    return regenerate(what, o.out, globals);
+    SR_TRY(Regeneration what, select_for_inpainting(request));
+    return regenerate(std::move(what), o.out, globals);
 }
 
 } // namespace

@@ -3,13 +3,13 @@
 // semrover page -o index.html --grid GRID: one HTML file that shows a finished run
 #include "tools/page/page.h"
 #include "engine/format/camera_path.h"
+#include "engine/job/outputs.h"
+#include "engine/job/version.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/lens_options.h"
 #include "tools/cli/progress.h"
-#include "tools/cli/version.h"
-#include "tools/generation.h"
 
 #include <algorithm>
 #include <CLI/CLI.hpp>
@@ -141,7 +141,7 @@ Result<PageContent> load_content(const PageArguments& o, const Globals& globals)
 
 Status page(const PageArguments& o, const Globals& globals)
 {
-    SR_CHECK(check_writable(o.output, globals));
+    SR_CHECK(check_writable(o.output, globals.yes));
     SR_TRY(const PageContent content, load_content(o, globals));
     const std::string html = page_html(content);
     SR_CHECK(write_file_atomically(o.output, html));

@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "tools/refiner.h"
+#include "engine/job/refine_store.h"
+#include "engine/refine/refine_chain.h"
 
 namespace semrover {
 

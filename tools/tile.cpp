@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover tile GRID -o DIR: cuts a grid into tiles; semrover tile DIR --join -o GRID: puts them together again
+#include "engine/job/outputs.h"
 #include "engine/scene/tiles.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/commands.h"
-#include "tools/generation.h"
 
 #include <CLI/CLI.hpp>
 
@@ -20,7 +20,7 @@ struct TileArguments {
 
 Status join(const TileArguments& o, const Globals& globals)
 {
-    SR_CHECK(check_writable(o.output, globals));
+    SR_CHECK(check_writable(o.output, globals.yes));
     SR_TRY(const TileFolder folder, TileFolder::open(o.input));
     SR_TRY(const VoxelGrid grid, folder.read_all());
     SR_CHECK(write_grid(o.output, grid));

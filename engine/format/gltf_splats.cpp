@@ -33,18 +33,18 @@ struct Attributes {
     bool view_dependent = false;
 };
 
-struct Placement {
+struct SplatPlacement {
     Rigid rigid; // from the file's axes and the node's to the world's
     double scale = 1;
     std::array<double, 4> rotation{};
 };
 
-Result<Placement> placement_of(const std::array<double, 16>& m, const std::string& where)
+Result<SplatPlacement> placement_of(const std::array<double, 16>& m, const std::string& where)
 {
     double squares = 0;
     for (size_t row = 0; row < 3; ++row)
         squares += m[4 * row] * m[4 * row];
-    Placement p;
+    SplatPlacement p;
     p.scale = std::sqrt(squares);
     std::array<double, 16> unit = m;
     for (size_t row = 0; row < 3; ++row)
@@ -99,7 +99,7 @@ Result<Attributes> attributes_of(const GltfDocument& d, const Json& json, const 
     return a;
 }
 
-Ellipsoid ellipsoid_of(const Attributes& a, size_t i, const Placement& p)
+Ellipsoid ellipsoid_of(const Attributes& a, size_t i, const SplatPlacement& p)
 {
     Ellipsoid e;
     const float* at = &a.position.data[3 * i];
@@ -119,7 +119,7 @@ Ellipsoid ellipsoid_of(const Attributes& a, size_t i, const Placement& p)
     return e;
 }
 
-Status add_primitive(const GltfDocument& d, const Json& primitive, const Placement& placement,
+Status add_primitive(const GltfDocument& d, const Json& primitive, const SplatPlacement& placement,
                      EllipsoidFlattener& flattener, const std::string& where)
 {
     const auto json = primitive.find("attributes");
@@ -161,7 +161,7 @@ Result<SplatFile> read_splats_glb(const Path& path)
             continue;
         for (const Json& primitive : *primitives)
             if (has_splats(primitive)) {
-                SR_TRY(const Placement placement, placement_of(instance.transform, where));
+                SR_TRY(const SplatPlacement placement, placement_of(instance.transform, where));
                 SR_CHECK(add_primitive(d, primitive, placement, flattener, where));
                 found = true;
             }

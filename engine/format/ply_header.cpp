@@ -22,7 +22,7 @@ struct TypeFacts {
 };
 
 // in the order of PlyType
-constexpr std::array<TypeFacts, 8> kTypes = {{
+constexpr std::array<TypeFacts, 8> kPlyTypes = {{
     {"char", "int8", 1, -128, 127},
     {"uchar", "uint8", 1, 0, 255},
     {"short", "int16", 2, -32768, 32767},
@@ -35,13 +35,13 @@ constexpr std::array<TypeFacts, 8> kTypes = {{
 
 const TypeFacts& facts(PlyType type)
 {
-    return kTypes[static_cast<size_t>(type)];
+    return kPlyTypes[static_cast<size_t>(type)];
 }
 
 std::optional<PlyType> type_of(std::string_view name)
 {
-    for (size_t i = 0; i < kTypes.size(); ++i)
-        if (name == kTypes[i].name || name == kTypes[i].sized_name)
+    for (size_t i = 0; i < kPlyTypes.size(); ++i)
+        if (name == kPlyTypes[i].name || name == kPlyTypes[i].sized_name)
             return static_cast<PlyType>(i);
     return std::nullopt;
 }

@@ -23,9 +23,9 @@ struct Placed {
 };
 
 // walks the scene from its root
-class Placement {
+class VoxPlacement {
   public:
-    Placement(const VoxFile& file, std::string_view where) : file_(file), where_(where) {}
+    VoxPlacement(const VoxFile& file, std::string_view where) : file_(file), where_(where) {}
 
     Status walk(uint32_t id, const VoxTransform& transform, size_t depth);
     Status place(uint32_t model, const VoxTransform& transform);
@@ -45,7 +45,7 @@ class Placement {
     size_t visits_ = 0;
 };
 
-Status Placement::place(uint32_t index, const VoxTransform& transform)
+Status VoxPlacement::place(uint32_t index, const VoxTransform& transform)
 {
     if (index >= file_.models.size())
         return fail(ErrorCode::bad_input, "{}: the scene names model {}, there are {}", where_, index,
@@ -58,7 +58,7 @@ Status Placement::place(uint32_t index, const VoxTransform& transform)
     return {};
 }
 
-Status Placement::walk(uint32_t id, const VoxTransform& transform, size_t depth)
+Status VoxPlacement::walk(uint32_t id, const VoxTransform& transform, size_t depth)
 {
     const auto found = file_.nodes.find(id);
     if (found == file_.nodes.end())
@@ -111,7 +111,8 @@ LabelMap palette_map(const VoxFile& file, bool nearest)
 }
 
 // the scene's voxels, or the first model's
-Status place_all(const VoxFile& file, Placement& placement, std::string_view where, std::vector<std::string>& warnings)
+Status place_all(const VoxFile& file, VoxPlacement& placement, std::string_view where,
+                 std::vector<std::string>& warnings)
 {
     if (!file.nodes.empty()) {
         SR_CHECK(placement.walk(0, {}, 0));
@@ -177,7 +178,7 @@ Result<SceneGrid> read_vox(const Path& path, const SceneGridOptions& o)
     SR_TRY(const std::vector<std::byte> bytes, read_file(path, kMaxFileBytes));
     SR_TRY(const VoxFile file, parse_vox(bytes, where));
     SceneGrid out;
-    Placement placement(file, where);
+    VoxPlacement placement(file, where);
     SR_CHECK(place_all(file, placement, where, out.warnings));
     LabelMap map = palette_map(file, o.nearest_color);
     if (!o.map.empty())

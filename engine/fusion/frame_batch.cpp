@@ -68,11 +68,11 @@ Result<FrameBatch> FrameBatch::create(Device& device, const DepthFrames& frames)
     if (largest > limit)
         return fail(ErrorCode::out_of_memory, "a frame of {} pixels; this device has room for {}", largest, limit);
     FrameBatch batch(device);
-    batch.pixels_ = uint32_t(std::min({std::max(largest, kMaxPixels), std::max(largest, all), limit}));
-    batch.memory_->add(uint64_t(kMaxFrames) * kTsdfFrameWords * 4);
-    batch.memory_->add(uint64_t(batch.pixels_) * 8);
-    SR_CHECK(batch.memory_->allocate(device, "frames to fuse"));
-    SR_CHECK(device.clear(batch.memory_->slice(1)));
+    const auto pixels = uint32_t(std::min({std::max(largest, kMaxPixels), std::max(largest, all), limit}));
+    batch.table_ = batch.state_.slot(kMaxFrames, kTsdfFrameWords, DType::f32, "frames", kTsdfFrameWords);
+    batch.pixels_ = batch.state_.slot(pixels, 2, DType::u32, "pixels", 2);
+    SR_CHECK(batch.state_.allocate(device, "frames to fuse"));
+    SR_CHECK(batch.pixels_.clear(device));
     return batch;
 }
 
@@ -82,7 +82,7 @@ size_t FrameBatch::fitting(const DepthFrames& frames, std::span<const uint32_t> 
     uint64_t pixels = 0;
     while (count < kMaxFrames && next + count < order.size()) {
         pixels += pixels_of(frames.cameras[order[next + count]]);
-        if (pixels > pixels_)
+        if (pixels > this->pixels())
             break;
         ++count;
     }
@@ -106,14 +106,13 @@ Status FrameBatch::upload(const DepthFrames& frames, const FusionBox& box, std::
         pack(images, excluded, &words[2 * first]);
         std::ranges::copy(table_row(camera, box, uint32_t(first)), &table[i * kTsdfFrameWords]);
     }
-    SR_CHECK(device_->write(memory_->slice(0), std::as_bytes(std::span(table))));
-    return device_->write(memory_->slice(1).part(0, words.size() * 4), std::as_bytes(std::span(words)));
+    SR_CHECK(table_.write(*device_, table));
+    return pixels_.row_range(0, uint32_t(words.size() / 2)).write(*device_, words);
 }
 
 TsdfFrames FrameBatch::in(Graph& g) const
 {
-    return {g.external(memory_->slice(0), kMaxFrames, kTsdfFrameWords, DType::f32, "frames", kTsdfFrameWords),
-            g.external(memory_->slice(1), pixels_, 2, DType::u32, "pixels", 2)};
+    return {table_.in(g), pixels_.in(g)};
 }
 
 } // namespace semrover

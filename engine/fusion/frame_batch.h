@@ -7,6 +7,7 @@
 #include "kernels/fusion.h"
 #include "kernels/network.h"
 #include "runtime/device/device.h"
+#include "runtime/device/state.h"
 
 #include <memory>
 #include <span>
@@ -31,14 +32,14 @@ class FrameBatch {
     Status upload(const DepthFrames& frames, const FusionBox& box, std::span<const uint32_t> batch, uint32_t excluded);
 
     TsdfFrames in(Graph& g) const;
-    uint32_t pixels() const { return pixels_; }
+    uint32_t pixels() const { return pixels_.rows(); }
 
   private:
     explicit FrameBatch(Device& device) : device_(&device) {}
 
     Device* device_;
-    std::unique_ptr<Arena> memory_ = std::make_unique<Arena>(); // table, pixels
-    uint32_t pixels_ = 0;
+    State state_;
+    Slot table_, pixels_;
 };
 
 } // namespace semrover

@@ -15,8 +15,6 @@ namespace {
 constexpr uint64_t kRangeBytes = 128u << 20; // of vertices and of faces that are read at a time
 constexpr uint32_t kNoVote = 31;             // in attributes
 
-enum Part : uint32_t { kTable, kCases, kEdges, kFirstVertex, kFirstFace, kVertices, kFaces };
-
 class Extraction {
   public:
     Extraction(Device& device, const TsdfVolume& volume) : device_(device), volume_(volume) {}
@@ -27,38 +25,28 @@ class Extraction {
   private:
     uint32_t blocks() const { return uint32_t(volume_.blocks().size()); }
     MarchingCubesCounts counts_in(Graph& g) const;
-    Tensor table_in(Graph& g) const { return g.external(memory_.slice(kTable), 256 * 16, 1, DType::u32, "table", 1); }
-    Result<std::vector<uint32_t>> starts(Part first, Part total) const; // of blocks, and the total
+    Result<std::vector<uint32_t>> starts(const Slot& first, const Slot& total) const; // of blocks, and the total
     uint32_t range_end(uint32_t first, uint64_t bytes) const;
     Status write_range(uint32_t first, uint32_t last, FusedSurface& surface);
     void append(uint32_t first, uint32_t last, std::span<const std::array<float, 4>> rows, FusedSurface& surface) const;
 
     Device& device_;
     const TsdfVolume& volume_;
-    Arena memory_;
+    State state_;
+    Slot table_, cases_, edges_, first_vertex_, first_face_, vertices_, faces_;
     std::vector<uint32_t> vertex_starts_, face_starts_; // [blocks + 1]
 };
 
 MarchingCubesCounts Extraction::counts_in(Graph& g) const
 {
-    const auto array = [&](Part part, uint32_t rows, const char* name) {
-        return g.external(memory_.slice(part), rows, 1, DType::u32, name, 1);
-    };
-    const uint32_t voxels = blocks() * kTsdfBlockVoxels;
-    return {array(kCases, voxels, "cases"),
-            array(kEdges, voxels, "edges"),
-            array(kFirstVertex, blocks(), "first vertices"),
-            array(kFirstFace, blocks(), "first faces"),
-            array(kVertices, 1, "vertices"),
-            array(kFaces, 1, "faces")};
+    return {cases_.in(g), edges_.in(g), first_vertex_.in(g), first_face_.in(g), vertices_.in(g), faces_.in(g)};
 }
 
-Result<std::vector<uint32_t>> Extraction::starts(Part first, Part total) const
+Result<std::vector<uint32_t>> Extraction::starts(const Slot& first, const Slot& total) const
 {
-    std::vector<uint32_t> values(blocks() + 1);
-    const auto bytes = std::as_writable_bytes(std::span(values));
-    SR_CHECK(device_.read(memory_.slice(first).part(0, bytes.size() - 4), bytes.first(bytes.size() - 4)));
-    SR_CHECK(device_.read(memory_.slice(total).part(0, 4), bytes.last(4)));
+    SR_TRY(std::vector<uint32_t> values, first.read<uint32_t>(device_));
+    SR_TRY(const std::vector<uint32_t> all, total.read<uint32_t>(device_));
+    values.push_back(all.front());
     if (values.back() == ~0u)
         return fail(ErrorCode::out_of_memory, "the surface has more than 2^32 vertices or faces");
     return values;
@@ -66,20 +54,24 @@ Result<std::vector<uint32_t>> Extraction::starts(Part first, Part total) const
 
 Status Extraction::count()
 {
-    const uint64_t voxels = uint64_t(blocks()) * kTsdfBlockVoxels;
     const std::vector<uint32_t> table = marching_cubes_table();
-    const uint64_t starts_bytes = blocks() * 4ull, table_bytes = table.size() * 4ull;
-    for (const uint64_t bytes : {table_bytes, voxels * 4, voxels * 4, starts_bytes, starts_bytes, uint64_t(4),
-                                 uint64_t(4)}) // in order of Part
-        memory_.add(bytes);
-    SR_CHECK(memory_.allocate(device_, "marching cubes"));
-    SR_CHECK(device_.write(memory_.slice(kTable).part(0, table_bytes), std::as_bytes(std::span(table))));
+    const auto array = [&](uint32_t rows, const char* name) { return state_.slot(rows, 1, DType::u32, name, 1); };
+    const uint32_t voxels = blocks() * kTsdfBlockVoxels;
+    table_ = array(uint32_t(table.size()), "table");
+    cases_ = array(voxels, "cases");
+    edges_ = array(voxels, "edges");
+    first_vertex_ = array(blocks(), "first vertices");
+    first_face_ = array(blocks(), "first faces");
+    vertices_ = array(1, "vertices");
+    faces_ = array(1, "faces");
+    SR_CHECK(state_.allocate(device_, "marching cubes"));
+    SR_CHECK(table_.write(device_, table));
     Graph g;
-    marching_cubes_count(g, volume_.in(g), table_in(g), counts_in(g));
+    marching_cubes_count(g, volume_.in(g), table_.in(g), counts_in(g));
     SR_TRY(const auto program, Program::create(device_, g));
     SR_CHECK(program->run());
-    SR_TRY(vertex_starts_, starts(kFirstVertex, kVertices));
-    SR_TRY(face_starts_, starts(kFirstFace, kFaces));
+    SR_TRY(vertex_starts_, starts(first_vertex_, vertices_));
+    SR_TRY(face_starts_, starts(first_face_, faces_));
     return {};
 }
 
@@ -110,25 +102,23 @@ Status Extraction::write_range(uint32_t first, uint32_t last, FusedSurface& surf
     const MarchingCubesRange range{first, last - first, vertex_starts_[first], face_starts_[first]};
     // a block may have faces whose vertices are its neighbours' only
     const uint32_t vertices = vertex_starts_[last] - range.first_vertex, faces = face_starts_[last] - range.first_face;
-    Arena out;
-    out.add(std::max(vertices, 1u) * 16ull);
-    out.add(std::max(faces, 1u) * 12ull);
+    State out;
+    const Slot positions = out.slot(std::max(vertices, 1u), 4, DType::f32, "vertices", 4);
+    const Slot corners = out.slot(std::max(faces, 1u), 3, DType::u32, "faces", 3);
     SR_CHECK(out.allocate(device_, "surface"));
     Graph g;
     const MarchingCubesField field = volume_.in(g);
     const MarchingCubesCounts counts = counts_in(g);
-    marching_cubes_vertices(g, field, counts, range,
-                            g.external(out.slice(0), std::max(vertices, 1u), 4, DType::f32, "vertices", 4));
-    marching_cubes_faces(g, field, counts, table_in(g), range,
-                         g.external(out.slice(1), std::max(faces, 1u), 3, DType::u32, "faces", 3));
+    marching_cubes_vertices(g, field, counts, range, positions.in(g));
+    marching_cubes_faces(g, field, counts, table_.in(g), range, corners.in(g));
     SR_TRY(const auto program, Program::create(device_, g));
     SR_CHECK(program->run());
-    std::vector<std::array<float, 4>> rows(vertices);
-    SR_CHECK(device_.read(out.slice(0).part(0, rows.size() * 16), std::as_writable_bytes(std::span(rows))));
+    using Row = std::array<float, 4>;
+    SR_TRY(const std::vector<Row> rows, positions.row_range(0, vertices).read<Row>(device_));
     append(first, last, rows, surface);
     const size_t before = surface.faces.size();
     surface.faces.resize(before + faces);
-    return device_.read(out.slice(1).part(0, faces * 12ull),
+    return device_.read(corners.row_range(0, faces).slice(),
                         std::as_writable_bytes(std::span(surface.faces).subspan(before)));
 }
 

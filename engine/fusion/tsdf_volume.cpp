@@ -128,16 +128,14 @@ Status TsdfVolume::plan_box(const DepthFrames& frames)
 Status TsdfVolume::touch(const DepthFrames& frames, FrameBatch& batch, const FusionProgress& progress)
 {
     const TsdfOptions options = kernel_options();
-    const uint32_t words = options.bitmap_words();
-    box_memory_->add(uint64_t(words) * 4);
-    box_memory_->add(uint64_t(words) * 4);
-    box_memory_->add(4);
-    SR_CHECK(box_memory_->allocate(*device_, "blocks of the box"));
-    SR_CHECK(device_->clear(box_memory_->slice(kBitmap)));
+    bitmap_ = box_state_.slot(options.bitmap_words(), 1, DType::u32, "bitmap", 1);
+    ranks_ = box_state_.slot(options.bitmap_words(), 1, DType::u32, "ranks", 1);
+    total_ = box_state_.slot(1, 1, DType::u32, "blocks", 1);
+    SR_CHECK(box_state_.allocate(*device_, "blocks of the box"));
+    SR_CHECK(bitmap_.clear(*device_));
     Graph g;
     const TsdfFrames table = batch.in(g);
-    const Tensor bitmap = g.external(box_memory_->slice(kBitmap), words, 1, DType::u32, "bitmap", 1);
-    tsdf_touch(g, table.frames, tsdf_planes(g, table, options), options, bitmap);
+    tsdf_touch(g, table.frames, tsdf_planes(g, table, options), options, bitmap_.in(g));
     SR_TRY(const auto program, Program::create(*device_, g));
     std::vector<uint32_t> order(frames.cameras.size());
     std::iota(order.begin(), order.end(), 0u);
@@ -153,19 +151,14 @@ Status TsdfVolume::touch(const DepthFrames& frames, FrameBatch& batch, const Fus
 
 Status TsdfVolume::list_blocks()
 {
-    const uint32_t words = kernel_options().bitmap_words();
-    const auto ranked = [&](Graph& g) {
-        return std::pair{g.external(box_memory_->slice(kBitmap), words, 1, DType::u32, "bitmap", 1),
-                         g.external(box_memory_->slice(kRanks), words, 1, DType::u32, "ranks", 1)};
-    };
     Graph count;
-    const auto [bitmap, ranks] = ranked(count);
-    const Tensor total = count.external(box_memory_->slice(kTotal), 1, 1, DType::u32, "blocks", 1);
-    count.replace(tsdf_rank(count, bitmap, total).sums.resource, ranks.resource);
+    const PrefixSum ranked = tsdf_rank(count, bitmap_.in(count));
+    count.keep(ranked.sums, ranks_);
+    count.keep(ranked.total, total_);
     SR_TRY(auto program, Program::create(*device_, count));
     SR_CHECK(program->run());
-    uint32_t blocks = 0;
-    SR_CHECK(device_->read(box_memory_->slice(kTotal), std::as_writable_bytes(std::span(&blocks, 1))));
+    SR_TRY(const std::vector<uint32_t> total, total_.read<uint32_t>(*device_));
+    const uint32_t blocks = total.front();
     if (blocks == 0)
         return fail(ErrorCode::bad_input, "nothing was observed: no pixel of {} frames has a depth within {} m",
                     reach_.size(), options_.max_depth);
@@ -175,16 +168,16 @@ Status TsdfVolume::list_blocks()
                     "the surface fills {} blocks of 8^3 voxels; this device has room for {}: fuse parts of the path, "
                     "or use a larger --tsdf-voxel or a smaller --max-depth",
                     blocks, most);
-    for (const uint64_t bytes : {uint64_t(blocks) * 4, blocks * kBlockBytes, blocks * kBlockBytes})
-        field_->add(bytes);
-    SR_CHECK(field_->allocate(*device_, "distance field"));
+    block_ids_ = field_.slot(blocks, 1, DType::u32, "blocks", 1);
+    distances_ = field_.slot(blocks * kTsdfBlockVoxels, 1, DType::f32, "distances", 1);
+    attributes_ = field_.slot(blocks * kTsdfBlockVoxels, 1, DType::u32, "attributes", 1);
+    SR_CHECK(field_.allocate(*device_, "distance field"));
     Graph g;
-    const auto [bits, before] = ranked(g);
-    tsdf_list(g, bits, before, g.external(field_->slice(kBlocks), blocks, 1, DType::u32, "blocks", 1));
+    tsdf_list(g, bitmap_.in(g), ranks_.in(g), block_ids_.in(g));
     SR_TRY(program, Program::create(*device_, g));
     SR_CHECK(program->run());
-    blocks_.resize(blocks);
-    return device_->read(field_->slice(kBlocks).part(0, blocks * 4ull), std::as_writable_bytes(std::span(blocks_)));
+    SR_TRY(blocks_, block_ids_.read<uint32_t>(*device_));
+    return {};
 }
 
 // how many blocks' sums and votes fit at a time
@@ -210,16 +203,32 @@ Result<uint32_t> TsdfVolume::chunk_blocks(const FrameBatch& batch) const
     return uint32_t(std::min<uint64_t>(most, blocks_.size()));
 }
 
+struct TsdfVolume::ChunkState {
+    State memory;
+    Slot blocks, sums, votes;
+
+    explicit ChunkState(uint32_t most)
+        : blocks(memory.slot(most, 1, DType::u32, "blocks", 1)),
+          sums(memory.slot(most * kTsdfBlockVoxels * kTsdfStateFields, 1, DType::f32, "sums", 1)),
+          votes(memory.slot(most * kTsdfBlockVoxels * kTsdfVoteWords, 1, DType::u32, "votes", 1))
+    {
+    }
+    // of the first `count` blocks
+    TsdfState in(Graph& g, uint32_t count) const
+    {
+        const uint32_t voxels = count * kTsdfBlockVoxels;
+        return {blocks.row_range(0, count).in(g), sums.row_range(0, voxels * kTsdfStateFields).in(g),
+                votes.row_range(0, voxels * kTsdfVoteWords).in(g)};
+    }
+};
+
 Status TsdfVolume::integrate(const DepthFrames& frames, FrameBatch& batch, const FusionProgress& progress)
 {
     SR_TRY(const uint32_t most, chunk_blocks(batch));
     const uint32_t blocks = uint32_t(blocks_.size());
     chunks_ = divide_up(blocks, most);
-    Arena state;
-    state.add(most * kBlockBytes * kTsdfStateFields);
-    state.add(most * kBlockBytes * kTsdfVoteWords);
-    state.add(most * 4ull);
-    SR_CHECK(state.allocate(*device_, "votes"));
+    ChunkState state(most);
+    SR_CHECK(state.memory.allocate(*device_, "votes"));
     for (uint32_t chunk = 0; chunk < chunks_; ++chunk) {
         const uint32_t first = chunk * most, count = std::min(most, blocks - first);
         const auto added = [&](size_t frame) {
@@ -230,24 +239,18 @@ Status TsdfVolume::integrate(const DepthFrames& frames, FrameBatch& batch, const
     return {};
 }
 
-Status TsdfVolume::integrate_chunk(const DepthFrames& frames, FrameBatch& batch, const Arena& state, uint32_t first,
-                                   uint32_t count, const std::function<Status(size_t)>& added)
+Status TsdfVolume::integrate_chunk(const DepthFrames& frames, FrameBatch& batch, const ChunkState& state,
+                                   uint32_t first, uint32_t count, const std::function<Status(size_t)>& added)
 {
     const TsdfOptions options = kernel_options();
-    const uint32_t voxels = count * kTsdfBlockVoxels;
-    const auto state_in = [&](Graph& g) {
-        return TsdfState{g.external(state.slice(2), count, 1, DType::u32, "blocks", 1),
-                         g.external(state.slice(0), voxels * kTsdfStateFields, 1, DType::f32, "sums", 1),
-                         g.external(state.slice(1), voxels * kTsdfVoteWords, 1, DType::u32, "votes", 1)};
-    };
+    const uint32_t at = first * kTsdfBlockVoxels, voxels = count * kTsdfBlockVoxels;
     Graph g;
     const TsdfFrames table = batch.in(g);
-    tsdf_integrate(g, table.frames, tsdf_planes(g, table, options), options, state_in(g));
+    tsdf_integrate(g, table.frames, tsdf_planes(g, table, options), options, state.in(g, count));
     SR_TRY(auto program, Program::create(*device_, g));
-    SR_CHECK(device_->clear(state.slice(0)));
-    SR_CHECK(device_->clear(state.slice(1)));
-    SR_CHECK(
-        device_->write(state.slice(2).part(0, count * 4ull), std::as_bytes(std::span(blocks_).subspan(first, count))));
+    SR_CHECK(state.sums.clear(*device_));
+    SR_CHECK(state.votes.clear(*device_));
+    SR_CHECK(state.blocks.row_range(0, count).write(*device_, std::span(blocks_).subspan(first, count)));
     const std::vector<uint32_t> order = frames_near(first, count);
     for (size_t next = 0; next < order.size();) {
         const size_t fitting = batch.fitting(frames, order, next);
@@ -257,10 +260,8 @@ Status TsdfVolume::integrate_chunk(const DepthFrames& frames, FrameBatch& batch,
         SR_CHECK(added(order[next - 1] + 1));
     }
     Graph finish;
-    const uint64_t at = first * kBlockBytes, bytes = count * kBlockBytes;
-    tsdf_finish(finish, state_in(finish), options,
-                finish.external(field_->slice(kDistances).part(at, bytes), voxels, 1, DType::f32, "distances", 1),
-                finish.external(field_->slice(kAttributes).part(at, bytes), voxels, 1, DType::u32, "attributes", 1));
+    tsdf_finish(finish, state.in(finish, count), options, distances_.row_range(at, voxels).in(finish),
+                attributes_.row_range(at, voxels).in(finish));
     SR_TRY(program, Program::create(*device_, finish));
     return program->run();
 }
@@ -292,34 +293,26 @@ std::vector<uint32_t> TsdfVolume::frames_near(uint32_t first, uint32_t count) co
 
 MarchingCubesField TsdfVolume::in(Graph& g) const
 {
-    const uint32_t words = kernel_options().bitmap_words(), blocks = uint32_t(blocks_.size());
-    const uint32_t voxels = blocks * kTsdfBlockVoxels;
     return {.blocks_x = box_.blocks[0],
             .blocks_y = box_.blocks[1],
             .blocks_z = box_.blocks[2],
-            .bitmap = g.external(box_memory_->slice(kBitmap), words, 1, DType::u32, "bitmap", 1),
-            .ranks = g.external(box_memory_->slice(kRanks), words, 1, DType::u32, "ranks", 1),
-            .blocks = g.external(field_->slice(kBlocks), blocks, 1, DType::u32, "blocks", 1),
-            .distances = g.external(field_->slice(kDistances), voxels, 1, DType::f32, "distances", 1),
-            .attributes = g.external(field_->slice(kAttributes), voxels, 1, DType::u32, "attributes", 1),
+            .bitmap = bitmap_.in(g),
+            .ranks = ranks_.in(g),
+            .blocks = block_ids_.in(g),
+            .distances = distances_.in(g),
+            .attributes = attributes_.in(g),
             .min_views = options_.min_views,
             .max_jump = float(options_.max_jump / options_.truncation)};
 }
 
 Result<std::vector<float>> TsdfVolume::read_distances() const
 {
-    std::vector<float> values(blocks_.size() * kTsdfBlockVoxels);
-    SR_CHECK(
-        device_->read(field_->slice(kDistances).part(0, values.size() * 4), std::as_writable_bytes(std::span(values))));
-    return values;
+    return distances_.read<float>(*device_);
 }
 
 Result<std::vector<uint32_t>> TsdfVolume::read_attributes() const
 {
-    std::vector<uint32_t> values(blocks_.size() * kTsdfBlockVoxels);
-    SR_CHECK(device_->read(field_->slice(kAttributes).part(0, values.size() * 4),
-                           std::as_writable_bytes(std::span(values))));
-    return values;
+    return attributes_.read<uint32_t>(*device_);
 }
 
 } // namespace semrover

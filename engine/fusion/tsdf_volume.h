@@ -27,15 +27,14 @@ class TsdfVolume {
     Result<std::vector<uint32_t>> read_attributes() const; // [blocks, 512] as tsdf_finish makes them
 
   private:
-    enum BoxPart : uint32_t { kBitmap, kRanks, kTotal };
-    enum FieldPart : uint32_t { kBlocks, kDistances, kAttributes };
+    struct ChunkState; // sums and votes of the blocks of a chunk
 
     TsdfVolume(Device& device, const FusionOptions& options) : device_(&device), options_(options) {}
     Status plan_box(const DepthFrames& frames);
     Status touch(const DepthFrames& frames, FrameBatch& batch, const FusionProgress& progress);
     Status list_blocks();
     Status integrate(const DepthFrames& frames, FrameBatch& batch, const FusionProgress& progress);
-    Status integrate_chunk(const DepthFrames& frames, FrameBatch& batch, const Arena& state, uint32_t first,
+    Status integrate_chunk(const DepthFrames& frames, FrameBatch& batch, const ChunkState& state, uint32_t first,
                            uint32_t count, const std::function<Status(size_t)>& added);
     Result<uint32_t> chunk_blocks(const FrameBatch& batch) const;
     std::vector<uint32_t> frames_near(uint32_t first, uint32_t count) const;
@@ -48,7 +47,9 @@ class TsdfVolume {
         std::array<int64_t, 3> low, high;
     };
     std::vector<Reach> reach_; // of each frame
-    std::unique_ptr<Arena> box_memory_ = std::make_unique<Arena>(), field_ = std::make_unique<Arena>();
+    State box_state_, field_;
+    Slot bitmap_, ranks_, total_;             // of the box
+    Slot block_ids_, distances_, attributes_; // of the field
     std::vector<uint32_t> blocks_;
     uint32_t chunks_ = 0;
 };

@@ -5,6 +5,7 @@
 #include "kernels/network.h"
 #include "kernels/splat.h"
 #include "runtime/device/program.h"
+#include "runtime/device/state.h"
 
 #include <algorithm>
 #include <cmath>
@@ -17,31 +18,25 @@ namespace {
 constexpr size_t kBatch = 1 << 20; // points or queries at once
 constexpr double kFar = std::numeric_limits<double>::infinity();
 
-Result<std::unique_ptr<Buffer>> upload(Device& device, std::span<const PointRow> values, const char* name)
-{
-    SR_TRY(auto buffer, Buffer::create(device, values.size_bytes(), MemoryKind::device, name));
-    SR_CHECK(device.write(buffer->slice(), std::as_bytes(values)));
-    return buffer;
-}
-
 // lowers `best` to the distances of queries from the nearest of some points within `radius`; 0: however far
 Status search_batch(Device& device, std::span<const PointRow> queries, std::span<const PointRow> batch, float cell_size,
                     float radius, std::span<double> best)
 {
-    SR_TRY(const auto points, upload(device, batch, "points"));
-    SR_TRY(const auto samples, upload(device, queries, "queries"));
-    SR_TRY(const auto results, Buffer::create(device, queries.size() * 4, MemoryKind::device, "nearest"));
     const auto rows = uint32_t(queries.size());
+    State state;
+    const Slot points = state.slot(uint32_t(batch.size()), 4, DType::f32, "points", 4);
+    const Slot samples = state.slot(rows, 4, DType::f32, "queries", 4);
+    const Slot nearest = state.slot(rows, 1, DType::u32, "nearest", 1);
+    SR_CHECK(state.allocate(device, "points"));
+    SR_CHECK(points.write(device, batch));
+    SR_CHECK(samples.write(device, queries));
     Graph g;
     KnnOptions options{.neighbors = 1, .cell_size = cell_size, .radius = radius};
-    options.queries = g.external(samples->slice(), rows, 4, DType::f32, "queries", 4);
-    const Tensor nearest =
-        knn(g, g.external(points->slice(), uint32_t(batch.size()), 4, DType::f32, "points", 4), options);
-    g.replace(nearest.resource, g.external(results->slice(), rows, 1, DType::u32, "nearest", 1).resource);
+    options.queries = samples.in(g);
+    g.keep(knn(g, points.in(g), options), nearest);
     SR_TRY(const auto program, Program::create(device, g));
     SR_CHECK(program->run());
-    std::vector<uint32_t> index(rows);
-    SR_CHECK(device.read(results->slice(), std::as_writable_bytes(std::span(index))));
+    SR_TRY(const std::vector<uint32_t> index, nearest.read<uint32_t>(device));
     for (size_t i = 0; i < rows; ++i) {
         if (index[i] >= batch.size())
             continue;

@@ -44,14 +44,6 @@ std::vector<TriangleCorners> corners_of(const Mesh& mesh, size_t first, size_t c
     return corners;
 }
 
-template <typename T>
-Result<std::unique_ptr<Buffer>> upload(Device& device, std::span<const T> values, const char* name)
-{
-    SR_TRY(auto buffer, Buffer::create(device, values.size_bytes(), MemoryKind::device, name));
-    SR_CHECK(device.write(buffer->slice(), std::as_bytes(values)));
-    return buffer;
-}
-
 } // namespace
 
 Result<NearestSurface> NearestSurface::create(Device& device, const Mesh& mesh)
@@ -63,29 +55,30 @@ Result<NearestSurface> NearestSurface::create(Device& device, const Mesh& mesh)
         const size_t count = std::min(most, mesh.faces.size() - first);
         const TriangleTree tree = triangle_tree(corners_of(mesh, first, count, s.origin_), uint32_t(first));
         Tree& t = s.trees_.emplace_back();
-        SR_TRY(t.nodes, upload<TriangleTree::Node>(device, tree.nodes, "nodes"));
-        SR_TRY(t.triangles, upload<TreeTriangle>(device, tree.triangles, "triangles"));
+        t.nodes = t.state.slot(uint32_t(tree.nodes.size()), 8, DType::u32, "nodes", 8);
+        t.triangles = t.state.slot(uint32_t(tree.triangles.size()), 10, DType::u32, "triangles", 10);
+        SR_CHECK(t.state.allocate(device, "triangles"));
+        SR_CHECK(t.nodes.write(device, tree.nodes));
+        SR_CHECK(t.triangles.write(device, tree.triangles));
     }
     return s;
 }
 
 Status NearestSurface::search(std::span<const std::array<float, 4>> points, std::span<NearestFace> nearest) const
 {
-    SR_TRY(const auto queries, upload(*device_, points, "points"));
-    SR_TRY(const auto results, upload<NearestFace>(*device_, nearest, "nearest faces"));
     const auto rows = uint32_t(points.size());
+    State state;
+    const Slot queries = state.slot(rows, 4, DType::f32, "points", 4);
+    const Slot results = state.slot(rows, 2, DType::u32, "nearest faces", 2);
+    SR_CHECK(state.allocate(*device_, "points"));
+    SR_CHECK(queries.write(*device_, points));
+    SR_CHECK(results.write(*device_, nearest));
     Graph g;
-    const Tensor x = g.external(queries->slice(), rows, 4, DType::f32, "points", 4);
-    const Tensor y = g.external(results->slice(), rows, 2, DType::u32, "nearest faces", 2);
-    for (const auto& [nodes, triangles] : trees_)
-        surface_distance(
-            g, x,
-            {g.external(nodes->slice(), uint32_t(nodes->bytes() / 32), 8, DType::u32, "nodes", 8),
-             g.external(triangles->slice(), uint32_t(triangles->bytes() / 40), 10, DType::u32, "triangles", 10)},
-            y);
+    for (const Tree& tree : trees_)
+        surface_distance(g, queries.in(g), {tree.nodes.in(g), tree.triangles.in(g)}, results.in(g));
     SR_TRY(const auto program, Program::create(*device_, g));
     SR_CHECK(program->run());
-    return device_->read(results->slice(), std::as_writable_bytes(nearest));
+    return device_->read(results.slice(), std::as_writable_bytes(nearest));
 }
 
 Result<std::vector<NearestFace>> NearestSurface::find(std::span<const std::array<float, 4>> points, float radius) const

@@ -4,7 +4,7 @@
 
 #include "engine/mesh/mesh.h"
 #include "runtime/device/device.h"
-#include "runtime/device/memory.h"
+#include "runtime/device/state.h"
 
 #include <memory>
 #include <span>
@@ -30,7 +30,8 @@ class NearestSurface {
 
   private:
     struct Tree { // as many faces as the device can bind
-        std::unique_ptr<Buffer> nodes, triangles;
+        State state;
+        Slot nodes, triangles;
     };
 
     explicit NearestSurface(Device& device) : device_(&device) {}

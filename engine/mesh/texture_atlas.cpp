@@ -18,14 +18,6 @@ uint64_t texels_of(const Texture& t)
     return uint64_t(t.image.width) * t.image.height;
 }
 
-template <typename T>
-Result<std::unique_ptr<Buffer>> upload(Device& device, const std::vector<T>& rows, const char* name)
-{
-    SR_TRY(auto buffer, Buffer::create(device, rows.size() * sizeof(T), MemoryKind::device, name));
-    SR_CHECK(device.write(buffer->slice(), std::as_bytes(std::span(rows))));
-    return buffer;
-}
-
 } // namespace
 
 uint8_t label_of_pixel(const uint8_t* rgb)
@@ -85,11 +77,11 @@ Status TextureAtlas::upload_tables(Device& device, const Mesh& mesh,
     auto rows = textures;
     if (rows.empty())
         rows.push_back({1, 1, 0, 0}); // a binding is never empty
-    material_rows_ = uint32_t(materials.size());
-    texture_rows_ = uint32_t(rows.size());
-    SR_TRY(materials_, upload(device, materials, "materials"));
-    SR_TRY(textures_, upload(device, rows, "textures"));
-    return {};
+    materials_ = tables_.slot(uint32_t(materials.size()), 8, DType::u32, "materials", 8);
+    textures_ = tables_.slot(uint32_t(rows.size()), 4, DType::u32, "textures", 4);
+    SR_CHECK(tables_.allocate(device, "materials"));
+    SR_CHECK(materials_.write(device, materials));
+    return textures_.write(device, rows);
 }
 
 Status TextureAtlas::upload_texels(Device& device, const Mesh& mesh, const std::vector<int32_t>& label_sources,
@@ -101,8 +93,11 @@ Status TextureAtlas::upload_texels(Device& device, const Mesh& mesh, const std::
     std::vector<uint32_t> page;
     uint64_t written = 0;
     const auto flush = [&]() -> Status {
-        SR_TRY(auto buffer, upload(device, page, "texels"));
-        pages_.push_back({std::move(buffer), uint32_t(written), uint32_t(page.size())});
+        Page& p = pages_.emplace_back();
+        p.first = uint32_t(written);
+        p.texels = p.state.slot(uint32_t(page.size()), 1, DType::u32, "texels", 1);
+        SR_CHECK(p.state.allocate(device, "texels"));
+        SR_CHECK(p.texels.write(device, page));
         written += page.size();
         page.clear();
         return {};
@@ -128,19 +123,18 @@ Status TextureAtlas::upload_texels(Device& device, const Mesh& mesh, const std::
 
 Tensor TextureAtlas::materials(Graph& g) const
 {
-    return g.external(materials_->slice(), material_rows_, 8, DType::u32, "materials", 8);
+    return materials_.in(g);
 }
 
 Tensor TextureAtlas::textures(Graph& g) const
 {
-    return g.external(textures_->slice(), texture_rows_, 4, DType::u32, "textures", 4);
+    return textures_.in(g);
 }
 
 void TextureAtlas::gather(Graph& g, Tensor addresses, Tensor y, Tensor count) const
 {
     for (const Page& page : pages_)
-        gather_texels(g, addresses, g.external(page.buffer->slice(), page.texels, 1, DType::u32, "texels", 1),
-                      page.first, y, count);
+        gather_texels(g, addresses, page.texels.in(g), page.first, y, count);
 }
 
 } // namespace semrover

@@ -5,6 +5,7 @@
 #include "engine/mesh/mesh.h"
 #include "kernels/mesh.h"
 #include "runtime/device/device.h"
+#include "runtime/device/state.h"
 
 namespace semrover {
 
@@ -24,16 +25,17 @@ class TextureAtlas {
 
   private:
     struct Page {
-        std::unique_ptr<Buffer> buffer;
-        uint32_t first, texels;
+        State state;
+        Slot texels;
+        uint32_t first;
     };
     Status upload_tables(Device& device, const Mesh& mesh, const std::vector<std::array<uint32_t, 4>>& textures,
                          const std::vector<int32_t>& label_rows);
     Status upload_texels(Device& device, const Mesh& mesh, const std::vector<int32_t>& label_sources,
                          uint8_t default_label, uint64_t texels);
 
-    std::unique_ptr<Buffer> materials_, textures_;
-    uint32_t material_rows_ = 0, texture_rows_ = 0;
+    State tables_;
+    Slot materials_, textures_;
     std::vector<Page> pages_;
     bool has_labels_ = false;
 };

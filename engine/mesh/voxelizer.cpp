@@ -9,6 +9,7 @@
 #include "engine/voxfield/token_codec.h"
 #include "kernels/sort.h"
 #include "runtime/device/program.h"
+#include "runtime/device/state.h"
 
 #include <algorithm>
 #include <bit>
@@ -87,17 +88,15 @@ class Voxelizer {
     Result<VoxelizedMesh> run(std::span<const uint8_t> labels);
 
   private:
-    // parts of the arena of a chunk
-    enum Part { kRecords, kAttributes, kTriangles, kSums, kStarts, kAreas, kLabels, kUnlabelledAreas, kParts };
     struct ChunkMemory {
-        Arena arena;
-        uint32_t triangles, pairs, cells;
+        State state;
+        uint32_t pairs, cells;
+        Slot records, attributes;
+        Slot triangles, sums;                         // of pairs
+        Slot starts, areas, labels, unlabelled_areas; // of cells
 
+        ChunkMemory(uint32_t triangles, uint32_t pairs, uint32_t cells);
         SurfaceTriangles in(Graph& g, const TextureAtlas& atlas) const;
-        Tensor words(Graph& g, Part part, uint32_t rows, DType dtype = DType::u32) const
-        {
-            return g.external(arena.slice(part), rows, 1, dtype, "", 1);
-        }
     };
     using CellRow = std::array<int32_t, 4>; // i, j, k, key
 
@@ -113,16 +112,28 @@ class Voxelizer {
     const Mesh& mesh_;
     const VoxelizeOptions& options_;
     TextureAtlas atlas_;
-    std::unique_ptr<Buffer> linear_;
+    State constants_;
+    Slot light_;
     VoxelizedMesh out_;
     double unlabelled_ = 0; // m^2
 };
 
+Voxelizer::ChunkMemory::ChunkMemory(uint32_t triangle_count, uint32_t pair_count, uint32_t cell_count)
+    : pairs(pair_count), cells(cell_count)
+{
+    records = state.slot(triangle_count, 12, DType::u32, "triangles", 12);
+    attributes = state.slot(triangle_count, 16, DType::u32, "attributes", 16);
+    triangles = state.slot(pairs, 1, DType::u32, "triangles of pairs", 1);
+    sums = state.slot(pairs, 1, DType::f32, "sums of areas", 1);
+    starts = state.slot(cells + 1, 1, DType::u32, "first pairs", 1);
+    areas = state.slot(cells, 1, DType::f32, "areas", 1);
+    labels = state.slot(cells, 1, DType::u32, "labels", 1);
+    unlabelled_areas = state.slot(cells, 1, DType::f32, "unlabelled areas", 1);
+}
+
 SurfaceTriangles Voxelizer::ChunkMemory::in(Graph& g, const TextureAtlas& atlas) const
 {
-    return {g.external(arena.slice(kRecords), triangles, 12, DType::u32, "triangles", 12),
-            g.external(arena.slice(kAttributes), triangles, 16, DType::u32, "attributes", 16), atlas.materials(g),
-            atlas.textures(g)};
+    return {records.in(g), attributes.in(g), atlas.materials(g), atlas.textures(g)};
 }
 
 SurfaceLimits Voxelizer::limits() const
@@ -138,15 +149,11 @@ SurfaceLimits Voxelizer::limits() const
 
 Result<Voxelizer::ChunkMemory> Voxelizer::upload(const SurfaceChunk& chunk)
 {
-    ChunkMemory m{
-        {}, uint32_t(chunk.records.size()), uint32_t(chunk.pairs), uint32_t(chunk.blocks.size() * kSurfaceBlockCells)};
-    const uint64_t bytes[kParts] = {m.triangles * 48ull, m.triangles * 64ull, m.pairs * 4ull, m.pairs * 4ull,
-                                    m.cells * 4ull + 4,  m.cells * 4ull,      m.cells * 4ull, m.cells * 4ull};
-    for (const uint64_t size : bytes)
-        m.arena.add(size);
-    SR_CHECK(m.arena.allocate(device_, "surface"));
-    SR_CHECK(device_.write(m.arena.slice(kRecords), std::as_bytes(std::span(chunk.records))));
-    SR_CHECK(device_.write(m.arena.slice(kAttributes), std::as_bytes(std::span(chunk.attributes))));
+    ChunkMemory m(uint32_t(chunk.records.size()), uint32_t(chunk.pairs),
+                  uint32_t(chunk.blocks.size() * kSurfaceBlockCells));
+    SR_CHECK(m.state.allocate(device_, "surface"));
+    SR_CHECK(m.records.write(device_, chunk.records));
+    SR_CHECK(m.attributes.write(device_, chunk.attributes));
     return m;
 }
 
@@ -165,12 +172,12 @@ Status Voxelizer::measure(const ChunkMemory& m)
         atlas_.gather(g, pairs.label_addresses, pairs.labels, found.count);
     const Tensor starts = bucket_starts(g, keys, m.cells, found.count);
     const CellAreas cells = cell_area(g, pairs.areas, pairs.labels, starts, m.cells);
-    g.replace(sorted.values.resource, m.words(g, kTriangles, m.pairs).resource);
-    g.replace(cells.sums.resource, m.words(g, kSums, m.pairs, DType::f32).resource);
-    g.replace(starts.resource, m.words(g, kStarts, m.cells + 1).resource);
-    g.replace(cells.areas.resource, m.words(g, kAreas, m.cells, DType::f32).resource);
-    g.replace(cells.labels.resource, m.words(g, kLabels, m.cells).resource);
-    g.replace(cells.unlabelled.resource, m.words(g, kUnlabelledAreas, m.cells, DType::f32).resource);
+    g.keep(sorted.values, m.triangles);
+    g.keep(cells.sums, m.sums);
+    g.keep(starts, m.starts);
+    g.keep(cells.areas, m.areas);
+    g.keep(cells.labels, m.labels);
+    g.keep(cells.unlabelled, m.unlabelled_areas);
     SR_TRY(const auto program, Program::create(device_, g));
     return program->run();
 }
@@ -178,11 +185,9 @@ Status Voxelizer::measure(const ChunkMemory& m)
 // those with enough area go into the grid
 Result<std::vector<Voxelizer::CellRow>> Voxelizer::keep_cells(const SurfaceChunk& chunk, const ChunkMemory& m)
 {
-    std::vector<float> areas(m.cells), unlabelled(m.cells);
-    std::vector<uint32_t> labels(m.cells);
-    SR_CHECK(device_.read(m.arena.slice(kAreas), std::as_writable_bytes(std::span(areas))));
-    SR_CHECK(device_.read(m.arena.slice(kLabels), std::as_writable_bytes(std::span(labels))));
-    SR_CHECK(device_.read(m.arena.slice(kUnlabelledAreas), std::as_writable_bytes(std::span(unlabelled))));
+    SR_TRY(const std::vector<float> areas, m.areas.read<float>(device_));
+    SR_TRY(const std::vector<float> unlabelled, m.unlabelled_areas.read<float>(device_));
+    SR_TRY(const std::vector<uint32_t> labels, m.labels.read<uint32_t>(device_));
     const double square = double(options_.voxel_size) * options_.voxel_size;
     std::vector<CellRow> kept;
     for (uint32_t key = 0; key < m.cells; ++key) {
@@ -203,23 +208,21 @@ Result<std::vector<Voxelizer::CellRow>> Voxelizer::keep_cells(const SurfaceChunk
 Status Voxelizer::sample(const ChunkMemory& m, std::span<const CellRow> cells)
 {
     const auto n = uint32_t(options_.points_per_voxel);
-    SR_TRY(const auto rows, Buffer::create(device_, cells.size_bytes(), MemoryKind::device, "cells"));
-    SR_CHECK(device_.write(rows->slice(), std::as_bytes(cells)));
-    std::vector<std::array<uint32_t, 4>> samples(cells.size() * n);
-    SR_TRY(const auto results, Buffer::create(device_, samples.size() * 16, MemoryKind::device, "samples"));
+    State state;
+    const Slot rows = state.slot(uint32_t(cells.size()), 4, DType::i32, "cells", 4);
+    const Slot results = state.slot(uint32_t(cells.size()) * n, 4, DType::u32, "samples", 4);
+    SR_CHECK(state.allocate(device_, "samples"));
+    SR_CHECK(rows.write(device_, cells));
     Graph g;
-    const SurfaceSamples points =
-        sample_surface(g, m.in(g, atlas_), m.words(g, kTriangles, m.pairs), m.words(g, kSums, m.pairs, DType::f32),
-                       m.words(g, kStarts, m.cells + 1),
-                       g.external(rows->slice(), uint32_t(cells.size()), 4, DType::i32, "cells", 4), n, options_.seed);
-    const Tensor texels = fill(g, uint32_t(samples.size() * 4), 0xffffffff);
+    const SurfaceSamples points = sample_surface(g, m.in(g, atlas_), m.triangles.in(g), m.sums.in(g), m.starts.in(g),
+                                                 rows.in(g), n, options_.seed);
+    const Tensor texels = fill(g, results.rows() * 4, 0xffffffff);
     atlas_.gather(g, points.addresses, texels);
-    const Tensor y =
-        surface_color(g, points, texels, g.external(linear_->slice(), 512, 1, DType::f32, "linear light", 1));
-    g.replace(y.resource, g.external(results->slice(), y.rows, 4, DType::u32, "samples", 4).resource);
+    g.keep(surface_color(g, points, texels, light_.in(g)), results);
     SR_TRY(const auto program, Program::create(device_, g));
     SR_CHECK(program->run());
-    SR_CHECK(device_.read(results->slice(), std::as_writable_bytes(std::span(samples))));
+    using Sample = std::array<uint32_t, 4>;
+    SR_TRY(const std::vector<Sample> samples, results.read<Sample>(device_));
     store(samples, cells.size());
     return {};
 }
@@ -262,8 +265,9 @@ Result<VoxelizedMesh> Voxelizer::run(std::span<const uint8_t> labels)
         linear[i] = float(kLinear[i]);
         linear[256 + i] = float(linear_of_srgb((double(i) + 0.5) / 255));
     }
-    SR_TRY(linear_, Buffer::create(device_, sizeof(linear), MemoryKind::device, "linear light"));
-    SR_CHECK(device_.write(linear_->slice(), std::as_bytes(std::span(linear))));
+    light_ = constants_.slot(512, 1, DType::f32, "linear light", 1);
+    SR_CHECK(constants_.allocate(device_, "linear light"));
+    SR_CHECK(light_.write(device_, linear));
     const SurfaceLimits limits = this->limits();
     SR_TRY(SurfaceBlocks blocks, SurfaceBlocks::create(mesh_, labels, options_.voxel_size, "the mesh"));
     const auto n = uint64_t(options_.points_per_voxel);

@@ -46,10 +46,9 @@ Result<std::vector<std::byte>> to_dtype(const std::vector<float>& values, DType 
 
 } // namespace
 
-NetworkWeights::Entry& NetworkWeights::add(uint32_t rows, uint32_t cols, DType dtype)
+NetworkWeights::Entry& NetworkWeights::add(const std::string& name, uint32_t rows, uint32_t cols, DType dtype)
 {
-    const uint64_t bytes = uint64_t(rows) * round_up(cols, kRowPadding) * dtype_bytes(dtype);
-    entries_.push_back({{arena_.add(bytes), rows, cols, dtype}, {}});
+    entries_.push_back({state_.slot(rows, cols, dtype, name), {}});
     return entries_.back();
 }
 
@@ -67,7 +66,7 @@ Layer NetworkWeights::conv(const std::string& name, const ConvShape& s)
     const uint32_t taps = s.kernel * s.kernel, channels = s.channels + s.channels2;
     const uint32_t first = round_up(s.channels, kRowPadding), width = first + round_up(s.channels2, kRowPadding);
     Layer layer;
-    Entry& weight = add(s.outputs, taps * width, s.dtype.value_or(precision_));
+    Entry& weight = add(name + ".weight", s.outputs, taps * width, s.dtype.value_or(precision_));
     layer.weight = weight.weight;
     const auto pack = [=](std::span<const float> values, float* rows, uint32_t ld) {
         for (uint32_t n = 0; n < s.outputs; ++n)
@@ -79,7 +78,7 @@ Layer NetworkWeights::conv(const std::string& name, const ConvShape& s)
             }
     };
     weight.sources.push_back({{name + ".weight", {s.outputs, channels, s.kernel, s.kernel}}, pack});
-    Entry& bias = add(1, s.outputs, DType::f32);
+    Entry& bias = add(name + ".bias", 1, s.outputs, DType::f32);
     layer.bias = bias.weight;
     add_vector(bias, name + ".bias", s.outputs, 0, 0, false, s.bias_gain);
     return layer;
@@ -91,7 +90,8 @@ Layer NetworkWeights::linear(const std::vector<Part>& parts, const LinearShape& 
     for (const Part& p : parts)
         rows += packed_rows(p.rows, p.heads, p.geglu);
     Layer layer;
-    Entry& weight = add(rows, s.col_heads ? padded_heads(s.cols, s.col_heads) : s.cols, s.dtype.value_or(precision_));
+    Entry& weight = add(parts.front().name + ".weight", rows, s.col_heads ? padded_heads(s.cols, s.col_heads) : s.cols,
+                        s.dtype.value_or(precision_));
     layer.weight = weight.weight;
     uint32_t first = 0;
     for (const Part& p : parts) {
@@ -110,7 +110,7 @@ Layer NetworkWeights::linear(const std::vector<Part>& parts, const LinearShape& 
     }
     if (!s.bias)
         return layer;
-    Entry& bias = add(1, rows, DType::f32);
+    Entry& bias = add(parts.front().name + ".bias", 1, rows, DType::f32);
     layer.bias = bias.weight;
     first = 0;
     for (const Part& p : parts) {
@@ -124,16 +124,16 @@ Layer NetworkWeights::norm(const std::string& name, uint32_t channels)
 {
     Layer layer;
     for (auto [weight, suffix] : {std::pair{&layer.weight, ".weight"}, std::pair{&layer.bias, ".bias"}}) {
-        Entry& entry = add(1, channels, DType::f32);
+        Entry& entry = add(name + suffix, 1, channels, DType::f32);
         *weight = entry.weight;
         add_vector(entry, name + suffix, channels, 0, 0, false, 1);
     }
     return layer;
 }
 
-Weight NetworkWeights::table(const std::string& name, uint32_t rows, uint32_t cols)
+Slot NetworkWeights::table(const std::string& name, uint32_t rows, uint32_t cols)
 {
-    Entry& entry = add(rows, cols, DType::f32);
+    Entry& entry = add(name + ".weight", rows, cols, DType::f32);
     const auto pack = [=](std::span<const float> values, float* to, uint32_t ld) {
         for (uint32_t r = 0; r < rows; ++r)
             std::copy_n(&values[size_t(r) * cols], cols, to + size_t(r) * ld);
@@ -157,28 +157,23 @@ uint64_t NetworkWeights::parameters() const
 
 Status NetworkWeights::upload(Device& device, const Checkpoint& checkpoint, const Entry& entry) const
 {
-    const uint32_t ld = round_up(entry.weight.cols, kRowPadding);
-    std::vector<float> rows(size_t(entry.weight.rows) * ld, 0.f), values;
+    const uint32_t ld = entry.weight.ld();
+    std::vector<float> rows(size_t(entry.weight.rows()) * ld, 0.f), values;
     for (const Source& source : entry.sources) {
         SR_CHECK(checkpoint.read(source.spec, values));
         source.pack(values, rows.data(), ld);
     }
-    SR_TRY(const auto bytes, to_dtype(rows, entry.weight.dtype, entry.sources.front().spec.name));
-    return device.write(arena_.slice(entry.weight.slice), bytes);
+    SR_TRY(const auto bytes, to_dtype(rows, entry.weight.dtype(), entry.sources.front().spec.name));
+    return entry.weight.write(device, bytes);
 }
 
 Status NetworkWeights::load(Device& device, const Checkpoint& checkpoint, std::span<const TensorSpec> schema)
 {
     SR_CHECK(checkpoint.require(schema));
-    SR_CHECK(arena_.allocate(device, "network weights"));
+    SR_CHECK(state_.allocate(device, "network weights"));
     for (const Entry& entry : entries_)
         SR_CHECK(upload(device, checkpoint, entry));
     return {};
-}
-
-Tensor NetworkWeights::tensor(Graph& g, const Weight& w, std::string_view name) const
-{
-    return w.rows ? g.external(arena_.slice(w.slice), w.rows, w.cols, w.dtype, name) : Tensor{};
 }
 
 } // namespace semrover

@@ -3,17 +3,16 @@
 #pragma once
 
 #include "engine/model/checkpoint.h"
-#include "engine/model/weight.h"
 #include "runtime/device/device.h"
-#include "runtime/graph/graph.h"
+#include "runtime/device/state.h"
 
 #include <functional>
 
 namespace semrover {
 
-// a layer of a network: its packed weight, and its bias in fp32 (rows = 0: none)
+// a layer of a network: its packed weight, and its bias in fp32, or none
 struct Layer {
-    Weight weight, bias;
+    Slot weight, bias;
 };
 
 // Parameters in device memory, in the layouts that the kernels read. First every layer is declared, then all of them
@@ -53,14 +52,12 @@ class NetworkWeights {
     };
     Layer linear(const std::vector<Part>& parts, const LinearShape& shape);
 
-    Layer norm(const std::string& name, uint32_t channels);              // weight and bias, [1, channels] fp32
-    Weight table(const std::string& name, uint32_t rows, uint32_t cols); // an embedding, fp32
+    Layer norm(const std::string& name, uint32_t channels);            // weight and bias, [1, channels] fp32
+    Slot table(const std::string& name, uint32_t rows, uint32_t cols); // an embedding, fp32
 
     uint64_t parameters() const; // as in the file
-    uint64_t device_bytes(const DeviceLimits& limits) const { return arena_.planned_bytes(limits); }
+    uint64_t device_bytes(const DeviceLimits& limits) const { return state_.planned_bytes(limits); }
     Status load(Device& device, const Checkpoint& checkpoint, std::span<const TensorSpec> schema);
-
-    Tensor tensor(Graph& g, const Weight& w, std::string_view name) const; // none for rows = 0
 
   private:
     // one tensor of the checkpoint and its way into a weight's rows
@@ -69,17 +66,17 @@ class NetworkWeights {
         std::function<void(std::span<const float> values, float* rows, uint32_t ld)> pack;
     };
     struct Entry {
-        Weight weight;
+        Slot weight;
         std::vector<Source> sources;
     };
-    Entry& add(uint32_t rows, uint32_t cols, DType dtype);
+    Entry& add(const std::string& name, uint32_t rows, uint32_t cols, DType dtype);
     void add_vector(Entry& entry, const std::string& name, uint32_t size, uint32_t first, uint32_t heads, bool geglu,
                     float gain);
     Status upload(Device& device, const Checkpoint& checkpoint, const Entry& entry) const;
 
     DType precision_;
     DeviceLimits limits_;
-    Arena arena_;
+    State state_;
     std::vector<Entry> entries_;
 };
 

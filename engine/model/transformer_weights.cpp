@@ -12,9 +12,9 @@ TransformerWeights::TransformerWeights(const TransformerConfig& config, DType pr
     : config_(config), precision_(precision)
 {
     const uint32_t d = config.dim(), c = config.channels(), p = config.pos_embed_dim;
-    const auto linear = [&](const char* name, uint32_t out, uint32_t in, DType dtype, Weight& w, Weight& b) {
-        w = matrix(out, in, dtype);
-        b = matrix(1, out, DType::f32);
+    const auto linear = [&](const std::string& name, uint32_t out, uint32_t in, DType dtype, Slot& w, Slot& b) {
+        w = state_.slot(out, in, dtype, name);
+        b = state_.slot(1, out, DType::f32, name + ".bias");
         place(name, w, b, 0, out);
     };
     linear("proj_in", d, c, precision, proj_in, proj_in_bias);
@@ -22,38 +22,32 @@ TransformerWeights::TransformerWeights(const TransformerConfig& config, DType pr
     linear("time_embed.linear_1", d, 256, DType::f32, time_in, time_in_bias);
     linear("time_embed.linear_2", d, d, DType::f32, time_out, time_out_bias);
     linear("proj_out", c, d, precision, proj_out, proj_out_bias);
-    semantic_embed = matrix(config.num_classes + 1, d, precision);
+    semantic_embed = state_.slot(config.num_classes + 1, d, precision, "semantic_embed");
     parts_.push_back(
         {"semantic_embed.weight", config.num_classes + 1, d, false, 0, config.num_classes + 1, semantic_embed, 0, 0});
-    norm_out = matrix(2 * d, d, precision);
-    norm_out_bias = matrix(1, 2 * d, DType::f32);
+    norm_out = state_.slot(2 * d, d, precision, "norm_out");
+    norm_out_bias = state_.slot(1, 2 * d, DType::f32, "norm_out.bias");
     place_swapped("norm_out.linear", norm_out, norm_out_bias, 0, 2 * d);
     blocks.resize(config.num_layers);
     for (uint32_t i = 0; i < config.num_layers; ++i)
         add_block(i, i + 1 == config.num_layers);
 }
 
-Weight TransformerWeights::matrix(uint32_t rows, uint32_t cols, DType dtype)
-{
-    const uint64_t bytes = uint64_t(rows) * round_up(cols, kRowPadding) * dtype_bytes(dtype);
-    return {arena_.add(bytes), rows, cols, dtype};
-}
-
-void TransformerWeights::place(const std::string& name, const Weight& weight, const Weight& bias, uint32_t row,
+void TransformerWeights::place(const std::string& name, const Slot& weight, const Slot& bias, uint32_t row,
                                uint32_t rows, uint32_t bias_row, uint32_t bias_col)
 {
-    parts_.push_back({name + ".weight", rows, weight.cols, false, 0, rows, weight, row, 0});
+    parts_.push_back({name + ".weight", rows, weight.cols(), false, 0, rows, weight, row, 0});
     parts_.push_back({name + ".bias", 1, rows, true, 0, rows, bias, bias_row, bias_col});
 }
 
 // AdaLayerNormContinuous stores scale before shift; the kernels want shift before scale
-void TransformerWeights::place_swapped(const std::string& name, const Weight& weight, const Weight& bias, uint32_t row,
+void TransformerWeights::place_swapped(const std::string& name, const Slot& weight, const Slot& bias, uint32_t row,
                                        uint32_t rows)
 {
     const uint32_t half = rows / 2;
     for (uint32_t part = 0; part < 2; ++part) {
         const uint32_t to = row + (1 - part) * half;
-        parts_.push_back({name + ".weight", rows, weight.cols, false, part * half, half, weight, to, 0});
+        parts_.push_back({name + ".weight", rows, weight.cols(), false, part * half, half, weight, to, 0});
         parts_.push_back({name + ".bias", 1, rows, true, part * half, half, bias, 0, to});
     }
 }
@@ -62,22 +56,22 @@ void TransformerWeights::add_block(uint32_t index, bool last)
 {
     BlockWeights& b = blocks[index];
     const uint32_t d = config_.dim(), streams = last ? 1 : 2, modulations = last ? 8 * d : 12 * d;
-    b.qkv = matrix(6 * d, d, precision_);
-    b.qkv_bias = matrix(2, 3 * d, DType::f32);
-    b.out = matrix(streams * d, d, precision_);
-    b.out_bias = matrix(streams, d, DType::f32);
-    b.ff_in = matrix(streams * 4 * d, d, precision_);
-    b.ff_in_bias = matrix(streams, 4 * d, DType::f32);
-    b.ff_out = matrix(streams * d, 4 * d, precision_);
-    b.ff_out_bias = matrix(streams, d, DType::f32);
-    b.modulation = matrix(modulations, d, precision_);
-    b.modulation_bias = matrix(1, modulations, DType::f32);
+    b.qkv = state_.slot(6 * d, d, precision_, "qkv");
+    b.qkv_bias = state_.slot(2, 3 * d, DType::f32, "qkv.bias");
+    b.out = state_.slot(streams * d, d, precision_, "out");
+    b.out_bias = state_.slot(streams, d, DType::f32, "out.bias");
+    b.ff_in = state_.slot(streams * 4 * d, d, precision_, "ff_in");
+    b.ff_in_bias = state_.slot(streams, 4 * d, DType::f32, "ff_in.bias");
+    b.ff_out = state_.slot(streams * d, 4 * d, precision_, "ff_out");
+    b.ff_out_bias = state_.slot(streams, d, DType::f32, "ff_out.bias");
+    b.modulation = state_.slot(modulations, d, precision_, "modulation");
+    b.modulation_bias = state_.slot(1, modulations, DType::f32, "modulation.bias");
     const std::string block = fmt::format("transformer_blocks.{}.", index);
     for (uint32_t stream = 0; stream < 2; ++stream)
         add_stream(block, b, stream, last);
     if (!config_.qk_norm)
         return;
-    b.head_norms = matrix(4, config_.attention_head_dim, DType::f32);
+    b.head_norms = state_.slot(4, config_.attention_head_dim, DType::f32, "head_norms");
     const char* norms[] = {"norm_q", "norm_k", "norm_added_q", "norm_added_k"};
     for (uint32_t i = 0; i < 4; ++i)
         parts_.push_back({block + "attn." + norms[i] + ".weight", 1, config_.attention_head_dim, true, 0,
@@ -115,7 +109,7 @@ uint64_t TransformerWeights::parameters() const
 Status TransformerWeights::upload(Device& device, const Part& part, const float* values)
 {
     const uint32_t rows = part.vector ? 1 : part.count, cols = part.vector ? part.count : part.cols;
-    const uint32_t ld = round_up(part.target.cols, kRowPadding), bytes = uint32_t(dtype_bytes(part.target.dtype));
+    const uint32_t ld = part.target.ld(), bytes = uint32_t(dtype_bytes(part.target.dtype()));
     const uint32_t width = part.vector ? cols : ld; // a vector may be a piece of a row that others share
     std::vector<std::byte> packed(size_t(rows) * width * bytes);
     for (uint32_t r = 0; r < rows; ++r)
@@ -126,7 +120,7 @@ Status TransformerWeights::upload(Device& device, const Part& part, const float*
             std::memcpy(&packed[at], bytes == 2 ? static_cast<const void*>(&half) : &v, bytes);
         }
     const uint64_t at = (uint64_t(part.target_row) * ld + part.target_col) * bytes;
-    const BufferSlice memory = arena_.slice(part.target.slice);
+    const BufferSlice memory = part.target.slice();
     return device.write(memory.part(at, memory.bytes - at), packed);
 }
 
@@ -143,7 +137,7 @@ Status TransformerWeights::load(Device& device, const SafetensorsSet& file)
     for (auto& [name, spec] : specs)
         schema.push_back(std::move(spec));
     SR_CHECK(file.require(schema));
-    SR_CHECK(arena_.allocate(device, "transformer weights"));
+    SR_CHECK(state_.allocate(device, "transformer weights"));
     SR_CHECK(check_finite(file));
     std::vector<float> values;
     for (const Part& p : parts_) {
@@ -159,7 +153,7 @@ Status TransformerWeights::load(Device& device, const SafetensorsSet& file)
 
 Status TransformerWeights::randomize(Device& device, uint64_t seed)
 {
-    SR_CHECK(arena_.allocate(device, "transformer weights"));
+    SR_CHECK(state_.allocate(device, "transformer weights"));
     uint64_t state = seed * 0x9e3779b97f4a7c15ull + 1;
     std::vector<float> values;
     for (const Part& p : parts_) {
@@ -174,11 +168,6 @@ Status TransformerWeights::randomize(Device& device, uint64_t seed)
         SR_CHECK(upload(device, p, values.data()));
     }
     return {};
-}
-
-Tensor TransformerWeights::tensor(Graph& g, const Weight& w, const char* name) const
-{
-    return g.external(arena_.slice(w.slice), w.rows, w.cols, w.dtype, name);
 }
 
 } // namespace semrover

@@ -3,21 +3,21 @@
 #pragma once
 
 #include "engine/model/transformer_config.h"
-#include "engine/model/weight.h"
 #include "runtime/base/safetensors.h"
 #include "runtime/device/device.h"
+#include "runtime/device/state.h"
 
 namespace semrover {
 
 // one joint block; streams (voxel, semantic) stacked as groups, but where the last block has only the voxel stream
 struct BlockWeights {
-    Weight qkv, qkv_bias;       // [2 * 3D, D], [2, 3D]
-    Weight out, out_bias;       // [streams * D, D]
-    Weight ff_in, ff_in_bias;   // [streams * 4D, D]
-    Weight ff_out, ff_out_bias; // [streams * D, 4D]
-    Weight modulation,
+    Slot qkv, qkv_bias;       // [2 * 3D, D], [2, 3D]
+    Slot out, out_bias;       // [streams * D, D]
+    Slot ff_in, ff_in_bias;   // [streams * 4D, D]
+    Slot ff_out, ff_out_bias; // [streams * D, 4D]
+    Slot modulation,
         modulation_bias; // [12D, D]; last block [8D, D]. Per stream: shift, scale, gate of attention, of the mlp
-    Weight head_norms;   // [4, head_dim]: q, k, added q, added k; only with qk_norm
+    Slot head_norms;     // [4, head_dim]: q, k, added q, added k; only with qk_norm
 };
 
 // The transformer's parameters in device memory, in the packed layout that its kernels read.
@@ -26,7 +26,7 @@ class TransformerWeights {
     // lays out the weights of a config, without loading anything
     TransformerWeights(const TransformerConfig& config, DType precision);
 
-    uint64_t device_bytes(const DeviceLimits& limits) const { return arena_.planned_bytes(limits); }
+    uint64_t device_bytes(const DeviceLimits& limits) const { return state_.planned_bytes(limits); }
     uint64_t parameters() const;
 
     // checks every name and shape, then uploads. Errors: bad_input, out_of_memory
@@ -34,12 +34,10 @@ class TransformerWeights {
     // seeded values at the scale of a trained model, for benchmarks
     Status randomize(Device& device, uint64_t seed);
 
-    Tensor tensor(Graph& g, const Weight& w, const char* name) const;
-
-    Weight proj_in, proj_in_bias, pos_embed, pos_embed_bias, semantic_embed;
-    Weight time_in, time_in_bias, time_out, time_out_bias; // fp32: their input reaches 1000 radians
-    Weight norm_out, norm_out_bias;                        // [2D, D]: shift, scale
-    Weight proj_out, proj_out_bias;
+    Slot proj_in, proj_in_bias, pos_embed, pos_embed_bias, semantic_embed;
+    Slot time_in, time_in_bias, time_out, time_out_bias; // fp32: their input reaches 1000 radians
+    Slot norm_out, norm_out_bias;                        // [2D, D]: shift, scale
+    Slot proj_out, proj_out_bias;
     std::vector<BlockWeights> blocks;
     uint32_t streams(size_t block) const { return block + 1 < blocks.size() ? 2 : 1; }
 
@@ -50,20 +48,19 @@ class TransformerWeights {
         uint32_t file_rows, cols; // the tensor in the file; a vector has one row
         bool vector;
         uint32_t first, count; // rows (or elements of a vector) taken
-        Weight target;
+        Slot target;
         uint32_t target_row, target_col;
     };
-    Weight matrix(uint32_t rows, uint32_t cols, DType dtype);
-    void place(const std::string& name, const Weight& weight, const Weight& bias, uint32_t row, uint32_t rows,
+    void place(const std::string& name, const Slot& weight, const Slot& bias, uint32_t row, uint32_t rows,
                uint32_t bias_row = 0, uint32_t bias_col = 0);
-    void place_swapped(const std::string& name, const Weight& weight, const Weight& bias, uint32_t row, uint32_t rows);
+    void place_swapped(const std::string& name, const Slot& weight, const Slot& bias, uint32_t row, uint32_t rows);
     void add_block(uint32_t index, bool last);
     void add_stream(const std::string& block, const BlockWeights& b, uint32_t stream, bool last);
     Status upload(Device& device, const Part& part, const float* values);
 
     TransformerConfig config_;
     DType precision_;
-    Arena arena_;
+    State state_;
     std::vector<Part> parts_;
 };
 

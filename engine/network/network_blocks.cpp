@@ -39,13 +39,13 @@ FeatureMap resnet(Graph& g, const NetworkWeights& w, const ResnetBlock& b, NormI
     norm.eps = b.eps * b.stream * b.stream; // the norm of stream * x is that of x
     norm.silu = true;
     norm.dtype = w.precision();
-    const FeatureMap n = normalize(g, w, b.norm1, norm, x, x2);
+    const FeatureMap n = normalize(g, b.norm1, norm, x, x2);
     const FeatureMap h = convolve(g, w, b.conv1, n, {}, {shift, {}});
-    const FeatureMap m = normalize(g, w, b.norm2, norm, with_moments(g, h));
+    const FeatureMap m = normalize(g, b.norm2, norm, with_moments(g, h));
     FeatureMap residual = x.x;
-    if (b.shortcut.weight.rows)
-        residual = conv2d(g, x.x, x2.x, w.tensor(g, b.shortcut.weight, "shortcut"),
-                          w.tensor(g, b.shortcut.bias, "shortcut.bias"), {.kernel = 1, .dtype = w.precision()});
+    if (b.shortcut.weight.valid())
+        residual =
+            conv2d(g, x.x, x2.x, b.shortcut.weight.in(g), b.shortcut.bias.in(g), {.kernel = 1, .dtype = w.precision()});
     return convolve(g, w, b.conv2, m, {}, {{}, residual});
 }
 
@@ -53,7 +53,7 @@ FeatureMap convolve(Graph& g, const NetworkWeights& w, const Layer& layer, Featu
                     const ConvAddends& addends)
 {
     options.dtype = w.precision();
-    const Tensor weight = w.tensor(g, layer.weight, "conv"), bias = w.tensor(g, layer.bias, "conv.bias");
+    const Tensor weight = layer.weight.in(g), bias = layer.bias.in(g);
     if (prefers_winograd(w.limits(), x, weight.rows, options))
         return winograd_conv2d(g, x, winograd_weight(g, weight), bias, options, addends);
     FeatureMap y = conv2d(g, x, {}, weight, bias, options);
@@ -64,14 +64,12 @@ FeatureMap convolve(Graph& g, const NetworkWeights& w, const Layer& layer, Featu
 
 Tensor project(Graph& g, const NetworkWeights& w, const Layer& layer, Tensor x)
 {
-    return gemm(g, x, w.tensor(g, layer.weight, "linear"), w.tensor(g, layer.bias, "linear.bias"),
-                {.dtype = w.precision()});
+    return gemm(g, x, layer.weight.in(g), layer.bias.in(g), {.dtype = w.precision()});
 }
 
-FeatureMap normalize(Graph& g, const NetworkWeights& w, const Layer& norm, const GroupNormOptions& options, NormInput x,
-                     NormInput x2)
+FeatureMap normalize(Graph& g, const Layer& norm, const GroupNormOptions& options, NormInput x, NormInput x2)
 {
-    return group_norm(g, x, x2, w.tensor(g, norm.weight, "norm"), w.tensor(g, norm.bias, "norm.bias"), options);
+    return group_norm(g, x, x2, norm.weight.in(g), norm.bias.in(g), options);
 }
 
 } // namespace semrover

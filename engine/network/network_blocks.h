@@ -33,7 +33,7 @@ ResnetBlock declare_resnet(NetworkWeights& weights, const std::string& name, con
 // y = x w^T + b
 [[nodiscard]] Tensor project(Graph& g, const NetworkWeights& weights, const Layer& layer, Tensor x);
 // y = norm(x, x2), as group_norm()
-[[nodiscard]] FeatureMap normalize(Graph& g, const NetworkWeights& weights, const Layer& norm,
-                                   const GroupNormOptions& options, NormInput x, NormInput x2 = {});
+[[nodiscard]] FeatureMap normalize(Graph& g, const Layer& norm, const GroupNormOptions& options, NormInput x,
+                                   NormInput x2 = {});
 
 } // namespace semrover

@@ -36,9 +36,9 @@ class Transformer {
     // sinusoid frequencies that the graphs read; part of the device memory of the model
     uint64_t device_bytes(const DeviceLimits& limits) const;
 
-    // pos and mask of the context, from its other tensors; once per batch of sets
-    void prepare(Graph& g, const TokenContext& context) const;
-    void embed_positions(Graph& g, const TokenContext& context) const; // pos alone
+    // mask and pos of a context, from its other tensors; once per batch of sets
+    [[nodiscard]] Tensor neighbors(Graph& g, const TokenContext& context) const;
+    [[nodiscard]] Tensor positions(Graph& g, const TokenContext& context) const;
 
     // adaLN modulations of every block for a list of timesteps; once per schedule
     void modulations(Graph& g,
@@ -55,7 +55,6 @@ class Transformer {
   private:
     Transformer(const TransformerConfig& config, DType precision);
     Status upload_frequencies(Device& device);
-    Tensor frequencies(Graph& g, uint32_t slice, uint32_t count) const;
     Tensor block(Graph& g, uint32_t index, Tensor x, const TokenContext& context, Tensor table, Tensor table_row) const;
 
     TransformerConfig config_;
@@ -63,8 +62,8 @@ class Transformer {
     TransformerWeights weights_;
     std::vector<uint32_t> block_columns_; // first column of each block in the modulation table; last: norm_out
     uint32_t modulation_width_ = 0;
-    Arena constants_;
-    uint32_t position_frequencies_ = 0, time_frequencies_ = 0;
+    State constants_;
+    Slot position_frequencies_, time_frequencies_;
 };
 
 } // namespace semrover

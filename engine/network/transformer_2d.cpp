@@ -50,7 +50,7 @@ Tensor block(Graph& g, const NetworkWeights& w, const Transformer2d& t, const Tr
              const FeatureMap& x, const TextContext& context)
 {
     const auto norm = [&](const Layer& layer, Tensor v) {
-        return layer_norm(g, v, w.tensor(g, layer.weight, "norm"), w.tensor(g, layer.bias, "norm.bias"), kLayerNormEps);
+        return layer_norm(g, v, layer.weight.in(g), layer.bias.in(g), kLayerNormEps);
     };
     const uint32_t d = t.heads * t.head_dim();
     FlashAttentionOptions self = attention_options(t, x);
@@ -93,7 +93,7 @@ FeatureMap transformer_2d(Graph& g, const NetworkWeights& w, const Transformer2d
     norm.groups = t.groups;
     norm.eps = kInputNormEps;
     norm.dtype = w.precision();
-    FeatureMap h = normalize(g, w, t.norm, norm, x);
+    FeatureMap h = normalize(g, t.norm, norm, x);
     h.data = project(g, w, t.proj_in, h.data);
     for (const Transformer2d::Block& b : t.blocks)
         h.data = block(g, w, t, b, h, context);

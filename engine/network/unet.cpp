@@ -26,12 +26,12 @@ struct Unet::Impl {
     UnetConfig config;
     NetworkWeights weights;
     Layer conv_in, time_in, time_out, time_shifts, context, norm_out, conv_out;
-    Weight class_embedding;
+    Slot class_embedding;
     std::vector<UnetLevel> down, up;
     std::vector<UnetLayer> mid;
     uint32_t time_width = 0, context_width = 0;
-    Arena constants;
-    uint32_t frequencies = 0;
+    State constants;
+    Slot frequencies;
 
     Impl(const UnetConfig& c, DType precision, const DeviceLimits& limits) : config(c), weights(precision, limits)
     {
@@ -43,7 +43,7 @@ struct Unet::Impl {
         time_shifts = weights.linear(shifts, {.cols = config.time_embed_dim()});
         if (!context_parts.empty())
             context = weights.linear(context_parts, {.cols = config.cross_attention_dim, .bias = false});
-        frequencies = constants.add(config.block_out_channels[0] / 2 * 4);
+        frequencies = constants.slot(config.block_out_channels[0] / 2, 1, DType::f32, "frequencies", 1);
     }
 
     // first and last layers, and the time embedding: fp32, its input is up to 1000 radians
@@ -148,7 +148,7 @@ struct Unet::Impl {
         std::vector<float> w(config.block_out_channels[0] / 2);
         for (size_t i = 0; i < w.size(); ++i)
             w[i] = float(std::exp(-std::log(10000.0) * double(i) / (double(w.size()) - config.freq_shift)));
-        return device.write(constants.slice(frequencies), std::as_bytes(std::span(w)));
+        return frequencies.write(device, w);
     }
 
     struct Inputs {
@@ -231,31 +231,26 @@ uint32_t Unet::context_width() const
     return impl_->context_width;
 }
 
-void Unet::time_table(Graph& g, Tensor timesteps, Tensor table, Tensor class_labels) const
+Tensor Unet::time_table(Graph& g, Tensor timesteps, Tensor class_labels) const
 {
     const Impl& n = *impl_;
-    const auto linear = [&](const Layer& layer, Tensor x, DType dtype, Tensor into = {}) {
-        return gemm(g, x, n.weights.tensor(g, layer.weight, "time"), n.weights.tensor(g, layer.bias, "time.bias"),
-                    {.dtype = dtype, .into = into});
+    const auto linear = [&](const Layer& layer, Tensor x, DType dtype) {
+        return gemm(g, x, layer.weight.in(g), layer.bias.in(g), {.dtype = dtype});
     };
-    const uint32_t count = n.config.block_out_channels[0] / 2;
-    const Tensor frequencies = g.external(n.constants.slice(n.frequencies), count, 1, DType::f32, "frequencies", 1);
-    const Tensor waves = sinusoid(g, timesteps, frequencies, n.config.flip_sin_to_cos, DType::f32);
+    const Tensor waves = sinusoid(g, timesteps, n.frequencies.in(g), n.config.flip_sin_to_cos, DType::f32);
     Tensor embedded = linear(n.time_out, silu(g, linear(n.time_in, waves, DType::f32)), precision());
     if (n.config.num_class_embeds) {
         SR_ASSERT(class_labels.valid(), "this network wants class labels");
-        embedded = embedding(g, class_labels, n.weights.tensor(g, n.class_embedding, "class_embedding"), embedded,
-                             precision());
+        embedded = embedding(g, class_labels, n.class_embedding.in(g), embedded, precision());
     }
     const Tensor active = silu(g, embedded); // every block's projection begins with it
-    (void)linear(n.time_shifts, active, DType::f32, table);
+    return linear(n.time_shifts, active, DType::f32);
 }
 
-void Unet::context_table(Graph& g, Tensor context, Tensor table) const
+Tensor Unet::context_table(Graph& g, Tensor context) const
 {
-    if (impl_->context_width)
-        (void)gemm(g, context, impl_->weights.tensor(g, impl_->context.weight, "context"), {},
-                   {.dtype = precision(), .into = table});
+    SR_ASSERT(impl_->context_width, "this network takes no text");
+    return gemm(g, context, impl_->context.weight.in(g), {}, {.dtype = precision()});
 }
 
 FeatureMap Unet::forward(Graph& g, FeatureMap x, Tensor table, Tensor table_row, const Context& context) const
@@ -273,9 +268,8 @@ FeatureMap Unet::forward(Graph& g, FeatureMap x, Tensor table, Tensor table_row,
     norm.eps = n.config.norm_eps;
     norm.silu = true;
     norm.dtype = precision();
-    const FeatureMap last = normalize(g, n.weights, n.norm_out, norm, h);
-    return conv2d(g, last, {}, n.weights.tensor(g, n.conv_out.weight, "conv_out"),
-                  n.weights.tensor(g, n.conv_out.bias, "conv_out.bias"), {.dtype = DType::f32});
+    const FeatureMap last = normalize(g, n.norm_out, norm, h);
+    return conv2d(g, last, {}, n.conv_out.weight.in(g), n.conv_out.bias.in(g), {.dtype = DType::f32});
 }
 
 } // namespace semrover

@@ -28,17 +28,16 @@ class Unet {
 
     // embeddings of the timesteps, a row each; run once per schedule
     uint32_t time_width() const;
-    void time_table(Graph& g,
-                    Tensor timesteps,                // [T, 1] fp32 array
-                    Tensor table,                    // [T, time_width] fp32
-                    Tensor class_labels = {}) const; // [T] u32, with num_class_embeds
+    [[nodiscard]] Tensor time_table(Graph& g,
+                                    Tensor timesteps,                // [T, 1] fp32 array
+                                    Tensor class_labels = {}) const; // [T] u32, with num_class_embeds
+                                                                     // -> [T, time_width] fp32
 
     // keys and values of every cross-attention; run once per text
-    uint32_t context_width() const;
-    void context_table(Graph& g,
-                       Tensor context,      // [rows, cross_attention_dim] in the network's precision
-                       Tensor table) const; // [rows, context_width] likewise
-    using Context = TextContext;            // the table, from context_table()
+    uint32_t context_width() const;                                     // 0: none
+    [[nodiscard]] Tensor context_table(Graph& g, Tensor context) const; // [rows, cross_attention_dim] in the network's
+                                                                        // precision -> [rows, context_width] likewise
+    using Context = TextContext;                                        // the table, from context_table()
 
     // one evaluation
     [[nodiscard]] FeatureMap forward(Graph& g,

@@ -144,7 +144,7 @@ struct Vae::Impl {
 
     FeatureMap attention(Graph& g, const MidBlock& m, NormInput x) const
     {
-        const FeatureMap n = normalize(g, weights, m.norm, norm_options(false), x);
+        const FeatureMap n = normalize(g, m.norm, norm_options(false), x);
         const Tensor qkv = project(g, weights, m.qkv, n.data);
         FlashAttentionOptions o;
         o.head_dim = qkv.cols / 3;
@@ -187,16 +187,14 @@ struct Vae::Impl {
 
     FeatureMap finish(Graph& g, const VaeHalf& half, NormInput x) const
     {
-        const FeatureMap n = normalize(g, weights, half.norm_out, norm_options(true), x);
-        return conv2d(g, n, {}, weights.tensor(g, half.conv_out.weight, "conv_out"),
-                      weights.tensor(g, half.conv_out.bias, "conv_out.bias"), {.dtype = DType::f32});
+        const FeatureMap n = normalize(g, half.norm_out, norm_options(true), x);
+        return conv2d(g, n, {}, half.conv_out.weight.in(g), half.conv_out.bias.in(g), {.dtype = DType::f32});
     }
 
     // a 1x1 convolution in fp32
     FeatureMap quantize(Graph& g, const Layer& layer, FeatureMap x) const
     {
-        return conv2d(g, x, {}, weights.tensor(g, layer.weight, "quant_conv"), weights.tensor(g, layer.bias, "bias"),
-                      {.kernel = 1, .dtype = DType::f32});
+        return conv2d(g, x, {}, layer.weight.in(g), layer.bias.in(g), {.kernel = 1, .dtype = DType::f32});
     }
 };
 

@@ -3,16 +3,16 @@
 #include "engine/refine/asd.h"
 
 #include "engine/sampling/step_rows.h"
+#include "kernels/picture.h"
 #include "kernels/sampling.h"
+#include "runtime/base/hash.h"
 
 #include <algorithm>
-#include <deque>
 
 namespace semrover {
 
 namespace {
 
-constexpr size_t kInFlight = 3;    // submits ahead of the device
 constexpr uint32_t kNoiseRows = 2; // rows of the step table before the plan's: first state, previous latent
 
 uint32_t halves_of(float guidance_scale)
@@ -27,78 +27,56 @@ struct AsdRenderer::Memory {
     const Unet& unet;
     const SamplingPlan& plan;
     uint32_t width, height, pixels, rows, channels, halves, tokens;
-    bool fed; // noise comes from the host
-    Arena arena;
-    uint32_t steps, clock, timesteps, table, context, context_table, table_row;
-    uint32_t cells, known, x, x0, previous, buffer, visible, first_noise = 0, previous_noise = 0;
+    State state;
+    Slot steps, clock, timesteps, times, context, text, table_row; // times, text: tables that are computed once
+    Slot cells, known, x0;
+    AsdSlots ends;                    // latent: the state x
+    Slot first_noise, previous_noise; // where noise comes from the host
 
     Memory(const Unet& u, const SamplingPlan& p, uint32_t text_tokens, const LatentSize& size, float guidance_scale,
-           bool noise_from_host)
+           bool fed)
         : unet(u), plan(p), width(size.width()), height(size.height()), pixels(size.pixels()),
           rows(round_up(pixels, kImageRowPadding)), channels(u.config().out_channels),
-          halves(halves_of(guidance_scale)), tokens(text_tokens), fed(noise_from_host)
-    {
-        const uint64_t latent = latent_values() * 4, element = dtype_bytes(u.precision());
-        steps = arena.add((plan.rows.size() + kNoiseRows) * sizeof(StepRow));
-        clock = arena.add(sizeof(StepClock));
-        timesteps = arena.add(plan.timesteps.size() * 4);
-        table = arena.add(plan.timesteps.size() * round_up(u.time_width(), kRowPadding) * 4);
-        context = arena.add(uint64_t(token_rows()) * text_ld() * element);
-        context_table = arena.add(uint64_t(token_rows()) * round_up(u.context_width(), kRowPadding) * element);
-        table_row = arena.add(halves * 4ull);
-        cells = arena.add(rows * 16ull);
-        known = arena.add(rows * 4ull);
-        for (uint32_t* state : {&x, &x0, &previous, &buffer})
-            *state = arena.add(latent);
-        visible = arena.add(rows * 4ull);
-        if (fed) {
-            first_noise = arena.add(latent);
-            previous_noise = arena.add(latent);
-        }
-    }
-    uint32_t ld() const { return round_up(channels, kRowPadding); }
-    uint64_t latent_values() const { return uint64_t(rows) * ld(); }
-    uint32_t token_rows() const { return round_up(tokens, kImageRowPadding); }
-    uint32_t text_ld() const { return round_up(unet.config().cross_attention_dim, kRowPadding); }
-
-    Tensor latent(Graph& g, uint32_t id, const char* name) const
-    {
-        return g.external(arena.slice(id), rows, channels, DType::f32, name);
-    }
-    Tensor words(Graph& g, uint32_t id, uint32_t count, const char* name) const
-    {
-        return g.external(arena.slice(id), count, 1, DType::u32, name, 1);
-    }
-    StepTable step_table(Graph& g) const
+          halves(halves_of(guidance_scale)), tokens(text_tokens)
     {
         constexpr uint32_t kWords = sizeof(StepRow) / 4;
-        const uint32_t count = uint32_t(plan.rows.size()) + kNoiseRows;
-        return {g.external(arena.slice(steps), count, kWords, DType::u32, "steps", kWords),
-                g.external(arena.slice(clock), 1, 2, DType::u32, "clock", 2)};
+        const uint32_t timestep_count = uint32_t(plan.timesteps.size());
+        steps = state.slot(uint32_t(plan.rows.size()) + kNoiseRows, kWords, DType::u32, "steps", kWords);
+        clock = ReplayMemory::clock_slot(state);
+        timesteps = state.slot(timestep_count, 1, DType::f32, "timesteps", 1);
+        times = state.slot(timestep_count, unet.time_width(), DType::f32, "times");
+        if (const uint32_t text_rows = round_up(tokens, kImageRowPadding); text_rows && unet.context_width()) {
+            context = state.slot(text_rows, unet.config().cross_attention_dim, unet.precision(), "conditioning");
+            text = state.slot(text_rows, unet.context_width(), unet.precision(), "text");
+        }
+        table_row = state.slot(halves, 1, DType::u32, "table_row", 1);
+        cells = state.slot(rows, 4, DType::i32, "cells", 4);
+        known = state.slot(rows, 1, DType::u32, "known", 1);
+        ends.latent = latent("x");
+        x0 = latent("x0");
+        ends.previous = latent("previous");
+        ends.buffer = latent("buffer");
+        ends.visible = state.slot(rows, 1, DType::f32, "visible", 1);
+        ends.bad = state.slot(1, 1, DType::u32, "first number that is none", 1);
+        if (fed) {
+            first_noise = latent("first noise");
+            previous_noise = latent("previous noise");
+        }
     }
-    Tensor time_table(Graph& g) const
-    {
-        return g.external(arena.slice(table), uint32_t(plan.timesteps.size()), unet.time_width(), DType::f32, "times");
-    }
-    Tensor text_table(Graph& g) const
-    {
-        return g.external(arena.slice(context_table), token_rows(), unet.context_width(), unet.precision(), "text");
-    }
+    Slot latent(const char* name) { return state.slot(rows, channels, DType::f32, name); }
+    StepTable step_table(Graph& g) const { return {steps.in(g), clock.in(g)}; }
     Tensor noise(Graph& g, StepTable table_of_steps, uint64_t seed) const
     {
-        const Tensor keys = g.external(arena.slice(cells), rows, 4, DType::i32, "cells", 4);
-        return step_noise(g, table_of_steps, keys, words(g, known, rows, "known"), channels, seed);
+        return step_noise(g, table_of_steps, cells.in(g), known.in(g), channels, seed);
     }
 
     // once: what depends on the timestep or the text only
     Graph tables_graph() const
     {
         Graph g;
-        const uint32_t times = uint32_t(plan.timesteps.size());
-        unet.time_table(g, g.external(arena.slice(timesteps), times, 1, DType::f32, "timesteps", 1), time_table(g));
-        const Tensor text = g.external(arena.slice(context), token_rows(), unet.config().cross_attention_dim,
-                                       unet.precision(), "conditioning");
-        unet.context_table(g, text, text_table(g));
+        g.keep(unet.time_table(g, timesteps.in(g)), times);
+        if (text.valid())
+            g.keep(unet.context_table(g, context.in(g)), text);
         return g;
     }
     // once a frame: the first state, and the noise on the previous latent
@@ -106,11 +84,9 @@ struct AsdRenderer::Memory {
     {
         Graph g;
         const StepTable s = step_table(g);
-        const Tensor first = fed ? latent(g, first_noise, "first noise") : noise(g, s, seed);
-        step_renoise(g, s, first, latent(g, x, "x"));
+        step_renoise(g, s, first_noise.valid() ? first_noise.in(g) : noise(g, s, seed), ends.latent.in(g));
         step_advance(g, s.clock);
-        const Tensor more = fed ? latent(g, previous_noise, "previous noise") : noise(g, s, seed);
-        step_renoise(g, s, more, latent(g, previous, "previous"));
+        step_renoise(g, s, previous_noise.valid() ? previous_noise.in(g) : noise(g, s, seed), ends.previous.in(g));
         step_advance(g, s.clock);
         return g;
     }
@@ -118,29 +94,24 @@ struct AsdRenderer::Memory {
     {
         Graph g;
         const StepTable s = step_table(g);
-        const Tensor row = words(g, table_row, halves, "table_row"), state = latent(g, x, "x");
-        const RendererFrame frame{latent(g, previous, "previous"), latent(g, buffer, "buffer"),
-                                  g.external(arena.slice(visible), rows, 1, DType::f32, "visible", 1)};
-        step_timestep(g, s, row);
-        const Tensor in = renderer_input(g, s, state, frame, halves, unet.precision());
-        const Unet::Context text{text_table(g), tokens, 0};
-        const FeatureMap m = unet.forward(g, {in, halves, height, width}, time_table(g), row, text);
+        const Tensor x = ends.latent.in(g);
+        const RendererFrame frame{ends.previous.in(g), ends.buffer.in(g), ends.visible.in(g)};
+        step_timestep(g, s, table_row.in(g));
+        const Tensor in = renderer_input(g, s, x, frame, halves, unet.precision());
+        const FeatureMap m =
+            unet.forward(g, {in, halves, height, width}, times.in(g), table_row.in(g), {text.in(g), tokens, 0});
         // samplers without noise take any finite numbers for it
         const bool noisy = std::ranges::any_of(plan.rows, [](const PlanRow& r) { return r.coefficients.c_z != 0; });
         const Tensor z = noisy ? noise(g, s, seed) : frame.buffer;
-        step_update(g, s, m.data, z, words(g, known, rows, "known"), frame.buffer, state, latent(g, x0, "x0"),
-                    guidance_scale, float(plan.clip));
+        step_update(g, s, m.data, z, known.in(g), frame.buffer, x, x0.in(g), guidance_scale, float(plan.clip));
         step_advance(g, s.clock);
         return g;
     }
-
-    // [pixels, C] with rows as on the device
-    std::vector<float> padded(std::span<const float> values) const
+    Graph check_graph() const
     {
-        std::vector<float> out(latent_values(), 0.f);
-        for (size_t i = 0; i < values.size(); ++i)
-            out[i / channels * ld() + i % channels] = values[i];
-        return out;
+        Graph g;
+        g.keep(first_non_finite(g, ends.latent.in(g), {width, height, width, height}), ends.bad);
+        return g;
     }
 };
 
@@ -171,7 +142,7 @@ Result<std::unique_ptr<AsdRenderer>> AsdRenderer::create(Device& device, const U
     std::unique_ptr<AsdRenderer> r(new AsdRenderer(device, unet, plan, std::move(options)));
     r->memory_ = std::make_unique<Memory>(unet, r->plan_, text.tokens, size, r->options_.guidance_scale,
                                           bool(r->options_.noise));
-    SR_CHECK(r->memory_->arena.allocate(device, "renderer state"));
+    SR_CHECK(r->memory_->state.allocate(device, "renderer state"));
     SR_CHECK(r->make_tables(text));
     return r;
 }
@@ -184,8 +155,9 @@ Result<AsdRenderer::Bytes> AsdRenderer::planned_bytes(const DeviceLimits& limits
     SR_TRY(const Plan tables, make_plan(m.tables_graph().desc(), limits));
     SR_TRY(const Plan begin, make_plan(m.begin_graph(0).desc(), limits));
     SR_TRY(const Plan step, make_plan(m.step_graph(guidance_scale, 0).desc(), limits));
-    return Bytes{m.arena.planned_bytes(limits),
-                 std::max(tables.arena_bytes(), begin.arena_bytes() + step.arena_bytes())};
+    SR_TRY(const Plan check, make_plan(m.check_graph().desc(), limits));
+    return Bytes{m.state.planned_bytes(limits),
+                 std::max(tables.arena_bytes(), begin.arena_bytes() + step.arena_bytes() + check.arena_bytes())};
 }
 
 Status AsdRenderer::make_tables(const Conditioning& text)
@@ -194,23 +166,15 @@ Status AsdRenderer::make_tables(const Conditioning& text)
     std::vector<StepRow> rows{first_noise_row(plan_.init_noise_sigma, kFirstDraw),
                               more_noise_row(options_.previous_noise, kPreviousFrameDraw)};
     std::ranges::transform(plan_.rows, std::back_inserter(rows), step_row);
-    SR_CHECK(device_.write(m.arena.slice(m.steps), std::as_bytes(std::span(rows))));
-    const std::vector<float> times(plan_.timesteps.begin(), plan_.timesteps.end());
-    SR_CHECK(device_.write(m.arena.slice(m.timesteps), std::as_bytes(std::span(times))));
+    SR_CHECK(m.steps.write(device_, rows));
+    SR_CHECK(m.clock.clear(device_));
+    SR_CHECK(m.timesteps.write(device_, std::vector<float>(plan_.timesteps.begin(), plan_.timesteps.end())));
     const uint32_t dim = unet_.config().cross_attention_dim;
     SR_ASSERT(text.values.size() == size_t(text.tokens) * dim, "{} numbers of conditioning for {} tokens of {}",
               text.values.size(), text.tokens, dim);
-    std::vector<float> padded(size_t(m.token_rows()) * m.text_ld(), 0.f);
-    for (size_t i = 0; i < text.values.size(); ++i)
-        padded[i / dim * m.text_ld() + i % dim] = text.values[i];
-    if (unet_.precision() == DType::f16) {
-        std::vector<uint16_t> halves(padded.size());
-        std::ranges::transform(padded, halves.begin(), float_to_half);
-        SR_CHECK(device_.write(m.arena.slice(m.context), std::as_bytes(std::span(halves))));
-    } else {
-        SR_CHECK(device_.write(m.arena.slice(m.context), std::as_bytes(std::span(padded))));
-    }
-    SR_CHECK(device_.clear(m.arena.slice(m.known)));
+    if (m.context.valid())
+        SR_CHECK(m.context.write_rows(device_, text.values));
+    SR_CHECK(m.known.clear(device_));
     SR_TRY(const auto tables, Program::create(device_, m.tables_graph()));
     return tables->run();
 }
@@ -221,13 +185,18 @@ Status AsdRenderer::make_programs()
         return {};
     SR_TRY(begin_, Program::create(device_, memory_->begin_graph(options_.seed)));
     SR_TRY(step_, Program::create(device_, memory_->step_graph(options_.guidance_scale, options_.seed)));
+    SR_TRY(check_, Program::create(device_, memory_->check_graph()));
+    replay_.emplace(device_, ReplayMemory{memory_->clock, memory_->ends.latent, memory_->x0}, plan_.rows.size(),
+                    [this](size_t) -> Result<Program*> { return step_.get(); });
     return {};
 }
 
 void AsdRenderer::rest()
 {
+    replay_.reset();
     begin_.reset();
     step_.reset();
+    check_.reset();
 }
 
 Status AsdRenderer::upload(const AsdFrame& frame)
@@ -235,78 +204,143 @@ Status AsdRenderer::upload(const AsdFrame& frame)
     const Memory& m = *memory_;
     const size_t values = size_t(m.pixels) * m.channels;
     SR_ASSERT(frame.buffer.size() == values && frame.visible.size() == m.pixels &&
-                  (frame.previous.empty() || frame.previous.size() == values) &&
-                  (frame.keys.empty() || frame.keys.size() == m.pixels),
+                  (frame.previous.empty() || frame.previous.size() == values),
               "a frame of {} values for {} pixels", frame.buffer.size(), m.pixels);
-    const auto write = [&](uint32_t id, const auto& array) {
-        return device_.write(m.arena.slice(id), std::as_bytes(std::span(array)));
-    };
+    SR_CHECK(m.ends.visible.write_rows(device_, frame.visible));
+    SR_CHECK(m.ends.buffer.write_rows(device_, frame.buffer));
+    return m.ends.previous.write_rows(device_, frame.previous);
+}
+
+// where noise comes from
+Status AsdRenderer::upload_keys(const AsdStart& start)
+{
+    const Memory& m = *memory_;
+    SR_ASSERT(start.keys.empty() || start.keys.size() == m.pixels, "{} keys for {} pixels", start.keys.size(),
+              m.pixels);
     std::vector<int32_t> cells(m.rows * 4ull, 0);
     for (uint32_t r = 0; r < m.rows; ++r) {
-        const NoiseKey key = r < frame.keys.size() ? frame.keys[r] : NoiseKey{r, frame.number};
+        const NoiseKey key = r < start.keys.size() ? start.keys[r] : NoiseKey{r, start.number};
         cells[4 * r] = int32_t(key.pixel);
         cells[4 * r + 1] = int32_t(key.frame);
-        cells[4 * r + 2] = int32_t(frame.chain);
+        cells[4 * r + 2] = int32_t(start.chain);
     }
-    std::vector<float> visible(frame.visible.begin(), frame.visible.end());
-    visible.resize(m.rows);
-    SR_CHECK(write(m.cells, cells));
-    SR_CHECK(write(m.visible, visible));
-    SR_CHECK(write(m.buffer, m.padded(frame.buffer)));
-    SR_CHECK(write(m.previous, m.padded(frame.previous)));
-    SR_CHECK(device_.clear(m.arena.slice(m.x)));
-    SR_CHECK(device_.clear(m.arena.slice(m.x0)));
-    if (m.fed) {
-        std::vector<float> initial(values), previous(values);
-        options_.noise(frame.number, initial, previous);
-        SR_CHECK(write(m.first_noise, m.padded(initial)));
-        SR_CHECK(write(m.previous_noise, m.padded(previous)));
-    }
-    const StepClock clock{0, 0};
-    return device_.write(m.arena.slice(m.clock), std::as_bytes(std::span(&clock, 1)));
+    SR_CHECK(m.cells.write(device_, cells));
+    if (!m.first_noise.valid())
+        return {};
+    std::vector<float> initial(size_t(m.pixels) * m.channels), previous(initial.size());
+    options_.noise(start.number, initial, previous);
+    SR_CHECK(m.first_noise.write_rows(device_, initial));
+    return m.previous_noise.write_rows(device_, previous);
 }
+
+// of everything but the network and the latents that decides the result
+uint64_t AsdRenderer::key_of(const AsdStart& start) const
+{
+    Hash hash;
+    const auto add = [&](const auto& values) { hash.add(std::as_bytes(std::span(values))); };
+    for (const PlanRow& row : plan_.rows) {
+        const StepRow values = step_row(row);
+        add(std::span(&values, 1));
+    }
+    add(plan_.timesteps);
+    const double settings[] = {plan_.init_noise_sigma, plan_.clip, options_.guidance_scale, options_.previous_noise};
+    add(settings);
+    const uint64_t what[] = {options_.seed, start.number, start.chain, start.first};
+    add(what);
+    return hash.value();
+}
+
+namespace {
+
+AsdStart start_of(const AsdFrame& frame)
+{
+    return {frame.number, frame.chain, frame.previous.empty(), frame.keys};
+}
+
+} // namespace
 
 Status AsdRenderer::begin(const AsdFrame& frame)
 {
-    SR_CHECK(make_programs());
     SR_CHECK(upload(frame));
-    SR_CHECK(begin_->run());
-    // note: the first frame has nothing before it, not even noise
-    return frame.previous.empty() ? device_.clear(memory_->arena.slice(memory_->previous)) : Status{};
+    return begin(start_of(frame));
 }
 
-Status AsdRenderer::run_steps(const StepCallback& callback)
+Status AsdRenderer::begin(const AsdStart& start)
 {
-    std::deque<uint64_t> flight;
-    const size_t total = plan_.rows.size();
-    // a CPU gains nothing from steps ahead, and a run that is stopped would wait for them
-    const size_t ahead = device_.limits().type == DeviceType::cpu || device_.profile() ? 0 : kInFlight;
-    for (size_t done = 1; done <= total; ++done) {
-        SR_TRY(const uint64_t ticket, step_->submit());
-        flight.push_back(ticket);
-        if (flight.size() > ahead) {
-            SR_CHECK(device_.wait(flight.front()));
-            flight.pop_front();
-            SR_CHECK(step_->collect_profile());
-        }
-        if (callback && !callback(done, total))
-            return fail(ErrorCode::interrupted, "interrupted");
-    }
-    return device_.wait(device_.last_ticket());
+    SR_CHECK(make_programs());
+    key_ = key_of(start);
+    SR_CHECK(replay_->begin(kNoiseRows));
+    SR_CHECK(upload_keys(start));
+    SR_CHECK(begin_->run());
+    // note: the first frame has nothing before it, not even noise
+    return start.first ? memory_->ends.previous.clear(device_) : Status{};
+}
+
+const AsdSlots& AsdRenderer::slots() const
+{
+    return memory_->ends;
+}
+
+Result<bool> AsdRenderer::step(size_t submits)
+{
+    SR_ASSERT(replay_, "a step of a renderer that has not begun a frame");
+    return replay_->step(submits);
+}
+
+Status AsdRenderer::cancel()
+{
+    return replay_ ? replay_->cancel() : Status{};
+}
+
+Result<std::vector<std::byte>> AsdRenderer::save()
+{
+    SR_ASSERT(replay_, "a renderer is saved that has not begun a frame");
+    return replay_->save(key_);
+}
+
+Status AsdRenderer::resume(const AsdFrame& frame, std::span<const std::byte> saved)
+{
+    SR_CHECK(upload(frame));
+    return resume(start_of(frame), saved);
+}
+
+Status AsdRenderer::resume(const AsdStart& start, std::span<const std::byte> saved)
+{
+    SR_CHECK(begin(start));
+    return replay_->resume(saved, key_);
+}
+
+Status AsdRenderer::end()
+{
+    SR_ASSERT(replay_ && replay_->active() && replay_->row() == steps(), "a frame is finished after {} of {} steps",
+              steps_done(), steps());
+    replay_->end();
+    SR_CHECK(check_->run());
+    SR_TRY(const std::vector<uint32_t> bad, memory_->ends.bad.read<uint32_t>(device_));
+    if (bad.front() == ~0u)
+        return {};
+    const Slot pixel = memory_->ends.latent.row_range(bad.front() / memory_->channels, 1);
+    SR_TRY(const std::vector<float> values, pixel.read_rows(device_, 1));
+    return not_finite(values[bad.front() % memory_->channels], bad.front(), "the denoised latent");
+}
+
+Result<std::vector<float>> AsdRenderer::finish()
+{
+    SR_CHECK(end());
+    return memory_->ends.latent.read_rows(device_, memory_->pixels);
 }
 
 Result<std::vector<float>> AsdRenderer::render(const AsdFrame& frame, const StepCallback& callback)
 {
     SR_CHECK(begin(frame));
-    SR_CHECK(run_steps(callback));
-    const Memory& m = *memory_;
-    std::vector<float> rows(m.latent_values());
-    SR_CHECK(device_.read(m.arena.slice(m.x), std::as_writable_bytes(std::span(rows))));
-    std::vector<float> latent(size_t(m.pixels) * m.channels);
-    for (size_t i = 0; i < latent.size(); ++i)
-        latent[i] = rows[i / m.channels * m.ld() + i % m.channels];
-    SR_CHECK(check_finite(latent, "the denoised latent"));
-    return latent;
+    for (bool done = false; !done;) {
+        SR_TRY(done, step(1));
+        if (callback && !callback(steps_done(), steps())) {
+            SR_CHECK(cancel());
+            return fail(ErrorCode::interrupted, "interrupted");
+        }
+    }
+    return finish();
 }
 
 uint32_t AsdRenderer::step_passes() const

@@ -6,8 +6,10 @@
 #include "engine/refine/latent_codec.h"
 #include "engine/refine/noise_trail.h"
 #include "engine/sampling/repaint.h"
+#include "engine/sampling/replay.h"
 
 #include <functional>
+#include <optional>
 
 namespace semrover {
 
@@ -29,6 +31,21 @@ struct AsdFrame {
     std::span<const NoiseKey> keys{}; // [pixels]; empty: each pixel's own, of this frame
 };
 
+// a frame whose latents lie in the renderer's slots already
+struct AsdStart {
+    uint32_t number = 0, chain = 0;   // as of AsdFrame
+    bool first = true;                // no frame before it
+    std::span<const NoiseKey> keys{}; // [pixels]; empty: each pixel's own, of this frame
+};
+
+// the ends of a renderer on the device, of the shapes that LatentCodec's have
+struct AsdSlots {
+    Slot buffer, visible; // latent of the splat buffer, visible share of each pixel
+    Slot previous;        // latent of the frame before; begin() puts noise on it
+    Slot latent;          // of the frame, when it has ended
+    Slot bad;             // [1] u32: first_non_finite() of it
+};
+
 // The text of a renderer, the same for every frame
 struct Conditioning {
     uint32_t tokens = 0;
@@ -38,7 +55,7 @@ struct Conditioning {
 // Autoregressive renderer: the UNet sees the noisy latent, the previous frame's latent with noise on it, the splat
 // buffer's latent and its visibility. The graph is built once per picture size and replayed for every step, one submit
 // a step; embeddings of the timesteps and keys and values of the text are computed once. The result depends on nothing
-// but the frame, the plan and the seed.
+// but the frame, the plan and the seed: not on where it stopped and was taken up again.
 class AsdRenderer {
   public:
     // errors: usage for a guidance scale or noise out of range; bad_input for a UNet of other channels; device errors
@@ -59,7 +76,31 @@ class AsdRenderer {
     // -> [pixels, C] latent. Errors: internal when the network returns NaN or infinity; interrupted; device errors
     Result<std::vector<float>> render(const AsdFrame& frame, const StepCallback& callback = {});
 
-    // drops the programs and their memory until the next frame
+    // the same, piecewise: begin, step until it says true, finish. A frame that has begun ends with finish, cancel, or
+    // the next begin. One row of the plan is one submit. What the frame's spans show is copied by begin.
+    Status begin(const AsdFrame& frame);
+    Result<bool> step(size_t submits);
+    Result<std::vector<float>> finish();
+    Status cancel();
+
+    // the same with latents that stay on the device: the caller copies them to slots().buffer, visible and (but for a
+    // first frame) previous, then begin, step until it says true, end; the result is slots().latent until the next
+    // begin
+    const AsdSlots& slots() const;
+    Status begin(const AsdStart& start);
+    Status end(); // errors: internal when the network returned NaN or infinity
+
+    size_t steps_done() const { return replay_ ? replay_->row() : 0; }
+    size_t steps() const { return plan_.rows.size(); }
+
+    // between two steps: what another renderer with the same network, text, plan and options needs to go on, to the
+    // same bytes
+    Result<std::vector<std::byte>> save();
+    // in place of begin. Errors: bad_input for what was saved of another frame, plan, seed or options
+    Status resume(const AsdFrame& frame, std::span<const std::byte> saved);
+    Status resume(const AsdStart& start, std::span<const std::byte> saved);
+
+    // drops the programs and their memory until the next frame; between frames only
     void rest();
 
     uint32_t step_passes() const; // of a step, while there is a program
@@ -73,15 +114,17 @@ class AsdRenderer {
     Status make_tables(const Conditioning& text);
     Status make_programs();
     Status upload(const AsdFrame& frame);
-    Status begin(const AsdFrame& frame);
-    Status run_steps(const StepCallback& callback);
+    Status upload_keys(const AsdStart& start);
+    uint64_t key_of(const AsdStart& start) const;
 
     Device& device_;
     const Unet& unet_;
     SamplingPlan plan_;
     AsdOptions options_;
     std::unique_ptr<Memory> memory_;
-    std::unique_ptr<Program> begin_, step_;
+    std::unique_ptr<Program> begin_, step_, check_;
+    std::optional<Replay> replay_;
+    uint64_t key_ = 0; // what the frame is
 
   public:
     ~AsdRenderer();

@@ -17,8 +17,18 @@ std::vector<uint8_t> normal_pixels(const SplatImage& image);                 // 
 std::vector<uint8_t> label_pixels(const SplatImage& image);                  // [height, width]
 std::vector<uint8_t> visible_pixels(const SplatImage& image);                // [height, width]
 
+// the same as the device makes it of a splat image: PixelWords (kernels/picture.h)
+struct FramePixels {
+    uint32_t width = 0, height = 0;
+    std::vector<uint32_t> seen, ranges, normals;
+};
+std::vector<uint8_t> color_pixels(const FramePixels& pixels);
+std::vector<uint16_t> depth_pixels(const FramePixels& pixels);
+std::vector<uint8_t> normal_pixels(const FramePixels& pixels);
+std::vector<uint8_t> label_pixels(const FramePixels& pixels);
+std::vector<uint8_t> visible_pixels(const FramePixels& pixels);
+
 // FOLDER/{color,depth,normal,label,visible}/NNNNNN.png; folders are made. Errors: bad_input
-Status write_frame_images(const Path& folder, uint32_t number, const SplatImage& image,
-                          const std::array<uint8_t, 3>& background);
+Status write_frame_images(const Path& folder, uint32_t number, const FramePixels& pixels);
 
 } // namespace semrover

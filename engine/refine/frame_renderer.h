@@ -4,6 +4,7 @@
 
 #include "engine/model/renderer_model.h"
 #include "engine/refine/memory_plan.h"
+#include "runtime/device/copy_ring.h"
 
 namespace semrover {
 
@@ -20,10 +21,26 @@ class FrameRenderer {
     // run's work) needs them. Errors: bad_input for weights that do not fit the model; device errors
     Status start(const RendererWork& work, const RendererWork& run);
 
-    // as LatentCodec and AsdRenderer do it
+    // as LatentCodec does it; not between begin and finish of a frame
     Result<std::vector<float>> encode(std::span<const float> image);
-    Result<std::vector<float>> denoise(const AsdFrame& frame, const AsdRenderer::StepCallback& callback);
     Result<std::vector<float>> decode(std::span<const float> latent);
+    // as AsdRenderer does it
+    Status begin(const AsdFrame& frame);
+    Result<bool> step(size_t submits); // true when the latent is done
+    Result<std::vector<float>> finish();
+    Status cancel();
+
+    // The same with latents that stay on the device from the splats' pixels to the frame's bytes: under the resident
+    // policy, and for work that denoises. Nothing is read back but a word of each: are all numbers finite?
+    // Errors: internal where they are not; device errors
+    Status encode_seen(const Slot& seen);                                             // as splat_pixels() makes it
+    Status encode_seen(std::span<const uint32_t> seen);                               // the same from the host
+    Status use_latent(std::span<const float> buffer, std::span<const float> visible); // or what was encoded before
+    Status use_previous(std::span<const float> latent); // of the frame before, where this run did not make it
+    Status begin_frame(const AsdStart& frame);     // then step; after the frame before: its latent is the previous one
+    Status end_frame();                            // slots().latent of denoiser() is the frame's
+    Result<Slot> decode_latent();                  // of the frame that has ended -> its bytes
+    AsdRenderer* denoiser() { return asd_.get(); } // while there is one
 
   private:
     enum class Part { encode, denoise, decode };
@@ -32,6 +49,9 @@ class FrameRenderer {
     Status load_vae();
     Status make_asd();
     Result<LatentCodec*> codec(CodecDirection direction);
+    Status make_denoiser();
+    Status copy(const Slot& from, const Slot& to);
+    Status encoded(const LatentCodec& codec);
 
     Device& device_;
     const RendererModel& model_;
@@ -45,6 +65,7 @@ class FrameRenderer {
     std::unique_ptr<AsdRenderer> asd_;
     std::unique_ptr<LatentCodec> codec_;
     CodecDirection direction_ = CodecDirection::encode; // of codec_
+    std::unique_ptr<CopyRing> copies_;
 };
 
 } // namespace semrover

@@ -5,6 +5,7 @@
 #include "engine/network/vae.h"
 #include "engine/refine/latent_size.h"
 #include "runtime/device/program.h"
+#include "runtime/device/state.h"
 
 #include <memory>
 #include <span>
@@ -16,6 +17,18 @@ namespace semrover {
 std::vector<float> block_shares(const LatentSize& size, std::span<const uint8_t> visible);
 
 enum class CodecDirection { encode, decode };
+
+// The ends of a codec on the device; pictures and latents are matrices, a row a pixel, padded as images are. Latents of
+// codecs and denoisers of one size have the same shape, so that one may be copied to the other.
+struct CodecSlots {
+    Slot image;  // [pixels of whole blocks, channels] fp32
+    Slot latent; // [latent pixels, latent_channels] fp32
+    Slot bad;    // [1] u32: first_non_finite() of what came out
+    Slot
+        seen; // of an encoder of three channels: [image pixels] u32, as splat_pixels() makes it, what encode_seen takes
+    Slot shares; // likewise: [latent pixels] fp32, the visible share of each block
+    Slot bytes;  // of a decoder of three channels: the picture, red, green, blue, four bytes a word
+};
 
 // A VAE for one picture size and one direction, in memory of its own. Latents are scaled as the denoiser sees them:
 // (z - shift_factor) * scaling_factor, z the mode of the posterior, that is its mean.
@@ -33,16 +46,22 @@ class LatentCodec {
     // latent: [height, width, latent_channels] -> [image_height, image_width, out_channels], -1..1 or beyond. Likewise
     Result<std::vector<float>> decode(std::span<const float> latent);
 
+    // the same on the device, submitted and not waited for, between slots that the caller copies to and from
+    const CodecSlots& slots() const;
+    Status encode_seen();   // slots().seen -> latent, shares
+    Status decode_latent(); // slots().latent -> image, bytes
+    // waits for it. Errors: internal when there was NaN or infinity in the result
+    Status check() const;
+
   private:
     struct Ends; // memory of what goes in and what comes out
     LatentCodec(Device& device, const Vae& vae, const LatentSize& size);
-    Result<std::vector<float>> run(std::span<const float> padded);
 
     Device& device_;
     const Vae& vae_;
     LatentSize size_;
     std::unique_ptr<Ends> ends_;
-    std::unique_ptr<Program> program_;
+    std::unique_ptr<Program> intake_, program_; // intake: of what was seen
 
   public:
     ~LatentCodec();
@@ -54,5 +73,6 @@ std::vector<uint8_t> pixels_of_floats(std::span<const float> values); // rounded
 
 // internal, with the index and the value, when one is NaN or infinite
 Status check_finite(std::span<const float> values, std::string_view what);
+tl::unexpected<Error> not_finite(float value, size_t element, std::string_view what); // that error
 
 } // namespace semrover

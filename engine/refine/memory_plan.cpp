@@ -24,7 +24,7 @@ uint64_t RendererBytes::peak(MemoryPolicy policy) const
         if (s.denoise)
             peak = std::max(peak, unet + s.state + s.denoise);
     }
-    return peak;
+    return outgoing + peak;
 }
 
 Result<RendererBytes> renderer_bytes(const DeviceLimits& limits, const RendererNetworks& n,

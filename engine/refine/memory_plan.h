@@ -22,6 +22,7 @@ struct RendererWork {
 // device bytes of a renderer's parts; 0 where a run has no work for them
 struct RendererBytes {
     uint64_t unet = 0, vae = 0; // weights
+    uint64_t outgoing = 0;      // of what is on its way to files
     struct Size {
         uint64_t state = 0, denoise = 0, encode = 0, decode = 0;
     };

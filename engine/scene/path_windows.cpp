@@ -102,4 +102,19 @@ std::vector<uint32_t> cells_to_grow(const VoxelGrid& grid, const std::vector<Gro
     return cells;
 }
 
+int64_t nearest_cell(const VoxelGrid& grid, const GroundPoint& point)
+{
+    const double edge = decimal_voxel_size(grid.voxel_size);
+    int64_t best = 0;
+    double nearest = 1e300;
+    for (size_t c = 0; c < grid.cells.size(); ++c) {
+        const double x = (grid.cells[c][0] + 0.5) * edge - point[0], y = (grid.cells[c][1] + 0.5) * edge - point[1];
+        if (x * x + y * y < nearest) {
+            nearest = x * x + y * y;
+            best = int64_t(c);
+        }
+    }
+    return best;
+}
+
 } // namespace semrover

@@ -41,4 +41,7 @@ CellWindow window_around(const std::vector<GroundPoint>& piece, double margin, f
 // indices of the cells without points whose centres are at most `horizon` metres from the piece, seen from above
 std::vector<uint32_t> cells_to_grow(const VoxelGrid& grid, const std::vector<GroundPoint>& piece, double horizon);
 
+// index of the cell whose centre is nearest to a point, seen from above; the first of equals
+int64_t nearest_cell(const VoxelGrid& grid, const GroundPoint& point);
+
 } // namespace semrover

@@ -3,7 +3,7 @@
 #include "engine/splat/rasterizer.h"
 
 #include "engine/camera/lens.h"
-#include "kernels/splat.h"
+#include "kernels/picture.h"
 
 #include <algorithm>
 #include <cmath>
@@ -112,14 +112,22 @@ Result<std::unique_ptr<Rasterizer>> Rasterizer::create(Device& device, const Sur
 Status Rasterizer::build()
 {
     program_.reset();
-    memory_ = std::make_unique<Arena>();
-    const uint64_t pixels = uint64_t(width_) * height_ * cameras_;
+    state_ = State();
+    const uint32_t pixels = width_ * height_ * cameras_;
     const SplatLens lens = lens_of(options_.model);
     const uint32_t camera_floats = splat_camera_floats(lens);
-    for (uint64_t bytes : {uint64_t(cameras_) * camera_floats * 4, uint64_t(4), uint64_t(4), pixels * 16, pixels * 16,
-                           pixels * 8, pixels * 8})
-        memory_->add(bytes); // in the order of Slot
-    SR_CHECK(memory_->allocate(device_, "splat images"));
+    camera_table_ = state_.slot(cameras_, camera_floats, DType::f32, "cameras", camera_floats);
+    visible_ = state_.slot(1, 1, DType::u32, "visible splats", 1);
+    pairs_ = state_.slot(1, 1, DType::u32, "splat pairs", 1);
+    if (options_.pixels_over)
+        pixels_ = {state_.slot(pixels, 1, DType::u32, "seen", 1), state_.slot(pixels, 1, DType::u32, "ranges", 1),
+                   state_.slot(pixels, 1, DType::u32, "normals", 1)};
+    else
+        images_ = {state_.slot(pixels, 4, DType::f32, "splat colour", 4),
+                   state_.slot(pixels, 4, DType::f32, "splat surface", 4),
+                   state_.slot(pixels, 2, DType::f32, "splat depth", 2),
+                   state_.slot(pixels, 2, DType::u32, "splat ids", 2)};
+    SR_CHECK(state_.allocate(device_, "splat images"));
     Graph g;
     SplatOptions o{.width = width_,
                    .height = height_,
@@ -133,16 +141,20 @@ Status Rasterizer::build()
     o.transmittance_min = options_.transmittance_min;
     o.screen_variance = options_.screen_variance;
     o.cutoff = options_.cutoff;
-    o.visible = g.external(memory_->slice(kVisible), 1, 1, DType::u32, "visible splats", 1);
-    o.pairs = g.external(memory_->slice(kPairs), 1, 1, DType::u32, "splat pairs", 1);
-    const Tensor cameras =
-        g.external(memory_->slice(kCameras), cameras_, camera_floats, DType::f32, "cameras", camera_floats);
-    const SplatImages y = splat(g, scene_.in(g), cameras, o);
-    for (const auto& [slot, made] :
-         {std::pair{kColor, y.color}, {kSurface, y.surface}, {kDepth, y.depth}, {kIds, y.ids}}) {
-        const Tensor kept = g.external(memory_->slice(slot), made.rows, made.cols, made.dtype, "splat image", made.ld);
-        g.replace(made.resource, kept.resource);
+    const SplatImages y = splat(g, scene_.in(g), camera_table_.in(g), o);
+    if (options_.pixels_over) {
+        const PixelWords pixels_of_files = splat_pixels(g, y, {*options_.pixels_over, options_.visible_alpha});
+        g.keep(pixels_of_files.seen, pixels_.seen);
+        g.keep(pixels_of_files.ranges, pixels_.ranges);
+        g.keep(pixels_of_files.normals, pixels_.normals);
+    } else {
+        g.keep(y.color, images_.color);
+        g.keep(y.surface, images_.surface);
+        g.keep(y.depth, images_.depth);
+        g.keep(y.ids, images_.ids);
     }
+    g.keep(y.visible, visible_);
+    g.keep(y.pairs, pairs_);
     SR_TRY(program_, Program::create(device_, g));
     return {};
 }
@@ -160,39 +172,70 @@ Status Rasterizer::make_room(uint32_t visible, uint32_t pairs)
     return build();
 }
 
-// the frames of at most cameras_ cameras, into memory_
-Status Rasterizer::draw(std::span<const SplatCamera> cameras)
+// the frames of at most cameras_ cameras
+Status Rasterizer::draw_together(std::span<const SplatCamera> cameras)
 {
     const uint32_t floats = splat_camera_floats(lens_of(options_.model));
     std::vector<float> table(size_t(cameras_) * floats);
     for (size_t i = 0; i < cameras.size(); ++i)
         write_row(cameras[i], std::span(table).subspan(i * floats, floats));
     for (;;) {
-        SR_CHECK(device_.write(memory_->slice(kCameras), std::as_bytes(std::span(table))));
+        SR_CHECK(camera_table_.write(device_, table));
         SR_CHECK(program_->run());
-        uint32_t visible, pairs;
-        SR_CHECK(device_.read(memory_->slice(kVisible), std::as_writable_bytes(std::span(&visible, 1))));
-        SR_CHECK(device_.read(memory_->slice(kPairs), std::as_writable_bytes(std::span(&pairs, 1))));
-        if (visible <= max_visible_ && pairs <= max_pairs_)
+        SR_TRY(const std::vector<uint32_t> visible, visible_.read<uint32_t>(device_));
+        SR_TRY(const std::vector<uint32_t> pairs, pairs_.read<uint32_t>(device_));
+        if (visible[0] <= max_visible_ && pairs[0] <= max_pairs_)
             return {};
-        SR_CHECK(make_room(visible, pairs)); // pairs of what was visible; with more room there may be more
+        SR_CHECK(make_room(visible[0], pairs[0])); // pairs of what was visible; with more room there may be more
     }
+}
+
+Result<uint32_t> Rasterizer::draw_some(std::span<const SplatCamera> cameras)
+{
+    for (;;) {
+        const auto some = cameras.first(std::min<size_t>(cameras_, cameras.size()));
+        const Status status = draw_together(some);
+        if (status)
+            return uint32_t(some.size());
+        if (status.error().code != ErrorCode::out_of_memory || some.size() == 1)
+            return tl::make_unexpected(status.error());
+        cameras_ = uint32_t(some.size() + 1) / 2; // together they are too many for this device
+        ++rebuilds_;
+        SR_CHECK(build());
+    }
+}
+
+Result<uint32_t> Rasterizer::draw(std::span<const SplatCamera> cameras)
+{
+    SR_ASSERT(!cameras.empty(), "no camera to draw");
+    for (size_t i = 0; i < cameras.size(); ++i)
+        SR_CHECK(check_camera(cameras[i], i));
+    return draw_some(cameras);
+}
+
+SplatPixelSlots Rasterizer::pixels(uint32_t camera) const
+{
+    const uint32_t pixels = width_ * height_, first = camera * pixels;
+    return {pixels_.seen.row_range(first, pixels), pixels_.ranges.row_range(first, pixels),
+            pixels_.normals.row_range(first, pixels)};
+}
+
+SplatSlots Rasterizer::images(uint32_t camera) const
+{
+    const uint32_t pixels = width_ * height_, first = camera * pixels;
+    return {images_.color.row_range(first, pixels), images_.surface.row_range(first, pixels),
+            images_.depth.row_range(first, pixels), images_.ids.row_range(first, pixels)};
 }
 
 Status Rasterizer::read_images(uint32_t count, std::vector<SplatImage>& out)
 {
-    const size_t pixels = size_t(width_) * height_;
-    std::vector<float> color(pixels * 4), surface(pixels * 4), depth(pixels * 2);
-    std::vector<uint32_t> ids(pixels * 2);
+    const uint32_t pixels = width_ * height_;
     for (uint32_t camera = 0; camera < count; ++camera) {
-        const auto fetch = [&](Slot slot, auto& values) {
-            const auto bytes = std::as_writable_bytes(std::span(values));
-            return device_.read(memory_->slice(slot).part(camera * bytes.size(), bytes.size()), bytes);
-        };
-        SR_CHECK(fetch(kColor, color));
-        SR_CHECK(fetch(kSurface, surface));
-        SR_CHECK(fetch(kDepth, depth));
-        SR_CHECK(fetch(kIds, ids));
+        const SplatSlots images = this->images(camera);
+        SR_TRY(const std::vector<float> color, images.color.read<float>(device_));
+        SR_TRY(const std::vector<float> surface, images.surface.read<float>(device_));
+        SR_TRY(const std::vector<float> depth, images.depth.read<float>(device_));
+        SR_TRY(const std::vector<uint32_t> ids, images.ids.read<uint32_t>(device_));
         SplatImage image{.width = width_, .height = height_};
         image.color.resize(pixels * 3);
         image.normal.resize(pixels * 3);
@@ -219,20 +262,13 @@ Status Rasterizer::read_images(uint32_t count, std::vector<SplatImage>& out)
 
 Result<std::vector<SplatImage>> Rasterizer::render(std::span<const SplatCamera> cameras)
 {
+    SR_ASSERT(!options_.pixels_over, "this rasterizer keeps pixels, not images");
     for (size_t i = 0; i < cameras.size(); ++i)
         SR_CHECK(check_camera(cameras[i], i));
     std::vector<SplatImage> out;
     while (out.size() < cameras.size()) {
-        const auto some = cameras.subspan(out.size(), std::min<size_t>(cameras_, cameras.size() - out.size()));
-        const Status status = draw(some);
-        if (!status && status.error().code == ErrorCode::out_of_memory && some.size() > 1) {
-            cameras_ = uint32_t(some.size() + 1) / 2; // together they are too many for this device
-            ++rebuilds_;
-            SR_CHECK(build());
-            continue;
-        }
-        SR_CHECK(status);
-        SR_CHECK(read_images(uint32_t(some.size()), out));
+        SR_TRY(const uint32_t drawn, draw_some(cameras.subspan(out.size())));
+        SR_CHECK(read_images(drawn, out));
     }
     return out;
 }

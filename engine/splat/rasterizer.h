@@ -8,6 +8,7 @@
 
 #include <array>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -49,6 +50,17 @@ struct RasterizerOptions {
     uint32_t tile = 16;                       // pixels, a multiple of 16
     uint32_t max_pairs = 0;                   // to begin with; 0: from the number of surfels
     CameraModel model = CameraModel::pinhole; // of all cameras
+    // keeps pixels as files have them, over this background, in place of images: draw() and pixels(), not render()
+    std::optional<std::array<uint8_t, 3>> pixels_over;
+};
+
+// what one camera sees, on the device, a row a pixel: as SplatImages (kernels/splat.h) has it, or as files have it
+// (PixelWords, kernels/picture.h)
+struct SplatSlots {
+    Slot color, surface, depth, ids;
+};
+struct SplatPixelSlots {
+    Slot seen, ranges, normals;
 };
 
 // Draws a scene from up to max_cameras cameras in one submit; more are drawn in turns. The graph is built once and
@@ -64,18 +76,23 @@ class Rasterizer {
     // errors: bad_input for a camera that is not finite or without focal length; out_of_memory, device_lost
     Result<std::vector<SplatImage>> render(std::span<const SplatCamera> cameras);
 
+    // the same on the device: draws as many of the first cameras as it has room for, and says how many; what they see
+    // stays until the next call
+    Result<uint32_t> draw(std::span<const SplatCamera> cameras);
+    SplatSlots images(uint32_t camera) const;
+    SplatPixelSlots pixels(uint32_t camera) const;
+
     const Program& program() const { return *program_; }
     // device memory for what it has room for now, beside the scene's
-    uint64_t planned_bytes() const { return memory_->planned_bytes(device_.limits()) + program_->plan().arena_bytes(); }
+    uint64_t planned_bytes() const { return state_.planned_bytes(device_.limits()) + program_->plan().arena_bytes(); }
     uint32_t rebuilds() const { return rebuilds_; } // how often there was not enough room
 
   private:
-    enum Slot { kCameras, kVisible, kPairs, kColor, kSurface, kDepth, kIds, kSlots };
-
     Rasterizer(Device& device, const SurfelScene& scene) : device_(device), scene_(scene) {}
     Status build();
     Status make_room(uint32_t visible, uint32_t pairs);
-    Status draw(std::span<const SplatCamera> cameras);
+    Result<uint32_t> draw_some(std::span<const SplatCamera> cameras);
+    Status draw_together(std::span<const SplatCamera> cameras);
     Status read_images(uint32_t count, std::vector<SplatImage>& out);
 
     Device& device_;
@@ -83,7 +100,10 @@ class Rasterizer {
     RasterizerOptions options_;
     uint32_t width_ = 0, height_ = 0, cameras_ = 0;
     uint32_t max_visible_ = 0, max_pairs_ = 0, rebuilds_ = 0;
-    std::unique_ptr<Arena> memory_; // cameras, totals, images
+    State state_;
+    Slot camera_table_, visible_, pairs_;
+    SplatSlots images_;      // of all cameras, or
+    SplatPixelSlots pixels_; // likewise
     std::unique_ptr<Program> program_;
 };
 

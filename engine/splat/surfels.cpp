@@ -111,32 +111,30 @@ Status SurfelScene::upload(const Host& host)
 {
     size_ = uint32_t(host.positions.size());
     skipped_ = uint32_t(host.skipped());
-    for (uint64_t bytes : {16, 16, 16, 4, 4}) // in the order of Part
-        arena_.add(bytes * rows());
-    SR_CHECK(arena_.allocate(*device_, "surfels"));
+    const uint32_t rows = std::max(size_, 1u);
+    positions_ = state_.slot(rows, 4, DType::f32, "positions", 4);
+    normals_ = state_.slot(rows, 4, DType::f32, "normals", 4);
+    colors_ = state_.slot(rows, 4, DType::f32, "colours", 4);
+    labels_ = state_.slot(rows, 1, DType::u32, "labels", 1);
+    cells_ = state_.slot(rows, 1, DType::u32, "cells", 1);
+    SR_CHECK(state_.allocate(*device_, "surfels"));
     if (!size_) {
-        for (uint32_t part = 0; part < kParts; ++part)
-            SR_CHECK(device_->clear(arena_.slice(part)));
+        for (const Slot& slot : {positions_, normals_, colors_, labels_, cells_})
+            SR_CHECK(slot.clear(*device_));
         return {};
     }
-    SR_CHECK(device_->write(arena_.slice(kPositions), std::as_bytes(std::span(host.positions))));
-    SR_CHECK(device_->write(arena_.slice(kNormals), std::as_bytes(std::span(host.normals))));
-    SR_CHECK(device_->write(arena_.slice(kColors), std::as_bytes(std::span(host.colors))));
-    SR_CHECK(device_->write(arena_.slice(kLabels), std::as_bytes(std::span(host.labels))));
-    return device_->write(arena_.slice(kCells), std::as_bytes(std::span(host.cells)));
-}
-
-Tensor SurfelScene::floats(Graph& g, Part part, std::string_view name) const
-{
-    return g.external(arena_.slice(part), rows(), 4, DType::f32, name, 4);
+    SR_CHECK(positions_.write(*device_, host.positions));
+    SR_CHECK(normals_.write(*device_, host.normals));
+    SR_CHECK(colors_.write(*device_, host.colors));
+    SR_CHECK(labels_.write(*device_, host.labels));
+    return cells_.write(*device_, host.cells);
 }
 
 // normals from the nearest points, and sigmas if they follow the spacing
 Status SurfelScene::derive(const SurfelOptions& options)
 {
     Graph g;
-    const Tensor points = floats(g, kPositions, "surfel positions"), colors = floats(g, kColors, "surfel colours");
-    const Tensor labels = g.external(arena_.slice(kLabels), rows(), 1, DType::u32, "surfel labels", 1);
+    const Tensor points = positions_.in(g), labels = labels_.in(g);
     KnnOptions near{.neighbors = options.neighbors, .radius = options.neighbor_radius};
     if (options.same_label)
         near.labels = labels;
@@ -147,34 +145,28 @@ Status SurfelScene::derive(const SurfelOptions& options)
     SurfelSize size{.sigma = options.sigma};
     if (options.auto_sigma)
         size.spacing = kSpacing;
-    const Tensor normals = surfel(g, points, colors, neighbors, planes.normals, size);
-    g.replace(normals.resource, floats(g, kNormals, "surfel normals").resource);
+    g.keep(surfel(g, points, colors_.in(g), neighbors, planes.normals, size), normals_);
     SR_TRY(const auto program, Program::create(*device_, g));
     return program->run();
 }
 
 SplatScene SurfelScene::in(Graph& g) const
 {
-    return {floats(g, kPositions, "positions"), floats(g, kNormals, "normals"), floats(g, kColors, "colours"),
-            g.external(arena_.slice(kLabels), rows(), 1, DType::u32, "labels", 1),
-            g.external(arena_.slice(kCells), rows(), 1, DType::u32, "cells", 1)};
+    return {positions_.in(g), normals_.in(g), colors_.in(g), labels_.in(g), cells_.in(g)};
 }
 
 uint64_t SurfelScene::bytes() const
 {
-    return arena_.planned_bytes(device_->limits());
+    return state_.planned_bytes(device_->limits());
 }
 
 Result<Surfels> SurfelScene::read() const
 {
     Host host;
-    for (const auto& [part, values] :
-         {std::pair{kPositions, &host.positions}, {kNormals, &host.normals}, {kColors, &host.colors}}) {
-        values->resize(rows());
-        SR_CHECK(device_->read(arena_.slice(part), std::as_writable_bytes(std::span(*values))));
-    }
-    host.labels.resize(rows());
-    SR_CHECK(device_->read(arena_.slice(kLabels), std::as_writable_bytes(std::span(host.labels))));
+    SR_TRY(host.positions, positions_.read<Host::Row>(*device_));
+    SR_TRY(host.normals, normals_.read<Host::Row>(*device_));
+    SR_TRY(host.colors, colors_.read<Host::Row>(*device_));
+    SR_TRY(host.labels, labels_.read<uint32_t>(*device_));
     Surfels out;
     for (size_t i = 0; i < size_; ++i) {
         const auto &p = host.positions[i], &n = host.normals[i], &c = host.colors[i];

@@ -7,6 +7,7 @@
 #include "kernels/network.h"
 #include "kernels/splat.h"
 #include "runtime/device/device.h"
+#include "runtime/device/state.h"
 
 namespace semrover {
 
@@ -39,18 +40,16 @@ class SurfelScene {
     Result<Surfels> read() const; // as they are drawn, for export
 
   private:
-    enum Part { kPositions, kNormals, kColors, kLabels, kCells, kParts };
     struct Host; // the parts, as they are uploaded
 
     explicit SurfelScene(Device& device) : device_(&device) {}
     Status upload(const Host& host);
     Status derive(const SurfelOptions& options);
-    Tensor floats(Graph& g, Part part, std::string_view name) const;
-    uint32_t rows() const { return size_ ? size_ : 1; }
 
     Device* device_;
     uint32_t size_ = 0, skipped_ = 0;
-    Arena arena_;
+    State state_;
+    Slot positions_, normals_, colors_, labels_, cells_; // as SplatScene has them; of one row at least
 };
 
 } // namespace semrover

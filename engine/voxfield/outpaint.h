@@ -18,12 +18,18 @@ struct RegionResult {
     std::vector<uint8_t> colors;   // [targets, n, 3]
 };
 
-struct OutpaintCallbacks {
-    std::function<Status(const RegionResult&)> finished;          // before dependents start: the place to save
-    std::function<bool(size_t cells_done, double part)> progress; // part: of the batch at work, 0..1; false stops
+// what has been done of a grid: taken up by another Outpainter of the same grid
+struct OutpaintState {
+    std::vector<RegionResult> finished;
+    std::vector<uint32_t> in_flight; // regions of the batch at work; empty: between two batches
+    std::vector<std::byte> sampler;  // how far it is
 };
 
-// Fills a grid region by region (docs/method.md §4): cells with generated = 1 are known and never change.
+// called before dependents start: the place to save
+using FinishedRegion = std::function<Status(const RegionResult&)>;
+
+// Fills a grid region by region (docs/method.md §4): cells with generated = 1 are known and never change. In order:
+// restore or resume what is done already, begin, then step until it says true.
 class Outpainter {
   public:
     // grid: made ready for points (arrays allocated, n and voxel size of the model); errors: bad_input
@@ -32,24 +38,39 @@ class Outpainter {
 
     size_t region_count() const { return graph_->region_count(); }
     size_t cells_to_do() const { return cells_to_do_; }
+    size_t cells_done() const { return cells_done_; }
+    double part() const; // of the batch in flight, 0..1
     uint32_t largest_region() const { return largest_; }
     const Regions& regions() const { return regions_; }
 
-    // regions of the largest batch that run() will make with this limit: dependencies may keep batches smaller. Of a
-    // run that has not begun; 0 when every region is restored.
+    // regions of the largest batch that will be made with this limit: dependencies may keep batches smaller. 0 when
+    // every region is restored.
     uint32_t widest_batch(uint32_t limit) const;
 
     // takes over a region that an earlier run finished; its targets must be those of this run
     Status restore(const RegionResult& result);
+    // takes over what save() gave, before begin(). Errors: bad_input for the state of another grid
+    Status resume(OutpaintState state);
 
-    // the rest, in batches of ready regions
-    Status run(TokenSampler& sampler, uint32_t batch, const OutpaintCallbacks& callbacks);
+    // the rest, in batches of up to `batch` ready regions. The sampler outlives the work and does nothing else while a
+    // batch is in flight. Errors: bad_input when the sampler's part of a resumed state is not of this run
+    Status begin(TokenSampler& sampler, uint32_t batch, FinishedRegion finished = {});
+    // Up to `submits` submits of the batch in flight, or of a new one; what is complete is stored in the grid. true:
+    // the grid is filled. Errors: as TokenSampler; those of `finished`
+    Result<bool> step(size_t submits);
+    // gives up the batch in flight; the grid keeps what is finished, and begin() may follow
+    Status cancel();
+    Result<OutpaintState> save(); // between two steps
 
   private:
     Outpainter(VoxelGrid& grid, const TransformerConfig& config) : grid_(grid), config_(config) {}
     RegionInput input(uint32_t region) const;
     RegionResult result(uint32_t region, const float* tokens) const;
+    RegionResult stored(uint32_t region) const;
     void store(const RegionResult& result);
+    std::vector<RegionInput> inputs() const;
+    Status begin_batch();
+    Status end_batch();
 
     VoxelGrid& grid_;
     const TransformerConfig& config_;
@@ -58,6 +79,14 @@ class Outpainter {
     std::vector<RegionResult> restored_; // by region; empty targets: not restored
     size_t cells_to_do_ = 0, cells_done_ = 0;
     uint32_t largest_ = 0;
+    TokenSampler* sampler_ = nullptr; // from begin() on
+    uint32_t batch_ = 1;
+    FinishedRegion finished_;
+    std::vector<uint32_t> flight_;   // regions of the batch at work
+    std::vector<std::byte> resumed_; // the sampler's part of it, until begin()
+
+  public:
+    ~Outpainter();
 };
 
 } // namespace semrover

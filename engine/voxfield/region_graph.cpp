@@ -97,4 +97,11 @@ void RegionGraph::done(uint32_t region)
             ready_.push(later);
 }
 
+void RegionGraph::give_back(uint32_t region)
+{
+    SR_ASSERT(region < states_.size() && states_[region] == State::taken, "region {} was not taken", region);
+    states_[region] = State::waiting;
+    ready_.push(region);
+}
+
 } // namespace semrover

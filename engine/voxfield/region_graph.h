@@ -31,9 +31,12 @@ class RegionGraph {
     std::vector<uint32_t> take(size_t limit);
     // Call when a region that was taken has written its targets.
     void done(uint32_t region);
+    // a region that was taken will not be worked on now: it is ready again
+    void give_back(uint32_t region);
 
     size_t region_count() const { return run_count_; } // with targets: those that run
     size_t done_count() const { return done_count_; }
+    bool is_done(uint32_t region) const { return states_[region] == State::done; }
     bool finished() const { return done_count_ == run_count_; }
 
     // cells the region generates, nearest to its seed first; empty for a dropped region

@@ -11,7 +11,7 @@ namespace semrover {
 
 namespace {
 
-using State = CellTree::State;
+using CellState = CellTree::State;
 
 constexpr int kMaxRegionSize = 4096; // the paper's sets hold 50 to 150; attention over a set is quadratic
 
@@ -35,7 +35,7 @@ class Frontier {
         while (true) {
             const auto [key, leaf] = queue_.top();
             const bool current = key == keys_[leaf];
-            if (current && key != 0 && tree_.state(tree_.index_of(key)) == State::free)
+            if (current && key != 0 && tree_.state(tree_.index_of(key)) == CellState::free)
                 return tree_.index_of(key);
             queue_.pop();
             if (current)
@@ -82,13 +82,13 @@ class Cover {
                 continue;
             if (options.strategy == RegionStrategy::paper)
                 break;
-            tree_.set_state(seed, State::set_aside);
+            tree_.set_state(seed, CellState::set_aside);
             set_aside.push_back(seed);
         }
         if (options.strategy == RegionStrategy::complete)
             take_rest(set_aside);
         for (uint32_t cell = 0; cell < tree_.size(); ++cell)
-            if (tree_.state(cell) != State::covered)
+            if (tree_.state(cell) != CellState::covered)
                 regions_.uncovered.push_back(cell);
         return std::move(regions_);
     }
@@ -98,7 +98,7 @@ class Cover {
     {
         tree_.nearest(seed, size_, keys_);
         const auto fresh = std::count_if(keys_.begin(), keys_.end(), [&](uint64_t key) {
-            return tree_.state(tree_.index_of(key)) != State::covered;
+            return tree_.state(tree_.index_of(key)) != CellState::covered;
         });
         if (fresh < threshold_)
             return false;
@@ -119,7 +119,7 @@ class Cover {
         for (uint64_t key : keys_) {
             const uint32_t cell = tree_.index_of(key);
             regions_.members.push_back(cell);
-            if (tree_.state(cell) == State::covered)
+            if (tree_.state(cell) == CellState::covered)
                 continue;
             cover(cell);
         }
@@ -129,7 +129,7 @@ class Cover {
 
     void cover(uint32_t cell)
     {
-        tree_.set_state(cell, State::covered);
+        tree_.set_state(cell, CellState::covered);
         frontier_.touch(tree_.leaf_of(cell));
     }
 
@@ -137,8 +137,8 @@ class Cover {
     void take_rest(std::span<const uint32_t> set_aside)
     {
         for (uint32_t cell : set_aside)
-            if (tree_.state(cell) == State::set_aside)
-                tree_.set_state(cell, State::free);
+            if (tree_.state(cell) == CellState::set_aside)
+                tree_.set_state(cell, CellState::free);
         for (uint32_t leaf = 0; leaf < tree_.leaf_count(); ++leaf)
             frontier_.touch(leaf);
         while (tree_.free_count() > 0)

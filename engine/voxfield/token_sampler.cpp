@@ -3,105 +3,88 @@
 #include "engine/voxfield/token_sampler.h"
 
 #include "engine/sampling/step_rows.h"
+#include "runtime/base/hash.h"
 
 #include <cmath>
-#include <cstring>
-#include <deque>
+#include <numeric>
 
 namespace semrover {
 
-namespace {
-
-constexpr size_t kInFlight = 3; // submits ahead of the device
-
-} // namespace
-
 struct TokenSampler::Batch {
-    uint32_t rows = 0, tiles = 0, longest = 0; // rows: of one guidance half
-    Arena arena;
-    uint32_t labels, cells, sets, tile_list, coords, pos, mask, known, fixed, x, x0, z, table_row;
+    uint32_t rows, tiles, longest; // rows: of one guidance half
+    State state;
+    Slot labels, cells, sets, tile_list, coords, pos, mask, known, fixed, x, x0, z, table_row; // z: noise that is given
     std::unique_ptr<Program> prepare, step, undo;
 
-    void lay_out(const Transformer& t, uint32_t halves)
+    Batch(const TokenSampler& s, const TokenSets& packed)
+        : rows(packed.rows() / s.halves_), tiles(uint32_t(packed.tiles.size() / 4)), longest(packed.longest)
     {
-        const uint64_t m = uint64_t(rows) * halves, c = round_up(t.config().channels(), kRowPadding) * 4ull;
-        labels = arena.add(m * 4);
-        cells = arena.add(m * 16);
-        sets = arena.add(m * 8);
-        tile_list = arena.add(tiles * 16ull);
-        coords = arena.add(m * 12);
-        pos = arena.add(m * round_up(t.config().dim(), kRowPadding) * dtype_bytes(t.precision()));
-        mask = arena.add(m * divide_up(longest, 32) * 4);
-        known = arena.add(rows * 4ull);
-        fixed = arena.add(rows * c);
-        x = arena.add(rows * c);
-        x0 = arena.add(rows * c);
-        z = arena.add(rows * c);
-        table_row = arena.add(2 * m * 4);
+        const Transformer& t = s.transformer_;
+        const uint32_t m = packed.rows(), channels = t.config().channels(), words = divide_up(longest, 32);
+        labels = state.slot(m, 1, DType::u32, "labels", 1);
+        cells = state.slot(m, 4, DType::i32, "cells", 4);
+        sets = state.slot(m, 2, DType::u32, "sets", 2);
+        tile_list = state.slot(tiles, 4, DType::u32, "tiles", 4);
+        coords = state.slot(m, 3, DType::f32, "coords", 3);
+        pos = state.slot(m, t.config().dim(), t.precision(), "pos");
+        mask = state.slot(m, words, DType::u32, "mask", words);
+        known = state.slot(rows, 1, DType::u32, "known", 1);
+        fixed = state.slot(rows, channels, DType::f32, "fixed");
+        x = state.slot(rows, channels, DType::f32, "x");
+        x0 = state.slot(rows, channels, DType::f32, "x0");
+        if (s.options_.noise)
+            z = state.slot(rows, channels, DType::f32, "z");
+        table_row = state.slot(2 * m, 1, DType::u32, "table_row", 1);
     }
-    TokenContext context(Graph& g, const Transformer& t, uint32_t halves) const
+    TokenContext context(Graph& g) const
     {
-        const uint32_t m = rows * halves;
         TokenContext c;
-        c.labels = g.external(arena.slice(labels), m, 1, DType::u32, "labels", 1);
-        c.cells = g.external(arena.slice(cells), m, 4, DType::i32, "cells", 4);
-        c.sets = g.external(arena.slice(sets), m, 2, DType::u32, "sets", 2);
-        c.tiles = g.external(arena.slice(tile_list), tiles, 4, DType::u32, "tiles", 4);
-        c.coords = g.external(arena.slice(coords), m, 3, DType::f32, "coords", 3);
-        c.pos = g.external(arena.slice(pos), m, t.config().dim(), t.precision(), "pos");
-        c.mask = g.external(arena.slice(mask), m, divide_up(longest, 32), DType::u32, "mask", divide_up(longest, 32));
+        c.labels = labels.in(g);
+        c.cells = cells.in(g);
+        c.sets = sets.in(g);
+        c.tiles = tile_list.in(g);
+        c.coords = coords.in(g);
+        c.pos = pos.in(g);
+        c.mask = mask.in(g);
         c.longest = longest;
         return c;
     }
-    Tensor state(Graph& g, const Transformer& t, uint32_t id, const char* name) const
-    {
-        return g.external(arena.slice(id), rows, t.config().channels(), DType::f32, name);
-    }
-    Graph prepare_graph(const Transformer& t, uint32_t halves) const
+    Graph prepare_graph(const Transformer& t) const
     {
         Graph g;
-        t.prepare(g, context(g, t, halves));
+        const TokenContext c = context(g);
+        g.keep(t.neighbors(g, c), mask);
+        g.keep(t.positions(g, c), pos);
         return g;
     }
-    Tensor noise(Graph& g, const TokenSampler& s, const StepTable& steps, const TokenContext& c,
-                 Tensor known_rows) const
+    Tensor noise(Graph& g, const TokenSampler& s, const StepTable& steps) const
     {
-        if (s.options_.noise)
-            return state(g, s.transformer_, z, "z");
-        return step_noise(g, steps, c.cells.row_range(0, rows), known_rows, s.transformer_.config().channels(),
+        if (z.valid())
+            return z.in(g);
+        return step_noise(g, steps, cells.row_range(0, rows).in(g), known.in(g), s.transformer_.config().channels(),
                           s.options_.seed);
     }
     Graph step_graph(const TokenSampler& s) const
     {
         Graph g;
         const Transformer& t = s.transformer_;
-        StepTable steps;
-        Tensor table;
-        s.add_tables(g, steps, table);
-        const TokenContext c = context(g, t, s.halves_);
-        const Tensor known_rows = g.external(arena.slice(known), rows, 1, DType::u32, "known", 1);
-        const Tensor current = g.external(arena.slice(table_row), 2 * rows * s.halves_, 1, DType::u32, "table_row", 1);
-        const Tensor state_x = state(g, t, x, "x");
+        const StepTable steps = s.step_table(g);
+        const Tensor state_x = x.in(g), current = table_row.in(g);
         step_timestep(g, steps, current);
         const Tensor in = step_input(g, steps, state_x, rows * s.halves_, t.precision());
-        const Tensor m = t.forward(g, in, c, table, current);
-        step_update(g, steps, m, noise(g, s, steps, c, known_rows), known_rows, state(g, t, fixed, "fixed"), state_x,
-                    state(g, t, x0, "x0"), s.options_.guidance_scale, float(s.plan_.clip));
+        const Tensor m = t.forward(g, in, context(g), s.table_.in(g), current);
+        step_update(g, steps, m, noise(g, s, steps), known.in(g), fixed.in(g), state_x, x0.in(g),
+                    s.options_.guidance_scale, float(s.plan_.clip));
         step_advance(g, steps.clock);
         return g;
     }
     Graph undo_graph(const TokenSampler& s) const
     {
         Graph g;
-        StepTable steps;
-        Tensor table;
-        s.add_tables(g, steps, table);
-        const TokenContext c = context(g, s.transformer_, s.halves_);
-        const Tensor known_rows = g.external(arena.slice(known), rows, 1, DType::u32, "known", 1);
-        const Tensor state_x = state(g, s.transformer_, x, "x");
-        step_renoise(g, steps, noise(g, s, steps, c, known_rows), state_x);
+        const StepTable steps = s.step_table(g);
+        step_renoise(g, steps, noise(g, s, steps), x.in(g));
         if (s.plan_.known == KnownTokens::clean)
-            step_hold(g, known_rows, state(g, s.transformer_, fixed, "fixed"), state_x);
+            step_hold(g, known.in(g), fixed.in(g), x.in(g));
         step_advance(g, steps.clock);
         return g;
     }
@@ -115,10 +98,11 @@ TokenSampler::TokenSampler(Device& device, const Transformer& transformer, const
       halves_(options_.guidance_scale == 1.f ? 1 : 2),
       window_(uint32_t(std::min<size_t>(options_.modulation_window, plan.timesteps.size())))
 {
-    steps_ = arena_.add((plan.rows.size() + 1) * sizeof(StepRow));
-    clock_ = arena_.add(sizeof(StepClock));
-    timesteps_ = arena_.add(window_ * 4);
-    table_ = arena_.add(uint64_t(window_) * round_up(transformer.modulation_width(), kRowPadding) * 4);
+    constexpr uint32_t kWords = sizeof(StepRow) / 4;
+    steps_ = state_.slot(uint32_t(plan.rows.size()) + 1, kWords, DType::u32, "steps", kWords);
+    clock_ = ReplayMemory::clock_slot(state_);
+    timesteps_ = state_.slot(window_, 1, DType::f32, "timesteps", 1);
+    table_ = state_.slot(window_, transformer.modulation_width(), DType::f32, "modulations");
 }
 
 Result<std::unique_ptr<TokenSampler>> TokenSampler::create(Device& device, const Transformer& transformer,
@@ -127,7 +111,7 @@ Result<std::unique_ptr<TokenSampler>> TokenSampler::create(Device& device, const
     if (!(options.guidance_scale >= 0 && options.guidance_scale <= 1000))
         return fail(ErrorCode::usage, "guidance scale {} is not in 0..1000", options.guidance_scale);
     std::unique_ptr<TokenSampler> s(new TokenSampler(device, transformer, plan, std::move(options)));
-    SR_CHECK(s->arena_.allocate(device, "sampler tables"));
+    SR_CHECK(s->state_.allocate(device, "sampler tables"));
     SR_CHECK(s->upload_steps());
     SR_CHECK(s->make_modulations());
     return s;
@@ -139,26 +123,21 @@ Status TokenSampler::upload_steps()
     std::vector<StepRow> rows{first_noise_row(plan_.init_noise_sigma, kFirstDraw)};
     for (const PlanRow& row : plan_.rows)
         rows.push_back(step_row(row));
-    return device_.write(arena_.slice(steps_), std::as_bytes(std::span(rows)));
+    SR_CHECK(clock_.clear(device_));
+    return steps_.write(device_, rows);
 }
 
 Status TokenSampler::make_modulations()
 {
     Graph g;
-    const Tensor timesteps = g.external(arena_.slice(timesteps_), window_, 1, DType::f32, "timesteps", 1);
-    const Tensor table =
-        g.external(arena_.slice(table_), window_, transformer_.modulation_width(), DType::f32, "modulations");
-    transformer_.modulations(g, timesteps, table);
+    transformer_.modulations(g, timesteps_.in(g), table_.in(g));
     SR_TRY(modulations_, Program::create(device_, g));
     return {};
 }
 
-void TokenSampler::add_tables(Graph& g, StepTable& steps, Tensor& table) const
+StepTable TokenSampler::step_table(Graph& g) const
 {
-    constexpr uint32_t kWords = sizeof(StepRow) / 4;
-    steps.rows = g.external(arena_.slice(steps_), uint32_t(plan_.rows.size()) + 1, kWords, DType::u32, "steps", kWords);
-    steps.clock = g.external(arena_.slice(clock_), 1, 2, DType::u32, "clock", 2);
-    table = g.external(arena_.slice(table_), window_, transformer_.modulation_width(), DType::f32, "modulations");
+    return {steps_.in(g), clock_.in(g)};
 }
 
 // each half is padded with sets of one cell to kRowAlignment rows
@@ -179,17 +158,16 @@ Result<TokenSampler::Batch*> TokenSampler::batch_for(const TokenSets& sets)
     const uint32_t rows = sets.rows() / halves_, tiles = uint32_t(sets.tiles.size() / 4);
     if (batch_ && batch_->rows == rows && batch_->tiles == tiles && batch_->longest == sets.longest)
         return batch_.get();
+    replay_.reset();
     batch_.reset(); // memory of the old shape goes before the new one's comes
-    auto b = std::make_unique<Batch>();
-    b->rows = rows;
-    b->tiles = tiles;
-    b->longest = sets.longest;
-    b->lay_out(transformer_, halves_);
-    SR_CHECK(b->arena.allocate(device_, "sampler state"));
-    SR_TRY(b->prepare, Program::create(device_, b->prepare_graph(transformer_, halves_)));
+    auto b = std::make_unique<Batch>(*this, sets);
+    SR_CHECK(b->state.allocate(device_, "sampler state"));
+    SR_TRY(b->prepare, Program::create(device_, b->prepare_graph(transformer_)));
     SR_TRY(b->step, Program::create(device_, b->step_graph(*this)));
     SR_TRY(b->undo, Program::create(device_, b->undo_graph(*this)));
     batch_ = std::move(b);
+    replay_.emplace(device_, ReplayMemory{clock_, batch_->x, batch_->x0}, this->rows(),
+                    [this](size_t row) { return program_of(row); });
     return batch_.get();
 }
 
@@ -199,14 +177,9 @@ Result<uint64_t> TokenSampler::planned_bytes(uint32_t regions, uint32_t cells) c
     for (uint32_t i = 0; i < cells; ++i)
         region.cells.push_back({int32_t(i), 0, 0});
     region.labels.assign(cells, 0);
-    const TokenSets sets = pack(std::vector<RegionInput>(regions, region));
-    Batch b;
-    b.rows = sets.rows() / halves_;
-    b.tiles = uint32_t(sets.tiles.size() / 4);
-    b.longest = sets.longest;
-    b.lay_out(transformer_, halves_);
-    uint64_t bytes = table_bytes() + b.arena.planned_bytes(device_.limits());
-    for (const Graph& g : {b.prepare_graph(transformer_, halves_), b.step_graph(*this), b.undo_graph(*this)}) {
+    const Batch b(*this, pack(std::vector<RegionInput>(regions, region)));
+    uint64_t bytes = table_bytes() + b.state.planned_bytes(device_.limits());
+    for (const Graph& g : {b.prepare_graph(transformer_), b.step_graph(*this), b.undo_graph(*this)}) {
         SR_TRY(const Plan plan, make_plan(g.desc(), device_.limits()));
         bytes += plan.arena_bytes();
     }
@@ -215,35 +188,28 @@ Result<uint64_t> TokenSampler::planned_bytes(uint32_t regions, uint32_t cells) c
 
 uint64_t TokenSampler::table_bytes() const
 {
-    return arena_.planned_bytes(device_.limits()) + modulations_->plan().arena_bytes();
+    return state_.planned_bytes(device_.limits()) + modulations_->plan().arena_bytes();
 }
 
 Status TokenSampler::upload(Batch& b, const TokenSets& sets, std::span<const RegionInput> regions)
 {
-    const auto write = [&](uint32_t id, const auto& values) {
-        return device_.write(b.arena.slice(id), std::as_bytes(std::span(values)));
-    };
-    SR_CHECK(write(b.labels, sets.labels));
-    SR_CHECK(write(b.cells, sets.cells));
-    SR_CHECK(write(b.sets, sets.sets));
-    SR_CHECK(write(b.tile_list, sets.tiles));
-    SR_CHECK(write(b.coords, sets.coords));
-    const size_t channels = transformer_.config().channels(), ld = round_up(uint32_t(channels), kRowPadding);
+    SR_CHECK(b.labels.write(device_, sets.labels));
+    SR_CHECK(b.cells.write(device_, sets.cells));
+    SR_CHECK(b.sets.write(device_, sets.sets));
+    SR_CHECK(b.tile_list.write(device_, sets.tiles));
+    SR_CHECK(b.coords.write(device_, sets.coords));
+    const size_t channels = transformer_.config().channels();
     std::vector<uint32_t> known(b.rows, 0);
-    std::vector<float> fixed(b.rows * ld, 0.f);
+    std::vector<float> fixed(b.rows * channels, 0.f);
     size_t row = 0;
     for (const RegionInput& r : regions)
         for (size_t i = 0; i < r.cells.size(); ++i, ++row) {
             known[row] = r.known.empty() ? 0 : r.known[i];
             if (known[row])
-                std::copy_n(&r.fixed[i * channels], channels, &fixed[row * ld]);
+                std::copy_n(&r.fixed[i * channels], channels, &fixed[row * channels]);
         }
-    SR_CHECK(write(b.known, known));
-    SR_CHECK(write(b.fixed, fixed));
-    SR_CHECK(device_.clear(b.arena.slice(b.x)));
-    SR_CHECK(device_.clear(b.arena.slice(b.x0)));
-    const StepClock clock{0, first_timestep_ == ~0u ? 0 : first_timestep_};
-    return device_.write(arena_.slice(clock_), std::as_bytes(std::span(&clock, 1)));
+    SR_CHECK(b.known.write(device_, known));
+    return b.fixed.write_rows(device_, fixed);
 }
 
 // the modulation table holds a window of the schedule's timesteps; jumps may leave it either way
@@ -255,10 +221,10 @@ Status TokenSampler::use_timestep(uint32_t index)
     std::vector<float> timesteps(window_);
     for (uint32_t i = 0; i < window_; ++i)
         timesteps[i] = float(plan_.timesteps[std::min<size_t>(first + i, plan_.timesteps.size() - 1)]);
-    SR_CHECK(device_.write(arena_.slice(timesteps_), std::as_bytes(std::span(timesteps))));
+    SR_CHECK(timesteps_.write(device_, timesteps));
     SR_CHECK(modulations_->run());
     first_timestep_ = first;
-    const BufferSlice word = arena_.slice(clock_).part(offsetof(StepClock, first_timestep), 4);
+    const BufferSlice word = clock_.slice().part(offsetof(StepClock, first_timestep), 4);
     return device_.write(word, std::as_bytes(std::span(&first, 1)));
 }
 
@@ -266,58 +232,108 @@ Status TokenSampler::feed_noise(Batch& b, size_t row)
 {
     if (!options_.noise)
         return {};
-    const size_t channels = transformer_.config().channels(), ld = round_up(uint32_t(channels), kRowPadding);
-    std::vector<float> normals(b.rows * channels), padded(b.rows * ld, 0.f);
+    std::vector<float> normals(size_t(b.rows) * transformer_.config().channels());
     options_.noise(row, normals);
-    for (size_t r = 0; r < b.rows; ++r)
-        std::copy_n(&normals[r * channels], channels, &padded[r * ld]);
-    return device_.write(b.arena.slice(b.z), std::as_bytes(std::span(padded)));
+    return b.z.write_rows(device_, normals);
 }
 
-Status TokenSampler::run_rows(Batch& b, const StepCallback& callback)
+// row 0 is the first noise
+Result<Program*> TokenSampler::program_of(size_t row)
 {
-    std::deque<uint64_t> flight;
-    const size_t total = plan_.rows.size() + 1;
-    for (size_t row = 0; row < total; ++row) {
-        const bool step = row > 0 && plan_.rows[row - 1].kind == PlanRowKind::step;
-        if (step)
-            SR_CHECK(use_timestep(plan_.rows[row - 1].timestep_index));
-        SR_CHECK(feed_noise(b, row));
-        Program& program = step ? *b.step : *b.undo;
-        SR_TRY(const uint64_t ticket, program.submit());
-        flight.push_back(ticket);
-        if (flight.size() > kInFlight || device_.profile() || options_.noise) {
-            SR_CHECK(device_.wait(device_.profile() ? ticket : flight.front()));
-            flight.pop_front();
-            SR_CHECK(program.collect_profile());
-        }
-        if (callback && !callback(row + 1, total))
-            return fail(ErrorCode::interrupted, "interrupted");
-    }
-    return device_.wait(device_.last_ticket());
+    const bool step = row > 0 && plan_.rows[row - 1].kind == PlanRowKind::step;
+    if (step)
+        SR_CHECK(use_timestep(plan_.rows[row - 1].timestep_index));
+    SR_CHECK(feed_noise(*batch_, row));
+    return step ? batch_->step.get() : batch_->undo.get();
 }
 
-Result<std::vector<float>> TokenSampler::run(std::span<const RegionInput> regions, const StepCallback& callback)
+// of everything but the model that decides the result
+uint64_t TokenSampler::key_of(std::span<const RegionInput> regions) const
+{
+    Hash hash;
+    const auto add = [&](const auto& values) { hash.add(std::as_bytes(std::span(values))); };
+    for (const PlanRow& row : plan_.rows) {
+        const StepRow values = step_row(row);
+        add(std::span(&values, 1));
+    }
+    add(plan_.timesteps);
+    const double settings[] = {plan_.init_noise_sigma, plan_.clip, double(plan_.known), options_.guidance_scale};
+    add(settings);
+    add(std::span(&options_.seed, 1));
+    for (const RegionInput& r : regions) {
+        add(r.cells);
+        add(r.labels);
+        add(r.known);
+        add(r.fixed);
+    }
+    return hash.value();
+}
+
+Status TokenSampler::begin(std::span<const RegionInput> regions)
 {
     const TokenSets sets = pack(regions);
+    if (replay_)
+        SR_CHECK(replay_->cancel());
     SR_TRY(Batch * b, batch_for(sets));
+    cells_.clear();
+    for (const RegionInput& r : regions)
+        cells_.push_back(uint32_t(r.cells.size()));
+    key_ = key_of(regions);
     SR_CHECK(upload(*b, sets, regions));
     SR_CHECK(b->prepare->run());
-    SR_CHECK(run_rows(*b, callback));
-    const size_t channels = transformer_.config().channels(), ld = round_up(uint32_t(channels), kRowPadding);
-    std::vector<float> padded(b->rows * ld);
-    SR_CHECK(device_.read(b->arena.slice(b->x), std::as_writable_bytes(std::span(padded))));
-    std::vector<float> tokens;
-    size_t row = 0;
-    for (const RegionInput& r : regions)
-        for (size_t i = 0; i < r.cells.size(); ++i, ++row)
-            tokens.insert(tokens.end(), &padded[row * ld], &padded[row * ld] + channels);
+    return replay_->begin();
+}
+
+Result<bool> TokenSampler::step(size_t submits)
+{
+    SR_ASSERT(replay_, "a step of a sampler that has not begun");
+    return replay_->step(submits);
+}
+
+Status TokenSampler::cancel()
+{
+    return replay_ ? replay_->cancel() : Status{};
+}
+
+Result<std::vector<std::byte>> TokenSampler::save()
+{
+    SR_ASSERT(replay_, "a sampler is saved that has not begun");
+    return replay_->save(key_);
+}
+
+Status TokenSampler::resume(std::span<const RegionInput> regions, std::span<const std::byte> saved)
+{
+    SR_CHECK(begin(regions));
+    return replay_->resume(saved, key_);
+}
+
+Result<std::vector<float>> TokenSampler::finish()
+{
+    SR_ASSERT(replay_ && replay_->active() && replay_->row() == rows(), "a run is finished after {} of {} rows",
+              rows_done(), rows());
+    replay_->end();
+    const size_t channels = transformer_.config().channels();
+    SR_TRY(std::vector<float> tokens,
+           batch_->x.read_rows(device_, std::accumulate(cells_.begin(), cells_.end(), uint32_t(0))));
     for (size_t i = 0; i < tokens.size(); ++i)
         if (!std::isfinite(tokens[i]))
             return fail(ErrorCode::internal,
                         "the network returned {} for channel {} of token {}: overflow; try --precision fp32", tokens[i],
                         i % channels, i / channels);
     return tokens;
+}
+
+Result<std::vector<float>> TokenSampler::run(std::span<const RegionInput> regions, const StepCallback& callback)
+{
+    SR_CHECK(begin(regions));
+    for (bool done = false; !done;) {
+        SR_TRY(done, step(1));
+        if (callback && !callback(rows_done(), rows())) {
+            SR_CHECK(cancel());
+            return fail(ErrorCode::interrupted, "interrupted");
+        }
+    }
+    return finish();
 }
 
 uint32_t TokenSampler::step_passes() const

@@ -4,11 +4,13 @@
 
 #include "engine/network/transformer.h"
 #include "engine/sampling/repaint.h"
+#include "engine/sampling/replay.h"
 #include "kernels/sampling.h"
 #include "runtime/device/program.h"
 
 #include <functional>
 #include <memory>
+#include <optional>
 
 namespace semrover {
 
@@ -40,7 +42,8 @@ inline SamplerOptions sampling_options(float guidance_scale, uint64_t seed)
 using StepCallback = std::function<bool(size_t done, size_t total)>;
 
 // Denoises batches of regions with the transformer: the graphs are built once per batch shape and replayed for every
-// step, one submit a step. The result of a region depends on nothing but its own input, the plan and the seed.
+// step, one submit a step. The result of a region depends on nothing but its own input, the plan and the seed: not on
+// where its run stopped and was taken up again.
 class TokenSampler {
   public:
     static Result<std::unique_ptr<TokenSampler>> create(Device& device, const Transformer& transformer,
@@ -54,6 +57,20 @@ class TokenSampler {
     // Errors: internal when the network returns NaN or infinity; interrupted; device errors
     Result<std::vector<float>> run(std::span<const RegionInput> regions, const StepCallback& callback = {});
 
+    // the same, piecewise: begin, step until it says true, finish. A run that has begun ends with finish, cancel, or
+    // the next begin. One row of the plan is one submit, and one more comes before them.
+    Status begin(std::span<const RegionInput> regions);
+    Result<bool> step(size_t submits);
+    Result<std::vector<float>> finish();
+    Status cancel();
+    size_t rows_done() const { return replay_ ? replay_->row() : 0; }
+    size_t rows() const { return plan_.rows.size() + 1; }
+
+    // between two steps: what another sampler with the same model, plan and options needs to go on, to the same bytes
+    Result<std::vector<std::byte>> save();
+    // in place of begin. Errors: bad_input for what was saved of other regions, another plan, seed or guidance
+    Status resume(std::span<const RegionInput> regions, std::span<const std::byte> saved);
+
     // of the batch shape of the last run: passes and barriers of a step, host time of one submit
     uint32_t step_passes() const;
     uint32_t step_barriers() const;
@@ -64,14 +81,15 @@ class TokenSampler {
     struct Batch; // memory and programs of one batch shape
     TokenSampler(Device& device, const Transformer& transformer, const SamplingPlan& plan, SamplerOptions options);
     Status upload_steps();
+    uint64_t key_of(std::span<const RegionInput> regions) const;
     Status make_modulations();
-    void add_tables(Graph& g, StepTable& steps, Tensor& table) const;
+    StepTable step_table(Graph& g) const;
     TokenSets pack(std::span<const RegionInput> regions) const;
     Result<Batch*> batch_for(const TokenSets& sets);
     Status upload(Batch& batch, const TokenSets& sets, std::span<const RegionInput> regions);
     Status use_timestep(uint32_t index);
     Status feed_noise(Batch& batch, size_t row);
-    Status run_rows(Batch& batch, const StepCallback& callback);
+    Result<Program*> program_of(size_t row);
 
     Device& device_;
     const Transformer& transformer_;
@@ -79,10 +97,13 @@ class TokenSampler {
     SamplerOptions options_;
     uint32_t halves_, window_; // window: timesteps that the modulation table holds at a time
     uint32_t first_timestep_ = ~0u;
-    Arena arena_; // what does not depend on the batch
-    uint32_t steps_, clock_, timesteps_, table_;
+    State state_; // what does not depend on the batch
+    Slot steps_, clock_, timesteps_, table_;
     std::unique_ptr<Program> modulations_;
     std::unique_ptr<Batch> batch_;
+    std::optional<Replay> replay_; // over the batch
+    std::vector<uint32_t> cells_;  // of each region of the run
+    uint64_t key_ = 0;             // what the run is
 
   public:
     ~TokenSampler();

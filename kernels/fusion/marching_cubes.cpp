@@ -48,8 +48,9 @@ void marching_cubes_count(Graph& g, const MarchingCubesField& f, Tensor table, c
                threads(blocks * 64));
     for (const auto& [sizes, first, total] :
          {std::tuple{vertices, counts.first_vertex, counts.vertices}, {faces, counts.first_face, counts.faces}}) {
-        const PrefixSum sums = prefix_sum(g, sizes, {.total = total});
-        g.replace(sums.sums.resource, first.resource);
+        const PrefixSum sums = prefix_sum(g, sizes);
+        g.keep(sums.sums, first);
+        g.keep(sums.total, total);
     }
 }
 

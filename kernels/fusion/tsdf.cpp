@@ -65,11 +65,11 @@ void tsdf_touch(Graph& g, Tensor frames, Tensor planes, const TsdfOptions& optio
                threads(planes.rows));
 }
 
-PrefixSum tsdf_rank(Graph& g, Tensor bitmap, Tensor total)
+PrefixSum tsdf_rank(Graph& g, Tensor bitmap)
 {
     const Tensor counts = g.array(bitmap.rows, DType::u32, "bits of words");
     g.dispatch(kernel::tsdf_count, {bitmap, counts}, make_push({}, bitmap.rows, 0), threads(bitmap.rows));
-    return prefix_sum(g, counts, {.total = total});
+    return prefix_sum(g, counts);
 }
 
 void tsdf_list(Graph& g, Tensor bitmap, Tensor ranks, Tensor blocks)

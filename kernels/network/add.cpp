@@ -8,11 +8,11 @@
 
 namespace semrover {
 
-Tensor add(Graph& g, Tensor x, Tensor residual, Tensor into)
+Tensor add(Graph& g, Tensor x, Tensor residual, const PartOf& part)
 {
     SR_ASSERT(residual.rows == x.rows && residual.cols == x.cols, "add: [{}, {}] onto [{}, {}]", x.rows, x.cols,
               residual.rows, residual.cols);
-    const Tensor y = into.valid() ? into : g.matrix(x.rows, x.cols, residual.dtype, "add");
+    const Tensor y = part.valid() ? part.of(x.rows, x.cols) : g.matrix(x.rows, x.cols, residual.dtype, "add");
     const AddPush push{.rows = x.rows, .cols = x.cols, .x_ld = x.ld, .y_ld = y.ld, .residual_ld = residual.ld};
     DispatchOptions options;
     options.absorbed_as = "kAdd";

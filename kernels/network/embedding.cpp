@@ -8,11 +8,12 @@
 
 namespace semrover {
 
-Tensor embedding(Graph& g, Tensor index, Tensor table, Tensor x, DType dtype, Tensor into)
+Tensor embedding(Graph& g, Tensor index, Tensor table, Tensor x, DType dtype, const PartOf& part)
 {
     SR_ASSERT(!x.valid() || (x.rows == index.rows && x.cols == table.cols), "embedding: [{}, {}] onto [{}, {}]",
               index.rows, table.cols, x.rows, x.cols);
-    const Tensor y = into.valid() ? into : g.matrix(index.rows, table.cols, dtype, "embedding");
+    const Tensor y =
+        part.valid() ? part.of(index.rows, table.cols) : g.matrix(index.rows, table.cols, dtype, "embedding");
     EmbeddingPush push{};
     push.rows = index.rows;
     push.cols = table.cols;

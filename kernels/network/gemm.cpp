@@ -24,9 +24,9 @@ Tensor gemm(Graph& g, Tensor x, Tensor w, Tensor bias, const GemmOptions& option
     SR_ASSERT(!bias.valid() || (bias.rows == groups && bias.cols == push.cols && bias.dtype == DType::f32),
               "gemm: bias [{}, {}] for {} columns in {} groups", bias.rows, bias.cols, push.cols, groups);
     push.bias_ld = bias.ld;
-    const Tensor y = options.into.valid() ? options.into : g.matrix(x.rows, push.cols, options.dtype, "gemm");
-    SR_ASSERT(y.rows == x.rows && y.cols == push.cols, "gemm: [{}, {}] written into [{}, {}]", x.rows, push.cols,
-              y.rows, y.cols);
+    const Tensor y =
+        options.part.valid() ? options.part.of(x.rows, push.cols) : g.matrix(x.rows, push.cols, options.dtype, "gemm");
+    SR_ASSERT(y.dtype == options.dtype, "gemm: {} written to {}", dtype_name(options.dtype), dtype_name(y.dtype));
     push.y_ld = y.ld;
     DispatchOptions dispatch;
     dispatch.flops = 2.0 * x.rows * push.cols * x.cols;

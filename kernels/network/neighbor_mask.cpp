@@ -8,12 +8,10 @@
 
 namespace semrover {
 
-Tensor neighbor_mask(Graph& g, Tensor cells, Tensor sets, uint32_t longest_set, int32_t radius2, Tensor into)
+Tensor neighbor_mask(Graph& g, Tensor cells, Tensor sets, uint32_t longest_set, int32_t radius2)
 {
     const uint32_t words = divide_up(longest_set, 32);
-    const Tensor mask = into.valid() ? into : g.array(cells.rows, DType::u32, "mask", words);
-    SR_ASSERT(mask.rows == cells.rows && mask.cols == words, "neighbor_mask: [{}, {}] for {} words", mask.rows,
-              mask.cols, words);
+    const Tensor mask = g.array(cells.rows, DType::u32, "mask", words);
     const NeighborMaskPush push{.rows = cells.rows, .words = words, .radius2 = radius2};
     g.dispatch(kernel::neighbor_mask, {cells, sets, mask}, push, threads(cells.rows * words));
     return mask;

@@ -8,22 +8,22 @@
 
 namespace semrover {
 
-FeatureMap pool2d(Graph& g, FeatureMap x, const PoolOptions& o, const ColumnRange& into)
+FeatureMap pool2d(Graph& g, FeatureMap x, const PoolOptions& o, const PartOf& part)
 {
     SR_ASSERT(o.kernel_height > o.padding_y && o.kernel_width > o.padding_x && o.stride_y && o.stride_x &&
                   x.height + 2 * o.padding_y >= o.kernel_height && x.width + 2 * o.padding_x >= o.kernel_width,
               "pool2d: a window of {}x{} with padding {}, {} over {}x{} pixels", o.kernel_height, o.kernel_width,
               o.padding_y, o.padding_x, x.height, x.width);
-    FeatureMap y{into.tensor, x.batch, (x.height + 2 * o.padding_y - o.kernel_height) / o.stride_y + 1,
+    FeatureMap y{part.whole, x.batch, (x.height + 2 * o.padding_y - o.kernel_height) / o.stride_y + 1,
                  (x.width + 2 * o.padding_x - o.kernel_width) / o.stride_x + 1};
-    if (!y.valid())
-        y.data = g.matrix(y.batch * y.image_rows(), x.channels(), x.data.dtype, "pool2d");
+    y.data = part.valid() ? part.whole.row_range(part.row, y.batch * y.image_rows())
+                          : g.matrix(y.batch * y.image_rows(), x.channels(), x.data.dtype, "pool2d");
     Pool2dPush push{};
     push.rows = y.batch * y.image_rows();
     push.width = round_up(x.channels(), kRowPadding);
-    SR_ASSERT(y.data.rows == push.rows && into.col % 8 == 0 && into.col + push.width <= round_up(y.data.cols, 8),
+    SR_ASSERT(part.col % 8 == 0 && part.col + push.width <= round_up(y.data.cols, 8),
               "pool2d: [{}, {}] written into [{}, {}] from column {}", push.rows, x.channels(), y.data.rows,
-              y.data.cols, into.col);
+              y.data.cols, part.col);
     push.out_width = y.width;
     push.out_pixels = y.pixels();
     push.image_rows = y.image_rows();
@@ -38,7 +38,7 @@ FeatureMap pool2d(Graph& g, FeatureMap x, const PoolOptions& o, const ColumnRang
     push.padding_x = o.padding_x;
     push.x_ld = x.data.ld;
     push.y_ld = y.data.ld;
-    push.y_col = into.col;
+    push.y_col = part.col;
     RowWindow window;
     window.out_width = y.width;
     window.out_height = y.height;

@@ -8,13 +8,13 @@
 
 namespace semrover {
 
-Tensor relu(Graph& g, Tensor x, const ColumnRange& into)
+Tensor relu(Graph& g, Tensor x, const PartOf& part)
 {
     const uint32_t width = round_up(x.cols, kRowPadding);
-    const Tensor y = into.tensor.valid() ? into.tensor : g.matrix(x.rows, x.cols, x.dtype, "relu");
-    SR_ASSERT(y.rows == x.rows && into.col % 8 == 0 && into.col + width <= round_up(y.cols, kRowPadding),
-              "relu: [{}, {}] written into [{}, {}] from column {}", x.rows, x.cols, y.rows, y.cols, into.col);
-    const ReluPush push{.rows = x.rows, .x_ld = x.ld, .y_ld = y.ld, .y_col = into.col, .width = width};
+    const Tensor y = part.valid() ? part.whole.row_range(part.row, x.rows) : g.matrix(x.rows, x.cols, x.dtype, "relu");
+    SR_ASSERT(part.col % 8 == 0 && part.col + width <= round_up(y.cols, kRowPadding),
+              "relu: [{}, {}] written into [{}, {}] from column {}", x.rows, x.cols, y.rows, y.cols, part.col);
+    const ReluPush push{.rows = x.rows, .x_ld = x.ld, .y_ld = y.ld, .y_col = part.col, .width = width};
     DispatchOptions options;
     options.absorbed_as = "kRelu";
     options.banded = {"X", "Y"};

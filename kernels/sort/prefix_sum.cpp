@@ -26,7 +26,7 @@ PrefixSum prefix_sum(Graph& g, Tensor x, const PrefixSumOptions& options)
     const PrefixSumPush push{.size = x.rows, .workers = std::min(divide_up(x.rows, kSumChunk), kMaxSumWorkers)};
     const Tensor partial = g.array(push.workers, DType::u32, "partial sums");
     const Tensor first = g.array(push.workers, DType::u32, "sums before chunks");
-    const Tensor total = options.total.valid() ? options.total : g.array(1, DType::u32, "total");
+    const Tensor total = g.array(1, DType::u32, "total");
     const Tensor y = g.array(x.rows, DType::u32, "prefix sums");
     const Tensor count = options.count.valid() ? options.count : x;
     DispatchOptions dispatch;

@@ -75,7 +75,7 @@ Seen project(Graph& g, const SplatScene& scene, Tensor cameras, const SplatOptio
     const Tensor keep = g.array(views, DType::u32, "keep");
     g.dispatch(pinhole ? kernel::splat_cull : kernel::splat_lens_cull,
                {cameras, scene.positions, scene.normals, scene.colors, keep}, push, threads(views), lens);
-    const PrefixSum slots = prefix_sum(g, keep, {.non_zero = true, .total = o.visible});
+    const PrefixSum slots = prefix_sum(g, keep, {.non_zero = true});
     const uint32_t texels = splat_record_bytes(o.lens) / 16;
     const Tensor records = g.array(push.max_visible * texels, DType::u32, "splat records", 4);
     const Tensor sources = g.array(push.max_visible, DType::u32, "splat sources");
@@ -88,7 +88,7 @@ Seen project(Graph& g, const SplatScene& scene, Tensor cameras, const SplatOptio
 
 // records by tile, nearest first, and the first pair of each tile
 struct Tiled {
-    Tensor records, starts;
+    Tensor records, starts, pairs;
 };
 
 Tiled sort_into_tiles(Graph& g, const Seen& seen, const SplatOptions& o, const SplatPush& push)
@@ -99,7 +99,7 @@ Tiled sort_into_tiles(Graph& g, const Seen& seen, const SplatOptions& o, const S
     const Tensor order = radix_sort(g, seen.depths, {}, {.count = seen.count}).values;
     const Tensor touched = g.array(push.max_visible, DType::u32, "tiles touched");
     g.dispatch(kernel::splat_count, {seen.records, order, seen.count, touched}, push, threads(push.max_visible), lens);
-    const PrefixSum first = prefix_sum(g, touched, {.count = seen.count, .total = o.pairs});
+    const PrefixSum first = prefix_sum(g, touched, {.count = seen.count});
     const SortedPairs pairs = {g.array(push.max_pairs, DType::u32, "pair tiles"),
                                g.array(push.max_pairs, DType::u32, "pair records")};
     g.dispatch(kernel::splat_emit,
@@ -107,7 +107,7 @@ Tiled sort_into_tiles(Graph& g, const Seen& seen, const SplatOptions& o, const S
                threads(push.max_visible), lens);
     const uint32_t bits = std::max(1, int(std::bit_width(tiles_all - 1)));
     const SortedPairs by_tile = radix_sort(g, pairs.keys, pairs.values, {.bits = bits, .count = first.total});
-    return {by_tile.values, bucket_starts(g, by_tile.keys, tiles_all, first.total)};
+    return {by_tile.values, bucket_starts(g, by_tile.keys, tiles_all, first.total), first.total};
 }
 
 } // namespace
@@ -121,7 +121,10 @@ SplatImages splat(Graph& g, const SplatScene& scene, Tensor cameras, const Splat
     const Tiled by_tile = sort_into_tiles(g, seen, options, push);
     const SplatImages y = {g.array(pixels, DType::f32, "splat colour", 4),
                            g.array(pixels, DType::f32, "splat surface", 4),
-                           g.array(pixels, DType::f32, "splat depth", 2), g.array(pixels, DType::u32, "splat ids", 2)};
+                           g.array(pixels, DType::f32, "splat depth", 2),
+                           g.array(pixels, DType::u32, "splat ids", 2),
+                           seen.count,
+                           by_tile.pairs};
     DispatchOptions blend;
     blend.flops = 40.0 * push.max_pairs * options.tile * options.tile; // an upper bound: pixels are done early
     const Grid grid = tiles(options.height, options.width, push.cameras);

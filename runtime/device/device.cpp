@@ -237,6 +237,13 @@ Status Device::wait(uint64_t ticket)
     return {};
 }
 
+Result<bool> Device::finished(uint64_t ticket) const
+{
+    uint64_t value = 0;
+    SR_VK(vkGetSemaphoreCounterValue(device_, timeline_, &value));
+    return value >= ticket;
+}
+
 Result<Buffer*> Device::staging()
 {
     if (!staging_) {
@@ -259,6 +266,7 @@ Status Device::write(const BufferSlice& to, std::span<const std::byte> bytes)
 {
     SR_ASSERT(bytes.size() <= to.bytes, "{} bytes written to a slice of {}", bytes.size(), to.bytes);
     SR_CHECK(wait(ticket_));
+    host_bytes_.written += bytes.size();
     if (std::byte* mapped = to.buffer->mapped()) {
         if (!bytes.empty())
             std::memcpy(mapped + to.offset, bytes.data(), bytes.size());
@@ -277,6 +285,7 @@ Status Device::read(const BufferSlice& from, std::span<std::byte> bytes)
 {
     SR_ASSERT(bytes.size() <= from.bytes, "{} bytes read from a slice of {}", bytes.size(), from.bytes);
     SR_CHECK(wait(ticket_));
+    host_bytes_.read += bytes.size();
     if (const std::byte* mapped = from.buffer->mapped()) {
         if (!bytes.empty())
             std::memcpy(bytes.data(), mapped + from.offset, bytes.size());

@@ -36,6 +36,11 @@ struct HostDevice {
     std::function<void()> lock, unlock; // around every use of the queue; may be empty
 };
 
+// bytes that crossed the border between host and device: to the host, from the host
+struct HostBytes {
+    uint64_t read = 0, written = 0;
+};
+
 struct DeviceSummary {
     uint32_t index;
     std::string name, driver, type, api;
@@ -67,10 +72,14 @@ class Device {
     Status write(const BufferSlice& to, std::span<const std::byte> bytes);
     Status read(const BufferSlice& from, std::span<std::byte> bytes);
     Status clear(const BufferSlice& slice);
+    // what went through them, and through rings of read-backs
+    const HostBytes& host_bytes() const { return host_bytes_; }
+    void count_read(uint64_t bytes) { host_bytes_.read += bytes; }
 
     // queue: a ticket is a value of one timeline semaphore
     Result<uint64_t> submit(std::span<const VkCommandBuffer> commands);
     Status wait(uint64_t ticket);
+    Result<bool> finished(uint64_t ticket) const; // without waiting
     uint64_t last_ticket() const { return ticket_; }
 
     // device memory in use, counted at allocation
@@ -109,6 +118,7 @@ class Device {
     std::unique_ptr<Buffer> staging_;
     std::unique_ptr<PipelineStore> pipelines_;
     std::shared_ptr<Profile> profile_;
+    HostBytes host_bytes_;
     DeviceLimits limits_;
     std::string name_, driver_;
     double timestamp_ns_ = 1;

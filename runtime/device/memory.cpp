@@ -4,8 +4,6 @@
 
 #include "runtime/device/device.h"
 
-#include <numeric>
-
 namespace semrover {
 
 namespace {
@@ -78,49 +76,6 @@ Buffer::~Buffer()
     if (memory_)
         vkFreeMemory(device_.handle(), memory_, nullptr);
     device_.release(accounted_);
-}
-
-uint32_t Arena::add(uint64_t bytes)
-{
-    SR_ASSERT(blocks_.empty(), "the arena is allocated already");
-    items_.push_back({bytes});
-    return uint32_t(items_.size() - 1);
-}
-
-std::vector<uint64_t> Arena::layout(const DeviceLimits& limits, std::vector<Item>& items) const
-{
-    std::vector<uint64_t> blocks;
-    for (Item& item : items) {
-        const uint64_t bytes = round_up64(std::max<uint64_t>(item.bytes, 1), limits.offset_alignment);
-        if (blocks.empty() || blocks.back() + bytes > limits.max_allocation)
-            blocks.push_back(0);
-        item.block = uint32_t(blocks.size() - 1);
-        item.offset = blocks.back();
-        blocks.back() += bytes;
-    }
-    return blocks;
-}
-
-uint64_t Arena::planned_bytes(const DeviceLimits& limits) const
-{
-    std::vector<Item> items = items_;
-    const std::vector<uint64_t> blocks = layout(limits, items);
-    return std::accumulate(blocks.begin(), blocks.end(), uint64_t(0));
-}
-
-Status Arena::allocate(Device& device, const char* name)
-{
-    for (uint64_t bytes : layout(device.limits(), items_)) {
-        SR_TRY(auto block, Buffer::create(device, bytes, MemoryKind::device, name));
-        blocks_.push_back(std::move(block));
-    }
-    return {};
-}
-
-BufferSlice Arena::slice(uint32_t id) const
-{
-    const Item& item = items_.at(id);
-    return {blocks_.empty() ? nullptr : blocks_.at(item.block).get(), item.offset, item.bytes};
 }
 
 } // namespace semrover

@@ -40,25 +40,4 @@ class Buffer {
     std::byte* mapped_ = nullptr;
 };
 
-// Memory for things that live as long as a model or a run: first every size is added, then all of it is allocated in
-// blocks of at most the device's largest allocation, so that the sum is known before anything exists.
-class Arena {
-  public:
-    uint32_t add(uint64_t bytes); // id of the slice
-    uint64_t planned_bytes(const DeviceLimits& limits) const;
-    Status allocate(Device& device, const char* name);
-    // before allocate(), a slice without a buffer: good for planning graphs, not for running them
-    BufferSlice slice(uint32_t id) const;
-
-  private:
-    struct Item {
-        uint64_t bytes, offset = 0;
-        uint32_t block = 0;
-    };
-    std::vector<uint64_t> layout(const DeviceLimits& limits, std::vector<Item>& items) const;
-
-    std::vector<Item> items_;
-    std::vector<std::unique_ptr<Buffer>> blocks_;
-};
-
 } // namespace semrover

@@ -8,6 +8,7 @@
 #include "runtime/graph/tensor.h"
 
 #include <initializer_list>
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -17,6 +18,7 @@
 namespace semrover {
 
 class Buffer;
+class Slot;
 
 // memory that outlives the graph: weights, inputs, outputs, state kept from one run to the next
 struct BufferSlice {
@@ -132,17 +134,27 @@ class Graph {
         add(kernel, tensors, {}, grid, std::move(options));
     }
 
-    // every use of transient `from` becomes a use of external `to`, of the same size: results are read where they are
-    // made
-    void replace(uint32_t from, uint32_t to);
+    // The only way to keep what a graph makes: `made`, a whole tensor of this graph, is made in memory outside it, of
+    // the same shape and row length. `made` and views of it go on being good and lie there too. What reads the memory's
+    // old contents must be in the graph before the pass that makes `made`.
+    Tensor keep(Tensor made, Tensor memory);
+    Tensor keep(Tensor made, const Slot& slot);
+
+    // the resource of a piece of memory that has an owner: the same one every time (Slot::in)
+    uint32_t outside(const void* owner, uint32_t item, const BufferSlice& memory, std::string_view name);
 
     const GraphDesc& desc() const { return desc_; }
 
   private:
     void add(const Kernel& kernel, std::initializer_list<Tensor> tensors, std::vector<uint8_t> push, Grid grid,
              DispatchOptions options);
+    Tensor placed(Tensor t) const; // where it is now, if it was kept
+    bool share_bytes(const Tensor& a, const Tensor& b) const;
+    void check_keep(const Tensor& made, const Tensor& memory) const;
 
     GraphDesc desc_;
+    std::map<uint32_t, Tensor> kept_;                            // transient -> the memory that it lies in
+    std::map<std::pair<const void*, uint32_t>, uint32_t> owned_; // owner and item -> resource
 };
 
 } // namespace semrover

@@ -92,38 +92,29 @@ void print_report(const Json& report, const Globals& globals)
         fmt::print("{:18} {}\n", name, value.is_string() ? value.get<std::string>() : value.dump());
 }
 
-uint32_t BenchInputs::add(uint32_t rows, uint32_t cols, DType dtype)
+Slot BenchInputs::add(uint32_t rows, uint32_t cols, DType dtype)
 {
-    const uint64_t ld = dtype == DType::u32 ? cols : round_up(cols, kRowPadding);
-    items_.push_back({arena_.add(rows * ld * dtype_bytes(dtype)), rows, cols, dtype});
-    return uint32_t(items_.size() - 1);
+    return slots_.emplace_back(state_.slot(rows, cols, dtype, "input", dtype == DType::u32 ? cols : 0));
 }
 
 Status BenchInputs::allocate()
 {
-    SR_CHECK(arena_.allocate(device_, "benchmark inputs"));
+    SR_CHECK(state_.allocate(device_, "benchmark inputs"));
     uint32_t state = 12345;
     const auto random = [&] { return state = state * 1664525u + 1013904223u; };
-    for (const Item& item : items_) {
-        const BufferSlice memory = arena_.slice(item.slice);
-        std::vector<uint32_t> words(memory.bytes / 4);
+    for (const Slot& slot : slots_) {
+        std::vector<uint32_t> words(slot.bytes() / 4);
         for (uint32_t& w : words) {
             const float v = float(random() >> 8) / 8388608.f - 1;
             w = random();
-            if (item.dtype == DType::f32)
+            if (slot.dtype() == DType::f32)
                 __builtin_memcpy(&w, &v, 4);
-            else if (item.dtype == DType::f16)
+            else if (slot.dtype() == DType::f16)
                 w = uint32_t(float_to_half(v)) | uint32_t(float_to_half(v * 0.5f)) << 16;
         }
-        SR_CHECK(device_.write(memory, std::as_bytes(std::span(words))));
+        SR_CHECK(slot.write(device_, words));
     }
     return {};
-}
-
-Tensor BenchInputs::tensor(Graph& g, uint32_t id) const
-{
-    const Item& i = items_.at(id);
-    return g.external(arena_.slice(i.slice), i.rows, i.cols, i.dtype, "input", i.dtype == DType::u32 ? i.cols : 0);
 }
 
 void add_bench(CLI::App& app, const Globals& globals, Run& run)

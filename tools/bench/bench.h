@@ -4,6 +4,7 @@
 
 #include "runtime/base/json.h"
 #include "runtime/device/program.h"
+#include "runtime/device/state.h"
 #include "tools/cli/commands.h"
 
 #include <functional>
@@ -39,19 +40,14 @@ class BenchInputs {
   public:
     explicit BenchInputs(Device& device) : device_(device) {}
     // normal-ish values as fp32 or fp16 matrices, or uniform words for u32
-    uint32_t add(uint32_t rows, uint32_t cols, DType dtype);
+    Slot add(uint32_t rows, uint32_t cols, DType dtype);
     Status allocate();
-    Tensor tensor(Graph& g, uint32_t id) const;
-    uint64_t bytes() const { return arena_.planned_bytes(device_.limits()); }
+    uint64_t bytes() const { return state_.planned_bytes(device_.limits()); }
 
   private:
-    struct Item {
-        uint32_t slice, rows, cols;
-        DType dtype;
-    };
     Device& device_;
-    Arena arena_;
-    std::vector<Item> items_;
+    State state_;
+    std::vector<Slot> slots_;
 };
 
 void add_bench_gemm(CLI::App& bench, const Globals& globals, Run& run);

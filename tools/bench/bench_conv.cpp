@@ -23,14 +23,14 @@ Status bench_conv(const BenchConvArguments& o, const Globals& globals)
     const DType dtype = o.precision == "fp32" ? DType::f32 : DType::f16;
     BenchInputs inputs(*device);
     FeatureMap map{{}, 1, o.height, o.width};
-    const uint32_t x = inputs.add(map.image_rows(), o.channels, dtype);
-    const uint32_t w = inputs.add(o.outputs, 9 * round_up(o.channels, kRowPadding), dtype);
+    const Slot x = inputs.add(map.image_rows(), o.channels, dtype);
+    const Slot w = inputs.add(o.outputs, 9 * round_up(o.channels, kRowPadding), dtype);
     SR_CHECK(inputs.allocate());
     Graph g;
-    map.data = inputs.tensor(g, x);
+    map.data = x.in(g);
     ConvOptions options;
     options.dtype = dtype;
-    const Tensor weight = inputs.tensor(g, w);
+    const Tensor weight = w.in(g);
     (void)(o.winograd ? winograd_conv2d(g, map, winograd_weight(g, weight), {}, options)
                       : conv2d(g, map, {}, weight, {}, options));
     SR_TRY(const auto program, Program::create(*device, g));

@@ -21,11 +21,11 @@ Status bench_gemm(const BenchGemmArguments& o, const Globals& globals)
     SR_TRY(const auto device, open_device(globals));
     const DType dtype = o.precision == "fp32" ? DType::f32 : DType::f16;
     BenchInputs inputs(*device);
-    const uint32_t x = inputs.add(o.m, o.k, dtype), w = inputs.add(o.n, o.k, dtype), y = inputs.add(o.m, o.n, dtype);
+    const Slot x = inputs.add(o.m, o.k, dtype), w = inputs.add(o.n, o.k, dtype), y = inputs.add(o.m, o.n, dtype);
     const uint64_t predicted = inputs.bytes();
     SR_CHECK(inputs.allocate());
     Graph g;
-    (void)gemm(g, inputs.tensor(g, x), inputs.tensor(g, w), {}, {.dtype = dtype, .into = inputs.tensor(g, y)});
+    g.keep(gemm(g, x.in(g), w.in(g), {}, {.dtype = dtype}), y.in(g));
     SR_TRY(const auto program, Program::create(*device, g));
     SR_TRY(const Timing timing, measure([&] { return program->run(); }));
     Json report = bench_report("gemm", *device, dtype, timing, predicted + program->plan().arena_bytes());

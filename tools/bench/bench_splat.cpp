@@ -26,11 +26,11 @@ Status bench_sort(const SortOptions& o, const Globals& globals)
 {
     SR_TRY(const auto device, open_device(globals));
     BenchInputs inputs(*device);
-    const uint32_t keys = inputs.add(o.pairs, 1, DType::u32), values = inputs.add(o.pairs, 1, DType::u32);
+    const Slot keys = inputs.add(o.pairs, 1, DType::u32), values = inputs.add(o.pairs, 1, DType::u32);
     const uint64_t predicted = inputs.bytes();
     SR_CHECK(inputs.allocate());
     Graph g;
-    (void)radix_sort(g, inputs.tensor(g, keys), inputs.tensor(g, values));
+    (void)radix_sort(g, keys.in(g), values.in(g));
     SR_TRY(const auto program, Program::create(*device, g));
     SR_TRY(const Timing timing, measure([&] { return program->run(); }));
     Json report = bench_report("sort", *device, DType::f32, timing, predicted + program->plan().arena_bytes());

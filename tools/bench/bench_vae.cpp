@@ -30,10 +30,10 @@ Status bench_vae(const BenchVaeArguments& o, const Globals& globals)
     const uint32_t scale = o.encode ? 1 : config.downscale();
     FeatureMap x{{}, 1, divide_up(o.height, scale), divide_up(o.width, scale)};
     BenchInputs inputs(*device);
-    const uint32_t in = inputs.add(x.image_rows(), o.encode ? config.in_channels : config.latent_channels, DType::f32);
+    const Slot in = inputs.add(x.image_rows(), o.encode ? config.in_channels : config.latent_channels, DType::f32);
     SR_CHECK(inputs.allocate());
     Graph g;
-    x.data = inputs.tensor(g, in);
+    x.data = in.in(g);
     (void)(o.encode ? vae->encode(g, x) : vae->decode(g, x));
     want_profile(*device, o.profile);
     SR_TRY(const auto program, Program::create(*device, g));

@@ -2,24 +2,29 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/cli/open_device.h"
 
+#include "runtime/device/profile.h"
+
 namespace semrover {
 
-Result<std::unique_ptr<Device>> open_device(const Globals& globals)
+Result<std::unique_ptr<Device>> open_device(const Globals& globals, const std::string& profile)
 {
     DeviceOptions options;
     options.select = globals.device;
     options.max_bytes = globals.max_vram;
-    return Device::create(options);
+    SR_TRY(auto device, Device::create(options));
+    if (!profile.empty())
+        device->set_profile(std::make_shared<Profile>());
+    return device;
 }
 
-Result<RunFolder> open_run(const Path& folder, const Json& settings, bool replace, const RunContents& contents)
+Status write_profile(Device& device, const std::string& path, const Globals& globals)
 {
-    if (!replace)
-        return RunFolder::open(folder, settings, false, contents);
-    const auto before = read_json(folder / "run.json");
-    const bool same = before && before->is_object() && before->value("settings", Json()) == settings &&
-                      before->value("state", "") == "running";
-    return RunFolder::open(folder, settings, !same, contents);
+    if (path.empty())
+        return {};
+    SR_CHECK(device.profile()->write(path));
+    if (globals.verbose)
+        fmt::print(stderr, "{}", device.profile()->summary());
+    return {};
 }
 
 } // namespace semrover

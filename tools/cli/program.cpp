@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/cli/program.h"
 
+#include "engine/job/version.h"
 #include "runtime/base/file.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/memory_size.h"
-#include "tools/cli/version.h"
 
 #include <cerrno>
 #include <CLI/CLI.hpp>

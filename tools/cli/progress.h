@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "runtime/base/bytes_text.h"
 #include "tools/cli/commands.h"
 
 #include <cstdint>
@@ -58,6 +59,5 @@ class Progress {
 };
 
 std::string duration_text(double seconds); // "00:42", "1:02:03"
-std::string bytes_text(uint64_t bytes);    // "412 MiB"
 
 } // namespace semrover

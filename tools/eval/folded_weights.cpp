@@ -40,8 +40,8 @@ uint32_t FoldedWeights::add(const std::string& convolution, const std::string& n
         schema_.push_back({norm + name, {outputs}});
     allow(norm + ".num_batches_tracked");
     const uint32_t depth = shape.taps.height * shape.taps.width * padded(shape.inputs);
-    layer.weight = {arena_.add(uint64_t(outputs) * depth * 4), outputs, depth, DType::f32};
-    layer.bias = {arena_.add(round_up(outputs, kRowPadding) * 4ull), 1, outputs, DType::f32};
+    layer.weight = state_.slot(outputs, depth, DType::f32, convolution + ".weight");
+    layer.bias = state_.slot(1, outputs, DType::f32, convolution + ".bias");
     layers_.push_back(std::move(layer));
     return uint32_t(layers_.size() - 1);
 }
@@ -75,7 +75,7 @@ Status FoldedWeights::load(Device& device, std::string_view prefix)
     for (const TensorSpec& spec : schema_)
         if (!spec.optional)
             SR_CHECK(check_finite(file_, *file_.find(spec.name)));
-    SR_CHECK(arena_.allocate(device, "network weights"));
+    SR_CHECK(state_.allocate(device, "network weights"));
     for (const Layer& layer : layers_)
         SR_CHECK(upload(device, layer));
     return {};
@@ -103,7 +103,7 @@ Status FoldedWeights::upload(Device& device, const Layer& layer) const
     }
     const uint32_t taps = s.taps.height * s.taps.width, width = padded(s.inputs);
     const uint32_t channels = std::accumulate(s.inputs.begin(), s.inputs.end(), 0u);
-    std::vector<float> rows(size_t(s.outputs) * layer.weight.cols), shifts(round_up(s.outputs, kRowPadding));
+    std::vector<float> rows(size_t(s.outputs) * layer.weight.cols()), shifts(round_up(s.outputs, kRowPadding));
     for (uint32_t n = 0; n < s.outputs; ++n) {
         if (variance[n] < 0)
             return fail(ErrorCode::bad_input, "{}: tensor '{}.running_var' holds {} at element {}",
@@ -114,25 +114,13 @@ Status FoldedWeights::upload(Device& device, const Layer& layer) const
         for (const uint32_t of_branch : s.inputs) {
             for (uint32_t c = 0; c < of_branch; ++c, ++channel)
                 for (uint32_t tap = 0; tap < taps; ++tap)
-                    rows[size_t(n) * layer.weight.cols + tap * width + first + c] =
+                    rows[size_t(n) * layer.weight.cols() + tap * width + first + c] =
                         float(weight[(size_t(n) * channels + channel) * taps + tap] * scale);
             first += round_up(of_branch, kRowPadding);
         }
     }
-    SR_CHECK(device.write(arena_.slice(layer.weight.slice), std::as_bytes(std::span(rows))));
-    return device.write(arena_.slice(layer.bias.slice), std::as_bytes(std::span(shifts)));
-}
-
-Tensor FoldedWeights::weight(Graph& g, uint32_t layer) const
-{
-    const Weight& w = layers_[layer].weight;
-    return g.external(arena_.slice(w.slice), w.rows, w.cols, w.dtype, "folded weight");
-}
-
-Tensor FoldedWeights::bias(Graph& g, uint32_t layer) const
-{
-    const Weight& w = layers_[layer].bias;
-    return g.external(arena_.slice(w.slice), w.rows, w.cols, w.dtype, "folded bias");
+    SR_CHECK(layer.weight.write(device, rows));
+    return layer.bias.write(device, shifts);
 }
 
 } // namespace semrover

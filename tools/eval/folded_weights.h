@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/model/weight.h"
 #include "kernels/network.h"
 #include "runtime/base/safetensors.h"
 #include "runtime/device/device.h"
+#include "runtime/device/state.h"
 
 namespace semrover {
 
@@ -28,20 +28,24 @@ class FoldedWeights {
     // a tensor that is not used and may be there
     void allow(const std::string& name);
 
-    uint64_t device_bytes(const DeviceLimits& limits) const { return arena_.planned_bytes(limits); }
+    uint64_t device_bytes(const DeviceLimits& limits) const { return state_.planned_bytes(limits); }
     uint64_t parameters() const;
     // Errors, bad_input: missing, misshapen and unexpected tensors (of those with `prefix`) in one line; NaN or
     // infinity; a variance below zero
     Status load(Device& device, std::string_view prefix = {});
 
-    Tensor weight(Graph& g, uint32_t layer) const; // [outputs, taps * padded inputs] fp32
-    Tensor bias(Graph& g, uint32_t layer) const;   // [1, outputs] fp32
+    Tensor weight(Graph& g, uint32_t layer) const
+    {
+        return layers_[layer].weight.in(g);
+    }                                                                                 // [outputs, taps * padded
+                                                                                      // inputs] fp32
+    Tensor bias(Graph& g, uint32_t layer) const { return layers_[layer].bias.in(g); } // [1, outputs] fp32
 
   private:
     struct Layer {
         std::string convolution, norm;
         Shape shape;
-        Weight weight, bias;
+        Slot weight, bias;
     };
     Result<std::vector<double>> read(const std::string& name) const;
     Status upload(Device& device, const Layer& layer) const;
@@ -49,7 +53,7 @@ class FoldedWeights {
     SafetensorsSet file_;
     std::vector<Layer> layers_;
     std::vector<TensorSpec> schema_;
-    Arena arena_;
+    State state_;
 };
 
 } // namespace semrover

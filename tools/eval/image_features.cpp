@@ -4,6 +4,7 @@
 
 #include "kernels/recognition.h"
 #include "runtime/device/program.h"
+#include "runtime/device/state.h"
 
 #include <cmath>
 #include <cstring>
@@ -14,46 +15,40 @@ struct ImageFeatures::Impl {
     Device& device;
     const Inception& network;
     ImageSize size;
-    uint32_t batch, pixels = 0, features = 0; // slices
-    uint32_t rows = 0, ld = 0;                // of the result
-    Arena arena;
-    Graph graph;
+    uint32_t batch;
+    State state;
+    Slot pixels, features;
     std::unique_ptr<Program> program;
 
     Impl(Device& d, const Inception& n, ImageSize s, uint32_t b) : device(d), network(n), size(s), batch(b)
     {
-        Graph sizes; // once without memory, to know how large the ends are
-        build(sizes, {}, {});
-        pixels = arena.add(uint64_t(batch) * words() * 4);
-        features = arena.add(uint64_t(rows) * ld * 4);
-        build(graph, arena.slice(pixels), arena.slice(features));
+        pixels = state.slot(batch, words(), DType::u32, "images", words());
+        Graph sizes; // to know how large the result is
+        const Tensor y = forward(sizes);
+        features = state.slot(y.rows, y.cols, DType::f32, "features");
     }
     uint32_t words() const { return rgb_words(size.height, size.width); }
-
-    void build(Graph& g, const BufferSlice& in, const BufferSlice& out)
+    Tensor forward(Graph& g) const
     {
-        BufferSlice memory = in;
-        memory.bytes = uint64_t(batch) * words() * 4;
-        const Tensor bytes = g.external(memory, batch, words(), DType::u32, "images", words());
         const ResizeOptions resize{size.height, size.width, kInceptionSide, kInceptionSide, DType::f32};
-        const FeatureMap y = network.forward(g, resize_bilinear(g, bytes, resize));
-        rows = y.data.rows;
-        ld = y.data.ld;
-        if (out.bytes)
-            g.replace(y.data.resource, g.external(out, y.data.rows, y.data.cols, DType::f32, "features").resource);
+        return network.forward(g, resize_bilinear(g, pixels.in(g), resize)).data;
+    }
+    Graph graph() const
+    {
+        Graph g;
+        g.keep(forward(g), features);
+        return g;
     }
     // arrays and transients; nothing is allocated yet
     Result<uint64_t> planned_bytes() const
     {
-        SR_TRY(const Plan plan, make_plan(graph.desc(), device.limits()));
-        return arena.planned_bytes(device.limits()) + plan.arena_bytes();
+        SR_TRY(const Plan plan, make_plan(graph().desc(), device.limits()));
+        return state.planned_bytes(device.limits()) + plan.arena_bytes();
     }
     Status allocate()
     {
-        SR_CHECK(arena.allocate(device, "images and features"));
-        Graph g;
-        build(g, arena.slice(pixels), arena.slice(features));
-        SR_TRY(program, Program::create(device, g));
+        SR_CHECK(state.allocate(device, "images and features"));
+        SR_TRY(program, Program::create(device, graph()));
         return {};
     }
 };
@@ -92,12 +87,12 @@ Status ImageFeatures::append(std::span<const ImageRgb8> images, Features& featur
                   image.height);
         std::memcpy(&words[i * m.words()], image.pixels.data(), image.pixels.size());
     }
-    SR_CHECK(m.device.write(m.arena.slice(m.pixels), std::as_bytes(std::span(words))));
+    SR_CHECK(m.pixels.write(m.device, words));
     SR_CHECK(m.program->run());
-    std::vector<float> rows(size_t(m.rows) * m.ld);
-    SR_CHECK(m.device.read(m.arena.slice(m.features), std::as_writable_bytes(std::span(rows))));
+    SR_TRY(const std::vector<float> rows, m.features.read<float>(m.device));
+    const uint32_t ld = m.features.ld();
     for (size_t i = 0; i < images.size(); ++i) {
-        const std::span<const float> row(&rows[i * (m.rows / m.batch) * m.ld], m.ld);
+        const std::span<const float> row(&rows[i * (m.features.rows() / m.batch) * ld], ld);
         const std::vector<double> values = m.network.unpadded(row);
         for (const double v : values)
             if (!std::isfinite(v))

@@ -185,7 +185,7 @@ class BlockRunner {
     {
         FeatureMap x = x_;
         if (branch.pool && branch.chain.empty() && branch.heads.empty()) {
-            y_ = pool2d(g_, x, *branch.pool, {y_.data, col_});
+            y_ = pool2d(g_, x, *branch.pool, {.whole = y_.data, .col = col_});
             return;
         }
         if (branch.pool)
@@ -224,7 +224,7 @@ class BlockRunner {
     {
         if (!y_.valid())
             y_ = feature_map(g_, c.batch, c.height, c.width, width_, DType::f32, "block");
-        relu(g_, c.data, {y_.data, col_});
+        relu(g_, c.data, {.whole = y_.data, .col = col_});
         col_ += round_up(c.channels(), kRowPadding);
     }
 

@@ -3,6 +3,7 @@
 #include "tools/eval/pointnet.h"
 
 #include "runtime/device/program.h"
+#include "runtime/device/state.h"
 
 #include <cmath>
 
@@ -11,40 +12,32 @@ namespace semrover {
 struct PointFeatures::Impl {
     Device& device;
     const Pointnet& network;
-    uint32_t batch, positions, inputs, features; // slices
-    uint32_t input_ld, ld, rows;                 // of what goes in and out
-    Arena arena;
+    uint32_t batch;
+    State state;
+    Slot positions, inputs, features;
     std::unique_ptr<Program> program;
 
     Impl(Device& d, const Pointnet& n, uint32_t b) : device(d), network(n), batch(b)
     {
         const PointnetConfig& c = network.config();
-        input_ld = round_up(c.input_width(), kRowPadding);
-        ld = round_up(network.features(), kRowPadding);
-        rows = round_up(batch, kImageRowPadding);
-        positions = arena.add(uint64_t(batch) * c.points * 16);
-        inputs = arena.add(uint64_t(batch) * c.points * input_ld * 4);
-        features = arena.add(uint64_t(rows) * ld * 4);
+        positions = state.slot(batch * c.points, 4, DType::f32, "points", 4);
+        inputs = state.slot(batch * c.points, c.input_width(), DType::f32, "inputs");
+        features = state.slot(round_up(batch, kImageRowPadding), network.features(), DType::f32, "features");
     }
     Graph graph() const
     {
-        const PointnetConfig& c = network.config();
         Graph g;
-        const Tensor xyz = g.external(arena.slice(positions), batch * c.points, 4, DType::f32, "points", 4);
-        const Tensor x = g.external(arena.slice(inputs), batch * c.points, c.input_width(), DType::f32, "inputs");
-        const Tensor y = network.forward(g, xyz, x, batch);
-        SR_ASSERT(y.rows == rows && y.ld == ld, "features [{}, {}]", y.rows, y.ld);
-        g.replace(y.resource, g.external(arena.slice(features), y.rows, y.cols, DType::f32, "features").resource);
+        g.keep(network.forward(g, positions.in(g), inputs.in(g), batch), features);
         return g;
     }
     Result<uint64_t> planned_bytes() const
     {
         SR_TRY(const Plan plan, make_plan(graph().desc(), device.limits()));
-        return arena.planned_bytes(device.limits()) + plan.arena_bytes();
+        return state.planned_bytes(device.limits()) + plan.arena_bytes();
     }
     Status allocate()
     {
-        SR_CHECK(arena.allocate(device, "points and features"));
+        SR_CHECK(state.allocate(device, "points and features"));
         SR_TRY(program, Program::create(device, graph()));
         return {};
     }
@@ -78,20 +71,19 @@ Status PointFeatures::append(const PointChunks& chunks, uint32_t first, uint32_t
     SR_ASSERT(count >= 1 && count <= m.batch && first + count <= chunks.count && chunks.points == points &&
                   chunks.width == width,
               "chunks {} to {} of {} for a batch of {}", first, first + count, chunks.count, m.batch);
-    std::vector<float> positions(size_t(m.batch) * points * 4), inputs(size_t(m.batch) * points * m.input_ld);
+    std::vector<float> positions(size_t(m.batch) * points * 4), inputs(size_t(m.batch) * points * width);
     for (size_t i = 0; i < size_t(m.batch) * points; ++i) { // a batch that is not full repeats its last chunk
         const size_t from = (first + std::min<size_t>(i / points, count - 1)) * points + i % points;
         std::copy_n(&chunks.positions[from * 4], 4, &positions[i * 4]);
-        std::copy_n(&chunks.inputs[from * width], width, &inputs[i * m.input_ld]);
+        std::copy_n(&chunks.inputs[from * width], width, &inputs[i * width]);
     }
-    SR_CHECK(m.device.write(m.arena.slice(m.positions), std::as_bytes(std::span(positions))));
-    SR_CHECK(m.device.write(m.arena.slice(m.inputs), std::as_bytes(std::span(inputs))));
+    SR_CHECK(m.positions.write(m.device, positions));
+    SR_CHECK(m.inputs.write_rows(m.device, inputs));
     SR_CHECK(m.program->run());
-    std::vector<float> rows(size_t(m.rows) * m.ld);
-    SR_CHECK(m.device.read(m.arena.slice(m.features), std::as_writable_bytes(std::span(rows))));
+    SR_TRY(const std::vector<float> rows, m.features.read_rows(m.device, count));
     features.cols = m.network.features();
     for (uint32_t i = 0; i < count; ++i) {
-        const float* row = &rows[size_t(i) * m.ld];
+        const float* row = &rows[size_t(i) * features.cols];
         for (uint32_t n = 0; n < features.cols; ++n)
             if (!std::isfinite(row[n]))
                 return fail(ErrorCode::internal, "a feature of chunk {} is {}", first + i, row[n]);

@@ -3,14 +3,15 @@
 // semrover fuse DIR -o OUT: depth, poses, labels and colours of frames to a mesh, a semantic grid and a voxfield grid
 #include "engine/fusion/fuse.h"
 #include "engine/fusion/fusion_folder.h"
+#include "engine/job/version.h"
 #include "engine/mesh/mesh_files.h"
 #include "engine/mesh/voxelizer.h"
 #include "engine/scene/palette.h"
 #include "runtime/base/quote.h"
+#include "runtime/base/json.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/progress.h"
-#include "tools/cli/version.h"
 
 #include <algorithm>
 #include <charconv>

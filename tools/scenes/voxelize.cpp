@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // semrover voxelize MESH -o OUT.sgrid: a textured mesh as a grid of labelled cells and points
 #include "engine/format/ply.h"
+#include "engine/job/version.h"
 #include "engine/mesh/mesh_files.h"
 #include "engine/mesh/voxelizer.h"
 #include "engine/scene/palette.h"
@@ -10,7 +11,6 @@
 #include "runtime/base/quote.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/open_device.h"
-#include "tools/cli/version.h"
 
 #include <charconv>
 #include <CLI/CLI.hpp>

@@ -4,6 +4,7 @@
 
 #include "engine/scene/cell_reach.h"
 #include "runtime/device/program.h"
+#include "runtime/device/state.h"
 #include "tools/trace/trace_scene.h"
 
 #include <bit>
@@ -71,22 +72,20 @@ Result<std::vector<uint32_t>> seen_cells(Device& device, const Mesh& mesh, const
                                          std::span<const CameraPath> paths, const SeenOptions& options)
 {
     SR_TRY(const DeviceTraceScene scene, DeviceTraceScene::create(device, trace_tables(mesh, {})));
-    Arena memory;
-    memory.add(options.rays * sizeof(Ray));
-    memory.add(options.rays * sizeof(Hit));
+    State memory;
+    const Slot cast = memory.slot(options.rays, 8, DType::f32, "rays", 8);
+    const Slot hits = memory.slot(options.rays, 4, DType::u32, "hits", 4);
     SR_CHECK(memory.allocate(device, "rays"));
     Graph g;
-    const Tensor hits = trace_rays(g, scene.in(g), g.external(memory.slice(0), options.rays, 8, DType::f32, "rays", 8));
-    g.replace(hits.resource, g.external(memory.slice(1), options.rays, 4, DType::u32, "hits", 4).resource);
+    g.keep(trace_rays(g, scene.in(g), cast.in(g)), hits);
     SR_TRY(const auto program, Program::create(device, g));
 
     std::vector<bool> seen(grid.cells.size());
-    std::vector<Hit> found(options.rays);
     for (const Point3& eye : eyes_along(paths, options.pose_spacing)) {
         const std::vector<Ray> rays = rays_from(eye, options);
-        SR_CHECK(device.write(memory.slice(0), std::as_bytes(std::span(rays))));
+        SR_CHECK(cast.write(device, rays));
         SR_CHECK(program->run());
-        SR_CHECK(device.read(memory.slice(1), std::as_writable_bytes(std::span(found))));
+        SR_TRY(const std::vector<Hit> found, hits.read<Hit>(device));
         for (size_t i = 0; i < rays.size(); ++i)
             if (found[i][3] != ~0u)
                 if (const auto at = cell_of(grid, rays[i], std::bit_cast<float>(found[i][0])))

@@ -225,34 +225,37 @@ TraceTables trace_tables(const Mesh& mesh, std::span<const float> gloss, std::sp
 Result<DeviceTraceScene> DeviceTraceScene::create(Device& device, const TraceTables& t)
 {
     DeviceTraceScene s;
-    const std::span<const std::byte> tables[] = {
-        std::as_bytes(std::span(t.nodes)), std::as_bytes(std::span(t.triangles)), std::as_bytes(std::span(t.corners)),
-        std::as_bytes(std::span(t.materials)), std::as_bytes(std::span(t.texels))};
-    const size_t row_bytes[] = {64, 48, 48, 32, 4};
     const uint64_t limit = std::min(device.limits().max_storage_range, device.limits().max_allocation);
-    for (size_t i = 0; i < 5; ++i) {
-        if (tables[i].size() > limit)
+    const auto declare = [&](Slot& slot, const auto& rows, DType dtype, const char* name) -> Status {
+        const uint64_t bytes = std::as_bytes(std::span(rows)).size(), width = sizeof(rows[0]) / 4;
+        if (bytes > limit)
             return fail(ErrorCode::out_of_memory,
                         "a scene of {} triangles and {} texels has a table of {} bytes; this device binds at most {}",
-                        t.triangles.size(), t.texels.size(), tables[i].size(), limit);
-        s.counts_[i] = uint32_t(tables[i].size() / row_bytes[i]);
-        s.arena_.add(std::max(tables[i].size(), row_bytes[i]));
-    }
-    SR_CHECK(s.arena_.allocate(device, "traced scene"));
-    for (uint32_t i = 0; i < 5; ++i)
-        if (!tables[i].empty())
-            SR_CHECK(device.write(s.arena_.slice(i).part(0, tables[i].size()), tables[i]));
+                        t.triangles.size(), t.texels.size(), bytes, limit);
+        slot = s.memory_.slot(std::max(uint32_t(rows.size()), 1u), uint32_t(width), dtype, name, uint32_t(width));
+        return {};
+    };
+    SR_CHECK(declare(s.nodes_, t.nodes, DType::u32, "tree"));
+    SR_CHECK(declare(s.triangles_, t.triangles, DType::f32, "triangles"));
+    SR_CHECK(declare(s.corners_, t.corners, DType::u32, "corners"));
+    SR_CHECK(declare(s.materials_, t.materials, DType::u32, "materials"));
+    SR_CHECK(declare(s.texels_, t.texels, DType::u32, "texels"));
+    s.triangle_count_ = t.triangles.size();
+    SR_CHECK(s.memory_.allocate(device, "traced scene"));
+    const auto write = [&](const Slot& slot, const auto& rows) {
+        return rows.empty() ? Status{} : slot.write(device, rows);
+    };
+    SR_CHECK(write(s.nodes_, t.nodes));
+    SR_CHECK(write(s.triangles_, t.triangles));
+    SR_CHECK(write(s.corners_, t.corners));
+    SR_CHECK(write(s.materials_, t.materials));
+    SR_CHECK(write(s.texels_, t.texels));
     return s;
 }
 
 TraceScene DeviceTraceScene::in(Graph& g) const
 {
-    const auto table = [&](uint32_t i, uint32_t width, DType dtype, std::string_view name) {
-        return g.external(arena_.slice(i), std::max(counts_[i], 1u), width, dtype, name, width);
-    };
-    return {table(0, 16, DType::u32, "tree"), table(1, 12, DType::f32, "triangles"),
-            table(2, 12, DType::u32, "corners"), table(3, 8, DType::u32, "materials"),
-            table(4, 1, DType::u32, "texels")};
+    return {nodes_.in(g), triangles_.in(g), corners_.in(g), materials_.in(g), texels_.in(g)};
 }
 
 } // namespace semrover

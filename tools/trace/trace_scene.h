@@ -7,6 +7,7 @@
 #include "kernels/network.h"
 #include "kernels/trace.h"
 #include "runtime/device/device.h"
+#include "runtime/device/state.h"
 
 #include <span>
 
@@ -32,11 +33,12 @@ class DeviceTraceScene {
     static Result<DeviceTraceScene> create(Device& device, const TraceTables& tables);
 
     TraceScene in(Graph& g) const;
-    size_t triangles() const { return counts_[1]; }
+    size_t triangles() const { return triangle_count_; }
 
   private:
-    Arena arena_;
-    std::array<uint32_t, 5> counts_{}; // rows of the tables
+    State memory_;
+    Slot nodes_, triangles_, corners_, materials_, texels_; // of one row at least
+    size_t triangle_count_ = 0;
 };
 
 } // namespace semrover

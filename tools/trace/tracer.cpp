@@ -75,15 +75,11 @@ Result<std::unique_ptr<Tracer>> Tracer::create(Device& device, const DeviceTrace
 {
     std::unique_ptr<Tracer> t(new Tracer(device));
     t->options_ = options;
-    const uint64_t pixels = uint64_t(options.width) * options.height;
-    t->memory_.add(sizeof(View));
-    t->memory_.add(pixels * 16);
+    t->view_ = t->memory_.slot(sizeof(View) / 16, 4, DType::f32, "view", 4);
+    t->picture_ = t->memory_.slot(options.width * options.height, 4, DType::u32, "picture", 4);
     SR_CHECK(t->memory_.allocate(device, "traced picture"));
     Graph g;
-    const Tensor view = g.external(t->memory_.slice(0), 8, 4, DType::f32, "view", 4);
-    const Tensor picture = shade(g, scene.in(g), view, options);
-    const Tensor kept = g.external(t->memory_.slice(1), picture.rows, 4, DType::u32, "picture", 4);
-    g.replace(picture.resource, kept.resource);
+    g.keep(shade(g, scene.in(g), t->view_.in(g), options), t->picture_);
     SR_TRY(t->program_, Program::create(device, g));
     return t;
 }
@@ -91,11 +87,10 @@ Result<std::unique_ptr<Tracer>> Tracer::create(Device& device, const DeviceTrace
 Result<TracedImage> Tracer::render(const CameraFrame& frame, const Daylight& light)
 {
     const View view = view_of(frame, light);
-    SR_CHECK(device_.write(memory_.slice(0).part(0, sizeof(View)), std::as_bytes(std::span(view))));
+    SR_CHECK(view_.write(device_, std::span(&view, 1)));
     SR_CHECK(program_->run());
-    std::vector<std::array<uint32_t, 4>> pixels(size_t(options_.width) * options_.height);
-    const auto bytes = std::as_writable_bytes(std::span(pixels));
-    SR_CHECK(device_.read(memory_.slice(1).part(0, bytes.size()), bytes));
+    using Pixel = std::array<uint32_t, 4>;
+    SR_TRY(const std::vector<Pixel> pixels, picture_.read<Pixel>(device_));
     TracedImage image{.width = options_.width, .height = options_.height};
     for (const auto& [color, depth_bits, normal, label] : pixels) {
         const float depth = std::bit_cast<float>(depth_bits);

@@ -4,6 +4,7 @@
 
 #include "engine/camera/camera.h"
 #include "runtime/device/program.h"
+#include "runtime/device/state.h"
 #include "tools/trace/trace_scene.h"
 
 #include <memory>
@@ -46,7 +47,8 @@ class Tracer {
 
     Device& device_;
     ShadeOptions options_;
-    Arena memory_; // view, picture
+    State memory_;
+    Slot view_, picture_;
     std::unique_ptr<Program> program_;
 };
 

@@ -49,22 +49,22 @@ Result<PcaNormalsResult> run_pca_normals(Device& device, std::span<const float> 
     const uint32_t n = uint32_t(positions.size() / 3);
     if (n == 0 || positions.size() % 3 || neighbors < 1 || neighbors > kMaxNeighbors)
         return fail(ErrorCode::bad_input, "pca_normals: {} numbers, {} neighbours", positions.size(), neighbors);
-    Arena memory;
-    const uint32_t points = memory.add(12ull * n), normals = memory.add(16ull * n), eigenvalues = memory.add(16ull * n);
+    State memory;
+    const Slot points = memory.slot(n, 3, DType::f32, "points", 3),
+               normals = memory.slot(n, 4, DType::f32, "normals", 4);
+    const Slot eigenvalues = memory.slot(n, 4, DType::f32, "eigenvalues", 4);
     SR_CHECK(memory.allocate(device, "points"));
-    SR_CHECK(device.write(memory.slice(points), std::as_bytes(positions)));
+    SR_CHECK(points.write(device, positions));
     Graph g;
-    const Tensor x = g.external(memory.slice(points), n, 3, DType::f32, "points", 3);
+    const Tensor x = points.in(g);
     const PcaNormals y = pca_normal(g, x, knn(g, x, {.neighbors = neighbors}));
-    g.replace(y.normals.resource, g.external(memory.slice(normals), n, 4, DType::f32, "normals", 4).resource);
-    g.replace(y.eigenvalues.resource,
-              g.external(memory.slice(eigenvalues), n, 4, DType::f32, "eigenvalues", 4).resource);
+    g.keep(y.normals, normals);
+    g.keep(y.eigenvalues, eigenvalues);
     SR_TRY(const auto program, Program::create(device, g));
     SR_CHECK(program->run());
     PcaNormalsResult out;
-    std::vector<float> rows(4 * size_t(n));
-    for (const auto& [slice, values] : {std::pair{normals, &out.normals}, {eigenvalues, &out.eigenvalues}}) {
-        SR_CHECK(device.read(memory.slice(slice), std::as_writable_bytes(std::span(rows))));
+    for (const auto& [slot, values] : {std::pair{normals, &out.normals}, {eigenvalues, &out.eigenvalues}}) {
+        SR_TRY(const std::vector<float> rows, slot.read<float>(device));
         for (size_t i = 0; i < n; ++i)
             values->insert(values->end(), rows.begin() + 4 * i, rows.begin() + 4 * i + 3);
     }

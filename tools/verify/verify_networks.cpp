@@ -5,7 +5,7 @@
 #include "engine/network/vae.h"
 #include "runtime/base/json.h"
 #include "runtime/device/program.h"
-#include "tools/measure/evaluation_memory.h"
+#include "runtime/device/state.h"
 #include "tools/verify/golden_case.h"
 
 #include <numeric>
@@ -27,67 +27,50 @@ Result<Shape> shape_of(const GoldenCase& c, const char* name)
     return Shape{uint32_t(s[0]), uint32_t(s[1]), uint32_t(s[2]), uint32_t(s[3])};
 }
 
-// NCHW to the rows of a feature map, with `ld` elements each
+// NCHW to the rows of a feature map
 std::vector<float> to_rows(const std::vector<float>& values, const Shape& s)
 {
     const uint32_t pixels = s.height * s.width, rows = round_up(pixels, kImageRowPadding);
-    const uint32_t ld = round_up(s.channels, kRowPadding);
-    std::vector<float> out(size_t(s.images) * rows * ld, 0.f);
+    std::vector<float> out(size_t(s.images) * rows * s.channels, 0.f);
     for (uint32_t i = 0; i < s.images; ++i)
         for (uint32_t c = 0; c < s.channels; ++c)
             for (uint32_t p = 0; p < pixels; ++p)
-                out[(size_t(i) * rows + p) * ld + c] = values[(size_t(i) * s.channels + c) * pixels + p];
+                out[(size_t(i) * rows + p) * s.channels + c] = values[(size_t(i) * s.channels + c) * pixels + p];
     return out;
 }
 
 std::vector<float> from_rows(const std::vector<float>& rows, const Shape& s)
 {
     const uint32_t pixels = s.height * s.width, image_rows = round_up(pixels, kImageRowPadding);
-    const uint32_t ld = round_up(s.channels, kRowPadding);
     std::vector<float> out(size_t(s.images) * s.channels * pixels);
     for (uint32_t i = 0; i < s.images; ++i)
         for (uint32_t c = 0; c < s.channels; ++c)
             for (uint32_t p = 0; p < pixels; ++p)
-                out[(size_t(i) * s.channels + c) * pixels + p] = rows[(size_t(i) * image_rows + p) * ld + c];
+                out[(size_t(i) * s.channels + c) * pixels + p] = rows[(size_t(i) * image_rows + p) * s.channels + c];
     return out;
-}
-
-std::vector<uint16_t> to_halves(const std::vector<float>& values)
-{
-    std::vector<uint16_t> halves(values.size());
-    std::transform(values.begin(), values.end(), halves.begin(), float_to_half);
-    return halves;
-}
-
-uint32_t add_values(EvaluationMemory& memory, const std::vector<float>& values, DType dtype)
-{
-    return dtype == DType::f16 ? memory.add(to_halves(values)) : memory.add(values);
-}
-
-uint64_t fp32_bytes(const FeatureMap& map)
-{
-    return uint64_t(map.data.rows) * round_up(map.channels(), kRowPadding) * 4;
 }
 
 // runs the graph and reads the fp32 feature map `y` as NCHW
 Result<std::vector<float>> run_and_read(Device& device, Graph& g, const FeatureMap& y)
 {
-    EvaluationMemory memory;
-    const uint32_t out = memory.add_empty(fp32_bytes(y));
-    SR_CHECK(memory.upload(device));
-    g.replace(y.data.resource, g.external(memory.slice(out), y.data.rows, y.channels(), DType::f32, "output").resource);
+    State state;
+    const Slot out = state.slot(y.data.rows, y.channels(), DType::f32, "output");
+    SR_CHECK(state.allocate(device, "golden case"));
+    g.keep(y.data, out);
     SR_TRY(const auto program, Program::create(device, g));
     SR_CHECK(program->run());
-    std::vector<float> rows(fp32_bytes(y) / 4);
-    SR_CHECK(device.read(memory.slice(out), std::as_writable_bytes(std::span(rows))));
+    SR_TRY(const std::vector<float> rows, out.read_rows(device, out.rows()));
     return from_rows(rows, {y.batch, y.channels(), y.height, y.width});
 }
 
-FeatureMap input_map(Graph& g, const BufferSlice& memory, const Shape& s, DType dtype)
+Slot input_slot(State& state, const Shape& s, DType dtype)
 {
-    FeatureMap map{{}, s.images, s.height, s.width};
-    map.data = g.external(memory, s.images * map.image_rows(), s.channels, dtype, "input");
-    return map;
+    return state.slot(s.images * round_up(s.height * s.width, kImageRowPadding), s.channels, dtype, "input");
+}
+
+FeatureMap input_map(Graph& g, const Slot& slot, const Shape& s)
+{
+    return {slot.in(g), s.images, s.height, s.width};
 }
 
 Result<Json> read_config(const GoldenCase& c)
@@ -99,7 +82,7 @@ Result<Json> read_config(const GoldenCase& c)
 struct UnetInput {
     Shape shape;
     uint32_t tokens = 0;
-    std::vector<float> sample, text; // rows as on the device
+    std::vector<float> sample, text; // rows of pixels and of tokens
     std::vector<float> timesteps;
     std::vector<uint32_t> table_row;
 };
@@ -108,17 +91,14 @@ Result<UnetInput> unet_input(const GoldenCase& c, const UnetConfig& config)
 {
     UnetInput in;
     SR_TRY(in.shape, shape_of(c, "input.sample"));
-    const uint32_t dim = config.cross_attention_dim, ld = round_up(dim, kRowPadding);
+    const uint32_t dim = config.cross_attention_dim;
     const std::vector<uint64_t> text = c.shape("input.encoder_hidden_states");
     if (text.size() != 3 || text[0] != in.shape.images || text[1] > 4096 || text[2] != dim)
         return fail(ErrorCode::bad_input, "input.encoder_hidden_states: expected [{}, tokens, {}]", in.shape.images,
                     dim);
     in.tokens = uint32_t(text[1]);
     in.sample = to_rows(c.floats("input.sample"), in.shape);
-    const std::vector<float> given = c.floats("input.encoder_hidden_states");
-    in.text.assign(given.size() / dim * ld, 0.f);
-    for (size_t i = 0; i < given.size(); ++i)
-        in.text[i / dim * ld + i % dim] = given[i];
+    in.text = c.floats("input.encoder_hidden_states");
     for (const int64_t t : c.integers("input.timestep"))
         in.timesteps.push_back(float(t));
     if (in.timesteps.size() != in.shape.images)
@@ -137,24 +117,23 @@ Result<GoldenOutputs> run_unet_2d_condition(Device& device, const GoldenCase& c,
     SR_TRY(const Checkpoint weights, Checkpoint::open_folder(c.model(), Checkpoint::Network::unet));
     SR_TRY(const auto unet, Unet::load(device, config, weights, precision));
     SR_TRY(const UnetInput input, unet_input(c, config));
-    EvaluationMemory memory;
-    const uint32_t x = add_values(memory, input.sample, precision), text_id = add_values(memory, input.text, precision);
-    const uint32_t steps = memory.add(input.timesteps), rows = memory.add(input.table_row);
-    SR_CHECK(memory.upload(device));
-    const uint32_t images = input.shape.images, text_rows = images * input.tokens;
+    const uint32_t images = input.shape.images;
+    State state;
+    const Slot x = input_slot(state, input.shape, precision);
+    const Slot text = state.slot(images * input.tokens, config.cross_attention_dim, precision, "context");
+    const Slot steps = state.slot(images, 1, DType::f32, "timesteps", 1);
+    const Slot rows = state.slot(images, 1, DType::u32, "table_row", 1);
+    SR_CHECK(state.allocate(device, "golden case"));
+    SR_CHECK(x.write_rows(device, input.sample));
+    SR_CHECK(text.write_rows(device, input.text));
+    SR_CHECK(steps.write(device, input.timesteps));
+    SR_CHECK(rows.write(device, input.table_row));
     Graph g;
-    const Tensor table = g.matrix(images, unet->time_width(), DType::f32, "time table");
-    unet->time_table(g, g.external(memory.slice(steps), images, 1, DType::f32, "timesteps", 1), table);
+    const Tensor table = unet->time_table(g, steps.in(g));
     Unet::Context context{{}, input.tokens, input.tokens};
-    if (unet->context_width()) {
-        context.table = g.matrix(text_rows, unet->context_width(), precision, "context table");
-        unet->context_table(
-            g, g.external(memory.slice(text_id), text_rows, config.cross_attention_dim, precision, "context"),
-            context.table);
-    }
-    const FeatureMap in = input_map(g, memory.slice(x), input.shape, precision);
-    const FeatureMap y =
-        unet->forward(g, in, table, g.external(memory.slice(rows), images, 1, DType::u32, "table_row", 1), context);
+    if (unet->context_width())
+        context.table = unet->context_table(g, text.in(g));
+    const FeatureMap y = unet->forward(g, input_map(g, x, input.shape), table, rows.in(g), context);
     GoldenOutputs out;
     SR_TRY(out.floats["sample"], run_and_read(device, g, y));
     return out;
@@ -168,13 +147,14 @@ Result<GoldenOutputs> run_autoencoder_kl(Device& device, const GoldenCase& c, DT
     SR_TRY(const auto vae, Vae::load(device, config, weights, precision));
     SR_TRY(const Shape image, shape_of(c, "input.image"));
     SR_TRY(const Shape latent, shape_of(c, "input.latent"));
-    EvaluationMemory memory;
-    const uint32_t image_id = memory.add(to_rows(c.floats("input.image"), image));
-    const uint32_t latent_id = memory.add(to_rows(c.floats("input.latent"), latent));
-    SR_CHECK(memory.upload(device));
+    State state;
+    const Slot pixels = input_slot(state, image, DType::f32), values = input_slot(state, latent, DType::f32);
+    SR_CHECK(state.allocate(device, "golden case"));
+    SR_CHECK(pixels.write_rows(device, to_rows(c.floats("input.image"), image)));
+    SR_CHECK(values.write_rows(device, to_rows(c.floats("input.latent"), latent)));
     GoldenOutputs out;
     Graph encode;
-    const FeatureMap in = input_map(encode, memory.slice(image_id), image, DType::f32);
+    const FeatureMap in = input_map(encode, pixels, image);
     SR_TRY(const auto moments, run_and_read(device, encode, vae->encode(encode, in)));
     const size_t half = size_t(latent.channels) * latent.height * latent.width;
     for (size_t i = 0; i < latent.images; ++i) { // mean, log-variance, clamped as the reference does
@@ -184,7 +164,7 @@ Result<GoldenOutputs> run_autoencoder_kl(Device& device, const GoldenCase& c, DT
             out.floats["logvar"].push_back(std::clamp(first[half + k], -30.f, 20.f));
     }
     Graph decode;
-    const FeatureMap z = input_map(decode, memory.slice(latent_id), latent, DType::f32);
+    const FeatureMap z = input_map(decode, values, latent);
     SR_TRY(out.floats["image"], run_and_read(device, decode, vae->decode(decode, z)));
     return out;
 }

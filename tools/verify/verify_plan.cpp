@@ -5,6 +5,7 @@
 #include "engine/voxfield/regions.h"
 #include "kernels/sampling.h"
 #include "runtime/device/program.h"
+#include "runtime/device/state.h"
 #include "shaders/lib/step_row.h"
 #include "tools/verify/golden_case.h"
 
@@ -17,58 +18,49 @@ class StepRunner {
   public:
     static Result<std::unique_ptr<StepRunner>> create(Device& device, const Schedule& schedule, uint32_t elements)
     {
-        auto r = std::unique_ptr<StepRunner>(new StepRunner(device, elements));
-        r->steps_ = r->arena_.add(schedule.steps.size() * sizeof(StepRow));
-        r->clock_ = r->arena_.add(sizeof(StepClock));
-        for (uint32_t* id : {&r->m_, &r->z_, &r->fixed_, &r->x_, &r->x0_})
-            *id = r->arena_.add(r->row_bytes());
-        r->known_ = r->arena_.add(4);
-        SR_CHECK(r->arena_.allocate(device, "golden case"));
+        auto r = std::unique_ptr<StepRunner>(new StepRunner(device));
+        constexpr uint32_t kWords = sizeof(StepRow) / 4;
+        r->steps_ = r->state_.slot(uint32_t(schedule.steps.size()), kWords, DType::u32, "steps", kWords);
+        r->clock_ = r->state_.slot(1, 2, DType::u32, "clock", 2);
+        for (Slot* slot : {&r->m_, &r->z_, &r->fixed_, &r->x_, &r->x0_})
+            *slot = r->state_.slot(1, elements, DType::f32, "row");
+        r->known_ = r->state_.slot(1, 1, DType::u32, "known", 1);
+        SR_CHECK(r->state_.allocate(device, "golden case"));
         std::vector<StepRow> rows;
         for (const StepCoefficients& c : schedule.steps)
             rows.push_back({float(c.in_scale), float(c.x0_x), float(c.x0_m), float(c.c_x0), float(c.c_x), float(c.c_m),
                             float(c.c_prev), float(c.c_z), float(c.known_scale), float(c.known_noise), 0, 0, 0, 0, 0,
                             0});
-        SR_CHECK(device.write(r->arena_.slice(r->steps_), std::as_bytes(std::span(rows))));
-        for (uint32_t id : {r->clock_, r->known_, r->fixed_, r->x0_, r->z_})
-            SR_CHECK(device.clear(r->arena_.slice(id)));
-        SR_TRY(r->program_, r->build(uint32_t(rows.size()), float(schedule.clip)));
+        SR_CHECK(r->steps_.write(device, rows));
+        for (const Slot& slot : {r->clock_, r->known_, r->fixed_, r->x0_, r->z_})
+            SR_CHECK(slot.clear(device));
+        SR_TRY(r->program_, r->build(float(schedule.clip)));
         return r;
     }
-    Status set_state(std::span<const float> x) { return write(x_, x); }
+    Status set_state(std::span<const float> x) { return x_.write_rows(device_, x); }
     Result<std::vector<float>> step(std::span<const float> m, std::span<const float> z)
     {
-        SR_CHECK(write(m_, m));
+        SR_CHECK(m_.write_rows(device_, m));
         if (!z.empty())
-            SR_CHECK(write(z_, z));
+            SR_CHECK(z_.write_rows(device_, z));
         SR_CHECK(program_->run());
-        std::vector<float> x(round_up(elements_, kRowPadding));
-        SR_CHECK(device_.read(arena_.slice(x_), std::as_writable_bytes(std::span(x))));
-        x.resize(elements_);
-        return x;
+        return x_.read_rows(device_, 1);
     }
 
   private:
-    StepRunner(Device& device, uint32_t elements) : device_(device), elements_(elements) {}
-    uint64_t row_bytes() const { return round_up(elements_, kRowPadding) * 4ull; }
-    Status write(uint32_t id, std::span<const float> v) { return device_.write(arena_.slice(id), std::as_bytes(v)); }
-    Result<std::unique_ptr<Program>> build(uint32_t steps, float clip)
+    explicit StepRunner(Device& device) : device_(device) {}
+    Result<std::unique_ptr<Program>> build(float clip)
     {
         Graph g;
-        constexpr uint32_t kWords = sizeof(StepRow) / 4;
-        const auto row = [&](uint32_t id) { return g.external(arena_.slice(id), 1, elements_, DType::f32); };
-        const StepTable table{g.external(arena_.slice(steps_), steps, kWords, DType::u32, "steps", kWords),
-                              g.external(arena_.slice(clock_), 1, 2, DType::u32, "clock", 2)};
-        step_update(g, table, row(m_), row(z_), g.external(arena_.slice(known_), 1, 1, DType::u32, "known", 1),
-                    row(fixed_), row(x_), row(x0_), 1, clip);
+        const StepTable table{steps_.in(g), clock_.in(g)};
+        step_update(g, table, m_.in(g), z_.in(g), known_.in(g), fixed_.in(g), x_.in(g), x0_.in(g), 1, clip);
         step_advance(g, table.clock);
         return Program::create(device_, g);
     }
 
     Device& device_;
-    uint32_t elements_;
-    Arena arena_;
-    uint32_t steps_, clock_, m_, z_, fixed_, x_, x0_, known_;
+    State state_;
+    Slot steps_, clock_, m_, z_, fixed_, x_, x0_, known_;
     std::unique_ptr<Program> program_;
 };
 

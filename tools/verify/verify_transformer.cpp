@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // golden kinds voxfield_transformer and voxfield_sampling
 #include "engine/voxfield/token_sampler.h"
-#include "tools/measure/evaluation_memory.h"
 #include "tools/verify/golden_case.h"
 
 #include <cmath>
@@ -54,48 +53,39 @@ Result<std::vector<float>> evaluate(Device& device, const Transformer& t, const 
 {
     const uint32_t m = in.sets.rows(), c = t.config().channels(), d = t.config().dim(),
                    words = divide_up(in.sets.longest, 32);
-    const uint32_t times = uint32_t(in.timesteps.size()), ld = round_up(c, kRowPadding);
-    std::vector<float> padded(size_t(m) * ld);
-    std::vector<uint16_t> halves(padded.size());
-    for (uint32_t r = 0; r < m; ++r)
-        std::copy_n(&in.tokens[size_t(r) * c], c, &padded[size_t(r) * ld]);
-    std::transform(padded.begin(), padded.end(), halves.begin(), float_to_half);
-    EvaluationMemory memory;
-    const uint32_t labels = memory.add(in.sets.labels), cells = memory.add(in.sets.cells),
-                   sets = memory.add(in.sets.sets);
-    const uint32_t tiles = memory.add(in.sets.tiles), coords = memory.add(in.sets.coords),
-                   rows = memory.add(in.table_row);
-    const uint32_t timesteps = memory.add(in.timesteps);
-    const uint32_t tokens = t.precision() == DType::f16 ? memory.add(halves) : memory.add(padded);
-    const uint32_t pos = memory.add_empty(uint64_t(m) * d * 4), mask = memory.add(in.mask);
-    const uint32_t table = memory.add_empty(uint64_t(times) * round_up(t.modulation_width(), kRowPadding) * 4);
-    const uint32_t out = memory.add_empty(uint64_t(m) * ld * 4);
-    SR_CHECK(memory.upload(device));
+    const uint32_t times = uint32_t(in.timesteps.size());
+    State state;
+    const auto array = [&](uint32_t rows, uint32_t width, DType dtype, const char* name) {
+        return state.slot(rows, width, dtype, name, width);
+    };
+    const Slot labels = array(m, 1, DType::u32, "labels"), cells = array(m, 4, DType::i32, "cells"),
+               sets = array(m, 2, DType::u32, "sets"), coords = array(m, 3, DType::f32, "coords"),
+               tiles = array(uint32_t(in.sets.tiles.size() / 4), 4, DType::u32, "tiles"),
+               mask = array(m, words, DType::u32, "mask"), rows = array(2 * m, 1, DType::u32, "table_row"),
+               timesteps = array(times, 1, DType::f32, "timesteps"), pos = state.slot(m, d, t.precision(), "pos"),
+               tokens = state.slot(m, c, t.precision(), "tokens"),
+               modulations = state.slot(times, t.modulation_width(), DType::f32, "modulations"),
+               out = state.slot(m, c, DType::f32, "out");
+    SR_CHECK(state.allocate(device, "golden case"));
+    SR_CHECK(labels.write(device, in.sets.labels));
+    SR_CHECK(cells.write(device, in.sets.cells));
+    SR_CHECK(sets.write(device, in.sets.sets));
+    SR_CHECK(tiles.write(device, in.sets.tiles));
+    SR_CHECK(coords.write(device, in.sets.coords));
+    SR_CHECK(mask.write(device, in.mask));
+    SR_CHECK(rows.write(device, in.table_row));
+    SR_CHECK(timesteps.write(device, in.timesteps));
+    SR_CHECK(tokens.write_rows(device, in.tokens));
 
     Graph g;
-    TokenContext context;
-    context.labels = g.external(memory.slice(labels), m, 1, DType::u32, "labels", 1);
-    context.cells = g.external(memory.slice(cells), m, 4, DType::i32, "cells", 4);
-    context.sets = g.external(memory.slice(sets), m, 2, DType::u32, "sets", 2);
-    context.tiles = g.external(memory.slice(tiles), uint32_t(in.sets.tiles.size() / 4), 4, DType::u32, "tiles", 4);
-    context.coords = g.external(memory.slice(coords), m, 3, DType::f32, "coords", 3);
-    context.pos = g.external(memory.slice(pos), m, d, t.precision(), "pos");
-    context.mask = g.external(memory.slice(mask), m, words, DType::u32, "mask", words);
-    context.longest = in.sets.longest;
-    const Tensor modulations = g.external(memory.slice(table), times, t.modulation_width(), DType::f32, "modulations");
-    t.embed_positions(g, context);
-    t.modulations(g, g.external(memory.slice(timesteps), times, 1, DType::f32, "timesteps", 1), modulations);
-    const Tensor y = t.forward(g, g.external(memory.slice(tokens), m, c, t.precision(), "tokens"), context, modulations,
-                               g.external(memory.slice(rows), 2 * m, 1, DType::u32, "table_row", 1));
-    const Tensor result = g.external(memory.slice(out), m, c, DType::f32, "out");
-    g.replace(y.resource, result.resource);
+    TokenContext context{labels.in(g), cells.in(g), sets.in(g), tiles.in(g),
+                         coords.in(g), pos.in(g),   mask.in(g), in.sets.longest};
+    g.keep(t.positions(g, context), pos);
+    t.modulations(g, timesteps.in(g), modulations.in(g));
+    g.keep(t.forward(g, tokens.in(g), context, modulations.in(g), rows.in(g)), out);
     SR_TRY(const auto program, Program::create(device, g));
     SR_CHECK(program->run());
-    SR_CHECK(device.read(memory.slice(out), std::as_writable_bytes(std::span(padded))));
-    std::vector<float> values(size_t(m) * c);
-    for (uint32_t r = 0; r < m; ++r)
-        std::copy_n(&padded[size_t(r) * ld], c, &values[size_t(r) * c]);
-    return values;
+    return out.read_rows(device, m);
 }
 
 } // namespace

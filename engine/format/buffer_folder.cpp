@@ -1,0 +1,195 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/format/buffer_folder.h"
+
+#include "engine/format/camera_path.h"
+#include "engine/scene/palette.h"
+#include "runtime/base/hash.h"
+#include "runtime/base/quote.h"
+
+#include <algorithm>
+#include <map>
+
+namespace semrover {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+// numbers of the pictures in a folder, ascending; other names are not looked at
+std::vector<uint32_t> picture_numbers(const Path& folder)
+{
+    std::vector<uint32_t> numbers;
+    std::error_code error;
+    for (const auto& entry : fs::directory_iterator(folder, error)) {
+        const std::string stem = entry.path().stem().string();
+        if (entry.path().extension() == ".png" && stem.size() == 6 && std::ranges::all_of(stem, ::isdigit))
+            numbers.push_back(uint32_t(std::stoul(stem)));
+    }
+    std::ranges::sort(numbers);
+    return numbers;
+}
+
+Status check_size(const Path& path, const ImageSize& expected)
+{
+    SR_TRY(const ImageSize size, read_png_size(path));
+    if (size != expected)
+        return fail(ErrorCode::bad_input, "{} is {} x {} pixels, the first frame of its camera is {} x {}",
+                    quote_path(path), size.width, size.height, expected.width, expected.height);
+    return {};
+}
+
+Result<BufferCamera> open_camera(const Path& folder, std::string name)
+{
+    BufferCamera c{std::move(name), folder, {}, 0};
+    const std::vector<uint32_t> numbers = picture_numbers(folder / "color");
+    if (numbers.empty())
+        return fail(ErrorCode::bad_input, "{} holds no pictures 000000.png, 000001.png, ..",
+                    quote_path(folder / "color"));
+    c.frames = uint32_t(numbers.size());
+    for (uint32_t i = 0; i < c.frames; ++i)
+        if (numbers[i] != i)
+            return fail(ErrorCode::bad_input, "{} is missing: there are frames up to {:06}",
+                        quote_path(frame_path(folder, "color", i)), numbers.back());
+    SR_TRY(c.size, read_png_size(frame_path(folder, "color", 0)));
+    for (uint32_t i = 0; i < c.frames; ++i) {
+        const Path visible = frame_path(folder, "visible", i);
+        if (!fs::exists(visible))
+            return fail(ErrorCode::bad_input,
+                        "{} has no {}: a buffer is color/ and visible/, as `semrover render` writes them",
+                        quote_path(frame_path(folder, "color", i)), quote_path(visible));
+        SR_CHECK(check_size(frame_path(folder, "color", i), c.size));
+        SR_CHECK(check_size(visible, c.size));
+    }
+    return c;
+}
+
+} // namespace
+
+Path frame_path(const Path& folder, const char* kind, uint32_t number, std::string_view extension)
+{
+    return folder / kind / fmt::format("{:06}.{}", number, extension);
+}
+
+std::string frame_text(const std::string& camera, uint32_t frame)
+{
+    return camera.empty() ? fmt::format("frame {}", frame) : fmt::format("frame {} of camera {}", frame, quote(camera));
+}
+
+Result<std::vector<BufferCamera>> open_buffers(const Path& folder)
+{
+    std::error_code error;
+    if (!fs::is_directory(folder, error))
+        return fail(ErrorCode::bad_input, "{}: expected a folder of splat buffers or an .sgrid file",
+                    quote_path(folder));
+    std::vector<BufferCamera> cameras;
+    if (fs::exists(folder / "color")) {
+        SR_TRY(cameras.emplace_back(), open_camera(folder, ""));
+        return cameras;
+    }
+    std::vector<Path> inside;
+    for (const auto& entry : fs::directory_iterator(folder, error))
+        if (fs::exists(entry.path() / "color", error) && is_camera_name(entry.path().filename().string()))
+            inside.push_back(entry.path());
+    std::ranges::sort(inside);
+    for (const Path& path : inside) {
+        SR_TRY(cameras.emplace_back(), open_camera(path, path.filename().string()));
+    }
+    if (cameras.empty())
+        return fail(ErrorCode::bad_input,
+                    "{} has no color/ nor folders of cameras with color/: expected what "
+                    "`semrover render` writes",
+                    quote_path(folder));
+    return cameras;
+}
+
+std::vector<BufferCamera> path_buffers(const Path& folder, const CameraPath& path)
+{
+    std::map<std::string, BufferCamera> cameras;
+    for (const CameraFrame& frame : path.frames) {
+        BufferCamera& c = cameras[frame.camera];
+        c.name = frame.camera;
+        c.folder = frame.camera.empty() ? folder : folder / frame.camera;
+        if (c.frames++ == 0)
+            c.size = {frame.intrinsics.width, frame.intrinsics.height};
+    }
+    std::vector<BufferCamera> list;
+    for (auto& [name, camera] : cameras)
+        list.push_back(std::move(camera));
+    return list;
+}
+
+Status check_against_path(std::span<const BufferCamera> cameras, const CameraPath& path)
+{
+    std::map<std::string, uint32_t> counts;
+    for (const CameraFrame& frame : path.frames) {
+        const auto* camera = std::to_address(std::ranges::find(cameras, frame.camera, &BufferCamera::name));
+        if (camera == std::to_address(cameras.end()))
+            return fail(ErrorCode::bad_input, "the path has a camera {}, the folder has no pictures of it",
+                        quote(frame.camera));
+        const uint32_t number = counts[frame.camera]++;
+        if (ImageSize{frame.intrinsics.width, frame.intrinsics.height} != camera->size)
+            return fail(ErrorCode::bad_input, "{} is {} x {} pixels in the path, others of its camera are {} x {}",
+                        frame_text(frame.camera, number), frame.intrinsics.width, frame.intrinsics.height,
+                        camera->size.width, camera->size.height);
+    }
+    for (const BufferCamera& camera : cameras)
+        if (counts[camera.name] != camera.frames)
+            return fail(ErrorCode::bad_input, "{} has {} frames, the path has {}", quote_path(camera.folder),
+                        camera.frames, counts[camera.name]);
+    return {};
+}
+
+Result<BufferFrame> read_buffer(const BufferCamera& camera, uint32_t frame)
+{
+    SR_TRY(ImageRgb8 color, read_png_rgb8(frame_path(camera.folder, "color", frame)));
+    SR_TRY(const ImageRgb8 visible, read_png_rgb8(frame_path(camera.folder, "visible", frame)));
+    for (const ImageRgb8* image : {&std::as_const(color), &visible})
+        if (ImageSize{image->width, image->height} != camera.size)
+            return fail(ErrorCode::bad_input, "the pictures of {} in {} changed their size",
+                        frame_text(camera.name, frame), quote_path(camera.folder));
+    BufferFrame b{std::move(color.pixels), {}};
+    b.visible.resize(visible.pixels.size() / 3);
+    for (size_t i = 0; i < b.visible.size(); ++i)
+        b.visible[i] = visible.pixels[3 * i];
+    return b;
+}
+
+Result<ImageGray16> read_depth(const BufferCamera& camera, uint32_t frame)
+{
+    const Path path = frame_path(camera.folder, "depth", frame);
+    SR_TRY(ImageGray16 depth, read_png_gray16(path));
+    if (ImageSize{depth.width, depth.height} != camera.size)
+        return fail(ErrorCode::bad_input, "{} is {} x {} pixels, the frames of its camera are {} x {}",
+                    quote_path(path), depth.width, depth.height, camera.size.width, camera.size.height);
+    return depth;
+}
+
+Result<std::vector<uint8_t>> read_label_picture(const BufferCamera& camera, uint32_t frame)
+{
+    const Path path = frame_path(camera.folder, "label", frame);
+    SR_TRY(ImageRgb8 labels, read_png_rgb8(path));
+    if (ImageSize{labels.width, labels.height} != camera.size)
+        return fail(ErrorCode::bad_input, "{} is {} x {} pixels, the frames of its camera are {} x {}",
+                    quote_path(path), labels.width, labels.height, camera.size.width, camera.size.height);
+    for (size_t i = 0; i < labels.pixels.size(); i += 3) {
+        const uint8_t label = labels.pixels[i];
+        const std::array<uint8_t, 3> color = label < kClassCount ? kPalette[label].color : std::array<uint8_t, 3>{};
+        std::ranges::copy(color, &labels.pixels[i]);
+    }
+    return std::move(labels.pixels);
+}
+
+Result<uint64_t> hash_pictures(const BufferCamera& camera, std::initializer_list<const char*> kinds, uint32_t first,
+                               uint32_t last)
+{
+    Hash hash;
+    for (uint32_t i = first; i <= last; ++i)
+        for (const char* kind : kinds) {
+            SR_TRY(const MappedFile file, MappedFile::open(frame_path(camera.folder, kind, i)));
+            hash.add(file.bytes());
+        }
+    return hash.value();
+}
+
+} // namespace semrover

@@ -1,0 +1,123 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/job/editing.h"
+
+#include "engine/job/version.h"
+#include "engine/scene/cell_reach.h"
+#include "engine/scene/edit_script.h"
+#include "engine/scene/stamp.h"
+#include "runtime/base/hash.h"
+#include "runtime/base/quote.h"
+
+#include <algorithm>
+
+namespace semrover {
+
+namespace {
+
+constexpr double kWidestHalo = 30; // metres
+
+// everything that decides the bytes, stamps by their content
+Result<Json> request_json(const EditRequest& r)
+{
+    Json operations = Json::array();
+    for (const EditOperation& operation : r.operations) {
+        Json json = operation_json(operation);
+        if (operation.kind == EditOperation::Kind::insert) {
+            SR_TRY(const uint64_t hash, hash_file(operation.stamp));
+            json["stamp"] = hash_text(hash);
+        }
+        operations.push_back(json);
+    }
+    return Json{{"operations", operations}, {"halo", r.halo}};
+}
+
+// what changed and what lies around it, but for points that came with a stamp
+std::vector<uint32_t> targets_of(const EditedGrid& edited, double halo)
+{
+    std::vector<uint32_t> targets =
+        cells_within(edited.grid.cells, edited.touched, reach_squared(halo, edited.grid.voxel_size));
+    std::erase_if(targets, [&](uint32_t c) { return std::ranges::binary_search(edited.kept, edited.grid.cells[c]); });
+    return targets;
+}
+
+// the cells that a second grid has, too
+Status keep_masked(std::vector<uint32_t>& cells, const VoxelGrid& grid, const Path& path)
+{
+    SR_TRY(const VoxelGrid mask, read_grid(path));
+    if (mask.voxel_size != grid.voxel_size)
+        return fail(ErrorCode::bad_input, "{} has cells of {} m, the grid has cells of {} m", quote_path(path),
+                    mask.voxel_size, grid.voxel_size);
+    std::erase_if(cells, [&](uint32_t c) { return !find_cell(mask, grid.cells[c]); });
+    return {};
+}
+
+} // namespace
+
+Status check_edit(const EditRequest& r)
+{
+    if (!(r.halo >= 0 && r.halo <= kWidestHalo))
+        return fail(ErrorCode::usage, "--halo: expected 0 to {} m, found {}", kWidestHalo, r.halo);
+    for (const EditOperation& operation : r.operations)
+        SR_CHECK(check_operation(operation, fmt::format("--{}", operation_name(operation.kind))));
+    return {};
+}
+
+Result<Regeneration> edit_grid(const EditRequest& r)
+{
+    SR_CHECK(check_edit(r));
+    Regeneration what;
+    what.command = "edit";
+    what.input = r.grid;
+    SR_TRY(what.before, read_grid(r.grid));
+    GridEditor editor(what.before);
+    for (const EditOperation& operation : r.operations)
+        SR_CHECK(editor.apply(operation));
+    EditedGrid edited = editor.finish();
+    if (edited.grid.cells.empty())
+        return fail(ErrorCode::bad_input, "the edit leaves no cell in {}", quote(r.grid.string()));
+    what.targets = targets_of(edited, r.generates ? r.halo : 0);
+    SR_TRY(what.request, request_json(r));
+    const auto left =
+        std::ranges::count_if(edited.touched, [&](const Cell& c) { return find_cell(edited.grid, c).has_value(); });
+    what.counts = {{"cells", edited.grid.cells.size()},
+                   {"changed", edited.touched.size()},
+                   {"removed", edited.touched.size() - size_t(left)},
+                   {"regenerated", r.generates ? what.targets.size() : 0}};
+    what.grid = std::move(edited.grid);
+    return what;
+}
+
+Result<Regeneration> select_for_inpainting(const InpaintRequest& r)
+{
+    Regeneration what;
+    what.command = "inpaint";
+    what.input = r.grid;
+    SR_TRY(what.before, read_grid(r.grid));
+    SR_TRY(what.targets, select_cells(what.before, r.where));
+    what.request = {{"where", selection_json(r.where)}};
+    if (!r.mask.empty()) {
+        SR_CHECK(keep_masked(what.targets, what.before, r.mask));
+        SR_TRY(const uint64_t hash, hash_file(r.mask));
+        what.request["mask"] = hash_text(hash);
+    }
+    if (what.targets.empty())
+        return fail(ErrorCode::bad_input, "no cell of {} is selected", quote(r.grid.string()));
+    what.grid = what.before;
+    what.counts = {{"cells", what.grid.cells.size()}, {"regenerated", what.targets.size()}};
+    return what;
+}
+
+Result<Json> write_stamp(const Path& path, const CellSelection& where, const Path& output)
+{
+    SR_TRY(const VoxelGrid grid, read_grid(path));
+    SR_TRY(const std::vector<uint32_t> cells, select_cells(grid, where));
+    if (cells.empty())
+        return fail(ErrorCode::bad_input, "cut: no cell of the grid is selected");
+    VoxelGrid stamp = cut_stamp(grid, cells);
+    stamp.metadata["tool"] = kProgram;
+    SR_CHECK(write_grid(output, stamp));
+    return Json{{"cells", cells.size()}, {"origin", stamp.metadata["stamp_origin"]}};
+}
+
+} // namespace semrover

@@ -1,0 +1,35 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/job/regeneration.h"
+#include "engine/scene/grid_editor.h"
+
+namespace semrover {
+
+// what `edit` asks for: operations in order, and how far around what they change is generated anew
+struct EditRequest {
+    Path grid;
+    std::vector<EditOperation> operations;
+    double halo = 3; // metres
+    // false: nothing around the change is thrown away, only cells that changed wait for points
+    bool generates = true;
+};
+// usage: an operation or a halo that cannot be; reads no file
+Status check_edit(const EditRequest& request);
+// the edited grid, and what of it is to be generated. Errors: as check_edit; bad_input (the files, no cell left)
+Result<Regeneration> edit_grid(const EditRequest& request);
+
+// what `inpaint` asks for: the cells that are selected and, where there is a mask, that it has too
+struct InpaintRequest {
+    Path grid;
+    CellSelection where;
+    Path mask; // .sgrid; empty: none
+};
+// bad_input: the files, no cell selected
+Result<Regeneration> select_for_inpainting(const InpaintRequest& request);
+
+// Writes the selected cells as a stamp; `cells` and `origin` of it. Errors: bad_input
+Result<Json> write_stamp(const Path& grid, const CellSelection& where, const Path& output);
+
+} // namespace semrover

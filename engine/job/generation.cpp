@@ -1,0 +1,142 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/job/generation.h"
+
+#include "engine/job/grid_filling.h"
+#include "engine/job/outputs.h"
+#include "engine/job/version.h"
+#include "runtime/base/hash.h"
+
+namespace semrover {
+
+namespace {
+
+uint64_t hash_grid(const VoxelGrid& grid)
+{
+    Hash hash;
+    hash.add(fmt::format("{}", grid.voxel_size));
+    hash.add(std::as_bytes(std::span(grid.cells)));
+    hash.add(std::as_bytes(std::span(grid.labels)));
+    hash.add(std::as_bytes(std::span(grid.points)));
+    hash.add(std::as_bytes(std::span(grid.colors)));
+    hash.add(std::as_bytes(std::span(grid.generated)));
+    return hash.value();
+}
+
+class GridGeneration : public GenerationJob {
+  public:
+    GridGeneration(Device& device, VoxelGrid grid, const GenerationRequest& request, const JobCallbacks& callbacks)
+        : request_(request), callbacks_(callbacks), grid_(std::move(grid)), filling_(device, request_.settings)
+    {
+    }
+
+    Status load();
+    Status start(std::optional<GenerationState> saved);
+    Result<Json> estimate() { return filling_.estimate(); }
+
+    Result<bool> step(const JobBudget& budget) override;
+    Result<Json> finish() override;
+    void cancel() override { (void)filling_.cancel(); } // what fails then will fail again
+    Path kept_in() const override { return request_.output.empty() ? Path() : run_folder(); }
+    const VoxelGrid& grid() const override { return grid_; }
+    Result<GenerationState> save() override;
+
+  private:
+    Path run_folder() const { return request_.output.string() + ".run"; }
+
+    const GenerationRequest request_;
+    const JobCallbacks callbacks_;
+    VoxelGrid grid_;
+    GridFilling filling_;
+    uint64_t grid_hash_ = 0;
+    Json settings_;
+    std::optional<RunFolder> run_;
+};
+
+// the grid's hash is taken before it gets room for points
+Status GridGeneration::load()
+{
+    grid_hash_ = request_.grid_hash ? *request_.grid_hash : hash_grid(grid_);
+    SR_CHECK(filling_.cut(grid_, request_.settings.regions));
+    return filling_.load(request_.seed, callbacks_);
+}
+
+Status GridGeneration::start(std::optional<GenerationState> saved)
+{
+    SR_TRY(settings_, settings_json(request_.settings, filling_.device(), "generate", grid_hash_));
+    settings_["seed"] = request_.seed;
+    if (!request_.output.empty()) {
+        SR_TRY(RunFolder run, open_run(run_folder(), settings_, request_.replace));
+        run_.emplace(std::move(run));
+    }
+    if (saved && saved->settings != settings_)
+        return fail(ErrorCode::bad_input, "the saved state is of a run with other settings, model, input or device");
+    SR_CHECK(saved ? filling_.start(std::move(saved->work)) : filling_.start(run_ ? &*run_ : nullptr));
+    filling_.say(callbacks_);
+    return {};
+}
+
+Result<bool> GridGeneration::step(const JobBudget& budget)
+{
+    SR_TRY(const bool filled, filling_.step(budget, [this] { filling_.say(callbacks_); }));
+    if (filled)
+        filling_.say(callbacks_, true);
+    return filled;
+}
+
+Result<GenerationState> GridGeneration::save()
+{
+    SR_TRY(OutpaintState work, filling_.save());
+    return GenerationState{settings_, std::move(work)};
+}
+
+Result<Json> GridGeneration::finish()
+{
+    grid_.metadata["seed"] = std::to_string(request_.seed);
+    grid_.metadata["tool"] = kProgram;
+    grid_.metadata["model"] = settings_["model"];
+    if (request_.ply.any())
+        SR_CHECK(export_ply(filling_.device(), grid_, request_.ply));
+    Json results = filling_.results();
+    if (request_.output.empty())
+        return results;
+    SR_CHECK(write_grid(request_.output, grid_));
+    SR_TRY(const uint64_t hash, hash_file(request_.output));
+    results["output"] = request_.output.filename().string();
+    results["xxh64"] = hash_text(hash);
+    SR_CHECK(run_->finish(results));
+    return results;
+}
+
+} // namespace
+
+Status check_generation_outputs(const GenerationRequest& request)
+{
+    for (const Path& path :
+         {request.output, Path(request.ply.points), Path(request.ply.splats_3d), Path(request.ply.splats_2d)})
+        if (!path.empty())
+            SR_CHECK(check_writable(path, request.replace));
+    return {};
+}
+
+Result<std::unique_ptr<GenerationJob>> begin_generation(Device& device, VoxelGrid grid,
+                                                        const GenerationRequest& request, const JobCallbacks& callbacks,
+                                                        std::optional<GenerationState> saved)
+{
+    SR_ASSERT(!saved || request.output.empty(), "a run with an output keeps its state there");
+    SR_CHECK(check_generation_outputs(request));
+    auto job = std::make_unique<GridGeneration>(device, std::move(grid), request, callbacks);
+    SR_CHECK(job->load());
+    SR_CHECK(job->start(std::move(saved)));
+    return job;
+}
+
+Result<Json> estimate_generation(Device& device, VoxelGrid grid, const GenerationRequest& request,
+                                 const JobCallbacks& callbacks)
+{
+    GridGeneration job(device, std::move(grid), request, callbacks);
+    SR_CHECK(job.load());
+    return job.estimate();
+}
+
+} // namespace semrover

@@ -1,0 +1,51 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/job/export_ply.h"
+#include "engine/job/generation_settings.h"
+#include "engine/job/job.h"
+#include "engine/voxfield/outpaint.h"
+
+namespace semrover {
+
+// semantic grid to coloured points: what `generate` does
+struct GenerationRequest {
+    GenerationSettings settings;
+    uint64_t seed = 0;
+    Path output; // .sgrid to write, with the run's state in OUTPUT.run; empty: nothing is written
+    PlyExports ply;
+    bool replace = false; // what is at `output` and `ply`, and a finished run's state
+    // of the file that the grid is from, to know an interrupted run by; none: of the grid itself
+    std::optional<uint64_t> grid_hash;
+};
+
+// what a generation without an output has done, for another of the same request
+struct GenerationState {
+    Json settings;
+    OutpaintState work;
+};
+
+class GenerationJob : public Job {
+  public:
+    virtual const VoxelGrid& grid() const = 0;  // filled as far as it is done
+    virtual Result<GenerationState> save() = 0; // between two steps
+};
+
+// usage, bad_input: an output that exists or cannot be written
+Status check_generation_outputs(const GenerationRequest& request);
+
+// Fills the cells of `grid` that have no points. With an output, an interrupted run of the same request goes on;
+// without one, `saved` does, if given. The device outlives the job, and other jobs may use it too. finish() gives
+// cells, regions, seconds, planned_device_bytes, peak_device_bytes, output and xxh64.
+// Errors: usage, bad_input (outputs, a grid that does not go with the model, a state of another run), out_of_memory
+Result<std::unique_ptr<GenerationJob>> begin_generation(Device& device, VoxelGrid grid,
+                                                        const GenerationRequest& request,
+                                                        const JobCallbacks& callbacks = {},
+                                                        std::optional<GenerationState> saved = {});
+
+// what it would take, as GridFilling::estimate says it
+Result<Json> estimate_generation(Device& device, VoxelGrid grid, const GenerationRequest& request,
+                                 const JobCallbacks& callbacks = {});
+
+} // namespace semrover

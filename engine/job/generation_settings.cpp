@@ -1,0 +1,65 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/job/generation_settings.h"
+
+#include "engine/job/version.h"
+#include "runtime/base/hash.h"
+
+namespace semrover {
+
+Result<GenerationSettings> resolve_generation(const GenerationOptions& o)
+{
+    GenerationSettings s;
+    std::optional<Sampler> sampler;
+    RepaintPreset preset;
+    if (!o.preset.empty()) {
+        SR_TRY(preset, repaint_preset(o.preset));
+        sampler = preset.sampler;
+    }
+    if (!o.sampler.empty()) {
+        SR_TRY(sampler, sampler_from_name(o.sampler));
+    }
+    SR_TRY(s.model, VoxfieldModel::open(o.model, sampler));
+    const VoxfieldDefaults& d = s.model.defaults;
+    s.steps = o.steps.value_or(preset.steps ? preset.steps : d.num_inference_steps);
+    s.guidance = o.cfg_scale.value_or(d.guidance_scale);
+    s.repaint = preset.steps ? preset.repaint : d.repaint;
+    s.repaint.jump_length = o.jump_length.value_or(s.repaint.jump_length);
+    s.repaint.jump_n_sample = o.jump_n_sample.value_or(s.repaint.jump_n_sample);
+    s.repaint.known = o.known.value_or(d.repaint.known);
+    s.regions = d.regions;
+    s.regions.region_size = o.region_size.value_or(d.regions.region_size);
+    s.regions.coverage_threshold =
+        std::min(o.coverage_threshold.value_or(d.regions.coverage_threshold), s.regions.region_size);
+    s.regions.strategy = o.strategy;
+    s.regions.first_seed = o.first_cell;
+    s.precision = o.precision;
+    s.batch = o.batch;
+    SR_TRY(s.plan, plan_sampling(s.model.scheduler, s.steps, s.repaint));
+    return s;
+}
+
+Result<Json> settings_json(const GenerationSettings& s, const Device& device, std::string_view command,
+                           uint64_t grid_hash)
+{
+    SR_TRY(const uint64_t model_hash, hash_folder(s.model.transformer));
+    return Json{{"command", std::string(command)},
+                {"version", kVersion},
+                {"device", device.name()},
+                {"driver", device.driver()},
+                {"grid", hash_text(grid_hash)},
+                {"model", hash_text(model_hash)},
+                {"precision", s.precision == DType::f32 ? "fp32" : "fp16"},
+                {"sampler", std::string(sampler_name(s.model.scheduler.sampler))},
+                {"steps", s.steps},
+                {"guidance_scale", s.guidance},
+                {"region_size", s.regions.region_size},
+                {"coverage_threshold", s.regions.coverage_threshold},
+                {"strategy", s.regions.strategy == RegionStrategy::paper ? "paper" : "complete"},
+                {"first_cell", s.regions.first_seed},
+                {"jump_length", s.repaint.jump_length},
+                {"jump_n_sample", s.repaint.jump_n_sample},
+                {"known_tokens", s.repaint.known == KnownTokens::clean ? "clean" : "noised"}};
+}
+
+} // namespace semrover

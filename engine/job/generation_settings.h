@@ -1,0 +1,47 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/voxfield/voxfield_model.h"
+#include "runtime/base/dtype.h"
+#include "runtime/base/json.h"
+#include "runtime/device/device.h"
+
+#include <optional>
+
+namespace semrover {
+
+// How a grid is filled with points, as far as the caller says so; what is missing comes from the preset, then from the
+// model.
+struct GenerationOptions {
+    Path model;                  // a folder
+    std::string sampler, preset; // names; empty: the model's
+    std::optional<int> steps, region_size, coverage_threshold, jump_length, jump_n_sample;
+    std::optional<float> cfg_scale;
+    std::optional<KnownTokens> known;
+    RegionStrategy strategy = RegionStrategy::complete;
+    int64_t first_cell = 0;
+    DType precision = DType::f16; // or f32
+    uint32_t batch = 0;           // regions at a time; 0: what suits the device
+};
+
+// the same with nothing open
+struct GenerationSettings {
+    VoxfieldModel model;
+    SamplingPlan plan;
+    int steps = 0;
+    float guidance = 0;
+    RegionOptions regions;
+    RepaintOptions repaint;
+    DType precision = DType::f16;
+    uint32_t batch = 0;
+};
+
+// Reads the model's description, no weights. Errors: usage (a name that nobody knows), bad_input
+Result<GenerationSettings> resolve_generation(const GenerationOptions& options);
+
+// for a run's folder: everything that decides the bytes of the result, beside the seed. Reads the whole model once.
+Result<Json> settings_json(const GenerationSettings& settings, const Device& device, std::string_view command,
+                           uint64_t grid_hash);
+
+} // namespace semrover

@@ -1,0 +1,84 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/job/path_drawing.h"
+
+#include "engine/splat/blocks.h"
+#include "runtime/base/quote.h"
+
+namespace semrover {
+
+namespace {
+
+// end of the run of frames from `first` with the same time, size and camera model
+size_t end_of_moment(const CameraPath& path, size_t first)
+{
+    const CameraFrame& a = path.frames[first];
+    size_t end = first + 1;
+    for (; end < path.frames.size(); ++end) {
+        const CameraFrame& b = path.frames[end];
+        if (b.time != a.time || b.camera == a.camera || b.intrinsics.width != a.intrinsics.width ||
+            b.intrinsics.height != a.intrinsics.height || b.intrinsics.model != a.intrinsics.model)
+            break;
+    }
+    return end;
+}
+
+} // namespace
+
+RasterizerOptions DrawOptions::rasterizer() const
+{
+    RasterizerOptions options;
+    options.visible_alpha = visible_alpha.value_or(options.visible_alpha);
+    options.pixels_over = background;
+    return options;
+}
+
+Result<SurfelScene> splats_of(Device& device, const VoxelGrid& grid, const Path& name, const DrawOptions& o)
+{
+    ScenePoints points = points_of(grid);
+    if (points.size() == 0 && !o.semantic)
+        return fail(ErrorCode::bad_input, "{} has no points yet: generate them, or draw its labels with --semantic",
+                    quote_path(name));
+    if (points.size() == 0)
+        return SurfelScene::create(device, block_surfels(grid));
+    if (o.semantic)
+        color_by_label(points);
+    return SurfelScene::create(device, points, o.surfels);
+}
+
+Status PathDrawing::draw(std::span<const CameraFrame> frames, const Drawn& drawn)
+{
+    const Intrinsics& size = frames.front().intrinsics;
+    auto& rasterizer = rasterizers_[{size.width, size.height, size.model}];
+    if (!rasterizer) {
+        RasterizerOptions options = options_;
+        options.model = size.model;
+        SR_TRY(rasterizer,
+               Rasterizer::create(device_, scene_, size.width, size.height, uint32_t(frames.size()), options));
+    }
+    std::vector<SplatCamera> cameras;
+    for (const CameraFrame& frame : frames)
+        cameras.push_back(splat_camera(frame.intrinsics, frame.pose));
+    for (size_t at = 0; at < cameras.size();) {
+        SR_TRY(const uint32_t together, rasterizer->draw(std::span(cameras).subspan(at)));
+        for (uint32_t i = 0; i < together; ++i, ++at)
+            SR_CHECK(drawn(frames[at], rasterizer->pixels(i)));
+    }
+    return {};
+}
+
+Result<bool> PathDrawing::step(const Drawn& drawn)
+{
+    SR_ASSERT(done_ < total(), "all {} frames are drawn", total());
+    const size_t end = end_of_moment(path_, done_);
+    SR_CHECK(draw(std::span(path_.frames).subspan(done_, end - done_), drawn));
+    done_ = end;
+    return done_ == total();
+}
+
+Path camera_folder(const Path& folder, const std::string& camera)
+{
+    return camera.empty() ? folder : folder / camera;
+}
+
+} // namespace semrover

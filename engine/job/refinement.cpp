@@ -1,0 +1,344 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/job/refinement.h"
+
+#include "engine/job/budget_meter.h"
+#include "engine/job/outputs.h"
+#include "engine/job/refiner.h"
+
+namespace semrover {
+
+namespace {
+
+// The buffer that copies go through, where the device needs one, exists from here on: plans count it.
+Status settle_device(Device& device)
+{
+    SR_TRY(const auto probe, Buffer::create(device, 256, MemoryKind::device, "probe"));
+    const uint32_t word = 0;
+    return device.write(probe->slice(), std::as_bytes(std::span(&word, 1)));
+}
+
+// outgoing: bytes of what is on its way to files, where it is not allocated yet
+Result<MemoryPlan> plan_of(Device& device, const Refinement& r, std::span<const RendererWork> work, uint64_t outgoing)
+{
+    const auto unet = Unet::plan(r.model.unet, r.options.precision, device.limits());
+    const auto vae = Vae::plan(r.model.vae, r.options.precision, device.limits());
+    const RendererNetworks networks{*unet, *vae, r.plan, r.model.conditioning_tokens, r.asd.guidance_scale};
+    SR_TRY(RendererBytes parts, renderer_bytes(device.limits(), networks, work));
+    parts.outgoing = outgoing;
+    return plan_memory(std::move(parts), device.allocated_bytes(), device.budget());
+}
+
+// words of a picture, the largest that is read back: a frame has three bytes for each of them, a latent less
+uint64_t largest_read(const Refinement& r)
+{
+    uint64_t bytes = 0;
+    const uint32_t channels = round_up(r.model.vae.latent_channels, kRowPadding);
+    for (const RefineChain& c : r.chains)
+        bytes = std::max({bytes, uint64_t(c.size.image_width) * c.size.image_height * 4,
+                          uint64_t(round_up(c.size.pixels(), kImageRowPadding)) * channels * 4});
+    return bytes;
+}
+
+// a grid's pictures on their way into OUT/buffers, as `semrover render` would write them
+struct BufferDrawing {
+    SurfelScene scene;
+    PathDrawing drawing;
+    std::unique_ptr<CopyRing> copies;
+    State state;
+    std::map<std::string, Slot> seen;       // SplatPixelSlots::seen of each camera's last frame
+    std::map<std::string, uint32_t> counts; // frames so far, per camera
+    std::vector<std::string> first_moment;  // its cameras, and what they see
+    std::vector<std::pair<std::string, ImageGray16>> first_depths;
+    bool started = false; // the first moment is drawn
+
+    BufferDrawing(Device& device, SurfelScene s, const Refinement& r)
+        : scene(std::move(s)), drawing(device, scene, *r.options.path, r.draw.rasterizer())
+    {
+        for (const RefineChain& c : r.chains)
+            seen[c.camera.name] =
+                state.slot(c.size.image_width * c.size.image_height, 1, DType::u32, "seen of a camera", 1);
+    }
+    Status allocate(Device& device)
+    {
+        SR_CHECK(state.allocate(device, "drawn buffers"));
+        SR_TRY(copies, CopyRing::create(device));
+        return {};
+    }
+};
+
+class RefinementJob : public Job {
+  public:
+    RefinementJob(Device& device, Refinement refinement, RunFolder run, std::unique_ptr<Outgoing> out,
+                  const RefinementCallbacks& callbacks)
+        : device_(device), r_(std::move(refinement)), run_(std::move(run)), callbacks_(callbacks), out_(std::move(out))
+    {
+        drawn_ = !r_.options.from_grid() || was_drawn();
+        host_bytes_ = device.host_bytes();
+    }
+
+    ~RefinementJob() override { cancel(); }
+
+    Result<bool> step(const JobBudget& budget) override { return settled(advance(budget)); }
+    Result<Json> finish() override { return settled(finish_run()); }
+    void cancel() override
+    {
+        // note: an error of the device is no longer of interest; the frame is begun again from its files
+        if (refiner_)
+            (void)refiner_->cancel();
+        (void)out_->drain();
+    }
+    Path kept_in() const override { return r_.options.output; }
+
+  private:
+    template <typename T>
+    Result<T> settled(Result<T> result)
+    {
+        if (result)
+            return result;
+        (void)out_->drain(); // of two errors the first one counts
+        run_.drop_if_empty();
+        return result;
+    }
+    Result<bool> advance(const JobBudget& budget)
+    {
+        BudgetMeter meter(budget, cost_);
+        bool done = false;
+        do {
+            const Result<bool> unit = submit();
+            if (!unit && unit.error().code == ErrorCode::out_of_memory && drawing_ && refiner_) {
+                SR_CHECK(part_ways());
+                continue;
+            }
+            SR_TRY(done, unit);
+            meter.submitted();
+        } while (!done && meter.room());
+        return done;
+    }
+    // one submit of the device; true: all is done
+    Result<bool> submit()
+    {
+        const bool drawing = !drawn_ && (!refiner_ || refined_ || refiner_->waits());
+        if (drawing) {
+            SR_CHECK(draw());
+            return drawn_ && refined_;
+        }
+        if (!refiner_)
+            SR_CHECK(begin_refiner());
+        SR_TRY(refined_, refiner_->step());
+        return refined_ && drawn_;
+    }
+
+    // by an earlier start of the run
+    bool was_drawn() const
+    {
+        for (const Json& entry : run_.entries())
+            if (entry.is_object() && entry.value("rendered", Json()) == r_.options.path->frames.size())
+                return true;
+        return false;
+    }
+    // The next moment. After the first one it is known what drawing takes: where it fits beside both networks, frames
+    // are refined as they are drawn, else all are drawn before.
+    Status draw()
+    {
+        if (!drawing_) {
+            SR_TRY(const VoxelGrid grid, r_.options.grid());
+            SR_TRY(SurfelScene scene, splats_of(device_, grid, r_.options.input, r_.draw));
+            drawing_ = std::make_unique<BufferDrawing>(device_, std::move(scene), r_);
+            SR_CHECK(drawing_->allocate(device_));
+        }
+        SR_CHECK(out_->poll());
+        SR_TRY(const bool last, drawing_->drawing.step([this](const CameraFrame& f, const SplatPixelSlots& pixels) {
+            return take(f, pixels);
+        }));
+        if (!std::exchange(drawing_->started, true))
+            SR_CHECK(try_to_refine_while_drawing());
+        if (!refiner_)
+            say_drawn(last);
+        return last ? end_drawing() : Status{};
+    }
+    Status take(const CameraFrame& frame, const SplatPixelSlots& slots)
+    {
+        const std::string& camera = frame.camera;
+        SR_CHECK(drawing_->copies->copy(slots.seen, drawing_->seen[camera]).map([](uint64_t) {}));
+        if (refiner_)
+            refiner_->give_buffer(camera, drawing_->seen[camera]);
+        else if (!drawing_->started)
+            drawing_->first_moment.push_back(camera);
+        const ImageSize size{frame.intrinsics.width, frame.intrinsics.height};
+        const uint32_t number = drawing_->counts[camera]++;
+        return out_->read(slots, size, [this, camera, number](FramePixels pixels) {
+            const ImageGray16 depth{pixels.width, pixels.height, depth_pixels(pixels)};
+            if (refiner_)
+                refiner_->give_depth(camera, depth);
+            else if (drawing_ && number == 0)
+                drawing_->first_depths.emplace_back(camera, depth);
+            return out_->write([folder = camera_folder(run_.path() / "buffers", camera), number,
+                                pixels = std::move(pixels)] { return write_frame_images(folder, number, pixels); });
+        });
+    }
+    Status end_drawing()
+    {
+        drawn_ = true;
+        if (!refiner_)
+            drawing_.reset(); // else it stays as it was planned
+        return out_->write([this] { return run_.append({{"rendered", r_.options.path->frames.size()}}); });
+    }
+    void say_drawn(bool ended)
+    {
+        const PathDrawing& d = drawing_->drawing;
+        const auto say = [&](size_t done, bool last) {
+            callbacks_.progress({.stage = "render",
+                                 .unit = "frames",
+                                 .done = done,
+                                 .total = d.total(),
+                                 .device_bytes = device_.allocated_bytes(),
+                                 .ended = last});
+        };
+        if (!callbacks_.progress)
+            return;
+        if (!said_drawn_)
+            say(0, false);
+        said_drawn_ = true;
+        say(d.done(), ended);
+    }
+
+    Status try_to_refine_while_drawing()
+    {
+        const auto same_size = [&](const RefineChain& c) { return c.size == r_.chains[0].size; };
+        if (!std::ranges::all_of(r_.chains, same_size))
+            return {}; // what depends on the size would be made again and again
+        SR_CHECK(out_->drain());
+        if (const Status planned = plan(); !planned) // with the splats beside it nothing fits: without them it may
+            return planned.error().code == ErrorCode::out_of_memory ? Status{} : planned;
+        if (memory_.policy != MemoryPolicy::resident)
+            return {};
+        SR_CHECK(begin_planned(&*r_.options.path));
+        for (const std::string& camera : drawing_->first_moment)
+            refiner_->give_buffer(camera, drawing_->seen[camera]);
+        for (const auto& [camera, depth] : drawing_->first_depths)
+            refiner_->give_depth(camera, depth);
+        return {};
+    }
+    // there is no room for drawing and refining at a time after all: draw what is left, then refine what is left
+    Status part_ways()
+    {
+        SR_CHECK(refiner_->cancel());
+        SR_CHECK(out_->drain());
+        refiner_->close();
+        if (drawn_)
+            drawing_.reset();
+        refiner_.reset();
+        renderer_.reset();
+        refined_ = false;
+        return {};
+    }
+
+    Status begin_refiner()
+    {
+        SR_CHECK(out_->drain());
+        SR_CHECK(plan());
+        return begin_planned(nullptr);
+    }
+    // what is left to do, and what it takes
+    Status plan()
+    {
+        if (!store_)
+            store_.emplace(run_, r_.options.format, r_.model.vae.latent_channels);
+        std::vector<RendererWork> work;
+        for (const RefineChain& c : r_.chains)
+            work.push_back(work_left(*store_, c));
+        SR_TRY(memory_, plan_of(device_, r_, work, 0));
+        return {};
+    }
+    Status begin_planned(const CameraPath* drawn)
+    {
+        if (r_.options.from_grid()) {
+            render_bytes_ = std::max(render_bytes_, device_.peak_bytes());
+            device_.reset_peak();
+        }
+        if (callbacks_.planned)
+            callbacks_.planned(r_, memory_);
+        renderer_.emplace(device_, r_.model, r_.plan, r_.options.precision, r_.asd, memory_.policy);
+        refiner_.emplace(Refiner::Parts{device_, *renderer_, *store_, *out_, r_.chains},
+                         RefineOrder{memory_.policy, r_.plan.rows.size(), drawn}, callbacks_);
+        return {};
+    }
+    Result<Json> finish_run()
+    {
+        SR_CHECK(out_->drain());
+        const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+        renderer_.reset();
+        drawing_.reset();
+        Json results{{"output", r_.options.output.string()},
+                     {"frames", r_.frames()},
+                     {"steps", r_.steps},
+                     {"seconds", seconds},
+                     {"policy", policy_name(memory_.policy)},
+                     {"planned_device_bytes", memory_.bytes},
+                     {"peak_device_bytes", device_.peak_bytes()},
+                     {"host_bytes_read", device_.host_bytes().read - host_bytes_.read},
+                     {"host_bytes_written", device_.host_bytes().written - host_bytes_.written}};
+        if (render_bytes_)
+            results["render_device_bytes"] = render_bytes_;
+        if (callbacks_.refined)
+            SR_CHECK(callbacks_.refined(*store_, r_.chains));
+        SR_CHECK(run_.finish(results));
+        return results;
+    }
+
+    Device& device_;
+    Refinement r_;
+    RunFolder run_;
+    RefinementCallbacks callbacks_;
+    SubmitCost cost_;
+    std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+
+    std::unique_ptr<BufferDrawing> drawing_; // while there is something to draw
+    bool drawn_ = false, refined_ = false;   // all of it
+    bool said_drawn_ = false;
+    HostBytes host_bytes_;      // of the device, before this job
+    uint64_t render_bytes_ = 0; // device memory at most while buffers were rendered
+
+    std::optional<RefineStore> store_;
+    MemoryPlan memory_;
+    std::optional<FrameRenderer> renderer_;
+    std::unique_ptr<Outgoing> out_;  // what it writes goes through the ones above
+    std::optional<Refiner> refiner_; // while drawing_ is there: frames are refined as they are drawn
+};
+
+} // namespace
+
+Result<MemoryPlan> plan_refinement(Device& device, const Refinement& r)
+{
+    SR_CHECK(settle_device(device));
+    device.reset_peak();
+    std::vector<RendererWork> work;
+    for (const RefineChain& c : r.chains)
+        work.push_back({c.size});
+    return plan_of(device, r, work, Outgoing::planned_bytes(device.limits(), largest_read(r)));
+}
+
+Result<std::unique_ptr<Job>> begin_refinement(Device& device, Refinement r, const RefinementCallbacks& callbacks)
+{
+    SR_CHECK(r.check_outputs({}));
+    if (r.was_stopped()) {
+        SR_CHECK(settle_device(device));
+        device.reset_peak();
+    } else { // what does not fit is refused before anything is replaced
+        SR_CHECK(plan_refinement(device, r));
+    }
+    SR_TRY(const Json settings, refinement_settings(r, device));
+    RunContents contents{{"encoded"}, {"latents", "frames"}};
+    if (r.options.from_grid())
+        contents.results.push_back("buffers");
+    SR_TRY(RunFolder run, open_run(r.options.output, settings, r.options.replace, contents));
+    auto out = Outgoing::create(device, largest_read(r));
+    if (!out) {
+        run.drop_if_empty();
+        return tl::make_unexpected(out.error());
+    }
+    return std::make_unique<RefinementJob>(device, std::move(r), std::move(run), std::move(*out), callbacks);
+}
+
+} // namespace semrover

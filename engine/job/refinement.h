@@ -1,0 +1,78 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/job/job.h"
+#include "engine/job/path_drawing.h"
+#include "engine/job/refine_store.h"
+#include "engine/model/renderer_model.h"
+#include "engine/refine/memory_plan.h"
+#include "engine/refine/refine_chain.h"
+
+namespace semrover {
+
+// what `refine` does: splat buffers to frames, each from the one before
+struct RefinementOptions {
+    Path input, model, output;      // input: a folder of buffers, or a grid
+    std::optional<Sampler> sampler; // this and what is optional below: as the model says
+    std::optional<int> steps;       // of denoising a frame
+    std::optional<float> guidance_scale, previous_noise;
+    std::optional<FrameNoise> frame_noise;
+    uint64_t seed = 0;
+    DType precision = DType::f16;
+    std::string frames; // "FIRST:LAST", both included, either may be left out; empty: all
+    Path from;          // output of an earlier run, whose latents come before FIRST
+    FrameFormat format;
+    std::optional<ImageSize> size;           // of the pictures, refused where it is another
+    std::optional<CameraPath> path;          // of the pictures, or through the grid
+    DrawOptions draw;                        // of a grid
+    bool radius_given = false;               // draw.surfels says how wide splats are, not the model
+    std::function<Result<VoxelGrid>()> grid; // of `input`, called when it is drawn
+    bool replace = false;                    // what is in `output`
+
+    bool from_grid() const { return is_file(input); }
+};
+
+// what a run will do, as far as it can be known without a device
+struct Refinement {
+    RefinementOptions options;
+    RendererModel model;
+    SamplingPlan plan;
+    int steps = 0;
+    AsdOptions asd;
+    FrameNoise frame_noise = FrameNoise::fresh;
+    DrawOptions draw;
+    std::vector<RefineChain> chains;
+
+    size_t frames() const;
+    // true when `output` holds a run that was stopped
+    bool was_stopped() const;
+    // what would be replaced is refused (usage), and so are `beside`, which the caller will write; a run that was
+    // stopped may go on
+    Status check_outputs(std::span<const Path> beside) const;
+};
+
+// Opens the model and looks at the buffers. Errors: bad_input, usage
+Result<Refinement> resolve_refinement(RefinementOptions options, const JobCallbacks& callbacks);
+
+// everything that decides the bytes of the frames
+Result<Json> refinement_settings(const Refinement& r, const Device& device);
+
+// the memory of a run of which nothing is done yet; out_of_memory when no policy fits
+Result<MemoryPlan> plan_refinement(Device& device, const Refinement& r);
+
+struct RefinementCallbacks : JobCallbacks {
+    // when what is left to do is known, before frames are refined
+    std::function<void(const Refinement&, const MemoryPlan&)> planned;
+    // all frames are there; before the run counts as finished
+    std::function<Status(const RefineStore&, std::span<const RefineChain>)> refined;
+};
+
+// Stages: "render" counts frames that are drawn of a grid, "refine" denoising steps; with the staged policy "encode"
+// and "decode" count frames. What is done is in the output's folder: begun again after a cancel or a kill, the job goes
+// on to the same bytes. Figures: output, frames, steps, seconds, policy, planned_device_bytes, peak_device_bytes, and
+// of a grid render_device_bytes. Errors: as check_outputs and plan_refinement; bad_input for another run in the folder
+Result<std::unique_ptr<Job>> begin_refinement(Device& device, Refinement refinement,
+                                              const RefinementCallbacks& callbacks);
+
+} // namespace semrover

@@ -1,0 +1,240 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/job/refinement.h"
+#include "engine/job/version.h"
+#include "runtime/base/hash.h"
+#include "runtime/base/quote.h"
+
+#include <algorithm>
+
+namespace semrover {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+Status open_model(Refinement& r, const JobCallbacks& callbacks)
+{
+    const RefinementOptions& o = r.options;
+    SR_TRY(r.model, RendererModel::open(o.model, o.sampler));
+    for (const std::string& warning : r.model.warnings)
+        if (callbacks.warning)
+            callbacks.warning(warning);
+    const RendererDefaults& d = r.model.defaults;
+    r.steps = o.steps.value_or(d.num_inference_steps);
+    r.asd.guidance_scale = o.guidance_scale.value_or(d.guidance_scale);
+    r.asd.previous_noise = o.previous_noise.value_or(d.previous_noise);
+    r.asd.seed = o.seed;
+    r.draw = o.draw;
+    r.draw.visible_alpha = o.draw.visible_alpha.value_or(d.visible_threshold);
+    if (!o.radius_given) {
+        r.draw.surfels.auto_sigma = !d.splat_radius;
+        r.draw.surfels.sigma = d.splat_radius.value_or(r.draw.surfels.sigma);
+    }
+    SR_TRY(r.plan, plan_sampling(r.model.scheduler, r.steps));
+    return {};
+}
+
+// "FIRST:LAST", either may be left out
+Result<FrameRange> range_of(const std::string& text, const BufferCamera& camera)
+{
+    FrameRange r{0, camera.frames - 1};
+    if (text.empty())
+        return r;
+    const size_t colon = text.find(':');
+    const std::string parts[] = {text.substr(0, colon), colon == std::string::npos ? "" : text.substr(colon + 1)};
+    uint32_t* numbers[] = {&r.first, &r.last};
+    for (size_t i = 0; i < 2; ++i) {
+        const bool digits = parts[i].size() <= 6 && parts[i].find_first_not_of("0123456789") == std::string::npos;
+        if (colon == std::string::npos || !digits)
+            return fail(ErrorCode::usage, "--frames takes FIRST:LAST, found {}", quote(text));
+        if (!parts[i].empty())
+            *numbers[i] = uint32_t(std::stoul(parts[i]));
+    }
+    if (r.first > r.last || r.last >= camera.frames)
+        return fail(ErrorCode::usage, "--frames {} is not within 0:{}, the frames{}", text, camera.frames - 1,
+                    camera.name.empty() ? "" : " of camera " + quote(camera.name));
+    return r;
+}
+
+Result<std::vector<BufferCamera>> cameras_of(const RefinementOptions& o)
+{
+    if (o.from_grid() && !o.path)
+        return fail(ErrorCode::usage, "--path is required to refine straight from a grid");
+    if (o.from_grid())
+        return path_buffers(o.output / "buffers", *o.path);
+    return open_buffers(o.input);
+}
+
+// the cameras, their frames and, with --from, what came before those
+Status find_chains(Refinement& r)
+{
+    const RefinementOptions& o = r.options;
+    SR_TRY(const std::vector<BufferCamera> cameras, cameras_of(o));
+    if (o.path)
+        SR_CHECK(check_against_path(cameras, *o.path));
+    for (const BufferCamera& camera : cameras) {
+        if (o.size && !o.path && camera.size != *o.size)
+            return fail(ErrorCode::bad_input, "the pictures in {} are {} x {} pixels, -W and -H say {} x {}",
+                        quote_path(camera.folder), camera.size.width, camera.size.height, o.size->width,
+                        o.size->height);
+        RefineChain& chain = r.chains.emplace_back();
+        chain.camera = camera;
+        chain.size = {camera.size.width, camera.size.height, r.model.vae.downscale()};
+        SR_TRY(chain.range, range_of(o.frames, camera));
+        if (o.from.empty() || chain.range.first == 0)
+            continue;
+        const Path latents = camera.name.empty() ? o.from / "latents" : o.from / "latents" / camera.name;
+        SR_TRY(chain.before, read_latent(latents / fmt::format("{:06}.safetensors", chain.range.first - 1), chain.size,
+                                         r.model.vae.latent_channels));
+    }
+    return {};
+}
+
+// Noise stays on surfaces where it is known where the cameras were: a model that asks for it gets fresh noise without a
+// path, an option is refused
+Status find_motion(Refinement& r, const JobCallbacks& callbacks)
+{
+    const RefinementOptions& o = r.options;
+    r.frame_noise = o.frame_noise.value_or(r.model.defaults.frame_noise);
+    if (r.frame_noise == FrameNoise::fresh)
+        return {};
+    if (!o.path) {
+        if (o.frame_noise)
+            return fail(ErrorCode::usage, "--frame-noise warped needs the cameras of the buffers: --path");
+        r.frame_noise = FrameNoise::fresh;
+        if (callbacks.warning)
+            callbacks.warning("without --path the noise does not stay on surfaces, as this model wants it: frames will "
+                              "flicker more");
+        return {};
+    }
+    for (RefineChain& c : r.chains)
+        std::ranges::copy_if(o.path->frames, std::back_inserter(c.cameras),
+                             [&](const CameraFrame& f) { return f.camera == c.camera.name; });
+    return {};
+}
+
+uint64_t hash_cameras(const CameraPath& path)
+{
+    Hash hash;
+    for (const CameraFrame& f : path.frames) {
+        const Intrinsics& k = f.intrinsics;
+        const double view[] = {f.time, k.fx, k.fy, k.cx, k.cy, double(k.width), double(k.height), double(k.model)};
+        hash.add(f.camera);
+        hash.add(std::as_bytes(std::span(view)));
+        hash.add(std::as_bytes(std::span(k.distortion)));
+        hash.add(std::as_bytes(std::span(f.pose.world_to_camera)));
+    }
+    return hash.value();
+}
+
+Result<Json> chain_json(const Refinement& r, const RefineChain& c)
+{
+    Json camera{{"name", c.camera.name},
+                {"width", c.size.image_width},
+                {"height", c.size.image_height},
+                {"first_frame", c.range.first},
+                {"last_frame", c.range.last}};
+    if (!c.before.empty()) {
+        Hash hash;
+        hash.add(std::as_bytes(std::span(c.before)));
+        camera["before"] = hash_text(hash.value());
+    }
+    if (r.options.from_grid())
+        return camera;
+    SR_TRY(const uint64_t buffers, hash_pictures(c.camera, {"color", "visible"}, c.range.first, c.range.last));
+    camera["buffers"] = hash_text(buffers);
+    if (r.frame_noise == FrameNoise::warped) {
+        SR_TRY(const uint64_t depth, hash_pictures(c.camera, {"depth"}, 0, c.range.last));
+        camera["depth"] = hash_text(depth);
+    }
+    return camera;
+}
+
+// what the buffers come from
+Result<Json> input_json(const Refinement& r)
+{
+    const RefinementOptions& o = r.options;
+    Json cameras = Json::array();
+    for (const RefineChain& c : r.chains) {
+        SR_TRY(Json camera, chain_json(r, c));
+        cameras.push_back(std::move(camera));
+    }
+    Json input{{"cameras", cameras}};
+    if (o.from_grid() || r.frame_noise == FrameNoise::warped)
+        input["path"] = hash_text(hash_cameras(*o.path)); // as read, whatever files and options it came from
+    if (!o.from_grid())
+        return input;
+    SR_TRY(const uint64_t grid, hash_file(o.input));
+    input["grid"] = hash_text(grid);
+    const SurfelOptions& s = r.draw.surfels;
+    input["drive"] = {{"splat_radius", s.auto_sigma ? "auto" : fmt::format("{}", s.sigma)},
+                      {"opacity", s.opacity},
+                      {"visible_alpha", *r.draw.visible_alpha},
+                      {"background", fmt::format("{}", fmt::join(r.draw.background, ","))}};
+    return input;
+}
+
+} // namespace
+
+Result<Refinement> resolve_refinement(RefinementOptions options, const JobCallbacks& callbacks)
+{
+    Refinement r{std::move(options), {}, {}, 0, {}, FrameNoise::fresh, {}, {}};
+    SR_CHECK(open_model(r, callbacks));
+    SR_CHECK(find_chains(r));
+    SR_CHECK(find_motion(r, callbacks));
+    return r;
+}
+
+size_t Refinement::frames() const
+{
+    size_t count = 0;
+    for (const RefineChain& c : chains)
+        count += c.range.count();
+    return count;
+}
+
+bool Refinement::was_stopped() const
+{
+    const auto before = read_json(options.output / "run.json");
+    return before && before->is_object() && before->value("state", "") == "running";
+}
+
+Status Refinement::check_outputs(std::span<const Path> beside) const
+{
+    if (options.replace || was_stopped())
+        return {};
+    const Path& out = options.output;
+    std::vector<Path> files{out / "run.json", out / "frames", out / "latents"};
+    files.insert(files.end(), beside.begin(), beside.end());
+    if (options.from_grid())
+        files.push_back(out / "buffers");
+    for (const Path& file : files)
+        if (fs::exists(file))
+            return fail(ErrorCode::usage, "{} exists; -y replaces it", quote_path(file));
+    return {};
+}
+
+Result<Json> refinement_settings(const Refinement& r, const Device& device)
+{
+    const RefinementOptions& o = r.options;
+    SR_TRY(const Json input, input_json(r));
+    SR_TRY(const uint64_t model, r.model.hash());
+    return Json{{"command", "refine"},
+                {"version", kVersion},
+                {"device", device.name()},
+                {"driver", device.driver()},
+                {"input", input},
+                {"model", hash_text(model)},
+                {"precision", o.precision == DType::f32 ? "fp32" : "fp16"},
+                {"sampler", std::string(sampler_name(r.model.scheduler.sampler))},
+                {"steps", r.steps},
+                {"guidance_scale", r.asd.guidance_scale},
+                {"previous_noise", r.asd.previous_noise},
+                {"frame_noise", r.frame_noise == FrameNoise::warped ? "warped" : "fresh"},
+                {"seed", o.seed},
+                {"format", o.format.jpeg ? "jpeg" : "png"},
+                {"quality", o.format.jpeg ? o.format.quality : 0}};
+}
+
+} // namespace semrover

@@ -1,0 +1,64 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "kernels/network.h"
+#include "kernels/splat.h"
+
+// Ops between pictures and networks, as those in kernels.h. Numbers are rounded to the last bit as the host rounds them
+// (shaders/lib/rounding.glsl), so that it makes no difference whether a picture went through a file.
+namespace semrover {
+
+// what splats look like in files: [P] u32 arrays
+struct PixelWords {
+    Tensor seen;    // red, green, blue over the background; 255 where it is visible, else 0
+    Tensor ranges;  // depth in millimetres, 16 bits; label, 255 for none
+    Tensor normals; // 128 + 127 n of each axis, in the low bytes
+};
+struct SplatPixelsOptions {
+    std::array<uint8_t, 3> background{};
+    float visible_alpha = 0.5f; // from which on a pixel is visible
+};
+[[nodiscard]] PixelWords splat_pixels(Graph& g, const SplatImages& images, const SplatPixelsOptions& options);
+
+// a picture and the blocks that cover it: it goes on with its last column and row where they are not full
+struct PictureShape {
+    uint32_t width = 0, height = 0;               // pixels
+    uint32_t padded_width = 0, padded_height = 0; // of whole blocks
+};
+
+// y = seen / 127.5 - 1 of red, green and blue: what a VAE encodes; zeros in the padding rows of the image
+[[nodiscard]] FeatureMap picture_input(Graph& g,
+                                       Tensor seen,                // [height * width] u32 array, as PixelWords has it
+                                       const PictureShape& shape); // [padded pixels, 3] fp32
+
+// y = share of the pixels of a block that are visible
+[[nodiscard]] Tensor block_shares(Graph& g,
+                                  Tensor seen, // [height * width] u32 array, as PixelWords has it
+                                  const PictureShape& shape,
+                                  uint32_t block); // pixels on a side -> [blocks, padded as an image's rows] fp32 array
+
+// y = (x - shift) factor of the first `cols` columns; back: y = x / factor + shift. Zeros in rows from `pixels` on.
+struct LatentScale {
+    float factor = 1, shift = 0;
+    bool back = false;
+};
+[[nodiscard]] Tensor scale_latent(Graph& g,
+                                  Tensor x,                                                  // [M, cols or more] fp32
+                                  uint32_t pixels, uint32_t cols, const LatentScale& scale); // [M, cols] fp32
+
+// bytes of a picture, red, green, blue, line by line: (x + 1) 127.5, rounded and cut to 0..255
+[[nodiscard]] Tensor picture_bytes(Graph& g,
+                                   Tensor x,                   // [padded pixels, 3] fp32
+                                   const PictureShape& shape); // [words] u32 array of 3 * width * height bytes
+constexpr uint32_t picture_words(uint32_t width, uint32_t height)
+{
+    return divide_up(3 * width * height, 4);
+}
+
+// index of the first number that is NaN or infinite, 2^32 - 1 for none: counted over the picture's own pixels
+[[nodiscard]] Tensor first_non_finite(Graph& g,
+                                      Tensor x,                   // [padded pixels, N] fp32
+                                      const PictureShape& shape); // [1] u32
+
+} // namespace semrover

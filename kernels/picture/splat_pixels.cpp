@@ -1,0 +1,32 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// bytes, millimetres, labels and directions of what splats look like: [P, ..] -> three words a pixel
+#include "kernels/picture.h"
+
+#include "shaders/picture/splat_pixels.h"
+#include "splat_pixels.spv.h"
+
+namespace semrover {
+
+PixelWords splat_pixels(Graph& g, const SplatImages& images, const SplatPixelsOptions& options)
+{
+    const uint32_t pixels = images.color.rows;
+    SR_ASSERT(images.color.ld == 4 && images.surface.ld == 4 && images.depth.ld == 2 && images.ids.ld == 2 &&
+                  images.surface.rows == pixels && images.depth.rows == pixels && images.ids.rows == pixels,
+              "splat_pixels: {}, {}, {} and {} pixels", pixels, images.surface.rows, images.depth.rows,
+              images.ids.rows);
+    const PixelWords y{g.array(pixels, DType::u32, "seen"), g.array(pixels, DType::u32, "ranges"),
+                       g.array(pixels, DType::u32, "normals")};
+    const auto& [red, green, blue] = options.background;
+    const SplatPixelsPush push{.pixels = pixels,
+                               .red = float(red),
+                               .green = float(green),
+                               .blue = float(blue),
+                               .visible_alpha = options.visible_alpha};
+    g.dispatch(kernel::splat_pixels,
+               {images.color, images.surface, images.depth, images.ids, y.seen, y.ranges, y.normals}, push,
+               threads(pixels));
+    return y;
+}
+
+} // namespace semrover

@@ -1,0 +1,33 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "runtime/device/device.h"
+#include "runtime/device/state.h"
+
+namespace semrover {
+
+// Copies that nobody waits for, each in its place in the queue: after everything submitted before it, before everything
+// that follows. What is copied must live until the device has done it.
+class CopyRing {
+  public:
+    static Result<std::unique_ptr<CopyRing>> create(Device& device, size_t count = 8);
+    ~CopyRing();
+    CopyRing(const CopyRing&) = delete;
+    CopyRing& operator=(const CopyRing&) = delete;
+
+    // between slots, or a slot and staging; of equal size. The ticket is for Device::wait.
+    Result<uint64_t> copy(const BufferSlice& from, const BufferSlice& to);
+    Result<uint64_t> copy(const Slot& from, const Slot& to) { return copy(from.slice(), to.slice()); }
+
+  private:
+    explicit CopyRing(Device& device) : device_(device) {}
+
+    Device& device_;
+    VkCommandPool pool_ = VK_NULL_HANDLE;
+    std::vector<VkCommandBuffer> commands_;
+    std::vector<uint64_t> tickets_; // when each may be used again
+    size_t next_ = 0;
+};
+
+} // namespace semrover

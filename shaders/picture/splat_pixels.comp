@@ -1,0 +1,49 @@
+#version 460
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// what splats look like in files, one pixel a thread: bytes over a background, millimetres, labels, directions
+#extension GL_GOOGLE_include_directive : require
+#include "lib/rounding.glsl"
+#include "lib/thread.glsl"
+#include "splat_pixels.h"
+
+layout(local_size_x = 64) in;
+layout(push_constant) uniform Push { SplatPixelsPush p; };
+layout(binding = 0) readonly buffer Color { vec4 color[]; };     // [pixels] sum of w rgb; alpha
+layout(binding = 1) readonly buffer Surface { vec4 surface[]; }; // [pixels] sum of w normal; of w depth
+layout(binding = 2) readonly buffer Depth { vec2 depth[]; };     // [pixels] expected, median
+layout(binding = 3) readonly buffer Ids { uvec2 ids[]; };        // [pixels] label, cell
+layout(binding = 4) writeonly buffer Seen { uint seen[]; };      // [pixels] red, green, blue, visible or not
+layout(binding = 5) writeonly buffer Ranges { uint ranges[]; };  // [pixels] depth, 16 bits; label
+layout(binding = 6) writeonly buffer Normals { uint normals[]; };
+
+uint color_byte(float value, float alpha, float background)
+{
+    precise float behind = (1.0 - alpha) * background;
+    precise float v = value + divide(behind, 255.0);
+    precise float scaled = clamp(v, 0.0, 1.0) * 255.0;
+    return rounded(scaled);
+}
+
+uint direction_byte(float value, float length)
+{
+    precise float scaled = 127.0 * value;
+    precise float v = 128.0 + (length > 0.0 ? divide(scaled, length) : 0.0);
+    return rounded(v);
+}
+
+void main()
+{
+    const uint i = linear_thread();
+    if (i >= p.pixels)
+        return;
+    const vec4 c = color[i];
+    seen[i] = color_byte(c.r, c.a, p.red) | color_byte(c.g, c.a, p.green) << 8 | color_byte(c.b, c.a, p.blue) << 16 |
+              (c.a >= p.visible_alpha ? 255u << 24 : 0u);
+    precise float millimetres = depth[i].x * 1000.0;
+    ranges[i] = rounded(clamp(millimetres, 0.0, 65535.0)) | min(ids[i].x, 255u) << 16;
+    const vec3 n = surface[i].xyz;
+    precise float square = n.x * n.x + n.y * n.y + n.z * n.z;
+    const float length = square_root(square);
+    normals[i] = direction_byte(n.x, length) | direction_byte(n.y, length) << 8 | direction_byte(n.z, length) << 16;
+}

@@ -1,0 +1,125 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "runtime/device/readback_ring.h"
+
+#include "kernels/sort.h"
+#include "tests/kernel_case.h"
+
+#include <numeric>
+
+namespace semrover {
+namespace {
+
+constexpr uint32_t kSize = 5000;
+
+// a slot, and a program that counts every element up
+struct Counter {
+    State state;
+    Slot x = state.slot(kSize, 1, DType::u32, "x", 1), one = state.slot(kSize, 1, DType::u32, "other", 1);
+    std::unique_ptr<Program> program;
+
+    Counter()
+    {
+        EXPECT_TRUE(state.allocate(test_device(), "counter"));
+        EXPECT_TRUE(x.write(test_device(), std::vector<uint32_t>(kSize, 0)));
+    }
+    // x is 100 i everywhere
+    Status set(uint32_t i)
+    {
+        Graph g;
+        g.keep(fill(g, kSize, 100 * i), x);
+        SR_TRY(program, Program::create(test_device(), g));
+        return program->submit().map([](uint64_t) {});
+    }
+};
+
+std::vector<uint32_t> words(std::span<const std::byte> bytes)
+{
+    std::vector<uint32_t> v(bytes.size() / 4);
+    std::memcpy(v.data(), bytes.data(), bytes.size());
+    return v;
+}
+
+TEST(runtime_copies, a_copy_takes_its_place_among_what_is_submitted)
+{
+    Counter c;
+    const auto copies = std::move(*CopyRing::create(test_device(), 2));
+    uint64_t last = 0;
+    for (uint32_t i = 1; i <= 5; ++i) { // more than it has command buffers
+        ASSERT_TRUE(c.set(i));
+        last = *copies->copy(c.x, c.one);
+    }
+    ASSERT_TRUE(c.set(9)); // what comes later does not matter
+    ASSERT_TRUE(test_device().wait(last));
+    EXPECT_TRUE(*test_device().finished(last));
+    EXPECT_EQ(*c.one.read<uint32_t>(test_device()), std::vector<uint32_t>(kSize, 500));
+    EXPECT_EQ(*c.x.read<uint32_t>(test_device()), std::vector<uint32_t>(kSize, 900));
+    EXPECT_DEATH((void)copies->copy(c.x, c.one.row_range(0, 3)), "20000 bytes copied to 12");
+}
+
+TEST(runtime_copies, a_read_has_what_the_slot_held_then_and_comes_in_order)
+{
+    Counter c;
+    const auto ring = std::move(*ReadbackRing::create(test_device(), c.x.bytes(), 3));
+    std::vector<uint32_t> seen;
+    for (uint32_t i = 1; i <= 7; ++i) {
+        ASSERT_TRUE(c.set(i));
+        ASSERT_TRUE(ring->read(c.x, [&, i](std::span<const std::byte> bytes) -> Status {
+            EXPECT_EQ(words(bytes), std::vector<uint32_t>(kSize, 100 * i));
+            seen.push_back(i);
+            return {};
+        }));
+        EXPECT_LE(ring->pending(), 3u);
+        EXPECT_GE(seen.size() + 3, i); // those for which there was no room were handed over
+    }
+    ASSERT_TRUE(ring->read(c.x.row_range(10, 2), [&](std::span<const std::byte> bytes) -> Status {
+        EXPECT_EQ(words(bytes), std::vector<uint32_t>(2, 700));
+        seen.push_back(8);
+        return {};
+    }));
+    ASSERT_TRUE(ring->drain());
+    std::vector<uint32_t> expected(8);
+    std::iota(expected.begin(), expected.end(), 1u);
+    EXPECT_EQ(seen, expected);
+    EXPECT_EQ(ring->pending(), 0u);
+}
+
+TEST(runtime_copies, what_has_arrived_is_handed_over_without_waiting)
+{
+    Counter c;
+    const auto ring = std::move(*ReadbackRing::create(test_device(), c.x.bytes()));
+    size_t arrived = 0;
+    ASSERT_TRUE(c.set(1));
+    ASSERT_TRUE(ring->read(c.x, [&](std::span<const std::byte>) -> Status {
+        ++arrived;
+        return {};
+    }));
+    ASSERT_TRUE(test_device().wait(test_device().last_ticket()));
+    ASSERT_TRUE(ring->poll());
+    EXPECT_EQ(arrived, 1u);
+}
+
+TEST(runtime_copies, a_sinks_error_comes_out_and_dropped_reads_reach_nobody)
+{
+    Counter c;
+    const auto ring = std::move(*ReadbackRing::create(test_device(), c.x.bytes()));
+    const auto refuse = [](std::span<const std::byte>) -> Status { return fail(ErrorCode::bad_input, "disk full"); };
+    ASSERT_TRUE(ring->read(c.x, refuse));
+    const Status status = ring->drain();
+    ASSERT_FALSE(status);
+    EXPECT_EQ(status.error().message, "disk full");
+    ASSERT_TRUE(ring->read(c.x, refuse));
+    ring->drop();
+    EXPECT_TRUE(ring->drain());
+}
+
+TEST(runtime_copies, a_ring_takes_the_memory_that_was_planned)
+{
+    Device& device = test_device();
+    const uint64_t before = device.allocated_bytes();
+    const auto ring = std::move(*ReadbackRing::create(device, 12345, 4));
+    EXPECT_EQ(device.allocated_bytes() - before, ReadbackRing::planned_bytes(device.limits(), 12345, 4));
+}
+
+} // namespace
+} // namespace semrover

@@ -1,0 +1,53 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/cli/run_job.h"
+
+#include "tools/cli/progress.h"
+
+namespace semrover {
+
+JobDisplay::JobDisplay(const Globals& globals) : globals_(globals) {}
+JobDisplay::~JobDisplay() = default;
+
+JobCallbacks JobDisplay::callbacks()
+{
+    JobCallbacks c;
+    c.progress = [this](const JobProgress& p) { show(p); };
+    if (!globals_.quiet)
+        c.warning = [](std::string_view message) { fmt::print(stderr, "semrover: warning: {}\n", message); };
+    if (globals_.verbose && !globals_.quiet)
+        c.detail = [](std::string_view line) { fmt::print(stderr, "{}\n", line); };
+    return c;
+}
+
+// the first word about a stage starts its clock and shows nothing
+void JobDisplay::show(const JobProgress& p)
+{
+    const bool first = !progress_;
+    if (first)
+        progress_ = std::make_unique<Progress>(progress_to_stderr(globals_), std::string(p.stage), std::string(p.unit),
+                                               p.total, p.done_before);
+    if (!first || p.ended)
+        progress_->update(p.done, p.device_bytes ? std::optional(p.device_bytes) : std::nullopt);
+    if (!p.ended)
+        return;
+    progress_->finish();
+    progress_.reset();
+}
+
+Result<Json> run_job(const Globals& globals, const BeginJob& begin)
+{
+    JobDisplay display(globals);
+    SR_TRY(const auto job, begin(display.callbacks()));
+    for (bool done = false; !done;) {
+        if (interrupt_requested()) {
+            job->cancel();
+            return fail(ErrorCode::interrupted, "interrupted; what is done is in '{}', the same command goes on",
+                        job->kept_in().string());
+        }
+        SR_TRY(done, job->step(JobBudget::one_submit()));
+    }
+    return job->finish();
+}
+
+} // namespace semrover

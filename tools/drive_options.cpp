@@ -1,0 +1,85 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/drive_options.h"
+
+#include "engine/camera/rig.h"
+#include "engine/format/camera_path.h"
+
+#include <CLI/CLI.hpp>
+
+namespace semrover {
+
+namespace {
+
+Result<std::array<uint8_t, 3>> background_of(const DriveOptions& o)
+{
+    unsigned r, g, b;
+    int used = 0;
+    if (std::sscanf(o.background.c_str(), "%u,%u,%u%n", &r, &g, &b, &used) != 3 ||
+        size_t(used) != o.background.size() || r > 255 || g > 255 || b > 255)
+        return fail(ErrorCode::usage, "--background takes R,G,B in 0..255, not '{}'", o.background);
+    return std::array<uint8_t, 3>{uint8_t(r), uint8_t(g), uint8_t(b)};
+}
+
+} // namespace
+
+void add_drive_options(CLI::App& c, DriveOptions& o)
+{
+    c.add_option(
+        "--path", o.path,
+        "camera path: TUM, KITTI, nerfstudio transforms.json or camera_path.json, or a folder of COLMAP's text");
+    add_lens_options(c, o);
+    c.add_flag("--equirect", o.equirect, "panoramas of W x W/2 in place of the path's cameras");
+    c.add_option("--rig", o.rig, "rig.json: every sensor at every pose, in folders of their names");
+    c.add_option(
+        "--splat-radius", o.splat_radius,
+        "standard deviation of a splat in metres (0.04, or what the renderer says), or auto: from the spacing of "
+        "the points");
+    c.add_option("--opacity", o.opacity, "of every splat")->check(CLI::Range(0.01f, 1.f));
+    c.add_option("--visible-alpha", o.visible_alpha, "alpha from which a pixel counts as visible")
+        ->check(CLI::Range(0.f, 1.f));
+    c.add_option("--background", o.background, "R,G,B behind the splats");
+}
+
+Result<SurfelOptions> surfel_options(const std::string& splat_radius, float opacity)
+{
+    SurfelOptions s;
+    s.opacity = opacity;
+    s.auto_sigma = splat_radius == "auto";
+    if (s.auto_sigma || splat_radius.empty())
+        return s;
+    char* end = nullptr;
+    s.sigma = std::strtof(splat_radius.c_str(), &end);
+    if (*end || !(s.sigma > 0 && s.sigma < 100))
+        return fail(ErrorCode::usage, "--splat-radius takes metres (0..100) or auto, not '{}'", splat_radius);
+    return s;
+}
+
+Result<DrawOptions> draw_options(const DriveOptions& o)
+{
+    DrawOptions draw;
+    draw.visible_alpha = o.visible_alpha;
+    SR_TRY(draw.surfels, surfel_options(o.splat_radius, o.opacity));
+    SR_CHECK(intrinsics_of(o).map([](const auto&) {}));
+    if (o.equirect && !o.rig.empty())
+        return fail(ErrorCode::usage, "--equirect or --rig; a rig.json may have an equirectangular sensor");
+    if (o.equirect && o.width % 2)
+        return fail(ErrorCode::usage, "--equirect draws W x W/2 pixels, and {} is odd", o.width);
+    SR_TRY(draw.background, background_of(o));
+    return draw;
+}
+
+Result<CameraPath> load_cameras(const DriveOptions& o)
+{
+    SR_TRY(const Intrinsics intrinsics, intrinsics_of(o));
+    SR_TRY(CameraPath path, read_camera_path(o.path, intrinsics));
+    if (o.equirect)
+        for (CameraFrame& frame : path.frames)
+            frame.intrinsics = whole_sphere(o.width, o.width / 2);
+    if (o.rig.empty())
+        return path;
+    SR_TRY(const Rig rig, read_rig(o.rig));
+    return expand_rig(rig, path);
+}
+
+} // namespace semrover
