@@ -135,7 +135,7 @@ struct FeatureMap {
                                      DType dtype, std::string_view name = "");
 
 // y[n] = bias[n] + sum over taps and channels of w[n, tap, c] x[c] at the tap's pixel, zeros outside the image. Runs as
-// an implicit GEMM. Two inputs stand for their concatenation along channels.
+// an implicit GEMM. Two inputs are read as if concatenated along channels.
 struct ConvOptions {
     uint32_t kernel = 3;      // square; 1 has no padding, others as below
     uint32_t stride = 1;      // 1 or 2
@@ -173,8 +173,8 @@ struct ConvAddends {
                                          Tensor u,    // winograd_weight()
                                          Tensor bias, // [1, N] fp32, or none
                                          const ConvOptions& options = {}, const ConvAddends& addends = {});
-// is it expected to be faster than conv2d on such a device, and does it fit its limits? Weights are transformed in
-// every run. Measured on lavapipe; GPUs, which have more multiplications for a byte, are left to conv2d.
+// True where winograd_conv2d fits the device's limits and is expected to be faster than conv2d, although it transforms
+// the weights in every run: on CPUs, as measured on lavapipe. GPUs have more multiplications for a byte and use conv2d.
 [[nodiscard]] bool prefers_winograd(const DeviceLimits& limits, const FeatureMap& x, uint32_t outputs,
                                     const ConvOptions& options);
 

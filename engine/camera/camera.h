@@ -42,7 +42,7 @@ struct CameraFrame {
     Intrinsics intrinsics;
 };
 
-// what a run renders, in order; a reader returns at least one frame
+// The frames that a run renders, in order. Readers return at least one.
 struct CameraPath {
     std::vector<CameraFrame> frames;
 };
@@ -52,7 +52,7 @@ Intrinsics scaled_to(const Intrinsics& intrinsics, uint32_t width, uint32_t heig
 
 // square pixels, centred; the field of view across the width, in degrees, above 0 and below 180
 Intrinsics pinhole_from_fov(double horizontal_degrees, uint32_t width, uint32_t height);
-// likewise, distance from the centre = focal length times angle; above 0, at most 360
+// the same for an equidistant fisheye: distance from the centre = focal length times angle; above 0, at most 360
 Intrinsics fisheye_from_fov(double horizontal_degrees, uint32_t width, uint32_t height);
 // the whole sphere: 360 degrees across the width, 180 across the height, forward in the middle
 Intrinsics whole_sphere(uint32_t width, uint32_t height);
@@ -71,7 +71,7 @@ struct Projection {
     double x, y;  // pixels
     double depth; // metres along z; equirectangular: from the camera
 };
-// none where the lens does not look: behind a pinhole, or where its formula no longer holds
+// none where the lens does not see: behind a pinhole, or beyond the limit of its formula
 std::optional<Projection> project(const CameraFrame& frame, const Point3& world);
 
 // a name that can be a folder: 1 to 64 of [A-Za-z0-9._-], not starting with a dot

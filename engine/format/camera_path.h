@@ -60,9 +60,9 @@ enum class PathFormat { tum, kitti, transforms, camera_path, colmap };
 std::string_view name_of(PathFormat format);
 std::optional<PathFormat> path_format_of(std::string_view name);
 
-// by what it is: a folder with cameras.txt, JSON with camera_path or frames, text with 12 or else 8 numbers a line.
-// KITTI's times.txt and calib.txt are read where they lie beside the poses. Only what has no intrinsics of its own
-// (TUM, KITTI, a transforms.json of poses) gets `fallback`.
+// Reads a path in the format that its content shows: a folder with cameras.txt, JSON with camera_path or frames, text
+// with 12 or else 8 numbers a line. KITTI's times.txt and calib.txt are read if they are beside the poses. `fallback`
+// is used only for formats without intrinsics (TUM, KITTI, a transforms.json of poses).
 Result<CameraPath> read_camera_path(const Path& path, const Intrinsics& fallback);
 
 } // namespace semrover

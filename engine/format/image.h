@@ -28,11 +28,11 @@ Status write_png_gray16(const Path& path, uint32_t width, uint32_t height, std::
 // limited, and nothing is allocated that the file is too short to fill.
 Result<ImageRgb8> read_png_rgb8(const Path& path);
 
-// baseline JPEG, 4:2:0, quality 1..100, likewise
+// baseline JPEG, 4:2:0, quality 1..100; written and refused like PNG
 Status write_jpeg_rgb8(const Path& path, uint32_t width, uint32_t height, std::span<const uint8_t> pixels, int quality);
 Result<ImageRgb8> read_jpeg_rgb8(const Path& path);
 
-// the bytes of a PNG file, and a PNG or JPEG file (told by its first bytes) that lies in memory; `where` names it
+// the bytes of a PNG file; a PNG or JPEG file in memory, told by its first bytes. `where` is its name in errors
 Result<std::vector<std::byte>> encode_png_rgb8(uint32_t width, uint32_t height, std::span<const uint8_t> pixels);
 Result<ImageRgb8> decode_jpeg_rgb8(std::span<const std::byte> file, std::string_view where);
 Result<ImageRgb8> decode_image_rgb8(std::span<const std::byte> file, std::string_view where);

@@ -14,7 +14,7 @@
 namespace semrover {
 
 constexpr uint8_t kLeftOut = 254; // a source label whose cells stay empty
-constexpr uint8_t kEmpty = 255;   // what a source says of free space
+constexpr uint8_t kEmpty = 255;   // free space in the source
 
 // what a format calls its classes
 struct SourceLabel {
@@ -25,7 +25,7 @@ struct SourceLabel {
 
 constexpr std::string_view kMapAdvice = "--map FILE says what they are";
 
-// source label numbers to classes, counting what it is asked for
+// Maps source label numbers to classes, and counts the lookups of each.
 class LabelMap {
   public:
     LabelMap() = default;
@@ -34,14 +34,14 @@ class LabelMap {
 
     void set(uint32_t source, std::string name, std::optional<uint8_t> target); // none: known by name only
 
-    // JSON: an object of source label (number, or name in the format's table) to class (name or number), or null for
-    // what is to be left out. Entries of the file win over those that are there. bad_input names the entry.
+    // Reads JSON: an object of source label (number, or name in the format's table) to class (name or number), or null
+    // to leave it out. The file's entries override the others. bad_input names the entry.
     Status apply(const Path& file);
 
     // a class, kLeftOut (also for an unknown label) or kEmpty
     uint8_t operator()(uint32_t source, uint64_t count = 1);
 
-    // bad_input lists the unknown labels that were asked for, with their counts, in one line that `advice` ends
+    // bad_input if unknown labels were looked up: one line with their counts, `advice` at its end
     Status check(std::string_view where, std::string_view things, std::string_view advice = kMapAdvice) const;
     // "4 of label 99 (other-object)", a line for each source label that was left out
     std::vector<std::string> left_out(std::string_view things) const;

@@ -13,7 +13,7 @@
 
 namespace semrover {
 
-// an array of a .npy file, little endian and row-major whatever it is in the file
+// an array of a .npy file, converted to little endian and row-major
 struct NpyArray {
     DType dtype = DType::u8;
     std::vector<uint64_t> shape; // empty for a scalar
@@ -30,8 +30,8 @@ struct NpyArray {
     }
 };
 
-// what the header says. Versions 1.0, 2.0 and 3.0; bool, integers and floats of 1 to 8 bytes of either byte order; up
-// to 8 dimensions. Source: numpy.lib.format
+// The header of a .npy file: versions 1.0, 2.0 and 3.0; bool, integers and floats of 1 to 8 bytes of either byte order;
+// up to 8 dimensions. Source: numpy.lib.format
 struct NpyHeader {
     DType dtype = DType::u8;
     bool big_endian = false, fortran_order = false;

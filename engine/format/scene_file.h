@@ -42,13 +42,13 @@ bool has_scene_extension(const Path& path);
 // its arrays. bad_input for other extensions, and for a .ply or .npz that cannot be read
 Result<SceneFormat> detect_scene_format(const Path& path);
 
-// what a path is to be written as, by its extension: .ply is labelled points. bad_input, listing what there is
+// The format to write, by the path's extension: .ply is labelled points. bad_input lists the formats.
 Result<SceneFormat> scene_format_to_write(const Path& path);
 
-// a grid in any of the formats; `format`: instead of what the file looks like. bad_input
+// Reads a grid in any format; `format` overrides the detected one. Errors: bad_input
 Result<SceneGrid> read_scene_grid(const Path& path, const SceneGridOptions& options = {},
                                   std::optional<SceneFormat> format = {});
-// atomic; `warnings` gets a line for each kind of thing that the format cannot hold
+// Writes atomically. `warnings` gets a line for each kind of content that the format cannot hold.
 Status write_scene_grid(const Path& path, const VoxelGrid& grid, SceneFormat format,
                         std::vector<std::string>& warnings);
 

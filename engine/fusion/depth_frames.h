@@ -15,7 +15,7 @@ struct DepthImages {
     std::vector<uint8_t> colors; // [.., 3] sRGB; empty: gray
 };
 
-// what is fused: cameras, and pictures that are read when they are needed (more than once)
+// The input of fusion: cameras, and a function that loads a frame's pictures. It is called more than once for a frame.
 struct DepthFrames {
     std::vector<CameraFrame> cameras;
     std::function<Result<DepthImages>(size_t)> load;

@@ -12,7 +12,7 @@ namespace semrover {
 
 struct FusionFolderOptions {
     Path poses;                           // any camera path; empty: transforms.json in the folder
-    std::optional<double> fx, fy, cx, cy; // pixels; what is given wins over files
+    std::optional<double> fx, fy, cx, cy; // pixels; they override the files
     std::optional<double> fov_x;          // degrees across the width
     Path map;                             // JSON that says what label numbers are (label_map.h)
 };

@@ -24,7 +24,7 @@ struct FusionOptions {
     uint32_t max_chunk_blocks = 0; // blocks of 8^3 voxels whose votes are kept at a time; 0: what memory allows
 };
 
-// called as work goes on; an error stops it
+// called after each part of the work; an error stops it
 using FusionProgress = std::function<Status(const char* stage, size_t done, size_t total)>;
 
 } // namespace semrover

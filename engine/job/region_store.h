@@ -7,11 +7,11 @@
 
 namespace semrover {
 
-// finished regions in a run folder: regions/<region>.safetensors and a journal line with its hash
+// Saves a finished region in a run folder: regions/<region>.safetensors, and a line with its hash in the journal.
 Status save_region(RunFolder& run, const RegionResult& result);
 
-// the regions that an interrupted run finished; one whose file is missing or damaged is left out, and will be done
-// again
+// Loads the regions that an interrupted run finished, without those whose file is missing or damaged: the run does
+// them again.
 std::vector<RegionResult> load_regions(const RunFolder& run);
 
 } // namespace semrover

@@ -8,18 +8,18 @@
 
 namespace semrover {
 
-// folders that a run keeps in its own: pieces go when it is finished, results stay; both go when it starts over
+// Folders inside a run's folder. Pieces are removed when the run is finished, results are kept; a restart removes both.
 struct RunContents {
     std::vector<std::string> pieces = {"regions"}, results;
 };
 
 // A run's folder: run.json (resolved settings, versions, device, hashes), journal.jsonl (one line per finished piece)
-// and the pieces' files. A process may be killed at any time; opening the folder again gives back every piece that was
-// finished. One process at a time.
+// and the pieces' files. A process may be killed at any time: the next open() finds every finished piece. One process
+// at a time, by a lock.
 class RunFolder {
   public:
-    // creates the folder, or reopens it when its run.json has the same `settings`; other settings are refused unless
-    // `restart`, which empties the folder first. Errors: bad_input
+    // Creates the folder, or reopens it if its run.json has the same `settings`. With `restart` it is emptied first.
+    // Errors: bad_input, also for other settings without `restart`
     static Result<RunFolder> open(const Path& folder, const Json& settings, bool restart,
                                   const RunContents& contents = {});
     RunFolder(RunFolder&& other) noexcept;
@@ -27,14 +27,14 @@ class RunFolder {
     ~RunFolder();
 
     const Path& path() const { return path_; }
-    // lines of the journal that were there when it was opened, whole ones only, in order
+    // the journal as it was when the folder was opened: whole lines, in order
     const std::vector<Json>& entries() const { return entries_; }
     bool resumed() const { return !entries_.empty(); }
 
     Status append(const Json& entry); // on the disk when it returns
-    // run.json with `results` added; the pieces' files go
+    // Adds `results` to run.json and removes the pieces.
     Status finish(const Json& results);
-    // after an error: a run without a single piece leaves nothing behind
+    // After an error: removes the folder if the run has no piece yet.
     void drop_if_empty();
 
   private:

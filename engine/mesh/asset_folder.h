@@ -9,7 +9,7 @@
 
 namespace semrover {
 
-// the folder of a mesh file, out of which its references to other files may not lead
+// The folder of a mesh file. References to other files must stay inside it.
 class AssetFolder {
   public:
     explicit AssetFolder(const Path& mesh_file);

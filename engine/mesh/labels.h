@@ -10,11 +10,11 @@
 
 namespace semrover {
 
-// the class that a material's name stands for: a class name, in any case, with '_', '-' and ' ' alike, alone or in
+// the class that a material's name means: a class name, in any case, with '_', '-' and ' ' alike, alone or in
 // front of something that is no letter ("Traffic_Light", "building.003", "road-lane 2"); the longest one that fits
 std::optional<uint8_t> class_of_material(std::string_view name);
 
-// what else names or numbers of a file stand for: a JSON object of "name", "na*e" (* is any text) or "number" to a
+// What other names or numbers of a file mean: a JSON object of "name", "na*e" (* is any text) or "number" to a
 // class name or number, or null for none. Names are compared as above; exact ones come first, then the first pattern.
 class MeshLabelMap {
   public:

@@ -40,8 +40,8 @@ class TextureAtlas {
     bool has_labels_ = false;
 };
 
-// the label that a pixel of a label texture stands for: its colour in the palette, else its number as gray;
-// kNoLabel if neither
+// The label of a pixel of a label texture: by its colour in the palette, else by its number as gray; kNoLabel if
+// neither.
 uint8_t label_of_pixel(const uint8_t* rgb);
 
 } // namespace semrover

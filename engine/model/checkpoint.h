@@ -9,28 +9,29 @@
 
 namespace semrover {
 
-// The weights of one network under diffusers' names, whatever the file calls them: a component's folder (one file or
-// shards), or its part of a single-file LDM checkpoint; old names of VAE attention; 1x1 convolutions stored as matrices
-// and the other way round. Or no file at all: seeded random numbers, for benchmarks and tests.
+// Gives access to the weights of one network by diffusers' names. The weights are in a component's folder (one file or
+// shards) or in a single-file LDM checkpoint, whose names it maps. It also maps old names of VAE attention, and takes
+// 1x1 convolutions stored as matrices and the reverse. random() needs no file: seeded numbers, for benchmarks and
+// tests.
 class Checkpoint {
   public:
     enum class Network { unet, vae };
 
     // errors: bad_input
     static Result<Checkpoint> open_folder(const Path& folder, Network network);
-    // part of a single-file LDM checkpoint: the network's config is given (ldm_config.h), the other may be null
+    // one network of a single-file LDM checkpoint. Its config (ldm_config.h) must be given; the other may be null.
     static Result<Checkpoint> open_ldm(const Path& file, Network network, const struct UnetConfig* unet,
                                        const struct VaeConfig* vae);
-    // every tensor exists: weights of variance 1 / fan-in, norm weights 1, biases small; a function of (seed, name)
+    // has every tensor: weights of variance 1 / fan-in, norm weights 1, small biases, as a function of (seed, name)
     static Checkpoint random(uint64_t seed);
 
-    // the checkpoint holds what the network needs: one error lists all missing, misshapen and unexpected tensors, by
-    // their names in the file
+    // Checks that the checkpoint has what the network needs. bad_input: one line lists all missing, misshapen and
+    // unexpected tensors by their names in the file.
     Status require(std::span<const TensorSpec> schema) const;
     // the values of a tensor that require() accepted, as fp32, in the order of `shape`; bad_input if one is no number
     Status read(const TensorSpec& spec, std::vector<float>& values) const;
 
-    // the tensor for another file, under the spec's name and shape: as it is stored (random numbers: F32) or as `dtype`
+    // the tensor, to be written under the spec's name and shape: in `dtype`, else as it is stored (random numbers: F32)
     TensorStream stream(const TensorSpec& spec, std::optional<DType> dtype = {}) const;
 
   private:
@@ -43,8 +44,8 @@ class Checkpoint {
     uint64_t seed_ = 0;
 };
 
-// Stable Diffusion's own UNet, with 4 input channels, where the deferred renderer's 13 are needed: what is missing and
-// the command that adds it
+// bad_input for Stable Diffusion's own UNet, which has 4 input channels and not the deferred renderer's 13. The message
+// says which command adds the others.
 tl::unexpected<Error> refuse_plain_unet(const Path& path);
 
 } // namespace semrover

@@ -11,28 +11,28 @@
 
 namespace semrover {
 
-// how the noise of a frame has to do with that of the frame before
+// How a frame's noise follows from that of the frame before.
 enum class FrameNoise {
-    fresh,  // not at all
-    warped, // it stays on the surfaces that both show
+    fresh,  // it does not
+    warped, // it stays on the surfaces that both frames show
 };
 
 // model_index.json's "defaults": {"renderer": {"num_inference_steps": 20, "guidance_scale": 1.5, "previous_noise": 0.3,
-// "frame_noise": "fresh", "visible_threshold": 0.5, "splat_radius": 0.04}}: what a command uses when no option says
-// otherwise. Fields of "defaults" beside "renderer" are the transformer's.
+// "frame_noise": "fresh", "visible_threshold": 0.5, "splat_radius": 0.04}}: what a command uses where no option
+// overrides it. The other fields of "defaults" are the transformer's.
 struct RendererDefaults {
     int num_inference_steps = 20;
     float guidance_scale = 1.5f;
     float previous_noise = 0.3f; // scale of the noise on the previous frame's latent
     FrameNoise frame_noise = FrameNoise::fresh;
     float visible_threshold = 0.5f; // alpha from which splats cover a pixel
-    // standard deviation of the splats in its buffers, metres; none ("auto"): from the spacing of the points. A
-    // renderer wants what it was trained on
+    // standard deviation of the splats in its buffers, metres; none ("auto"): from the spacing of the points. It must
+    // be what the renderer was trained on
     std::optional<float> splat_radius = 0.04f;
 };
 
-// A deferred renderer's description; weights are read by Unet::load and Vae::load. On disk: a folder in the diffusers
-// layout (renderer/ or unet/, vae/, scheduler/, conditioning/), or a single-file LDM checkpoint.
+// A deferred renderer's configs, without the weights: Unet::load and Vae::load read those. On disk: a folder in the
+// diffusers layout (renderer/ or unet/, vae/, scheduler/, conditioning/), or a single-file LDM checkpoint.
 struct RendererModel {
     Path folder; // or the LDM file
     bool ldm = false;
@@ -45,10 +45,10 @@ struct RendererModel {
     RendererDefaults defaults;
     std::vector<std::string> warnings;
 
-    // a model that can render: its UNet takes noisy, previous and buffer latents and visibility, its weights fit its
-    // configs. errors: bad_input, with what is missing and where it should be
+    // Opens a model that can render: its UNet takes noisy, previous and buffer latents and visibility, and its weights
+    // fit its configs. Errors: bad_input, with what is missing and where it should be
     static Result<RendererModel> open(const Path& path, std::optional<Sampler> sampler = {});
-    // the same for any Stable Diffusion 1.5-shaped model, whatever its UNet's input, without a look at the weights
+    // Reads the configs of any model of Stable Diffusion 1.5's shape; does not check the UNet's input or the weights.
     static Result<RendererModel> read(const Path& path, std::optional<Sampler> sampler = {});
 
     Result<Checkpoint> open_unet() const;
@@ -67,7 +67,7 @@ inline uint32_t renderer_channels(const VaeConfig& vae)
     return 3 * vae.latent_channels + 1;
 }
 
-// Stable Diffusion's noise schedule (docs/method.md §6.1), and the scheduler_config.json that says so
+// Stable Diffusion's noise schedule (docs/method.md §6.1), and its scheduler_config.json
 SchedulerConfig stable_diffusion_scheduler(std::optional<Sampler> sampler = {});
 nlohmann::json stable_diffusion_scheduler_json();
 

@@ -6,11 +6,11 @@
 
 namespace semrover {
 
-// the most that a configuration may ask for
+// limits of a configuration
 constexpr size_t kMaxLevels = 8;
 constexpr uint32_t kMaxChannels = 65536;
 
-// the weights of a network, collected layer by layer under PyTorch's names
+// Collects names and shapes of a network's weights layer by layer, by PyTorch's names.
 struct Schema {
     std::vector<TensorSpec> specs;
 

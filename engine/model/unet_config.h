@@ -39,7 +39,7 @@ struct UnetConfig {
 
 // errors: bad_input; a value that the engine does not implement is refused by name
 Result<UnetConfig> parse_unet_config(const nlohmann::json& json);
-// the config.json that says the same
+// the config as a config.json
 nlohmann::json unet_config_json(const UnetConfig& config);
 
 // names and shapes of the network's weights, as diffusers calls them

@@ -31,7 +31,7 @@ struct VaeConfig {
 
 // errors: bad_input; a value that the engine does not implement is refused by name
 Result<VaeConfig> parse_vae_config(const nlohmann::json& json);
-// the config.json that says the same
+// the config as a config.json
 nlohmann::json vae_config_json(const VaeConfig& config);
 
 // names and shapes of the network's weights, as diffusers calls them

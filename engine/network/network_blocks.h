@@ -7,9 +7,9 @@
 
 namespace semrover {
 
-// What UNets and VAEs are made of: weights of a block, declared once, and the block as a part of a graph.
+// Blocks that UNets and VAEs share: declare_*() lays out a block's weights once, the other functions add it to a graph.
 
-// a feature map whose statistics somebody will want; both are lazy
+// a feature map and its statistics, for a group norm; both are lazy
 NormInput with_moments(Graph& g, FeatureMap x);
 
 // h = conv1(silu(norm1(x))) + shift;  y = conv2(silu(norm2(h))) + shortcut(x)
@@ -27,7 +27,7 @@ ResnetBlock declare_resnet(NetworkWeights& weights, const std::string& name, con
 [[nodiscard]] FeatureMap resnet(Graph& g, const NetworkWeights& weights, const ResnetBlock& block, NormInput x,
                                 NormInput x2, const ChannelShift& shift = {});
 
-// y = conv(x) + shift + residual, in the way that the device likes best
+// y = conv(x) + shift + residual, by Winograd's algorithm or directly, whichever the device prefers
 [[nodiscard]] FeatureMap convolve(Graph& g, const NetworkWeights& weights, const Layer& layer, FeatureMap x,
                                   ConvOptions options = {}, const ConvAddends& addends = {});
 // y = x w^T + b

@@ -18,7 +18,7 @@ class Unet {
     ~Unet();
     static Result<std::unique_ptr<Unet>> load(Device& device, const UnetConfig& config, const Checkpoint& weights,
                                               DType precision);
-    // lays out the weights without loading anything: for planning memory
+    // lays out the weights without loading them, to plan memory
     static std::unique_ptr<Unet> plan(const UnetConfig& config, DType precision, const DeviceLimits& limits);
 
     const UnetConfig& config() const;
@@ -26,14 +26,14 @@ class Unet {
     uint64_t parameters() const;
     uint64_t device_bytes(const DeviceLimits& limits) const; // of the weights
 
-    // what depends on the timestep only: a row per timestep, once per schedule
+    // embeddings of the timesteps, a row each; run once per schedule
     uint32_t time_width() const;
     [[nodiscard]] Tensor time_table(Graph& g,
                                     Tensor timesteps,                // [T, 1] fp32 array
                                     Tensor class_labels = {}) const; // [T] u32, with num_class_embeds
                                                                      // -> [T, time_width] fp32
 
-    // keys and values of every cross-attention; once per text
+    // keys and values of every cross-attention; run once per text
     uint32_t context_width() const;                                     // 0: none
     [[nodiscard]] Tensor context_table(Graph& g, Tensor context) const; // [rows, cross_attention_dim] in the network's
                                                                         // precision -> [rows, context_width] likewise

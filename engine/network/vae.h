@@ -18,7 +18,7 @@ class Vae {
     ~Vae();
     static Result<std::unique_ptr<Vae>> load(Device& device, const VaeConfig& config, const Checkpoint& weights,
                                              DType precision);
-    // lays out the weights without loading anything: for planning memory
+    // lays out the weights without loading them, to plan memory
     static std::unique_ptr<Vae> plan(const VaeConfig& config, DType precision, const DeviceLimits& limits);
 
     const VaeConfig& config() const;

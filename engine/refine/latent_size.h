@@ -8,8 +8,8 @@
 
 namespace semrover {
 
-// A picture and its latent. The latent's pixels are blocks of downscale x downscale; a picture that does not fill the
-// last blocks is continued by repeating its last column and row, and cut again after decoding.
+// Sizes of a picture and its latent, whose pixels are blocks of downscale x downscale. A picture that does not fill its
+// last blocks is padded by repeating its last column and row, and cropped after decoding.
 struct LatentSize {
     uint32_t image_width = 0, image_height = 0; // pixels
     uint32_t downscale = 8;

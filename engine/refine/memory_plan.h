@@ -6,14 +6,14 @@
 
 namespace semrover {
 
-// which networks are on the device at a time
+// Which networks are on the device at the same time.
 enum class MemoryPolicy {
     resident, // both for the whole run, and the memory of one kind of work at a time; frames are ready one by one
     staged,   // the VAE encodes every buffer, then the UNet denoises every frame, then the VAE decodes every latent
 };
 std::string_view policy_name(MemoryPolicy policy);
 
-// what a run has to do with the pictures of one size
+// The work of a run on pictures of one size.
 struct RendererWork {
     LatentSize size;
     bool encode = true, denoise = true, decode = true;
@@ -31,7 +31,7 @@ struct RendererBytes {
     uint64_t peak(MemoryPolicy policy) const;
 };
 
-// what the parts will take, from graphs without memory. The networks may have been made by Unet::plan and Vae::plan.
+// Plans the bytes of each part, without allocating. Unet::plan and Vae::plan are enough for the networks.
 struct RendererNetworks {
     const Unet& unet;
     const Vae& vae;
@@ -48,8 +48,8 @@ struct MemoryPlan {
     RendererBytes parts;
 };
 
-// the first policy that fits `budget` (0: any does) beside what is allocated already.
-// Errors: out_of_memory, with what each policy would take
+// Returns the first policy that fits `budget` (0: no budget) beside the bytes that are `allocated` already.
+// Errors: out_of_memory, with the bytes of each policy
 Result<MemoryPlan> plan_memory(RendererBytes parts, uint64_t allocated, uint64_t budget);
 
 } // namespace semrover

@@ -11,24 +11,23 @@
 
 namespace semrover {
 
-// what decides the noise on a pixel of a latent, beside seed, chain and draw
+// Keys the noise of a pixel of a latent, with seed, chain and draw.
 struct NoiseKey {
     uint32_t pixel = 0, frame = 0;
 
     auto operator<=>(const NoiseKey&) const = default;
 };
 
-// Noise that stays on surfaces while a camera drives past them, so that what a renderer makes of it stays, too. A pixel
-// of the latent takes the key of that pixel of the frame before where its surface (at the centre of its block of the
-// picture; infinitely far away without a depth) was seen. Every key goes to one pixel at most, of several to the
-// nearest (of equally near ones the first), and what is left gets new ones: within a frame normals stay independent.
-// After Chang et al., How I Warped Your Noise (ICLR 2024) and Burgert et al., Go-with-the-Flow (arXiv 2501.08331), who
-// blend the noise of several pixels.
+// Keeps noise on surfaces while a camera moves past them, so that what a renderer makes of it flickers less
+// (docs/method.md §6.2). A pixel of the latent gets the key of the pixel of the frame before that saw the same surface:
+// at the centre of its block of the picture, infinitely far away without a depth. A key goes to at most one pixel: of
+// several to the nearest, of equally near ones to the first. The other pixels get new keys. So normals within a frame
+// stay independent.
 class NoiseTrail {
   public:
     explicit NoiseTrail(const LatentSize& size) : size_(size) {}
 
-    // the next frame; depth: [image_height, image_width] millimetres as `render` writes it, 0 and 65535: nothing
+    // Computes the keys of the next frame. depth: [image_height, image_width] millimetres, 0 and 65535: nothing
     void follow(const CameraFrame& camera, const ImageGray16& depth);
 
     uint32_t frames() const { return frames_; }              // followed so far; the next one's number

@@ -10,14 +10,14 @@
 
 namespace semrover {
 
-// how the network sees tokens that are given, at each step
+// How the network sees known tokens at each step.
 enum class KnownTokens {
-    noised, // with noise of the level that the others have, as in RePaint
-    clean,  // as they are: for a network that was trained to go on from such (tools/train, known_share)
+    noised, // with the current step's noise, as in RePaint
+    clean,  // without noise: for a network that was trained that way (tools/train, known_share)
 };
 
-// RePaint, arXiv 2201.09865: every jump_length steps, go back up jump_length steps by adding noise and come down again,
-// jump_n_sample times in all. jump_length 0 or jump_n_sample 1 never goes back.
+// RePaint, arXiv 2201.09865: every jump_length steps, add noise to get back up jump_length steps, and denoise them
+// again, jump_n_sample times in all. With jump_length 0 or jump_n_sample 1 there are no jumps.
 struct RepaintOptions {
     int jump_length = 0;   // 0..10000
     int jump_n_sample = 1; // 1..10000
@@ -52,7 +52,7 @@ struct PlanRow {
     uint32_t timestep_index = 0; // into SamplingPlan::timesteps; in an undo row, of the timestep gone up to
 };
 
-// everything a sampling run does, row by row; one plan serves any number of cells
+// A whole sampling run, row by row. One plan is used for any number of cells.
 struct SamplingPlan {
     std::vector<PlanRow> rows;
     std::vector<double> timesteps; // distinct ones, in the order they are first visited

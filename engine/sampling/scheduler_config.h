@@ -19,8 +19,8 @@ enum class Prediction { epsilon, sample, v_prediction };
 enum class TimestepSpacing { leading, trailing, linspace };
 enum class VarianceType { fixed_small, fixed_large };
 
-// What a diffusers scheduler_config.json says. Every sampler reads the first group; clip_sample holds for all of them,
-// though diffusers' multistep and Euler classes have no such field.
+// The fields of a diffusers scheduler_config.json. Every sampler reads the first group, clip_sample included, although
+// diffusers' multistep and Euler classes have no such field.
 struct SchedulerConfig {
     Sampler sampler = Sampler::ddpm;
     int num_train_timesteps = 1000; // 1..10000
@@ -49,16 +49,16 @@ struct SchedulerConfig {
 Result<Sampler> sampler_from_name(std::string_view name);
 std::string_view sampler_name(Sampler sampler);
 
-// A scheduler_config.json, already parsed (defaults are those of its diffusers class), or as text, where the -Infinity
-// that diffusers writes for lambda_min_clipped is understood. The class is "_class_name", or "type" in golden cases.
-// With `sampler`, that sampler runs over the file's noise schedule, whatever its class (SD 1.5 folders name PNDM).
-// Fields nobody knows are named in `warnings`. Bad input, by field name: a wrong type, a value out of bounds, or one
-// that the engine does not implement (trained_betas, thresholding, rescale_betas_zero_snr, other classes, ...).
+// Reads a scheduler_config.json: parsed, or as text, in which diffusers may write -Infinity for lambda_min_clipped.
+// Defaults are those of its diffusers class, "_class_name" ("type" in golden cases). `sampler` overrides the class and
+// keeps the noise schedule (SD 1.5 folders name PNDM). `warnings` gets a line for each unknown field. Bad input, by
+// field name: a wrong type, a value out of bounds, or one that the engine does not implement (trained_betas,
+// thresholding, rescale_betas_zero_snr, other classes, ...).
 Result<SchedulerConfig> scheduler_config_from_json(const nlohmann::json& json, std::vector<std::string>& warnings,
                                                    std::optional<Sampler> sampler = {});
 Result<SchedulerConfig> scheduler_config_from_text(std::string_view text, std::vector<std::string>& warnings,
                                                    std::optional<Sampler> sampler = {});
-// the file's name starts its errors and warnings
+// Errors and warnings begin with the file's name.
 Result<SchedulerConfig> read_scheduler_config(const Path& path, std::vector<std::string>& warnings,
                                               std::optional<Sampler> sampler = {});
 

@@ -8,7 +8,7 @@
 
 namespace semrover {
 
-// noise keys of what comes before a plan's rows, whose draws count from 0 up to kMaxPlanRows
+// draws of the noise before a plan's first row; the rows' own are 0 up to kMaxPlanRows
 constexpr uint32_t kFirstDraw = 0xfffff;         // the first noise
 constexpr uint32_t kPreviousFrameDraw = 0xffffe; // the noise on the frame before
 

@@ -16,7 +16,7 @@ struct WorldSphere {
     double radius = 0; // metres
 };
 
-// which cells: all conditions that are given hold. A cell lies in a box or sphere when its centre does, the surface
+// Selects the cells for which all given conditions hold. A cell is in a box or sphere when its centre is, surface
 // included.
 struct CellSelection {
     std::optional<uint8_t> label;

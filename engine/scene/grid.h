@@ -39,10 +39,10 @@ std::array<float, 3> cell_center(const Cell& cell, float voxel_size);
 // index of a cell, by binary search; none if the grid does not have it
 std::optional<size_t> find_cell(const VoxelGrid& grid, const Cell& cell);
 
-// one more cell at the end of `to`: cell `index` of `from` with what belongs to it; both have points or both have none
+// Appends cell `index` of `from`, with its label and points, to `to`. Both have points or both have none.
 void append_cell(VoxelGrid& to, const VoxelGrid& from, size_t index);
 
-// puts cells (and what belongs to them) in order; for grids that were just read or made. Array sizes must agree.
+// Sorts the cells of a grid, with their labels and points. Array sizes must agree.
 void sort_cells(VoxelGrid& grid);
 
 // bad_input, with `where` in front, for: no cells, arrays that disagree in size, a voxel size outside 1 mm..1 km, cells
@@ -50,10 +50,10 @@ void sort_cells(VoxelGrid& grid);
 // more than 1 mm outside their cell
 Status check_grid(const VoxelGrid& grid, std::string_view where);
 
-// a .sgrid file, cells in any order; without `generated`, cells with points count as generated
+// Reads a .sgrid file, with cells in any order. Without `generated`, cells with points count as generated.
 Result<VoxelGrid> read_grid(const Path& path);
 
-// the same grid gives the same bytes; atomic; refuses what check_grid refuses
+// Writes a .sgrid file atomically; the same grid gives the same bytes. Refuses what check_grid refuses.
 Status write_grid(const Path& path, const VoxelGrid& grid);
 
 } // namespace semrover

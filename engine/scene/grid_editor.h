@@ -29,15 +29,14 @@ struct EditOperation {
     bool keep_points = false;                // of the stamp or the copy; else they are generated anew
 };
 std::string_view operation_name(EditOperation::Kind kind); // erase is called "delete"
-// usage: what the operation needs is missing, or something has no meaning for it; `where` says which operation it is
+// usage: something that the operation needs is missing, or does not apply to it; `where` names the operation
 Status check_operation(const EditOperation& operation, std::string_view where);
 
 // road, sidewalk, terrain and road-lane: what things stand on
 bool is_ground(uint8_t label);
 
-// what operations made of a grid. Cells that are `touched` have another label, other occupancy, or points that came
-// with a stamp; `kept` are those with such points. All sorted. Cells that changed, and came without points, have
-// generated = 0 and zeros for points.
+// The grid after an edit. `touched` cells have another label, other occupancy, or points of a stamp; `kept` cells are
+// those with points of a stamp. Both are sorted. Changed cells without points have generated = 0 and zeros.
 struct EditedGrid {
     VoxelGrid grid;
     std::vector<Cell> touched, kept;

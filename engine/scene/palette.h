@@ -16,7 +16,7 @@ struct SemanticClass {
 };
 
 constexpr size_t kClassCount = 20;
-constexpr uint8_t kNoLabel = 255; // of what nobody has said the class of
+constexpr uint8_t kNoLabel = 255; // no class is known
 
 // the labels of a grid, by number: Cityscapes' train ids and colours (0-18), and lane markings
 constexpr std::array<SemanticClass, kClassCount> kPalette = {{

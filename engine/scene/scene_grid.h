@@ -9,7 +9,7 @@
 
 namespace semrover {
 
-// how files of other programs become a grid; a format takes what concerns it
+// Options for reading other programs' files as a grid; each format uses those that concern it.
 struct SceneGridOptions {
     Path map;                             // JSON that says what source labels are (label_map.h)
     float voxel_size = 0.6f;              // metres, of the grid

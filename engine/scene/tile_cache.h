@@ -8,7 +8,7 @@
 
 namespace semrover {
 
-// where a growing world's labels come from: a folder of tiles, or one grid that is cut into tiles in memory
+// The source of a growing world's labels: a folder of tiles, or one grid that is cut into tiles in memory.
 class TileSource {
   public:
     // tile_cells: for a .sgrid; a folder has its own. Errors: bad_input
@@ -37,8 +37,8 @@ struct GrownCells {
     std::vector<uint8_t> colors;  // [cells, n, 3]
 };
 
-// The tiles around the place where a world grows: read from the output folder where they have been written before, else
-// from the source; in memory only while a window touches them.
+// The tiles around the place where a world grows. A tile is read from the output folder if it was written before, else
+// from the source; it stays in memory while a window touches it.
 class TileCache {
   public:
     TileCache(const TileSource& source, const Path& output, int points_per_voxel)
@@ -46,14 +46,14 @@ class TileCache {
     {
     }
 
-    // the cells of a window, sorted, with room for points; tiles that it does not touch are dropped
+    // Returns the cells of a window, sorted, with arrays for points. Drops the tiles that it does not touch.
     Result<VoxelGrid> window(const CellWindow& window);
-    // sets points, generated = 1, for cells of tiles that are in memory, and writes these tiles. Doing it twice gives
-    // the same files. note: only after `grown` is safe on the disk, or a killed run would not know it is there.
+    // Sets points and generated = 1 for cells of tiles in memory, and writes these tiles. Doing it twice gives the same
+    // files. note: call it only when `grown` is safe on the disk; else a killed run would not know of it.
     Status store(const GrownCells& grown);
-    // the tiles that hold these cells, into memory
+    // Loads the tiles that hold these cells.
     Status bring(const std::vector<Cell>& cells);
-    // only in memory: for a dry run
+    // The same without writing, for a dry run.
     Status mark(const GrownCells& grown);
 
     size_t cells_in_memory() const;

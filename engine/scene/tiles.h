@@ -62,7 +62,7 @@ class TileFolder {
     std::map<TileIndex, uint64_t> tiles_;
 };
 
-// what index.json says beside the list; written last, so that a folder without it is not whole
+// The fields of index.json beside the list of tiles. It is written last, so a folder without it is not whole.
 struct TileFolderInfo {
     float voxel_size = 0;
     int32_t tile_cells = 0;
@@ -82,7 +82,7 @@ void append_cells(VoxelGrid& grid, const VoxelGrid& part);
 // number of cells of a .sgrid, from its header
 Result<uint64_t> cells_in_file(const Path& path);
 
-// a .sgrid, or all tiles of a folder
+// Reads a .sgrid, or all tiles of a folder.
 Result<VoxelGrid> read_grid_or_tiles(const Path& path);
 
 } // namespace semrover

@@ -22,14 +22,14 @@ namespace semrover {
 //         for (uint32_t region : graph.take(batch)) { ...; graph.done(region); }
 class RegionGraph {
   public:
-    // generated [cell_count] or empty: cells with a value other than 0 are known from the start and nobody's target.
-    // A caller's bug: a member that is not below cell_count, or a generated of another length.
+    // generated [cell_count] or empty: cells with a value other than 0 are known from the start and no region's target.
+    // Asserts that members are below cell_count and that `generated` has the right length.
     RegionGraph(const Regions& regions, size_t cell_count, std::span<const uint8_t> generated = {});
 
-    // up to `limit` ready regions, lowest first; each is handed out once. Empty with limit > 0 only while regions that
-    // were taken are not done, or when all is finished.
+    // Returns up to `limit` ready regions, lowest first, each only once. Empty with limit > 0 only while regions that
+    // were taken are not done, or when all are finished.
     std::vector<uint32_t> take(size_t limit);
-    // a region that was taken has written its targets
+    // Call when a region that was taken has written its targets.
     void done(uint32_t region);
     // a region that was taken will not be worked on now: it is ready again
     void give_back(uint32_t region);

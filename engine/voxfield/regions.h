@@ -11,7 +11,7 @@
 
 namespace semrover {
 
-// what happens to a seed whose region holds too few uncovered cells
+// What to do with a seed whose region has too few uncovered cells.
 enum class RegionStrategy {
     paper,    // stop there, as Algorithm 1 is printed; most of a scene may stay uncovered
     complete, // set it aside; when no other seed is left, take the remaining cells nearest first, with their whole

@@ -8,7 +8,7 @@
 
 namespace semrover {
 
-// The neighbourhood of what is to be generated, cut out of a grid that may be much larger.
+// The cells to generate and the known cells around them, cut out of a grid that may be much larger.
 struct SubGrid {
     VoxelGrid grid;              // targets have generated = 0, the known cells around them 1
     std::vector<uint32_t> cells; // where they are in the whole
@@ -20,11 +20,11 @@ struct SubGrid {
 // extract_regions
 Result<SubGrid> cut_sub_grid(const VoxelGrid& whole, std::span<const uint32_t> targets, int region_size);
 
-// points and colours of the targets that have them now go to the whole, and nothing else; a whole without points gets
-// zeros for the rest
+// Copies the points and colours of the targets that have them back into the whole, and nothing else. If the whole has
+// no points, its other cells get zeros.
 void put_back(VoxelGrid& whole, const SubGrid& part, std::span<const uint32_t> targets);
 
-// arrays for n points a cell, if the grid has none: zeros, and generated = 0
+// Allocates the arrays for n points a cell, if the grid has none: zeros, generated = 0.
 void make_room_for_points(VoxelGrid& grid, int points_per_voxel);
 
 } // namespace semrover

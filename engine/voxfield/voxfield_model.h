@@ -8,7 +8,7 @@
 
 namespace semrover {
 
-// model_index.json's "defaults": what a command uses when no option says otherwise
+// "defaults" of model_index.json: what a command uses where no option overrides it
 struct VoxfieldDefaults {
     int num_inference_steps = 50;
     float guidance_scale = 4;
@@ -16,7 +16,7 @@ struct VoxfieldDefaults {
     RepaintOptions repaint;
 };
 
-// a model folder's description; weights are read by Transformer::load
+// A model folder's configs, without the weights: Transformer::load reads those.
 struct VoxfieldModel {
     Path folder;
     Path transformer; // the component's folder

@@ -16,23 +16,23 @@ namespace semrover {
 
 using Path = std::filesystem::path;
 
-// false also where the answer cannot be had
+// false when it is absent, or cannot be examined
 bool is_there(const Path& path);
 bool is_file(const Path& path); // a regular one, or a link to one
 bool is_folder(const Path& path);
 
-// with those above it; nothing to do where it is there
+// Makes a folder and those above it; it may exist.
 Status make_folder(const Path& path);
 
-// the whole of a regular file; bad_input when it is missing, unreadable, a directory, a device or a pipe, or longer
-// than max_bytes. Nothing is allocated before the length is known to fit.
+// Reads a whole regular file. The length is checked before anything is allocated. bad_input: it is missing,
+// unreadable, a directory, a device or a pipe, or longer than max_bytes.
 Result<std::vector<std::byte>> read_file(const Path& path, uint64_t max_bytes);
 Result<std::string> read_text_file(const Path& path, uint64_t max_bytes);
 
-// a file that appears whole or not at all: written under a temporary name in the same folder, flushed to the disk,
-// renamed over `path`, the folder flushed. Dropped without commit(), or after any error, it leaves nothing behind and
-// what was at `path` before is intact (a process that is killed leaves a `.semrover-*.tmp`). Whether an existing file
-// may be replaced is the caller's question.
+// A file that appears whole or not at all. It is written under a temporary name in the same folder; commit() flushes
+// it to the disk, renames it over `path` and flushes the folder. Without commit(), or after an error, nothing is left
+// and the old file is intact. A process that is killed leaves a `.semrover-*.tmp`. The caller decides whether an
+// existing file may be replaced.
 class AtomicFile {
   public:
     // bad_input when the folder is missing or not writable, or `path` is a folder or a device
@@ -42,7 +42,7 @@ class AtomicFile {
     AtomicFile& operator=(AtomicFile&& other) noexcept;
     ~AtomicFile();
 
-    // appends; bad_input when the disk is full or fails, and the file is then given up
+    // Appends. bad_input when the disk is full or fails; the file is then discarded.
     Status write(std::span<const std::byte> bytes);
     Status write(std::string_view text) { return write(std::as_bytes(std::span(text.data(), text.size()))); }
 
@@ -60,12 +60,12 @@ class AtomicFile {
 Status write_file_atomically(const Path& path, std::span<const std::byte> bytes);
 Status write_file_atomically(const Path& path, std::string_view text);
 
-// below `folder`: what processes that were killed were writing. For folders in which nobody else writes meanwhile
+// Removes what killed processes were writing below `folder`. Only where nobody else writes at the same time.
 void remove_temporary_files(const Path& folder);
 
-// a regular file mapped for reading. Its length is fixed when it is opened.
-// note: another process that truncates the file makes an access past the new end raise SIGBUS, so files are mapped
-// only from storage that others do not write to; replace a file by renaming, as AtomicFile does.
+// A regular file mapped for reading. Its length is fixed when it is opened.
+// note: if another process truncates the file, an access past the new end raises SIGBUS. Map only files that others do
+// not write to; replace a file by renaming, as AtomicFile does.
 class MappedFile {
   public:
     static Result<MappedFile> open(const Path& path);

@@ -21,7 +21,7 @@ class Hash {
     Hash(const Hash&) = delete;
     Hash& operator=(const Hash&) = delete;
 
-    // the length goes in too, so that pieces cannot run into each other
+    // hashes the length, too, so that ("ab", "c") and ("a", "bc") differ
     void add(std::span<const std::byte> bytes);
     void add(std::string_view text) { add(std::as_bytes(std::span(text.data(), text.size()))); }
     uint64_t value() const;

@@ -14,8 +14,8 @@ namespace semrover {
 
 using Json = nlohmann::json;
 
-// what a strict reader of events derives from: the first refusal is kept and stops the parser. nlohmann's events; its
-// parser keeps no call stack, so depth costs nothing until a handler allows it.
+// Base of strict readers of JSON events. The first refusal stops the parser and is kept. The events are nlohmann's;
+// its parser keeps no call stack, so depth costs nothing until a handler allows it.
 class JsonEvents : public nlohmann::json_sax<Json> {
   public:
     bool binary(binary_t&) override { return refuse("found binary data"); } // never in text
@@ -30,8 +30,8 @@ class JsonEvents : public nlohmann::json_sax<Json> {
     std::string refusal_;
 };
 
-// runs the events of `text` (a whole document: nothing but white space around one value) through `events`; bad_input
-// with `where` in front for a byte order mark, a NUL byte, broken UTF-8 or syntax, and for what `events` refuses
+// Parses `text`, a whole document (one value, white space around it), and calls `events` for each event. bad_input,
+// with `where` in front: a byte order mark, a NUL byte, broken UTF-8 or syntax, and what `events` refuses.
 Status parse_json_events(std::string_view text, std::string_view where, JsonEvents& events);
 
 struct JsonLimits {
@@ -40,7 +40,7 @@ struct JsonLimits {
     uint32_t values = 2u << 20; // arrays, objects, strings, numbers, ... together
 };
 
-// a document as a value. On top of the syntax: duplicate keys at any level and numbers beyond double are refused.
+// Parses a document into a value. bad_input as above, and for duplicate keys at any level and numbers beyond double.
 Result<Json> parse_json(std::string_view text, std::string_view where, const JsonLimits& limits = {});
 Result<Json> read_json(const Path& path, const JsonLimits& limits = {});
 

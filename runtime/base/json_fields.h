@@ -12,14 +12,15 @@
 
 namespace semrover {
 
-// Reads the fields of a JSON object into variables that hold the defaults, with bounds; remembers which fields it was
-// asked for and the first that is wrong. null stands for "not given", as in diffusers' configs.
+// Reads the fields of a JSON object into variables that hold the defaults, with bounds. A field that is absent or null
+// leaves its variable as it is, as in diffusers' configs. finish() reports the first field that was wrong, and the
+// fields that nothing read.
 class JsonFields {
   public:
     template <typename T>
     using Names = std::initializer_list<std::pair<const char*, T>>;
 
-    // `where` starts each message: "scheduler config". Something else than an object is refused by finish().
+    // `where` starts each message: "scheduler config". finish() refuses anything but an object.
     JsonFields(const Json& object, std::string where);
 
     void flag(const char* name, bool& out);
@@ -67,7 +68,7 @@ class JsonFields {
         refuse(name, expected(names));
     }
 
-    // a list of names, each standing for a value
+    // a list of names, each of which means a value
     template <typename T>
     void choices(const char* name, Names<T> names, std::vector<T>& out)
     {
@@ -88,18 +89,18 @@ class JsonFields {
             refuse(name, "a list of " + expected(names));
     }
 
-    // a feature of the file's origin that only this value (or a list of nothing else) leaves out
+    // a feature that the engine lacks: only this value, or a list of nothing else, is accepted
     void only(const char* name, const Json& supported);
     void ignore(const char* name) { find(name); }
     void ignore(std::initializer_list<const char*> names);
-    // a field that the origin lets be null, with a meaning of its own
+    // refuses null, for fields where it has a meaning of its own
     void refuse_null(const char* name, std::string_view expected);
 
     const Json* find(const char* name); // null when absent or null
     void refuse(const char* name, std::string_view expected);
     bool good() const { return !error_; }
 
-    // bad_input for the first field that was wrong; else names in `warnings` what nobody asked for
+    // bad_input for the first field that was wrong; else adds a warning for each field that was not read
     Status finish(std::vector<std::string>& warnings) const;
 
   private:

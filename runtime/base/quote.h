@@ -9,8 +9,8 @@
 
 namespace semrover {
 
-// text that came from a file, made fit for one line of a message or a terminal: control characters and bytes that are
-// not UTF-8 become \xNN, and what exceeds `limit` bytes is replaced by "..."
+// Makes text of a file printable in one line of a message or a terminal: control characters and bytes that are not
+// UTF-8 become \xNN, and what exceeds `limit` bytes becomes "...".
 std::string printable(std::string_view text, size_t limit = 200);
 
 // the same between single quotes

@@ -98,7 +98,7 @@ std::vector<T> elements(const SafetensorsSet& file, std::string_view name)
 // index of the first element that is NaN or infinite; none for integers. `bytes` may be misaligned.
 std::optional<uint64_t> first_non_finite(std::span<const std::byte> bytes, DType dtype);
 
-// an error that names the first tensor with a NaN or infinity and where in it
+// bad_input for the first tensor with a NaN or infinity, with its index
 Status check_finite(const SafetensorsSet& set);
 Status check_finite(const SafetensorsSet& set, const TensorInfo& tensor);
 
@@ -120,7 +120,7 @@ struct TensorStream {
     std::string name;
     DType dtype;
     std::vector<uint64_t> shape;
-    // what it returns is valid until the next tensor is asked for; it may lie in `scratch`
+    // the bytes are valid until the next call for any tensor; they may be in `scratch`
     std::function<Result<std::span<const std::byte>>(std::vector<std::byte>& scratch)> bytes;
 };
 Status stream_safetensors(const Path& path, std::span<const TensorStream> tensors,

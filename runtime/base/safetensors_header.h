@@ -40,7 +40,7 @@ struct TensorInfo {
     uint64_t elements() const { return bytes() / dtype_bytes(dtype); }
 };
 
-// a tensor whose dtype the engine has no use for (F8_E4M3, C64, or one nobody defined): its range is checked, it can be
+// a tensor whose dtype the engine does not use (F8_E4M3, C64, or an unknown one): its range is checked, it can be
 // listed, it cannot be read
 struct UnsupportedTensor {
     std::string name;

@@ -13,7 +13,7 @@ Status begin_commands(VkCommandBuffer commands, bool once);
 
 // every shader write before is visible to every shader access after
 void record_barrier(VkCommandBuffer commands);
-// the same at the end of a submit, for whatever comes next: shaders, copies, the host
+// the same at the end of a submit: what follows may be shaders, copies or the host
 void record_final_barrier(VkCommandBuffer commands);
 // with the barrier that lets shaders, copies and the host follow
 void record_copy(VkCommandBuffer commands, VkBuffer from, uint64_t from_at, VkBuffer to, uint64_t to_at,

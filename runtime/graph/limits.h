@@ -11,7 +11,7 @@ namespace semrover {
 
 enum class DeviceType { cpu, integrated, discrete, other };
 
-// what the graph compiler must know of a device; plain data, so that it can be tested without one
+// What the graph compiler knows of a device: plain data, so that it is tested without one.
 struct DeviceLimits {
     DeviceType type = DeviceType::cpu;
     uint32_t subgroup_size = 8;

@@ -77,7 +77,7 @@ Status order(Plan& plan);                                     // levels from acc
 // do the memory ranges of two bindings overlap, after placement?
 bool overlaps(const Plan& plan, const PassBinding& a, const PassBinding& b);
 
-// variant of `kernel` that the device should run: forced, else cpu / simt by device type, among those its limits allow
+// The variant of `kernel` for a device, among those its limits allow: the forced one, else cpu or simt by device type.
 const KernelVariant* choose_variant(const Kernel& kernel, const DeviceLimits& limits);
 
 } // namespace semrover
