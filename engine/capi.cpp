@@ -3,6 +3,7 @@
 // the C interface over the engine: copies structures within their sizes, turns errors and exceptions into statuses
 #include "engine/semrover.h"
 
+#include "runtime/base/diagnostics.h"
 #include "runtime/device/device.h"
 #include "runtime/device/physical_device.h"
 
@@ -195,6 +196,11 @@ size_t sr_last_error(const sr_context* context, char* buffer, size_t size)
         buffer[count] = 0;
     }
     return text.size();
+}
+
+void sr_set_diagnostic_callback(void (*callback)(void* user, const char* line), void* user)
+{
+    set_diagnostic_callback(callback, user);
 }
 
 sr_status sr_list_devices(sr_device_info* devices, uint32_t* count)

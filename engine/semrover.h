@@ -49,6 +49,12 @@ const char* sr_status_name(sr_status status); /* "SR_ERR_USAGE"; "unknown" for o
  * with 0. */
 size_t sr_last_error(const sr_context* context, char* buffer, size_t size);
 
+/* Lines that no call returns: of the validation that sr_context_desc asks for, and of a failed assertion before the
+ * process ends. The library itself prints nothing. The callback counts for the whole process, runs on the thread that
+ * has something to say, one line at a time, and must not call the library. NULL, as at the beginning: lines are
+ * dropped. */
+void sr_set_diagnostic_callback(void (*callback)(void* user, const char* line), void* user);
+
 typedef struct sr_device_info {
     uint32_t struct_size;
     uint32_t index; /* for sr_context_desc.device */
@@ -84,7 +90,7 @@ typedef struct sr_vulkan_device {
 
 typedef struct sr_context_desc {
     uint32_t struct_size;
-    uint32_t validation; /* 1: Khronos validation, messages on stderr; not with a host's device */
+    uint32_t validation; /* 1: Khronos validation, see sr_set_diagnostic_callback; not with a host's device */
     const void* next;
     const char* device;             /* NULL: the best; an index, or a part of a name */
     const sr_vulkan_device* vulkan; /* not NULL: the host's, instead of one of our own */

@@ -123,6 +123,11 @@ static void makes_a_context_of_its_own(void)
     sr_context_destroy(context);
 }
 
+static void print_line(void* user, const char* line)
+{
+    fprintf((FILE*)user, "%s\n", line);
+}
+
 static int locks, unlocks;
 static void lock_queue(void* user)
 {
@@ -208,6 +213,7 @@ static void lends_its_own_device(void)
 
 int main(void)
 {
+    sr_set_diagnostic_callback(print_line, stderr);
     knows_its_version();
     lists_devices();
     writes_no_more_than_an_old_program_has();

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/format/camera_path.h"
 #include "engine/job/drawing.h"
+#include "engine/job/generation.h"
 #include "engine/job/refinement.h"
 #include "tests/renderer_folders.h"
 
@@ -143,6 +144,41 @@ TEST_F(JobRefinement, refinements_take_turns_on_one_device_and_do_not_know_of_ea
     EXPECT_TRUE(second == results("b"));
 }
 
+TEST_F(JobRefinement, a_generation_takes_turns_with_it_on_one_device)
+{
+    const auto expected = whole(options_of_grid("whole"), "whole");
+    GenerationOptions generation;
+    generation.model = SEMROVER_SOURCE_DIR "/tests/golden/sampling_ddpm/model";
+    generation.steps = 2;
+    generation.region_size = 40;
+    generation.coverage_threshold = 12;
+    const auto begin_to = [&](const char* output) {
+        GenerationRequest request;
+        request.settings = *resolve_generation(generation);
+        request.output = folder_ / output;
+        VoxelGrid labels = street();
+        labels.points.clear();
+        labels.colors.clear();
+        labels.generated.clear();
+        auto job = begin_generation(device(), std::move(labels), request, {});
+        EXPECT_TRUE(job) << job.error().message;
+        return std::move(*job);
+    };
+    const size_t generation_steps = run(*begin_to("alone.sgrid"), JobBudget::one_submit());
+    ASSERT_GT(generation_steps, kFrames * (kSteps + 3)); // so that the turns reach every step of the refinement
+    const auto a = begin_to("turns.sgrid");
+    const auto b = begin(options_of_grid("turns"));
+    for (bool a_done = false, b_done = false; !a_done || !b_done;) {
+        if (!a_done)
+            a_done = *a->step(JobBudget::one_submit());
+        if (!b_done)
+            b_done = *b->step(JobBudget::one_submit());
+    }
+    ASSERT_TRUE(a->finish() && b->finish());
+    EXPECT_EQ(contents(folder_ / "alone.sgrid"), contents(folder_ / "turns.sgrid"));
+    EXPECT_TRUE(expected == results("turns"));
+}
+
 TEST_F(JobRefinement, a_job_that_is_given_up_at_any_step_is_begun_again_and_gives_the_same_bytes)
 {
     const auto expected = whole(options_of_grid("whole"), "whole");
@@ -213,6 +249,33 @@ TEST_F(JobRefinement, where_memory_is_short_everything_is_drawn_before_and_the_b
     EXPECT_LT(tight["planned_device_bytes"], roomy["planned_device_bytes"]);
     EXPECT_EQ(stages, (std::vector<std::string>{"render", "refine"}));
     EXPECT_TRUE(results("roomy") == results("tight"));
+}
+
+TEST_F(JobRefinement, where_drawing_needs_more_than_is_left_the_rest_is_drawn_before_and_the_bytes_are_the_same)
+{
+    const auto of_two_lenses = [&](std::string_view output) {
+        RefinementOptions o = options_of_grid(output);
+        o.frame_noise = FrameNoise::fresh;
+        o.path->frames.back().intrinsics.model = CameraModel::fisheye; // drawn by another rasterizer
+        return o;
+    };
+    Json one_lens, two_lenses;
+    run(*begin(options_of_grid("one_lens")), JobBudget::unlimited(), &one_lens);
+    run(*begin(of_two_lenses("roomy")), JobBudget::unlimited(), &two_lenses);
+    DeviceOptions limited; // the networks fit beside one of the rasterizers, and not quite beside both
+    limited.max_bytes = two_lenses["peak_device_bytes"].get<uint64_t>() - 4096;
+    ASSERT_LT(one_lens["planned_device_bytes"], limited.max_bytes);
+    const auto small = std::move(*Device::create(limited));
+    std::vector<std::string> planned;
+    RefinementCallbacks callbacks;
+    callbacks.planned = [&](const Refinement&, const MemoryPlan& plan) {
+        planned.emplace_back(policy_name(plan.policy));
+    };
+    run(*begin(of_two_lenses("tight"), callbacks, *small), JobBudget::one_submit());
+    EXPECT_EQ(planned, (std::vector<std::string>{"resident", "resident"})); // beside the drawing, and after it
+    EXPECT_TRUE(results("roomy") == results("tight"));
+    const auto kinds = {"color", "depth", "visible", "label", "normal"};
+    EXPECT_TRUE(files_in(folder_ / "roomy" / "buffers", kinds) == files_in(folder_ / "tight" / "buffers", kinds));
 }
 
 TEST_F(JobRefinement, callbacks_tell_stages_counts_and_the_plan_and_may_refuse_the_end)

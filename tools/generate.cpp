@@ -5,6 +5,7 @@
 #include "engine/job/generation.h"
 #include "engine/job/growth.h"
 #include "runtime/base/hash.h"
+#include "tools/cli/choice.h"
 #include "tools/generation_options.h"
 #include "tools/scene_input.h"
 
@@ -27,8 +28,6 @@ Status generate_along(const GenerateArguments& o, const Globals& globals)
 {
     if (o.ply.any())
         return fail(ErrorCode::usage, "--ply and its like have no meaning with --along: convert what it writes");
-    if (o.output.empty() && !o.generation.dry_run)
-        return fail(ErrorCode::usage, "-o/--output is required");
     GrowthRequest request = o.along;
     request.generation = o.generation.options;
     request.scaffold = o.grid;
@@ -43,14 +42,13 @@ Status generate_along(const GenerateArguments& o, const Globals& globals)
 
 Status generate(const GenerateArguments& o, const Globals& globals)
 {
+    if (o.output.empty() && !o.generation.dry_run)
+        return fail(ErrorCode::usage, "-o/--output is required");
     if (!o.along.path.empty())
         return generate_along(o, globals);
     GenerationRequest request{.settings = {}, .seed = o.seed, .output = o.output, .ply = o.ply, .replace = globals.yes};
-    if (!o.generation.dry_run) {
-        if (o.output.empty())
-            return fail(ErrorCode::usage, "-o/--output is required");
+    if (!o.generation.dry_run)
         SR_CHECK(check_generation_outputs(request));
-    }
     SR_TRY(request.settings, resolve_generation(o.generation.options));
     SR_TRY(VoxelGrid grid, load_grid(o.grid, o.input, globals));
     // what another program's file became depends on options and on other files
@@ -78,13 +76,10 @@ void add_generate(CLI::App& app, const Globals& globals, Run& run)
     c->add_option("-o,--output", o->output, ".sgrid to write; OUTPUT.run beside it keeps the run's state");
     c->add_option("-s,--seed", o->seed, "noise seed");
     add_generation_options(*c, o->generation);
-    c->add_option_function<std::string>(
-         "--strategy",
-         [o](const std::string& text) {
-             o->generation.options.strategy = text == "paper" ? RegionStrategy::paper : RegionStrategy::complete;
-         },
-         "complete, or paper (Algorithm 1 as printed: may leave cells empty)")
-        ->check(CLI::IsMember({"complete", "paper"}));
+    add_choice(*c, "--strategy", {"complete", "paper"},
+               "complete, or paper (Algorithm 1 as printed: may leave cells empty)", [o](const std::string& text) {
+                   o->generation.options.strategy = text == "paper" ? RegionStrategy::paper : RegionStrategy::complete;
+               });
     c->add_option("--first-cell", o->generation.options.first_cell, "index of the cell to start from");
     c->add_option("--ply", o->ply.points, "also write the points with colour and label as PLY");
     c->add_option("--ply-3dgs", o->ply.splats_3d, "also write the splats as a 3DGS PLY");

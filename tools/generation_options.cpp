@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/generation_options.h"
 
+#include "tools/cli/choice.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/progress.h"
 #include "tools/cli/run_job.h"
@@ -53,18 +54,13 @@ void add_generation_options(CLI::App& c, GenerationArguments& a)
     c.add_option("--preset", o.preset, "fast (20 steps), standard (50, RePaint 5/2), paper (250, RePaint 10/10, DDPM)");
     c.add_option("--jump-length", o.jump_length, "RePaint: steps of a jump back");
     c.add_option("--jump-n-sample", o.jump_n_sample, "RePaint: passes over each jump");
-    c.add_option_function<std::string>(
-         "--known-tokens",
-         [&o](const std::string& text) { o.known = text == "clean" ? KnownTokens::clean : KnownTokens::noised; },
-         "how the network sees cells that are there: as the model says, or")
-        ->check(CLI::IsMember({"noised", "clean"}));
+    add_choice(c, "--known-tokens", {"noised", "clean"},
+               "how the network sees cells that are there: as the model says, or",
+               [&o](const std::string& text) { o.known = text == "clean" ? KnownTokens::clean : KnownTokens::noised; });
     c.add_option("--batch", o.batch, "regions at a time; any value gives the same bytes")->check(CLI::Range(1u, 1024u));
     c.add_option("--region-size", o.region_size, "cells of a region");
     c.add_option("--coverage-threshold", o.coverage_threshold, "new cells that a region must have");
-    c.add_option_function<std::string>(
-         "--precision", [&o](const std::string& text) { o.precision = text == "fp32" ? DType::f32 : DType::f16; },
-         "storage of weights and activations")
-        ->check(CLI::IsMember({"fp16", "fp32"}));
+    add_precision_option(c, o.precision);
     c.add_option("--profile", a.profile, "write device times as a Chrome trace");
     c.add_flag("--dry-run", a.dry_run, "only say how many regions, how much memory, how long");
 }

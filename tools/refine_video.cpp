@@ -21,6 +21,15 @@ std::vector<uint8_t> joined(std::span<const std::span<const uint8_t>> pictures, 
     return out;
 }
 
+// FILE.mp4, or FILE-CAMERA.mp4 when there are several cameras
+Path video_path(const Path& file, const std::string& camera, size_t cameras)
+{
+    if (cameras == 1)
+        return file;
+    Path path = file;
+    return path.replace_filename(fmt::format("{}-{}{}", file.stem().string(), camera, file.extension().string()));
+}
+
 Result<Video> open_video(const Path& file, const RefineChain& chain, size_t chains, uint32_t pictures, int rate)
 {
     const ImageSize& size = chain.camera.size;
@@ -56,12 +65,14 @@ Status write_chain(const RefineVideos& videos, const RefineStore& store, const R
 
 } // namespace
 
-Path video_path(const Path& file, const std::string& camera, size_t cameras)
+std::vector<Path> video_files(const RefineVideos& videos, std::span<const RefineChain> chains)
 {
-    if (cameras == 1)
-        return file;
-    Path path = file;
-    return path.replace_filename(fmt::format("{}-{}{}", file.stem().string(), camera, file.extension().string()));
+    std::vector<Path> files;
+    for (const Path& video : {videos.frames, videos.side_by_side})
+        for (const RefineChain& c : chains)
+            if (!video.empty())
+                files.push_back(video_path(video, c.camera.name, chains.size()));
+    return files;
 }
 
 Status write_videos(const RefineVideos& videos, const RefineStore& store, std::span<const RefineChain> chains)

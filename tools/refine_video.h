@@ -15,8 +15,8 @@ struct RefineVideos {
     bool any() const { return !frames.empty() || !side_by_side.empty(); }
 };
 
-// FILE.mp4, or FILE-CAMERA.mp4 when there are several cameras
-Path video_path(const Path& file, const std::string& camera, size_t cameras);
+// what write_videos will write: FILE.mp4 each, or FILE-CAMERA.mp4 when there are several cameras
+std::vector<Path> video_files(const RefineVideos& videos, std::span<const RefineChain> chains);
 
 // from the finished frames of the store
 Status write_videos(const RefineVideos& videos, const RefineStore& store, std::span<const RefineChain> chains);

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // semrover render GRID --path FILE -o DIR: splat buffers of a camera path: colour, depth, normal, label, visibility
 #include "engine/job/drawing.h"
+#include "engine/job/outputs.h"
 #include "runtime/base/quote.h"
-#include "runtime/device/profile.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/run_job.h"
 #include "tools/drive_options.h"
@@ -17,7 +17,8 @@ namespace semrover {
 namespace {
 
 struct RenderArguments {
-    std::string grid, output, video, profile;
+    Path grid, output, video;
+    std::string profile;
     DriveOptions drive;
     SceneInputOptions input;
     int frames_per_second = 10;
@@ -28,15 +29,14 @@ Status check_outputs(const RenderArguments& o, const Globals& globals)
 {
     if (o.drive.path.empty() && !o.top)
         return fail(ErrorCode::usage, "--path (a camera path) or --top is required");
-    const Path folder = o.output;
-    for (const Path& existing : {folder / "color", folder / "top.png"})
+    for (const Path& existing : {o.output / "color", o.output / "top.png"})
         if (std::filesystem::exists(existing) && !globals.yes)
             return fail(ErrorCode::usage, "{} exists; -y replaces pictures there", quote_path(existing));
-    if (!o.video.empty() && std::filesystem::exists(o.video) && !globals.yes)
-        return fail(ErrorCode::usage, "{} exists; -y replaces it", quote_path(o.video));
-    if (!o.video.empty() && o.drive.path.empty())
+    if (o.video.empty())
+        return {};
+    if (o.drive.path.empty())
         return fail(ErrorCode::usage, "--video needs --path");
-    return {};
+    return check_writable(o.video, globals.yes);
 }
 
 // of the first camera, from where the job hands pictures over
@@ -83,32 +83,26 @@ Status render(const RenderArguments& o, const Globals& globals)
 {
     SR_CHECK(check_outputs(o, globals));
     SR_TRY(DrawingOptions options, drawing_options(o, globals));
-    SR_TRY(const auto device, open_device(globals));
-    if (!o.profile.empty())
-        device->set_profile(std::make_shared<Profile>());
+    SR_TRY(const auto device, open_device(globals, o.profile));
     VideoOfFrames video;
     size_t drawn = 0;
     options.picture = [&](const CameraFrame& frame, std::span<const uint8_t> pixels) {
         ++drawn;
         return video.add(frame, pixels);
     };
-    const auto begin = [&](const JobCallbacks& callbacks) -> Result<std::unique_ptr<Job>> {
+    const auto results = run_job(globals, [&](const JobCallbacks& callbacks) -> Result<std::unique_ptr<Job>> {
         const CameraPath path = options.path;
         SR_TRY(auto job, begin_drawing(*device, std::move(options), callbacks));
         if (!o.video.empty())
             SR_CHECK(video.open(o, path.frames.front()));
         return job;
-    };
-    const auto results = run_job(globals, begin);
+    });
     if (!results && results.error().code == ErrorCode::interrupted)
         return fail(ErrorCode::interrupted, "interrupted after {} frames; they are in {}", drawn, quote_path(o.output));
     SR_CHECK(results);
     if (video.video)
         SR_CHECK(video.video->finish());
-    if (device->profile())
-        SR_CHECK(device->profile()->write(o.profile));
-    if (device->profile() && globals.verbose)
-        fmt::print(stderr, "{}", device->profile()->summary());
+    SR_CHECK(write_profile(*device, o.profile, globals));
     if (globals.json)
         fmt::print("{}\n", results->dump());
     return {};

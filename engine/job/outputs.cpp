@@ -2,12 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/outputs.h"
 
+#include "runtime/base/quote.h"
+
 namespace semrover {
 
 Status check_writable(const Path& path, bool replace)
 {
     if (std::filesystem::exists(path) && !replace)
-        return fail(ErrorCode::usage, "'{}' exists; -y replaces it", path.string());
+        return fail(ErrorCode::usage, "{} exists; -y replaces it", quote_path(path));
     return AtomicFile::create(path).map([](const AtomicFile&) {});
 }
 

@@ -148,16 +148,18 @@ class RefinementJob : public Job {
             SR_CHECK(drawing_->allocate(device_));
         }
         SR_CHECK(out_->poll());
-        SR_TRY(const bool last, drawing_->drawing.step([this](const CameraFrame& f, const SplatPixelSlots& pixels) {
-            return take(f, pixels);
-        }));
+        const auto counts = drawing_->counts;
+        const Result<bool> last = drawing_->drawing.step(
+            [this](const CameraFrame& f, const SplatPixelSlots& pixels) { return take(f, pixels); });
+        if (!last) {
+            drawing_->counts = counts; // where memory was short, the moment is drawn again as a whole
+            return tl::make_unexpected(last.error());
+        }
         if (!std::exchange(drawing_->started, true))
             SR_CHECK(try_to_refine_while_drawing());
         if (!refiner_)
-            say_drawn(last);
-        if (last)
-            end_drawing();
-        return {};
+            say_drawn(*last);
+        return *last ? end_drawing() : Status{};
     }
     Status take(const CameraFrame& frame, const SplatPixelSlots& slots)
     {
@@ -169,7 +171,7 @@ class RefinementJob : public Job {
             drawing_->first_moment.push_back(camera);
         const ImageSize size{frame.intrinsics.width, frame.intrinsics.height};
         const uint32_t number = drawing_->counts[camera]++;
-        return out_->read(slots, size, [this, camera, number](FramePixels pixels) -> Status {
+        SR_CHECK(out_->read(slots, size, [this, camera, number](FramePixels pixels) -> Status {
             const ImageGray16 depth{pixels.width, pixels.height, depth_pixels(pixels)};
             if (refiner_)
                 refiner_->give_depth(camera, depth);
@@ -177,17 +179,25 @@ class RefinementJob : public Job {
                 drawing_->first_depths.emplace_back(camera, depth);
             SR_CHECK(out_->write([folder = camera_folder(run_.path() / "buffers", camera), number,
                                   pixels = std::move(pixels)] { return write_frame_images(folder, number, pixels); }));
-            const size_t total = r_.options.path->frames.size();
-            if (++drawn_frames_ < total)
-                return {};
-            return out_->write([this, total] { return run_.append({{"rendered", total}}); });
-        });
+            ++arrived_;
+            return note_drawn();
+        }));
+        ++taken_;
+        return {};
     }
-    void end_drawing()
+    Status end_drawing()
     {
         drawn_ = true;
         if (!refiner_)
             drawing_.reset(); // else it stays as it was planned
+        return note_drawn();
+    }
+    // in the journal, behind the files of the last frame
+    Status note_drawn()
+    {
+        if (!drawn_ || arrived_ < taken_)
+            return {};
+        return out_->write([this] { return run_.append({{"rendered", r_.options.path->frames.size()}}); });
     }
     void say_drawn(bool ended)
     {
@@ -302,9 +312,9 @@ class RefinementJob : public Job {
     std::unique_ptr<BufferDrawing> drawing_; // while there is something to draw
     bool drawn_ = false, refined_ = false;   // all of it
     bool said_drawn_ = false;
-    size_t drawn_frames_ = 0;   // that arrived
-    HostBytes host_bytes_;      // of the device, before this job
-    uint64_t render_bytes_ = 0; // device memory at most while buffers were rendered
+    size_t taken_ = 0, arrived_ = 0; // frames whose pixels are on their way from the device, and there
+    HostBytes host_bytes_;           // of the device, before this job
+    uint64_t render_bytes_ = 0;      // device memory at most while buffers were rendered
 
     std::optional<RefineStore> store_;
     MemoryPlan memory_;

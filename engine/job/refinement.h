@@ -61,6 +61,9 @@ Result<Json> refinement_settings(const Refinement& r, const Device& device);
 // the memory of a run of which nothing is done yet; out_of_memory when no policy fits
 Result<MemoryPlan> plan_refinement(Device& device, const Refinement& r);
 
+// the same as figures: frames, steps, policy, planned_device_bytes, what each policy takes, bytes of both networks
+Json describe(const Device& device, const Refinement& r, const MemoryPlan& plan);
+
 struct RefinementCallbacks : JobCallbacks {
     // when what is left to do is known, before frames are refined
     std::function<void(const Refinement&, const MemoryPlan&)> planned;

@@ -237,4 +237,19 @@ Result<Json> refinement_settings(const Refinement& r, const Device& device)
                 {"quality", o.format.jpeg ? o.format.quality : 0}};
 }
 
+Json describe(const Device& device, const Refinement& r, const MemoryPlan& plan)
+{
+    Json policies;
+    for (MemoryPolicy policy : {MemoryPolicy::resident, MemoryPolicy::staged})
+        policies[std::string(policy_name(policy))] = device.allocated_bytes() + plan.parts.peak(policy);
+    return {{"frames", r.frames()},
+            {"steps", r.steps},
+            {"policy", policy_name(plan.policy)},
+            {"planned_device_bytes", plan.bytes},
+            {"policies", policies},
+            {"unet_bytes", plan.parts.unet},
+            {"vae_bytes", plan.parts.vae},
+            {"device", device.name()}};
+}
+
 } // namespace semrover

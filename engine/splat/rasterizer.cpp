@@ -179,6 +179,8 @@ Status Rasterizer::draw_together(std::span<const SplatCamera> cameras)
     std::vector<float> table(size_t(cameras_) * floats);
     for (size_t i = 0; i < cameras.size(); ++i)
         write_row(cameras[i], std::span(table).subspan(i * floats, floats));
+    if (!program_) // there was no memory for it the last time
+        SR_CHECK(build());
     for (;;) {
         SR_CHECK(camera_table_.write(device_, table));
         SR_CHECK(program_->run());

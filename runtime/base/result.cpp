@@ -2,14 +2,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/base/result.h"
 
-#include <cstdio>
+#include "runtime/base/diagnostics.h"
+
 #include <cstdlib>
 
 namespace semrover {
 
 void assertion_failed(const char* condition, const char* file, int line, const std::string& message)
 {
-    std::fprintf(stderr, "%s:%d: assertion failed: %s: %s\n", file, line, condition, message.c_str());
+    diagnose(fmt::format("{}:{}: assertion failed: {}: {}", file, line, condition, message));
     std::abort();
 }
 

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/device/device.h"
 
+#include "runtime/base/diagnostics.h"
 #include "runtime/device/command.h"
 #include "runtime/device/physical_device.h"
 #include "runtime/device/pipeline.h"
@@ -9,7 +10,6 @@
 #include "runtime/graph/kernel.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 
@@ -29,7 +29,7 @@ std::string environment(const char* name)
 VKAPI_ATTR VkBool32 VKAPI_CALL on_validation(VkDebugUtilsMessageSeverityFlagBitsEXT, VkDebugUtilsMessageTypeFlagsEXT,
                                              const VkDebugUtilsMessengerCallbackDataEXT* data, void*)
 {
-    std::fprintf(stderr, "validation: %s\n", data->pMessage);
+    diagnose(fmt::format("validation: {}", data->pMessage));
     if (environment("SEMROVER_VALIDATION") == "fatal")
         std::abort();
     return VK_FALSE;

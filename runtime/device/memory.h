@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "runtime/base/result.h"
 #include "runtime/device/vulkan.h"
-#include "runtime/graph/graph.h"
+#include "runtime/graph/buffer_slice.h"
 
 #include <cstddef>
 #include <memory>

@@ -12,6 +12,8 @@
 
 namespace semrover {
 
+class Graph;
+struct DeviceLimits;
 struct StateMemory; // items of a State, and its blocks once they are there
 
 // A matrix of a State. Cheap to copy, and good as long as its State is, wherever that is moved to. Its memory is there

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "runtime/base/result.h"
+#include "runtime/graph/buffer_slice.h"
 #include "runtime/graph/kernel.h"
 #include "runtime/graph/limits.h"
 #include "runtime/graph/tensor.h"
@@ -17,17 +18,7 @@
 // data (plan.h), then replayed (program.h). Nothing here touches Vulkan.
 namespace semrover {
 
-class Buffer;
 class Slot;
-
-// memory that outlives the graph: weights, inputs, outputs, state kept from one run to the next
-struct BufferSlice {
-    const Buffer* buffer = nullptr;
-    uint64_t offset = 0;
-    uint64_t bytes = 0;
-
-    BufferSlice part(uint64_t at, uint64_t count) const { return {buffer, offset + at, count}; }
-};
 
 struct Grid {
     enum class Unit : uint8_t { groups, threads, row_tiles, tiles } unit = Unit::groups;

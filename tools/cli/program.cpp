@@ -3,6 +3,7 @@
 #include "tools/cli/program.h"
 
 #include "engine/job/version.h"
+#include "runtime/base/diagnostics.h"
 #include "runtime/base/file.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/memory_size.h"
@@ -25,6 +26,11 @@ volatile std::sig_atomic_t interrupted = 0;
 void on_signal(int)
 {
     interrupted = 1;
+}
+
+void print_diagnostic(void*, const char* line)
+{
+    fmt::print(stderr, "{}\n", line);
 }
 
 void install_signal_handlers()
@@ -112,6 +118,7 @@ bool interrupt_requested()
 
 int run_program(int argc, char** argv, std::initializer_list<Command> commands)
 {
+    set_diagnostic_callback(print_diagnostic);
     install_signal_handlers();
     CLI::App app("turn a semantic voxel grid into a coloured 3D street scene, and drive a camera rig through it",
                  "semrover");
