@@ -27,7 +27,7 @@ struct PartOf {
 struct GemmOptions {
     uint32_t groups = 1;
     DType dtype = DType::f16; // of y
-    PartOf part;
+    PartOf part = {};
 };
 [[nodiscard]] Tensor gemm(Graph& g,
                           Tensor x,    // [groups * M, K] fp32 or fp16
@@ -145,7 +145,7 @@ struct ConvOptions {
     struct Taps {
         uint32_t height = 0, width = 0;
         uint32_t padding_y = 0, padding_x = 0; // on both sides
-    } taps;                                    // any rectangle instead of `kernel` and its padding
+    } taps = {};                               // any rectangle instead of `kernel` and its padding
 };
 [[nodiscard]] FeatureMap
 conv2d(Graph& g, FeatureMap x,

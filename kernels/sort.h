@@ -12,7 +12,7 @@ namespace semrover {
 
 // y[i] = x[0] + .. + x[i - 1]
 struct PrefixSumOptions {
-    Tensor count; // [1] u32, or none: only the first count[0] elements of x are there; the rest of y is undefined
+    Tensor count = {}; // [1] u32, or none: only the first count[0] elements of x are there; the rest of y is undefined
     bool non_zero = false; // counts the elements that are not zero instead of adding them
 };
 struct PrefixSum {
@@ -24,7 +24,7 @@ struct PrefixSum {
 // pairs sorted by the low bits of their keys; equal keys stay in their order
 struct RadixSortOptions {
     uint32_t bits = 32; // only these low bits of the keys are compared
-    Tensor count;       // [1] u32, or none: only the first count[0] pairs are there; what follows them is undefined
+    Tensor count = {};  // [1] u32, or none: only the first count[0] pairs are there; what follows them is undefined
 };
 struct SortedPairs {
     Tensor keys;   // [N] u32

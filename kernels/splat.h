@@ -13,9 +13,9 @@ struct KnnOptions {
     uint32_t neighbors = 16;
     float cell_size = 0.45f;     // metres, of the search grid: about ten points per cell are best
     float radius = 0;            // metres, no neighbour is further away; 0: no limit
-    Tensor labels;               // [P] u32, or none: prefer neighbours of the same label
+    Tensor labels = {};          // [P] u32, or none: prefer neighbours of the same label
     uint32_t min_same_label = 4; // if there are fewer of those, neighbours of any label
-    Tensor queries;              // [Q, 3 or more] fp32 array, or none: of these instead, [Q, neighbors]; no labels
+    Tensor queries = {};         // [Q, 3 or more] fp32 array, or none: of these instead, [Q, neighbors]; no labels
 };
 [[nodiscard]] Tensor knn(Graph& g,
                          Tensor points, // [P, 3 or more] fp32 array; one that is not finite has no neighbours
@@ -24,7 +24,7 @@ struct KnnOptions {
 // the plane through a point's neighbours, by principal components; its normal's largest component is positive
 struct PcaNormalOptions {
     bool fallbacks = false;   // where neighbours form a thin line, its outward direction; where there is no plane, +z
-    Tensor labels;            // [P] u32, or none
+    Tensor labels = {};       // [P] u32, or none
     uint32_t line_labels = 0; // bit per label: things that count as lines more readily (poles)
 };
 struct PcaNormals {

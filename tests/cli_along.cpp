@@ -5,6 +5,7 @@
 #include "runtime/base/json.h"
 #include "runtime/base/safetensors.h"
 #include "tests/child_program.h"
+#include "tests/json_text.h"
 #include "tests/program.h"
 
 #include <algorithm>
@@ -50,7 +51,7 @@ class CliAlong : public testing::Test {
     {
         const ProgramResult result = semrover_program(command + " --json");
         EXPECT_EQ(result.code, 0) << result.err;
-        return result.code ? Json() : Json::parse(result.out);
+        return result.code ? Json() : json_of(result.out);
     }
     // hashes of all files of a folder of tiles, by name
     std::map<std::string, std::string> bytes(std::string_view name) const
@@ -189,7 +190,7 @@ TEST_F(CliAlong, tiles_that_a_killed_run_had_no_time_to_write_are_written)
     std::string journal = contents(path("out.run/journal.jsonl"));
     journal = journal.substr(0, journal.rfind('\n') + 1); // the last line may be half written
     const size_t last = journal.rfind('\n', journal.size() - 2) + 1;
-    Json entry = Json::parse(journal.substr(last));
+    Json entry = json_of(journal.substr(last));
     const Path piece = folder_ / fmt::format("out.run/windows/{:06}.safetensors", size_t(entry["window"]));
     // as if it had died between the journal and the tiles: what was made is in the piece alone
     Made made;

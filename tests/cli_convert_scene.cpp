@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/format/image.h"
 #include "engine/scene/grid.h"
+#include "tests/json_text.h"
 #include "tests/program.h"
 #include "tests/zip_bytes.h"
 
@@ -43,7 +44,7 @@ TEST(CliConvertScene, a_grid_goes_through_every_format_and_back)
         ASSERT_EQ(convert(kTruth, there).code, 0) << name;
         const ProgramResult result = convert(there, back, "-y --json");
         ASSERT_EQ(result.code, 0) << result.err;
-        const auto json = nlohmann::json::parse(result.out);
+        const auto json = json_of(result.out);
         EXPECT_EQ(json["cells"], 3710);
         EXPECT_EQ(json["labels"]["road"], 416);
         EXPECT_EQ(json["dropped"], 0);
@@ -90,7 +91,7 @@ TEST(CliConvertScene, occ3d_is_recognised_by_its_arrays)
                                               {"grid.npz", "npz", 2}}) {
         const ProgramResult result = convert(kNumpy + name, out, "-y -q --json");
         ASSERT_EQ(result.code, 0) << result.err;
-        const auto json = nlohmann::json::parse(result.out);
+        const auto json = json_of(result.out);
         EXPECT_EQ(json["from"], format);
         EXPECT_EQ(json["cells"], cells);
     }
@@ -147,7 +148,7 @@ TEST(CliConvertScene, splats_of_every_format_draw_the_same_picture)
         const std::string there = (folder / name).string();
         const ProgramResult result = convert(in, there, std::string(to) + " --json");
         ASSERT_EQ(result.code, 0) << result.err;
-        EXPECT_EQ(nlohmann::json::parse(result.out)["splats"], 20 * kCells);
+        EXPECT_EQ(json_of(result.out)["splats"], 20 * kCells);
         const std::vector<uint8_t> found = picture(there);
         ASSERT_EQ(found.size(), expected.size());
         double squares = 0;
@@ -173,10 +174,10 @@ TEST(CliConvertScene, inspect_and_render_read_what_convert_writes)
     ASSERT_EQ(convert(kSemantic, vox).code, 0);
     const ProgramResult grid = semrover_program("inspect --json " + vox);
     ASSERT_EQ(grid.code, 0) << grid.err;
-    EXPECT_EQ(nlohmann::json::parse(grid.out)["labels"]["vegetation"], 788);
-    EXPECT_EQ(nlohmann::json::parse(grid.out)["format"], "vox");
+    EXPECT_EQ(json_of(grid.out)["labels"]["vegetation"], 788);
+    EXPECT_EQ(json_of(grid.out)["format"], "vox");
     ASSERT_EQ(convert(kSemantic, splats).code, 0); // the blocks of a grid without points
-    const auto json = nlohmann::json::parse(semrover_program("inspect --json " + splats).out);
+    const auto json = json_of(semrover_program("inspect --json " + splats).out);
     EXPECT_GT(json["count"], 100000);
     EXPECT_EQ(json["labelled"], 0);
     const auto top = [&](const std::string& scene) {

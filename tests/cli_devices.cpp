@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "kernels/catalogue.h"
+#include "tests/json_text.h"
 #include "tests/program.h"
 
 #include <algorithm>
@@ -31,7 +32,7 @@ TEST(CliDevices, every_device_is_listed_with_limits_and_kernels)
 {
     const ProgramResult text = semrover_program("devices");
     ASSERT_EQ(text.code, 0) << text.err;
-    const Json devices = Json::parse(semrover_program("devices --json").out)["devices"];
+    const Json devices = json_of(semrover_program("devices --json").out)["devices"];
     ASSERT_FALSE(devices.empty());
     for (size_t i = 0; i < devices.size(); ++i) {
         EXPECT_EQ(devices[i]["index"], i);
@@ -45,7 +46,7 @@ TEST(CliDevices, every_device_is_listed_with_limits_and_kernels)
 TEST(CliDevices, limits_that_a_test_lowers_are_the_ones_shown)
 {
     setenv("SEMROVER_LIMITS", "shared=16384,variant=simt", 1);
-    const Json device = Json::parse(semrover_program("devices --json").out)["devices"][0];
+    const Json device = json_of(semrover_program("devices --json").out)["devices"][0];
     unsetenv("SEMROVER_LIMITS");
     EXPECT_EQ(device["shared_bytes"], 16384);
     EXPECT_EQ(device["kernels"]["gemm"], "simt");
@@ -55,7 +56,7 @@ TEST(CliDoctor, a_machine_that_runs_tests_has_all_it_needs)
 {
     const ProgramResult result = semrover_program("doctor --json");
     ASSERT_EQ(result.code, 0) << result.err;
-    const Json report = Json::parse(result.out);
+    const Json report = json_of(result.out);
     for (const Json& finding : report["findings"])
         EXPECT_TRUE(finding["ok"]) << finding;
     EXPECT_EQ("semrover " + report["version"].get<std::string>() + "\n", semrover_program("--version").out);

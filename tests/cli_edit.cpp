@@ -4,6 +4,7 @@
 #include "runtime/base/dtype.h"
 #include "runtime/base/json.h"
 #include "tests/child_program.h"
+#include "tests/json_text.h"
 #include "tests/program.h"
 
 #include <algorithm>
@@ -67,7 +68,7 @@ class CliEdit : public testing::Test {
     {
         const ProgramResult result = semrover_program(command + " --json");
         EXPECT_EQ(result.code, 0) << result.err;
-        return result.code ? Json() : Json::parse(result.out);
+        return result.code ? Json() : json_of(result.out);
     }
     void expect_refusal(const std::string& command, int code, std::string_view text) const
     {

@@ -3,6 +3,7 @@
 #include "engine/format/image.h"
 #include "engine/scene/grid.h"
 #include "tests/inception_reference.h"
+#include "tests/json_text.h"
 #include "tests/pointnet_files.h"
 #include "tests/program.h"
 
@@ -63,16 +64,16 @@ TEST(CliEval, features_in_files_need_no_device)
                                          (folder / "b.safetensors").string());
     const ProgramResult fid = eval("fid " + sets);
     ASSERT_EQ(fid.code, 0) << fid.err;
-    EXPECT_DOUBLE_EQ(Json::parse(fid.out)["value"], 1); // equal variances, means 1 and 2
+    EXPECT_DOUBLE_EQ(json_of(fid.out)["value"], 1); // equal variances, means 1 and 2
     const ProgramResult f3d = eval("f3d " + sets);
-    EXPECT_DOUBLE_EQ(Json::parse(f3d.out)["value"], 1);
+    EXPECT_DOUBLE_EQ(json_of(f3d.out)["value"], 1);
     const ProgramResult mmd = eval("mmd --kernel polynomial --degree 1 " + sets);
     ASSERT_EQ(mmd.code, 0) << mmd.err;
-    EXPECT_DOUBLE_EQ(Json::parse(mmd.out)["value"], 1);
-    EXPECT_DOUBLE_EQ(Json::parse(mmd.out)["squared_unbiased"], -1);
+    EXPECT_DOUBLE_EQ(json_of(mmd.out)["value"], 1);
+    EXPECT_DOUBLE_EQ(json_of(mmd.out)["squared_unbiased"], -1);
     const ProgramResult kid = eval("kid --full --subsets 3 " + sets); // both samples: every subset is everything
     ASSERT_EQ(kid.code, 0) << kid.err;
-    const Json report = Json::parse(kid.out);
+    const Json report = json_of(kid.out);
     // k = (x y + 1)^3: 1 and 4^3 between different samples of a set; 1, 1, 27, 343 across
     EXPECT_NEAR(report["value"].get<double>(), 1 + 64 - 2 * (1 + 1 + 27 + 343) / 4., 1e-9);
     EXPECT_NEAR(report["full"].get<double>(), report["value"].get<double>(), 1e-9);
@@ -108,7 +109,7 @@ TEST(CliEval, folders_of_images_go_through_a_network_and_their_features_are_kept
     const std::string sets = (folder / "a").string() + " " + (folder / "b").string() + features;
     const ProgramResult fid = eval("fid --json " + sets + " --save-features " + (folder / "out").string());
     ASSERT_EQ(fid.code, 0) << fid.err;
-    const Json report = Json::parse(fid.out);
+    const Json report = json_of(fid.out);
     EXPECT_GT(report["value"], 0);
     EXPECT_EQ(report["a"]["samples"], 5);
     EXPECT_EQ(report["b"]["width"], 50);
@@ -118,12 +119,12 @@ TEST(CliEval, folders_of_images_go_through_a_network_and_their_features_are_kept
                       kept_b = (folder / "out/b.safetensors").string();
     const ProgramResult again = eval("fid --json --device none " + kept_a + " " + kept_b);
     ASSERT_EQ(again.code, 0) << again.err;
-    EXPECT_NEAR(Json::parse(again.out)["value"].get<double>(), report["value"].get<double>(), 1e-9);
+    EXPECT_NEAR(json_of(again.out)["value"].get<double>(), report["value"].get<double>(), 1e-9);
     const ProgramResult mixed = eval("fid --json --batch 2 " + kept_a + " " + (folder / "b").string() + features);
     ASSERT_EQ(mixed.code, 0) << mixed.err;
-    EXPECT_EQ(Json::parse(mixed.out)["value"], report["value"]);
+    EXPECT_EQ(json_of(mixed.out)["value"], report["value"]);
     const ProgramResult same = eval("fid --json " + kept_a + " " + kept_a);
-    EXPECT_NEAR(Json::parse(same.out)["value"].get<double>(), 0, 1e-6);
+    EXPECT_NEAR(json_of(same.out)["value"].get<double>(), 0, 1e-6);
     expect_error(eval("fid " + sets + " --save-features " + (folder / "out").string()), 2,
                  "a.safetensors\' exists; -y");
 
@@ -150,14 +151,14 @@ TEST(CliEval, grids_go_through_a_network_of_points)
     const std::string features = " --features " + (folder / "net.safetensors").string();
     const ProgramResult f3d = eval("f3d -q --json " + one + " " + many + features);
     ASSERT_EQ(f3d.code, 0) << f3d.err;
-    const Json report = Json::parse(f3d.out);
+    const Json report = json_of(f3d.out);
     EXPECT_EQ(report["a"]["samples"], 8); // 8 m x 4 m in chunks of 2 m
     EXPECT_EQ(report["b"]["samples"], 16);
     EXPECT_EQ(report["features"], 10);
     EXPECT_GT(report["value"], 0);
     const ProgramResult listed = eval("f3d -q --json " + one + " " + (folder / "list.txt").string() + features);
     ASSERT_EQ(listed.code, 0) << listed.err;
-    EXPECT_NEAR(Json::parse(listed.out)["value"].get<double>(), report["value"].get<double>(), 1e-6);
+    EXPECT_NEAR(json_of(listed.out)["value"].get<double>(), report["value"].get<double>(), 1e-6);
     const ProgramResult mmd = eval("mmd -q " + one + " " + many + features);
     ASSERT_EQ(mmd.code, 0) << mmd.err;
     EXPECT_TRUE(mmd.out.starts_with("mmd ")) << mmd.out;

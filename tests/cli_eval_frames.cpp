@@ -3,6 +3,7 @@
 #include "engine/format/camera_path.h"
 #include "engine/format/image.h"
 #include "runtime/base/json.h"
+#include "tests/json_text.h"
 #include "tests/program.h"
 
 #include <algorithm>
@@ -61,7 +62,7 @@ TEST(CliEvalFrames, psnr_and_ssim_by_hand)
     const ProgramResult result =
         eval("frames --json -q " + folders + " --visible " + (p / "true") + " --labels " + (p / "true/label"));
     ASSERT_EQ(result.code, 0) << result.err;
-    const Json report = Json::parse(result.out);
+    const Json report = json_of(result.out);
     EXPECT_NEAR(report["psnr"].get<double>(), 10 * std::log10(65025. / 25), 1e-9); // a quarter of all pixels by 10
     EXPECT_NEAR(report["mean_psnr"].get<double>(), 10 * std::log10(65025. / 50), 1e-9);
     EXPECT_EQ(report["equal_frames"], 1);
@@ -90,7 +91,7 @@ TEST(CliEvalFrames, cameras_are_matched_across_the_layouts_of_refine_and_render)
     p.put("true/left/label/000000.png", 1, 1, kWidth, true);
     const ProgramResult result = eval("frames --json -q " + (p / "made") + " " + (p / "true"));
     ASSERT_EQ(result.code, 0) << result.err;
-    const Json report = Json::parse(result.out);
+    const Json report = json_of(result.out);
     EXPECT_EQ(report["frames"][0]["name"], "front/000000");
     EXPECT_NEAR(report["frames"][0]["psnr"].get<double>(), 20 * std::log10(25.5), 0.5);
     EXPECT_EQ(report["frames"][1]["name"], "left/000000");
@@ -158,7 +159,7 @@ TEST(CliEvalFlicker, change_without_cause_is_measured_and_the_truth_beside_it)
     const ProgramResult result = eval("flicker --json -q " + (p / "made") + " --depth " + drive + " --path " + drive +
                                       "/transforms.json --truth " + drive);
     ASSERT_EQ(result.code, 0) << result.err;
-    const Json report = Json::parse(result.out);
+    const Json report = json_of(result.out);
     EXPECT_NEAR(report["mean"].get<double>(), 4, 1e-9);
     EXPECT_NEAR(report["rms"].get<double>(), 4, 1e-9);
     EXPECT_NEAR(report["share"].get<double>(), 23. / 24, 1e-9); // a column has left the picture
@@ -171,7 +172,7 @@ TEST(CliEvalFlicker, change_without_cause_is_measured_and_the_truth_beside_it)
     const ProgramResult tum = eval(fmt::format("flicker --json -q {} --depth {}/depth --path {}/drive.tum --fov-x {}",
                                                p / "made", drive, drive, fov));
     ASSERT_EQ(tum.code, 0) << tum.err;
-    EXPECT_NEAR(Json::parse(tum.out)["mean"].get<double>(), 4, 1e-9);
+    EXPECT_NEAR(json_of(tum.out)["mean"].get<double>(), 4, 1e-9);
     const ProgramResult table =
         eval("flicker -q " + (p / "made") + " --depth " + drive + " --path " + drive + "/transforms.json");
     EXPECT_TRUE(table.out.starts_with("2 pairs of frames, 95.8 % of pixels can be compared\n")) << table.out;
@@ -180,7 +181,7 @@ TEST(CliEvalFlicker, change_without_cause_is_measured_and_the_truth_beside_it)
     const ProgramResult part =
         eval("flicker --json -q " + (p / "made") + " --depth " + drive + " --path " + drive + "/transforms.json");
     ASSERT_EQ(part.code, 0) << part.err;
-    EXPECT_EQ(Json::parse(part.out)["pairs"].size(), 1u);
+    EXPECT_EQ(json_of(part.out)["pairs"].size(), 1u);
 }
 
 TEST(CliEvalFlicker, what_does_not_fit_together_is_one_clear_line)

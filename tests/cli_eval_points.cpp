@@ -3,6 +3,7 @@
 #include "engine/scene/grid.h"
 #include "runtime/base/dtype.h"
 #include "runtime/base/json.h"
+#include "tests/json_text.h"
 #include "tests/program.h"
 
 #include <algorithm>
@@ -60,7 +61,7 @@ TEST(CliEvalPoints, a_pair_is_measured_by_class)
     const std::string truth = files.put("truth.sgrid", road(1, 0)), gray = files.put("gray.sgrid", road(2, 0.5));
     const ProgramResult result = eval_points(gray + " " + truth + " --json");
     ASSERT_EQ(result.code, 0) << result.err;
-    const Json report = Json::parse(result.out);
+    const Json report = json_of(result.out);
     EXPECT_EQ(report["metric"], "points");
     EXPECT_EQ(report["left_out"], 0);
     EXPECT_EQ(report["pairs"].size(), 1u);
@@ -79,7 +80,7 @@ TEST(CliEvalPoints, a_pair_is_measured_by_class)
     ASSERT_EQ(table.code, 0) << table.err;
     EXPECT_TRUE(table.out.starts_with("1 pair, 32 cells, 0 left out")) << table.out;
     EXPECT_NE(table.out.find("road-lane"), std::string::npos) << table.out;
-    const Json strong = Json::parse(eval_points(gray + " " + truth + " --json --strong-step 0.4").out);
+    const Json strong = json_of(eval_points(gray + " " + truth + " --json --strong-step 0.4").out);
     EXPECT_EQ(strong["classes"]["road-lane"]["edges"]["generated"], 0);
     EXPECT_GT(strong["classes"]["road-lane"]["edges"]["truth"], 0.1); // of 160
 }
@@ -93,14 +94,14 @@ TEST(CliEvalPoints, folders_and_lists_are_pooled)
     files.folder.put("true.txt", "true/b.sgrid\ntrue/a.sgrid\n");
     const ProgramResult folders = eval_points((files / "made") + " " + (files / "true") + " --json");
     ASSERT_EQ(folders.code, 0) << folders.err;
-    const Json report = Json::parse(folders.out);
+    const Json report = json_of(folders.out);
     ASSERT_EQ(report["pairs"].size(), 2u);
     EXPECT_EQ(report["pairs"][1]["generated"], b);
     EXPECT_EQ(report["pairs"][1]["all"]["color_error"], 0);
     EXPECT_EQ(report["pairs"][1]["all"]["sharpness"]["ratio"], 1);
     EXPECT_EQ(report["all"]["cells"], 64);
     EXPECT_NEAR(report["all"]["chamfer"].get<double>(), report["pairs"][0]["all"]["chamfer"].get<double>() / 2, 1e-9);
-    const Json listed = Json::parse(eval_points((files / "made.txt") + " " + (files / "true.txt") + " --json").out);
+    const Json listed = json_of(eval_points((files / "made.txt") + " " + (files / "true.txt") + " --json").out);
     EXPECT_NEAR(listed["all"]["chamfer"].get<double>(), report["all"]["chamfer"].get<double>(), 1e-12);
     EXPECT_EQ(listed["pairs"][0]["generated"], b);
 }

@@ -4,9 +4,11 @@
 #include "engine/format/image.h"
 #include "engine/scene/grid.h"
 #include "runtime/base/json.h"
+#include "tests/json_text.h"
 #include "tests/program.h"
 #include "tests/street_scene.h"
 
+#include <fstream>
 #include <gtest/gtest.h>
 #include <map>
 
@@ -97,7 +99,7 @@ TEST(CliFuse, a_drive_becomes_a_mesh_and_two_grids_of_the_same_cells)
     const Drive drive;
     const ProgramResult result = drive.fuse("--json");
     ASSERT_EQ(result.code, 0) << result.err;
-    const Json figures = Json::parse(result.out), run = run_of(drive.out());
+    const Json figures = json_of(result.out), run = run_of(drive.out());
     EXPECT_EQ(run["results"], figures);
     EXPECT_EQ(run["settings"]["excluded"], Json::array({"sky"}));
     EXPECT_EQ(figures["frames"], 3);

@@ -3,11 +3,13 @@
 #include "engine/scene/grid.h"
 #include "runtime/base/safetensors.h"
 #include "tests/child_program.h"
+#include "tests/json_text.h"
 #include "tests/program.h"
 
 #include <algorithm>
 #include <csignal>
 #include <cstring>
+#include <fstream>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
@@ -138,7 +140,7 @@ TEST_F(CliGenerate, a_run_killed_while_it_writes_the_grid_loses_nothing)
         if (std::filesystem::exists(path(output))) {
             EXPECT_TRUE(whole == contents(path(output)));
         }
-        const Json report = Json::parse(generate(output, "-y --json").out);
+        const Json report = json_of(generate(output, "-y --json").out);
         EXPECT_TRUE(whole == contents(path(output)));
         EXPECT_EQ(report["planned_device_bytes"], report["peak_device_bytes"]);
     }
@@ -188,7 +190,7 @@ TEST_F(CliGenerate, known_cells_stay_as_they_are)
     ASSERT_TRUE(write_grid(path("half.sgrid"), *grid));
     const ProgramResult result = generate("out.sgrid", "--json", "half.sgrid");
     ASSERT_EQ(result.code, 0) << result.err;
-    EXPECT_EQ(Json::parse(result.out)["cells"], 150);
+    EXPECT_EQ(json_of(result.out)["cells"], 150);
     const auto after = read_grid(path("out.sgrid"));
     ASSERT_TRUE(after);
     size_t changed = 0;
@@ -230,13 +232,13 @@ TEST_F(CliGenerate, a_dry_run_writes_nothing_and_says_what_a_run_would_take)
     const ProgramResult result =
         semrover_program("generate " + path("in.sgrid") + " -m " + kModel + kSettings + "--dry-run --json");
     ASSERT_EQ(result.code, 0) << result.err;
-    const Json report = Json::parse(result.out);
+    const Json report = json_of(result.out);
     EXPECT_EQ(report["cells"], 300);
     EXPECT_EQ(report["steps"], 2);
     EXPECT_GT(report["regions"], 5);
     EXPECT_GT(report["seconds"], 0);
     EXPECT_EQ(folder_.entries(), entries);
-    const Json run = Json::parse(generate("out.sgrid", "--json").out);
+    const Json run = json_of(generate("out.sgrid", "--json").out);
     EXPECT_EQ(report["peak_device_bytes"], run["peak_device_bytes"]);
     EXPECT_EQ(report["regions"], run["regions"]);
 }
@@ -247,21 +249,21 @@ TEST_F(CliGenerate, the_planned_memory_is_the_memory_that_was_used)
                              "--batch 2 --cfg-scale 1"}) {
         const ProgramResult result = generate("out.sgrid", fmt::format("--json -y {}", more));
         ASSERT_EQ(result.code, 0) << result.err;
-        const Json report = Json::parse(result.out);
+        const Json report = json_of(result.out);
         EXPECT_EQ(report["planned_device_bytes"], report["peak_device_bytes"]) << more;
     }
     ASSERT_EQ(stop_after("resumed.sgrid", 4, SIGKILL), 128 + SIGKILL);
-    const Json report = Json::parse(generate("resumed.sgrid", "--json --batch 8").out);
+    const Json report = json_of(generate("resumed.sgrid", "--json --batch 8").out);
     EXPECT_EQ(report["planned_device_bytes"], report["peak_device_bytes"]);
 }
 
 TEST_F(CliGenerate, a_budget_makes_batches_smaller_and_the_bytes_stay)
 {
-    const Json one = Json::parse(generate("one.sgrid", "--json --batch 1").out);
+    const Json one = json_of(generate("one.sgrid", "--json --batch 1").out);
     const uint64_t bytes = one["peak_device_bytes"];
     const ProgramResult result = generate("small.sgrid", fmt::format("--json --batch 8 --max-vram {}", bytes));
     ASSERT_EQ(result.code, 0) << result.err;
-    EXPECT_EQ(Json::parse(result.out)["peak_device_bytes"], bytes);
+    EXPECT_EQ(json_of(result.out)["peak_device_bytes"], bytes);
     EXPECT_TRUE(contents(path("one.sgrid")) == contents(path("small.sgrid")));
     EXPECT_EQ(generate("less.sgrid", fmt::format("--batch 8 --max-vram {}", bytes - 1)).code, 5);
     EXPECT_EQ(generate("", fmt::format("--dry-run --max-vram {}", bytes)).code, 0);

@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+#include "tests/json_text.h"
 #include "tests/program.h"
 #include "tests/renderer_weights.h"
 #include "tests/safetensors_bytes.h"
@@ -20,7 +21,7 @@ TEST(CliInspect, a_grid_shows_its_cells_and_labels)
     EXPECT_EQ(text.err, "");
     EXPECT_NE(text.out.find("vegetation  788"), std::string::npos) << text.out;
     const ProgramResult result = semrover_program("inspect --json " + kAssets + "/scenes/street.semantic.sgrid");
-    const auto json = nlohmann::json::parse(result.out);
+    const auto json = json_of(result.out);
     EXPECT_EQ(json["cells"], 3710);
     EXPECT_EQ(json["voxel_size"], 0.6);
     EXPECT_EQ(json["labels"]["road"], 416);
@@ -32,7 +33,7 @@ TEST(CliInspect, a_model_shows_components_config_and_weights)
 {
     const ProgramResult result = semrover_program("--json inspect " + kAssets + "/model");
     ASSERT_EQ(result.code, 0) << result.err;
-    const auto json = nlohmann::json::parse(result.out);
+    const auto json = json_of(result.out);
     const auto& transformer = json["components"]["voxfield_transformer"];
     EXPECT_EQ(transformer["class"], "VoxfieldTransformer");
     EXPECT_EQ(transformer["config"]["num_layers"], 6);
@@ -57,7 +58,7 @@ TEST(CliInspect, a_model_without_a_component_and_a_single_component_are_shown_to
     folder.put("d/scheduler_config.json", R"({"beta_end":1})");
     const ProgramResult model = semrover_program("inspect --json " + folder.path().string());
     ASSERT_EQ(model.code, 0) << model.err;
-    const auto json = nlohmann::json::parse(model.out);
+    const auto json = json_of(model.out);
     EXPECT_TRUE(json["components"]["a"].contains("missing"));
     EXPECT_EQ(json["components"].size(), 2u);
     EXPECT_EQ(json["components"]["d"]["config"]["beta_end"], 1);
@@ -72,7 +73,7 @@ TEST(CliInspect, a_checkpoint_says_what_it_is_and_whether_it_can_render)
     ldm_weights(unet, small_vae()).write(folder / "ldm.safetensors", DType::f16);
     const ProgramResult ldm = semrover_program("inspect --json " + (folder / "ldm.safetensors").string());
     ASSERT_EQ(ldm.code, 0) << ldm.err;
-    const auto json = nlohmann::json::parse(ldm.out);
+    const auto json = json_of(ldm.out);
     EXPECT_EQ(json["kind"], "Stable Diffusion-like single file (LDM)");
     EXPECT_EQ(json["unet"]["config"], unet_config_json(unet));
     EXPECT_EQ(json["unet"]["deferred_renderer"], "ready (13 input channels)");
@@ -94,7 +95,7 @@ TEST(CliInspect, a_checkpoint_says_what_it_is_and_whether_it_can_render)
                                      std::pair{"vae_tiny/model", "AutoencoderKL"},
                                      std::pair{"vae_temporal_tiny/model", "AutoencoderKLTemporalDecoder"},
                                      std::pair{"transformer_tiny/model", "VoxfieldTransformer"}}) {
-        const auto part = nlohmann::json::parse(semrover_program("inspect --json " + golden + name).out);
+        const auto part = json_of(semrover_program("inspect --json " + golden + name).out);
         EXPECT_EQ(part["weights"]["kind"], kind);
     }
 }

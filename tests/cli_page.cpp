@@ -3,6 +3,7 @@
 // what `semrover page` writes: one file with everything in it, whatever the inputs say
 #include "engine/scene/palette.h"
 #include "runtime/base/dtype.h"
+#include "tests/json_text.h"
 #include "tests/page_inputs.h"
 #include "tests/program.h"
 #include "tools/page/page.h"
@@ -10,6 +11,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <fstream>
 #include <regex>
 #include <tuple>
 
@@ -54,7 +56,7 @@ struct DecodedPoint {
 // as the page's script reads them
 std::vector<DecodedPoint> points_in(const std::string& html, size_t scene)
 {
-    const Json data = Json::parse(script(html, "page-data"))["scenes"][scene];
+    const Json data = json_of(script(html, "page-data"))["scenes"][scene];
     const std::vector<uint8_t> bytes = decoded(script(html, "points-" + std::to_string(scene)));
     const size_t n = data["count"];
     EXPECT_EQ(bytes.size(), 10 * n);
@@ -76,7 +78,7 @@ TEST(CliPage, every_point_of_the_grid_is_in_it_to_half_a_step)
     const std::string html = in.page("--grid " + in.grid("a.sgrid").string());
     const VoxelGrid grid = street_of_cells();
     const auto points = points_in(html, 0);
-    const Json data = Json::parse(script(html, "page-data"))["scenes"][0];
+    const Json data = json_of(script(html, "page-data"))["scenes"][0];
     size_t next = 0;
     for (size_t cell = 0; cell < grid.cells.size(); ++cell)
         for (size_t k = 0; grid.generated[cell] && k < size_t(grid.points_per_voxel); ++k, ++next) {
@@ -132,7 +134,7 @@ TEST(CliPage, pictures_of_the_moments_that_all_sets_have_are_in_it)
     ASSERT_EQ(result.code, 0) << result.err;
     EXPECT_NE(result.err.find("1 of 4 pictures of 'splats' are left out"), std::string::npos) << result.err;
     const std::string html = contents(in / "index.html");
-    const Json data = Json::parse(script(html, "page-data"));
+    const Json data = json_of(script(html, "page-data"));
     EXPECT_EQ(data["moments"], Json({1, 2, 5}));
     for (size_t set = 0; set < 2; ++set)
         for (size_t m = 0; m < 3; ++m) {
@@ -157,7 +159,7 @@ TEST(CliPage, of_many_moments_the_first_the_last_and_even_steps_between_stay)
     in.pictures("labels", {0, 1, 2, 3, 4, 5, 6, 7, 8, 10});
     in.pictures("splats", {0, 1, 2, 3, 4, 5, 6, 7, 8, 10});
     const std::string html = in.page(in.whole_arguments() + " --max-frames 4");
-    EXPECT_EQ(Json::parse(script(html, "page-data"))["moments"], Json({0, 3, 6, 10}));
+    EXPECT_EQ(json_of(script(html, "page-data"))["moments"], Json({0, 3, 6, 10}));
     EXPECT_NE(html.find("4 of 10 moments"), std::string::npos);
 }
 
@@ -239,7 +241,7 @@ TEST(CliPage, hostile_text_stays_text)
                              "\xff", "</style><script>"})
         EXPECT_EQ(html.find(text), std::string::npos) << text;
     EXPECT_EQ(html.find("\u2028", html.find("id=\"page-data\"")), std::string::npos); // in markup only
-    const Json data = Json::parse(script(html, "page-data"));
+    const Json data = json_of(script(html, "page-data"));
     EXPECT_EQ(data["sets"][0]["name"].get<std::string>().find("</script><script>alert(1)</script>"), 0u);
     EXPECT_NE(html.find("&lt;/script&gt;&lt;script&gt;alert(1)"), std::string::npos);
     const auto tags = [&](const std::string& tag) {

@@ -3,6 +3,7 @@
 #include "tools/cli/progress.h"
 
 // note: the program's own files are in no library that a test could link
+#include "tests/json_text.h"
 #include "tools/cli/progress.cpp"
 
 #include <gtest/gtest.h>
@@ -79,7 +80,7 @@ TEST(Progress, json_lines_hold_the_numbers)
     std::vector<nlohmann::json> lines;
     std::istringstream in(script.text);
     for (std::string line; std::getline(in, line);)
-        lines.push_back(nlohmann::json::parse(line));
+        lines.push_back(json_of(line));
     ASSERT_EQ(lines.size(), 3u);
     EXPECT_EQ(lines[0], nlohmann::json({{"event", "progress"},
                                         {"stage", "render"},

@@ -1,11 +1,13 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/child_program.h"
+#include "tests/json_text.h"
 #include "tests/program.h"
 #include "tests/renderer_folders.h"
 
 #include <algorithm>
 #include <csignal>
+#include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
 
@@ -83,7 +85,7 @@ TEST_F(CliRefine, a_run_writes_frames_and_latents_the_same_again_and_others_with
     EXPECT_FALSE(first == refined("c", "--seed 8"));
     EXPECT_FALSE(first == refined("d", "--sampler dpm++2m"));
     EXPECT_FALSE(fs::exists(folder_ / "a" / "encoded"));
-    const Json run = Json::parse(contents(folder_ / "a" / "run.json"));
+    const Json run = json_of(contents(folder_ / "a" / "run.json"));
     EXPECT_EQ(run["state"], "finished");
     EXPECT_EQ(run["settings"]["steps"], 3);
 }
@@ -153,7 +155,7 @@ TEST_F(CliRefine, cameras_are_chains_that_do_not_know_of_each_other)
 TEST_F(CliRefine, less_memory_means_stages_and_the_same_bytes)
 {
     const auto whole = refined("whole");
-    const Json plan = Json::parse(semrover_program(arguments("none") + "--dry-run --json").out);
+    const Json plan = json_of(semrover_program(arguments("none") + "--dry-run --json").out);
     EXPECT_FALSE(fs::exists(folder_ / "none"));
     EXPECT_EQ(plan["policy"], "resident");
     const uint64_t resident = plan["policies"]["resident"], staged = plan["policies"]["staged"];
@@ -256,7 +258,7 @@ TEST_F(CliRefine, noise_stays_on_surfaces_where_the_model_or_the_option_says_so)
     const auto whole = refined("whole", drive + warped, "street.sgrid");
     EXPECT_TRUE(fresh.at("latents/000000.safetensors") == whole.at("latents/000000.safetensors"));
     EXPECT_FALSE(fresh.at("latents/000001.safetensors") == whole.at("latents/000001.safetensors"));
-    EXPECT_EQ(Json::parse(contents(folder_ / "whole" / "run.json"))["settings"]["frame_noise"], "warped");
+    EXPECT_EQ(json_of(contents(folder_ / "whole" / "run.json"))["settings"]["frame_noise"], "warped");
     // from buffers, from a frame on, and after a kill it is the same
     const std::string buffers = "whole/buffers";
     EXPECT_TRUE(whole == refined("again", drive + warped, buffers));

@@ -5,6 +5,7 @@
 #include "engine/mesh/mesh_files.h"
 #include "engine/scene/grid.h"
 #include "runtime/base/json.h"
+#include "tests/json_text.h"
 #include "tests/program.h"
 
 #include <algorithm>
@@ -28,13 +29,13 @@ TEST(CliStreets, a_street_comes_with_mesh_grids_drive_and_pictures_that_agree)
     const ProgramResult result = streets(out, "--seed 5 --images --samples 1 --ambient-rays 1 -W 48 -H 32 --json");
     ASSERT_EQ(result.code, 0) << result.err;
     EXPECT_EQ(folder.entries(), 1u); // nothing temporary
-    const Json about = Json::parse(result.out);
+    const Json about = json_of(result.out);
     EXPECT_EQ(about["seed"], 5);
     EXPECT_EQ(about["frames"], 1);
     EXPECT_EQ(about["classes"]["sky"]["faces"], 0);
     EXPECT_GT(about["classes"]["building"]["faces"], 1000);
     EXPECT_GT(about["objects"]["building"], 3);
-    EXPECT_EQ(Json::parse(contents(out / "street.json")), about);
+    EXPECT_EQ(json_of(contents(out / "street.json")), about);
     EXPECT_GT(fs::file_size(out / "mesh.glb"), 1000000u);
     const auto semantic = read_grid(out / "semantic.sgrid"), truth = read_grid(out / "truth.sgrid");
     ASSERT_TRUE(semantic && truth);

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/base/safetensors.h"
+#include "tests/json_text.h"
 #include "tests/program.h"
 
 #include <algorithm>
@@ -74,7 +75,7 @@ TEST(CliVerify, a_kind_without_a_runner_is_skipped_and_said_in_summary_and_exit_
     const std::string cases = kGolden + "/vae_temporal_tiny " + kGolden + "/regions_paper";
     const ProgramResult result = semrover_program("verify --json --allow-skip " + cases);
     EXPECT_EQ(result.code, 0) << result.err;
-    const auto report = nlohmann::json::parse(result.out);
+    const auto report = json_of(result.out);
     EXPECT_EQ(report["passed"], 1);
     EXPECT_EQ(report["skipped"], 1);
     EXPECT_EQ(report["cases"][0]["outcome"], "SKIP");

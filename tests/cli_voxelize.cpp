@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/scene/grid.h"
 #include "runtime/base/json.h"
+#include "tests/json_text.h"
 #include "tests/program.h"
 
 #include <gtest/gtest.h>
@@ -30,7 +31,7 @@ TEST(CliVoxelize, a_mesh_becomes_a_grid_with_labels_and_colours)
     const ProgramResult made = semrover_program("voxelize " + mesh + " -o " + out + mapped +
                                                 " --json --points 5 --ply " + (folder / "m.ply").string());
     ASSERT_EQ(made.code, 0) << made.err;
-    const Json json = Json::parse(made.out);
+    const Json json = json_of(made.out);
     const auto grid = read_grid(out);
     ASSERT_TRUE(grid) << grid.error().message;
     EXPECT_EQ(json["cells"], grid->cells.size());
@@ -71,7 +72,7 @@ TEST(CliVoxelize, eval_chamfer_measures_a_grid_or_sweeps)
     ASSERT_EQ(semrover_program("voxelize " + mesh + " -q --default-label wall -o " + grid).code, 0);
     const ProgramResult one = semrover_program("eval chamfer " + mesh + " " + grid + " --samples 20000 --json");
     ASSERT_EQ(one.code, 0) << one.err;
-    const Json measured = Json::parse(one.out)["grids"][0];
+    const Json measured = json_of(one.out)["grids"][0];
     EXPECT_EQ(measured["points"], 20);
     EXPECT_LT(measured["points_to_surface"].get<double>(), 2e-4);
     EXPECT_NEAR(measured["chamfer"].get<double>(),
@@ -79,7 +80,7 @@ TEST(CliVoxelize, eval_chamfer_measures_a_grid_or_sweeps)
     const ProgramResult sweep =
         semrover_program("eval chamfer " + mesh + " --sweep 4..32 --samples 20000 --json -q --csv " + csv);
     ASSERT_EQ(sweep.code, 0) << sweep.err;
-    const Json grids = Json::parse(sweep.out)["grids"];
+    const Json grids = json_of(sweep.out)["grids"];
     ASSERT_EQ(grids.size(), 5u); // 4, 8, 16, 20, 32
     for (size_t i = 1; i < grids.size(); ++i)
         EXPECT_LT(grids[i]["chamfer"], grids[i - 1]["chamfer"]);

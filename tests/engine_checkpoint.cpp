@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/model/checkpoint.h"
 #include "engine/model/ldm_config.h"
+#include "tests/json_text.h"
 #include "tests/renderer_weights.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"

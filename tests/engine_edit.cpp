@@ -7,6 +7,7 @@
 #include "runtime/base/dtype.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/safetensors.h"
+#include "tests/json_text.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
 

@@ -6,6 +6,7 @@
 #include "engine/job/editing.h"
 #include "engine/job/growth.h"
 #include "runtime/base/hash.h"
+#include "tests/json_text.h"
 #include "tests/scratch_folder.h"
 
 #include <algorithm>

@@ -4,6 +4,7 @@
 #include "engine/job/drawing.h"
 #include "engine/job/generation.h"
 #include "engine/job/refinement.h"
+#include "tests/json_text.h"
 #include "tests/renderer_folders.h"
 
 #include <nlohmann/json.hpp>
@@ -305,7 +306,7 @@ TEST_F(JobRefinement, callbacks_tell_stages_counts_and_the_plan_and_may_refuse_t
     EXPECT_EQ(refused.error().message, "no room for a video");
     EXPECT_EQ(told.back(), "refine 6 of 6 steps");
     EXPECT_NE(std::ranges::find(told, "2 frames, resident"), told.end());
-    EXPECT_EQ(Json::parse(contents(folder_ / "out" / "run.json"))["state"], "running");
+    EXPECT_EQ(json_of(contents(folder_ / "out" / "run.json"))["state"], "running");
 }
 
 TEST_F(JobRefinement, what_cannot_be_is_refused_before_any_work)

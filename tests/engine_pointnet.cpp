@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+#include "tests/json_text.h"
 #include "tests/kernel_case.h"
 #include "tests/pointnet_files.h"
 #include "tests/says.h"

@@ -4,6 +4,7 @@
 #include "engine/model/unet_config.h"
 #include "engine/model/vae_config.h"
 #include "runtime/base/json.h"
+#include "tests/json_text.h"
 #include "tests/says.h"
 
 #include <map>

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/model/renderer_model.h"
+#include "tests/json_text.h"
 #include "tests/renderer_weights.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/sampling/repaint.h"
 #include "tests/golden_tensors.h"
+#include "tests/json_text.h"
 
 #include <algorithm>
 #include <cmath>

@@ -2,9 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/sampling/schedule.h"
 #include "tests/golden_tensors.h"
+#include "tests/json_text.h"
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
+#include <iterator>
 
 namespace semrover {
 namespace {

@@ -3,6 +3,7 @@
 #include "engine/refine/frame_images.h"
 #include "tests/frame_pixels_reference.h"
 #include "tests/golden_tensors.h"
+#include "tests/json_text.h"
 #include "tests/splat_case.h"
 #include "tools/verify/splat_cases.cpp"
 #include "tools/verify/splat_cases.h"

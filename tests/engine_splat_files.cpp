@@ -7,6 +7,7 @@
 #include "engine/format/splat_file.h"
 
 #include "runtime/base/json.h"
+#include "tests/json_text.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
 #include "tests/zip_bytes.h"
@@ -315,7 +316,7 @@ const std::string kBinary = floats({1, 2, 3, 99}) + std::string("\0\0\0\x7f", 4)
 
 Json hand_made()
 {
-    return Json::parse(R"({
+    return json_of(R"({
       "asset": {"version": "2.0"}, "extensionsUsed": ["KHR_gaussian_splatting"], "scene": 0,
       "scenes": [{"nodes": [0]}],
       "nodes": [{"translation": [10, 0, 0], "children": [1]},
@@ -373,8 +374,8 @@ TEST(GltfSplats, splats_come_back)
     expect_near(file->surfels, s, {.position = 1e-5f}, true);
     // up is y, and the header says how long it is
     const std::string bytes = contents(folder / "s.glb");
-    const Json json = Json::parse(
-        bytes.substr(20, static_cast<unsigned char>(bytes[12]) | static_cast<unsigned char>(bytes[13]) << 8));
+    const Json json =
+        json_of(bytes.substr(20, static_cast<unsigned char>(bytes[12]) | static_cast<unsigned char>(bytes[13]) << 8));
     EXPECT_EQ(json["accessors"][0]["max"][1], std::ranges::max(s.position, {}, [](auto& p) { return p[2]; })[2]);
     EXPECT_EQ(json["meshes"][0]["primitives"][0]["extensions"]["KHR_gaussian_splatting"]["kernel"], "ellipse");
     EXPECT_EQ(json["buffers"][0]["byteLength"], 200 * 4 * (3 + 4 + 4 + 3 + 1 + 3 + 1));

@@ -5,6 +5,7 @@
 #include "runtime/base/dtype.h"
 #include "runtime/base/json.h"
 #include "tests/grid_case.h"
+#include "tests/json_text.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
 
@@ -100,7 +101,7 @@ TEST(engine_tiles, folders_that_are_not_sound_are_refused)
     ASSERT_TRUE(write_tiles(tiles, plain(0, 8, true), 4));
     const std::string index = contents(tiles / "index.json");
     const auto with = [&](const std::function<void(Json&)>& change, const char* message) {
-        Json json = Json::parse(index);
+        Json json = json_of(index);
         change(json);
         folder.put("tiles/index.json", json.dump());
         EXPECT_TRUE(says(read_grid_or_tiles(tiles), message));

@@ -4,9 +4,7 @@
 
 #include <cstdint>
 #include <cstring>
-#include <fstream>
 #include <gtest/gtest.h>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -20,17 +18,7 @@ struct GoldenTensors {
     nlohmann::json header;
     std::string data;
 
-    explicit GoldenTensors(const std::string& name)
-    {
-        const std::string folder = std::string(SEMROVER_SOURCE_DIR) + "/tests/golden/" + name;
-        params = nlohmann::json::parse(std::ifstream(folder + "/case.json")).at("params");
-        std::ifstream file(folder + "/tensors.safetensors", std::ios::binary);
-        const std::string all{std::istreambuf_iterator<char>(file), {}};
-        uint64_t length = 0;
-        std::memcpy(&length, all.data(), sizeof(length));
-        header = nlohmann::json::parse(all.substr(8, length));
-        data = all.substr(8 + length);
-    }
+    explicit GoldenTensors(const std::string& name);
 
     template <typename T>
     std::vector<T> get(const std::string& tensor) const

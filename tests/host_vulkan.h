@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "runtime/device/vulkan.h"
+
 #include <cstdio>
 #include <cstdlib>
 #include <vector>
@@ -9,8 +11,8 @@
 
 namespace semrover {
 
-// a program that has Vulkan already, and lends its device: plain calls, nothing of ours; with SEMROVER_VALIDATION its
-// instance has the layer too, and messages are counted
+// a program that has Vulkan already, and lends its device: plain calls; with SEMROVER_VALIDATION its instance has the
+// layer too, and messages are counted
 class HostVulkan {
   public:
     HostVulkan()
@@ -19,12 +21,13 @@ class HostVulkan {
         uint32_t count = 1;
         vkEnumeratePhysicalDevices(instance, &count, &physical);
         const float priority = 1;
-        VkDeviceQueueCreateInfo wanted{VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO};
+        auto wanted = vk_struct<VkDeviceQueueCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO);
         wanted.queueCount = 1;
         wanted.pQueuePriorities = &priority;
-        VkPhysicalDeviceVulkan12Features features{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES};
+        auto features =
+            vk_struct<VkPhysicalDeviceVulkan12Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES);
         features.timelineSemaphore = VK_TRUE;
-        VkDeviceCreateInfo info{VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO, &features};
+        auto info = vk_struct<VkDeviceCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO, &features);
         info.queueCreateInfoCount = 1;
         info.pQueueCreateInfos = &wanted;
         if (vkCreateDevice(physical, &info, nullptr, &device) != VK_SUCCESS)
@@ -60,9 +63,9 @@ class HostVulkan {
     {
         const bool validation = std::getenv("SEMROVER_VALIDATION");
         const char *layer = "VK_LAYER_KHRONOS_validation", *extension = VK_EXT_DEBUG_UTILS_EXTENSION_NAME;
-        VkApplicationInfo app{VK_STRUCTURE_TYPE_APPLICATION_INFO};
+        auto app = vk_struct<VkApplicationInfo>(VK_STRUCTURE_TYPE_APPLICATION_INFO);
         app.apiVersion = VK_API_VERSION_1_2;
-        VkInstanceCreateInfo info{VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO};
+        auto info = vk_struct<VkInstanceCreateInfo>(VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO);
         info.pApplicationInfo = &app;
         info.enabledLayerCount = info.enabledExtensionCount = validation;
         info.ppEnabledLayerNames = &layer;
@@ -71,7 +74,8 @@ class HostVulkan {
             std::abort();
         if (!validation)
             return;
-        VkDebugUtilsMessengerCreateInfoEXT messages_to{VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT};
+        auto messages_to =
+            vk_struct<VkDebugUtilsMessengerCreateInfoEXT>(VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT);
         messages_to.messageSeverity =
             VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT;
         messages_to.messageType = VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT;

@@ -13,18 +13,7 @@
 namespace semrover {
 
 // one device for a test program; SEMROVER_LIMITS lowers its limits
-inline Device& test_device()
-{
-    static const std::unique_ptr<Device> device = [] {
-        auto made = Device::create({});
-        if (!made) {
-            ADD_FAILURE() << made.error().message;
-            std::abort();
-        }
-        return std::move(*made);
-    }();
-    return *device;
-}
+Device& test_device();
 
 // values as the device will see them: rounded to the dtype, rows padded
 struct HostMatrix {
@@ -50,35 +39,10 @@ class KernelCase {
 
     Graph graph;
 
-    HostMatrix random(uint32_t rows, uint32_t cols, DType dtype, float scale = 1)
-    {
-        HostMatrix m(rows, cols, dtype);
-        std::normal_distribution<float> normal(0, scale);
-        for (uint32_t r = 0; r < rows; ++r)
-            for (uint32_t c = 0; c < cols; ++c)
-                m.set(r, c, normal(random_));
-        return m;
-    }
-    std::vector<uint32_t> indices(uint32_t count, uint32_t below)
-    {
-        std::vector<uint32_t> v(count);
-        for (uint32_t& i : v)
-            i = uint32_t(random_() % below);
-        return v;
-    }
+    HostMatrix random(uint32_t rows, uint32_t cols, DType dtype, float scale = 1);
+    std::vector<uint32_t> indices(uint32_t count, uint32_t below);
 
-    Tensor input(const HostMatrix& m)
-    {
-        std::vector<std::byte> bytes(m.values.size() * dtype_bytes(m.dtype));
-        for (size_t i = 0; i < m.values.size(); ++i) {
-            const uint16_t half = float_to_half(m.values[i]);
-            if (m.dtype == DType::f16)
-                std::memcpy(&bytes[2 * i], &half, 2);
-            else
-                std::memcpy(&bytes[4 * i], &m.values[i], 4);
-        }
-        return graph.external(upload(bytes), m.rows, m.cols, m.dtype, "input", m.ld);
-    }
+    Tensor input(const HostMatrix& m);
     template <typename T>
     Tensor input(const std::vector<T>& v, uint32_t width = 1)
     {
@@ -89,46 +53,14 @@ class KernelCase {
                               width);
     }
     // memory that a kernel writes and the test reads
-    Tensor output(uint32_t rows, uint32_t cols, DType dtype, uint32_t ld = 0)
-    {
-        const uint32_t pitch = ld ? ld : round_up(cols, kRowPadding);
-        std::vector<std::byte> poison(size_t(rows) * pitch * dtype_bytes(dtype), std::byte(0xff));
-        return graph.external(upload(poison), rows, cols, dtype, "output", pitch);
-    }
+    Tensor output(uint32_t rows, uint32_t cols, DType dtype, uint32_t ld = 0);
 
-    Status compile_and_run()
-    {
-        SR_TRY(program_, Program::create(device_, graph));
-        return program_->run();
-    }
+    Status compile_and_run();
     const Plan& plan() const { return program_->plan(); }
 
     // runs the graph and reads y, which is copied out of the arena through a program that ends in memory of ours
-    HostMatrix run(Tensor y)
-    {
-        const Tensor out = output(y.rows, y.cols, y.dtype, y.ld);
-        redirect(y, out);
-        const Status status = compile_and_run();
-        EXPECT_TRUE(status) << status.error().message;
-        return read(out);
-    }
-    HostMatrix read(const Tensor& t)
-    {
-        HostMatrix m(t.rows, t.cols, t.dtype);
-        m.ld = t.ld;
-        m.values.resize(size_t(t.rows) * t.ld);
-        const std::vector<std::byte> bytes = read_bytes(t);
-        for (size_t i = 0; i < m.values.size(); ++i) {
-            uint16_t half = 0;
-            if (t.dtype == DType::f16) {
-                std::memcpy(&half, &bytes[2 * i], 2);
-                m.values[i] = half_to_float(half);
-            } else {
-                std::memcpy(&m.values[i], &bytes[4 * i], 4);
-            }
-        }
-        return m;
-    }
+    HostMatrix run(Tensor y);
+    HostMatrix read(const Tensor& t);
     template <typename T>
     std::vector<T> read_array(const Tensor& t)
     {
@@ -138,32 +70,11 @@ class KernelCase {
         return v;
     }
 
-    void expect_zero_padding(const HostMatrix& m)
-    {
-        for (uint32_t r = 0; r < m.rows; ++r)
-            for (uint32_t c = m.cols; c < round_up(m.cols, kRowPadding); ++c)
-                ASSERT_EQ(m.values[size_t(r) * m.ld + c], 0.f) << "padding of row " << r;
-    }
+    void expect_zero_padding(const HostMatrix& m);
 
   private:
-    BufferSlice upload(const std::vector<std::byte>& bytes)
-    {
-        auto buffer = Buffer::create(device_, bytes.size(), MemoryKind::device, "test");
-        SR_ASSERT(bool(buffer), "{}", buffer.error().message);
-        const Status written = device_.write((*buffer)->slice(), bytes);
-        SR_ASSERT(bool(written), "{}", written.error().message);
-        buffers_.push_back(std::move(*buffer));
-        return buffers_.back()->slice();
-    }
-    std::vector<std::byte> read_bytes(const Tensor& t)
-    {
-        std::vector<std::byte> bytes(t.bytes());
-        const BufferSlice& memory = graph.desc().resources[t.resource].memory;
-        const Status status = device_.read(memory.part(t.offset, bytes.size()), bytes);
-        EXPECT_TRUE(status) << status.error().message;
-        return bytes;
-    }
-    void redirect(const Tensor& from, const Tensor& to) { graph.keep(from, to); }
+    BufferSlice upload(const std::vector<std::byte>& bytes);
+    std::vector<std::byte> read_bytes(const Tensor& t);
 
     Device& device_;
     std::mt19937 random_;

@@ -6,6 +6,7 @@
 #include "engine/model/model_writer.h"
 #include "engine/model/random_weights.h"
 #include "engine/model/renderer_model.h"
+#include "tests/json_text.h"
 
 #include <CLI/CLI.hpp>
 

@@ -4,7 +4,6 @@
 
 #include "tests/program_result.h"
 
-#include <algorithm>
 #include <gtest/gtest.h>
 #include <string>
 #include <string_view>
@@ -12,19 +11,9 @@
 namespace semrover {
 
 // runs `semrover ARGUMENTS` (a line for the shell) and waits
-inline ProgramResult semrover_program(const std::string& arguments)
-{
-    return run_program_line(SEMROVER_BINARY, arguments);
-}
+ProgramResult semrover_program(const std::string& arguments);
 
 // an error of the program: its code, one line that says the text, and nothing else
-inline void expect_error(const ProgramResult& result, int code, std::string_view text)
-{
-    EXPECT_EQ(result.code, code) << result.err;
-    EXPECT_TRUE(result.err.starts_with("semrover: error: ")) << result.err;
-    EXPECT_NE(result.err.find(text), std::string::npos) << result.err;
-    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
-    EXPECT_EQ(result.out, "");
-}
+void expect_error(const ProgramResult& result, int code, std::string_view text);
 
 } // namespace semrover

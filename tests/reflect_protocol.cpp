@@ -9,7 +9,7 @@ namespace semrover {
 namespace {
 
 struct Declarations {
-    std::string constants, push = "uint rows;", y = "writeonly buffer Y { uint y[]; }";
+    std::string constants = {}, push = "uint rows;", y = "writeonly buffer Y { uint y[]; }";
 };
 
 std::string shader(const Declarations& d)

@@ -7,10 +7,12 @@
 #include "runtime/device/program.h"
 #include "runtime/device/state.h"
 #include "tests/host_vulkan.h"
+#include "tests/json_text.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
 
 #include <cstring>
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 namespace semrover {
@@ -244,7 +246,7 @@ TEST(runtime_device, writes_a_chrome_trace_of_every_pass)
     run_small_graph(*device);
     const ScratchFolder folder;
     ASSERT_TRUE(profile->write(folder / "trace.json"));
-    const nlohmann::json trace = nlohmann::json::parse(contents(folder / "trace.json"));
+    const nlohmann::json trace = json_of(contents(folder / "trace.json"));
     ASSERT_EQ(trace.at("traceEvents").size(), 6u);
     double last = 0;
     for (const auto& event : trace.at("traceEvents")) {

@@ -14,12 +14,12 @@ namespace semrover {
 
 // N flat Gaussian splats; every array has N entries, but writing points needs only position, color and label
 struct Surfels {
-    std::vector<std::array<float, 3>> position; // metres
-    std::vector<std::array<float, 3>> normal;   // unit
-    std::vector<std::array<float, 3>> color;    // sRGB, 0..1
-    std::vector<float> sigma_u, sigma_v;        // metres, standard deviations along the tangents
-    std::vector<float> opacity;                 // 0..1
-    std::vector<uint8_t> label;
+    std::vector<std::array<float, 3>> position = {}; // metres
+    std::vector<std::array<float, 3>> normal = {};   // unit
+    std::vector<std::array<float, 3>> color = {};    // sRGB, 0..1
+    std::vector<float> sigma_u = {}, sigma_v = {};   // metres, standard deviations along the tangents
+    std::vector<float> opacity = {};                 // 0..1
+    std::vector<uint8_t> label = {};
 };
 
 // the tangents of a surfel: u = normalize(e x n), e the axis that n leans on least (x before y before z); v = n x u, so

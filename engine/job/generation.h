@@ -17,7 +17,7 @@ struct GenerationRequest {
     PlyExports ply;
     bool replace = false; // what is at `output` and `ply`, and a finished run's state
     // of the file that the grid is from, to know an interrupted run by; none: of the grid itself
-    std::optional<uint64_t> grid_hash;
+    std::optional<uint64_t> grid_hash = {};
 };
 
 // what a generation without an output has done, for another of the same request

@@ -41,8 +41,8 @@ struct SchedulerConfig {
 
     bool final_sigma_zero = true; // dpmpp_2m and euler; else the last sigma is that of timestep 0
     bool use_karras_sigmas = false;
-    std::optional<double> sigma_min, sigma_max; // of the karras sigmas; by default the schedule's own
-    bool continuous_timesteps = false;          // euler, with v_prediction: the network sees 0.25 ln(sigma)
+    std::optional<double> sigma_min = {}, sigma_max = {}; // of the karras sigmas; by default the schedule's own
+    bool continuous_timesteps = false;                    // euler, with v_prediction: the network sees 0.25 ln(sigma)
 };
 
 // "ddpm", "ddim", "dpm++2m", "euler"; another name is a usage error that lists them

@@ -28,14 +28,14 @@ SplatCamera splat_camera(const Intrinsics& intrinsics, const Pose& pose);
 // what one camera sees; [height, width] row-major. w is the weight of a splat in a pixel, front to back.
 struct SplatImage {
     uint32_t width = 0, height = 0;
-    std::vector<float> color;          // [.., 3] sum of w rgb, nothing behind it
-    std::vector<float> alpha;          // sum of w
-    std::vector<float> normal;         // [.., 3] sum of w normal; camera frame, towards the camera
-    std::vector<float> depth_sum;      // sum of w depth, metres along the axis (or as SplatCamera::radial_depth says)
-    std::vector<float> depth_expected; // depth_sum / alpha, 0 where alpha is
-    std::vector<float> depth_median;   // of the splat with which alpha passes one half, else of the last; 0 for none
-    std::vector<uint32_t> label, cell; // of the splat with the largest w; kNothing for none
-    std::vector<uint8_t> visible;      // 1 where alpha reaches the threshold
+    std::vector<float> color = {};     // [.., 3] sum of w rgb, nothing behind it
+    std::vector<float> alpha = {};     // sum of w
+    std::vector<float> normal = {};    // [.., 3] sum of w normal; camera frame, towards the camera
+    std::vector<float> depth_sum = {}; // sum of w depth, metres along the axis (or as SplatCamera::radial_depth says)
+    std::vector<float> depth_expected = {}; // depth_sum / alpha, 0 where alpha is
+    std::vector<float> depth_median = {}; // of the splat with which alpha passes one half, else of the last; 0 for none
+    std::vector<uint32_t> label = {}, cell = {}; // of the splat with the largest w; kNothing for none
+    std::vector<uint8_t> visible = {};           // 1 where alpha reaches the threshold
 
     static constexpr uint32_t kNothing = 0xffffffffu;
 };
@@ -51,7 +51,7 @@ struct RasterizerOptions {
     uint32_t max_pairs = 0;                   // to begin with; 0: from the number of surfels
     CameraModel model = CameraModel::pinhole; // of all cameras
     // keeps pixels as files have them, over this background, in place of images: draw() and pixels(), not render()
-    std::optional<std::array<uint8_t, 3>> pixels_over;
+    std::optional<std::array<uint8_t, 3>> pixels_over = {};
 };
 
 // what one camera sees, on the device, a row a pixel: as SplatImages (kernels/splat.h) has it, or as files have it

@@ -12,8 +12,8 @@ namespace semrover {
 // rows as SplatScene of kernels/splat.h has them
 struct SurfelScene::Host {
     using Row = std::array<float, 4>;
-    std::vector<Row> positions, normals, colors;
-    std::vector<uint32_t> labels, cells;
+    std::vector<Row> positions = {}, normals = {}, colors = {};
+    std::vector<uint32_t> labels = {}, cells = {};
     bool complete = false; // normals are known
 
     size_t skipped() const

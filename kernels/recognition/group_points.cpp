@@ -17,6 +17,7 @@ Tensor group_points(Graph& g, Tensor points, Tensor centers, Tensor features, Te
               features.rows, features.cols, index.rows);
     const Tensor y = g.matrix(index.rows, 3 + features.cols, DType::f32, "grouped");
     const GroupPointsPush push{.rows = index.rows,
+                               .first_row = 0,
                                .neighbors = index.rows / centers.rows,
                                .features = features.cols,
                                .features_ld = features.ld,

@@ -34,7 +34,7 @@ SortedPairs radix_sort(Graph& g, Tensor keys, Tensor values, const RadixSortOpti
     SR_ASSERT(!values.valid() || (values.rows == keys.rows && values.ld == 1), "radix_sort: {} values for {} keys",
               values.rows, keys.rows);
     const uint32_t passes = divide_up(options.bits, kDigitBits), digit = divide_up(options.bits, passes);
-    RadixSortPush push{.size = keys.rows, .workers = workers_for(keys.rows)};
+    RadixSortPush push{.size = keys.rows, .workers = workers_for(keys.rows), .shift = 0, .buckets = 0};
     const Tensor count = options.count.valid() ? options.count : keys;
     for (uint32_t pass = 0; pass < passes; ++pass) {
         push.shift = pass * digit;

@@ -27,11 +27,14 @@ Tensor knn(Graph& g, Tensor points, const KnnOptions& options)
     SR_ASSERT(!others || (options.queries.dtype == DType::f32 && options.queries.cols >= 3 && !labelled),
               "knn: queries [{}, {}]{}", options.queries.rows, options.queries.cols, labelled ? " with labels" : "");
     const uint32_t bits = std::clamp<uint32_t>(uint32_t(std::bit_width(rows / 2)), 6, 22);
-    KnnPush push{.rows = rows, .points_ld = points.ld, .mask = (1u << bits) - 1, .cell_size = options.cell_size};
-    push.radius2 = options.radius > 0 ? options.radius * options.radius : 1e38f;
-    push.min_same_label = labelled ? options.min_same_label : 0;
-    push.queries = others ? options.queries.rows : 0;
-    push.queries_ld = others ? options.queries.ld : 0;
+    const KnnPush push{.rows = rows,
+                       .points_ld = points.ld,
+                       .mask = (1u << bits) - 1,
+                       .cell_size = options.cell_size,
+                       .radius2 = options.radius > 0 ? options.radius * options.radius : 1e38f,
+                       .queries = others ? options.queries.rows : 0,
+                       .queries_ld = others ? options.queries.ld : 0,
+                       .min_same_label = labelled ? options.min_same_label : 0};
     const ConstantValue has_labels{"kLabels", labelled};
     const Tensor keys = g.array(rows, DType::u32, "cell hashes");
     g.dispatch(kernel::knn_hash, {points, keys}, push, threads(rows));

@@ -17,6 +17,7 @@ Tensor shade(Graph& g, const TraceScene& scene, Tensor view, const ShadeOptions&
               "shade: {} x {} pixels, {} samples, {} rays, view [{}, {}]", options.width, options.height,
               options.samples, options.ambient_rays, view.rows, view.ld);
     const ShadePush push{.rows = pixels,
+                         .first_row = 0,
                          .width = options.width,
                          .height = options.height,
                          .samples = options.samples,

@@ -9,13 +9,13 @@ namespace semrover {
 Result<std::unique_ptr<CopyRing>> CopyRing::create(Device& device, size_t count)
 {
     std::unique_ptr<CopyRing> r(new CopyRing(device));
-    VkCommandPoolCreateInfo pool{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO};
+    auto pool = vk_struct<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
     pool.queueFamilyIndex = device.queue_family();
     pool.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
     SR_VK(vkCreateCommandPool(device.handle(), &pool, nullptr, &r->pool_));
     r->commands_.resize(count);
     r->tickets_.assign(count, 0);
-    VkCommandBufferAllocateInfo allocate{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO};
+    auto allocate = vk_struct<VkCommandBufferAllocateInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO);
     allocate.commandPool = r->pool_;
     allocate.commandBufferCount = uint32_t(count);
     SR_VK(vkAllocateCommandBuffers(device.handle(), &allocate, r->commands_.data()));

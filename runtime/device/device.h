@@ -19,8 +19,8 @@ class PipelineStore;
 class Profile;
 
 struct DeviceOptions {
-    std::string select;      // "", an index of list_devices(), or part of a name
-    std::string limits;      // override_limits(); also from SEMROVER_LIMITS
+    std::string select = {}; // "", an index of list_devices(), or part of a name
+    std::string limits = {}; // override_limits(); also from SEMROVER_LIMITS
     uint64_t max_bytes = 0;  // refuse to allocate more device memory than this; 0: no budget
     bool validation = false; // Khronos validation with synchronization checks; also SEMROVER_VALIDATION=1 or =fatal
 };
@@ -32,8 +32,8 @@ struct HostDevice {
     VkDevice device = VK_NULL_HANDLE; // Vulkan 1.2 with timelineSemaphore enabled
     VkQueue queue = VK_NULL_HANDLE;   // with compute
     uint32_t queue_family = 0;
-    bool float16 = false;               // shaderFloat16 is enabled too
-    std::function<void()> lock, unlock; // around every use of the queue; may be empty
+    bool float16 = false;                         // shaderFloat16 is enabled too
+    std::function<void()> lock = {}, unlock = {}; // around every use of the queue; may be empty
 };
 
 // bytes that crossed the border between host and device: to the host, from the host

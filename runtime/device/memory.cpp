@@ -37,7 +37,7 @@ Result<std::unique_ptr<Buffer>> Buffer::create(Device& device, uint64_t bytes, M
                     bytes, device.limits().max_allocation);
     std::unique_ptr<Buffer> b(new Buffer(device));
     b->bytes_ = round_up64(std::max<uint64_t>(bytes, 1), device.limits().offset_alignment);
-    VkBufferCreateInfo info{VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO};
+    auto info = vk_struct<VkBufferCreateInfo>(VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO);
     info.size = b->bytes_;
     info.usage = VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
     if (kind == MemoryKind::device)
@@ -55,7 +55,7 @@ Result<std::unique_ptr<Buffer>> Buffer::create(Device& device, uint64_t bytes, M
     const int type = choose_type(memory, needs.memoryTypeBits, kind);
     if (type < 0)
         return fail(ErrorCode::no_device, "{}: the device has no memory type for it", name);
-    VkMemoryAllocateInfo allocate{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO};
+    auto allocate = vk_struct<VkMemoryAllocateInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO);
     allocate.allocationSize = needs.size;
     allocate.memoryTypeIndex = uint32_t(type);
     if (vkAllocateMemory(device.handle(), &allocate, nullptr, &b->memory_) != VK_SUCCESS)

@@ -71,7 +71,7 @@ Result<std::unique_ptr<PipelineStore>> PipelineStore::create(Device& device)
     store->cache_path_ = cache_path(device.physical());
     const std::vector<char> blob =
         store->cache_path_.empty() ? std::vector<char>{} : load_blob(store->cache_path_, device.physical());
-    VkPipelineCacheCreateInfo info{VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO};
+    auto info = vk_struct<VkPipelineCacheCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO);
     info.initialDataSize = blob.size();
     info.pInitialData = blob.data();
     store->reused_bytes_ = blob.size();
@@ -138,12 +138,12 @@ Status PipelineStore::make_layout(const KernelVariant& variant, Pipeline& out)
             {b.binding,
              b.kind == BindingKind::texel ? VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER : VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
              1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr});
-    VkDescriptorSetLayoutCreateInfo set{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO};
+    auto set = vk_struct<VkDescriptorSetLayoutCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO);
     set.bindingCount = uint32_t(bindings.size());
     set.pBindings = bindings.data();
     SR_VK(vkCreateDescriptorSetLayout(device_.handle(), &set, nullptr, &out.set_layout));
     const VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, variant.push_bytes};
-    VkPipelineLayoutCreateInfo layout{VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO};
+    auto layout = vk_struct<VkPipelineLayoutCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO);
     layout.setLayoutCount = 1;
     layout.pSetLayouts = &out.set_layout;
     layout.pushConstantRangeCount = variant.push_bytes ? 1 : 0;
@@ -155,7 +155,7 @@ Status PipelineStore::make_layout(const KernelVariant& variant, Pipeline& out)
 Status PipelineStore::make(const KernelVariant& variant, const std::map<uint32_t, uint32_t>& constants, Pipeline& out)
 {
     SR_CHECK(make_layout(variant, out));
-    VkShaderModuleCreateInfo code{VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO};
+    auto code = vk_struct<VkShaderModuleCreateInfo>(VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO);
     code.codeSize = variant.code.size_bytes();
     code.pCode = variant.code.data();
     VkShaderModule module;
@@ -168,7 +168,7 @@ Status PipelineStore::make(const KernelVariant& variant, const std::map<uint32_t
     }
     const VkSpecializationInfo specialization{uint32_t(entries.size()), entries.data(), values.size() * 4,
                                               values.data()};
-    VkComputePipelineCreateInfo info{VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO};
+    auto info = vk_struct<VkComputePipelineCreateInfo>(VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO);
     info.stage = {VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO,
                   nullptr,
                   0,

@@ -72,12 +72,12 @@ Status Program::make_sets()
         return {};
     const VkDescriptorPoolSize sizes[] = {{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, std::max(storage, 1u)},
                                           {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, std::max(texel, 1u)}};
-    VkDescriptorPoolCreateInfo pool{VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO};
+    auto pool = vk_struct<VkDescriptorPoolCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO);
     pool.maxSets = uint32_t(layouts.size());
     pool.poolSizeCount = 2;
     pool.pPoolSizes = sizes;
     SR_VK(vkCreateDescriptorPool(device_.handle(), &pool, nullptr, &descriptors_));
-    VkDescriptorSetAllocateInfo allocate{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO};
+    auto allocate = vk_struct<VkDescriptorSetAllocateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO);
     allocate.descriptorPool = descriptors_;
     allocate.descriptorSetCount = uint32_t(layouts.size());
     allocate.pSetLayouts = layouts.data();
@@ -91,7 +91,8 @@ Status Program::make_sets()
 Status Program::bind(const Pass& pass, VkDescriptorSet set)
 {
     const size_t n = pass.bindings.size();
-    std::vector<VkWriteDescriptorSet> writes(n, {VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET});
+    std::vector<VkWriteDescriptorSet> writes(n,
+                                             vk_struct<VkWriteDescriptorSet>(VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET));
     std::vector<VkDescriptorBufferInfo> buffers(n);
     std::vector<VkBufferView> views(n);
     for (size_t i = 0; i < n; ++i) {
@@ -103,7 +104,7 @@ Status Program::bind(const Pass& pass, VkDescriptorSet set)
         writes[i].dstBinding = pass.variant->bindings[i].binding;
         writes[i].descriptorCount = 1;
         if (b.kind == BindingKind::texel) {
-            VkBufferViewCreateInfo info{VK_STRUCTURE_TYPE_BUFFER_VIEW_CREATE_INFO};
+            auto info = vk_struct<VkBufferViewCreateInfo>(VK_STRUCTURE_TYPE_BUFFER_VIEW_CREATE_INFO);
             info.buffer = buffer;
             info.format = VK_FORMAT_R32G32B32A32_UINT;
             info.offset = offset;
@@ -124,18 +125,18 @@ Status Program::bind(const Pass& pass, VkDescriptorSet set)
 
 Status Program::record()
 {
-    VkCommandPoolCreateInfo pool{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO};
+    auto pool = vk_struct<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
     pool.queueFamilyIndex = device_.queue_family();
     SR_VK(vkCreateCommandPool(device_.handle(), &pool, nullptr, &commands_pool_));
     commands_.resize(plan_.submits);
     if (commands_.empty())
         return {};
-    VkCommandBufferAllocateInfo allocate{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO};
+    auto allocate = vk_struct<VkCommandBufferAllocateInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO);
     allocate.commandPool = commands_pool_;
     allocate.commandBufferCount = plan_.submits;
     SR_VK(vkAllocateCommandBuffers(device_.handle(), &allocate, commands_.data()));
     if (device_.profile()) {
-        VkQueryPoolCreateInfo queries{VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO};
+        auto queries = vk_struct<VkQueryPoolCreateInfo>(VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO);
         queries.queryType = VK_QUERY_TYPE_TIMESTAMP;
         queries.queryCount = uint32_t(plan_.passes.size() * 2);
         SR_VK(vkCreateQueryPool(device_.handle(), &queries, nullptr, &queries_));

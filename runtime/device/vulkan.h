@@ -11,6 +11,16 @@ namespace semrover {
 const char* vk_result_name(VkResult result);
 Error vk_error(VkResult result, const char* call);
 
+// a structure of Vulkan's: its type, what follows it, and zeros
+template <typename T>
+T vk_struct(VkStructureType type, void* next = nullptr)
+{
+    T made{};
+    made.sType = type;
+    made.pNext = next;
+    return made;
+}
+
 } // namespace semrover
 
 #define SR_VK(call)                                                                                                    \

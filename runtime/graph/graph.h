@@ -72,12 +72,12 @@ struct BandedBinding {
 };
 
 struct DispatchOptions {
-    std::vector<ConstantValue> constants;
+    std::vector<ConstantValue> constants = {};
     // with these the op can be cut into bands of rows; needs a push member `rows`, and `first_row` where the shader
     // must know which rows it has
-    std::vector<BandedBinding> banded;
+    std::vector<BandedBinding> banded = {};
     // the constant with which a producer of binding X can do this dispatch's work in its epilogue ("kGelu")
-    std::string_view absorbed_as;
+    std::string_view absorbed_as = {};
     bool keeps_x = false; // absorbed: the producer goes on writing X, others may read it (statistics of X)
     double flops = 0;
 };

@@ -89,7 +89,7 @@ class Plots {
         double first, last; // along the street
         uint64_t key;
         bool house, open_first = false, open_last = false;
-        FacadeStyle style;
+        FacadeStyle style = {};
         double top = 0; // of the house, in the world
     };
 

@@ -16,10 +16,10 @@ namespace semrover {
 // A mesh as rays see it, on the host: the tables of TraceScene (kernels/trace.h). Where faces meet they are smooth if
 // they bend by less than 44 degrees.
 struct TraceTables {
-    std::vector<std::array<uint32_t, 16>> nodes;
-    std::vector<std::array<uint32_t, 12>> triangles, corners;
-    std::vector<std::array<uint32_t, 8>> materials;
-    std::vector<uint32_t> texels; // all levels of all pictures
+    std::vector<std::array<uint32_t, 16>> nodes = {};
+    std::vector<std::array<uint32_t, 12>> triangles = {}, corners = {};
+    std::vector<std::array<uint32_t, 8>> materials = {};
+    std::vector<uint32_t> texels = {}; // all levels of all pictures
 };
 
 // the faces that are named, all if none are; gloss: of each material, 0 if empty. The mesh must pass check_mesh.

@@ -27,8 +27,8 @@ Daylight daylight_of_seed(uint64_t seed);
 // 128, label 10, visible 0
 struct TracedImage {
     uint32_t width = 0, height = 0;
-    std::vector<uint8_t> color, normal, label, visible; // color and normal [height, width, 3]
-    std::vector<uint16_t> depth;                        // millimetres
+    std::vector<uint8_t> color = {}, normal = {}, label = {}, visible = {}; // color and normal [height, width, 3]
+    std::vector<uint16_t> depth = {};                                       // millimetres
 };
 
 // FOLDER/{color,depth,normal,label,visible}/NNNNNN.png; folders are made. Errors: bad_input

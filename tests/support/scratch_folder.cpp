@@ -1,0 +1,43 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/scratch_folder.h"
+
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+
+namespace semrover {
+
+ScratchFolder::ScratchFolder()
+{
+    std::string name = (std::filesystem::temp_directory_path() / "semrover-test-XXXXXX").string();
+    if (!mkdtemp(name.data()))
+        std::abort();
+    path_ = name;
+}
+
+ScratchFolder::~ScratchFolder()
+{
+    std::filesystem::remove_all(path_);
+}
+
+std::filesystem::path ScratchFolder::put(std::string_view name, std::string_view text) const
+{
+    std::filesystem::path file = path_ / name;
+    std::ofstream(file, std::ios::binary).write(text.data(), static_cast<std::streamsize>(text.size()));
+    return file;
+}
+
+size_t ScratchFolder::entries() const
+{
+    using Iterator = std::filesystem::directory_iterator;
+    return static_cast<size_t>(std::distance(Iterator(path_), Iterator()));
+}
+
+std::string contents(const std::filesystem::path& path)
+{
+    std::ifstream in(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+}
+
+} // namespace semrover
