@@ -144,6 +144,62 @@ TEST(MeshFiles, concave_polygons_cover_their_own_area)
     EXPECT_NEAR(sum, 3, 1e-6);
 }
 
+double surface(const Mesh& m)
+{
+    double sum = 0;
+    for (size_t f = 0; f < m.faces.size(); ++f)
+        sum += face_area(m, f);
+    return sum;
+}
+
+// a strip of width 1 that winds around itself, with as many corners as are cut by ears
+std::string spiral()
+{
+    std::string vertices, face = "f";
+    double x[256], y[256], area = 0;
+    for (int i = 0; i < 256; ++i) {
+        const int along = i < 128 ? i : 255 - i;
+        const double radius = 0.5 * along + (i < 128 ? 3 : 2), angle = 0.2 * along;
+        x[i] = radius * std::cos(angle);
+        y[i] = radius * std::sin(angle);
+        vertices += fmt::format("v {:.6f} {:.6f} 0\n", x[i], y[i]);
+        face += fmt::format(" {}", i + 1);
+    }
+    for (int i = 0; i < 256; ++i)
+        area += (x[i] * y[(i + 1) % 256] - x[(i + 1) % 256] * y[i]) / 2;
+    return vertices + face + fmt::format("\n# {:.6f}\n", area);
+}
+
+TEST(MeshFiles, a_long_concave_polygon_covers_its_own_area)
+{
+    const ScratchFolder folder;
+    const std::string text = spiral();
+    const Mesh m = readable(folder.put("m.obj", text));
+    EXPECT_EQ(m.faces.size(), 254u);
+    EXPECT_NEAR(surface(m), std::stod(text.substr(text.find('#') + 1)), 1e-3);
+}
+
+TEST(MeshFiles, a_face_of_more_corners_than_are_supported_is_refused)
+{
+    const ScratchFolder folder;
+    std::string face;
+    for (size_t i = 0; i < 16384; ++i)
+        face += " 1 2 3 4";
+    const std::string v = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nusemtl a b\n";
+    const Mesh m = readable(folder.put("m.obj", v + "f" + face + "\n"));
+    EXPECT_EQ(m.faces.size(), 65534u);
+    EXPECT_TRUE(says(read_mesh(folder.put("m.obj", v + "f" + face + " 1\n")),
+                     "line 6: a face of more than 65536 corners, which is not supported"));
+    EXPECT_TRUE(says(read_mesh(folder.put("m.obj", v + "f" + face + face + "\n")), "more than 65536 corners"));
+    std::string list;
+    for (size_t i = 0; i < 65537; ++i)
+        list += " 0";
+    const std::string ply = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty "
+                            "float z\nelement face 1\nproperty list uint int vertex_indices\nend_header\n0 0 0\n";
+    EXPECT_TRUE(says(read_mesh(folder.put("m.ply", ply + "65537" + list + "\n")),
+                     "face 0 has 65537 corners, at most 65536 are supported"));
+}
+
 TEST(MeshFiles, broken_obj_files_are_one_line_that_says_where)
 {
     const ScratchFolder folder;
