@@ -232,7 +232,7 @@ TEST(MeshFiles, broken_obj_files_are_one_line_that_says_where)
              {"mtllib ..\\x.mtl\n", "expected a file within its own folder"},
              {"mtllib link.mtl\n", "leads out of its folder"},
              {"mtllib bad.mtl\n", "bad.mtl': line 2: refers to 'none.png', which is missing"},
-             {"mtllib text.mtl\n", "expected a PNG or JPEG image"},
+             {"mtllib text.mtl\n", "expected a PNG, JPEG, BMP, HDR or TGA image"},
              {"mtllib out.mtl\n", "refers to '../x.png'"},
              {"mtllib kd.mtl\n", "the colour 2"},
              {"mtllib early.mtl\n", "in front of the first newmtl"}})
