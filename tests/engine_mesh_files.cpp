@@ -128,6 +128,21 @@ TEST(MeshFiles, obj_polygons_indices_colours_and_materials_are_read)
     EXPECT_TRUE(colored.face_materials.empty());
 }
 
+TEST(MeshFiles, a_texture_of_an_obj_may_be_a_bmp)
+{
+    const ScratchFolder folder;
+    std::string bmp(58, '\0'); // one pixel: blue 3, green 2, red 1, padding
+    bmp.replace(0, 2, "BM");
+    for (const auto& [at, value] :
+         {std::pair{10, 54}, {14, 40}, {18, 1}, {22, 1}, {26, 1}, {28, 24}, {54, 3}, {55, 2}, {56, 1}})
+        bmp[size_t(at)] = char(value);
+    folder.put("a.bmp", bmp);
+    folder.put("m.mtl", "newmtl a\nmap_Kd a.bmp\n");
+    const Mesh m =
+        readable(folder.put("m.obj", "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\n"));
+    EXPECT_EQ(m.textures.at(0).image.pixels, (std::vector<uint8_t>{1, 2, 3}));
+}
+
 TEST(MeshFiles, concave_polygons_cover_their_own_area)
 {
     const ScratchFolder folder;
@@ -411,6 +426,56 @@ TEST(MeshFiles, a_cut_glb_is_refused_at_every_length)
         changed[at] = char(changed[at] ^ 0x15);
         (void)read_mesh(folder.put("changed.glb", changed));
     }
+}
+
+// ---- docs/formats.md §5.1: files that packaged libraries get wrong
+
+Path library_case(const char* name)
+{
+    return Path(SEMROVER_SOURCE_DIR) / "tests/data/meshes/inside" / name;
+}
+
+TEST(MeshFiles, obj_files_that_libraries_get_wrong_are_read_right_or_refused)
+{
+    EXPECT_TRUE(says(read_mesh(library_case("range.obj")), "line 5: refers to vertex -9, there are 3 so far"));
+    EXPECT_TRUE(says(read_mesh(library_case("range_uv.obj")), "line 6: refers to texture coordinate 9, there are 1"));
+    EXPECT_TRUE(says(read_mesh(library_case("number.obj")), "line 2: expected a number, found '1e999'"));
+    EXPECT_TRUE(
+        says(read_mesh(library_case("climb.obj")), "line 2: refers to '../outside.mtl', expected a file within"));
+    EXPECT_NEAR(surface(readable(library_case("concave.obj"))), 2.8, 1e-6);
+    EXPECT_NEAR(surface(readable(library_case("joined.obj"))), 1, 1e-6);
+    const Mesh names = readable(library_case("names.obj"));
+    EXPECT_EQ(names.materials.at(names.face_materials.at(0)).name, "brick wall");
+    EXPECT_EQ(readable(library_case("colours.obj")).colors,
+              (std::vector<std::array<uint8_t, 3>>{{255, 0, 0}, {255, 255, 255}, {0, 0, 255}}));
+}
+
+TEST(MeshFiles, gltf_files_that_libraries_get_wrong_are_read_right_or_refused)
+{
+    EXPECT_TRUE(says(read_mesh(library_case("accessor.gltf")), "4000 elements of 12 bytes"));
+    EXPECT_TRUE(says(read_mesh(library_case("climb.gltf")), "refers to '../outside.bin', expected a file within"));
+    EXPECT_TRUE(says(read_mesh(library_case("cycle.gltf")), "nodes[0]: is the child of two nodes, or of itself"));
+    EXPECT_TRUE(says(read_mesh(library_case("required.gltf")), "needs the extension 'EXT_unheard_of'"));
+    const std::vector<std::array<float, 3>> corners = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    EXPECT_EQ(readable(library_case("percent.gltf"), UpAxis::z).positions, corners);
+    EXPECT_EQ(readable(library_case("quantized.gltf"), UpAxis::z).positions, corners);
+    // u twice as long and v three times, then a quarter turn, then (0.5, 0.25) further
+    const Mesh turned = readable(library_case("transform.gltf"));
+    const float expected[3][2] = {{0.5f, 0.25f}, {0.5f, -1.75f}, {3.5f, 0.25f}};
+    for (size_t c = 0; c < 3; ++c)
+        for (size_t a = 0; a < 2; ++a)
+            EXPECT_NEAR(turned.uvs.at(0)[c][a], expected[c][a], 1e-6) << c;
+}
+
+TEST(MeshFiles, depth_of_a_gltf_costs_no_stack)
+{
+    const ScratchFolder folder;
+    std::string nodes = R"("children":[1])";
+    for (size_t i = 2; i <= 20000; ++i)
+        nodes += fmt::format(R"(}},{{"children":[{}])", i);
+    EXPECT_EQ(readable(folder.put("m.gltf", gltf(kStrip, "", "", nodes + R"(},{"mesh":0)"))).faces.size(), 2u);
+    const std::string deep = std::string(200000, '[') + std::string(200000, ']');
+    EXPECT_TRUE(says(read_mesh(folder.put("m.gltf", gltf(kStrip, R"(,"extras":)" + deep))), "nested deeper than 64"));
 }
 
 TEST(MeshFiles, labels_come_from_names_maps_and_faces)
