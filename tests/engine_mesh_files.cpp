@@ -128,6 +128,21 @@ TEST(MeshFiles, obj_polygons_indices_colours_and_materials_are_read)
     EXPECT_TRUE(colored.face_materials.empty());
 }
 
+TEST(MeshFiles, a_texture_of_an_obj_may_be_a_bmp)
+{
+    const ScratchFolder folder;
+    std::string bmp(58, '\0'); // one pixel: blue 3, green 2, red 1, padding
+    bmp.replace(0, 2, "BM");
+    for (const auto& [at, value] :
+         {std::pair{10, 54}, {14, 40}, {18, 1}, {22, 1}, {26, 1}, {28, 24}, {54, 3}, {55, 2}, {56, 1}})
+        bmp[size_t(at)] = char(value);
+    folder.put("a.bmp", bmp);
+    folder.put("m.mtl", "newmtl a\nmap_Kd a.bmp\n");
+    const Mesh m =
+        readable(folder.put("m.obj", "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\n"));
+    EXPECT_EQ(m.textures.at(0).image.pixels, (std::vector<uint8_t>{1, 2, 3}));
+}
+
 TEST(MeshFiles, concave_polygons_cover_their_own_area)
 {
     const ScratchFolder folder;
@@ -142,6 +157,62 @@ TEST(MeshFiles, concave_polygons_cover_their_own_area)
     }
     EXPECT_EQ(m.faces.size(), 4u);
     EXPECT_NEAR(sum, 3, 1e-6);
+}
+
+double surface(const Mesh& m)
+{
+    double sum = 0;
+    for (size_t f = 0; f < m.faces.size(); ++f)
+        sum += face_area(m, f);
+    return sum;
+}
+
+// a strip of width 1 that winds around itself, with as many corners as are cut by ears
+std::string spiral()
+{
+    std::string vertices, face = "f";
+    double x[256], y[256], area = 0;
+    for (int i = 0; i < 256; ++i) {
+        const int along = i < 128 ? i : 255 - i;
+        const double radius = 0.5 * along + (i < 128 ? 3 : 2), angle = 0.2 * along;
+        x[i] = radius * std::cos(angle);
+        y[i] = radius * std::sin(angle);
+        vertices += fmt::format("v {:.6f} {:.6f} 0\n", x[i], y[i]);
+        face += fmt::format(" {}", i + 1);
+    }
+    for (int i = 0; i < 256; ++i)
+        area += (x[i] * y[(i + 1) % 256] - x[(i + 1) % 256] * y[i]) / 2;
+    return vertices + face + fmt::format("\n# {:.6f}\n", area);
+}
+
+TEST(MeshFiles, a_long_concave_polygon_covers_its_own_area)
+{
+    const ScratchFolder folder;
+    const std::string text = spiral();
+    const Mesh m = readable(folder.put("m.obj", text));
+    EXPECT_EQ(m.faces.size(), 254u);
+    EXPECT_NEAR(surface(m), std::stod(text.substr(text.find('#') + 1)), 1e-3);
+}
+
+TEST(MeshFiles, a_face_of_more_corners_than_are_supported_is_refused)
+{
+    const ScratchFolder folder;
+    std::string face;
+    for (size_t i = 0; i < 16384; ++i)
+        face += " 1 2 3 4";
+    const std::string v = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nusemtl a b\n";
+    const Mesh m = readable(folder.put("m.obj", v + "f" + face + "\n"));
+    EXPECT_EQ(m.faces.size(), 65534u);
+    EXPECT_TRUE(says(read_mesh(folder.put("m.obj", v + "f" + face + " 1\n")),
+                     "line 6: a face of more than 65536 corners, which is not supported"));
+    EXPECT_TRUE(says(read_mesh(folder.put("m.obj", v + "f" + face + face + "\n")), "more than 65536 corners"));
+    std::string list;
+    for (size_t i = 0; i < 65537; ++i)
+        list += " 0";
+    const std::string ply = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty "
+                            "float z\nelement face 1\nproperty list uint int vertex_indices\nend_header\n0 0 0\n";
+    EXPECT_TRUE(says(read_mesh(folder.put("m.ply", ply + "65537" + list + "\n")),
+                     "face 0 has 65537 corners, at most 65536 are supported"));
 }
 
 TEST(MeshFiles, broken_obj_files_are_one_line_that_says_where)
@@ -176,7 +247,7 @@ TEST(MeshFiles, broken_obj_files_are_one_line_that_says_where)
              {"mtllib ..\\x.mtl\n", "expected a file within its own folder"},
              {"mtllib link.mtl\n", "leads out of its folder"},
              {"mtllib bad.mtl\n", "bad.mtl': line 2: refers to 'none.png', which is missing"},
-             {"mtllib text.mtl\n", "expected a PNG or JPEG image"},
+             {"mtllib text.mtl\n", "expected a PNG, JPEG, BMP, HDR or TGA image"},
              {"mtllib out.mtl\n", "refers to '../x.png'"},
              {"mtllib kd.mtl\n", "the colour 2"},
              {"mtllib early.mtl\n", "in front of the first newmtl"}})
@@ -297,6 +368,14 @@ TEST(MeshFiles, broken_gltf_files_are_one_line_that_says_where)
              {R"({"asset":{"version":"2.0"}})", "no faces"},
              {R"({"asset":{"version":"2.0"},"extensionsRequired":["KHR_draco_mesh_compression"]})",
               "needs the extension 'KHR_draco_mesh_compression'"},
+             {R"({"asset":{"version":"2.0"},"nodes":{"a":{}}})", "nodes: expected an array, found object"},
+             {R"({"asset":{"version":"2.0"},"scene":0,"scenes":{"nodes":[]}})", "scenes: expected an array"},
+             {R"({"asset":{"version":"2.0"},"buffers":7})", "buffers: expected an array, found number"},
+             {R"({"asset":{"version":"2.0"},"extensionsRequired":{"a":"KHR_draco_mesh_compression"}})",
+              "extensionsRequired: expected an array, found object"},
+             {gltf(kStrip, R"(,"materials":{"a":{}})"), "materials: expected an array, found object"},
+             {gltf(kStrip, "", "", R"("mesh":0,"children":{"a":1}},{"mesh":0)"),
+              "children: expected an array, found object"},
              {gltf(with("{}")), "refers to accessors[-1], there are 1"},
              {gltf(with(R"({"POSITION":7})")), "refers to accessors[7], there are 1"},
              {gltf(R"({"attributes":{"POSITION":0},"mode":9})"), "expected triangles, strips or fans"},
@@ -347,6 +426,56 @@ TEST(MeshFiles, a_cut_glb_is_refused_at_every_length)
         changed[at] = char(changed[at] ^ 0x15);
         (void)read_mesh(folder.put("changed.glb", changed));
     }
+}
+
+// ---- docs/formats.md §5.1: files that packaged libraries get wrong
+
+Path library_case(const char* name)
+{
+    return Path(SEMROVER_SOURCE_DIR) / "tests/data/meshes/inside" / name;
+}
+
+TEST(MeshFiles, obj_files_that_libraries_get_wrong_are_read_right_or_refused)
+{
+    EXPECT_TRUE(says(read_mesh(library_case("range.obj")), "line 5: refers to vertex -9, there are 3 so far"));
+    EXPECT_TRUE(says(read_mesh(library_case("range_uv.obj")), "line 6: refers to texture coordinate 9, there are 1"));
+    EXPECT_TRUE(says(read_mesh(library_case("number.obj")), "line 2: expected a number, found '1e999'"));
+    EXPECT_TRUE(
+        says(read_mesh(library_case("climb.obj")), "line 2: refers to '../outside.mtl', expected a file within"));
+    EXPECT_NEAR(surface(readable(library_case("concave.obj"))), 2.8, 1e-6);
+    EXPECT_NEAR(surface(readable(library_case("joined.obj"))), 1, 1e-6);
+    const Mesh names = readable(library_case("names.obj"));
+    EXPECT_EQ(names.materials.at(names.face_materials.at(0)).name, "brick wall");
+    EXPECT_EQ(readable(library_case("colours.obj")).colors,
+              (std::vector<std::array<uint8_t, 3>>{{255, 0, 0}, {255, 255, 255}, {0, 0, 255}}));
+}
+
+TEST(MeshFiles, gltf_files_that_libraries_get_wrong_are_read_right_or_refused)
+{
+    EXPECT_TRUE(says(read_mesh(library_case("accessor.gltf")), "4000 elements of 12 bytes"));
+    EXPECT_TRUE(says(read_mesh(library_case("climb.gltf")), "refers to '../outside.bin', expected a file within"));
+    EXPECT_TRUE(says(read_mesh(library_case("cycle.gltf")), "nodes[0]: is the child of two nodes, or of itself"));
+    EXPECT_TRUE(says(read_mesh(library_case("required.gltf")), "needs the extension 'EXT_unheard_of'"));
+    const std::vector<std::array<float, 3>> corners = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    EXPECT_EQ(readable(library_case("percent.gltf"), UpAxis::z).positions, corners);
+    EXPECT_EQ(readable(library_case("quantized.gltf"), UpAxis::z).positions, corners);
+    // u twice as long and v three times, then a quarter turn, then (0.5, 0.25) further
+    const Mesh turned = readable(library_case("transform.gltf"));
+    const float expected[3][2] = {{0.5f, 0.25f}, {0.5f, -1.75f}, {3.5f, 0.25f}};
+    for (size_t c = 0; c < 3; ++c)
+        for (size_t a = 0; a < 2; ++a)
+            EXPECT_NEAR(turned.uvs.at(0)[c][a], expected[c][a], 1e-6) << c;
+}
+
+TEST(MeshFiles, depth_of_a_gltf_costs_no_stack)
+{
+    const ScratchFolder folder;
+    std::string nodes = R"("children":[1])";
+    for (size_t i = 2; i <= 20000; ++i)
+        nodes += fmt::format(R"(}},{{"children":[{}])", i);
+    EXPECT_EQ(readable(folder.put("m.gltf", gltf(kStrip, "", "", nodes + R"(},{"mesh":0)"))).faces.size(), 2u);
+    const std::string deep = std::string(200000, '[') + std::string(200000, ']');
+    EXPECT_TRUE(says(read_mesh(folder.put("m.gltf", gltf(kStrip, R"(,"extras":)" + deep))), "nested deeper than 64"));
 }
 
 TEST(MeshFiles, labels_come_from_names_maps_and_faces)

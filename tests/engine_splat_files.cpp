@@ -430,6 +430,8 @@ TEST(GltfSplats, refuses_malformed_files)
     EXPECT_TRUE(says(with("/nodes/1/mesh", 7), "node 1: there is no mesh 7"));
     EXPECT_TRUE(says(with("/nodes/0/children", {0}), "nodes more than 64 deep"));
     EXPECT_TRUE(says(with("/nodes/0/children", {5}), "there is no node 5"));
+    EXPECT_TRUE(says(with("/nodes/0/children", {{"a", 1}}), "children: expected an array, found object"));
+    EXPECT_TRUE(says(with("/scenes/0/nodes", {{"a", 0}}), "nodes: expected an array, found object"));
     std::string logarithms = kBinary;
     logarithms.replace(20, 4, floats({-3}));
     EXPECT_TRUE(says(read(glb(hand_made().dump(), logarithms)), "splat 0: a scale of -3: an early draft"));

@@ -159,6 +159,13 @@ const Json* GltfDocument::entry(const char* list, const Json& index) const
     return &(*found)[index.get<size_t>()];
 }
 
+Status GltfDocument::check_array(const Json& value, const char* key) const
+{
+    if (value.is_array())
+        return {};
+    return fail(ErrorCode::bad_input, "{}: {}: expected an array, found {}", where_, key, value.type_name());
+}
+
 Status GltfDocument::walk(const Json& index, const std::array<double, 16>& parent, size_t depth, size_t& visits,
                           std::vector<GltfInstance>& out) const
 {
@@ -182,9 +189,11 @@ Status GltfDocument::walk(const Json& index, const std::array<double, 16>& paren
                         printable(mesh->dump(-1, ' ', true), 60));
         out.push_back({mesh->get<uint64_t>(), m});
     }
-    if (const auto children = node->find("children"); children != node->end())
+    if (const auto children = node->find("children"); children != node->end()) {
+        SR_CHECK(check_array(*children, "children"));
         for (const Json& child : *children)
             SR_CHECK(walk(child, m, depth + 1, visits, out));
+    }
     return {};
 }
 
@@ -196,12 +205,15 @@ Result<std::vector<GltfInstance>> GltfDocument::instances() const
     std::vector<GltfInstance> out;
     size_t visits = 0;
     if (scene && scene->contains("nodes")) {
+        SR_CHECK(check_array((*scene)["nodes"], "nodes"));
         for (const Json& node : (*scene)["nodes"])
             SR_CHECK(walk(node, kIdentity, 0, visits, out));
         return out;
     }
     // without a scene, meshes where they are
     const auto meshes = json_.find("meshes");
+    if (meshes != json_.end())
+        SR_CHECK(check_array(*meshes, "meshes"));
     for (uint64_t i = 0; meshes != json_.end() && i < std::min(meshes->size(), kMaxInstances); ++i)
         out.push_back({i, kIdentity});
     return out;

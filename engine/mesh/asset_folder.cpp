@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/mesh/asset_folder.h"
 
+#include "engine/mesh/texture_image.h"
 #include "runtime/base/quote.h"
 
 #include <algorithm>
@@ -43,7 +44,7 @@ Result<int32_t> AssetFolder::texture(Mesh& mesh, std::string_view name, std::str
     if (!is_new)
         return entry->second;
     SR_TRY(const Path path, find(name, where));
-    SR_TRY(ImageRgb8 image, read_image_rgb8(path));
+    SR_TRY(ImageRgb8 image, read_texture_rgb8(path));
     mesh.textures.push_back({std::move(image), wrap, wrap});
     SR_CHECK(check_texture_budget(mesh, where));
     return entry->second;

@@ -172,10 +172,9 @@ Status GltfFile::check_version() const
     const bool has = asset != json_.end() && asset->is_object() && asset->contains("version");
     if (!has || !(*asset)["version"].is_string() || !(*asset)["version"].get<std::string>().starts_with("2."))
         return fail(ErrorCode::bad_input, "{}: expected glTF of version 2", where_);
-    const auto required = json_.find("extensionsRequired");
-    if (required == json_.end() || !required->is_array())
-        return {};
-    for (const Json& name : *required) {
+    SR_TRY(const size_t required, count("extensionsRequired"));
+    for (size_t i = 0; i < required; ++i) {
+        const Json& name = json_["extensionsRequired"][i];
         constexpr const char* kKnown[] = {"KHR_texture_transform", "KHR_materials_unlit", "KHR_mesh_quantization"};
         if (std::ranges::find(kKnown, name) == std::end(kKnown))
             return fail(ErrorCode::bad_input, "{}: needs the extension {}, which is not supported", where_,
@@ -184,15 +183,19 @@ Status GltfFile::check_version() const
     return {};
 }
 
-size_t GltfFile::count(const char* array) const
+Result<size_t> GltfFile::count(const char* array) const
 {
     const auto found = json_.find(array);
-    return found != json_.end() && found->is_array() ? found->size() : 0;
+    if (found == json_.end())
+        return 0;
+    if (!found->is_array())
+        return fail(ErrorCode::bad_input, "{}: {}: expected an array, found {}", where_, array, found->type_name());
+    return found->size();
 }
 
 Result<const Json*> GltfFile::entry(const char* array, int64_t index) const
 {
-    const size_t size = count(array);
+    SR_TRY(const size_t size, count(array));
     if (index < 0 || index >= int64_t(size))
         return fail(ErrorCode::bad_input, "{}: refers to {}[{}], there are {}", where_, array, index, size);
     const Json& found = json_[array][size_t(index)];
@@ -229,7 +232,8 @@ Result<std::vector<std::byte>> GltfFile::load_uri(const std::string& uri, std::s
 
 Status GltfFile::load_buffers()
 {
-    for (size_t i = 0; i < count("buffers"); ++i) {
+    SR_TRY(const size_t buffers, count("buffers"));
+    for (size_t i = 0; i < buffers; ++i) {
         SR_TRY(const Json* buffer, entry("buffers", int64_t(i)));
         SR_TRY(const auto length, integer(*buffer, "byteLength"));
         const auto uri = buffer->find("uri");

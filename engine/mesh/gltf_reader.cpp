@@ -161,7 +161,8 @@ Status GltfReader::read_base_color(const Json& pbr, const std::string& where, Ma
 
 Status GltfReader::read_materials()
 {
-    for (size_t i = 0; i < file_.count("materials"); ++i) {
+    SR_TRY(const size_t count, file_.count("materials"));
+    for (size_t i = 0; i < count; ++i) {
         SR_TRY(const Json* json, file_.entry("materials", int64_t(i)));
         const std::string where = fmt::format("{}: materials[{}]", where_, i);
         Material material;
@@ -190,6 +191,8 @@ Result<std::vector<int64_t>> GltfReader::indices_in(const Json& object, const ch
     const auto list = object.find(key);
     if (list == object.end())
         return out;
+    if (!list->is_array())
+        return fail(ErrorCode::bad_input, "{}: {}: expected an array, found {}", where_, key, list->type_name());
     for (const Json& value : *list) {
         if (!value.is_number_integer() || value < 0)
             return fail(ErrorCode::bad_input, "{}: {}: expected a list of numbers", where_, key);
@@ -202,11 +205,13 @@ Result<std::vector<int64_t>> GltfReader::indices_in(const Json& object, const ch
 Result<std::vector<int64_t>> GltfReader::roots() const
 {
     SR_TRY(const auto scene, file_.integer(file_.json(), "scene"));
-    if (scene || file_.count("scenes")) {
+    SR_TRY(const size_t scenes, file_.count("scenes"));
+    if (scene || scenes) {
         SR_TRY(const Json* json, file_.entry("scenes", scene.value_or(0)));
         return indices_in(*json, "nodes");
     }
-    std::vector<bool> is_child(file_.count("nodes"));
+    SR_TRY(const size_t nodes, file_.count("nodes"));
+    std::vector<bool> is_child(nodes);
     for (size_t i = 0; i < is_child.size(); ++i) {
         SR_TRY(const Json* node, file_.entry("nodes", int64_t(i)));
         SR_TRY(const std::vector<int64_t> children, indices_in(*node, "children"));
@@ -409,7 +414,8 @@ Status GltfReader::read_primitive(const Json& primitive, const Matrix& matrix, c
 Result<Mesh> GltfReader::read()
 {
     SR_CHECK(read_materials());
-    visited_.resize(file_.count("nodes"));
+    SR_TRY(const size_t nodes, file_.count("nodes"));
+    visited_.resize(nodes);
     SR_TRY(const std::vector<int64_t> first, roots());
     for (auto i = first.rbegin(); i != first.rend(); ++i)
         pending_.push_back({*i, kOne});

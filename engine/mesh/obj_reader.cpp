@@ -17,6 +17,7 @@ namespace {
 
 constexpr uint64_t kMaxObjBytes = 8ull << 30, kMaxMtlBytes = 16u << 20;
 constexpr size_t kMaxMaterials = 1 << 16;
+constexpr size_t kMaxWords = kMaxFaceCorners + 2; // that are kept of a line: one more than the longest face has
 
 // the words of one line after another; a backslash at the end of a line joins it to the next
 class WordLines {
@@ -50,7 +51,7 @@ class WordLines {
         if (first >= words.size())
             return {};
         const char* begin = words[first].data();
-        return {begin, size_t(words.back().data() + words.back().size() - begin)};
+        return {begin, size_t(end_ - begin)};
     }
 
     std::vector<std::string_view> words;
@@ -62,13 +63,16 @@ class WordLines {
         constexpr std::string_view kBlank = " \t\v\f";
         for (size_t at = line.find_first_not_of(kBlank); at != std::string_view::npos && line[at] != '#';) {
             const size_t end = std::min(line.find_first_of(kBlank, at), line.size());
-            words.push_back(line.substr(at, end - at));
+            if (words.size() < kMaxWords)
+                words.push_back(line.substr(at, end - at));
+            end_ = line.data() + end;
             at = line.find_first_not_of(kBlank, end);
         }
     }
 
     std::string_view text_;
     size_t at_ = 0;
+    const char* end_ = nullptr; // of the last word
 };
 
 Result<float> number_of(std::string_view word, std::string_view where, size_t line)
@@ -175,6 +179,9 @@ Status ObjReader::read_face()
     if (lines_.words.size() < 4)
         return fail(ErrorCode::bad_input, "{}: line {}: a face of {} corners, expected 3 or more", where_,
                     lines_.number, lines_.words.size() - 1);
+    if (lines_.words.size() - 1 > kMaxFaceCorners)
+        return fail(ErrorCode::bad_input, "{}: line {}: a face of more than {} corners, which is not supported", where_,
+                    lines_.number, kMaxFaceCorners);
     std::vector<Corner> corners;
     std::vector<std::array<float, 3>> positions;
     for (size_t i = 1; i < lines_.words.size(); ++i) {

@@ -128,6 +128,9 @@ Status PlyMesh::read_face(size_t row)
     const uint64_t begin = indices_->starts[row], count = indices_->starts[row + 1] - begin;
     if (count < 3)
         return fail(ErrorCode::bad_input, "{}: face {} has {} corners, expected 3 or more", where_, row, count);
+    if (count > kMaxFaceCorners)
+        return fail(ErrorCode::bad_input, "{}: face {} has {} corners, at most {} are supported", where_, row, count,
+                    kMaxFaceCorners);
     std::vector<std::array<float, 3>> corners;
     for (uint64_t i = begin; i < begin + count; ++i) {
         const double index = indices_->values[i];

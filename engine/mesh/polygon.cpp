@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/mesh/polygon.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 
@@ -9,7 +10,7 @@ namespace semrover {
 
 namespace {
 
-constexpr size_t kMaxEars = 256; // corners; cutting takes the cube of their number
+constexpr size_t kMaxEars = 256; // corners; cutting takes the square of their number
 
 using Flat = std::array<double, 2>;
 using Triangles = std::vector<std::array<uint32_t, 3>>;
@@ -48,19 +49,56 @@ Triangles fan(uint32_t corners)
     return out;
 }
 
-bool is_ear(const std::vector<Flat>& p, const std::vector<uint32_t>& left, size_t at)
-{
-    const size_t n = left.size();
-    const uint32_t ia = left[(at + n - 1) % n], ib = left[at], ic = left[(at + 1) % n];
-    const Flat &a = p[ia], &b = p[ib], &c = p[ic];
-    if (turn(a, b, c) <= 0)
+// Cuts ears off a polygon. What was found to lie outside a corner's triangle stays there until a neighbour of the
+// corner goes, so no test is made twice: all tests together are as many as the square of the corners.
+class EarCutter {
+  public:
+    explicit EarCutter(std::vector<Flat> corners) : p_(std::move(corners)), left_(p_.size()), clear_(p_.size())
+    {
+        std::iota(left_.begin(), left_.end(), 0u);
+    }
+
+    // the first ear goes to `out`; false when there is none
+    bool cut(Triangles& out)
+    {
+        for (size_t at = 0; at < left_.size(); ++at) {
+            const size_t n = left_.size();
+            const uint32_t a = left_[(at + n - 1) % n], b = left_[at], c = left_[(at + 1) % n];
+            if (!is_ear(a, b, c))
+                continue;
+            out.push_back({a, b, c});
+            left_.erase(left_.begin() + ptrdiff_t(at));
+            clear_[a] = clear_[c] = 0;
+            return true;
+        }
         return false;
-    for (const uint32_t i : left)
-        if (i != ia && i != ib && i != ic && p[i] != a && p[i] != b && p[i] != c && turn(a, b, p[i]) >= 0 &&
-            turn(b, c, p[i]) >= 0 && turn(c, a, p[i]) >= 0)
+    }
+
+    const std::vector<uint32_t>& left() const { return left_; }
+
+  private:
+    bool is_ear(uint32_t a, uint32_t b, uint32_t c)
+    {
+        if (turn(p_[a], p_[b], p_[c]) <= 0)
             return false;
-    return true;
-}
+        for (auto i = std::ranges::lower_bound(left_, clear_[b]); i != left_.end(); ++i) {
+            clear_[b] = *i;
+            if (blocks(p_[*i], p_[a], p_[b], p_[c]))
+                return false;
+        }
+        return true;
+    }
+
+    // corners at the same place, the triangle's own among them, do not
+    static bool blocks(const Flat& x, const Flat& a, const Flat& b, const Flat& c)
+    {
+        return x != a && x != b && x != c && turn(a, b, x) >= 0 && turn(b, c, x) >= 0 && turn(c, a, x) >= 0;
+    }
+
+    std::vector<Flat> p_;
+    std::vector<uint32_t> left_;  // corners that are not cut yet, ascending
+    std::vector<uint32_t> clear_; // of a corner: those below this one do not block it
+};
 
 } // namespace
 
@@ -75,20 +113,12 @@ Triangles triangulated(std::span<const std::array<float, 3>> corners)
         convex = convex && turn(p[i], p[(i + 1) % count], p[(i + 2) % count]) >= 0;
     if (convex)
         return fan(count);
-    std::vector<uint32_t> left(count);
-    std::iota(left.begin(), left.end(), 0u);
+    EarCutter cutter(p);
     Triangles out;
-    while (left.size() > 3) {
-        size_t at = 0;
-        while (at < left.size() && !is_ear(p, left, at))
-            ++at;
-        if (at == left.size())
+    while (cutter.left().size() > 3)
+        if (!cutter.cut(out))
             return fan(count);
-        const size_t n = left.size();
-        out.push_back({left[(at + n - 1) % n], left[at], left[(at + 1) % n]});
-        left.erase(left.begin() + ptrdiff_t(at));
-    }
-    out.push_back({left[0], left[1], left[2]});
+    out.push_back({cutter.left()[0], cutter.left()[1], cutter.left()[2]});
     return out;
 }
 
