@@ -6,6 +6,7 @@ find_program(GLSLANG glslangValidator REQUIRED)
 add_executable(reflect cmake/reflect/main.cpp cmake/reflect/module.cpp cmake/reflect/protocol.cpp)
 target_include_directories(reflect PRIVATE ${CMAKE_SOURCE_DIR})
 target_link_libraries(reflect PRIVATE fmt::fmt)
+target_compile_options(reflect PRIVATE "${cold_options}")
 
 # add_shader_headers(TARGET FAMILY...): an interface target with the headers of these families; names of ops are left in
 # TARGET_ops
