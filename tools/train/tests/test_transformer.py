@@ -84,7 +84,8 @@ class TheRecipe(unittest.TestCase):
                   "mirror": False, "ordered_points": True, "known_share": 0,
                   "network": {"num_classes": 20, "voxel_size": 0.6}}
         sets = LocalSets(Grids([self.grid], self.path("cache")), config)
-        centers, labels, tokens, known = sets.batch(5)
+        centers, labels, tokens, known, conditions = sets.batch(5)
+        self.assertEqual(conditions.shape, labels.shape + (0,))
         self.assertFalse(known.any())
         self.assertEqual(tokens.shape, labels.shape + (24,))
         dropped = (labels == 20).all(1)
