@@ -15,7 +15,7 @@ namespace semrover {
 namespace {
 
 struct GenerateArguments {
-    std::string grid, output;
+    std::string grid, output, objects = "none";
     uint64_t seed = 0;
     GenerationArguments generation;
     PlyExports ply;
@@ -27,6 +27,8 @@ Status generate_along(const GenerateArguments& o, const Globals& globals)
 {
     if (o.ply.any())
         return fail(ErrorCode::usage, "--ply and its like have no meaning with --along: convert what it writes");
+    if (o.objects != "none")
+        return fail(ErrorCode::usage, "--objects and --along do not go together");
     if (o.output.empty() && !o.generation.dry_run)
         return fail(ErrorCode::usage, "-o/--output is required");
     GrowthRequest request = o.along;
@@ -52,6 +54,9 @@ Status generate(const GenerateArguments& o, const Globals& globals)
         SR_CHECK(check_generation_outputs(request));
     }
     SR_TRY(request.settings, resolve_generation(o.generation.options));
+    if (o.objects != "none") {
+        SR_TRY(request.objects, read_objects(o.objects));
+    }
     SR_TRY(VoxelGrid grid, load_grid(o.grid, o.input, globals));
     // what another program's file became depends on options and on other files
     if (o.input.from.empty() && Path(o.grid).extension() == ".sgrid") {
@@ -77,6 +82,7 @@ void add_generate(CLI::App& app, const Globals& globals, Run& run)
     c->add_option("-m,--model", o->generation.options.model, "model folder")->required();
     c->add_option("-o,--output", o->output, ".sgrid to write; OUTPUT.run beside it keeps the run's state");
     c->add_option("-s,--seed", o->seed, "noise seed");
+    c->add_option("--objects", o->objects, "objects.json: boxes and colours that the model is told of; or none");
     add_generation_options(*c, o->generation);
     c->add_option_function<std::string>(
          "--strategy",

@@ -50,12 +50,13 @@ def train(grids, output, steps, *more):
 
 class TheModule(unittest.TestCase):
     def test_gives_what_the_golden_cases_expect(self):
-        for name in ("transformer_tiny", "transformer_wide"):
+        for name in ("transformer_tiny", "transformer_wide", "transformer_objects"):
             case, t = golden.read_case(name)
             model = golden.load_network(from_config, name)
             valid = t["input.valid"].bool()
             with torch.no_grad():
-                got = model(t["input.tokens"], t["input.labels"].long(), t["input.centers"], valid, t["input.timestep"])
+                got = model(t["input.tokens"], t["input.labels"].long(), t["input.centers"], valid, t["input.timestep"],
+                            t.get("input.condition"))
             apart = golden.apart(got[valid], t["expect.sample"][valid])
             self.assertLess(apart, case["tolerance"]["fp32"], name)
 
