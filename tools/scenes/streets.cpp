@@ -8,6 +8,7 @@
 #include "tools/cli/commands.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/output_folder.h"
+#include "tools/scenes/placement_option.h"
 #include "tools/scenes/street_images.h"
 #include "tools/streets/camera_drive.h"
 #include "tools/streets/seen_cells.h"
@@ -140,6 +141,7 @@ void add_streets(CLI::App& app, const Globals& globals, Run& run)
     c->add_option("--reach", o->sight.reach, "metres that --seen looks")->check(CLI::Range(1.0, 1000.0));
     c->add_option("--voxel-size", o->voxels.voxel_size, "metres")->check(CLI::Range(0.05f, 10.f));
     c->add_option("--points", o->voxels.points_per_voxel, "points of a cell")->check(CLI::Range(1, 4096));
+    add_placement(*c, o->voxels);
     c->add_flag("--images", o->pictures, "also pictures of both drives: {color,depth,normal,label,visible}/000000.png");
     c->add_option("--samples", o->images.samples, "rays a pixel")->check(CLI::Range(1u, 256u));
     c->add_option("--ambient-rays", o->images.ambient_rays, "rays for the light from around, a sample")
