@@ -7,7 +7,7 @@ import torch
 from torch import nn
 from torch.nn import functional as F
 
-from ..condition import width_of
+from ..condition import WIDTHS, width_of
 from .attention import attend
 
 CONFIG_FIELDS = ("num_layers", "num_attention_heads", "attention_head_dim", "points_per_voxel", "num_classes",
@@ -122,10 +122,14 @@ class TimeEmbedding(nn.Module):
 class ConditionEmbedding(nn.Module):
     """without bias: a cell of which nothing is told gets exactly nothing"""
 
-    def __init__(self, count, width):
+    def __init__(self, parts, width):
         super().__init__()
-        self.linear_1 = nn.Linear(count, width, bias=False)
+        self.linear_1 = nn.Linear(width_of(parts), width, bias=False)
         self.linear_2 = nn.Linear(width, width, bias=False)
+        at = 0
+        for part in parts:  # each is heard alike, whether it has four numbers or sixty
+            nn.init.normal_(self.linear_1.weight.data[:, at:at + WIDTHS[part]], std=(2 / WIDTHS[part]) ** 0.5)
+            at += WIDTHS[part]
 
     def forward(self, x):
         return self.linear_2(F.silu(self.linear_1(x)))
@@ -142,7 +146,7 @@ class VoxfieldTransformer(nn.Module):
         self.proj_in = nn.Linear(c, d)
         self.pos_embed = nn.Linear(3 * pos_embed_dim, d)
         self.semantic_embed = nn.Embedding(num_classes + 1, d)  # the last row is the null label
-        self.condition_embed = ConditionEmbedding(width_of(condition), d) if condition else None
+        self.condition_embed = ConditionEmbedding(condition, d) if condition else None
         self.time_embed = TimeEmbedding(d)
         self.transformer_blocks = nn.ModuleList(
             JointBlock(d, num_attention_heads, last=i == num_layers - 1) for i in range(num_layers))
