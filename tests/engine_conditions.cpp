@@ -100,6 +100,13 @@ TEST(engine_conditions, a_config_names_each_part_once)
     EXPECT_TRUE(says(config(R"("tint")"), "condition"));
 }
 
+TEST(engine_conditions, a_config_says_how_points_of_the_training_data_lay)
+{
+    EXPECT_EQ(parse_transformer_config(Json::object())->placement, "shifted");
+    EXPECT_EQ(parse_transformer_config(Json{{"placement", "canonical"}})->placement, "canonical");
+    EXPECT_TRUE(says(parse_transformer_config(Json{{"placement", "random"}}), "placement"));
+}
+
 RegionInput patch(int32_t x, uint32_t cells, bool told)
 {
     RegionInput r;

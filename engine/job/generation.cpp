@@ -115,6 +115,8 @@ Result<Json> GridGeneration::finish()
     grid_.metadata["seed"] = std::to_string(request_.seed);
     grid_.metadata["tool"] = kProgram;
     grid_.metadata["model"] = settings_["model"];
+    if (const std::string& placement = request_.settings.model.config.placement; placement != "shifted")
+        grid_.metadata["placement"] = placement;
     if (request_.ply.any())
         SR_CHECK(export_ply(filling_.device(), grid_, request_.ply));
     Json results = filling_.results();

@@ -67,6 +67,8 @@ Result<TransformerConfig> parse_transformer_config(const Json& json)
     fields.choice<bool>("qk_norm", {{"rms_norm", true}}, c.qk_norm);
     fields.choices<ConditionPart>("condition", {{"object", ConditionPart::object}, {"tint", ConditionPart::tint}},
                                   c.condition);
+    fields.choice<std::string>("placement", {{"shifted", "shifted"}, {"canonical", "canonical"}, {"mixed", "mixed"}},
+                               c.placement);
     if (c.condition.size() > 1 && std::ranges::count(c.condition, c.condition[0]) > 1)
         fields.refuse("condition", "a list of different names");
     if (c.attention_head_dim % 8)

@@ -46,6 +46,11 @@ def read_tokens(path):
     return t["cells"], t["labels"], tokens.clip(-1, 1).astype(np.float16)
 
 
+def placement_of(path):
+    """how the points of an .sgrid were placed (docs/method.md §1.3)"""
+    return safetensors_file.read_header(path)[1].get("placement", "shifted")
+
+
 def read_owners(path, cells, labels):
     """the objects.json beside a .sgrid, if there is one -> owners i32 [V], tints near each cell u8 [V, 3], boxes
     f64 [O, 7], tints of the objects f32 [O, 3]"""
@@ -73,6 +78,8 @@ class Grids:
         if known.get("files") != files or known.get("arrays") != list(self.ARRAYS):
             self._fill(files, cache, about)
         self.offsets = read_json(about)["offsets"]
+        placements = {placement_of(f) for f in files}
+        self.placement = placements.pop() if len(placements) == 1 else "mixed"
         for name in self.ARRAYS:
             mode = "r" if name in ("cells", "tokens") else None
             setattr(self, name, np.load(os.path.join(cache, f"{name}.npy"), mmap_mode=mode))

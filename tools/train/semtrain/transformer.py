@@ -71,10 +71,13 @@ def with_new_parts(state, model):
     return {**{name: t for name, t in model.state_dict().items() if name.startswith("condition_embed.")}, **state}
 
 
-def exporter(folder, config):
+def exporter(folder, config, placement):
+    told = {} if placement == "shifted" else {"placement": placement}
+
     def export(state):
         write_component(os.path.join(folder, "model", "voxfield_transformer"),
-                        {"_class_name": "VoxfieldTransformer", **config["network"], "prediction_type": "sample"}, state)
+                        {"_class_name": "VoxfieldTransformer", **config["network"], **told, "prediction_type": "sample"},
+                        state)
         write_scheduler(os.path.join(folder, "model", "voxfield_scheduler"), {
             "_class_name": "DDPMScheduler", "num_train_timesteps": config["num_train_timesteps"],
             "beta_start": config["beta_start"], "beta_end": config["beta_end"], "beta_schedule": "linear",
@@ -96,7 +99,7 @@ def main():
     torch.manual_seed(config["seed"])
     model = VoxfieldTransformer(**config["network"])
     model.start_at_zero()
-    trainer = Trainer(options.output, model, config, exporter(options.output, config))
+    trainer = Trainer(options.output, model, config, exporter(options.output, config, sets.grids.placement))
     if options.init:
         trainer.start_from(with_new_parts(read_component(options.init)[1], model))
     print(f"{sum(p.numel() for p in model.parameters())} parameters, {len(sets.grids.labels)} cells", flush=True)
