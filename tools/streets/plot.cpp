@@ -195,8 +195,8 @@ class Plots {
     void border(double s0, double s1, int side, KeyedRandom& r)
     {
         const double kind = r.uniform();
-        const uint8_t label = kind < 0.35 ? label::kWall : kind < 0.75 ? label::kFence : label::kVegetation;
-        const ObjectNote note(m_, label, place((s0 + s1) / 2, side, 0.25).turned(-1.5707963267948966));
+        const uint8_t what = kind < 0.35 ? label::kWall : kind < 0.75 ? label::kFence : label::kVegetation;
+        const ObjectNote note(m_, what, place((s0 + s1) / 2, side, 0.25).turned(-1.5707963267948966));
         for (double s = s0; s < s1 - 0.1; s += 3) {
             const double e = std::min(s + 3, s1), wide = e - s;
             const Frame f = place(side > 0 ? s : e, side, 0.25);

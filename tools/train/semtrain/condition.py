@@ -19,9 +19,9 @@ def width_of(condition):
 
 
 def object_part(centers, boxes, given):
-    """centers [N, 3] metres, boxes [N, 7] (centre, size, heading), given bool [N] -> f32 [N, 60]: a flag; distances from
-    front, back, left, right, top and bottom in units of 4 m; sines and cosines of these; size; sine and cosine of the
-    heading"""
+    """centers [N, 3] metres, boxes [N, 7] (centre, size, heading), given bool [N] -> f32 [N, 60]: a flag; distances
+    from front, back, left, right, top and bottom in units of 4 m; sines and cosines of these; size; sine and cosine of
+    the heading"""
     boxes = np.where(given[:, None], boxes, np.ones(7))
     place, half = place_in(boxes, centers), boxes[:, 3:6] / 2
     faces = np.stack([half - place, half + place], -1).reshape(-1, 6).clip(NEAREST, FARTHEST)

@@ -56,7 +56,8 @@ def read_owners(path, cells, labels):
     f64 [O, 7], tints of the objects f32 [O, 3]"""
     about = os.path.join(os.path.dirname(path), "objects.json")
     if not os.path.exists(about):
-        return np.full(len(cells), -1, np.int32), np.zeros((len(cells), 3), np.uint8), np.zeros((0, 7)), np.zeros((0, 3))
+        none = np.full(len(cells), -1, np.int32)
+        return none, np.zeros((len(cells), 3), np.uint8), np.zeros((0, 7)), np.zeros((0, 3))
     grid, size = read_grid(path)
     boxes, box_labels, tints = read_objects(about)
     centers = (cells + 0.5) * size

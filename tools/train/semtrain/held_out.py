@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
 """Squared errors of transformers on streets that they were not trained on, at three noise levels, nothing known, with
-labels alone and with what each can be told beside them: a table in Markdown. All see the same sets and the same noise."""
+labels alone and with what each can be told beside them: a table in Markdown. All see the same sets and noise."""
 import argparse
 import os
 import tempfile
@@ -55,7 +55,8 @@ def tellings(parts):
 def main(arguments=None):
     p = argparse.ArgumentParser(prog="tools/train/run held_out", description=__doc__)
     p.add_argument("--grids", nargs="+", required=True, help=".sgrid files with points, or folders of them")
-    p.add_argument("--model", action="append", required=True, metavar="NAME=FOLDER", help="a voxfield_transformer folder")
+    p.add_argument("--model", action="append", required=True, metavar="NAME=FOLDER",
+                   help="a voxfield_transformer folder")
     p.add_argument("--batches", type=int, default=6, help="of 8 sets")
     p.add_argument("--cells", type=int, default=128, help="of a set")
     p.add_argument("--threads", type=int, default=0, help="of the CPU; 0: all")
