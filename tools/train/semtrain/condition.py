@@ -73,6 +73,18 @@ def told_tints(random, owners, config):
     return (owners >= 0) & (random.random(len(owners)) < share)
 
 
+def drawn_boxes(random, owners, boxes, config):
+    """boxes [N, 7] as somebody might give them: exact or, in every other set, each object's off by `jitter` metres in
+    place and size, and by a little in heading"""
+    if not config["jitter"] or random.random() < 0.5:
+        return boxes
+    _, of_cells = np.unique(owners, return_inverse=True)
+    off = random.normal(0, 1, (of_cells.max() + 1, 7)) * [*[config["jitter"]] * 6, 0.04]
+    boxes = boxes + off[of_cells]
+    boxes[:, 3:6] = boxes[:, 3:6].clip(0.1)
+    return boxes
+
+
 def drawn_tints(random, owners, local, whole, config):
     """colours 0..1 as somebody might give them: of the whole object or, with a chance of `local`, those near the cell;
     each object's off by `noise`"""

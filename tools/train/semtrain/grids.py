@@ -7,7 +7,7 @@ import os
 import numpy as np
 
 from . import safetensors_file
-from .condition import drawn_tints, mirrored, told_boxes, told_tints, vector_of, width_of
+from .condition import drawn_boxes, drawn_tints, mirrored, told_boxes, told_tints, vector_of, width_of
 from .json_file import read_json, write_json
 from .known_cells import draw_known
 from .objects import local_tints, owners_of, read_objects
@@ -147,7 +147,7 @@ class LocalSets:
         local = self.grids.local_tints[cells] / 255
         whole = self.grids.tints[owners] if len(self.grids.tints) else local
         tints = drawn_tints(random, owners, local, np.where(np.isnan(whole), local, whole), config)
-        return vector_of(parts, centers, boxes, has_box, tints, has_tint)
+        return vector_of(parts, centers, drawn_boxes(random, owners, boxes, config), has_box, tints, has_tint)
 
     def _set(self, random, size):
         """-> centers, labels, tokens, which cells of the grids these are, and the boxes of their objects"""

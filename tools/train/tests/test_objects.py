@@ -14,7 +14,7 @@ import torch
 
 from recipe import run_recipe
 from semtrain import held_out, safetensors_file, transformer
-from semtrain.condition import mirrored, object_part, told_boxes, told_tints, vector_of, width_of
+from semtrain.condition import drawn_boxes, mirrored, object_part, told_boxes, told_tints, vector_of, width_of
 from semtrain.grids import Grids, LocalSets
 from semtrain.model_folder import write_component
 from semtrain.nets.transformer import VoxfieldTransformer
@@ -25,7 +25,7 @@ NETWORK = {"num_layers": 2, "num_attention_heads": 2, "attention_head_dim": 16, 
            "num_classes": 20, "voxel_size": 0.6, "attention_radius": 3.0, "pos_embed_dim": 8,
            "context_pos_embed": True}
 BOTH = {**NETWORK, "condition": ["object", "tint"]}
-TELL_ALL = {"dropout": 0, "partial": 0, "local": 0, "noise": 0}
+TELL_ALL = {"dropout": 0, "partial": 0, "local": 0, "noise": 0, "jitter": 0}
 CAR = [2.4, 0.0, 0.6, 4.2, 1.8, 1.2, 0.0]  # centre, size, heading
 
 
@@ -154,6 +154,17 @@ class Objects(unittest.TestCase):
         for seen in shares.values():
             none, every = np.mean(np.array(seen) == 0), np.mean(np.array(seen) == 1)
             self.assertTrue(0.15 < none < 0.4 and 0.25 < every < 0.5, (none, every))
+
+    def test_may_be_off_each_as_a_whole_in_every_other_set(self):
+        owners, boxes = np.repeat([0, 1], 20), np.repeat(np.array([CAR, CAR[::-1]]), 20, 0)
+        moved = [drawn_boxes(np.random.default_rng(seed), owners, boxes, {"jitter": 0.2}) for seed in range(100)]
+        exact = np.mean([(m == boxes).all() for m in moved])
+        self.assertTrue(0.35 < exact < 0.65, exact)
+        for m in moved:
+            self.assertTrue((m[:20] == m[0]).all() and (m[20:] == m[20]).all())
+        off = np.array([m[0] - boxes[0] for m in moved if not (m == boxes).all()])
+        self.assertTrue(0.15 < off[:, :6].std() < 0.25 and off[:, 6].std() < 0.06, off.std(0))
+        self.assertTrue((drawn_boxes(np.random.default_rng(1), owners, boxes, {"jitter": 0}) == boxes).all())
 
     def test_say_nothing_to_a_network_before_it_learns_and_nothing_where_none_are_given(self):
         torch.manual_seed(1)
