@@ -61,7 +61,8 @@ struct CellAreas {
                                   Tensor starts, // [cells + 1] u32: bucket_starts() of the keys
                                   uint32_t cells);
 
-// points drawn uniformly from the surface in cells, Philox4x32-10 keyed by (seed, cell, sample)
+// points drawn uniformly from the surface in cells, Philox4x32-10 keyed by (seed, cell, sample); canonical: where
+// samples of any other cell with the same surface lie, nothing is random
 struct SurfaceSamples {
     Tensor points;    // [cells * samples, 8] fp32: offset from the cell's centre in cells; where the point lies between
                       // its four texels, right and down; linear factor of the colour, r g b
@@ -72,7 +73,7 @@ struct SurfaceSamples {
                                             Tensor sums,      // [pairs] fp32: of cell_area()
                                             Tensor starts,    // [keys + 1] u32
                                             Tensor cells,     // [cells, 4] i32: i, j, k, key; each has area
-                                            uint32_t samples, uint64_t seed);
+                                            uint32_t samples, uint64_t seed, bool canonical = false);
 
 // y = offset (bits of three floats); the colour: texels bilinearly in linear light times the factor, as sRGB bytes
 [[nodiscard]] Tensor surface_color(Graph& g, const SurfaceSamples& samples,

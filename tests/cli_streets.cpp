@@ -3,7 +3,7 @@
 #include "engine/format/camera_path.h"
 #include "engine/format/image.h"
 #include "engine/mesh/mesh_files.h"
-#include "engine/scene/grid.h"
+#include "engine/scene/cell_objects.h"
 #include "runtime/base/json.h"
 #include "tests/json_text.h"
 #include "tests/program.h"
@@ -44,6 +44,18 @@ TEST(CliStreets, a_street_comes_with_mesh_grids_drive_and_pictures_that_agree)
     EXPECT_FALSE(semantic->has_points());
     EXPECT_EQ(truth->points.size(), truth->cells.size() * 60);
     EXPECT_GT(std::ranges::count(truth->labels, 19), 10); // thin lines are not lost
+    const auto objects = read_objects(out / "objects.json");
+    ASSERT_TRUE(objects) << objects.error().message;
+    const std::vector<int32_t> owners = objects_of_cells(*truth, *objects);
+    size_t cars = 0, owned = 0;
+    for (size_t v = 0; v < owners.size(); ++v)
+        if (truth->labels[v] == 13) {
+            ++cars;
+            owned += owners[v] != kNoObject;
+            EXPECT_TRUE(owners[v] == kNoObject || (*objects)[size_t(owners[v])].tint);
+        }
+    EXPECT_GT(cars, 50u);
+    EXPECT_EQ(owned, cars);
     const auto path = read_transforms(out / "transforms.json"),
                tum = read_tum(out / "drive.tum", pinhole_from_fov(73, 48, 32));
     ASSERT_TRUE(path) << path.error().message;
@@ -100,7 +112,7 @@ TEST(CliStreets, the_same_seed_gives_the_same_files)
     for (const char* name : {"a", "b"})
         ASSERT_EQ(streets(folder / name, "--seed 2").code, 0);
     for (const char* file :
-         {"mesh.glb", "truth.sgrid", "semantic.sgrid", "drive.tum", "transforms.json", "street.json"})
+         {"mesh.glb", "truth.sgrid", "semantic.sgrid", "drive.tum", "transforms.json", "street.json", "objects.json"})
         EXPECT_TRUE(contents(folder / "a" / file) == contents(folder / "b" / file)) << file;
 }
 

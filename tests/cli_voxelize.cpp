@@ -48,6 +48,23 @@ TEST(CliVoxelize, a_mesh_becomes_a_grid_with_labels_and_colours)
     EXPECT_EQ(contents(out), bytes);
 }
 
+TEST(CliVoxelize, canonical_placement_is_said_in_the_grid_and_needs_no_seed)
+{
+    const ScratchFolder folder;
+    const std::string line = "voxelize " + scene(folder) + " -q --default-label building --placement ";
+    const auto made = [&](const std::string& name, const std::string& more) {
+        const std::string out = (folder / name).string();
+        const ProgramResult result = semrover_program(line + more + " -o " + out);
+        EXPECT_EQ(result.code, 0) << result.err;
+        return *read_grid(out);
+    };
+    const VoxelGrid a = made("a.sgrid", "canonical --seed 1"), b = made("b.sgrid", "canonical --seed 2");
+    EXPECT_EQ(a.points, b.points);
+    EXPECT_EQ(a.metadata.at("placement"), "canonical");
+    EXPECT_NE(made("c.sgrid", "shifted --seed 1").points, made("d.sgrid", "shifted --seed 2").points);
+    EXPECT_EQ(semrover_program(line + "random -o " + (folder / "e.sgrid").string()).code, 2);
+}
+
 TEST(CliVoxelize, scale_axes_and_a_default_label_apply)
 {
     const ScratchFolder folder;

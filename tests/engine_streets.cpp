@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+#include "engine/scene/cell_objects.h"
 #include "engine/scene/palette.h"
 #include "runtime/base/hash.h"
 #include "tools/streets/camera_drive.h"
@@ -176,6 +177,54 @@ TEST(engine_streets, vehicles_have_their_size)
         KeyedRandom r(1, {9});
         add_bus(m, {}, r);
     });
+}
+
+TEST(engine_streets, objects_are_boxes_around_what_was_drawn)
+{
+    const Street street = make_street({.seed = 1, .length = 90});
+    std::vector<size_t> held(kClassCount), all(kClassCount), count(kClassCount);
+    for (const SceneObject& o : street.boxes)
+        ++count[o.label];
+    for (size_t f = 0; f < street.mesh.faces.size(); ++f) {
+        const auto& p = street.mesh.positions[street.mesh.faces[f][0]];
+        const uint8_t l = street.mesh.face_labels[f];
+        ++all[l];
+        held[l] += std::ranges::any_of(street.boxes, [&](const SceneObject& o) {
+            const std::array<double, 3> at = place_in(o, {p[0], p[1], p[2]});
+            const double around = l == label::kBuilding ? 1.5 : 0.001; // balconies and eaves stand out of a plot
+            return o.label == l && std::abs(at[0]) < o.size[0] / 2 + around &&
+                   std::abs(at[1]) < o.size[1] / 2 + around && std::abs(at[2]) < o.size[2] / 2 + around;
+        });
+    }
+    for (uint8_t l : {label::kCar, label::kPerson, label::kBuilding, label::kTrafficSign}) {
+        EXPECT_EQ(held[l], all[l]) << label_name(l);
+        EXPECT_GT(count[l], 3u) << label_name(l);
+    }
+    EXPECT_EQ(count[label::kCar], street.objects.at("car"));
+    EXPECT_EQ(count[label::kPerson], street.objects.at("person"));
+    EXPECT_EQ(count[label::kRoad], 0u);
+}
+
+TEST(engine_streets, cars_look_along_the_street_and_houses_at_it)
+{
+    const Street street = make_street({.seed = 3, .length = 60});
+    size_t cars = 0, houses = 0;
+    for (const SceneObject& o : street.boxes) {
+        const double road = std::abs(o.center[1]), facade = street.road.section().facade();
+        if (o.label == label::kCar && road < facade && std::abs(o.center[0]) < 15) {
+            EXPECT_GT(std::abs(std::cos(o.heading)), 0.9);
+            EXPECT_GT(o.size[0], o.size[1] * 1.8);
+            ++cars;
+        }
+        const bool front = std::abs(road - facade - 5.5) < 0.5 && o.center[0] > 0 && o.center[0] < 25;
+        if (o.label == label::kBuilding && front && o.size[2] > 5) {
+            EXPECT_LT(std::sin(o.heading) * o.center[1], 0); // to the middle of the street
+            EXPECT_NEAR(o.size[0], 11, 1e-6);
+            ++houses;
+        }
+    }
+    EXPECT_GT(cars, 0u);
+    EXPECT_GT(houses, 1u);
 }
 
 TEST(engine_streets, solids_look_outwards)

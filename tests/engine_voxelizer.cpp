@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 
 namespace semrover {
 namespace {
@@ -226,6 +227,69 @@ TEST(EngineVoxelizer, points_of_many_cells_are_uniform_over_the_area_of_a_cell)
     for (const size_t count : all)
         chi2 += std::pow(double(count) - 320, 2) / 320;
     EXPECT_LT(chi2, 63 + 4 * 11.2); // 63 degrees of freedom
+}
+
+std::vector<float> places(const VoxelGrid& g, const Cell& cell)
+{
+    std::vector<float> x;
+    const size_t at = *find_cell(g, cell), values = size_t(g.points_per_voxel) * 3;
+    for (size_t i = 0; i < values; ++i)
+        x.push_back(half_to_float(g.points[at * values + i]));
+    return x;
+}
+
+TEST(EngineVoxelizer, canonical_points_of_a_flat_cell_are_the_same_four_rows_of_five_however_it_is_cut)
+{
+    Mesh m; // a wall of two triangles, and one of many in front of a plane that nobody sees
+    add_quad(m, {0, 0.9f, 0}, {6, 0, 0}, {0, 0, 6});
+    add_quad(m, {0, 3.4f, 0}, {6, 0, 0}, {0, 0, 6});
+    for (int i = 0; i < 7; ++i)
+        add_quad(m, {float(i) * 0.857f, 3.3f, 0}, {0.857f, 0, 0}, {0, 0, 6});
+    const VoxelizedMesh v = voxelized(m, {.placement = PointPlacement::canonical, .seed = 1}),
+                        other = voxelized(m, {.placement = PointPlacement::canonical, .seed = 2});
+    EXPECT_EQ(v.grid.points, other.grid.points);
+    EXPECT_EQ(v.grid.metadata.at("placement"), "canonical");
+    EXPECT_FALSE(voxelized(m, {}).grid.metadata.contains("placement"));
+    std::set<std::pair<int, int>> texels;
+    const std::vector<float> first = places(v.grid, {3, 1, 3});
+    for (size_t i = 0; i < 20; ++i) {
+        const double x = first[3 * i] / 0.6 + 0.5, z = first[3 * i + 2] / 0.6 + 0.5;
+        EXPECT_NEAR(first[3 * i + 1], 0, 1e-4); // 0.9 is the middle of cells of 0.6
+        texels.insert({int(std::lround(z * 4 - 0.5)), int(std::lround(x * 5 - 0.5))});
+        EXPECT_NEAR(z * 4 - 0.5, std::round(z * 4 - 0.5), 1e-2);
+        EXPECT_NEAR(x * 5 - 0.5, std::round(x * 5 - 0.5), 1e-2);
+    }
+    EXPECT_EQ(texels.size(), 20u);
+    for (int32_t i = 0; i < 9; ++i)
+        EXPECT_EQ(places(v.grid, {i, 1, 4}), first) << i;
+    for (int32_t i = 0; i < 9; ++i) {
+        const std::vector<float> cut = places(v.grid, {i, 5, 2});
+        for (size_t p = 0; p < 20; ++p) {
+            EXPECT_NEAR(cut[3 * p], first[3 * p], 3e-4) << i;
+            EXPECT_NEAR(cut[3 * p + 1], 0, 1e-3) << i; // at 3.3, not at 3.4
+        }
+    }
+}
+
+TEST(EngineVoxelizer, canonical_points_lie_on_the_surface_and_as_near_to_it_as_shifted_ones)
+{
+    const Mesh m = street({2.03f, 0.04f, 0.05f}, 8);
+    const VoxelizedMesh v = voxelized(m, {.placement = PointPlacement::canonical});
+    for (size_t cell = 0; cell < v.grid.cells.size(); ++cell)
+        for (size_t i = 0; i < 20; ++i) {
+            double nearest = 1;
+            for (size_t f = 0; f < m.faces.size(); ++f)
+                nearest = std::min(nearest, triangle_distance(point_of(v.grid, cell, i), corners_of(m, f)));
+            ASSERT_LT(nearest, 1e-4 + 1.23e-4 * std::sqrt(3.0)) << "cell " << cell << " point " << i;
+        }
+    Mesh walls;
+    add_quad(walls, {0, 0.2f, 0.31f}, {12, 0, 0}, {0, 12, 0});
+    add_quad(walls, {0, 12.2f, 0.31f}, {12, 0, 0}, {0, 0, 6});
+    const auto mean = [&](PointPlacement placement) {
+        return chamfer(test_device(), walls, voxelized(walls, {.placement = placement}).grid, {.samples = 20000})
+            ->mean();
+    };
+    EXPECT_LT(mean(PointPlacement::canonical), 1.02 * mean(PointPlacement::shifted));
 }
 
 TEST(EngineVoxelizer, neither_the_order_of_faces_nor_the_size_of_portions_changes_a_byte)

@@ -6,6 +6,7 @@
 #include "engine/job/outputs.h"
 #include "engine/job/version.h"
 #include "runtime/base/hash.h"
+#include "runtime/base/quote.h"
 
 namespace semrover {
 
@@ -20,6 +21,19 @@ uint64_t hash_grid(const VoxelGrid& grid)
     hash.add(std::as_bytes(std::span(grid.points)));
     hash.add(std::as_bytes(std::span(grid.colors)));
     hash.add(std::as_bytes(std::span(grid.generated)));
+    return hash.value();
+}
+
+uint64_t hash_objects(std::span<const SceneObject> objects)
+{
+    Hash hash;
+    for (const SceneObject& o : objects) {
+        const std::array<double, 3> tint = o.tint.value_or(std::array<double, 3>{-1, -1, -1});
+        const std::array<double, 11> values = {double(o.label), o.center[0], o.center[1], o.center[2],
+                                               o.size[0],       o.size[1],   o.size[2],   o.heading,
+                                               tint[0],         tint[1],     tint[2]};
+        hash.add(std::as_bytes(std::span(values)));
+    }
     return hash.value();
 }
 
@@ -57,7 +71,11 @@ class GridGeneration : public GenerationJob {
 Status GridGeneration::load()
 {
     grid_hash_ = request_.grid_hash ? *request_.grid_hash : hash_grid(grid_);
-    SR_CHECK(filling_.cut(grid_, request_.settings.regions));
+    const VoxfieldModel& model = request_.settings.model;
+    if (!request_.objects.empty() && model.config.condition.empty())
+        return fail(ErrorCode::bad_input, "{}: the model knows labels alone and cannot be told of objects",
+                    quote_path(model.folder));
+    SR_CHECK(filling_.cut(grid_, request_.settings.regions, request_.objects));
     return filling_.load(request_.seed, callbacks_);
 }
 
@@ -65,6 +83,8 @@ Status GridGeneration::start(std::optional<GenerationState> saved)
 {
     SR_TRY(settings_, settings_json(request_.settings, filling_.device(), "generate", grid_hash_));
     settings_["seed"] = request_.seed;
+    if (!request_.objects.empty())
+        settings_["objects"] = hash_text(hash_objects(request_.objects));
     if (!request_.output.empty()) {
         SR_TRY(RunFolder run, open_run(run_folder(), settings_, request_.replace));
         run_.emplace(std::move(run));
@@ -95,6 +115,8 @@ Result<Json> GridGeneration::finish()
     grid_.metadata["seed"] = std::to_string(request_.seed);
     grid_.metadata["tool"] = kProgram;
     grid_.metadata["model"] = settings_["model"];
+    if (const std::string& placement = request_.settings.model.config.placement; placement != "shifted")
+        grid_.metadata["placement"] = placement;
     if (request_.ply.any())
         SR_CHECK(export_ply(filling_.device(), grid_, request_.ply));
     Json results = filling_.results();

@@ -9,12 +9,13 @@
 
 namespace semrover {
 
-Status GridFilling::cut(VoxelGrid& grid, const RegionOptions& regions)
+Status GridFilling::cut(VoxelGrid& grid, const RegionOptions& regions, std::span<const SceneObject> objects)
 {
     outpainter_.reset();
     seconds_ = 0;
     restored_ = 0;
     SR_TRY(outpainter_, Outpainter::create(grid, settings_.model.config, regions));
+    outpainter_->tell(CellConditions(settings_.model.config, grid, objects));
     return {};
 }
 

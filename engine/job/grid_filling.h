@@ -17,7 +17,8 @@ class GridFilling {
     GridFilling(Device& device, const GenerationSettings& settings) : device_(device), settings_(settings) {}
 
     // cuts the grid, which must outlive the filling, into regions; cells with generated = 0 are the targets
-    Status cut(VoxelGrid& grid, const RegionOptions& regions);
+    // and are made with what `objects` say of them, if the model can be told
+    Status cut(VoxelGrid& grid, const RegionOptions& regions, std::span<const SceneObject> objects = {});
     // Weights if they are not there yet, a sampler if the seed is another, and the batch that fits the device's budget.
     // Errors: out_of_memory when not even one region does
     Status load(uint64_t seed, const JobCallbacks& callbacks);

@@ -214,8 +214,9 @@ Status Voxelizer::sample(const ChunkMemory& m, std::span<const CellRow> cells)
     SR_CHECK(state.allocate(device_, "samples"));
     SR_CHECK(rows.write(device_, cells));
     Graph g;
-    const SurfaceSamples points = sample_surface(g, m.in(g, atlas_), m.triangles.in(g), m.sums.in(g), m.starts.in(g),
-                                                 rows.in(g), n, options_.seed);
+    const SurfaceSamples points =
+        sample_surface(g, m.in(g, atlas_), m.triangles.in(g), m.sums.in(g), m.starts.in(g), rows.in(g), n,
+                       options_.seed, options_.placement == PointPlacement::canonical);
     const Tensor texels = fill(g, results.rows() * 4, 0xffffffff);
     atlas_.gather(g, points.addresses, texels);
     g.keep(surface_color(g, points, texels, light_.in(g)), results);
@@ -249,6 +250,8 @@ VoxelizedMesh Voxelizer::finish()
     grid.voxel_size = options_.voxel_size;
     grid.points_per_voxel = options_.points_per_voxel;
     grid.generated.assign(grid.cells.size(), 1);
+    if (options_.placement == PointPlacement::canonical)
+        grid.metadata["placement"] = "canonical";
     const std::vector<Cell> cells = grid.cells;
     sort_cells(grid);
     std::vector<float> area(cells.size());

@@ -8,11 +8,16 @@
 
 namespace semrover {
 
+// where a cell's points lie: on a lattice with a random shift, or the same in every cell with the same surface
+// (docs/method.md §1.3)
+enum class PointPlacement : uint8_t { shifted, canonical };
+
 struct VoxelizeOptions {
     float voxel_size = 0.6f;   // metres
     int points_per_voxel = 20; // 1..4096
     float min_area = 1e-4f;    // in squares of the voxel size: cells with less surface stay empty
-    uint64_t seed = 0;
+    PointPlacement placement = PointPlacement::shifted;
+    uint64_t seed = 0;                // of the shifts
     uint8_t default_label = kNoLabel; // of faces without one; kNoLabel: such faces are bad_input, with their area
     uint64_t max_pairs = 0; // triangles in cells that are on the device at once; 0: as many as suit it. No result
                             // depends on it

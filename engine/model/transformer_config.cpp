@@ -4,6 +4,8 @@
 
 #include "runtime/base/json_fields.h"
 
+#include <algorithm>
+
 namespace semrover {
 
 namespace {
@@ -32,6 +34,14 @@ Status read_normalization(const Json& json, TransformerConfig& config)
 
 } // namespace
 
+uint32_t TransformerConfig::condition_width() const
+{
+    uint32_t width = 0;
+    for (ConditionPart part : condition)
+        width += semrover::condition_width(part);
+    return width;
+}
+
 int32_t TransformerConfig::radius2() const
 {
     // 1e-6 m as in the reference: distances between cell centres that equal the radius count
@@ -55,6 +65,12 @@ Result<TransformerConfig> parse_transformer_config(const Json& json)
     fields.number("attention_radius", 0.f, 1e5f, c.attention_radius);
     fields.flag("context_pos_embed", c.context_pos_embed);
     fields.choice<bool>("qk_norm", {{"rms_norm", true}}, c.qk_norm);
+    fields.choices<ConditionPart>("condition", {{"object", ConditionPart::object}, {"tint", ConditionPart::tint}},
+                                  c.condition);
+    fields.choice<std::string>("placement", {{"shifted", "shifted"}, {"canonical", "canonical"}, {"mixed", "mixed"}},
+                               c.placement);
+    if (c.condition.size() > 1 && std::ranges::count(c.condition, c.condition[0]) > 1)
+        fields.refuse("condition", "a list of different names");
     if (c.attention_head_dim % 8)
         fields.refuse("attention_head_dim", "multiples of 8");
     if (c.pos_embed_dim % 2)

@@ -14,6 +14,13 @@
 
 namespace semrover {
 
+// what a transformer may be told of a cell beside its label (docs/method.md §2.1)
+enum class ConditionPart : uint8_t { object, tint };
+constexpr uint32_t condition_width(ConditionPart part)
+{
+    return part == ConditionPart::object ? 60 : 4;
+}
+
 // config.json of a VoxfieldTransformer (docs/models.md §3); nothing assumes the defaults
 struct TransformerConfig {
     uint32_t num_layers = 12;
@@ -26,6 +33,8 @@ struct TransformerConfig {
     uint32_t pos_embed_dim = 128; // sinusoids per axis, even
     bool context_pos_embed = true;
     bool qk_norm = false; // rms_norm
+    std::vector<ConditionPart> condition;
+    std::string placement = "shifted"; // of the points that it was trained on: shifted, canonical, mixed
 
     // per-channel x, y, z, r, g, b: token = (value - mean) / std, after the scaling to [-1, 1]
     struct Normalization {
@@ -36,6 +45,7 @@ struct TransformerConfig {
 
     uint32_t dim() const { return num_attention_heads * attention_head_dim; }
     uint32_t channels() const { return 6 * points_per_voxel; }
+    uint32_t condition_width() const; // numbers of a cell; 0: labels are all that the model knows
     // largest squared distance in cells at which two cells see each other; inclusive
     int32_t radius2() const;
 };

@@ -25,6 +25,12 @@ TransformerWeights::TransformerWeights(const TransformerConfig& config, DType pr
     semantic_embed = state_.slot(config.num_classes + 1, d, precision, "semantic_embed");
     parts_.push_back(
         {"semantic_embed.weight", config.num_classes + 1, d, false, 0, config.num_classes + 1, semantic_embed, 0, 0});
+    if (const uint32_t width = config.condition_width()) {
+        condition_in = state_.slot(d, width, precision, "condition_embed.linear_1");
+        condition_out = state_.slot(d, d, precision, "condition_embed.linear_2");
+        parts_.push_back({"condition_embed.linear_1.weight", d, width, false, 0, d, condition_in, 0, 0});
+        parts_.push_back({"condition_embed.linear_2.weight", d, d, false, 0, d, condition_out, 0, 0});
+    }
     norm_out = state_.slot(2 * d, d, precision, "norm_out");
     norm_out_bias = state_.slot(1, 2 * d, DType::f32, "norm_out.bias");
     place_swapped("norm_out.linear", norm_out, norm_out_bias, 0, 2 * d);

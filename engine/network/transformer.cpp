@@ -78,6 +78,13 @@ Tensor Transformer::positions(Graph& g, const TokenContext& context) const
     return gemm(g, waves, weights_.pos_embed.in(g), weights_.pos_embed_bias.in(g), {.dtype = precision_});
 }
 
+Tensor Transformer::tell(Graph& g, Tensor pos, Tensor condition) const
+{
+    const Tensor hidden = silu(g, gemm(g, condition, weights_.condition_in.in(g), {}, {.dtype = precision_}));
+    const Tensor told = gemm(g, hidden, weights_.condition_out.in(g), {}, {.dtype = precision_});
+    return config_.context_pos_embed ? add(g, told, pos) : told;
+}
+
 void Transformer::modulations(Graph& g, Tensor timesteps, Tensor table) const
 {
     const Tensor waves = sinusoid(g, timesteps, time_frequencies_.in(g), true, DType::f32); // [T, 256]
@@ -125,8 +132,8 @@ Tensor Transformer::forward(Graph& g, Tensor tokens, const TokenContext& context
     Tensor x = g.matrix(2 * rows, config_.dim(), precision_, "tokens");
     const Tensor embedded = gemm(g, tokens, weights_.proj_in.in(g), weights_.proj_in_bias.in(g), {.dtype = precision_});
     add(g, embedded, context.pos, {x});
-    embedding(g, context.labels, weights_.semantic_embed.in(g), config_.context_pos_embed ? context.pos : Tensor{},
-              precision_, {x, rows});
+    const Tensor beside = context.told.valid() ? context.told : config_.context_pos_embed ? context.pos : Tensor{};
+    embedding(g, context.labels, weights_.semantic_embed.in(g), beside, precision_, {x, rows});
     for (uint32_t i = 0; i < config_.num_layers; ++i)
         x = block(g, i, x, context, table, table_row);
     const uint32_t column = block_columns_.back();

@@ -63,11 +63,15 @@ RegionInput Outpainter::input(uint32_t region) const
     const auto members = regions_.region(region);
     RegionInput in;
     in.fixed.resize(members.size() * channels);
+    const size_t width = conditions_.empty() ? 0 : conditions_.width();
+    in.told.resize(members.size() * width);
     for (size_t i = 0; i < members.size(); ++i) {
         const uint32_t cell = members[i];
         in.cells.push_back(grid_.cells[cell]);
         in.labels.push_back(grid_.labels[cell]);
         in.known.push_back(!graph_->is_target(region, cell));
+        if (width)
+            conditions_.row(cell, grid_.cells[cell], std::span(in.told).subspan(i * width, width));
         if (in.known.back())
             encode_token(config_, std::span(grid_.points).subspan(cell * n * 3, n * 3),
                          std::span(grid_.colors).subspan(cell * n * 3, n * 3),

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "engine/scene/grid.h"
+#include "engine/voxfield/cell_conditions.h"
 #include "engine/voxfield/region_graph.h"
 #include "engine/voxfield/token_sampler.h"
 
@@ -35,6 +36,9 @@ class Outpainter {
     // grid: made ready for points (arrays allocated, n and voxel size of the model); errors: bad_input
     static Result<std::unique_ptr<Outpainter>> create(VoxelGrid& grid, const TransformerConfig& config,
                                                       const RegionOptions& options);
+
+    // what is known of the grid's cells beside their labels; before begin()
+    void tell(CellConditions conditions) { conditions_ = std::move(conditions); }
 
     size_t region_count() const { return graph_->region_count(); }
     size_t cells_to_do() const { return cells_to_do_; }
@@ -74,6 +78,7 @@ class Outpainter {
 
     VoxelGrid& grid_;
     const TransformerConfig& config_;
+    CellConditions conditions_;
     Regions regions_;
     std::unique_ptr<RegionGraph> graph_;
     std::vector<RegionResult> restored_; // by region; empty targets: not restored

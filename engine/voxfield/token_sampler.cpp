@@ -14,6 +14,7 @@ struct TokenSampler::Batch {
     uint32_t rows, tiles, longest; // rows: of one guidance half
     State state;
     Slot labels, cells, sets, tile_list, coords, pos, mask, known, fixed, x, x0, z, table_row; // z: noise that is given
+    Slot condition, told; // none where the model is told nothing
     std::unique_ptr<Program> prepare, step, undo;
 
     Batch(const TokenSampler& s, const TokenSets& packed)
@@ -32,6 +33,10 @@ struct TokenSampler::Batch {
         fixed = state.slot(rows, channels, DType::f32, "fixed");
         x = state.slot(rows, channels, DType::f32, "x");
         x0 = state.slot(rows, channels, DType::f32, "x0");
+        if (const uint32_t width = t.config().condition_width()) {
+            condition = state.slot(m, width, t.precision(), "condition");
+            told = state.slot(m, t.config().dim(), t.precision(), "told");
+        }
         if (s.options_.noise)
             z = state.slot(rows, channels, DType::f32, "z");
         table_row = state.slot(2 * m, 1, DType::u32, "table_row", 1);
@@ -45,6 +50,7 @@ struct TokenSampler::Batch {
         c.tiles = tile_list.in(g);
         c.coords = coords.in(g);
         c.pos = pos.in(g);
+        c.told = told.in(g);
         c.mask = mask.in(g);
         c.longest = longest;
         return c;
@@ -54,7 +60,10 @@ struct TokenSampler::Batch {
         Graph g;
         const TokenContext c = context(g);
         g.keep(t.neighbors(g, c), mask);
-        g.keep(t.positions(g, c), pos);
+        const Tensor positions = t.positions(g, c);
+        g.keep(positions, pos);
+        if (told.valid())
+            g.keep(t.tell(g, positions, condition.in(g)), told);
         return g;
     }
     Tensor noise(Graph& g, const TokenSampler& s, const StepTable& steps) const
@@ -191,6 +200,21 @@ uint64_t TokenSampler::table_bytes() const
     return state_.planned_bytes(device_.limits()) + modulations_->plan().arena_bytes();
 }
 
+// of the half with labels; that without is told nothing
+std::vector<float> TokenSampler::told_rows(uint32_t rows, std::span<const RegionInput> regions) const
+{
+    const size_t width = transformer_.config().condition_width();
+    std::vector<float> told(rows * width, 0.f);
+    size_t row = 0;
+    for (const RegionInput& r : regions) {
+        SR_ASSERT(r.told.empty() || r.told.size() == r.cells.size() * width, "{} numbers tell {} cells", r.told.size(),
+                  r.cells.size());
+        std::ranges::copy(r.told, told.begin() + ptrdiff_t(row * width));
+        row += r.cells.size();
+    }
+    return told;
+}
+
 Status TokenSampler::upload(Batch& b, const TokenSets& sets, std::span<const RegionInput> regions)
 {
     SR_CHECK(b.labels.write(device_, sets.labels));
@@ -209,7 +233,8 @@ Status TokenSampler::upload(Batch& b, const TokenSets& sets, std::span<const Reg
                 std::copy_n(&r.fixed[i * channels], channels, &fixed[row * channels]);
         }
     SR_CHECK(b.known.write(device_, known));
-    return b.fixed.write_rows(device_, fixed);
+    SR_CHECK(b.fixed.write_rows(device_, fixed));
+    return b.condition.valid() ? b.condition.write_rows(device_, told_rows(b.rows, regions)) : Status();
 }
 
 // the modulation table holds a window of the schedule's timesteps; jumps may leave it either way
@@ -260,6 +285,7 @@ uint64_t TokenSampler::key_of(std::span<const RegionInput> regions) const
         add(r.labels);
         add(r.known);
         add(r.fixed);
+        add(r.told);
     }
     return hash.value();
 }

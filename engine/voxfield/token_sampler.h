@@ -20,6 +20,7 @@ struct RegionInput {
     std::vector<uint32_t> labels;
     std::vector<uint32_t> known; // 1: the token is given in `fixed`
     std::vector<float> fixed;    // [cells, C]; read where known
+    std::vector<float> told;     // [cells, W], the condition of each cell; or nothing
 };
 
 struct SamplerOptions {
@@ -86,6 +87,7 @@ class TokenSampler {
     StepTable step_table(Graph& g) const;
     TokenSets pack(std::span<const RegionInput> regions) const;
     Result<Batch*> batch_for(const TokenSets& sets);
+    std::vector<float> told_rows(uint32_t rows, std::span<const RegionInput> regions) const;
     Status upload(Batch& batch, const TokenSets& sets, std::span<const RegionInput> regions);
     Status use_timestep(uint32_t index);
     Status feed_noise(Batch& batch, size_t row);

@@ -14,7 +14,7 @@
 namespace semrover {
 
 SurfaceSamples sample_surface(Graph& g, const SurfaceTriangles& s, Tensor triangles, Tensor sums, Tensor starts,
-                              Tensor cells, uint32_t samples, uint64_t seed)
+                              Tensor cells, uint32_t samples, uint64_t seed, bool canonical)
 {
     SR_ASSERT(cells.dtype == DType::i32 && cells.ld == 4 && samples && triangles.rows == sums.rows,
               "sample_surface: cells [{}, {}], {} samples, {} triangles, {} sums", cells.rows, cells.ld, samples,
@@ -26,7 +26,7 @@ SurfaceSamples sample_surface(Graph& g, const SurfaceTriangles& s, Tensor triang
     g.dispatch(
         kernel::sample_surface,
         {s.records, s.attributes, s.materials, s.textures, triangles, sums, starts, cells, y.points, y.addresses}, push,
-        threads(size));
+        threads(size), {.constants = {{"kCanonical", canonical}}});
     return y;
 }
 

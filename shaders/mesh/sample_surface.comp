@@ -6,6 +6,9 @@
 // 1976). x is the share of the area before the point, across pairs and the fans of their polygons; the root of y how far
 // it lies from the fan's corner. Each point by itself is uniform; together they leave smaller gaps than independent
 // ones. And what a point's colour is made of.
+// kCanonical: nothing is random. Where a cell's surface faces one axis, sample k lies at place k of a grid of rows over
+// the cell, seen along that axis, on what is outermost there. Elsewhere, and where nothing is, the lattice's shift is a
+// constant.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/clip_cell.glsl"
 #include "lib/philox.glsl"
@@ -14,6 +17,7 @@
 #include "sample_surface.h"
 
 layout(local_size_x = 64) in;
+layout(constant_id = 0) const bool kCanonical = false;
 layout(push_constant) uniform Push { SampleSurfacePush p; };
 layout(binding = 0) readonly buffer Triangles { uint triangles[]; };  // [T, 12]
 layout(binding = 1) readonly buffer Attributes { uint attributes[]; }; // [T, 16]
@@ -63,6 +67,65 @@ vec3 point_in_polygon(float into, float outward)
     return (1.0 - r) * polygon[0] + (r * (1.0 - s)) * polygon[i] + (r * s) * polygon[i + 1];
 }
 
+const uint kMostPairs = 4096; // of a cell that is looked at as a whole: one with more is no wall
+const float kFlat = 0.85;     // mean of |normal| along an axis from which on a surface faces it
+
+#define CORNERS(t, origin, a, b, c)                                                                                    \
+    const vec3 a = RECORD_CORNER(triangles, t, 0) - origin, b = RECORD_CORNER(triangles, t, 1) - origin,               \
+               c = RECORD_CORNER(triangles, t, 2) - origin
+
+// the axis that most of a cell's surface faces, and to which side; false if it is bent
+bool faced_axis(uint key, vec3 origin, out uint axis, out float side)
+{
+    vec3 along = vec3(0), signed_along = vec3(0);
+    const uint first = starts[key], end = starts[key + 1];
+    for (uint i = first; i < min(end, first + kMostPairs); ++i) {
+        CORNERS(values[i], origin, a, b, c);
+        const vec3 n = cross(b - a, c - a);
+        const float size = length(n), area = sums[i] - (i > first ? sums[i - 1] : 0.0);
+        if (!(size > 0.0))
+            continue;
+        along += abs(n) * (area / size);
+        signed_along += n * (area / size);
+    }
+    axis = along.x >= along.y && along.x >= along.z ? 0 : along.y >= along.z ? 1 : 2;
+    side = signed_along[axis] < 0.0 ? -1.0 : 1.0;
+    return end - first <= kMostPairs && along[axis] >= kFlat * sums[end - 1];
+}
+
+// place k of n in rows over a square
+vec2 place_in_rows(uint k, uint n)
+{
+    const uint rows = max(uint(sqrt(float(n)) + 0.5), 1u), row = k * rows / n;
+    const uint first = (row * n + rows - 1) / rows, next = ((row + 1) * n + rows - 1) / rows;
+    return vec2((float(row) + 0.5) / float(rows), (float(k - first) + 0.5) / float(next - first));
+}
+
+// the triangle of a cell that is outermost at a place seen along an axis; false if there is none
+bool outermost(uint key, vec3 origin, uint axis, float side, vec2 place, out uint found, out vec3 point)
+{
+    const uint u = (axis + 1) % 3, v = (axis + 2) % 3;
+    float best = -3e38;
+    for (uint i = starts[key]; i < starts[key + 1]; ++i) {
+        CORNERS(values[i], origin, a, b, c);
+        const vec2 p = place - vec2(a[u], a[v]), q = vec2(b[u], b[v]) - vec2(a[u], a[v]),
+                   r = vec2(c[u], c[v]) - vec2(a[u], a[v]);
+        const float area = q.x * r.y - q.y * r.x, wb = (p.x * r.y - p.y * r.x) / area,
+                    wc = (q.x * p.y - q.y * p.x) / area;
+        if (abs(area) < 1e-9 || min(min(wb, wc), 1.0 - wb - wc) < -1e-6)
+            continue;
+        const float height = a[axis] + wb * (b[axis] - a[axis]) + wc * (c[axis] - a[axis]);
+        if (height < 0.0 || height >= 1.0 || height * side <= best)
+            continue;
+        best = height * side;
+        found = values[i];
+        point[u] = place.x;
+        point[v] = place.y;
+        point[axis] = height;
+    }
+    return best > -3e38;
+}
+
 // addresses of the four texels around a point of the texture, and where it lies between them
 uvec4 texels_around(uint texture, vec2 uv, out vec2 between)
 {
@@ -96,22 +159,35 @@ void write_color(uint to, uint t, vec3 weights)
     samples[8 * to + 7] = factor.z;
 }
 
+// by area: x is the share of it before the point, y how far the point lies from its fan's corner
+void place_by_area(uint key, vec3 origin, float x, float y, out uint t, out vec3 point)
+{
+    float into;
+    t = values[pick_pair(key, x, into)];
+    CORNERS(t, origin, a, b, c);
+    clip_to_cell(a, b, c);
+    point = clamp(point_in_polygon(into, y), 0.0, 1.0);
+}
+
 void main()
 {
     const uint to = linear_thread();
     if (to >= p.cells * p.samples)
         return;
     const ivec4 cell = cells[to / p.samples];
-    const uint key = uint(cell.w);
-    const uint k = to % p.samples;
-    const uvec4 random = philox(uvec4(uvec3(cell.xyz), 0), uvec2(p.seed_low, p.seed_high));
-    float into;
-    const uint t = values[pick_pair(key, unit(random.x + k * (0xffffffffu / p.samples)), into)];
+    const uint key = uint(cell.w), k = to % p.samples;
     const vec3 origin = vec3(cell_of_key(key));
-    const vec3 a = RECORD_CORNER(triangles, t, 0) - origin, b = RECORD_CORNER(triangles, t, 1) - origin,
-               c = RECORD_CORNER(triangles, t, 2) - origin;
-    clip_to_cell(a, b, c);
-    const vec3 point = clamp(point_in_polygon(into, unit(random.y + k * 0x9E3779B9u)), 0.0, 1.0);
+    uint t, axis;
+    float side;
+    vec3 point;
+    if (!kCanonical || !faced_axis(key, origin, axis, side) ||
+        !outermost(key, origin, axis, side, place_in_rows(k, p.samples), t, point)) {
+        const uvec4 random = kCanonical ? uvec4(0x80000000u / p.samples, 0x80000000u, 0, 0)
+                                        : philox(uvec4(uvec3(cell.xyz), 0), uvec2(p.seed_low, p.seed_high));
+        place_by_area(key, origin, unit(random.x + k * (0xffffffffu / p.samples)), unit(random.y + k * 0x9E3779B9u), t,
+                      point);
+    }
+    CORNERS(t, origin, a, b, c);
     samples[8 * to] = point.x - 0.5;
     samples[8 * to + 1] = point.y - 0.5;
     samples[8 * to + 2] = point.z - 0.5;

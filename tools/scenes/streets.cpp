@@ -2,11 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // semrover streets -o DIR: makes up a street: a textured, labelled mesh, its grids, a drive, and with --images pictures
 #include "engine/mesh/mesh_files.h"
+#include "engine/scene/cell_objects.h"
 #include "engine/scene/palette.h"
 #include "runtime/base/json.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/output_folder.h"
+#include "tools/scenes/placement_option.h"
 #include "tools/scenes/street_images.h"
 #include "tools/streets/camera_drive.h"
 #include "tools/streets/seen_cells.h"
@@ -54,12 +56,13 @@ Json street_json(const StreetsArguments& o, const Street& street, const CameraPa
             {"shift", o.shift}};
 }
 
-Status write_grids(const StreetsArguments& o, Device& device, const Street& street, std::span<const CameraPath> drives,
+Status write_grids(const StreetsArguments& o, Device& device, Street& street, std::span<const CameraPath> drives,
                    const OutputFolder& out)
 {
     VoxelizeOptions voxels = o.voxels;
     voxels.seed = o.street.seed;
     SR_TRY(StreetGrids grids, street_grids(device, street, voxels));
+    tint_objects(street.boxes, grids.truth);
     if (o.seen) {
         SR_TRY(const std::vector<uint32_t> seen, seen_cells(device, street.mesh, grids.truth, drives, o.sight));
         grids = part_of(grids, seen);
@@ -72,8 +75,8 @@ Status write_grids(const StreetsArguments& o, Device& device, const Street& stre
     return write_grid(out / "semantic.sgrid", grids.semantic);
 }
 
-Status draw(const StreetsArguments& o, const Globals& globals, Device& device, const Street& street,
-            const CameraPath& path, const CameraPath& shifted, const OutputFolder& out)
+Status draw(const StreetsArguments& o, const Globals& globals, Device& device, Street& street, const CameraPath& path,
+            const CameraPath& shifted, const OutputFolder& out)
 {
     if (!o.no_grids)
         SR_CHECK(write_grids(o, device, street, std::array{path, shifted}, out));
@@ -88,7 +91,7 @@ Status draw(const StreetsArguments& o, const Globals& globals, Device& device, c
 Status streets(const StreetsArguments& o, const Globals& globals)
 {
     SR_TRY(OutputFolder out, OutputFolder::create(o.output, globals.yes));
-    const Street street = make_street(o.street);
+    Street street = make_street(o.street);
     const Intrinsics lens = pinhole_from_fov(o.fov, o.images.width, o.images.height);
     const CameraPath path = drive_along(street.road, o.drive, lens);
     DriveShape beside = o.drive;
@@ -106,6 +109,7 @@ Status streets(const StreetsArguments& o, const Globals& globals)
         SR_TRY(const auto device, open_device(globals));
         SR_CHECK(draw(o, globals, *device, street, path, shifted, out));
     }
+    SR_CHECK(write_objects(out / "objects.json", street.boxes));
     SR_CHECK(out.commit());
     if (globals.json)
         fmt::print("{}\n", about.dump());
@@ -137,6 +141,7 @@ void add_streets(CLI::App& app, const Globals& globals, Run& run)
     c->add_option("--reach", o->sight.reach, "metres that --seen looks")->check(CLI::Range(1.0, 1000.0));
     c->add_option("--voxel-size", o->voxels.voxel_size, "metres")->check(CLI::Range(0.05f, 10.f));
     c->add_option("--points", o->voxels.points_per_voxel, "points of a cell")->check(CLI::Range(1, 4096));
+    add_placement(*c, o->voxels);
     c->add_flag("--images", o->pictures, "also pictures of both drives: {color,depth,normal,label,visible}/000000.png");
     c->add_option("--samples", o->images.samples, "rays a pixel")->check(CLI::Range(1u, 256u));
     c->add_option("--ambient-rays", o->images.ambient_rays, "rays for the light from around, a sample")

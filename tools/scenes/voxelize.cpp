@@ -11,6 +11,7 @@
 #include "runtime/base/quote.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/open_device.h"
+#include "tools/scenes/placement_option.h"
 
 #include <charconv>
 #include <CLI/CLI.hpp>
@@ -154,6 +155,7 @@ void add_voxelize(CLI::App& app, const Globals& globals, Run& run)
     c->add_option("--voxel-size", o->voxelize.voxel_size, "metres (0.6)")->check(CLI::Range(0.001, 1000.0));
     c->add_option("--points", o->voxelize.points_per_voxel, "of a cell (20)")->check(CLI::Range(1, 4096));
     c->add_option("--seed", o->voxelize.seed, "of the points (0)");
+    add_placement(*c, o->voxelize);
     c->add_option("--min-area", o->voxelize.min_area,
                   "surface of an occupied cell, in squares of the voxel size (0.0001)")
         ->check(CLI::Range(0.0, 1.0));

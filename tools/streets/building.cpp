@@ -5,6 +5,7 @@
 #include "tools/streets/class_label.h"
 
 #include <algorithm>
+#include <numbers>
 
 namespace semrover {
 
@@ -141,11 +142,25 @@ class Roof {
     Finish cover_, gravel_, gutter_;
 };
 
+// the plot's box from the ground up to what stands highest of the faces from number `first` on
+void note_building(MeshBuilder& m, const BuildingPlot& p, size_t first)
+{
+    const size_t count = m.objects().size();
+    m.note_object(label::kBuilding, p.frame.turned(-std::numbers::pi / 2), first); // its front looks against y
+    SR_ASSERT(m.objects().size() == count + 1, "a building without faces");
+    SceneObject& o = m.objects().back();
+    const Vector3 middle = p.frame.at(p.width / 2, p.depth / 2, 0);
+    const double top = o.center[2] + o.size[2] / 2;
+    o.center = {middle.x, middle.y, (middle.z + top) / 2};
+    o.size = {p.depth, p.width, top - middle.z};
+}
+
 } // namespace
 
 void add_building(MeshBuilder& m, const FacadeStyle& s, const BuildingPlot& p, uint64_t seed, uint64_t key)
 {
     KeyedRandom r(seed, {10, key});
+    const size_t first = m.faces();
     const Frame& f = p.frame;
     const double w = p.width, d = p.depth, top = s.height();
     add_facade(m, s, f, w, true, r);
@@ -166,6 +181,7 @@ void add_building(MeshBuilder& m, const FacadeStyle& s, const BuildingPlot& p, u
     const Finish pipe = m.finish(Pattern::metal, label::kBuilding, {0.5, 0.51, 0.5});
     m.tube(pipe, f.at(0.12, -0.1, 0), 0.05, f.at(0.12, -0.1, top - 0.4), 0.05, 6, 0);
     Roof(m, s, p, r).add();
+    note_building(m, p, first);
 }
 
 } // namespace semrover

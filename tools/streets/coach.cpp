@@ -84,6 +84,7 @@ void add_truck(MeshBuilder& m, const Frame& f, KeyedRandom& r)
         {0.85, 0.85, 0.84}, {0.2, 0.28, 0.42}, {0.5, 0.15, 0.12}, {0.62, 0.6, 0.3}, {0.25, 0.36, 0.3}};
     constexpr Color boxes[] = {{0.84, 0.84, 0.82}, {0.74, 0.73, 0.7}, {0.42, 0.47, 0.52}, {0.7, 0.62, 0.5}};
     const uint8_t l = label::kTruck;
+    const ObjectNote note(m, l, f);
     const Finish paint = m.finish(Pattern::car_paint, l, r.pick(cabs)), glass = m.finish(Pattern::car_glass, l);
     const Finish cargo = m.finish(Pattern::cargo, l, r.pick(boxes)),
                  metal = m.finish(Pattern::metal, l, {0.3, 0.3, 0.3});
@@ -111,6 +112,7 @@ void add_bus(MeshBuilder& m, const Frame& f, KeyedRandom& r)
     constexpr Color paints[] = {
         {0.72, 0.2, 0.16}, {0.83, 0.8, 0.72}, {0.2, 0.36, 0.55}, {0.3, 0.5, 0.36}, {0.85, 0.66, 0.2}};
     const uint8_t l = label::kBus;
+    const ObjectNote note(m, l, f);
     const Color c = r.pick(paints);
     const Finish paint = m.finish(Pattern::car_paint, l, c), flank = m.finish(Pattern::bus_side, l, c);
     const Hull h{-5.9, 5.9, 2.5, 0.35, 3.1, 0.22};
@@ -132,6 +134,7 @@ void add_tram(MeshBuilder& m, const Frame& f, KeyedRandom& r)
 {
     constexpr Color paints[] = {{0.68, 0.16, 0.14}, {0.8, 0.77, 0.68}, {0.24, 0.42, 0.3}, {0.85, 0.7, 0.25}};
     const uint8_t l = label::kTrain;
+    const ObjectNote note(m, l, f);
     const Color c = r.pick(paints);
     const Finish paint = m.finish(Pattern::car_paint, l, c), flank = m.finish(Pattern::train_side, l, c);
     const Finish glass = m.finish(Pattern::car_glass, l), dark = m.finish(Pattern::rubber, l);

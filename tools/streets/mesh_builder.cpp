@@ -228,6 +228,34 @@ void MeshBuilder::torus(Finish f, const Vector3& center, const Vector3& axis, do
     loft(f, rings);
 }
 
+void MeshBuilder::note_object(uint8_t label, const Frame& frame, size_t first)
+{
+    const Frame upright = upright_frame({}, std::atan2(frame.x.y, frame.x.x));
+    std::array<double, 3> low{}, high{};
+    bool any = false;
+    for (size_t f = first; f < mesh_.faces.size(); ++f) {
+        if (mesh_.face_labels[f] != label)
+            continue;
+        for (uint32_t v : mesh_.faces[f]) {
+            const Vector3 at{mesh_.positions[v][0], mesh_.positions[v][1], mesh_.positions[v][2]};
+            const std::array<double, 3> p = {dot(at, upright.x), dot(at, upright.y), at.z};
+            for (size_t a = 0; a < 3; ++a) {
+                low[a] = any ? std::min(low[a], p[a]) : p[a];
+                high[a] = any ? std::max(high[a], p[a]) : p[a];
+            }
+            any = true;
+        }
+    }
+    if (!any)
+        return;
+    const Vector3 middle = upright.at((low[0] + high[0]) / 2, (low[1] + high[1]) / 2, (low[2] + high[2]) / 2);
+    SceneObject o{.id = uint32_t(objects_.size()), .label = label, .center = {middle.x, middle.y, middle.z}};
+    for (size_t a = 0; a < 3; ++a)
+        o.size[a] = std::max(high[a] - low[a], 0.01);
+    o.heading = std::atan2(upright.x.y, upright.x.x);
+    objects_.push_back(o);
+}
+
 Mesh MeshBuilder::take() &&
 {
     return std::move(mesh_);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "engine/mesh/mesh.h"
+#include "engine/scene/scene_objects.h"
 #include "tools/streets/pattern.h"
 #include "tools/streets/vector3.h"
 
@@ -62,6 +63,11 @@ class MeshBuilder {
     void torus(Finish f, const Vector3& center, const Vector3& axis, double radius, double thickness, int corners = 14,
                int section = 5);
 
+    // Adds an object: the upright box, along the frame's x, of the faces from number `first` on that have this label.
+    // Nothing where there are none. Its id is its number.
+    void note_object(uint8_t label, const Frame& frame, size_t first);
+    std::vector<SceneObject>& objects() { return objects_; }
+
     size_t faces() const { return mesh_.faces.size(); }
     const Mesh& mesh() const { return mesh_; }
     // smoothness of materials, 0..1 (what they mirror of the sky at right angles), by number
@@ -74,10 +80,29 @@ class MeshBuilder {
     uint32_t texture_of(Pattern pattern);
 
     Mesh mesh_;
+    std::vector<SceneObject> objects_;
     std::vector<float> gloss_;
     std::vector<double> size_; // metres a picture, by material
     std::map<Pattern, uint32_t> textures_;
     std::map<std::tuple<Pattern, std::array<int, 3>>, uint32_t> materials_;
+};
+
+// What is drawn with a label while this lives is an object whose front looks along the frame's x.
+class ObjectNote {
+  public:
+    ObjectNote(MeshBuilder& mesh, uint8_t label, const Frame& frame)
+        : mesh_(mesh), label_(label), frame_(frame), first_(mesh.faces())
+    {
+    }
+    ~ObjectNote() { mesh_.note_object(label_, frame_, first_); }
+    ObjectNote(const ObjectNote&) = delete;
+    ObjectNote& operator=(const ObjectNote&) = delete;
+
+  private:
+    MeshBuilder& mesh_;
+    uint8_t label_;
+    Frame frame_;
+    size_t first_;
 };
 
 } // namespace semrover

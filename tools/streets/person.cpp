@@ -111,6 +111,7 @@ void add_body(MeshBuilder& m, const Frame& f, const Posture& p, const Clothes& c
 
 void add_person(MeshBuilder& m, const Frame& foot, KeyedRandom& r)
 {
+    const ObjectNote note(m, label::kPerson, foot);
     const double size = r.uniform(0.92, 1.05);
     const Frame f{foot.origin, foot.x * size, foot.y * size, foot.z * size};
     const Clothes c(m, label::kPerson, r);
@@ -121,6 +122,7 @@ void add_person(MeshBuilder& m, const Frame& foot, KeyedRandom& r)
 
 void add_rider(MeshBuilder& m, const Frame& middle, bool motorcycle, KeyedRandom& r)
 {
+    const ObjectNote note(m, label::kRider, middle);
     add_body(m, middle, riding_posture(motorcycle), Clothes(m, label::kRider, r), motorcycle || r.chance(0.5));
 }
 
@@ -129,6 +131,7 @@ void add_bicycle(MeshBuilder& m, const Frame& f, KeyedRandom& r)
     constexpr Color paints[] = {
         {0.15, 0.15, 0.16}, {0.45, 0.12, 0.1}, {0.16, 0.26, 0.4}, {0.7, 0.7, 0.68}, {0.2, 0.33, 0.25}};
     const uint8_t l = label::kBicycle;
+    const ObjectNote note(m, l, f);
     const Finish tyre = m.finish(Pattern::rubber, l), paint = m.finish(Pattern::car_paint, l, r.pick(paints));
     const Finish metal = m.finish(Pattern::metal, l, {0.62, 0.62, 0.62});
     const Vector3 rear{-0.52, 0, 0.34}, front{0.53, 0, 0.34}, crank{-0.08, 0, 0.29}, seat{-0.22, 0, 0.88},
@@ -161,6 +164,7 @@ void add_motorcycle(MeshBuilder& m, const Frame& f, KeyedRandom& r)
     constexpr Color paints[] = {
         {0.5, 0.1, 0.08}, {0.12, 0.12, 0.13}, {0.16, 0.25, 0.42}, {0.78, 0.77, 0.74}, {0.2, 0.3, 0.2}};
     const uint8_t l = label::kMotorcycle;
+    const ObjectNote note(m, l, f);
     const Finish tyre = m.finish(Pattern::rubber, l), paint = m.finish(Pattern::car_paint, l, r.pick(paints));
     const Finish metal = m.finish(Pattern::metal, l, {0.5, 0.5, 0.5}), rim = m.finish(Pattern::rim, l);
     for (double x : {-0.68, 0.7}) {

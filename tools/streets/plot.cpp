@@ -169,7 +169,7 @@ class Plots {
         } else {
             for (int i = 0; i < 3; ++i)
                 tree(place(r.uniform(s0 + 1.5, s1 - 1.5), side, r.uniform(5, 14)), r);
-            add_hedge(m_, place(side > 0 ? s0 : s1, side, 20), s1 - s0, 1.2, 3, r);
+            hedge(place(side > 0 ? s0 : s1, side, 20), s1 - s0, 1.2, 3, r);
             house_row(s0, s1, side, key, district);
         }
         for (int i = 0; i < 3; ++i) {
@@ -195,6 +195,8 @@ class Plots {
     void border(double s0, double s1, int side, KeyedRandom& r)
     {
         const double kind = r.uniform();
+        const uint8_t what = kind < 0.35 ? label::kWall : kind < 0.75 ? label::kFence : label::kVegetation;
+        const ObjectNote note(m_, what, place((s0 + s1) / 2, side, 0.25).turned(-1.5707963267948966));
         for (double s = s0; s < s1 - 0.1; s += 3) {
             const double e = std::min(s + 3, s1), wide = e - s;
             const Frame f = place(side > 0 ? s : e, side, 0.25);
@@ -210,6 +212,12 @@ class Plots {
             }
         }
         ++site_.objects[kind < 0.35 ? "wall" : kind < 0.75 ? "fence" : "hedge"];
+    }
+
+    void hedge(const Frame& f, double length, double width, double height, KeyedRandom& r)
+    {
+        const ObjectNote note(m_, label::kVegetation, f.turned(-1.5707963267948966));
+        add_hedge(m_, f, length, width, height, r);
     }
 
     void fence(const Frame& f, double wide, bool wood)
@@ -267,7 +275,7 @@ class Plots {
         m_.quad(lawn_, p(0, -half), p(14, -half), p(14, half), p(0, half));
         for (int i = 0; i < 7; ++i)
             tree(f.moved(r.uniform(4, 9), (i - 3) * 5 + r.uniform(-1, 1), 0.1), r);
-        add_hedge(m_, f.moved(1, half, 0.1).turned(-1.5707963267948966), 2 * half, 1, 1.3, r);
+        hedge(f.moved(1, half, 0.1).turned(-1.5707963267948966), 2 * half, 1, 1.3, r);
         for (int i = 0; i < 4; ++i) {
             const double wide = half / 2;
             const Frame wall{f.at(14, half - i * wide, 0.1), f.y * -1, f.x, f.z};

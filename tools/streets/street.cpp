@@ -11,7 +11,7 @@ namespace semrover {
 
 Street make_street(const StreetOptions& options)
 {
-    Street street{RoadNetwork(options.seed, options.length), {}, {}, {}};
+    Street street{RoadNetwork(options.seed, options.length), {}, {}, {}, {}};
     MeshBuilder mesh;
     Site site{mesh, street.road, options.seed, street.objects};
     add_road_surface(mesh, street.road, options.seed);
@@ -19,6 +19,7 @@ Street make_street(const StreetOptions& options)
     add_furnishing(site);
     add_traffic(site);
     street.gloss = mesh.gloss();
+    street.boxes = std::move(mesh.objects());
     street.mesh = std::move(mesh).take();
     return street;
 }

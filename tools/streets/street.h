@@ -5,6 +5,7 @@
 #include "engine/format/camera_path.h"
 #include "engine/mesh/mesh.h"
 #include "engine/scene/grid.h"
+#include "engine/scene/scene_objects.h"
 #include "tools/streets/road_network.h"
 
 #include <map>
@@ -23,6 +24,7 @@ struct Street {
     Mesh mesh;                             // every face has a label and a textured material
     std::vector<float> gloss;              // of each material, 0..1 (engine/trace)
     std::map<std::string, size_t> objects; // how many of each kind stand in it
+    std::vector<SceneObject> boxes;        // of vehicles, buildings, people, trees, ... without tints
 };
 
 // The same seed gives the same street on every run; a longer one begins like a shorter one, as far as 60 m before the

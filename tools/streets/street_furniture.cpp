@@ -71,6 +71,7 @@ void plate(MeshBuilder& m, const Frame& f, Pattern face, double z, double size, 
 
 void add_street_light(MeshBuilder& m, const Frame& f, double height, bool old_fashioned)
 {
+    const ObjectNote note(m, label::kPole, f);
     const Color color = old_fashioned ? kDarkGreen : kSteel;
     const Finish metal = m.finish(Pattern::metal, label::kPole, color);
     const Finish lamp = m.finish(Pattern::trim, label::kPole, {0.93, 0.92, 0.86});
@@ -92,6 +93,7 @@ void add_street_light(MeshBuilder& m, const Frame& f, double height, bool old_fa
 
 void add_traffic_light(MeshBuilder& m, const Frame& f, bool arm, bool red)
 {
+    const ObjectNote pole(m, label::kPole, f), lights(m, label::kTrafficLight, f.turned(std::numbers::pi));
     post(m, f, arm ? 5.6 : 3.2, 0.07, kAnthracite);
     signal_head(m, f, arm ? 0.26 : 0.0, 2.75, red);
     if (!arm)
@@ -103,6 +105,7 @@ void add_traffic_light(MeshBuilder& m, const Frame& f, bool arm, bool red)
 
 void add_sign(MeshBuilder& m, const Frame& f, SignKind kind)
 {
+    const ObjectNote pole(m, label::kPole, f), shield(m, label::kTrafficSign, f.turned(std::numbers::pi));
     post(m, f, 2.85, 0.035, kSteel);
     const double z = 2.45;
     switch (kind) {
@@ -132,6 +135,7 @@ void add_sign(MeshBuilder& m, const Frame& f, SignKind kind)
 
 void add_bollard(MeshBuilder& m, const Frame& f)
 {
+    const ObjectNote note(m, label::kPole, f);
     const Finish metal = m.finish(Pattern::metal, label::kPole, kAnthracite);
     m.tube(metal, f.at(0, 0, -0.02), 0.06, f.at(0, 0, 0.85), 0.05, 9, 0);
     m.tube(m.finish(Pattern::trim, label::kPole, {0.85, 0.85, 0.83}), f.at(0, 0, 0.68), 0.058, f.at(0, 0, 0.76), 0.058,
@@ -141,6 +145,7 @@ void add_bollard(MeshBuilder& m, const Frame& f)
 
 void add_bin(MeshBuilder& m, const Frame& f, KeyedRandom& r)
 {
+    const ObjectNote note(m, label::kPole, f);
     constexpr Color colors[] = {{0.2, 0.3, 0.22}, {0.3, 0.31, 0.32}, {0.2, 0.26, 0.36}, {0.5, 0.34, 0.14}};
     const Color c = r.pick(colors);
     if (r.chance(0.5)) { // on wheels, of the houses
@@ -160,6 +165,7 @@ void add_bin(MeshBuilder& m, const Frame& f, KeyedRandom& r)
 
 void add_bench(MeshBuilder& m, const Frame& f)
 {
+    const ObjectNote note(m, label::kFence, f.turned(std::numbers::pi / 2));
     const Finish wood = m.finish(Pattern::planks, label::kFence, {0.6, 0.44, 0.3});
     const Finish metal = m.finish(Pattern::metal, label::kFence, kAnthracite);
     for (double y : {-0.2, -0.05, 0.1})
@@ -174,6 +180,7 @@ void add_bench(MeshBuilder& m, const Frame& f)
 
 void add_cabinet(MeshBuilder& m, const Frame& f)
 {
+    const ObjectNote note(m, label::kWall, f.turned(std::numbers::pi / 2));
     m.box(m.finish(Pattern::metal, label::kWall, {0.56, 0.58, 0.54}), f, {-0.55, -0.18, 0.08}, {0.55, 0.18, 1.3});
     m.box(m.finish(Pattern::concrete, label::kWall, {0.6, 0.6, 0.6}), f, {-0.6, -0.2, -0.02}, {0.6, 0.2, 0.08});
     m.box(m.finish(Pattern::metal, label::kWall, {0.42, 0.44, 0.42}), f, {-0.006, 0.18, 0.12}, {0.006, 0.185, 1.25});
@@ -181,6 +188,7 @@ void add_cabinet(MeshBuilder& m, const Frame& f)
 
 void add_planter(MeshBuilder& m, const Frame& f, KeyedRandom& r)
 {
+    const ObjectNote note(m, label::kWall, f);
     m.box(m.finish(Pattern::concrete, label::kWall, {0.66, 0.64, 0.6}), f, {-0.6, -0.3, 0}, {0.6, 0.3, 0.5});
     add_bush(m, f.moved(0, 0, 0.4), {0.58, 0.32, 0.5}, r);
 }
@@ -203,6 +211,7 @@ void add_bike_rack(MeshBuilder& m, const Frame& f, int bicycles, KeyedRandom& r)
 
 void add_bus_stop(MeshBuilder& m, const Frame& f)
 {
+    const ObjectNote note(m, label::kBuilding, f.turned(std::numbers::pi / 2));
     const uint8_t l = label::kBuilding;
     const Finish metal = m.finish(Pattern::metal, l, kAnthracite),
                  glass = m.finish(Pattern::office_glass, l, {0.95, 1, 1});

@@ -84,6 +84,7 @@ Shape shape_of(TreeKind kind, KeyedRandom& r)
 
 void add_tree(MeshBuilder& m, const Frame& foot, TreeKind kind, KeyedRandom& r)
 {
+    const ObjectNote note(m, label::kVegetation, foot);
     const Shape s = shape_of(kind, r);
     const Greens greens(m, r.pick(kGreens));
     const Finish bark = m.finish(Pattern::bark, label::kVegetation, r.pick(kBarks));
@@ -109,6 +110,7 @@ void add_tree(MeshBuilder& m, const Frame& foot, TreeKind kind, KeyedRandom& r)
 
 void add_bush(MeshBuilder& m, const Frame& foot, const Vector3& radii, KeyedRandom& r)
 {
+    const ObjectNote note(m, label::kVegetation, foot);
     const Greens greens(m, r.pick(kGreens));
     const int leaves = int(240 * radii.x * radii.y + 90);
     for (int i = 0; i < leaves; ++i) {

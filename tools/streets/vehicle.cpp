@@ -232,6 +232,7 @@ void add_car(MeshBuilder& m, const Frame& middle, CarBody kind, KeyedRandom& r)
 {
     const Body body = body_of(kind);
     const Color paint = kind == CarBody::van && r.chance(0.6) ? Color{0.86, 0.87, 0.87} : r.pick(kPaints);
+    const ObjectNote note(m, label::kCar, middle);
     CarShell(m, middle, body, paint).add();
 }
 

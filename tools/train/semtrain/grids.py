@@ -7,8 +7,10 @@ import os
 import numpy as np
 
 from . import safetensors_file
+from .condition import drawn_boxes, drawn_tints, mirrored, told_boxes, told_tints, vector_of, width_of
 from .json_file import read_json, write_json
 from .known_cells import draw_known
+from .objects import local_tints, owners_of, read_objects
 
 
 def find_grids(sources):
@@ -44,28 +46,60 @@ def read_tokens(path):
     return t["cells"], t["labels"], tokens.clip(-1, 1).astype(np.float16)
 
 
+def placement_of(path):
+    """how the points of an .sgrid were placed (docs/method.md §1.3)"""
+    return safetensors_file.read_header(path)[1].get("placement", "shifted")
+
+
+def read_owners(path, cells, labels):
+    """the objects.json beside a .sgrid, if there is one -> owners i32 [V], tints near each cell u8 [V, 3], boxes
+    f64 [O, 7], tints of the objects f32 [O, 3]"""
+    about = os.path.join(os.path.dirname(path), "objects.json")
+    if not os.path.exists(about):
+        none = np.full(len(cells), -1, np.int32)
+        return none, np.zeros((len(cells), 3), np.uint8), np.zeros((0, 7)), np.zeros((0, 3))
+    grid, size = read_grid(path)
+    boxes, box_labels, tints = read_objects(about)
+    centers = (cells + 0.5) * size
+    owners = owners_of(centers, labels, boxes, box_labels)
+    return owners, local_tints(centers, owners, grid["colors"]), boxes, tints
+
+
 class Grids:
-    """All grids of some sources, kept as one file each of cells, labels and tokens under `cache`, mapped to memory."""
+    """All grids of some sources, kept as one file each of cells, labels, tokens and what their objects are under
+    `cache`, mapped to memory."""
+
+    ARRAYS = ("cells", "labels", "tokens", "owners", "local_tints", "boxes", "tints")
 
     def __init__(self, sources, cache):
         files = find_grids(sources)
         os.makedirs(cache, exist_ok=True)
         about = os.path.join(cache, "grids.json")
         known = read_json(about) if os.path.exists(about) else {}
-        if known.get("files") != files:
+        if known.get("files") != files or known.get("arrays") != list(self.ARRAYS):
             self._fill(files, cache, about)
         self.offsets = read_json(about)["offsets"]
-        self.cells = np.load(os.path.join(cache, "cells.npy"), mmap_mode="r")
-        self.labels = np.load(os.path.join(cache, "labels.npy"))
-        self.tokens = np.load(os.path.join(cache, "tokens.npy"), mmap_mode="r")
+        placements = {placement_of(f) for f in files}
+        self.placement = placements.pop() if len(placements) == 1 else "mixed"
+        for name in self.ARRAYS:
+            mode = "r" if name in ("cells", "tokens") else None
+            setattr(self, name, np.load(os.path.join(cache, f"{name}.npy"), mmap_mode=mode))
 
-    @staticmethod
-    def _fill(files, cache, about):
-        parts = [read_tokens(f) for f in files]
-        for i, name in enumerate(("cells", "labels", "tokens")):
+    @classmethod
+    def _fill(cls, files, cache, about):
+        parts = [cls._arrays(f) for f in files]
+        counts = np.cumsum([0] + [len(p[5]) for p in parts])  # objects are numbered through
+        for part, first in zip(parts, counts):
+            part[3][part[3] >= 0] += first
+        for i, name in enumerate(cls.ARRAYS):
             np.save(os.path.join(cache, f"{name}.npy"), np.concatenate([p[i] for p in parts]))
         offsets = np.cumsum([0] + [len(p[1]) for p in parts]).tolist()
-        write_json(about, {"files": files, "offsets": offsets})
+        write_json(about, {"files": files, "arrays": list(cls.ARRAYS), "offsets": offsets})
+
+    @staticmethod
+    def _arrays(path):
+        cells, labels, tokens = read_tokens(path)
+        return (cells, labels, tokens, *read_owners(path, cells, labels))
 
     def balance(self, power):
         """for each grid, how likely its cells are the middle of a set: frequency of the class to -power"""
@@ -87,19 +121,36 @@ class LocalSets:
         self.near = [np.array(grids.cells[a:b], np.float32) for a, b in zip(grids.offsets, grids.offsets[1:])]
 
     def batch(self, step):
-        """of one size: centers [B, N, 3] metres, labels [B, N], tokens [B, N, 6n], known [B, N]; fp32, i64, fp32, bool"""
+        """of one size: centers [B, N, 3] metres, labels [B, N], tokens [B, N, 6n], known [B, N], conditions [B, N, W];
+        fp32, i64, fp32, bool, fp32"""
         c = self.config
         random = np.random.default_rng([c["seed"], step])
         size = int(random.integers(c["set_size"][0], c["set_size"][1] + 1))
         size = min(size, min(len(n) for n in self.near))
         sets = [self._set(random, size) for _ in range(c["batch"])]
-        centers, labels, tokens = (np.stack(part) for part in zip(*sets))
+        centers, labels, tokens, cells, boxes = (np.stack(part) for part in zip(*sets))
         labels = labels.astype(np.int64)
-        labels[random.random(c["batch"]) < c["label_dropout"]] = c["network"]["num_classes"]
+        dropped = random.random(c["batch"]) < c["label_dropout"]
+        labels[dropped] = c["network"]["num_classes"]
         known = np.stack([draw_known(random, set_centers, c["known_share"]) for set_centers in centers])
-        return centers, labels, tokens, known
+        conditions = np.stack([self._condition(np.random.default_rng([c["seed"], step, i]), *of_set)
+                               for i, of_set in enumerate(zip(centers, cells, boxes, dropped))])
+        return centers, labels, tokens, known, conditions
+
+    def _condition(self, random, centers, cells, boxes, dropped):
+        """what a set is told beside its labels; where these are dropped, nothing"""
+        owners, parts = self.grids.owners[cells], self.config["network"].get("condition", ())
+        if dropped or not parts:
+            return np.zeros((len(cells), width_of(parts)), np.float32)
+        config = self.config["telling"]
+        has_box, has_tint = told_boxes(random, owners, config), told_tints(random, owners, config)
+        local = self.grids.local_tints[cells] / 255
+        whole = self.grids.tints[owners] if len(self.grids.tints) else local
+        tints = drawn_tints(random, owners, local, np.where(np.isnan(whole), local, whole), config)
+        return vector_of(parts, centers, drawn_boxes(random, owners, boxes, config), has_box, tints, has_tint)
 
     def _set(self, random, size):
+        """-> centers, labels, tokens, which cells of the grids these are, and the boxes of their objects"""
         g = int(random.integers(len(self.near)))
         cells, first = self.near[g], self.grids.offsets[g]
         middle = min(int(np.searchsorted(self.sums[g], random.random())), len(cells) - 1)
@@ -107,10 +158,13 @@ class LocalSets:
         chosen = np.argpartition(apart, size - 1)[:size]
         centers = (cells[chosen] + 0.5) * self.config["network"]["voxel_size"]
         tokens = self.grids.tokens[first + chosen].astype(np.float32).reshape(size, -1, 6)
+        owners = self.grids.owners[first + chosen]
+        boxes = self.grids.boxes[owners] if len(self.grids.boxes) else np.ones((size, 7))
         for axis in range(2):  # streets mirrored in either direction are streets
             if self.config["mirror"] and random.random() < 0.5:
                 centers[:, axis] *= -1
                 tokens[..., axis] *= -1
+                boxes = mirrored(boxes, axis)
         if not self.config["ordered_points"]:
             tokens = np.take_along_axis(tokens, random.random(tokens.shape[:2]).argsort(1)[..., None], 1)
-        return centers, self.grids.labels[first + chosen], tokens.reshape(size, -1)
+        return centers, self.grids.labels[first + chosen], tokens.reshape(size, -1), first + chosen, boxes

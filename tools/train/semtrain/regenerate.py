@@ -20,7 +20,8 @@ SETS = 8             # of a batch
 def load_transformer(folder):
     """-> VoxfieldTransformer of a voxfield_transformer folder, evaluating"""
     config, state = read_component(folder)
-    model = VoxfieldTransformer(**{k: v for k, v in config.items() if not k.startswith("_") and k != "prediction_type"})
+    model = VoxfieldTransformer(**{k: v for k, v in config.items()
+                                   if not k.startswith("_") and k not in ("prediction_type", "placement")})
     model.load_state_dict({name: t.float() for name, t in state.items()})
     return model.eval().requires_grad_(False)
 

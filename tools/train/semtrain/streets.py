@@ -8,13 +8,13 @@ import os
 from .program import semrover
 
 
-def make_street(folder, seed, length, keep_mesh=False):
+def make_street(folder, seed, length, keep_mesh=False, placement="shifted"):
     """FOLDER/truth.sgrid holds what drives along the whole street see. -> whether it was made now"""
     if os.path.exists(os.path.join(folder, "truth.sgrid")):
         return False
     os.makedirs(os.path.dirname(os.path.abspath(folder)), exist_ok=True)
-    semrover("streets", "--seed", seed, "--length", length, "--end-margin", 12, "--spacing", 2, "--seen", "-o", folder,
-             "--quiet", "-y")
+    semrover("streets", "--seed", seed, "--length", length, "--end-margin", 12, "--spacing", 2, "--seen", "--placement",
+             placement, "-o", folder, "--quiet", "-y")
     if not keep_mesh:
         os.remove(os.path.join(folder, "mesh.glb"))
     return True
@@ -27,10 +27,11 @@ def main():
     p.add_argument("--count", type=int, default=110)
     p.add_argument("--length", type=float, default=60, help="metres of each street")
     p.add_argument("--keep-mesh", action="store_true", help="keep mesh.glb too: 8 MB a street")
+    p.add_argument("--placement", choices=["shifted", "canonical"], default="shifted", help="of points in flat cells")
     options = p.parse_args()
     for seed in range(options.first_seed, options.first_seed + options.count):
         folder = os.path.join(options.output, str(seed))
-        if make_street(folder, seed, options.length, options.keep_mesh):
+        if make_street(folder, seed, options.length, options.keep_mesh, options.placement):
             print(folder, flush=True)
 
 

@@ -54,21 +54,30 @@ def loss_of(sets, config):
     weights, of_colors = weights_of(alphas, config["snr_gamma"]), config["color_weight"]
 
     def loss(model, step):
-        centers, labels, x0, known = (torch.from_numpy(a).to(device) for a in sets.batch(step))
+        centers, labels, x0, known, condition = (torch.from_numpy(a).to(device) for a in sets.batch(step))
         random = generator(config, step)
         t = torch.randint(0, len(alphas), (len(x0),), generator=random).to(device)
         noisy = with_known(noised(x0, alphas, t, random), x0, known, alphas, config["known_levels"], random)
         valid = torch.ones(labels.shape, dtype=torch.bool, device=device)
-        places, colors = mean_error(model(noisy, labels, centers, valid, t).float(), x0, ~known)
+        told = (condition,) if condition.shape[-1] else ()
+        places, colors = mean_error(model(noisy, labels, centers, valid, t, *told).float(), x0, ~known)
         loss = ((places + of_colors * colors) / (1 + of_colors) * weights[t]).mean()
         return loss, {"places": float(places.mean()), "colors": float(colors.mean())}
     return loss
 
 
-def exporter(folder, config):
+def with_new_parts(state, model):
+    """weights of a model that is told nothing beside labels, and those that `model` begins with where it is told more"""
+    return {**{name: t for name, t in model.state_dict().items() if name.startswith("condition_embed.")}, **state}
+
+
+def exporter(folder, config, placement):
+    told = {} if placement == "shifted" else {"placement": placement}
+
     def export(state):
         write_component(os.path.join(folder, "model", "voxfield_transformer"),
-                        {"_class_name": "VoxfieldTransformer", **config["network"], "prediction_type": "sample"}, state)
+                        {"_class_name": "VoxfieldTransformer", **config["network"], **told, "prediction_type": "sample"},
+                        state)
         write_scheduler(os.path.join(folder, "model", "voxfield_scheduler"), {
             "_class_name": "DDPMScheduler", "num_train_timesteps": config["num_train_timesteps"],
             "beta_start": config["beta_start"], "beta_end": config["beta_end"], "beta_schedule": "linear",
@@ -90,9 +99,9 @@ def main():
     torch.manual_seed(config["seed"])
     model = VoxfieldTransformer(**config["network"])
     model.start_at_zero()
-    trainer = Trainer(options.output, model, config, exporter(options.output, config))
+    trainer = Trainer(options.output, model, config, exporter(options.output, config, sets.grids.placement))
     if options.init:
-        trainer.start_from(read_component(options.init)[1])
+        trainer.start_from(with_new_parts(read_component(options.init)[1], model))
     print(f"{sum(p.numel() for p in model.parameters())} parameters, {len(sets.grids.labels)} cells", flush=True)
     trainer.run(loss_of(sets, config))
 

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The transformer's module against the golden cases, and its recipe from grids to a model that the engine generates
 with."""
+import json
 import os
 import subprocess
 import tempfile
@@ -50,12 +51,13 @@ def train(grids, output, steps, *more):
 
 class TheModule(unittest.TestCase):
     def test_gives_what_the_golden_cases_expect(self):
-        for name in ("transformer_tiny", "transformer_wide"):
+        for name in ("transformer_tiny", "transformer_wide", "transformer_objects"):
             case, t = golden.read_case(name)
             model = golden.load_network(from_config, name)
             valid = t["input.valid"].bool()
             with torch.no_grad():
-                got = model(t["input.tokens"], t["input.labels"].long(), t["input.centers"], valid, t["input.timestep"])
+                got = model(t["input.tokens"], t["input.labels"].long(), t["input.centers"], valid, t["input.timestep"],
+                            t.get("input.condition"))
             apart = golden.apart(got[valid], t["expect.sample"][valid])
             self.assertLess(apart, case["tolerance"]["fp32"], name)
 
@@ -84,7 +86,8 @@ class TheRecipe(unittest.TestCase):
                   "mirror": False, "ordered_points": True, "known_share": 0,
                   "network": {"num_classes": 20, "voxel_size": 0.6}}
         sets = LocalSets(Grids([self.grid], self.path("cache")), config)
-        centers, labels, tokens, known = sets.batch(5)
+        centers, labels, tokens, known, conditions = sets.batch(5)
+        self.assertEqual(conditions.shape, labels.shape + (0,))
         self.assertFalse(known.any())
         self.assertEqual(tokens.shape, labels.shape + (24,))
         dropped = (labels == 20).all(1)
@@ -141,6 +144,17 @@ class TheRecipe(unittest.TestCase):
         parts = train(self.grid, self.path("parts"), 30)
         for name, tensor in whole.items():
             self.assertTrue(torch.equal(tensor, parts[name]), name)
+
+    def test_says_in_the_model_how_the_points_of_the_data_lay(self):
+        def exported(folder, *grids):
+            train(self.path(grids[0]), self.path(folder), 1, "--grids", *(self.path(g) for g in grids))
+            with open(self.path(f"{folder}/model/voxfield_transformer/config.json")) as file:
+                return json.load(file).get("placement")
+        tensors, (_, metadata, _) = safetensors_file.read(self.grid), safetensors_file.read_header(self.grid)
+        safetensors_file.write(self.path("c.sgrid"), tensors, {**metadata, "placement": "canonical"})
+        self.assertIsNone(exported("plain", "a.sgrid"))
+        self.assertEqual(exported("canonical", "c.sgrid"), "canonical")
+        self.assertEqual(exported("both", "a.sgrid", "c.sgrid"), "mixed")
 
     def test_writes_a_model_that_the_engine_generates_with(self):
         train(self.grid, self.path("run"), 250, "--set", "learning_rate=0.01", "--set", "ema=0.9")

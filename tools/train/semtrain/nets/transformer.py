@@ -7,10 +7,11 @@ import torch
 from torch import nn
 from torch.nn import functional as F
 
+from ..condition import WIDTHS, width_of
 from .attention import attend
 
 CONFIG_FIELDS = ("num_layers", "num_attention_heads", "attention_head_dim", "points_per_voxel", "num_classes",
-                 "voxel_size", "attention_radius", "pos_embed_dim", "context_pos_embed")
+                 "voxel_size", "attention_radius", "pos_embed_dim", "context_pos_embed", "condition")
 
 
 def sinusoids(x, width, max_period=10000.0):
@@ -118,9 +119,26 @@ class TimeEmbedding(nn.Module):
         return self.linear_2(F.silu(self.linear_1(torch.cat([cos, sin], -1))))
 
 
+class ConditionEmbedding(nn.Module):
+    """without bias: a cell of which nothing is told gets exactly nothing"""
+
+    def __init__(self, parts, width):
+        super().__init__()
+        self.linear_1 = nn.Linear(width_of(parts), width, bias=False)
+        self.linear_2 = nn.Linear(width, width, bias=False)
+        at = 0
+        for part in parts:  # each is heard alike, whether it has four numbers or sixty
+            nn.init.normal_(self.linear_1.weight.data[:, at:at + WIDTHS[part]], std=(2 / WIDTHS[part]) ** 0.5)
+            at += WIDTHS[part]
+
+    def forward(self, x):
+        return self.linear_2(F.silu(self.linear_1(x)))
+
+
 class VoxfieldTransformer(nn.Module):
     def __init__(self, num_layers=12, num_attention_heads=8, attention_head_dim=128, points_per_voxel=20,
-                 num_classes=20, voxel_size=0.6, attention_radius=3.0, pos_embed_dim=128, context_pos_embed=True):
+                 num_classes=20, voxel_size=0.6, attention_radius=3.0, pos_embed_dim=128, context_pos_embed=True,
+                 condition=()):
         super().__init__()
         values = locals()
         self.config = {name: values[name] for name in CONFIG_FIELDS}
@@ -128,6 +146,7 @@ class VoxfieldTransformer(nn.Module):
         self.proj_in = nn.Linear(c, d)
         self.pos_embed = nn.Linear(3 * pos_embed_dim, d)
         self.semantic_embed = nn.Embedding(num_classes + 1, d)  # the last row is the null label
+        self.condition_embed = ConditionEmbedding(condition, d) if condition else None
         self.time_embed = TimeEmbedding(d)
         self.transformer_blocks = nn.ModuleList(
             JointBlock(d, num_attention_heads, last=i == num_layers - 1) for i in range(num_layers))
@@ -135,13 +154,15 @@ class VoxfieldTransformer(nn.Module):
         self.proj_out = nn.Linear(d, c)
 
     def start_at_zero(self):
-        """adaLN-Zero: at first every block is the identity and the output 0"""
+        """adaLN-Zero: at first every block is the identity and the output 0; conditions say nothing"""
         for module in self.modules():
             if isinstance(module, Modulation):
                 nn.init.zeros_(module.linear.weight)
                 nn.init.zeros_(module.linear.bias)
         nn.init.zeros_(self.proj_out.weight)
         nn.init.zeros_(self.proj_out.bias)
+        if self.condition_embed:
+            nn.init.zeros_(self.condition_embed.linear_2.weight)
 
     def attention_mask(self, centers, valid):
         """[B, 1, 2N, 2N]: 0 where a token may look, else -1e9; padded rows see themselves"""
@@ -150,15 +171,17 @@ class VoxfieldTransformer(nn.Module):
         near = near | torch.eye(near.shape[1], dtype=torch.bool, device=near.device)
         return torch.zeros(near.shape, device=near.device).masked_fill_(~near, -1e9).repeat(1, 2, 2)[:, None]
 
-    def forward(self, tokens, labels, centers, valid, timestep):
+    def forward(self, tokens, labels, centers, valid, timestep, condition=None):
         """tokens [B, N, 6n] noisy; labels [B, N], num_classes = null; centers [B, N, 3] metres; valid [B, N] bool;
-        timestep [B] -> x0 [B, N, 6n]"""
+        timestep [B]; condition [B, N, W] or None -> x0 [B, N, 6n]"""
         w = valid[..., None].to(centers.dtype)
         origin = (centers * w).sum(1, keepdim=True) / w.sum(1, keepdim=True)
         places = sinusoids((centers - origin) / self.config["voxel_size"], self.config["pos_embed_dim"]).flatten(-2)
         position = self.pos_embed(places)
         x = self.proj_in(tokens) + position
         c = self.semantic_embed(labels)
+        if condition is not None and self.condition_embed:
+            c = c + self.condition_embed(condition)
         if self.config["context_pos_embed"]:
             c = c + position
         temb = self.time_embed(timestep)

@@ -1,0 +1,166 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/scene/scene_objects.h"
+
+#include "engine/scene/palette.h"
+#include "runtime/base/json_numbers.h"
+#include "runtime/base/quote.h"
+
+#include <algorithm>
+#include <charconv>
+#include <set>
+
+namespace semrover {
+
+namespace {
+
+using Triple = std::array<double, 3>;
+
+constexpr const char* kFormat = "semrover.objects";
+constexpr double kFarthest = 1e6, kLongest = 1e4, kLargestAngle = 1e3;
+
+Status check_object_keys(const Json& json, std::initializer_list<std::string_view> keys, std::string_view where)
+{
+    for (const auto& [key, value] : json.items())
+        if (std::ranges::find(keys, key) == keys.end())
+            return fail(ErrorCode::bad_input, "{}: unknown key {}", where, quote(key));
+    return {};
+}
+
+Result<double> number_within(const Json& json, double low, double high, std::string_view where)
+{
+    SR_TRY(const double value, finite_number(json, where));
+    if (value < low || value > high)
+        return fail(ErrorCode::bad_input, "{}: expected a number from {} to {}, found {}", where, low, high, value);
+    return value;
+}
+
+Result<Triple> triple_of(const Json& object, const char* key, double low, double high, std::string_view where)
+{
+    const auto entry = object.find(key);
+    const std::string at = fmt::format("{}: {}", where, key);
+    if (entry == object.end() || !entry->is_array() || entry->size() != 3)
+        return fail(ErrorCode::bad_input, "{}: expected an array of 3 numbers", at);
+    Triple values{};
+    for (size_t i = 0; i < 3; ++i) {
+        SR_TRY(values[i], number_within((*entry)[i], low, high, at));
+    }
+    return values;
+}
+
+Result<Triple> color_of_hex(std::string_view text, std::string_view where)
+{
+    uint32_t bits = 0;
+    const char* end = text.data() + text.size();
+    const bool shaped = text.size() == 7 && text[0] == '#';
+    if (!shaped || std::from_chars(text.data() + 1, end, bits, 16).ptr != end)
+        return fail(ErrorCode::bad_input, "{}: tint: expected #rrggbb or 3 numbers, found {}", where, quote(text));
+    return Triple{(bits >> 16) / 255.0, (bits >> 8 & 255) / 255.0, (bits & 255) / 255.0};
+}
+
+Result<std::optional<Triple>> tint_of(const Json& object, std::string_view where)
+{
+    const auto entry = object.find("tint");
+    if (entry == object.end() || entry->is_null())
+        return std::optional<Triple>();
+    if (entry->is_string()) {
+        SR_TRY(const Triple color, color_of_hex(entry->get_ref<const std::string&>(), where));
+        return std::optional(color);
+    }
+    SR_TRY(const Triple color, triple_of(object, "tint", 0, 1, where));
+    return std::optional(color);
+}
+
+Result<uint8_t> class_of(const Json& object, std::string_view where)
+{
+    const auto entry = object.find("class");
+    if (entry == object.end() || !entry->is_string())
+        return fail(ErrorCode::bad_input, "{}: class: expected the name of a class", where);
+    const std::string& name = entry->get_ref<const std::string&>();
+    const auto label = class_of_name(name);
+    if (!label)
+        return fail(ErrorCode::bad_input, "{}: class: there is no class {}", where, quote(name));
+    return *label;
+}
+
+Result<SceneObject> parse_object(const Json& json, std::string_view where)
+{
+    if (!json.is_object())
+        return fail(ErrorCode::bad_input, "{}: expected an object, found {}", where, json.type_name());
+    SR_CHECK(check_object_keys(json, {"id", "class", "center", "size", "heading", "tint", "comment"}, where));
+    SceneObject o;
+    const auto id = json.find("id");
+    if (id == json.end() || !id->is_number_unsigned() || id->get<uint64_t>() > UINT32_MAX)
+        return fail(ErrorCode::bad_input, "{}: id: expected a whole number from 0 to {}", where, UINT32_MAX);
+    o.id = id->get<uint32_t>();
+    SR_TRY(o.label, class_of(json, where));
+    SR_TRY(o.center, triple_of(json, "center", -kFarthest, kFarthest, where));
+    SR_TRY(o.size, triple_of(json, "size", 1e-3, kLongest, where));
+    const auto heading = json.find("heading");
+    if (heading == json.end())
+        return fail(ErrorCode::bad_input, "{}: heading is missing", where);
+    SR_TRY(o.heading, number_within(*heading, -kLargestAngle, kLargestAngle, fmt::format("{}: heading", where)));
+    SR_TRY(o.tint, tint_of(json, where));
+    return o;
+}
+
+Json triple_json(const Triple& values, double per_unit)
+{
+    Json json = Json::array();
+    for (double v : values)
+        json.push_back(std::round(v * per_unit) / per_unit + 0.0); // no -0
+    return json;
+}
+
+Json object_json(const SceneObject& o)
+{
+    Json json = {{"id", o.id},
+                 {"class", std::string(kPalette[o.label].name)},
+                 {"center", triple_json(o.center, 1e4)},
+                 {"size", triple_json(o.size, 1e4)},
+                 {"heading", std::round(o.heading * 1e5) / 1e5 + 0.0}};
+    if (o.tint)
+        json["tint"] = triple_json(*o.tint, 1e3);
+    return json;
+}
+
+} // namespace
+
+Result<std::vector<SceneObject>> parse_objects(const Json& json, std::string_view where)
+{
+    if (!json.is_object() || json.value("format", Json()) != kFormat)
+        return fail(ErrorCode::bad_input, "{}: expected an object with \"format\": \"{}\"", where, kFormat);
+    if (json.value("version", Json()) != 1)
+        return fail(ErrorCode::bad_input, "{}: version: expected 1, found {}", where,
+                    json.value("version", Json()).dump());
+    SR_CHECK(check_object_keys(json, {"format", "version", "objects", "comment"}, where));
+    const auto list = json.find("objects");
+    if (list == json.end() || !list->is_array() || list->size() > kMaxObjects)
+        return fail(ErrorCode::bad_input, "{}: objects: expected an array of at most {}", where, kMaxObjects);
+    std::vector<SceneObject> objects;
+    std::set<uint32_t> ids;
+    for (const Json& item : *list) {
+        const std::string at = fmt::format("{}: object {}", where, objects.size() + 1);
+        SR_TRY(SceneObject o, parse_object(item, at));
+        if (!ids.insert(o.id).second)
+            return fail(ErrorCode::bad_input, "{}: id {} is given twice", at, o.id);
+        objects.push_back(std::move(o));
+    }
+    return objects;
+}
+
+Result<std::vector<SceneObject>> read_objects(const Path& path)
+{
+    SR_TRY(const Json json, read_json(path, {.bytes = 256u << 20, .values = 32u << 20}));
+    return parse_objects(json, quote_path(path));
+}
+
+Status write_objects(const Path& path, std::span<const SceneObject> objects)
+{
+    std::string text = fmt::format("{{\"format\": \"{}\", \"version\": 1, \"objects\": [", kFormat);
+    for (size_t i = 0; i < objects.size(); ++i)
+        text += (i ? ",\n " : "\n ") + object_json(objects[i]).dump();
+    return write_file_atomically(path, text + "\n]}\n");
+}
+
+} // namespace semrover

@@ -1,0 +1,34 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "runtime/base/json.h"
+
+#include <array>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace semrover {
+
+// A thing of one class in an upright box. Metres in the world's frame; the heading is where its front looks, radians
+// from x towards y.
+struct SceneObject {
+    uint32_t id = 0;   // unique in a scene
+    uint8_t label = 0; // < kClassCount
+    std::array<double, 3> center{};
+    std::array<double, 3> size{}; // along the heading, across it, up
+    double heading = 0;
+    std::optional<std::array<double, 3>> tint = {}; // its colour, sRGB 0..1
+};
+
+constexpr size_t kMaxObjects = 1 << 20;
+
+// Files of objects (docs/formats.md §2.8). The writer rounds lengths to 0.1 mm; the same objects give the same bytes.
+// Errors: bad_input with the number of the object, for unknown keys and classes, ids given twice, boxes beyond 1000 km
+// or without size, colours outside 0..1.
+Result<std::vector<SceneObject>> parse_objects(const Json& json, std::string_view where);
+Result<std::vector<SceneObject>> read_objects(const Path& path);
+Status write_objects(const Path& path, std::span<const SceneObject> objects);
+
+} // namespace semrover

@@ -1,0 +1,35 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/model/transformer_config.h"
+#include "engine/scene/cell_objects.h"
+
+namespace semrover {
+
+// the numbers of one part, after its flag (docs/method.md §2.1)
+void object_condition(const SceneObject& object, const std::array<double, 3>& point, std::span<float> out); // 60
+void tint_condition(const std::array<double, 3>& tint, std::span<float> out);                               // 4
+
+// What a model is told of the cells of a grid beside their labels, from the objects that are known.
+class CellConditions {
+  public:
+    CellConditions() = default; // tells nothing
+
+    // of the grid's cells as they are now, in their order
+    CellConditions(const TransformerConfig& config, const VoxelGrid& grid, std::span<const SceneObject> objects);
+
+    bool empty() const { return owners_.empty(); }
+    size_t width() const { return width_; }
+    // of one cell; zeros where nothing is known. out: width() numbers
+    void row(uint32_t cell, const Cell& index, std::span<float> out) const;
+
+  private:
+    std::vector<ConditionPart> parts_;
+    size_t width_ = 0;
+    double voxel_size_ = 0;
+    std::vector<int32_t> owners_; // of each cell
+    std::vector<SceneObject> objects_;
+};
+
+} // namespace semrover

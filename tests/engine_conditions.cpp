@@ -1,0 +1,164 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/voxfield/cell_conditions.h"
+#include "engine/voxfield/outpaint.h"
+#include "engine/voxfield/token_sampler.h"
+#include "tests/json_text.h"
+#include "tests/says.h"
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+namespace semrover {
+namespace {
+
+constexpr uint32_t kWidth = 64;
+
+Device& device()
+{
+    static const std::unique_ptr<Device> d = std::move(*Device::create({}));
+    return *d;
+}
+
+const Transformer& transformer()
+{
+    static const std::unique_ptr<Transformer> t = std::move(
+        *Transformer::load(device(), SEMROVER_SOURCE_DIR "/tests/golden/transformer_objects/model", DType::f16));
+    return *t;
+}
+
+SceneObject car()
+{
+    return {.id = 0, .label = 13, .center = {2.4, 0, 0.6}, .size = {4.2, 1.8, 1.2}, .heading = 0};
+}
+
+TEST(engine_conditions, a_cell_is_told_how_far_it_lies_from_each_face_of_its_box)
+{
+    std::vector<float> row(60, 9);
+    object_condition(car(), {3.4, 0.5, 0.6}, row);
+    const double faces[] = {1.1, 3.1, 0.4, 1.4, 0.6, 0.6};
+    EXPECT_EQ(row[0], 1);
+    for (size_t face = 0; face < 6; ++face) {
+        EXPECT_NEAR(row[1 + face] * 4, faces[face], 1e-6);
+        for (size_t w = 0; w < 4; ++w) {
+            const double angle = 2 * std::numbers::pi * faces[face] / double(1 << w);
+            EXPECT_NEAR(row[7 + 4 * face + w], std::sin(angle), 1e-6);
+            EXPECT_NEAR(row[31 + 4 * face + w], std::cos(angle), 1e-6);
+        }
+    }
+    EXPECT_NEAR(row[55] * 4, std::log2(4.2), 1e-6);
+    EXPECT_NEAR(row[56] * 4, std::log2(1.8), 1e-6);
+    EXPECT_NEAR(row[57] * 4, std::log2(1.2), 1e-6);
+    EXPECT_EQ(row[58], 0);
+    EXPECT_EQ(row[59], 1);
+    object_condition(car(), {-20, 0, 0.6}, row);
+    EXPECT_EQ(row[1] * 4, 8);
+    EXPECT_EQ(row[2] * 4, -2);
+}
+
+TEST(engine_conditions, parts_are_joined_in_the_order_of_the_config_and_what_is_not_known_is_zero)
+{
+    VoxelGrid grid;
+    grid.voxel_size = 0.6f;
+    grid.cells = {{4, 0, 0}, {4, 0, 1}, {40, 0, 0}};
+    grid.labels = {13, 2, 13};
+    SceneObject painted = car();
+    painted.tint = {1, 0.5, 0};
+    TransformerConfig config;
+    config.condition = {ConditionPart::tint, ConditionPart::object};
+    const CellConditions told(config, grid, std::span(&painted, 1));
+    ASSERT_EQ(told.width(), kWidth);
+    std::vector<float> row(kWidth, 9), expected(60);
+    told.row(0, grid.cells[0], row);
+    EXPECT_EQ(std::vector<float>(row.begin(), row.begin() + 4), (std::vector<float>{1, 1, 0, -1}));
+    object_condition(painted, {2.7, 0.3, 0.3}, expected);
+    for (size_t i = 0; i < 60; ++i)
+        EXPECT_NEAR(row[4 + i], expected[i], 1e-6) << i;
+    for (uint32_t cell : {1u, 2u}) { // another class; far away
+        told.row(cell, grid.cells[cell], row);
+        EXPECT_EQ(row, std::vector<float>(kWidth, 0.f)) << cell;
+    }
+    config.condition = {ConditionPart::tint};
+    const SceneObject plain = car();
+    const CellConditions colors(config, grid, std::span(&plain, 1));
+    row.assign(4, 9);
+    colors.row(0, grid.cells[0], row);
+    EXPECT_EQ(row, std::vector<float>(4, 0.f));
+    EXPECT_TRUE(CellConditions(config, grid, {}).empty());
+}
+
+TEST(engine_conditions, a_config_names_each_part_once)
+{
+    const auto config = [](const char* list) {
+        return parse_transformer_config(Json{{"condition", json_of(list)}});
+    };
+    EXPECT_EQ(config(R"(["tint", "object"])")->condition_width(), kWidth);
+    EXPECT_EQ(config("[]")->condition_width(), 0u);
+    EXPECT_EQ(config("null")->condition_width(), 0u);
+    EXPECT_TRUE(says(config(R"(["tint", "tint"])"), "condition"));
+    EXPECT_TRUE(says(config(R"(["colour"])"), "condition"));
+    EXPECT_TRUE(says(config(R"("tint")"), "condition"));
+}
+
+TEST(engine_conditions, a_config_says_how_points_of_the_training_data_lay)
+{
+    EXPECT_EQ(parse_transformer_config(Json::object())->placement, "shifted");
+    EXPECT_EQ(parse_transformer_config(Json{{"placement", "canonical"}})->placement, "canonical");
+    EXPECT_TRUE(says(parse_transformer_config(Json{{"placement", "random"}}), "placement"));
+}
+
+RegionInput patch(int32_t x, uint32_t cells, bool told)
+{
+    RegionInput r;
+    const SceneObject object = car();
+    for (uint32_t i = 0; i < cells; ++i) {
+        r.cells.push_back({x + int32_t(i % 7), int32_t(i / 7), 0});
+        r.labels.push_back(i % 20);
+        r.told.resize((i + 1) * kWidth);
+        if (told && i % 2) {
+            object_condition(object, {0.1 * i, 0, 0}, std::span(r.told).last(kWidth));
+            tint_condition({0.9, 0.2, 0.1 * (i % 10)}, std::span(r.told).last(4));
+        }
+    }
+    r.fixed.resize(cells * transformer().config().channels());
+    return r;
+}
+
+std::vector<float> run(const std::vector<RegionInput>& regions, float guidance)
+{
+    SchedulerConfig config;
+    config.prediction = Prediction::sample;
+    config.spacing = TimestepSpacing::trailing;
+    auto sampler =
+        TokenSampler::create(device(), transformer(), *plan_sampling(config, 3), sampling_options(guidance, 7));
+    EXPECT_TRUE(sampler) << sampler.error().message;
+    auto tokens = (*sampler)->run(regions);
+    EXPECT_TRUE(tokens) << tokens.error().message;
+    return *tokens;
+}
+
+TEST(engine_conditions, zeros_and_nothing_are_the_same_and_what_is_told_is_heard)
+{
+    for (float guidance : {1.f, 2.f}) {
+        const RegionInput told = patch(0, 33, true), zeros = patch(0, 33, false);
+        RegionInput nothing = zeros;
+        nothing.told.clear();
+        const std::vector<float> silent = run({nothing}, guidance);
+        EXPECT_EQ(run({zeros}, guidance), silent);
+        EXPECT_NE(run({told}, guidance), silent);
+    }
+}
+
+TEST(engine_conditions, a_region_is_the_same_alone_and_beside_one_that_is_told_nothing)
+{
+    RegionInput nothing = patch(90, 20, false);
+    nothing.told.clear();
+    const RegionInput told = patch(0, 33, true);
+    const std::vector<float> alone = run({told}, 2), batched = run({nothing, told}, 2);
+    const int64_t channels = transformer().config().channels();
+    EXPECT_EQ(std::vector<float>(batched.begin() + 20 * channels, batched.end()), alone);
+}
+
+} // namespace
+} // namespace semrover

@@ -1,0 +1,78 @@
+# SPDX-FileCopyrightText: semrover authors
+# SPDX-License-Identifier: Apache-2.0
+"""Objects of a scene (docs/formats.md §2.8): which cells are theirs, and which colours these have."""
+import numpy as np
+
+from .json_file import read_json
+
+CLASSES = ("road", "sidewalk", "building", "wall", "fence", "pole", "traffic light", "traffic sign", "vegetation",
+           "terrain", "sky", "person", "rider", "car", "truck", "bus", "train", "motorcycle", "bicycle", "road-lane")
+BOX_REACH = 1.5   # metres by which boxes are widened: balconies and mirrors stand out of them
+TINT_REACH = 3.0  # metres within which the points of an object make a local tint
+
+
+def read_objects(path):
+    """-> boxes f64 [O, 7] (centre, size, heading), labels i64 [O], tints f32 [O, 3], 0..1, NaN where there is none"""
+    about = read_json(path)
+    if about.get("format") != "semrover.objects" or about.get("version") != 1:
+        raise SystemExit(f"{path}: not a file of objects, version 1")
+    boxes = [[*o["center"], *o["size"], o["heading"]] for o in about["objects"]]
+    tints = [tint_of(o.get("tint")) for o in about["objects"]]
+    return (np.array(boxes, np.float64).reshape(-1, 7),
+            np.array([CLASSES.index(o["class"]) for o in about["objects"]], np.int64),
+            np.array(tints, np.float32).reshape(-1, 3))
+
+
+def tint_of(value):
+    if value is None:
+        return [np.nan] * 3
+    if isinstance(value, str):
+        return [int(value[i:i + 2], 16) / 255 for i in (1, 3, 5)]
+    return value
+
+
+def place_in(boxes, points):
+    """boxes [..., 7], points [..., 3] -> place in the box's axes, metres from its middle"""
+    x, y, z = np.moveaxis(points - boxes[..., :3], -1, 0)
+    c, s = np.cos(boxes[..., 6]), np.sin(boxes[..., 6])
+    return np.stack([c * x + s * y, c * y - s * x, z], -1)
+
+
+def owners_of(centers, labels, boxes, box_labels):
+    """centers [V, 3] metres -> i32 [V]: the object of its class in which each cell lies deepest, among those whose
+    widened box holds its centre; -1 for none"""
+    owners, depths = np.full(len(centers), -1, np.int32), np.full(len(centers), -BOX_REACH)
+    of_class = {label: np.flatnonzero(labels == label) for label in np.unique(box_labels)}
+    for o, (box, label) in enumerate(zip(boxes, box_labels)):
+        cells = of_class[label]
+        depth = (box[3:6] / 2 - np.abs(place_in(box, centers[cells]))).min(1)
+        deeper = depth > depths[cells]
+        owners[cells[deeper]], depths[cells[deeper]] = o, depth[deeper]
+    return owners
+
+
+def medians_near(centers, colors, reach, rows=256):
+    """centers [n, 3], colors u8 [n, 3] -> u8 [n, 3]: median, channel by channel, of the colours within reach of each"""
+    out = np.empty_like(colors)
+    orders = colors.argsort(0, kind="stable")
+    for first in range(0, len(centers), rows):
+        apart = ((centers[first:first + rows, None] - centers[None]) ** 2).sum(-1)
+        near = apart <= (reach + 1e-6) ** 2
+        half = (near.sum(1, keepdims=True) + 1) // 2
+        for c in range(3):
+            at = (near[:, orders[:, c]].cumsum(1, dtype=np.int32) >= half).argmax(1)
+            out[first:first + rows, c] = colors[orders[at, c], c]
+    return out
+
+
+def local_tints(centers, owners, colors):
+    """colors u8 [V, n, 3] of points -> u8 [V, 3]: for a cell of an object the median of the medians of the object's
+    cells within 3 m; 0 for others"""
+    tints = np.zeros((len(centers), 3), np.uint8)
+    order = np.argsort(owners, kind="stable")
+    order = order[np.searchsorted(owners[order], 0):]
+    for cells in np.split(order, np.flatnonzero(np.diff(owners[order])) + 1):
+        if len(cells):
+            middle = np.median(colors[cells], 1).astype(np.uint8)
+            tints[cells] = medians_near(centers[cells].astype(np.float32), middle, TINT_REACH)
+    return tints

@@ -1,0 +1,231 @@
+# SPDX-FileCopyrightText: semrover authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a transformer is told beside labels: boxes and colours of objects, from objects.json to a trained model."""
+import contextlib
+import io
+import json
+import math
+import os
+import tempfile
+import unittest
+
+import numpy as np
+import torch
+
+from recipe import run_recipe
+from semtrain import held_out, safetensors_file, transformer
+from semtrain.condition import drawn_boxes, mirrored, object_part, told_boxes, told_tints, vector_of, width_of
+from semtrain.grids import Grids, LocalSets
+from semtrain.model_folder import write_component
+from semtrain.nets.transformer import VoxfieldTransformer
+from semtrain.objects import local_tints, medians_near, owners_of, read_objects
+from semtrain.regenerate import load_transformer
+
+NETWORK = {"num_layers": 2, "num_attention_heads": 2, "attention_head_dim": 16, "points_per_voxel": 4,
+           "num_classes": 20, "voxel_size": 0.6, "attention_radius": 3.0, "pos_embed_dim": 8,
+           "context_pos_embed": True}
+BOTH = {**NETWORK, "condition": ["object", "tint"]}
+TELL_ALL = {"dropout": 0, "partial": 0, "local": 0, "noise": 0, "jitter": 0}
+CAR = [2.4, 0.0, 0.6, 4.2, 1.8, 1.2, 0.0]  # centre, size, heading
+
+
+def write_cars(folder):
+    """two rows of cars on a road: a dark and a bright one, end to end, with their boxes"""
+    cells = np.array(sorted((i, j, k) for i in range(14) for j in range(-2, 2) for k in range(-1, 2)), np.int32)
+    labels = np.where(cells[:, 2] < 0, 0, 13).astype(np.uint8)
+    bright = cells[:, 0] >= 7
+    colors = np.where(labels == 0, 90, np.where(bright, 220, 30))[:, None, None] + np.zeros((len(cells), 4, 3))
+    points = np.random.default_rng(1).uniform(-0.3, 0.3, (len(cells), 4, 3)).astype(np.float16)
+    safetensors_file.write(os.path.join(folder, "truth.sgrid"), {
+        "cells": torch.from_numpy(cells), "labels": torch.from_numpy(labels), "points": torch.from_numpy(points),
+        "colors": torch.from_numpy(colors.astype(np.uint8))}, {"voxel_size": "0.6", "points_per_voxel": "4"})
+    objects = [{"id": i, "class": "car", "center": [x, 0, 0.6], "size": [4.1, 2.4, 1.2], "heading": 0, "tint": tint}
+               for i, (x, tint) in enumerate([(2.1, "#1e1e1e"), (6.3, [0.86, 0.86, 0.86])])]
+    with open(os.path.join(folder, "objects.json"), "w") as file:
+        json.dump({"format": "semrover.objects", "version": 1, "objects": objects}, file)
+
+
+def config_of(**more):
+    return {"seed": 3, "set_size": [40, 40], "batch": 8, "label_dropout": 0, "class_balance": 0.5, "mirror": False,
+            "ordered_points": True, "known_share": 0, "network": BOTH, "telling": TELL_ALL, **more}
+
+
+class Objects(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        write_cars(self.folder.name)
+
+    def tearDown(self):
+        self.folder.cleanup()
+
+    def path(self, name):
+        return os.path.join(self.folder.name, name)
+
+    def sets(self, **more):
+        return LocalSets(Grids([self.path("truth.sgrid")], self.path("cache")), config_of(**more))
+
+    def test_are_read_with_colours_of_either_form(self):
+        boxes, labels, tints = read_objects(self.path("objects.json"))
+        self.assertEqual(labels.tolist(), [13, 13])
+        self.assertTrue(np.allclose(boxes[1], [6.3, 0, 0.6, 4.1, 2.4, 1.2, 0]))
+        self.assertTrue(np.allclose(tints * 255, [[30] * 3, [219.3] * 3]))
+
+    def test_own_the_cells_of_their_class_that_lie_deepest_in_them(self):
+        sets = self.sets()
+        g = sets.grids
+        self.assertTrue((g.owners[g.labels == 0] == -1).all())
+        cars = g.cells[g.labels == 13]
+        self.assertTrue((g.owners[g.labels == 13] == (cars[:, 0] >= 7)).all())
+        turned = np.array([[*CAR[:6], math.pi / 2]])  # across: only the cells within 0.9 m of x = 2.4, and 1.5 beyond
+        centers = np.array([[x, 0.0, 0.6] for x in np.arange(-1.2, 6, 0.7)])
+        owners = owners_of(centers, np.full(len(centers), 13), turned, np.array([13]))
+        self.assertEqual(owners.tolist(), [0 if abs(x - 2.4) < 2.4 else -1 for x in centers[:, 0]])
+        self.assertTrue({0, -1} == set(owners.tolist()))
+
+    def test_have_the_median_colour_of_what_is_near(self):
+        centers = np.array([[float(x), 0, 0] for x in range(10)], np.float32)
+        colors = np.repeat(np.array([[1], [2], [3], [4], [200], [201], [202], [203], [204], [205]], np.uint8), 3, 1)
+        self.assertEqual(medians_near(centers, colors, 2.0, rows=4)[:, 0].tolist(),
+                         [2, 2, 3, 4, 200, 201, 202, 203, 203, 204])
+        points = np.repeat(colors[:, None], 4, 1)
+        owners = np.array([0] * 4 + [1] * 5 + [-1])
+        tints = local_tints(centers * 10, owners, points)
+        self.assertEqual(tints[:, 0].tolist(), [1, 2, 3, 4, 200, 201, 202, 203, 204, 0])
+
+    def test_tell_a_cell_how_far_it_lies_from_each_face(self):
+        part = object_part(np.array([[3.4, 0.5, 0.6], [-20, 0, 0.6]]), np.array([CAR] * 2), np.array([True, True]))
+        self.assertEqual(part.shape, (2, 60))
+        self.assertTrue(np.allclose(part[0, 1:7] * 4, [1.1, 3.1, 0.4, 1.4, 0.6, 0.6], atol=1e-5))
+        self.assertTrue(np.allclose(part[1, 1:3] * 4, [8, -2]))
+        self.assertTrue(np.allclose(part[0, 7:11], np.sin(2 * math.pi * 1.1 / np.array([1, 2, 4, 8])), atol=1e-5))
+        self.assertTrue(np.allclose(part[0, 31:35], np.cos(2 * math.pi * 1.1 / np.array([1, 2, 4, 8])), atol=1e-5))
+        self.assertTrue(np.allclose(part[0, 55:58] * 4, np.log2([4.2, 1.8, 1.2]), atol=1e-5))
+        self.assertTrue(np.allclose(part[0, 58:], [0, 1]))
+
+    def test_turned_over_swap_left_and_right_and_nothing_else(self):
+        box, at = np.array([[2.4, 1.0, 0.6, 4.2, 1.8, 1.2, 0.4]]), np.array([[3.0, 1.3, 0.4]])
+        plain = object_part(at, box, np.array([True]))[0, 1:7]
+        for axis in range(2):
+            there = at.copy()
+            there[:, axis] *= -1
+            over = object_part(there, mirrored(box, axis), np.array([True]))[0, 1:7]
+            self.assertTrue(np.allclose(over, plain[[0, 1, 3, 2, 4, 5]], atol=1e-6), axis)
+            ahead = mirrored(box, axis)[0, 6]
+            self.assertTrue(np.allclose([math.cos(ahead), math.sin(ahead)],
+                                        np.array([math.cos(0.4), math.sin(0.4)]) * np.eye(2)[1 - axis] * 2 -
+                                        np.array([math.cos(0.4), math.sin(0.4)])), axis)
+
+    def test_are_told_to_a_set_with_tints_in_the_order_of_the_config(self):
+        sets = self.sets()
+        centers, labels, tokens, _, conditions = sets.batch(2)
+        self.assertEqual(conditions.shape, (8, 40, 64))
+        is_car = labels == 13
+        self.assertTrue((conditions[..., 0] == is_car).all())
+        self.assertTrue((conditions[..., 60] == is_car).all())
+        self.assertTrue((conditions[~is_car] == 0).all())
+        told = (conditions[..., 61:][is_car] + 1) / 2 * 255
+        true = (tokens.reshape(8, 40, 4, 6)[..., 3:].mean(2)[is_car] + 1) / 2 * 255
+        self.assertLess(np.abs(told - true).max(), 1)
+        swapped = LocalSets(sets.grids, config_of(network={**NETWORK, "condition": ["tint", "object"]})).batch(2)[4]
+        self.assertTrue((swapped[..., 4:] == conditions[..., :60]).all())
+        self.assertTrue((swapped[..., :4] == conditions[..., 60:]).all())
+        self.assertEqual(vector_of([], centers[0], None, None, None, None).shape, (40, 0))
+
+    def test_are_left_out_each_for_itself_and_with_the_labels(self):
+        counts = np.zeros((2, 2), int)
+        sets = self.sets(telling={**TELL_ALL, "dropout": 0.5}, label_dropout=0.2, batch=64)
+        _, labels, _, _, conditions = sets.batch(0)
+        for of_set, set_labels in zip(conditions, labels):
+            if (set_labels == 20).all():
+                self.assertTrue((of_set == 0).all())
+            elif (set_labels == 13).any():
+                counts[int(of_set[:, 0].any()), int(of_set[:, 60].any())] += 1
+        self.assertTrue((counts > 4).all(), counts)
+
+    def test_may_be_told_in_part(self):
+        owners, shares = np.repeat(np.arange(-1, 9), 30), {told_boxes: [], told_tints: []}
+        for seed in range(200):
+            for tell, seen in shares.items():
+                told = tell(np.random.default_rng(seed), owners, {"dropout": 0.25, "partial": 0.5})
+                self.assertFalse(told[owners < 0].any())
+                seen.append(told[owners >= 0].mean())
+                if tell is told_boxes:
+                    self.assertTrue(all(len(set(told[owners == o])) == 1 for o in range(9)))
+        for seen in shares.values():
+            none, every = np.mean(np.array(seen) == 0), np.mean(np.array(seen) == 1)
+            self.assertTrue(0.15 < none < 0.4 and 0.25 < every < 0.5, (none, every))
+
+    def test_may_be_off_each_as_a_whole_in_every_other_set(self):
+        owners, boxes = np.repeat([0, 1], 20), np.repeat(np.array([CAR, CAR[::-1]]), 20, 0)
+        moved = [drawn_boxes(np.random.default_rng(seed), owners, boxes, {"jitter": 0.2}) for seed in range(100)]
+        exact = np.mean([(m == boxes).all() for m in moved])
+        self.assertTrue(0.35 < exact < 0.65, exact)
+        for m in moved:
+            self.assertTrue((m[:20] == m[0]).all() and (m[20:] == m[20]).all())
+        off = np.array([m[0] - boxes[0] for m in moved if not (m == boxes).all()])
+        self.assertTrue(0.15 < off[:, :6].std() < 0.25 and off[:, 6].std() < 0.06, off.std(0))
+        self.assertTrue((drawn_boxes(np.random.default_rng(1), owners, boxes, {"jitter": 0}) == boxes).all())
+
+    def test_say_nothing_to_a_network_before_it_learns_and_nothing_where_none_are_given(self):
+        torch.manual_seed(1)
+        model, plain = VoxfieldTransformer(**BOTH), VoxfieldTransformer(**NETWORK)
+        model.condition_embed.linear_2.weight.data.normal_()
+        plain.load_state_dict({n: t for n, t in model.state_dict().items() if not n.startswith("condition_embed.")})
+        given = (torch.randn(1, 5, 24), torch.tensor([[13, 13, 0, 0, 2]]), torch.randn(1, 5, 3),
+                 torch.ones(1, 5, dtype=torch.bool), torch.tensor([300]))
+        condition = torch.randn(1, 5, width_of(BOTH["condition"]))
+        with torch.no_grad():
+            expected = plain(*given)
+            self.assertTrue(torch.equal(model(*given, torch.zeros_like(condition)), expected))
+            self.assertFalse(torch.equal(model(*given, condition), expected))
+            state = transformer.with_new_parts(plain.state_dict(), model)
+            self.assertEqual(sorted(state), sorted(model.state_dict()))
+            model.condition_embed.linear_2.weight.data.zero_()
+            self.assertTrue(torch.equal(model(*given, condition), expected))
+
+    def test_teach_a_model_which_car_is_bright(self):
+        config = {**BOTH, "condition": ["tint"]}
+        settings = ["--config", "objects", "--set", f"network={json.dumps(config)}", "--set", "batch=4", "--set", "set_size=[24,30]",
+                    "--set", "warmup=2", "--set", "precision=fp32", "--set", "known_share=0", "--set", "ema=0.9",
+                    "--set", f"telling={json.dumps(TELL_ALL)}", "--set", "learning_rate=0.01", "--set", "steps=150",
+                    "--set", "mirror=false", "--set", "label_dropout=0"]
+        run_recipe("transformer", self.path("run"), "--grids", self.path("truth.sgrid"), *settings)
+        with open(self.path("run/model/voxfield_transformer/config.json")) as file:
+            about = json.load(file)
+        self.assertEqual(about["condition"], ["tint"])
+        model = load_transformer(self.path("run/model/voxfield_transformer"))
+        sets = LocalSets(Grids([self.path("truth.sgrid")], self.path("cache")), config_of(network=config, batch=1))
+        centers, labels, tokens, known, conditions = (torch.from_numpy(a) for a in sets.batch(4))
+        noise, cars = torch.randn(tokens.shape), labels[0] == 13
+
+        def brightness(told):
+            condition = torch.zeros_like(conditions)
+            condition[0, cars] = torch.tensor([1.0, told, told, told])
+            with torch.no_grad():
+                made = model(noise, labels, centers, ~known, torch.tensor([999]), condition)
+            return float(made.unflatten(2, (-1, 6))[0, cars][..., 3:].mean())
+        self.assertGreater(brightness(0.7) - brightness(-0.75), 0.8)
+
+
+class TheTable(unittest.TestCase):
+    def test_has_a_row_for_each_telling_and_the_same_errors_where_nothing_is_told(self):
+        with tempfile.TemporaryDirectory() as folder:
+            write_cars(folder)
+            torch.manual_seed(1)
+            state = {n: torch.randn(t.shape) * 0.1 for n, t in VoxfieldTransformer(**BOTH).state_dict().items()}
+            told, plain = os.path.join(folder, "told"), os.path.join(folder, "plain")
+            write_component(told, BOTH, state)
+            write_component(plain, NETWORK, {n: t for n, t in state.items() if not n.startswith("condition_embed.")})
+            out = io.StringIO()
+            with contextlib.redirect_stdout(out):
+                held_out.main(["--grids", os.path.join(folder, "truth.sgrid"), "--model", f"plain={plain}", "--model",
+                               f"told={told}", "--batches", "1", "--cells", "30", "--threads", "1"])
+            rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in out.getvalue().splitlines()[2:]]
+            self.assertEqual([r[:2] for r in rows], [["plain", "labels"], ["told", "labels"], ["told", "object"],
+                                                     ["told", "tint"], ["told", "object and tint"]])
+            self.assertEqual(rows[0][2:], rows[1][2:])
+            self.assertEqual(len({tuple(r[2:]) for r in rows}), 4)
+
+
+if __name__ == "__main__":
+    unittest.main()
