@@ -14,7 +14,7 @@
 #include <gtest/gtest.h>
 
 namespace semrover {
-namespace {
+namespace cli_along_test {
 
 const std::string kModel = SEMROVER_SOURCE_DIR "/tests/golden/sampling_ddpm/model";
 const std::string kSettings = " -m " + kModel + " --steps 1 --region-size 40 --coverage-threshold 12 --quiet ";
@@ -272,5 +272,5 @@ TEST_F(CliAlong, what_makes_no_sense_is_refused)
     refused(line("x"), 3, "path.tum");
 }
 
-} // namespace
+} // namespace cli_along_test
 } // namespace semrover

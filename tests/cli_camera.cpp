@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 namespace semrover {
-namespace {
+namespace cli_camera_test {
 
 namespace fs = std::filesystem;
 
@@ -132,5 +132,5 @@ TEST(CliCamera, render_draws_a_rig_of_several_lenses)
             EXPECT_TRUE(fs::exists(folder / "out" / name / kind / "000001.png")) << name << " " << kind;
 }
 
-} // namespace
+} // namespace cli_camera_test
 } // namespace semrover

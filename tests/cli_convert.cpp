@@ -6,7 +6,7 @@
 #include "tests/renderer_weights.h"
 
 namespace semrover {
-namespace {
+namespace cli_convert_test {
 
 namespace fs = std::filesystem;
 
@@ -207,5 +207,5 @@ TEST(CliConvert, what_is_no_model_is_bad_input)
     EXPECT_FALSE(fs::exists(folder / "out"));
 }
 
-} // namespace
+} // namespace cli_convert_test
 } // namespace semrover

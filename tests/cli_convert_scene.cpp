@@ -12,7 +12,7 @@
 #include <nlohmann/json.hpp>
 
 namespace semrover {
-namespace {
+namespace cli_convert_scene_test {
 
 const std::string kScenes = SEMROVER_SOURCE_DIR "/assets/scenes/";
 const std::string kTruth = kScenes + "street.truth.sgrid", kSemantic = kScenes + "street.semantic.sgrid";
@@ -218,5 +218,5 @@ TEST(CliConvertScene, what_it_cannot_do_ends_with_one_line_and_a_code)
     EXPECT_FALSE(std::filesystem::exists(folder / "r"));
 }
 
-} // namespace
+} // namespace cli_convert_scene_test
 } // namespace semrover

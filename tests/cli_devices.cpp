@@ -10,7 +10,7 @@
 #include <set>
 
 namespace semrover {
-namespace {
+namespace cli_devices_test {
 
 using Json = nlohmann::json;
 
@@ -74,5 +74,5 @@ TEST(CliDoctor, without_a_driver_it_says_what_to_install_and_exits_with_4)
     EXPECT_EQ(devices.out, "");
 }
 
-} // namespace
+} // namespace cli_devices_test
 } // namespace semrover

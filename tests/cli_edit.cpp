@@ -12,7 +12,7 @@
 #include <gtest/gtest.h>
 
 namespace semrover {
-namespace {
+namespace cli_edit_test {
 
 const std::string kModel = SEMROVER_SOURCE_DIR "/tests/golden/sampling_ddpm/model";
 const std::string kSettings = " -m " + kModel + " --steps 2 --region-size 48 --coverage-threshold 12 --quiet ";
@@ -296,5 +296,5 @@ TEST_F(CliEdit, a_grid_is_cut_into_tiles_and_joined_again)
     expect_refusal("tile " + path("in.sgrid") + " --join -o " + path("x.sgrid"), 3, "index.json");
 }
 
-} // namespace
+} // namespace cli_edit_test
 } // namespace semrover

@@ -10,7 +10,7 @@
 #include <algorithm>
 
 namespace semrover {
-namespace {
+namespace cli_eval_test {
 
 ProgramResult eval(const std::string& arguments)
 {
@@ -216,5 +216,5 @@ TEST(CliEval, what_cannot_be_compared_is_one_clear_line)
     expect_error(eval(""), 2, "subcommand");
 }
 
-} // namespace
+} // namespace cli_eval_test
 } // namespace semrover

@@ -11,7 +11,7 @@
 #include <gtest/gtest.h>
 
 namespace semrover {
-namespace {
+namespace cli_eval_frames_test {
 
 constexpr uint32_t kWidth = 24, kHeight = 16;
 
@@ -220,5 +220,5 @@ TEST(CliEvalFlicker, what_does_not_fit_together_is_one_clear_line)
     expect_error(flicker(made + " --depth " + drive + " --path " + (p / "short.json")), 3, "short.json");
 }
 
-} // namespace
+} // namespace cli_eval_frames_test
 } // namespace semrover

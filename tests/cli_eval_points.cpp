@@ -11,7 +11,7 @@
 #include <random>
 
 namespace semrover {
-namespace {
+namespace cli_eval_points_test {
 
 ProgramResult eval_points(const std::string& arguments)
 {
@@ -150,5 +150,5 @@ TEST(CliEvalPoints, what_cannot_be_compared_is_one_clear_line)
     expect_error(eval_points(truth + " " + truth + " --device none"), 4, "none");
 }
 
-} // namespace
+} // namespace cli_eval_points_test
 } // namespace semrover

@@ -13,7 +13,7 @@
 #include <map>
 
 namespace semrover {
-namespace {
+namespace cli_fuse_test {
 
 namespace fs = std::filesystem;
 
@@ -307,5 +307,5 @@ TEST(CliFuse, device_memory_that_does_not_suffice_is_refused_and_little_of_it_gi
     drive.expect_refusal("--max-vram", "--max-vram 1MB", 5);
 }
 
-} // namespace
+} // namespace cli_fuse_test
 } // namespace semrover

@@ -14,7 +14,7 @@
 #include <nlohmann/json.hpp>
 
 namespace semrover {
-namespace {
+namespace cli_generate_test {
 
 using Json = nlohmann::json;
 
@@ -399,5 +399,5 @@ TEST_F(CliGenerateRefuses, devices_and_options_that_cannot_be)
     expect_refusal(line + "--first-cell 300", 3, "first");
 }
 
-} // namespace
+} // namespace cli_generate_test
 } // namespace semrover

@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 
 namespace semrover {
-namespace {
+namespace cli_inspect_test {
 
 const std::string kAssets = SEMROVER_SOURCE_DIR "/assets";
 
@@ -143,5 +143,5 @@ TEST(Cli, help_and_version_end_with_code_0)
     EXPECT_EQ(semrover_program("inspect --help").code, 0);
 }
 
-} // namespace
+} // namespace cli_inspect_test
 } // namespace semrover

@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 namespace semrover {
-namespace {
+namespace cli_objects_test {
 
 const std::string kGolden = SEMROVER_SOURCE_DIR "/tests/golden/";
 
@@ -85,5 +85,5 @@ TEST_F(CliObjects, a_model_that_knows_labels_alone_and_a_broken_file_are_refused
     EXPECT_FALSE(is_there(folder_ / "out.sgrid"));
 }
 
-} // namespace
+} // namespace cli_objects_test
 } // namespace semrover

@@ -16,7 +16,7 @@
 #include <tuple>
 
 namespace semrover {
-namespace {
+namespace cli_page_test {
 
 namespace fs = std::filesystem;
 
@@ -347,5 +347,5 @@ TEST(CliPage, text_for_a_page_is_escaped_and_base64_is_the_rfcs)
     EXPECT_EQ(counted(123456), "123,456");
 }
 
-} // namespace
+} // namespace cli_page_test
 } // namespace semrover

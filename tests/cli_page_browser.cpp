@@ -9,7 +9,7 @@
 #include <cstring>
 
 namespace semrover {
-namespace {
+namespace cli_page_browser_test {
 
 constexpr int kMoments = 4;
 
@@ -181,5 +181,5 @@ TEST_F(CliPageBrowser, a_broken_page_says_so)
     EXPECT_EQ(report_of(broken("class Orbit {", "}}}}}}}}")), Json());
 }
 
-} // namespace
+} // namespace cli_page_browser_test
 } // namespace semrover

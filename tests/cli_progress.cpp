@@ -10,7 +10,7 @@
 #include <sstream>
 
 namespace semrover {
-namespace {
+namespace cli_progress_test {
 
 // a clock that is set by hand, and what was written
 struct Script {
@@ -135,5 +135,5 @@ TEST(Progress, durations_and_sizes_are_short)
     EXPECT_EQ(bytes_text(~uint64_t(0)), "16.0 EiB");
 }
 
-} // namespace
+} // namespace cli_progress_test
 } // namespace semrover

@@ -12,7 +12,7 @@
 #include <nlohmann/json.hpp>
 
 namespace semrover {
-namespace {
+namespace cli_refine_test {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
@@ -386,5 +386,5 @@ TEST_F(CliRefineRefuses, outputs_devices_and_options_that_cannot_be)
     EXPECT_TRUE(refined("stopped", "--seed 9 -y") == refined("other", "--seed 9"));
 }
 
-} // namespace
+} // namespace cli_refine_test
 } // namespace semrover

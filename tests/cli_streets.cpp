@@ -13,7 +13,7 @@
 #include <numeric>
 
 namespace semrover {
-namespace {
+namespace cli_streets_test {
 
 namespace fs = std::filesystem;
 
@@ -148,5 +148,5 @@ TEST(CliStreets, what_cannot_be_is_refused_and_leaves_nothing)
     EXPECT_EQ(folder.entries(), 1u);
 }
 
-} // namespace
+} // namespace cli_streets_test
 } // namespace semrover

@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 
 namespace semrover {
-namespace {
+namespace cli_verify_test {
 
 const std::string kGolden = SEMROVER_SOURCE_DIR "/tests/golden";
 
@@ -96,5 +96,5 @@ TEST(CliVerify, a_folder_without_cases_is_refused)
     EXPECT_EQ(semrover_program("verify").code, 2);
 }
 
-} // namespace
+} // namespace cli_verify_test
 } // namespace semrover

@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 namespace semrover {
-namespace {
+namespace cli_voxelize_test {
 
 // a road of 4 m by 4 m and a pane beside it
 std::string scene(const ScratchFolder& folder)
@@ -109,5 +109,5 @@ TEST(CliVoxelize, eval_chamfer_measures_a_grid_or_sweeps)
                  "either a GRID or --sweep");
 }
 
-} // namespace
+} // namespace cli_voxelize_test
 } // namespace semrover

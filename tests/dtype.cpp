@@ -8,7 +8,7 @@
 #include <limits>
 
 namespace semrover {
-namespace {
+namespace dtype_test {
 
 TEST(DType, every_half_is_the_number_it_says_and_comes_back)
 {
@@ -42,5 +42,5 @@ TEST(DType, bf16_is_the_upper_half_of_a_float_rounded_to_even)
     EXPECT_TRUE(std::isnan(bf16_to_float(float_to_bf16(NAN))));
 }
 
-} // namespace
+} // namespace dtype_test
 } // namespace semrover

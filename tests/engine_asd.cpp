@@ -9,7 +9,7 @@
 #include <limits>
 
 namespace semrover {
-namespace {
+namespace engine_asd_test {
 
 const Path kModel = SEMROVER_SOURCE_DIR "/tests/golden/asd_rollout_tiny/model";
 const LatentSize kSize{51, 38, 8}; // a latent of 7 x 5 whose last blocks are not full
@@ -279,5 +279,5 @@ TEST(engine_memory_plan, takes_the_first_policy_that_fits_and_says_what_each_nee
     EXPECT_EQ(plan_memory(parts, 0, 0)->bytes, 190u);
 }
 
-} // namespace
+} // namespace engine_asd_test
 } // namespace semrover

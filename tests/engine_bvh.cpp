@@ -8,7 +8,7 @@
 #include <random>
 
 namespace semrover {
-namespace {
+namespace engine_bvh_test {
 
 struct Soup {
     std::vector<std::array<float, 3>> positions;
@@ -124,5 +124,5 @@ TEST(engine_bvh, is_the_same_for_the_same_triangles)
     EXPECT_EQ(a.order, b.order);
 }
 
-} // namespace
+} // namespace engine_bvh_test
 } // namespace semrover

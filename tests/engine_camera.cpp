@@ -11,7 +11,7 @@
 #include <random>
 
 namespace semrover {
-namespace {
+namespace engine_camera_test {
 
 const Intrinsics kView = pinhole_from_fov(90, 616, 424);
 
@@ -373,5 +373,5 @@ TEST(Rig, what_is_wrong_with_a_rig_is_named)
     EXPECT_TRUE(says(changed("{\"sensors\"", "{\"path_axes\":\"x\",\"sensors\""), "path_axes: expected"));
 }
 
-} // namespace
+} // namespace engine_camera_test
 } // namespace semrover

@@ -10,7 +10,7 @@
 #include <random>
 
 namespace semrover {
-namespace {
+namespace engine_camera_files_test {
 
 const Intrinsics kView = pinhole_from_fov(90, 616, 424);
 
@@ -387,5 +387,5 @@ TEST(CameraFiles, a_transforms_file_without_intrinsics_takes_a_lens)
         EXPECT_EQ(read_camera_path(file, k)->frames[0].intrinsics, k);
 }
 
-} // namespace
+} // namespace engine_camera_files_test
 } // namespace semrover

@@ -7,7 +7,7 @@
 #include "tests/scratch_folder.h"
 
 namespace semrover {
-namespace {
+namespace engine_camera_render_test {
 
 SurfelScene make_scene(Device& device, const Surfels& surfels)
 {
@@ -167,5 +167,5 @@ TEST(engine_camera_render, lenses_of_a_panorama_and_of_turns_agree)
     }
 }
 
-} // namespace
+} // namespace engine_camera_render_test
 } // namespace semrover

@@ -10,7 +10,7 @@
 #include <cmath>
 
 namespace semrover {
-namespace {
+namespace engine_checkpoint_test {
 
 using Network = Checkpoint::Network;
 
@@ -251,5 +251,5 @@ TEST(LdmConfig, a_file_that_lacks_a_layer_says_which)
     EXPECT_TRUE(says(ldm_vae_config(*set), "tensor 'first_stage_model.decoder.conv_in.weight' is missing"));
 }
 
-} // namespace
+} // namespace engine_checkpoint_test
 } // namespace semrover

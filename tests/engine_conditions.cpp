@@ -11,7 +11,7 @@
 #include <numbers>
 
 namespace semrover {
-namespace {
+namespace engine_conditions_test {
 
 constexpr uint32_t kWidth = 64;
 
@@ -90,9 +90,7 @@ TEST(engine_conditions, parts_are_joined_in_the_order_of_the_config_and_what_is_
 
 TEST(engine_conditions, a_config_names_each_part_once)
 {
-    const auto config = [](const char* list) {
-        return parse_transformer_config(Json{{"condition", json_of(list)}});
-    };
+    const auto config = [](const char* list) { return parse_transformer_config(Json{{"condition", json_of(list)}}); };
     EXPECT_EQ(config(R"(["tint", "object"])")->condition_width(), kWidth);
     EXPECT_EQ(config("[]")->condition_width(), 0u);
     EXPECT_EQ(config("null")->condition_width(), 0u);
@@ -160,5 +158,5 @@ TEST(engine_conditions, a_region_is_the_same_alone_and_beside_one_that_is_told_n
     EXPECT_EQ(std::vector<float>(batched.begin() + 20 * channels, batched.end()), alone);
 }
 
-} // namespace
+} // namespace engine_conditions_test
 } // namespace semrover

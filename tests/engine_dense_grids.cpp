@@ -13,7 +13,7 @@
 #include <random>
 
 namespace semrover {
-namespace {
+namespace engine_dense_grids_test {
 
 const std::string kNumpy = SEMROVER_SOURCE_DIR "/tests/data/numpy/";
 constexpr size_t kVoxels = 256 * 256 * 32;
@@ -392,5 +392,5 @@ TEST(Occ3d, refuses_malformed_files)
     EXPECT_TRUE(says(read_occ3d(folder.put("m.npz", masked), Occ3dKind::nuscenes, o), "'m': expected shape [200"));
 }
 
-} // namespace
+} // namespace engine_dense_grids_test
 } // namespace semrover

@@ -17,7 +17,7 @@
 #include <set>
 
 namespace semrover {
-namespace {
+namespace engine_edit_test {
 
 using Cells = std::vector<Cell>;
 using Kind = EditOperation::Kind;
@@ -555,5 +555,5 @@ TEST_F(EngineUndo, records_that_are_damaged_or_of_another_grid_change_nothing)
             after, "not sorted");
 }
 
-} // namespace
+} // namespace engine_edit_test
 } // namespace semrover

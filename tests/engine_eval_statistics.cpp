@@ -11,7 +11,7 @@
 #include <random>
 
 namespace semrover {
-namespace {
+namespace engine_eval_statistics_test {
 
 Features random_features(uint32_t rows, uint32_t cols, uint32_t seed, double scale = 1, double shift = 0)
 {
@@ -353,5 +353,5 @@ TEST(engine_eval_statistics, feature_files_that_are_something_else_are_refused)
         says(read_gaussian(put(folder, {{"mu", {{1}, {NAN}}}, {"sigma", {{1, 1}, {1}}}})), "nan in row 0, column 0"));
 }
 
-} // namespace
+} // namespace engine_eval_statistics_test
 } // namespace semrover

@@ -7,7 +7,7 @@
 #include <random>
 
 namespace semrover {
-namespace {
+namespace engine_flicker_test {
 
 constexpr uint32_t kWidth = 40, kHeight = 24;
 
@@ -198,5 +198,5 @@ TEST(EngineFlicker, a_panorama_that_turns_by_whole_pixels_is_the_same_picture_sh
         }
 }
 
-} // namespace
+} // namespace engine_flicker_test
 } // namespace semrover

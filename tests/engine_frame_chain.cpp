@@ -11,7 +11,7 @@
 #include <limits>
 
 namespace semrover {
-namespace {
+namespace engine_frame_chain_test {
 
 const Path kModel = SEMROVER_SOURCE_DIR "/tests/golden/asd_rollout_tiny/model";
 const LatentSize kSize{51, 38, 8}; // the last blocks are not full
@@ -216,5 +216,5 @@ TEST(engine_frame_chain, what_is_not_finite_is_told_as_on_the_host)
     EXPECT_TRUE(status.error().message.ends_with(": overflow; try --precision fp32")) << status.error().message;
 }
 
-} // namespace
+} // namespace engine_frame_chain_test
 } // namespace semrover

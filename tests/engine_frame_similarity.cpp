@@ -8,7 +8,7 @@
 #include <random>
 
 namespace semrover {
-namespace {
+namespace engine_frame_similarity_test {
 
 ImageRgb8 random_image(uint32_t width, uint32_t height, uint32_t seed, uint32_t step = 1)
 {
@@ -166,5 +166,5 @@ TEST(EngineFrameSimilarity, masks_and_classes_share_the_pixels_out)
     EXPECT_EQ(twice.labels[19].pixels, 2 * s.labels[19].pixels);
 }
 
-} // namespace
+} // namespace engine_frame_similarity_test
 } // namespace semrover

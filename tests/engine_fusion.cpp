@@ -8,7 +8,7 @@
 #include <map>
 
 namespace semrover {
-namespace {
+namespace engine_fusion_test {
 
 const StreetScene kStreet;
 
@@ -181,5 +181,5 @@ TEST(EngineFusion, poses_that_cannot_be_and_empty_pictures_are_bad_input)
     EXPECT_TRUE(says(fuse(test_device(), kStreet.frames(wide), fine), "use a larger --tsdf-voxel"));
 }
 
-} // namespace
+} // namespace engine_fusion_test
 } // namespace semrover

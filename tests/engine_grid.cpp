@@ -14,7 +14,7 @@
 #include <gtest/gtest.h>
 
 namespace semrover {
-namespace {
+namespace engine_grid_test {
 
 VoxelGrid semantic_grid()
 {
@@ -176,5 +176,5 @@ TEST(Palette, names_and_colours_are_unique)
     EXPECT_EQ(class_of_name("moon"), std::nullopt);
 }
 
-} // namespace
+} // namespace engine_grid_test
 } // namespace semrover

@@ -9,7 +9,7 @@
 #include <random>
 
 namespace semrover {
-namespace {
+namespace engine_image_test {
 
 template <typename T>
 std::vector<T> noise(size_t count)
@@ -173,5 +173,5 @@ TEST(Image, the_size_of_a_png_is_read_without_its_pixels)
     EXPECT_TRUE(says(read_png_size(folder.put("c.png", contents(folder / "a.png").substr(0, 20))), "not a valid PNG"));
 }
 
-} // namespace
+} // namespace engine_image_test
 } // namespace semrover

@@ -7,7 +7,7 @@
 #include "tools/eval/inception.h"
 
 namespace semrover {
-namespace {
+namespace engine_inception_test {
 
 ImageRgb8 random_image(uint32_t width, uint32_t height, uint32_t seed)
 {
@@ -160,5 +160,5 @@ TEST(engine_inception, a_classifier_may_be_there_and_files_that_do_not_fit_are_r
     EXPECT_TRUE(says(Inception::load(test_device(), folder.put("cut.safetensors", "\x10")), "cut.safetensors"));
 }
 
-} // namespace
+} // namespace engine_inception_test
 } // namespace semrover

@@ -14,7 +14,7 @@
 #include <map>
 
 namespace semrover {
-namespace {
+namespace engine_job_generation_test {
 
 Device& device()
 {
@@ -413,5 +413,5 @@ TEST(engine_job_regeneration, cut_off_at_any_step_it_gives_every_seed_its_bytes)
     }
 }
 
-} // namespace
+} // namespace engine_job_generation_test
 } // namespace semrover

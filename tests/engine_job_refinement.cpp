@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 
 namespace semrover {
-namespace {
+namespace engine_job_refinement_test {
 
 namespace fs = std::filesystem;
 
@@ -355,5 +355,5 @@ TEST_F(JobRefinement, a_drawing_by_steps_writes_the_files_of_one_that_runs_throu
     EXPECT_EQ(contents(folder_ / "through" / "top.png"), contents(folder_ / "steps" / "top.png"));
 }
 
-} // namespace
+} // namespace engine_job_refinement_test
 } // namespace semrover

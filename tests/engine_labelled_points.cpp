@@ -12,7 +12,7 @@
 #include <set>
 
 namespace semrover {
-namespace {
+namespace engine_labelled_points_test {
 
 std::string ply(const std::string& properties, const std::vector<std::string>& rows)
 {
@@ -236,5 +236,5 @@ TEST(LabelledPoints, no_prefix_of_a_file_reads_or_crashes)
         EXPECT_FALSE(read_labelled_points(folder.put("t.ply", bytes.substr(0, n)), {})) << n;
 }
 
-} // namespace
+} // namespace engine_labelled_points_test
 } // namespace semrover

@@ -9,7 +9,7 @@
 #include <random>
 
 namespace semrover {
-namespace {
+namespace engine_lens_test {
 
 // order k1 k2 p1 p2 k3 k4 k5 k6
 const Intrinsics kOpencv{812.5,
@@ -242,5 +242,5 @@ TEST(Lens, depth_is_from_the_camera_where_z_cannot_tell)
     EXPECT_TRUE(Lens(whole_sphere(8, 4)).radial_depth());
 }
 
-} // namespace
+} // namespace engine_lens_test
 } // namespace semrover

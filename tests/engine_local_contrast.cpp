@@ -9,7 +9,7 @@
 #include <random>
 
 namespace semrover {
-namespace {
+namespace engine_local_contrast_test {
 
 using Vec = std::array<double, 3>;
 
@@ -308,5 +308,5 @@ TEST(EngineLocalContrast, order_of_points_and_place_of_the_grid_change_nothing)
     }
 }
 
-} // namespace
+} // namespace engine_local_contrast_test
 } // namespace semrover

@@ -9,7 +9,7 @@
 #include <cstring>
 
 namespace semrover {
-namespace {
+namespace engine_mesh_files_test {
 
 const ImageRgb8 kImage{2, 2, {255, 0, 0, 0, 255, 0, 0, 0, 255, 9, 8, 7}};
 
@@ -511,5 +511,5 @@ TEST(MeshFiles, labels_come_from_names_maps_and_faces)
         EXPECT_TRUE(says(MeshLabelMap::read(folder.put("map.json", text)), error)) << text;
 }
 
-} // namespace
+} // namespace engine_mesh_files_test
 } // namespace semrover

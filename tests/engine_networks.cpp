@@ -7,7 +7,7 @@
 #include <cmath>
 
 namespace semrover {
-namespace {
+namespace engine_networks_test {
 
 VaeConfig small_vae()
 {
@@ -157,5 +157,5 @@ TEST(engine_networks, refuse_a_network_without_its_weights)
     std::filesystem::remove_all(empty);
 }
 
-} // namespace
+} // namespace engine_networks_test
 } // namespace semrover

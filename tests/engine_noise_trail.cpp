@@ -6,7 +6,7 @@
 #include <set>
 
 namespace semrover {
-namespace {
+namespace engine_noise_trail_test {
 
 const LatentSize kSize{64, 48, 4};
 
@@ -116,5 +116,5 @@ TEST(engine_noise_trail, what_was_behind_the_camera_is_new)
     EXPECT_EQ(carried(trail), 0u);
 }
 
-} // namespace
+} // namespace engine_noise_trail_test
 } // namespace semrover

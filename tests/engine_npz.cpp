@@ -12,7 +12,7 @@
 #include <numeric>
 
 namespace semrover {
-namespace {
+namespace engine_npz_test {
 
 const std::string kNumpy = SEMROVER_SOURCE_DIR "/tests/data/numpy/";
 
@@ -260,5 +260,5 @@ TEST(GridNpz, refuses_malformed_grids)
              "the grid is empty"));
 }
 
-} // namespace
+} // namespace engine_npz_test
 } // namespace semrover

@@ -10,7 +10,7 @@
 #include <numbers>
 
 namespace semrover {
-namespace {
+namespace engine_objects_test {
 
 constexpr uint8_t kBuilding = 2, kCar = 13;
 
@@ -150,5 +150,5 @@ TEST(engine_objects, a_tint_is_the_median_of_the_points_of_the_objects_own_cells
     EXPECT_FALSE(objects[0].tint);
 }
 
-} // namespace
+} // namespace engine_objects_test
 } // namespace semrover

@@ -13,7 +13,7 @@
 #include <sstream>
 
 namespace semrover {
-namespace {
+namespace engine_ply_test {
 
 struct PlyFile {
     std::vector<std::string> comments;
@@ -190,5 +190,5 @@ TEST(PlyDeathTest, arrays_of_different_lengths_are_a_bug)
     EXPECT_DEATH(static_cast<void>(write_points_ply("/tmp/never.ply", s)), "2 points with 2 colors and 1 labels");
 }
 
-} // namespace
+} // namespace engine_ply_test
 } // namespace semrover

@@ -12,7 +12,7 @@
 #include <gtest/gtest.h>
 
 namespace semrover {
-namespace {
+namespace engine_ply_reader_test {
 
 // bytes of a number, most or least significant first
 template <typename T>
@@ -229,5 +229,5 @@ TEST(PlyReader, no_prefix_of_a_file_reads_or_crashes)
         EXPECT_FALSE(read_ply(folder.put("t.ply", kAscii.substr(0, n)))) << n;
 }
 
-} // namespace
+} // namespace engine_ply_reader_test
 } // namespace semrover

@@ -9,7 +9,7 @@
 #include <cmath>
 
 namespace semrover {
-namespace {
+namespace engine_point_scores_test {
 
 constexpr uint8_t kRoad = 0, kBuilding = 2, kLane = 19;
 
@@ -259,5 +259,5 @@ TEST(EnginePointScores, what_cannot_be_compared_says_why)
     EXPECT_TRUE(says(score(good, good, {.radius = NAN}), "found nan m"));
 }
 
-} // namespace
+} // namespace engine_point_scores_test
 } // namespace semrover

@@ -11,7 +11,7 @@
 #include <set>
 
 namespace semrover {
-namespace {
+namespace engine_pointnet_test {
 
 // points on multiples of 1/64 m, so that every distance is exact in fp32
 ScenePoints lattice_scene(size_t points, double side, uint32_t seed)
@@ -294,5 +294,5 @@ TEST(engine_pointnet, files_that_do_not_fit_are_refused)
         says(Pointnet::load(test_device(), path, warnings), "expected tensors such as 'sa1.mlp_convs.0.weight'"));
 }
 
-} // namespace
+} // namespace engine_pointnet_test
 } // namespace semrover

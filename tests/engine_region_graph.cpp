@@ -8,7 +8,7 @@
 #include <random>
 
 namespace semrover {
-namespace {
+namespace engine_region_graph_test {
 
 // regions given by their members
 Regions make_regions(const std::vector<std::vector<uint32_t>>& rows)
@@ -179,5 +179,5 @@ TEST(RegionGraph, IsBuiltInUnderASecondForAHundredThousandCells)
     EXPECT_LT(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(), 1.0);
 }
 
-} // namespace
+} // namespace engine_region_graph_test
 } // namespace semrover

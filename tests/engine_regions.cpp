@@ -11,7 +11,7 @@
 #include <random>
 
 namespace semrover {
-namespace {
+namespace engine_regions_test {
 
 using Cloud = std::vector<std::array<int32_t, 3>>;
 
@@ -266,5 +266,5 @@ TEST(Regions, CellsFarFromTheOriginAreExact)
     EXPECT_EQ(regions->members, (std::vector<uint32_t>{0, 2, 1, 2}));
 }
 
-} // namespace
+} // namespace engine_regions_test
 } // namespace semrover

@@ -10,7 +10,7 @@
 #include <map>
 
 namespace semrover {
-namespace {
+namespace engine_renderer_configs_test {
 
 const std::string kGolden = SEMROVER_SOURCE_DIR "/tests/golden/";
 
@@ -238,5 +238,5 @@ TEST(RandomWeights, depend_on_seed_and_name_and_have_the_variance_of_the_fan_in)
         EXPECT_NEAR(v, 0, 0.05);
 }
 
-} // namespace
+} // namespace engine_renderer_configs_test
 } // namespace semrover

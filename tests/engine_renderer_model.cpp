@@ -7,7 +7,7 @@
 #include "tests/scratch_folder.h"
 
 namespace semrover {
-namespace {
+namespace engine_renderer_model_test {
 
 namespace fs = std::filesystem;
 
@@ -188,5 +188,5 @@ TEST(RendererModel, files_that_do_not_fit_are_refused_before_a_device_is_touched
     EXPECT_TRUE(says(RendererModel::open(folder.path()), "expected a JSON object"));
 }
 
-} // namespace
+} // namespace engine_renderer_model_test
 } // namespace semrover

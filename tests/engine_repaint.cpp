@@ -13,7 +13,7 @@
 #include <utility>
 
 namespace semrover {
-namespace {
+namespace engine_repaint_test {
 
 constexpr size_t kCells = 6, kKnown = 2, kWidth = 5;
 
@@ -284,5 +284,5 @@ TEST(Repaint, PlansThatCannotBeAreRefused)
     EXPECT_NE(plan_sampling(config, 20, {5, 2}).error().message.find("euler"), std::string::npos);
 }
 
-} // namespace
+} // namespace engine_repaint_test
 } // namespace semrover

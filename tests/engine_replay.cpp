@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 
 namespace semrover {
-namespace {
+namespace engine_replay_test {
 
 const Path kGolden = SEMROVER_SOURCE_DIR "/tests/golden";
 const LatentSize kSize{51, 38, 8};
@@ -238,5 +238,5 @@ TEST(engine_replay_of_two, a_step_without_a_run_is_the_callers_mistake)
     EXPECT_DEATH((void)sampler->save(), "a run is saved that has not begun, or has ended");
 }
 
-} // namespace
+} // namespace engine_replay_test
 } // namespace semrover

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 namespace semrover {
-namespace {
+namespace engine_sampler_test {
 
 Device& device()
 {
@@ -146,5 +146,5 @@ TEST(engine_sampler, stops_when_the_callback_says_so)
     EXPECT_EQ(result.error().code, ErrorCode::interrupted);
 }
 
-} // namespace
+} // namespace engine_sampler_test
 } // namespace semrover

@@ -10,7 +10,7 @@
 #include <iterator>
 
 namespace semrover {
-namespace {
+namespace engine_schedule_test {
 
 SchedulerConfig parse(const nlohmann::json& json)
 {
@@ -261,5 +261,5 @@ TEST(SchedulerConfig, SamplersHaveNames)
     EXPECT_NE(unknown.error().message.find("dpm++2m"), std::string::npos);
 }
 
-} // namespace
+} // namespace engine_schedule_test
 } // namespace semrover

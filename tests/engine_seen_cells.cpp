@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 namespace semrover {
-namespace {
+namespace engine_seen_cells_test {
 
 // walls across x, 6 m wide and 3 m high
 Mesh walls_at(std::initializer_list<float> places)
@@ -88,5 +88,5 @@ TEST_F(SeenCells, own_a_surface_that_lies_between_two_cells)
     EXPECT_EQ(found.begin()->second, kWall);
 }
 
-} // namespace
+} // namespace engine_seen_cells_test
 } // namespace semrover

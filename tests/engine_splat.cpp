@@ -9,7 +9,7 @@
 #include "tools/verify/splat_cases.h"
 
 namespace semrover {
-namespace {
+namespace engine_splat_test {
 
 std::array<float, 3> floats(const Vector& v)
 {
@@ -323,5 +323,5 @@ TEST(engine_splat, surfels_are_read_back_as_they_are_drawn)
     }
 }
 
-} // namespace
+} // namespace engine_splat_test
 } // namespace semrover

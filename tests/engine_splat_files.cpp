@@ -18,7 +18,7 @@
 #include <random>
 
 namespace semrover {
-namespace {
+namespace engine_splat_files_test {
 
 Surfels random_surfels(size_t n)
 {
@@ -439,5 +439,5 @@ TEST(GltfSplats, refuses_malformed_files)
         EXPECT_FALSE(read(good.substr(0, n))) << n;
 }
 
-} // namespace
+} // namespace engine_splat_files_test
 } // namespace semrover

@@ -15,7 +15,7 @@
 #include <set>
 
 namespace semrover {
-namespace {
+namespace engine_streets_test {
 
 template <typename T>
 void add_all(Hash& hash, const std::vector<T>& values)
@@ -281,5 +281,5 @@ TEST(engine_streets, the_drive_keeps_to_the_right_lane_and_its_twin_beside_it)
     }
 }
 
-} // namespace
+} // namespace engine_streets_test
 } // namespace semrover

@@ -12,7 +12,7 @@
 #include <set>
 
 namespace semrover {
-namespace {
+namespace engine_sub_grid_test {
 
 const std::string kModel = SEMROVER_SOURCE_DIR "/tests/golden/sampling_ddpm/model";
 
@@ -230,5 +230,5 @@ TEST(engine_sub_grid, regions_grow_from_the_known_cells_as_the_plain_algorithm_s
     EXPECT_EQ(extract_regions(two, options(), std::vector<uint8_t>{1, 1})->size(), 0u);
 }
 
-} // namespace
+} // namespace engine_sub_grid_test
 } // namespace semrover

@@ -8,7 +8,7 @@
 #include <cmath>
 
 namespace semrover {
-namespace {
+namespace engine_surface_error_test {
 
 using Vec = std::array<double, 3>;
 
@@ -139,5 +139,5 @@ TEST(engine_surface_error, views_are_counted_where_the_depth_agrees)
     EXPECT_EQ(*views, (std::vector<uint32_t>{1, 0, 0, 1, 0, 1}));
 }
 
-} // namespace
+} // namespace engine_surface_error_test
 } // namespace semrover

@@ -9,7 +9,7 @@
 #include <random>
 
 namespace semrover {
-namespace {
+namespace engine_texture_image_test {
 
 using Bytes = std::vector<uint8_t>;
 
@@ -262,5 +262,5 @@ TEST(TextureImage, what_would_be_read_wrong_is_refused)
     EXPECT_TRUE(says(read_texture_rgb8(folder.put("a.bmp", runs)), "not a valid BMP: BMP type not supported: RLE"));
 }
 
-} // namespace
+} // namespace engine_texture_image_test
 } // namespace semrover

@@ -15,7 +15,7 @@
 #include <set>
 
 namespace semrover {
-namespace {
+namespace engine_tiles_test {
 
 VoxelGrid plain(int32_t low, int32_t high, bool points)
 {
@@ -229,5 +229,5 @@ TEST(engine_tiles, the_cache_holds_only_tiles_of_the_window_and_storing_twice_is
     }
 }
 
-} // namespace
+} // namespace engine_tiles_test
 } // namespace semrover

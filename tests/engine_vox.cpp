@@ -14,7 +14,7 @@
 #include <set>
 
 namespace semrover {
-namespace {
+namespace engine_vox_test {
 
 using Dictionary = std::vector<std::pair<std::string, std::string>>;
 
@@ -317,5 +317,5 @@ TEST(Vox, no_prefix_of_a_file_reads_or_crashes)
         EXPECT_FALSE(read(folder, file(children.substr(0, n)))) << n;
 }
 
-} // namespace
+} // namespace engine_vox_test
 } // namespace semrover

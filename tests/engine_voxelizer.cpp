@@ -12,7 +12,7 @@
 #include <set>
 
 namespace semrover {
-namespace {
+namespace engine_voxelizer_test {
 
 using Corner = std::array<float, 3>;
 
@@ -483,5 +483,5 @@ TEST(EngineVoxelizer, chamfer_of_a_plane_is_that_of_points_strewn_over_it_and_fa
     EXPECT_TRUE(says(chamfer(test_device(), m, empty), "no points"));
 }
 
-} // namespace
+} // namespace engine_voxelizer_test
 } // namespace semrover

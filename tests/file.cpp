@@ -13,7 +13,7 @@
 #include <unistd.h>
 
 namespace semrover {
-namespace {
+namespace file_test {
 
 TEST(File, a_file_reads_back_as_written)
 {
@@ -158,5 +158,5 @@ TEST(Quote, controls_and_broken_utf8_are_escaped_and_long_text_is_cut)
     EXPECT_EQ(printable("ab\xc3\xbc", 3), "ab...");
 }
 
-} // namespace
+} // namespace file_test
 } // namespace semrover

@@ -4,7 +4,7 @@
 #include "tests/random_graph.h"
 
 namespace semrover {
-namespace {
+namespace graph_execute_test {
 
 using Bytes = std::vector<std::byte>;
 
@@ -200,5 +200,5 @@ TEST(graph_execute, uses_exactly_the_memory_that_the_plan_predicts)
     }
 }
 
-} // namespace
+} // namespace graph_execute_test
 } // namespace semrover

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 namespace semrover {
-namespace {
+namespace graph_fuse_test {
 
 // externals of one shape, and ops on them
 struct FuseCase {
@@ -131,5 +131,5 @@ TEST(graph_fuse, cuts_a_fused_pass_in_all_its_bindings_or_not_at_all)
     EXPECT_EQ(levels_text(*plan), "gemm"); // two groups lie one after the other: no band of rows serves both
 }
 
-} // namespace
+} // namespace graph_fuse_test
 } // namespace semrover

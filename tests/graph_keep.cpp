@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 namespace semrover {
-namespace {
+namespace graph_keep_test {
 
 // of slots and graphs without a device: what is planned, and what is refused
 struct KeepCase {
@@ -147,5 +147,5 @@ TEST(graph_keep, refuses_to_keep_twice_or_what_is_kept_already)
     EXPECT_DEATH(c.g.keep(Tensor{}, c.y), "a tensor of another graph, or none");
 }
 
-} // namespace
+} // namespace graph_keep_test
 } // namespace semrover

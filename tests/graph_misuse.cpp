@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 namespace semrover {
-namespace {
+namespace graph_misuse_test {
 
 // the error of a graph that must not compile
 Error error_of(const Graph& g, const DeviceLimits& limits = test_limits())
@@ -123,5 +123,5 @@ TEST(graph_misuse_death, stops_at_shapes_that_do_not_meet)
     EXPECT_DEATH((void)g.external(fake_memory(100), 4, 64, DType::f32, "short"), "'short' of 1024 bytes in 100 bytes");
 }
 
-} // namespace
+} // namespace graph_misuse_test
 } // namespace semrover

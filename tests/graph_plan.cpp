@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 namespace semrover {
-namespace {
+namespace graph_plan_test {
 
 Plan plan_of(const Graph& g, const DeviceLimits& limits = test_limits())
 {
@@ -181,5 +181,5 @@ TEST(graph_plan, saves_memory_on_deep_graphs)
     EXPECT_EQ(plan.arena_bytes(), plan.transient_bytes() / 50);
 }
 
-} // namespace
+} // namespace graph_plan_test
 } // namespace semrover

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 namespace semrover {
-namespace {
+namespace graph_slice_test {
 
 Plan plan_of(const Graph& g, const DeviceLimits& limits)
 {
@@ -187,5 +187,5 @@ TEST(graph_slice, folds_workgroups_beyond_a_dimension_over_y)
     EXPECT_EQ(plan.passes[1].group_count[1], 17u);
 }
 
-} // namespace
+} // namespace graph_slice_test
 } // namespace semrover

@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 namespace semrover {
-namespace {
+namespace json_test {
 
 TEST(Json, a_document_becomes_the_value_it_says)
 {
@@ -54,5 +54,5 @@ TEST(Json, a_file_is_read_and_named_in_its_error)
     EXPECT_TRUE(says(read_json(folder / "none.json"), "No such file"));
 }
 
-} // namespace
+} // namespace json_test
 } // namespace semrover

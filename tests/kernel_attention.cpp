@@ -5,7 +5,7 @@
 #include <cmath>
 
 namespace semrover {
-namespace {
+namespace kernel_attention_test {
 
 constexpr int32_t kRadius2 = 9;
 
@@ -148,5 +148,5 @@ TEST(kernel_attention, gives_a_set_the_same_bits_whatever_it_is_packed_with)
     }
 }
 
-} // namespace
+} // namespace kernel_attention_test
 } // namespace semrover

@@ -5,7 +5,7 @@
 #include <cmath>
 
 namespace semrover {
-namespace {
+namespace kernel_conv2d_test {
 
 struct ConvCase {
     uint32_t batch, height, width, channels, channels2, outputs, kernel, stride;
@@ -151,5 +151,5 @@ TEST(kernel_conv2d, gives_the_same_bits_in_bands_of_rows)
     }
 }
 
-} // namespace
+} // namespace kernel_conv2d_test
 } // namespace semrover

@@ -5,7 +5,7 @@
 #include <cmath>
 
 namespace semrover {
-namespace {
+namespace kernel_conv2d_taps_test {
 
 struct TapsCase {
     uint32_t batch, height, width, channels, outputs, stride;
@@ -78,5 +78,5 @@ TEST(kernel_conv2d_taps, takes_rectangles_of_taps_and_writes_relu_into_columns_o
         }
 }
 
-} // namespace
+} // namespace kernel_conv2d_taps_test
 } // namespace semrover

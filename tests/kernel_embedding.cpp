@@ -5,7 +5,7 @@
 #include <cmath>
 
 namespace semrover {
-namespace {
+namespace kernel_embedding_test {
 
 struct EmbeddingCase {
     uint32_t rows, cols, classes;
@@ -109,5 +109,5 @@ TEST(kernel_sinusoid, is_right_around_every_multiple_of_a_quarter_turn)
     }
 }
 
-} // namespace
+} // namespace kernel_embedding_test
 } // namespace semrover

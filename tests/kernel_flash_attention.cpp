@@ -5,7 +5,7 @@
 #include <cmath>
 
 namespace semrover {
-namespace {
+namespace kernel_flash_attention_test {
 
 struct FlashCase {
     uint32_t queries, keys, heads, head_dim;
@@ -191,5 +191,5 @@ TEST(kernel_flash_attention, gives_the_same_bits_in_bands)
     EXPECT_EQ(banded.values, k.read(out).values);
 }
 
-} // namespace
+} // namespace kernel_flash_attention_test
 } // namespace semrover

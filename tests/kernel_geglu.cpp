@@ -5,7 +5,7 @@
 #include <cmath>
 
 namespace semrover {
-namespace {
+namespace kernel_geglu_test {
 
 double gelu_exact(double v)
 {
@@ -53,5 +53,5 @@ TEST(kernel_geglu, runs_in_the_epilogue_of_a_gemm)
         }
 }
 
-} // namespace
+} // namespace kernel_geglu_test
 } // namespace semrover

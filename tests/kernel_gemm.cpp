@@ -5,7 +5,7 @@
 #include <cmath>
 
 namespace semrover {
-namespace {
+namespace kernel_gemm_test {
 
 struct GemmCase {
     uint32_t rows, cols, depth, groups;
@@ -101,5 +101,5 @@ TEST(kernel_gemm, gives_a_row_the_same_bits_wherever_it_stands)
     }
 }
 
-} // namespace
+} // namespace kernel_gemm_test
 } // namespace semrover

@@ -5,7 +5,7 @@
 #include <cmath>
 
 namespace semrover {
-namespace {
+namespace kernel_group_norm_test {
 
 struct NormCase {
     uint32_t batch, height, width, channels, channels2, groups;
@@ -126,5 +126,5 @@ TEST(kernel_group_norm, takes_statistics_from_the_producer)
     }
 }
 
-} // namespace
+} // namespace kernel_group_norm_test
 } // namespace semrover

@@ -5,7 +5,7 @@
 #include <cmath>
 
 namespace semrover {
-namespace {
+namespace kernel_head_rms_norm_test {
 
 struct HeadCase {
     uint32_t rows, heads, head_dim, groups;
@@ -55,5 +55,5 @@ TEST(kernel_head_rms_norm, keeps_a_head_of_zeros_finite)
         EXPECT_EQ(v, 0.f);
 }
 
-} // namespace
+} // namespace kernel_head_rms_norm_test
 } // namespace semrover

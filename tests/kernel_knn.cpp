@@ -7,7 +7,7 @@
 #include <numeric>
 
 namespace semrover {
-namespace {
+namespace kernel_knn_test {
 
 struct KnnCase {
     uint32_t points, neighbors, width;
@@ -156,5 +156,5 @@ TEST(kernel_knn, points_that_are_not_finite_have_no_neighbours_and_are_none)
     EXPECT_EQ(std::vector<uint32_t>(got.begin() + 24, got.begin() + 27), (std::vector<uint32_t>{8, 6, 10}));
 }
 
-} // namespace
+} // namespace kernel_knn_test
 } // namespace semrover

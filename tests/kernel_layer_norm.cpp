@@ -5,7 +5,7 @@
 #include <cmath>
 
 namespace semrover {
-namespace {
+namespace kernel_layer_norm_test {
 
 // one element; aligned; odd tails; rows longer than one sweep of a workgroup
 constexpr std::pair<uint32_t, uint32_t> kCases[] = {{1, 1}, {3, 64}, {25, 65}, {24, 320}, {7, 1287}, {131, 520}};
@@ -41,5 +41,5 @@ TEST(kernel_layer_norm, matches_two_passes_in_double)
         }
 }
 
-} // namespace
+} // namespace kernel_layer_norm_test
 } // namespace semrover

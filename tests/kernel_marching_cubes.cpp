@@ -11,7 +11,7 @@
 #include <set>
 
 namespace semrover {
-namespace {
+namespace kernel_marching_cubes_test {
 
 using Voxel = std::array<int, 3>;
 using Position = std::array<double, 3>;
@@ -369,5 +369,5 @@ TEST(kernel_marching_cubes, every_case_of_the_table_uses_each_crossed_edge_and_i
     }
 }
 
-} // namespace
+} // namespace kernel_marching_cubes_test
 } // namespace semrover

@@ -5,7 +5,7 @@
 #include <cmath>
 
 namespace semrover {
-namespace {
+namespace kernel_modulate_test {
 
 struct RowCase {
     uint32_t rows, cols, groups;
@@ -196,5 +196,5 @@ TEST(kernel_silu, matches_its_formula_in_double)
     for_every_case([](const RowCase& c, DType dtype) { check_activation(silu, silu_reference, c, dtype); });
 }
 
-} // namespace
+} // namespace kernel_modulate_test
 } // namespace semrover

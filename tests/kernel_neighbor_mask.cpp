@@ -3,7 +3,7 @@
 #include "tests/attention_sets.h"
 
 namespace semrover {
-namespace {
+namespace kernel_neighbor_mask_test {
 
 void check(const std::vector<CellSet>& sets, int32_t radius2)
 {
@@ -39,5 +39,5 @@ TEST(kernel_neighbor_mask, does_not_wrap_for_cells_that_are_far_apart)
     check({{{0, 0, 0}, {65536, 0, 0}, {0, -65536, 65536}, {2000000000, 0, 0}, {50000, 50000, 50000}}}, 9);
 }
 
-} // namespace
+} // namespace kernel_neighbor_mask_test
 } // namespace semrover

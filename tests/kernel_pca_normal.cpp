@@ -7,7 +7,7 @@
 #include <cmath>
 
 namespace semrover {
-namespace {
+namespace kernel_pca_normal_test {
 
 using Matrix = std::array<std::array<double, 3>, 3>;
 
@@ -176,5 +176,5 @@ TEST(kernel_pca_normal, labels_decide_what_is_a_line_between_the_two_ratios)
         ASSERT_EQ(y.normals[i * 4 + 3], i % 2 ? 1 : 0) << i;
 }
 
-} // namespace
+} // namespace kernel_pca_normal_test
 } // namespace semrover

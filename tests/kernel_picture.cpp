@@ -12,7 +12,7 @@
 #include <cmath>
 
 namespace semrover {
-namespace {
+namespace kernel_picture_test {
 
 constexpr PictureShape kShapes[] = {{1, 1, 8, 8}, {51, 38, 56, 40}, {64, 48, 64, 48}, {3, 130, 4, 132}};
 
@@ -195,5 +195,5 @@ TEST(kernel_picture, finds_the_first_number_that_is_none)
     }
 }
 
-} // namespace
+} // namespace kernel_picture_test
 } // namespace semrover

@@ -6,7 +6,7 @@
 #include <cmath>
 
 namespace semrover {
-namespace {
+namespace kernel_point_groups_test {
 
 struct PointCase {
     uint32_t sets, points, samples, neighbors;
@@ -147,5 +147,5 @@ TEST(kernel_point_groups, members_are_the_same_bits_in_bands_of_rows)
     EXPECT_EQ(results[0], results[1]);
 }
 
-} // namespace
+} // namespace kernel_point_groups_test
 } // namespace semrover

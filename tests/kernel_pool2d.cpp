@@ -6,7 +6,7 @@
 #include <cmath>
 
 namespace semrover {
-namespace {
+namespace kernel_pool2d_test {
 
 struct PoolCase {
     uint32_t batch, height, width, channels;
@@ -100,5 +100,5 @@ TEST(kernel_pool2d, gives_the_same_bits_in_bands_of_rows)
     EXPECT_EQ(results[0], results[1]);
 }
 
-} // namespace
+} // namespace kernel_pool2d_test
 } // namespace semrover

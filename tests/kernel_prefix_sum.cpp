@@ -4,7 +4,7 @@
 #include "tests/kernel_case.h"
 
 namespace semrover {
-namespace {
+namespace kernel_prefix_sum_test {
 
 struct PrefixSumCase {
     uint32_t size, present; // elements; those that the count on the device admits
@@ -53,5 +53,5 @@ TEST(kernel_prefix_sum, says_when_the_total_does_not_fit)
     EXPECT_EQ(k.read_array<uint32_t>(total)[0], 0xffffffffu);
 }
 
-} // namespace
+} // namespace kernel_prefix_sum_test
 } // namespace semrover

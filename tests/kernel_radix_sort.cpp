@@ -8,7 +8,7 @@
 #include <numeric>
 
 namespace semrover {
-namespace {
+namespace kernel_radix_sort_test {
 
 struct SortCase {
     uint32_t size, present, bits, below; // pairs; those that the count admits; bits compared; keys lie below this
@@ -68,5 +68,5 @@ TEST(kernel_radix_sort, matches_a_stable_sort_on_the_host)
         check(c);
 }
 
-} // namespace
+} // namespace kernel_radix_sort_test
 } // namespace semrover

@@ -3,7 +3,7 @@
 #include "tests/kernel_case.h"
 
 namespace semrover {
-namespace {
+namespace kernel_relu_test {
 
 TEST(kernel_relu, cuts_at_zero_and_leaves_the_padding_zero)
 {
@@ -38,5 +38,5 @@ TEST(kernel_relu, runs_in_the_epilogue_of_a_gemm)
     }
 }
 
-} // namespace
+} // namespace kernel_relu_test
 } // namespace semrover

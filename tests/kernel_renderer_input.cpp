@@ -5,7 +5,7 @@
 #include "tests/kernel_case.h"
 
 namespace semrover {
-namespace {
+namespace kernel_renderer_input_test {
 
 struct Case {
     uint32_t rows, channels, halves;
@@ -65,5 +65,5 @@ TEST(kernel_renderer_input, joins_state_frame_before_buffer_and_visibility_and_h
             check(c, dtype);
 }
 
-} // namespace
+} // namespace kernel_renderer_input_test
 } // namespace semrover

@@ -6,7 +6,7 @@
 #include <cmath>
 
 namespace semrover {
-namespace {
+namespace kernel_resize_bilinear_test {
 
 struct ResizeCase {
     uint32_t images, height, width, out_height, out_width;
@@ -69,5 +69,5 @@ TEST(kernel_resize_bilinear, matches_interpolation_in_double)
             check(c, dtype);
 }
 
-} // namespace
+} // namespace kernel_resize_bilinear_test
 } // namespace semrover

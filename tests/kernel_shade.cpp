@@ -8,7 +8,7 @@
 #include <cmath>
 
 namespace semrover {
-namespace {
+namespace kernel_shade_test {
 
 constexpr uint32_t kWidth = 45, kHeight = 37; // odd on purpose
 constexpr double kPi = 3.14159265358979323846;
@@ -143,5 +143,5 @@ TEST(kernel_shade, more_samples_leave_depth_and_labels_as_they_are)
     }
 }
 
-} // namespace
+} // namespace kernel_shade_test
 } // namespace semrover

@@ -3,7 +3,7 @@
 #include "tests/splat_case.h"
 
 namespace semrover {
-namespace {
+namespace kernel_splat_test {
 
 struct SplatCase {
     uint32_t splats, width, height, cameras;
@@ -180,5 +180,5 @@ TEST(kernel_splat, what_did_not_fit_is_counted)
     EXPECT_EQ(few_splats.visible, whole.visible);
 }
 
-} // namespace
+} // namespace kernel_splat_test
 } // namespace semrover

@@ -3,7 +3,7 @@
 #include "tests/splat_case.h"
 
 namespace semrover {
-namespace {
+namespace kernel_splat_lens_test {
 
 constexpr std::array<double, 12> kStraight = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
 
@@ -351,5 +351,5 @@ TEST(kernel_splat_lens, a_splat_seen_edge_on_is_a_dot)
     EXPECT_EQ(got.color[(32 * 65 + 36) * 4 + 3], 0);
 }
 
-} // namespace
+} // namespace kernel_splat_lens_test
 } // namespace semrover

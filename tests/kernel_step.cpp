@@ -9,7 +9,7 @@
 #include <cmath>
 
 namespace semrover {
-namespace {
+namespace kernel_step_test {
 
 constexpr uint64_t kSeed = 0x123456789abcdef0;
 
@@ -300,5 +300,5 @@ TEST(kernel_step_update, follows_the_formula_in_double_with_guidance_known_token
         check(u);
 }
 
-} // namespace
+} // namespace kernel_step_test
 } // namespace semrover

@@ -10,7 +10,7 @@
 #include <set>
 
 namespace semrover {
-namespace {
+namespace kernel_surface_test {
 
 constexpr uint32_t kNone = 0xffffffff;
 constexpr uint32_t kWholeBlock = 8u << 12 | 8u << 16 | 8u << 20;
@@ -543,5 +543,5 @@ TEST(kernel_surface, surface_distance_matches_all_triangles_in_double)
     }
 }
 
-} // namespace
+} // namespace kernel_surface_test
 } // namespace semrover

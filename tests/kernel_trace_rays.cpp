@@ -8,7 +8,7 @@
 #include <cmath>
 
 namespace semrover {
-namespace {
+namespace kernel_trace_rays_test {
 
 using Vec = std::array<double, 3>;
 
@@ -200,5 +200,5 @@ TEST(kernel_trace_rays, an_empty_scene_is_missed)
             ASSERT_EQ(hit[3], ~0u);
 }
 
-} // namespace
+} // namespace kernel_trace_rays_test
 } // namespace semrover

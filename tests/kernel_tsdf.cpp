@@ -9,7 +9,7 @@
 #include <set>
 
 namespace semrover {
-namespace {
+namespace kernel_tsdf_test {
 
 using Vec = std::array<double, 3>;
 
@@ -482,5 +482,5 @@ TEST(kernel_tsdf, a_counter_stops_at_65535)
     }
 }
 
-} // namespace
+} // namespace kernel_tsdf_test
 } // namespace semrover

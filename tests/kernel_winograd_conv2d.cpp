@@ -5,7 +5,7 @@
 #include <cmath>
 
 namespace semrover {
-namespace {
+namespace kernel_winograd_conv2d_test {
 
 struct WinogradCase {
     uint32_t batch, height, width, channels, outputs;
@@ -120,5 +120,5 @@ TEST(kernel_winograd_conv2d, does_large_images_in_bands_of_tiles)
     check(c, r, DType::f16, 997);
 }
 
-} // namespace
+} // namespace kernel_winograd_conv2d_test
 } // namespace semrover

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 namespace semrover {
-namespace {
+namespace reflect_protocol_test {
 
 struct Declarations {
     std::string constants = {}, push = "uint rows;", y = "writeonly buffer Y { uint y[]; }";
@@ -16,8 +16,7 @@ std::string shader(const Declarations& d)
 {
     return "#version 460\nlayout(local_size_x = 64) in;\n" + d.constants + "\nlayout(push_constant) uniform Push { " +
            d.push + " } p;\nlayout(binding = 0) readonly buffer X { uint x[]; };\nlayout(binding = 1) " + d.y +
-           ";\nvoid main() { " + (d.y.starts_with("readonly") ? "uint v = x[0] + y[0];" : "y[0] = x[0];") +
-           " }\n";
+           ";\nvoid main() { " + (d.y.starts_with("readonly") ? "uint v = x[0] + y[0];" : "y[0] = x[0];") + " }\n";
 }
 
 // what the reflector says of an op of these variants; empty: it took them
@@ -90,5 +89,5 @@ TEST(Protocol, variants_of_an_op_declare_the_same)
                      "variant simt: constant kTileM has id 1, in the first variant 0"));
 }
 
-} // namespace
+} // namespace reflect_protocol_test
 } // namespace semrover

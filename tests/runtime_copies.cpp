@@ -8,7 +8,7 @@
 #include <numeric>
 
 namespace semrover {
-namespace {
+namespace runtime_copies_test {
 
 constexpr uint32_t kSize = 5000;
 
@@ -145,5 +145,5 @@ TEST(runtime_copies, a_ring_takes_the_memory_that_was_planned)
     EXPECT_EQ(device.allocated_bytes() - before, ReadbackRing::planned_bytes(device.limits(), 12345, 4));
 }
 
-} // namespace
+} // namespace runtime_copies_test
 } // namespace semrover

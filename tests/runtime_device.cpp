@@ -16,7 +16,7 @@
 #include <nlohmann/json.hpp>
 
 namespace semrover {
-namespace {
+namespace runtime_device_test {
 
 using Bytes = std::vector<std::byte>;
 
@@ -356,5 +356,5 @@ TEST(runtime_device, refuses_a_host_device_that_lacks_something)
     EXPECT_EQ(vulkan.messages, 0);
 }
 
-} // namespace
+} // namespace runtime_device_test
 } // namespace semrover

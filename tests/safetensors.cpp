@@ -11,7 +11,7 @@
 #include <limits>
 
 namespace semrover {
-namespace {
+namespace safetensors_test {
 
 template <typename T>
 std::span<const std::byte> bytes_of(const std::vector<T>& values)
@@ -143,5 +143,5 @@ TEST(FirstNonFinite, nan_and_infinity_are_found_in_every_float_type)
     EXPECT_EQ(first_non_finite(bytes_of(std::vector<uint32_t>{0xffffffff}), DType::u32), std::nullopt);
 }
 
-} // namespace
+} // namespace safetensors_test
 } // namespace semrover

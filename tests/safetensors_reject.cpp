@@ -11,7 +11,7 @@
 #include <random>
 
 namespace semrover {
-namespace {
+namespace safetensors_reject_test {
 
 struct Case {
     const char* name;
@@ -262,5 +262,5 @@ TEST(SafetensorsReject, a_file_cut_at_any_byte_or_with_any_byte_changed_never_cr
     }
 }
 
-} // namespace
+} // namespace safetensors_reject_test
 } // namespace semrover

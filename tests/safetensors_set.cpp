@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 namespace semrover {
-namespace {
+namespace safetensors_set_test {
 
 constexpr const char* kIndexName = "m.safetensors.index.json";
 
@@ -148,5 +148,5 @@ TEST(SafetensorsSet, the_default_model_is_finite_and_a_nan_is_found)
     EXPECT_TRUE(says(check_finite(*bad), "tensor 'w' holds NaN or infinity, first at element 1 of 2"));
 }
 
-} // namespace
+} // namespace safetensors_set_test
 } // namespace semrover

@@ -10,5 +10,6 @@ int main(int argc, char** argv)
 {
     semrover::set_diagnostic_callback([](void*, const char* line) { std::fprintf(stderr, "%s\n", line); });
     testing::InitGoogleTest(&argc, argv);
-    return RUN_ALL_TESTS();
+    const int result = RUN_ALL_TESTS();
+    return testing::UnitTest::GetInstance()->test_to_run_count() ? result : 1; // a filter that names nothing
 }
