@@ -86,6 +86,17 @@ class JobRefinement : public testing::Test {
             *figures = *finished;
         return steps;
     }
+    // steps of one submit, one after the other, until both have finished
+    void take_turns(Job& a, Job& b)
+    {
+        for (bool a_done = false, b_done = false; !a_done || !b_done;) {
+            if (!a_done)
+                a_done = *a.step(JobBudget::one_submit());
+            if (!b_done)
+                b_done = *b.step(JobBudget::one_submit());
+        }
+        EXPECT_TRUE(a.finish() && b.finish());
+    }
     std::map<std::string, std::string> results(std::string_view output) const
     {
         return files_in(folder_ / output, {"frames", "latents"});
@@ -134,13 +145,7 @@ TEST_F(JobRefinement, refinements_take_turns_on_one_device_and_do_not_know_of_ea
     RefinementOptions other_again = other;
     other_again.output = folder_ / "b";
     const auto a = begin(options("a")), b = begin(other_again);
-    for (bool a_done = false, b_done = false; !a_done || !b_done;) {
-        if (!a_done)
-            a_done = *a->step(JobBudget::one_submit());
-        if (!b_done)
-            b_done = *b->step(JobBudget::one_submit());
-    }
-    ASSERT_TRUE(a->finish() && b->finish());
+    take_turns(*a, *b);
     EXPECT_TRUE(first == results("a"));
     EXPECT_TRUE(second == results("b"));
 }
@@ -169,13 +174,7 @@ TEST_F(JobRefinement, a_generation_takes_turns_with_it_on_one_device)
     ASSERT_GT(generation_steps, kFrames * (kSteps + 3)); // so that the turns reach every step of the refinement
     const auto a = begin_to("turns.sgrid");
     const auto b = begin(options_of_grid("turns"));
-    for (bool a_done = false, b_done = false; !a_done || !b_done;) {
-        if (!a_done)
-            a_done = *a->step(JobBudget::one_submit());
-        if (!b_done)
-            b_done = *b->step(JobBudget::one_submit());
-    }
-    ASSERT_TRUE(a->finish() && b->finish());
+    take_turns(*a, *b);
     EXPECT_EQ(contents(folder_ / "alone.sgrid"), contents(folder_ / "turns.sgrid"));
     EXPECT_TRUE(expected == results("turns"));
 }

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/format/gltf_document.h"
 
+#include "runtime/base/json_fields.h"
 #include "runtime/base/quote.h"
 
 #include <algorithm>
@@ -159,13 +160,6 @@ const Json* GltfDocument::entry(const char* list, const Json& index) const
     return &(*found)[index.get<size_t>()];
 }
 
-Status GltfDocument::check_array(const Json& value, const char* key) const
-{
-    if (value.is_array())
-        return {};
-    return fail(ErrorCode::bad_input, "{}: {}: expected an array, found {}", where_, key, value.type_name());
-}
-
 Status GltfDocument::walk(const Json& index, const std::array<double, 16>& parent, size_t depth, size_t& visits,
                           std::vector<GltfInstance>& out) const
 {
@@ -190,7 +184,7 @@ Status GltfDocument::walk(const Json& index, const std::array<double, 16>& paren
         out.push_back({mesh->get<uint64_t>(), m});
     }
     if (const auto children = node->find("children"); children != node->end()) {
-        SR_CHECK(check_array(*children, "children"));
+        SR_CHECK(check_array(*children, "children", where_));
         for (const Json& child : *children)
             SR_CHECK(walk(child, m, depth + 1, visits, out));
     }
@@ -205,7 +199,7 @@ Result<std::vector<GltfInstance>> GltfDocument::instances() const
     std::vector<GltfInstance> out;
     size_t visits = 0;
     if (scene && scene->contains("nodes")) {
-        SR_CHECK(check_array((*scene)["nodes"], "nodes"));
+        SR_CHECK(check_array((*scene)["nodes"], "nodes", where_));
         for (const Json& node : (*scene)["nodes"])
             SR_CHECK(walk(node, kIdentity, 0, visits, out));
         return out;
@@ -213,7 +207,7 @@ Result<std::vector<GltfInstance>> GltfDocument::instances() const
     // without a scene, meshes where they are
     const auto meshes = json_.find("meshes");
     if (meshes != json_.end())
-        SR_CHECK(check_array(*meshes, "meshes"));
+        SR_CHECK(check_array(*meshes, "meshes", where_));
     for (uint64_t i = 0; meshes != json_.end() && i < std::min(meshes->size(), kMaxInstances); ++i)
         out.push_back({i, kIdentity});
     return out;

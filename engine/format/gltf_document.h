@@ -39,7 +39,6 @@ class GltfDocument {
                         std::string_view name) const;
 
   private:
-    Status check_array(const Json& value, const char* key) const;
     Status walk(const Json& node, const std::array<double, 16>& parent, size_t depth, size_t& visits,
                 std::vector<GltfInstance>& out) const;
     Result<std::span<const std::byte>> view(const Json& accessor, uint64_t& stride, std::string_view name) const;

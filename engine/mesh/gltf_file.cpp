@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/mesh/gltf_file.h"
 
+#include "runtime/base/json_fields.h"
 #include "runtime/base/quote.h"
 
 #include <algorithm>
@@ -188,8 +189,7 @@ Result<size_t> GltfFile::count(const char* array) const
     const auto found = json_.find(array);
     if (found == json_.end())
         return 0;
-    if (!found->is_array())
-        return fail(ErrorCode::bad_input, "{}: {}: expected an array, found {}", where_, array, found->type_name());
+    SR_CHECK(check_array(*found, array, where_));
     return found->size();
 }
 

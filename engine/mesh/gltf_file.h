@@ -33,8 +33,8 @@ class GltfFile {
 
     // entry `index` of a top-level array, an object
     Result<const Json*> entry(const char* array, int64_t index) const;
-    Result<size_t>
-    count(const char* array) const; // of its entries; 0 when it is absent, bad_input for what is no array
+    // of its entries; 0 when it is absent, bad_input for what is no array
+    Result<size_t> count(const char* array) const;
 
     // a member of an object that is a whole number, none when it is absent
     Result<std::optional<int64_t>> integer(const Json& object, const char* key) const;

@@ -4,6 +4,7 @@
 #include "engine/mesh/gltf_file.h"
 #include "engine/mesh/mesh_readers.h"
 #include "engine/scene/srgb.h"
+#include "runtime/base/json_fields.h"
 #include "runtime/base/json_numbers.h"
 #include "runtime/base/quote.h"
 
@@ -191,8 +192,7 @@ Result<std::vector<int64_t>> GltfReader::indices_in(const Json& object, const ch
     const auto list = object.find(key);
     if (list == object.end())
         return out;
-    if (!list->is_array())
-        return fail(ErrorCode::bad_input, "{}: {}: expected an array, found {}", where_, key, list->type_name());
+    SR_CHECK(check_array(*list, key, where_));
     for (const Json& value : *list) {
         if (!value.is_number_integer() || value < 0)
             return fail(ErrorCode::bad_input, "{}: {}: expected a list of numbers", where_, key);

@@ -3,6 +3,7 @@
 #include "engine/scene/edit_script.h"
 
 #include "engine/scene/palette.h"
+#include "runtime/base/json_fields.h"
 #include "runtime/base/json_numbers.h"
 #include "runtime/base/quote.h"
 
@@ -93,21 +94,14 @@ Result<std::optional<std::array<double, 3>>> point_of(const Json& json, const ch
     return std::optional(p);
 }
 
-Status check_keys(const Json& json, std::string_view where)
-{
-    constexpr std::array<std::string_view, 12> kKeys = {"op",   "class", "box", "sphere", "object", "label",
-                                                        "fill", "stamp", "at",  "by",     "rotate", "points"};
-    for (const auto& [key, value] : json.items())
-        if (std::ranges::find(kKeys, key) == kKeys.end())
-            return fail(ErrorCode::bad_input, "{}: unknown key {}", where, quote(key));
-    return {};
-}
+constexpr std::array<std::string_view, 12> kKeys = {"op",   "class", "box", "sphere", "object", "label",
+                                                    "fill", "stamp", "at",  "by",     "rotate", "points"};
 
 Result<EditOperation> parse_operation(const Json& json, const Path& folder, std::string_view where)
 {
     if (!json.is_object())
         return fail(ErrorCode::bad_input, "{}: expected an object, found {}", where, json.type_name());
-    SR_CHECK(check_keys(json, where));
+    SR_CHECK(check_keys(json, kKeys, where));
     EditOperation o;
     SR_TRY(const std::string name, text_of(json, "op", where));
     const auto kind = std::ranges::find(kKinds, name, operation_name);

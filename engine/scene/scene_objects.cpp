@@ -3,6 +3,7 @@
 #include "engine/scene/scene_objects.h"
 
 #include "engine/scene/palette.h"
+#include "runtime/base/json_fields.h"
 #include "runtime/base/json_numbers.h"
 #include "runtime/base/quote.h"
 
@@ -17,15 +18,9 @@ namespace {
 using Triple = std::array<double, 3>;
 
 constexpr const char* kFormat = "semrover.objects";
+constexpr std::array<std::string_view, 4> kFileKeys = {"format", "version", "objects", "comment"};
+constexpr std::array<std::string_view, 7> kObjectKeys = {"id", "class", "center", "size", "heading", "tint", "comment"};
 constexpr double kFarthest = 1e6, kLongest = 1e4, kLargestAngle = 1e3;
-
-Status check_object_keys(const Json& json, std::initializer_list<std::string_view> keys, std::string_view where)
-{
-    for (const auto& [key, value] : json.items())
-        if (std::ranges::find(keys, key) == keys.end())
-            return fail(ErrorCode::bad_input, "{}: unknown key {}", where, quote(key));
-    return {};
-}
 
 Result<double> number_within(const Json& json, double low, double high, std::string_view where)
 {
@@ -87,7 +82,7 @@ Result<SceneObject> parse_object(const Json& json, std::string_view where)
 {
     if (!json.is_object())
         return fail(ErrorCode::bad_input, "{}: expected an object, found {}", where, json.type_name());
-    SR_CHECK(check_object_keys(json, {"id", "class", "center", "size", "heading", "tint", "comment"}, where));
+    SR_CHECK(check_keys(json, kObjectKeys, where));
     SceneObject o;
     const auto id = json.find("id");
     if (id == json.end() || !id->is_number_unsigned() || id->get<uint64_t>() > UINT32_MAX)
@@ -133,7 +128,7 @@ Result<std::vector<SceneObject>> parse_objects(const Json& json, std::string_vie
     if (json.value("version", Json()) != 1)
         return fail(ErrorCode::bad_input, "{}: version: expected 1, found {}", where,
                     json.value("version", Json()).dump());
-    SR_CHECK(check_object_keys(json, {"format", "version", "objects", "comment"}, where));
+    SR_CHECK(check_keys(json, kFileKeys, where));
     const auto list = json.find("objects");
     if (list == json.end() || !list->is_array() || list->size() > kMaxObjects)
         return fail(ErrorCode::bad_input, "{}: objects: expected an array of at most {}", where, kMaxObjects);

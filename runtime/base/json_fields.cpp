@@ -123,4 +123,19 @@ Status JsonFields::finish(std::vector<std::string>& warnings) const
     return {};
 }
 
+Status check_keys(const Json& object, std::span<const std::string_view> known, std::string_view where)
+{
+    for (const auto& [key, value] : object.items())
+        if (std::ranges::find(known, key) == known.end())
+            return fail(ErrorCode::bad_input, "{}: unknown key {}", where, quote(key));
+    return {};
+}
+
+Status check_array(const Json& value, std::string_view key, std::string_view where)
+{
+    if (value.is_array())
+        return {};
+    return fail(ErrorCode::bad_input, "{}: {}: expected an array, found {}", where, key, value.type_name());
+}
+
 } // namespace semrover

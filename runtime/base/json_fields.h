@@ -8,6 +8,7 @@
 #include <initializer_list>
 #include <optional>
 #include <set>
+#include <span>
 #include <vector>
 
 namespace semrover {
@@ -118,5 +119,9 @@ class JsonFields {
     std::set<std::string, std::less<>> seen_;
     std::optional<Error> error_;
 };
+
+// of what is read by hand; bad_input with `where` in front
+Status check_keys(const Json& object, std::span<const std::string_view> known, std::string_view where);
+Status check_array(const Json& value, std::string_view key, std::string_view where);
 
 } // namespace semrover
