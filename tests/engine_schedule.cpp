@@ -102,6 +102,14 @@ TEST(Schedule, TimestepsRoundAsNumpyDoes)
     EXPECT_EQ(halves[1], 937); // 937.5 - 1, to even before the 1 is taken
     EXPECT_EQ(halves[3], 811); // 812.5
     EXPECT_EQ(spaced(Sampler::ddpm, TimestepSpacing::trailing, 1000).back(), 0);
+    for (Sampler sampler : {Sampler::ddpm, Sampler::ddim, Sampler::dpmpp_2m})
+        EXPECT_EQ(spaced(sampler, TimestepSpacing::quadratic, 4), (List{999, 561, 249, 61})); // 562.5 to even, less 1
+    for (int steps = 1; steps <= 1000; ++steps) {
+        const List quadratic = spaced(Sampler::ddpm, TimestepSpacing::quadratic, steps);
+        EXPECT_EQ(quadratic.front(), 999);
+        EXPECT_GE(quadratic.back(), 0);
+        EXPECT_EQ(std::ranges::adjacent_find(quadratic, std::less_equal<>()), quadratic.end()) << steps;
+    }
     for (int steps = 1; steps <= 1000; ++steps)
         EXPECT_EQ(spaced(Sampler::ddim, TimestepSpacing::trailing, steps).size(), size_t(steps));
 }
@@ -110,7 +118,8 @@ TEST(Schedule, ANetworkThatKnowsTheAnswerIsFollowedToItByEverySamplerAndPredicti
 {
     const double answer = 0.37;
     for (Sampler sampler : {Sampler::ddpm, Sampler::ddim, Sampler::dpmpp_2m, Sampler::euler})
-        for (TimestepSpacing spacing : {TimestepSpacing::leading, TimestepSpacing::trailing, TimestepSpacing::linspace})
+        for (TimestepSpacing spacing : {TimestepSpacing::leading, TimestepSpacing::trailing, TimestepSpacing::linspace,
+                                        TimestepSpacing::quadratic})
             for (int steps : {1, 2, 10, 20}) {
                 std::vector<double> ends;
                 for (Prediction prediction : {Prediction::sample, Prediction::epsilon, Prediction::v_prediction}) {

@@ -5,6 +5,7 @@
 #include "engine/job/outputs.h"
 #include "engine/scene/edit_script.h"
 #include "engine/scene/edit_undo.h"
+#include "engine/scene/scene_objects.h"
 #include "tools/generation_options.h"
 
 #include <CLI/CLI.hpp>
@@ -74,6 +75,8 @@ constexpr OrderedOption kOperations[] = {
      [](A& o, Text& t, Name n) { add(o, Kind::erase).where.label = class_or_all(t, n); }},
     {"--paint", "class that the selected cells get",
      [](A& o, Text& t, Name n) { add(o, Kind::paint).label = parsed(parse_class(t), n); }},
+    {"--tint", "#rrggbb: the colour of the objects that most of the selected cells belong to",
+     [](A& o, Text& t, Name n) { add(o, Kind::tint).color = parsed(parse_tint(t, n), n); }},
     {"--insert", "stamp (.sgrid) that is set --at x,y,z", [](A& o, Text& t, Name) { add(o, Kind::insert).stamp = t; }},
     {"--copy", "the selected cells once more, moved --by x,y,z", [](A& o, Text&, Name) { add(o, Kind::copy); }, kFlag},
     {"--move", "the same, and they are removed where they were", [](A& o, Text&, Name) { add(o, Kind::move); }, kFlag},
@@ -148,13 +151,14 @@ Status edit(const EditArguments& o, const Globals& globals)
     if (o.cut)
         return cut(o, globals);
     if (o.edit.operations.empty())
-        return fail(ErrorCode::usage, "no operation given (--remove, --delete, --paint, --insert, --copy, --move, "
-                                      "--script; or --cut, --undo)");
+        return fail(ErrorCode::usage, "no operation given (--remove, --delete, --paint, --tint, --insert, --copy, "
+                                      "--move, --script; or --cut, --undo)");
     EditRequest request = o.edit;
     request.grid = o.grid;
     request.generates = !o.out.generation.options.model.empty();
     SR_CHECK(check_edit(request));
     SR_CHECK(check_outputs(o.grid, o.out, globals));
+    SR_TRY(request.objects, objects_of(o.grid, o.out));
     SR_TRY(Regeneration what, edit_grid(request));
     return regenerate(std::move(what), o.out, globals);
 }

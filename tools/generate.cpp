@@ -16,7 +16,7 @@ namespace semrover {
 namespace {
 
 struct GenerateArguments {
-    std::string grid, output, objects = "none";
+    std::string grid, output, objects = "auto";
     uint64_t seed = 0;
     GenerationArguments generation;
     PlyExports ply;
@@ -28,13 +28,12 @@ Status generate_along(const GenerateArguments& o, const Globals& globals)
 {
     if (o.ply.any())
         return fail(ErrorCode::usage, "--ply and its like have no meaning with --along: convert what it writes");
-    if (o.objects != "none")
-        return fail(ErrorCode::usage, "--objects and --along do not go together");
     GrowthRequest request = o.along;
     request.generation = o.generation.options;
     request.scaffold = o.grid;
     request.output = o.output;
     request.seed = o.seed;
+    SR_TRY(request.objects, given_objects(o.objects));
     request.replace = globals.yes;
     SR_TRY(GrowthPlan plan, plan_growth(request, !o.generation.dry_run));
     return run_on_device(
@@ -52,9 +51,7 @@ Status generate(const GenerateArguments& o, const Globals& globals)
     if (!o.generation.dry_run)
         SR_CHECK(check_generation_outputs(request));
     SR_TRY(request.settings, resolve_generation(o.generation.options));
-    if (o.objects != "none") {
-        SR_TRY(request.objects, read_objects(o.objects));
-    }
+    SR_TRY(request.objects, given_objects(o.objects));
     SR_TRY(VoxelGrid grid, load_grid(o.grid, o.input, globals));
     // what another program's file became depends on options and on other files
     if (o.input.from.empty() && Path(o.grid).extension() == ".sgrid") {
@@ -80,7 +77,10 @@ void add_generate(CLI::App& app, const Globals& globals, Run& run)
     c->add_option("-m,--model", o->generation.options.model, "model folder")->required();
     c->add_option("-o,--output", o->output, ".sgrid to write; OUTPUT.run beside it keeps the run's state");
     c->add_option("-s,--seed", o->seed, "noise seed");
-    c->add_option("--objects", o->objects, "objects.json: boxes and colours that the model is told of; or none");
+    c->add_option(
+        "--objects", o->objects,
+        "boxes and colours that the model is told of: objects.json, auto (guessed from the labels and the seed) "
+        "or none; they are written beside OUTPUT");
     add_generation_options(*c, o->generation);
     add_choice(*c, "--strategy", {"complete", "paper"},
                "complete, or paper (Algorithm 1 as printed: may leave cells empty)", [o](const std::string& text) {

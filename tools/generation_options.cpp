@@ -45,6 +45,25 @@ void report(const Json& results, const Globals& globals)
 
 } // namespace
 
+Result<GivenObjects> given_objects(const std::string& option)
+{
+    if (option == "auto")
+        return GivenObjects();
+    if (option == "none")
+        return GivenObjects(std::in_place);
+    return read_objects(option).map(
+        [](std::vector<SceneObject>&& objects) { return GivenObjects(std::move(objects)); });
+}
+
+Result<GivenObjects> objects_of(const Path& grid, const RegenerationArguments& o)
+{
+    std::error_code ignored;
+    const Path beside = objects_beside(grid);
+    if (!o.objects.empty())
+        return given_objects(o.objects);
+    return given_objects(std::filesystem::exists(beside, ignored) ? beside.string() : "auto");
+}
+
 void add_generation_options(CLI::App& c, GenerationArguments& a)
 {
     GenerationOptions& o = a.options;
@@ -84,6 +103,10 @@ void add_regeneration_options(CLI::App& c, RegenerationArguments& o)
 {
     c.add_option("-m,--model", o.generation.options.model, "model folder");
     c.add_option("-o,--output", o.output, "what to write; OUTPUT.undo beside it takes it back");
+    c.add_option(
+        "--objects", o.objects,
+        "boxes and colours that the model is told of: objects.json, auto (guessed from the labels and the seed) "
+        "or none; by default the file beside GRID, or else auto");
     c.add_option("-s,--seed", o.seed, "noise seed");
     c.add_option("--seeds", o.seeds, "several seeds, such as 1,2,3: writes OUTPUT-seedN.sgrid for each")
         ->delimiter(',');

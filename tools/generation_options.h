@@ -13,6 +13,9 @@ struct GenerationArguments {
     std::string profile;
     bool dry_run = false;
 };
+// boxes and colours that a model is told of: a file, "auto" (guessed of labels) or "none"
+Result<GivenObjects> given_objects(const std::string& option);
+
 void add_generation_options(CLI::App& command, GenerationArguments& o);
 
 // The end of each of them: opens the device and runs the job to its end, or, for --dry-run, says what it would take;
@@ -24,7 +27,7 @@ Status run_on_device(const GenerationArguments& o, const Globals& globals, const
 
 // what edit and inpaint share
 struct RegenerationArguments {
-    std::string output;
+    std::string output, objects; // objects: empty: the file beside the grid, else auto
     std::vector<uint64_t> seeds;
     std::optional<uint64_t> seed;
     GenerationArguments generation; // an empty model: targets are left without points
@@ -33,6 +36,7 @@ void add_regeneration_options(CLI::App& command, RegenerationArguments& o);
 
 // before any work: what cannot be written, and options that exclude each other
 Status check_outputs(const Path& input, const RegenerationArguments& o, const Globals& globals);
+Result<GivenObjects> objects_of(const Path& grid, const RegenerationArguments& o);
 Status regenerate(Regeneration what, const RegenerationArguments& o, const Globals& globals);
 
 } // namespace semrover

@@ -26,7 +26,7 @@ Status parse_into(std::optional<T>& value, const std::string& text, Parse parse)
 
 Status inpaint(const InpaintArguments& o, const Globals& globals)
 {
-    InpaintRequest request{.grid = o.grid, .where = {}, .mask = o.mask};
+    InpaintRequest request{.grid = o.grid, .where = {}, .mask = o.mask, .objects = {}};
     SR_CHECK(parse_into(request.where.label, o.label, parse_class));
     SR_CHECK(parse_into(request.where.box, o.box, parse_box));
     SR_CHECK(parse_into(request.where.sphere, o.sphere, parse_sphere));
@@ -34,6 +34,7 @@ Status inpaint(const InpaintArguments& o, const Globals& globals)
     if (!request.where.any() && o.mask.empty())
         return fail(ErrorCode::usage, "say which cells: --box, --sphere, --class, --object or --mask");
     SR_CHECK(check_outputs(o.grid, o.out, globals));
+    SR_TRY(request.objects, objects_of(o.grid, o.out));
     SR_TRY(Regeneration what, select_for_inpainting(request));
     return regenerate(std::move(what), o.out, globals);
 }

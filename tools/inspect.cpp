@@ -6,6 +6,7 @@
 #include "engine/model/ldm_names.h"
 #include "engine/model/renderer_model.h"
 #include "engine/scene/palette.h"
+#include "engine/scene/scene_objects.h"
 #include "engine/splat/bounds.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
@@ -246,6 +247,17 @@ Result<Report> describe_components(const Path& folder, const Json& index, bool w
     return components;
 }
 
+// with the number of an object's colours in place of these
+Report described_defaults(const Json& defaults)
+{
+    Report described = defaults;
+    if (described.is_object() && described.contains("objects") && described["objects"].is_object())
+        for (auto& [name, usual] : described["objects"].items())
+            if (usual.is_object() && usual.contains("tints"))
+                usual["tints"] = usual["tints"].size();
+    return described;
+}
+
 Result<Report> describe_folder(const Path& folder, bool with_tensors)
 {
     Totals totals;
@@ -257,7 +269,7 @@ Result<Report> describe_folder(const Path& folder, bool with_tensors)
                         quote_path(folder / "model_index.json"), index.type_name());
         report["class"] = index.value("_class_name", Json());
         if (index.contains("defaults"))
-            report["defaults"] = index["defaults"];
+            report["defaults"] = described_defaults(index["defaults"]);
         SR_TRY(report["components"], describe_components(folder, index, with_tensors, totals));
     } else if (is_there(folder / "config.json") || is_there(folder / "scheduler_config.json")) {
         SR_TRY(const Report component, describe_component(folder, with_tensors, totals));
@@ -301,6 +313,15 @@ Report describe_splats(const Path& path, const SceneInput& input)
     return report;
 }
 
+Report counted_by_class(const std::array<uint64_t, kClassCount>& counts)
+{
+    Report report = Report::object();
+    for (size_t i = 0; i < kClassCount; ++i)
+        if (counts[i])
+            report[std::string(kPalette[i].name)] = counts[i];
+    return report;
+}
+
 Report describe_grid(const Path& path, const SceneInput& input)
 {
     const VoxelGrid& grid = *input.grid;
@@ -309,19 +330,30 @@ Report describe_grid(const Path& path, const SceneInput& input)
     std::array<uint64_t, kClassCount> counts{};
     for (const uint8_t label : grid.labels)
         ++counts[label];
-    Report labels = Report::object();
-    for (size_t i = 0; i < kClassCount; ++i)
-        if (counts[i])
-            labels[std::string(kPalette[i].name)] = counts[i];
     Report report = {{"grid", path.string()}, {"cells", grid.cells.size()}};
     report["voxel_size"] = std::round(edge * 1e6) / 1e6; // metres; the float's own digits mean nothing
     report["points_per_voxel"] = grid.points_per_voxel;
     report["points"] = grid.points.size() / 3;
     report["generated"] = grid.generated.size() - static_cast<size_t>(std::ranges::count(grid.generated, 0));
     report["extent"] = {{"min_m", metres(bounds.low)}, {"max_m", metres(bounds.high)}};
-    report["labels"] = labels;
+    report["labels"] = counted_by_class(counts);
+    if (const Path objects = objects_beside(path); is_there(objects))
+        report["objects"] = objects.string();
     report["metadata"] = grid.metadata;
     add_input(report, input);
+    return report;
+}
+
+// boxes and colours by class
+Result<Report> describe_objects(const Path& path)
+{
+    SR_TRY(const std::vector<SceneObject> objects, read_objects(path));
+    std::array<uint64_t, kClassCount> counts{};
+    for (const SceneObject& o : objects)
+        ++counts[o.label];
+    Report report = {{"objects", path.string()}, {"count", objects.size()}};
+    report["tinted"] = std::ranges::count_if(objects, [](const SceneObject& o) { return o.tint.has_value(); });
+    report["classes"] = counted_by_class(counts);
     return report;
 }
 
@@ -336,6 +368,8 @@ Result<Report> describe(const Path& path, const SceneInputOptions& input, const 
     std::error_code ignored;
     if (std::filesystem::is_directory(path, ignored))
         return describe_folder(path, globals.verbose || globals.json);
+    if (path.extension() == ".json" && input.from.empty() && !path.string().ends_with(".index.json"))
+        return describe_objects(path);
     // a .bin without labels beside it is a pickle
     const bool pickle = path.extension() == ".bin" && !is_there(Path(path).replace_extension(".label"));
     if (!input.from.empty() || (has_scene_extension(path) && !pickle))
@@ -365,7 +399,10 @@ void add_inspect(CLI::App& app, const Globals& globals, Run& run)
         "inspect", "show the tensors and config of a model, or what is in a grid or a file of splats");
     const auto path = std::make_shared<std::string>();
     const auto input = std::make_shared<SceneInputOptions>();
-    command->add_option("FILE|DIR", *path, "a .safetensors file or index, a model's folder, or a scene in any format")
+    command
+        ->add_option("FILE|DIR", *path,
+                     "a .safetensors file or index, a model's folder, a scene in any format, or "
+                     "its objects (.json)")
         ->required();
     add_scene_input_options(*command, *input);
     command->callback([=, &globals, &run] { run = [=, &globals] { return inspect(*path, *input, globals); }; });

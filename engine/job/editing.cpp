@@ -3,6 +3,7 @@
 #include "engine/job/editing.h"
 
 #include "engine/job/version.h"
+#include "engine/scene/cell_objects.h"
 #include "engine/scene/cell_reach.h"
 #include "engine/scene/edit_script.h"
 #include "engine/scene/stamp.h"
@@ -41,6 +42,29 @@ std::vector<uint32_t> targets_of(const EditedGrid& edited, double halo)
     return targets;
 }
 
+// colours of the objects that the tints are for. The cells of these are targets; what lies around them is not.
+Status apply_tints(const EditedGrid& edited, std::vector<SceneObject>& objects, std::vector<uint32_t>& targets)
+{
+    for (const EditedGrid::Tint& tint : edited.tints) {
+        std::vector<uint32_t> cells;
+        for (const Cell& cell : tint.cells)
+            if (const auto found = find_cell(edited.grid, cell)) // a later operation may have removed it
+                cells.push_back(uint32_t(*found));
+        const std::vector<size_t> meant = objects_meant(edited.grid, objects, cells);
+        if (meant.empty())
+            return fail(ErrorCode::bad_input, "tint: the cells that are selected belong to no object");
+        const std::vector<int32_t> owners = objects_of_cells(edited.grid, objects);
+        for (const size_t o : meant)
+            objects[o].tint = tint.color;
+        for (uint32_t v = 0; v < owners.size(); ++v)
+            if (owners[v] != kNoObject && std::ranges::binary_search(meant, size_t(owners[v])))
+                targets.push_back(v);
+    }
+    std::ranges::sort(targets);
+    targets.erase(std::ranges::unique(targets).begin(), targets.end());
+    return {};
+}
+
 // the cells that a second grid has, too
 Status keep_masked(std::vector<uint32_t>& cells, const VoxelGrid& grid, const Path& path)
 {
@@ -77,6 +101,13 @@ Result<Regeneration> edit_grid(const EditRequest& r)
     if (edited.grid.cells.empty())
         return fail(ErrorCode::bad_input, "the edit leaves no cell in {}", quote(r.grid.string()));
     what.targets = targets_of(edited, r.generates ? r.halo : 0);
+    what.objects = r.objects;
+    if (!edited.tints.empty() && !what.objects)
+        return fail(ErrorCode::bad_input, "tint: {} is missing; --objects FILE says which objects there are",
+                    quote_path(objects_beside(r.grid)));
+    what.needs_objects = !edited.tints.empty();
+    if (what.needs_objects)
+        SR_CHECK(apply_tints(edited, *what.objects, what.targets));
     SR_TRY(what.request, request_json(r));
     const auto left =
         std::ranges::count_if(edited.touched, [&](const Cell& c) { return find_cell(edited.grid, c).has_value(); });
@@ -93,6 +124,7 @@ Result<Regeneration> select_for_inpainting(const InpaintRequest& r)
     Regeneration what;
     what.command = "inpaint";
     what.input = r.grid;
+    what.objects = r.objects;
     SR_TRY(what.before, read_grid(r.grid));
     SR_TRY(what.targets, select_cells(what.before, r.where));
     what.request = {{"where", selection_json(r.where)}};

@@ -4,9 +4,9 @@
 
 #include "engine/job/grid_filling.h"
 #include "engine/job/outputs.h"
+#include "engine/job/told_objects.h"
 #include "engine/job/version.h"
 #include "runtime/base/hash.h"
-#include "runtime/base/quote.h"
 
 namespace semrover {
 
@@ -21,19 +21,6 @@ uint64_t hash_grid(const VoxelGrid& grid)
     hash.add(std::as_bytes(std::span(grid.points)));
     hash.add(std::as_bytes(std::span(grid.colors)));
     hash.add(std::as_bytes(std::span(grid.generated)));
-    return hash.value();
-}
-
-uint64_t hash_objects(std::span<const SceneObject> objects)
-{
-    Hash hash;
-    for (const SceneObject& o : objects) {
-        const std::array<double, 3> tint = o.tint.value_or(std::array<double, 3>{-1, -1, -1});
-        const std::array<double, 11> values = {double(o.label), o.center[0], o.center[1], o.center[2],
-                                               o.size[0],       o.size[1],   o.size[2],   o.heading,
-                                               tint[0],         tint[1],     tint[2]};
-        hash.add(std::as_bytes(std::span(values)));
-    }
     return hash.value();
 }
 
@@ -63,6 +50,7 @@ class GridGeneration : public GenerationJob {
     VoxelGrid grid_;
     GridFilling filling_;
     uint64_t grid_hash_ = 0;
+    std::vector<SceneObject> objects_; // that the model is told of
     Json settings_;
     std::optional<RunFolder> run_;
 };
@@ -71,11 +59,8 @@ class GridGeneration : public GenerationJob {
 Status GridGeneration::load()
 {
     grid_hash_ = request_.grid_hash ? *request_.grid_hash : hash_grid(grid_);
-    const VoxfieldModel& model = request_.settings.model;
-    if (!request_.objects.empty() && model.config.condition.empty())
-        return fail(ErrorCode::bad_input, "{}: the model knows labels alone and cannot be told of objects",
-                    quote_path(model.folder));
-    SR_CHECK(filling_.cut(grid_, request_.settings.regions, request_.objects));
+    SR_TRY(objects_, told_objects(request_.settings.model, request_.objects, grid_, request_.seed));
+    SR_CHECK(filling_.cut(grid_, request_.settings.regions, objects_));
     return filling_.load(request_.seed, callbacks_);
 }
 
@@ -83,8 +68,8 @@ Status GridGeneration::start(std::optional<GenerationState> saved)
 {
     SR_TRY(settings_, settings_json(request_.settings, filling_.device(), "generate", grid_hash_));
     settings_["seed"] = request_.seed;
-    if (!request_.objects.empty())
-        settings_["objects"] = hash_text(hash_objects(request_.objects));
+    if (!objects_.empty())
+        settings_["objects"] = hash_text(hash_objects(objects_));
     if (!request_.output.empty()) {
         SR_TRY(RunFolder run, open_run(run_folder(), settings_, request_.replace));
         run_.emplace(std::move(run));
@@ -123,6 +108,8 @@ Result<Json> GridGeneration::finish()
     if (request_.output.empty())
         return results;
     SR_CHECK(write_grid(request_.output, grid_));
+    if (!objects_.empty())
+        SR_CHECK(write_objects(objects_beside(request_.output), objects_));
     SR_TRY(const uint64_t hash, hash_file(request_.output));
     results["output"] = request_.output.filename().string();
     results["xxh64"] = hash_text(hash);
@@ -134,8 +121,9 @@ Result<Json> GridGeneration::finish()
 
 Status check_generation_outputs(const GenerationRequest& request)
 {
-    for (const Path& path :
-         {request.output, Path(request.ply.points), Path(request.ply.splats_3d), Path(request.ply.splats_2d)})
+    const bool told = !request.output.empty() && !request.settings.model.config.condition.empty();
+    for (const Path& path : {request.output, told ? objects_beside(request.output) : Path(), Path(request.ply.points),
+                             Path(request.ply.splats_3d), Path(request.ply.splats_2d)})
         if (!path.empty())
             SR_CHECK(check_writable(path, request.replace));
     return {};

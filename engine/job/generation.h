@@ -5,7 +5,7 @@
 #include "engine/job/export_ply.h"
 #include "engine/job/generation_settings.h"
 #include "engine/job/job.h"
-#include "engine/scene/scene_objects.h"
+#include "engine/job/told_objects.h"
 #include "engine/voxfield/outpaint.h"
 
 namespace semrover {
@@ -19,8 +19,10 @@ struct GenerationRequest {
     bool replace = false; // what is at `output` and `ply`, and a finished run's state
     // of the file that the grid is from, to know an interrupted run by; none: of the grid itself
     std::optional<uint64_t> grid_hash = {};
-    // what is known beside labels; none: labels alone. A model that cannot be told is an error (bad_input).
-    std::vector<SceneObject> objects = {};
+    // What is known beside labels; empty: labels alone. A model that cannot be told of them is an error (bad_input).
+    // Not given: where a model can be told, objects are guessed from the labels. With an output, the objects that the
+    // model was told of are written beside it (objects_beside).
+    GivenObjects objects = {};
 };
 
 // what a generation without an output has done, for another of the same request

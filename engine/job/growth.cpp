@@ -93,6 +93,8 @@ Result<Json> Growth::settings() const
     settings["horizon"] = r.horizon;
     settings["window"] = r.window;
     settings["tile_cells"] = plan_.source.tile_cells();
+    if (!plan_.objects.empty())
+        settings["objects"] = hash_text(hash_objects(plan_.objects));
     return settings;
 }
 
@@ -153,7 +155,7 @@ Status Growth::cut_window()
     SR_TRY(part_, cut_sub_grid(around_, targets_, regions.region_size));
     regions.from_known = true;
     regions.first_seed = nearest_cell(part_.grid, piece.front());
-    return filling_.cut(part_.grid, regions);
+    return filling_.cut(part_.grid, regions, plan_.objects);
 }
 
 Status Growth::load()

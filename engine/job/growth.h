@@ -4,6 +4,7 @@
 
 #include "engine/job/generation_settings.h"
 #include "engine/job/job.h"
+#include "engine/job/told_objects.h"
 #include "engine/scene/path_windows.h"
 #include "engine/scene/tile_cache.h"
 
@@ -20,7 +21,8 @@ struct GrowthRequest {
     double horizon = 30; // metres to either side and ahead
     double window = 10;  // metres of path at a time
     double tile_size = 38.4;
-    bool replace = false; // tiles that are in `output`, and a finished run's state
+    GivenObjects objects = {}; // guessed of a scaffold that is one file; of a folder of tiles nothing is guessed
+    bool replace = false;      // tiles that are in `output`, and a finished run's state
 };
 
 // a request with all that needs no device
@@ -29,6 +31,7 @@ struct GrowthPlan {
     GenerationSettings settings;
     PathWindows windows;
     TileSource source;
+    std::vector<SceneObject> objects; // that the model is told of
 };
 
 // Reads the model's description, the path and the index of the scaffold. writes: false where only an estimate is

@@ -28,6 +28,14 @@ Status check(const GrowthRequest& r, bool writes)
     return {};
 }
 
+Result<std::vector<SceneObject>> objects_of(const GrowthRequest& r, const VoxfieldModel& model)
+{
+    if (r.objects || model.config.condition.empty() || fs::is_directory(r.scaffold))
+        return told_objects(model, r.objects ? r.objects : GivenObjects(std::in_place), {}, r.seed);
+    SR_TRY(const VoxelGrid grid, read_grid(r.scaffold));
+    return told_objects(model, {}, grid, r.seed);
+}
+
 } // namespace
 
 Result<GrowthPlan> plan_growth(const GrowthRequest& r, bool writes)
@@ -38,7 +46,8 @@ Result<GrowthPlan> plan_growth(const GrowthRequest& r, bool writes)
     SR_TRY(PathWindows windows, PathWindows::cut(path, r.window));
     SR_TRY(const int32_t edge, tile_cells_of(r.tile_size, settings.model.config.voxel_size));
     SR_TRY(TileSource source, TileSource::open(r.scaffold, edge));
-    return GrowthPlan{r, std::move(settings), std::move(windows), std::move(source)};
+    SR_TRY(std::vector<SceneObject> objects, objects_of(r, settings.model));
+    return GrowthPlan{r, std::move(settings), std::move(windows), std::move(source), std::move(objects)};
 }
 
 } // namespace semrover

@@ -41,10 +41,13 @@ std::optional<Json> finished_before(const Path& output, const Json& settings)
     return results;
 }
 
-// the grid, then what takes it back
-Result<Json> write_result(const Regeneration& what, const Path& output, const VoxelGrid& grid)
+// the grid with its objects, then what takes it back
+Result<Json> write_result(const Regeneration& what, const Path& output, const VoxelGrid& grid,
+                          std::span<const SceneObject> objects)
 {
     SR_CHECK(write_grid(output, grid));
+    if (!objects.empty())
+        SR_CHECK(write_objects(objects_beside(output), objects));
     SR_CHECK(write_undo(undo_of(output), what.input, what.before, output, grid));
     SR_TRY(const uint64_t hash, hash_file(output));
     return Json{{"output", output.filename().string()},
@@ -85,7 +88,8 @@ class SeedRuns : public Job {
     SubGrid part_;        // what a seed fills
     VoxelGrid part_grid_; // as it was before
     RegionOptions regions_;
-    Json settings_; // of the seed at work
+    std::vector<SceneObject> objects_; // that the model is told of
+    Json settings_;                    // of the seed at work
     std::optional<RunFolder> run_;
     size_t at_ = 0; // seed at work
     Json done_ = Json::array();
@@ -100,6 +104,8 @@ Status SeedRuns::prepare()
     SR_TRY(const uint64_t grid, hash_file(what_.input));
     SR_TRY(settings_, settings_json(generation_, filling_.device(), what_.command, grid));
     settings_["request"] = what_.request;
+    if (what_.objects && !what_.objects->empty())
+        settings_["objects"] = hash_text(hash_objects(*what_.objects));
     return {};
 }
 
@@ -121,7 +127,11 @@ Status SeedRuns::begin_seed()
     if (fs::exists(output()) && !outputs_.replace)
         return fail(ErrorCode::usage, "'{}' exists; -y replaces it", output().string());
     part_.grid = part_grid_;
-    SR_CHECK(filling_.cut(part_.grid, regions_));
+    objects_ = what_.objects.value_or(std::vector<SceneObject>());
+    if (what_.needs_objects || !generation_.model.config.condition.empty()) {
+        SR_TRY(objects_, told_objects(generation_.model, what_.objects, what_.grid, seed()));
+    }
+    SR_CHECK(filling_.cut(part_.grid, regions_, objects_));
     SR_CHECK(filling_.load(seed(), callbacks_));
     SR_TRY(RunFolder run, open_run(run_folder_of(output()), settings_, outputs_.replace));
     run_.emplace(std::move(run));
@@ -155,7 +165,7 @@ Status SeedRuns::finish_seed()
     grid.metadata["tool"] = kProgram;
     grid.metadata[what_.command + "_seed"] = std::to_string(seed());
     grid.metadata[what_.command + "_model"] = settings_["model"];
-    SR_TRY(Json results, write_result(what_, output(), grid));
+    SR_TRY(Json results, write_result(what_, output(), grid, objects_));
     results["seed"] = seed();
     results.update(filling_.results());
     SR_CHECK(run_->finish(results));
@@ -208,7 +218,8 @@ Status check_regeneration_outputs(const Path& input, const RegenerationOutputs& 
         if (fs::equivalent(input, output, ignored)) // the record of what was there is made from it at the end
             return fail(ErrorCode::usage, "input and output are the same, '{}'", output.string());
         if (o.seeds.size() < 2 || !finished_before(output, Json()))
-            SR_CHECK(check_writable(output, o.replace));
+            for (const Path& path : {output, objects_beside(output)})
+                SR_CHECK(check_writable(path, o.replace));
         if (!fs::exists(run_folder_of(output))) // the record is not of a run of ours that goes on
             SR_CHECK(check_writable(undo_of(output), o.replace));
     }
@@ -241,7 +252,8 @@ Result<Json> leave_without_points(const Regeneration& what, const RegenerationOu
             if (grid.has_points())
                 grid.generated[target] = 0;
         grid.metadata["tool"] = kProgram;
-        SR_TRY(const Json result, write_result(what, outputs.of(seed), grid));
+        SR_TRY(const Json result,
+               write_result(what, outputs.of(seed), grid, what.objects.value_or(std::vector<SceneObject>())));
         results["outputs"].push_back(result);
     }
     return results;

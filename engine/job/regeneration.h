@@ -4,6 +4,7 @@
 
 #include "engine/job/generation_settings.h"
 #include "engine/job/job.h"
+#include "engine/job/told_objects.h"
 #include "engine/scene/grid.h"
 
 namespace semrover {
@@ -15,6 +16,8 @@ struct Regeneration {
     VoxelGrid before;
     VoxelGrid grid;                // what is written, but for the targets
     std::vector<uint32_t> targets; // ascending indices into `grid`
+    GivenObjects objects;          // what a model is told; written beside each output (objects_beside)
+    bool needs_objects = false;    // a model that cannot be told of them is an error
     Json request;                  // what was asked for, for the settings of the run
     Json counts;                   // for the report
 };

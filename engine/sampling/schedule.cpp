@@ -31,6 +31,18 @@ std::vector<double> trailing(int train, int steps)
     return values;
 }
 
+// train (i / steps)^2 - 1, i falling from steps to 1, and no two alike: most steps where little noise is left. The
+// quadratic spacing of arXiv 2010.02502, appendix D.2, begun at the last timestep, as trailing is.
+std::vector<double> quadratic(int train, int steps)
+{
+    std::vector<double> values(steps);
+    for (int i = 0; i < steps; ++i) {
+        const double part = double(steps - i) / steps;
+        values[i] = std::max(std::nearbyint(train * part * part) - 1, double(steps - 1 - i));
+    }
+    return values;
+}
+
 // timesteps in the order they are visited; fractions only with linspace and euler
 Result<std::vector<double>> spaced_timesteps(const SchedulerConfig& config, int steps)
 {
@@ -39,6 +51,8 @@ Result<std::vector<double>> spaced_timesteps(const SchedulerConfig& config, int 
     std::vector<double> values;
     if (config.spacing == TimestepSpacing::trailing) {
         values = trailing(train, steps);
+    } else if (config.spacing == TimestepSpacing::quadratic) {
+        values = quadratic(train, steps);
     } else {
         values = config.spacing == TimestepSpacing::linspace ? linspace(train - 1, steps + dropped)
                                                              : std::vector<double>(steps + dropped);
@@ -136,7 +150,8 @@ void fill_markov(const SchedulerConfig& config, const std::vector<double>& times
             schedule.steps.push_back(ddpm_step(config, timesteps[i], now, next, last));
         } else {
             // note: diffusers' DDIM goes down by a fixed stride, which trailing and linspace only meet on average
-            const double next = timesteps[i] - stride;
+            const bool even = config.spacing != TimestepSpacing::quadratic;
+            const double next = even ? timesteps[i] - stride : last ? -1 : timesteps[i + 1];
             const double end = config.set_alpha_to_one ? 1.0 : abar[0];
             schedule.steps.push_back(ddim_step(config, timesteps[i], now, next >= 0 ? abar[size_t(next)] : end, last));
         }

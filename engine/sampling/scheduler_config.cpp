@@ -39,7 +39,8 @@ void read_noise(JsonFields& fields, SchedulerConfig& config)
     fields.choice<TimestepSpacing>("timestep_spacing",
                                    {{"leading", TimestepSpacing::leading},
                                     {"trailing", TimestepSpacing::trailing},
-                                    {"linspace", TimestepSpacing::linspace}},
+                                    {"linspace", TimestepSpacing::linspace},
+                                    {"quadratic", TimestepSpacing::quadratic}},
                                    config.spacing);
     fields.integer("steps_offset", 0, kMaxTrainTimesteps, config.steps_offset);
     fields.flag("clip_sample", config.clip_sample);

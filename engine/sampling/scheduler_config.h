@@ -16,7 +16,7 @@ namespace semrover {
 enum class Sampler { ddpm, ddim, dpmpp_2m, euler };
 enum class BetaSchedule { linear, scaled_linear, squaredcos_cap_v2 };
 enum class Prediction { epsilon, sample, v_prediction };
-enum class TimestepSpacing { leading, trailing, linspace };
+enum class TimestepSpacing { leading, trailing, linspace, quadratic };
 enum class VarianceType { fixed_small, fixed_large };
 
 // The fields of a diffusers scheduler_config.json. Every sampler reads the first group, clip_sample included, although

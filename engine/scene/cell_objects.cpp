@@ -79,6 +79,26 @@ std::vector<int32_t> objects_of_cells(const VoxelGrid& grid, std::span<const Sce
     return owners;
 }
 
+std::vector<size_t> objects_meant(const VoxelGrid& grid, std::span<const SceneObject> objects,
+                                  std::span<const uint32_t> cells)
+{
+    const std::vector<int32_t> owners = objects_of_cells(grid, objects);
+    std::vector<size_t> all(objects.size()), chosen(objects.size()), meant;
+    for (const int32_t owner : owners)
+        if (owner != kNoObject)
+            ++all[size_t(owner)];
+    for (const uint32_t cell : cells)
+        if (owners[cell] != kNoObject)
+            ++chosen[size_t(owners[cell])];
+    for (size_t o = 0; o < objects.size(); ++o)
+        if (chosen[o] * 2 > all[o])
+            meant.push_back(o);
+    const auto most = std::ranges::max_element(chosen);
+    if (meant.empty() && most != chosen.end() && *most > 0)
+        meant.push_back(size_t(most - chosen.begin()));
+    return meant;
+}
+
 void tint_objects(std::span<SceneObject> objects, const VoxelGrid& grid)
 {
     if (!grid.has_points())

@@ -18,6 +18,12 @@ std::array<double, 3> place_in(const SceneObject& object, const std::array<doubl
 // first). The depth is the distance from the nearest face along the box's axes, negative outside.
 std::vector<int32_t> objects_of_cells(const VoxelGrid& grid, std::span<const SceneObject> objects);
 
+// Which objects somebody means who selects these cells (indices into `grid`): those of which more than half of the
+// cells are among them or, where there is none, the one that has most of them. Indices, ascending; empty where the
+// cells belong to no object.
+std::vector<size_t> objects_meant(const VoxelGrid& grid, std::span<const SceneObject> objects,
+                                  std::span<const uint32_t> cells);
+
 // Gives each object the median colour, channel by channel, of the points of its cells; objects without points keep what
 // they have.
 void tint_objects(std::span<SceneObject> objects, const VoxelGrid& grid);

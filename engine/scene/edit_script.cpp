@@ -3,6 +3,7 @@
 #include "engine/scene/edit_script.h"
 
 #include "engine/scene/palette.h"
+#include "engine/scene/scene_objects.h"
 #include "runtime/base/json_fields.h"
 #include "runtime/base/json_numbers.h"
 #include "runtime/base/quote.h"
@@ -15,7 +16,8 @@ namespace {
 
 using Kind = EditOperation::Kind;
 
-constexpr std::array<Kind, 6> kKinds = {Kind::remove, Kind::erase, Kind::paint, Kind::insert, Kind::copy, Kind::move};
+constexpr std::array kKinds = {Kind::remove, Kind::erase, Kind::paint, Kind::insert,
+                               Kind::copy,   Kind::move,  Kind::tint};
 
 // `count` numbers under a key; none when the object has no such key
 Result<std::vector<double>> array_of(const Json& object, const char* key, size_t count, std::string_view where)
@@ -94,8 +96,8 @@ Result<std::optional<std::array<double, 3>>> point_of(const Json& json, const ch
     return std::optional(p);
 }
 
-constexpr std::array<std::string_view, 12> kKeys = {"op",   "class", "box", "sphere", "object", "label",
-                                                    "fill", "stamp", "at",  "by",     "rotate", "points"};
+constexpr std::array<std::string_view, 13> kKeys = {"op",    "class", "box", "sphere", "object", "label", "fill",
+                                                    "stamp", "at",    "by",  "rotate", "points", "color"};
 
 Result<EditOperation> parse_operation(const Json& json, const Path& folder, std::string_view where)
 {
@@ -106,8 +108,8 @@ Result<EditOperation> parse_operation(const Json& json, const Path& folder, std:
     SR_TRY(const std::string name, text_of(json, "op", where));
     const auto kind = std::ranges::find(kKinds, name, operation_name);
     if (kind == kKinds.end())
-        return fail(ErrorCode::bad_input, "{}: op: expected remove, delete, paint, insert, copy or move, found {}",
-                    where, quote(name));
+        return fail(ErrorCode::bad_input,
+                    "{}: op: expected remove, delete, paint, insert, copy, move or tint, found {}", where, quote(name));
     o.kind = *kind;
     SR_TRY(o.where, parse_selection(json, where));
     if (json.contains("label") != (o.kind == Kind::paint))
@@ -115,6 +117,12 @@ Result<EditOperation> parse_operation(const Json& json, const Path& folder, std:
     if (o.kind == Kind::paint) {
         SR_TRY(const std::string label, text_of(json, "label", where));
         SR_TRY(o.label, in_file(parse_class(label), where));
+    }
+    if (json.contains("color") != (o.kind == Kind::tint))
+        return fail(ErrorCode::bad_input, "{}: tint, and nothing else, has a color", where);
+    if (o.kind == Kind::tint) {
+        SR_TRY(const std::string color, text_of(json, "color", where));
+        SR_TRY(o.color, parse_tint(color, where));
     }
     if (json.contains("fill") && !json["fill"].is_boolean())
         return fail(ErrorCode::bad_input, "{}: fill: expected true or false", where);
@@ -194,6 +202,8 @@ Json operation_json(const EditOperation& o)
         json["label"] = std::string(kPalette[o.label].name);
         json["fill"] = o.fill;
     }
+    if (o.kind == Kind::tint)
+        json["color"] = tint_text(o.color);
     if (o.kind == Kind::insert)
         json["stamp"] = o.stamp.string();
     if (o.at)

@@ -11,6 +11,7 @@ namespace semrover {
 //   {"op": "remove"|"delete", "class": "car", "box": [x0,y0,z0,x1,y1,z1], "sphere": [x,y,z,r], "object": [i,j,k]}
 //   {"op": "paint", "label": "road", ..., "fill": true}
 //   {"op": "insert", "stamp": "car.sgrid", "at": [x,y,z], "rotate": 90, "points": "keep"|"regenerate"}
+//   {"op": "tint", "color": "#aa4433", "class": "building", ...}
 //   {"op": "copy"|"move", ..., "by": [x,y,z], "rotate": 90, "points": "keep"|"regenerate"}
 // Metres, cells for "object", degrees; a stamp's path is relative to the file's folder. Unknown keys are refused.
 // Errors: bad_input, with the number of the operation.

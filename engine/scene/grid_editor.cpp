@@ -58,7 +58,7 @@ Cell whole_cells(const std::array<double, 3>& metres, float voxel_size)
 
 std::string_view operation_name(Kind kind)
 {
-    constexpr std::array<std::string_view, 6> kNames = {"remove", "delete", "paint", "insert", "copy", "move"};
+    constexpr std::array<std::string_view, 7> kNames = {"remove", "delete", "paint", "insert", "copy", "move", "tint"};
     return kNames[size_t(kind)];
 }
 
@@ -111,12 +111,16 @@ Status GridEditor::apply(const EditOperation& o)
     if (o.kind == Kind::copy || o.kind == Kind::move)
         return copy(o);
     SR_TRY(const std::vector<uint32_t> cells, selected(o));
-    std::vector<Cell> gone;
+    std::vector<Cell> chosen;
     for (const uint32_t c : cells)
-        gone.push_back(view_.cells[c]);
+        chosen.push_back(view_.cells[c]);
+    if (o.kind == Kind::tint) {
+        tints_.push_back({std::move(chosen), o.color});
+        return {};
+    }
     drop(cells);
     if (o.kind == Kind::remove)
-        close_ground(gone);
+        close_ground(chosen);
     return {};
 }
 
@@ -327,6 +331,7 @@ EditedGrid GridEditor::finish() const
     EditedGrid out;
     out.grid = with_points(all);
     out.grid.metadata = base_.metadata;
+    out.tints = tints_;
     for (const auto& [cell, content] : kept_)
         out.kept.push_back(cell);
     size_t a = 0, b = 0; // of the grid before and after

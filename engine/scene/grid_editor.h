@@ -17,10 +17,12 @@ struct EditOperation {
         insert, // a stamp's cells replace what is at their places
         copy,   // the selection once more, elsewhere
         move,   // the same, and the selection is removed where it was
+        tint,   // objects get a colour; cells stay as they are
     };
     Kind kind = Kind::remove;
-    CellSelection where; // all but insert
-    uint8_t label = 0;   // paint
+    CellSelection where;           // all but insert
+    uint8_t label = 0;             // paint
+    std::array<double, 3> color{}; // tint: sRGB 0..1
     bool fill = false;
     Path stamp;                              // insert
     std::optional<std::array<double, 3>> at; // insert: metres; the cell there gets the stamp's lowest corner
@@ -38,8 +40,13 @@ bool is_ground(uint8_t label);
 // The grid after an edit. `touched` cells have another label, other occupancy, or points of a stamp; `kept` cells are
 // those with points of a stamp. Both are sorted. Changed cells without points have generated = 0 and zeros.
 struct EditedGrid {
+    struct Tint {
+        std::vector<Cell> cells; // sorted
+        std::array<double, 3> color;
+    };
     VoxelGrid grid;
     std::vector<Cell> touched, kept;
+    std::vector<Tint> tints; // in order; for the caller, who knows the objects
 };
 
 // Applies operations in order, each to what the one before left. The ground closes thus: a column of removed cells that
@@ -75,6 +82,7 @@ class GridEditor {
     const VoxelGrid& base_;
     VoxelGrid view_; // cells and labels as they are now
     std::map<Cell, Content> kept_;
+    std::vector<EditedGrid::Tint> tints_;
     int points_per_voxel_;
 };
 

@@ -43,23 +43,13 @@ Result<Triple> triple_of(const Json& object, const char* key, double low, double
     return values;
 }
 
-Result<Triple> color_of_hex(std::string_view text, std::string_view where)
-{
-    uint32_t bits = 0;
-    const char* end = text.data() + text.size();
-    const bool shaped = text.size() == 7 && text[0] == '#';
-    if (!shaped || std::from_chars(text.data() + 1, end, bits, 16).ptr != end)
-        return fail(ErrorCode::bad_input, "{}: tint: expected #rrggbb or 3 numbers, found {}", where, quote(text));
-    return Triple{(bits >> 16) / 255.0, (bits >> 8 & 255) / 255.0, (bits & 255) / 255.0};
-}
-
 Result<std::optional<Triple>> tint_of(const Json& object, std::string_view where)
 {
     const auto entry = object.find("tint");
     if (entry == object.end() || entry->is_null())
         return std::optional<Triple>();
     if (entry->is_string()) {
-        SR_TRY(const Triple color, color_of_hex(entry->get_ref<const std::string&>(), where));
+        SR_TRY(const Triple color, parse_tint(entry->get_ref<const std::string&>(), where));
         return std::optional(color);
     }
     SR_TRY(const Triple color, triple_of(object, "tint", 0, 1, where));
@@ -99,27 +89,43 @@ Result<SceneObject> parse_object(const Json& json, std::string_view where)
     return o;
 }
 
-Json triple_json(const Triple& values, double per_unit)
+double rounded(double value, double per_unit)
 {
-    Json json = Json::array();
-    for (double v : values)
-        json.push_back(std::round(v * per_unit) / per_unit + 0.0); // no -0
-    return json;
+    return std::round(value * per_unit) / per_unit + 0.0; // no -0
 }
 
-Json object_json(const SceneObject& o)
+constexpr double kPerMetre = 1e4, kPerRadian = 1e5, kPerTint = 1e3;
+
+Json object_json(const SceneObject& object)
 {
+    const SceneObject o = as_written(object);
     Json json = {{"id", o.id},
                  {"class", std::string(kPalette[o.label].name)},
-                 {"center", triple_json(o.center, 1e4)},
-                 {"size", triple_json(o.size, 1e4)},
-                 {"heading", std::round(o.heading * 1e5) / 1e5 + 0.0}};
+                 {"center", o.center},
+                 {"size", o.size},
+                 {"heading", o.heading}};
     if (o.tint)
-        json["tint"] = triple_json(*o.tint, 1e3);
+        json["tint"] = *o.tint;
     return json;
 }
 
 } // namespace
+
+Result<Triple> parse_tint(std::string_view text, std::string_view where)
+{
+    uint32_t bits = 0;
+    const char* end = text.data() + text.size();
+    const bool shaped = text.size() == 7 && text[0] == '#';
+    if (!shaped || std::from_chars(text.data() + 1, end, bits, 16).ptr != end)
+        return fail(ErrorCode::bad_input, "{}: tint: expected #rrggbb, found {}", where, quote(text));
+    return Triple{(bits >> 16) / 255.0, (bits >> 8 & 255) / 255.0, (bits & 255) / 255.0};
+}
+
+std::string tint_text(const Triple& tint)
+{
+    const auto level = [](double v) { return uint32_t(std::lround(std::clamp(v, 0.0, 1.0) * 255)); };
+    return fmt::format("#{:02x}{:02x}{:02x}", level(tint[0]), level(tint[1]), level(tint[2]));
+}
 
 Result<std::vector<SceneObject>> parse_objects(const Json& json, std::string_view where)
 {
@@ -148,6 +154,23 @@ Result<std::vector<SceneObject>> read_objects(const Path& path)
 {
     SR_TRY(const Json json, read_json(path, {.bytes = 256u << 20, .values = 32u << 20}));
     return parse_objects(json, quote_path(path));
+}
+
+SceneObject as_written(SceneObject o)
+{
+    for (size_t a = 0; a < 3; ++a) {
+        o.center[a] = rounded(o.center[a], kPerMetre);
+        o.size[a] = rounded(o.size[a], kPerMetre);
+        if (o.tint)
+            (*o.tint)[a] = rounded((*o.tint)[a], kPerTint);
+    }
+    o.heading = rounded(o.heading, kPerRadian);
+    return o;
+}
+
+Path objects_beside(const Path& grid)
+{
+    return Path(grid).replace_extension(".objects.json");
 }
 
 Status write_objects(const Path& path, std::span<const SceneObject> objects)

@@ -24,11 +24,18 @@ struct SceneObject {
 
 constexpr size_t kMaxObjects = 1 << 20;
 
-// Files of objects (docs/formats.md §2.8). The writer rounds lengths to 0.1 mm; the same objects give the same bytes.
-// Errors: bad_input with the number of the object, for unknown keys and classes, ids given twice, boxes beyond 1000 km
-// or without size, colours outside 0..1.
+// "#7a1f1c" -> sRGB 0..1. Errors: bad_input, with `where` in front
+Result<std::array<double, 3>> parse_tint(std::string_view text, std::string_view where);
+std::string tint_text(const std::array<double, 3>& tint); // "#7a1f1c", each channel rounded to 8 bits
+
+// Files of objects (docs/formats.md §2.8). The writer rounds (as_written) lengths to 0.1 mm; the same objects give the
+// same bytes. Errors: bad_input with the number of the object, for unknown keys and classes, ids given twice, boxes
+// beyond 1000 km or without size, colours outside 0..1.
 Result<std::vector<SceneObject>> parse_objects(const Json& json, std::string_view where);
 Result<std::vector<SceneObject>> read_objects(const Path& path);
+// "street.sgrid" -> "street.objects.json": where generate writes, and edit and inpaint look for, a grid's objects
+Path objects_beside(const Path& grid);
+SceneObject as_written(SceneObject object);
 Status write_objects(const Path& path, std::span<const SceneObject> objects);
 
 } // namespace semrover

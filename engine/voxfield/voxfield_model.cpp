@@ -21,6 +21,9 @@ Status read_defaults(const Json& index, VoxfieldDefaults& d)
     fields.integer("jump_length", 0, 10000, d.repaint.jump_length);
     fields.integer("jump_n_sample", 1, 10000, d.repaint.jump_n_sample);
     fields.choice("known_tokens", {{"noised", KnownTokens::noised}, {"clean", KnownTokens::clean}}, d.repaint.known);
+    if (const Json* usual = fields.find("objects")) {
+        SR_TRY(d.usual_objects, parse_usual_objects(*usual, "model_index.json: defaults: objects"));
+    }
     std::vector<std::string> others; // for other components
     return fields.finish(others);
 }

@@ -4,6 +4,7 @@
 
 #include "engine/model/transformer_config.h"
 #include "engine/sampling/repaint.h"
+#include "engine/scene/usual_objects.h"
 #include "engine/voxfield/regions.h"
 
 namespace semrover {
@@ -14,6 +15,7 @@ struct VoxfieldDefaults {
     float guidance_scale = 4;
     RegionOptions regions;
     RepaintOptions repaint;
+    UsualObjects usual_objects; // to guess objects from labels
 };
 
 // A model folder's configs, without the weights: Transformer::load reads those.

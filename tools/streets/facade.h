@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "tools/streets/keyed_random.h"
+#include "runtime/base/keyed_random.h"
 #include "tools/streets/mesh_builder.h"
 
 #include <vector>

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/streets/road_network.h"
 
-#include "tools/streets/keyed_random.h"
+#include "runtime/base/keyed_random.h"
 
 #include <algorithm>
 

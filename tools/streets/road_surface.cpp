@@ -3,7 +3,7 @@
 #include "tools/streets/road_surface.h"
 
 #include "tools/streets/class_label.h"
-#include "tools/streets/keyed_random.h"
+#include "runtime/base/keyed_random.h"
 
 #include <algorithm>
 #include <functional>

@@ -72,7 +72,7 @@ class Grids:
     ARRAYS = ("cells", "labels", "tokens", "owners", "local_tints", "boxes", "tints")
 
     def __init__(self, sources, cache):
-        files = find_grids(sources)
+        self.files = files = find_grids(sources)
         os.makedirs(cache, exist_ok=True)
         about = os.path.join(cache, "grids.json")
         known = read_json(about) if os.path.exists(about) else {}

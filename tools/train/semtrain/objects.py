@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
 """Objects of a scene (docs/formats.md §2.8): which cells are theirs, and which colours these have."""
+import os
+
 import numpy as np
 
 from .json_file import read_json
@@ -76,3 +78,24 @@ def local_tints(centers, owners, colors):
             middle = np.median(colors[cells], 1).astype(np.uint8)
             tints[cells] = medians_near(centers[cells].astype(np.float32), middle, TINT_REACH)
     return tints
+
+
+def usual_objects(grids, most=32, fewest=4):
+    """Of the objects.json beside each of some .sgrid files: {class: {size: median in metres, tints: at most `most`
+    colours, drawn from all}}, for `objects` of a model's defaults (docs/models.md §8). Classes with fewer than `fewest`
+    objects are left out."""
+    files = sorted({os.path.join(os.path.dirname(g), "objects.json") for g in grids})
+    parts = [read_objects(f) for f in files if os.path.exists(f)]
+    if not parts:
+        return {}
+    boxes, labels, tints = (np.concatenate(p) for p in zip(*parts))
+    random, usual = np.random.default_rng(1), {}
+    for label in np.unique(labels):
+        of_class = tints[(labels == label) & ~np.isnan(tints).any(1)]
+        if (labels == label).sum() < fewest:
+            continue
+        chosen = random.permutation(len(of_class))[:most]
+        levels = np.round(of_class[chosen] * 255).astype(int)
+        usual[CLASSES[label]] = {"size": np.median(boxes[labels == label, 3:6], 0).round(2).tolist(),
+                                 "tints": ["#%02x%02x%02x" % tuple(level) for level in levels]}
+    return usual

@@ -9,6 +9,7 @@ import torch
 from .grids import Grids, LocalSets
 from .model_folder import add_to_index, read_component, write_component, write_scheduler
 from .nets.transformer import VoxfieldTransformer
+from .objects import usual_objects
 from .settings import parser, resolve
 from .trainer import Trainer, generator
 
@@ -71,7 +72,11 @@ def with_new_parts(state, model):
     return {**{name: t for name, t in model.state_dict().items() if name.startswith("condition_embed.")}, **state}
 
 
-def exporter(folder, config, placement):
+def exporter(folder, config, grids):
+    """grids: Grids, which say how points were placed and how objects usually are"""
+    placement, defaults = grids.placement, dict(config["defaults"])
+    if config["network"].get("condition"):
+        defaults["objects"] = usual_objects(grids.files)
     told = {} if placement == "shifted" else {"placement": placement}
 
     def export(state):
@@ -85,7 +90,7 @@ def exporter(folder, config, placement):
             "timestep_spacing": "trailing"})
         add_to_index(os.path.join(folder, "model"), {"voxfield_transformer": ["semrover", "VoxfieldTransformer"],
                                                      "voxfield_scheduler": ["semrover", "DDPMScheduler"]},
-                     config["defaults"])
+                     defaults)
     return export
 
 
@@ -99,7 +104,7 @@ def main():
     torch.manual_seed(config["seed"])
     model = VoxfieldTransformer(**config["network"])
     model.start_at_zero()
-    trainer = Trainer(options.output, model, config, exporter(options.output, config, sets.grids.placement))
+    trainer = Trainer(options.output, model, config, exporter(options.output, config, sets.grids))
     if options.init:
         trainer.start_from(with_new_parts(read_component(options.init)[1], model))
     print(f"{sum(p.numel() for p in model.parameters())} parameters, {len(sets.grids.labels)} cells", flush=True)

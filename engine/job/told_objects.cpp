@@ -1,0 +1,40 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/job/told_objects.h"
+
+#include "engine/scene/guessed_objects.h"
+#include "runtime/base/hash.h"
+#include "runtime/base/quote.h"
+
+#include <algorithm>
+
+namespace semrover {
+
+Result<std::vector<SceneObject>> told_objects(const VoxfieldModel& model, const GivenObjects& given,
+                                              const VoxelGrid& grid, uint64_t seed)
+{
+    if (!model.config.condition.empty()) {
+        std::vector<SceneObject> told = given ? *given : guess_objects(grid, model.defaults.usual_objects, seed);
+        std::ranges::transform(told, told.begin(), as_written);
+        return told;
+    }
+    if (given && !given->empty())
+        return fail(ErrorCode::bad_input, "{}: the model knows labels alone and cannot be told of objects",
+                    quote_path(model.folder));
+    return std::vector<SceneObject>();
+}
+
+uint64_t hash_objects(std::span<const SceneObject> objects)
+{
+    Hash hash;
+    for (const SceneObject& o : objects) {
+        const std::array<double, 3> tint = o.tint.value_or(std::array<double, 3>{-1, -1, -1});
+        const std::array<double, 11> values = {double(o.label), o.center[0], o.center[1], o.center[2],
+                                               o.size[0],       o.size[1],   o.size[2],   o.heading,
+                                               tint[0],         tint[1],     tint[2]};
+        hash.add(std::as_bytes(std::span(values)));
+    }
+    return hash.value();
+}
+
+} // namespace semrover

@@ -1,0 +1,17 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/scene/grid.h"
+#include "engine/scene/scene_objects.h"
+#include "engine/scene/usual_objects.h"
+
+namespace semrover {
+
+// Objects of a scene of which only labels are known (docs/method.md §2.2): boxes around connected cells of a class,
+// rows of them cut at usual lengths, buildings at the houses that their street shows. Each colour is drawn from the
+// usual ones, keyed by the seed, the class and the object's lowest cell. Classes of which nothing is usual have no
+// objects. The same labels and seed give the same objects.
+std::vector<SceneObject> guess_objects(const VoxelGrid& grid, const UsualObjects& usual, uint64_t seed);
+
+} // namespace semrover

@@ -1,0 +1,247 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/scene/cell_objects.h"
+#include "engine/scene/connected_groups.h"
+#include "engine/scene/guessed_objects.h"
+#include "tests/says.h"
+
+#include <algorithm>
+#include <cmath>
+#include <gtest/gtest.h>
+#include <map>
+#include <numbers>
+
+namespace semrover {
+namespace engine_guessed_objects_test {
+
+constexpr uint8_t kRoad = 0, kSidewalk = 1, kBuilding = 2, kCar = 13;
+constexpr double kPi = std::numbers::pi;
+
+class Scene {
+  public:
+    void fill(uint8_t label, const Cell& low, const Cell& high) // inclusive
+    {
+        for (int32_t i = low[0]; i <= high[0]; ++i)
+            for (int32_t j = low[1]; j <= high[1]; ++j)
+                for (int32_t k = low[2]; k <= high[2]; ++k)
+                    cells_[{i, j, k}] = label;
+    }
+    VoxelGrid grid() const
+    {
+        VoxelGrid g;
+        g.voxel_size = 0.6f;
+        for (const auto& [cell, label] : cells_) {
+            g.cells.push_back(cell);
+            g.labels.push_back(label);
+        }
+        return g;
+    }
+    // x and y exchanged, and y turned over: a quarter turn counterclockwise about the corner of cell 0
+    Scene turned() const
+    {
+        Scene s;
+        for (const auto& [c, label] : cells_)
+            s.cells_[{-c[1] - 1, c[0], c[2]}] = label;
+        return s;
+    }
+
+  private:
+    std::map<Cell, uint8_t> cells_;
+};
+
+UsualObjects usual()
+{
+    UsualObjects u;
+    u[kBuilding] = {{11, 11, 16}, {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 0}}};
+    u[kCar] = {{4.6, 2.1, 1.5}, {{0.1, 0.1, 0.1}, {0.9, 0.9, 0.9}, {0.5, 0, 0}}};
+    return u;
+}
+
+// along x: a road between two sidewalks, houses to its left with tops at 12 and 18 m, and three cars in a row
+Scene street()
+{
+    Scene s;
+    s.fill(kRoad, {0, -5, 0}, {59, 5, 0});
+    s.fill(kSidewalk, {0, 6, 0}, {59, 9, 0});
+    s.fill(kSidewalk, {0, -9, 0}, {59, -6, 0});
+    s.fill(kBuilding, {0, 10, 0}, {17, 10, 19});
+    s.fill(kBuilding, {18, 10, 0}, {35, 10, 29});
+    s.fill(kBuilding, {36, 10, 0}, {59, 10, 21});
+    for (int32_t car = 0; car < 3; ++car)
+        s.fill(kCar, {2 + 9 * car, -4, 1}, {9 + 9 * car, -1, 3});
+    s.fill(kCar, {10, -3, 1}, {10, -3, 1}); // the first two touch
+    s.fill(kCar, {19, -3, 1}, {19, -3, 1}); // and the next two
+    return s;
+}
+
+std::vector<SceneObject> of_class(const std::vector<SceneObject>& objects, uint8_t label)
+{
+    std::vector<SceneObject> found;
+    std::ranges::copy_if(objects, std::back_inserter(found), [&](const SceneObject& o) { return o.label == label; });
+    std::ranges::sort(found, {}, [](const SceneObject& o) { return o.center; });
+    return found;
+}
+
+double apart(double a, double b) // of two angles
+{
+    return std::abs(std::remainder(a - b, 2 * kPi));
+}
+
+TEST(engine_guessed_objects, groups_are_connected_cells_of_one_label)
+{
+    Scene s;
+    s.fill(kRoad, {0, 0, 0}, {3, 0, 0});
+    s.fill(kCar, {1, 0, 1}, {1, 0, 1});
+    s.fill(kCar, {2, 1, 2}, {2, 1, 2}); // over a corner
+    s.fill(kCar, {4, 1, 2}, {4, 1, 2}); // a cell further
+    const VoxelGrid grid = s.grid();
+    const auto groups = connected_groups(grid);
+    ASSERT_EQ(groups.size(), 3u);
+    std::vector<size_t> sizes;
+    for (const auto& group : groups) {
+        EXPECT_TRUE(std::ranges::is_sorted(group));
+        sizes.push_back(group.size());
+    }
+    EXPECT_EQ(sizes, (std::vector<size_t>{4, 2, 1}));
+}
+
+TEST(engine_guessed_objects, a_row_of_cars_is_cut_where_they_touch)
+{
+    const VoxelGrid grid = street().grid();
+    const auto cars = of_class(guess_objects(grid, usual(), 1), kCar);
+    ASSERT_EQ(cars.size(), 3u);
+    for (size_t c = 0; c < 3; ++c) {
+        EXPECT_NEAR(cars[c].center[0], (2 + 9 * double(c) + 4) * 0.6, 0.4);
+        EXPECT_NEAR(cars[c].center[1], -1.2, 0.01);
+        EXPECT_NEAR(cars[c].size[0], 4.2, 0.7);
+        EXPECT_LT(apart(cars[c].heading, 0), 0.05) << "the sidewalk is nearer on the side of -y, the right";
+        EXPECT_TRUE(cars[c].tint);
+    }
+}
+
+TEST(engine_guessed_objects, a_car_on_the_other_side_looks_the_other_way)
+{
+    Scene s = street();
+    s.fill(kCar, {40, 2, 1}, {47, 4, 3});
+    const auto cars = of_class(guess_objects(s.grid(), usual(), 1), kCar);
+    ASSERT_EQ(cars.size(), 4u);
+    EXPECT_LT(apart(cars[3].heading, kPi), 0.05);
+}
+
+TEST(engine_guessed_objects, houses_are_cut_where_their_height_steps_and_look_at_the_street)
+{
+    const auto houses = of_class(guess_objects(street().grid(), usual(), 1), kBuilding);
+    ASSERT_EQ(houses.size(), 3u);
+    const double edges[] = {0, 18, 36, 60};
+    for (size_t h = 0; h < 3; ++h) {
+        EXPECT_LT(apart(houses[h].heading, -kPi / 2), 0.1);
+        EXPECT_NEAR(houses[h].center[0], (edges[h] + edges[h + 1]) / 2 * 0.6, 1.0);
+        EXPECT_NEAR(houses[h].size[1], (edges[h + 1] - edges[h]) * 0.6, 1.5);
+        EXPECT_NEAR(houses[h].size[0], 11, 1e-9) << "as deep as usual: of the back nothing is seen";
+        EXPECT_NEAR(houses[h].center[1] - houses[h].size[0] / 2, 6.3, 1.0) << "the front is where the wall is";
+    }
+    EXPECT_NEAR(houses[1].size[2] - houses[0].size[2], 6, 0.01);
+}
+
+TEST(engine_guessed_objects, every_cell_of_a_wall_belongs_to_the_house_around_it)
+{
+    const VoxelGrid grid = street().grid();
+    const auto objects = guess_objects(grid, usual(), 1);
+    const std::vector<int32_t> owners = objects_of_cells(grid, objects);
+    std::map<int32_t, int> houses;
+    for (size_t v = 0; v < grid.cells.size(); ++v)
+        if (grid.labels[v] == kBuilding || grid.labels[v] == kCar) {
+            ASSERT_NE(owners[v], kNoObject);
+            ++houses[owners[v]];
+        }
+    EXPECT_EQ(houses.size(), 6u);
+}
+
+TEST(engine_guessed_objects, a_turned_scene_has_turned_objects)
+{
+    const auto straight = of_class(guess_objects(street().grid(), usual(), 1), kBuilding);
+    const auto turned = of_class(guess_objects(street().turned().grid(), usual(), 1), kBuilding);
+    ASSERT_EQ(turned.size(), straight.size());
+    for (const SceneObject& o : straight) {
+        const auto same = std::ranges::find_if(turned, [&](const SceneObject& t) {
+            return std::hypot(t.center[0] + o.center[1], t.center[1] - o.center[0]) < 0.7;
+        });
+        ASSERT_NE(same, turned.end());
+        EXPECT_LT(apart(same->heading, o.heading + kPi / 2), 0.05);
+    }
+}
+
+TEST(engine_guessed_objects, a_long_front_without_steps_is_cut_at_places_that_the_seed_decides)
+{
+    Scene s;
+    s.fill(kRoad, {0, 0, 0}, {99, 9, 0});
+    s.fill(kBuilding, {0, 12, 0}, {99, 12, 19});
+    const VoxelGrid grid = s.grid();
+    std::set<double> widths;
+    for (uint64_t seed : {1, 2, 3}) {
+        const auto houses = of_class(guess_objects(grid, usual(), seed), kBuilding);
+        ASSERT_EQ(houses.size(), 5u) << "60 m of 11 m each";
+        for (const SceneObject& o : houses) {
+            EXPECT_GT(o.size[1], 6);
+            EXPECT_LT(o.size[1], 17);
+            widths.insert(o.size[1]);
+        }
+    }
+    EXPECT_GT(widths.size(), 5u);
+}
+
+TEST(engine_guessed_objects, colours_depend_on_the_seed_and_boxes_of_cars_do_not)
+{
+    const VoxelGrid grid = street().grid();
+    const auto first = guess_objects(grid, usual(), 1), again = guess_objects(grid, usual(), 1);
+    std::set<std::array<double, 3>> tints;
+    for (uint64_t seed = 1; seed < 12; ++seed) {
+        const auto cars = of_class(guess_objects(grid, usual(), seed), kCar);
+        EXPECT_EQ(cars[0].center, of_class(first, kCar)[0].center);
+        tints.insert(*cars[0].tint);
+    }
+    EXPECT_EQ(tints.size(), 3u) << "each usual colour is drawn at times";
+    for (size_t o = 0; o < first.size(); ++o) {
+        EXPECT_EQ(first[o].center, again[o].center);
+        EXPECT_EQ(first[o].tint, again[o].tint);
+    }
+}
+
+TEST(engine_guessed_objects, classes_of_which_nothing_is_usual_have_none)
+{
+    const VoxelGrid grid = street().grid();
+    UsualObjects only_cars = usual();
+    only_cars[kBuilding] = {};
+    EXPECT_EQ(guess_objects(grid, only_cars, 1).size(), 3u);
+    EXPECT_TRUE(guess_objects(grid, {}, 1).empty());
+}
+
+TEST(engine_guessed_objects, a_building_without_a_street_has_a_box_around_it)
+{
+    Scene s;
+    s.fill(kBuilding, {0, 0, 0}, {19, 9, 9});
+    const auto houses = guess_objects(s.grid(), usual(), 1);
+    ASSERT_EQ(houses.size(), 1u);
+    EXPECT_NEAR(houses[0].center[0], 6, 1e-6);
+    EXPECT_NEAR(houses[0].center[1], 3, 1e-6);
+}
+
+TEST(engine_guessed_objects, a_table_of_what_is_usual_is_read_and_mistakes_are_named)
+{
+    const auto read = [](const char* text) { return parse_usual_objects(*parse_json(text, "t"), "t"); };
+    const auto table = read(R"({"car": {"size": [4.6, 2.1, 1.5], "tints": ["#ff0000", "#0000ff"]}})");
+    ASSERT_TRUE(table) << table.error().message;
+    EXPECT_EQ((*table)[kCar].size[0], 4.6);
+    EXPECT_EQ((*table)[kCar].tints[1], (std::array<double, 3>{0, 0, 1}));
+    EXPECT_FALSE((*table)[kBuilding].known());
+    EXPECT_TRUE(says(read(R"([])"), "expected an object"));
+    EXPECT_TRUE(says(read(R"({"cat": {"size": [1, 1, 1]}})"), "no class 'cat'"));
+    EXPECT_TRUE(says(read(R"({"car": {"size": [1, 1]}})"), "car: size: expected 3 numbers"));
+    EXPECT_TRUE(says(read(R"({"car": {}})"), "car: size"));
+    EXPECT_TRUE(says(read(R"({"car": {"size": [1, 0, 1]}})"), "0.001 to 1000"));
+    EXPECT_TRUE(says(read(R"({"car": {"size": [1, 1, 1], "tints": ["red"]}})"), "#rrggbb"));
+    EXPECT_TRUE(says(read(R"({"car": {"size": [1, 1, 1], "tint": []}})"), "tint"));
+}
+
+} // namespace engine_guessed_objects_test
+} // namespace semrover
