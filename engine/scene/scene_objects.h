@@ -29,6 +29,9 @@ constexpr size_t kMaxObjects = 1 << 20;
 // or without size, colours outside 0..1.
 Result<std::vector<SceneObject>> parse_objects(const Json& json, std::string_view where);
 Result<std::vector<SceneObject>> read_objects(const Path& path);
+// bad_input, with `where` in front, for a box beyond 1000 km, without size or longer than 10 km, and for what is not
+// finite: what a file of objects cannot hold
+Status check_object(const SceneObject& object, std::string_view where);
 Status write_objects(const Path& path, std::span<const SceneObject> objects);
 
 } // namespace semrover
