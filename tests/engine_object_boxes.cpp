@@ -346,6 +346,19 @@ TEST_F(ObjectBoxes, carla_boxes_of_an_actor_move_with_its_transform)
     const auto rolled = carla(R"([{"type": "Car", "location": [0, 1, 0], "rotation": [0, 0, 0], "extent": [2, 1, 1],
         "transform": {"location": [0, 0, 0], "rotation": [0, 0, 30]}}])");
     expect_box(rolled->objects.at(0), kCar, {0, -std::sqrt(0.75), -0.5}, {4, 2, 2}, 0);
+    // one that looks along CARLA's y has -x to its right; rolled by 30 degrees, right is (-cos, 0, -sin) and up is
+    // (-sin, 0, cos)
+    const auto turned = carla(R"([{"type": "Car", "location": [0, 1, 2], "rotation": [0, 0, 0], "extent": [2, 1, 1],
+        "transform": {"location": [0, 0, 0], "rotation": [0, 90, 30]}}])");
+    expect_box(turned->objects.at(0), kCar, {-std::sqrt(0.75) - 1, 0, std::sqrt(3) - 0.5}, {4, 2, 2}, -kPi / 2);
+    // rolled by 30 degrees, right is (0, cos, -sin); climbing by 30, up becomes (-sin, 0, cos): right is (1/4, cos,
+    // ...)
+    const auto climbing = carla(R"([{"type": "Car", "location": [0, 1, 0], "rotation": [30, 0, 30],
+        "extent": [2, 1, 1], "transform": {"location": [0, 0, 0], "rotation": [0, 0, 0]}}, {"type": "Car",
+        "location": [0, 1, 0], "rotation": [0, 0, 0], "extent": [2, 1, 1],
+        "transform": {"location": [0, 0, 0], "rotation": [30, 0, 30]}}])");
+    expect_box(climbing->objects.at(0), kCar, {0, -1, 0}, {4, 2, 2}, 0);
+    expect_box(climbing->objects.at(1), kCar, {0.25, -std::sqrt(0.75), -std::sqrt(0.1875)}, {4, 2, 2}, 0);
     const auto lying =
         carla(R"([{"type": "Car", "location": [0, 1, 0], "rotation": [0, 0, 80], "extent": [2, 1, 1]}])");
     ASSERT_TRUE(lying) << lying.error().message;
