@@ -46,7 +46,7 @@ TEST(CliStreets, a_street_comes_with_mesh_grids_drive_and_pictures_that_agree)
     EXPECT_GT(std::ranges::count(truth->labels, 19), 10); // thin lines are not lost
     const auto objects = read_objects(out / "objects.json");
     ASSERT_TRUE(objects) << objects.error().message;
-    const std::vector<int32_t> owners = objects_of_cells(*truth, *objects);
+    const std::vector<int32_t> owners = *objects_of_cells(*truth, *objects);
     size_t cars = 0, owned = 0;
     for (size_t v = 0; v < owners.size(); ++v)
         if (truth->labels[v] == 13) {

@@ -67,7 +67,7 @@ TEST(engine_conditions, parts_are_joined_in_the_order_of_the_config_and_what_is_
     painted.tint = {1, 0.5, 0};
     TransformerConfig config;
     config.condition = {ConditionPart::tint, ConditionPart::object};
-    const CellConditions told(config, grid, std::span(&painted, 1));
+    const CellConditions told = *CellConditions::create(config, grid, std::span(&painted, 1));
     ASSERT_EQ(told.width(), kWidth);
     std::vector<float> row(kWidth, 9), expected(60);
     told.row(0, grid.cells[0], row);
@@ -81,11 +81,11 @@ TEST(engine_conditions, parts_are_joined_in_the_order_of_the_config_and_what_is_
     }
     config.condition = {ConditionPart::tint};
     const SceneObject plain = car();
-    const CellConditions colors(config, grid, std::span(&plain, 1));
+    const CellConditions colors = *CellConditions::create(config, grid, std::span(&plain, 1));
     row.assign(4, 9);
     colors.row(0, grid.cells[0], row);
     EXPECT_EQ(row, std::vector<float>(4, 0.f));
-    EXPECT_TRUE(CellConditions(config, grid, {}).empty());
+    EXPECT_TRUE(CellConditions::create(config, grid, {})->empty());
 }
 
 TEST(engine_conditions, a_config_names_each_part_once)

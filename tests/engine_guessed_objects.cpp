@@ -147,7 +147,7 @@ TEST(engine_guessed_objects, every_cell_of_a_wall_belongs_to_the_house_around_it
 {
     const VoxelGrid grid = street().grid();
     const auto objects = guess_objects(grid, usual(), 1);
-    const std::vector<int32_t> owners = objects_of_cells(grid, objects);
+    const std::vector<int32_t> owners = *objects_of_cells(grid, objects);
     std::map<int32_t, int> houses;
     for (size_t v = 0; v < grid.cells.size(); ++v)
         if (grid.labels[v] == kBuilding || grid.labels[v] == kCar) {

@@ -5,9 +5,11 @@
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
 
+#include <algorithm>
 #include <cmath>
 #include <gtest/gtest.h>
 #include <numbers>
+#include <random>
 
 namespace semrover {
 namespace engine_objects_test {
@@ -110,7 +112,7 @@ TEST(engine_objects, cells_belong_to_the_box_of_their_class_in_which_they_lie_de
     const VoxelGrid grid = slab();
     const double turn = std::numbers::pi / 6;
     const std::vector<SceneObject> objects = {car(0, -4, 0, turn), car(1, 0.5, 0, turn), car(2, 900, 0, 0)};
-    const std::vector<int32_t> owners = objects_of_cells(grid, objects);
+    const std::vector<int32_t> owners = *objects_of_cells(grid, objects);
     size_t owned = 0;
     for (size_t v = 0; v < grid.cells.size(); ++v) {
         const auto center = cell_center(grid.cells[v], grid.voxel_size);
@@ -133,12 +135,80 @@ TEST(engine_objects, cells_belong_to_the_box_of_their_class_in_which_they_lie_de
     EXPECT_LT(owned, 500u);
 }
 
+// as objects_of_cells, by comparing every object with every cell of its class
+std::vector<int32_t> owners_by_product(const VoxelGrid& grid, const std::vector<SceneObject>& objects)
+{
+    const double size = double(grid.voxel_size);
+    std::vector<int32_t> owners;
+    for (size_t v = 0; v < grid.cells.size(); ++v) {
+        const auto& [i, j, k] = grid.cells[v];
+        double best = -kObjectReach;
+        owners.push_back(kNoObject);
+        for (size_t o = 0; o < objects.size(); ++o) {
+            const auto place = place_in(objects[o], {(i + 0.5) * size, (j + 0.5) * size, (k + 0.5) * size});
+            double depth = 1e9;
+            for (size_t a = 0; a < 3; ++a)
+                depth = std::min(depth, objects[o].size[a] / 2 - std::abs(place[a]));
+            if (objects[o].label == grid.labels[v] && depth > best) {
+                best = depth;
+                owners.back() = int32_t(o);
+            }
+        }
+    }
+    return owners;
+}
+
+TEST(engine_objects, owners_are_those_of_the_product_of_all_objects_and_cells)
+{
+    std::mt19937 random(5);
+    const auto number = [&](double low, double high) { return low + (high - low) * double(random()) / 4294967296.0; };
+    for (const float voxel_size : {0.25f, 0.6f, 2.f}) {
+        VoxelGrid grid;
+        grid.voxel_size = voxel_size;
+        for (int n = 0; n < 6000; ++n) {
+            grid.cells.push_back({int32_t(number(-60, 60)), int32_t(number(-40, 40)), int32_t(number(-2, 9))});
+            grid.labels.push_back(random() % 2 ? kBuilding : kCar);
+        }
+        sort_cells(grid);
+        std::vector<SceneObject> objects;
+        for (uint32_t n = 0; n < 200; ++n) {
+            const double longest = n % 10 ? 6 : 60;
+            objects.push_back({.id = n,
+                               .label = n % 3 ? kBuilding : kCar,
+                               .center = {number(-70, 70), number(-50, 50), number(-1, 4)},
+                               .size = {number(0.1, longest), number(0.1, longest / 3), number(0.1, 8)},
+                               .heading = n % 7 ? number(-4, 4) : std::numbers::pi / 2 * double(n % 4)});
+        }
+        objects.push_back(objects[1]); // of equals the first
+        const auto owners = objects_of_cells(grid, objects);
+        ASSERT_TRUE(owners);
+        EXPECT_EQ(*owners, owners_by_product(grid, objects)) << voxel_size;
+        EXPECT_GT(std::ranges::count_if(*owners, [](int32_t o) { return o != kNoObject; }), 100) << voxel_size;
+        EXPECT_EQ(std::ranges::count(*owners, 200), 0);
+    }
+}
+
+TEST(engine_objects, boxes_that_lie_over_too_many_cells_are_refused)
+{
+    const VoxelGrid grid = slab(); // 800 cells of cars in 40 slices
+    const SceneObject wide = {.id = 0, .label = kCar, .center = {}, .size = {100, 100, 2}, .heading = 0.3};
+    std::vector<SceneObject> objects(3, wide);
+    EXPECT_TRUE(objects_of_cells(grid, objects, 3 * 840));
+    EXPECT_TRUE(
+        says(objects_of_cells(grid, objects, 3 * 840 - 1),
+             "object 3 of 3: the boxes so far lie over more than 2519 cells of their classes, counted with each "
+             "box; the grid has 1600 cells"));
+    EXPECT_TRUE(says(objects_of_cells(grid, objects, 840 + 40 - 1), "object 2 of 3"));
+    objects.assign(1 << 20, car(0, 500, 0, 0)); // far from all cells: nothing to compare
+    EXPECT_TRUE(objects_of_cells(grid, objects, 0));
+}
+
 TEST(engine_objects, a_tint_is_the_median_of_the_points_of_the_objects_own_cells)
 {
     VoxelGrid grid = slab();
     std::vector<SceneObject> objects = {car(0, 0, 0, 0), car(1, 50, 0, 0)};
     objects[1].tint = {0, 1, 0};
-    tint_objects(objects, grid);
+    ASSERT_TRUE(tint_objects(objects, grid));
     ASSERT_TRUE(objects[0].tint);
     EXPECT_NEAR((*objects[0].tint)[0] * 255, 19.5, 0.6); // i from -6 to 5, 20 added
     EXPECT_NEAR((*objects[0].tint)[1] * 255, 10, 1e-9);
@@ -146,7 +216,7 @@ TEST(engine_objects, a_tint_is_the_median_of_the_points_of_the_objects_own_cells
     EXPECT_EQ(objects[1].tint, (std::array<double, 3>{0, 1, 0}));
     grid.generated.assign(grid.cells.size(), 0);
     objects[0].tint.reset();
-    tint_objects(objects, grid);
+    ASSERT_TRUE(tint_objects(objects, grid));
     EXPECT_FALSE(objects[0].tint);
 }
 

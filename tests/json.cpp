@@ -46,6 +46,44 @@ TEST(Json, limits_hold_for_depth_values_and_bytes)
     EXPECT_TRUE(says(parse_json("[1,2,3]", "t", {.bytes = 6}), "at most 6 bytes"));
 }
 
+TEST(Json, values_of_an_array_come_one_by_one)
+{
+    Json all = Json::array();
+    const auto keep = [&](const Json& value, size_t number) -> Status {
+        EXPECT_EQ(number, all.size());
+        all.push_back(value);
+        return {};
+    };
+    const char* text = R"([{"a": [1, {"b": []}], "c": null}, 7, [], [[2], true], "x", -1, 1.5, {}])";
+    ASSERT_TRUE(parse_json_records(text, "t", {.depth = 4, .values = 6}, keep));
+    EXPECT_EQ(all, Json::parse(text));
+    all = Json::array();
+    EXPECT_TRUE(parse_json_records("[]", "t", {}, keep));
+    EXPECT_TRUE(all.empty());
+    EXPECT_TRUE(says(parse_json_records(text, "t", {.depth = 2}, keep), "t: value 0: nested deeper than 2"));
+    EXPECT_TRUE(says(parse_json_records("[[1, 2, 3], 4]", "t", {.values = 3}, [](auto&&...) { return Status(); }),
+                     "value 0: more than 3 values"));
+    all = Json::array();
+    EXPECT_TRUE(says(parse_json_records(R"([1, {"k": 1, "k": 2}])", "t", {}, keep), "value 1: key 'k' appears twice"));
+    EXPECT_EQ(all.size(), 1u);
+    for (const char* other : {"{}", "7", "null", "{\"a\": []}"})
+        EXPECT_TRUE(says(parse_json_records(other, "t", {}, keep), "t: expected an array")) << other;
+    for (const char* broken : {"", "[", "[1", "[1]]", "[1] 2", "[{\"a\""}) {
+        all = Json::array();
+        EXPECT_TRUE(says(parse_json_records(broken, "t", {}, keep), "not valid JSON")) << broken;
+    }
+    EXPECT_TRUE(says(parse_json_records("[1]", "t", {.bytes = 2}, keep), "at most 2 bytes"));
+    size_t calls = 0;
+    EXPECT_TRUE(says(parse_json_records("[1, 2, 3]", "t", {},
+                                        [&](const Json&, size_t) -> Status {
+                                            if (++calls == 2)
+                                                return fail(ErrorCode::bad_input, "enough");
+                                            return {};
+                                        }),
+                     "enough"));
+    EXPECT_EQ(calls, 2u);
+}
+
 TEST(Json, a_file_is_read_and_named_in_its_error)
 {
     const ScratchFolder folder;

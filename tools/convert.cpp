@@ -1,7 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// semrover convert IN OUT: a model in another layout, or a scene or a camera path in another format, by what IN is
+// semrover convert IN OUT: a model in another layout; or a scene, a camera path or boxes in another format, as IN says
+#include "runtime/base/quote.h"
 #include "tools/convert_model.h"
+#include "tools/convert_objects.h"
 #include "tools/convert_path.h"
 #include "tools/convert_scene.h"
 
@@ -15,7 +17,35 @@ struct ConvertArguments {
     ConvertModelOptions model;
     ConvertSceneOptions scene;
     ConvertPathOptions path;
+    ConvertObjectsOptions objects;
 };
+
+// --from; else what leaves no doubt
+std::optional<BoxFormat> box_format(const ConvertArguments& o)
+{
+    return o.scene.input.from.empty() ? detect_box_format(o.model.in) : box_format_of(o.scene.input.from);
+}
+
+Status convert_boxes(const ConvertArguments& o, BoxFormat format, const Globals& globals)
+{
+    if (!o.model.dtype.empty() || o.model.asd_init || !o.scene.to.empty())
+        return fail(ErrorCode::usage, "--dtype, --asd-init and --to have no meaning for boxes");
+    SR_TRY(const Point3 origin, origin_of(o.scene.input));
+    return convert_objects(
+        {.in = o.model.in, .out = o.model.out, .map = o.scene.input.map, .origin = origin, .dry_run = o.model.dry_run},
+        format, o.objects, globals);
+}
+
+Status check_from(const ConvertArguments& o)
+{
+    const std::string& from = o.scene.input.from;
+    if (from.empty() || scene_format_of_name(from))
+        return {};
+    std::string names = names_of_box_formats();
+    for (const SceneFormatFacts& f : scene_formats())
+        names += fmt::format(", {}", f.name);
+    return fail(ErrorCode::usage, "--from: there is no format {}; formats are {}", quote(from, 60), names);
+}
 
 // a .bin may be SemanticKITTI's, or a model's pickle
 bool is_scene(const ConvertArguments& o)
@@ -31,6 +61,14 @@ bool is_scene(const ConvertArguments& o)
 
 Status convert(ConvertArguments& o, const Globals& globals)
 {
+    if (const auto format = box_format(o))
+        return convert_boxes(o, *format, globals);
+    SR_CHECK(check_from(o));
+    if (o.objects.any())
+        return fail(ErrorCode::usage,
+                    "--calib, --frame, --sample and --vehicle-frame are for boxes; {} are none, or "
+                    "--from says which",
+                    quote_path(o.model.in));
     if (is_camera_path(o.model.in))
         return convert_path(o.model.in, o.model.out, o.path, globals);
     if (!is_scene(o))
@@ -52,7 +90,7 @@ void add_convert(CLI::App& app, const Globals& globals, Run& run)
     c->add_option(
          "IN", o->model.in,
          "a single-file Stable Diffusion checkpoint (.safetensors) or a model folder; or a grid (.sgrid, .npz, "
-         ".label, .vox, .ply) or splats (.ply, .glb, .splat)")
+         ".label, .vox, .ply) or splats (.ply, .glb, .splat); or boxes (KITTI, nuScenes, Waymo, CARLA)")
         ->required();
     c->add_option("OUT", o->model.out, "folder to write; or the scene's file, its format by the extension")->required();
     c->add_option("--dtype", o->model.dtype, "precision of the weights; by default as in IN")
@@ -67,6 +105,8 @@ void add_convert(CLI::App& app, const Globals& globals, Run& run)
     c->add_option("--opacity", o->scene.opacity, "grid to splats: of every splat")->check(CLI::Range(0.01f, 1.f));
     c->add_flag("--splat-labels", o->scene.splat_labels, "a property label in .ply splats");
     add_path_options(*c, o->path);
+    add_box_options(*c, o->objects);
+    c->get_option("--from")->description(c->get_option("--from")->get_description() + ", " + names_of_box_formats());
     c->callback([o, &globals, &run] { run = [o, &globals] { return convert(*o, globals); }; });
 }
 

@@ -21,24 +21,12 @@ std::string names_of_formats()
     return names;
 }
 
-Result<std::array<double, 3>> origin_of(const std::string& text)
-{
-    std::array<double, 3> origin{};
-    int used = 0;
-    if (text.empty())
-        return origin;
-    if (std::sscanf(text.c_str(), "%lf,%lf,%lf%n", &origin[0], &origin[1], &origin[2], &used) != 3 ||
-        size_t(used) != text.size() || !std::isfinite(origin[0] + origin[1] + origin[2]))
-        return fail(ErrorCode::usage, "--origin takes X,Y,Z in metres, not {}", quote(text, 60));
-    return origin;
-}
-
 Result<SceneGridOptions> grid_options(const SceneInputOptions& o)
 {
     SceneGridOptions g;
     g.map = o.map;
     g.voxel_size = o.voxel_size;
-    SR_TRY(g.origin, origin_of(o.origin));
+    SR_TRY(g.origin, origin_of(o));
     g.min_fill = o.min_fill;
     g.mask = o.mask;
     g.points_per_voxel = o.points_per_voxel;
@@ -54,6 +42,19 @@ Result<SceneGridOptions> grid_options(const SceneInputOptions& o)
 }
 
 } // namespace
+
+Result<std::array<double, 3>> origin_of(const SceneInputOptions& options)
+{
+    const std::string& text = options.origin;
+    std::array<double, 3> origin{};
+    int used = 0;
+    if (text.empty())
+        return origin;
+    if (std::sscanf(text.c_str(), "%lf,%lf,%lf%n", &origin[0], &origin[1], &origin[2], &used) != 3 ||
+        size_t(used) != text.size() || !std::isfinite(origin[0] + origin[1] + origin[2]))
+        return fail(ErrorCode::usage, "--origin takes X,Y,Z in metres, not {}", quote(text, 60));
+    return origin;
+}
 
 void add_scene_input_options(CLI::App& c, SceneInputOptions& o)
 {

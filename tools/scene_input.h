@@ -21,6 +21,9 @@ struct SceneInputOptions {
 void add_scene_input_options(CLI::App& command, SceneInputOptions& options); // the ones that most files need
 void add_all_scene_input_options(CLI::App& command, SceneInputOptions& options);
 
+// --origin as numbers; errors: usage
+Result<std::array<double, 3>> origin_of(const SceneInputOptions& options);
+
 // what a file holds: one of the two
 struct SceneInput {
     SceneFormat format = SceneFormat::sgrid;

@@ -13,7 +13,7 @@ namespace {
 
 constexpr size_t kMostListed = 20;
 
-std::optional<uint32_t> number_of(std::string_view text)
+std::optional<uint32_t> number_of_key(std::string_view text)
 {
     uint32_t value = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -65,7 +65,7 @@ Status LabelMap::apply(const Path& file)
     for (const auto& [key, value] : json.items()) {
         const std::string where = fmt::format("{}: {}", quote_path(file), quote(key, 60));
         SR_TRY(const uint8_t target, target_of(value, where));
-        if (const auto number = number_of(key)) {
+        if (const auto number = number_of_key(key)) {
             entries_[*number].target = target;
             continue;
         }

@@ -45,15 +45,15 @@ std::vector<uint32_t> targets_of(const EditedGrid& edited, double halo)
 // colours of the objects that the tints are for. The cells of these are targets; what lies around them is not.
 Status apply_tints(const EditedGrid& edited, std::vector<SceneObject>& objects, std::vector<uint32_t>& targets)
 {
+    SR_TRY(const std::vector<int32_t> owners, objects_of_cells(edited.grid, objects));
     for (const EditedGrid::Tint& tint : edited.tints) {
         std::vector<uint32_t> cells;
         for (const Cell& cell : tint.cells)
             if (const auto found = find_cell(edited.grid, cell)) // a later operation may have removed it
                 cells.push_back(uint32_t(*found));
-        const std::vector<size_t> meant = objects_meant(edited.grid, objects, cells);
+        const std::vector<size_t> meant = objects_meant(owners, objects.size(), cells);
         if (meant.empty())
             return fail(ErrorCode::bad_input, "tint: the cells that are selected belong to no object");
-        const std::vector<int32_t> owners = objects_of_cells(edited.grid, objects);
         for (const size_t o : meant)
             objects[o].tint = tint.color;
         for (uint32_t v = 0; v < owners.size(); ++v)

@@ -15,7 +15,8 @@ Status GridFilling::cut(VoxelGrid& grid, const RegionOptions& regions, std::span
     seconds_ = 0;
     restored_ = 0;
     SR_TRY(outpainter_, Outpainter::create(grid, settings_.model.config, regions));
-    outpainter_->tell(CellConditions(settings_.model.config, grid, objects));
+    SR_TRY(CellConditions conditions, CellConditions::create(settings_.model.config, grid, objects));
+    outpainter_->tell(std::move(conditions));
     return {};
 }
 

@@ -10,25 +10,111 @@ namespace semrover {
 
 namespace {
 
-double depth_in(const SceneObject& object, const std::array<double, 3>& point)
+// an object with its heading's cosine and sine, which many cells need
+struct Turned {
+    const SceneObject& object;
+    double cosine = std::cos(object.heading), sine = std::sin(object.heading);
+
+    std::array<double, 3> place(const std::array<double, 3>& point) const
+    {
+        const double x = point[0] - object.center[0], y = point[1] - object.center[1];
+        return {cosine * x + sine * y, cosine * y - sine * x, point[2] - object.center[2]};
+    }
+    double depth(const std::array<double, 3>& point) const
+    {
+        const std::array<double, 3> p = place(point);
+        double depth = std::numeric_limits<double>::infinity();
+        for (size_t a = 0; a < 3; ++a)
+            depth = std::min(depth, object.size[a] / 2 - std::abs(p[a]));
+        return depth;
+    }
+    // of the widened box, along the world's axis 0 or 1: from, to
+    std::pair<double, double> extent(size_t axis) const
+    {
+        const double ahead = object.size[0] / 2 + kObjectReach, aside = object.size[1] / 2 + kObjectReach;
+        const double half = axis == 0 ? std::abs(cosine) * ahead + std::abs(sine) * aside
+                                      : std::abs(sine) * ahead + std::abs(cosine) * aside;
+        return {object.center[axis] - half, object.center[axis] + half};
+    }
+};
+
+// the cells of one class, in the grid's order, cut into slices of equal i
+struct ClassCells {
+    struct Slice {
+        int32_t i;
+        size_t first; // of `cells`
+    };
+    std::vector<uint32_t> cells; // of the grid
+    std::vector<Slice> slices;
+
+    void add(uint32_t cell, int32_t i)
+    {
+        if (slices.empty() || slices.back().i != i)
+            slices.push_back({i, cells.size()});
+        cells.push_back(cell);
+    }
+    size_t end_of(size_t slice) const { return slice + 1 < slices.size() ? slices[slice + 1].first : cells.size(); }
+};
+
+// of sorted items those whose coordinate, a number of cells, may be between the ends of the extent
+template <typename Items, typename Coordinate>
+auto between(const Items& items, std::pair<double, double> extent, double size, const Coordinate& coordinate)
 {
-    const std::array<double, 3> p = place_in(object, point);
-    double depth = std::numeric_limits<double>::infinity();
-    for (size_t a = 0; a < 3; ++a)
-        depth = std::min(depth, object.size[a] / 2 - std::abs(p[a]));
-    return depth;
+    const auto real = [&](const auto& item) { return double(coordinate(item)); };
+    const auto first = std::ranges::lower_bound(items, std::floor(extent.first / size), {}, real);
+    const auto last = std::ranges::upper_bound(items, std::floor(extent.second / size), {}, real);
+    return std::ranges::subrange(first, std::max(first, last));
 }
 
-// of the sorted cells those that may belong to the object: a range of i
-std::pair<size_t, size_t> cells_across(const VoxelGrid& grid, const SceneObject& object)
-{
-    const double half = std::hypot(object.size[0] / 2 + kObjectReach, object.size[1] / 2 + kObjectReach);
-    const auto cell_of = [&](double x) { return std::floor(x / double(grid.voxel_size)); };
-    const double low = cell_of(object.center[0] - half), high = cell_of(object.center[0] + half);
-    const auto first = std::ranges::lower_bound(grid.cells, low, {}, [](const Cell& c) { return double(c[0]); });
-    const auto last = std::ranges::upper_bound(grid.cells, high, {}, [](const Cell& c) { return double(c[0]); });
-    return {size_t(first - grid.cells.begin()), size_t(last - grid.cells.begin())};
-}
+class OwnerSearch {
+  public:
+    OwnerSearch(const VoxelGrid& grid, uint64_t most)
+        : grid_(grid), owners_(grid.cells.size(), kNoObject), depths_(grid.cells.size(), -kObjectReach), most_(most)
+    {
+        for (uint32_t v = 0; v < grid.cells.size(); ++v)
+            classes_[grid.labels[v]].add(v, grid.cells[v][0]);
+    }
+
+    // false: more comparisons than are allowed
+    bool add(const SceneObject& object, int32_t index)
+    {
+        const Turned turned{object};
+        const ClassCells& own = classes_[object.label];
+        const double size = double(grid_.voxel_size);
+        const auto slices = between(own.slices, turned.extent(0), size, [](const auto& s) { return s.i; });
+        if ((pairs_ += slices.size()) > most_)
+            return false;
+        for (auto slice = slices.begin(); slice != slices.end(); ++slice) {
+            const size_t end = own.end_of(size_t(slice - own.slices.begin()));
+            const auto cells = between(std::span(own.cells).subspan(slice->first, end - slice->first), turned.extent(1),
+                                       size, [&](uint32_t v) { return grid_.cells[v][1]; });
+            if ((pairs_ += cells.size()) > most_)
+                return false;
+            for (uint32_t v : cells)
+                compare(v, turned, index);
+        }
+        return true;
+    }
+    std::vector<int32_t> take() { return std::move(owners_); }
+
+  private:
+    void compare(uint32_t v, const Turned& turned, int32_t index)
+    {
+        const double size = double(grid_.voxel_size);
+        const Cell& c = grid_.cells[v];
+        const double depth = turned.depth({(c[0] + 0.5) * size, (c[1] + 0.5) * size, (c[2] + 0.5) * size});
+        if (depth > depths_[v]) {
+            depths_[v] = depth;
+            owners_[v] = index;
+        }
+    }
+
+    const VoxelGrid& grid_;
+    std::array<ClassCells, 256> classes_;
+    std::vector<int32_t> owners_;
+    std::vector<double> depths_;
+    uint64_t most_, pairs_ = 0;
+};
 
 std::array<double, 3> median_color(const VoxelGrid& grid, std::span<const uint32_t> cells)
 {
@@ -53,44 +139,32 @@ std::array<double, 3> median_color(const VoxelGrid& grid, std::span<const uint32
 
 std::array<double, 3> place_in(const SceneObject& object, const std::array<double, 3>& point)
 {
-    const double x = point[0] - object.center[0], y = point[1] - object.center[1];
-    const double c = std::cos(object.heading), s = std::sin(object.heading);
-    return {c * x + s * y, c * y - s * x, point[2] - object.center[2]};
+    return Turned{object}.place(point);
 }
 
-std::vector<int32_t> objects_of_cells(const VoxelGrid& grid, std::span<const SceneObject> objects)
+Result<std::vector<int32_t>> objects_of_cells(const VoxelGrid& grid, std::span<const SceneObject> objects,
+                                              uint64_t most)
 {
-    const double size = double(grid.voxel_size);
-    std::vector<int32_t> owners(grid.cells.size(), kNoObject);
-    std::vector<double> depths(grid.cells.size(), -kObjectReach);
-    for (size_t o = 0; o < objects.size(); ++o) {
-        const auto [first, last] = cells_across(grid, objects[o]);
-        for (size_t v = first; v < last; ++v) {
-            if (grid.labels[v] != objects[o].label)
-                continue;
-            const Cell& c = grid.cells[v];
-            const double depth = depth_in(objects[o], {(c[0] + 0.5) * size, (c[1] + 0.5) * size, (c[2] + 0.5) * size});
-            if (depth > depths[v]) {
-                depths[v] = depth;
-                owners[v] = int32_t(o);
-            }
-        }
-    }
-    return owners;
+    OwnerSearch search(grid, most);
+    for (size_t o = 0; o < objects.size(); ++o)
+        if (!search.add(objects[o], int32_t(o)))
+            return fail(ErrorCode::bad_input,
+                        "object {} of {}: the boxes so far lie over more than {} cells of their classes, counted with "
+                        "each box; the grid has {} cells",
+                        o + 1, objects.size(), most, grid.cells.size());
+    return search.take();
 }
 
-std::vector<size_t> objects_meant(const VoxelGrid& grid, std::span<const SceneObject> objects,
-                                  std::span<const uint32_t> cells)
+std::vector<size_t> objects_meant(std::span<const int32_t> owners, size_t objects, std::span<const uint32_t> cells)
 {
-    const std::vector<int32_t> owners = objects_of_cells(grid, objects);
-    std::vector<size_t> all(objects.size()), chosen(objects.size()), meant;
+    std::vector<size_t> all(objects), chosen(objects), meant;
     for (const int32_t owner : owners)
         if (owner != kNoObject)
             ++all[size_t(owner)];
     for (const uint32_t cell : cells)
         if (owners[cell] != kNoObject)
             ++chosen[size_t(owners[cell])];
-    for (size_t o = 0; o < objects.size(); ++o)
+    for (size_t o = 0; o < objects; ++o)
         if (chosen[o] * 2 > all[o])
             meant.push_back(o);
     const auto most = std::ranges::max_element(chosen);
@@ -99,11 +173,11 @@ std::vector<size_t> objects_meant(const VoxelGrid& grid, std::span<const SceneOb
     return meant;
 }
 
-void tint_objects(std::span<SceneObject> objects, const VoxelGrid& grid)
+Status tint_objects(std::span<SceneObject> objects, const VoxelGrid& grid)
 {
     if (!grid.has_points())
-        return;
-    const std::vector<int32_t> owners = objects_of_cells(grid, objects);
+        return {};
+    SR_TRY(const std::vector<int32_t> owners, objects_of_cells(grid, objects));
     std::vector<uint32_t> cells;
     for (uint32_t v = 0; v < owners.size(); ++v)
         if (owners[v] != kNoObject && grid.generated[v])
@@ -115,6 +189,7 @@ void tint_objects(std::span<SceneObject> objects, const VoxelGrid& grid)
             ++last;
         objects[size_t(owner)].tint = median_color(grid, std::span(cells).subspan(first, last - first));
     }
+    return {};
 }
 
 } // namespace semrover

@@ -10,22 +10,28 @@ namespace semrover {
 constexpr int32_t kNoObject = -1;
 constexpr double kObjectReach = 1.5; // metres: balconies and mirrors stand out of boxes
 
+// the most pairs of an object and a cell near it that are compared: each of a million cells with a thousand boxes
+constexpr uint64_t kMaxObjectPairs = 1ull << 30;
+
 // place of a point in the axes of an object's box, metres from the box's middle
 std::array<double, 3> place_in(const SceneObject& object, const std::array<double, 3>& point);
 
 // For each cell of a grid the index of the object that it belongs to, or kNoObject: among the objects of its class
 // whose box, widened by kObjectReach on all sides, holds its centre, the one in which it lies deepest (of equals the
-// first). The depth is the distance from the nearest face along the box's axes, negative outside.
-std::vector<int32_t> objects_of_cells(const VoxelGrid& grid, std::span<const SceneObject> objects);
+// first). The depth is the distance from the nearest face along the box's axes, negative outside. The grid's cells are
+// sorted. Compares each object with the cells of its class below and above the rectangle that its box covers.
+// Errors: bad_input with the number of the object at which the comparisons, and the slices of cells that they need,
+// come to more than `most`.
+Result<std::vector<int32_t>> objects_of_cells(const VoxelGrid& grid, std::span<const SceneObject> objects,
+                                              uint64_t most = kMaxObjectPairs);
 
-// Which objects somebody means who selects these cells (indices into `grid`): those of which more than half of the
-// cells are among them or, where there is none, the one that has most of them. Indices, ascending; empty where the
-// cells belong to no object.
-std::vector<size_t> objects_meant(const VoxelGrid& grid, std::span<const SceneObject> objects,
-                                  std::span<const uint32_t> cells);
+// Which of a number of objects somebody means who selects these cells, by objects_of_cells: those of which more than
+// half of the cells are among them or, where there is none, the one that has most of them. Indices, ascending; empty
+// where the cells belong to no object.
+std::vector<size_t> objects_meant(std::span<const int32_t> owners, size_t objects, std::span<const uint32_t> cells);
 
 // Gives each object the median colour, channel by channel, of the points of its cells; objects without points keep what
-// they have.
-void tint_objects(std::span<SceneObject> objects, const VoxelGrid& grid);
+// they have. Errors: as objects_of_cells
+Status tint_objects(std::span<SceneObject> objects, const VoxelGrid& grid);
 
 } // namespace semrover

@@ -20,7 +20,7 @@ using Triple = std::array<double, 3>;
 constexpr const char* kFormat = "semrover.objects";
 constexpr std::array<std::string_view, 4> kFileKeys = {"format", "version", "objects", "comment"};
 constexpr std::array<std::string_view, 7> kObjectKeys = {"id", "class", "center", "size", "heading", "tint", "comment"};
-constexpr double kFarthest = 1e6, kLongest = 1e4, kLargestAngle = 1e3;
+constexpr double kFarthest = 1e6, kShortest = 1e-3, kLongest = 1e4, kLargestAngle = 1e3;
 
 Result<double> number_within(const Json& json, double low, double high, std::string_view where)
 {
@@ -80,7 +80,7 @@ Result<SceneObject> parse_object(const Json& json, std::string_view where)
     o.id = id->get<uint32_t>();
     SR_TRY(o.label, class_of(json, where));
     SR_TRY(o.center, triple_of(json, "center", -kFarthest, kFarthest, where));
-    SR_TRY(o.size, triple_of(json, "size", 1e-3, kLongest, where));
+    SR_TRY(o.size, triple_of(json, "size", kShortest, kLongest, where));
     const auto heading = json.find("heading");
     if (heading == json.end())
         return fail(ErrorCode::bad_input, "{}: heading is missing", where);
@@ -171,6 +171,22 @@ SceneObject as_written(SceneObject o)
 Path objects_beside(const Path& grid)
 {
     return Path(grid).replace_extension(".objects.json");
+}
+
+Status check_object(const SceneObject& object, std::string_view where)
+{
+    for (double v : object.center)
+        if (!(std::abs(v) <= kFarthest))
+            return fail(ErrorCode::bad_input, "{}: center: expected numbers from {} to {}, found {}", where, -kFarthest,
+                        kFarthest, v);
+    for (double v : object.size)
+        if (!(v >= kShortest && v <= kLongest))
+            return fail(ErrorCode::bad_input, "{}: size: expected numbers from {} to {}, found {}", where, kShortest,
+                        kLongest, v);
+    if (!(std::abs(object.heading) <= kLargestAngle))
+        return fail(ErrorCode::bad_input, "{}: heading: expected a number from {} to {}, found {}", where,
+                    -kLargestAngle, kLargestAngle, object.heading);
+    return {};
 }
 
 Status write_objects(const Path& path, std::span<const SceneObject> objects)

@@ -33,6 +33,9 @@ std::string tint_text(const std::array<double, 3>& tint); // "#7a1f1c", each cha
 // beyond 1000 km or without size, colours outside 0..1.
 Result<std::vector<SceneObject>> parse_objects(const Json& json, std::string_view where);
 Result<std::vector<SceneObject>> read_objects(const Path& path);
+// bad_input, with `where` in front, for a box beyond 1000 km, without size or longer than 10 km, and for what is not
+// finite: what a file of objects cannot hold
+Status check_object(const SceneObject& object, std::string_view where);
 // "street.sgrid" -> "street.objects.json": where generate writes, and edit and inpaint look for, a grid's objects
 Path objects_beside(const Path& grid);
 SceneObject as_written(SceneObject object);

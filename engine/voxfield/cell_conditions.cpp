@@ -44,13 +44,18 @@ void tint_condition(const std::array<double, 3>& tint, std::span<float> out)
         out[1 + c] = float(2 * tint[c] - 1);
 }
 
-CellConditions::CellConditions(const TransformerConfig& config, const VoxelGrid& grid,
-                               std::span<const SceneObject> objects)
-    : parts_(config.condition), width_(config.condition_width()), voxel_size_(double(grid.voxel_size)),
-      objects_(objects.begin(), objects.end())
+Result<CellConditions> CellConditions::create(const TransformerConfig& config, const VoxelGrid& grid,
+                                              std::span<const SceneObject> objects)
 {
-    if (width_ && !objects_.empty())
-        owners_ = objects_of_cells(grid, objects_);
+    CellConditions conditions;
+    conditions.parts_ = config.condition;
+    conditions.width_ = config.condition_width();
+    conditions.voxel_size_ = double(grid.voxel_size);
+    conditions.objects_.assign(objects.begin(), objects.end());
+    if (conditions.width_ && !objects.empty()) {
+        SR_TRY(conditions.owners_, objects_of_cells(grid, objects));
+    }
+    return conditions;
 }
 
 void CellConditions::row(uint32_t cell, const Cell& index, std::span<float> out) const

@@ -16,8 +16,9 @@ class CellConditions {
   public:
     CellConditions() = default; // tells nothing
 
-    // of the grid's cells as they are now, in their order
-    CellConditions(const TransformerConfig& config, const VoxelGrid& grid, std::span<const SceneObject> objects);
+    // of the grid's cells as they are now, in their order. Errors: as objects_of_cells
+    static Result<CellConditions> create(const TransformerConfig& config, const VoxelGrid& grid,
+                                         std::span<const SceneObject> objects);
 
     bool empty() const { return owners_.empty(); }
     size_t width() const { return width_; }

@@ -4,6 +4,7 @@
 
 #include "runtime/base/quote.h"
 
+#include <optional>
 #include <vector>
 
 namespace semrover {
@@ -34,6 +35,7 @@ class ValueBuilder : public JsonEvents {
         return true;
     }
 
+    bool whole() const { return open_.empty(); } // no array or object is open
     Json root;
 
   private:
@@ -75,6 +77,85 @@ class ValueBuilder : public JsonEvents {
     std::vector<Json*> open_;
     std::string key_;
     uint64_t values_ = 0;
+};
+
+// gives the values of an array to a function one by one
+class RecordEvents : public JsonEvents {
+  public:
+    using Record = std::function<Status(const Json&, size_t)>;
+    RecordEvents(const JsonLimits& limits, const Record& record) : limits_(limits), record_(record) {}
+
+    bool null() override
+    {
+        return pass([](ValueBuilder& b) { return b.null(); });
+    }
+    bool boolean(bool value) override
+    {
+        return pass([=](ValueBuilder& b) { return b.boolean(value); });
+    }
+    bool number_integer(number_integer_t value) override
+    {
+        return pass([=](ValueBuilder& b) { return b.number_integer(value); });
+    }
+    bool number_unsigned(number_unsigned_t value) override
+    {
+        return pass([=](ValueBuilder& b) { return b.number_unsigned(value); });
+    }
+    bool number_float(number_float_t value, const string_t& text) override
+    {
+        return pass([&](ValueBuilder& b) { return b.number_float(value, text); });
+    }
+    bool string(string_t& value) override
+    {
+        return pass([&](ValueBuilder& b) { return b.string(value); });
+    }
+    bool key(string_t& name) override
+    {
+        return pass([&](ValueBuilder& b) { return b.key(name); });
+    }
+    bool start_object(size_t size) override
+    {
+        return pass([=](ValueBuilder& b) { return b.start_object(size); });
+    }
+    bool end_object() override
+    {
+        return pass([](ValueBuilder& b) { return b.end_object(); });
+    }
+    bool start_array(size_t size) override
+    {
+        if (!begun_)
+            return begun_ = true;
+        return pass([=](ValueBuilder& b) { return b.start_array(size); });
+    }
+    bool end_array() override
+    {
+        return !builder_ || pass([](ValueBuilder& b) { return b.end_array(); });
+    }
+
+    Status result;
+
+  private:
+    template <typename Event>
+    bool pass(const Event& event)
+    {
+        if (!begun_)
+            return refuse("expected an array");
+        if (!builder_)
+            builder_.emplace(limits_);
+        if (!event(*builder_))
+            return refuse(fmt::format("value {}: {}", number_, builder_->refusal()));
+        if (!builder_->whole())
+            return true;
+        result = record_(builder_->root, number_++);
+        builder_.reset();
+        return result.has_value();
+    }
+
+    const JsonLimits& limits_;
+    const Record& record_;
+    std::optional<ValueBuilder> builder_;
+    size_t number_ = 0;
+    bool begun_ = false;
 };
 
 } // namespace
@@ -122,6 +203,18 @@ Result<Json> read_json(const Path& path, const JsonLimits& limits)
 {
     SR_TRY(const std::string text, read_text_file(path, limits.bytes));
     return parse_json(text, quote_path(path), limits);
+}
+
+Status parse_json_records(std::string_view text, std::string_view where, const JsonLimits& limits,
+                          const std::function<Status(const Json& value, size_t number)>& record)
+{
+    if (text.size() > limits.bytes)
+        return fail(ErrorCode::bad_input, "{}: expected at most {} bytes of JSON, found {}", where, limits.bytes,
+                    text.size());
+    RecordEvents events(limits, record);
+    const Status parsed = parse_json_events(text, where, events);
+    SR_CHECK(std::move(events.result));
+    return parsed;
 }
 
 Json short_number(float value)

@@ -6,6 +6,7 @@
 #include "runtime/base/result.h"
 
 #include <cstdint>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
@@ -43,6 +44,12 @@ struct JsonLimits {
 // Parses a document into a value. bad_input as above, and for duplicate keys at any level and numbers beyond double.
 Result<Json> parse_json(std::string_view text, std::string_view where, const JsonLimits& limits = {});
 Result<Json> read_json(const Path& path, const JsonLimits& limits = {});
+
+// Parses an array of values and calls `record` with each and its number from 0, so that only one is in memory.
+// `limits.depth` and `limits.values` are those of one. Errors: bad_input as above and for what is no array, and what
+// `record` returns.
+Status parse_json_records(std::string_view text, std::string_view where, const JsonLimits& limits,
+                          const std::function<Status(const Json& value, size_t number)>& record);
 
 // a float's shortest digits: 0.18215, not 0.18215000629425049
 Json short_number(float value);

@@ -62,7 +62,7 @@ Status write_grids(const StreetsArguments& o, Device& device, Street& street, st
     VoxelizeOptions voxels = o.voxels;
     voxels.seed = o.street.seed;
     SR_TRY(StreetGrids grids, street_grids(device, street, voxels));
-    tint_objects(street.boxes, grids.truth);
+    SR_CHECK(tint_objects(street.boxes, grids.truth));
     if (o.seen) {
         SR_TRY(const std::vector<uint32_t> seen, seen_cells(device, street.mesh, grids.truth, drives, o.sight));
         grids = part_of(grids, seen);

@@ -1,0 +1,29 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/format/object_boxes.h"
+#include "tools/cli/commands.h"
+
+namespace semrover {
+
+// boxes of another program to a file of objects (docs/formats.md §3.1)
+struct ConvertObjectsOptions {
+    std::string calibration, sample;
+    std::optional<uint64_t> frame;
+    bool vehicle_frame = false;
+
+    bool any() const { return !calibration.empty() || !sample.empty() || frame || vehicle_frame; }
+};
+void add_box_options(CLI::App& command, ConvertObjectsOptions& options);
+
+struct ObjectsInput {
+    std::string in, out, map;
+    Point3 origin{};
+    bool dry_run = false;
+};
+// errors: usage; bad_input, and then nothing was written
+Status convert_objects(const ObjectsInput& input, BoxFormat format, const ConvertObjectsOptions& options,
+                       const Globals& globals);
+
+} // namespace semrover
