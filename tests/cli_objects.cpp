@@ -126,6 +126,10 @@ TEST_F(CliObjects, what_is_guessed_is_written_and_gives_the_same_when_it_is_give
     made_with(model, "none.sgrid", "--objects none");
     EXPECT_NE(first.colors, read_grid(path("none.sgrid"))->colors);
     EXPECT_FALSE(is_there(folder_ / "none.objects.json"));
+    const std::string convert = "convert " + path("in.sgrid") + " " + path("guess.json");
+    expect_error(semrover_program(convert), 2, "--model is missing");
+    ASSERT_EQ(semrover_program(convert + " -m " + model).code, 0);
+    EXPECT_EQ(contents(folder_ / "guess.json"), contents(folder_ / "auto.objects.json"));
     expect_error(generate_with(model, "auto.sgrid"), 2, "exists");
 }
 

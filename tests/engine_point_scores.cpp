@@ -259,5 +259,42 @@ TEST(EnginePointScores, what_cannot_be_compared_says_why)
     EXPECT_TRUE(says(score(good, good, {.radius = NAN}), "found nan m"));
 }
 
+// rows of ten cells along x, each cell with two points whose brightness is that of the row -+ its detail
+VoxelGrid rows_of_cells(const std::vector<std::pair<int, int>>& rows)
+{
+    VoxelGrid grid;
+    grid.voxel_size = 0.6f;
+    grid.points_per_voxel = 2;
+    for (size_t r = 0; r < rows.size(); ++r)
+        for (int i = 0; i < 10; ++i) {
+            grid.cells.push_back({10 * int32_t(r) + i, 0, 0});
+            grid.labels.push_back(kBuilding);
+            grid.generated.push_back(1);
+            for (int side : {-1, 1})
+                for (int c = 0; c < 3; ++c) {
+                    grid.points.push_back(0);
+                    grid.colors.push_back(uint8_t(rows[r].first + side * rows[r].second));
+                }
+        }
+    return grid;
+}
+
+TEST(engine_point_scores, variety_is_told_within_cells_and_from_one_cube_of_6_m_to_the_next)
+{
+    const VoxelGrid truth = rows_of_cells({{51, 10}, {102, 30}});
+    std::vector<uint8_t> used(20, 1);
+    const VarietySums sums = color_variety(truth, used)[kBuilding];
+    EXPECT_EQ(sums.blocks, 2u);
+    EXPECT_NEAR(sums.detail(), 20 / 255.0, 1e-9) << "the mean of 10 and 30";
+    EXPECT_NEAR(sums.spread(), 0.1, 1e-9) << "of 0.2 and 0.4";
+    std::fill(used.begin() + 14, used.end(), uint8_t(0)); // four are too few for a cube to count
+    EXPECT_EQ(color_variety(truth, used)[kBuilding].blocks, 1u);
+    EXPECT_EQ(color_variety(truth, used)[kBuilding].spread(), 0);
+    VarietySums pooled = sums;
+    pooled += color_variety(rows_of_cells({{51, 10}}), std::vector<uint8_t>(10, 1))[kBuilding];
+    EXPECT_EQ(pooled.blocks, 3u);
+    EXPECT_NEAR(pooled.spread(), std::sqrt((0.04 + 0.16 + 0.04) / 3 - std::pow(0.8 / 3, 2)), 1e-9);
+}
+
 } // namespace engine_point_scores_test
 } // namespace semrover

@@ -18,6 +18,7 @@ struct ConvertArguments {
     ConvertSceneOptions scene;
     ConvertPathOptions path;
     ConvertObjectsOptions objects;
+    std::string guessing_model; // of a grid whose OUT is objects
 };
 
 // --from; else what leaves no doubt
@@ -75,6 +76,10 @@ Status convert(ConvertArguments& o, const Globals& globals)
         return convert_model(o.model, globals);
     if (!o.model.dtype.empty() || o.model.asd_init)
         return fail(ErrorCode::usage, "--dtype and --asd-init are for models");
+    if (Path(o.model.out).extension() == ".json")
+        return guess_objects_of(
+            {.in = o.model.in, .out = o.model.out, .map = {}, .origin = {}, .dry_run = o.model.dry_run}, o.scene.input,
+            o.guessing_model, globals);
     o.scene.in = o.model.in;
     o.scene.out = o.model.out;
     o.scene.dry_run = o.model.dry_run;
@@ -106,6 +111,9 @@ void add_convert(CLI::App& app, const Globals& globals, Run& run)
     c->add_flag("--splat-labels", o->scene.splat_labels, "a property label in .ply splats");
     add_path_options(*c, o->path);
     add_box_options(*c, o->objects);
+    c->add_option(
+        "-m,--model", o->guessing_model,
+        "of a grid whose OUT is .json: objects are guessed, with the sizes and colours that this model knows");
     c->get_option("--from")->description(c->get_option("--from")->get_description() + ", " + names_of_box_formats());
     c->callback([o, &globals, &run] { run = [o, &globals] { return convert(*o, globals); }; });
 }

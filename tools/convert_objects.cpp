@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/convert_objects.h"
 
-#include "engine/scene/palette.h"
+#include "engine/job/told_objects.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
 #include "tools/scene_input.h"
@@ -43,6 +43,31 @@ void add_box_options(CLI::App& c, ConvertObjectsOptions& o)
     c.add_option("--frame", o.frame, "of boxes of many frames: the number of one (KITTI), or its timestamp (Waymo)");
     c.add_option("--sample", o.sample, "of nuScenes' boxes: the token of a sample; by default each instance once");
     c.add_flag("--vehicle-frame", o.vehicle_frame, "of nuScenes' and Waymo's boxes: in the vehicle's frame");
+}
+
+Status guess_objects_of(const ObjectsInput& input, const SceneInputOptions& scene, const std::string& model_folder,
+                        const Globals& globals)
+{
+    SR_CHECK(check_output(input.in, input.out, globals));
+    if (model_folder.empty())
+        return fail(ErrorCode::usage, "-m/--model is missing: it says how large objects usually are, and which colour");
+    SR_TRY(const VoxfieldModel model, VoxfieldModel::open(model_folder));
+    SR_TRY(const VoxelGrid grid, load_grid(input.in, scene, globals));
+    SR_TRY(const std::vector<SceneObject> objects, told_objects(model, {}, grid, scene.seed));
+    if (objects.empty())
+        return fail(ErrorCode::bad_input, "{}: nothing that the model knows the usual size of is in {}",
+                    quote(model_folder), quote_path(input.in));
+    if (!input.dry_run)
+        SR_CHECK(write_objects(input.out, objects));
+    const Json json{{"input", printable(input.in)},
+                    {"output", printable(input.out)},
+                    {"objects", objects.size()},
+                    {"classes", classes_of(objects)}};
+    if (globals.json)
+        fmt::print("{}\n", json.dump(-1, ' ', false, Json::error_handler_t::replace));
+    else if (!globals.quiet)
+        fmt::print("{} objects\n", objects.size());
+    return {};
 }
 
 Status convert_objects(const ObjectsInput& input, BoxFormat format, const ConvertObjectsOptions& options,

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "engine/format/object_boxes.h"
-#include "tools/cli/commands.h"
+#include "tools/scene_input.h"
 
 namespace semrover {
 
@@ -25,5 +25,10 @@ struct ObjectsInput {
 // errors: usage; bad_input, and then nothing was written
 Status convert_objects(const ObjectsInput& input, BoxFormat format, const ConvertObjectsOptions& options,
                        const Globals& globals);
+
+// Objects guessed from the labels of a grid (docs/method.md §2.2), with the usual objects of a model and scene.seed.
+// Errors: usage; bad_input, and then nothing was written
+Status guess_objects_of(const ObjectsInput& input, const SceneInputOptions& scene, const std::string& model_folder,
+                        const Globals& globals);
 
 } // namespace semrover

@@ -73,7 +73,7 @@ void add_all_scene_input_options(CLI::App& c, SceneInputOptions& o)
     c.add_option("--mask", o.mask, "array of an Occ3D .npz that says which voxels count: mask_camera, mask_lidar, ...");
     c.add_option("--points-per-voxel", o.points_per_voxel, "of a grid made of points with colours")
         ->check(CLI::Range(1, 4096));
-    c.add_option("--seed", o.seed, "which points stay where a cell has more");
+    c.add_option("--seed", o.seed, "which points stay where a cell has more; of objects, which are guessed");
     c.add_flag("--labels-only", o.labels_only, "points with colours make a grid of labels too");
     c.add_flag("--nearest-color", o.nearest_color, "a .vox colour that no class has counts as the nearest one's");
     c.add_option("--label", o.label, "class of points without a label");

@@ -11,8 +11,8 @@ namespace semrover {
 struct EditRequest {
     Path grid;
     std::vector<EditOperation> operations;
-    double halo = 3;      // metres
-    GivenObjects objects; // of the grid: what a tint is for, and what a model is told
+    double halo = 3;           // metres
+    GivenObjects objects = {}; // of the grid: what a tint is for, and what a model is told
     // false: nothing around the change is thrown away, only cells that changed wait for points
     bool generates = true;
 };
@@ -25,8 +25,8 @@ Result<Regeneration> edit_grid(const EditRequest& request);
 struct InpaintRequest {
     Path grid;
     CellSelection where;
-    Path mask;            // .sgrid; empty: none
-    GivenObjects objects; // of the grid, for the model
+    Path mask;                 // .sgrid; empty: none
+    GivenObjects objects = {}; // of the grid, for the model
 };
 // bad_input: the files, no cell selected
 Result<Regeneration> select_for_inpainting(const InpaintRequest& request);

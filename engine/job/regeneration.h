@@ -16,7 +16,7 @@ struct Regeneration {
     VoxelGrid before;
     VoxelGrid grid;                // what is written, but for the targets
     std::vector<uint32_t> targets; // ascending indices into `grid`
-    GivenObjects objects;          // what a model is told; written beside each output (objects_beside)
+    GivenObjects objects = {};     // what a model is told; written beside each output (objects_beside)
     bool needs_objects = false;    // a model that cannot be told of them is an error
     Json request;                  // what was asked for, for the settings of the run
     Json counts;                   // for the report

@@ -137,6 +137,8 @@ ClassScores& ClassScores::operator+=(const ClassScores& other)
     to_generated += other.to_generated;
     generated_contrast += other.generated_contrast;
     truth_contrast += other.truth_contrast;
+    generated_variety += other.generated_variety;
+    truth_variety += other.truth_variety;
     return *this;
 }
 
@@ -184,8 +186,11 @@ Result<PointScores> score_points(Device& device, const VoxelGrid& generated, con
         return fail(ErrorCode::bad_input, "none of {} cells is generated on both sides", used.size());
     const auto contrast_of_generated = local_contrast(generated, used, options);
     const auto contrast_of_truth = local_contrast(truth, used, options);
+    const auto variety_of_generated = color_variety(generated, used), variety_of_truth = color_variety(truth, used);
     for (uint8_t label = 0; label < kClassCount; ++label) {
         ClassScores& c = scores.classes[label];
+        c.generated_variety = variety_of_generated[label];
+        c.truth_variety = variety_of_truth[label];
         c.generated_contrast = contrast_of_generated[label];
         c.truth_contrast = contrast_of_truth[label];
         scores.all += c;

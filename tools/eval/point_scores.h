@@ -3,6 +3,7 @@
 #pragma once
 
 #include "runtime/device/device.h"
+#include "tools/eval/color_variety.h"
 #include "tools/eval/local_contrast.h"
 
 namespace semrover {
@@ -14,6 +15,7 @@ struct ClassScores {
     double cell_error = 0;                      // sum over cells of the error of the cell's mean colour
     double to_truth = 0, to_generated = 0;      // metres, sums of distances to the nearest point of the other side
     ContrastSums generated_contrast, truth_contrast;
+    VarietySums generated_variety, truth_variety;
 
     ClassScores& operator+=(const ClassScores& other);
     double color_error() const;      // between the mean colours, mean of the three channels

@@ -105,7 +105,9 @@ Json class_json(const ClassScores& s)
             {"to_generated", s.to_generated / double(s.points)},
             {"sharpness", both_sides(a.sharpness(), b.sharpness())},
             {"contrast", both_sides(a.contrast(), b.contrast())},
-            {"edges", both_sides(a.edges(), b.edges())}};
+            {"edges", both_sides(a.edges(), b.edges())},
+            {"detail", both_sides(s.generated_variety.detail(), s.truth_variety.detail())},
+            {"spread", both_sides(s.generated_variety.spread(), s.truth_variety.spread())}};
 }
 
 Json scores_json(const PointScores& s)

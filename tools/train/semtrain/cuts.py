@@ -5,6 +5,7 @@ Small enough to generate with many settings."""
 import argparse
 import math
 import os
+import shutil
 
 import torch
 
@@ -14,7 +15,8 @@ from .grids import find_grids
 
 def cut_grid(path, folder, along, across):
     """cells whose centres lie within along = (low, high) metres of x, and within across of y
-    -> FOLDER/truth/NAME.sgrid, FOLDER/semantic/NAME.sgrid; NAME is that of the grid's folder"""
+    -> FOLDER/truth/NAME.sgrid, FOLDER/semantic/NAME.sgrid; NAME is that of the grid's folder. The street's objects and
+    labels go whole to FOLDER/objects/NAME.json and FOLDER/street/NAME.sgrid"""
     tensors, metadata = safetensors_file.read(path), safetensors_file.read_header(path)[1]
     centers = (tensors["cells"][:, :2].double() + 0.5) * float(metadata["voxel_size"])
     low, high = torch.tensor([along, across], dtype=torch.float64).T
@@ -23,6 +25,11 @@ def cut_grid(path, folder, along, across):
     for kind, names in (("truth", list(tensors)), ("semantic", ["cells", "labels"])):
         os.makedirs(os.path.join(folder, kind), exist_ok=True)
         safetensors_file.write(os.path.join(folder, kind, name), {n: tensors[n][chosen] for n in names}, metadata)
+    for source, kind in (("objects.json", "objects"), ("semantic.sgrid", "street")):
+        beside = os.path.join(os.path.dirname(os.path.abspath(path)), source)
+        if os.path.exists(beside):
+            os.makedirs(os.path.join(folder, kind), exist_ok=True)
+            shutil.copy(beside, os.path.join(folder, kind, os.path.splitext(name)[0] + os.path.splitext(source)[1]))
     return len(chosen)
 
 
