@@ -92,7 +92,7 @@ Tensor embedding(Graph& g,
 
 // Tokens of several sets, packed one after the other without padding; the semantic stream repeats the voxel stream's
 // order. A query sees the tokens of both streams in the cells of its own set that lie within the radius.
-constexpr uint32_t kAttentionTile = 32; // queries of a tile, at most; a tile stays within one set
+constexpr uint32_t kAttentionTile = 32; // queries of a tile, at most; a tile stays within one set and may be empty
 
 // bit j of row i: cell j of the set of i has di^2 + dj^2 + dk^2 <= radius2
 [[nodiscard]] Tensor neighbor_mask(Graph& g,

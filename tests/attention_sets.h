@@ -32,6 +32,7 @@ struct PackedSets {
             rows += count;
             longest = std::max(longest, count);
         }
+        tiles.insert(tiles.end(), 4, 0); // an empty tile
     }
     bool sees(uint32_t i, uint32_t j, int32_t radius2) const
     {

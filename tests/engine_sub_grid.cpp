@@ -53,20 +53,21 @@ std::vector<uint32_t> disc(const VoxelGrid& grid, int32_t i, int32_t j, int64_t 
     return cells_within(grid.cells, std::vector<Cell>{{i, j, 0}}, reach2);
 }
 
-RegionOptions options()
+RegionOptions options(RegionStrategy strategy = RegionStrategy::complete)
 {
     RegionOptions o;
+    o.strategy = strategy;
     o.region_size = 40;
     o.coverage_threshold = 10;
     o.from_known = true;
     return o;
 }
 
-void generate(VoxelGrid& grid, uint32_t batch)
+void generate(VoxelGrid& grid, uint32_t batch, const RegionOptions& regions = options())
 {
     const auto plan = plan_sampling(SchedulerConfig{.sampler = Sampler::ddpm, .prediction = Prediction::sample}, 2);
     ASSERT_TRUE(plan) << plan.error().message;
-    auto outpainter = Outpainter::create(grid, transformer().config(), options());
+    auto outpainter = Outpainter::create(grid, transformer().config(), regions);
     ASSERT_TRUE(outpainter) << outpainter.error().message;
     auto sampler = TokenSampler::create(device(), transformer(), *plan, sampling_options(2, 5));
     ASSERT_TRUE(sampler) << sampler.error().message;
@@ -78,19 +79,19 @@ void generate(VoxelGrid& grid, uint32_t batch)
     }
 }
 
-TEST(engine_sub_grid, filling_a_part_gives_the_bytes_of_filling_the_whole_and_changes_nothing_else)
+void expect_a_part_gives_the_bytes_of_the_whole(const RegionOptions& regions)
 {
     const VoxelGrid before = street();
     const std::vector<uint32_t> targets = disc(before, 31, 12, 30);
     VoxelGrid whole = before;
     for (const uint32_t target : targets)
         whole.generated[target] = 0;
-    auto part = cut_sub_grid(before, targets, options().region_size);
+    auto part = cut_sub_grid(before, targets, cells_considered(regions));
     ASSERT_TRUE(part) << part.error().message;
     EXPECT_LT(part->cells.size(), before.cells.size() / 2);
     EXPECT_EQ(std::ranges::count(part->grid.generated, 0), int64_t(targets.size()));
-    generate(whole, 1);
-    generate(part->grid, 3);
+    generate(whole, 1, regions);
+    generate(part->grid, 3, regions);
     VoxelGrid result = before;
     put_back(result, *part, targets);
     EXPECT_EQ(result.points, whole.points);
@@ -105,6 +106,12 @@ TEST(engine_sub_grid, filling_a_part_gives_the_bytes_of_filling_the_whole_and_ch
         EXPECT_TRUE(same || std::ranges::binary_search(targets, c)) << c;
     }
     EXPECT_EQ(differ, targets.size());
+}
+
+TEST(engine_sub_grid, filling_a_part_gives_the_bytes_of_filling_the_whole_and_changes_nothing_else)
+{
+    for (const RegionStrategy strategy : {RegionStrategy::complete, RegionStrategy::rim})
+        expect_a_part_gives_the_bytes_of_the_whole(options(strategy));
 }
 
 TEST(engine_sub_grid, cells_without_points_that_nobody_asked_for_stay_out)

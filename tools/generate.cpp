@@ -82,9 +82,13 @@ void add_generate(CLI::App& app, const Globals& globals, Run& run)
         "boxes and colours that the model is told of: objects.json, auto (guessed from the labels and the seed) "
         "or none; they are written beside OUTPUT");
     add_generation_options(*c, o->generation);
-    add_choice(*c, "--strategy", {"complete", "paper"},
-               "complete, or paper (Algorithm 1 as printed: may leave cells empty)", [o](const std::string& text) {
-                   o->generation.options.strategy = text == "paper" ? RegionStrategy::paper : RegionStrategy::complete;
+    add_choice(*c, "--strategy", {"rim", "complete", "paper"},
+               "which cells make a region: new ones and a rim of known ones; the nearest; or as Algorithm 1 is printed "
+               "(may leave cells empty)",
+               [o](const std::string& text) {
+                   for (const auto s : {RegionStrategy::rim, RegionStrategy::complete, RegionStrategy::paper})
+                       if (text == region_strategy_name(s))
+                           o->generation.options.strategy = s;
                });
     c->add_option("--first-cell", o->generation.options.first_cell, "index of the cell to start from");
     c->add_option("--ply", o->ply.points, "also write the points with colour and label as PLY");

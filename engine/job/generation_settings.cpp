@@ -31,7 +31,7 @@ Result<GenerationSettings> resolve_generation(const GenerationOptions& o)
     s.regions.region_size = o.region_size.value_or(d.regions.region_size);
     s.regions.coverage_threshold =
         std::min(o.coverage_threshold.value_or(d.regions.coverage_threshold), s.regions.region_size);
-    s.regions.strategy = o.strategy;
+    s.regions.strategy = o.strategy.value_or(d.regions.strategy);
     s.regions.first_seed = o.first_cell;
     s.precision = o.precision;
     s.batch = o.batch;
@@ -55,7 +55,7 @@ Result<Json> settings_json(const GenerationSettings& s, const Device& device, st
                 {"guidance_scale", s.guidance},
                 {"region_size", s.regions.region_size},
                 {"coverage_threshold", s.regions.coverage_threshold},
-                {"strategy", s.regions.strategy == RegionStrategy::paper ? "paper" : "complete"},
+                {"strategy", std::string(region_strategy_name(s.regions.strategy))},
                 {"first_cell", s.regions.first_seed},
                 {"jump_length", s.repaint.jump_length},
                 {"jump_n_sample", s.repaint.jump_n_sample},

@@ -19,7 +19,7 @@ struct GenerationOptions {
     std::optional<int> steps, region_size, coverage_threshold, jump_length, jump_n_sample;
     std::optional<float> cfg_scale;
     std::optional<KnownTokens> known;
-    RegionStrategy strategy = RegionStrategy::complete;
+    std::optional<RegionStrategy> strategy;
     int64_t first_cell = 0;
     DType precision = DType::f16; // or f32
     uint32_t batch = 0;           // regions at a time; 0: what suits the device

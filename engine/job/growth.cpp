@@ -152,7 +152,7 @@ Status Growth::cut_window()
     if (targets_.empty())
         return {};
     RegionOptions regions = plan_.settings.regions;
-    SR_TRY(part_, cut_sub_grid(around_, targets_, regions.region_size));
+    SR_TRY(part_, cut_sub_grid(around_, targets_, cells_considered(regions)));
     regions.from_known = true;
     regions.first_seed = nearest_cell(part_.grid, piece.front());
     return filling_.cut(part_.grid, regions, plan_.objects);

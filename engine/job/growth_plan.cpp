@@ -13,7 +13,7 @@ namespace fs = std::filesystem;
 
 Status check(const GrowthRequest& r, bool writes)
 {
-    if (r.generation.first_cell != 0 || r.generation.strategy != RegionStrategy::complete)
+    if (r.generation.first_cell != 0 || r.generation.strategy)
         return fail(ErrorCode::usage, "--first-cell and --strategy have no meaning with --along");
     if (!(r.horizon > 0 && r.horizon <= 1000))
         return fail(ErrorCode::usage, "--horizon: expected metres above 0 and up to 1000, found {}", r.horizon);

@@ -98,7 +98,7 @@ class SeedRuns : public Job {
 Status SeedRuns::prepare()
 {
     regions_ = generation_.regions;
-    SR_TRY(part_, cut_sub_grid(what_.grid, what_.targets, regions_.region_size));
+    SR_TRY(part_, cut_sub_grid(what_.grid, what_.targets, cells_considered(regions_)));
     part_grid_ = part_.grid;
     regions_.from_known = true;
     SR_TRY(const uint64_t grid, hash_file(what_.input));

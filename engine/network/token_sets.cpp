@@ -31,9 +31,11 @@ void TokenSets::add(std::span<const CellIndex> set_cells, std::span<const uint32
 
 void TokenSets::pad(uint32_t null_label)
 {
-    const CellIndex nowhere{0, 0, 0};
-    while (rows() % kRowAlignment)
-        add({&nowhere, 1}, {&null_label, 1});
+    const std::vector<CellIndex> nowhere(round_up(rows(), kRowAlignment) - rows());
+    if (nowhere.empty())
+        tiles.insert(tiles.end(), 4, 0);
+    else
+        add(nowhere, std::vector<uint32_t>(nowhere.size(), null_label));
 }
 
 } // namespace semrover

@@ -26,7 +26,8 @@ struct TokenSets {
 
     uint32_t rows() const { return uint32_t(labels.size()); }
     void add(std::span<const CellIndex> set_cells, std::span<const uint32_t> set_labels);
-    // sets of one cell up to a multiple of kRowAlignment rows
+    // A set that nobody reads up to a multiple of kRowAlignment rows. One tile in any case, if need be of no rows: so
+    // smaller sets have no more rows or tiles than larger ones.
     void pad(uint32_t null_label);
 };
 

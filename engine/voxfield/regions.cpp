@@ -58,8 +58,9 @@ class Frontier {
 
 class Cover {
   public:
-    Cover(CellTree& tree, const RegionOptions& options)
-        : tree_(tree), frontier_(tree), size_(uint32_t(options.region_size)), threshold_(options.coverage_threshold)
+    Cover(CellTree& tree, std::span<const std::array<int32_t, 3>> cells, const RegionOptions& options)
+        : tree_(tree), cells_(cells), frontier_(tree), options_(options),
+          threshold_(std::min(options.coverage_threshold, most_targets(options)))
     {
         regions_.offsets.push_back(0);
     }
@@ -71,21 +72,21 @@ class Cover {
                 cover(cell);
     }
 
-    Regions run(const RegionOptions& options)
+    Regions run()
     {
         if (tree_.free_count() == tree_.size())
-            accept(uint32_t(options.first_seed));
+            accept(uint32_t(options_.first_seed));
         std::vector<uint32_t> set_aside;
         while (tree_.free_count() > 0) {
             const uint32_t seed = frontier_.seed();
             if (try_accept(seed))
                 continue;
-            if (options.strategy == RegionStrategy::paper)
+            if (options_.strategy == RegionStrategy::paper)
                 break;
             tree_.set_state(seed, CellState::set_aside);
             set_aside.push_back(seed);
         }
-        if (options.strategy == RegionStrategy::complete)
+        if (options_.strategy != RegionStrategy::paper)
             take_rest(set_aside);
         for (uint32_t cell = 0; cell < tree_.size(); ++cell)
             if (tree_.state(cell) != CellState::covered)
@@ -96,10 +97,8 @@ class Cover {
   private:
     bool try_accept(uint32_t seed)
     {
-        tree_.nearest(seed, size_, keys_);
-        const auto fresh = std::count_if(keys_.begin(), keys_.end(), [&](uint64_t key) {
-            return tree_.state(tree_.index_of(key)) != CellState::covered;
-        });
+        tree_.nearest(seed, uint32_t(cells_considered(options_)), keys_);
+        const auto fresh = std::count_if(keys_.begin(), keys_.end(), [&](uint64_t key) { return !is_covered(key); });
         if (fresh < threshold_)
             return false;
         add(seed);
@@ -108,23 +107,58 @@ class Cover {
 
     void accept(uint32_t seed)
     {
-        tree_.nearest(seed, size_, keys_);
+        tree_.nearest(seed, uint32_t(cells_considered(options_)), keys_);
         add(seed);
     }
 
-    // the region in keys_
+    bool is_covered(uint64_t key) const { return tree_.state(tree_.index_of(key)) == CellState::covered; }
+
+    // the region among keys_
     void add(uint32_t seed)
     {
         std::sort(keys_.begin(), keys_.end());
+        if (options_.strategy == RegionStrategy::rim)
+            choose();
         for (uint64_t key : keys_) {
             const uint32_t cell = tree_.index_of(key);
             regions_.members.push_back(cell);
-            if (tree_.state(cell) == CellState::covered)
-                continue;
-            cover(cell);
+            if (!is_covered(key))
+                cover(cell);
         }
         regions_.offsets.push_back(uint32_t(regions_.members.size()));
         regions_.seeds.push_back(seed);
+    }
+
+    // leaves targets and their rim in keys_, which stay nearest to the seed first
+    void choose()
+    {
+        std::vector<uint64_t> chosen, covered;
+        for (const uint64_t key : keys_)
+            (is_covered(key) ? covered : chosen).push_back(key);
+        chosen.resize(std::min(chosen.size(), size_t(most_targets(options_))));
+        std::vector<std::pair<int64_t, uint64_t>> rim; // squared distance from the nearest target, key
+        for (const uint64_t key : covered) {
+            int64_t nearest = INT64_MAX;
+            for (const uint64_t target : chosen)
+                nearest = std::min(nearest, distance(tree_.index_of(key), tree_.index_of(target)));
+            rim.emplace_back(nearest, key);
+        }
+        std::sort(rim.begin(), rim.end());
+        rim.resize(std::min(rim.size(), size_t(rim_cells(options_, int(chosen.size())))));
+        for (const auto& [nearest, key] : rim)
+            chosen.push_back(key);
+        keys_ = std::move(chosen);
+        std::sort(keys_.begin(), keys_.end());
+    }
+
+    int64_t distance(uint32_t a, uint32_t b) const // squared
+    {
+        int64_t sum = 0;
+        for (size_t axis = 0; axis < 3; ++axis) {
+            const int64_t d = int64_t(cells_[a][axis]) - cells_[b][axis];
+            sum += d * d;
+        }
+        return sum;
     }
 
     void cover(uint32_t cell)
@@ -146,14 +180,37 @@ class Cover {
     }
 
     CellTree& tree_;
+    std::span<const std::array<int32_t, 3>> cells_;
     Frontier frontier_;
-    uint32_t size_;
+    const RegionOptions options_;
     int threshold_;
     Regions regions_;
     std::vector<uint64_t> keys_; // of the region being looked at
 };
 
 } // namespace
+
+std::string_view region_strategy_name(RegionStrategy strategy)
+{
+    return std::array<std::string_view, 3>{"paper", "complete", "rim"}[size_t(strategy)];
+}
+
+// more than the region, so that a seed at the edge of what is covered finds as many uncovered cells as it may have
+int cells_considered(const RegionOptions& o)
+{
+    return o.strategy == RegionStrategy::rim ? o.region_size * 5 / 2 : o.region_size;
+}
+
+int most_targets(const RegionOptions& o)
+{
+    return o.strategy == RegionStrategy::rim ? o.region_size - o.region_size * 3 / 16 : o.region_size;
+}
+
+// small regions have a wider rim: half the region in all
+int rim_cells(const RegionOptions& o, int targets)
+{
+    return std::max(o.region_size - most_targets(o), o.region_size / 2 - targets);
+}
 
 Result<Regions> extract_regions(std::span<const std::array<int32_t, 3>> cells, const RegionOptions& options,
                                 std::span<const uint8_t> known)
@@ -170,11 +227,12 @@ Result<Regions> extract_regions(std::span<const std::array<int32_t, 3>> cells, c
     if (options.first_seed < 0 || options.first_seed >= int64_t(cells.size()))
         return fail(ErrorCode::bad_input, "first_seed is {}, but the cloud has {} cells", options.first_seed,
                     cells.size());
-    SR_ASSERT(!options.from_known || known.size() == cells.size(), "{} flags for {} cells", known.size(), cells.size());
-    Cover cover(tree, options);
-    if (options.from_known)
+    SR_ASSERT((!options.from_known && known.empty()) || known.size() == cells.size(), "{} flags for {} cells",
+              known.size(), cells.size());
+    Cover cover(tree, cells, options);
+    if (options.from_known || options.strategy == RegionStrategy::rim)
         cover.cover(known);
-    return cover.run(options);
+    return cover.run();
 }
 
 } // namespace semrover

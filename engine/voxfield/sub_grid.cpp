@@ -76,7 +76,7 @@ SubGrid take(const VoxelGrid& whole, std::span<const uint32_t> cells, std::span<
 
 } // namespace
 
-Result<SubGrid> cut_sub_grid(const VoxelGrid& whole, std::span<const uint32_t> targets, int region_size)
+Result<SubGrid> cut_sub_grid(const VoxelGrid& whole, std::span<const uint32_t> targets, int considered)
 {
     SR_ASSERT(!targets.empty() && std::ranges::is_sorted(targets), "{} targets, in order", targets.size());
     const Candidates all = candidates_of(whole, targets);
@@ -95,7 +95,7 @@ Result<SubGrid> cut_sub_grid(const VoxelGrid& whole, std::span<const uint32_t> t
         }
         bool enough = reach >= kLastReach || near.size() == all.cells.size();
         if (!enough) {
-            SR_TRY(enough, reach_is_enough(cells, near_targets, uint32_t(std::max(region_size, 1)), reach));
+            SR_TRY(enough, reach_is_enough(cells, near_targets, uint32_t(std::max(considered, 1)), reach));
         }
         if (enough)
             return take(whole, in_whole, targets);

@@ -15,10 +15,10 @@ struct SubGrid {
 };
 
 // targets [n]: ascending indices of cells. The known cells are those with points that no target is, within a reach that
-// doubles from 8 cells until every target has region_size cells in it, or 64 cells, or everything: so the regions of
-// the sub-grid are those of the whole. Cells without points that are no targets stay outside. Errors: bad_input, as
-// extract_regions
-Result<SubGrid> cut_sub_grid(const VoxelGrid& whole, std::span<const uint32_t> targets, int region_size);
+// doubles from 8 cells until every target has `considered` cells in it (cells_considered of its regions), or 64 cells,
+// or everything: so the regions of the sub-grid are those of the whole. Cells without points that are no targets stay
+// outside. Errors: bad_input, as extract_regions
+Result<SubGrid> cut_sub_grid(const VoxelGrid& whole, std::span<const uint32_t> targets, int considered);
 
 // Copies the points and colours of the targets that have them back into the whole, and nothing else. If the whole has
 // no points, its other cells get zeros.

@@ -149,7 +149,7 @@ StepTable TokenSampler::step_table(Graph& g) const
     return {steps_.in(g), clock_.in(g)};
 }
 
-// each half is padded with sets of one cell to kRowAlignment rows
+// each half is padded to kRowAlignment rows
 TokenSets TokenSampler::pack(std::span<const RegionInput> regions) const
 {
     TokenSets sets;

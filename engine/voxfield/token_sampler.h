@@ -50,7 +50,7 @@ class TokenSampler {
     static Result<std::unique_ptr<TokenSampler>> create(Device& device, const Transformer& transformer,
                                                         const SamplingPlan& plan, SamplerOptions options);
 
-    // device memory of the sampler for `regions` regions of `cells` cells, beside the transformer's own
+    // device memory of the sampler for `regions` regions of `cells` cells at most, beside the transformer's own
     Result<uint64_t> planned_bytes(uint32_t regions, uint32_t cells) const;
     uint64_t table_bytes() const; // the part of it that is allocated from the start
 

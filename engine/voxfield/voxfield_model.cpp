@@ -18,6 +18,8 @@ Status read_defaults(const Json& index, VoxfieldDefaults& d)
     fields.number("guidance_scale", 0.f, 1000.f, d.guidance_scale);
     fields.integer("region_size", 1, 4096, d.regions.region_size);
     fields.integer("coverage_threshold", 1, 4096, d.regions.coverage_threshold);
+    fields.choice("strategy", {{"complete", RegionStrategy::complete}, {"rim", RegionStrategy::rim}},
+                  d.regions.strategy);
     fields.integer("jump_length", 0, 10000, d.repaint.jump_length);
     fields.integer("jump_n_sample", 1, 10000, d.repaint.jump_n_sample);
     fields.choice("known_tokens", {{"noised", KnownTokens::noised}, {"clean", KnownTokens::clean}}, d.repaint.known);
