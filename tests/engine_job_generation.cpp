@@ -413,5 +413,28 @@ TEST(engine_job_regeneration, cut_off_at_any_step_it_gives_every_seed_its_bytes)
     }
 }
 
+TEST(engine_job_generation, warns_where_points_were_placed_in_another_way_than_the_models)
+{
+    VoxfieldModel model;
+    VoxelGrid grid;
+    std::vector<std::string> said;
+    const JobCallbacks callbacks{
+        .progress = {}, .warning = [&](std::string_view text) { said.emplace_back(text); }, .detail = {}};
+    model.config.placement = "canonical";
+    grid.generated = {0, 0};
+    warn_of_placement(model, grid, callbacks);
+    EXPECT_TRUE(said.empty()) << "no points yet";
+    grid.generated = {0, 1};
+    warn_of_placement(model, grid, callbacks);
+    ASSERT_EQ(said.size(), 1u);
+    EXPECT_NE(said[0].find("shifted, the model makes canonical"), std::string::npos) << said[0];
+    grid.metadata["placement"] = "canonical";
+    warn_of_placement(model, grid, callbacks);
+    grid.metadata.clear();
+    model.config.placement = "mixed";
+    warn_of_placement(model, grid, callbacks);
+    EXPECT_EQ(said.size(), 1u);
+}
+
 } // namespace engine_job_generation_test
 } // namespace semrover

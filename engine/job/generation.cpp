@@ -59,6 +59,7 @@ class GridGeneration : public GenerationJob {
 Status GridGeneration::load()
 {
     grid_hash_ = request_.grid_hash ? *request_.grid_hash : hash_grid(grid_);
+    warn_of_placement(request_.settings.model, grid_, callbacks_);
     SR_TRY(objects_, told_objects(request_.settings.model, request_.objects, grid_, request_.seed));
     SR_CHECK(filling_.cut(grid_, request_.settings.regions, objects_));
     return filling_.load(request_.seed, callbacks_);

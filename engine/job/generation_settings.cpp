@@ -5,6 +5,8 @@
 #include "engine/job/version.h"
 #include "runtime/base/hash.h"
 
+#include <algorithm>
+
 namespace semrover {
 
 Result<GenerationSettings> resolve_generation(const GenerationOptions& o)
@@ -37,6 +39,17 @@ Result<GenerationSettings> resolve_generation(const GenerationOptions& o)
     s.batch = o.batch;
     SR_TRY(s.plan, plan_sampling(s.model.scheduler, s.steps, s.repaint));
     return s;
+}
+
+void warn_of_placement(const VoxfieldModel& model, const VoxelGrid& grid, const JobCallbacks& callbacks)
+{
+    const auto said = grid.metadata.find("placement");
+    const std::string placement = said == grid.metadata.end() ? "shifted" : said->second;
+    const bool known = std::ranges::any_of(grid.generated, [](uint8_t generated) { return generated != 0; });
+    const bool fits = placement == model.config.placement || model.config.placement == "mixed";
+    if (known && !fits && callbacks.warning)
+        callbacks.warning(fmt::format("the grid's points are {}, the model makes {} ones: they may not fit together",
+                                      placement, model.config.placement));
 }
 
 Result<Json> settings_json(const GenerationSettings& s, const Device& device, std::string_view command,

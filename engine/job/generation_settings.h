@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/job/job.h"
+#include "engine/scene/grid.h"
 #include "engine/voxfield/voxfield_model.h"
 #include "runtime/base/dtype.h"
 #include "runtime/base/json.h"
@@ -39,6 +41,10 @@ struct GenerationSettings {
 
 // Reads the model's description, no weights. Errors: usage (a name that nobody knows), bad_input
 Result<GenerationSettings> resolve_generation(const GenerationOptions& options);
+
+// Warns where a grid has points that were placed in another way (docs/method.md §1.3) than the model places its own: it
+// has not learned to go on from such.
+void warn_of_placement(const VoxfieldModel& model, const VoxelGrid& grid, const JobCallbacks& callbacks);
 
 // for a run's folder: everything that decides the bytes of the result, beside the seed. Reads the whole model once.
 Result<Json> settings_json(const GenerationSettings& settings, const Device& device, std::string_view command,

@@ -112,6 +112,7 @@ Status SeedRuns::prepare()
 Status SeedRuns::begin()
 {
     SR_CHECK(prepare());
+    warn_of_placement(generation_.model, what_.grid, callbacks_);
     return begin_seed();
 }
 
