@@ -34,13 +34,18 @@ def read_grid(path):
     return {name: values[has] for name, values in t.items()}, float(safetensors_file.read_header(path)[1]["voxel_size"])
 
 
+def token_order(points):
+    """points [V, n, 3 or more] -> [V, n, 1]: nearest to the cell's centre first, ties by x, y, z"""
+    x, y, z = points[..., 0], points[..., 1], points[..., 2]
+    return np.lexsort((z, y, x, (points[..., :3] ** 2).sum(-1)), axis=-1)[..., None]
+
+
 def read_tokens(path):
     """-> cells i32 [V, 3], labels u8 [V], tokens f16 [V, 6n] in [-1, 1], the point nearest the cell's centre first
     (ties by x, y, z); only cells that have points"""
     t, size = read_grid(path)
     points, colors = t["points"].astype(np.float32), t["colors"].astype(np.float32)
-    x, y, z = points[..., 0], points[..., 1], points[..., 2]
-    order = np.lexsort((z, y, x, (points ** 2).sum(-1)), axis=-1)[..., None]
+    order = token_order(points)
     points, colors = np.take_along_axis(points, order, 1), np.take_along_axis(colors, order, 1)
     tokens = np.concatenate([points / (size / 2), colors / 127.5 - 1], -1).reshape(len(points), -1)
     return t["cells"], t["labels"], tokens.clip(-1, 1).astype(np.float16)
@@ -160,11 +165,13 @@ class LocalSets:
         tokens = self.grids.tokens[first + chosen].astype(np.float32).reshape(size, -1, 6)
         owners = self.grids.owners[first + chosen]
         boxes = self.grids.boxes[owners] if len(self.grids.boxes) else np.ones((size, 7))
-        for axis in range(2):  # streets mirrored in either direction are streets
-            if self.config["mirror"] and random.random() < 0.5:
-                centers[:, axis] *= -1
-                tokens[..., axis] *= -1
-                boxes = mirrored(boxes, axis)
+        turned = [self.config["mirror"] and random.random() < 0.5 for _ in range(2)]
+        for axis in np.flatnonzero(turned):  # streets mirrored in either direction are streets
+            centers[:, axis] *= -1
+            tokens[..., axis] *= -1
+            boxes = mirrored(boxes, axis)
+        if any(turned):  # points of a lattice are equally far from the centre: their order turns over, too
+            tokens = np.take_along_axis(tokens, token_order(tokens), 1)
         if not self.config["ordered_points"]:
             tokens = np.take_along_axis(tokens, random.random(tokens.shape[:2]).argsort(1)[..., None], 1)
         return centers, self.grids.labels[first + chosen], tokens.reshape(size, -1), first + chosen, boxes

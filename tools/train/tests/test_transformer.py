@@ -81,6 +81,22 @@ class TheRecipe(unittest.TestCase):
         self.assertTrue((np.diff(apart, axis=1) >= -1e-3).all())
         self.assertLess(np.abs(points[labels == 2][..., 3:] - (200 / 127.5 - 1)).max(), 1e-3)
 
+    def test_keeps_the_order_of_points_where_a_set_is_mirrored(self):
+        write_street(self.grid)
+        t = safetensors_file.read(self.grid)
+        lattice = torch.tensor([[-0.2, -0.1, 0], [-0.2, 0.1, 0], [0.2, -0.1, 0], [0.2, 0.1, 0]], dtype=torch.float16)
+        t["points"] = lattice.expand(len(t["cells"]), 4, 3).contiguous()  # all equally far from the centre
+        t["colors"] = torch.arange(4, dtype=torch.uint8)[None, :, None].expand(len(t["cells"]), 4, 3).contiguous()
+        safetensors_file.write(self.grid, t, safetensors_file.read_header(self.grid)[1])
+        sets = LocalSets(Grids([self.grid], self.path("cache")),
+                         {"seed": 1, "set_size": [8, 8], "batch": 64, "label_dropout": 0, "class_balance": 0,
+                          "mirror": True, "ordered_points": True, "known_share": 0, "network": {
+                              "voxel_size": 0.6, "num_classes": 20}})
+        tokens = sets.batch(0)[2].reshape(-1, 4, 6)
+        expected = np.broadcast_to(lattice.float() / 0.3, tokens[..., :3].shape)
+        np.testing.assert_allclose(tokens[..., :3], expected, atol=1e-3)
+        self.assertEqual(len(np.unique(tokens[..., 3], axis=0)), 4)  # the colours are where the mirrors brought them
+
     def test_draws_sets_of_neighbours_and_drops_the_labels_of_some(self):
         config = {"seed": 3, "set_size": [8, 12], "batch": 64, "label_dropout": 0.25, "class_balance": 0.5,
                   "mirror": False, "ordered_points": True, "known_share": 0,
