@@ -74,6 +74,11 @@ Scene street()
     return s;
 }
 
+std::vector<SceneObject> guessed(const VoxelGrid& grid, const UsualObjects& usual, uint64_t seed)
+{
+    return *guess_objects(grid, usual, seed);
+}
+
 std::vector<SceneObject> of_class(const std::vector<SceneObject>& objects, uint8_t label)
 {
     std::vector<SceneObject> found;
@@ -108,7 +113,7 @@ TEST(engine_guessed_objects, groups_are_connected_cells_of_one_label)
 TEST(engine_guessed_objects, a_row_of_cars_is_cut_where_they_touch)
 {
     const VoxelGrid grid = street().grid();
-    const auto cars = of_class(guess_objects(grid, usual(), 1), kCar);
+    const auto cars = of_class(guessed(grid, usual(), 1), kCar);
     ASSERT_EQ(cars.size(), 3u);
     for (size_t c = 0; c < 3; ++c) {
         EXPECT_NEAR(cars[c].center[0], (2 + 9 * double(c) + 4) * 0.6, 0.4);
@@ -123,14 +128,14 @@ TEST(engine_guessed_objects, a_car_on_the_other_side_looks_the_other_way)
 {
     Scene s = street();
     s.fill(kCar, {40, 2, 1}, {47, 4, 3});
-    const auto cars = of_class(guess_objects(s.grid(), usual(), 1), kCar);
+    const auto cars = of_class(guessed(s.grid(), usual(), 1), kCar);
     ASSERT_EQ(cars.size(), 4u);
     EXPECT_LT(apart(cars[3].heading, kPi), 0.05);
 }
 
 TEST(engine_guessed_objects, houses_are_cut_where_their_height_steps_and_look_at_the_street)
 {
-    const auto houses = of_class(guess_objects(street().grid(), usual(), 1), kBuilding);
+    const auto houses = of_class(guessed(street().grid(), usual(), 1), kBuilding);
     ASSERT_EQ(houses.size(), 3u);
     const double edges[] = {0, 18, 36, 60};
     for (size_t h = 0; h < 3; ++h) {
@@ -146,7 +151,7 @@ TEST(engine_guessed_objects, houses_are_cut_where_their_height_steps_and_look_at
 TEST(engine_guessed_objects, every_cell_of_a_wall_belongs_to_the_house_around_it)
 {
     const VoxelGrid grid = street().grid();
-    const auto objects = guess_objects(grid, usual(), 1);
+    const auto objects = guessed(grid, usual(), 1);
     const std::vector<int32_t> owners = *objects_of_cells(grid, objects);
     std::map<int32_t, int> houses;
     for (size_t v = 0; v < grid.cells.size(); ++v)
@@ -159,8 +164,8 @@ TEST(engine_guessed_objects, every_cell_of_a_wall_belongs_to_the_house_around_it
 
 TEST(engine_guessed_objects, a_turned_scene_has_turned_objects)
 {
-    const auto straight = of_class(guess_objects(street().grid(), usual(), 1), kBuilding);
-    const auto turned = of_class(guess_objects(street().turned().grid(), usual(), 1), kBuilding);
+    const auto straight = of_class(guessed(street().grid(), usual(), 1), kBuilding);
+    const auto turned = of_class(guessed(street().turned().grid(), usual(), 1), kBuilding);
     ASSERT_EQ(turned.size(), straight.size());
     for (const SceneObject& o : straight) {
         const auto same = std::ranges::find_if(turned, [&](const SceneObject& t) {
@@ -179,7 +184,7 @@ TEST(engine_guessed_objects, a_long_front_without_steps_is_cut_at_places_that_th
     const VoxelGrid grid = s.grid();
     std::set<double> widths;
     for (uint64_t seed : {1, 2, 3}) {
-        const auto houses = of_class(guess_objects(grid, usual(), seed), kBuilding);
+        const auto houses = of_class(guessed(grid, usual(), seed), kBuilding);
         ASSERT_EQ(houses.size(), 5u) << "60 m of 11 m each";
         for (const SceneObject& o : houses) {
             EXPECT_GT(o.size[1], 6);
@@ -193,10 +198,10 @@ TEST(engine_guessed_objects, a_long_front_without_steps_is_cut_at_places_that_th
 TEST(engine_guessed_objects, colours_depend_on_the_seed_and_boxes_of_cars_do_not)
 {
     const VoxelGrid grid = street().grid();
-    const auto first = guess_objects(grid, usual(), 1), again = guess_objects(grid, usual(), 1);
+    const auto first = guessed(grid, usual(), 1), again = guessed(grid, usual(), 1);
     std::set<std::array<double, 3>> tints;
     for (uint64_t seed = 1; seed < 12; ++seed) {
-        const auto cars = of_class(guess_objects(grid, usual(), seed), kCar);
+        const auto cars = of_class(guessed(grid, usual(), seed), kCar);
         EXPECT_EQ(cars[0].center, of_class(first, kCar)[0].center);
         tints.insert(*cars[0].tint);
     }
@@ -212,15 +217,15 @@ TEST(engine_guessed_objects, classes_of_which_nothing_is_usual_have_none)
     const VoxelGrid grid = street().grid();
     UsualObjects only_cars = usual();
     only_cars[kBuilding] = {};
-    EXPECT_EQ(guess_objects(grid, only_cars, 1).size(), 3u);
-    EXPECT_TRUE(guess_objects(grid, {}, 1).empty());
+    EXPECT_EQ(guessed(grid, only_cars, 1).size(), 3u);
+    EXPECT_TRUE(guessed(grid, {}, 1).empty());
 }
 
 TEST(engine_guessed_objects, a_building_without_a_street_has_a_box_around_it)
 {
     Scene s;
     s.fill(kBuilding, {0, 0, 0}, {19, 9, 9});
-    const auto houses = guess_objects(s.grid(), usual(), 1);
+    const auto houses = guessed(s.grid(), usual(), 1);
     ASSERT_EQ(houses.size(), 1u);
     EXPECT_NEAR(houses[0].center[0], 6, 1e-6);
     EXPECT_NEAR(houses[0].center[1], 3, 1e-6);

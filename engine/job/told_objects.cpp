@@ -14,7 +14,10 @@ Result<std::vector<SceneObject>> told_objects(const VoxfieldModel& model, const 
                                               const VoxelGrid& grid, uint64_t seed)
 {
     if (!model.config.condition.empty()) {
-        std::vector<SceneObject> told = given ? *given : guess_objects(grid, model.defaults.usual_objects, seed);
+        std::vector<SceneObject> told = given.value_or(std::vector<SceneObject>());
+        if (!given) {
+            SR_TRY(told, guess_objects(grid, model.defaults.usual_objects, seed));
+        }
         std::ranges::transform(told, told.begin(), as_written);
         return told;
     }

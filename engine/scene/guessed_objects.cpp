@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 
 namespace semrover {
@@ -22,6 +23,7 @@ constexpr double kUsuallyOne = 1.5; // usual lengths that are still one thing
 constexpr double kGap = 0.9;        // metres between things of a row
 constexpr double kCutReach = 1;     // metres to either side of an even cut, where a better one is looked for
 constexpr double kElongated = 1.3;  // length over width from which a box is turned
+constexpr double kBlock = 32;       // metres, in which houses near a thing are looked for
 constexpr double kParallel = 0.4;   // radians from a wall's direction, within which things are taken to stand along it
 constexpr int kSidewalkReach = 8;   // cells from a vehicle to the sidewalk that tells its front
 
@@ -48,15 +50,19 @@ class Guess {
     {
     }
 
-    std::vector<SceneObject> run()
+    Result<std::vector<SceneObject>> run()
     {
         const std::vector<Cells> groups = connected_groups(grid_);
         std::vector<bool> done(groups.size());
         for (size_t g = 0; g < groups.size(); ++g)
             done[g] = usual_for(groups[g]) && label_ == kBuilding && add_houses(groups[g]);
-        houses_ = objects_.size();
+        SR_TRY(const std::vector<int32_t> houses, objects_of_cells(grid_, objects_));
+        for (size_t o = 0; o < objects_.size(); ++o)
+            walls_[block_of(objects_[o].center)].push_back(o);
+        // what is seen of a roof or a yard belongs to the house around it
+        const auto in_a_house = [&](uint32_t v) { return houses[v] != kNoObject; };
         for (size_t g = 0; g < groups.size(); ++g)
-            if (!done[g] && usual_for(groups[g]) && !(label_ == kBuilding && in_a_house(groups[g])))
+            if (!done[g] && usual_for(groups[g]) && !std::ranges::all_of(groups[g], in_a_house))
                 add_row(groups[g]);
         return std::move(objects_);
     }
@@ -98,33 +104,30 @@ class Guess {
         return !houses.empty();
     }
 
-    // what is seen of a roof or a yard belongs to the house around it
-    bool in_a_house(const Cells& group) const
+    static Column block_of(const std::array<double, 3>& point)
     {
-        return std::ranges::any_of(std::span(objects_).first(houses_), [&](const SceneObject& house) {
-            return std::ranges::all_of(group, [&](uint32_t v) {
-                const auto p = place_in(house, place(v, 0));
-                return std::abs(p[0]) <= house.size[0] / 2 + kObjectReach &&
-                       std::abs(p[1]) <= house.size[1] / 2 + kObjectReach &&
-                       std::abs(p[2]) <= house.size[2] / 2 + kObjectReach;
-            });
-        });
+        return {int32_t(std::floor(point[0] / kBlock)), int32_t(std::floor(point[1] / kBlock))};
     }
 
     // the direction of the nearest house's walls that is nearest to `angle`, or `angle` where none is near it
     double along_walls(double angle, const Cells& cells) const
     {
         const auto e = extents(cells, 0);
-        const SceneObject* nearest = nullptr;
-        double least = INFINITY;
-        for (const SceneObject& house : std::span(objects_).first(houses_)) {
-            const double apart = std::hypot(house.center[0] - e[0].middle(), house.center[1] - e[1].middle());
-            if (apart < least) {
-                least = apart;
-                nearest = &house;
+        const std::array<double, 3> at = {e[0].middle(), e[1].middle(), 0};
+        double least = INFINITY, off = INFINITY;
+        for (int n = 0; n < 9; ++n) {
+            const Column block = block_of(at);
+            const auto found = walls_.find({block[0] + n / 3 - 1, block[1] + n % 3 - 1});
+            if (found == walls_.end())
+                continue;
+            for (size_t o : found->second) {
+                const double apart = std::hypot(objects_[o].center[0] - at[0], objects_[o].center[1] - at[1]);
+                if (apart < least) {
+                    least = apart;
+                    off = std::remainder(objects_[o].heading - angle, std::numbers::pi / 2);
+                }
             }
         }
-        const double off = nearest ? std::remainder(nearest->heading - angle, std::numbers::pi / 2) : 0;
         return std::abs(off) < kParallel ? angle + off : angle;
     }
 
@@ -230,13 +233,13 @@ class Guess {
     const double size_;
     const std::set<Column> street_, sidewalk_;
     uint8_t label_ = 0;
-    std::vector<SceneObject> objects_; // houses first
-    size_t houses_ = 0;
+    std::vector<SceneObject> objects_;            // houses first
+    std::map<Column, std::vector<size_t>> walls_; // houses by where they are
 };
 
 } // namespace
 
-std::vector<SceneObject> guess_objects(const VoxelGrid& grid, const UsualObjects& usual, uint64_t seed)
+Result<std::vector<SceneObject>> guess_objects(const VoxelGrid& grid, const UsualObjects& usual, uint64_t seed)
 {
     return Guess(grid, usual, seed).run();
 }

@@ -12,6 +12,7 @@ namespace semrover {
 // rows of them cut at usual lengths, buildings at the houses that their street shows. Each colour is drawn from the
 // usual ones, keyed by the seed, the class and the object's lowest cell. Classes of which nothing is usual have no
 // objects. The same labels and seed give the same objects.
-std::vector<SceneObject> guess_objects(const VoxelGrid& grid, const UsualObjects& usual, uint64_t seed);
+// Errors: as objects_of_cells
+Result<std::vector<SceneObject>> guess_objects(const VoxelGrid& grid, const UsualObjects& usual, uint64_t seed);
 
 } // namespace semrover

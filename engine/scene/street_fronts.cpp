@@ -210,6 +210,32 @@ double plane_of(const VoxelGrid& grid, std::span<const uint32_t> cells, double h
     return most->second.second / double(most->second.first);
 }
 
+// width: cells
+std::vector<HouseFront> houses_of(const VoxelGrid& grid, const Wall& wall, const Row& row, double cross, double width,
+                                  uint64_t seed)
+{
+    const double size = double(grid.voxel_size), heading = cross + row.side * std::numbers::pi / 2;
+    double low = INFINITY;
+    for (const Column& c : row.columns)
+        low = std::min(low, along(c, heading));
+    const auto [i, j] = *std::ranges::min_element(row.columns);
+    KeyedRandom random(seed, {uint64_t(uint32_t(i)), uint64_t(uint32_t(j))});
+    const std::vector<double> cuts = cuts_of(tops_of(grid, wall, row, heading, low), kNarrowest / size, width, random);
+    std::vector<HouseFront> houses(cuts.size());
+    for (const Column& c : row.columns) {
+        const auto after = std::ranges::upper_bound(cuts, along(c, heading) - low);
+        auto& house = houses[size_t(std::max<ptrdiff_t>(after - cuts.begin() - 1, 0))].cells;
+        house.insert(house.end(), wall.at(c).cells.begin(), wall.at(c).cells.end());
+    }
+    std::erase_if(houses, [](const HouseFront& house) { return house.cells.empty(); });
+    for (HouseFront& house : houses) {
+        std::ranges::sort(house.cells);
+        house.heading = heading;
+        house.front = plane_of(grid, house.cells, heading) * size;
+    }
+    return houses;
+}
+
 } // namespace
 
 std::set<Column> columns_of(const VoxelGrid& grid, std::initializer_list<uint8_t> labels)
@@ -236,32 +262,9 @@ std::vector<HouseFront> street_fronts(const VoxelGrid& grid, std::span<const uin
     std::vector<Row> rows = rows_of(wall);
     join_sides(rows, wall, *cross, kLongSide * depth / size);
     std::vector<HouseFront> houses;
-    for (const Row& row : rows) {
-        if (row.columns.empty())
-            continue;
-        const double heading = *cross + row.side * std::numbers::pi / 2;
-        double low = INFINITY;
-        for (const Column& c : row.columns)
-            low = std::min(low, along(c, heading));
-        const auto [i, j] = *std::ranges::min_element(row.columns);
-        KeyedRandom random(seed, {uint64_t(uint32_t(i)), uint64_t(uint32_t(j))});
-        const std::vector<double> cuts =
-            cuts_of(tops_of(grid, wall, row, heading, low), kNarrowest / size, width / size, random);
-        std::vector<HouseFront> of_row(cuts.size());
-        for (const Column& c : row.columns) {
-            const auto after = std::ranges::upper_bound(cuts, along(c, heading) - low);
-            auto& house = of_row[size_t(std::max<ptrdiff_t>(after - cuts.begin() - 1, 0))].cells;
-            house.insert(house.end(), wall[c].cells.begin(), wall[c].cells.end());
-        }
-        for (HouseFront& house : of_row) {
-            if (house.cells.empty())
-                continue;
-            std::ranges::sort(house.cells);
-            house.heading = heading;
-            house.front = plane_of(grid, house.cells, heading) * size;
-            houses.push_back(std::move(house));
-        }
-    }
+    for (const Row& row : rows)
+        if (!row.columns.empty())
+            std::ranges::move(houses_of(grid, wall, row, *cross, width / size, seed), std::back_inserter(houses));
     return houses;
 }
 
