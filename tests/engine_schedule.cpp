@@ -206,7 +206,7 @@ TEST(SchedulerConfig, TheModelOfTheDemoIsRead)
     const auto config = scheduler_config_from_text(text, warnings);
     ASSERT_TRUE(config) << config.error().message;
     EXPECT_EQ(config->sampler, Sampler::ddpm);
-    EXPECT_EQ(config->spacing, TimestepSpacing::trailing);
+    EXPECT_EQ(config->spacing, TimestepSpacing::quadratic);
     EXPECT_EQ(config->prediction, Prediction::sample);
     EXPECT_TRUE(warnings.empty());
     const auto other = scheduler_config_from_text(text, warnings, Sampler::dpmpp_2m);
