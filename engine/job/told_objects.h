@@ -12,9 +12,8 @@ namespace semrover {
 using GivenObjects = std::optional<std::vector<SceneObject>>;
 
 // What a run tells its model beside labels: the given objects, or those guessed of `grid` with the model's usual ones.
-// A model that knows labels alone is told nothing.
-// Numbers are as write_objects writes them, so that what was written gives the same. Errors: bad_input, where such a
-// model is given objects
+// Numbers are as write_objects writes them, so that what was written gives the same. A model that knows labels alone is
+// told nothing. Errors: bad_input, where such a model is given objects, and as guess_objects
 Result<std::vector<SceneObject>> told_objects(const VoxfieldModel& model, const GivenObjects& given,
                                               const VoxelGrid& grid, uint64_t seed);
 

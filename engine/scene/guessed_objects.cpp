@@ -178,7 +178,7 @@ class Guess {
         std::vector<double> cuts;
         for (int n = 1; n < count; ++n)
             cuts.push_back(emptiest(filled, length * n / count));
-        std::vector<Cells> pieces(size_t(count) + 0);
+        std::vector<Cells> pieces(cuts.size() + 1);
         for (uint32_t v : cells) {
             const auto after = std::ranges::upper_bound(cuts, place(v, heading)[axis] - e.low);
             pieces[size_t(after - cuts.begin())].push_back(v);

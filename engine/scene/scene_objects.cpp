@@ -22,24 +22,18 @@ constexpr std::array<std::string_view, 4> kFileKeys = {"format", "version", "obj
 constexpr std::array<std::string_view, 7> kObjectKeys = {"id", "class", "center", "size", "heading", "tint", "comment"};
 constexpr double kFarthest = 1e6, kShortest = 1e-3, kLongest = 1e4, kLargestAngle = 1e3;
 
-Result<double> number_within(const Json& json, double low, double high, std::string_view where)
+Status check_within(double value, double low, double high, std::string_view where)
 {
-    SR_TRY(const double value, finite_number(json, where));
     if (value < low || value > high)
         return fail(ErrorCode::bad_input, "{}: expected a number from {} to {}, found {}", where, low, high, value);
-    return value;
+    return {};
 }
 
 Result<Triple> triple_of(const Json& object, const char* key, double low, double high, std::string_view where)
 {
-    const auto entry = object.find(key);
-    const std::string at = fmt::format("{}: {}", where, key);
-    if (entry == object.end() || !entry->is_array() || entry->size() != 3)
-        return fail(ErrorCode::bad_input, "{}: expected an array of 3 numbers", at);
-    Triple values{};
-    for (size_t i = 0; i < 3; ++i) {
-        SR_TRY(values[i], number_within((*entry)[i], low, high, at));
-    }
+    SR_TRY(const Triple values, numbers_at<3>(object, key, where));
+    for (double value : values)
+        SR_CHECK(check_within(value, low, high, fmt::format("{}: {}", where, key)));
     return values;
 }
 
@@ -84,7 +78,8 @@ Result<SceneObject> parse_object(const Json& json, std::string_view where)
     const auto heading = json.find("heading");
     if (heading == json.end())
         return fail(ErrorCode::bad_input, "{}: heading is missing", where);
-    SR_TRY(o.heading, number_within(*heading, -kLargestAngle, kLargestAngle, fmt::format("{}: heading", where)));
+    SR_TRY(o.heading, finite_number(*heading, fmt::format("{}: heading", where)));
+    SR_CHECK(check_within(o.heading, -kLargestAngle, kLargestAngle, fmt::format("{}: heading", where)));
     SR_TRY(o.tint, tint_of(json, where));
     return o;
 }

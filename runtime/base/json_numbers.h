@@ -30,6 +30,20 @@ inline Result<std::optional<double>> optional_number(const Json& object, const c
     return std::optional<double>(value);
 }
 
+// N numbers under a key
+template <size_t N>
+Result<std::array<double, N>> numbers_at(const Json& object, const char* key, std::string_view where)
+{
+    const auto entry = object.find(key);
+    if (entry == object.end() || !entry->is_array() || entry->size() != N)
+        return fail(ErrorCode::bad_input, "{}: {}: expected an array of {} numbers", where, key, N);
+    std::array<double, N> numbers{};
+    for (size_t i = 0; i < N; ++i) {
+        SR_TRY(numbers[i], finite_number((*entry)[i], fmt::format("{}: {}", where, key)));
+    }
+    return numbers;
+}
+
 // an array of numbers, or of arrays of numbers, in the order of the text
 inline Result<std::vector<double>> numbers_of(const Json& value, std::string_view where)
 {
