@@ -116,23 +116,48 @@ class OwnerSearch {
     uint64_t most_, pairs_ = 0;
 };
 
-std::array<double, 3> median_color(const VoxelGrid& grid, std::span<const uint32_t> cells)
+using Rgb = std::array<uint8_t, 3>;
+
+// luma of Rec. 709, of levels, times 10,000
+uint32_t lightness(const Rgb& color)
 {
-    const size_t values = size_t(grid.points_per_voxel) * 3;
-    std::array<std::array<uint32_t, 256>, 3> counts{};
-    for (uint32_t v : cells)
-        for (size_t i = 0; i < values; ++i)
-            ++counts[i % 3][grid.colors[v * values + i]];
-    const uint64_t all = uint64_t(cells.size()) * uint64_t(grid.points_per_voxel);
-    std::array<double, 3> color{};
+    return 2126u * color[0] + 7152u * color[1] + 722u * color[2];
+}
+
+// the lighter two fifths: what windows, tyres and shadows leave out is the paint
+void keep_lighter_part(std::vector<Rgb>& colors)
+{
+    std::vector<uint32_t> levels(colors.size());
+    std::ranges::transform(colors, levels.begin(), lightness);
+    const auto first = levels.begin() + ptrdiff_t(levels.size() * 3 / 5);
+    std::ranges::nth_element(levels, first);
+    std::erase_if(colors, [least = *first](const Rgb& color) { return lightness(color) < least; });
+}
+
+// colors: one at least -> their median, channel by channel, 0..1
+std::array<double, 3> median_color(std::span<const Rgb> colors)
+{
+    std::array<double, 3> median{};
+    std::vector<uint8_t> levels(colors.size());
     for (size_t c = 0; c < 3; ++c) {
-        uint64_t below = 0;
-        uint32_t level = 0;
-        while ((below += counts[c][level]) * 2 < all)
-            ++level;
-        color[c] = level / 255.0;
+        std::ranges::transform(colors, levels.begin(), [c](const Rgb& color) { return color[c]; });
+        const auto middle = levels.begin() + ptrdiff_t((levels.size() - 1) / 2);
+        std::ranges::nth_element(levels, middle);
+        median[c] = *middle / 255.0;
     }
-    return color;
+    return median;
+}
+
+std::array<double, 3> paint_color(const VoxelGrid& grid, std::span<const uint32_t> cells)
+{
+    const size_t points = size_t(grid.points_per_voxel);
+    std::vector<Rgb> colors;
+    colors.reserve(cells.size() * points);
+    for (const uint32_t v : cells)
+        for (size_t i = v * points; i < (v + 1) * points; ++i)
+            colors.push_back({grid.colors[i * 3], grid.colors[i * 3 + 1], grid.colors[i * 3 + 2]});
+    keep_lighter_part(colors);
+    return median_color(colors);
 }
 
 } // namespace
@@ -187,7 +212,7 @@ Status tint_objects(std::span<SceneObject> objects, const VoxelGrid& grid)
         const int32_t owner = owners[cells[first]];
         for (last = first; last < cells.size() && owners[cells[last]] == owner;)
             ++last;
-        objects[size_t(owner)].tint = median_color(grid, std::span(cells).subspan(first, last - first));
+        objects[size_t(owner)].tint = paint_color(grid, std::span(cells).subspan(first, last - first));
     }
     return {};
 }

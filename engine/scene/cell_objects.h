@@ -30,8 +30,9 @@ Result<std::vector<int32_t>> objects_of_cells(const VoxelGrid& grid, std::span<c
 // where the cells belong to no object.
 std::vector<size_t> objects_meant(std::span<const int32_t> owners, size_t objects, std::span<const uint32_t> cells);
 
-// Gives each object the median colour, channel by channel, of the points of its cells; objects without points keep what
-// they have. Errors: as objects_of_cells
+// Gives each object the colour of its paint: the median, channel by channel, of the lighter two fifths (by Rec. 709
+// luma) of its cells' points. A car's windows and tyres are more than half of it. Objects without points keep what they
+// have. Errors: as objects_of_cells
 Status tint_objects(std::span<SceneObject> objects, const VoxelGrid& grid);
 
 } // namespace semrover

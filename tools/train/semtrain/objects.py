@@ -53,22 +53,33 @@ def owners_of(centers, labels, boxes, box_labels):
     return owners
 
 
-def medians_near(centers, colors, reach, rows=256):
-    """centers [n, 3], colors u8 [n, 3] -> u8 [n, 3]: median, channel by channel, of the colours within reach of each"""
+LUMA = np.array([2126, 7152, 722])  # of Rec. 709, times 10,000
+
+
+def paint_near(centers, colors, reach, rows=256):
+    """centers [n, 3], colors u8 [n, 3] -> u8 [n, 3]: median, channel by channel, of the lighter two fifths of the
+    colours within reach of each: the engine's tint_objects, of a part of the object"""
     out = np.empty_like(colors)
-    orders = colors.argsort(0, kind="stable")
+    light = colors @ LUMA
+    by_light, orders = light.argsort(kind="stable"), colors.argsort(0, kind="stable")
     for first in range(0, len(centers), rows):
         apart = ((centers[first:first + rows, None] - centers[None]) ** 2).sum(-1)
         near = apart <= (reach + 1e-6) ** 2
-        half = (near.sum(1, keepdims=True) + 1) // 2
+        least = by_light[at_rank(near[:, by_light], near.sum(1) * 3 // 5 + 1)]
+        near &= light >= light[least][:, None]
         for c in range(3):
-            at = (near[:, orders[:, c]].cumsum(1, dtype=np.int32) >= half).argmax(1)
+            at = at_rank(near[:, orders[:, c]], (near.sum(1) + 1) // 2)
             out[first:first + rows, c] = colors[orders[at, c], c]
     return out
 
 
+def at_rank(chosen, ranks):
+    """chosen bool [R, n], ranks [R], from 1 -> [R]: where the one of that rank stands"""
+    return (chosen.cumsum(1, dtype=np.int32) >= ranks[:, None]).argmax(1)
+
+
 def local_tints(centers, owners, colors):
-    """colors u8 [V, n, 3] of points -> u8 [V, 3]: for a cell of an object the median of the medians of the object's
+    """colors u8 [V, n, 3] of points -> u8 [V, 3]: for a cell of an object the paint among the medians of the object's
     cells within 3 m; 0 for others"""
     tints = np.zeros((len(centers), 3), np.uint8)
     order = np.argsort(owners, kind="stable")
@@ -76,7 +87,7 @@ def local_tints(centers, owners, colors):
     for cells in np.split(order, np.flatnonzero(np.diff(owners[order])) + 1):
         if len(cells):
             middle = np.median(colors[cells], 1).astype(np.uint8)
-            tints[cells] = medians_near(centers[cells].astype(np.float32), middle, TINT_REACH)
+            tints[cells] = paint_near(centers[cells].astype(np.float32), middle, TINT_REACH)
     return tints
 
 

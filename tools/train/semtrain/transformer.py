@@ -34,6 +34,11 @@ def noised(x0, alphas, t, random):
     return a.sqrt() * x0 + (1 - a).sqrt() * noise
 
 
+def drawn_timesteps(count, timesteps, power, random):
+    """[count]: uniform with a power of 1; with a larger one more are low, as where a sampler takes quadratic steps"""
+    return (torch.rand(count, generator=random) ** power * timesteps).long().clamp(max=timesteps - 1)
+
+
 def with_known(noisy, x0, known, alphas, top, random):
     """noisy, but cells that are known [B, N] have the noise of a level below `top` only: what was generated before is a
     little worse than the truth"""
@@ -57,7 +62,7 @@ def loss_of(sets, config):
     def loss(model, step):
         centers, labels, x0, known, condition = (torch.from_numpy(a).to(device) for a in sets.batch(step))
         random = generator(config, step)
-        t = torch.randint(0, len(alphas), (len(x0),), generator=random).to(device)
+        t = drawn_timesteps(len(x0), len(alphas), config["timestep_power"], random).to(device)
         noisy = with_known(noised(x0, alphas, t, random), x0, known, alphas, config["known_levels"], random)
         valid = torch.ones(labels.shape, dtype=torch.bool, device=device)
         told = (condition,) if condition.shape[-1] else ()

@@ -18,7 +18,7 @@ from semtrain.condition import drawn_boxes, mirrored, object_part, told_boxes, t
 from semtrain.grids import Grids, LocalSets
 from semtrain.model_folder import write_component
 from semtrain.nets.transformer import VoxfieldTransformer
-from semtrain.objects import local_tints, medians_near, owners_of, read_objects
+from semtrain.objects import local_tints, owners_of, paint_near, read_objects
 from semtrain.regenerate import load_transformer
 
 NETWORK = {"num_layers": 2, "num_attention_heads": 2, "attention_head_dim": 16, "points_per_voxel": 4,
@@ -82,11 +82,11 @@ class Objects(unittest.TestCase):
         self.assertEqual(owners.tolist(), [0 if abs(x - 2.4) < 2.4 else -1 for x in centers[:, 0]])
         self.assertTrue({0, -1} == set(owners.tolist()))
 
-    def test_have_the_median_colour_of_what_is_near(self):
+    def test_have_the_colour_of_the_lighter_part_of_what_is_near(self):
         centers = np.array([[float(x), 0, 0] for x in range(10)], np.float32)
         colors = np.repeat(np.array([[1], [2], [3], [4], [200], [201], [202], [203], [204], [205]], np.uint8), 3, 1)
-        self.assertEqual(medians_near(centers, colors, 2.0, rows=4)[:, 0].tolist(),
-                         [2, 2, 3, 4, 200, 201, 202, 203, 203, 204])
+        self.assertEqual(paint_near(centers, colors, 2.0, rows=4)[:, 0].tolist(),
+                         [2, 3, 4, 200, 201, 202, 203, 204, 204, 204])
         points = np.repeat(colors[:, None], 4, 1)
         owners = np.array([0] * 4 + [1] * 5 + [-1])
         tints = local_tints(centers * 10, owners, points)
