@@ -1,20 +1,20 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
 
-# shaders/<family>/<op>[.<variant>].comp -> SPIR-V -> <build>/generated/<op>.spv.h, one header per op with all its variants
+# <folder>/<op>[.<variant>].comp -> SPIR-V -> <build>/generated/<op>.spv.h, one header per op with all its variants
 find_program(GLSLANG glslangValidator REQUIRED)
 add_executable(reflect cmake/reflect/main.cpp cmake/reflect/module.cpp cmake/reflect/protocol.cpp)
 target_include_directories(reflect PRIVATE ${CMAKE_SOURCE_DIR})
 target_link_libraries(reflect PRIVATE fmt::fmt)
 target_compile_options(reflect PRIVATE "${cold_options}")
 
-# add_shader_headers(TARGET FAMILY...): an interface target with the headers of these families; names of ops are left in
+# add_shader_headers(TARGET FOLDER...): an interface target with the headers of the ops in these folders; names of ops are left in
 # TARGET_ops
 function(add_shader_headers target)
     set(shaders)
-    foreach(family ${ARGN})
-        file(GLOB of_family CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/shaders/${family}/*.comp)
-        list(APPEND shaders ${of_family})
+    foreach(folder ${ARGN})
+        file(GLOB of_folder CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/${folder}/*.comp)
+        list(APPEND shaders ${of_folder})
     endforeach()
     file(GLOB_RECURSE libraries CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/shaders/*.h ${CMAKE_SOURCE_DIR}/shaders/lib/*.glsl)
     set(generated ${CMAKE_BINARY_DIR}/generated)

@@ -1,6 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 
+#include "lib/half.glsl"
+
 // storage is 32-bit words: fp32, or two fp16 each, so that fp16 needs no device feature
 void unpack8(uvec4 w, out vec4 lo, out vec4 hi)
 {
@@ -10,7 +12,7 @@ void unpack8(uvec4 w, out vec4 lo, out vec4 hi)
 
 uvec4 pack8(vec4 lo, vec4 hi)
 {
-    return uvec4(packHalf2x16(lo.xy), packHalf2x16(lo.zw), packHalf2x16(hi.xy), packHalf2x16(hi.zw));
+    return uvec4(pack_halves(lo.xy), pack_halves(lo.zw), pack_halves(hi.xy), pack_halves(hi.zw));
 }
 
 // eight elements of row-major words, at an element index that is a multiple of 8

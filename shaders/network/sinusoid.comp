@@ -4,6 +4,7 @@
 // y = per axis [sin(x w_0), sin(x w_1), .., cos(x w_0), cos(x w_1), ..], or cosines first; one element a thread pair
 #extension GL_GOOGLE_include_directive : require
 #include "sinusoid.h"
+#include "lib/half.glsl"
 #include "lib/thread.glsl"
 #include "lib/trigonometry.glsl"
 
@@ -33,7 +34,7 @@ void main()
     const vec2 pair = vec2(element(row, col), element(row, col + 1));
     const uint at = row * p.y_ld + col;
     if (kHalfY) {
-        y[at / 2] = packHalf2x16(pair);
+        y[at / 2] = pack_halves(pair);
     } else {
         y[at] = floatBitsToUint(pair.x);
         y[at + 1] = floatBitsToUint(pair.y);

@@ -5,6 +5,7 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 #include "winograd_output.h"
+#include "lib/half.glsl"
 #include "lib/thread.glsl"
 #include "lib/winograd.glsl"
 
@@ -25,7 +26,7 @@ layout(binding = 5) readonly buffer Residual { uvec2 residual[]; }; // as y
 void store(uint at, vec4 v)
 {
     if (kHalfY) {
-        y[at / 4] = uvec2(packHalf2x16(v.xy), packHalf2x16(v.zw));
+        y[at / 4] = uvec2(pack_halves(v.xy), pack_halves(v.zw));
     } else {
         y[at / 2] = floatBitsToUint(v.xy);
         y[at / 2 + 1] = floatBitsToUint(v.zw);
