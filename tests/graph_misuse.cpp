@@ -95,7 +95,13 @@ TEST(graph_misuse, names_the_kernel_that_no_variant_of_runs)
     const Error e = error_of(g, limits);
     EXPECT_EQ(e.code, ErrorCode::no_device);
     EXPECT_EQ(e.message,
-              "no variant of kernel 'gelu' runs on this device (16384 bytes of shared memory, 16 threads a group)");
+              "no variant of kernel 'gelu' runs on this device (16384 bytes of shared memory, 16 threads a group, 16 "
+              "storage buffers a shader)");
+    limits = test_limits();
+    limits.max_storage_buffers = 1; // x and y are two
+    EXPECT_EQ(error_of(g, limits).code, ErrorCode::no_device);
+    limits.max_storage_buffers = 2;
+    EXPECT_TRUE(make_plan(g.desc(), limits));
 }
 
 TEST(graph_misuse, refuses_more_workgroups_than_both_dimensions_take)

@@ -166,6 +166,20 @@ TEST(runtime_device, refuses_memory_beyond_the_budget_with_numbers)
     EXPECT_EQ(device->budget(), 1u << 20);
 }
 
+TEST(runtime_device, copies_through_staging_when_the_budget_is_used_up)
+{
+    const auto device = make_device({.max_bytes = 1 << 20, .limits = "staging=1"});
+    const auto all = make_buffer(*device, 1 << 20);
+    EXPECT_EQ(all->mapped(), nullptr);
+    const Bytes bytes = pattern(1 << 20);
+    const Status written = device->write(all->slice(), bytes);
+    ASSERT_TRUE(written) << written.error().message;
+    Bytes back(bytes.size());
+    ASSERT_TRUE(device->read(all->slice(), back));
+    EXPECT_EQ(back, bytes);
+    EXPECT_EQ(device->peak_bytes(), 1u << 20);
+}
+
 TEST(runtime_device, refuses_one_allocation_that_is_too_large_with_numbers)
 {
     const auto device = make_device({.limits = "alloc=1048576"});

@@ -31,6 +31,7 @@ Tensor knn(Graph& g, Tensor points, const KnnOptions& options)
                        .points_ld = points.ld,
                        .mask = (1u << bits) - 1,
                        .cell_size = options.cell_size,
+                       .per_metre = 1 / options.cell_size,
                        .radius2 = options.radius > 0 ? options.radius * options.radius : 1e38f,
                        .queries = others ? options.queries.rows : 0,
                        .queries_ld = others ? options.queries.ld : 0,

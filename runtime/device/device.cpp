@@ -248,7 +248,7 @@ Result<Buffer*> Device::staging()
 {
     if (!staging_) {
         SR_TRY(staging_,
-               Buffer::create(*this, std::min(kStagingBytes, limits_.max_allocation), MemoryKind::staging, "staging"));
+               Buffer::create(*this, std::min(kStagingBytes, limits_.max_allocation), MemoryKind::transfer, "staging"));
     }
     return staging_.get();
 }

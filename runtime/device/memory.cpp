@@ -20,7 +20,7 @@ int find_type(const VkPhysicalDeviceMemoryProperties& memory, uint32_t allowed, 
 int choose_type(const VkPhysicalDeviceMemoryProperties& memory, uint32_t allowed, MemoryKind kind)
 {
     constexpr VkMemoryPropertyFlags kHost = VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
-    if (kind == MemoryKind::staging) {
+    if (kind != MemoryKind::device) {
         const int cached = find_type(memory, allowed, kHost | VK_MEMORY_PROPERTY_HOST_CACHED_BIT);
         return cached >= 0 ? cached : find_type(memory, allowed, kHost);
     }
@@ -48,8 +48,10 @@ Result<std::unique_ptr<Buffer>> Buffer::create(Device& device, uint64_t bytes, M
     if (needs.size > device.limits().max_allocation)
         return fail(ErrorCode::out_of_memory, "{}: {} bytes exceed the device's largest allocation of {} bytes", name,
                     needs.size, device.limits().max_allocation);
-    SR_CHECK(device.account(int64_t(needs.size), name));
-    b->accounted_ = needs.size;
+    if (kind != MemoryKind::transfer) {
+        SR_CHECK(device.account(int64_t(needs.size), name));
+        b->accounted_ = needs.size;
+    }
     VkPhysicalDeviceMemoryProperties memory;
     vkGetPhysicalDeviceMemoryProperties(device.physical(), &memory);
     const int type = choose_type(memory, needs.memoryTypeBits, kind);
@@ -60,10 +62,10 @@ Result<std::unique_ptr<Buffer>> Buffer::create(Device& device, uint64_t bytes, M
     allocate.memoryTypeIndex = uint32_t(type);
     if (vkAllocateMemory(device.handle(), &allocate, nullptr, &b->memory_) != VK_SUCCESS)
         return fail(ErrorCode::out_of_memory, "{}: the device refused {} bytes; {} bytes are in use", name, needs.size,
-                    device.allocated_bytes() - needs.size);
+                    device.allocated_bytes() - b->accounted_);
     SR_VK(vkBindBufferMemory(device.handle(), b->buffer_, b->memory_, 0));
     constexpr VkMemoryPropertyFlags kHost = VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
-    const bool direct = kind == MemoryKind::staging || !device.limits().force_staging;
+    const bool direct = kind != MemoryKind::device || !device.limits().force_staging;
     if (direct && (memory.memoryTypes[type].propertyFlags & kHost) == kHost)
         SR_VK(vkMapMemory(device.handle(), b->memory_, 0, VK_WHOLE_SIZE, 0, reinterpret_cast<void**>(&b->mapped_)));
     return b;

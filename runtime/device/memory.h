@@ -14,7 +14,9 @@ namespace semrover {
 
 class Device;
 
-enum class MemoryKind : uint8_t { device, staging };
+// device: what kernels read and write. staging: what the host sees, and copies pass through. transfer: staging that the
+// budget (--max-vram) does not count, as no plan has it: the device's one window of 16 MiB, where it needs any.
+enum class MemoryKind : uint8_t { device, staging, transfer };
 
 // one VkBuffer with memory of its own; usable as storage, texel buffer, and transfer source and target
 class Buffer {

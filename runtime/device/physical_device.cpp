@@ -80,6 +80,7 @@ DeviceLimits limits_of(VkPhysicalDevice physical, const VkPhysicalDeviceProperti
     l.offset_alignment = uint32_t(std::max<uint64_t>(
         {256, v.minStorageBufferOffsetAlignment, v.minTexelBufferOffsetAlignment, v.nonCoherentAtomSize}));
     l.max_push_bytes = v.maxPushConstantsSize;
+    l.max_storage_buffers = std::min(v.maxPerStageDescriptorStorageBuffers, v.maxDescriptorSetStorageBuffers);
     l.submit_seconds = l.type == DeviceType::cpu ? 0 : 0.1;
     return l;
 }

@@ -40,6 +40,8 @@ Status apply(DeviceLimits& limits, const std::string& key, const std::string& te
         return lower(limits.max_allocation, key, value);
     if (key == "groups")
         return lower(limits.max_groups, key, value);
+    if (key == "buffers")
+        return lower(limits.max_storage_buffers, key, value);
     if (key == "fp16") {
         if (value == 0)
             limits.needs_supported &= ~uint32_t(kNeedsFloat16);
@@ -61,7 +63,8 @@ Status apply(DeviceLimits& limits, const std::string& key, const std::string& te
     }
     return fail(
         ErrorCode::usage,
-        "unknown limit '{}' (known: shared, range, texels, alloc, groups, fp16, subgroups, staging, submit, variant)",
+        "unknown limit '{}' (known: shared, range, texels, alloc, groups, buffers, fp16, subgroups, staging, submit, "
+        "variant)",
         key);
 }
 

@@ -5,6 +5,7 @@
 
 #include "runtime/graph/protocol.h"
 
+#include <algorithm>
 #include <cstring>
 
 namespace semrover {
@@ -13,9 +14,11 @@ namespace {
 
 bool runs_on(const KernelVariant& v, const DeviceLimits& limits)
 {
+    const auto buffers = std::ranges::count(v.bindings, BindingKind::storage, &BindingInfo::kind);
     const uint32_t group_threads = v.local_size[0] * v.local_size[1] * v.local_size[2];
     return v.shared_bytes <= limits.max_shared_bytes && group_threads <= limits.max_group_threads &&
-           (v.needs & ~limits.needs_supported) == 0 && v.push_bytes <= limits.max_push_bytes;
+           (v.needs & ~limits.needs_supported) == 0 && v.push_bytes <= limits.max_push_bytes &&
+           uint64_t(buffers) <= limits.max_storage_buffers;
 }
 
 // lower is better; kernels with one variant have an empty name
@@ -100,9 +103,11 @@ Status stage::pick_variants(Plan& plan, const DeviceLimits& limits)
     for (Pass& pass : plan.passes) {
         pass.variant = choose_variant(*pass.kernel, limits);
         if (!pass.variant)
-            return fail(ErrorCode::no_device,
-                        "no variant of kernel '{}' runs on this device ({} bytes of shared memory, {} threads a group)",
-                        pass.kernel->name, limits.max_shared_bytes, limits.max_group_threads);
+            return fail(
+                ErrorCode::no_device,
+                "no variant of kernel '{}' runs on this device ({} bytes of shared memory, {} threads a group, {} "
+                "storage buffers a shader)",
+                pass.kernel->name, limits.max_shared_bytes, limits.max_group_threads, limits.max_storage_buffers);
         for (const ConstantValue& c : pass.options.constants)
             set_constant(pass, c.name, c.value);
         fit_tile(pass);

@@ -9,6 +9,7 @@ struct KnnPush {
     uint points_ld;      // floats from one point to the next
     uint mask;           // buckets - 1, buckets a power of two
     float cell_size;     // of the grid
+    float per_metre;     // 1 / cell_size
     float radius2;       // square of the largest distance of a neighbour
     uint queries;        // points whose neighbours are sought, if they are others
     uint queries_ld;

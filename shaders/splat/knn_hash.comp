@@ -18,5 +18,5 @@ void main()
     if (i >= p.rows)
         return;
     const uint at = i * p.points_ld;
-    keys[i] = grid_hash(grid_cell(vec3(points[at], points[at + 1], points[at + 2]), p.cell_size)) & p.mask;
+    keys[i] = grid_hash(grid_cell(vec3(points[at], points[at + 1], points[at + 2]), p.per_metre)) & p.mask;
 }

@@ -72,7 +72,7 @@ void search_shell(ivec3 center, int shell)
         const uint bucket = grid_hash(cell) & p.mask, end = starts[bucket + 1];
         for (uint j = starts[bucket]; j < end; ++j) {
             const vec4 candidate = sorted_points[j];
-            if (grid_cell(candidate.xyz, p.cell_size) == cell) // else the bucket holds another cell as well
+            if (grid_cell(candidate.xyz, p.per_metre) == cell) // else the bucket holds another cell as well
                 offer(j, candidate);
         }
     }
@@ -100,7 +100,7 @@ void search_all()
 void search()
 {
     clear();
-    const ivec3 center = grid_cell(own, p.cell_size);
+    const ivec3 center = grid_cell(own, p.per_metre);
     const vec3 within = own - vec3(center) * p.cell_size, edge = min(within, p.cell_size - within);
     // distance from the point to the border of its cell, less what rounding can have moved other points across it
     const float margin = min(min(edge.x, edge.y), edge.z) - 1e-6 * (abs(own.x) + abs(own.y) + abs(own.z) + p.cell_size);
