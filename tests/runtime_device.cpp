@@ -168,7 +168,7 @@ TEST(runtime_device, refuses_memory_beyond_the_budget_with_numbers)
 
 TEST(runtime_device, copies_through_staging_when_the_budget_is_used_up)
 {
-    const auto device = make_device({.max_bytes = 1 << 20, .limits = "staging=1"});
+    const auto device = make_device({.limits = "staging=1", .max_bytes = 1 << 20});
     const auto all = make_buffer(*device, 1 << 20);
     EXPECT_EQ(all->mapped(), nullptr);
     const Bytes bytes = pattern(1 << 20);
