@@ -8,8 +8,8 @@ target_include_directories(reflect PRIVATE ${CMAKE_SOURCE_DIR})
 target_link_libraries(reflect PRIVATE fmt::fmt)
 target_compile_options(reflect PRIVATE "${cold_options}")
 
-# add_shader_headers(TARGET FOLDER...): an interface target with the headers of the ops in these folders; names of ops are left in
-# TARGET_ops
+# add_shader_headers(TARGET FOLDER...): an interface target with the headers of the ops in these folders; their names are
+# left in TARGET_ops
 function(add_shader_headers target)
     set(shaders)
     foreach(folder ${ARGN})

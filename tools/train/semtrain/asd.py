@@ -17,7 +17,7 @@ from .denoising import alphas_cumprod, ddim_timesteps, denoise, input_of, noise_
 from .frames import find_drives, to_pixels, write_beside
 from .latents import load_vae, sequences
 from .nets.unet import UNet2DConditionModel
-from .trainer import Trainer, generator, number_below
+from .trainer import Trainer, generator, number_below, timesteps_at
 
 INDEX = {"renderer": ["diffusers", "UNet2DConditionModel"], "vae": ["diffusers", "AutoencoderKL"],
          "scheduler": ["diffusers", "DDIMScheduler"]}
@@ -73,7 +73,7 @@ def draw_timesteps(n, config, draw):
     nothing that one can see. sampler_share of them are instead of those where samplers of few_steps steps look: a small
     network has none to waste on others"""
     spread = (torch.arange(n) + torch.rand(1, generator=draw)) / n
-    t = (spread ** config["timestep_power"] * 1000).long().clamp(max=999)
+    t = timesteps_at(spread, 1000, config["timestep_power"])
     samplers = [ddim_timesteps(steps, config["timestep_spacing"]) for steps in config["few_steps"]]
     for i in range(n):
         if samplers and float(torch.rand(1, generator=draw)) < config["sampler_share"]:

@@ -26,6 +26,11 @@ def generator(config, step, stream=0):
     return torch.Generator().manual_seed((config["seed"] * 1000003 + step) * 16 + stream)
 
 
+def timesteps_at(shares, count, power):
+    """shares of 0..1, raised to a power -> timesteps below count: with a power above 1 more are low, below 1 fewer"""
+    return (shares ** power * count).long().clamp(max=count - 1)
+
+
 def number_below(n, draw):
     """0..n - 1, from a generator"""
     return int(torch.randint(n, (1,), generator=draw))

@@ -11,7 +11,7 @@ from .model_folder import add_to_index, read_component, write_component, write_s
 from .nets.transformer import VoxfieldTransformer
 from .objects import usual_objects
 from .settings import parser, resolve
-from .trainer import Trainer, generator
+from .trainer import Trainer, generator, timesteps_at
 
 
 def linear_alphas(config):
@@ -32,11 +32,6 @@ def noised(x0, alphas, t, random):
     noise = torch.randn(x0.shape, generator=random).to(x0.device)
     a = alphas[t][:, None, None]
     return a.sqrt() * x0 + (1 - a).sqrt() * noise
-
-
-def drawn_timesteps(count, timesteps, power, random):
-    """[count]: uniform with a power of 1; with a larger one more are low, as where a sampler takes quadratic steps"""
-    return (torch.rand(count, generator=random) ** power * timesteps).long().clamp(max=timesteps - 1)
 
 
 def with_known(noisy, x0, known, alphas, top, random):
@@ -62,7 +57,7 @@ def loss_of(sets, config):
     def loss(model, step):
         centers, labels, x0, known, condition = (torch.from_numpy(a).to(device) for a in sets.batch(step))
         random = generator(config, step)
-        t = drawn_timesteps(len(x0), len(alphas), config["timestep_power"], random).to(device)
+        t = timesteps_at(torch.rand(len(x0), generator=random), len(alphas), config["timestep_power"]).to(device)
         noisy = with_known(noised(x0, alphas, t, random), x0, known, alphas, config["known_levels"], random)
         valid = torch.ones(labels.shape, dtype=torch.bool, device=device)
         told = (condition,) if condition.shape[-1] else ()
