@@ -1,13 +1,19 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
 """A street as a trained transformer would have placed it: noise on the truth's tokens, up to a level at which the street
-can still be told, and denoised from there. What the transformer cannot draw is then wrong as it is in generated streets."""
+can still be told, and denoised from there. What the transformer cannot draw is then wrong as it is in generated streets.
+A model that may be told of objects and colours is told the street's own, and what it makes of an object gets the
+object's mean colour: a car of another colour than its picture would teach a renderer to leave colours out of account."""
+import os
+
 import numpy as np
 import torch
 
+from .condition import vector_of, width_of
 from .grids import read_tokens
 from .model_folder import read_component
 from .nets.transformer import VoxfieldTransformer
+from .objects import owners_of, read_objects
 from .precision import autocast
 from .transformer import linear_alphas, noised
 
@@ -50,35 +56,62 @@ def ancestral_step(x, x0, a, b, random):
     return b.sqrt() * x0 + (1 - b - fresh).clamp(min=0).sqrt() * noise + fresh.sqrt() * torch.randn(x.shape, generator=random)
 
 
+class Objects:
+    """the objects.json beside a .sgrid, if there is one: owners i32 [V] of the cells, -1 for none; boxes and tints"""
+
+    def __init__(self, path, centers, labels):
+        about = os.path.join(os.path.dirname(path), "objects.json")
+        self.boxes, of_boxes, self.tints = read_objects(about) if os.path.exists(about) else (np.ones((0, 7)), [], [])
+        self.centers, self.owners = centers, owners_of(centers, labels, self.boxes, of_boxes)
+
+    def tell(self, parts):
+        """boxes, and colours of whole objects -> f32 [V, W]"""
+        if not len(self.boxes):
+            return np.zeros((len(self.centers), width_of(parts)), np.float32)
+        has, of_cells = self.owners >= 0, np.maximum(self.owners, 0)
+        tints = self.tints[of_cells]
+        return vector_of(parts, self.centers, self.boxes[of_cells], has, tints, has & ~np.isnan(tints).any(1))
+
+    def keep_colors(self, made, true):
+        """tokens [V, n, 6]: moves the colours that were made so that those of each object have the true mean"""
+        for owner in np.unique(self.owners[self.owners >= 0]):
+            cells = self.owners == owner
+            made[cells, :, 3:] += true[cells, :, 3:].mean((0, 1)) - made[cells, :, 3:].mean((0, 1))
+
+
 @torch.no_grad()
 def regenerate(model, path, seed):
     """the .sgrid's cells that have points -> {cells, labels, points, colors}, as the file has them"""
     cells, labels, tokens = read_tokens(path)
     size, n = model.config["voxel_size"], model.config["points_per_voxel"]
+    objects = Objects(path, (cells + 0.5) * size, labels)
+    told = objects.tell(model.config["condition"])
     random = torch.Generator().manual_seed(seed)
     first = int(torch.randint(*LEVELS, (1,), generator=random))
     out, sets = np.empty(tokens.shape, np.float32), bisected(cells, MOST_CELLS)
     for i in range(0, len(sets), SETS):
-        denoise_sets(model, sets[i:i + SETS], cells, labels, tokens, out, first, random)
-    out = torch.from_numpy(out).reshape(len(cells), n, 6).clamp(-1, 1)
+        denoise_sets(model, sets[i:i + SETS], cells, labels, tokens, told, out, first, random)
+    out = out.reshape(len(cells), n, 6)
+    objects.keep_colors(out, tokens.astype(np.float32).reshape(out.shape))
+    out = torch.from_numpy(out).clamp(-1, 1)
     return {"cells": torch.from_numpy(cells), "labels": torch.from_numpy(labels),
             "points": (out[..., :3] * (size / 2)).half(),
             "colors": ((out[..., 3:] + 1) * 127.5).round().to(torch.uint8)}
 
 
-def denoise_sets(model, sets, cells, labels, tokens, out, first, random):
+def denoise_sets(model, sets, cells, labels, tokens, told, out, first, random):
     """one batch of sets, from timestep `first` on -> written to out"""
     rows = np.stack([np.resize(s, MOST_CELLS) for s in sets])  # what fills a row is marked as not there
     valid = torch.stack([torch.arange(MOST_CELLS) < len(s) for s in sets])
     x0 = torch.from_numpy(tokens[rows].astype(np.float32))
     centers = torch.from_numpy((cells[rows] + 0.5).astype(np.float32) * model.config["voxel_size"])
-    of_rows = torch.from_numpy(labels[rows].astype(np.int64))
+    of_rows, told = torch.from_numpy(labels[rows].astype(np.int64)), torch.from_numpy(told[rows])
     alphas = linear_alphas({"beta_start": 1e-4, "beta_end": 0.02, "num_train_timesteps": 1000})
     levels = levels_between(first, STEPS)
     x = noised(x0, alphas, torch.full((len(x0),), first), random)
     for t, after in zip(levels, levels[1:]):
         with autocast("bf16", "cpu"):
-            made = model(x, of_rows, centers, valid, torch.full((len(x),), t)).float().clamp(-1, 1)
+            made = model(x, of_rows, centers, valid, torch.full((len(x),), t), told).float().clamp(-1, 1)
         x = made if after < 0 else ancestral_step(x, made, alphas[t], alphas[after], random)
     for s, made in zip(sets, x.numpy()):
         out[s] = made[:len(s)]

@@ -15,11 +15,11 @@ import torch
 from recipe import run_recipe
 from semtrain import held_out, safetensors_file, transformer
 from semtrain.condition import drawn_boxes, mirrored, object_part, told_boxes, told_tints, vector_of, width_of
-from semtrain.grids import Grids, LocalSets
+from semtrain.grids import Grids, LocalSets, read_tokens
 from semtrain.model_folder import write_component
 from semtrain.nets.transformer import VoxfieldTransformer
 from semtrain.objects import local_tints, owners_of, paint_near, read_objects
-from semtrain.regenerate import load_transformer
+from semtrain.regenerate import Objects as StreetObjects, load_transformer
 
 NETWORK = {"num_layers": 2, "num_attention_heads": 2, "attention_head_dim": 16, "points_per_voxel": 4,
            "num_classes": 20, "voxel_size": 0.6, "attention_radius": 3.0, "pos_embed_dim": 8,
@@ -130,6 +130,35 @@ class Objects(unittest.TestCase):
         self.assertTrue((swapped[..., 4:] == conditions[..., :60]).all())
         self.assertTrue((swapped[..., :4] == conditions[..., 60:]).all())
         self.assertEqual(vector_of([], centers[0], None, None, None, None).shape, (40, 0))
+
+    def test_are_told_to_a_street_that_is_placed_anew(self):
+        """all of them, with their whole colours, as a set of one batch is told in training"""
+        path = os.path.join(self.folder.name, "truth.sgrid")
+        t = {name: tensor.numpy() for name, tensor in safetensors_file.read(path).items()}
+        centers, chosen = (t["cells"] + 0.5) * 0.6, np.arange(len(t["cells"]))
+        objects = StreetObjects(path, centers, t["labels"])
+        told = objects.tell(BOTH["condition"])
+        grids = Grids([path], os.path.join(self.folder.name, "cache"))
+        sets = LocalSets(grids, config_of())
+        boxes = grids.boxes[grids.owners]
+        np.testing.assert_array_equal(told, sets._condition(np.random.default_rng(1), centers, chosen, boxes, False))
+        self.assertGreater(told[t["labels"] == 13, -3:].max(), 0.6)
+        self.assertEqual(objects.tell(()).shape, (len(t["cells"]), 0))
+
+    def test_keep_their_mean_colour_where_a_street_is_placed_anew(self):
+        path = os.path.join(self.folder.name, "truth.sgrid")
+        cells, labels, tokens = read_tokens(path)
+        objects = StreetObjects(path, (cells + 0.5) * 0.6, labels)
+        true = tokens.astype(np.float32).reshape(len(cells), 4, 6)
+        made = np.random.default_rng(2).uniform(-1, 1, true.shape).astype(np.float32)
+        before = made.copy()
+        objects.keep_colors(made, true)
+        for owner in (0, 1):
+            of_car = objects.owners == owner
+            self.assertGreater(of_car.sum(), 20)
+            np.testing.assert_allclose(made[of_car, :, 3:].mean((0, 1)), true[of_car, :, 3:].mean((0, 1)), atol=1e-5)
+        np.testing.assert_array_equal(made[..., :3], before[..., :3])
+        np.testing.assert_array_equal(made[objects.owners < 0], before[objects.owners < 0])
 
     def test_are_left_out_each_for_itself_and_with_the_labels(self):
         counts = np.zeros((2, 2), int)
