@@ -18,6 +18,11 @@ struct Hit {
 const uint kNoTriangle = 0xffffffffu, kLeafBit = 0x80000000u;
 const uint kStackSize = 48; // kBvhDepth
 
+// Nodes that are left for later, a column for each thread: in registers they are more than some GPUs have for a thread.
+// No thread reads another's, so there is no barrier.
+shared uint bvh_stack[kStackSize * gl_WorkGroupSize.x];
+#define BVH_STACK(depth) bvh_stack[(depth) * gl_WorkGroupSize.x + gl_LocalInvocationIndex]
+
 // note: a component of 0 becomes a tiny one, so that no product is 0 x infinity
 vec3 safe_inverse(vec3 d)
 {
@@ -58,7 +63,6 @@ Hit trace(Ray ray, bool any)
 {
     Hit hit = Hit(ray.far, kNoTriangle, 0.0, 0.0);
     const vec3 inverse = safe_inverse(ray.direction);
-    uint stack[kStackSize];
     uint depth = 0, at = 0;
     for (;;) {
         if ((at & kLeafBit) != 0) {
@@ -67,7 +71,7 @@ Hit trace(Ray ray, bool any)
                 intersect_triangle(first + i, ray, hit);
             if (depth == 0 || (any && hit.triangle != kNoTriangle))
                 break;
-            at = stack[--depth];
+            at = BVH_STACK(--depth);
             continue;
         }
         const uvec4 a = nodes[4 * at], b = nodes[4 * at + 1], c = nodes[4 * at + 2], d = nodes[4 * at + 3];
@@ -80,12 +84,12 @@ Hit trace(Ray ray, bool any)
         if (nearer == kMiss) {
             if (depth == 0)
                 break;
-            at = stack[--depth];
+            at = BVH_STACK(--depth);
             continue;
         }
         at = left_first ? a.w : b.w;
         if (farther != kMiss && depth < kStackSize)
-            stack[depth++] = left_first ? b.w : a.w;
+            BVH_STACK(depth++) = left_first ? b.w : a.w;
     }
     return hit;
 }

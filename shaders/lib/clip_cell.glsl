@@ -5,7 +5,7 @@
 // two cells belongs to the upper one, so that no area is counted twice or lost. Everything is `precise`: two shaders
 // that clip the same triangle get the same polygon.
 
-const uint kMaxCorners = 12; // 3 and one for each plane; the rest is for corners that rounding puts astride a plane
+const uint kMaxCorners = 11; // 3 and one for each plane; the rest is for corners that rounding puts astride a plane
 
 vec3 polygon[kMaxCorners];
 uint polygon_size;

@@ -9,11 +9,11 @@ const uint kSamples = 6;             // that they see
 const float kA = 0.7071067811865476; // sqrt(1/2)
 const float kB = 1.4142135623730951; // sqrt(2)
 
-// B^T d
+// B^T d, of values of type CHANNELS
 #define WINOGRAD_INPUT(d0, d1, d2, d3, d4, d5)                                                                         \
     {                                                                                                                  \
-        const vec4 even_a = d4 - 2.0 * d2, odd_a = kA * d3 - kB * d1;                                                  \
-        const vec4 even_b = d4 - 0.5 * d2, odd_b = kB * d3 - kA * d1;                                                  \
+        const CHANNELS even_a = d4 - 2.0 * d2, odd_a = kA * d3 - kB * d1;                                              \
+        const CHANNELS even_b = d4 - 0.5 * d2, odd_b = kB * d3 - kA * d1;                                              \
         d0 = d0 - 2.5 * d2 + d4;                                                                                       \
         d5 = d1 - 2.5 * d3 + d5;                                                                                       \
         d1 = even_a + odd_a;                                                                                           \

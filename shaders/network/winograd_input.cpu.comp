@@ -4,41 +4,7 @@
 // V = B^T d B per tile of 6 x 6 pixels and channel, four channels a thread; zeros outside the image
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
-#include "winograd_input.h"
-#include "lib/thread.glsl"
-#include "lib/winograd.glsl"
-
-layout(local_size_x = 64) in;
-layout(constant_id = 0) const bool kHalfX = false;
-layout(push_constant) uniform Push { WinogradInputPush p; };
-layout(binding = 0) uniform usamplerBuffer X;         // [images * image_rows, cols]
-layout(binding = 1) writeonly buffer V { vec4 v[]; }; // [36 * tiles, cols]
-
-void main()
-{
-    const uint per_tile = p.cols / 4;
-    const uint row = linear_thread() / per_tile, col = linear_thread() % per_tile * 4;
-    if (row >= p.tiles)
-        return;
-    const uint tile = p.first_tile + row, in_image = tile % p.image_tiles;
-    const uint image = tile / p.image_tiles * p.image_rows;
-    const int top = int(in_image / p.tiles_x * kOutputs) - 1, left = int(in_image % p.tiles_x * kOutputs) - 1;
-    vec4 d[kSamples][kSamples];
-    [[unroll]] for (uint i = 0; i < kSamples; ++i) {
-        const int y = top + int(i);
-        [[unroll]] for (uint j = 0; j < kSamples; ++j) {
-            const int x = left + int(j);
-            const bool inside = y >= 0 && x >= 0 && y < int(p.seen_height) && x < int(p.seen_width);
-            const uint pixel = image + (uint(y) >> p.shift) * p.width + (uint(x) >> p.shift);
-            const uint at = inside ? pixel * p.x_ld + col : 0;
-            const vec4 value = FETCH4(X, kHalfX, at);
-            d[i][j] = inside ? value : vec4(0.0);
-        }
-        WINOGRAD_INPUT(d[i][0], d[i][1], d[i][2], d[i][3], d[i][4], d[i][5])
-    }
-    [[unroll]] for (uint j = 0; j < kSamples; ++j) {
-        WINOGRAD_INPUT(d[0][j], d[1][j], d[2][j], d[3][j], d[4][j], d[5][j])
-        [[unroll]] for (uint i = 0; i < kSamples; ++i)
-            v[(((i * kSamples + j) * p.tiles + row) * p.v_ld + col) / 4] = d[i][j];
-    }
-}
+#define CHANNELS vec4
+#define PARTS 1
+#define PART(value, part) value
+#include "lib/winograd_input.glsl"

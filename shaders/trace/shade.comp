@@ -40,44 +40,54 @@ void plane_axes(vec3 n, out vec3 x, out vec3 y)
     y = cross(n, x);
 }
 
-vec3 sun_on(vec3 point, Surface s)
+// Rays of a sample: the pixel's own, one to the sun, some to all around, one mirrored. All go through one call of trace:
+// four would be four copies of its loop and stack, more registers than GPUs have.
+const uint kPixelRay = 0, kSunRay = 1, kFirstAmbientRay = 2;
+
+// to a point of the sun's disc; false where the surface turns away from it
+bool sun_ray(vec3 point, Surface s, out Ray ray)
 {
-    const float facing = dot(s.normal, sun_direction());
-    if (facing <= 0.0 || dot(s.facing, sun_direction()) <= 0.0)
-        return vec3(0.0);
+    if (dot(s.normal, sun_direction()) <= 0.0 || dot(s.facing, sun_direction()) <= 0.0)
+        return false;
     vec3 x, y;
     plane_axes(sun_direction(), x, y);
     const float r = sun_width() * sqrt(next_noise()), turn = 6.2831853 * next_noise();
     const vec3 to_sun = normalize(sun_direction() + r * (cos(turn) * x + sin(turn) * y));
-    const Hit hit = trace(Ray(point + s.facing * kLift, to_sun, 0.0, kFar), true);
-    return hit.triangle == kNoTriangle ? sun_light() * facing : vec3(0.0);
+    ray = Ray(point + s.facing * kLift, to_sun, 0.0, kFar);
+    return true;
+}
+
+// ray k of all around; directions are stratified over the samples of the pixel
+bool ambient_ray(vec3 point, Surface s, uint k, float turn, out Ray ray)
+{
+    vec3 x, y;
+    plane_axes(s.normal, x, y);
+    const float r2 = (float(k) + next_noise()) / float(p.samples * p.ambient_rays);
+    const float angle = 6.2831853 * (turn + float(k) * 0.61803399);
+    const vec3 d = normalize(sqrt(r2) * (cos(angle) * x + sin(angle) * y) + sqrt(1.0 - r2) * s.normal);
+    ray = Ray(point + s.facing * kLift, d, 0.0, kFar);
+    return dot(d, s.facing) > 0.0;
+}
+
+bool mirror_ray(Ray seen, vec3 point, Surface s, out Ray ray)
+{
+    const vec3 d = reflect(seen.direction, s.normal);
+    ray = Ray(point + s.facing * kLift, d, 0.0, kFar);
+    return s.gloss > 0.03 && dot(d, s.facing) > 0.0;
 }
 
 // what comes back along a ray that is not followed further: the surface in an even light
-vec3 glance(Ray ray, float spread, bool clouds)
+vec3 even_light(Surface s)
 {
-    const Hit hit = trace(ray, false);
-    if (hit.triangle == kNoTriangle)
-        return clouds ? sky_light(ray.direction) : clear_sky(ray.direction);
-    const Surface s = surface_of(ray, hit, spread);
     const float sunny = max(dot(s.normal, sun_direction()), 0.0) * 0.45;
     return s.albedo * (sun_light() * sunny * 0.318 + vec3(0.42, 0.44, 0.48) * sky_level() * (0.6 + 0.4 * s.normal.z));
 }
 
-// over pi, of the light from all around; directions are stratified over the samples of the pixel
-vec3 ambient_on(vec3 point, Surface s, uint sample_index, float turn)
+float fresnel(Surface s, Ray ray) // Schlick's approximation
 {
-    vec3 x, y, sum = vec3(0.0);
-    plane_axes(s.normal, x, y);
-    const uint total = p.samples * p.ambient_rays;
-    for (uint i = 0; i < p.ambient_rays; ++i) {
-        const uint k = sample_index * p.ambient_rays + i;
-        const float r2 = (float(k) + next_noise()) / float(total), angle = 6.2831853 * (turn + float(k) * 0.61803399);
-        const vec3 d = normalize(sqrt(r2) * (cos(angle) * x + sin(angle) * y) + sqrt(1.0 - r2) * s.normal);
-        if (dot(d, s.facing) > 0.0)
-            sum += glance(Ray(point + s.facing * kLift, d, 0.0, kFar), 0.3, false);
-    }
-    return sum / float(p.ambient_rays);
+    const float facing = clamp(-dot(s.normal, ray.direction), 0.0, 1.0), away = 1.0 - facing;
+    const float away2 = away * away;
+    return s.gloss + (1.0 - s.gloss) * away2 * away2 * away;
 }
 
 struct Sum {
@@ -85,24 +95,63 @@ struct Sum {
     float covered;
 };
 
-void add_hit(inout Sum sum, Ray ray, Hit hit, Surface s, float spread, uint index, float turn)
+struct First { // what the pixel's middle shows
+    float depth;
+    uint normal, label;
+};
+
+// a sample: its light and what is around it are added to sum; the first tells what the pixel shows
+void add_sample(inout Sum sum, inout First first, Ray seen, float distance_of_depth, float spread, uint index, float turn)
 {
-    const vec3 point = ray.origin + ray.direction * hit.t;
-    vec3 light = s.albedo * sun_on(point, s) * 0.318309886;
-    const vec3 ambient = ambient_on(point, s, index, turn);
-    if (s.gloss > 0.03) { // Schlick's approximation of Fresnel's formula
-        const float facing = clamp(-dot(s.normal, ray.direction), 0.0, 1.0), away = 1.0 - facing;
-        const float away2 = away * away, mirrored = s.gloss + (1.0 - s.gloss) * away2 * away2 * away;
-        const vec3 d = reflect(ray.direction, s.normal);
-        if (dot(d, s.facing) > 0.0)
-            light += 0.8 * mirrored * glance(Ray(point + s.facing * kLift, d, 0.0, kFar), spread * 4.0, true);
+    Surface s;
+    vec3 point = vec3(0.0), light = vec3(0.0), ambient = vec3(0.0);
+    float t = 0.0;
+    const uint mirror = kFirstAmbientRay + p.ambient_rays;
+    for (uint r = 0; r <= mirror; ++r) {
+        Ray ray = seen;
+        bool sent = true;
+        if (r == kSunRay)
+            sent = sun_ray(point, s, ray);
+        else if (r == mirror)
+            sent = mirror_ray(seen, point, s, ray);
+        else if (r >= kFirstAmbientRay)
+            sent = ambient_ray(point, s, index * p.ambient_rays + r - kFirstAmbientRay, turn, ray);
+        if (!sent)
+            continue;
+        const Hit hit = trace(ray, r == kSunRay);
+        const bool missed = hit.triangle == kNoTriangle;
+        if (r == kSunRay) {
+            if (missed)
+                light = s.albedo * (sun_light() * dot(s.normal, sun_direction())) * 0.318309886;
+            continue;
+        }
+        Surface found;
+        if (!missed)
+            found = surface_of(ray, hit, r == kPixelRay ? spread : r == mirror ? spread * 4.0 : 0.3);
+        if (r == kPixelRay) {
+            if (missed) {
+                sum.light += sky_light(ray.direction);
+                return;
+            }
+            s = found;
+            t = hit.t;
+            point = ray.origin + ray.direction * t;
+        } else if (r == mirror) {
+            light += 0.8 * fresnel(s, seen) * (missed ? sky_light(ray.direction) : even_light(found));
+        } else {
+            ambient += missed ? clear_sky(ray.direction) : even_light(found);
+        }
     }
-    const float clear = exp(-hit.t / haze_distance());
-    const vec3 haze = clear_sky(normalize(vec3(ray.direction.xy, 0.03))) * 0.9;
+    const float clear = exp(-t / haze_distance());
+    const vec3 haze = clear_sky(normalize(vec3(seen.direction.xy, 0.03))) * 0.9;
     sum.light += mix(haze, light, clear);
-    sum.ambient += ambient;
+    sum.ambient += ambient / float(p.ambient_rays);
     sum.albedo += s.albedo * clear;
     sum.covered += 1.0;
+    if (index == 0) {
+        const vec3 n = vec3(dot(s.normal, view_axis(0)), dot(s.normal, view_axis(1)), dot(s.normal, view_axis(2)));
+        first = First(t / distance_of_depth, packSnorm4x8(vec4(n, 0.0)), s.label);
+    }
 }
 
 void main()
@@ -116,28 +165,15 @@ void main()
     const float turn = float((x & 3u) * 4u + (y & 3u)) / 16.0 + 0.31 * float((x ^ y) & 1u); // differs among neighbours
     const float spread = 1.0 / view[0].x * inversesqrt(float(p.samples));
     Sum sum = Sum(vec3(0.0), vec3(0.0), vec3(0.0), 0.0);
-    uvec3 first = uvec3(0, 0, 10); // nothing: label sky
-    float depth = 0.0;
+    First first = First(0.0, 0, 10); // nothing: label sky
     for (uint i = 0; i < p.samples; ++i) {
         // the first sample through the centre, the others on a lattice of rank 1 about it
         const vec2 shift = i == 0 ? vec2(0.5) : fract(vec2(0.5) + float(i) * vec2(0.7548777, 0.5698403));
         const vec3 along = pixel_direction(vec2(x, y) + shift);
-        const Ray ray = Ray(view_origin(), normalize(along), 0.05, kFar);
-        const Hit hit = trace(ray, false);
-        if (hit.triangle == kNoTriangle) {
-            sum.light += sky_light(ray.direction);
-            continue;
-        }
-        const Surface s = surface_of(ray, hit, spread);
-        if (i == 0) {
-            depth = hit.t / length(along);
-            const vec3 n = vec3(dot(s.normal, view_axis(0)), dot(s.normal, view_axis(1)), dot(s.normal, view_axis(2)));
-            first = uvec3(0, packSnorm4x8(vec4(n, 0.0)), s.label);
-        }
-        add_hit(sum, ray, hit, s, spread, i, turn);
+        add_sample(sum, first, Ray(view_origin(), normalize(along), 0.05, kFar), length(along), spread, i, turn);
     }
     const float all = 1.0 / float(p.samples), some = 1.0 / max(sum.covered, 1.0);
-    light_out[at] = vec4(sum.light * all, depth);
+    light_out[at] = vec4(sum.light * all, first.depth);
     ambient_out[at] = vec4(sum.ambient * some, sum.covered * all);
-    surface_out[at] = uvec4(packUnorm4x8(vec4(sqrt(sum.albedo * some), 0.0)), first.y, first.z, 0);
+    surface_out[at] = uvec4(packUnorm4x8(vec4(sqrt(sum.albedo * some), 0.0)), first.normal, first.label, 0);
 }
