@@ -100,6 +100,7 @@ Result<std::unique_ptr<Device>> adopt(const sr_vulkan_device& v, const DeviceOpt
     host.queue = static_cast<VkQueue>(v.queue);
     host.queue_family = v.queue_family;
     host.float16 = v.shader_float16;
+    host.robust_buffer_access = v.robust_buffer_access == 1;
     if (v.lock_queue)
         host.lock = [=] { v.lock_queue(v.user); };
     if (v.unlock_queue)
@@ -261,6 +262,6 @@ sr_status sr_context_memory(sr_context* context, sr_memory_info* memory)
 
 // the layout that programs were built against: a change here is a new ABI
 static_assert(sizeof(sr_device_info) == 816 && offsetof(sr_device_info, memory_bytes) == 808);
-static_assert(sizeof(sr_vulkan_device) == 80 && offsetof(sr_vulkan_device, shader_float16) == 72);
+static_assert(sizeof(sr_vulkan_device) == 80 && offsetof(sr_vulkan_device, robust_buffer_access) == 76);
 static_assert(sizeof(sr_context_desc) == 40 && offsetof(sr_context_desc, max_bytes) == 32);
 static_assert(sizeof(sr_memory_info) == 32);

@@ -71,8 +71,9 @@ typedef struct sr_device_info {
  * SR_ERR_PARTIAL when there are more. */
 sr_status sr_list_devices(sr_device_info* devices, uint32_t* count);
 
-/* A device that belongs to the host program. It outlives the context. Vulkan 1.2 with timelineSemaphore enabled;
- * robustBufferAccess is advised, because files decide what is read. */
+/* A device that belongs to the host program. It outlives the context. Vulkan 1.2 with timelineSemaphore and
+ * robustBufferAccess enabled: files decide what shaders read. Vulkan cannot be asked which features a device was made
+ * with, so the host says it. SR_ERR_USAGE without robust_buffer_access. */
 typedef struct sr_vulkan_device {
     uint32_t struct_size;
     uint32_t queue_family; /* with compute */
@@ -84,8 +85,8 @@ typedef struct sr_vulkan_device {
     void* user;                     /* for the callbacks */
     void (*lock_queue)(void* user); /* around every use of the queue, from the thread that calls; both or neither */
     void (*unlock_queue)(void* user);
-    uint32_t shader_float16; /* 1: shaderFloat16 is enabled too */
-    uint32_t reserved;
+    uint32_t shader_float16;       /* 1: shaderFloat16 is enabled too */
+    uint32_t robust_buffer_access; /* 1: robustBufferAccess is enabled; anything else is refused */
 } sr_vulkan_device;
 
 typedef struct sr_context_desc {

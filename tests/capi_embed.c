@@ -156,8 +156,10 @@ static VkDevice make_device(VkPhysicalDevice physical)
     const float priority = 1;
     VkPhysicalDeviceVulkan12Features features = {0};
     VkDeviceQueueCreateInfo queue = {0};
+    VkPhysicalDeviceFeatures robust = {0};
     VkDeviceCreateInfo info = {0};
     VkDevice device;
+    robust.robustBufferAccess = VK_TRUE;
     features.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES;
     features.timelineSemaphore = VK_TRUE;
     queue.sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO;
@@ -167,6 +169,7 @@ static VkDevice make_device(VkPhysicalDevice physical)
     info.pNext = &features;
     info.queueCreateInfoCount = 1;
     info.pQueueCreateInfos = &queue;
+    info.pEnabledFeatures = &robust;
     CHECK(vkCreateDevice(physical, &info, NULL, &device) == VK_SUCCESS);
     return device;
 }
@@ -195,6 +198,8 @@ static void lends_its_own_device(void)
     memset(&desc, 0, sizeof desc);
     desc.struct_size = sizeof desc;
     desc.vulkan = &vulkan;
+    CHECK(sr_context_create(&desc, &context) == SR_ERR_USAGE && says(NULL, "robustBufferAccess"));
+    vulkan.robust_buffer_access = 1;
     CHECK(sr_context_create(&desc, &context) == SR_ERR_USAGE && says(NULL, "both of lock and unlock"));
     vulkan.unlock_queue = unlock_queue;
     desc.device = "0";

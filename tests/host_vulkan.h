@@ -30,6 +30,9 @@ class HostVulkan {
         auto info = vk_struct<VkDeviceCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO, &features);
         info.queueCreateInfoCount = 1;
         info.pQueueCreateInfos = &wanted;
+        VkPhysicalDeviceFeatures robust{};
+        robust.robustBufferAccess = VK_TRUE;
+        info.pEnabledFeatures = &robust;
         if (vkCreateDevice(physical, &info, nullptr, &device) != VK_SUCCESS)
             std::abort();
         vkGetDeviceQueue(device, 0, 0, &queue);

@@ -308,6 +308,14 @@ TEST(runtime_device, keeps_its_pipelines_in_a_file_and_starts_with_them)
     EXPECT_EQ(reused_by_a_run(), bytes - 8); // after the checksum
 }
 
+TEST(runtime_device, saves_its_pipelines_while_it_runs)
+{
+    const CacheHome home;
+    const auto device = make_device();
+    run_small_graph(*device);
+    EXPECT_GT(std::filesystem::file_size(home.file()), 8u); // what a run leaves that is killed now
+}
+
 TEST(runtime_device, ignores_a_damaged_pipeline_cache_and_writes_a_good_one)
 {
     const CacheHome home;
@@ -334,7 +342,7 @@ TEST(runtime_device, works_on_a_device_that_the_host_made_and_leaves_it)
 {
     HostVulkan vulkan;
     int locks = 0, unlocks = 0;
-    HostDevice host{vulkan.instance, vulkan.physical, vulkan.device, vulkan.queue, 0};
+    HostDevice host{vulkan.instance, vulkan.physical, vulkan.device, vulkan.queue, 0, true};
     host.lock = [&] {
         EXPECT_EQ(locks, unlocks);
         ++locks;
@@ -356,13 +364,16 @@ TEST(runtime_device, works_on_a_device_that_the_host_made_and_leaves_it)
 TEST(runtime_device, refuses_a_host_device_that_lacks_something)
 {
     HostVulkan vulkan;
-    const HostDevice whole{vulkan.instance, vulkan.physical, vulkan.device, vulkan.queue, 0};
+    const HostDevice whole{vulkan.instance, vulkan.physical, vulkan.device, vulkan.queue, 0, true};
     HostDevice host = whole;
     host.queue = VK_NULL_HANDLE;
     EXPECT_TRUE(says(Device::adopt(host, {}), "a host device needs instance, physical device, device and queue"));
     host = whole;
     host.queue_family = 77;
     EXPECT_TRUE(says(Device::adopt(host, {}), "queue family 77 of the host device has no compute"));
+    host = whole;
+    host.robust_buffer_access = false;
+    EXPECT_TRUE(says(Device::adopt(host, {}), "a host device needs robustBufferAccess"));
     host = whole;
     host.lock = [] {};
     EXPECT_TRUE(says(Device::adopt(host, {}), "needs both of lock and unlock, or neither"));

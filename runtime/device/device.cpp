@@ -82,6 +82,9 @@ Result<std::unique_ptr<Device>> Device::adopt(const HostDevice& host, const Devi
         return fail(ErrorCode::usage, "a host device needs instance, physical device, device and queue");
     if (!is_compute_family(host.physical, host.queue_family))
         return fail(ErrorCode::usage, "queue family {} of the host device has no compute", host.queue_family);
+    if (!host.robust_buffer_access)
+        return fail(ErrorCode::usage, "a host device needs robustBufferAccess, and to say so: files decide what "
+                                      "shaders read");
     if (bool(host.lock) != bool(host.unlock))
         return fail(ErrorCode::usage, "a host device needs both of lock and unlock, or neither");
     std::unique_ptr<Device> d(new Device());
@@ -136,6 +139,9 @@ Status Device::create_device(const DeviceOptions&)
     auto info = vk_struct<VkDeviceCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO, &features);
     info.queueCreateInfoCount = 1;
     info.pQueueCreateInfos = &queue;
+    const char* subset = "VK_KHR_portability_subset"; // must be enabled where there is one: MoltenVK's
+    info.enabledExtensionCount = has_extension(physical_, subset);
+    info.ppEnabledExtensionNames = &subset;
     SR_VK(vkCreateDevice(physical_, &info, nullptr, &device_));
     vkGetDeviceQueue(device_, queue_family_, 0, &queue_);
     return {};
@@ -286,7 +292,7 @@ Status Device::read(const BufferSlice& from, std::span<std::byte> bytes)
     SR_ASSERT(bytes.size() <= from.bytes, "{} bytes read from a slice of {}", bytes.size(), from.bytes);
     SR_CHECK(wait(ticket_));
     host_bytes_.read += bytes.size();
-    if (const std::byte* mapped = from.buffer->mapped()) {
+    if (const std::byte* mapped = from.buffer->mapped(); mapped && from.buffer->cached()) {
         if (!bytes.empty())
             std::memcpy(bytes.data(), mapped + from.offset, bytes.size());
         return {};

@@ -29,9 +29,10 @@ struct DeviceOptions {
 struct HostDevice {
     VkInstance instance = VK_NULL_HANDLE;
     VkPhysicalDevice physical = VK_NULL_HANDLE;
-    VkDevice device = VK_NULL_HANDLE; // Vulkan 1.2 with timelineSemaphore enabled
+    VkDevice device = VK_NULL_HANDLE; // Vulkan 1.2 with timelineSemaphore and robustBufferAccess enabled
     VkQueue queue = VK_NULL_HANDLE;   // with compute
     uint32_t queue_family = 0;
+    bool robust_buffer_access = false;            // it is enabled, as it must be: files decide what is read
     bool float16 = false;                         // shaderFloat16 is enabled too
     std::function<void()> lock = {}, unlock = {}; // around every use of the queue; may be empty
 };

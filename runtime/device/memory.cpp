@@ -68,6 +68,9 @@ Result<std::unique_ptr<Buffer>> Buffer::create(Device& device, uint64_t bytes, M
     const bool direct = kind != MemoryKind::device || !device.limits().force_staging;
     if (direct && (memory.memoryTypes[type].propertyFlags & kHost) == kHost)
         SR_VK(vkMapMemory(device.handle(), b->memory_, 0, VK_WHOLE_SIZE, 0, reinterpret_cast<void**>(&b->mapped_)));
+    // staging is read as it is, where no cached memory is to be had
+    b->cached_ =
+        kind != MemoryKind::device || memory.memoryTypes[type].propertyFlags & VK_MEMORY_PROPERTY_HOST_CACHED_BIT;
     return b;
 }
 

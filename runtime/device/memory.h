@@ -31,6 +31,7 @@ class Buffer {
     VkBuffer handle() const { return buffer_; }
     uint64_t bytes() const { return bytes_; }
     std::byte* mapped() const { return mapped_; } // null where the host cannot see it
+    bool cached() const { return cached_; }       // the host's reads are cached: else they are slow
     BufferSlice slice() const { return {this, 0, bytes_}; }
 
   private:
@@ -41,6 +42,7 @@ class Buffer {
     VkDeviceMemory memory_ = VK_NULL_HANDLE;
     uint64_t bytes_ = 0, accounted_ = 0;
     std::byte* mapped_ = nullptr;
+    bool cached_ = false;
 };
 
 } // namespace semrover

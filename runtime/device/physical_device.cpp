@@ -98,6 +98,17 @@ std::string refusal(VkPhysicalDevice physical, const VkPhysicalDeviceProperties&
     return compute_queue_family(physical) ? "" : "has no compute queue";
 }
 
+bool has_instance_extension(const char* name)
+{
+    uint32_t count = 0;
+    if (vkEnumerateInstanceExtensionProperties(nullptr, &count, nullptr) != VK_SUCCESS)
+        return false;
+    std::vector<VkExtensionProperties> all(count);
+    if (vkEnumerateInstanceExtensionProperties(nullptr, &count, all.data()) != VK_SUCCESS)
+        return false;
+    return std::ranges::any_of(all, [&](const auto& e) { return !std::strcmp(e.extensionName, name); });
+}
+
 } // namespace
 
 std::string api_version_text(uint32_t version)
@@ -117,13 +128,18 @@ Result<VkInstance> create_instance(bool validation)
     auto features = vk_struct<VkValidationFeaturesEXT>(VK_STRUCTURE_TYPE_VALIDATION_FEATURES_EXT);
     features.enabledValidationFeatureCount = 1;
     features.pEnabledValidationFeatures = enables;
-    const char* extensions[] = {VK_EXT_DEBUG_UTILS_EXTENSION_NAME, VK_EXT_VALIDATION_FEATURES_EXTENSION_NAME};
+    const char* extensions[3] = {VK_EXT_DEBUG_UTILS_EXTENSION_NAME, VK_EXT_VALIDATION_FEATURES_EXTENSION_NAME};
     if (validation) {
         info.pNext = &features;
         info.enabledLayerCount = 1;
         info.ppEnabledLayerNames = &kValidationLayer;
         info.enabledExtensionCount = 2;
         info.ppEnabledExtensionNames = extensions;
+    }
+    if (has_instance_extension(VK_KHR_PORTABILITY_ENUMERATION_EXTENSION_NAME)) { // MoltenVK is not listed without
+        info.ppEnabledExtensionNames = extensions;
+        info.flags |= VK_INSTANCE_CREATE_ENUMERATE_PORTABILITY_BIT_KHR;
+        extensions[info.enabledExtensionCount++] = VK_KHR_PORTABILITY_ENUMERATION_EXTENSION_NAME;
     }
     VkInstance instance;
     const VkResult result = vkCreateInstance(&info, nullptr, &instance);
@@ -183,9 +199,15 @@ bool is_compute_family(VkPhysicalDevice physical, uint32_t family)
 Result<uint32_t> compute_queue_family(VkPhysicalDevice physical)
 {
     const auto families = queue_families(physical);
-    for (uint32_t i = 0; i < families.size(); ++i)
-        if (families[i].queueFlags & VK_QUEUE_COMPUTE_BIT)
-            return i;
+    const auto is_compute = [](const auto& f) { return (f.queueFlags & VK_QUEUE_COMPUTE_BIT) != 0; };
+    // one that draws nothing, where there is one: a desktop draws beside it
+    auto found = std::ranges::find_if(families, [&](const auto& f) {
+        return is_compute(f) && !(f.queueFlags & VK_QUEUE_GRAPHICS_BIT) && f.timestampValidBits > 0;
+    });
+    if (found == families.end())
+        found = std::ranges::find_if(families, is_compute);
+    if (found != families.end())
+        return uint32_t(found - families.begin());
     return fail(ErrorCode::no_device, "the device has no compute queue");
 }
 

@@ -7,6 +7,7 @@
 
 #include <array>
 #include <bit>
+#include <chrono>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
@@ -20,6 +21,8 @@ namespace fs = std::filesystem;
 namespace semrover {
 
 namespace {
+
+constexpr double kSaveAfterSeconds = 2; // of compiling: writing the file takes some milliseconds
 
 std::string cache_path(VkPhysicalDevice physical)
 {
@@ -81,7 +84,7 @@ Result<std::unique_ptr<PipelineStore>> PipelineStore::create(Device& device)
 
 PipelineStore::~PipelineStore()
 {
-    if (changed_)
+    if (unsaved_seconds_ > 0)
         save();
     for (auto& [key, p] : pipelines_)
         destroy(p);
@@ -115,12 +118,23 @@ Result<const Pipeline*> PipelineStore::get(const KernelVariant& variant, const s
     if (const auto it = pipelines_.find(key); it != pipelines_.end())
         return &it->second;
     Pipeline p;
+    const auto begin = std::chrono::steady_clock::now();
     if (Status made = make(variant, constants, p); !made) {
         destroy(p);
         return tl::make_unexpected(std::move(made).error());
     }
-    changed_ = true;
+    save_by_and_by(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
     return &(pipelines_[key] = p);
+}
+
+void PipelineStore::save_by_and_by(double seconds)
+{
+    unsaved_seconds_ += seconds;
+    const bool first = pipelines_.empty() && reused_bytes_ == 0;
+    if (!first && unsaved_seconds_ < kSaveAfterSeconds)
+        return;
+    save();
+    unsaved_seconds_ = 0;
 }
 
 void PipelineStore::destroy(const Pipeline& p)

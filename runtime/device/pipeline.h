@@ -20,7 +20,8 @@ struct Pipeline {
 };
 
 // Compute pipelines by (variant, constants), made on first use, over a VkPipelineCache kept on disk in
-// $XDG_CACHE_HOME/semrover (safe to delete; a file of another driver is ignored).
+// $XDG_CACHE_HOME/semrover (safe to delete; a file of another driver is ignored). It is saved as pipelines are made: a
+// run that is killed, or whose device is lost, leaves what it compiled to the next.
 class PipelineStore {
   public:
     static Result<std::unique_ptr<PipelineStore>> create(Device& device);
@@ -38,12 +39,13 @@ class PipelineStore {
     Status make_layout(const KernelVariant& variant, Pipeline& out);
     void destroy(const Pipeline& pipeline);
     void save();
+    void save_by_and_by(double seconds);
 
     Device& device_;
     VkPipelineCache cache_ = VK_NULL_HANDLE;
     std::string cache_path_; // empty: nowhere to keep it
     size_t reused_bytes_ = 0;
-    bool changed_ = false;
+    double unsaved_seconds_ = 0; // of compiling
     std::map<std::pair<const KernelVariant*, std::map<uint32_t, uint32_t>>, Pipeline> pipelines_;
 };
 
