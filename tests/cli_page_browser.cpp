@@ -32,7 +32,7 @@ class CliPageBrowser : public testing::Test {
     void SetUp() override
     {
         ASSERT_EQ(std::system("command -v chromium >/dev/null"), 0)
-            << "chromium is missing, without which nobody knows whether pages work: tools/setup installs it";
+            << "chromium is missing, without which nobody knows whether pages work: tools/setup --test installs it";
         in_.pictures("labels", {0, 1, 2, 3});
         in_.pictures("splats", {0, 1, 2, 3});
     }

@@ -257,7 +257,7 @@ TEST(engine_job_generation, what_cannot_be_is_refused_before_any_work)
     expect_refusal(request(0, folder / "there.sgrid"), ErrorCode::usage, "-y replaces it");
     expect_refusal(request(0, folder / "no/such/folder.sgrid"), ErrorCode::bad_input, "no/such");
     GenerationRequest odd = request(0, folder / "out.sgrid");
-    odd.settings.guidance = -1;
+    odd.settings.guidance.scale = -1;
     expect_refusal(odd, ErrorCode::usage, "guidance");
     odd = request(0, folder / "out.sgrid");
     odd.settings.regions.region_size = 0;

@@ -67,7 +67,7 @@ struct TokenRun {
     }
     std::unique_ptr<TokenSampler> make() const
     {
-        SamplerOptions options = sampling_options(2.5f, seed);
+        SamplerOptions options = sampling_options(Guidance{2.5f, 500}, seed);
         options.modulation_window = 2;
         return std::move(*TokenSampler::create(device(), transformer(), plan, options));
     }

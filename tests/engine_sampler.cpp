@@ -116,6 +116,43 @@ TEST(engine_sampler, a_small_window_of_modulations_changes_nothing)
     EXPECT_EQ(run(p, small, {region}), run(p, sampling_options(2, 5), {region}));
 }
 
+TEST(engine_sampler, guides_the_steps_from_a_timestep_on)
+{
+    const std::vector<RegionInput> regions{patch(0, 50, 20), patch(40, 33, 0)};
+    const SamplingPlan p = plan(Sampler::ddpm, 4, {2, 2}); // timesteps 999, 749, 499, 249
+    const auto from = [&](double timestep) { return run(p, sampling_options(Guidance{2, timestep}, 7), regions); };
+    const std::vector<float> some = from(500);
+    EXPECT_EQ(from(250), from(499));
+    EXPECT_EQ(from(0), run(p, sampling_options(2, 7), regions));
+    EXPECT_EQ(from(1000), run(p, sampling_options(1, 7), regions));
+    EXPECT_NE(some, from(0));
+    EXPECT_NE(some, from(1000));
+    const std::vector<float> alone = run(p, sampling_options(Guidance{2, 500}, 7), {regions[0]});
+    EXPECT_TRUE(std::equal(alone.begin(), alone.end(), some.begin()));
+}
+
+// a guided step and one that is not, each a run of its own that begins with what the one before left
+TEST(engine_sampler, steps_that_are_guided_and_not_follow_each_other)
+{
+    const RegionInput region = patch(0, 30, 0);
+    const SamplingPlan both = plan(Sampler::ddpm, 2, {});
+    const auto part = [&](size_t first, size_t count, float scale, double from, const std::vector<float>& begin) {
+        SamplingPlan p = both;
+        p.rows = {both.rows.begin() + ptrdiff_t(first), both.rows.begin() + ptrdiff_t(first + count)};
+        SamplerOptions options = sampling_options(Guidance{scale, from}, 0);
+        options.noise = [=](size_t row, std::span<float> normals) {
+            for (size_t i = 0; i < normals.size(); ++i)
+                normals[i] = row == 0 && i < begin.size() ? begin[i] : float((i * 13) % 31) / 15.5f - 1;
+        };
+        return run(p, options, {region});
+    };
+    std::vector<float> noise(30 * size_t(transformer().config().channels()));
+    for (size_t i = 0; i < noise.size(); ++i)
+        noise[i] = float((i * 7) % 41) / 20.5f - 1;
+    const std::vector<float> middle = part(0, 1, 3, 0, noise);
+    EXPECT_EQ(part(0, 2, 3, 600, noise), part(1, 1, 1, 0, middle));
+}
+
 TEST(engine_sampler, the_seed_and_only_the_seed_changes_the_result)
 {
     const SamplingPlan p = plan(Sampler::ddpm, 2, {});
@@ -129,11 +166,13 @@ TEST(engine_sampler, the_seed_and_only_the_seed_changes_the_result)
 TEST(engine_sampler, planned_memory_is_the_memory_in_use)
 {
     const SamplingPlan p = plan(Sampler::ddpm, 2, {});
-    const uint64_t before = device().allocated_bytes();
-    auto sampler = *TokenSampler::create(device(), transformer(), p, sampling_options(2, 5));
-    const uint64_t planned = *sampler->planned_bytes(2, 40);
-    ASSERT_TRUE(sampler->run(std::vector<RegionInput>{patch(0, 40, 0), patch(50, 40, 0)}));
-    EXPECT_EQ(device().allocated_bytes() - before, planned);
+    for (const double from : {0., 600.}) {
+        const uint64_t before = device().allocated_bytes();
+        auto sampler = *TokenSampler::create(device(), transformer(), p, sampling_options(Guidance{2, from}, 5));
+        const uint64_t planned = *sampler->planned_bytes(2, 40);
+        ASSERT_TRUE(sampler->run(std::vector<RegionInput>{patch(0, 40, 0), patch(50, 40, 0)}));
+        EXPECT_EQ(device().allocated_bytes() - before, planned);
+    }
 }
 
 TEST(engine_sampler, stops_when_the_callback_says_so)

@@ -86,6 +86,41 @@ std::vector<double> timesteps_of(const SchedulerConfig& config, int steps)
     return timesteps;
 }
 
+// x' as a sum of x, the network's output m and fresh noise, where x0 is not clipped
+TEST(Schedule, DdimWithAllOfItsFreshNoiseIsDdpm)
+{
+    for (TimestepSpacing spacing : {TimestepSpacing::trailing, TimestepSpacing::quadratic})
+        for (Prediction prediction : {Prediction::sample, Prediction::epsilon, Prediction::v_prediction}) {
+            SchedulerConfig ddim = config_of(Sampler::ddim, prediction, spacing);
+            ddim.eta = 1;
+            const Schedule a = schedule_of(ddim, 10),
+                           b = schedule_of(config_of(Sampler::ddpm, prediction, spacing), 10);
+            for (size_t i = 0; i < 10; ++i) {
+                const StepCoefficients &p = a.steps[i], &q = b.steps[i];
+                EXPECT_NEAR(p.c_x0 * p.x0_x + p.c_x, q.c_x0 * q.x0_x + q.c_x, 1e-12 * (1 + std::abs(q.c_x0 * q.x0_x)));
+                EXPECT_NEAR(p.c_x0 * p.x0_m + p.c_m, q.c_x0 * q.x0_m + q.c_m, 1e-12 * (1 + std::abs(q.c_x0 * q.x0_m)));
+                EXPECT_NEAR(p.c_z, q.c_z, 1e-12);
+            }
+        }
+}
+
+// whatever eta, a state at the level of one step comes to the level of the next: variance 1 - abar
+TEST(Schedule, DdimKeepsTheLevelOfNoiseWithAnyShareOfFreshNoise)
+{
+    for (double eta : {0., 0.3, 0.5, 1.}) {
+        SchedulerConfig config = config_of(Sampler::ddim, Prediction::sample, TimestepSpacing::quadratic);
+        config.eta = eta;
+        const Schedule schedule = schedule_of(config, 12);
+        for (size_t i = 0; i + 1 < 12; ++i) {
+            const StepCoefficients& step = schedule.steps[i];
+            const double next = schedule.steps[i + 1].abar; // the network knows x0: m = x0, x = sqrt(abar) x0 + noise
+            EXPECT_NEAR(step.c_x0 + step.c_m + step.c_x * std::sqrt(step.abar), std::sqrt(next), 1e-12);
+            EXPECT_NEAR(step.c_x * step.c_x * (1 - step.abar) + step.c_z * step.c_z, 1 - next, 1e-12);
+        }
+        EXPECT_EQ(schedule.steps.back().c_z, 0);
+    }
+}
+
 TEST(Schedule, TimestepsRoundAsNumpyDoes)
 {
     const auto spaced = [](Sampler sampler, TimestepSpacing spacing, int steps) {

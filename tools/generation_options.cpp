@@ -69,6 +69,8 @@ void add_generation_options(CLI::App& c, GenerationArguments& a)
     GenerationOptions& o = a.options;
     c.add_option("--steps", o.steps, "denoising steps");
     c.add_option("--cfg-scale", o.cfg_scale, "guidance towards the labels; 1: none");
+    c.add_option("--cfg-from", o.cfg_from, "timestep below which steps are not guided, which halves their cost")
+        ->check(CLI::Range(0, 10000));
     c.add_option("--sampler", o.sampler, "ddpm, ddim or dpm++2m");
     c.add_option("--preset", o.preset, "fast (20 steps), standard (50, RePaint 5/2), paper (250, RePaint 10/10, DDPM)");
     c.add_option("--jump-length", o.jump_length, "RePaint: steps of a jump back");

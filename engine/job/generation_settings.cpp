@@ -24,7 +24,7 @@ Result<GenerationSettings> resolve_generation(const GenerationOptions& o)
     SR_TRY(s.model, VoxfieldModel::open(o.model, sampler));
     const VoxfieldDefaults& d = s.model.defaults;
     s.steps = o.steps.value_or(preset.steps ? preset.steps : d.num_inference_steps);
-    s.guidance = o.cfg_scale.value_or(d.guidance_scale);
+    s.guidance = {o.cfg_scale.value_or(d.guidance_scale), double(o.cfg_from.value_or(d.guidance_from))};
     s.repaint = preset.steps ? preset.repaint : d.repaint;
     s.repaint.jump_length = o.jump_length.value_or(s.repaint.jump_length);
     s.repaint.jump_n_sample = o.jump_n_sample.value_or(s.repaint.jump_n_sample);
@@ -65,7 +65,8 @@ Result<Json> settings_json(const GenerationSettings& s, const Device& device, st
                 {"precision", s.precision == DType::f32 ? "fp32" : "fp16"},
                 {"sampler", std::string(sampler_name(s.model.scheduler.sampler))},
                 {"steps", s.steps},
-                {"guidance_scale", s.guidance},
+                {"guidance_scale", s.guidance.scale},
+                {"guidance_from", s.guidance.from},
                 {"region_size", s.regions.region_size},
                 {"coverage_threshold", s.regions.coverage_threshold},
                 {"strategy", std::string(region_strategy_name(s.regions.strategy))},

@@ -4,6 +4,7 @@
 
 #include "engine/job/job.h"
 #include "engine/scene/grid.h"
+#include "engine/voxfield/token_sampler.h"
 #include "engine/voxfield/voxfield_model.h"
 #include "runtime/base/dtype.h"
 #include "runtime/base/json.h"
@@ -20,6 +21,7 @@ struct GenerationOptions {
     std::string sampler, preset; // names; empty: the model's
     std::optional<int> steps, region_size, coverage_threshold, jump_length, jump_n_sample;
     std::optional<float> cfg_scale;
+    std::optional<int> cfg_from;
     std::optional<KnownTokens> known;
     std::optional<RegionStrategy> strategy;
     int64_t first_cell = 0;
@@ -32,7 +34,7 @@ struct GenerationSettings {
     VoxfieldModel model;
     SamplingPlan plan;
     int steps = 0;
-    float guidance = 0;
+    Guidance guidance;
     RegionOptions regions;
     RepaintOptions repaint;
     DType precision = DType::f16;

@@ -111,15 +111,19 @@ StepCoefficients ddpm_step(const SchedulerConfig& config, double timestep, doubl
     return step;
 }
 
-// formula (12) of arXiv 2010.02502 with eta 0: x' = sqrt(next) * x0 + sqrt(1 - next) * noise
+// formula (12) of arXiv 2010.02502: x' = sqrt(next) * x0 + sqrt(1 - next - fresh^2) * noise + fresh * z, where fresh is
+// eta times the deviation of DDPM's step, formula (16)
 // note: the noise comes from the prediction before it is clipped
 StepCoefficients ddim_step(const SchedulerConfig& config, double timestep, double abar, double next, bool last)
 {
     StepCoefficients step;
     step.timestep = timestep;
     step.abar = abar;
-    const double alpha = std::sqrt(abar), sigma = std::sqrt(1 - abar), direction = std::sqrt(1 - next);
+    const double alpha = std::sqrt(abar), sigma = std::sqrt(1 - abar);
+    const double fresh = config.eta * config.eta * (1 - next) / (1 - abar) * (1 - abar / next);
+    const double direction = std::sqrt(1 - next - fresh);
     set_prediction(step, config.prediction, alpha, sigma);
+    step.c_z = last ? 0 : std::sqrt(fresh);
     step.c_x0 = std::sqrt(next);
     switch (config.prediction) {
     case Prediction::epsilon:

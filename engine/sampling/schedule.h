@@ -42,7 +42,7 @@ constexpr int kMaxInferenceSteps = 10000;
 // cumulative products of 1 - beta [num_train_timesteps], in double; diffusers rounds betas to float first
 std::vector<double> alphas_cumprod(const SchedulerConfig& config);
 
-// The coefficients of `steps` denoising steps, after diffusers' DDPMScheduler, DDIMScheduler (eta 0),
+// The coefficients of `steps` denoising steps, after diffusers' DDPMScheduler, DDIMScheduler (with eta),
 // DPMSolverMultistepScheduler (dpmsolver++, midpoint) and EulerDiscreteScheduler (no churn), with their timesteps.
 // note: DDPM adds no noise in its last step; diffusers adds 1e-10 z there when the last timestep is not 0.
 // Bad input: steps not in 1..min(10000, num_train_timesteps), or an offset that moves a timestep out of range.

@@ -55,6 +55,7 @@ void read_solver(JsonFields& fields, SchedulerConfig& config)
                                  {"fixed_large", VarianceType::fixed_large}},
                                 config.variance_type);
     fields.flag("set_alpha_to_one", config.set_alpha_to_one);
+    fields.number("eta", 0.0, 1.0, config.eta);
     fields.integer("solver_order", 1, 2, config.solver_order);
     fields.flag("lower_order_final", config.lower_order_final);
     fields.flag("euler_at_final", config.euler_at_final);

@@ -34,6 +34,7 @@ struct SchedulerConfig {
 
     VarianceType variance_type = VarianceType::fixed_small; // ddpm
     bool set_alpha_to_one = true;                           // ddim
+    double eta = 0;                                         // ddim, 0..1: share of DDPM's fresh noise in a step
 
     int solver_order = 2;          // dpmpp_2m, 1 or 2
     bool lower_order_final = true; // first order at the end of runs under 15 steps

@@ -14,8 +14,8 @@ struct TokenSampler::Batch {
     uint32_t rows, tiles, longest; // rows: of one guidance half
     State state;
     Slot labels, cells, sets, tile_list, coords, pos, mask, known, fixed, x, x0, z, table_row; // z: noise that is given
-    Slot condition, told; // none where the model is told nothing
-    std::unique_ptr<Program> prepare, step, undo;
+    Slot condition, told;                                   // none where the model is told nothing
+    std::unique_ptr<Program> prepare, step, unguided, undo; // unguided: of the first half, where steps differ
 
     Batch(const TokenSampler& s, const TokenSets& packed)
         : rows(packed.rows() / s.halves_), tiles(uint32_t(packed.tiles.size() / 4)), longest(packed.longest)
@@ -41,24 +41,28 @@ struct TokenSampler::Batch {
             z = state.slot(rows, channels, DType::f32, "z");
         table_row = state.slot(2 * m, 1, DType::u32, "table_row", 1);
     }
-    TokenContext context(Graph& g) const
+    // of both halves, or of the first one
+    TokenContext context(Graph& g, uint32_t halves) const
     {
+        const uint32_t m = rows * halves, all = labels.rows();
         TokenContext c;
-        c.labels = labels.in(g);
-        c.cells = cells.in(g);
-        c.sets = sets.in(g);
-        c.tiles = tile_list.in(g);
-        c.coords = coords.in(g);
-        c.pos = pos.in(g);
-        c.told = told.in(g);
-        c.mask = mask.in(g);
+        c.labels = labels.row_range(0, m).in(g);
+        c.cells = cells.row_range(0, m).in(g);
+        c.sets = sets.row_range(0, m).in(g);
+        c.tiles = tile_list.row_range(0, tiles * m / all).in(g);
+        c.coords = coords.row_range(0, m).in(g);
+        c.pos = pos.row_range(0, m).in(g);
+        if (told.valid())
+            c.told = told.row_range(0, m).in(g);
+        c.mask = mask.row_range(0, m).in(g);
         c.longest = longest;
         return c;
     }
-    Graph prepare_graph(const Transformer& t) const
+    Graph prepare_graph(const TokenSampler& s) const
     {
         Graph g;
-        const TokenContext c = context(g);
+        const Transformer& t = s.transformer_;
+        const TokenContext c = context(g, s.halves_);
         g.keep(t.neighbors(g, c), mask);
         const Tensor positions = t.positions(g, c);
         g.keep(positions, pos);
@@ -73,17 +77,17 @@ struct TokenSampler::Batch {
         return step_noise(g, steps, cells.row_range(0, rows).in(g), known.in(g), s.transformer_.config().channels(),
                           s.options_.seed);
     }
-    Graph step_graph(const TokenSampler& s) const
+    Graph step_graph(const TokenSampler& s, uint32_t halves) const
     {
         Graph g;
         const Transformer& t = s.transformer_;
         const StepTable steps = s.step_table(g);
-        const Tensor state_x = x.in(g), current = table_row.in(g);
+        const Tensor state_x = x.in(g), current = table_row.row_range(0, 2 * rows * halves).in(g);
         step_timestep(g, steps, current);
-        const Tensor in = step_input(g, steps, state_x, rows * s.halves_, t.precision());
-        const Tensor m = t.forward(g, in, context(g), s.table_.in(g), current);
+        const Tensor in = step_input(g, steps, state_x, rows * halves, t.precision());
+        const Tensor m = t.forward(g, in, context(g, halves), s.table_.in(g), current);
         step_update(g, steps, m, noise(g, s, steps), known.in(g), fixed.in(g), state_x, x0.in(g),
-                    s.options_.guidance_scale, float(s.plan_.clip));
+                    s.options_.guidance.scale, float(s.plan_.clip));
         step_advance(g, steps.clock);
         return g;
     }
@@ -103,10 +107,17 @@ TokenSampler::~TokenSampler() = default;
 
 TokenSampler::TokenSampler(Device& device, const Transformer& transformer, const SamplingPlan& plan,
                            SamplerOptions options)
-    : device_(device), transformer_(transformer), plan_(plan), options_(std::move(options)),
-      halves_(options_.guidance_scale == 1.f ? 1 : 2),
+    : device_(device), transformer_(transformer), plan_(plan), options_(std::move(options)), halves_(1),
       window_(uint32_t(std::min<size_t>(options_.modulation_window, plan.timesteps.size())))
 {
+    for (const PlanRow& row : plan_.rows) {
+        if (row.kind != PlanRowKind::step)
+            continue;
+        if (guided(row))
+            halves_ = 2;
+        else
+            ++unguided_steps_;
+    }
     constexpr uint32_t kWords = sizeof(StepRow) / 4;
     steps_ = state_.slot(uint32_t(plan.rows.size()) + 1, kWords, DType::u32, "steps", kWords);
     clock_ = ReplayMemory::clock_slot(state_);
@@ -117,13 +128,21 @@ TokenSampler::TokenSampler(Device& device, const Transformer& transformer, const
 Result<std::unique_ptr<TokenSampler>> TokenSampler::create(Device& device, const Transformer& transformer,
                                                            const SamplingPlan& plan, SamplerOptions options)
 {
-    if (!(options.guidance_scale >= 0 && options.guidance_scale <= 1000))
-        return fail(ErrorCode::usage, "guidance scale {} is not in 0..1000", options.guidance_scale);
+    const Guidance& guidance = options.guidance;
+    if (!(guidance.scale >= 0 && guidance.scale <= 1000))
+        return fail(ErrorCode::usage, "guidance scale {} is not in 0..1000", guidance.scale);
+    if (!(guidance.from >= 0))
+        return fail(ErrorCode::usage, "guidance from timestep {}, which is below 0", guidance.from);
     std::unique_ptr<TokenSampler> s(new TokenSampler(device, transformer, plan, std::move(options)));
     SR_CHECK(s->state_.allocate(device, "sampler tables"));
     SR_CHECK(s->upload_steps());
     SR_CHECK(s->make_modulations());
     return s;
+}
+
+bool TokenSampler::guided(const PlanRow& step) const
+{
+    return options_.guidance.at(step.coefficients.timestep);
 }
 
 // row 0 is the first noise, x = init_noise_sigma * z; the plan's rows follow
@@ -171,8 +190,11 @@ Result<TokenSampler::Batch*> TokenSampler::batch_for(const TokenSets& sets)
     batch_.reset(); // memory of the old shape goes before the new one's comes
     auto b = std::make_unique<Batch>(*this, sets);
     SR_CHECK(b->state.allocate(device_, "sampler state"));
-    SR_TRY(b->prepare, Program::create(device_, b->prepare_graph(transformer_)));
-    SR_TRY(b->step, Program::create(device_, b->step_graph(*this)));
+    SR_TRY(b->prepare, Program::create(device_, b->prepare_graph(*this)));
+    SR_TRY(b->step, Program::create(device_, b->step_graph(*this, halves_)));
+    if (halves_ == 2 && unguided_steps_) {
+        SR_TRY(b->unguided, Program::create(device_, b->step_graph(*this, 1)));
+    }
     SR_TRY(b->undo, Program::create(device_, b->undo_graph(*this)));
     batch_ = std::move(b);
     replay_.emplace(device_, ReplayMemory{clock_, batch_->x, batch_->x0}, this->rows(),
@@ -188,7 +210,13 @@ Result<uint64_t> TokenSampler::planned_bytes(uint32_t regions, uint32_t cells) c
     region.labels.assign(cells, 0);
     const Batch b(*this, pack(std::vector<RegionInput>(regions, region)));
     uint64_t bytes = table_bytes() + b.state.planned_bytes(device_.limits());
-    for (const Graph& g : {b.prepare_graph(transformer_), b.step_graph(*this), b.undo_graph(*this)}) {
+    std::vector<Graph> graphs;
+    graphs.push_back(b.prepare_graph(*this));
+    graphs.push_back(b.step_graph(*this, halves_));
+    graphs.push_back(b.undo_graph(*this));
+    if (halves_ == 2 && unguided_steps_)
+        graphs.push_back(b.step_graph(*this, 1));
+    for (const Graph& g : graphs) {
         SR_TRY(const Plan plan, make_plan(g.desc(), device_.limits()));
         bytes += plan.arena_bytes();
     }
@@ -269,7 +297,9 @@ Result<Program*> TokenSampler::program_of(size_t row)
     if (step)
         SR_CHECK(use_timestep(plan_.rows[row - 1].timestep_index));
     SR_CHECK(feed_noise(*batch_, row));
-    return step ? batch_->step.get() : batch_->undo.get();
+    if (!step)
+        return batch_->undo.get();
+    return batch_->unguided && !guided(plan_.rows[row - 1]) ? batch_->unguided.get() : batch_->step.get();
 }
 
 // of everything but the model that decides the result
@@ -278,7 +308,8 @@ uint64_t TokenSampler::key_of(std::span<const RegionInput> regions) const
     Hash hash;
     const auto add = [&](const auto& values) { hash.add(std::as_bytes(std::span(values))); };
     add_plan(hash, plan_);
-    add(std::span(&options_.guidance_scale, 1));
+    add(std::span(&options_.guidance.scale, 1));
+    add(std::span(&options_.guidance.from, 1));
     add(std::span(&options_.seed, 1));
     for (const RegionInput& r : regions) {
         add(r.cells);

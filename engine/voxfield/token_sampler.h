@@ -23,20 +23,33 @@ struct RegionInput {
     std::vector<float> told;     // [cells, W], the condition of each cell; or nothing
 };
 
+// Classifier-free guidance: m = u + scale (c - u), u without labels. Below timestep `from` the network runs on c alone,
+// which costs half: there guidance changes little (Kynkäänniemi et al. 2024, arXiv 2404.07724).
+struct Guidance {
+    float scale = 4; // 1: no unconditional half
+    double from = 0;
+
+    bool at(double timestep) const { return scale != 1.f && timestep >= from; }
+};
+
 struct SamplerOptions {
-    float guidance_scale = 4; // 1: no unconditional half
+    Guidance guidance;
     uint64_t seed = 0;
     uint32_t modulation_window = 64; // timesteps whose modulations are kept at a time: 40 MB for the full-size model
     // golden cases only: normals come from the caller, who fills [rows, C] before plan row r (0: the first noise)
     std::function<void(size_t row, std::span<float> normals)> noise;
 };
 
-inline SamplerOptions sampling_options(float guidance_scale, uint64_t seed)
+inline SamplerOptions sampling_options(Guidance guidance, uint64_t seed)
 {
     SamplerOptions o;
-    o.guidance_scale = guidance_scale;
+    o.guidance = guidance;
     o.seed = seed;
     return o;
+}
+inline SamplerOptions sampling_options(float guidance_scale, uint64_t seed)
+{
+    return sampling_options(Guidance{guidance_scale}, seed);
 }
 
 // called after plan rows; returning false stops the run (ErrorCode::interrupted)
@@ -81,6 +94,7 @@ class TokenSampler {
   private:
     struct Batch; // memory and programs of one batch shape
     TokenSampler(Device& device, const Transformer& transformer, const SamplingPlan& plan, SamplerOptions options);
+    bool guided(const PlanRow& step) const;
     Status upload_steps();
     uint64_t key_of(std::span<const RegionInput> regions) const;
     Status make_modulations();
@@ -97,7 +111,9 @@ class TokenSampler {
     const Transformer& transformer_;
     SamplingPlan plan_;
     SamplerOptions options_;
-    uint32_t halves_, window_; // window: timesteps that the modulation table holds at a time
+    uint32_t halves_; // 2 if any step is guided
+    uint32_t unguided_steps_ = 0;
+    uint32_t window_; // timesteps that the modulation table holds at a time
     uint32_t first_timestep_ = ~0u;
     State state_; // what does not depend on the batch
     Slot steps_, clock_, timesteps_, table_;

@@ -13,6 +13,7 @@ namespace semrover {
 struct VoxfieldDefaults {
     int num_inference_steps = 50;
     float guidance_scale = 4;
+    int guidance_from = 0; // timestep below which no step is guided
     RegionOptions regions;
     RepaintOptions repaint;
     UsualObjects usual_objects; // to guess objects from labels

@@ -194,7 +194,7 @@ Result<GoldenOutputs> run_voxfield_sampling(Device& device, const GoldenCase& c,
         next += n * channels;
     };
     SamplerOptions options;
-    options.guidance_scale = float(guidance);
+    options.guidance.scale = float(guidance);
     options.noise = [&](size_t row, std::span<float> out) {
         if (row == 0) {
             std::copy(first.begin(), first.end(), out.begin());
