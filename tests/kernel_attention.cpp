@@ -1,5 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+#include "attention.spv.h"
+#include "runtime/graph/plan.h"
 #include "tests/attention_sets.h"
 
 #include <cmath>
@@ -145,6 +147,19 @@ TEST(kernel_attention, gives_a_set_the_same_bits_whatever_it_is_packed_with)
                                   all.at(side * packed.rows + packed.spans[s][0] + r, c))
                             << "set " << s << " row " << r << " column " << c;
         }
+    }
+}
+
+// 16 keys of kChunks * 8 floats, and 32 queries' weights: 18,560 bytes at head_dim 256, 10,368 at 128
+TEST(kernel_attention, needs_the_shared_memory_of_its_head_dim)
+{
+    DeviceLimits limits;
+    limits.type = DeviceType::discrete;
+    for (const auto& [head_dim, shared, expected] :
+         {std::tuple{128u, 10368u, "simt"}, {128u, 10367u, "cpu"}, {256u, 18560u, "simt"}, {256u, 16384u, "cpu"}}) {
+        limits.max_shared_bytes = shared;
+        const ConstantValue chunks[] = {{"kChunks", head_dim / 8}};
+        EXPECT_EQ(choose_variant(kernel::attention, limits, chunks)->name, expected) << head_dim << " " << shared;
     }
 }
 

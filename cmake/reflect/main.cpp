@@ -45,7 +45,9 @@ std::string arrays(const std::string& id, const Module& m)
     out += fmt::format("}}}};\ninline constexpr std::array<PushMember, {}> {}_push{{{{", m.push.size(), id);
     for (const auto& p : m.push)
         out += fmt::format("{{\"{}\", {}}},", p.name, p.offset);
-    return out + "}};\n";
+    return out +
+           fmt::format("}}}};\nconstexpr uint32_t {}_shared([[maybe_unused]] const uint32_t* c) {{ return {}; }}\n", id,
+                       m.shared_bytes);
 }
 
 std::vector<Variant> read_variants(const std::string& op, const std::vector<fs::path>& files)
@@ -71,8 +73,8 @@ std::string header(const std::string& op, const std::vector<fs::path>& files)
         const std::string id = op + (variant.empty() ? "" : "_" + variant);
         out += arrays(id, m);
         table += fmt::format(
-            "    {{\"{}\", {}_code, {}_bindings, {}_constants, {}_push, {}, {{{}, {}, {}}}, {}, {}}},\n", variant, id,
-            id, id, id, m.push_bytes, m.local_size[0], m.local_size[1], m.local_size[2], m.shared_bytes, m.needs);
+            "    {{\"{}\", {}_code, {}_bindings, {}_constants, {}_push, {}, {{{}, {}, {}}}, {}_shared, {}}},\n",
+            variant, id, id, id, id, m.push_bytes, m.local_size[0], m.local_size[1], m.local_size[2], id, m.needs);
     }
     out +=
         fmt::format("inline constexpr KernelVariant {}_variants[] = {{\n{}}};\n}} // namespace generated\n", op, table);

@@ -66,9 +66,9 @@ class Reader {
                 throw std::runtime_error("zero-length instruction");
             instruction(uint16_t(code[at] & 0xffff), &code[at + 1], (code[at] >> 16) - 1);
         }
+        constants();
         for (uint32_t v : variables_)
             variable(ids_[v]);
-        constants();
         std::sort(module_.bindings.begin(), module_.bindings.end(),
                   [](const Binding& a, const Binding& b) { return a.binding < b.binding; });
         return std::move(module_);
@@ -182,7 +182,7 @@ class Reader {
             push(type);
             break;
         case kWorkgroup:
-            module_.shared_bytes += bytes(type);
+            module_.shared_bytes += " + " + bytes(type);
             break;
         default:
             break;
@@ -204,52 +204,52 @@ class Reader {
         }
     }
 
-    uint32_t bytes(const Id& type) const
+    // sizes as expressions in C++, because lengths of arrays may depend on specialization constants
+    std::string bytes(const Id& type) const
     {
         switch (type.op) {
         case kOpTypeInt:
         case kOpTypeFloat:
-            return type.operands[0] / 8;
+            return number(type.operands[0] / 8);
         case kOpTypeVector:
-            return bytes(ids_[type.operands[0]]) * type.operands[1];
+            return bytes(ids_[type.operands[0]]) + " * " + number(type.operands[1]);
         case kOpTypeArray:
-            return bytes(ids_[type.operands[0]]) * length(ids_[type.operands[1]]);
+            return bytes(ids_[type.operands[0]]) + " * " + length(type.operands[1]);
         case kOpTypeStruct: {
-            uint32_t sum = 0;
+            std::string sum = "(0u";
             for (uint32_t member : type.operands)
-                sum += bytes(ids_[member]);
-            return sum;
+                sum += " + " + bytes(ids_[member]);
+            return sum + ")";
         }
         default:
-            return 4;
+            return "4u"; // bool
         }
     }
 
-    uint32_t length(const Id& constant) const
+    static std::string number(uint32_t value) { return std::to_string(value) + "u"; }
+
+    std::string length(uint32_t id) const
     {
+        const Id& constant = ids_[id];
         if (constant.op == kOpSpecConstantOp)
-            return folded(constant);
-        return constant.operands.at(0);
+            return "(" + operation(constant) + ")";
+        if (!constant.spec_set)
+            return number(constant.operands.at(0));
+        for (size_t i = 0; i < module_.constants.size(); ++i)
+            if (module_.constants[i].id == constant.spec_id)
+                return "c[" + std::to_string(i) + "]";
+        throw std::runtime_error("a shared array's size uses an unknown constant");
     }
 
-    // sizes of shared arrays may be sums, products and quotients of constants
-    uint32_t folded(const Id& c) const
+    // sums, products and quotients of constants
+    std::string operation(const Id& c) const
     {
-        const uint32_t a = length(ids_[c.operands.at(1)]);
-        const uint32_t b = c.operands.size() > 2 ? length(ids_[c.operands[2]]) : 0;
-        switch (c.operands[0]) {
-        case 128:
-            return a + b; // OpIAdd
-        case 130:
-            return a - b; // OpISub
-        case 132:
-            return a * b; // OpIMul
-        case 134:         // OpUDiv
-        case 135:
-            return b ? a / b : 0;
-        default:
+        const std::map<uint32_t, std::string> kOperators = {
+            {128, " + "}, {130, " - "}, {132, " * "}, {134, " / "}, {135, " / "}}; // OpIAdd, ISub, IMul, UDiv, SDiv
+        const auto found = kOperators.find(c.operands[0]);
+        if (found == kOperators.end())
             throw std::runtime_error("a shared array's size uses an operation the reflector does not know");
-        }
+        return length(c.operands.at(1)) + found->second + length(c.operands.at(2));
     }
 
     void constants()

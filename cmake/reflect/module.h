@@ -31,7 +31,7 @@ struct Module {
     std::vector<Member> push;
     uint32_t push_bytes = 0;
     uint32_t local_size[3] = {1, 1, 1};
-    uint32_t shared_bytes = 0;
+    std::string shared_bytes = "0u"; // as C++: of c, the constants' values in the order above
     uint32_t needs = 0; // KernelNeeds of runtime/graph/kernel.h
 };
 

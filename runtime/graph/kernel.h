@@ -47,8 +47,8 @@ struct KernelVariant {
     std::span<const PushMember> push;
     uint32_t push_bytes;
     uint32_t local_size[3];
-    uint32_t shared_bytes; // at the constants' default values
-    uint32_t needs;        // KernelNeeds
+    uint32_t (*shared_bytes)(const uint32_t* values); // of shared memory, for values in the order of `constants`
+    uint32_t needs;                                   // KernelNeeds
 
     const ConstantInfo* constant(std::string_view constant_name) const
     {

@@ -77,7 +77,9 @@ Status order(Plan& plan);                                     // levels from acc
 // do the memory ranges of two bindings overlap, after placement?
 bool overlaps(const Plan& plan, const PassBinding& a, const PassBinding& b);
 
-// The variant of `kernel` for a device, among those its limits allow: the forced one, else cpu or simt by device type.
-const KernelVariant* choose_variant(const Kernel& kernel, const DeviceLimits& limits);
+// The variant of `kernel` for a device, among those its limits allow with these constants: the forced one, else cpu or
+// simt by device type.
+const KernelVariant* choose_variant(const Kernel& kernel, const DeviceLimits& limits,
+                                    std::span<const ConstantValue> constants = {});
 
 } // namespace semrover

@@ -12,11 +12,22 @@ namespace semrover {
 
 namespace {
 
-bool runs_on(const KernelVariant& v, const DeviceLimits& limits)
+// with the constants that the op gives; those that the planner sets (kHalf*, tiles) size no shared memory
+uint32_t shared_bytes(const KernelVariant& v, std::span<const ConstantValue> given)
+{
+    std::vector<uint32_t> values;
+    for (const ConstantInfo& c : v.constants) {
+        const auto found = std::ranges::find(given, c.name, &ConstantValue::name);
+        values.push_back(found == given.end() ? c.value : found->value);
+    }
+    return v.shared_bytes(values.data());
+}
+
+bool runs_on(const KernelVariant& v, const DeviceLimits& limits, std::span<const ConstantValue> constants)
 {
     const auto buffers = std::ranges::count(v.bindings, BindingKind::storage, &BindingInfo::kind);
     const uint32_t group_threads = v.local_size[0] * v.local_size[1] * v.local_size[2];
-    return v.shared_bytes <= limits.max_shared_bytes && group_threads <= limits.max_group_threads &&
+    return shared_bytes(v, constants) <= limits.max_shared_bytes && group_threads <= limits.max_group_threads &&
            (v.needs & ~limits.needs_supported) == 0 && v.push_bytes <= limits.max_push_bytes &&
            uint64_t(buffers) <= limits.max_storage_buffers;
 }
@@ -89,11 +100,12 @@ void Pass::set_push(std::string_view name, uint32_t value)
     std::memcpy(&push[m->offset], &value, 4);
 }
 
-const KernelVariant* choose_variant(const Kernel& kernel, const DeviceLimits& limits)
+const KernelVariant* choose_variant(const Kernel& kernel, const DeviceLimits& limits,
+                                    std::span<const ConstantValue> constants)
 {
     const KernelVariant* best = nullptr;
     for (const KernelVariant& v : kernel.variants)
-        if (runs_on(v, limits) && (!best || preference(v.name, limits) < preference(best->name, limits)))
+        if (runs_on(v, limits, constants) && (!best || preference(v.name, limits) < preference(best->name, limits)))
             best = &v;
     return best;
 }
@@ -101,7 +113,7 @@ const KernelVariant* choose_variant(const Kernel& kernel, const DeviceLimits& li
 Status stage::pick_variants(Plan& plan, const DeviceLimits& limits)
 {
     for (Pass& pass : plan.passes) {
-        pass.variant = choose_variant(*pass.kernel, limits);
+        pass.variant = choose_variant(*pass.kernel, limits, pass.options.constants);
         if (!pass.variant)
             return fail(
                 ErrorCode::no_device,
