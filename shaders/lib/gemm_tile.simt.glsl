@@ -4,10 +4,16 @@
 // 64 x 64 outputs of a workgroup of 64 threads, 8 x 8 each; 16 columns of K at a time in shared memory
 const uint kStep = 16;  // columns of K in shared memory
 const uint kPitch = 68; // floats of a row of 64; keeps vec4 alignment and spreads the transposing stores over banks
-shared float tile_x[kStep * kPitch]; // [k][row]
-shared float tile_w[kStep * kPitch]; // [k][col]
+const uint kTileX = 0, kTileW = kStep * kPitch;
+shared float tile[2 * kStep * kPitch]; // [k][row] of x, [k][col] of w
 
+// Rows 8 (thread / 8) on. While sums are made, columns 4 (thread % 8) on and 32 + 4 (thread % 8) on: so eight threads read
+// 32 floats next to each other, one from each of 32 banks. store_tile() begins with columns 8 (thread % 8) on.
 float acc[8][8];
+
+// note: bitfieldExtract tells compilers what a quotient hides, that the product is a multiple of 8: reads are of four floats
+uint thread_row() { return bitfieldExtract(gl_LocalInvocationID.x, 3, 3) * 8; }
+uint thread_quad() { return bitfieldExtract(gl_LocalInvocationID.x, 0, 3) * 4; }
 
 void clear_tile()
 {
@@ -21,23 +27,38 @@ void stage(vec4 a[4], vec4 b[4])
 {
     const uint thread = gl_LocalInvocationID.x;
     [[unroll]] for (uint i = 0; i < kStep; ++i) {
-        tile_x[i * kPitch + thread] = a[i / 4][i % 4];
-        tile_w[i * kPitch + thread] = b[i / 4][i % 4];
+        tile[kTileX + i * kPitch + thread] = a[i / 4][i % 4];
+        tile[kTileW + i * kPitch + thread] = b[i / 4][i % 4];
     }
 }
 
 void multiply()
 {
-    const uint tm = gl_LocalInvocationID.x / 8 * 8, tn = gl_LocalInvocationID.x % 8 * 8;
+    const uint tm = kTileX + thread_row(), tn = kTileW + thread_quad();
     [[unroll]] for (uint s = 0; s < kStep; ++s) {
         float u[8], v[8];
         [[unroll]] for (uint i = 0; i < 8; ++i) {
-            u[i] = tile_x[s * kPitch + tm + i];
-            v[i] = tile_w[s * kPitch + tn + i];
+            u[i] = tile[s * kPitch + tm + i];
+            v[i] = tile[s * kPitch + tn + i % 4 + i / 4 * 32];
         }
         [[unroll]] for (uint i = 0; i < 8; ++i)
             [[unroll]] for (uint j = 0; j < 8; ++j)
                 acc[i][j] += u[i] * v[j];
+    }
+}
+
+// to eight columns next to each other, for stores of eight: through shared memory, four rows of each thread at a time
+void join_columns()
+{
+    [[unroll]] for (uint half_of = 0; half_of < 2; ++half_of) {
+        barrier();
+        [[unroll]] for (uint i = 0; i < 4; ++i)
+            [[unroll]] for (uint j = 0; j < 8; ++j)
+                tile[(thread_row() / 2 + i) * 64 + thread_quad() + j % 4 + j / 4 * 32] = acc[4 * half_of + i][j];
+        barrier();
+        [[unroll]] for (uint i = 0; i < 4; ++i)
+            [[unroll]] for (uint j = 0; j < 8; ++j)
+                acc[4 * half_of + i][j] = tile[(thread_row() / 2 + i) * 64 + 2 * thread_quad() + j];
     }
 }
 
@@ -47,12 +68,12 @@ void multiply_by_neighbors_gate(inout vec4 lo, inout vec4 hi)
     const uint at = gl_LocalInvocationID.x * 8, gate = (gl_LocalInvocationID.x | 1) * 8;
     barrier();
     [[unroll]] for (uint i = 0; i < 4; ++i) {
-        tile_x[at + i] = lo[i];
-        tile_x[at + 4 + i] = hi[i];
+        tile[at + i] = lo[i];
+        tile[at + 4 + i] = hi[i];
     }
     barrier();
-    lo *= gelu_erf(vec4(tile_x[gate], tile_x[gate + 1], tile_x[gate + 2], tile_x[gate + 3]));
-    hi *= gelu_erf(vec4(tile_x[gate + 4], tile_x[gate + 5], tile_x[gate + 6], tile_x[gate + 7]));
+    lo *= gelu_erf(vec4(tile[gate], tile[gate + 1], tile[gate + 2], tile[gate + 3]));
+    hi *= gelu_erf(vec4(tile[gate + 4], tile[gate + 5], tile[gate + 6], tile[gate + 7]));
 }
 
 // two threads hold the 16 rows of a moment: the second one's are merged into the first's; every thread must call it
@@ -63,19 +84,19 @@ void merge_moments(uint row, uint col, ColumnMoments m)
     column_moments(m, mean, m2);
     barrier();
     [[unroll]] for (uint i = 0; i < 8; ++i) {
-        tile_x[thread * 16 + i] = mean[i / 4][i % 4];
-        tile_x[thread * 16 + 8 + i] = m2[i / 4][i % 4];
+        tile[kTileX + thread * 16 + i] = mean[i / 4][i % 4];
+        tile[kTileX + thread * 16 + 8 + i] = m2[i / 4][i % 4];
     }
-    tile_w[thread] = float(m.count);
+    tile[kTileW + thread] = float(m.count);
     barrier();
     if (thread / 8 % 2 != 0 || row >= p.rows || col >= p.cols)
         return;
-    const float n_a = float(m.count), n_b = tile_w[other], share = n_b / max(n_a + n_b, 1.0);
+    const float n_a = float(m.count), n_b = tile[kTileW + other], share = n_b / max(n_a + n_b, 1.0);
     [[unroll]] for (uint i = 0; i < 2; ++i) {
         vec4 mean_b, m2_b;
         [[unroll]] for (uint j = 0; j < 4; ++j) {
-            mean_b[j] = tile_x[other * 16 + 4 * i + j];
-            m2_b[j] = tile_x[other * 16 + 8 + 4 * i + j];
+            mean_b[j] = tile[kTileX + other * 16 + 4 * i + j];
+            m2_b[j] = tile[kTileX + other * 16 + 8 + 4 * i + j];
         }
         const vec4 delta = mean_b - mean[i];
         mean[i] += delta * share;
@@ -90,6 +111,7 @@ void store_tile(uint tile_row, uint tile_col)
     const uint thread = gl_LocalInvocationID.x;
     const uint row = tile_row + thread / 8 * 8, col = tile_col + thread % 8 * 8;
     ColumnMoments m = no_moments();
+    join_columns();
     [[unroll]] for (uint i = 0; i < 8; ++i) {
         bool inside = row + i < p.rows && col < p.cols;
         vec4 lo = vec4(acc[i][0], acc[i][1], acc[i][2], acc[i][3]), hi = vec4(acc[i][4], acc[i][5], acc[i][6], acc[i][7]);
