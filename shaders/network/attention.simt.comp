@@ -21,9 +21,10 @@ layout(binding = 3) writeonly buffer Y { uvec4 y[]; };        // [streams * rows
 
 const uint kQueries = 32;
 const uint kKeys = 16;
-const uint kOwned = (kChunks + 1) / 2; // chunks of the output that each of a query's two threads sums
+const uint kOwned = (kChunks + 1) / 2; // chunks of the output that each of a query's two threads sums, by turns
+const uint kPitch = 2 * kChunks + 1;   // of a key: odd, so that the keys of two threads lie in different banks
 
-shared vec4 block[kKeys * kChunks * 2];
+shared vec4 block[kKeys * kPitch];
 shared float weights[kQueries * (kKeys + 1)];
 
 // rows [first, first + kKeys) of keys or values (`column`), clamped to the set
@@ -33,8 +34,9 @@ void stage(uint side, uint set_first, uint first, uint set_rows, uint column)
         const uint key = min(first + i / kChunks, set_rows - 1);
         vec4 lo, hi;
         LOAD8(qkv, kHalfQkv, (side * p.rows + set_first + key) * p.qkv_ld + column + i % kChunks * 8, lo, hi);
-        block[2 * i] = lo;
-        block[2 * i + 1] = hi;
+        const uint at = i / kChunks * kPitch + i % kChunks * 2;
+        block[at] = lo;
+        block[at + 1] = hi;
     }
 }
 
@@ -55,19 +57,19 @@ void main()
             barrier();
             stage(side, tile.z, first, tile.w, dim + head * p.head_dim);
             barrier();
-            float s[kKeys / 2]; // this thread's half of the keys
+            float s[kKeys / 2]; // this thread's half of the keys, every other one
             [[unroll]] for (uint j = 0; j < kKeys / 2; ++j)
                 s[j] = 0.0;
             for (uint c = 0; c < kChunks; ++c) {
                 vec4 lo, hi;
                 LOAD8(qkv, kHalfQkv, q_at + c * 8, lo, hi);
                 [[unroll]] for (uint j = 0; j < kKeys / 2; ++j) {
-                    const uint at = 2 * ((part * (kKeys / 2) + j) * kChunks + c);
+                    const uint at = (2 * j + part) * kPitch + 2 * c;
                     s[j] += dot(lo, block[at]) + dot(hi, block[at + 1]);
                 }
             }
             [[unroll]] for (uint j = 0; j < kKeys / 2; ++j)
-                weights[query * (kKeys + 1) + part * (kKeys / 2) + j] = s[j] * p.scale;
+                weights[query * (kKeys + 1) + 2 * j + part] = s[j] * p.scale;
             barrier();
             stage(side, tile.z, first, tile.w, 2 * dim + head * p.head_dim);
             float m = largest;
@@ -88,7 +90,7 @@ void main()
                 const float w = exp(weights[query * (kKeys + 1) + j] - m);
                 total += w;
                 [[unroll]] for (uint c = 0; c < kOwned; ++c) {
-                    const uint at = 2 * (j * kChunks + min(part * kOwned + c, kChunks - 1));
+                    const uint at = j * kPitch + 2 * min(2 * c + part, kChunks - 1);
                     o_lo[c] += w * block[at];
                     o_hi[c] += w * block[at + 1];
                 }
@@ -99,6 +101,6 @@ void main()
         return;
     const uint to = (stream * p.rows + row) * p.y_ld + head * p.head_dim;
     [[unroll]] for (uint c = 0; c < kOwned; ++c)
-        if (part * kOwned + c < kChunks)
-            STORE8(y, kHalfY, to + (part * kOwned + c) * 8, (o_lo[c] / total), (o_hi[c] / total));
+        if (2 * c + part < kChunks)
+            STORE8(y, kHalfY, to + (2 * c + part) * 8, (o_lo[c] / total), (o_hi[c] / total));
 }
