@@ -101,7 +101,7 @@ struct First { // what the pixel's middle shows
 };
 
 // a sample: its light and what is around it are added to sum; the first tells what the pixel shows
-void add_sample(inout Sum sum, inout First first, Ray seen, float distance_of_depth, float spread, uint index, float turn)
+void add_sample(inout Sum sum, inout First first, Ray seen, float far_at_depth_one, float spread, uint index, float turn)
 {
     Surface s;
     vec3 point = vec3(0.0), light = vec3(0.0), ambient = vec3(0.0);
@@ -150,7 +150,7 @@ void add_sample(inout Sum sum, inout First first, Ray seen, float distance_of_de
     sum.covered += 1.0;
     if (index == 0) {
         const vec3 n = vec3(dot(s.normal, view_axis(0)), dot(s.normal, view_axis(1)), dot(s.normal, view_axis(2)));
-        first = First(t / distance_of_depth, packSnorm4x8(vec4(n, 0.0)), s.label);
+        first = First(t / far_at_depth_one, packSnorm4x8(vec4(n, 0.0)), s.label);
     }
 }
 
