@@ -7,11 +7,13 @@ const uint kPitch = 68; // floats of a row of 64; keeps vec4 alignment and sprea
 const uint kTileX = 0, kTileW = kStep * kPitch;
 shared float tile[2 * kStep * kPitch]; // [k][row] of x, [k][col] of w
 
-// Rows 8 (thread / 8) on. While sums are made, columns 4 (thread % 8) on and 32 + 4 (thread % 8) on: so eight threads read
-// 32 floats next to each other, one from each of 32 banks. store_tile() begins with columns 8 (thread % 8) on.
+// Eight rows from 8 (thread / 8) on. While sums are made, four columns from 4 (thread % 8) on and four 32 further: so
+// eight threads read 32 floats next to each other, one from each of 32 banks. store_tile() first changes that to eight
+// columns from 8 (thread % 8) on.
 float acc[8][8];
 
-// note: bitfieldExtract tells compilers what a quotient hides, that the product is a multiple of 8: reads are of four floats
+// note: bitfieldExtract tells compilers what a quotient hides, that the product is a multiple of 8: they read four floats
+// at once
 uint thread_row() { return bitfieldExtract(gl_LocalInvocationID.x, 3, 3) * 8; }
 uint thread_quad() { return bitfieldExtract(gl_LocalInvocationID.x, 0, 3) * 4; }
 

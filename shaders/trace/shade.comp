@@ -40,8 +40,8 @@ void plane_axes(vec3 n, out vec3 x, out vec3 y)
     y = cross(n, x);
 }
 
-// Rays of a sample: the pixel's own, one to the sun, some to all around, one mirrored. All go through one call of trace:
-// four would be four copies of its loop and stack, more registers than GPUs have.
+// Rays of a sample: the pixel's own, one to the sun, some to all around, one mirrored. All go through one call of
+// trace: four would be four copies of its loop, more registers than GPUs have.
 const uint kPixelRay = 0, kSunRay = 1, kFirstAmbientRay = 2;
 
 // to a point of the sun's disc; false where the surface turns away from it
@@ -101,7 +101,8 @@ struct First { // what the pixel's middle shows
 };
 
 // a sample: its light and what is around it are added to sum; the first tells what the pixel shows
-void add_sample(inout Sum sum, inout First first, Ray seen, float far_at_depth_one, float spread, uint index, float turn)
+void add_sample(inout Sum sum, inout First first, Ray seen, float far_at_depth_one, float spread, uint index,
+                float turn)
 {
     Surface s;
     vec3 point = vec3(0.0), light = vec3(0.0), ambient = vec3(0.0);
