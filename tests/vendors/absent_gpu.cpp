@@ -433,20 +433,20 @@ VKAPI_ATTR VkResult VKAPI_CALL create_pipelines(VkDevice device, VkPipelineCache
 
 // ---- instance and device: the rest of the chain's
 
-template <typename Info>
-VkLayerInstanceCreateInfo* instance_link(const Info* info)
+// where the loader says what comes next in the chain; null if it does not
+template <typename Link, typename Info>
+Link* link_of(const Info* info, VkStructureType type)
 {
-    auto* link = static_cast<const VkLayerInstanceCreateInfo*>(info->pNext);
-    while (link &&
-           !(link->sType == VK_STRUCTURE_TYPE_LOADER_INSTANCE_CREATE_INFO && link->function == VK_LAYER_LINK_INFO))
-        link = static_cast<const VkLayerInstanceCreateInfo*>(link->pNext);
-    return const_cast<VkLayerInstanceCreateInfo*>(link);
+    auto* link = static_cast<const Link*>(info->pNext);
+    while (link && !(link->sType == type && link->function == VK_LAYER_LINK_INFO))
+        link = static_cast<const Link*>(link->pNext);
+    return const_cast<Link*>(link);
 }
 
 VKAPI_ATTR VkResult VKAPI_CALL create_instance(const VkInstanceCreateInfo* info, const VkAllocationCallbacks* allocator,
                                                VkInstance* instance)
 {
-    VkLayerInstanceCreateInfo* link = instance_link(info);
+    auto* link = link_of<VkLayerInstanceCreateInfo>(info, VK_STRUCTURE_TYPE_LOADER_INSTANCE_CREATE_INFO);
     if (!link)
         return VK_ERROR_INITIALIZATION_FAILED;
     driver.instance_proc = link->u.pLayerInfo->pfnNextGetInstanceProcAddr;
@@ -457,19 +457,10 @@ VKAPI_ATTR VkResult VKAPI_CALL create_instance(const VkInstanceCreateInfo* info,
     return result;
 }
 
-VkLayerDeviceCreateInfo* device_link(const VkDeviceCreateInfo* info)
-{
-    auto* link = static_cast<const VkLayerDeviceCreateInfo*>(info->pNext);
-    while (link &&
-           !(link->sType == VK_STRUCTURE_TYPE_LOADER_DEVICE_CREATE_INFO && link->function == VK_LAYER_LINK_INFO))
-        link = static_cast<const VkLayerDeviceCreateInfo*>(link->pNext);
-    return const_cast<VkLayerDeviceCreateInfo*>(link);
-}
-
 VKAPI_ATTR VkResult VKAPI_CALL create_device(VkPhysicalDevice physical, const VkDeviceCreateInfo* info,
                                              const VkAllocationCallbacks* allocator, VkDevice* device)
 {
-    VkLayerDeviceCreateInfo* link = device_link(info);
+    auto* link = link_of<VkLayerDeviceCreateInfo>(info, VK_STRUCTURE_TYPE_LOADER_DEVICE_CREATE_INFO);
     if (!link)
         return VK_ERROR_INITIALIZATION_FAILED;
     driver.device_proc = link->u.pLayerInfo->pfnNextGetDeviceProcAddr;
