@@ -97,6 +97,9 @@ TEST(engine_conditions, a_config_names_each_part_once)
     EXPECT_TRUE(says(config(R"(["tint", "tint"])"), "condition"));
     EXPECT_TRUE(says(config(R"(["colour"])"), "condition"));
     EXPECT_TRUE(says(config(R"("tint")"), "condition"));
+    const Json unheard = {{"condition_voxels", true}};
+    EXPECT_TRUE(says(parse_transformer_config(unheard), "condition_voxels"));
+    EXPECT_TRUE((*parse_transformer_config({{"condition", {"tint"}}, {"condition_voxels", true}})).condition_voxels);
 }
 
 TEST(engine_conditions, a_config_says_how_points_of_the_training_data_lay)

@@ -67,10 +67,13 @@ Result<TransformerConfig> parse_transformer_config(const Json& json)
     fields.choice<bool>("qk_norm", {{"rms_norm", true}}, c.qk_norm);
     fields.choices<ConditionPart>("condition", {{"object", ConditionPart::object}, {"tint", ConditionPart::tint}},
                                   c.condition);
+    fields.flag("condition_voxels", c.condition_voxels);
     fields.choice<std::string>("placement", {{"shifted", "shifted"}, {"canonical", "canonical"}, {"mixed", "mixed"}},
                                c.placement);
     if (c.condition.size() > 1 && std::ranges::count(c.condition, c.condition[0]) > 1)
         fields.refuse("condition", "a list of different names");
+    if (c.condition_voxels && c.condition.empty())
+        fields.refuse("condition_voxels", "false without a condition");
     if (c.attention_head_dim % 8)
         fields.refuse("attention_head_dim", "multiples of 8");
     if (c.pos_embed_dim % 2)

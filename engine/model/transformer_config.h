@@ -34,6 +34,7 @@ struct TransformerConfig {
     bool context_pos_embed = true;
     bool qk_norm = false; // rms_norm
     std::vector<ConditionPart> condition;
+    bool condition_voxels = false;     // voxel tokens are told it too, not only semantic tokens
     std::string placement = "shifted"; // of the points that it was trained on: shifted, canonical, mixed
 
     // per-channel x, y, z, r, g, b: token = (value - mean) / std, after the scaling to [-1, 1]

@@ -31,6 +31,10 @@ TransformerWeights::TransformerWeights(const TransformerConfig& config, DType pr
         parts_.push_back({"condition_embed.linear_1.weight", d, width, false, 0, d, condition_in, 0, 0});
         parts_.push_back({"condition_embed.linear_2.weight", d, d, false, 0, d, condition_out, 0, 0});
     }
+    if (config.condition_voxels) {
+        condition_voxels = state_.slot(d, d, precision, "condition_embed.linear_voxels");
+        parts_.push_back({"condition_embed.linear_voxels.weight", d, d, false, 0, d, condition_voxels, 0, 0});
+    }
     norm_out = state_.slot(2 * d, d, precision, "norm_out");
     norm_out_bias = state_.slot(1, 2 * d, DType::f32, "norm_out.bias");
     place_swapped("norm_out.linear", norm_out, norm_out_bias, 0, 2 * d);

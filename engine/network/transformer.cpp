@@ -78,11 +78,14 @@ Tensor Transformer::positions(Graph& g, const TokenContext& context) const
     return gemm(g, waves, weights_.pos_embed.in(g), weights_.pos_embed_bias.in(g), {.dtype = precision_});
 }
 
-Tensor Transformer::tell(Graph& g, Tensor pos, Tensor condition) const
+ToldTokens Transformer::tell(Graph& g, Tensor pos, Tensor condition) const
 {
     const Tensor hidden = silu(g, gemm(g, condition, weights_.condition_in.in(g), {}, {.dtype = precision_}));
     const Tensor told = gemm(g, hidden, weights_.condition_out.in(g), {}, {.dtype = precision_});
-    return config_.context_pos_embed ? add(g, told, pos) : told;
+    ToldTokens tokens{.semantic = config_.context_pos_embed ? add(g, told, pos) : told, .voxels = {}};
+    if (config_.condition_voxels)
+        tokens.voxels = add(g, gemm(g, hidden, weights_.condition_voxels.in(g), {}, {.dtype = precision_}), pos);
+    return tokens;
 }
 
 void Transformer::modulations(Graph& g, Tensor timesteps, Tensor table) const
@@ -131,7 +134,7 @@ Tensor Transformer::forward(Graph& g, Tensor tokens, const TokenContext& context
     const uint32_t rows = tokens.rows;
     Tensor x = g.matrix(2 * rows, config_.dim(), precision_, "tokens");
     const Tensor embedded = gemm(g, tokens, weights_.proj_in.in(g), weights_.proj_in_bias.in(g), {.dtype = precision_});
-    add(g, embedded, context.pos, {x});
+    add(g, embedded, context.told_voxels.valid() ? context.told_voxels : context.pos, {x});
     const Tensor beside = context.told.valid() ? context.told : config_.context_pos_embed ? context.pos : Tensor{};
     embedding(g, context.labels, weights_.semantic_embed.in(g), beside, precision_, {x, rows});
     for (uint32_t i = 0; i < config_.num_layers; ++i)

@@ -15,8 +15,13 @@ struct TokenContext {
     Tensor labels, cells, sets, tiles, coords; // as in TokenSets
     Tensor pos;                                // [M, D]
     Tensor told;                               // [M, D]: what meets the labels' embeddings in place of pos, or none
+    Tensor told_voxels;                        // [M, D]: what meets the embedded tokens in place of pos, or none
     Tensor mask;                               // [M, words]
     uint32_t longest = 0;
+};
+
+struct ToldTokens {
+    Tensor semantic, voxels; // [M, D] each; voxels: none where the model tells semantic tokens alone
 };
 
 // The Σ-Voxfield transformer (docs/method.md §2): SD3's joint blocks over voxel and semantic tokens. Its functions add
@@ -37,12 +42,12 @@ class Transformer {
     // sinusoid frequencies that the graphs read; part of the device memory of the model
     uint64_t device_bytes(const DeviceLimits& limits) const;
 
-    // mask, pos and told of a context, from its other tensors; once per batch of sets
+    // mask, pos, told and told_voxels of a context, from its other tensors; once per batch of sets
     [[nodiscard]] Tensor neighbors(Graph& g, const TokenContext& context) const;
     [[nodiscard]] Tensor positions(Graph& g, const TokenContext& context) const;
-    [[nodiscard]] Tensor tell(Graph& g,
-                              Tensor pos,              // [M, D]
-                              Tensor condition) const; // [M, W] in the model's precision, rows of zeros tell nothing
+    [[nodiscard]] ToldTokens tell(Graph& g,
+                                  Tensor pos,              // [M, D]
+                                  Tensor condition) const; // [M, W] in the model's precision; zeros tell nothing
 
     // adaLN modulations of every block for a list of timesteps; once per schedule
     void modulations(Graph& g,

@@ -14,7 +14,7 @@ struct TokenSampler::Batch {
     uint32_t rows, tiles, longest; // rows: of one guidance half
     State state;
     Slot labels, cells, sets, tile_list, coords, pos, mask, known, fixed, x, x0, z, table_row; // z: noise that is given
-    Slot condition, told;                                   // none where the model is told nothing
+    Slot condition, told, told_voxels;                      // none where the model is told nothing
     std::unique_ptr<Program> prepare, step, unguided, undo; // unguided: of the first half, where steps differ
 
     Batch(const TokenSampler& s, const TokenSets& packed)
@@ -37,6 +37,8 @@ struct TokenSampler::Batch {
             condition = state.slot(m, width, t.precision(), "condition");
             told = state.slot(m, t.config().dim(), t.precision(), "told");
         }
+        if (t.config().condition_voxels)
+            told_voxels = state.slot(m, t.config().dim(), t.precision(), "told_voxels");
         if (s.options_.noise)
             z = state.slot(rows, channels, DType::f32, "z");
         table_row = state.slot(2 * m, 1, DType::u32, "table_row", 1);
@@ -54,6 +56,8 @@ struct TokenSampler::Batch {
         c.pos = pos.row_range(0, m).in(g);
         if (told.valid())
             c.told = told.row_range(0, m).in(g);
+        if (told_voxels.valid())
+            c.told_voxels = told_voxels.row_range(0, m).in(g);
         c.mask = mask.row_range(0, m).in(g);
         c.longest = longest;
         return c;
@@ -66,8 +70,12 @@ struct TokenSampler::Batch {
         g.keep(t.neighbors(g, c), mask);
         const Tensor positions = t.positions(g, c);
         g.keep(positions, pos);
-        if (told.valid())
-            g.keep(t.tell(g, positions, condition.in(g)), told);
+        if (!told.valid())
+            return g;
+        const ToldTokens tokens = t.tell(g, positions, condition.in(g));
+        g.keep(tokens.semantic, told);
+        if (tokens.voxels.valid())
+            g.keep(tokens.voxels, told_voxels);
         return g;
     }
     Tensor noise(Graph& g, const TokenSampler& s, const StepTable& steps) const

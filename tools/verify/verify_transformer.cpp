@@ -67,10 +67,12 @@ Result<std::vector<float>> evaluate(Device& device, const Transformer& t, const 
                tokens = state.slot(m, c, t.precision(), "tokens"),
                modulations = state.slot(times, t.modulation_width(), DType::f32, "modulations"),
                out = state.slot(m, c, DType::f32, "out");
-    Slot condition, told;
+    Slot condition, told, told_voxels;
     if (!in.condition.empty()) {
         condition = state.slot(m, t.config().condition_width(), t.precision(), "condition");
         told = state.slot(m, d, t.precision(), "told");
+        if (t.config().condition_voxels)
+            told_voxels = state.slot(m, d, t.precision(), "told_voxels");
     }
     SR_CHECK(state.allocate(device, "golden case"));
     SR_CHECK(labels.write(device, in.sets.labels));
@@ -86,12 +88,16 @@ Result<std::vector<float>> evaluate(Device& device, const Transformer& t, const 
         SR_CHECK(condition.write_rows(device, in.condition));
 
     Graph g;
-    TokenContext context{labels.in(g), cells.in(g), sets.in(g), tiles.in(g),    coords.in(g),
-                         pos.in(g),    told.in(g),  mask.in(g), in.sets.longest};
+    TokenContext context{labels.in(g), cells.in(g), sets.in(g),        tiles.in(g), coords.in(g),
+                         pos.in(g),    told.in(g),  told_voxels.in(g), mask.in(g),  in.sets.longest};
     const Tensor positions = t.positions(g, context);
     g.keep(positions, pos);
-    if (told.valid())
-        g.keep(t.tell(g, positions, condition.in(g)), told);
+    if (told.valid()) {
+        const ToldTokens heard = t.tell(g, positions, condition.in(g));
+        g.keep(heard.semantic, told);
+        if (told_voxels.valid())
+            g.keep(heard.voxels, told_voxels);
+    }
     t.modulations(g, timesteps.in(g), modulations.in(g));
     g.keep(t.forward(g, tokens.in(g), context, modulations.in(g), rows.in(g)), out);
     SR_TRY(const auto program, Program::create(device, g));

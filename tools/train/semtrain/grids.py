@@ -11,6 +11,7 @@ from .condition import drawn_boxes, drawn_tints, mirrored, told_boxes, told_tint
 from .json_file import read_json, write_json
 from .known_cells import draw_known
 from .objects import local_tints, owners_of, read_objects
+from .repaint import repaint
 
 
 def find_grids(sources):
@@ -139,11 +140,12 @@ class LocalSets:
         labels[dropped] = c["network"]["num_classes"]
         known = np.stack([draw_known(random, set_centers, c["known_share"]) for set_centers in centers])
         conditions = np.stack([self._condition(np.random.default_rng([c["seed"], step, i]), *of_set)
-                               for i, of_set in enumerate(zip(centers, cells, boxes, dropped))])
+                               for i, of_set in enumerate(zip(centers, cells, boxes, tokens, dropped))])
         return centers, labels, tokens, known, conditions
 
-    def _condition(self, random, centers, cells, boxes, dropped):
-        """what a set is told beside its labels; where these are dropped, nothing"""
+    def _condition(self, random, centers, cells, boxes, tokens, dropped):
+        """what a set is told beside its labels; where these are dropped, nothing. Where all colours are told, some
+        things have others than in the grid: changes `tokens`"""
         owners, parts = self.grids.owners[cells], self.config["network"].get("condition", ())
         if dropped or not parts:
             return np.zeros((len(cells), width_of(parts)), np.float32)
@@ -151,7 +153,13 @@ class LocalSets:
         has_box, has_tint = told_boxes(random, owners, config), told_tints(random, owners, config)
         local = self.grids.local_tints[cells] / 255
         whole = self.grids.tints[owners] if len(self.grids.tints) else local
-        tints = drawn_tints(random, owners, local, np.where(np.isnan(whole), local, whole), config)
+        whole = np.where(np.isnan(whole), local, whole)
+        if has_tint[owners >= 0].all():
+            colors = tokens.reshape(len(tokens), -1, 6)[..., 3:]
+            made, whole, local = repaint(random, config["repaint"], owners, self.grids.labels[cells], whole,
+                                         (colors + 1) / 2, whole, local)
+            colors[...] = 2 * made - 1
+        tints = drawn_tints(random, owners, local, whole, config)
         return vector_of(parts, centers, drawn_boxes(random, owners, boxes, config), has_box, tints, has_tint)
 
     def _set(self, random, size):

@@ -17,7 +17,7 @@ from .transformer import linear_alphas, mean_error, noised
 
 LEVELS = (200, 600, 999)
 CONFIG = {"seed": 1, "batch": 8, "label_dropout": 0, "class_balance": 0.35, "mirror": False, "ordered_points": True,
-          "known_share": 0, "telling": {"dropout": 0, "partial": 0, "local": 0, "noise": 0, "jitter": 0},
+          "known_share": 0, "telling": {"dropout": 0, "partial": 0, "local": 0, "noise": 0, "jitter": 0, "repaint": 0},
           "num_train_timesteps": 1000, "beta_start": 1e-4, "beta_end": 0.02}
 
 

@@ -43,11 +43,14 @@ def with_known(noisy, x0, known, alphas, top, random):
     return torch.where(known[..., None], noised(x0, alphas, t, random), noisy)
 
 
-def mean_error(made, x0, target):
-    """squared error [B, N, 6n] of the cells that are targets [B, N] -> of places and of colours, [B] each"""
-    error = (made - x0).square().unflatten(2, (-1, 6))
-    of_sets = (error.mean(2) * target[..., None]).sum(1) / target.sum(1, keepdim=True)
-    return of_sets[:, :3].mean(1), of_sets[:, 3:].mean(1)
+def mean_error(made, x0, target, of_hue=1):
+    """squared error of tokens [B, N, 6n] of the cells that are targets [B, N] -> of places and of colours, [B] each; that
+    of what is left of a colour without its grey counts `of_hue` times"""
+    off = (made - x0).unflatten(2, (-1, 6))
+    grey = off[..., 3:].mean(-1, keepdim=True)
+    errors = off[..., :3].square().mean((2, 3)), \
+        (off[..., 3:].square() + (of_hue - 1) * (off[..., 3:] - grey).square()).mean((2, 3))
+    return tuple((error * target).sum(1) / target.sum(1) for error in errors)
 
 
 def loss_of(sets, config):
@@ -61,14 +64,15 @@ def loss_of(sets, config):
         noisy = with_known(noised(x0, alphas, t, random), x0, known, alphas, config["known_levels"], random)
         valid = torch.ones(labels.shape, dtype=torch.bool, device=device)
         told = (condition,) if condition.shape[-1] else ()
-        places, colors = mean_error(model(noisy, labels, centers, valid, t, *told).float(), x0, ~known)
+        places, colors = mean_error(model(noisy, labels, centers, valid, t, *told).float(), x0, ~known,
+                                    config["hue_weight"])
         loss = ((places + of_colors * colors) / (1 + of_colors) * weights[t]).mean()
         return loss, {"places": float(places.mean()), "colors": float(colors.mean())}
     return loss
 
 
 def with_new_parts(state, model):
-    """weights of a model that is told nothing beside labels, and those that `model` begins with where it is told more"""
+    """weights of a model that is told less than `model`, and those that `model` begins with for the rest"""
     return {**{name: t for name, t in model.state_dict().items() if name.startswith("condition_embed.")}, **state}
 
 

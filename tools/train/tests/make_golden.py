@@ -1,7 +1,8 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""make_golden.py: writes the golden case transformer_objects, a transformer that is told of objects, as the module of
-the recipe computes it. The inputs but the condition are those of transformer_tiny; the weights are random."""
+"""make_golden.py: writes the golden cases transformer_objects and transformer_voxels, transformers that are told of
+objects, as the module of the recipe computes them: semantic tokens alone, and voxel tokens too. The inputs but the
+condition are those of transformer_tiny; the weights are random."""
 import json
 import os
 
@@ -15,7 +16,7 @@ from semtrain.model_folder import write_component
 from semtrain.nets.transformer import VoxfieldTransformer
 from semtrain.objects import owners_of
 
-NAME = "transformer_objects"
+NAMES = {"transformer_objects": False, "transformer_voxels": True}
 NETWORK = {"num_layers": 2, "num_attention_heads": 2, "attention_head_dim": 32, "points_per_voxel": 20,
            "num_classes": 20, "voxel_size": 0.6, "attention_radius": 3.0, "pos_embed_dim": 16,
            "context_pos_embed": True, "condition": ["object", "tint"]}
@@ -43,17 +44,18 @@ def condition_of(centers, labels):
     return torch.from_numpy(np.stack(rows))
 
 
-def main():
+def make(name, voxels):
+    network = {**NETWORK, "attention_head_dim": 16, "condition_voxels": True} if voxels else NETWORK
     _, given = golden.read_case("transformer_tiny")
     inputs = {name: t for name, t in given.items() if name.startswith("input.")}
-    model = VoxfieldTransformer(**NETWORK).eval()
+    model = VoxfieldTransformer(**network).eval()
     random_weights(model)
     labels = inputs["input.labels"].long()
     inputs["input.condition"] = condition_of(inputs["input.centers"], labels)
     with torch.no_grad():
         made = model(inputs["input.tokens"], labels, inputs["input.centers"], inputs["input.valid"].bool(),
                      inputs["input.timestep"], inputs["input.condition"])
-    folder = os.path.join(golden.FOLDER, NAME)
+    folder = os.path.join(golden.FOLDER, name)
     os.makedirs(folder, exist_ok=True)
     with open(os.path.join(folder, "case.json"), "w") as file:
         json.dump({"kind": "voxfield_transformer", "note": "by tools/train/tests/make_golden.py: rows with valid 0 are "
@@ -61,8 +63,13 @@ def main():
                    "tolerance": TOLERANCE}, file, indent=1)
         file.write("\n")
     safetensors_file.write(os.path.join(folder, "tensors.safetensors"), {**inputs, "expect.sample": made})
-    write_component(os.path.join(folder, "model"), {"_class_name": "VoxfieldTransformer", **NETWORK,
+    write_component(os.path.join(folder, "model"), {"_class_name": "VoxfieldTransformer", **network,
                                                     "prediction_type": "sample"}, model.state_dict())
+
+
+def main():
+    for name, voxels in NAMES.items():
+        make(name, voxels)
 
 
 if __name__ == "__main__":

@@ -20,12 +20,13 @@ from semtrain.model_folder import write_component
 from semtrain.nets.transformer import VoxfieldTransformer
 from semtrain.objects import local_tints, owners_of, paint_near, read_objects
 from semtrain.regenerate import Objects as StreetObjects, load_transformer
+from semtrain.repaint import repainted
 
 NETWORK = {"num_layers": 2, "num_attention_heads": 2, "attention_head_dim": 16, "points_per_voxel": 4,
            "num_classes": 20, "voxel_size": 0.6, "attention_radius": 3.0, "pos_embed_dim": 8,
            "context_pos_embed": True}
 BOTH = {**NETWORK, "condition": ["object", "tint"]}
-TELL_ALL = {"dropout": 0, "partial": 0, "local": 0, "noise": 0, "jitter": 0}
+TELL_ALL = {"dropout": 0, "partial": 0, "local": 0, "noise": 0, "jitter": 0, "repaint": 0}
 CAR = [2.4, 0.0, 0.6, 4.2, 1.8, 1.2, 0.0]  # centre, size, heading
 
 
@@ -141,7 +142,8 @@ class Objects(unittest.TestCase):
         grids = Grids([path], os.path.join(self.folder.name, "cache"))
         sets = LocalSets(grids, config_of())
         boxes = grids.boxes[grids.owners]
-        np.testing.assert_array_equal(told, sets._condition(np.random.default_rng(1), centers, chosen, boxes, False))
+        again = sets._condition(np.random.default_rng(1), centers, chosen, boxes, np.array(grids.tokens), False)
+        np.testing.assert_array_equal(told, again)
         self.assertGreater(told[t["labels"] == 13, -3:].max(), 0.6)
         self.assertEqual(objects.tell(()).shape, (len(t["cells"]), 0))
 
@@ -211,6 +213,44 @@ class Objects(unittest.TestCase):
             self.assertEqual(sorted(state), sorted(model.state_dict()))
             model.condition_embed.linear_2.weight.data.zero_()
             self.assertTrue(torch.equal(model(*given, condition), expected))
+
+    def test_reach_voxel_tokens_where_the_config_says_so_and_begin_there_with_nothing(self):
+        torch.manual_seed(1)
+        model, semantic = VoxfieldTransformer(**BOTH, condition_voxels=True), VoxfieldTransformer(**BOTH)
+        state = transformer.with_new_parts(semantic.state_dict(), model)
+        self.assertEqual(sorted(state), sorted(model.state_dict()))
+        model.load_state_dict(state)
+        given = (torch.randn(1, 5, 24), torch.tensor([[13, 13, 0, 0, 2]]), torch.randn(1, 5, 3),
+                 torch.ones(1, 5, dtype=torch.bool), torch.tensor([300]))
+        condition = torch.randn(1, 5, width_of(BOTH["condition"]))
+        with torch.no_grad():
+            model.condition_embed.start_at_zero()
+            silent = model(*given, condition)
+            model.condition_embed.linear_voxels.weight.data.normal_()
+            self.assertFalse(torch.equal(model(*given, condition), silent))
+            self.assertTrue(torch.equal(model(*given, torch.zeros_like(condition)), silent))
+
+    def test_are_told_with_the_colours_of_what_was_repainted(self):
+        plain = self.sets(batch=16).batch(2)
+        painted = self.sets(batch=16, telling={**TELL_ALL, "repaint": 0.5}).batch(2)
+        is_car = plain[1] == 13
+        before, after = (((b[2].reshape(16, 40, 4, 6)[..., 3:].mean(2) + 1) / 2)[is_car] for b in (plain, painted))
+        told = ((painted[4][..., 61:] + 1) / 2)[is_car]
+        changed = np.abs(after - before).max(1) > 0.02
+        self.assertTrue(0.2 < changed.mean() < 0.7, changed.mean())
+        self.assertLess(np.abs(told - after).max(), 0.01)
+        self.assertTrue((painted[2][~is_car] == plain[2][~is_car]).all())
+        self.assertTrue((painted[2].reshape(16, 40, 4, 6)[..., :3] == plain[2].reshape(16, 40, 4, 6)[..., :3]).all())
+        some = self.sets(telling={**TELL_ALL, "partial": 1, "repaint": 1}).batch(2)[2]
+        self.assertTrue((some == self.sets(telling={**TELL_ALL, "partial": 1}).batch(2)[2]).all())
+
+    def test_keep_dark_parts_when_repainted(self):
+        paint, red = np.array([0.6, 0.6, 0.6]), np.array([0.6, 0.2, 0.2])
+        colors = np.array([[0.6, 0.6, 0.6], [0.7, 0.7, 0.7], [0.2, 0.22, 0.25], [0.9, 0.9, 0.9]])
+        made = repainted(colors, paint, red)
+        self.assertTrue(np.allclose(made[:2], [[0.6, 0.2, 0.2], [0.7, 0.7 / 3, 0.7 / 3]]))
+        self.assertTrue((made[2] == colors[2]).all())
+        self.assertTrue(np.allclose(made[3], [0.9, 0.3, 0.3]))
 
     def test_teach_a_model_which_car_is_bright(self):
         config = {**BOTH, "condition": ["tint"]}

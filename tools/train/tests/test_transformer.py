@@ -18,7 +18,7 @@ from semtrain.grids import Grids, LocalSets, read_tokens
 from semtrain.known_cells import draw_known
 from semtrain.nets.transformer import CONFIG_FIELDS, VoxfieldTransformer
 from semtrain.program import semrover_path
-from semtrain.transformer import loss_of
+from semtrain.transformer import loss_of, mean_error
 
 TINY = ["--set", 'network={"num_layers": 2, "num_attention_heads": 2, "attention_head_dim": 16, "points_per_voxel": 4,'
         ' "num_classes": 20, "voxel_size": 0.6, "attention_radius": 3.0, "pos_embed_dim": 8, "context_pos_embed": true}',
@@ -51,7 +51,7 @@ def train(grids, output, steps, *more):
 
 class TheModule(unittest.TestCase):
     def test_gives_what_the_golden_cases_expect(self):
-        for name in ("transformer_tiny", "transformer_wide", "transformer_objects"):
+        for name in ("transformer_tiny", "transformer_wide", "transformer_objects", "transformer_voxels"):
             case, t = golden.read_case(name)
             model = golden.load_network(from_config, name)
             valid = t["input.valid"].bool()
@@ -60,6 +60,19 @@ class TheModule(unittest.TestCase):
                             t.get("input.condition"))
             apart = golden.apart(got[valid], t["expect.sample"][valid])
             self.assertLess(apart, case["tolerance"]["fp32"], name)
+
+
+class Errors(unittest.TestCase):
+    def test_of_a_hue_count_more_than_those_of_a_grey(self):
+        true, target = torch.zeros(1, 2, 6), torch.tensor([[True, False]])
+        grey, red = true.clone(), true.clone()
+        grey[0, :, 3:] = 0.3
+        red[0, :, 3:] = torch.tensor([0.6, -0.3, -0.3])
+        for made, plain, weighted in ((grey, 0.09, 0.09), (red, 0.18, 4 * 0.18)):
+            for of_hue, expected in ((1, plain), (4, weighted)):
+                places, colors = mean_error(made, true, target, of_hue)
+                self.assertAlmostEqual(float(colors), expected, 6)
+                self.assertEqual(float(places), 0)
 
 
 class TheRecipe(unittest.TestCase):

@@ -11,7 +11,8 @@ from ..condition import WIDTHS, width_of
 from .attention import attend
 
 CONFIG_FIELDS = ("num_layers", "num_attention_heads", "attention_head_dim", "points_per_voxel", "num_classes",
-                 "voxel_size", "attention_radius", "pos_embed_dim", "context_pos_embed", "condition")
+                 "voxel_size", "attention_radius", "pos_embed_dim", "context_pos_embed", "condition",
+                 "condition_voxels")
 
 
 def sinusoids(x, width, max_period=10000.0):
@@ -120,25 +121,34 @@ class TimeEmbedding(nn.Module):
 
 
 class ConditionEmbedding(nn.Module):
-    """without bias: a cell of which nothing is told gets exactly nothing"""
+    """What is told of cells, for semantic tokens and, if `voxels`, for voxel tokens. Without bias: a cell of which nothing
+    is told gets exactly nothing."""
 
-    def __init__(self, parts, width):
+    def __init__(self, parts, width, voxels):
         super().__init__()
         self.linear_1 = nn.Linear(width_of(parts), width, bias=False)
         self.linear_2 = nn.Linear(width, width, bias=False)
+        self.linear_voxels = nn.Linear(width, width, bias=False) if voxels else None
         at = 0
         for part in parts:  # each is heard alike, whether it has four numbers or sixty
             nn.init.normal_(self.linear_1.weight.data[:, at:at + WIDTHS[part]], std=(2 / WIDTHS[part]) ** 0.5)
             at += WIDTHS[part]
 
+    def start_at_zero(self):
+        for linear in (self.linear_2, self.linear_voxels):
+            if linear:
+                nn.init.zeros_(linear.weight)
+
     def forward(self, x):
-        return self.linear_2(F.silu(self.linear_1(x)))
+        """[B, N, W] -> what semantic tokens and what voxel tokens get, [B, N, D] each"""
+        hidden = F.silu(self.linear_1(x))
+        return self.linear_2(hidden), self.linear_voxels(hidden) if self.linear_voxels else 0
 
 
 class VoxfieldTransformer(nn.Module):
     def __init__(self, num_layers=12, num_attention_heads=8, attention_head_dim=128, points_per_voxel=20,
                  num_classes=20, voxel_size=0.6, attention_radius=3.0, pos_embed_dim=128, context_pos_embed=True,
-                 condition=()):
+                 condition=(), condition_voxels=False):
         super().__init__()
         values = locals()
         self.config = {name: values[name] for name in CONFIG_FIELDS}
@@ -146,7 +156,7 @@ class VoxfieldTransformer(nn.Module):
         self.proj_in = nn.Linear(c, d)
         self.pos_embed = nn.Linear(3 * pos_embed_dim, d)
         self.semantic_embed = nn.Embedding(num_classes + 1, d)  # the last row is the null label
-        self.condition_embed = ConditionEmbedding(condition, d) if condition else None
+        self.condition_embed = ConditionEmbedding(condition, d, condition_voxels) if condition else None
         self.time_embed = TimeEmbedding(d)
         self.transformer_blocks = nn.ModuleList(
             JointBlock(d, num_attention_heads, last=i == num_layers - 1) for i in range(num_layers))
@@ -162,7 +172,7 @@ class VoxfieldTransformer(nn.Module):
         nn.init.zeros_(self.proj_out.weight)
         nn.init.zeros_(self.proj_out.bias)
         if self.condition_embed:
-            nn.init.zeros_(self.condition_embed.linear_2.weight)
+            self.condition_embed.start_at_zero()
 
     def attention_mask(self, centers, valid):
         """[B, 1, 2N, 2N]: 0 where a token may look, else -1e9; padded rows see themselves"""
@@ -181,7 +191,8 @@ class VoxfieldTransformer(nn.Module):
         x = self.proj_in(tokens) + position
         c = self.semantic_embed(labels)
         if condition is not None and self.condition_embed:
-            c = c + self.condition_embed(condition)
+            of_labels, of_voxels = self.condition_embed(condition)
+            c, x = c + of_labels, x + of_voxels
         if self.config["context_pos_embed"]:
             c = c + position
         temb = self.time_embed(timestep)
