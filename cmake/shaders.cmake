@@ -1,7 +1,8 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
 
-# <folder>/<op>[.<variant>].comp -> SPIR-V -> <build>/generated/<op>.spv.h, one header per op with all its variants
+# <folder>/<op>[.<variant>].comp -> SPIR-V -> <build>/generated/<op>.spv.h, one header per op with all its variants. Debian
+# 12's compiler does not know cooperative matrices: SPIR-V of .coopmat variants lies in shaders/spirv (tools/spirv)
 find_program(GLSLANG glslangValidator REQUIRED)
 add_executable(reflect cmake/reflect/main.cpp cmake/reflect/module.cpp cmake/reflect/protocol.cpp)
 target_include_directories(reflect PRIVATE ${CMAKE_SOURCE_DIR})
@@ -24,12 +25,16 @@ function(add_shader_headers target)
         get_filename_component(file ${shader} NAME)
         string(REGEX REPLACE "\\.comp$" "" module ${file})
         string(REGEX REPLACE "\\..*$" "" op ${module})
+        list(APPEND ops ${op})
+        if(module MATCHES "\\.coopmat$")
+            list(APPEND modules_${op} ${CMAKE_SOURCE_DIR}/shaders/spirv/${module}.spv)
+            continue()
+        endif()
         set(spirv ${generated}/${module}.spv)
         add_custom_command(OUTPUT ${spirv}
             COMMAND ${GLSLANG} -V --quiet --target-env vulkan1.2 -I${CMAKE_SOURCE_DIR}/shaders -I${CMAKE_SOURCE_DIR}
                     -o ${spirv} ${shader}
             DEPENDS ${shader} ${libraries} COMMENT "SPIR-V ${module}" VERBATIM)
-        list(APPEND ops ${op})
         list(APPEND modules_${op} ${spirv})
     endforeach()
     list(REMOVE_DUPLICATES ops)

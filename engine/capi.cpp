@@ -123,7 +123,7 @@ Result<std::unique_ptr<sr_context>> make_context(const sr_context_desc& desc)
     } else {
         SR_TRY(context->device, Device::create(options));
     }
-    context->summary = summarize(context->device->physical(), context->device->index());
+    context->summary = summarize(context->device->instance(), context->device->physical(), context->device->index());
     return context;
 }
 

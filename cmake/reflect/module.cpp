@@ -27,12 +27,20 @@ enum Op : uint16_t {
     kOpSpecConstantTrue = 48,
     kOpSpecConstantFalse = 49,
     kOpSpecConstant = 50,
+    kOpSpecConstantComposite = 51,
     kOpSpecConstantOp = 52,
     kOpVariable = 59,
     kOpDecorate = 71,
     kOpMemberDecorate = 72,
 };
-enum Decoration : uint32_t { kSpecId = 1, kNonWritable = 24, kNonReadable = 25, kBinding = 33, kOffset = 35 };
+enum Decoration : uint32_t {
+    kSpecId = 1,
+    kBuiltIn = 11,
+    kNonWritable = 24,
+    kNonReadable = 25,
+    kBinding = 33,
+    kOffset = 35
+};
 enum Storage : uint32_t { kUniformConstant = 0, kWorkgroup = 4, kPushConstant = 9, kStorageBuffer = 12 };
 
 struct Id {
@@ -41,7 +49,7 @@ struct Id {
     std::vector<uint32_t> operands; // of the defining instruction, result ids left out
     std::vector<std::string> member_names;
     std::map<uint32_t, uint32_t> member_offsets;
-    bool binding_set = false, spec_set = false, non_writable = false, non_readable = false;
+    bool binding_set = false, spec_set = false, non_writable = false, non_readable = false, is_workgroup_size = false;
     uint32_t binding = 0, spec_id = 0;
 };
 
@@ -67,6 +75,7 @@ class Reader {
             instruction(uint16_t(code[at] & 0xffff), &code[at + 1], (code[at] >> 16) - 1);
         }
         constants();
+        workgroup_size();
         for (uint32_t v : variables_)
             variable(ids_[v]);
         std::sort(module_.bindings.begin(), module_.bindings.end(),
@@ -118,6 +127,7 @@ class Reader {
         case kOpSpecConstantTrue:
         case kOpSpecConstantFalse:
         case kOpSpecConstantOp:
+        case kOpSpecConstantComposite:
             define(op, w[1], w + 2, n - 2);
             break;
         case kOpVariable:
@@ -158,6 +168,8 @@ class Reader {
         } else if (decoration == kSpecId) {
             id.spec_set = true;
             id.spec_id = value;
+        } else if (decoration == kBuiltIn) {
+            id.is_workgroup_size = value == 25; // WorkgroupSize
         } else if (decoration == kNonWritable) {
             id.non_writable = true;
         } else if (decoration == kNonReadable) {
@@ -252,10 +264,25 @@ class Reader {
         return length(c.operands.at(1)) + found->second + length(c.operands.at(2));
     }
 
+    // of local_size_x_id: what the constants of these ids are without a specialization
+    void workgroup_size()
+    {
+        const auto found = std::ranges::find_if(ids_, &Id::is_workgroup_size);
+        if (found == ids_.end() || found->op != kOpSpecConstantComposite)
+            return;
+        for (size_t i = 0; i < 3; ++i) {
+            const Id& size = ids_[found->operands.at(i)];
+            module_.local_size[i] = size.operands.at(0);
+            for (const Constant& c : module_.constants)
+                if (size.spec_set && c.id == size.spec_id)
+                    module_.local_size[i] = c.value;
+        }
+    }
+
     void constants()
     {
         for (const Id& id : ids_) {
-            if (!id.spec_set || id.op == 0)
+            if (!id.spec_set || id.op == 0 || id.name.empty()) // local_size_x_id declares one without a name
                 continue;
             const uint32_t value = id.op == kOpSpecConstant ? id.operands[0] : id.op == kOpSpecConstantTrue;
             module_.constants.push_back({id.name, id.spec_id, value});

@@ -4,6 +4,7 @@
 
 #include "runtime/base/diagnostics.h"
 #include "runtime/device/command.h"
+#include "runtime/device/cooperative_matrix.h"
 #include "runtime/device/physical_device.h"
 #include "runtime/device/pipeline.h"
 #include "runtime/device/profile.h"
@@ -68,7 +69,7 @@ Result<std::unique_ptr<Device>> Device::create(const DeviceOptions& options)
     SR_TRY(const auto physical, physical_devices(d->instance_));
     std::vector<DeviceSummary> summaries;
     for (size_t i = 0; i < physical.size(); ++i)
-        summaries.push_back(summarize(physical[i], uint32_t(i)));
+        summaries.push_back(summarize(d->instance_, physical[i], uint32_t(i)));
     SR_TRY(d->index_, select_device(summaries, options.select));
     d->physical_ = physical[d->index_];
     SR_CHECK(d->create_device(options));
@@ -97,7 +98,9 @@ Result<std::unique_ptr<Device>> Device::adopt(const HostDevice& host, const Devi
     d->lock_ = host.lock;
     d->unlock_ = host.unlock;
     SR_CHECK(d->finish(options));
-    if (!host.float16) // what the hardware could do is not what the host asked for
+    // what the hardware could do is not what the host asked for
+    d->limits_.needs_supported &= ~uint32_t(kNeedsCooperativeMatrix);
+    if (!host.float16)
         d->limits_.needs_supported &= ~uint32_t(kNeedsFloat16);
     return d;
 }
@@ -136,12 +139,21 @@ Status Device::create_device(const DeviceOptions&)
     auto features = vk_struct<VkPhysicalDeviceFeatures2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2, &f12);
     // gathers use indices that came from files: out of bounds must not leave the buffer
     features.features.robustBufferAccess = available.features.robustBufferAccess;
+    std::vector<const char*> extensions;
+    if (has_extension(physical_, "VK_KHR_portability_subset")) // must be enabled where there is one: MoltenVK's
+        extensions.push_back("VK_KHR_portability_subset");
+    MatrixFeatures matrix;
+    if (matrix_shape(instance_, physical_).m) {
+        f12.vulkanMemoryModel = VK_TRUE;
+        f12.pNext = matrix.chain();
+        extensions.insert(extensions.end(),
+                          {VK_KHR_COOPERATIVE_MATRIX_EXTENSION_NAME, VK_EXT_SUBGROUP_SIZE_CONTROL_EXTENSION_NAME});
+    }
     auto info = vk_struct<VkDeviceCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO, &features);
     info.queueCreateInfoCount = 1;
     info.pQueueCreateInfos = &queue;
-    const char* subset = "VK_KHR_portability_subset"; // must be enabled where there is one: MoltenVK's
-    info.enabledExtensionCount = has_extension(physical_, subset);
-    info.ppEnabledExtensionNames = &subset;
+    info.enabledExtensionCount = uint32_t(extensions.size());
+    info.ppEnabledExtensionNames = extensions.data();
     SR_VK(vkCreateDevice(physical_, &info, nullptr, &device_));
     vkGetDeviceQueue(device_, queue_family_, 0, &queue_);
     return {};
@@ -149,7 +161,7 @@ Status Device::create_device(const DeviceOptions&)
 
 Status Device::finish(const DeviceOptions& options)
 {
-    const DeviceSummary summary = summarize(physical_, 0);
+    const DeviceSummary summary = summarize(instance_, physical_, 0);
     if (!summary.refusal.empty())
         return fail(ErrorCode::no_device, "device '{}' cannot be used: {}", summary.name, summary.refusal);
     name_ = summary.name;

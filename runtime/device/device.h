@@ -64,6 +64,7 @@ class Device {
     const std::string& driver() const { return driver_; }
     uint32_t index() const { return index_; } // in list_devices(); 0 for a host's
     VkDevice handle() const { return device_; }
+    VkInstance instance() const { return instance_; }
     VkPhysicalDevice physical() const { return physical_; }
     uint32_t queue_family() const { return queue_family_; }
     double timestamp_ns() const { return timestamp_ns_; }

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/device/physical_device.h"
 
+#include "runtime/device/cooperative_matrix.h"
 #include "runtime/graph/kernel.h"
 
 #include <algorithm>
@@ -98,15 +99,24 @@ std::string refusal(VkPhysicalDevice physical, const VkPhysicalDeviceProperties&
     return compute_queue_family(physical) ? "" : "has no compute queue";
 }
 
-bool has_instance_extension(const char* name)
+// enumerate(&count, extensions): as Vulkan's two functions do, of an instance or of a device
+template <typename Enumerate>
+bool lists(const char* name, Enumerate enumerate)
 {
     uint32_t count = 0;
-    if (vkEnumerateInstanceExtensionProperties(nullptr, &count, nullptr) != VK_SUCCESS)
+    if (enumerate(&count, nullptr) != VK_SUCCESS)
         return false;
     std::vector<VkExtensionProperties> all(count);
-    if (vkEnumerateInstanceExtensionProperties(nullptr, &count, all.data()) != VK_SUCCESS)
+    if (enumerate(&count, all.data()) != VK_SUCCESS)
         return false;
     return std::ranges::any_of(all, [&](const auto& e) { return !std::strcmp(e.extensionName, name); });
+}
+
+bool has_instance_extension(const char* name)
+{
+    return lists(name, [](uint32_t* count, VkExtensionProperties* all) {
+        return vkEnumerateInstanceExtensionProperties(nullptr, count, all);
+    });
 }
 
 } // namespace
@@ -168,13 +178,9 @@ Result<std::vector<VkPhysicalDevice>> physical_devices(VkInstance instance)
 
 bool has_extension(VkPhysicalDevice physical, const char* name)
 {
-    uint32_t count = 0;
-    if (vkEnumerateDeviceExtensionProperties(physical, nullptr, &count, nullptr) != VK_SUCCESS)
-        return false;
-    std::vector<VkExtensionProperties> all(count);
-    if (vkEnumerateDeviceExtensionProperties(physical, nullptr, &count, all.data()) != VK_SUCCESS)
-        return false;
-    return std::any_of(all.begin(), all.end(), [&](const auto& e) { return !std::strcmp(e.extensionName, name); });
+    return lists(name, [&](uint32_t* count, VkExtensionProperties* all) {
+        return vkEnumerateDeviceExtensionProperties(physical, nullptr, count, all);
+    });
 }
 
 namespace {
@@ -211,7 +217,7 @@ Result<uint32_t> compute_queue_family(VkPhysicalDevice physical)
     return fail(ErrorCode::no_device, "the device has no compute queue");
 }
 
-DeviceSummary summarize(VkPhysicalDevice physical, uint32_t index)
+DeviceSummary summarize(VkInstance instance, VkPhysicalDevice physical, uint32_t index)
 {
     auto p12 = vk_struct<VkPhysicalDeviceVulkan12Properties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_PROPERTIES);
     auto p11 =
@@ -227,6 +233,9 @@ DeviceSummary summarize(VkPhysicalDevice physical, uint32_t index)
     s.api = api_version_text(p.properties.apiVersion);
     s.refusal = refusal(physical, p.properties);
     s.limits = limits_of(physical, p.properties, p11);
+    s.limits.matrix = matrix_shape(instance, physical);
+    if (s.limits.matrix.m)
+        s.limits.needs_supported |= kNeedsCooperativeMatrix;
     VkPhysicalDeviceMemoryProperties memory;
     vkGetPhysicalDeviceMemoryProperties(physical, &memory);
     s.memory_bytes = 0;
@@ -246,7 +255,7 @@ Result<std::vector<DeviceSummary>> list_devices()
     std::vector<DeviceSummary> out;
     if (all)
         for (size_t i = 0; i < all->size(); ++i)
-            out.push_back(summarize((*all)[i], uint32_t(i)));
+            out.push_back(summarize(instance, (*all)[i], uint32_t(i)));
     vkDestroyInstance(instance, nullptr);
     if (!all)
         return tl::make_unexpected(all.error());

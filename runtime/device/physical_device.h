@@ -11,7 +11,7 @@ inline constexpr const char* kValidationLayer = "VK_LAYER_KHRONOS_validation";
 std::string api_version_text(uint32_t version); // "1.3.239"
 Result<VkInstance> create_instance(bool validation);
 Result<std::vector<VkPhysicalDevice>> physical_devices(VkInstance instance); // best first
-DeviceSummary summarize(VkPhysicalDevice physical, uint32_t index);
+DeviceSummary summarize(VkInstance instance, VkPhysicalDevice physical, uint32_t index);
 bool has_extension(VkPhysicalDevice physical, const char* name);
 Result<uint32_t> compute_queue_family(VkPhysicalDevice physical);
 bool is_compute_family(VkPhysicalDevice physical, uint32_t family);

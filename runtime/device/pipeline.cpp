@@ -180,16 +180,21 @@ Status PipelineStore::make(const KernelVariant& variant, const std::map<uint32_t
         entries.push_back({id, uint32_t(values.size() * 4), 4});
         values.push_back(value);
     }
+    auto subgroup = vk_struct<VkPipelineShaderStageRequiredSubgroupSizeCreateInfo>(
+        VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_REQUIRED_SUBGROUP_SIZE_CREATE_INFO);
+    subgroup.requiredSubgroupSize = device_.limits().matrix.subgroup;
+    const bool matrices = variant.needs & kNeedsCooperativeMatrix;
     const VkSpecializationInfo specialization{uint32_t(entries.size()), entries.data(), values.size() * 4,
                                               values.data()};
     auto info = vk_struct<VkComputePipelineCreateInfo>(VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO);
-    info.stage = {VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO,
-                  nullptr,
-                  0,
-                  VK_SHADER_STAGE_COMPUTE_BIT,
-                  module,
-                  "main",
-                  &specialization};
+    info.stage = {
+        VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO,
+        matrices ? &subgroup : nullptr,
+        matrices ? VkPipelineShaderStageCreateFlags(VK_PIPELINE_SHADER_STAGE_CREATE_REQUIRE_FULL_SUBGROUPS_BIT) : 0,
+        VK_SHADER_STAGE_COMPUTE_BIT,
+        module,
+        "main",
+        &specialization};
     info.layout = out.layout;
     const VkResult result = vkCreateComputePipelines(device_.handle(), cache_, 1, &info, nullptr, &out.pipeline);
     vkDestroyShaderModule(device_.handle(), module, nullptr);

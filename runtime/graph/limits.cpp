@@ -44,7 +44,12 @@ Status apply(DeviceLimits& limits, const std::string& key, const std::string& te
         return lower(limits.max_storage_buffers, key, value);
     if (key == "fp16") {
         if (value == 0)
-            limits.needs_supported &= ~uint32_t(kNeedsFloat16);
+            limits.needs_supported &= ~uint32_t(kNeedsFloat16 | kNeedsCooperativeMatrix);
+        return {};
+    }
+    if (key == "coopmat") {
+        if (value == 0)
+            limits.needs_supported &= ~uint32_t(kNeedsCooperativeMatrix);
         return {};
     }
     if (key == "subgroups") {
@@ -63,7 +68,7 @@ Status apply(DeviceLimits& limits, const std::string& key, const std::string& te
     }
     return fail(
         ErrorCode::usage,
-        "unknown limit '{}' (known: shared, range, texels, alloc, groups, buffers, fp16, subgroups, staging, submit, "
+        "unknown limit '{}' (known: shared, range, texels, alloc, groups, buffers, fp16, coopmat, subgroups, staging, submit, "
         "variant)",
         key);
 }

@@ -11,11 +11,18 @@ namespace semrover {
 
 enum class DeviceType { cpu, integrated, discrete, other };
 
+// of cooperative matrices with fp16 factors and fp32 sums, [m, k] x [k, n]; m is 0 where a device has none
+struct MatrixShape {
+    uint32_t m = 0, n = 0, k = 0;
+    uint32_t subgroup = 0; // invocations that share one
+};
+
 // What the graph compiler knows of a device: plain data, so that it is tested without one.
 struct DeviceLimits {
     DeviceType type = DeviceType::cpu;
     uint32_t subgroup_size = 8;
     uint32_t needs_supported = 0; // KernelNeeds
+    MatrixShape matrix;
     uint32_t max_shared_bytes = 16384;
     uint32_t max_group_threads = 128;
     uint32_t max_groups = 65535; // per dimension
@@ -30,7 +37,7 @@ struct DeviceLimits {
     bool force_staging = false;  // upload through staging even where memory is host-visible
 };
 
-// Lowers limits for tests: "shared=16384,range=67108864,alloc=536870912,fp16=0,variant=simt,staging=1,submit=0.001".
+// Lowers limits for tests: "shared=16384,range=67108864,alloc=536870912,fp16=0,coopmat=0,variant=simt,staging=1,submit=0.001".
 // Raising one above what the device has is refused.
 Status override_limits(DeviceLimits& limits, const std::string& text);
 

@@ -77,9 +77,10 @@ Status order(Plan& plan);                                     // levels from acc
 // do the memory ranges of two bindings overlap, after placement?
 bool overlaps(const Plan& plan, const PassBinding& a, const PassBinding& b);
 
-// The variant of `kernel` for a device, among those its limits allow with these constants: the forced one, else cpu or
-// simt by device type.
+// The variant of `kernel` for a device, among those its limits allow with these constants and tensors (none: fp16 ones):
+// the forced one, else cpu, coopmat or simt by device type.
 const KernelVariant* choose_variant(const Kernel& kernel, const DeviceLimits& limits,
-                                    std::span<const ConstantValue> constants = {});
+                                    std::span<const ConstantValue> constants = {},
+                                    std::span<const Tensor> tensors = {});
 
 } // namespace semrover

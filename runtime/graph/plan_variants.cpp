@@ -32,6 +32,17 @@ bool runs_on(const KernelVariant& v, const DeviceLimits& limits, std::span<const
            uint64_t(buffers) <= limits.max_storage_buffers;
 }
 
+// cooperative matrices have fp16 factors only
+bool takes(const KernelVariant& v, std::span<const Tensor> tensors)
+{
+    if (!(v.needs & kNeedsCooperativeMatrix) || tensors.empty())
+        return true;
+    for (size_t b = 0; b < std::min(tensors.size(), v.bindings.size()); ++b)
+        if (v.bindings[b].name == protocol::kInput)
+            return tensors[b].dtype == DType::f16;
+    return false;
+}
+
 // lower is better; kernels with one variant have an empty name
 int preference(std::string_view name, const DeviceLimits& limits)
 {
@@ -79,6 +90,27 @@ void fit_tile(Pass& pass)
     pass.set_push(protocol::kColLanesMember, best);
 }
 
+// Shape and threads of cooperative matrices. The larger tile where it still makes enough workgroups for a large GPU,
+// and where a lane holds no more than 128 sums: every tile gives the same bits.
+void fit_matrices(Pass& pass, const DeviceLimits& limits)
+{
+    if (!(pass.variant->needs & kNeedsCooperativeMatrix))
+        return;
+    constexpr uint32_t kLarge = 128, kSmall = 64, kEnoughGroups = 256, kMostSums = 128;
+    const MatrixShape& shape = limits.matrix;
+    set_constant(pass, protocol::kMatM, shape.m);
+    set_constant(pass, protocol::kMatN, shape.n);
+    set_constant(pass, protocol::kMatK, shape.k);
+    set_constant(pass, protocol::kThreads, 4 * shape.subgroup);
+    const uint64_t groups =
+        uint64_t(divide_up(pass.grid.x, kLarge)) * divide_up(pass.grid.y, kLarge) * std::max(pass.grid.z, 1u);
+    const bool large = groups >= kEnoughGroups && kLarge * kLarge / 4 / shape.subgroup <= kMostSums;
+    const uint32_t tile = large ? kLarge : kSmall;
+    pass.tile_rows = pass.tile_cols = tile;
+    set_constant(pass, protocol::kTileRows, tile);
+    set_constant(pass, protocol::kTileCols, tile);
+}
+
 Status bind(Pass& pass)
 {
     const auto& declared = pass.variant->bindings;
@@ -101,11 +133,12 @@ void Pass::set_push(std::string_view name, uint32_t value)
 }
 
 const KernelVariant* choose_variant(const Kernel& kernel, const DeviceLimits& limits,
-                                    std::span<const ConstantValue> constants)
+                                    std::span<const ConstantValue> constants, std::span<const Tensor> tensors)
 {
     const KernelVariant* best = nullptr;
     for (const KernelVariant& v : kernel.variants)
-        if (runs_on(v, limits, constants) && (!best || preference(v.name, limits) < preference(best->name, limits)))
+        if (runs_on(v, limits, constants) && takes(v, tensors) &&
+            (!best || preference(v.name, limits) < preference(best->name, limits)))
             best = &v;
     return best;
 }
@@ -113,7 +146,7 @@ const KernelVariant* choose_variant(const Kernel& kernel, const DeviceLimits& li
 Status stage::pick_variants(Plan& plan, const DeviceLimits& limits)
 {
     for (Pass& pass : plan.passes) {
-        pass.variant = choose_variant(*pass.kernel, limits, pass.options.constants);
+        pass.variant = choose_variant(*pass.kernel, limits, pass.options.constants, pass.tensors);
         if (!pass.variant)
             return fail(
                 ErrorCode::no_device,
@@ -123,6 +156,7 @@ Status stage::pick_variants(Plan& plan, const DeviceLimits& limits)
         for (const ConstantValue& c : pass.options.constants)
             set_constant(pass, c.name, c.value);
         fit_tile(pass);
+        fit_matrices(pass, limits);
         SR_CHECK(bind(pass));
     }
     return {};

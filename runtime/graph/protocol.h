@@ -9,23 +9,28 @@
 // build (cmake/reflect/protocol.cpp); the planner reads no other names of bindings, constants and push members. What
 // ops name themselves (constants of epilogues, `absorbed_as`) is theirs.
 //
-// | where               | name        | meaning                                                                       |
-// |---------------------|-------------|-------------------------------------------------------------------------------|
-// | binding             | X           | what an epilogue that another pass takes over would have read | | binding | Y
-// | what a pass makes; an epilogue that it takes over writes here                   | | constant            | kHalf<B>
-// | the tensor bound to B is fp16                                                 | | constant            | kTileM |
-// rows of the output that a workgroup makes                                     | | constant            | kTileN      |
-// columns likewise                                                              | | constant            | kColLanes   |
-// invocations that lie side by side in a tile, if `col_lanes` says nothing else   | | push member         | col_lanes
-// | the planner's choice of them                                                  | | push member         | rows | rows
-// of the output in this pass; a pass that may be cut into bands has it      | | push member         | first_row   |
-// which row of the whole output comes first                                     | | push member         | <b>_first   |
-// which row of B comes first, where a band reads rows around it                 | | push member         | <b>_<what>  |
-// belongs to binding B (`x_ld`) and moves with it into another pass              |
+// clang-format off
+// | where       | name                | meaning                                                                      |
+// |-------------|---------------------|------------------------------------------------------------------------------|
+// | binding     | X                   | what an epilogue that another pass takes over would have read                |
+// | binding     | Y                   | what a pass makes; an epilogue that it takes over writes here                |
+// | constant    | kHalf<B>            | the tensor bound to B is fp16                                                |
+// | constant    | kTileM              | rows of the output that a workgroup makes                                    |
+// | constant    | kTileN              | columns likewise                                                             |
+// | constant    | kColLanes           | invocations side by side in a tile, if `col_lanes` says nothing else         |
+// | constant    | kMatM, kMatN, kMatK | shape of the device's cooperative matrices; such a variant takes an fp16 X   |
+// | constant    | kThreads            | invocations of a workgroup of four subgroups, where matrices are cooperative |
+// | push member | col_lanes           | the planner's choice of them                                                 |
+// | push member | rows                | rows of the output in this pass; a pass that may be cut into bands has it    |
+// | push member | first_row           | which row of the whole output comes first                                    |
+// | push member | <b>_first           | which row of B comes first, where a band reads rows around it                |
+// | push member | <b>_<what>          | belongs to binding B (`x_ld`) and moves with it into another pass            |
+// clang-format on
 namespace semrover::protocol {
 
 inline constexpr std::string_view kInput = "X", kOutput = "Y";
 inline constexpr std::string_view kTileRows = "kTileM", kTileCols = "kTileN", kColLanes = "kColLanes";
+inline constexpr std::string_view kMatM = "kMatM", kMatN = "kMatN", kMatK = "kMatK", kThreads = "kThreads";
 inline constexpr std::string_view kHalfPrefix = "kHalf";
 inline constexpr std::string_view kColLanesMember = "col_lanes", kRows = "rows", kFirstRow = "first_row";
 inline constexpr std::string_view kFirstSuffix = "_first";

@@ -1,0 +1,95 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "runtime/device/cooperative_matrix.h"
+
+#include "runtime/device/physical_device.h"
+
+#include <algorithm>
+#include <vector>
+
+namespace semrover {
+
+namespace {
+
+constexpr uint32_t kPreferredSubgroup = 32; // AMD's and NVIDIA's matrix units work for 32 invocations
+
+bool has_features(VkPhysicalDevice physical)
+{
+    auto matrix = vk_struct<VkPhysicalDeviceCooperativeMatrixFeaturesKHR>(
+        VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_COOPERATIVE_MATRIX_FEATURES_KHR);
+    auto subgroups = vk_struct<VkPhysicalDeviceSubgroupSizeControlFeatures>(
+        VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_SIZE_CONTROL_FEATURES, &matrix);
+    auto f12 =
+        vk_struct<VkPhysicalDeviceVulkan12Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES, &subgroups);
+    auto features = vk_struct<VkPhysicalDeviceFeatures2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2, &f12);
+    vkGetPhysicalDeviceFeatures2(physical, &features);
+    return matrix.cooperativeMatrix && subgroups.subgroupSizeControl && subgroups.computeFullSubgroups &&
+           f12.vulkanMemoryModel && f12.shaderFloat16;
+}
+
+// 0: none that can be asked for
+uint32_t subgroup_size(VkPhysicalDevice physical)
+{
+    auto control = vk_struct<VkPhysicalDeviceSubgroupSizeControlProperties>(
+        VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_SIZE_CONTROL_PROPERTIES);
+    auto p11 = vk_struct<VkPhysicalDeviceVulkan11Properties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_PROPERTIES,
+                                                             &control);
+    auto p = vk_struct<VkPhysicalDeviceProperties2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2, &p11);
+    vkGetPhysicalDeviceProperties2(physical, &p);
+    if (!(control.requiredSubgroupSizeStages & VK_SHADER_STAGE_COMPUTE_BIT))
+        return 0;
+    const uint32_t size = std::clamp(kPreferredSubgroup, control.minSubgroupSize, control.maxSubgroupSize);
+    return 4 * size <= p.properties.limits.maxComputeWorkGroupInvocations && 4 <= control.maxComputeWorkgroupSubgroups
+               ? size
+               : 0;
+}
+
+// can a tile be cut into them, and a step of K?
+bool fits(const VkCooperativeMatrixPropertiesKHR& p)
+{
+    const auto one_of = [](uint32_t size, std::initializer_list<uint32_t> sizes) {
+        return std::ranges::find(sizes, size) != sizes.end();
+    };
+    return p.AType == VK_COMPONENT_TYPE_FLOAT16_KHR && p.BType == VK_COMPONENT_TYPE_FLOAT16_KHR &&
+           p.CType == VK_COMPONENT_TYPE_FLOAT32_KHR && p.ResultType == VK_COMPONENT_TYPE_FLOAT32_KHR &&
+           p.scope == VK_SCOPE_SUBGROUP_KHR && one_of(p.MSize, {8, 16}) && one_of(p.NSize, {8, 16}) &&
+           one_of(p.KSize, {8, 16, 32});
+}
+
+} // namespace
+
+MatrixShape matrix_shape(VkInstance instance, VkPhysicalDevice physical)
+{
+    const auto enumerate = reinterpret_cast<PFN_vkGetPhysicalDeviceCooperativeMatrixPropertiesKHR>(
+        vkGetInstanceProcAddr(instance, "vkGetPhysicalDeviceCooperativeMatrixPropertiesKHR"));
+    if (!enumerate || !has_extension(physical, VK_KHR_COOPERATIVE_MATRIX_EXTENSION_NAME) ||
+        !has_extension(physical, VK_EXT_SUBGROUP_SIZE_CONTROL_EXTENSION_NAME) || !has_features(physical))
+        return {};
+    uint32_t count = 0;
+    if (enumerate(physical, &count, nullptr) != VK_SUCCESS)
+        return {};
+    std::vector<VkCooperativeMatrixPropertiesKHR> all(
+        count, vk_struct<VkCooperativeMatrixPropertiesKHR>(VK_STRUCTURE_TYPE_COOPERATIVE_MATRIX_PROPERTIES_KHR));
+    if (enumerate(physical, &count, all.data()) != VK_SUCCESS)
+        return {};
+    std::erase_if(all, [](const auto& p) { return !fits(p); });
+    const auto outputs = [](const auto& p) { return p.MSize * p.NSize * (p.KSize == 16 ? 2 : 1); };
+    const auto best = std::ranges::max_element(all, {}, outputs);
+    const uint32_t subgroup = subgroup_size(physical);
+    if (best == all.end() || !subgroup)
+        return {};
+    return {best->MSize, best->NSize, best->KSize, subgroup};
+}
+
+MatrixFeatures::MatrixFeatures()
+    : subgroups_(vk_struct<VkPhysicalDeviceSubgroupSizeControlFeatures>(
+          VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_SIZE_CONTROL_FEATURES)),
+      matrix_(vk_struct<VkPhysicalDeviceCooperativeMatrixFeaturesKHR>(
+          VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_COOPERATIVE_MATRIX_FEATURES_KHR, &subgroups_))
+{
+    subgroups_.subgroupSizeControl = VK_TRUE;
+    subgroups_.computeFullSubgroups = VK_TRUE;
+    matrix_.cooperativeMatrix = VK_TRUE;
+}
+
+} // namespace semrover

@@ -1,0 +1,52 @@
+#version 460
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// y = epilogue(x w^T) of fp16 factors, for GPUs with matrix units (VK_KHR_cooperative_matrix). tools/spirv compiles it.
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
+#extension GL_EXT_shader_explicit_arithmetic_types : require
+#extension GL_KHR_cooperative_matrix : require
+#extension GL_KHR_memory_scope_semantics : require
+#extension GL_KHR_shader_subgroup_basic : require
+#include "gemm.h"
+
+layout(local_size_x = 128, local_size_x_id = 33) in; // kThreads
+layout(constant_id = 0) const uint kTileM = 128;
+layout(constant_id = 1) const uint kTileN = 128;
+layout(push_constant) uniform Push { GemmPush p; };
+layout(binding = 0) readonly buffer X { uvec4 x[]; }; // [groups * rows, depth], fp16
+layout(binding = 1) readonly buffer W { uvec4 w[]; }; // [groups * cols, depth], fp16
+#include "lib/gemm_gate.glsl"
+#include "lib/gemm_epilogue.glsl"
+#include "lib/gemm_tile.coopmat.glsl"
+
+// columns k to k + 31 of the tile's rows of x and of w
+void load(uint tile_row, uint tile_col, uint k)
+{
+    const uint from = k + load_k();
+    const bool inside = from < p.depth;
+    [[unroll]] for (uint i = 0; i < kLoadsX; ++i) {
+        const uint row = epilogue_group * p.rows + min(tile_row + load_row(i), p.rows - 1);
+        next_x[i] = inside ? x[(row * p.x_ld + from) / 8] : uvec4(0);
+    }
+    [[unroll]] for (uint i = 0; i < kLoadsW; ++i) {
+        const uint row = epilogue_group * p.cols + min(tile_col + load_row(i), p.cols - 1);
+        next_w[i] = inside ? w[(row * p.w_ld + from) / 8] : uvec4(0);
+    }
+}
+
+void main()
+{
+    epilogue_group = gate_group = gl_WorkGroupID.z;
+    const uint row = gl_WorkGroupID.x * kTileM, col = gl_WorkGroupID.y * kTileN;
+    clear_tile();
+    load(row, col, 0);
+    for (uint k = 0; k < p.depth; k += kStep) {
+        barrier();
+        stage();
+        barrier();
+        load(row, col, k + kStep);
+        multiply();
+    }
+    store_tile(row, col);
+}
