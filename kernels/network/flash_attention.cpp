@@ -13,6 +13,8 @@ namespace semrover {
 
 namespace {
 
+constexpr uint32_t kMostMatrixChunks = 12; // flash_attention.coopmat keeps queries and sums in registers
+
 void check(const Tensor& q, const Tensor& kv, const FlashAttentionOptions& o)
 {
     const uint32_t width = o.heads * o.head_dim;
@@ -52,6 +54,8 @@ Tensor flash_attention(Graph& g, Tensor q, Tensor kv, const FlashAttentionOption
     DispatchOptions dispatch;
     dispatch.constants = {{"kChunks", chunks}, {"kMostChunks", chunks <= 20 ? 20u : 64u}};
     dispatch.flops = 4.0 * o.batch * o.query_rows * o.keys * o.heads * o.head_dim;
+    if (chunks > kMostMatrixChunks)
+        dispatch.without_needs = kNeedsCooperativeMatrix;
     if (o.batch == 1)
         dispatch.banded = {"Q", "Y"};
     g.dispatch(kernel::flash_attention, {q, kv, y}, push, tiles(o.query_rows, o.heads, o.batch), std::move(dispatch));

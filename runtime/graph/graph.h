@@ -80,6 +80,7 @@ struct DispatchOptions {
     std::string_view absorbed_as = {};
     bool keeps_x = false; // absorbed: the producer goes on writing X, others may read it (statistics of X)
     double flops = 0;
+    uint32_t without_needs = 0; // KernelNeeds that a variant may not have for this one: its shape does not suit them
 };
 
 struct Resource {

@@ -32,15 +32,18 @@ bool runs_on(const KernelVariant& v, const DeviceLimits& limits, std::span<const
            uint64_t(buffers) <= limits.max_storage_buffers;
 }
 
-// cooperative matrices have fp16 factors only
-bool takes(const KernelVariant& v, std::span<const Tensor> tensors)
+// a variant without kHalf<B>, which another one has, takes fp16 there
+bool takes(const Kernel& kernel, const KernelVariant& v, std::span<const Tensor> tensors)
 {
-    if (!(v.needs & kNeedsCooperativeMatrix) || tensors.empty())
+    if (!(v.needs & kNeedsCooperativeMatrix))
         return true;
-    for (size_t b = 0; b < std::min(tensors.size(), v.bindings.size()); ++b)
-        if (v.bindings[b].name == protocol::kInput)
-            return tensors[b].dtype == DType::f16;
-    return false;
+    for (size_t b = 0; b < std::min(tensors.size(), v.bindings.size()); ++b) {
+        const std::string name = protocol::half_constant(v.bindings[b].name);
+        const bool either = std::ranges::any_of(kernel.variants, [&](const auto& o) { return o.constant(name); });
+        if (either && !v.constant(name) && tensors[b].dtype != DType::f16)
+            return false;
+    }
+    return true;
 }
 
 // lower is better; kernels with one variant have an empty name
@@ -102,6 +105,8 @@ void fit_matrices(Pass& pass, const DeviceLimits& limits)
     set_constant(pass, protocol::kMatN, shape.n);
     set_constant(pass, protocol::kMatK, shape.k);
     set_constant(pass, protocol::kThreads, 4 * shape.subgroup);
+    if (pass.tile_rows != kLarge || pass.tile_cols != kLarge)
+        return;
     const uint64_t groups =
         uint64_t(divide_up(pass.grid.x, kLarge)) * divide_up(pass.grid.y, kLarge) * std::max(pass.grid.z, 1u);
     const bool large = groups >= kEnoughGroups && kLarge * kLarge / 4 / shape.subgroup <= kMostSums;
@@ -137,7 +142,7 @@ const KernelVariant* choose_variant(const Kernel& kernel, const DeviceLimits& li
 {
     const KernelVariant* best = nullptr;
     for (const KernelVariant& v : kernel.variants)
-        if (runs_on(v, limits, constants) && takes(v, tensors) &&
+        if (runs_on(v, limits, constants) && takes(kernel, v, tensors) &&
             (!best || preference(v.name, limits) < preference(best->name, limits)))
             best = &v;
     return best;
@@ -146,7 +151,9 @@ const KernelVariant* choose_variant(const Kernel& kernel, const DeviceLimits& li
 Status stage::pick_variants(Plan& plan, const DeviceLimits& limits)
 {
     for (Pass& pass : plan.passes) {
-        pass.variant = choose_variant(*pass.kernel, limits, pass.options.constants, pass.tensors);
+        DeviceLimits allowed = limits;
+        allowed.needs_supported &= ~pass.options.without_needs;
+        pass.variant = choose_variant(*pass.kernel, allowed, pass.options.constants, pass.tensors);
         if (!pass.variant)
             return fail(
                 ErrorCode::no_device,

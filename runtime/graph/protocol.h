@@ -14,11 +14,12 @@
 // |-------------|---------------------|------------------------------------------------------------------------------|
 // | binding     | X                   | what an epilogue that another pass takes over would have read                |
 // | binding     | Y                   | what a pass makes; an epilogue that it takes over writes here                |
-// | constant    | kHalf<B>            | the tensor bound to B is fp16                                                |
+// | constant    | kHalf<B>            | the tensor bound to B is fp16; a variant for cooperative matrices without it |
+// |             |                     | takes nothing else there                                                     |
 // | constant    | kTileM              | rows of the output that a workgroup makes                                    |
 // | constant    | kTileN              | columns likewise                                                             |
 // | constant    | kColLanes           | invocations side by side in a tile, if `col_lanes` says nothing else         |
-// | constant    | kMatM, kMatN, kMatK | shape of the device's cooperative matrices; such a variant takes an fp16 X   |
+// | constant    | kMatM, kMatN, kMatK | shape of the device's cooperative matrices                                   |
 // | constant    | kThreads            | invocations of a workgroup of four subgroups, where matrices are cooperative |
 // | push member | col_lanes           | the planner's choice of them                                                 |
 // | push member | rows                | rows of the output in this pass; a pass that may be cut into bands has it    |
