@@ -1,10 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "attention.spv.h"
-#include "runtime/graph/plan.h"
 #include "tests/attention_sets.h"
-
-#include <cmath>
+#include "tests/softmax_sum.h"
 
 namespace semrover {
 namespace kernel_attention_test {
@@ -24,12 +22,12 @@ const AttentionCase kCases[] = {
 };
 
 // softmax over the keys of both streams, in double
-std::vector<double> reference(const HostMatrix& qkv, const PackedSets& p, uint32_t query, uint32_t head, uint32_t heads,
-                              uint32_t head_dim)
+SoftmaxSum reference(const HostMatrix& qkv, const PackedSets& p, uint32_t query, uint32_t head, uint32_t heads,
+                     uint32_t head_dim)
 {
     const uint32_t i = query % p.rows, first = p.sets[2 * i], count = p.sets[2 * i + 1], dim = heads * head_dim;
     std::vector<std::pair<double, uint32_t>> scores; // of the keys in sight
-    double largest = -1e300, total = 0;
+    double largest = -1e300;
     for (uint32_t side = 0; side < 2; ++side)
         for (uint32_t j = first; j < first + count; ++j) {
             if (!p.sees(i, j, kRadius2))
@@ -40,16 +38,11 @@ std::vector<double> reference(const HostMatrix& qkv, const PackedSets& p, uint32
             scores.emplace_back(score / std::sqrt(double(head_dim)), side * p.rows + j);
             largest = std::max(largest, scores.back().first);
         }
-    std::vector<double> y(head_dim);
-    for (const auto& [score, row] : scores) {
-        const double weight = std::exp(score - largest);
-        total += weight;
-        for (uint32_t d = 0; d < head_dim; ++d)
-            y[d] += weight * qkv.at(row, 2 * dim + head * head_dim + d);
-    }
-    for (double& v : y)
-        v /= total;
-    return y;
+    SoftmaxSum sum(head_dim);
+    for (const auto& [score, row] : scores)
+        sum.add(std::exp(score - largest), [&](uint32_t d) { return qkv.at(row, 2 * dim + head * head_dim + d); });
+    sum.finish();
+    return sum;
 }
 
 HostMatrix attend(KernelCase& k, const PackedSets& p, const HostMatrix& qkv, uint32_t heads, uint32_t streams)
@@ -71,14 +64,13 @@ void check(const AttentionCase& c, DType dtype)
     const HostMatrix qkv = k.random(2 * p.rows, 3 * c.heads * c.head_dim, dtype);
     const HostMatrix got = attend(k, p, qkv, c.heads, c.streams);
     ASSERT_EQ(got.rows, c.streams * p.rows);
+    const bool rounded = rounds_weights(kernel::attention, c.head_dim, 128, dtype);
     for (uint32_t query = 0; query < got.rows; ++query)
         for (uint32_t head = 0; head < c.heads; ++head) {
-            const std::vector<double> y = reference(qkv, p, query, head, c.heads, c.head_dim);
-            for (uint32_t d = 0; d < c.head_dim; ++d) {
-                const double tolerance = 3e-6 + (dtype == DType::f16 ? 3e-8 + 6e-4 * std::abs(y[d]) : 0);
-                ASSERT_NEAR(got.at(query, head * c.head_dim + d), y[d], tolerance)
+            const SoftmaxSum sum = reference(qkv, p, query, head, c.heads, c.head_dim);
+            for (uint32_t d = 0; d < c.head_dim; ++d)
+                ASSERT_NEAR(got.at(query, head * c.head_dim + d), sum.y[d], 3e-6 + sum.tolerance(d, dtype, rounded))
                     << "query " << query << " head " << head;
-            }
         }
 }
 

@@ -1,10 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "flash_attention.spv.h"
-#include "runtime/graph/plan.h"
-#include "tests/kernel_case.h"
-
-#include <cmath>
+#include "tests/softmax_sum.h"
 
 namespace semrover {
 namespace kernel_flash_attention_test {
@@ -52,38 +49,25 @@ FlashAttentionOptions options_of(const FlashCase& c)
     return o;
 }
 
-// one head of one query, in double; off: how far a sum may be off where each weight is rounded to fp16
-struct Reference {
-    std::vector<double> y, off;
-};
-
-Reference reference(const HostMatrix& q, const HostMatrix& kv, const FlashAttentionOptions& o, uint32_t image,
-                    uint32_t query, uint32_t head)
+// one head of one query, in double
+SoftmaxSum reference(const HostMatrix& q, const HostMatrix& kv, const FlashAttentionOptions& o, uint32_t image,
+                     uint32_t query, uint32_t head)
 {
     const uint32_t q_row = image * o.query_rows + query, first = image * o.key_rows, at = head * o.head_dim;
     const double scale = o.scale > 0 ? o.scale : 1 / std::sqrt(double(o.head_dim));
-    std::vector<double> weights(o.keys), y(o.head_dim), off(o.head_dim);
-    double largest = -1e300, total = 0;
+    std::vector<double> scores(o.keys);
+    double largest = -1e300;
     for (uint32_t j = 0; j < o.keys; ++j) {
         for (uint32_t d = at; d < at + o.head_dim; ++d)
-            weights[j] += double(q.at(q_row, o.q_col + d)) * kv.at(first + j, o.k_col + d);
-        weights[j] *= scale;
-        largest = std::max(largest, weights[j]);
+            scores[j] += double(q.at(q_row, o.q_col + d)) * kv.at(first + j, o.k_col + d);
+        scores[j] *= scale;
+        largest = std::max(largest, scores[j]);
     }
-    for (uint32_t j = 0; j < o.keys; ++j) {
-        const double weight = std::exp(weights[j] - largest);
-        total += weight;
-        for (uint32_t d = 0; d < o.head_dim; ++d) {
-            const double v = kv.at(first + j, o.v_col + at + d);
-            y[d] += weight * v;
-            off[d] += std::max(weight * 0x1p-11, 0x1p-25) * std::abs(v); // half a unit in the last place
-        }
-    }
-    for (uint32_t d = 0; d < o.head_dim; ++d) {
-        y[d] /= total;
-        off[d] /= total;
-    }
-    return {y, off};
+    SoftmaxSum sum(o.head_dim);
+    for (uint32_t j = 0; j < o.keys; ++j)
+        sum.add(std::exp(scores[j] - largest), [&](uint32_t d) { return kv.at(first + j, o.v_col + at + d); });
+    sum.finish();
+    return sum;
 }
 
 // rows that belong to no image: what reads them shows
@@ -120,14 +104,6 @@ Attended attend(const FlashCase& c, const FlashAttentionOptions& o, DType dtype)
     return a;
 }
 
-// matrix units multiply fp16 weights
-bool rounds_weights(const FlashAttentionOptions& o, DType dtype)
-{
-    const ConstantValue chunks[] = {{"kChunks", o.head_dim / 8}};
-    const KernelVariant* v = choose_variant(kernel::flash_attention, test_device().limits(), chunks);
-    return dtype == DType::f16 && o.head_dim <= 96 && v && v->name == "coopmat";
-}
-
 void check(const FlashCase& c, const FlashAttentionOptions& o, DType dtype, double tolerance)
 {
     SCOPED_TRACE(fmt::format("{} queries, {} keys, {} heads of {}, batch {} {}", c.queries, c.keys, c.heads, c.head_dim,
@@ -135,17 +111,16 @@ void check(const FlashCase& c, const FlashAttentionOptions& o, DType dtype, doub
     const Attended a = attend(c, o, dtype);
     ASSERT_EQ(a.y.rows, c.batch * o.query_rows);
     ASSERT_EQ(a.y.cols, c.heads * c.head_dim);
-    const bool rounded = rounds_weights(o, dtype);
+    const bool rounded = rounds_weights(kernel::flash_attention, c.head_dim, 96, dtype);
     for (float v : a.y.values) // padding rows too
         ASSERT_TRUE(std::isfinite(v));
     for (uint32_t image = 0; image < c.batch; ++image)
         for (uint32_t query = 0; query < c.queries; ++query)
             for (uint32_t head = 0; head < c.heads; ++head) {
-                const auto [y, off] = reference(a.q, a.kv, o, image, query, head);
+                const SoftmaxSum sum = reference(a.q, a.kv, o, image, query, head);
                 for (uint32_t d = 0; d < c.head_dim; ++d)
-                    ASSERT_NEAR(a.y.at(image * o.query_rows + query, head * c.head_dim + d), y[d],
-                                tolerance + (dtype == DType::f16 ? 3e-8 + 6e-4 * std::abs(y[d]) : 0) +
-                                    (rounded ? off[d] : 0))
+                    ASSERT_NEAR(a.y.at(image * o.query_rows + query, head * c.head_dim + d), sum.y[d],
+                                tolerance + sum.tolerance(d, dtype, rounded))
                         << "image " << image << " query " << query << " head " << head << " channel " << d;
             }
 }

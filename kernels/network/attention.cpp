@@ -11,6 +11,12 @@
 
 namespace semrover {
 
+namespace {
+
+constexpr uint32_t kMostMatrixDim = 128; // attention.coopmat keeps queries and sums in registers
+
+} // namespace
+
 Tensor attention(Graph& g, Tensor qkv, Tensor tiles, Tensor mask, uint32_t heads, uint32_t streams)
 {
     const uint32_t head_dim = qkv.cols / (3 * heads), rows = qkv.rows / 2;
@@ -28,6 +34,8 @@ Tensor attention(Graph& g, Tensor qkv, Tensor tiles, Tensor mask, uint32_t heads
     push.scale = 1.f / std::sqrt(float(head_dim));
     DispatchOptions options;
     options.constants = {{"kChunks", head_dim / 8}};
+    if (head_dim > kMostMatrixDim)
+        options.without_needs = kNeedsCooperativeMatrix;
     options.flops =
         4.0 * streams * rows * (64.0 * mask.cols) * heads * head_dim; // an upper bound: masked blocks are skipped
     g.dispatch(kernel::attention, {qkv, tiles, mask, y}, push, groups(tiles.rows, heads, streams), std::move(options));

@@ -13,7 +13,7 @@ namespace semrover {
 
 namespace {
 
-constexpr uint32_t kMostMatrixChunks = 12; // flash_attention.coopmat keeps queries and sums in registers
+constexpr uint32_t kMostFlashMatrixDim = 96; // flash_attention.coopmat keeps queries and sums in registers
 
 void check(const Tensor& q, const Tensor& kv, const FlashAttentionOptions& o)
 {
@@ -54,7 +54,7 @@ Tensor flash_attention(Graph& g, Tensor q, Tensor kv, const FlashAttentionOption
     DispatchOptions dispatch;
     dispatch.constants = {{"kChunks", chunks}, {"kMostChunks", chunks <= 20 ? 20u : 64u}};
     dispatch.flops = 4.0 * o.batch * o.query_rows * o.keys * o.heads * o.head_dim;
-    if (chunks > kMostMatrixChunks)
+    if (o.head_dim > kMostFlashMatrixDim)
         dispatch.without_needs = kNeedsCooperativeMatrix;
     if (o.batch == 1)
         dispatch.banded = {"Q", "Y"};

@@ -1,0 +1,184 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+
+// Attention by cooperative matrices, online over blocks of 32 keys: 16 queries a subgroup, whose queries and sums stay
+// in registers. Includers say kChunks (head_dim / 8), kSides (how many blocks of keys are staged at once) and
+// visible_keys(row, first), a bit for each of the 32 keys from `first` on; they set block_at and score_scale.
+layout(constant_id = 30) const uint kMatM = 16; // 8 or 16
+layout(constant_id = 31) const uint kMatN = 16; // 8 or 16
+layout(constant_id = 32) const uint kMatK = 16; // divides 32
+layout(constant_id = 33) const uint kThreads = 128;
+
+const uint kKeys = 32;    // of a block
+const uint kQueries = 16; // of a subgroup
+const uint kRowChunks = (kChunks + 3) / 4 * 4; // head_dim in steps of 32, with zeros behind it
+const uint kDim = kRowChunks * 8;
+const uint kPitch = kRowChunks + 1;      // uvec4 of a row of queries or keys: rows begin in different banks
+const uint kValuePitch = kKeys / 8 + 1;  // of a channel of values
+const uint kScorePitch = kKeys + 4;      // floats
+const uint kWeightPitch = kKeys / 8 + 1; // uvec4
+const uint kDown = kQueries / kMatM, kKeysAcross = kKeys / kMatN, kDimAcross = kDim / kMatN, kDimSteps = kDim / kMatK;
+const uint kBlock = kDim * kValuePitch; // uvec4 of what is staged of a side
+
+shared uvec4 rows_of[kSides * kBlock];             // 32 queries or keys, or the values of 32 keys
+shared float scores[4 * kQueries * kScorePitch];   // of each subgroup; then other matrices of 16 rows
+shared uvec4 weights[4 * kQueries * kWeightPitch]; // likewise, fp16
+
+#define MatrixQ coopmat<float16_t, gl_ScopeSubgroup, kMatM, kMatK, gl_MatrixUseA>
+#define MatrixKv coopmat<float16_t, gl_ScopeSubgroup, kMatK, kMatN, gl_MatrixUseB>
+#define MatrixS coopmat<float, gl_ScopeSubgroup, kMatM, kMatN, gl_MatrixUseAccumulator>
+
+MatrixQ queries[kDown * kDimSteps];
+MatrixS sums[kDown * kDimAcross];
+uint score_at, weight_at; // of this subgroup
+uint block_at;            // of the side whose keys it looks at
+float score_scale;        // log2(e) times that of the scores
+
+// a row is two invocations' side by side: each has half of the keys, and both have its largest score and total
+const uint kRounds = 8 * kQueries / kThreads > 0 ? 8 * kQueries / kThreads : 1;
+uint row_of(uint round) { return (round * gl_SubgroupSize + gl_SubgroupInvocationID) / 2; }
+float largest[kRounds], total[kRounds];
+
+// what a subgroup wrote to its parts of shared memory, the others do not see
+void own_barrier()
+{
+    subgroupMemoryBarrierShared();
+    subgroupBarrier();
+}
+
+void start_attention()
+{
+    score_at = gl_SubgroupID * kQueries * kScorePitch;
+    weight_at = gl_SubgroupID * kQueries * kWeightPitch;
+    [[unroll]] for (uint i = 0; i < kDown * kDimAcross; ++i)
+        sums[i] = MatrixS(0.0);
+    [[unroll]] for (uint round = 0; round < kRounds; ++round) {
+        largest[round] = -1e30;
+        total[round] = 0.0;
+    }
+}
+
+// eight channels of a query or a key
+void stage_row(uint block, uint row, uint chunk, uvec4 value) { rows_of[block + row * kPitch + chunk] = value; }
+
+// eight channels of the values of two keys, of which the first is even, as they share a word
+void stage_values(uint block, uint key, uint chunk, uvec4 a, uvec4 b)
+{
+    [[unroll]] for (uint j = 0; j < 4; ++j) {
+        const uint at = block + (chunk * 8 + 2 * j) * kValuePitch + key / 8;
+        rows_of[at][key / 2 % 4] = (a[j] & 0xffff) | b[j] << 16;
+        rows_of[at + kValuePitch][key / 2 % 4] = a[j] >> 16 | (b[j] & 0xffff0000);
+    }
+}
+
+// from the rows that are staged, `first` on
+void load_queries(uint first)
+{
+    [[unroll]] for (uint i = 0; i < kDown; ++i)
+        [[unroll]] for (uint k = 0; k < kDimSteps; ++k)
+            coopMatLoad(queries[i * kDimSteps + k], rows_of, (first + i * kMatM) * kPitch + k * kMatK / 8, kPitch,
+                        gl_CooperativeMatrixLayoutRowMajor);
+}
+
+// with the keys that are staged, to `scores`
+void multiply_keys()
+{
+    [[unroll]] for (uint j = 0; j < kKeysAcross; ++j) {
+        MatrixS s[kDown];
+        [[unroll]] for (uint i = 0; i < kDown; ++i)
+            s[i] = MatrixS(0.0);
+        [[unroll]] for (uint k = 0; k < kDimSteps; ++k) {
+            MatrixKv b;
+            coopMatLoad(b, rows_of, block_at + j * kMatN * kPitch + k * kMatK / 8, kPitch,
+                        gl_CooperativeMatrixLayoutColumnMajor);
+            [[unroll]] for (uint i = 0; i < kDown; ++i)
+                s[i] = coopMatMulAdd(queries[i * kDimSteps + k], b, s[i]);
+        }
+        [[unroll]] for (uint i = 0; i < kDown; ++i)
+            coopMatStore(s[i], scores, score_at + i * kMatM * kScorePitch + j * kMatN, kScorePitch,
+                         gl_CooperativeMatrixLayoutRowMajor);
+    }
+}
+
+// scores of a block, of which `first` is the first key, to weights and to the factor of what was summed before
+void softmax_block(uint first)
+{
+    const uint part = gl_SubgroupInvocationID % 2 * (kKeys / 2);
+    own_barrier();
+    [[unroll]] for (uint round = 0; round < kRounds; ++round) {
+        const bool inside = row_of(round) < kQueries;
+        const uint row = min(row_of(round), kQueries - 1), at = score_at + row * kScorePitch + part;
+        const uint visible = visible_keys(row, first) >> part;
+        float s[kKeys / 2], m = largest[round];
+        [[unroll]] for (uint j = 0; j < kKeys / 2; ++j) {
+            s[j] = (visible >> j & 1) != 0 ? scores[at + j] * score_scale : -1e30;
+            m = max(m, s[j]);
+        }
+        m = max(m, subgroupShuffleXor(m, 1));
+        const float shrink = exp2(largest[round] - m);
+        largest[round] = m;
+        float sum = 0.0;
+        [[unroll]] for (uint j = 0; j < kKeys / 2; ++j) {
+            s[j] = (visible >> j & 1) != 0 ? exp2(s[j] - m) : 0.0;
+            sum += s[j];
+        }
+        total[round] = total[round] * shrink + sum + subgroupShuffleXor(sum, 1);
+        own_barrier(); // both halves of a row are read
+        if (!inside)
+            continue;
+        [[unroll]] for (uint j = 0; j < kKeys / 2; j += 8)
+            weights[weight_at + row * kWeightPitch + (part + j) / 8] =
+                pack8(vec4(s[j], s[j + 1], s[j + 2], s[j + 3]), vec4(s[j + 4], s[j + 5], s[j + 6], s[j + 7]));
+        [[unroll]] for (uint j = 0; j < kMatN / 2; ++j) // a matrix that has it in each column
+            scores[score_at + row * kScorePitch + part / (kKeys / 2) * (kMatN / 2) + j] = shrink;
+    }
+    own_barrier();
+}
+
+void shrink_sums()
+{
+    [[unroll]] for (uint i = 0; i < kDown; ++i) {
+        MatrixS shrink;
+        coopMatLoad(shrink, scores, score_at + i * kMatM * kScorePitch, kScorePitch,
+                    gl_CooperativeMatrixLayoutRowMajor);
+        [[unroll]] for (uint j = 0; j < kDimAcross; ++j)
+            sums[i * kDimAcross + j] = sums[i * kDimAcross + j] * shrink;
+    }
+}
+
+// weights times the values that are staged
+void add_values()
+{
+    MatrixQ w[kDown * (kKeys / kMatK)];
+    [[unroll]] for (uint i = 0; i < kDown; ++i)
+        [[unroll]] for (uint k = 0; k < kKeys / kMatK; ++k)
+            coopMatLoad(w[i * (kKeys / kMatK) + k], weights, weight_at + i * kMatM * kWeightPitch + k * kMatK / 8,
+                        kWeightPitch, gl_CooperativeMatrixLayoutRowMajor);
+    [[unroll]] for (uint j = 0; j < kDimAcross; ++j)
+        [[unroll]] for (uint k = 0; k < kKeys / kMatK; ++k) {
+            MatrixKv b;
+            coopMatLoad(b, rows_of, block_at + j * kMatN * kValuePitch + k * kMatK / 8, kValuePitch,
+                        gl_CooperativeMatrixLayoutColumnMajor);
+            [[unroll]] for (uint i = 0; i < kDown; ++i)
+                sums[i * kDimAcross + j] = coopMatMulAdd(w[i * (kKeys / kMatK) + k], b, sums[i * kDimAcross + j]);
+        }
+}
+
+// 16 channels of the sums, from 16 piece on, to `scores`. note: compilers must know which sums are stored, or all of
+// them lie in memory
+void put_sums(uint piece)
+{
+    [[unroll]] for (uint i = 0; i < kDown * kDimAcross; ++i) {
+        const uint column = i % kDimAcross * kMatN;
+        if (column / 16 == piece)
+            coopMatStore(sums[i], scores, score_at + i / kDimAcross * kMatM * kScorePitch + column % 16, kScorePitch,
+                         gl_CooperativeMatrixLayoutRowMajor);
+    }
+}
+
+// eight of them, of one query of a subgroup
+void get_sums(uint at, out vec4 lo, out vec4 hi)
+{
+    lo = vec4(scores[at], scores[at + 1], scores[at + 2], scores[at + 3]);
+    hi = vec4(scores[at + 4], scores[at + 5], scores[at + 6], scores[at + 7]);
+}
