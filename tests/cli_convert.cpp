@@ -141,7 +141,7 @@ TEST(CliConvert, a_transformer_comes_along)
     const ScratchFolder folder;
     const ProgramResult result = convert(SEMROVER_SOURCE_DIR "/assets/model", folder / "out", "--dtype f32 --json");
     ASSERT_EQ(result.code, 0) << result.err;
-    EXPECT_EQ(json_of(result.out)["components"]["voxfield_transformer"]["tensors"], 177);
+    EXPECT_EQ(json_of(result.out)["components"]["voxfield_transformer"]["tensors"], 178);
     const Json index = *read_json(folder / "out/model_index.json");
     EXPECT_EQ(index["voxfield_scheduler"][1], "DDPMScheduler");
     const Json before = *read_json(SEMROVER_SOURCE_DIR "/assets/model/model_index.json");
