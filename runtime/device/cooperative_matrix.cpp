@@ -24,7 +24,7 @@ bool has_features(VkPhysicalDevice physical)
     auto features = vk_struct<VkPhysicalDeviceFeatures2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2, &f12);
     vkGetPhysicalDeviceFeatures2(physical, &features);
     return matrix.cooperativeMatrix && subgroups.subgroupSizeControl && subgroups.computeFullSubgroups &&
-           f12.vulkanMemoryModel && f12.shaderFloat16;
+           f12.vulkanMemoryModel && f12.vulkanMemoryModelDeviceScope && f12.shaderFloat16;
 }
 
 // 0: none that can be asked for

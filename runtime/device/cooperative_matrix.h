@@ -38,7 +38,7 @@ namespace semrover {
 // cut into. m is 0 without the extension, the features beside it, or such a shape.
 MatrixShape matrix_shape(VkInstance instance, VkPhysicalDevice physical);
 
-// what a device must have enabled for them, beside vulkanMemoryModel and shaderFloat16
+// what a device must have enabled for them, beside vulkanMemoryModel, vulkanMemoryModelDeviceScope and shaderFloat16
 class MatrixFeatures {
   public:
     MatrixFeatures();

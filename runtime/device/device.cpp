@@ -145,6 +145,7 @@ Status Device::create_device(const DeviceOptions&)
     MatrixFeatures matrix;
     if (matrix_shape(instance_, physical_).m) {
         f12.vulkanMemoryModel = VK_TRUE;
+        f12.vulkanMemoryModelDeviceScope = VK_TRUE; // once there is a memory model, atomics of any shader need it
         f12.pNext = matrix.chain();
         extensions.insert(extensions.end(),
                           {VK_KHR_COOPERATIVE_MATRIX_EXTENSION_NAME, VK_EXT_SUBGROUP_SIZE_CONTROL_EXTENSION_NAME});

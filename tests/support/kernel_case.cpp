@@ -4,17 +4,40 @@
 
 namespace semrover {
 
+namespace {
+
+// gone before main() ends: validation layers of Debian 13 fail where a device lives as long as the process
+class TestDevice : public testing::Environment {
+  public:
+    Device& get()
+    {
+        if (!device_) {
+            auto made = Device::create({});
+            if (!made) {
+                ADD_FAILURE() << made.error().message;
+                std::abort();
+            }
+            device_ = std::move(*made);
+        }
+        return *device_;
+    }
+    void TearDown() override { device_.reset(); }
+
+  private:
+    std::unique_ptr<Device> device_;
+};
+
+TestDevice* const kTestDevice = [] {
+    auto* device = new TestDevice();
+    testing::AddGlobalTestEnvironment(device);
+    return device;
+}();
+
+} // namespace
+
 Device& test_device()
 {
-    static const std::unique_ptr<Device> device = [] {
-        auto made = Device::create({});
-        if (!made) {
-            ADD_FAILURE() << made.error().message;
-            std::abort();
-        }
-        return std::move(*made);
-    }();
-    return *device;
+    return kTestDevice->get();
 }
 
 HostMatrix KernelCase::random(uint32_t rows, uint32_t cols, DType dtype, float scale)
