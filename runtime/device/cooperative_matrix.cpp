@@ -13,18 +13,15 @@ namespace {
 
 constexpr uint32_t kPreferredSubgroup = 32; // AMD's and NVIDIA's matrix units work for 32 invocations
 
+// of a device with both extensions: others leave what they do not know as it is
 bool has_features(VkPhysicalDevice physical)
 {
-    auto matrix = vk_struct<VkPhysicalDeviceCooperativeMatrixFeaturesKHR>(
-        VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_COOPERATIVE_MATRIX_FEATURES_KHR);
-    auto subgroups = vk_struct<VkPhysicalDeviceSubgroupSizeControlFeatures>(
-        VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_SIZE_CONTROL_FEATURES, &matrix);
-    auto f12 =
-        vk_struct<VkPhysicalDeviceVulkan12Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES, &subgroups);
+    MatrixFeatures matrix;
+    auto f12 = vk_struct<VkPhysicalDeviceVulkan12Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES,
+                                                           matrix.chain());
     auto features = vk_struct<VkPhysicalDeviceFeatures2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2, &f12);
     vkGetPhysicalDeviceFeatures2(physical, &features);
-    return matrix.cooperativeMatrix && subgroups.subgroupSizeControl && subgroups.computeFullSubgroups &&
-           f12.vulkanMemoryModel && f12.vulkanMemoryModelDeviceScope && f12.shaderFloat16;
+    return matrix.all() && f12.vulkanMemoryModel && f12.vulkanMemoryModelDeviceScope && f12.shaderFloat16;
 }
 
 // 0: none that can be asked for
@@ -90,6 +87,11 @@ MatrixFeatures::MatrixFeatures()
     subgroups_.subgroupSizeControl = VK_TRUE;
     subgroups_.computeFullSubgroups = VK_TRUE;
     matrix_.cooperativeMatrix = VK_TRUE;
+}
+
+bool MatrixFeatures::all() const
+{
+    return subgroups_.subgroupSizeControl && subgroups_.computeFullSubgroups && matrix_.cooperativeMatrix;
 }
 
 } // namespace semrover

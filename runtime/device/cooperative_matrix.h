@@ -42,7 +42,8 @@ MatrixShape matrix_shape(VkInstance instance, VkPhysicalDevice physical);
 class MatrixFeatures {
   public:
     MatrixFeatures();
-    void* chain() { return &matrix_; } // of VkDeviceCreateInfo; valid as long as this is
+    void* chain() { return &matrix_; } // of VkDeviceCreateInfo, or to be filled in; valid as long as this is
+    bool all() const;
 
   private:
     VkPhysicalDeviceSubgroupSizeControlFeatures subgroups_;

@@ -72,7 +72,7 @@ Result<std::unique_ptr<Device>> Device::create(const DeviceOptions& options)
         summaries.push_back(summarize(d->instance_, physical[i], uint32_t(i)));
     SR_TRY(d->index_, select_device(summaries, options.select));
     d->physical_ = physical[d->index_];
-    SR_CHECK(d->create_device(options));
+    SR_CHECK(d->create_device(summaries[d->index_].limits.matrix.m != 0));
     SR_CHECK(d->finish(options));
     return d;
 }
@@ -122,7 +122,7 @@ Status Device::create_instance(const DeviceOptions& options)
     return {};
 }
 
-Status Device::create_device(const DeviceOptions&)
+Status Device::create_device(bool matrices)
 {
     SR_TRY(queue_family_, compute_queue_family(physical_));
     const float priority = 1;
@@ -143,7 +143,7 @@ Status Device::create_device(const DeviceOptions&)
     if (has_extension(physical_, "VK_KHR_portability_subset")) // must be enabled where there is one: MoltenVK's
         extensions.push_back("VK_KHR_portability_subset");
     MatrixFeatures matrix;
-    if (matrix_shape(instance_, physical_).m) {
+    if (matrices) {
         f12.vulkanMemoryModel = VK_TRUE;
         f12.vulkanMemoryModelDeviceScope = VK_TRUE; // once there is a memory model, atomics of any shader need it
         f12.pNext = matrix.chain();

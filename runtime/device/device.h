@@ -98,7 +98,7 @@ class Device {
   private:
     Device();
     Status create_instance(const DeviceOptions& options);
-    Status create_device(const DeviceOptions& options);
+    Status create_device(bool matrices); // enables cooperative matrices
     Status finish(const DeviceOptions& options);
     Status copy(VkBuffer from, uint64_t from_at, VkBuffer to, uint64_t to_at, uint64_t bytes);
     Result<Buffer*> staging();

@@ -4,10 +4,7 @@
 // Attention by cooperative matrices, online over blocks of 32 keys: 16 queries a subgroup, whose queries and sums stay
 // in registers. Includers say kChunks (head_dim / 8), kSides (how many blocks of keys are staged at once) and
 // visible_keys(row, first), a bit for each of the 32 keys from `first` on; they set block_at and score_scale.
-layout(constant_id = 30) const uint kMatM = 16; // 8 or 16
-layout(constant_id = 31) const uint kMatN = 16; // 8 or 16
-layout(constant_id = 32) const uint kMatK = 16; // divides 32
-layout(constant_id = 33) const uint kThreads = 128;
+#include "lib/cooperative_matrix.glsl"
 
 const uint kKeys = 32;    // of a block
 const uint kQueries = 16; // of a subgroup
@@ -38,13 +35,6 @@ float score_scale;        // log2(e) times that of the scores
 const uint kRounds = 8 * kQueries / kThreads > 0 ? 8 * kQueries / kThreads : 1;
 uint row_of(uint round) { return (round * gl_SubgroupSize + gl_SubgroupInvocationID) / 2; }
 float largest[kRounds], total[kRounds];
-
-// what a subgroup wrote to its parts of shared memory, the others do not see
-void own_barrier()
-{
-    subgroupMemoryBarrierShared();
-    subgroupBarrier();
-}
 
 void start_attention()
 {
@@ -174,11 +164,4 @@ void put_sums(uint piece)
             coopMatStore(sums[i], scores, score_at + i / kDimAcross * kMatM * kScorePitch + column % 16, kScorePitch,
                          gl_CooperativeMatrixLayoutRowMajor);
     }
-}
-
-// eight of them, of one query of a subgroup
-void get_sums(uint at, out vec4 lo, out vec4 hi)
-{
-    lo = vec4(scores[at], scores[at + 1], scores[at + 2], scores[at + 3]);
-    hi = vec4(scores[at + 4], scores[at + 5], scores[at + 6], scores[at + 7]);
 }

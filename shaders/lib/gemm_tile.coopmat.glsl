@@ -4,10 +4,7 @@
 // kTileM x kTileN outputs of a workgroup of four subgroups, a quarter each, as cooperative matrices: fp16 factors, fp32
 // sums. 32 columns of K at a time in shared memory, the next ones loaded into registers behind the arithmetic. The
 // planner sets tile, shape and threads; every tile gives the same bits, as K is summed in one order.
-layout(constant_id = 30) const uint kMatM = 16; // 8 or 16
-layout(constant_id = 31) const uint kMatN = 16; // 8 or 16
-layout(constant_id = 32) const uint kMatK = 16; // divides 32
-layout(constant_id = 33) const uint kThreads = 128;
+#include "lib/cooperative_matrix.glsl"
 
 const uint kStep = 32;         // columns of K in shared memory
 const uint kPitch = kStep + 8; // fp16 of a row: 16 bytes more, so that rows begin in different banks
@@ -66,25 +63,12 @@ void multiply()
     }
 }
 
-void read_slab(uint at, out vec4 lo, out vec4 hi)
-{
-    lo = vec4(slab[at], slab[at + 1], slab[at + 2], slab[at + 3]);
-    hi = vec4(slab[at + 4], slab[at + 5], slab[at + 6], slab[at + 7]);
-}
-
 void write_slab(uint at, vec4 lo, vec4 hi)
 {
     [[unroll]] for (uint i = 0; i < 4; ++i) {
         slab[at + i] = lo[i];
         slab[at + 4 + i] = hi[i];
     }
-}
-
-// what one subgroup wrote to its slab, the others do not see
-void slab_barrier()
-{
-    subgroupMemoryBarrierShared();
-    subgroupBarrier();
 }
 
 // eight columns of a row of the slab; with GEGLU the eight after them are their gates
@@ -95,11 +79,11 @@ void finish_slab_row(uint slab_at, uint item, uint first_row, uint first_col)
     if (row >= p.rows || col >= p.cols || (kGeglu && item % 2 != 0))
         return;
     vec4 lo, hi;
-    read_slab(at, lo, hi);
+    READ8(slab, at, lo, hi);
     activate8(row, col, lo, hi);
     if (kGeglu) {
         vec4 gate_lo, gate_hi;
-        read_slab(at + 8, gate_lo, gate_hi);
+        READ8(slab, at + 8, gate_lo, gate_hi);
         activate8(row, col + 8, gate_lo, gate_hi);
         lo *= gelu_erf(gate_lo);
         hi *= gelu_erf(gate_hi);
@@ -118,7 +102,7 @@ void store_slab_moments(uint slab_at, uint half_of, uint first_row, uint first_c
     ColumnMoments m = no_moments();
     for (uint i = 0; i < kSlab; ++i) {
         vec4 lo, hi;
-        read_slab(slab_at + i * kSlabPitch + half_of * 8, lo, hi);
+        READ8(slab, slab_at + i * kSlabPitch + half_of * 8, lo, hi);
         if (counts_in_moments(first_row + i))
             add_moments(m, lo, hi);
     }
@@ -131,20 +115,20 @@ void store_tile(uint tile_row, uint tile_col)
 {
     const uint at = gl_SubgroupID * kSlab * kSlabPitch, across = kHalfN / kSlab;
     [[dont_unroll]] for (uint s = 0; s < kHalfM / kSlab * across; ++s) {
-        slab_barrier();
+        own_barrier();
         [[unroll]] for (uint i = 0; i < kMatsDown * kMatsAcross; ++i) {
             const uint r = i / kMatsAcross * kMatM, c = i % kMatsAcross * kMatN;
             if (r / kSlab * across + c / kSlab == s)
                 coopMatStore(sums[i], slab, at + r % kSlab * kSlabPitch + c % kSlab, kSlabPitch,
                              gl_CooperativeMatrixLayoutRowMajor);
         }
-        slab_barrier();
+        own_barrier();
         const uint row = tile_row + quarter_row() + s / across * kSlab;
         const uint col = tile_col + quarter_col() + s % across * kSlab;
         for (uint item = gl_SubgroupInvocationID; item < 2 * kSlab; item += gl_SubgroupSize)
             finish_slab_row(at, item, row, col);
         if (kMoments) {
-            slab_barrier();
+            own_barrier();
             if (gl_SubgroupInvocationID < 2)
                 store_slab_moments(at, gl_SubgroupInvocationID, row, col);
         }

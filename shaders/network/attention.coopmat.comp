@@ -91,8 +91,8 @@ void store(uint stream, uint head)
             const float m = max(largest[round], theirs.x), a = exp2(largest[round] - m), b = exp2(theirs.x - m);
             const float inverse = 1.0 / (total[round] * a + theirs.y * b);
             vec4 lo, hi, their_lo, their_hi;
-            get_sums(score_at + own * kScorePitch + part * 8, lo, hi);
-            get_sums(other_at + own * kScorePitch + part * 8, their_lo, their_hi);
+            READ8(scores, score_at + own * kScorePitch + part * 8, lo, hi);
+            READ8(scores, other_at + own * kScorePitch + part * 8, their_lo, their_hi);
             lo = (lo * a + their_lo * b) * inverse;
             hi = (hi * a + their_hi * b) * inverse;
             STORE8(y, kHalfY, (stream * p.rows + query_row(own)) * p.y_ld + head + c * 8, lo, hi);

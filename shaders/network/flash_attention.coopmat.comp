@@ -86,7 +86,7 @@ void store(uint first_query, uint y_at, uint head)
                 continue;
             const float inverse = 1.0 / total[round];
             vec4 lo, hi;
-            get_sums(score_at + own * kScorePitch + half_of * 8, lo, hi);
+            READ8(scores, score_at + own * kScorePitch + half_of * 8, lo, hi);
             STORE8(y, kHalfY, y_at + row * p.y_ld + head + c * 8, (lo * inverse), (hi * inverse));
         }
     }
