@@ -16,7 +16,7 @@ struct TraceScene {
     Tensor materials; // [M, 8] u32 array
     Tensor texels;    // [texels] u32
 };
-constexpr double kFlopsPerRay = 6000; // a guess for a street: some forty boxes and ten triangles
+constexpr double kOperationsPerRay = 6000; // a guess for a street: some forty boxes and ten triangles
 
 // the nearest triangle on each ray, or with `any` some triangle; edges belong to triangles, both sides count
 [[nodiscard]] Tensor trace_rays(Graph& g, const TraceScene& scene,

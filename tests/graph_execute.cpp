@@ -84,7 +84,7 @@ Plan one_after_the_other(Plan plan)
         plan.blocks.push_back(std::max<uint64_t>(plan.resources[r].bytes, 256));
     }
     for (uint32_t i = 0; i < plan.passes.size(); ++i)
-        plan.passes[i].submit = plan.passes[i].level = i;
+        plan.dispatches[i].submit = plan.passes[i].level = i;
     plan.submits = plan.levels = uint32_t(plan.passes.size());
     return plan;
 }
@@ -102,14 +102,14 @@ TEST(graph_execute, gives_the_same_bytes_as_one_pass_per_submit_without_aliasing
     }
 }
 
-TEST(graph_execute, gives_the_same_bytes_in_bands_in_submits_and_in_folded_groups)
+TEST(graph_execute, gives_the_same_bytes_in_bands_in_parts_and_in_folded_groups)
 {
     DeviceLimits limits = test_device().limits();
     limits.max_storage_range = 16384;
     limits.max_texel_elements = 1024;
     limits.submit_seconds = 1e-7;
     limits.max_groups = 5;
-    uint32_t submits = 0, passes = 0;
+    uint32_t submits = 0, bands = 0, parts = 0;
     for (uint32_t seed = 100; seed < 115; ++seed) {
         SCOPED_TRACE(seed);
         ExternalMemory memory;
@@ -117,11 +117,13 @@ TEST(graph_execute, gives_the_same_bytes_in_bands_in_submits_and_in_folded_group
         const RandomGraph made(g, seed, [&](uint32_t rows, uint32_t cols) { return memory.add(g, rows, cols); });
         const Plan cut = plan_of(g, limits);
         submits += cut.submits - 1;
-        passes += uint32_t(cut.passes.size() - plan_of(g).passes.size());
+        bands += uint32_t(cut.passes.size() - plan_of(g).passes.size());
+        parts += uint32_t(cut.dispatches.size() - cut.passes.size());
         ASSERT_TRUE(run(memory, plan_of(g)) == run(memory, cut));
     }
     EXPECT_GT(submits, 100u);
-    EXPECT_GT(passes, 30u);
+    EXPECT_GT(bands, 5u);
+    EXPECT_GT(parts, 100u);
 }
 
 TEST(graph_execute, slices_a_gemm_without_changing_a_bit)
@@ -163,6 +165,44 @@ TEST(graph_execute, replays_a_program_with_the_same_bytes)
         if (first.empty())
             first = now;
         ASSERT_TRUE(first == now) << "run " << i;
+    }
+}
+
+// the first run is timed, and the others have submits of what it took
+TEST(graph_execute, cuts_submits_anew_after_the_first_run)
+{
+    auto device = Device::create({.limits = "submit=0.0005"});
+    ASSERT_TRUE(device) << device.error().message;
+    std::vector<float> numbers(256 * 256);
+    for (size_t i = 0; i < numbers.size(); ++i)
+        numbers[i] = float(i % 17) / 64 - 0.1f;
+    const uint64_t bytes = numbers.size() * sizeof(float);
+    auto x = Buffer::create(**device, bytes, MemoryKind::device, "x");
+    auto y = Buffer::create(**device, bytes, MemoryKind::device, "y");
+    ASSERT_TRUE(x && y);
+    ASSERT_TRUE((*device)->write((*x)->slice(), std::as_bytes(std::span(numbers))));
+    Graph g;
+    const Tensor w = g.external((*x)->slice(), 256, 256, DType::f32, "x");
+    Tensor t = w;
+    for (int i = 0; i < 4; ++i)
+        t = gemm(g, t, w, {}, {.dtype = DType::f32}); // 0.07 ms each, as estimated
+    g.keep(t, g.external((*y)->slice(), 256, 256, DType::f32, "y"));
+    auto program = Program::create(**device, g);
+    ASSERT_TRUE(program) << program.error().message;
+    EXPECT_EQ((*program)->plan().submits, 1u);
+    std::vector<float> first(numbers.size()), now(numbers.size());
+    ASSERT_TRUE((*program)->run());
+    ASSERT_TRUE((*device)->read((*y)->slice(), std::as_writable_bytes(std::span(first))));
+    for (int i = 0; i < 3; ++i) {
+        ASSERT_TRUE((*program)->run());
+        ASSERT_TRUE((*device)->read((*y)->slice(), std::as_writable_bytes(std::span(now))));
+        EXPECT_TRUE(first == now) << i;
+    }
+    if ((*device)->limits().type == DeviceType::cpu) { // far slower than that
+        EXPECT_GT((*program)->plan().submits, 1u);
+        auto next = Program::create(**device, g);
+        ASSERT_TRUE(next) << next.error().message;
+        EXPECT_GT((*next)->plan().submits, 1u); // it has learned
     }
 }
 

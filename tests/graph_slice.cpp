@@ -139,39 +139,6 @@ TEST(graph_slice, counts_texels_as_the_cpu_variant_binds_them)
     EXPECT_EQ(plan.passes.size(), 4u);
 }
 
-TEST(graph_slice, cuts_long_work_into_bands_and_submits)
-{
-    Graph g;
-    const Tensor x = fake_external(g, 4096, 4096), w = fake_external(g, 4096, 4096);
-    (void)gemm(g, x, w, {}, {.dtype = DType::f32}); // 137 GFLOP, 0.27 s at the assumed rate
-    DeviceLimits limits = test_limits();
-    limits.submit_seconds = 0.1;
-    const Plan plan = plan_of(g, limits);
-    EXPECT_EQ(plan.passes.size(), 3u);
-    EXPECT_EQ(plan.submits, 3u);
-    for (uint32_t i = 0; i < plan.passes.size(); ++i) {
-        EXPECT_EQ(plan.passes[i].submit, i);
-        EXPECT_LE(plan.passes[i].options.flops / 5e11, limits.submit_seconds * 1.001);
-    }
-    EXPECT_EQ(plan_of(g, test_limits()).submits, 1u); // nothing is cut without a watchdog
-}
-
-TEST(graph_slice, fills_a_submit_with_short_passes)
-{
-    Graph g;
-    Tensor x = fake_external(g, 512, 512);
-    const Tensor w = fake_external(g, 512, 512);
-    for (int i = 0; i < 12; ++i)
-        x = gemm(g, x, w, {}, {.dtype = DType::f32}); // 0.54 ms each
-    DeviceLimits limits = test_limits();
-    limits.submit_seconds = 0.002;
-    const Plan plan = plan_of(g, limits);
-    EXPECT_EQ(plan.passes.size(), 12u);
-    EXPECT_EQ(plan.submits, 4u);
-    for (size_t i = 1; i < 12; ++i)
-        EXPECT_GE(plan.passes[i].submit, plan.passes[i - 1].submit);
-}
-
 TEST(graph_slice, folds_workgroups_beyond_a_dimension_over_y)
 {
     Graph g;

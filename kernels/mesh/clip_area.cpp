@@ -8,6 +8,8 @@
 
 namespace semrover {
 
+constexpr double kOperationsPerPair = 4000; // six planes, up to eleven corners
+
 SurfaceAreas clip_area(Graph& g, const SurfaceTriangles& s, const SurfacePairs& pairs)
 {
     SR_ASSERT(s.records.ld == 12 && s.attributes.ld == 16 && s.attributes.rows == s.records.rows &&
@@ -20,7 +22,7 @@ SurfaceAreas clip_area(Graph& g, const SurfaceTriangles& s, const SurfacePairs& 
     g.dispatch(kernel::clip_area,
                {s.records, s.attributes, s.materials, s.textures, pairs.count, pairs.keys, pairs.triangles, y.areas,
                 y.labels, y.label_addresses},
-               ClipAreaPush{.size = size}, threads(size));
+               ClipAreaPush{.size = size}, threads(size), {.most_operations = size * kOperationsPerPair});
     return y;
 }
 

@@ -13,6 +13,8 @@
 
 namespace semrover {
 
+constexpr double kOperationsPerSample = 5000; // a triangle is clipped to the cell
+
 SurfaceSamples sample_surface(Graph& g, const SurfaceTriangles& s, Tensor triangles, Tensor sums, Tensor starts,
                               Tensor cells, uint32_t samples, uint64_t seed, bool canonical)
 {
@@ -26,7 +28,7 @@ SurfaceSamples sample_surface(Graph& g, const SurfaceTriangles& s, Tensor triang
     g.dispatch(
         kernel::sample_surface,
         {s.records, s.attributes, s.materials, s.textures, triangles, sums, starts, cells, y.points, y.addresses}, push,
-        threads(size), {.constants = {{"kCanonical", canonical}}});
+        threads(size), {.constants = {{"kCanonical", canonical}}, .most_operations = size * kOperationsPerSample});
     return y;
 }
 

@@ -8,13 +8,16 @@
 
 namespace semrover {
 
+constexpr double kOperationsPerPoint = 10000; // some hundred nodes of the tree, and triangles in the last ones
+
 void surface_distance(Graph& g, Tensor points, const SurfaceTree& tree, Tensor y)
 {
     SR_ASSERT(points.dtype == DType::f32 && points.cols >= 3 && y.rows == points.rows && tree.nodes.ld == 8 &&
                   tree.triangles.ld == 10 && y.ld == 2,
               "surface_distance: points [{}, {}], {} results", points.rows, points.cols, y.rows);
     g.dispatch(kernel::surface_distance, {points, tree.nodes, tree.triangles, y},
-               SurfaceDistancePush{.size = points.rows, .points_ld = points.ld}, threads(points.rows));
+               SurfaceDistancePush{.size = points.rows, .points_ld = points.ld}, threads(points.rows),
+               {.most_operations = points.rows * kOperationsPerPoint});
 }
 
 } // namespace semrover

@@ -21,7 +21,9 @@ Tensor ball_query(Graph& g, Tensor points, Tensor centers, const BallOptions& o)
                              .neighbors = o.neighbors,
                              .radius2 = o.radius * o.radius};
     const Tensor index = g.array(centers.rows * o.neighbors, DType::u32, "group members");
-    g.dispatch(kernel::ball_query, {points, centers, index}, push, threads(push.rows));
+    DispatchOptions dispatch;
+    dispatch.most_operations = 12.0 * push.rows * push.count; // no set is full before all points were looked at
+    g.dispatch(kernel::ball_query, {points, centers, index}, push, threads(push.rows), std::move(dispatch));
     return index;
 }
 

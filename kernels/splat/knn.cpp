@@ -13,6 +13,8 @@
 
 namespace semrover {
 
+constexpr double kCandidates = 27 * 16; // of a point: the cells around it, with more in each than surfaces have
+
 Tensor knn(Graph& g, Tensor points, const KnnOptions& options)
 {
     const uint32_t rows = points.rows;
@@ -49,7 +51,9 @@ Tensor knn(Graph& g, Tensor points, const KnnOptions& options)
     const uint32_t sought = others ? push.queries : rows;
     const Tensor neighbors = g.array(sought, DType::u32, "neighbours", options.neighbors);
     g.dispatch(kernel::knn_search, {sorted, sorted_labels, starts, others ? options.queries : sorted, neighbors}, push,
-               threads(sought), {.constants = {{"kNeighbors", options.neighbors}, has_labels, {"kQueries", others}}});
+               threads(sought),
+               {.constants = {{"kNeighbors", options.neighbors}, has_labels, {"kQueries", others}},
+                .most_operations = double(sought) * kCandidates * (16 + 6 * options.neighbors)});
     return neighbors;
 }
 

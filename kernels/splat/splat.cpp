@@ -102,9 +102,11 @@ Tiled sort_into_tiles(Graph& g, const Seen& seen, const SplatOptions& o, const S
     const PrefixSum first = prefix_sum(g, touched, {.count = seen.count});
     const SortedPairs pairs = {g.array(push.max_pairs, DType::u32, "pair tiles"),
                                g.array(push.max_pairs, DType::u32, "pair records")};
+    DispatchOptions emit = lens;
+    emit.most_operations = 60.0 * push.max_pairs;
     g.dispatch(kernel::splat_emit,
                {seen.records, seen.sources, order, seen.count, first.sums, pairs.keys, pairs.values}, push,
-               threads(push.max_visible), lens);
+               threads(push.max_visible), std::move(emit));
     const uint32_t bits = std::max(1, int(std::bit_width(tiles_all - 1)));
     const SortedPairs by_tile = radix_sort(g, pairs.keys, pairs.values, {.bits = bits, .count = first.total});
     return {by_tile.values, bucket_starts(g, by_tile.keys, tiles_all, first.total), first.total};
@@ -126,7 +128,7 @@ SplatImages splat(Graph& g, const SplatScene& scene, Tensor cameras, const Splat
                            seen.count,
                            by_tile.pairs};
     DispatchOptions blend;
-    blend.flops = 40.0 * push.max_pairs * options.tile * options.tile; // an upper bound: pixels are done early
+    blend.most_operations = 40.0 * push.max_pairs * options.tile * options.tile; // no pixel is done early
     const Grid grid = tiles(options.height, options.width, push.cameras);
     if (options.lens == SplatLens::pinhole) {
         g.dispatch(kernel::splat_blend,

@@ -28,7 +28,7 @@ Tensor shade(Graph& g, const TraceScene& scene, Tensor view, const ShadeOptions&
     const Tensor surfaces = g.array(pixels, DType::u32, "surfaces", 4);
     DispatchOptions dispatch;
     dispatch.banded = {"Light", "Ambient", "Surfaces"};
-    dispatch.flops = double(pixels) * options.samples * (2.5 + options.ambient_rays) * kFlopsPerRay;
+    dispatch.most_operations = double(pixels) * options.samples * (2.5 + options.ambient_rays) * kOperationsPerRay;
     g.dispatch(
         kernel::shade,
         {scene.nodes, scene.triangles, scene.corners, scene.materials, scene.texels, view, light, ambient, surfaces},

@@ -16,7 +16,7 @@ Tensor trace_rays(Graph& g, const TraceScene& scene, Tensor rays, bool any)
     DispatchOptions options;
     options.constants = {{"kAny", any}};
     options.banded = {"Rays", "Hits"};
-    options.flops = rays.rows * kFlopsPerRay;
+    options.most_operations = rays.rows * kOperationsPerRay;
     g.dispatch(kernel::trace_rays, {scene.nodes, scene.triangles, rays, hits}, push, threads(rays.rows),
                std::move(options));
     return hits;

@@ -173,7 +173,7 @@ Status Device::finish(const DeviceOptions& options)
     SR_CHECK(override_limits(limits_, options.limits));
     VkPhysicalDeviceProperties properties;
     vkGetPhysicalDeviceProperties(physical_, &properties);
-    timestamp_ns_ = properties.limits.timestampPeriod;
+    timestamp_ns_ = has_timestamps(physical_, queue_family_) ? properties.limits.timestampPeriod : 0;
     auto type = vk_struct<VkSemaphoreTypeCreateInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_TYPE_CREATE_INFO);
     type.semaphoreType = VK_SEMAPHORE_TYPE_TIMELINE;
     auto semaphore = vk_struct<VkSemaphoreCreateInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO, &type);

@@ -5,6 +5,7 @@
 #include "runtime/device/memory.h"
 #include "runtime/device/vulkan.h"
 #include "runtime/graph/limits.h"
+#include "runtime/graph/work_rates.h"
 
 #include <functional>
 #include <memory>
@@ -67,7 +68,8 @@ class Device {
     VkInstance instance() const { return instance_; }
     VkPhysicalDevice physical() const { return physical_; }
     uint32_t queue_family() const { return queue_family_; }
-    double timestamp_ns() const { return timestamp_ns_; }
+    double timestamp_ns() const { return timestamp_ns_; } // of a unit; 0: the queue has none
+    WorkRates& rates() { return rates_; }
     PipelineStore& pipelines() { return *pipelines_; }
 
     // synchronous copies, after everything submitted so far; through staging where the host cannot see the memory
@@ -122,6 +124,7 @@ class Device {
     std::shared_ptr<Profile> profile_;
     HostBytes host_bytes_;
     DeviceLimits limits_;
+    WorkRates rates_;
     std::string name_, driver_;
     double timestamp_ns_ = 1;
     uint64_t allocated_ = 0, peak_ = 0, budget_ = 0;

@@ -202,6 +202,12 @@ bool is_compute_family(VkPhysicalDevice physical, uint32_t family)
     return family < families.size() && (families[family].queueFlags & VK_QUEUE_COMPUTE_BIT);
 }
 
+bool has_timestamps(VkPhysicalDevice physical, uint32_t family)
+{
+    const auto families = queue_families(physical);
+    return family < families.size() && families[family].timestampValidBits > 0;
+}
+
 Result<uint32_t> compute_queue_family(VkPhysicalDevice physical)
 {
     const auto families = queue_families(physical);

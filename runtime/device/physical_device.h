@@ -14,6 +14,7 @@ Result<std::vector<VkPhysicalDevice>> physical_devices(VkInstance instance); // 
 DeviceSummary summarize(VkInstance instance, VkPhysicalDevice physical, uint32_t index);
 bool has_extension(VkPhysicalDevice physical, const char* name);
 Result<uint32_t> compute_queue_family(VkPhysicalDevice physical);
+bool has_timestamps(VkPhysicalDevice physical, uint32_t family);
 bool is_compute_family(VkPhysicalDevice physical, uint32_t family);
 
 } // namespace semrover

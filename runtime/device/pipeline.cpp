@@ -196,6 +196,7 @@ Status PipelineStore::make(const KernelVariant& variant, const std::map<uint32_t
         "main",
         &specialization};
     info.layout = out.layout;
+    info.flags = VK_PIPELINE_CREATE_DISPATCH_BASE_BIT; // long passes are cut
     const VkResult result = vkCreateComputePipelines(device_.handle(), cache_, 1, &info, nullptr, &out.pipeline);
     vkDestroyShaderModule(device_.handle(), module, nullptr);
     SR_VK(result);

@@ -13,6 +13,7 @@ namespace semrover {
 Result<std::unique_ptr<Program>> Program::create(Device& device, const Graph& graph)
 {
     SR_TRY(Plan plan, make_plan(graph.desc(), device.limits()));
+    stage::schedule(plan, device.limits(), device.rates().seconds(plan));
     return create(device, std::move(plan));
 }
 
@@ -21,6 +22,8 @@ Result<std::unique_ptr<Program>> Program::create(Device& device, Plan plan)
     std::unique_ptr<Program> p(new Program(device, std::move(plan)));
     SR_CHECK(p->allocate());
     SR_CHECK(p->make_sets());
+    p->measuring_ = device.limits().submit_seconds > 0 && device.timestamp_ns() > 0 && !p->plan_.passes.empty();
+    SR_CHECK(p->make_queries());
     SR_CHECK(p->record());
     return p;
 }
@@ -123,6 +126,17 @@ Status Program::bind(const Pass& pass, VkDescriptorSet set)
     return {};
 }
 
+Status Program::make_queries()
+{
+    if (!device_.profile() && !measuring_)
+        return {};
+    auto queries = vk_struct<VkQueryPoolCreateInfo>(VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO);
+    queries.queryType = VK_QUERY_TYPE_TIMESTAMP;
+    queries.queryCount = uint32_t(plan_.dispatches.size() * 2);
+    SR_VK(vkCreateQueryPool(device_.handle(), &queries, nullptr, &queries_));
+    return {};
+}
+
 Status Program::record()
 {
     auto pool = vk_struct<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
@@ -135,12 +149,6 @@ Status Program::record()
     allocate.commandPool = commands_pool_;
     allocate.commandBufferCount = plan_.submits;
     SR_VK(vkAllocateCommandBuffers(device_.handle(), &allocate, commands_.data()));
-    if (device_.profile()) {
-        auto queries = vk_struct<VkQueryPoolCreateInfo>(VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO);
-        queries.queryType = VK_QUERY_TYPE_TIMESTAMP;
-        queries.queryCount = uint32_t(plan_.passes.size() * 2);
-        SR_VK(vkCreateQueryPool(device_.handle(), &queries, nullptr, &queries_));
-    }
     for (uint32_t i = 0; i < plan_.submits; ++i)
         SR_CHECK(record_submit(i));
     return {};
@@ -151,35 +159,48 @@ Status Program::record_submit(uint32_t index)
     const VkCommandBuffer commands = commands_[index];
     SR_CHECK(begin_commands(commands, false));
     uint32_t level = ~0u;
-    for (size_t i = 0; i < plan_.passes.size(); ++i) {
-        const Pass& pass = plan_.passes[i];
-        if (pass.submit != index)
+    for (size_t i = 0; i < plan_.dispatches.size(); ++i) {
+        if (plan_.dispatches[i].submit != index)
             continue;
+        const Pass& pass = plan_.passes[plan_.dispatches[i].pass];
         if (level != ~0u && pass.level != level)
             record_barrier(commands);
         level = pass.level;
-        vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipelines_[i]->pipeline);
-        vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipelines_[i]->layout, 0, 1, &sets_[i], 0,
-                                nullptr);
-        if (!pass.push.empty())
-            vkCmdPushConstants(commands, pipelines_[i]->layout, VK_SHADER_STAGE_COMPUTE_BIT, 0,
-                               uint32_t(pass.push.size()), pass.push.data());
-        const uint32_t query = uint32_t(i * 2);
-        if (queries_) {
-            vkCmdResetQueryPool(commands, queries_, query, 2);
-            vkCmdWriteTimestamp(commands, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, queries_, query);
-        }
-        vkCmdDispatch(commands, pass.group_count[0], pass.group_count[1], pass.group_count[2]);
-        if (queries_)
-            vkCmdWriteTimestamp(commands, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, queries_, query + 1);
+        record_dispatch(commands, i);
     }
     record_final_barrier(commands);
     SR_VK(vkEndCommandBuffer(commands));
     return {};
 }
 
+void Program::record_dispatch(VkCommandBuffer commands, size_t index)
+{
+    const Dispatch& d = plan_.dispatches[index];
+    const Pass& pass = plan_.passes[d.pass];
+    const Pipeline& pipeline = *pipelines_[d.pass];
+    vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline.pipeline);
+    vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline.layout, 0, 1, &sets_[d.pass], 0,
+                            nullptr);
+    if (!pass.push.empty())
+        vkCmdPushConstants(commands, pipeline.layout, VK_SHADER_STAGE_COMPUTE_BIT, 0, uint32_t(pass.push.size()),
+                           pass.push.data());
+    const uint32_t query = uint32_t(index * 2);
+    if (queries_) {
+        vkCmdResetQueryPool(commands, queries_, query, 2);
+        vkCmdWriteTimestamp(commands, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, queries_, query);
+    }
+    if (d.base[0] || d.base[1] || d.base[2])
+        vkCmdDispatchBase(commands, d.base[0], d.base[1], d.base[2], d.count[0], d.count[1], d.count[2]);
+    else
+        vkCmdDispatch(commands, d.count[0], d.count[1], d.count[2]);
+    if (queries_)
+        vkCmdWriteTimestamp(commands, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, queries_, query + 1);
+}
+
 Result<uint64_t> Program::submit()
 {
+    if (measuring_ && runs_ == 1)
+        SR_CHECK(schedule_again());
     const auto begin = std::chrono::steady_clock::now();
     uint64_t ticket = device_.last_ticket();
     for (const VkCommandBuffer& commands : commands_) {
@@ -194,25 +215,59 @@ Status Program::run()
 {
     SR_TRY(const uint64_t ticket, submit());
     SR_CHECK(device_.wait(ticket));
-    return queries_ ? collect_profile() : Status{};
+    return device_.profile() ? collect_profile() : Status{};
+}
+
+Result<std::vector<uint64_t>> Program::stamps() const
+{
+    std::vector<uint64_t> out(plan_.dispatches.size() * 2);
+    SR_VK(vkGetQueryPoolResults(device_.handle(), queries_, 0, uint32_t(out.size()), out.size() * 8, out.data(), 8,
+                                VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT));
+    return out;
+}
+
+// by what the first run took
+Status Program::schedule_again()
+{
+    SR_CHECK(device_.wait(device_.last_ticket()));
+    SR_TRY(const std::vector<uint64_t> stamps, stamps());
+    std::vector<double> seconds(plan_.passes.size());
+    for (size_t i = 0; i < plan_.dispatches.size(); ++i)
+        if (stamps[2 * i + 1] > stamps[2 * i]) // counters of few bits begin again
+            seconds[plan_.dispatches[i].pass] +=
+                double(stamps[2 * i + 1] - stamps[2 * i]) * device_.timestamp_ns() / 1e9;
+    for (size_t i = 0; i < plan_.passes.size(); ++i) {
+        const Pass& pass = plan_.passes[i];
+        device_.rates().learn(pass, seconds[i]);
+        if (pass.options.most_operations > 0)
+            seconds[i] = std::max(seconds[i], device_.rates().seconds(pass));
+    }
+    stage::schedule(plan_, device_.limits(), seconds);
+    vkDestroyCommandPool(device_.handle(), commands_pool_, nullptr);
+    vkDestroyQueryPool(device_.handle(), queries_, nullptr);
+    queries_ = VK_NULL_HANDLE;
+    measuring_ = false;
+    SR_CHECK(make_queries());
+    return record();
 }
 
 Status Program::collect_profile()
 {
     if (!queries_ || !device_.profile())
         return {};
-    std::vector<uint64_t> stamps(plan_.passes.size() * 2);
-    SR_VK(vkGetQueryPoolResults(device_.handle(), queries_, 0, uint32_t(stamps.size()), stamps.size() * 8,
-                                stamps.data(), 8, VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT));
-    for (size_t i = 0; i < plan_.passes.size(); ++i) {
-        const Pass& pass = plan_.passes[i];
+    SR_TRY(const std::vector<uint64_t> stamps, stamps());
+    for (size_t i = 0; i < plan_.dispatches.size(); ++i) {
+        const Dispatch& d = plan_.dispatches[i];
+        const Pass& pass = plan_.passes[d.pass];
         const double begin = double(stamps[2 * i]) * device_.timestamp_ns() / 1e3;
         const double end = double(stamps[2 * i + 1]) * device_.timestamp_ns() / 1e3;
         std::string name(pass.kernel->name);
         if (!pass.variant->name.empty())
             name += fmt::format(".{}", pass.variant->name);
+        const double part = double(d.count[0]) * d.count[1] * d.count[2] /
+                            (double(pass.group_count[0]) * pass.group_count[1] * pass.group_count[2]);
         device_.profile()->add(
-            {std::move(name), begin, end - begin, std::to_array(pass.group_count), pass.options.flops});
+            {std::move(name), begin, end - begin, std::to_array(d.count), pass.options.flops * part});
     }
     return {};
 }

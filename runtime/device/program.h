@@ -11,7 +11,8 @@
 namespace semrover {
 
 // A compiled graph on a device: arena, pipelines, descriptor sets and recorded command buffers; run any number of
-// times, each run one submit (one per slice where the plan cut it).
+// times, each run one submit, or several short ones where the device has a watchdog. The first run is measured then,
+// and the second waits for it once and cuts submits by what passes really took.
 class Program {
   public:
     static Result<std::unique_ptr<Program>> create(Device& device, const Graph& graph);
@@ -32,8 +33,12 @@ class Program {
     Status allocate();
     Status make_sets();
     Status bind(const Pass& pass, VkDescriptorSet set);
+    Status make_queries();
     Status record();
     Status record_submit(uint32_t index);
+    void record_dispatch(VkCommandBuffer commands, size_t index);
+    Result<std::vector<uint64_t>> stamps() const; // two a dispatch, in units of the device
+    Status schedule_again();
     std::pair<VkBuffer, uint64_t> locate(const PassBinding& binding) const;
 
     Device& device_;
@@ -46,6 +51,7 @@ class Program {
     std::vector<VkDescriptorSet> sets_;             // one per pass
     std::vector<VkBufferView> views_;
     std::vector<VkCommandBuffer> commands_; // one per submit
+    bool measuring_ = false;                // the first run, whose passes are timed to cut submits by
     double host_us_ = 0;
     uint64_t runs_ = 0;
 };

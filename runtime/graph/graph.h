@@ -78,8 +78,9 @@ struct DispatchOptions {
     std::vector<BandedBinding> banded = {};
     // the constant with which a producer of binding X can do this dispatch's work in its epilogue ("kGelu")
     std::string_view absorbed_as = {};
-    bool keeps_x = false; // absorbed: the producer goes on writing X, others may read it (statistics of X)
-    double flops = 0;
+    bool keeps_x = false;       // absorbed: the producer goes on writing X, others may read it (statistics of X)
+    double flops = 0;           // counted
+    double most_operations = 0; // about, at most: where the data says how many
     uint32_t without_needs = 0; // KernelNeeds that a variant may not have for this one: its shape does not suit them
 };
 

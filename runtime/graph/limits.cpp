@@ -66,11 +66,10 @@ Status apply(DeviceLimits& limits, const std::string& key, const std::string& te
         limits.submit_seconds = value;
         return {};
     }
-    return fail(
-        ErrorCode::usage,
-        "unknown limit '{}' (known: shared, range, texels, alloc, groups, buffers, fp16, coopmat, subgroups, staging, submit, "
-        "variant)",
-        key);
+    return fail(ErrorCode::usage,
+                "unknown limit '{}' (known: shared, range, texels, alloc, groups, buffers, fp16, coopmat, subgroups, "
+                "staging, submit, variant)",
+                key);
 }
 
 } // namespace

@@ -37,6 +37,10 @@ Result<Plan> make_plan(const GraphDesc& graph, const DeviceLimits& limits)
     SR_CHECK(stage::place(plan, limits));
     SR_CHECK(stage::slice(plan, limits));
     SR_CHECK(stage::order(plan));
+    std::vector<double> seconds;
+    for (const Pass& pass : plan.passes)
+        seconds.push_back(estimated_seconds(pass));
+    stage::schedule(plan, limits, seconds);
     return plan;
 }
 

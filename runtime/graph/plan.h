@@ -35,10 +35,18 @@ struct Pass {
     std::vector<uint32_t> absorbed; // ids of the constants of fused epilogues, and the bindings they took
     std::vector<size_t> slots;
     uint32_t level = 0;                           // passes of one level run without a barrier between them
-    uint32_t submit = 0;                          // index of the command buffer it is recorded in
     std::optional<uint32_t> tile_rows, tile_cols; // of the output, that a workgroup makes; where its shader says so
 
     void set_push(std::string_view name, uint32_t value); // the shader has such a member
+};
+
+// a part of a pass's workgroups, or all of them, as the device gets it
+struct Dispatch {
+    uint32_t pass = 0;                                  // its index
+    uint32_t submit = 0;                                // index of the command buffer it is recorded in
+    uint32_t base[3] = {0, 0, 0}, count[3] = {1, 1, 1}; // workgroups
+
+    bool operator==(const Dispatch&) const = default;
 };
 
 struct Placement {
@@ -52,6 +60,7 @@ struct Plan {
     std::vector<Pass> passes;
     std::vector<Placement> placements; // one per resource
     std::vector<uint64_t> blocks;      // bytes of the arena's blocks
+    std::vector<Dispatch> dispatches;  // in order of the passes
     uint32_t levels = 0;
     uint32_t submits = 0;
     uint32_t fused = 0; // nodes absorbed by their producers
@@ -70,15 +79,21 @@ Status fuse(Plan& plan);  // epilogues into their producers
 Status pick_variants(Plan& plan, const DeviceLimits& limits); // a shader per pass, its constants and bindings
 Status lifetimes(Plan& plan);                                 // first and last pass of each transient
 Status place(Plan& plan, const DeviceLimits& limits);         // aliased arena
-Status slice(Plan& plan, const DeviceLimits& limits);         // row bands for limits, groups, submits
+Status slice(Plan& plan, const DeviceLimits& limits);         // row bands for limits, groups
 Status order(Plan& plan);                                     // levels from access x byte range: the barriers
+// dispatches and submits for passes that take that many seconds each; may be done again once they are measured
+void schedule(Plan& plan, const DeviceLimits& limits, std::span<const double> seconds);
 } // namespace stage
+
+// Seconds that a pass takes on a slow GPU: arithmetic or memory, whichever takes longer. Good enough to keep the first
+// submits under a watchdog.
+double estimated_seconds(const Pass& pass);
 
 // do the memory ranges of two bindings overlap, after placement?
 bool overlaps(const Plan& plan, const PassBinding& a, const PassBinding& b);
 
-// The variant of `kernel` for a device, among those its limits allow with these constants and tensors (none: fp16 ones):
-// the forced one, else cpu, coopmat or simt by device type.
+// The variant of `kernel` for a device, among those its limits allow with these constants and tensors (none: fp16
+// ones): the forced one, else cpu, coopmat or simt by device type.
 const KernelVariant* choose_variant(const Kernel& kernel, const DeviceLimits& limits,
                                     std::span<const ConstantValue> constants = {},
                                     std::span<const Tensor> tensors = {});

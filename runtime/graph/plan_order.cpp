@@ -32,9 +32,7 @@ Status order(Plan& plan)
         uint32_t level = 0;
         for (size_t k = 0; k < i; ++k) {
             const Pass& before = plan.passes[k];
-            if (before.submit != plan.passes[i].submit)
-                level = std::max(level, before.level + 1); // submits stay in order
-            else if (before.level >= level && conflict(plan, before, plan.passes[i]))
+            if (before.level >= level && conflict(plan, before, plan.passes[i]))
                 level = before.level + 1;
         }
         plan.passes[i].level = level;

@@ -1,7 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// stage 6: cuts passes into bands of rows where a binding exceeds what the device can bind or the work exceeds one
-// submit; then counts workgroups
+// stage 6: cuts passes into bands of rows where a binding exceeds what the device can bind; then counts workgroups
 #include "runtime/graph/plan.h"
 
 #include "runtime/graph/protocol.h"
@@ -14,8 +13,8 @@ namespace semrover::stage {
 
 namespace {
 
-// a rate that no supported GPU falls short of by much; only used to keep one submit under the watchdog
-constexpr double kAssumedFlopsPerSecond = 5e11;
+// of a row, where one dimension does not hold all workgroups: short, as rows are what a schedule can cut then
+constexpr uint32_t kFoldedGroups = 4096;
 
 uint64_t range_limit(const PassBinding& b, const DeviceLimits& limits)
 {
@@ -116,9 +115,6 @@ Result<uint32_t> band_rows(const Plan& plan, const Pass& pass, const DeviceLimit
         if (!how || band < step)
             return too_large(plan, pass, b, step, limits);
     }
-    const double seconds = pass.options.flops / kAssumedFlopsPerSecond;
-    if (limits.submit_seconds > 0 && seconds > limits.submit_seconds && rows)
-        band = std::min<uint64_t>(band, uint64_t(rows * limits.submit_seconds / seconds) + 1);
     if (band >= rows)
         return rows;
     const uint64_t whole_tiles = std::lcm(step, uint64_t(pass.tile_rows.value_or(1))); // no half-empty ones
@@ -145,6 +141,7 @@ Pass band_of(const Pass& whole, uint32_t first, uint32_t count, uint32_t total, 
         pass.set_push(protocol::kFirstRow, first);
     pass.grid.x = pass.grid.unit == Grid::Unit::tiles ? count : uint32_t(uint64_t(whole.grid.x) * count / total);
     pass.options.flops = whole.options.flops * count / total;
+    pass.options.most_operations = whole.options.most_operations * count / total;
     return pass;
 }
 
@@ -163,7 +160,8 @@ Status count_groups(Pass& pass, const DeviceLimits& limits)
         SR_ASSERT(m || pass.grid.unit == Grid::Unit::threads, "{}: a grid of row tiles needs kTileM",
                   pass.kernel->name);
         n[0] = divide_up(pass.grid.x, pass.grid.unit == Grid::Unit::threads ? pass.variant->local_size[0] : *m);
-        n[1] = divide_up(n[0], limits.max_groups); // the shader's linear_group() undoes it
+        if (n[0] > limits.max_groups)
+            n[1] = divide_up(n[0], std::min(limits.max_groups, kFoldedGroups)); // the shader's linear_group() undoes it
         n[0] = divide_up(n[0], n[1]);
     }
     for (int i = 0; i < 3; ++i)
@@ -171,23 +169,6 @@ Status count_groups(Pass& pass, const DeviceLimits& limits)
             return fail(ErrorCode::out_of_memory, "{}: {} workgroups in dimension {}, the device takes 1..{}",
                         pass.kernel->name, n[i], i, limits.max_groups);
     return {};
-}
-
-// consecutive passes share a submit until its estimated time is used up
-void assign_submits(Plan& plan, const DeviceLimits& limits)
-{
-    double seconds = 0;
-    uint32_t submit = 0;
-    for (Pass& pass : plan.passes) {
-        const double cost = pass.options.flops / kAssumedFlopsPerSecond;
-        if (limits.submit_seconds > 0 && seconds > 0 && seconds + cost > limits.submit_seconds) {
-            ++submit;
-            seconds = 0;
-        }
-        seconds += cost;
-        pass.submit = submit;
-    }
-    plan.submits = plan.passes.empty() ? 0 : submit + 1;
 }
 
 } // namespace
@@ -208,7 +189,6 @@ Status slice(Plan& plan, const DeviceLimits& limits)
     for (Pass& pass : passes)
         SR_CHECK(count_groups(pass, limits));
     plan.passes = std::move(passes);
-    assign_submits(plan, limits);
     return {};
 }
 

@@ -313,6 +313,12 @@ VKAPI_ATTR void VKAPI_CALL dispatch(VkCommandBuffer commands, uint32_t x, uint32
     p.fewest_groups = std::min(p.fewest_groups, uint64_t(x) * y * z);
 }
 
+VKAPI_ATTR void VKAPI_CALL dispatch_base(VkCommandBuffer commands, uint32_t, uint32_t, uint32_t, uint32_t x, uint32_t y,
+                                         uint32_t z)
+{
+    dispatch(commands, x, y, z);
+}
+
 VKAPI_ATTR void VKAPI_CALL barrier(VkCommandBuffer, VkPipelineStageFlags, VkPipelineStageFlags, VkDependencyFlags,
                                    uint32_t, const VkMemoryBarrier*, uint32_t, const VkBufferMemoryBarrier*, uint32_t,
                                    const VkImageMemoryBarrier*)
@@ -538,6 +544,7 @@ PFN_vkVoidFunction ours(std::string_view name)
         {"vkCmdBindDescriptorSets", any(bind_sets)},
         {"vkCmdPushConstants", any(push_constants)},
         {"vkCmdDispatch", any(dispatch)},
+        {"vkCmdDispatchBase", any(dispatch_base)},
         {"vkCmdPipelineBarrier", any(barrier)},
         {"vkCmdCopyBuffer", any(copy_buffer)},
         {"vkCmdFillBuffer", any(fill_buffer)},

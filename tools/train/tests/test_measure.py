@@ -10,8 +10,9 @@ import unittest
 
 import numpy as np
 
-from semtrain import cuts, measure, safetensors_file
+from semtrain import cuts, measure, measure_generated, safetensors_file
 from semtrain.json_file import read_json
+from semtrain.program import REPOSITORY
 from test_transformer import train, write_street
 
 
@@ -60,6 +61,23 @@ class Pieces(unittest.TestCase):
         made = os.stat(self.path("table", "tiny-ddpm-2-1", "7.sgrid")).st_mtime_ns
         self.assertEqual(self.measure()[2:], rows)
         self.assertEqual(os.stat(self.path("table", "tiny-ddpm-2-1", "7.sgrid")).st_mtime_ns, made)
+
+
+class GeneratedStreets(unittest.TestCase):
+    def test_are_refined_and_compared_with_refined_true_points(self):
+        with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()):
+            measure_generated.main(["-o", folder, "--model", "default=" + os.path.join(REPOSITORY, "assets", "model"),
+                                    "--seeds", "9004", "--frames", "2", "--reach", "6", "-W", "128", "-H", "96",
+                                    "--objects", "street"])
+            with open(os.path.join(folder, "table.md")) as file:
+                rows = [line.split(" | ") for line in file.read().splitlines()[2:]]
+            self.assertEqual([row[:4] for row in rows][0], ["| default", "true points", "-", "-"])
+            self.assertEqual(rows[1][1], "street")
+            self.assertGreater(float(rows[1][2]), 10)  # dB: the same place, but not the same points
+            self.assertLess(float(rows[1][3]), 1)
+            sizes = {name: safetensors_file.read(os.path.join(folder, "streets", "9004", name + ".sgrid"))["cells"].shape
+                     for name in ("truth", "semantic")}
+            self.assertEqual(sizes["truth"], sizes["semantic"])
 
 
 if __name__ == "__main__":
