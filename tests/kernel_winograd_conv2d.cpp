@@ -120,5 +120,27 @@ TEST(kernel_winograd_conv2d, does_large_images_in_bands_of_tiles)
     check(c, r, DType::f16, 997);
 }
 
+// Winograd's sums have other bits than direct ones
+TEST(kernel_winograd_conv2d, is_chosen_by_the_image_and_not_by_how_many_there_are)
+{
+    DeviceLimits limits;
+    limits.max_texel_elements = 1 << 27;
+    ConvOptions o;
+    o.kernel = 3;
+    uint32_t chosen = 0, others = 0;
+    for (uint32_t height = 4; height <= 40; ++height)
+        for (uint32_t width = 4; width <= 40; width += 3) {
+            const auto prefers = [&](uint32_t images) {
+                Graph g;
+                return prefers_winograd(limits, feature_map(g, images, height, width, 128, DType::f16, "x"), 128, o);
+            };
+            for (uint32_t images : {2u, 3u, 8u})
+                ASSERT_EQ(prefers(images), prefers(1)) << images << " images of " << width << "x" << height;
+            ++(prefers(1) ? chosen : others);
+        }
+    EXPECT_GT(chosen, 50u);
+    EXPECT_GT(others, 50u);
+}
+
 } // namespace kernel_winograd_conv2d_test
 } // namespace semrover

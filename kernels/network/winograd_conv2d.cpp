@@ -16,7 +16,7 @@ namespace {
 constexpr uint64_t kBandBytes = 64 << 20; // of V and m, about: larger images are done in bands of tiles
 constexpr uint32_t kBandTiles = 32;       // a band is a multiple: rows of a GEMM tile on CPUs
 
-constexpr uint32_t kFewestTiles = 64;
+constexpr uint32_t kFewestTiles = 32;    // of an image; guidance has two
 constexpr uint64_t kFewestChannels = 48; // N C / (N + C)
 
 struct Tiling {
@@ -137,8 +137,9 @@ bool prefers_winograd(const DeviceLimits& limits, const FeatureMap& x, uint32_t 
     if (36 * n * c * 4 > most || rows * round_up(outputs, kRowPadding) * dtype_bytes(o.dtype) > most ||
         kBandBytes + (kBandTiles * 36 * 4 * (n + c)) > most || x.data.bytes() > texel_bytes)
         return false;
-    // tiles pay for the transform of the weights, channels for those of the image
-    return tiling_of(y).total >= kFewestTiles && n * c >= kFewestChannels * (n + c);
+    // Tiles pay for the transform of the weights, channels for those of the image. Of one image: the same bits whatever
+    // it is packed with.
+    return tiling_of(y).per_image >= kFewestTiles && n * c >= kFewestChannels * (n + c);
 }
 
 } // namespace semrover

@@ -5,9 +5,11 @@
 #include "runtime/base/diagnostics.h"
 #include "runtime/device/command.h"
 #include "runtime/device/cooperative_matrix.h"
+#include "runtime/device/device_fault.h"
 #include "runtime/device/physical_device.h"
 #include "runtime/device/pipeline.h"
 #include "runtime/device/profile.h"
+#include "runtime/device/staging.h"
 #include "runtime/graph/kernel.h"
 
 #include <algorithm>
@@ -142,6 +144,13 @@ Status Device::create_device(bool matrices)
     std::vector<const char*> extensions;
     if (has_extension(physical_, "VK_KHR_portability_subset")) // must be enabled where there is one: MoltenVK's
         extensions.push_back("VK_KHR_portability_subset");
+    auto faults = vk_struct<VkPhysicalDeviceFaultFeaturesEXT>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FAULT_FEATURES_EXT);
+    if (tells_faults(physical_)) {
+        faults.deviceFault = VK_TRUE;
+        features.pNext = &faults;
+        faults.pNext = &f12;
+        extensions.push_back(VK_EXT_DEVICE_FAULT_EXTENSION_NAME);
+    }
     MatrixFeatures matrix;
     if (matrices) {
         f12.vulkanMemoryModel = VK_TRUE;
@@ -238,7 +247,8 @@ Result<uint64_t> Device::submit(std::span<const VkCommandBuffer> commands)
     const VkResult result = vkQueueSubmit(queue_, 1, &info, VK_NULL_HANDLE);
     if (unlock_)
         unlock_();
-    SR_VK(result);
+    if (result != VK_SUCCESS)
+        return tl::make_unexpected(device_error(device_, result, "vkQueueSubmit"));
     return ticket_ = value;
 }
 
@@ -252,7 +262,8 @@ Status Device::wait(uint64_t ticket)
     if (result == VK_TIMEOUT)
         return fail(ErrorCode::device_lost, "device '{}' did not finish a submit within {} s", name_,
                     kWaitNanoseconds / 1000000000);
-    SR_VK(result);
+    if (result != VK_SUCCESS)
+        return tl::make_unexpected(device_error(device_, result, "vkWaitSemaphores"));
     return {};
 }
 
@@ -263,22 +274,12 @@ Result<bool> Device::finished(uint64_t ticket) const
     return value >= ticket;
 }
 
-Result<Buffer*> Device::staging()
+Result<Staging*> Device::staging()
 {
     if (!staging_) {
-        SR_TRY(staging_,
-               Buffer::create(*this, std::min(kStagingBytes, limits_.max_allocation), MemoryKind::transfer, "staging"));
+        SR_TRY(staging_, Staging::create(*this, std::min(kStagingBytes, limits_.max_allocation)));
     }
     return staging_.get();
-}
-
-Status Device::copy(VkBuffer from, uint64_t from_at, VkBuffer to, uint64_t to_at, uint64_t bytes)
-{
-    SR_CHECK(begin_commands(copy_commands_, true));
-    record_copy(copy_commands_, from, from_at, to, to_at, bytes);
-    SR_VK(vkEndCommandBuffer(copy_commands_));
-    SR_TRY(const uint64_t ticket, submit({&copy_commands_, 1}));
-    return wait(ticket);
 }
 
 Status Device::write(const BufferSlice& to, std::span<const std::byte> bytes)
@@ -291,13 +292,8 @@ Status Device::write(const BufferSlice& to, std::span<const std::byte> bytes)
             std::memcpy(mapped + to.offset, bytes.data(), bytes.size());
         return {};
     }
-    SR_TRY(Buffer * stage, staging());
-    for (uint64_t at = 0; at < bytes.size(); at += stage->bytes()) {
-        const uint64_t count = std::min<uint64_t>(stage->bytes(), bytes.size() - at);
-        std::memcpy(stage->mapped(), bytes.data() + at, count);
-        SR_CHECK(copy(stage->handle(), 0, to.buffer->handle(), to.offset + at, count));
-    }
-    return {};
+    SR_TRY(Staging * window, staging());
+    return window->write(to, bytes);
 }
 
 Status Device::read(const BufferSlice& from, std::span<std::byte> bytes)
@@ -310,13 +306,8 @@ Status Device::read(const BufferSlice& from, std::span<std::byte> bytes)
             std::memcpy(bytes.data(), mapped + from.offset, bytes.size());
         return {};
     }
-    SR_TRY(Buffer * stage, staging());
-    for (uint64_t at = 0; at < bytes.size(); at += stage->bytes()) {
-        const uint64_t count = std::min<uint64_t>(stage->bytes(), bytes.size() - at);
-        SR_CHECK(copy(from.buffer->handle(), from.offset + at, stage->handle(), 0, count));
-        std::memcpy(bytes.data() + at, stage->mapped(), count);
-    }
-    return {};
+    SR_TRY(Staging * window, staging());
+    return window->read(from, bytes);
 }
 
 Status Device::clear(const BufferSlice& slice)

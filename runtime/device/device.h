@@ -18,6 +18,7 @@ namespace semrover {
 
 class PipelineStore;
 class Profile;
+class Staging;
 
 struct DeviceOptions {
     std::string select = {}; // "", an index of list_devices(), or part of a name
@@ -102,8 +103,7 @@ class Device {
     Status create_instance(const DeviceOptions& options);
     Status create_device(bool matrices); // enables cooperative matrices
     Status finish(const DeviceOptions& options);
-    Status copy(VkBuffer from, uint64_t from_at, VkBuffer to, uint64_t to_at, uint64_t bytes);
-    Result<Buffer*> staging();
+    Result<Staging*> staging();
 
     VkInstance instance_ = VK_NULL_HANDLE;
     VkDebugUtilsMessengerEXT messenger_ = VK_NULL_HANDLE;
@@ -119,7 +119,7 @@ class Device {
     uint64_t ticket_ = 0;
     VkCommandPool copy_pool_ = VK_NULL_HANDLE;
     VkCommandBuffer copy_commands_ = VK_NULL_HANDLE;
-    std::unique_ptr<Buffer> staging_;
+    std::unique_ptr<Staging> staging_;
     std::unique_ptr<PipelineStore> pipelines_;
     std::shared_ptr<Profile> profile_;
     HostBytes host_bytes_;
