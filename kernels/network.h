@@ -115,8 +115,7 @@ constexpr uint32_t kAttentionTile = 32; // queries of a tile, at most; a tile st
                                uint32_t heads,
                                uint32_t streams); // whose queries are answered: 1 voxel only, 2 both
 
-// -- images: convolution, norms, attention
-// -----------------------------------------------------------------------------
+// -- images: convolution, norms, attention ---------------------------------------------------------------------------
 
 // Images as NHWC matrices: pixel (y, x) of image b is row b * image_rows() + y * width + x. The rows of an image are
 // padded, so that no tile of a kernel holds two images; padding rows hold finite numbers that nothing depends on.
@@ -184,6 +183,7 @@ struct ConvAddends {
 // y = GroupNorm(x, x2) * weight + bias, then SiLU if asked; groups may span both inputs
 struct GroupNormOptions {
     uint32_t groups = 32;
+    uint32_t images = 1; // that have their statistics together: the frames of a video
     float eps = 1e-5f;
     bool silu = false;
     DType dtype = DType::f16; // of y
@@ -222,5 +222,32 @@ struct FlashAttentionOptions {
                                      Tensor q,  // [batch * query_rows, q_col + heads * head_dim or more]
                                      Tensor kv, // [(batch *) key_rows, ..] with keys and values; may be q itself
                                      const FlashAttentionOptions& options); // [batch * query_rows, heads * head_dim]
+
+// -- videos ----------------------------------------------------------------------------------------------------------
+
+// The frames of a video are images one after the other, videos likewise.
+constexpr uint32_t kMostFrames = 64;
+
+// The same rows as one image a video, of which each row is a frame, padding included: a convolution with taps {3, 1}
+// then reaches from a pixel to the same pixel of the frames around.
+// note: padding rows are pixels there, so statistics must be taken of the images
+[[nodiscard]] FeatureMap frames_as_rows(const FeatureMap& x, uint32_t frames);
+
+// y = softmax(q k^T scale) v over the frames of a video, per pixel and head
+struct FrameAttentionOptions {
+    uint32_t heads = 1, head_dim = 0; // head_dim a multiple of 8, as stored
+    float scale = 0;                  // of the scores; 0: 1 / sqrt(head_dim)
+    uint32_t videos = 1, frames = 1;  // frames of a video, kMostFrames at most
+    uint32_t image_rows = 0;          // from one frame to the next
+};
+[[nodiscard]] Tensor frame_attention(Graph& g,
+                                     Tensor qkv, // [videos * frames * image_rows, 3 * heads * head_dim]: q, k, v
+                                     const FrameAttentionOptions& options); // [.., heads * head_dim]
+
+// y = x + share (z - x)
+[[nodiscard]] Tensor blend(Graph& g,
+                           Tensor x,      // [M, N]
+                           Tensor z,      // [M, N]
+                           Tensor share); // [1, 1] fp32
 
 } // namespace semrover

@@ -38,6 +38,16 @@ void step_hold(Graph& g,
                Tensor known,            // [M] u32
                Tensor fixed, Tensor x); // [M, N] fp32; x in place
 
+// how far the conditional prediction is followed: the same everywhere, or linear over the frames of a video
+struct FrameGuidance {
+    float first = 1, last = 1; // of the first and the last frame
+    uint32_t frames = 1;       // that the rows of x are
+
+    FrameGuidance() = default;
+    FrameGuidance(float scale) : first(scale), last(scale) {}
+    FrameGuidance(float from, float to, uint32_t count) : first(from), last(to), frames(count) {}
+};
+
 // guidance, prediction, next state; known tokens are put back at the level of the next state
 void step_update(Graph& g, StepTable steps,
                  Tensor m,     // [M, N], or [2M, N] conditional then unconditional: network output
@@ -46,19 +56,21 @@ void step_update(Graph& g, StepTable steps,
                  Tensor fixed, // [M, N] tokens of the known rows
                  Tensor x,     // [M, N], in place
                  Tensor x0,    // [M, N], in place: previous prediction, then this one
-                 float guidance, float clip);
+                 const FrameGuidance& guidance, float clip);
 
-// what a deferred renderer's network sees beside the state x, [M, C]: pixels of one frame, at the size of its latent
+// what a deferred renderer's network sees beside the state x, [M, C]: pixels of one frame or of the frames of a video,
+// at the size of the latent
 struct RendererFrame {
-    Tensor previous; // [M, C] fp32: latent of the frame before, with noise
+    Tensor previous; // [M, C] fp32: latent of the frame before, with noise; none: the network does not see one
     Tensor buffer;   // [M, C] fp32: latent of the splat buffer
     Tensor visible;  // [M, 1] fp32: share of the pixel that the splats cover
 };
 
-// y = [in_scale x, previous, buffer, visible]; with two halves [in_scale x, 0, buffer, 0] follows, for guidance
+// y = [in_scale x, previous, buffer, visible]; with two halves [in_scale x, 0, buffer, 0] follows, for guidance.
+// Without a previous latent its columns are left out.
 [[nodiscard]] Tensor renderer_input(Graph& g, StepTable steps,
                                     Tensor x, // [M, C] fp32
                                     const RendererFrame& frame, uint32_t halves,
-                                    DType dtype); // of y: [halves * M, 3C + 1]
+                                    DType dtype); // of y: [halves * M, 3C + 1], or 2C + 1
 
 } // namespace semrover

@@ -72,7 +72,10 @@ TEST(CliVerify, parameters_of_the_wrong_type_fail_their_case_only)
 
 TEST(CliVerify, a_kind_without_a_runner_is_skipped_and_said_in_summary_and_exit_code)
 {
-    const std::string cases = kGolden + "/vae_temporal_tiny " + kGolden + "/regions_paper";
+    const ScratchFolder folder;
+    put_case(folder / "unknown", "scheduler_ddim_sample", 0);
+    folder.put("unknown/case.json", R"({"kind":"novelty"})");
+    const std::string cases = (folder / "unknown").string() + " " + kGolden + "/regions_paper";
     const ProgramResult result = semrover_program("verify --json --allow-skip " + cases);
     EXPECT_EQ(result.code, 0) << result.err;
     const auto report = json_of(result.out);

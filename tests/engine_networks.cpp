@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/network/unet.h"
 #include "engine/network/vae.h"
+#include "runtime/base/json.h"
 #include "tests/feature_map_case.h"
 
 #include <cmath>
@@ -147,6 +148,76 @@ TEST(engine_networks, evaluate_every_image_of_a_batch_alike_at_odd_sizes)
                         ASSERT_EQ(v, three.at(i, p / width, p % width, c)) << "image " << i << " pixel " << p;
                     }
         }
+}
+
+UnetConfig small_video_unet()
+{
+    UnetConfig c = small_unet();
+    c.in_channels = 9;
+    c.block_out_channels = {32, 96, 64};
+    c.video = true;
+    c.norm_num_groups = 32;
+    c.use_linear_projection = true;
+    c.added_embed_dim = 8;
+    c.added_numbers = 3;
+    return c;
+}
+
+// one evaluation over `copies` of a video of three frames
+HostImages evaluate_videos(DType precision, uint32_t copies, uint32_t height, uint32_t width)
+{
+    constexpr uint32_t kFrames = 3;
+    const UnetConfig config = small_video_unet();
+    auto unet = Unet::load(test_device(), config, Checkpoint::random(5), precision);
+    SR_ASSERT(bool(unet), "{}", unet.error().message);
+    KernelCase k(test_device());
+    const HostImages one = random_images(k, kFrames, height, width, config.in_channels, precision);
+    HostImages x{height, width, HostMatrix(copies * one.rows.rows, config.in_channels, precision)};
+    for (uint32_t r = 0; r < x.rows.rows; ++r)
+        for (uint32_t c = 0; c < config.in_channels; ++c)
+            x.rows.set(r, c, one.rows.at(r % one.rows.rows, c));
+    std::vector<uint32_t> number, row(copies * kFrames, 0);
+    for (uint32_t i = 0; i < copies * kFrames; ++i)
+        number.push_back(i % kFrames);
+    const Tensor text = k.input(k.random(2, config.cross_attention_dim, precision));
+    const Tensor added = k.input(std::vector<float>{6, 127, 0.02f}, 3);
+    const Tensor table = (*unet)->time_table(k.graph, k.input(std::vector<float>{0.4f}), {}, added);
+    const Tensor context = (*unet)->context_table(k.graph, text);
+    const Tensor made = (*unet)->frame_table(k.graph, k.input(std::vector<float>{0, 1, 2}));
+    const Tensor frames = k.output(made.rows, made.cols, made.dtype, made.ld);
+    k.graph.keep(made, frames);
+    const Unet::Videos videos{{kFrames, frames, k.input(number)}, k.input(std::vector<uint32_t>(copies, 0))};
+    const FeatureMap y = (*unet)->forward(k.graph, x.input(k), table, k.input(row), {context, 2, 0}, videos);
+    return {y.height, y.width, k.run(y.data)};
+}
+
+void expect_same(const HostImages& video, const HostImages& videos)
+{
+    const uint32_t frames = video.batch();
+    for (uint32_t i = 0; i < videos.batch(); ++i)
+        for (uint32_t p = 0; p < video.height * video.width; ++p)
+            for (uint32_t c = 0; c < 4; ++c) {
+                const float v = video.at(i % frames, p / video.width, p % video.width, c);
+                ASSERT_TRUE(std::isfinite(v));
+                ASSERT_EQ(v, videos.at(i, p / video.width, p % video.width, c)) << "image " << i << " pixel " << p;
+            }
+}
+
+TEST(engine_networks, of_videos_have_the_parameters_of_stable_video_diffusion)
+{
+    const auto config = [](const char* name) {
+        return (*read_json(SEMROVER_SOURCE_DIR "/tests/golden/layouts/" + std::string(name)))["config"];
+    };
+    const UnetConfig unet = *parse_video_unet_config(config("svd_vsd_unet.json"));
+    EXPECT_EQ(Unet::plan(unet, DType::f16, {})->parameters(), 1524625962u);
+    const VaeConfig vae = *parse_video_vae_config(config("svd_vae.json"));
+    EXPECT_EQ(Vae::plan(vae, DType::f16, {})->parameters(), 97742847u);
+}
+
+TEST(engine_networks, evaluate_every_video_of_a_batch_alike)
+{
+    for (DType precision : {DType::f32, DType::f16})
+        expect_same(evaluate_videos(precision, 1, 9, 7), evaluate_videos(precision, 2, 9, 7));
 }
 
 TEST(engine_networks, refuse_a_network_without_its_weights)

@@ -54,6 +54,13 @@ Json unet_with(const std::string& field, Json value)
     return config;
 }
 
+Json video_unet_with(const std::string& field, Json value)
+{
+    Json config = layout("svd_vsd_unet")["config"];
+    config[field] = std::move(value);
+    return config;
+}
+
 Json vae_with(const std::string& field, Json value)
 {
     Json config = layout("sd15_vae")["config"];
@@ -76,6 +83,21 @@ TEST(RendererConfigs, the_full_networks_have_the_names_and_shapes_of_the_public_
     EXPECT_EQ(shapes_of(vae_schema(*vae_config)), vae["tensors"].get<Shapes>());
 }
 
+TEST(RendererConfigs, the_full_networks_of_videos_have_the_names_and_shapes_of_the_public_code)
+{
+    const Json unet = layout("svd_vsd_unet"), vae = layout("svd_vae");
+    const auto unet_config = parse_video_unet_config(unet["config"]);
+    ASSERT_TRUE(unet_config) << unet_config.error().message;
+    EXPECT_EQ(unet_config->warnings, std::vector<std::string>());
+    EXPECT_EQ(unet_config->heads, (std::vector<uint32_t>{5, 10, 20, 20}));
+    EXPECT_EQ(unet_config->added_numbers, 3u);
+    EXPECT_EQ(shapes_of(unet_schema(*unet_config)), unet["tensors"].get<Shapes>());
+    const auto vae_config = parse_video_vae_config(vae["config"]);
+    ASSERT_TRUE(vae_config) << vae_config.error().message;
+    EXPECT_EQ(vae_config->warnings, std::vector<std::string>());
+    EXPECT_EQ(shapes_of(vae_schema(*vae_config)), vae["tensors"].get<Shapes>());
+}
+
 TEST(RendererConfigs, the_golden_models_have_the_tensors_their_configs_ask_for)
 {
     for (const char* folder : {"unet_asd_tiny/model", "unet_odd_tiny/model", "asd_rollout_tiny/model/unet"}) {
@@ -88,6 +110,18 @@ TEST(RendererConfigs, the_golden_models_have_the_tensors_their_configs_ask_for)
         ASSERT_TRUE(config) << config.error().message;
         EXPECT_EQ(shapes_of(vae_schema(*config)), shapes_in(folder)) << folder;
     }
+    for (const char* folder : {"unet_vsd_tiny/model", "vsd_window_tiny/model/unet"}) {
+        const auto config = parse_video_unet_config(config_of(folder));
+        ASSERT_TRUE(config) << config.error().message;
+        EXPECT_EQ(shapes_of(unet_schema(*config)), shapes_in(folder)) << folder;
+    }
+    for (const char* folder : {"vae_temporal_tiny/model", "vsd_window_tiny/model/vae"}) {
+        const auto config = parse_video_vae_config(config_of(folder));
+        ASSERT_TRUE(config) << config.error().message;
+        EXPECT_EQ(shapes_of(vae_schema(*config)), shapes_in(folder)) << folder;
+    }
+    EXPECT_TRUE(says(parse_video_unet_config(config_of("unet_asd_tiny/model")), "UNet2DConditionModel"));
+    EXPECT_TRUE(says(parse_video_vae_config(config_of("vae_tiny/model")), "AutoencoderKL"));
     EXPECT_TRUE(says(parse_unet_config(config_of("unet_vsd_tiny/model")), "UNetSpatioTemporalConditionModel"));
     EXPECT_TRUE(says(parse_vae_config(config_of("vae_temporal_tiny/model")), "AutoencoderKLTemporalDecoder"));
 }
@@ -192,6 +226,31 @@ TEST(RendererConfigs, what_the_engine_does_not_do_is_refused_by_name)
         EXPECT_TRUE(says(parse_vae_config(vae_with(field, value)), field)) << field << " " << value;
     EXPECT_TRUE(says(parse_unet_config(Json::array()), "expected a JSON object, found array"));
     EXPECT_TRUE(says(parse_vae_config(7), "expected a JSON object, found number"));
+}
+
+TEST(RendererConfigs, what_a_network_of_videos_cannot_be_is_refused_by_name)
+{
+    const std::pair<const char*, Json> unet[] = {
+        {"down_block_types", {"CrossAttnDownBlock2D", "DownBlock2D", "DownBlock2D", "DownBlock2D"}},
+        {"up_block_types", {"UpBlockSpatioTemporal"}},
+        {"cross_attention_dim", {32, 32, 32, 64}},
+        {"layers_per_block", {1, 2}},
+        {"transformer_layers_per_block", 0},
+        {"num_attention_heads", {5, 10}},
+        {"addition_time_embed_dim", 3},
+        {"projection_class_embeddings_input_dim", 700},
+        {"num_frames", 0},
+        {"in_channels", "9"}};
+    for (const auto& [field, value] : unet)
+        EXPECT_TRUE(says(parse_video_unet_config(video_unet_with(field, value)), field)) << field << " " << value;
+    EXPECT_TRUE(says(parse_video_unet_config(video_unet_with("num_attention_heads", 7)),
+                     "320 channels at level 0 do not divide into 7 heads"));
+    EXPECT_TRUE(says(parse_video_unet_config(video_unet_with("block_out_channels", {48, 96, 96, 96})),
+                     "48 channels at level 0 do not divide into 32 groups"));
+    EXPECT_EQ(parse_video_unet_config(video_unet_with("layers_per_block", {1, 2, 3, 4}))->layers_per_block[3], 4u);
+    EXPECT_EQ(parse_video_unet_config(video_unet_with("num_attention_heads", 4))->heads, std::vector<uint32_t>(4, 4));
+    EXPECT_EQ(parse_video_unet_config(video_unet_with("novelty", 1))->warnings,
+              std::vector<std::string>{"video unet config: unknown field \"novelty\" is ignored"});
 }
 
 TEST(RendererConfigs, channels_must_divide_into_groups_and_heads)

@@ -10,42 +10,46 @@ namespace kernel_group_norm_test {
 struct NormCase {
     uint32_t batch, height, width, channels, channels2, groups;
     bool silu;
-    float mean; // of x: a large one costs digits where sums of squares are taken naively
+    float mean;          // of x: a large one costs digits where sums of squares are taken naively
+    uint32_t images = 1; // that have their statistics together
 };
 
 const NormCase kCases[] = {
-    {1, 1, 1, 8, 0, 8, false, 0},     {1, 1, 2, 8, 0, 1, false, 0},   {2, 5, 7, 16, 0, 8, true, 0},
-    {1, 9, 31, 20, 0, 5, true, 0},    {2, 13, 19, 16, 8, 3, true, 0}, {1, 4, 4, 24, 40, 8, false, 0},
-    {2, 16, 16, 8, 0, 2, false, 300},
+    {1, 1, 1, 8, 0, 8, false, 0},     {1, 1, 2, 8, 0, 1, false, 0},    {2, 5, 7, 16, 0, 8, true, 0},
+    {1, 9, 31, 20, 0, 5, true, 0},    {2, 13, 19, 16, 8, 3, true, 0},  {1, 4, 4, 24, 40, 8, false, 0},
+    {2, 16, 16, 8, 0, 2, false, 300}, {6, 5, 7, 16, 0, 8, true, 0, 3}, {4, 1, 1, 8, 8, 16, false, 0, 4},
+    {2, 9, 11, 24, 0, 3, true, 0, 2},
 };
 
 // magnitude: of the terms x scale and mean scale, whose difference the kernel forms
 double naive(const NormCase& c, const HostImages& x, const HostImages& x2, uint32_t image, uint32_t pixel,
              uint32_t channel, const HostMatrix& weight, const HostMatrix& bias, double& magnitude)
 {
-    const auto at = [&](uint32_t p, uint32_t k) -> double {
-        return k < c.channels ? x.at(image, p / c.width, p % c.width, k)
-                              : x2.at(image, p / c.width, p % c.width, k - c.channels);
+    const auto at = [&](uint32_t i, uint32_t p, uint32_t k) -> double {
+        return k < c.channels ? x.at(i, p / c.width, p % c.width, k)
+                              : x2.at(i, p / c.width, p % c.width, k - c.channels);
     };
     const uint32_t size = (c.channels + c.channels2) / c.groups, first = channel / size * size;
-    const uint32_t pixels = c.height * c.width;
+    const uint32_t pixels = c.height * c.width, count = c.images * pixels * size, set = image / c.images * c.images;
     double mean = 0, var = 0;
-    for (uint32_t p = 0; p < pixels; ++p)
-        for (uint32_t k = first; k < first + size; ++k)
-            mean += at(p, k) / (pixels * size);
-    for (uint32_t p = 0; p < pixels; ++p)
-        for (uint32_t k = first; k < first + size; ++k)
-            var += (at(p, k) - mean) * (at(p, k) - mean) / (pixels * size);
+    for (uint32_t i = set; i < set + c.images; ++i)
+        for (uint32_t p = 0; p < pixels; ++p)
+            for (uint32_t k = first; k < first + size; ++k)
+                mean += at(i, p, k) / count;
+    for (uint32_t i = set; i < set + c.images; ++i)
+        for (uint32_t p = 0; p < pixels; ++p)
+            for (uint32_t k = first; k < first + size; ++k)
+                var += (at(i, p, k) - mean) * (at(i, p, k) - mean) / count;
     const double scale = weight.at(0, channel) / std::sqrt(var + 1e-5);
-    const double v = (at(pixel, channel) - mean) * scale + bias.at(0, channel);
-    magnitude = (std::abs(at(pixel, channel)) + std::abs(mean)) * std::abs(scale) + std::abs(v);
+    const double v = (at(image, pixel, channel) - mean) * scale + bias.at(0, channel);
+    magnitude = (std::abs(at(image, pixel, channel)) + std::abs(mean)) * std::abs(scale) + std::abs(v);
     return c.silu ? v / (1 + std::exp(-v)) : v;
 }
 
 void check(const NormCase& c, DType dtype)
 {
-    SCOPED_TRACE(fmt::format("{} x {}x{}x{}+{} groups {} {}", c.batch, c.height, c.width, c.channels, c.channels2,
-                             c.groups, dtype_name(dtype)));
+    SCOPED_TRACE(fmt::format("{} x {}x{}x{}+{} groups {} of {} images {}", c.batch, c.height, c.width, c.channels,
+                             c.channels2, c.groups, c.images, dtype_name(dtype)));
     KernelCase k(test_device());
     const uint32_t cols = c.channels + c.channels2;
     HostImages x = random_images(k, c.batch, c.height, c.width, c.channels, dtype);
@@ -61,6 +65,7 @@ void check(const NormCase& c, DType dtype)
     GroupNormOptions options;
     options.groups = c.groups;
     options.silu = c.silu;
+    options.images = c.images;
     options.dtype = dtype;
     const FeatureMap y =
         group_norm(k.graph, input(x), c.channels2 ? input(x2) : NormInput{}, k.input(weight), k.input(bias), options);
@@ -82,6 +87,29 @@ TEST(kernel_group_norm, matches_two_passes_in_double)
     for (const NormCase& c : kCases)
         for (DType dtype : {DType::f32, DType::f16})
             check(c, dtype);
+}
+
+// weight / sqrt(eps) is in the hundreds there: what is left of x - mean would show, of the producer's statistics, too
+TEST(kernel_group_norm, leaves_the_bias_of_a_group_of_one_pixel)
+{
+    for (DType dtype : {DType::f32, DType::f16}) {
+        KernelCase k(test_device());
+        const HostImages x = random_images(k, 2, 1, 1, 24, dtype);
+        const HostMatrix w = k.random(40, 24, dtype, 8), weight = k.random(1, 40, DType::f32);
+        const HostMatrix bias = k.random(1, 40, DType::f32);
+        const FeatureMap in = x.input(k), made = in.with(gemm(k.graph, in.data, k.input(w), {}, {.dtype = dtype}));
+        GroupNormOptions options;
+        options.groups = 40;
+        options.eps = 1e-6f;
+        options.dtype = dtype;
+        const NormInput input{made, channel_moments(k.graph, made)};
+        const HostMatrix y = k.run(group_norm(k.graph, input, {}, k.input(weight), k.input(bias), options).data);
+        for (uint32_t image = 0; image < 2; ++image)
+            for (uint32_t c = 0; c < 40; ++c)
+                ASSERT_NEAR(y.at(image * 16, c), bias.at(0, c),
+                            dtype == DType::f16 ? 4.9e-4 * std::abs(bias.at(0, c)) : 0)
+                    << "image " << image << " channel " << c;
+    }
 }
 
 // statistics taken in the epilogue of the pass that makes x are those of a pass of their own

@@ -235,12 +235,12 @@ struct UpdateCase {
     uint32_t rows, cols;
     bool guided;
     float guidance, clip;
+    float last_guidance = guidance; // linear over the frames
+    uint32_t frames = 1;
 };
-const UpdateCase kUpdates[] = {{1, 1, false, 1, 3e38f},
-                               {24, 64, true, 3, 3e38f},
-                               {25, 13, true, 7.5f, 1},
-                               {131, 72, false, 0, 1.5f},
-                               {7, 200, true, 0, 2}};
+const UpdateCase kUpdates[] = {
+    {1, 1, false, 1, 3e38f}, {24, 64, true, 3, 3e38f},         {25, 13, true, 7.5f, 1},       {131, 72, false, 0, 1.5f},
+    {7, 200, true, 0, 2},    {96, 4, true, 1, 3e38f, 2.5f, 6}, {48, 12, true, 3, 3e38f, 0, 3}};
 
 StepRow update_row()
 {
@@ -260,9 +260,11 @@ struct UpdateInputs {
 std::pair<double, double> update_reference(const UpdateCase& u, const UpdateInputs& in, uint32_t r, uint32_t c)
 {
     const StepRow s = update_row();
-    double m = in.m.at(r, c);
+    double m = in.m.at(r, c), guidance = u.guidance;
+    if (u.frames > 1)
+        guidance += (double(u.last_guidance) - u.guidance) * (r / (u.rows / u.frames)) / (u.frames - 1);
     if (u.guided)
-        m = in.m.at(u.rows + r, c) + double(u.guidance) * (m - in.m.at(u.rows + r, c));
+        m = in.m.at(u.rows + r, c) + guidance * (m - in.m.at(u.rows + r, c));
     const double x0 = std::clamp(double(s.x0_x) * in.x.at(r, c) + double(s.x0_m) * m, -double(u.clip), double(u.clip));
     double next = double(s.c_x0) * x0 + double(s.c_x) * in.x.at(r, c) + double(s.c_m) * m +
                   double(s.c_prev) * in.x0.at(r, c) + double(s.c_z) * in.z.at(r, c);
@@ -282,7 +284,7 @@ void check(const UpdateCase& u)
     in.known = k.indices(u.rows, 2);
     const Tensor x = k.input(in.x), x0 = k.input(in.x0);
     step_update(k.graph, table(k, one_of_three(update_row()), 1), k.input(in.m), k.input(in.z), k.input(in.known),
-                k.input(in.fixed), x, x0, u.guidance, u.clip);
+                k.input(in.fixed), x, x0, {u.guidance, u.last_guidance, u.frames}, u.clip);
     run(k);
     const HostMatrix next = k.read(x), start = k.read(x0);
     for (uint32_t r = 0; r < u.rows; ++r)

@@ -2,7 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/model/network_weights.h"
 
+#include <cmath>
 #include <cstring>
+#include <map>
 
 namespace semrover {
 
@@ -44,6 +46,12 @@ Result<std::vector<std::byte>> to_dtype(const std::vector<float>& values, DType 
     return bytes;
 }
 
+float share_of(float mix_factor, bool switched)
+{
+    const double alpha = 1 / (1 + std::exp(-double(mix_factor)));
+    return float(switched ? alpha : 1 - alpha);
+}
+
 } // namespace
 
 NetworkWeights::Entry& NetworkWeights::add(const std::string& name, uint32_t rows, uint32_t cols, DType dtype)
@@ -55,15 +63,17 @@ NetworkWeights::Entry& NetworkWeights::add(const std::string& name, uint32_t row
 void NetworkWeights::add_vector(Entry& entry, const std::string& name, uint32_t size, uint32_t first, uint32_t heads,
                                 bool geglu, float gain)
 {
-    entry.sources.push_back({{name, {size}}, [=](std::span<const float> values, float* row, uint32_t) {
+    entry.sources.push_back({{name, {size}},
+                             [=](std::span<const float> values, float* row, uint32_t) {
                                  for (uint32_t i = 0; i < size; ++i)
                                      row[first + packed_row(i, size, heads, geglu)] = gain * values[i];
-                             }});
+                             },
+                             {}});
 }
 
 Layer NetworkWeights::conv(const std::string& name, const ConvShape& s)
 {
-    const uint32_t taps = s.kernel * s.kernel, channels = s.channels + s.channels2;
+    const uint32_t taps = s.frames ? s.kernel : s.kernel * s.kernel, channels = s.channels + s.channels2;
     const uint32_t first = round_up(s.channels, kRowPadding), width = first + round_up(s.channels2, kRowPadding);
     Layer layer;
     Entry& weight = add(name + ".weight", s.outputs, taps * width, s.dtype.value_or(precision_));
@@ -77,10 +87,14 @@ Layer NetworkWeights::conv(const std::string& name, const ConvShape& s)
                     to[tap * width] = s.gain * from[tap];
             }
     };
-    weight.sources.push_back({{name + ".weight", {s.outputs, channels, s.kernel, s.kernel}}, pack});
+    std::vector<uint64_t> shape{s.outputs, channels, s.kernel, s.kernel};
+    if (s.frames)
+        shape = {s.outputs, channels, s.kernel, 1, 1};
+    weight.sources.push_back({{name + ".weight", shape}, pack, s.share});
     Entry& bias = add(name + ".bias", 1, s.outputs, DType::f32);
     layer.bias = bias.weight;
     add_vector(bias, name + ".bias", s.outputs, 0, 0, false, s.bias_gain);
+    bias.sources.back().share = s.share;
     return layer;
 }
 
@@ -105,7 +119,7 @@ Layer NetworkWeights::linear(const std::vector<Part>& parts, const LinearShape& 
         std::vector<uint64_t> shape{p.rows, s.cols};
         if (p.conv)
             shape.insert(shape.end(), {1, 1});
-        weight.sources.push_back({{p.name + ".weight", shape}, pack});
+        weight.sources.push_back({{p.name + ".weight", shape}, pack, {}});
         first += packed_rows(p.rows, p.heads, p.geglu);
     }
     if (!s.bias)
@@ -138,21 +152,48 @@ Slot NetworkWeights::table(const std::string& name, uint32_t rows, uint32_t cols
         for (uint32_t r = 0; r < rows; ++r)
             std::copy_n(&values[size_t(r) * cols], cols, to + size_t(r) * ld);
     };
-    entry.sources.push_back({{name + ".weight", {rows, cols}}, pack});
+    entry.sources.push_back({{name + ".weight", {rows, cols}}, pack, {}});
+    return entry.weight;
+}
+
+Slot NetworkWeights::share(const FrameShare& share)
+{
+    Entry& entry = add(share.mix_factor, 1, 1, DType::f32);
+    const auto pack = [switched = share.switched](std::span<const float> values, float* to, uint32_t) {
+        *to = share_of(values[0], switched);
+    };
+    entry.sources.push_back({{share.mix_factor, {1}}, pack, {}});
     return entry.weight;
 }
 
 uint64_t NetworkWeights::parameters() const
 {
-    uint64_t sum = 0;
+    std::map<std::string, uint64_t> sizes;
     for (const Entry& entry : entries_)
         for (const Source& source : entry.sources) {
-            uint64_t size = 1;
+            uint64_t& size = sizes[source.spec.name] = 1;
             for (uint64_t n : source.spec.shape)
                 size *= n;
-            sum += size;
+            if (source.share)
+                sizes[source.share->mix_factor] = 1;
         }
+    uint64_t sum = 0;
+    for (const auto& [name, size] : sizes)
+        sum += size;
     return sum;
+}
+
+Status NetworkWeights::read(const Checkpoint& checkpoint, const Source& source, std::vector<float>& values) const
+{
+    SR_CHECK(checkpoint.read(source.spec, values));
+    if (!source.share)
+        return {};
+    std::vector<float> mix;
+    SR_CHECK(checkpoint.read({source.share->mix_factor, {1}}, mix));
+    const float share = share_of(mix.front(), source.share->switched);
+    for (float& value : values)
+        value *= share;
+    return {};
 }
 
 Status NetworkWeights::upload(Device& device, const Checkpoint& checkpoint, const Entry& entry) const
@@ -160,7 +201,7 @@ Status NetworkWeights::upload(Device& device, const Checkpoint& checkpoint, cons
     const uint32_t ld = entry.weight.ld();
     std::vector<float> rows(size_t(entry.weight.rows()) * ld, 0.f), values;
     for (const Source& source : entry.sources) {
-        SR_CHECK(checkpoint.read(source.spec, values));
+        SR_CHECK(read(checkpoint, source, values));
         source.pack(values, rows.data(), ld);
     }
     SR_TRY(const auto bytes, to_dtype(rows, entry.weight.dtype(), entry.sources.front().spec.name));

@@ -25,6 +25,14 @@ class NetworkWeights {
     DType precision() const { return precision_; }
     const DeviceLimits& limits() const { return limits_; }
 
+    // The share of what a video's frames make together, against what each makes alone: sigmoid(mix) or, as diffusers'
+    // AlphaBlender has it unless it is switched, 1 - sigmoid(mix)
+    struct FrameShare {
+        std::string mix_factor; // the tensor's name
+        bool switched = false;
+    };
+    Slot share(const FrameShare& share); // [1, 1] fp32
+
     // convolution over C channels, or C and C2 that come as two inputs: [N, kernel^2 * (C + C2)], tap by tap, each
     // input padded to kRowPadding. `gain` multiplies weights, `bias_gain` biases. Without a dtype: the network's
     // precision.
@@ -32,6 +40,8 @@ class NetworkWeights {
         uint32_t outputs, channels, channels2 = 0, kernel = 3;
         float gain = 1, bias_gain = 1;
         std::optional<DType> dtype = {};
+        bool frames = false;                  // taps along time only: [N, C, kernel, 1, 1] in the file
+        std::optional<FrameShare> share = {}; // multiplies weights and biases, too
     };
     Layer conv(const std::string& name, const ConvShape& shape);
 
@@ -64,6 +74,7 @@ class NetworkWeights {
     struct Source {
         TensorSpec spec;
         std::function<void(std::span<const float> values, float* rows, uint32_t ld)> pack;
+        std::optional<FrameShare> share = {}; // what the values are multiplied by
     };
     struct Entry {
         Slot weight;
@@ -73,6 +84,7 @@ class NetworkWeights {
     void add_vector(Entry& entry, const std::string& name, uint32_t size, uint32_t first, uint32_t heads, bool geglu,
                     float gain);
     Status upload(Device& device, const Checkpoint& checkpoint, const Entry& entry) const;
+    Status read(const Checkpoint& checkpoint, const Source& source, std::vector<float>& values) const;
 
     DType precision_;
     DeviceLimits limits_;

@@ -30,6 +30,20 @@ struct Schema {
         specs.push_back({name + ".weight", {out, in, side, side}});
         specs.push_back({name + ".bias", {out}});
     }
+    // taps along time only
+    void frame_conv(const std::string& name, uint32_t out, uint32_t in, uint32_t taps)
+    {
+        specs.push_back({name + ".weight", {out, in, taps, 1, 1}});
+        specs.push_back({name + ".bias", {out}});
+    }
+
+    // the rest: diffusers' blocks. time: width of the time embedding, 0 for none
+    void resnet(const std::string& name, uint32_t in, uint32_t out, uint32_t time = 0);
+    void frame_resnet(const std::string& name, uint32_t channels, uint32_t time = 0);         // TemporalResnetBlock
+    void video_resnet(const std::string& name, uint32_t in, uint32_t out, uint32_t time = 0); // SpatioTemporalResBlock
+    void attention(const std::string& name, uint32_t channels, uint32_t context); // without biases of q, k, v
+    void feed_forward(const std::string& name, uint32_t channels);                // GEGLU
+    void transformer_block(const std::string& name, uint32_t channels, uint32_t context);
 };
 
 } // namespace semrover

@@ -101,23 +101,27 @@ Status check_together(const UnetConfig& c)
 
 // ---- the weights
 
-void add_resnet(Schema& s, const std::string& name, uint32_t in, uint32_t out, uint32_t time)
+void add_resnet(Schema& s, const std::string& name, const UnetConfig& c, uint32_t in, uint32_t out)
 {
-    s.norm(name + ".norm1", in);
-    s.conv(name + ".conv1", out, in, 3);
-    s.linear(name + ".time_emb_proj", out, time);
-    s.norm(name + ".norm2", out);
-    s.conv(name + ".conv2", out, out, 3);
-    if (in != out)
-        s.conv(name + ".conv_shortcut", out, in, 1);
+    if (c.video)
+        s.video_resnet(name, in, out, c.time_embed_dim());
+    else
+        s.resnet(name, in, out, c.time_embed_dim());
 }
 
-void add_attention(Schema& s, const std::string& name, uint32_t channels, uint32_t context)
+// what a transformer of a video has beside that of an image
+void add_frame_blocks(Schema& s, const std::string& name, const UnetConfig& c, size_t level)
 {
-    s.matrix(name + ".to_q.weight", channels, channels);
-    s.matrix(name + ".to_k.weight", channels, context);
-    s.matrix(name + ".to_v.weight", channels, context);
-    s.linear(name + ".to_out.0", channels, channels);
+    const uint32_t channels = c.block_out_channels[level];
+    for (uint32_t k = 0; k < c.transformer_layers[level]; ++k) {
+        const std::string block = fmt::format("{}.temporal_transformer_blocks.{}", name, k);
+        s.norm(block + ".norm_in", channels);
+        s.feed_forward(block + ".ff_in", channels);
+        s.transformer_block(block, channels, c.cross_attention_dim);
+    }
+    s.linear(name + ".time_pos_embed.linear_1", 4 * channels, channels);
+    s.linear(name + ".time_pos_embed.linear_2", channels, 4 * channels);
+    s.specs.push_back({name + ".time_mixer.mix_factor", {1}});
 }
 
 void add_transformer(Schema& s, const std::string& name, const UnetConfig& c, size_t level)
@@ -131,15 +135,10 @@ void add_transformer(Schema& s, const std::string& name, const UnetConfig& c, si
     };
     s.norm(name + ".norm", channels);
     projection(".proj_in");
-    for (uint32_t k = 0; k < c.transformer_layers[level]; ++k) {
-        const std::string block = fmt::format("{}.transformer_blocks.{}", name, k);
-        for (const char* norm : {".norm1", ".norm2", ".norm3"})
-            s.norm(block + norm, channels);
-        add_attention(s, block + ".attn1", channels, channels);
-        add_attention(s, block + ".attn2", channels, c.cross_attention_dim);
-        s.linear(block + ".ff.net.0.proj", 8 * channels, channels); // values and gates, 4 C each
-        s.linear(block + ".ff.net.2", channels, 4 * channels);
-    }
+    for (uint32_t k = 0; k < c.transformer_layers[level]; ++k)
+        s.transformer_block(fmt::format("{}.transformer_blocks.{}", name, k), channels, c.cross_attention_dim);
+    if (c.video)
+        add_frame_blocks(s, name, c, level);
     projection(".proj_out");
 }
 
@@ -149,7 +148,7 @@ void add_down_block(Schema& s, const UnetConfig& c, size_t level)
     uint32_t in = c.block_out_channels[level ? level - 1 : 0];
     const std::string block = fmt::format("down_blocks.{}", level);
     for (uint32_t j = 0; j < c.layers_per_block[level]; ++j) {
-        add_resnet(s, fmt::format("{}.resnets.{}", block, j), in, out, c.time_embed_dim());
+        add_resnet(s, fmt::format("{}.resnets.{}", block, j), c, in, out);
         if (c.down_attention[level])
             add_transformer(s, fmt::format("{}.attentions.{}", block, j), c, level);
         in = out;
@@ -167,7 +166,7 @@ void add_up_block(Schema& s, const UnetConfig& c, size_t index)
     const std::string block = fmt::format("up_blocks.{}", index);
     for (uint32_t j = 0; j < layers; ++j) {
         const uint32_t skip = j + 1 < layers ? out : c.block_out_channels[level ? level - 1 : 0];
-        add_resnet(s, fmt::format("{}.resnets.{}", block, j), in + skip, out, c.time_embed_dim());
+        add_resnet(s, fmt::format("{}.resnets.{}", block, j), c, in + skip, out);
         if (c.up_attention[index])
             add_transformer(s, fmt::format("{}.attentions.{}", block, j), c, level);
         in = out;
@@ -236,14 +235,18 @@ std::vector<TensorSpec> unet_schema(const UnetConfig& c)
     s.conv("conv_in", first, c.in_channels, 3);
     s.linear("time_embedding.linear_1", c.time_embed_dim(), first);
     s.linear("time_embedding.linear_2", c.time_embed_dim(), c.time_embed_dim());
+    if (c.video) {
+        s.linear("add_embedding.linear_1", c.time_embed_dim(), c.added_numbers * c.added_embed_dim);
+        s.linear("add_embedding.linear_2", c.time_embed_dim(), c.time_embed_dim());
+    }
     if (c.num_class_embeds)
         s.matrix("class_embedding.weight", c.num_class_embeds, c.time_embed_dim());
     for (size_t i = 0; i < c.levels(); ++i)
         add_down_block(s, c, i);
-    add_resnet(s, "mid_block.resnets.0", last, last, c.time_embed_dim());
+    add_resnet(s, "mid_block.resnets.0", c, last, last);
     if (c.mid_attention) {
         add_transformer(s, "mid_block.attentions.0", c, c.levels() - 1);
-        add_resnet(s, "mid_block.resnets.1", last, last, c.time_embed_dim());
+        add_resnet(s, "mid_block.resnets.1", c, last, last);
     }
     for (size_t i = 0; i < c.levels(); ++i)
         add_up_block(s, c, i);

@@ -13,7 +13,8 @@
 
 namespace semrover {
 
-// config.json of a UNet2DConditionModel (diffusers), as far as Stable-Diffusion-1.5-shaped networks use it
+// config.json of a UNet2DConditionModel (diffusers), as far as Stable-Diffusion-1.5-shaped networks use it, or of a
+// UNetSpatioTemporalConditionModel, as Stable Video Diffusion has it
 struct UnetConfig {
     uint32_t in_channels = 4, out_channels = 4;
     std::vector<uint32_t> block_out_channels = {320, 640, 1280, 1280};
@@ -31,15 +32,24 @@ struct UnetConfig {
     bool flip_sin_to_cos = true;
     float freq_shift = 0;
     uint32_t num_class_embeds = 0;     // rows of class_embedding; 0: none
+    bool video = false;                // UNetSpatioTemporalConditionModel
+    uint32_t added_embed_dim = 0;      // of a video: of each number that comes with it, such as frames a second
+    uint32_t added_numbers = 0;        // how many they are
+    uint32_t num_frames = 0;           // that it was trained on
     std::vector<std::string> warnings; // fields that the engine does not know
 
     size_t levels() const { return block_out_channels.size(); }
     uint32_t time_embed_dim() const { return 4 * block_out_channels[0]; }
+    // eps of the group norms in resnets; diffusers' blocks of videos have two
+    float down_eps(size_t level) const { return video && down_attention[level] ? 1e-6f : norm_eps; }
+    float up_eps() const { return video ? 1e-6f : norm_eps; }
 };
 
 // errors: bad_input; a value that the engine does not implement is refused by name
 Result<UnetConfig> parse_unet_config(const nlohmann::json& json);
-// the config as a config.json
+// the same of a UNetSpatioTemporalConditionModel
+Result<UnetConfig> parse_video_unet_config(const nlohmann::json& json);
+// the config as a config.json; not of videos
 nlohmann::json unet_config_json(const UnetConfig& config);
 
 // names and shapes of the network's weights, as diffusers calls them

@@ -9,16 +9,20 @@ namespace semrover {
 
 namespace {
 
+void read_block_types(JsonFields& fields, const VaeConfig& c, const char* name, const char* type)
+{
+    std::vector<bool> blocks(c.block_out_channels.size());
+    fields.choices<bool>(name, {{type, true}}, blocks);
+    if (blocks.size() != c.block_out_channels.size())
+        fields.refuse(name, fmt::format("as many as block_out_channels, {}", c.block_out_channels.size()));
+}
+
 void read_blocks(JsonFields& fields, VaeConfig& c)
 {
     fields.list("block_out_channels", kMaxLevels, 1, kMaxChannels, c.block_out_channels);
-    for (const auto& [name, type] :
-         {std::pair{"down_block_types", "DownEncoderBlock2D"}, std::pair{"up_block_types", "UpDecoderBlock2D"}}) {
-        std::vector<bool> blocks(c.block_out_channels.size());
-        fields.choices<bool>(name, {{type, true}}, blocks);
-        if (blocks.size() != c.block_out_channels.size())
-            fields.refuse(name, fmt::format("as many as block_out_channels, {}", c.block_out_channels.size()));
-    }
+    read_block_types(fields, c, "down_block_types", "DownEncoderBlock2D");
+    if (!c.video)
+        read_block_types(fields, c, "up_block_types", "UpDecoderBlock2D");
     std::vector<uint32_t> layers(c.block_out_channels.size(), c.layers_per_block);
     fields.integers("layers_per_block", layers.size(), 1, 64, layers);
     for (const uint32_t n : layers)
@@ -27,27 +31,28 @@ void read_blocks(JsonFields& fields, VaeConfig& c)
     c.layers_per_block = layers[0];
 }
 
-void add_resnet(Schema& s, const std::string& name, uint32_t in, uint32_t out)
+void add_mid_attention(Schema& s, const std::string& name, uint32_t channels)
 {
-    s.norm(name + ".norm1", in);
-    s.conv(name + ".conv1", out, in, 3);
-    s.norm(name + ".norm2", out);
-    s.conv(name + ".conv2", out, out, 3);
-    if (in != out)
-        s.conv(name + ".conv_shortcut", out, in, 1);
+    s.norm(name + ".group_norm", channels);
+    for (const char* part : {".to_q", ".to_k", ".to_v", ".to_out.0"})
+        s.linear(name + part, channels, channels);
 }
 
 void add_mid_block(Schema& s, const std::string& name, const VaeConfig& c)
 {
     const uint32_t channels = c.block_out_channels.back();
-    add_resnet(s, name + ".resnets.0", channels, channels);
-    if (c.mid_block_add_attention) {
-        const std::string attention = name + ".attentions.0";
-        s.norm(attention + ".group_norm", channels);
-        for (const char* part : {".to_q", ".to_k", ".to_v", ".to_out.0"})
-            s.linear(attention + part, channels, channels);
-    }
-    add_resnet(s, name + ".resnets.1", channels, channels);
+    s.resnet(name + ".resnets.0", channels, channels);
+    if (c.mid_block_add_attention)
+        add_mid_attention(s, name + ".attentions.0", channels);
+    s.resnet(name + ".resnets.1", channels, channels);
+}
+
+void add_video_mid_block(Schema& s, const std::string& name, const VaeConfig& c)
+{
+    const uint32_t channels = c.block_out_channels.back();
+    for (uint32_t i = 0; i < c.layers_per_block; ++i)
+        s.video_resnet(fmt::format("{}.resnets.{}", name, i), channels, channels);
+    add_mid_attention(s, name + ".attentions.0", channels);
 }
 
 void add_encoder(Schema& s, const VaeConfig& c)
@@ -59,7 +64,7 @@ void add_encoder(Schema& s, const VaeConfig& c)
         const std::string block = fmt::format("encoder.down_blocks.{}", i);
         const uint32_t out = c.block_out_channels[i];
         for (uint32_t j = 0; j < c.layers_per_block; ++j, in = out)
-            add_resnet(s, fmt::format("{}.resnets.{}", block, j), in, out);
+            s.resnet(fmt::format("{}.resnets.{}", block, j), in, out);
         if (i + 1 < levels)
             s.conv(block + ".downsamplers.0.conv", out, out, 3);
     }
@@ -73,17 +78,48 @@ void add_decoder(Schema& s, const VaeConfig& c)
     const size_t levels = c.block_out_channels.size();
     uint32_t in = c.block_out_channels.back();
     s.conv("decoder.conv_in", in, c.latent_channels, 3);
-    add_mid_block(s, "decoder.mid_block", c);
+    if (c.video)
+        add_video_mid_block(s, "decoder.mid_block", c);
+    else
+        add_mid_block(s, "decoder.mid_block", c);
     for (size_t i = 0; i < levels; ++i) {
         const std::string block = fmt::format("decoder.up_blocks.{}", i);
         const uint32_t out = c.block_out_channels[levels - 1 - i];
-        for (uint32_t j = 0; j < c.layers_per_block + 1; ++j, in = out)
-            add_resnet(s, fmt::format("{}.resnets.{}", block, j), in, out);
+        for (uint32_t j = 0; j < c.layers_per_block + 1; ++j, in = out) {
+            const std::string layer = fmt::format("{}.resnets.{}", block, j);
+            if (c.video)
+                s.video_resnet(layer, in, out);
+            else
+                s.resnet(layer, in, out);
+        }
         if (i + 1 < levels)
             s.conv(block + ".upsamplers.0.conv", out, out, 3);
     }
     s.norm("decoder.conv_norm_out", in);
     s.conv("decoder.conv_out", c.out_channels, in, 3);
+    if (c.video)
+        s.frame_conv("decoder.time_conv_out", c.out_channels, c.out_channels, 3);
+}
+
+// what both kinds have
+void read_numbers(JsonFields& fields, VaeConfig& c)
+{
+    fields.integer("in_channels", 1u, 4096u, c.in_channels);
+    fields.integer("out_channels", 1u, 4096u, c.out_channels);
+    fields.integer("latent_channels", 1u, 4096u, c.latent_channels);
+    read_blocks(fields, c);
+    fields.number("scaling_factor", 1e-6f, 1e6f, c.scaling_factor);
+    fields.flag("force_upcast", c.force_upcast);
+    fields.ignore("sample_size");
+}
+
+Status check_groups(const VaeConfig& c)
+{
+    for (const uint32_t channels : c.block_out_channels)
+        if (channels % c.norm_num_groups)
+            return fail(ErrorCode::bad_input, "vae config: {} channels do not divide into {} groups", channels,
+                        c.norm_num_groups);
+    return {};
 }
 
 } // namespace
@@ -93,14 +129,9 @@ Result<VaeConfig> parse_vae_config(const Json& json)
     VaeConfig c;
     JsonFields fields(json, "vae config");
     fields.only("_class_name", "AutoencoderKL");
-    fields.integer("in_channels", 1u, 4096u, c.in_channels);
-    fields.integer("out_channels", 1u, 4096u, c.out_channels);
-    fields.integer("latent_channels", 1u, 4096u, c.latent_channels);
-    read_blocks(fields, c);
+    read_numbers(fields, c);
     fields.integer("norm_num_groups", 1u, kMaxChannels, c.norm_num_groups);
-    fields.number("scaling_factor", 1e-6f, 1e6f, c.scaling_factor);
     fields.number("shift_factor", -1e6f, 1e6f, c.shift_factor);
-    fields.flag("force_upcast", c.force_upcast);
     fields.flag("use_quant_conv", c.use_quant_conv);
     fields.flag("use_post_quant_conv", c.use_post_quant_conv);
     fields.flag("mid_block_add_attention", c.mid_block_add_attention);
@@ -108,12 +139,21 @@ Result<VaeConfig> parse_vae_config(const Json& json)
     fields.choice<bool>("act_fn", {{"silu", true}, {"swish", true}}, silu);
     fields.only("latents_mean", nullptr);
     fields.only("latents_std", nullptr);
-    fields.ignore("sample_size");
     SR_CHECK(fields.finish(c.warnings));
-    for (const uint32_t channels : c.block_out_channels)
-        if (channels % c.norm_num_groups)
-            return fail(ErrorCode::bad_input, "vae config: {} channels do not divide into {} groups", channels,
-                        c.norm_num_groups);
+    SR_CHECK(check_groups(c));
+    return c;
+}
+
+Result<VaeConfig> parse_video_vae_config(const Json& json)
+{
+    VaeConfig c;
+    c.video = true;
+    c.use_post_quant_conv = false;
+    JsonFields fields(json, "video vae config");
+    fields.only("_class_name", "AutoencoderKLTemporalDecoder");
+    read_numbers(fields, c);
+    SR_CHECK(fields.finish(c.warnings));
+    SR_CHECK(check_groups(c));
     return c;
 }
 

@@ -13,7 +13,7 @@
 
 namespace semrover {
 
-// config.json of an AutoencoderKL (diffusers)
+// config.json of an AutoencoderKL (diffusers), or of an AutoencoderKLTemporalDecoder
 struct VaeConfig {
     uint32_t in_channels = 3, out_channels = 3, latent_channels = 4;
     std::vector<uint32_t> block_out_channels = {128, 256, 512, 512};
@@ -24,6 +24,7 @@ struct VaeConfig {
     bool force_upcast = true; // activations may exceed fp16
     bool use_quant_conv = true, use_post_quant_conv = true;
     bool mid_block_add_attention = true;
+    bool video = false;                // AutoencoderKLTemporalDecoder: the decoder sees the frames of a video together
     std::vector<std::string> warnings; // fields that the engine does not know
 
     uint32_t downscale() const { return 1u << (block_out_channels.size() - 1); } // pixels of a latent pixel
@@ -31,7 +32,9 @@ struct VaeConfig {
 
 // errors: bad_input; a value that the engine does not implement is refused by name
 Result<VaeConfig> parse_vae_config(const nlohmann::json& json);
-// the config as a config.json
+// the same of an AutoencoderKLTemporalDecoder
+Result<VaeConfig> parse_video_vae_config(const nlohmann::json& json);
+// the config as a config.json; not of videos
 nlohmann::json vae_config_json(const VaeConfig& config);
 
 // names and shapes of the network's weights, as diffusers calls them

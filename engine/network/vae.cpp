@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/network/vae.h"
 
-#include "engine/network/network_blocks.h"
+#include "engine/network/frame_resnet.h"
 
 #include <cmath>
 
@@ -11,23 +11,30 @@ namespace semrover {
 namespace {
 
 constexpr float kVaeNormEps = 1e-6f;
+constexpr float kFrameNormEps = 1e-5f; // of the resnets over frames
 // what the residual stream is stored multiplied by where it may exceed fp16 (force_upcast): up to 2e6 fits
 constexpr float kHalfStream = 1.f / 32;
 
+struct VaeLayer {
+    ResnetBlock resnet;
+    std::optional<FrameResnet> frame_resnet; // of a video's decoder
+};
+
 // resnet, attention over all pixels with one head, resnet
 struct MidBlock {
-    ResnetBlock first, second;
+    VaeLayer first;
+    std::optional<VaeLayer> second; // a video's decoder of one layer per block has one resnet, and no attention
     bool attention = false;
     Layer norm, qkv, out;
 };
 
 struct VaeLevel {
-    std::vector<ResnetBlock> layers;
+    std::vector<VaeLayer> layers;
     std::optional<Layer> resample;
 };
 
 struct VaeHalf {
-    Layer conv_in, norm_out, conv_out;
+    Layer conv_in, norm_out, conv_out, frames_out;
     MidBlock mid;
     std::vector<VaeLevel> levels; // in the order in which they run
 };
@@ -60,11 +67,22 @@ struct Vae::Impl {
         return {channels, 0, outputs, config.norm_num_groups, kVaeNormEps, stream};
     }
 
-    MidBlock declare_mid(const std::string& name)
+    VaeLayer declare_layer(const std::string& name, uint32_t channels, uint32_t outputs, bool video)
+    {
+        if (!video)
+            return {declare_resnet(weights, name, resnet_shape(channels, outputs)), {}};
+        const FrameResnetShape frames{outputs, config.norm_num_groups, kFrameNormEps, stream, true};
+        return {declare_resnet(weights, name + ".spatial_res_block", resnet_shape(channels, outputs)),
+                declare_frame_resnet(weights, name, frames)};
+    }
+
+    MidBlock declare_mid(const std::string& name, bool video)
     {
         const uint32_t c = config.block_out_channels.back();
         MidBlock m;
-        m.first = declare_resnet(weights, name + ".resnets.0", resnet_shape(c, c));
+        m.first = declare_layer(name + ".resnets.0", c, c, video);
+        if (video && config.layers_per_block == 1)
+            return m;
         m.attention = config.mid_block_add_attention;
         if (m.attention) {
             const std::string a = name + ".attentions.0";
@@ -72,7 +90,7 @@ struct Vae::Impl {
             m.qkv = weights.linear({{a + ".to_q", c, 1}, {a + ".to_k", c, 1}, {a + ".to_v", c, 1}}, {.cols = c});
             m.out = weights.linear({{a + ".to_out.0", c}}, {.cols = c, .col_heads = 1, .gain = stream});
         }
-        m.second = declare_resnet(weights, name + ".resnets.1", resnet_shape(c, c));
+        m.second = declare_layer(name + ".resnets.1", c, c, video);
         return m;
     }
 
@@ -95,13 +113,12 @@ struct Vae::Impl {
             const uint32_t outputs = config.block_out_channels[i];
             VaeLevel level;
             for (uint32_t k = 0; k < config.layers_per_block; ++k, channels = outputs)
-                level.layers.push_back(
-                    declare_resnet(weights, fmt::format("{}.resnets.{}", block, k), resnet_shape(channels, outputs)));
+                level.layers.push_back(declare_layer(fmt::format("{}.resnets.{}", block, k), channels, outputs, false));
             if (i + 1 < config.block_out_channels.size())
                 level.resample = declare_resample(block + ".downsamplers.0.conv", outputs);
             encoder.levels.push_back(std::move(level));
         }
-        encoder.mid = declare_mid("encoder.mid_block");
+        encoder.mid = declare_mid("encoder.mid_block", false);
         encoder.norm_out = weights.norm("encoder.conv_norm_out", channels);
         encoder.conv_out =
             weights.conv("encoder.conv_out", {.outputs = 2 * config.latent_channels, .channels = channels});
@@ -116,20 +133,26 @@ struct Vae::Impl {
                                                            .gain = stream,
                                                            .bias_gain = stream,
                                                            .dtype = DType::f32});
-        decoder.mid = declare_mid("decoder.mid_block");
+        decoder.mid = declare_mid("decoder.mid_block", config.video);
         for (size_t i = 0; i < levels; ++i) {
             const std::string block = fmt::format("decoder.up_blocks.{}", i);
             const uint32_t outputs = config.block_out_channels[levels - 1 - i];
             VaeLevel level;
             for (uint32_t k = 0; k <= config.layers_per_block; ++k, channels = outputs)
                 level.layers.push_back(
-                    declare_resnet(weights, fmt::format("{}.resnets.{}", block, k), resnet_shape(channels, outputs)));
+                    declare_layer(fmt::format("{}.resnets.{}", block, k), channels, outputs, config.video));
             if (i + 1 < levels)
                 level.resample = declare_resample(block + ".upsamplers.0.conv", outputs);
             decoder.levels.push_back(std::move(level));
         }
         decoder.norm_out = weights.norm("decoder.conv_norm_out", channels);
         decoder.conv_out = weights.conv("decoder.conv_out", {.outputs = config.out_channels, .channels = channels});
+        if (!config.video)
+            return;
+        NetworkWeights::ConvShape frames{.outputs = config.out_channels, .channels = config.out_channels};
+        frames.dtype = DType::f32;
+        frames.frames = true;
+        decoder.frames_out = weights.conv("decoder.time_conv_out", frames);
     }
 
     GroupNormOptions norm_options(bool with_silu) const
@@ -157,19 +180,26 @@ struct Vae::Impl {
         return x.x.with(add(g, project(g, weights, m.out, flash_attention(g, qkv, qkv, o)), x.x.data));
     }
 
+    // the images of a video are its frames
+    FeatureMap run_layer(Graph& g, const VaeLayer& l, NormInput x) const
+    {
+        const FeatureMap y = resnet(g, weights, l.resnet, x, {});
+        return l.frame_resnet ? frame_resnet(g, weights, *l.frame_resnet, with_moments(g, y), y.batch) : y;
+    }
+
     NormInput mid(Graph& g, const MidBlock& m, NormInput x) const
     {
-        NormInput h = with_moments(g, resnet(g, weights, m.first, x, {}));
+        NormInput h = with_moments(g, run_layer(g, m.first, x));
         if (m.attention)
             h = with_moments(g, attention(g, m, h));
-        return with_moments(g, resnet(g, weights, m.second, h, {}));
+        return m.second ? with_moments(g, run_layer(g, *m.second, h)) : h;
     }
 
     // what a level hands to the next one; statistics are not wanted in front of a resampling convolution
     NormInput run_level(Graph& g, const VaeLevel& level, NormInput x, bool upwards) const
     {
         for (size_t i = 0; i < level.layers.size(); ++i) {
-            const FeatureMap y = resnet(g, weights, level.layers[i], x, {});
+            const FeatureMap y = run_layer(g, level.layers[i], x);
             x = i + 1 == level.layers.size() && level.resample ? NormInput{y, {}} : with_moments(g, y);
         }
         if (!level.resample)
@@ -250,7 +280,8 @@ FeatureMap Vae::decode(Graph& g, FeatureMap latent) const
     h = n.mid(g, n.decoder.mid, h);
     for (const VaeLevel& level : n.decoder.levels)
         h = n.run_level(g, level, h, true);
-    return n.finish(g, n.decoder, h);
+    const FeatureMap y = n.finish(g, n.decoder, h);
+    return n.config.video ? convolve_frames(g, n.decoder.frames_out, y, y.batch, DType::f32) : y;
 }
 
 } // namespace semrover

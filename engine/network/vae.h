@@ -11,8 +11,9 @@
 
 namespace semrover {
 
-// AutoencoderKL (docs/models.md §5). Its functions add to a graph. Where the config asks for force_upcast and the
-// precision is fp16, the residual stream is stored divided by a power of two, which group norms undo exactly.
+// AutoencoderKL or AutoencoderKLTemporalDecoder (docs/models.md §5). Its functions add to a graph. Where the config
+// asks for force_upcast and the precision is fp16, the residual stream is stored divided by a power of two, which group
+// norms undo exactly.
 class Vae {
   public:
     ~Vae();
@@ -28,7 +29,8 @@ class Vae {
 
     // image: in_channels, -1..1, fp32 -> 2 * latent_channels, fp32: mean, log-variance
     [[nodiscard]] FeatureMap encode(Graph& g, FeatureMap image) const;
-    // latent: latent_channels, fp32, not scaled -> out_channels, fp32, -1..1 or beyond
+    // latent: latent_channels, fp32, not scaled -> out_channels, fp32, -1..1 or beyond. Of a config of videos the
+    // images are the frames of one.
     [[nodiscard]] FeatureMap decode(Graph& g, FeatureMap latent) const;
 
   private:

@@ -39,8 +39,13 @@ struct LatentCodec::Ends {
             slots.bytes = words(picture_words(picture.width, picture.height), "bytes");
         }
     }
-    bool encodes() const { return direction == CodecDirection::encode; }
-    LatentScale scale() const { return {config.scaling_factor, config.shift_factor, !encodes()}; }
+    bool encodes() const { return direction != CodecDirection::decode; }
+    LatentScale scale() const
+    {
+        if (direction == CodecDirection::encode_unscaled)
+            return {};
+        return {config.scaling_factor, config.shift_factor, !encodes()};
+    }
 
     Graph graph(const Vae& vae) const { return encodes() ? encode_graph(vae) : decode_graph(vae); }
     Graph encode_graph(const Vae& vae) const

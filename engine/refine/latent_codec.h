@@ -16,7 +16,11 @@ namespace semrover {
 // [image_height, image_width], 0 or not -> [height, width]: share of each block that is not 0
 std::vector<float> block_shares(const LatentSize& size, std::span<const uint8_t> visible);
 
-enum class CodecDirection { encode, decode };
+enum class CodecDirection {
+    encode,
+    decode,
+    encode_unscaled, // as encode, but the latent is z itself: what the video renderer sees of a splat buffer
+};
 
 // The ends of a codec on the device; pictures and latents are matrices, a row a pixel, padded as images are. Latents of
 // codecs and denoisers of one size have the same shape, so that one may be copied to the other.

@@ -58,6 +58,12 @@ FeatureMap feature_map(Graph& g, uint32_t batch, uint32_t height, uint32_t width
     return map;
 }
 
+FeatureMap frames_as_rows(const FeatureMap& x, uint32_t frames)
+{
+    SR_ASSERT(frames > 0 && x.batch % frames == 0, "{} images are no videos of {} frames", x.batch, frames);
+    return {x.data, x.batch / frames, frames, x.image_rows()};
+}
+
 FeatureMap conv2d(Graph& g, FeatureMap x, FeatureMap x2, Tensor w, Tensor bias, const ConvOptions& options)
 {
     const RowWindow window = window_of(x, options);

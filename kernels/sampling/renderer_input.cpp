@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // y = [in_scale x, previous, buffer, visible], then, with two halves, [in_scale x, 0, buffer, 0]: -> [halves * M, 3C +
-// 1]
+// 1]; without previous: -> [halves * M, 2C + 1]
 #include "kernels/sampling.h"
 
 #include "renderer_input.spv.h"
@@ -11,12 +11,13 @@ namespace semrover {
 
 Tensor renderer_input(Graph& g, StepTable steps, Tensor x, const RendererFrame& frame, uint32_t halves, DType dtype)
 {
-    for (const Tensor& latent : {frame.previous, frame.buffer})
+    const bool previous = frame.previous.valid();
+    for (const Tensor& latent : {previous ? frame.previous : frame.buffer, frame.buffer})
         SR_ASSERT(latent.rows == x.rows && latent.cols == x.cols && latent.ld == x.ld && latent.dtype == DType::f32,
                   "renderer_input: x [{}, {}], latent [{}, {}]", x.rows, x.cols, latent.rows, latent.cols);
     SR_ASSERT(x.dtype == DType::f32 && frame.visible.dtype == DType::f32 && frame.visible.rows == x.rows,
               "renderer_input: {} rows, {} of visibility; all are fp32", x.rows, frame.visible.rows);
-    const Tensor y = g.matrix(halves * x.rows, 3 * x.cols + 1, dtype, "renderer_input");
+    const Tensor y = g.matrix(halves * x.rows, (previous ? 3 : 2) * x.cols + 1, dtype, "renderer_input");
     RendererInputPush push{};
     push.rows = y.rows;
     push.x_rows = x.rows;
@@ -24,8 +25,10 @@ Tensor renderer_input(Graph& g, StepTable steps, Tensor x, const RendererFrame& 
     push.latent_ld = x.ld;
     push.visible_ld = frame.visible.ld;
     push.y_ld = y.ld;
-    g.dispatch(kernel::renderer_input, {steps.clock, steps.rows, x, frame.previous, frame.buffer, frame.visible, y},
-               push, threads(y.rows * (y.ld / 8)));
+    push.latents = previous ? 3 : 2;
+    const Tensor second = previous ? frame.previous : frame.buffer.row_range(0, 1);
+    g.dispatch(kernel::renderer_input, {steps.clock, steps.rows, x, second, frame.buffer, frame.visible, y}, push,
+               threads(y.rows * (y.ld / 8)));
     return y;
 }
 

@@ -10,12 +10,21 @@
 namespace semrover {
 
 void step_update(Graph& g, StepTable steps, Tensor m, Tensor z, Tensor known, Tensor fixed, Tensor x, Tensor x0,
-                 float guidance, float clip)
+                 const FrameGuidance& guidance, float clip)
 {
     const uint32_t guided = m.rows == 2 * x.rows;
     SR_ASSERT((guided || m.rows == x.rows) && m.ld == x.ld && z.ld == x.ld && fixed.ld == x.ld && x0.ld == x.ld,
               "step_update: m [{}, {}], x [{}, {}]", m.rows, m.ld, x.rows, x.ld);
-    const StepUpdatePush push{.rows = x.rows, .ld = x.ld, .guided = guided, .guidance = guidance, .clip = clip};
+    SR_ASSERT(guidance.frames > 0 && x.rows % guidance.frames == 0, "step_update: {} rows of {} frames", x.rows,
+              guidance.frames);
+    StepUpdatePush push{};
+    push.rows = x.rows;
+    push.ld = x.ld;
+    push.guided = guided;
+    push.guidance = guidance.first;
+    push.guidance_step = guidance.frames > 1 ? (guidance.last - guidance.first) / float(guidance.frames - 1) : 0.f;
+    push.frame_rows = x.rows / guidance.frames;
+    push.clip = clip;
     g.dispatch(kernel::step_update, {steps.clock, steps.rows, m, z, known, fixed, x, x0}, push,
                threads(x.rows * (x.ld / 4)));
 }

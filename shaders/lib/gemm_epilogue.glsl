@@ -66,6 +66,8 @@ void finish8(uint row, uint col, uint cols, inout vec4 lo, inout vec4 hi)
     if (col + 8 > cols)
         clear_padding(col, cols, lo, hi);
     STORE8(y, kHalfY, row * p.y_ld + p.y_col + col, lo, hi);
+    if (kMoments && kHalfY)
+        unpack8(pack8(lo, hi), lo, hi); // statistics are of what is stored: the mean of a single pixel is that pixel
 }
 
 // is this row a pixel, and not padding of its image?

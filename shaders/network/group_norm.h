@@ -7,6 +7,7 @@
 struct GroupNormScalePush {
     uint pixels; // of an image
     uint chunks; // of 16 rows, of an image
+    uint images; // whose statistics are taken together
     uint x_cols;
     uint x2_cols;
     uint moments_ld;
@@ -21,7 +22,7 @@ struct GroupNormApplyPush {
     uint x_cols;
     uint x2_cols;
     uint first_row;
-    uint image_rows;
+    uint image_rows; // of all images that have their statistics together
     uint x_ld;
     uint x2_ld;
     uint y_ld;

@@ -1,7 +1,9 @@
 #version 460
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// y = silu(x * scale + shift), over one input or two side by side; eight channels a thread
+// y = silu((x - mean) * scale + bias), over one input or two side by side; eight channels a thread
+// note: the mean is taken off first. A group of one pixel has a scale of weight / sqrt(eps), up to 1000, which would
+// make a shift of bias - mean * scale lose three digits
 #extension GL_GOOGLE_include_directive : require
 #include "group_norm.h"
 #include "lib/activation.glsl"
@@ -15,8 +17,9 @@ layout(constant_id = 2) const bool kSilu = false;
 layout(push_constant) uniform Push { GroupNormApplyPush p; };
 layout(binding = 0) readonly buffer X { uvec4 x[]; };        // [rows, x_cols]
 layout(binding = 1) readonly buffer X2 { uvec4 x2[]; };      // [rows, x2_cols]
-layout(binding = 2) readonly buffer Scale { vec4 scale[]; }; // [2 * images, x_cols + x2_cols]: scales, then shifts
-layout(binding = 3) writeonly buffer Y { uvec4 y[]; };       // [rows, x_cols + x2_cols]
+layout(binding = 2) readonly buffer Scale { vec4 scale[]; }; // [2 * sets, x_cols + x2_cols]: scales, then means
+layout(binding = 3) readonly buffer Bias { vec4 bias[]; };   // [x_cols + x2_cols]
+layout(binding = 4) writeonly buffer Y { uvec4 y[]; };       // [rows, x_cols + x2_cols]
 
 void main()
 {
@@ -30,10 +33,10 @@ void main()
     } else {
         LOAD8(x2, kHalfX, row * p.x2_ld + col - p.x_cols, lo, hi);
     }
-    const uint image = (row + p.first_row) / p.image_rows;
-    const uint at = (2 * image * p.scale_ld + col) / 4, shift_at = at + p.scale_ld / 4;
-    lo = lo * scale[at] + scale[shift_at];
-    hi = hi * scale[at + 1] + scale[shift_at + 1];
+    const uint set = (row + p.first_row) / p.image_rows;
+    const uint at = (2 * set * p.scale_ld + col) / 4, mean_at = at + p.scale_ld / 4;
+    lo = (lo - scale[mean_at]) * scale[at] + bias[col / 4];
+    hi = (hi - scale[mean_at + 1]) * scale[at + 1] + bias[col / 4 + 1];
     if (kSilu) {
         lo = silu(lo);
         hi = silu(hi);

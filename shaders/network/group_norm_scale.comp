@@ -1,7 +1,7 @@
 #version 460
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// scale = weight / sqrt(var + eps), shift = bias - mean * scale of every channel of a group of an image, from the
+// weight / sqrt(var + eps) and mean of every channel of a group of an image, or of several images together, from the
 // moments of chunks of 16 rows, merged in a fixed order as in Chan, Golub and LeVeque 1979. A workgroup a group.
 #extension GL_GOOGLE_include_directive : require
 #include "group_norm.h"
@@ -11,8 +11,7 @@ layout(push_constant) uniform Push { GroupNormScalePush p; };
 layout(binding = 0) readonly buffer Moments { vec2 moments[]; };   // [images * chunks, x_cols] mean, m2
 layout(binding = 1) readonly buffer Moments2 { vec2 moments2[]; }; // [images * chunks, x2_cols]
 layout(binding = 2) readonly buffer Weight { float weight[]; };    // [x_cols + x2_cols]
-layout(binding = 3) readonly buffer Bias { float bias[]; };
-layout(binding = 4) writeonly buffer Scale { float scale[]; };     // [2 * images, x_cols + x2_cols]: scales, then shifts
+layout(binding = 3) writeonly buffer Scale { float scale[]; };     // [2 * sets, x_cols + x2_cols]: scales, then means
 
 shared vec3 partial[64];
 
@@ -23,20 +22,21 @@ vec3 merge(vec3 a, vec3 b)
     return vec3(n, a.y + delta * share, a.z + b.z + delta * delta * a.x * share);
 }
 
-vec3 load(uint image, uint chunk, uint col)
+// chunk: of all images of the set
+vec3 load(uint set, uint chunk, uint col)
 {
-    const uint row = image * p.chunks + chunk;
+    const uint row = set * p.images * p.chunks + chunk, first = chunk % p.chunks * 16;
     const vec2 m = col < p.x_cols ? moments[row * (p.moments_ld / 2) + col] : moments2[row * (p.moments2_ld / 2) + col - p.x_cols];
-    return vec3(float(min(p.pixels - min(chunk * 16, p.pixels), 16)), m);
+    return vec3(float(min(p.pixels - min(first, p.pixels), 16)), m);
 }
 
 void main()
 {
-    const uint thread = gl_LocalInvocationID.x, group = gl_WorkGroupID.x, image = gl_WorkGroupID.y;
+    const uint thread = gl_LocalInvocationID.x, group = gl_WorkGroupID.x, set = gl_WorkGroupID.y;
     const uint first = group * p.group_cols;
     vec3 sum = vec3(0.0);
-    for (uint i = thread; i < p.chunks * p.group_cols; i += 64)
-        sum = merge(sum, load(image, i / p.group_cols, first + i % p.group_cols));
+    for (uint i = thread; i < p.images * p.chunks * p.group_cols; i += 64)
+        sum = merge(sum, load(set, i / p.group_cols, first + i % p.group_cols));
     partial[thread] = sum;
     for (uint step = 32; step > 0; step /= 2) {
         barrier();
@@ -46,8 +46,7 @@ void main()
     barrier();
     const float mean = partial[0].y, inverse = inversesqrt(partial[0].z / partial[0].x + p.eps);
     for (uint c = first + thread; c < first + p.group_cols; c += 64) {
-        const float factor = weight[c] * inverse;
-        scale[2 * image * p.scale_ld + c] = factor;
-        scale[(2 * image + 1) * p.scale_ld + c] = bias[c] - mean * factor;
+        scale[2 * set * p.scale_ld + c] = weight[c] * inverse;
+        scale[(2 * set + 1) * p.scale_ld + c] = mean;
     }
 }

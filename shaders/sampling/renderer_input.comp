@@ -2,7 +2,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // y = [in_scale x, previous, buffer, visible], once per guidance half: in rows beyond those of x, the unconditional
-// half, previous and visible are zeros; eight elements a thread
+// half, previous and visible are zeros; eight elements a thread. Of two latents previous is left out.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/pack.glsl"
 #include "lib/step_row.h"
@@ -25,16 +25,16 @@ float value(uint row, uint col, bool conditional, float scale)
     const uint part = col / p.channels, at = row * p.latent_ld + col % p.channels;
     if (part == 0)
         return scale * x[at];
+    if (part + 1 == p.latents)
+        return latent[at];
     if (part == 1)
         return conditional ? previous[at] : 0.0;
-    if (part == 2)
-        return latent[at];
-    return conditional && col == 3 * p.channels ? visible[row * p.visible_ld] : 0.0;
+    return conditional && col == p.latents * p.channels ? visible[row * p.visible_ld] : 0.0;
 }
 
 void main()
 {
-    const uint per_row = (3 * p.channels + 8) / 8;
+    const uint per_row = (p.latents * p.channels + 8) / 8;
     const uint row = linear_thread() / per_row, col = linear_thread() % per_row * 8;
     if (row >= p.rows)
         return;

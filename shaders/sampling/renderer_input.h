@@ -8,6 +8,7 @@ struct RendererInputPush {
     uint rows; // of y
     uint x_rows;
     uint channels;  // of a latent
+    uint latents;   // in a row: 3, or 2 without the previous one
     uint latent_ld; // elements, of x, previous and buffer
     uint visible_ld;
     uint y_ld;

@@ -2,7 +2,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // one denoising step of any sampler, four elements a thread:
-//   m = u + guidance (c - u)
+//   m = u + guidance (c - u), guidance linear over the frames
 //   x0 = clamp(x0_x x + x0_m m, -clip, clip)
 //   x' = c_x0 x0 + c_x x + c_m m + c_prev x0_prev + c_z z;  known tokens: x' = known_scale fixed + known_noise z
 #extension GL_GOOGLE_include_directive : require
@@ -30,7 +30,8 @@ void main()
     vec4 prediction = m[i];
     if (p.guided != 0) {
         const vec4 unconditional = m[i + p.rows * quads];
-        prediction = unconditional + p.guidance * (prediction - unconditional);
+        const float guidance = p.guidance + p.guidance_step * float(i / quads / p.frame_rows);
+        prediction = unconditional + guidance * (prediction - unconditional);
     }
     const vec4 start = clamp(s.x0_x * x[i] + s.x0_m * prediction, -p.clip, p.clip);
     vec4 next = s.c_x0 * start + s.c_x * x[i] + s.c_m * prediction + s.c_prev * x0[i] + s.c_z * z[i];

@@ -6,9 +6,11 @@
 
 struct StepUpdatePush {
     uint rows;
-    uint ld;     // elements, of every matrix
-    uint guided; // 1: rows [rows, 2 rows) of m are the unconditional half
-    float guidance;
+    uint ld;             // elements, of every matrix
+    uint guided;         // 1: rows [rows, 2 rows) of m are the unconditional half
+    float guidance;      // of the first frame
+    float guidance_step; // from one frame to the next
+    uint frame_rows;     // of a frame
     float clip;
 };
 

@@ -70,8 +70,11 @@ Result<GoldenOutputs> run_region_extraction(Device& device, const GoldenCase& c,
 Result<GoldenOutputs> run_splat_render(Device& device, const GoldenCase& c, DType precision);
 Result<GoldenOutputs> run_pca_normals(Device& device, const GoldenCase& c, DType precision);
 Result<GoldenOutputs> run_asd_rollout(Device& device, const GoldenCase& c, DType precision);
+Result<GoldenOutputs> run_vsd_window(Device& device, const GoldenCase& c, DType precision);
 
 Result<GoldenOutputs> run_unet_2d_condition(Device& device, const GoldenCase& c, DType precision);
+Result<GoldenOutputs> run_unet_spatio_temporal_condition(Device& device, const GoldenCase& c, DType precision);
+Result<GoldenOutputs> run_autoencoder_kl_temporal_decoder(Device& device, const GoldenCase& c, DType precision);
 Result<GoldenOutputs> run_mesh_voxelization(Device& device, const GoldenCase& c, DType precision);
 Result<GoldenOutputs> run_autoencoder_kl(Device& device, const GoldenCase& c, DType precision);
 

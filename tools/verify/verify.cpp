@@ -40,8 +40,11 @@ constexpr Kind kKinds[] = {
     {"pca_normals", run_pca_normals},
     {"mesh_voxelization", run_mesh_voxelization},
     {"asd_rollout", run_asd_rollout},
+    {"vsd_window", run_vsd_window},
     {"unet_2d_condition", run_unet_2d_condition},
     {"autoencoder_kl", run_autoencoder_kl},
+    {"unet_spatio_temporal_condition", run_unet_spatio_temporal_condition},
+    {"autoencoder_kl_temporal_decoder", run_autoencoder_kl_temporal_decoder},
 };
 
 enum class Outcome { pass, fail, skip };

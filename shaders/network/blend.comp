@@ -1,0 +1,33 @@
+#version 460
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// y = x + share (z - x), eight elements a thread
+#extension GL_GOOGLE_include_directive : require
+#include "blend.h"
+#include "lib/pack.glsl"
+#include "lib/thread.glsl"
+
+layout(local_size_x = 64) in;
+layout(constant_id = 0) const bool kHalfX = false;
+layout(constant_id = 1) const bool kHalfZ = false;
+layout(constant_id = 2) const bool kHalfY = false;
+layout(push_constant) uniform Push { BlendPush p; };
+layout(binding = 0) readonly buffer X { uvec4 x[]; };         // [rows, cols]
+layout(binding = 1) readonly buffer Z { uvec4 z[]; };         // [rows, cols]
+layout(binding = 2) readonly buffer Share { float share[]; }; // [1]
+layout(binding = 3) writeonly buffer Y { uvec4 y[]; };        // [rows, cols]
+
+void main()
+{
+    const uint per_row = (p.cols + 7) / 8;
+    const uint row = linear_thread() / per_row, col = linear_thread() % per_row * 8;
+    if (row >= p.rows)
+        return;
+    vec4 lo, hi, z_lo, z_hi;
+    LOAD8(x, kHalfX, row * p.x_ld + col, lo, hi);
+    LOAD8(z, kHalfZ, row * p.z_ld + col, z_lo, z_hi);
+    lo += share[0] * (z_lo - lo);
+    hi += share[0] * (z_hi - hi);
+    clear_padding(col, p.cols, lo, hi);
+    STORE8(y, kHalfY, row * p.y_ld + col, lo, hi);
+}
