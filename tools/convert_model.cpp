@@ -169,15 +169,15 @@ Result<Conversion> plan_conversion(const ConvertModelOptions& o)
 // ---- writing
 
 // a folder beside the output that the results are written to, gone unless commit() renames it
-class Staging {
+class StagingFolder {
   public:
-    explicit Staging(const Path& out)
+    explicit StagingFolder(const Path& out)
         : out_(out), path_(out.parent_path() / fmt::format(".semrover-{}-{}.tmp", out.filename().string(), getpid()))
     {
     }
-    Staging(const Staging&) = delete;
-    Staging& operator=(const Staging&) = delete;
-    ~Staging()
+    StagingFolder(const StagingFolder&) = delete;
+    StagingFolder& operator=(const StagingFolder&) = delete;
+    ~StagingFolder()
     {
         std::error_code ignored;
         fs::remove_all(path_, ignored);
@@ -252,7 +252,7 @@ Status write_conversion(Conversion& plan, const Path& out, const Globals& global
         total += files.tensors.size();
     Progress progress(progress_to_stderr(globals), "convert", "tensors", total);
     watch(plan, progress, done);
-    Staging staging(out);
+    StagingFolder staging(out);
     for (const auto& [name, files] : plan.components)
         SR_CHECK(write_component(staging.path() / name, files));
     for (const auto& [name, json] : plan.texts)
