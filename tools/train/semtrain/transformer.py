@@ -6,6 +6,7 @@ import os
 
 import torch
 
+from .condition import width_of
 from .grids import Grids, LocalSets
 from .model_folder import add_to_index, read_component, write_component, write_scheduler
 from .nets.transformer import VoxfieldTransformer
@@ -43,6 +44,16 @@ def with_known(noisy, x0, known, alphas, top, random):
     return torch.where(known[..., None], noised(x0, alphas, t, random), noisy)
 
 
+def with_drift(x0, cells, strength, random):
+    """tokens x0 [B, N, 6n]; in every other set the colours of the cells [B, N] are off, all by the same. What was
+    generated before may have drifted away from what it was told, and is not to lead away what comes next"""
+    off = strength * torch.randn((len(x0), 1, 1, 3), generator=random)
+    off *= (torch.rand((len(x0), 1, 1, 1), generator=random) < 0.5)
+    tokens = x0.unflatten(2, (-1, 6)).clone()
+    tokens[..., 3:] += torch.where(cells[..., None, None], off.to(x0.device), 0.0)
+    return tokens.flatten(2)
+
+
 def mean_error(made, x0, target, of_hue=1):
     """squared error of tokens [B, N, 6n] of the cells that are targets [B, N] -> of places and of colours, [B] each; that
     of what is left of a colour without its grey counts `of_hue` times"""
@@ -56,12 +67,17 @@ def mean_error(made, x0, target, of_hue=1):
 def loss_of(sets, config):
     alphas, device = linear_alphas(config).to(config["device"]), config["device"]
     weights, of_colors = weights_of(alphas, config["snr_gamma"]), config["color_weight"]
+    parts = config["network"].get("condition", [])
+    tint_flag = width_of(parts[:parts.index("tint")]) if "tint" in parts else None
 
     def loss(model, step):
         centers, labels, x0, known, condition = (torch.from_numpy(a).to(device) for a in sets.batch(step))
         random = generator(config, step)
         t = timesteps_at(torch.rand(len(x0), generator=random), len(alphas), config["timestep_power"]).to(device)
-        noisy = with_known(noised(x0, alphas, t, random), x0, known, alphas, config["known_levels"], random)
+        noisy, before = noised(x0, alphas, t, random), x0
+        if config["known_drift"] and tint_flag is not None:
+            before = with_drift(x0, known & (condition[..., tint_flag] > 0), config["known_drift"], random)
+        noisy = with_known(noisy, before, known, alphas, config["known_levels"], random)
         valid = torch.ones(labels.shape, dtype=torch.bool, device=device)
         told = (condition,) if condition.shape[-1] else ()
         places, colors = mean_error(model(noisy, labels, centers, valid, t, *told).float(), x0, ~known,

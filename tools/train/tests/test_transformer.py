@@ -18,7 +18,7 @@ from semtrain.grids import Grids, LocalSets, read_tokens
 from semtrain.known_cells import draw_known
 from semtrain.nets.transformer import CONFIG_FIELDS, VoxfieldTransformer
 from semtrain.program import semrover_path
-from semtrain.transformer import loss_of, mean_error
+from semtrain.transformer import loss_of, mean_error, with_drift
 
 TINY = ["--set", 'network={"num_layers": 2, "num_attention_heads": 2, "attention_head_dim": 16, "points_per_voxel": 4,'
         ' "num_classes": 20, "voxel_size": 0.6, "attention_radius": 3.0, "pos_embed_dim": 8, "context_pos_embed": true}',
@@ -73,6 +73,21 @@ class Errors(unittest.TestCase):
                 places, colors = mean_error(made, true, target, of_hue)
                 self.assertAlmostEqual(float(colors), expected, 6)
                 self.assertEqual(float(places), 0)
+
+
+class Drift(unittest.TestCase):
+    def test_moves_the_colours_of_the_cells_alone_by_the_same_in_half_of_the_sets(self):
+        x0 = torch.randn((64, 5, 18))
+        cells = torch.zeros((64, 5), dtype=torch.bool)
+        cells[:, 1:3] = True
+        off = (with_drift(x0, cells, 0.15, torch.Generator().manual_seed(2)) - x0).unflatten(2, (-1, 6))
+        self.assertEqual(float(off[..., :3].abs().max()), 0)
+        self.assertEqual(float(off[:, [0, 3, 4]].abs().max()), 0)
+        moved = off[:, 1:3, :, 3:]
+        torch.testing.assert_close(moved, moved[:, :1, :1].expand_as(moved), atol=1e-6, rtol=0)
+        some = moved[:, 0, 0].abs().amax(1) > 0
+        self.assertTrue(20 < int(some.sum()) < 44)
+        self.assertAlmostEqual(float(moved[some, 0, 0].std()), 0.15, delta=0.04)
 
 
 class TheRecipe(unittest.TestCase):
