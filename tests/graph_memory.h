@@ -5,6 +5,8 @@
 #include "kernels/network.h"
 #include "runtime/graph/plan.h"
 
+#include <gtest/gtest.h>
+
 // what graph tests need when there is no device: limits, and external memory that nobody dereferences
 namespace semrover {
 
@@ -34,6 +36,13 @@ inline Tensor fake_external(Graph& g, uint32_t rows, uint32_t cols, DType dtype 
 inline Tensor fake_array(Graph& g, uint32_t count, std::string_view name = "array")
 {
     return g.external(fake_memory(uint64_t(count) * 4), count, 1, DType::u32, name, 1);
+}
+
+inline Plan planned(const Graph& g, const DeviceLimits& limits = test_limits())
+{
+    auto plan = make_plan(g.desc(), limits);
+    EXPECT_TRUE(plan) << plan.error().message;
+    return plan ? *plan : Plan{};
 }
 
 // kernels in the order they run, with a bar for every barrier: "gelu silu | add"

@@ -8,13 +8,6 @@
 namespace semrover {
 namespace graph_plan_test {
 
-Plan plan_of(const Graph& g, const DeviceLimits& limits = test_limits())
-{
-    auto plan = make_plan(g.desc(), limits);
-    EXPECT_TRUE(plan) << plan.error().message;
-    return plan ? *plan : Plan{};
-}
-
 TEST(graph_plan, puts_no_barrier_between_passes_that_read_the_same)
 {
     Graph g;
@@ -22,7 +15,7 @@ TEST(graph_plan, puts_no_barrier_between_passes_that_read_the_same)
     const Tensor a = gelu(g, x), b = silu(g, x), c = gelu(g, x);
     add(g, a, b, {fake_external(g, 16, 64)});
     add(g, b, c, {fake_external(g, 16, 64)});
-    EXPECT_EQ(levels_text(plan_of(g)), "gelu silu gelu | add add");
+    EXPECT_EQ(levels_text(planned(g)), "gelu silu gelu | add add");
 }
 
 TEST(graph_plan, lets_independent_branches_share_a_level)
@@ -32,7 +25,7 @@ TEST(graph_plan, lets_independent_branches_share_a_level)
     const Tensor a = gelu(g, x), b = gelu(g, y), c = silu(g, x);
     add(g, a, b, {z});
     add(g, b, c, {x}); // also after the reads of x
-    EXPECT_EQ(levels_text(plan_of(g)), "gelu gelu silu | add add");
+    EXPECT_EQ(levels_text(planned(g)), "gelu gelu silu | add add");
 }
 
 TEST(graph_plan, orders_a_write_after_the_reads_before_it)
@@ -42,7 +35,7 @@ TEST(graph_plan, orders_a_write_after_the_reads_before_it)
     (void)gelu(g, x);
     add(g, y, y, {x});
     (void)silu(g, x);
-    EXPECT_EQ(levels_text(plan_of(g)), "gelu | add | silu");
+    EXPECT_EQ(levels_text(planned(g)), "gelu | add | silu");
 }
 
 TEST(graph_plan, orders_writes_to_the_same_bytes_and_not_to_different_rows)
@@ -51,9 +44,9 @@ TEST(graph_plan, orders_writes_to_the_same_bytes_and_not_to_different_rows)
     const Tensor x = fake_external(g, 16, 64), y = fake_external(g, 32, 64);
     add(g, x, x, {y, 0});
     add(g, x, x, {y, 16});
-    EXPECT_EQ(levels_text(plan_of(g)), "add add");
+    EXPECT_EQ(levels_text(planned(g)), "add add");
     add(g, x, x, {y, 8});
-    EXPECT_EQ(levels_text(plan_of(g)), "add add | add");
+    EXPECT_EQ(levels_text(planned(g)), "add add | add");
 }
 
 TEST(graph_plan, knows_two_tensors_in_the_same_memory)
@@ -63,7 +56,7 @@ TEST(graph_plan, knows_two_tensors_in_the_same_memory)
     const Tensor a = g.external(memory, 16, 64, DType::f32, "a"), b = g.external(memory, 16, 64, DType::f32, "b");
     add(g, fake_external(g, 16, 64), fake_external(g, 16, 64), {a});
     (void)gelu(g, b);
-    EXPECT_EQ(levels_text(plan_of(g)), "add | gelu");
+    EXPECT_EQ(levels_text(planned(g)), "add | gelu");
 }
 
 TEST(graph_plan, separates_passes_that_only_meet_in_aliased_memory)
@@ -73,7 +66,7 @@ TEST(graph_plan, separates_passes_that_only_meet_in_aliased_memory)
     Tensor t = x;
     for (int i = 0; i < 5; ++i)
         t = gelu(g, t);
-    const Plan plan = plan_of(g);
+    const Plan plan = planned(g);
     EXPECT_EQ(levels_text(plan), "gelu | gelu | gelu | gelu | gelu");
     EXPECT_EQ(plan.arena_bytes(), 2 * 16 * 64 * 4u);
     EXPECT_EQ(plan.transient_bytes(), 5 * 16 * 64 * 4u);
@@ -84,7 +77,7 @@ TEST(graph_plan, prints_passes_levels_bytes_and_places)
     Graph g;
     const Tensor x = fake_external(g, 16, 64);
     (void)silu(g, gelu(g, x));
-    EXPECT_EQ(plan_of(g).print(), "2 passes, 0 fused, 2 barriers, 1 submits; arena 8192 bytes (8192 without aliasing)\n"
+    EXPECT_EQ(planned(g).print(), "2 passes, 0 fused, 2 barriers, 1 submits; arena 8192 bytes (8192 without aliasing)\n"
                                   "-- level 0\n"
                                   "   0 gelu [2 1 1] X:r=input(ext +4096) Y:w=gelu(0@0 +4096)\n"
                                   "-- level 1\n"
@@ -145,7 +138,7 @@ void check_random(uint32_t seed, const DeviceLimits& limits)
     SCOPED_TRACE(seed);
     Graph g;
     const RandomGraph made(g, seed, [&](uint32_t rows, uint32_t cols) { return fake_external(g, rows, cols); });
-    const Plan plan = plan_of(g, limits);
+    const Plan plan = planned(g, limits);
     ASSERT_FALSE(plan.passes.empty());
     expect_owned_reads(plan);
     expect_no_hazard_within_a_level(plan);
@@ -177,7 +170,7 @@ TEST(graph_plan, saves_memory_on_deep_graphs)
     Tensor t = fake_external(g, 256, 64);
     for (int i = 0; i < 50; ++i)
         t = silu(g, gelu(g, t));
-    const Plan plan = plan_of(g);
+    const Plan plan = planned(g);
     EXPECT_EQ(plan.arena_bytes(), plan.transient_bytes() / 50);
 }
 

@@ -10,13 +10,6 @@
 namespace semrover {
 namespace graph_schedule_test {
 
-Plan plan_of(const Graph& g, const DeviceLimits& limits = test_limits())
-{
-    auto plan = make_plan(g.desc(), limits);
-    EXPECT_TRUE(plan) << plan.error().message;
-    return plan ? *plan : Plan{};
-}
-
 double sum(const Plan& plan, uint32_t pass, const std::vector<double>& seconds, uint32_t submit)
 {
     double out = 0;
@@ -74,12 +67,12 @@ TEST(graph_schedule, cuts_long_work_into_ranges_of_workgroups)
     (void)gemm(g, x, w, {}, {.dtype = DType::f32}); // 137 GFLOP, 0.27 s at the assumed rate
     DeviceLimits limits = test_limits();
     limits.submit_seconds = 0.1;
-    const Plan plan = plan_of(g, limits);
+    const Plan plan = planned(g, limits);
     EXPECT_EQ(plan.passes.size(), 1u);
     EXPECT_EQ(plan.dispatches.size(), 3u);
     EXPECT_EQ(plan.submits, 3u);
     expect_complete(plan, {estimated_seconds(plan.passes[0])}, 0.1);
-    EXPECT_EQ(plan_of(g, test_limits()).dispatches.size(), 1u); // nothing is cut without a watchdog
+    EXPECT_EQ(planned(g, test_limits()).dispatches.size(), 1u); // nothing is cut without a watchdog
 }
 
 TEST(graph_schedule, fills_a_submit_with_short_passes)
@@ -91,7 +84,7 @@ TEST(graph_schedule, fills_a_submit_with_short_passes)
         x = gemm(g, x, w, {}, {.dtype = DType::f32}); // 0.54 ms each
     DeviceLimits limits = test_limits();
     limits.submit_seconds = 0.002;
-    const Plan plan = plan_of(g, limits);
+    const Plan plan = planned(g, limits);
     EXPECT_EQ(plan.dispatches.size(), 12u);
     EXPECT_EQ(plan.submits, 4u);
 }
@@ -109,7 +102,7 @@ TEST(graph_schedule, gives_every_workgroup_once_whatever_passes_take)
     limits.max_groups = 60;
     for (const double limit : {0.0, 0.001, 0.01, 0.1, 10.0}) {
         limits.submit_seconds = limit;
-        Plan plan = plan_of(g, limits);
+        Plan plan = planned(g, limits);
         for (const double scale : {1e-5, 1e-3, 0.02, 0.5}) {
             std::vector<double> seconds;
             for (size_t i = 0; i < plan.passes.size(); ++i)
@@ -127,7 +120,7 @@ TEST(graph_schedule, estimates_passes_that_count_no_operations)
 {
     Graph g;
     (void)add(g, fake_external(g, 100000, 64), fake_external(g, 100000, 64));
-    const Plan plan = plan_of(g);
+    const Plan plan = planned(g);
     EXPECT_NEAR(estimated_seconds(plan.passes[0]), 3 * 100000. * 64 * 4 / 2e10, 1e-6);
 }
 
@@ -136,7 +129,7 @@ TEST(graph_schedule, learns_how_long_a_shader_takes)
     Graph g;
     const Tensor x = fake_external(g, 4096, 4096), w = fake_external(g, 4096, 4096);
     (void)gelu(g, gemm(g, x, w, {}, {.groups = 2, .dtype = DType::f32}));
-    Plan plan = plan_of(g);
+    Plan plan = planned(g);
     WorkRates rates;
     Pass& pass = plan.passes[0];
     const double estimated = estimated_seconds(pass);

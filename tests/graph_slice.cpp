@@ -8,13 +8,6 @@
 namespace semrover {
 namespace graph_slice_test {
 
-Plan plan_of(const Graph& g, const DeviceLimits& limits)
-{
-    auto plan = make_plan(g.desc(), limits);
-    EXPECT_TRUE(plan) << plan.error().message;
-    return plan ? *plan : Plan{};
-}
-
 uint32_t pushed(const Pass& pass, std::string_view member)
 {
     uint32_t value = 0;
@@ -64,7 +57,7 @@ TEST(graph_slice, lays_the_lanes_of_a_tile_where_fewest_outputs_are_computed_for
         (void)gemm(g, fake_external(g, c.rows, 64), fake_external(g, c.cols, 64), {});
         DeviceLimits limits = test_limits();
         limits.type = DeviceType::cpu;
-        const Plan plan = plan_of(g, limits);
+        const Plan plan = planned(g, limits);
         ASSERT_EQ(plan.passes.size(), 1u);
         const Pass& pass = plan.passes[0];
         ASSERT_EQ(pass.variant->name, "cpu");
@@ -84,7 +77,7 @@ TEST(graph_slice, cuts_rows_into_aligned_bands_that_cover_each_row_once)
         limits.max_storage_range = 1 << 15;
         limits.offset_alignment = 256;
         limits.max_storage_range = std::max<uint64_t>(limits.max_storage_range, 64 * cols * 4);
-        const Plan plan = plan_of(g, limits);
+        const Plan plan = planned(g, limits);
         EXPECT_GT(plan.passes.size(), 1u);
         EXPECT_EQ(plan.levels, 1u); // bands touch different rows
         for (const char* name : {"X", "Y"})
@@ -101,7 +94,7 @@ TEST(graph_slice, cuts_a_fused_gemm_in_every_operand_that_has_rows)
     (void)gated_add(g, gelu(g, gemm(g, x, w, {}, {.dtype = DType::f32})), gate, residual);
     DeviceLimits limits = test_limits();
     limits.max_storage_range = 1 << 16;
-    const Plan plan = plan_of(g, limits);
+    const Plan plan = planned(g, limits);
     EXPECT_EQ(plan.fused, 2u);
     EXPECT_EQ(plan.passes.size(), 4u); // 256 rows each, whole tiles of 64
     for (const char* name : {"X", "Residual", "Y"})
@@ -120,7 +113,7 @@ TEST(graph_slice, takes_rows_that_fit_even_where_a_tile_of_them_does_not)
     (void)gemm(g, x, w, {}, {.dtype = DType::f32});
     DeviceLimits limits = test_limits();
     limits.max_storage_range = 40 * 1024 * 4; // less than one tile of 64 rows
-    const Plan plan = plan_of(g, limits);
+    const Plan plan = planned(g, limits);
     EXPECT_EQ(plan.passes.size(), 5u);
     expect_bands(plan, "X", 200, 4096, limits);
     expect_bands(plan, "Y", 200, 32, limits);
@@ -134,7 +127,7 @@ TEST(graph_slice, counts_texels_as_the_cpu_variant_binds_them)
     DeviceLimits limits = test_limits();
     limits.type = DeviceType::cpu;
     limits.max_texel_elements = 24 * 64 / 4; // w, and 24 rows of x
-    const Plan plan = plan_of(g, limits);
+    const Plan plan = planned(g, limits);
     EXPECT_EQ(plan.passes.front().variant->name, "cpu");
     EXPECT_EQ(plan.passes.size(), 4u);
 }
@@ -147,7 +140,7 @@ TEST(graph_slice, folds_workgroups_beyond_a_dimension_over_y)
     (void)modulate(g, x, {fake_external(g, 1, 128), fake_array(g, 1000)}, 64, 1e-6f); // 1000 groups
     DeviceLimits limits = test_limits();
     limits.max_groups = 60;
-    const Plan plan = plan_of(g, limits);
+    const Plan plan = planned(g, limits);
     EXPECT_EQ(plan.passes[0].group_count[0], 42u);
     EXPECT_EQ(plan.passes[0].group_count[1], 3u);
     EXPECT_EQ(plan.passes[1].group_count[0], 59u);

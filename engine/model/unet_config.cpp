@@ -3,7 +3,7 @@
 #include "engine/model/unet_config.h"
 
 #include "engine/model/schema.h"
-#include "runtime/base/json_fields.h"
+#include "engine/model/unet_fields.h"
 
 #include <algorithm>
 
@@ -13,30 +13,12 @@ namespace {
 
 void read_blocks(JsonFields& fields, UnetConfig& c)
 {
-    fields.list("block_out_channels", kMaxLevels, 1, kMaxChannels, c.block_out_channels);
-    fields.choices<bool>("down_block_types", {{"CrossAttnDownBlock2D", true}, {"DownBlock2D", false}},
-                         c.down_attention);
-    fields.choices<bool>("up_block_types", {{"CrossAttnUpBlock2D", true}, {"UpBlock2D", false}}, c.up_attention);
+    read_block_types(fields, {{"CrossAttnDownBlock2D", true}, {"DownBlock2D", false}},
+                     {{"CrossAttnUpBlock2D", true}, {"UpBlock2D", false}}, c);
     fields.refuse_null("mid_block_type", "\"UNetMidBlock2DCrossAttn\", \"UNetMidBlock2D\"");
     fields.choice<bool>("mid_block_type", {{"UNetMidBlock2DCrossAttn", true}, {"UNetMidBlock2D", false}},
                         c.mid_attention);
-    const std::string count = fmt::format("as many as block_out_channels, {}", c.levels());
-    if (c.down_attention.size() != c.levels())
-        fields.refuse("down_block_types", count);
-    if (c.up_attention.size() != c.levels())
-        fields.refuse("up_block_types", count);
-    c.layers_per_block.assign(c.levels(), 2);
-    fields.integers("layers_per_block", c.levels(), 1, 64, c.layers_per_block);
-}
-
-// one number: lists of other networks differ per level
-void read_context_width(JsonFields& fields, UnetConfig& c)
-{
-    std::vector<uint32_t> widths(c.levels(), c.cross_attention_dim);
-    fields.integers("cross_attention_dim", c.levels(), 1, kMaxChannels, widths);
-    if (std::ranges::adjacent_find(widths, std::ranges::not_equal_to()) != widths.end())
-        fields.refuse("cross_attention_dim", "the same number at every level");
-    c.cross_attention_dim = widths[0];
+    read_layers(fields, c);
 }
 
 void read_attention(JsonFields& fields, UnetConfig& c)
@@ -44,9 +26,7 @@ void read_attention(JsonFields& fields, UnetConfig& c)
     c.heads.assign(c.levels(), 8);
     fields.integers("attention_head_dim", c.levels(), 1, 1024, c.heads);
     fields.integers("num_attention_heads", c.levels(), 1, 1024, c.heads);
-    c.transformer_layers.assign(c.levels(), 1);
-    fields.integers("transformer_layers_per_block", c.levels(), 1, 64, c.transformer_layers);
-    read_context_width(fields, c);
+    read_transformers(fields, c);
     fields.flag("use_linear_projection", c.use_linear_projection);
 }
 
@@ -74,25 +54,9 @@ void refuse_the_rest(JsonFields& fields)
     fields.ignore({"sample_size", "dropout", "addition_embed_type_num_heads", "upcast_attention"});
 }
 
-bool has_attention(const UnetConfig& c, size_t level)
-{
-    return c.down_attention[level] || c.up_attention[c.levels() - 1 - level] ||
-           (level + 1 == c.levels() && c.mid_attention);
-}
-
 Status check_together(const UnetConfig& c)
 {
-    for (size_t i = 0; i < c.levels(); ++i) {
-        const uint32_t channels = c.block_out_channels[i];
-        if (channels % c.norm_num_groups)
-            return fail(ErrorCode::bad_input, "unet config: {} channels at level {} do not divide into {} groups",
-                        channels, i, c.norm_num_groups);
-        if (has_attention(c, i) && channels % c.heads[i])
-            return fail(ErrorCode::bad_input,
-                        "unet config: {} channels at level {} do not divide into {} heads (attention_head_dim is "
-                        "their number)",
-                        channels, i, c.heads[i]);
-    }
+    SR_CHECK(check_channels(c, "unet config", " (attention_head_dim is their number)"));
     if (c.block_out_channels[0] % 2)
         return fail(ErrorCode::bad_input, "unet config: block_out_channels[0] {} must be even",
                     c.block_out_channels[0]);

@@ -1,31 +1,11 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/model/schema.h"
-#include "engine/model/unet_config.h"
-#include "runtime/base/json_fields.h"
-
-#include <algorithm>
+#include "engine/model/unet_fields.h"
 
 namespace semrover {
 
 namespace {
-
-void read_video_blocks(JsonFields& fields, UnetConfig& c)
-{
-    fields.list("block_out_channels", kMaxLevels, 1, kMaxChannels, c.block_out_channels);
-    fields.choices<bool>("down_block_types",
-                         {{"CrossAttnDownBlockSpatioTemporal", true}, {"DownBlockSpatioTemporal", false}},
-                         c.down_attention);
-    fields.choices<bool>("up_block_types", {{"CrossAttnUpBlockSpatioTemporal", true}, {"UpBlockSpatioTemporal", false}},
-                         c.up_attention);
-    const std::string count = fmt::format("as many as block_out_channels, {}", c.levels());
-    if (c.down_attention.size() != c.levels())
-        fields.refuse("down_block_types", count);
-    if (c.up_attention.size() != c.levels())
-        fields.refuse("up_block_types", count);
-    c.layers_per_block.assign(c.levels(), 2);
-    fields.integers("layers_per_block", c.levels(), 1, 64, c.layers_per_block);
-}
 
 void read_video_attention(JsonFields& fields, UnetConfig& c)
 {
@@ -33,13 +13,7 @@ void read_video_attention(JsonFields& fields, UnetConfig& c)
     if (c.heads.size() != c.levels() && !fields.find("num_attention_heads"))
         fields.refuse("num_attention_heads", fmt::format("as many as block_out_channels, {}", c.levels()));
     fields.integers("num_attention_heads", c.levels(), 1, 1024, c.heads);
-    c.transformer_layers.assign(c.levels(), 1);
-    fields.integers("transformer_layers_per_block", c.levels(), 1, 64, c.transformer_layers);
-    std::vector<uint32_t> widths(c.levels(), 1024);
-    fields.integers("cross_attention_dim", c.levels(), 1, kMaxChannels, widths);
-    if (std::ranges::adjacent_find(widths, std::ranges::not_equal_to()) != widths.end())
-        fields.refuse("cross_attention_dim", "the same number at every level");
-    c.cross_attention_dim = widths[0];
+    read_transformers(fields, c);
 }
 
 void read_added_numbers(JsonFields& fields, UnetConfig& c)
@@ -56,21 +30,6 @@ void read_added_numbers(JsonFields& fields, UnetConfig& c)
     c.added_numbers = width / c.added_embed_dim;
 }
 
-Status check_video(const UnetConfig& c)
-{
-    for (size_t i = 0; i < c.levels(); ++i) {
-        const uint32_t channels = c.block_out_channels[i];
-        if (channels % c.norm_num_groups)
-            return fail(ErrorCode::bad_input, "video unet config: {} channels at level {} do not divide into {} groups",
-                        channels, i, c.norm_num_groups);
-        const bool attends = c.down_attention[i] || c.up_attention[c.levels() - 1 - i] || i + 1 == c.levels();
-        if (attends && channels % c.heads[i])
-            return fail(ErrorCode::bad_input, "video unet config: {} channels at level {} do not divide into {} heads",
-                        channels, i, c.heads[i]);
-    }
-    return {};
-}
-
 } // namespace
 
 Result<UnetConfig> parse_video_unet_config(const Json& json)
@@ -79,18 +38,21 @@ Result<UnetConfig> parse_video_unet_config(const Json& json)
     c.video = true;
     c.in_channels = 8;
     c.use_linear_projection = true;
+    c.cross_attention_dim = 1024;
     c.num_frames = 25;
     JsonFields fields(json, "video unet config");
     fields.only("_class_name", "UNetSpatioTemporalConditionModel");
     fields.integer("in_channels", 1u, 4096u, c.in_channels);
     fields.integer("out_channels", 1u, 4096u, c.out_channels);
-    read_video_blocks(fields, c);
+    read_block_types(fields, {{"CrossAttnDownBlockSpatioTemporal", true}, {"DownBlockSpatioTemporal", false}},
+                     {{"CrossAttnUpBlockSpatioTemporal", true}, {"UpBlockSpatioTemporal", false}}, c);
+    read_layers(fields, c);
     read_video_attention(fields, c);
     read_added_numbers(fields, c);
     fields.integer("num_frames", 1u, 4096u, c.num_frames);
     fields.ignore({"sample_size", "dropout"});
     SR_CHECK(fields.finish(c.warnings));
-    SR_CHECK(check_video(c));
+    SR_CHECK(check_channels(c, "video unet config", ""));
     return c;
 }
 

@@ -100,9 +100,7 @@ struct AsdRenderer::Memory {
         const Tensor in = renderer_input(g, s, x, frame, halves, unet.precision());
         const FeatureMap m =
             unet.forward(g, {in, halves, height, width}, times.in(g), table_row.in(g), {text.in(g), tokens, 0});
-        // samplers without noise take any finite numbers for it
-        const bool noisy = std::ranges::any_of(plan.rows, [](const PlanRow& r) { return r.coefficients.c_z != 0; });
-        const Tensor z = noisy ? noise(g, s, seed) : frame.buffer;
+        const Tensor z = draws_noise(plan) ? noise(g, s, seed) : frame.buffer;
         step_update(g, s, m.data, z, known.in(g), frame.buffer, x, x0.in(g), guidance_scale, float(plan.clip));
         step_advance(g, s.clock);
         return g;

@@ -227,4 +227,12 @@ tl::unexpected<Error> not_finite(float value, size_t element, std::string_view w
     return fail(ErrorCode::internal, "{} holds {} at element {}: overflow; try --precision fp32", what, value, element);
 }
 
+Status check_finite(std::span<const float> values, std::string_view what)
+{
+    const auto bad = std::ranges::find_if(values, [](float v) { return !std::isfinite(v); });
+    if (bad != values.end())
+        return not_finite(*bad, size_t(bad - values.begin()), what);
+    return {};
+}
+
 } // namespace semrover

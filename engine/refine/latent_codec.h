@@ -77,5 +77,6 @@ std::vector<uint8_t> pixels_of_floats(std::span<const float> values); // rounded
 
 // internal: a number that is NaN or infinite, and its index
 tl::unexpected<Error> not_finite(float value, size_t element, std::string_view what);
+Status check_finite(std::span<const float> values, std::string_view what);
 
 } // namespace semrover

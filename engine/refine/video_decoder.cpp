@@ -2,10 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/refine/video_decoder.h"
 
+#include "engine/refine/frame_slots.h"
 #include "kernels/picture.h"
-
-#include <algorithm>
-#include <cmath>
 
 namespace semrover {
 
@@ -63,23 +61,16 @@ Result<std::vector<float>> VideoDecoder::decode(std::span<const float> latents)
     const Ends& e = *ends_;
     const size_t latent = size_t(e.size.pixels()) * e.latents.cols(), channels = e.images.cols();
     SR_ASSERT(latents.size() == e.frames * latent, "{} numbers to decode", latents.size());
-    for (uint32_t f = 0; f < e.frames; ++f)
-        SR_CHECK(e.latents.row_range(f * e.latent_rows, e.latent_rows)
-                     .write_rows(device_, latents.subspan(f * latent, latent)));
+    SR_CHECK(write_frames(device_, e.latents, e.frames, latents));
     SR_CHECK(program_->run());
-    std::vector<float> images;
     const uint32_t line = e.size.width() * e.size.downscale; // pixels of one, padding included
-    for (uint32_t f = 0; f < e.frames; ++f) {
-        SR_TRY(const auto rows,
-               e.images.row_range(f * e.image_rows, e.image_rows).read_rows(device_, e.size.image_height * line));
-        for (uint32_t y = 0; y < e.size.image_height; ++y) {
-            const auto first = rows.begin() + std::ptrdiff_t(size_t(y) * line * channels);
-            images.insert(images.end(), first, first + std::ptrdiff_t(e.size.image_width * channels));
-        }
+    SR_TRY(const auto lines, read_frames(device_, e.images, e.frames, e.size.image_height * line));
+    std::vector<float> images;
+    for (uint32_t y = 0; y < e.frames * e.size.image_height; ++y) {
+        const auto first = lines.begin() + std::ptrdiff_t(size_t(y) * line * channels);
+        images.insert(images.end(), first, first + std::ptrdiff_t(e.size.image_width * channels));
     }
-    const auto bad = std::ranges::find_if(images, [](float v) { return !std::isfinite(v); });
-    if (bad != images.end())
-        return not_finite(*bad, size_t(bad - images.begin()), "the decoded video");
+    SR_CHECK(check_finite(images, "the decoded video"));
     return images;
 }
 

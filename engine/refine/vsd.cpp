@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/refine/vsd.h"
 
+#include "engine/refine/frame_slots.h"
 #include "engine/sampling/step_rows.h"
 #include "kernels/sampling.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace semrover {
 
@@ -110,24 +110,11 @@ struct VsdRenderer::Memory {
         const Unet::Videos videos{{frames, frame_table.in(g), frame_row.in(g)}, row.row_range(0, halves)};
         const FeatureMap m =
             unet.forward(g, {in, halves * frames, height, width}, times.in(g), row, {text.in(g), tokens, 0}, videos);
-        // samplers without noise take any finite numbers for it
-        const bool noisy = std::ranges::any_of(plan.rows, [](const PlanRow& r) { return r.coefficients.c_z != 0; });
         const FrameGuidance guidance(options.first_guidance, options.last_guidance, frames);
-        step_update(g, s, m.data, noisy ? normals(g, s) : seen.buffer, known.in(g), seen.buffer, state_x, x0.in(g),
-                    guidance, float(plan.clip));
+        step_update(g, s, m.data, draws_noise(plan) ? normals(g, s) : seen.buffer, known.in(g), seen.buffer, state_x,
+                    x0.in(g), guidance, float(plan.clip));
         step_advance(g, s.clock);
         return g;
-    }
-
-    // values: [frames, pixels, columns of the slot] -> the rows of images, padded
-    Status write_frames(Device& device, const Slot& slot, std::span<const float> values) const
-    {
-        const size_t size = size_t(pixels) * slot.cols();
-        SR_ASSERT(values.size() == frames * size, "{} numbers for {} frames of {} pixels", values.size(), frames,
-                  pixels);
-        for (uint32_t f = 0; f < frames; ++f)
-            SR_CHECK(slot.row_range(f * image_rows, image_rows).write_rows(device, values.subspan(f * size, size)));
-        return {};
     }
 };
 
@@ -227,8 +214,11 @@ Status VsdRenderer::make_programs()
 Status VsdRenderer::upload(const VsdWindow& window)
 {
     const Memory& m = *memory_;
-    SR_CHECK(m.write_frames(device_, m.buffer, window.buffers));
-    SR_CHECK(m.write_frames(device_, m.visible, window.visible));
+    SR_ASSERT(window.visible.size() == size_t(m.frames) * m.pixels &&
+                  window.buffers.size() == window.visible.size() * m.channels,
+              "a window of {} values for {} frames of {} pixels", window.buffers.size(), m.frames, m.pixels);
+    SR_CHECK(write_frames(device_, m.buffer, m.frames, window.buffers));
+    SR_CHECK(write_frames(device_, m.visible, m.frames, window.visible));
     std::vector<int32_t> cells(m.rows() * 4ull, 0);
     for (uint32_t r = 0; r < m.rows(); ++r) {
         cells[4 * r] = int32_t(r % m.image_rows);
@@ -240,20 +230,14 @@ Status VsdRenderer::upload(const VsdWindow& window)
         return {};
     std::vector<float> noise(size_t(m.frames) * m.pixels * m.channels);
     options_.noise(window.number, noise);
-    return m.write_frames(device_, m.noise, noise);
+    return write_frames(device_, m.noise, m.frames, noise);
 }
 
 Result<std::vector<float>> VsdRenderer::read() const
 {
     const Memory& m = *memory_;
-    std::vector<float> latents;
-    for (uint32_t f = 0; f < m.frames; ++f) {
-        SR_TRY(const auto frame, m.x.row_range(f * m.image_rows, m.image_rows).read_rows(device_, m.pixels));
-        latents.insert(latents.end(), frame.begin(), frame.end());
-    }
-    const auto bad = std::ranges::find_if(latents, [](float v) { return !std::isfinite(v); });
-    if (bad != latents.end())
-        return not_finite(*bad, size_t(bad - latents.begin()), "the denoised latent");
+    SR_TRY(std::vector<float> latents, read_frames(device_, m.x, m.frames, m.pixels));
+    SR_CHECK(check_finite(latents, "the denoised latent"));
     return latents;
 }
 

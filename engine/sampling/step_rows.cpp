@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/sampling/step_rows.h"
 
+#include <algorithm>
+
 namespace semrover {
 
 StepRow step_row(const PlanRow& row)
@@ -22,6 +24,11 @@ StepRow step_row(const PlanRow& row)
     r.timestep_index = row.timestep_index;
     r.noise_stream = row.kind == PlanRowKind::undo ? 2 : 0;
     return r;
+}
+
+bool draws_noise(const SamplingPlan& plan)
+{
+    return std::ranges::any_of(plan.rows, [](const PlanRow& r) { return r.coefficients.c_z != 0; });
 }
 
 StepRow first_noise_row(double scale, uint32_t draw)

@@ -14,6 +14,9 @@ constexpr uint32_t kPreviousFrameDraw = 0xffffe; // the noise on the frame befor
 
 StepRow step_row(const PlanRow& row); // of a plan, for the device
 
+// whether any row adds noise; else step_update takes any finite numbers for it
+bool draws_noise(const SamplingPlan& plan);
+
 // x = scale z, and x += scale z: rows for step_renoise, with noise of the stream of all tokens
 StepRow first_noise_row(double scale, uint32_t draw);
 StepRow more_noise_row(double scale, uint32_t draw);

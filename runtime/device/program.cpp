@@ -12,8 +12,7 @@ namespace semrover {
 
 Result<std::unique_ptr<Program>> Program::create(Device& device, const Graph& graph)
 {
-    SR_TRY(Plan plan, make_plan(graph.desc(), device.limits()));
-    stage::schedule(plan, device.limits(), device.rates().seconds(plan));
+    SR_TRY(Plan plan, make_plan(graph.desc(), device.limits(), device.rates()));
     return create(device, std::move(plan));
 }
 

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/graph/plan.h"
 
+#include "runtime/graph/work_rates.h"
+
 #include <numeric>
 
 namespace semrover {
@@ -29,6 +31,11 @@ Plan from_desc(const GraphDesc& graph)
 
 Result<Plan> make_plan(const GraphDesc& graph, const DeviceLimits& limits)
 {
+    return make_plan(graph, limits, WorkRates());
+}
+
+Result<Plan> make_plan(const GraphDesc& graph, const DeviceLimits& limits, const WorkRates& rates)
+{
     Plan plan = from_desc(graph);
     SR_CHECK(stage::check(plan));
     SR_CHECK(stage::fuse(plan));
@@ -37,10 +44,7 @@ Result<Plan> make_plan(const GraphDesc& graph, const DeviceLimits& limits)
     SR_CHECK(stage::place(plan, limits));
     SR_CHECK(stage::slice(plan, limits));
     SR_CHECK(stage::order(plan));
-    std::vector<double> seconds;
-    for (const Pass& pass : plan.passes)
-        seconds.push_back(estimated_seconds(pass));
-    stage::schedule(plan, limits, seconds);
+    stage::schedule(plan, limits, rates.seconds(plan));
     return plan;
 }
 

@@ -71,6 +71,10 @@ struct Plan {
     std::string print() const;
 };
 
+class WorkRates;
+
+// rates: what the device has shown of its shaders; without any, as estimated
+Result<Plan> make_plan(const GraphDesc& graph, const DeviceLimits& limits, const WorkRates& rates);
 Result<Plan> make_plan(const GraphDesc& graph, const DeviceLimits& limits);
 
 namespace stage {

@@ -2,40 +2,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // golden kind asd_rollout: a chain of frames through encoder, denoiser and decoder
 #include "engine/refine/asd.h"
-#include "runtime/base/json.h"
 #include "tools/verify/golden_case.h"
 #include "tools/verify/planar.h"
+#include "tools/verify/renderer_networks.h"
 
 #include <algorithm>
 
 namespace semrover {
 
-namespace {
-
-struct Networks {
-    std::unique_ptr<Unet> unet;
-    std::unique_ptr<Vae> vae;
-};
-
-Result<Networks> load_networks(Device& device, const Path& model, DType precision)
-{
-    Networks n;
-    SR_TRY(const nlohmann::json unet_json, read_json(model / "unet" / "config.json"));
-    SR_TRY(const UnetConfig unet, parse_unet_config(unet_json));
-    SR_TRY(const Checkpoint unet_weights, Checkpoint::open_folder(model / "unet", Checkpoint::Network::unet));
-    SR_TRY(n.unet, Unet::load(device, unet, unet_weights, precision));
-    SR_TRY(const nlohmann::json vae_json, read_json(model / "vae" / "config.json"));
-    SR_TRY(const VaeConfig vae, parse_vae_config(vae_json));
-    SR_TRY(const Checkpoint vae_weights, Checkpoint::open_folder(model / "vae", Checkpoint::Network::vae));
-    SR_TRY(n.vae, Vae::load(device, vae, vae_weights, precision));
-    return n;
-}
-
-} // namespace
-
 Result<GoldenOutputs> run_asd_rollout(Device& device, const GoldenCase& c, DType precision)
 {
-    SR_TRY(const Networks n, load_networks(device, c.model(), precision));
+    SR_TRY(const RendererNetworks n, load_networks(device, c.model(), precision, parse_unet_config, parse_vae_config));
     std::vector<std::string> warnings;
     SR_TRY(const SchedulerConfig scheduler,
            scheduler_config_from_json(c.params().value("scheduler", nlohmann::json()), warnings));

@@ -3,34 +3,15 @@
 // golden kind vsd_window: the frames of a window through encoder, denoiser and decoder
 #include "engine/refine/video_decoder.h"
 #include "engine/refine/vsd.h"
-#include "runtime/base/json.h"
 #include "tools/verify/golden_case.h"
 #include "tools/verify/planar.h"
+#include "tools/verify/renderer_networks.h"
 
 #include <algorithm>
 
 namespace semrover {
 
 namespace {
-
-struct VideoNetworks {
-    std::unique_ptr<Unet> unet;
-    std::unique_ptr<Vae> vae;
-};
-
-Result<VideoNetworks> load_video_networks(Device& device, const Path& model, DType precision)
-{
-    VideoNetworks n;
-    SR_TRY(const nlohmann::json unet_json, read_json(model / "unet" / "config.json"));
-    SR_TRY(const UnetConfig unet, parse_video_unet_config(unet_json));
-    SR_TRY(const Checkpoint unet_weights, Checkpoint::open_folder(model / "unet", Checkpoint::Network::unet));
-    SR_TRY(n.unet, Unet::load(device, unet, unet_weights, precision));
-    SR_TRY(const nlohmann::json vae_json, read_json(model / "vae" / "config.json"));
-    SR_TRY(const VaeConfig vae, parse_video_vae_config(vae_json));
-    SR_TRY(const Checkpoint vae_weights, Checkpoint::open_folder(model / "vae", Checkpoint::Network::vae));
-    SR_TRY(n.vae, Vae::load(device, vae, vae_weights, precision));
-    return n;
-}
 
 // inputs of a case that belong together
 struct WindowInputs {
@@ -40,7 +21,7 @@ struct WindowInputs {
     std::vector<float> buffers, visible, text, added, noise;
 };
 
-Result<WindowInputs> window_inputs(const GoldenCase& c, const VideoNetworks& n)
+Result<WindowInputs> window_inputs(const GoldenCase& c, const RendererNetworks& n)
 {
     const auto shape = c.shape("input.buffers"), text_shape = c.shape("input.encoder_hidden_states"); // [F, 3, H, W]
     if (shape.size() != 4 || text_shape.size() != 3 || text_shape[0] != 1 || text_shape[1] > 4096 || shape[0] == 0 ||
@@ -86,7 +67,8 @@ Status encode_window(Device& device, const Vae& vae, const WindowInputs& in, std
 
 Result<GoldenOutputs> run_vsd_window(Device& device, const GoldenCase& c, DType precision)
 {
-    SR_TRY(const VideoNetworks n, load_video_networks(device, c.model(), precision));
+    SR_TRY(const RendererNetworks n,
+           load_networks(device, c.model(), precision, parse_video_unet_config, parse_video_vae_config));
     std::vector<std::string> warnings;
     SR_TRY(const SchedulerConfig scheduler,
            scheduler_config_from_json(c.params().value("scheduler", nlohmann::json()), warnings));

@@ -98,17 +98,16 @@ def judge(pose, folder, options):
     return out
 
 
-def flicker_of(figures):
-    """-> mean over the pixels of all drives, and the truth's"""
+def mean_flicker(figures, mean_of=lambda pair: pair["mean"]):
+    """-> mean over the pixels of all drives"""
     pairs = [pair for one in figures.values() for pair in one["pairs"]]
-    valid = sum(pair["valid"] for pair in pairs)
-    return [sum(of(pair) * pair["valid"] for pair in pairs) / valid
-            for of in (lambda p: p["mean"], lambda p: p["truth"]["mean"])]
+    return sum(mean_of(pair) * pair["valid"] for pair in pairs) / max(1, sum(pair["valid"] for pair in pairs))
 
 
 def line_of(pose, name, figures):
     """| poses | frames | PSNR dB | where splats are | SSIM | KID x 1000 | flicker | truth's |"""
-    made, truth = flicker_of(figures["flicker"])
+    made = mean_flicker(figures["flicker"])
+    truth = mean_flicker(figures["flicker"], lambda pair: pair["truth"]["mean"])
     kid = f"{1000 * figures['kid']['full']:.1f}" if "kid" in figures else "-"
     frames = figures["frames"]
     decibels = ["equal" if of["psnr"] is None else f"{of['psnr']:.2f}" for of in (frames, frames["visible"])]

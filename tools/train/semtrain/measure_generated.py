@@ -10,7 +10,7 @@ import os
 
 from .drives import drive_of, make_buffers
 from .json_file import read_json, write_json
-from .measure_frames import gather
+from .measure_frames import gather, mean_flicker
 from .program import semrover
 
 TRUE = "true points"
@@ -78,14 +78,12 @@ def judge(streets, folder, truth, features):
 
 def line_of(name, told, figures):
     """| model | told | PSNR dB | SSIM | KID x 1000 | flicker |"""
-    pairs = [pair for one in figures["flicker"].values() for pair in one["pairs"]]
-    flicker = sum(pair["mean"] * pair["valid"] for pair in pairs) / max(1, sum(pair["valid"] for pair in pairs))
     cells = ["-", "-", "-"]
     if "frames" in figures:
         cells[:2] = [f"{figures['frames']['psnr']:.2f}", f"{figures['frames']['ssim']:.3f}"]
     if "kid" in figures:
         cells[2] = f"{1000 * figures['kid']['full']:.1f}"
-    return f"| {name} | {told} | {' | '.join(cells)} | {flicker:.2f} |"
+    return f"| {name} | {told} | {' | '.join(cells)} | {mean_flicker(figures['flicker']):.2f} |"
 
 
 def measure(streets, models, tellings, options):
