@@ -175,6 +175,21 @@ TEST_F(CliGenerate, an_interrupt_saves_what_is_done_and_exits_with_130)
     EXPECT_TRUE(bytes_of("whole.sgrid") == bytes_of("out.sgrid"));
 }
 
+TEST_F(CliGenerate, a_run_whose_device_is_lost_goes_on_with_a_new_one)
+{
+    const std::string whole = bytes_of("whole.sgrid");
+    const std::string arguments_lost =
+        "generate " + path("in.sgrid") + " -m " + kModel + " -o " + path("lost.sgrid") + kSettings + "--batch 1";
+    const ProgramResult twice = semrover_with_lost_devices(2, 8, arguments_lost);
+    EXPECT_EQ(twice.code, 0) << twice.err;
+    EXPECT_NE(twice.err.find("going on with a new device"), std::string::npos) << twice.err;
+    EXPECT_TRUE(whole == contents(path("lost.sgrid")));
+    const ProgramResult always = semrover_with_lost_devices(1000, 8, arguments("always.sgrid"));
+    EXPECT_EQ(always.code, 6) << always.err;
+    EXPECT_NE(always.err.find("VK_ERROR_DEVICE_LOST"), std::string::npos) << always.err;
+    EXPECT_FALSE(std::filesystem::exists(path("always.sgrid")));
+}
+
 TEST_F(CliGenerate, known_cells_stay_as_they_are)
 {
     bytes_of("whole.sgrid", "--seed 3");

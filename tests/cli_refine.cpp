@@ -90,6 +90,14 @@ TEST_F(CliRefine, a_run_writes_frames_and_latents_the_same_again_and_others_with
     EXPECT_EQ(run["settings"]["steps"], 3);
 }
 
+TEST_F(CliRefine, a_run_whose_device_is_lost_goes_on_with_a_new_one)
+{
+    const auto whole = refined("whole");
+    const ProgramResult lost = semrover_with_lost_devices(1, 14, arguments("lost"));
+    EXPECT_EQ(lost.code, 0) << lost.err;
+    EXPECT_TRUE(whole == results("lost"));
+}
+
 TEST_F(CliRefine, a_run_that_was_killed_goes_on_to_the_same_bytes)
 {
     const auto whole = refined("whole");

@@ -28,6 +28,7 @@ const ConvCase kCases[] = {
     {1, 4, 5, 8, 0, 8, 3, 1, false, 8, 10, true, false, false, false},
     {2, 4, 5, 8, 0, 8, 3, 1, false, 7, 9, true, false, false, false},
     {2, 11, 13, 40, 0, 72, 3, 1, false, 0, 0, true, true, false, true},
+    {2, 23, 24, 8, 0, 509, 3, 1, false, 0, 0, true, true, false, true},
 };
 
 // y of one output pixel and channel, in double; magnitude: sum of |terms|
@@ -55,6 +56,15 @@ double convolve(const ConvCase& c, const HostImages& x, const HostImages& x2, co
             add(x2.at(image, sy, sx, k), w.at(n, tap * (cols + cols2) + cols + k));
     }
     return sum;
+}
+
+HostMatrix first_rows(const HostMatrix& m, uint32_t rows)
+{
+    HostMatrix first(rows, m.cols, m.dtype);
+    for (uint32_t r = 0; r < rows; ++r)
+        for (uint32_t c = 0; c < m.cols; ++c)
+            first.set(r, c, m.at(r, c));
+    return first;
 }
 
 // weights in the kernel's layout; the columns that pad an input meet zeros
@@ -117,6 +127,36 @@ TEST(kernel_conv2d, matches_a_sum_in_double_with_every_epilogue)
     for (const ConvCase& c : kCases)
         for (DType dtype : {DType::f32, DType::f16})
             check(c, dtype);
+}
+
+// an image alone, and beside others that make a GPU's tiles larger: output and moments
+TEST(kernel_conv2d, gives_an_image_the_same_bits_beside_others)
+{
+    const ConvCase c{24, 7, 9, 16, 8, 520, 3, 1, false, 0, 0, true, false, false, true};
+    for (DType dtype : {DType::f32, DType::f16}) {
+        std::vector<float> results[2];
+        for (const uint32_t batch : {c.batch, 1u}) {
+            KernelCase k(test_device());
+            HostImages x = random_images(k, c.batch, c.height, c.width, c.channels, dtype);
+            HostImages x2 = random_images(k, c.batch, c.height, c.width, c.channels2, dtype);
+            HostImages residual = random_images(k, c.batch, c.height, c.width, c.outputs, dtype);
+            const HostMatrix w = packed_weights(k, c, dtype), bias = k.random(1, c.outputs, DType::f32);
+            for (HostImages* images : {&x, &x2, &residual})
+                images->rows = first_rows(images->rows, batch * images->image_rows());
+            FeatureMap y = conv2d(k.graph, x.input(k), x2.input(k), k.input(w), k.input(bias), options_of(c, dtype));
+            y = y.with(add(k.graph, y.data, residual.input(k).data));
+            const Tensor moments = channel_moments(k.graph, y);
+            const Tensor out = k.output(moments.rows, moments.cols, DType::f32, moments.ld);
+            k.graph.keep(moments, out);
+            std::vector<float>& result = results[batch == 1];
+            for (const HostMatrix& m : {first_rows(k.run(y.data), y.image_rows()),
+                                        first_rows(k.read(out), y.image_rows() / kImageRowPadding)})
+                for (uint32_t row = 0; row < m.rows; ++row)
+                    for (uint32_t col = 0; col < m.cols; ++col)
+                        result.push_back(m.at(row, col));
+        }
+        EXPECT_EQ(results[0], results[1]) << dtype_name(dtype);
+    }
 }
 
 // the same convolution on a device that binds less than its tensors: bands with the rows around them

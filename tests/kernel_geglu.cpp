@@ -37,7 +37,8 @@ TEST(kernel_geglu, matches_the_exact_erf)
 
 TEST(kernel_geglu, runs_in_the_epilogue_of_a_gemm)
 {
-    for (const auto& [rows, cols] : {std::pair{1u, 8u}, std::pair{37u, 40u}, std::pair{131u, 104u}})
+    for (const auto& [rows, cols] :
+         {std::pair{1u, 8u}, std::pair{37u, 40u}, std::pair{131u, 104u}, std::pair{1030u, 264u}})
         for (DType dtype : {DType::f32, DType::f16}) {
             KernelCase k(test_device()), apart(test_device());
             const HostMatrix x = k.random(rows, 56, dtype), w = k.random(2 * cols, 56, dtype, 0.2f);

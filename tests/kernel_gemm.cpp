@@ -16,7 +16,7 @@ struct GemmCase {
 const GemmCase kCases[] = {
     {1, 1, 1, 1, false, false, false},    {1, 64, 8, 1, true, false, false},    {24, 64, 64, 1, true, false, false},
     {25, 65, 9, 1, true, true, false},    {77, 41, 60, 1, true, false, true},   {50, 72, 48, 2, true, false, true},
-    {37, 120, 120, 2, true, true, false}, {131, 200, 264, 1, true, true, true},
+    {37, 120, 120, 2, true, true, false}, {131, 200, 264, 1, true, true, true}, {1090, 500, 24, 1, true, true, true},
 };
 
 double gelu_reference(double v)
@@ -86,7 +86,8 @@ TEST(kernel_gemm, gives_a_row_the_same_bits_wherever_it_stands)
 {
     for (DType dtype : {DType::f32, DType::f16}) {
         KernelCase k(test_device()), alone(test_device());
-        const HostMatrix x = k.random(131, 120, dtype), w = k.random(72, 120, dtype);
+        // with so many rows and columns, a tile of GPUs is larger than with two rows
+        const HostMatrix x = k.random(1100, 120, dtype), w = k.random(520, 120, dtype);
         const HostMatrix all = k.run(gemm(k.graph, k.input(x), k.input(w), {}, {.dtype = dtype}));
         HostMatrix rows(2, 120, dtype);
         for (uint32_t c = 0; c < 120; ++c) {
@@ -94,7 +95,7 @@ TEST(kernel_gemm, gives_a_row_the_same_bits_wherever_it_stands)
             rows.set(1, c, x.at(47, c));
         }
         const HostMatrix two = alone.run(gemm(alone.graph, alone.input(rows), alone.input(w), {}, {.dtype = dtype}));
-        for (uint32_t c = 0; c < 72; ++c) {
+        for (uint32_t c = 0; c < 520; ++c) {
             ASSERT_EQ(two.at(0, c), all.at(130, c));
             ASSERT_EQ(two.at(1, c), all.at(47, c));
         }

@@ -6,6 +6,7 @@
 #include "engine/scene/edit_script.h"
 #include "engine/scene/edit_undo.h"
 #include "engine/scene/scene_objects.h"
+#include "tools/cli/run_job.h"
 #include "tools/generation_options.h"
 
 #include <CLI/CLI.hpp>
@@ -182,7 +183,7 @@ void add_edit(CLI::App& app, const Globals& globals, Run& run)
     c->add_option("--halo", o->edit.halo, "metres around what changed that are generated anew (with -m)");
     c->add_option("--undo", o->undo, "OUTPUT.undo of an edit: gives back the file that was edited");
     add_regeneration_options(*c, o->out);
-    c->callback([o, &globals, &run] { run = [o, &globals] { return edit(*o, globals); }; });
+    c->callback([o, &globals, &run] { run = resuming(globals, [o, &globals] { return edit(*o, globals); }); });
 }
 
 } // namespace semrover

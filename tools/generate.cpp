@@ -6,6 +6,7 @@
 #include "engine/job/growth.h"
 #include "runtime/base/hash.h"
 #include "tools/cli/choice.h"
+#include "tools/cli/run_job.h"
 #include "tools/generation_options.h"
 #include "tools/scene_input.h"
 
@@ -100,7 +101,7 @@ void add_generate(CLI::App& app, const Globals& globals, Run& run)
     c->add_option("--window", o->along.window, "--along: metres of path at a time; another value gives another world");
     c->add_option("--tile-size", o->along.tile_size,
                   "--along: metres of a tile's edge, when the scaffold is one .sgrid");
-    c->callback([o, &globals, &run] { run = [o, &globals] { return generate(*o, globals); }; });
+    c->callback([o, &globals, &run] { run = resuming(globals, [o, &globals] { return generate(*o, globals); }); });
 }
 
 } // namespace semrover

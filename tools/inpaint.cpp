@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // semrover inpaint GRID -m MODEL -o OUT --box ...: regenerates chosen cells, the rest staying byte for byte
 #include "engine/job/editing.h"
+#include "tools/cli/run_job.h"
 #include "tools/generation_options.h"
 
 #include <CLI/CLI.hpp>
@@ -53,7 +54,7 @@ void add_inpaint(CLI::App& app, const Globals& globals, Run& run)
     c->add_option("--mask", o->mask, "cells that this .sgrid has, too; of several conditions all must hold");
     add_regeneration_options(*c, o->out);
     c->get_option("--model")->required();
-    c->callback([o, &globals, &run] { run = [o, &globals] { return inpaint(*o, globals); }; });
+    c->callback([o, &globals, &run] { run = resuming(globals, [o, &globals] { return inpaint(*o, globals); }); });
 }
 
 } // namespace semrover

@@ -116,6 +116,20 @@ void fit_matrices(Pass& pass, const DeviceLimits& limits)
     set_constant(pass, protocol::kTileCols, tile);
 }
 
+// A tile of 64 x 64 becomes one of 32 x 32 where that is what gives a large GPU's units work: both give the same bits.
+void fit_small_tile(Pass& pass)
+{
+    constexpr uint32_t kLarge = 64, kSmall = 32, kEnoughGroups = 128;
+    if (pass.variant->name != "simt" || pass.tile_rows != kLarge || pass.tile_cols != kLarge)
+        return;
+    if (uint64_t(divide_up(pass.grid.x, kLarge)) * divide_up(pass.grid.y, kLarge) * std::max(pass.grid.z, 1u) >=
+        kEnoughGroups)
+        return;
+    pass.tile_rows = pass.tile_cols = kSmall;
+    set_constant(pass, protocol::kTileRows, kSmall);
+    set_constant(pass, protocol::kTileCols, kSmall);
+}
+
 Status bind(Pass& pass)
 {
     const auto& declared = pass.variant->bindings;
@@ -164,6 +178,7 @@ Status stage::pick_variants(Plan& plan, const DeviceLimits& limits)
             set_constant(pass, c.name, c.value);
         fit_tile(pass);
         fit_matrices(pass, limits);
+        fit_small_tile(pass);
         SR_CHECK(bind(pass));
     }
     return {};

@@ -17,6 +17,7 @@
 // | constant    | kHalf<B>            | the tensor bound to B is fp16; a variant for cooperative matrices without it |
 // |             |                     | takes nothing else there                                                     |
 // | constant    | kTileM              | rows of the output that a workgroup makes                                    |
+// |             |                     | (simt variants with 64 x 64 take 32 x 32 as well)                            |
 // | constant    | kTileN              | columns likewise                                                             |
 // | constant    | kColLanes           | invocations side by side in a tile, if `col_lanes` says nothing else         |
 // | constant    | kMatM, kMatN, kMatK | shape of the device's cooperative matrices                                   |

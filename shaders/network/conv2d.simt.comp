@@ -2,8 +2,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // y[n] = epilogue(sum over taps and channels of w[n, tap, c] x[pixel at tap, c]), an implicit GEMM with the same tiles as
-// gemm.simt.comp: 64 pixels x 64 channels a workgroup, 16 channels of a tap at a time through shared memory, the next
-// ones loaded behind the arithmetic. Taps outside the image load zeros.
+// gemm.simt.comp: 64 pixels x 64 channels a workgroup, or 32 x 32, 16 channels of a tap at a time through shared memory,
+// the next ones loaded behind the arithmetic. Taps outside the image load zeros.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 #include "conv2d.h"
@@ -40,7 +40,7 @@ void advance(inout Cursor c)
     }
 }
 
-// 16 channels of one row of x and of w; what lies beyond an input's channels is zero
+// this thread's channels of 16, of one row of x and of w; what lies beyond an input's channels is zero
 void load(ConvPixel pixel, uint w_row, Cursor c, out vec4 a[4], out vec4 b[4])
 {
     [[unroll]] for (uint i = 0; i < 4; ++i)
@@ -54,8 +54,8 @@ void load(ConvPixel pixel, uint w_row, Cursor c, out vec4 a[4], out vec4 b[4])
     const uint channel = second ? c.channel - first : c.channel, cols = second ? p.x2_cols : p.x_cols;
     const uint x_at = second ? (row - p.x2_first) * p.x2_ld : (row - p.x_first) * p.x_ld;
     const uint w_at = w_row + c.tap * (p.x_cols + p.x2_cols) + (second ? p.x_cols : 0);
-    [[unroll]] for (uint i = 0; i < 2; ++i) {
-        const uint k = channel + 8 * i;
+    [[unroll]] for (uint i = 0; i < kBring / 2; ++i) {
+        const uint k = channel + bring_k() + 8 * i;
         if (k >= cols)
             continue;
         LOAD8(w, kHalfX, w_at + k, b[2 * i], b[2 * i + 1]);
@@ -71,11 +71,10 @@ void load(ConvPixel pixel, uint w_row, Cursor c, out vec4 a[4], out vec4 b[4])
 
 void main()
 {
-    const uint thread = gl_LocalInvocationID.x;
     epilogue_group = 0;
     const uint row = gl_WorkGroupID.x * kTileM, col = gl_WorkGroupID.y * kTileN;
-    const ConvPixel pixel = conv_pixel(row + thread);
-    const uint w_row = min(col + thread, p.cols - 1) * p.w_ld;
+    const ConvPixel pixel = conv_pixel(row + bring_row());
+    const uint w_row = min(col + bring_row(), p.cols - 1) * p.w_ld;
     clear_tile();
     Cursor cursor = Cursor(0, 0);
     vec4 a[4], b[4];

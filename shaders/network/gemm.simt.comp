@@ -1,8 +1,8 @@
 #version 460
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// y = epilogue(x w^T), for GPUs without matrix units: 64 x 64 outputs a workgroup of 64 threads, 8 x 8 each; 16 columns
-// of K at a time through shared memory, the next ones loaded into registers behind the arithmetic. 8.5 KiB of shared
+// y = epilogue(x w^T), for GPUs without matrix units: 64 x 64 or 32 x 32 outputs a workgroup of 64 threads; 16 columns of
+// K at a time through shared memory, the next ones loaded into registers behind the arithmetic. 8.5 KiB of shared
 // memory; needs no subgroup operation.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
@@ -19,20 +19,21 @@ layout(binding = 1) readonly buffer W { uvec4 w[]; }; // [groups * cols, depth]
 #include "lib/gemm_epilogue.glsl"
 #include "lib/gemm_tile.simt.glsl"
 
-// 16 columns of one row of x and one of w
+// this thread's columns of the 16 from k on, of one row of x and one of w
 void load(uint x_row, uint w_row, uint k, out vec4 a[4], out vec4 b[4])
 {
+    k += bring_k();
     [[unroll]] for (uint i = 0; i < 4; ++i)
         a[i] = b[i] = vec4(0.0);
     if (kHalfX) {
-        [[unroll]] for (uint i = 0; i < 2; ++i) {
+        [[unroll]] for (uint i = 0; i < kBring / 2; ++i) {
             if (k + 8 * i >= p.depth)
                 continue;
             unpack8(x[(x_row + k) / 8 + i], a[2 * i], a[2 * i + 1]);
             unpack8(w[(w_row + k) / 8 + i], b[2 * i], b[2 * i + 1]);
         }
     } else {
-        [[unroll]] for (uint i = 0; i < 4; ++i) {
+        [[unroll]] for (uint i = 0; i < kBring; ++i) {
             if (k + 4 * i >= p.depth)
                 continue;
             a[i] = uintBitsToFloat(x[(x_row + k) / 4 + i]);
@@ -43,11 +44,10 @@ void load(uint x_row, uint w_row, uint k, out vec4 a[4], out vec4 b[4])
 
 void main()
 {
-    const uint thread = gl_LocalInvocationID.x;
     epilogue_group = gate_group = gl_WorkGroupID.z;
     const uint row = gl_WorkGroupID.x * kTileM, col = gl_WorkGroupID.y * kTileN;
-    const uint x_row = (epilogue_group * p.rows + min(row + thread, p.rows - 1)) * p.x_ld;
-    const uint w_row = (epilogue_group * p.cols + min(col + thread, p.cols - 1)) * p.w_ld;
+    const uint x_row = (epilogue_group * p.rows + min(row + bring_row(), p.rows - 1)) * p.x_ld;
+    const uint w_row = (epilogue_group * p.cols + min(col + bring_row(), p.cols - 1)) * p.w_ld;
     clear_tile();
     vec4 a[4], b[4];
     load(x_row, w_row, 0, a, b);

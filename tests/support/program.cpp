@@ -24,6 +24,14 @@ ProgramResult semrover_program(const std::string& arguments)
     return run_program_line(SEMROVER_BINARY, arguments);
 }
 
+ProgramResult semrover_with_lost_devices(int devices, int submits, const std::string& arguments)
+{
+    const std::string environment = "env VK_ADD_LAYER_PATH=" SEMROVER_LAYERS
+                                    " VK_INSTANCE_LAYERS=VK_LAYER_SEMROVER_losing_gpu LOSING_GPU_DEVICES=" +
+                                    std::to_string(devices) + " LOSING_GPU_SUBMITS=" + std::to_string(submits) + " ";
+    return run_program_line(environment + SEMROVER_BINARY, arguments);
+}
+
 void expect_error(const ProgramResult& result, int code, std::string_view text)
 {
     EXPECT_EQ(result.code, code) << result.err;

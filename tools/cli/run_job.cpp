@@ -50,4 +50,19 @@ Result<Json> run_job(const Globals& globals, const BeginJob& begin)
     return job->finish();
 }
 
+Run resuming(const Globals& globals, Run work)
+{
+    return [&globals, work = std::move(work)]() -> Status {
+        constexpr int kMostDevices = 3;
+        for (int devices = 1;; ++devices) {
+            Status status = work();
+            if (status || status.error().code != ErrorCode::device_lost || devices == kMostDevices)
+                return status;
+            if (!globals.quiet)
+                fmt::print(stderr, "semrover: warning: {}; going on with a new device from what is done\n",
+                           status.error().message);
+        }
+    };
+}
+
 } // namespace semrover

@@ -32,4 +32,8 @@ class JobDisplay {
 // says where what is done is kept.
 Result<Json> run_job(const Globals& globals, const BeginJob& begin);
 
+// The work of a command whose run folder keeps what is done. Where its device is lost, it runs again and goes on with a
+// new one: at most three devices, then the error stands.
+Run resuming(const Globals& globals, Run work);
+
 } // namespace semrover
