@@ -15,6 +15,7 @@ layout(push_constant) uniform Push { WinogradInputPush p; };
 layout(binding = 0) uniform usamplerBuffer X;             // [images * image_rows, cols]
 layout(binding = 1) writeonly buffer V { CHANNELS v[]; }; // [36 * tiles, cols]
 
+// note: 36 samples without a branch: compilers like SwiftShader's do not end with five at each
 void main()
 {
     const uint per_tile = p.cols / 4;
@@ -30,11 +31,12 @@ void main()
             const int y = top + int(i);
             [[unroll]] for (uint j = 0; j < kSamples; ++j) {
                 const int x = left + int(j);
-                const bool inside = y >= 0 && x >= 0 && y < int(p.seen_height) && x < int(p.seen_width);
+                const bool inside = all(lessThan(uvec2(x, y), uvec2(p.seen_width, p.seen_height)));
                 const uint pixel = image + (uint(y) >> p.shift) * p.width + (uint(x) >> p.shift);
-                const uint at = inside ? pixel * p.x_ld + col : 0;
-                const vec4 value = FETCH4(X, kHalfX, at);
-                d[i][j] = inside ? PART(value, part) : CHANNELS(0.0);
+                const uint at = pixel * p.x_ld + col, from = inside ? at : 0;
+                const vec4 value = FETCH4(X, kHalfX, from);
+                const CHANNELS own = PART(value, part), none = CHANNELS(0.0);
+                d[i][j] = inside ? own : none;
             }
             WINOGRAD_INPUT(d[i][0], d[i][1], d[i][2], d[i][3], d[i][4], d[i][5])
         }

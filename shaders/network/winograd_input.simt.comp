@@ -7,5 +7,5 @@
 #extension GL_EXT_control_flow_attributes : require
 #define CHANNELS vec2
 #define PARTS 2
-#define PART(value, part) (part == 0 ? value.xy : value.zw)
+#define PART(value, part) mix(value.zw, value.xy, bvec2(part == 0))
 #include "lib/winograd_input.glsl"
