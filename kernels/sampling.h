@@ -58,6 +58,20 @@ void step_update(Graph& g, StepTable steps,
                  Tensor x0,    // [M, N], in place: previous prediction, then this one
                  const FrameGuidance& guidance, float clip);
 
+// how much of what a step's prediction got wrong of known frames is carried into each of the others
+struct FrameWeights {
+    Tensor table;           // [steps * frames, frames] fp32 array: of each step and frame, for each known frame
+    uint32_t frames = 1;    // that the rows of x are
+    uint32_t first_row = 0; // of the step table, whose weights come first
+};
+
+// after step_update, whose x0 is the prediction of known frames, too: d = sum of weight (fixed - x0) over the known
+// frames; x0 += d, and x as if the prediction had been so. Frames are known or not as a whole.
+void step_carry(Graph& g, StepTable steps, const FrameWeights& weights,
+                Tensor known,         // [M] u32
+                Tensor fixed,         // [M, N] fp32
+                Tensor x, Tensor x0); // [M, N] fp32, in place
+
 // what a deferred renderer's network sees beside the state x, [M, C]: pixels of one frame or of the frames of a video,
 // at the size of the latent
 struct RendererFrame {

@@ -2,17 +2,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/refine/asd.h"
 #include "engine/refine/memory_plan.h"
-#include "runtime/base/json.h"
+#include "tests/golden_renderer.h"
 
 #include <cmath>
-#include <gtest/gtest.h>
 #include <limits>
 
 namespace semrover {
 namespace engine_asd_test {
 
-const Path kModel = SEMROVER_SOURCE_DIR "/tests/golden/asd_rollout_tiny/model";
-const LatentSize kSize{51, 38, 8}; // a latent of 7 x 5 whose last blocks are not full
+const LatentSize kSize = kOddSize;
 
 Device& device()
 {
@@ -20,20 +18,20 @@ Device& device()
     return *d;
 }
 
+const GoldenRenderer& networks()
+{
+    static const GoldenRenderer n(device(), "asd_rollout_tiny", 5);
+    return n;
+}
+
 const Unet& unet()
 {
-    static const std::unique_ptr<Unet> network =
-        std::move(*Unet::load(device(), *parse_unet_config(*read_json(kModel / "unet" / "config.json")),
-                              *Checkpoint::open_folder(kModel / "unet", Checkpoint::Network::unet), DType::f16));
-    return *network;
+    return *networks().unet;
 }
 
 const Vae& vae()
 {
-    static const std::unique_ptr<Vae> network =
-        std::move(*Vae::load(device(), *parse_vae_config(*read_json(kModel / "vae" / "config.json")),
-                             *Checkpoint::open_folder(kModel / "vae", Checkpoint::Network::vae), DType::f16));
-    return *network;
+    return *networks().vae;
 }
 
 SamplingPlan plan(Sampler sampler = Sampler::ddim, int steps = 3)
@@ -57,13 +55,7 @@ AsdOptions options(float guidance = 2.5f, uint64_t seed = 7)
 
 const std::vector<float>& text()
 {
-    static const std::vector<float> values = [] {
-        std::vector<float> v(5 * unet().config().cross_attention_dim);
-        for (size_t i = 0; i < v.size(); ++i)
-            v[i] = std::sin(float(i));
-        return v;
-    }();
-    return values;
+    return networks().text;
 }
 
 std::unique_ptr<AsdRenderer> renderer(const AsdOptions& o = options(), const SamplingPlan& p = plan())

@@ -2,19 +2,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // a chain of frames whose pixels and latents stay on the device: the bytes are those of one that goes through the host
 #include "engine/refine/frame_renderer.h"
-#include "runtime/base/json.h"
 #include "runtime/device/readback_ring.h"
+#include "tests/golden_renderer.h"
 
 #include <cmath>
 #include <cstring>
-#include <gtest/gtest.h>
 #include <limits>
 
 namespace semrover {
 namespace engine_frame_chain_test {
 
 const Path kModel = SEMROVER_SOURCE_DIR "/tests/golden/asd_rollout_tiny/model";
-const LatentSize kSize{51, 38, 8}; // the last blocks are not full
+const LatentSize kSize = kOddSize;
 constexpr uint32_t kFrames = 3;
 
 Device& device()
@@ -23,20 +22,9 @@ Device& device()
     return *d;
 }
 
-struct Networks {
-    std::unique_ptr<Unet> unet;
-    std::unique_ptr<Vae> vae;
-    std::vector<float> text;
+struct Networks : GoldenRenderer {
+    explicit Networks(DType precision) : GoldenRenderer(device(), "asd_rollout_tiny", 5, precision) {}
 
-    explicit Networks(DType precision)
-    {
-        unet = std::move(*Unet::load(device(), *parse_unet_config(*read_json(kModel / "unet" / "config.json")),
-                                     *Checkpoint::open_folder(kModel / "unet", Checkpoint::Network::unet), precision));
-        vae = std::move(*Vae::load(device(), *parse_vae_config(*read_json(kModel / "vae" / "config.json")),
-                                   *Checkpoint::open_folder(kModel / "vae", Checkpoint::Network::vae), precision));
-        for (size_t i = 0; i < 5 * unet->config().cross_attention_dim; ++i)
-            text.push_back(std::sin(float(i)));
-    }
     std::unique_ptr<AsdRenderer> renderer() const
     {
         SchedulerConfig config;

@@ -186,7 +186,8 @@ TEST(Schedule, KnownTokensAreNoisedToTheLevelOfTheNextStepAndEndExact)
     for (Sampler sampler : {Sampler::ddpm, Sampler::ddim, Sampler::dpmpp_2m})
         for (TimestepSpacing spacing : {TimestepSpacing::leading, TimestepSpacing::trailing}) {
             const Schedule schedule = schedule_of(config_of(sampler, Prediction::sample, spacing), 20);
-            ASSERT_TRUE(schedule.can_hold_known());
+            ASSERT_TRUE(schedule.can_jump());
+            EXPECT_NEAR(schedule.init_known_scale, std::sqrt(schedule.steps.front().abar), 1e-12);
             for (size_t i = 0; i + 1 < schedule.steps.size(); ++i) {
                 const double level = schedule.steps[i + 1].abar;
                 EXPECT_NEAR(schedule.steps[i].known_scale, std::sqrt(level), 1e-12);
@@ -196,6 +197,15 @@ TEST(Schedule, KnownTokensAreNoisedToTheLevelOfTheNextStepAndEndExact)
             EXPECT_EQ(schedule.steps.back().known_noise, 0.0);
             EXPECT_EQ(schedule.steps.back().c_z, 0.0);
         }
+    // euler's x is x0 + sigma noise
+    const Schedule euler = schedule_of(config_of(Sampler::euler, Prediction::sample, TimestepSpacing::trailing), 20);
+    EXPECT_FALSE(euler.can_jump());
+    EXPECT_EQ(euler.init_known_scale, 1.0);
+    for (size_t i = 0; i < euler.steps.size(); ++i) {
+        const double next = i + 1 < euler.steps.size() ? euler.steps[i + 1].abar : 1;
+        EXPECT_EQ(euler.steps[i].known_scale, 1.0);
+        EXPECT_NEAR(euler.steps[i].known_noise, std::sqrt(1 / next - 1), 1e-9);
+    }
 }
 
 TEST(Schedule, StepsThatTheMultistepSolverTakesTwiceStayFinite)

@@ -2,17 +2,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/refine/video_decoder.h"
 #include "engine/refine/vsd.h"
-#include "runtime/base/json.h"
+#include "tests/golden_renderer.h"
 #include "tests/says.h"
 
 #include <cmath>
-#include <gtest/gtest.h>
+#include <limits>
 
 namespace semrover {
 namespace engine_vsd_test {
 
-const Path kModel = SEMROVER_SOURCE_DIR "/tests/golden/vsd_window_tiny/model";
-const LatentSize kSize{51, 38, 8}; // a latent of 7 x 5 whose last blocks are not full
+const LatentSize kSize = kOddSize;
 constexpr uint32_t kFrames = 3;
 const std::vector<float> kAdded{6, 127, 0.02f};
 
@@ -22,20 +21,20 @@ Device& device()
     return *d;
 }
 
+const GoldenRenderer& networks()
+{
+    static const GoldenRenderer n(device(), "vsd_window_tiny", 2);
+    return n;
+}
+
 const Unet& unet()
 {
-    static const std::unique_ptr<Unet> network =
-        std::move(*Unet::load(device(), *parse_video_unet_config(*read_json(kModel / "unet" / "config.json")),
-                              *Checkpoint::open_folder(kModel / "unet", Checkpoint::Network::unet), DType::f16));
-    return *network;
+    return *networks().unet;
 }
 
 const Vae& vae()
 {
-    static const std::unique_ptr<Vae> network =
-        std::move(*Vae::load(device(), *parse_video_vae_config(*read_json(kModel / "vae" / "config.json")),
-                             *Checkpoint::open_folder(kModel / "vae", Checkpoint::Network::vae), DType::f16));
-    return *network;
+    return *networks().vae;
 }
 
 SamplingPlan plan()
@@ -61,16 +60,9 @@ VsdOptions options(float last_guidance = 2.5f, uint64_t seed = 7)
     return o;
 }
 
-// of two tokens, which may differ
 const std::vector<float>& text()
 {
-    static const std::vector<float> values = [] {
-        std::vector<float> v(2 * unet().config().cross_attention_dim);
-        for (size_t i = 0; i < v.size(); ++i)
-            v[i] = std::sin(float(i));
-        return v;
-    }();
-    return values;
+    return networks().text;
 }
 
 std::unique_ptr<VsdRenderer> renderer(const VsdOptions& o = options(), std::vector<float> added = kAdded)
@@ -142,14 +134,151 @@ TEST(engine_vsd, stops_where_the_callback_says)
     EXPECT_EQ(base, render(*r));
 }
 
+// a window whose first frames are given
+std::vector<float> render_known(VsdRenderer& r, std::span<const float> known, uint32_t number = 0)
+{
+    const Window window;
+    auto latents = r.render({number, 0, window.buffers, window.visible, known});
+    EXPECT_TRUE(latents) << latents.error().message;
+    return *latents;
+}
+
+TEST(engine_vsd, known_frames_leave_as_they_came_and_change_the_others)
+{
+    const auto r = renderer();
+    const std::vector<float> free = render(*r);
+    const size_t frame = kSize.pixels() * 4;
+    std::vector<float> known(2 * frame);
+    for (size_t i = 0; i < known.size(); ++i)
+        known[i] = std::cos(float(i) * 0.1f);
+    const std::vector<float> held = render_known(*r, known);
+    EXPECT_TRUE(std::equal(known.begin(), known.end(), held.begin()));
+    EXPECT_FALSE(
+        std::equal(held.begin() + std::ptrdiff_t(2 * frame), held.end(), free.begin() + std::ptrdiff_t(2 * frame)));
+    // all of them: nothing is left to make
+    known.resize(kFrames * frame, 0.5f);
+    EXPECT_EQ(render_known(*r, known), known);
+    EXPECT_EQ(free, render(*r)); // and the next window knows nothing of it
+}
+
+// In the first step noise hides everything: what the network says wrongly of the known frame is added to the next frame
+// by 0.9, to the one after it by 0.9 squared.
+TEST(engine_vsd, what_known_frames_are_off_by_corrects_the_others)
+{
+    const size_t frame = kSize.pixels() * 4;
+    const std::vector<float> known(frame, 0.25f);
+    const Window window;
+    VsdOptions o = options(1);
+    const auto first_step = [&](VsdRenderer& r) {
+        EXPECT_TRUE(r.begin({0, 0, window.buffers, window.visible, known}));
+        EXPECT_FALSE(*r.step(1));
+        EXPECT_TRUE(r.cancel());
+        return *r.state();
+    };
+    const std::vector<float> held = first_step(*renderer(o));
+    o.correlation = 0.9f;
+    const auto r = renderer(o);
+    const std::vector<float> corrected = first_step(*r);
+    EXPECT_TRUE(std::equal(held.begin(), held.begin() + std::ptrdiff_t(frame), corrected.begin()));
+    double largest = 0;
+    for (size_t i = frame; i < 2 * frame; ++i) {
+        const double next = corrected[i] - held[i], after = corrected[i + frame] - held[i + frame];
+        largest = std::max(largest, std::abs(next));
+        ASSERT_NEAR(after, 0.9 * next, 1e-3 * (1 + std::abs(next))) << i;
+    }
+    EXPECT_GT(largest, 0.1);
+    EXPECT_EQ(render(*r), render(*renderer(options(1)))); // where nothing is known it changes nothing
+    o.correlation = 1;
+    EXPECT_TRUE(says(VsdRenderer::create(device(), unet(), plan(), {{2, text()}, kAdded}, kSize, kFrames, o),
+                     "a correlation of 1 between frames"));
+}
+
+// the first state, and every next one, are what is known plus sigma times the frame's own noise
+TEST(engine_vsd, the_network_sees_known_frames_with_the_noise_that_they_began_with)
+{
+    const size_t frame = kSize.pixels() * 4;
+    VsdOptions o = options(1);
+    std::vector<float> given(kFrames * frame);
+    for (size_t i = 0; i < given.size(); ++i)
+        given[i] = std::sin(float(i) * 1.3f);
+    o.noise = [&](uint32_t, std::span<float> noise) { std::ranges::copy(given, noise.begin()); };
+    const auto r = renderer(o);
+    const std::vector<float> known(frame, 0.25f);
+    const std::vector<float> base = render_known(*r, known);
+    given[7] += 1; // of the known frame: the others see it
+    const std::vector<float> other = render_known(*r, known);
+    EXPECT_TRUE(std::equal(known.begin(), known.end(), other.begin()));
+    EXPECT_NE(base, other);
+}
+
+TEST(engine_vsd, noise_follows_its_keys)
+{
+    const auto r = renderer();
+    const Window window;
+    std::vector<NoiseKey> keys;
+    for (uint32_t f = 0; f < kFrames; ++f)
+        for (uint32_t i = 0; i < kSize.pixels(); ++i)
+            keys.push_back({i, 3 + f});
+    const auto with_keys = [&](uint32_t number) {
+        return *r->render({number, 0, window.buffers, window.visible, {}, keys});
+    };
+    EXPECT_EQ(with_keys(3), render(*r, 3)); // each pixel its own
+    EXPECT_EQ(with_keys(4), render(*r, 3)); // nothing else of a window decides its noise
+    std::swap(keys[0], keys[kSize.pixels() + 20]);
+    EXPECT_NE(with_keys(3), render(*r, 3));
+}
+
+// what a frame has of noise does not depend on which window it is in
+TEST(engine_vsd, a_frame_keeps_its_noise_from_window_to_window)
+{
+    const auto r = renderer(options(1));
+    const Window window;
+    const size_t frame = kSize.pixels() * 4;
+    const auto first_step = [&](uint32_t number) { // nearly all noise yet: sigma is 700
+        EXPECT_TRUE(r->begin({number, 0, window.buffers, window.visible, std::vector<float>(kFrames * frame, 0.f)}));
+        EXPECT_FALSE(*r->step(1));
+        EXPECT_TRUE(r->cancel());
+        return *r->state();
+    };
+    const std::vector<float> a = first_step(0), b = first_step(1);
+    ASSERT_EQ(a.size(), kFrames * frame);
+    EXPECT_TRUE(std::equal(a.begin() + std::ptrdiff_t(frame), a.end(), b.begin()));
+    EXPECT_FALSE(std::equal(a.begin(), a.begin() + std::ptrdiff_t(frame), b.begin()));
+}
+
 TEST(engine_vsd, memory_is_what_was_planned)
 {
-    const auto planned = VsdRenderer::planned_bytes(device().limits(), unet(), plan(), 2, kSize, kFrames, options());
-    ASSERT_TRUE(planned) << planned.error().message;
+    (void)networks();
+    for (const float guidance : {1.f, 2.5f}) {
+        const uint64_t before = device().allocated_bytes();
+        const auto planned =
+            VsdRenderer::planned_bytes(device().limits(), unet(), plan(), 2, kSize, kFrames, options(guidance));
+        ASSERT_TRUE(planned) << planned.error().message;
+        device().reset_peak();
+        const auto r = renderer(options(guidance));
+        EXPECT_EQ(device().allocated_bytes() - before, planned->state);
+        (void)render(*r);
+        EXPECT_EQ(planned->programs, r->arena_bytes());
+        EXPECT_EQ(device().peak_bytes() - before, planned->state + planned->programs);
+        r->rest();
+        EXPECT_EQ(device().allocated_bytes() - before, planned->state);
+    }
+    const uint64_t before = device().allocated_bytes();
+    const auto decoder = VideoDecoder::create(device(), vae(), kSize, kFrames);
+    ASSERT_TRUE(decoder) << decoder.error().message;
+    EXPECT_EQ(device().allocated_bytes() - before,
+              *VideoDecoder::planned_bytes(device().limits(), vae(), kSize, kFrames));
+}
+
+TEST(engine_vsd, a_latent_with_nan_is_an_error_and_names_the_element)
+{
     const auto r = renderer();
-    (void)render(*r);
-    EXPECT_EQ(planned->programs, r->arena_bytes());
-    EXPECT_GT(planned->state, 0u);
+    Window window;
+    window.buffers[kSize.pixels() * 4 + 9] = std::numeric_limits<float>::quiet_NaN();
+    const auto latents = r->render({0, 0, window.buffers, window.visible});
+    ASSERT_FALSE(latents);
+    EXPECT_EQ(latents.error().code, ErrorCode::internal);
+    EXPECT_TRUE(latents.error().message.starts_with("the denoised latent holds ")) << latents.error().message;
 }
 
 TEST(engine_vsd, refuses_networks_and_options_that_do_not_fit)
@@ -160,7 +289,7 @@ TEST(engine_vsd, refuses_networks_and_options_that_do_not_fit)
     EXPECT_TRUE(says(create(unet(), kAdded, 65, options()), "a window of 65 frames, expected 1 to 64"));
     EXPECT_TRUE(says(create(unet(), kAdded, 0, options()), "a window of 0 frames"));
     EXPECT_TRUE(says(create(unet(), {6}, kFrames, options()), "takes 3 numbers with a video, not 1"));
-    EXPECT_TRUE(says(create(unet(), kAdded, kFrames, options(-1)), "guidance from 1 to -1"));
+    EXPECT_TRUE(says(create(unet(), kAdded, kFrames, options(-1)), "guidance scale -1 is not in 0..1000"));
     UnetConfig config = unet().config();
     config.in_channels = 8;
     const auto other = Unet::plan(config, DType::f16, device().limits());
@@ -185,11 +314,16 @@ TEST(engine_vsd, decodes_the_frames_of_a_video_together)
     const auto changed = (*decoder)->decode(latents);
     ASSERT_TRUE(changed);
     EXPECT_FALSE(std::equal(images->begin(), images->begin() + image, changed->begin()));
+    // the same as bytes
+    ASSERT_TRUE((*decoder)->decode_bytes(latents));
+    for (uint32_t f = 0; f < kFrames; ++f) {
+        const auto first = changed->begin() + std::ptrdiff_t(f * image);
+        std::vector<uint8_t> bytes = *(*decoder)->bytes(f).read<uint8_t>(device());
+        bytes.resize(image);
+        EXPECT_EQ(bytes, pixels_of_floats(std::vector<float>(first, first + image))) << f;
+    }
     latents[5] = NAN;
     EXPECT_TRUE(says((*decoder)->decode(latents), "the decoded video holds"));
-    const auto planned = VideoDecoder::planned_bytes(device().limits(), vae(), kSize, kFrames);
-    ASSERT_TRUE(planned);
-    EXPECT_GT(*planned, 0u);
 }
 
 } // namespace engine_vsd_test

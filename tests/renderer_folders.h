@@ -11,19 +11,24 @@
 
 namespace semrover {
 
-const std::filesystem::path kRolloutCase = SEMROVER_SOURCE_DIR "/tests/golden/asd_rollout_tiny";
-
-// the networks of the golden rollout as a model's folder, with its conditioning
-inline void put_renderer_model(const std::filesystem::path& folder)
+// the networks of a golden case of renderers as a model's folder, with its conditioning
+inline void put_renderer_model(const std::filesystem::path& folder, const char* name = "asd_rollout_tiny")
 {
     namespace fs = std::filesystem;
+    const fs::path golden = fs::path(SEMROVER_SOURCE_DIR "/tests/golden") / name;
     fs::create_directories(folder / "conditioning");
-    fs::copy(kRolloutCase / "model" / "unet", folder / "renderer");
-    fs::copy(kRolloutCase / "model" / "vae", folder / "vae");
-    const auto file = Safetensors::open(kRolloutCase / "tensors.safetensors");
+    fs::copy(golden / "model" / "unet", folder / "renderer");
+    fs::copy(golden / "model" / "vae", folder / "vae");
+    const auto file = Safetensors::open(golden / "tensors.safetensors");
     const TensorInfo& text = **file->get("input.encoder_hidden_states");
     const TensorData tensor{"encoder_hidden_states", text.dtype, text.shape, file->bytes(text)};
     ASSERT_TRUE(write_safetensors(folder / "conditioning" / "conditioning.safetensors", {&tensor, 1}));
+}
+
+// of videos: windows of 6 frames, by its num_frames
+inline void put_video_model(const std::filesystem::path& folder)
+{
+    put_renderer_model(folder, "vsd_window_tiny");
 }
 
 // splat buffers of a drive towards a wall: stripes that grow, seen in the lower two thirds

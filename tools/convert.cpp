@@ -27,10 +27,15 @@ std::optional<BoxFormat> box_format(const ConvertArguments& o)
     return o.scene.input.from.empty() ? detect_box_format(o.model.in) : box_format_of(o.scene.input.from);
 }
 
+bool for_models(const ConvertModelOptions& o)
+{
+    return !o.dtype.empty() || o.asd_init || o.vsd_init;
+}
+
 Status convert_boxes(const ConvertArguments& o, BoxFormat format, const Globals& globals)
 {
-    if (!o.model.dtype.empty() || o.model.asd_init || !o.scene.to.empty())
-        return fail(ErrorCode::usage, "--dtype, --asd-init and --to have no meaning for boxes");
+    if (for_models(o.model) || !o.scene.to.empty())
+        return fail(ErrorCode::usage, "--dtype, --asd-init, --vsd-init and --to have no meaning for boxes");
     SR_TRY(const Point3 origin, origin_of(o.scene.input));
     return convert_objects(
         {.in = o.model.in, .out = o.model.out, .map = o.scene.input.map, .origin = origin, .dry_run = o.model.dry_run},
@@ -74,8 +79,8 @@ Status convert(ConvertArguments& o, const Globals& globals)
         return convert_path(o.model.in, o.model.out, o.path, globals);
     if (!is_scene(o))
         return convert_model(o.model, globals);
-    if (!o.model.dtype.empty() || o.model.asd_init)
-        return fail(ErrorCode::usage, "--dtype and --asd-init are for models");
+    if (for_models(o.model))
+        return fail(ErrorCode::usage, "--dtype, --asd-init and --vsd-init are for models");
     if (Path(o.model.out).extension() == ".json")
         return guess_objects_of(
             {.in = o.model.in, .out = o.model.out, .map = {}, .origin = {}, .dry_run = o.model.dry_run}, o.scene.input,
@@ -102,6 +107,10 @@ void add_convert(CLI::App& app, const Globals& globals, Run& run)
         ->check(CLI::IsMember({"f32", "f16", "bf16"}));
     c->add_flag("--asd-init", o->model.asd_init,
                 "make a plain UNet the start of a deferred renderer: 9 more input channels, with zero weights");
+    c->add_flag("--vsd-init", o->model.vsd_init,
+                "make a plain UNet of videos the start of one: its image channels see the splat buffer, 1 more the "
+                "visibility, with zero weights")
+        ->excludes("--asd-init");
     c->add_flag("--dry-run", o->model.dry_run, "check IN and say what would be written");
     c->add_option("--to", o->scene.to, "format of a scene's OUT: 3dgs, 2dgs, inria62 or points-ply for a .ply, ...");
     add_all_scene_input_options(*c, o->scene.input);

@@ -43,6 +43,26 @@ std::vector<TensorStream> streams_of(const Checkpoint& checkpoint, std::span<con
     return streams;
 }
 
+// The input channels that a renderer lacks, with zero weights. A video's has those of the noisy latent and of the
+// image, which comes unscaled, as splat buffers do: the buffer takes the image's, and visibility is new.
+Status widen(const ConvertModelOptions& o, const RendererModel& m, ComponentFiles& files)
+{
+    const char* option = o.vsd_init ? "--vsd-init" : "--asd-init";
+    const uint32_t plain = (o.vsd_init ? 2 : 1) * m.vae.latent_channels;
+    if (m.video() != o.vsd_init)
+        return fail(ErrorCode::bad_input, "{}: {} wants a UNet of {}", quote_path(m.unet_folder), option,
+                    o.vsd_init ? "videos" : "single images");
+    if (m.unet.in_channels != plain)
+        return fail(ErrorCode::bad_input, "{}: {} adds channels to a plain UNet with {}, this one takes {}",
+                    quote_path(m.unet_folder), option, plain, m.unet.in_channels);
+    const auto conv_in = std::ranges::find(files.tensors, "conv_in.weight", &TensorStream::name);
+    *conv_in = widen_conv_in(*conv_in, renderer_channels(m.vae, m.video()));
+    files.config["in_channels"] = renderer_channels(m.vae, m.video());
+    if (o.vsd_init)
+        files.config["num_frames"] = VideoDefaults().window_frames; // the paper's, to be trained on
+    return {};
+}
+
 Status plan_unet(const ConvertModelOptions& o, const RendererModel& m, Conversion& plan)
 {
     SR_TRY(const Checkpoint checkpoint, m.open_unet());
@@ -52,15 +72,9 @@ Status plan_unet(const ConvertModelOptions& o, const RendererModel& m, Conversio
     if (!m.ldm) {
         SR_TRY(files.config, read_json(m.unet_folder / "config.json")); // with the fields that the engine ignores
     }
-    if (o.asd_init) {
-        if (m.unet.in_channels != m.vae.latent_channels)
-            return fail(ErrorCode::bad_input, "{}: --asd-init adds channels to a plain UNet with {}, this one takes {}",
-                        quote_path(m.unet_folder), m.vae.latent_channels, m.unet.in_channels);
-        const auto conv_in = std::ranges::find(files.tensors, "conv_in.weight", &TensorStream::name);
-        *conv_in = widen_conv_in(*conv_in, renderer_channels(m.vae));
-        files.config["in_channels"] = renderer_channels(m.vae);
-    }
-    plan.index["renderer"] = {"diffusers", "UNet2DConditionModel"};
+    if (o.asd_init || o.vsd_init)
+        SR_CHECK(widen(o, m, files));
+    plan.index["renderer"] = {"diffusers", m.video() ? "UNetSpatioTemporalConditionModel" : "UNet2DConditionModel"};
     plan.components["renderer"] = std::move(files);
     return {};
 }
@@ -74,7 +88,10 @@ Status plan_vae(const ConvertModelOptions& o, const RendererModel& m, Conversion
     if (!m.ldm) {
         SR_TRY(files.config, read_json(m.vae_folder / "config.json"));
     }
-    plan.index["vae"] = {"diffusers", "AutoencoderKL"};
+    if (m.vae.video && !m.vae.use_quant_conv)
+        for (TensorStream& tensor : identity_quant_conv(m.vae.latent_channels, files.tensors.front().dtype))
+            files.tensors.push_back(std::move(tensor));
+    plan.index["vae"] = {"diffusers", m.vae.video ? "AutoencoderKLTemporalDecoder" : "AutoencoderKL"};
     plan.components["vae"] = std::move(files);
     return {};
 }
@@ -86,8 +103,9 @@ Status plan_renderer(const ConvertModelOptions& o, Conversion& plan)
     SR_CHECK(plan_vae(o, m, plan));
     plan.warnings = m.warnings;
     if (m.ldm || !is_there(m.folder / "scheduler")) {
-        plan.texts["scheduler/scheduler_config.json"] = stable_diffusion_scheduler_json();
-        plan.index["scheduler"] = {"diffusers", "DDIMScheduler"};
+        const Json config = m.video() ? video_scheduler_json() : stable_diffusion_scheduler_json();
+        plan.texts["scheduler/scheduler_config.json"] = config;
+        plan.index["scheduler"] = {"diffusers", config["_class_name"]};
     }
     return {};
 }
@@ -144,7 +162,7 @@ Status plan_ldm_rest(const Path& in, Conversion& plan)
         plan.text = stream_tensor(shared, *text, text->dtype);
         plan.text->name = kConditioning;
     }
-    for (const char* prefix : {"cond_stage_model.", "model_ema."})
+    for (const char* prefix : {"cond_stage_model.", "conditioner.", "model_ema."})
         if (std::ranges::any_of(set.tensors(), [&](const TensorInfo& t) { return t.name.starts_with(prefix); }))
             plan.left_out.push_back(std::string(prefix) + "*");
     return {};
@@ -160,8 +178,9 @@ Result<Conversion> plan_conversion(const ConvertModelOptions& o)
         SR_CHECK(plan_transformer(o, in / "voxfield_transformer", plan));
     if (!transformer || is_there(in / "renderer") || is_there(in / "unet"))
         SR_CHECK(plan_renderer(o, plan));
-    else if (o.asd_init)
-        return fail(ErrorCode::bad_input, "{}: has no renderer for --asd-init", quote_path(in));
+    else if (o.asd_init || o.vsd_init)
+        return fail(ErrorCode::bad_input, "{}: has no renderer for {}", quote_path(in),
+                    o.asd_init ? "--asd-init" : "--vsd-init");
     SR_CHECK(folder ? plan_copies(in, plan) : plan_ldm_rest(in, plan));
     return plan;
 }

@@ -7,10 +7,10 @@
 namespace semrover {
 
 // a model in the diffusers layout, from a single-file LDM checkpoint or from another folder, with weights of another
-// precision or with the deferred renderer's input channels
+// precision or with a deferred renderer's input channels: asd_init for one of images, vsd_init for one of videos
 struct ConvertModelOptions {
     std::string in, out, dtype;
-    bool asd_init = false, dry_run = false;
+    bool asd_init = false, vsd_init = false, dry_run = false;
 };
 Status convert_model(const ConvertModelOptions& options, const Globals& globals);
 

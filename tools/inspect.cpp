@@ -85,14 +85,15 @@ uint64_t parameters_of(const SafetensorsSet& set, std::string_view prefix)
 }
 
 // whether a UNet of so many input channels can render, and what to do if not
-std::string renderer_text(uint64_t in_channels)
+std::string renderer_text(uint64_t in_channels, bool video)
 {
-    if (in_channels == renderer_channels({}))
-        return fmt::format("ready ({} input channels)", in_channels);
-    if (in_channels == VaeConfig().latent_channels)
-        return fmt::format("no: a plain UNet ({} input channels); semrover convert IN OUT --asd-init adds the others",
-                           in_channels);
-    return fmt::format("no: {} input channels, expected {}", in_channels, renderer_channels({}));
+    const uint32_t expected = renderer_channels({}, video);
+    if (in_channels == expected)
+        return fmt::format("ready{} ({} input channels)", video ? ", of videos" : "", in_channels);
+    if (in_channels == (video ? 2 : 1) * VaeConfig().latent_channels)
+        return fmt::format("no: a plain UNet{} ({} input channels); semrover convert IN OUT --{}-init adds the others",
+                           video ? " of videos" : "", in_channels, video ? "vsd" : "asd");
+    return fmt::format("no: {} input channels, expected {}", in_channels, expected);
 }
 
 // both networks of a single file, with the configs that its shapes tell
@@ -103,10 +104,11 @@ void describe_ldm(Report& report, const SafetensorsSet& set)
                           : unet->cross_attention_dim == 768  ? " 1.x"
                           : unet->cross_attention_dim == 1024 ? " 2.x"
                                                               : "-like";
-    report["kind"] = fmt::format("Stable Diffusion{} single file (LDM)", version);
+    report["kind"] = unet && unet->video ? "Stable Video Diffusion single file (LDM)"
+                                         : fmt::format("Stable Diffusion{} single file (LDM)", version);
     Report& u = report["unet"] = {{"parameters", parameters_of(set, kLdmUnet)}};
     if (unet) {
-        u["deferred_renderer"] = renderer_text(unet->in_channels);
+        u["deferred_renderer"] = renderer_text(unet->in_channels, unet->video);
         u["config"] = unet_config_json(*unet);
     } else {
         u["error"] = unet.error().message;
@@ -131,8 +133,7 @@ void describe_kind(Report& report, const SafetensorsSet& set)
     } else if (const TensorInfo* conv_in = set.find("conv_in.weight"); conv_in && conv_in->shape.size() == 4) {
         const bool video = set.find("add_embedding.linear_1.weight") != nullptr;
         report["kind"] = video ? "UNetSpatioTemporalConditionModel" : "UNet2DConditionModel";
-        if (!video)
-            report["deferred_renderer"] = renderer_text(conv_in->shape[1]);
+        report["deferred_renderer"] = renderer_text(conv_in->shape[1], video);
     } else if (set.find("encoder.conv_in.weight") && set.find("decoder.conv_in.weight")) {
         report["kind"] = set.find("decoder.time_conv_out.weight") ? "AutoencoderKLTemporalDecoder" : "AutoencoderKL";
     } else if (set.find("semantic_embed.weight") && set.find("proj_in.weight")) {
@@ -247,6 +248,22 @@ Result<Report> describe_components(const Path& folder, const Json& index, bool w
     return components;
 }
 
+// of a renderer of videos: how `refine` cuts drives, and what it tells the network; nothing of others
+void describe_video(Report& report, const Path& folder)
+{
+    const auto model = RendererModel::read(folder);
+    if (!model || !model->video())
+        return;
+    const VideoDefaults& v = model->defaults.video;
+    report["video"] = {{"window_frames", v.window_frames},
+                       {"window_overlap", v.window_overlap},
+                       {"frame_correlation", v.frame_correlation},
+                       {"decode_frames", v.decode_frames},
+                       {"guidance_scale", {v.first_guidance_scale, model->defaults.guidance_scale}},
+                       {"num_inference_steps", model->defaults.num_inference_steps},
+                       {"sampler", sampler_name(model->scheduler.sampler)}};
+}
+
 // with the number of an object's colours in place of these
 Report described_defaults(const Json& defaults)
 {
@@ -271,6 +288,7 @@ Result<Report> describe_folder(const Path& folder, bool with_tensors)
         if (index.contains("defaults"))
             report["defaults"] = described_defaults(index["defaults"]);
         SR_TRY(report["components"], describe_components(folder, index, with_tensors, totals));
+        describe_video(report, folder);
     } else if (is_there(folder / "config.json") || is_there(folder / "scheduler_config.json")) {
         SR_TRY(const Report component, describe_component(folder, with_tensors, totals));
         report.update(component);

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// semrover refine DIR|GRID -m MODEL -o OUT: splat buffers to frames, each from the one before
+// semrover refine DIR|GRID -m MODEL -o OUT: splat buffers to frames, each from the one before or windows of them
 #include "engine/job/refinement.h"
 #include "runtime/base/bytes_text.h"
 #include "runtime/base/quote.h"
@@ -42,13 +42,25 @@ Result<Refinement> resolve(const RefineArguments& o, const Globals& globals, con
     return resolve_refinement(std::move(r), callbacks);
 }
 
+// of a renderer of videos
+std::string windows_text(const Refinement& r)
+{
+    size_t windows = 0;
+    for (const RefineChain& c : r.chains)
+        windows += c.windows.size();
+    if (!r.model.video())
+        return "";
+    return fmt::format("{} window{} of up to {}, ", windows, windows == 1 ? "" : "s", r.shape.frames);
+}
+
 void print_plan(const Refinement& r, const MemoryPlan& plan, const Globals& globals)
 {
     if (globals.json || globals.quiet)
         return;
     const ImageSize& size = r.chains.front().camera.size;
-    fmt::print("{} frames of {} x {}, {} steps each\nplanned device memory {} bytes ({}), {}\n", r.frames(), size.width,
-               size.height, r.steps, plan.bytes, bytes_text(plan.bytes), policy_name(plan.policy));
+    fmt::print("{} frames of {} x {}, {}{} steps each\nplanned device memory {} bytes ({}), {}\n", r.frames(),
+               size.width, size.height, windows_text(r), r.steps, plan.bytes, bytes_text(plan.bytes),
+               policy_name(plan.policy));
     std::fflush(stdout);
 }
 
@@ -105,8 +117,13 @@ void add_options(CLI::App& c, RefineArguments& a)
     c.add_option("-o,--output", o.output, "folder for frames/, latents/ and the run's state");
     c.add_option("-s,--seed", o.seed, "noise seed");
     c.add_option("--steps", o.steps, "denoising steps of a frame");
-    c.add_option("--cfg-scale", o.guidance_scale, "guidance towards the previous frame and what is visible; 1: none");
-    add_choice(c, "--sampler", {"ddim", "dpm++2m"}, "ddim or dpm++2m",
+    c.add_option("--cfg-scale", o.guidance_scale,
+                 "guidance towards the previous frame and what is visible; 1: none; of a window's last frame");
+    c.add_option("--cfg-first", o.first_guidance_scale, "guidance of a window's first frame; linear in between");
+    c.add_option("--window", o.window_frames, "frames that a renderer of videos makes together");
+    c.add_option("--window-overlap", o.window_overlap, "of these, how many are known from the window before");
+    c.add_option("--decode-frames", o.decode_frames, "frames that its VAE decodes together: less memory with fewer");
+    add_choice(c, "--sampler", {"ddim", "dpm++2m", "euler"}, "ddim, dpm++2m or euler",
                [&o](const std::string& text) { o.sampler = *sampler_from_name(text); });
     c.add_option("--previous-noise", o.previous_noise, "noise on the previous frame's latent");
     add_choice(
@@ -115,7 +132,7 @@ void add_options(CLI::App& c, RefineArguments& a)
         [&o](const std::string& text) { o.frame_noise = text == "warped" ? FrameNoise::warped : FrameNoise::fresh; });
     add_precision_option(c, o.precision);
     c.add_option("--frames", o.frames, "FIRST:LAST, both included, either may be left out; FIRST is a first frame");
-    c.add_option("--from", o.from, "output of an earlier run: FIRST goes on from its latent of the frame before");
+    c.add_option("--from", o.from, "output of an earlier run: FIRST goes on from its latents of the frames before");
     add_choice(c, "--format", {"png", "jpeg"}, "of the frames",
                [&o](const std::string& text) { o.format.jpeg = text == "jpeg"; });
     c.add_option("--quality", o.format.quality, "of JPEG frames")->check(CLI::Range(1, 100));
@@ -132,7 +149,7 @@ void add_options(CLI::App& c, RefineArguments& a)
 void add_refine(CLI::App& app, const Globals& globals, Run& run)
 {
     auto o = std::make_shared<RefineArguments>();
-    CLI::App* c = app.add_subcommand("refine", "splat buffers to frames, each from the one before");
+    CLI::App* c = app.add_subcommand("refine", "splat buffers to frames, each from the one before or windows of them");
     add_options(*c, *o);
     c->callback([o, c, &globals, &run] {
         o->size_given = c->count("--width") + c->count("--height") > 0;

@@ -3,8 +3,9 @@
 #include "engine/job/refinement.h"
 
 #include "engine/job/budget_meter.h"
+#include "engine/job/frame_refiner.h"
 #include "engine/job/outputs.h"
-#include "engine/job/refiner.h"
+#include "engine/job/window_refiner.h"
 
 namespace semrover {
 
@@ -23,7 +24,7 @@ Result<MemoryPlan> plan_of(Device& device, const Refinement& r, std::span<const 
 {
     const auto unet = Unet::plan(r.model.unet, r.options.precision, device.limits());
     const auto vae = Vae::plan(r.model.vae, r.options.precision, device.limits());
-    const RendererNetworks networks{*unet, *vae, r.plan, r.model.conditioning_tokens, r.asd.guidance_scale};
+    const RendererNetworks networks{*unet, *vae, r.plan, r.model.conditioning_tokens, r.asd.guidance_scale, r.vsd};
     SR_TRY(RendererBytes parts, renderer_bytes(device.limits(), networks, work));
     parts.outgoing = outgoing;
     return plan_memory(std::move(parts), device.allocated_bytes(), device.budget());
@@ -221,8 +222,8 @@ class RefinementJob : public Job {
     Status try_to_refine_while_drawing()
     {
         const auto same_size = [&](const RefineChain& c) { return c.size == r_.chains[0].size; };
-        if (!std::ranges::all_of(r_.chains, same_size))
-            return {}; // what depends on the size would be made again and again
+        if (r_.model.video() || !std::ranges::all_of(r_.chains, same_size))
+            return {}; // windows of several cameras at a time; what depends on the size would be made again and again
         SR_CHECK(out_->drain());
         if (const Status planned = plan(); !planned) // with the splats beside it nothing fits: without them it may
             return planned.error().code == ErrorCode::out_of_memory ? Status{} : planned;
@@ -244,7 +245,6 @@ class RefinementJob : public Job {
         if (drawn_)
             drawing_.reset();
         refiner_.reset();
-        renderer_.reset();
         refined_ = false;
         return {};
     }
@@ -274,16 +274,24 @@ class RefinementJob : public Job {
         }
         if (callbacks_.planned)
             callbacks_.planned(r_, memory_);
-        renderer_.emplace(device_, r_.model, r_.plan, r_.options.precision, r_.asd, memory_.policy);
-        refiner_.emplace(Refiner::Parts{device_, *renderer_, *store_, *out_, r_.chains},
-                         RefineOrder{memory_.policy, r_.plan.rows.size(), drawn}, callbacks_);
+        const Refiner::Parts parts{device_, *store_, *out_, r_.chains};
+        const RefineOrder order{memory_.policy, r_.plan.rows.size(), drawn};
+        const DType precision = r_.options.precision;
+        if (r_.model.video())
+            refiner_ = std::make_unique<WindowRefiner>(
+                parts, std::make_unique<WindowRenderer>(device_, r_.model, r_.plan, precision, r_.vsd, memory_.policy),
+                order, callbacks_);
+        else
+            refiner_ = std::make_unique<FrameRefiner>(
+                parts, std::make_unique<FrameRenderer>(device_, r_.model, r_.plan, precision, r_.asd, memory_.policy),
+                order, callbacks_);
         return {};
     }
     Result<Json> finish_run()
     {
         SR_CHECK(out_->drain());
         const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-        renderer_.reset();
+        refiner_.reset();
         drawing_.reset();
         Json results{{"output", r_.options.output.string()},
                      {"frames", r_.frames()},
@@ -318,9 +326,8 @@ class RefinementJob : public Job {
 
     std::optional<RefineStore> store_;
     MemoryPlan memory_;
-    std::optional<FrameRenderer> renderer_;
-    std::unique_ptr<Outgoing> out_;  // what it writes goes through the ones above
-    std::optional<Refiner> refiner_; // while drawing_ is there: frames are refined as they are drawn
+    std::unique_ptr<Outgoing> out_;    // what it writes goes through the ones above
+    std::unique_ptr<Refiner> refiner_; // while drawing_ is there: frames are refined as they are drawn
 };
 
 } // namespace
@@ -331,7 +338,7 @@ Result<MemoryPlan> plan_refinement(Device& device, const Refinement& r)
     device.reset_peak();
     std::vector<RendererWork> work;
     for (const RefineChain& c : r.chains)
-        work.push_back({c.size});
+        work.push_back(whole_work(c));
     return plan_of(device, r, work, Outgoing::planned_bytes(device.limits(), largest_read(r)));
 }
 

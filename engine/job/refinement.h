@@ -11,13 +11,17 @@
 
 namespace semrover {
 
-// what `refine` does: splat buffers to frames, each from the one before
+// what `refine` does: splat buffers to frames, each from the one before, or windows of them together
 struct RefinementOptions {
     Path input, model, output;      // input: a folder of buffers, or a grid
     std::optional<Sampler> sampler; // this and what is optional below: as the model says
     std::optional<int> steps;       // of denoising a frame
     std::optional<float> guidance_scale, previous_noise;
     std::optional<FrameNoise> frame_noise;
+    // of a renderer of videos: guidance of a window's first frame (guidance_scale is that of the last), frames of a
+    // window, frames that it knows of the one before, frames that are decoded together
+    std::optional<float> first_guidance_scale;
+    std::optional<uint32_t> window_frames, window_overlap, decode_frames;
     uint64_t seed = 0;
     DType precision = DType::f16;
     std::string frames; // "FIRST:LAST", both included, either may be left out; empty: all
@@ -40,6 +44,8 @@ struct Refinement {
     SamplingPlan plan;
     int steps = 0;
     AsdOptions asd;
+    VsdOptions vsd; // of a renderer of videos, in place of `asd`
+    WindowShape shape;
     FrameNoise frame_noise = FrameNoise::fresh;
     DrawOptions draw;
     std::vector<RefineChain> chains;
@@ -71,10 +77,11 @@ struct RefinementCallbacks : JobCallbacks {
     std::function<Status(const RefineStore&, std::span<const RefineChain>)> refined;
 };
 
-// Stages: "render" counts frames that are drawn of a grid, "refine" denoising steps; with the staged policy "encode"
-// and "decode" count frames. What is done is in the output's folder: begun again after a cancel or a kill, the job goes
-// on to the same bytes. Figures: output, frames, steps, seconds, policy, planned_device_bytes, peak_device_bytes, and
-// of a grid render_device_bytes. Errors: as check_outputs and plan_refinement; bad_input for another run in the folder
+// Stages: "render" counts frames that are drawn of a grid, "refine" denoising steps of frames, or of windows; with the
+// staged policy "encode" and "decode" count frames. What is done is in the output's folder: begun again after a cancel
+// or a kill, the job goes on to the same bytes. Figures: output, frames, steps, seconds, policy, planned_device_bytes,
+// peak_device_bytes, and of a grid render_device_bytes. Errors: as check_outputs and plan_refinement; bad_input for
+// another run in the folder
 Result<std::unique_ptr<Job>> begin_refinement(Device& device, Refinement refinement,
                                               const RefinementCallbacks& callbacks);
 

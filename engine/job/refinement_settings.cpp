@@ -13,6 +13,46 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// a renderer that makes each frame from the one before
+Status set_frame_renderer(Refinement& r)
+{
+    const RefinementOptions& o = r.options;
+    if (o.first_guidance_scale || o.window_frames || o.window_overlap || o.decode_frames)
+        return fail(ErrorCode::usage, "{}: this renderer makes frames one by one, and has no windows of them",
+                    quote_path(o.model));
+    r.asd.guidance_scale = o.guidance_scale.value_or(r.model.defaults.guidance_scale);
+    r.asd.previous_noise = o.previous_noise.value_or(r.model.defaults.previous_noise);
+    r.asd.seed = o.seed;
+    return {};
+}
+
+// one that makes windows of frames
+Status set_video_renderer(Refinement& r)
+{
+    const RefinementOptions& o = r.options;
+    const VideoDefaults& d = r.model.defaults.video;
+    if (o.previous_noise)
+        return fail(ErrorCode::usage, "{}: a renderer of videos puts no noise on the frame before",
+                    quote_path(o.model));
+    r.vsd.first_guidance = o.first_guidance_scale.value_or(d.first_guidance_scale);
+    r.vsd.last_guidance = o.guidance_scale.value_or(r.model.defaults.guidance_scale);
+    r.vsd.seed = o.seed;
+    WindowShape& s = r.shape;
+    s.frames = o.window_frames.value_or(d.window_frames);
+    if (s.frames < 1 || s.frames > kMostWindowFrames)
+        return fail(ErrorCode::usage, "a window of {} frames, expected 1 to {}", s.frames, kMostWindowFrames);
+    s.overlap = o.window_overlap.value_or(std::min(d.window_overlap, s.frames - 1));
+    r.vsd.correlation = d.frame_correlation;
+    if (s.overlap >= s.frames)
+        return fail(ErrorCode::usage, "windows of {} frames cannot overlap by {}", s.frames, s.overlap);
+    s.decode_frames = std::min(o.decode_frames.value_or(d.decode_frames), s.frames);
+    if (s.decode_frames < 1)
+        return fail(ErrorCode::usage, "no frame is decoded at a time, expected 1 or more");
+    if (!o.from.empty() && s.overlap == 0)
+        return fail(ErrorCode::usage, "--from needs windows that overlap: they know nothing of the frames before them");
+    return {};
+}
+
 Status open_model(Refinement& r, const JobCallbacks& callbacks)
 {
     const RefinementOptions& o = r.options;
@@ -22,9 +62,7 @@ Status open_model(Refinement& r, const JobCallbacks& callbacks)
             callbacks.warning(warning);
     const RendererDefaults& d = r.model.defaults;
     r.steps = o.steps.value_or(d.num_inference_steps);
-    r.asd.guidance_scale = o.guidance_scale.value_or(d.guidance_scale);
-    r.asd.previous_noise = o.previous_noise.value_or(d.previous_noise);
-    r.asd.seed = o.seed;
+    SR_CHECK(r.model.video() ? set_video_renderer(r) : set_frame_renderer(r));
     r.draw = o.draw;
     r.draw.visible_alpha = o.draw.visible_alpha.value_or(d.visible_threshold);
     if (!o.radius_given) {
@@ -66,6 +104,24 @@ Result<std::vector<BufferCamera>> cameras_of(const RefinementOptions& o)
     return open_buffers(o.input);
 }
 
+// the windows of a chain's frames and, with --from, the latents of frames before those
+Status find_windows(const Refinement& r, RefineChain& chain)
+{
+    const uint32_t first = chain.range.first;
+    const bool goes_on = !r.options.from.empty() && first > 0;
+    const uint32_t most = r.model.video() ? std::min(first, r.shape.frames - 1) : 0;
+    chain.windows = frame_windows(chain.range, goes_on ? most : 0, r.shape.frames, r.shape.overlap);
+    if (!goes_on)
+        return {};
+    const Path latents = r.options.from / "latents" / chain.camera.name;
+    for (uint32_t f = r.model.video() ? chain.windows.front().first : first - 1; f < first; ++f) {
+        SR_TRY(const std::vector<float> latent,
+               read_latent(latents / fmt::format("{:06}.safetensors", f), chain.size, r.model.vae.latent_channels));
+        chain.before.insert(chain.before.end(), latent.begin(), latent.end());
+    }
+    return {};
+}
+
 // the cameras, their frames and, with --from, what came before those
 Status find_chains(Refinement& r)
 {
@@ -81,12 +137,9 @@ Status find_chains(Refinement& r)
         RefineChain& chain = r.chains.emplace_back();
         chain.camera = camera;
         chain.size = {camera.size.width, camera.size.height, r.model.vae.downscale()};
+        chain.shape = r.shape;
         SR_TRY(chain.range, range_of(o.frames, camera));
-        if (o.from.empty() || chain.range.first == 0)
-            continue;
-        const Path latents = camera.name.empty() ? o.from / "latents" : o.from / "latents" / camera.name;
-        SR_TRY(chain.before, read_latent(latents / fmt::format("{:06}.safetensors", chain.range.first - 1), chain.size,
-                                         r.model.vae.latent_channels));
+        SR_CHECK(find_windows(r, chain));
     }
     return {};
 }
@@ -142,7 +195,8 @@ Result<Json> chain_json(const Refinement& r, const RefineChain& c)
     }
     if (r.options.from_grid())
         return camera;
-    SR_TRY(const uint64_t buffers, hash_pictures(c.camera, {"color", "visible"}, c.range.first, c.range.last));
+    const uint32_t first = std::min(c.range.first, c.windows.front().first); // the first that a window sees
+    SR_TRY(const uint64_t buffers, hash_pictures(c.camera, {"color", "visible"}, first, c.range.last));
     camera["buffers"] = hash_text(buffers);
     if (r.frame_noise == FrameNoise::warped) {
         SR_TRY(const uint64_t depth, hash_pictures(c.camera, {"depth"}, 0, c.range.last));
@@ -175,11 +229,28 @@ Result<Json> input_json(const Refinement& r)
     return input;
 }
 
+Json shape_json(const WindowShape& s)
+{
+    return {{"window_frames", s.frames}, {"window_overlap", s.overlap}, {"decode_frames", s.decode_frames}};
+}
+
+// what of a renderer of videos decides its frames
+Json video_settings(const Refinement& r)
+{
+    Json settings = shape_json(r.shape);
+    settings["guidance_scale"] = r.vsd.last_guidance;
+    settings["first_guidance_scale"] = r.vsd.first_guidance;
+    settings["frame_correlation"] = r.vsd.correlation;
+    settings["added_time_ids"] = r.model.defaults.video.added_numbers;
+    return settings;
+}
+
 } // namespace
 
 Result<Refinement> resolve_refinement(RefinementOptions options, const JobCallbacks& callbacks)
 {
-    Refinement r{std::move(options), {}, {}, 0, {}, FrameNoise::fresh, {}, {}};
+    Refinement r;
+    r.options = std::move(options);
     SR_CHECK(open_model(r, callbacks));
     SR_CHECK(find_chains(r));
     SR_CHECK(find_motion(r, callbacks));
@@ -220,21 +291,23 @@ Result<Json> refinement_settings(const Refinement& r, const Device& device)
     const RefinementOptions& o = r.options;
     SR_TRY(const Json input, input_json(r));
     SR_TRY(const uint64_t model, r.model.hash());
-    return Json{{"command", "refine"},
-                {"version", kVersion},
-                {"device", device.name()},
-                {"driver", device.driver()},
-                {"input", input},
-                {"model", hash_text(model)},
-                {"precision", o.precision == DType::f32 ? "fp32" : "fp16"},
-                {"sampler", std::string(sampler_name(r.model.scheduler.sampler))},
-                {"steps", r.steps},
-                {"guidance_scale", r.asd.guidance_scale},
-                {"previous_noise", r.asd.previous_noise},
-                {"frame_noise", r.frame_noise == FrameNoise::warped ? "warped" : "fresh"},
-                {"seed", o.seed},
-                {"format", o.format.jpeg ? "jpeg" : "png"},
-                {"quality", o.format.jpeg ? o.format.quality : 0}};
+    Json settings{{"command", "refine"},
+                  {"version", kVersion},
+                  {"device", device.name()},
+                  {"driver", device.driver()},
+                  {"input", input},
+                  {"model", hash_text(model)},
+                  {"precision", o.precision == DType::f32 ? "fp32" : "fp16"},
+                  {"sampler", std::string(sampler_name(r.model.scheduler.sampler))},
+                  {"steps", r.steps},
+                  {"frame_noise", r.frame_noise == FrameNoise::warped ? "warped" : "fresh"},
+                  {"seed", o.seed},
+                  {"format", o.format.jpeg ? "jpeg" : "png"},
+                  {"quality", o.format.jpeg ? o.format.quality : 0}};
+    settings.update(r.model.video()
+                        ? video_settings(r)
+                        : Json{{"guidance_scale", r.asd.guidance_scale}, {"previous_noise", r.asd.previous_noise}});
+    return settings;
 }
 
 Json describe(const Device& device, const Refinement& r, const MemoryPlan& plan)
@@ -242,14 +315,17 @@ Json describe(const Device& device, const Refinement& r, const MemoryPlan& plan)
     Json policies;
     for (MemoryPolicy policy : {MemoryPolicy::resident, MemoryPolicy::staged})
         policies[std::string(policy_name(policy))] = device.allocated_bytes() + plan.parts.peak(policy);
-    return {{"frames", r.frames()},
-            {"steps", r.steps},
-            {"policy", policy_name(plan.policy)},
-            {"planned_device_bytes", plan.bytes},
-            {"policies", policies},
-            {"unet_bytes", plan.parts.unet},
-            {"vae_bytes", plan.parts.vae},
-            {"device", device.name()}};
+    Json figures{{"frames", r.frames()},
+                 {"steps", r.steps},
+                 {"policy", policy_name(plan.policy)},
+                 {"planned_device_bytes", plan.bytes},
+                 {"policies", policies},
+                 {"unet_bytes", plan.parts.unet},
+                 {"vae_bytes", plan.parts.vae},
+                 {"device", device.name()}};
+    if (r.model.video())
+        figures.update(shape_json(r.shape));
+    return figures;
 }
 
 } // namespace semrover

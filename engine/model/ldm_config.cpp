@@ -128,6 +128,14 @@ void read_down_blocks(Shapes& s, UnetConfig& c)
     }
 }
 
+// what shapes do not tell is as in Stable Video Diffusion: three numbers come with a video
+void read_video(Shapes& s, UnetConfig& c)
+{
+    c.added_numbers = 3;
+    c.added_embed_dim = std::max(2u, s.dim("label_emb.0.0.weight", 1) / c.added_numbers);
+    c.num_frames = 25;
+}
+
 void read_up_blocks(Shapes& s, UnetConfig& c)
 {
     c.up_attention.clear();
@@ -161,9 +169,10 @@ Result<UnetConfig> ldm_unet_config(const SafetensorsSet& set)
 {
     SR_TRY(const Json own, own_config(set, "unet"));
     if (!own.is_null())
-        return parse_unet_config(own);
+        return parse_any_unet_config(own);
     Shapes s(set, kLdmUnet);
     UnetConfig c;
+    c.video = s.has("input_blocks.1.0.time_stack.in_layers.0.weight");
     c.in_channels = s.dim("input_blocks.0.0.weight", 1);
     c.out_channels = s.dim("out.2.weight", 0);
     read_down_blocks(s, c);
@@ -180,8 +189,12 @@ Result<UnetConfig> ldm_unet_config(const SafetensorsSet& set)
     for (const uint32_t channels : c.block_out_channels)
         c.heads.push_back(c.cross_attention_dim == 1024 ? std::max(1u, channels / kHeadWidth) : kHeads);
     std::vector<std::string> warnings;
-    c.norm_num_groups = common_groups(c.block_out_channels, warnings);
-    SR_TRY(c, parse_unet_config(unet_config_json(c))); // what a file may say is checked in one place
+    if (c.video)
+        read_video(s, c);
+    else
+        c.norm_num_groups = common_groups(c.block_out_channels, warnings);
+    SR_CHECK(s.finish("UNet"));
+    SR_TRY(c, parse_any_unet_config(unet_config_json(c))); // what a file may say is checked in one place
     c.warnings = std::move(warnings);
     return c;
 }
@@ -190,7 +203,7 @@ Result<VaeConfig> ldm_vae_config(const SafetensorsSet& set)
 {
     SR_TRY(const Json own, own_config(set, "vae"));
     if (!own.is_null())
-        return parse_vae_config(own);
+        return parse_any_vae_config(own);
     Shapes s(set, ldm_vae_prefix(set));
     VaeConfig c;
     c.in_channels = s.dim("encoder.conv_in.weight", 1);
@@ -206,10 +219,14 @@ Result<VaeConfig> ldm_vae_config(const SafetensorsSet& set)
     c.use_quant_conv = s.has("quant_conv.weight");
     c.use_post_quant_conv = s.has("post_quant_conv.weight");
     c.mid_block_add_attention = s.has("encoder.mid.attn_1.norm.weight");
+    c.video = s.has("decoder.conv_out.time_mix_conv.weight");
     SR_CHECK(s.finish("VAE"));
     std::vector<std::string> warnings;
-    c.norm_num_groups = common_groups(c.block_out_channels, warnings);
-    SR_TRY(c, parse_vae_config(vae_config_json(c)));
+    if (!c.video)
+        c.norm_num_groups = common_groups(c.block_out_channels, warnings);
+    const bool quant_conv = c.use_quant_conv; // which a config of videos does not tell
+    SR_TRY(c, parse_any_vae_config(vae_config_json(c)));
+    c.use_quant_conv = quant_conv;
     c.warnings = std::move(warnings);
     return c;
 }

@@ -20,6 +20,8 @@ constexpr Renamed kUnetTop[] = {{"conv_in", "input_blocks.0.0"},
                                 {"time_embedding.linear_1", "time_embed.0"},
                                 {"time_embedding.linear_2", "time_embed.2"},
                                 {"class_embedding", "label_emb"},
+                                {"add_embedding.linear_1", "label_emb.0.0"},
+                                {"add_embedding.linear_2", "label_emb.0.2"},
                                 {"conv_norm_out", "out.0"},
                                 {"conv_out", "out.2"},
                                 {"mid_block.resnets.0", "middle_block.0"},
@@ -28,10 +30,15 @@ constexpr Renamed kUnetTop[] = {{"conv_in", "input_blocks.0.0"},
 constexpr Renamed kUnetResnet[] = {{"norm1", "in_layers.0"},          {"conv1", "in_layers.2"},
                                    {"time_emb_proj", "emb_layers.1"}, {"norm2", "out_layers.0"},
                                    {"conv2", "out_layers.3"},         {"conv_shortcut", "skip_connection"}};
+// of a transformer of videos
+constexpr Renamed kFrameTransformer[] = {{"temporal_transformer_blocks", "time_stack"},
+                                         {"time_pos_embed.linear_1", "time_pos_embed.0"},
+                                         {"time_pos_embed.linear_2", "time_pos_embed.2"}};
 constexpr Renamed kVaeTop[] = {{"mid_block.resnets.0", "mid.block_1"},
                                {"mid_block.resnets.1", "mid.block_2"},
                                {"mid_block.attentions.0", "mid.attn_1"},
-                               {"conv_norm_out", "norm_out"}};
+                               {"conv_norm_out", "norm_out"},
+                               {"time_conv_out", "conv_out.time_mix_conv"}};
 constexpr Renamed kVaeResnet[] = {{"conv_shortcut", "nin_shortcut"}};
 constexpr Renamed kVaeAttention[] = {
     {"group_norm", "norm"}, {"to_q", "q"}, {"to_k", "k"}, {"to_v", "v"}, {"to_out.0", "proj_out"}};
@@ -73,11 +80,23 @@ std::string place(std::string_view list, size_t index, size_t slot, const std::s
     return fmt::format("{}.{}.{}.{}", list, index, slot, rest);
 }
 
+// of a resnet: `names` are those of an image's; one of a video has such a part, and one over its frames
+std::string resnet_name(std::string_view name, std::span<const Renamed> names)
+{
+    constexpr std::string_view kSpatial = "spatial_res_block.", kTemporal = "temporal_res_block.";
+    if (name.starts_with(kSpatial))
+        return rename(name.substr(kSpatial.size()), names);
+    if (name.starts_with(kTemporal))
+        return "time_stack." + rename(name.substr(kTemporal.size()), kUnetResnet);
+    return rename(name, names);
+}
+
 std::string layer_name(std::string_view list, size_t index, const Parts& parts)
 {
     const bool resnet = parts[2] == "resnets";
     const std::string rest = rest_of(parts, 4);
-    return place(list, index, resnet ? 0 : 1, resnet ? rename(rest, kUnetResnet) : rest);
+    return place(list, index, resnet ? 0 : 1,
+                 resnet ? resnet_name(rest, kUnetResnet) : rename(rest, kFrameTransformer));
 }
 
 // a down block is its layers and, but for the last block, a downsampler; input block 0 is conv_in
@@ -105,6 +124,11 @@ std::string up_name(const UnetConfig& c, const Parts& parts)
     return layer_name("output_blocks", index + index_of(parts[3]), parts);
 }
 
+std::string vae_resnet_name(std::string_view name)
+{
+    return name == "time_mixer.mix_factor" ? "mix_factor" : resnet_name(name, kVaeResnet);
+}
+
 // encoder.down_blocks.1.resnets.0.conv1.weight and its like
 std::string vae_block_name(const VaeConfig& c, const Parts& parts)
 {
@@ -112,7 +136,7 @@ std::string vae_block_name(const VaeConfig& c, const Parts& parts)
     const size_t index = index_of(parts[2]), level = down ? index : c.block_out_channels.size() - 1 - index;
     const std::string block = fmt::format("{}.{}.{}", parts[0], down ? "down" : "up", level);
     if (parts[3] == "resnets")
-        return fmt::format("{}.block.{}.{}", block, parts[4], rename(rest_of(parts, 5), kVaeResnet));
+        return fmt::format("{}.block.{}.{}", block, parts[4], vae_resnet_name(rest_of(parts, 5)));
     return fmt::format("{}.{}.{}", block, down ? "downsample" : "upsample", rest_of(parts, 5));
 }
 
@@ -126,7 +150,10 @@ std::string ldm_unet_name(const UnetConfig& config, std::string_view name)
     if (parts[0] == "up_blocks")
         return up_name(config, parts);
     if (parts[0] == "mid_block" && parts[1] == "resnets")
-        return rename(fmt::format("mid_block.resnets.{}.{}", parts[2], rename(rest_of(parts, 3), kUnetResnet)),
+        return rename(fmt::format("mid_block.resnets.{}.{}", parts[2], resnet_name(rest_of(parts, 3), kUnetResnet)),
+                      kUnetTop);
+    if (parts[0] == "mid_block")
+        return rename(fmt::format("mid_block.attentions.{}.{}", parts[2], rename(rest_of(parts, 3), kFrameTransformer)),
                       kUnetTop);
     return rename(name, kUnetTop);
 }
@@ -139,6 +166,8 @@ std::string ldm_vae_name(const VaeConfig& config, std::string_view name)
     if (parts[1] == "down_blocks" || parts[1] == "up_blocks")
         return vae_block_name(config, parts);
     std::string rest = rest_of(parts, 1);
+    if (parts[1] == "mid_block" && parts[2] == "resnets")
+        rest = fmt::format("mid_block.resnets.{}.{}", parts[3], vae_resnet_name(rest_of(parts, 4)));
     if (parts[1] == "mid_block" && parts[2] == "attentions")
         rest = "mid_block.attentions.0." + rename(rest_of(parts, 4), kVaeAttention);
     return std::string(parts[0]) + "." + rename(rest, kVaeTop);

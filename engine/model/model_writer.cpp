@@ -80,4 +80,21 @@ TensorStream widen_conv_in(TensorStream conv_in, uint32_t channels)
     return conv_in;
 }
 
+std::vector<TensorStream> identity_quant_conv(uint32_t latent_channels, DType dtype)
+{
+    const uint32_t n = 2 * latent_channels;
+    const auto stream = [&](const char* name, std::vector<uint64_t> shape, std::vector<float> values) {
+        const auto make = [name, dtype, numbers = std::move(values)](
+                              std::vector<std::byte>& scratch) -> Result<std::span<const std::byte>> {
+            return encode_floats(numbers, dtype, name, scratch);
+        };
+        return TensorStream{name, dtype, std::move(shape), make};
+    };
+    std::vector<float> identity(size_t(n) * n, 0.f);
+    for (uint32_t i = 0; i < n; ++i)
+        identity[size_t(i) * n + i] = 1;
+    return {stream("quant_conv.weight", {n, n, 1, 1}, std::move(identity)),
+            stream("quant_conv.bias", {n}, std::vector<float>(n, 0.f))};
+}
+
 } // namespace semrover

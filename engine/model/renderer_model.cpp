@@ -3,6 +3,7 @@
 #include "engine/model/renderer_model.h"
 
 #include "engine/model/ldm_config.h"
+#include "engine/sampling/guidance.h"
 #include "engine/sampling/schedule.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/json_fields.h"
@@ -63,6 +64,8 @@ Status read_conditioning(RendererModel& m)
         m.warnings.push_back(
             fmt::format("{}: has no {}; zeros stand for the text", quote_path(m.folder),
                         m.ldm ? fmt::format("tensor {}", name) : "conditioning/conditioning.safetensors"));
+        if (m.video())
+            m.conditioning_tokens = 1;
         m.conditioning.assign(size_t(m.conditioning_tokens) * width, 0.f);
         return {};
     }
@@ -97,7 +100,46 @@ void read_splat_radius(JsonFields& fields, RendererDefaults& d)
         fields.refuse("splat_radius", "metres (0..100) or \"auto\"");
 }
 
-Status read_defaults(const Path& path, RendererDefaults& d, std::vector<std::string>& warnings)
+RendererDefaults defaults_of(const UnetConfig& unet)
+{
+    RendererDefaults d;
+    if (!unet.video)
+        return d;
+    d.num_inference_steps = 25;
+    d.guidance_scale = 3;
+    d.video.window_frames = std::min(unet.num_frames, kMostWindowFrames);
+    d.video.window_overlap = std::min(4u, d.video.window_frames / 3);
+    if (d.video.added_numbers.size() != unet.added_numbers)
+        d.video.added_numbers.assign(unet.added_numbers, 0.f);
+    return d;
+}
+
+void read_added_numbers(JsonFields& fields, std::vector<float>& numbers)
+{
+    const Json* value = fields.find("added_time_ids");
+    if (!value)
+        return;
+    const bool fits =
+        value->is_array() && value->size() == numbers.size() &&
+        std::ranges::all_of(*value, [](const Json& n) { return n.is_number() && std::abs(n.get<double>()) <= 1e6; });
+    if (!fits)
+        fields.refuse("added_time_ids", fmt::format("{} numbers, as the UNet takes them", numbers.size()));
+    for (size_t i = 0; fits && i < numbers.size(); ++i)
+        numbers[i] = (*value)[i].get<float>();
+}
+
+void read_video_defaults(JsonFields& fields, VideoDefaults& v)
+{
+    fields.number("first_guidance_scale", 0.f, kMaxGuidance, v.first_guidance_scale);
+    fields.integer("window_frames", 1u, kMostWindowFrames, v.window_frames);
+    v.window_overlap = std::min(4u, v.window_frames / 3);
+    fields.integer("window_overlap", 0u, v.window_frames - 1, v.window_overlap);
+    fields.number("frame_correlation", 0.f, 0.999f, v.frame_correlation);
+    fields.integer("decode_frames", 1u, kMostWindowFrames, v.decode_frames);
+    read_added_numbers(fields, v.added_numbers);
+}
+
+Status read_defaults(const Path& path, bool video, RendererDefaults& d, std::vector<std::string>& warnings)
 {
     SR_TRY(const Json index, read_json(path));
     const std::string where = quote_path(path) + ": defaults.renderer";
@@ -105,8 +147,11 @@ Status read_defaults(const Path& path, RendererDefaults& d, std::vector<std::str
     const Json defaults = all.is_object() ? all.value("renderer", Json::object()) : all;
     JsonFields fields(defaults, where);
     fields.integer("num_inference_steps", 1, kMaxInferenceSteps, d.num_inference_steps);
-    fields.number("guidance_scale", 0.f, 1000.f, d.guidance_scale);
-    fields.number("previous_noise", 0.f, 100.f, d.previous_noise);
+    fields.number("guidance_scale", 0.f, kMaxGuidance, d.guidance_scale);
+    if (video)
+        read_video_defaults(fields, d.video);
+    else
+        fields.number("previous_noise", 0.f, 100.f, d.previous_noise);
     fields.choice("frame_noise", {{"fresh", FrameNoise::fresh}, {"warped", FrameNoise::warped}}, d.frame_noise);
     fields.number("visible_threshold", 0.f, 1.f, d.visible_threshold);
     read_splat_radius(fields, d);
@@ -116,8 +161,11 @@ Status read_defaults(const Path& path, RendererDefaults& d, std::vector<std::str
 Status read_scheduler(RendererModel& m, std::optional<Sampler> sampler)
 {
     const Path path = m.folder / "scheduler" / "scheduler_config.json";
-    if (!is_there(path))
+    if (m.ldm || !is_there(path)) {
+        const Json usual = m.video() ? video_scheduler_json() : stable_diffusion_scheduler_json();
+        SR_TRY(m.scheduler, scheduler_config_from_json(usual, m.warnings, sampler));
         return {};
+    }
     // Stable Diffusion's own folders name PNDM
     const auto json = read_json(path);
     if (!sampler && json && json->is_object() && json->value("_class_name", Json()) == "PNDMScheduler") {
@@ -128,7 +176,7 @@ Status read_scheduler(RendererModel& m, std::optional<Sampler> sampler)
     return {};
 }
 
-Status read_folder(RendererModel& m, std::optional<Sampler> sampler)
+Status read_folder(RendererModel& m)
 {
     m.unet_folder = m.folder / (is_there(m.folder / "renderer") ? "renderer" : "unet");
     m.vae_folder = m.folder / "vae";
@@ -136,11 +184,12 @@ Status read_folder(RendererModel& m, std::optional<Sampler> sampler)
         return missing_component(m.folder, "renderer", "renderer/config.json or unet/config.json");
     if (!is_there(m.vae_folder / "config.json"))
         return missing_component(m.folder, "VAE", "vae/config.json");
-    SR_TRY(m.unet, read_config(m.unet_folder / "config.json", parse_unet_config));
-    SR_TRY(m.vae, read_config(m.vae_folder / "config.json", parse_vae_config));
+    SR_TRY(m.unet, read_config(m.unet_folder / "config.json", parse_any_unet_config));
+    SR_TRY(m.vae, read_config(m.vae_folder / "config.json", parse_any_vae_config));
+    m.defaults = defaults_of(m.unet);
     if (is_there(m.folder / "model_index.json"))
-        SR_CHECK(read_defaults(m.folder / "model_index.json", m.defaults, m.warnings));
-    return read_scheduler(m, sampler);
+        SR_CHECK(read_defaults(m.folder / "model_index.json", m.unet.video, m.defaults, m.warnings));
+    return {};
 }
 
 Status read_ldm(RendererModel& m)
@@ -158,18 +207,31 @@ Status read_ldm(RendererModel& m)
                     quote_path(m.folder));
     SR_TRY(m.unet, ldm_unet_config(set));
     SR_TRY(m.vae, ldm_vae_config(set));
+    m.defaults = defaults_of(m.unet);
     return {};
+}
+
+tl::unexpected<Error> refuse_image_video_unet(const Path& path, uint32_t latent_channels)
+{
+    return fail(
+        ErrorCode::bad_input,
+        "{}: conv_in takes {} channels, a plain Stable Video Diffusion UNet; the video renderer needs {}: noisy "
+        "latent ({}), buffer latent ({}) in place of the image, and visibility (1). 'semrover convert IN OUT "
+        "--vsd-init' makes it so, to be trained",
+        quote_path(path), 2 * latent_channels, 2 * latent_channels + 1, latent_channels, latent_channels);
 }
 
 Status check_renderer(const RendererModel& m)
 {
-    if (m.unet.in_channels == m.vae.latent_channels)
+    if (m.unet.in_channels == m.vae.latent_channels && !m.video())
         return refuse_plain_unet(m.unet_folder);
-    if (m.unet.in_channels != renderer_channels(m.vae))
+    if (m.unet.in_channels == 2 * m.vae.latent_channels && m.video())
+        return refuse_image_video_unet(m.unet_folder, m.vae.latent_channels);
+    if (const uint32_t expected = renderer_channels(m.vae, m.video()); m.unet.in_channels != expected)
         return fail(ErrorCode::bad_input,
-                    "{}: in_channels is {}, expected {}: noisy, previous and buffer latent of {} channels each, and "
-                    "visibility",
-                    quote_path(m.unet_folder), m.unet.in_channels, renderer_channels(m.vae), m.vae.latent_channels);
+                    "{}: in_channels is {}, expected {}: noisy, {}buffer latent of {} channels each, and visibility",
+                    quote_path(m.unet_folder), m.unet.in_channels, expected, m.video() ? "" : "previous and ",
+                    m.vae.latent_channels);
     if (m.unet.out_channels != m.vae.latent_channels)
         return fail(ErrorCode::bad_input, "{}: out_channels is {}, expected the VAE's latent_channels, {}",
                     quote_path(m.unet_folder), m.unet.out_channels, m.vae.latent_channels);
@@ -197,16 +259,36 @@ Json stable_diffusion_scheduler_json()
             {"timestep_spacing", "leading"}};
 }
 
+Json video_scheduler_json()
+{
+    return {{"_class_name", "EulerDiscreteScheduler"},
+            {"num_train_timesteps", 1000},
+            {"beta_schedule", "scaled_linear"},
+            {"beta_start", 0.00085},
+            {"beta_end", 0.012},
+            {"prediction_type", "v_prediction"},
+            {"use_karras_sigmas", true},
+            {"sigma_min", 0.002},
+            {"sigma_max", 700.0},
+            {"timestep_type", "continuous"},
+            {"timestep_spacing", "leading"},
+            {"steps_offset", 1}};
+}
+
 Result<RendererModel> RendererModel::read(const Path& path, std::optional<Sampler> sampler)
 {
     RendererModel m;
     m.folder = path;
-    m.scheduler = stable_diffusion_scheduler(sampler);
     std::error_code ignored;
     if (fs::is_directory(path, ignored))
-        SR_CHECK(read_folder(m, sampler));
+        SR_CHECK(read_folder(m));
     else
         SR_CHECK(read_ldm(m));
+    SR_CHECK(read_scheduler(m, sampler));
+    if (m.scheduler.continuous_timesteps && m.scheduler.sampler != Sampler::euler)
+        return fail(ErrorCode::bad_input,
+                    "{}: timestep_type is \"continuous\", which the euler sampler alone gives, not {}",
+                    quote_path(path), sampler_name(m.scheduler.sampler));
     m.warnings.insert(m.warnings.end(), m.unet.warnings.begin(), m.unet.warnings.end());
     m.warnings.insert(m.warnings.end(), m.vae.warnings.begin(), m.vae.warnings.end());
     SR_CHECK(read_conditioning(m));

@@ -161,28 +161,26 @@ Result<UnetConfig> parse_unet_config(const Json& json)
     return c;
 }
 
+Result<UnetConfig> parse_any_unet_config(const Json& json)
+{
+    const bool video = json.is_object() && json.value("_class_name", Json()) == kVideoUnetClass;
+    return video ? parse_video_unet_config(json) : parse_unet_config(json);
+}
+
 Json unet_config_json(const UnetConfig& c)
 {
-    const auto per_level = [](const std::vector<uint32_t>& values) { // one number where they are all the same
-        const bool same = std::ranges::count(values, values[0]) == std::ptrdiff_t(values.size());
-        return same ? Json(values[0]) : Json(values);
-    };
-    const auto types = [](const std::vector<bool>& attention, const char* name) {
-        Json list = Json::array();
-        for (const bool a : attention)
-            list.push_back((a ? "CrossAttn" : "") + std::string(name));
-        return list;
-    };
+    if (c.video)
+        return video_unet_config_json(c);
     return {{"_class_name", "UNet2DConditionModel"},
             {"in_channels", c.in_channels},
             {"out_channels", c.out_channels},
             {"block_out_channels", c.block_out_channels},
-            {"layers_per_block", per_level(c.layers_per_block)},
-            {"down_block_types", types(c.down_attention, "DownBlock2D")},
+            {"layers_per_block", per_level_json(c.layers_per_block)},
+            {"down_block_types", block_types_json(c.down_attention, "DownBlock2D")},
             {"mid_block_type", c.mid_attention ? "UNetMidBlock2DCrossAttn" : "UNetMidBlock2D"},
-            {"up_block_types", types(c.up_attention, "UpBlock2D")},
-            {"attention_head_dim", per_level(c.heads)},
-            {"transformer_layers_per_block", per_level(c.transformer_layers)},
+            {"up_block_types", block_types_json(c.up_attention, "UpBlock2D")},
+            {"attention_head_dim", per_level_json(c.heads)},
+            {"transformer_layers_per_block", per_level_json(c.transformer_layers)},
             {"cross_attention_dim", c.cross_attention_dim},
             {"norm_num_groups", c.norm_num_groups},
             {"norm_eps", short_number(c.norm_eps)},

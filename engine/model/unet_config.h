@@ -49,7 +49,9 @@ struct UnetConfig {
 Result<UnetConfig> parse_unet_config(const nlohmann::json& json);
 // the same of a UNetSpatioTemporalConditionModel
 Result<UnetConfig> parse_video_unet_config(const nlohmann::json& json);
-// the config as a config.json; not of videos
+// the same of either, as _class_name says; without one of images
+Result<UnetConfig> parse_any_unet_config(const nlohmann::json& json);
+// the config as a config.json
 nlohmann::json unet_config_json(const UnetConfig& config);
 
 // names and shapes of the network's weights, as diffusers calls them

@@ -47,6 +47,20 @@ void read_transformers(JsonFields& fields, UnetConfig& c)
     c.cross_attention_dim = widths[0];
 }
 
+Json per_level_json(const std::vector<uint32_t>& values)
+{
+    const bool same = std::ranges::count(values, values[0]) == std::ptrdiff_t(values.size());
+    return same ? Json(values[0]) : Json(values);
+}
+
+Json block_types_json(const std::vector<bool>& attention, const char* name)
+{
+    Json list = Json::array();
+    for (const bool a : attention)
+        list.push_back((a ? "CrossAttn" : "") + std::string(name));
+    return list;
+}
+
 Status check_channels(const UnetConfig& c, std::string_view what, std::string_view of_heads)
 {
     for (size_t i = 0; i < c.levels(); ++i) {

@@ -9,6 +9,8 @@ namespace semrover {
 
 namespace {
 
+constexpr const char* kVideoVaeClass = "AutoencoderKLTemporalDecoder";
+
 void read_block_types(JsonFields& fields, const VaeConfig& c, const char* name, const char* type)
 {
     std::vector<bool> blocks(c.block_out_channels.size());
@@ -150,16 +152,32 @@ Result<VaeConfig> parse_video_vae_config(const Json& json)
     c.video = true;
     c.use_post_quant_conv = false;
     JsonFields fields(json, "video vae config");
-    fields.only("_class_name", "AutoencoderKLTemporalDecoder");
+    fields.only("_class_name", kVideoVaeClass);
     read_numbers(fields, c);
     SR_CHECK(fields.finish(c.warnings));
     SR_CHECK(check_groups(c));
     return c;
 }
 
+Result<VaeConfig> parse_any_vae_config(const Json& json)
+{
+    const bool video = json.is_object() && json.value("_class_name", Json()) == kVideoVaeClass;
+    return video ? parse_video_vae_config(json) : parse_vae_config(json);
+}
+
 Json vae_config_json(const VaeConfig& c)
 {
     const size_t levels = c.block_out_channels.size();
+    if (c.video)
+        return {{"_class_name", kVideoVaeClass},
+                {"in_channels", c.in_channels},
+                {"out_channels", c.out_channels},
+                {"latent_channels", c.latent_channels},
+                {"block_out_channels", c.block_out_channels},
+                {"layers_per_block", c.layers_per_block},
+                {"down_block_types", std::vector<std::string>(levels, "DownEncoderBlock2D")},
+                {"scaling_factor", short_number(c.scaling_factor)},
+                {"force_upcast", c.force_upcast}};
     return {{"_class_name", "AutoencoderKL"},
             {"in_channels", c.in_channels},
             {"out_channels", c.out_channels},

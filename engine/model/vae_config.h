@@ -34,7 +34,9 @@ struct VaeConfig {
 Result<VaeConfig> parse_vae_config(const nlohmann::json& json);
 // the same of an AutoencoderKLTemporalDecoder
 Result<VaeConfig> parse_video_vae_config(const nlohmann::json& json);
-// the config as a config.json; not of videos
+// the same of either, as _class_name says; without one of images
+Result<VaeConfig> parse_any_vae_config(const nlohmann::json& json);
+// the config as a config.json
 nlohmann::json vae_config_json(const VaeConfig& config);
 
 // names and shapes of the network's weights, as diffusers calls them

@@ -41,7 +41,7 @@ Result<UnetConfig> parse_video_unet_config(const Json& json)
     c.cross_attention_dim = 1024;
     c.num_frames = 25;
     JsonFields fields(json, "video unet config");
-    fields.only("_class_name", "UNetSpatioTemporalConditionModel");
+    fields.only("_class_name", kVideoUnetClass);
     fields.integer("in_channels", 1u, 4096u, c.in_channels);
     fields.integer("out_channels", 1u, 4096u, c.out_channels);
     read_block_types(fields, {{"CrossAttnDownBlockSpatioTemporal", true}, {"DownBlockSpatioTemporal", false}},
@@ -54,6 +54,23 @@ Result<UnetConfig> parse_video_unet_config(const Json& json)
     SR_CHECK(fields.finish(c.warnings));
     SR_CHECK(check_channels(c, "video unet config", ""));
     return c;
+}
+
+Json video_unet_config_json(const UnetConfig& c)
+{
+    return {{"_class_name", kVideoUnetClass},
+            {"in_channels", c.in_channels},
+            {"out_channels", c.out_channels},
+            {"block_out_channels", c.block_out_channels},
+            {"layers_per_block", per_level_json(c.layers_per_block)},
+            {"down_block_types", block_types_json(c.down_attention, "DownBlockSpatioTemporal")},
+            {"up_block_types", block_types_json(c.up_attention, "UpBlockSpatioTemporal")},
+            {"num_attention_heads", c.heads},
+            {"transformer_layers_per_block", per_level_json(c.transformer_layers)},
+            {"cross_attention_dim", c.cross_attention_dim},
+            {"addition_time_embed_dim", c.added_embed_dim},
+            {"projection_class_embeddings_input_dim", c.added_embed_dim * c.added_numbers},
+            {"num_frames", c.num_frames}};
 }
 
 } // namespace semrover

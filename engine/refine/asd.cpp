@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/refine/asd.h"
 
+#include "engine/sampling/guidance.h"
 #include "engine/sampling/step_rows.h"
 #include "kernels/picture.h"
-#include "kernels/sampling.h"
 #include "runtime/base/hash.h"
 
 #include <algorithm>
@@ -26,10 +26,10 @@ uint32_t halves_of(float guidance_scale)
 struct AsdRenderer::Memory {
     const Unet& unet;
     const SamplingPlan& plan;
-    uint32_t width, height, pixels, rows, channels, halves, tokens;
+    uint32_t width, height, pixels, rows, channels, halves;
     State state;
-    Slot steps, clock, timesteps, times, context, text, table_row; // times, text: tables that are computed once
-    Slot cells, known, x0;
+    DenoiserTables tables;
+    Slot table_row, cells, known, x0;
     AsdSlots ends;                    // latent: the state x
     Slot first_noise, previous_noise; // where noise comes from the host
 
@@ -37,18 +37,8 @@ struct AsdRenderer::Memory {
            bool fed)
         : unet(u), plan(p), width(size.width()), height(size.height()), pixels(size.pixels()),
           rows(round_up(pixels, kImageRowPadding)), channels(u.config().out_channels),
-          halves(halves_of(guidance_scale)), tokens(text_tokens)
+          halves(halves_of(guidance_scale)), tables(state, u, p, kNoiseRows, text_tokens)
     {
-        constexpr uint32_t kWords = sizeof(StepRow) / 4;
-        const uint32_t timestep_count = uint32_t(plan.timesteps.size());
-        steps = state.slot(uint32_t(plan.rows.size()) + kNoiseRows, kWords, DType::u32, "steps", kWords);
-        clock = ReplayMemory::clock_slot(state);
-        timesteps = state.slot(timestep_count, 1, DType::f32, "timesteps", 1);
-        times = state.slot(timestep_count, unet.time_width(), DType::f32, "times");
-        if (const uint32_t text_rows = round_up(tokens, kImageRowPadding); text_rows && unet.context_width()) {
-            context = state.slot(text_rows, unet.config().cross_attention_dim, unet.precision(), "conditioning");
-            text = state.slot(text_rows, unet.context_width(), unet.precision(), "text");
-        }
         table_row = state.slot(halves, 1, DType::u32, "table_row", 1);
         cells = state.slot(rows, 4, DType::i32, "cells", 4);
         known = state.slot(rows, 1, DType::u32, "known", 1);
@@ -64,7 +54,6 @@ struct AsdRenderer::Memory {
         }
     }
     Slot latent(const char* name) { return state.slot(rows, channels, DType::f32, name); }
-    StepTable step_table(Graph& g) const { return {steps.in(g), clock.in(g)}; }
     Tensor noise(Graph& g, StepTable table_of_steps, uint64_t seed) const
     {
         return step_noise(g, table_of_steps, cells.in(g), known.in(g), channels, seed);
@@ -74,16 +63,14 @@ struct AsdRenderer::Memory {
     Graph tables_graph() const
     {
         Graph g;
-        g.keep(unet.time_table(g, timesteps.in(g)), times);
-        if (text.valid())
-            g.keep(unet.context_table(g, context.in(g)), text);
+        tables.add(g, unet);
         return g;
     }
     // once a frame: the first state, and the noise on the previous latent
     Graph begin_graph(uint64_t seed) const
     {
         Graph g;
-        const StepTable s = step_table(g);
+        const StepTable s = tables.in(g);
         step_renoise(g, s, first_noise.valid() ? first_noise.in(g) : noise(g, s, seed), ends.latent.in(g));
         step_advance(g, s.clock);
         step_renoise(g, s, previous_noise.valid() ? previous_noise.in(g) : noise(g, s, seed), ends.previous.in(g));
@@ -93,13 +80,13 @@ struct AsdRenderer::Memory {
     Graph step_graph(float guidance_scale, uint64_t seed) const
     {
         Graph g;
-        const StepTable s = step_table(g);
+        const StepTable s = tables.in(g);
         const Tensor x = ends.latent.in(g);
         const RendererFrame frame{ends.previous.in(g), ends.buffer.in(g), ends.visible.in(g)};
         step_timestep(g, s, table_row.in(g));
         const Tensor in = renderer_input(g, s, x, frame, halves, unet.precision());
         const FeatureMap m =
-            unet.forward(g, {in, halves, height, width}, times.in(g), table_row.in(g), {text.in(g), tokens, 0});
+            unet.forward(g, {in, halves, height, width}, tables.times.in(g), table_row.in(g), tables.context(g));
         const Tensor z = draws_noise(plan) ? noise(g, s, seed) : frame.buffer;
         step_update(g, s, m.data, z, known.in(g), frame.buffer, x, x0.in(g), guidance_scale, float(plan.clip));
         step_advance(g, s.clock);
@@ -113,8 +100,8 @@ struct AsdRenderer::Memory {
     }
 };
 
-AsdRenderer::AsdRenderer(Device& device, const Unet& unet, const SamplingPlan& plan, AsdOptions options)
-    : device_(device), unet_(unet), plan_(plan), options_(std::move(options))
+AsdRenderer::AsdRenderer(Device& device, const SamplingPlan& plan, AsdOptions options)
+    : device_(device), plan_(plan), options_(std::move(options))
 {
 }
 AsdRenderer::~AsdRenderer() = default;
@@ -123,8 +110,7 @@ Result<std::unique_ptr<AsdRenderer>> AsdRenderer::create(Device& device, const U
                                                          const Conditioning& text, const LatentSize& size,
                                                          AsdOptions options)
 {
-    if (!(options.guidance_scale >= 0 && options.guidance_scale <= 1000))
-        return fail(ErrorCode::usage, "guidance scale {} is not in 0..1000", options.guidance_scale);
+    SR_CHECK(check_guidance(options.guidance_scale));
     if (!(options.previous_noise >= 0 && options.previous_noise <= 1000))
         return fail(ErrorCode::usage, "noise of {} on the previous frame is not in 0..1000", options.previous_noise);
     const UnetConfig& c = unet.config();
@@ -137,7 +123,7 @@ Result<std::unique_ptr<AsdRenderer>> AsdRenderer::create(Device& device, const U
     if (c.num_class_embeds)
         return fail(ErrorCode::bad_input, "the UNet wants one of {} class labels, which a renderer does not have",
                     c.num_class_embeds);
-    std::unique_ptr<AsdRenderer> r(new AsdRenderer(device, unet, plan, std::move(options)));
+    std::unique_ptr<AsdRenderer> r(new AsdRenderer(device, plan, std::move(options)));
     r->memory_ = std::make_unique<Memory>(unet, r->plan_, text.tokens, size, r->options_.guidance_scale,
                                           bool(r->options_.noise));
     SR_CHECK(r->memory_->state.allocate(device, "renderer state"));
@@ -161,17 +147,9 @@ Result<AsdRenderer::Bytes> AsdRenderer::planned_bytes(const DeviceLimits& limits
 Status AsdRenderer::make_tables(const Conditioning& text)
 {
     const Memory& m = *memory_;
-    std::vector<StepRow> rows{first_noise_row(plan_.init_noise_sigma, kFirstDraw),
+    const StepRow before[] = {first_noise_row(plan_.init_noise_sigma, kFirstDraw),
                               more_noise_row(options_.previous_noise, kPreviousFrameDraw)};
-    std::ranges::transform(plan_.rows, std::back_inserter(rows), step_row);
-    SR_CHECK(m.steps.write(device_, rows));
-    SR_CHECK(m.clock.clear(device_));
-    SR_CHECK(m.timesteps.write(device_, std::vector<float>(plan_.timesteps.begin(), plan_.timesteps.end())));
-    const uint32_t dim = unet_.config().cross_attention_dim;
-    SR_ASSERT(text.values.size() == size_t(text.tokens) * dim, "{} numbers of conditioning for {} tokens of {}",
-              text.values.size(), text.tokens, dim);
-    if (m.context.valid())
-        SR_CHECK(m.context.write_rows(device_, text.values));
+    SR_CHECK(m.tables.write(device_, plan_, before, {text}));
     SR_CHECK(m.known.clear(device_));
     SR_TRY(const auto tables, Program::create(device_, m.tables_graph()));
     return tables->run();
@@ -184,7 +162,7 @@ Status AsdRenderer::make_programs()
     SR_TRY(begin_, Program::create(device_, memory_->begin_graph(options_.seed)));
     SR_TRY(step_, Program::create(device_, memory_->step_graph(options_.guidance_scale, options_.seed)));
     SR_TRY(check_, Program::create(device_, memory_->check_graph()));
-    replay_.emplace(device_, ReplayMemory{memory_->clock, memory_->ends.latent, memory_->x0}, plan_.rows.size(),
+    replay_.emplace(device_, ReplayMemory{memory_->tables.clock, memory_->ends.latent, memory_->x0}, plan_.rows.size(),
                     [this](size_t) -> Result<Program*> { return step_.get(); });
     return {};
 }

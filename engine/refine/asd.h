@@ -2,11 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/network/unet.h"
+#include "engine/refine/denoiser_tables.h"
 #include "engine/refine/latent_codec.h"
 #include "engine/refine/noise_trail.h"
-#include "engine/sampling/repaint.h"
-#include "engine/sampling/replay.h"
 
 #include <functional>
 #include <optional>
@@ -44,12 +42,6 @@ struct AsdSlots {
     Slot previous;        // latent of the frame before; begin() puts noise on it
     Slot latent;          // of the frame, when it has ended
     Slot bad;             // [1] u32: first_non_finite() of it
-};
-
-// The text of a renderer, the same for every frame
-struct Conditioning {
-    uint32_t tokens = 0;
-    std::span<const float> values; // [tokens, cross_attention_dim]
 };
 
 // Autoregressive renderer: the UNet sees the noisy latent, the previous frame's latent with noise on it, the splat
@@ -110,7 +102,7 @@ class AsdRenderer {
 
   private:
     struct Memory;
-    AsdRenderer(Device& device, const Unet& unet, const SamplingPlan& plan, AsdOptions options);
+    AsdRenderer(Device& device, const SamplingPlan& plan, AsdOptions options);
     Status make_tables(const Conditioning& text);
     Status make_programs();
     Status upload(const AsdFrame& frame);
@@ -118,7 +110,6 @@ class AsdRenderer {
     uint64_t key_of(const AsdStart& start) const;
 
     Device& device_;
-    const Unet& unet_;
     SamplingPlan plan_;
     AsdOptions options_;
     std::unique_ptr<Memory> memory_;

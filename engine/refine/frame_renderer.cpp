@@ -6,7 +6,8 @@ namespace semrover {
 
 FrameRenderer::FrameRenderer(Device& device, const RendererModel& model, const SamplingPlan& plan, DType precision,
                              AsdOptions options, MemoryPolicy policy)
-    : device_(device), model_(model), plan_(plan), precision_(precision), options_(std::move(options)), policy_(policy)
+    : device_(device), model_(model), plan_(plan), options_(std::move(options)), policy_(policy),
+      networks_(device, model, precision)
 {
 }
 FrameRenderer::~FrameRenderer() = default;
@@ -21,9 +22,9 @@ Status FrameRenderer::start(const RendererWork& work, const RendererWork& run)
     if (policy_ == MemoryPolicy::staged)
         return {};
     if (run.encode || run.decode)
-        SR_CHECK(load_vae());
+        SR_CHECK(networks_.vae());
     if (run.denoise)
-        SR_CHECK(load_unet());
+        SR_CHECK(networks_.unet());
     if (!work.denoise || asd_)
         return {};
     codec_.reset();
@@ -43,28 +44,10 @@ Status FrameRenderer::make_way(Part part)
         return {};
     if (coding) {
         asd_.reset();
-        unet_.reset();
+        networks_.drop_unet();
     } else {
-        vae_.reset();
+        networks_.drop_vae();
     }
-    return {};
-}
-
-Status FrameRenderer::load_unet()
-{
-    if (unet_)
-        return {};
-    SR_TRY(const Checkpoint weights, model_.open_unet());
-    SR_TRY(unet_, Unet::load(device_, model_.unet, weights, precision_));
-    return {};
-}
-
-Status FrameRenderer::load_vae()
-{
-    if (vae_)
-        return {};
-    SR_TRY(const Checkpoint weights, model_.open_vae());
-    SR_TRY(vae_, Vae::load(device_, model_.vae, weights, precision_));
     return {};
 }
 
@@ -73,16 +56,17 @@ Status FrameRenderer::make_asd()
     if (asd_)
         return {};
     const Conditioning text{model_.conditioning_tokens, model_.conditioning};
-    SR_TRY(asd_, AsdRenderer::create(device_, *unet_, plan_, text, size_, options_));
+    SR_TRY(const Unet* unet, networks_.unet());
+    SR_TRY(asd_, AsdRenderer::create(device_, *unet, plan_, text, size_, options_));
     return {};
 }
 
 Result<LatentCodec*> FrameRenderer::codec(CodecDirection direction)
 {
     SR_CHECK(make_way(direction == CodecDirection::encode ? Part::encode : Part::decode));
-    SR_CHECK(load_vae());
+    SR_TRY(const Vae* vae, networks_.vae());
     if (!codec_) {
-        SR_TRY(codec_, LatentCodec::create(device_, *vae_, size_, direction));
+        SR_TRY(codec_, LatentCodec::create(device_, *vae, size_, direction));
         direction_ = direction;
     }
     return codec_.get();
@@ -97,7 +81,6 @@ Result<std::vector<float>> FrameRenderer::encode(std::span<const float> image)
 Status FrameRenderer::begin(const AsdFrame& frame)
 {
     SR_CHECK(make_way(Part::denoise));
-    SR_CHECK(load_unet());
     SR_CHECK(make_asd());
     return asd_->begin(frame);
 }
@@ -137,7 +120,6 @@ Status FrameRenderer::copy(const Slot& from, const Slot& to)
 Status FrameRenderer::make_denoiser()
 {
     SR_ASSERT(policy_ == MemoryPolicy::resident, "latents stay on the device under the resident policy only");
-    SR_CHECK(load_unet());
     return make_asd();
 }
 

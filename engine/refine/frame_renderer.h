@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/model/renderer_model.h"
+#include "engine/refine/loaded_networks.h"
 #include "engine/refine/memory_plan.h"
 #include "runtime/device/copy_ring.h"
 
@@ -45,8 +45,6 @@ class FrameRenderer {
   private:
     enum class Part { encode, denoise, decode };
     Status make_way(Part part); // drops what the policy does not keep beside it
-    Status load_unet();
-    Status load_vae();
     Status make_asd();
     Result<LatentCodec*> codec(CodecDirection direction);
     Status make_denoiser();
@@ -56,12 +54,10 @@ class FrameRenderer {
     Device& device_;
     const RendererModel& model_;
     const SamplingPlan& plan_;
-    DType precision_;
     AsdOptions options_;
     MemoryPolicy policy_;
     LatentSize size_;
-    std::unique_ptr<Unet> unet_;
-    std::unique_ptr<Vae> vae_;
+    LoadedNetworks networks_;
     std::unique_ptr<AsdRenderer> asd_;
     std::unique_ptr<LatentCodec> codec_;
     CodecDirection direction_ = CodecDirection::encode; // of codec_

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/refine/memory_plan.h"
 
+#include "engine/refine/video_decoder.h"
+
 #include <algorithm>
 
 namespace semrover {
@@ -27,6 +29,24 @@ uint64_t RendererBytes::peak(MemoryPolicy policy) const
     return outgoing + peak;
 }
 
+namespace {
+
+Result<AsdRenderer::Bytes> denoiser_bytes(const DeviceLimits& limits, const RendererNetworks& n, const RendererWork& w)
+{
+    if (n.unet.config().video)
+        return VsdRenderer::planned_bytes(limits, n.unet, n.plan, n.text_tokens, w.size, w.frames, n.video);
+    return AsdRenderer::planned_bytes(limits, n.unet, n.plan, n.text_tokens, w.size, n.guidance_scale);
+}
+
+Result<uint64_t> decoder_bytes(const DeviceLimits& limits, const RendererNetworks& n, const RendererWork& w)
+{
+    if (n.unet.config().video)
+        return VideoDecoder::planned_bytes(limits, n.vae, w.size, w.decode_frames);
+    return LatentCodec::planned_bytes(limits, n.vae, w.size, CodecDirection::decode);
+}
+
+} // namespace
+
 Result<RendererBytes> renderer_bytes(const DeviceLimits& limits, const RendererNetworks& n,
                                      std::span<const RendererWork> work)
 {
@@ -34,17 +54,16 @@ Result<RendererBytes> renderer_bytes(const DeviceLimits& limits, const RendererN
     for (const RendererWork& w : work) {
         RendererBytes::Size& s = bytes.sizes.emplace_back();
         if (w.denoise) {
-            SR_TRY(const AsdRenderer::Bytes asd,
-                   AsdRenderer::planned_bytes(limits, n.unet, n.plan, n.text_tokens, w.size, n.guidance_scale));
-            s.state = asd.state;
-            s.denoise = asd.programs;
+            SR_TRY(const AsdRenderer::Bytes denoiser, denoiser_bytes(limits, n, w));
+            s.state = denoiser.state;
+            s.denoise = denoiser.programs;
             bytes.unet = n.unet.device_bytes(limits);
         }
         if (w.encode) {
             SR_TRY(s.encode, LatentCodec::planned_bytes(limits, n.vae, w.size, CodecDirection::encode));
         }
         if (w.decode) {
-            SR_TRY(s.decode, LatentCodec::planned_bytes(limits, n.vae, w.size, CodecDirection::decode));
+            SR_TRY(s.decode, decoder_bytes(limits, n, w));
         }
         if (w.encode || w.decode)
             bytes.vae = n.vae.device_bytes(limits);

@@ -2,13 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/refine/asd.h"
+#include "engine/refine/vsd.h"
 
 namespace semrover {
 
 // Which networks are on the device at the same time.
 enum class MemoryPolicy {
-    resident, // both for the whole run, and the memory of one kind of work at a time; frames are ready one by one
+    resident, // both for the whole run, and the memory of one kind of work at a time; frames (or windows of them) are
+              // ready one by one
     staged,   // the VAE encodes every buffer, then the UNet denoises every frame, then the VAE decodes every latent
 };
 std::string_view policy_name(MemoryPolicy policy);
@@ -17,6 +18,12 @@ std::string_view policy_name(MemoryPolicy policy);
 struct RendererWork {
     LatentSize size;
     bool encode = true, denoise = true, decode = true;
+    uint32_t frames = 1, decode_frames = 1; // denoised, and decoded, together
+
+    bool same_shapes(const RendererWork& other) const
+    {
+        return size == other.size && frames == other.frames && decode_frames == other.decode_frames;
+    }
 };
 
 // device bytes of a renderer's parts; 0 where a run has no work for them
@@ -38,6 +45,7 @@ struct RendererNetworks {
     const SamplingPlan& plan;
     uint32_t text_tokens = 0;
     float guidance_scale = 1;
+    VsdOptions video = {}; // of a UNet of videos
 };
 Result<RendererBytes> renderer_bytes(const DeviceLimits& limits, const RendererNetworks& networks,
                                      std::span<const RendererWork> work);

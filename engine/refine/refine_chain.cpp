@@ -4,7 +4,22 @@
 
 #include "runtime/base/hash.h"
 
+#include <algorithm>
+
 namespace semrover {
+
+namespace {
+
+// frames that a decoder of videos sees before those that are kept
+constexpr uint32_t kDecodeOverlap = 1;
+
+} // namespace
+
+std::vector<FrameWindow> decode_windows(const RefineChain& chain, const FrameWindow& window)
+{
+    const uint32_t length = chain.shape.decode_frames, overlap = std::min(kDecodeOverlap, length - 1);
+    return frame_windows({window.next(), window.end() - 1}, window.known, length, overlap);
+}
 
 uint32_t chain_key(const std::string& camera)
 {

@@ -3,27 +3,31 @@
 #pragma once
 
 #include "engine/format/buffer_folder.h"
+#include "engine/refine/frame_windows.h"
 #include "engine/refine/latent_size.h"
-
-#include <vector>
 
 namespace semrover {
 
-// frames of a camera that a run refines, first and last included
-struct FrameRange {
-    uint32_t first = 0, last = 0;
-
-    uint32_t count() const { return last - first + 1; }
+// How a drive is cut: windows of `frames`, which begin `overlap` frames before the first one that is new. Frames are
+// decoded `decode_frames` at a time.
+struct WindowShape {
+    uint32_t frames = 1, overlap = 0, decode_frames = 1; // frame by frame
 };
 
-// the frames of one camera: an autoregressive chain that depends on no other
+// the frames of one camera: a chain that depends on no other, each frame or window on the one before
 struct RefineChain {
     BufferCamera camera;
     FrameRange range;
     LatentSize size;
-    std::vector<float> before;        // latent of frame range.first - 1; empty: the first frame has none before it
+    std::vector<float> before;        // latents of frames before the range; empty: the first frame has none before it
     std::vector<CameraFrame> cameras; // of all frames, for noise that stays on surfaces; empty: each frame has its own
+    WindowShape shape = {};
+    std::vector<FrameWindow> windows = {}; // of the range, as they are denoised
 };
+
+// The windows that the frames which `window` makes are decoded in: the first frames of each are decoded for those after
+// them, and not kept.
+std::vector<FrameWindow> decode_windows(const RefineChain& chain, const FrameWindow& window);
 
 // noise key of a camera, from its name: the same whichever cameras are refined beside it
 uint32_t chain_key(const std::string& camera);

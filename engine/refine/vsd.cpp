@@ -2,9 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/refine/vsd.h"
 
+#include "engine/model/renderer_model.h"
 #include "engine/refine/frame_slots.h"
+#include "engine/refine/known_frames.h"
+#include "engine/sampling/guidance.h"
 #include "engine/sampling/step_rows.h"
-#include "kernels/sampling.h"
 
 #include <algorithm>
 
@@ -12,12 +14,8 @@ namespace semrover {
 
 namespace {
 
+static_assert(kMostWindowFrames == kMostFrames);
 constexpr uint32_t kFirstRows = 1; // rows of the step table before the plan's: the first state
-
-bool in_range(float guidance)
-{
-    return guidance >= 0 && guidance <= 1000;
-}
 
 uint32_t video_halves(const VsdOptions& o)
 {
@@ -31,50 +29,41 @@ struct VsdRenderer::Memory {
     const Unet& unet;
     const SamplingPlan& plan;
     const VsdOptions& options;
-    uint32_t width, height, pixels, image_rows, frames, channels, halves, tokens;
+    uint32_t width, height, pixels, image_rows, frames, channels, halves;
     State state;
-    Slot steps, clock, timesteps, added, numbers, context;
-    Slot times, frame_table, text; // computed once
-    Slot table_row, frame_row;     // of each image
-    Slot cells, known, x, x0, buffer, visible;
-    Slot noise; // where it comes from the host
+    DenoiserTables tables;
+    Slot numbers, frame_table; // of the frames; the table is computed once
+    Slot table_row, frame_row; // of each image
+    Slot cells, known;         // of each pixel: key of its noise, and 1 where its frame is known
+    Slot x, x0, first, fixed;  // first: noise of the first state; fixed: latents of the known frames
+    Slot weights;              // known_frame_weights(), where they are carried
+    Slot buffer, visible, bad; // bad: first_non_finite() of each frame
 
     Memory(const Unet& u, const SamplingPlan& p, uint32_t text_tokens, const LatentSize& size, uint32_t frame_count,
            const VsdOptions& o)
         : unet(u), plan(p), options(o), width(size.width()), height(size.height()), pixels(size.pixels()),
           image_rows(round_up(pixels, kImageRowPadding)), frames(frame_count), channels(u.config().out_channels),
-          halves(video_halves(o)), tokens(text_tokens)
+          halves(video_halves(o)), tables(state, u, p, kFirstRows, text_tokens)
     {
-        declare_tables();
         const auto u32 = [&](uint32_t count, const char* name) { return state.slot(count, 1, DType::u32, name, 1); };
+        numbers = state.slot(frames, 1, DType::f32, "frame numbers", 1);
+        frame_table = state.slot(frames, unet.frame_width(), DType::f32, "frames");
         table_row = u32(halves * frames, "table_row");
         frame_row = u32(halves * frames, "frame_row");
         cells = state.slot(rows(), 4, DType::i32, "cells", 4);
         known = u32(rows(), "known");
         x = latent("x");
         x0 = latent("x0");
+        first = latent("first noise");
+        fixed = latent("known frames");
+        if (o.correlation > 0)
+            weights = state.slot(uint32_t(p.rows.size()) * frames, frames, DType::f32, "weights", frames);
         buffer = latent("buffer");
         visible = state.slot(rows(), 1, DType::f32, "visible", 1);
-        if (o.noise)
-            noise = latent("noise");
-    }
-    void declare_tables()
-    {
-        constexpr uint32_t kWords = sizeof(StepRow) / 4;
-        const uint32_t count = uint32_t(plan.timesteps.size()), numbers_of_video = unet.config().added_numbers;
-        steps = state.slot(uint32_t(plan.rows.size()) + kFirstRows, kWords, DType::u32, "steps", kWords);
-        clock = ReplayMemory::clock_slot(state);
-        timesteps = state.slot(count, 1, DType::f32, "timesteps", 1);
-        added = state.slot(count, numbers_of_video, DType::f32, "added numbers", numbers_of_video);
-        numbers = state.slot(frames, 1, DType::f32, "frame numbers", 1);
-        context = state.slot(tokens, unet.config().cross_attention_dim, unet.precision(), "conditioning");
-        times = state.slot(count, unet.time_width(), DType::f32, "times");
-        frame_table = state.slot(frames, unet.frame_width(), DType::f32, "frames");
-        text = state.slot(tokens, unet.context_width(), unet.precision(), "text");
+        bad = frame_words(state, frames, 1, "first number that is none");
     }
     uint32_t rows() const { return frames * image_rows; }
     Slot latent(const char* name) { return state.slot(rows(), channels, DType::f32, name); }
-    StepTable step_table(Graph& g) const { return {steps.in(g), clock.in(g)}; }
     Tensor normals(Graph& g, StepTable s) const
     {
         return step_noise(g, s, cells.in(g), known.in(g), channels, options.seed);
@@ -84,24 +73,25 @@ struct VsdRenderer::Memory {
     Graph tables_graph() const
     {
         Graph g;
-        g.keep(unet.time_table(g, timesteps.in(g), {}, added.in(g)), times);
+        tables.add(g, unet);
         g.keep(unet.frame_table(g, numbers.in(g)), frame_table);
-        g.keep(unet.context_table(g, context.in(g)), text);
         return g;
     }
     // once a window: the first state
     Graph begin_graph() const
     {
         Graph g;
-        const StepTable s = step_table(g);
-        step_renoise(g, s, noise.valid() ? noise.in(g) : normals(g, s), x.in(g));
+        const StepTable s = tables.in(g);
+        const Tensor state_x = x.in(g);
+        step_hold(g, known.in(g), fixed.in(g), state_x);
+        step_renoise(g, s, options.noise ? first.in(g) : g.keep(normals(g, s), first), state_x);
         step_advance(g, s.clock);
         return g;
     }
     Graph step_graph() const
     {
         Graph g;
-        const StepTable s = step_table(g);
+        const StepTable s = tables.in(g);
         const Tensor state_x = x.in(g), row = table_row.in(g);
         const RendererFrame seen{{}, buffer.in(g), visible.in(g)};
         step_timestep(g, s, row);
@@ -109,11 +99,19 @@ struct VsdRenderer::Memory {
         // note: every image and video is at the same timestep
         const Unet::Videos videos{{frames, frame_table.in(g), frame_row.in(g)}, row.row_range(0, halves)};
         const FeatureMap m =
-            unet.forward(g, {in, halves * frames, height, width}, times.in(g), row, {text.in(g), tokens, 0}, videos);
+            unet.forward(g, {in, halves * frames, height, width}, tables.times.in(g), row, tables.context(g), videos);
         const FrameGuidance guidance(options.first_guidance, options.last_guidance, frames);
-        step_update(g, s, m.data, draws_noise(plan) ? normals(g, s) : seen.buffer, known.in(g), seen.buffer, state_x,
+        step_update(g, s, m.data, draws_noise(plan) ? normals(g, s) : first.in(g), known.in(g), fixed.in(g), state_x,
                     x0.in(g), guidance, float(plan.clip));
+        if (weights.valid())
+            step_carry(g, s, {weights.in(g), frames, kFirstRows}, known.in(g), fixed.in(g), state_x, x0.in(g));
         step_advance(g, s.clock);
+        return g;
+    }
+    Graph check_graph() const
+    {
+        Graph g;
+        check_frames(g, x, frames, {width, height, width, height}, bad);
         return g;
     }
 };
@@ -129,9 +127,11 @@ namespace {
 Status check_video_renderer(const Unet& unet, const VideoConditioning& conditioning, uint32_t frames,
                             const VsdOptions& options)
 {
-    if (!in_range(options.first_guidance) || !in_range(options.last_guidance))
-        return fail(ErrorCode::usage, "guidance from {} to {} is not in 0..1000", options.first_guidance,
-                    options.last_guidance);
+    SR_CHECK(check_guidance(options.first_guidance));
+    SR_CHECK(check_guidance(options.last_guidance));
+    if (!(options.correlation >= 0 && options.correlation < 1))
+        return fail(ErrorCode::usage, "a correlation of {} between frames, expected 0 to less than 1",
+                    options.correlation);
     if (frames < 1 || frames > kMostFrames)
         return fail(ErrorCode::usage, "a window of {} frames, expected 1 to {}", frames, kMostFrames);
     const UnetConfig& c = unet.config();
@@ -171,31 +171,26 @@ Result<AsdRenderer::Bytes> VsdRenderer::planned_bytes(const DeviceLimits& limits
     SR_TRY(const Plan tables, make_plan(m.tables_graph().desc(), limits));
     SR_TRY(const Plan begin, make_plan(m.begin_graph().desc(), limits));
     SR_TRY(const Plan step, make_plan(m.step_graph().desc(), limits));
-    return AsdRenderer::Bytes{m.state.planned_bytes(limits),
-                              std::max(tables.arena_bytes(), begin.arena_bytes() + step.arena_bytes())};
+    SR_TRY(const Plan check, make_plan(m.check_graph().desc(), limits));
+    return AsdRenderer::Bytes{
+        m.state.planned_bytes(limits),
+        std::max(tables.arena_bytes(), begin.arena_bytes() + step.arena_bytes() + check.arena_bytes())};
 }
 
 Status VsdRenderer::make_tables(const VideoConditioning& conditioning)
 {
     const Memory& m = *memory_;
-    std::vector<StepRow> rows{first_noise_row(plan_.init_noise_sigma, kFirstDraw)};
-    std::ranges::transform(plan_.rows, std::back_inserter(rows), step_row);
-    SR_CHECK(m.steps.write(device_, rows));
-    SR_CHECK(m.clock.clear(device_));
-    SR_CHECK(m.timesteps.write(device_, std::vector<float>(plan_.timesteps.begin(), plan_.timesteps.end())));
-    std::vector<float> added, numbers;
-    for (size_t i = 0; i < plan_.timesteps.size(); ++i)
-        added.insert(added.end(), conditioning.added.begin(), conditioning.added.end());
+    StepRow first = first_noise_row(plan_.init_noise_sigma, kFirstDraw);
+    first.c_x = float(plan_.init_known_scale); // x is zero but where a frame is known
+    SR_CHECK(m.tables.write(device_, plan_, std::span(&first, 1), conditioning));
+    std::vector<float> numbers;
     std::vector<uint32_t> frame_rows;
-    for (uint32_t i = 0; i < m.halves * m.frames; ++i)
-        frame_rows.push_back(i % m.frames);
     for (uint32_t f = 0; f < m.frames; ++f)
         numbers.push_back(float(f));
-    SR_CHECK(m.added.write(device_, added));
+    for (uint32_t i = 0; i < m.halves * m.frames; ++i)
+        frame_rows.push_back(i % m.frames);
     SR_CHECK(m.numbers.write(device_, numbers));
     SR_CHECK(m.frame_row.write(device_, frame_rows));
-    SR_CHECK(m.context.write_rows(device_, conditioning.text.values));
-    SR_CHECK(m.known.clear(device_));
     SR_TRY(const auto tables, Program::create(device_, m.tables_graph()));
     return tables->run();
 }
@@ -206,61 +201,126 @@ Status VsdRenderer::make_programs()
         return {};
     SR_TRY(begin_, Program::create(device_, memory_->begin_graph()));
     SR_TRY(step_, Program::create(device_, memory_->step_graph()));
-    replay_.emplace(device_, ReplayMemory{memory_->clock, memory_->x, memory_->x0}, plan_.rows.size(),
+    SR_TRY(check_, Program::create(device_, memory_->check_graph()));
+    replay_.emplace(device_, ReplayMemory{memory_->tables.clock, memory_->x, memory_->x0}, plan_.rows.size(),
                     [this](size_t) -> Result<Program*> { return step_.get(); });
     return {};
 }
 
-Status VsdRenderer::upload(const VsdWindow& window)
+void VsdRenderer::rest()
+{
+    replay_.reset();
+    begin_.reset();
+    step_.reset();
+    check_.reset();
+}
+
+Status VsdRenderer::upload(const VsdWindow& w)
 {
     const Memory& m = *memory_;
-    SR_ASSERT(window.visible.size() == size_t(m.frames) * m.pixels &&
-                  window.buffers.size() == window.visible.size() * m.channels,
-              "a window of {} values for {} frames of {} pixels", window.buffers.size(), m.frames, m.pixels);
-    SR_CHECK(write_frames(device_, m.buffer, m.frames, window.buffers));
-    SR_CHECK(write_frames(device_, m.visible, m.frames, window.visible));
+    const size_t frame = size_t(m.pixels) * m.channels, known = w.known.size() / frame;
+    SR_ASSERT(w.visible.size() == size_t(m.frames) * m.pixels && w.buffers.size() == m.frames * frame &&
+                  w.known.size() == known * frame && known <= m.frames,
+              "a window of {} values, {} of them known, for {} frames of {} pixels", w.buffers.size(), w.known.size(),
+              m.frames, m.pixels);
+    SR_CHECK(write_frames(device_, m.buffer, m.frames, w.buffers));
+    SR_CHECK(write_frames(device_, m.visible, m.frames, w.visible));
+    SR_CHECK(m.fixed.clear(device_));
+    for (uint32_t f = 0; f < known; ++f)
+        SR_CHECK(frame_of(m.fixed, m.frames, f).write_rows(device_, w.known.subspan(f * frame, frame)));
+    std::vector<uint32_t> is_known(m.rows(), 0);
+    std::fill_n(is_known.begin(), known * m.image_rows, 1u);
+    SR_CHECK(m.known.write(device_, is_known));
+    if (m.weights.valid())
+        SR_CHECK(m.weights.write(device_, known_frame_weights(plan_, m.frames, uint32_t(known), options_.correlation)));
+    return upload_keys(w);
+}
+
+// where noise comes from
+Status VsdRenderer::upload_keys(const VsdWindow& w)
+{
+    const Memory& m = *memory_;
+    SR_ASSERT(w.keys.empty() || w.keys.size() == size_t(m.frames) * m.pixels, "{} keys for {} frames of {} pixels",
+              w.keys.size(), m.frames, m.pixels);
     std::vector<int32_t> cells(m.rows() * 4ull, 0);
     for (uint32_t r = 0; r < m.rows(); ++r) {
-        cells[4 * r] = int32_t(r % m.image_rows);
-        cells[4 * r + 1] = int32_t(window.number + r / m.image_rows);
-        cells[4 * r + 2] = int32_t(window.chain);
+        const uint32_t frame = r / m.image_rows, pixel = r % m.image_rows;
+        NoiseKey key{pixel, w.number + frame};
+        if (!w.keys.empty() && pixel < m.pixels)
+            key = w.keys[size_t(frame) * m.pixels + pixel];
+        cells[4 * r] = int32_t(key.pixel);
+        cells[4 * r + 1] = int32_t(key.frame);
+        cells[4 * r + 2] = int32_t(w.chain);
     }
     SR_CHECK(m.cells.write(device_, cells));
-    if (!m.noise.valid())
+    if (!options_.noise)
         return {};
     std::vector<float> noise(size_t(m.frames) * m.pixels * m.channels);
-    options_.noise(window.number, noise);
-    return write_frames(device_, m.noise, m.frames, noise);
+    options_.noise(w.number, noise);
+    return write_frames(device_, m.first, m.frames, noise);
 }
 
-Result<std::vector<float>> VsdRenderer::read() const
-{
-    const Memory& m = *memory_;
-    SR_TRY(std::vector<float> latents, read_frames(device_, m.x, m.frames, m.pixels));
-    SR_CHECK(check_finite(latents, "the denoised latent"));
-    return latents;
-}
-
-Result<std::vector<float>> VsdRenderer::render(const VsdWindow& window, const StepCallback& callback)
+Status VsdRenderer::begin(const VsdWindow& window)
 {
     SR_CHECK(make_programs());
     SR_CHECK(replay_->begin(kFirstRows));
     SR_CHECK(upload(window));
-    SR_CHECK(begin_->run());
+    return begin_->run();
+}
+
+Result<bool> VsdRenderer::step(size_t submits)
+{
+    SR_ASSERT(replay_, "a step of a renderer that has not begun a window");
+    return replay_->step(submits);
+}
+
+Status VsdRenderer::cancel()
+{
+    return replay_ ? replay_->cancel() : Status{};
+}
+
+Status VsdRenderer::check()
+{
+    const Memory& m = *memory_;
+    SR_CHECK(check_->run());
+    return check_frame_words(device_, m.bad, m.x, m.frames, {m.width, m.height, m.width, m.height},
+                             "the denoised latent");
+}
+
+Result<std::vector<float>> VsdRenderer::finish()
+{
+    SR_ASSERT(replay_ && replay_->active() && replay_->row() == steps(), "a window is finished before its last step");
+    replay_->end();
+    SR_CHECK(check());
+    return state();
+}
+
+Result<std::vector<float>> VsdRenderer::state() const
+{
+    return read_frames(device_, memory_->x, memory_->frames, memory_->pixels);
+}
+
+Result<std::vector<float>> VsdRenderer::render(const VsdWindow& window, const StepCallback& callback)
+{
+    SR_CHECK(begin(window));
     for (bool done = false; !done;) {
-        SR_TRY(done, replay_->step(1));
+        SR_TRY(done, step(1));
         if (callback && !callback(replay_->row(), steps())) {
-            SR_CHECK(replay_->cancel());
+            SR_CHECK(cancel());
             return fail(ErrorCode::interrupted, "interrupted");
         }
     }
-    replay_->end();
-    return read();
+    return finish();
+}
+
+uint32_t VsdRenderer::frames() const
+{
+    return memory_->frames;
 }
 
 uint64_t VsdRenderer::arena_bytes() const
 {
-    return step_ ? begin_->plan().arena_bytes() + step_->plan().arena_bytes() : 0;
+    return step_ ? begin_->plan().arena_bytes() + step_->plan().arena_bytes() + check_->plan().arena_bytes() : 0;
 }
 
 } // namespace semrover

@@ -70,13 +70,13 @@ Result<SamplingPlan> plan_sampling(const SchedulerConfig& config, int steps, con
 {
     SR_TRY(const Schedule schedule, make_schedule(config, steps));
     SR_TRY(const std::vector<int> levels, repaint_levels(steps, repaint));
-    if (!schedule.can_hold_known() && levels.size() > schedule.steps.size())
+    if (!schedule.can_jump() && levels.size() > schedule.steps.size())
         return fail(ErrorCode::bad_input, "sampler {} cannot jump back, choose another or jump_n_sample 1",
                     sampler_name(schedule.sampler));
     SamplingPlan plan;
     plan.init_noise_sigma = schedule.init_noise_sigma;
     plan.clip = schedule.clip;
-    plan.can_hold_known = schedule.can_hold_known();
+    plan.init_known_scale = schedule.init_known_scale;
     plan.known = repaint.known;
     std::map<double, uint32_t> index_of; // of a timestep
     PlanRowKind before = PlanRowKind::step;

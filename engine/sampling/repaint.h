@@ -58,8 +58,8 @@ struct SamplingPlan {
     std::vector<double> timesteps; // distinct ones, in the order they are first visited
     size_t evaluations = 0;        // rows of kind step: how often the network runs
     double init_noise_sigma = 1;   // the first x is this times a standard normal
+    double init_known_scale = 1;   // and, where it is known, this times what is known
     double clip = Schedule::kNoClip;
-    bool can_hold_known = true;              // false with euler
     KnownTokens known = KnownTokens::noised; // clean: after rows of kind undo, too, known tokens take `fixed`
 };
 

@@ -273,6 +273,7 @@ void fill_euler(const SchedulerConfig& config, const std::vector<double>& timest
         step.x0_x *= step.in_scale;
         step.c_x = sigmas[i + 1].sigma / sigma;
         step.c_x0 = 1 - step.c_x;
+        step.known_noise = sigmas[i + 1].sigma; // and known_scale 1
         schedule.steps.push_back(step);
     }
     schedule.restarts = schedule.steps;
@@ -325,6 +326,8 @@ Result<Schedule> make_schedule(const SchedulerConfig& config, int steps)
         fill_euler(config, timesteps, schedule);
     else
         fill_markov(config, timesteps, schedule);
+    if (config.sampler != Sampler::euler)
+        schedule.init_known_scale = std::sqrt(schedule.steps.front().abar);
     return schedule;
 }
 

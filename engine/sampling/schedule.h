@@ -20,8 +20,9 @@ struct StepCoefficients {
     double in_scale = 1;
     double x0_x = 0, x0_m = 0;
     double c_x0 = 0, c_x = 0, c_m = 0, c_prev = 0, c_z = 0;
-    double known_scale = 1, known_noise = 0; // level after the step: sqrt(abar), sqrt(1 - abar); 1 and 0 at the end
-    double abar = 1;                         // cumulative alpha of x before the step
+    // level after the step: sqrt(abar), sqrt(1 - abar), of euler 1 and sigma; 1 and 0 at the end
+    double known_scale = 1, known_noise = 0;
+    double abar = 1; // cumulative alpha of x before the step
 };
 
 struct Schedule {
@@ -31,10 +32,11 @@ struct Schedule {
     std::vector<StepCoefficients> steps;
     std::vector<StepCoefficients> restarts; // the same steps when there is no x0_prev to build on: c_prev is 0
     double init_noise_sigma = 1;            // the first x is this times a standard normal
+    double init_known_scale = 1;            // and, where it is known, this times what is known
     double clip = kNoClip;
 
-    // euler's x grows with sigma, so its known_scale and known_noise say nothing
-    bool can_hold_known() const { return sampler != Sampler::euler; }
+    // RePaint's jumps are those of an x whose variance does not grow; euler's does
+    bool can_jump() const { return sampler != Sampler::euler; }
 };
 
 constexpr int kMaxInferenceSteps = 10000;

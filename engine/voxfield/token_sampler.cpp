@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/voxfield/token_sampler.h"
 
+#include "engine/sampling/guidance.h"
 #include "engine/sampling/step_rows.h"
 #include "runtime/base/hash.h"
 
@@ -137,8 +138,7 @@ Result<std::unique_ptr<TokenSampler>> TokenSampler::create(Device& device, const
                                                            const SamplingPlan& plan, SamplerOptions options)
 {
     const Guidance& guidance = options.guidance;
-    if (!(guidance.scale >= 0 && guidance.scale <= 1000))
-        return fail(ErrorCode::usage, "guidance scale {} is not in 0..1000", guidance.scale);
+    SR_CHECK(check_guidance(guidance.scale));
     if (!(guidance.from >= 0))
         return fail(ErrorCode::usage, "guidance from timestep {}, which is below 0", guidance.from);
     std::unique_ptr<TokenSampler> s(new TokenSampler(device, transformer, plan, std::move(options)));

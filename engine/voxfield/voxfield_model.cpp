@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/voxfield/voxfield_model.h"
 
+#include "engine/sampling/guidance.h"
 #include "runtime/base/json_fields.h"
 
 namespace semrover {
@@ -15,7 +16,7 @@ Status read_defaults(const Json& index, VoxfieldDefaults& d)
     const Json defaults = index.value("defaults", Json::object());
     JsonFields fields(defaults, "model_index.json: defaults");
     fields.integer("num_inference_steps", 1, kMaxInferenceSteps, d.num_inference_steps);
-    fields.number("guidance_scale", 0.f, 1000.f, d.guidance_scale);
+    fields.number("guidance_scale", 0.f, kMaxGuidance, d.guidance_scale);
     fields.integer("guidance_from", 0, 10000, d.guidance_from);
     fields.integer("region_size", 1, 4096, d.regions.region_size);
     fields.integer("coverage_threshold", 1, 4096, d.regions.coverage_threshold);

@@ -56,15 +56,20 @@ void add_rate(Json& report, double flops, const Timing& timing)
     report["gflops_best"] = flops / timing.ms_min / 1e6;
 }
 
-void add_network(Json& report, const Program& program, const Timing& timing, uint64_t parameters, uint64_t weight_bytes)
+double flops_of(const Program& program)
 {
     double flops = 0;
     for (const Pass& pass : program.plan().passes)
         flops += pass.options.flops;
+    return flops;
+}
+
+void add_network(Json& report, const Program& program, const Timing& timing, uint64_t parameters, uint64_t weight_bytes)
+{
     report["parameters"] = parameters;
     report["weight_bytes"] = weight_bytes;
     report["arena_bytes"] = program.plan().arena_bytes();
-    add_rate(report, flops, timing);
+    add_rate(report, flops_of(program), timing);
     add_program(report, program);
 }
 
@@ -128,6 +133,7 @@ void add_bench(CLI::App& app, const Globals& globals, Run& run)
     add_bench_unet(*bench, globals, run);
     add_bench_vae(*bench, globals, run);
     add_bench_asd(*bench, globals, run);
+    add_bench_vsd(*bench, globals, run);
     add_bench_regions(*bench, globals, run);
     add_bench_sort(*bench, globals, run);
     add_bench_splat(*bench, globals, run);

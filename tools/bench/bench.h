@@ -30,6 +30,8 @@ void add_rate(Json& report, double flops, const Timing& timing); // gflop, gflop
 // gflops, weight_bytes
 void add_network(Json& report, const Program& program, const Timing& timing, uint64_t parameters,
                  uint64_t weight_bytes);
+// multiplications and additions of a program, as its plan counts them
+double flops_of(const Program& program);
 // device times where --profile asked for them: a Chrome trace, and their sums to stderr
 void want_profile(Device& device, const std::string& path);
 Status write_profile(Device& device, const std::string& path);
@@ -50,12 +52,19 @@ class BenchInputs {
     std::vector<Slot> slots_;
 };
 
+// y [m, n] = x [m, k] w [n, k]^T
+struct GemmShape {
+    uint32_t m = 384, n = 4096, k = 1024;
+};
+Result<std::unique_ptr<Program>> gemm_program(Device& device, BenchInputs& inputs, const GemmShape& shape, DType dtype);
+
 void add_bench_gemm(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_conv(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_transformer(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_unet(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_vae(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_asd(CLI::App& bench, const Globals& globals, Run& run);
+void add_bench_vsd(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_regions(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_sort(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_splat(CLI::App& bench, const Globals& globals, Run& run);

@@ -12,7 +12,7 @@ namespace semrover {
 namespace {
 
 struct BenchGemmArguments {
-    uint32_t m = 384, n = 4096, k = 1024;
+    GemmShape shape;
     std::string precision = "fp16";
 };
 
@@ -21,19 +21,14 @@ Status bench_gemm(const BenchGemmArguments& o, const Globals& globals)
     SR_TRY(const auto device, open_device(globals));
     const DType dtype = o.precision == "fp32" ? DType::f32 : DType::f16;
     BenchInputs inputs(*device);
-    const Slot x = inputs.add(o.m, o.k, dtype), w = inputs.add(o.n, o.k, dtype), y = inputs.add(o.m, o.n, dtype);
-    const uint64_t predicted = inputs.bytes();
-    SR_CHECK(inputs.allocate());
-    Graph g;
-    g.keep(gemm(g, x.in(g), w.in(g), {}, {.dtype = dtype}), y.in(g));
-    SR_TRY(const auto program, Program::create(*device, g));
+    SR_TRY(const auto program, gemm_program(*device, inputs, o.shape, dtype));
     SR_TRY(const Timing timing, measure([&] { return program->run(); }));
-    Json report = bench_report("gemm", *device, dtype, timing, predicted + program->plan().arena_bytes());
-    report["m"] = o.m;
-    report["n"] = o.n;
-    report["k"] = o.k;
+    Json report = bench_report("gemm", *device, dtype, timing, inputs.bytes() + program->plan().arena_bytes());
+    report["m"] = o.shape.m;
+    report["n"] = o.shape.n;
+    report["k"] = o.shape.k;
     report["variant"] = program->plan().passes[0].variant->name;
-    add_rate(report, 2.0 * o.m * o.n * o.k, timing);
+    add_rate(report, flops_of(*program), timing);
     add_program(report, *program);
     print_report(report, globals);
     return {};
@@ -41,14 +36,23 @@ Status bench_gemm(const BenchGemmArguments& o, const Globals& globals)
 
 } // namespace
 
+Result<std::unique_ptr<Program>> gemm_program(Device& device, BenchInputs& inputs, const GemmShape& s, DType dtype)
+{
+    const Slot x = inputs.add(s.m, s.k, dtype), w = inputs.add(s.n, s.k, dtype), y = inputs.add(s.m, s.n, dtype);
+    SR_CHECK(inputs.allocate());
+    Graph g;
+    g.keep(gemm(g, x.in(g), w.in(g), {}, {.dtype = dtype}), y.in(g));
+    return Program::create(device, g);
+}
+
 void add_bench_gemm(CLI::App& bench, const Globals& globals, Run& run)
 {
     auto o = std::make_shared<BenchGemmArguments>();
     CLI::App* c = bench.add_subcommand("gemm", "dense layer: y [m, n] = x [m, k] w [n, k]^T");
     const auto size = CLI::Range(1u, 65536u);
-    c->add_option("--m", o->m, "rows of x")->check(size);
-    c->add_option("--n", o->n, "rows of w")->check(size);
-    c->add_option("--k", o->k, "columns of both")->check(size);
+    c->add_option("--m", o->shape.m, "rows of x")->check(size);
+    c->add_option("--n", o->shape.n, "rows of w")->check(size);
+    c->add_option("--k", o->shape.k, "columns of both")->check(size);
     c->add_option("--precision", o->precision, "storage")->check(CLI::IsMember({"fp16", "fp32"}));
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_gemm(*o, globals); }; });
 }

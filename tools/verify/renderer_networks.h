@@ -13,12 +13,7 @@ struct RendererNetworks {
     std::unique_ptr<Vae> vae;
 };
 
-// how the configs are read says whether they are of images or of videos
-using UnetParser = Result<UnetConfig> (*)(const nlohmann::json&);
-using VaeParser = Result<VaeConfig> (*)(const nlohmann::json&);
-
-// MODEL/unet and MODEL/vae
-Result<RendererNetworks> load_networks(Device& device, const Path& model, DType precision, UnetParser parse_unet,
-                                       VaeParser parse_vae);
+// MODEL/unet and MODEL/vae, of images or of videos
+Result<RendererNetworks> load_networks(Device& device, const Path& model, DType precision);
 
 } // namespace semrover

@@ -12,7 +12,7 @@ namespace semrover {
 
 Result<GoldenOutputs> run_asd_rollout(Device& device, const GoldenCase& c, DType precision)
 {
-    SR_TRY(const RendererNetworks n, load_networks(device, c.model(), precision, parse_unet_config, parse_vae_config));
+    SR_TRY(const RendererNetworks n, load_networks(device, c.model(), precision));
     std::vector<std::string> warnings;
     SR_TRY(const SchedulerConfig scheduler,
            scheduler_config_from_json(c.params().value("scheduler", nlohmann::json()), warnings));

@@ -67,8 +67,7 @@ Status encode_window(Device& device, const Vae& vae, const WindowInputs& in, std
 
 Result<GoldenOutputs> run_vsd_window(Device& device, const GoldenCase& c, DType precision)
 {
-    SR_TRY(const RendererNetworks n,
-           load_networks(device, c.model(), precision, parse_video_unet_config, parse_video_vae_config));
+    SR_TRY(const RendererNetworks n, load_networks(device, c.model(), precision));
     std::vector<std::string> warnings;
     SR_TRY(const SchedulerConfig scheduler,
            scheduler_config_from_json(c.params().value("scheduler", nlohmann::json()), warnings));

@@ -10,12 +10,14 @@ from . import model_folder, safetensors_file
 from .denoising import block_shares
 from .frames import fill_blocks, to_floats
 from .nets.vae import AutoencoderKL
+from .nets.video_vae import AutoencoderKLTemporalDecoder
 
 
 def load_vae(folder):
-    """-> AutoencoderKL with the weights of a vae folder, evaluating"""
+    """-> AutoencoderKL, or that of videos, as the config says, with the weights of a vae folder, evaluating"""
     config, state = model_folder.read_component(folder)
-    vae = AutoencoderKL(config)
+    of_videos = config.get("_class_name") == "AutoencoderKLTemporalDecoder"
+    vae = AutoencoderKLTemporalDecoder(config) if of_videos else AutoencoderKL(config)
     vae.load_state_dict({name: t.float() for name, t in state.items()})
     return vae.eval().requires_grad_(False)
 

@@ -1,0 +1,178 @@
+# SPDX-FileCopyrightText: semrover authors
+# SPDX-License-Identifier: Apache-2.0
+"""The renderer VSD: a UNet of Stable Video Diffusion that draws windows of frames over their splat buffers
+(docs/method.md §6.3).
+
+Its input is the noisy latents, the buffers' latents, which are not scaled, and the visibility; it predicts the velocity
+over noise of any strength. The paper fine-tunes Stable Video Diffusion with windows of 12 frames and drops the
+visibility in 30 %, for guidance: --config paper --init FOLDER.
+"""
+import os
+import shutil
+
+import torch
+from torch import nn
+
+from . import model_folder, safetensors_file, settings
+from .frames import find_drives, to_pixels, write_beside
+from .latents import load_vae, sequences
+from .nets.video_unet import UNetSpatioTemporalConditionModel
+from .trainer import Trainer, generator, number_below
+from .video_denoising import (SCHEDULER, denoise_window, timestep_of, velocity_target, video_input, window_denoiser)
+
+INDEX = {"renderer": ["diffusers", "UNetSpatioTemporalConditionModel"], "scheduler": ["diffusers", SCHEDULER["_class_name"]]}
+
+
+class Renderer(nn.Module):
+    """the UNet, and the text that stands for every frame [1, text_tokens, cross_attention_dim]"""
+
+    def __init__(self, config):
+        super().__init__()
+        self.unet = UNetSpatioTemporalConditionModel(config)
+        width = self.unet.config["cross_attention_dim"]
+        self.text = nn.Parameter(torch.zeros(1, config["text_tokens"], width), requires_grad=config["train_text"])
+        self.added = config["defaults"]["added_time_ids"]
+
+    def numbers(self):
+        return torch.tensor([self.added], dtype=torch.float32, device=self.text.device)
+
+    def forward(self, x, buffer, visible, sigma):
+        """[B, F, 4, h, w] twice, [B, F, 1, h, w], [B] -> [B, F, 4, h, w]"""
+        seen = torch.stack([video_input(*frames) for frames in zip(x, buffer, visible, sigma)])
+        return self.unet(seen, timestep_of(sigma), self.text, self.numbers())
+
+
+def unscaled(latents, vae_config):
+    """latents as a denoiser of images sees them -> as the VAE gives them, which is what the network sees of a buffer"""
+    return latents / vae_config["scaling_factor"] + (vae_config.get("shift_factor") or 0)
+
+
+class Batches:
+    """what a step trains on: crops of windows of consecutive frames"""
+
+    def __init__(self, all_sequences, config, vae_config):
+        self.config, self.vae_config, self.frames = config, vae_config, config["num_frames"]
+        self.starts = [(s, i) for s in all_sequences for i in range(len(s) - self.frames + 1)
+                       if not any(s.first[i + 1:i + self.frames])]
+        if not self.starts:
+            raise SystemExit(f"no drive has {self.frames} frames in a row; --set num_frames=N takes shorter windows")
+        h, w = self.starts[0][0].truth.shape[2:]
+        self.crop = (min(config["crop"][0], h), min(config["crop"][1], w))
+
+    def make(self, step):
+        """-> truth, buffer [B, F, 4, h, w], visible [B, F, 1, h, w]"""
+        draw, rows = generator(self.config, step), []
+        for _ in range(self.config["batch"]):
+            sequence, i = self.starts[number_below(len(self.starts), draw)]
+            rows.append(self._window(sequence, i, draw))
+        return [torch.stack(parts).to(self.config["device"]) for parts in zip(*rows)]
+
+    def _window(self, s, i, draw):
+        top = number_below(s.truth.shape[2] - self.crop[0] + 1, draw)
+        left = number_below(s.truth.shape[3] - self.crop[1] + 1, draw)
+        place = (slice(i, i + self.frames), slice(None), slice(top, top + self.crop[0]),
+                 slice(left, left + self.crop[1]))
+        visible = s.visible[place]
+        if float(torch.rand(1, generator=draw)) < self.config["dropout"]:
+            visible = torch.zeros_like(visible)
+        return s.truth[place], unscaled(s.buffer[place], self.vae_config), visible
+
+
+def step_loss(model, batch, config, draw):
+    """log sigma is normal; -> loss, {eps: the plain error of the velocity at sigma below 1}"""
+    truth, buffer, visible = batch
+    sigma = torch.exp(config["sigma_mean"] + config["sigma_deviation"] * torch.randn(len(truth), generator=draw))
+    sigma = sigma.clamp(SCHEDULER["sigma_min"], SCHEDULER["sigma_max"]).to(truth.device)
+    noise = torch.randn(truth.shape, generator=draw).to(truth.device)
+    level = sigma.view(-1, 1, 1, 1, 1)
+    made = model(truth + level * noise, buffer, visible, sigma).float()
+    error = (made - velocity_target(truth, noise, level)).square().mean((1, 2, 3, 4))
+    low = error[sigma < 1]
+    return error.mean(), {"low": float(low.mean() if len(low) else error.mean())}
+
+
+class Export:
+    """writes OUT as a model folder that `semrover refine -m` loads, and one held-out window as it draws it"""
+
+    def __init__(self, folder, config, vae_folder, held):
+        self.folder, self.config, self.vae_folder, self.held = folder, config, vae_folder, held
+
+    @torch.no_grad()
+    def __call__(self, state):
+        unet = {name[5:]: t for name, t in state.items() if name.startswith("unet.")}
+        model = Renderer(self.config).eval()
+        model.load_state_dict(state)
+        vae_class = model_folder.read_component(self.vae_folder)[0].get("_class_name", "AutoencoderKL")
+        model_folder.write_component(os.path.join(self.folder, "renderer"), model.unet.config_json(), unet)
+        os.makedirs(os.path.join(self.folder, "conditioning"), exist_ok=True)
+        safetensors_file.write(os.path.join(self.folder, "conditioning", "conditioning.safetensors"),
+                               {"encoder_hidden_states": state["text"].half()})
+        model_folder.write_scheduler(os.path.join(self.folder, "scheduler"), SCHEDULER)
+        shutil.copytree(self.vae_folder, os.path.join(self.folder, "vae"), dirs_exist_ok=True)
+        model_folder.add_to_index(self.folder, {**INDEX, "vae": ["diffusers", vae_class]},
+                                  {"renderer": self.config["defaults"]})
+        if self.held:
+            self._draw(model)
+
+    def _draw(self, model):
+        """buffer | drawn | truth, of the first and the last frame of a window"""
+        s, drive = self.held
+        count, vae, d = min(self.config["num_frames"], len(s)), load_vae(self.vae_folder), self.config["defaults"]
+        noise = torch.randn(s.truth[:count].shape, generator=torch.Generator().manual_seed(1))
+        clean = window_denoiser(model.unet, model.text, model.numbers(), unscaled(s.buffer[:count], vae.config),
+                                s.visible[:count], d["first_guidance_scale"], d["guidance_scale"])
+        pictures = to_pixels(vae.decode_scaled(denoise_window(clean, noise, d["num_inference_steps"])))
+        for i in (0, count - 1):
+            number = drive.numbers[i]
+            truth = drive.truth(number)
+            made = pictures[i, :, :truth.shape[1], :truth.shape[2]]
+            write_beside(os.path.join(self.folder, f"held_out_{i}.png"), [drive.buffer(number), made, truth])
+
+
+def read_init(folder, config):
+    """weights of a renderer of videos, or of a plain Stable Video Diffusion folder, whose UNet keeps the image's
+    channels for the buffer and gets one more with zeros (as `semrover convert --vsd-init` does) -> state of a Renderer;
+    the UNet's shape goes to config"""
+    part = "renderer" if os.path.isdir(os.path.join(folder, "renderer")) else "unet"
+    of_init, state = model_folder.read_component(os.path.join(folder, part))
+    frames = config["num_frames"]
+    config.update({k: v for k, v in UNetSpatioTemporalConditionModel(of_init).config.items() if k in of_init})
+    conv = state["conv_in.weight"].float()
+    config["in_channels"], config["num_frames"] = 2 * config["out_channels"] + 1, frames
+    more = conv.new_zeros(conv.shape[0], config["in_channels"] - conv.shape[1], *conv.shape[2:])
+    out = {f"unet.{name}": t for name, t in state.items()}
+    out["unet.conv_in.weight"] = torch.cat([conv, more], 1)
+    path = os.path.join(folder, "conditioning", "conditioning.safetensors")
+    if os.path.exists(path):
+        out["text"] = safetensors_file.read(path)["encoder_hidden_states"].float()
+        config["text_tokens"] = out["text"].shape[1]
+    else:
+        out["text"] = torch.zeros(1, config["text_tokens"], config["cross_attention_dim"])
+    return out
+
+
+def main(arguments=None):
+    p = settings.parser("vsd", __doc__.splitlines()[0])
+    p.add_argument("--frames", required=True, help="folder of drives (see semtrain/frames.py)")
+    p.add_argument("--vae", required=True, help="folder of the VAE, of images or of videos; it stays as it is")
+    p.add_argument("--held-out", help="folder of drives; the first is drawn at each checkpoint")
+    p.add_argument("--init", help="model folder to start from: a renderer of videos, or Stable Video Diffusion")
+    p.add_argument("--cache", help="folder for the frames' latents; default: OUT/latents")
+    options = p.parse_args(arguments)
+    config = settings.resolve("vsd", options)
+    state = read_init(options.init, config) if options.init else None
+    cache = options.cache or os.path.join(options.output, "latents")
+    torch.manual_seed(config["seed"])
+    batches = Batches(sequences(options.vae, find_drives(options.frames), cache, config["mirror"]), config,
+                      load_vae(options.vae).config)
+    held = find_drives(options.held_out)[:1] if options.held_out else []
+    held = (sequences(options.vae, held, cache, False)[0], held[0]) if held else None
+    print(f"{len(batches.starts)} windows of {batches.frames} frames, mirror images counted", flush=True)
+    trainer = Trainer(options.output, Renderer(config), config, Export(options.output, config, options.vae, held))
+    if state:
+        trainer.start_from(state)
+    trainer.run(lambda m, step: step_loss(m, batches.make(step), config, generator(config, step, 1)))
+
+
+if __name__ == "__main__":
+    main()
