@@ -8,8 +8,15 @@
  * be zero, or the call fails with SR_ERR_USAGE, so that nothing asked for is silently ignored. `next` is reserved:
  * NULL.
  *
- * Threads: different contexts may be used at the same time; one context by one thread at a time. Strings that the
- * library returns are static. Everything that a call is given is copied before it returns.
+ * Threads: different contexts may be used at the same time; one context, with the worlds on it, by one thread at a
+ * time; a grid likewise. Callbacks run on the thread that calls, before the call returns, and must not call the library
+ * but where it is said. Strings that the library returns are static. Everything that a call is given is copied before
+ * it returns, but for what belongs to Vulkan.
+ *
+ * Which calls block: sr_context_create (drivers), sr_world_create (loads a model and compiles shaders: seconds, the
+ * first time), sr_world_step (for its budget), sr_world_flush (for the disk), sr_world_draw (for the device).
+ *
+ * docs/embedding.md has a complete example.
  */
 #ifndef SEMROVER_H
 #define SEMROVER_H
@@ -44,15 +51,16 @@ uint32_t sr_abi_version(void);                /* of the library; compare with SR
 const char* sr_version(void);                 /* "0.1.0" */
 const char* sr_status_name(sr_status status); /* "SR_ERR_USAGE"; "unknown" for others */
 
-/* One line about the last call that failed: with this context, or, for NULL, in this thread without a context. Writes
+/* One line about the last call that failed: with this context or a world on it, or, for NULL, in this thread without a
+ * context, as calls with grids are. Writes
  * at most `size` bytes with the terminating zero and returns the length that the whole line has. buffer may be NULL
  * with 0. */
 size_t sr_last_error(const sr_context* context, char* buffer, size_t size);
 
-/* Lines that no call returns: of the validation that sr_context_desc asks for, and of a failed assertion before the
- * process ends. The library itself prints nothing. The callback counts for the whole process, runs on the thread that
- * has something to say, one line at a time, and must not call the library. NULL, as at the beginning: lines are
- * dropped. */
+/* Lines that no call returns: of the validation that sr_context_desc asks for. (A failed assertion, a bug of ours,
+ * makes its call return SR_ERR_INTERNAL with its text; its context should not be used further.) The library itself
+ * prints nothing. The callback counts for the whole process, runs on the thread that has something to say, one line at
+ * a time, and must not call the library. NULL, as at the beginning: lines are dropped. */
 void sr_set_diagnostic_callback(void (*callback)(void* user, const char* line), void* user);
 
 typedef struct sr_device_info {
@@ -114,6 +122,190 @@ typedef struct sr_memory_info {
 } sr_memory_info;
 
 sr_status sr_context_memory(sr_context* context, sr_memory_info* memory);
+
+/* ---- Grids: labelled cells of one size, each with coloured points or none. Host memory only. ---- */
+
+typedef struct sr_grid sr_grid;
+
+#define SR_NO_CELL 0xffffffffu
+
+/* Cell (i, j, k) spans [i, i+1) x [j, j+1) x [k, k+1) voxel sizes, x forward, y left, z up. Coordinates: -2^20..2^20.
+ * label: 0 road, 1 sidewalk, 2 building, ... 19 road-lane (docs/method.md, section 1.1); SR_NO_CELL: there is none. */
+typedef struct sr_cell {
+    int32_t i, j, k;
+    uint32_t label;
+} sr_cell;
+
+typedef struct sr_grid_info {
+    uint32_t struct_size;
+    uint32_t points_per_cell; /* 0: cells have labels only */
+    uint64_t cells;
+    double voxel_size; /* metres */
+} sr_grid_info;
+
+/* On failure *grid is NULL. read: a .sgrid file, or a folder of tiles (docs/formats.md, section 2).
+ * SR_ERR_USAGE: a NULL; SR_ERR_BAD_INPUT: a voxel size outside 1 mm..1 km, a file or its content. */
+sr_status sr_grid_create(double voxel_size, sr_grid** grid);
+sr_status sr_grid_read(const char* path, sr_grid** grid);
+void sr_grid_destroy(sr_grid* grid); /* NULL is fine */
+
+/* Writes a .sgrid, whole or not at all; a file that is there is replaced. SR_ERR_BAD_INPUT: a grid without cells, the
+ * disk. */
+sr_status sr_grid_write(const sr_grid* grid, const char* path);
+
+sr_status sr_grid_get_info(const sr_grid* grid, sr_grid_info* info);
+
+/* Adds cells, changes labels, or takes cells away (SR_NO_CELL); of equal cells the last counts. Cells whose label
+ * changes lose their points. SR_ERR_BAD_INPUT: coordinates, labels; nothing is changed then. */
+sr_status sr_grid_set_cells(sr_grid* grid, const sr_cell* cells, uint64_t count);
+
+/* The cells from number `first` on, sorted by i, j, k. cells: room for `count`; *written: how many there were. */
+sr_status sr_grid_get_cells(const sr_grid* grid, uint64_t first, uint64_t count, sr_cell* cells, uint64_t* written);
+
+/* The points of the same cells, points_per_cell each: x, y, z in metres in the world's frame, then r, g, b (sRGB,
+ * 0..1). points: room for count * points_per_cell * 6 floats. Cells without points have zeros. SR_ERR_BAD_INPUT: a grid
+ * without points. */
+sr_status sr_grid_get_points(const sr_grid* grid, uint64_t first, uint64_t count, float* points, uint64_t* written);
+
+/* ---- Worlds: a street of any extent, generated around a camera as it moves. ---- */
+
+typedef struct sr_world sr_world;
+
+/* cells low <= (i, j) <= high, all k */
+typedef struct sr_window {
+    int32_t low[2], high[2];
+} sr_window;
+
+/* Labels come from one of grid, folder and labels. The callback adds the cells of a window to a grid, with
+ * sr_grid_set_cells and nothing else of the library; it is asked again for a window that was dropped, and answers
+ * alike. What it returns beside SR_OK ends the call that needed the labels, with that status.
+ *
+ * Order-free: the bytes of a place depend on model, seed, the labels near it and edits, not on the way of the camera.
+ * One device and driver are meant: others round in other ways. */
+typedef struct sr_world_desc {
+    uint32_t struct_size;
+    uint32_t steps; /* of denoising; 0: as the model says */
+    const void* next;
+    const char* model;   /* a folder */
+    const sr_grid* grid; /* its labels are copied */
+    const char* folder;  /* of tiles */
+    sr_status (*labels)(void* user, const sr_window* window, sr_grid* grid);
+    void (*message)(void* user, const char* line); /* warnings, during sr_world_create; NULL: none */
+    void* user;                                    /* for the callbacks */
+    const char* cache;   /* a folder for finished tiles, made where it is missing, also for later sessions; NULL: none.
+                            One world at a time */
+    const char* objects; /* boxes and colours that the model is told of, a .json file (docs/formats.md, section 2.8);
+                            NULL: guessed of the labels, where the model can be told */
+    uint64_t seed;
+    uint64_t host_bytes;    /* for tiles in memory; 0: no budget */
+    uint64_t splat_bytes;   /* for splats on the device, 56 bytes each, 20 a cell; allocated here. 0: no splats */
+    double tile_size;       /* metres; 0: 9.6. Another size gives another world */
+    double splat_radius;    /* metres; 0: from the distance of the points */
+    uint32_t tiles_at_once; /* generated together; 0: as suits the device. Does not change the bytes */
+    uint32_t reserved;
+} sr_world_desc;
+
+/* Loads the model and compiles shaders, so that no step does. context: outlives the world, and is not destroyed before
+ * it. On failure *world is NULL. SR_ERR_USAGE, SR_ERR_BAD_INPUT (files, a grid that does not go with the model),
+ * SR_ERR_OUT_OF_MEMORY. */
+sr_status sr_world_create(sr_context* context, const sr_world_desc* desc, sr_world** world);
+void sr_world_destroy(sr_world* world); /* gives up what is at work, waits for the device and the cache; NULL is fine */
+
+/* What is wanted from now on: all tiles within `radius` metres of the position, seen from above; nearest first, and
+ * what lies in `direction` before what lies behind. Cheap: may be called every frame. SR_ERR_USAGE: numbers that are
+ * not finite, a radius that is not 0..2000 m. */
+sr_status sr_world_focus(sr_world* world, const double position[3], const double direction[3], double radius);
+
+/* Works for about budget_us microseconds and returns; 0: one piece of work. It stops when the next piece is expected
+ * not to fit, going by those of its kind before, but does one at least. A piece is a denoising step of a few regions at
+ * most, or a tile read, written or turned into splats. The device is idle when it returns. *done (may be NULL): 1 when
+ * all that is wanted and fits the budgets is finished. After an error the next step tries again. */
+sr_status sr_world_step(sr_world* world, uint64_t budget_us, uint32_t* done);
+
+/* Changes labels as sr_grid_set_cells does. The tiles of these cells, and those beside them that saw their points, are
+ * generated anew by the next steps; their points and splats are gone at once. */
+sr_status sr_world_edit(sr_world* world, const sr_cell* cells, uint64_t count);
+
+typedef struct sr_world_info {
+    uint32_t struct_size;
+    uint32_t full;       /* 1: host_bytes or splat_bytes has no room for more of what is wanted */
+    uint64_t wanted;     /* tiles of the focus */
+    uint64_t finished;   /* of these */
+    uint64_t in_memory;  /* tiles */
+    uint64_t host_bytes; /* of these */
+    uint64_t generated;  /* tiles so far, and so on */
+    uint64_t loaded;     /* from the cache */
+    uint64_t dropped;    /* from memory: they come back when they are wanted */
+    uint64_t splats;     /* on the device */
+    double voxel_size;   /* metres */
+    uint32_t tile_cells; /* edge of a tile */
+    uint32_t points_per_cell;
+} sr_world_info;
+
+sr_status sr_world_get_info(sr_world* world, sr_world_info* info);
+
+/* A copy of the finished cells of a window that are in memory, with their points; maybe none. The caller destroys it.
+ */
+sr_status sr_world_copy_cells(sr_world* world, const sr_window* window, sr_grid** grid);
+
+/* waits until the cache has all that is finished */
+sr_status sr_world_flush(sr_world* world);
+
+/* ---- Splats: 2D Gaussians on the device. ---- */
+
+typedef struct sr_array {
+    void* buffer; /* VkBuffer, with usage STORAGE_BUFFER and TRANSFER_SRC */
+    uint64_t offset;
+    uint64_t bytes;
+} sr_array;
+
+/* Splat n has element n of each array. Axes: t_u = normalize(e x normal) with e the axis least aligned with the normal,
+ * t_v = normal x t_u. Splats with opacity 0 are places that no tile has. Buffers stay the same for the life of a world.
+ * They belong to the queue family of the context. A step or an edit writes them: the host's reads must have finished
+ * before those calls, and see all that was written once they have returned. */
+typedef struct sr_splats {
+    uint32_t struct_size;
+    uint32_t count;     /* elements to look at */
+    uint64_t version;   /* moves when splats come or go */
+    sr_array positions; /* 4 floats: x, y, z in metres, opacity */
+    sr_array normals;   /* 4 floats: unit normal, sigma along t_u in metres */
+    sr_array colors;    /* 4 floats: r, g, b (sRGB, 0..1), sigma along t_v in metres */
+    sr_array labels;    /* uint32 */
+} sr_splats;
+
+/* SR_ERR_USAGE: a world without splat_bytes */
+sr_status sr_world_get_splats(sr_world* world, sr_splats* splats);
+
+/* Where a picture goes: host memory, a buffer of the host's, or an image of its own, which has the picture's size, one
+ * level and one layer, TRANSFER_DST usage, and belongs to the context's queue family. All of them may be NULL. */
+typedef struct sr_target {
+    void* memory;
+    void* buffer; /* VkBuffer with TRANSFER_DST usage */
+    uint64_t buffer_offset;
+    void* image;            /* VkImage of the format that sr_draw_desc says */
+    uint32_t layout_before; /* VkImageLayout: as it is; VK_IMAGE_LAYOUT_UNDEFINED is fine, all is written */
+    uint32_t layout_after;  /* VkImageLayout: as it will be */
+} sr_target;
+
+/* A pinhole camera in OpenCV's convention: x right, y down, z forward; the centre of pixel (x, y) lies at
+ * (x + 0.5, y + 0.5). Pixels are stored row by row from the top. */
+typedef struct sr_draw_desc {
+    uint32_t struct_size;
+    uint32_t width; /* pixels */
+    const void* next;
+    uint32_t height;
+    uint32_t reserved;
+    double fx, fy, cx, cy;      /* pixels */
+    double world_to_camera[12]; /* [3, 4] row by row: a rotation and metres */
+    sr_target color;            /* R32G32B32A32_SFLOAT: r, g, b times alpha (sRGB), alpha */
+    sr_target normal; /* R32G32B32A32_SFLOAT: sum of w normal in the camera's frame, towards it; sum of w depth */
+    sr_target depth;  /* R32G32_SFLOAT: metres along z, mean and median of the splats; 0 where nothing is */
+    sr_target label;  /* R32G32_UINT: label of the splat with most weight, SR_NO_CELL for none; a number to ignore */
+} sr_draw_desc;
+
+/* Draws the splats that are there, and waits for it. The first draw of a size compiles it. SR_ERR_USAGE: a world
+ * without splat_bytes, sizes that are not 1..16384; SR_ERR_BAD_INPUT: a camera that is not finite. */
+sr_status sr_world_draw(sr_world* world, const sr_draw_desc* draw);
 
 #ifdef __cplusplus
 }

@@ -2,31 +2,7 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * A host in C: what it may get wrong, a context of its own, and a context on a device that it made itself. */
-#include "engine/semrover.h"
-
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <vulkan/vulkan.h>
-
-#define CHECK(condition)                                                                                               \
-    do {                                                                                                               \
-        if (!(condition)) {                                                                                            \
-            fprintf(stderr, "%s:%d: %s\n", __FILE__, __LINE__, #condition);                                            \
-            exit(1);                                                                                                   \
-        }                                                                                                              \
-    } while (0)
-
-/* the last error has this text in it */
-static int says(const sr_context* context, const char* text)
-{
-    char message[512];
-    const size_t length = sr_last_error(context, message, sizeof message);
-    if (length < sizeof message && strstr(message, text) && !strchr(message, '\n'))
-        return 1;
-    fprintf(stderr, "expected \"%s\", found \"%s\"\n", text, message);
-    return 0;
-}
+#include "tests/capi_vulkan.h"
 
 static void knows_its_version(void)
 {
@@ -123,11 +99,6 @@ static void makes_a_context_of_its_own(void)
     sr_context_destroy(context);
 }
 
-static void print_line(void* user, const char* line)
-{
-    fprintf((FILE*)user, "%s\n", line);
-}
-
 static int locks, unlocks;
 static void lock_queue(void* user)
 {
@@ -138,61 +109,18 @@ static void unlock_queue(void* user)
     unlocks += user == &locks;
 }
 
-static VkInstance make_instance(void)
-{
-    VkApplicationInfo app = {0};
-    VkInstanceCreateInfo info = {0};
-    VkInstance instance;
-    app.sType = VK_STRUCTURE_TYPE_APPLICATION_INFO;
-    app.apiVersion = VK_API_VERSION_1_2;
-    info.sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO;
-    info.pApplicationInfo = &app;
-    CHECK(vkCreateInstance(&info, NULL, &instance) == VK_SUCCESS);
-    return instance;
-}
-
-static VkDevice make_device(VkPhysicalDevice physical)
-{
-    const float priority = 1;
-    VkPhysicalDeviceVulkan12Features features = {0};
-    VkDeviceQueueCreateInfo queue = {0};
-    VkPhysicalDeviceFeatures robust = {0};
-    VkDeviceCreateInfo info = {0};
-    VkDevice device;
-    robust.robustBufferAccess = VK_TRUE;
-    features.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES;
-    features.timelineSemaphore = VK_TRUE;
-    queue.sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO;
-    queue.queueCount = 1;
-    queue.pQueuePriorities = &priority;
-    info.sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO;
-    info.pNext = &features;
-    info.queueCreateInfoCount = 1;
-    info.pQueueCreateInfos = &queue;
-    info.pEnabledFeatures = &robust;
-    CHECK(vkCreateDevice(physical, &info, NULL, &device) == VK_SUCCESS);
-    return device;
-}
-
 static void lends_its_own_device(void)
 {
-    const VkInstance instance = make_instance();
-    VkPhysicalDevice physical;
-    VkDevice device;
-    VkQueue queue;
-    uint32_t count = 1;
+    const struct host host = make_host();
     sr_vulkan_device vulkan;
     sr_context_desc desc;
     sr_context* context = NULL;
-    vkEnumeratePhysicalDevices(instance, &count, &physical);
-    device = make_device(physical);
-    vkGetDeviceQueue(device, 0, 0, &queue);
     memset(&vulkan, 0, sizeof vulkan);
     vulkan.struct_size = sizeof vulkan;
-    vulkan.instance = instance;
-    vulkan.physical_device = physical;
-    vulkan.device = device;
-    vulkan.queue = queue;
+    vulkan.instance = host.instance;
+    vulkan.physical_device = host.physical;
+    vulkan.device = host.device;
+    vulkan.queue = host.queue;
     vulkan.user = &locks;
     vulkan.lock_queue = lock_queue;
     memset(&desc, 0, sizeof desc);
@@ -207,13 +135,12 @@ static void lends_its_own_device(void)
     desc.device = NULL;
     vulkan.queue = NULL;
     CHECK(sr_context_create(&desc, &context) == SR_ERR_USAGE && says(NULL, "needs instance, physical device"));
-    vulkan.queue = queue;
+    vulkan.queue = host.queue;
     CHECK(sr_context_create(&desc, &context) == SR_OK);
     sr_context_destroy(context);
     CHECK(locks == unlocks);
-    CHECK(vkDeviceWaitIdle(device) == VK_SUCCESS); /* still the host's */
-    vkDestroyDevice(device, NULL);
-    vkDestroyInstance(instance, NULL);
+    CHECK(vkDeviceWaitIdle(host.device) == VK_SUCCESS); /* still the host's */
+    destroy_host(&host);
 }
 
 int main(void)

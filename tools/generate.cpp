@@ -17,7 +17,8 @@ namespace semrover {
 namespace {
 
 struct GenerateArguments {
-    std::string grid, output, objects = "auto";
+    std::string grid, output, objects = "auto", order = "scene";
+    std::optional<double> tile_size;
     uint64_t seed = 0;
     GenerationArguments generation;
     PlyExports ply;
@@ -29,8 +30,11 @@ Status generate_along(const GenerateArguments& o, const Globals& globals)
 {
     if (o.ply.any())
         return fail(ErrorCode::usage, "--ply and its like have no meaning with --along: convert what it writes");
+    if (o.order == "tiles")
+        return fail(ErrorCode::usage, "--order tiles has no meaning with --along");
     GrowthRequest request = o.along;
     request.generation = o.generation.options;
+    request.tile_size = o.tile_size.value_or(request.tile_size);
     request.scaffold = o.grid;
     request.output = o.output;
     request.seed = o.seed;
@@ -42,16 +46,23 @@ Status generate_along(const GenerateArguments& o, const Globals& globals)
         [&](Device& d, const JobCallbacks& c) { return estimate_growth(d, std::move(plan), c); });
 }
 
+constexpr double kOrderTile = 9.6; // metres; 16 cells of the usual size
+
 Status generate(const GenerateArguments& o, const Globals& globals)
 {
     if (o.output.empty() && !o.generation.dry_run)
         return fail(ErrorCode::usage, "-o/--output is required");
+    if (o.along.path.empty() && o.order == "scene" && o.tile_size)
+        return fail(ErrorCode::usage, "--tile-size has a meaning with --order tiles and --along");
     if (!o.along.path.empty())
         return generate_along(o, globals);
     GenerationRequest request{.settings = {}, .seed = o.seed, .output = o.output, .ply = o.ply, .replace = globals.yes};
     if (!o.generation.dry_run)
         SR_CHECK(check_generation_outputs(request));
-    SR_TRY(request.settings, resolve_generation(o.generation.options));
+    GenerationOptions options = o.generation.options;
+    if (o.order == "tiles")
+        options.tile_size = o.tile_size.value_or(kOrderTile);
+    SR_TRY(request.settings, resolve_generation(options));
     SR_TRY(request.objects, given_objects(o.objects));
     SR_TRY(VoxelGrid grid, load_grid(o.grid, o.input, globals));
     // what another program's file became depends on options and on other files
@@ -99,8 +110,13 @@ void add_generate(CLI::App& app, const Globals& globals, Run& run)
                   "camera path: grow the scaffold along it into a folder of tiles, with memory that does not grow");
     c->add_option("--horizon", o->along.horizon, "--along: metres from the path, seen from above, that are generated");
     c->add_option("--window", o->along.window, "--along: metres of path at a time; another value gives another world");
-    c->add_option("--tile-size", o->along.tile_size,
-                  "--along: metres of a tile's edge, when the scaffold is one .sgrid");
+    add_choice(*c, "--order", {"scene", "tiles"},
+               "of regions: one over the whole scene, or tile by tile, where the points of a place depend on the "
+               "labels near it alone",
+               [o](const std::string& text) { o->order = text; });
+    c->add_option("--tile-size", o->tile_size,
+                  "metres of a tile's edge: --order tiles (9.6; another value gives other points), --along (38.4), "
+                  "when the scaffold is one .sgrid");
     c->callback([o, &globals, &run] { run = resuming(globals, [o, &globals] { return generate(*o, globals); }); });
 }
 

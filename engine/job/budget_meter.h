@@ -4,18 +4,26 @@
 
 #include "engine/job/job.h"
 
+#include <algorithm>
 #include <chrono>
 
 namespace semrover {
 
-// what a submit of a job takes: the mean of those so far, in which the last ones weigh most
+// what a submit of a job, or another piece of work of one kind, takes
 class SubmitCost {
   public:
-    double microseconds() const { return mean_; } // 0 before the first
-    void add(double us) { mean_ = mean_ > 0 ? mean_ + (us - mean_) / 4 : us; }
+    // the mean of those so far, in which the last ones weigh most; 0 before the first
+    double microseconds() const { return mean_; }
+    // that the next one hardly exceeds: the longest of the last ones
+    double bound() const { return std::max(mean_, longest_); }
+    void add(double us)
+    {
+        mean_ = mean_ > 0 ? mean_ + (us - mean_) / 4 : us;
+        longest_ = std::max(us, longest_ + (us - longest_) / 16);
+    }
 
   private:
-    double mean_ = 0;
+    double mean_ = 0, longest_ = 0;
 };
 
 // Counts what a step spends of its budget.
@@ -24,20 +32,24 @@ class SubmitCost {
 //     do { submit something, wait for it if budget.timed(); meter.submitted(); } while (work is left && meter.room());
 class BudgetMeter {
   public:
-    BudgetMeter(const JobBudget& budget, SubmitCost& cost) : budget_(budget), cost_(cost) {}
+    BudgetMeter(const JobBudget& budget, SubmitCost& cost) : budget_(budget), cost_(&cost) {}
+    explicit BudgetMeter(const JobBudget& budget) : budget_(budget) {} // of work of several kinds
 
-    void submitted()
+    void submitted() { spent(*cost_, true); }
+    bool room() const { return room_for(cost_->microseconds()); } // one more submit fits
+
+    // the time since the last piece of work was for one of this kind
+    void spent(SubmitCost& cost, bool submit)
     {
         const double now = elapsed();
-        cost_.add(now - last_);
+        cost.add(now - last_);
         last_ = now;
-        ++submits_;
+        submits_ += submit;
     }
-    // one more submit fits
-    bool room() const
+    bool room_for(double microseconds) const
     {
         return submits_ < budget_.submits &&
-               (!budget_.timed() || elapsed() + cost_.microseconds() <= double(budget_.microseconds));
+               (!budget_.timed() || elapsed() + microseconds <= double(budget_.microseconds));
     }
     double elapsed() const // microseconds
     {
@@ -46,7 +58,7 @@ class BudgetMeter {
 
   private:
     JobBudget budget_;
-    SubmitCost& cost_;
+    SubmitCost* cost_ = nullptr;
     std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
     double last_ = 0; // elapsed() at the last submit
     uint32_t submits_ = 0;

@@ -60,7 +60,8 @@ Status GridGeneration::load()
 {
     grid_hash_ = request_.grid_hash ? *request_.grid_hash : hash_grid(grid_);
     warn_of_placement(request_.settings.model, grid_, callbacks_);
-    SR_TRY(objects_, told_objects(request_.settings.model, request_.objects, grid_, request_.seed));
+    const bool by_blocks = request_.settings.regions.tile_cells > 0;
+    SR_TRY(objects_, told_objects(request_.settings.model, request_.objects, grid_, request_.seed, by_blocks));
     SR_CHECK(filling_.cut(grid_, request_.settings.regions, objects_));
     return filling_.load(request_.seed, callbacks_);
 }
@@ -103,6 +104,8 @@ Result<Json> GridGeneration::finish()
     grid_.metadata["model"] = settings_["model"];
     if (const std::string& placement = request_.settings.model.config.placement; placement != "shifted")
         grid_.metadata["placement"] = placement;
+    if (const int32_t edge = request_.settings.regions.tile_cells)
+        grid_.metadata["tile_cells"] = std::to_string(edge);
     if (request_.ply.any())
         SR_CHECK(export_ply(filling_.device(), grid_, request_.ply));
     Json results = filling_.results();

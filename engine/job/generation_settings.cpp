@@ -3,11 +3,27 @@
 #include "engine/job/generation_settings.h"
 
 #include "engine/job/version.h"
+#include "engine/scene/tiles.h"
 #include "runtime/base/hash.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace semrover {
+
+namespace {
+
+// attention does not reach farther than its radius, and more known cells would only be looked at
+Status set_tiles(RegionOptions& regions, const TransformerConfig& config, double tile_size)
+{
+    if (regions.first_seed != 0)
+        return fail(ErrorCode::usage, "--first-cell has no meaning with --order tiles");
+    SR_TRY(regions.tile_cells, tile_cells_of(tile_size, config.voxel_size));
+    regions.halo_cells = int32_t(std::sqrt(double(config.radius2())));
+    return {};
+}
+
+} // namespace
 
 Result<GenerationSettings> resolve_generation(const GenerationOptions& o)
 {
@@ -35,6 +51,8 @@ Result<GenerationSettings> resolve_generation(const GenerationOptions& o)
         std::min(o.coverage_threshold.value_or(d.regions.coverage_threshold), s.regions.region_size);
     s.regions.strategy = o.strategy.value_or(d.regions.strategy);
     s.regions.first_seed = o.first_cell;
+    if (o.tile_size > 0)
+        SR_CHECK(set_tiles(s.regions, s.model.config, o.tile_size));
     s.precision = o.precision;
     s.batch = o.batch;
     SR_TRY(s.plan, plan_sampling(s.model.scheduler, s.steps, s.repaint));
@@ -56,24 +74,27 @@ Result<Json> settings_json(const GenerationSettings& s, const Device& device, st
                            uint64_t grid_hash)
 {
     SR_TRY(const uint64_t model_hash, hash_folder(s.model.transformer));
-    return Json{{"command", std::string(command)},
-                {"version", kVersion},
-                {"device", device.name()},
-                {"driver", device.driver()},
-                {"grid", hash_text(grid_hash)},
-                {"model", hash_text(model_hash)},
-                {"precision", s.precision == DType::f32 ? "fp32" : "fp16"},
-                {"sampler", std::string(sampler_name(s.model.scheduler.sampler))},
-                {"steps", s.steps},
-                {"guidance_scale", s.guidance.scale},
-                {"guidance_from", s.guidance.from},
-                {"region_size", s.regions.region_size},
-                {"coverage_threshold", s.regions.coverage_threshold},
-                {"strategy", std::string(region_strategy_name(s.regions.strategy))},
-                {"first_cell", s.regions.first_seed},
-                {"jump_length", s.repaint.jump_length},
-                {"jump_n_sample", s.repaint.jump_n_sample},
-                {"known_tokens", s.repaint.known == KnownTokens::clean ? "clean" : "noised"}};
+    Json settings{{"command", std::string(command)},
+                  {"version", kVersion},
+                  {"device", device.name()},
+                  {"driver", device.driver()},
+                  {"grid", hash_text(grid_hash)},
+                  {"model", hash_text(model_hash)},
+                  {"precision", s.precision == DType::f32 ? "fp32" : "fp16"},
+                  {"sampler", std::string(sampler_name(s.model.scheduler.sampler))},
+                  {"steps", s.steps},
+                  {"guidance_scale", s.guidance.scale},
+                  {"guidance_from", s.guidance.from},
+                  {"region_size", s.regions.region_size},
+                  {"coverage_threshold", s.regions.coverage_threshold},
+                  {"strategy", std::string(region_strategy_name(s.regions.strategy))},
+                  {"first_cell", s.regions.first_seed},
+                  {"jump_length", s.repaint.jump_length},
+                  {"jump_n_sample", s.repaint.jump_n_sample},
+                  {"known_tokens", s.repaint.known == KnownTokens::clean ? "clean" : "noised"}};
+    if (s.regions.tile_cells) // not there for the other order, whose runs of earlier versions go on
+        settings["tile_cells"] = s.regions.tile_cells;
+    return settings;
 }
 
 } // namespace semrover

@@ -25,6 +25,7 @@ struct GenerationOptions {
     std::optional<KnownTokens> known;
     std::optional<RegionStrategy> strategy;
     int64_t first_cell = 0;
+    double tile_size = 0;         // metres; above 0: in the order of tiles of this size
     DType precision = DType::f16; // or f32
     uint32_t batch = 0;           // regions at a time; 0: what suits the device
 };

@@ -165,6 +165,7 @@ Json GridFilling::results() const
 {
     return {{"cells", outpainter_->cells_to_do()},
             {"regions", outpainter_->region_count()},
+            {"cells_computed", outpainter_->cells_to_compute()},
             {"seconds", seconds_},
             {"planned_device_bytes", planned_bytes_},
             {"peak_device_bytes", peak_bytes_}};

@@ -13,8 +13,8 @@ namespace fs = std::filesystem;
 
 Status check(const GrowthRequest& r, bool writes)
 {
-    if (r.generation.first_cell != 0 || r.generation.strategy)
-        return fail(ErrorCode::usage, "--first-cell and --strategy have no meaning with --along");
+    if (r.generation.first_cell != 0 || r.generation.strategy || r.generation.tile_size != 0)
+        return fail(ErrorCode::usage, "--first-cell, --strategy and --order have no meaning with --along");
     if (!(r.horizon > 0 && r.horizon <= 1000))
         return fail(ErrorCode::usage, "--horizon: expected metres above 0 and up to 1000, found {}", r.horizon);
     if (!(r.window > 0 && r.window <= 1000))

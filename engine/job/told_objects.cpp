@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/told_objects.h"
 
-#include "engine/scene/guessed_objects.h"
+#include "engine/scene/object_blocks.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/quote.h"
 
@@ -11,12 +11,13 @@
 namespace semrover {
 
 Result<std::vector<SceneObject>> told_objects(const VoxfieldModel& model, const GivenObjects& given,
-                                              const VoxelGrid& grid, uint64_t seed)
+                                              const VoxelGrid& grid, uint64_t seed, bool by_blocks)
 {
     if (!model.config.condition.empty()) {
         std::vector<SceneObject> told = given.value_or(std::vector<SceneObject>());
         if (!given) {
-            SR_TRY(told, guess_objects(grid, model.defaults.usual_objects, seed));
+            const UsualObjects& usual = model.defaults.usual_objects;
+            SR_TRY(told, by_blocks ? guess_blocks(grid, usual, seed) : guess_objects(grid, usual, seed));
         }
         std::ranges::transform(told, told.begin(), as_written);
         return told;

@@ -13,9 +13,10 @@ using GivenObjects = std::optional<std::vector<SceneObject>>;
 
 // What a run tells its model beside labels: the given objects, or those guessed of `grid` with the model's usual ones.
 // Numbers are as write_objects writes them, so that what was written gives the same. A model that knows labels alone is
-// told nothing. Errors: bad_input, where such a model is given objects, and as guess_objects
+// told nothing. by_blocks: guess them as worlds do that are generated place by place (guess_blocks).
+// Errors: bad_input, where such a model is given objects, and as guess_objects
 Result<std::vector<SceneObject>> told_objects(const VoxfieldModel& model, const GivenObjects& given,
-                                              const VoxelGrid& grid, uint64_t seed);
+                                              const VoxelGrid& grid, uint64_t seed, bool by_blocks = false);
 
 uint64_t hash_objects(std::span<const SceneObject> objects);
 

@@ -3,6 +3,7 @@
 #include "engine/splat/surfels.h"
 
 #include "engine/scene/palette.h"
+#include "runtime/device/copy_ring.h"
 #include "runtime/device/program.h"
 
 #include <cmath>
@@ -107,19 +108,49 @@ Result<SurfelScene> SurfelScene::create(Device& device, const Surfels& s)
     return scene;
 }
 
-Status SurfelScene::upload(const Host& host)
+Result<SurfelScene> SurfelScene::reserve(Device& device, uint32_t size)
 {
-    size_ = uint32_t(host.positions.size());
-    skipped_ = uint32_t(host.skipped());
+    SurfelScene scene(device);
+    scene.size_ = size;
+    SR_CHECK(scene.allocate());
+    for (const Slot& slot : scene.arrays())
+        SR_CHECK(slot.clear(device));
+    return scene;
+}
+
+Status SurfelScene::put(CopyRing& copies, uint32_t first, const SurfelScene& from)
+{
+    SR_ASSERT(first + from.size_ <= size_, "{} surfels from {} on in a scene of {}", from.size_, first, size_);
+    const std::array<Slot, 5> to_arrays = arrays(), from_arrays = from.arrays();
+    for (size_t a = 0; a < to_arrays.size() && from.size_; ++a)
+        SR_CHECK(copies.copy(from_arrays[a].row_range(0, from.size_), to_arrays[a].row_range(first, from.size_))
+                     .map([](uint64_t) {}));
+    return {};
+}
+
+Status SurfelScene::hide(uint32_t first, uint32_t count)
+{
+    return positions_.row_range(first, count).clear(*device_);
+}
+
+Status SurfelScene::allocate()
+{
     const uint32_t rows = std::max(size_, 1u);
     positions_ = state_.slot(rows, 4, DType::f32, "positions", 4);
     normals_ = state_.slot(rows, 4, DType::f32, "normals", 4);
     colors_ = state_.slot(rows, 4, DType::f32, "colours", 4);
     labels_ = state_.slot(rows, 1, DType::u32, "labels", 1);
     cells_ = state_.slot(rows, 1, DType::u32, "cells", 1);
-    SR_CHECK(state_.allocate(*device_, "surfels"));
+    return state_.allocate(*device_, "surfels");
+}
+
+Status SurfelScene::upload(const Host& host)
+{
+    size_ = uint32_t(host.positions.size());
+    skipped_ = uint32_t(host.skipped());
+    SR_CHECK(allocate());
     if (!size_) {
-        for (const Slot& slot : {positions_, normals_, colors_, labels_, cells_})
+        for (const Slot& slot : arrays())
             SR_CHECK(slot.clear(*device_));
         return {};
     }

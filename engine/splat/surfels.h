@@ -11,6 +11,8 @@
 
 namespace semrover {
 
+class CopyRing;
+
 struct SurfelOptions {
     float sigma = 0.04f;     // metres (the paper's splat radius)
     bool auto_sigma = false; // sigma from the distance of the nearest points, which closes the holes
@@ -31,6 +33,15 @@ class SurfelScene {
     // of surfels that are complete; the cell of each is its index
     static Result<SurfelScene> create(Device& device, const Surfels& surfels);
 
+    // room for surfels, all without opacity at first: not drawn
+    static Result<SurfelScene> reserve(Device& device, uint32_t size);
+    // copies a scene's surfels over those from `first` on, without waiting
+    Status put(CopyRing& copies, uint32_t first, const SurfelScene& from);
+    Status hide(uint32_t first, uint32_t count); // takes opacity away
+
+    // the arrays that in() gives, in its order
+    std::array<Slot, 5> arrays() const { return {positions_, normals_, colors_, labels_, cells_}; }
+
     uint32_t size() const { return size_; }       // surfels
     uint32_t skipped() const { return skipped_; } // of these, not drawn: not finite, or without normal, size or opacity
     uint64_t bytes() const;                       // on the device
@@ -43,6 +54,7 @@ class SurfelScene {
     struct Host; // the parts, as they are uploaded
 
     explicit SurfelScene(Device& device) : device_(&device) {}
+    Status allocate();
     Status upload(const Host& host);
     Status derive(const SurfelOptions& options);
 

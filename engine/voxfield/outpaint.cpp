@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/voxfield/outpaint.h"
 
+#include "engine/voxfield/tile_regions.h"
 #include "engine/voxfield/token_codec.h"
 
 #include <algorithm>
@@ -34,11 +35,14 @@ Result<std::unique_ptr<Outpainter>> Outpainter::create(VoxelGrid& grid, const Tr
     grid.points.resize(v * n * 3);
     grid.colors.resize(v * n * 3);
     grid.generated.resize(v);
-    SR_TRY(o->regions_, extract_regions(grid.cells, options, grid.generated));
+    SR_TRY(o->regions_, options.tile_cells ? extract_tile_regions(grid.cells, options, grid.generated)
+                                           : extract_regions(grid.cells, options, grid.generated));
     o->graph_ = std::make_unique<RegionGraph>(o->regions_, v, grid.generated);
     o->restored_.resize(o->regions_.size());
     for (uint32_t r = 0; r < o->regions_.size(); ++r) {
         o->cells_to_do_ += o->graph_->targets(r).size();
+        if (!o->graph_->targets(r).empty())
+            o->cells_to_compute_ += o->regions_.region(r).size();
         o->largest_ = std::max(o->largest_, uint32_t(o->regions_.region(r).size()));
     }
     return o;

@@ -43,7 +43,11 @@ class Outpainter {
     size_t region_count() const { return graph_->region_count(); }
     size_t cells_to_do() const { return cells_to_do_; }
     size_t cells_done() const { return cells_done_; }
-    double part() const; // of the batch in flight, 0..1
+    size_t cells_to_compute() const { return cells_to_compute_; } // members of regions, the known ones too
+    double part() const;                                          // of the batch in flight, 0..1
+    // what the next submit does beside a row of the plan: begins a batch, or ends it
+    bool begins_batch() const { return flight_.empty(); }
+    bool ends_batch() const { return sampler_ && sampler_->rows_done() + 1 >= sampler_->rows(); }
     uint32_t largest_region() const { return largest_; }
     const Regions& regions() const { return regions_; }
 
@@ -82,7 +86,7 @@ class Outpainter {
     Regions regions_;
     std::unique_ptr<RegionGraph> graph_;
     std::vector<RegionResult> restored_; // by region; empty targets: not restored
-    size_t cells_to_do_ = 0, cells_done_ = 0;
+    size_t cells_to_do_ = 0, cells_done_ = 0, cells_to_compute_ = 0;
     uint32_t largest_ = 0;
     TokenSampler* sampler_ = nullptr; // from begin() on
     uint32_t batch_ = 1;

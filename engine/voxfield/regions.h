@@ -29,6 +29,9 @@ struct RegionOptions {
     // cells that have points already count as covered: regions grow from them into what is missing, and none is made
     // where nothing is. extract_regions needs the cells' flags for it.
     bool from_known = false;
+    // Above 0: in the order of tiles (tile_regions.h), square ones of so many cells; known cells up to halo_cells away
+    // from a tile are seen by its regions. first_seed and from_known have no meaning then.
+    int32_t tile_cells = 0, halo_cells = 0;
 };
 
 // A region of strategy rim is chosen among the cells_considered(o) cells nearest to its seed. It has their uncovered

@@ -21,6 +21,17 @@ void barrier(VkCommandBuffer commands, VkPipelineStageFlags from, VkAccessFlags 
     vkCmdPipelineBarrier(commands, from, to, 0, 1, &memory, 0, nullptr, 0, nullptr);
 }
 
+constexpr VkAccessFlags kAnything = VK_ACCESS_MEMORY_READ_BIT | VK_ACCESS_MEMORY_WRITE_BIT;
+
+VkImageMemoryBarrier transition(const HostImage& to)
+{
+    auto image = vk_struct<VkImageMemoryBarrier>(VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER);
+    image.srcQueueFamilyIndex = image.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
+    image.image = to.image;
+    image.subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
+    return image;
+}
+
 } // namespace
 
 Status begin_commands(VkCommandBuffer commands, bool once)
@@ -48,6 +59,36 @@ void record_copy(VkCommandBuffer commands, VkBuffer from, uint64_t from_at, VkBu
     vkCmdCopyBuffer(commands, from, to, 1, &region);
     barrier(commands, kTransfer, VK_ACCESS_TRANSFER_WRITE_BIT, kCompute | kTransfer | kHost,
             kShader | kCopy | VK_ACCESS_HOST_READ_BIT);
+}
+
+void record_host_copy(VkCommandBuffer commands, VkBuffer from, uint64_t from_at, VkBuffer to, uint64_t to_at,
+                      uint64_t bytes)
+{
+    barrier(commands, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, kAnything, kTransfer, kCopy); // what the host did with it
+    const VkBufferCopy region{from_at, to_at, bytes};
+    vkCmdCopyBuffer(commands, from, to, 1, &region);
+    barrier(commands, kTransfer, VK_ACCESS_TRANSFER_WRITE_BIT, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT | kHost,
+            kAnything | VK_ACCESS_HOST_READ_BIT);
+}
+
+void record_image_copy(VkCommandBuffer commands, VkBuffer from, uint64_t from_at, const HostImage& to)
+{
+    VkImageMemoryBarrier image = transition(to);
+    image.srcAccessMask = kAnything;
+    image.dstAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT;
+    image.oldLayout = to.before;
+    image.newLayout = VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL;
+    vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, kTransfer, 0, 0, nullptr, 0, nullptr, 1, &image);
+    VkBufferImageCopy region{};
+    region.bufferOffset = from_at;
+    region.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1};
+    region.imageExtent = {to.width, to.height, 1};
+    vkCmdCopyBufferToImage(commands, from, to.image, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, 1, &region);
+    image.srcAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT;
+    image.dstAccessMask = kAnything;
+    image.oldLayout = VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL;
+    image.newLayout = to.after;
+    vkCmdPipelineBarrier(commands, kTransfer, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, 0, 0, nullptr, 0, nullptr, 1, &image);
 }
 
 void record_clear(VkCommandBuffer commands, VkBuffer buffer, uint64_t at, uint64_t bytes)

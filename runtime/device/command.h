@@ -18,6 +18,16 @@ void record_final_barrier(VkCommandBuffer commands);
 // with the barrier that lets shaders, copies and the host follow
 void record_copy(VkCommandBuffer commands, VkBuffer from, uint64_t from_at, VkBuffer to, uint64_t to_at,
                  uint64_t bytes);
+// Into memory that belongs to a host program: everything that follows in the queue may use it. An image has one level
+// and one layer, and comes in one layout and goes in another; its whole content is replaced.
+void record_host_copy(VkCommandBuffer commands, VkBuffer from, uint64_t from_at, VkBuffer to, uint64_t to_at,
+                      uint64_t bytes);
+struct HostImage {
+    VkImage image = VK_NULL_HANDLE;
+    uint32_t width = 0, height = 0;
+    VkImageLayout before = VK_IMAGE_LAYOUT_UNDEFINED, after = VK_IMAGE_LAYOUT_GENERAL;
+};
+void record_image_copy(VkCommandBuffer commands, VkBuffer from, uint64_t from_at, const HostImage& to);
 void record_clear(VkCommandBuffer commands, VkBuffer buffer, uint64_t at, uint64_t bytes);
 
 } // namespace semrover

@@ -21,6 +21,7 @@ void add_eval(CLI::App& app, const Globals& globals, Run& run)
     add_eval_kid(*eval, globals, run);
     add_eval_mmd(*eval, globals, run);
     add_eval_points(*eval, globals, run);
+    add_eval_seams(*eval, globals, run);
     add_eval_surface(*eval, globals, run);
 }
 

@@ -15,6 +15,7 @@ void add_eval_frames(CLI::App& eval, const Globals& globals, Run& run);
 void add_eval_kid(CLI::App& eval, const Globals& globals, Run& run);
 void add_eval_mmd(CLI::App& eval, const Globals& globals, Run& run);
 void add_eval_points(CLI::App& eval, const Globals& globals, Run& run);
+void add_eval_seams(CLI::App& eval, const Globals& globals, Run& run);
 void add_eval_surface(CLI::App& eval, const Globals& globals, Run& run);
 
 } // namespace semrover

@@ -1,76 +1,18 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// the C interface over the engine: copies structures within their sizes, turns errors and exceptions into statuses
-#include "engine/semrover.h"
-
+// devices and contexts
+#include "engine/capi/call.h"
+#include "engine/capi/handles.h"
 #include "runtime/base/diagnostics.h"
-#include "runtime/device/device.h"
 #include "runtime/device/physical_device.h"
 
-#include <algorithm>
-#include <cstring>
-#include <new>
-
 using namespace semrover;
-
-struct sr_context {
-    std::unique_ptr<Device> device;
-    DeviceSummary summary;
-    std::string error;
-};
+using namespace semrover::capi;
 
 namespace {
 
 // of calls without a context; a thread sees its own
 thread_local std::string thread_error;
-
-sr_status remember(sr_context* context, sr_status status, std::string message) noexcept
-{
-    (context ? context->error : thread_error) = std::move(message);
-    return status;
-}
-
-// calls f, which returns Status; nothing it throws gets past
-template <typename F>
-sr_status guarded(sr_context* context, F f) noexcept
-{
-    try {
-        if (Status status = f(); !status)
-            return remember(context, sr_status(status.error().code), std::move(status.error().message));
-        return SR_OK;
-    } catch (const std::bad_alloc&) {
-        return remember(context, SR_ERR_OUT_OF_MEMORY, ""); // a text might not fit either
-    } catch (...) {
-        return remember(context, SR_ERR_INTERNAL, "internal");
-    }
-}
-
-// the caller's structure as this library knows it
-template <typename T>
-Result<T> read_struct(const T* given, const char* name)
-{
-    T known{};
-    if (!given || given->struct_size < sizeof(uint32_t))
-        return fail(ErrorCode::usage, "{}: {}", name, given ? "struct_size is not set" : "NULL");
-    const auto* bytes = reinterpret_cast<const unsigned char*>(given);
-    std::memcpy(&known, bytes, std::min<size_t>(given->struct_size, sizeof(T)));
-    for (size_t i = sizeof(T); i < given->struct_size; ++i)
-        if (bytes[i])
-            return fail(ErrorCode::usage, "{}: byte {} asks for something that version {} does not know", name, i,
-                        SEMROVER_VERSION);
-    if constexpr (requires { known.next; })
-        if (known.next)
-            return fail(ErrorCode::usage, "{}: next is not NULL", name);
-    return known;
-}
-
-// `size` bytes of the caller's, of which the first four stay
-template <typename T>
-void write_struct(const T& known, void* to, uint32_t size)
-{
-    const size_t count = std::min<size_t>(size, sizeof(T));
-    std::memcpy(static_cast<char*>(to) + 4, reinterpret_cast<const char*>(&known) + 4, count > 4 ? count - 4 : 0);
-}
 
 template <size_t N>
 void copy_text(char (&to)[N], const std::string& text)
@@ -149,6 +91,16 @@ Status list(sr_device_info* devices, uint32_t& count)
 }
 
 } // namespace
+
+namespace semrover::capi {
+
+sr_status remember(sr_context* context, sr_status status, std::string message) noexcept
+{
+    (context ? context->error : thread_error) = std::move(message);
+    return status;
+}
+
+} // namespace semrover::capi
 
 extern "C" {
 

@@ -1,0 +1,75 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/semrover.h"
+#include "runtime/base/assertion.h"
+#include "runtime/base/result.h"
+
+#include <algorithm>
+#include <cstring>
+#include <new>
+
+// what every call of the C interface does: copies structures within their sizes, turns errors and exceptions into
+// statuses
+namespace semrover::capi {
+
+// where the line of a call that failed goes: into its context, or else into the thread
+sr_status remember(sr_context* context, sr_status status, std::string message) noexcept;
+
+// calls f, which returns Status; nothing it throws gets past
+template <typename F>
+sr_status guarded(sr_context* context, F f) noexcept
+{
+    try {
+        const AssertionsThrow assertions;
+        if (Status status = f(); !status)
+            return remember(context, sr_status(status.error().code), std::move(status.error().message));
+        return SR_OK;
+    } catch (const std::bad_alloc&) {
+        return remember(context, SR_ERR_OUT_OF_MEMORY, ""); // a text might not fit either
+    } catch (const std::exception& error) {
+        return remember(context, SR_ERR_INTERNAL, error.what());
+    } catch (...) {
+        return remember(context, SR_ERR_INTERNAL, "internal");
+    }
+}
+
+// the caller's structure as this library knows it
+template <typename T>
+Result<T> read_struct(const T* given, const char* name)
+{
+    T known{};
+    if (!given || given->struct_size < sizeof(uint32_t))
+        return fail(ErrorCode::usage, "{}: {}", name, given ? "struct_size is not set" : "NULL");
+    const auto* bytes = reinterpret_cast<const unsigned char*>(given);
+    std::memcpy(&known, bytes, std::min<size_t>(given->struct_size, sizeof(T)));
+    for (size_t i = sizeof(T); i < given->struct_size; ++i)
+        if (bytes[i])
+            return fail(ErrorCode::usage, "{}: byte {} asks for something that version {} does not know", name, i,
+                        SEMROVER_VERSION);
+    if constexpr (requires { known.next; })
+        if (known.next)
+            return fail(ErrorCode::usage, "{}: next is not NULL", name);
+    return known;
+}
+
+// `size` bytes of the caller's, of which the first four stay
+template <typename T>
+void write_struct(const T& known, void* to, uint32_t size)
+{
+    const size_t count = std::min<size_t>(size, sizeof(T));
+    std::memcpy(static_cast<char*>(to) + 4, reinterpret_cast<const char*>(&known) + 4, count > 4 ? count - 4 : 0);
+}
+
+// the caller's structure for a result. name: of the call
+template <typename T>
+Status write_result(const T& known, T* to, const char* name)
+{
+    if (!to || to->struct_size < 8)
+        return fail(ErrorCode::usage, "{}: {}", name, to ? "struct_size is not set" : "NULL");
+    write_struct(known, to, to->struct_size);
+    return {};
+}
+
+} // namespace semrover::capi

@@ -1,0 +1,212 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// worlds: opened, walked through, edited
+#include "engine/capi/edits.h"
+#include "engine/capi/handles.h"
+#include "engine/scene/cell_reach.h"
+#include "engine/scene/tiles.h"
+
+using namespace semrover;
+using namespace semrover::capi;
+
+namespace {
+
+constexpr double kUsualTile = 9.6; // metres: that of `generate --order tiles`
+
+Result<GenerationSettings> settings_of(const sr_world_desc& d)
+{
+    if (!d.model)
+        return fail(ErrorCode::usage, "sr_world_desc: model is NULL");
+    if (d.steps > 1'000'000)
+        return fail(ErrorCode::usage, "sr_world_desc: {} steps", d.steps);
+    GenerationOptions o;
+    o.model = d.model;
+    if (d.steps)
+        o.steps = int(d.steps);
+    o.tile_size = d.tile_size == 0 ? kUsualTile : d.tile_size;
+    if (!(o.tile_size > 0))
+        return fail(ErrorCode::usage, "sr_world_desc: a tile_size of {} m", d.tile_size);
+    return resolve_generation(o);
+}
+
+// the host's callback as the engine calls it
+LabelCallback labels_callback(const sr_world_desc& d, float voxel_size)
+{
+    return [labels = d.labels, user = d.user, voxel_size](const CellWindow& window, VoxelGrid& grid) -> Status {
+        sr_grid cells;
+        cells.grid.voxel_size = voxel_size;
+        const sr_window asked{{window.low[0], window.low[1]}, {window.high[0], window.high[1]}};
+        if (const sr_status status = labels(user, &asked, &cells); status != SR_OK)
+            return fail(ErrorCode(status), "the host's labels callback returned {}", sr_status_name(status));
+        grid.cells = std::move(cells.grid.cells);
+        grid.labels = std::move(cells.grid.labels);
+        return {};
+    };
+}
+
+Result<std::unique_ptr<WorldLabels>> labels_of(const sr_world_desc& d, float voxel_size)
+{
+    if ((d.grid != nullptr) + (d.folder != nullptr) + (d.labels != nullptr) != 1)
+        return fail(ErrorCode::usage, "sr_world_desc: one of grid, folder and labels must be given");
+    if (d.folder)
+        return labels_of_folder(d.folder);
+    if (d.labels)
+        return labels_of_callback(voxel_size, labels_callback(d, voxel_size));
+    VoxelGrid grid;
+    grid.voxel_size = d.grid->grid.voxel_size;
+    grid.cells = d.grid->grid.cells;
+    grid.labels = d.grid->grid.labels;
+    return labels_of_grid(std::move(grid));
+}
+
+Result<std::unique_ptr<sr_world>> make_world(sr_context& context, const sr_world_desc& d)
+{
+    auto world = std::make_unique<sr_world>();
+    world->context = &context;
+    SR_TRY(world->settings, settings_of(d));
+    SR_TRY(auto labels, labels_of(d, world->settings.model.config.voxel_size));
+    WorldRequest request{.settings = world->settings, .seed = d.seed};
+    if (d.objects) {
+        SR_TRY(std::vector<SceneObject> objects, read_objects(d.objects));
+        request.objects = std::move(objects);
+    }
+    request.cache = d.cache ? Path(d.cache) : Path();
+    request.host_bytes = d.host_bytes;
+    request.splat_bytes = d.splat_bytes;
+    request.tiles_at_once = d.tiles_at_once;
+    if (d.splat_radius != 0)
+        request.surfels = {.sigma = float(d.splat_radius)};
+    JobCallbacks callbacks;
+    if (d.message)
+        callbacks.warning = [&d](std::string_view line) { d.message(d.user, std::string(line).c_str()); };
+    SR_TRY(world->world, open_world(*context.device, std::move(request), std::move(labels), callbacks));
+    return world;
+}
+
+// calls f with the world; an error is its context's
+template <typename F>
+sr_status with_world(sr_world* world, const char* name, F f) noexcept
+{
+    return guarded(world ? world->context : nullptr, [&]() -> Status {
+        if (!world)
+            return fail(ErrorCode::usage, "{}: world is NULL", name);
+        return f();
+    });
+}
+
+sr_world_info info_of(const sr_world& world)
+{
+    const WorldFigures f = world.world->figures();
+    const SplatPool* splats = world.world->splats();
+    sr_world_info info{};
+    info.full = f.full;
+    info.wanted = f.wanted;
+    info.finished = f.finished;
+    info.in_memory = f.in_memory;
+    info.host_bytes = f.host_bytes;
+    info.generated = f.generated;
+    info.loaded = f.loaded;
+    info.dropped = f.dropped;
+    info.splats = splats ? splats->surfels() : 0;
+    info.voxel_size = decimal_voxel_size(world.settings.model.config.voxel_size);
+    info.tile_cells = uint32_t(world.world->tile_cells());
+    info.points_per_cell = world.settings.model.config.points_per_voxel;
+    return info;
+}
+
+VoxelGrid cells_in(const sr_world& world, const CellWindow& window)
+{
+    VoxelGrid out;
+    out.voxel_size = world.settings.model.config.voxel_size;
+    out.points_per_voxel = int(world.settings.model.config.points_per_voxel);
+    for (const TileIndex& index : world.world->tiles_with_points())
+        if (const VoxelGrid* tile = world.world->tile(index))
+            for (size_t c = 0; c < tile->cells.size(); ++c)
+                if (window.holds(tile->cells[c]))
+                    append_cell(out, *tile, c);
+    sort_cells(out);
+    return out;
+}
+
+} // namespace
+
+extern "C" {
+
+sr_status sr_world_create(sr_context* context, const sr_world_desc* desc, sr_world** world)
+{
+    return guarded(context, [&]() -> Status {
+        if (!context || !world)
+            return fail(ErrorCode::usage, "sr_world_create: NULL");
+        *world = nullptr;
+        SR_TRY(const sr_world_desc known, read_struct(desc, "sr_world_desc"));
+        if (known.reserved)
+            return fail(ErrorCode::usage, "sr_world_desc: reserved is not 0");
+        SR_TRY(auto made, make_world(*context, known));
+        *world = made.release();
+        return {};
+    });
+}
+
+void sr_world_destroy(sr_world* world)
+{
+    delete world;
+}
+
+sr_status sr_world_focus(sr_world* world, const double position[3], const double direction[3], double radius)
+{
+    return with_world(world, "sr_world_focus", [&]() -> Status {
+        if (!position || !direction)
+            return fail(ErrorCode::usage, "sr_world_focus: NULL");
+        WorldFocus focus{.radius = radius};
+        std::copy_n(position, 3, focus.position.begin());
+        std::copy_n(direction, 3, focus.direction.begin());
+        return world->world->focus(focus);
+    });
+}
+
+sr_status sr_world_step(sr_world* world, uint64_t budget_us, uint32_t* done)
+{
+    return with_world(world, "sr_world_step", [&]() -> Status {
+        constexpr uint64_t kMost = 1ull << 60; // beyond it a budget is none
+        SR_TRY(const bool all, world->world->step({.submits = ~0u, .microseconds = std::min(budget_us, kMost)}));
+        Device& device = *world->context->device;
+        SR_CHECK(device.wait(device.last_ticket())); // splats that were copied last
+        if (done)
+            *done = all;
+        return {};
+    });
+}
+
+sr_status sr_world_edit(sr_world* world, const sr_cell* cells, uint64_t count)
+{
+    return with_world(world, "sr_world_edit", [&]() -> Status {
+        SR_TRY(const CellEdits edits, edits_of(cells, count, "sr_world_edit"));
+        return world->world->edit(edits);
+    });
+}
+
+sr_status sr_world_get_info(sr_world* world, sr_world_info* info)
+{
+    return with_world(world, "sr_world_get_info",
+                      [&]() -> Status { return write_result(info_of(*world), info, "sr_world_get_info"); });
+}
+
+sr_status sr_world_copy_cells(sr_world* world, const sr_window* window, sr_grid** grid)
+{
+    return with_world(world, "sr_world_copy_cells", [&]() -> Status {
+        if (!window || !grid)
+            return fail(ErrorCode::usage, "sr_world_copy_cells: NULL");
+        *grid = nullptr;
+        *grid = new sr_grid{cells_in(*world, {{window->low[0], window->low[1]}, {window->high[0], window->high[1]}})};
+        return {};
+    });
+}
+
+sr_status sr_world_flush(sr_world* world)
+{
+    return with_world(world, "sr_world_flush", [&]() -> Status { return world->world->flush(); });
+}
+
+} // extern "C"
+
+static_assert(sizeof(sr_world_desc) == 128 && sizeof(sr_world_info) == 88);

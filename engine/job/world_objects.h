@@ -1,0 +1,30 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/job/told_objects.h"
+#include "engine/job/world_labels.h"
+
+namespace semrover {
+
+// The objects that a world's model is told of: those that were given or, block by block as generation comes near,
+// guessed of the labels as the source has them. Edits change no object.
+class WorldObjects {
+  public:
+    // model: outlives this. Errors: bad_input for objects that it cannot be told of
+    static Result<WorldObjects> create(const VoxfieldModel& model, const GivenObjects& given, uint64_t seed);
+
+    // Those that may reach a cell of the window, always in the same order. Errors: of the source; as guess_objects
+    Result<std::vector<SceneObject>> near(WorldLabels& labels, const CellWindow& window);
+    void keep_near(const CellWindow& window); // forgets the blocks that do not reach it
+
+  private:
+    WorldObjects(const VoxfieldModel& model, uint64_t seed) : model_(&model), seed_(seed) {}
+
+    const VoxfieldModel* model_;
+    uint64_t seed_;
+    GivenObjects given_;
+    std::map<TileIndex, std::vector<SceneObject>> blocks_;
+};
+
+} // namespace semrover

@@ -1,0 +1,127 @@
+/* SPDX-FileCopyrightText: semrover authors
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * Buffers and images of a host in C. */
+#ifndef SEMROVER_TESTS_CAPI_MEMORY_H
+#define SEMROVER_TESTS_CAPI_MEMORY_H
+
+#include "tests/capi_vulkan.h"
+
+struct host_buffer {
+    VkBuffer buffer;
+    VkDeviceMemory memory;
+    void* mapped; /* zeros at first */
+};
+
+struct host_image {
+    VkImage image;
+    VkDeviceMemory memory;
+    uint32_t width, height;
+};
+
+/* of a type with these properties */
+static VkDeviceMemory allocate(const struct host* host, const VkMemoryRequirements* needs, VkMemoryPropertyFlags wanted)
+{
+    VkPhysicalDeviceMemoryProperties types;
+    VkMemoryAllocateInfo info = {0};
+    VkDeviceMemory memory = VK_NULL_HANDLE;
+    uint32_t type = 0;
+    vkGetPhysicalDeviceMemoryProperties(host->physical, &types);
+    while (type < types.memoryTypeCount &&
+           !((needs->memoryTypeBits >> type & 1) && (types.memoryTypes[type].propertyFlags & wanted) == wanted))
+        ++type;
+    CHECK(type < types.memoryTypeCount);
+    info.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO;
+    info.allocationSize = needs->size;
+    info.memoryTypeIndex = type;
+    CHECK(vkAllocateMemory(host->device, &info, NULL, &memory) == VK_SUCCESS);
+    return memory;
+}
+
+static struct host_buffer make_buffer(const struct host* host, size_t bytes)
+{
+    struct host_buffer made;
+    VkBufferCreateInfo info = {0};
+    VkMemoryRequirements needs;
+    info.sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO;
+    info.size = bytes;
+    info.usage = VK_BUFFER_USAGE_TRANSFER_DST_BIT;
+    CHECK(vkCreateBuffer(host->device, &info, NULL, &made.buffer) == VK_SUCCESS);
+    vkGetBufferMemoryRequirements(host->device, made.buffer, &needs);
+    made.memory = allocate(host, &needs, VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT);
+    CHECK(vkBindBufferMemory(host->device, made.buffer, made.memory, 0) == VK_SUCCESS);
+    CHECK(vkMapMemory(host->device, made.memory, 0, VK_WHOLE_SIZE, 0, &made.mapped) == VK_SUCCESS);
+    memset(made.mapped, 0, bytes);
+    return made;
+}
+
+static void destroy_buffer(const struct host* host, const struct host_buffer* buffer)
+{
+    vkDestroyBuffer(host->device, buffer->buffer, NULL);
+    vkFreeMemory(host->device, buffer->memory, NULL);
+}
+
+static struct host_image make_image(const struct host* host, uint32_t width, uint32_t height, VkFormat format)
+{
+    struct host_image made;
+    VkImageCreateInfo info = {0};
+    VkMemoryRequirements needs;
+    info.sType = VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO;
+    info.imageType = VK_IMAGE_TYPE_2D;
+    info.format = format;
+    info.extent.width = width;
+    info.extent.height = height;
+    info.extent.depth = 1;
+    info.mipLevels = info.arrayLayers = 1;
+    info.samples = VK_SAMPLE_COUNT_1_BIT;
+    info.tiling = VK_IMAGE_TILING_OPTIMAL;
+    info.usage = VK_IMAGE_USAGE_TRANSFER_DST_BIT | VK_IMAGE_USAGE_TRANSFER_SRC_BIT;
+    CHECK(vkCreateImage(host->device, &info, NULL, &made.image) == VK_SUCCESS);
+    vkGetImageMemoryRequirements(host->device, made.image, &needs);
+    made.memory = allocate(host, &needs, 0);
+    CHECK(vkBindImageMemory(host->device, made.image, made.memory, 0) == VK_SUCCESS);
+    made.width = width;
+    made.height = height;
+    return made;
+}
+
+static void destroy_image(const struct host* host, const struct host_image* image)
+{
+    vkDestroyImage(host->device, image->image, NULL);
+    vkFreeMemory(host->device, image->memory, NULL);
+}
+
+/* copies an image in layout TRANSFER_SRC_OPTIMAL to the beginning of a buffer, and waits */
+static void read_image(const struct host* host, const struct host_image* image, const struct host_buffer* to)
+{
+    VkCommandPoolCreateInfo pool_info = {0};
+    VkCommandBufferAllocateInfo allocation = {0};
+    VkCommandBufferBeginInfo begin = {0};
+    VkBufferImageCopy region = {0};
+    VkSubmitInfo submit = {0};
+    VkCommandPool pool;
+    VkCommandBuffer commands;
+    pool_info.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO;
+    CHECK(vkCreateCommandPool(host->device, &pool_info, NULL, &pool) == VK_SUCCESS);
+    allocation.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO;
+    allocation.commandPool = pool;
+    allocation.commandBufferCount = 1;
+    CHECK(vkAllocateCommandBuffers(host->device, &allocation, &commands) == VK_SUCCESS);
+    begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
+    CHECK(vkBeginCommandBuffer(commands, &begin) == VK_SUCCESS);
+    region.imageSubresource.aspectMask = VK_IMAGE_ASPECT_COLOR_BIT;
+    region.imageSubresource.layerCount = 1;
+    region.imageExtent.width = image->width;
+    region.imageExtent.height = image->height;
+    region.imageExtent.depth = 1;
+    vkCmdCopyImageToBuffer(commands, image->image, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, to->buffer, 1, &region);
+    CHECK(vkEndCommandBuffer(commands) == VK_SUCCESS);
+    submit.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO;
+    submit.commandBufferCount = 1;
+    submit.pCommandBuffers = &commands;
+    CHECK(vkQueueSubmit(host->queue, 1, &submit, VK_NULL_HANDLE) == VK_SUCCESS);
+    CHECK(vkQueueWaitIdle(host->queue) == VK_SUCCESS);
+    vkDestroyCommandPool(host->device, pool, NULL);
+}
+
+#endif

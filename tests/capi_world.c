@@ -1,0 +1,370 @@
+/* SPDX-FileCopyrightText: semrover authors
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * A host in C that streams a world: labels of a grid and of a callback, budgets, edits, splats, pictures in host memory
+ * and in buffers and images of its own device; and what it may get wrong. */
+#include "tests/capi_memory.h"
+
+#include <math.h>
+
+enum { WIDTH = 64, HEIGHT = 40, PIXELS = WIDTH * HEIGHT, MOST_CELLS = 4096 };
+
+static const char* model;
+
+/* a road with a wall beside it, without end */
+static uint32_t label_of(int32_t j)
+{
+    return j == 6 ? 2 : 0;
+}
+static uint64_t cells_of(const sr_window* window, sr_cell* cells)
+{
+    uint64_t count = 0;
+    int32_t i, j, k;
+    for (i = window->low[0]; i <= window->high[0]; ++i)
+        for (j = window->low[1]; j <= window->high[1]; ++j)
+            for (k = 0; k < (j == 6 ? 4 : 1); ++k)
+                if (j >= -6 && j <= 6) {
+                    CHECK(count < MOST_CELLS);
+                    cells[count].i = i;
+                    cells[count].j = j;
+                    cells[count].k = k;
+                    cells[count++].label = label_of(j);
+                }
+    return count;
+}
+
+static int broken, calls;
+static sr_status labels(void* user, const sr_window* window, sr_grid* grid)
+{
+    static sr_cell cells[MOST_CELLS];
+    CHECK(user == &calls);
+    ++calls;
+    if (broken)
+        return SR_ERR_BAD_INPUT;
+    return sr_grid_set_cells(grid, cells, cells_of(window, cells));
+}
+
+static sr_grid* street(void)
+{
+    static sr_cell cells[MOST_CELLS];
+    const sr_window all = {{-40, -40}, {40, 40}};
+    sr_grid* grid = NULL;
+    CHECK(sr_grid_create(0.6, &grid) == SR_OK);
+    CHECK(sr_grid_set_cells(grid, cells, cells_of(&all, cells)) == SR_OK);
+    return grid;
+}
+
+static sr_world_desc description(void)
+{
+    sr_world_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.struct_size = sizeof desc;
+    desc.model = model;
+    desc.steps = 2;
+    desc.tile_size = 4.8;
+    desc.labels = labels;
+    desc.user = &calls;
+    desc.splat_bytes = 2u << 20;
+    return desc;
+}
+
+static void walk(sr_context* context, sr_world* world, double x, double radius)
+{
+    const double position[3] = {x, 0, 1.5}, forward[3] = {1, 0, 0};
+    uint32_t done = 0, steps = 0;
+    CHECK_OK(context, sr_world_focus(world, position, forward, radius));
+    for (; !done; ++steps) {
+        CHECK_OK(context, sr_world_step(world, 20000, &done));
+        CHECK(steps < 10000);
+    }
+}
+
+static sr_world_info info_of(sr_world* world)
+{
+    sr_world_info info;
+    memset(&info, 0, sizeof info);
+    info.struct_size = sizeof info;
+    CHECK(sr_world_get_info(world, &info) == SR_OK);
+    return info;
+}
+
+/* all numbers of a window's points; the caller frees them */
+static float* points_of(sr_world* world, const sr_window* window, uint64_t* cells)
+{
+    sr_grid* grid = NULL;
+    sr_grid_info info;
+    uint64_t written = 0;
+    float* points;
+    memset(&info, 0, sizeof info);
+    info.struct_size = sizeof info;
+    CHECK(sr_world_copy_cells(world, window, &grid) == SR_OK);
+    CHECK(sr_grid_get_info(grid, &info) == SR_OK);
+    points = malloc((size_t)(info.cells * 20 * 6 * sizeof(float)) + 1);
+    if (info.cells) {
+        CHECK(info.points_per_cell == 20);
+        CHECK(sr_grid_get_points(grid, 0, info.cells, points, &written) == SR_OK && written == info.cells);
+    }
+    sr_grid_destroy(grid);
+    *cells = info.cells;
+    return points;
+}
+
+static void edits_grids_cell_by_cell(void)
+{
+    const sr_cell set[4] = {{1, 0, 0, 0}, {0, 0, 0, 2}, {1, 0, 0, 1}, {5, 5, 5, SR_NO_CELL}};
+    const sr_cell wrong[2] = {{0, 0, 0, 1}, {0, 0, 0, 20}}, far = {1 << 21, 0, 0, 0}, gone = {0, 0, 0, SR_NO_CELL};
+    sr_cell cells[4];
+    sr_grid* grid = NULL;
+    sr_grid_info info;
+    uint64_t written = 0;
+    float point[6];
+    CHECK(sr_grid_create(-1, &grid) == SR_ERR_BAD_INPUT && says(NULL, "voxel size") && !grid);
+    CHECK(sr_grid_create(0.6, NULL) == SR_ERR_USAGE && says(NULL, "NULL"));
+    CHECK(sr_grid_read("/nonesuch.sgrid", &grid) == SR_ERR_BAD_INPUT && !grid);
+    CHECK(sr_grid_create(0.6, &grid) == SR_OK);
+    CHECK(sr_grid_set_cells(grid, set, 4) == SR_OK);
+    CHECK(sr_grid_set_cells(grid, wrong, 2) == SR_ERR_BAD_INPUT && says(NULL, "cell 1 of 2 has label 20"));
+    CHECK(sr_grid_set_cells(grid, &far, 1) == SR_ERR_BAD_INPUT && says(NULL, "beyond"));
+    CHECK(sr_grid_set_cells(grid, NULL, 1) == SR_ERR_USAGE && says(NULL, "cells is NULL"));
+    memset(&info, 0, sizeof info);
+    CHECK(sr_grid_get_info(grid, &info) == SR_ERR_USAGE && says(NULL, "struct_size"));
+    info.struct_size = sizeof info;
+    CHECK(sr_grid_get_info(grid, &info) == SR_OK && info.cells == 2 && info.points_per_cell == 0);
+    CHECK(info.voxel_size == 0.6);
+    CHECK(sr_grid_get_cells(grid, 0, 4, cells, &written) == SR_OK && written == 2);
+    CHECK(cells[0].i == 0 && cells[0].label == 2 && cells[1].i == 1 && cells[1].label == 1);
+    CHECK(sr_grid_get_cells(grid, 1, 4, cells, &written) == SR_OK && written == 1 && cells[0].i == 1);
+    CHECK(sr_grid_get_cells(grid, 7, 4, cells, &written) == SR_OK && written == 0);
+    CHECK(sr_grid_get_points(grid, 0, 1, point, &written) == SR_ERR_BAD_INPUT && says(NULL, "no points"));
+    CHECK(sr_grid_set_cells(grid, &gone, 1) == SR_OK && sr_grid_get_info(grid, &info) == SR_OK && info.cells == 1);
+    sr_grid_destroy(grid);
+    sr_grid_destroy(NULL);
+}
+
+static void refuses_wrong_worlds(sr_context* context)
+{
+    sr_world_desc desc = description();
+    sr_world* world = (sr_world*)&desc;
+    sr_draw_desc draw;
+    sr_splats splats;
+    const double origin[3] = {0, 0, 0};
+    CHECK(sr_world_create(context, NULL, &world) == SR_ERR_USAGE && says(context, "NULL") && !world);
+    desc.struct_size = 0;
+    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "struct_size"));
+    desc = description();
+    desc.folder = "nonesuch";
+    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "one of grid, folder and labels"));
+    desc.labels = NULL;
+    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_BAD_INPUT && says(context, "nonesuch"));
+    desc = description();
+    desc.model = "/nonesuch";
+    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_BAD_INPUT && says(context, "nonesuch"));
+    desc = description();
+    desc.tile_size = 1.2;
+    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "narrower than its halo"));
+    desc = description();
+    desc.reserved = 1;
+    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "reserved"));
+    desc = description();
+    desc.splat_bytes = 0;
+    CHECK_OK(context, sr_world_create(context, &desc, &world));
+    memset(&splats, 0, sizeof splats);
+    splats.struct_size = sizeof splats;
+    CHECK(sr_world_get_splats(world, &splats) == SR_ERR_USAGE && says(context, "without splat_bytes"));
+    memset(&draw, 0, sizeof draw);
+    draw.struct_size = sizeof draw;
+    CHECK(sr_world_draw(world, &draw) == SR_ERR_USAGE && says(context, "without splat_bytes"));
+    CHECK(sr_world_focus(world, origin, NULL, 1) == SR_ERR_USAGE && says(context, "NULL"));
+    CHECK(sr_world_focus(world, origin, origin, -1) == SR_ERR_USAGE && says(context, "radius"));
+    CHECK(sr_world_focus(NULL, origin, origin, 1) == SR_ERR_USAGE && says(NULL, "world is NULL"));
+    sr_world_destroy(world);
+    sr_world_destroy(NULL);
+}
+
+/* a grid and a callback that say the same give the same world, whichever way the camera came */
+static void labels_of_a_grid_and_of_a_callback_give_the_same_points(sr_context* context)
+{
+    const sr_window place = {{0, -6}, {15, 6}};
+    sr_world_desc desc = description();
+    sr_world *called = NULL, *read = NULL;
+    sr_grid* grid = street();
+    uint64_t a_cells = 0, b_cells = 0;
+    float *a, *b;
+    broken = 1;
+    CHECK_OK(context, sr_world_create(context, &desc, &called));
+    {
+        const double position[3] = {8, 0, 1.5};
+        CHECK_OK(context, sr_world_focus(called, position, position, 3));
+        CHECK(sr_world_step(called, 0, NULL) == SR_ERR_BAD_INPUT &&
+              says(context, "callback returned SR_ERR_BAD_INPUT"));
+    }
+    broken = 0;
+    walk(context, called, 20, 2);
+    walk(context, called, 14, 3);
+    walk(context, called, 4.8, 5);
+    CHECK(calls > 10);
+    desc.labels = NULL;
+    desc.grid = grid;
+    CHECK_OK(context, sr_world_create(context, &desc, &read));
+    sr_grid_destroy(grid);
+    walk(context, read, 4.8, 5);
+    a = points_of(called, &place, &a_cells);
+    b = points_of(read, &place, &b_cells);
+    CHECK(a_cells == 16 * 16 && b_cells == a_cells);
+    CHECK(!memcmp(a, b, (size_t)a_cells * 20 * 6 * sizeof(float)));
+    CHECK(info_of(read).finished == info_of(read).wanted && !info_of(read).full);
+    free(a);
+    free(b);
+    sr_world_destroy(read);
+    sr_world_destroy(called);
+}
+
+static void an_edit_makes_its_place_anew(sr_context* context)
+{
+    const sr_window place = {{8, -6}, {15, 6}};
+    const sr_cell wall = {10, 0, 1, 2}, wrong = {0, 0, 0, 77};
+    sr_world_desc desc = description();
+    sr_world* world = NULL;
+    uint64_t cells = 0;
+    uint32_t done = 0;
+    CHECK_OK(context, sr_world_create(context, &desc, &world));
+    walk(context, world, 6, 2);
+    free(points_of(world, &place, &cells));
+    CHECK(cells == 16 * 8);
+    CHECK(sr_world_edit(world, &wrong, 1) == SR_ERR_BAD_INPUT && says(context, "label 77"));
+    CHECK_OK(context, sr_world_edit(world, &wall, 1));
+    free(points_of(world, &place, &cells));
+    CHECK(cells < 16 * 8);
+    while (!done)
+        CHECK_OK(context, sr_world_step(world, 20000, &done));
+    free(points_of(world, &place, &cells));
+    CHECK(cells == 16 * 8 + 1);
+    sr_world_destroy(world);
+}
+
+static sr_draw_desc camera(void)
+{
+    const double to_camera[12] = {0, -1, 0, 0, 0, 0, -1, 1.5, 1, 0, 0, -1};
+    sr_draw_desc draw;
+    memset(&draw, 0, sizeof draw);
+    draw.struct_size = sizeof draw;
+    draw.width = WIDTH;
+    draw.height = HEIGHT;
+    draw.fx = draw.fy = WIDTH / 2;
+    draw.cx = WIDTH / 2;
+    draw.cy = HEIGHT / 2;
+    memcpy(draw.world_to_camera, to_camera, sizeof to_camera);
+    return draw;
+}
+
+static float color[PIXELS * 4], normal[PIXELS * 4], depth[PIXELS * 2];
+static uint32_t label[PIXELS * 2];
+
+/* the road fills the lower half, and its depth is that of the plane */
+static void looks_right(void)
+{
+    const int pixel = (HEIGHT - 6) * WIDTH + WIDTH / 2;
+    const double a_metre_down = (WIDTH / 2) / (HEIGHT / 2 - 6 + 0.5); /* points lie up to 0.6 m above the ground */
+    CHECK(color[4 * pixel + 3] > 0.5f);
+    CHECK(depth[2 * pixel + 1] > 0.75 * a_metre_down && depth[2 * pixel + 1] < 1.65 * a_metre_down);
+    CHECK(label[2 * pixel] == 0);
+    CHECK(normal[4 * pixel + 3] > 0);
+    CHECK(color[4 * (WIDTH / 2) + 3] == 0 && label[2 * (WIDTH / 2)] == SR_NO_CELL); /* the sky */
+}
+
+static void draws_into_host_memory(sr_context* context)
+{
+    sr_world_desc desc = description();
+    sr_world* world = NULL;
+    sr_draw_desc draw = camera();
+    sr_splats splats;
+    uint64_t version;
+    CHECK_OK(context, sr_world_create(context, &desc, &world));
+    memset(&splats, 0, sizeof splats);
+    splats.struct_size = sizeof splats;
+    CHECK_OK(context, sr_world_get_splats(world, &splats));
+    version = splats.version;
+    CHECK(splats.count == 0 && splats.positions.buffer);
+    walk(context, world, 4, 6);
+    CHECK_OK(context, sr_world_get_splats(world, &splats));
+    CHECK(splats.count == info_of(world).splats && splats.count > 5000 && splats.version > version);
+    CHECK(splats.positions.bytes == 16 * (uint64_t)((2u << 20) / 56) &&
+          splats.labels.bytes * 4 == splats.positions.bytes);
+    draw.color.memory = color;
+    draw.normal.memory = normal;
+    draw.depth.memory = depth;
+    draw.label.memory = label;
+    CHECK_OK(context, sr_world_draw(world, &draw));
+    looks_right();
+    draw.fx = NAN;
+    CHECK(sr_world_draw(world, &draw) == SR_ERR_BAD_INPUT && says(context, "not finite"));
+    draw = camera();
+    draw.width = 0;
+    CHECK(sr_world_draw(world, &draw) == SR_ERR_USAGE && says(context, "0 x 40"));
+    sr_world_destroy(world);
+}
+
+/* the same pictures through buffers and images of the host's own device */
+static void draws_into_buffers_and_images_of_a_host(void)
+{
+    struct host host = make_host();
+    sr_vulkan_device vulkan;
+    sr_context_desc desc;
+    sr_world_desc world_desc = description();
+    sr_context* context = NULL;
+    sr_world* world = NULL;
+    sr_draw_desc draw = camera();
+    struct host_buffer buffer = make_buffer(&host, PIXELS * 16 + 64);
+    struct host_image image = make_image(&host, WIDTH, HEIGHT, VK_FORMAT_R32G32B32A32_SFLOAT);
+    memset(&vulkan, 0, sizeof vulkan);
+    vulkan.struct_size = sizeof vulkan;
+    vulkan.instance = host.instance;
+    vulkan.physical_device = host.physical;
+    vulkan.device = host.device;
+    vulkan.queue = host.queue;
+    vulkan.robust_buffer_access = 1;
+    memset(&desc, 0, sizeof desc);
+    desc.struct_size = sizeof desc;
+    desc.vulkan = &vulkan;
+    CHECK(sr_context_create(&desc, &context) == SR_OK);
+    CHECK_OK(context, sr_world_create(context, &world_desc, &world));
+    walk(context, world, 4, 6);
+    draw.color.memory = color;
+    draw.depth.memory = depth;
+    draw.normal.memory = normal;
+    draw.label.memory = label;
+    draw.color.buffer = buffer.buffer;
+    draw.color.buffer_offset = 64;
+    draw.normal.image = image.image;
+    draw.normal.layout_before = VK_IMAGE_LAYOUT_UNDEFINED;
+    draw.normal.layout_after = VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL;
+    CHECK_OK(context, sr_world_draw(world, &draw));
+    looks_right();
+    CHECK(!memcmp((char*)buffer.mapped + 64, color, sizeof color));
+    CHECK(((char*)buffer.mapped)[63] == 0);
+    read_image(&host, &image, &buffer); /* in the layout that was asked for */
+    CHECK(!memcmp(buffer.mapped, normal, sizeof normal));
+    sr_world_destroy(world);
+    sr_context_destroy(context);
+    destroy_image(&host, &image);
+    destroy_buffer(&host, &buffer);
+    CHECK(vkDeviceWaitIdle(host.device) == VK_SUCCESS);
+    destroy_host(&host);
+}
+
+int main(int argc, char** argv)
+{
+    sr_context* context = NULL;
+    CHECK(argc == 2);
+    model = argv[1];
+    sr_set_diagnostic_callback(print_line, stderr);
+    edits_grids_cell_by_cell();
+    CHECK(sr_context_create(NULL, &context) == SR_OK);
+    refuses_wrong_worlds(context);
+    labels_of_a_grid_and_of_a_callback_give_the_same_points(context);
+    an_edit_makes_its_place_anew(context);
+    draws_into_host_memory(context);
+    sr_context_destroy(context);
+    draws_into_buffers_and_images_of_a_host();
+    return 0;
+}

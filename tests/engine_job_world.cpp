@@ -1,0 +1,426 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// worlds that are generated around a camera: the way there, budgets, caches and edits change no byte
+#include "engine/job/world.h"
+
+#include "engine/job/generation.h"
+#include "engine/voxfield/tile_regions.h"
+#include "tests/json_text.h"
+#include "tests/scratch_folder.h"
+
+#include <algorithm>
+#include <gtest/gtest.h>
+#include <set>
+
+namespace semrover {
+namespace engine_job_world_test {
+
+constexpr int32_t kEdge = 6; // cells of a tile
+
+Device& device()
+{
+    static const std::unique_ptr<Device> d = std::move(*Device::create({}));
+    return *d;
+}
+
+GenerationOptions options()
+{
+    GenerationOptions o;
+    o.model = SEMROVER_SOURCE_DIR "/tests/golden/sampling_ddpm/model";
+    o.steps = 2;
+    o.region_size = 24;
+    o.coverage_threshold = 8;
+    o.strategy = RegionStrategy::rim;
+    o.batch = 2;
+    o.tile_size = kEdge * 0.6;
+    return o;
+}
+
+// a road along x with a wall beside it and a hole in it
+VoxelGrid street(int32_t begin = -12, int32_t end = 24)
+{
+    VoxelGrid grid;
+    grid.voxel_size = 0.6f;
+    for (int32_t i = begin; i < end; ++i)
+        for (int32_t j = -6; j < 12; ++j)
+            for (int32_t k = 0; k < (j == 9 ? 3 : 1); ++k)
+                if (i != 3 || j != 4) {
+                    grid.cells.push_back({i, j, k});
+                    grid.labels.push_back(j == 9 ? 2 : 0);
+                }
+    sort_cells(grid);
+    return grid;
+}
+
+// what `generate --order tiles` makes of a grid
+VoxelGrid generated(VoxelGrid grid, uint32_t batch = 2)
+{
+    GenerationRequest r;
+    GenerationOptions o = options();
+    o.batch = batch;
+    r.settings = *resolve_generation(o);
+    auto job = begin_generation(device(), std::move(grid), r);
+    EXPECT_TRUE(job) << job.error().message;
+    for (bool done = false; !done;) {
+        const auto step = (*job)->step(JobBudget::unlimited());
+        EXPECT_TRUE(step) << step.error().message;
+        done = !step || *step;
+    }
+    EXPECT_TRUE((*job)->finish());
+    return (*job)->grid();
+}
+
+const VoxelGrid& whole()
+{
+    static const VoxelGrid grid = generated(street());
+    return grid;
+}
+
+std::unique_ptr<World> open(const Path& cache = {}, uint64_t host_bytes = 0, uint32_t at_once = 1,
+                            VoxelGrid grid = street())
+{
+    WorldRequest r{.settings = *resolve_generation(options()), .cache = cache};
+    r.host_bytes = host_bytes;
+    r.tiles_at_once = at_once;
+    auto world = open_world(device(), std::move(r), labels_of_grid(std::move(grid)));
+    EXPECT_TRUE(world) << world.error().message;
+    return std::move(*world);
+}
+
+WorldFocus looking(double x, double radius, double direction = 1)
+{
+    return {.position = {x, 1.5, 1.5}, .direction = {direction, 0, 0}, .radius = radius};
+}
+
+size_t run(World& world, const JobBudget& budget = JobBudget::unlimited())
+{
+    size_t steps = 0;
+    for (bool done = false; !done; ++steps) {
+        const auto step = world.step(budget);
+        EXPECT_TRUE(step) << step.error().message;
+        done = !step || *step;
+        EXPECT_LT(steps, 10000u);
+    }
+    return steps;
+}
+
+std::set<TileIndex> tiles_of(const World& world)
+{
+    std::set<TileIndex> tiles;
+    for (int32_t x = -5; x < 8; ++x)
+        for (int32_t y = -3; y < 4; ++y)
+            if (world.tile({x, y}))
+                tiles.insert({x, y});
+    return tiles;
+}
+
+// of a tile's cells, those with the same points as in `grid`
+size_t same_cells(const VoxelGrid& tile, const VoxelGrid& grid)
+{
+    const size_t width = size_t(tile.points_per_voxel) * 3;
+    size_t same = 0;
+    for (size_t c = 0; c < tile.cells.size(); ++c) {
+        const auto found = find_cell(grid, tile.cells[c]);
+        same += found &&
+                std::equal(&tile.points[c * width], &tile.points[c * width] + width, &grid.points[*found * width]) &&
+                std::equal(&tile.colors[c * width], &tile.colors[c * width] + width, &grid.colors[*found * width]);
+    }
+    return same;
+}
+
+void expect_same(const World& world, const VoxelGrid& grid)
+{
+    EXPECT_FALSE(tiles_of(world).empty());
+    for (const TileIndex& index : tiles_of(world)) {
+        const VoxelGrid& tile = *world.tile(index);
+        EXPECT_EQ(same_cells(tile, grid), tile.cells.size()) << index[0] << ", " << index[1];
+        EXPECT_EQ(std::ranges::count(tile.generated, 1), int64_t(tile.cells.size()));
+    }
+}
+
+// ---- the order of tiles, by `generate`
+
+TEST(engine_job_world, generate_by_tiles_gives_the_same_bytes_for_every_batch)
+{
+    for (const uint32_t batch : {1u, 5u}) {
+        const VoxelGrid other = generated(street(), batch);
+        EXPECT_EQ(other.points, whole().points);
+        EXPECT_EQ(other.colors, whole().colors);
+    }
+    EXPECT_EQ(std::ranges::count(whole().generated, 1), int64_t(whole().cells.size()));
+}
+
+TEST(engine_job_world, a_part_with_the_neighbours_of_a_place_gives_the_bytes_of_the_whole)
+{
+    for (const int32_t tile : {0, 1}) {
+        const VoxelGrid part = generated(street((tile - 1) * kEdge, (tile + 2) * kEdge));
+        VoxelGrid place;
+        place.points_per_voxel = part.points_per_voxel;
+        for (size_t c = 0; c < part.cells.size(); ++c)
+            if (tile_of(part.cells[c], kEdge)[0] == tile)
+                append_cell(place, part, c);
+        EXPECT_GT(place.cells.size(), 100u);
+        EXPECT_EQ(same_cells(place, whole()), place.cells.size());
+    }
+}
+
+// ---- worlds
+
+TEST(engine_job_world, two_ways_to_a_place_give_the_same_bytes)
+{
+    const auto from_left = open(), from_right = open({}, 0, 4), at_once = open();
+    for (double x = -6; x <= 4; x += 2) {
+        ASSERT_TRUE(from_left->focus(looking(x, 2)));
+        run(*from_left);
+    }
+    for (double x = 13; x >= 4; x -= 3) {
+        ASSERT_TRUE(from_right->focus(looking(x, 2, -1)));
+        run(*from_right);
+    }
+    ASSERT_TRUE(at_once->focus(looking(4, 30)));
+    run(*at_once);
+    for (const auto* world : {&from_left, &from_right, &at_once})
+        expect_same(**world, whole());
+    EXPECT_EQ(at_once->figures().generated, 18u); // all tiles of the street
+    EXPECT_EQ(at_once->figures().finished, at_once->figures().wanted);
+}
+
+TEST(engine_job_world, a_submit_at_a_time_and_focus_between_them_change_nothing)
+{
+    const auto world = open();
+    size_t steps = 0;
+    for (double x = -6; steps < 60; x += 0.5, ++steps) {
+        ASSERT_TRUE(world->focus(looking(x, 3)));
+        ASSERT_TRUE(world->step(JobBudget::one_submit()));
+    }
+    ASSERT_TRUE(world->focus(looking(4, 4)));
+    run(*world, JobBudget::one_submit());
+    expect_same(*world, whole());
+}
+
+TEST(engine_job_world, what_is_ahead_comes_first)
+{
+    const auto order = [](double direction) {
+        const auto world = open();
+        EXPECT_TRUE(world->focus(looking(3, 12, direction)));
+        std::vector<TileIndex> came;
+        for (bool done = false; !done;) {
+            done = *world->step(JobBudget::one_submit());
+            for (const WorldChange& change : world->take_changes()) {
+                EXPECT_TRUE(change.there);
+                came.push_back(change.tile);
+            }
+        }
+        return came;
+    };
+    const std::vector<TileIndex> ahead = order(1), behind = order(-1);
+    const auto rank = [](const std::vector<TileIndex>& came, const TileIndex& tile) {
+        return std::ranges::find(came, tile) - came.begin();
+    };
+    EXPECT_LT(rank(ahead, {3, 0}), rank(ahead, {-2, 0}));
+    EXPECT_GT(rank(behind, {3, 0}), rank(behind, {-2, 0}));
+    EXPECT_LT(rank(ahead, {0, 0}), 9);
+}
+
+TEST(engine_job_world, what_was_dropped_comes_back_with_the_same_bytes_from_the_cache_or_anew)
+{
+    const ScratchFolder folder;
+    for (const Path& cache : {Path(), folder / "cache"}) {
+        const uint64_t budget = 34 << 10; // some four tiles
+        const auto world = open(cache, budget);
+        ASSERT_TRUE(world->focus(looking(-5, 1)));
+        run(*world);
+        const auto near = tiles_of(*world);
+        EXPECT_LE(world->figures().host_bytes, budget);
+        for (double x = -2; x < 14; x += 2) {
+            ASSERT_TRUE(world->focus(looking(x, 1)));
+            run(*world);
+            EXPECT_LE(world->figures().host_bytes, budget);
+            EXPECT_FALSE(world->figures().full);
+        }
+        EXPECT_GE(world->figures().dropped, 2u); // six tiles lie on the way
+        EXPECT_FALSE(world->tile(*near.begin()));
+        const uint64_t before = world->figures().generated;
+        ASSERT_TRUE(world->focus(looking(-5, 1)));
+        run(*world);
+        EXPECT_TRUE(world->tile(*near.begin()));
+        expect_same(*world, whole());
+        EXPECT_EQ(world->figures().generated == before, !cache.empty());
+        EXPECT_EQ(world->figures().loaded > 0, !cache.empty());
+    }
+}
+
+TEST(engine_job_world, a_cache_serves_another_session_and_no_other_world)
+{
+    const ScratchFolder folder;
+    const Path cache = folder / "cache";
+    {
+        const auto world = open(cache);
+        ASSERT_TRUE(world->focus(looking(4, 30)));
+        run(*world);
+        ASSERT_TRUE(world->flush());
+    }
+    const auto again = open(cache);
+    ASSERT_TRUE(again->focus(looking(4, 30)));
+    run(*again);
+    EXPECT_EQ(again->figures().generated, 0u);
+    EXPECT_EQ(again->figures().loaded, 18u);
+    expect_same(*again, whole());
+    // one file is damaged, and one label is another: these tiles and those that see them are made anew
+    folder.put("cache/tile_-2_-1.sgrid", "nothing");
+    VoxelGrid other = street();
+    other.labels[*find_cell(other, {8, 8, 0})] = 1; // of tile (1, 1), which nobody sees
+    const auto changed = open(cache, 0, 1, other);
+    ASSERT_TRUE(changed->focus(looking(4, 30)));
+    run(*changed);
+    EXPECT_EQ(changed->figures().generated, 2u);
+    expect_same(*changed, generated(other));
+}
+
+TEST(engine_job_world, an_edit_spoils_its_tile_and_those_that_see_it_and_can_be_taken_back)
+{
+    const ScratchFolder folder;
+    for (const Path& cache : {Path(), folder / "cache"}) {
+        const auto world = open(cache);
+        ASSERT_TRUE(world->focus(looking(4, 30)));
+        run(*world);
+        (void)world->take_changes();
+        const Cell paved = {1, 2, 0}, gone = {2, 2, 0}, added = {1, 2, 1}; // of tile (0, 0)
+        ASSERT_TRUE(world->edit({{paved, uint8_t(1)}, {gone, std::nullopt}, {added, uint8_t(13)}}));
+        std::set<TileIndex> left;
+        for (const WorldChange& change : world->take_changes()) {
+            EXPECT_FALSE(change.there);
+            left.insert(change.tile);
+        }
+        std::set<TileIndex> spoiled = {{0, 0}};
+        for (const TileIndex& tile : tiles_that_see({0, 0}))
+            spoiled.insert(tile);
+        EXPECT_EQ(left, spoiled);
+        EXPECT_FALSE(world->tile({0, 0}));
+        expect_same(*world, whole()); // what is left of it
+        run(*world);
+        VoxelGrid other = street();
+        other.labels[*find_cell(other, paved)] = 1;
+        const size_t hole = *find_cell(other, gone);
+        other.cells[hole] = added;
+        other.labels[hole] = 13;
+        sort_cells(other);
+        const VoxelGrid expected = generated(other);
+        expect_same(*world, expected);
+        EXPECT_LT(same_cells(*world->tile({0, 0}), whole()), world->tile({0, 0})->cells.size());
+        ASSERT_TRUE(world->edit({{paved, uint8_t(0)}, {gone, uint8_t(0)}, {added, std::nullopt}}));
+        run(*world);
+        expect_same(*world, whole());
+        EXPECT_EQ(tiles_of(*world).size(), 18u);
+    }
+}
+
+TEST(engine_job_world, an_edit_while_its_tile_is_made_begins_it_again)
+{
+    for (size_t steps = 1; steps < 14; steps += 3) {
+        const auto world = open();
+        ASSERT_TRUE(world->focus(looking(1, 0.5)));
+        for (size_t i = 0; i < steps; ++i)
+            ASSERT_TRUE(world->step(JobBudget::one_submit()));
+        ASSERT_TRUE(world->edit({{{2, 2, 0}, uint8_t(1)}}));
+        run(*world);
+        VoxelGrid other = street();
+        other.labels[*find_cell(other, {2, 2, 0})] = 1;
+        static const VoxelGrid expected = generated(other);
+        expect_same(*world, expected);
+        EXPECT_TRUE(world->tile({0, 0}));
+    }
+}
+
+TEST(engine_job_world, labels_come_from_a_folder_of_tiles_and_from_a_callback_alike)
+{
+    const ScratchFolder folder;
+    ASSERT_TRUE(write_tiles(folder / "labels", street(), 16));
+    WorldRequest r{.settings = *resolve_generation(options())};
+    auto from_folder = open_world(device(), r, std::move(*labels_of_folder(folder / "labels")));
+    const VoxelGrid all = street();
+    size_t calls = 0;
+    auto from_callback =
+        open_world(device(), r, labels_of_callback(0.6f, [&](const CellWindow& window, VoxelGrid& grid) -> Status {
+                       ++calls;
+                       for (size_t c = all.cells.size(); c-- > 0;) // in any order
+                           if (window.holds(all.cells[c]))
+                               append_cell(grid, all, c);
+                       return {};
+                   }));
+    ASSERT_TRUE(from_folder && from_callback);
+    for (World* world : {from_folder->get(), from_callback->get()}) {
+        ASSERT_TRUE(world->focus(looking(4, 6)));
+        run(*world);
+        expect_same(*world, whole());
+    }
+    EXPECT_GE(calls, (*from_callback)->figures().in_memory);
+}
+
+TEST(engine_job_world, an_error_of_the_source_is_told_and_the_next_step_tries_again)
+{
+    bool broken = true;
+    const VoxelGrid all = street();
+    auto world = open_world(device(), {.settings = *resolve_generation(options())},
+                            labels_of_callback(0.6f, [&](const CellWindow& window, VoxelGrid& grid) -> Status {
+                                if (broken)
+                                    return fail(ErrorCode::bad_input, "no map here");
+                                for (size_t c = 0; c < all.cells.size(); ++c)
+                                    if (window.holds(all.cells[c]))
+                                        append_cell(grid, all, c);
+                                return {};
+                            }));
+    ASSERT_TRUE(world) << world.error().message;
+    ASSERT_TRUE((*world)->focus(looking(4, 1)));
+    const auto step = (*world)->step(JobBudget::unlimited());
+    ASSERT_FALSE(step);
+    EXPECT_EQ(step.error().message, "no map here");
+    broken = false;
+    run(**world);
+    expect_same(**world, whole());
+}
+
+TEST(engine_job_world, without_labels_nothing_is_made_and_a_world_without_room_says_so)
+{
+    const auto empty = open();
+    ASSERT_TRUE(empty->focus(looking(500, 10)));
+    EXPECT_EQ(run(*empty), 1u);
+    EXPECT_EQ(empty->figures().generated, 0u);
+    EXPECT_EQ(empty->figures().finished, empty->figures().wanted);
+    const auto narrow = open({}, 100 << 10);
+    ASSERT_TRUE(narrow->focus(looking(4, 30)));
+    run(*narrow);
+    EXPECT_TRUE(narrow->figures().full);
+    EXPECT_LE(narrow->figures().host_bytes, 100u << 10);
+    EXPECT_GT(narrow->figures().generated, 0u);
+    expect_same(*narrow, whole());
+}
+
+TEST(engine_job_world, refuses_what_cannot_be)
+{
+    const auto refused = [](const auto& result, ErrorCode code, const char* text) {
+        ASSERT_FALSE(result);
+        EXPECT_EQ(result.error().code, code);
+        EXPECT_NE(result.error().message.find(text), std::string::npos) << result.error().message;
+    };
+    GenerationOptions o = options();
+    o.tile_size = 0;
+    refused(open_world(device(), {.settings = *resolve_generation(o)}, labels_of_grid(street())), ErrorCode::usage,
+            "tile size");
+    o.tile_size = 1.2;
+    refused(open_world(device(), {.settings = *resolve_generation(o)}, labels_of_grid(street())), ErrorCode::usage,
+            "narrower");
+    VoxelGrid fine = street();
+    fine.voxel_size = 0.3f;
+    refused(open_world(device(), {.settings = *resolve_generation(options())}, labels_of_grid(fine)),
+            ErrorCode::bad_input, "0.3 m");
+    const auto world = open();
+    refused(world->focus(looking(0, -1)), ErrorCode::usage, "radius");
+    refused(world->focus(looking(1e9, 1)), ErrorCode::usage, "too far");
+    refused(world->focus(looking(NAN, 1)), ErrorCode::usage, "finite");
+    refused(world->edit({{{0, 0, 0}, uint8_t(20)}}), ErrorCode::bad_input, "label 20");
+    refused(world->edit({{{1 << 21, 0, 0}, uint8_t(0)}}), ErrorCode::bad_input, "beyond");
+}
+
+} // namespace engine_job_world_test
+} // namespace semrover
