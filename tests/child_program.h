@@ -31,6 +31,11 @@ class ChildProgram {
             pid_ = -1;
         return pid_ > 0;
     }
+    void send(int signal)
+    {
+        if (running())
+            kill(pid_, signal);
+    }
     // sends the signal and waits: exit status, 128 + signal when killed
     int stop(int signal)
     {

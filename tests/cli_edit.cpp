@@ -217,6 +217,9 @@ TEST_F(CliEdit, operations_come_in_the_order_given_from_line_and_script)
                                   {"op": "remove", "class": "road", "box": [4, 2, 0, 8, 4, 1]}])");
     run(line("edit", "--script " + path("edits.json"), "b.sgrid"));
     EXPECT_EQ(contents(path("a.sgrid")), contents(path("b.sgrid")));
+    folder_.put("edits.json", R"([{"op": "remove", "class": "car"}, {"op": "remove", "class": "bicycle"}])");
+    expect_refusal(line("edit", "--script " + path("edits.json"), "c.sgrid"), 3,
+                   "operation 2 of 2: remove: no cell of the grid is selected");
 }
 
 TEST_F(CliEdit, a_car_is_cut_out_and_set_elsewhere)

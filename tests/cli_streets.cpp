@@ -106,6 +106,23 @@ TEST(CliStreets, the_sun_stands_where_it_is_asked_to)
     EXPECT_EQ(streets(folder / "x", "--clouds 1.5").code, 2);
 }
 
+TEST(CliStreets, cells_may_be_so_large_that_no_lane_wins_one)
+{
+    const ScratchFolder folder;
+    const ProgramResult made = streets(folder / "x", "--voxel-size 2");
+    EXPECT_EQ(made.code, 0) << made.err;
+    EXPECT_TRUE(fs::exists(folder / "x/semantic.sgrid"));
+}
+
+TEST(CliStreets, a_drive_that_cannot_be_is_refused)
+{
+    const ScratchFolder folder;
+    expect_error(semrover_program("streets --length 50 --first 51 -o " + (folder / "x").string()), 2,
+                 "--first: 51 m is behind the end of the street, which is 50 m long");
+    expect_error(semrover_program("streets --length 20000 --spacing 0.01 -o " + (folder / "x").string()), 2,
+                 "--spacing: 0.01 m makes 1999400 frames of this street, at most 100000 are possible");
+}
+
 TEST(CliStreets, the_same_seed_gives_the_same_files)
 {
     const ScratchFolder folder;

@@ -212,6 +212,7 @@ TEST(Camera, a_broken_tum_line_is_named)
     EXPECT_TRUE(says(read("0 0 0 0 0 0 0 one\n"), "line 1: expected a number, found 'one'"));
     EXPECT_TRUE(says(read("0 0 0 0 0 0 0 1x\n"), "expected a number, found '1x'"));
     EXPECT_TRUE(says(read("0 nan 0 0 0 0 0 1\n"), "a number that is not finite"));
+    EXPECT_TRUE(says(read("0 0 0 0 0 0 0 1\n0 1e300 0 0 0 0 0 1\n"), "a.tum' line 2: a pose at 1e+300, 0, 0 m"));
     EXPECT_TRUE(says(read("inf 0 0 0 0 0 0 1\n"), "a time that is not finite"));
     EXPECT_TRUE(says(read("0 0 0 0 0 0 0 1e999\n"), "expected a number"));
     EXPECT_TRUE(says(read("0 0 0 0 0 0 0 0\n"), "expected a quaternion of norm 1, found 0"));

@@ -420,6 +420,8 @@ TEST(engine_edit, scripts_that_make_no_sense_are_refused_with_their_place)
         {R"([{"op": "paint", "label": "road", "class": "car", "fill": 1}])", "fill: expected true or false"},
         {R"([{"op": "insert", "stamp": "x"}])", "--at x,y,z is missing"},
         {R"([{"op": "insert", "at": [0, 0, 0]}])", "the stamp is missing"},
+        {R"([{"op": "insert", "stamp": "/etc/passwd", "at": [0, 0, 0]}])", "operation 1: stamp: expected a file in"},
+        {R"([{"op": "insert", "stamp": "a/../../x", "at": [0, 0, 0]}])", "found 'a/../../x'"},
         {R"([{"op": "insert", "stamp": "x", "at": [0, 0, 0], "rotate": 45}])", "0, 90, 180 or 270"},
         {R"([{"op": "copy", "class": "car"}])", "--by x,y,z is missing"},
         {R"([{"op": "copy", "class": "car", "by": [1, 1, 1], "points": "maybe"}])", "keep or regenerate"},

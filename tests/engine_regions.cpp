@@ -326,8 +326,8 @@ TEST(Regions, BadInputIsRefusedWithTheReason)
     EXPECT_NE(message(two, {.region_size = 0}).find("region_size"), std::string::npos);
     EXPECT_NE(message(two, {.coverage_threshold = 0}).find("coverage_threshold"), std::string::npos);
     EXPECT_NE(message(two, {.coverage_threshold = 129}).find("coverage_threshold"), std::string::npos);
-    EXPECT_NE(message(two, {.first_seed = 2}).find("first_seed"), std::string::npos);
-    EXPECT_NE(message(two, {.first_seed = -1}).find("first_seed"), std::string::npos);
+    EXPECT_NE(message(two, {.first_seed = 2}).find("first_cell"), std::string::npos);
+    EXPECT_NE(message(two, {.first_seed = -1}).find("first_cell"), std::string::npos);
     EXPECT_NE(message({{INT32_MIN, 0, 0}, {INT32_MAX, 0, 0}, {0, 0, 0}}, {}).find("too wide"), std::string::npos);
 }
 

@@ -115,7 +115,7 @@ TEST(Vox, a_model_without_a_scene_begins_at_the_origin)
     ASSERT_TRUE(moved) << moved.error().message;
     EXPECT_EQ(moved->grid.cells[0], (Cell{-2, 1, 4}));
     o.origin = {0.3, 0, 0};
-    EXPECT_TRUE(says(read(folder, bytes, o), "origin: 0.3 m is not a whole number of cells of 0.5 m"));
+    EXPECT_TRUE(says(read(folder, bytes, o), "origin: 0.3 m is not a whole number of voxels of 0.5 m"));
 }
 
 TEST(Vox, transforms_place_and_turn_models)

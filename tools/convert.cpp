@@ -2,11 +2,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // semrover convert IN OUT: a model in another layout; or a scene, a camera path or boxes in another format, as IN says
 #include "runtime/base/quote.h"
+#include "tools/cli/choice.h"
+#include "tools/cli/number_option.h"
+#include "tools/cli/option_meaning.h"
 #include "tools/convert_model.h"
 #include "tools/convert_objects.h"
 #include "tools/convert_path.h"
 #include "tools/convert_scene.h"
 
+#include <array>
 #include <CLI/CLI.hpp>
 
 namespace semrover {
@@ -18,8 +22,20 @@ struct ConvertArguments {
     ConvertSceneOptions scene;
     ConvertPathOptions path;
     ConvertObjectsOptions objects;
-    std::string guessing_model; // of a grid whose OUT is objects
+    std::string guessing_model;        // of a grid whose OUT is objects
+    const CLI::App* command = nullptr; // whose options they are
 };
+
+using Names = std::span<const std::string_view>;
+constexpr std::array<std::string_view, 1> kDryRun = {"--dry-run"};
+constexpr std::array<std::string_view, 7> kBoxNames = {"--from",  "--map",    "--origin",       "--calib",
+                                                       "--frame", "--sample", "--vehicle-frame"};
+constexpr std::array<std::string_view, 3> kModelNames = {"--dtype", "--asd-init", "--vsd-init"};
+constexpr std::array<std::string_view, 8> kPathNames = {"--path-format", "--camera", "--rig",          "--width",
+                                                        "--height",      "--fov-x",  "--camera-model", "--distortion"};
+constexpr std::array<std::string_view, 2> kGuessNames = {"--model", "--seed"};
+constexpr std::array<std::string_view, 5> kSceneNames = {"--to", "--seed", "--splat-radius", "--opacity",
+                                                         "--splat-labels"};
 
 // --from; else what leaves no doubt
 std::optional<BoxFormat> box_format(const ConvertArguments& o)
@@ -27,15 +43,9 @@ std::optional<BoxFormat> box_format(const ConvertArguments& o)
     return o.scene.input.from.empty() ? detect_box_format(o.model.in) : box_format_of(o.scene.input.from);
 }
 
-bool for_models(const ConvertModelOptions& o)
-{
-    return !o.dtype.empty() || o.asd_init || o.vsd_init;
-}
-
 Status convert_boxes(const ConvertArguments& o, BoxFormat format, const Globals& globals)
 {
-    if (for_models(o.model) || !o.scene.to.empty())
-        return fail(ErrorCode::usage, "--dtype, --asd-init, --vsd-init and --to have no meaning for boxes");
+    SR_CHECK(refuse_others(*o.command, {kDryRun, kBoxNames}, "boxes"));
     SR_TRY(const Point3 origin, origin_of(o.scene.input));
     return convert_objects(
         {.in = o.model.in, .out = o.model.out, .map = o.scene.input.map, .origin = origin, .dry_run = o.model.dry_run},
@@ -70,21 +80,26 @@ Status convert(ConvertArguments& o, const Globals& globals)
     if (const auto format = box_format(o))
         return convert_boxes(o, *format, globals);
     SR_CHECK(check_from(o));
-    if (o.objects.any())
-        return fail(ErrorCode::usage,
-                    "--calib, --frame, --sample and --vehicle-frame are for boxes; {} are none, or "
-                    "--from says which",
-                    quote_path(o.model.in));
-    if (is_camera_path(o.model.in))
-        return convert_path(o.model.in, o.model.out, o.path, globals);
-    if (!is_scene(o))
+    const auto refuse_but = [&](std::initializer_list<Names> meant, std::string_view kind) {
+        return refuse_others(
+            *o.command, meant,
+            fmt::format("{}, which {} is taken for (--from says which format it has)", kind, quote_path(o.model.in)));
+    };
+    if (is_camera_path(o.model.in)) {
+        SR_CHECK(refuse_but({kDryRun, kPathNames}, "a camera path"));
+        return convert_path(o.model.in, o.model.out, o.path, o.model.dry_run, globals);
+    }
+    if (!is_scene(o)) {
+        SR_CHECK(refuse_but({kDryRun, kModelNames}, "a model"));
         return convert_model(o.model, globals);
-    if (for_models(o.model))
-        return fail(ErrorCode::usage, "--dtype, --asd-init and --vsd-init are for models");
-    if (Path(o.model.out).extension() == ".json")
+    }
+    if (Path(o.model.out).extension() == ".json") {
+        SR_CHECK(refuse_others(*o.command, {kDryRun, kGuessNames, scene_input_options()}, "objects that are guessed"));
         return guess_objects_of(
             {.in = o.model.in, .out = o.model.out, .map = {}, .origin = {}, .dry_run = o.model.dry_run}, o.scene.input,
             o.guessing_model, globals);
+    }
+    SR_CHECK(refuse_but({kDryRun, kSceneNames, scene_input_options()}, "a scene"));
     o.scene.in = o.model.in;
     o.scene.out = o.model.out;
     o.scene.dry_run = o.model.dry_run;
@@ -103,8 +118,7 @@ void add_convert(CLI::App& app, const Globals& globals, Run& run)
          ".label, .vox, .ply) or splats (.ply, .glb, .splat); or boxes (KITTI, nuScenes, Waymo, CARLA)")
         ->required();
     c->add_option("OUT", o->model.out, "folder to write; or the scene's file, its format by the extension")->required();
-    c->add_option("--dtype", o->model.dtype, "precision of the weights; by default as in IN")
-        ->check(CLI::IsMember({"f32", "f16", "bf16"}));
+    add_choice(*c, "--dtype", {"f32", "f16", "bf16"}, "precision of the weights; by default as in IN", o->model.dtype);
     c->add_flag("--asd-init", o->model.asd_init,
                 "make a plain UNet the start of a deferred renderer: 9 more input channels, with zero weights");
     c->add_flag("--vsd-init", o->model.vsd_init,
@@ -113,10 +127,13 @@ void add_convert(CLI::App& app, const Globals& globals, Run& run)
         ->excludes("--asd-init");
     c->add_flag("--dry-run", o->model.dry_run, "check IN and say what would be written");
     c->add_option("--to", o->scene.to, "format of a scene's OUT: 3dgs, 2dgs, inria62 or points-ply for a .ply, ...");
-    add_all_scene_input_options(*c, o->scene.input);
+    o->command = c;
+    add_scene_input_options(*c, o->scene.input);
+    add_seed(*c, "--seed", o->scene.input.seed,
+             "which points stay where a cell has more; of objects, which are guessed");
     c->add_option("--splat-radius", o->scene.splat_radius,
                   "grid to splats: standard deviation in metres, or auto: from the spacing of the points");
-    c->add_option("--opacity", o->scene.opacity, "grid to splats: of every splat")->check(CLI::Range(0.01f, 1.f));
+    add_number(*c, "--opacity", o->scene.opacity, "grid to splats: of every splat", 0.01f, 1.f);
     c->add_flag("--splat-labels", o->scene.splat_labels, "a property label in .ply splats");
     add_path_options(*c, o->path);
     add_box_options(*c, o->objects);

@@ -5,6 +5,7 @@
 #include "engine/model/model_writer.h"
 #include "engine/model/renderer_model.h"
 #include "runtime/base/quote.h"
+#include "tools/cli/print_stderr.h"
 #include "tools/cli/progress.h"
 
 #include <algorithm>
@@ -191,7 +192,7 @@ Result<Conversion> plan_conversion(const ConvertModelOptions& o)
 class StagingFolder {
   public:
     explicit StagingFolder(const Path& out)
-        : out_(out), path_(out.parent_path() / fmt::format(".semrover-{}-{}.tmp", out.filename().string(), getpid()))
+        : out_(out), path_(out.parent_path() / fmt::format(".semrover-{}-model.tmp", getpid())), unfinished_(path_)
     {
     }
     StagingFolder(const StagingFolder&) = delete;
@@ -206,6 +207,7 @@ class StagingFolder {
 
     Status commit()
     {
+        const Together renamed_and_forgotten;
         std::error_code error;
         if (!is_there(out_))
             fs::rename(path_, out_, error);
@@ -248,6 +250,7 @@ class StagingFolder {
     }
 
     Path out_, path_;
+    Unfinished unfinished_;
 };
 
 // each tensor reports that it is done, and stops where the user wants
@@ -347,7 +350,7 @@ Status convert_model(const ConvertModelOptions& o, const Globals& globals)
     SR_TRY(Conversion plan, plan_conversion(o));
     for (const std::string& warning : plan.warnings)
         if (!globals.quiet)
-            fmt::print(stderr, "semrover: warning: {}\n", warning);
+            print_stderr("semrover: warning: {}\n", warning);
     if (!o.dry_run)
         SR_CHECK(write_conversion(plan, out, globals));
     report(plan, o, globals);

@@ -5,6 +5,7 @@
 #include "engine/job/told_objects.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
+#include "tools/cli/number_option.h"
 #include "tools/scene_input.h"
 
 #include <CLI/CLI.hpp>
@@ -40,7 +41,8 @@ Json classes_of(std::span<const SceneObject> objects)
 void add_box_options(CLI::App& c, ConvertObjectsOptions& o)
 {
     c.add_option("--calib", o.calibration, "of KITTI's boxes: the calibration; they come out in the lidar's frame");
-    c.add_option("--frame", o.frame, "of boxes of many frames: the number of one (KITTI), or its timestamp (Waymo)");
+    add_number(c, "--frame", o.frame, "of boxes of many frames: the number of one (KITTI), or its timestamp (Waymo)", 0,
+               UINT64_MAX);
     c.add_option("--sample", o.sample, "of nuScenes' boxes: the token of a sample; by default each instance once");
     c.add_flag("--vehicle-frame", o.vehicle_frame, "of nuScenes' and Waymo's boxes: in the vehicle's frame");
 }

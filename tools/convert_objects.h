@@ -12,8 +12,6 @@ struct ConvertObjectsOptions {
     std::string calibration, sample;
     std::optional<uint64_t> frame;
     bool vehicle_frame = false;
-
-    bool any() const { return !calibration.empty() || !sample.empty() || frame || vehicle_frame; }
 };
 void add_box_options(CLI::App& command, ConvertObjectsOptions& options);
 

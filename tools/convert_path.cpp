@@ -7,6 +7,7 @@
 #include "engine/format/camera_text.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
+#include "tools/cli/choice.h"
 
 #include <algorithm>
 #include <CLI/CLI.hpp>
@@ -124,8 +125,8 @@ Status write_output(const Path& out, const CameraPath& path, PathFormat format)
 
 void add_path_options(CLI::App& c, ConvertPathOptions& o)
 {
-    c.add_option("--path-format", o.format, "of a camera path that is written; by default OUT's name tells")
-        ->check(CLI::IsMember({"tum", "kitti", "transforms", "camera_path", "colmap"}));
+    add_choice(c, "--path-format", {"tum", "kitti", "transforms", "camera_path", "colmap"},
+               "of a camera path that is written; by default OUT's name tells", o.format);
     c.add_option("--camera", o.camera, "of a camera path: only the frames of this camera");
     c.add_option("--rig", o.rig, "of a camera path: every sensor of a rig.json at every pose");
     add_lens_options(c, o.lens);
@@ -141,14 +142,15 @@ bool is_camera_path(const Path& path)
            ((extension == ".txt" || extension.empty()) && starts_with_a_pose(path));
 }
 
-Status convert_path(const Path& in, const Path& out, const ConvertPathOptions& o, const Globals& globals)
+Status convert_path(const Path& in, const Path& out, const ConvertPathOptions& o, bool dry_run, const Globals& globals)
 {
     const Path to = out.has_filename() ? out : out.parent_path(); // "sparse/"
     SR_TRY(const PathFormat format, output_format(to, o));
     SR_CHECK(check_output(in, to, format, globals));
     SR_TRY(CameraPath path, read_input(in, o));
     SR_CHECK(choose_camera(path, in, o, format));
-    SR_CHECK(write_output(to, path, format));
+    if (!dry_run)
+        SR_CHECK(write_output(to, path, format));
     if (globals.json)
         fmt::print("{}\n", Json{{"output", printable(to.string())},
                                 {"format", std::string(name_of(format))},

@@ -21,6 +21,7 @@ void add_path_options(CLI::App& command, ConvertPathOptions& options);
 bool is_camera_path(const Path& path);
 
 // errors: usage; bad_input, and then nothing was written
-Status convert_path(const Path& in, const Path& out, const ConvertPathOptions& options, const Globals& globals);
+Status convert_path(const Path& in, const Path& out, const ConvertPathOptions& options, bool dry_run,
+                    const Globals& globals);
 
 } // namespace semrover

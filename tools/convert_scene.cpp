@@ -6,6 +6,7 @@
 #include "engine/splat/blocks.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/open_device.h"
+#include "tools/cli/option_meaning.h"
 #include "tools/drive_options.h"
 
 namespace semrover {
@@ -30,6 +31,22 @@ Result<SceneFormat> output_format(const ConvertSceneOptions& o, const SceneInput
         return fail(ErrorCode::usage, "--to: {} cannot be written; formats are {}", quote(o.to, 60), names);
     }
     return *format;
+}
+
+// options that do nothing with this input and this output
+Status check_meaning(const ConvertSceneOptions& o, const SceneInput& input, SceneFormat to)
+{
+    const CLI::App& c = *o.input.command;
+    static constexpr std::array<std::string_view, 1> kSeed = {"--seed"}, kLabels = {"--splat-labels"};
+    static constexpr std::array<std::string_view, 2> kSplats = {"--splat-radius", "--opacity"};
+    const std::string what = fmt::format("{} to {}", facts_of(input.format).name, facts_of(to).name);
+    if (input.format != SceneFormat::points_ply)
+        SR_CHECK(refuse_given(c, kSeed, what));
+    if (to != SceneFormat::gaussian_3d && to != SceneFormat::gaussian_2d)
+        SR_CHECK(refuse_given(c, kLabels, what));
+    if (input.splats || !facts_of(to).splats || !input.grid->has_points())
+        SR_CHECK(refuse_given(c, kSplats, what));
+    return {};
 }
 
 std::vector<Path> files_of(const Path& out, SceneFormat format)
@@ -95,8 +112,10 @@ Json summary(const ConvertSceneOptions& o, const SceneInput& input, SceneFormat 
 Status write_output(const ConvertSceneOptions& o, SceneInput& input, SceneFormat to, const Globals& globals)
 {
     const bool as_splats = facts_of(to).splats;
-    if (input.grid && !as_splats)
+    if (input.grid && !as_splats) {
+        const Together files_of_one_result;
         return write_scene_grid(o.out, *input.grid, to, input.warnings);
+    }
     if (!input.splats) {
         SR_TRY(input.splats, splats_of(o, *input.grid, globals));
     }
@@ -113,6 +132,7 @@ Status convert_scene(const ConvertSceneOptions& o, const Globals& globals)
     if (input.splats && !facts_of(to).splats && to != SceneFormat::points_ply)
         return fail(ErrorCode::usage, "{} holds splats; {} holds a grid: write points-ply first, and grid that",
                     quote_path(o.in), facts_of(to).name);
+    SR_CHECK(check_meaning(o, input, to));
     if (!o.dry_run) {
         SR_CHECK(check_output(o, to, globals));
         SR_CHECK(write_output(o, input, to, globals));

@@ -4,6 +4,7 @@
 
 #include "engine/camera/rig.h"
 #include "engine/format/camera_path.h"
+#include "tools/cli/number_option.h"
 
 #include <CLI/CLI.hpp>
 
@@ -35,9 +36,8 @@ void add_drive_options(CLI::App& c, DriveOptions& o)
         "--splat-radius", o.splat_radius,
         "standard deviation of a splat in metres (0.04, or what the renderer says), or auto: from the spacing of "
         "the points");
-    c.add_option("--opacity", o.opacity, "of every splat")->check(CLI::Range(0.01f, 1.f));
-    c.add_option("--visible-alpha", o.visible_alpha, "alpha from which a pixel counts as visible")
-        ->check(CLI::Range(0.f, 1.f));
+    add_number(c, "--opacity", o.opacity, "of every splat", 0.01f, 1.f);
+    add_number(c, "--visible-alpha", o.visible_alpha, "alpha from which a pixel counts as visible", 0.f, 1.f);
     c.add_option("--background", o.background, "R,G,B behind the splats");
 }
 

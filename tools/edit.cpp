@@ -6,6 +6,7 @@
 #include "engine/scene/edit_script.h"
 #include "engine/scene/edit_undo.h"
 #include "engine/scene/scene_objects.h"
+#include "tools/cli/number_option.h"
 #include "tools/cli/run_job.h"
 #include "tools/generation_options.h"
 
@@ -176,11 +177,12 @@ void add_edit(CLI::App& app, const Globals& globals, Run& run)
     const auto rotate = [o = o.get()](double t) {
         last(*o, "--rotate").quarter_turns = parsed(quarter_turns(t), "--rotate");
     };
-    c->add_option_function<double>(
-         "--rotate", rotate, "of insert, copy and move: 0, 90, 180 or 270 degrees, counterclockwise seen from above")
+    add_number_function<double>(*c, "--rotate", rotate,
+                                "of insert, copy and move: 0, 90, 180 or 270 degrees, counterclockwise seen from above",
+                                {0, 270})
         ->trigger_on_parse();
     add_ordered(*c, o.get(), kPoints);
-    c->add_option("--halo", o->edit.halo, "metres around what changed that are generated anew (with -m)");
+    add_number(*c, "--halo", o->edit.halo, "metres around what changed that are generated anew (with -m)", 0, 30);
     c->add_option("--undo", o->undo, "OUTPUT.undo of an edit: gives back the file that was edited");
     add_regeneration_options(*c, o->out);
     c->callback([o, &globals, &run] { run = resuming(globals, [o, &globals] { return edit(*o, globals); }); });

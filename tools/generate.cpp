@@ -6,6 +6,8 @@
 #include "engine/job/growth.h"
 #include "runtime/base/hash.h"
 #include "tools/cli/choice.h"
+#include "tools/cli/number_option.h"
+#include "tools/cli/option_meaning.h"
 #include "tools/cli/run_job.h"
 #include "tools/generation_options.h"
 #include "tools/scene_input.h"
@@ -32,6 +34,7 @@ Status generate_along(const GenerateArguments& o, const Globals& globals)
         return fail(ErrorCode::usage, "--ply and its like have no meaning with --along: convert what it writes");
     if (o.order == "tiles")
         return fail(ErrorCode::usage, "--order tiles has no meaning with --along");
+    SR_CHECK(refuse_given(*o.input.command, scene_input_options(), "--along, whose scaffold is a grid of ours"));
     GrowthRequest request = o.along;
     request.generation = o.generation.options;
     request.tile_size = o.tile_size.value_or(request.tile_size);
@@ -88,7 +91,7 @@ void add_generate(CLI::App& app, const Globals& globals, Run& run)
     add_scene_input_options(*c, o->input);
     c->add_option("-m,--model", o->generation.options.model, "model folder")->required();
     c->add_option("-o,--output", o->output, ".sgrid to write; OUTPUT.run beside it keeps the run's state");
-    c->add_option("-s,--seed", o->seed, "noise seed");
+    add_seed(*c, "-s,--seed", o->seed, "noise seed");
     c->add_option(
         "--objects", o->objects,
         "boxes and colours that the model is told of: objects.json, auto (guessed from the labels and the seed) "
@@ -102,21 +105,26 @@ void add_generate(CLI::App& app, const Globals& globals, Run& run)
                        if (text == region_strategy_name(s))
                            o->generation.options.strategy = s;
                });
-    c->add_option("--first-cell", o->generation.options.first_cell, "index of the cell to start from");
+    add_number(*c, "--first-cell", o->generation.options.first_cell, "index of the cell to start from", 0, 1ll << 40);
     c->add_option("--ply", o->ply.points, "also write the points with colour and label as PLY");
     c->add_option("--ply-3dgs", o->ply.splats_3d, "also write the splats as a 3DGS PLY");
     c->add_option("--ply-2dgs", o->ply.splats_2d, "also write the splats as a 2DGS PLY");
-    c->add_option("--along", o->along.path,
-                  "camera path: grow the scaffold along it into a folder of tiles, with memory that does not grow");
-    c->add_option("--horizon", o->along.horizon, "--along: metres from the path, seen from above, that are generated");
-    c->add_option("--window", o->along.window, "--along: metres of path at a time; another value gives another world");
+    CLI::Option* along =
+        c->add_option("--along", o->along.path,
+                      "camera path: grow the scaffold along it into a folder of tiles, with memory that does not grow");
+    add_number(*c, "--horizon", o->along.horizon, "--along: metres from the path, seen from above, that are generated",
+               0.1, 1000)
+        ->needs(along);
+    add_number(*c, "--window", o->along.window, "--along: metres of path at a time; another value gives another world",
+               0.1, 1000);
     add_choice(*c, "--order", {"scene", "tiles"},
                "of regions: one over the whole scene, or tile by tile, where the points of a place depend on the "
                "labels near it alone",
-               [o](const std::string& text) { o->order = text; });
-    c->add_option("--tile-size", o->tile_size,
-                  "metres of a tile's edge: --order tiles (9.6; another value gives other points), --along (38.4), "
-                  "when the scaffold is one .sgrid");
+               o->order);
+    add_number(*c, "--tile-size", o->tile_size,
+               "metres of a tile's edge: --order tiles (9.6; another value gives other points), --along (38.4), "
+               "when the scaffold is one .sgrid",
+               0.01, 1e6);
     c->callback([o, &globals, &run] { run = resuming(globals, [o, &globals] { return generate(*o, globals); }); });
 }
 

@@ -3,6 +3,7 @@
 #include "tools/generation_options.h"
 
 #include "tools/cli/choice.h"
+#include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/progress.h"
 #include "tools/cli/run_job.h"
@@ -67,20 +68,20 @@ Result<GivenObjects> objects_of(const Path& grid, const RegenerationArguments& o
 void add_generation_options(CLI::App& c, GenerationArguments& a)
 {
     GenerationOptions& o = a.options;
-    c.add_option("--steps", o.steps, "denoising steps");
-    c.add_option("--cfg-scale", o.cfg_scale, "guidance towards the labels; 1: none");
-    c.add_option("--cfg-from", o.cfg_from, "timestep below which steps are not guided, which halves their cost")
-        ->check(CLI::Range(0, 10000));
+    add_number(c, "--steps", o.steps, "denoising steps", 1, 10000);
+    add_number(c, "--cfg-scale", o.cfg_scale, "guidance towards the labels; 1: none", 0, 1000);
+    add_number(c, "--cfg-from", o.cfg_from, "timestep below which steps are not guided, which halves their cost", 0,
+               10000);
     c.add_option("--sampler", o.sampler, "ddpm, ddim or dpm++2m");
     c.add_option("--preset", o.preset, "fast (20 steps), standard (50, RePaint 5/2), paper (250, RePaint 10/10, DDPM)");
-    c.add_option("--jump-length", o.jump_length, "RePaint: steps of a jump back");
-    c.add_option("--jump-n-sample", o.jump_n_sample, "RePaint: passes over each jump");
+    add_number(c, "--jump-length", o.jump_length, "RePaint: steps of a jump back", 0, 10000);
+    add_number(c, "--jump-n-sample", o.jump_n_sample, "RePaint: passes over each jump", 1, 10000);
     add_choice(c, "--known-tokens", {"noised", "clean"},
                "how the network sees cells that are there: as the model says, or",
                [&o](const std::string& text) { o.known = text == "clean" ? KnownTokens::clean : KnownTokens::noised; });
-    c.add_option("--batch", o.batch, "regions at a time; any value gives the same bytes")->check(CLI::Range(1u, 1024u));
-    c.add_option("--region-size", o.region_size, "cells of a region");
-    c.add_option("--coverage-threshold", o.coverage_threshold, "new cells that a region must have");
+    add_number(c, "--batch", o.batch, "regions at a time; any value gives the same bytes", 1u, 1024u);
+    add_number(c, "--region-size", o.region_size, "cells of a region", 1, 4096);
+    add_number(c, "--coverage-threshold", o.coverage_threshold, "new cells that a region must have", 1, 4096);
     add_precision_option(c, o.precision);
     c.add_option("--profile", a.profile, "write device times as a Chrome trace");
     c.add_flag("--dry-run", a.dry_run, "only say how many regions, how much memory, how long");
@@ -109,9 +110,8 @@ void add_regeneration_options(CLI::App& c, RegenerationArguments& o)
         "--objects", o.objects,
         "boxes and colours that the model is told of: objects.json, auto (guessed from the labels and the seed) "
         "or none; by default the file beside GRID, or else auto");
-    c.add_option("-s,--seed", o.seed, "noise seed");
-    c.add_option("--seeds", o.seeds, "several seeds, such as 1,2,3: writes OUTPUT-seedN.sgrid for each")
-        ->delimiter(',');
+    add_seed(c, "-s,--seed", o.seed, "noise seed");
+    add_seeds(c, "--seeds", o.seeds, "several seeds, such as 1,2,3: writes OUTPUT-seedN.sgrid for each");
     add_generation_options(c, o.generation);
 }
 

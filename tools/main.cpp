@@ -18,6 +18,7 @@ int main(int argc, char** argv)
          add_generate,
          add_inpaint,
          add_inspect,
+         add_labels,
          add_page,
          add_refine,
          add_render,

@@ -9,6 +9,8 @@
 #include "runtime/base/quote.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/lens_options.h"
+#include "tools/cli/number_option.h"
+#include "tools/cli/print_stderr.h"
 #include "tools/cli/progress.h"
 
 #include <algorithm>
@@ -109,7 +111,7 @@ Result<PictureTable> load_pictures(const PageArguments& o, const Globals& global
         progress->finish();
     for (const std::string& warning : table.warnings)
         if (!globals.quiet)
-            fmt::print(stderr, "semrover: warning: {}\n", warning);
+            print_stderr("semrover: warning: {}\n", warning);
     return table;
 }
 
@@ -171,14 +173,15 @@ void add_page(CLI::App& app, const Globals& globals, Run& run)
     c->add_option("--truth", o->truth, "another .sgrid file, to look at in its place");
     c->add_option("--title", o->title, "of the page; else the grid's name");
     c->add_option("--about", o->about, "a sentence or two below the title");
-    c->add_option("--frames", o->frames, "NAME=FOLDER of pictures 000000.png; several lie beside each other");
+    CLI::Option* frames =
+        c->add_option("--frames", o->frames, "NAME=FOLDER of pictures 000000.png; several lie beside each other");
     c->add_option("--run", o->runs, "a run's folder, or its run.json, for the table of settings and results");
     c->add_option("--figures", o->figures, "a JSON object of names and values, for a table of its own");
     c->add_option("--path", o->path, "a camera path of any format, to drive along in the scene");
-    c->add_option("--max-frames", o->pictures.limit, "moments at most, evenly chosen")->check(CLI::Range(1u, 2000u));
-    c->add_option("--quality", o->pictures.quality, "of JPEG")->check(CLI::Range(1, 100));
-    c->add_option("--max-points", o->max_points, "points of a scene at most, evenly chosen")
-        ->check(CLI::Range(uint64_t(1), uint64_t(20000000)));
+    add_number(*c, "--max-frames", o->pictures.limit, "moments at most, evenly chosen", 1u, 2000u)->needs(frames);
+    add_number(*c, "--quality", o->pictures.quality, "of JPEG", 1, 100)->needs(frames);
+    add_number(*c, "--max-points", o->max_points, "points of a scene at most, evenly chosen", uint64_t(1),
+               uint64_t(20000000));
     c->callback([o, &globals, &run] { run = [o, &globals] { return page(*o, globals); }; });
 }
 

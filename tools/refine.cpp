@@ -5,6 +5,7 @@
 #include "runtime/base/bytes_text.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/choice.h"
+#include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/run_job.h"
 #include "tools/drive_options.h"
@@ -37,7 +38,12 @@ Result<Refinement> resolve(const RefineArguments& o, const Globals& globals, con
     if (!o.drive.path.empty()) {
         SR_TRY(r.path, load_cameras(o.drive));
     }
-    r.grid = [&o, &globals] { return load_grid(o.options.input, {}, globals); };
+    r.grid = [&o, &globals]() -> Result<VoxelGrid> {
+        Result<VoxelGrid> grid = load_grid(o.options.input, {}, globals);
+        if (!grid && o.options.input.extension() != ".sgrid") // options that the message may name are convert's
+            return fail(grid.error().code, "{} (`semrover convert` makes a .sgrid of it)", grid.error().message);
+        return grid;
+    };
     r.replace = globals.yes;
     return resolve_refinement(std::move(r), callbacks);
 }
@@ -115,17 +121,20 @@ void add_options(CLI::App& c, RefineArguments& a)
     c.add_option("DIR|GRID", o.input, "folder that `semrover render` wrote, or a grid with --path")->required();
     c.add_option("-m,--model", o.model, "model with a renderer: folder, or LDM file")->required();
     c.add_option("-o,--output", o.output, "folder for frames/, latents/ and the run's state");
-    c.add_option("-s,--seed", o.seed, "noise seed");
-    c.add_option("--steps", o.steps, "denoising steps of a frame");
-    c.add_option("--cfg-scale", o.guidance_scale,
-                 "guidance towards the previous frame and what is visible; 1: none; of a window's last frame");
-    c.add_option("--cfg-first", o.first_guidance_scale, "guidance of a window's first frame; linear in between");
-    c.add_option("--window", o.window_frames, "frames that a renderer of videos makes together");
-    c.add_option("--window-overlap", o.window_overlap, "of these, how many are known from the window before");
-    c.add_option("--decode-frames", o.decode_frames, "frames that its VAE decodes together: less memory with fewer");
+    add_seed(c, "-s,--seed", o.seed, "noise seed");
+    add_number(c, "--steps", o.steps, "denoising steps of a frame", 1, 10000);
+    add_number(c, "--cfg-scale", o.guidance_scale,
+               "guidance towards the previous frame and what is visible; 1: none; of a window's last frame", 0, 1000);
+    add_number(c, "--cfg-first", o.first_guidance_scale, "guidance of a window's first frame; linear in between", 0,
+               1000);
+    add_number(c, "--window", o.window_frames, "frames that a renderer of videos makes together", 1, kMostWindowFrames);
+    add_number(c, "--window-overlap", o.window_overlap, "of these, how many are known from the window before", 0,
+               kMostWindowFrames - 1);
+    add_number(c, "--decode-frames", o.decode_frames, "frames that its VAE decodes together: less memory with fewer", 1,
+               kMostWindowFrames);
     add_choice(c, "--sampler", {"ddim", "dpm++2m", "euler"}, "ddim, dpm++2m or euler",
                [&o](const std::string& text) { o.sampler = *sampler_from_name(text); });
-    c.add_option("--previous-noise", o.previous_noise, "noise on the previous frame's latent");
+    add_number(c, "--previous-noise", o.previous_noise, "noise on the previous frame's latent", 0, 1000);
     add_choice(
         c, "--frame-noise", {"fresh", "warped"},
         "of a frame: fresh, or warped, as it was on the surfaces of the frame before (wants --path)",
@@ -135,10 +144,10 @@ void add_options(CLI::App& c, RefineArguments& a)
     c.add_option("--from", o.from, "output of an earlier run: FIRST goes on from its latents of the frames before");
     add_choice(c, "--format", {"png", "jpeg"}, "of the frames",
                [&o](const std::string& text) { o.format.jpeg = text == "jpeg"; });
-    c.add_option("--quality", o.format.quality, "of JPEG frames")->check(CLI::Range(1, 100));
+    add_number(c, "--quality", o.format.quality, "of JPEG frames", 1, 100);
     c.add_option("--video", a.videos.frames, "also an MP4 of the frames, one per camera, through ffmpeg");
     c.add_option("--side-by-side", a.videos.side_by_side, "also an MP4 of label, buffer and frame");
-    c.add_option("--fps", a.videos.frames_per_second, "frames a second of the videos")->check(CLI::Range(1, 240));
+    add_number(c, "--fps", a.videos.frames_per_second, "frames a second of the videos", 1, 240);
     c.add_option("--profile", a.profile, "write device times as a Chrome trace");
     c.add_flag("--dry-run", a.dry_run, "only say how many frames and how much memory");
     add_drive_options(c, a.drive);

@@ -4,6 +4,7 @@
 #include "engine/job/drawing.h"
 #include "engine/job/outputs.h"
 #include "runtime/base/quote.h"
+#include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/run_job.h"
 #include "tools/drive_options.h"
@@ -123,8 +124,9 @@ void add_render(CLI::App& app, const Globals& globals, Run& run)
     add_scene_input_options(*c, o->input);
     c->add_flag("--semantic", o->semantic, "label colours; a grid without points is drawn as blocks");
     c->add_flag("--top", o->top, "also an overview from above, top.png");
-    c->add_option("--video", o->video, "also an MP4 of the colour frames (of the first camera), through ffmpeg");
-    c->add_option("--fps", o->frames_per_second, "frames a second of the video")->check(CLI::Range(1, 240));
+    CLI::Option* video =
+        c->add_option("--video", o->video, "also an MP4 of the colour frames (of the first camera), through ffmpeg");
+    add_number(*c, "--fps", o->frames_per_second, "frames a second of the video", 1, 240)->needs(video);
     c->add_option("--profile", o->profile, "write device times as a Chrome trace");
     c->callback([o, &globals, &run] { run = [o, &globals] { return render(*o, globals); }; });
 }

@@ -5,7 +5,13 @@
 #include "engine/scene/palette.h"
 #include "engine/scene/tiles.h"
 #include "runtime/base/quote.h"
+#include "tools/cli/class_option.h"
+#include "tools/cli/number_option.h"
+#include "tools/cli/option_meaning.h"
+#include "tools/cli/print_stderr.h"
 
+#include <algorithm>
+#include <array>
 #include <CLI/CLI.hpp>
 #include <cmath>
 
@@ -21,12 +27,47 @@ std::string names_of_formats()
     return names;
 }
 
+// what the options mean for a format, beside --from
+std::vector<std::string_view> options_of(SceneFormat format, bool finer)
+{
+    switch (format) {
+    case SceneFormat::npz:
+        return {"--voxel-size"};
+    case SceneFormat::semantickitti:
+        return {"--map", "--voxel-size", "--origin", "--min-fill"};
+    case SceneFormat::occ3d_nuscenes:
+    case SceneFormat::occ3d_waymo:
+        return {"--map", "--voxel-size", "--origin", "--min-fill", "--mask"};
+    case SceneFormat::vox:
+        if (finer)
+            return {"--map", "--voxel-size", "--origin", "--nearest-color", "--file-voxel-size", "--min-fill"};
+        return {"--map", "--voxel-size", "--origin", "--nearest-color", "--file-voxel-size"};
+    case SceneFormat::points_ply:
+        return {"--map", "--voxel-size", "--origin", "--label", "--labels-only", "--points-per-voxel"};
+    default: // our own grids, and splats, are read as they are
+        return {};
+    }
+}
+
+// `what`: the input, for the message
+Status check_options(const SceneInputOptions& o, SceneFormat format, std::string_view what)
+{
+    if (!o.command)
+        return {};
+    const std::vector<std::string_view> meant = options_of(format, o.file_voxel_size > 0);
+    for (const std::string_view name : scene_input_options())
+        if (name != "--from" && std::ranges::find(meant, name) == meant.end())
+            SR_CHECK(refuse_given(*o.command, {&name, 1}, what));
+    return {};
+}
+
 Result<SceneGridOptions> grid_options(const SceneInputOptions& o)
 {
     SceneGridOptions g;
     g.map = o.map;
     g.voxel_size = o.voxel_size;
     SR_TRY(g.origin, origin_of(o));
+    g.file_voxel_size = o.file_voxel_size;
     g.min_fill = o.min_fill;
     g.mask = o.mask;
     g.points_per_voxel = o.points_per_voxel;
@@ -34,9 +75,7 @@ Result<SceneGridOptions> grid_options(const SceneInputOptions& o)
     g.semantic = o.labels_only;
     g.nearest_color = o.nearest_color;
     if (!o.label.empty()) {
-        g.default_label = class_of_name(o.label);
-        if (!g.default_label)
-            return fail(ErrorCode::usage, "--label: there is no class {}", quote(o.label, 60));
+        SR_TRY(g.default_label, class_option("--label", o.label));
     }
     return g;
 }
@@ -58,25 +97,28 @@ Result<std::array<double, 3>> origin_of(const SceneInputOptions& options)
 
 void add_scene_input_options(CLI::App& c, SceneInputOptions& o)
 {
+    o.command = &c;
     c.add_option("--from", o.from, "format of the input, instead of by its extension: " + names_of_formats());
     c.add_option("--map", o.map, "JSON: label of the input (number or name) to class (name or number), null: left out");
-    c.add_option("--voxel-size", o.voxel_size, "metres, of a grid made of another program's voxels or points")
-        ->check(CLI::Range(0.001f, 100.f));
+    add_number(c, "--voxel-size", o.voxel_size, "metres, of a grid made of another program's voxels or points", 0.001f,
+               100.f);
+    add_number(c, "--file-voxel-size", o.file_voxel_size,
+               "metres of a voxel of a .vox, where several make a cell; as --voxel-size", 0.0001, 100);
     c.add_option("--origin", o.origin, "X,Y,Z: where the input's origin lies in the world, metres");
-}
-
-void add_all_scene_input_options(CLI::App& c, SceneInputOptions& o)
-{
-    add_scene_input_options(c, o);
-    c.add_option("--min-fill", o.min_fill, "share of a cell that smaller voxels must fill; 0: any")
-        ->check(CLI::Range(0.0, 1.0));
+    add_number(c, "--min-fill", o.min_fill, "share of a cell that smaller voxels must fill; 0: any", 0.0, 1.0);
     c.add_option("--mask", o.mask, "array of an Occ3D .npz that says which voxels count: mask_camera, mask_lidar, ...");
-    c.add_option("--points-per-voxel", o.points_per_voxel, "of a grid made of points with colours")
-        ->check(CLI::Range(1, 4096));
-    c.add_option("--seed", o.seed, "which points stay where a cell has more; of objects, which are guessed");
+    add_number(c, "--points-per-voxel", o.points_per_voxel, "of a grid made of points with colours", 1, 4096);
     c.add_flag("--labels-only", o.labels_only, "points with colours make a grid of labels too");
     c.add_flag("--nearest-color", o.nearest_color, "a .vox colour that no class has counts as the nearest one's");
     c.add_option("--label", o.label, "class of points without a label");
+}
+
+std::span<const std::string_view> scene_input_options()
+{
+    static constexpr std::array<std::string_view, 11> kNames = {
+        "--from", "--map",   "--voxel-size",       "--file-voxel-size", "--origin",       "--min-fill",
+        "--mask", "--label", "--points-per-voxel", "--labels-only",     "--nearest-color"};
+    return kNames;
 }
 
 Result<SceneInput> read_scene_input(const Path& path, const SceneInputOptions& o)
@@ -85,6 +127,7 @@ Result<SceneInput> read_scene_input(const Path& path, const SceneInputOptions& o
     SR_TRY(const SceneGridOptions options, grid_options(o));
     std::error_code ignored;
     if (std::filesystem::is_directory(path, ignored)) {
+        SR_CHECK(check_options(o, SceneFormat::sgrid, "a folder of tiles"));
         SR_TRY(input.grid, read_grid_or_tiles(path));
         return input;
     }
@@ -97,7 +140,9 @@ Result<SceneInput> read_scene_input(const Path& path, const SceneInputOptions& o
     } else {
         SR_TRY(input.format, detect_scene_format(path));
     }
-    if (facts_of(input.format).splats) {
+    const SceneFormatFacts& facts = facts_of(input.format);
+    SR_CHECK(check_options(o, input.format, fmt::format("{} of {}", facts.splats ? "splats" : "a grid", facts.name)));
+    if (facts.splats) {
         SR_TRY(SplatFile file, read_splats(path, input.format));
         input.splats = std::move(file.surfels);
         input.warnings = std::move(file.warnings);
@@ -115,7 +160,7 @@ void print_warnings(const std::vector<std::string>& warnings, const Globals& glo
 {
     for (const std::string& warning : warnings)
         if (!globals.quiet)
-            fmt::print(stderr, "semrover: warning: {}\n", warning);
+            print_stderr("semrover: warning: {}\n", warning);
 }
 
 Result<VoxelGrid> load_grid(const Path& path, const SceneInputOptions& options, const Globals& globals)

@@ -7,19 +7,24 @@
 
 #include <optional>
 
+namespace CLI {
+class App;
+}
+
 namespace semrover {
 
 // how a command reads grids and splats of any format: what `convert`, `render`, `generate` and `inspect` share
 struct SceneInputOptions {
     std::string from, map, origin, mask, label;
     float voxel_size = 0.6f;
-    double min_fill = 0;
+    double file_voxel_size = 0, min_fill = 0;
     int points_per_voxel = 20;
     uint64_t seed = 0;
     bool labels_only = false, nearest_color = false;
+    const CLI::App* command = nullptr; // that they are options of; none: all have their defaults
 };
-void add_scene_input_options(CLI::App& command, SceneInputOptions& options); // the ones that most files need
-void add_all_scene_input_options(CLI::App& command, SceneInputOptions& options);
+void add_scene_input_options(CLI::App& command, SceneInputOptions& options);
+std::span<const std::string_view> scene_input_options(); // their names
 
 // --origin as numbers; errors: usage
 Result<std::array<double, 3>> origin_of(const SceneInputOptions& options);
@@ -32,6 +37,7 @@ struct SceneInput {
     std::vector<std::string> warnings;
     uint64_t dropped = 0;
 };
+// usage also for options that have no meaning for this format
 Result<SceneInput> read_scene_input(const Path& path, const SceneInputOptions& options);
 
 void print_warnings(const std::vector<std::string>& warnings, const Globals& globals);

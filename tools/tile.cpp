@@ -5,6 +5,7 @@
 #include "engine/scene/tiles.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/commands.h"
+#include "tools/cli/number_option.h"
 
 #include <CLI/CLI.hpp>
 
@@ -58,8 +59,9 @@ void add_tile(CLI::App& app, const Globals& globals, Run& run)
     CLI::App* c = app.add_subcommand("tile", "cut a grid into a folder of tiles, or join one");
     c->add_option("INPUT", o->input, ".sgrid, or with --join a folder of tiles")->required();
     c->add_option("-o,--output", o->output, "folder, or with --join a .sgrid")->required();
-    c->add_option("--tile-size", o->tile_size, "metres of a tile's edge, rounded to whole cells");
-    c->add_flag("--join", o->join, "put tiles together to one grid");
+    CLI::Option* size =
+        add_number(*c, "--tile-size", o->tile_size, "metres of a tile's edge, rounded to whole cells", 0.01, 1e6);
+    c->add_flag("--join", o->join, "put tiles together to one grid")->excludes(size);
     c->callback(
         [o, &globals, &run] { run = [o, &globals] { return o->join ? join(*o, globals) : cut(*o, globals); }; });
 }

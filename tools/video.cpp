@@ -46,7 +46,8 @@ Result<Video> Video::create(const Path& path, uint32_t width, uint32_t height, i
     Video v;
     v.path_ = path;
     v.temporary_ = path;
-    v.temporary_.replace_filename(fmt::format(".semrover-{}-{}", getpid(), path.filename().string()));
+    static int count = 0;
+    v.temporary_.replace_filename(fmt::format(".semrover-{}-video{}.tmp", getpid(), count++));
     const std::vector<std::string> arguments = {
         "ffmpeg", "-loglevel", "error", "-y", "-f", "rawvideo", "-pixel_format", "rgb24", "-video_size",
         fmt::format("{}x{}", width, height), "-framerate", std::to_string(frames_per_second), "-i", "-",
@@ -56,21 +57,22 @@ Result<Video> Video::create(const Path& path, uint32_t width, uint32_t height, i
     int ends[2];
     if (::pipe2(ends, O_CLOEXEC) != 0)
         return fail(ErrorCode::bad_input, "cannot make a pipe: {}", std::strerror(errno));
+    const Together started_and_known;
     const auto child = spawn_ffmpeg(arguments, ends[0]);
     ::close(ends[0]);
     if (!child) {
         ::close(ends[1]);
         return tl::make_unexpected(child.error());
     }
-    std::signal(SIGPIPE, SIG_IGN); // an ffmpeg that dies is told by write()
     v.child_ = *child;
+    v.unfinished_ = std::make_unique<Unfinished>(v.temporary_, [pid = *child] { ::kill(pid, SIGKILL); });
     v.input_ = ends[1];
     return v;
 }
 
 Video::Video(Video&& other) noexcept
     : path_(std::move(other.path_)), temporary_(std::move(other.temporary_)), child_(std::exchange(other.child_, -1)),
-      input_(std::exchange(other.input_, -1))
+      input_(std::exchange(other.input_, -1)), unfinished_(std::move(other.unfinished_))
 {
 }
 
@@ -85,6 +87,7 @@ Video::~Video()
     ::unlink(temporary_.c_str());
 }
 
+// note: SIGPIPE is ignored (tools/cli/program.cpp), so an ffmpeg that died is an error of write()
 Status Video::add(std::span<const uint8_t> rgb)
 {
     for (size_t at = 0; at < rgb.size();) {
@@ -101,7 +104,10 @@ Status Video::finish()
 {
     ::close(std::exchange(input_, -1));
     int status = 0;
-    ::waitpid(std::exchange(child_, -1), &status, 0);
+    ::waitpid(child_, &status, 0);
+    const Together renamed_and_forgotten;
+    child_ = -1; // its number may be another process's now
+    unfinished_.reset();
     if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) {
         ::unlink(temporary_.c_str());
         return fail(ErrorCode::bad_input, "ffmpeg could not write {}", quote_path(path_));

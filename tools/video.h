@@ -30,6 +30,7 @@ class Video {
     Path path_, temporary_;
     pid_t child_ = -1;
     int input_ = -1;
+    std::unique_ptr<Unfinished> unfinished_;
 };
 
 } // namespace semrover

@@ -42,6 +42,18 @@ Rigid from_columns(const Point3& x, const Point3& y, const Point3& z, const Poin
     return {x[0], y[0], z[0], t[0], x[1], y[1], z[1], t[1], x[2], y[2], z[2], t[2], 0, 0, 0, 1};
 }
 
+// beyond it nothing is drawn with any precision; earth-centred and map coordinates are within
+constexpr double kMostMetres = 1e8;
+
+Status check_place(const Point3& p, std::string_view where)
+{
+    for (const double x : p)
+        if (!(std::abs(x) <= kMostMetres))
+            return fail(ErrorCode::bad_input, "{}: a pose at {:g}, {:g}, {:g} m, at most {:g} are supported", where,
+                        p[0], p[1], p[2], kMostMetres);
+    return {};
+}
+
 } // namespace
 
 Rigid compose(const Rigid& a, const Rigid& b)
@@ -99,6 +111,7 @@ Result<Rigid> rigid_from_quaternion(const Point3& translation, const Quaternion&
 {
     if (!all_finite(translation) || !all_finite(rotation))
         return fail(ErrorCode::bad_input, "{}: a pose with a number that is not finite", where);
+    SR_CHECK(check_place(translation, where));
     auto [x, y, z, w] = rotation;
     const double norm = std::sqrt(x * x + y * y + z * z + w * w);
     if (norm < 0.9 || norm > 1.1)
@@ -119,6 +132,7 @@ Result<Rigid> rigid_from_matrix(std::span<const double> values, std::string_view
         return fail(ErrorCode::bad_input, "{}: expected a 4x4 or 3x4 matrix, found {} numbers", where, values.size());
     if (!all_finite(values))
         return fail(ErrorCode::bad_input, "{}: a matrix with a number that is not finite", where);
+    SR_CHECK(check_place(column(values, 3), where));
     const double last[4] = {0, 0, 0, 1};
     for (size_t i = 12; i < values.size(); ++i)
         if (std::abs(values[i] - last[i - 12]) > kRotationSlack)

@@ -71,7 +71,7 @@ Status LabelMap::apply(const Path& file)
         }
         bool found = false;
         for (auto& [number, entry] : entries_)
-            if (entry.name == key) {
+            if (same_class_name(entry.name, key)) {
                 entry.target = target;
                 found = true;
             }

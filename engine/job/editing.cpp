@@ -53,7 +53,8 @@ Status apply_tints(const EditedGrid& edited, std::vector<SceneObject>& objects, 
                 cells.push_back(uint32_t(*found));
         const std::vector<size_t> meant = objects_meant(owners, objects.size(), cells);
         if (meant.empty())
-            return fail(ErrorCode::bad_input, "tint: the cells that are selected belong to no object");
+            return fail(ErrorCode::bad_input, "tint {}: the cells that are selected belong to no object",
+                        tint_text(tint.color));
         for (const size_t o : meant)
             objects[o].tint = tint.color;
         for (uint32_t v = 0; v < owners.size(); ++v)
@@ -95,8 +96,10 @@ Result<Regeneration> edit_grid(const EditRequest& r)
     what.input = r.grid;
     SR_TRY(what.before, read_grid(r.grid));
     GridEditor editor(what.before);
-    for (const EditOperation& operation : r.operations)
-        SR_CHECK(editor.apply(operation));
+    for (size_t i = 0; i < r.operations.size(); ++i)
+        if (const Status applied = editor.apply(r.operations[i]); !applied)
+            return fail(applied.error().code, "operation {} of {}: {}", i + 1, r.operations.size(),
+                        applied.error().message);
     EditedGrid edited = editor.finish();
     if (edited.grid.cells.empty())
         return fail(ErrorCode::bad_input, "the edit leaves no cell in {}", quote(r.grid.string()));

@@ -120,7 +120,9 @@ Status Growth::take_up()
 {
     Json last;
     for (const Json& entry : run_->entries()) {
-        if (!entry.is_object() || entry.value("window", Json()) != Json(first_))
+        if (!entry.is_object() || entry.value("window", Json()) != Json(first_) ||
+            !entry.value("cells", Json(0u)).is_number_unsigned() ||
+            !entry.value("regions", Json(0u)).is_number_unsigned())
             return fail(ErrorCode::bad_input, "the journal in {} is damaged; -y starts over", quote_path(run_->path()));
         ++first_;
         cells_ += entry.value("cells", size_t(0));
@@ -135,7 +137,7 @@ Status Growth::take_up()
     if (!fs::exists(piece))
         return {}; // it goes when the tiles are written
     SR_TRY(const uint64_t hash, hash_file(piece));
-    if (hash_text(hash) != last.value("xxh64", ""))
+    if (last.value("xxh64", Json()) != hash_text(hash))
         return fail(ErrorCode::bad_input, "{} is damaged; -y starts over", quote_path(piece));
     SR_TRY(const GrownCells grown, load_piece(piece, points_per_voxel()));
     SR_CHECK(cache_.bring(grown.cells));

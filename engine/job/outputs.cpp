@@ -19,7 +19,7 @@ Result<RunFolder> open_run(const Path& folder, const Json& settings, bool replac
         return RunFolder::open(folder, settings, false, contents);
     const auto before = read_json(folder / "run.json");
     const bool same = before && before->is_object() && before->value("settings", Json()) == settings &&
-                      before->value("state", "") == "running";
+                      before->value("state", Json()) == "running";
     return RunFolder::open(folder, settings, !same, contents);
 }
 

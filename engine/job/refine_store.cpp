@@ -47,7 +47,7 @@ RefineStore::RefineStore(RunFolder& run, FrameFormat format, uint32_t channels)
             continue;
         const std::string piece = entry["piece"];
         const auto hash = hash_file(run.path() / piece);
-        done_[piece] = hash && hash_text(*hash) == entry.value("xxh64", "");
+        done_[piece] = hash && entry.value("xxh64", Json()) == hash_text(*hash);
     }
 }
 

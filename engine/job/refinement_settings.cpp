@@ -268,7 +268,7 @@ size_t Refinement::frames() const
 bool Refinement::was_stopped() const
 {
     const auto before = read_json(options.output / "run.json");
-    return before && before->is_object() && before->value("state", "") == "running";
+    return before && before->is_object() && before->value("state", Json()) == "running";
 }
 
 Status Refinement::check_outputs(std::span<const Path> beside) const

@@ -45,6 +45,7 @@ std::optional<Json> finished_before(const Path& output, const Json& settings)
 Result<Json> write_result(const Regeneration& what, const Path& output, const VoxelGrid& grid,
                           std::span<const SceneObject> objects)
 {
+    const Together one_result;
     SR_CHECK(write_grid(output, grid));
     if (!objects.empty())
         SR_CHECK(write_objects(objects_beside(output), objects));

@@ -65,7 +65,7 @@ std::vector<RegionResult> load_regions(const RunFolder& run)
             continue;
         const uint32_t region = entry["region"];
         const auto hash = hash_file(region_path(run, region));
-        if (!hash || hash_text(*hash) != entry.value("xxh64", ""))
+        if (!hash || entry.value("xxh64", Json()) != hash_text(*hash))
             continue;
         if (auto r = read_region(region_path(run, region), region))
             regions.push_back(std::move(*r));

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 namespace semrover {
@@ -21,6 +22,39 @@ constexpr uint64_t kMaxJournalBytes = 1ull << 30;
 tl::unexpected<Error> system_failure(const char* what, const Path& path)
 {
     return fail(ErrorCode::bad_input, "cannot {} {}: {}", what, quote_path(path), std::strerror(errno));
+}
+
+tl::unexpected<Error> is_a_link(const Path& path)
+{
+    return fail(ErrorCode::bad_input, "{} is a link: the state of a run lies in the run's folder itself; remove it",
+                quote_path(path));
+}
+
+// note: what others put there may be a link to any file of the user's, or a pipe that nobody writes to
+Result<int> open_own(const Path& path, int flags)
+{
+    const int fd = ::open(path.c_str(), flags | O_CREAT | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0666);
+    if (fd < 0 && errno == ELOOP)
+        return is_a_link(path);
+    struct stat status;
+    if (fd < 0 || ::fstat(fd, &status) != 0)
+        return system_failure("open", path);
+    if (S_ISREG(status.st_mode))
+        return fd;
+    ::close(fd);
+    return fail(ErrorCode::bad_input, "cannot open {}: expected a file, found a device or pipe", quote_path(path));
+}
+
+// the settings and the state of a run.json
+Result<Json> read_summary(const Path& path)
+{
+    SR_TRY(Json summary, read_json(path));
+    if (!summary.is_object() || !summary.value("settings", Json()).is_object() ||
+        !summary.value("state", Json()).is_string())
+        return fail(ErrorCode::bad_input,
+                    "{}: expected an object with the settings and the state of a run; start over with -y",
+                    quote_path(path));
+    return summary;
 }
 
 } // namespace
@@ -47,9 +81,10 @@ Result<RunFolder> RunFolder::open(const Path& folder, const Json& settings, bool
     run.settings_ = settings;
     run.contents_ = contents;
     SR_CHECK(make_folder(folder));
+    SR_CHECK(run.refuse_links());
     SR_CHECK(run.lock());
     if (fs::exists(folder / "run.json") && !restart) {
-        SR_TRY(const Json before, read_json(folder / "run.json"));
+        SR_TRY(const Json before, read_summary(folder / "run.json"));
         if (before.value("settings", Json()) != settings)
             return fail(ErrorCode::bad_input,
                         "{} holds a run with other settings, model, input or device; finish that one, name another "
@@ -63,19 +98,31 @@ Result<RunFolder> RunFolder::open(const Path& folder, const Json& settings, bool
     for (const auto* names : {&contents.pieces, &contents.results})
         for (const std::string& name : *names)
             remove_temporary_files(folder / name);
-    const Path journal = folder / "journal.jsonl";
-    run.journal_ = ::open(journal.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, 0644);
-    if (run.journal_ < 0)
-        return system_failure("open", journal);
+    SR_TRY(run.journal_, open_own(folder / "journal.jsonl", O_WRONLY | O_APPEND));
     return run;
+}
+
+Status RunFolder::refuse_links() const
+{
+    std::vector<std::string> names = {"run.json", "journal.jsonl", "lock"};
+    for (const auto* more : {&contents_.pieces, &contents_.results})
+        names.insert(names.end(), more->begin(), more->end());
+    std::error_code ignored;
+    for (const std::string& name : names) {
+        if (fs::is_symlink(path_ / name, ignored))
+            return is_a_link(path_ / name);
+        fs::recursive_directory_iterator inside(path_ / name, ignored); // a file's, or an absent folder's: at its end
+        for (; inside != fs::recursive_directory_iterator(); inside.increment(ignored))
+            if (inside->is_symlink(ignored))
+                return is_a_link(inside->path());
+    }
+    return {};
 }
 
 Status RunFolder::lock()
 {
     const Path path = path_ / "lock";
-    lock_ = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
-    if (lock_ < 0)
-        return system_failure("open", path);
+    SR_TRY(lock_, open_own(path, O_RDWR));
     if (::flock(lock_, LOCK_EX | LOCK_NB) != 0)
         return fail(ErrorCode::bad_input, "another process works in {}", quote_path(path_));
     return {};

@@ -15,11 +15,12 @@ struct RunContents {
 
 // A run's folder: run.json (resolved settings, versions, device, hashes), journal.jsonl (one line per finished piece)
 // and the pieces' files. A process may be killed at any time: the next open() finds every finished piece. One process
-// at a time, by a lock.
+// at a time, by a lock. What others left there is not trusted: a link in place of one of these files or folders is
+// refused, so that nothing outside the folder is read or written.
 class RunFolder {
   public:
     // Creates the folder, or reopens it if its run.json has the same `settings`. With `restart` it is emptied first.
-    // Errors: bad_input, also for other settings without `restart`
+    // Errors: bad_input, also for other settings without `restart`, and for links
     static Result<RunFolder> open(const Path& folder, const Json& settings, bool restart,
                                   const RunContents& contents = {});
     RunFolder(RunFolder&& other) noexcept;
@@ -39,6 +40,7 @@ class RunFolder {
 
   private:
     RunFolder() = default;
+    Status refuse_links() const;
     Status lock();
     Status read_journal();
     Status start(const Json& settings);

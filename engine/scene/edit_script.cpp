@@ -128,8 +128,14 @@ Result<EditOperation> parse_operation(const Json& json, const Path& folder, std:
         return fail(ErrorCode::bad_input, "{}: fill: expected true or false", where);
     o.fill = json.value("fill", false);
     SR_TRY(const std::string stamp, text_of(json, "stamp", where));
-    if (!stamp.empty())
-        o.stamp = folder / stamp;
+    if (!stamp.empty()) {
+        // a script may come from elsewhere, and what it names is read
+        const Path path = stamp;
+        if (path.is_absolute() || std::ranges::find(path, "..") != path.end())
+            return fail(ErrorCode::bad_input, "{}: stamp: expected a file in the script's folder, found {}", where,
+                        quote(stamp));
+        o.stamp = folder / path;
+    }
     SR_TRY(o.at, point_of(json, "at", where));
     SR_TRY(o.by, point_of(json, "by", where));
     SR_TRY(const auto degrees, optional_number(json, "rotate", where));

@@ -13,7 +13,8 @@ namespace semrover {
 //   {"op": "insert", "stamp": "car.sgrid", "at": [x,y,z], "rotate": 90, "points": "keep"|"regenerate"}
 //   {"op": "tint", "color": "#aa4433", "class": "building", ...}
 //   {"op": "copy"|"move", ..., "by": [x,y,z], "rotate": 90, "points": "keep"|"regenerate"}
-// Metres, cells for "object", degrees; a stamp's path is relative to the file's folder. Unknown keys are refused.
+// Metres, cells for "object", degrees; a stamp's path is relative to the file's folder and stays
+// inside it. Unknown keys are refused.
 // Errors: bad_input, with the number of the operation.
 Result<std::vector<EditOperation>> read_edit_script(const Path& path);
 Result<std::vector<EditOperation>> parse_edit_script(const Json& json, const Path& folder, std::string_view where);

@@ -54,6 +54,9 @@ inline std::string label_name(size_t label)
     return label < kClassCount ? std::string(kPalette[label].name) : "none";
 }
 
+// whether two names are the same but for case and for what lies between words: "Traffic_Sign" is "traffic sign"
+bool same_class_name(std::string_view a, std::string_view b);
+
 // number of a class by its name, none if there is no such class
 std::optional<uint8_t> class_of_name(std::string_view name);
 

@@ -14,7 +14,8 @@ struct SceneGridOptions {
     Path map;                             // JSON that says what source labels are (label_map.h)
     float voxel_size = 0.6f;              // metres, of the grid
     std::array<double, 3> origin{};       // metres: where the file's origin lies in the world
-    double min_fill = 0;                  // dense labels: share of a cell's volume that makes it a cell; 0: any
+    double file_voxel_size = 0;           // .vox: metres of a voxel; 0: as voxel_size
+    double min_fill = 0;                  // smaller voxels: share of a cell's volume that makes it a cell; 0: any
     std::string mask;                     // .npz: an array of 0 and 1 that says which voxels count
     int points_per_voxel = 20;            // of points with colours
     uint64_t seed = 0;                    // which points stay where a cell has more

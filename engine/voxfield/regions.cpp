@@ -225,7 +225,7 @@ Result<Regions> extract_regions(std::span<const std::array<int32_t, 3>> cells, c
                     cells.size(), options.region_size);
     SR_TRY(CellTree tree, CellTree::build(cells));
     if (options.first_seed < 0 || options.first_seed >= int64_t(cells.size()))
-        return fail(ErrorCode::bad_input, "first_seed is {}, but the cloud has {} cells", options.first_seed,
+        return fail(ErrorCode::bad_input, "first_cell is {}, but the grid has {} cells", options.first_seed,
                     cells.size());
     SR_ASSERT((!options.from_known && known.empty()) || known.size() == cells.size(), "{} flags for {} cells",
               known.size(), cells.size());

@@ -143,14 +143,15 @@ Result<std::string> read_text_file(const Path& path, uint64_t max_bytes)
     return read_whole<std::string>(path, max_bytes);
 }
 
-AtomicFile::AtomicFile(Path path, Path temporary, int descriptor)
-    : path_(std::move(path)), temporary_(std::move(temporary)), descriptor_(descriptor)
+AtomicFile::AtomicFile(Path path, Path temporary, int descriptor, std::unique_ptr<Unfinished> unfinished)
+    : path_(std::move(path)), temporary_(std::move(temporary)), descriptor_(descriptor),
+      unfinished_(std::move(unfinished))
 {
 }
 
 AtomicFile::AtomicFile(AtomicFile&& other) noexcept
     : path_(std::move(other.path_)), temporary_(std::exchange(other.temporary_, {})),
-      descriptor_(std::exchange(other.descriptor_, -1))
+      descriptor_(std::exchange(other.descriptor_, -1)), unfinished_(std::move(other.unfinished_))
 {
 }
 
@@ -161,6 +162,7 @@ AtomicFile& AtomicFile::operator=(AtomicFile&& other) noexcept
         path_ = std::move(other.path_);
         temporary_ = std::exchange(other.temporary_, {});
         descriptor_ = std::exchange(other.descriptor_, -1);
+        unfinished_ = std::move(other.unfinished_);
     }
     return *this;
 }
@@ -178,6 +180,7 @@ void AtomicFile::discard() noexcept
         ::unlink(temporary_.c_str());
     descriptor_ = -1;
     temporary_.clear();
+    unfinished_.reset();
 }
 
 Result<AtomicFile> AtomicFile::create(const Path& path)
@@ -192,9 +195,12 @@ Result<AtomicFile> AtomicFile::create(const Path& path)
     for (int attempt = 0; attempt < 100; ++attempt) { // a killed run with the same pid may have left its name
         // the name is short whatever the length of the final one (NAME_MAX is 255)
         Path temporary = folder_of(path) / fmt::format(".semrover-{}-{}.tmp", ::getpid(), counter++);
+        const Together created_and_known;
         const int fd = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-        if (fd >= 0)
-            return AtomicFile(path, std::move(temporary), fd);
+        if (fd >= 0) {
+            auto unfinished = std::make_unique<Unfinished>(temporary);
+            return AtomicFile(path, std::move(temporary), fd, std::move(unfinished));
+        }
         if (errno != EEXIST)
             return cannot_write(path, errno);
     }
@@ -225,12 +231,14 @@ Status AtomicFile::commit()
     const bool flushed = ::fsync(descriptor_) == 0 || errno == EINVAL;
     const int flush_error = errno;
     const bool closed = ::close(std::exchange(descriptor_, -1)) == 0;
+    const Together renamed_and_forgotten;
     if (!flushed || !closed || ::rename(temporary_.c_str(), path_.c_str()) != 0) {
         const int error = flushed ? errno : flush_error;
         discard();
         return cannot_write(path_, error);
     }
     temporary_.clear();
+    unfinished_.reset();
     return flush_folder(folder_of(path_));
 }
 

@@ -3,10 +3,12 @@
 #pragma once
 
 #include "runtime/base/result.h"
+#include "runtime/base/unfinished.h"
 
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -49,12 +51,13 @@ class AtomicFile {
     Status commit(); // once, after the last write
 
   private:
-    AtomicFile(Path path, Path temporary, int descriptor);
+    AtomicFile(Path path, Path temporary, int descriptor, std::unique_ptr<Unfinished> unfinished);
     void discard() noexcept;
 
     Path path_;
     Path temporary_; // empty when there is nothing to remove
     int descriptor_ = -1;
+    std::unique_ptr<Unfinished> unfinished_;
 };
 
 Status write_file_atomically(const Path& path, std::span<const std::byte> bytes);

@@ -169,6 +169,13 @@ Status Device::create_device(bool matrices)
     return {};
 }
 
+Status Device::check_cancelled() const
+{
+    if (cancelled_ && cancelled_())
+        return fail(ErrorCode::interrupted, "interrupted");
+    return {};
+}
+
 Status Device::finish(const DeviceOptions& options)
 {
     const DeviceSummary summary = summarize(instance_, physical_, 0);
@@ -178,6 +185,7 @@ Status Device::finish(const DeviceOptions& options)
     driver_ = summary.driver;
     limits_ = summary.limits;
     budget_ = options.max_bytes;
+    cancelled_ = options.cancelled;
     SR_CHECK(override_limits(limits_, environment("SEMROVER_LIMITS")));
     SR_CHECK(override_limits(limits_, options.limits));
     VkPhysicalDeviceProperties properties;

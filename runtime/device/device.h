@@ -24,6 +24,9 @@ struct DeviceOptions {
     std::string select = {}; // "", an index of list_devices(), or part of a name
     std::string limits = {}; // override_limits(); also from SEMROVER_LIMITS
     uint64_t max_bytes = 0;  // refuse to allocate more device memory than this; 0: no budget
+    // Asked before a pipeline is compiled and before work is submitted; true: those calls fail with
+    // ErrorCode::interrupted. From any thread that uses the device.
+    std::function<bool()> cancelled = {};
     bool validation = false; // Khronos validation with synchronization checks; also SEMROVER_VALIDATION=1 or =fatal
 };
 
@@ -81,6 +84,8 @@ class Device {
     const HostBytes& host_bytes() const { return host_bytes_; }
     void count_read(uint64_t bytes) { host_bytes_.read += bytes; }
 
+    Status check_cancelled() const; // interrupted, where DeviceOptions::cancelled says so
+
     // queue: a ticket is a value of one timeline semaphore
     Result<uint64_t> submit(std::span<const VkCommandBuffer> commands);
     Status wait(uint64_t ticket);
@@ -114,6 +119,7 @@ class Device {
     uint32_t index_ = 0;
     bool owned_ = true;
     std::function<void()> lock_, unlock_;
+    std::function<bool()> cancelled_;
     std::mutex queue_mutex_;
     VkSemaphore timeline_ = VK_NULL_HANDLE;
     uint64_t ticket_ = 0;

@@ -2,18 +2,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/device/pipeline.h"
 
+#include "runtime/base/file.h"
 #include "runtime/base/hash.h"
 #include "runtime/device/device.h"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <chrono>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <unistd.h>
 #include <vector>
 
 namespace fs = std::filesystem;
@@ -22,6 +21,7 @@ namespace semrover {
 
 namespace {
 
+constexpr uint64_t kMaxCacheBytes = 1ull << 31;
 constexpr double kSaveAfterSeconds = 2; // of compiling: writing the file takes some milliseconds
 
 std::string cache_path(VkPhysicalDevice physical)
@@ -49,10 +49,12 @@ std::array<char, 8> checksum(const std::vector<char>& blob)
 // the file is the checksum and the blob
 std::vector<char> load_blob(const std::string& path, VkPhysicalDevice physical)
 {
-    std::ifstream in(path, std::ios::binary);
+    const auto file = read_text_file(path, kMaxCacheBytes); // what is no file is no cache
     std::array<char, 8> expected{};
-    in.read(expected.data(), expected.size());
-    std::vector<char> blob{std::istreambuf_iterator<char>(in), {}};
+    if (!file || file->size() < expected.size())
+        return {};
+    std::ranges::copy(file->substr(0, expected.size()), expected.begin());
+    const std::vector<char> blob(file->begin() + expected.size(), file->end());
     if (checksum(blob) != expected)
         return {};
     VkPhysicalDeviceProperties p;
@@ -101,15 +103,11 @@ void PipelineStore::save()
     std::vector<char> blob(bytes);
     if (vkGetPipelineCacheData(device_.handle(), cache_, &bytes, blob.data()) != VK_SUCCESS)
         return;
-    std::error_code ignored;
-    fs::create_directories(fs::path(cache_path_).parent_path(), ignored);
-    const std::string temporary = fmt::format("{}.{}", cache_path_, getpid());
-    {
-        std::ofstream out(temporary, std::ios::binary);
-        blob.resize(bytes);
-        out.write(checksum(blob).data(), 8).write(blob.data(), std::streamsize(bytes));
-    }
-    fs::rename(temporary, cache_path_, ignored);
+    blob.resize(bytes);
+    const std::array<char, 8> sum = checksum(blob);
+    blob.insert(blob.begin(), sum.begin(), sum.end());
+    if (make_folder(fs::path(cache_path_).parent_path()))
+        (void)write_file_atomically(cache_path_, std::as_bytes(std::span(blob)));
 }
 
 Result<const Pipeline*> PipelineStore::get(const KernelVariant& variant, const std::map<uint32_t, uint32_t>& constants)
@@ -117,6 +115,7 @@ Result<const Pipeline*> PipelineStore::get(const KernelVariant& variant, const s
     const auto key = std::make_pair(&variant, constants);
     if (const auto it = pipelines_.find(key); it != pipelines_.end())
         return &it->second;
+    SR_CHECK(device_.check_cancelled());
     Pipeline p;
     const auto begin = std::chrono::steady_clock::now();
     if (Status made = make(variant, constants, p); !made) {

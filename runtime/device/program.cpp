@@ -198,6 +198,7 @@ void Program::record_dispatch(VkCommandBuffer commands, size_t index)
 
 Result<uint64_t> Program::submit()
 {
+    SR_CHECK(device_.check_cancelled());
     if (measuring_ && runs_ == 1)
         SR_CHECK(schedule_again());
     const auto begin = std::chrono::steady_clock::now();

@@ -4,6 +4,7 @@
 #include "tools/bench/bench.h"
 
 #include "runtime/device/profile.h"
+#include "tools/cli/print_stderr.h"
 
 #include <algorithm>
 #include <chrono>
@@ -83,7 +84,7 @@ Status write_profile(Device& device, const std::string& path)
 {
     if (!device.profile())
         return {};
-    fmt::print(stderr, "{}", device.profile()->summary());
+    print_stderr("{}", device.profile()->summary());
     return device.profile()->write(path);
 }
 

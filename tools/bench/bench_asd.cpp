@@ -6,6 +6,8 @@
 #include "engine/refine/asd.h"
 #include "runtime/base/json.h"
 #include "tools/bench/bench.h"
+#include "tools/cli/choice.h"
+#include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
 
 #include <CLI/CLI.hpp>
@@ -94,11 +96,11 @@ void add_bench_asd(CLI::App& bench, const Globals& globals, Run& run)
     CLI::App* c = bench.add_subcommand("asd", "a denoising step of the autoregressive renderer, and its VAE");
     c->add_option("--config", o->unet, "the UNet's config.json; default: Stable Diffusion 1.5 with 13 input channels");
     c->add_option("--vae-config", o->vae, "the VAE's; default: Stable Diffusion 1.5's");
-    c->add_option("-W,--width", o->width, "pixels")->check(CLI::Range(1u, 16384u));
-    c->add_option("-H,--height", o->height, "pixels")->check(CLI::Range(1u, 16384u));
-    c->add_option("--tokens", o->tokens, "tokens of the text")->check(CLI::Range(1u, 4096u));
-    c->add_option("--cfg-scale", o->cfg_scale, "guidance; 1: no unconditional half");
-    c->add_option("--precision", o->precision, "storage")->check(CLI::IsMember({"fp16", "fp32"}));
+    add_number(*c, "-W,--width", o->width, "pixels", 1u, 16384u);
+    add_number(*c, "-H,--height", o->height, "pixels", 1u, 16384u);
+    add_number(*c, "--tokens", o->tokens, "tokens of the text", 1u, 4096u);
+    add_number(*c, "--cfg-scale", o->cfg_scale, "guidance; 1: no unconditional half", 0, 1000);
+    add_choice(*c, "--precision", {"fp16", "fp32"}, "storage", o->precision);
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_asd(*o, globals); }; });
 }
 

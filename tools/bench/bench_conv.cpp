@@ -3,6 +3,8 @@
 // semrover bench conv: one 3x3 convolution
 #include "kernels/network.h"
 #include "tools/bench/bench.h"
+#include "tools/cli/choice.h"
+#include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
 
 #include <CLI/CLI.hpp>
@@ -54,13 +56,12 @@ void add_bench_conv(CLI::App& bench, const Globals& globals, Run& run)
 {
     auto o = std::make_shared<BenchConvArguments>();
     CLI::App* c = bench.add_subcommand("conv", "3x3 convolution of an image, zeros around it");
-    const auto size = CLI::Range(1u, 16384u);
-    c->add_option("-W,--width", o->width, "pixels")->check(size);
-    c->add_option("-H,--height", o->height, "pixels")->check(size);
-    c->add_option("--channels", o->channels, "of the input")->check(size);
-    c->add_option("--outputs", o->outputs, "channels of the output")->check(size);
+    add_number(*c, "-W,--width", o->width, "pixels", 1, 16384);
+    add_number(*c, "-H,--height", o->height, "pixels", 1, 16384);
+    add_number(*c, "--channels", o->channels, "of the input", 1, 16384);
+    add_number(*c, "--outputs", o->outputs, "channels of the output", 1, 16384);
     c->add_flag("--winograd", o->winograd, "by Winograd's algorithm, weights transformed in every run");
-    c->add_option("--precision", o->precision, "storage")->check(CLI::IsMember({"fp16", "fp32"}));
+    add_choice(*c, "--precision", {"fp16", "fp32"}, "storage", o->precision);
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_conv(*o, globals); }; });
 }
 

@@ -3,6 +3,8 @@
 // semrover bench gemm: y = x w^T, x [m, k], w [n, k]
 #include "kernels/network.h"
 #include "tools/bench/bench.h"
+#include "tools/cli/choice.h"
+#include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
 
 #include <CLI/CLI.hpp>
@@ -49,11 +51,10 @@ void add_bench_gemm(CLI::App& bench, const Globals& globals, Run& run)
 {
     auto o = std::make_shared<BenchGemmArguments>();
     CLI::App* c = bench.add_subcommand("gemm", "dense layer: y [m, n] = x [m, k] w [n, k]^T");
-    const auto size = CLI::Range(1u, 65536u);
-    c->add_option("--m", o->shape.m, "rows of x")->check(size);
-    c->add_option("--n", o->shape.n, "rows of w")->check(size);
-    c->add_option("--k", o->shape.k, "columns of both")->check(size);
-    c->add_option("--precision", o->precision, "storage")->check(CLI::IsMember({"fp16", "fp32"}));
+    add_number(*c, "--m", o->shape.m, "rows of x", 1, 65536);
+    add_number(*c, "--n", o->shape.n, "rows of w", 1, 65536);
+    add_number(*c, "--k", o->shape.k, "columns of both", 1, 65536);
+    add_choice(*c, "--precision", {"fp16", "fp32"}, "storage", o->precision);
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_gemm(*o, globals); }; });
 }
 

@@ -3,6 +3,7 @@
 // semrover bench regions: Algorithm 1 over a street-like cloud, one core, no device
 #include "engine/voxfield/region_graph.h"
 #include "tools/bench/bench.h"
+#include "tools/cli/number_option.h"
 
 #include <chrono>
 #include <CLI/CLI.hpp>
@@ -63,10 +64,9 @@ void add_bench_regions(CLI::App& bench, const Globals& globals, Run& run)
 {
     auto o = std::make_shared<BenchRegionsArguments>();
     CLI::App* c = bench.add_subcommand("regions", "region extraction and the dependency graph (host, one core)");
-    c->add_option("--cells", o->cells, "cells of the cloud")->check(CLI::Range(1u, 20000000u));
-    c->add_option("--region-size", o->region_size, "cells of a region")->check(CLI::Range(1, 4096));
-    c->add_option("--coverage-threshold", o->coverage_threshold, "new cells that a region must have")
-        ->check(CLI::Range(1, 4096));
+    add_number(*c, "--cells", o->cells, "cells of the cloud", 1u, 20000000u);
+    add_number(*c, "--region-size", o->region_size, "cells of a region", 1, 4096);
+    add_number(*c, "--coverage-threshold", o->coverage_threshold, "new cells that a region must have", 1, 4096);
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_regions(*o, globals); }; });
 }
 

@@ -4,6 +4,8 @@
 #include "engine/splat/rasterizer.h"
 #include "kernels/sort.h"
 #include "tools/bench/bench.h"
+#include "tools/cli/choice.h"
+#include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
 
 #include <CLI/CLI.hpp>
@@ -114,7 +116,7 @@ void add_bench_sort(CLI::App& bench, const Globals& globals, Run& run)
 {
     auto o = std::make_shared<SortOptions>();
     CLI::App* c = bench.add_subcommand("sort", "stable radix sort of 32-bit pairs");
-    c->add_option("--pairs", o->pairs, "pairs")->check(CLI::Range(1u, 1u << 28));
+    add_number(*c, "--pairs", o->pairs, "pairs", 1u, 1u << 28);
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_sort(*o, globals); }; });
 }
 
@@ -122,12 +124,11 @@ void add_bench_splat(CLI::App& bench, const Globals& globals, Run& run)
 {
     auto o = std::make_shared<SplatBenchOptions>();
     CLI::App* c = bench.add_subcommand("splat", "one frame of 2D Gaussian splats, images read back");
-    c->add_option("--splats", o->splats, "splats of the scene")->check(CLI::Range(1u, 50000000u));
-    c->add_option("-W,--width", o->width, "pixels")->check(CLI::Range(1u, 16384u));
-    c->add_option("-H,--height", o->height, "pixels")->check(CLI::Range(1u, 16384u));
-    c->add_option("--splat-radius", o->sigma, "metres")->check(CLI::Range(0.001f, 10.f));
-    c->add_option("--camera-model", o->model, "lens")
-        ->check(CLI::IsMember({"pinhole", "opencv", "fisheye", "equirectangular"}));
+    add_number(*c, "--splats", o->splats, "splats of the scene", 1u, 50000000u);
+    add_number(*c, "-W,--width", o->width, "pixels", 1u, 16384u);
+    add_number(*c, "-H,--height", o->height, "pixels", 1u, 16384u);
+    add_number(*c, "--splat-radius", o->sigma, "metres", 0.001f, 10.f);
+    add_choice(*c, "--camera-model", {"pinhole", "opencv", "fisheye", "equirectangular"}, "lens", o->model);
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_splat(*o, globals); }; });
 }
 

@@ -3,6 +3,8 @@
 // semrover bench transformer: one denoising step of a batch of regions, both guidance halves, random weights
 #include "engine/voxfield/token_sampler.h"
 #include "tools/bench/bench.h"
+#include "tools/cli/choice.h"
+#include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
 
 #include <CLI/CLI.hpp>
@@ -77,9 +79,9 @@ void add_bench_transformer(CLI::App& bench, const Globals& globals, Run& run)
     auto o = std::make_shared<BenchTransformerArguments>();
     CLI::App* c = bench.add_subcommand("transformer", "one denoising step of the Σ-Voxfield transformer");
     c->add_option("--config", o->config, "config.json; default: the full-size model, 12 layers of 8 heads of 128");
-    c->add_option("--cells", o->cells, "cells of a region")->check(CLI::Range(1u, 4096u));
-    c->add_option("--batch", o->batch, "regions")->check(CLI::Range(1u, 1024u));
-    c->add_option("--precision", o->precision, "storage")->check(CLI::IsMember({"fp16", "fp32"}));
+    add_number(*c, "--cells", o->cells, "cells of a region", 1u, 4096u);
+    add_number(*c, "--batch", o->batch, "regions", 1u, 1024u);
+    add_choice(*c, "--precision", {"fp16", "fp32"}, "storage", o->precision);
     c->add_flag("--unguided", o->unguided, "without the unconditional half");
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_transformer(*o, globals); }; });
 }

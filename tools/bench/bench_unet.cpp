@@ -3,6 +3,8 @@
 // semrover bench unet: one evaluation of a renderer's UNet, random weights
 #include "engine/network/unet.h"
 #include "tools/bench/bench.h"
+#include "tools/cli/choice.h"
+#include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
 
 #include <CLI/CLI.hpp>
@@ -66,11 +68,11 @@ void add_bench_unet(CLI::App& bench, const Globals& globals, Run& run)
     auto o = std::make_shared<BenchUnetArguments>();
     CLI::App* c = bench.add_subcommand("unet", "one evaluation of a renderer's UNet");
     c->add_option("--config", o->config, "config.json; default: Stable Diffusion 1.5 with 13 input channels");
-    c->add_option("-W,--width", o->width, "latent pixels")->check(CLI::Range(1u, 4096u));
-    c->add_option("-H,--height", o->height, "latent pixels")->check(CLI::Range(1u, 4096u));
-    c->add_option("--batch", o->batch, "images; 2 is one step with guidance")->check(CLI::Range(1u, 64u));
-    c->add_option("--tokens", o->tokens, "tokens of the text")->check(CLI::Range(1u, 4096u));
-    c->add_option("--precision", o->precision, "storage")->check(CLI::IsMember({"fp16", "fp32"}));
+    add_number(*c, "-W,--width", o->width, "latent pixels", 1u, 4096u);
+    add_number(*c, "-H,--height", o->height, "latent pixels", 1u, 4096u);
+    add_number(*c, "--batch", o->batch, "images; 2 is one step with guidance", 1u, 64u);
+    add_number(*c, "--tokens", o->tokens, "tokens of the text", 1u, 4096u);
+    add_choice(*c, "--precision", {"fp16", "fp32"}, "storage", o->precision);
     c->add_option("--profile", o->profile, "write device times as a Chrome trace, and their sums to stderr");
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_unet(*o, globals); }; });
 }

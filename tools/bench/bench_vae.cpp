@@ -3,6 +3,8 @@
 // semrover bench vae: one picture through the decoder, or the encoder, of a VAE with random weights
 #include "engine/network/vae.h"
 #include "tools/bench/bench.h"
+#include "tools/cli/choice.h"
+#include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
 
 #include <CLI/CLI.hpp>
@@ -56,9 +58,9 @@ void add_bench_vae(CLI::App& bench, const Globals& globals, Run& run)
     auto o = std::make_shared<BenchVaeArguments>();
     CLI::App* c = bench.add_subcommand("vae", "a picture through the decoder of a VAE");
     c->add_option("--config", o->config, "config.json; default: Stable Diffusion 1.5");
-    c->add_option("-W,--width", o->width, "pixels")->check(CLI::Range(1u, 16384u));
-    c->add_option("-H,--height", o->height, "pixels")->check(CLI::Range(1u, 16384u));
-    c->add_option("--precision", o->precision, "storage")->check(CLI::IsMember({"fp16", "fp32"}));
+    add_number(*c, "-W,--width", o->width, "pixels", 1u, 16384u);
+    add_number(*c, "-H,--height", o->height, "pixels", 1u, 16384u);
+    add_choice(*c, "--precision", {"fp16", "fp32"}, "storage", o->precision);
     c->add_flag("--encode", o->encode, "through the encoder instead");
     c->add_option("--profile", o->profile, "write device times as a Chrome trace, and their sums to stderr");
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_vae(*o, globals); }; });

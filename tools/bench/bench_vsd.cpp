@@ -7,6 +7,8 @@
 #include "engine/refine/video_decoder.h"
 #include "runtime/base/json.h"
 #include "tools/bench/bench.h"
+#include "tools/cli/choice.h"
+#include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
 
 #include <chrono>
@@ -148,15 +150,15 @@ void add_bench_vsd(CLI::App& bench, const Globals& globals, Run& run)
     CLI::App* c = bench.add_subcommand("vsd", "an evaluation of the video renderer's UNet on a window, and its VAE");
     c->add_option("--config", o->unet, "the UNet's config.json; default: Stable Video Diffusion, 9 input channels");
     c->add_option("--vae-config", o->vae, "the VAE's; default: Stable Video Diffusion's");
-    c->add_option("-W,--width", o->width, "pixels")->check(CLI::Range(1u, 16384u));
-    c->add_option("-H,--height", o->height, "pixels")->check(CLI::Range(1u, 16384u));
-    c->add_option("--frames", o->frames, "of the window")->check(CLI::Range(1u, kMostWindowFrames));
-    c->add_option("--decode-frames", o->decode_frames, "decoded together")->check(CLI::Range(1u, kMostWindowFrames));
-    c->add_option("--tokens", o->tokens, "tokens of the text")->check(CLI::Range(1u, 4096u));
-    c->add_option("--cfg-scale", o->cfg_scale, "guidance of the last frame, the first has 1; 1: no unconditional half");
-    c->add_option("--evaluations", o->evaluations, "runs of each part, the first to warm up; 0: memory only")
-        ->check(CLI::Range(0u, 1000u));
-    c->add_option("--precision", o->precision, "storage")->check(CLI::IsMember({"fp16", "fp32"}));
+    add_number(*c, "-W,--width", o->width, "pixels", 1, 16384);
+    add_number(*c, "-H,--height", o->height, "pixels", 1, 16384);
+    add_number(*c, "--frames", o->frames, "of the window", 1, kMostWindowFrames);
+    add_number(*c, "--decode-frames", o->decode_frames, "decoded together", 1, kMostWindowFrames);
+    add_number(*c, "--tokens", o->tokens, "tokens of the text", 1, 4096);
+    add_number(*c, "--cfg-scale", o->cfg_scale, "guidance of the last frame, the first has 1; 1: no unconditional half",
+               0, 1000);
+    add_number(*c, "--evaluations", o->evaluations, "runs of each part, the first to warm up; 0: memory only", 0, 1000);
+    add_choice(*c, "--precision", {"fp16", "fp32"}, "storage", o->precision);
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_vsd(*o, globals); }; });
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "runtime/base/result.h"
+#include "tools/cli/interrupt.h"
 
 #include <cstdint>
 #include <functional>
@@ -28,10 +29,6 @@ struct Globals {
 // what main runs once the command line is understood; an error becomes one line and the exit code of its ErrorCode
 using Run = std::function<Status()>;
 
-// true once the user has pressed Ctrl-C (SIGINT) or the system asks to stop (SIGTERM): save and return
-// ErrorCode::interrupted. A second one ends the program at once.
-bool interrupt_requested();
-
 // one a file: declares the subcommand's options and, when it is the one given, sets `run`. Options live in a
 // std::shared_ptr that the callback holds.
 void add_bench(CLI::App& app, const Globals& globals, Run& run);
@@ -44,6 +41,7 @@ void add_fuse(CLI::App& app, const Globals& globals, Run& run);
 void add_generate(CLI::App& app, const Globals& globals, Run& run);
 void add_inpaint(CLI::App& app, const Globals& globals, Run& run);
 void add_inspect(CLI::App& app, const Globals& globals, Run& run);
+void add_labels(CLI::App& app, const Globals& globals, Run& run);
 void add_page(CLI::App& app, const Globals& globals, Run& run);
 void add_refine(CLI::App& app, const Globals& globals, Run& run);
 void add_render(CLI::App& app, const Globals& globals, Run& run);

@@ -3,6 +3,8 @@
 #include "tools/cli/lens_options.h"
 
 #include "runtime/base/quote.h"
+#include "tools/cli/choice.h"
+#include "tools/cli/number_option.h"
 
 #include <charconv>
 #include <CLI/CLI.hpp>
@@ -48,12 +50,12 @@ Status put_distortion(const LensOptions& o, Intrinsics& k)
 
 void add_lens_options(CLI::App& c, LensOptions& o)
 {
-    c.add_option("-W,--width", o.width, "pixels")->check(CLI::Range(1u, 16384u));
-    c.add_option("-H,--height", o.height, "pixels")->check(CLI::Range(1u, 16384u));
-    c.add_option("--fov-x", o.fov, "horizontal field of view in degrees, where the path has no intrinsics")
-        ->check(CLI::Range(1.0, 360.0));
-    c.add_option("--camera-model", o.camera_model, "lens, where the path has no intrinsics")
-        ->check(CLI::IsMember({"pinhole", "opencv", "fisheye", "equirectangular"}));
+    add_number(c, "-W,--width", o.width, "pixels", 1u, 16384u);
+    add_number(c, "-H,--height", o.height, "pixels", 1u, 16384u);
+    add_number(c, "--fov-x", o.fov, "horizontal field of view in degrees, where the path has no intrinsics", 1.0,
+               360.0);
+    add_choice(c, "--camera-model", {"pinhole", "opencv", "fisheye", "equirectangular"},
+               "lens, where the path has no intrinsics", o.camera_model);
     c.add_option("--distortion", o.distortion, "k1,k2,p1,p2[,k3[,k4,k5,k6]] of opencv, k1,k2,k3,k4 of fisheye");
 }
 

@@ -3,6 +3,7 @@
 #include "tools/cli/open_device.h"
 
 #include "runtime/device/profile.h"
+#include "tools/cli/print_stderr.h"
 
 namespace semrover {
 
@@ -11,6 +12,7 @@ Result<std::unique_ptr<Device>> open_device(const Globals& globals, const std::s
     DeviceOptions options;
     options.select = globals.device;
     options.max_bytes = globals.max_vram;
+    options.cancelled = interrupt_requested;
     SR_TRY(auto device, Device::create(options));
     if (!profile.empty())
         device->set_profile(std::make_shared<Profile>());
@@ -23,7 +25,7 @@ Status write_profile(Device& device, const std::string& path, const Globals& glo
         return {};
     SR_CHECK(device.profile()->write(path));
     if (globals.verbose)
-        fmt::print(stderr, "{}", device.profile()->summary());
+        print_stderr("{}", device.profile()->summary());
     return {};
 }
 

@@ -4,7 +4,9 @@
 
 #include "runtime/base/quote.h"
 
-#include <cstdlib>
+#include <cerrno>
+#include <sys/stat.h>
+#include <unistd.h>
 
 namespace semrover {
 
@@ -21,17 +23,24 @@ Result<OutputFolder> OutputFolder::create(const Path& path, bool replace)
         return fail(ErrorCode::bad_input, "{} is a file; a folder is needed", quote_path(path));
     if (fs::exists(f.path_, error) && !replace)
         return fail(ErrorCode::usage, "{} exists; -y replaces what is written there", quote_path(path));
-    std::string name = (f.path_.parent_path() / ".semrover-").string() + std::string(6, 'X'); // as mkdtemp wants it
-    if (!mkdtemp(name.data()))
-        return fail(ErrorCode::bad_input, "cannot create a folder in {}: {}", quote_path(f.path_.parent_path()),
-                    std::error_code(errno, std::generic_category()).message());
-    f.temporary_ = name;
-    fs::permissions(f.temporary_, fs::perms(0755), error);
-    return f;
+    for (int attempt = 0; attempt < 100; ++attempt) { // a killed run with the same pid may have left its name
+        const Path name = f.path_.parent_path() / fmt::format(".semrover-{}-{}.tmp", getpid(), attempt);
+        const Together created_and_known;
+        if (mkdir(name.c_str(), 0777) == 0) { // the umask decides, as for files
+            f.temporary_ = name;
+            f.unfinished_ = std::make_unique<Unfinished>(name);
+            return f;
+        }
+        if (errno != EEXIST)
+            break;
+    }
+    return fail(ErrorCode::bad_input, "cannot create a folder in {}: {}", quote_path(f.path_.parent_path()),
+                std::error_code(errno, std::generic_category()).message());
 }
 
 OutputFolder::OutputFolder(OutputFolder&& other) noexcept
-    : path_(std::move(other.path_)), temporary_(std::exchange(other.temporary_, {}))
+    : path_(std::move(other.path_)), temporary_(std::exchange(other.temporary_, {})),
+      unfinished_(std::move(other.unfinished_))
 {
 }
 
@@ -44,6 +53,7 @@ OutputFolder::~OutputFolder()
 
 Status OutputFolder::commit()
 {
+    const Together renamed_and_forgotten;
     std::error_code error;
     if (!fs::exists(path_, error)) {
         fs::rename(temporary_, path_, error);

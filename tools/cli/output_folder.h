@@ -25,6 +25,7 @@ class OutputFolder {
     OutputFolder() = default;
 
     Path path_, temporary_; // no temporary: done
+    std::unique_ptr<Unfinished> unfinished_;
 };
 
 } // namespace semrover

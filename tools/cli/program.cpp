@@ -6,13 +6,18 @@
 #include "runtime/base/diagnostics.h"
 #include "runtime/base/file.h"
 #include "runtime/base/quote.h"
+#include "tools/cli/interrupt.h"
 #include "tools/cli/memory_size.h"
+#include "tools/cli/option_facts.h"
+#include "tools/cli/print_stderr.h"
 
 #include <cerrno>
 #include <CLI/CLI.hpp>
 #include <csignal>
 #include <cstdio>
 #include <cstring>
+#include <fcntl.h>
+#include <iostream>
 #include <new>
 #include <system_error>
 #include <unistd.h>
@@ -21,26 +26,19 @@ namespace semrover {
 
 namespace {
 
-volatile std::sig_atomic_t interrupted = 0;
-
-void on_signal(int)
-{
-    interrupted = 1;
-}
-
 void print_diagnostic(void*, const char* line)
 {
-    fmt::print(stderr, "{}\n", line);
+    print_stderr("{}\n", line);
 }
 
-void install_signal_handlers()
+// A descriptor that the caller closed would be that of the next file we open, and messages would go there.
+void fill_standard_streams()
 {
-    struct sigaction action {};
-    action.sa_handler = on_signal;
-    action.sa_flags = SA_RESTART | static_cast<int>(SA_RESETHAND); // the second signal is not caught
-    sigemptyset(&action.sa_mask);
-    sigaction(SIGINT, &action, nullptr);
-    sigaction(SIGTERM, &action, nullptr);
+    // note: standard output is opened for reading, so that writing to it fails as it does on a closed one
+    for (const auto& [fd, flags] :
+         {std::pair{STDIN_FILENO, O_RDONLY}, {STDOUT_FILENO, O_RDONLY}, {STDERR_FILENO, O_WRONLY}})
+        if (fcntl(fd, F_GETFD) < 0 && errno == EBADF)
+            (void)!open("/dev/null", flags); // gets the lowest number that is free, which is fd
 }
 
 void add_globals(CLI::App& app, Globals& globals)
@@ -50,6 +48,8 @@ void add_globals(CLI::App& app, Globals& globals)
         const auto bytes = parse_memory_size(text);
         if (!bytes)
             throw CLI::ValidationError("--max-vram", bytes.error().message);
+        if (*bytes == 0)
+            throw CLI::ValidationError("--max-vram", "expected more than nothing, found " + quote(text));
         globals.max_vram = *bytes;
     };
     app.add_option_function<std::string>("--max-vram", set_max_vram,
@@ -63,27 +63,19 @@ void add_globals(CLI::App& app, Globals& globals)
 
 int report(ErrorCode code, std::string_view message)
 {
-    fmt::print(stderr, "semrover: error: {}\n", message);
+    claim_last_word();
+    print_stderr("semrover: error: {}\n", message);
     return static_cast<int>(code);
 }
 
-// nothing thrown by the standard library or fmt leaves the program without a line and a code
-int run_and_report(const Run& run)
+// what a buffer still holds may not fit the disk, or nobody may read it
+int report_output()
 {
-    try {
-        if (const Status status = run(); !status)
-            return report(status.error().code, status.error().message);
-        if (std::fflush(stdout) != 0)
-            return report(ErrorCode::bad_input, "cannot write to standard output");
-        return 0;
-    } catch (const std::bad_alloc&) {
-        return report(ErrorCode::out_of_memory, "the host's memory is exhausted");
-    } catch (const std::system_error& e) { // of a write to a closed or full output
-        return report(ErrorCode::bad_input, printable(e.what()));
-    } catch (const std::exception& e) {
-        return report(ErrorCode::internal,
-                      fmt::format("a fault in semrover, please report it: {}", printable(e.what())));
-    }
+    const bool written = std::fflush(stdout) == 0 && !std::ferror(stdout) && std::cout.flush().good();
+    if (!written)
+        return report(ErrorCode::bad_input, "cannot write to standard output");
+    claim_last_word();
+    return 0;
 }
 
 // This command belongs to another program of ours, which lies beside this one and takes the same command line. Returns
@@ -93,6 +85,7 @@ Status run_neighbour(const Command& command, char** argv)
     std::error_code error;
     Path program = std::filesystem::read_symlink("/proc/self/exe", error);
     program.replace_filename(command.program);
+    block_signals();
     execv(program.c_str(), argv);
     return fail(
         ErrorCode::bad_input,
@@ -109,40 +102,84 @@ void add_neighbour(CLI::App& app, const Command& command, char** argv, Run& run)
     c->callback([&command, argv, &run] { run = [&command, argv] { return run_neighbour(command, argv); }; });
 }
 
-} // namespace
-
-bool interrupt_requested()
+// an empty text is a variable that was not set, in a script: it names no file and means nothing
+void refuse_empty_values(CLI::App& command)
 {
-    return interrupted != 0;
+    for (CLI::Option* option : command.get_options())
+        if (option->get_items_expected_max() > 0)
+            option->check([](const std::string& text) {
+                return text.empty() ? std::string("expected a value, found an empty text") : std::string();
+            });
+    for (CLI::App* sub : command.get_subcommands({}))
+        if (!sub->get_prefix_command())
+            refuse_empty_values(*sub);
 }
 
-int run_program(int argc, char** argv, std::initializer_list<Command> commands)
+// the subcommand that the command line names, through all levels
+const CLI::App& chosen(const CLI::App& app)
 {
-    set_diagnostic_callback(print_diagnostic);
-    install_signal_handlers();
-    CLI::App app("turn a semantic voxel grid into a coloured 3D street scene, and drive a camera rig through it",
-                 "semrover");
-    app.set_version_flag("--version", kProgram);
-    app.fallthrough(); // global options may follow the subcommand
-    Globals globals;
-    add_globals(app, globals);
-    Run run;
-    for (const Command& command : commands)
-        if (command.add)
-            command.add(app, globals, run);
-        else
-            add_neighbour(app, command, argv, run);
+    const std::vector<CLI::App*> next = app.get_subcommands();
+    return next.empty() ? app : chosen(*next.front());
+}
+
+int show_help(const CLI::App& app, const CLI::ParseError& request)
+{
+    if (app.count("--json") > 0 && dynamic_cast<const CLI::CallForHelp*>(&request))
+        fmt::print("{}\n", options_json(chosen(app)).dump());
+    else
+        app.exit(request); // --help, --version
+    return report_output();
+}
+
+int parse_and_run(CLI::App& app, int argc, char** argv, const Run& run)
+{
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& e) {
         if (e.get_exit_code() == 0)
-            return app.exit(e); // --help, --version
+            return show_help(app, e);
         return report(ErrorCode::usage,
                       fmt::format("{} (semrover --help lists commands and options)", printable(e.what(), 400)));
     }
     if (!run)
         return report(ErrorCode::usage, "no command given (semrover --help lists them)");
-    return run_and_report(run);
+    if (const Status status = run(); !status)
+        return report(status.error().code, status.error().message);
+    return report_output();
+}
+
+} // namespace
+
+// nothing thrown by the standard library or fmt leaves the program without a line and a code
+int run_program(int argc, char** argv, std::initializer_list<Command> commands)
+{
+    fill_standard_streams();
+    std::signal(SIGPIPE, SIG_IGN); // a reader that is gone is an error of the write
+    set_diagnostic_callback(print_diagnostic);
+    watch_signals();
+    try {
+        CLI::App app("turn a semantic voxel grid into a coloured 3D street scene, and drive a camera rig through it",
+                     "semrover");
+        app.set_version_flag("--version", kProgram);
+        app.fallthrough(); // global options may follow the subcommand
+        Globals globals;
+        add_globals(app, globals);
+        Run run;
+        for (const Command& command : commands)
+            if (command.add)
+                command.add(app, globals, run);
+            else
+                add_neighbour(app, command, argv, run);
+        refuse_empty_values(app);
+        return parse_and_run(app, argc, argv, run);
+    } catch (const std::bad_alloc&) {
+        return report(ErrorCode::out_of_memory, "the host's memory is exhausted");
+    } catch (const std::system_error& e) { // of a write to a closed or full output
+        return report(ErrorCode::bad_input, printable(e.what()));
+    } catch (const std::exception& e) {
+        return report(ErrorCode::internal,
+                      fmt::format("a fault in semrover, please report it: {}", printable(e.what())));
+    }
 }
 
 } // namespace semrover

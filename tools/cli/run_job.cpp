@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/cli/run_job.h"
 
+#include "runtime/base/quote.h"
+#include "tools/cli/print_stderr.h"
 #include "tools/cli/progress.h"
 
 namespace semrover {
@@ -14,9 +16,9 @@ JobCallbacks JobDisplay::callbacks()
     JobCallbacks c;
     c.progress = [this](const JobProgress& p) { show(p); };
     if (!globals_.quiet)
-        c.warning = [](std::string_view message) { fmt::print(stderr, "semrover: warning: {}\n", message); };
+        c.warning = [](std::string_view message) { print_stderr("semrover: warning: {}\n", message); };
     if (globals_.verbose && !globals_.quiet)
-        c.detail = [](std::string_view line) { fmt::print(stderr, "{}\n", line); };
+        c.detail = [](std::string_view line) { print_stderr("{}\n", line); };
     return c;
 }
 
@@ -35,17 +37,30 @@ void JobDisplay::show(const JobProgress& p)
     progress_.reset();
 }
 
+namespace {
+
+std::string words_when_interrupted(const Job& job)
+{
+    if (job.kept_in().empty())
+        return "interrupted";
+    return fmt::format("interrupted; what is done is in {}, the same command goes on", quote_path(job.kept_in()));
+}
+
+} // namespace
+
 Result<Json> run_job(const Globals& globals, const BeginJob& begin)
 {
     JobDisplay display(globals);
     SR_TRY(const auto job, begin(display.callbacks()));
+    set_interrupt_message(words_when_interrupted(*job));
     for (bool done = false; !done;) {
-        if (interrupt_requested()) {
+        Result<bool> step =
+            interrupt_requested() ? fail(ErrorCode::interrupted, "") : job->step(JobBudget::one_submit());
+        if (!step && step.error().code == ErrorCode::interrupted) { // by us, or by the device, which asks the same
             job->cancel();
-            return fail(ErrorCode::interrupted, "interrupted; what is done is in '{}', the same command goes on",
-                        job->kept_in().string());
+            return fail(ErrorCode::interrupted, "{}", words_when_interrupted(*job));
         }
-        SR_TRY(done, job->step(JobBudget::one_submit()));
+        SR_TRY(done, std::move(step));
     }
     return job->finish();
 }
@@ -59,8 +74,8 @@ Run resuming(const Globals& globals, Run work)
             if (status || status.error().code != ErrorCode::device_lost || devices == kMostDevices)
                 return status;
             if (!globals.quiet)
-                fmt::print(stderr, "semrover: warning: {}; going on with a new device from what is done\n",
-                           status.error().message);
+                print_stderr("semrover: warning: {}; going on with a new device from what is done\n",
+                             status.error().message);
         }
     };
 }

@@ -6,6 +6,8 @@
 #include "engine/mesh/voxelizer.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
+#include "tools/cli/choice.h"
+#include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/progress.h"
 #include "tools/measure/eval.h"
@@ -158,13 +160,13 @@ void add_eval_chamfer(CLI::App& eval, const Globals& globals, Run& run)
     c->add_option("MESH", o->mesh, ".obj, .ply, .glb or .gltf")->required();
     c->add_option("GRID", o->grid, ".sgrid; without one the mesh is voxelized");
     c->add_option("--sweep", o->sweep, "grids of FIRST..LAST points a cell, doubled each time (and 20), or ..:STEP");
-    c->add_option("--points", o->voxelize.points_per_voxel, "of a cell (20)")->check(CLI::Range(1, 4096));
-    c->add_option("--voxel-size", o->voxelize.voxel_size, "metres (0.6)")->check(CLI::Range(0.001, 1000.0));
-    c->add_option("--samples", o->chamfer.samples, "of the surface (200000)")->check(CLI::Range(1, 1 << 26));
-    c->add_option_function<uint64_t>(
-        "--seed", [o](uint64_t seed) { o->voxelize.seed = o->chamfer.seed = seed; }, "of points and samples (0)");
-    c->add_option("--up", o->up, "axis of the file that points up")->check(CLI::IsMember({"y", "z"}));
-    c->add_option("--scale", o->scale, "metres in a unit of the file (1)")->check(CLI::Range(1e-6, 1e6));
+    add_number(*c, "--points", o->voxelize.points_per_voxel, "of a cell (20)", 1, 4096);
+    add_number(*c, "--voxel-size", o->voxelize.voxel_size, "metres (0.6)", 0.001, 1000.0);
+    add_number(*c, "--samples", o->chamfer.samples, "of the surface (200000)", 1, 1 << 26);
+    add_number_function<uint64_t>(*c, "--seed", [o](uint64_t seed) { o->voxelize.seed = o->chamfer.seed = seed; },
+                                  "of points and samples (0)", {0, UINT64_MAX});
+    add_choice(*c, "--up", {"y", "z"}, "axis of the file that points up", o->up);
+    add_number(*c, "--scale", o->scale, "metres in a unit of the file (1)", 1e-6, 1e6);
     c->add_option("--csv", o->csv, "also write the table there");
     c->callback([o, &globals, &run] { run = [o, &globals] { return eval_chamfer(*o, globals); }; });
 }

@@ -5,6 +5,7 @@
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/lens_options.h"
+#include "tools/cli/number_option.h"
 #include "tools/cli/progress.h"
 #include "tools/eval/flicker.h"
 #include "tools/eval/frame_files.h"
@@ -209,10 +210,8 @@ void add_eval_flicker(CLI::App& eval, const Globals& globals, Run& run)
     c->add_option("--depth", o->depth, "16-bit depth of these names; 0 and 65535: nothing")->required();
     c->add_option("--path", o->path, "camera path of the frames, in any format that `render` reads")->required();
     c->add_option("--truth", o->truth, "true pictures of these names: also their figure, which is the floor");
-    c->add_option("--depth-scale", o->flow.depth_scale, "metres of one unit of depth; 0.001")
-        ->check(CLI::Range(1e-6, 10.0));
-    c->add_option("--tolerance", o->flow.tolerance, "relative, of the depths of both frames; 0.01")
-        ->check(CLI::Range(1e-6, 1.0));
+    add_number(*c, "--depth-scale", o->flow.depth_scale, "metres of one unit of depth; 0.001", 1e-6, 10.0);
+    add_number(*c, "--tolerance", o->flow.tolerance, "relative, of the depths of both frames; 0.01", 1e-6, 1.0);
     add_lens_options(*c, o->lens);
     c->callback([o, &globals, &run] { run = [o, &globals] { return eval_flicker(*o, globals); }; });
 }

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/measure/eval_frechet.h"
 
+#include "tools/cli/print_stderr.h"
 #include "tools/eval/frechet.h"
 
 namespace semrover {
@@ -17,8 +18,7 @@ void warn_of_small_sets(const EvalSets& sets)
             features = set.features->cols;
         }
     if (fewest <= features)
-        fmt::print(
-            stderr,
+        print_stderr(
             "semrover: warning: {} samples of {} features: the covariance is singular and the distance too large; "
             "compare only with as many samples\n",
             fewest, features);

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover eval kid A B --features inception.safetensors: kernel Inception distance of two sets of images
+#include "tools/cli/number_option.h"
 #include "tools/cli/progress.h"
 #include "tools/eval/kernel_distance.h"
 #include "tools/measure/eval.h"
@@ -66,11 +67,9 @@ void add_eval_kid(CLI::App& eval, const Globals& globals, Run& run)
     auto o = std::make_shared<EvalKidArguments>();
     CLI::App* c = eval.add_subcommand("kid", "kernel Inception distance of two sets of images");
     add_eval_options(*c, o->sets);
-    c->add_option("--subsets", o->subsets, "random subsets to average over")
-        ->check(CLI::Range(1u, 100000u))
-        ->capture_default_str();
-    c->add_option("--subset-size", o->size, "samples of a subset (default: 1000, or the smaller set)")
-        ->check(CLI::Range(2u, 1000000u));
+    add_number(*c, "--subsets", o->subsets, "random subsets to average over", 1u, 100000u)
+        ->default_str(std::to_string(o->subsets));
+    add_number(*c, "--subset-size", o->size, "samples of a subset (default: 1000, or the smaller set)", 2u, 1000000u);
     c->add_flag("--full", o->full, "the distance of all samples too");
     c->callback([o, &globals, &run] { run = [o, &globals] { return eval_kid(*o, globals); }; });
 }

@@ -1,6 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover eval mmd A B --features NETWORK.safetensors: maximum mean discrepancy of two sets of grids or images
+#include "tools/cli/choice.h"
+#include "tools/cli/number_option.h"
 #include "tools/eval/kernel_distance.h"
 #include "tools/measure/eval.h"
 #include "tools/measure/eval_sets.h"
@@ -64,16 +66,13 @@ void add_eval_mmd(CLI::App& eval, const Globals& globals, Run& run)
     auto o = std::make_shared<EvalMmdArguments>();
     CLI::App* c = eval.add_subcommand("mmd", "maximum mean discrepancy of features of two sets of grids or images");
     add_eval_options(*c, o->sets);
-    c->add_option("--kernel", o->kernel, "rbf or polynomial")
-        ->check(CLI::IsMember({"rbf", "polynomial"}))
-        ->capture_default_str();
-    c->add_option("--bandwidth", o->bandwidth, "of rbf: exp(-d^2 / (2 bandwidth^2)) (default: the median distance)")
-        ->check(CLI::Range(1e-12, 1e12));
-    c->add_option("--degree", o->degree, "of the polynomial")->check(CLI::Range(1, 16))->capture_default_str();
-    c->add_option("--gamma", o->gamma, "of the polynomial (default: 1 / features)")->check(CLI::Range(1e-12, 1e12));
-    c->add_option("--coefficient", o->coefficient, "of the polynomial")
-        ->check(CLI::Range(0., 1e12))
-        ->capture_default_str();
+    add_choice(*c, "--kernel", {"rbf", "polynomial"}, "rbf or polynomial", o->kernel)->default_str(o->kernel);
+    add_number(*c, "--bandwidth", o->bandwidth, "of rbf: exp(-d^2 / (2 bandwidth^2)) (default: the median distance)",
+               1e-12, 1e12);
+    add_number(*c, "--degree", o->degree, "of the polynomial", 1, 16)->default_str(std::to_string(o->degree));
+    add_number(*c, "--gamma", o->gamma, "of the polynomial (default: 1 / features)", 1e-12, 1e12);
+    add_number(*c, "--coefficient", o->coefficient, "of the polynomial", 0., 1e12)
+        ->default_str(fmt::format("{}", o->coefficient));
     c->callback([o, &globals, &run] { run = [o, &globals] { return eval_mmd(*o, globals); }; });
 }
 

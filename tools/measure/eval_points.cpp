@@ -4,6 +4,7 @@
 // sharpness
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
+#include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/progress.h"
 #include "tools/eval/point_scores.h"
@@ -183,10 +184,8 @@ void add_eval_points(CLI::App& eval, const Globals& globals, Run& run)
     c->add_option("GENERATED", o->generated, ".sgrid, a folder of them, or a .txt that names one a line")->required();
     c->add_option("TRUTH", o->truth, "likewise: a file, a folder with the same names, a list in the same order")
         ->required();
-    c->add_option("--radius", o->contrast.radius, "metres, of the neighbourhoods of sharpness (0.3)")
-        ->check(CLI::Range(0.001, 100.0));
-    c->add_option("--strong-step", o->contrast.strong_step, "of brightness, for edges (0.25)")
-        ->check(CLI::Range(0.0, 1.0));
+    add_number(*c, "--radius", o->contrast.radius, "metres, of the neighbourhoods of sharpness (0.3)", 0.001, 100.0);
+    add_number(*c, "--strong-step", o->contrast.strong_step, "of brightness, for edges (0.25)", 0.0, 1.0);
     c->callback([o, &globals, &run] { run = [o, &globals] { return eval_points(*o, globals); }; });
 }
 

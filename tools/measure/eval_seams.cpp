@@ -4,6 +4,7 @@
 #include "engine/scene/tiles.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
+#include "tools/cli/number_option.h"
 #include "tools/eval/color_steps.h"
 #include "tools/measure/eval.h"
 
@@ -52,7 +53,7 @@ void add_eval_seams(CLI::App& eval, const Globals& globals, Run& run)
     auto o = std::make_shared<EvalSeamsArguments>();
     CLI::App* c = eval.add_subcommand("seams", "steps of colour between neighbouring cells, across tiles and inside");
     c->add_option("GRID", o->grid, ".sgrid with points, or a folder of tiles")->required();
-    c->add_option("--tile-size", o->tile_size, "metres of a tile's edge (9.6)");
+    add_number(*c, "--tile-size", o->tile_size, "metres of a tile's edge (9.6)", 0.01, 1e6);
     c->callback([o, &globals, &run] { run = [o, &globals] { return eval_seams(*o, globals); }; });
 }
 

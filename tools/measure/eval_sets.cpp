@@ -6,7 +6,9 @@
 #include "runtime/base/hash.h"
 #include "runtime/base/quote.h"
 #include "runtime/base/safetensors.h"
+#include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
+#include "tools/cli/print_stderr.h"
 #include "tools/cli/progress.h"
 #include "tools/eval/inception.h"
 #include "tools/eval/pointnet.h"
@@ -196,7 +198,7 @@ Status compute_features(const EvalOptions& o, std::optional<EvalNetwork> only, c
         SR_TRY(pointnet, Pointnet::load(*device, o.network, warnings));
     }
     for (const std::string& warning : warnings)
-        fmt::print(stderr, "semrover: warning: {}\n", warning);
+        print_stderr("semrover: warning: {}\n", warning);
     for (size_t side = 0; side < 2; ++side) {
         if (is_feature_file(o.sets[side]))
             continue;
@@ -227,9 +229,8 @@ void add_eval_options(CLI::App& command, EvalOptions& o)
     command.add_option("B", o.sets[1], "the set to compare with, of the same kind")->required();
     command.add_option("--features", o.network, "the network: safetensors (docs/eval.md has the layouts)");
     command.add_option("--save-features", o.save, "a folder to write a.safetensors and b.safetensors to");
-    command.add_option("--batch", o.batch, "images or chunks at a time (default: 8 images, 4 chunks)")
-        ->check(CLI::Range(1u, 1024u));
-    command.add_option("--seed", o.seed, "of what is drawn at random")->capture_default_str();
+    add_number(command, "--batch", o.batch, "images or chunks at a time (default: 8 images, 4 chunks)", 1u, 1024u);
+    add_seed(command, "--seed", o.seed, "of what is drawn at random (0)");
 }
 
 Result<EvalSets> load_eval_sets(const EvalOptions& o, std::optional<EvalNetwork> only, const Globals& globals)

@@ -5,6 +5,7 @@
 #include "engine/fusion/surface_error.h"
 #include "engine/mesh/mesh_files.h"
 #include "engine/scene/palette.h"
+#include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
 #include "tools/measure/eval.h"
 
@@ -119,10 +120,10 @@ void add_eval_surface(CLI::App& eval, const Globals& globals, Run& run)
     c->add_option("TRUTH", o->truth, "the true mesh, likewise")->required();
     c->add_option("--frames", o->frames, "folder of depth pictures, as for fuse: only vertices they saw are measured");
     c->add_option("--poses", o->poses, "camera path of these; FRAMES/transforms.json");
-    c->add_option("--fov-x", o->input.fov_x, "degrees, where files have no intrinsics")->check(CLI::Range(1.0, 179.0));
-    c->add_option("--depth-scale", o->depth_scale, "metres of one unit of depth; 0.001")->check(CLI::Range(1e-6, 10.0));
-    c->add_option("--min-views", o->min_views, "frames that must have seen a vertex; 2")->check(CLI::Range(1, 1000));
-    c->add_option("--radius", o->radius, "metres, of the search for the true surface; 5")->check(CLI::Range(0.01, 1e3));
+    add_number(*c, "--fov-x", o->input.fov_x, "degrees, where files have no intrinsics", 1.0, 179.0);
+    add_number(*c, "--depth-scale", o->depth_scale, "metres of one unit of depth; 0.001", 1e-6, 10.0);
+    add_number(*c, "--min-views", o->min_views, "frames that must have seen a vertex; 2", 1, 1000);
+    add_number(*c, "--radius", o->radius, "metres, of the search for the true surface; 5", 0.01, 1e3);
     c->callback([o, &globals, &run] { run = [o, &globals] { return run_surface(*o, globals); }; });
 }
 

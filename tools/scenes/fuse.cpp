@@ -7,14 +7,18 @@
 #include "engine/mesh/mesh_files.h"
 #include "engine/mesh/voxelizer.h"
 #include "engine/scene/palette.h"
-#include "runtime/base/quote.h"
 #include "runtime/base/json.h"
+#include "runtime/base/quote.h"
+#include "tools/cli/choice.h"
+#include "tools/cli/class_option.h"
 #include "tools/cli/commands.h"
+#include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
+#include "tools/cli/output_folder.h"
+#include "tools/cli/print_stderr.h"
 #include "tools/cli/progress.h"
 
 #include <algorithm>
-#include <charconv>
 #include <CLI/CLI.hpp>
 #include <optional>
 
@@ -36,26 +40,13 @@ struct FuseArguments {
 struct Outputs {
     Path mesh, semantic, voxfield, run;
 
-    explicit Outputs(const FuseArguments& o)
-        : mesh(Path(o.output) / ("mesh." + o.mesh_format)), semantic(Path(o.output) / "semantic.sgrid"),
-          voxfield(Path(o.output) / "voxfield.sgrid"), run(Path(o.output) / "run.json")
+    Outputs(const Path& folder, const std::string& mesh_format)
+        : mesh(folder / ("mesh." + mesh_format)), semantic(folder / "semantic.sgrid"),
+          voxfield(folder / "voxfield.sgrid"), run(folder / "run.json")
     {
     }
     std::array<Path, 4> all() const { return {mesh, semantic, voxfield, run}; }
 };
-
-// a class by its name or number
-Result<uint8_t> class_option(const char* option, const std::string& text)
-{
-    if (const auto label = class_of_name(text))
-        return *label;
-    uint32_t number = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-    if (error == std::errc() && end == text.data() + text.size() && number < kClassCount)
-        return uint8_t(number);
-    return fail(ErrorCode::usage, "{}: {} is no class, expected a name such as 'car' or a number from 0 to {}", option,
-                quote(text), kClassCount - 1);
-}
 
 Status resolve(FuseArguments& o, const Globals& globals)
 {
@@ -71,7 +62,7 @@ Status resolve(FuseArguments& o, const Globals& globals)
     std::error_code error;
     if (fs::exists(o.output, error) && !fs::is_directory(o.output, error))
         return fail(ErrorCode::usage, "{} is a file, expected a folder", quote_path(o.output));
-    for (const Path& path : Outputs(o).all())
+    for (const Path& path : Outputs(o.output, o.mesh_format).all())
         if (fs::exists(path, error) && !globals.yes)
             return fail(ErrorCode::usage, "{} exists; -y replaces it", quote_path(path));
     return {};
@@ -183,40 +174,26 @@ Json figures_of(const FusionFolder& folder, const FusedMesh& fused, const Grids&
             {"cells", grids.semantic.cells.size()}, {"peak_device_bytes", device.peak_bytes()}};
 }
 
+// all of them or none; what else is in the folder stays
 Status write_outputs(const FuseArguments& o, const FusedMesh& fused, const Grids& grids, const Json& run)
 {
-    const Outputs out(o);
+    SR_TRY(OutputFolder folder, OutputFolder::create(o.output, true)); // resolve() has looked at what is there
+    const Outputs out(folder.path(), o.mesh_format);
     SR_CHECK(o.mesh_format == "ply" ? write_mesh_ply(out.mesh, fused.mesh) : write_glb(out.mesh, fused.mesh));
     SR_CHECK(write_grid(out.semantic, grids.semantic));
     SR_CHECK(write_grid(out.voxfield, grids.voxfield));
-    return write_file_atomically(out.run, run.dump(1) + "\n");
-}
-
-// all of them or none; a folder that was there before stays
-Status write_all(const FuseArguments& o, const FusedMesh& fused, const Grids& grids, const Json& run)
-{
-    std::error_code error;
-    const bool made = fs::create_directories(o.output, error);
-    if (error)
-        return fail(ErrorCode::bad_input, "cannot create {}: {}", quote_path(o.output), error.message());
-    const Status status = write_outputs(o, fused, grids, run);
-    if (!status) {
-        for (const Path& path : Outputs(o).all())
-            fs::remove(path, error);
-        if (made)
-            fs::remove(o.output, error);
-    }
-    return status;
+    SR_CHECK(write_file_atomically(out.run, run.dump(1) + "\n"));
+    return folder.commit();
 }
 
 void print_warnings(const FusionFolder& folder, const FusedMesh& fused)
 {
     if (folder.labelled() < folder.cameras().size())
-        fmt::print(stderr, "semrover: warning: {} of {} frames have no labels\n",
-                   folder.cameras().size() - folder.labelled(), folder.cameras().size());
+        print_stderr("semrover: warning: {} of {} frames have no labels\n", folder.cameras().size() - folder.labelled(),
+                     folder.cameras().size());
     if (fused.figures.unlabelled_faces)
-        fmt::print(stderr, "semrover: warning: {} of {} faces have no label\n", fused.figures.unlabelled_faces,
-                   fused.mesh.faces.size());
+        print_stderr("semrover: warning: {} of {} faces have no label\n", fused.figures.unlabelled_faces,
+                     fused.mesh.faces.size());
 }
 
 Status run_fuse(FuseArguments o, const Globals& globals)
@@ -231,12 +208,12 @@ Status run_fuse(FuseArguments o, const Globals& globals)
     progress.finish();
     SR_TRY(const Grids grids, make_grids(o, fused, *device));
     const Json figures = figures_of(folder, fused, grids, *device);
-    SR_CHECK(write_all(o, fused, grids,
-                       {{"settings", settings_of(o)},
-                        {"version", kVersion},
-                        {"device", device->name()},
-                        {"state", "finished"},
-                        {"results", figures}}));
+    SR_CHECK(write_outputs(o, fused, grids,
+                           {{"settings", settings_of(o)},
+                            {"version", kVersion},
+                            {"device", device->name()},
+                            {"state", "finished"},
+                            {"results", figures}}));
     if (!globals.quiet)
         print_warnings(folder, fused);
     if (globals.json)
@@ -249,26 +226,23 @@ Status run_fuse(FuseArguments o, const Globals& globals)
 
 void add_camera_options(CLI::App& c, FusionFolderOptions& o)
 {
-    const auto positive = CLI::Range(1e-3, 1e6);
-    c.add_option("--fx", o.fx, "focal length in pixels, in place of what files say")->check(positive);
-    c.add_option("--fy", o.fy, "likewise; as --fx")->check(positive);
-    c.add_option("--cx", o.cx, "pixels from the left; the middle")->check(CLI::Range(-1e5, 1e5));
-    c.add_option("--cy", o.cy, "pixels from the top; the middle")->check(CLI::Range(-1e5, 1e5));
-    c.add_option("--fov-x", o.fov_x, "field of view across the width, degrees")->check(CLI::Range(1.0, 179.0));
+    add_number(c, "--fx", o.fx, "focal length in pixels, in place of what files say", 1e-3, 1e6);
+    add_number(c, "--fy", o.fy, "likewise; as --fx", 1e-3, 1e6);
+    add_number(c, "--cx", o.cx, "pixels from the left; the middle", -1e5, 1e5);
+    add_number(c, "--cy", o.cy, "pixels from the top; the middle", -1e5, 1e5);
+    add_number(c, "--fov-x", o.fov_x, "field of view across the width, degrees", 1.0, 179.0);
 }
 
 void add_fusion_options(CLI::App& c, FusionOptions& o)
 {
-    c.add_option("--depth-scale", o.depth_scale, "metres of one unit of depth; 0.001")->check(CLI::Range(1e-6, 10.0));
-    c.add_option("--tsdf-voxel", o.voxel, "metres, of the distance field; 0.1")->check(CLI::Range(0.005, 10.0));
-    c.add_option("--truncation", o.truncation, "voxels, of the distance field; 4")->check(CLI::Range(3.5, 32.0));
-    c.add_option("--max-jump", o.max_jump,
-                 "voxels between distances in a cell: more is the edge of a shadow, not a surface; 3.2 (16: keep all)")
-        ->check(CLI::Range(1.8, 1000.0));
-    c.add_option("--min-weight", o.min_weight, "of a voxel; a frame adds at most 1 / (1 + depth); 0")
-        ->check(CLI::Range(0.0, 1e6));
-    c.add_option("--min-views", o.min_views, "frames that must have seen a piece of surface; 2")
-        ->check(CLI::Range(0, 7));
+    add_number(c, "--depth-scale", o.depth_scale, "metres of one unit of depth; 0.001", 1e-6, 10.0);
+    add_number(c, "--tsdf-voxel", o.voxel, "metres, of the distance field; 0.1", 0.005, 10.0);
+    add_number(c, "--truncation", o.truncation, "voxels, of the distance field; 4", 3.5, 32.0);
+    add_number(c, "--max-jump", o.max_jump,
+               "voxels between distances in a cell: more is the edge of a shadow, not a surface; 3.2 (16: keep all)",
+               1.8, 1000.0);
+    add_number(c, "--min-weight", o.min_weight, "of a voxel; a frame adds at most 1 / (1 + depth); 0", 0.0, 1e6);
+    add_number(c, "--min-views", o.min_views, "frames that must have seen a piece of surface; 2", 0, 7);
 }
 
 } // namespace
@@ -283,16 +257,15 @@ void add_fuse(CLI::App& app, const Globals& globals, Run& run)
     c->add_option("--poses", o->poses, "a camera path; DIR/transforms.json");
     add_camera_options(*c, o->input);
     add_fusion_options(*c, o->fusion);
-    c->add_option("--max-depth", o->max_depth, "metres; where a pixel is 0.55 voxels wide, 30 at most")
-        ->check(CLI::Range(0.1, 1000.0));
+    add_number(*c, "--max-depth", o->max_depth, "metres; where a pixel is 0.55 voxels wide, 30 at most", 0.1, 1000.0);
     c->add_option("--map", o->map, "JSON: label number or name to class, or null for pixels to leave out");
     c->add_option("--exclude", o->exclude, "classes whose pixels are left out, such as car,person; sky always is")
         ->delimiter(',');
     c->add_option("--default-label", o->default_label, "class of what has no label; none: not in the grids");
-    c->add_option("--voxel-size", o->voxels.voxel_size, "metres, of the grids; 0.6")->check(CLI::Range(0.05, 100.0));
-    c->add_option("--points", o->voxels.points_per_voxel, "points of a cell; 20")->check(CLI::Range(1, 4096));
-    c->add_option("-s,--seed", o->voxels.seed, "of the points; 0");
-    c->add_option("--mesh-format", o->mesh_format, "glb or ply; glb")->check(CLI::IsMember({"glb", "ply"}));
+    add_number(*c, "--voxel-size", o->voxels.voxel_size, "metres, of the grids; 0.6", 0.05, 100.0);
+    add_number(*c, "--points", o->voxels.points_per_voxel, "points of a cell; 20", 1, 4096);
+    add_seed(*c, "-s,--seed", o->voxels.seed, "of the points; 0");
+    add_choice(*c, "--mesh-format", {"glb", "ply"}, "glb or ply; glb", o->mesh_format);
     c->callback([o, &globals, &run] { run = [o, &globals] { return run_fuse(*o, globals); }; });
 }
 

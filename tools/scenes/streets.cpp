@@ -6,6 +6,7 @@
 #include "engine/scene/palette.h"
 #include "runtime/base/json.h"
 #include "tools/cli/commands.h"
+#include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/output_folder.h"
 #include "tools/scenes/placement_option.h"
@@ -88,8 +89,21 @@ Status draw(const StreetsArguments& o, const Globals& globals, Device& device, S
     return {};
 }
 
+Status check_drive(const StreetsArguments& o)
+{
+    constexpr double kMostFrames = 100000; // each has its lines in two camera paths
+    if (o.drive.first > o.street.length)
+        return fail(ErrorCode::usage, "--first: {} m is behind the end of the street, which is {} m long",
+                    o.drive.first, o.street.length);
+    if (const double frames = (o.street.length - o.drive.first) / o.drive.spacing; frames > kMostFrames)
+        return fail(ErrorCode::usage, "--spacing: {} m makes {:.0f} frames of this street, at most {:.0f} are possible",
+                    o.drive.spacing, frames, kMostFrames);
+    return {};
+}
+
 Status streets(const StreetsArguments& o, const Globals& globals)
 {
+    SR_CHECK(check_drive(o));
     SR_TRY(OutputFolder out, OutputFolder::create(o.output, globals.yes));
     Street street = make_street(o.street);
     const Intrinsics lens = pinhole_from_fov(o.fov, o.images.width, o.images.height);
@@ -126,36 +140,34 @@ void add_streets(CLI::App& app, const Globals& globals, Run& run)
     auto o = std::make_shared<StreetsArguments>();
     CLI::App* c = app.add_subcommand("streets", "make up a street: mesh, grids, a drive, and pictures to train with");
     c->add_option("-o,--output", o->output, "folder")->required();
-    c->add_option("--seed", o->street.seed, "another seed, another street");
-    c->add_option("--length", o->street.length, "metres")->check(CLI::Range(30.0, 20000.0));
-    c->add_option("--spacing", o->drive.spacing, "metres between the frames of the drive")
-        ->check(CLI::Range(0.01, 1000.0));
-    c->add_option("--first", o->drive.first, "metres along the street where the drive begins");
-    c->add_option("--end-margin", o->drive.end_margin, "metres before the end where it stops")
-        ->check(CLI::Range(0.0, 20000.0));
-    c->add_option("--camera-height", o->drive.height, "of the camera, metres")->check(CLI::Range(0.2, 50.0));
-    c->add_option("--yaw", o->drive.yaw, "radians to the left of the street");
-    c->add_option("--shift", o->shift, "metres to the left of the second, novel drive");
-    c->add_flag("--no-grids", o->no_grids, "without truth.sgrid and semantic.sgrid");
-    c->add_flag("--seen", o->seen, "of the grids only what the drives see, as a recording would");
-    c->add_option("--reach", o->sight.reach, "metres that --seen looks")->check(CLI::Range(1.0, 1000.0));
-    c->add_option("--voxel-size", o->voxels.voxel_size, "metres")->check(CLI::Range(0.05f, 10.f));
-    c->add_option("--points", o->voxels.points_per_voxel, "points of a cell")->check(CLI::Range(1, 4096));
-    add_placement(*c, o->voxels);
-    c->add_flag("--images", o->pictures, "also pictures of both drives: {color,depth,normal,label,visible}/000000.png");
-    c->add_option("--samples", o->images.samples, "rays a pixel")->check(CLI::Range(1u, 256u));
-    c->add_option("--ambient-rays", o->images.ambient_rays, "rays for the light from around, a sample")
-        ->check(CLI::Range(1u, 64u));
-    c->add_option(
-         "--sun-azimuth", o->images.sun_azimuth,
-         "where the sun stands, degrees to the left of the street's direction; the sky is the seed's otherwise")
-        ->check(CLI::Range(-360.0, 360.0));
-    c->add_option("--sun-elevation", o->images.sun_elevation, "degrees above the horizon")
-        ->check(CLI::Range(1.0, 90.0));
-    c->add_option("--clouds", o->images.cloud_cover, "share of the sky that they cover")->check(CLI::Range(0.0, 1.0));
-    c->add_option("-W,--width", o->images.width, "pixels")->check(CLI::Range(1u, 4096u));
-    c->add_option("-H,--height", o->images.height, "pixels")->check(CLI::Range(1u, 4096u));
-    c->add_option("--fov-x", o->fov, "horizontal field of view in degrees")->check(CLI::Range(1.0, 170.0));
+    add_seed(*c, "--seed", o->street.seed, "another seed, another street");
+    add_number(*c, "--length", o->street.length, "metres", 30.0, 20000.0);
+    add_number(*c, "--spacing", o->drive.spacing, "metres between the frames of the drive", 0.01, 1000.0);
+    add_number(*c, "--first", o->drive.first, "metres along the street where the drive begins", 0, 20000);
+    add_number(*c, "--end-margin", o->drive.end_margin, "metres before the end where it stops", 0.0, 20000.0);
+    add_number(*c, "--camera-height", o->drive.height, "of the camera, metres", 0.2, 50.0);
+    add_number(*c, "--yaw", o->drive.yaw, "radians to the left of the street", -6.3, 6.3);
+    add_number(*c, "--shift", o->shift, "metres to the left of the second, novel drive", -100, 100);
+    CLI::Option* no_grids = c->add_flag("--no-grids", o->no_grids, "without truth.sgrid and semantic.sgrid");
+    CLI::Option* seen = c->add_flag("--seen", o->seen, "of the grids only what the drives see, as a recording would");
+    seen->excludes(no_grids);
+    add_number(*c, "--reach", o->sight.reach, "metres that --seen looks", 1.0, 1000.0)->needs(seen);
+    add_number(*c, "--voxel-size", o->voxels.voxel_size, "metres", 0.05f, 10.f)->excludes(no_grids);
+    add_number(*c, "--points", o->voxels.points_per_voxel, "points of a cell", 1, 4096)->excludes(no_grids);
+    add_placement(*c, o->voxels)->excludes(no_grids);
+    CLI::Option* images = c->add_flag("--images", o->pictures,
+                                      "also pictures of both drives: {color,depth,normal,label,visible}/000000.png");
+    add_number(*c, "--samples", o->images.samples, "rays a pixel", 1u, 256u)->needs(images);
+    add_number(*c, "--ambient-rays", o->images.ambient_rays, "rays for the light from around, a sample", 1u, 64u)
+        ->needs(images);
+    add_number(*c, "--sun-azimuth", o->images.sun_azimuth,
+               "where the sun stands, degrees to the left of the street's direction; the sky is the seed's otherwise",
+               -360.0, 360.0);
+    add_number(*c, "--sun-elevation", o->images.sun_elevation, "degrees above the horizon", 1.0, 90.0)->needs(images);
+    add_number(*c, "--clouds", o->images.cloud_cover, "share of the sky that they cover", 0.0, 1.0)->needs(images);
+    add_number(*c, "-W,--width", o->images.width, "pixels", 1u, 4096u);
+    add_number(*c, "-H,--height", o->images.height, "pixels", 1u, 4096u);
+    add_number(*c, "--fov-x", o->fov, "horizontal field of view in degrees", 1.0, 170.0);
     c->callback([o, &globals, &run] { run = [o, &globals] { return streets(*o, globals); }; });
 }
 

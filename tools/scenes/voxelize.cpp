@@ -9,11 +9,14 @@
 #include "engine/scene/scene_points.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
+#include "tools/cli/choice.h"
+#include "tools/cli/class_option.h"
 #include "tools/cli/commands.h"
+#include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
+#include "tools/cli/print_stderr.h"
 #include "tools/scenes/placement_option.h"
 
-#include <charconv>
 #include <CLI/CLI.hpp>
 
 namespace semrover {
@@ -25,18 +28,6 @@ struct VoxelizeArguments {
     VoxelizeOptions voxelize;
     double scale = 1;
 };
-
-Result<uint8_t> parse_label(const std::string& text)
-{
-    int number = -1;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-    if (error == std::errc() && end == text.data() + text.size() && number >= 0 && number < int(kClassCount))
-        return uint8_t(number);
-    if (const auto label = class_of_material(text))
-        return *label;
-    return fail(ErrorCode::usage, "--default-label: {} is no class; their names are road, sidewalk, building, ...",
-                quote(text, 60));
-}
 
 LabelSource source_of(const std::string& name)
 {
@@ -66,8 +57,8 @@ Status label_mesh(Mesh& mesh, const VoxelizeArguments& o, const MeshLabelMap& ma
                     "to the rest",
                     quote_path(o.mesh), unlabelled_text(unknown));
     if (!globals.quiet)
-        fmt::print(stderr, "semrover: warning: labelled {}: {}\n", kPalette[o.voxelize.default_label].name,
-                   unlabelled_text(unknown));
+        print_stderr("semrover: warning: labelled {}: {}\n", kPalette[o.voxelize.default_label].name,
+                     unlabelled_text(unknown));
     return {};
 }
 
@@ -128,7 +119,7 @@ Status run_voxelize(VoxelizeArguments o, const Globals& globals)
 {
     SR_CHECK(check_outputs(o, globals));
     if (!o.default_label.empty()) {
-        SR_TRY(o.voxelize.default_label, parse_label(o.default_label));
+        SR_TRY(o.voxelize.default_label, class_option("--default-label", o.default_label));
     }
     SR_TRY(const Mesh mesh, load_mesh(o, globals));
     SR_TRY(const auto device, open_device(globals));
@@ -152,18 +143,16 @@ void add_voxelize(CLI::App& app, const Globals& globals, Run& run)
     CLI::App* c = app.add_subcommand("voxelize", "a textured mesh as a grid of labelled cells and coloured points");
     c->add_option("MESH", o->mesh, ".obj, .ply, .glb or .gltf")->required();
     c->add_option("-o,--output", o->output, ".sgrid")->required();
-    c->add_option("--voxel-size", o->voxelize.voxel_size, "metres (0.6)")->check(CLI::Range(0.001, 1000.0));
-    c->add_option("--points", o->voxelize.points_per_voxel, "of a cell (20)")->check(CLI::Range(1, 4096));
-    c->add_option("--seed", o->voxelize.seed, "of the points (0)");
+    add_number(*c, "--voxel-size", o->voxelize.voxel_size, "metres (0.6)", 0.001, 1000.0);
+    add_number(*c, "--points", o->voxelize.points_per_voxel, "of a cell (20)", 1, 4096);
+    add_seed(*c, "--seed", o->voxelize.seed, "of the points (0)");
     add_placement(*c, o->voxelize);
-    c->add_option("--min-area", o->voxelize.min_area,
-                  "surface of an occupied cell, in squares of the voxel size (0.0001)")
-        ->check(CLI::Range(0.0, 1.0));
-    c->add_option("--up", o->up, "axis of the file that points up (glTF: y, others: z)")
-        ->check(CLI::IsMember({"y", "z"}));
-    c->add_option("--scale", o->scale, "metres in a unit of the file (1)")->check(CLI::Range(1e-6, 1e6));
-    c->add_option("--labels", o->labels, "where labels come from (auto: faces, material names, label textures)")
-        ->check(CLI::IsMember({"auto", "material", "texture", "face"}));
+    add_number(*c, "--min-area", o->voxelize.min_area,
+               "surface of an occupied cell, in squares of the voxel size (0.0001)", 0.0, 1.0);
+    add_choice(*c, "--up", {"y", "z"}, "axis of the file that points up (glTF: y, others: z)", o->up);
+    add_number(*c, "--scale", o->scale, "metres in a unit of the file (1)", 1e-6, 1e6);
+    add_choice(*c, "--labels", {"auto", "material", "texture", "face"},
+               "where labels come from (auto: faces, material names, label textures)", o->labels);
     c->add_option("--map", o->map, "JSON object: material name, pattern with * or number -> class name or number");
     c->add_option("--default-label", o->default_label, "class of what has none");
     c->add_option("--ply", o->ply, "also the points, as PLY");

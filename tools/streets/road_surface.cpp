@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/streets/road_surface.h"
 
-#include "tools/streets/class_label.h"
 #include "runtime/base/keyed_random.h"
+#include "tools/streets/class_label.h"
 
 #include <algorithm>
 #include <functional>

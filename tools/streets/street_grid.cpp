@@ -24,6 +24,16 @@ Mesh part_of(const Mesh& mesh, uint8_t wanted)
     return part;
 }
 
+// Cells with enough of a mesh; none, where cells are so large that it is too narrow for all of them: an error of the
+// voxelizer then, unless cells with as little as `least` of it are found.
+Result<std::vector<Cell>> cells_of(Device& device, const Mesh& mesh, VoxelizeOptions options, float least)
+{
+    if (Result<VoxelizedMesh> found = voxelize(device, mesh, options); found || options.min_area <= least)
+        return found.map([](VoxelizedMesh& v) { return std::move(v.grid.cells); });
+    options.min_area = least;
+    return voxelize(device, mesh, options).map([](const VoxelizedMesh&) { return std::vector<Cell>(); });
+}
+
 } // namespace
 
 Result<StreetGrids> street_grids(Device& device, const Street& street, const VoxelizeOptions& options, float lane_share)
@@ -35,8 +45,8 @@ Result<StreetGrids> street_grids(Device& device, const Street& street, const Vox
         VoxelizeOptions coarse = options;
         coarse.points_per_voxel = 1;
         coarse.min_area = lane_share;
-        SR_TRY(const VoxelizedMesh marked, voxelize(device, lanes, coarse));
-        for (const Cell& cell : marked.grid.cells)
+        SR_TRY(const std::vector<Cell> marked, cells_of(device, lanes, coarse, options.min_area));
+        for (const Cell& cell : marked)
             if (const auto at = find_cell(grids.truth, cell))
                 grids.truth.labels[*at] = label::kRoadLane;
     }

@@ -3,6 +3,7 @@
 // semrover verify CASE...: runs golden cases, one line a case
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
+#include "tools/cli/choice.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/open_device.h"
 #include "tools/verify/golden_case.h"
@@ -149,10 +150,10 @@ Status verify(const VerifyArguments& o, const Globals& globals)
     nlohmann::ordered_json list = nlohmann::ordered_json::array();
     std::array<size_t, 3> counts{};
     for (const Path& folder : cases) {
-        if (interrupt_requested())
+        const CaseReport r = run_case(*device, folder, o.precision);
+        if (interrupt_requested()) // the case may have been cut off
             return fail(ErrorCode::interrupted, "interrupted after {} of {} cases", counts[0] + counts[1] + counts[2],
                         cases.size());
-        const CaseReport r = run_case(*device, folder, o.precision);
         ++counts[size_t(r.outcome)];
         if (globals.json)
             list.push_back(to_json(r));
@@ -185,8 +186,7 @@ void add_verify(CLI::App& app, const Globals& globals, Run& run)
     auto o = std::make_shared<VerifyArguments>();
     CLI::App* c = app.add_subcommand("verify", "run golden cases: what public reference code gives for known inputs");
     c->add_option("CASE", o->cases, "folder of a case, or of cases (tests/golden)")->required();
-    c->add_option("--precision", o->precision, "storage of weights and activations")
-        ->check(CLI::IsMember({"fp32", "fp16"}));
+    add_choice(*c, "--precision", {"fp32", "fp16"}, "storage of weights and activations", o->precision);
     c->add_flag("--allow-skip", o->allow_skip, "exit 0 although cases of unknown kinds were skipped");
     c->callback([o, &globals, &run] { run = [o, &globals] { return verify(*o, globals); }; });
 }

@@ -1,0 +1,91 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// what others put into a run's folder
+#include "engine/job/outputs.h"
+#include "engine/job/region_store.h"
+#include "tests/says.h"
+#include "tests/scratch_folder.h"
+
+#include <sys/stat.h>
+
+namespace semrover {
+namespace engine_run_folder_test {
+
+namespace fs = std::filesystem;
+
+const Json kSettings = {{"command", "test"}, {"seed", 1}};
+
+TEST(engine_run_folder, a_link_is_refused_by_name_and_its_target_stays)
+{
+    for (const char* name : {"journal.jsonl", "lock", "run.json", "regions", "frames", "frames/front"})
+        for (const bool restart : {false, true}) {
+            const ScratchFolder folder;
+            const fs::path run = folder / "run";
+            // of an earlier run, so that the journal would be read and cut
+            ASSERT_TRUE(RunFolder::open(run, kSettings, false, {{"regions"}, {"frames"}}));
+            const fs::path target = folder.put("target", "precious, and no journal");
+            fs::create_directories((run / name).parent_path());
+            fs::remove_all(run / name);
+            fs::create_symlink(target, run / name);
+            EXPECT_TRUE(says(RunFolder::open(run, kSettings, restart, {{"regions"}, {"frames"}}),
+                             std::string(name) + "' is a link"));
+            EXPECT_EQ(contents(target), "precious, and no journal") << name;
+        }
+}
+
+TEST(engine_run_folder, a_link_to_nothing_creates_nothing)
+{
+    for (const char* name : {"journal.jsonl", "lock"}) {
+        const ScratchFolder folder;
+        fs::create_directories(folder / "run");
+        fs::create_symlink(folder / "new", folder / (std::string("run/") + name));
+        EXPECT_TRUE(says(RunFolder::open(folder / "run", kSettings, false), "is a link"));
+        EXPECT_FALSE(fs::exists(folder / "new"));
+    }
+}
+
+TEST(engine_run_folder, a_pipe_is_not_waited_for)
+{
+    for (const char* name : {"journal.jsonl", "lock", "run.json"}) {
+        const ScratchFolder folder;
+        fs::create_directories(folder / "run");
+        if (std::string_view(name) == "journal.jsonl")
+            folder.put("run/run.json", Json{{"settings", kSettings}, {"state", "finished"}}.dump());
+        ASSERT_EQ(mkfifo((folder / "run" / name).c_str(), 0600), 0);
+        const auto opened = RunFolder::open(folder / "run", kSettings, false);
+        if (std::string_view(name) != "journal.jsonl") // a run that begins removes the old journal, whatever it is
+            EXPECT_TRUE(says(opened, name));
+    }
+}
+
+TEST(engine_run_folder, a_run_json_that_is_none_is_an_error_and_yes_starts_over)
+{
+    for (const char* text : {"[]", "null", "3", "\"x\"", "{}", R"({"settings": {}})", R"({"settings": 1, "state": 2})",
+                             R"({"settings": {}, "state": []})"}) {
+        const ScratchFolder folder;
+        fs::create_directories(folder / "run");
+        folder.put("run/run.json", text);
+        EXPECT_TRUE(says(open_run(folder / "run", kSettings, false), "run.json")) << text;
+        EXPECT_TRUE(open_run(folder / "run", kSettings, true)) << text;
+    }
+}
+
+TEST(engine_run_folder, lines_of_the_journal_with_other_types_are_no_regions)
+{
+    const ScratchFolder folder;
+    {
+        auto run = RunFolder::open(folder / "run", kSettings, false);
+        ASSERT_TRUE(run);
+        ASSERT_TRUE(save_region(*run, {.region = 0, .targets = {1}, .points = {0, 0, 0}, .colors = {1, 2, 3}}));
+        for (const Json& odd : {Json(nullptr), Json(1), Json{{"region", 0}, {"xxh64", 12}}, Json{{"region", 0}},
+                                Json{{"region", "0"}, {"xxh64", ""}}, Json{{"region", 0}, {"xxh64", {1, 2}}}})
+            ASSERT_TRUE(run->append(odd));
+    }
+    const auto again = RunFolder::open(folder / "run", kSettings, false);
+    ASSERT_TRUE(again);
+    EXPECT_EQ(again->entries().size(), 7u);
+    EXPECT_EQ(load_regions(*again).size(), 1u);
+}
+
+} // namespace engine_run_folder_test
+} // namespace semrover
