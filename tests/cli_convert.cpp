@@ -4,6 +4,7 @@
 #include "tests/json_text.h"
 #include "tests/program.h"
 #include "tests/renderer_weights.h"
+#include "tests/says.h"
 
 namespace semrover {
 namespace cli_convert_test {
@@ -134,6 +135,74 @@ TEST(CliConvert, asd_init_widens_the_input_with_zeros)
         }
     }
     expect_error(convert(folder / "out", folder / "again", "--asd-init"), 3, "this one takes 13");
+}
+
+TEST(CliConvert, a_single_file_of_stable_video_diffusion_becomes_a_renderer_of_videos)
+{
+    const ScratchFolder folder;
+    UnetConfig unet = small_video_unet();
+    unet.in_channels = 8;
+    Weights w = ldm_weights(unet, small_video_vae());
+    for (const char* name : {"model.diffusion_model.label_emb.0.2.weight",
+                             "model.diffusion_model.input_blocks.1.0.time_stack.in_layers.0.weight",
+                             "model.diffusion_model.input_blocks.1.0.time_mixer.mix_factor",
+                             "model.diffusion_model.input_blocks.1.1.time_stack.0.norm_in.weight",
+                             "model.diffusion_model.input_blocks.1.1.time_pos_embed.2.bias",
+                             "model.diffusion_model.middle_block.2.time_stack.out_layers.3.weight",
+                             "first_stage_model.decoder.mid.block_1.time_stack.in_layers.2.weight",
+                             "first_stage_model.decoder.up.1.block.2.mix_factor",
+                             "first_stage_model.decoder.conv_out.time_mix_conv.weight"})
+        EXPECT_TRUE(w.specs.contains(name)) << name;
+    w.add("conditioner.embedders.0.x", {"x", {3}});
+    w.write(folder / "in.safetensors");
+    const ProgramResult plain = convert(folder / "in.safetensors", folder / "plain");
+    ASSERT_EQ(plain.code, 0) << plain.err;
+    EXPECT_NE(plain.out.find("left out: conditioner.*"), std::string::npos) << plain.out;
+    const auto m = RendererModel::read(folder / "plain");
+    ASSERT_TRUE(m) << m.error().message;
+    EXPECT_EQ(unet_config_json(m->unet), unet_config_json(unet));
+    expect_seeded(*m->open_unet(), unet_schema(m->unet), DType::f32);
+    EXPECT_EQ(m->scheduler.sampler, Sampler::euler);
+    EXPECT_TRUE(m->vae.video);
+    std::vector<float> quant; // the file has none, the folder one that changes nothing
+    ASSERT_TRUE(m->open_vae()->read({"quant_conv.weight", {8, 8, 1, 1}}, quant));
+    for (size_t i = 0; i < quant.size(); ++i)
+        EXPECT_EQ(quant[i], i / 8 == i % 8 ? 1.f : 0.f);
+    const Json index = *read_json(folder / "plain/model_index.json");
+    EXPECT_EQ(index["renderer"][1], "UNetSpatioTemporalConditionModel");
+    EXPECT_EQ(index["vae"][1], "AutoencoderKLTemporalDecoder");
+    EXPECT_EQ(index["scheduler"][1], "EulerDiscreteScheduler");
+    EXPECT_TRUE(says(RendererModel::open(folder / "plain"), "--vsd-init' makes it so"));
+    expect_error(convert(folder / "plain", folder / "no", "--asd-init"), 3, "--asd-init wants a UNet of single images");
+}
+
+TEST(CliConvert, vsd_init_keeps_the_images_weights_for_the_buffer_and_adds_visibility_with_zeros)
+{
+    const ScratchFolder folder;
+    UnetConfig unet = small_video_unet();
+    unet.in_channels = 8;
+    ldm_weights(unet, small_video_vae()).write(folder / "in.safetensors");
+    ASSERT_EQ(convert(folder / "in.safetensors", folder / "plain").code, 0);
+    for (const char* in : {"in.safetensors", "plain"}) {
+        const ProgramResult result = convert(folder / in, folder / "out", "-y --vsd-init");
+        ASSERT_EQ(result.code, 0) << result.err;
+        const auto m = RendererModel::open(folder / "out");
+        ASSERT_TRUE(m) << m.error().message;
+        EXPECT_EQ(m->unet.in_channels, 9u);
+        EXPECT_EQ(m->defaults.video.window_frames, 12u);
+        EXPECT_EQ(m->defaults.video.window_overlap, 4u);
+        std::vector<float> plain, wide;
+        random_tensor(1, {"conv_in.weight", {32, 8, 3, 3}}, plain);
+        ASSERT_TRUE(m->open_unet()->read({"conv_in.weight", {32, 9, 3, 3}}, wide));
+        for (size_t i = 0; i < wide.size(); ++i) {
+            const size_t row = i / (9 * 9), column = i % (9 * 9);
+            ASSERT_EQ(wide[i], column < 8 * 9 ? plain[row * 8 * 9 + column] : 0.f) << i;
+        }
+    }
+    expect_error(convert(folder / "out", folder / "again", "--vsd-init"), 3, "this one takes 9");
+    put_diffusers(folder / "images");
+    expect_error(convert(folder / "images", folder / "again", "--vsd-init"), 3, "--vsd-init wants a UNet of videos");
+    expect_error(convert(folder / "out", folder / "again", "--vsd-init --asd-init"), 2, "excludes");
 }
 
 TEST(CliConvert, a_transformer_comes_along)

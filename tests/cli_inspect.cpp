@@ -89,6 +89,14 @@ TEST(CliInspect, a_checkpoint_says_what_it_is_and_whether_it_can_render)
     EXPECT_NE(plain.out.find("no: a plain UNet (4 input channels)"), std::string::npos);
     EXPECT_NE(plain.out.find("vae         none"), std::string::npos) << plain.out.substr(0, 2000);
 
+    UnetConfig video = small_video_unet();
+    ldm_weights(video, small_video_vae()).write(folder / "video.safetensors", DType::f16);
+    const auto svd = json_of(semrover_program("inspect --json " + (folder / "video.safetensors").string()).out);
+    EXPECT_EQ(svd["kind"], "Stable Video Diffusion single file (LDM)");
+    EXPECT_EQ(svd["unet"]["deferred_renderer"], "ready, of videos (9 input channels)");
+    EXPECT_EQ(svd["unet"]["config"], unet_config_json(video));
+    EXPECT_EQ(svd["vae"]["config"], vae_config_json(small_video_vae()));
+
     const std::string golden = SEMROVER_SOURCE_DIR "/tests/golden/";
     for (const auto& [name, kind] : {std::pair{"unet_asd_tiny/model", "UNet2DConditionModel"},
                                      std::pair{"unet_vsd_tiny/model", "UNetSpatioTemporalConditionModel"},
@@ -98,6 +106,25 @@ TEST(CliInspect, a_checkpoint_says_what_it_is_and_whether_it_can_render)
         const auto part = json_of(semrover_program("inspect --json " + golden + name).out);
         EXPECT_EQ(part["weights"]["kind"], kind);
     }
+}
+
+TEST(CliInspect, a_renderer_of_videos_says_how_drives_are_cut)
+{
+    const ScratchFolder folder;
+    const std::filesystem::path golden = SEMROVER_SOURCE_DIR "/tests/golden/vsd_window_tiny/model";
+    std::filesystem::copy(golden / "unet", folder / "renderer");
+    std::filesystem::copy(golden / "vae", folder / "vae");
+    folder.put("model_index.json", R"({"renderer": ["diffusers", "UNetSpatioTemporalConditionModel"],
+        "defaults": {"renderer": {"window_overlap": 3, "frame_correlation": 0}}})");
+    const auto json = json_of(semrover_program("inspect --json " + folder.path().string()).out);
+    EXPECT_EQ(json["components"]["renderer"]["weights"]["deferred_renderer"], "ready, of videos (9 input channels)");
+    EXPECT_EQ(json["video"]["window_frames"], 6);
+    EXPECT_EQ(json["video"]["window_overlap"], 3);
+    EXPECT_EQ(json["video"]["frame_correlation"], 0);
+    EXPECT_EQ(json["video"]["decode_frames"], 4);
+    EXPECT_EQ(json["video"]["guidance_scale"], nlohmann::json({1, 3}));
+    EXPECT_EQ(json["video"]["sampler"], "euler");
+    EXPECT_FALSE(json_of(semrover_program("inspect --json " + kAssets + "/model").out).contains("video"));
 }
 
 TEST(CliInspect, what_it_cannot_show_ends_with_one_line_and_code_3)

@@ -33,6 +33,34 @@ inline VaeConfig small_vae()
     return c;
 }
 
+// of videos, as a single file's shapes tell it: heads of 64 channels, three numbers that come with a video
+inline UnetConfig small_video_unet()
+{
+    UnetConfig c;
+    c.video = c.use_linear_projection = true;
+    c.in_channels = 9;
+    c.block_out_channels = {32, 64};
+    c.layers_per_block = {1, 1};
+    c.down_attention = {true, false};
+    c.up_attention = {false, true};
+    c.heads = {1, 1};
+    c.transformer_layers = {1, 1};
+    c.cross_attention_dim = 1024;
+    c.added_embed_dim = 8;
+    c.added_numbers = 3;
+    c.num_frames = 25;
+    return c;
+}
+
+inline VaeConfig small_video_vae()
+{
+    VaeConfig c;
+    c.video = true;
+    c.block_out_channels = {32, 64};
+    c.use_quant_conv = c.use_post_quant_conv = false;
+    return c;
+}
+
 // tensors to write, and a file of them
 struct Weights {
     std::map<std::string, TensorSpec> specs; // by name in the file
