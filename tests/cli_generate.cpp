@@ -91,6 +91,34 @@ TEST_F(CliGenerate, any_batch_and_a_second_run_give_the_same_bytes)
     EXPECT_EQ(grid->labels, street().labels);
 }
 
+TEST_F(CliGenerate, in_the_order_of_tiles_a_part_killed_runs_and_batches_give_the_bytes_of_the_whole)
+{
+    const std::string tiles = "--order tiles --tile-size 3.6 ";
+    const std::string first = bytes_of("a.sgrid", tiles + "--batch 1");
+    EXPECT_TRUE(first == bytes_of("b.sgrid", tiles + "--batch 4"));
+    EXPECT_FALSE(first == bytes_of("c.sgrid", "--order scene"));
+    EXPECT_FALSE(first == bytes_of("d.sgrid", "--order tiles --tile-size 4.2"));
+    ChildProgram child(arguments("e.sgrid") + tiles + "--batch 1");
+    while (journal_lines("e.sgrid") < 3 && child.running())
+        usleep(500);
+    child.stop(SIGKILL);
+    EXPECT_TRUE(first == bytes_of("e.sgrid", tiles));
+    VoxelGrid part; // tiles 0 and 1 along i, of which tile 0 has all its neighbours
+    part.voxel_size = 0.6f;
+    for (size_t c = 0; c < street().cells.size(); ++c)
+        if (street().cells[c][0] < 12)
+            append_cell(part, street(), c);
+    ASSERT_TRUE(write_grid(path("part.sgrid"), part));
+    ASSERT_EQ(generate("f.sgrid", tiles, "part.sgrid").code, 0);
+    const auto whole = read_grid(path("a.sgrid")), cut = read_grid(path("f.sgrid"));
+    ASSERT_TRUE(whole && cut);
+    EXPECT_EQ(cut->metadata.at("tile_cells"), "6");
+    const size_t values = size_t(std::ranges::count_if(cut->cells, [](const Cell& c) { return c[0] < 6; })) * 60;
+    EXPECT_GT(values, 60u * 80);
+    EXPECT_TRUE(std::equal(cut->points.begin(), cut->points.begin() + ptrdiff_t(values), whole->points.begin()));
+    EXPECT_TRUE(std::equal(cut->colors.begin(), cut->colors.begin() + ptrdiff_t(values), whole->colors.begin()));
+}
+
 TEST_F(CliGenerate, the_model_says_how_known_cells_are_seen_and_an_option_says_otherwise)
 {
     std::filesystem::create_directory(folder_ / "model");
@@ -412,6 +440,12 @@ TEST_F(CliGenerateRefuses, devices_and_options_that_cannot_be)
     expect_refusal(line + "--cfg-scale=-1", 2, "guidance");
     expect_refusal(line + "--region-size 0", 3, "region");
     expect_refusal(line + "--first-cell 300", 3, "first");
+    expect_refusal(line + "--order spiral", 2, "spiral");
+    expect_refusal(line + "--tile-size 4.8", 2, "--order tiles");
+    expect_refusal(line + "--order tiles --first-cell 3", 2, "--first-cell");
+    expect_refusal(line + "--order tiles --tile-size 2.4", 2, "narrower than its halo");
+    expect_refusal(line + "--order tiles --strategy paper", 2, "leaves cells empty");
+    expect_refusal(line + "--order tiles --along " + path("in.sgrid"), 2, "--order tiles");
 }
 
 } // namespace cli_generate_test
