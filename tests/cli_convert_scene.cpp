@@ -115,7 +115,7 @@ TEST(CliConvertScene, unknown_labels_are_listed_and_a_map_says_what_they_are)
     EXPECT_EQ(grid_of(out).labels, (std::vector<uint8_t>{19, 19, 7}));
     EXPECT_EQ(grid_of(out).cells, (std::vector<Cell>{{2, -1, 0}, {4, -1, 0}, {6, -1, 0}}));
     expect_error(convert(ply, out, "-y --origin 1,2"), 2, "--origin takes X,Y,Z");
-    expect_error(convert(ply, out, "-y --label dog"), 2, "there is no class 'dog'");
+    expect_error(convert(ply, out, "-y --label dog"), 2, "--label: unknown class 'dog'");
 }
 
 TEST(CliConvertScene, splats_of_every_format_draw_the_same_picture)
@@ -206,7 +206,7 @@ TEST(CliConvertScene, what_it_cannot_do_ends_with_one_line_and_a_code)
     expect_error(convert(kSemantic, out, "--to occ3d-waymo"), 2, "'occ3d-waymo' cannot be written");
     expect_error(convert(kSemantic, out, "--from tiff"), 2, "there is no format 'tiff'");
     expect_error(convert(kSemantic, out, "--splat-radius x"), 2, "--splat-radius takes metres");
-    expect_error(convert(kSemantic, out, "--dtype f16"), 2, "--dtype and --asd-init are for models");
+    expect_error(convert(kSemantic, out, "--dtype f16"), 2, "--dtype has no meaning for a scene");
     expect_error(convert(kSemantic, kSemantic, "-y"), 2, "IN and OUT are the same");
     expect_error(convert(kSemantic, (folder / "no/o.vox").string()), 3, "cannot write");
     EXPECT_FALSE(std::filesystem::exists(out));

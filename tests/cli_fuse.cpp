@@ -216,8 +216,8 @@ TEST(CliFuse, unknown_labels_are_listed_with_counts_and_may_be_mapped)
 TEST(CliFuse, bad_options_are_usage_errors)
 {
     const Drive drive(1);
-    drive.expect_refusal("--exclude: 'tree' is no class", "--exclude tree", 2);
-    drive.expect_refusal("--default-label: '20' is no class", "--default-label 20", 2);
+    drive.expect_refusal("--exclude: unknown class 'tree'", "--exclude tree", 2);
+    drive.expect_refusal("--default-label: unknown class '20'", "--default-label 20", 2);
     drive.expect_refusal("--min-views", "--min-views 9", 2);
 }
 

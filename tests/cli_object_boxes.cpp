@@ -70,12 +70,12 @@ TEST_F(CliObjectBoxes, what_cannot_be_made_is_refused_and_nothing_is_written)
     expect_error(convert("l.txt", kLabels, "--frame 3"), 2, "--frame is for labels of tracking");
     expect_error(convert("l.txt", kLabels, "--sample 3"), 2, "--sample has no meaning for kitti-boxes");
     expect_error(convert("l.txt", kLabels, "--calib " + path("none.txt")), 3, "none.txt");
-    expect_error(convert("l.txt", kLabels, "--to vox"), 2, "have no meaning for boxes");
+    expect_error(convert("l.txt", kLabels, "--to vox"), 2, "--to has no meaning for boxes");
     expect_error(convert("l.txt", kLabels, "--origin 1"), 2, "--origin takes X,Y,Z");
     expect_error(convert("l.txt", kLabels, "", "out.sgrid"), 2, "in a file that ends with .json");
     expect_error(convert("l.txt", kLabels, "--from boxes"), 2, "formats are kitti-boxes, nuscenes-boxes, waymo-boxes");
     expect_error(convert("l.json", "[]", "--from waymo-boxes --calib x"), 2, "--calib has no meaning for waymo-boxes");
-    expect_error(convert("p.tum", "0 0 0 0 0 0 0 1\n", "--calib x"), 2, "are for boxes");
+    expect_error(convert("p.tum", "0 0 0 0 0 0 0 1\n", "--calib x"), 2, "--calib has no meaning for a camera path");
     EXPECT_EQ(convert("l.txt", kLabels, "--dry-run").code, 0);
     EXPECT_FALSE(is_there(path("out.json")));
     EXPECT_FALSE(is_there(path("out.sgrid")));

@@ -103,8 +103,9 @@ TEST(cli_options, all_say_what_they_take)
     for (const Listed& o : options) {
         EXPECT_TRUE(kinds.contains(o.option["kind"])) << o.command << " " << o.option.dump();
         EXPECT_FALSE(o.option["help"].get<std::string>().empty()) << o.command << " " << o.name();
-        if (is_number(o))
+        if (is_number(o)) {
             EXPECT_LT(o.option["least"], o.option["most"]) << o.command << " " << o.name();
+        }
     }
 }
 

@@ -78,7 +78,7 @@ TEST(CliVoxelize, scale_axes_and_a_default_label_apply)
     EXPECT_EQ(grid->voxel_size, 0.5f);
     EXPECT_TRUE(find_cell(*grid, {0, -1, 3})); // y of the file is up, x runs to the right
     expect_error(semrover_program("voxelize " + mesh + " -o " + out + " -y --default-label grass"), 2,
-                 "'grass' is no class");
+                 "unknown class 'grass'");
     expect_error(semrover_program("voxelize " + (folder / "none.obj").string() + " -o " + out + " -y"), 3, "none.obj");
 }
 
