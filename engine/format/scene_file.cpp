@@ -28,6 +28,7 @@ constexpr SceneFormatFacts kFormats[] = {
     {SceneFormat::occ3d_waymo, "occ3d-waymo", ".npz", false, false},
     {SceneFormat::vox, "vox", ".vox", false, true},
     {SceneFormat::points_ply, "points-ply", ".ply", false, true},
+    {SceneFormat::carla_points, "carla-points", ".ply", false, false},
     {SceneFormat::gaussian_3d, "3dgs", ".ply", true, true},
     {SceneFormat::gaussian_2d, "2dgs", ".ply", true, true},
     {SceneFormat::inria62, "inria62", ".ply", true, true},
@@ -60,7 +61,7 @@ Result<SceneFormat> ply_format(const Path& path)
         return vertex != header.elements.end() && std::ranges::find(vertex->names, name) != vertex->names.end();
     };
     if (!has("scale_0") || !has("rot_0"))
-        return SceneFormat::points_ply;
+        return has("ObjTag") ? SceneFormat::carla_points : SceneFormat::points_ply;
     return has("f_rest_44") ? SceneFormat::inria62
            : has("scale_2") ? SceneFormat::gaussian_3d
                             : SceneFormat::gaussian_2d;
@@ -173,6 +174,8 @@ Status write_scene_grid(const Path& path, const VoxelGrid& grid, SceneFormat for
     case SceneFormat::npz:
         return write_grid_npz(path, grid);
     case SceneFormat::semantickitti:
+    case SceneFormat::carla_points:
+        return read_carla_points(path, o);
         without_points();
         return write_semantic_kitti(path, grid, warnings);
     case SceneFormat::vox:

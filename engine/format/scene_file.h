@@ -17,6 +17,7 @@ enum class SceneFormat : uint8_t {
     occ3d_waymo,
     vox,
     points_ply,
+    carla_points,
     gaussian_3d,
     gaussian_2d,
     inria62,
