@@ -91,7 +91,9 @@ TEST(SplatPly, the_rigid_variant_has_the_62_floats_of_the_first_program)
     EXPECT_EQ(p[8].name, "f_dc_2");
     for (size_t i = 0; i < 45; ++i) {
         EXPECT_EQ(p[9 + i].name, fmt::format("f_rest_{}", i));
-        EXPECT_EQ(p[9 + i].values, (std::vector<double>{0, 0, 0}));
+        ASSERT_EQ(p[9 + i].values.size(), 3u);
+        for (size_t row = 0; row < 3; ++row)
+            EXPECT_EQ(p[9 + i].values[row], 0);
     }
     EXPECT_EQ(p[54].name, "opacity");
     EXPECT_EQ(p[57].name, "scale_2");
