@@ -48,8 +48,9 @@ Status put_distortion(const LensOptions& o, Intrinsics& k)
 
 void add_lens_options(CLI::App& c, LensOptions& o)
 {
-    c.add_option("-W,--width", o.width, "pixels")->check(CLI::Range(1u, 16384u));
-    c.add_option("-H,--height", o.height, "pixels")->check(CLI::Range(1u, 16384u));
+    const auto given = [&o](const std::string&) { o.size_given = true; };
+    c.add_option("-W,--width", o.width, "pixels")->check(CLI::Range(1u, 16384u))->each(given);
+    c.add_option("-H,--height", o.height, "pixels")->check(CLI::Range(1u, 16384u))->each(given);
     c.add_option("--fov-x", o.fov, "horizontal field of view in degrees, where the path has no intrinsics")
         ->check(CLI::Range(1.0, 360.0));
     c.add_option("--camera-model", o.camera_model, "lens, where the path has no intrinsics")
