@@ -6,6 +6,7 @@
 #include "engine/job/growth_pieces.h"
 #include "engine/job/outputs.h"
 #include "engine/job/version.h"
+#include "engine/scene/cell_reach.h"
 #include "runtime/base/bytes_text.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/host_memory.h"
