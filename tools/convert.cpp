@@ -108,6 +108,9 @@ void add_convert(CLI::App& app, const Globals& globals, Run& run)
     c->add_option("--splat-radius", o->scene.splat_radius,
                   "grid to splats: standard deviation in metres, or auto: from the spacing of the points");
     c->add_option("--opacity", o->scene.opacity, "grid to splats: of every splat")->check(CLI::Range(0.01f, 1.f));
+    c->add_option("--up", o->scene.up,
+                  "axis that points up in .ply and .splat files of splats: z, as in the world, or y, for viewers")
+        ->check(CLI::IsMember({"y", "z"}));
     c->add_flag("--splat-labels", o->scene.splat_labels, "a property label in .ply splats");
     add_path_options(*c, o->path);
     add_box_options(*c, o->objects);

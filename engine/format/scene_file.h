@@ -36,7 +36,7 @@ std::span<const SceneFormatFacts> scene_formats();
 const SceneFormatFacts& facts_of(SceneFormat format);
 std::optional<SceneFormat> scene_format_of_name(std::string_view name);
 
-// whether a path's extension is one of a scene's
+// whether a path's extension is one of a scene's, or of a format of splats that is named when it is refused
 bool has_scene_extension(const Path& path);
 
 // what a file is: by its extension; of .ply by whether it has splats' properties, of .npz by the names and shapes of
