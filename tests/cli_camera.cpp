@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/format/camera_path.h"
 #include "engine/format/image.h"
+#include "engine/format/npy.h"
 #include "tests/program.h"
 
 #include <gtest/gtest.h>
@@ -23,8 +24,8 @@ TEST(CliCamera, a_drive_goes_through_every_format_and_comes_back)
 {
     const ScratchFolder folder;
     const std::string at = folder.path().string() + "/";
-    ASSERT_EQ(convert(kDrive, at + "poses.txt").code, 0);
-    ASSERT_EQ(convert(at + "poses.txt", at + "camera_path.json", "-W 320 -H 200 --fov-x 60").code, 0);
+    ASSERT_EQ(convert(kDrive, at + "poses.txt", "-W 320 -H 200 --fov-x 60").code, 0);
+    ASSERT_EQ(convert(at + "poses.txt", at + "camera_path.json").code, 0); // its lens is in calib.txt
     ASSERT_EQ(convert(at + "camera_path.json", at + "sparse/").code, 0);
     ASSERT_EQ(convert(at + "sparse", at + "transforms.json").code, 0);
     const ProgramResult last = convert(at + "transforms.json", at + "back.tum");
@@ -39,7 +40,7 @@ TEST(CliCamera, a_drive_goes_through_every_format_and_comes_back)
             EXPECT_NEAR(now->frames[i].pose.world_to_camera[j], first->frames[i].pose.world_to_camera[j], 1e-6);
         EXPECT_NEAR(lens->frames[i].intrinsics.fx, view.fx, 1e-6);
     }
-    EXPECT_EQ(folder.entries(), 5u); // nothing temporary is left
+    EXPECT_EQ(folder.entries(), 7u); // with times.txt and calib.txt; nothing temporary is left
 }
 
 TEST(CliCamera, a_rig_becomes_one_file_or_a_file_of_one_camera)
@@ -113,6 +114,77 @@ TEST(CliCamera, render_draws_every_lens)
     expect_error(render(folder / "x", one + " -W 61 --equirect"), 2, "61 is odd");
     expect_error(render(folder / "x", one + " --equirect --rig r.json"), 2, "--equirect or --rig");
     EXPECT_FALSE(fs::exists(folder / "x"));
+}
+
+std::vector<float> plane(const Path& file, ImageSize size)
+{
+    const std::string bytes = contents(file);
+    const auto header = parse_npy_header(bytes, "plane");
+    EXPECT_TRUE(header) << file;
+    EXPECT_EQ(header->dtype, DType::f32);
+    EXPECT_EQ(header->shape, (std::vector<uint64_t>{size.height, size.width}));
+    std::vector<float> values(size_t(size.width) * size.height);
+    EXPECT_EQ(bytes.size(), header->bytes + values.size() * 4);
+    std::memcpy(values.data(), bytes.data() + header->bytes, values.size() * 4);
+    return values;
+}
+
+TEST(CliCamera, render_writes_depth_as_numbers_and_where_it_is_visible)
+{
+    const ScratchFolder folder;
+    const std::string one =
+        "--path " + folder.put("one.tum", "0 1 0 1.7 -0.5 0.5 -0.5 0.5\n").string() + " -W 60 -H 40";
+    const ProgramResult result = render(folder / "a", one + " --npy");
+    ASSERT_EQ(result.code, 0) << result.err;
+    ASSERT_EQ(render(folder / "b", one + " --visible-depth").code, 0);
+    const auto expected = plane(folder / "a/depth_expected/000000.npy", {60, 40}),
+               median = plane(folder / "a/depth_median/000000.npy", {60, 40}),
+               alpha = plane(folder / "a/alpha/000000.npy", {60, 40});
+    const auto depth = read_png_gray16(folder / "a/depth/000000.png"),
+               masked = read_png_gray16(folder / "b/depth/000000.png");
+    const auto visible = read_png_rgb8(folder / "a/visible/000000.png");
+    ASSERT_TRUE(depth && masked && visible);
+    size_t thin = 0, seen = 0;
+    for (size_t i = 0; i < expected.size(); ++i) {
+        EXPECT_NEAR(expected[i] * 1000, depth->pixels[i], 0.51) << i; // the picture is the expected depth, rounded
+        EXPECT_EQ(alpha[i] >= 0.5f, visible->pixels[3 * i] == 255) << i;
+        EXPECT_EQ(masked->pixels[i], alpha[i] >= 0.5f ? depth->pixels[i] : 0) << i;
+        EXPECT_EQ(median[i] > 0, alpha[i] > 0) << i;
+        thin += alpha[i] > 0 && alpha[i] < 0.5f;
+        seen += alpha[i] >= 0.5f;
+    }
+    EXPECT_GT(thin, 10u); // pixels that tell the two apart
+    EXPECT_GT(seen, 500u);
+    EXPECT_FALSE(fs::exists(folder / "b/alpha"));
+}
+
+TEST(CliCamera, kitti_keeps_times_and_lens)
+{
+    const ScratchFolder folder;
+    const Path drive = folder.put("a.tum", "0.5 1 0 1.7 -0.5 0.5 -0.5 0.5\n0.75 2 0 1.7 -0.5 0.5 -0.5 0.5\n");
+    const ProgramResult out = convert(drive.string(), folder / "poses.txt", "-W 620 -H 188 --fov-x 80");
+    ASSERT_EQ(out.code, 0) << out.err;
+    EXPECT_EQ(out.out, "2 frames as kitti, with times.txt and calib.txt beside them\n");
+    EXPECT_EQ(contents(folder / "times.txt"), "0.5\n0.75\n");
+    // read without a size: the file has it. A folder is a path, too
+    ASSERT_EQ(convert(folder.path().string(), folder / "transforms.json").code, 0);
+    const auto path = read_transforms(folder / "transforms.json");
+    ASSERT_TRUE(path) << path.error().message;
+    EXPECT_EQ(path->frames[1].time, 0.75);
+    const Intrinsics view = pinhole_from_fov(80, 620, 188);
+    EXPECT_NEAR(path->frames[0].intrinsics.fx, view.fx, 1e-9);
+    EXPECT_NEAR(path->frames[0].intrinsics.cx, view.cx, 1e-9);
+    EXPECT_EQ(path->frames[0].intrinsics.width, 620u);
+    // odometry's own calibration says no size: it has to be given
+    folder.put("calib.txt", "P0: 718.856 0 607.1928 0 0 718.856 185.2157 0 0 0 1 0\n");
+    expect_error(convert((folder / "poses.txt").string(), folder / "b.json"), 3,
+                 "calib.txt': has no size of the pictures (S_rect_00); give it with -W and -H");
+    EXPECT_EQ(convert((folder / "poses.txt").string(), folder / "b.json", "-W 1241 -H 376").code, 0);
+    expect_error(convert(drive.string(), folder / "c.kitti"), 2, "times.txt' exists; -y replaces it");
+    fs::create_directory(folder / "empty");
+    expect_error(semrover_program("render " + kGrid + " --path " + (folder / "empty").string() + " -o " +
+                                  (folder / "r").string()),
+                 3, "a folder without a path, expected COLMAP's cameras.bin or cameras.txt, or KITTI's poses.txt");
 }
 
 TEST(CliCamera, render_draws_a_rig_of_several_lenses)

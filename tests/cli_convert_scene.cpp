@@ -160,6 +160,12 @@ TEST(CliConvertScene, splats_of_every_format_draw_the_same_picture)
         EXPECT_EQ(convert(there, (folder / "x.splat").string(), "-y -q").code, 0);
         EXPECT_EQ(std::filesystem::file_size(folder / "x.splat"), 32u * 20 * kCells);
     }
+    for (const char* name : {"c.spz", "c.sog", "c.ksplat"}) {
+        expect_error(convert((folder / "b.ply").string(), (folder / name).string()), 3, "is neither read nor written");
+        expect_error(convert(folder.put(name, "x").string(), (folder / "c.ply").string()), 3, "splat-transform");
+    }
+    expect_error(convert((folder / "b.ply").string(), (folder / "u.glb").string(), "--up y"), 2,
+                 "--up is for splats as .ply or .splat");
     expect_error(convert((folder / "d.glb").string(), (folder / "g.sgrid").string()), 2, "write points-ply first");
     ASSERT_EQ(convert((folder / "b.ply").string(), (folder / "p.ply").string(), "-q --to points-ply").code, 0);
     ASSERT_EQ(convert((folder / "p.ply").string(), (folder / "g.sgrid").string(), "-q").code, 0);

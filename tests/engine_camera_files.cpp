@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+#include "engine/camera/lens.h"
 #include "engine/format/camera_path.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
@@ -318,8 +319,12 @@ TEST(CameraFiles, a_broken_colmap_folder_is_named)
     EXPECT_TRUE(says(read("", image), "cameras.txt': no cameras"));
     EXPECT_TRUE(says(read("1 PINHOLE 8 6\n", image),
                      "cameras.txt' line 1: expected CAMERA_ID MODEL WIDTH HEIGHT PARAMS, found 4 words"));
-    EXPECT_TRUE(says(read("1 FOV 8 6 4 4 4 3 1\n", image),
-                     "camera model 'FOV' is not supported, expected one of SIMPLE_PINHOLE, PINHOLE"));
+    EXPECT_TRUE(says(read("1 EUCM 8 6 4 4 4 3 1 1\n", image),
+                     "camera model 'EUCM' is not supported, expected one of SIMPLE_PINHOLE, PINHOLE"));
+    EXPECT_TRUE(says(read("1 THIN_PRISM_FISHEYE 8 6 4 4 4 3 .1 0 .2 0 0 0 0 0\n", image),
+                     "with p1, p2, sx1 or sy1 other than 0, which is not supported"));
+    EXPECT_TRUE(says(read("1 FOV 8 6 4 4 4 3 2.5\n", image), "that does not see the image's corners"));
+    EXPECT_TRUE(says(read("1 FOV 8000 6000 2000 2000 4000 3000 0.62\n", image), "pixels away from it, at most 0.05"));
     EXPECT_TRUE(says(read("1 PINHOLE 8 6 4 4 3\n", image), "expected 4 parameters of PINHOLE, found 3"));
     EXPECT_TRUE(says(read("1 OPENCV 8 6 4 4 4 3 0.1\n", image), "expected 8 parameters of OPENCV, found 5"));
     EXPECT_TRUE(says(read("1 PINHOLE 8 0 4 4 4 3\n", image), "height: expected an image size"));
@@ -341,7 +346,160 @@ TEST(CameraFiles, a_broken_colmap_folder_is_named)
     EXPECT_TRUE(says(read_colmap(folder.path()), "No such file"));
     std::filesystem::remove(folder / "cameras.txt");
     EXPECT_TRUE(says(read_colmap(folder.path()), "No such file"));
-    EXPECT_TRUE(says(read_camera_path(folder.path(), kView), "a folder without cameras.txt"));
+    EXPECT_TRUE(
+        says(read_camera_path(folder.path(), kView), "expected COLMAP's cameras.bin or cameras.txt, or KITTI's"));
+}
+
+// COLMAP's binary files, written by hand from the description of its format
+class BinaryModel {
+  public:
+    template <typename T>
+    BinaryModel& put(T value)
+    {
+        bytes.append(reinterpret_cast<const char*>(&value), sizeof(T));
+        return *this;
+    }
+    BinaryModel& camera(uint32_t id, uint32_t model, uint64_t width, uint64_t height, const std::vector<double>& params)
+    {
+        put(id).put(model).put(width).put(height);
+        for (const double p : params)
+            put(p);
+        return *this;
+    }
+    BinaryModel& image(uint32_t id, const std::array<double, 7>& pose, uint32_t camera, std::string_view name,
+                       uint64_t points)
+    {
+        put(id);
+        for (const double p : pose)
+            put(p);
+        put(camera);
+        bytes.append(name).push_back('\0');
+        put(points);
+        for (uint64_t i = 0; i < points; ++i)
+            put(1.5).put(2.5).put(~uint64_t(0));
+        return *this;
+    }
+    std::string bytes;
+};
+
+TEST(CameraFiles, colmaps_binary_model_is_read_like_its_text)
+{
+    const ScratchFolder folder;
+    std::filesystem::create_directory(folder / "text");
+    std::filesystem::create_directory(folder / "binary");
+    folder.put("text/cameras.txt", "7 SIMPLE_RADIAL 8 6 4 4 3 0.1\n2 PINHOLE 10 12 7 8 5 6\n"
+                                   "9 FULL_OPENCV 8 6 4 5 4 3 .1 .2 .01 .02 .3 .4 .5 .6\n"
+                                   "4 OPENCV_FISHEYE 8 6 4 5 4 3 .1 .2 .03 .04\n3 EQUIRECTANGULAR 8 4 8 4\n");
+    folder.put("text/images.txt",
+               "5 0.5 0.5 -0.5 0.5 1 2 3 7 front/b.png\n1 2 -1 3 4 8\n6 1 0 0 0 0 0 0 2 front/a.png\n\n"
+               "7 1 0 0 0 0 0 9 9 front/c.png\n\n8 1 0 0 0 0 0 8 4 left/d.png\n\n"
+               "9 1 0 0 0 0 0 7 3 left/e.png\n\n");
+    const std::string cameras = BinaryModel()
+                                    .put(uint64_t(5))
+                                    .camera(7, 2, 8, 6, {4, 4, 3, 0.1})
+                                    .camera(2, 1, 10, 12, {7, 8, 5, 6})
+                                    .camera(9, 6, 8, 6, {4, 5, 4, 3, .1, .2, .01, .02, .3, .4, .5, .6})
+                                    .camera(4, 5, 8, 6, {4, 5, 4, 3, .1, .2, .03, .04})
+                                    .camera(3, 17, 8, 4, {8, 4})
+                                    .bytes;
+    const std::string images = BinaryModel()
+                                   .put(uint64_t(5))
+                                   .image(5, {0.5, 0.5, -0.5, 0.5, 1, 2, 3}, 7, "front/b.png", 2)
+                                   .image(6, {1, 0, 0, 0, 0, 0, 0}, 2, "front/a.png", 0)
+                                   .image(7, {1, 0, 0, 0, 0, 0, 9}, 9, "front/c.png", 1)
+                                   .image(8, {1, 0, 0, 0, 0, 0, 8}, 4, "left/d.png", 0)
+                                   .image(9, {1, 0, 0, 0, 0, 0, 7}, 3, "left/e.png", 0)
+                                   .bytes;
+    folder.put("binary/cameras.bin", cameras);
+    folder.put("binary/images.bin", images);
+    const auto text = read_camera_path(folder / "text", kView), binary = read_camera_path(folder / "binary", kView);
+    ASSERT_TRUE(text) << text.error().message;
+    ASSERT_TRUE(binary) << binary.error().message;
+    ASSERT_EQ(binary->frames.size(), 5u);
+    for (size_t i = 0; i < 5; ++i) {
+        EXPECT_EQ(binary->frames[i].camera, text->frames[i].camera);
+        EXPECT_EQ(binary->frames[i].time, text->frames[i].time);
+        EXPECT_EQ(binary->frames[i].pose.world_to_camera, text->frames[i].pose.world_to_camera);
+        EXPECT_EQ(binary->frames[i].intrinsics, text->frames[i].intrinsics);
+    }
+    for (size_t bytes = 0; bytes < cameras.size(); ++bytes) {
+        folder.put("binary/cameras.bin", cameras.substr(0, bytes));
+        EXPECT_FALSE(read_colmap(folder / "binary")) << bytes;
+    }
+    folder.put("binary/cameras.bin", cameras);
+    for (size_t bytes = 0; bytes < images.size(); ++bytes) {
+        folder.put("binary/images.bin", images.substr(0, bytes));
+        EXPECT_FALSE(read_colmap(folder / "binary")) << bytes;
+    }
+    EXPECT_TRUE(says(write_colmap(folder / "binary", *text), "holds a binary model"));
+}
+
+TEST(CameraFiles, a_broken_binary_model_is_named)
+{
+    const ScratchFolder folder;
+    const auto read = [&](const BinaryModel& cameras, const BinaryModel& images) {
+        folder.put("cameras.bin", cameras.bytes);
+        folder.put("images.bin", images.bytes);
+        return read_colmap(folder.path());
+    };
+    const BinaryModel good = BinaryModel().put(uint64_t(1)).camera(1, 1, 8, 6, {4, 4, 4, 3});
+    const std::array<double, 7> pose = {1, 0, 0, 0, 0, 0, 0};
+    const BinaryModel image = BinaryModel().put(uint64_t(1)).image(1, pose, 1, "a.png", 0);
+    EXPECT_TRUE(read(good, image));
+    EXPECT_TRUE(says(read(BinaryModel().put(uint64_t(0)), image), "cameras.bin': no cameras"));
+    EXPECT_TRUE(says(read(BinaryModel().put(~uint64_t(0)).camera(1, 1, 8, 6, {4, 4, 4, 3}), image),
+                     "camera 1 at byte 64: the file ends, expected 18446744073709551615 cameras"));
+    EXPECT_TRUE(says(read(BinaryModel().put(uint64_t(1)).camera(1, 16, 8, 6, {4, 4, 4, 3, 1, 1}), image),
+                     "camera 0 at byte 8: camera model number 16 is not supported"));
+    EXPECT_TRUE(says(read(BinaryModel().put(uint64_t(1)).camera(1, 1, ~0ull, 6, {4, 4, 4, 3}), image),
+                     "width: expected an image size"));
+    EXPECT_TRUE(says(read(BinaryModel(good).put(uint8_t(1)), image), "1 bytes follow the last camera"));
+    EXPECT_TRUE(
+        says(read(good, BinaryModel().put(uint64_t(1)).image(1, pose, 2, "a.png", 0)), "no camera 2 in cameras.bin"));
+    EXPECT_TRUE(says(read(good, BinaryModel().put(uint64_t(1)).image(1, {2, 0, 0, 0, 0, 0, 0}, 1, "a.png", 0)),
+                     "image 0 at byte 8: expected a quaternion of norm 1, found 2"));
+    EXPECT_TRUE(says(read(good, BinaryModel().put(uint64_t(1)).image(1, {1, 0, 0, 0, NAN, 0, 0}, 1, "a.png", 0)),
+                     "not finite"));
+    EXPECT_TRUE(says(read(good, BinaryModel().put(uint64_t(0))), "images.bin': a camera path without poses"));
+    EXPECT_TRUE(says(read(good, BinaryModel().put(uint64_t(1)).image(1, pose, 1, std::string(5000, 'a'), 0)),
+                     "a name of more than 4096 bytes"));
+    BinaryModel points = image; // says it has 2^61 points
+    points.bytes.replace(points.bytes.size() - 8, 8, std::string("\0\0\0\0\0\0\0\x20", 8));
+    EXPECT_TRUE(says(read(good, points), "ends within a picture of 2305843009213693952 points"));
+}
+
+// against the formulas of the description: theta = atan(r), and a radius of atan(2 r tan(omega / 2)) / omega
+TEST(CameraFiles, colmaps_fisheyes_become_ours)
+{
+    const ScratchFolder folder;
+    const auto lens = [&](const std::string& line) {
+        folder.put("cameras.txt", "1 " + line + "\n");
+        folder.put("images.txt", "1 1 0 0 0 0 0 0 1 a.png\n\n");
+        const auto path = read_colmap(folder.path());
+        EXPECT_TRUE(path) << path.error().message;
+        return path ? path->frames[0].intrinsics : Intrinsics{};
+    };
+    EXPECT_EQ(lens("SIMPLE_RADIAL_FISHEYE 80 60 40 40 30 0.1"),
+              (Intrinsics{40, 40, 40, 30, 80, 60, CameraModel::fisheye, {0.1}}));
+    EXPECT_EQ(lens("RADIAL_FISHEYE 80 60 40 40 30 0.1 0.02"),
+              (Intrinsics{40, 40, 40, 30, 80, 60, CameraModel::fisheye, {0.1, 0.02}}));
+    EXPECT_EQ(lens("FISHEYE 80 60 40 41 40 30"), (Intrinsics{40, 41, 40, 30, 80, 60, CameraModel::fisheye}));
+    EXPECT_EQ(lens("THIN_PRISM_FISHEYE 80 60 40 41 40 30 0.1 0.02 0 0 0.003 0.004 0 0"),
+              (Intrinsics{40, 41, 40, 30, 80, 60, CameraModel::fisheye, {0.1, 0.02, 0.003, 0.004}}));
+    // Project Tango's fisheye
+    const double fx = 256.3, fy = 255.9, cx = 318.1, cy = 241.7, omega = 0.92;
+    const Lens ours(lens("FOV 640 480 256.3 255.9 318.1 241.7 0.92"));
+    double worst = 0;
+    for (double x = 0; x <= 640; x += 16)
+        for (double y = 0; y <= 480; y += 16) {
+            const double a = (x - cx) / fx, b = (y - cy) / fy, radius = std::hypot(a, b);
+            const double away = std::tan(radius * omega) / (2 * std::tan(omega / 2)),
+                         scale = radius > 0 ? away / radius : 1;
+            const auto seen = ours.project({a * scale, b * scale, 1});
+            ASSERT_TRUE(seen) << x << " " << y;
+            worst = std::max(worst, std::hypot(seen->x - x, seen->y - y));
+        }
+    EXPECT_LT(worst, 0.05);
 }
 
 TEST(CameraFiles, pictures_of_colmap_give_order_and_cameras)

@@ -21,6 +21,14 @@ std::vector<T> noise(size_t count)
     return values;
 }
 
+std::string bytes_of_hex(std::string_view hex)
+{
+    std::string bytes;
+    for (size_t i = 0; i < hex.size(); i += 2)
+        bytes += static_cast<char>(std::stoi(std::string(hex.substr(i, 2)), nullptr, 16));
+    return bytes;
+}
+
 TEST(Image, colour_pixels_read_back_the_same)
 {
     const ScratchFolder folder;
@@ -125,10 +133,7 @@ TEST(Image, a_palette_with_transparency_becomes_rgb)
         "89504e470d0a1a0a0000000d494844520000000400000002020300000002c695f00000000c504c5445000102030405060708090a0bdc4c"
         "389c"
         "0000000174524e5380ad5e5b460000000c49444154789c639066780200013901004564919b0000000049454e44ae426082";
-    std::string file;
-    for (size_t i = 0; i < kHex.size(); i += 2)
-        file += static_cast<char>(std::stoi(std::string(kHex.substr(i, 2)), nullptr, 16));
-    const auto image = read_png_rgb8(folder.put("a", file));
+    const auto image = read_png_rgb8(folder.put("a", bytes_of_hex(kHex)));
     ASSERT_TRUE(image) << image.error().message;
     EXPECT_EQ(image->pixels,
               (std::vector<uint8_t>{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 9, 10, 11, 6, 7, 8, 3, 4, 5, 0, 1, 2}));
@@ -162,6 +167,72 @@ TEST(Image, what_is_not_a_jpeg_is_refused)
     EXPECT_TRUE(says(read_jpeg_rgb8(folder.put("empty.jpg", "")), "empty"));
     EXPECT_TRUE(says(read_jpeg_rgb8(folder.put("text.jpg", "no picture at all")), "not a valid JPEG"));
     EXPECT_TRUE(says(write_jpeg_rgb8(folder / "a.jpg", 0, 0, {}, 90), "0 x 0"));
+}
+
+// 24 x 17, progressive, in 10 scans; by Pillow 9.4
+constexpr std::string_view kProgressiveJpeg =
+    "ffd8ffe000104a46494600010100000100010000ffdb0043000d090a0b0a080d0b0a0b0e0e0d0f13201513121213271c"
+    "1e17202e2931302e292d2c333a4a3e333646372c2d405741464c4e525352323e5a615a50604a51524fffdb0043010e0e"
+    "0e131113261515264f352d354f4f4f4f4f4f4f4f4f4f4f4f4f4f4f4f4f4f4f4f4f4f4f4f4f4f4f4f4f4f4f4f4f4f4f4f"
+    "4f4f4f4f4f4f4f4f4f4f4f4f4f4fffc20011080011001803012200021101031101ffc400170001010101000000000000"
+    "00000000000000040503ffc4001801000203000000000000000000000000000205030406ffda000c0301000210031000"
+    "0001c5a2da42389ac365c692be7a906cbfffc400161001010100000000000000000000000000000103ffda0008010100"
+    "01050299a6699a6699a66888ffc400191100020301000000000000000000000000000203042131ffda0008010301013f"
+    "0186c0b630845e1fffc4001811000203000000000000000000000000000001021012ffda0008010201013f0153362aff"
+    "c40014100100000000000000000000000000000030ffda0008010100063f021fffc40016100101010000000000000000"
+    "0000000000610020ffda0008010100013f2128a28a28b1ff00ffda000c03010002000300000010773f00ffc400171100"
+    "03010000000000000000000000000000105161ffda0008010301013f10d0b1afffc40016110101010000000000000000"
+    "0000000000000110ffda0008010201013f101308ffc40017100101010100000000000000000000000000311041ffda00"
+    "08010100013f1049122589239739ffd9";
+
+// the size in the header of frame, which follows its marker
+std::string resized(std::string jpeg, uint16_t width, uint16_t height)
+{
+    size_t at = 2;
+    while (jpeg[at + 1] != '\xc0' && jpeg[at + 1] != '\xc2')
+        at += 2 + size_t(uint8_t(jpeg[at + 2])) * 256 + uint8_t(jpeg[at + 3]);
+    for (const auto& [place, value] : {std::pair(at + 5, height), std::pair(at + 7, width)}) {
+        jpeg[place] = char(value >> 8);
+        jpeg[place + 1] = char(value & 255);
+    }
+    return jpeg;
+}
+
+TEST(Image, a_cut_jpeg_is_refused_wherever_it_is_cut)
+{
+    const ScratchFolder folder;
+    ASSERT_TRUE(write_jpeg_rgb8(folder / "a.jpg", 70, 50, noise<uint8_t>(70 * 50 * 3), 90));
+    for (const std::string& whole : {contents(folder / "a.jpg"), bytes_of_hex(kProgressiveJpeg)}) {
+        EXPECT_TRUE(read_jpeg_rgb8(folder.put("whole.jpg", whole)));
+        for (size_t bytes = 0; bytes < whole.size(); ++bytes)
+            ASSERT_FALSE(read_jpeg_rgb8(folder.put("cut.jpg", whole.substr(0, bytes)))) << bytes;
+        // with the end marker set behind the cut, pixels are missing all the same
+        EXPECT_TRUE(says(read_jpeg_rgb8(folder.put("ends.jpg", whole.substr(0, whole.size() * 3 / 4) + "\xff\xd9")),
+                         "ends.jpg': not a valid JPEG"));
+    }
+    // after the first scan's header: no component has a value yet
+    const std::string progressive = bytes_of_hex(kProgressiveJpeg);
+    const size_t scan = progressive.find("\xff\xda");
+    EXPECT_FALSE(read_jpeg_rgb8(folder.put("none.jpg", progressive.substr(0, scan) + "\xff\xd9")));
+}
+
+TEST(Image, a_jpeg_has_no_more_pixels_than_its_bytes_can_hold)
+{
+    const ScratchFolder folder;
+    ASSERT_TRUE(write_jpeg_rgb8(folder / "a.jpg", 70, 50, noise<uint8_t>(70 * 50 * 3), 90));
+    const std::string whole = contents(folder / "a.jpg");
+    EXPECT_TRUE(says(read_jpeg_rgb8(folder.put("b.jpg", resized(whole, 16384, 16384))),
+                     fmt::format("b.jpg': 16384 x 16384 pixels in {} bytes, at most 16384 to a side and 1024 to a byte",
+                                 whole.size())));
+    EXPECT_TRUE(says(read_jpeg_rgb8(folder.put("c.jpg", resized(whole, 1024, 1024))), "premature end"));
+    // a scan that is there 200 times
+    const std::string progressive = bytes_of_hex(kProgressiveJpeg);
+    const size_t begin = progressive.find("\xff\xda"), end = progressive.find("\xff\xc4", begin);
+    std::string scans = progressive.substr(0, begin);
+    for (int i = 0; i < 200; ++i)
+        scans += progressive.substr(begin, end - begin);
+    scans += progressive.substr(end);
+    EXPECT_TRUE(says(read_jpeg_rgb8(folder.put("d.jpg", scans)), "more than 100 scans"));
 }
 
 TEST(Image, the_size_of_a_png_is_read_without_its_pixels)

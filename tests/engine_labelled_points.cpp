@@ -2,7 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/format/labelled_points.h"
 
+#include "engine/format/object_boxes.h"
 #include "engine/format/ply_reader.h"
+#include "engine/format/scene_file.h"
 #include "engine/scene/palette.h"
 #include "runtime/base/dtype.h"
 #include "tests/says.h"
@@ -221,6 +223,37 @@ TEST(LabelledPoints, carlas_tags_have_a_map)
     for (uint8_t i = 0; i < 20; ++i)
         EXPECT_EQ(out->grid.labels[i], i);
     EXPECT_EQ(out->dropped, 1u);
+}
+
+// a parked car on the right of the way, a wall on the left, in CARLA's axes; the car's box is found in the same place
+TEST(LabelledPoints, carlas_axes_are_left_handed)
+{
+    const ScratchFolder folder;
+    const auto cloud = folder.put(
+        "lidar.ply", ply(std::string(kXyz) + "property float CosAngle\nproperty uint ObjIdx\nproperty uint ObjTag\n",
+                         {"5.2 3.1 0.5 0.9 31 14", "0.1 -4.1 1.3 0.9 0 4", "3.1 0.1 -0.2 0.9 0 1"}));
+    SceneGridOptions o;
+    o.map = SEMROVER_SOURCE_DIR "/assets/label_maps/carla.json";
+    EXPECT_EQ(detect_scene_format(cloud).value(), SceneFormat::carla_points);
+    const auto out = read_scene_grid(cloud, o);
+    ASSERT_TRUE(out) << out.error().message;
+    EXPECT_EQ(out->grid.cells, (std::vector<Cell>{{0, 6, 2}, {5, -1, -1}, {8, -6, 0}}));
+    EXPECT_EQ(out->grid.labels, (std::vector<uint8_t>{3, 0, 13})); // wall, road, car
+    ASSERT_EQ(out->warnings.size(), 1u);
+    EXPECT_NE(out->warnings[0].find("--from points-ply keeps it"), std::string::npos);
+
+    const auto boxes = read_box_file(
+        folder.put("boxes.json", R"([{"type_id": "vehicle.audi.tt", "location": {"x": 5.2, "y": 3.1, "z": 0.5},
+            "extent": {"x": 2, "y": 1, "z": 0.7}, "rotation": {"pitch": 0, "yaw": 0, "roll": 0}}])"),
+        BoxFormat::carla, {});
+    ASSERT_TRUE(boxes) << boxes.error().message;
+    EXPECT_NEAR(boxes->objects[0].center[1], -3.1, 1e-6);
+
+    o.origin = {0, 1.2, 0}; // metres of ours
+    EXPECT_EQ(read_scene_grid(cloud, o)->grid.cells[0], (Cell{0, 8, 2}));
+    const auto kept = read_scene_grid(cloud, o, SceneFormat::points_ply);
+    EXPECT_EQ(kept->grid.cells[0], (Cell{0, -5, 2}));
+    EXPECT_TRUE(kept->warnings.empty());
 }
 
 TEST(LabelledPoints, no_prefix_of_a_file_reads_or_crashes)

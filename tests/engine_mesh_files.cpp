@@ -233,7 +233,8 @@ TEST(MeshFiles, broken_obj_files_are_one_line_that_says_where)
              {v + "f 1 2 -4\n", "line 4: refers to vertex -4"},
              {v + "f 0 1 2\n", "line 4: refers to vertex 0"},
              {v + "f 1 2\n", "line 4: a face of 2 corners"},
-             {v + "f 1/1 2/1 3/1\n", "refers to texture coordinate 1, there are 0"},
+             {v + "f 1/1 2/1 3/1\nvt 0 0\n", "line 5: a texture coordinate behind the face of line 4 that names it"},
+             {v + "vt 0 0\nf 1/1 2/2 3/1\n", "refers to texture coordinate 2, there are 1"},
              {v + "f 1 2 x\n", "expected the number of a vertex, found 'x'"},
              {v + "f 1 2 99999999999999999999\n", "expected the number of a vertex"},
              {"v 0 0\n", "line 1: a vertex of 2 numbers"},
@@ -242,7 +243,6 @@ TEST(MeshFiles, broken_obj_files_are_one_line_that_says_where)
              {"v 0 0 1e39\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "vertex 0 is at (0, 0, inf)"},
              {"v 0 0 2e6\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "expected numbers within 1e6"},
              {"v 0 0 0 1 1 7\n", "the colour 7"},
-             {"mtllib none.mtl\n", "refers to 'none.mtl', which is missing"},
              {"mtllib /etc/passwd\n", "refers to '/etc/passwd', expected a file within its own folder"},
              {"mtllib ..\\x.mtl\n", "expected a file within its own folder"},
              {"mtllib link.mtl\n", "leads out of its folder"},
@@ -253,7 +253,104 @@ TEST(MeshFiles, broken_obj_files_are_one_line_that_says_where)
              {"mtllib early.mtl\n", "in front of the first newmtl"}})
         EXPECT_TRUE(says(read_mesh(folder.put("m.obj", text)), error)) << text;
     EXPECT_TRUE(says(read_mesh(folder / "none.obj"), "none.obj"));
-    EXPECT_TRUE(says(read_mesh(folder.put("m.stl", "solid")), "expected a mesh: .obj, .ply, .glb or .gltf"));
+    EXPECT_TRUE(
+        says(read_mesh(folder.put("m.fbx", "solid")), "expected a mesh: .obj, .ply, .stl, .off, .glb or .gltf"));
+}
+
+TEST(MeshFiles, what_an_obj_does_not_need_may_be_missing)
+{
+    const ScratchFolder folder;
+    const Mesh m = readable(folder.put(
+        "m.obj", "mtllib none.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl building\nf 1/1/1 2/1/1 3/1/1\nf 3/1 2/1 1/1\n"));
+    ASSERT_EQ(m.faces.size(), 2u);
+    EXPECT_EQ(m.materials.at(m.face_materials[0]).name, "building"); // labels come from names
+    EXPECT_TRUE(m.uvs.empty());
+    ASSERT_EQ(m.warnings.size(), 2u);
+    EXPECT_NE(m.warnings[0].find("m.obj': line 1: 'none.mtl' is missing: its materials are white"), std::string::npos);
+    EXPECT_NE(m.warnings[1].find("line 6: faces name texture coordinates, the file has none"), std::string::npos);
+    // a broken link is no file that is missing
+    std::filesystem::create_symlink("/nowhere", folder / "dead.mtl");
+    EXPECT_TRUE(says(read_mesh(folder.put("m.obj", "mtllib dead.mtl\n")), "refers to 'dead.mtl', which is missing"));
+}
+
+std::string binary_stl(const std::string& header, uint32_t says, size_t facets)
+{
+    std::string bytes = header;
+    bytes.resize(80, ' ');
+    bytes.append(reinterpret_cast<const char*>(&says), 4);
+    for (size_t f = 0; f < facets; ++f) {
+        for (const float x : {0.f, 0.f, 1.f, 0.f, 0.f, float(f), 2.f, 0.f, 0.f, 0.f, 3.f, 0.f})
+            bytes.append(reinterpret_cast<const char*>(&x), 4);
+        bytes += "\xff\x7f";
+    }
+    return bytes;
+}
+
+TEST(MeshFiles, stl_is_read_in_both_kinds)
+{
+    const ScratchFolder folder;
+    for (const char* header : {"a header", "solid that is none"}) {
+        const Mesh m = readable(folder.put("m.stl", binary_stl(header, 3, 3)));
+        ASSERT_EQ(m.faces.size(), 3u);
+        EXPECT_EQ(corners(m, 2), (std::array<std::array<float, 3>, 3>{{{0, 0, 2}, {2, 0, 0}, {0, 3, 0}}}));
+        EXPECT_TRUE(m.face_materials.empty());
+    }
+    const std::string facet = "facet normal 0 0 1\n outer loop\n  vertex 0 0 0\n  vertex 1 0 0\n  vertex 0 1 5e-1\n"
+                              " endloop\nendfacet\n";
+    const Mesh named = readable(
+        folder.put("t.stl", "solid building 3\r\n" + facet + facet + "endsolid\nsolid\n" + facet + "endsolid x"));
+    ASSERT_EQ(named.faces.size(), 3u);
+    EXPECT_EQ(named.face_materials, (std::vector<uint32_t>{0, 0, 1}));
+    EXPECT_EQ(named.materials[0].name, "building 3");
+    EXPECT_EQ(named.positions[8], (std::array<float, 3>{0, 1, 0.5f}));
+    for (const auto& [text, error] : std::initializer_list<std::pair<std::string, const char*>>{
+             {"", "expected STL, found 0 bytes"},
+             {"text", "expected STL, found 4 bytes"},
+             {binary_stl("a", 4, 3), "says it has 4 triangles, there is room for 3"},
+             {binary_stl("a", 0xffffffff, 3), "says it has 4294967295 triangles"},
+             {binary_stl("a", 0, 0), "no faces"},
+             {"solid a\n", "no faces"},
+             {"solid a\nfacet\nvertex 0 0\n", "line 3: a vertex of 2 numbers"},
+             {"solid a\nfacet\nvertex 0 0 x\n", "line 3: expected a number, found 'x'"},
+             {"solid a\nfacet\nvertex 0 0 nan\nvertex 0 0 0\nvertex 1 0 0\nendfacet\n", "vertex 0 is at (0, 0, nan)"},
+             {"solid a\nfacet\nvertex 0 0 0\nendfacet\n", "line 4: a facet of 1 vertices"},
+             {"solid a\nfacet\nvertex 0 0 0\n", "ends within a facet"},
+             {"solid a\nfaces 3\n", "line 2: expected STL, found 'faces'"}})
+        EXPECT_TRUE(says(read_mesh(folder.put("m.stl", text)), error)) << text;
+}
+
+TEST(MeshFiles, off_is_read_with_colours)
+{
+    const ScratchFolder folder;
+    const std::string square = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
+    const Mesh m = readable(folder.put("m.off", "OFF # a comment\n\n4 3 0\n" + square +
+                                                    "4 0 1 2 3 255 0 0\n3 0 1 2 0.0 1.0 0.0 1.0\n3 1 2 3\n"));
+    ASSERT_EQ(m.faces.size(), 4u);
+    EXPECT_EQ(m.face_materials, (std::vector<uint32_t>{0, 0, 1, 2}));
+    EXPECT_EQ(m.materials[0].color, (std::array<float, 3>{1, 0, 0}));
+    EXPECT_EQ(m.materials[1].color, (std::array<float, 3>{0, 1, 0}));
+    EXPECT_EQ(m.materials[2].color, (std::array<float, 3>{1, 1, 1}));
+    const Mesh colored =
+        readable(folder.put("c.off", "COFF 3 1 0\n0 0 0 10 20 30 255\n1 0 0 0.5 0.0 1.0 1\n0 1 0 1 2 3 4\n3 0 1 2\n"));
+    EXPECT_EQ(colored.colors, (std::vector<std::array<uint8_t, 3>>{{10, 20, 30}, {128, 0, 255}, {1, 2, 3}}));
+    EXPECT_TRUE(colored.materials.empty());
+    for (const auto& [text, error] : std::initializer_list<std::pair<std::string, const char*>>{
+             {"", "ends where OFF is expected"},
+             {"PLY\n", "line 1: expected OFF, COFF, NOFF or CNOFF, found 'PLY'"},
+             {"OFF BINARY\n", "binary OFF"},
+             {"OFF\n4\n", "line 2: expected a number up to 268435456, found ''"},
+             {"OFF\n4000000000 1 0\n", "found '4000000000'"},
+             {"OFF\n0 0 0\n", "no vertices"},
+             {"OFF\n200000000 1 0\n" + square, "ends where a vertex is expected"},
+             {"OFF\n4 1 0\n" + square, "ends where a face is expected"},
+             {"OFF\n4 0 0\n" + square, "no faces"},
+             {"OFF\n4 1 0\n" + square + "3 0 1 4\n", "line 7: expected a number up to 3, found '4'"},
+             {"OFF\n4 1 0\n" + square + "3 0 1\n", "a face of 3 corners with 2 numbers"},
+             {"OFF\n4 1 0\n" + square + "2 0 1\n", "a face of 2 corners"},
+             {"OFF\n4 1 0\n" + square + "3 0 1 2 300 0 0\n", "the colour 300"},
+             {"NOFF\n1 1 0\n0 0 0\n", "a vertex of 3 numbers, expected 6"},
+             {"OFF\n1 1 0\n0 0 inf\n3 0 0 0\n", "vertex 0 is at (0, 0, inf)"}})
+        EXPECT_TRUE(says(read_mesh(folder.put("m.off", text)), error)) << text;
 }
 
 const std::string kPlyVertices =
@@ -274,6 +371,14 @@ TEST(MeshFiles, ply_polygons_textures_and_labels_are_read)
     EXPECT_EQ(m.face_labels, (std::vector<uint8_t>{8, 8}));
     EXPECT_EQ(m.uvs[1][2], (std::array<float, 2>{0, 0}));
     EXPECT_EQ(m.materials.at(m.face_materials[0]).texture, 0);
+    std::string blanks = kPlyVertices; // as MeshLab writes it
+    blanks.replace(blanks.find("TextureFile t.png"), 17, "TextureFile   t.png ");
+    EXPECT_EQ(readable(folder.put("b.ply", blanks +
+                                               "element face 1\nproperty list uchar int vertex_index\n"
+                                               "end_header\n" +
+                                               kSquare + "3 0 1 2\n"))
+                  .textures.size(),
+              1u);
     const Path other = folder.put("n.ply", kPlyVertices + "property float s\nproperty float t\nelement face 1\n"
                                                           "property list uchar int vertex_indices\nproperty int label\n"
                                                           "end_header\n0 0 0 0 0\n1 0 0 1 0\n1 1 0 1 1\n0 1 0 0 1\n"
@@ -351,6 +456,18 @@ TEST(MeshFiles, gltf_strips_fans_and_nodes_are_read)
             R"({"attributes":{"POSITION":0},"material":0})",
             R"(,"materials":[{"name":"x","extras":{"label":5},"pbrMetallicRoughness":{"baseColorFactor":[0.5,0.25,1,1]}}])")));
     EXPECT_EQ(labelled.face_labels, std::vector<uint8_t>{5});
+    // a texture that the primitive has no coordinates for, and a colour of an older extension
+    ASSERT_TRUE(write_png_rgb8(folder / "t.png", 2, 2, kImage.pixels));
+    const Mesh plain = readable(folder.put(
+        "m.gltf",
+        gltf(
+            R"({"attributes":{"POSITION":0},"material":0},{"attributes":{"POSITION":0},"material":1})",
+            R"(,"extensionsRequired":["KHR_materials_pbrSpecularGlossiness"],"images":[{"uri":"t.png"}],"textures":[{"source":0}],"materials":[{"name":"car","pbrMetallicRoughness":{"baseColorTexture":{"index":0}}},{"name":"road","extensions":{"KHR_materials_pbrSpecularGlossiness":{"diffuseFactor":[0.5,0.25,1,1]}}}])")));
+    EXPECT_EQ(plain.materials[plain.face_materials[0]].texture, -1);
+    EXPECT_EQ(plain.materials[plain.face_materials[0]].name, "car");
+    EXPECT_EQ(plain.materials[plain.face_materials[1]].color, (std::array<float, 3>{0.5f, 0.25f, 1}));
+    ASSERT_EQ(plain.warnings.size(), 1u);
+    EXPECT_NE(plain.warnings[0].find("primitives[0]: has a texture but no TEXCOORD_0"), std::string::npos);
     EXPECT_EQ(labelled.materials[0].color, (std::array<float, 3>{0.5f, 0.25f, 1}));
 }
 

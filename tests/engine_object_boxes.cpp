@@ -410,7 +410,7 @@ TEST_F(ObjectBoxes, broken_carla_boxes_are_refused_with_their_number)
     refused(R"("type": "Car", "transform": {"location": [0, 0, 0]}, )" + kPlace, "box 1: transform: rotation");
     for (const char* color : {"\"1,2\"", "\"1,2,256\"", "\"1,2,3,4\"", "\"1;2;3\"", "\"\"", "\"1,2,-3\"", "[1, 2, 3]"})
         refused(R"("type": "Car", "color": )" + std::string(color) + ", " + kPlace, "box 1: color: expected \"r,g,b\"");
-    EXPECT_TRUE(says(carla("{}"), "expected an array of boxes, found object"));
+    EXPECT_TRUE(says(carla("{}"), "boxes.json': expected an array"));
     const std::string twice = R"({"type": "Car", "id": 4, )" + kPlace + "}";
     EXPECT_TRUE(says(carla("[" + twice + "," + twice + "]"), "box 1: id 4 is given twice"));
     // ids of 64 bits do not fit: all are counted

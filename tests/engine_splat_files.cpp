@@ -78,6 +78,44 @@ TEST(SplatPly, splats_come_back_from_every_variant)
         }
 }
 
+// what is shown after the half turn about z of the viewers is what the .glb shows, and no splat changes its shape
+TEST(SplatPly, viewers_get_their_axes)
+{
+    const ScratchFolder folder;
+    Surfels s = random_surfels(200);
+    s.normal[0] = {0, 0, 1}; // two equal numbers: the tangents of the turned normal are others
+    s.normal[1] = {0, 1, 0};
+    s.normal[2] = {-1, 0, 0};
+    const float third = std::sqrt(1 / 3.f);
+    s.normal[3] = {third, third, third};
+    const Surfels turned = turned_for_viewers(s);
+    ASSERT_TRUE(write_splats_ply(folder / "s.ply", turned, SplatPly::gaussian_3d));
+    ASSERT_TRUE(write_splats_glb(folder / "s.glb", s));
+    const auto shown = read_splats_ply(folder / "s.ply"), world = read_splats_glb(folder / "s.glb");
+    ASSERT_TRUE(shown && world);
+    const auto covariance = [](const Surfels& from, size_t i) {
+        const Tangents t = tangents_of(from.normal[i]);
+        std::array<float, 9> c{};
+        for (size_t row = 0; row < 3; ++row)
+            for (size_t col = 0; col < 3; ++col)
+                c[3 * row + col] = from.sigma_u[i] * from.sigma_u[i] * t.u[row] * t.u[col] +
+                                   from.sigma_v[i] * from.sigma_v[i] * t.v[row] * t.v[col];
+        return c;
+    };
+    constexpr size_t kAxis[3] = {1, 2, 0}; // of the world, in the file's x, y, z
+    constexpr float kSign[3] = {1, -1, -1};
+    for (size_t i = 0; i < s.position.size(); ++i) {
+        const auto before = covariance(world->surfels, i), after = covariance(shown->surfels, i);
+        for (size_t a = 0; a < 3; ++a) {
+            EXPECT_NEAR(shown->surfels.position[i][a], kSign[a] * s.position[i][kAxis[a]], 1e-5);
+            EXPECT_NEAR(shown->surfels.normal[i][a], kSign[a] * s.normal[i][kAxis[a]], 2e-6);
+            for (size_t b = 0; b < 3 && i != 3; ++b) // the corner of a cube has no tangents that turn with it
+                EXPECT_NEAR(after[3 * a + b], kSign[a] * kSign[b] * before[3 * kAxis[a] + kAxis[b]], 2e-5) << i;
+        }
+    }
+    EXPECT_GT(shown->surfels.sigma_u[3], 0);
+}
+
 TEST(SplatPly, the_rigid_variant_has_the_62_floats_of_the_first_program)
 {
     const ScratchFolder folder;
@@ -91,7 +129,9 @@ TEST(SplatPly, the_rigid_variant_has_the_62_floats_of_the_first_program)
     EXPECT_EQ(p[8].name, "f_dc_2");
     for (size_t i = 0; i < 45; ++i) {
         EXPECT_EQ(p[9 + i].name, fmt::format("f_rest_{}", i));
-        EXPECT_EQ(p[9 + i].values, (std::vector<double>{0, 0, 0}));
+        ASSERT_EQ(p[9 + i].values.size(), 3u);
+        for (size_t row = 0; row < 3; ++row)
+            EXPECT_EQ(p[9 + i].values[row], 0);
     }
     EXPECT_EQ(p[54].name, "opacity");
     EXPECT_EQ(p[57].name, "scale_2");

@@ -11,6 +11,12 @@
 namespace semrover {
 namespace engine_texture_image_test {
 
+Result<ImageRgb8> picture_of(const Path& path)
+{
+    TextureBudget budget;
+    return read_texture_rgb8(path, budget);
+}
+
 using Bytes = std::vector<uint8_t>;
 
 void put(Bytes& to, uint32_t value, size_t bytes)
@@ -151,7 +157,7 @@ TEST(TextureImage, bmp_and_tga_files_give_their_pixels)
     const ScratchFolder folder;
     for (const NamedFile& f : files())
         if (!f.bytes.starts_with("#?")) {
-            const auto image = read_texture_rgb8(folder.put(f.name, f.bytes));
+            const auto image = picture_of(folder.put(f.name, f.bytes));
             ASSERT_TRUE(image) << image.error().message;
             EXPECT_EQ(image->width, 3u) << f.name;
             EXPECT_EQ(image->height, 2u) << f.name;
@@ -163,11 +169,11 @@ TEST(TextureImage, light_of_an_hdr_is_clamped_and_becomes_srgb)
 {
     const ScratchFolder folder;
     // mantissa / 256 * 2^(exponent - 128): 0.5 0.5 0.5, then 1 0.5 0, then 4 0.25 0, then black
-    const auto flat = read_texture_rgb8(
-        folder.put("a.hdr", hdr(4, 1, {128, 128, 128, 128, 128, 64, 0, 129, 128, 8, 0, 131, 9, 9, 9, 0})));
+    const auto flat =
+        picture_of(folder.put("a.hdr", hdr(4, 1, {128, 128, 128, 128, 128, 64, 0, 129, 128, 8, 0, 131, 9, 9, 9, 0})));
     ASSERT_TRUE(flat) << flat.error().message;
     EXPECT_EQ(flat->pixels, (Bytes{188, 188, 188, 255, 188, 0, 255, 137, 0, 0, 0, 0}));
-    const auto runs = read_texture_rgb8(folder.put("b.hdr", hdr_in_runs()));
+    const auto runs = picture_of(folder.put("b.hdr", hdr_in_runs()));
     ASSERT_TRUE(runs) << runs.error().message;
     ASSERT_EQ(runs->pixels.size(), 54u);
     EXPECT_EQ(runs->pixels[24], 188);    // 0.5
@@ -180,14 +186,14 @@ TEST(TextureImage, what_a_file_is_is_told_by_its_first_bytes_and_only_a_tga_by_i
 {
     const ScratchFolder folder;
     ASSERT_TRUE(write_png_rgb8(folder / "a.tga", 3, 2, rgb()));
-    EXPECT_EQ(read_texture_rgb8(folder / "a.tga")->pixels, rgb());
-    EXPECT_EQ(read_texture_rgb8(folder.put("b.png", bmp(24)))->pixels, rgb());
-    EXPECT_EQ(read_texture_rgb8(folder.put("c.tga", hdr_in_runs()))->width, 9u);
-    EXPECT_TRUE(says(read_texture_rgb8(folder.put("d.bmp", tga(2))),
+    EXPECT_EQ(picture_of(folder / "a.tga")->pixels, rgb());
+    EXPECT_EQ(picture_of(folder.put("b.png", bmp(24)))->pixels, rgb());
+    EXPECT_EQ(picture_of(folder.put("c.tga", hdr_in_runs()))->width, 9u);
+    EXPECT_TRUE(says(picture_of(folder.put("d.bmp", tga(2))),
                      "expected a PNG, JPEG, BMP, HDR or TGA image, found something else"));
-    EXPECT_TRUE(says(read_texture_rgb8(folder.put("e.tga", "no picture")), "e.tga': not a valid TGA"));
-    EXPECT_TRUE(says(read_texture_rgb8(folder.put("f.tga", "")), "not a valid TGA"));
-    EXPECT_TRUE(says(read_texture_rgb8(folder / "none.bmp"), "none.bmp"));
+    EXPECT_TRUE(says(picture_of(folder.put("e.tga", "no picture")), "e.tga': not a valid TGA"));
+    EXPECT_TRUE(says(picture_of(folder.put("f.tga", "")), "not a valid TGA"));
+    EXPECT_TRUE(says(picture_of(folder / "none.bmp"), "none.bmp"));
 }
 
 TEST(TextureImage, a_file_cut_anywhere_is_refused)
@@ -195,7 +201,7 @@ TEST(TextureImage, a_file_cut_anywhere_is_refused)
     const ScratchFolder folder;
     for (const NamedFile& f : files())
         for (size_t length = 0; length < f.bytes.size(); ++length) {
-            const auto image = read_texture_rgb8(folder.put(f.name, f.bytes.substr(0, length)));
+            const auto image = picture_of(folder.put(f.name, f.bytes.substr(0, length)));
             ASSERT_FALSE(image) << f.name << " of " << length;
             EXPECT_EQ(image.error().code, ErrorCode::bad_input);
         }
@@ -212,7 +218,7 @@ TEST(TextureImage, changed_bytes_give_an_error_or_always_the_same_picture)
             for (uint32_t n = random() % 3 + 1; n > 0; --n)
                 changed[random() % changed.size()] = char(random());
             const Path path = folder.put(f.name, changed);
-            const auto image = read_texture_rgb8(path), again = read_texture_rgb8(path);
+            const auto image = picture_of(path), again = picture_of(path);
             ASSERT_EQ(bool(image), bool(again));
             if (!image)
                 continue;
@@ -236,30 +242,30 @@ TEST(TextureImage, a_small_file_that_claims_a_huge_image_is_refused_before_it_is
              {"a.hdr", hdr(10000, 10000, {}), "10000 x 10000 pixels cannot come from"},
              {"a.hdr", hdr(0, 10, {}), "an image of 0 x 10 pixels"},
              {"a.hdr", hdr(4294967295u, 1, {}), "expected 1 to 16384"}})
-        EXPECT_TRUE(says(read_texture_rgb8(folder.put(name, bytes)), error)) << name;
+        EXPECT_TRUE(says(picture_of(folder.put(name, bytes)), error)) << name;
 }
 
 TEST(TextureImage, an_hdr_that_ends_within_a_run_ends_in_an_error)
 {
     const ScratchFolder folder;
-    EXPECT_TRUE(says(read_texture_rgb8(folder.put("a.hdr", hdr(9, 2, {2, 2, 0, 9, 128 + 4, 1}))), "the file is cut"));
-    EXPECT_TRUE(says(read_texture_rgb8(folder.put("a.hdr", hdr(9, 2, {2, 2, 0, 9, 0, 0, 0, 0}))), "the file is cut"));
-    EXPECT_TRUE(says(read_texture_rgb8(folder.put("a.hdr", hdr(9, 1, {2, 2, 0, 9, 128 + 10, 1}))),
+    EXPECT_TRUE(says(picture_of(folder.put("a.hdr", hdr(9, 2, {2, 2, 0, 9, 128 + 4, 1}))), "the file is cut"));
+    EXPECT_TRUE(says(picture_of(folder.put("a.hdr", hdr(9, 2, {2, 2, 0, 9, 0, 0, 0, 0}))), "the file is cut"));
+    EXPECT_TRUE(says(picture_of(folder.put("a.hdr", hdr(9, 1, {2, 2, 0, 9, 128 + 10, 1}))),
                      "not a valid HDR: bad RLE data in HDR"));
 }
 
 TEST(TextureImage, what_would_be_read_wrong_is_refused)
 {
     const ScratchFolder folder;
-    EXPECT_TRUE(says(read_texture_rgb8(folder.put("a.bmp", bmp(8, 2, 3))), "a pixel has colour 3 of a palette of 3"));
-    EXPECT_TRUE(says(read_texture_rgb8(folder.put("a.bmp", bmp(2))), "2 bits a pixel"));
-    EXPECT_TRUE(says(read_texture_rgb8(folder.put("a.tga", tga(2, 0x30))), "rows from right to left"));
+    EXPECT_TRUE(says(picture_of(folder.put("a.bmp", bmp(8, 2, 3))), "a pixel has colour 3 of a palette of 3"));
+    EXPECT_TRUE(says(picture_of(folder.put("a.bmp", bmp(2))), "2 bits a pixel"));
+    EXPECT_TRUE(says(picture_of(folder.put("a.tga", tga(2, 0x30))), "rows from right to left"));
     std::string moved = tga(1);
     moved[3] = 2;
-    EXPECT_TRUE(says(read_texture_rgb8(folder.put("a.tga", moved)), "a TGA whose palette begins at 2"));
+    EXPECT_TRUE(says(picture_of(folder.put("a.tga", moved)), "a TGA whose palette begins at 2"));
     std::string runs = bmp(8);
     runs[30] = 1;
-    EXPECT_TRUE(says(read_texture_rgb8(folder.put("a.bmp", runs)), "not a valid BMP: BMP type not supported: RLE"));
+    EXPECT_TRUE(says(picture_of(folder.put("a.bmp", runs)), "not a valid BMP: BMP type not supported: RLE"));
 }
 
 } // namespace engine_texture_image_test

@@ -257,6 +257,33 @@ TEST(Vox, writes_the_bytes_of_the_description)
                    transform(2, 3, {{"_t", "-3 7 2"}}) + shape(3, 0) + chunk("RGBA", colors)));
 }
 
+TEST(Vox, a_file_without_a_palette_has_the_default_one)
+{
+    const auto palette = default_vox_palette();
+    using Color = std::array<uint8_t, 3>;
+    // as the description lists it, bytes in the order A B G R: 0xffccffff, 0xff00ffff, 0xffffffcc, 0xff330000, ...
+    for (const auto& [index, color] : std::initializer_list<std::pair<size_t, Color>>{{0, {0, 0, 0}},
+                                                                                      {1, {255, 255, 255}},
+                                                                                      {2, {255, 255, 0xcc}},
+                                                                                      {6, {255, 255, 0}},
+                                                                                      {37, {0xcc, 255, 255}},
+                                                                                      {136, {0x66, 0x33, 0x66}},
+                                                                                      {215, {0, 0, 0x33}},
+                                                                                      {216, {0xee, 0, 0}},
+                                                                                      {225, {0x11, 0, 0}},
+                                                                                      {226, {0, 0xee, 0}},
+                                                                                      {236, {0, 0, 0xee}},
+                                                                                      {246, {0xee, 0xee, 0xee}},
+                                                                                      {255, {0x11, 0x11, 0x11}}})
+        EXPECT_EQ(palette[index], color) << index;
+    const ScratchFolder folder;
+    const std::string model = size(2, 1, 1) + voxels({{0, 0, 0, 37}, {1, 0, 0, 216}});
+    EXPECT_TRUE(says(read(folder, file(model)), "unknown labels: 37 #ccffff (1 voxels), 216 #ee0000 (1 voxels)"));
+    SceneGridOptions o;
+    o.nearest_color = true;
+    EXPECT_EQ(read_vox(folder.put("n.vox", file(model)), o)->grid.cells.size(), 2u);
+}
+
 TEST(Vox, refuses_malformed_files)
 {
     const ScratchFolder folder;
@@ -271,7 +298,6 @@ TEST(Vox, refuses_malformed_files)
     EXPECT_TRUE(
         says(read(folder, "VOX " + u32(150) + "MAIN" + u32(0) + u32(9) + "12345678"), "9 bytes are expected, 8"));
     EXPECT_TRUE(says(bad(palette()), "has no models"));
-    EXPECT_TRUE(says(bad(model), "has no palette (RGBA)"));
     EXPECT_TRUE(says(bad(size(0, 1, 1)), "expected a size of 1 to 256, found 0"));
     EXPECT_TRUE(says(bad(size(1, 257, 1)), "found 257"));
     EXPECT_TRUE(says(bad(size(1, 1, 1) + size(1, 1, 1)), "a second SIZE"));

@@ -34,8 +34,8 @@ constexpr std::array<std::string_view, 3> kModelNames = {"--dtype", "--asd-init"
 constexpr std::array<std::string_view, 8> kPathNames = {"--path-format", "--camera", "--rig",          "--width",
                                                         "--height",      "--fov-x",  "--camera-model", "--distortion"};
 constexpr std::array<std::string_view, 2> kGuessNames = {"--model", "--seed"};
-constexpr std::array<std::string_view, 5> kSceneNames = {"--to", "--seed", "--splat-radius", "--opacity",
-                                                         "--splat-labels"};
+constexpr std::array<std::string_view, 6> kSceneNames = {"--to",      "--seed", "--splat-radius",
+                                                         "--opacity", "--up",   "--splat-labels"};
 
 // --from; else what leaves no doubt
 std::optional<BoxFormat> box_format(const ConvertArguments& o)
@@ -134,6 +134,9 @@ void add_convert(CLI::App& app, const Globals& globals, Run& run)
     c->add_option("--splat-radius", o->scene.splat_radius,
                   "grid to splats: standard deviation in metres, or auto: from the spacing of the points");
     add_number(*c, "--opacity", o->scene.opacity, "grid to splats: of every splat", 0.01f, 1.f);
+    add_choice(*c, "--up", {"y", "z"},
+               "axis that points up in .ply and .splat files of splats: z, as in the world, or y, for viewers",
+               o->scene.up);
     c->add_flag("--splat-labels", o->scene.splat_labels, "a property label in .ply splats");
     add_path_options(*c, o->path);
     add_box_options(*c, o->objects);

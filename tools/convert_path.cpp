@@ -69,8 +69,12 @@ Status check_output(const Path& in, const Path& out, PathFormat format, const Gl
         return fail(ErrorCode::bad_input, "{} is a file; COLMAP's model is a folder", quote_path(out));
     if (format != PathFormat::colmap && folder)
         return fail(ErrorCode::bad_input, "{} is a folder, expected a file to write", quote_path(out));
-    const Path existing = format == PathFormat::colmap ? out / "cameras.txt" : out;
-    for (const Path& path : {existing, format == PathFormat::colmap ? out / "images.txt" : out})
+    std::vector<Path> files{out};
+    if (format == PathFormat::colmap)
+        files = {out / "cameras.txt", out / "images.txt"};
+    if (format == PathFormat::kitti)
+        files = {out, out.parent_path() / "times.txt", out.parent_path() / "calib.txt"};
+    for (const Path& path : files)
         if (is_there(path) && !globals.yes)
             return fail(ErrorCode::usage, "{} exists; -y replaces it", quote_path(path));
     return {};
@@ -97,7 +101,7 @@ Status choose_camera(CameraPath& path, const Path& in, const ConvertPathOptions&
 Result<CameraPath> read_input(const Path& in, const ConvertPathOptions& o)
 {
     SR_TRY(const Intrinsics lens, intrinsics_of(o.lens));
-    SR_TRY(CameraPath path, read_camera_path(in, lens));
+    SR_TRY(CameraPath path, read_camera_path(in, lens, o.lens.size_given));
     if (o.rig.empty())
         return path;
     SR_TRY(const Rig rig, read_rig(o.rig));
@@ -136,7 +140,8 @@ bool is_camera_path(const Path& path)
 {
     std::error_code ignored;
     if (fs::is_directory(path, ignored))
-        return is_there(path / "cameras.txt") || is_there(path / "images.txt");
+        return is_there(path / "cameras.txt") || is_there(path / "cameras.bin") || is_there(path / "images.txt") ||
+               is_file(path / "poses.txt");
     const Path extension = path.extension();
     return extension == ".json" || extension == ".tum" || extension == ".kitti" ||
            ((extension == ".txt" || extension.empty()) && starts_with_a_pose(path));
@@ -159,8 +164,9 @@ Status convert_path(const Path& in, const Path& out, const ConvertPathOptions& o
     else if (!globals.quiet)
         fmt::print("{} frames as {}{}\n", path.frames.size(), name_of(format),
                    format == PathFormat::tum     ? ", without intrinsics"
-                   : format == PathFormat::kitti ? ", without times and intrinsics"
-                                                 : "");
+                   : format != PathFormat::kitti ? ""
+                   : has_kitti_calibration(path) ? ", with times.txt and calib.txt beside them"
+                                                 : ", with times.txt beside them, without intrinsics");
     return {};
 }
 

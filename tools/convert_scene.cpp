@@ -119,7 +119,7 @@ Status write_output(const ConvertSceneOptions& o, SceneInput& input, SceneFormat
     if (!input.splats) {
         SR_TRY(input.splats, splats_of(o, *input.grid, globals));
     }
-    return write_splats(o.out, *input.splats, to, o.splat_labels);
+    return write_splats(o.out, o.up == "y" ? turned_for_viewers(*input.splats) : *input.splats, to, o.splat_labels);
 }
 
 } // namespace
@@ -129,6 +129,9 @@ Status convert_scene(const ConvertSceneOptions& o, const Globals& globals)
     SR_CHECK(surfel_options(o.splat_radius, o.opacity).map([](const SurfelOptions&) {}));
     SR_TRY(SceneInput input, read_scene_input(o.in, o.input));
     SR_TRY(const SceneFormat to, output_format(o, input));
+    if (!o.up.empty() && (!facts_of(to).splats || to == SceneFormat::gltf_splats))
+        return fail(ErrorCode::usage, "--up is for splats as .ply or .splat; {} has axes of its own",
+                    facts_of(to).name);
     if (input.splats && !facts_of(to).splats && to != SceneFormat::points_ply)
         return fail(ErrorCode::usage, "{} holds splats; {} holds a grid: write points-ply first, and grid that",
                     quote_path(o.in), facts_of(to).name);

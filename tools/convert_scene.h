@@ -9,6 +9,7 @@ namespace semrover {
 // a scene in another format: grids to grids and splats, splats to splats and points
 struct ConvertSceneOptions {
     std::string in, out, to;
+    std::string up; // "y": of splats in .ply and .splat, as their viewers expect it; else the world's axes
     SceneInputOptions input;
     std::string splat_radius = "0.04";
     float opacity = 1;

@@ -72,7 +72,7 @@ Result<DrawOptions> draw_options(const DriveOptions& o)
 Result<CameraPath> load_cameras(const DriveOptions& o)
 {
     SR_TRY(const Intrinsics intrinsics, intrinsics_of(o));
-    SR_TRY(CameraPath path, read_camera_path(o.path, intrinsics));
+    SR_TRY(CameraPath path, read_camera_path(o.path, intrinsics, o.size_given));
     if (o.equirect)
         for (CameraFrame& frame : path.frames)
             frame.intrinsics = whole_sphere(o.width, o.width / 2);

@@ -23,7 +23,7 @@ struct RenderArguments {
     DriveOptions drive;
     SceneInputOptions input;
     int frames_per_second = 10;
-    bool top = false, semantic = false;
+    bool top = false, semantic = false, floats = false, visible_depth = false;
 };
 
 Status check_outputs(const RenderArguments& o, const Globals& globals)
@@ -64,6 +64,8 @@ Result<DrawingOptions> drawing_options(const RenderArguments& o, const Globals& 
     DrawingOptions d;
     SR_TRY(d.draw, draw_options(o.drive));
     d.draw.semantic = o.semantic;
+    d.floats = o.floats;
+    d.visible_depth = o.visible_depth;
     SR_TRY(SceneInput input, read_scene_input(o.grid, o.input));
     print_warnings(input.warnings, globals);
     if (input.grid)
@@ -124,6 +126,9 @@ void add_render(CLI::App& app, const Globals& globals, Run& run)
     add_scene_input_options(*c, o->input);
     c->add_flag("--semantic", o->semantic, "label colours; a grid without points is drawn as blocks");
     c->add_flag("--top", o->top, "also an overview from above, top.png");
+    c->add_flag("--npy", o->floats,
+                "also float32 arrays {depth_expected,depth_median,alpha}/000000.npy, depths in metres");
+    c->add_flag("--visible-depth", o->visible_depth, "depth pictures are 0 where a pixel is not visible");
     CLI::Option* video =
         c->add_option("--video", o->video, "also an MP4 of the colour frames (of the first camera), through ffmpeg");
     add_number(*c, "--fps", o->frames_per_second, "frames a second of the video", 1, 240)->needs(video);

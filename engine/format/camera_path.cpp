@@ -21,12 +21,25 @@ bool is_kitti(std::string_view text)
     return false;
 }
 
-// a file beside the poses, if it is there
+// a file beside the poses, or of poses/NN.txt in sequences/NN, if it is there
 Path beside(const Path& path, const char* name)
 {
-    std::error_code ignored;
-    const Path file = path.parent_path() / name;
-    return path.filename() != name && std::filesystem::exists(file, ignored) ? file : Path();
+    for (const Path& folder : {path.parent_path(), path.parent_path() / ".." / "sequences" / path.stem()})
+        if (path.filename() != name && is_file(folder / name))
+            return folder / name;
+    return {};
+}
+
+Result<CameraPath> read_path_folder(const Path& folder, const Intrinsics& fallback, bool size_given)
+{
+    if (is_there(folder / "cameras.bin") || is_there(folder / "cameras.txt"))
+        return read_colmap(folder);
+    if (is_file(folder / "poses.txt"))
+        return read_camera_path(folder / "poses.txt", fallback, size_given);
+    return fail(ErrorCode::bad_input,
+                "{}: a folder without a path, expected COLMAP's cameras.bin or cameras.txt, or KITTI's poses.txt (as "
+                "poses/00.txt it is named itself)",
+                quote_path(folder));
 }
 
 } // namespace
@@ -44,15 +57,10 @@ std::optional<PathFormat> path_format_of(std::string_view name)
     return PathFormat(found - std::begin(kFormatNames));
 }
 
-Result<CameraPath> read_camera_path(const Path& path, const Intrinsics& fallback)
+Result<CameraPath> read_camera_path(const Path& path, const Intrinsics& fallback, bool size_given)
 {
-    std::error_code ignored;
-    if (std::filesystem::is_directory(path, ignored)) {
-        if (!std::filesystem::exists(path / "cameras.txt", ignored))
-            return fail(ErrorCode::bad_input, "{}: a folder without cameras.txt, expected COLMAP's text model",
-                        quote_path(path));
-        return read_colmap(path);
-    }
+    if (is_folder(path))
+        return read_path_folder(path, fallback, size_given);
     if (path.extension() == ".json") {
         SR_TRY(const Json file, read_json(path));
         return file.is_object() && file.contains("camera_path") ? parse_camera_path_json(file, quote_path(path))
@@ -60,7 +68,7 @@ Result<CameraPath> read_camera_path(const Path& path, const Intrinsics& fallback
     }
     SR_TRY(const std::string text, read_text_file(path, kMaxPathBytes));
     if (is_kitti(text))
-        return read_kitti(path, fallback, {beside(path, "times.txt"), beside(path, "calib.txt")});
+        return read_kitti(path, fallback, {beside(path, "times.txt"), beside(path, "calib.txt"), size_given});
     return read_tum(path, fallback);
 }
 

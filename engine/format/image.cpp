@@ -183,7 +183,8 @@ bool read_rows(Png& p, const Format& format, uint32_t width, uint32_t height)
 
 // the pixels go where `allocate(width, height)` says
 template <typename Allocate>
-Status decode_png(std::span<const std::byte> file, std::string_view where, const Format& format, Allocate&& allocate)
+Status decode_png(std::span<const std::byte> file, std::string_view where, const Format& format, uint64_t max_pixels,
+                  Allocate&& allocate)
 {
     if (file.size() < 8 || png_sig_cmp(reinterpret_cast<png_const_bytep>(file.data()), 0, 8) != 0)
         return fail(ErrorCode::bad_input, "{}: expected a PNG file, found something else", where);
@@ -196,6 +197,7 @@ Status decode_png(std::span<const std::byte> file, std::string_view where, const
     if (stored / kMaxInflation > file.size())
         return fail(ErrorCode::bad_input, "{}: {} x {} pixels cannot come from {} bytes; the file is cut", where, width,
                     height, file.size());
+    SR_CHECK(check_pixels({width, height}, max_pixels, where));
     const bool is_gray16 =
         png_get_bit_depth(p.png, p.info) == 16 && png_get_color_type(p.png, p.info) == PNG_COLOR_TYPE_GRAY;
     if (format.bit_depth == 16 && !is_gray16)
@@ -210,13 +212,13 @@ template <typename Allocate>
 Status read_png(const Path& path, const Format& format, Allocate&& allocate)
 {
     SR_TRY(const std::vector<std::byte> file, read_file(path, kMaxPngBytes));
-    return decode_png(file, quote_path(path), format, std::forward<Allocate>(allocate));
+    return decode_png(file, quote_path(path), format, kMaxImagePixels, std::forward<Allocate>(allocate));
 }
 
-Result<ImageRgb8> decode_png_rgb8(std::span<const std::byte> file, std::string_view where)
+Result<ImageRgb8> decode_png_rgb8(std::span<const std::byte> file, std::string_view where, uint64_t max_pixels)
 {
     ImageRgb8 image;
-    SR_CHECK(decode_png(file, where, kRgb8, [&](uint32_t width, uint32_t height) {
+    SR_CHECK(decode_png(file, where, kRgb8, max_pixels, [&](uint32_t width, uint32_t height) {
         image.width = width;
         image.height = height;
         image.pixels.resize(kRgb8.row_bytes(width) * height);
@@ -245,7 +247,7 @@ Status write_png_gray16(const Path& path, uint32_t width, uint32_t height, std::
 Result<ImageRgb8> read_png_rgb8(const Path& path)
 {
     SR_TRY(const std::vector<std::byte> file, read_file(path, kMaxPngBytes));
-    return decode_png_rgb8(file, quote_path(path));
+    return decode_png_rgb8(file, quote_path(path), kMaxImagePixels);
 }
 
 Result<std::vector<std::byte>> encode_png_rgb8(uint32_t width, uint32_t height, std::span<const uint8_t> pixels)
@@ -255,15 +257,23 @@ Result<std::vector<std::byte>> encode_png_rgb8(uint32_t width, uint32_t height, 
     return std::vector<std::byte>(bytes.begin(), bytes.end());
 }
 
-Result<ImageRgb8> decode_image_rgb8(std::span<const std::byte> file, std::string_view where)
+Status check_pixels(ImageSize size, uint64_t max_pixels, std::string_view where)
+{
+    if (uint64_t(size.width) * size.height > max_pixels)
+        return fail(ErrorCode::bad_input, "{}: {} x {} pixels, expected at most {} in all", where, size.width,
+                    size.height, max_pixels);
+    return {};
+}
+
+Result<ImageRgb8> decode_image_rgb8(std::span<const std::byte> file, std::string_view where, uint64_t max_pixels)
 {
     const auto starts_with = [&](std::initializer_list<uint8_t> magic) {
         return file.size() >= magic.size() && std::memcmp(file.data(), magic.begin(), magic.size()) == 0;
     };
     if (starts_with({0x89, 'P', 'N', 'G'}))
-        return decode_png_rgb8(file, where);
+        return decode_png_rgb8(file, where, max_pixels);
     if (starts_with({0xff, 0xd8, 0xff}))
-        return decode_jpeg_rgb8(file, where);
+        return decode_jpeg_rgb8(file, where, max_pixels);
     return fail(ErrorCode::bad_input, "{}: expected a PNG or JPEG image, found something else", where);
 }
 

@@ -28,15 +28,23 @@ Status write_png_gray16(const Path& path, uint32_t width, uint32_t height, std::
 // limited, and nothing is allocated that the file is too short to fill.
 Result<ImageRgb8> read_png_rgb8(const Path& path);
 
-// baseline JPEG, 4:2:0, quality 1..100; written and refused like PNG
+// baseline JPEG, 4:2:0, quality 1..100; written and refused like PNG. Any JPEG but those with arithmetic coding is
+// read. One that is cut, or lacks pixels for another reason, is refused; so is one of more than 1024 pixels a byte
 Status write_jpeg_rgb8(const Path& path, uint32_t width, uint32_t height, std::span<const uint8_t> pixels, int quality);
 Result<ImageRgb8> read_jpeg_rgb8(const Path& path);
 
-// the bytes of a PNG file; a PNG or JPEG file in memory, told by its first bytes. `where` is its name in errors
+// the bytes of a PNG file; a PNG or JPEG file in memory, told by its first bytes. `where` is its name in errors. An
+// image of more than `max_pixels` is refused before they are allocated
+constexpr uint64_t kMaxImagePixels = uint64_t(kMaxImageSide) * kMaxImageSide;
 Result<std::vector<std::byte>> encode_png_rgb8(uint32_t width, uint32_t height, std::span<const uint8_t> pixels);
-Result<ImageRgb8> decode_jpeg_rgb8(std::span<const std::byte> file, std::string_view where);
-Result<ImageRgb8> decode_image_rgb8(std::span<const std::byte> file, std::string_view where);
+Result<ImageRgb8> decode_jpeg_rgb8(std::span<const std::byte> file, std::string_view where,
+                                   uint64_t max_pixels = kMaxImagePixels);
+Result<ImageRgb8> decode_image_rgb8(std::span<const std::byte> file, std::string_view where,
+                                    uint64_t max_pixels = kMaxImagePixels);
 Result<ImageRgb8> read_image_rgb8(const Path& path); // likewise, at most 1 GiB
+
+// bad_input, with `where` in front
+Status check_pixels(ImageSize size, uint64_t max_pixels, std::string_view where);
 
 Result<ImageSize> read_png_size(const Path& path);
 

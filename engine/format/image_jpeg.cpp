@@ -5,17 +5,26 @@
 #include "engine/format/image.h"
 #include "runtime/base/quote.h"
 
+#include <algorithm>
 #include <csetjmp>
 #include <cstdio>
 #include <cstdlib>
 #include <jpeglib.h>
+
+#include <jerror.h> // needs jpeglib.h
 
 namespace semrover {
 
 namespace {
 
 constexpr uint64_t kMaxJpegBytes = 1u << 30;
-constexpr uint64_t kMaxExpansion = 8192; // a block of 64 pixels takes a bit or more of each channel
+// Pixels of a byte at most: each scan spends a bit or more on a block, and where one component is sampled 4 x 1 and
+// another 1 x 4, eight blocks are 1024 pixels.
+constexpr uint64_t kMaxExpansion = 1024;
+constexpr int kMaxScans = 100; // of a progressive file; encoders make about ten. Each visits all blocks
+
+// what libjpeg only warns of, and fills with gray
+constexpr int kDamage[] = {JWRN_JPEG_EOF, JWRN_HIT_MARKER, JWRN_HUFF_BAD_CODE, JWRN_MUST_RESYNC};
 
 // libjpeg reports errors by a callback that must not return: it keeps the message and jumps back. No object with a
 // destructor lives in a frame that is jumped over.
@@ -32,7 +41,11 @@ struct Errors {
             info->err->format_message(info, self->message);
             std::longjmp(self->jump, 1);
         };
-        manager.output_message = [](j_common_ptr) {}; // warnings do not go to the terminal
+        manager.emit_message = [](j_common_ptr info, int level) {
+            if (level < 0 && std::ranges::find(kDamage, info->err->msg_code) != std::end(kDamage))
+                info->err->error_exit(info);
+        };
+        manager.output_message = [](j_common_ptr) {}; // other warnings do not go to the terminal
         return &manager;
     }
 };
@@ -92,6 +105,7 @@ Status encode(Encoder& e, std::string_view where, uint32_t width, uint32_t heigh
 struct Decoder {
     jpeg_decompress_struct info{};
     Errors errors;
+    jpeg_progress_mgr progress{};
 
     Decoder() { info.err = errors.install(); }
     Decoder(const Decoder&) = delete;
@@ -109,19 +123,43 @@ bool read_header(Decoder& d, std::span<const std::byte> file)
     return true;
 }
 
-bool read_rows(Decoder& d, uint8_t* pixels)
+void check_scans(j_common_ptr info)
+{
+    if (reinterpret_cast<j_decompress_ptr>(info)->input_scan_number <= kMaxScans)
+        return;
+    auto* errors = reinterpret_cast<Errors*>(info->err);
+    std::snprintf(errors->message, sizeof(errors->message), "it has more than %d scans", kMaxScans);
+    std::longjmp(errors->jump, 1);
+}
+
+// rows are appended, so that a cut file takes no memory for those that it lacks; `pixels` has room for all
+bool read_rows(Decoder& d, std::vector<uint8_t>& pixels)
 {
     if (setjmp(d.errors.jump))
         return false;
     d.info.out_color_space = JCS_RGB;
     d.info.dct_method = JDCT_ISLOW;
+    d.progress.progress_monitor = check_scans;
+    d.info.progress = &d.progress;
     jpeg_start_decompress(&d.info);
+    const size_t row_bytes = size_t(d.info.output_width) * 3;
     while (d.info.output_scanline < d.info.output_height) {
-        uint8_t* row = pixels + size_t(d.info.output_scanline) * d.info.output_width * 3;
+        const size_t begin = pixels.size();
+        pixels.resize(begin + row_bytes);
+        uint8_t* row = pixels.data() + begin;
         jpeg_read_scanlines(&d.info, &row, 1);
     }
     jpeg_finish_decompress(&d.info);
     return true;
+}
+
+// a progressive file whose end marker comes before the first scan of a component
+bool lacks_scans(const Decoder& d)
+{
+    for (int c = 0; d.info.coef_bits && c < d.info.num_components; ++c)
+        if (d.info.coef_bits[c][0] < 0)
+            return true;
+    return false;
 }
 
 } // namespace
@@ -147,7 +185,7 @@ Result<ImageRgb8> read_jpeg_rgb8(const Path& path)
     return decode_jpeg_rgb8(file, quote_path(path));
 }
 
-Result<ImageRgb8> decode_jpeg_rgb8(std::span<const std::byte> file, std::string_view where)
+Result<ImageRgb8> decode_jpeg_rgb8(std::span<const std::byte> file, std::string_view where, uint64_t max_pixels)
 {
     Decoder d;
     if (file.empty() || !read_header(d, file))
@@ -156,12 +194,19 @@ Result<ImageRgb8> decode_jpeg_rgb8(std::span<const std::byte> file, std::string_
     const uint64_t pixels = uint64_t(d.info.image_width) * d.info.image_height;
     if (d.info.image_width > kMaxImageSide || d.info.image_height > kMaxImageSide ||
         pixels / kMaxExpansion > file.size())
-        return fail(ErrorCode::bad_input, "{}: {} x {} pixels in {} bytes; the file is cut or too large", where,
-                    d.info.image_width, d.info.image_height, file.size());
+        return fail(ErrorCode::bad_input,
+                    "{}: {} x {} pixels in {} bytes, at most {} to a side and {} to a byte; the file is cut or too "
+                    "large",
+                    where, d.info.image_width, d.info.image_height, file.size(), kMaxImageSide, kMaxExpansion);
+    SR_CHECK(check_pixels({d.info.image_width, d.info.image_height}, max_pixels, where));
+    if (d.info.arith_code)
+        return fail(ErrorCode::bad_input, "{}: a JPEG with arithmetic coding, which is not supported", where);
     ImageRgb8 image{d.info.image_width, d.info.image_height, {}};
-    image.pixels.resize(pixels * 3);
-    if (!read_rows(d, image.pixels.data()))
+    image.pixels.reserve(pixels * 3);
+    if (!read_rows(d, image.pixels))
         return fail(ErrorCode::bad_input, "{}: not a valid JPEG: {}", where, printable(d.errors.message));
+    if (lacks_scans(d))
+        return fail(ErrorCode::bad_input, "{}: not a valid JPEG: it ends before all components were seen", where);
     return image;
 }
 

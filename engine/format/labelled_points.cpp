@@ -19,6 +19,7 @@ namespace semrover {
 namespace {
 
 constexpr size_t kMaxPoints = 1u << 30;
+constexpr uint64_t kPointBytes = 48; // of a point, sorted
 constexpr double kFaceMargin = 1e-4; // of a cell; less than half of what 16 bits resolve at its face
 
 struct Points {
@@ -108,8 +109,10 @@ Result<std::optional<Cell>> cell_of(const std::array<double, 3>& p, size_t row, 
     return std::optional<Cell>({int32_t(c[0]), int32_t(c[1]), int32_t(c[2])});
 }
 
-Status take_points(const PlyElement& vertices, const SceneGridOptions& o, const std::string& where, Points& points,
-                   SceneGrid& out)
+enum class Handedness : uint8_t { right, left };
+
+Status take_points(const PlyElement& vertices, const SceneGridOptions& o, Handedness handedness,
+                   const std::string& where, Points& points, SceneGrid& out)
 {
     SR_TRY(const CloudColumns columns, columns_of(vertices, o, where));
     LabelMap map = LabelMap::identity();
@@ -119,7 +122,7 @@ Status take_points(const PlyElement& vertices, const SceneGridOptions& o, const 
     for (size_t row = 0; row < vertices.rows; ++row) {
         std::array<double, 3> p;
         for (size_t a = 0; a < 3; ++a)
-            p[a] = columns.position[a]->values[row] + o.origin[a];
+            p[a] = columns.position[a]->values[row] * (a == 1 && handedness == Handedness::left ? -1 : 1) + o.origin[a];
         SR_TRY(const std::optional<Cell> cell, cell_of(p, row, double(o.voxel_size), where));
         uint8_t target = o.default_label.value_or(0);
         if (cell && columns.label) {
@@ -201,9 +204,7 @@ void move_inside(std::array<float, 3>& position, const Cell& cell, double voxel_
     }
 }
 
-} // namespace
-
-Result<SceneGrid> read_labelled_points(const Path& path, const SceneGridOptions& o)
+Result<SceneGrid> read_points(const Path& path, const SceneGridOptions& o, Handedness handedness)
 {
     const std::string where = quote_path(path);
     SceneGrid out;
@@ -216,7 +217,12 @@ Result<SceneGrid> read_labelled_points(const Path& path, const SceneGridOptions&
         if (vertices->rows > kMaxPoints)
             return fail(ErrorCode::bad_input, "{}: {} vertices, at most {} are supported", where, vertices->rows,
                         kMaxPoints);
-        SR_CHECK(take_points(*vertices, o, where, points, out));
+        const uint64_t file_bytes = std::filesystem::file_size(path),
+                       most = ((256u << 20) + 6 * file_bytes) / kPointBytes;
+        if (vertices->rows > most) // in 16 bytes, as most programs write them, or more: never
+            return fail(ErrorCode::bad_input, "{}: {} vertices in {} bytes, at most {} are supported", where,
+                        vertices->rows, file_bytes, most);
+        SR_CHECK(take_points(*vertices, o, handedness, where, points, out));
     }
     std::vector<size_t> order(points.cells.size());
     std::iota(order.begin(), order.end(), size_t(0));
@@ -236,6 +242,21 @@ Result<SceneGrid> read_labelled_points(const Path& path, const SceneGridOptions&
     }
     grid.metadata["source"] = "labelled points";
     SR_CHECK(check_grid(grid, where));
+    return out;
+}
+
+} // namespace
+
+Result<SceneGrid> read_labelled_points(const Path& path, const SceneGridOptions& o)
+{
+    return read_points(path, o, Handedness::right);
+}
+
+Result<SceneGrid> read_carla_points(const Path& path, const SceneGridOptions& o)
+{
+    SR_TRY(SceneGrid out, read_points(path, o, Handedness::left));
+    out.warnings.push_back(
+        fmt::format("{}: CARLA's y points right: it is turned over; --from points-ply keeps it", quote_path(path)));
     return out;
 }
 

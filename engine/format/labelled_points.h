@@ -12,10 +12,14 @@ namespace semrover {
 // With colours (unless `options.semantic`) the result is a Sigma-Voxfield grid of options.points_per_voxel = n: where a
 // cell has more points, n are drawn by random numbers keyed by (seed, cell, place in the file), those of the cell's
 // label first; where it has fewer, they are repeated in turn. Points keep the file's order. Points that are not finite
-// are dropped with a warning. CARLA's semantic lidar (ObjTag) goes through assets/label_maps/carla.json: its tags since
-// 0.9.14 are Cityscapes' train ids + 1, and 24 for lane markings. bad_input for files without these properties, and
-// unknown labels (listed with counts).
+// are dropped with a warning. bad_input for files without these properties, and unknown labels (listed with counts).
 Result<SceneGrid> read_labelled_points(const Path& path, const SceneGridOptions& options);
+
+// The same for what CARLA's semantic lidar writes (save_to_disk: x y z CosAngle ObjIdx ObjTag). Its axes are x forward,
+// y right, z up, and so left-handed: y is turned over before options.origin is added, and a warning says so. Tags need
+// assets/label_maps/carla.json: since 0.9.14 they are Cityscapes' train ids + 1, and 24 for lane markings.
+// Source: https://carla.readthedocs.io/en/latest/ref_sensors/#semantic-lidar-sensor and its example open3d_lidar.py
+Result<SceneGrid> read_carla_points(const Path& path, const SceneGridOptions& options);
 
 // the grid's points with colours and labels, those on a cell's faces moved inside by 1e-4 of its size, so that reading
 // finds the same cells; of a grid without points, or cells that have none, their centres in the

@@ -16,6 +16,8 @@ namespace semrover {
 
 namespace {
 
+constexpr JsonLimits kCarlaFile{.bytes = 256u << 20, .values = 1 << 12}; // values of a box
+
 // carla.CityObjectLabel by its numbers since 0.9.14, base types of vehicles, kinds of blueprints, our own names where
 // they are none of these, and blueprints of vehicles
 constexpr SourceLabel kCarlaLabels[] = {
@@ -263,12 +265,10 @@ std::span<const SourceLabel> carla_box_labels()
 Status read_carla_boxes(const Path& path, const BoxOptions&, BoxCollector& to)
 {
     const std::string name = quote_path(path);
-    SR_TRY(const Json file, read_json(path, {.bytes = 256u << 20, .values = 32u << 20}));
-    if (!file.is_array())
-        return fail(ErrorCode::bad_input, "{}: expected an array of boxes, found {}", name, file.type_name());
-    for (size_t i = 0; i < file.size(); ++i)
-        SR_CHECK(add_box(file[i], fmt::format("{} box {}", name, i), to));
-    return {};
+    SR_TRY(const std::string text, read_text_file(path, kCarlaFile.bytes));
+    return parse_json_records(text, name, kCarlaFile, [&](const Json& box, size_t i) {
+        return add_box(box, fmt::format("{} box {}", name, i), to);
+    });
 }
 
 } // namespace semrover

@@ -89,7 +89,7 @@ Result<Rigid> vehicle_to_world(const Json& frame, std::string_view name)
 Status read_json_labels(const Path& path, const BoxOptions& options, BoxCollector& to)
 {
     const std::string name = quote_path(path);
-    SR_TRY(const Json file, read_json(path, {.bytes = kMaxWaymoBytes, .values = 32u << 20}));
+    SR_TRY(const Json file, read_json(path, {.bytes = kMaxWaymoBytes, .values = 32u << 20, .containers = 4u << 20}));
     const Json* labels = file.is_array() ? &file : nullptr;
     Rigid to_frame = kIdentity;
     if (file.is_object()) {

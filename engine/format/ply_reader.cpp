@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/format/ply_reader.h"
 
-#include "engine/format/ply_header.h"
 #include "runtime/base/quote.h"
 
 #include <algorithm>
@@ -10,6 +9,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 namespace semrover {
 
@@ -23,36 +23,53 @@ bool is_blank(char c)
 }
 
 template <typename T>
-double decode(const char* bytes, bool big_endian)
+double loaded(const char* bytes)
 {
-    std::array<char, sizeof(T)> raw;
-    std::memcpy(raw.data(), bytes, sizeof(T));
-    if (big_endian)
-        std::ranges::reverse(raw);
-    return static_cast<double>(std::bit_cast<T>(raw));
+    T value;
+    std::memcpy(&value, bytes, sizeof(T));
+    return static_cast<double>(value);
+}
+
+double loaded(PlyType type, const char* bytes)
+{
+    switch (type) {
+    case PlyType::i8:
+        return loaded<int8_t>(bytes);
+    case PlyType::u8:
+        return loaded<uint8_t>(bytes);
+    case PlyType::i16:
+        return loaded<int16_t>(bytes);
+    case PlyType::u16:
+        return loaded<uint16_t>(bytes);
+    case PlyType::i32:
+        return loaded<int32_t>(bytes);
+    case PlyType::u32:
+        return loaded<uint32_t>(bytes);
+    case PlyType::f32:
+        return loaded<float>(bytes);
+    case PlyType::f64:
+        break;
+    }
+    return loaded<double>(bytes);
+}
+
+// an integer type's own bytes are the lowest ones of a wider one
+template <typename T>
+std::array<char, 8> stored(double value)
+{
+    std::array<char, 8> bytes{};
+    const T typed = static_cast<T>(value);
+    std::memcpy(bytes.data(), &typed, sizeof(T));
+    return bytes;
 }
 
 double decode(PlyType type, const char* bytes, bool big_endian)
 {
-    switch (type) {
-    case PlyType::i8:
-        return decode<int8_t>(bytes, big_endian);
-    case PlyType::u8:
-        return decode<uint8_t>(bytes, big_endian);
-    case PlyType::i16:
-        return decode<int16_t>(bytes, big_endian);
-    case PlyType::u16:
-        return decode<uint16_t>(bytes, big_endian);
-    case PlyType::i32:
-        return decode<int32_t>(bytes, big_endian);
-    case PlyType::u32:
-        return decode<uint32_t>(bytes, big_endian);
-    case PlyType::f32:
-        return decode<float>(bytes, big_endian);
-    case PlyType::f64:
-        break;
-    }
-    return decode<double>(bytes, big_endian);
+    std::array<char, 8> raw;
+    std::memcpy(raw.data(), bytes, size_of(type));
+    if (big_endian)
+        std::reverse(raw.begin(), raw.begin() + ptrdiff_t(size_of(type)));
+    return loaded(type, raw.data());
 }
 
 template <typename T>
@@ -95,6 +112,7 @@ class BodyReader {
     Status read_binary_row(PlyElement& element, const std::vector<PlyColumn>& columns, uint64_t row);
     Status read_text_row(std::string_view text, PlyElement& element, const std::vector<PlyColumn>& columns);
     std::string_view next_line();
+    Status end_list(PlyProperty& property) const;
     uint64_t left() const { return bytes_.size() - at_; }
 
     std::string_view bytes_;
@@ -109,6 +127,14 @@ Status BodyReader::check_rows(const PlyElement& element, uint64_t row_bytes) con
     if (element.rows > left() / row_bytes)
         return fail(ErrorCode::bad_input, "{}: element {} has {} rows of at least {} bytes, but {} bytes are left",
                     where_, quote(element.name, 60), element.rows, row_bytes, left());
+    return {};
+}
+
+Status BodyReader::end_list(PlyProperty& property) const
+{
+    if (property.values.size() > std::numeric_limits<uint32_t>::max())
+        return fail(ErrorCode::bad_input, "{}: {}: more than 2^32 values in lists", where_, quote(property.name, 60));
+    property.starts.push_back(static_cast<uint32_t>(property.values.size()));
     return {};
 }
 
@@ -147,10 +173,10 @@ Status BodyReader::read_text_row(std::string_view text, PlyElement& element, con
         }
         for (uint64_t j = 0; j < static_cast<uint64_t>(length); ++j) {
             SR_CHECK(next(columns[i].type, property.name, value));
-            property.values.push_back(value);
+            property.values.append(value);
         }
         if (property.is_list)
-            property.starts.push_back(property.values.size());
+            SR_CHECK(end_list(property));
     }
     if (text.find_first_not_of(" \t") != std::string_view::npos)
         return fail(ErrorCode::bad_input, "{}: line {}: more values than properties: {}", where_, line_,
@@ -180,11 +206,11 @@ void BodyReader::read_columns(PlyElement& element, const std::vector<PlyColumn>&
 {
     uint64_t offset = 0;
     for (size_t i = 0; i < columns.size(); ++i) {
-        std::vector<double>& values = element.properties[i].values;
-        values.resize(element.rows);
+        PlyValues& values = element.properties[i].values;
+        values.reserve(element.rows);
         const char* first = bytes_.data() + at_ + offset;
         for (uint64_t row = 0; row < element.rows; ++row)
-            values[row] = decode(columns[i].type, first + row * row_bytes, big_endian_);
+            values.append(first + row * row_bytes, big_endian_);
         offset += size_of(columns[i].type);
     }
     at_ += element.rows * row_bytes;
@@ -212,9 +238,9 @@ Status BodyReader::read_binary_row(PlyElement& element, const std::vector<PlyCol
             return fail(ErrorCode::bad_input, "{}: row {} of element {}: the file ends before {}", where_, row,
                         quote(element.name, 60), quote(property.name, 60));
         for (uint64_t j = 0; j < length; ++j, at_ += size_of(type))
-            property.values.push_back(decode(type, bytes_.data() + at_, big_endian_));
+            property.values.append(bytes_.data() + at_, big_endian_);
         if (property.is_list)
-            property.starts.push_back(property.values.size());
+            SR_CHECK(end_list(property));
     }
     return {};
 }
@@ -247,6 +273,27 @@ Status BodyReader::finish() const
 
 } // namespace
 
+double PlyValues::operator[](size_t i) const
+{
+    return loaded(type_, bytes_.data() + i * size_of(type_));
+}
+
+void PlyValues::append(const char* bytes, bool big_endian)
+{
+    const size_t at = bytes_.size();
+    bytes_.insert(bytes_.end(), bytes, bytes + size_of(type_));
+    if (big_endian)
+        std::reverse(bytes_.begin() + ptrdiff_t(at), bytes_.end());
+}
+
+void PlyValues::append(double value)
+{
+    const std::array<char, 8> raw = type_ == PlyType::f32   ? stored<float>(value)
+                                    : type_ == PlyType::f64 ? stored<double>(value)
+                                                            : stored<int64_t>(value);
+    append(raw.data(), false);
+}
+
 const PlyProperty* PlyElement::find(std::string_view property) const
 {
     const auto found = std::ranges::find(properties, property, &PlyProperty::name);
@@ -271,7 +318,8 @@ Result<PlyFile> read_ply(const Path& path)
         PlyElement element{std::move(layout.name), layout.rows, {}};
         for (size_t i = 0; i < layout.columns.size(); ++i) {
             const bool list = layout.columns[i].count.has_value();
-            element.properties.push_back({std::move(layout.names[i]), is_float(layout.columns[i].type), list, {}, {}});
+            const PlyType type = layout.columns[i].type;
+            element.properties.push_back({std::move(layout.names[i]), is_float(type), list, PlyValues(type), {}});
             if (list)
                 element.properties.back().starts.push_back(0);
         }

@@ -28,6 +28,7 @@ constexpr SceneFormatFacts kFormats[] = {
     {SceneFormat::occ3d_waymo, "occ3d-waymo", ".npz", false, false},
     {SceneFormat::vox, "vox", ".vox", false, true},
     {SceneFormat::points_ply, "points-ply", ".ply", false, true},
+    {SceneFormat::carla_points, "carla-points", ".ply", false, false},
     {SceneFormat::gaussian_3d, "3dgs", ".ply", true, true},
     {SceneFormat::gaussian_2d, "2dgs", ".ply", true, true},
     {SceneFormat::inria62, "inria62", ".ply", true, true},
@@ -42,8 +43,21 @@ bool has_extension(const SceneFormatFacts& facts, std::string extension)
            (" " + std::string(facts.extensions) + " ").find(" " + extension + " ") != std::string::npos;
 }
 
+// splats as others compress them: no packaged library reads them, and their maker's program does
+constexpr std::string_view kForeignSplats[] = {".spz", ".sog", ".ksplat", ".lcc"};
+
+bool is_foreign(const Path& path)
+{
+    return std::ranges::find(kForeignSplats, path.extension().string()) != std::end(kForeignSplats);
+}
+
 Error unknown_extension(const Path& path)
 {
+    if (is_foreign(path))
+        return {ErrorCode::bad_input,
+                fmt::format("{}: {} is a compressed format of splats, which is neither read nor written; "
+                            "`npx @playcanvas/splat-transform` makes it of a .ply, and a .ply of it",
+                            quote_path(path), printable(path.extension().string()))};
     std::string list;
     for (const SceneFormatFacts& f : kFormats)
         list += fmt::format("{}{} ({})", list.empty() ? "" : ", ", f.name, f.extensions);
@@ -59,8 +73,13 @@ Result<SceneFormat> ply_format(const Path& path)
     const auto has = [&](std::string_view name) {
         return vertex != header.elements.end() && std::ranges::find(vertex->names, name) != vertex->names.end();
     };
+    if (has("packed_position"))
+        return fail(ErrorCode::bad_input,
+                    "{}: a compressed .ply of PlayCanvas, which is not read; `npx @playcanvas/splat-transform` makes a "
+                    "plain .ply of it",
+                    quote_path(path));
     if (!has("scale_0") || !has("rot_0"))
-        return SceneFormat::points_ply;
+        return has("ObjTag") ? SceneFormat::carla_points : SceneFormat::points_ply;
     return has("f_rest_44") ? SceneFormat::inria62
            : has("scale_2") ? SceneFormat::gaussian_3d
                             : SceneFormat::gaussian_2d;
@@ -110,8 +129,9 @@ std::optional<SceneFormat> scene_format_of_name(std::string_view name)
 
 bool has_scene_extension(const Path& path)
 {
-    return std::ranges::any_of(kFormats,
-                               [&](const SceneFormatFacts& f) { return has_extension(f, path.extension().string()); });
+    return is_foreign(path) || std::ranges::any_of(kFormats, [&](const SceneFormatFacts& f) {
+               return has_extension(f, path.extension().string());
+           });
 }
 
 Result<SceneFormat> detect_scene_format(const Path& path)
@@ -154,6 +174,8 @@ Result<SceneGrid> read_scene_grid(const Path& path, const SceneGridOptions& o, s
         return read_vox(path, o);
     case SceneFormat::points_ply:
         return read_labelled_points(path, o);
+    case SceneFormat::carla_points:
+        return read_carla_points(path, o);
     default:
         return fail(ErrorCode::bad_input, "{}: holds splats ({}), expected a grid", quote_path(path),
                     facts_of(*format).name);

@@ -17,6 +17,7 @@ enum class SceneFormat : uint8_t {
     occ3d_waymo,
     vox,
     points_ply,
+    carla_points,
     gaussian_3d,
     gaussian_2d,
     inria62,
@@ -35,7 +36,7 @@ std::span<const SceneFormatFacts> scene_formats();
 const SceneFormatFacts& facts_of(SceneFormat format);
 std::optional<SceneFormat> scene_format_of_name(std::string_view name);
 
-// whether a path's extension is one of a scene's
+// whether a path's extension is one of a scene's, or of a format of splats that is named when it is refused
 bool has_scene_extension(const Path& path);
 
 // what a file is: by its extension; of .ply by whether it has splats' properties, of .npz by the names and shapes of

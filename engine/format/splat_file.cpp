@@ -192,6 +192,26 @@ Result<SplatFile> read_splats_ply(const Path& path)
     return std::move(flattener).finish();
 }
 
+Surfels turned_for_viewers(const Surfels& surfels)
+{
+    const auto turned = [](const std::array<float, 3>& p) { return std::array<float, 3>{p[1], -p[2], -p[0]}; };
+    const auto along = [](const std::array<float, 3>& a, const std::array<float, 3>& b) {
+        return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    };
+    Surfels s = surfels;
+    for (size_t i = 0; i < s.position.size(); ++i) {
+        const Tangents before = tangents_of(surfels.normal[i]);
+        s.position[i] = turned(surfels.position[i]);
+        s.normal[i] = turned(surfels.normal[i]);
+        // the tangents follow from the normal: where two of its numbers are equal, others than the turned ones
+        const Tangents after = tangents_of(s.normal[i]);
+        const auto u = turned(before.u), v = turned(before.v);
+        s.sigma_u[i] = std::hypot(surfels.sigma_u[i] * along(u, after.u), surfels.sigma_v[i] * along(v, after.u));
+        s.sigma_v[i] = std::hypot(surfels.sigma_u[i] * along(u, after.v), surfels.sigma_v[i] * along(v, after.v));
+    }
+    return s;
+}
+
 // ---- .splat
 
 Result<SplatFile> read_dot_splat(const Path& path)

@@ -50,6 +50,11 @@ class EllipsoidFlattener {
 // splats are flat (2DGS). bad_input for files without these
 Result<SplatFile> read_splats_ply(const Path& path);
 
+// In the axes that viewers of .ply and .splat expect: y down, x and z so that half a turn about z, which they apply,
+// shows what a .glb of the same scene shows. (x, y, z) of the world becomes (y, -z, -x).
+// Source: PlayCanvas' splat-transform, Transform.PLY
+Surfels turned_for_viewers(const Surfels& surfels);
+
 // antimatter15's .splat: 32 bytes a splat: position 3 f32, scale 3 f32 in metres, RGBA u8, quaternion u8 (w first,
 // 128 q + 128). Source: https://github.com/antimatter15/splat, README.md and convert.py
 Result<SplatFile> read_dot_splat(const Path& path);

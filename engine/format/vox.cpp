@@ -17,6 +17,7 @@ namespace {
 
 constexpr uint64_t kMaxFileBytes = uint64_t(1) << 30;
 constexpr size_t kMaxVoxels = 1u << 25, kMaxVisits = 1u << 20, kMaxDepth = 64;
+constexpr size_t kMaxRepeated = 1u << 22; // voxels of models that are placed again
 
 struct Placed {
     Cell cell;
@@ -27,7 +28,9 @@ struct Placed {
 // walks the scene from its root
 class VoxPlacement {
   public:
-    VoxPlacement(const VoxFile& file, std::string_view where) : file_(file), where_(where) {}
+    VoxPlacement(const VoxFile& file, std::string_view where) : file_(file), where_(where), placed_(file.models.size())
+    {
+    }
 
     Status walk(uint32_t id, const VoxTransform& transform, size_t depth);
     Status place(uint32_t model, const VoxTransform& transform);
@@ -44,7 +47,8 @@ class VoxPlacement {
 
     const VoxFile& file_;
     std::string_view where_;
-    size_t visits_ = 0;
+    std::vector<bool> placed_; // models
+    size_t visits_ = 0, repeated_ = 0;
 };
 
 Status VoxPlacement::place(uint32_t index, const VoxTransform& transform)
@@ -53,6 +57,11 @@ Status VoxPlacement::place(uint32_t index, const VoxTransform& transform)
         return fail(ErrorCode::bad_input, "{}: the scene names model {}, there are {}", where_, index,
                     file_.models.size());
     const VoxModel& model = file_.models[index];
+    repeated_ += placed_[index] ? model.voxels.size() : 0;
+    placed_[index] = true;
+    if (repeated_ > kMaxRepeated)
+        return fail(ErrorCode::bad_input, "{}: model {} of {} voxels is placed again: more than {} voxels are repeated",
+                    where_, index, model.voxels.size(), kMaxRepeated);
     if (voxels.size() + model.voxels.size() > kMaxVoxels)
         return fail(ErrorCode::bad_input, "{}: the scene has more than {} voxels", where_, kMaxVoxels);
     for (const VoxVoxel& v : model.voxels)

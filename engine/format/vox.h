@@ -12,7 +12,7 @@ namespace semrover {
 // "#rrggbb"), or by the nearest class's with `nearest_color`, or else refused, all listed with counts. The scene's
 // transforms place the models (rotations too); hidden nodes and layers are left out; where models overlap, the later
 // counts. A file without a scene is one model from cell (0, 0, 0). `options.origin` must be whole voxels.
-// bad_input also for more than 2^25 voxels.
+// bad_input also for more than 2^25 voxels, or 2^22 of models that are placed again.
 Result<SceneGrid> read_vox(const Path& path, const SceneGridOptions& options);
 
 // colour index = label + 1; one model for each 256 x 256 x 256 block that has cells, in place by its transform, so that

@@ -324,7 +324,7 @@ Result<VoxFile> Parser::parse()
     if (file_.models.empty())
         return fail(ErrorCode::bad_input, "{}: has no models", where_);
     if (!has_palette_)
-        return fail(ErrorCode::bad_input, "{}: has no palette (RGBA), so its colours say nothing", where_);
+        file_.palette = default_vox_palette();
     return std::move(file_);
 }
 
@@ -390,6 +390,20 @@ void append_model(Bytes& main, const VoxModel& model)
 }
 
 } // namespace
+
+// red, green and blue of six levels each but for black, blue fastest; then ten levels more of red, green, blue and gray
+std::array<std::array<uint8_t, 3>, 256> default_vox_palette()
+{
+    std::array<std::array<uint8_t, 3>, 256> palette{};
+    constexpr uint8_t kRamp[] = {0xee, 0xdd, 0xbb, 0xaa, 0x88, 0x77, 0x55, 0x44, 0x22, 0x11};
+    const auto level = [](size_t digit) { return uint8_t(255 - 51 * digit); };
+    for (size_t i = 0; i < 215; ++i)
+        palette[i + 1] = {level(i / 36), level(i / 6 % 6), level(i % 6)};
+    for (size_t i = 0; i < 40; ++i)
+        for (size_t a = 0; a < 3; ++a)
+            palette[216 + i][a] = i / 10 == a || i / 10 == 3 ? kRamp[i % 10] : uint8_t(0);
+    return palette;
+}
 
 VoxTransform compose(const VoxTransform& a, const VoxTransform& b)
 {

@@ -45,6 +45,9 @@ struct VoxFile {
     std::array<std::array<uint8_t, 3>, 256> palette{}; // by colour index; 0 is no colour
 };
 
+// of files without RGBA, as the description lists it
+std::array<std::array<uint8_t, 3>, 256> default_vox_palette();
+
 // bad_input names the chunk and the byte: sizes beyond the file, voxels outside their model, rotations that are none
 Result<VoxFile> parse_vox(std::span<const std::byte> bytes, std::string_view where);
 

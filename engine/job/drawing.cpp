@@ -4,6 +4,7 @@
 
 #include "engine/format/image.h"
 #include "engine/job/budget_meter.h"
+#include "engine/job/float_buffers.h"
 #include "engine/job/outgoing.h"
 #include "engine/scene/palette.h"
 #include "engine/splat/bounds.h"
@@ -41,7 +42,8 @@ class DrawingJob : public Job {
     DrawingJob(Device& device, DrawingOptions options, SurfelScene scene, std::unique_ptr<Outgoing> out,
                const JobCallbacks& callbacks)
         : device_(device), o_(std::move(options)), scene_(std::move(scene)), callbacks_(callbacks),
-          drawing_(device, scene_, o_.path, o_.draw.rasterizer()), out_(std::move(out))
+          drawing_(device, scene_, o_.path, o_.draw.rasterizer()), floats_(device, scene_, o_.draw.rasterizer()),
+          out_(std::move(out))
     {
         say(false);
     }
@@ -93,14 +95,17 @@ class DrawingJob : public Job {
     {
         const Path folder = camera_folder(o_.folder, frame.camera);
         const ImageSize size{frame.intrinsics.width, frame.intrinsics.height};
-        return out_->read(slots, size,
-                          [this, frame, folder, number = counts_[frame.camera]++](FramePixels pixels) -> Status {
-                              if (o_.picture)
-                                  SR_CHECK(o_.picture(frame, color_pixels(pixels)));
-                              return out_->write([folder, number, pixels = std::move(pixels)] {
-                                  return write_frame_images(folder, number, pixels);
-                              });
-                          });
+        const uint32_t number = counts_[frame.camera]++;
+        if (o_.floats)
+            SR_CHECK(floats_.write(folder, number, frame));
+        return out_->read(slots, size, [this, frame, folder, number](FramePixels pixels) -> Status {
+            if (o_.visible_depth)
+                clear_hidden_depth(pixels);
+            if (o_.picture)
+                SR_CHECK(o_.picture(frame, color_pixels(pixels)));
+            return out_->write(
+                [folder, number, pixels = std::move(pixels)] { return write_frame_images(folder, number, pixels); });
+        });
     }
     Status draw_overview()
     {
@@ -124,6 +129,7 @@ class DrawingJob : public Job {
     SurfelScene scene_;
     JobCallbacks callbacks_;
     PathDrawing drawing_;
+    FloatBuffers floats_;
     SubmitCost cost_;
     std::map<std::string, uint32_t> counts_; // frames so far, per camera
     std::unique_ptr<Outgoing> out_;          // last: what it writes is of the others

@@ -19,6 +19,8 @@ struct DrawingOptions {
     ImageSize top;   // of top.png; 0 x 0: none
     Path folder;     // gets {color,depth,normal,label,visible}/000000.png, in folders of the cameras' names
     DrawOptions draw;
+    bool floats = false;        // also {depth_expected,depth_median,alpha}/000000.npy
+    bool visible_depth = false; // depth is 0 where a pixel is not visible
     // gets the colours of every frame of the path, [height, width, 3], when they arrive from the device; may be empty
     std::function<Status(const CameraFrame&, std::span<const uint8_t>)> picture;
 };

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/mesh/asset_folder.h"
 
-#include "engine/mesh/texture_image.h"
 #include "runtime/base/quote.h"
 
 #include <algorithm>
@@ -17,7 +16,7 @@ AssetFolder::AssetFolder(const Path& mesh_file)
     folder_ = parent.empty() ? Path(".") : parent;
 }
 
-Result<Path> AssetFolder::find(std::string_view name, std::string_view where) const
+std::optional<Path> AssetFolder::relative(std::string_view name)
 {
     std::string text(name);
     std::ranges::replace(text, '\\', '/'); // as Windows writes them
@@ -25,10 +24,25 @@ Result<Path> AssetFolder::find(std::string_view name, std::string_view where) co
     const bool climbs = std::ranges::find(relative, Path("..")) != relative.end();
     if (text.empty() || relative.is_absolute() || climbs || text.find('\0') != std::string::npos ||
         (text.size() > 1 && text[1] == ':'))
+        return std::nullopt;
+    return relative;
+}
+
+bool AssetFolder::missing(std::string_view name) const
+{
+    const auto path = relative(name);
+    std::error_code error;
+    return path && fs::symlink_status(folder_ / *path, error).type() == fs::file_type::not_found;
+}
+
+Result<Path> AssetFolder::find(std::string_view name, std::string_view where) const
+{
+    const auto path = relative(name);
+    if (!path)
         return fail(ErrorCode::bad_input, "{}: refers to {}, expected a file within its own folder", where,
                     quote(name));
     std::error_code error;
-    const Path found = fs::canonical(folder_ / relative, error);
+    const Path found = fs::canonical(folder_ / *path, error);
     if (error)
         return fail(ErrorCode::bad_input, "{}: refers to {}, which is missing: {}", where, quote(name),
                     error.message());
@@ -40,24 +54,13 @@ Result<Path> AssetFolder::find(std::string_view name, std::string_view where) co
 
 Result<int32_t> AssetFolder::texture(Mesh& mesh, std::string_view name, std::string_view where, TextureWrap wrap)
 {
-    const auto [entry, is_new] = textures_.try_emplace({std::string(name), wrap}, int32_t(mesh.textures.size()));
-    if (!is_new)
-        return entry->second;
     SR_TRY(const Path path, find(name, where));
-    SR_TRY(ImageRgb8 image, read_texture_rgb8(path));
+    const auto entry = textures_.find({path, wrap});
+    if (entry != textures_.end())
+        return entry->second;
+    SR_TRY(ImageRgb8 image, read_texture_rgb8(path, budget_));
     mesh.textures.push_back({std::move(image), wrap, wrap});
-    SR_CHECK(check_texture_budget(mesh, where));
-    return entry->second;
-}
-
-Status check_texture_budget(const Mesh& mesh, std::string_view where)
-{
-    uint64_t pixels = 0;
-    for (const Texture& t : mesh.textures)
-        pixels += uint64_t(t.image.width) * t.image.height;
-    if (pixels > 1u << 30)
-        return fail(ErrorCode::bad_input, "{}: the textures have {} pixels, at most 2^30 are supported", where, pixels);
-    return {};
+    return textures_[{path, wrap}] = int32_t(mesh.textures.size() - 1);
 }
 
 } // namespace semrover

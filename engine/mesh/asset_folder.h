@@ -3,9 +3,11 @@
 #pragma once
 
 #include "engine/mesh/mesh.h"
+#include "engine/mesh/texture_image.h"
 #include "runtime/base/file.h"
 
 #include <map>
+#include <optional>
 
 namespace semrover {
 
@@ -18,16 +20,19 @@ class AssetFolder {
     // files that are missing
     Result<Path> find(std::string_view name, std::string_view where) const;
 
-    // index of a texture in the mesh, decoded once for each name and pair of wraps; mesh files repeat them
+    // whether it names a place inside the folder where no file is; false also for names that find() refuses
+    bool missing(std::string_view name) const;
+
+    // index of a texture in the mesh, decoded once for each file and pair of wraps; mesh files repeat them
     Result<int32_t> texture(Mesh& mesh, std::string_view name, std::string_view where,
                             TextureWrap wrap = TextureWrap::repeat);
 
   private:
-    Path folder_;
-    std::map<std::pair<std::string, TextureWrap>, int32_t> textures_;
-};
+    static std::optional<Path> relative(std::string_view name); // none if it is absolute, or may leave the folder
 
-// bad_input if all textures together have more than 2^30 pixels: files of a few bytes can hold large images
-Status check_texture_budget(const Mesh& mesh, std::string_view where);
+    Path folder_;
+    std::map<std::pair<Path, TextureWrap>, int32_t> textures_; // by where links lead
+    TextureBudget budget_;
+};
 
 } // namespace semrover

@@ -15,8 +15,7 @@ static_assert(std::endian::native == std::endian::little, "numbers lie in the fi
 
 namespace {
 
-constexpr uint64_t kMaxFileBytes = 8ull << 30;
-constexpr JsonLimits kJsonLimits{.bytes = 512u << 20, .depth = 64, .values = 32u << 20};
+constexpr JsonLimits kJsonLimits{.bytes = 512u << 20, .depth = 64, .values = 32u << 20, .containers = 1u << 20};
 
 uint32_t component_bytes(int64_t component)
 {
@@ -63,6 +62,7 @@ double read_integer(const std::byte* at, bool normalized)
 bool decode_base64(std::string_view text, std::vector<std::byte>& out)
 {
     uint32_t bits = 0, have = 0;
+    out.reserve(text.size() / 4 * 3);
     while (text.ends_with('='))
         text.remove_suffix(1);
     for (const char c : text) {
@@ -132,8 +132,8 @@ GltfFile::GltfFile(const Path& path) : where_(quote_path(path)), folder_(path) {
 Result<GltfFile> GltfFile::open(const Path& path)
 {
     GltfFile f(path);
-    SR_TRY(f.file_, read_file(path, kMaxFileBytes));
-    std::string_view text(reinterpret_cast<const char*>(f.file_.data()), f.file_.size());
+    SR_TRY(f.file_, MappedFile::open(path));
+    std::string_view text(reinterpret_cast<const char*>(f.file_.bytes().data()), f.file_.bytes().size());
     if (text.starts_with("glTF"))
         SR_CHECK(f.split_binary(text));
     SR_TRY(f.json_, parse_json(text, f.where_, kJsonLimits));
@@ -147,23 +147,24 @@ Result<GltfFile> GltfFile::open(const Path& path)
 // header of 12 bytes; chunks of length, type and data: JSON, then perhaps BIN
 Status GltfFile::split_binary(std::string_view& text)
 {
-    const auto word = [&](size_t at) { return read_as<uint32_t>(file_.data() + at); };
-    if (file_.size() < 20 || word(4) != 2)
+    const std::span<const std::byte> file = file_.bytes();
+    const auto word = [&](size_t at) { return read_as<uint32_t>(file.data() + at); };
+    if (file.size() < 20 || word(4) != 2)
         return fail(ErrorCode::bad_input, "{}: expected binary glTF of version 2, found {}", where_,
-                    file_.size() < 20 ? "a cut file" : fmt::format("version {}", word(4)));
+                    file.size() < 20 ? "a cut file" : fmt::format("version {}", word(4)));
     const uint64_t json_bytes = word(12);
-    if (word(8) > file_.size() || json_bytes > file_.size() - 20 || word(16) != 0x4E4F534A)
+    if (word(8) > file.size() || json_bytes > file.size() - 20 || word(16) != 0x4E4F534A)
         return fail(ErrorCode::bad_input,
                     "{}: says it has {} bytes with {} of JSON, the file has {}; it is cut or broken", where_, word(8),
-                    json_bytes, file_.size());
+                    json_bytes, file.size());
     text = text.substr(20, json_bytes);
     const size_t at = 20 + json_bytes;
-    if (file_.size() - at < 8 || word(at + 4) != 0x004E4942)
+    if (file.size() - at < 8 || word(at + 4) != 0x004E4942)
         return {};
-    if (word(at) > file_.size() - at - 8)
+    if (word(at) > file.size() - at - 8)
         return fail(ErrorCode::bad_input, "{}: says it has {} bytes of data, {} are left; the file is cut", where_,
-                    word(at), file_.size() - at - 8);
-    binary_ = std::span<const std::byte>(file_).subspan(at + 8, word(at));
+                    word(at), file.size() - at - 8);
+    binary_ = file.subspan(at + 8, word(at));
     return {};
 }
 
@@ -176,8 +177,9 @@ Status GltfFile::check_version() const
     SR_TRY(const size_t required, count("extensionsRequired"));
     for (size_t i = 0; i < required; ++i) {
         const Json& name = json_["extensionsRequired"][i];
-        constexpr const char* kKnown[] = {"KHR_texture_transform", "KHR_materials_unlit", "KHR_mesh_quantization"};
-        if (std::ranges::find(kKnown, name) == std::end(kKnown))
+        constexpr const char* kKnown[] = {"KHR_texture_transform", "KHR_mesh_quantization", "KHR_lights_punctual"};
+        const bool material = name.is_string() && name.get_ref<const std::string&>().starts_with("KHR_materials_");
+        if (!material && std::ranges::find(kKnown, name) == std::end(kKnown))
             return fail(ErrorCode::bad_input, "{}: needs the extension {}, which is not supported", where_,
                         quote(name.is_string() ? name.get<std::string>() : "?", 60));
     }
@@ -216,18 +218,32 @@ Result<std::optional<int64_t>> GltfFile::integer(const Json& object, const char*
     return std::optional(found->get<int64_t>());
 }
 
-Result<std::vector<std::byte>> GltfFile::load_uri(const std::string& uri, std::string_view where) const
+Result<std::span<const std::byte>> GltfFile::load_uri(const std::string& uri, std::string_view where)
 {
     if (!uri.starts_with("data:")) {
         SR_TRY(const Path path, folder_.find(percent_decoded(uri), where));
-        return read_file(path, kMaxFileBytes);
+        auto named = named_.find(path);
+        if (named == named_.end()) {
+            SR_TRY(MappedFile file, MappedFile::open(path));
+            named = named_.emplace(path, std::move(file)).first;
+        }
+        return named->second.bytes();
     }
     constexpr std::string_view kBase64 = ";base64,";
     const size_t comma = uri.substr(0, 200).find(kBase64);
     std::vector<std::byte> bytes;
     if (comma == std::string::npos || !decode_base64(std::string_view(uri).substr(comma + kBase64.size()), bytes))
         return fail(ErrorCode::bad_input, "{}: a data URI that is not base64", where);
-    return bytes;
+    data_uris_.push_back(std::move(bytes));
+    return data_uris_.back();
+}
+
+uint64_t GltfFile::bytes() const
+{
+    uint64_t sum = file_.bytes().size();
+    for (const auto& [path, file] : named_)
+        sum += file.bytes().size();
+    return sum;
 }
 
 Status GltfFile::load_buffers()
@@ -239,10 +255,8 @@ Status GltfFile::load_buffers()
         const auto uri = buffer->find("uri");
         const std::string where = fmt::format("{}: buffers[{}]", where_, i);
         std::span<const std::byte> bytes = binary_;
-        loaded_.emplace_back();
         if (uri != buffer->end() && uri->is_string()) {
-            SR_TRY(loaded_.back(), load_uri(uri->get<std::string>(), where));
-            bytes = loaded_.back();
+            SR_TRY(bytes, load_uri(uri->get_ref<const std::string&>(), where));
         } else if (i > 0 || binary_.empty()) {
             return fail(ErrorCode::bad_input, "{}: has neither a uri nor the file's binary part", where);
         }
@@ -307,20 +321,17 @@ Result<GltfAccessor> GltfFile::accessor(int64_t index) const
     return a;
 }
 
-Result<ImageRgb8> GltfFile::image(int64_t index) const
+Result<std::span<const std::byte>> GltfFile::image_file(int64_t index)
 {
     SR_TRY(const Json* json, entry("images", index));
     const std::string where = fmt::format("{}: images[{}]", where_, index);
     SR_TRY(const auto view_index, integer(*json, "bufferView"));
-    if (view_index) {
-        SR_TRY(const auto bytes, view(*view_index));
-        return decode_image_rgb8(bytes, where);
-    }
+    if (view_index)
+        return view(*view_index);
     const auto uri = json->find("uri");
     if (uri == json->end() || !uri->is_string())
         return fail(ErrorCode::bad_input, "{}: has neither a bufferView nor a uri", where);
-    SR_TRY(const std::vector<std::byte> bytes, load_uri(uri->get<std::string>(), where));
-    return decode_image_rgb8(bytes, where);
+    return load_uri(uri->get_ref<const std::string&>(), where);
 }
 
 } // namespace semrover

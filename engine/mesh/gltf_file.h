@@ -42,21 +42,25 @@ class GltfFile {
     // sparse ones are refused, and those without a buffer view (Draco has them)
     Result<GltfAccessor> accessor(int64_t index) const;
     Result<std::span<const std::byte>> view(int64_t index) const;
-    Result<ImageRgb8> image(int64_t index) const;
+    // the file of an image, the same bytes at the same place for all that name the same
+    Result<std::span<const std::byte>> image_file(int64_t index);
+    // of the file and those that it names, each counted once
+    uint64_t bytes() const;
 
   private:
     explicit GltfFile(const Path& path);
     Status split_binary(std::string_view& text);
     Status check_version() const;
     Status load_buffers();
-    Result<std::vector<std::byte>> load_uri(const std::string& uri, std::string_view where) const;
+    Result<std::span<const std::byte>> load_uri(const std::string& uri, std::string_view where);
 
     std::string where_;
     AssetFolder folder_;
-    std::vector<std::byte> file_;
+    MappedFile file_;
     std::span<const std::byte> binary_; // of a GLB
     Json json_;
-    std::vector<std::vector<std::byte>> loaded_;
+    std::map<Path, MappedFile> named_;              // by where links lead: buffers and images may share a file
+    std::vector<std::vector<std::byte>> data_uris_; // decoded
     std::vector<std::span<const std::byte>> buffers_;
 };
 

@@ -16,6 +16,7 @@ namespace {
 
 using Matrix = std::array<double, 16>; // row-major
 
+constexpr size_t kMaxWarnings = 10;
 constexpr Matrix kOne = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
 
 Matrix product(const Matrix& a, const Matrix& b)
@@ -34,6 +35,19 @@ double determinant(const Matrix& m)
            m[2] * (m[4] * m[9] - m[5] * m[8]);
 }
 
+// an object in objects, by its keys; null when it is not there
+const Json* find_object(const Json& object, std::initializer_list<const char*> keys)
+{
+    const Json* at = &object;
+    for (const char* key : keys) {
+        const auto found = at->find(key);
+        if (found == at->end() || !found->is_object())
+            return nullptr;
+        at = &*found;
+    }
+    return at;
+}
+
 // how a material sees texture coordinates
 struct TextureView {
     int64_t set = 0; // TEXCOORD_n
@@ -49,32 +63,44 @@ struct TextureView {
 
 class GltfReader {
   public:
-    explicit GltfReader(const GltfFile& file) : file_(file), where_(file.where()) {}
+    explicit GltfReader(GltfFile& file)
+        : file_(file), where_(file.where()),
+          max_elements_(std::min<uint64_t>(kMaxMeshElements / 4, kMaxRepeatedElements + file.bytes() / 2))
+    {
+    }
 
     Result<Mesh> read();
 
   private:
     Status read_materials();
-    Status read_base_color(const Json& pbr, const std::string& where, Material& material, TextureView& view);
+    Status read_base_color(const Json& pbr, const char* factor, const char* texture, const std::string& where,
+                           Material& material, TextureView& view);
     Status read_texture(const Json& info, const std::string& where, Material& material, TextureView& view);
+    Result<int32_t> texture_of(int64_t image, TextureWrap u, TextureWrap v);
+    uint32_t untextured(uint32_t material);
     Result<TextureWrap> wrap_of(const Json& texture, const char* key) const;
     Result<std::vector<int64_t>> roots() const;
     Result<std::vector<int64_t>> indices_in(const Json& object, const char* key) const;
     Result<Matrix> matrix_of(const Json& node, const std::string& where) const;
     Result<std::vector<double>> numbers(const Json& object, const char* key, size_t count,
                                         std::string_view where) const;
+    Status push_node(int64_t index, const Matrix& parent);
     Status read_node(int64_t index, const Matrix& parent);
     Status read_mesh(int64_t index, const Matrix& matrix);
     Status read_primitive(const Json& primitive, const Matrix& matrix, const std::string& where);
     Status read_vertices(const Json& attributes, const Matrix& matrix, const std::string& where);
-    Status add_faces(const std::vector<uint32_t>& corners, int64_t mode, bool mirrored, uint32_t first);
+    Status add_faces(const std::vector<uint32_t>& corners, int64_t mode, bool mirrored, uint32_t first,
+                     std::string_view where);
     Result<std::vector<uint32_t>> corners_of(const Json& primitive, size_t vertices, const std::string& where) const;
 
-    const GltfFile& file_;
+    GltfFile& file_;
     std::string where_;
+    uint64_t max_elements_; // vertices, and faces
     Mesh mesh_;
-    std::vector<TextureView> views_;                     // of materials
-    std::map<std::array<int64_t, 3>, int32_t> textures_; // image and wraps
+    std::vector<TextureView> views_;          // of materials
+    std::map<uint32_t, uint32_t> untextured_; // the same without their textures
+    std::map<std::tuple<const std::byte*, TextureWrap, TextureWrap>, int32_t> textures_; // by the image's file
+    TextureBudget texture_budget_;
     std::vector<bool> visited_;
     struct Pending {
         int64_t node;
@@ -115,6 +141,19 @@ Result<TextureWrap> GltfReader::wrap_of(const Json& texture, const char* key) co
     }
 }
 
+Result<int32_t> GltfReader::texture_of(int64_t image, TextureWrap u, TextureWrap v)
+{
+    SR_TRY(const auto file, file_.image_file(image));
+    const auto entry = textures_.find({file.data(), u, v});
+    if (entry != textures_.end())
+        return entry->second;
+    SR_TRY(ImageRgb8 pixels, decode_image_rgb8(file, fmt::format("{}: images[{}]", where_, image),
+                                               texture_budget_.pixels_left(file.size())));
+    texture_budget_.take(pixels);
+    mesh_.textures.push_back({std::move(pixels), u, v});
+    return textures_[{file.data(), u, v}] = int32_t(mesh_.textures.size() - 1);
+}
+
 Status GltfReader::read_texture(const Json& info, const std::string& where, Material& material, TextureView& view)
 {
     SR_TRY(const auto index, file_.integer(info, "index"));
@@ -126,14 +165,7 @@ Status GltfReader::read_texture(const Json& info, const std::string& where, Mate
         return fail(ErrorCode::bad_input, "{}: textures[{}] has no PNG or JPEG image", where, *index);
     SR_TRY(const TextureWrap u, wrap_of(*texture, "wrapS"));
     SR_TRY(const TextureWrap v, wrap_of(*texture, "wrapT"));
-    const auto [entry, is_new] =
-        textures_.try_emplace({*source, int64_t(u), int64_t(v)}, int32_t(mesh_.textures.size()));
-    material.texture = entry->second;
-    if (is_new) {
-        SR_TRY(ImageRgb8 image, file_.image(*source));
-        mesh_.textures.push_back({std::move(image), u, v});
-        SR_CHECK(check_texture_budget(mesh_, where_));
-    }
+    SR_TRY(material.texture, texture_of(*source, u, v));
     const auto extensions = info.find("extensions");
     if (extensions == info.end() || !extensions->is_object() || !extensions->contains("KHR_texture_transform"))
         return {};
@@ -151,12 +183,13 @@ Status GltfReader::read_texture(const Json& info, const std::string& where, Mate
     return {};
 }
 
-Status GltfReader::read_base_color(const Json& pbr, const std::string& where, Material& material, TextureView& view)
+Status GltfReader::read_base_color(const Json& pbr, const char* factor_key, const char* texture_key,
+                                   const std::string& where, Material& material, TextureView& view)
 {
-    SR_TRY(const auto factor, numbers(pbr, "baseColorFactor", 4, where));
+    SR_TRY(const auto factor, numbers(pbr, factor_key, 4, where));
     for (size_t a = 0; a < 3 && !factor.empty(); ++a)
         material.color[a] = float(factor[a]);
-    const auto texture = pbr.find("baseColorTexture");
+    const auto texture = pbr.find(texture_key);
     return texture != pbr.end() && texture->is_object() ? read_texture(*texture, where, material, view) : Status{};
 }
 
@@ -171,7 +204,10 @@ Status GltfReader::read_materials()
         if (const auto name = json->find("name"); name != json->end() && name->is_string())
             material.name = name->get<std::string>();
         if (const auto pbr = json->find("pbrMetallicRoughness"); pbr != json->end() && pbr->is_object())
-            SR_CHECK(read_base_color(*pbr, where, material, view));
+            SR_CHECK(read_base_color(*pbr, "baseColorFactor", "baseColorTexture", where, material, view));
+        // of exporters from before 2.0's end: its colour is the one to take where both are there
+        if (const Json* older = find_object(*json, {"extensions", "KHR_materials_pbrSpecularGlossiness"}))
+            SR_CHECK(read_base_color(*older, "diffuseFactor", "diffuseTexture", where, material, view));
         if (const auto extras = json->find("extras"); extras != json->end() && extras->is_object()) {
             SR_TRY(const auto label, file_.integer(*extras, "label"));
             if (label && (*label < 0 || *label > 254))
@@ -184,6 +220,18 @@ Status GltfReader::read_materials()
     mesh_.materials.emplace_back(); // of primitives without one
     views_.emplace_back();
     return {};
+}
+
+// behind those of the file
+uint32_t GltfReader::untextured(uint32_t material)
+{
+    const auto [entry, is_new] = untextured_.try_emplace(material, uint32_t(mesh_.materials.size()));
+    if (is_new) {
+        Material plain = mesh_.materials[material];
+        plain.texture = -1;
+        mesh_.materials.push_back(std::move(plain));
+    }
+    return entry->second;
 }
 
 Result<std::vector<int64_t>> GltfReader::indices_in(const Json& object, const char* key) const
@@ -257,13 +305,21 @@ Result<Matrix> GltfReader::matrix_of(const Json& node, const std::string& where)
     return m;
 }
 
+// marked when it is put on the list, so that the list has each node once
+Status GltfReader::push_node(int64_t index, const Matrix& parent)
+{
+    SR_CHECK(file_.entry("nodes", index).map([](const Json*) {}));
+    if (visited_[size_t(index)])
+        return fail(ErrorCode::bad_input, "{}: nodes[{}]: is the child of two nodes, or of itself", where_, index);
+    visited_[size_t(index)] = true;
+    pending_.push_back({index, parent});
+    return {};
+}
+
 Status GltfReader::read_node(int64_t index, const Matrix& parent)
 {
     SR_TRY(const Json* node, file_.entry("nodes", index));
     const std::string where = fmt::format("{}: nodes[{}]", where_, index);
-    if (visited_[size_t(index)])
-        return fail(ErrorCode::bad_input, "{}: is the child of two nodes, or of itself", where);
-    visited_[size_t(index)] = true;
     SR_TRY(const Matrix own, matrix_of(*node, where));
     const Matrix matrix = product(parent, own);
     SR_TRY(const auto mesh, file_.integer(*node, "mesh"));
@@ -271,7 +327,7 @@ Status GltfReader::read_node(int64_t index, const Matrix& parent)
         SR_CHECK(read_mesh(*mesh, matrix));
     SR_TRY(const std::vector<int64_t> children, indices_in(*node, "children"));
     for (const int64_t child : children)
-        pending_.push_back({child, matrix});
+        SR_CHECK(push_node(child, matrix));
     return {};
 }
 
@@ -299,8 +355,9 @@ Status GltfReader::read_vertices(const Json& attributes, const Matrix& matrix, c
     if (p.components != 3 || p.component == 5125)
         return fail(ErrorCode::bad_input, "{}: POSITION: expected vectors of three numbers", where);
     const size_t first = mesh_.positions.size();
-    if (first + p.count > kMaxMeshElements / 4)
-        return fail(ErrorCode::bad_input, "{}: more than {} vertices", where, kMaxMeshElements / 4);
+    if (first + p.count > max_elements_)
+        return fail(ErrorCode::bad_input, "{}: {} vertices with those before it, at most {} from files of {} bytes",
+                    where, first + p.count, max_elements_, file_.bytes());
     for (size_t i = 0; i < p.count; ++i) {
         const double v[3] = {p.number(i, 0), p.number(i, 1), p.number(i, 2)};
         std::array<float, 3> to;
@@ -351,9 +408,13 @@ Result<std::vector<uint32_t>> GltfReader::corners_of(const Json& primitive, size
 }
 
 // lists (4), strips (5) and fans (6)
-Status GltfReader::add_faces(const std::vector<uint32_t>& corners, int64_t mode, bool mirrored, uint32_t first)
+Status GltfReader::add_faces(const std::vector<uint32_t>& corners, int64_t mode, bool mirrored, uint32_t first,
+                             std::string_view where)
 {
-    const size_t step = mode == 4 ? 3 : 1;
+    const size_t step = mode == 4 ? 3 : 1, faces = corners.size() < 3 ? 0 : (corners.size() - 3) / step + 1;
+    if (mesh_.faces.size() + faces > max_elements_)
+        return fail(ErrorCode::bad_input, "{}: {} triangles with those before it, at most {} from files of {} bytes",
+                    where, mesh_.faces.size() + faces, max_elements_, file_.bytes());
     for (size_t i = 0; i + 2 < corners.size(); i += step) {
         std::array<uint32_t, 3> f = {corners[mode == 6 ? 0 : i], corners[i + 1], corners[i + 2]};
         if ((mode == 5 && i % 2 == 1) != mirrored)
@@ -362,8 +423,6 @@ Status GltfReader::add_faces(const std::vector<uint32_t>& corners, int64_t mode,
             v += first;
         mesh_.faces.push_back(f);
     }
-    if (mesh_.faces.size() > kMaxMeshElements / 4)
-        return fail(ErrorCode::bad_input, "{}: more than {} triangles", where_, kMaxMeshElements / 4);
     return {};
 }
 
@@ -383,12 +442,12 @@ Status GltfReader::read_primitive(const Json& primitive, const Matrix& matrix, c
     const size_t first = mesh_.positions.size(), first_face = mesh_.faces.size();
     SR_CHECK(read_vertices(*attributes, matrix, where));
     const size_t vertices = mesh_.positions.size() - first;
-    const int64_t material = material_given.value_or(int64_t(mesh_.materials.size()) - 1);
-    if (material < 0 || material >= int64_t(mesh_.materials.size()))
+    const int64_t material = material_given.value_or(int64_t(views_.size()) - 1);
+    if (material < 0 || material >= int64_t(views_.size()))
         return fail(ErrorCode::bad_input, "{}: refers to materials[{}], there are {}", where, material,
-                    mesh_.materials.size() - 1);
+                    views_.size() - 1);
     SR_TRY(const std::vector<uint32_t> corners, corners_of(primitive, vertices, where));
-    SR_CHECK(add_faces(corners, mode, determinant(matrix) < 0, uint32_t(first)));
+    SR_CHECK(add_faces(corners, mode, determinant(matrix) < 0, uint32_t(first), where));
     const TextureView& view = views_[size_t(material)];
     mesh_.face_materials.resize(mesh_.faces.size(), uint32_t(material));
     mesh_.face_labels.resize(mesh_.faces.size(), view.label);
@@ -397,8 +456,13 @@ Status GltfReader::read_primitive(const Json& primitive, const Matrix& matrix, c
     SR_TRY(const auto texcoord, file_.integer(*attributes, fmt::format("TEXCOORD_{}", view.set).c_str()));
     if (mesh_.materials[size_t(material)].texture < 0)
         return {};
-    if (!texcoord)
-        return fail(ErrorCode::bad_input, "{}: has a texture but no TEXCOORD_{}", where, view.set);
+    if (!texcoord) { // the specification leaves it open; viewers show the base colour
+        mesh_.face_materials.resize(first_face);
+        mesh_.face_materials.resize(mesh_.faces.size(), untextured(uint32_t(material)));
+        if (mesh_.warnings.size() < kMaxWarnings)
+            mesh_.warnings.push_back(fmt::format("{}: has a texture but no TEXCOORD_{}", where, view.set));
+        return {};
+    }
     SR_TRY(const GltfAccessor uv, file_.accessor(*texcoord));
     if (uv.components != 2 || uv.count != vertices)
         return fail(ErrorCode::bad_input, "{}: TEXCOORD_{}: expected {} pairs", where, view.set, vertices);
@@ -418,7 +482,7 @@ Result<Mesh> GltfReader::read()
     visited_.resize(nodes);
     SR_TRY(const std::vector<int64_t> first, roots());
     for (auto i = first.rbegin(); i != first.rend(); ++i)
-        pending_.push_back({*i, kOne});
+        SR_CHECK(push_node(*i, kOne));
     while (!pending_.empty()) {
         const Pending next = pending_.back();
         pending_.pop_back();
@@ -437,7 +501,7 @@ Result<Mesh> GltfReader::read()
 
 Result<Mesh> read_gltf(const Path& path)
 {
-    SR_TRY(const GltfFile file, GltfFile::open(path));
+    SR_TRY(GltfFile file, GltfFile::open(path));
     return GltfReader(file).read();
 }
 

@@ -37,6 +37,7 @@ struct Mesh {
     std::vector<uint8_t> face_labels;     // [F] class or kNoLabel, or empty
     std::vector<Material> materials;
     std::vector<Texture> textures;
+    std::vector<std::string> warnings; // a line each: what its file lacks, or has no place here
 };
 
 double face_area(const Mesh& mesh, size_t face); // m^2

@@ -10,16 +10,17 @@ namespace semrover {
 
 // how axes of a file become the world's (x forward, y left, z up)
 enum class UpAxis {
-    file, // as the format says: glTF is y up (-z forward), OBJ and PLY are taken as z up
+    file, // as the format says: glTF is y up (-z forward), the others are taken as z up
     y,    // y up, -z forward
     z,
 };
 
-// .obj (with .mtl), .ply, .glb, .gltf by extension. Untrusted input: sizes are limited before anything is allocated.
-// bad_input names the file and what is wrong: a texture that is missing, indices out of range, numbers that are not
-// finite. Polygons become triangles. A PLY's per-face label, class, class_id, category or scalar_Classification goes
-// through `map`; a GLB's material may say {"label": n} in its extras. Vertex colours of an OBJ or PLY that has textures
-// are dropped. The mesh passes check_mesh.
+// .obj (with .mtl), .ply, .stl, .off, .glb, .gltf by extension. Untrusted input: sizes are limited before anything is
+// allocated. bad_input names the file and what is wrong: a texture that is missing, indices out of range, numbers that
+// are not finite. Polygons become triangles. A PLY's per-face label, class, class_id, category or scalar_Classification
+// goes through `map`; a GLB's material may say {"label": n} in its extras. Vertex colours of an OBJ or PLY that has
+// textures are dropped. What is not needed may be missing (a .mtl), with a line in Mesh::warnings. The mesh passes
+// check_mesh.
 Result<Mesh> read_mesh(const Path& path, UpAxis up = UpAxis::file, const MeshLabelMap& map = {});
 
 // binary glTF 2.0, y up as the format wants it; textures inside as PNG; a face's label goes into its material: name,

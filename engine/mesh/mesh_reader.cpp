@@ -18,7 +18,11 @@ Result<Mesh> read_by_extension(const Path& path, const std::string& extension, c
         return read_ply_mesh(path, map);
     if (extension == ".glb" || extension == ".gltf")
         return read_gltf(path);
-    return fail(ErrorCode::bad_input, "{}: expected a mesh: .obj, .ply, .glb or .gltf", quote_path(path));
+    if (extension == ".stl")
+        return read_stl(path);
+    if (extension == ".off")
+        return read_off(path);
+    return fail(ErrorCode::bad_input, "{}: expected a mesh: .obj, .ply, .stl, .off, .glb or .gltf", quote_path(path));
 }
 
 } // namespace

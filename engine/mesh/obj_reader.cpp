@@ -4,12 +4,14 @@
 #include "engine/mesh/asset_folder.h"
 #include "engine/mesh/mesh_readers.h"
 #include "engine/mesh/polygon.h"
+#include "engine/mesh/word_lines.h"
 #include "engine/scene/srgb.h"
 #include "runtime/base/quote.h"
 
 #include <algorithm>
 #include <charconv>
 #include <map>
+#include <set>
 
 namespace semrover {
 
@@ -17,73 +19,6 @@ namespace {
 
 constexpr uint64_t kMaxObjBytes = 8ull << 30, kMaxMtlBytes = 16u << 20;
 constexpr size_t kMaxMaterials = 1 << 16;
-constexpr size_t kMaxWords = kMaxFaceCorners + 2; // that are kept of a line: one more than the longest face has
-
-// the words of one line after another; a backslash at the end of a line joins it to the next
-class WordLines {
-  public:
-    explicit WordLines(std::string_view text) : text_(text) {}
-
-    bool next()
-    {
-        words.clear();
-        if (at_ >= text_.size())
-            return false;
-        bool joined = true;
-        while (joined && at_ < text_.size()) {
-            const size_t end = std::min(text_.find('\n', at_), text_.size());
-            std::string_view line = text_.substr(at_, end - at_);
-            at_ = end + 1;
-            ++number;
-            if (line.ends_with('\r'))
-                line.remove_suffix(1);
-            joined = line.ends_with('\\');
-            if (joined)
-                line.remove_suffix(1);
-            split(line);
-        }
-        return true;
-    }
-
-    // from word `first` on, as it stands in the line: names may hold spaces
-    std::string_view rest(size_t first) const
-    {
-        if (first >= words.size())
-            return {};
-        const char* begin = words[first].data();
-        return {begin, size_t(end_ - begin)};
-    }
-
-    std::vector<std::string_view> words;
-    size_t number = 0; // of the last line, from 1
-
-  private:
-    void split(std::string_view line)
-    {
-        constexpr std::string_view kBlank = " \t\v\f";
-        for (size_t at = line.find_first_not_of(kBlank); at != std::string_view::npos && line[at] != '#';) {
-            const size_t end = std::min(line.find_first_of(kBlank, at), line.size());
-            if (words.size() < kMaxWords)
-                words.push_back(line.substr(at, end - at));
-            end_ = line.data() + end;
-            at = line.find_first_not_of(kBlank, end);
-        }
-    }
-
-    std::string_view text_;
-    size_t at_ = 0;
-    const char* end_ = nullptr; // of the last word
-};
-
-Result<float> number_of(std::string_view word, std::string_view where, size_t line)
-{
-    const char* begin = word.data() + (word.starts_with('+') ? 1 : 0);
-    double value = 0;
-    const auto [end, error] = std::from_chars(begin, word.data() + word.size(), value);
-    if (error != std::errc() || end != word.data() + word.size())
-        return fail(ErrorCode::bad_input, "{}: line {}: expected a number, found {}", where, line, quote(word, 40));
-    return float(value); // what is not finite as a float is refused with the mesh
-}
 
 class ObjReader {
   public:
@@ -102,6 +37,7 @@ class ObjReader {
     Result<Corner> corner_of(std::string_view word);
     Result<int64_t> index_of(std::string_view word, size_t count, const char* what);
     Status use_material();
+    Status read_texture_coordinate();
     Status read_materials(std::string_view name);
     Status read_material_line(WordLines& lines, const std::string& where, int64_t& current);
     Result<uint32_t> add_material(const std::string& name);
@@ -113,7 +49,9 @@ class ObjReader {
     Mesh mesh_;
     std::vector<std::array<float, 2>> uvs_;
     std::map<std::string, uint32_t> materials_;
+    std::set<Path> material_files_; // each is read once
     int64_t material_ = -1;
+    size_t uv_less_line_ = 0; // the first face that names texture coordinates before there are any
     bool any_material_ = false, any_uv_ = false;
 };
 
@@ -167,7 +105,9 @@ Result<ObjReader::Corner> ObjReader::corner_of(std::string_view word)
     if (slash < word.size()) {
         const std::string_view after = word.substr(slash + 1);
         const std::string_view uv = after.substr(0, after.find('/'));
-        if (!uv.empty()) {
+        if (!uv.empty() && uvs_.empty()) { // exporters write f 1/1/1 whether there are any or not
+            uv_less_line_ = uv_less_line_ ? uv_less_line_ : lines_.number;
+        } else if (!uv.empty()) {
             SR_TRY(corner.uv, index_of(uv, uvs_.size(), "texture coordinate"));
         }
     }
@@ -280,7 +220,16 @@ Status ObjReader::read_material_line(WordLines& lines, const std::string& where,
 
 Status ObjReader::read_materials(std::string_view name)
 {
+    const auto missing = folder_.missing(name);
+    if (missing) { // names of materials are in the OBJ itself; colours and textures are not
+        if (mesh_.warnings.size() < 10)
+            mesh_.warnings.push_back(
+                fmt::format("{}: line {}: {} is missing: its materials are white", where_, lines_.number, quote(name)));
+        return {};
+    }
     SR_TRY(const Path path, folder_.find(name, fmt::format("{}: line {}", where_, lines_.number)));
+    if (!material_files_.insert(path).second)
+        return {};
     const std::string where = quote_path(path);
     SR_TRY(const std::string text, read_text_file(path, kMaxMtlBytes));
     WordLines lines(text);
@@ -291,6 +240,22 @@ Status ObjReader::read_materials(std::string_view name)
     for (Material& m : mesh_.materials)
         if (m.texture >= 0 && m.color == std::array<float, 3>{0, 0, 0})
             m.color = {1, 1, 1}; // exporters leave Kd black beside a texture
+    return {};
+}
+
+Status ObjReader::read_texture_coordinate()
+{
+    if (uv_less_line_)
+        return fail(ErrorCode::bad_input, "{}: line {}: a texture coordinate behind the face of line {} that names it",
+                    where_, lines_.number, uv_less_line_);
+    if (lines_.words.size() < 2 || lines_.words.size() > 4)
+        return fail(ErrorCode::bad_input, "{}: line {}: a texture coordinate of {} numbers, expected 2", where_,
+                    lines_.number, lines_.words.size() - 1);
+    std::array<float, 2> uv{};
+    for (size_t i = 0; i + 1 < std::min<size_t>(lines_.words.size(), 3); ++i) {
+        SR_TRY(uv[i], number_of(lines_.words[i + 1], where_, lines_.number));
+    }
+    uvs_.push_back({uv[0], 1 - uv[1]}); // v runs up in these files
     return {};
 }
 
@@ -308,17 +273,7 @@ Status ObjReader::read_line()
             return fail(ErrorCode::bad_input, "{}: line {}: mtllib without a name", where_, lines_.number);
         return read_materials(lines_.rest(1));
     }
-    if (key != "vt") // normals, groups, lines, points and the like say nothing that is used
-        return {};
-    if (lines_.words.size() < 2 || lines_.words.size() > 4)
-        return fail(ErrorCode::bad_input, "{}: line {}: a texture coordinate of {} numbers, expected 2", where_,
-                    lines_.number, lines_.words.size() - 1);
-    std::array<float, 2> uv{};
-    for (size_t i = 0; i + 1 < std::min<size_t>(lines_.words.size(), 3); ++i) {
-        SR_TRY(uv[i], number_of(lines_.words[i + 1], where_, lines_.number));
-    }
-    uvs_.push_back({uv[0], 1 - uv[1]}); // v runs up in these files
-    return {};
+    return key == "vt" ? read_texture_coordinate() : Status(); // normals, groups, lines and the like are not used
 }
 
 Result<Mesh> ObjReader::read(std::string_view text)
@@ -331,6 +286,9 @@ Result<Mesh> ObjReader::read(std::string_view text)
         mesh_.colors.resize(mesh_.positions.size(), {255, 255, 255});
     if (!mesh_.textures.empty())
         mesh_.colors.clear();
+    if (uv_less_line_)
+        mesh_.warnings.push_back(
+            fmt::format("{}: line {}: faces name texture coordinates, the file has none", where_, uv_less_line_));
     if (!any_uv_)
         mesh_.uvs.clear();
     if (!any_material_)

@@ -85,7 +85,14 @@ Status PlyMesh::read_colors(const PlyElement& vertices)
     return {};
 }
 
-// `comment TextureFile NAME`, one for each number that texnumber can have
+// without blanks around it
+std::string trimmed(const std::string& text)
+{
+    const size_t begin = text.find_first_not_of(" \t"), end = text.find_last_not_of(" \t");
+    return begin == std::string::npos ? "" : text.substr(begin, end + 1 - begin);
+}
+
+// `comment TextureFile NAME`, one for each number that texnumber can have; MeshLab writes blanks around the name
 Status PlyMesh::read_textures()
 {
     constexpr std::string_view kKey = "TextureFile ";
@@ -94,8 +101,7 @@ Status PlyMesh::read_textures()
             continue;
         if (mesh_.materials.size() >= 4096)
             return fail(ErrorCode::bad_input, "{}: more than 4096 textures", where_);
-        const std::string name = comment.substr(kKey.size());
-        SR_TRY(const int32_t texture, folder_.texture(mesh_, name, where_));
+        SR_TRY(const int32_t texture, folder_.texture(mesh_, trimmed(comment.substr(kKey.size())), where_));
         mesh_.materials.push_back({.name = "", .texture = texture});
     }
     return {};

@@ -19,6 +19,7 @@ constexpr double kStep = 1 << 20;         // steps of a cell that positions are 
 constexpr double kMaxCell = 1 << 20;      // as in grids
 constexpr double kMaxCells = 1 << 28;     // of the whole surface
 constexpr int kEdge = int(kSurfaceBlock); // cells
+constexpr size_t kMaxPieces = 1 << 20;    // of all faces, 152 bytes each
 
 using Vector = std::array<double, 3>;
 
@@ -164,9 +165,11 @@ void SurfaceBlocks::add_instances(uint32_t item, const Corners& c, uint64_t orde
                 instances_.push_back({block_key(b), order, item});
 }
 
-// halves along the longest edge until a piece is at most a block wide
+// halves along the longest edge until a piece is at most a block wide; stops where there are too many
 void SurfaceBlocks::split(const Corners& whole, const Piece& piece, uint64_t order)
 {
+    if (pieces_.size() > kMaxPieces)
+        return;
     if (extent_of(piece.corners) <= kEdge) {
         if (area_of(piece.corners[0], piece.corners[1], piece.corners[2]) > 0) {
             pieces_.push_back(piece);
@@ -216,8 +219,14 @@ Result<SurfaceBlocks> SurfaceBlocks::create(const Mesh& mesh, std::span<const ui
               labels.size(), mesh.faces.size());
     SurfaceBlocks blocks(mesh, labels, voxel_size);
     SR_CHECK(blocks.check_extent(where));
-    for (uint32_t f = 0; f < mesh.faces.size(); ++f)
+    for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
         blocks.add_face(f);
+        if (blocks.pieces_.size() > kMaxPieces)
+            return fail(ErrorCode::bad_input,
+                        "{}: face {} of {:.4g} m^2 and those before it are cut into more than {} pieces of {} cells; "
+                        "take a larger voxel size",
+                        where, f, face_area(mesh, f), kMaxPieces, kEdge);
+    }
     std::ranges::sort(blocks.instances_, [&](const Instance& a, const Instance& b) {
         if (a.block != b.block || a.order != b.order)
             return std::tie(a.block, a.order) < std::tie(b.block, b.order);

@@ -38,8 +38,9 @@ struct SurfaceLimits { // of a portion
 
 class SurfaceBlocks {
   public:
-    // labels [F]: a class or kNoSurfaceLabel. bad_input, with `where` in front, for vertices beyond 2^20 cells and for
-    // a surface of more than 2^28 cells. The mesh outlives this.
+    // labels [F]: a class or kNoSurfaceLabel. bad_input, with `where` in front, for vertices beyond 2^20 cells, a
+    // surface of more than 2^28 cells, and large faces that make more than 2^20 pieces of a block. The mesh outlives
+    // this.
     static Result<SurfaceBlocks> create(const Mesh& mesh, std::span<const uint8_t> labels, float voxel_size,
                                         std::string_view where);
 

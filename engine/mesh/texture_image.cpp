@@ -50,8 +50,8 @@ struct StbFree {
 
 class StbFile {
   public:
-    StbFile(std::vector<std::byte> file, std::string where)
-        : bytes_(std::move(file)), size_(bytes_.size()), where_(std::move(where))
+    StbFile(std::vector<std::byte> file, std::string where, uint64_t max_pixels)
+        : bytes_(std::move(file)), size_(bytes_.size()), where_(std::move(where)), max_pixels_(max_pixels)
     {
         bytes_.resize(size_ + kPadding, std::byte(kFiller));
         rewind();
@@ -73,6 +73,7 @@ class StbFile {
     std::vector<std::byte> bytes_;
     size_t size_; // of the file
     std::string where_;
+    uint64_t max_pixels_;
     stbi__context context_;
     int width_ = 0, height_ = 0, channels_ = 0; // as stb_image reports them
 };
@@ -95,7 +96,9 @@ Result<ImageSize> StbFile::size_as(const StbFormat& format)
         return fail(ErrorCode::bad_input, "{}: {} x {} pixels cannot come from {} bytes; the file is cut", where_,
                     width, height, size_);
     rewind();
-    return ImageSize{uint32_t(width), uint32_t(height)};
+    const ImageSize size{uint32_t(width), uint32_t(height)};
+    SR_CHECK(check_pixels(size, max_pixels_, where_));
+    return size;
 }
 
 Status StbFile::check_end(const void* pixels, const StbFormat& format) const
@@ -192,22 +195,30 @@ bool is_named_tga(const Path& path)
     return extension == ".tga";
 }
 
+Result<ImageRgb8> decode(std::vector<std::byte> file, const std::string& where, bool named_tga, TextureBudget& budget)
+{
+    const uint64_t max_pixels = budget.pixels_left(file.size());
+    const std::string_view text(reinterpret_cast<const char*>(file.data()), file.size());
+    if (text.starts_with("\x89PNG") || text.starts_with("\xff\xd8\xff"))
+        return decode_image_rgb8(file, where, max_pixels);
+    if (text.starts_with("BM"))
+        return StbFile(std::move(file), where, max_pixels).bmp();
+    if (text.starts_with("#?RADIANCE\n") || text.starts_with("#?RGBE\n"))
+        return StbFile(std::move(file), where, max_pixels).hdr();
+    if (named_tga)
+        return StbFile(std::move(file), where, max_pixels).tga();
+    return fail(ErrorCode::bad_input, "{}: expected a PNG, JPEG, BMP, HDR or TGA image, found something else", where);
+}
+
 } // namespace
 
-Result<ImageRgb8> read_texture_rgb8(const Path& path)
+Result<ImageRgb8> read_texture_rgb8(const Path& path, TextureBudget& budget)
 {
     const std::string where = quote_path(path);
     SR_TRY(std::vector<std::byte> file, read_file(path, kMaxTextureBytes));
-    const std::string_view text(reinterpret_cast<const char*>(file.data()), file.size());
-    if (text.starts_with("\x89PNG") || text.starts_with("\xff\xd8\xff"))
-        return decode_image_rgb8(file, where);
-    if (text.starts_with("BM"))
-        return StbFile(std::move(file), where).bmp();
-    if (text.starts_with("#?RADIANCE\n") || text.starts_with("#?RGBE\n"))
-        return StbFile(std::move(file), where).hdr();
-    if (is_named_tga(path))
-        return StbFile(std::move(file), where).tga();
-    return fail(ErrorCode::bad_input, "{}: expected a PNG, JPEG, BMP, HDR or TGA image, found something else", where);
+    SR_TRY(ImageRgb8 image, decode(std::move(file), where, is_named_tga(path), budget));
+    budget.take(image);
+    return image;
 }
 
 } // namespace semrover

@@ -4,12 +4,30 @@
 
 #include "engine/format/image.h"
 
+#include <algorithm>
+
 namespace semrover {
+
+// What the textures of a mesh may have together, so that files of a few bytes do not fill memory: 2^26 pixels, and 32
+// more for each byte of their files (a JPEG of a photograph has 1 to 16); 2^30 at most.
+class TextureBudget {
+  public:
+    // of the next image, whose file has so many bytes
+    uint64_t pixels_left(uint64_t file_bytes)
+    {
+        bytes_ += file_bytes;
+        return std::min(uint64_t(1) << 30, (uint64_t(1) << 26) + 32 * bytes_) - pixels_;
+    }
+    void take(const ImageRgb8& image) { pixels_ += uint64_t(image.width) * image.height; }
+
+  private:
+    uint64_t bytes_ = 0, pixels_ = 0;
+};
 
 // Reads an image file of a mesh's texture: PNG, JPEG, BMP or Radiance HDR, told by its first bytes, or TGA, which has
 // no such bytes and is told by its name. Alpha is dropped. HDR holds linear light: it is clamped to 0..1 and becomes
 // sRGB. Untrusted input: at most 1 GiB and kMaxImageSide, nothing is allocated that the file is too short to fill, and
-// a file that is cut is refused.
-Result<ImageRgb8> read_texture_rgb8(const Path& path);
+// a file that is cut is refused, like one that exceeds the budget.
+Result<ImageRgb8> read_texture_rgb8(const Path& path, TextureBudget& budget);
 
 } // namespace semrover

@@ -272,7 +272,7 @@ Result<VoxelizedMesh> Voxelizer::run(std::span<const uint8_t> labels)
     SR_CHECK(constants_.allocate(device_, "linear light"));
     SR_CHECK(light_.write(device_, linear));
     const SurfaceLimits limits = this->limits();
-    SR_TRY(SurfaceBlocks blocks, SurfaceBlocks::create(mesh_, labels, options_.voxel_size, "the mesh"));
+    SR_TRY(SurfaceBlocks blocks, SurfaceBlocks::create(mesh_, labels, options_.voxel_size, options_.name));
     const auto n = uint64_t(options_.points_per_voxel);
     const uint64_t batch = std::max<uint64_t>(1, limits.pairs / 2 / n); // cells
     while (true) {
@@ -283,16 +283,16 @@ Result<VoxelizedMesh> Voxelizer::run(std::span<const uint8_t> labels)
         SR_CHECK(measure(memory));
         SR_TRY(const std::vector<CellRow> cells, keep_cells(*chunk, memory));
         if (out_.grid.cells.size() * n > kMaxSamples)
-            return fail(ErrorCode::bad_input, "the mesh fills more than {} cells of {} points; take a larger voxel",
-                        kMaxSamples / n, n);
+            return fail(ErrorCode::bad_input, "{}: fills more than {} cells of {} points; take a larger voxel size",
+                        options_.name, kMaxSamples / n, n);
         for (size_t first = 0; first < cells.size(); first += batch)
             SR_CHECK(sample(memory, std::span(cells).subspan(first, std::min(batch, cells.size() - first))));
     }
     if (unlabelled_ > 0)
         return no_label(unlabelled_, "pixels of label textures");
     if (out_.grid.cells.empty())
-        return fail(ErrorCode::bad_input, "the mesh has no surface: {:.4g} m^2 in {} faces, at least {:.4g} in a cell",
-                    blocks.area(), mesh_.faces.size(),
+        return fail(ErrorCode::bad_input, "{}: has no surface: {:.4g} m^2 in {} faces, at least {:.4g} in a cell",
+                    options_.name, blocks.area(), mesh_.faces.size(),
                     double(options_.min_area) * options_.voxel_size * options_.voxel_size);
     return finish();
 }
@@ -302,7 +302,7 @@ Result<VoxelizedMesh> Voxelizer::run(std::span<const uint8_t> labels)
 Result<VoxelizedMesh> voxelize(Device& device, const Mesh& mesh, const VoxelizeOptions& options)
 {
     SR_CHECK(check_options(options));
-    SR_CHECK(check_mesh(mesh, "the mesh"));
+    SR_CHECK(check_mesh(mesh, options.name));
     SR_TRY(const std::vector<uint8_t> labels, labels_of_faces(mesh, options.default_label));
     SR_TRY(TextureAtlas atlas, TextureAtlas::create(device, mesh, options.default_label));
     return Voxelizer(device, mesh, options, std::move(atlas)).run(labels);

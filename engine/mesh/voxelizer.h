@@ -19,6 +19,7 @@ struct VoxelizeOptions {
     PointPlacement placement = PointPlacement::shifted;
     uint64_t seed = 0;                // of the shifts
     uint8_t default_label = kNoLabel; // of faces without one; kNoLabel: such faces are bad_input, with their area
+    std::string name = "the mesh";    // in errors
     uint64_t max_pairs = 0; // triangles in cells that are on the device at once; 0: as many as suit it. No result
                             // depends on it
 };

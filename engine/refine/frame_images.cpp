@@ -54,6 +54,13 @@ std::vector<uint8_t> visible_pixels(const FramePixels& pixels)
     return shifted<uint8_t>(pixels.seen, 24);
 }
 
+void clear_hidden_depth(FramePixels& pixels)
+{
+    for (size_t i = 0; i < pixels.ranges.size(); ++i)
+        if (pixels.seen[i] >> 24 == 0)
+            pixels.ranges[i] &= 0xffff0000u;
+}
+
 Status write_frame_images(const Path& folder, uint32_t number, const FramePixels& pixels)
 {
     const std::string name = fmt::format("{:06}.png", number);

@@ -21,6 +21,8 @@ std::vector<uint8_t> normal_pixels(const FramePixels& pixels);  // [height, widt
 std::vector<uint8_t> label_pixels(const FramePixels& pixels);   // [height, width]
 std::vector<uint8_t> visible_pixels(const FramePixels& pixels); // [height, width]
 
+void clear_hidden_depth(FramePixels& pixels); // 0 where a pixel is not visible
+
 // FOLDER/{color,depth,normal,label,visible}/NNNNNN.png; folders are made. Errors: bad_input
 Status write_frame_images(const Path& folder, uint32_t number, const FramePixels& pixels);
 

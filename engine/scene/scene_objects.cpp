@@ -147,7 +147,7 @@ Result<std::vector<SceneObject>> parse_objects(const Json& json, std::string_vie
 
 Result<std::vector<SceneObject>> read_objects(const Path& path)
 {
-    SR_TRY(const Json json, read_json(path, {.bytes = 256u << 20, .values = 32u << 20}));
+    SR_TRY(const Json json, read_json(path, {.bytes = 256u << 20, .values = 32u << 20, .containers = 4u << 20}));
     return parse_objects(json, quote_path(path));
 }
 

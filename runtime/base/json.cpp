@@ -61,6 +61,8 @@ class ValueBuilder : public JsonEvents {
     {
         if (open_.size() >= limits_.depth)
             return refuse(fmt::format("nested deeper than {}", limits_.depth));
+        if (++containers_ > limits_.containers)
+            return refuse(fmt::format("more than {} arrays and objects", limits_.containers));
         Json* placed = place(std::move(value));
         if (placed)
             open_.push_back(placed); // stays valid: the parent grows only after this one is closed
@@ -76,7 +78,7 @@ class ValueBuilder : public JsonEvents {
     const JsonLimits& limits_;
     std::vector<Json*> open_;
     std::string key_;
-    uint64_t values_ = 0;
+    uint64_t values_ = 0, containers_ = 0;
 };
 
 // gives the values of an array to a function one by one

@@ -38,7 +38,8 @@ Status parse_json_events(std::string_view text, std::string_view where, JsonEven
 struct JsonLimits {
     uint64_t bytes = 16u << 20;
     uint32_t depth = 32;
-    uint32_t values = 2u << 20; // arrays, objects, strings, numbers, ... together
+    uint32_t values = 2u << 20;      // arrays, objects, strings, numbers, ... together
+    uint32_t containers = 256 << 10; // arrays and objects, which take 64 bytes or more where the text has two
 };
 
 // Parses a document into a value. bad_input as above, and for duplicate keys at any level and numbers beyond double.

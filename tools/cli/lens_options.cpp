@@ -50,8 +50,14 @@ Status put_distortion(const LensOptions& o, Intrinsics& k)
 
 void add_lens_options(CLI::App& c, LensOptions& o)
 {
-    add_number(c, "-W,--width", o.width, "pixels", 1u, 16384u);
-    add_number(c, "-H,--height", o.height, "pixels", 1u, 16384u);
+    const auto set = [&o](uint32_t& to) {
+        return [&o, &to](uint32_t pixels) {
+            to = pixels;
+            o.size_given = true;
+        };
+    };
+    add_number_function<uint32_t>(c, "-W,--width", set(o.width), "pixels", {1, 16384});
+    add_number_function<uint32_t>(c, "-H,--height", set(o.height), "pixels", {1, 16384});
     add_number(c, "--fov-x", o.fov, "horizontal field of view in degrees, where the path has no intrinsics", 1.0,
                360.0);
     add_choice(c, "--camera-model", {"pinhole", "opencv", "fisheye", "equirectangular"},

@@ -70,6 +70,9 @@ Result<Mesh> load_mesh(const VoxelizeArguments& o, const Globals& globals)
     }
     const UpAxis up = o.up == "y" ? UpAxis::y : o.up == "z" ? UpAxis::z : UpAxis::file;
     SR_TRY(Mesh mesh, read_mesh(o.mesh, up, map));
+    for (const std::string& warning : mesh.warnings)
+        if (!globals.quiet)
+            print_stderr("semrover: warning: {}\n", warning);
     for (auto& p : mesh.positions)
         for (float& x : p)
             x = float(x * o.scale);
@@ -122,6 +125,7 @@ Status run_voxelize(VoxelizeArguments o, const Globals& globals)
         SR_TRY(o.voxelize.default_label, class_option("--default-label", o.default_label));
     }
     SR_TRY(const Mesh mesh, load_mesh(o, globals));
+    o.voxelize.name = quote_path(o.mesh);
     SR_TRY(const auto device, open_device(globals));
     SR_TRY(VoxelizedMesh v, voxelize(*device, mesh, o.voxelize));
     v.grid.metadata["frame"] = "x forward, y left, z up, metres";
@@ -141,7 +145,7 @@ void add_voxelize(CLI::App& app, const Globals& globals, Run& run)
 {
     auto o = std::make_shared<VoxelizeArguments>();
     CLI::App* c = app.add_subcommand("voxelize", "a textured mesh as a grid of labelled cells and coloured points");
-    c->add_option("MESH", o->mesh, ".obj, .ply, .glb or .gltf")->required();
+    c->add_option("MESH", o->mesh, ".obj, .ply, .stl, .off, .glb or .gltf")->required();
     c->add_option("-o,--output", o->output, ".sgrid")->required();
     add_number(*c, "--voxel-size", o->voxelize.voxel_size, "metres (0.6)", 0.001, 1000.0);
     add_number(*c, "--points", o->voxelize.points_per_voxel, "of a cell (20)", 1, 4096);

@@ -1,0 +1,183 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// OFF in text, with colours of vertices (COFF) or of faces. Source: the Geomview manual, "OFF: Object File Format",
+// http://www.geomview.org/docs/html/OFF.html
+#include "engine/mesh/mesh_readers.h"
+#include "engine/mesh/polygon.h"
+#include "engine/mesh/word_lines.h"
+#include "engine/scene/srgb.h"
+#include "runtime/base/file.h"
+
+#include <map>
+
+namespace semrover {
+
+namespace {
+
+constexpr size_t kMaxFaceColors = 1 << 16;
+
+class OffReader {
+  public:
+    OffReader(std::string_view text, std::string where) : lines_(text), where_(std::move(where)) {}
+
+    Result<Mesh> read();
+
+  private:
+    template <typename... Args>
+    tl::unexpected<Error> refuse(fmt::format_string<Args...> format, Args&&... args) const
+    {
+        return fail(ErrorCode::bad_input, "{}: line {}: {}", where_, lines_.number,
+                    fmt::format(format, std::forward<Args>(args)...));
+    }
+    Status next_line(std::string_view expected);
+    Status read_kind();
+    Result<size_t> count_at(size_t word, size_t most);
+    Result<std::array<uint8_t, 3>> color_at(size_t word);
+    Status read_vertex();
+    Status read_face();
+    Result<uint32_t> material_of(size_t word);
+
+    WordLines lines_;
+    std::string where_;
+    Mesh mesh_;
+    size_t normals_ = 0; // words of a vertex behind its place
+    bool colors_ = false, any_material_ = false;
+    std::map<std::array<uint8_t, 3>, uint32_t> materials_;
+};
+
+// that has words
+Status OffReader::next_line(std::string_view expected)
+{
+    while (lines_.next())
+        if (!lines_.words.empty())
+            return {};
+    return fail(ErrorCode::bad_input, "{}: ends where {} is expected; the file is cut", where_, expected);
+}
+
+// [C][N]OFF; the counts may follow on the same line
+Status OffReader::read_kind()
+{
+    SR_CHECK(next_line("OFF"));
+    const std::string_view kind = lines_.words[0];
+    if (kind != "OFF" && kind != "COFF" && kind != "NOFF" && kind != "CNOFF")
+        return refuse("expected OFF, COFF, NOFF or CNOFF, found {}", quote(kind, 40));
+    colors_ = kind.starts_with('C');
+    normals_ = kind.find('N') != std::string_view::npos ? 3 : 0;
+    lines_.words.erase(lines_.words.begin());
+    if (!lines_.words.empty() && lines_.words[0] == "BINARY")
+        return refuse("binary OFF is not supported");
+    return lines_.words.empty() ? next_line("the numbers of vertices and faces") : Status();
+}
+
+Result<size_t> OffReader::count_at(size_t word, size_t most)
+{
+    size_t value = 0;
+    const std::string_view text = word < lines_.words.size() ? lines_.words[word] : "";
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (text.empty() || error != std::errc() || end != text.data() + text.size() || value > most)
+        return refuse("expected a number up to {}, found {}", most, quote(text, 40));
+    return value;
+}
+
+// whole numbers up to 255, or fractions, which have a point
+Result<std::array<uint8_t, 3>> OffReader::color_at(size_t word)
+{
+    std::array<uint8_t, 3> color{};
+    for (size_t a = 0; a < 3; ++a) {
+        const std::string_view text = lines_.words[word + a];
+        SR_TRY(const float value, number_of(text, where_, lines_.number));
+        const float scaled = text.find('.') == std::string_view::npos ? value : value * 255;
+        if (!(scaled >= 0 && scaled <= 255.5f))
+            return refuse("the colour {}, expected 0 to 255, or 0.0 to 1.0", value);
+        color[a] = uint8_t(std::min(255l, std::lround(scaled)));
+    }
+    return color;
+}
+
+Status OffReader::read_vertex()
+{
+    SR_CHECK(next_line("a vertex"));
+    const size_t expected = 3 + normals_ + (colors_ ? 3 : 0);
+    if (lines_.words.size() < expected)
+        return refuse("a vertex of {} numbers, expected {}", lines_.words.size(), expected);
+    std::array<float, 3> p{};
+    for (size_t a = 0; a < 3; ++a) {
+        SR_TRY(p[a], number_of(lines_.words[a], where_, lines_.number));
+    }
+    mesh_.positions.push_back(p);
+    if (colors_) {
+        SR_TRY(mesh_.colors.emplace_back(), color_at(3 + normals_));
+    }
+    return {};
+}
+
+// of a face's colour, its first word; one number alone is a place in a map that the file does not have
+Result<uint32_t> OffReader::material_of(size_t word)
+{
+    std::array<uint8_t, 3> color = {255, 255, 255};
+    if (lines_.words.size() >= word + 3) {
+        SR_TRY(color, color_at(word));
+        any_material_ = true;
+    }
+    const auto [entry, is_new] = materials_.try_emplace(color, uint32_t(mesh_.materials.size()));
+    if (!is_new)
+        return entry->second;
+    if (mesh_.materials.size() >= kMaxFaceColors)
+        return refuse("more than {} colours of faces", kMaxFaceColors);
+    mesh_.materials.emplace_back();
+    for (size_t a = 0; a < 3; ++a)
+        mesh_.materials.back().color[a] = float(linear_of_srgb(color[a] / 255.0));
+    return entry->second;
+}
+
+Status OffReader::read_face()
+{
+    SR_CHECK(next_line("a face"));
+    SR_TRY(const size_t corners, count_at(0, kMaxFaceCorners));
+    if (corners < 3 || lines_.words.size() < corners + 1)
+        return refuse("a face of {} corners with {} numbers behind it", corners, lines_.words.size() - 1);
+    std::vector<uint32_t> indices;
+    std::vector<std::array<float, 3>> positions;
+    for (size_t i = 1; i <= corners; ++i) {
+        SR_TRY(const size_t vertex, count_at(i, mesh_.positions.size() - 1));
+        indices.push_back(uint32_t(vertex));
+        positions.push_back(mesh_.positions[vertex]);
+    }
+    SR_TRY(const uint32_t material, material_of(corners + 1));
+    for (const auto& t : triangulated(positions)) {
+        mesh_.faces.push_back({indices[t[0]], indices[t[1]], indices[t[2]]});
+        mesh_.face_materials.push_back(material);
+    }
+    if (mesh_.faces.size() > kMaxMeshElements)
+        return refuse("more than {} triangles", kMaxMeshElements);
+    return {};
+}
+
+Result<Mesh> OffReader::read()
+{
+    SR_CHECK(read_kind());
+    SR_TRY(const size_t vertices, count_at(0, kMaxMeshElements));
+    SR_TRY(const size_t faces, count_at(1, kMaxMeshElements));
+    if (vertices == 0)
+        return refuse("no vertices");
+    for (size_t i = 0; i < vertices; ++i) // nothing is reserved: lines that are there fill memory
+        SR_CHECK(read_vertex());
+    for (size_t i = 0; i < faces; ++i)
+        SR_CHECK(read_face());
+    if (!any_material_) {
+        mesh_.materials.clear();
+        mesh_.face_materials.clear();
+    }
+    return std::move(mesh_);
+}
+
+} // namespace
+
+Result<Mesh> read_off(const Path& path)
+{
+    SR_TRY(const MappedFile file, MappedFile::open(path));
+    return OffReader({reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size()}, quote_path(path))
+        .read();
+}
+
+} // namespace semrover
