@@ -72,8 +72,9 @@ void add_generation_options(CLI::App& c, GenerationArguments& a)
     add_number(c, "--cfg-scale", o.cfg_scale, "guidance towards the labels; 1: none", 0, 1000);
     add_number(c, "--cfg-from", o.cfg_from, "timestep below which steps are not guided, which halves their cost", 0,
                10000);
-    c.add_option("--sampler", o.sampler, "ddpm, ddim or dpm++2m");
-    c.add_option("--preset", o.preset, "fast (20 steps), standard (50, RePaint 5/2), paper (250, RePaint 10/10, DDPM)");
+    add_choice(c, "--sampler", {"ddpm", "ddim", "dpm++2m"}, "of the noise schedule", o.sampler);
+    add_choice(c, "--preset", {"fast", "standard", "paper"},
+               "fast (20 steps), standard (50, RePaint 5/2), paper (250, RePaint 10/10, DDPM)", o.preset);
     add_number(c, "--jump-length", o.jump_length, "RePaint: steps of a jump back", 0, 10000);
     add_number(c, "--jump-n-sample", o.jump_n_sample, "RePaint: passes over each jump", 1, 10000);
     add_choice(c, "--known-tokens", {"noised", "clean"},

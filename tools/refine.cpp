@@ -140,8 +140,10 @@ void add_options(CLI::App& c, RefineArguments& a)
         "of a frame: fresh, or warped, as it was on the surfaces of the frame before (wants --path)",
         [&o](const std::string& text) { o.frame_noise = text == "warped" ? FrameNoise::warped : FrameNoise::fresh; });
     add_precision_option(c, o.precision);
-    c.add_option("--frames", o.frames, "FIRST:LAST, both included, either may be left out; FIRST is a first frame");
-    c.add_option("--from", o.from, "output of an earlier run: FIRST goes on from its latents of the frames before");
+    CLI::Option* frames =
+        c.add_option("--frames", o.frames, "FIRST:LAST, both included, either may be left out; FIRST is a first frame");
+    c.add_option("--from", o.from, "output of an earlier run: FIRST goes on from its latents of the frames before")
+        ->needs(frames);
     add_choice(c, "--format", {"png", "jpeg"}, "of the frames",
                [&o](const std::string& text) { o.format.jpeg = text == "jpeg"; });
     add_number(c, "--quality", o.format.quality, "of JPEG frames", 1, 100);

@@ -85,7 +85,9 @@ Status run_neighbour(const Command& command, char** argv)
     std::error_code error;
     Path program = std::filesystem::read_symlink("/proc/self/exe", error);
     program.replace_filename(command.program);
-    block_signals();
+    block_signals(); // what comes from here on reaches that program; what came before would be forgotten
+    if (interrupt_requested())
+        return fail(ErrorCode::interrupted, "interrupted");
     execv(program.c_str(), argv);
     return fail(
         ErrorCode::bad_input,
