@@ -1,0 +1,182 @@
+# SPDX-FileCopyrightText: semrover authors
+# SPDX-License-Identifier: Apache-2.0
+"""What other programs make of our files, and we of theirs. A program that is not installed skips its tests by name.
+
+Programs: colmap and python3-skimage of Debian (tools/setup --programs); of npm, gltf-validator and
+@playcanvas/splat-transform in the folder NODE_MODULES.
+"""
+import json
+import math
+import os
+import shutil
+import struct
+import subprocess
+import tempfile
+import unittest
+from pathlib import Path
+
+SEMROVER = os.environ.get("SEMROVER", "semrover")
+SCENES = Path(__file__).resolve().parents[2] / "assets" / "scenes"
+MODULES = Path(os.environ.get("NODE_MODULES", "node_modules"))
+
+VALIDATE = """
+const fs = require('fs'), validator = require(process.argv[1]);
+validator.validateBytes(new Uint8Array(fs.readFileSync(process.argv[2])), {maxIssues: 100})
+    .then(report => console.log(JSON.stringify(report.issues)));
+"""
+
+
+def run(*arguments):
+    result = subprocess.run([str(a) for a in arguments], capture_output=True, text=True, timeout=600)
+    if result.returncode != 0:
+        raise AssertionError(f"{arguments[0]} {arguments[1]}: exit code {result.returncode}: {result.stderr[-2000:]}")
+    return result.stdout
+
+
+def needs_module(name):
+    return unittest.skipUnless(shutil.which("node") and (MODULES / name).is_dir(),
+                               f"no {name} in {MODULES}: NODE_MODULES says where npm put it")
+
+
+def needs_program(name):
+    return unittest.skipUnless(shutil.which(name), f"{name} is not installed")
+
+
+def skimage_metrics():
+    try:
+        from skimage import metrics
+        return metrics
+    except ImportError:
+        return None
+
+
+class Case(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = Path(folder.name)
+
+
+def splat(position, scale=(0.5, 0.1, 1e-4), color=(200, 100, 50, 255), rotation=(255, 128, 128, 128)):
+    return struct.pack("<6f8B", *position, *scale, *color, *rotation)
+
+
+class Gltf(Case):
+    def issues(self, path):
+        report = run("node", "-e", VALIDATE, (MODULES / "gltf-validator").resolve(), path)
+        # errors and warnings, but for attributes of an extension that the validator does not know yet
+        return [m for m in json.loads(report)["messages"] if m["severity"] < 2 and not
+                (m["code"] == "MESH_PRIMITIVE_INVALID_ATTRIBUTE" and "/KHR_gaussian_splatting:" in m["pointer"])]
+
+    @needs_module("gltf-validator")
+    def test_splats(self):
+        source = self.folder / "a.splat"
+        source.write_bytes(splat((1, 2, 3)) + splat((-4, 5, 0.5), rotation=(200, 160, 100, 90)))
+        run(SEMROVER, "convert", "-q", source, self.folder / "a.glb")
+        self.assertEqual(self.issues(self.folder / "a.glb"), [])
+
+    @needs_module("gltf-validator")
+    def test_mesh_of_a_street(self):
+        run(SEMROVER, "streets", "-q", "--no-grids", "--length", 40, "--spacing", 100, "-o", self.folder / "street")
+        self.assertEqual(self.issues(self.folder / "street" / "mesh.glb"), [])
+
+    @needs_module("gltf-validator")
+    def test_mesh_of_depth_images(self):
+        path = self.folder / "two.tum"
+        path.write_text("0 1 0 1.7 -0.5 0.5 -0.5 0.5\n1 2 0 1.7 -0.5 0.5 -0.5 0.5\n")
+        frames = self.folder / "frames"
+        run(SEMROVER, "render", "-q", SCENES / "street.truth.sgrid", "--path", path, "-W", 96, "-H", 64,
+            "--splat-radius", "auto", "-o", frames)
+        run(SEMROVER, "fuse", "-q", frames, "--poses", path, "--fov-x", 73, "-o", self.folder / "fused")
+        self.assertEqual(self.issues(self.folder / "fused" / "mesh.glb"), [])
+
+
+class Viewers(Case):
+    @needs_module("@playcanvas/splat-transform")
+    def test_up_y_is_what_a_glb_shows(self):
+        # a splat 10 m ahead, one 5 m to the left of it and one 2 m above it
+        source = self.folder / "a.splat"
+        source.write_bytes(b"".join(splat(p) for p in [(10, 0, 0), (10, 5, 0), (10, 0, 2)]))
+        for name, extension in [("a.ply", []), ("b.splat", [])]:
+            written, shown = self.folder / name, self.folder / (name + ".glb")
+            run(SEMROVER, "convert", "-q", source, written, "--up", "y", *extension)
+            run("node", MODULES / "@playcanvas" / "splat-transform" / "bin" / "cli.mjs", "-q", "-w", written, shown)
+            # glTF: x right, y up, z back
+            for found, expected in zip(gltf_positions(shown), [(0, 0, -10), (-5, 0, -10), (0, 2, -10)]):
+                for a, b in zip(found, expected):
+                    self.assertAlmostEqual(a, b, places=4)
+            # and as our own reader has it
+            run(SEMROVER, "convert", "-q", shown, self.folder / (name + ".back.splat"))
+            back = (self.folder / (name + ".back.splat")).read_bytes()
+            places = [struct.unpack_from("<3f", back, 32 * i) for i in range(3)]
+            for found, expected in zip(places, [(10, 0, 0), (10, 5, 0), (10, 0, 2)]):
+                for a, b in zip(found, expected):
+                    self.assertAlmostEqual(a, b, places=4)
+
+
+def gltf_positions(path):
+    data = path.read_bytes()
+    size = struct.unpack_from("<I", data, 12)[0]
+    document, binary = json.loads(data[20:20 + size]), 20 + size + 8
+    accessor = document["accessors"][document["meshes"][0]["primitives"][0]["attributes"]["POSITION"]]
+    view = document["bufferViews"][accessor["bufferView"]]
+    start = binary + view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
+    stride = view.get("byteStride", 12)
+    places = [struct.unpack_from("<3f", data, start + i * stride) for i in range(accessor["count"])]
+    root = document["nodes"][document["scenes"][0]["nodes"][0]]
+    if "matrix" in root or "rotation" in root or "scale" in root or "translation" in root:
+        raise AssertionError(f"a node that is turned: {root}")
+    return places
+
+
+class Colmap(Case):
+    @needs_program("colmap")
+    def test_it_reads_our_text_and_we_read_its_binary_model(self):
+        for model, more in [("pinhole", []), ("opencv", ["--distortion=-0.1,0.02,0.001,0.002"]),
+                            ("fisheye", ["--distortion=0.05,0.01,0,0", "--fov-x", "150"])]:
+            ours, binary, text = (self.folder / f"{model}.{kind}" for kind in ("text", "binary", "back"))
+            run(SEMROVER, "convert", "-q", SCENES / "street.tum", ours, "--path-format", "colmap", "-W", 640, "-H", 480,
+                "--camera-model", model, *more)
+            binary.mkdir()
+            run("colmap", "model_converter", "--input_path", ours, "--output_path", binary, "--output_type", "BIN")
+            self.assertFalse((binary / "cameras.txt").exists())
+            for source, name in [(ours, "a"), (binary, "b")]:
+                run(SEMROVER, "convert", "-q", source, self.folder / f"{model}.{name}.json")
+            a, b = (json.loads((self.folder / f"{model}.{name}.json").read_text()) for name in "ab")
+            self.assertEqual(len(b["frames"]), 24)
+            for key in a:
+                if key != "frames":
+                    self.assertAlmostEqual(a[key], b[key], places=9) if isinstance(a[key], float) else \
+                        self.assertEqual(a[key], b[key])
+            for one, other in zip(a["frames"], b["frames"]):
+                for row, expected in zip(other["transform_matrix"], one["transform_matrix"]):
+                    for x, y in zip(row, expected):
+                        self.assertAlmostEqual(x, y, places=9)
+
+
+class Skimage(Case):
+    @unittest.skipUnless(skimage_metrics(), "skimage is not installed")
+    def test_psnr_and_ssim_are_the_same(self):
+        import numpy as np
+        from PIL import Image
+        random = np.random.default_rng(3)
+        a = np.clip(random.normal(128, 40, (57, 83, 3)), 0, 255).astype(np.uint8)
+        for name, spread in [("near", 3), ("far", 60)]:
+            b = np.clip(a + random.normal(0, spread, a.shape), 0, 255).astype(np.uint8)
+            for folder, image in [("frames", a), ("truth", b)]:
+                (self.folder / name / folder).mkdir(parents=True)
+                Image.fromarray(image).save(self.folder / name / folder / "000000.png")
+            ours = json.loads(run(SEMROVER, "eval", "frames", self.folder / name / "frames",
+                                  self.folder / name / "truth", "--json"))
+            metrics = skimage_metrics()
+            luma = [image.astype(np.float64) @ [0.299, 0.587, 0.114] for image in (a, b)]
+            ssim = metrics.structural_similarity(*luma, win_size=11, gaussian_weights=True, sigma=1.5,
+                                                 use_sample_covariance=False, data_range=255)
+            psnr = metrics.peak_signal_noise_ratio(b, a, data_range=255)
+            self.assertAlmostEqual(ours["psnr"], psnr, places=6)
+            self.assertAlmostEqual(ours["ssim"], ssim, places=6)
+            self.assertTrue(math.isfinite(psnr))
+
+
+if __name__ == "__main__":
+    unittest.main()
