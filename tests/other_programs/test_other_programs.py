@@ -64,7 +64,9 @@ def splat(position, scale=(0.5, 0.1, 1e-4), color=(200, 100, 50, 255), rotation=
 class Gltf(Case):
     def issues(self, path):
         report = run("node", "-e", VALIDATE, (MODULES / "gltf-validator").resolve(), path)
-        return [m for m in json.loads(report)["messages"] if m["severity"] < 2]  # errors and warnings
+        # errors and warnings, but for attributes of an extension that the validator does not know yet
+        return [m for m in json.loads(report)["messages"] if m["severity"] < 2 and not
+                (m["code"] == "MESH_PRIMITIVE_INVALID_ATTRIBUTE" and "/KHR_gaussian_splatting:" in m["pointer"])]
 
     @needs_module("gltf-validator")
     def test_splats(self):
