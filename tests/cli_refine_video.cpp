@@ -237,12 +237,12 @@ TEST_F(CliRefineVideo, what_cannot_be_is_refused_in_a_line)
         EXPECT_EQ(std::ranges::count(r.err, '\n'), 1) << r.err;
         EXPECT_EQ(folder_.entries(), entries) << more;
     };
-    refuses("--window 65", 2, "a window of 65 frames, expected 1 to 64");
+    refuses("--window 65", 2, "--window: expected an integer from 1 to 64");
     refuses("--window 3 --window-overlap 3", 2, "windows of 3 frames cannot overlap by 3");
-    refuses("--decode-frames 0", 2, "no frame is decoded at a time");
+    refuses("--decode-frames 0", 2, "--decode-frames: expected an integer from 1 to 64");
     refuses("--previous-noise 0.3", 2, "puts no noise on the frame before");
     refuses("--sampler ddim", 3, "timestep_type is \"continuous\", which the euler sampler alone gives");
-    refuses("--cfg-first=-1", 2, "guidance scale -1 is not in 0..1000");
+    refuses("--cfg-first=-1", 2, "--cfg-first: expected a number from 0 to 1000");
     put_renderer_model(folder_ / "frames_model");
     const ProgramResult frames =
         semrover_program("refine " + path("in") + " -m " + path("frames_model") + " -o " + path("out") + " --window 4");

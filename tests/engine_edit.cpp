@@ -393,7 +393,7 @@ TEST(engine_edit, a_script_says_what_the_command_line_says)
     Json again = Json::array();
     for (const EditOperation& operation : *o)
         again.push_back(operation_json(operation));
-    const auto reread = parse_edit_script(again, "", "again");
+    const auto reread = parse_edit_script(again, folder.path(), "again");
     ASSERT_TRUE(reread) << reread.error().message;
     for (size_t i = 0; i < o->size(); ++i)
         EXPECT_EQ(operation_json((*reread)[i]), again[i]);

@@ -102,7 +102,7 @@ TEST(graph_slice, cuts_a_fused_gemm_in_every_operand_that_has_rows)
     expect_bands(plan, "GateRow", rows, 4, limits);
     for (const Pass& pass : plan.passes) {
         EXPECT_EQ(binding(pass, "W").offset, 0u);
-        EXPECT_EQ(pass.group_count[0], divide_up(pushed(pass, "rows"), 64));
+        EXPECT_EQ(pass.group_count[0], divide_up(pushed(pass, "rows"), *pass.tile_rows));
     }
 }
 
