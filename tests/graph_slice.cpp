@@ -96,7 +96,7 @@ TEST(graph_slice, cuts_a_fused_gemm_in_every_operand_that_has_rows)
     limits.max_storage_range = 1 << 16;
     const Plan plan = planned(g, limits);
     EXPECT_EQ(plan.fused, 2u);
-    EXPECT_EQ(plan.passes.size(), 4u); // 256 rows each, whole tiles of 64
+    EXPECT_EQ(plan.passes.size(), 4u); // 256 rows each, whole tiles
     for (const char* name : {"X", "Residual", "Y"})
         expect_bands(plan, name, rows, 256, limits);
     expect_bands(plan, "GateRow", rows, 4, limits);
@@ -112,9 +112,9 @@ TEST(graph_slice, takes_rows_that_fit_even_where_a_tile_of_them_does_not)
     const Tensor x = fake_external(g, 200, 1024), w = fake_external(g, 8, 1024);
     (void)gemm(g, x, w, {}, {.dtype = DType::f32});
     DeviceLimits limits = test_limits();
-    limits.max_storage_range = 40 * 1024 * 4; // less than one tile of 64 rows
+    limits.max_storage_range = 24 * 1024 * 4; // less than one tile of 32 rows
     const Plan plan = planned(g, limits);
-    EXPECT_EQ(plan.passes.size(), 5u);
+    EXPECT_EQ(plan.passes.size(), 9u);
     expect_bands(plan, "X", 200, 4096, limits);
     expect_bands(plan, "Y", 200, 32, limits);
 }
