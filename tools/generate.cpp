@@ -49,8 +49,6 @@ Status generate_along(const GenerateArguments& o, const Globals& globals)
         [&](Device& d, const JobCallbacks& c) { return estimate_growth(d, std::move(plan), c); });
 }
 
-constexpr double kOrderTile = 9.6; // metres; 16 cells of the usual size
-
 Status generate(const GenerateArguments& o, const Globals& globals)
 {
     if (o.output.empty() && !o.generation.dry_run)
@@ -64,7 +62,7 @@ Status generate(const GenerateArguments& o, const Globals& globals)
         SR_CHECK(check_generation_outputs(request));
     GenerationOptions options = o.generation.options;
     if (o.order == "tiles")
-        options.tile_size = o.tile_size.value_or(kOrderTile);
+        options.tile_size = o.tile_size.value_or(kUsualTileSize);
     SR_TRY(request.settings, resolve_generation(options));
     SR_TRY(request.objects, given_objects(o.objects));
     SR_TRY(VoxelGrid grid, load_grid(o.grid, o.input, globals));

@@ -3,17 +3,12 @@
 #pragma once
 
 #include "engine/capi/call.h"
-#include "engine/scene/grid.h"
-
-#include <map>
-#include <optional>
+#include "engine/scene/label_edits.h"
 
 namespace semrover::capi {
 
-using CellEdits = std::map<Cell, std::optional<uint8_t>>;
-
 // what a caller sets, the last of equal cells; none: SR_NO_CELL. name: of the call.
 // Errors: usage; bad_input for coordinates and labels
-Result<CellEdits> edits_of(const sr_cell* cells, uint64_t count, const char* name);
+Result<LabelEdits> edits_of(const sr_cell* cells, uint64_t count, const char* name);
 
 } // namespace semrover::capi

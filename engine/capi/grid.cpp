@@ -13,11 +13,11 @@ using namespace semrover::capi;
 
 namespace semrover::capi {
 
-Result<CellEdits> edits_of(const sr_cell* cells, uint64_t count, const char* name)
+Result<LabelEdits> edits_of(const sr_cell* cells, uint64_t count, const char* name)
 {
     if (count && !cells)
         return fail(ErrorCode::usage, "{}: cells is NULL", name);
-    CellEdits edits;
+    LabelEdits edits;
     for (uint64_t n = 0; n < count; ++n) {
         const sr_cell& c = cells[n];
         for (const int32_t coordinate : {c.i, c.j, c.k})
@@ -38,33 +38,6 @@ Result<CellEdits> edits_of(const sr_cell* cells, uint64_t count, const char* nam
 } // namespace semrover::capi
 
 namespace {
-
-VoxelGrid edited(const VoxelGrid& grid, const CellEdits& edits)
-{
-    VoxelGrid out;
-    out.voxel_size = grid.voxel_size;
-    out.points_per_voxel = grid.points_per_voxel;
-    out.metadata = grid.metadata;
-    for (size_t c = 0; c < grid.cells.size(); ++c) {
-        const auto edit = edits.find(grid.cells[c]);
-        if (edit == edits.end() || edit->second == grid.labels[c])
-            append_cell(out, grid, c);
-    }
-    const size_t width = grid.has_points() ? size_t(grid.points_per_voxel) * 3 : 0;
-    for (const auto& [cell, label] : edits) {
-        const auto there = find_cell(grid, cell);
-        if (!label || (there && grid.labels[*there] == *label))
-            continue;
-        out.cells.push_back(cell);
-        out.labels.push_back(*label);
-        out.points.insert(out.points.end(), width, 0);
-        out.colors.insert(out.colors.end(), width, 0);
-        if (width)
-            out.generated.push_back(0);
-    }
-    sort_cells(out);
-    return out;
-}
 
 // numbers of the cells that a caller asks for
 Result<std::pair<size_t, size_t>> range_of(const sr_grid* grid, uint64_t first, uint64_t count, const void* to,
@@ -154,8 +127,8 @@ sr_status sr_grid_set_cells(sr_grid* grid, const sr_cell* cells, uint64_t count)
     return guarded(nullptr, [&]() -> Status {
         if (!grid)
             return fail(ErrorCode::usage, "sr_grid_set_cells: grid is NULL");
-        SR_TRY(const CellEdits edits, edits_of(cells, count, "sr_grid_set_cells"));
-        grid->grid = edited(grid->grid, edits);
+        SR_TRY(const LabelEdits edits, edits_of(cells, count, "sr_grid_set_cells"));
+        grid->grid = with_edits(grid->grid, edits);
         return {};
     });
 }

@@ -11,8 +11,6 @@ using namespace semrover::capi;
 
 namespace {
 
-constexpr double kUsualTile = 9.6; // metres: that of `generate --order tiles`
-
 Result<GenerationSettings> settings_of(const sr_world_desc& d)
 {
     if (!d.model)
@@ -23,7 +21,7 @@ Result<GenerationSettings> settings_of(const sr_world_desc& d)
     o.model = d.model;
     if (d.steps)
         o.steps = int(d.steps);
-    o.tile_size = d.tile_size == 0 ? kUsualTile : d.tile_size;
+    o.tile_size = d.tile_size == 0 ? kUsualTileSize : d.tile_size;
     if (!(o.tile_size > 0))
         return fail(ErrorCode::usage, "sr_world_desc: a tile_size of {} m", d.tile_size);
     return resolve_generation(o);
@@ -180,7 +178,7 @@ sr_status sr_world_step(sr_world* world, uint64_t budget_us, uint32_t* done)
 sr_status sr_world_edit(sr_world* world, const sr_cell* cells, uint64_t count)
 {
     return with_world(world, "sr_world_edit", [&]() -> Status {
-        SR_TRY(const CellEdits edits, edits_of(cells, count, "sr_world_edit"));
+        SR_TRY(const LabelEdits edits, edits_of(cells, count, "sr_world_edit"));
         return world->world->edit(edits);
     });
 }

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <Eigen/Cholesky>
 #include <numbers>
 
 namespace semrover {
@@ -38,32 +39,6 @@ const ColmapModel kModels[] = {
     {17, "EQUIRECTANGULAR", CameraModel::equirectangular, 0, {}},
 };
 
-// x of A x = b by elimination with pivots; A is symmetric and positive
-template <size_t N>
-std::array<double, N> solved(std::array<std::array<double, N>, N> a, std::array<double, N> b)
-{
-    for (size_t i = 0; i < N; ++i) {
-        size_t pivot = i;
-        for (size_t row = i + 1; row < N; ++row)
-            if (std::abs(a[row][i]) > std::abs(a[pivot][i]))
-                pivot = row;
-        std::swap(a[i], a[pivot]);
-        std::swap(b[i], b[pivot]);
-        for (size_t row = i + 1; row < N; ++row) {
-            const double factor = a[row][i] / a[i][i];
-            for (size_t col = i; col < N; ++col)
-                a[row][col] -= factor * a[i][col];
-            b[row] -= factor * b[i];
-        }
-    }
-    for (size_t i = N; i-- > 0;) {
-        for (size_t col = i + 1; col < N; ++col)
-            b[i] -= a[i][col] * b[col];
-        b[i] /= a[i][i];
-    }
-    return b;
-}
-
 // Devernay and Faugeras 2001: the image's radius at an angle from the axis, in focal lengths
 double fov_radius(double angle, double omega)
 {
@@ -90,31 +65,30 @@ double farthest_corner(const Intrinsics& k)
 Status fit_fov(Intrinsics& k, double omega, std::string_view where)
 {
     constexpr int kSteps = 400;
-    constexpr size_t kTerms = 5;
+    constexpr int kTerms = 5;
     const double corner = farthest_corner(k);
     if (!(omega > 1e-6 && omega < std::numbers::pi) || corner * omega >= std::numbers::pi / 2)
         return fail(ErrorCode::bad_input, "{}: a FOV lens of omega {:.4g} that does not see the image's corners", where,
                     omega);
     const double largest = fov_angle(corner, omega);
-    std::array<std::array<double, kTerms>, kTerms> a{};
-    std::array<double, kTerms> b{};
+    using Terms = Eigen::Matrix<double, kTerms, 1>;
+    Eigen::Matrix<double, kTerms, kTerms> a = decltype(a)::Zero();
+    Terms b = Terms::Zero();
     for (int i = 0; i < kSteps; ++i) { // Chebyshev's points: the error is the same all over
         const double t = std::sin(std::numbers::pi / 2 * (i + 0.5) / kSteps);
-        std::array<double, kTerms> powers{t};
-        for (size_t n = 1; n < kTerms; ++n)
+        Terms powers;
+        powers[0] = t;
+        for (int n = 1; n < kTerms; ++n)
             powers[n] = powers[n - 1] * t * t;
-        for (size_t row = 0; row < kTerms; ++row) {
-            b[row] += powers[row] * fov_radius(t * largest, omega);
-            for (size_t col = 0; col < kTerms; ++col)
-                a[row][col] += powers[row] * powers[col];
-        }
+        b += powers * fov_radius(t * largest, omega);
+        a += powers * powers.transpose();
     }
-    const std::array<double, kTerms> c = solved(a, b);
+    const Terms c = a.ldlt().solve(b);
     double worst = 0;
     for (int i = 1; i <= kSteps; ++i) {
         const double t = double(i) / kSteps;
         double radius = 0;
-        for (size_t n = kTerms; n-- > 0;)
+        for (int n = kTerms; n-- > 0;)
             radius = radius * t * t + c[n];
         worst = std::max(worst, std::abs(radius * t - fov_radius(t * largest, omega)));
     }
@@ -128,8 +102,8 @@ Status fit_fov(Intrinsics& k, double omega, std::string_view where)
     const double focal = c[0] / largest;
     k.fx *= focal;
     k.fy *= focal;
-    for (size_t n = 1; n < kTerms; ++n)
-        k.distortion[n - 1] = c[n] / c[0] / std::pow(largest, 2.0 * double(n));
+    for (int n = 1; n < kTerms; ++n)
+        k.distortion[size_t(n) - 1] = c[n] / c[0] / std::pow(largest, 2.0 * n);
     return {};
 }
 

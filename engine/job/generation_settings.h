@@ -14,6 +14,8 @@
 
 namespace semrover {
 
+constexpr double kUsualTileSize = 9.6; // metres: 16 cells of the usual size
+
 // How a grid is filled with points, as far as the caller says so; what is missing comes from the preset, then from the
 // model.
 struct GenerationOptions {

@@ -95,8 +95,7 @@ Status StreamedWorld::open()
     const GenerationSettings& s = request_.settings;
     if (!s.regions.tile_cells)
         return fail(ErrorCode::usage, "a world is generated in the order of tiles: its settings need a tile size");
-    if (s.regions.strategy == RegionStrategy::paper || s.regions.tile_cells < s.regions.halo_cells)
-        return extract_tile_regions(std::vector<Cell>(1), s.regions).map([](const auto&) {});
+    SR_CHECK(check_tile_options(s.regions));
     if (std::abs(labels_->voxel_size() - voxel_size()) > 1e-4f * voxel_size())
         return fail(ErrorCode::bad_input, "the labels have cells of {} m, the model was trained on {} m",
                     labels_->voxel_size(), voxel_size());

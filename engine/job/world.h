@@ -7,6 +7,7 @@
 #include "engine/job/told_objects.h"
 #include "engine/job/world_labels.h"
 #include "engine/job/world_order.h"
+#include "engine/scene/label_edits.h"
 #include "engine/splat/splat_pool.h"
 
 namespace semrover {
@@ -54,7 +55,7 @@ class World {
 
     // Sets labels, or takes cells away. Their tiles and those that see them are generated anew; what was finished of
     // them is gone at once. Errors: bad_input for cells beyond 2^20 and unknown labels; nothing is changed then
-    virtual Status edit(const std::map<Cell, std::optional<uint8_t>>& edits) = 0;
+    virtual Status edit(const LabelEdits& edits) = 0;
 
     // cells of a finished tile that is in memory, or null: sorted, each with points. Valid until the next call.
     virtual const VoxelGrid* tile(const TileIndex& tile) const = 0;

@@ -13,17 +13,6 @@ namespace {
 
 constexpr size_t kTilesKept = 9; // of a folder: a place and what is around it
 
-void add_labels(VoxelGrid& to, const VoxelGrid& from, const CellWindow& window)
-{
-    const auto begin = std::ranges::lower_bound(from.cells, Cell{window.low[0], INT32_MIN, INT32_MIN});
-    for (size_t c = size_t(begin - from.cells.begin()); c < from.cells.size() && from.cells[c][0] <= window.high[0];
-         ++c)
-        if (window.holds(from.cells[c])) {
-            to.cells.push_back(from.cells[c]);
-            to.labels.push_back(from.labels[c]);
-        }
-}
-
 VoxelGrid empty_grid(float voxel_size)
 {
     VoxelGrid grid;
@@ -39,7 +28,7 @@ class GridLabels : public WorldLabels {
     Result<VoxelGrid> read(const CellWindow& window) override
     {
         VoxelGrid out = empty_grid(grid_.voxel_size);
-        add_labels(out, grid_, window);
+        append_labels(out, grid_, window);
         return out;
     }
 
@@ -55,14 +44,10 @@ class FolderLabels : public WorldLabels {
     Result<VoxelGrid> read(const CellWindow& window) override
     {
         VoxelGrid out = empty_grid(folder_.voxel_size());
-        const TileIndex low = tile_of({window.low[0], window.low[1], 0}, folder_.tile_cells());
-        const TileIndex high = tile_of({window.high[0], window.high[1], 0}, folder_.tile_cells());
-        for (int32_t x = low[0]; x <= high[0]; ++x)
-            for (int32_t y = low[1]; y <= high[1]; ++y)
-                if (folder_.tiles().contains({x, y})) {
-                    SR_TRY(const VoxelGrid* tile, tile_at({x, y}));
-                    add_labels(out, *tile, window);
-                }
+        for (const TileIndex& index : folder_.tiles_in(window)) {
+            SR_TRY(const VoxelGrid* tile, tile_at(index));
+            append_labels(out, *tile, window);
+        }
         sort_cells(out);
         return out;
     }

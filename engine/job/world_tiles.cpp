@@ -15,28 +15,6 @@ namespace {
 
 constexpr size_t kFilesWaiting = 16; // for the disk
 
-// labels over labels; both are sorted
-VoxelGrid edited(const VoxelGrid& labels, const LabelEdits& edits)
-{
-    VoxelGrid out;
-    out.voxel_size = labels.voxel_size;
-    const auto add = [&out](const Cell& cell, uint8_t label) {
-        out.cells.push_back(cell);
-        out.labels.push_back(label);
-    };
-    auto edit = edits.begin();
-    for (size_t c = 0; c <= labels.cells.size(); ++c) {
-        for (; edit != edits.end() && (c == labels.cells.size() || edit->first < labels.cells[c]); ++edit)
-            if (edit->second)
-                add(edit->first, *edit->second);
-        if (c == labels.cells.size())
-            break;
-        if (edit == edits.end() || edit->first != labels.cells[c])
-            add(labels.cells[c], labels.labels[c]);
-    }
-    return out;
-}
-
 } // namespace
 
 uint64_t WorldTile::bytes() const
@@ -69,7 +47,7 @@ Result<WorldTile*> WorldTiles::bring(const TileIndex& tile)
         return &there->second;
     SR_TRY(const VoxelGrid labels, labels_.read(tile_window(tile, edge())));
     const auto edits = edits_.find(tile);
-    WorldTile made{.cells = edits == edits_.end() ? labels : edited(labels, edits->second)};
+    WorldTile made{.cells = edits == edits_.end() ? labels : with_edits(labels, edits->second)};
     made.finished = made.cells.cells.empty();
     return &tiles_.emplace(tile, std::move(made)).first->second;
 }

@@ -5,6 +5,7 @@
 #include "engine/job/file_queue.h"
 #include "engine/job/generation_settings.h"
 #include "engine/job/world_objects.h"
+#include "engine/scene/label_edits.h"
 #include "engine/voxfield/tile_regions.h"
 
 #include <set>
@@ -19,9 +20,6 @@ struct WorldTile {
 
     uint64_t bytes() const; // on the host
 };
-
-// a label that a host has set; none: the cell is not there
-using LabelEdits = std::map<Cell, std::optional<uint8_t>>;
 
 // The tiles of a world that are in memory, and their cache folder: CACHE/tile_X_Y.sgrid, with a key in its metadata
 // that names all that its points depend on. A file with another key is generated anew.

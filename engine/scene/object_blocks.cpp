@@ -15,20 +15,6 @@ namespace {
 
 constexpr double kBlockMetres = 38.4;
 
-VoxelGrid labels_in(const VoxelGrid& grid, const CellWindow& window)
-{
-    VoxelGrid part;
-    part.voxel_size = grid.voxel_size;
-    const auto begin = std::ranges::lower_bound(grid.cells, Cell{window.low[0], INT32_MIN, INT32_MIN});
-    for (size_t c = size_t(begin - grid.cells.begin()); c < grid.cells.size() && grid.cells[c][0] <= window.high[0];
-         ++c)
-        if (window.holds(grid.cells[c])) {
-            part.cells.push_back(grid.cells[c]);
-            part.labels.push_back(grid.labels[c]);
-        }
-    return part;
-}
-
 } // namespace
 
 int32_t object_block_cells(float voxel_size)
@@ -38,9 +24,7 @@ int32_t object_block_cells(float voxel_size)
 
 CellWindow labels_of_block(const TileIndex& block, int32_t edge)
 {
-    const int32_t margin = edge / 2;
-    return {{block[0] * edge - margin, block[1] * edge - margin},
-            {(block[0] + 1) * edge - 1 + margin, (block[1] + 1) * edge - 1 + margin}};
+    return tile_window(block, edge, edge / 2);
 }
 
 std::vector<TileIndex> blocks_that_reach(const CellWindow& window, int32_t edge)
@@ -58,7 +42,9 @@ Result<std::vector<SceneObject>> guess_block(const VoxelGrid& labels, const Tile
                                              uint64_t seed)
 {
     const int32_t edge = object_block_cells(labels.voxel_size);
-    const VoxelGrid around = labels_in(labels, labels_of_block(block, edge));
+    VoxelGrid around;
+    around.voxel_size = labels.voxel_size;
+    append_labels(around, labels, labels_of_block(block, edge));
     std::vector<SceneObject> kept;
     if (around.cells.empty())
         return kept;

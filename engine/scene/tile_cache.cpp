@@ -45,16 +45,7 @@ std::vector<TileIndex> TileSource::all_tiles() const
 
 std::vector<TileIndex> TileSource::tiles_in(const CellWindow& window) const
 {
-    const TileIndex low = tile_of({window.low[0], window.low[1], 0}, tile_cells_);
-    const TileIndex high = tile_of({window.high[0], window.high[1], 0}, tile_cells_);
-    std::vector<TileIndex> tiles;
-    const auto collect = [&](const auto& map) {
-        for (auto entry = map.lower_bound(low); entry != map.end() && entry->first[0] <= high[0]; ++entry)
-            if (entry->first[1] >= low[1] && entry->first[1] <= high[1])
-                tiles.push_back(entry->first);
-    };
-    folder_ ? collect(folder_->tiles()) : collect(grids_);
-    return tiles;
+    return folder_ ? folder_->tiles_in(window) : semrover::tiles_in(grids_, window, tile_cells_);
 }
 
 Result<VoxelGrid> TileSource::read(const TileIndex& tile) const

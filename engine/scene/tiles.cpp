@@ -142,6 +142,11 @@ uint64_t TileFolder::cell_count() const
     return count;
 }
 
+std::vector<TileIndex> TileFolder::tiles_in(const CellWindow& window) const
+{
+    return semrover::tiles_in(tiles_, window, tile_cells_);
+}
+
 Result<VoxelGrid> TileFolder::read(const TileIndex& tile) const
 {
     const auto entry = tiles_.find(tile);
@@ -171,14 +176,7 @@ Result<VoxelGrid> TileFolder::read(const CellWindow& window) const
     out.voxel_size = voxel_size_;
     out.points_per_voxel = points_per_voxel_;
     out.metadata = metadata_;
-    const TileIndex low = tile_of({window.low[0], window.low[1], 0}, tile_cells_);
-    const TileIndex high = tile_of({window.high[0], window.high[1], 0}, tile_cells_);
-    for (auto entry = tiles_.lower_bound({low[0], INT32_MIN}); entry != tiles_.end(); ++entry) {
-        const TileIndex& tile = entry->first;
-        if (tile[0] > high[0])
-            break;
-        if (tile[1] < low[1] || tile[1] > high[1])
-            continue;
+    for (const TileIndex& tile : tiles_in(window)) {
         SR_TRY(const VoxelGrid part, read(tile));
         append_cells(out, part);
     }
@@ -206,6 +204,23 @@ Result<VoxelGrid> TileFolder::read_all() const
     sort_cells(out);
     SR_CHECK(check_grid(out, quote_path(path_)));
     return out;
+}
+
+CellWindow tile_window(const TileIndex& tile, int32_t edge, int32_t halo)
+{
+    return {{tile[0] * edge - halo, tile[1] * edge - halo},
+            {(tile[0] + 1) * edge - 1 + halo, (tile[1] + 1) * edge - 1 + halo}};
+}
+
+void append_labels(VoxelGrid& to, const VoxelGrid& from, const CellWindow& window)
+{
+    const auto begin = std::ranges::lower_bound(from.cells, Cell{window.low[0], INT32_MIN, INT32_MIN});
+    for (size_t c = size_t(begin - from.cells.begin()); c < from.cells.size() && from.cells[c][0] <= window.high[0];
+         ++c)
+        if (window.holds(from.cells[c])) {
+            to.cells.push_back(from.cells[c]);
+            to.labels.push_back(from.labels[c]);
+        }
 }
 
 void append_cells(VoxelGrid& grid, const VoxelGrid& part)

@@ -30,6 +30,25 @@ struct CellWindow {
     }
 };
 
+// the cells of a tile and those up to `halo` cells from it, along i and j
+CellWindow tile_window(const TileIndex& tile, int32_t tile_cells, int32_t halo = 0);
+
+// adds the cells of `from`, which is sorted, that a window holds, with their labels only
+void append_labels(VoxelGrid& to, const VoxelGrid& from, const CellWindow& window);
+
+// the tiles of a map by index that a window touches, in order
+template <typename T>
+std::vector<TileIndex> tiles_in(const std::map<TileIndex, T>& tiles, const CellWindow& window, int32_t tile_cells)
+{
+    const TileIndex low = tile_of({window.low[0], window.low[1], 0}, tile_cells);
+    const TileIndex high = tile_of({window.high[0], window.high[1], 0}, tile_cells);
+    std::vector<TileIndex> found;
+    for (auto entry = tiles.lower_bound(low); entry != tiles.end() && entry->first[0] <= high[0]; ++entry)
+        if (entry->first[1] >= low[1] && entry->first[1] <= high[1])
+            found.push_back(entry->first);
+    return found;
+}
+
 class TileFolder {
   public:
     // reads and checks index.json, and that each tile is there; tiles are read when they are asked for. Errors:
@@ -45,6 +64,7 @@ class TileFolder {
     const std::map<std::string, std::string>& metadata() const { return metadata_; }
     const std::map<TileIndex, uint64_t>& tiles() const { return tiles_; } // and their number of cells
     uint64_t cell_count() const;
+    std::vector<TileIndex> tiles_in(const CellWindow& window) const; // in order
 
     // one tile, checked against the index
     Result<VoxelGrid> read(const TileIndex& tile) const;

@@ -99,12 +99,6 @@ int tile_colour(const TileIndex& tile)
     return (tile[0] & 1) + (tile[1] & 1);
 }
 
-CellWindow tile_window(const TileIndex& tile, int32_t edge, int32_t halo)
-{
-    return {{tile[0] * edge - halo, tile[1] * edge - halo},
-            {(tile[0] + 1) * edge - 1 + halo, (tile[1] + 1) * edge - 1 + halo}};
-}
-
 std::vector<TileIndex> tiles_that_see(const TileIndex& tile)
 {
     std::vector<TileIndex> tiles = neighbors(tile);
@@ -120,16 +114,22 @@ std::vector<TileIndex> tiles_seen_by(const TileIndex& tile)
     return tiles;
 }
 
-Result<Regions> extract_tile_regions(std::span<const Cell> cells, const RegionOptions& options,
-                                     std::span<const uint8_t> known)
+Status check_tile_options(const RegionOptions& options)
 {
-    SR_ASSERT(known.empty() || known.size() == cells.size(), "{} flags for {} cells", known.size(), cells.size());
-    SR_ASSERT(std::ranges::is_sorted(cells), "cells of tiles are in order");
     if (options.strategy == RegionStrategy::paper)
         return fail(ErrorCode::usage, "strategy paper leaves cells empty: the order of tiles takes rim or complete");
     if (options.tile_cells < std::max(options.halo_cells, 1))
         return fail(ErrorCode::usage, "a tile of {} cells is narrower than its halo of {} cells", options.tile_cells,
                     options.halo_cells);
+    return {};
+}
+
+Result<Regions> extract_tile_regions(std::span<const Cell> cells, const RegionOptions& options,
+                                     std::span<const uint8_t> known)
+{
+    SR_ASSERT(known.empty() || known.size() == cells.size(), "{} flags for {} cells", known.size(), cells.size());
+    SR_ASSERT(std::ranges::is_sorted(cells), "cells of tiles are in order");
+    SR_CHECK(check_tile_options(options));
     if (cells.empty())
         return fail(ErrorCode::bad_input, "the cloud has no cells");
     return TileCover(cells, options, known).run();

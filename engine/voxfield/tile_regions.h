@@ -16,8 +16,8 @@ constexpr int kTileColours = 3;
 // how many of the two indices are odd: tiles of one colour touch at corners at most, and never see each other
 int tile_colour(const TileIndex& tile);
 
-// the cells of a tile and those up to `halo` cells from it, along i and j
-CellWindow tile_window(const TileIndex& tile, int32_t tile_cells, int32_t halo = 0);
+// usage for strategy paper, and for tiles that are narrower than the halo
+Status check_tile_options(const RegionOptions& options);
 
 // Tiles that see `tile`: those of higher colours among its eight neighbours. What changes in a tile changes their
 // points, too, and nobody else's.
@@ -29,7 +29,7 @@ std::vector<TileIndex> tiles_seen_by(const TileIndex& tile);
 // Covers each tile with regions of its own (extract_regions), colour after colour: from its lowest cell or, where cells
 // within the halo are known, from those. Those are the cells that `known` says, and those of tiles of lower colours.
 // cells [n]: sorted. options: with tile_cells and halo_cells.
-// Errors: as extract_regions; usage for strategy paper and for tiles that are narrower than the halo
+// Errors: as extract_regions and check_tile_options
 Result<Regions> extract_tile_regions(std::span<const Cell> cells, const RegionOptions& options,
                                      std::span<const uint8_t> known = {});
 

@@ -93,6 +93,19 @@ void fit_tile(Pass& pass)
     pass.set_push(protocol::kColLanesMember, best);
 }
 
+// of a pass whose workgroups make square tiles
+uint64_t workgroups(const Pass& pass, uint32_t tile)
+{
+    return uint64_t(divide_up(pass.grid.x, tile)) * divide_up(pass.grid.y, tile) * std::max(pass.grid.z, 1u);
+}
+
+void set_tile(Pass& pass, uint32_t tile)
+{
+    pass.tile_rows = pass.tile_cols = tile;
+    set_constant(pass, protocol::kTileRows, tile);
+    set_constant(pass, protocol::kTileCols, tile);
+}
+
 // Shape and threads of cooperative matrices. The larger tile where it still makes enough workgroups for a large GPU,
 // and where a lane holds no more than 128 sums: every tile gives the same bits.
 void fit_matrices(Pass& pass, const DeviceLimits& limits)
@@ -107,27 +120,17 @@ void fit_matrices(Pass& pass, const DeviceLimits& limits)
     set_constant(pass, protocol::kThreads, 4 * shape.subgroup);
     if (pass.tile_rows != kLarge || pass.tile_cols != kLarge)
         return;
-    const uint64_t groups =
-        uint64_t(divide_up(pass.grid.x, kLarge)) * divide_up(pass.grid.y, kLarge) * std::max(pass.grid.z, 1u);
-    const bool large = groups >= kEnoughGroups && kLarge * kLarge / 4 / shape.subgroup <= kMostSums;
-    const uint32_t tile = large ? kLarge : kSmall;
-    pass.tile_rows = pass.tile_cols = tile;
-    set_constant(pass, protocol::kTileRows, tile);
-    set_constant(pass, protocol::kTileCols, tile);
+    const bool large = workgroups(pass, kLarge) >= kEnoughGroups && kLarge * kLarge / 4 / shape.subgroup <= kMostSums;
+    set_tile(pass, large ? kLarge : kSmall);
 }
 
 // A tile of 64 x 64 becomes one of 32 x 32 where that is what gives a large GPU's units work: both give the same bits.
 void fit_small_tile(Pass& pass)
 {
     constexpr uint32_t kLarge = 64, kSmall = 32, kEnoughGroups = 128;
-    if (pass.variant->name != "simt" || pass.tile_rows != kLarge || pass.tile_cols != kLarge)
-        return;
-    if (uint64_t(divide_up(pass.grid.x, kLarge)) * divide_up(pass.grid.y, kLarge) * std::max(pass.grid.z, 1u) >=
-        kEnoughGroups)
-        return;
-    pass.tile_rows = pass.tile_cols = kSmall;
-    set_constant(pass, protocol::kTileRows, kSmall);
-    set_constant(pass, protocol::kTileCols, kSmall);
+    if (pass.variant->name == "simt" && pass.tile_rows == kLarge && pass.tile_cols == kLarge &&
+        workgroups(pass, kLarge) < kEnoughGroups)
+        set_tile(pass, kSmall);
 }
 
 Status bind(Pass& pass)

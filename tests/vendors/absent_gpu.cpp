@@ -10,10 +10,8 @@
 // SPIR-V, constants, seconds, the compiler's statistics), and one for each device when it goes: what was recorded, and
 // of each pipeline the dispatches and the workgroups of the smallest. ABSENT_GPU_ASSEMBLY: a folder for what
 // VK_KHR_pipeline_executable_properties says of each pipeline's code.
-#include <vulkan/vk_layer.h>
-#include <vulkan/vulkan.h>
+#include "tests/vendors/layer.h"
 
-#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -26,27 +24,6 @@
 #include <vector>
 
 namespace {
-
-// ---- what the next layer, or the driver, offers
-
-struct Driver {
-    PFN_vkGetInstanceProcAddr instance_proc = nullptr;
-    PFN_vkGetDeviceProcAddr device_proc = nullptr;
-    VkInstance instance = VK_NULL_HANDLE;
-    VkDevice device = VK_NULL_HANDLE;
-
-    template <typename F>
-    F of_instance(const char* name) const
-    {
-        return reinterpret_cast<F>(instance_proc(instance, name));
-    }
-    template <typename F>
-    F of_device(const char* name) const
-    {
-        return reinterpret_cast<F>(device_proc(device, name));
-    }
-};
-Driver driver; // one instance and one device at a time: what a program of ours opens
 
 // ---- what is noted
 
@@ -437,40 +414,11 @@ VKAPI_ATTR VkResult VKAPI_CALL create_pipelines(VkDevice device, VkPipelineCache
     return VK_SUCCESS;
 }
 
-// ---- instance and device: the rest of the chain's
-
-// where the loader says what comes next in the chain; null if it does not
-template <typename Link, typename Info>
-Link* link_of(const Info* info, VkStructureType type)
-{
-    auto* link = static_cast<const Link*>(info->pNext);
-    while (link && !(link->sType == type && link->function == VK_LAYER_LINK_INFO))
-        link = static_cast<const Link*>(link->pNext);
-    return const_cast<Link*>(link);
-}
-
-VKAPI_ATTR VkResult VKAPI_CALL create_instance(const VkInstanceCreateInfo* info, const VkAllocationCallbacks* allocator,
-                                               VkInstance* instance)
-{
-    auto* link = link_of<VkLayerInstanceCreateInfo>(info, VK_STRUCTURE_TYPE_LOADER_INSTANCE_CREATE_INFO);
-    if (!link)
-        return VK_ERROR_INITIALIZATION_FAILED;
-    driver.instance_proc = link->u.pLayerInfo->pfnNextGetInstanceProcAddr;
-    link->u.pLayerInfo = link->u.pLayerInfo->pNext;
-    const auto make = reinterpret_cast<PFN_vkCreateInstance>(driver.instance_proc(VK_NULL_HANDLE, "vkCreateInstance"));
-    const VkResult result = make(info, allocator, instance);
-    driver.instance = *instance;
-    return result;
-}
+// ---- the device: with what its compiler says
 
 VKAPI_ATTR VkResult VKAPI_CALL create_device(VkPhysicalDevice physical, const VkDeviceCreateInfo* info,
                                              const VkAllocationCallbacks* allocator, VkDevice* device)
 {
-    auto* link = link_of<VkLayerDeviceCreateInfo>(info, VK_STRUCTURE_TYPE_LOADER_DEVICE_CREATE_INFO);
-    if (!link)
-        return VK_ERROR_INITIALIZATION_FAILED;
-    driver.device_proc = link->u.pLayerInfo->pfnNextGetDeviceProcAddr;
-    link->u.pLayerInfo = link->u.pLayerInfo->pNext;
     VkPhysicalDevicePipelineExecutablePropertiesFeaturesKHR statistics{
         VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PIPELINE_EXECUTABLE_PROPERTIES_FEATURES_KHR, const_cast<void*>(info->pNext),
         VK_TRUE};
@@ -481,10 +429,7 @@ VKAPI_ATTR VkResult VKAPI_CALL create_device(VkPhysicalDevice physical, const Vk
     more.pNext = &statistics;
     more.enabledExtensionCount = uint32_t(extensions.size());
     more.ppEnabledExtensionNames = extensions.data();
-    const auto make = driver.of_instance<PFN_vkCreateDevice>("vkCreateDevice");
-    const VkResult result = make(physical, &more, allocator, device);
-    driver.device = *device;
-    return result;
+    return create_next_device(physical, *info, more, allocator, device);
 }
 
 VKAPI_ATTR void VKAPI_CALL destroy_device(VkDevice device, const VkAllocationCallbacks* allocator)
@@ -495,21 +440,9 @@ VKAPI_ATTR void VKAPI_CALL destroy_device(VkDevice device, const VkAllocationCal
 
 // ---- the table of functions
 
-template <typename F>
-PFN_vkVoidFunction any(F function)
-{
-    return reinterpret_cast<PFN_vkVoidFunction>(function);
-}
-
-VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL instance_proc(VkInstance instance, const char* name);
-VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL device_proc(VkDevice device, const char* name);
-
 PFN_vkVoidFunction ours(std::string_view name)
 {
     static const std::map<std::string_view, PFN_vkVoidFunction> functions = {
-        {"vkGetInstanceProcAddr", any(instance_proc)},
-        {"vkGetDeviceProcAddr", any(device_proc)},
-        {"vkCreateInstance", any(create_instance)},
         {"vkCreateDevice", any(create_device)},
         {"vkDestroyDevice", any(destroy_device)},
         {"vkGetPhysicalDeviceMemoryProperties", any(get_memory)},
@@ -557,25 +490,4 @@ PFN_vkVoidFunction ours(std::string_view name)
     return found == functions.end() ? nullptr : found->second;
 }
 
-VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL instance_proc(VkInstance instance, const char* name)
-{
-    const PFN_vkVoidFunction function = ours(name);
-    return function || !driver.instance_proc ? function : driver.instance_proc(instance, name);
-}
-
-VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL device_proc(VkDevice device, const char* name)
-{
-    const PFN_vkVoidFunction function = ours(name);
-    return function ? function : driver.device_proc(device, name);
-}
-
 } // namespace
-
-extern "C" VK_LAYER_EXPORT VkResult VKAPI_CALL vkNegotiateLoaderLayerInterfaceVersion(VkNegotiateLayerInterface* loader)
-{
-    loader->loaderLayerInterfaceVersion = std::min(loader->loaderLayerInterfaceVersion, 2u);
-    loader->pfnGetInstanceProcAddr = instance_proc;
-    loader->pfnGetDeviceProcAddr = device_proc;
-    loader->pfnGetPhysicalDeviceProcAddr = nullptr;
-    return VK_SUCCESS;
-}

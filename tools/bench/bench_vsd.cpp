@@ -94,6 +94,27 @@ void add_shape(Json& report, const BenchVsdArguments& o, const Timing& encode, c
     report["decode_ms"] = decode.ms_median;
 }
 
+Result<SamplingPlan> one_step()
+{
+    std::vector<std::string> warnings;
+    SR_TRY(const SchedulerConfig scheduler, scheduler_config_from_json(video_scheduler_json(), warnings));
+    return plan_sampling(scheduler, 1);
+}
+
+Result<Timing> time_window(VsdRenderer& vsd, const LatentSize& size, uint32_t channels, uint32_t runs)
+{
+    const std::vector<float> buffers(size_t(vsd.frames()) * size.pixels() * channels, 0.25f),
+        visible(size_t(vsd.frames()) * size.pixels(), 1.f);
+    const VsdWindow window{0, 0, buffers, visible};
+    SR_CHECK(vsd.begin(window));
+    SR_TRY(const Timing step, measure_runs(runs, [&]() -> Status {
+               SR_CHECK(vsd.begin(window));
+               return vsd.step(1).map([](bool) {});
+           }));
+    SR_CHECK(vsd.cancel());
+    return step;
+}
+
 Status bench_vsd(const BenchVsdArguments& o, const Globals& globals)
 {
     SR_TRY(const VideoNetworks n, read_video_networks(o));
@@ -105,11 +126,7 @@ Status bench_vsd(const BenchVsdArguments& o, const Globals& globals)
     const LatentSize size{o.width, o.height, n.vae.downscale()};
     SR_TRY(const auto vae, Vae::load(*device, n.vae, Checkpoint::random(1), dtype));
     SR_TRY(const auto unet, Unet::load(*device, n.unet, Checkpoint::random(1), dtype));
-    SR_TRY(const SamplingPlan plan, [&]() -> Result<SamplingPlan> {
-        std::vector<std::string> none;
-        SR_TRY(const SchedulerConfig scheduler, scheduler_config_from_json(video_scheduler_json(), none));
-        return plan_sampling(scheduler, 1);
-    }());
+    SR_TRY(const SamplingPlan plan, one_step());
     VsdOptions options;
     options.last_guidance = o.cfg_scale;
     const std::vector<float> text(size_t(o.tokens) * n.unet.cross_attention_dim, 0.f), added(n.unet.added_numbers, 1.f);
@@ -120,14 +137,7 @@ Status bench_vsd(const BenchVsdArguments& o, const Globals& globals)
            VsdRenderer::create(*device, *unet, plan, {{o.tokens, text}, added}, size, o.frames, options));
     SR_TRY(const Timing encode, time_encoder(*device, *vae, size, o.evaluations));
     SR_TRY(const Timing decode, time_decoder(*device, *vae, size, o.decode_frames, o.evaluations));
-    const std::vector<float> buffers(size_t(o.frames) * size.pixels() * n.unet.out_channels, 0.25f),
-        visible(size_t(o.frames) * size.pixels(), 1.f);
-    SR_CHECK(vsd->begin({0, 0, buffers, visible}));
-    SR_TRY(const Timing step, measure_runs(o.evaluations, [&]() -> Status {
-               SR_CHECK(vsd->begin({0, 0, buffers, visible}));
-               return vsd->step(1).map([](bool) {});
-           }));
-    SR_CHECK(vsd->cancel());
+    SR_TRY(const Timing step, time_window(*vsd, size, n.unet.out_channels, o.evaluations));
     Json report = bench_report("vsd", *device, dtype, step, before + planned.peak(MemoryPolicy::resident));
     report["staged_bytes"] = before + planned.peak(MemoryPolicy::staged);
     report["parameters"] = unet->parameters();

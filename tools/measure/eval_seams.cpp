@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover eval seams GRID: how far colours differ from one cell to the next, across the borders of tiles and inside
+#include "engine/job/generation_settings.h"
 #include "engine/scene/tiles.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
@@ -16,7 +17,7 @@ namespace {
 
 struct EvalSeamsArguments {
     std::string grid;
-    double tile_size = 9.6;
+    double tile_size = kUsualTileSize;
 };
 
 Json steps_json(const ColorSteps& s)
