@@ -132,6 +132,16 @@ void check_scans(j_common_ptr info)
     std::longjmp(errors->jump, 1);
 }
 
+// a progressive file whose end marker comes before the first scan of a component;
+// jpeg_finish_decompress frees what tells
+bool lacks_scans(const Decoder& d)
+{
+    for (int c = 0; d.info.coef_bits && c < d.info.num_components; ++c)
+        if (d.info.coef_bits[c][0] < 0)
+            return true;
+    return false;
+}
+
 // rows are appended, so that a cut file takes no memory for those that it lacks; `pixels` has room for all
 bool read_rows(Decoder& d, std::vector<uint8_t>& pixels)
 {
@@ -149,17 +159,12 @@ bool read_rows(Decoder& d, std::vector<uint8_t>& pixels)
         uint8_t* row = pixels.data() + begin;
         jpeg_read_scanlines(&d.info, &row, 1);
     }
+    if (lacks_scans(d)) {
+        std::snprintf(d.errors.message, sizeof(d.errors.message), "it ends before all components were seen");
+        return false;
+    }
     jpeg_finish_decompress(&d.info);
     return true;
-}
-
-// a progressive file whose end marker comes before the first scan of a component
-bool lacks_scans(const Decoder& d)
-{
-    for (int c = 0; d.info.coef_bits && c < d.info.num_components; ++c)
-        if (d.info.coef_bits[c][0] < 0)
-            return true;
-    return false;
 }
 
 } // namespace
@@ -205,8 +210,6 @@ Result<ImageRgb8> decode_jpeg_rgb8(std::span<const std::byte> file, std::string_
     image.pixels.reserve(pixels * 3);
     if (!read_rows(d, image.pixels))
         return fail(ErrorCode::bad_input, "{}: not a valid JPEG: {}", where, printable(d.errors.message));
-    if (lacks_scans(d))
-        return fail(ErrorCode::bad_input, "{}: not a valid JPEG: it ends before all components were seen", where);
     return image;
 }
 
