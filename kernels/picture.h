@@ -56,6 +56,11 @@ constexpr uint32_t picture_words(uint32_t width, uint32_t height)
     return divide_up(3 * width * height, 4);
 }
 
+// the same as four bytes a pixel, the fourth 255: what an image of R8G8B8A8 holds
+[[nodiscard]] Tensor picture_texels(Graph& g,
+                                    Tensor bytes,     // [words] u32 array, as picture_bytes() makes it
+                                    uint32_t pixels); // [pixels] u32 array
+
 // index of the first number that is NaN or infinite, 2^32 - 1 for none: counted over the picture's own pixels
 [[nodiscard]] Tensor first_non_finite(Graph& g,
                                       Tensor x,                   // [padded pixels, N] fp32

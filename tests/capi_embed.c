@@ -112,15 +112,10 @@ static void unlock_queue(void* user)
 static void lends_its_own_device(void)
 {
     const struct host host = make_host();
-    sr_vulkan_device vulkan;
+    sr_vulkan_device vulkan = lent(&host);
     sr_context_desc desc;
     sr_context* context = NULL;
-    memset(&vulkan, 0, sizeof vulkan);
-    vulkan.struct_size = sizeof vulkan;
-    vulkan.instance = host.instance;
-    vulkan.physical_device = host.physical;
-    vulkan.device = host.device;
-    vulkan.queue = host.queue;
+    vulkan.robust_buffer_access = 0;
     vulkan.user = &locks;
     vulkan.lock_queue = lock_queue;
     memset(&desc, 0, sizeof desc);

@@ -1,11 +1,23 @@
 /* SPDX-FileCopyrightText: semrover authors
  * SPDX-License-Identifier: Apache-2.0
  *
- * Buffers and images of a host in C. */
+ * A context on a host's device in C, and buffers and images of the host's. */
 #ifndef SEMROVER_TESTS_CAPI_MEMORY_H
 #define SEMROVER_TESTS_CAPI_MEMORY_H
 
 #include "tests/capi_vulkan.h"
+
+static sr_context* adopt_host(const struct host* host)
+{
+    const sr_vulkan_device vulkan = lent(host);
+    sr_context_desc desc;
+    sr_context* context = NULL;
+    memset(&desc, 0, sizeof desc);
+    desc.struct_size = sizeof desc;
+    desc.vulkan = &vulkan;
+    CHECK_OK(NULL, sr_context_create(&desc, &context));
+    return context;
+}
 
 struct host_buffer {
     VkBuffer buffer;
@@ -45,7 +57,7 @@ static struct host_buffer make_buffer(const struct host* host, size_t bytes)
     VkMemoryRequirements needs;
     info.sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO;
     info.size = bytes;
-    info.usage = VK_BUFFER_USAGE_TRANSFER_DST_BIT;
+    info.usage = VK_BUFFER_USAGE_TRANSFER_DST_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
     CHECK(vkCreateBuffer(host->device, &info, NULL, &made.buffer) == VK_SUCCESS);
     vkGetBufferMemoryRequirements(host->device, made.buffer, &needs);
     made.memory = allocate(host, &needs, VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT);

@@ -50,20 +50,62 @@ static void print_line(void* user, const char* line)
 
 struct host {
     VkInstance instance;
+    VkDebugUtilsMessengerEXT messenger; /* where SEMROVER_VALIDATION asks for it: a message ends the test */
     VkPhysicalDevice physical;
     VkDevice device;
     VkQueue queue; /* of family 0 */
 };
 
-static VkInstance make_instance(void)
+static VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlagBitsEXT severity,
+                                                 VkDebugUtilsMessageTypeFlagsEXT type,
+                                                 const VkDebugUtilsMessengerCallbackDataEXT* data, void* user)
 {
+    (void)severity;
+    (void)type;
+    (void)user;
+    fprintf(stderr, "validation: %s\n", data->pMessage);
+    exit(1);
+}
+
+static VkDebugUtilsMessengerEXT make_messenger(VkInstance instance)
+{
+    const PFN_vkCreateDebugUtilsMessengerEXT create =
+        (PFN_vkCreateDebugUtilsMessengerEXT)vkGetInstanceProcAddr(instance, "vkCreateDebugUtilsMessengerEXT");
+    VkDebugUtilsMessengerCreateInfoEXT info = {0};
+    VkDebugUtilsMessengerEXT messenger;
+    info.sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT;
+    info.messageSeverity =
+        VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT;
+    info.messageType = VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT;
+    info.pfnUserCallback = on_message;
+    CHECK(create(instance, &info, NULL, &messenger) == VK_SUCCESS);
+    return messenger;
+}
+
+/* core and synchronization */
+static VkInstance make_instance(int validation)
+{
+    const char* layer = "VK_LAYER_KHRONOS_validation";
+    const char* extensions[2] = {VK_EXT_DEBUG_UTILS_EXTENSION_NAME, VK_EXT_VALIDATION_FEATURES_EXTENSION_NAME};
+    const VkValidationFeatureEnableEXT enables = VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT;
+    VkValidationFeaturesEXT features = {0};
     VkApplicationInfo app = {0};
     VkInstanceCreateInfo info = {0};
     VkInstance instance;
     app.sType = VK_STRUCTURE_TYPE_APPLICATION_INFO;
     app.apiVersion = VK_API_VERSION_1_2;
+    features.sType = VK_STRUCTURE_TYPE_VALIDATION_FEATURES_EXT;
+    features.enabledValidationFeatureCount = 1;
+    features.pEnabledValidationFeatures = &enables;
     info.sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO;
     info.pApplicationInfo = &app;
+    if (validation) {
+        info.pNext = &features;
+        info.enabledLayerCount = 1;
+        info.ppEnabledLayerNames = &layer;
+        info.enabledExtensionCount = 2;
+        info.ppEnabledExtensionNames = extensions;
+    }
     CHECK(vkCreateInstance(&info, NULL, &instance) == VK_SUCCESS);
     return instance;
 }
@@ -95,7 +137,9 @@ static struct host make_host(void)
 {
     struct host host;
     uint32_t count = 1;
-    host.instance = make_instance();
+    const int validation = getenv("SEMROVER_VALIDATION") != NULL;
+    host.instance = make_instance(validation);
+    host.messenger = validation ? make_messenger(host.instance) : VK_NULL_HANDLE;
     vkEnumeratePhysicalDevices(host.instance, &count, &host.physical);
     CHECK(count == 1);
     host.device = make_device(host.physical);
@@ -106,7 +150,24 @@ static struct host make_host(void)
 static void destroy_host(const struct host* host)
 {
     vkDestroyDevice(host->device, NULL);
+    if (host->messenger)
+        ((PFN_vkDestroyDebugUtilsMessengerEXT)vkGetInstanceProcAddr(host->instance, "vkDestroyDebugUtilsMessengerEXT"))(
+            host->instance, host->messenger, NULL);
     vkDestroyInstance(host->instance, NULL);
+}
+
+/* the same for the library */
+static sr_vulkan_device lent(const struct host* host)
+{
+    sr_vulkan_device vulkan;
+    memset(&vulkan, 0, sizeof vulkan);
+    vulkan.struct_size = sizeof vulkan;
+    vulkan.instance = host->instance;
+    vulkan.physical_device = host->physical;
+    vulkan.device = host->device;
+    vulkan.queue = host->queue;
+    vulkan.robust_buffer_access = 1;
+    return vulkan;
 }
 
 #endif

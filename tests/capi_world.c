@@ -4,45 +4,13 @@
  * A host in C that streams a world: labels of a grid and of a callback, budgets, edits, splats, pictures in host memory
  * and in buffers and images of its own device; and what it may get wrong. */
 #include "tests/capi_memory.h"
+#include "tests/capi_street.h"
 
 #include <math.h>
 
-enum { WIDTH = 64, HEIGHT = 40, PIXELS = WIDTH * HEIGHT, MOST_CELLS = 4096 };
+enum { WIDTH = 64, HEIGHT = 40, PIXELS = WIDTH * HEIGHT };
 
 static const char* model;
-
-/* a road with a wall beside it, without end */
-static uint32_t label_of(int32_t j)
-{
-    return j == 6 ? 2 : 0;
-}
-static uint64_t cells_of(const sr_window* window, sr_cell* cells)
-{
-    uint64_t count = 0;
-    int32_t i, j, k;
-    for (i = window->low[0]; i <= window->high[0]; ++i)
-        for (j = window->low[1]; j <= window->high[1]; ++j)
-            for (k = 0; k < (j == 6 ? 4 : 1); ++k)
-                if (j >= -6 && j <= 6) {
-                    CHECK(count < MOST_CELLS);
-                    cells[count].i = i;
-                    cells[count].j = j;
-                    cells[count].k = k;
-                    cells[count++].label = label_of(j);
-                }
-    return count;
-}
-
-static int broken, calls;
-static sr_status labels(void* user, const sr_window* window, sr_grid* grid)
-{
-    static sr_cell cells[MOST_CELLS];
-    CHECK(user == &calls);
-    ++calls;
-    if (broken)
-        return SR_ERR_BAD_INPUT;
-    return sr_grid_set_cells(grid, cells, cells_of(window, cells));
-}
 
 static sr_grid* street(void)
 {
@@ -56,27 +24,7 @@ static sr_grid* street(void)
 
 static sr_world_desc description(void)
 {
-    sr_world_desc desc;
-    memset(&desc, 0, sizeof desc);
-    desc.struct_size = sizeof desc;
-    desc.model = model;
-    desc.steps = 2;
-    desc.tile_size = 4.8;
-    desc.labels = labels;
-    desc.user = &calls;
-    desc.splat_bytes = 2u << 20;
-    return desc;
-}
-
-static void walk(sr_context* context, sr_world* world, double x, double radius)
-{
-    const double position[3] = {x, 0, 1.5}, forward[3] = {1, 0, 0};
-    uint32_t done = 0, steps = 0;
-    CHECK_OK(context, sr_world_focus(world, position, forward, radius));
-    for (; !done; ++steps) {
-        CHECK_OK(context, sr_world_step(world, 20000, &done));
-        CHECK(steps < 10000);
-    }
+    return world_of(model);
 }
 
 static sr_world_info info_of(sr_world* world)
@@ -244,7 +192,6 @@ static void an_edit_makes_its_place_anew(sr_context* context)
 
 static sr_draw_desc camera(void)
 {
-    const double to_camera[12] = {0, -1, 0, 0, 0, 0, -1, 1.5, 1, 0, 0, -1};
     sr_draw_desc draw;
     memset(&draw, 0, sizeof draw);
     draw.struct_size = sizeof draw;
@@ -253,7 +200,7 @@ static sr_draw_desc camera(void)
     draw.fx = draw.fy = WIDTH / 2;
     draw.cx = WIDTH / 2;
     draw.cy = HEIGHT / 2;
-    memcpy(draw.world_to_camera, to_camera, sizeof to_camera);
+    look(1, draw.world_to_camera);
     return draw;
 }
 
@@ -308,25 +255,12 @@ static void draws_into_host_memory(sr_context* context)
 static void draws_into_buffers_and_images_of_a_host(void)
 {
     struct host host = make_host();
-    sr_vulkan_device vulkan;
-    sr_context_desc desc;
+    sr_context* context = adopt_host(&host);
     sr_world_desc world_desc = description();
-    sr_context* context = NULL;
     sr_world* world = NULL;
     sr_draw_desc draw = camera();
     struct host_buffer buffer = make_buffer(&host, PIXELS * 16 + 64);
     struct host_image image = make_image(&host, WIDTH, HEIGHT, VK_FORMAT_R32G32B32A32_SFLOAT);
-    memset(&vulkan, 0, sizeof vulkan);
-    vulkan.struct_size = sizeof vulkan;
-    vulkan.instance = host.instance;
-    vulkan.physical_device = host.physical;
-    vulkan.device = host.device;
-    vulkan.queue = host.queue;
-    vulkan.robust_buffer_access = 1;
-    memset(&desc, 0, sizeof desc);
-    desc.struct_size = sizeof desc;
-    desc.vulkan = &vulkan;
-    CHECK(sr_context_create(&desc, &context) == SR_OK);
     CHECK_OK(context, sr_world_create(context, &world_desc, &world));
     walk(context, world, 4, 6);
     draw.color.memory = color;

@@ -169,6 +169,24 @@ TEST(kernel_picture, numbers_become_the_bytes_of_a_picture)
     }
 }
 
+TEST(kernel_picture, bytes_become_texels)
+{
+    for (const uint32_t pixels : {1u, 2u, 3u, 4u, 5u, 64u, 51u * 38}) {
+        KernelCase k(test_device());
+        std::vector<uint32_t> words(picture_words(pixels, 1));
+        for (size_t i = 0; i < words.size(); ++i)
+            words[i] = uint32_t((i + 1) * 2654435761u);
+        const Tensor out = k.output(pixels, 1, DType::u32, 1);
+        k.graph.keep(picture_texels(k.graph, k.input(words), pixels), out);
+        ASSERT_TRUE(k.compile_and_run());
+        const auto got = k.read_array<uint32_t>(out);
+        const auto byte_of = [&](uint32_t n) { return words[n / 4] >> 8 * (n % 4) & 255; };
+        for (uint32_t i = 0; i < pixels; ++i)
+            ASSERT_EQ(got[i], byte_of(3 * i) | byte_of(3 * i + 1) << 8 | byte_of(3 * i + 2) << 16 | 255u << 24)
+                << i << " of " << pixels;
+    }
+}
+
 TEST(kernel_picture, finds_the_first_number_that_is_none)
 {
     const PictureShape s{51, 38, 56, 40};

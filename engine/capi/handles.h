@@ -2,9 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/capi/sized_rasterizer.h"
+#include "engine/job/frame_chain.h"
 #include "engine/job/world.h"
 #include "engine/semrover.h"
-#include "engine/splat/rasterizer.h"
 #include "runtime/device/device.h"
 #include "runtime/device/host_copies.h"
 
@@ -13,6 +14,7 @@ struct sr_context {
     std::unique_ptr<semrover::Device> device;
     semrover::DeviceSummary summary;
     std::string error;
+    std::unique_ptr<semrover::HostCopies> copies; // from the first call that needs them on
 };
 
 struct sr_grid {
@@ -23,7 +25,11 @@ struct sr_world {
     sr_context* context = nullptr;
     semrover::GenerationSettings settings;
     std::unique_ptr<semrover::World> world;
-    std::unique_ptr<semrover::Rasterizer> rasterizer; // of the last draw's size
-    uint32_t width = 0, height = 0;
-    std::unique_ptr<semrover::HostCopies> copies; // from the first draw that needs them on
+    semrover::capi::SizedRasterizer images, pixels; // of draws, and of chains that draw
+};
+
+struct sr_chain {
+    sr_context* context = nullptr;
+    semrover::ImageSize size;
+    std::unique_ptr<semrover::FrameChain> chain;
 };

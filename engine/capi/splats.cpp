@@ -1,25 +1,12 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // splats of a world, and pictures of them in the host's memory
-#include "engine/capi/call.h"
-#include "engine/capi/handles.h"
-
-#include <cmath>
+#include "engine/capi/exchange.h"
 
 using namespace semrover;
 using namespace semrover::capi;
 
 namespace {
-
-constexpr uint32_t kMostPixels = 16384; // of a side
-
-Result<const SplatPool*> splats_of(const sr_world& world, const char* name)
-{
-    const SplatPool* splats = world.world->splats();
-    if (!splats)
-        return fail(ErrorCode::usage, "{}: the world was created without splat_bytes", name);
-    return splats;
-}
 
 sr_array array_of(const Slot& slot)
 {
@@ -27,56 +14,21 @@ sr_array array_of(const Slot& slot)
     return {slice.buffer->handle(), slice.offset, slice.bytes};
 }
 
-SplatCamera camera_of(const sr_draw_desc& d)
-{
-    SplatCamera camera{float(d.fx), float(d.fy), float(d.cx), float(d.cy)};
-    for (size_t i = 0; i < 12; ++i)
-        camera.world_to_camera[i] = float(d.world_to_camera[i]);
-    return camera;
-}
-
-// the program of a size, which stays for the next draw
-Status make_rasterizer(sr_world& world, const SplatPool& splats, uint32_t width, uint32_t height)
-{
-    if (world.rasterizer && world.width == width && world.height == height)
-        return {};
-    world.rasterizer.reset(); // its memory goes before the next one's comes
-    SR_TRY(world.rasterizer, Rasterizer::create(*world.context->device, splats.scene(), width, height, 1));
-    world.width = width;
-    world.height = height;
-    return {};
-}
-
-Status hand_over(sr_world& world, const Slot& pixels, const sr_target& to)
-{
-    Device& device = *world.context->device;
-    if (to.memory)
-        SR_CHECK(device.read(pixels.slice(), {static_cast<std::byte*>(to.memory), size_t(pixels.bytes())}));
-    if (!to.buffer && !to.image)
-        return {};
-    if (!world.copies) {
-        SR_TRY(world.copies, HostCopies::create(device));
-    }
-    HostTarget target{.buffer = static_cast<VkBuffer>(to.buffer), .offset = to.buffer_offset};
-    target.image = {static_cast<VkImage>(to.image), world.width, world.height, VkImageLayout(to.layout_before),
-                    VkImageLayout(to.layout_after)};
-    return world.copies->copy(pixels.slice(), target);
-}
-
 Status draw_world(sr_world& world, const sr_draw_desc& d)
 {
     SR_TRY(const SplatPool* splats, splats_of(world, "sr_world_draw"));
-    if (d.width < 1 || d.height < 1 || d.width > kMostPixels || d.height > kMostPixels)
-        return fail(ErrorCode::usage, "sr_draw_desc: {} x {} pixels; 1 to {} are possible", d.width, d.height,
-                    kMostPixels);
-    SR_CHECK(make_rasterizer(world, *splats, d.width, d.height));
-    const SplatCamera camera = camera_of(d);
-    SR_CHECK(world.rasterizer->draw({&camera, 1}).map([](uint32_t) {}));
-    const SplatSlots images = world.rasterizer->images(0);
-    SR_CHECK(hand_over(world, images.color, d.color));
-    SR_CHECK(hand_over(world, images.surface, d.normal));
-    SR_CHECK(hand_over(world, images.depth, d.depth));
-    return hand_over(world, images.ids, d.label);
+    const ImageSize size{d.width, d.height};
+    SR_CHECK(check_size(size, "sr_draw_desc"));
+    sr_context& context = *world.context;
+    SR_TRY(Rasterizer * rasterizer, world.images.of(*context.device, splats->scene(), size, {}));
+    const CameraFrame frame = camera_frame({d.fx, d.fy, d.cx, d.cy}, d.world_to_camera, size);
+    const SplatCamera camera = splat_camera(frame.intrinsics, frame.pose);
+    SR_CHECK(rasterizer->draw({&camera, 1}).map([](uint32_t) {}));
+    const SplatSlots images = rasterizer->images(0);
+    SR_CHECK(hand_over(context, images.color, size, d.color));
+    SR_CHECK(hand_over(context, images.surface, size, d.normal));
+    SR_CHECK(hand_over(context, images.depth, size, d.depth));
+    return hand_over(context, images.ids, size, d.label);
 }
 
 } // namespace

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // worlds: opened, walked through, edited
 #include "engine/capi/edits.h"
-#include "engine/capi/handles.h"
+#include "engine/capi/exchange.h"
 #include "engine/scene/cell_reach.h"
 #include "engine/scene/tiles.h"
 
@@ -165,8 +165,7 @@ sr_status sr_world_focus(sr_world* world, const double position[3], const double
 sr_status sr_world_step(sr_world* world, uint64_t budget_us, uint32_t* done)
 {
     return with_world(world, "sr_world_step", [&]() -> Status {
-        constexpr uint64_t kMost = 1ull << 60; // beyond it a budget is none
-        SR_TRY(const bool all, world->world->step({.submits = ~0u, .microseconds = std::min(budget_us, kMost)}));
+        SR_TRY(const bool all, world->world->step(timed_budget(budget_us)));
         Device& device = *world->context->device;
         SR_CHECK(device.wait(device.last_ticket())); // splats that were copied last
         if (done)

@@ -19,17 +19,6 @@ Status settle_device(Device& device)
     return device.write(probe->slice(), std::as_bytes(std::span(&word, 1)));
 }
 
-// outgoing: bytes of what is on its way to files, where it is not allocated yet
-Result<MemoryPlan> plan_of(Device& device, const Refinement& r, std::span<const RendererWork> work, uint64_t outgoing)
-{
-    const auto unet = Unet::plan(r.model.unet, r.options.precision, device.limits());
-    const auto vae = Vae::plan(r.model.vae, r.options.precision, device.limits());
-    const RendererNetworks networks{*unet, *vae, r.plan, r.model.conditioning_tokens, r.asd.guidance_scale, r.vsd};
-    SR_TRY(RendererBytes parts, renderer_bytes(device.limits(), networks, work));
-    parts.outgoing = outgoing;
-    return plan_memory(std::move(parts), device.allocated_bytes(), device.budget());
-}
-
 // words of a picture, the largest that is read back: a frame has three bytes for each of them, a latent less
 uint64_t largest_read(const Refinement& r)
 {
@@ -263,7 +252,7 @@ class RefinementJob : public Job {
         std::vector<RendererWork> work;
         for (const RefineChain& c : r_.chains)
             work.push_back(work_left(*store_, c));
-        SR_TRY(memory_, plan_of(device_, r_, work, 0));
+        SR_TRY(memory_, plan_renderer(device_, r_, work, 0));
         return {};
     }
     Status begin_planned(const CameraPath* drawn)
@@ -332,6 +321,17 @@ class RefinementJob : public Job {
 
 } // namespace
 
+Result<MemoryPlan> plan_renderer(Device& device, const Refinement& r, std::span<const RendererWork> work,
+                                 uint64_t beside)
+{
+    const auto unet = Unet::plan(r.model.unet, r.options.precision, device.limits());
+    const auto vae = Vae::plan(r.model.vae, r.options.precision, device.limits());
+    const RendererNetworks networks{*unet, *vae, r.plan, r.model.conditioning_tokens, r.asd.guidance_scale, r.vsd};
+    SR_TRY(RendererBytes parts, renderer_bytes(device.limits(), networks, work));
+    parts.outgoing = beside;
+    return plan_memory(std::move(parts), device.allocated_bytes(), device.budget());
+}
+
 Result<MemoryPlan> plan_refinement(Device& device, const Refinement& r)
 {
     SR_CHECK(settle_device(device));
@@ -339,7 +339,7 @@ Result<MemoryPlan> plan_refinement(Device& device, const Refinement& r)
     std::vector<RendererWork> work;
     for (const RefineChain& c : r.chains)
         work.push_back(whole_work(c));
-    return plan_of(device, r, work, Outgoing::planned_bytes(device.limits(), largest_read(r)));
+    return plan_renderer(device, r, work, Outgoing::planned_bytes(device.limits(), largest_read(r)));
 }
 
 Result<std::unique_ptr<Job>> begin_refinement(Device& device, Refinement r, const RefinementCallbacks& callbacks)

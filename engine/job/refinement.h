@@ -58,11 +58,18 @@ struct Refinement {
     Status check_outputs(std::span<const Path> beside) const;
 };
 
-// Opens the model and looks at the buffers. Errors: bad_input, usage
+// Opens the model and settles how it denoises and draws; chains and inputs stay empty. Errors: bad_input, usage
+Result<Refinement> open_renderer(RefinementOptions options, const JobCallbacks& callbacks);
+
+// The same, and looks at the buffers. Errors: bad_input, usage
 Result<Refinement> resolve_refinement(RefinementOptions options, const JobCallbacks& callbacks);
 
 // everything that decides the bytes of the frames
 Result<Json> refinement_settings(const Refinement& r, const Device& device);
+
+// The memory of a renderer at work, with `beside` bytes that stay beside it. Errors: out_of_memory when no policy fits
+Result<MemoryPlan> plan_renderer(Device& device, const Refinement& r, std::span<const RendererWork> work,
+                                 uint64_t beside);
 
 // the memory of a run of which nothing is done yet; out_of_memory when no policy fits
 Result<MemoryPlan> plan_refinement(Device& device, const Refinement& r);

@@ -53,8 +53,12 @@ Status set_video_renderer(Refinement& r)
     return {};
 }
 
-Status open_model(Refinement& r, const JobCallbacks& callbacks)
+} // namespace
+
+Result<Refinement> open_renderer(RefinementOptions options, const JobCallbacks& callbacks)
 {
+    Refinement r;
+    r.options = std::move(options);
     const RefinementOptions& o = r.options;
     SR_TRY(r.model, RendererModel::open(o.model, o.sampler));
     for (const std::string& warning : r.model.warnings)
@@ -62,6 +66,7 @@ Status open_model(Refinement& r, const JobCallbacks& callbacks)
             callbacks.warning(warning);
     const RendererDefaults& d = r.model.defaults;
     r.steps = o.steps.value_or(d.num_inference_steps);
+    r.frame_noise = o.frame_noise.value_or(d.frame_noise);
     SR_CHECK(r.model.video() ? set_video_renderer(r) : set_frame_renderer(r));
     r.draw = o.draw;
     r.draw.visible_alpha = o.draw.visible_alpha.value_or(d.visible_threshold);
@@ -70,8 +75,10 @@ Status open_model(Refinement& r, const JobCallbacks& callbacks)
         r.draw.surfels.sigma = d.splat_radius.value_or(r.draw.surfels.sigma);
     }
     SR_TRY(r.plan, plan_sampling(r.model.scheduler, r.steps));
-    return {};
+    return r;
 }
+
+namespace {
 
 // "FIRST:LAST", either may be left out
 Result<FrameRange> range_of(const std::string& text, const BufferCamera& camera)
@@ -149,7 +156,6 @@ Status find_chains(Refinement& r)
 Status find_motion(Refinement& r, const JobCallbacks& callbacks)
 {
     const RefinementOptions& o = r.options;
-    r.frame_noise = o.frame_noise.value_or(r.model.defaults.frame_noise);
     if (r.frame_noise == FrameNoise::fresh)
         return {};
     if (!o.path) {
@@ -249,9 +255,7 @@ Json video_settings(const Refinement& r)
 
 Result<Refinement> resolve_refinement(RefinementOptions options, const JobCallbacks& callbacks)
 {
-    Refinement r;
-    r.options = std::move(options);
-    SR_CHECK(open_model(r, callbacks));
+    SR_TRY(Refinement r, open_renderer(std::move(options), callbacks));
     SR_CHECK(find_chains(r));
     SR_CHECK(find_motion(r, callbacks));
     return r;

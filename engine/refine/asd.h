@@ -92,6 +92,8 @@ class AsdRenderer {
     Status resume(const AsdFrame& frame, std::span<const std::byte> saved);
     Status resume(const AsdStart& start, std::span<const std::byte> saved);
 
+    // makes the programs, which begin() does otherwise
+    Status make_programs();
     // drops the programs and their memory until the next frame; between frames only
     void rest();
 
@@ -104,7 +106,6 @@ class AsdRenderer {
     struct Memory;
     AsdRenderer(Device& device, const SamplingPlan& plan, AsdOptions options);
     Status make_tables(const Conditioning& text);
-    Status make_programs();
     Status upload(const AsdFrame& frame);
     Status upload_keys(const AsdStart& start);
     uint64_t key_of(const AsdStart& start) const;

@@ -32,6 +32,15 @@ Status FrameRenderer::start(const RendererWork& work, const RendererWork& run)
     return {};
 }
 
+Status FrameRenderer::compile()
+{
+    SR_CHECK(codec(CodecDirection::encode));
+    SR_CHECK(make_way(Part::denoise));
+    SR_CHECK(make_denoiser());
+    SR_CHECK(asd_->make_programs());
+    return codec(CodecDirection::decode).map([](LatentCodec*) {});
+}
+
 Status FrameRenderer::make_way(Part part)
 {
     const bool coding = part != Part::denoise;

@@ -20,6 +20,9 @@ class FrameRenderer {
     // what the next calls are about; with the resident policy both networks are loaded here, as far as `run` (the whole
     // run's work) needs them. Errors: bad_input for weights that do not fit the model; device errors
     Status start(const RendererWork& work, const RendererWork& run);
+    // With the resident policy: makes the programs of all three kinds of work once, so that no later call compiles.
+    // Between frames only
+    Status compile();
 
     // as LatentCodec does it; not between begin and finish of a frame
     Result<std::vector<float>> encode(std::span<const float> image);

@@ -32,6 +32,18 @@ Status HostCopies::copy(const BufferSlice& from, const HostTarget& to)
         record_host_copy(commands_, from.buffer->handle(), from.offset, to.buffer, to.offset, from.bytes);
     if (to.image.image)
         record_image_copy(commands_, from.buffer->handle(), from.offset, to.image);
+    return submit();
+}
+
+Status HostCopies::fetch(VkBuffer from, uint64_t offset, const BufferSlice& to)
+{
+    SR_CHECK(begin_commands(commands_, true));
+    record_host_copy(commands_, from, offset, to.buffer->handle(), to.offset, to.bytes);
+    return submit();
+}
+
+Status HostCopies::submit()
+{
     SR_VK(vkEndCommandBuffer(commands_));
     SR_TRY(const uint64_t ticket, device_.submit({&commands_, 1}));
     return device_.wait(ticket);

@@ -14,7 +14,7 @@ struct HostTarget {
     HostImage image = {};
 };
 
-// Copies what lies on the device into a host program's memory, and waits for it.
+// Copies what lies on the device into a host program's memory, and back, and waits for it.
 class HostCopies {
   public:
     static Result<std::unique_ptr<HostCopies>> create(Device& device);
@@ -24,9 +24,12 @@ class HostCopies {
 
     // to.image: texels of the slice's rows, as many as it has
     Status copy(const BufferSlice& from, const HostTarget& to);
+    // as many bytes as the slice has, from a buffer with TRANSFER_SRC usage
+    Status fetch(VkBuffer from, uint64_t offset, const BufferSlice& to);
 
   private:
     explicit HostCopies(Device& device) : device_(device) {}
+    Status submit();
 
     Device& device_;
     VkCommandPool pool_ = VK_NULL_HANDLE;

@@ -1,0 +1,93 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/capi/exchange.h"
+
+#include <cmath>
+
+namespace semrover::capi {
+
+namespace {
+
+Result<HostCopies*> copies_of(sr_context& context)
+{
+    if (!context.copies) {
+        SR_TRY(context.copies, HostCopies::create(*context.device));
+    }
+    return context.copies.get();
+}
+
+} // namespace
+
+CameraFrame camera_frame(const double (&pinhole)[4], const double (&world_to_camera)[12], const ImageSize& size)
+{
+    CameraFrame frame;
+    Intrinsics& i = frame.intrinsics;
+    i.fx = pinhole[0];
+    i.fy = pinhole[1];
+    i.cx = pinhole[2];
+    i.cy = pinhole[3];
+    i.width = size.width;
+    i.height = size.height;
+    std::copy_n(world_to_camera, 12, frame.pose.world_to_camera.begin());
+    return frame;
+}
+
+Status check_camera(const CameraFrame& frame, const char* name)
+{
+    for (const double v : frame.pose.world_to_camera)
+        if (!std::isfinite(v))
+            return fail(ErrorCode::bad_input, "{}: a number of world_to_camera is not finite", name);
+    return check_intrinsics(frame.intrinsics, name);
+}
+
+JobBudget timed_budget(uint64_t microseconds)
+{
+    return {.submits = ~0u, .microseconds = std::min<uint64_t>(microseconds, 1ull << 60)};
+}
+
+Status check_size(const ImageSize& size, const char* name)
+{
+    if (size.width < 1 || size.height < 1 || size.width > kMostPixels || size.height > kMostPixels)
+        return fail(ErrorCode::usage, "{}: {} x {} pixels; 1 to {} are possible", name, size.width, size.height,
+                    kMostPixels);
+    return {};
+}
+
+Status hand_over(sr_context& context, const Slot& pixels, const ImageSize& size, const sr_target& to)
+{
+    if (to.memory)
+        SR_CHECK(context.device->read(pixels.slice(), {static_cast<std::byte*>(to.memory), size_t(pixels.bytes())}));
+    if (!to.buffer && !to.image)
+        return {};
+    SR_TRY(HostCopies * copies, copies_of(context));
+    return copies->copy(pixels.slice(), host_target(to, size));
+}
+
+HostTarget host_target(const sr_target& to, const ImageSize& size)
+{
+    HostTarget target{.buffer = static_cast<VkBuffer>(to.buffer), .offset = to.buffer_offset};
+    target.image = {static_cast<VkImage>(to.image), size.width, size.height, VkImageLayout(to.layout_before),
+                    VkImageLayout(to.layout_after)};
+    return target;
+}
+
+Status take_in(sr_context& context, const sr_source& from, const Slot& to, uint64_t bytes, const char* name)
+{
+    if (!from.memory == !from.buffer)
+        return fail(ErrorCode::usage, "{}: one of memory and buffer must be given", name);
+    const BufferSlice slice = to.slice().part(0, bytes);
+    if (from.memory)
+        return context.device->write(slice, {static_cast<const std::byte*>(from.memory), size_t(bytes)});
+    SR_TRY(HostCopies * copies, copies_of(context));
+    return copies->fetch(static_cast<VkBuffer>(from.buffer), from.buffer_offset, slice);
+}
+
+Result<const SplatPool*> splats_of(const sr_world& world, const char* name)
+{
+    const SplatPool* splats = world.world->splats();
+    if (!splats)
+        return fail(ErrorCode::usage, "{}: the world was created without splat_bytes", name);
+    return splats;
+}
+
+} // namespace semrover::capi

@@ -1,0 +1,37 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/capi/call.h"
+#include "engine/capi/handles.h"
+
+// pictures on their way between our memory and what a host gives: its memory, buffers and images
+namespace semrover::capi {
+
+constexpr uint32_t kMostPixels = 16384; // of a side
+
+// fx, fy, cx, cy in pixels and [3, 4] row by row
+CameraFrame camera_frame(const double (&pinhole)[4], const double (&world_to_camera)[12], const ImageSize& size);
+
+// Errors: bad_input for numbers that are not finite, and focal lengths that are not above 0. name: of the structure
+Status check_camera(const CameraFrame& frame, const char* name);
+
+// of microseconds; beyond some thousand years it is none
+JobBudget timed_budget(uint64_t microseconds);
+
+// Errors: usage for sizes that are not 1..kMostPixels. name: of the structure
+Status check_size(const ImageSize& size, const char* name);
+
+HostTarget host_target(const sr_target& to, const ImageSize& size);
+
+// A picture to where the host wants it; waits for it
+Status hand_over(sr_context& context, const Slot& pixels, const ImageSize& size, const sr_target& to);
+
+// `bytes` of the host's to the beginning of a slot; waits for it. Errors: usage unless there is one of memory and
+// buffer. name: of the member
+Status take_in(sr_context& context, const sr_source& from, const Slot& to, uint64_t bytes, const char* name);
+
+// Errors: usage for a world without splat_bytes. name: of the call
+Result<const SplatPool*> splats_of(const sr_world& world, const char* name);
+
+} // namespace semrover::capi
