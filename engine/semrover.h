@@ -313,7 +313,7 @@ typedef struct sr_chain sr_chain;
 
 /* where noise comes from (docs/method.md, section 6.2) */
 #define SR_NOISE_OF_MODEL 0u    /* one of the two below */
-#define SR_NOISE_FRESH 1u       /* each frame has its own */
+#define SR_NOISE_FRESH 1u       /* each frame has its own, and holds nothing of the frame before (section 6.5) */
 #define SR_NOISE_ON_SURFACES 2u /* it stays on what both frames show, which flickers less: needs depth and camera */
 
 /* The frames have the bytes that `semrover refine` gives for the same buffers, model, seed, steps, noise and name of
@@ -353,10 +353,10 @@ typedef struct sr_frame_desc {
     uint32_t struct_size;
     uint32_t reserved;
     const void* next;
-    sr_world* world;       /* of the same context, with splat_bytes; NULL: */
-    sr_source seen;        /* 4 bytes a pixel: r, g, b (sRGB, over black), and 255 where splats cover it, else 0 */
-    sr_source depth;       /* uint16 a pixel: millimetres along z, 0 for nothing. Read with noise on surfaces only */
-    double fx, fy, cx, cy; /* pixels */
+    sr_world* world;            /* of the same context, with splat_bytes; NULL: */
+    sr_source seen;             /* 4 bytes a pixel: r, g, b (sRGB, over black), and 255 where splats cover it, else 0 */
+    sr_source depth;            /* uint16 a pixel: millimetres along z, 0 for nothing. Not read with fresh noise */
+    double fx, fy, cx, cy;      /* pixels */
     double world_to_camera[12]; /* [3, 4] row by row: a rotation and metres */
 } sr_frame_desc;
 

@@ -61,6 +61,25 @@ constexpr uint32_t picture_words(uint32_t width, uint32_t height)
                                     Tensor bytes,     // [words] u32 array, as picture_bytes() makes it
                                     uint32_t pixels); // [pixels] u32 array
 
+// A frame and what its depth says of the frame before (temporal accumulation; docs/method.md §6.5): where both see the
+// same surface, a share of the frame before
+struct FrameAndDepth {
+    Tensor bytes; // [picture_words()] u32 array
+    Tensor depth; // [height * width] u32 array: millimetres in the low 16 bits; 0 and 65535: infinitely far away
+};
+struct AccumulateOptions {
+    uint32_t width = 0, height = 0;
+    SplatLens lens = SplatLens::pinhole; // of both cameras
+    float share = 0;                     // of the frame before, 0..1
+    float tolerance = 0.02f;             // relative, of the depth at which the frame before shows the surface
+    float spread = 2; // the frame before is cut to this many standard deviations of the 3 x 3 pixels around
+};
+[[nodiscard]] Tensor accumulate(Graph& g,
+                                Tensor cameras, // [2, kLensCameraFloats] fp32 as of splat(): of `now`, where the world
+                                                // is its own frame, and of `past`
+                                const FrameAndDepth& now, const FrameAndDepth& past,
+                                const AccumulateOptions& options); // -> [picture_words()] u32 array
+
 // index of the first number that is NaN or infinite, 2^32 - 1 for none: counted over the picture's own pixels
 [[nodiscard]] Tensor first_non_finite(Graph& g,
                                       Tensor x,                   // [padded pixels, N] fp32

@@ -60,9 +60,10 @@ struct SplatScene {
 };
 // how rays become pixels, of all cameras of one call: engine/camera/lens.h
 enum class SplatLens : uint32_t { pinhole, opencv, fisheye, equirectangular };
+constexpr uint32_t kLensCameraFloats = 28;
 constexpr uint32_t splat_camera_floats(SplatLens lens)
 {
-    return lens == SplatLens::pinhole ? 16 : 28;
+    return lens == SplatLens::pinhole ? 16 : kLensCameraFloats;
 }
 constexpr uint32_t splat_record_bytes(SplatLens lens)
 {

@@ -281,8 +281,50 @@ TEST_F(CliRefine, noise_stays_on_surfaces_where_the_model_or_the_option_says_so)
     const ProgramResult without =
         semrover_program("refine " + path(buffers) + " -m " + path("model") + " -o " + path("without") + kSettings);
     EXPECT_EQ(without.code, 0);
-    EXPECT_NE(without.err.find("without --path the noise does not stay on surfaces"), std::string::npos) << without.err;
+    EXPECT_NE(without.err.find("without --path it is not known which surfaces frames share"), std::string::npos)
+        << without.err;
     EXPECT_TRUE(fresh == results("without"));
+}
+
+TEST_F(CliRefine, finished_frames_take_a_share_of_the_one_before_and_latents_do_not)
+{
+    ASSERT_TRUE(write_grid(folder_ / "street.sgrid", street()));
+    folder_.put("path.tum", "0 0 3.6 1.6 -0.5 0.5 -0.5 0.5\n1 0.2 3.6 1.6 -0.5 0.5 -0.5 0.5\n"
+                            "2 0.4 3.6 1.6 -0.5 0.5 -0.5 0.5\n");
+    const std::string drive = " --path " + path("path.tum") + " -W 56 -H 40 ", history = "--frame-history 0.6 ";
+    const auto without = refined("without", drive, "street.sgrid");
+    const auto whole = refined("whole", drive + history, "street.sgrid");
+    for (const auto& [name, bytes] : whole) {
+        const bool same = name.starts_with("latents") || name == "frames/000000.png";
+        EXPECT_EQ(bytes == without.at(name), same) << name;
+    }
+    // from buffers, from a frame on, one network at a time, and after a kill it is the same
+    const std::string buffers = "whole/buffers";
+    const Json planned = report("planned", drive + history + "--dry-run", buffers);
+    const std::string least = fmt::format("--max-vram {} ", planned["policies"]["staged"].get<uint64_t>());
+    EXPECT_TRUE(whole == refined("again", drive + history, buffers));
+    EXPECT_TRUE(whole == refined("staged", drive + history + least, buffers));
+    const auto last = refined("last", drive + history + "--frames 2: --from " + path("whole"), buffers);
+    EXPECT_TRUE(last.at("frames/000002.png") == whole.at("frames/000002.png"));
+    for (const char* format : {"png", "jpeg"}) {
+        const std::string options = drive + history + "--format " + format + " ",
+                          name = std::string("killed_") + format;
+        const auto expected = refined(std::string("whole_") + format, options, buffers);
+        ASSERT_EQ(stop_after(name, 5, SIGKILL, options, buffers), 128 + SIGKILL);
+        EXPECT_TRUE(expected == refined(name, options, buffers)) << format;
+    }
+    // a model that asks for it, with cameras and without
+    folder_.put("model/model_index.json", R"({"defaults": {"renderer": {"frame_history": 0.6}}})");
+    EXPECT_TRUE(whole == refined("said", drive, buffers));
+    EXPECT_TRUE(without == refined("overruled", drive + "--frame-history 0", buffers));
+    const ProgramResult blind =
+        semrover_program("refine " + path(buffers) + " -m " + path("model") + " -o " + path("blind") + kSettings);
+    EXPECT_EQ(blind.code, 0);
+    EXPECT_NE(blind.err.find("without --path it is not known which surfaces"), std::string::npos) << blind.err;
+    EXPECT_TRUE(without == results("blind"));
+    const ProgramResult asked = refine("asked", "--frame-history 0.5", buffers);
+    EXPECT_EQ(asked.code, 2);
+    EXPECT_NE(asked.err.find("--frame-history needs the cameras"), std::string::npos) << asked.err;
 }
 
 // ---- bad input: one line, the exit code, nothing left behind
@@ -376,8 +418,7 @@ TEST_F(CliRefineRefuses, outputs_devices_and_options_that_cannot_be)
     expect_refusal(line + "--frames 0:3", 2, "--frames 0:3 is not within 0:2");
     expect_refusal(line + "--frames two", 2, "FIRST:LAST");
     expect_refusal(line + "--sampler heun", 2, "heun");
-    expect_refusal("refine " + path("in") + " -m " + path("model") + " -o " + path("out") + " --steps 0", 2,
-                   "--steps");
+    expect_refusal("refine " + path("in") + " -m " + path("model") + " -o " + path("out") + " --steps 0", 2, "--steps");
     expect_refusal(line + "--cfg-scale=-1", 2, "--cfg-scale");
     expect_refusal(line + "--max-vram 100KiB", 5, "--max-vram");
     expect_refusal(line + "--max-vram 0.0001", 5, "--max-vram allows 100000"); // GB

@@ -60,6 +60,7 @@ class JobRefinement : public testing::Test {
         o.path = drive();
         o.grid = [] { return street(); };
         o.frame_noise = FrameNoise::warped;
+        o.frame_history = 0.6f;
         return o;
     }
     std::unique_ptr<Job> begin(const RefinementOptions& o, const RefinementCallbacks& callbacks = {},

@@ -139,6 +139,9 @@ void add_options(CLI::App& c, RefineArguments& a)
         c, "--frame-noise", {"fresh", "warped"},
         "of a frame: fresh, or warped, as it was on the surfaces of the frame before (wants --path)",
         [&o](const std::string& text) { o.frame_noise = text == "warped" ? FrameNoise::warped : FrameNoise::fresh; });
+    add_number(c, "--frame-history", o.frame_history,
+               "share of the frame before, where both show the same surface: flickers less (wants --path)", 0,
+               kMostFrameHistory);
     add_precision_option(c, o.precision);
     CLI::Option* frames =
         c.add_option("--frames", o.frames, "FIRST:LAST, both included, either may be left out; FIRST is a first frame");

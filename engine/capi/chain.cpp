@@ -48,6 +48,8 @@ Result<RefinementOptions> options_of(const sr_chain_desc& d)
     o.seed = d.seed;
     o.precision = d.fp32 ? DType::f32 : DType::f16;
     SR_TRY(o.frame_noise, noise_of(d.noise));
+    if (d.noise == SR_NOISE_FRESH)
+        o.frame_history = 0; // neither needs to know what frames share
     return o;
 }
 

@@ -56,8 +56,12 @@ Result<std::unique_ptr<FrameChain>> FrameChain::create(Device& device, Refinemen
 Status FrameChain::make()
 {
     const RendererWork work{.size = size_};
-    SR_TRY(memory_, plan_renderer(device_, r_, {&work, 1}, state_.planned_bytes(device_.limits())));
+    const uint64_t history = r_.frame_history > 0 ? FrameHistory::planned_bytes(device_.limits(), size_) : 0;
+    SR_TRY(memory_, plan_renderer(device_, r_, {&work, 1}, state_.planned_bytes(device_.limits()) + history));
     SR_CHECK(state_.allocate(device_, "a chain's pictures"));
+    if (r_.frame_history > 0) {
+        SR_TRY(history_, FrameHistory::create(device_, size_, r_.frame_history));
+    }
     SR_TRY(copies_, CopyRing::create(device_));
     Graph g;
     g.keep(picture_texels(g, bytes_.in(g), size_.image_width * size_.image_height), texels_);
@@ -76,9 +80,13 @@ Status FrameChain::fill(const Slot& seen)
 Status FrameChain::begin(const CameraFrame& camera, const ImageGray16& depth)
 {
     SR_ASSERT(!busy(), "a frame begins before the one before has ended");
-    if (follows_surfaces()) {
+    if (warped()) {
         next_trail_ = trail_;
         next_trail_.follow(camera, depth);
+    }
+    if (history_) {
+        camera_ = camera;
+        depth_ = depth;
     }
     stage_ = Stage::encode;
     return {};
@@ -86,7 +94,7 @@ Status FrameChain::begin(const CameraFrame& camera, const ImageGray16& depth)
 
 AsdStart FrameChain::start() const
 {
-    return {frames_, key_, frames_ == 0, follows_surfaces() ? next_trail_.keys() : std::span<const NoiseKey>{}};
+    return {frames_, key_, frames_ == 0, warped() ? next_trail_.keys() : std::span<const NoiseKey>{}};
 }
 
 Status FrameChain::encode()
@@ -129,6 +137,10 @@ Status FrameChain::decode()
         bytes.resize(bytes_.bytes());
         SR_CHECK(bytes_.write(device_, bytes));
     }
+    if (history_) {
+        SR_CHECK(history_->add(bytes_, camera_, depth_));
+        SR_CHECK(copies_->copy(history_->frame(), bytes_).map([](uint64_t) {}));
+    }
     SR_CHECK(to_texels_->run());
     return keep_latent();
 }
@@ -140,7 +152,7 @@ Status FrameChain::keep_latent()
         SR_CHECK(copies_->copy(renderer_->denoiser()->slots().latent, last_).map([](uint64_t) {}));
     else
         last_on_host_ = std::move(new_latent_);
-    if (follows_surfaces())
+    if (warped())
         trail_ = next_trail_;
     ++frames_;
     stage_ = Stage::idle;
@@ -195,6 +207,8 @@ void FrameChain::restart()
     SR_ASSERT(!busy(), "a chain restarts in the middle of a frame");
     frames_ = 0;
     trail_ = NoiseTrail(size_);
+    if (history_)
+        history_->restart();
 }
 
 } // namespace semrover

@@ -4,6 +4,7 @@
 
 #include "engine/job/budget_meter.h"
 #include "engine/job/refinement.h"
+#include "engine/refine/frame_history.h"
 #include "engine/refine/frame_renderer.h"
 
 namespace semrover {
@@ -25,13 +26,13 @@ class FrameChain {
     Status fill(const Slot& seen); // a copy, behind what was submitted before
     // a host's millimetres on their way here, two a word; none where nobody reads them
     const Slot& depths() const { return depths_; }
-    bool follows_surfaces() const { return r_.frame_noise == FrameNoise::warped; }
+    bool follows_surfaces() const { return r_.follows_surfaces(); }
 
     // One frame: begin, step until it says true; the result is texels() until the next frame ends. With
-    // follows_surfaces(), camera and depth say where its noise comes from; else they are not read. A step works for
-    // what the budget has room for, one submit at least: the encoder, a step of denoising, or the decoder. An error
-    // gives the frame up, as cancel() does: the chain is as it was before begin().
-    // Errors: internal where the networks return NaN or infinity; device errors
+    // follows_surfaces(), camera and depth say what it shares with the frame before; else they are not read. A step
+    // works for what the budget has room for, one submit at least: the encoder, a step of denoising, or the decoder. An
+    // error gives the frame up, as cancel() does: the chain is as it was before begin(). Errors: internal where the
+    // networks return NaN or infinity; device errors
     Status begin(const CameraFrame& camera, const ImageGray16& depth);
     Result<bool> step(const JobBudget& budget);
     Status cancel();
@@ -54,6 +55,7 @@ class FrameChain {
     Status decode();
     Status keep_latent();
     AsdStart start() const;
+    bool warped() const { return r_.frame_noise == FrameNoise::warped; }
     bool resident() const { return memory_.policy == MemoryPolicy::resident; }
 
     Device& device_;
@@ -70,6 +72,9 @@ class FrameChain {
 
     Stage stage_ = Stage::idle;
     uint32_t frames_ = 0;
+    std::unique_ptr<FrameHistory> history_; // null: a finished frame holds nothing of the one before
+    CameraFrame camera_;                    // of the frame that has begun, and its depth
+    ImageGray16 depth_;
     NoiseTrail trail_, next_trail_;                // of the frames before, and with the one that has begun
     std::vector<float> last_on_host_, new_latent_; // where the networks take turns
     SubmitCost cost_[3];                           // of the stages

@@ -19,6 +19,16 @@ std::vector<float> rows_of(const Slot& slot, uint32_t pixels, std::span<const st
 
 } // namespace
 
+// histories are there from the first task on, as they are planned
+Status FrameRefiner::start(const RendererWork& work, const RendererWork& total)
+{
+    for (const RefineChain& c : p_.chains)
+        if (c.history > 0 && !trails_[&c].history) {
+            SR_TRY(trails_[&c].history, FrameHistory::create(p_.device, c.size, c.history));
+        }
+    return renderer_->start(work, total);
+}
+
 void FrameRefiner::give_buffer(const std::string& camera, const Slot& seen)
 {
     Trail& t = trails_[chain_of(camera)];
@@ -117,17 +127,74 @@ Status FrameRefiner::end_window(const RefineTask& t)
     });
 }
 
+// What was not kept without a loss, from the first frame on. Its latents are there.
+Status FrameRefiner::decode_again(const RefineTask& t, FrameHistory& history)
+{
+    const RefineChain& c = *t.chain;
+    for (uint32_t f = c.range.first; f < t.frame(); ++f) {
+        SR_TRY(const std::vector<float> values, latent(c, f));
+        SR_TRY(const std::vector<float> image, renderer_->decode(values));
+        SR_TRY(const ImageGray16 depth, depth_of(c, f));
+        SR_CHECK(history.add(pixels_of_floats(image), c.cameras[f], depth));
+    }
+    return {};
+}
+
+Result<FrameHistory*> FrameRefiner::history(const RefineTask& t)
+{
+    const RefineChain& c = *t.chain;
+    Trail& trail = trails_[&c];
+    FrameHistory* history = trail.history.get();
+    if (trail.finished == t.frame())
+        return history;
+    history->restart();
+    const bool first = t.frame() == c.range.first;
+    if (first && c.picture_before.empty())
+        return history;
+    if (!first && !p_.store.lossless()) {
+        SR_CHECK(decode_again(t, *history));
+        return history;
+    }
+    const uint32_t before = t.frame() - 1;
+    std::vector<uint8_t> pixels = c.picture_before;
+    if (!first) {
+        SR_TRY(const ImageRgb8 picture, p_.store.load_frame(c.camera, before));
+        pixels = picture.pixels;
+    }
+    SR_TRY(const ImageGray16 depth, depth_of(c, before));
+    SR_CHECK(history->restore(pixels, c.cameras[before], depth));
+    return history;
+}
+
+// decoded: pixels, or a slot of their words
+template <typename Decoded>
+Status FrameRefiner::accumulate(const RefineTask& t, const Decoded& decoded)
+{
+    const RefineChain& c = *t.chain;
+    SR_TRY(FrameHistory * frames, history(t));
+    SR_TRY(const ImageGray16 depth, depth_of(c, t.frame()));
+    SR_CHECK(frames->add(decoded, c.cameras[t.frame()], depth));
+    trails_[&c].finished = t.frame() + 1;
+    return read_frame(t, frames->frame());
+}
+
+Status FrameRefiner::read_frame(const RefineTask& t, const Slot& bytes)
+{
+    return p_.out.read(bytes,
+                       [this, t](std::span<const std::byte> read) { return save_frame(*t.chain, t.frame(), read); });
+}
+
 Status FrameRefiner::decode(const RefineTask& t)
 {
+    const bool accumulated = t.chain->history > 0;
     if (on_device_ != t.chain || frame_on_device_ != t.frame()) {
         SR_TRY(const std::vector<float> values, latent(*t.chain, t.frame()));
         SR_TRY(const std::vector<float> image, renderer_->decode(values));
         const std::vector<uint8_t> pixels = pixels_of_floats(image);
-        return save_frame(*t.chain, t.frame(), std::as_bytes(std::span(pixels)));
+        return accumulated ? accumulate(t, pixels) : save_frame(*t.chain, t.frame(), std::as_bytes(std::span(pixels)));
     }
     SR_TRY(const Slot bytes, renderer_->decode_latent());
-    return p_.out.read(bytes,
-                       [this, t](std::span<const std::byte> read) { return save_frame(*t.chain, t.frame(), read); });
+    return accumulated ? accumulate(t, bytes) : read_frame(t, bytes);
 }
 
 } // namespace semrover

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "engine/job/refiner.h"
+#include "engine/refine/frame_history.h"
 #include "engine/refine/frame_renderer.h"
 
 namespace semrover {
@@ -27,14 +28,21 @@ class FrameRefiner : public Refiner {
         uint32_t given = 0;        // buffers so far
         uint32_t frame = 0;        // of `latent`
         std::vector<float> latent; // empty: none yet
+        std::unique_ptr<FrameHistory> history;
+        std::optional<uint32_t> finished; // the frame after the last one of the history
     };
-    Status start(const RendererWork& work, const RendererWork& total) override { return renderer_->start(work, total); }
+    Status start(const RendererWork& work, const RendererWork& total) override;
     Status encode(const RefineTask& task) override;
     Status begin_window(const RefineTask& task) override;
     Result<bool> step_window() override { return renderer_->step(1); }
     Status end_window(const RefineTask& task) override;
     Status cancel_window() override { return renderer_->cancel(); }
     Status decode(const RefineTask& task) override;
+    Status decode_again(const RefineTask& task, FrameHistory& history);
+    Result<FrameHistory*> history(const RefineTask& task); // that ends with the frame before
+    template <typename Decoded>
+    Status accumulate(const RefineTask& task, const Decoded& decoded);
+    Status read_frame(const RefineTask& task, const Slot& bytes);
     Status begin_staged(const RefineTask& task, std::span<const NoiseKey> noise);
     Status begin_resident(const RefineTask& task, std::span<const NoiseKey> noise);
     Result<std::vector<float>> latent(const RefineChain& chain, uint32_t frame);

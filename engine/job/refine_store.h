@@ -33,6 +33,7 @@ class RefineStore {
   public:
     RefineStore(RunFolder& run, FrameFormat format, uint32_t channels); // reads the journal
 
+    bool lossless() const { return !format_.jpeg; } // a frame that is loaded is the one that was saved
     Path path(PieceKind kind, const BufferCamera& camera, uint32_t frame) const;
     bool has(PieceKind kind, const BufferCamera& camera, uint32_t frame) const;
 

@@ -30,6 +30,16 @@ uint64_t largest_read(const Refinement& r)
     return bytes;
 }
 
+// of all cameras, each of which has its own
+uint64_t history_bytes(const Device& device, const Refinement& r)
+{
+    uint64_t bytes = 0;
+    for (const RefineChain& c : r.chains)
+        if (c.history > 0)
+            bytes += FrameHistory::planned_bytes(device.limits(), c.size);
+    return bytes;
+}
+
 // a grid's pictures on their way into OUT/buffers, as `semrover render` would write them
 struct BufferDrawing {
     SurfelScene scene;
@@ -252,7 +262,7 @@ class RefinementJob : public Job {
         std::vector<RendererWork> work;
         for (const RefineChain& c : r_.chains)
             work.push_back(work_left(*store_, c));
-        SR_TRY(memory_, plan_renderer(device_, r_, work, 0));
+        SR_TRY(memory_, plan_renderer(device_, r_, work, history_bytes(device_, r_)));
         return {};
     }
     Status begin_planned(const CameraPath* drawn)
@@ -339,7 +349,8 @@ Result<MemoryPlan> plan_refinement(Device& device, const Refinement& r)
     std::vector<RendererWork> work;
     for (const RefineChain& c : r.chains)
         work.push_back(whole_work(c));
-    return plan_renderer(device, r, work, Outgoing::planned_bytes(device.limits(), largest_read(r)));
+    const uint64_t outgoing = Outgoing::planned_bytes(device.limits(), largest_read(r));
+    return plan_renderer(device, r, work, outgoing + history_bytes(device, r));
 }
 
 Result<std::unique_ptr<Job>> begin_refinement(Device& device, Refinement r, const RefinementCallbacks& callbacks)

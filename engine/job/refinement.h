@@ -16,7 +16,7 @@ struct RefinementOptions {
     Path input, model, output;      // input: a folder of buffers, or a grid
     std::optional<Sampler> sampler; // this and what is optional below: as the model says
     std::optional<int> steps;       // of denoising a frame
-    std::optional<float> guidance_scale, previous_noise;
+    std::optional<float> guidance_scale, previous_noise, frame_history;
     std::optional<FrameNoise> frame_noise;
     // of a renderer of videos: guidance of a window's first frame (guidance_scale is that of the last), frames of a
     // window, frames that it knows of the one before, frames that are decoded together
@@ -47,10 +47,13 @@ struct Refinement {
     VsdOptions vsd; // of a renderer of videos, in place of `asd`
     WindowShape shape;
     FrameNoise frame_noise = FrameNoise::fresh;
+    float frame_history = 0; // share of the frame before in a finished one
     DrawOptions draw;
     std::vector<RefineChain> chains;
 
     size_t frames() const;
+    // depth and cameras say which surfaces a frame shares with the one before
+    bool follows_surfaces() const { return frame_noise == FrameNoise::warped || frame_history > 0; }
     // true when `output` holds a run that was stopped
     bool was_stopped() const;
     // what would be replaced is refused (usage), and so are `beside`, which the caller will write; a run that was

@@ -23,6 +23,10 @@ Status set_frame_renderer(Refinement& r)
     r.asd.guidance_scale = o.guidance_scale.value_or(r.model.defaults.guidance_scale);
     r.asd.previous_noise = o.previous_noise.value_or(r.model.defaults.previous_noise);
     r.asd.seed = o.seed;
+    r.frame_history = o.frame_history.value_or(r.model.defaults.frame_history);
+    if (!(r.frame_history >= 0 && r.frame_history <= kMostFrameHistory))
+        return fail(ErrorCode::usage, "a share of {} of the frame before, expected 0 to {}", r.frame_history,
+                    kMostFrameHistory);
     return {};
 }
 
@@ -33,6 +37,9 @@ Status set_video_renderer(Refinement& r)
     const VideoDefaults& d = r.model.defaults.video;
     if (o.previous_noise)
         return fail(ErrorCode::usage, "{}: a renderer of videos puts no noise on the frame before",
+                    quote_path(o.model));
+    if (o.frame_history.value_or(0) > 0)
+        return fail(ErrorCode::usage, "{}: a renderer of videos takes no share of the frame before",
                     quote_path(o.model));
     r.vsd.first_guidance = o.first_guidance_scale.value_or(d.first_guidance_scale);
     r.vsd.last_guidance = o.guidance_scale.value_or(r.model.defaults.guidance_scale);
@@ -151,25 +158,50 @@ Status find_chains(Refinement& r)
     return {};
 }
 
-// Noise stays on surfaces where it is known where the cameras were: a model that asks for it gets fresh noise without a
-// path, an option is refused
+// with --from, the frame that an earlier run finished before the range: where it is there without a loss
+Status find_picture_before(const Refinement& r, RefineChain& chain)
+{
+    if (chain.before.empty())
+        return {};
+    const Path picture =
+        r.options.from / "frames" / chain.camera.name / fmt::format("{:06}.png", chain.range.first - 1);
+    if (!fs::exists(picture))
+        return {};
+    SR_TRY(const ImageRgb8 image, read_png_rgb8(picture));
+    if (image.width != chain.size.image_width || image.height != chain.size.image_height)
+        return fail(ErrorCode::bad_input, "{}: {} x {} pixels, expected {} x {}", quote_path(picture), image.width,
+                    image.height, chain.size.image_width, chain.size.image_height);
+    chain.picture_before = image.pixels;
+    return {};
+}
+
+// Which surfaces frames share is known where the cameras are: without a path a model that asks for it does without, an
+// option is refused
 Status find_motion(Refinement& r, const JobCallbacks& callbacks)
 {
     const RefinementOptions& o = r.options;
-    if (r.frame_noise == FrameNoise::fresh)
+    if (!r.follows_surfaces())
         return {};
     if (!o.path) {
-        if (o.frame_noise)
+        if (o.frame_noise == FrameNoise::warped)
             return fail(ErrorCode::usage, "--frame-noise warped needs the cameras of the buffers: --path");
+        if (o.frame_history.value_or(0) > 0)
+            return fail(ErrorCode::usage, "--frame-history needs the cameras of the buffers: --path");
         r.frame_noise = FrameNoise::fresh;
+        r.frame_history = 0;
         if (callbacks.warning)
-            callbacks.warning("without --path the noise does not stay on surfaces, as this model wants it: frames will "
-                              "flicker more");
+            callbacks.warning("without --path it is not known which surfaces frames share, as this model wants it: "
+                              "frames will flicker more");
         return {};
     }
-    for (RefineChain& c : r.chains)
+    for (RefineChain& c : r.chains) {
+        c.warped_noise = r.frame_noise == FrameNoise::warped;
+        c.history = r.frame_history;
         std::ranges::copy_if(o.path->frames, std::back_inserter(c.cameras),
                              [&](const CameraFrame& f) { return f.camera == c.camera.name; });
+        if (c.history > 0)
+            SR_CHECK(find_picture_before(r, c));
+    }
     return {};
 }
 
@@ -197,6 +229,7 @@ Result<Json> chain_json(const Refinement& r, const RefineChain& c)
     if (!c.before.empty()) {
         Hash hash;
         hash.add(std::as_bytes(std::span(c.before)));
+        hash.add(std::as_bytes(std::span(c.picture_before)));
         camera["before"] = hash_text(hash.value());
     }
     if (r.options.from_grid())
@@ -204,7 +237,7 @@ Result<Json> chain_json(const Refinement& r, const RefineChain& c)
     const uint32_t first = std::min(c.range.first, c.windows.front().first); // the first that a window sees
     SR_TRY(const uint64_t buffers, hash_pictures(c.camera, {"color", "visible"}, first, c.range.last));
     camera["buffers"] = hash_text(buffers);
-    if (r.frame_noise == FrameNoise::warped) {
+    if (r.follows_surfaces()) {
         SR_TRY(const uint64_t depth, hash_pictures(c.camera, {"depth"}, 0, c.range.last));
         camera["depth"] = hash_text(depth);
     }
@@ -221,7 +254,7 @@ Result<Json> input_json(const Refinement& r)
         cameras.push_back(std::move(camera));
     }
     Json input{{"cameras", cameras}};
-    if (o.from_grid() || r.frame_noise == FrameNoise::warped)
+    if (o.from_grid() || r.follows_surfaces())
         input["path"] = hash_text(hash_cameras(*o.path)); // as read, whatever files and options it came from
     if (!o.from_grid())
         return input;
@@ -308,6 +341,8 @@ Result<Json> refinement_settings(const Refinement& r, const Device& device)
                   {"seed", o.seed},
                   {"format", o.format.jpeg ? "jpeg" : "png"},
                   {"quality", o.format.jpeg ? o.format.quality : 0}};
+    if (r.frame_history > 0) // not there without, so that runs of earlier versions go on
+        settings["frame_history"] = r.frame_history;
     settings.update(r.model.video()
                         ? video_settings(r)
                         : Json{{"guidance_scale", r.asd.guidance_scale}, {"previous_noise", r.asd.previous_noise}});

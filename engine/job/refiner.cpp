@@ -52,10 +52,36 @@ const RefineChain* Refiner::chain_of(const std::string& camera) const
 void Refiner::give_depth(const std::string& camera, const ImageGray16& depth)
 {
     const RefineChain* chain = chain_of(camera);
-    if (chain->cameras.empty())
+    DrawnDepths& depths = depths_[chain];
+    const uint32_t frame = depths.given++;
+    if (wants_depth(*chain, frame))
+        depths.frames[frame] = depth;
+    if (!chain->warped_noise)
         return;
     NoiseTrail& noise = noise_.try_emplace(chain, chain->size).first->second;
-    noise.follow(chain->cameras[noise.frames()], depth);
+    noise.follow(chain->cameras[frame], depth);
+}
+
+// of a finished frame and of the one before it, until that is there
+bool Refiner::wants_depth(const RefineChain& chain, uint32_t frame) const
+{
+    const FrameRange& range = chain.range;
+    const auto left = [&](uint32_t f) {
+        return f >= range.first && f <= range.last && !p_.store.has(PieceKind::frame, chain.camera, f);
+    };
+    return chain.history > 0 && (left(frame) || left(frame + 1));
+}
+
+Result<ImageGray16> Refiner::depth_of(const RefineChain& c, uint32_t frame)
+{
+    if (!order_.drawn)
+        return read_depth(c.camera, frame);
+    SR_CHECK(p_.out.arrive()); // with what was drawn
+    std::map<uint32_t, ImageGray16>& frames = depths_[&c].frames;
+    frames.erase(frames.begin(), frames.lower_bound(frame));
+    const auto found = frames.find(frame);
+    SR_ASSERT(found != frames.end(), "the depth of frame {} was not drawn", frame);
+    return found->second;
 }
 
 Result<bool> Refiner::settle()
@@ -117,7 +143,7 @@ Result<bool> Refiner::denoise(const RefineTask& task)
 // followed from the camera's first frame on, whichever frames are refined
 Result<std::span<const NoiseKey>> Refiner::keys(const RefineChain& c, uint32_t frame)
 {
-    if (c.cameras.empty())
+    if (!c.warped_noise)
         return std::span<const NoiseKey>{};
     if (order_.drawn)
         SR_CHECK(p_.out.arrive()); // with what was drawn

@@ -52,6 +52,8 @@ class Refiner {
 
     const RefineChain* chain_of(const std::string& camera) const;
     bool staged() const { return order_.policy == MemoryPolicy::staged; }
+    // as it was drawn, or from the buffers' files; frames in order
+    Result<ImageGray16> depth_of(const RefineChain& chain, uint32_t frame);
     // noise of a frame; empty: each frame has its own
     Result<std::span<const NoiseKey>> keys(const RefineChain& chain, uint32_t frame);
     Status save_latent(PieceKind kind, const RefineChain& chain, uint32_t frame, std::vector<float> latent);
@@ -69,7 +71,13 @@ class Refiner {
     std::map<const RefineChain*, RendererWork> work_;
     RendererWork total_{{}, false, false, false}; // of all chains, size apart
     bool begun_ = false;                          // the window of the task is being denoised
+    bool wants_depth(const RefineChain& chain, uint32_t frame) const;
     std::map<const RefineChain*, NoiseTrail> noise_;
+    struct DrawnDepths {
+        uint32_t given = 0;                     // so far
+        std::map<uint32_t, ImageGray16> frames; // that are still wanted
+    };
+    std::map<const RefineChain*, DrawnDepths> depths_;
 };
 
 // a buffer's files as splat_pixels() would make them

@@ -139,6 +139,13 @@ void read_video_defaults(JsonFields& fields, VideoDefaults& v)
     read_added_numbers(fields, v.added_numbers);
 }
 
+// of a renderer that makes each frame from the one before
+void read_frame_defaults(JsonFields& fields, RendererDefaults& d)
+{
+    fields.number("previous_noise", 0.f, 100.f, d.previous_noise);
+    fields.number("frame_history", 0.f, kMostFrameHistory, d.frame_history);
+}
+
 Status read_defaults(const Path& path, bool video, RendererDefaults& d, std::vector<std::string>& warnings)
 {
     SR_TRY(const Json index, read_json(path));
@@ -151,7 +158,7 @@ Status read_defaults(const Path& path, bool video, RendererDefaults& d, std::vec
     if (video)
         read_video_defaults(fields, d.video);
     else
-        fields.number("previous_noise", 0.f, 100.f, d.previous_noise);
+        read_frame_defaults(fields, d);
     fields.choice("frame_noise", {{"fresh", FrameNoise::fresh}, {"warped", FrameNoise::warped}}, d.frame_noise);
     fields.number("visible_threshold", 0.f, 1.f, d.visible_threshold);
     read_splat_radius(fields, d);

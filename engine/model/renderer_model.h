@@ -30,14 +30,17 @@ struct VideoDefaults {
     std::vector<float> added_numbers = {6, 127, 0.02f}; // SVD's: frames a second less 1, motion, noise of the image
 };
 
+constexpr float kMostFrameHistory = 0.95f; // with more, nothing new would come in
+
 // model_index.json's "defaults": {"renderer": {"num_inference_steps": 20, "guidance_scale": 1.5, "previous_noise": 0.3,
-// "frame_noise": "fresh", "visible_threshold": 0.5, "splat_radius": 0.04}}: what a command uses where no option
-// overrides it. The other fields of "defaults" are the transformer's.
+// "frame_noise": "fresh", "frame_history": 0, "visible_threshold": 0.5, "splat_radius": 0.04}}: what a command uses
+// where no option overrides it. The other fields of "defaults" are the transformer's.
 struct RendererDefaults {
     int num_inference_steps = 20;
     float guidance_scale = 1.5f; // of a video: of a window's last frame
     float previous_noise = 0.3f; // scale of the noise on the previous frame's latent
-    VideoDefaults video;         // of a renderer of videos, which has no previous_noise
+    float frame_history = 0;     // share of the frame before in a finished one, 0 to kMostFrameHistory
+    VideoDefaults video;         // of a renderer of videos, which has neither of the two
     FrameNoise frame_noise = FrameNoise::fresh;
     float visible_threshold = 0.5f; // alpha from which splats cover a pixel
     // standard deviation of the splats in its buffers, metres; none ("auto"): from the spacing of the points. It must

@@ -20,7 +20,10 @@ struct RefineChain {
     FrameRange range;
     LatentSize size;
     std::vector<float> before;        // latents of frames before the range; empty: the first frame has none before it
-    std::vector<CameraFrame> cameras; // of all frames, for noise that stays on surfaces; empty: each frame has its own
+    std::vector<CameraFrame> cameras; // of all frames, where surfaces are followed from one to the next
+    bool warped_noise = false;        // noise stays on surfaces; else each frame has its own
+    float history = 0;                // share of the frame before in a finished one (FrameHistory)
+    std::vector<uint8_t> picture_before = {}; // finished, before the range; empty: none
     WindowShape shape = {};
     std::vector<FrameWindow> windows = {}; // of the range, as they are denoised
 };

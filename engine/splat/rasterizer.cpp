@@ -14,6 +14,30 @@ namespace {
 
 constexpr uint32_t kPairBytes = 4;
 
+Status check_camera(const SplatCamera& c, size_t index)
+{
+    bool finite = std::isfinite(c.fx) && std::isfinite(c.fy) && std::isfinite(c.cx) && std::isfinite(c.cy);
+    for (float v : c.world_to_camera)
+        finite = finite && std::isfinite(v);
+    for (float v : c.distortion)
+        finite = finite && std::isfinite(v);
+    if (!finite || c.fx == 0 || c.fy == 0)
+        return fail(ErrorCode::bad_input, "camera {}: {}", index,
+                    finite ? "no focal length" : "a number is not finite");
+    return {};
+}
+
+// room for `need` and a quarter more, if the device can bind it
+Result<uint32_t> room_for(uint32_t need, uint32_t bytes_each, const DeviceLimits& limits, const char* what)
+{
+    const uint64_t limit = std::min(limits.max_storage_range, limits.max_allocation) / bytes_each;
+    if (need > limit)
+        return fail(ErrorCode::out_of_memory, "a frame needs {} {}; this device has room for {}", need, what, limit);
+    return uint32_t(std::min<uint64_t>(limit, uint64_t(need) + need / 4 + 1024));
+}
+
+} // namespace
+
 SplatLens lens_of(CameraModel model)
 {
     switch (model) {
@@ -29,20 +53,6 @@ SplatLens lens_of(CameraModel model)
     return SplatLens::pinhole;
 }
 
-Status check_camera(const SplatCamera& c, size_t index)
-{
-    bool finite = std::isfinite(c.fx) && std::isfinite(c.fy) && std::isfinite(c.cx) && std::isfinite(c.cy);
-    for (float v : c.world_to_camera)
-        finite = finite && std::isfinite(v);
-    for (float v : c.distortion)
-        finite = finite && std::isfinite(v);
-    if (!finite || c.fx == 0 || c.fy == 0)
-        return fail(ErrorCode::bad_input, "camera {}: {}", index,
-                    finite ? "no focal length" : "a number is not finite");
-    return {};
-}
-
-// a camera as the kernels take it
 void write_row(const SplatCamera& c, std::span<float> row)
 {
     const float focal[] = {c.fx, c.fy, c.cx, c.cy};
@@ -54,17 +64,6 @@ void write_row(const SplatCamera& c, std::span<float> row)
     row[24] = c.limit;
     row[25] = c.radial_depth;
 }
-
-// room for `need` and a quarter more, if the device can bind it
-Result<uint32_t> room_for(uint32_t need, uint32_t bytes_each, const DeviceLimits& limits, const char* what)
-{
-    const uint64_t limit = std::min(limits.max_storage_range, limits.max_allocation) / bytes_each;
-    if (need > limit)
-        return fail(ErrorCode::out_of_memory, "a frame needs {} {}; this device has room for {}", need, what, limit);
-    return uint32_t(std::min<uint64_t>(limit, uint64_t(need) + need / 4 + 1024));
-}
-
-} // namespace
 
 SplatCamera splat_camera(const Intrinsics& i, const Pose& pose)
 {

@@ -24,6 +24,9 @@ struct SplatCamera {
     bool radial_depth = false; // depth is the distance from the camera, not along z
 };
 SplatCamera splat_camera(const Intrinsics& intrinsics, const Pose& pose);
+SplatLens lens_of(CameraModel model);
+// as kernels take it: splat_camera_floats() numbers
+void write_row(const SplatCamera& camera, std::span<float> row);
 
 // what one camera sees; [height, width] row-major. w is the weight of a splat in a pixel, front to back.
 struct SplatImage {
