@@ -13,6 +13,8 @@ constexpr uint32_t kMostPixels = 16384; // of a side
 // fx, fy, cx, cy in pixels and [3, 4] row by row
 CameraFrame camera_frame(const double (&pinhole)[4], const double (&world_to_camera)[12], const ImageSize& size);
 
+SplatCamera pinhole_camera(const sr_draw_desc& draw, const ImageSize& size);
+
 // Errors: bad_input for numbers that are not finite, and focal lengths that are not above 0. name: of the structure
 Status check_camera(const CameraFrame& frame, const char* name);
 

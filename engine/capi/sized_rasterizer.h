@@ -22,6 +22,8 @@ class SizedRasterizer {
         return rasterizer_.get();
     }
 
+    Rasterizer* last() const { return rasterizer_.get(); } // or null
+
   private:
     std::unique_ptr<Rasterizer> rasterizer_;
     ImageSize size_;

@@ -21,8 +21,7 @@ Status draw_world(sr_world& world, const sr_draw_desc& d)
     SR_CHECK(check_size(size, "sr_draw_desc"));
     sr_context& context = *world.context;
     SR_TRY(Rasterizer * rasterizer, world.images.of(*context.device, splats->scene(), size, {}));
-    const CameraFrame frame = camera_frame({d.fx, d.fy, d.cx, d.cy}, d.world_to_camera, size);
-    const SplatCamera camera = splat_camera(frame.intrinsics, frame.pose);
+    const SplatCamera camera = pinhole_camera(d, size);
     SR_CHECK(rasterizer->draw({&camera, 1}).map([](uint32_t) {}));
     const SplatSlots images = rasterizer->images(0);
     SR_CHECK(hand_over(context, images.color, size, d.color));

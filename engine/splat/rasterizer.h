@@ -82,6 +82,15 @@ class Rasterizer {
     SplatSlots images(uint32_t camera) const;
     SplatPixelSlots pixels(uint32_t camera) const;
 
+    // The same by a host's hand: records the drawing into a command buffer, to be executed any number of times, one
+    // after the other, on the device's queue family. camera: copied. What is recorded is good until make_whole()
+    // returns false, and as long as the rasterizer. Errors: bad_input as render()'s
+    Status record(VkCommandBuffer commands, const SplatCamera& camera);
+    // When the executions have ended: had all of the last kRecordings room for their splats? Where one had not, there
+    // is more room from now on, and false is returned. Errors: out_of_memory
+    Result<bool> make_whole();
+    static constexpr uint32_t kRecordings = 16;
+
     const Program& program() const { return *program_; }
     // device memory for what it has room for now, beside the scene's
     uint64_t planned_bytes() const { return state_.planned_bytes(device_.limits()) + program_->plan().arena_bytes(); }
@@ -102,6 +111,8 @@ class Rasterizer {
     uint32_t max_visible_ = 0, max_pairs_ = 0, rebuilds_ = 0;
     State state_;
     Slot camera_table_, visible_, pairs_;
+    Slot recorded_; // [kRecordings, 2] u32: visible and pairs of what was recorded
+    uint32_t recording_ = 0;
     SplatSlots images_;      // of all cameras, or
     SplatPixelSlots pixels_; // likewise
     std::unique_ptr<Program> program_;

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "runtime/device/command.h"
-#include "runtime/device/device.h"
+#include "runtime/device/command_ring.h"
 
 namespace semrover {
 
@@ -14,16 +14,15 @@ struct HostTarget {
     HostImage image = {};
 };
 
+// into a command buffer that is being recorded. to.image: texels of the slice's rows, as many as it has
+void record_host_target(const Device& device, VkCommandBuffer commands, const BufferSlice& from, const HostTarget& to);
+
 // Copies what lies on the device into a host program's memory, and back, and waits for it.
 class HostCopies {
   public:
     static Result<std::unique_ptr<HostCopies>> create(Device& device);
-    ~HostCopies();
-    HostCopies(const HostCopies&) = delete;
-    HostCopies& operator=(const HostCopies&) = delete;
 
-    // to.image: texels of the slice's rows, as many as it has
-    Status copy(const BufferSlice& from, const HostTarget& to);
+    Status copy(const BufferSlice& from, const HostTarget& to); // as record_host_target()
     // as many bytes as the slice has, from a buffer with TRANSFER_SRC usage
     Status fetch(VkBuffer from, uint64_t offset, const BufferSlice& to);
 
@@ -32,8 +31,7 @@ class HostCopies {
     Status submit();
 
     Device& device_;
-    VkCommandPool pool_ = VK_NULL_HANDLE;
-    VkCommandBuffer commands_ = VK_NULL_HANDLE;
+    std::unique_ptr<CommandRing> commands_;
 };
 
 } // namespace semrover
