@@ -356,9 +356,9 @@ typedef struct sr_sync {
 sr_status sr_world_submit(sr_world* world, const sr_draw_desc* draw, const sr_sync* sync);
 
 /* How many tiles of the picture splats touch is known only when they are drawn. sr_world_draw repeats a picture that
- * there was too little room for; what is recorded cannot be repeated, and lacks the farthest splats then. Call this when
- * what was recorded or submitted has finished. SR_OK: the last 16 pictures were whole. SR_ERR_PARTIAL: one was not;
- * there is more room from now on, and what was recorded before is no longer valid. */
+ * there was too little room for; what is recorded cannot be repeated, and lacks the farthest splats then. Call this
+ * when what was recorded or submitted has finished. SR_OK: the last 16 pictures were whole. SR_ERR_PARTIAL: one was
+ * not; there is more room from now on, and what was recorded before is no longer valid. */
 sr_status sr_world_check_draws(sr_world* world);
 
 /* ---- Chains: frames of one camera, each refined from its splat buffer and the frame before. ---- */

@@ -23,11 +23,11 @@ def make_empty(header, folder):
     with open(header, encoding="utf-8") as file:
         text = re.sub(r"/\*.*?\*/", "", file.read(), flags=re.S)
     functions = [m[0][:-1] + " { __builtin_trap(); }" for m in PROTOTYPE.finditer(text)]
-    source, library = os.path.join(folder, "empty.c"), os.path.join(folder, "libsemrover.so")
-    with open(source, "w", encoding="utf-8") as file:
+    library = os.path.join(folder, "libsemrover.so")
+    with open(os.path.join(folder, "empty.c"), "w", encoding="utf-8") as file:
         file.write("\n".join(['#include "semrover.h"'] + functions) + "\n")
-    subprocess.run(["cc", "-std=c99", "-Wno-pedantic", "-g", "-shared", "-fPIC", "-I" + os.path.dirname(header), "-o",
-                    library, source], check=True)
+    subprocess.run(["cc", "-std=c99", "-Wno-pedantic", "-g", "-shared", "-fPIC",
+                    "-I" + os.path.dirname(os.path.abspath(header)), "-o", library, "empty.c"], check=True, cwd=folder)
     return library
 
 
