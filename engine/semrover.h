@@ -300,6 +300,19 @@ typedef struct sr_target {
     uint32_t layout_after;  /* VkImageLayout: as it will be */
 } sr_target;
 
+/* A z-buffer of the host's: splats behind it are not drawn. Metres along z are scale / (d - offset) for the number d of
+ * a pixel. With 0 at the near plane n and 1 at the far plane f: scale = f n / (n - f), offset = f / (f - n). Reversed,
+ * without a far plane (d = n / z): scale = n, offset = 0. */
+typedef struct sr_depth_image {
+    void* image;     /* VkImage of the picture's size, one level and one layer, TRANSFER_SRC usage, of the context's
+                        queue family; NULL: no test */
+    uint32_t format; /* VkFormat: D32_SFLOAT or R32_SFLOAT */
+    uint32_t layout_before; /* VkImageLayout, not UNDEFINED */
+    uint32_t layout_after;
+    uint32_t reserved;
+    double scale, offset;
+} sr_depth_image;
+
 /* A pinhole camera in OpenCV's convention: x right, y down, z forward; the centre of pixel (x, y) lies at
  * (x + 0.5, y + 0.5). Pixels are stored row by row from the top. */
 typedef struct sr_draw_desc {
@@ -314,6 +327,7 @@ typedef struct sr_draw_desc {
     sr_target normal; /* R32G32B32A32_SFLOAT: sum of w normal in the camera's frame, towards it; sum of w depth */
     sr_target depth;  /* R32G32_SFLOAT: metres along z, mean and median of the splats; 0 where nothing is */
     sr_target label;  /* R32G32_UINT: label of the splat with most weight, SR_NO_CELL for none; a number to ignore */
+    sr_depth_image depth_test;
 } sr_draw_desc;
 
 /* Draws the splats that are there, and waits for it. The first draw of a size compiles it. SR_ERR_USAGE: a world
@@ -330,9 +344,10 @@ sr_status sr_world_draw(sr_world* world, const sr_draw_desc* draw);
  *
  * The camera is copied; splats are those that are there when the commands are executed. They may be executed any number
  * of times, but executions share memory: on one queue, one after the other, or ordered by the host's semaphores. They
- * stay valid until the world is destroyed, a call of sr_world_record or sr_world_submit for another size, or an
- * SR_ERR_PARTIAL of sr_world_check_draws. Like the host's own reads of splats, executions must have finished before
- * those calls and before sr_world_step, sr_world_edit and sr_chain_begin. */
+ * stay valid until the world is destroyed, a call of sr_world_record or sr_world_submit for another size (draws with
+ * depth test and those without count apart), or an SR_ERR_PARTIAL of sr_world_check_draws. Like the host's own reads of
+ * splats, executions must have finished before those calls and before sr_world_step, sr_world_edit and sr_chain_begin.
+ */
 sr_status sr_world_record(sr_world* world, const sr_draw_desc* draw, void* command_buffer);
 
 typedef struct sr_semaphore {

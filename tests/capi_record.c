@@ -10,6 +10,8 @@
 #include "tests/capi_memory.h"
 #include "tests/capi_street.h"
 
+#include <math.h>
+
 enum { WIDTH = 64, HEIGHT = 40, PIXELS = WIDTH * HEIGHT };
 
 static const char *model, *cache;
@@ -138,6 +140,119 @@ static void records_draws(const struct host* host, sr_context* context, sr_world
     destroy_image(host, &image);
     destroy_buffer(host, &buffer);
     destroy_buffer(host, &read);
+}
+
+/* every pixel the same, as a pass of the host's would leave it */
+static struct host_image make_depth(const struct host* host, VkFormat format, float value)
+{
+    const int depth = format == VK_FORMAT_D32_SFLOAT;
+    const struct host_image made = make_image(host, WIDTH, HEIGHT, format);
+    const struct host_commands commands = begin_commands(host);
+    VkImageMemoryBarrier barrier = {0};
+    VkClearDepthStencilValue z = {0};
+    VkClearColorValue color = {{0}};
+    z.depth = color.float32[0] = value;
+    barrier.sType = VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER;
+    barrier.srcQueueFamilyIndex = barrier.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
+    barrier.image = made.image;
+    barrier.subresourceRange.aspectMask = depth ? VK_IMAGE_ASPECT_DEPTH_BIT : VK_IMAGE_ASPECT_COLOR_BIT;
+    barrier.subresourceRange.levelCount = barrier.subresourceRange.layerCount = 1;
+    barrier.dstAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT;
+    barrier.newLayout = VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL;
+    vkCmdPipelineBarrier(commands.commands, VK_PIPELINE_STAGE_TOP_OF_PIPE_BIT, VK_PIPELINE_STAGE_TRANSFER_BIT, 0, 0,
+                         NULL, 0, NULL, 1, &barrier);
+    if (depth)
+        vkCmdClearDepthStencilImage(commands.commands, made.image, barrier.newLayout, &z, 1, &barrier.subresourceRange);
+    else
+        vkCmdClearColorImage(commands.commands, made.image, barrier.newLayout, &color, 1, &barrier.subresourceRange);
+    CHECK(vkEndCommandBuffer(commands.commands) == VK_SUCCESS);
+    run_commands(host, &commands);
+    vkDestroyCommandPool(host->device, commands.pool, NULL);
+    return made;
+}
+
+enum { NEAR = 1, FAR = 101 };
+
+/* of a z-buffer with 0 at NEAR and 1 at FAR, in which `metres` is everywhere */
+static sr_draw_desc tested_camera(const struct host_image* image, VkFormat format)
+{
+    sr_draw_desc draw = camera(1);
+    draw.depth_test.image = image->image;
+    draw.depth_test.format = format;
+    draw.depth_test.layout_before = VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL;
+    draw.depth_test.layout_after = VK_IMAGE_LAYOUT_GENERAL;
+    draw.depth_test.scale = (double)FAR * NEAR / (NEAR - FAR);
+    draw.depth_test.offset = (double)FAR / (FAR - NEAR);
+    return draw;
+}
+static float z_of(double metres)
+{
+    return (float)((double)FAR / (FAR - NEAR) * (1 - NEAR / metres));
+}
+
+/* pixels with something in them; nothing lies behind the limit, and nothing changed where all lies before it */
+static int check_limit(const float* color, const float* depth, const float* all_depth, double metres)
+{
+    int i, seen = 0;
+    for (i = 0; i < PIXELS; ++i) {
+        seen += color[4 * i + 3] > 0;
+        CHECK(depth[2 * i] <= metres * 1.0001 && depth[2 * i + 1] <= metres * 1.0001);
+        if (all_depth[2 * i] > metres * 1.5) /* the mean: something was behind */
+            CHECK(color[4 * i + 3] < first[4 * i + 3]);
+    }
+    return seen;
+}
+
+/* against z-buffers at several distances, of both formats, waited for and recorded */
+static void tests_against_the_hosts_depth(const struct host* host, sr_context* context, sr_world* world)
+{
+    static float color[PIXELS * 4], depth[PIXELS * 2], all_depth[PIXELS * 2];
+    const double metres[4] = {100.5, 7, 3, 1.01};
+    struct host_buffer buffer = make_buffer(host, kBytes);
+    sr_draw_desc draw = camera(1);
+    int seen[4], i;
+    draw.depth.memory = all_depth;
+    CHECK_OK(context, sr_world_draw(world, &draw));
+    for (i = 0; i < 4; ++i) {
+        const VkFormat format = i % 2 ? VK_FORMAT_R32_SFLOAT : VK_FORMAT_D32_SFLOAT;
+        struct host_image image = make_depth(host, format, z_of(metres[i]));
+        const struct host_commands commands = begin_commands(host);
+        draw = tested_camera(&image, format);
+        draw.color.memory = color;
+        draw.depth.memory = depth;
+        CHECK_OK(context, sr_world_draw(world, &draw));
+        seen[i] = check_limit(color, depth, all_depth, metres[i]);
+        draw = tested_camera(&image, format);
+        draw.depth_test.layout_before = VK_IMAGE_LAYOUT_GENERAL; /* as the draw left it */
+        draw.color.buffer = buffer.buffer;
+        CHECK_OK(context, sr_world_record(world, &draw, commands.commands));
+        CHECK(vkEndCommandBuffer(commands.commands) == VK_SUCCESS);
+        run_commands(host, &commands);
+        vkDestroyCommandPool(host->device, commands.pool, NULL);
+        CHECK(!memcmp(buffer.mapped, color, kBytes));
+        CHECK_OK(context, sr_world_check_draws(world));
+        if (i == 0)
+            CHECK(!memcmp(color, first, kBytes)); /* all of it */
+        destroy_image(host, &image);
+    }
+    CHECK(seen[0] > seen[1] && seen[1] > seen[2] && seen[2] > seen[3]);
+    destroy_buffer(host, &buffer);
+}
+
+static void refuses_wrong_depth_images(sr_context* context, sr_world* world)
+{
+    const struct host_image none = {(VkImage)(size_t)1, VK_NULL_HANDLE, WIDTH, HEIGHT}; /* which nobody looks at */
+    sr_draw_desc draw = tested_camera(&none, VK_FORMAT_D16_UNORM);
+    CHECK(sr_world_draw(world, &draw) == SR_ERR_USAGE && says(context, "format 124"));
+    draw = tested_camera(&none, VK_FORMAT_D32_SFLOAT);
+    draw.depth_test.layout_before = VK_IMAGE_LAYOUT_UNDEFINED;
+    CHECK(sr_world_draw(world, &draw) == SR_ERR_USAGE && says(context, "UNDEFINED"));
+    draw = tested_camera(&none, VK_FORMAT_D32_SFLOAT);
+    draw.depth_test.reserved = 1;
+    CHECK(sr_world_draw(world, &draw) == SR_ERR_USAGE && says(context, "reserved"));
+    draw = tested_camera(&none, VK_FORMAT_D32_SFLOAT);
+    draw.depth_test.scale = INFINITY;
+    CHECK(sr_world_draw(world, &draw) == SR_ERR_BAD_INPUT && says(context, "not finite"));
 }
 
 static VkSemaphore make_timeline(const struct host* host)
@@ -390,6 +505,8 @@ int main(int argc, char** argv)
     CHECK(memcmp(first, second, kBytes) != 0);
     records_draws(&host, context, world);
     waits_for_and_signals_semaphores(&host, context, world);
+    refuses_wrong_depth_images(context, world);
+    tests_against_the_hosts_depth(&host, context, world);
     sr_world_destroy(world);
     tells_of_splats_that_are_missing(&host, context);
     sr_context_destroy(context);

@@ -28,8 +28,13 @@ Status record(sr_world& world, const sr_draw_desc& d, VkCommandBuffer commands, 
     const ImageSize size{d.width, d.height};
     SR_CHECK(check_size(size, "sr_draw_desc"));
     SR_CHECK(check_targets(d));
-    SR_TRY(Rasterizer * rasterizer, world.recorded.of(device, splats->scene(), size, {}));
-    SR_CHECK(rasterizer->record(commands, pinhole_camera(d, size)));
+    const bool tested = d.depth_test.image;
+    SR_TRY(Rasterizer * rasterizer, world.recorded[tested].of(device, splats->scene(), size, {.depth_tested = tested}));
+    if (tested) {
+        SR_TRY(const HostFloats depth, host_depth(d.depth_test, size));
+        record_host_floats(device, commands, depth, rasterizer->z_buffer().slice());
+    }
+    SR_CHECK(rasterizer->record(commands, pinhole_camera(d, size), z_scale(d.depth_test)));
     const SplatSlots images = rasterizer->images(0);
     record_host_target(device, commands, images.color.slice(), host_target(d.color, size));
     record_host_target(device, commands, images.surface.slice(), host_target(d.normal, size));
@@ -96,8 +101,12 @@ sr_status sr_world_check_draws(sr_world* world)
     return guarded(world ? world->context : nullptr, [&]() -> Status {
         if (!world)
             return fail(ErrorCode::usage, "sr_world_check_draws: world is NULL");
-        Rasterizer* rasterizer = world->recorded.last();
-        SR_TRY(const bool whole, rasterizer ? rasterizer->make_whole() : Result<bool>(true));
+        bool whole = true;
+        for (const SizedRasterizer& recorded : world->recorded)
+            if (Rasterizer* rasterizer = recorded.last()) {
+                SR_TRY(const bool this_one, rasterizer->make_whole());
+                whole = whole && this_one;
+            }
         if (!whole)
             return fail(ErrorCode::partial, "a picture lacks splats: there is more room for the next one");
         return {};

@@ -121,6 +121,10 @@ Status Rasterizer::build()
     visible_ = state_.slot(1, 1, DType::u32, "visible splats", 1);
     pairs_ = state_.slot(1, 1, DType::u32, "splat pairs", 1);
     recorded_ = state_.slot(kRecordings, 2, DType::u32, "recorded counts", 2);
+    if (options_.depth_tested) {
+        z_buffer_ = state_.slot(pixels, 1, DType::f32, "z-buffer", 1);
+        z_scale_ = state_.slot(1, 2, DType::f32, "scale of the z-buffer", 2);
+    }
     if (options_.pixels_over)
         pixels_ = {state_.slot(pixels, 1, DType::u32, "seen", 1), state_.slot(pixels, 1, DType::u32, "ranges", 1),
                    state_.slot(pixels, 1, DType::u32, "normals", 1)};
@@ -144,6 +148,8 @@ Status Rasterizer::build()
     o.transmittance_min = options_.transmittance_min;
     o.screen_variance = options_.screen_variance;
     o.cutoff = options_.cutoff;
+    if (options_.depth_tested)
+        o.limits = splat_limits(g, z_buffer_.in(g), z_scale_.in(g));
     const SplatImages y = splat(g, scene_.in(g), camera_table_.in(g), o);
     if (options_.pixels_over) {
         const PixelWords pixels_of_files = splat_pixels(g, y, {*options_.pixels_over, options_.visible_alpha});
@@ -195,7 +201,7 @@ Status Rasterizer::draw_together(std::span<const SplatCamera> cameras)
     }
 }
 
-Status Rasterizer::record(VkCommandBuffer commands, const SplatCamera& camera)
+Status Rasterizer::record(VkCommandBuffer commands, const SplatCamera& camera, std::array<float, 2> z_scale)
 {
     SR_CHECK(check_camera(camera, 0));
     if (!program_) // there was no memory for it the last time
@@ -206,6 +212,10 @@ Status Rasterizer::record(VkCommandBuffer commands, const SplatCamera& camera)
     const BufferSlice cameras = camera_table_.slice();
     record_entry_barrier(vk, commands);
     record_update(vk, commands, cameras.buffer->handle(), cameras.offset, std::as_bytes(std::span(table)));
+    if (options_.depth_tested) {
+        const BufferSlice scale = z_scale_.slice();
+        record_update(vk, commands, scale.buffer->handle(), scale.offset, std::as_bytes(std::span(z_scale)));
+    }
     program_->record_into(commands);
     const uint32_t row = recording_++ % kRecordings;
     const BufferSlice counts = recorded_.row_range(row, 1).slice();

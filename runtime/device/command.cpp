@@ -95,6 +95,33 @@ void record_image_copy(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer
                           &image);
 }
 
+void record_image_fetch(const VulkanCalls& vk, VkCommandBuffer commands, const HostImage& from,
+                        VkImageAspectFlags aspect, VkBuffer to, uint64_t to_at)
+{
+    // what was read of the buffer before, too
+    barrier(vk, commands, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, kAnything, kTransfer, kCopy);
+    VkImageMemoryBarrier image = transition(from);
+    image.subresourceRange.aspectMask = aspect;
+    image.srcAccessMask = kAnything;
+    image.dstAccessMask = VK_ACCESS_TRANSFER_READ_BIT;
+    image.oldLayout = from.before;
+    image.newLayout = VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL;
+    vk.CmdPipelineBarrier(commands, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, kTransfer, 0, 0, nullptr, 0, nullptr, 1,
+                          &image);
+    VkBufferImageCopy region{};
+    region.bufferOffset = to_at;
+    region.imageSubresource = {aspect, 0, 0, 1};
+    region.imageExtent = {from.width, from.height, 1};
+    vk.CmdCopyImageToBuffer(commands, from.image, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, to, 1, &region);
+    image.srcAccessMask = 0; // nothing is written
+    image.dstAccessMask = kAnything;
+    image.oldLayout = VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL;
+    image.newLayout = from.after;
+    vk.CmdPipelineBarrier(commands, kTransfer, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, 0, 0, nullptr, 0, nullptr, 1,
+                          &image);
+    barrier(vk, commands, kTransfer, VK_ACCESS_TRANSFER_WRITE_BIT, kCompute | kTransfer, kShader | kCopy);
+}
+
 void record_entry_barrier(const VulkanCalls& vk, VkCommandBuffer commands)
 {
     barrier(vk, commands, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, kAnything, kCompute | kTransfer, kShader | kCopy);

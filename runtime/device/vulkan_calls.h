@@ -26,6 +26,7 @@
     X(CmdBindPipeline)                                                                                                 \
     X(CmdCopyBuffer)                                                                                                   \
     X(CmdCopyBufferToImage)                                                                                            \
+    X(CmdCopyImageToBuffer)                                                                                            \
     X(CmdDispatch)                                                                                                     \
     X(CmdDispatchBase)                                                                                                 \
     X(CmdFillBuffer)                                                                                                   \
