@@ -394,6 +394,17 @@ static VKAPI_ATTR VkResult VKAPI_CALL counted_submit(VkQueue queue, uint32_t cou
     ++submits;
     return real_submit(queue, count, infos, fence);
 }
+static uint64_t locks, unlocks;
+static void lock_queue(void* user)
+{
+    CHECK(user == &locks && locks == unlocks);
+    ++locks;
+}
+static void unlock_queue(void* user)
+{
+    ++unlocks;
+    CHECK(user == &locks && locks == unlocks);
+}
 static VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL device_call(VkDevice device, const char* name)
 {
     const PFN_vkVoidFunction found = vkGetDeviceProcAddr(device, name);
@@ -475,6 +486,9 @@ static void takes_the_hosts_way_to_vulkan(const struct host* host)
     vulkan.get_instance_proc_addr = (void (*)(void))no_call;
     CHECK(sr_context_create(&desc, &context) == SR_ERR_NO_DEVICE && says(NULL, "this Vulkan has no vk") && !context);
     vulkan.get_instance_proc_addr = (void (*)(void))instance_call;
+    vulkan.lock_queue = lock_queue;
+    vulkan.unlock_queue = unlock_queue;
+    vulkan.user = &locks;
     context = adopt(&vulkan);
     world = make_world(context, &world_desc);
     CHECK(dispatches > 100 && submits > 10);
@@ -483,6 +497,7 @@ static void takes_the_hosts_way_to_vulkan(const struct host* host)
     keeps_what_drivers_compile(host, context);
     sr_world_destroy(world);
     sr_context_destroy(context);
+    CHECK(locks == submits && unlocks == submits); /* around each of them */
 }
 
 int main(int argc, char** argv)
