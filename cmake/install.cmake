@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-# `cmake --install BUILD --prefix DIR --component library`: libsemrover.so, semrover.h, and what tells CMake
-# (find_package(semrover)) and pkg-config of them
+# `cmake --install BUILD --prefix DIR --component library`: libsemrover.so, semrover.h, what tells CMake
+# (find_package(semrover)) and pkg-config of them, and sample hosts to build against them (share/semrover/host)
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
@@ -9,6 +9,7 @@ set_target_properties(semrover_c PROPERTIES EXPORT_NAME semrover)
 target_include_directories(semrover_c INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
 install(TARGETS semrover_c EXPORT semrover COMPONENT library
     LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT library)
+install(DIRECTORY tools/host DESTINATION ${CMAKE_INSTALL_DATADIR}/semrover COMPONENT library)
 install(FILES engine/semrover.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT library)
 set(semrover_cmake_folder ${CMAKE_INSTALL_LIBDIR}/cmake/semrover)
 install(EXPORT semrover NAMESPACE semrover:: FILE semroverConfig.cmake DESTINATION ${semrover_cmake_folder}

@@ -15,7 +15,8 @@
  *
  * Which calls block: sr_context_create (drivers), sr_world_create and sr_chain_create (load a model and compile
  * shaders: seconds, the first time), sr_world_step and sr_chain_step (for their budget), sr_world_flush (for the disk),
- * sr_world_draw, sr_chain_begin and sr_chain_take (for the device).
+ * sr_world_draw, sr_chain_begin and sr_chain_take (for the device), sr_world_record and sr_world_submit (the first time
+ * with a size, to compile).
  *
  * docs/embedding.md has a complete example.
  */
@@ -79,9 +80,10 @@ typedef struct sr_device_info {
  * SR_ERR_PARTIAL when there are more. */
 sr_status sr_list_devices(sr_device_info* devices, uint32_t* count);
 
-/* A device that belongs to the host program. It outlives the context. Vulkan 1.2 with timelineSemaphore and
- * robustBufferAccess enabled: files decide what shaders read. Vulkan cannot be asked which features a device was made
- * with, so the host says it. SR_ERR_USAGE without robust_buffer_access. */
+/* A device that belongs to the host program. It outlives the context. For a context on it the library writes no file
+ * and reads no variable of the environment. Vulkan 1.2 with timelineSemaphore and robustBufferAccess enabled: files
+ * decide what shaders read. Vulkan cannot be asked which features a device was made with, so the host says it.
+ * SR_ERR_USAGE without robust_buffer_access. */
 typedef struct sr_vulkan_device {
     uint32_t struct_size;
     uint32_t queue_family; /* with compute */
@@ -95,6 +97,8 @@ typedef struct sr_vulkan_device {
     void (*unlock_queue)(void* user);
     uint32_t shader_float16;       /* 1: shaderFloat16 is enabled too */
     uint32_t robust_buffer_access; /* 1: robustBufferAccess is enabled; anything else is refused */
+    /* PFN_vkGetInstanceProcAddr of the host's, through which every call is found; NULL: the loader's */
+    void (*get_instance_proc_addr)(void);
 } sr_vulkan_device;
 
 typedef struct sr_context_desc {
@@ -104,6 +108,10 @@ typedef struct sr_context_desc {
     const char* device;             /* NULL: the best; an index, or a part of a name */
     const sr_vulkan_device* vulkan; /* not NULL: the host's, instead of one of our own */
     uint64_t max_bytes;             /* of device memory; 0: no budget */
+    /* What sr_context_get_pipeline_cache gave another process, read before the call returns. One that is damaged, or of
+     * another driver, is ignored. NULL: a context of our own keeps a file in $XDG_CACHE_HOME/semrover. */
+    const void* pipeline_cache;
+    uint64_t pipeline_cache_bytes;
 } sr_context_desc;
 
 /* desc may be NULL: the best device. On failure *context is NULL; sr_last_error(NULL, ..) says why. */
@@ -122,6 +130,11 @@ typedef struct sr_memory_info {
 } sr_memory_info;
 
 sr_status sr_context_memory(sr_context* context, sr_memory_info* memory);
+
+/* What the driver compiled so far, to be kept by the host: shaders are compiled again in a process that does not get
+ * it. data NULL: only the size. Otherwise *bytes is the room at `data`; it becomes the size. SR_ERR_PARTIAL: there is
+ * less room than that, and nothing is written. */
+sr_status sr_context_get_pipeline_cache(sr_context* context, void* data, uint64_t* bytes);
 
 /* ---- Grids: labelled cells of one size, each with coloured points or none. Host memory only. ---- */
 
@@ -287,6 +300,19 @@ typedef struct sr_target {
     uint32_t layout_after;  /* VkImageLayout: as it will be */
 } sr_target;
 
+/* A z-buffer of the host's: splats behind it are not drawn. Metres along z are scale / (d - offset) for the number d of
+ * a pixel. With 0 at the near plane n and 1 at the far plane f: scale = f n / (n - f), offset = f / (f - n). Reversed,
+ * without a far plane (d = n / z): scale = n, offset = 0. */
+typedef struct sr_depth_image {
+    void* image;     /* VkImage of the picture's size, one level and one layer, TRANSFER_SRC usage, of the context's
+                        queue family; NULL: no test */
+    uint32_t format; /* VkFormat: D32_SFLOAT or R32_SFLOAT */
+    uint32_t layout_before; /* VkImageLayout, not UNDEFINED */
+    uint32_t layout_after;
+    uint32_t reserved;
+    double scale, offset;
+} sr_depth_image;
+
 /* A pinhole camera in OpenCV's convention: x right, y down, z forward; the centre of pixel (x, y) lies at
  * (x + 0.5, y + 0.5). Pixels are stored row by row from the top. */
 typedef struct sr_draw_desc {
@@ -301,11 +327,54 @@ typedef struct sr_draw_desc {
     sr_target normal; /* R32G32B32A32_SFLOAT: sum of w normal in the camera's frame, towards it; sum of w depth */
     sr_target depth;  /* R32G32_SFLOAT: metres along z, mean and median of the splats; 0 where nothing is */
     sr_target label;  /* R32G32_UINT: label of the splat with most weight, SR_NO_CELL for none; a number to ignore */
+    sr_depth_image depth_test;
 } sr_draw_desc;
 
 /* Draws the splats that are there, and waits for it. The first draw of a size compiles it. SR_ERR_USAGE: a world
  * without splat_bytes, sizes that are not 1..16384; SR_ERR_BAD_INPUT: a camera that is not finite. */
 sr_status sr_world_draw(sr_world* world, const sr_draw_desc* draw);
+
+/* The next two need a context on a device of the host's, and neither waits nor reads back. Targets are buffers and
+ * images: `memory` is NULL. Errors are those of sr_world_draw; the first call of a size compiles it.
+ *
+ * Records the drawing into a primary VkCommandBuffer that the host is recording, outside a render pass, from a pool of
+ * the context's queue family. It begins with a barrier after all that was recorded or submitted before it, and ends
+ * with one that lets everything after it use the targets; images go from layout_before to layout_after. Binding of a
+ * compute pipeline, its descriptor set 0 and push constants are left changed.
+ *
+ * The camera is copied; splats are those that are there when the commands are executed. They may be executed any number
+ * of times, but executions share memory: on one queue, one after the other, or ordered by the host's semaphores. They
+ * stay valid until the world is destroyed, a call of sr_world_record or sr_world_submit for another size (draws with
+ * depth test and those without count apart), or an SR_ERR_PARTIAL of sr_world_check_draws. Like the host's own reads of
+ * splats, executions must have finished before those calls and before sr_world_step, sr_world_edit and sr_chain_begin.
+ */
+sr_status sr_world_record(sr_world* world, const sr_draw_desc* draw, void* command_buffer);
+
+typedef struct sr_semaphore {
+    void* semaphore; /* VkSemaphore of type TIMELINE */
+    uint64_t value;
+} sr_semaphore;
+
+typedef struct sr_sync {
+    uint32_t struct_size;
+    uint32_t reserved;
+    const void* next;
+    const sr_semaphore* waits; /* the drawing begins when all of them have reached their values */
+    uint32_t wait_count;
+    uint32_t signal_count;
+    const sr_semaphore* signals; /* reach their values when the targets are written */
+} sr_sync;
+
+/* The same in a command buffer of the library's, submitted to the context's queue at once. Calls that wait for the
+ * device wait for it too, and so for what it waits for: what signals `waits` must be submitted already, or come from
+ * another thread. Of eight draws that are on their way the ninth waits for the first. */
+sr_status sr_world_submit(sr_world* world, const sr_draw_desc* draw, const sr_sync* sync);
+
+/* How many tiles of the picture splats touch is known only when they are drawn. sr_world_draw repeats a picture that
+ * there was too little room for; what is recorded cannot be repeated, and lacks the farthest splats then. Call this
+ * when what was recorded or submitted has finished. SR_OK: the last 16 pictures were whole. SR_ERR_PARTIAL: one was
+ * not; there is more room from now on, and what was recorded before is no longer valid. */
+sr_status sr_world_check_draws(sr_world* world);
 
 /* ---- Chains: frames of one camera, each refined from its splat buffer and the frame before. ---- */
 

@@ -82,6 +82,8 @@ struct SplatOptions {
     float transmittance_min = 1e-4f;
     float screen_variance = 0.5f; // pixels^2, of the screen filter; 0: none
     float cutoff = 0;             // sigmas; 0: as far as alpha_min
+    // [cameras * height * width] fp32 array, or none, of pinholes: metres along z, what lies farther is not seen
+    Tensor limits = {};
 };
 struct SplatImages { // [cameras * height * width] rows; w = weight of a splat in a pixel
     Tensor color;    // [.., 4] fp32: sum of w rgb; alpha = sum of w
@@ -90,6 +92,10 @@ struct SplatImages { // [cameras * height * width] rows; w = weight of a splat i
     Tensor ids;      // [.., 2] u32: label and cell of the splat with the largest w, 2^32 - 1 for none
     Tensor visible, pairs; // [1] u32: the numbers that had to fit the two maxima
 };
+// such limits of z-buffers: scale / (z - offset); infinite where that is not above 0
+[[nodiscard]] Tensor splat_limits(Graph& g,
+                                  Tensor z,      // [P] fp32 array
+                                  Tensor scale); // [1, 2] fp32: scale, offset -> [P] fp32 array
 [[nodiscard]] SplatImages
 splat(Graph& g, const SplatScene& scene,
       // [C, 16] fp32: fx fy cx cy, world to camera [3, 4]; fx = 0: sees nothing. With another lens [C, 28], then

@@ -177,10 +177,11 @@ static void refine_by_the_program(const char* noise)
     static uint8_t frame[PIXELS * 3];
     char text[2048];
     int f, i, c;
-    snprintf(text, sizeof text,
-             "%s refine %s/in -m %s -o %s/out -y --quiet --path %s/path.tum -W %d -H %d --fov-x 90 --steps %d --seed %d "
-             "--frame-noise %s",
-             program, folder, renderer, folder, folder, WIDTH, HEIGHT, STEPS, SEED, noise);
+    snprintf(
+        text, sizeof text,
+        "%s refine %s/in -m %s -o %s/out -y --quiet --path %s/path.tum -W %d -H %d --fov-x 90 --steps %d --seed %d "
+        "--frame-noise %s",
+        program, folder, renderer, folder, folder, WIDTH, HEIGHT, STEPS, SEED, noise);
     run(text);
     for (f = 0; f < FRAMES; ++f) {
         snprintf(text, sizeof text, "%s/out/frames/%06d.png", folder, f);

@@ -7,16 +7,21 @@
 
 #include "tests/capi_vulkan.h"
 
-static sr_context* adopt_host(const struct host* host)
+static sr_context* adopt(const sr_vulkan_device* vulkan)
 {
-    const sr_vulkan_device vulkan = lent(host);
     sr_context_desc desc;
     sr_context* context = NULL;
     memset(&desc, 0, sizeof desc);
     desc.struct_size = sizeof desc;
-    desc.vulkan = &vulkan;
+    desc.vulkan = vulkan;
     CHECK_OK(NULL, sr_context_create(&desc, &context));
     return context;
+}
+
+static sr_context* adopt_host(const struct host* host)
+{
+    const sr_vulkan_device vulkan = lent(host);
+    return adopt(&vulkan);
 }
 
 struct host_buffer {
@@ -103,37 +108,54 @@ static void destroy_image(const struct host* host, const struct host_image* imag
     vkFreeMemory(host->device, image->memory, NULL);
 }
 
+struct host_commands {
+    VkCommandPool pool;
+    VkCommandBuffer commands;
+};
+
+static struct host_commands begin_commands(const struct host* host)
+{
+    struct host_commands made;
+    VkCommandPoolCreateInfo pool = {0};
+    VkCommandBufferAllocateInfo allocation = {0};
+    VkCommandBufferBeginInfo begin = {0};
+    pool.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO;
+    CHECK(vkCreateCommandPool(host->device, &pool, NULL, &made.pool) == VK_SUCCESS);
+    allocation.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO;
+    allocation.commandPool = made.pool;
+    allocation.commandBufferCount = 1;
+    CHECK(vkAllocateCommandBuffers(host->device, &allocation, &made.commands) == VK_SUCCESS);
+    begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
+    CHECK(vkBeginCommandBuffer(made.commands, &begin) == VK_SUCCESS);
+    return made;
+}
+
+/* submits them and waits */
+static void run_commands(const struct host* host, const struct host_commands* commands)
+{
+    VkSubmitInfo submit = {0};
+    submit.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO;
+    submit.commandBufferCount = 1;
+    submit.pCommandBuffers = &commands->commands;
+    CHECK(vkQueueSubmit(host->queue, 1, &submit, VK_NULL_HANDLE) == VK_SUCCESS);
+    CHECK(vkQueueWaitIdle(host->queue) == VK_SUCCESS);
+}
+
 /* copies an image in layout TRANSFER_SRC_OPTIMAL to the beginning of a buffer, and waits */
 static void read_image(const struct host* host, const struct host_image* image, const struct host_buffer* to)
 {
-    VkCommandPoolCreateInfo pool_info = {0};
-    VkCommandBufferAllocateInfo allocation = {0};
-    VkCommandBufferBeginInfo begin = {0};
+    const struct host_commands commands = begin_commands(host);
     VkBufferImageCopy region = {0};
-    VkSubmitInfo submit = {0};
-    VkCommandPool pool;
-    VkCommandBuffer commands;
-    pool_info.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO;
-    CHECK(vkCreateCommandPool(host->device, &pool_info, NULL, &pool) == VK_SUCCESS);
-    allocation.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO;
-    allocation.commandPool = pool;
-    allocation.commandBufferCount = 1;
-    CHECK(vkAllocateCommandBuffers(host->device, &allocation, &commands) == VK_SUCCESS);
-    begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
-    CHECK(vkBeginCommandBuffer(commands, &begin) == VK_SUCCESS);
     region.imageSubresource.aspectMask = VK_IMAGE_ASPECT_COLOR_BIT;
     region.imageSubresource.layerCount = 1;
     region.imageExtent.width = image->width;
     region.imageExtent.height = image->height;
     region.imageExtent.depth = 1;
-    vkCmdCopyImageToBuffer(commands, image->image, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, to->buffer, 1, &region);
-    CHECK(vkEndCommandBuffer(commands) == VK_SUCCESS);
-    submit.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO;
-    submit.commandBufferCount = 1;
-    submit.pCommandBuffers = &commands;
-    CHECK(vkQueueSubmit(host->queue, 1, &submit, VK_NULL_HANDLE) == VK_SUCCESS);
-    CHECK(vkQueueWaitIdle(host->queue) == VK_SUCCESS);
-    vkDestroyCommandPool(host->device, pool, NULL);
+    vkCmdCopyImageToBuffer(commands.commands, image->image, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, to->buffer, 1,
+                           &region);
+    CHECK(vkEndCommandBuffer(commands.commands) == VK_SUCCESS);
+    run_commands(host, &commands);
+    vkDestroyCommandPool(host->device, commands.pool, NULL);
 }
 
 #endif

@@ -121,6 +121,41 @@ TEST(kernel_splat, depth_follows_the_surface)
     }
 }
 
+// every pixel of two cameras with a limit of its own: before both splats, between them, behind them, without end, and
+// of a z-buffer that is reversed
+TEST(kernel_splat, what_lies_behind_a_z_buffer_is_not_seen)
+{
+    const uint32_t width = 37, height = 21, pixels = width * height;
+    const HostSplat near = {{0, 0, 2}, {0, 0, 1}, {1, 0, 0}, 0.5, 0.5, 0.6},
+                    far = {{0, 0, 4}, {0, 0, 1}, {0, 1, 0}, 1, 1, 0.8};
+    const std::vector<HostCamera> cameras = {camera_for(width, height), camera_for(width, height, 0.1)};
+    const SplatOptions options{.width = width, .height = height};
+    HostSplat behind = near;
+    behind.position[2] = -2;
+    const SplatPixels none = run_splats({behind}, cameras, options), first = run_splats({near}, cameras, options),
+                      both = run_splats({near, far}, cameras, options);
+    const float metres[] = {1.5f, 3, 6, 1e9f};
+    const SplatPixels* expected[] = {&none, &first, &both, &both};
+    HostDepth standard{{}, {10.f * 0.1f / (0.1f - 10), 10 / (10 - 0.1f)}}, reversed{{}, {0.1f, 0}};
+    for (uint32_t i = 0; i < 2 * pixels; ++i) {
+        const float m = metres[i % 4];
+        standard.z.push_back(i % 4 == 3 ? 2.f : standard.scale[1] + standard.scale[0] / m); // 2: beyond all distances
+        reversed.z.push_back(i % 4 == 3 ? 0.f : 0.1f / m);
+    }
+    for (const HostDepth& test : {standard, reversed}) {
+        const SplatPixels got = run_splats({near, far}, cameras, options, test);
+        for (uint32_t i = 0; i < 2 * pixels; ++i) {
+            const SplatPixels& e = *expected[i % 4];
+            for (uint32_t c = 0; c < 4; ++c)
+                ASSERT_EQ(got.color[4 * i + c], e.color[4 * i + c]) << i;
+            ASSERT_EQ(got.depth[2 * i + 1], e.depth[2 * i + 1]) << i;
+            ASSERT_EQ(got.ids[2 * i + 1], e.ids[2 * i + 1]) << i;
+        }
+    }
+    EXPECT_NE(first.color, none.color);
+    EXPECT_NE(first.color, both.color);
+}
+
 TEST(kernel_splat, what_is_not_a_splat_is_skipped)
 {
     std::vector<HostSplat> splats = random_splats(60, 5);

@@ -279,9 +279,10 @@ class CacheHome {
   public:
     CacheHome() { setenv("XDG_CACHE_HOME", folder_.path().c_str(), 1); }
     ~CacheHome() { before_.empty() ? unsetenv("XDG_CACHE_HOME") : setenv("XDG_CACHE_HOME", before_.c_str(), 1); }
+    std::filesystem::path folder() const { return folder_ / "semrover"; } // drivers have their own
     std::filesystem::path file() const
     {
-        for (const auto& entry : std::filesystem::directory_iterator(folder_ / "semrover")) // drivers have their own
+        for (const auto& entry : std::filesystem::directory_iterator(folder()))
             return entry.path();
         return {};
     }
@@ -338,11 +339,64 @@ TEST(runtime_device, runs_without_a_place_for_its_cache)
     EXPECT_EQ(reused_by_a_run(), 0u);
 }
 
+HostDevice host_of(const HostVulkan& vulkan)
+{
+    HostDevice host;
+    host.instance = vulkan.instance;
+    host.physical = vulkan.physical;
+    host.device = vulkan.device;
+    host.queue = vulkan.queue;
+    host.robust_buffer_access = true;
+    return host;
+}
+
+TEST(runtime_device, keeps_no_file_for_a_device_of_the_host_and_starts_with_what_the_host_kept)
+{
+    const CacheHome home;
+    HostVulkan vulkan;
+    std::vector<char> blob;
+    {
+        const auto device = Device::adopt(host_of(vulkan), {});
+        ASSERT_TRUE(device) << device.error().message;
+        EXPECT_TRUE((*device)->pipelines().file().empty());
+        run_small_graph(**device);
+        blob = *(*device)->pipelines().blob();
+    }
+    const auto reused = [&](const std::vector<char>& given) {
+        const auto device = Device::adopt(host_of(vulkan), {.pipeline_cache = std::as_bytes(std::span(given))});
+        return (*device)->pipelines().reused_bytes();
+    };
+    EXPECT_EQ(reused(blob), blob.size() - 8); // after the checksum
+    for (const size_t bytes : {size_t(1), size_t(8), blob.size() - 1})
+        EXPECT_EQ(reused({blob.begin(), blob.begin() + long(bytes)}), 0u) << bytes;
+    std::vector<char> flipped = blob;
+    flipped.back() ^= 1;
+    EXPECT_EQ(reused(flipped), 0u);
+    // in place of the file of a device of our own, too
+    const auto own = Device::create({.pipeline_cache = std::as_bytes(std::span(blob))});
+    ASSERT_TRUE(own) << own.error().message;
+    EXPECT_EQ((*own)->pipelines().reused_bytes(), blob.size() - 8);
+    run_small_graph(**own);
+    EXPECT_FALSE(std::filesystem::exists(home.folder()));
+    EXPECT_EQ(vulkan.messages, 0);
+}
+
+TEST(runtime_device, reads_no_variable_for_a_device_of_the_host)
+{
+    HostVulkan vulkan;
+    const char* before = std::getenv("SEMROVER_LIMITS");
+    const std::string limits = before ? before : "";
+    setenv("SEMROVER_LIMITS", "colour=1", 1);
+    EXPECT_TRUE(Device::adopt(host_of(vulkan), {}));
+    EXPECT_TRUE(says(Device::create({}), "unknown limit 'colour'"));
+    before ? setenv("SEMROVER_LIMITS", limits.c_str(), 1) : unsetenv("SEMROVER_LIMITS");
+}
+
 TEST(runtime_device, works_on_a_device_that_the_host_made_and_leaves_it)
 {
     HostVulkan vulkan;
     int locks = 0, unlocks = 0;
-    HostDevice host{vulkan.instance, vulkan.physical, vulkan.device, vulkan.queue, 0, true};
+    HostDevice host = host_of(vulkan);
     host.lock = [&] {
         EXPECT_EQ(locks, unlocks);
         ++locks;
@@ -364,7 +418,7 @@ TEST(runtime_device, works_on_a_device_that_the_host_made_and_leaves_it)
 TEST(runtime_device, refuses_a_host_device_that_lacks_something)
 {
     HostVulkan vulkan;
-    const HostDevice whole{vulkan.instance, vulkan.physical, vulkan.device, vulkan.queue, 0, true};
+    const HostDevice whole = host_of(vulkan);
     HostDevice host = whole;
     host.queue = VK_NULL_HANDLE;
     EXPECT_TRUE(says(Device::adopt(host, {}), "a host device needs instance, physical device, device and queue"));

@@ -29,7 +29,7 @@ TEST(runtime_device_fault, tells_all_that_a_driver_says)
 // other errors are as they are: nobody is asked
 TEST(runtime_device_fault, asks_for_lost_devices_only)
 {
-    const Error error = device_error(VK_NULL_HANDLE, VK_ERROR_OUT_OF_DEVICE_MEMORY, "vkQueueSubmit");
+    const Error error = device_error({}, VK_NULL_HANDLE, VK_ERROR_OUT_OF_DEVICE_MEMORY, "vkQueueSubmit");
     EXPECT_EQ(error.code, ErrorCode::out_of_memory);
     EXPECT_EQ(error.message, vk_error(VK_ERROR_OUT_OF_DEVICE_MEMORY, "vkQueueSubmit").message);
 }

@@ -34,9 +34,13 @@ inline SplatScene scene_of(KernelCase& k, const std::vector<HostSplat>& splats)
     return {k.input(positions, 4), k.input(normals, 4), k.input(colors, 4), k.input(labels), k.input(cells)};
 }
 
-// runs the op on splats of the host and a table of cameras; room for all unless the options say otherwise
+// runs the op on splats of the host and a table of cameras; room for all unless the options say otherwise. z: what
+// pixels are tested against, with scale and offset; none: nothing
+struct HostDepth {
+    std::vector<float> z, scale;
+};
 inline SplatPixels run_splats(const std::vector<HostSplat>& splats, const std::vector<float>& table,
-                              SplatOptions options)
+                              SplatOptions options, const HostDepth& depth_test = {})
 {
     KernelCase k(test_device());
     const uint32_t floats = splat_camera_floats(options.lens);
@@ -45,6 +49,8 @@ inline SplatPixels run_splats(const std::vector<HostSplat>& splats, const std::v
         options.max_visible = uint32_t(splats.size() * table.size() / floats);
     if (!options.max_pairs)
         options.max_pairs = 1u << 18;
+    if (!depth_test.z.empty())
+        options.limits = splat_limits(k.graph, k.input(depth_test.z), k.input(depth_test.scale, 2));
     const SplatImages y = splat(k.graph, scene, k.input(table, floats), options);
     const auto keep = [&](const Tensor& t) {
         const Tensor out = k.output(t.rows, t.cols, t.dtype, t.ld);
@@ -60,7 +66,7 @@ inline SplatPixels run_splats(const std::vector<HostSplat>& splats, const std::v
 }
 
 inline SplatPixels run_splats(const std::vector<HostSplat>& splats, const std::vector<HostCamera>& cameras,
-                              const SplatOptions& options)
+                              const SplatOptions& options, const HostDepth& depth_test = {})
 {
     std::vector<float> table;
     for (const HostCamera& c : cameras) {
@@ -69,7 +75,7 @@ inline SplatPixels run_splats(const std::vector<HostSplat>& splats, const std::v
         for (double v : c.view)
             table.push_back(float(v));
     }
-    return run_splats(splats, table, options);
+    return run_splats(splats, table, options, depth_test);
 }
 
 // cameras with lenses, all of one model and size

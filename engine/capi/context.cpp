@@ -5,6 +5,7 @@
 #include "engine/capi/handles.h"
 #include "runtime/base/diagnostics.h"
 #include "runtime/device/physical_device.h"
+#include "runtime/device/pipeline.h"
 
 using namespace semrover;
 using namespace semrover::capi;
@@ -36,6 +37,7 @@ sr_device_info info_of(const DeviceSummary& d)
 Result<std::unique_ptr<Device>> adopt(const sr_vulkan_device& v, const DeviceOptions& options)
 {
     HostDevice host;
+    host.get_instance_proc_addr = reinterpret_cast<PFN_vkGetInstanceProcAddr>(v.get_instance_proc_addr);
     host.instance = static_cast<VkInstance>(v.instance);
     host.physical = static_cast<VkPhysicalDevice>(v.physical_device);
     host.device = static_cast<VkDevice>(v.device);
@@ -56,6 +58,9 @@ Result<std::unique_ptr<sr_context>> make_context(const sr_context_desc& desc)
     options.max_bytes = desc.max_bytes;
     options.validation = desc.validation;
     options.select = desc.device ? desc.device : "";
+    if (!desc.pipeline_cache != !desc.pipeline_cache_bytes)
+        return fail(ErrorCode::usage, "sr_context_desc: pipeline_cache and its bytes come together");
+    options.pipeline_cache = {static_cast<const std::byte*>(desc.pipeline_cache), size_t(desc.pipeline_cache_bytes)};
     auto context = std::make_unique<sr_context>();
     if (desc.vulkan) {
         if (desc.device || desc.validation)
@@ -65,7 +70,8 @@ Result<std::unique_ptr<sr_context>> make_context(const sr_context_desc& desc)
     } else {
         SR_TRY(context->device, Device::create(options));
     }
-    context->summary = summarize(context->device->instance(), context->device->physical(), context->device->index());
+    context->summary = summarize(context->device->vk(), context->device->instance(), context->device->physical(),
+                                 context->device->index());
     return context;
 }
 
@@ -210,10 +216,26 @@ sr_status sr_context_memory(sr_context* context, sr_memory_info* memory)
     });
 }
 
+sr_status sr_context_get_pipeline_cache(sr_context* context, void* data, uint64_t* bytes)
+{
+    return guarded(context, [&]() -> Status {
+        if (!context || !bytes)
+            return fail(ErrorCode::usage, "sr_context_get_pipeline_cache: NULL");
+        SR_TRY(const std::vector<char> blob, context->device->pipelines().blob());
+        const uint64_t room = std::exchange(*bytes, blob.size());
+        if (!data)
+            return {};
+        if (room < blob.size())
+            return fail(ErrorCode::partial, "sr_context_get_pipeline_cache: {} bytes, room for {}", blob.size(), room);
+        std::memcpy(data, blob.data(), blob.size());
+        return {};
+    });
+}
+
 } // extern "C"
 
 // the layout that programs were built against: a change here is a new ABI
 static_assert(sizeof(sr_device_info) == 816 && offsetof(sr_device_info, memory_bytes) == 808);
-static_assert(sizeof(sr_vulkan_device) == 80 && offsetof(sr_vulkan_device, robust_buffer_access) == 76);
-static_assert(sizeof(sr_context_desc) == 40 && offsetof(sr_context_desc, max_bytes) == 32);
+static_assert(sizeof(sr_vulkan_device) == 88 && offsetof(sr_vulkan_device, robust_buffer_access) == 76);
+static_assert(sizeof(sr_context_desc) == 56 && offsetof(sr_context_desc, max_bytes) == 32);
 static_assert(sizeof(sr_memory_info) == 32);

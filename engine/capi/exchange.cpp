@@ -6,8 +6,6 @@
 
 namespace semrover::capi {
 
-namespace {
-
 Result<HostCopies*> copies_of(sr_context& context)
 {
     if (!context.copies) {
@@ -15,8 +13,6 @@ Result<HostCopies*> copies_of(sr_context& context)
     }
     return context.copies.get();
 }
-
-} // namespace
 
 CameraFrame camera_frame(const double (&pinhole)[4], const double (&world_to_camera)[12], const ImageSize& size)
 {
@@ -30,6 +26,12 @@ CameraFrame camera_frame(const double (&pinhole)[4], const double (&world_to_cam
     i.height = size.height;
     std::copy_n(world_to_camera, 12, frame.pose.world_to_camera.begin());
     return frame;
+}
+
+SplatCamera pinhole_camera(const sr_draw_desc& d, const ImageSize& size)
+{
+    const CameraFrame frame = camera_frame({d.fx, d.fy, d.cx, d.cy}, d.world_to_camera, size);
+    return splat_camera(frame.intrinsics, frame.pose);
 }
 
 Status check_camera(const CameraFrame& frame, const char* name)
@@ -69,6 +71,25 @@ HostTarget host_target(const sr_target& to, const ImageSize& size)
     target.image = {static_cast<VkImage>(to.image), size.width, size.height, VkImageLayout(to.layout_before),
                     VkImageLayout(to.layout_after)};
     return target;
+}
+
+Result<HostFloats> host_depth(const sr_depth_image& d, const ImageSize& size)
+{
+    if (d.format != VK_FORMAT_D32_SFLOAT && d.format != VK_FORMAT_R32_SFLOAT)
+        return fail(ErrorCode::usage, "sr_depth_image: format {} is neither D32_SFLOAT nor R32_SFLOAT", d.format);
+    if (d.layout_before == VK_IMAGE_LAYOUT_UNDEFINED || d.layout_after == VK_IMAGE_LAYOUT_UNDEFINED || d.reserved)
+        return fail(ErrorCode::usage, "sr_depth_image: {}", d.reserved ? "reserved is not 0" : "a layout is UNDEFINED");
+    if (!std::isfinite(d.scale) || !std::isfinite(d.offset))
+        return fail(ErrorCode::bad_input, "sr_depth_image: scale {} and offset {} are not finite", d.scale, d.offset);
+    const bool depth = d.format == VK_FORMAT_D32_SFLOAT;
+    return HostFloats{{static_cast<VkImage>(d.image), size.width, size.height, VkImageLayout(d.layout_before),
+                       VkImageLayout(d.layout_after)},
+                      VkImageAspectFlags(depth ? VK_IMAGE_ASPECT_DEPTH_BIT : VK_IMAGE_ASPECT_COLOR_BIT)};
+}
+
+std::array<float, 2> z_scale(const sr_depth_image& d)
+{
+    return {float(d.scale), float(d.offset)};
 }
 
 Status take_in(sr_context& context, const sr_source& from, const Slot& to, uint64_t bytes, const char* name)

@@ -13,6 +13,8 @@ constexpr uint32_t kMostPixels = 16384; // of a side
 // fx, fy, cx, cy in pixels and [3, 4] row by row
 CameraFrame camera_frame(const double (&pinhole)[4], const double (&world_to_camera)[12], const ImageSize& size);
 
+SplatCamera pinhole_camera(const sr_draw_desc& draw, const ImageSize& size);
+
 // Errors: bad_input for numbers that are not finite, and focal lengths that are not above 0. name: of the structure
 Status check_camera(const CameraFrame& frame, const char* name);
 
@@ -24,7 +26,13 @@ Status check_size(const ImageSize& size, const char* name);
 
 HostTarget host_target(const sr_target& to, const ImageSize& size);
 
+// What a draw is tested against. Errors: usage for another format than two, and a layout before that is UNDEFINED;
+// bad_input for numbers that are not finite
+Result<HostFloats> host_depth(const sr_depth_image& depth, const ImageSize& size);
+std::array<float, 2> z_scale(const sr_depth_image& depth);
+
 // A picture to where the host wants it; waits for it
+Result<HostCopies*> copies_of(sr_context& context);
 Status hand_over(sr_context& context, const Slot& pixels, const ImageSize& size, const sr_target& to);
 
 // `bytes` of the host's to the beginning of a slot; waits for it. Errors: usage unless there is one of memory and

@@ -25,7 +25,9 @@ struct sr_world {
     sr_context* context = nullptr;
     semrover::GenerationSettings settings;
     std::unique_ptr<semrover::World> world;
-    semrover::capi::SizedRasterizer images, pixels; // of draws, and of chains that draw
+    semrover::capi::SizedRasterizer pixels;                 // of chains that draw
+    semrover::capi::SizedRasterizer images[2], recorded[2]; // of draws; the second with depth test
+    std::unique_ptr<semrover::CommandRing> commands;        // of sr_world_submit, from the first on
 };
 
 struct sr_chain {

@@ -7,7 +7,8 @@
 
 namespace semrover::capi {
 
-// A rasterizer for one camera and the size of the last pictures, made anew when another size is asked for.
+// A rasterizer for one camera, of one kind, and the size of the last pictures, made anew when another size is asked
+// for.
 class SizedRasterizer {
   public:
     Result<Rasterizer*> of(Device& device, const SurfelScene& scene, const ImageSize& size,
@@ -21,6 +22,8 @@ class SizedRasterizer {
         alpha_ = options.visible_alpha;
         return rasterizer_.get();
     }
+
+    Rasterizer* last() const { return rasterizer_.get(); } // or null
 
   private:
     std::unique_ptr<Rasterizer> rasterizer_;

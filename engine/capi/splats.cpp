@@ -20,9 +20,16 @@ Status draw_world(sr_world& world, const sr_draw_desc& d)
     const ImageSize size{d.width, d.height};
     SR_CHECK(check_size(size, "sr_draw_desc"));
     sr_context& context = *world.context;
-    SR_TRY(Rasterizer * rasterizer, world.images.of(*context.device, splats->scene(), size, {}));
-    const CameraFrame frame = camera_frame({d.fx, d.fy, d.cx, d.cy}, d.world_to_camera, size);
-    const SplatCamera camera = splat_camera(frame.intrinsics, frame.pose);
+    const bool tested = d.depth_test.image;
+    SR_TRY(Rasterizer * rasterizer,
+           world.images[tested].of(*context.device, splats->scene(), size, {.depth_tested = tested}));
+    if (tested) {
+        SR_TRY(const HostFloats depth, host_depth(d.depth_test, size));
+        SR_TRY(HostCopies * copies, copies_of(context));
+        SR_CHECK(copies->fetch(depth, rasterizer->z_buffer().slice()));
+        SR_CHECK(rasterizer->z_scale().write(*context.device, z_scale(d.depth_test)));
+    }
+    const SplatCamera camera = pinhole_camera(d, size);
     SR_CHECK(rasterizer->draw({&camera, 1}).map([](uint32_t) {}));
     const SplatSlots images = rasterizer->images(0);
     SR_CHECK(hand_over(context, images.color, size, d.color));
@@ -68,4 +75,4 @@ sr_status sr_world_draw(sr_world* world, const sr_draw_desc* draw)
 } // extern "C"
 
 static_assert(sizeof(sr_array) == 24 && sizeof(sr_splats) == 112 && sizeof(sr_target) == 40);
-static_assert(sizeof(sr_draw_desc) == 312);
+static_assert(sizeof(sr_depth_image) == 40 && sizeof(sr_draw_desc) == 352);

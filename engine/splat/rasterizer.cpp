@@ -4,6 +4,7 @@
 
 #include "engine/camera/lens.h"
 #include "kernels/picture.h"
+#include "runtime/device/command.h"
 
 #include <algorithm>
 #include <cmath>
@@ -118,6 +119,11 @@ Status Rasterizer::build()
     camera_table_ = state_.slot(cameras_, camera_floats, DType::f32, "cameras", camera_floats);
     visible_ = state_.slot(1, 1, DType::u32, "visible splats", 1);
     pairs_ = state_.slot(1, 1, DType::u32, "splat pairs", 1);
+    recorded_ = state_.slot(kRecordings, 2, DType::u32, "recorded counts", 2);
+    if (options_.depth_tested) {
+        z_buffer_ = state_.slot(pixels, 1, DType::f32, "z-buffer", 1);
+        z_scale_ = state_.slot(1, 2, DType::f32, "scale of the z-buffer", 2);
+    }
     if (options_.pixels_over)
         pixels_ = {state_.slot(pixels, 1, DType::u32, "seen", 1), state_.slot(pixels, 1, DType::u32, "ranges", 1),
                    state_.slot(pixels, 1, DType::u32, "normals", 1)};
@@ -127,6 +133,7 @@ Status Rasterizer::build()
                    state_.slot(pixels, 2, DType::f32, "splat depth", 2),
                    state_.slot(pixels, 2, DType::u32, "splat ids", 2)};
     SR_CHECK(state_.allocate(device_, "splat images"));
+    SR_CHECK(recorded_.clear(device_));
     Graph g;
     SplatOptions o{.width = width_,
                    .height = height_,
@@ -140,6 +147,8 @@ Status Rasterizer::build()
     o.transmittance_min = options_.transmittance_min;
     o.screen_variance = options_.screen_variance;
     o.cutoff = options_.cutoff;
+    if (options_.depth_tested)
+        o.limits = splat_limits(g, z_buffer_.in(g), z_scale_.in(g));
     const SplatImages y = splat(g, scene_.in(g), camera_table_.in(g), o);
     if (options_.pixels_over) {
         const PixelWords pixels_of_files = splat_pixels(g, y, {*options_.pixels_over, options_.visible_alpha});
@@ -189,6 +198,48 @@ Status Rasterizer::draw_together(std::span<const SplatCamera> cameras)
             return {};
         SR_CHECK(make_room(visible[0], pairs[0])); // pairs of what was visible; with more room there may be more
     }
+}
+
+Status Rasterizer::record(VkCommandBuffer commands, const SplatCamera& camera, std::array<float, 2> z_scale)
+{
+    SR_CHECK(check_camera(camera, 0));
+    if (!program_) // there was no memory for it the last time
+        SR_CHECK(build());
+    std::vector<float> table(size_t(cameras_) * splat_camera_floats(lens_of(options_.model)));
+    write_row(camera, std::span(table).first(table.size() / cameras_));
+    const VulkanCalls& vk = device_.vk();
+    const BufferSlice cameras = camera_table_.slice();
+    record_entry_barrier(vk, commands);
+    record_update(vk, commands, cameras.buffer->handle(), cameras.offset, std::as_bytes(std::span(table)));
+    if (options_.depth_tested) {
+        const BufferSlice scale = z_scale_.slice();
+        record_update(vk, commands, scale.buffer->handle(), scale.offset, std::as_bytes(std::span(z_scale)));
+    }
+    program_->record_into(commands);
+    const uint32_t row = recording_++ % kRecordings;
+    const BufferSlice counts = recorded_.row_range(row, 1).slice();
+    uint64_t at = counts.offset;
+    for (const BufferSlice& count : {visible_.slice(), pairs_.slice()}) {
+        record_copy(vk, commands, count.buffer->handle(), count.offset, counts.buffer->handle(), at, sizeof(uint32_t));
+        at += sizeof(uint32_t);
+    }
+    return {};
+}
+
+Result<bool> Rasterizer::make_whole()
+{
+    if (!program_)
+        return true;
+    SR_TRY(const std::vector<uint32_t> counts, recorded_.read<uint32_t>(device_));
+    uint32_t visible = 0, pairs = 0;
+    for (size_t i = 0; i < counts.size(); i += 2) {
+        visible = std::max(visible, counts[i]);
+        pairs = std::max(pairs, counts[i + 1]);
+    }
+    if (visible <= max_visible_ && pairs <= max_pairs_)
+        return true;
+    SR_CHECK(make_room(visible, pairs));
+    return false;
 }
 
 Result<uint32_t> Rasterizer::draw_some(std::span<const SplatCamera> cameras)

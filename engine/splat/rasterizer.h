@@ -55,6 +55,7 @@ struct RasterizerOptions {
     CameraModel model = CameraModel::pinhole; // of all cameras
     // keeps pixels as files have them, over this background, in place of images: draw() and pixels(), not render()
     std::optional<std::array<uint8_t, 3>> pixels_over = {};
+    bool depth_tested = false; // against z_buffer(), of pinholes
 };
 
 // what one camera sees, on the device, a row a pixel: as SplatImages (kernels/splat.h) has it, or as files have it
@@ -85,6 +86,21 @@ class Rasterizer {
     SplatSlots images(uint32_t camera) const;
     SplatPixelSlots pixels(uint32_t camera) const;
 
+    // With depth_tested: [height * width] of the first camera, and [1, 2] fp32, scale and offset: splats farther than
+    // scale / (z - offset) metres along z are not drawn. To be filled before each draw
+    const Slot& z_buffer() const { return z_buffer_; }
+    const Slot& z_scale() const { return z_scale_; }
+
+    // The same by a host's hand: records the drawing into a command buffer, to be executed any number of times, one
+    // after the other, on the device's queue family. camera: copied. What is recorded is good until make_whole()
+    // returns false, and as long as the rasterizer. z_scale: likewise, with depth_tested; z_buffer() is filled by what
+    // was recorded before. Errors: bad_input as render()'s
+    Status record(VkCommandBuffer commands, const SplatCamera& camera, std::array<float, 2> z_scale = {});
+    // When the executions have ended: had all of the last kRecordings room for their splats? Where one had not, there
+    // is more room from now on, and false is returned. Errors: out_of_memory
+    Result<bool> make_whole();
+    static constexpr uint32_t kRecordings = 16;
+
     const Program& program() const { return *program_; }
     // device memory for what it has room for now, beside the scene's
     uint64_t planned_bytes() const { return state_.planned_bytes(device_.limits()) + program_->plan().arena_bytes(); }
@@ -104,7 +120,9 @@ class Rasterizer {
     uint32_t width_ = 0, height_ = 0, cameras_ = 0;
     uint32_t max_visible_ = 0, max_pairs_ = 0, rebuilds_ = 0;
     State state_;
-    Slot camera_table_, visible_, pairs_;
+    Slot camera_table_, visible_, pairs_, z_buffer_, z_scale_;
+    Slot recorded_; // [kRecordings, 2] u32: visible and pairs of what was recorded
+    uint32_t recording_ = 0;
     SplatSlots images_;      // of all cameras, or
     SplatPixelSlots pixels_; // likewise
     std::unique_ptr<Program> program_;

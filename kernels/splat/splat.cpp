@@ -57,6 +57,9 @@ void check(const SplatScene& scene, Tensor cameras, const SplatOptions& o)
               "splat: {} x {} pixels, cameras of {} floats", o.width, o.height, cameras.ld);
     SR_ASSERT(o.tile % 16 == 0 && o.tile > 0 && o.max_visible > 0 && o.max_pairs > 0,
               "splat: tiles of {}, {} splats, {} pairs", o.tile, o.max_visible, o.max_pairs);
+    SR_ASSERT(!o.limits.valid() || (o.lens == SplatLens::pinhole && o.limits.ld == 1 &&
+                                    o.limits.rows == o.width * o.height * cameras.rows),
+              "splat: {} limits for {} x {} pixels", o.limits.rows, o.width, o.height);
     SR_ASSERT(uint64_t(n) * cameras.rows < 1ull << 32, "splat: {} splats in {} cameras", n, cameras.rows);
 }
 
@@ -131,9 +134,11 @@ SplatImages splat(Graph& g, const SplatScene& scene, Tensor cameras, const Splat
     blend.most_operations = 40.0 * push.max_pairs * options.tile * options.tile; // no pixel is done early
     const Grid grid = tiles(options.height, options.width, push.cameras);
     if (options.lens == SplatLens::pinhole) {
+        const bool limited = options.limits.valid();
+        blend.constants = {{"kLimited", limited}};
         g.dispatch(kernel::splat_blend,
                    {seen.records, by_tile.records, by_tile.starts, seen.sources, scene.labels, scene.cells, y.color,
-                    y.surface, y.depth, y.ids},
+                    y.surface, y.depth, y.ids, limited ? options.limits : scene.positions},
                    push, grid, std::move(blend));
         return y;
     }

@@ -2,32 +2,42 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "runtime/device/vulkan.h"
+#include "runtime/device/vulkan_calls.h"
 
 #include <cstdint>
+#include <span>
 
 // recording; the only file that emits barriers
 namespace semrover {
 
-Status begin_commands(VkCommandBuffer commands, bool once);
+Status begin_commands(const VulkanCalls& vk, VkCommandBuffer commands, bool once);
 
 // every shader write before is visible to every shader access after
-void record_barrier(VkCommandBuffer commands);
+void record_barrier(const VulkanCalls& vk, VkCommandBuffer commands);
 // the same at the end of a submit: what follows may be shaders, copies or the host
-void record_final_barrier(VkCommandBuffer commands);
+void record_final_barrier(const VulkanCalls& vk, VkCommandBuffer commands);
 // with the barrier that lets shaders, copies and the host follow
-void record_copy(VkCommandBuffer commands, VkBuffer from, uint64_t from_at, VkBuffer to, uint64_t to_at,
-                 uint64_t bytes);
+void record_copy(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer from, uint64_t from_at, VkBuffer to,
+                 uint64_t to_at, uint64_t bytes);
 // Into memory that belongs to a host program: everything that follows in the queue may use it. An image has one level
 // and one layer, and comes in one layout and goes in another; its whole content is replaced.
-void record_host_copy(VkCommandBuffer commands, VkBuffer from, uint64_t from_at, VkBuffer to, uint64_t to_at,
-                      uint64_t bytes);
+void record_host_copy(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer from, uint64_t from_at, VkBuffer to,
+                      uint64_t to_at, uint64_t bytes);
 struct HostImage {
     VkImage image = VK_NULL_HANDLE;
     uint32_t width = 0, height = 0;
     VkImageLayout before = VK_IMAGE_LAYOUT_UNDEFINED, after = VK_IMAGE_LAYOUT_GENERAL;
 };
-void record_image_copy(VkCommandBuffer commands, VkBuffer from, uint64_t from_at, const HostImage& to);
-void record_clear(VkCommandBuffer commands, VkBuffer buffer, uint64_t at, uint64_t bytes);
+// the other way, of a depth or color image of 32-bit floats: row by row. `before` is not UNDEFINED
+void record_image_fetch(const VulkanCalls& vk, VkCommandBuffer commands, const HostImage& from,
+                        VkImageAspectFlags aspect, VkBuffer to, uint64_t to_at);
+void record_image_copy(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer from, uint64_t from_at,
+                       const HostImage& to);
+// into a command buffer of a host's: what follows may use everything that came before, in the queue too
+void record_entry_barrier(const VulkanCalls& vk, VkCommandBuffer commands);
+// bytes of the command itself: a multiple of 4, at most 65536; with the barrier that lets shaders follow
+void record_update(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer to, uint64_t at,
+                   std::span<const std::byte> bytes);
+void record_clear(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer buffer, uint64_t at, uint64_t bytes);
 
 } // namespace semrover

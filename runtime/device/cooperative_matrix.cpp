@@ -14,25 +14,25 @@ namespace {
 constexpr uint32_t kPreferredSubgroup = 32; // AMD's and NVIDIA's matrix units work for 32 invocations
 
 // of a device with both extensions: others leave what they do not know as it is
-bool has_features(VkPhysicalDevice physical)
+bool has_features(const VulkanCalls& vk, VkPhysicalDevice physical)
 {
     MatrixFeatures matrix;
     auto f12 = vk_struct<VkPhysicalDeviceVulkan12Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES,
                                                            matrix.chain());
     auto features = vk_struct<VkPhysicalDeviceFeatures2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2, &f12);
-    vkGetPhysicalDeviceFeatures2(physical, &features);
+    vk.GetPhysicalDeviceFeatures2(physical, &features);
     return matrix.all() && f12.vulkanMemoryModel && f12.vulkanMemoryModelDeviceScope && f12.shaderFloat16;
 }
 
 // 0: none that can be asked for
-uint32_t subgroup_size(VkPhysicalDevice physical)
+uint32_t subgroup_size(const VulkanCalls& vk, VkPhysicalDevice physical)
 {
     auto control = vk_struct<VkPhysicalDeviceSubgroupSizeControlProperties>(
         VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_SIZE_CONTROL_PROPERTIES);
     auto p11 = vk_struct<VkPhysicalDeviceVulkan11Properties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_PROPERTIES,
                                                              &control);
     auto p = vk_struct<VkPhysicalDeviceProperties2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2, &p11);
-    vkGetPhysicalDeviceProperties2(physical, &p);
+    vk.GetPhysicalDeviceProperties2(physical, &p);
     if (!(control.requiredSubgroupSizeStages & VK_SHADER_STAGE_COMPUTE_BIT))
         return 0;
     const uint32_t size = std::clamp(kPreferredSubgroup, control.minSubgroupSize, control.maxSubgroupSize);
@@ -55,12 +55,12 @@ bool fits(const VkCooperativeMatrixPropertiesKHR& p)
 
 } // namespace
 
-MatrixShape matrix_shape(VkInstance instance, VkPhysicalDevice physical)
+MatrixShape matrix_shape(const VulkanCalls& vk, VkInstance instance, VkPhysicalDevice physical)
 {
     const auto enumerate = reinterpret_cast<PFN_vkGetPhysicalDeviceCooperativeMatrixPropertiesKHR>(
-        vkGetInstanceProcAddr(instance, "vkGetPhysicalDeviceCooperativeMatrixPropertiesKHR"));
-    if (!enumerate || !has_extension(physical, VK_KHR_COOPERATIVE_MATRIX_EXTENSION_NAME) ||
-        !has_extension(physical, VK_EXT_SUBGROUP_SIZE_CONTROL_EXTENSION_NAME) || !has_features(physical))
+        vk.GetInstanceProcAddr(instance, "vkGetPhysicalDeviceCooperativeMatrixPropertiesKHR"));
+    if (!enumerate || !has_extension(vk, physical, VK_KHR_COOPERATIVE_MATRIX_EXTENSION_NAME) ||
+        !has_extension(vk, physical, VK_EXT_SUBGROUP_SIZE_CONTROL_EXTENSION_NAME) || !has_features(vk, physical))
         return {};
     uint32_t count = 0;
     if (enumerate(physical, &count, nullptr) != VK_SUCCESS)
@@ -72,7 +72,7 @@ MatrixShape matrix_shape(VkInstance instance, VkPhysicalDevice physical)
     std::erase_if(all, [](const auto& p) { return !fits(p); });
     const auto outputs = [](const auto& p) { return p.MSize * p.NSize * (p.KSize == 16 ? 2 : 1); };
     const auto best = std::ranges::max_element(all, {}, outputs);
-    const uint32_t subgroup = subgroup_size(physical);
+    const uint32_t subgroup = subgroup_size(vk, physical);
     if (best == all.end() || !subgroup)
         return {};
     return {best->MSize, best->NSize, best->KSize, subgroup};

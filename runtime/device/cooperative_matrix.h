@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "runtime/device/vulkan.h"
+#include "runtime/device/vulkan_calls.h"
 #include "runtime/graph/limits.h"
 
 // VK_KHR_cooperative_matrix, as headers before 1.3.255 (Debian 12) do not have it
@@ -36,7 +36,7 @@ namespace semrover {
 
 // The shape that .coopmat variants take on this device: 16 x 16 x 16 where there is one, else what their tiles can be
 // cut into. m is 0 without the extension, the features beside it, or such a shape.
-MatrixShape matrix_shape(VkInstance instance, VkPhysicalDevice physical);
+MatrixShape matrix_shape(const VulkanCalls& vk, VkInstance instance, VkPhysicalDevice physical);
 
 // what a device must have enabled for them, beside vulkanMemoryModel, vulkanMemoryModelDeviceScope and shaderFloat16
 class MatrixFeatures {

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "runtime/device/device.h"
+#include "runtime/device/command_ring.h"
 #include "runtime/device/state.h"
 
 namespace semrover {
@@ -12,9 +12,6 @@ namespace semrover {
 class CopyRing {
   public:
     static Result<std::unique_ptr<CopyRing>> create(Device& device, size_t count = 8);
-    ~CopyRing();
-    CopyRing(const CopyRing&) = delete;
-    CopyRing& operator=(const CopyRing&) = delete;
 
     // between slots, or a slot and staging; of equal size. The ticket is for Device::wait.
     Result<uint64_t> copy(const BufferSlice& from, const BufferSlice& to);
@@ -24,10 +21,7 @@ class CopyRing {
     explicit CopyRing(Device& device) : device_(device) {}
 
     Device& device_;
-    VkCommandPool pool_ = VK_NULL_HANDLE;
-    std::vector<VkCommandBuffer> commands_;
-    std::vector<uint64_t> tickets_; // when each may be used again
-    size_t next_ = 0;
+    std::unique_ptr<CommandRing> commands_;
 };
 
 } // namespace semrover

@@ -60,6 +60,24 @@ Result<uint32_t> select_device(const std::vector<DeviceSummary>& all, const std:
     return fail(ErrorCode::no_device, "no usable device matches '{}'; there are: {}", select, names);
 }
 
+// points of timelines as a submit takes them
+struct SemaphoreValues {
+    std::vector<VkSemaphore> semaphores;
+    std::vector<uint64_t> values;
+
+    explicit SemaphoreValues(std::span<const TimelinePoint> points)
+    {
+        for (const TimelinePoint& p : points)
+            add(p);
+    }
+    void add(const TimelinePoint& point)
+    {
+        semaphores.push_back(point.semaphore);
+        values.push_back(point.value);
+    }
+    uint32_t count() const { return uint32_t(values.size()); }
+};
+
 } // namespace
 
 Device::Device() = default;
@@ -68,10 +86,10 @@ Result<std::unique_ptr<Device>> Device::create(const DeviceOptions& options)
 {
     std::unique_ptr<Device> d(new Device());
     SR_CHECK(d->create_instance(options));
-    SR_TRY(const auto physical, physical_devices(d->instance_));
+    SR_TRY(const auto physical, physical_devices(d->vk_, d->instance_));
     std::vector<DeviceSummary> summaries;
     for (size_t i = 0; i < physical.size(); ++i)
-        summaries.push_back(summarize(d->instance_, physical[i], uint32_t(i)));
+        summaries.push_back(summarize(d->vk_, d->instance_, physical[i], uint32_t(i)));
     SR_TRY(d->index_, select_device(summaries, options.select));
     d->physical_ = physical[d->index_];
     SR_CHECK(d->create_device(summaries[d->index_].limits.matrix.m != 0));
@@ -83,15 +101,17 @@ Result<std::unique_ptr<Device>> Device::adopt(const HostDevice& host, const Devi
 {
     if (!host.instance || !host.physical || !host.device || !host.queue)
         return fail(ErrorCode::usage, "a host device needs instance, physical device, device and queue");
-    if (!is_compute_family(host.physical, host.queue_family))
+    std::unique_ptr<Device> d(new Device());
+    d->owned_ = false;
+    SR_CHECK(d->vk_.load_instance(host.get_instance_proc_addr, host.instance));
+    SR_CHECK(d->vk_.load_device(host.device));
+    if (!is_compute_family(d->vk_, host.physical, host.queue_family))
         return fail(ErrorCode::usage, "queue family {} of the host device has no compute", host.queue_family);
     if (!host.robust_buffer_access)
         return fail(ErrorCode::usage, "a host device needs robustBufferAccess, and to say so: files decide what "
                                       "shaders read");
     if (bool(host.lock) != bool(host.unlock))
         return fail(ErrorCode::usage, "a host device needs both of lock and unlock, or neither");
-    std::unique_ptr<Device> d(new Device());
-    d->owned_ = false;
     d->instance_ = host.instance;
     d->physical_ = host.physical;
     d->device_ = host.device;
@@ -111,6 +131,7 @@ Status Device::create_instance(const DeviceOptions& options)
 {
     const bool validation = options.validation || !environment("SEMROVER_VALIDATION").empty();
     SR_TRY(instance_, semrover::create_instance(validation));
+    SR_CHECK(vk_.load_instance(nullptr, instance_));
     if (!validation)
         return {};
     auto info = vk_struct<VkDebugUtilsMessengerCreateInfoEXT>(VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT);
@@ -119,14 +140,14 @@ Status Device::create_instance(const DeviceOptions& options)
     info.messageType = VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT;
     info.pfnUserCallback = on_validation;
     const auto create = reinterpret_cast<PFN_vkCreateDebugUtilsMessengerEXT>(
-        vkGetInstanceProcAddr(instance_, "vkCreateDebugUtilsMessengerEXT"));
+        vk_.GetInstanceProcAddr(instance_, "vkCreateDebugUtilsMessengerEXT"));
     SR_VK(create(instance_, &info, nullptr, &messenger_));
     return {};
 }
 
 Status Device::create_device(bool matrices)
 {
-    SR_TRY(queue_family_, compute_queue_family(physical_));
+    SR_TRY(queue_family_, compute_queue_family(vk_, physical_));
     const float priority = 1;
     auto queue = vk_struct<VkDeviceQueueCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO);
     queue.queueFamilyIndex = queue_family_;
@@ -134,7 +155,7 @@ Status Device::create_device(bool matrices)
     queue.pQueuePriorities = &priority;
     auto have = vk_struct<VkPhysicalDeviceVulkan12Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES);
     auto available = vk_struct<VkPhysicalDeviceFeatures2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2, &have);
-    vkGetPhysicalDeviceFeatures2(physical_, &available);
+    vk_.GetPhysicalDeviceFeatures2(physical_, &available);
     auto f12 = vk_struct<VkPhysicalDeviceVulkan12Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES);
     f12.timelineSemaphore = VK_TRUE;
     f12.shaderFloat16 = have.shaderFloat16;
@@ -142,10 +163,10 @@ Status Device::create_device(bool matrices)
     // gathers use indices that came from files: out of bounds must not leave the buffer
     features.features.robustBufferAccess = available.features.robustBufferAccess;
     std::vector<const char*> extensions;
-    if (has_extension(physical_, "VK_KHR_portability_subset")) // must be enabled where there is one: MoltenVK's
+    if (has_extension(vk_, physical_, "VK_KHR_portability_subset")) // must be enabled where there is one: MoltenVK's
         extensions.push_back("VK_KHR_portability_subset");
     auto faults = vk_struct<VkPhysicalDeviceFaultFeaturesEXT>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FAULT_FEATURES_EXT);
-    if (tells_faults(physical_)) {
+    if (tells_faults(vk_, physical_)) {
         faults.deviceFault = VK_TRUE;
         features.pNext = &faults;
         faults.pNext = &f12;
@@ -164,8 +185,9 @@ Status Device::create_device(bool matrices)
     info.pQueueCreateInfos = &queue;
     info.enabledExtensionCount = uint32_t(extensions.size());
     info.ppEnabledExtensionNames = extensions.data();
-    SR_VK(vkCreateDevice(physical_, &info, nullptr, &device_));
-    vkGetDeviceQueue(device_, queue_family_, 0, &queue_);
+    SR_VK(vk_.CreateDevice(physical_, &info, nullptr, &device_));
+    SR_CHECK(vk_.load_device(device_));
+    vk_.GetDeviceQueue(device_, queue_family_, 0, &queue_);
     return {};
 }
 
@@ -178,7 +200,7 @@ Status Device::check_cancelled() const
 
 Status Device::finish(const DeviceOptions& options)
 {
-    const DeviceSummary summary = summarize(instance_, physical_, 0);
+    const DeviceSummary summary = summarize(vk_, instance_, physical_, 0);
     if (!summary.refusal.empty())
         return fail(ErrorCode::no_device, "device '{}' cannot be used: {}", summary.name, summary.refusal);
     name_ = summary.name;
@@ -186,24 +208,25 @@ Status Device::finish(const DeviceOptions& options)
     limits_ = summary.limits;
     budget_ = options.max_bytes;
     cancelled_ = options.cancelled;
-    SR_CHECK(override_limits(limits_, environment("SEMROVER_LIMITS")));
+    if (owned_)
+        SR_CHECK(override_limits(limits_, environment("SEMROVER_LIMITS")));
     SR_CHECK(override_limits(limits_, options.limits));
     VkPhysicalDeviceProperties properties;
-    vkGetPhysicalDeviceProperties(physical_, &properties);
-    timestamp_ns_ = has_timestamps(physical_, queue_family_) ? properties.limits.timestampPeriod : 0;
+    vk_.GetPhysicalDeviceProperties(physical_, &properties);
+    timestamp_ns_ = has_timestamps(vk_, physical_, queue_family_) ? properties.limits.timestampPeriod : 0;
     auto type = vk_struct<VkSemaphoreTypeCreateInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_TYPE_CREATE_INFO);
     type.semaphoreType = VK_SEMAPHORE_TYPE_TIMELINE;
     auto semaphore = vk_struct<VkSemaphoreCreateInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO, &type);
-    SR_VK(vkCreateSemaphore(device_, &semaphore, nullptr, &timeline_));
+    SR_VK(vk_.CreateSemaphore(device_, &semaphore, nullptr, &timeline_));
     auto pool = vk_struct<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
     pool.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
     pool.queueFamilyIndex = queue_family_;
-    SR_VK(vkCreateCommandPool(device_, &pool, nullptr, &copy_pool_));
+    SR_VK(vk_.CreateCommandPool(device_, &pool, nullptr, &copy_pool_));
     auto commands = vk_struct<VkCommandBufferAllocateInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO);
     commands.commandPool = copy_pool_;
     commands.commandBufferCount = 1;
-    SR_VK(vkAllocateCommandBuffers(device_, &commands, &copy_commands_));
-    SR_TRY(pipelines_, PipelineStore::create(*this));
+    SR_VK(vk_.AllocateCommandBuffers(device_, &commands, &copy_commands_));
+    SR_TRY(pipelines_, PipelineStore::create(*this, options.pipeline_cache));
     return {};
 }
 
@@ -214,18 +237,18 @@ Device::~Device()
     pipelines_.reset();
     staging_.reset();
     if (copy_pool_)
-        vkDestroyCommandPool(device_, copy_pool_, nullptr);
+        vk_.DestroyCommandPool(device_, copy_pool_, nullptr);
     if (timeline_)
-        vkDestroySemaphore(device_, timeline_, nullptr);
+        vk_.DestroySemaphore(device_, timeline_, nullptr);
     if (!owned_)
         return;
     if (device_)
-        vkDestroyDevice(device_, nullptr);
+        vk_.DestroyDevice(device_, nullptr);
     if (messenger_)
         reinterpret_cast<PFN_vkDestroyDebugUtilsMessengerEXT>(
-            vkGetInstanceProcAddr(instance_, "vkDestroyDebugUtilsMessengerEXT"))(instance_, messenger_, nullptr);
+            vk_.GetInstanceProcAddr(instance_, "vkDestroyDebugUtilsMessengerEXT"))(instance_, messenger_, nullptr);
     if (instance_)
-        vkDestroyInstance(instance_, nullptr);
+        vk_.DestroyInstance(instance_, nullptr);
 }
 
 Status Device::account(int64_t bytes, const char* what)
@@ -238,25 +261,33 @@ Status Device::account(int64_t bytes, const char* what)
     return {};
 }
 
-Result<uint64_t> Device::submit(std::span<const VkCommandBuffer> commands)
+Result<uint64_t> Device::submit(std::span<const VkCommandBuffer> commands, const TimelinePoints& points)
 {
     const std::lock_guard guard(queue_mutex_);
     const uint64_t value = ticket_ + 1;
+    SemaphoreValues waits(points.waits), signals(points.signals);
+    signals.add({timeline_, value});
     auto timeline = vk_struct<VkTimelineSemaphoreSubmitInfo>(VK_STRUCTURE_TYPE_TIMELINE_SEMAPHORE_SUBMIT_INFO);
-    timeline.signalSemaphoreValueCount = 1;
-    timeline.pSignalSemaphoreValues = &value;
+    timeline.waitSemaphoreValueCount = waits.count();
+    timeline.pWaitSemaphoreValues = waits.values.data();
+    timeline.signalSemaphoreValueCount = signals.count();
+    timeline.pSignalSemaphoreValues = signals.values.data();
+    const std::vector<VkPipelineStageFlags> stages(waits.count(), VK_PIPELINE_STAGE_ALL_COMMANDS_BIT);
     auto info = vk_struct<VkSubmitInfo>(VK_STRUCTURE_TYPE_SUBMIT_INFO, &timeline);
+    info.waitSemaphoreCount = waits.count();
+    info.pWaitSemaphores = waits.semaphores.data();
+    info.pWaitDstStageMask = stages.data();
     info.commandBufferCount = uint32_t(commands.size());
     info.pCommandBuffers = commands.data();
-    info.signalSemaphoreCount = 1;
-    info.pSignalSemaphores = &timeline_;
+    info.signalSemaphoreCount = signals.count();
+    info.pSignalSemaphores = signals.semaphores.data();
     if (lock_)
         lock_();
-    const VkResult result = vkQueueSubmit(queue_, 1, &info, VK_NULL_HANDLE);
+    const VkResult result = vk_.QueueSubmit(queue_, 1, &info, VK_NULL_HANDLE);
     if (unlock_)
         unlock_();
     if (result != VK_SUCCESS)
-        return tl::make_unexpected(device_error(device_, result, "vkQueueSubmit"));
+        return tl::make_unexpected(device_error(vk_, device_, result, "vkQueueSubmit"));
     return ticket_ = value;
 }
 
@@ -266,19 +297,19 @@ Status Device::wait(uint64_t ticket)
     info.semaphoreCount = 1;
     info.pSemaphores = &timeline_;
     info.pValues = &ticket;
-    const VkResult result = vkWaitSemaphores(device_, &info, kWaitNanoseconds);
+    const VkResult result = vk_.WaitSemaphores(device_, &info, kWaitNanoseconds);
     if (result == VK_TIMEOUT)
         return fail(ErrorCode::device_lost, "device '{}' did not finish a submit within {} s", name_,
                     kWaitNanoseconds / 1000000000);
     if (result != VK_SUCCESS)
-        return tl::make_unexpected(device_error(device_, result, "vkWaitSemaphores"));
+        return tl::make_unexpected(device_error(vk_, device_, result, "vkWaitSemaphores"));
     return {};
 }
 
 Result<bool> Device::finished(uint64_t ticket) const
 {
     uint64_t value = 0;
-    SR_VK(vkGetSemaphoreCounterValue(device_, timeline_, &value));
+    SR_VK(vk_.GetSemaphoreCounterValue(device_, timeline_, &value));
     return value >= ticket;
 }
 
@@ -333,9 +364,9 @@ Status Device::clear(const BufferSlice& slice)
     SR_CHECK(write(slice.part(tail - slice.offset, end - tail), {kZeros, end - tail}));
     if (begin == tail)
         return {};
-    SR_CHECK(begin_commands(copy_commands_, true));
-    record_clear(copy_commands_, slice.buffer->handle(), begin, tail - begin);
-    SR_VK(vkEndCommandBuffer(copy_commands_));
+    SR_CHECK(begin_commands(vk_, copy_commands_, true));
+    record_clear(vk_, copy_commands_, slice.buffer->handle(), begin, tail - begin);
+    SR_VK(vk_.EndCommandBuffer(copy_commands_));
     SR_TRY(const uint64_t ticket, submit({&copy_commands_, 1}));
     return wait(ticket);
 }

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "runtime/device/memory.h"
-#include "runtime/device/vulkan.h"
+#include "runtime/device/vulkan_calls.h"
 #include "runtime/graph/limits.h"
 #include "runtime/graph/work_rates.h"
 
@@ -28,10 +28,15 @@ struct DeviceOptions {
     // ErrorCode::interrupted. From any thread that uses the device.
     std::function<bool()> cancelled = {};
     bool validation = false; // Khronos validation with synchronization checks; also SEMROVER_VALIDATION=1 or =fatal
+    // PipelineStore::blob() of an earlier process, read while the device is made; with a host's device, or with a blob,
+    // no file is kept
+    std::span<const std::byte> pipeline_cache = {};
 };
 
-// a device that belongs to the host program; it outlives the engine
+// A device that belongs to the host program; it outlives the engine. No file is kept and no variable of the environment
+// read for it.
 struct HostDevice {
+    PFN_vkGetInstanceProcAddr get_instance_proc_addr = nullptr; // its way to Vulkan; null: the loader's
     VkInstance instance = VK_NULL_HANDLE;
     VkPhysicalDevice physical = VK_NULL_HANDLE;
     VkDevice device = VK_NULL_HANDLE; // Vulkan 1.2 with timelineSemaphore and robustBufferAccess enabled
@@ -40,6 +45,15 @@ struct HostDevice {
     bool robust_buffer_access = false;            // it is enabled, as it must be: files decide what is read
     bool float16 = false;                         // shaderFloat16 is enabled too
     std::function<void()> lock = {}, unlock = {}; // around every use of the queue; may be empty
+};
+
+// A value of a timeline semaphore: to wait for before a submit begins, or to signal when it has ended.
+struct TimelinePoint {
+    VkSemaphore semaphore = VK_NULL_HANDLE;
+    uint64_t value = 0;
+};
+struct TimelinePoints {
+    std::vector<TimelinePoint> waits, signals;
 };
 
 // bytes that crossed the border between host and device: to the host, from the host
@@ -69,6 +83,8 @@ class Device {
     const std::string& driver() const { return driver_; }
     uint32_t index() const { return index_; } // in list_devices(); 0 for a host's
     VkDevice handle() const { return device_; }
+    const VulkanCalls& vk() const { return vk_; }
+    bool owned() const { return owned_; } // not a host's
     VkInstance instance() const { return instance_; }
     VkPhysicalDevice physical() const { return physical_; }
     uint32_t queue_family() const { return queue_family_; }
@@ -87,7 +103,7 @@ class Device {
     Status check_cancelled() const; // interrupted, where DeviceOptions::cancelled says so
 
     // queue: a ticket is a value of one timeline semaphore
-    Result<uint64_t> submit(std::span<const VkCommandBuffer> commands);
+    Result<uint64_t> submit(std::span<const VkCommandBuffer> commands, const TimelinePoints& points = {});
     Status wait(uint64_t ticket);
     Result<bool> finished(uint64_t ticket) const; // without waiting
     uint64_t last_ticket() const { return ticket_; }
@@ -110,6 +126,7 @@ class Device {
     Status finish(const DeviceOptions& options);
     Result<Staging*> staging();
 
+    VulkanCalls vk_;
     VkInstance instance_ = VK_NULL_HANDLE;
     VkDebugUtilsMessengerEXT messenger_ = VK_NULL_HANDLE;
     VkPhysicalDevice physical_ = VK_NULL_HANDLE;

@@ -36,10 +36,10 @@ std::string_view text_of(const char (&array)[n])
     return {array, strnlen(array, n)};
 }
 
-std::string describe_fault(VkDevice device)
+std::string describe_fault(const VulkanCalls& vk, VkDevice device)
 {
     const auto get =
-        reinterpret_cast<PFN_vkGetDeviceFaultInfoEXT>(vkGetDeviceProcAddr(device, "vkGetDeviceFaultInfoEXT"));
+        reinterpret_cast<PFN_vkGetDeviceFaultInfoEXT>(vk.GetDeviceProcAddr(device, "vkGetDeviceFaultInfoEXT"));
     auto counts = vk_struct<VkDeviceFaultCountsEXT>(VK_STRUCTURE_TYPE_DEVICE_FAULT_COUNTS_EXT);
     if (!get || get(device, &counts, nullptr) != VK_SUCCESS)
         return "";
@@ -57,21 +57,21 @@ std::string describe_fault(VkDevice device)
 
 } // namespace
 
-bool tells_faults(VkPhysicalDevice physical)
+bool tells_faults(const VulkanCalls& vk, VkPhysicalDevice physical)
 {
-    if (!has_extension(physical, VK_EXT_DEVICE_FAULT_EXTENSION_NAME))
+    if (!has_extension(vk, physical, VK_EXT_DEVICE_FAULT_EXTENSION_NAME))
         return false;
     auto faults = vk_struct<VkPhysicalDeviceFaultFeaturesEXT>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FAULT_FEATURES_EXT);
     auto features = vk_struct<VkPhysicalDeviceFeatures2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2, &faults);
-    vkGetPhysicalDeviceFeatures2(physical, &features);
+    vk.GetPhysicalDeviceFeatures2(physical, &features);
     return faults.deviceFault;
 }
 
-Error device_error(VkDevice device, VkResult result, const char* call)
+Error device_error(const VulkanCalls& vk, VkDevice device, VkResult result, const char* call)
 {
     Error error = vk_error(result, call);
     if (result == VK_ERROR_DEVICE_LOST)
-        error.message += describe_fault(device);
+        error.message += describe_fault(vk, device);
     return error;
 }
 

@@ -4,48 +4,50 @@
 
 namespace semrover {
 
+void record_host_target(const Device& device, VkCommandBuffer commands, const BufferSlice& from, const HostTarget& to)
+{
+    if (to.buffer)
+        record_host_copy(device.vk(), commands, from.buffer->handle(), from.offset, to.buffer, to.offset, from.bytes);
+    if (to.image.image)
+        record_image_copy(device.vk(), commands, from.buffer->handle(), from.offset, to.image);
+}
+
+void record_host_floats(const Device& device, VkCommandBuffer commands, const HostFloats& from, const BufferSlice& to)
+{
+    record_image_fetch(device.vk(), commands, from.image, from.aspect, to.buffer->handle(), to.offset);
+}
+
 Result<std::unique_ptr<HostCopies>> HostCopies::create(Device& device)
 {
     std::unique_ptr<HostCopies> c(new HostCopies(device));
-    auto pool = vk_struct<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
-    pool.queueFamilyIndex = device.queue_family();
-    pool.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
-    SR_VK(vkCreateCommandPool(device.handle(), &pool, nullptr, &c->pool_));
-    auto allocate = vk_struct<VkCommandBufferAllocateInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO);
-    allocate.commandPool = c->pool_;
-    allocate.commandBufferCount = 1;
-    SR_VK(vkAllocateCommandBuffers(device.handle(), &allocate, &c->commands_));
+    SR_TRY(c->commands_, CommandRing::create(device, 1));
     return c;
-}
-
-HostCopies::~HostCopies()
-{
-    (void)device_.wait(device_.last_ticket()); // a lost device is told elsewhere
-    if (pool_)
-        vkDestroyCommandPool(device_.handle(), pool_, nullptr);
 }
 
 Status HostCopies::copy(const BufferSlice& from, const HostTarget& to)
 {
-    SR_CHECK(begin_commands(commands_, true));
-    if (to.buffer)
-        record_host_copy(commands_, from.buffer->handle(), from.offset, to.buffer, to.offset, from.bytes);
-    if (to.image.image)
-        record_image_copy(commands_, from.buffer->handle(), from.offset, to.image);
+    SR_TRY(const VkCommandBuffer commands, commands_->begin());
+    record_host_target(device_, commands, from, to);
     return submit();
 }
 
 Status HostCopies::fetch(VkBuffer from, uint64_t offset, const BufferSlice& to)
 {
-    SR_CHECK(begin_commands(commands_, true));
-    record_host_copy(commands_, from, offset, to.buffer->handle(), to.offset, to.bytes);
+    SR_TRY(const VkCommandBuffer commands, commands_->begin());
+    record_host_copy(device_.vk(), commands, from, offset, to.buffer->handle(), to.offset, to.bytes);
+    return submit();
+}
+
+Status HostCopies::fetch(const HostFloats& from, const BufferSlice& to)
+{
+    SR_TRY(const VkCommandBuffer commands, commands_->begin());
+    record_host_floats(device_, commands, from, to);
     return submit();
 }
 
 Status HostCopies::submit()
 {
-    SR_VK(vkEndCommandBuffer(commands_));
-    SR_TRY(const uint64_t ticket, device_.submit({&commands_, 1}));
+    SR_TRY(const uint64_t ticket, commands_->submit());
     return device_.wait(ticket);
 }
 

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "runtime/device/command.h"
-#include "runtime/device/device.h"
+#include "runtime/device/command_ring.h"
 
 namespace semrover {
 
@@ -14,26 +14,34 @@ struct HostTarget {
     HostImage image = {};
 };
 
+// an image of 32-bit floats that a host program has
+struct HostFloats {
+    HostImage image;
+    VkImageAspectFlags aspect = VK_IMAGE_ASPECT_DEPTH_BIT;
+};
+
+// into a command buffer that is being recorded, too
+void record_host_floats(const Device& device, VkCommandBuffer commands, const HostFloats& from, const BufferSlice& to);
+
+// into a command buffer that is being recorded. to.image: texels of the slice's rows, as many as it has
+void record_host_target(const Device& device, VkCommandBuffer commands, const BufferSlice& from, const HostTarget& to);
+
 // Copies what lies on the device into a host program's memory, and back, and waits for it.
 class HostCopies {
   public:
     static Result<std::unique_ptr<HostCopies>> create(Device& device);
-    ~HostCopies();
-    HostCopies(const HostCopies&) = delete;
-    HostCopies& operator=(const HostCopies&) = delete;
 
-    // to.image: texels of the slice's rows, as many as it has
-    Status copy(const BufferSlice& from, const HostTarget& to);
+    Status copy(const BufferSlice& from, const HostTarget& to); // as record_host_target()
     // as many bytes as the slice has, from a buffer with TRANSFER_SRC usage
     Status fetch(VkBuffer from, uint64_t offset, const BufferSlice& to);
+    Status fetch(const HostFloats& from, const BufferSlice& to); // pixels, row by row
 
   private:
     explicit HostCopies(Device& device) : device_(device) {}
     Status submit();
 
     Device& device_;
-    VkCommandPool pool_ = VK_NULL_HANDLE;
-    VkCommandBuffer commands_ = VK_NULL_HANDLE;
+    std::unique_ptr<CommandRing> commands_;
 };
 
 } // namespace semrover

@@ -42,9 +42,9 @@ Result<std::unique_ptr<Buffer>> Buffer::create(Device& device, uint64_t bytes, M
     info.usage = VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
     if (kind == MemoryKind::device)
         info.usage |= VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT;
-    SR_VK(vkCreateBuffer(device.handle(), &info, nullptr, &b->buffer_));
+    SR_VK(device.vk().CreateBuffer(device.handle(), &info, nullptr, &b->buffer_));
     VkMemoryRequirements needs;
-    vkGetBufferMemoryRequirements(device.handle(), b->buffer_, &needs);
+    device.vk().GetBufferMemoryRequirements(device.handle(), b->buffer_, &needs);
     if (needs.size > device.limits().max_allocation)
         return fail(ErrorCode::out_of_memory, "{}: {} bytes exceed the device's largest allocation of {} bytes", name,
                     needs.size, device.limits().max_allocation);
@@ -53,21 +53,22 @@ Result<std::unique_ptr<Buffer>> Buffer::create(Device& device, uint64_t bytes, M
         b->accounted_ = needs.size;
     }
     VkPhysicalDeviceMemoryProperties memory;
-    vkGetPhysicalDeviceMemoryProperties(device.physical(), &memory);
+    device.vk().GetPhysicalDeviceMemoryProperties(device.physical(), &memory);
     const int type = choose_type(memory, needs.memoryTypeBits, kind);
     if (type < 0)
         return fail(ErrorCode::no_device, "{}: the device has no memory type for it", name);
     auto allocate = vk_struct<VkMemoryAllocateInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO);
     allocate.allocationSize = needs.size;
     allocate.memoryTypeIndex = uint32_t(type);
-    if (vkAllocateMemory(device.handle(), &allocate, nullptr, &b->memory_) != VK_SUCCESS)
+    if (device.vk().AllocateMemory(device.handle(), &allocate, nullptr, &b->memory_) != VK_SUCCESS)
         return fail(ErrorCode::out_of_memory, "{}: the device refused {} bytes; {} bytes are in use", name, needs.size,
                     device.allocated_bytes() - b->accounted_);
-    SR_VK(vkBindBufferMemory(device.handle(), b->buffer_, b->memory_, 0));
+    SR_VK(device.vk().BindBufferMemory(device.handle(), b->buffer_, b->memory_, 0));
     constexpr VkMemoryPropertyFlags kHost = VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
     const bool direct = kind != MemoryKind::device || !device.limits().force_staging;
     if (direct && (memory.memoryTypes[type].propertyFlags & kHost) == kHost)
-        SR_VK(vkMapMemory(device.handle(), b->memory_, 0, VK_WHOLE_SIZE, 0, reinterpret_cast<void**>(&b->mapped_)));
+        SR_VK(device.vk().MapMemory(device.handle(), b->memory_, 0, VK_WHOLE_SIZE, 0,
+                                    reinterpret_cast<void**>(&b->mapped_)));
     // staging is read as it is, where no cached memory is to be had
     b->cached_ =
         kind != MemoryKind::device || memory.memoryTypes[type].propertyFlags & VK_MEMORY_PROPERTY_HOST_CACHED_BIT;
@@ -79,9 +80,9 @@ Buffer::~Buffer()
     if (memory_)
         (void)device_.wait(device_.last_ticket()); // commands in flight may use it; a lost device is told elsewhere
     if (buffer_)
-        vkDestroyBuffer(device_.handle(), buffer_, nullptr);
+        device_.vk().DestroyBuffer(device_.handle(), buffer_, nullptr);
     if (memory_)
-        vkFreeMemory(device_.handle(), memory_, nullptr);
+        device_.vk().FreeMemory(device_.handle(), memory_, nullptr);
     device_.release(accounted_);
 }
 

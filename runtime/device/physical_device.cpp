@@ -46,11 +46,12 @@ int rank(DeviceType type)
     return 4;
 }
 
-uint32_t supported_needs(VkPhysicalDevice physical, const VkPhysicalDeviceVulkan11Properties& p11)
+uint32_t supported_needs(const VulkanCalls& vk, VkPhysicalDevice physical,
+                         const VkPhysicalDeviceVulkan11Properties& p11)
 {
     auto f12 = vk_struct<VkPhysicalDeviceVulkan12Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES);
     auto features = vk_struct<VkPhysicalDeviceFeatures2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2, &f12);
-    vkGetPhysicalDeviceFeatures2(physical, &features);
+    vk.GetPhysicalDeviceFeatures2(physical, &features);
     uint32_t needs = 0;
     if (p11.subgroupSupportedStages & VK_SHADER_STAGE_COMPUTE_BIT) {
         if (p11.subgroupSupportedOperations & VK_SUBGROUP_FEATURE_ARITHMETIC_BIT)
@@ -63,14 +64,14 @@ uint32_t supported_needs(VkPhysicalDevice physical, const VkPhysicalDeviceVulkan
     return f12.shaderFloat16 ? needs | kNeedsFloat16 : needs;
 }
 
-DeviceLimits limits_of(VkPhysicalDevice physical, const VkPhysicalDeviceProperties& p,
+DeviceLimits limits_of(const VulkanCalls& vk, VkPhysicalDevice physical, const VkPhysicalDeviceProperties& p,
                        const VkPhysicalDeviceVulkan11Properties& p11)
 {
     const VkPhysicalDeviceLimits& v = p.limits;
     DeviceLimits l;
     l.type = device_type(p.deviceType);
     l.subgroup_size = p11.subgroupSize;
-    l.needs_supported = supported_needs(physical, p11);
+    l.needs_supported = supported_needs(vk, physical, p11);
     l.max_shared_bytes = v.maxComputeSharedMemorySize;
     l.max_group_threads = v.maxComputeWorkGroupInvocations;
     l.max_groups =
@@ -86,17 +87,17 @@ DeviceLimits limits_of(VkPhysicalDevice physical, const VkPhysicalDeviceProperti
     return l;
 }
 
-std::string refusal(VkPhysicalDevice physical, const VkPhysicalDeviceProperties& p)
+std::string refusal(const VulkanCalls& vk, VkPhysicalDevice physical, const VkPhysicalDeviceProperties& p)
 {
     if (p.apiVersion < VK_API_VERSION_1_2)
         return fmt::format("needs Vulkan 1.2, has {}.{}", VK_API_VERSION_MAJOR(p.apiVersion),
                            VK_API_VERSION_MINOR(p.apiVersion));
     auto f12 = vk_struct<VkPhysicalDeviceVulkan12Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES);
     auto features = vk_struct<VkPhysicalDeviceFeatures2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2, &f12);
-    vkGetPhysicalDeviceFeatures2(physical, &features);
+    vk.GetPhysicalDeviceFeatures2(physical, &features);
     if (!f12.timelineSemaphore)
         return "has no timeline semaphores";
-    return compute_queue_family(physical) ? "" : "has no compute queue";
+    return compute_queue_family(vk, physical) ? "" : "has no compute queue";
 }
 
 // enumerate(&count, extensions): as Vulkan's two functions do, of an instance or of a device
@@ -161,56 +162,56 @@ Result<VkInstance> create_instance(bool validation)
     return instance;
 }
 
-Result<std::vector<VkPhysicalDevice>> physical_devices(VkInstance instance)
+Result<std::vector<VkPhysicalDevice>> physical_devices(const VulkanCalls& vk, VkInstance instance)
 {
     uint32_t count = 0;
-    SR_VK(vkEnumeratePhysicalDevices(instance, &count, nullptr));
+    SR_VK(vk.EnumeratePhysicalDevices(instance, &count, nullptr));
     std::vector<VkPhysicalDevice> all(count);
-    SR_VK(vkEnumeratePhysicalDevices(instance, &count, all.data()));
-    std::stable_sort(all.begin(), all.end(), [](VkPhysicalDevice a, VkPhysicalDevice b) {
+    SR_VK(vk.EnumeratePhysicalDevices(instance, &count, all.data()));
+    std::stable_sort(all.begin(), all.end(), [&](VkPhysicalDevice a, VkPhysicalDevice b) {
         VkPhysicalDeviceProperties pa, pb;
-        vkGetPhysicalDeviceProperties(a, &pa);
-        vkGetPhysicalDeviceProperties(b, &pb);
+        vk.GetPhysicalDeviceProperties(a, &pa);
+        vk.GetPhysicalDeviceProperties(b, &pb);
         return rank(device_type(pa.deviceType)) < rank(device_type(pb.deviceType));
     });
     return all;
 }
 
-bool has_extension(VkPhysicalDevice physical, const char* name)
+bool has_extension(const VulkanCalls& vk, VkPhysicalDevice physical, const char* name)
 {
     return lists(name, [&](uint32_t* count, VkExtensionProperties* all) {
-        return vkEnumerateDeviceExtensionProperties(physical, nullptr, count, all);
+        return vk.EnumerateDeviceExtensionProperties(physical, nullptr, count, all);
     });
 }
 
 namespace {
 
-std::vector<VkQueueFamilyProperties> queue_families(VkPhysicalDevice physical)
+std::vector<VkQueueFamilyProperties> queue_families(const VulkanCalls& vk, VkPhysicalDevice physical)
 {
     uint32_t count = 0;
-    vkGetPhysicalDeviceQueueFamilyProperties(physical, &count, nullptr);
+    vk.GetPhysicalDeviceQueueFamilyProperties(physical, &count, nullptr);
     std::vector<VkQueueFamilyProperties> families(count);
-    vkGetPhysicalDeviceQueueFamilyProperties(physical, &count, families.data());
+    vk.GetPhysicalDeviceQueueFamilyProperties(physical, &count, families.data());
     return families;
 }
 
 } // namespace
 
-bool is_compute_family(VkPhysicalDevice physical, uint32_t family)
+bool is_compute_family(const VulkanCalls& vk, VkPhysicalDevice physical, uint32_t family)
 {
-    const auto families = queue_families(physical);
+    const auto families = queue_families(vk, physical);
     return family < families.size() && (families[family].queueFlags & VK_QUEUE_COMPUTE_BIT);
 }
 
-bool has_timestamps(VkPhysicalDevice physical, uint32_t family)
+bool has_timestamps(const VulkanCalls& vk, VkPhysicalDevice physical, uint32_t family)
 {
-    const auto families = queue_families(physical);
+    const auto families = queue_families(vk, physical);
     return family < families.size() && families[family].timestampValidBits > 0;
 }
 
-Result<uint32_t> compute_queue_family(VkPhysicalDevice physical)
+Result<uint32_t> compute_queue_family(const VulkanCalls& vk, VkPhysicalDevice physical)
 {
-    const auto families = queue_families(physical);
+    const auto families = queue_families(vk, physical);
     const auto is_compute = [](const auto& f) { return (f.queueFlags & VK_QUEUE_COMPUTE_BIT) != 0; };
     // one that draws nothing, where there is one: a desktop draws beside it
     auto found = std::ranges::find_if(families, [&](const auto& f) {
@@ -223,13 +224,13 @@ Result<uint32_t> compute_queue_family(VkPhysicalDevice physical)
     return fail(ErrorCode::no_device, "the device has no compute queue");
 }
 
-DeviceSummary summarize(VkInstance instance, VkPhysicalDevice physical, uint32_t index)
+DeviceSummary summarize(const VulkanCalls& vk, VkInstance instance, VkPhysicalDevice physical, uint32_t index)
 {
     auto p12 = vk_struct<VkPhysicalDeviceVulkan12Properties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_PROPERTIES);
     auto p11 =
         vk_struct<VkPhysicalDeviceVulkan11Properties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_PROPERTIES, &p12);
     auto p = vk_struct<VkPhysicalDeviceProperties2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2, &p11);
-    vkGetPhysicalDeviceProperties2(physical, &p);
+    vk.GetPhysicalDeviceProperties2(physical, &p);
     static constexpr const char* kTypes[] = {"cpu", "integrated", "discrete", "other"};
     DeviceSummary s;
     s.index = index;
@@ -237,19 +238,19 @@ DeviceSummary summarize(VkInstance instance, VkPhysicalDevice physical, uint32_t
     s.driver = fmt::format("{} {}", p12.driverName, p12.driverInfo);
     s.type = kTypes[int(device_type(p.properties.deviceType))];
     s.api = api_version_text(p.properties.apiVersion);
-    s.refusal = refusal(physical, p.properties);
-    s.limits = limits_of(physical, p.properties, p11);
-    s.limits.matrix = matrix_shape(instance, physical);
+    s.refusal = refusal(vk, physical, p.properties);
+    s.limits = limits_of(vk, physical, p.properties, p11);
+    s.limits.matrix = matrix_shape(vk, instance, physical);
     if (s.limits.matrix.m)
         s.limits.needs_supported |= kNeedsCooperativeMatrix;
     VkPhysicalDeviceMemoryProperties memory;
-    vkGetPhysicalDeviceMemoryProperties(physical, &memory);
+    vk.GetPhysicalDeviceMemoryProperties(physical, &memory);
     s.memory_bytes = 0;
     for (uint32_t i = 0; i < memory.memoryHeapCount; ++i)
         if (memory.memoryHeaps[i].flags & VK_MEMORY_HEAP_DEVICE_LOCAL_BIT)
             s.memory_bytes = std::max<uint64_t>(s.memory_bytes, memory.memoryHeaps[i].size);
     for (const char* extension : kOptionalExtensions)
-        if (has_extension(physical, extension))
+        if (has_extension(vk, physical, extension))
             s.extensions.push_back(extension);
     return s;
 }
@@ -257,12 +258,14 @@ DeviceSummary summarize(VkInstance instance, VkPhysicalDevice physical, uint32_t
 Result<std::vector<DeviceSummary>> list_devices()
 {
     SR_TRY(const VkInstance instance, create_instance(false));
-    auto all = physical_devices(instance);
+    VulkanCalls vk;
+    SR_CHECK(vk.load_instance(nullptr, instance));
+    auto all = physical_devices(vk, instance);
     std::vector<DeviceSummary> out;
     if (all)
         for (size_t i = 0; i < all->size(); ++i)
-            out.push_back(summarize(instance, (*all)[i], uint32_t(i)));
-    vkDestroyInstance(instance, nullptr);
+            out.push_back(summarize(vk, instance, (*all)[i], uint32_t(i)));
+    vk.DestroyInstance(instance, nullptr);
     if (!all)
         return tl::make_unexpected(all.error());
     return out;

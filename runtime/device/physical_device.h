@@ -3,6 +3,7 @@
 #pragma once
 
 #include "runtime/device/device.h"
+#include "runtime/device/vulkan_calls.h"
 
 namespace semrover {
 
@@ -10,11 +11,11 @@ inline constexpr const char* kValidationLayer = "VK_LAYER_KHRONOS_validation";
 
 std::string api_version_text(uint32_t version); // "1.3.239"
 Result<VkInstance> create_instance(bool validation);
-Result<std::vector<VkPhysicalDevice>> physical_devices(VkInstance instance); // best first
-DeviceSummary summarize(VkInstance instance, VkPhysicalDevice physical, uint32_t index);
-bool has_extension(VkPhysicalDevice physical, const char* name);
-Result<uint32_t> compute_queue_family(VkPhysicalDevice physical);
-bool has_timestamps(VkPhysicalDevice physical, uint32_t family);
-bool is_compute_family(VkPhysicalDevice physical, uint32_t family);
+Result<std::vector<VkPhysicalDevice>> physical_devices(const VulkanCalls& vk, VkInstance instance); // best first
+DeviceSummary summarize(const VulkanCalls& vk, VkInstance instance, VkPhysicalDevice physical, uint32_t index);
+bool has_extension(const VulkanCalls& vk, VkPhysicalDevice physical, const char* name);
+Result<uint32_t> compute_queue_family(const VulkanCalls& vk, VkPhysicalDevice physical);
+bool has_timestamps(const VulkanCalls& vk, VkPhysicalDevice physical, uint32_t family);
+bool is_compute_family(const VulkanCalls& vk, VkPhysicalDevice physical, uint32_t family);
 
 } // namespace semrover

@@ -24,14 +24,14 @@ namespace {
 constexpr uint64_t kMaxCacheBytes = 1ull << 31;
 constexpr double kSaveAfterSeconds = 2; // of compiling: writing the file takes some milliseconds
 
-std::string cache_path(VkPhysicalDevice physical)
+std::string cache_path(Device& device)
 {
     const char *cache = std::getenv("XDG_CACHE_HOME"), *home = std::getenv("HOME");
     if (!(cache && *cache) && !(home && *home))
         return "";
     const fs::path root = cache && *cache ? fs::path(cache) : fs::path(home) / ".cache";
     VkPhysicalDeviceProperties p;
-    vkGetPhysicalDeviceProperties(physical, &p);
+    device.vk().GetPhysicalDeviceProperties(device.physical(), &p);
     std::string name = fmt::format("pipelines-{:x}-{:x}-{:x}-", p.vendorID, p.deviceID, p.driverVersion);
     for (uint8_t byte : p.pipelineCacheUUID)
         name += fmt::format("{:02x}", byte);
@@ -45,42 +45,49 @@ std::array<char, 8> checksum(const std::vector<char>& blob)
     return std::bit_cast<std::array<char, 8>>(hash.value());
 }
 
-// drivers trust what follows the header: a truncated, damaged or foreign file must not reach them.
-// the file is the checksum and the blob
-std::vector<char> load_blob(const std::string& path, VkPhysicalDevice physical)
+// drivers trust what follows the header: a truncated, damaged or foreign blob must not reach them. It is the checksum
+// and the driver's data
+std::vector<char> data_of(std::string_view blob, Device& device)
 {
-    const auto file = read_text_file(path, kMaxCacheBytes); // what is no file is no cache
     std::array<char, 8> expected{};
-    if (!file || file->size() < expected.size())
+    if (blob.size() < expected.size())
         return {};
-    std::ranges::copy(file->substr(0, expected.size()), expected.begin());
-    const std::vector<char> blob(file->begin() + expected.size(), file->end());
-    if (checksum(blob) != expected)
+    std::ranges::copy(blob.substr(0, expected.size()), expected.begin());
+    std::vector<char> data(blob.begin() + expected.size(), blob.end());
+    if (checksum(data) != expected)
         return {};
     VkPhysicalDeviceProperties p;
-    vkGetPhysicalDeviceProperties(physical, &p);
+    device.vk().GetPhysicalDeviceProperties(device.physical(), &p);
     VkPipelineCacheHeaderVersionOne header;
-    if (blob.size() < sizeof header)
+    if (data.size() < sizeof header)
         return {};
-    std::memcpy(&header, blob.data(), sizeof header);
+    std::memcpy(&header, data.data(), sizeof header);
     const bool ours = header.vendorID == p.vendorID && header.deviceID == p.deviceID &&
                       !std::memcmp(header.pipelineCacheUUID, p.pipelineCacheUUID, VK_UUID_SIZE);
-    return ours ? blob : std::vector<char>{};
+    return ours ? std::move(data) : std::vector<char>{};
+}
+
+std::vector<char> load_data(const std::string& path, Device& device)
+{
+    const auto file = read_text_file(path, kMaxCacheBytes); // what is no file is no cache
+    return file ? data_of(*file, device) : std::vector<char>{};
 }
 
 } // namespace
 
-Result<std::unique_ptr<PipelineStore>> PipelineStore::create(Device& device)
+Result<std::unique_ptr<PipelineStore>> PipelineStore::create(Device& device, std::span<const std::byte> blob)
 {
     std::unique_ptr<PipelineStore> store(new PipelineStore(device));
-    store->cache_path_ = cache_path(device.physical());
-    const std::vector<char> blob =
-        store->cache_path_.empty() ? std::vector<char>{} : load_blob(store->cache_path_, device.physical());
+    if (device.owned() && blob.empty())
+        store->cache_path_ = cache_path(device);
+    const std::string_view given(reinterpret_cast<const char*>(blob.data()), blob.size());
+    const std::vector<char> data =
+        store->cache_path_.empty() ? data_of(given, device) : load_data(store->cache_path_, device);
     auto info = vk_struct<VkPipelineCacheCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO);
-    info.initialDataSize = blob.size();
-    info.pInitialData = blob.data();
-    store->reused_bytes_ = blob.size();
-    SR_VK(vkCreatePipelineCache(device.handle(), &info, nullptr, &store->cache_));
+    info.initialDataSize = data.size();
+    info.pInitialData = data.data();
+    store->reused_bytes_ = data.size();
+    SR_VK(device.vk().CreatePipelineCache(device.handle(), &info, nullptr, &store->cache_));
     return store;
 }
 
@@ -91,23 +98,29 @@ PipelineStore::~PipelineStore()
     for (auto& [key, p] : pipelines_)
         destroy(p);
     if (cache_)
-        vkDestroyPipelineCache(device_.handle(), cache_, nullptr);
+        device_.vk().DestroyPipelineCache(device_.handle(), cache_, nullptr);
+}
+
+Result<std::vector<char>> PipelineStore::blob() const
+{
+    size_t bytes = 0;
+    SR_VK(device_.vk().GetPipelineCacheData(device_.handle(), cache_, &bytes, nullptr));
+    std::vector<char> blob(bytes);
+    SR_VK(device_.vk().GetPipelineCacheData(device_.handle(), cache_, &bytes, blob.data()));
+    blob.resize(bytes);
+    const std::array<char, 8> sum = checksum(blob);
+    blob.insert(blob.begin(), sum.begin(), sum.end());
+    return blob;
 }
 
 // best effort: a cache that cannot be written costs time at the next start, nothing else
 void PipelineStore::save()
 {
-    size_t bytes = 0;
-    if (cache_path_.empty() || vkGetPipelineCacheData(device_.handle(), cache_, &bytes, nullptr) != VK_SUCCESS)
+    if (cache_path_.empty())
         return;
-    std::vector<char> blob(bytes);
-    if (vkGetPipelineCacheData(device_.handle(), cache_, &bytes, blob.data()) != VK_SUCCESS)
-        return;
-    blob.resize(bytes);
-    const std::array<char, 8> sum = checksum(blob);
-    blob.insert(blob.begin(), sum.begin(), sum.end());
-    if (make_folder(fs::path(cache_path_).parent_path()))
-        (void)write_file_atomically(cache_path_, std::as_bytes(std::span(blob)));
+    const auto bytes = blob();
+    if (bytes && make_folder(fs::path(cache_path_).parent_path()))
+        (void)write_file_atomically(cache_path_, std::as_bytes(std::span(*bytes)));
 }
 
 Result<const Pipeline*> PipelineStore::get(const KernelVariant& variant, const std::map<uint32_t, uint32_t>& constants)
@@ -138,9 +151,9 @@ void PipelineStore::save_by_and_by(double seconds)
 
 void PipelineStore::destroy(const Pipeline& p)
 {
-    vkDestroyPipeline(device_.handle(), p.pipeline, nullptr);
-    vkDestroyPipelineLayout(device_.handle(), p.layout, nullptr);
-    vkDestroyDescriptorSetLayout(device_.handle(), p.set_layout, nullptr);
+    device_.vk().DestroyPipeline(device_.handle(), p.pipeline, nullptr);
+    device_.vk().DestroyPipelineLayout(device_.handle(), p.layout, nullptr);
+    device_.vk().DestroyDescriptorSetLayout(device_.handle(), p.set_layout, nullptr);
 }
 
 Status PipelineStore::make_layout(const KernelVariant& variant, Pipeline& out)
@@ -154,14 +167,14 @@ Status PipelineStore::make_layout(const KernelVariant& variant, Pipeline& out)
     auto set = vk_struct<VkDescriptorSetLayoutCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO);
     set.bindingCount = uint32_t(bindings.size());
     set.pBindings = bindings.data();
-    SR_VK(vkCreateDescriptorSetLayout(device_.handle(), &set, nullptr, &out.set_layout));
+    SR_VK(device_.vk().CreateDescriptorSetLayout(device_.handle(), &set, nullptr, &out.set_layout));
     const VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, variant.push_bytes};
     auto layout = vk_struct<VkPipelineLayoutCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO);
     layout.setLayoutCount = 1;
     layout.pSetLayouts = &out.set_layout;
     layout.pushConstantRangeCount = variant.push_bytes ? 1 : 0;
     layout.pPushConstantRanges = &range;
-    SR_VK(vkCreatePipelineLayout(device_.handle(), &layout, nullptr, &out.layout));
+    SR_VK(device_.vk().CreatePipelineLayout(device_.handle(), &layout, nullptr, &out.layout));
     return {};
 }
 
@@ -172,7 +185,7 @@ Status PipelineStore::make(const KernelVariant& variant, const std::map<uint32_t
     code.codeSize = variant.code.size_bytes();
     code.pCode = variant.code.data();
     VkShaderModule module;
-    SR_VK(vkCreateShaderModule(device_.handle(), &code, nullptr, &module));
+    SR_VK(device_.vk().CreateShaderModule(device_.handle(), &code, nullptr, &module));
     std::vector<VkSpecializationMapEntry> entries;
     std::vector<uint32_t> values;
     for (const auto& [id, value] : constants) {
@@ -196,8 +209,9 @@ Status PipelineStore::make(const KernelVariant& variant, const std::map<uint32_t
         &specialization};
     info.layout = out.layout;
     info.flags = VK_PIPELINE_CREATE_DISPATCH_BASE_BIT; // long passes are cut
-    const VkResult result = vkCreateComputePipelines(device_.handle(), cache_, 1, &info, nullptr, &out.pipeline);
-    vkDestroyShaderModule(device_.handle(), module, nullptr);
+    const VkResult result =
+        device_.vk().CreateComputePipelines(device_.handle(), cache_, 1, &info, nullptr, &out.pipeline);
+    device_.vk().DestroyShaderModule(device_.handle(), module, nullptr);
     SR_VK(result);
     return {};
 }

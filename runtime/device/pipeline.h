@@ -7,7 +7,9 @@
 
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
+#include <vector>
 
 namespace semrover {
 
@@ -24,12 +26,16 @@ struct Pipeline {
 // run that is killed, or whose device is lost, leaves what it compiled to the next.
 class PipelineStore {
   public:
-    static Result<std::unique_ptr<PipelineStore>> create(Device& device);
+    // blob: of an earlier process, in place of the file; with a host's device there is no file either way
+    static Result<std::unique_ptr<PipelineStore>> create(Device& device, std::span<const std::byte> blob = {});
     ~PipelineStore();
 
-    const std::string& file() const { return cache_path_; } // empty: neither HOME nor XDG_CACHE_HOME is set
+    // empty: none is kept, or neither HOME nor XDG_CACHE_HOME is set
+    const std::string& file() const { return cache_path_; }
+    // what create() takes in another process: whole, or refused there
+    Result<std::vector<char>> blob() const;
 
-    // bytes of an earlier run's cache that this one started with; 0: no file, or none that is whole and this driver's
+    // bytes of an earlier run's cache that this one started with; 0: none, or none that is whole and this driver's
     size_t reused_bytes() const { return reused_bytes_; }
     Result<const Pipeline*> get(const KernelVariant& variant, const std::map<uint32_t, uint32_t>& constants);
 

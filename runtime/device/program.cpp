@@ -31,13 +31,13 @@ Program::~Program()
 {
     (void)device_.wait(device_.last_ticket()); // command buffers may be in flight; a lost device is told elsewhere
     for (VkBufferView view : views_)
-        vkDestroyBufferView(device_.handle(), view, nullptr);
+        device_.vk().DestroyBufferView(device_.handle(), view, nullptr);
     if (queries_)
-        vkDestroyQueryPool(device_.handle(), queries_, nullptr);
+        device_.vk().DestroyQueryPool(device_.handle(), queries_, nullptr);
     if (descriptors_)
-        vkDestroyDescriptorPool(device_.handle(), descriptors_, nullptr);
+        device_.vk().DestroyDescriptorPool(device_.handle(), descriptors_, nullptr);
     if (commands_pool_)
-        vkDestroyCommandPool(device_.handle(), commands_pool_, nullptr);
+        device_.vk().DestroyCommandPool(device_.handle(), commands_pool_, nullptr);
 }
 
 Status Program::allocate()
@@ -78,13 +78,13 @@ Status Program::make_sets()
     pool.maxSets = uint32_t(layouts.size());
     pool.poolSizeCount = 2;
     pool.pPoolSizes = sizes;
-    SR_VK(vkCreateDescriptorPool(device_.handle(), &pool, nullptr, &descriptors_));
+    SR_VK(device_.vk().CreateDescriptorPool(device_.handle(), &pool, nullptr, &descriptors_));
     auto allocate = vk_struct<VkDescriptorSetAllocateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO);
     allocate.descriptorPool = descriptors_;
     allocate.descriptorSetCount = uint32_t(layouts.size());
     allocate.pSetLayouts = layouts.data();
     sets_.resize(layouts.size());
-    SR_VK(vkAllocateDescriptorSets(device_.handle(), &allocate, sets_.data()));
+    SR_VK(device_.vk().AllocateDescriptorSets(device_.handle(), &allocate, sets_.data()));
     for (size_t i = 0; i < plan_.passes.size(); ++i)
         SR_CHECK(bind(plan_.passes[i], sets_[i]));
     return {};
@@ -111,7 +111,7 @@ Status Program::bind(const Pass& pass, VkDescriptorSet set)
             info.format = VK_FORMAT_R32G32B32A32_UINT;
             info.offset = offset;
             info.range = b.bytes / 16 * 16;
-            SR_VK(vkCreateBufferView(device_.handle(), &info, nullptr, &views[i]));
+            SR_VK(device_.vk().CreateBufferView(device_.handle(), &info, nullptr, &views[i]));
             views_.push_back(views[i]);
             writes[i].descriptorType = VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER;
             writes[i].pTexelBufferView = &views[i];
@@ -121,7 +121,7 @@ Status Program::bind(const Pass& pass, VkDescriptorSet set)
             writes[i].pBufferInfo = &buffers[i];
         }
     }
-    vkUpdateDescriptorSets(device_.handle(), uint32_t(n), writes.data(), 0, nullptr);
+    device_.vk().UpdateDescriptorSets(device_.handle(), uint32_t(n), writes.data(), 0, nullptr);
     return {};
 }
 
@@ -132,7 +132,7 @@ Status Program::make_queries()
     auto queries = vk_struct<VkQueryPoolCreateInfo>(VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO);
     queries.queryType = VK_QUERY_TYPE_TIMESTAMP;
     queries.queryCount = uint32_t(plan_.dispatches.size() * 2);
-    SR_VK(vkCreateQueryPool(device_.handle(), &queries, nullptr, &queries_));
+    SR_VK(device_.vk().CreateQueryPool(device_.handle(), &queries, nullptr, &queries_));
     return {};
 }
 
@@ -140,14 +140,14 @@ Status Program::record()
 {
     auto pool = vk_struct<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
     pool.queueFamilyIndex = device_.queue_family();
-    SR_VK(vkCreateCommandPool(device_.handle(), &pool, nullptr, &commands_pool_));
+    SR_VK(device_.vk().CreateCommandPool(device_.handle(), &pool, nullptr, &commands_pool_));
     commands_.resize(plan_.submits);
     if (commands_.empty())
         return {};
     auto allocate = vk_struct<VkCommandBufferAllocateInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO);
     allocate.commandPool = commands_pool_;
     allocate.commandBufferCount = plan_.submits;
-    SR_VK(vkAllocateCommandBuffers(device_.handle(), &allocate, commands_.data()));
+    SR_VK(device_.vk().AllocateCommandBuffers(device_.handle(), &allocate, commands_.data()));
     for (uint32_t i = 0; i < plan_.submits; ++i)
         SR_CHECK(record_submit(i));
     return {};
@@ -156,44 +156,55 @@ Status Program::record()
 Status Program::record_submit(uint32_t index)
 {
     const VkCommandBuffer commands = commands_[index];
-    SR_CHECK(begin_commands(commands, false));
-    uint32_t level = ~0u;
-    for (size_t i = 0; i < plan_.dispatches.size(); ++i) {
-        if (plan_.dispatches[i].submit != index)
-            continue;
-        const Pass& pass = plan_.passes[plan_.dispatches[i].pass];
-        if (level != ~0u && pass.level != level)
-            record_barrier(commands);
-        level = pass.level;
-        record_dispatch(commands, i);
-    }
-    record_final_barrier(commands);
-    SR_VK(vkEndCommandBuffer(commands));
+    SR_CHECK(begin_commands(device_.vk(), commands, false));
+    record_passes(commands, index, queries_ != VK_NULL_HANDLE);
+    SR_VK(device_.vk().EndCommandBuffer(commands));
     return {};
 }
 
-void Program::record_dispatch(VkCommandBuffer commands, size_t index)
+void Program::record_into(VkCommandBuffer commands) const
+{
+    for (uint32_t i = 0; i < plan_.submits; ++i)
+        record_passes(commands, i, false);
+}
+
+void Program::record_passes(VkCommandBuffer commands, uint32_t submit, bool timed) const
+{
+    uint32_t level = ~0u;
+    for (size_t i = 0; i < plan_.dispatches.size(); ++i) {
+        if (plan_.dispatches[i].submit != submit)
+            continue;
+        const Pass& pass = plan_.passes[plan_.dispatches[i].pass];
+        if (level != ~0u && pass.level != level)
+            record_barrier(device_.vk(), commands);
+        level = pass.level;
+        record_dispatch(commands, i, timed);
+    }
+    record_final_barrier(device_.vk(), commands);
+}
+
+void Program::record_dispatch(VkCommandBuffer commands, size_t index, bool timed) const
 {
     const Dispatch& d = plan_.dispatches[index];
     const Pass& pass = plan_.passes[d.pass];
     const Pipeline& pipeline = *pipelines_[d.pass];
-    vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline.pipeline);
-    vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline.layout, 0, 1, &sets_[d.pass], 0,
-                            nullptr);
+    device_.vk().CmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline.pipeline);
+    device_.vk().CmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline.layout, 0, 1, &sets_[d.pass],
+                                       0, nullptr);
     if (!pass.push.empty())
-        vkCmdPushConstants(commands, pipeline.layout, VK_SHADER_STAGE_COMPUTE_BIT, 0, uint32_t(pass.push.size()),
-                           pass.push.data());
+        device_.vk().CmdPushConstants(commands, pipeline.layout, VK_SHADER_STAGE_COMPUTE_BIT, 0,
+                                      uint32_t(pass.push.size()), pass.push.data());
     const uint32_t query = uint32_t(index * 2);
-    if (queries_) {
-        vkCmdResetQueryPool(commands, queries_, query, 2);
-        vkCmdWriteTimestamp(commands, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, queries_, query);
+    if (timed) {
+        device_.vk().CmdResetQueryPool(commands, queries_, query, 2);
+        device_.vk().CmdWriteTimestamp(commands, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, queries_, query);
     }
     if (d.base[0] || d.base[1] || d.base[2])
-        vkCmdDispatchBase(commands, d.base[0], d.base[1], d.base[2], d.count[0], d.count[1], d.count[2]);
+        device_.vk().CmdDispatchBase(commands, d.base[0], d.base[1], d.base[2], d.count[0], d.count[1], d.count[2]);
     else
-        vkCmdDispatch(commands, d.count[0], d.count[1], d.count[2]);
-    if (queries_)
-        vkCmdWriteTimestamp(commands, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, queries_, query + 1);
+        device_.vk().CmdDispatch(commands, d.count[0], d.count[1], d.count[2]);
+    if (timed)
+        device_.vk().CmdWriteTimestamp(commands, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, queries_, query + 1);
 }
 
 Result<uint64_t> Program::submit()
@@ -221,8 +232,8 @@ Status Program::run()
 Result<std::vector<uint64_t>> Program::stamps() const
 {
     std::vector<uint64_t> out(plan_.dispatches.size() * 2);
-    SR_VK(vkGetQueryPoolResults(device_.handle(), queries_, 0, uint32_t(out.size()), out.size() * 8, out.data(), 8,
-                                VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT));
+    SR_VK(device_.vk().GetQueryPoolResults(device_.handle(), queries_, 0, uint32_t(out.size()), out.size() * 8,
+                                           out.data(), 8, VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT));
     return out;
 }
 
@@ -243,8 +254,8 @@ Status Program::schedule_again()
             seconds[i] = std::max(seconds[i], device_.rates().seconds(pass));
     }
     stage::schedule(plan_, device_.limits(), seconds);
-    vkDestroyCommandPool(device_.handle(), commands_pool_, nullptr);
-    vkDestroyQueryPool(device_.handle(), queries_, nullptr);
+    device_.vk().DestroyCommandPool(device_.handle(), commands_pool_, nullptr);
+    device_.vk().DestroyQueryPool(device_.handle(), queries_, nullptr);
     queries_ = VK_NULL_HANDLE;
     measuring_ = false;
     SR_CHECK(make_queries());

@@ -23,7 +23,10 @@ class Program {
 
     Status run();              // submits and waits
     Result<uint64_t> submit(); // ticket for Device::wait
-    Status collect_profile();  // after a wait, when the device has a profile
+    // into a command buffer that is being recorded, which stays good as long as the program: executions must not
+    // overlap
+    void record_into(VkCommandBuffer commands) const;
+    Status collect_profile(); // after a wait, when the device has a profile
 
     const Plan& plan() const { return plan_; }
     double host_us() const { return runs_ ? host_us_ / double(runs_) : 0; } // host time of one submit, mean
@@ -36,7 +39,8 @@ class Program {
     Status make_queries();
     Status record();
     Status record_submit(uint32_t index);
-    void record_dispatch(VkCommandBuffer commands, size_t index);
+    void record_passes(VkCommandBuffer commands, uint32_t submit, bool timed) const;
+    void record_dispatch(VkCommandBuffer commands, size_t index, bool timed) const;
     Result<std::vector<uint64_t>> stamps() const; // two a dispatch, in units of the device
     Status schedule_again();
     std::pair<VkBuffer, uint64_t> locate(const PassBinding& binding) const;

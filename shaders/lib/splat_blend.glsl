@@ -4,6 +4,17 @@
 // what both variants of the blending of pinhole cameras share: one splat over one pixel
 #include "lib/splat_pixel.glsl"
 
+layout(constant_id = 2) const bool kLimited = false;
+layout(binding = 10) readonly buffer Limits { float limits[]; }; // [cameras, height, width] metres, if kLimited
+
+// how far a pixel sees
+float limit_of(uvec2 at, uint camera)
+{
+    if (!kLimited || at.x >= p.width || at.y >= p.height)
+        return 1e30;
+    return limits[(camera * p.height + at.y) * p.width + at.x];
+}
+
 struct Splat {
     vec2 center;
     vec4 m;
@@ -21,7 +32,7 @@ Splat read_splat(vec4 t0, vec4 t1, vec4 t2, vec4 t3)
 
 // alpha = min(alpha_max, o exp(-r^2 / 2)), r the smaller of the distances on the surface, in sigmas, and on the screen;
 // depth = that of the ray's hit, or of the centre where the screen is nearer
-void blend(inout Pixel pixel, Splat s, vec2 at, uint record)
+void blend(inout Pixel pixel, Splat s, vec2 at, uint record, float limit)
 {
     const vec2 d = at - s.center;
     const float den = 1.0 + dot(s.g, d), scale = 1.0 / (abs(den) < 1e-20 ? 1e-20 : den);
@@ -30,6 +41,7 @@ void blend(inout Pixel pixel, Splat s, vec2 at, uint record)
     const bool hit = r2_surface <= r2_screen;
     const float r2 = hit ? r2_surface : r2_screen, z = hit ? s.z * scale : s.z;
     const float alpha = min(p.alpha_max, s.opacity * exp(-0.5 * r2));
-    const bool seen = alpha >= p.alpha_min && z >= p.near && r2 <= p.cutoff2 && pixel.transmittance > 0.0;
+    const bool seen = alpha >= p.alpha_min && z >= p.near && r2 <= p.cutoff2 && pixel.transmittance > 0.0 &&
+                      (!kLimited || z <= limit);
     cover(pixel, s.color, s.normal, alpha, z, seen, record);
 }

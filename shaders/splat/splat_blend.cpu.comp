@@ -33,8 +33,11 @@ void main()
 {
     const uint camera = gl_WorkGroupID.z, column = gl_LocalInvocationID.x;
     const uvec2 corner = gl_WorkGroupID.yx * 8, tile_at = corner / p.tile;
-    [[unroll]] for (uint y = 0; y < kRows; ++y)
+    float limits_of_rows[kRows];
+    [[unroll]] for (uint y = 0; y < kRows; ++y) {
         pixels[y] = empty_pixel();
+        limits_of_rows[y] = limit_of(corner + uvec2(column, y), camera);
+    }
     Walk walk = walk_of((camera * p.tiles_y + tile_at.y) * p.tiles_x + tile_at.x);
     while (any_left() && find_hits(walk, corner)) {
         do {
@@ -42,7 +45,7 @@ void main()
             const Splat s =
                 read_splat(texel_of(record, 0), texel_of(record, 1), texel_of(record, 2), texel_of(record, 3));
             [[unroll]] for (uint y = 0; y < kRows; ++y)
-                blend(pixels[y], s, vec2(corner + uvec2(column, y)) + 0.5, record);
+                blend(pixels[y], s, vec2(corner + uvec2(column, y)) + 0.5, record, limits_of_rows[y]);
         } while (walk.hits != 0);
     }
     [[unroll]] for (uint y = 0; y < kRows; ++y)

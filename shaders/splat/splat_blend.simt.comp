@@ -36,8 +36,11 @@ void main()
     const uvec2 corner = gl_WorkGroupID.yx * 16, own = corner + uvec2(t % 16, t / 16), tile_at = corner / p.tile;
     const uint tile = (camera * p.tiles_y + tile_at.y) * p.tiles_x + tile_at.x, end = starts[tile + 1];
     Pixel pixels[kOwn];
-    [[unroll]] for (uint y = 0; y < kOwn; ++y)
+    float limits_of_rows[kOwn];
+    [[unroll]] for (uint y = 0; y < kOwn; ++y) {
         pixels[y] = empty_pixel();
+        limits_of_rows[y] = limit_of(own + uvec2(0, 4 * y), camera);
+    }
     living[0] = 1;
     uint turn = 0;
     for (uint i = starts[tile]; i < end; i += kBatch, turn ^= 1) {
@@ -52,7 +55,7 @@ void main()
             const Splat s = read_splat(uintBitsToFloat(batch[j * kRecord]), uintBitsToFloat(batch[j * kRecord + 1]),
                                        uintBitsToFloat(batch[j * kRecord + 2]), uintBitsToFloat(batch[j * kRecord + 3]));
             [[unroll]] for (uint y = 0; y < kOwn; ++y)
-                blend(pixels[y], s, vec2(own + uvec2(0, 4 * y)) + 0.5, batch_record[j]);
+                blend(pixels[y], s, vec2(own + uvec2(0, 4 * y)) + 0.5, batch_record[j], limits_of_rows[y]);
         }
         float left = 0.0;
         [[unroll]] for (uint y = 0; y < kOwn; ++y)

@@ -1,0 +1,118 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// draws that nobody waits for: in a command buffer of the host's, or submitted between semaphores of the host's
+#include "engine/capi/exchange.h"
+
+using namespace semrover;
+using namespace semrover::capi;
+
+namespace {
+
+Status check_targets(const sr_draw_desc& d)
+{
+    for (const sr_target* target : {&d.color, &d.normal, &d.depth, &d.label})
+        if (target->memory)
+            return fail(ErrorCode::usage, "sr_draw_desc: what is recorded goes to buffers and images, not to memory");
+    return {};
+}
+
+// draws and copies, into a command buffer that is being recorded
+Status record(sr_world& world, const sr_draw_desc& d, VkCommandBuffer commands, const char* name)
+{
+    Device& device = *world.context->device;
+    if (device.owned())
+        return fail(ErrorCode::usage, "{}: the context is not on a device of the host's", name);
+    if (d.reserved)
+        return fail(ErrorCode::usage, "sr_draw_desc: reserved is not 0");
+    SR_TRY(const SplatPool* splats, splats_of(world, name));
+    const ImageSize size{d.width, d.height};
+    SR_CHECK(check_size(size, "sr_draw_desc"));
+    SR_CHECK(check_targets(d));
+    const bool tested = d.depth_test.image;
+    SR_TRY(Rasterizer * rasterizer, world.recorded[tested].of(device, splats->scene(), size, {.depth_tested = tested}));
+    if (tested) {
+        SR_TRY(const HostFloats depth, host_depth(d.depth_test, size));
+        record_host_floats(device, commands, depth, rasterizer->z_buffer().slice());
+    }
+    SR_CHECK(rasterizer->record(commands, pinhole_camera(d, size), z_scale(d.depth_test)));
+    const SplatSlots images = rasterizer->images(0);
+    record_host_target(device, commands, images.color.slice(), host_target(d.color, size));
+    record_host_target(device, commands, images.surface.slice(), host_target(d.normal, size));
+    record_host_target(device, commands, images.depth.slice(), host_target(d.depth, size));
+    record_host_target(device, commands, images.ids.slice(), host_target(d.label, size));
+    return {};
+}
+
+Result<std::vector<TimelinePoint>> points_of(const sr_semaphore* semaphores, uint32_t count, const char* name)
+{
+    if (count && !semaphores)
+        return fail(ErrorCode::usage, "sr_sync: {} is NULL", name);
+    std::vector<TimelinePoint> points;
+    for (uint32_t i = 0; i < count; ++i) {
+        if (!semaphores[i].semaphore)
+            return fail(ErrorCode::usage, "sr_sync: semaphore {} of {} is NULL", i, name);
+        points.push_back({static_cast<VkSemaphore>(semaphores[i].semaphore), semaphores[i].value});
+    }
+    return points;
+}
+
+Status submit(sr_world& world, const sr_draw_desc& d, const sr_sync& sync)
+{
+    if (sync.reserved)
+        return fail(ErrorCode::usage, "sr_sync: reserved is not 0");
+    TimelinePoints points;
+    SR_TRY(points.waits, points_of(sync.waits, sync.wait_count, "waits"));
+    SR_TRY(points.signals, points_of(sync.signals, sync.signal_count, "signals"));
+    if (!world.commands) {
+        SR_TRY(world.commands, CommandRing::create(*world.context->device));
+    }
+    SR_TRY(const VkCommandBuffer commands, world.commands->begin());
+    SR_CHECK(record(world, d, commands, "sr_world_submit"));
+    return world.commands->submit(points).map([](uint64_t) {});
+}
+
+} // namespace
+
+extern "C" {
+
+sr_status sr_world_record(sr_world* world, const sr_draw_desc* draw, void* command_buffer)
+{
+    return guarded(world ? world->context : nullptr, [&]() -> Status {
+        if (!world || !command_buffer)
+            return fail(ErrorCode::usage, "sr_world_record: NULL");
+        SR_TRY(const sr_draw_desc known, read_struct(draw, "sr_draw_desc"));
+        return record(*world, known, static_cast<VkCommandBuffer>(command_buffer), "sr_world_record");
+    });
+}
+
+sr_status sr_world_submit(sr_world* world, const sr_draw_desc* draw, const sr_sync* sync)
+{
+    return guarded(world ? world->context : nullptr, [&]() -> Status {
+        if (!world)
+            return fail(ErrorCode::usage, "sr_world_submit: world is NULL");
+        SR_TRY(const sr_draw_desc known, read_struct(draw, "sr_draw_desc"));
+        SR_TRY(const sr_sync known_sync, read_struct(sync, "sr_sync"));
+        return submit(*world, known, known_sync);
+    });
+}
+
+sr_status sr_world_check_draws(sr_world* world)
+{
+    return guarded(world ? world->context : nullptr, [&]() -> Status {
+        if (!world)
+            return fail(ErrorCode::usage, "sr_world_check_draws: world is NULL");
+        bool whole = true;
+        for (const SizedRasterizer& recorded : world->recorded)
+            if (Rasterizer* rasterizer = recorded.last()) {
+                SR_TRY(const bool this_one, rasterizer->make_whole());
+                whole = whole && this_one;
+            }
+        if (!whole)
+            return fail(ErrorCode::partial, "a picture lacks splats: there is more room for the next one");
+        return {};
+    });
+}
+
+} // extern "C"
+
+static_assert(sizeof(sr_semaphore) == 16 && sizeof(sr_sync) == 40);

@@ -1,0 +1,50 @@
+/* SPDX-FileCopyrightText: semrover authors
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * The Vulkan device of a sample host, and a context of the library on it. Everything ends the program with a line where
+ * it fails: these are samples. */
+#ifndef HOST_GPU_H
+#define HOST_GPU_H
+
+#include <semrover.h>
+#include <vulkan/vulkan.h>
+
+struct gpu {
+    VkInstance instance;
+    VkPhysicalDevice physical;
+    VkDevice device;
+    VkQueue queue;
+    uint32_t family; /* draws, computes and presents */
+    VkSurfaceKHR surface;
+    sr_context* context;
+};
+
+struct buffer {
+    VkBuffer buffer;
+    VkDeviceMemory memory;
+    void* mapped; /* NULL: the host cannot see it */
+};
+
+struct image {
+    VkImage image;
+    VkDeviceMemory memory;
+    VkImageView view;
+};
+
+void check(int fine, const char* what);                     /* else the program ends */
+void check_sr(sr_status status, const sr_context* context); /* likewise, with the line of the library */
+
+/* extensions: of the instance. make_surface: gives gpu->surface, which the device must be able to present to, once
+ * there is an instance; NULL: no window */
+void gpu_create(struct gpu* gpu, const char* const* extensions, uint32_t count,
+                void (*make_surface)(struct gpu* gpu, void* user), void* user);
+void gpu_destroy(struct gpu* gpu);
+
+struct buffer gpu_buffer(const struct gpu* gpu, VkDeviceSize bytes, VkBufferUsageFlags usage, int mapped);
+struct image gpu_image(const struct gpu* gpu, uint32_t width, uint32_t height, VkFormat format, VkImageUsageFlags usage,
+                       VkImageAspectFlags aspect);
+VkImageView gpu_view(const struct gpu* gpu, VkImage image, VkFormat format, VkImageAspectFlags aspect);
+void gpu_free_buffer(const struct gpu* gpu, struct buffer* buffer);
+void gpu_free_image(const struct gpu* gpu, struct image* image);
+
+#endif

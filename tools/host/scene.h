@@ -1,0 +1,40 @@
+/* SPDX-FileCopyrightText: semrover authors
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * A frame of a sample host: the library's splats and cubes of the host's, in one z-buffer. The library draws color and
+ * depth into two buffers; a render pass of the host's writes both into its picture, and draws cubes with depth test. */
+#ifndef HOST_SCENE_H
+#define HOST_SCENE_H
+
+#include "gpu.h"
+
+enum { MOST_PICTURES = 8 };
+
+struct scene {
+    const struct gpu* gpu;
+    uint32_t width, height;
+    struct buffer color, depth; /* what the library draws */
+    struct image z;
+    VkRenderPass pass;
+    VkFramebuffer framebuffers[MOST_PICTURES]; /* of the pictures */
+    uint32_t pictures;
+    VkDescriptorSetLayout set_layout;
+    VkPipelineLayout layout;
+    VkDescriptorPool pool;
+    VkDescriptorSet set;
+    VkPipeline splats, cubes;
+};
+
+/* views: of the pictures that are drawn into, which each frame leaves in `layout` */
+void scene_create(struct scene* scene, const struct gpu* gpu, const VkImageView* views, uint32_t pictures,
+                  VkFormat format, VkImageLayout layout, uint32_t width, uint32_t height);
+void scene_destroy(struct scene* scene); /* the device must have finished with it */
+
+/* what a camera at `position` sees that looks `yaw` radians to the left of x, 90 degrees across */
+void scene_look(const struct scene* scene, const double position[3], double yaw, sr_draw_desc* draw);
+
+/* records a whole frame into a command buffer that has begun */
+void scene_record(const struct scene* scene, sr_world* world, const sr_draw_desc* draw, uint32_t picture,
+                  VkCommandBuffer commands);
+
+#endif

@@ -1,0 +1,38 @@
+/* SPDX-FileCopyrightText: semrover authors
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * The street of the sample hosts: a road along x with pavements and a low wall on each side, without end. Its labels
+ * come from a callback, as in a game that has its own idea of the city. */
+#ifndef HOST_STREET_H
+#define HOST_STREET_H
+
+#include <semrover.h>
+
+#define VOXEL 0.6 /* metres, of the models */
+
+/* one column of cells of a window at a time; how high it is depends on j, across the street */
+static sr_status street_labels(void* user, const sr_window* window, sr_grid* grid)
+{
+    int32_t i, j, k;
+    (void)user;
+    for (i = window->low[0]; i <= window->high[0]; ++i)
+        for (j = window->low[1]; j <= window->high[1]; ++j) {
+            const int32_t side = j < 0 ? -1 - j : j; /* 0 and on, away from the middle */
+            sr_cell cells[4];
+            sr_status status;
+            if (side > 8)
+                continue;
+            for (k = 0; k < (side == 8 ? 4 : 1); ++k) {
+                cells[k].i = i;
+                cells[k].j = j;
+                cells[k].k = k;
+                cells[k].label = side == 8 ? 2u : side > 5 ? 1u : 0u; /* building, sidewalk, road */
+            }
+            status = sr_grid_set_cells(grid, cells, (uint64_t)k);
+            if (status != SR_OK)
+                return status;
+        }
+    return SR_OK;
+}
+
+#endif

@@ -1,0 +1,335 @@
+/* SPDX-FileCopyrightText: semrover authors
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * A host with a window: flies down a street that grows ahead of it. The library has some milliseconds of every frame.
+ *
+ *     vulkan_host MODEL [FRAMES SCREENSHOT.ppm]     with FRAMES it ends by itself, and writes what it saw last
+ *
+ * Keys: left and right turn, up and down change the speed, space puts a block onto the road ahead, escape ends. */
+#include "scene.h"
+#include "street.h"
+
+#define GLFW_INCLUDE_VULKAN
+#include <GLFW/glfw3.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { BUDGET_US = 8000 };
+
+struct window {
+    GLFWwindow* glfw;
+    struct gpu gpu;
+    VkSwapchainKHR swapchain;
+    uint32_t pictures;
+    VkImage images[MOST_PICTURES];
+    VkImageView views[MOST_PICTURES];
+    VkSemaphore drawn[MOST_PICTURES]; /* of the picture: may be shown */
+    VkSemaphore acquired;
+    VkFence finished;
+    VkCommandPool pool;
+    VkCommandBuffer commands;
+    struct scene scene;
+    struct buffer pixels; /* of the picture, for the screenshot */
+};
+
+struct drive {
+    double position[3], yaw, speed; /* metres, radians, metres a second */
+    int space;                      /* it was down in the frame before */
+};
+
+static void make_surface(struct gpu* gpu, void* user)
+{
+    const struct window* w = user;
+    check(glfwCreateWindowSurface(gpu->instance, w->glfw, NULL, &gpu->surface) == VK_SUCCESS, "making a surface");
+}
+
+static VkSemaphore make_semaphore(const struct gpu* gpu)
+{
+    const VkSemaphoreCreateInfo info = {.sType = VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO};
+    VkSemaphore made;
+    check(vkCreateSemaphore(gpu->device, &info, NULL, &made) == VK_SUCCESS, "vkCreateSemaphore");
+    return made;
+}
+
+/* eight bits a channel that are shown as they are: splats are sRGB already */
+static VkSurfaceFormatKHR pick_format(const struct gpu* gpu)
+{
+    VkSurfaceFormatKHR formats[32];
+    uint32_t count = 32, i;
+    vkGetPhysicalDeviceSurfaceFormatsKHR(gpu->physical, gpu->surface, &count, formats);
+    for (i = 0; i < count; ++i)
+        if (formats[i].format == VK_FORMAT_B8G8R8A8_UNORM || formats[i].format == VK_FORMAT_R8G8B8A8_UNORM)
+            return formats[i];
+    check(0, "looking for a format of the window");
+    return formats[0];
+}
+
+static void make_swapchain(struct window* w)
+{
+    const struct gpu* gpu = &w->gpu;
+    const VkSurfaceFormatKHR format = pick_format(gpu);
+    VkSurfaceCapabilitiesKHR can;
+    VkSwapchainCreateInfoKHR info = {.sType = VK_STRUCTURE_TYPE_SWAPCHAIN_CREATE_INFO_KHR,
+                                     .surface = gpu->surface,
+                                     .imageFormat = format.format,
+                                     .imageColorSpace = format.colorSpace,
+                                     .imageArrayLayers = 1,
+                                     .imageUsage =
+                                         VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT | VK_IMAGE_USAGE_TRANSFER_SRC_BIT,
+                                     .compositeAlpha = VK_COMPOSITE_ALPHA_OPAQUE_BIT_KHR,
+                                     .presentMode = VK_PRESENT_MODE_FIFO_KHR,
+                                     .clipped = VK_TRUE};
+    int width = 0, height = 0;
+    uint32_t i;
+    glfwGetFramebufferSize(w->glfw, &width, &height);
+    vkGetPhysicalDeviceSurfaceCapabilitiesKHR(gpu->physical, gpu->surface, &can);
+    if (can.currentExtent.width != UINT32_MAX) {
+        width = (int)can.currentExtent.width;
+        height = (int)can.currentExtent.height;
+    }
+    info.minImageCount = can.minImageCount;
+    info.imageExtent.width = (uint32_t)width;
+    info.imageExtent.height = (uint32_t)height;
+    info.preTransform = can.currentTransform;
+    check(vkCreateSwapchainKHR(gpu->device, &info, NULL, &w->swapchain) == VK_SUCCESS, "vkCreateSwapchainKHR");
+    w->pictures = MOST_PICTURES;
+    check(vkGetSwapchainImagesKHR(gpu->device, w->swapchain, &w->pictures, w->images) == VK_SUCCESS,
+          "vkGetSwapchainImagesKHR");
+    for (i = 0; i < w->pictures; ++i) {
+        w->views[i] = gpu_view(gpu, w->images[i], format.format, VK_IMAGE_ASPECT_COLOR_BIT);
+        w->drawn[i] = make_semaphore(gpu);
+    }
+    scene_create(&w->scene, gpu, w->views, w->pictures, format.format, VK_IMAGE_LAYOUT_PRESENT_SRC_KHR,
+                 info.imageExtent.width, info.imageExtent.height);
+    w->pixels = gpu_buffer(gpu, (VkDeviceSize)width * height * 4, VK_BUFFER_USAGE_TRANSFER_DST_BIT, 1);
+}
+
+static void free_swapchain(struct window* w)
+{
+    const VkDevice device = w->gpu.device;
+    uint32_t i;
+    vkDeviceWaitIdle(device);
+    gpu_free_buffer(&w->gpu, &w->pixels);
+    scene_destroy(&w->scene);
+    for (i = 0; i < w->pictures; ++i) {
+        vkDestroyImageView(device, w->views[i], NULL);
+        vkDestroySemaphore(device, w->drawn[i], NULL);
+    }
+    vkDestroySwapchainKHR(device, w->swapchain, NULL);
+}
+
+static void open_window(struct window* w)
+{
+    const char* const* extensions;
+    uint32_t count = 0;
+    const VkFenceCreateInfo fence = {.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO};
+    VkCommandPoolCreateInfo pool = {.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO,
+                                    .flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT};
+    VkCommandBufferAllocateInfo commands = {.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO,
+                                            .commandBufferCount = 1};
+    check(glfwInit(), "glfwInit");
+    glfwWindowHint(GLFW_CLIENT_API, GLFW_NO_API);
+    w->glfw = glfwCreateWindow(480, 300, "semrover", NULL, NULL);
+    check(w->glfw != NULL, "opening a window");
+    extensions = glfwGetRequiredInstanceExtensions(&count);
+    gpu_create(&w->gpu, extensions, count, make_surface, w);
+    pool.queueFamilyIndex = w->gpu.family;
+    check(vkCreateFence(w->gpu.device, &fence, NULL, &w->finished) == VK_SUCCESS, "vkCreateFence");
+    check(vkCreateCommandPool(w->gpu.device, &pool, NULL, &w->pool) == VK_SUCCESS, "vkCreateCommandPool");
+    commands.commandPool = w->pool;
+    check(vkAllocateCommandBuffers(w->gpu.device, &commands, &w->commands) == VK_SUCCESS, "vkAllocateCommandBuffers");
+    w->acquired = make_semaphore(&w->gpu);
+    make_swapchain(w);
+}
+
+static void close_window(struct window* w)
+{
+    free_swapchain(w);
+    vkDestroySemaphore(w->gpu.device, w->acquired, NULL);
+    vkDestroyFence(w->gpu.device, w->finished, NULL);
+    vkDestroyCommandPool(w->gpu.device, w->pool, NULL);
+    gpu_destroy(&w->gpu);
+    glfwDestroyWindow(w->glfw);
+    glfwTerminate();
+}
+
+static void turn(VkCommandBuffer commands, VkImage image, VkImageLayout from, VkImageLayout to)
+{
+    const VkImageMemoryBarrier barrier = {.sType = VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER,
+                                          .srcAccessMask = VK_ACCESS_MEMORY_WRITE_BIT,
+                                          .dstAccessMask = VK_ACCESS_MEMORY_READ_BIT,
+                                          .oldLayout = from,
+                                          .newLayout = to,
+                                          .srcQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED,
+                                          .dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED,
+                                          .image = image,
+                                          .subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1}};
+    vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, 0, 0, NULL,
+                         0, NULL, 1, &barrier);
+}
+
+/* a copy of the picture for the screenshot */
+static void copy_picture(const struct window* w, uint32_t picture)
+{
+    const VkImage image = w->images[picture];
+    const VkBufferImageCopy region = {.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1},
+                                      .imageExtent = {w->scene.width, w->scene.height, 1}};
+    const VkMemoryBarrier seen = {.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER,
+                                  .srcAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT,
+                                  .dstAccessMask = VK_ACCESS_HOST_READ_BIT};
+    turn(w->commands, image, VK_IMAGE_LAYOUT_PRESENT_SRC_KHR, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL);
+    vkCmdCopyImageToBuffer(w->commands, image, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, w->pixels.buffer, 1, &region);
+    turn(w->commands, image, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, VK_IMAGE_LAYOUT_PRESENT_SRC_KHR);
+    vkCmdPipelineBarrier(w->commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_PIPELINE_STAGE_HOST_BIT, 0, 1, &seen, 0, NULL,
+                         0, NULL);
+}
+
+/* Draws and shows one frame, and waits for the device: the library's next step changes the splats. 0: the window has
+ * another size now */
+static int show(struct window* w, sr_world* world, const sr_draw_desc* draw, int copied)
+{
+    const VkCommandBufferBeginInfo begin = {.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO};
+    const VkPipelineStageFlags stage = VK_PIPELINE_STAGE_ALL_COMMANDS_BIT;
+    VkSubmitInfo submit = {.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO,
+                           .waitSemaphoreCount = 1,
+                           .pWaitSemaphores = &w->acquired,
+                           .pWaitDstStageMask = &stage,
+                           .commandBufferCount = 1,
+                           .pCommandBuffers = &w->commands,
+                           .signalSemaphoreCount = 1};
+    VkPresentInfoKHR present = {.sType = VK_STRUCTURE_TYPE_PRESENT_INFO_KHR,
+                                .waitSemaphoreCount = 1,
+                                .swapchainCount = 1,
+                                .pSwapchains = &w->swapchain};
+    uint32_t picture = 0;
+    VkResult result =
+        vkAcquireNextImageKHR(w->gpu.device, w->swapchain, UINT64_MAX, w->acquired, VK_NULL_HANDLE, &picture);
+    if (result == VK_ERROR_OUT_OF_DATE_KHR)
+        return 0;
+    check(result == VK_SUCCESS || result == VK_SUBOPTIMAL_KHR, "vkAcquireNextImageKHR");
+    check(vkBeginCommandBuffer(w->commands, &begin) == VK_SUCCESS, "vkBeginCommandBuffer");
+    scene_record(&w->scene, world, draw, picture, w->commands);
+    if (copied)
+        copy_picture(w, picture);
+    check(vkEndCommandBuffer(w->commands) == VK_SUCCESS, "vkEndCommandBuffer");
+    submit.pSignalSemaphores = &w->drawn[picture];
+    check(vkQueueSubmit(w->gpu.queue, 1, &submit, w->finished) == VK_SUCCESS, "vkQueueSubmit");
+    present.pWaitSemaphores = &w->drawn[picture];
+    present.pImageIndices = &picture;
+    result = vkQueuePresentKHR(w->gpu.queue, &present);
+    check(vkWaitForFences(w->gpu.device, 1, &w->finished, VK_TRUE, UINT64_MAX) == VK_SUCCESS, "vkWaitForFences");
+    check(vkResetFences(w->gpu.device, 1, &w->finished) == VK_SUCCESS, "vkResetFences");
+    return result == VK_SUCCESS;
+}
+
+/* a block of three cells where the camera looks, four metres ahead */
+static void put_block(struct gpu* gpu, sr_world* world, const struct drive* d)
+{
+    sr_cell cells[3];
+    int32_t k;
+    for (k = 0; k < 3; ++k) {
+        cells[k].i = (int32_t)floor((d->position[0] + 4 * cos(d->yaw)) / VOXEL);
+        cells[k].j = (int32_t)floor((d->position[1] + 4 * sin(d->yaw)) / VOXEL);
+        cells[k].k = k;
+        cells[k].label = 2;
+    }
+    check_sr(sr_world_edit(world, cells, 3), gpu->context);
+}
+
+static void steer(struct window* w, sr_world* world, struct drive* d, double seconds)
+{
+    const int space = glfwGetKey(w->glfw, GLFW_KEY_SPACE) == GLFW_PRESS;
+    d->yaw += seconds * 0.8 * (glfwGetKey(w->glfw, GLFW_KEY_LEFT) == GLFW_PRESS);
+    d->yaw -= seconds * 0.8 * (glfwGetKey(w->glfw, GLFW_KEY_RIGHT) == GLFW_PRESS);
+    d->speed += seconds * 4 * (glfwGetKey(w->glfw, GLFW_KEY_UP) == GLFW_PRESS);
+    d->speed -= seconds * 4 * (glfwGetKey(w->glfw, GLFW_KEY_DOWN) == GLFW_PRESS);
+    d->position[0] += seconds * d->speed * cos(d->yaw);
+    d->position[1] += seconds * d->speed * sin(d->yaw);
+    if (space && !d->space)
+        put_block(&w->gpu, world, d);
+    d->space = space;
+    if (glfwGetKey(w->glfw, GLFW_KEY_ESCAPE) == GLFW_PRESS)
+        glfwSetWindowShouldClose(w->glfw, GLFW_TRUE);
+}
+
+static sr_world* make_world(sr_context* context, const char* model)
+{
+    const sr_world_desc desc = {.struct_size = sizeof desc,
+                                .model = model,
+                                .steps = 4, /* for a quick look; 0: as the model says */
+                                .labels = street_labels,
+                                .host_bytes = 256u << 20,
+                                .splat_bytes = 32u << 20};
+    sr_world* world = NULL;
+    check_sr(sr_world_create(context, &desc, &world), context);
+    return world;
+}
+
+static void write_ppm(const char* path, const struct window* w)
+{
+    const unsigned char* pixels = w->pixels.mapped;
+    const int swapped = pick_format(&w->gpu).format == VK_FORMAT_B8G8R8A8_UNORM;
+    FILE* file = fopen(path, "wb");
+    size_t i;
+    int c;
+    check(file != NULL, path);
+    fprintf(file, "P6 %u %u 255\n", (unsigned)w->scene.width, (unsigned)w->scene.height);
+    for (i = 0; i < (size_t)w->scene.width * w->scene.height; ++i)
+        for (c = 0; c < 3; ++c)
+            fputc(pixels[4 * i + (swapped ? 2 - c : c)], file);
+    check(fclose(file) == 0, path);
+}
+
+/* one frame: what the host does, some milliseconds of the library, and the picture */
+static void run_frame(struct window* w, sr_world* world, struct drive* d, int copied)
+{
+    const double direction[3] = {cos(d->yaw), sin(d->yaw), 0};
+    sr_draw_desc draw;
+    sr_status whole;
+    check_sr(sr_world_focus(world, d->position, direction, 18), w->gpu.context);
+    check_sr(sr_world_step(world, BUDGET_US, NULL), w->gpu.context);
+    scene_look(&w->scene, d->position, d->yaw, &draw);
+    if (!show(w, world, &draw, copied)) {
+        free_swapchain(w);
+        make_swapchain(w);
+    }
+    whole = sr_world_check_draws(world);
+    if (whole != SR_ERR_PARTIAL) /* else the next picture has more room */
+        check_sr(whole, w->gpu.context);
+}
+
+int main(int argc, char** argv)
+{
+    const int frames = argc > 3 ? atoi(argv[2]) : -1;
+    struct window w;
+    struct drive d = {{1, 0, 1.7}, 0.1, 3, 0};
+    sr_world* world;
+    sr_world_info info = {.struct_size = sizeof info};
+    double before;
+    int n;
+    if (argc != 2 && argc != 4) {
+        fprintf(stderr, "usage: %s MODEL [FRAMES SCREENSHOT.ppm]\n", argv[0]);
+        return 2;
+    }
+    memset(&w, 0, sizeof w);
+    open_window(&w);
+    world = make_world(w.gpu.context, argv[1]);
+    before = glfwGetTime();
+    for (n = 0; n != frames && !glfwWindowShouldClose(w.glfw); ++n) {
+        const double now = glfwGetTime();
+        glfwPollEvents();
+        steer(&w, world, &d, frames < 0 ? now - before : 0.02);
+        before = now;
+        run_frame(&w, world, &d, n == frames - 1);
+    }
+    if (argc == 4)
+        write_ppm(argv[3], &w);
+    check_sr(sr_world_get_info(world, &info), w.gpu.context);
+    printf("%d frames, %.1f m, %lu tiles, %lu splats\n", n, d.position[0] - 1, (unsigned long)info.generated,
+           (unsigned long)info.splats);
+    sr_world_destroy(world);
+    close_window(&w);
+    return 0;
+}
