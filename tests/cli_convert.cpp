@@ -260,6 +260,16 @@ TEST(CliConvert, what_is_no_model_is_bad_input)
     expect_error(convert(folder.path(), folder / "out"), 3, "has no renderer");
     expect_error(convert(folder.put("x.ckpt", "x"), folder / "out"), 3, "convert it with Python");
     expect_error(convert(folder.path(), folder / "out"), 3, "convert it with Python");
+    for (const char* name : {"cameras.bin", "images.bin", "points3D.bin"}) { // no pickles, and no clouds
+        const Path part = folder.put(name, "x");
+        const std::string advice = fmt::format("give its folder, '{}'", folder.path().string());
+        for (const char* out : {"out", "out.sgrid", "out.tum"})
+            expect_error(convert(part, folder / out), 3, advice);
+        expect_error(semrover_program("inspect " + part.string()), 3, advice);
+        expect_error(semrover_program("render " SEMROVER_SOURCE_DIR "/assets/scenes/street.truth.sgrid --path " +
+                                      part.string() + " -o " + (folder / "frames").string()),
+                     3, advice);
+    }
     const Path plain = folder / "transformer";
     for (const char* part : {"voxfield_transformer", "voxfield_scheduler"}) {
         fs::create_directories(plain / part);

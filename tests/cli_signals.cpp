@@ -63,18 +63,18 @@ class CliSignals : public testing::Test {
     ScratchFolder folder_;
 };
 
-// hills of 8 million square metres: minutes of work
+// hills of 3 million square metres: a minute of work, and less than the limit of their pieces
 std::string large_mesh(const ScratchFolder& folder)
 {
     std::string text = "usemtl road\n";
-    for (int i = 0; i <= 300; ++i)
-        for (int j = 0; j <= 300; ++j)
+    for (int i = 0; i <= 180; ++i)
+        for (int j = 0; j <= 180; ++j)
             text +=
                 "v " + std::to_string(i * 10) + " " + std::to_string(j * 10) + " " + std::to_string(i * j % 7) + "\n";
-    for (int i = 0; i < 300; ++i)
-        for (int j = 1; j <= 300; ++j) {
-            const int a = i * 301 + j;
-            text += "f " + std::to_string(a) + " " + std::to_string(a + 301) + " " + std::to_string(a + 302) + " " +
+    for (int i = 0; i < 180; ++i)
+        for (int j = 1; j <= 180; ++j) {
+            const int a = i * 181 + j;
+            text += "f " + std::to_string(a) + " " + std::to_string(a + 181) + " " + std::to_string(a + 182) + " " +
                     std::to_string(a + 1) + "\n";
         }
     return folder.put("hills.obj", text).string();
@@ -82,7 +82,7 @@ std::string large_mesh(const ScratchFolder& folder)
 
 TEST_F(CliSignals, voxelize_stops)
 {
-    expect_stop("voxelize " + large_mesh(folder_) + " --voxel-size 0.3 -o " + (folder_ / "out.sgrid").string());
+    expect_stop("voxelize " + large_mesh(folder_) + " --voxel-size 0.5 -o " + (folder_ / "out.sgrid").string());
     EXPECT_FALSE(std::filesystem::exists(folder_ / "out.sgrid"));
 }
 

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover convert IN OUT: a model in another layout; or a scene, a camera path or boxes in another format, as IN says
+#include "engine/format/camera_path.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/choice.h"
 #include "tools/cli/number_option.h"
@@ -80,6 +81,8 @@ Status convert(ConvertArguments& o, const Globals& globals)
     if (const auto format = box_format(o))
         return convert_boxes(o, *format, globals);
     SR_CHECK(check_from(o));
+    if (o.scene.input.from.empty())
+        SR_CHECK(refuse_colmap_file(o.model.in));
     const auto refuse_but = [&](std::initializer_list<Names> meant, std::string_view kind) {
         return refuse_others(
             *o.command, meant,

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // semrover inspect FILE|DIR: what is in a model or a scene. The report is one JSON object; without --json it is printed
 // as indented text.
+#include "engine/format/camera_path.h"
 #include "engine/model/ldm_config.h"
 #include "engine/model/ldm_names.h"
 #include "engine/model/renderer_model.h"
@@ -386,6 +387,8 @@ Result<Report> describe(const Path& path, const SceneInputOptions& input, const 
     std::error_code ignored;
     if (std::filesystem::is_directory(path, ignored))
         return describe_folder(path, globals.verbose || globals.json);
+    if (input.from.empty())
+        SR_CHECK(refuse_colmap_file(path));
     if (path.extension() == ".json" && input.from.empty() && !path.string().ends_with(".index.json"))
         return describe_objects(path);
     // a .bin without labels beside it is a pickle

@@ -57,6 +57,16 @@ std::optional<PathFormat> path_format_of(std::string_view name)
     return PathFormat(found - std::begin(kFormatNames));
 }
 
+Status refuse_colmap_file(const Path& path)
+{
+    for (const char* name : {"cameras.bin", "images.bin", "points3D.bin", "rigs.bin", "frames.bin"})
+        if (path.filename() == name)
+            return fail(ErrorCode::bad_input,
+                        "{}: a part of a COLMAP model, which is read as a whole; give its folder, {}", quote_path(path),
+                        quote_path(path.has_parent_path() ? path.parent_path() : Path(".")));
+    return {};
+}
+
 Result<CameraPath> read_camera_path(const Path& path, const Intrinsics& fallback, bool size_given)
 {
     if (is_folder(path))
@@ -66,6 +76,7 @@ Result<CameraPath> read_camera_path(const Path& path, const Intrinsics& fallback
         return file.is_object() && file.contains("camera_path") ? parse_camera_path_json(file, quote_path(path))
                                                                 : parse_transforms(file, quote_path(path), fallback);
     }
+    SR_CHECK(refuse_colmap_file(path));
     SR_TRY(const std::string text, read_text_file(path, kMaxPathBytes));
     if (is_kitti(text))
         return read_kitti(path, fallback, {beside(path, "times.txt"), beside(path, "calib.txt"), size_given});

@@ -61,6 +61,8 @@ Status write_camera_path_json(const Path& path, const CameraPath& cameras);
 Result<CameraPath> read_colmap(const Path& folder);
 // the text model, pictures named as write_transforms does; bad_input where a binary model is in the folder
 Status write_colmap(const Path& folder, const CameraPath& cameras);
+// bad_input for a binary file of such a model, which is read as a folder; its names are cameras.bin and the like
+Status refuse_colmap_file(const Path& path);
 
 enum class PathFormat { tum, kitti, transforms, camera_path, colmap };
 std::string_view name_of(PathFormat format);
