@@ -346,8 +346,7 @@ sr_status sr_world_draw(sr_world* world, const sr_draw_desc* draw);
  * of times, but executions share memory: on one queue, one after the other, or ordered by the host's semaphores. They
  * stay valid until the world is destroyed, a call of sr_world_record or sr_world_submit for another size (draws with
  * depth test and those without count apart), or an SR_ERR_PARTIAL of sr_world_check_draws. Like the host's own reads of
- * splats, executions must have finished before those calls and before sr_world_step, sr_world_edit and sr_chain_begin.
- */
+ * splats, executions must have finished before those calls and before sr_world_step and sr_world_edit. */
 sr_status sr_world_record(sr_world* world, const sr_draw_desc* draw, void* command_buffer);
 
 typedef struct sr_semaphore {
