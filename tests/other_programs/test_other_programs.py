@@ -87,7 +87,8 @@ class Gltf(Case):
         frames = self.folder / "frames"
         run(SEMROVER, "render", "-q", SCENES / "street.truth.sgrid", "--path", path, "-W", 96, "-H", 64,
             "--splat-radius", "auto", "-o", frames)
-        run(SEMROVER, "fuse", "-q", frames, "--poses", path, "--fov-x", 73, "-o", self.folder / "fused")
+        run(SEMROVER, "fuse", "-q", frames, "--poses", path, "--fov-x", 73, "--tsdf-voxel", 0.3,
+            "-o", self.folder / "fused")
         self.assertEqual(self.issues(self.folder / "fused" / "mesh.glb"), [])
 
 
