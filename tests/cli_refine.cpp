@@ -33,6 +33,16 @@ class CliRefine : public testing::Test {
     {
         return "refine " + path(input) + " -m " + path("model") + " -o " + path(output) + " --quiet" + kSettings;
     }
+    // a grid, street.sgrid, and the options of a drive along it by these metres
+    std::string put_drive(std::initializer_list<double> places) const
+    {
+        EXPECT_TRUE(write_grid(folder_ / "street.sgrid", street()));
+        std::string poses;
+        for (const double x : places)
+            poses += fmt::format("{0} {0} 3.6 1.6 -0.5 0.5 -0.5 0.5\n", x);
+        folder_.put("path.tum", poses);
+        return " --path " + path("path.tum") + " -W 56 -H 40 ";
+    }
     ProgramResult refine(std::string_view output, const std::string& more = "", std::string_view input = "in") const
     {
         return semrover_program(arguments(output, input) + more);
@@ -245,9 +255,7 @@ TEST_F(CliRefine, straight_from_a_grid_is_render_and_refine)
 
 TEST_F(CliRefine, splats_are_as_wide_as_the_model_says_unless_the_option_says_otherwise)
 {
-    ASSERT_TRUE(write_grid(folder_ / "street.sgrid", street()));
-    folder_.put("path.tum", "0 0 3.6 1.6 -0.5 0.5 -0.5 0.5\n");
-    const std::string drive = " --path " + path("path.tum") + " -W 56 -H 40 ";
+    const std::string drive = put_drive({0});
     const auto narrow = refined("narrow", drive, "street.sgrid");
     const auto wide = refined("wide", drive + "--splat-radius auto", "street.sgrid");
     EXPECT_FALSE(narrow == wide);
@@ -258,10 +266,7 @@ TEST_F(CliRefine, splats_are_as_wide_as_the_model_says_unless_the_option_says_ot
 
 TEST_F(CliRefine, noise_stays_on_surfaces_where_the_model_or_the_option_says_so)
 {
-    ASSERT_TRUE(write_grid(folder_ / "street.sgrid", street()));
-    folder_.put("path.tum", "0 0 3.6 1.6 -0.5 0.5 -0.5 0.5\n1 0.5 3.6 1.6 -0.5 0.5 -0.5 0.5\n"
-                            "2 1 3.6 1.6 -0.5 0.5 -0.5 0.5\n");
-    const std::string drive = " --path " + path("path.tum") + " -W 56 -H 40 ", warped = "--frame-noise warped ";
+    const std::string drive = put_drive({0, 0.5, 1}), warped = "--frame-noise warped ";
     const auto fresh = refined("fresh", drive, "street.sgrid");
     const auto whole = refined("whole", drive + warped, "street.sgrid");
     EXPECT_TRUE(fresh.at("latents/000000.safetensors") == whole.at("latents/000000.safetensors"));
@@ -288,10 +293,7 @@ TEST_F(CliRefine, noise_stays_on_surfaces_where_the_model_or_the_option_says_so)
 
 TEST_F(CliRefine, finished_frames_take_a_share_of_the_one_before_and_latents_do_not)
 {
-    ASSERT_TRUE(write_grid(folder_ / "street.sgrid", street()));
-    folder_.put("path.tum", "0 0 3.6 1.6 -0.5 0.5 -0.5 0.5\n1 0.2 3.6 1.6 -0.5 0.5 -0.5 0.5\n"
-                            "2 0.4 3.6 1.6 -0.5 0.5 -0.5 0.5\n");
-    const std::string drive = " --path " + path("path.tum") + " -W 56 -H 40 ", history = "--frame-history 0.6 ";
+    const std::string drive = put_drive({0, 0.2, 0.4}), history = "--frame-history 0.6 ";
     const auto without = refined("without", drive, "street.sgrid");
     const auto whole = refined("whole", drive + history, "street.sgrid");
     for (const auto& [name, bytes] : whole) {
@@ -312,6 +314,9 @@ TEST_F(CliRefine, finished_frames_take_a_share_of_the_one_before_and_latents_do_
         const auto expected = refined(std::string("whole_") + format, options, buffers);
         ASSERT_EQ(stop_after(name, 5, SIGKILL, options, buffers), 128 + SIGKILL);
         EXPECT_TRUE(expected == refined(name, options, buffers)) << format;
+        const std::string drawn = name + "_drawn"; // with two frames finished
+        ASSERT_EQ(stop_after(drawn, 4, SIGKILL, options, "street.sgrid"), 128 + SIGKILL);
+        EXPECT_TRUE(expected == refined(drawn, options, "street.sgrid")) << format;
     }
     // a model that asks for it, with cameras and without
     folder_.put("model/model_index.json", R"({"defaults": {"renderer": {"frame_history": 0.6}}})");

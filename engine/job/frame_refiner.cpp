@@ -24,7 +24,8 @@ Status FrameRefiner::start(const RendererWork& work, const RendererWork& total)
 {
     for (const RefineChain& c : p_.chains)
         if (c.history > 0 && !trails_[&c].history) {
-            SR_TRY(trails_[&c].history, FrameHistory::create(p_.device, c.size, c.history));
+            SR_TRY(trails_[&c].history,
+                   FrameHistory::create(p_.device, c.size, c.cameras.front().intrinsics.model, c.history));
         }
     return renderer_->start(work, total);
 }
@@ -140,30 +141,30 @@ Status FrameRefiner::decode_again(const RefineTask& t, FrameHistory& history)
     return {};
 }
 
-Result<FrameHistory*> FrameRefiner::history(const RefineTask& t)
+// none: it is a first frame
+Result<std::vector<uint8_t>> FrameRefiner::finished_before(const RefineTask& t) const
+{
+    if (t.frame() == t.chain->range.first)
+        return t.chain->picture_before;
+    SR_TRY(ImageRgb8 picture, p_.store.load_frame(t.chain->camera, t.frame() - 1));
+    return std::move(picture.pixels);
+}
+
+// to the frame before
+Status FrameRefiner::catch_up(const RefineTask& t)
 {
     const RefineChain& c = *t.chain;
-    Trail& trail = trails_[&c];
-    FrameHistory* history = trail.history.get();
-    if (trail.finished == t.frame())
-        return history;
-    history->restart();
-    const bool first = t.frame() == c.range.first;
-    if (first && c.picture_before.empty())
-        return history;
-    if (!first && !p_.store.lossless()) {
-        SR_CHECK(decode_again(t, *history));
-        return history;
-    }
-    const uint32_t before = t.frame() - 1;
-    std::vector<uint8_t> pixels = c.picture_before;
-    if (!first) {
-        SR_TRY(const ImageRgb8 picture, p_.store.load_frame(c.camera, before));
-        pixels = picture.pixels;
-    }
-    SR_TRY(const ImageGray16 depth, depth_of(c, before));
-    SR_CHECK(history->restore(pixels, c.cameras[before], depth));
-    return history;
+    if (trails_[&c].finished == t.frame())
+        return {};
+    FrameHistory& history = *trails_[&c].history;
+    history.restart();
+    if (t.frame() != c.range.first && !p_.store.lossless())
+        return decode_again(t, history);
+    SR_TRY(const std::vector<uint8_t> pixels, finished_before(t));
+    if (pixels.empty())
+        return {};
+    SR_TRY(const ImageGray16 depth, depth_of(c, t.frame() - 1));
+    return history.restore(pixels, c.cameras[t.frame() - 1], depth);
 }
 
 // decoded: pixels, or a slot of their words
@@ -171,11 +172,11 @@ template <typename Decoded>
 Status FrameRefiner::accumulate(const RefineTask& t, const Decoded& decoded)
 {
     const RefineChain& c = *t.chain;
-    SR_TRY(FrameHistory * frames, history(t));
+    Trail& trail = trails_[&c];
     SR_TRY(const ImageGray16 depth, depth_of(c, t.frame()));
-    SR_CHECK(frames->add(decoded, c.cameras[t.frame()], depth));
-    trails_[&c].finished = t.frame() + 1;
-    return read_frame(t, frames->frame());
+    SR_CHECK(trail.history->add(decoded, c.cameras[t.frame()], depth));
+    trail.finished = t.frame() + 1;
+    return read_frame(t, trail.history->frame());
 }
 
 Status FrameRefiner::read_frame(const RefineTask& t, const Slot& bytes)
@@ -187,6 +188,8 @@ Status FrameRefiner::read_frame(const RefineTask& t, const Slot& bytes)
 Status FrameRefiner::decode(const RefineTask& t)
 {
     const bool accumulated = t.chain->history > 0;
+    if (accumulated)
+        SR_CHECK(catch_up(t)); // which may decode others: before this one is
     if (on_device_ != t.chain || frame_on_device_ != t.frame()) {
         SR_TRY(const std::vector<float> values, latent(*t.chain, t.frame()));
         SR_TRY(const std::vector<float> image, renderer_->decode(values));

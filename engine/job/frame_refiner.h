@@ -39,7 +39,8 @@ class FrameRefiner : public Refiner {
     Status cancel_window() override { return renderer_->cancel(); }
     Status decode(const RefineTask& task) override;
     Status decode_again(const RefineTask& task, FrameHistory& history);
-    Result<FrameHistory*> history(const RefineTask& task); // that ends with the frame before
+    Result<std::vector<uint8_t>> finished_before(const RefineTask& task) const;
+    Status catch_up(const RefineTask& task);
     template <typename Decoded>
     Status accumulate(const RefineTask& task, const Decoded& decoded);
     Status read_frame(const RefineTask& task, const Slot& bytes);

@@ -52,7 +52,7 @@ const RefineChain* Refiner::chain_of(const std::string& camera) const
 void Refiner::give_depth(const std::string& camera, const ImageGray16& depth)
 {
     const RefineChain* chain = chain_of(camera);
-    DrawnDepths& depths = depths_[chain];
+    Depths& depths = depths_[chain];
     const uint32_t frame = depths.given++;
     if (wants_depth(*chain, frame))
         depths.frames[frame] = depth;
@@ -69,19 +69,22 @@ bool Refiner::wants_depth(const RefineChain& chain, uint32_t frame) const
     const auto left = [&](uint32_t f) {
         return f >= range.first && f <= range.last && !p_.store.has(PieceKind::frame, chain.camera, f);
     };
-    return chain.history > 0 && (left(frame) || left(frame + 1));
+    // frames that were not kept without a loss are decoded again from the first one on
+    return chain.history > 0 && (!p_.store.lossless() || left(frame) || left(frame + 1));
 }
 
 Result<ImageGray16> Refiner::depth_of(const RefineChain& c, uint32_t frame)
 {
-    if (!order_.drawn)
-        return read_depth(c.camera, frame);
-    SR_CHECK(p_.out.arrive()); // with what was drawn
     std::map<uint32_t, ImageGray16>& frames = depths_[&c].frames;
-    frames.erase(frames.begin(), frames.lower_bound(frame));
-    const auto found = frames.find(frame);
-    SR_ASSERT(found != frames.end(), "the depth of frame {} was not drawn", frame);
-    return found->second;
+    if (order_.drawn) {
+        SR_CHECK(p_.out.arrive()); // with what was drawn
+        frames.erase(frames.begin(), frames.lower_bound(frame));
+        SR_ASSERT(frames.contains(frame), "the depth of frame {} was not drawn", frame);
+    } else if (!frames.contains(frame)) {
+        frames.clear();
+        SR_TRY(frames[frame], read_depth(c.camera, frame));
+    }
+    return frames[frame];
 }
 
 Result<bool> Refiner::settle()
@@ -151,7 +154,8 @@ Result<std::span<const NoiseKey>> Refiner::keys(const RefineChain& c, uint32_t f
     if (noise.frames() > frame + 1)
         noise = NoiseTrail(c.size);
     while (noise.frames() <= frame) {
-        SR_TRY(const ImageGray16 depth, read_depth(c.camera, noise.frames()));
+        SR_TRY(const ImageGray16 depth,
+               order_.drawn ? read_depth(c.camera, noise.frames()) : depth_of(c, noise.frames()));
         noise.follow(c.cameras[noise.frames()], depth);
     }
     return noise.keys();

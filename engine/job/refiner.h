@@ -73,11 +73,11 @@ class Refiner {
     bool begun_ = false;                          // the window of the task is being denoised
     bool wants_depth(const RefineChain& chain, uint32_t frame) const;
     std::map<const RefineChain*, NoiseTrail> noise_;
-    struct DrawnDepths {
-        uint32_t given = 0;                     // so far
-        std::map<uint32_t, ImageGray16> frames; // that are still wanted
+    struct Depths {
+        uint32_t given = 0;                     // of those that are drawn, so far
+        std::map<uint32_t, ImageGray16> frames; // that are still wanted, or the last one that was read
     };
-    std::map<const RefineChain*, DrawnDepths> depths_;
+    std::map<const RefineChain*, Depths> depths_;
 };
 
 // a buffer's files as splat_pixels() would make them
