@@ -453,7 +453,7 @@ typedef struct sr_chain_info {
     uint32_t struct_size;
     uint32_t steps;        /* of denoising a frame */
     uint32_t frames;       /* finished since the chain began; the number of the next one */
-    uint32_t noise;        /* SR_NOISE_FRESH or SR_NOISE_ON_SURFACES */
+    uint32_t noise;        /* SR_NOISE_FRESH, or SR_NOISE_ON_SURFACES where depth and camera are read */
     uint32_t busy;         /* 1: a frame is at work */
     uint32_t resident;     /* 1: both networks stay on the device */
     uint64_t device_bytes; /* of the context at most, as planned; the drawing of a world comes to it */

@@ -47,7 +47,7 @@ std::vector<uint8_t> bytes_of(const FrameHistory& history)
 
 std::unique_ptr<FrameHistory> begin()
 {
-    auto history = FrameHistory::create(test_device(), kSize, 0.6f);
+    auto history = FrameHistory::create(test_device(), kSize, CameraModel::pinhole, 0.6f);
     EXPECT_TRUE(history) << history.error().message;
     return std::move(*history);
 }

@@ -60,7 +60,7 @@ Status FrameChain::make()
     SR_TRY(memory_, plan_renderer(device_, r_, {&work, 1}, state_.planned_bytes(device_.limits()) + history));
     SR_CHECK(state_.allocate(device_, "a chain's pictures"));
     if (r_.frame_history > 0) {
-        SR_TRY(history_, FrameHistory::create(device_, size_, r_.frame_history));
+        SR_TRY(history_, FrameHistory::create(device_, size_, CameraModel::pinhole, r_.frame_history));
     }
     SR_TRY(copies_, CopyRing::create(device_));
     Graph g;

@@ -51,12 +51,13 @@ Graph FrameHistory::Memory::graph(SplatLens lens, float share) const
     return g;
 }
 
-Result<std::unique_ptr<FrameHistory>> FrameHistory::create(Device& device, const LatentSize& size, float share)
+Result<std::unique_ptr<FrameHistory>> FrameHistory::create(Device& device, const LatentSize& size, CameraModel model,
+                                                           float share)
 {
     std::unique_ptr<FrameHistory> h(new FrameHistory(device, size, share));
     SR_CHECK(h->memory_.state.allocate(device, "the frame before"));
     SR_TRY(h->copies_, CopyRing::create(device));
-    SR_CHECK(h->use_lens(CameraModel::pinhole));
+    SR_CHECK(h->use_lens(model));
     return h;
 }
 

@@ -16,8 +16,9 @@ namespace semrover {
 // a chain that is taken up again goes on to the same bytes.
 class FrameHistory {
   public:
-    // share: of the frame before, 0..1. Errors: out_of_memory; device errors
-    static Result<std::unique_ptr<FrameHistory>> create(Device& device, const LatentSize& size, float share);
+    // model: of the first frame's lens; share: of the frame before, 0..1. Errors: out_of_memory; device errors
+    static Result<std::unique_ptr<FrameHistory>> create(Device& device, const LatentSize& size, CameraModel model,
+                                                        float share);
 
     // The next frame of the chain. The first one stays as it is, and so does one through another lens than the frame
     // before. bytes: as picture_bytes() makes them, pixels: [height,

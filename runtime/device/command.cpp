@@ -23,13 +23,50 @@ void barrier(const VulkanCalls& vk, VkCommandBuffer commands, VkPipelineStageFla
 
 constexpr VkAccessFlags kAnything = VK_ACCESS_MEMORY_READ_BIT | VK_ACCESS_MEMORY_WRITE_BIT;
 
-VkImageMemoryBarrier transition(const HostImage& to)
+// what a copy needs an image of a host's to be
+struct ImageTransfer {
+    const HostImage& image;
+    VkImageAspectFlags aspect;
+    VkImageLayout layout;
+    VkAccessFlags access;
+};
+
+void move_image(const VulkanCalls& vk, VkCommandBuffer commands, const ImageTransfer& t, VkPipelineStageFlags from,
+                VkPipelineStageFlags to, VkImageMemoryBarrier image)
+{
+    image.srcQueueFamilyIndex = image.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
+    image.image = t.image.image;
+    image.subresourceRange = {t.aspect, 0, 1, 0, 1};
+    vk.CmdPipelineBarrier(commands, from, to, 0, 0, nullptr, 0, nullptr, 1, &image);
+}
+
+void begin_transfer(const VulkanCalls& vk, VkCommandBuffer commands, const ImageTransfer& t)
 {
     auto image = vk_struct<VkImageMemoryBarrier>(VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER);
-    image.srcQueueFamilyIndex = image.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
-    image.image = to.image;
-    image.subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
-    return image;
+    image.srcAccessMask = kAnything;
+    image.dstAccessMask = t.access;
+    image.oldLayout = t.image.before;
+    image.newLayout = t.layout;
+    move_image(vk, commands, t, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, kTransfer, image);
+}
+
+void end_transfer(const VulkanCalls& vk, VkCommandBuffer commands, const ImageTransfer& t, VkAccessFlags written)
+{
+    auto image = vk_struct<VkImageMemoryBarrier>(VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER);
+    image.srcAccessMask = written;
+    image.dstAccessMask = kAnything;
+    image.oldLayout = t.layout;
+    image.newLayout = t.image.after;
+    move_image(vk, commands, t, kTransfer, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, image);
+}
+
+VkBufferImageCopy whole_image(const ImageTransfer& t, uint64_t offset)
+{
+    VkBufferImageCopy region{};
+    region.bufferOffset = offset;
+    region.imageSubresource = {t.aspect, 0, 0, 1};
+    region.imageExtent = {t.image.width, t.image.height, 1};
+    return region;
 }
 
 } // namespace
@@ -75,24 +112,12 @@ void record_host_copy(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer 
 void record_image_copy(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer from, uint64_t from_at,
                        const HostImage& to)
 {
-    VkImageMemoryBarrier image = transition(to);
-    image.srcAccessMask = kAnything;
-    image.dstAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT;
-    image.oldLayout = to.before;
-    image.newLayout = VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL;
-    vk.CmdPipelineBarrier(commands, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, kTransfer, 0, 0, nullptr, 0, nullptr, 1,
-                          &image);
-    VkBufferImageCopy region{};
-    region.bufferOffset = from_at;
-    region.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1};
-    region.imageExtent = {to.width, to.height, 1};
-    vk.CmdCopyBufferToImage(commands, from, to.image, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, 1, &region);
-    image.srcAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT;
-    image.dstAccessMask = kAnything;
-    image.oldLayout = VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL;
-    image.newLayout = to.after;
-    vk.CmdPipelineBarrier(commands, kTransfer, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, 0, 0, nullptr, 0, nullptr, 1,
-                          &image);
+    const ImageTransfer transfer{to, VK_IMAGE_ASPECT_COLOR_BIT, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
+                                 VK_ACCESS_TRANSFER_WRITE_BIT};
+    begin_transfer(vk, commands, transfer);
+    const VkBufferImageCopy region = whole_image(transfer, from_at);
+    vk.CmdCopyBufferToImage(commands, from, to.image, transfer.layout, 1, &region);
+    end_transfer(vk, commands, transfer, VK_ACCESS_TRANSFER_WRITE_BIT);
 }
 
 void record_image_fetch(const VulkanCalls& vk, VkCommandBuffer commands, const HostImage& from,
@@ -100,25 +125,11 @@ void record_image_fetch(const VulkanCalls& vk, VkCommandBuffer commands, const H
 {
     // what was read of the buffer before, too
     barrier(vk, commands, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, kAnything, kTransfer, kCopy);
-    VkImageMemoryBarrier image = transition(from);
-    image.subresourceRange.aspectMask = aspect;
-    image.srcAccessMask = kAnything;
-    image.dstAccessMask = VK_ACCESS_TRANSFER_READ_BIT;
-    image.oldLayout = from.before;
-    image.newLayout = VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL;
-    vk.CmdPipelineBarrier(commands, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, kTransfer, 0, 0, nullptr, 0, nullptr, 1,
-                          &image);
-    VkBufferImageCopy region{};
-    region.bufferOffset = to_at;
-    region.imageSubresource = {aspect, 0, 0, 1};
-    region.imageExtent = {from.width, from.height, 1};
-    vk.CmdCopyImageToBuffer(commands, from.image, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, to, 1, &region);
-    image.srcAccessMask = 0; // nothing is written
-    image.dstAccessMask = kAnything;
-    image.oldLayout = VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL;
-    image.newLayout = from.after;
-    vk.CmdPipelineBarrier(commands, kTransfer, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, 0, 0, nullptr, 0, nullptr, 1,
-                          &image);
+    const ImageTransfer transfer{from, aspect, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, VK_ACCESS_TRANSFER_READ_BIT};
+    begin_transfer(vk, commands, transfer);
+    const VkBufferImageCopy region = whole_image(transfer, to_at);
+    vk.CmdCopyImageToBuffer(commands, from.image, transfer.layout, to, 1, &region);
+    end_transfer(vk, commands, transfer, 0);
     barrier(vk, commands, kTransfer, VK_ACCESS_TRANSFER_WRITE_BIT, kCompute | kTransfer, kShader | kCopy);
 }
 

@@ -42,18 +42,23 @@ uint index_of(ivec2 at)
     return uint(pixel.y) * p.width + uint(pixel.x);
 }
 
+// three bytes of two words, from `byte` of the first one on
+vec3 color_of(uint first, uint second, uint byte)
+{
+    const uint bits = byte == 0 ? first : first >> 8 * byte | second << (32 - 8 * byte);
+    return vec3(bits & 255u, bits >> 8 & 255u, bits >> 16 & 255u);
+}
+
 vec3 color_now(ivec2 at)
 {
-    const uint byte = 3 * index_of(at);
-    return vec3(now[byte / 4] >> 8 * (byte % 4) & 255u, now[(byte + 1) / 4] >> 8 * ((byte + 1) % 4) & 255u,
-                now[(byte + 2) / 4] >> 8 * ((byte + 2) % 4) & 255u);
+    const uint byte = 3 * index_of(at), word = byte / 4;
+    return color_of(now[word], now[min(word + 1, p.words - 1)], byte % 4);
 }
 
 vec3 color_past(ivec2 at)
 {
-    const uint byte = 3 * index_of(at);
-    return vec3(past[byte / 4] >> 8 * (byte % 4) & 255u, past[(byte + 1) / 4] >> 8 * ((byte + 1) % 4) & 255u,
-                past[(byte + 2) / 4] >> 8 * ((byte + 2) % 4) & 255u);
+    const uint byte = 3 * index_of(at), word = byte / 4;
+    return color_of(past[word], past[min(word + 1, p.words - 1)], byte % 4);
 }
 
 float camera_depth(uint camera, vec3 point)
