@@ -96,9 +96,13 @@ TEST(graph_execute, gives_the_same_bytes_as_one_pass_per_submit_without_aliasing
         ExternalMemory memory;
         Graph g;
         const RandomGraph made(g, seed, [&](uint32_t rows, uint32_t cols) { return memory.add(g, rows, cols); });
-        const Plan plan = plan_of(g);
-        EXPECT_LT(plan.levels, plan.passes.size() + 1);
-        ASSERT_TRUE(run(memory, plan) == run(memory, one_after_the_other(plan)));
+        DeviceLimits limits = test_device().limits();
+        for (bool side_by_side : {false, true}) {
+            limits.side_by_side = side_by_side;
+            const Plan plan = plan_of(g, limits);
+            EXPECT_LT(plan.levels, plan.passes.size() + 1);
+            ASSERT_TRUE(run(memory, plan) == run(memory, one_after_the_other(plan)));
+        }
     }
 }
 

@@ -133,7 +133,7 @@ TEST(runtime_device, refuses_limits_that_it_cannot_lower)
 TEST(runtime_device, takes_every_limit_that_it_can_lower)
 {
     const auto device = make_device({.limits = "shared=8192,range=1e6,texels=4096,alloc=2e6,groups=100,fp16=0,"
-                                               "subgroups=0,staging=1,submit=0.5,variant=simt"});
+                                               "subgroups=0,staging=1,branches=1,submit=0.5,variant=simt"});
     const DeviceLimits& l = device->limits();
     EXPECT_EQ(l.max_shared_bytes, 8192u);
     EXPECT_EQ(l.max_storage_range, 1000000u);
@@ -141,7 +141,7 @@ TEST(runtime_device, takes_every_limit_that_it_can_lower)
     EXPECT_EQ(l.max_allocation, 2000000u);
     EXPECT_EQ(l.max_groups, 100u);
     EXPECT_EQ(l.needs_supported & (kNeedsFloat16 | kNeedsSubgroupBallot), 0u);
-    EXPECT_TRUE(l.force_staging);
+    EXPECT_TRUE(l.force_staging && l.side_by_side);
     EXPECT_EQ(l.submit_seconds, 0.5);
     EXPECT_EQ(l.force_variant, "simt");
 }

@@ -83,6 +83,7 @@ DeviceLimits limits_of(const VulkanCalls& vk, VkPhysicalDevice physical, const V
         {256, v.minStorageBufferOffsetAlignment, v.minTexelBufferOffsetAlignment, v.nonCoherentAtomSize}));
     l.max_push_bytes = v.maxPushConstantsSize;
     l.max_storage_buffers = std::min(v.maxPerStageDescriptorStorageBuffers, v.maxDescriptorSetStorageBuffers);
+    l.side_by_side = l.type != DeviceType::cpu;
     l.submit_seconds = l.type == DeviceType::cpu ? 0 : 0.1;
     return l;
 }

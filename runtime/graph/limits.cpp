@@ -62,13 +62,17 @@ Status apply(DeviceLimits& limits, const std::string& key, const std::string& te
         limits.force_staging = value != 0;
         return {};
     }
+    if (key == "branches") {
+        limits.side_by_side = value != 0;
+        return {};
+    }
     if (key == "submit") {
         limits.submit_seconds = value;
         return {};
     }
     return fail(ErrorCode::usage,
                 "unknown limit '{}' (known: shared, range, texels, alloc, groups, buffers, fp16, coopmat, subgroups, "
-                "staging, submit, variant)",
+                "staging, branches, submit, variant)",
                 key);
 }
 

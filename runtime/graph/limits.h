@@ -33,13 +33,14 @@ struct DeviceLimits {
     uint32_t max_push_bytes = 128;
     uint32_t max_storage_buffers = 16; // of a shader; Vulkan promises 4, kernels have up to 11
     double submit_seconds = 0.1;       // work of one submit; zero: no limit (CPU devices have no watchdog)
+    bool side_by_side = false;         // memory is shared so that independent passes need no barrier between them
     std::string force_variant;         // "", or a kernel variant to prefer wherever it exists
     bool force_staging = false;        // upload through staging even where memory is host-visible
 };
 
 // Lowers limits for tests:
-// "shared=16384,range=67108864,alloc=536870912,fp16=0,coopmat=0,variant=simt,staging=1,submit=0.001". Raising one above
-// what the device has is refused.
+// "shared=16384,range=67108864,alloc=536870912,fp16=0,coopmat=0,variant=simt,staging=1,branches=1,submit=0.001".
+// Raising one above what the device has is refused.
 Status override_limits(DeviceLimits& limits, const std::string& text);
 
 } // namespace semrover

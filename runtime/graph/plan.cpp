@@ -40,6 +40,7 @@ Result<Plan> make_plan(const GraphDesc& graph, const DeviceLimits& limits, const
     SR_CHECK(stage::check(plan));
     SR_CHECK(stage::fuse(plan));
     SR_CHECK(stage::pick_variants(plan, limits));
+    stage::arrange(plan, limits.side_by_side);
     SR_CHECK(stage::lifetimes(plan));
     SR_CHECK(stage::place(plan, limits));
     SR_CHECK(stage::slice(plan, limits));
@@ -68,7 +69,10 @@ bool overlaps(const Plan& plan, const PassBinding& a, const PassBinding& b)
     if (ra.external != rb.external)
         return false;
     uint64_t start_a = a.offset, start_b = b.offset;
-    if (ra.external) {
+    if (!ra.external && plan.blocks.empty()) {
+        if (a.resource != b.resource)
+            return false;
+    } else if (ra.external) {
         if (a.resource != b.resource && (!ra.memory.buffer || ra.memory.buffer != rb.memory.buffer))
             return false; // without memory, when only planning, names are all that tells them apart
         start_a += ra.memory.offset;
@@ -81,6 +85,15 @@ bool overlaps(const Plan& plan, const PassBinding& a, const PassBinding& b)
         start_b += pb.offset;
     }
     return start_a < start_b + b.bytes && start_b < start_a + a.bytes;
+}
+
+bool conflict(const Plan& plan, const Pass& a, const Pass& b)
+{
+    for (const PassBinding& x : a.bindings)
+        for (const PassBinding& y : b.bindings)
+            if (((uint8_t(x.access) | uint8_t(y.access)) & uint8_t(Access::write)) && overlaps(plan, x, y))
+                return true;
+    return false;
 }
 
 std::string Plan::print() const

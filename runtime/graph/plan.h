@@ -52,7 +52,7 @@ struct Dispatch {
 struct Placement {
     uint32_t block = 0; // transients: block of the arena
     uint64_t offset = 0;
-    uint32_t first_use = ~0u, last_use = 0; // pass indices
+    uint32_t first_use = ~0u, last_use = 0; // levels, before memory is shared
 };
 
 struct Plan {
@@ -81,10 +81,13 @@ namespace stage {
 Status check(Plan& plan); // every transient is written before it is read, ranges fit
 Status fuse(Plan& plan);  // epilogues into their producers
 Status pick_variants(Plan& plan, const DeviceLimits& limits); // a shader per pass, its constants and bindings
-Status lifetimes(Plan& plan);                                 // first and last pass of each transient
-Status place(Plan& plan, const DeviceLimits& limits);         // aliased arena
-Status slice(Plan& plan, const DeviceLimits& limits);         // row bands for limits, groups
-Status order(Plan& plan);                                     // levels from access x byte range: the barriers
+// Levels before memory is shared: of what passes read and write where they may run side by side, else one each. So
+// passes of a level do not share memory, and lie in levels of their own later only if memory has to be shared.
+void arrange(Plan& plan, bool side_by_side);
+Status lifetimes(Plan& plan);                         // first and last level of each transient
+Status place(Plan& plan, const DeviceLimits& limits); // aliased arena
+Status slice(Plan& plan, const DeviceLimits& limits); // row bands for limits, groups
+Status order(Plan& plan);                             // levels from access x byte range: the barriers
 // dispatches and submits for passes that take that many seconds each; may be done again once they are measured
 void schedule(Plan& plan, const DeviceLimits& limits, std::span<const double> seconds);
 } // namespace stage
@@ -93,8 +96,10 @@ void schedule(Plan& plan, const DeviceLimits& limits, std::span<const double> se
 // submits under a watchdog.
 double estimated_seconds(const Pass& pass);
 
-// do the memory ranges of two bindings overlap, after placement?
+// do the memory ranges of two bindings overlap? Before placement no two transients do
 bool overlaps(const Plan& plan, const PassBinding& a, const PassBinding& b);
+// does one write what the other reads or writes?
+bool conflict(const Plan& plan, const Pass& a, const Pass& b);
 
 // The variant of `kernel` for a device, among those its limits allow with these constants and tensors (none: fp16
 // ones): the forced one, else cpu, coopmat or simt by device type.

@@ -1,30 +1,12 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// stage 7: hazards from access x byte range, after aliasing. A pass runs one level after the last pass that it
+// stage 8: hazards from access x byte range, after aliasing. A pass runs one level after the last pass that it
 // conflicts with; one barrier stands between levels, none for read after read.
 #include "runtime/graph/plan.h"
 
 #include <algorithm>
 
 namespace semrover::stage {
-
-namespace {
-
-bool writes(Access a)
-{
-    return uint8_t(a) & uint8_t(Access::write);
-}
-
-bool conflict(const Plan& plan, const Pass& a, const Pass& b)
-{
-    for (const PassBinding& x : a.bindings)
-        for (const PassBinding& y : b.bindings)
-            if ((writes(x.access) || writes(y.access)) && overlaps(plan, x, y))
-                return true;
-    return false;
-}
-
-} // namespace
 
 Status order(Plan& plan)
 {

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// stages 4 and 5: lifetimes of transients, and offsets in an arena where lives that do not overlap share bytes
+// stages 5 and 6: lifetimes of transients, and offsets in an arena where lives that do not overlap share bytes
 #include "runtime/graph/plan.h"
 
 #include <algorithm>
@@ -9,11 +9,11 @@ namespace semrover::stage {
 
 Status lifetimes(Plan& plan)
 {
-    for (size_t i = 0; i < plan.passes.size(); ++i)
-        for (const PassBinding& b : plan.passes[i].bindings) {
+    for (const Pass& pass : plan.passes)
+        for (const PassBinding& b : pass.bindings) {
             Placement& p = plan.placements[b.resource];
-            p.first_use = std::min(p.first_use, uint32_t(i));
-            p.last_use = std::max(p.last_use, uint32_t(i));
+            p.first_use = std::min(p.first_use, pass.level);
+            p.last_use = std::max(p.last_use, pass.level);
         }
     return {};
 }

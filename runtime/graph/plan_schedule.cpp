@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// stage 8: what goes to the device at a time. GPUs are taken away from whoever keeps them for too long, by a watchdog,
+// stage 9: what goes to the device at a time. GPUs are taken away from whoever keeps them for too long, by a watchdog,
 // so submits are short: passes share one until its time is used up, and a long pass is cut into ranges of its
 // workgroups.
 #include "runtime/graph/plan.h"

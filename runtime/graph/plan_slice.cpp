@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// stage 6: cuts passes into bands of rows where a binding exceeds what the device can bind; then counts workgroups
+// stage 7: cuts passes into bands of rows where a binding exceeds what the device can bind; then counts workgroups
 #include "runtime/graph/plan.h"
 
 #include "runtime/graph/protocol.h"
