@@ -106,31 +106,45 @@ void set_tile(Pass& pass, uint32_t tile)
     set_constant(pass, protocol::kTileCols, tile);
 }
 
-// Shape and threads of cooperative matrices. The larger tile where it still makes enough workgroups for a large GPU,
-// and where a lane holds no more than 128 sums: every tile gives the same bits.
+// Square tiles that a variant can make, and the workgroups from which a large GPU has enough to do with each. All give
+// the same bits, so the choice may depend on the number of rows.
+struct SquareTile {
+    uint32_t size, enough;
+};
+
+SquareTile largest_that_fills(const Pass& pass, std::span<const SquareTile> tiles)
+{
+    for (const SquareTile& t : tiles)
+        if (workgroups(pass, t.size) >= t.enough)
+            return t;
+    return tiles.back();
+}
+
+// Shape and threads of cooperative matrices. Four subgroups share a tile: a lane holds 128 sums at most, and has
+// something to load.
 void fit_matrices(Pass& pass, const DeviceLimits& limits)
 {
     if (!(pass.variant->needs & kNeedsCooperativeMatrix))
         return;
-    constexpr uint32_t kLarge = 128, kSmall = 64, kEnoughGroups = 256, kMostSums = 128;
+    constexpr uint32_t kMostSums = 128, kLoadsOfSmall = 32 * 32 / 8;
+    constexpr SquareTile kTiles[] = {{128, 256}, {64, 128}, {32, 0}};
     const MatrixShape& shape = limits.matrix;
     set_constant(pass, protocol::kMatM, shape.m);
     set_constant(pass, protocol::kMatN, shape.n);
     set_constant(pass, protocol::kMatK, shape.k);
     set_constant(pass, protocol::kThreads, 4 * shape.subgroup);
-    if (pass.tile_rows != kLarge || pass.tile_cols != kLarge)
+    if (pass.tile_rows != kTiles[0].size || pass.tile_cols != kTiles[0].size)
         return;
-    const bool large = workgroups(pass, kLarge) >= kEnoughGroups && kLarge * kLarge / 4 / shape.subgroup <= kMostSums;
-    set_tile(pass, large ? kLarge : kSmall);
+    const size_t first = kTiles[0].size * kTiles[0].size / (4 * shape.subgroup) > kMostSums;
+    const size_t last = 4 * shape.subgroup <= kLoadsOfSmall ? 3 : 2;
+    set_tile(pass, largest_that_fills(pass, std::span(kTiles).subspan(first, last - first)).size);
 }
 
-// A tile of 64 x 64 becomes one of 32 x 32 where that is what gives a large GPU's units work: both give the same bits.
-void fit_small_tile(Pass& pass)
+void fit_simt_tile(Pass& pass)
 {
-    constexpr uint32_t kLarge = 64, kSmall = 32, kEnoughGroups = 128;
-    if (pass.variant->name == "simt" && pass.tile_rows == kLarge && pass.tile_cols == kLarge &&
-        workgroups(pass, kLarge) < kEnoughGroups)
-        set_tile(pass, kSmall);
+    constexpr SquareTile kTiles[] = {{64, 128}, {32, 0}};
+    if (pass.variant->name == "simt" && pass.tile_rows == kTiles[0].size && pass.tile_cols == kTiles[0].size)
+        set_tile(pass, largest_that_fills(pass, kTiles).size);
 }
 
 Status bind(Pass& pass)
@@ -181,7 +195,7 @@ Status stage::pick_variants(Plan& plan, const DeviceLimits& limits)
             set_constant(pass, c.name, c.value);
         fit_tile(pass);
         fit_matrices(pass, limits);
-        fit_small_tile(pass);
+        fit_simt_tile(pass);
         SR_CHECK(bind(pass));
     }
     return {};
