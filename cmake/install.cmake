@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-# `cmake --install BUILD --prefix DIR --component library`: libsemrover.so, semrover.h, what tells CMake
+# `cmake --install BUILD --prefix DIR --component library`: libsemrover.so, its headers, what tells CMake
 # (find_package(semrover)) and pkg-config of them, and sample hosts to build against them (share/semrover/host)
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
@@ -10,7 +10,7 @@ target_include_directories(semrover_c INTERFACE $<INSTALL_INTERFACE:${CMAKE_INST
 install(TARGETS semrover_c EXPORT semrover COMPONENT library
     LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT library)
 install(DIRECTORY tools/host DESTINATION ${CMAKE_INSTALL_DATADIR}/semrover COMPONENT library)
-install(FILES engine/semrover.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT library)
+install(FILES engine/semrover.h engine/semrover_chain.h engine/semrover_gl.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT library)
 set(semrover_cmake_folder ${CMAKE_INSTALL_LIBDIR}/cmake/semrover)
 install(EXPORT semrover NAMESPACE semrover:: FILE semroverConfig.cmake DESTINATION ${semrover_cmake_folder}
     COMPONENT library)
@@ -18,8 +18,9 @@ write_basic_package_version_file(${CMAKE_CURRENT_BINARY_DIR}/semroverConfigVersi
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/semroverConfigVersion.cmake DESTINATION ${semrover_cmake_folder}
     COMPONENT library)
 # the prefix is told from where the file lies, so that the tree may be moved
-file(RELATIVE_PATH up /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
-file(CONFIGURE OUTPUT semrover.pc @ONLY CONTENT
+function(write_pkgconfig file libdir)
+    file(RELATIVE_PATH up /${libdir}/pkgconfig /)
+    file(CONFIGURE OUTPUT ${file} @ONLY CONTENT
 "prefix=\${pcfiledir}/@up@
 Name: semrover
 Description: streets of coloured points from labels, on any Vulkan device
@@ -27,4 +28,6 @@ Version: @PROJECT_VERSION@
 Cflags: -I\${prefix}/@CMAKE_INSTALL_INCLUDEDIR@
 Libs: -L\${pcfiledir}/.. -lsemrover
 ")
+endfunction()
+write_pkgconfig(semrover.pc ${CMAKE_INSTALL_LIBDIR})
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/semrover.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT library)

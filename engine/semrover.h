@@ -11,14 +11,15 @@
  * Threads: different contexts may be used at the same time; one context, with the worlds and chains on it, by one
  * thread at a time; a grid likewise. Callbacks run on the thread that calls, before the call returns, and must not call
  * the library but where it is said. Strings that the library returns are static. Everything that a call is given is
- * copied before it returns, but for what belongs to Vulkan.
+ * copied before it returns, but for what belongs to Vulkan, and models in memory (sr_file).
  *
  * Which calls block: sr_context_create (drivers), sr_world_create and sr_chain_create (load a model and compile
  * shaders: seconds, the first time), sr_world_step and sr_chain_step (for their budget), sr_world_flush (for the disk),
  * sr_world_draw, sr_chain_begin and sr_chain_take (for the device), sr_world_record and sr_world_submit (the first time
  * with a size, to compile).
  *
- * docs/embedding.md has a complete example.
+ * docs/embedding.md has a complete example. Chains, which refine frames, are in semrover_chain.h, which this header
+ * includes; OpenGL is in semrover_gl.h, which it does not.
  */
 #ifndef SEMROVER_H
 #define SEMROVER_H
@@ -80,6 +81,23 @@ typedef struct sr_device_info {
  * SR_ERR_PARTIAL when there are more. */
 sr_status sr_list_devices(sr_device_info* devices, uint32_t* count);
 
+/* Memory that the library asks an allocator of the host's for: of one buffer, for as long as it lives. */
+typedef struct sr_memory_request {
+    uint32_t struct_size;
+    uint32_t memory_type; /* index in VkPhysicalDeviceMemoryProperties */
+    uint64_t bytes;
+    uint64_t alignment; /* of the offset, bytes */
+    uint32_t mapped;    /* 1: the host's pointer to it is needed, for as long as it lives */
+    uint32_t reserved;
+} sr_memory_request;
+
+typedef struct sr_memory_piece {
+    void* memory;    /* VkDeviceMemory of the type that was asked for */
+    uint64_t offset; /* bytes */
+    void* mapped;    /* where the host sees the piece; NULL where `mapped` was 0 */
+    void* handle;    /* the allocator's own; the library only hands it back */
+} sr_memory_piece;
+
 /* A device that belongs to the host program. It outlives the context. For a context on it the library writes no file
  * and reads no variable of the environment. Vulkan 1.2 with timelineSemaphore and robustBufferAccess enabled: files
  * decide what shaders read. Vulkan cannot be asked which features a device was made with, so the host says it.
@@ -99,6 +117,13 @@ typedef struct sr_vulkan_device {
     uint32_t robust_buffer_access; /* 1: robustBufferAccess is enabled; anything else is refused */
     /* PFN_vkGetInstanceProcAddr of the host's, through which every call is found; NULL: the loader's */
     void (*get_instance_proc_addr)(void);
+    /* Instead of vkAllocateMemory, but for memory that semrover_gl.h shares. Both or neither. allocate_memory fills
+     * *piece, which is zero; a status beside SR_OK (SR_ERR_OUT_OF_MEMORY) ends the call that needed the memory, with
+     * that status. free_memory gets the piece back when the device has finished with it. */
+    sr_status (*allocate_memory)(void* user, const sr_memory_request* request, sr_memory_piece* piece);
+    void (*free_memory)(void* user, const sr_memory_piece* piece);
+    uint32_t external_memory_fd;    /* 1: VK_KHR_external_memory_fd is enabled, for semrover_gl.h */
+    uint32_t external_semaphore_fd; /* 1: VK_KHR_external_semaphore_fd is enabled, likewise */
 } sr_vulkan_device;
 
 typedef struct sr_context_desc {
@@ -112,6 +137,12 @@ typedef struct sr_context_desc {
      * another driver, is ignored. NULL: a context of our own keeps a file in $XDG_CACHE_HOME/semrover. */
     const void* pipeline_cache;
     uint64_t pipeline_cache_bytes;
+    /* VkAllocationCallbacks, copied, for every Vulkan object that the library makes, with a host's device too. Called
+     * from the threads that call the library, and from threads of the driver. NULL: the driver's own. */
+    const void* allocation_callbacks;
+    uint32_t share_by_fd; /* 1: enables what semrover_gl.h shares memory by, where there is it. Not with a host's
+                             device, which says by itself what it has */
+    uint32_t reserved;
 } sr_context_desc;
 
 /* desc may be NULL: the best device. On failure *context is NULL; sr_last_error(NULL, ..) says why. */
@@ -141,6 +172,12 @@ sr_status sr_context_get_pipeline_cache(sr_context* context, void* data, uint64_
 typedef struct sr_grid sr_grid;
 
 #define SR_NO_CELL 0xffffffffu
+#define SR_LABELS 20u
+
+/* The name of a label, "road", static, or NULL where there is no such label; and its colour in the palette: r, g, b,
+ * 0..255. SR_ERR_USAGE: a NULL, no such label. */
+const char* sr_label_name(uint32_t label);
+sr_status sr_label_color(uint32_t label, uint8_t rgb[3]);
 
 /* Cell (i, j, k) spans [i, i+1) x [j, j+1) x [k, k+1) voxel sizes, x forward, y left, z up. Coordinates: -2^20..2^20.
  * label: 0 road, 1 sidewalk, 2 building, ... 19 road-lane (docs/method.md, section 1.1); SR_NO_CELL: there is none. */
@@ -184,6 +221,14 @@ sr_status sr_grid_get_points(const sr_grid* grid, uint64_t first, uint64_t count
 
 typedef struct sr_world sr_world;
 
+/* A file of a model that the host has in memory. The bytes are not copied: they stay where they are, and as they are,
+ * until the world or chain is destroyed. */
+typedef struct sr_file {
+    const char* path; /* below the model's folder: "voxfield_transformer/config.json" */
+    const void* data;
+    uint64_t bytes;
+} sr_file;
+
 /* cells low <= (i, j) <= high, all k */
 typedef struct sr_window {
     int32_t low[2], high[2];
@@ -216,6 +261,8 @@ typedef struct sr_world_desc {
     double splat_radius;    /* metres; 0: from the distance of the points */
     uint32_t tiles_at_once; /* generated together; 0: as suits the device. Does not change the bytes */
     uint32_t reserved;
+    const sr_file* model_files; /* the model's folder in memory; `model` is NULL then, or a folder among them */
+    uint64_t model_file_count;
 } sr_world_desc;
 
 /* Loads the model and compiles shaders, so that no step does. context: outlives the world, and is not destroyed before
@@ -375,96 +422,9 @@ sr_status sr_world_submit(sr_world* world, const sr_draw_desc* draw, const sr_sy
  * not; there is more room from now on, and what was recorded before is no longer valid. */
 sr_status sr_world_check_draws(sr_world* world);
 
-/* ---- Chains: frames of one camera, each refined from its splat buffer and the frame before. ---- */
-
-typedef struct sr_chain sr_chain;
-
-/* where noise comes from (docs/method.md, section 6.2) */
-#define SR_NOISE_OF_MODEL 0u    /* one of the two below */
-#define SR_NOISE_FRESH 1u       /* each frame has its own, and holds nothing of the frame before (section 6.5) */
-#define SR_NOISE_ON_SURFACES 2u /* it stays on what both frames show, which flickers less: needs depth and camera */
-
-/* The frames have the bytes that `semrover refine` gives for the same buffers, model, seed, steps, noise and name of
- * the camera, on the same device and driver; budgets do not change them. */
-typedef struct sr_chain_desc {
-    uint32_t struct_size;
-    uint32_t steps; /* of denoising a frame; 0: as the model says */
-    const void* next;
-    const char* model;      /* a renderer of single frames: a folder, or a .safetensors file of the LDM layout */
-    uint32_t width, height; /* of the frames, pixels, 1..16384 */
-    uint64_t seed;
-    const char* camera; /* NULL: the only one. Cameras of a rig have a chain each, and their noise differs by name */
-    uint32_t noise;     /* SR_NOISE_.. */
-    uint32_t fp32;      /* 1: networks in fp32, with twice the memory */
-    void (*message)(void* user, const char* line); /* warnings, during sr_chain_create; NULL: none */
-    void* user;                                    /* for the callback */
-} sr_chain_desc;
-
-/* Loads the networks and compiles them. Where sr_context_desc.max_bytes has no room for all of it, they are loaded in
- * turn for every frame, to the same bytes. context: outlives the chain, and is not destroyed before it. On failure
- * *chain is NULL. SR_ERR_USAGE: a NULL, a size, a renderer of videos; SR_ERR_BAD_INPUT: the model's files;
- * SR_ERR_OUT_OF_MEMORY: with what it would take. */
-sr_status sr_chain_create(sr_context* context, const sr_chain_desc* desc, sr_chain** chain);
-void sr_chain_destroy(sr_chain* chain); /* gives up a frame that is at work; NULL is fine */
-
-/* Host memory, or a buffer of the host's that belongs to the context's queue family. One of the two. */
-typedef struct sr_source {
-    const void* memory;
-    void* buffer; /* VkBuffer with TRANSFER_SRC usage */
-    uint64_t buffer_offset;
-} sr_source;
-
-/* What the next frame is made of: splats of a world, drawn here without leaving the device, or buffers of the host's.
- * Row by row from the top, without padding. The camera is as in sr_draw_desc; it is needed for a world, and for noise
- * on surfaces. */
-typedef struct sr_frame_desc {
-    uint32_t struct_size;
-    uint32_t reserved;
-    const void* next;
-    sr_world* world;            /* of the same context, with splat_bytes; NULL: */
-    sr_source seen;             /* 4 bytes a pixel: r, g, b (sRGB, over black), and 255 where splats cover it, else 0 */
-    sr_source depth;            /* uint16 a pixel: millimetres along z, 0 for nothing. Not read with fresh noise */
-    double fx, fy, cx, cy;      /* pixels */
-    double world_to_camera[12]; /* [3, 4] row by row: a rotation and metres */
-} sr_frame_desc;
-
-/* Begins a frame: draws the world, or copies the buffers, which the host may change once it has returned. SR_ERR_USAGE:
- * a frame is at work, a world without splat_bytes or of another context, none or both of memory and buffer;
- * SR_ERR_BAD_INPUT: a camera that is not finite. */
-sr_status sr_chain_begin(sr_chain* chain, const sr_frame_desc* frame);
-
-/* Works on the frame for about budget_us microseconds and returns; 0: one piece of work. It stops when the next piece
- * is expected not to fit, but does one at least. Pieces are the encoder, each step of denoising, and the decoder. The
- * device is idle when it returns. *done (may be NULL): 1 when the frame is finished. After an error the frame is given
- * up, as by sr_chain_cancel. SR_ERR_USAGE: no frame has begun; SR_ERR_INTERNAL: numbers overflow in fp16, try fp32. */
-sr_status sr_chain_step(sr_chain* chain, uint64_t budget_us, uint32_t* done);
-
-/* The last finished frame, 4 bytes a pixel: r, g, b (sRGB), 255. An image has format R8G8B8A8_UNORM or _SRGB; the
- * target is else as for draws. Blocks until it is there. SR_ERR_USAGE: none is finished. */
-sr_status sr_chain_take(sr_chain* chain, const sr_target* target);
-
-/* Gives up the frame that is at work; the chain is as before sr_chain_begin. Without one it does nothing. */
-sr_status sr_chain_cancel(sr_chain* chain);
-
-/* The next frame has none before it, as the first one: after a cut. SR_ERR_USAGE: a frame is at work. */
-sr_status sr_chain_restart(sr_chain* chain);
-
-typedef struct sr_chain_info {
-    uint32_t struct_size;
-    uint32_t steps;        /* of denoising a frame */
-    uint32_t frames;       /* finished since the chain began; the number of the next one */
-    uint32_t noise;        /* SR_NOISE_FRESH, or SR_NOISE_ON_SURFACES where depth and camera are read */
-    uint32_t busy;         /* 1: a frame is at work */
-    uint32_t resident;     /* 1: both networks stay on the device */
-    uint64_t device_bytes; /* of the context at most, as planned; the drawing of a world comes to it */
-    double splat_radius;   /* metres, that the model was trained on, for sr_world_desc; 0: from the points' distance */
-    float visible_alpha;   /* from which splats cover a pixel, which `seen` says */
-    float reserved;
-} sr_chain_info;
-
-sr_status sr_chain_get_info(sr_chain* chain, sr_chain_info* info);
-
 #ifdef __cplusplus
 }
 #endif
+
+#include "semrover_chain.h"
 #endif

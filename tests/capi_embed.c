@@ -12,6 +12,19 @@ static void knows_its_version(void)
     CHECK(!strcmp(sr_status_name((sr_status)1234), "unknown"));
 }
 
+static void names_labels(void)
+{
+    uint8_t rgb[3] = {0, 0, 0};
+    uint32_t label;
+    CHECK(!strcmp(sr_label_name(0), "road") && !strcmp(sr_label_name(19), "road-lane"));
+    CHECK(!sr_label_name(SR_LABELS) && !sr_label_name(SR_NO_CELL));
+    for (label = 0; label < SR_LABELS; ++label)
+        CHECK(sr_label_name(label) && sr_label_color(label, rgb) == SR_OK);
+    CHECK(rgb[0] == 255 && rgb[1] == 255 && rgb[2] == 0);
+    CHECK(sr_label_color(SR_LABELS, rgb) == SR_ERR_USAGE && says(NULL, "there is no label 20"));
+    CHECK(sr_label_color(0, NULL) == SR_ERR_USAGE && says(NULL, "rgb is NULL"));
+}
+
 static void lists_devices(void)
 {
     uint32_t count = 0, room = 0;
@@ -142,6 +155,7 @@ int main(void)
 {
     sr_set_diagnostic_callback(print_line, stderr);
     knows_its_version();
+    names_labels();
     lists_devices();
     writes_no_more_than_an_old_program_has();
     refuses_wrong_descriptions();

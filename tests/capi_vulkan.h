@@ -110,7 +110,8 @@ static VkInstance make_instance(int validation)
     return instance;
 }
 
-static VkDevice make_device(VkPhysicalDevice physical)
+/* extension: enabled; NULL: none */
+static VkDevice make_device(VkPhysicalDevice physical, const char* extension)
 {
     const float priority = 1;
     VkPhysicalDeviceVulkan12Features features = {0};
@@ -129,11 +130,13 @@ static VkDevice make_device(VkPhysicalDevice physical)
     info.queueCreateInfoCount = 1;
     info.pQueueCreateInfos = &queue;
     info.pEnabledFeatures = &robust;
+    info.enabledExtensionCount = extension ? 1 : 0;
+    info.ppEnabledExtensionNames = &extension;
     CHECK(vkCreateDevice(physical, &info, NULL, &device) == VK_SUCCESS);
     return device;
 }
 
-static struct host make_host(void)
+static struct host make_host_with(const char* extension)
 {
     struct host host;
     uint32_t count = 1;
@@ -142,9 +145,14 @@ static struct host make_host(void)
     host.messenger = validation ? make_messenger(host.instance) : VK_NULL_HANDLE;
     vkEnumeratePhysicalDevices(host.instance, &count, &host.physical);
     CHECK(count == 1);
-    host.device = make_device(host.physical);
+    host.device = make_device(host.physical, extension);
     vkGetDeviceQueue(host.device, 0, 0, &host.queue);
     return host;
+}
+
+static inline struct host make_host(void)
+{
+    return make_host_with(NULL);
 }
 
 static void destroy_host(const struct host* host)

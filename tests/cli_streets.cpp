@@ -79,6 +79,30 @@ TEST(CliStreets, a_street_comes_with_mesh_grids_drive_and_pictures_that_agree)
     }
 }
 
+// A house that is plaster towards the street and brick behind is told as plaster, where nothing behind is in the grid.
+TEST(CliStreets, objects_have_the_colours_of_what_is_seen)
+{
+    const ScratchFolder folder;
+    const ProgramResult result = streets(folder / "street", "--seed 5 --seen");
+    ASSERT_EQ(result.code, 0) << result.err;
+    const auto objects = read_objects(folder / "street/objects.json");
+    const auto truth = read_grid(folder / "street/truth.sgrid");
+    ASSERT_TRUE(objects && truth);
+    std::vector<SceneObject> seen = *objects;
+    for (SceneObject& object : seen)
+        object.tint.reset();
+    ASSERT_TRUE(tint_objects(seen, *truth));
+    size_t tinted = 0;
+    for (size_t o = 0; o < seen.size(); ++o) {
+        ASSERT_EQ(bool(seen[o].tint), bool((*objects)[o].tint)) << o;
+        for (size_t c = 0; seen[o].tint && c < 3; ++c)
+            EXPECT_NEAR((*seen[o].tint)[c], (*(*objects)[o].tint)[c], 0.001) << o;
+        tinted += bool(seen[o].tint);
+    }
+    EXPECT_GT(tinted, 10u);
+    EXPECT_LT(tinted, seen.size()); // some things are out of sight
+}
+
 double mean_level(const Path& picture)
 {
     const auto image = read_png_rgb8(picture);

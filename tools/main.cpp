@@ -25,5 +25,8 @@ int main(int argc, char** argv)
          add_tile,
          {"streets", "semrover-scenes", "make up a street: mesh, grids, a drive, and pictures to train with"},
          {"verify", "semrover-eval", "run golden cases: what public reference code gives for known inputs"},
+         {"view", "semrover-view", "look at a street, fly through it, paint it, refine a view",
+          "it needs the packages libglfw3-dev and libimgui-dev (tools/setup --view); then cmake --preset release && "
+          "cmake --build --preset release --target programs builds it"},
          {"voxelize", "semrover-scenes", "a textured mesh as a grid of labelled cells and coloured points"}});
 }

@@ -62,6 +62,15 @@ void write_struct(const T& known, void* to, uint32_t size)
     std::memcpy(static_cast<char*>(to) + 4, reinterpret_cast<const char*>(&known) + 4, count > 4 ? count - 4 : 0);
 }
 
+// as much as there is room for, and zeros
+template <size_t N>
+void copy_text(char (&to)[N], const std::string& text)
+{
+    const size_t count = std::min(text.size(), N - 1);
+    std::memcpy(to, text.data(), count);
+    std::memset(to + count, 0, N - count);
+}
+
 // the caller's structure for a result. name: of the call
 template <typename T>
 Status write_result(const T& known, T* to, const char* name)

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // chains: frames of splat buffers, one after the other
 #include "engine/capi/exchange.h"
+#include "engine/capi/model_files.h"
 
 using namespace semrover;
 using namespace semrover::capi;
@@ -33,16 +34,14 @@ Result<std::optional<FrameNoise>> noise_of(uint32_t noise)
     }
 }
 
-Result<RefinementOptions> options_of(const sr_chain_desc& d)
+Result<RefinementOptions> options_of(const sr_chain_desc& d, std::unique_ptr<MemoryFolder>& folder)
 {
-    if (!d.model)
-        return fail(ErrorCode::usage, "sr_chain_desc: model is NULL");
     if (d.steps > 1'000'000)
         return fail(ErrorCode::usage, "sr_chain_desc: {} steps", d.steps);
     if (d.fp32 > 1)
         return fail(ErrorCode::usage, "sr_chain_desc: fp32 is {}, expected 0 or 1", d.fp32);
     RefinementOptions o;
-    o.model = d.model;
+    SR_TRY(o.model, model_path(d.model, d.model_files, d.model_file_count, "sr_chain_desc", folder));
     if (d.steps)
         o.steps = int(d.steps);
     o.seed = d.seed;
@@ -59,7 +58,7 @@ Result<std::unique_ptr<sr_chain>> make_chain(sr_context& context, const sr_chain
     chain->context = &context;
     chain->size = {d.width, d.height};
     SR_CHECK(check_size(chain->size, "sr_chain_desc"));
-    SR_TRY(RefinementOptions options, options_of(d));
+    SR_TRY(RefinementOptions options, options_of(d, chain->files));
     JobCallbacks callbacks;
     if (d.message)
         callbacks.warning = [&d](std::string_view line) { d.message(d.user, std::string(line).c_str()); };
@@ -221,4 +220,4 @@ sr_status sr_chain_get_info(sr_chain* chain, sr_chain_info* info)
 } // extern "C"
 
 static_assert(sizeof(sr_source) == 24 && sizeof(sr_frame_desc) == 200);
-static_assert(sizeof(sr_chain_desc) == 72 && sizeof(sr_chain_info) == 48);
+static_assert(sizeof(sr_chain_desc) == 88 && sizeof(sr_chain_info) == 48);

@@ -15,12 +15,6 @@ namespace {
 // of calls without a context; a thread sees its own
 thread_local std::string thread_error;
 
-template <size_t N>
-void copy_text(char (&to)[N], const std::string& text)
-{
-    std::memcpy(to, text.data(), std::min(text.size(), N - 1)); // the rest is zero
-}
-
 sr_device_info info_of(const DeviceSummary& d)
 {
     sr_device_info info{};
@@ -34,6 +28,26 @@ sr_device_info info_of(const DeviceSummary& d)
     return info;
 }
 
+// the host's allocator as Buffer calls it
+MemorySource memory_source(const sr_vulkan_device& v)
+{
+    MemorySource source;
+    if (v.allocate_memory)
+        source.allocate = [=](const MemoryRequest& r) -> Result<MemoryPiece> {
+            const sr_memory_request request{sizeof request, r.type, r.bytes, r.alignment, r.mapped, 0};
+            sr_memory_piece piece{};
+            if (const sr_status status = v.allocate_memory(v.user, &request, &piece); status != SR_OK)
+                return fail(ErrorCode(status), "the host's allocator returned {}", sr_status_name(status));
+            return MemoryPiece{static_cast<VkDeviceMemory>(piece.memory), piece.offset, piece.mapped, piece.handle};
+        };
+    if (v.free_memory)
+        source.release = [=](const MemoryPiece& p) {
+            const sr_memory_piece piece{p.memory, p.offset, p.mapped, p.handle};
+            v.free_memory(v.user, &piece);
+        };
+    return source;
+}
+
 Result<std::unique_ptr<Device>> adopt(const sr_vulkan_device& v, const DeviceOptions& options)
 {
     HostDevice host;
@@ -45,6 +59,8 @@ Result<std::unique_ptr<Device>> adopt(const sr_vulkan_device& v, const DeviceOpt
     host.queue_family = v.queue_family;
     host.float16 = v.shader_float16;
     host.robust_buffer_access = v.robust_buffer_access == 1;
+    host.sharing = {v.external_memory_fd == 1, v.external_semaphore_fd == 1};
+    host.memory = memory_source(v);
     if (v.lock_queue)
         host.lock = [=] { v.lock_queue(v.user); };
     if (v.unlock_queue)
@@ -58,13 +74,18 @@ Result<std::unique_ptr<sr_context>> make_context(const sr_context_desc& desc)
     options.max_bytes = desc.max_bytes;
     options.validation = desc.validation;
     options.select = desc.device ? desc.device : "";
+    options.allocation = static_cast<const VkAllocationCallbacks*>(desc.allocation_callbacks);
+    options.share_by_fd = desc.share_by_fd == 1;
+    if (desc.share_by_fd > 1 || desc.reserved)
+        return fail(ErrorCode::usage, "sr_context_desc: share_by_fd is 0 or 1, reserved 0");
     if (!desc.pipeline_cache != !desc.pipeline_cache_bytes)
         return fail(ErrorCode::usage, "sr_context_desc: pipeline_cache and its bytes come together");
     options.pipeline_cache = {static_cast<const std::byte*>(desc.pipeline_cache), size_t(desc.pipeline_cache_bytes)};
     auto context = std::make_unique<sr_context>();
     if (desc.vulkan) {
-        if (desc.device || desc.validation)
-            return fail(ErrorCode::usage, "sr_context_desc: device and validation do not go with a host's device");
+        if (desc.device || desc.validation || desc.share_by_fd)
+            return fail(ErrorCode::usage,
+                        "sr_context_desc: device, validation and share_by_fd do not go with a host's device");
         SR_TRY(const sr_vulkan_device vulkan, read_struct(desc.vulkan, "sr_vulkan_device"));
         SR_TRY(context->device, adopt(vulkan, options));
     } else {
@@ -236,6 +257,7 @@ sr_status sr_context_get_pipeline_cache(sr_context* context, void* data, uint64_
 
 // the layout that programs were built against: a change here is a new ABI
 static_assert(sizeof(sr_device_info) == 816 && offsetof(sr_device_info, memory_bytes) == 808);
-static_assert(sizeof(sr_vulkan_device) == 88 && offsetof(sr_vulkan_device, robust_buffer_access) == 76);
-static_assert(sizeof(sr_context_desc) == 56 && offsetof(sr_context_desc, max_bytes) == 32);
+static_assert(sizeof(sr_vulkan_device) == 112 && offsetof(sr_vulkan_device, robust_buffer_access) == 76);
+static_assert(sizeof(sr_context_desc) == 72 && offsetof(sr_context_desc, max_bytes) == 32);
 static_assert(sizeof(sr_memory_info) == 32);
+static_assert(sizeof(sr_memory_request) == 32 && sizeof(sr_memory_piece) == 32);

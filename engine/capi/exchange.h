@@ -39,6 +39,11 @@ Status hand_over(sr_context& context, const Slot& pixels, const ImageSize& size,
 // buffer. name: of the member
 Status take_in(sr_context& context, const sr_source& from, const Slot& to, uint64_t bytes, const char* name);
 
+// What a camera sees, on the device, until the next draw of the world: at once, or by commands that are being recorded.
+// Targets are not looked at. Errors: as sr_world_draw has them. name: of the call
+Result<SplatSlots> draw_splats(sr_world& world, const sr_draw_desc& draw, const char* name);
+Result<SplatSlots> record_splats(sr_world& world, const sr_draw_desc& draw, VkCommandBuffer commands, const char* name);
+
 // Errors: usage for a world without splat_bytes. name: of the call
 Result<const SplatPool*> splats_of(const sr_world& world, const char* name);
 

@@ -6,6 +6,7 @@
 #include "engine/job/frame_chain.h"
 #include "engine/job/world.h"
 #include "engine/semrover.h"
+#include "runtime/base/memory_files.h"
 #include "runtime/device/device.h"
 #include "runtime/device/host_copies.h"
 
@@ -15,6 +16,7 @@ struct sr_context {
     semrover::DeviceSummary summary;
     std::string error;
     std::unique_ptr<semrover::HostCopies> copies; // from the first call that needs them on
+    uint64_t worlds = 0;                          // made so far
 };
 
 struct sr_grid {
@@ -23,6 +25,8 @@ struct sr_grid {
 
 struct sr_world {
     sr_context* context = nullptr;
+    uint64_t number = 0;                           // of the context's worlds, from 1 on
+    std::unique_ptr<semrover::MemoryFolder> files; // of its model, where the host has them in memory
     semrover::GenerationSettings settings;
     std::unique_ptr<semrover::World> world;
     semrover::capi::SizedRasterizer pixels;                 // of chains that draw
@@ -32,6 +36,7 @@ struct sr_world {
 
 struct sr_chain {
     sr_context* context = nullptr;
+    std::unique_ptr<semrover::MemoryFolder> files; // of its model, where the host has them in memory
     semrover::ImageSize size;
     std::unique_ptr<semrover::FrameChain> chain;
 };

@@ -24,18 +24,9 @@ Status record(sr_world& world, const sr_draw_desc& d, VkCommandBuffer commands, 
         return fail(ErrorCode::usage, "{}: the context is not on a device of the host's", name);
     if (d.reserved)
         return fail(ErrorCode::usage, "sr_draw_desc: reserved is not 0");
-    SR_TRY(const SplatPool* splats, splats_of(world, name));
-    const ImageSize size{d.width, d.height};
-    SR_CHECK(check_size(size, "sr_draw_desc"));
     SR_CHECK(check_targets(d));
-    const bool tested = d.depth_test.image;
-    SR_TRY(Rasterizer * rasterizer, world.recorded[tested].of(device, splats->scene(), size, {.depth_tested = tested}));
-    if (tested) {
-        SR_TRY(const HostFloats depth, host_depth(d.depth_test, size));
-        record_host_floats(device, commands, depth, rasterizer->z_buffer().slice());
-    }
-    SR_CHECK(rasterizer->record(commands, pinhole_camera(d, size), z_scale(d.depth_test)));
-    const SplatSlots images = rasterizer->images(0);
+    SR_TRY(const SplatSlots images, record_splats(world, d, commands, name));
+    const ImageSize size{d.width, d.height};
     record_host_target(device, commands, images.color.slice(), host_target(d.color, size));
     record_host_target(device, commands, images.surface.slice(), host_target(d.normal, size));
     record_host_target(device, commands, images.depth.slice(), host_target(d.depth, size));
@@ -72,6 +63,26 @@ Status submit(sr_world& world, const sr_draw_desc& d, const sr_sync& sync)
 }
 
 } // namespace
+
+namespace semrover::capi {
+
+Result<SplatSlots> record_splats(sr_world& world, const sr_draw_desc& d, VkCommandBuffer commands, const char* name)
+{
+    Device& device = *world.context->device;
+    SR_TRY(const SplatPool* splats, splats_of(world, name));
+    const ImageSize size{d.width, d.height};
+    SR_CHECK(check_size(size, "sr_draw_desc"));
+    const bool tested = d.depth_test.image;
+    SR_TRY(Rasterizer * rasterizer, world.recorded[tested].of(device, splats->scene(), size, {.depth_tested = tested}));
+    if (tested) {
+        SR_TRY(const HostFloats depth, host_depth(d.depth_test, size));
+        record_host_floats(device, commands, depth, rasterizer->z_buffer().slice());
+    }
+    SR_CHECK(rasterizer->record(commands, pinhole_camera(d, size), z_scale(d.depth_test)));
+    return rasterizer->images(0);
+}
+
+} // namespace semrover::capi
 
 extern "C" {
 

@@ -16,7 +16,22 @@ sr_array array_of(const Slot& slot)
 
 Status draw_world(sr_world& world, const sr_draw_desc& d)
 {
-    SR_TRY(const SplatPool* splats, splats_of(world, "sr_world_draw"));
+    SR_TRY(const SplatSlots images, draw_splats(world, d, "sr_world_draw"));
+    const ImageSize size{d.width, d.height};
+    sr_context& context = *world.context;
+    SR_CHECK(hand_over(context, images.color, size, d.color));
+    SR_CHECK(hand_over(context, images.surface, size, d.normal));
+    SR_CHECK(hand_over(context, images.depth, size, d.depth));
+    return hand_over(context, images.ids, size, d.label);
+}
+
+} // namespace
+
+namespace semrover::capi {
+
+Result<SplatSlots> draw_splats(sr_world& world, const sr_draw_desc& d, const char* name)
+{
+    SR_TRY(const SplatPool* splats, splats_of(world, name));
     const ImageSize size{d.width, d.height};
     SR_CHECK(check_size(size, "sr_draw_desc"));
     sr_context& context = *world.context;
@@ -31,14 +46,10 @@ Status draw_world(sr_world& world, const sr_draw_desc& d)
     }
     const SplatCamera camera = pinhole_camera(d, size);
     SR_CHECK(rasterizer->draw({&camera, 1}).map([](uint32_t) {}));
-    const SplatSlots images = rasterizer->images(0);
-    SR_CHECK(hand_over(context, images.color, size, d.color));
-    SR_CHECK(hand_over(context, images.surface, size, d.normal));
-    SR_CHECK(hand_over(context, images.depth, size, d.depth));
-    return hand_over(context, images.ids, size, d.label);
+    return rasterizer->images(0);
 }
 
-} // namespace
+} // namespace semrover::capi
 
 extern "C" {
 

@@ -3,6 +3,7 @@
 // worlds: opened, walked through, edited
 #include "engine/capi/edits.h"
 #include "engine/capi/exchange.h"
+#include "engine/capi/model_files.h"
 #include "engine/scene/cell_reach.h"
 #include "engine/scene/tiles.h"
 
@@ -11,14 +12,12 @@ using namespace semrover::capi;
 
 namespace {
 
-Result<GenerationSettings> settings_of(const sr_world_desc& d)
+Result<GenerationSettings> settings_of(const sr_world_desc& d, std::unique_ptr<MemoryFolder>& folder)
 {
-    if (!d.model)
-        return fail(ErrorCode::usage, "sr_world_desc: model is NULL");
     if (d.steps > 1'000'000)
         return fail(ErrorCode::usage, "sr_world_desc: {} steps", d.steps);
     GenerationOptions o;
-    o.model = d.model;
+    SR_TRY(o.model, model_path(d.model, d.model_files, d.model_file_count, "sr_world_desc", folder));
     if (d.steps)
         o.steps = int(d.steps);
     o.tile_size = d.tile_size == 0 ? kUsualTileSize : d.tile_size;
@@ -61,7 +60,8 @@ Result<std::unique_ptr<sr_world>> make_world(sr_context& context, const sr_world
 {
     auto world = std::make_unique<sr_world>();
     world->context = &context;
-    SR_TRY(world->settings, settings_of(d));
+    world->number = ++context.worlds;
+    SR_TRY(world->settings, settings_of(d, world->files));
     SR_TRY(auto labels, labels_of(d, world->settings.model.config.voxel_size));
     WorldRequest request{.settings = world->settings, .seed = d.seed};
     if (d.objects) {
@@ -165,8 +165,9 @@ sr_status sr_world_focus(sr_world* world, const double position[3], const double
 sr_status sr_world_step(sr_world* world, uint64_t budget_us, uint32_t* done)
 {
     return with_world(world, "sr_world_step", [&]() -> Status {
-        SR_TRY(const bool all, world->world->step(timed_budget(budget_us)));
         Device& device = *world->context->device;
+        SR_CHECK(device.wait(device.last_ticket())); // draws that nobody waited for
+        SR_TRY(const bool all, world->world->step(timed_budget(budget_us)));
         SR_CHECK(device.wait(device.last_ticket())); // splats that were copied last
         if (done)
             *done = all;
@@ -178,6 +179,7 @@ sr_status sr_world_edit(sr_world* world, const sr_cell* cells, uint64_t count)
 {
     return with_world(world, "sr_world_edit", [&]() -> Status {
         SR_TRY(const LabelEdits edits, edits_of(cells, count, "sr_world_edit"));
+        SR_CHECK(world->context->device->wait(world->context->device->last_ticket())); // likewise
         return world->world->edit(edits);
     });
 }
@@ -206,4 +208,4 @@ sr_status sr_world_flush(sr_world* world)
 
 } // extern "C"
 
-static_assert(sizeof(sr_world_desc) == 128 && sizeof(sr_world_info) == 88);
+static_assert(sizeof(sr_world_desc) == 144 && sizeof(sr_world_info) == 88);

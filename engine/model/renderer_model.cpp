@@ -16,8 +16,6 @@ namespace semrover {
 
 namespace {
 
-namespace fs = std::filesystem;
-
 template <typename Config>
 Result<Config> read_config(const Path& path, Result<Config> (*parse)(const Json&))
 {
@@ -33,11 +31,7 @@ Result<Config> read_config(const Path& path, Result<Config> (*parse)(const Json&
 // a folder without the component: what else lies there may say what was meant
 tl::unexpected<Error> missing_component(const Path& folder, std::string_view what, std::string_view expected)
 {
-    std::vector<Path> files;
-    std::error_code ignored;
-    for (const auto& entry : fs::directory_iterator(folder, ignored))
-        files.push_back(entry.path());
-    std::ranges::sort(files);
+    const std::vector<Path> files = list_files(folder).value_or(std::vector<Path>{});
     for (const Path& file : files)
         for (const char* pickle : {".ckpt", ".bin", ".pt", ".pth"})
             if (file.extension() == pickle)
@@ -286,8 +280,7 @@ Result<RendererModel> RendererModel::read(const Path& path, std::optional<Sample
 {
     RendererModel m;
     m.folder = path;
-    std::error_code ignored;
-    if (fs::is_directory(path, ignored))
+    if (is_folder(path))
         SR_CHECK(read_folder(m));
     else
         SR_CHECK(read_ldm(m));

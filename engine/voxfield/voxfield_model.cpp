@@ -9,8 +9,6 @@ namespace semrover {
 
 namespace {
 
-namespace fs = std::filesystem;
-
 Status read_defaults(const Json& index, VoxfieldDefaults& d)
 {
     const Json defaults = index.value("defaults", Json::object());
@@ -48,21 +46,21 @@ Result<VoxfieldModel> VoxfieldModel::open(const Path& folder, std::optional<Samp
     VoxfieldModel m;
     m.folder = folder;
     m.transformer = folder / "voxfield_transformer";
-    if (!fs::exists(m.transformer) && fs::exists(folder / "config.json"))
+    if (!is_there(m.transformer) && is_there(folder / "config.json"))
         m.transformer = folder; // the component itself was given
-    if (!fs::exists(m.transformer / "config.json"))
+    if (!is_there(m.transformer / "config.json"))
         return fail(ErrorCode::bad_input,
                     "'{}' has no voxfield_transformer/config.json: a model is a folder in the diffusers layout",
                     folder.string());
     SR_TRY(m.config, read_transformer_config(m.transformer));
     m.warnings = m.config.warnings;
-    if (fs::exists(folder / "model_index.json")) {
+    if (is_there(folder / "model_index.json")) {
         SR_TRY(const Json index, read_json(folder / "model_index.json"));
         SR_CHECK(read_defaults(index, m.defaults));
     }
     const Path scheduler = folder / "voxfield_scheduler" / "scheduler_config.json";
     m.scheduler = method_scheduler(sampler);
-    if (fs::exists(scheduler)) {
+    if (is_there(scheduler)) {
         SR_TRY(m.scheduler, read_scheduler_config(scheduler, m.warnings, sampler));
     }
     if (m.scheduler.prediction != Prediction::sample)

@@ -2,10 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/base/file.h"
 
+#include "runtime/base/memory_files.h"
 #include "runtime/base/quote.h"
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <cstring>
 #include <fcntl.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
@@ -61,14 +64,36 @@ Result<OpenFile> open_regular(const Path& path)
     return OpenFile{std::move(descriptor), static_cast<uint64_t>(status.st_size)};
 }
 
+Status check_length(const Path& path, uint64_t bytes, uint64_t max_bytes)
+{
+    if (bytes > max_bytes)
+        return fail(ErrorCode::bad_input, "cannot read {}: expected at most {} bytes, found {}", quote_path(path),
+                    max_bytes, bytes);
+    return {};
+}
+
+// of a folder in memory
+Result<std::span<const std::byte>> bytes_of(const MemoryEntry& entry, const Path& path)
+{
+    if (entry.folder)
+        return fail(ErrorCode::bad_input, "cannot read {}: expected a file, found a folder", quote_path(path));
+    return entry.bytes;
+}
+
 template <typename Buffer>
 Result<Buffer> read_whole(const Path& path, uint64_t max_bytes)
 {
-    SR_TRY(const OpenFile file, open_regular(path));
-    if (file.size > max_bytes)
-        return fail(ErrorCode::bad_input, "cannot read {}: expected at most {} bytes, found {}", quote_path(path),
-                    max_bytes, file.size);
     Buffer buffer;
+    if (const auto entry = find_in_memory(path)) {
+        SR_TRY(const std::span<const std::byte> bytes, bytes_of(*entry, path));
+        SR_CHECK(check_length(path, bytes.size(), max_bytes));
+        buffer.resize(bytes.size());
+        if (!bytes.empty())
+            std::memcpy(buffer.data(), bytes.data(), bytes.size());
+        return buffer;
+    }
+    SR_TRY(const OpenFile file, open_regular(path));
+    SR_CHECK(check_length(path, file.size, max_bytes));
     buffer.resize(file.size);
     for (uint64_t done = 0; done < file.size;) {
         const ssize_t n = ::read(file.descriptor.get(), buffer.data() + done, file.size - done);
@@ -109,19 +134,38 @@ tl::unexpected<Error> cannot_write(const Path& path, int error)
 bool is_there(const Path& path)
 {
     std::error_code ignored;
-    return std::filesystem::exists(path, ignored);
+    return find_in_memory(path) || std::filesystem::exists(path, ignored);
 }
 
 bool is_file(const Path& path)
 {
     std::error_code ignored;
+    if (const auto entry = find_in_memory(path))
+        return !entry->folder;
     return std::filesystem::is_regular_file(path, ignored);
 }
 
 bool is_folder(const Path& path)
 {
     std::error_code ignored;
+    if (const auto entry = find_in_memory(path))
+        return entry->folder;
     return std::filesystem::is_directory(path, ignored);
+}
+
+Result<std::vector<Path>> list_files(const Path& folder)
+{
+    if (find_in_memory(folder))
+        return list_in_memory(folder);
+    std::vector<Path> files;
+    std::error_code error;
+    for (const auto& entry : std::filesystem::directory_iterator(folder, error))
+        if (is_file(entry.path()))
+            files.push_back(entry.path());
+    if (error)
+        return fail(ErrorCode::bad_input, "cannot list {}: {}", quote_path(folder), error.message());
+    std::ranges::sort(files);
+    return files;
 }
 
 Status make_folder(const Path& path)
@@ -266,8 +310,15 @@ void remove_temporary_files(const Path& folder)
 
 Result<MappedFile> MappedFile::open(const Path& path)
 {
-    SR_TRY(const OpenFile file, open_regular(path));
     MappedFile mapped;
+    if (const auto entry = find_in_memory(path)) {
+        SR_TRY(const std::span<const std::byte> bytes, bytes_of(*entry, path));
+        mapped.data_ = bytes.data();
+        mapped.size_ = bytes.size();
+        mapped.borrowed_ = true;
+        return mapped;
+    }
+    SR_TRY(const OpenFile file, open_regular(path));
     if (file.size == 0) // mmap refuses length 0
         return mapped;
     void* data = ::mmap(nullptr, file.size, PROT_READ, MAP_PRIVATE, file.descriptor.get(), 0);
@@ -280,7 +331,8 @@ Result<MappedFile> MappedFile::open(const Path& path)
 }
 
 MappedFile::MappedFile(MappedFile&& other) noexcept
-    : data_(std::exchange(other.data_, nullptr)), size_(std::exchange(other.size_, 0))
+    : data_(std::exchange(other.data_, nullptr)), size_(std::exchange(other.size_, 0)),
+      borrowed_(std::exchange(other.borrowed_, false))
 {
 }
 
@@ -290,6 +342,7 @@ MappedFile& MappedFile::operator=(MappedFile&& other) noexcept
         unmap();
         data_ = std::exchange(other.data_, nullptr);
         size_ = std::exchange(other.size_, 0);
+        borrowed_ = std::exchange(other.borrowed_, false);
     }
     return *this;
 }
@@ -301,7 +354,7 @@ MappedFile::~MappedFile()
 
 void MappedFile::unmap() noexcept
 {
-    if (data_)
+    if (data_ && !borrowed_)
         ::munmap(const_cast<std::byte*>(data_), size_);
 }
 

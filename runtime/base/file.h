@@ -18,10 +18,15 @@ namespace semrover {
 
 using Path = std::filesystem::path;
 
+// Paths are of the disk, or of a folder in memory (memory_files.h), which can be read and not written.
+
 // false when it is absent, or cannot be examined
 bool is_there(const Path& path);
 bool is_file(const Path& path); // a regular one, or a link to one
 bool is_folder(const Path& path);
+
+// The regular files directly in a folder, sorted. bad_input: it cannot be listed.
+Result<std::vector<Path>> list_files(const Path& folder);
 
 // Makes a folder and those above it; it may exist.
 Status make_folder(const Path& path);
@@ -78,7 +83,7 @@ class MappedFile {
     MappedFile& operator=(MappedFile&& other) noexcept;
     ~MappedFile();
 
-    // page aligned; empty for an empty file
+    // empty for an empty file
     std::span<const std::byte> bytes() const { return {data_, size_}; }
 
   private:
@@ -86,6 +91,7 @@ class MappedFile {
 
     const std::byte* data_ = nullptr;
     size_t size_ = 0;
+    bool borrowed_ = false; // of a folder in memory
 };
 
 } // namespace semrover

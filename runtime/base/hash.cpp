@@ -42,14 +42,7 @@ Result<uint64_t> hash_file(const Path& path)
 
 Result<uint64_t> hash_folder(const Path& folder)
 {
-    std::vector<Path> files;
-    std::error_code error;
-    for (const auto& entry : std::filesystem::directory_iterator(folder, error))
-        if (entry.is_regular_file())
-            files.push_back(entry.path());
-    if (error)
-        return fail(ErrorCode::bad_input, "cannot list '{}': {}", folder.string(), error.message());
-    std::sort(files.begin(), files.end());
+    SR_TRY(const std::vector<Path> files, list_files(folder));
     Hash hash;
     for (const Path& path : files) {
         SR_TRY(const MappedFile file, MappedFile::open(path));

@@ -149,18 +149,17 @@ Result<SafetensorsSet> SafetensorsSet::open_index(const Path& path, const Safete
 Result<SafetensorsSet> SafetensorsSet::open_folder(const Path& folder, std::string_view base,
                                                    const SafetensorsLimits& limits)
 {
-    std::error_code ignored;
-    if (!std::filesystem::is_directory(folder, ignored))
+    if (!is_folder(folder))
         return fail(ErrorCode::bad_input, "cannot read weights: {} is no folder", quote_path(folder));
     for (const char* suffix :
          {".fp16.safetensors", ".safetensors", ".safetensors.index.fp16.json", ".safetensors.index.json"}) {
         const Path path = folder / (std::string(base) + suffix);
-        if (std::filesystem::exists(path, ignored))
+        if (is_there(path))
             return open(path, limits);
     }
-    for (const auto& entry : std::filesystem::directory_iterator(folder, ignored))
-        if (is_pickle(entry.path()))
-            return refuse_pickle(entry.path());
+    for (const Path& file : list_files(folder).value_or(std::vector<Path>{}))
+        if (is_pickle(file))
+            return refuse_pickle(file);
     return fail(ErrorCode::bad_input,
                 "{}: expected {}.safetensors, .fp16.safetensors or .safetensors.index.json, found none",
                 quote_path(folder), base);

@@ -145,6 +145,18 @@ void record_update(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer to,
     barrier(vk, commands, kTransfer, VK_ACCESS_TRANSFER_WRITE_BIT, kCompute | kTransfer, kShader | kCopy);
 }
 
+void record_share(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer buffer, uint32_t queue_family)
+{
+    auto release = vk_struct<VkBufferMemoryBarrier>(VK_STRUCTURE_TYPE_BUFFER_MEMORY_BARRIER);
+    release.srcAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT;
+    release.srcQueueFamilyIndex = queue_family;
+    release.dstQueueFamilyIndex = VK_QUEUE_FAMILY_EXTERNAL;
+    release.buffer = buffer;
+    release.size = VK_WHOLE_SIZE;
+    vk.CmdPipelineBarrier(commands, kTransfer, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, 0, 0, nullptr, 1, &release, 0,
+                          nullptr);
+}
+
 void record_clear(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer buffer, uint64_t at, uint64_t bytes)
 {
     vk.CmdFillBuffer(commands, buffer, at, bytes, 0);

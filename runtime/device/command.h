@@ -38,6 +38,8 @@ void record_entry_barrier(const VulkanCalls& vk, VkCommandBuffer commands);
 // bytes of the command itself: a multiple of 4, at most 65536; with the barrier that lets shaders follow
 void record_update(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer to, uint64_t at,
                    std::span<const std::byte> bytes);
+// a buffer goes to another API (MemoryKind::shared), with all that was written to it; what overwrites it takes it back
+void record_share(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer buffer, uint32_t queue_family);
 void record_clear(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer buffer, uint64_t at, uint64_t bytes);
 
 } // namespace semrover

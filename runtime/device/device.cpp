@@ -9,6 +9,7 @@
 #include "runtime/device/physical_device.h"
 #include "runtime/device/pipeline.h"
 #include "runtime/device/profile.h"
+#include "runtime/device/sharing.h"
 #include "runtime/device/staging.h"
 #include "runtime/graph/kernel.h"
 
@@ -85,6 +86,7 @@ Device::Device() = default;
 Result<std::unique_ptr<Device>> Device::create(const DeviceOptions& options)
 {
     std::unique_ptr<Device> d(new Device());
+    d->take_allocation(options);
     SR_CHECK(d->create_instance(options));
     SR_TRY(const auto physical, physical_devices(d->vk_, d->instance_));
     std::vector<DeviceSummary> summaries;
@@ -92,7 +94,7 @@ Result<std::unique_ptr<Device>> Device::create(const DeviceOptions& options)
         summaries.push_back(summarize(d->vk_, d->instance_, physical[i], uint32_t(i)));
     SR_TRY(d->index_, select_device(summaries, options.select));
     d->physical_ = physical[d->index_];
-    SR_CHECK(d->create_device(summaries[d->index_].limits.matrix.m != 0));
+    SR_CHECK(d->create_device(options, summaries[d->index_].limits.matrix.m != 0));
     SR_CHECK(d->finish(options));
     return d;
 }
@@ -103,6 +105,7 @@ Result<std::unique_ptr<Device>> Device::adopt(const HostDevice& host, const Devi
         return fail(ErrorCode::usage, "a host device needs instance, physical device, device and queue");
     std::unique_ptr<Device> d(new Device());
     d->owned_ = false;
+    d->take_allocation(options);
     SR_CHECK(d->vk_.load_instance(host.get_instance_proc_addr, host.instance));
     SR_CHECK(d->vk_.load_device(host.device));
     if (!is_compute_family(d->vk_, host.physical, host.queue_family))
@@ -112,6 +115,8 @@ Result<std::unique_ptr<Device>> Device::adopt(const HostDevice& host, const Devi
                                       "shaders read");
     if (bool(host.lock) != bool(host.unlock))
         return fail(ErrorCode::usage, "a host device needs both of lock and unlock, or neither");
+    if (bool(host.memory.allocate) != bool(host.memory.release))
+        return fail(ErrorCode::usage, "a host device needs both of allocate_memory and free_memory, or neither");
     d->instance_ = host.instance;
     d->physical_ = host.physical;
     d->device_ = host.device;
@@ -119,6 +124,8 @@ Result<std::unique_ptr<Device>> Device::adopt(const HostDevice& host, const Devi
     d->queue_family_ = host.queue_family;
     d->lock_ = host.lock;
     d->unlock_ = host.unlock;
+    d->memory_source_ = host.memory;
+    d->sharing_ = host.sharing;
     SR_CHECK(d->finish(options));
     // what the hardware could do is not what the host asked for
     d->limits_.needs_supported &= ~uint32_t(kNeedsCooperativeMatrix);
@@ -130,7 +137,7 @@ Result<std::unique_ptr<Device>> Device::adopt(const HostDevice& host, const Devi
 Status Device::create_instance(const DeviceOptions& options)
 {
     const bool validation = options.validation || !environment("SEMROVER_VALIDATION").empty();
-    SR_TRY(instance_, semrover::create_instance(validation));
+    SR_TRY(instance_, semrover::create_instance(validation, vk_.allocator()));
     SR_CHECK(vk_.load_instance(nullptr, instance_));
     if (!validation)
         return {};
@@ -141,11 +148,11 @@ Status Device::create_instance(const DeviceOptions& options)
     info.pfnUserCallback = on_validation;
     const auto create = reinterpret_cast<PFN_vkCreateDebugUtilsMessengerEXT>(
         vk_.GetInstanceProcAddr(instance_, "vkCreateDebugUtilsMessengerEXT"));
-    SR_VK(create(instance_, &info, nullptr, &messenger_));
+    SR_VK(create(instance_, &info, vk_.allocator(), &messenger_));
     return {};
 }
 
-Status Device::create_device(bool matrices)
+Status Device::create_device(const DeviceOptions& options, bool matrices)
 {
     SR_TRY(queue_family_, compute_queue_family(vk_, physical_));
     const float priority = 1;
@@ -165,6 +172,13 @@ Status Device::create_device(bool matrices)
     std::vector<const char*> extensions;
     if (has_extension(vk_, physical_, "VK_KHR_portability_subset")) // must be enabled where there is one: MoltenVK's
         extensions.push_back("VK_KHR_portability_subset");
+    if (options.share_by_fd) {
+        sharing_ = sharing_of(vk_, physical_);
+        if (sharing_.memory)
+            extensions.push_back(VK_KHR_EXTERNAL_MEMORY_FD_EXTENSION_NAME);
+        if (sharing_.semaphores)
+            extensions.push_back(VK_KHR_EXTERNAL_SEMAPHORE_FD_EXTENSION_NAME);
+    }
     auto faults = vk_struct<VkPhysicalDeviceFaultFeaturesEXT>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FAULT_FEATURES_EXT);
     if (tells_faults(vk_, physical_)) {
         faults.deviceFault = VK_TRUE;
@@ -185,10 +199,16 @@ Status Device::create_device(bool matrices)
     info.pQueueCreateInfos = &queue;
     info.enabledExtensionCount = uint32_t(extensions.size());
     info.ppEnabledExtensionNames = extensions.data();
-    SR_VK(vk_.CreateDevice(physical_, &info, nullptr, &device_));
+    SR_VK(vk_.CreateDevice(physical_, &info, vk_.allocator(), &device_));
     SR_CHECK(vk_.load_device(device_));
     vk_.GetDeviceQueue(device_, queue_family_, 0, &queue_);
     return {};
+}
+
+void Device::take_allocation(const DeviceOptions& options)
+{
+    if (options.allocation)
+        vk_.allocation = *options.allocation;
 }
 
 Status Device::check_cancelled() const
@@ -206,6 +226,9 @@ Status Device::finish(const DeviceOptions& options)
     name_ = summary.name;
     driver_ = summary.driver;
     limits_ = summary.limits;
+    const Sharing can = sharing_of(vk_, physical_); // a host may have enabled what cannot be exported
+    sharing_.memory = sharing_.memory && can.memory && vk_.GetMemoryFdKHR;
+    sharing_.semaphores = sharing_.semaphores && can.semaphores && vk_.GetSemaphoreFdKHR;
     budget_ = options.max_bytes;
     cancelled_ = options.cancelled;
     if (owned_)
@@ -217,11 +240,11 @@ Status Device::finish(const DeviceOptions& options)
     auto type = vk_struct<VkSemaphoreTypeCreateInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_TYPE_CREATE_INFO);
     type.semaphoreType = VK_SEMAPHORE_TYPE_TIMELINE;
     auto semaphore = vk_struct<VkSemaphoreCreateInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO, &type);
-    SR_VK(vk_.CreateSemaphore(device_, &semaphore, nullptr, &timeline_));
+    SR_VK(vk_.CreateSemaphore(device_, &semaphore, vk_.allocator(), &timeline_));
     auto pool = vk_struct<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
     pool.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
     pool.queueFamilyIndex = queue_family_;
-    SR_VK(vk_.CreateCommandPool(device_, &pool, nullptr, &copy_pool_));
+    SR_VK(vk_.CreateCommandPool(device_, &pool, vk_.allocator(), &copy_pool_));
     auto commands = vk_struct<VkCommandBufferAllocateInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO);
     commands.commandPool = copy_pool_;
     commands.commandBufferCount = 1;
@@ -237,18 +260,18 @@ Device::~Device()
     pipelines_.reset();
     staging_.reset();
     if (copy_pool_)
-        vk_.DestroyCommandPool(device_, copy_pool_, nullptr);
+        vk_.DestroyCommandPool(device_, copy_pool_, vk_.allocator());
     if (timeline_)
-        vk_.DestroySemaphore(device_, timeline_, nullptr);
+        vk_.DestroySemaphore(device_, timeline_, vk_.allocator());
     if (!owned_)
         return;
     if (device_)
-        vk_.DestroyDevice(device_, nullptr);
+        vk_.DestroyDevice(device_, vk_.allocator());
     if (messenger_)
-        reinterpret_cast<PFN_vkDestroyDebugUtilsMessengerEXT>(
-            vk_.GetInstanceProcAddr(instance_, "vkDestroyDebugUtilsMessengerEXT"))(instance_, messenger_, nullptr);
+        reinterpret_cast<PFN_vkDestroyDebugUtilsMessengerEXT>(vk_.GetInstanceProcAddr(
+            instance_, "vkDestroyDebugUtilsMessengerEXT"))(instance_, messenger_, vk_.allocator());
     if (instance_)
-        vk_.DestroyInstance(instance_, nullptr);
+        vk_.DestroyInstance(instance_, vk_.allocator());
 }
 
 Status Device::account(int64_t bytes, const char* what)

@@ -31,6 +31,14 @@ struct DeviceOptions {
     // PipelineStore::blob() of an earlier process, read while the device is made; with a host's device, or with a blob,
     // no file is kept
     std::span<const std::byte> pipeline_cache = {};
+    // for every Vulkan object, read while the device is made; null: the driver's own
+    const VkAllocationCallbacks* allocation = nullptr;
+    bool share_by_fd = false; // enables what Sharing needs, where there is it; a host's device says what it has
+};
+
+// what other APIs can be given by file descriptor
+struct Sharing {
+    bool memory = false, semaphores = false;
 };
 
 // A device that belongs to the host program; it outlives the engine. No file is kept and no variable of the environment
@@ -45,6 +53,8 @@ struct HostDevice {
     bool robust_buffer_access = false;            // it is enabled, as it must be: files decide what is read
     bool float16 = false;                         // shaderFloat16 is enabled too
     std::function<void()> lock = {}, unlock = {}; // around every use of the queue; may be empty
+    Sharing sharing = {};                         // its extensions are enabled
+    MemorySource memory = {};                     // instead of vkAllocateMemory
 };
 
 // A value of a timeline semaphore: to wait for before a submit begins, or to signal when it has ended.
@@ -89,6 +99,8 @@ class Device {
     VkPhysicalDevice physical() const { return physical_; }
     uint32_t queue_family() const { return queue_family_; }
     double timestamp_ns() const { return timestamp_ns_; } // of a unit; 0: the queue has none
+    const Sharing& sharing() const { return sharing_; }
+    const MemorySource& memory_source() const { return memory_source_; }
     WorkRates& rates() { return rates_; }
     PipelineStore& pipelines() { return *pipelines_; }
 
@@ -121,8 +133,9 @@ class Device {
 
   private:
     Device();
+    void take_allocation(const DeviceOptions& options);
     Status create_instance(const DeviceOptions& options);
-    Status create_device(bool matrices); // enables cooperative matrices
+    Status create_device(const DeviceOptions& options, bool matrices); // enables cooperative matrices
     Status finish(const DeviceOptions& options);
     Result<Staging*> staging();
 
@@ -135,6 +148,8 @@ class Device {
     uint32_t queue_family_ = 0;
     uint32_t index_ = 0;
     bool owned_ = true;
+    Sharing sharing_;
+    MemorySource memory_source_;
     std::function<void()> lock_, unlock_;
     std::function<bool()> cancelled_;
     std::mutex queue_mutex_;

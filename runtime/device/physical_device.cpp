@@ -129,7 +129,7 @@ std::string api_version_text(uint32_t version)
                        VK_API_VERSION_PATCH(version));
 }
 
-Result<VkInstance> create_instance(bool validation)
+Result<VkInstance> create_instance(bool validation, const VkAllocationCallbacks* allocation)
 {
     auto app = vk_struct<VkApplicationInfo>(VK_STRUCTURE_TYPE_APPLICATION_INFO);
     app.pApplicationName = app.pEngineName = "semrover";
@@ -154,9 +154,11 @@ Result<VkInstance> create_instance(bool validation)
         extensions[info.enabledExtensionCount++] = VK_KHR_PORTABILITY_ENUMERATION_EXTENSION_NAME;
     }
     VkInstance instance;
-    const VkResult result = vkCreateInstance(&info, nullptr, &instance);
+    const VkResult result = vkCreateInstance(&info, allocation, &instance);
     if (result == VK_ERROR_LAYER_NOT_PRESENT)
         return fail(ErrorCode::no_device, "{} is not installed (Debian: vulkan-validationlayers)", kValidationLayer);
+    if (result == VK_ERROR_OUT_OF_HOST_MEMORY)
+        return tl::make_unexpected(vk_error(result, "vkCreateInstance"));
     if (result != VK_SUCCESS)
         return fail(ErrorCode::no_device, "no Vulkan driver: {}; install one (Debian: mesa-vulkan-drivers)",
                     vk_result_name(result));

@@ -10,7 +10,7 @@ namespace semrover {
 inline constexpr const char* kValidationLayer = "VK_LAYER_KHRONOS_validation";
 
 std::string api_version_text(uint32_t version); // "1.3.239"
-Result<VkInstance> create_instance(bool validation);
+Result<VkInstance> create_instance(bool validation, const VkAllocationCallbacks* allocation = nullptr);
 Result<std::vector<VkPhysicalDevice>> physical_devices(const VulkanCalls& vk, VkInstance instance); // best first
 DeviceSummary summarize(const VulkanCalls& vk, VkInstance instance, VkPhysicalDevice physical, uint32_t index);
 bool has_extension(const VulkanCalls& vk, VkPhysicalDevice physical, const char* name);

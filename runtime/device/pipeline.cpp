@@ -87,7 +87,7 @@ Result<std::unique_ptr<PipelineStore>> PipelineStore::create(Device& device, std
     info.initialDataSize = data.size();
     info.pInitialData = data.data();
     store->reused_bytes_ = data.size();
-    SR_VK(device.vk().CreatePipelineCache(device.handle(), &info, nullptr, &store->cache_));
+    SR_VK(device.vk().CreatePipelineCache(device.handle(), &info, device.vk().allocator(), &store->cache_));
     return store;
 }
 
@@ -98,7 +98,7 @@ PipelineStore::~PipelineStore()
     for (auto& [key, p] : pipelines_)
         destroy(p);
     if (cache_)
-        device_.vk().DestroyPipelineCache(device_.handle(), cache_, nullptr);
+        device_.vk().DestroyPipelineCache(device_.handle(), cache_, device_.vk().allocator());
 }
 
 Result<std::vector<char>> PipelineStore::blob() const
@@ -151,9 +151,9 @@ void PipelineStore::save_by_and_by(double seconds)
 
 void PipelineStore::destroy(const Pipeline& p)
 {
-    device_.vk().DestroyPipeline(device_.handle(), p.pipeline, nullptr);
-    device_.vk().DestroyPipelineLayout(device_.handle(), p.layout, nullptr);
-    device_.vk().DestroyDescriptorSetLayout(device_.handle(), p.set_layout, nullptr);
+    device_.vk().DestroyPipeline(device_.handle(), p.pipeline, device_.vk().allocator());
+    device_.vk().DestroyPipelineLayout(device_.handle(), p.layout, device_.vk().allocator());
+    device_.vk().DestroyDescriptorSetLayout(device_.handle(), p.set_layout, device_.vk().allocator());
 }
 
 Status PipelineStore::make_layout(const KernelVariant& variant, Pipeline& out)
@@ -167,14 +167,14 @@ Status PipelineStore::make_layout(const KernelVariant& variant, Pipeline& out)
     auto set = vk_struct<VkDescriptorSetLayoutCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO);
     set.bindingCount = uint32_t(bindings.size());
     set.pBindings = bindings.data();
-    SR_VK(device_.vk().CreateDescriptorSetLayout(device_.handle(), &set, nullptr, &out.set_layout));
+    SR_VK(device_.vk().CreateDescriptorSetLayout(device_.handle(), &set, device_.vk().allocator(), &out.set_layout));
     const VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, variant.push_bytes};
     auto layout = vk_struct<VkPipelineLayoutCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO);
     layout.setLayoutCount = 1;
     layout.pSetLayouts = &out.set_layout;
     layout.pushConstantRangeCount = variant.push_bytes ? 1 : 0;
     layout.pPushConstantRanges = &range;
-    SR_VK(device_.vk().CreatePipelineLayout(device_.handle(), &layout, nullptr, &out.layout));
+    SR_VK(device_.vk().CreatePipelineLayout(device_.handle(), &layout, device_.vk().allocator(), &out.layout));
     return {};
 }
 
@@ -185,7 +185,7 @@ Status PipelineStore::make(const KernelVariant& variant, const std::map<uint32_t
     code.codeSize = variant.code.size_bytes();
     code.pCode = variant.code.data();
     VkShaderModule module;
-    SR_VK(device_.vk().CreateShaderModule(device_.handle(), &code, nullptr, &module));
+    SR_VK(device_.vk().CreateShaderModule(device_.handle(), &code, device_.vk().allocator(), &module));
     std::vector<VkSpecializationMapEntry> entries;
     std::vector<uint32_t> values;
     for (const auto& [id, value] : constants) {
@@ -209,9 +209,9 @@ Status PipelineStore::make(const KernelVariant& variant, const std::map<uint32_t
         &specialization};
     info.layout = out.layout;
     info.flags = VK_PIPELINE_CREATE_DISPATCH_BASE_BIT; // long passes are cut
-    const VkResult result =
-        device_.vk().CreateComputePipelines(device_.handle(), cache_, 1, &info, nullptr, &out.pipeline);
-    device_.vk().DestroyShaderModule(device_.handle(), module, nullptr);
+    const VkResult result = device_.vk().CreateComputePipelines(device_.handle(), cache_, 1, &info,
+                                                                device_.vk().allocator(), &out.pipeline);
+    device_.vk().DestroyShaderModule(device_.handle(), module, device_.vk().allocator());
     SR_VK(result);
     return {};
 }

@@ -31,13 +31,13 @@ Program::~Program()
 {
     (void)device_.wait(device_.last_ticket()); // command buffers may be in flight; a lost device is told elsewhere
     for (VkBufferView view : views_)
-        device_.vk().DestroyBufferView(device_.handle(), view, nullptr);
+        device_.vk().DestroyBufferView(device_.handle(), view, device_.vk().allocator());
     if (queries_)
-        device_.vk().DestroyQueryPool(device_.handle(), queries_, nullptr);
+        device_.vk().DestroyQueryPool(device_.handle(), queries_, device_.vk().allocator());
     if (descriptors_)
-        device_.vk().DestroyDescriptorPool(device_.handle(), descriptors_, nullptr);
+        device_.vk().DestroyDescriptorPool(device_.handle(), descriptors_, device_.vk().allocator());
     if (commands_pool_)
-        device_.vk().DestroyCommandPool(device_.handle(), commands_pool_, nullptr);
+        device_.vk().DestroyCommandPool(device_.handle(), commands_pool_, device_.vk().allocator());
 }
 
 Status Program::allocate()
@@ -78,7 +78,7 @@ Status Program::make_sets()
     pool.maxSets = uint32_t(layouts.size());
     pool.poolSizeCount = 2;
     pool.pPoolSizes = sizes;
-    SR_VK(device_.vk().CreateDescriptorPool(device_.handle(), &pool, nullptr, &descriptors_));
+    SR_VK(device_.vk().CreateDescriptorPool(device_.handle(), &pool, device_.vk().allocator(), &descriptors_));
     auto allocate = vk_struct<VkDescriptorSetAllocateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO);
     allocate.descriptorPool = descriptors_;
     allocate.descriptorSetCount = uint32_t(layouts.size());
@@ -111,7 +111,7 @@ Status Program::bind(const Pass& pass, VkDescriptorSet set)
             info.format = VK_FORMAT_R32G32B32A32_UINT;
             info.offset = offset;
             info.range = b.bytes / 16 * 16;
-            SR_VK(device_.vk().CreateBufferView(device_.handle(), &info, nullptr, &views[i]));
+            SR_VK(device_.vk().CreateBufferView(device_.handle(), &info, device_.vk().allocator(), &views[i]));
             views_.push_back(views[i]);
             writes[i].descriptorType = VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER;
             writes[i].pTexelBufferView = &views[i];
@@ -132,7 +132,7 @@ Status Program::make_queries()
     auto queries = vk_struct<VkQueryPoolCreateInfo>(VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO);
     queries.queryType = VK_QUERY_TYPE_TIMESTAMP;
     queries.queryCount = uint32_t(plan_.dispatches.size() * 2);
-    SR_VK(device_.vk().CreateQueryPool(device_.handle(), &queries, nullptr, &queries_));
+    SR_VK(device_.vk().CreateQueryPool(device_.handle(), &queries, device_.vk().allocator(), &queries_));
     return {};
 }
 
@@ -140,7 +140,7 @@ Status Program::record()
 {
     auto pool = vk_struct<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
     pool.queueFamilyIndex = device_.queue_family();
-    SR_VK(device_.vk().CreateCommandPool(device_.handle(), &pool, nullptr, &commands_pool_));
+    SR_VK(device_.vk().CreateCommandPool(device_.handle(), &pool, device_.vk().allocator(), &commands_pool_));
     commands_.resize(plan_.submits);
     if (commands_.empty())
         return {};
@@ -254,8 +254,9 @@ Status Program::schedule_again()
             seconds[i] = std::max(seconds[i], device_.rates().seconds(pass));
     }
     stage::schedule(plan_, device_.limits(), seconds);
-    device_.vk().DestroyCommandPool(device_.handle(), commands_pool_, nullptr);
-    device_.vk().DestroyQueryPool(device_.handle(), queries_, nullptr);
+    device_.vk().DestroyCommandPool(device_.handle(), commands_pool_, device_.vk().allocator());
+    device_.vk().DestroyQueryPool(device_.handle(), queries_, device_.vk().allocator());
+    commands_pool_ = VK_NULL_HANDLE; // what follows may fail
     queries_ = VK_NULL_HANDLE;
     measuring_ = false;
     SR_CHECK(make_queries());

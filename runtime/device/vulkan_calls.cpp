@@ -31,6 +31,9 @@ Status VulkanCalls::load_device(VkDevice device)
 #define SR_LOAD(name) SR_CHECK(set(name, GetDeviceProcAddr(device, "vk" #name), "vk" #name));
     SR_DEVICE_CALLS(SR_LOAD)
 #undef SR_LOAD
+#define SR_LOAD(name) name = reinterpret_cast<PFN_vk##name>(GetDeviceProcAddr(device, "vk" #name));
+    SR_EXTENSION_CALLS(SR_LOAD)
+#undef SR_LOAD
     return {};
 }
 

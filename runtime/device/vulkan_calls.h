@@ -11,6 +11,8 @@
     X(EnumerateDeviceExtensionProperties)                                                                              \
     X(EnumeratePhysicalDevices)                                                                                        \
     X(GetDeviceProcAddr)                                                                                               \
+    X(GetPhysicalDeviceExternalBufferProperties)                                                                       \
+    X(GetPhysicalDeviceExternalSemaphoreProperties)                                                                    \
     X(GetPhysicalDeviceFeatures2)                                                                                      \
     X(GetPhysicalDeviceMemoryProperties)                                                                               \
     X(GetPhysicalDeviceProperties)                                                                                     \
@@ -70,6 +72,10 @@
     X(ResetCommandBuffer)                                                                                              \
     X(UpdateDescriptorSets)                                                                                            \
     X(WaitSemaphores)
+// calls of extensions: null where a device does not have them
+#define SR_EXTENSION_CALLS(X)                                                                                          \
+    X(GetMemoryFdKHR)                                                                                                  \
+    X(GetSemaphoreFdKHR)
 
 namespace semrover {
 
@@ -79,7 +85,14 @@ struct VulkanCalls {
 #define SR_DECLARE(name) PFN_vk##name name = nullptr;
     SR_INSTANCE_CALLS(SR_DECLARE)
     SR_DEVICE_CALLS(SR_DECLARE)
+    SR_EXTENSION_CALLS(SR_DECLARE)
 #undef SR_DECLARE
+    VkAllocationCallbacks allocation = {}; // of a host's, for every object; without pfnAllocation: none
+
+    const VkAllocationCallbacks* allocator() const
+    {
+        return allocation.pfnAllocation ? &allocation : nullptr;
+    }
 
     // get: null for the loader's. Errors: no_device where a call is missing
     Status load_instance(PFN_vkGetInstanceProcAddr get, VkInstance instance);

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""Compares the functions and types of semrover.h with those that were recorded: a change that programs which are built
+"""Compares the functions and types of the headers with those that were recorded: a change that programs which are built
 already would notice must be meant. And the library has these functions and no other.
 
-check.py HEADER LIBRARY [--write]     needs Debian's abigail-tools
+check.py FOLDER LIBRARY [--write]     FOLDER: of the headers. Needs Debian's abigail-tools
 """
 import os
 import re
@@ -13,21 +13,24 @@ import subprocess
 import sys
 import tempfile
 
+HEADERS = ("semrover.h", "semrover_chain.h", "semrover_gl.h")
 RECORDED = os.path.join(os.path.dirname(os.path.abspath(__file__)), "semrover.abi")
 PROTOTYPE = re.compile(r"^(?!typedef)[a-z][\w *]*[ *]sr_\w+\([^;]*\);", re.M)
 QUIET = ("--no-show-locs", "--no-comp-dir-path", "--no-corpus-path", "--no-architecture", "--no-elf-needed")
 
 
-def make_empty(header, folder):
-    """a library of empty functions: the header alone says what they take"""
-    with open(header, encoding="utf-8") as file:
-        text = re.sub(r"/\*.*?\*/", "", file.read(), flags=re.S)
+def make_empty(headers, folder):
+    """a library of empty functions: the headers alone say what they take"""
+    text = ""
+    for name in HEADERS:
+        with open(os.path.join(headers, name), encoding="utf-8") as file:
+            text += re.sub(r"/\*.*?\*/", "", file.read(), flags=re.S)
     functions = [m[0][:-1] + " { __builtin_trap(); }" for m in PROTOTYPE.finditer(text)]
     library = os.path.join(folder, "libsemrover.so")
     with open(os.path.join(folder, "empty.c"), "w", encoding="utf-8") as file:
-        file.write("\n".join(['#include "semrover.h"'] + functions) + "\n")
+        file.write("\n".join([f'#include "{name}"' for name in HEADERS] + functions) + "\n")
     subprocess.run(["cc", "-std=c99", "-Wno-pedantic", "-g", "-shared", "-fPIC",
-                    "-I" + os.path.dirname(os.path.abspath(header)), "-o", library, "empty.c"], check=True, cwd=folder)
+                    "-I" + os.path.abspath(headers), "-o", library, "empty.c"], check=True, cwd=folder)
     return library
 
 
@@ -36,9 +39,9 @@ def functions_of(library):
     return set(re.findall(r" T (sr_\w+)", listed))
 
 
-def main(header, library, *options):
+def main(headers, library, *options):
     with tempfile.TemporaryDirectory() as folder:
-        empty = make_empty(header, folder)
+        empty = make_empty(headers, folder)
         declared, there = functions_of(empty), functions_of(library)
         if declared != there or not there:
             sys.exit(f"declared and not there: {declared - there}; there and not declared: {there - declared}")
@@ -48,7 +51,7 @@ def main(header, library, *options):
             shutil.copyfile(now, RECORDED)
             return
         if subprocess.run(["abidiff", RECORDED, now]).returncode:
-            sys.exit(f"the interface is another than recorded; if it shall be: {sys.argv[0]} {header} {library} --write")
+            sys.exit(f"the interface is another than recorded; if it shall be: {sys.argv[0]} {headers} {library} --write")
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
 # Installs the library into an empty folder, builds the sample hosts that come with it there, runs them with validation,
-# and looks at their pictures. Without Xvfb and GLFW the one with a window is left out.
+# and looks at their pictures. Without EGL the one by OpenGL ES is left out, without Xvfb and GLFW the one with a window.
 # hosts.sh CMAKE BUILD MODEL
 set -eu
 cmake=$1 build=$2 model=$3
@@ -27,6 +27,14 @@ silent() {
 mkdir "$folder/frames"
 silent "$folder/build/record_host" "$model" "$folder/frames" 2
 /usr/bin/python3 "$here/see_cubes.py" record "$folder/frames/000000.ppm" "$folder/frames/000001.ppm"
+
+if test -x "$folder/build/gles_host"; then
+    mkdir "$folder/gles"
+    silent "$folder/build/gles_host" "$model" "$folder/gles" 2
+    /usr/bin/python3 "$here/see_cubes.py" record "$folder/gles/000000.ppm" "$folder/gles/000001.ppm"
+else
+    echo "no EGL: nothing by OpenGL ES"
+fi
 
 test -x "$folder/build/vulkan_host" && command -v Xvfb >/dev/null || { echo "no GLFW or no Xvfb: no window"; exit 0; }
 Xvfb -displayfd 3 -screen 0 800x600x24 3>"$folder/display" 2>/dev/null &

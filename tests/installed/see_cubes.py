@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the sample hosts (tools/host) must show: sky, splats of the street, and cubes that stand among them.
 
-see_cubes.py record FRAME.ppm FRAME.ppm    of record_host: cubes where they are, hidden where a wall is before them
+see_cubes.py record FRAME.ppm FRAME.ppm    of record_host and gles_host: cubes where they are, hidden where a wall is before them
 see_cubes.py window FRAME.ppm              of vulkan_host, after some flight: sky, street, and a cube
 """
 import math
@@ -42,7 +42,7 @@ def face(color, brightness):
 
 
 def project(picture, frame, point, yaw=0.1):
-    """as scene_look() and cube.vert have it"""
+    """as scene_look() and cube.vert have it, and gles_host.c"""
     dx, dy, dz = point[0] - (1 + 0.5 * frame), point[1], point[2] - 1.7
     right = math.sin(yaw) * dx - math.cos(yaw) * dy
     forward = math.cos(yaw) * dx + math.sin(yaw) * dy

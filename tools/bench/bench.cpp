@@ -137,6 +137,7 @@ void add_bench(CLI::App& app, const Globals& globals, Run& run)
     add_bench_vsd(*bench, globals, run);
     add_bench_regions(*bench, globals, run);
     add_bench_sort(*bench, globals, run);
+    add_bench_world(*bench, globals, run);
     add_bench_splat(*bench, globals, run);
 }
 

@@ -67,6 +67,7 @@ void add_bench_asd(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_vsd(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_regions(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_sort(CLI::App& bench, const Globals& globals, Run& run);
+void add_bench_world(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_splat(CLI::App& bench, const Globals& globals, Run& run);
 
 } // namespace semrover

@@ -48,6 +48,7 @@ void add_render(CLI::App& app, const Globals& globals, Run& run);
 void add_tile(CLI::App& app, const Globals& globals, Run& run);
 void add_streets(CLI::App& app, const Globals& globals, Run& run);
 void add_verify(CLI::App& app, const Globals& globals, Run& run);
+void add_view(CLI::App& app, const Globals& globals, Run& run);
 void add_voxelize(CLI::App& app, const Globals& globals, Run& run);
 
 } // namespace semrover

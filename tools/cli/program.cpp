@@ -89,10 +89,9 @@ Status run_neighbour(const Command& command, char** argv)
     if (interrupt_requested())
         return fail(ErrorCode::interrupted, "interrupted");
     execv(program.c_str(), argv);
-    return fail(
-        ErrorCode::bad_input,
-        "{} is run by {}, which cannot be started ({}): cmake --build --preset release --target programs builds it",
-        command.name, quote_path(program), std::strerror(errno));
+    return fail(ErrorCode::bad_input, "{} is run by {}, which cannot be started ({}): {}", command.name,
+                quote_path(program), std::strerror(errno),
+                command.advice ? command.advice : "cmake --build --preset release --target programs builds it");
 }
 
 void add_neighbour(CLI::App& app, const Command& command, char** argv, Run& run)

@@ -14,10 +14,14 @@ using AddCommand = void (*)(CLI::App& app, const Globals& globals, Run& run);
 // itself, as git does, so that who builds only `semrover` compiles only what it runs.
 struct Command {
     Command(AddCommand add) : add(add) {}
-    Command(const char* name, const char* program, const char* help) : name(name), program(program), help(help) {}
+    // advice: how to get that program where it is not there; nullptr: the target `programs` builds it
+    Command(const char* name, const char* program, const char* help, const char* advice = nullptr)
+        : name(name), program(program), help(help), advice(advice)
+    {
+    }
 
     AddCommand add = nullptr;
-    const char *name = nullptr, *program = nullptr, *help = nullptr;
+    const char *name = nullptr, *program = nullptr, *help = nullptr, *advice = nullptr;
 };
 
 // Reads the command line, runs the command that it names, and prints an error as one line. Returns the exit code.

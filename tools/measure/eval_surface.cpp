@@ -5,6 +5,7 @@
 #include "engine/fusion/surface_error.h"
 #include "engine/mesh/mesh_files.h"
 #include "engine/scene/palette.h"
+#include "runtime/base/json.h"
 #include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
 #include "tools/measure/eval.h"

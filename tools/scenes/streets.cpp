@@ -63,11 +63,11 @@ Status write_grids(const StreetsArguments& o, Device& device, Street& street, st
     VoxelizeOptions voxels = o.voxels;
     voxels.seed = o.street.seed;
     SR_TRY(StreetGrids grids, street_grids(device, street, voxels));
-    SR_CHECK(tint_objects(street.boxes, grids.truth));
     if (o.seen) {
         SR_TRY(const std::vector<uint32_t> seen, seen_cells(device, street.mesh, grids.truth, drives, o.sight));
         grids = part_of(grids, seen);
     }
+    SR_CHECK(tint_objects(street.boxes, grids.truth)); // of the front that is seen, not of the walls behind it
     for (VoxelGrid* grid : {&grids.truth, &grids.semantic}) {
         grid->metadata["name"] = fmt::format("street {}", o.street.seed);
         grid->metadata["seed"] = std::to_string(o.street.seed);

@@ -1,0 +1,65 @@
+# SPDX-FileCopyrightText: semrover authors
+# SPDX-License-Identifier: Apache-2.0
+# `cpack -G DEB` in a build folder where everything is built: packages of the program, the library, and what programs
+# need to be built against it. Places are Debian's, below /usr.
+set(debian_libdir lib/${CMAKE_LIBRARY_ARCHITECTURE})
+set(debian_cmake ${debian_libdir}/cmake/semrover)
+
+set(debian_programs semrover semrover-eval semrover-scenes)
+if(TARGET semrover-view)
+    list(APPEND debian_programs semrover-view)
+endif()
+install(TARGETS ${debian_programs} DESTINATION bin COMPONENT deb_program EXCLUDE_FROM_ALL)
+
+install(TARGETS semrover_c EXPORT semrover_debian LIBRARY DESTINATION ${debian_libdir}
+    COMPONENT deb_library NAMELINK_COMPONENT deb_development EXCLUDE_FROM_ALL)
+file(GLOB debian_headers CONFIGURE_DEPENDS engine/semrover*.h)
+install(FILES ${debian_headers} DESTINATION include COMPONENT deb_development EXCLUDE_FROM_ALL)
+install(DIRECTORY tools/host DESTINATION share/semrover COMPONENT deb_development EXCLUDE_FROM_ALL)
+install(EXPORT semrover_debian NAMESPACE semrover:: FILE semroverConfig.cmake DESTINATION ${debian_cmake}
+    COMPONENT deb_development EXCLUDE_FROM_ALL)
+install(FILES ${CMAKE_CURRENT_BINARY_DIR}/semroverConfigVersion.cmake DESTINATION ${debian_cmake}
+    COMPONENT deb_development EXCLUDE_FROM_ALL)
+write_pkgconfig(debian/semrover.pc ${debian_libdir})
+install(FILES ${CMAKE_CURRENT_BINARY_DIR}/debian/semrover.pc DESTINATION ${debian_libdir}/pkgconfig
+    COMPONENT deb_development EXCLUDE_FROM_ALL)
+foreach(package "program;semrover" "library;libsemrover0" "development;libsemrover-dev")
+    list(GET package 0 component)
+    list(GET package 1 name)
+    install(FILES LICENSE DESTINATION share/doc/${name} RENAME copyright COMPONENT deb_${component} EXCLUDE_FROM_ALL)
+    string(TOUPPER DEB_${component} variable)
+    set(CPACK_DEBIAN_${variable}_PACKAGE_NAME ${name})
+    set(CPACK_DEBIAN_${variable}_FILE_NAME DEB-DEFAULT)
+endforeach()
+
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_NAME semrover)
+set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})
+set(CPACK_PACKAGE_CONTACT "semrover authors")
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_COMPONENTS_GROUPING IGNORE)
+set(CPACK_COMPONENTS_ALL deb_program deb_library deb_development)
+
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${CMAKE_BINARY_DIR}) # where libsemrover.so is
+set(CPACK_DEBIAN_DEB_LIBRARY_PACKAGE_GENERATE_SHLIBS ON)
+set(CPACK_DEBIAN_DEB_LIBRARY_PACKAGE_SECTION libs)
+set(CPACK_DEBIAN_DEB_DEVELOPMENT_PACKAGE_SECTION libdevel)
+set(CPACK_DEBIAN_DEB_DEVELOPMENT_PACKAGE_DEPENDS "libsemrover0 (= ${PROJECT_VERSION})")
+set(CPACK_DEBIAN_DEB_PROGRAM_PACKAGE_SECTION graphics)
+if(TARGET semrover-view)
+    set(CPACK_DEBIAN_DEB_PROGRAM_PACKAGE_DEPENDS "libsemrover0 (= ${PROJECT_VERSION})")
+endif()
+set(CPACK_DEBIAN_DEB_PROGRAM_PACKAGE_RECOMMENDS mesa-vulkan-drivers)
+set(CPACK_DEBIAN_DEB_PROGRAM_PACKAGE_SUGGESTS ffmpeg)
+set(CPACK_COMPONENT_DEB_PROGRAM_DESCRIPTION "coloured 3D streets from semantic voxel grids
+Turns labelled voxels into coloured points, draws them as splats along camera
+paths, and refines the frames, on any Vulkan 1.2 device.")
+set(CPACK_COMPONENT_DEB_LIBRARY_DESCRIPTION "streets that are generated around a camera: shared library
+Turns labelled voxels into coloured points and splats inside a host program,
+on any Vulkan 1.2 device.")
+set(CPACK_COMPONENT_DEB_DEVELOPMENT_DESCRIPTION "streets that are generated around a camera: development files
+Header, CMake and pkg-config files of libsemrover, and sample hosts.")
+include(CPack)

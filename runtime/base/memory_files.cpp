@@ -1,0 +1,96 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "runtime/base/memory_files.h"
+
+#include "runtime/base/quote.h"
+
+#include <mutex>
+
+namespace semrover {
+
+namespace {
+
+constexpr std::string_view kPrefix = "memory:";
+
+// all files of all folders by their whole paths
+struct AllFiles {
+    std::mutex mutex;
+    std::map<std::string, std::span<const std::byte>> files;
+    uint64_t folders = 0; // made so far
+};
+AllFiles& all_files()
+{
+    static AllFiles all;
+    return all;
+}
+
+std::string key_of(const Path& path)
+{
+    std::string key = path.lexically_normal().generic_string();
+    if (key.ends_with('/'))
+        key.pop_back();
+    return key;
+}
+
+bool may_be_ours(const Path& path)
+{
+    return path.native().starts_with(kPrefix);
+}
+
+} // namespace
+
+MemoryFolder::MemoryFolder()
+{
+    AllFiles& all = all_files();
+    const std::lock_guard guard(all.mutex);
+    path_ = std::string(kPrefix) + std::to_string(++all.folders);
+}
+
+MemoryFolder::~MemoryFolder()
+{
+    AllFiles& all = all_files();
+    const std::lock_guard guard(all.mutex);
+    std::erase_if(all.files, [&](const auto& file) { return file.first.starts_with(path_.native() + "/"); });
+}
+
+Status MemoryFolder::add(std::string_view path, std::span<const std::byte> bytes)
+{
+    const Path inner = Path(path).lexically_normal();
+    if (path.empty() || inner.is_absolute() || inner.begin()->native() == ".." || !inner.has_filename() || inner == ".")
+        return fail(ErrorCode::usage, "a file in memory has the path {}, expected one below its folder",
+                    quote_path(path));
+    AllFiles& all = all_files();
+    const std::lock_guard guard(all.mutex);
+    if (!all.files.emplace(key_of(path_ / inner), bytes).second)
+        return fail(ErrorCode::usage, "two files in memory have the path {}", quote_path(path));
+    return {};
+}
+
+std::optional<MemoryEntry> find_in_memory(const Path& path)
+{
+    if (!may_be_ours(path))
+        return std::nullopt;
+    AllFiles& all = all_files();
+    const std::string key = key_of(path);
+    const std::lock_guard guard(all.mutex);
+    if (const auto file = all.files.find(key); file != all.files.end())
+        return MemoryEntry{false, file->second};
+    const auto below = all.files.lower_bound(key + "/");
+    if (below != all.files.end() && below->first.starts_with(key + "/"))
+        return MemoryEntry{true};
+    return std::nullopt;
+}
+
+std::vector<Path> list_in_memory(const Path& folder)
+{
+    AllFiles& all = all_files();
+    const std::string key = key_of(folder) + "/";
+    const std::lock_guard guard(all.mutex);
+    std::vector<Path> files;
+    for (auto file = all.files.lower_bound(key); file != all.files.end() && file->first.starts_with(key); ++file)
+        if (file->first.find('/', key.size()) == std::string::npos)
+            files.emplace_back(file->first);
+    return files;
+}
+
+} // namespace semrover

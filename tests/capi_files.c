@@ -1,0 +1,313 @@
+/* SPDX-FileCopyrightText: semrover authors
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * A host in C that has models in memory: worlds and chains have the bytes that they have from a folder, and share its
+ * cache; and what a host may get wrong.
+ *
+ *     capi_files MODEL RENDERER FOLDER     FOLDER: for the cache, which is emptied */
+#include "tests/capi_street.h"
+
+enum { WIDTH = 24, HEIGHT = 16, PIXELS = WIDTH * HEIGHT, MOST_FILES = 8 };
+
+static const char *model, *renderer, *folder;
+
+/* files of a model, at odd addresses */
+struct files {
+    sr_file files[MOST_FILES];
+    char* memory[MOST_FILES];
+    uint64_t count;
+};
+
+static void read_one(struct files* files, const char* from, const char* path)
+{
+    char name[1024];
+    FILE* file;
+    long bytes;
+    sr_file* made = &files->files[files->count];
+    CHECK(files->count < MOST_FILES);
+    snprintf(name, sizeof name, "%s/%s", from, path);
+    file = fopen(name, "rb");
+    CHECK(file && fseek(file, 0, SEEK_END) == 0);
+    bytes = ftell(file);
+    CHECK(bytes > 0 && fseek(file, 0, SEEK_SET) == 0);
+    files->memory[files->count] = malloc((size_t)bytes + 1);
+    CHECK(files->memory[files->count]);
+    CHECK(fread(files->memory[files->count] + 1, 1, (size_t)bytes, file) == (size_t)bytes);
+    fclose(file);
+    made->path = path;
+    made->data = files->memory[files->count] + 1;
+    made->bytes = (uint64_t)bytes;
+    ++files->count;
+}
+
+/* nobody reads them any more: what would is told by other bytes */
+static void free_files(struct files* files)
+{
+    uint64_t i;
+    for (i = 0; i < files->count; ++i) {
+        memset(files->memory[i], 0x5a, (size_t)files->files[i].bytes + 1);
+        free(files->memory[i]);
+    }
+    files->count = 0;
+}
+
+static struct files model_in_memory(void)
+{
+    struct files files;
+    memset(&files, 0, sizeof files);
+    read_one(&files, model, "config.json");
+    read_one(&files, model, "diffusion_pytorch_model.safetensors");
+    return files;
+}
+
+static struct files renderer_in_memory(void)
+{
+    static const char* const paths[] = {"model_index.json",
+                                        "renderer/config.json",
+                                        "renderer/diffusion_pytorch_model.safetensors",
+                                        "vae/config.json",
+                                        "vae/diffusion_pytorch_model.safetensors",
+                                        "scheduler/scheduler_config.json",
+                                        "conditioning/conditioning.safetensors"};
+    struct files files;
+    size_t i;
+    memset(&files, 0, sizeof files);
+    for (i = 0; i < sizeof paths / sizeof *paths; ++i)
+        read_one(&files, renderer, paths[i]);
+    return files;
+}
+
+static sr_world_desc with_files(const struct files* files)
+{
+    sr_world_desc desc = world_of(NULL);
+    desc.model_files = files->files;
+    desc.model_file_count = files->count;
+    return desc;
+}
+
+static void draw(sr_context* context, sr_world* world, float* color)
+{
+    sr_draw_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.struct_size = sizeof desc;
+    desc.width = WIDTH;
+    desc.height = HEIGHT;
+    desc.fx = desc.fy = desc.cx = WIDTH / 2;
+    desc.cy = HEIGHT / 2;
+    look(1, desc.world_to_camera);
+    desc.color.memory = color;
+    CHECK_OK(context, sr_world_draw(world, &desc));
+}
+
+static sr_world_info info_of(sr_world* world)
+{
+    sr_world_info info;
+    memset(&info, 0, sizeof info);
+    info.struct_size = sizeof info;
+    CHECK(sr_world_get_info(world, &info) == SR_OK);
+    return info;
+}
+
+static float from_folder[PIXELS * 4], from_memory[PIXELS * 4];
+
+/* a world that finds all of its tiles there; they come in another order, so that sums of splats round in another way */
+static void from_cache(sr_context* context, sr_world_desc desc, float* color)
+{
+    sr_world* world = NULL;
+    desc.cache = folder;
+    CHECK_OK(context, sr_world_create(context, &desc, &world));
+    walk(context, world, 2, 2);
+    draw(context, world, color);
+    CHECK(info_of(world).generated == 0 && info_of(world).loaded > 0);
+    sr_world_destroy(world);
+}
+
+/* generated from the folder into a cache, generated from memory, and read from the folder's cache */
+static sr_world* worlds_are_the_same(sr_context* context, struct files* files)
+{
+    sr_world_desc desc = world_of(model);
+    sr_world *read = NULL, *made = NULL;
+    char command[1024];
+    snprintf(command, sizeof command, "rm -rf '%s'", folder);
+    CHECK(system(command) == 0);
+    desc.cache = folder;
+    CHECK_OK(context, sr_world_create(context, &desc, &read));
+    walk(context, read, 2, 2);
+    draw(context, read, from_folder);
+    CHECK(from_folder[4 * PIXELS - 1] > 0.5f);
+    CHECK_OK(context, sr_world_flush(read));
+    sr_world_destroy(read);
+    desc = with_files(files);
+    CHECK_OK(context, sr_world_create(context, &desc, &made));
+    walk(context, made, 2, 2);
+    draw(context, made, from_memory);
+    CHECK(info_of(made).generated > 0 && !memcmp(from_folder, from_memory, sizeof from_folder));
+    from_cache(context, world_of(model), from_folder);
+    from_cache(context, with_files(files), from_memory);
+    CHECK(!memcmp(from_folder, from_memory, sizeof from_folder));
+    return made;
+}
+
+/* in a folder of its own among the files */
+static void a_model_may_lie_deeper(sr_context* context)
+{
+    struct files files = model_in_memory();
+    sr_world_desc desc = with_files(&files);
+    sr_world* world = NULL;
+    files.files[0].path = "models/street/voxfield_transformer/config.json";
+    files.files[1].path = "models/street/voxfield_transformer/diffusion_pytorch_model.safetensors";
+    desc = with_files(&files);
+    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_BAD_INPUT && says(context, "diffusers layout"));
+    desc.model = "models/street";
+    CHECK_OK(context, sr_world_create(context, &desc, &world));
+    sr_world_destroy(world);
+    free_files(&files);
+}
+
+static void refuses_wrong_files(sr_context* context)
+{
+    struct files files = model_in_memory();
+    sr_world_desc desc = with_files(&files);
+    sr_world* world = NULL;
+    desc.model_file_count = 0;
+    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "come together"));
+    desc = with_files(&files);
+    desc.model_files = NULL;
+    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "come together"));
+    desc.model_file_count = 0;
+    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "model is NULL"));
+    desc = with_files(&files);
+    files.files[0].path = "../config.json";
+    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "../config.json"));
+    files.files[0].path = "a/../../config.json";
+    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "expected one below"));
+    files.files[0].path = "/config.json";
+    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "expected one below"));
+    files.files[0].path = "";
+    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "expected one below"));
+    files.files[0].path = NULL;
+    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "file 0 of 2 has no path"));
+    files.files[0].path = "./diffusion_pytorch_model.safetensors";
+    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "two files"));
+    files.files[0].path = "config.json";
+    desc.model_file_count = 1;
+    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_BAD_INPUT && says(context, "safetensors"));
+    desc = with_files(&files);
+    files.files[1].bytes -= 4;
+    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_BAD_INPUT && says(context, "safetensors"));
+    files.files[1].bytes = 0;
+    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_BAD_INPUT && says(context, "safetensors"));
+    files.files[1].bytes = 4;
+    files.files[1].data = NULL;
+    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "file 1 of 2"));
+    CHECK(!world);
+    free(files.memory[0]);
+    free(files.memory[1]);
+}
+
+static sr_chain_desc chain_desc(void)
+{
+    sr_chain_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.struct_size = sizeof desc;
+    desc.width = WIDTH;
+    desc.height = HEIGHT;
+    desc.steps = 1;
+    desc.noise = SR_NOISE_FRESH;
+    return desc;
+}
+
+static void refine(sr_context* context, sr_chain* chain, uint8_t* frame)
+{
+    static uint8_t seen[PIXELS * 4];
+    sr_frame_desc desc;
+    sr_target target;
+    uint32_t done = 0, i;
+    for (i = 0; i < sizeof seen; ++i)
+        seen[i] = (uint8_t)(i % 4 == 3 ? 255 : i * 7);
+    memset(&desc, 0, sizeof desc);
+    desc.struct_size = sizeof desc;
+    desc.seen.memory = seen;
+    memset(&target, 0, sizeof target);
+    target.memory = frame;
+    CHECK_OK(context, sr_chain_begin(chain, &desc));
+    while (!done)
+        CHECK_OK(context, sr_chain_step(chain, 20000, &done));
+    CHECK_OK(context, sr_chain_take(chain, &target));
+}
+
+static uint64_t device_bytes(sr_chain* chain)
+{
+    sr_chain_info info;
+    memset(&info, 0, sizeof info);
+    info.struct_size = sizeof info;
+    CHECK(sr_chain_get_info(chain, &info) == SR_OK);
+    return info.device_bytes;
+}
+
+/* also where networks are loaded in turn, and so are read again for every frame */
+static void chains_are_the_same(sr_context* context)
+{
+    static uint8_t expected[PIXELS * 4], found[PIXELS * 4];
+    struct files files = renderer_in_memory();
+    sr_chain_desc desc = chain_desc();
+    sr_context_desc small;
+    sr_context* in_turns = NULL;
+    sr_chain* chain = NULL;
+    desc.model = renderer;
+    CHECK_OK(context, sr_chain_create(context, &desc, &chain));
+    refine(context, chain, expected);
+    memset(&small, 0, sizeof small);
+    small.struct_size = sizeof small;
+    small.max_bytes = device_bytes(chain) - 1;
+    sr_chain_destroy(chain);
+    desc.model = NULL;
+    desc.model_files = files.files;
+    desc.model_file_count = files.count;
+    CHECK_OK(context, sr_chain_create(context, &desc, &chain));
+    refine(context, chain, found);
+    CHECK(!memcmp(found, expected, sizeof found));
+    sr_chain_destroy(chain);
+    CHECK_OK(NULL, sr_context_create(&small, &in_turns));
+    CHECK_OK(in_turns, sr_chain_create(in_turns, &desc, &chain));
+    CHECK(device_bytes(chain) < small.max_bytes);
+    refine(in_turns, chain, found);
+    CHECK(!memcmp(found, expected, sizeof found));
+    refine(in_turns, chain, found);
+    sr_chain_destroy(chain);
+    sr_context_destroy(in_turns);
+    desc.model_file_count = 1;
+    CHECK(sr_chain_create(context, &desc, &chain) == SR_ERR_BAD_INPUT && says(context, "has no"));
+    desc.model_files = NULL;
+    CHECK(sr_chain_create(context, &desc, &chain) == SR_ERR_USAGE && says(context, "come together") && !chain);
+    free_files(&files);
+}
+
+int main(int argc, char** argv)
+{
+    const struct host host = make_host();
+    const sr_vulkan_device vulkan = lent(&host);
+    sr_context_desc desc;
+    sr_context* context = NULL;
+    sr_world* world;
+    struct files files;
+    CHECK(argc == 4);
+    model = argv[1];
+    renderer = argv[2];
+    folder = argv[3];
+    sr_set_diagnostic_callback(print_line, stderr);
+    memset(&desc, 0, sizeof desc);
+    desc.struct_size = sizeof desc;
+    desc.vulkan = &vulkan;
+    CHECK_OK(NULL, sr_context_create(&desc, &context));
+    files = model_in_memory();
+    world = worlds_are_the_same(context, &files);
+    refuses_wrong_files(context); /* while a world has files of the same names */
+    a_model_may_lie_deeper(context);
+    sr_world_destroy(world);
+    free_files(&files);
+    chains_are_the_same(context);
+    sr_context_destroy(context);
+    destroy_host(&host);
+    return 0;
+}

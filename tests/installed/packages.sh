@@ -1,0 +1,67 @@
+#!/bin/sh
+# SPDX-FileCopyrightText: semrover authors
+# SPDX-License-Identifier: Apache-2.0
+# Makes Debian packages, looks at what they say and hold, unpacks them beside each other, runs the program there, and
+# builds a host against what is there. Without dpkg's tools it says so.
+# packages.sh CPACK CMAKE BUILD HOST.c
+set -eu
+cpack=$1 cmake=$2 build=$3 source=$4
+here=$(dirname "$0")
+command -v dpkg-shlibdeps >/dev/null || { echo "SKIP: no dpkg-shlibdeps"; exit 77; }
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+(cd "$build" && "$cpack" -G DEB -B "$folder") >"$folder/cpack.log" 2>&1 || { cat "$folder/cpack.log"; exit 1; }
+
+version=$("$build/semrover" --version | sed 's/[^0-9]*\([0-9.]*\).*/\1/')
+machine=$(dpkg --print-architecture)
+say() { dpkg-deb -f "$folder/$1_${version}_$machine.deb" "$2"; }
+holds() {
+    dpkg-deb -c "$folder/$1_${version}_$machine.deb" >"$folder/list"
+    grep -E "\\./$2( -> .*)?\$" "$folder/list"
+}
+lacks() { if holds "$@"; then return 1; fi; }
+expect() { echo "$1" | grep -E "$2" || { echo "no $2 in: $1"; exit 1; }; }
+
+test "$(ls "$folder"/*.deb | wc -l)" = 3
+libdir=usr/lib/[^/]+
+for program in semrover semrover-eval semrover-scenes; do holds semrover "usr/bin/$program"; done
+holds libsemrover0 "$libdir/libsemrover.so.0"
+holds libsemrover0 "$libdir/libsemrover.so.$version"
+holds libsemrover-dev "$libdir/libsemrover.so"
+holds libsemrover-dev usr/include/semrover.h
+holds libsemrover-dev "$libdir/pkgconfig/semrover.pc"
+holds libsemrover-dev "$libdir/cmake/semrover/semroverConfig.cmake"
+holds libsemrover-dev usr/share/semrover/host/vulkan_host.c
+for package in semrover libsemrover0 libsemrover-dev; do
+    holds "$package" "usr/share/doc/$package/copyright"
+    dpkg-deb -I "$folder/${package}_${version}_$machine.deb" >"$folder/info"
+    expect "$(say "$package" Version)" "^$version\$"
+    expect "$(say "$package" Architecture)" "^$machine\$"
+    expect "$(say "$package" Maintainer)" authors
+    expect "$(say "$package" Description)" street
+done
+lacks libsemrover-dev 'usr/include/[^.]*/.*' # no header of ours besides
+lacks libsemrover-dev 'usr/bin/.+'
+expect "$(say libsemrover0 Depends)" 'libc6 \(>=.*libvulkan1'
+expect "$(say semrover Depends)" 'libpng16-16.*libvulkan1|libvulkan1.*libpng16-16'
+expect "$(say libsemrover-dev Depends)" "libsemrover0 \\(= $version\\)"
+if test -x "$build/semrover-view"; then
+    holds semrover usr/bin/semrover-view
+    expect "$(say semrover Depends)" "libsemrover0 \\(= $version\\)"
+    expect "$(say semrover Depends)" libglfw3
+fi
+
+for package in "$folder"/*.deb; do dpkg-deb -x "$package" "$folder/root"; done
+pc=$(dirname "$(find "$folder/root" -name semrover.pc)")
+LD_LIBRARY_PATH=$pc/.. && export LD_LIBRARY_PATH
+"$folder/root/usr/bin/semrover" --version
+"$folder/root/usr/bin/semrover" bench --help >/dev/null # of another program beside it
+test ! -x "$build/semrover-view" || "$folder/root/usr/bin/semrover" view --help >/dev/null
+mkdir "$folder/host"
+cp "$here/CMakeLists.txt" "$folder/host"
+cp "$source" "$folder/host/host.c"
+"$cmake" -S "$folder/host" -B "$folder/build" -DCMAKE_PREFIX_PATH="$folder/root/usr" >"$folder/configure.log"
+"$cmake" --build "$folder/build" >"$folder/build.log" || { cat "$folder/build.log"; exit 1; }
+"$folder/build/host" 2>&1 | grep usage
+cc -std=c99 -o "$folder/by_hand" "$source" $(PKG_CONFIG_PATH=$pc pkg-config --cflags --libs semrover)
+"$folder/by_hand" 2>&1 | grep usage

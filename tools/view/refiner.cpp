@@ -1,0 +1,82 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/view/refiner.h"
+
+#include "tools/view/figures.h"
+
+namespace semrover::view {
+
+Refiner::~Refiner()
+{
+    sr_chain_destroy(chain_);
+}
+
+Status Refiner::open(uint32_t width, uint32_t height)
+{
+    if (chain_ && width == width_ && height == height_)
+        return {};
+    sr_chain_destroy(chain_);
+    chain_ = nullptr;
+    sr_chain_desc desc{};
+    desc.struct_size = sizeof desc;
+    desc.steps = request_.steps;
+    desc.model = request_.model.c_str();
+    desc.width = width_ = width;
+    desc.height = height_ = height;
+    desc.seed = request_.seed;
+    desc.noise = SR_NOISE_FRESH; // a frame alone: its picture does not depend on those before
+    SR_CHECK(checked(sr_chain_create(context_, &desc, &chain_), context_));
+    sr_chain_info info{};
+    info.struct_size = sizeof info;
+    SR_CHECK(checked(sr_chain_get_info(chain_, &info), context_));
+    steps_ = info.steps;
+    return {};
+}
+
+Status Refiner::begin(const Street& street, const Camera& camera, const Picture& picture)
+{
+    cancel();
+    SR_CHECK(open(picture.width(), picture.height()));
+    SR_CHECK(checked(sr_chain_restart(chain_), context_));
+    sr_frame_desc frame{};
+    frame.struct_size = sizeof frame;
+    frame.world = street.world();
+    sr_draw_desc draw{};
+    draw.width = picture.width();
+    draw.height = picture.height();
+    camera.aim(draw);
+    frame.fx = draw.fx;
+    frame.fy = draw.fy;
+    frame.cx = draw.cx;
+    frame.cy = draw.cy;
+    std::copy_n(draw.world_to_camera, 12, frame.world_to_camera);
+    SR_CHECK(checked(sr_chain_begin(chain_, &frame), context_));
+    busy_ = true;
+    return {};
+}
+
+Result<bool> Refiner::step(uint64_t budget_us, const Picture& picture)
+{
+    const Stopwatch watch;
+    uint32_t done = 0;
+    if (const Status status = checked(sr_chain_step(chain_, budget_us, &done), context_); !status) {
+        busy_ = false;
+        return tl::make_unexpected(status.error());
+    }
+    step_ms_ = watch.ms();
+    if (!done)
+        return false;
+    busy_ = false;
+    const sr_target target = picture.refined();
+    SR_CHECK(checked(sr_chain_take(chain_, &target), context_));
+    return true;
+}
+
+void Refiner::cancel()
+{
+    if (busy_)
+        sr_chain_cancel(chain_);
+    busy_ = false;
+}
+
+} // namespace semrover::view

@@ -1,0 +1,57 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "runtime/base/file.h"
+#include "tools/view/camera.h"
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace semrover::view {
+
+struct StreetRequest {
+    Path grid; // a .sgrid or a folder of tiles
+    std::string model, objects, cache;
+    uint64_t seed = 0, host_bytes = 0, splat_bytes = 0;
+    uint32_t steps = 0;      // 0: as the model says
+    double splat_radius = 0; // metres; 0: from the points
+    double radius = 20;      // metres around the camera that are generated
+    std::function<void(const std::string&)> warning;
+};
+
+// a finished cell
+struct PlacedCell {
+    sr_cell cell{};
+    std::vector<std::array<float, 6>> points; // x, y, z, r, g, b
+};
+
+// The world that is looked at: a sr_world of the library.
+class Street {
+  public:
+    static Result<std::unique_ptr<Street>> open(sr_context* context, const StreetRequest& request);
+    ~Street();
+
+    sr_world* world() const { return world_; }
+    const Camera& start() const { return start_; } // over a road, where there is one
+    double radius = 20;
+
+    Status focus(const Camera& camera);
+    Result<bool> step(uint64_t budget_us); // true: all that is wanted is there
+    Result<sr_world_info> info() const;
+    Result<std::vector<PlacedCell>> cells(const sr_window& window) const; // those that are finished
+    Status edit(const std::vector<sr_cell>& cells);
+    Status save(const Path& path) const; // all finished cells in memory, as .sgrid
+
+  private:
+    explicit Street(sr_context* context) : context_(context) {}
+    Status create(const StreetRequest& request);
+
+    sr_context* context_;
+    sr_world* world_ = nullptr;
+    Camera start_;
+};
+
+} // namespace semrover::view
