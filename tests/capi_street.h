@@ -59,7 +59,7 @@ static sr_world_desc world_of(const char* model)
 }
 
 /* until all around x is there */
-static void walk(sr_context* context, sr_world* world, double x, double radius)
+static inline void walk(sr_context* context, sr_world* world, double x, double radius)
 {
     const double position[3] = {x, 0, 1.5}, forward[3] = {1, 0, 0};
     uint32_t done = 0, steps = 0;
