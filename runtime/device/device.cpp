@@ -231,6 +231,7 @@ Status Device::finish(const DeviceOptions& options)
     sharing_.semaphores = sharing_.semaphores && can.semaphores && vk_.GetSemaphoreFdKHR;
     budget_ = options.max_bytes;
     cancelled_ = options.cancelled;
+    autotunes_ = options.autotune;
     if (owned_)
         SR_CHECK(override_limits(limits_, environment("SEMROVER_LIMITS")));
     SR_CHECK(override_limits(limits_, options.limits));

@@ -5,6 +5,7 @@
 #include "runtime/device/memory.h"
 #include "runtime/device/vulkan_calls.h"
 #include "runtime/graph/limits.h"
+#include "runtime/graph/tile_choices.h"
 #include "runtime/graph/work_rates.h"
 
 #include <functional>
@@ -33,6 +34,7 @@ struct DeviceOptions {
     std::span<const std::byte> pipeline_cache = {};
     // for every Vulkan object, read while the device is made; null: the driver's own
     const VkAllocationCallbacks* allocation = nullptr;
+    bool autotune = true;     // programs try tiles in their first runs, where a device has a watchdog
     bool share_by_fd = false; // enables what Sharing needs, where there is it; a host's device says what it has
 };
 
@@ -102,6 +104,8 @@ class Device {
     const Sharing& sharing() const { return sharing_; }
     const MemorySource& memory_source() const { return memory_source_; }
     WorkRates& rates() { return rates_; }
+    TileChoices& tiles() { return tiles_; } // kept with the pipeline cache
+    bool autotunes() const { return autotunes_; }
     PipelineStore& pipelines() { return *pipelines_; }
 
     // synchronous copies, after everything submitted so far; through staging where the host cannot see the memory
@@ -163,6 +167,8 @@ class Device {
     HostBytes host_bytes_;
     DeviceLimits limits_;
     WorkRates rates_;
+    TileChoices tiles_;
+    bool autotunes_ = true;
     std::string name_, driver_;
     double timestamp_ns_ = 1;
     uint64_t allocated_ = 0, peak_ = 0, budget_ = 0;

@@ -38,39 +38,49 @@ std::string cache_path(Device& device)
     return (root / "semrover" / (name + ".bin")).string();
 }
 
-std::array<char, 8> checksum(const std::vector<char>& blob)
+using Checksum = std::array<char, 8>;
+
+Checksum checksum(std::string_view bytes)
 {
     Hash hash;
-    hash.add(std::as_bytes(std::span(blob)));
-    return std::bit_cast<std::array<char, 8>>(hash.value());
+    hash.add(std::as_bytes(std::span(bytes)));
+    return std::bit_cast<Checksum>(hash.value());
 }
 
-// drivers trust what follows the header: a truncated, damaged or foreign blob must not reach them. It is the checksum
-// and the driver's data
-std::vector<char> data_of(std::string_view blob, Device& device)
+// A file, or a host's blob: a checksum, and under it the bytes of the tiles' text, that text, and the driver's data.
+struct Kept {
+    std::string_view tiles, data; // empty: none, or none that can be used
+};
+
+bool is_ours(std::string_view data, Device& device)
 {
-    std::array<char, 8> expected{};
-    if (blob.size() < expected.size())
-        return {};
-    std::ranges::copy(blob.substr(0, expected.size()), expected.begin());
-    std::vector<char> data(blob.begin() + expected.size(), blob.end());
-    if (checksum(data) != expected)
-        return {};
     VkPhysicalDeviceProperties p;
     device.vk().GetPhysicalDeviceProperties(device.physical(), &p);
     VkPipelineCacheHeaderVersionOne header;
     if (data.size() < sizeof header)
-        return {};
+        return false;
     std::memcpy(&header, data.data(), sizeof header);
-    const bool ours = header.vendorID == p.vendorID && header.deviceID == p.deviceID &&
-                      !std::memcmp(header.pipelineCacheUUID, p.pipelineCacheUUID, VK_UUID_SIZE);
-    return ours ? std::move(data) : std::vector<char>{};
+    return header.vendorID == p.vendorID && header.deviceID == p.deviceID &&
+           !std::memcmp(header.pipelineCacheUUID, p.pipelineCacheUUID, VK_UUID_SIZE);
 }
 
-std::vector<char> load_data(const std::string& path, Device& device)
+// drivers trust what follows the header: a truncated, damaged or foreign blob must not reach them
+Kept parse(std::string_view blob, Device& device)
 {
-    const auto file = read_text_file(path, kMaxCacheBytes); // what is no file is no cache
-    return file ? data_of(*file, device) : std::vector<char>{};
+    Checksum sum;
+    uint64_t tile_bytes = 0;
+    if (blob.size() < sizeof sum + sizeof tile_bytes)
+        return {};
+    std::memcpy(sum.data(), blob.data(), sizeof sum);
+    blob.remove_prefix(sizeof sum);
+    if (checksum(blob) != sum)
+        return {};
+    std::memcpy(&tile_bytes, blob.data(), sizeof tile_bytes);
+    blob.remove_prefix(sizeof tile_bytes);
+    if (tile_bytes > blob.size())
+        return {};
+    const Kept kept{blob.substr(0, tile_bytes), blob.substr(tile_bytes)};
+    return is_ours(kept.data, device) ? kept : Kept{};
 }
 
 } // namespace
@@ -80,20 +90,24 @@ Result<std::unique_ptr<PipelineStore>> PipelineStore::create(Device& device, std
     std::unique_ptr<PipelineStore> store(new PipelineStore(device));
     if (device.owned() && blob.empty())
         store->cache_path_ = cache_path(device);
+    std::string file;
+    if (!store->cache_path_.empty())
+        file = read_text_file(store->cache_path_, kMaxCacheBytes).value_or(""); // what is no file is no cache
     const std::string_view given(reinterpret_cast<const char*>(blob.data()), blob.size());
-    const std::vector<char> data =
-        store->cache_path_.empty() ? data_of(given, device) : load_data(store->cache_path_, device);
+    const Kept kept = parse(store->cache_path_.empty() ? given : file, device);
+    device.tiles().read(kept.tiles);
+    store->saved_tiles_ = device.tiles().size();
     auto info = vk_struct<VkPipelineCacheCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO);
-    info.initialDataSize = data.size();
-    info.pInitialData = data.data();
-    store->reused_bytes_ = data.size();
+    info.initialDataSize = kept.data.size();
+    info.pInitialData = kept.data.data();
+    store->reused_bytes_ = kept.data.size();
     SR_VK(device.vk().CreatePipelineCache(device.handle(), &info, device.vk().allocator(), &store->cache_));
     return store;
 }
 
 PipelineStore::~PipelineStore()
 {
-    if (unsaved_seconds_ > 0)
+    if (unsaved_seconds_ > 0 || device_.tiles().size() != saved_tiles_)
         save();
     for (auto& [key, p] : pipelines_)
         destroy(p);
@@ -105,11 +119,17 @@ Result<std::vector<char>> PipelineStore::blob() const
 {
     size_t bytes = 0;
     SR_VK(device_.vk().GetPipelineCacheData(device_.handle(), cache_, &bytes, nullptr));
-    std::vector<char> blob(bytes);
-    SR_VK(device_.vk().GetPipelineCacheData(device_.handle(), cache_, &bytes, blob.data()));
-    blob.resize(bytes);
-    const std::array<char, 8> sum = checksum(blob);
-    blob.insert(blob.begin(), sum.begin(), sum.end());
+    const std::string tiles = device_.tiles().text();
+    const uint64_t tile_bytes = tiles.size();
+    std::string kept(reinterpret_cast<const char*>(&tile_bytes), sizeof tile_bytes);
+    kept += tiles;
+    const size_t before = kept.size();
+    kept.resize(before + bytes);
+    SR_VK(device_.vk().GetPipelineCacheData(device_.handle(), cache_, &bytes, kept.data() + before));
+    kept.resize(before + bytes);
+    const Checksum sum = checksum(kept);
+    std::vector<char> blob(sum.begin(), sum.end());
+    blob.insert(blob.end(), kept.begin(), kept.end());
     return blob;
 }
 
@@ -121,6 +141,7 @@ void PipelineStore::save()
     const auto bytes = blob();
     if (bytes && make_folder(fs::path(cache_path_).parent_path()))
         (void)write_file_atomically(cache_path_, std::as_bytes(std::span(*bytes)));
+    saved_tiles_ = device_.tiles().size();
 }
 
 Result<const Pipeline*> PipelineStore::get(const KernelVariant& variant, const std::map<uint32_t, uint32_t>& constants)

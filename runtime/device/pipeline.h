@@ -23,7 +23,8 @@ struct Pipeline {
 
 // Compute pipelines by (variant, constants), made on first use, over a VkPipelineCache kept on disk in
 // $XDG_CACHE_HOME/semrover (safe to delete; a file of another driver is ignored). It is saved as pipelines are made: a
-// run that is killed, or whose device is lost, leaves what it compiled to the next.
+// run that is killed, or whose device is lost, leaves what it compiled to the next. The tiles that the device's
+// programs chose (TileChoices) are kept with it.
 class PipelineStore {
   public:
     // blob: of an earlier process, in place of the file; with a host's device there is no file either way
@@ -52,6 +53,7 @@ class PipelineStore {
     std::string cache_path_; // empty: nowhere to keep it
     size_t reused_bytes_ = 0;
     double unsaved_seconds_ = 0; // of compiling
+    size_t saved_tiles_ = 0;     // how many were chosen then
     std::map<std::pair<const KernelVariant*, std::map<uint32_t, uint32_t>>, Pipeline> pipelines_;
 };
 

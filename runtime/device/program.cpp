@@ -19,9 +19,11 @@ Result<std::unique_ptr<Program>> Program::create(Device& device, const Graph& gr
 Result<std::unique_ptr<Program>> Program::create(Device& device, Plan plan)
 {
     std::unique_ptr<Program> p(new Program(device, std::move(plan)));
-    SR_CHECK(p->allocate());
-    SR_CHECK(p->make_sets());
     p->measuring_ = device.limits().submit_seconds > 0 && device.timestamp_ns() > 0 && !p->plan_.passes.empty();
+    SR_CHECK(p->choose_tiles());
+    SR_CHECK(p->allocate());
+    SR_CHECK(p->get_pipelines());
+    SR_CHECK(p->make_sets());
     SR_CHECK(p->make_queries());
     SR_CHECK(p->record());
     return p;
@@ -38,6 +40,16 @@ Program::~Program()
         device_.vk().DestroyDescriptorPool(device_.handle(), descriptors_, device_.vk().allocator());
     if (commands_pool_)
         device_.vk().DestroyCommandPool(device_.handle(), commands_pool_, device_.vk().allocator());
+}
+
+Status Program::choose_tiles()
+{
+    if (!measuring_ || !device_.autotunes())
+        return {};
+    SR_TRY(trial_, TileTrial::begin(plan_, device_.limits(), device_.tiles()));
+    if (trial_.changed())
+        stage::schedule(plan_, device_.limits(), device_.rates().seconds(plan_));
+    return {};
 }
 
 Status Program::allocate()
@@ -59,15 +71,23 @@ std::pair<VkBuffer, uint64_t> Program::locate(const PassBinding& b) const
     return {blocks_[p.block]->handle(), p.offset + b.offset};
 }
 
+Status Program::get_pipelines()
+{
+    pipelines_.clear();
+    for (const Pass& pass : plan_.passes) {
+        SR_TRY(const Pipeline* pipeline, device_.pipelines().get(*pass.variant, pass.constants));
+        pipelines_.push_back(pipeline);
+    }
+    return {};
+}
+
 Status Program::make_sets()
 {
     uint32_t storage = 0, texel = 0;
     std::vector<VkDescriptorSetLayout> layouts;
-    for (const Pass& pass : plan_.passes) {
-        SR_TRY(const Pipeline* pipeline, device_.pipelines().get(*pass.variant, pass.constants));
-        pipelines_.push_back(pipeline);
-        layouts.push_back(pipeline->set_layout);
-        for (const PassBinding& b : pass.bindings)
+    for (size_t i = 0; i < plan_.passes.size(); ++i) {
+        layouts.push_back(pipelines_[i]->set_layout);
+        for (const PassBinding& b : plan_.passes[i].bindings)
             ++(b.kind == BindingKind::texel ? texel : storage);
     }
     if (plan_.passes.empty())
@@ -210,7 +230,7 @@ void Program::record_dispatch(VkCommandBuffer commands, size_t index, bool timed
 Result<uint64_t> Program::submit()
 {
     SR_CHECK(device_.check_cancelled());
-    if (measuring_ && runs_ == 1)
+    if (measuring_ && runs_ > 0)
         SR_CHECK(schedule_again());
     const auto begin = std::chrono::steady_clock::now();
     uint64_t ticket = device_.last_ticket();
@@ -237,7 +257,7 @@ Result<std::vector<uint64_t>> Program::stamps() const
     return out;
 }
 
-// by what the first run took
+// by what the run before took, with the next tiles to try
 Status Program::schedule_again()
 {
     SR_CHECK(device_.wait(device_.last_ticket()));
@@ -253,12 +273,16 @@ Status Program::schedule_again()
         if (pass.options.most_operations > 0)
             seconds[i] = std::max(seconds[i], device_.rates().seconds(pass));
     }
+    if (trial_.running()) {
+        SR_CHECK(trial_.next(plan_, seconds, device_.limits(), device_.tiles()));
+        SR_CHECK(get_pipelines());
+    }
     stage::schedule(plan_, device_.limits(), seconds);
     device_.vk().DestroyCommandPool(device_.handle(), commands_pool_, device_.vk().allocator());
     device_.vk().DestroyQueryPool(device_.handle(), queries_, device_.vk().allocator());
     commands_pool_ = VK_NULL_HANDLE; // what follows may fail
     queries_ = VK_NULL_HANDLE;
-    measuring_ = false;
+    measuring_ = trial_.running();
     SR_CHECK(make_queries());
     return record();
 }

@@ -4,6 +4,7 @@
 
 #include "runtime/device/device.h"
 #include "runtime/graph/plan.h"
+#include "runtime/graph/tile_trial.h"
 
 #include <memory>
 #include <vector>
@@ -12,7 +13,8 @@ namespace semrover {
 
 // A compiled graph on a device: arena, pipelines, descriptor sets and recorded command buffers; run any number of
 // times, each run one submit, or several short ones where the device has a watchdog. The first run is measured then,
-// and the second waits for it once and cuts submits by what passes really took.
+// and the second waits for it once and cuts submits by what passes really took. A program with tiles to try measures
+// some more (TileTrial).
 class Program {
   public:
     static Result<std::unique_ptr<Program>> create(Device& device, const Graph& graph);
@@ -33,7 +35,9 @@ class Program {
 
   private:
     Program(Device& device, Plan plan) : device_(device), plan_(std::move(plan)) {}
+    Status choose_tiles();
     Status allocate();
+    Status get_pipelines();
     Status make_sets();
     Status bind(const Pass& pass, VkDescriptorSet set);
     Status make_queries();
@@ -55,7 +59,8 @@ class Program {
     std::vector<VkDescriptorSet> sets_;             // one per pass
     std::vector<VkBufferView> views_;
     std::vector<VkCommandBuffer> commands_; // one per submit
-    bool measuring_ = false;                // the first run, whose passes are timed to cut submits by
+    bool measuring_ = false;                // the first run, or one of a trial: its passes are timed
+    TileTrial trial_;
     double host_us_ = 0;
     uint64_t runs_ = 0;
 };

@@ -145,6 +145,8 @@ Pass band_of(const Pass& whole, uint32_t first, uint32_t count, uint32_t total, 
     return pass;
 }
 
+} // namespace
+
 Status count_groups(Pass& pass, const DeviceLimits& limits)
 {
     uint32_t* n = pass.group_count;
@@ -170,8 +172,6 @@ Status count_groups(Pass& pass, const DeviceLimits& limits)
                         pass.kernel->name, n[i], i, limits.max_groups);
     return {};
 }
-
-} // namespace
 
 Status slice(Plan& plan, const DeviceLimits& limits)
 {

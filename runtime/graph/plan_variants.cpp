@@ -59,94 +59,6 @@ int preference(std::string_view name, const DeviceLimits& limits)
     return name.empty() ? 2 : 3; // "", "simt"
 }
 
-void set_constant(Pass& pass, std::string_view name, uint32_t value)
-{
-    const ConstantInfo* c = pass.variant->constant(name);
-    if (c && c->value != value)
-        pass.constants[c->id] = value;
-}
-
-// The tile of a workgroup. Where its lanes may lie otherwise (col_lanes of them side by side), as few outputs as can be
-// are computed beyond the last row and column.
-void fit_tile(Pass& pass)
-{
-    const ConstantInfo *lanes = pass.variant->constant(protocol::kColLanes),
-                       *m = pass.variant->constant(protocol::kTileRows),
-                       *n = pass.variant->constant(protocol::kTileCols);
-    if (m)
-        pass.tile_rows = m->value;
-    if (n)
-        pass.tile_cols = n->value;
-    if (!lanes || pass.grid.unit != Grid::Unit::tiles)
-        return;
-    const uint32_t all = pass.variant->local_size[0];
-    const uint32_t lane_rows = m->value * lanes->value / all, lane_cols = n->value / lanes->value;
-    const auto outputs = [&](uint32_t across) {
-        return uint64_t(round_up(pass.grid.x, lane_rows * (all / across))) * round_up(pass.grid.y, lane_cols * across);
-    };
-    uint32_t best = lanes->value;
-    for (uint32_t across = all; across >= 1; across /= 2)
-        if (outputs(across) < outputs(best))
-            best = across;
-    pass.tile_rows = lane_rows * (all / best);
-    pass.tile_cols = lane_cols * best;
-    pass.set_push(protocol::kColLanesMember, best);
-}
-
-// of a pass whose workgroups make square tiles
-uint64_t workgroups(const Pass& pass, uint32_t tile)
-{
-    return uint64_t(divide_up(pass.grid.x, tile)) * divide_up(pass.grid.y, tile) * std::max(pass.grid.z, 1u);
-}
-
-void set_tile(Pass& pass, uint32_t tile)
-{
-    pass.tile_rows = pass.tile_cols = tile;
-    set_constant(pass, protocol::kTileRows, tile);
-    set_constant(pass, protocol::kTileCols, tile);
-}
-
-// Square tiles that a variant can make, and the workgroups from which a large GPU has enough to do with each. All give
-// the same bits, so the choice may depend on the number of rows.
-struct SquareTile {
-    uint32_t size, enough;
-};
-
-SquareTile largest_that_fills(const Pass& pass, std::span<const SquareTile> tiles)
-{
-    for (const SquareTile& t : tiles)
-        if (workgroups(pass, t.size) >= t.enough)
-            return t;
-    return tiles.back();
-}
-
-// Shape and threads of cooperative matrices. Four subgroups share a tile: a lane holds 128 sums at most, and has
-// something to load.
-void fit_matrices(Pass& pass, const DeviceLimits& limits)
-{
-    if (!(pass.variant->needs & kNeedsCooperativeMatrix))
-        return;
-    constexpr uint32_t kMostSums = 128, kLoadsOfSmall = 32 * 32 / 8;
-    constexpr SquareTile kTiles[] = {{128, 256}, {64, 128}, {32, 0}};
-    const MatrixShape& shape = limits.matrix;
-    set_constant(pass, protocol::kMatM, shape.m);
-    set_constant(pass, protocol::kMatN, shape.n);
-    set_constant(pass, protocol::kMatK, shape.k);
-    set_constant(pass, protocol::kThreads, 4 * shape.subgroup);
-    if (pass.tile_rows != kTiles[0].size || pass.tile_cols != kTiles[0].size)
-        return;
-    const size_t first = kTiles[0].size * kTiles[0].size / (4 * shape.subgroup) > kMostSums;
-    const size_t last = 4 * shape.subgroup <= kLoadsOfSmall ? 3 : 2;
-    set_tile(pass, largest_that_fills(pass, std::span(kTiles).subspan(first, last - first)).size);
-}
-
-void fit_simt_tile(Pass& pass)
-{
-    constexpr SquareTile kTiles[] = {{64, 128}, {32, 0}};
-    if (pass.variant->name == "simt" && pass.tile_rows == kTiles[0].size && pass.tile_cols == kTiles[0].size)
-        set_tile(pass, largest_that_fills(pass, kTiles).size);
-}
-
 Status bind(Pass& pass)
 {
     const auto& declared = pass.variant->bindings;
@@ -154,12 +66,21 @@ Status bind(Pass& pass)
         const Tensor& t = pass.tensors[b];
         pass.bindings.push_back(
             {t.resource, t.offset, t.bytes(), declared[b].access, declared[b].kind, declared[b].name});
-        set_constant(pass, protocol::half_constant(declared[b].name), t.dtype == DType::f16);
+        pass.set_constant(protocol::half_constant(declared[b].name), t.dtype == DType::f16);
     }
     return {};
 }
 
 } // namespace
+
+void Pass::set_constant(std::string_view name, uint32_t value)
+{
+    const ConstantInfo* c = variant->constant(name);
+    if (c && c->value != value)
+        constants[c->id] = value;
+    else if (c)
+        constants.erase(c->id);
+}
 
 void Pass::set_push(std::string_view name, uint32_t value)
 {
@@ -192,10 +113,8 @@ Status stage::pick_variants(Plan& plan, const DeviceLimits& limits)
                 "storage buffers a shader)",
                 pass.kernel->name, limits.max_shared_bytes, limits.max_group_threads, limits.max_storage_buffers);
         for (const ConstantValue& c : pass.options.constants)
-            set_constant(pass, c.name, c.value);
-        fit_tile(pass);
-        fit_matrices(pass, limits);
-        fit_simt_tile(pass);
+            pass.set_constant(c.name, c.value);
+        fit_tile(pass, limits);
         SR_CHECK(bind(pass));
     }
     return {};

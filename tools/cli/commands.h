@@ -19,6 +19,7 @@ namespace semrover {
 struct Globals {
     std::string device;    // name or index; empty: the best there is
     uint64_t max_vram = 0; // bytes; 0: what the device has
+    bool autotune = true;  // measure which tiles run fastest
     bool yes = false;      // replace existing files
     bool quiet = false;    // no progress
     bool verbose = false;

@@ -12,6 +12,7 @@ Result<std::unique_ptr<Device>> open_device(const Globals& globals, const std::s
     DeviceOptions options;
     options.select = globals.device;
     options.max_bytes = globals.max_vram;
+    options.autotune = globals.autotune;
     options.cancelled = interrupt_requested;
     SR_TRY(auto device, Device::create(options));
     if (!profile.empty())

@@ -54,6 +54,7 @@ void add_globals(CLI::App& app, Globals& globals)
     };
     app.add_option_function<std::string>("--max-vram", set_max_vram,
                                          "device memory to use at most, such as 6GiB, 500MB or 2.2 (GB)");
+    app.add_flag("!--no-autotune", globals.autotune, "do not measure which tiles run fastest; the bytes are the same");
     app.add_flag("-y,--yes", globals.yes, "replace existing files");
     app.add_flag("-q,--quiet", globals.quiet, "no progress");
     app.add_flag("-v,--verbose", globals.verbose, "more detail");
