@@ -3,8 +3,8 @@
 // golden kind asd_rollout: a chain of frames through encoder, denoiser and decoder
 #include "engine/refine/asd.h"
 #include "tools/verify/golden_case.h"
+#include "tools/verify/golden_networks.h"
 #include "tools/verify/planar.h"
-#include "tools/verify/renderer_networks.h"
 
 #include <algorithm>
 
@@ -12,7 +12,7 @@ namespace semrover {
 
 Result<GoldenOutputs> run_asd_rollout(Device& device, const GoldenCase& c, DType precision)
 {
-    SR_TRY(const RendererNetworks n, load_networks(device, c.model(), precision));
+    SR_TRY(const GoldenNetworks n, load_networks(device, c.model(), precision));
     std::vector<std::string> warnings;
     SR_TRY(const SchedulerConfig scheduler,
            scheduler_config_from_json(c.params().value("scheduler", nlohmann::json()), warnings));

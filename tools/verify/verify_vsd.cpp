@@ -4,8 +4,8 @@
 #include "engine/refine/video_decoder.h"
 #include "engine/refine/vsd.h"
 #include "tools/verify/golden_case.h"
+#include "tools/verify/golden_networks.h"
 #include "tools/verify/planar.h"
-#include "tools/verify/renderer_networks.h"
 
 #include <algorithm>
 
@@ -21,7 +21,7 @@ struct WindowInputs {
     std::vector<float> buffers, visible, text, added, noise;
 };
 
-Result<WindowInputs> window_inputs(const GoldenCase& c, const RendererNetworks& n)
+Result<WindowInputs> window_inputs(const GoldenCase& c, const GoldenNetworks& n)
 {
     const auto shape = c.shape("input.buffers"), text_shape = c.shape("input.encoder_hidden_states"); // [F, 3, H, W]
     if (shape.size() != 4 || text_shape.size() != 3 || text_shape[0] != 1 || text_shape[1] > 4096 || shape[0] == 0 ||
@@ -67,7 +67,7 @@ Status encode_window(Device& device, const Vae& vae, const WindowInputs& in, std
 
 Result<GoldenOutputs> run_vsd_window(Device& device, const GoldenCase& c, DType precision)
 {
-    SR_TRY(const RendererNetworks n, load_networks(device, c.model(), precision));
+    SR_TRY(const GoldenNetworks n, load_networks(device, c.model(), precision));
     std::vector<std::string> warnings;
     SR_TRY(const SchedulerConfig scheduler,
            scheduler_config_from_json(c.params().value("scheduler", nlohmann::json()), warnings));

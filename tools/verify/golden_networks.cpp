@@ -1,14 +1,14 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/verify/renderer_networks.h"
+#include "tools/verify/golden_networks.h"
 
 #include "runtime/base/json.h"
 
 namespace semrover {
 
-Result<RendererNetworks> load_networks(Device& device, const Path& model, DType precision)
+Result<GoldenNetworks> load_networks(Device& device, const Path& model, DType precision)
 {
-    RendererNetworks n;
+    GoldenNetworks n;
     SR_TRY(const nlohmann::json unet_json, read_json(model / "unet" / "config.json"));
     SR_TRY(const UnetConfig unet, parse_any_unet_config(unet_json));
     SR_TRY(const Checkpoint unet_weights, Checkpoint::open_folder(model / "unet", Checkpoint::Network::unet));

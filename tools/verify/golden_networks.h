@@ -8,12 +8,12 @@
 
 namespace semrover {
 
-struct RendererNetworks {
+struct GoldenNetworks {
     std::unique_ptr<Unet> unet;
     std::unique_ptr<Vae> vae;
 };
 
 // MODEL/unet and MODEL/vae, of images or of videos
-Result<RendererNetworks> load_networks(Device& device, const Path& model, DType precision);
+Result<GoldenNetworks> load_networks(Device& device, const Path& model, DType precision);
 
 } // namespace semrover
