@@ -215,7 +215,7 @@ static sr_status run(sr_context* context, sr_grid* grid, sr_world** world)
 {
     const double position[3] = {1, 0, 1.5}, forward[3] = {1, 0, 0};
     sr_world_desc desc = world_of(model);
-    sr_draw_desc draw;
+    sr_draw_desc draw = camera_at(-1, WIDTH, HEIGHT);
     uint32_t done = 0;
     sr_status status;
     desc.labels = NULL;
@@ -233,13 +233,6 @@ static sr_status run(sr_context* context, sr_grid* grid, sr_world** world)
         if (status != SR_OK)
             return status;
     }
-    memset(&draw, 0, sizeof draw);
-    draw.struct_size = sizeof draw;
-    draw.width = WIDTH;
-    draw.height = HEIGHT;
-    draw.fx = draw.fy = draw.cx = WIDTH / 2;
-    draw.cy = HEIGHT / 2;
-    look(-1, draw.world_to_camera);
     draw.color.memory = color;
     return sr_world_draw(*world, &draw);
 }

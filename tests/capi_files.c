@@ -87,25 +87,9 @@ static sr_world_desc with_files(const struct files* files)
 
 static void draw(sr_context* context, sr_world* world, float* color)
 {
-    sr_draw_desc desc;
-    memset(&desc, 0, sizeof desc);
-    desc.struct_size = sizeof desc;
-    desc.width = WIDTH;
-    desc.height = HEIGHT;
-    desc.fx = desc.fy = desc.cx = WIDTH / 2;
-    desc.cy = HEIGHT / 2;
-    look(1, desc.world_to_camera);
+    sr_draw_desc desc = camera_at(1, WIDTH, HEIGHT);
     desc.color.memory = color;
     CHECK_OK(context, sr_world_draw(world, &desc));
-}
-
-static sr_world_info info_of(sr_world* world)
-{
-    sr_world_info info;
-    memset(&info, 0, sizeof info);
-    info.struct_size = sizeof info;
-    CHECK(sr_world_get_info(world, &info) == SR_OK);
-    return info;
 }
 
 static float from_folder[PIXELS * 4], from_memory[PIXELS * 4];
@@ -118,7 +102,7 @@ static void from_cache(sr_context* context, sr_world_desc desc, float* color)
     CHECK_OK(context, sr_world_create(context, &desc, &world));
     walk(context, world, 2, 2);
     draw(context, world, color);
-    CHECK(info_of(world).generated == 0 && info_of(world).loaded > 0);
+    CHECK(world_info(world).generated == 0 && world_info(world).loaded > 0);
     sr_world_destroy(world);
 }
 
@@ -141,7 +125,7 @@ static sr_world* worlds_are_the_same(sr_context* context, struct files* files)
     CHECK_OK(context, sr_world_create(context, &desc, &made));
     walk(context, made, 2, 2);
     draw(context, made, from_memory);
-    CHECK(info_of(made).generated > 0 && !memcmp(from_folder, from_memory, sizeof from_folder));
+    CHECK(world_info(made).generated > 0 && !memcmp(from_folder, from_memory, sizeof from_folder));
     from_cache(context, world_of(model), from_folder);
     from_cache(context, with_files(files), from_memory);
     CHECK(!memcmp(from_folder, from_memory, sizeof from_folder));

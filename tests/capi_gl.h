@@ -53,14 +53,7 @@ static sr_gl_draw_desc gl_camera(double x, const struct textures* t)
 
 static void draw_without_gl(sr_context* context, sr_world* world, double x)
 {
-    sr_draw_desc draw;
-    memset(&draw, 0, sizeof draw);
-    draw.struct_size = sizeof draw;
-    draw.width = WIDTH;
-    draw.height = HEIGHT;
-    draw.fx = draw.fy = draw.cx = WIDTH / 2;
-    draw.cy = HEIGHT / 2;
-    look(x, draw.world_to_camera);
+    sr_draw_desc draw = camera_at(x, WIDTH, HEIGHT);
     draw.color.memory = color;
     draw.normal.memory = normal;
     draw.depth.memory = depth;

@@ -18,15 +18,7 @@ static const char *model, *cache;
 
 static sr_draw_desc camera(double x)
 {
-    sr_draw_desc draw;
-    memset(&draw, 0, sizeof draw);
-    draw.struct_size = sizeof draw;
-    draw.width = WIDTH;
-    draw.height = HEIGHT;
-    draw.fx = draw.fy = draw.cx = WIDTH / 2;
-    draw.cy = HEIGHT / 2;
-    look(x, draw.world_to_camera);
-    return draw;
+    return camera_at(x, WIDTH, HEIGHT);
 }
 
 static sr_world* make_world(sr_context* context, const sr_world_desc* desc)

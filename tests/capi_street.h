@@ -77,5 +77,26 @@ static void look(double x, double world_to_camera[12])
     memcpy(world_to_camera, to_camera, sizeof to_camera);
     world_to_camera[11] = -x;
 }
+static inline sr_draw_desc camera_at(double x, uint32_t width, uint32_t height)
+{
+    sr_draw_desc draw;
+    memset(&draw, 0, sizeof draw);
+    draw.struct_size = sizeof draw;
+    draw.width = width;
+    draw.height = height;
+    draw.fx = draw.fy = draw.cx = width / 2;
+    draw.cy = height / 2;
+    look(x, draw.world_to_camera);
+    return draw;
+}
+
+static inline sr_world_info world_info(sr_world* world)
+{
+    sr_world_info info;
+    memset(&info, 0, sizeof info);
+    info.struct_size = sizeof info;
+    CHECK(sr_world_get_info(world, &info) == SR_OK);
+    return info;
+}
 
 #endif

@@ -27,15 +27,6 @@ static sr_world_desc description(void)
     return world_of(model);
 }
 
-static sr_world_info info_of(sr_world* world)
-{
-    sr_world_info info;
-    memset(&info, 0, sizeof info);
-    info.struct_size = sizeof info;
-    CHECK(sr_world_get_info(world, &info) == SR_OK);
-    return info;
-}
-
 /* all numbers of a window's points; the caller frees them */
 static float* points_of(sr_world* world, const sr_window* window, uint64_t* cells)
 {
@@ -160,7 +151,7 @@ static void labels_of_a_grid_and_of_a_callback_give_the_same_points(sr_context* 
     b = points_of(read, &place, &b_cells);
     CHECK(a_cells == 16 * 16 && b_cells == a_cells);
     CHECK(!memcmp(a, b, (size_t)a_cells * 20 * 6 * sizeof(float)));
-    CHECK(info_of(read).finished == info_of(read).wanted && !info_of(read).full);
+    CHECK(world_info(read).finished == world_info(read).wanted && !world_info(read).full);
     free(a);
     free(b);
     sr_world_destroy(read);
@@ -234,7 +225,7 @@ static void draws_into_host_memory(sr_context* context)
     CHECK(splats.count == 0 && splats.positions.buffer);
     walk(context, world, 4, 6);
     CHECK_OK(context, sr_world_get_splats(world, &splats));
-    CHECK(splats.count == info_of(world).splats && splats.count > 5000 && splats.version > version);
+    CHECK(splats.count == world_info(world).splats && splats.count > 5000 && splats.version > version);
     CHECK(splats.positions.bytes == 16 * (uint64_t)((2u << 20) / 56) &&
           splats.labels.bytes * 4 == splats.positions.bytes);
     draw.color.memory = color;

@@ -69,8 +69,9 @@ Status TileTrial::next(Plan& plan, std::span<const double> seconds, const Device
             SR_CHECK(set_tile(plan, group, group.tiles[run_ % group.tiles.size()], limits));
             continue;
         }
-        SR_CHECK(set_tile(plan, group, best_of(group), limits));
-        choices.set(group.key, best_of(group));
+        const uint32_t best = best_of(group);
+        SR_CHECK(set_tile(plan, group, best, limits));
+        choices.set(group.key, best);
     }
     std::erase_if(groups_, [&](const Group& g) { return run_ >= kTurns * g.tiles.size(); });
     return {};

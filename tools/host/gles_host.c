@@ -280,19 +280,6 @@ static void write_ppm(const char* folder, uint32_t number, const struct picture*
     free(pixels);
 }
 
-static sr_world* make_world(sr_context* context, const char* model)
-{
-    const sr_world_desc desc = {.struct_size = sizeof desc,
-                                .model = model,
-                                .steps = 4, /* for a quick look; 0: as the model says */
-                                .labels = street_labels,
-                                .host_bytes = 256u << 20,
-                                .splat_bytes = 32u << 20};
-    sr_world* world = NULL;
-    check_sr(sr_world_create(context, &desc, &world), context);
-    return world;
-}
-
 static sr_gl* make_gl(sr_context* context)
 {
     const sr_gl_desc desc = {.struct_size = sizeof desc, .get_proc_address = eglGetProcAddress};
@@ -336,7 +323,7 @@ int main(int argc, char** argv)
     check_sr(sr_context_create(&desc, &context), NULL);
     gl = make_gl(context);
     make_picture(&picture, width, height);
-    world = make_world(context, argv[1]);
+    check_sr(make_street(context, argv[1], &world), context);
     for (n = 0; n < frames; ++n) {
         const double position[3] = {1 + 0.5 * n, 0, 1.7};
         const sr_gl_draw_desc draw = look(&picture, position, 0.1);

@@ -82,19 +82,6 @@ static void write_ppm(const char* folder, uint32_t number, uint32_t width, uint3
     check(fclose(file) == 0, path);
 }
 
-static sr_world* make_world(sr_context* context, const char* model)
-{
-    const sr_world_desc desc = {.struct_size = sizeof desc,
-                                .model = model,
-                                .steps = 4, /* for a quick look; 0: as the model says */
-                                .labels = street_labels,
-                                .host_bytes = 256u << 20,
-                                .splat_bytes = 32u << 20};
-    sr_world* world = NULL;
-    check_sr(sr_world_create(context, &desc, &world), context);
-    return world;
-}
-
 /* all that is wanted around the camera; a game takes one step a frame instead, as vulkan_host does */
 static void generate(sr_context* context, sr_world* world, const double position[3])
 {
@@ -122,7 +109,7 @@ int main(int argc, char** argv)
     make_frame(&frame, &gpu, width, height);
     scene_create(&scene, &gpu, &frame.picture.view, 1, VK_FORMAT_R8G8B8A8_UNORM, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL,
                  width, height);
-    world = make_world(gpu.context, argv[1]);
+    check_sr(make_street(gpu.context, argv[1], &world), gpu.context);
     for (n = 0; n < frames; ++n) {
         const double position[3] = {1 + 0.5 * n, 0, 1.7};
         sr_draw_desc draw;

@@ -35,4 +35,15 @@ static sr_status street_labels(void* user, const sr_window* window, sr_grid* gri
     return SR_OK;
 }
 
+static sr_status make_street(sr_context* context, const char* model, sr_world** world)
+{
+    const sr_world_desc desc = {.struct_size = sizeof desc,
+                                .model = model,
+                                .steps = 4, /* for a quick look; 0: as the model says */
+                                .labels = street_labels,
+                                .host_bytes = 256u << 20,
+                                .splat_bytes = 32u << 20};
+    return sr_world_create(context, &desc, world);
+}
+
 #endif

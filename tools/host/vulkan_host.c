@@ -254,19 +254,6 @@ static void steer(struct window* w, sr_world* world, struct drive* d, double sec
         glfwSetWindowShouldClose(w->glfw, GLFW_TRUE);
 }
 
-static sr_world* make_world(sr_context* context, const char* model)
-{
-    const sr_world_desc desc = {.struct_size = sizeof desc,
-                                .model = model,
-                                .steps = 4, /* for a quick look; 0: as the model says */
-                                .labels = street_labels,
-                                .host_bytes = 256u << 20,
-                                .splat_bytes = 32u << 20};
-    sr_world* world = NULL;
-    check_sr(sr_world_create(context, &desc, &world), context);
-    return world;
-}
-
 static void write_ppm(const char* path, const struct window* w)
 {
     const unsigned char* pixels = w->pixels.mapped;
@@ -315,7 +302,7 @@ int main(int argc, char** argv)
     }
     memset(&w, 0, sizeof w);
     open_window(&w);
-    world = make_world(w.gpu.context, argv[1]);
+    check_sr(make_street(w.gpu.context, argv[1], &world), w.gpu.context);
     before = glfwGetTime();
     for (n = 0; n != frames && !glfwWindowShouldClose(w.glfw); ++n) {
         const double now = glfwGetTime();
