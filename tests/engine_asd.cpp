@@ -254,7 +254,7 @@ TEST(engine_memory_plan, takes_the_first_policy_that_fits_and_says_what_each_nee
     RendererBytes parts;
     parts.unet = 1000;
     parts.vae = 100;
-    parts.sizes = {{10, 50, 70, 90}};
+    parts.sizes = {{10, 50, 70, 90, 60}};
     EXPECT_EQ(parts.peak(MemoryPolicy::resident), 1200u);
     EXPECT_EQ(parts.peak(MemoryPolicy::staged), 1060u);
     EXPECT_EQ(plan_memory(parts, 5, 0)->policy, MemoryPolicy::resident);

@@ -131,6 +131,22 @@ TEST(engine_sampler, guides_the_steps_from_a_timestep_on)
     EXPECT_TRUE(std::equal(alone.begin(), alone.end(), some.begin()));
 }
 
+TEST(engine_sampler, guides_the_steps_up_to_a_timestep)
+{
+    const std::vector<RegionInput> regions{patch(0, 50, 20)};
+    const SamplingPlan p = plan(Sampler::ddpm, 4, {}); // timesteps 999, 749, 499, 249
+    const auto between = [&](double from, double until) {
+        return run(p, sampling_options(Guidance{2, from, until}, 7), regions);
+    };
+    EXPECT_EQ(between(0, 999), run(p, sampling_options(2, 7), regions));
+    EXPECT_EQ(between(0, 998), between(0, 749));
+    EXPECT_NE(between(0, 998), between(0, 999));
+    EXPECT_EQ(between(300, 400), run(p, sampling_options(1, 7), regions));
+    const auto backwards = TokenSampler::create(device(), transformer(), p, sampling_options(Guidance{2, 500, 400}, 7));
+    ASSERT_FALSE(backwards);
+    EXPECT_EQ(backwards.error().code, ErrorCode::usage);
+}
+
 // a guided step and one that is not, each a run of its own that begins with what the one before left
 TEST(engine_sampler, steps_that_are_guided_and_not_follow_each_other)
 {

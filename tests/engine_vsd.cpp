@@ -118,6 +118,21 @@ TEST(engine_vsd, guidance_of_one_needs_no_unconditional_half)
         ASSERT_NEAR(plain[i], both[i], 1e-3 * (1 + std::abs(plain[i]))) << i;
 }
 
+TEST(engine_vsd, halves_one_after_the_other_give_the_same_bytes_in_less_memory)
+{
+    VsdOptions apart = options();
+    apart.halves_apart = true;
+    EXPECT_EQ(render(*renderer()), render(*renderer(apart)));
+    DeviceLimits limits = device().limits();
+    for (const bool side_by_side : {false, true}) { // as on a GPU
+        limits.side_by_side = side_by_side;
+        const auto bytes = [&](const VsdOptions& o) {
+            return VsdRenderer::planned_bytes(limits, unet(), plan(), 2, kSize, kFrames, o)->programs;
+        };
+        EXPECT_LT(bytes(apart), bytes(options()) * 7 / 10);
+    }
+}
+
 TEST(engine_vsd, stops_where_the_callback_says)
 {
     const auto r = renderer();
@@ -249,13 +264,14 @@ TEST(engine_vsd, a_frame_keeps_its_noise_from_window_to_window)
 TEST(engine_vsd, memory_is_what_was_planned)
 {
     (void)networks();
-    for (const float guidance : {1.f, 2.5f}) {
+    for (const auto& [guidance, apart] : {std::pair{1.f, false}, {1.f, true}, {2.5f, false}, {2.5f, true}}) {
+        VsdOptions o = options(guidance);
+        o.halves_apart = apart;
         const uint64_t before = device().allocated_bytes();
-        const auto planned =
-            VsdRenderer::planned_bytes(device().limits(), unet(), plan(), 2, kSize, kFrames, options(guidance));
+        const auto planned = VsdRenderer::planned_bytes(device().limits(), unet(), plan(), 2, kSize, kFrames, o);
         ASSERT_TRUE(planned) << planned.error().message;
         device().reset_peak();
-        const auto r = renderer(options(guidance));
+        const auto r = renderer(o);
         EXPECT_EQ(device().allocated_bytes() - before, planned->state);
         (void)render(*r);
         EXPECT_EQ(planned->programs, r->arena_bytes());

@@ -92,6 +92,17 @@ TEST(graph_plan, lets_branches_run_side_by_side_on_gpus)
     EXPECT_EQ(planned(g).arena_bytes(), 3 * 16 * 64 * 4u);
 }
 
+TEST(graph_plan, keeps_the_order_of_passes_where_that_is_wanted)
+{
+    Graph g;
+    const Tensor x = fake_external(g, 16, 64), y = fake_external(g, 16, 64);
+    g.keep(silu(g, gelu(g, silu(g, x))), fake_external(g, 16, 64));
+    g.keep(silu(g, gelu(g, silu(g, y))), fake_external(g, 16, 64));
+    EXPECT_EQ(planned(g, side_by_side()).arena_bytes(), 4 * 16 * 64 * 4u);
+    g.keep_order();
+    EXPECT_EQ(planned(g, side_by_side()).arena_bytes(), 2 * 16 * 64 * 4u);
+}
+
 TEST(graph_plan, runs_what_can_wait_as_late_as_it_may)
 {
     Graph g;

@@ -40,7 +40,8 @@ Result<GenerationSettings> resolve_generation(const GenerationOptions& o)
     SR_TRY(s.model, VoxfieldModel::open(o.model, sampler));
     const VoxfieldDefaults& d = s.model.defaults;
     s.steps = o.steps.value_or(preset.steps ? preset.steps : d.num_inference_steps);
-    s.guidance = {o.cfg_scale.value_or(d.guidance_scale), double(o.cfg_from.value_or(d.guidance_from))};
+    s.guidance = {o.cfg_scale.value_or(d.guidance_scale), double(o.cfg_from.value_or(d.guidance_from)),
+                  double(o.cfg_until.value_or(d.guidance_until))};
     s.repaint = preset.steps ? preset.repaint : d.repaint;
     s.repaint.jump_length = o.jump_length.value_or(s.repaint.jump_length);
     s.repaint.jump_n_sample = o.jump_n_sample.value_or(s.repaint.jump_n_sample);
@@ -92,7 +93,10 @@ Result<Json> settings_json(const GenerationSettings& s, const Device& device, st
                   {"jump_length", s.repaint.jump_length},
                   {"jump_n_sample", s.repaint.jump_n_sample},
                   {"known_tokens", s.repaint.known == KnownTokens::clean ? "clean" : "noised"}};
-    if (s.regions.tile_cells) // not there for the other order, whose runs of earlier versions go on
+    // not there where they say nothing: runs of earlier versions go on
+    if (s.guidance.until < kLastTimestep)
+        settings["guidance_until"] = s.guidance.until;
+    if (s.regions.tile_cells)
         settings["tile_cells"] = s.regions.tile_cells;
     return settings;
 }

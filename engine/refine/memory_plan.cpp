@@ -24,17 +24,21 @@ uint64_t RendererBytes::peak(MemoryPolicy policy) const
         if (s.encode || s.decode)
             peak = std::max(peak, vae + std::max(s.encode, s.decode));
         if (s.denoise)
-            peak = std::max(peak, unet + s.state + s.denoise);
+            peak = std::max(peak, unet + s.apart);
     }
     return outgoing + peak;
 }
 
 namespace {
 
-Result<AsdRenderer::Bytes> denoiser_bytes(const DeviceLimits& limits, const RendererNetworks& n, const RendererWork& w)
+Result<AsdRenderer::Bytes> denoiser_bytes(const DeviceLimits& limits, const RendererNetworks& n, const RendererWork& w,
+                                          MemoryPolicy policy)
 {
-    if (n.unet.config().video)
-        return VsdRenderer::planned_bytes(limits, n.unet, n.plan, n.text_tokens, w.size, w.frames, n.video);
+    if (n.unet.config().video) {
+        VsdOptions options = n.video;
+        options.halves_apart = policy == MemoryPolicy::staged;
+        return VsdRenderer::planned_bytes(limits, n.unet, n.plan, n.text_tokens, w.size, w.frames, options);
+    }
     return AsdRenderer::planned_bytes(limits, n.unet, n.plan, n.text_tokens, w.size, n.guidance_scale);
 }
 
@@ -54,9 +58,11 @@ Result<RendererBytes> renderer_bytes(const DeviceLimits& limits, const RendererN
     for (const RendererWork& w : work) {
         RendererBytes::Size& s = bytes.sizes.emplace_back();
         if (w.denoise) {
-            SR_TRY(const AsdRenderer::Bytes denoiser, denoiser_bytes(limits, n, w));
+            SR_TRY(const AsdRenderer::Bytes denoiser, denoiser_bytes(limits, n, w, MemoryPolicy::resident));
+            SR_TRY(const AsdRenderer::Bytes apart, denoiser_bytes(limits, n, w, MemoryPolicy::staged));
             s.state = denoiser.state;
             s.denoise = denoiser.programs;
+            s.apart = apart.state + apart.programs;
             bytes.unet = n.unet.device_bytes(limits);
         }
         if (w.encode) {

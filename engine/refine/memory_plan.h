@@ -10,7 +10,8 @@ namespace semrover {
 enum class MemoryPolicy {
     resident, // both for the whole run, and the memory of one kind of work at a time; frames (or windows of them) are
               // ready one by one
-    staged,   // the VAE encodes every buffer, then the UNet denoises every frame, then the VAE decodes every latent
+    staged,   // the VAE encodes every buffer, then the UNet denoises every frame, then the VAE decodes every latent; of
+              // a window the guided half and the other one after the other
 };
 std::string_view policy_name(MemoryPolicy policy);
 
@@ -32,6 +33,7 @@ struct RendererBytes {
     uint64_t outgoing = 0;      // of what is on its way to files
     struct Size {
         uint64_t state = 0, denoise = 0, encode = 0, decode = 0;
+        uint64_t apart = 0; // state and denoise with the halves one after the other
     };
     std::vector<Size> sizes; // one per RendererWork
 

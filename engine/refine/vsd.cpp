@@ -38,6 +38,7 @@ struct VsdRenderer::Memory {
     Slot x, x0, first, fixed;  // first: noise of the first state; fixed: latents of the known frames
     Slot weights;              // known_frame_weights(), where they are carried
     Slot buffer, visible, bad; // bad: first_non_finite() of each frame
+    Slot velocity;             // of every half, where they are apart
 
     Memory(const Unet& u, const SamplingPlan& p, uint32_t text_tokens, const LatentSize& size, uint32_t frame_count,
            const VsdOptions& o)
@@ -61,7 +62,10 @@ struct VsdRenderer::Memory {
         buffer = latent("buffer");
         visible = state.slot(rows(), 1, DType::f32, "visible", 1);
         bad = frame_words(state, frames, 1, "first number that is none");
+        if (apart())
+            velocity = state.slot(halves * rows(), channels, DType::f32, "velocity");
     }
+    bool apart() const { return options.halves_apart && halves > 1; }
     uint32_t rows() const { return frames * image_rows; }
     Slot latent(const char* name) { return state.slot(rows(), channels, DType::f32, name); }
     Tensor normals(Graph& g, StepTable s) const
@@ -88,6 +92,27 @@ struct VsdRenderer::Memory {
         step_advance(g, s.clock);
         return g;
     }
+    // [videos * rows, in_channels] of that many halves -> velocity, fp32. Every image and video is at the same
+    // timestep.
+    Tensor forward(Graph& g, Tensor in, uint32_t videos) const
+    {
+        const uint32_t images = videos * frames;
+        const Tensor row = table_row.in(g);
+        const FrameEmbedding embedding{frames, frame_table.in(g), frame_row.in(g).row_range(0, images)};
+        return unet
+            .forward(g, {in, images, height, width}, tables.times.in(g), row.row_range(0, images), tables.context(g),
+                     {embedding, row.row_range(0, videos)})
+            .data;
+    }
+    Tensor evaluate(Graph& g, Tensor in) const
+    {
+        if (!apart())
+            return forward(g, in, halves);
+        g.keep_order();
+        for (uint32_t half = 0; half < halves; ++half)
+            g.keep(forward(g, in.row_range(half * rows(), rows()), 1), velocity.row_range(half * rows(), rows()));
+        return velocity.in(g);
+    }
     Graph step_graph() const
     {
         Graph g;
@@ -96,13 +121,9 @@ struct VsdRenderer::Memory {
         const RendererFrame seen{{}, buffer.in(g), visible.in(g)};
         step_timestep(g, s, row);
         const Tensor in = renderer_input(g, s, state_x, seen, halves, unet.precision());
-        // note: every image and video is at the same timestep
-        const Unet::Videos videos{{frames, frame_table.in(g), frame_row.in(g)}, row.row_range(0, halves)};
-        const FeatureMap m =
-            unet.forward(g, {in, halves * frames, height, width}, tables.times.in(g), row, tables.context(g), videos);
         const FrameGuidance guidance(options.first_guidance, options.last_guidance, frames);
-        step_update(g, s, m.data, draws_noise(plan) ? normals(g, s) : first.in(g), known.in(g), fixed.in(g), state_x,
-                    x0.in(g), guidance, float(plan.clip));
+        step_update(g, s, evaluate(g, in), draws_noise(plan) ? normals(g, s) : first.in(g), known.in(g), fixed.in(g),
+                    state_x, x0.in(g), guidance, float(plan.clip));
         if (weights.valid())
             step_carry(g, s, {weights.in(g), frames, kFirstRows}, known.in(g), fixed.in(g), state_x, x0.in(g));
         step_advance(g, s.clock);

@@ -10,6 +10,7 @@ struct VsdOptions {
     float first_guidance = 1, last_guidance = 3; // guidance is linear over the frames; 1 and 1: no unconditional half
     float correlation = 0; // of neighbouring frames, 0..1: of what known frames are off by; 0: not carried to others
     uint64_t seed = 0;
+    bool halves_apart = false; // guided and not, one after the other: half of the memory, the same latents
     // golden cases only: normals come from the caller, [frames, pixels, C]
     std::function<void(uint32_t window, std::span<float> noise)> noise;
 };

@@ -9,6 +9,7 @@ WindowRenderer::WindowRenderer(Device& device, const RendererModel& model, const
     : device_(device), model_(model), plan_(plan), options_(std::move(options)), policy_(policy),
       networks_(device, model, precision)
 {
+    options_.halves_apart = policy == MemoryPolicy::staged;
 }
 WindowRenderer::~WindowRenderer() = default;
 

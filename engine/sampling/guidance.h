@@ -9,6 +9,9 @@ namespace semrover {
 // the largest guidance scale; the least is 0
 constexpr float kMaxGuidance = 1000;
 
+// the largest timestep that a schedule may have
+constexpr int kLastTimestep = 10000;
+
 // usage for a scale that is out of range, or no number
 inline Status check_guidance(float scale)
 {

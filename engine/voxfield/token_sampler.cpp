@@ -141,6 +141,9 @@ Result<std::unique_ptr<TokenSampler>> TokenSampler::create(Device& device, const
     SR_CHECK(check_guidance(guidance.scale));
     if (!(guidance.from >= 0))
         return fail(ErrorCode::usage, "guidance from timestep {}, which is below 0", guidance.from);
+    if (!(guidance.until >= guidance.from))
+        return fail(ErrorCode::usage, "guidance until timestep {}, which is below {}, from where it begins",
+                    guidance.until, guidance.from);
     std::unique_ptr<TokenSampler> s(new TokenSampler(device, transformer, plan, std::move(options)));
     SR_CHECK(s->state_.allocate(device, "sampler tables"));
     SR_CHECK(s->upload_steps());
@@ -318,6 +321,7 @@ uint64_t TokenSampler::key_of(std::span<const RegionInput> regions) const
     add_plan(hash, plan_);
     add(std::span(&options_.guidance.scale, 1));
     add(std::span(&options_.guidance.from, 1));
+    add(std::span(&options_.guidance.until, 1));
     add(std::span(&options_.seed, 1));
     for (const RegionInput& r : regions) {
         add(r.cells);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "engine/network/transformer.h"
+#include "engine/sampling/guidance.h"
 #include "engine/sampling/repaint.h"
 #include "engine/sampling/replay.h"
 #include "kernels/sampling.h"
@@ -23,13 +24,15 @@ struct RegionInput {
     std::vector<float> told;     // [cells, W], the condition of each cell; or nothing
 };
 
-// Classifier-free guidance: m = u + scale (c - u), u without labels. Below timestep `from` the network runs on c alone,
-// which costs half: there guidance changes little (Kynkäänniemi et al. 2024, arXiv 2404.07724).
+// Classifier-free guidance: m = u + scale (c - u), u without labels. Below timestep `from` and above `until` the
+// network runs on c alone, which costs half (Kynkäänniemi et al. 2024, arXiv 2404.07724): below, guidance changes
+// little; above, it moves mean colours.
 struct Guidance {
     float scale = 4; // 1: no unconditional half
     double from = 0;
+    double until = kLastTimestep;
 
-    bool at(double timestep) const { return scale != 1.f && timestep >= from; }
+    bool at(double timestep) const { return scale != 1.f && timestep >= from && timestep <= until; }
 };
 
 struct SamplerOptions {

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/voxfield/voxfield_model.h"
 
-#include "engine/sampling/guidance.h"
 #include "runtime/base/json_fields.h"
 
 namespace semrover {
@@ -15,7 +14,8 @@ Status read_defaults(const Json& index, VoxfieldDefaults& d)
     JsonFields fields(defaults, "model_index.json: defaults");
     fields.integer("num_inference_steps", 1, kMaxInferenceSteps, d.num_inference_steps);
     fields.number("guidance_scale", 0.f, kMaxGuidance, d.guidance_scale);
-    fields.integer("guidance_from", 0, 10000, d.guidance_from);
+    fields.integer("guidance_from", 0, kLastTimestep, d.guidance_from);
+    fields.integer("guidance_until", 0, kLastTimestep, d.guidance_until);
     fields.integer("region_size", 1, 4096, d.regions.region_size);
     fields.integer("coverage_threshold", 1, 4096, d.regions.coverage_threshold);
     fields.choice("strategy", {{"complete", RegionStrategy::complete}, {"rim", RegionStrategy::rim}},

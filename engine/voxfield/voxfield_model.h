@@ -3,6 +3,7 @@
 #pragma once
 
 #include "engine/model/transformer_config.h"
+#include "engine/sampling/guidance.h"
 #include "engine/sampling/repaint.h"
 #include "engine/scene/usual_objects.h"
 #include "engine/voxfield/regions.h"
@@ -14,6 +15,7 @@ struct VoxfieldDefaults {
     int num_inference_steps = 50;
     float guidance_scale = 4;
     int guidance_from = 0; // timestep below which no step is guided
+    int guidance_until = kLastTimestep; // and above which none is
     RegionOptions regions;
     RepaintOptions repaint;
     UsualObjects usual_objects; // to guess objects from labels

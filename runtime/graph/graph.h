@@ -102,6 +102,7 @@ struct Node {
 struct GraphDesc {
     std::vector<Resource> resources;
     std::vector<Node> nodes;
+    bool in_order = false;
 };
 
 class Graph {
@@ -132,6 +133,10 @@ class Graph {
     // old contents must be in the graph before the pass that makes `made`.
     Tensor keep(Tensor made, Tensor memory);
     Tensor keep(Tensor made, const Slot& slot);
+
+    // Passes run in the order in which they are added, also where they could run side by side: halves of the work that
+    // follow each other then share their memory.
+    void keep_order() { desc_.in_order = true; }
 
     // the resource of a piece of memory that has an owner: the same one every time (Slot::in)
     uint32_t outside(const void* owner, uint32_t item, const BufferSlice& memory, std::string_view name);
