@@ -263,6 +263,9 @@ typedef struct sr_world_desc {
     uint32_t reserved;
     const sr_file* model_files; /* the model's folder in memory; `model` is NULL then, or a folder among them */
     uint64_t model_file_count;
+    double detail_distance; /* metres: a tile within it has a splat of each point, up to twice as far one of each half
+                               cell, up to four times one of each cell, and so on. So a kilometre takes little more than
+                               what is near. 0: each point has one everywhere */
 } sr_world_desc;
 
 /* Loads the model and compiles shaders, so that no step does. context: outlives the world, and is not destroyed before

@@ -105,6 +105,9 @@ static void refuses_wrong_worlds(sr_context* context)
     desc.reserved = 1;
     CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "reserved"));
     desc = description();
+    desc.detail_distance = -1;
+    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "detail distance"));
+    desc = description();
     desc.splat_bytes = 0;
     CHECK_OK(context, sr_world_create(context, &desc, &world));
     memset(&splats, 0, sizeof splats);

@@ -380,6 +380,62 @@ TEST(engine_job_world, an_error_of_the_source_is_told_and_the_next_step_tries_ag
     expect_same(**world, whole());
 }
 
+// ---- splats
+
+// how many splats a tile has, and the largest sigma
+std::pair<size_t, float> splats_of(const World& world, const TileIndex& tile)
+{
+    const auto& places = world.splats()->places();
+    const auto place = places.find(tile);
+    if (place == places.end())
+        return {};
+    const Surfels all = *world.splats()->scene().read();
+    float largest = 0;
+    for (size_t i = place->second.first; i < place->second.first + place->second.count; ++i) {
+        EXPECT_GT(all.opacity[i], 0);
+        largest = std::max(largest, all.sigma_u[i]);
+    }
+    return {place->second.count, largest};
+}
+
+// tiles are 3.6 m wide and have some 36 cells. The tiny model's points fill space, those of streets lie on surfaces
+TEST(engine_job_world, far_tiles_have_fewer_and_larger_splats_and_all_of_them_when_they_are_near)
+{
+    WorldRequest r{.settings = *resolve_generation(options())};
+    r.splat_bytes = 4u << 20;
+    r.detail_distance = 2;
+    const auto world = *open_world(device(), std::move(r), labels_of_grid(street()));
+    ASSERT_TRUE(world->focus(looking(-3, 30)));
+    run(*world);
+    const TileIndex near{-1, 0}, half_cells{0, 0}, whole_cells{1, 0}, far{3, 0};
+    const VoxelGrid& cells = *world->tile(far);
+    const auto [all, small] = splats_of(*world, near);
+    EXPECT_EQ(all, size_t(cells.points_per_voxel) * world->tile(near)->cells.size());
+    const auto [some, larger] = splats_of(*world, half_cells);       // 3 m away
+    const auto [fewer, larger_yet] = splats_of(*world, whole_cells); // 6.6 m
+    const auto [few, large] = splats_of(*world, far);                // 13.8 m, two cells
+    EXPECT_LT(some, all * 7 / 10);
+    EXPECT_LT(fewer, some / 2);
+    EXPECT_LT(few, fewer / 2);
+    EXPECT_GT(few, 0u);
+    EXPECT_LT(small, larger);
+    EXPECT_LT(larger, larger_yet);
+    EXPECT_LT(larger_yet, large);
+
+    const uint64_t version = world->splats()->version();
+    ASSERT_TRUE(world->focus(looking(-3, 30)));
+    run(*world);
+    EXPECT_EQ(world->splats()->version(), version); // nothing is made again
+
+    ASSERT_TRUE(world->focus(looking(12, 30)));
+    run(*world);
+    EXPECT_EQ(splats_of(*world, far).first, size_t(cells.points_per_voxel) * cells.cells.size());
+    EXPECT_LT(splats_of(*world, near).first, all);
+    ASSERT_TRUE(world->focus(looking(-3, 30)));
+    run(*world);
+    EXPECT_EQ(splats_of(*world, near), (std::pair{all, small}));
+}
+
 TEST(engine_job_world, without_labels_nothing_is_made_and_a_world_without_room_says_so)
 {
     const auto empty = open();

@@ -72,6 +72,7 @@ Result<std::unique_ptr<sr_world>> make_world(sr_context& context, const sr_world
     request.host_bytes = d.host_bytes;
     request.splat_bytes = d.splat_bytes;
     request.tiles_at_once = d.tiles_at_once;
+    request.detail_distance = d.detail_distance;
     if (d.splat_radius != 0)
         request.surfels = {.sigma = float(d.splat_radius)};
     JobCallbacks callbacks;
@@ -208,4 +209,4 @@ sr_status sr_world_flush(sr_world* world)
 
 } // extern "C"
 
-static_assert(sizeof(sr_world_desc) == 144 && sizeof(sr_world_info) == 88);
+static_assert(sizeof(sr_world_desc) == 152 && sizeof(sr_world_info) == 88);

@@ -62,7 +62,14 @@ class StreamedWorld : public World {
     Status cut();
     Status fill(bool waits);
     Status finish();
+    uint32_t detail(const TileIndex& tile) const
+    {
+        return detail_of(distance_to_tile(focus_, tile, tile_cells(), voxel_size()), request_.detail_distance);
+    }
+    bool has_splats(const TileIndex& tile) const { return splats_->has(tile) && details_.at(tile) == detail(tile); }
+    Result<SurfelScene> splats_of(const VoxelGrid& cells, uint32_t detail);
     Status make_splats(const TileIndex& tile);
+    Status drop_splats(const TileIndex& tile);
     void give_up();
     void came(const TileIndex& tile);
     Status went(const TileIndex& tile);
@@ -83,7 +90,8 @@ class StreamedWorld : public World {
     bool cut_ = false, filled_ = false; // how far they are
     VoxelGrid part_;                    // they, and what they know
     std::unique_ptr<SplatPool> splats_;
-    std::vector<TileIndex> bare_; // finished tiles whose splats are made next
+    std::vector<TileIndex> bare_;           // finished tiles whose splats are made next
+    std::map<TileIndex, uint32_t> details_; // of the splats that tiles have
     std::array<SubmitCost, kPieces> costs_;
     std::vector<WorldChange> changes_;
     uint64_t generated_ = 0, loaded_ = 0, dropped_ = 0;
@@ -128,6 +136,8 @@ Status StreamedWorld::warm_up()
     SR_CHECK(filling_.cancel());
     if (!request_.splat_bytes)
         return {};
+    if (!(request_.detail_distance >= 0 && std::isfinite(request_.detail_distance)))
+        return fail(ErrorCode::usage, "a detail distance of {} m", request_.detail_distance);
     SR_TRY(splats_, SplatPool::create(filling_.device(), request_.splat_bytes));
     grid.generated.assign(grid.cells.size(), 1); // points in the middle of their cells
     return SurfelScene::create(filling_.device(), points_of(grid), request_.surfels).map([](const auto&) {});
@@ -151,7 +161,7 @@ Status StreamedWorld::focus(const WorldFocus& focus)
     loading_.clear();
     bare_.clear();
     for (const TileIndex& tile : wanted_)
-        if (splats_ && this->tile(tile) && !splats_->has(tile))
+        if (splats_ && this->tile(tile) && !has_splats(tile))
             bare_.push_back(tile);
     const double reach = focus.radius + 2 * tile_cells() * double(voxel_size());
     const Cell low = cell_at({focus.position[0] - reach, focus.position[1] - reach, 0}, voxel_size());
@@ -361,16 +371,37 @@ Status StreamedWorld::went(const TileIndex& tile)
 {
     changes_.push_back({tile, false});
     std::erase(bare_, tile);
-    return splats_ ? splats_->remove(tile) : Status();
+    return splats_ ? drop_splats(tile) : Status();
+}
+
+Status StreamedWorld::drop_splats(const TileIndex& tile)
+{
+    details_.erase(tile);
+    return splats_->remove(tile);
+}
+
+Result<SurfelScene> StreamedWorld::splats_of(const VoxelGrid& cells, uint32_t detail)
+{
+    const ScenePoints points = points_of(cells);
+    if (!detail)
+        return SurfelScene::create(filling_.device(), points, request_.surfels);
+    const float edge = std::ldexp(voxel_size(), int(detail) - 2); // half a cell, a cell, two cells
+    SurfelOptions options = request_.surfels;
+    options.auto_sigma = true; // they stand for larger pieces
+    options.largest_sigma = 2 * edge;
+    options.neighbor_radius = std::max(options.neighbor_radius, 3 * edge);
+    return SurfelScene::create(filling_.device(), thinned(points, edge), options);
 }
 
 // one that is dropped meanwhile, or for which there is no room, has none
 Status StreamedWorld::make_splats(const TileIndex& index)
 {
     const VoxelGrid* cells = tile(index);
-    if (!cells || splats_->has(index))
+    if (!cells || has_splats(index))
         return {};
-    SR_TRY(const SurfelScene surfels, SurfelScene::create(filling_.device(), points_of(*cells), request_.surfels));
+    const uint32_t detail = this->detail(index);
+    SR_TRY(const SurfelScene surfels, splats_of(*cells, detail));
+    details_.erase(index);
     SR_TRY(bool there, splats_->add(index, surfels));
     // those out of reach make room, farthest first
     std::vector<std::pair<double, TileIndex>> others;
@@ -379,9 +410,11 @@ Status StreamedWorld::make_splats(const TileIndex& index)
             others.emplace_back(away, other);
     std::ranges::sort(others);
     for (; !there && !others.empty(); others.pop_back()) {
-        SR_CHECK(splats_->remove(others.back().second));
+        SR_CHECK(drop_splats(others.back().second));
         SR_TRY(there, splats_->add(index, surfels));
     }
+    if (there)
+        details_[index] = detail;
     full_ = full_ || !there;
     return {};
 }

@@ -23,6 +23,10 @@ struct WorldRequest {
     uint64_t host_bytes = 0;   // of tiles in memory; 0: no budget
     uint64_t splat_bytes = 0;  // of splats on the device, all allocated at the beginning; 0: none are made
     SurfelOptions surfels = {.auto_sigma = true};
+    // metres from the focus within which a tile has a splat of each of its points. Up to twice as far it has one of
+    // each half cell, and so on: half as many along each axis whenever the distance doubles (detail_of). 0: all
+    // everywhere
+    double detail_distance = 0;
     uint32_t tiles_at_once = 0; // that are generated together; 0: what suits the device. Does not change the bytes
 };
 

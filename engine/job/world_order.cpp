@@ -31,6 +31,14 @@ double distance_to_tile(const WorldFocus& focus, const TileIndex& tile, int32_t 
     return std::hypot(outside[0], outside[1]);
 }
 
+uint32_t detail_of(double away, double detail_distance)
+{
+    uint32_t detail = 0;
+    for (double reach = detail_distance; reach > 0 && away > reach && detail < kCoarsestDetail; reach *= 2)
+        ++detail;
+    return detail;
+}
+
 std::vector<TileIndex> tiles_in_order(const WorldFocus& focus, int32_t tile_cells, float voxel_size)
 {
     const double edge = tile_cells * decimal_voxel_size(voxel_size);

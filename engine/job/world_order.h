@@ -20,4 +20,9 @@ std::vector<TileIndex> tiles_in_order(const WorldFocus& focus, int32_t tile_cell
 // metres from the position to the nearest place of a tile
 double distance_to_tile(const WorldFocus& focus, const TileIndex& tile, int32_t tile_cells, float voxel_size);
 
+// How coarse a tile at that distance is: 0 within `detail_distance`, 1 up to twice as far, 2 up to four times, and so
+// on to kCoarsestDetail; always 0 where detail_distance is 0.
+constexpr uint32_t kCoarsestDetail = 5;
+uint32_t detail_of(double away, double detail_distance);
+
 } // namespace semrover

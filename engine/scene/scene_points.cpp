@@ -6,6 +6,8 @@
 #include "runtime/base/dtype.h"
 
 #include <algorithm>
+#include <cmath>
+#include <map>
 
 namespace semrover {
 
@@ -28,6 +30,51 @@ ScenePoints points_of(const VoxelGrid& grid)
             out.labels.push_back(grid.labels[cell]);
             out.cells.push_back(uint32_t(cell));
         }
+    }
+    return out;
+}
+
+namespace {
+
+// of the points in a cube
+struct PointSums {
+    std::array<double, 3> position{}, color{};
+    uint32_t cell = 0; // of the first
+    uint32_t count = 0;
+
+    void add(const ScenePoints& points, size_t i)
+    {
+        if (count++ == 0)
+            cell = points.cells[i];
+        for (size_t a = 0; a < 3; ++a) {
+            position[a] += points.positions[i][a];
+            color[a] += points.colors[i][a];
+        }
+    }
+    std::array<float, 3> mean(const std::array<double, 3>& sum) const
+    {
+        return {float(sum[0] / count), float(sum[1] / count), float(sum[2] / count)};
+    }
+};
+
+} // namespace
+
+ScenePoints thinned(const ScenePoints& points, float edge)
+{
+    SR_ASSERT(edge > 0, "cubes of {} m", edge);
+    std::map<std::pair<Cell, uint32_t>, PointSums> cubes;
+    for (size_t i = 0; i < points.size(); ++i) {
+        Cell cube;
+        for (size_t a = 0; a < 3; ++a)
+            cube[a] = int32_t(std::floor(points.positions[i][a] / edge));
+        cubes[{cube, points.labels[i]}].add(points, i);
+    }
+    ScenePoints out;
+    for (const auto& [key, sums] : cubes) {
+        out.positions.push_back(sums.mean(sums.position));
+        out.colors.push_back(sums.mean(sums.color));
+        out.labels.push_back(key.second);
+        out.cells.push_back(sums.cell);
     }
     return out;
 }

@@ -19,6 +19,10 @@ struct ScenePoints {
 // points of the cells that have them
 ScenePoints points_of(const VoxelGrid& grid);
 
+// One point of each label and cube of the lattice whose cubes have edges of `edge` metres, at the mean place and with
+// the mean colour of those in it: a voxel grid filter. Sorted by cube.
+ScenePoints thinned(const ScenePoints& points, float edge);
+
 // colours become those of the labels
 void color_by_label(ScenePoints& points);
 

@@ -176,6 +176,7 @@ Status SurfelScene::derive(const SurfelOptions& options)
     SurfelSize size{.sigma = options.sigma};
     if (options.auto_sigma)
         size.spacing = kSpacing;
+    size.largest = options.largest_sigma;
     g.keep(surfel(g, points, colors_.in(g), neighbors, planes.normals, size), normals_);
     SR_TRY(const auto program, Program::create(*device_, g));
     return program->run();

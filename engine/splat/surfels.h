@@ -14,8 +14,9 @@ namespace semrover {
 class CopyRing;
 
 struct SurfelOptions {
-    float sigma = 0.04f;     // metres (the paper's splat radius)
-    bool auto_sigma = false; // sigma from the distance of the nearest points, which closes the holes
+    float sigma = 0.04f;        // metres (the paper's splat radius)
+    bool auto_sigma = false;    // sigma from the distance of the nearest points, which closes the holes,
+    float largest_sigma = 0.3f; // up to this, metres
     float opacity = 1;
     uint32_t neighbors = 16;       // of a point, itself included, for its normal
     float neighbor_radius = 0.45f; // metres; 0: no limit
