@@ -20,7 +20,7 @@ constexpr double kMetresOfMemory = 50;   // between two looks at memory
 struct BenchWorldArguments {
     Path model;
     std::optional<double> budget; // milliseconds
-    double seconds = 60, metres = 200, radius = 24;
+    double seconds = 60, metres = 200, radius = 24, detail_distance = 0;
     std::optional<int> steps;
 };
 
@@ -52,7 +52,8 @@ Json memory_at(double metres, const World& world, const Device& device)
             {"device_bytes", device.allocated_bytes()},
             {"tile_bytes", f.host_bytes},
             {"tiles_in_memory", f.in_memory},
-            {"tiles_generated", f.generated}};
+            {"tiles_generated", f.generated},
+            {"splats", world.splats()->surfels()}};
 }
 
 // One frame: what is wanted, a step, and how much is there. A host that is done early waits for its screen.
@@ -98,6 +99,7 @@ Result<Json> fly(Device& device, const GenerationSettings& settings, const Bench
     WorldRequest request{.settings = settings};
     request.splat_bytes = 256u << 20;
     request.host_bytes = 1u << 30;
+    request.detail_distance = o.detail_distance;
     SR_TRY(const auto world,
            open_world(device, std::move(request), labels_of_callback(settings.model.config.voxel_size, street_cells)));
     Flight flight;
@@ -131,7 +133,8 @@ Status bench_world(const BenchWorldArguments& o, const Globals& globals)
                    {"denoising_steps", settings.steps},
                    {"metres", o.metres},
                    {"seconds", o.seconds},
-                   {"radius", o.radius}};
+                   {"radius", o.radius},
+                   {"detail_distance", o.detail_distance}};
     Json flights = Json::array();
     for (const double budget : o.budget ? std::vector<double>{*o.budget} : std::vector<double>{20, 50, 100}) {
         SR_TRY(Json flight, fly(*device, settings, o, budget));
@@ -154,6 +157,8 @@ void add_bench_world(CLI::App& bench, const Globals& globals, Run& run)
     add_number(*c, "--seconds", o->seconds, "of a flight", 0.1, 3600.);
     add_number(*c, "--metres", o->metres, "of a flight", 1., 10000.);
     add_number(*c, "--radius", o->radius, "metres around the camera that are wanted", 0., 2000.);
+    add_number(*c, "--detail-distance", o->detail_distance,
+               "metres within which each point has a splat, farther away fewer have; 0: everywhere", 0., 2000.);
     add_number(*c, "--steps", o->steps, "denoising steps; else as the model says", 1, 10000);
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_world(*o, globals); }; });
 }

@@ -136,6 +136,7 @@ Status Street::create(const StreetRequest& r)
     desc.host_bytes = r.host_bytes;
     desc.splat_bytes = r.splat_bytes;
     desc.splat_radius = r.splat_radius;
+    desc.detail_distance = r.detail_distance;
     return checked(sr_world_create(context_, &desc, &world_), context_);
 }
 

@@ -16,9 +16,10 @@ struct StreetRequest {
     Path grid; // a .sgrid or a folder of tiles
     std::string model, objects, cache;
     uint64_t seed = 0, host_bytes = 0, splat_bytes = 0;
-    uint32_t steps = 0;      // 0: as the model says
-    double splat_radius = 0; // metres; 0: from the points
-    double radius = 20;      // metres around the camera that are generated
+    uint32_t steps = 0;         // 0: as the model says
+    double splat_radius = 0;    // metres; 0: from the points
+    double detail_distance = 0; // as sr_world_desc has it
+    double radius = 20;         // metres around the camera that are generated
     std::function<void(const std::string&)> warning;
 };
 

@@ -165,6 +165,8 @@ void add_world_options(CLI::App& c, ViewArguments& o)
     add_number(c, "--budget", r.budget_ms,
                "milliseconds of a frame in which points are generated; 8, without a window 500 at least", 0.001,
                10000.);
+    add_number(c, "--detail-distance", r.street.detail_distance,
+               "metres within which each point has a splat, farther away fewer have; 0: everywhere", 0., 2000.);
     c.add_option("--tile-memory", o.host_memory, "of the host, for tiles; 1GiB");
     c.add_option("--splat-memory", o.splat_memory, "of the device, for splats; 128MiB");
 }
