@@ -436,6 +436,21 @@ TEST(engine_job_world, far_tiles_have_fewer_and_larger_splats_and_all_of_them_wh
     EXPECT_EQ(splats_of(*world, near), (std::pair{all, small}));
 }
 
+TEST(engine_job_world, where_all_splats_of_a_tile_do_not_fit_it_has_coarser_ones)
+{
+    for (const double distance : {0., 100.}) {
+        WorldRequest r{.settings = *resolve_generation(options())};
+        r.splat_bytes = 300 * SplatPool::kSurfelBytes;
+        r.detail_distance = distance;
+        const auto world = *open_world(device(), std::move(r), labels_of_grid(street()));
+        ASSERT_TRUE(world->focus(looking(1.8, 0)));
+        run(*world);
+        ASSERT_GT(world->tile({0, 0})->cells.size() * size_t(world->tile({0, 0})->points_per_voxel), 300u);
+        EXPECT_TRUE(world->figures().full);
+        EXPECT_EQ(world->splats()->surfels() > 0, distance > 0);
+    }
+}
+
 TEST(engine_job_world, without_labels_nothing_is_made_and_a_world_without_room_says_so)
 {
     const auto empty = open();

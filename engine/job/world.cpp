@@ -67,7 +67,9 @@ class StreamedWorld : public World {
         return detail_of(distance_to_tile(focus_, tile, tile_cells(), voxel_size()), request_.detail_distance);
     }
     bool has_splats(const TileIndex& tile) const { return splats_->has(tile) && details_.at(tile) == detail(tile); }
+    void find_bare();
     Result<SurfelScene> splats_of(const VoxelGrid& cells, uint32_t detail);
+    Result<bool> add_splats(const TileIndex& tile, const SurfelScene& surfels);
     Status make_splats(const TileIndex& tile);
     Status drop_splats(const TileIndex& tile);
     void give_up();
@@ -91,7 +93,7 @@ class StreamedWorld : public World {
     VoxelGrid part_;                    // they, and what they know
     std::unique_ptr<SplatPool> splats_;
     std::vector<TileIndex> bare_;           // finished tiles whose splats are made next
-    std::map<TileIndex, uint32_t> details_; // of the splats that tiles have
+    std::map<TileIndex, uint32_t> details_; // that the splats of tiles were made for
     std::array<SubmitCost, kPieces> costs_;
     std::vector<WorldChange> changes_;
     uint64_t generated_ = 0, loaded_ = 0, dropped_ = 0;
@@ -159,15 +161,23 @@ Status StreamedWorld::focus(const WorldFocus& focus)
     done_ = 0;
     idle_ = full_ = false;
     loading_.clear();
-    bare_.clear();
-    for (const TileIndex& tile : wanted_)
-        if (splats_ && this->tile(tile) && !has_splats(tile))
-            bare_.push_back(tile);
+    find_bare();
     const double reach = focus.radius + 2 * tile_cells() * double(voxel_size());
     const Cell low = cell_at({focus.position[0] - reach, focus.position[1] - reach, 0}, voxel_size());
     const Cell high = cell_at({focus.position[0] + reach, focus.position[1] + reach, 0}, voxel_size());
     tiles_->keep_objects_near({{low[0], low[1]}, {high[0], high[1]}});
     return {};
+}
+
+// tiles that get fewer splats first: they make room for the others
+void StreamedWorld::find_bare()
+{
+    bare_.clear();
+    for (const TileIndex& tile : wanted_)
+        if (splats_ && this->tile(tile) && !has_splats(tile))
+            bare_.push_back(tile);
+    std::ranges::stable_partition(bare_,
+                                  [this](const TileIndex& t) { return splats_->has(t) && details_.at(t) < detail(t); });
 }
 
 Piece StreamedWorld::next_piece() const
@@ -393,17 +403,11 @@ Result<SurfelScene> StreamedWorld::splats_of(const VoxelGrid& cells, uint32_t de
     return SurfelScene::create(filling_.device(), thinned(points, edge), options);
 }
 
-// one that is dropped meanwhile, or for which there is no room, has none
-Status StreamedWorld::make_splats(const TileIndex& index)
+// those out of reach make room, farthest first; false: there is none
+Result<bool> StreamedWorld::add_splats(const TileIndex& index, const SurfelScene& surfels)
 {
-    const VoxelGrid* cells = tile(index);
-    if (!cells || has_splats(index))
-        return {};
-    const uint32_t detail = this->detail(index);
-    SR_TRY(const SurfelScene surfels, splats_of(*cells, detail));
     details_.erase(index);
     SR_TRY(bool there, splats_->add(index, surfels));
-    // those out of reach make room, farthest first
     std::vector<std::pair<double, TileIndex>> others;
     for (const auto& [other, place] : splats_->places())
         if (const double away = distance_to_tile(focus_, other, tile_cells(), voxel_size()); away > focus_.radius)
@@ -413,9 +417,24 @@ Status StreamedWorld::make_splats(const TileIndex& index)
         SR_CHECK(drop_splats(others.back().second));
         SR_TRY(there, splats_->add(index, surfels));
     }
+    return there;
+}
+
+// One that is dropped meanwhile has none. Where there is no room, coarser ones may fit.
+Status StreamedWorld::make_splats(const TileIndex& index)
+{
+    const VoxelGrid* cells = tile(index);
+    if (!cells || has_splats(index))
+        return {};
+    const uint32_t wanted = detail(index), coarsest = request_.detail_distance > 0 ? kCoarsestDetail : 0;
+    bool there = false;
+    for (uint32_t detail = wanted; !there && detail <= coarsest; ++detail) {
+        SR_TRY(const SurfelScene surfels, splats_of(*cells, detail));
+        SR_TRY(there, add_splats(index, surfels));
+        full_ = full_ || !there;
+    }
     if (there)
-        details_[index] = detail;
-    full_ = full_ || !there;
+        details_[index] = wanted;
     return {};
 }
 
