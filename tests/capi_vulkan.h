@@ -43,7 +43,7 @@ static int says(const sr_context* context, const char* text)
     return 0;
 }
 
-static void print_line(void* user, const char* line)
+static inline void print_line(void* user, const char* line)
 {
     fprintf((FILE*)user, "%s\n", line);
 }
@@ -155,7 +155,7 @@ static inline struct host make_host(void)
     return make_host_with(NULL);
 }
 
-static void destroy_host(const struct host* host)
+static inline void destroy_host(const struct host* host)
 {
     vkDestroyDevice(host->device, NULL);
     if (host->messenger)
@@ -165,7 +165,7 @@ static void destroy_host(const struct host* host)
 }
 
 /* the same for the library */
-static sr_vulkan_device lent(const struct host* host)
+static inline sr_vulkan_device lent(const struct host* host)
 {
     sr_vulkan_device vulkan;
     memset(&vulkan, 0, sizeof vulkan);

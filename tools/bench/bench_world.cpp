@@ -8,7 +8,9 @@
 #include "tools/cli/open_device.h"
 
 #include <CLI/CLI.hpp>
+#include <fstream>
 #include <thread>
+#include <unistd.h>
 
 namespace semrover {
 
@@ -22,6 +24,7 @@ struct BenchWorldArguments {
     std::optional<double> budget; // milliseconds
     double seconds = 60, metres = 200, radius = 24, detail_distance = 0;
     std::optional<int> steps;
+    uint64_t tile_bytes = 1u << 30;
 };
 
 // a road along x with pavements and a house front on each side, as the sample hosts have it
@@ -45,11 +48,20 @@ struct Flight {
     Json memory = Json::array();
 };
 
+// of this process, in memory; 0 where the system does not say
+uint64_t resident_bytes()
+{
+    uint64_t pages = 0, resident = 0;
+    std::ifstream("/proc/self/statm") >> pages >> resident;
+    return resident * uint64_t(sysconf(_SC_PAGESIZE));
+}
+
 Json memory_at(double metres, const World& world, const Device& device)
 {
     const WorldFigures f = world.figures();
     return {{"metres", metres},
             {"device_bytes", device.allocated_bytes()},
+            {"process_bytes", resident_bytes()},
             {"tile_bytes", f.host_bytes},
             {"tiles_in_memory", f.in_memory},
             {"tiles_generated", f.generated},
@@ -98,7 +110,7 @@ Result<Json> fly(Device& device, const GenerationSettings& settings, const Bench
 {
     WorldRequest request{.settings = settings};
     request.splat_bytes = 256u << 20;
-    request.host_bytes = 1u << 30;
+    request.host_bytes = o.tile_bytes;
     request.detail_distance = o.detail_distance;
     SR_TRY(const auto world,
            open_world(device, std::move(request), labels_of_callback(settings.model.config.voxel_size, street_cells)));
@@ -157,6 +169,7 @@ void add_bench_world(CLI::App& bench, const Globals& globals, Run& run)
     add_number(*c, "--seconds", o->seconds, "of a flight", 0.1, 3600.);
     add_number(*c, "--metres", o->metres, "of a flight", 1., 10000.);
     add_number(*c, "--radius", o->radius, "metres around the camera that are wanted", 0., 2000.);
+    add_number(*c, "--tile-bytes", o->tile_bytes, "of the host, for tiles", uint64_t(0), uint64_t(1) << 40);
     add_number(*c, "--detail-distance", o->detail_distance,
                "metres within which each point has a splat, farther away fewer have; 0: everywhere", 0., 2000.);
     add_number(*c, "--steps", o->steps, "denoising steps; else as the model says", 1, 10000);
