@@ -14,7 +14,7 @@ namespace semrover {
 struct VoxfieldDefaults {
     int num_inference_steps = 50;
     float guidance_scale = 4;
-    int guidance_from = 0; // timestep below which no step is guided
+    int guidance_from = 0;              // timestep below which no step is guided
     int guidance_until = kLastTimestep; // and above which none is
     RegionOptions regions;
     RepaintOptions repaint;
