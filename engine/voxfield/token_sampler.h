@@ -25,8 +25,8 @@ struct RegionInput {
 };
 
 // Classifier-free guidance: m = u + scale (c - u), u without labels. Below timestep `from` and above `until` the
-// network runs on c alone, which costs half (Kynkäänniemi et al. 2024, arXiv 2404.07724): below, guidance changes
-// little; above, it moves mean colours.
+// network runs on c alone, which costs half: there guidance changes little (Kynkäänniemi et al. 2024, arXiv
+// 2404.07724).
 struct Guidance {
     float scale = 4; // 1: no unconditional half
     double from = 0;
