@@ -106,6 +106,8 @@ Status StreamedWorld::open()
     if (!s.regions.tile_cells)
         return fail(ErrorCode::usage, "a world is generated in the order of tiles: its settings need a tile size");
     SR_CHECK(check_tile_options(s.regions));
+    if (!(request_.detail_distance >= 0 && std::isfinite(request_.detail_distance)))
+        return fail(ErrorCode::usage, "a detail distance of {} m", request_.detail_distance);
     if (std::abs(labels_->voxel_size() - voxel_size()) > 1e-4f * voxel_size())
         return fail(ErrorCode::bad_input, "the labels have cells of {} m, the model was trained on {} m",
                     labels_->voxel_size(), voxel_size());
@@ -138,8 +140,6 @@ Status StreamedWorld::warm_up()
     SR_CHECK(filling_.cancel());
     if (!request_.splat_bytes)
         return {};
-    if (!(request_.detail_distance >= 0 && std::isfinite(request_.detail_distance)))
-        return fail(ErrorCode::usage, "a detail distance of {} m", request_.detail_distance);
     SR_TRY(splats_, SplatPool::create(filling_.device(), request_.splat_bytes));
     grid.generated.assign(grid.cells.size(), 1); // points in the middle of their cells
     return SurfelScene::create(filling_.device(), points_of(grid), request_.surfels).map([](const auto&) {});

@@ -32,14 +32,13 @@ uint64_t RendererBytes::peak(MemoryPolicy policy) const
 namespace {
 
 Result<AsdRenderer::Bytes> denoiser_bytes(const DeviceLimits& limits, const RendererNetworks& n, const RendererWork& w,
-                                          MemoryPolicy policy)
+                                          bool halves_apart)
 {
-    if (n.unet.config().video) {
-        VsdOptions options = n.video;
-        options.halves_apart = policy == MemoryPolicy::staged;
-        return VsdRenderer::planned_bytes(limits, n.unet, n.plan, n.text_tokens, w.size, w.frames, options);
-    }
-    return AsdRenderer::planned_bytes(limits, n.unet, n.plan, n.text_tokens, w.size, n.guidance_scale);
+    if (!n.unet.config().video)
+        return AsdRenderer::planned_bytes(limits, n.unet, n.plan, n.text_tokens, w.size, n.guidance_scale);
+    VsdOptions options = n.video;
+    options.halves_apart = halves_apart;
+    return VsdRenderer::planned_bytes(limits, n.unet, n.plan, n.text_tokens, w.size, w.frames, options);
 }
 
 Result<uint64_t> decoder_bytes(const DeviceLimits& limits, const RendererNetworks& n, const RendererWork& w)
@@ -58,8 +57,11 @@ Result<RendererBytes> renderer_bytes(const DeviceLimits& limits, const RendererN
     for (const RendererWork& w : work) {
         RendererBytes::Size& s = bytes.sizes.emplace_back();
         if (w.denoise) {
-            SR_TRY(const AsdRenderer::Bytes denoiser, denoiser_bytes(limits, n, w, MemoryPolicy::resident));
-            SR_TRY(const AsdRenderer::Bytes apart, denoiser_bytes(limits, n, w, MemoryPolicy::staged));
+            SR_TRY(const AsdRenderer::Bytes denoiser, denoiser_bytes(limits, n, w, false));
+            AsdRenderer::Bytes apart = denoiser;
+            if (n.unet.config().video) {
+                SR_TRY(apart, denoiser_bytes(limits, n, w, true));
+            }
             s.state = denoiser.state;
             s.denoise = denoiser.programs;
             s.apart = apart.state + apart.programs;

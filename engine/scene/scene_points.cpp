@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/scene/scene_points.h"
 
+#include "engine/scene/cell_reach.h"
 #include "engine/scene/palette.h"
 #include "runtime/base/dtype.h"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 
 namespace semrover {
@@ -64,10 +64,8 @@ ScenePoints thinned(const ScenePoints& points, float edge)
     SR_ASSERT(edge > 0, "cubes of {} m", edge);
     std::map<std::pair<Cell, uint32_t>, PointSums> cubes;
     for (size_t i = 0; i < points.size(); ++i) {
-        Cell cube;
-        for (size_t a = 0; a < 3; ++a)
-            cube[a] = int32_t(std::floor(points.positions[i][a] / edge));
-        cubes[{cube, points.labels[i]}].add(points, i);
+        const auto& [x, y, z] = points.positions[i];
+        cubes[{cell_at({x, y, z}, edge), points.labels[i]}].add(points, i);
     }
     ScenePoints out;
     for (const auto& [key, sums] : cubes) {
