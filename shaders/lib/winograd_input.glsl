@@ -15,7 +15,8 @@ layout(push_constant) uniform Push { WinogradInputPush p; };
 layout(binding = 0) uniform usamplerBuffer X;             // [images * image_rows, cols]
 layout(binding = 1) writeonly buffer V { CHANNELS v[]; }; // [36 * tiles, cols]
 
-// note: 36 samples without a branch: compilers like SwiftShader's do not end with five at each
+// note: a branch a row and none a sample: one each is more than compilers like SwiftShader's end with, and without any
+// AMD's loads all 36 samples first, for which it has not the registers
 void main()
 {
     const uint per_tile = p.cols / 4;
@@ -28,16 +29,18 @@ void main()
     [[dont_unroll]] for (uint part = 0; part < PARTS; ++part) {
         CHANNELS d[kSamples][kSamples];
         [[unroll]] for (uint i = 0; i < kSamples; ++i) {
-            const int y = top + int(i);
-            [[unroll]] for (uint j = 0; j < kSamples; ++j) {
-                const int x = left + int(j);
-                const bool inside = all(lessThan(uvec2(x, y), uvec2(p.seen_width, p.seen_height)));
-                const uint pixel = image + (uint(y) >> p.shift) * p.width + (uint(x) >> p.shift);
-                const uint at = pixel * p.x_ld + col, from = inside ? at : 0;
-                const vec4 value = FETCH4(X, kHalfX, from);
-                const CHANNELS own = PART(value, part), none = CHANNELS(0.0);
-                d[i][j] = inside ? own : none;
-            }
+            const uint y = uint(top + int(i));
+            [[unroll]] for (uint j = 0; j < kSamples; ++j)
+                d[i][j] = CHANNELS(0.0);
+            if (y < p.seen_height)
+                [[unroll]] for (uint j = 0; j < kSamples; ++j) {
+                    const uint x = uint(left + int(j)), pixel = image + (y >> p.shift) * p.width + (x >> p.shift);
+                    const bool inside = x < p.seen_width;
+                    const uint from = inside ? pixel * p.x_ld + col : 0;
+                    const vec4 value = FETCH4(X, kHalfX, from);
+                    const CHANNELS own = PART(value, part);
+                    d[i][j] = inside ? own : d[i][j];
+                }
             WINOGRAD_INPUT(d[i][0], d[i][1], d[i][2], d[i][3], d[i][4], d[i][5])
         }
         [[unroll]] for (uint j = 0; j < kSamples; ++j) {
