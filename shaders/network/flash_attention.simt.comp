@@ -2,9 +2,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // y = softmax(q k^T scale) v, online over blocks of 32 keys; for GPUs: a workgroup holds 32 queries of one head, eight
-// threads a group of queries; keys, then values, go through shared memory 64 channels at a time, so that it holds 14.3
-// KiB at any head_dim. A thread sums 64 elements of y at most: above 256 channels the queries take two turns. Needs no
-// subgroup operation.
+// threads a group of queries; keys, then values, go through shared memory 64 channels at a time, so that it holds 15.4
+// KiB at any head_dim. A thread sums 64 elements of y at most: above 256 channels the queries take two turns. Heads of
+// 40 and fewer have a way of their own (lib/flash_narrow.simt.glsl). Needs no subgroup operation.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 #include "flash_attention.h"
@@ -33,9 +33,18 @@ const uint kSlab = 8;                           // chunks
 const uint kSlabs = (kChunks + kSlab - 1) / kSlab;
 const uint kPitch = kSlab + 1; // rows of a slab start in different banks
 
-shared vec4 slab_lo[kKeys * kPitch], slab_hi[kKeys * kPitch];
+const uint kUpper = kKeys * kPitch; // upper halves of chunks lie behind the lower ones
+
+shared vec4 slabs[640]; // 2 kUpper, and what lib/flash_narrow.simt.glsl needs
 shared float weights[kKeys * 33]; // [key][query], likewise
 shared float part_largest[32 * (kParts + 1)];
+
+// where a query's columns start; rows behind the last one repeat it
+uint query_at(uint query)
+{
+    const uint last = max(p.queries, p.first_row + 1) - p.first_row - 1;
+    return (gl_WorkGroupID.z * p.query_rows + min(query, last)) * p.q_ld + p.q_col;
+}
 
 // chunks of a slab of keys or values (`column`), rows [first, first + kKeys), clamped to the image's
 void stage(uint first, uint column, uint slab)
@@ -47,8 +56,8 @@ void stage(uint first, uint column, uint slab)
         const uint row = gl_WorkGroupID.z * p.key_rows + min(first + key, p.keys - 1);
         vec4 lo, hi;
         LOAD8(kv, kHalfKv, row * p.kv_ld + column + (slab * kSlab + c) * 8, lo, hi);
-        slab_lo[key * kPitch + c] = lo;
-        slab_hi[key * kPitch + c] = hi;
+        slabs[key * kPitch + c] = lo;
+        slabs[kUpper + key * kPitch + c] = hi;
     }
     barrier();
 }
@@ -67,7 +76,7 @@ void scores(uint first, uint column, uint q_at[kOwn], uint part, out float s[kOw
             [[unroll]] for (uint j = 0; j < kOwnKeys; ++j) {
                 const uint at = (part + j * kParts) * kPitch + c;
                 [[unroll]] for (uint n = 0; n < kOwn; ++n)
-                    s[n][j] += dot(lo[n], slab_lo[at]) + dot(hi[n], slab_hi[at]);
+                    s[n][j] += dot(lo[n], slabs[at]) + dot(hi[n], slabs[kUpper + at]);
             }
         }
     }
@@ -123,12 +132,11 @@ void attend(uint first_query)
 {
     const uint part = gl_LocalInvocationID.x % kParts, query = gl_LocalInvocationID.x / kParts * kOwn;
     const uint head = gl_WorkGroupID.y * kChunks * 8, image = gl_WorkGroupID.z;
-    const uint last_query = max(p.queries, p.first_row + 1) - p.first_row - 1; // rows behind it repeat it
     uint q_at[kOwn];
     float largest[kOwn], total[kOwn], shrink[kOwn], s[kOwn][kOwnKeys];
     vec4 o_lo[kSlabs][kOwn], o_hi[kSlabs][kOwn];
     [[unroll]] for (uint n = 0; n < kOwn; ++n) {
-        q_at[n] = (image * p.query_rows + min(first_query + query + n, last_query)) * p.q_ld + p.q_col + head;
+        q_at[n] = query_at(first_query + query + n) + head;
         largest[n] = -1e30;
         total[n] = 0.0;
         [[unroll]] for (uint slab = 0; slab < kSlabs; ++slab)
@@ -146,8 +154,8 @@ void attend(uint first_query)
             for (uint j = 0; j < kKeys; ++j)
                 [[unroll]] for (uint n = 0; n < kOwn; ++n) {
                     const float w = weights[j * 33 + query + n];
-                    o_lo[slab][n] += w * slab_lo[j * kPitch + part];
-                    o_hi[slab][n] += w * slab_hi[j * kPitch + part];
+                    o_lo[slab][n] += w * slabs[j * kPitch + part];
+                    o_hi[slab][n] += w * slabs[kUpper + j * kPitch + part];
                 }
         }
     }
@@ -163,8 +171,14 @@ void attend(uint first_query)
     }
 }
 
+#include "lib/flash_narrow.simt.glsl"
+
 void main()
 {
+    if (kChunks <= kMostNarrow) {
+        attend_narrow(gl_WorkGroupID.x * kTileM);
+        return;
+    }
     [[unroll]] for (uint turn = 0; turn < kTurns; ++turn)
         attend(gl_WorkGroupID.x * kTileM + turn * kQueries);
 }
