@@ -19,7 +19,7 @@ namespace semrover {
 namespace {
 
 struct BenchVsdArguments {
-    std::string unet, vae, precision = "fp16";
+    std::string unet, vae, precision = "fp16", profile;
     uint32_t width = 576, height = 384, frames = 12, decode_frames = 4, tokens = 1, evaluations = 6;
     float cfg_scale = 3;
 };
@@ -135,6 +135,7 @@ Status bench_vsd(const BenchVsdArguments& o, const Globals& globals)
            renderer_bytes(device->limits(), {*unet, *vae, plan, o.tokens, 1, options}, std::span(&work, 1)));
     SR_TRY(const auto vsd,
            VsdRenderer::create(*device, *unet, plan, {{o.tokens, text}, added}, size, o.frames, options));
+    want_profile(*device, o.profile);
     SR_TRY(const Timing encode, time_encoder(*device, *vae, size, o.evaluations));
     SR_TRY(const Timing decode, time_decoder(*device, *vae, size, o.decode_frames, o.evaluations));
     SR_TRY(const Timing step, time_window(*vsd, size, n.unet.out_channels, o.evaluations));
@@ -149,7 +150,7 @@ Status bench_vsd(const BenchVsdArguments& o, const Globals& globals)
     }
     add_program(report, *vsd->step_program());
     print_report(report, globals);
-    return {};
+    return write_profile(*device, o.profile);
 }
 
 } // namespace
@@ -169,6 +170,7 @@ void add_bench_vsd(CLI::App& bench, const Globals& globals, Run& run)
                0, 1000);
     add_number(*c, "--evaluations", o->evaluations, "runs of each part, the first to warm up; 0: memory only", 0, 1000);
     add_choice(*c, "--precision", {"fp16", "fp32"}, "storage", o->precision);
+    c->add_option("--profile", o->profile, "write device times as a Chrome trace, and their sums to stderr");
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_vsd(*o, globals); }; });
 }
 
