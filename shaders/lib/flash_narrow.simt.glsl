@@ -5,10 +5,9 @@
 // eighth key, so no thread is idle, weights stay in registers, and a block of keys costs two barriers instead of five.
 // The eight sums are joined at the end.
 
-const uint kMostNarrow = 5;                    // chunks
-const uint kNarrowPitch = kChunks | 1;         // odd: keys of a slab start in different banks
-const uint kNarrowSlab = kKeys * kMostNarrow;  // of `slabs`: keys' lower and upper halves, then values'
-const uint kJoinPitch = kParts + 1;            // likewise, of the parts of a query
+const uint kNarrowPitch = kChunks | 1;        // odd: keys of a slab start in different banks
+const uint kNarrowSlab = kKeys * kMostNarrow; // of `slabs`: keys' lower and upper halves, then values'
+const uint kJoinPitch = kParts + 1;           // of the parts of a query, likewise
 
 // keys and values of rows [first, first + kKeys), clamped to the image's
 void stage_narrow(uint first, uint head)
@@ -102,13 +101,12 @@ void attend_narrow(uint first_query)
     }
     // the largest score of a query: by its own a part may have had no key at all
     [[unroll]] for (uint n = 0; n < kOwn; ++n)
-        part_largest[(query + n) * kJoinPitch + part] = largest[n];
+        part_largest[(query + n) * (kParts + 1) + part] = largest[n];
     barrier();
     [[unroll]] for (uint n = 0; n < kOwn; ++n)
         shrink[n] = exp2(largest[n] - largest_of(query + n));
-    barrier();
     [[unroll]] for (uint n = 0; n < kOwn; ++n)
-        part_largest[(query + n) * kJoinPitch + part] = total[n] * shrink[n];
+        shrink[n] /= sum_of_parts(query + n, part, total[n] * shrink[n]);
     const uint own = gl_LocalInvocationID.x, row = first_query + own; // the query that this thread writes
     [[unroll]] for (uint c = 0; c < kMostNarrow; ++c) {
         if (c >= kChunks)
@@ -120,14 +118,12 @@ void attend_narrow(uint first_query)
         }
         barrier();
         if (own < kQueries && row < p.rows) {
-            float sum = 0.0;
             vec4 lo = vec4(0.0), hi = vec4(0.0);
             [[unroll]] for (uint i = 0; i < kParts; ++i) {
-                sum += part_largest[own * kJoinPitch + i];
                 lo += slabs[own * kJoinPitch + i];
                 hi += slabs[(kQueries + own) * kJoinPitch + i];
             }
-            STORE8(y, kHalfY, (image * p.query_rows + row) * p.y_ld + head + c * 8, (lo / sum), (hi / sum));
+            STORE8(y, kHalfY, (image * p.query_rows + row) * p.y_ld + head + c * 8, lo, hi);
         }
     }
 }

@@ -34,8 +34,9 @@ const uint kSlabs = (kChunks + kSlab - 1) / kSlab;
 const uint kPitch = kSlab + 1; // rows of a slab start in different banks
 
 const uint kUpper = kKeys * kPitch; // upper halves of chunks lie behind the lower ones
+const uint kMostNarrow = 5;         // chunks of heads that go the way of lib/flash_narrow.simt.glsl
 
-shared vec4 slabs[640]; // 2 kUpper, and what lib/flash_narrow.simt.glsl needs
+shared vec4 slabs[4 * kKeys * kMostNarrow]; // and 2 kUpper are fewer
 shared float weights[kKeys * 33]; // [key][query], likewise
 shared float part_largest[32 * (kParts + 1)];
 
