@@ -13,7 +13,7 @@ namespace semrover {
 
 // AutoencoderKL or AutoencoderKLTemporalDecoder (docs/models.md §5). Its functions add to a graph. Where the config
 // asks for force_upcast and the precision is fp16, the residual stream is stored divided by a power of two, which group
-// norms undo exactly.
+// norms undo exactly; the encoder of a video's VAE is then in fp32.
 class Vae {
   public:
     ~Vae();
@@ -23,7 +23,7 @@ class Vae {
     static std::unique_ptr<Vae> plan(const VaeConfig& config, DType precision, const DeviceLimits& limits);
 
     const VaeConfig& config() const;
-    DType precision() const;
+    DType precision() const; // of the decoder
     uint64_t parameters() const;
     uint64_t device_bytes(const DeviceLimits& limits) const; // of the weights
 
