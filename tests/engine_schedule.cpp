@@ -87,6 +87,72 @@ std::vector<double> timesteps_of(const SchedulerConfig& config, int steps)
 }
 
 // x' as a sum of x, the network's output m and fresh noise, where x0 is not clipped
+// Of normal x0 with this variance the best prediction is known, and so is how far it is off. Steps of any length then
+// have to keep the variance of x that noise puts on such x0.
+struct NormalData {
+    double variance;
+    double slope(double abar) const { return std::sqrt(abar) * variance / spread(abar); } // x0 = slope x
+    double error(double abar) const { return variance * (1 - abar) / spread(abar); }
+    double spread(double abar) const { return abar * variance + 1 - abar; }
+};
+
+TEST(Schedule, AnalyticNoiseKeepsTheVarianceOfNormalDataInFewSteps)
+{
+    const NormalData places{0.3}, colors{0.07};
+    SchedulerConfig config;
+    config.prediction = Prediction::sample;
+    config.spacing = TimestepSpacing::quadratic;
+    config.variance_type = VarianceType::analytic;
+    const auto abar = alphas_cumprod(config);
+    for (int t = 0; t < 1000; ++t)
+        config.prediction_errors.push_back({double(t), places.error(abar[t]), colors.error(abar[t])});
+    const auto last_spread = [](const Schedule& schedule, const NormalData& data, bool color) {
+        double spread = data.spread(schedule.steps.front().abar);
+        for (size_t i = 0; i + 1 < schedule.steps.size(); ++i) {
+            const StepCoefficients& s = schedule.steps[i];
+            const double kept = s.c_x0 * data.slope(s.abar) + s.c_x,
+                         fresh = color ? s.c_z_color.value_or(s.c_z) : s.c_z;
+            spread = kept * kept * spread + fresh * fresh;
+        }
+        return spread / data.spread(schedule.steps.back().abar);
+    };
+    for (int steps : {2, 5, 16, 100}) {
+        const Schedule analytic = schedule_of(config, steps);
+        EXPECT_NEAR(last_spread(analytic, places, false), 1, 1e-9) << steps;
+        EXPECT_NEAR(last_spread(analytic, colors, true), 1, 1e-9) << steps;
+        EXPECT_EQ(analytic.steps.back().c_z, 0);
+        EXPECT_FALSE(analytic.steps.back().c_z_color);
+    }
+    config.variance_type = VarianceType::fixed_small;
+    EXPECT_LT(last_spread(schedule_of(config, 16), places, false), 0.9);
+}
+
+TEST(Schedule, ErrorsAreInterpolatedBetweenRowsAndConstantBeyondThem)
+{
+    SchedulerConfig config;
+    config.spacing = TimestepSpacing::quadratic;
+    config.variance_type = VarianceType::analytic;
+    config.prediction_errors = {{100, 0.1, 0.02}, {500, 0.3, 0.06}};
+    const Schedule schedule = schedule_of(config, 10);
+    const auto errors = [&](double timestep) {
+        for (const StepCoefficients& s : schedule.steps)
+            if (s.timestep == timestep) {
+                SchedulerConfig plain = config;
+                plain.variance_type = VarianceType::fixed_small;
+                const Schedule small = schedule_of(plain, 10);
+                const double least = std::pow(small.steps[&s - schedule.steps.data()].c_z, 2);
+                return std::pair((s.c_z * s.c_z - least) / (s.c_x0 * s.c_x0),
+                                 (*s.c_z_color * *s.c_z_color - least) / (s.c_x0 * s.c_x0));
+            }
+        return std::pair(-1.0, -1.0);
+    };
+    EXPECT_NEAR(errors(39).first, 0.1, 1e-9); // 1000 (2 / 10)^2 - 1
+    EXPECT_NEAR(errors(39).second, 0.02, 1e-9);
+    EXPECT_NEAR(errors(249).first, 0.1 + 0.2 * 149 / 400, 1e-9);
+    EXPECT_NEAR(errors(249).second, 0.02 + 0.04 * 149 / 400, 1e-9);
+    EXPECT_NEAR(errors(809).first, 0.3, 1e-9);
+}
+
 TEST(Schedule, DdimWithAllOfItsFreshNoiseIsDdpm)
 {
     for (TimestepSpacing spacing : {TimestepSpacing::trailing, TimestepSpacing::quadratic})
@@ -285,6 +351,11 @@ TEST(SchedulerConfig, WhatIsNotImplementedIsRefusedByName)
     };
     refused(R"(, "beta_schedule": "sigmoid")", "beta_schedule is \"sigmoid\"");
     refused(R"(, "variance_type": "learned_range")", "variance_type");
+    refused(R"(, "variance_type": "analytic")", "prediction_errors is not given");
+    refused(R"(, "prediction_errors": [[1, 0.1]])", "prediction_errors");
+    refused(R"(, "prediction_errors": [[1, 0.1, "a"]])", "prediction_errors");
+    refused(R"(, "prediction_errors": [[1, 0.1, -0.1]])", "prediction_errors");
+    refused(R"(, "prediction_errors": [[2, 0.1, 0.1], [2, 0.1, 0.1]])", "rows of rising timesteps");
     refused(R"(, "thresholding": true)", "thresholding");
     refused(R"(, "rescale_betas_zero_snr": true)", "rescale_betas_zero_snr");
     refused(R"(, "trained_betas": [0.1, 0.2])", "trained_betas");

@@ -246,7 +246,7 @@ StepRow update_row()
 {
     StepRow s{};
     s.x0_x = 1.3f, s.x0_m = -0.7f;
-    s.c_x0 = 0.4f, s.c_x = 0.5f, s.c_m = -0.2f, s.c_prev = 0.3f, s.c_z = 0.6f;
+    s.c_x0 = 0.4f, s.c_x = 0.5f, s.c_m = -0.2f, s.c_prev = 0.3f, s.c_z = 0.6f, s.c_z_color = 0.8f;
     s.known_scale = 0.9f, s.known_noise = 0.43f;
     return s;
 }
@@ -267,7 +267,7 @@ std::pair<double, double> update_reference(const UpdateCase& u, const UpdateInpu
         m = in.m.at(u.rows + r, c) + guidance * (m - in.m.at(u.rows + r, c));
     const double x0 = std::clamp(double(s.x0_x) * in.x.at(r, c) + double(s.x0_m) * m, -double(u.clip), double(u.clip));
     double next = double(s.c_x0) * x0 + double(s.c_x) * in.x.at(r, c) + double(s.c_m) * m +
-                  double(s.c_prev) * in.x0.at(r, c) + double(s.c_z) * in.z.at(r, c);
+                  double(s.c_prev) * in.x0.at(r, c) + double(c % 6 < 3 ? s.c_z : s.c_z_color) * in.z.at(r, c);
     if (in.known[r])
         next = double(s.known_scale) * in.fixed.at(r, c) + double(s.known_noise) * in.z.at(r, c);
     return {next, x0};

@@ -174,6 +174,9 @@ Status read_scheduler(RendererModel& m, std::optional<Sampler> sampler)
         sampler = Sampler::ddim;
     }
     SR_TRY(m.scheduler, read_scheduler_config(path, m.warnings, sampler));
+    if (m.scheduler.variance_type == VarianceType::analytic)
+        return fail(ErrorCode::bad_input, "{}: variance_type \"analytic\" is for tokens, latents have no colours",
+                    quote_path(path));
     return {};
 }
 

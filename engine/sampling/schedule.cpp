@@ -94,6 +94,29 @@ void set_known(StepCoefficients& step, double next_abar, bool last)
     step.known_noise = last ? 0 : std::sqrt(1 - next_abar);
 }
 
+// how far x0 is off at a timestep, between the rows of the table and constant beyond them
+PredictionError prediction_error(const std::vector<PredictionError>& table, double timestep)
+{
+    const auto above = std::ranges::upper_bound(table, timestep, {}, &PredictionError::timestep);
+    if (above == table.begin())
+        return table.front();
+    if (above == table.end())
+        return table.back();
+    const PredictionError &low = above[-1], &high = above[0];
+    const double share = (timestep - low.timestep) / (high.timestep - low.timestep);
+    return {timestep, std::lerp(low.places, high.places, share), std::lerp(low.colors, high.colors, share)};
+}
+
+// The fresh noise of a step has to make up for what x0, a mean, leaves out: the variance about it, theorem 1 of
+// Analytic-DPM (arXiv 2201.06503), with measured errors.
+void set_analytic_noise(const SchedulerConfig& config, double small, StepCoefficients& step)
+{
+    const PredictionError error = prediction_error(config.prediction_errors, step.timestep);
+    const double share = step.c_x0 * step.c_x0;
+    step.c_z = std::sqrt(small + share * error.places);
+    step.c_z_color = std::sqrt(small + share * error.colors);
+}
+
 // posterior mean and variance, formula (7) of arXiv 2006.11239, for steps of any length
 StepCoefficients ddpm_step(const SchedulerConfig& config, double timestep, double abar, double next, bool last)
 {
@@ -105,7 +128,9 @@ StepCoefficients ddpm_step(const SchedulerConfig& config, double timestep, doubl
     step.c_x0 = std::sqrt(next) * beta / (1 - abar);
     step.c_x = std::sqrt(abar / next) * (1 - next) / (1 - abar);
     const double small = std::max((1 - next) / (1 - abar) * beta, 1e-20);
-    if (!last)
+    if (!last && config.variance_type == VarianceType::analytic)
+        set_analytic_noise(config, small, step);
+    else if (!last)
         step.c_z = std::sqrt(config.variance_type == VarianceType::fixed_small ? small : beta);
     set_known(step, next, last);
     return step;

@@ -4,6 +4,7 @@
 
 #include "engine/sampling/scheduler_config.h"
 
+#include <optional>
 #include <vector>
 
 namespace semrover {
@@ -20,6 +21,7 @@ struct StepCoefficients {
     double in_scale = 1;
     double x0_x = 0, x0_m = 0;
     double c_x0 = 0, c_x = 0, c_m = 0, c_prev = 0, c_z = 0;
+    std::optional<double> c_z_color = {}; // c_z of the colours of tokens, where it is another
     // level after the step: sqrt(abar), sqrt(1 - abar), of euler 1 and sigma; 1 and 0 at the end
     double known_scale = 1, known_noise = 0;
     double abar = 1; // cumulative alpha of x before the step

@@ -4,11 +4,15 @@
 
 #include "runtime/base/json_fields.h"
 
+#include <algorithm>
+#include <functional>
+
 namespace semrover {
 
 namespace {
 
 constexpr int kMaxTrainTimesteps = 10000;
+constexpr size_t kMaxPredictionErrors = 1000;
 
 struct SamplerNames {
     Sampler sampler;
@@ -47,13 +51,29 @@ void read_noise(JsonFields& fields, SchedulerConfig& config)
     fields.number("clip_sample_range", 1e-6, 1e6, config.clip_sample_range);
 }
 
+// [[timestep, places, colours], ...]
+void read_prediction_errors(JsonFields& fields, SchedulerConfig& config)
+{
+    std::vector<std::array<double, 3>> rows;
+    fields.triples("prediction_errors", kMaxPredictionErrors, 0.0, double(kMaxTrainTimesteps), rows);
+    for (const auto& [timestep, places, colors] : rows)
+        config.prediction_errors.push_back({timestep, places, colors});
+    const bool rising = std::ranges::is_sorted(config.prediction_errors, std::less_equal{}, &PredictionError::timestep);
+    if (!rows.empty() && !rising)
+        fields.refuse("prediction_errors", "rows of rising timesteps");
+    if (config.variance_type == VarianceType::analytic && rows.empty())
+        fields.refuse("prediction_errors", "rows of [timestep, places, colours], with variance_type \"analytic\"");
+}
+
 void read_solver(JsonFields& fields, SchedulerConfig& config)
 {
     fields.choice<VarianceType>("variance_type",
                                 {{"fixed_small", VarianceType::fixed_small},
                                  {"fixed_small_log", VarianceType::fixed_small},
-                                 {"fixed_large", VarianceType::fixed_large}},
+                                 {"fixed_large", VarianceType::fixed_large},
+                                 {"analytic", VarianceType::analytic}},
                                 config.variance_type);
+    read_prediction_errors(fields, config);
     fields.flag("set_alpha_to_one", config.set_alpha_to_one);
     fields.number("eta", 0.0, 1.0, config.eta);
     fields.integer("solver_order", 1, 2, config.solver_order);

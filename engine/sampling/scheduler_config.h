@@ -17,7 +17,12 @@ enum class Sampler { ddpm, ddim, dpmpp_2m, euler };
 enum class BetaSchedule { linear, scaled_linear, squaredcos_cap_v2 };
 enum class Prediction { epsilon, sample, v_prediction };
 enum class TimestepSpacing { leading, trailing, linspace, quadratic };
-enum class VarianceType { fixed_small, fixed_large };
+enum class VarianceType { fixed_small, fixed_large, analytic };
+
+// How far a network's x0 is off at a timestep: mean squared error of the places and of the colours of tokens.
+struct PredictionError {
+    double timestep, places, colors;
+};
 
 // The fields of a diffusers scheduler_config.json. Every sampler reads the first group, clip_sample included, although
 // diffusers' multistep and Euler classes have no such field.
@@ -33,6 +38,7 @@ struct SchedulerConfig {
     double clip_sample_range = 1;
 
     VarianceType variance_type = VarianceType::fixed_small; // ddpm
+    std::vector<PredictionError> prediction_errors = {};    // ddpm with variance analytic; by timestep, rising
     bool set_alpha_to_one = true;                           // ddim
     double eta = 0;                                         // ddim, 0..1: share of DDPM's fresh noise in a step
 

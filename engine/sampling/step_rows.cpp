@@ -20,6 +20,7 @@ StepRow step_row(const PlanRow& row)
     r.c_z = float(c.c_z);
     r.known_scale = float(c.known_scale);
     r.known_noise = float(c.known_noise);
+    r.c_z_color = float(c.c_z_color.value_or(c.c_z));
     r.draw = row.draw;
     r.timestep_index = row.timestep_index;
     r.noise_stream = row.kind == PlanRowKind::undo ? 2 : 0;

@@ -97,6 +97,21 @@ void JsonFields::list(const char* name, size_t most, uint32_t low, uint32_t high
     out = value->get<std::vector<uint32_t>>();
 }
 
+void JsonFields::triples(const char* name, size_t most, double low, double high,
+                         std::vector<std::array<double, 3>>& out)
+{
+    const Json* value = find(name);
+    if (!value)
+        return;
+    const auto is_number = [&](const Json& v) { return v.is_number() && v >= low && v <= high; };
+    const auto is_triple = [&](const Json& v) {
+        return v.is_array() && v.size() == 3 && std::ranges::all_of(v, is_number);
+    };
+    if (!value->is_array() || value->empty() || value->size() > most || !std::ranges::all_of(*value, is_triple))
+        return refuse(name, fmt::format("a list of 1 to {} lists of three numbers from {} to {}", most, low, high));
+    out = value->get<std::vector<std::array<double, 3>>>();
+}
+
 void JsonFields::only(const char* name, const Json& supported)
 {
     const Json* value = find(name);

@@ -4,6 +4,7 @@
 
 #include "runtime/base/json.h"
 
+#include <array>
 #include <cmath>
 #include <initializer_list>
 #include <optional>
@@ -54,6 +55,9 @@ class JsonFields {
     void integers(const char* name, size_t count, uint32_t low, uint32_t high, std::vector<uint32_t>& out);
     // a list of 1 to `most` numbers
     void list(const char* name, size_t most, uint32_t low, uint32_t high, std::vector<uint32_t>& out);
+
+    // a list of 1 to `most` lists of three numbers
+    void triples(const char* name, size_t most, double low, double high, std::vector<std::array<double, 3>>& out);
 
     template <typename T>
     void choice(const char* name, Names<T> names, T& out)

@@ -10,10 +10,11 @@ struct StepRow {
     float x0_x, x0_m;
     float c_x0, c_x, c_m, c_prev, c_z;
     float known_scale, known_noise;
+    float c_z_color;     // c_z of the colours of tokens
     uint draw;           // part of the noise key
     uint timestep_index; // into the timesteps of the schedule
     uint noise_stream;   // 0 for target tokens and 1 for known ones in a step; 2 for all in an undo or the first noise
-    uint unused0, unused1, unused2;
+    uint unused0, unused1;
 };
 
 // the position of a run in its step table, on the device

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // golden kinds scheduler, repaint_timesteps and region_extraction
-#include "engine/sampling/repaint.h"
+#include "engine/sampling/step_rows.h"
 #include "engine/voxfield/regions.h"
 #include "kernels/sampling.h"
 #include "runtime/device/program.h"
@@ -28,9 +28,7 @@ class StepRunner {
         SR_CHECK(r->state_.allocate(device, "golden case"));
         std::vector<StepRow> rows;
         for (const StepCoefficients& c : schedule.steps)
-            rows.push_back({float(c.in_scale), float(c.x0_x), float(c.x0_m), float(c.c_x0), float(c.c_x), float(c.c_m),
-                            float(c.c_prev), float(c.c_z), float(c.known_scale), float(c.known_noise), 0, 0, 0, 0, 0,
-                            0});
+            rows.push_back(step_row({.coefficients = c}));
         SR_CHECK(r->steps_.write(device, rows));
         for (const Slot& slot : {r->clock_, r->known_, r->fixed_, r->x0_, r->z_})
             SR_CHECK(slot.clear(device));

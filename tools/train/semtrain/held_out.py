@@ -32,13 +32,13 @@ def told_of(conditions, parts, told):
 
 
 @torch.no_grad()
-def errors_of(model, sets, batches, told):
+def errors_of(model, sets, batches, told, levels=LEVELS):
     """-> [(places, colours) of each level]"""
-    alphas, sums = linear_alphas(CONFIG), torch.zeros(len(LEVELS), 2)
+    alphas, sums = linear_alphas(CONFIG), torch.zeros(len(levels), 2)
     for step in range(batches):
         centers, labels, x0, known, conditions = (torch.from_numpy(a) for a in sets.batch(step))
         valid, parts = torch.ones_like(known), model.config["condition"]
-        for i, level in enumerate(LEVELS):
+        for i, level in enumerate(levels):
             t = torch.full((len(x0),), level)
             noisy = noised(x0, alphas, t, generator(CONFIG, step, i))
             with autocast("bf16", "cpu"):

@@ -13,10 +13,11 @@ import numpy as np
 import torch
 
 from recipe import run_recipe
-from semtrain import held_out, safetensors_file, transformer
+from semtrain import held_out, safetensors_file, transformer, variance
 from semtrain.condition import drawn_boxes, mirrored, object_part, told_boxes, told_tints, vector_of, width_of
 from semtrain.grids import Grids, LocalSets, read_tokens
-from semtrain.model_folder import write_component
+from semtrain.json_file import read_json
+from semtrain.model_folder import write_component, write_scheduler
 from semtrain.nets.transformer import VoxfieldTransformer
 from semtrain.objects import local_tints, owners_of, paint_near, read_objects
 from semtrain.regenerate import Objects as StreetObjects, load_transformer
@@ -294,6 +295,26 @@ class TheTable(unittest.TestCase):
                                                      ["told", "tint"], ["told", "object and tint"]])
             self.assertEqual(rows[0][2:], rows[1][2:])
             self.assertEqual(len({tuple(r[2:]) for r in rows}), 4)
+
+
+class Variance(unittest.TestCase):
+    def test_of_a_model_that_says_nothing_is_the_tokens_own_second_moment(self):
+        with tempfile.TemporaryDirectory() as folder:
+            write_cars(folder)
+            state = {n: torch.zeros(t.shape) for n, t in VoxfieldTransformer(**BOTH).state_dict().items()}
+            write_component(os.path.join(folder, "voxfield_transformer"), BOTH, state)
+            write_scheduler(os.path.join(folder, "voxfield_scheduler"), {"variance_type": "fixed_small", "beta_end": 0.02})
+            truth = os.path.join(folder, "truth.sgrid")
+            variance.main([folder, "--grids", truth, "--batches", "1", "--cells", "1000", "--threads", "1", "--colors", "2"])
+            scheduler = read_json(os.path.join(folder, "voxfield_scheduler", "scheduler_config.json"))
+            self.assertEqual((scheduler["variance_type"], scheduler["beta_end"]), ("analytic", 0.02))
+            tokens = read_tokens(truth)[2].astype(np.float64).reshape(-1, 6)
+            times = [row[0] for row in scheduler["prediction_errors"]]
+            self.assertEqual((times[0], times[-1]), (2, 999))
+            self.assertEqual(times, sorted(set(times)))
+            for _, places, colors in scheduler["prediction_errors"]:
+                self.assertAlmostEqual(places, (tokens[:, :3] ** 2).mean(), delta=1e-3)
+                self.assertAlmostEqual(colors, 2 * (tokens[:, 3:] ** 2).mean(), delta=1e-3)
 
 
 if __name__ == "__main__":
