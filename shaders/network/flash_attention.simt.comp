@@ -37,7 +37,7 @@ const uint kUpper = kKeys * kPitch; // upper halves of chunks lie behind the low
 const uint kMostNarrow = 5;         // chunks of heads that go the way of lib/flash_narrow.simt.glsl
 
 shared vec4 slabs[4 * kKeys * kMostNarrow]; // and 2 kUpper are fewer
-shared float weights[kKeys * 33]; // [key][query], likewise
+shared float weights[kKeys * 33]; // [key][query]; 33, not 32: rows start in different banks
 shared float part_largest[32 * (kParts + 1)];
 
 // where a query's columns start; rows behind the last one repeat it
