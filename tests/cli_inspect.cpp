@@ -121,7 +121,7 @@ TEST(CliInspect, a_renderer_of_videos_says_how_drives_are_cut)
     EXPECT_EQ(json["video"]["window_frames"], 6);
     EXPECT_EQ(json["video"]["window_overlap"], 3);
     EXPECT_EQ(json["video"]["frame_correlation"], 0);
-    EXPECT_EQ(json["video"]["decode_frames"], 4);
+    EXPECT_EQ(json["video"]["decode_frames"], 2);
     EXPECT_EQ(json["video"]["guidance_scale"], nlohmann::json({1, 3}));
     EXPECT_EQ(json["video"]["sampler"], "euler");
     EXPECT_FALSE(json_of(semrover_program("inspect --json " + kAssets + "/model").out).contains("video"));

@@ -26,7 +26,7 @@ struct VideoDefaults {
     uint32_t window_frames = 12;                        // the UNet's num_frames, where it is not said
     uint32_t window_overlap = 4;                        // a third of them, and at most 4
     float frame_correlation = 0.9f;                     // of neighbouring frames' latents (docs/method.md §6.4)
-    uint32_t decode_frames = 4;                         // that the VAE decodes together
+    uint32_t decode_frames = 2;                         // that the VAE decodes together
     std::vector<float> added_numbers = {6, 127, 0.02f}; // SVD's: frames a second less 1, motion, noise of the image
 };
 
