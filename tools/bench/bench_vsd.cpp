@@ -20,7 +20,8 @@ namespace {
 
 struct BenchVsdArguments {
     std::string unet, vae, precision = "fp16", profile;
-    uint32_t width = 576, height = 384, frames = 12, decode_frames = 2, tokens = 1, evaluations = 6;
+    uint32_t width = 576, height = 384, frames = VideoDefaults().window_frames;
+    uint32_t decode_frames = VideoDefaults().decode_frames, tokens = 1, evaluations = 6;
     float cfg_scale = 3;
 };
 

@@ -10,7 +10,8 @@ import torch
 
 from .grids import Grids, LocalSets
 from .held_out import CONFIG, errors_of
-from .json_file import read_json, write_json
+from .json_file import read_json
+from .model_folder import write_scheduler
 from .regenerate import load_transformer
 
 LEVELS = [round(1000 * (i / 20) ** 2) - 1 for i in range(1, 21)]
@@ -38,8 +39,9 @@ def main(arguments=None):
         config = {**CONFIG, "set_size": [options.cells] * 2, "network": model.config}
         sets = LocalSets(Grids(options.grids, cache), config)
         rows = error_rows(model, sets, options.batches, options.places, options.colors)
-    path = os.path.join(options.model, "voxfield_scheduler", "scheduler_config.json")
-    write_json(path, {**read_json(path), "variance_type": "analytic", "prediction_errors": rows})
+    folder = os.path.join(options.model, "voxfield_scheduler")
+    scheduler = read_json(os.path.join(folder, "scheduler_config.json"))
+    write_scheduler(folder, {**scheduler, "variance_type": "analytic", "prediction_errors": rows})
 
 
 if __name__ == "__main__":
