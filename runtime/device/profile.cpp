@@ -21,7 +21,7 @@ Status Profile::write(const std::string& path) const
                          {"tid", 1},
                          {"ts", e.begin_us},
                          {"dur", e.duration_us},
-                         {"args", {{"groups", e.groups}, {"gflop", e.flops / 1e9}}}});
+                         {"args", {{"groups", e.groups}, {"gflop", e.flops / 1e9}, {"tile", e.tile}}}});
     std::ofstream out(path);
     out << nlohmann::json{{"traceEvents", std::move(trace)}, {"displayTimeUnit", "ms"}}.dump();
     if (!out.flush())

@@ -302,8 +302,12 @@ Status Program::collect_profile()
             name += fmt::format(".{}", pass.variant->name);
         const double part = double(d.count[0]) * d.count[1] * d.count[2] /
                             (double(pass.group_count[0]) * pass.group_count[1] * pass.group_count[2]);
-        device_.profile()->add(
-            {std::move(name), begin, end - begin, std::to_array(d.count), pass.options.flops * part});
+        device_.profile()->add({std::move(name),
+                                begin,
+                                end - begin,
+                                std::to_array(d.count),
+                                pass.options.flops * part,
+                                {pass.tile_rows.value_or(0), pass.tile_cols.value_or(0)}});
     }
     return {};
 }

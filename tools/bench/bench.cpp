@@ -74,6 +74,11 @@ void add_network(Json& report, const Program& program, const Timing& timing, uin
     add_program(report, program);
 }
 
+void add_profile(CLI::App& command, std::string& path)
+{
+    command.add_option("--profile", path, "write device times as a Chrome trace, and their sums to stderr");
+}
+
 void want_profile(Device& device, const std::string& path)
 {
     if (!path.empty())

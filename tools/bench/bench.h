@@ -33,6 +33,7 @@ void add_network(Json& report, const Program& program, const Timing& timing, uin
 // multiplications and additions of a program, as its plan counts them
 double flops_of(const Program& program);
 // device times where --profile asked for them: a Chrome trace, and their sums to stderr
+void add_profile(CLI::App& command, std::string& path);
 void want_profile(Device& device, const std::string& path);
 Status write_profile(Device& device, const std::string& path);
 void print_report(const Json& report, const Globals& globals);

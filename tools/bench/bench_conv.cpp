@@ -15,13 +15,14 @@ namespace {
 
 struct BenchConvArguments {
     uint32_t width = 77, height = 53, channels = 320, outputs = 320;
-    std::string precision = "fp16";
+    std::string precision = "fp16", profile;
     bool winograd = false;
 };
 
 Status bench_conv(const BenchConvArguments& o, const Globals& globals)
 {
     SR_TRY(const auto device, open_device(globals));
+    want_profile(*device, o.profile);
     const DType dtype = o.precision == "fp32" ? DType::f32 : DType::f16;
     BenchInputs inputs(*device);
     FeatureMap map{{}, 1, o.height, o.width};
@@ -47,7 +48,7 @@ Status bench_conv(const BenchConvArguments& o, const Globals& globals)
     add_rate(report, 2.0 * 9 * o.channels * o.outputs * o.width * o.height, timing); // as a direct convolution
     add_program(report, *program);
     print_report(report, globals);
-    return {};
+    return write_profile(*device, o.profile);
 }
 
 } // namespace
@@ -62,6 +63,7 @@ void add_bench_conv(CLI::App& bench, const Globals& globals, Run& run)
     add_number(*c, "--outputs", o->outputs, "channels of the output", 1, 16384);
     c->add_flag("--winograd", o->winograd, "by Winograd's algorithm, weights transformed in every run");
     add_choice(*c, "--precision", {"fp16", "fp32"}, "storage", o->precision);
+    add_profile(*c, o->profile);
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_conv(*o, globals); }; });
 }
 

@@ -15,12 +15,13 @@ namespace {
 
 struct BenchGemmArguments {
     GemmShape shape;
-    std::string precision = "fp16";
+    std::string precision = "fp16", profile;
 };
 
 Status bench_gemm(const BenchGemmArguments& o, const Globals& globals)
 {
     SR_TRY(const auto device, open_device(globals));
+    want_profile(*device, o.profile);
     const DType dtype = o.precision == "fp32" ? DType::f32 : DType::f16;
     BenchInputs inputs(*device);
     SR_TRY(const auto program, gemm_program(*device, inputs, o.shape, dtype));
@@ -33,7 +34,7 @@ Status bench_gemm(const BenchGemmArguments& o, const Globals& globals)
     add_rate(report, flops_of(*program), timing);
     add_program(report, *program);
     print_report(report, globals);
-    return {};
+    return write_profile(*device, o.profile);
 }
 
 } // namespace
@@ -55,6 +56,7 @@ void add_bench_gemm(CLI::App& bench, const Globals& globals, Run& run)
     add_number(*c, "--n", o->shape.n, "rows of w", 1, 65536);
     add_number(*c, "--k", o->shape.k, "columns of both", 1, 65536);
     add_choice(*c, "--precision", {"fp16", "fp32"}, "storage", o->precision);
+    add_profile(*c, o->profile);
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_gemm(*o, globals); }; });
 }
 

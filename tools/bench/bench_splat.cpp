@@ -16,17 +16,19 @@ namespace {
 
 struct SortOptions {
     uint32_t pairs = 1000000;
+    std::string profile;
 };
 
 struct SplatBenchOptions {
     uint32_t splats = 200000, width = 616, height = 424;
     float sigma = 0.04f;
-    std::string model = "pinhole";
+    std::string model = "pinhole", profile;
 };
 
 Status bench_sort(const SortOptions& o, const Globals& globals)
 {
     SR_TRY(const auto device, open_device(globals));
+    want_profile(*device, o.profile);
     BenchInputs inputs(*device);
     const Slot keys = inputs.add(o.pairs, 1, DType::u32), values = inputs.add(o.pairs, 1, DType::u32);
     const uint64_t predicted = inputs.bytes();
@@ -43,7 +45,7 @@ Status bench_sort(const SortOptions& o, const Globals& globals)
     report["gbps"] = 80.0 * o.pairs / timing.ms_median / 1e6;
     add_program(report, *program);
     print_report(report, globals);
-    return {};
+    return write_profile(*device, o.profile);
 }
 
 // a street: ground, two facades and blobs between them, in front of a camera at the origin that looks along x
@@ -89,6 +91,7 @@ Intrinsics bench_camera(CameraModel model, uint32_t width, uint32_t height)
 Status bench_splat(const SplatBenchOptions& o, const Globals& globals)
 {
     SR_TRY(const auto device, open_device(globals));
+    want_profile(*device, o.profile);
     SR_TRY(const SurfelScene scene, SurfelScene::create(*device, street_surfels(o.splats, o.sigma)));
     const CameraModel model = camera_model_of(o.model).value_or(CameraModel::pinhole);
     SR_TRY(const auto rasterizer, Rasterizer::create(*device, scene, o.width, o.height, 1, {.model = model}));
@@ -107,7 +110,7 @@ Status bench_splat(const SplatBenchOptions& o, const Globals& globals)
     report["gbps"] = (64.0 * o.splats + 48.0 * o.width * o.height) / timing.ms_median / 1e6;
     add_program(report, rasterizer->program());
     print_report(report, globals);
-    return {};
+    return write_profile(*device, o.profile);
 }
 
 } // namespace
@@ -117,6 +120,7 @@ void add_bench_sort(CLI::App& bench, const Globals& globals, Run& run)
     auto o = std::make_shared<SortOptions>();
     CLI::App* c = bench.add_subcommand("sort", "stable radix sort of 32-bit pairs");
     add_number(*c, "--pairs", o->pairs, "pairs", 1u, 1u << 28);
+    add_profile(*c, o->profile);
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_sort(*o, globals); }; });
 }
 
@@ -129,6 +133,7 @@ void add_bench_splat(CLI::App& bench, const Globals& globals, Run& run)
     add_number(*c, "-H,--height", o->height, "pixels", 1u, 16384u);
     add_number(*c, "--splat-radius", o->sigma, "metres", 0.001f, 10.f);
     add_choice(*c, "--camera-model", {"pinhole", "opencv", "fisheye", "equirectangular"}, "lens", o->model);
+    add_profile(*c, o->profile);
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_splat(*o, globals); }; });
 }
 

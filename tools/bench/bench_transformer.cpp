@@ -17,7 +17,7 @@ namespace {
 constexpr int kSteps = 2; // per measured run
 
 struct BenchTransformerArguments {
-    std::string config, precision = "fp16";
+    std::string config, precision = "fp16", profile;
     uint32_t cells = 128, batch = 1;
     bool unguided = false;
 };
@@ -45,6 +45,7 @@ Status bench_transformer(const BenchTransformerArguments& o, const Globals& glob
         SR_TRY(config, parse_transformer_config(json));
     }
     SR_TRY(const auto device, open_device(globals));
+    want_profile(*device, o.profile);
     const DType dtype = o.precision == "fp32" ? DType::f32 : DType::f16;
     SR_TRY(const auto transformer, Transformer::random(*device, config, dtype));
     SchedulerConfig scheduler;
@@ -69,7 +70,7 @@ Status bench_transformer(const BenchTransformerArguments& o, const Globals& glob
     report["barriers"] = sampler->step_barriers();
     report["host_us_per_step"] = sampler->host_us_per_step();
     print_report(report, globals);
-    return {};
+    return write_profile(*device, o.profile);
 }
 
 } // namespace
@@ -83,6 +84,7 @@ void add_bench_transformer(CLI::App& bench, const Globals& globals, Run& run)
     add_number(*c, "--batch", o->batch, "regions", 1u, 1024u);
     add_choice(*c, "--precision", {"fp16", "fp32"}, "storage", o->precision);
     c->add_flag("--unguided", o->unguided, "without the unconditional half");
+    add_profile(*c, o->profile);
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_transformer(*o, globals); }; });
 }
 

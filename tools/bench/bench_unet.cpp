@@ -73,7 +73,7 @@ void add_bench_unet(CLI::App& bench, const Globals& globals, Run& run)
     add_number(*c, "--batch", o->batch, "images; 2 is one step with guidance", 1u, 64u);
     add_number(*c, "--tokens", o->tokens, "tokens of the text", 1u, 4096u);
     add_choice(*c, "--precision", {"fp16", "fp32"}, "storage", o->precision);
-    c->add_option("--profile", o->profile, "write device times as a Chrome trace, and their sums to stderr");
+    add_profile(*c, o->profile);
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_unet(*o, globals); }; });
 }
 

@@ -62,7 +62,7 @@ void add_bench_vae(CLI::App& bench, const Globals& globals, Run& run)
     add_number(*c, "-H,--height", o->height, "pixels", 1u, 16384u);
     add_choice(*c, "--precision", {"fp16", "fp32"}, "storage", o->precision);
     c->add_flag("--encode", o->encode, "through the encoder instead");
-    c->add_option("--profile", o->profile, "write device times as a Chrome trace, and their sums to stderr");
+    add_profile(*c, o->profile);
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_vae(*o, globals); }; });
 }
 

@@ -171,7 +171,7 @@ void add_bench_vsd(CLI::App& bench, const Globals& globals, Run& run)
                0, 1000);
     add_number(*c, "--evaluations", o->evaluations, "runs of each part, the first to warm up; 0: memory only", 0, 1000);
     add_choice(*c, "--precision", {"fp16", "fp32"}, "storage", o->precision);
-    c->add_option("--profile", o->profile, "write device times as a Chrome trace, and their sums to stderr");
+    add_profile(*c, o->profile);
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_vsd(*o, globals); }; });
 }
 
