@@ -3,6 +3,7 @@
 // y = (x - mean(x)) / sqrt(var(x) + eps) * weight + bias: [M, N] -> [M, N]
 #include "kernels/network.h"
 
+#include "kernels/network/row_norm.h"
 #include "layer_norm.spv.h"
 #include "shaders/network/layer_norm.h"
 
@@ -15,6 +16,7 @@ Tensor layer_norm(Graph& g, Tensor x, Tensor weight, Tensor bias, float eps)
     const Tensor y = g.matrix(x.rows, x.cols, x.dtype, "layer_norm");
     const LayerNormPush push{.rows = x.rows, .cols = x.cols, .x_ld = x.ld, .y_ld = y.ld, .eps = eps};
     DispatchOptions options;
+    options.constants = {{"kKept", kept_sweeps(x.cols)}};
     options.banded = {"X", "Y"};
     g.dispatch(kernel::layer_norm, {x, weight, bias, y}, push, row_tiles(x.rows), std::move(options));
     return y;

@@ -3,6 +3,7 @@
 // y = (x - mean(x)) / sqrt(var(x) + eps) * (1 + scale) + shift: [groups * M, N] -> [groups * M, N]
 #include "kernels/network.h"
 
+#include "kernels/network/row_norm.h"
 #include "modulate.spv.h"
 #include "shaders/network/modulate.h"
 
@@ -24,7 +25,9 @@ Tensor modulate(Graph& g, Tensor x, Modulation shift, uint32_t scale_col, float 
     push.scale_col = scale_col;
     push.step = shift.step;
     push.eps = eps;
+    const bool aligned = (shift.table.ld | shift.col | scale_col | shift.step) % 4 == 0;
     DispatchOptions options;
+    options.constants = {{"kKept", kept_sweeps(x.cols)}, {"kAligned", aligned}};
     if (groups == 1)
         options.banded = {"X", "TableRow", "Y"};
     g.dispatch(kernel::modulate, {x, shift.table, shift.table_row, y}, push, row_tiles(x.rows), std::move(options));

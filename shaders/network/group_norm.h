@@ -4,10 +4,22 @@
 #define SEMROVER_GROUP_NORM_H
 #include "shaders/lib/types.h"
 
+struct GroupNormMergePush {
+    uint rows;     // of the result, of all images
+    uint merged;   // rows of the result, of an image
+    uint together; // chunks that become one
+    uint pixels;   // of an image
+    uint chunks;   // of 16 rows, of an image
+    uint cols;
+    uint moments_ld;
+    uint merged_ld;
+};
+
 struct GroupNormScalePush {
-    uint pixels; // of an image
-    uint chunks; // of 16 rows, of an image
-    uint images; // whose statistics are taken together
+    uint pixels;     // of an image
+    uint chunks;     // of an image
+    uint chunk_rows; // rows of a chunk
+    uint images;     // whose statistics are taken together
     uint x_cols;
     uint x2_cols;
     uint moments_ld;
