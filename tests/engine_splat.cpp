@@ -233,6 +233,44 @@ TEST(engine_splat, pixels_on_the_device_are_those_that_files_of_the_images_hold)
     EXPECT_EQ(next, 3u);
 }
 
+TEST(engine_splat, a_large_image_holds_the_texels_of_the_device_also_in_memory_of_an_earlier_one)
+{
+    constexpr uint32_t kWidth = 1003, kHeight = 601; // threads share it
+    const SplatCamera camera = device_camera(camera_for(kWidth, kHeight));
+    for (const char* limits : {"", "staging=1"}) {
+        auto device = Device::create({.limits = limits});
+        ASSERT_TRUE(device);
+        auto scene = SurfelScene::create(**device, surfels_of(random_splats(300, 9)));
+        ASSERT_TRUE(scene);
+        auto rasterizer = Rasterizer::create(**device, *scene, kWidth, kHeight, 1);
+        ASSERT_TRUE(rasterizer);
+        std::vector<SplatImage> images(3); // as many as there are cameras is what it becomes
+        for (int turn = 0; turn < 2; ++turn) {
+            ASSERT_TRUE((*rasterizer)->render({&camera, 1}, images));
+            ASSERT_EQ(images.size(), 1u);
+            const SplatImage& image = images[0];
+            const SplatSlots slots = (*rasterizer)->images(0);
+            const auto color = *slots.color.read<float>(**device), surface = *slots.surface.read<float>(**device),
+                       depth = *slots.depth.read<float>(**device);
+            const auto ids = *slots.ids.read<uint32_t>(**device);
+            ASSERT_EQ(image.alpha.size(), size_t(kWidth) * kHeight);
+            for (size_t i = 0; i < image.alpha.size(); ++i) {
+                for (size_t c = 0; c < 3; ++c) {
+                    ASSERT_EQ(image.color[i * 3 + c], color[i * 4 + c]);
+                    ASSERT_EQ(image.normal[i * 3 + c], surface[i * 4 + c]);
+                }
+                ASSERT_EQ(image.alpha[i], color[i * 4 + 3]);
+                ASSERT_EQ(image.depth_sum[i], surface[i * 4 + 3]);
+                ASSERT_EQ(image.depth_expected[i], depth[i * 2]);
+                ASSERT_EQ(image.depth_median[i], depth[i * 2 + 1]);
+                ASSERT_EQ(image.label[i], ids[i * 2]);
+                ASSERT_EQ(image.cell[i], ids[i * 2 + 1]);
+                ASSERT_EQ(image.visible[i], image.alpha[i] >= 0.5f);
+            }
+        }
+    }
+}
+
 TEST(engine_splat, visible_pixels_are_those_that_reach_the_threshold)
 {
     const SurfelScene scene = make_scene(surfels_of(random_splats(300, 9)));

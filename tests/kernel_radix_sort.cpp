@@ -15,7 +15,8 @@ struct SortCase {
     bool counted, iota;
 };
 
-// one pair; all keys equal; a tail; digits of 4, 6 and 8 bits; few pairs in a large capacity, none, too many; large
+// one pair; all keys equal; a tail; digits of 4, 6 and 8 bits; few pairs in a large capacity, none, too many; large;
+// several tiles a worker
 const SortCase kCases[] = {
     {1, 1, 32, ~0u, false, false},
     {777, 777, 8, 1, false, true},
@@ -28,6 +29,7 @@ const SortCase kCases[] = {
     {100000, 100000, 32, 3, false, false},
     {300007, 299999, 32, ~0u, true, false},
     {1000000, 1000000, 32, ~0u, false, true},
+    {3300003, 3300003, 8, 199, false, true},
 };
 
 void check(const SortCase& c)

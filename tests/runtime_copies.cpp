@@ -145,5 +145,32 @@ TEST(runtime_copies, a_ring_takes_the_memory_that_was_planned)
     EXPECT_EQ(device.allocated_bytes() - before, ReadbackRing::planned_bytes(device.limits(), 12345, 4));
 }
 
+TEST(runtime_copies, a_sink_gets_the_slices_in_order_in_pieces_that_make_them_up)
+{
+    for (const char* limits : {"", "staging=1"}) { // from memory that the host sees, and through the window
+        auto device = Device::create({.limits = limits});
+        ASSERT_TRUE(device);
+        State state;
+        const Slot large = state.slot(5000001, 1, DType::u32, "large", 1),
+                   small = state.slot(3, 1, DType::u32, "small", 1);
+        ASSERT_TRUE(state.allocate(**device, "slots"));
+        std::vector<std::vector<uint32_t>> expected = {std::vector<uint32_t>(5000001), {7, 8, 9}};
+        std::iota(expected[0].begin(), expected[0].end(), 1u);
+        ASSERT_TRUE(large.write(**device, expected[0]));
+        ASSERT_TRUE(small.write(**device, expected[1]));
+        std::vector<std::vector<uint32_t>> got(2);
+        const BufferSlice slices[] = {large.slice(), small.slice()};
+        ASSERT_TRUE((*device)->read(slices, [&](const ReadPiece& piece) {
+            ASSERT_LT(piece.slice, 2u);
+            EXPECT_EQ(piece.at % 16, 0u);
+            EXPECT_EQ(piece.at, got[piece.slice].size() * 4);
+            const std::vector<uint32_t> some = words(piece.bytes);
+            got[piece.slice].insert(got[piece.slice].end(), some.begin(), some.end());
+        }));
+        EXPECT_TRUE(got == expected);
+        EXPECT_EQ((*device)->host_bytes().read, 4u * 5000004);
+    }
+}
+
 } // namespace runtime_copies_test
 } // namespace semrover

@@ -3,11 +3,13 @@
 #include "engine/splat/rasterizer.h"
 
 #include "engine/camera/lens.h"
+#include "engine/splat/planes.h"
 #include "kernels/picture.h"
 #include "runtime/device/command.h"
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 namespace semrover {
 
@@ -35,6 +37,30 @@ Result<uint32_t> room_for(uint32_t need, uint32_t bytes_each, const DeviceLimits
     if (need > limit)
         return fail(ErrorCode::out_of_memory, "a frame needs {} {}; this device has room for {}", need, what, limit);
     return uint32_t(std::min<uint64_t>(limit, uint64_t(need) + need / 4 + 1024));
+}
+
+// some texels of what SplatSlots has, in that order
+void take_apart(const ReadPiece& piece, SplatImage& image, float visible_alpha)
+{
+    if (piece.bytes.empty())
+        return;
+    const size_t which = piece.slice % 4, first = piece.at / (which < 2 ? 16 : 8);
+    const std::span numbers(reinterpret_cast<const float*>(piece.bytes.data()), piece.bytes.size() / sizeof(float));
+    const std::span words(reinterpret_cast<const uint32_t*>(piece.bytes.data()), numbers.size());
+    switch (which) {
+    case 0:
+        split_texels(numbers, &image.color[first * 3], &image.alpha[first]);
+        mark_from(std::span(image.alpha).subspan(first, numbers.size() / 4), visible_alpha, &image.visible[first]);
+        break;
+    case 1:
+        split_texels(numbers, &image.normal[first * 3], &image.depth_sum[first]);
+        break;
+    case 2:
+        split_pairs(numbers, &image.depth_expected[first], &image.depth_median[first]);
+        break;
+    default:
+        split_pairs(words, &image.label[first], &image.cell[first]);
+    }
 }
 
 } // namespace
@@ -103,7 +129,9 @@ Result<std::unique_ptr<Rasterizer>> Rasterizer::create(Device& device, const Sur
     r->cameras_ = uint32_t(std::min<uint64_t>(max_cameras, limit / per_camera));
     r->max_visible_ =
         uint32_t(std::min<uint64_t>(std::max(scene.size(), 1024u), limit / splat_record_bytes(lens_of(options.model))));
-    const uint64_t pairs = options.max_pairs ? options.max_pairs : std::max<uint64_t>(8ull * scene.size(), 65536);
+    // A street of a million surfels has 1.5 pairs a surfel at 616 x 424 and 2.8 at 1920 x 1080. More room makes the
+    // blending seem longer than a submit may last, and then it is cut.
+    const uint64_t pairs = options.max_pairs ? options.max_pairs : std::max<uint64_t>(4ull * scene.size(), 65536);
     r->max_pairs_ = uint32_t(std::min(pairs, limit / kPairBytes));
     SR_CHECK(r->build());
     return r;
@@ -192,11 +220,15 @@ Status Rasterizer::draw_together(std::span<const SplatCamera> cameras)
     for (;;) {
         SR_CHECK(camera_table_.write(device_, table));
         SR_CHECK(program_->run());
-        SR_TRY(const std::vector<uint32_t> visible, visible_.read<uint32_t>(device_));
-        SR_TRY(const std::vector<uint32_t> pairs, pairs_.read<uint32_t>(device_));
-        if (visible[0] <= max_visible_ && pairs[0] <= max_pairs_)
+        const BufferSlice slices[] = {visible_.slice(), pairs_.slice()};
+        uint32_t counts[2] = {};
+        SR_CHECK(device_.read(slices, [&](const ReadPiece& piece) {
+            std::memcpy(&counts[piece.slice], piece.bytes.data(), sizeof(uint32_t));
+        }));
+        const auto [visible, pairs] = counts;
+        if (visible <= max_visible_ && pairs <= max_pairs_)
             return {};
-        SR_CHECK(make_room(visible[0], pairs[0])); // pairs of what was visible; with more room there may be more
+        SR_CHECK(make_room(visible, pairs)); // pairs of what was visible; with more room there may be more
     }
 }
 
@@ -279,16 +311,14 @@ SplatSlots Rasterizer::images(uint32_t camera) const
             images_.depth.row_range(first, pixels), images_.ids.row_range(first, pixels)};
 }
 
-Status Rasterizer::read_images(uint32_t count, std::vector<SplatImage>& out)
+Status Rasterizer::read_images(std::span<SplatImage> images)
 {
-    const uint32_t pixels = width_ * height_;
-    for (uint32_t camera = 0; camera < count; ++camera) {
-        const SplatSlots images = this->images(camera);
-        SR_TRY(const std::vector<float> color, images.color.read<float>(device_));
-        SR_TRY(const std::vector<float> surface, images.surface.read<float>(device_));
-        SR_TRY(const std::vector<float> depth, images.depth.read<float>(device_));
-        SR_TRY(const std::vector<uint32_t> ids, images.ids.read<uint32_t>(device_));
-        SplatImage image{.width = width_, .height = height_};
+    const size_t pixels = size_t(width_) * height_;
+    std::vector<BufferSlice> slices; // four a camera
+    for (uint32_t camera = 0; camera < images.size(); ++camera) {
+        SplatImage& image = images[camera];
+        image.width = width_;
+        image.height = height_;
         image.color.resize(pixels * 3);
         image.normal.resize(pixels * 3);
         for (auto* plane : {&image.alpha, &image.depth_sum, &image.depth_expected, &image.depth_median})
@@ -296,33 +326,33 @@ Status Rasterizer::read_images(uint32_t count, std::vector<SplatImage>& out)
         image.label.resize(pixels);
         image.cell.resize(pixels);
         image.visible.resize(pixels);
-        for (size_t i = 0; i < pixels; ++i) {
-            std::copy_n(&color[i * 4], 3, &image.color[i * 3]);
-            std::copy_n(&surface[i * 4], 3, &image.normal[i * 3]);
-            image.alpha[i] = color[i * 4 + 3];
-            image.depth_sum[i] = surface[i * 4 + 3];
-            image.depth_expected[i] = depth[i * 2];
-            image.depth_median[i] = depth[i * 2 + 1];
-            image.label[i] = ids[i * 2];
-            image.cell[i] = ids[i * 2 + 1];
-            image.visible[i] = image.alpha[i] >= options_.visible_alpha;
-        }
-        out.push_back(std::move(image));
+        const SplatSlots slots = this->images(camera);
+        for (const Slot* slot : {&slots.color, &slots.surface, &slots.depth, &slots.ids})
+            slices.push_back(slot->slice());
+    }
+    return device_.read(
+        slices, [&](const ReadPiece& piece) { take_apart(piece, images[piece.slice / 4], options_.visible_alpha); });
+}
+
+Status Rasterizer::render(std::span<const SplatCamera> cameras, std::vector<SplatImage>& images)
+{
+    SR_ASSERT(!options_.pixels_over, "this rasterizer keeps pixels, not images");
+    for (size_t i = 0; i < cameras.size(); ++i)
+        SR_CHECK(check_camera(cameras[i], i));
+    images.resize(cameras.size());
+    for (size_t done = 0; done < cameras.size();) {
+        SR_TRY(const uint32_t drawn, draw_some(cameras.subspan(done)));
+        SR_CHECK(read_images(std::span(images).subspan(done, drawn)));
+        done += drawn;
     }
     return {};
 }
 
 Result<std::vector<SplatImage>> Rasterizer::render(std::span<const SplatCamera> cameras)
 {
-    SR_ASSERT(!options_.pixels_over, "this rasterizer keeps pixels, not images");
-    for (size_t i = 0; i < cameras.size(); ++i)
-        SR_CHECK(check_camera(cameras[i], i));
-    std::vector<SplatImage> out;
-    while (out.size() < cameras.size()) {
-        SR_TRY(const uint32_t drawn, draw_some(cameras.subspan(out.size())));
-        SR_CHECK(read_images(drawn, out));
-    }
-    return out;
+    std::vector<SplatImage> images;
+    SR_CHECK(render(cameras, images));
+    return images;
 }
 
 } // namespace semrover

@@ -79,6 +79,9 @@ class Rasterizer {
 
     // errors: bad_input for a camera that is not finite or without focal length; out_of_memory, device_lost
     Result<std::vector<SplatImage>> render(std::span<const SplatCamera> cameras);
+    // The same into `images`, whose memory is used again where it fits. For frame after frame: to allocate new memory
+    // takes the host longer than to read the images back.
+    Status render(std::span<const SplatCamera> cameras, std::vector<SplatImage>& images);
 
     // the same on the device: draws as many of the first cameras as it has room for, and says how many; what they see
     // stays until the next call
@@ -112,7 +115,7 @@ class Rasterizer {
     Status make_room(uint32_t visible, uint32_t pairs);
     Result<uint32_t> draw_some(std::span<const SplatCamera> cameras);
     Status draw_together(std::span<const SplatCamera> cameras);
-    Status read_images(uint32_t count, std::vector<SplatImage>& out);
+    Status read_images(std::span<SplatImage> images);
 
     Device& device_;
     const SurfelScene& scene_;

@@ -15,7 +15,7 @@ namespace semrover {
 namespace {
 
 constexpr uint32_t kDigitBits = 8;
-constexpr uint32_t kSortChunk = 1024, kMaxSortWorkers = 2048; // pairs a worker should have at least; chunks
+constexpr uint32_t kSortChunk = 3072, kMaxSortWorkers = 1024; // pairs a worker should have at least; chunks
 
 // an odd multiple of 8: whole workgroups of the CPU variant, and columns of counters that do not fall into one cache
 // set

@@ -137,7 +137,8 @@ Result<std::unique_ptr<Device>> Device::adopt(const HostDevice& host, const Devi
 Status Device::create_instance(const DeviceOptions& options)
 {
     const bool validation = options.validation || !environment("SEMROVER_VALIDATION").empty();
-    SR_TRY(instance_, semrover::create_instance(validation, vk_.allocator()));
+    SR_TRY(instance_,
+           vk_.allocator() ? semrover::create_instance(validation, vk_.allocator()) : process_instance(validation));
     SR_CHECK(vk_.load_instance(nullptr, instance_));
     if (!validation)
         return {};
@@ -271,7 +272,7 @@ Device::~Device()
     if (messenger_)
         reinterpret_cast<PFN_vkDestroyDebugUtilsMessengerEXT>(vk_.GetInstanceProcAddr(
             instance_, "vkDestroyDebugUtilsMessengerEXT"))(instance_, messenger_, vk_.allocator());
-    if (instance_)
+    if (instance_ && vk_.allocator()) // else the process keeps it
         vk_.DestroyInstance(instance_, vk_.allocator());
 }
 
@@ -362,15 +363,28 @@ Status Device::write(const BufferSlice& to, std::span<const std::byte> bytes)
 Status Device::read(const BufferSlice& from, std::span<std::byte> bytes)
 {
     SR_ASSERT(bytes.size() <= from.bytes, "{} bytes read from a slice of {}", bytes.size(), from.bytes);
+    const BufferSlice some = from.part(0, bytes.size());
+    return read({&some, 1}, [&](const ReadPiece& piece) {
+        std::memcpy(bytes.data() + piece.at, piece.bytes.data(), piece.bytes.size());
+    });
+}
+
+Status Device::read(std::span<const BufferSlice> from, const PieceSink& sink)
+{
     SR_CHECK(wait(ticket_));
-    host_bytes_.read += bytes.size();
-    if (const std::byte* mapped = from.buffer->mapped(); mapped && from.buffer->cached()) {
-        if (!bytes.empty())
-            std::memcpy(bytes.data(), mapped + from.offset, bytes.size());
-        return {};
+    bool cached = true;
+    for (const BufferSlice& slice : from) {
+        host_bytes_.read += slice.bytes;
+        cached = cached && slice.buffer->mapped() && slice.buffer->cached();
     }
-    SR_TRY(Staging * window, staging());
-    return window->read(from, bytes);
+    if (!cached) {
+        SR_TRY(Staging * window, staging());
+        return window->read(from, sink);
+    }
+    for (size_t i = 0; i < from.size(); ++i)
+        if (from[i].bytes)
+            sink({i, 0, {from[i].buffer->mapped() + from[i].offset, from[i].bytes}});
+    return {};
 }
 
 Status Device::clear(const BufferSlice& slice)

@@ -68,6 +68,14 @@ struct TimelinePoints {
     std::vector<TimelinePoint> waits, signals;
 };
 
+// some bytes of one of the slices that are read
+struct ReadPiece {
+    size_t slice = 0; // which of them
+    uint64_t at = 0;  // where in it they begin, a multiple of 16
+    std::span<const std::byte> bytes;
+};
+using PieceSink = std::function<void(const ReadPiece&)>;
+
 // bytes that crossed the border between host and device: to the host, from the host
 struct HostBytes {
     uint64_t read = 0, written = 0;
@@ -111,6 +119,9 @@ class Device {
     // synchronous copies, after everything submitted so far; through staging where the host cannot see the memory
     Status write(const BufferSlice& to, std::span<const std::byte> bytes);
     Status read(const BufferSlice& from, std::span<std::byte> bytes);
+    // Hands the slices to the sink, one after the other, in pieces that are good until it returns. The sink takes them
+    // from memory that the device wrote, so this saves a copy, and the device copies the next piece meanwhile.
+    Status read(std::span<const BufferSlice> from, const PieceSink& sink);
     Status clear(const BufferSlice& slice);
     // what went through them, and through rings of read-backs
     const HostBytes& host_bytes() const { return host_bytes_; }

@@ -35,29 +35,32 @@ Status Staging::write(const BufferSlice& to, std::span<const std::byte> bytes)
     return device_.wait(*std::ranges::max_element(tickets));
 }
 
-Status Staging::read(const BufferSlice& from, std::span<std::byte> bytes)
+Status Staging::read(std::span<const BufferSlice> from, const PieceSink& sink)
 {
     struct Copy {
         uint64_t ticket = 0;
-        BufferSlice half;
-        std::byte* to = nullptr;
+        BufferSlice half; // of no bytes: there is none
+        size_t slice = 0;
+        uint64_t at = 0;
     };
-    Copy last; // still to be emptied
+    Copy last; // still to be handed over
     size_t index = 0;
-    const auto empty = [&](const Copy& copy) -> Status {
+    const auto hand_over = [&](const Copy& copy) -> Status {
+        if (!copy.half.bytes)
+            return {};
         SR_CHECK(device_.wait(copy.ticket));
-        if (copy.to)
-            std::memcpy(copy.to, window_->mapped() + copy.half.offset, copy.half.bytes);
+        sink({copy.slice, copy.at, {window_->mapped() + copy.half.offset, copy.half.bytes}});
         return {};
     };
-    for (uint64_t at = 0; at < bytes.size(); at += half_bytes(), ++index) {
-        const uint64_t count = std::min<uint64_t>(half_bytes(), bytes.size() - at);
-        Copy next{0, half(index, count), bytes.data() + at};
-        SR_TRY(next.ticket, copies_->copy(from.part(at, count), next.half));
-        SR_CHECK(empty(last));
-        last = next;
-    }
-    return empty(last);
+    for (size_t i = 0; i < from.size(); ++i)
+        for (uint64_t at = 0; at < from[i].bytes; at += half_bytes(), ++index) {
+            const uint64_t count = std::min<uint64_t>(half_bytes(), from[i].bytes - at);
+            Copy next{0, half(index, count), i, at};
+            SR_TRY(next.ticket, copies_->copy(from[i].part(at, count), next.half));
+            SR_CHECK(hand_over(last));
+            last = next;
+        }
+    return hand_over(last);
 }
 
 } // namespace semrover

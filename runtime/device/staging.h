@@ -14,11 +14,11 @@ class Staging {
 
     // return when all is there
     Status write(const BufferSlice& to, std::span<const std::byte> bytes);
-    Status read(const BufferSlice& from, std::span<std::byte> bytes);
+    Status read(std::span<const BufferSlice> from, const PieceSink& sink); // see Device::read
 
   private:
     explicit Staging(Device& device) : device_(device) {}
-    uint64_t half_bytes() const { return window_->bytes() / kHalves; }
+    uint64_t half_bytes() const { return window_->bytes() / kHalves / 16 * 16; }
     BufferSlice half(size_t index, uint64_t bytes) const;
 
     static constexpr size_t kHalves = 2;

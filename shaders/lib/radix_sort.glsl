@@ -10,10 +10,15 @@ layout(binding = 1) readonly buffer Count { uint count[]; }; // [1]
 
 uint digit_of(uint key) { return key >> p.shift & p.buckets - 1; }
 
+const uint kSortTile = 3072; // pairs that a workgroup of a GPU takes at a time
+
 // [first, last) of a worker
 uvec2 chunk_of(uint worker)
 {
     const uint size = kCounted ? min(count[0], p.size) : p.size;
-    const uint chunk = (size + p.workers - 1) / p.workers;
+    uint chunk = (size + p.workers - 1) / p.workers;
+#ifdef CHUNK_OF_TILES // whole tiles: then some workers may have none
+    chunk = (chunk + kSortTile - 1) / kSortTile * kSortTile;
+#endif
     return min(uvec2(worker, worker + 1) * chunk, uvec2(size));
 }

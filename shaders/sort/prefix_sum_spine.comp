@@ -16,20 +16,22 @@ shared bool wrapped;
 
 void main()
 {
-    const uint t = gl_LocalInvocationID.x;
-    uint carry = 0;
+    // a thread owns some partial sums in a row: one scan of the workgroup does for all of them
+    const uint t = gl_LocalInvocationID.x, own = (p.workers + 63) / 64;
+    const uint begin = min(t * own, p.workers), end = min(begin + own, p.workers);
     wrapped = false;
-    for (uint base = 0; base < p.workers; base += 64) {
-        const uint w = base + t, own = w < p.workers ? partial[w] : 0;
-        uint sum;
-        const uint before = carry + scan_workgroup(own, sum);
-        if (w < p.workers)
-            first[w] = before;
-        if (before + own < before)
+    uint sum = 0, all;
+    for (uint w = begin; w < end; ++w)
+        sum += partial[w];
+    uint before = scan_workgroup(sum, all); // its barriers come before anyone finds that the sum wrapped
+    for (uint w = begin; w < end; ++w) {
+        const uint next = before + partial[w];
+        first[w] = before;
+        if (next < before)
             wrapped = true;
-        carry += sum;
+        before = next;
     }
     barrier();
     if (t == 0)
-        total[0] = wrapped ? 0xffffffffu : carry;
+        total[0] = wrapped ? 0xffffffffu : all;
 }

@@ -97,9 +97,10 @@ Status bench_splat(const SplatBenchOptions& o, const Globals& globals)
     SR_TRY(const auto rasterizer, Rasterizer::create(*device, scene, o.width, o.height, 1, {.model = model}));
     const SplatCamera camera =
         splat_camera(bench_camera(model, o.width, o.height), {{0, -1, 0, 0, 0, 0, -1, 0, 1, 0, 0, 0, 0, 0, 0, 1}});
-    SR_CHECK(rasterizer->render({&camera, 1}).map([](const auto&) {})); // finds how much room the pairs need
+    std::vector<SplatImage> images;
+    SR_CHECK(rasterizer->render({&camera, 1}, images)); // finds how much room the pairs need
     device->reset_peak();
-    SR_TRY(const Timing timing, measure([&] { return rasterizer->render({&camera, 1}).map([](const auto&) {}); }));
+    SR_TRY(const Timing timing, measure([&] { return rasterizer->render({&camera, 1}, images); }));
     Json report = bench_report("splat", *device, DType::f32, timing, scene.bytes() + rasterizer->planned_bytes());
     report["splats"] = o.splats;
     report["camera_model"] = o.model;
