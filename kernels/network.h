@@ -223,6 +223,14 @@ struct FlashAttentionOptions {
                                      Tensor kv, // [(batch *) key_rows, ..] with keys and values; may be q itself
                                      const FlashAttentionOptions& options); // [batch * query_rows, heads * head_dim]
 
+// y = softmax(scale x) over the first columns of each row; zeros behind them
+struct SoftmaxOptions {
+    uint32_t count = 0; // columns
+    float scale = 1;
+    DType dtype = DType::f16; // of y
+};
+[[nodiscard]] Tensor softmax(Graph& g, Tensor x, const SoftmaxOptions& options); // [M, N] -> [M, N]
+
 // -- videos ----------------------------------------------------------------------------------------------------------
 
 // The frames of a video are images one after the other, videos likewise.

@@ -365,7 +365,7 @@ int main(int argc, char** argv)
     memcpy(expected, color, sizeof expected);
     CHECK(objects > 0 && pieces > 0 && objects_ever > 100 && pieces_ever > 3);
     sr_world_destroy(world);
-    CHECK(pieces == 0);
+    CHECK(pieces <= 1); /* the context's window for copies, where the host cannot see the memory */
     sr_context_destroy(context);
     CHECK(objects == 0 && pieces == 0 && pieces_bytes == 0);
     printf("a run: %lu calls\n", (unsigned long)calls_of_a_run);

@@ -102,7 +102,7 @@ TEST(graph_tiles, are_known_by_what_a_pass_does_but_for_its_tile)
     Plan plan = products();
     Pass& pass = plan.passes[0];
     const TileChoices::Key key = TileChoices::key(pass);
-    pass.set_tile(32);
+    pass.set_tile(32, simt_limits());
     EXPECT_EQ(TileChoices::key(pass), key);
     EXPECT_EQ(TileChoices::key(plan.passes.back()), key);
     EXPECT_NE(TileChoices::key(products(4032).passes[0]), key);

@@ -9,14 +9,15 @@ namespace semrover {
 namespace reflect_protocol_test {
 
 struct Declarations {
-    std::string constants = {}, push = "uint rows;", y = "writeonly buffer Y { uint y[]; }";
+    std::string constants = {}, push = "uint rows;", y = "writeonly buffer Y { uint y[]; }", more = {};
 };
 
 std::string shader(const Declarations& d)
 {
     return "#version 460\nlayout(local_size_x = 64) in;\n" + d.constants + "\nlayout(push_constant) uniform Push { " +
            d.push + " } p;\nlayout(binding = 0) readonly buffer X { uint x[]; };\nlayout(binding = 1) " + d.y +
-           ";\nvoid main() { " + (d.y.starts_with("readonly") ? "uint v = x[0] + y[0];" : "y[0] = x[0];") + " }\n";
+           ";\nvoid main() { " + (d.y.starts_with("readonly") ? "uint v = x[0] + y[0];" : "y[0] = x[0];") + d.more +
+           " }\n";
 }
 
 // what the reflector says of an op of these variants; empty: it took them
@@ -74,6 +75,12 @@ TEST(Protocol, what_the_planner_needs_together_is_declared_together)
     EXPECT_TRUE(says(fault({.constants = lanes}), "kColLanes without kTileM"));
     EXPECT_TRUE(says(fault({.constants = lanes + tile}), "kColLanes without push member col_lanes"));
     EXPECT_EQ(fault({.constants = lanes + tile, .push = "uint rows; uint col_lanes;"}), "");
+}
+
+TEST(Protocol, what_vulkan_leaves_open_is_refused)
+{
+    EXPECT_TRUE(says(fault({.more = "y[1] = uint(int(x[1]) % int(x[2]));"}), "% of signed numbers"));
+    EXPECT_EQ(fault({.more = "y[1] = x[1] % x[2];"}), "");
 }
 
 TEST(Protocol, variants_of_an_op_declare_the_same)

@@ -30,6 +30,9 @@ enum Op : uint16_t {
     kOpSpecConstantComposite = 51,
     kOpSpecConstantOp = 52,
     kOpVariable = 59,
+    kOpSRem = 138,
+    kOpSMod = 139,
+    kOpTypeCooperativeMatrix = 4456,
     kOpDecorate = 71,
     kOpMemberDecorate = 72,
 };
@@ -135,6 +138,13 @@ class Reader {
             ids_[w[1]].operands = {w[0], w[2]}; // pointer type, storage class
             variables_.push_back(w[1]);
             break;
+        case kOpTypeCooperativeMatrix: // component, scope, rows, columns, use
+            if (ids_[w[1]].operands.at(0) == 16 && ids_[w[5]].operands.at(0) == 2) // fp16 sums
+                module_.needs |= 32;
+            break;
+        case kOpSRem:
+        case kOpSMod:
+            throw std::runtime_error("a % of signed numbers: undefined in Vulkan for negative ones, use unsigned ones");
         default:
             break;
         }
@@ -148,6 +158,8 @@ class Reader {
 
     void capability(uint32_t c)
     {
+        if (c == 62) // GroupNonUniformVote
+            module_.needs |= 64;
         if (c == 63) // GroupNonUniformArithmetic
             module_.needs |= 1;
         if (c == 64) // GroupNonUniformBallot

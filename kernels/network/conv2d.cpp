@@ -5,6 +5,7 @@
 #include "kernels/network.h"
 
 #include "conv2d.spv.h"
+#include "kernels/network/depth_step.h"
 #include "shaders/network/conv2d.h"
 
 namespace semrover {
@@ -106,6 +107,9 @@ FeatureMap conv2d(Graph& g, FeatureMap x, FeatureMap x2, Tensor w, Tensor bias, 
                           {"kKernelWidth", taps.width},
                           {"kTwoInputs", x2.valid()},
                           {"kBias", bias.valid()}};
+    dispatch.depth = depth;
+    dispatch.image_rows = y.image_rows();
+    dispatch.depth_step = depth_step({push.x_cols, push.x2_cols});
     dispatch.banded = {{"X", window}, "Y"};
     if (x2.valid())
         dispatch.banded.push_back({"X2", window});

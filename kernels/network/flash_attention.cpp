@@ -13,7 +13,7 @@ namespace semrover {
 
 namespace {
 
-constexpr uint32_t kMostFlashMatrixDim = 96; // flash_attention.coopmat keeps queries and sums in registers
+constexpr uint32_t kMostFlashMatrixDim = 160; // flash_attention.coopmat keeps queries and sums in registers
 
 void check(const Tensor& q, const Tensor& kv, const FlashAttentionOptions& o)
 {

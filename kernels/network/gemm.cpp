@@ -4,6 +4,7 @@
 #include "kernels/network.h"
 
 #include "gemm.spv.h"
+#include "kernels/network/depth_step.h"
 #include "shaders/network/gemm.h"
 
 namespace semrover {
@@ -30,6 +31,7 @@ Tensor gemm(Graph& g, Tensor x, Tensor w, Tensor bias, const GemmOptions& option
     push.y_ld = y.ld;
     DispatchOptions dispatch;
     dispatch.flops = 2.0 * x.rows * push.cols * x.cols;
+    dispatch.depth_step = depth_step({push.depth});
     if (bias.valid())
         dispatch.constants.push_back({"kBias", 1});
     if (groups == 1)

@@ -41,16 +41,15 @@ uint32_t subgroup_size(const VulkanCalls& vk, VkPhysicalDevice physical)
                : 0;
 }
 
-// can a tile be cut into them, and a step of K?
-bool fits(const VkCooperativeMatrixPropertiesKHR& p)
+// fp16 factors, sums of a type; can a tile be cut into them, and a step of K?
+bool fits(const VkCooperativeMatrixPropertiesKHR& p, uint32_t sums)
 {
     const auto one_of = [](uint32_t size, std::initializer_list<uint32_t> sizes) {
         return std::ranges::find(sizes, size) != sizes.end();
     };
-    return p.AType == VK_COMPONENT_TYPE_FLOAT16_KHR && p.BType == VK_COMPONENT_TYPE_FLOAT16_KHR &&
-           p.CType == VK_COMPONENT_TYPE_FLOAT32_KHR && p.ResultType == VK_COMPONENT_TYPE_FLOAT32_KHR &&
-           p.scope == VK_SCOPE_SUBGROUP_KHR && one_of(p.MSize, {8, 16}) && one_of(p.NSize, {8, 16}) &&
-           one_of(p.KSize, {8, 16, 32});
+    return p.AType == VK_COMPONENT_TYPE_FLOAT16_KHR && p.BType == VK_COMPONENT_TYPE_FLOAT16_KHR && p.CType == sums &&
+           p.ResultType == sums && p.scope == VK_SCOPE_SUBGROUP_KHR && one_of(p.MSize, {8, 16}) &&
+           one_of(p.NSize, {8, 16}) && one_of(p.KSize, {8, 16, 32});
 }
 
 } // namespace
@@ -69,13 +68,18 @@ MatrixShape matrix_shape(const VulkanCalls& vk, VkInstance instance, VkPhysicalD
         count, vk_struct<VkCooperativeMatrixPropertiesKHR>(VK_STRUCTURE_TYPE_COOPERATIVE_MATRIX_PROPERTIES_KHR));
     if (enumerate(physical, &count, all.data()) != VK_SUCCESS)
         return {};
-    std::erase_if(all, [](const auto& p) { return !fits(p); });
+    std::vector<VkCooperativeMatrixPropertiesKHR> half = all;
+    std::erase_if(all, [](const auto& p) { return !fits(p, VK_COMPONENT_TYPE_FLOAT32_KHR); });
+    std::erase_if(half, [](const auto& p) { return !fits(p, VK_COMPONENT_TYPE_FLOAT16_KHR); });
     const auto outputs = [](const auto& p) { return p.MSize * p.NSize * (p.KSize == 16 ? 2 : 1); };
     const auto best = std::ranges::max_element(all, {}, outputs);
     const uint32_t subgroup = subgroup_size(vk, physical);
     if (best == all.end() || !subgroup)
         return {};
-    return {best->MSize, best->NSize, best->KSize, subgroup};
+    const bool half_sums = std::ranges::any_of(half, [&](const auto& p) {
+        return p.MSize == best->MSize && p.NSize == best->NSize && p.KSize == best->KSize;
+    });
+    return {best->MSize, best->NSize, best->KSize, subgroup, half_sums};
 }
 
 MatrixFeatures::MatrixFeatures()

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <mutex>
 
 namespace semrover {
 
@@ -60,6 +61,8 @@ uint32_t supported_needs(const VulkanCalls& vk, VkPhysicalDevice physical,
             needs |= kNeedsSubgroupBallot;
         if (p11.subgroupSupportedOperations & VK_SUBGROUP_FEATURE_SHUFFLE_BIT)
             needs |= kNeedsSubgroupShuffle;
+        if (p11.subgroupSupportedOperations & VK_SUBGROUP_FEATURE_VOTE_BIT)
+            needs |= kNeedsSubgroupVote;
     }
     return f12.shaderFloat16 ? needs | kNeedsFloat16 : needs;
 }
@@ -165,6 +168,18 @@ Result<VkInstance> create_instance(bool validation, const VkAllocationCallbacks*
     return instance;
 }
 
+Result<VkInstance> process_instance(bool validation)
+{
+    static std::mutex mutex;
+    static VkInstance instances[2] = {};
+    const std::lock_guard guard(mutex);
+    VkInstance& instance = instances[validation];
+    if (!instance) {
+        SR_TRY(instance, create_instance(validation));
+    }
+    return instance;
+}
+
 Result<std::vector<VkPhysicalDevice>> physical_devices(const VulkanCalls& vk, VkInstance instance)
 {
     uint32_t count = 0;
@@ -246,6 +261,8 @@ DeviceSummary summarize(const VulkanCalls& vk, VkInstance instance, VkPhysicalDe
     s.limits.matrix = matrix_shape(vk, instance, physical);
     if (s.limits.matrix.m)
         s.limits.needs_supported |= kNeedsCooperativeMatrix;
+    if (s.limits.matrix.half_sums)
+        s.limits.needs_supported |= kNeedsHalfSums;
     VkPhysicalDeviceMemoryProperties memory;
     vk.GetPhysicalDeviceMemoryProperties(physical, &memory);
     s.memory_bytes = 0;
@@ -260,7 +277,7 @@ DeviceSummary summarize(const VulkanCalls& vk, VkInstance instance, VkPhysicalDe
 
 Result<std::vector<DeviceSummary>> list_devices()
 {
-    SR_TRY(const VkInstance instance, create_instance(false));
+    SR_TRY(const VkInstance instance, process_instance(false));
     VulkanCalls vk;
     SR_CHECK(vk.load_instance(nullptr, instance));
     auto all = physical_devices(vk, instance);
@@ -268,7 +285,6 @@ Result<std::vector<DeviceSummary>> list_devices()
     if (all)
         for (size_t i = 0; i < all->size(); ++i)
             out.push_back(summarize(vk, instance, (*all)[i], uint32_t(i)));
-    vk.DestroyInstance(instance, nullptr);
     if (!all)
         return tl::make_unexpected(all.error());
     return out;

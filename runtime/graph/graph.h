@@ -81,6 +81,9 @@ struct DispatchOptions {
     bool keeps_x = false;       // absorbed: the producer goes on writing X, others may read it (statistics of X)
     double flops = 0;           // counted
     double most_operations = 0; // about, at most: where the data says how many
+    // columns of K that suit its shape, where a workgroup has some at a time in shared memory; 0: any
+    uint32_t depth_step = 0;
+    uint32_t depth = 0, image_rows = 0; // K, and rows of one image; 0: not to be cut into slices of K
     uint32_t without_needs = 0; // KernelNeeds that a variant may not have for this one: its shape does not suit them
 };
 

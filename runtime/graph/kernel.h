@@ -37,6 +37,8 @@ enum KernelNeeds : uint32_t {
     kNeedsSubgroupShuffle = 4,
     kNeedsFloat16 = 8, // fp16 arithmetic (storage is always packed into 32-bit words and needs nothing)
     kNeedsCooperativeMatrix = 16,
+    kNeedsHalfSums = 32, // cooperative matrices with fp16 sums, too
+    kNeedsSubgroupVote = 64,
 };
 
 struct KernelVariant {

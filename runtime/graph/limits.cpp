@@ -55,7 +55,7 @@ Status apply(DeviceLimits& limits, const std::string& key, const std::string& te
     if (key == "subgroups") {
         if (value == 0)
             limits.needs_supported &=
-                ~uint32_t(kNeedsSubgroupArithmetic | kNeedsSubgroupBallot | kNeedsSubgroupShuffle);
+                ~uint32_t(kNeedsSubgroupArithmetic | kNeedsSubgroupBallot | kNeedsSubgroupShuffle | kNeedsSubgroupVote);
         return {};
     }
     if (key == "staging") {
@@ -77,6 +77,13 @@ Status apply(DeviceLimits& limits, const std::string& key, const std::string& te
 }
 
 } // namespace
+
+bool has_matrix_units(const DeviceLimits& limits)
+{
+    const bool wanted =
+        limits.force_variant == "coopmat" || (limits.force_variant.empty() && limits.type != DeviceType::cpu);
+    return wanted && limits.matrix.m != 0;
+}
 
 Status override_limits(DeviceLimits& limits, const std::string& text)
 {

@@ -14,7 +14,8 @@ enum class DeviceType { cpu, integrated, discrete, other };
 // of cooperative matrices with fp16 factors and fp32 sums, [m, k] x [k, n]; m is 0 where a device has none
 struct MatrixShape {
     uint32_t m = 0, n = 0, k = 0;
-    uint32_t subgroup = 0; // invocations that share one
+    uint32_t subgroup = 0;  // invocations that share one
+    bool half_sums = false; // the same shape has fp16 sums as well
 };
 
 // What the graph compiler knows of a device: plain data, so that it is tested without one.
@@ -37,6 +38,9 @@ struct DeviceLimits {
     std::string force_variant;         // "", or a kernel variant to prefer wherever it exists
     bool force_staging = false;        // upload through staging even where memory is host-visible
 };
+
+// are products of fp16 factors made by cooperative matrices?
+bool has_matrix_units(const DeviceLimits& limits);
 
 // Lowers limits for tests:
 // "shared=16384,range=67108864,alloc=536870912,fp16=0,coopmat=0,variant=simt,staging=1,branches=1,submit=0.001".

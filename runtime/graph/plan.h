@@ -39,7 +39,8 @@ struct Pass {
 
     void set_constant(std::string_view name, uint32_t value); // where the shader has one
     void set_push(std::string_view name, uint32_t value);     // the shader has such a member
-    void set_tile(uint32_t tile);                             // one of tiles_of; workgroups are counted later
+    // one of tiles_of; workgroups are counted later
+    void set_tile(uint32_t tile, const DeviceLimits& limits);
 };
 
 // a part of a pass's workgroups, or all of them, as the device gets it
@@ -84,14 +85,16 @@ Status check(Plan& plan); // every transient is written before it is read, range
 Status fuse(Plan& plan);  // epilogues into their producers
 Status pick_variants(Plan& plan, const DeviceLimits& limits); // a shader per pass, its constants and bindings
 void fit_tile(Pass& pass, const DeviceLimits& limits);        // part of it
+void bind(Pass& pass);                                        // part of it: tensors to bindings
+Status split(Plan& plan, const DeviceLimits& limits);         // long sums over few outputs into slices
 // Levels before memory is shared: of what passes read and write where they may run side by side, else one each. So
 // passes of a level do not share memory, and lie in levels of their own later only if memory has to be shared.
 void arrange(Plan& plan, bool side_by_side);
-Status lifetimes(Plan& plan);                         // first and last level of each transient
-Status place(Plan& plan, const DeviceLimits& limits); // aliased arena
-Status slice(Plan& plan, const DeviceLimits& limits); // row bands for limits, groups
+Status lifetimes(Plan& plan);                                // first and last level of each transient
+Status place(Plan& plan, const DeviceLimits& limits);        // aliased arena
+Status slice(Plan& plan, const DeviceLimits& limits);        // row bands for limits, groups
 Status count_groups(Pass& pass, const DeviceLimits& limits); // part of it: workgroups of a grid
-Status order(Plan& plan);                             // levels from access x byte range: the barriers
+Status order(Plan& plan);                                    // levels from access x byte range: the barriers
 // dispatches and submits for passes that take that many seconds each; may be done again once they are measured
 void schedule(Plan& plan, const DeviceLimits& limits, std::span<const double> seconds);
 } // namespace stage

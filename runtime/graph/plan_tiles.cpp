@@ -15,8 +15,10 @@ namespace {
 // the same bits, so the choice may depend on the number of rows.
 struct SquareTile {
     uint32_t size, enough;
+    uint32_t subgroups = 4, step = 32; // of cooperative matrices, where the device has room: kSubgroups, kStep
 };
-constexpr SquareTile kMatrixTiles[] = {{128, 256}, {64, 128}, {32, 0}}, kSimtTiles[] = {{64, 128}, {32, 0}};
+constexpr SquareTile kMatrixTiles[] = {{128, 256, 8, 64}, {64, 128, 4, 64}, {32, 0, 4, 128}};
+constexpr SquareTile kSimtTiles[] = {{64, 128}, {32, 0}};
 
 // Where the lanes of a workgroup may lie otherwise (col_lanes of them side by side), as few outputs as can be are
 // computed beyond the last row and column.
@@ -45,7 +47,7 @@ void fit_lanes(Pass& pass)
     pass.set_push(protocol::kColLanesMember, best);
 }
 
-// shape and threads of cooperative matrices: four subgroups share a tile
+// shape and threads of cooperative matrices
 void fit_matrices(Pass& pass, const MatrixShape& shape)
 {
     pass.set_constant(protocol::kMatM, shape.m);
@@ -54,11 +56,39 @@ void fit_matrices(Pass& pass, const MatrixShape& shape)
     pass.set_constant(protocol::kThreads, 4 * shape.subgroup);
 }
 
+// with the constants that it has by now
+uint32_t shared_bytes(const Pass& pass)
+{
+    std::vector<uint32_t> values;
+    for (const ConstantInfo& c : pass.variant->constants) {
+        const auto set = pass.constants.find(c.id);
+        values.push_back(set == pass.constants.end() ? c.value : set->second);
+    }
+    return pass.variant->shared_bytes(values.data());
+}
+
+// how many subgroups share a tile, and how much of K they have at a time: as much as there is room for
+void share_tile(Pass& pass, const SquareTile& tile, const DeviceLimits& limits)
+{
+    const uint32_t suits = pass.options.depth_step ? pass.options.depth_step : tile.step;
+    const auto fits = [&](uint32_t subgroups, uint32_t step) {
+        pass.set_constant(protocol::kSubgroups, subgroups);
+        pass.set_constant(protocol::kStep, step);
+        pass.set_constant(protocol::kThreads, subgroups * limits.matrix.subgroup);
+        return subgroups * limits.matrix.subgroup <= limits.max_group_threads &&
+               shared_bytes(pass) <= limits.max_shared_bytes;
+    };
+    for (const uint32_t subgroups : {tile.subgroups, 4u})
+        for (uint32_t step = std::min(tile.step, suits); step >= 32; step /= 2)
+            if (fits(subgroups, step))
+                return;
+}
+
 // of cooperative matrices: a lane holds 128 sums at most, and has something to load
-std::span<const SquareTile> matrix_tiles(const MatrixShape& shape)
+std::span<const SquareTile> matrix_tiles(const DeviceLimits& limits)
 {
     constexpr uint32_t kMostSums = 128, kLoadsOfSmall = 32 * 32 / 8;
-    const uint32_t threads = 4 * shape.subgroup;
+    const uint32_t threads = 4 * limits.matrix.subgroup;
     const size_t first = kMatrixTiles[0].size * kMatrixTiles[0].size / threads > kMostSums;
     const size_t last = threads <= kLoadsOfSmall ? 3 : 2;
     return std::span(kMatrixTiles).subspan(first, last - first);
@@ -72,8 +102,10 @@ bool makes(const KernelVariant& variant, uint32_t tile)
 
 std::span<const SquareTile> square_tiles(const Pass& pass, const DeviceLimits& limits)
 {
+    if (const ConstantInfo* c = pass.variant->constant(protocol::kAddSlices); c && pass.constants.contains(c->id))
+        return {};
     if (pass.variant->needs & kNeedsCooperativeMatrix)
-        return makes(*pass.variant, kMatrixTiles[0].size) ? matrix_tiles(limits.matrix) : std::span<const SquareTile>();
+        return makes(*pass.variant, kMatrixTiles[0].size) ? matrix_tiles(limits) : std::span<const SquareTile>();
     if (pass.variant->name == "simt" && makes(*pass.variant, kSimtTiles[0].size))
         return kSimtTiles;
     return {};
@@ -102,11 +134,13 @@ std::vector<uint32_t> tiles_of(const Pass& pass, const DeviceLimits& limits)
     return sizes;
 }
 
-void Pass::set_tile(uint32_t tile)
+void Pass::set_tile(uint32_t tile, const DeviceLimits& limits)
 {
     tile_rows = tile_cols = tile;
     set_constant(protocol::kTileRows, tile);
     set_constant(protocol::kTileCols, tile);
+    if (variant->constant(protocol::kStep))
+        share_tile(*this, *std::ranges::find(kMatrixTiles, tile, &SquareTile::size), limits);
 }
 
 void stage::fit_tile(Pass& pass, const DeviceLimits& limits)
@@ -115,7 +149,7 @@ void stage::fit_tile(Pass& pass, const DeviceLimits& limits)
     if (pass.variant->needs & kNeedsCooperativeMatrix)
         fit_matrices(pass, limits.matrix);
     if (const auto tiles = square_tiles(pass, limits); !tiles.empty())
-        pass.set_tile(largest_that_fills(pass, tiles));
+        pass.set_tile(largest_that_fills(pass, tiles), limits);
 }
 
 } // namespace semrover

@@ -59,18 +59,6 @@ int preference(std::string_view name, const DeviceLimits& limits)
     return name.empty() ? 2 : 3; // "", "simt"
 }
 
-Status bind(Pass& pass)
-{
-    const auto& declared = pass.variant->bindings;
-    for (size_t b = 0; b < declared.size(); ++b) {
-        const Tensor& t = pass.tensors[b];
-        pass.bindings.push_back(
-            {t.resource, t.offset, t.bytes(), declared[b].access, declared[b].kind, declared[b].name});
-        pass.set_constant(protocol::half_constant(declared[b].name), t.dtype == DType::f16);
-    }
-    return {};
-}
-
 } // namespace
 
 void Pass::set_constant(std::string_view name, uint32_t value)
@@ -87,6 +75,18 @@ void Pass::set_push(std::string_view name, uint32_t value)
     const PushMember* m = variant->push_member(name);
     SR_ASSERT(m, "{}.{}: no push member {}", kernel->name, variant->name, name);
     std::memcpy(&push[m->offset], &value, 4);
+}
+
+void stage::bind(Pass& pass)
+{
+    const auto& declared = pass.variant->bindings;
+    pass.bindings.clear();
+    for (size_t b = 0; b < declared.size(); ++b) {
+        const Tensor& t = pass.tensors[b];
+        pass.bindings.push_back(
+            {t.resource, t.offset, t.bytes(), declared[b].access, declared[b].kind, declared[b].name});
+        pass.set_constant(protocol::half_constant(declared[b].name), t.dtype == DType::f16);
+    }
 }
 
 const KernelVariant* choose_variant(const Kernel& kernel, const DeviceLimits& limits,
@@ -115,7 +115,7 @@ Status stage::pick_variants(Plan& plan, const DeviceLimits& limits)
         for (const ConstantValue& c : pass.options.constants)
             pass.set_constant(c.name, c.value);
         fit_tile(pass, limits);
-        SR_CHECK(bind(pass));
+        bind(pass);
     }
     return {};
 }

@@ -21,7 +21,11 @@
 // | constant    | kTileN              | columns likewise                                                             |
 // | constant    | kColLanes           | invocations side by side in a tile, if `col_lanes` says nothing else         |
 // | constant    | kMatM, kMatN, kMatK | shape of the device's cooperative matrices                                   |
-// | constant    | kThreads            | invocations of a workgroup of four subgroups, where matrices are cooperative |
+// | constant    | kThreads            | invocations of a workgroup, where matrices are cooperative                   |
+// | constant    | kSubgroups          | subgroups of such a workgroup, if not four                                   |
+// | constant    | kStep               | columns of K that it has in shared memory                                    |
+// | constant    | kSlices             | slices of K, of which workgroups (z) write fp32 sums to Y, one below another |
+// | constant    | kAddSlices          | X are such sums: they are added, and the epilogue follows                    |
 // | push member | col_lanes           | the planner's choice of them                                                 |
 // | push member | rows                | rows of the output in this pass; a pass that may be cut into bands has it    |
 // | push member | first_row           | which row of the whole output comes first                                    |
@@ -32,7 +36,10 @@ namespace semrover::protocol {
 
 inline constexpr std::string_view kInput = "X", kOutput = "Y";
 inline constexpr std::string_view kTileRows = "kTileM", kTileCols = "kTileN", kColLanes = "kColLanes";
-inline constexpr std::string_view kMatM = "kMatM", kMatN = "kMatN", kMatK = "kMatK", kThreads = "kThreads";
+inline constexpr std::string_view kMatM = "kMatM", kMatN = "kMatN", kMatK = "kMatK", kThreads = "kThreads",
+                                  kSubgroups = "kSubgroups", kStep = "kStep", kSlices = "kSlices",
+                                  kAddSlices = "kAddSlices";
+inline constexpr std::string_view kFactors[] = {"X", "W", "X2"}; // of what has slices
 inline constexpr std::string_view kHalfPrefix = "kHalf";
 inline constexpr std::string_view kColLanesMember = "col_lanes", kRows = "rows", kFirstRow = "first_row";
 inline constexpr std::string_view kFirstSuffix = "_first";

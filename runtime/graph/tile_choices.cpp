@@ -13,7 +13,8 @@ namespace {
 
 bool is_tile(const KernelVariant& variant, uint32_t constant)
 {
-    for (const std::string_view name : {protocol::kTileRows, protocol::kTileCols})
+    for (const std::string_view name :
+         {protocol::kTileRows, protocol::kTileCols, protocol::kSubgroups, protocol::kStep, protocol::kThreads})
         if (const ConstantInfo* c = variant.constant(name); c && c->id == constant)
             return true;
     return false;

@@ -25,7 +25,7 @@ Result<TileTrial> TileTrial::begin(Plan& plan, const DeviceLimits& limits, const
         const TileChoices::Key key = TileChoices::key(pass);
         if (const auto best = choices.best(key); best && std::ranges::find(tiles, *best) != tiles.end()) {
             trial.changed_ |= pass.tile_rows != *best;
-            pass.set_tile(*best);
+            pass.set_tile(*best, limits);
             SR_CHECK(stage::count_groups(pass, limits));
             continue;
         }
@@ -43,7 +43,7 @@ Result<TileTrial> TileTrial::begin(Plan& plan, const DeviceLimits& limits, const
 Status TileTrial::set_tile(Plan& plan, const Group& group, uint32_t tile, const DeviceLimits& limits)
 {
     for (const size_t i : group.passes) {
-        plan.passes[i].set_tile(tile);
+        plan.passes[i].set_tile(tile, limits);
         SR_CHECK(stage::count_groups(plan.passes[i], limits));
     }
     return {};

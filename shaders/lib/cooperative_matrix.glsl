@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 
-// what every variant for cooperative matrices has: their shape, and four subgroups that each own a part of shared memory
+// what every variant for cooperative matrices has: their shape, and subgroups that each own a part of shared memory
 layout(constant_id = 30) const uint kMatM = 16; // 8 or 16
 layout(constant_id = 31) const uint kMatN = 16; // 8 or 16
 layout(constant_id = 32) const uint kMatK = 16; // divides 32

@@ -11,14 +11,13 @@ const uint kQueries = 16; // of a subgroup
 const uint kRowChunks = (kChunks + 3) / 4 * 4; // head_dim in steps of 32, with zeros behind it
 const uint kDim = kRowChunks * 8;
 const uint kPitch = kRowChunks + 1;      // uvec4 of a row of queries or keys: rows begin in different banks
-const uint kValuePitch = kKeys / 8 + 1;  // of a channel of values
-const uint kScorePitch = kKeys + 4;      // floats
+const uint kScorePitch = kKeys / 4 + 1;  // uvec4 of a row of scores
 const uint kWeightPitch = kKeys / 8 + 1; // uvec4
 const uint kDown = kQueries / kMatM, kKeysAcross = kKeys / kMatN, kDimAcross = kDim / kMatN, kDimSteps = kDim / kMatK;
-const uint kBlock = kDim * kValuePitch; // uvec4 of what is staged of a side
+const uint kBlock = kKeys * kPitch; // uvec4 of what is staged of a side
 
 shared uvec4 rows_of[kSides * kBlock];             // 32 queries or keys, or the values of 32 keys
-shared float scores[4 * kQueries * kScorePitch];   // of each subgroup; then other matrices of 16 rows
+shared uvec4 scores[4 * kQueries * kScorePitch];   // of each subgroup, floats; then other matrices of 16 rows
 shared uvec4 weights[4 * kQueries * kWeightPitch]; // likewise, fp16
 
 #define MatrixQ coopmat<float16_t, gl_ScopeSubgroup, kMatM, kMatK, gl_MatrixUseA>
@@ -30,6 +29,7 @@ MatrixS sums[kDown * kDimAcross];
 uint score_at, weight_at; // of this subgroup
 uint block_at;            // of the side whose keys it looks at
 float score_scale;        // log2(e) times that of the scores
+bool shrinks;             // did the largest score of any row of this subgroup move?
 
 // a row is two invocations' side by side: each has half of the keys, and both have its largest score and total
 const uint kRounds = 8 * kQueries / kThreads > 0 ? 8 * kQueries / kThreads : 1;
@@ -48,18 +48,8 @@ void start_attention()
     }
 }
 
-// eight channels of a query or a key
+// eight channels of a query, a key or a value
 void stage_row(uint block, uint row, uint chunk, uvec4 value) { rows_of[block + row * kPitch + chunk] = value; }
-
-// eight channels of the values of two keys, of which the first is even, as they share a word
-void stage_values(uint block, uint key, uint chunk, uvec4 a, uvec4 b)
-{
-    [[unroll]] for (uint j = 0; j < 4; ++j) {
-        const uint at = block + (chunk * 8 + 2 * j) * kValuePitch + key / 8;
-        rows_of[at][key / 2 % 4] = (a[j] & 0xffff) | b[j] << 16;
-        rows_of[at + kValuePitch][key / 2 % 4] = a[j] >> 16 | (b[j] & 0xffff0000);
-    }
-}
 
 // from the rows that are staged, `first` on
 void load_queries(uint first)
@@ -85,7 +75,7 @@ void multiply_keys()
                 s[i] = coopMatMulAdd(queries[i * kDimSteps + k], b, s[i]);
         }
         [[unroll]] for (uint i = 0; i < kDown; ++i)
-            coopMatStore(s[i], scores, score_at + i * kMatM * kScorePitch + j * kMatN, kScorePitch,
+            coopMatStore(s[i], scores, score_at + i * kMatM * kScorePitch + j * kMatN / 4, kScorePitch,
                          gl_CooperativeMatrixLayoutRowMajor);
     }
 }
@@ -94,23 +84,31 @@ void multiply_keys()
 void softmax_block(uint first)
 {
     const uint part = gl_SubgroupInvocationID % 2 * (kKeys / 2);
+    bool moved = false;
     own_barrier();
     [[unroll]] for (uint round = 0; round < kRounds; ++round) {
         const bool inside = row_of(round) < kQueries;
-        const uint row = min(row_of(round), kQueries - 1), at = score_at + row * kScorePitch + part;
+        const uint row = min(row_of(round), kQueries - 1), at = score_at + row * kScorePitch + part / 4;
         const uint visible = visible_keys(row, first) >> part;
         float s[kKeys / 2], m = largest[round];
-        [[unroll]] for (uint j = 0; j < kKeys / 2; ++j) {
-            s[j] = (visible >> j & 1) != 0 ? scores[at + j] * score_scale : -1e30;
-            m = max(m, s[j]);
+        [[unroll]] for (uint j = 0; j < kKeys / 2; j += 4) {
+            const vec4 four = uintBitsToFloat(scores[at + j / 4]) * score_scale;
+            [[unroll]] for (uint i = 0; i < 4; ++i) {
+                s[j + i] = (visible >> (j + i) & 1) != 0 ? four[i] : -1e30;
+                m = max(m, s[j + i]);
+            }
         }
         m = max(m, subgroupShuffleXor(m, 1));
+        moved = moved || m != largest[round];
         const float shrink = exp2(largest[round] - m);
         largest[round] = m;
-        float sum = 0.0;
-        [[unroll]] for (uint j = 0; j < kKeys / 2; ++j) {
-            s[j] = (visible >> j & 1) != 0 ? exp2(s[j] - m) : 0.0;
-            sum += s[j];
+        float sum = 0.0; // of what is added: rounded
+        uint halves[kKeys / 4];
+        [[unroll]] for (uint j = 0; j < kKeys / 2; j += 2) {
+            vec2 two = vec2((visible >> j & 1) != 0 ? exp2(s[j] - m) : 0.0,
+                                  (visible >> (j + 1) & 1) != 0 ? exp2(s[j + 1] - m) : 0.0);
+            halves[j / 2] = pack_shares(two);
+            sum += two.x + two.y;
         }
         total[round] = total[round] * shrink + sum + subgroupShuffleXor(sum, 1);
         own_barrier(); // both halves of a row are read
@@ -118,15 +116,18 @@ void softmax_block(uint first)
             continue;
         [[unroll]] for (uint j = 0; j < kKeys / 2; j += 8)
             weights[weight_at + row * kWeightPitch + (part + j) / 8] =
-                pack8(vec4(s[j], s[j + 1], s[j + 2], s[j + 3]), vec4(s[j + 4], s[j + 5], s[j + 6], s[j + 7]));
-        [[unroll]] for (uint j = 0; j < kMatN / 2; ++j) // a matrix that has it in each column
-            scores[score_at + row * kScorePitch + part / (kKeys / 2) * (kMatN / 2) + j] = shrink;
+                uvec4(halves[j / 2], halves[j / 2 + 1], halves[j / 2 + 2], halves[j / 2 + 3]);
+        [[unroll]] for (uint j = 0; j < kMatN / 8; ++j) // a matrix that has it in each column
+            scores[score_at + row * kScorePitch + part / (kKeys / 2) * (kMatN / 8) + j] = floatBitsToUint(vec4(shrink));
     }
+    shrinks = subgroupAny(moved);
     own_barrier();
 }
 
 void shrink_sums()
 {
+    if (!shrinks) // all factors are 1
+        return;
     [[unroll]] for (uint i = 0; i < kDown; ++i) {
         MatrixS shrink;
         coopMatLoad(shrink, scores, score_at + i * kMatM * kScorePitch, kScorePitch,
@@ -147,8 +148,8 @@ void add_values()
     [[unroll]] for (uint j = 0; j < kDimAcross; ++j)
         [[unroll]] for (uint k = 0; k < kKeys / kMatK; ++k) {
             MatrixKv b;
-            coopMatLoad(b, rows_of, block_at + j * kMatN * kValuePitch + k * kMatK / 8, kValuePitch,
-                        gl_CooperativeMatrixLayoutColumnMajor);
+            coopMatLoad(b, rows_of, block_at + k * kMatK * kPitch + j * kMatN / 8, kPitch,
+                        gl_CooperativeMatrixLayoutRowMajor);
             [[unroll]] for (uint i = 0; i < kDown; ++i)
                 sums[i * kDimAcross + j] = coopMatMulAdd(w[i * (kKeys / kMatK) + k], b, sums[i * kDimAcross + j]);
         }
@@ -161,7 +162,7 @@ void put_sums(uint piece)
     [[unroll]] for (uint i = 0; i < kDown * kDimAcross; ++i) {
         const uint column = i % kDimAcross * kMatN;
         if (column / 16 == piece)
-            coopMatStore(sums[i], scores, score_at + i / kDimAcross * kMatM * kScorePitch + column % 16, kScorePitch,
-                         gl_CooperativeMatrixLayoutRowMajor);
+            coopMatStore(sums[i], scores, score_at + i / kDimAcross * kMatM * kScorePitch + column % 16 / 4,
+                         kScorePitch, gl_CooperativeMatrixLayoutRowMajor);
     }
 }

@@ -15,6 +15,22 @@ float nearest_half(float x)
     return nearest;
 }
 
+// of 0 <= x <= 1
+float nearest_half_share(float x)
+{
+    const float step = 8192.0 * max(uintBitsToFloat(floatBitsToUint(x) & 0x7f800000u), 6.103515625e-5);
+    precise float shifted = x + step;
+    precise float nearest = shifted - step;
+    return nearest;
+}
+
+// two of these, rounded, and in a word
+uint pack_shares(inout vec2 shares)
+{
+    shares = vec2(nearest_half_share(shares.x), nearest_half_share(shares.y));
+    return packHalf2x16(shares);
+}
+
 // two numbers in a word, the first in the low half
 uint pack_halves(vec2 v)
 {

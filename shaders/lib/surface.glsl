@@ -16,9 +16,10 @@ struct Surface {
 
 vec3 from_srgb(vec3 c) { return c * (c * (c * 0.305306011 + 0.682171111) + 0.012522878); } // to 0.001
 
+// at: from -size on
 vec3 texel(uint first, ivec2 size, ivec2 at)
 {
-    at = (at % size + size) % size;
+    at = ivec2(uvec2(at + size) % uvec2(size));
     return from_srgb(unpackUnorm4x8(texels[first + uint(at.y * size.x + at.x)]).rgb);
 }
 

@@ -11,6 +11,7 @@
 #extension GL_KHR_memory_scope_semantics : require
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_shuffle : require
+#extension GL_KHR_shader_subgroup_vote : require
 #include "attention.h"
 #include "lib/pack.glsl"
 
@@ -49,25 +50,13 @@ void stage_queries(uint stream, uint column)
     barrier();
 }
 
-// of both sides
-void stage_block_keys(uint first, uint column)
+// keys or values (`column`) of both sides
+void stage_block(uint first, uint column)
 {
-    barrier(); // queries or values may still be read
+    barrier(); // what lies there may still be read
     for (uint i = gl_LocalInvocationID.x; i < kSides * kKeys * kRowChunks; i += kThreads) {
         const uint side = i / (kKeys * kRowChunks), key = i / kRowChunks % kKeys, c = i % kRowChunks;
         stage_row(side * kBlock, key, c, load_row(first + key < tile.w, side, tile.z + first + key, column, c));
-    }
-    barrier();
-}
-
-void stage_block_values(uint first, uint column)
-{
-    barrier(); // the keys may still be read
-    for (uint i = gl_LocalInvocationID.x; i < kSides * kKeys / 2 * kRowChunks; i += kThreads) {
-        const uint side = i / (kKeys / 2 * kRowChunks), key = i % (kKeys / 2) * 2;
-        const uint c = i / (kKeys / 2) % kRowChunks, row = tile.z + first + key;
-        stage_values(side * kBlock, key, c, load_row(first + key < tile.w, side, row, column, c),
-                     load_row(first + key + 1 < tile.w, side, row + 1, column, c));
     }
     barrier();
 }
@@ -90,11 +79,12 @@ void store(uint stream, uint head)
             const vec2 theirs = joined[other * kQueries + own];
             const float m = max(largest[round], theirs.x), a = exp2(largest[round] - m), b = exp2(theirs.x - m);
             const float inverse = 1.0 / (total[round] * a + theirs.y * b);
-            vec4 lo, hi, their_lo, their_hi;
-            READ8(scores, score_at + own * kScorePitch + part * 8, lo, hi);
-            READ8(scores, other_at + own * kScorePitch + part * 8, their_lo, their_hi);
-            lo = (lo * a + their_lo * b) * inverse;
-            hi = (hi * a + their_hi * b) * inverse;
+            const uint at = own * kScorePitch + part * 2;
+            const vec4 our_lo = uintBitsToFloat(scores[score_at + at]);
+            const vec4 our_hi = uintBitsToFloat(scores[score_at + at + 1]);
+            const vec4 their_lo = uintBitsToFloat(scores[other_at + at]);
+            const vec4 their_hi = uintBitsToFloat(scores[other_at + at + 1]);
+            const vec4 lo = (our_lo * a + their_lo * b) * inverse, hi = (our_hi * a + their_hi * b) * inverse;
             STORE8(y, kHalfY, (stream * p.rows + query_row(own)) * p.y_ld + head + c * 8, lo, hi);
         }
     }
@@ -110,10 +100,10 @@ void main()
     stage_queries(gl_WorkGroupID.z, head);
     load_queries(half_of_tile());
     for (uint first = 0; first < tile.w; first += kKeys) {
-        stage_block_keys(first, dim + head);
+        stage_block(first, dim + head);
         multiply_keys();
         softmax_block(first);
-        stage_block_values(first, 2 * dim + head);
+        stage_block(first, 2 * dim + head);
         shrink_sums();
         add_values();
     }

@@ -2,7 +2,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // y[n] = epilogue(sum over taps and channels of w[n, tap, c] x[pixel at tap, c]) of fp16 factors, for GPUs with matrix
-// units: an implicit GEMM with the tiles of gemm.coopmat.comp, 32 channels of a tap at a time. tools/spirv compiles it.
+// units: an implicit GEMM with the tiles of gemm.coopmat.comp, kStep channels of a tap at a time. tools/spirv compiles it.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_EXT_shader_explicit_arithmetic_types : require
@@ -23,6 +23,7 @@ layout(binding = 1) readonly buffer W { uvec4 w[]; };   // [cols, taps * (x_cols
 layout(binding = 8) readonly buffer X2 { uvec4 x2[]; }; // as x, x2_cols
 #include "lib/conv_shift.glsl"
 #include "lib/gemm_epilogue.glsl"
+#define SLICES
 #include "lib/gemm_tile.coopmat.glsl"
 #include "lib/conv_taps.glsl"
 
@@ -32,6 +33,18 @@ ConvPixel pixels[kLoadsX]; // of the rows that this thread brings
 struct Cursor {
     uint tap, channel;
 };
+
+const uint kRun = 128; // channels, or the last ones of an input: slices of K are cut there, whatever kStep is
+
+Cursor start_of(uint slice)
+{
+    const uint runs = (p.x_cols + kRun - 1) / kRun, all = runs + (p.x2_cols + kRun - 1) / kRun;
+    const uint run = slice * (kKernelHeight * kKernelWidth * all) / kSlices, in_tap = run % all;
+    const uint first = (p.x_cols + kStep - 1) / kStep * kStep;
+    return Cursor(run / all, in_tap < runs ? in_tap * kRun : first + (in_tap - runs) * kRun);
+}
+
+bool before(Cursor a, Cursor b) { return a.tap < b.tap || (a.tap == b.tap && a.channel < b.channel); }
 
 void advance(inout Cursor c)
 {
@@ -44,7 +57,7 @@ void advance(inout Cursor c)
     }
 }
 
-// 32 channels of the tile's rows of x and of w; what lies beyond an input's channels is zero
+// kStep channels of the tile's rows of x and of w; what lies beyond an input's channels is zero
 void load(uint tile_col, Cursor c)
 {
     const uint first = (p.x_cols + kStep - 1) / kStep * kStep;
@@ -70,14 +83,19 @@ void load(uint tile_col, Cursor c)
 
 void main()
 {
-    epilogue_group = 0;
+    epilogue_group = gl_WorkGroupID.z; // the slice, whose sums lie below those of the slice before it
     const uint row = gl_WorkGroupID.x * kTileM, col = gl_WorkGroupID.y * kTileN;
+    if (kAddSlices) {
+        store_tile(row, col);
+        return;
+    }
     [[unroll]] for (uint i = 0; i < kLoadsX; ++i)
         pixels[i] = conv_pixel(row + load_row(i));
     clear_tile();
-    Cursor cursor = Cursor(0, 0);
+    Cursor cursor = start_of(gl_WorkGroupID.z);
+    const Cursor end = start_of(gl_WorkGroupID.z + 1);
     load(col, cursor);
-    while (cursor.tap < kKernelHeight * kKernelWidth) {
+    while (before(cursor, end)) {
         barrier();
         stage();
         barrier();

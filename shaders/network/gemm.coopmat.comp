@@ -20,7 +20,7 @@ layout(binding = 1) readonly buffer W { uvec4 w[]; }; // [groups * cols, depth],
 #include "lib/gemm_epilogue.glsl"
 #include "lib/gemm_tile.coopmat.glsl"
 
-// columns k to k + 31 of the tile's rows of x and of w
+// kStep columns of the tile's rows of x and of w, k the first
 void load(uint tile_row, uint tile_col, uint k)
 {
     const uint from = k + load_k();

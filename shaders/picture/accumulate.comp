@@ -28,11 +28,11 @@ float metres(uint word)
     return millimetres == 0 || millimetres == 65535 ? kInfinity : float(millimetres) * 1e-3;
 }
 
-// columns go on around a panorama
+// columns go on around a panorama, of which they leave two at most
 ivec2 inside(ivec2 at)
 {
     const int width = int(p.width);
-    const int x = kModel == kEquirectangular ? (at.x % width + width) % width : clamp(at.x, 0, width - 1);
+    const int x = kModel == kEquirectangular ? int(uint(at.x + 2 * width) % p.width) : clamp(at.x, 0, width - 1);
     return ivec2(x, clamp(at.y, 0, int(p.height) - 1));
 }
 

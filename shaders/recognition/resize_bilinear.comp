@@ -21,8 +21,8 @@ struct Place {
 
 Place place(uint i, uint size_in, uint size_out)
 {
-    const int n = max(int((2 * i + 1) * size_in) - int(size_out), 0), d = 2 * int(size_out);
-    const uint low = min(uint(n / d), size_in - 1);
+    const uint n = uint(max(int((2 * i + 1) * size_in) - int(size_out), 0)), d = 2 * size_out;
+    const uint low = min(n / d, size_in - 1);
     return Place(low, min(low + 1, size_in - 1), float(n % d) / float(d));
 }
 

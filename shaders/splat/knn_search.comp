@@ -63,9 +63,9 @@ void offer(uint at, vec4 candidate)
 // cells whose largest coordinate differs from that of `center` by `shell`
 void search_shell(ivec3 center, int shell)
 {
-    const int side = 2 * shell + 1;
-    for (int c = 0; c < side * side * side; ++c) {
-        const ivec3 d = ivec3(c % side, c / side % side, c / (side * side)) - shell;
+    const uint side = 2 * shell + 1;
+    for (uint c = 0; c < side * side * side; ++c) {
+        const ivec3 d = ivec3(uvec3(c % side, c / side % side, c / (side * side))) - shell;
         if (max(max(abs(d.x), abs(d.y)), abs(d.z)) < shell)
             continue;
         const ivec3 cell = center + d;

@@ -29,19 +29,25 @@ layout(push_constant) uniform Push { HalfRoundingPush p; };
 // lib/half.glsl twice: with the device's packHalf2x16 and with one that AMD's compilers might have
 #define nearest_half nearest_half_here
 #define pack_halves pack_here
+#define nearest_half_share nearest_half_share_here
+#define pack_shares pack_shares_here
 #include "lib/half.glsl"
 #undef nearest_half
 #undef pack_halves
+#undef nearest_half_share
+#undef pack_shares
 #define packHalf2x16 pack_toward_zero
 #include "lib/half.glsl"
 #undef packHalf2x16
 
 layout(binding = 0) readonly buffer X { vec2 x[]; };   // [count]
-layout(binding = 1) writeonly buffer Y { uvec4 y[]; }; // [count]: ours, ours on a device that truncates, truncated, 0
+layout(binding = 1) writeonly buffer Y { uvec4 y[]; }; // [count]: ours, ours on a device that truncates, truncated, shares
 
 void main()
 {
     const uint i = linear_thread();
-    if (i < p.count)
-        y[i] = uvec4(pack_here(x[i]), pack_halves(x[i]), pack_toward_zero(x[i]), 0u);
+    if (i >= p.count)
+        return;
+    vec2 shares = min(abs(x[i]), 1.0);
+    y[i] = uvec4(pack_here(x[i]), pack_halves(x[i]), pack_toward_zero(x[i]), pack_shares(shares));
 }

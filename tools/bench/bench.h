@@ -18,7 +18,7 @@ struct Timing {
     size_t runs = 0;
 };
 
-// runs `work` once to warm up, then until 5 runs and a second have passed, or 30 s
+// runs `work` ten times or for a second to warm up, then until 5 runs and a second have passed, or 30 s
 Result<Timing> measure(const std::function<Status()>& work);
 
 // the fields that every benchmark's JSON has

@@ -14,11 +14,9 @@ namespace semrover {
 
 namespace {
 
-constexpr int kSteps = 2; // per measured run
-
 struct BenchTransformerArguments {
     std::string config, precision = "fp16", profile;
-    uint32_t cells = 128, batch = 1;
+    uint32_t cells = 128, batch = 1, steps = 2;
     bool unguided = false;
 };
 
@@ -50,15 +48,15 @@ Status bench_transformer(const BenchTransformerArguments& o, const Globals& glob
     SR_TRY(const auto transformer, Transformer::random(*device, config, dtype));
     SchedulerConfig scheduler;
     scheduler.prediction = Prediction::sample;
-    SR_TRY(const SamplingPlan plan, plan_sampling(scheduler, kSteps));
+    SR_TRY(const SamplingPlan plan, plan_sampling(scheduler, int(o.steps)));
     const float guidance = o.unguided ? 1.f : 4.f;
     SR_TRY(const auto sampler, TokenSampler::create(*device, *transformer, plan, sampling_options(guidance, 1)));
     SR_TRY(const uint64_t planned, sampler->planned_bytes(o.batch, o.cells));
     const uint64_t predicted = transformer->device_bytes(device->limits()) + planned;
     const std::vector<RegionInput> regions = make_regions(o, config.num_classes);
     SR_TRY(Timing timing, measure([&] { return sampler->run(regions).map([](const auto&) {}); }));
-    timing.ms_median /= kSteps;
-    timing.ms_min /= kSteps;
+    timing.ms_median /= o.steps;
+    timing.ms_min /= o.steps;
     Json report = bench_report("transformer", *device, dtype, timing, predicted);
     report["parameters"] = transformer->weights().parameters();
     report["cells"] = o.cells;
@@ -83,6 +81,7 @@ void add_bench_transformer(CLI::App& bench, const Globals& globals, Run& run)
     add_number(*c, "--cells", o->cells, "cells of a region", 1u, 4096u);
     add_number(*c, "--batch", o->batch, "regions", 1u, 1024u);
     add_choice(*c, "--precision", {"fp16", "fp32"}, "storage", o->precision);
+    add_number(*c, "--steps", o->steps, "of a measured run, which sets up and reads back once", 1u, 1000u);
     c->add_flag("--unguided", o->unguided, "without the unconditional half");
     add_profile(*c, o->profile);
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_transformer(*o, globals); }; });

@@ -1,0 +1,30 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// y = softmax(scale x) over the first `count` columns: [M, N] -> [M, N]
+#include "kernels/network.h"
+
+#include "shaders/network/softmax.h"
+#include "softmax.spv.h"
+
+#include <cmath>
+
+namespace semrover {
+
+Tensor softmax(Graph& g, Tensor x, const SoftmaxOptions& options)
+{
+    SR_ASSERT(options.count > 0 && options.count <= x.cols, "softmax: {} of {} columns", options.count, x.cols);
+    const Tensor y = g.matrix(x.rows, x.cols, options.dtype, "softmax");
+    SoftmaxPush push{};
+    push.rows = x.rows;
+    push.cols = options.count;
+    push.width = round_up(x.cols, kRowPadding);
+    push.x_ld = x.ld;
+    push.y_ld = y.ld;
+    push.scale = float(M_LOG2E * double(options.scale));
+    DispatchOptions dispatch;
+    dispatch.banded = {"X", "Y"};
+    g.dispatch(kernel::softmax, {x, y}, push, row_tiles(x.rows), std::move(dispatch));
+    return y;
+}
+
+} // namespace semrover
