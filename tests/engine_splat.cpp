@@ -235,7 +235,7 @@ TEST(engine_splat, pixels_on_the_device_are_those_that_files_of_the_images_hold)
 
 TEST(engine_splat, a_large_image_holds_the_texels_of_the_device_also_in_memory_of_an_earlier_one)
 {
-    constexpr uint32_t kWidth = 1003, kHeight = 601; // threads share it
+    constexpr uint32_t kWidth = 1003, kHeight = 601;
     const SplatCamera camera = device_camera(camera_for(kWidth, kHeight));
     for (const char* limits : {"", "staging=1"}) {
         auto device = Device::create({.limits = limits});
