@@ -13,8 +13,3 @@ void own_barrier()
     subgroupMemoryBarrierShared();
     subgroupBarrier();
 }
-
-// eight floats of an array in shared memory
-#define READ8(values, at, lo, hi)                                                                                      \
-    lo = vec4(values[at], values[(at) + 1], values[(at) + 2], values[(at) + 3]);                                       \
-    hi = vec4(values[(at) + 4], values[(at) + 5], values[(at) + 6], values[(at) + 7])
