@@ -124,6 +124,12 @@ typedef struct sr_vulkan_device {
     void (*free_memory)(void* user, const sr_memory_piece* piece);
     uint32_t external_memory_fd;    /* 1: VK_KHR_external_memory_fd is enabled, for semrover_gl.h */
     uint32_t external_semaphore_fd; /* 1: VK_KHR_external_semaphore_fd is enabled, likewise */
+    /* 1: what matrix units need is enabled: VK_KHR_cooperative_matrix and VK_EXT_subgroup_size_control (or Vulkan 1.3)
+     * with cooperativeMatrix, subgroupSizeControl, computeFullSubgroups, vulkanMemoryModel and
+     * vulkanMemoryModelDeviceScope; shader_float16 must be 1, too. Without them large networks take several times as
+     * long on a GPU that has them. */
+    uint32_t cooperative_matrix;
+    uint32_t reserved;
 } sr_vulkan_device;
 
 typedef struct sr_context_desc {

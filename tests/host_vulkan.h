@@ -2,10 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "runtime/device/cooperative_matrix.h"
 #include "runtime/device/vulkan.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <vector>
 #include <vulkan/vulkan.h>
 
@@ -15,27 +18,14 @@ namespace semrover {
 // layer too, and messages are counted
 class HostVulkan {
   public:
-    HostVulkan()
+    // matrices: enables what matrix units need, if the device has that
+    explicit HostVulkan(bool matrices = false)
     {
         make_instance();
         uint32_t count = 1;
         vkEnumeratePhysicalDevices(instance, &count, &physical);
-        const float priority = 1;
-        auto wanted = vk_struct<VkDeviceQueueCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO);
-        wanted.queueCount = 1;
-        wanted.pQueuePriorities = &priority;
-        auto features =
-            vk_struct<VkPhysicalDeviceVulkan12Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES);
-        features.timelineSemaphore = VK_TRUE;
-        auto info = vk_struct<VkDeviceCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO, &features);
-        info.queueCreateInfoCount = 1;
-        info.pQueueCreateInfos = &wanted;
-        VkPhysicalDeviceFeatures robust{};
-        robust.robustBufferAccess = VK_TRUE;
-        info.pEnabledFeatures = &robust;
-        if (vkCreateDevice(physical, &info, nullptr, &device) != VK_SUCCESS)
-            std::abort();
-        vkGetDeviceQueue(device, 0, 0, &queue);
+        has_matrices = matrices && has_extension(VK_KHR_COOPERATIVE_MATRIX_EXTENSION_NAME);
+        make_device();
     }
     HostVulkan(const HostVulkan&) = delete;
     HostVulkan& operator=(const HostVulkan&) = delete;
@@ -52,9 +42,46 @@ class HostVulkan {
     VkPhysicalDevice physical = VK_NULL_HANDLE;
     VkDevice device = VK_NULL_HANDLE;
     VkQueue queue = VK_NULL_HANDLE;
+    bool has_matrices = false; // they are enabled
     int messages = 0;
 
   private:
+    bool has_extension(const char* name) const
+    {
+        uint32_t count = 0;
+        vkEnumerateDeviceExtensionProperties(physical, nullptr, &count, nullptr);
+        std::vector<VkExtensionProperties> all(count);
+        vkEnumerateDeviceExtensionProperties(physical, nullptr, &count, all.data());
+        return std::ranges::any_of(all, [&](const auto& e) { return !std::strcmp(e.extensionName, name); });
+    }
+    void make_device()
+    {
+        const float priority = 1;
+        auto wanted = vk_struct<VkDeviceQueueCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO);
+        wanted.queueCount = 1;
+        wanted.pQueuePriorities = &priority;
+        auto features =
+            vk_struct<VkPhysicalDeviceVulkan12Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES);
+        features.timelineSemaphore = VK_TRUE;
+        MatrixFeatures matrix;
+        const char* extensions[] = {VK_KHR_COOPERATIVE_MATRIX_EXTENSION_NAME,
+                                    VK_EXT_SUBGROUP_SIZE_CONTROL_EXTENSION_NAME};
+        if (has_matrices) {
+            features.pNext = matrix.chain();
+            features.shaderFloat16 = features.vulkanMemoryModel = features.vulkanMemoryModelDeviceScope = VK_TRUE;
+        }
+        auto info = vk_struct<VkDeviceCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO, &features);
+        info.queueCreateInfoCount = 1;
+        info.pQueueCreateInfos = &wanted;
+        info.enabledExtensionCount = has_matrices ? 2 : 0;
+        info.ppEnabledExtensionNames = extensions;
+        VkPhysicalDeviceFeatures robust{};
+        robust.robustBufferAccess = VK_TRUE;
+        info.pEnabledFeatures = &robust;
+        if (vkCreateDevice(physical, &info, nullptr, &device) != VK_SUCCESS)
+            std::abort();
+        vkGetDeviceQueue(device, 0, 0, &queue);
+    }
     static VKAPI_ATTR VkBool32 VKAPI_CALL count(VkDebugUtilsMessageSeverityFlagBitsEXT, VkDebugUtilsMessageTypeFlagsEXT,
                                                 const VkDebugUtilsMessengerCallbackDataEXT* data, void* host)
     {

@@ -330,6 +330,7 @@ HostDevice host_of(const HostVulkan& vulkan)
     host.device = vulkan.device;
     host.queue = vulkan.queue;
     host.robust_buffer_access = true;
+    host.float16 = host.cooperative_matrix = vulkan.has_matrices;
     return host;
 }
 
@@ -396,6 +397,40 @@ TEST(runtime_device, works_on_a_device_that_the_host_made_and_leaves_it)
     }
     EXPECT_EQ(vkQueueWaitIdle(vulkan.queue), VK_SUCCESS);
     EXPECT_EQ(vulkan.messages, 0);
+}
+
+// multiplies fp16 matrices of ones; -> by which variant
+std::string run_half_gemm(Device& device)
+{
+    const uint32_t size = 64;
+    const auto x = make_buffer(device, size * size * 2), y = make_buffer(device, size * size * 4);
+    const std::vector<uint16_t> ones(size * size, 0x3c00);
+    EXPECT_TRUE(device.write(x->slice(), std::as_bytes(std::span(ones))));
+    Graph g;
+    const Tensor a = g.external(x->slice(), size, size, DType::f16, "x");
+    g.keep(gemm(g, a, a, {}, {.dtype = DType::f32}), g.external(y->slice(), size, size, DType::f32, "y"));
+    auto program = Program::create(device, g);
+    SR_ASSERT(bool(program), "{}", program.error().message);
+    EXPECT_TRUE((*program)->run());
+    std::vector<float> got(size * size);
+    EXPECT_TRUE(device.read(y->slice(), std::as_writable_bytes(std::span(got))));
+    EXPECT_EQ(got, std::vector<float>(size * size, float(size)));
+    return std::string((*program)->plan().passes[0].variant->name);
+}
+
+// what the hardware has, and the host has enabled and says so
+TEST(runtime_device, uses_matrix_units_of_a_host_device_where_the_host_enabled_them)
+{
+    const bool has = make_device()->limits().needs_supported & kNeedsCooperativeMatrix;
+    HostVulkan with(true), without;
+    EXPECT_EQ(with.has_matrices, has);
+    for (const HostVulkan* vulkan : {&with, &without}) {
+        const auto device = Device::adopt(host_of(*vulkan), {.limits = "variant=coopmat"});
+        ASSERT_TRUE(device) << device.error().message;
+        EXPECT_EQ(has_matrix_units((*device)->limits()), vulkan->has_matrices);
+        EXPECT_EQ(run_half_gemm(**device) == "coopmat", vulkan->has_matrices);
+        EXPECT_EQ(vulkan->messages, 0);
+    }
 }
 
 TEST(runtime_device, refuses_a_host_device_that_lacks_something)

@@ -50,6 +50,8 @@ MemorySource memory_source(const sr_vulkan_device& v)
 
 Result<std::unique_ptr<Device>> adopt(const sr_vulkan_device& v, const DeviceOptions& options)
 {
+    if (v.reserved)
+        return fail(ErrorCode::usage, "sr_vulkan_device: reserved is not 0");
     HostDevice host;
     host.get_instance_proc_addr = reinterpret_cast<PFN_vkGetInstanceProcAddr>(v.get_instance_proc_addr);
     host.instance = static_cast<VkInstance>(v.instance);
@@ -58,6 +60,7 @@ Result<std::unique_ptr<Device>> adopt(const sr_vulkan_device& v, const DeviceOpt
     host.queue = static_cast<VkQueue>(v.queue);
     host.queue_family = v.queue_family;
     host.float16 = v.shader_float16;
+    host.cooperative_matrix = v.cooperative_matrix;
     host.robust_buffer_access = v.robust_buffer_access == 1;
     host.sharing = {v.external_memory_fd == 1, v.external_semaphore_fd == 1};
     host.memory = memory_source(v);
@@ -257,7 +260,7 @@ sr_status sr_context_get_pipeline_cache(sr_context* context, void* data, uint64_
 
 // the layout that programs were built against: a change here is a new ABI
 static_assert(sizeof(sr_device_info) == 816 && offsetof(sr_device_info, memory_bytes) == 808);
-static_assert(sizeof(sr_vulkan_device) == 112 && offsetof(sr_vulkan_device, robust_buffer_access) == 76);
+static_assert(sizeof(sr_vulkan_device) == 120 && offsetof(sr_vulkan_device, robust_buffer_access) == 76);
 static_assert(sizeof(sr_context_desc) == 72 && offsetof(sr_context_desc, max_bytes) == 32);
 static_assert(sizeof(sr_memory_info) == 32);
 static_assert(sizeof(sr_memory_request) == 32 && sizeof(sr_memory_piece) == 32);

@@ -113,6 +113,8 @@ Result<std::unique_ptr<Device>> Device::adopt(const HostDevice& host, const Devi
     if (!host.robust_buffer_access)
         return fail(ErrorCode::usage, "a host device needs robustBufferAccess, and to say so: files decide what "
                                       "shaders read");
+    if (host.cooperative_matrix && !host.float16)
+        return fail(ErrorCode::usage, "a host device with cooperative matrices needs shaderFloat16, and to say so");
     if (bool(host.lock) != bool(host.unlock))
         return fail(ErrorCode::usage, "a host device needs both of lock and unlock, or neither");
     if (bool(host.memory.allocate) != bool(host.memory.release))
@@ -128,7 +130,8 @@ Result<std::unique_ptr<Device>> Device::adopt(const HostDevice& host, const Devi
     d->sharing_ = host.sharing;
     SR_CHECK(d->finish(options));
     // what the hardware could do is not what the host asked for
-    d->limits_.needs_supported &= ~uint32_t(kNeedsCooperativeMatrix);
+    if (!host.cooperative_matrix)
+        d->limits_.needs_supported &= ~uint32_t(kNeedsCooperativeMatrix);
     if (!host.float16)
         d->limits_.needs_supported &= ~uint32_t(kNeedsFloat16);
     return d;

@@ -54,6 +54,7 @@ struct HostDevice {
     uint32_t queue_family = 0;
     bool robust_buffer_access = false;            // it is enabled, as it must be: files decide what is read
     bool float16 = false;                         // shaderFloat16 is enabled too
+    bool cooperative_matrix = false;              // and MatrixFeatures, with the memory model for all of the device
     std::function<void()> lock = {}, unlock = {}; // around every use of the queue; may be empty
     Sharing sharing = {};                         // its extensions are enabled
     MemorySource memory = {};                     // instead of vkAllocateMemory

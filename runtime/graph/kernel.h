@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string_view>
 
@@ -58,6 +59,13 @@ struct KernelVariant {
             if (c.name == constant_name)
                 return &c;
         return nullptr;
+    }
+    std::optional<size_t> binding(std::string_view binding_name) const // its index
+    {
+        for (size_t b = 0; b < bindings.size(); ++b)
+            if (bindings[b].name == binding_name)
+                return b;
+        return std::nullopt;
     }
     const PushMember* push_member(std::string_view member_name) const
     {

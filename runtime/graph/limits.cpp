@@ -82,7 +82,7 @@ bool has_matrix_units(const DeviceLimits& limits)
 {
     const bool wanted =
         limits.force_variant == "coopmat" || (limits.force_variant.empty() && limits.type != DeviceType::cpu);
-    return wanted && limits.matrix.m != 0;
+    return wanted && (limits.needs_supported & kNeedsCooperativeMatrix);
 }
 
 Status override_limits(DeviceLimits& limits, const std::string& text)

@@ -86,7 +86,7 @@ Status fuse(Plan& plan);  // epilogues into their producers
 Status pick_variants(Plan& plan, const DeviceLimits& limits); // a shader per pass, its constants and bindings
 void fit_tile(Pass& pass, const DeviceLimits& limits);        // part of it
 void bind(Pass& pass);                                        // part of it: tensors to bindings
-Status split(Plan& plan, const DeviceLimits& limits);         // long sums over few outputs into slices
+void split(Plan& plan, const DeviceLimits& limits);           // long sums over few outputs into slices
 // Levels before memory is shared: of what passes read and write where they may run side by side, else one each. So
 // passes of a level do not share memory, and lie in levels of their own later only if memory has to be shared.
 void arrange(Plan& plan, bool side_by_side);
@@ -111,6 +111,9 @@ double estimated_seconds(const Pass& pass);
 bool overlaps(const Plan& plan, const PassBinding& a, const PassBinding& b);
 // does one write what the other reads or writes?
 bool conflict(const Plan& plan, const Pass& a, const Pass& b);
+
+// bytes of shared memory that a variant takes with these constants (id -> value); others have their defaults
+uint32_t shared_bytes(const KernelVariant& variant, const std::map<uint32_t, uint32_t>& constants);
 
 // The variant of `kernel` for a device, among those its limits allow with these constants and tensors (none: fp16
 // ones): the forced one, else cpu, coopmat or simt by device type.

@@ -14,15 +14,6 @@ namespace semrover::stage {
 
 namespace {
 
-const BindingInfo* find_binding(const Kernel& kernel, std::string_view name, size_t& index)
-{
-    const auto& bindings = kernel.variants.front().bindings;
-    for (index = 0; index < bindings.size(); ++index)
-        if (bindings[index].name == name)
-            return &bindings[index];
-    return nullptr;
-}
-
 bool same(const Tensor& a, const Tensor& b)
 {
     return a.resource == b.resource && a.offset == b.offset && a.rows == b.rows && a.cols == b.cols && a.ld == b.ld;
@@ -129,36 +120,48 @@ void move_unused_outputs(Pass& producer, size_t y, uint32_t old_resource)
             producer.tensors[b] = producer.tensors[y].row_range(0, 1);
 }
 
+// where a producer binds what its consumer does, X aside; empty: not all of it
+std::vector<size_t> slots_of(const Pass& consumer, const KernelVariant& taking)
+{
+    std::vector<size_t> slots(consumer.tensors.size());
+    for (size_t b = 1; b < slots.size(); ++b) {
+        const std::optional<size_t> slot = taking.binding(consumer.kernel->variants.front().bindings[b].name);
+        if (!slot)
+            return {};
+        slots[b] = *slot;
+    }
+    return slots;
+}
+
 bool absorb(Plan& plan, size_t consumer)
 {
     Pass& c = plan.passes[consumer];
-    const auto& declared = c.kernel->variants.front().bindings;
     Pass* producer = c.options.keeps_x ? last_writer(plan, consumer) : sole_producer(plan, consumer);
-    if (!producer || !producer->kernel->variants.front().constant(c.options.absorbed_as))
+    if (!producer)
         return false;
-    size_t y;
-    if (!find_binding(*producer->kernel, protocol::kOutput, y) || !same(producer->tensors[y], c.tensors.front()))
+    const KernelVariant& taking = producer->kernel->variants.front();
+    const ConstantInfo* absorbing = taking.constant(c.options.absorbed_as);
+    const std::optional<size_t> y = taking.binding(protocol::kOutput);
+    if (!absorbing || !y || !same(producer->tensors[*y], c.tensors.front()))
         return false;
-    std::vector<size_t> slots(c.tensors.size());
-    for (size_t b = 1; b < c.tensors.size(); ++b)
-        if (!find_binding(*producer->kernel, declared[b].name, slots[b]))
-            return false;
-    const uint32_t id = producer->kernel->variants.front().constant(c.options.absorbed_as)->id;
-    if (!producer->absorbed.empty() && producer->absorbed.back() >= id)
+    const std::vector<size_t> slots = slots_of(c, taking);
+    if (slots.empty())
+        return false;
+    if (!producer->absorbed.empty() && producer->absorbed.back() >= absorbing->id)
         return false; // the shader applies its epilogues in the order of their ids
     for (size_t b = 1; b < c.tensors.size(); ++b)
-        if (slots[b] != y && std::count(producer->slots.begin(), producer->slots.end(), slots[b]))
+        if (slots[b] != *y && std::count(producer->slots.begin(), producer->slots.end(), slots[b]))
             return false; // another epilogue uses that binding
     if (!can_move_up(plan, producer, consumer) || overwrites_input(plan, *producer, c))
         return false;
-    const uint32_t old_y = producer->tensors[y].resource;
+    const uint32_t old_y = producer->tensors[*y].resource;
     for (size_t b = 1; b < c.tensors.size(); ++b) {
         producer->tensors[slots[b]] = c.tensors[b];
         producer->slots.push_back(slots[b]);
     }
     if (!c.options.keeps_x)
-        move_unused_outputs(*producer, y, old_y);
-    producer->absorbed.push_back(id);
+        move_unused_outputs(*producer, *y, old_y);
+    producer->absorbed.push_back(absorbing->id);
     move_push(c, *producer);
     producer->options.constants.push_back({c.options.absorbed_as, 1});
     if (!producer->options.banded.empty()) // else its rows cannot be cut, and neither can these

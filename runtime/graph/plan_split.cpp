@@ -1,12 +1,13 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // part of stage 3: sums over a long K by several workgroups, where few outputs would leave a large GPU idle (split-K)
-#include "runtime/graph/plan.h"
+#include "runtime/graph/plan_bands.h"
 
 #include "runtime/graph/protocol.h"
 
 #include <algorithm>
 #include <bit>
+#include <numeric>
 
 namespace semrover {
 
@@ -36,12 +37,6 @@ bool is_epilogue(const BindingInfo& b)
     return b.name != protocol::kOutput && std::ranges::find(protocol::kFactors, b.name) == std::end(protocol::kFactors);
 }
 
-size_t index_of(const Pass& pass, std::string_view name)
-{
-    const auto& bindings = pass.variant->bindings;
-    return size_t(std::ranges::find(bindings, name, &BindingInfo::name) - bindings.begin());
-}
-
 void set_member(Pass& pass, std::string_view binding, std::string_view member, uint32_t value)
 {
     pass.set_push(protocol::member_prefix(binding).append(member), value);
@@ -51,26 +46,26 @@ void set_member(Pass& pass, std::string_view binding, std::string_view member, u
 Pass adding_pass(const Pass& whole, const Tensor& sums, uint32_t slices, const DeviceLimits& limits)
 {
     Pass pass = whole;
-    pass.tensors[index_of(pass, protocol::kInput)] = sums;
+    pass.tensors[*pass.variant->binding(protocol::kInput)] = sums;
     set_member(pass, protocol::kInput, "ld", sums.ld);
     pass.options.flops = 0;
     pass.options.depth_step = 32;
-    pass.options.banded.clear();
     pass.set_constant(protocol::kSlices, slices);
     pass.set_constant(protocol::kAddSlices, 1);
     pass.set_tile(32, limits);
+    pass.options.banded.clear(); // it fits
     return pass;
 }
 
 // the product alone, of which each slice writes its own rows of `sums`
 void keep_product(Pass& pass, const Tensor& sums, uint32_t slices)
 {
-    const size_t y = index_of(pass, protocol::kOutput);
+    const size_t y = *pass.variant->binding(protocol::kOutput);
     pass.tensors[y] = sums;
     for (size_t b = 0; b < pass.tensors.size(); ++b)
         if (is_epilogue(pass.variant->bindings[b]))
             pass.tensors[b] = pass.variant->bindings[b].access == Access::read
-                                  ? pass.tensors[index_of(pass, protocol::kInput)].row_range(0, 1)
+                                  ? pass.tensors[*pass.variant->binding(protocol::kInput)].row_range(0, 1)
                                   : sums.row_range(0, 1);
     set_member(pass, protocol::kOutput, "ld", sums.ld);
     pass.set_constant(protocol::kSlices, slices);
@@ -78,27 +73,60 @@ void keep_product(Pass& pass, const Tensor& sums, uint32_t slices)
     pass.grid.z = slices;
 }
 
+bool binds_in_bands(const Pass& pass, uint32_t rows, uint32_t band, const DeviceLimits& limits)
+{
+    for (uint32_t first = 0; first < rows; first += band)
+        if (!binds(band_of(pass, first, std::min(band, rows - first), limits), limits))
+            return false;
+    return true;
+}
+
+// Rows of whole images, of as many as the device can bind with the sums of their slices. 0: not of the fewest that
+// begin aligned, which says nothing of how many there are.
+uint32_t rows_at_once(const Pass& pass, uint64_t row_bytes, const DeviceLimits& limits)
+{
+    const uint32_t rows = rows_of(pass);
+    const uint64_t step = std::lcm<uint64_t>(pass.options.image_rows, aligned_rows(pass, limits));
+    uint64_t count = std::min(limits.max_storage_range / row_bytes / step, (rows + step - 1) / step) * step;
+    while (count && !binds_in_bands(pass, rows, uint32_t(count), limits))
+        count -= step;
+    return uint32_t(std::min<uint64_t>(count, rows));
+}
+
+void append_sliced(std::vector<Pass>& passes, Pass&& whole, const Tensor& sums, uint32_t slices,
+                   const DeviceLimits& limits)
+{
+    Pass adding = adding_pass(whole, sums, slices, limits);
+    keep_product(whole, sums, slices);
+    stage::fit_tile(whole, limits);
+    for (Pass* pass : {&whole, &adding}) {
+        stage::bind(*pass);
+        passes.push_back(std::move(*pass));
+    }
+}
+
 } // namespace
 
-Status stage::split(Plan& plan, const DeviceLimits& limits)
+void stage::split(Plan& plan, const DeviceLimits& limits)
 {
-    for (size_t i = 0; i < plan.passes.size(); ++i) {
-        const uint32_t slices = slices_of(plan.passes[i]);
-        const uint32_t rows = plan.passes[i].grid.x, cols = plan.passes[i].grid.y;
-        const Tensor sums{uint32_t(plan.resources.size()), DType::f32, slices * rows, cols,
-                          round_up(cols, kRowPadding),     0};
-        if (slices < 2 || sums.bytes() > limits.max_storage_range)
+    std::vector<Pass> passes;
+    for (Pass& pass : plan.passes) {
+        const uint32_t slices = slices_of(pass), cols = pass.grid.y, ld = round_up(cols, kRowPadding);
+        const uint32_t rows = slices > 1 ? rows_at_once(pass, uint64_t(slices) * ld * 4, limits) : 0;
+        if (!rows) {
+            passes.push_back(std::move(pass));
             continue;
+        }
+        const Tensor sums{uint32_t(plan.resources.size()), DType::f32, slices * rows, cols, ld, 0};
         plan.resources.push_back({"slices", sums.bytes(), false, {}});
         plan.placements.emplace_back();
-        Pass adding = adding_pass(plan.passes[i], sums, slices, limits);
-        keep_product(plan.passes[i], sums, slices);
-        fit_tile(plan.passes[i], limits);
-        for (Pass* pass : {&plan.passes[i], &adding})
-            bind(*pass);
-        plan.passes.insert(plan.passes.begin() + int64_t(++i), std::move(adding));
+        for (uint32_t first = 0; first < pass.grid.x; first += rows) {
+            const uint32_t count = std::min(rows, pass.grid.x - first);
+            append_sliced(passes, band_of(pass, first, count, limits), sums.row_range(0, slices * count), slices,
+                          limits);
+        }
     }
-    return {};
+    plan.passes = std::move(passes);
 }
 
 } // namespace semrover

@@ -56,17 +56,6 @@ void fit_matrices(Pass& pass, const MatrixShape& shape)
     pass.set_constant(protocol::kThreads, 4 * shape.subgroup);
 }
 
-// with the constants that it has by now
-uint32_t shared_bytes(const Pass& pass)
-{
-    std::vector<uint32_t> values;
-    for (const ConstantInfo& c : pass.variant->constants) {
-        const auto set = pass.constants.find(c.id);
-        values.push_back(set == pass.constants.end() ? c.value : set->second);
-    }
-    return pass.variant->shared_bytes(values.data());
-}
-
 // how many subgroups share a tile, and how much of K they have at a time: as much as there is room for
 void share_tile(Pass& pass, const SquareTile& tile, const DeviceLimits& limits)
 {
@@ -76,7 +65,7 @@ void share_tile(Pass& pass, const SquareTile& tile, const DeviceLimits& limits)
         pass.set_constant(protocol::kStep, step);
         pass.set_constant(protocol::kThreads, subgroups * limits.matrix.subgroup);
         return subgroups * limits.matrix.subgroup <= limits.max_group_threads &&
-               shared_bytes(pass) <= limits.max_shared_bytes;
+               shared_bytes(*pass.variant, pass.constants) <= limits.max_shared_bytes;
     };
     for (const uint32_t subgroups : {tile.subgroups, 4u})
         for (uint32_t step = std::min(tile.step, suits); step >= 32; step /= 2)

@@ -12,24 +12,23 @@ namespace semrover {
 
 namespace {
 
-// with the constants that the op gives; those that the planner sets (kHalf*, tiles) size no shared memory
-uint32_t shared_bytes(const KernelVariant& v, std::span<const ConstantValue> given)
+// what the op gives; what the planner sets (kHalf*, tiles) sizes no shared memory here
+std::map<uint32_t, uint32_t> by_id(const KernelVariant& v, std::span<const ConstantValue> given)
 {
-    std::vector<uint32_t> values;
-    for (const ConstantInfo& c : v.constants) {
-        const auto found = std::ranges::find(given, c.name, &ConstantValue::name);
-        values.push_back(found == given.end() ? c.value : found->value);
-    }
-    return v.shared_bytes(values.data());
+    std::map<uint32_t, uint32_t> values;
+    for (const ConstantValue& c : given)
+        if (const ConstantInfo* info = v.constant(c.name))
+            values[info->id] = c.value;
+    return values;
 }
 
 bool runs_on(const KernelVariant& v, const DeviceLimits& limits, std::span<const ConstantValue> constants)
 {
     const auto buffers = std::ranges::count(v.bindings, BindingKind::storage, &BindingInfo::kind);
     const uint32_t group_threads = v.local_size[0] * v.local_size[1] * v.local_size[2];
-    return shared_bytes(v, constants) <= limits.max_shared_bytes && group_threads <= limits.max_group_threads &&
-           (v.needs & ~limits.needs_supported) == 0 && v.push_bytes <= limits.max_push_bytes &&
-           uint64_t(buffers) <= limits.max_storage_buffers;
+    return shared_bytes(v, by_id(v, constants)) <= limits.max_shared_bytes &&
+           group_threads <= limits.max_group_threads && (v.needs & ~limits.needs_supported) == 0 &&
+           v.push_bytes <= limits.max_push_bytes && uint64_t(buffers) <= limits.max_storage_buffers;
 }
 
 // a variant without kHalf<B>, which another one has, takes fp16 there
@@ -60,6 +59,16 @@ int preference(std::string_view name, const DeviceLimits& limits)
 }
 
 } // namespace
+
+uint32_t shared_bytes(const KernelVariant& variant, const std::map<uint32_t, uint32_t>& constants)
+{
+    std::vector<uint32_t> values;
+    for (const ConstantInfo& c : variant.constants) {
+        const auto set = constants.find(c.id);
+        values.push_back(set == constants.end() ? c.value : set->second);
+    }
+    return variant.shared_bytes(values.data());
+}
 
 void Pass::set_constant(std::string_view name, uint32_t value)
 {

@@ -63,60 +63,7 @@ uint own_at;                                  // this subgroup's weights
 // row r of those of this subgroup that this invocation looks after; beyond the last there may be none
 uint own_row(uint r) { return r * kLanes + gl_SubgroupInvocationID; }
 
-// channels behind the head's are never written again
-void clear_padding_channels()
-{
-    for (uint key = gl_LocalInvocationID.x; key < kKeys; key += kThreads) {
-        for (uint c = kChunks; c < kKeyPitch; ++c)
-            tile[key * kKeyPitch + c] = uvec4(0);
-        for (uint c = kChunks; c < kValuePitch; ++c)
-            tile[kValuesAt + key * kValuePitch + c] = uvec4(0);
-    }
-}
-
-// through shared memory to registers
-void load_queries(uint image, uint first, uint column)
-{
-    const uint last = max(p.queries, p.first_row + 1) - p.first_row - 1; // rows behind it repeat it
-    barrier();
-    for (uint i = gl_LocalInvocationID.x; i < 4 * kQueries * (kDim / 8); i += kThreads) {
-        const uint row = i / (kDim / 8), c = i % (kDim / 8), at = image * p.query_rows + min(first + row, last);
-        tile[row * kKeyPitch + c] = c < kChunks ? q[(at * p.q_ld + column) / 8 + c] : uvec4(0);
-    }
-    barrier();
-    [[unroll]] for (uint i = 0; i < kDown; ++i)
-        [[unroll]] for (uint k = 0; k < kSteps; ++k)
-            coopMatLoad(queries[i * kSteps + k], tile,
-                        (gl_SubgroupID * kQueries + i * kMatM) * kKeyPitch + k * kMatK / 8, kKeyPitch,
-                        gl_CooperativeMatrixLayoutRowMajor);
-    barrier();
-    clear_padding_channels();
-}
-
-// Keys behind the last one repeat it, and no weight is larger for them; their values and 1 are zeros.
-void load_block(uint image, uint first, uint head)
-{
-    [[unroll]] for (uint n = 0; n < kLoads; ++n) {
-        const uint i = n * kThreads + gl_LocalInvocationID.x, key = first + i / kChunks;
-        const uint at = (image * p.key_rows + min(key, p.keys - 1)) * p.kv_ld + head;
-        next_keys[n] = kv[(at + p.k_col) / 8 + i % kChunks];
-        next_values[n] = key < p.keys ? kv[(at + p.v_col) / 8 + i % kChunks] : uvec4(0);
-    }
-}
-
-void stage_block(uint first)
-{
-    [[unroll]] for (uint n = 0; n < kLoads; ++n) {
-        const uint i = n * kThreads + gl_LocalInvocationID.x;
-        if (kKeys * kChunks % kThreads == 0 || i < kKeys * kChunks) {
-            tile[i / kChunks * kKeyPitch + i % kChunks] = next_keys[n];
-            tile[kValuesAt + i / kChunks * kValuePitch + i % kChunks] = next_values[n];
-        }
-    }
-    if (first == 0 || first + kKeys > p.keys)
-        for (uint key = gl_LocalInvocationID.x; key < kKeys; key += kThreads)
-            tile[kValuesAt + key * kValuePitch + kChunks].x = first + key < p.keys ? 0x3c00 : 0; // 1
-}
+#include "lib/flash_stage.coopmat.glsl"
 
 // scores of the staged keys from kMatN j on, less what is subtracted
 void multiply_keys(uint j, out MatrixS s[kDown])
@@ -223,41 +170,7 @@ void attend_block(uint first)
     add_values();
 }
 
-// sums from column kMatN piece on, to this subgroup's part of shared memory. note: compilers must know which sums are
-// stored, or all of them lie in memory
-void put_sums(uint piece)
-{
-    own_barrier();
-    [[unroll]] for (uint i = 0; i < kDown * kAcross; ++i)
-        if (i % kAcross == piece)
-            coopMatStore(sums[i], weights, own_at + i / kAcross * kMatM * kWeightPitch, kWeightPitch,
-                         gl_CooperativeMatrixLayoutRowMajor);
-    own_barrier();
-}
-
-// y_at: of the image's first row in y
-void store(uint first_query, uint y_at)
-{
-    float inverse[kOwnRows];
-    put_sums(kTotalAt);
-    [[unroll]] for (uint r = 0; r < kOwnRows; ++r)
-        inverse[r] = 1.0 / uintBitsToFloat(weights[own_at + min(own_row(r), kQueries - 1) * kWeightPitch +
-                                                   kChunks * 8 % kMatN / 4].x);
-    [[dont_unroll]] for (uint piece = 0; piece < (kChunks * 8 + kMatN - 1) / kMatN; ++piece) {
-        put_sums(piece);
-        [[unroll]] for (uint r = 0; r < kOwnRows; ++r) {
-            const uint row = first_query + gl_SubgroupID * kQueries + own_row(r);
-            [[unroll]] for (uint part = 0; part < kMatN / 8; ++part) {
-                const uint c = piece * (kMatN / 8) + part, at = own_at + own_row(r) * kWeightPitch + 2 * part;
-                if (own_row(r) >= kQueries || row >= p.rows || c >= kChunks)
-                    continue;
-                const vec4 lo = uintBitsToFloat(weights[at]) * inverse[r];
-                const vec4 hi = uintBitsToFloat(weights[at + 1]) * inverse[r];
-                STORE8(y, kHalfY, y_at + row * p.y_ld + c * 8, lo, hi);
-            }
-        }
-    }
-}
+#include "lib/flash_store.coopmat.glsl"
 
 void attend(uint first_query, uint head, uint image)
 {

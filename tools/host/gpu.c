@@ -2,6 +2,8 @@
  * SPDX-License-Identifier: Apache-2.0 */
 #include "gpu.h"
 
+#include "matrices.h"
+
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -59,11 +61,13 @@ static void pick_device(struct gpu* gpu)
     check(0, "looking for a device that draws and computes");
 }
 
-/* with what the library needs enabled: timelineSemaphore and robustBufferAccess */
+/* with what the library needs enabled: timelineSemaphore and robustBufferAccess, and what matrix units need */
 static void make_device(struct gpu* gpu)
 {
-    const char* swapchain = "VK_KHR_swapchain";
+    const char* extensions[1 + MATRIX_EXTENSIONS] = {"VK_KHR_swapchain"};
     const float priority = 1;
+    uint32_t count = gpu->surface ? 1 : 0, i;
+    struct matrices matrices;
     VkPhysicalDeviceVulkan12Features features = {.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES,
                                                  .timelineSemaphore = VK_TRUE};
     const VkPhysicalDeviceFeatures robust = {.robustBufferAccess = VK_TRUE};
@@ -71,13 +75,18 @@ static void make_device(struct gpu* gpu)
                                            .queueFamilyIndex = gpu->family,
                                            .queueCount = 1,
                                            .pQueuePriorities = &priority};
-    const VkDeviceCreateInfo info = {.sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO,
-                                     .pNext = &features,
-                                     .queueCreateInfoCount = 1,
-                                     .pQueueCreateInfos = &queue,
-                                     .enabledExtensionCount = gpu->surface ? 1 : 0,
-                                     .ppEnabledExtensionNames = &swapchain,
-                                     .pEnabledFeatures = &robust};
+    VkDeviceCreateInfo info = {.sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO,
+                               .pNext = &features,
+                               .queueCreateInfoCount = 1,
+                               .pQueueCreateInfos = &queue,
+                               .ppEnabledExtensionNames = extensions,
+                               .pEnabledFeatures = &robust};
+    matrices_ask(&matrices, gpu->physical, &features);
+    gpu->matrices = matrices.enabled;
+    features.pNext = matrices.chain;
+    for (i = 0; matrices.enabled && i < MATRIX_EXTENSIONS; ++i)
+        extensions[count++] = matrices.extensions[i];
+    info.enabledExtensionCount = count;
     check(vkCreateDevice(gpu->physical, &info, NULL, &gpu->device) == VK_SUCCESS, "vkCreateDevice");
     vkGetDeviceQueue(gpu->device, gpu->family, 0, &gpu->queue);
 }
@@ -91,7 +100,9 @@ static void make_context(struct gpu* gpu)
                                      .physical_device = gpu->physical,
                                      .device = gpu->device,
                                      .queue = gpu->queue,
-                                     .robust_buffer_access = 1};
+                                     .shader_float16 = gpu->matrices,
+                                     .robust_buffer_access = 1,
+                                     .cooperative_matrix = gpu->matrices};
     const sr_context_desc desc = {.struct_size = sizeof desc, .vulkan = &vulkan};
     check_sr(sr_context_create(&desc, &gpu->context), NULL);
 }

@@ -14,7 +14,8 @@ struct gpu {
     VkPhysicalDevice physical;
     VkDevice device;
     VkQueue queue;
-    uint32_t family; /* draws, computes and presents */
+    uint32_t family;   /* draws, computes and presents */
+    uint32_t matrices; /* 1: what the library needs for matrix units is enabled */
     VkSurfaceKHR surface;
     sr_context* context;
 };

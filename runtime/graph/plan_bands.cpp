@@ -1,0 +1,148 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "runtime/graph/plan_bands.h"
+
+#include "runtime/graph/protocol.h"
+
+#include <algorithm>
+#include <numeric>
+
+namespace semrover {
+
+namespace {
+
+uint64_t range_limit(const PassBinding& b, const DeviceLimits& limits)
+{
+    return b.kind == BindingKind::texel ? limits.max_texel_elements * 16 : limits.max_storage_range;
+}
+
+const BandedBinding* banded(const Pass& pass, std::string_view binding)
+{
+    for (const BandedBinding& b : pass.options.banded)
+        if (b.name == binding)
+            return &b;
+    return nullptr;
+}
+
+// rows of a binding after which the next one starts aligned
+uint64_t aligned_rows(const Tensor& t, const DeviceLimits& limits)
+{
+    return limits.offset_alignment / std::gcd<uint64_t>(limits.offset_alignment, t.row_bytes());
+}
+
+// rows [first, last) of a binding that a band of output rows needs
+std::pair<uint64_t, uint64_t> binding_rows(const BandedBinding& band, const Tensor& t, uint64_t first, uint64_t count,
+                                           const DeviceLimits& limits)
+{
+    if (!band.window.out_width)
+        return {first / band.divisor, (first + count + band.divisor - 1) / band.divisor};
+    auto [begin, end] = band.window.input_rows(first, count);
+    begin -= begin % aligned_rows(t, limits);
+    return {begin, end};
+}
+
+// the most rows per band, of at most `band`, of which a window fits the limit; 0 if not even one step does
+uint64_t window_rows(const BandedBinding& b, const Tensor& t, uint64_t rows, uint64_t band, uint64_t step,
+                     uint64_t limit, const DeviceLimits& limits)
+{
+    const auto fits = [&](uint64_t count) {
+        for (uint64_t first = 0; first < rows; first += count) {
+            const auto [begin, end] = binding_rows(b, t, first, std::min(count, rows - first), limits);
+            if ((end - begin) * t.row_bytes() > limit)
+                return false;
+        }
+        return true;
+    };
+    uint64_t count = std::max(band / step * step, step); // never more than `band`: other bindings decided it
+    while (count > step && !fits(count))
+        count = std::max(count * 3 / 4 / step * step, step);
+    return fits(count) ? count : 0;
+}
+
+tl::unexpected<Error> too_large(const Plan& plan, const Pass& pass, size_t b, uint64_t rows, const DeviceLimits& limits)
+{
+    const PassBinding& binding = pass.bindings[b];
+    const std::string& tensor = plan.resources[binding.resource].name;
+    const uint64_t limit = range_limit(binding, limits);
+    if (!banded(pass, binding.name))
+        return fail(ErrorCode::out_of_memory, "{}: binding {} ('{}') has {} bytes; this device binds at most {}",
+                    pass.kernel->name, binding.name, tensor, binding.bytes, limit);
+    return fail(ErrorCode::out_of_memory, "{}: {} rows of binding {} ('{}') are {} bytes; this device binds at most {}",
+                pass.kernel->name, rows, binding.name, tensor, rows * pass.tensors[b].row_bytes(), limit);
+}
+
+} // namespace
+
+uint32_t rows_of(const Pass& pass)
+{
+    for (size_t b = 0; b < pass.bindings.size(); ++b)
+        if (const BandedBinding* band = banded(pass, pass.bindings[b].name);
+            band && band->divisor == 1 && !band->window.out_width)
+            return pass.tensors[b].rows;
+    return 0;
+}
+
+uint64_t aligned_rows(const Pass& pass, const DeviceLimits& limits)
+{
+    uint64_t step = 1;
+    for (size_t b = 0; b < pass.bindings.size(); ++b)
+        if (const BandedBinding* band = banded(pass, pass.bindings[b].name); band && !band->window.out_width)
+            step = std::lcm(step, band->divisor * aligned_rows(pass.tensors[b], limits));
+    return step;
+}
+
+bool binds(const Pass& pass, const DeviceLimits& limits)
+{
+    return std::ranges::all_of(pass.bindings, [&](const auto& b) { return b.bytes <= range_limit(b, limits); });
+}
+
+Result<uint32_t> band_rows(const Plan& plan, const Pass& pass, const DeviceLimits& limits)
+{
+    const uint32_t rows = rows_of(pass);
+    const uint64_t step = aligned_rows(pass, limits);
+    uint64_t band = rows;
+    for (size_t b = 0; b < pass.bindings.size(); ++b) {
+        const uint64_t limit = range_limit(pass.bindings[b], limits);
+        if (pass.bindings[b].bytes <= limit)
+            continue;
+        const BandedBinding* how = banded(pass, pass.bindings[b].name);
+        if (how && how->window.out_width)
+            band = window_rows(*how, pass.tensors[b], rows, band, step, limit, limits);
+        else
+            band =
+                std::min(band, limit / std::max<uint64_t>(pass.tensors[b].row_bytes(), 1) * (how ? how->divisor : 1));
+        if (!how || band < step)
+            return too_large(plan, pass, b, step, limits);
+    }
+    if (band >= rows)
+        return rows;
+    const uint64_t whole_tiles = std::lcm(step, uint64_t(pass.tile_rows.value_or(1))); // no half-empty ones
+    const uint64_t unit = whole_tiles <= band ? whole_tiles : step;
+    return uint32_t(std::max(band / unit * unit, unit));
+}
+
+Pass band_of(const Pass& whole, uint32_t first, uint32_t count, const DeviceLimits& limits)
+{
+    const uint32_t total = rows_of(whole);
+    Pass pass = whole;
+    for (size_t b = 0; b < pass.bindings.size(); ++b) {
+        const BandedBinding* band = banded(pass, pass.bindings[b].name);
+        if (!band)
+            continue;
+        const auto [begin, end] = binding_rows(*band, pass.tensors[b], first, count, limits);
+        pass.tensors[b] = pass.tensors[b].row_range(uint32_t(begin), uint32_t(end - begin));
+        pass.bindings[b].offset = pass.tensors[b].offset;
+        pass.bindings[b].bytes = pass.tensors[b].bytes();
+        if (band->window.out_width)
+            pass.set_push(protocol::first_member(band->name), uint32_t(begin));
+    }
+    pass.set_push(protocol::kRows, count);
+    if (pass.variant->push_member(protocol::kFirstRow))
+        pass.set_push(protocol::kFirstRow, first);
+    pass.grid.x = pass.grid.unit == Grid::Unit::tiles ? count : uint32_t(uint64_t(whole.grid.x) * count / total);
+    pass.options.flops = whole.options.flops * count / total;
+    pass.options.most_operations = whole.options.most_operations * count / total;
+    return pass;
+}
+
+} // namespace semrover
