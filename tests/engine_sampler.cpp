@@ -45,9 +45,10 @@ SamplingPlan plan(Sampler sampler, int steps, RepaintOptions repaint)
     return *plan_sampling(config, steps, repaint);
 }
 
-std::vector<float> run(const SamplingPlan& p, SamplerOptions options, const std::vector<RegionInput>& regions)
+std::vector<float> run(const SamplingPlan& p, SamplerOptions options, const std::vector<RegionInput>& regions,
+                       const Transformer& network = transformer())
 {
-    auto sampler = TokenSampler::create(device(), transformer(), p, std::move(options));
+    auto sampler = TokenSampler::create(device(), network, p, std::move(options));
     EXPECT_TRUE(sampler) << sampler.error().message;
     auto tokens = (*sampler)->run(regions);
     EXPECT_TRUE(tokens) << tokens.error().message;
@@ -145,6 +146,29 @@ TEST(engine_sampler, guides_the_steps_up_to_a_timestep)
     const auto backwards = TokenSampler::create(device(), transformer(), p, sampling_options(Guidance{2, 500, 400}, 7));
     ASSERT_FALSE(backwards);
     EXPECT_EQ(backwards.error().code, ErrorCode::usage);
+}
+
+// with scale 0 a step is its unlabelled half: what a network of that radius makes of the same cells without labels
+TEST(engine_sampler, lets_cells_without_labels_see_none_beyond_the_guidance_radius)
+{
+    const SamplingPlan p = plan(Sampler::ddpm, 3, {});
+    const RegionInput region = patch(0, 50, 0);
+    RegionInput bare = region;
+    TransformerConfig config = transformer().config(), narrow = config;
+    bare.labels.assign(region.cells.size(), config.num_classes);
+    const double radius = 2 * config.voxel_size;
+    narrow.attention_radius = float(radius);
+    const std::unique_ptr<Transformer> whole = std::move(*Transformer::random(device(), config, DType::f16)),
+                                       near = std::move(*Transformer::random(device(), narrow, DType::f16));
+    const auto unlabelled = [&](double r) {
+        return run(p, sampling_options(Guidance{0, 0, kLastTimestep, r}, 7), {region}, *whole);
+    };
+    EXPECT_EQ(unlabelled(radius), run(p, sampling_options(1, 7), {bare}, *near));
+    EXPECT_EQ(unlabelled(config.attention_radius), run(p, sampling_options(1, 7), {bare}, *whole));
+    EXPECT_NE(unlabelled(radius), unlabelled(config.attention_radius));
+    // the labelled half sees as far as ever
+    EXPECT_EQ(run(p, sampling_options(Guidance{1, 0, kLastTimestep, radius}, 7), {region}, *whole),
+              run(p, sampling_options(1, 7), {region}, *whole));
 }
 
 // a guided step and one that is not, each a run of its own that begins with what the one before left

@@ -47,7 +47,7 @@ SoftmaxSum reference(const HostMatrix& qkv, const PackedSets& p, uint32_t query,
 
 HostMatrix attend(KernelCase& k, const PackedSets& p, const HostMatrix& qkv, uint32_t heads, uint32_t streams)
 {
-    const Tensor mask = neighbor_mask(k.graph, k.input(p.cells, 4), k.input(p.sets, 2), p.longest, kRadius2);
+    const Tensor mask = neighbor_mask(k.graph, k.input(p.cells, 4), k.input(p.sets, 2), p.longest, {kRadius2});
     return k.run(attention(k.graph, k.input(qkv), k.input(p.tiles, 4), mask, heads, streams));
 }
 

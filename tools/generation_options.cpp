@@ -73,6 +73,9 @@ void add_generation_options(CLI::App& c, GenerationArguments& a)
     add_number(c, "--cfg-from", o.cfg_from, "timestep below which steps are not guided, which halves their cost", 0,
                kLastTimestep);
     add_number(c, "--cfg-until", o.cfg_until, "timestep above which steps are not guided", 0, kLastTimestep);
+    add_number(c, "--cfg-radius", o.cfg_radius,
+               "metres beyond which cells without labels see no others: guidance towards what neighbors agree on", 0,
+               kWholeRadius);
     add_choice(c, "--sampler", {"ddpm", "ddim", "dpm++2m"}, "of the noise schedule", o.sampler);
     add_choice(c, "--preset", {"fast", "standard", "paper"},
                "fast (20 steps), standard (50, RePaint 5/2), paper (250, RePaint 10/10, DDPM)", o.preset);

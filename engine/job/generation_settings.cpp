@@ -41,7 +41,7 @@ Result<GenerationSettings> resolve_generation(const GenerationOptions& o)
     const VoxfieldDefaults& d = s.model.defaults;
     s.steps = o.steps.value_or(preset.steps ? preset.steps : d.num_inference_steps);
     s.guidance = {o.cfg_scale.value_or(d.guidance_scale), double(o.cfg_from.value_or(d.guidance_from)),
-                  double(o.cfg_until.value_or(d.guidance_until))};
+                  double(o.cfg_until.value_or(d.guidance_until)), o.cfg_radius.value_or(d.guidance_radius)};
     s.repaint = preset.steps ? preset.repaint : d.repaint;
     s.repaint.jump_length = o.jump_length.value_or(s.repaint.jump_length);
     s.repaint.jump_n_sample = o.jump_n_sample.value_or(s.repaint.jump_n_sample);
@@ -96,6 +96,8 @@ Result<Json> settings_json(const GenerationSettings& s, const Device& device, st
     // not there where they say nothing: runs of earlier versions go on
     if (s.guidance.until < kLastTimestep)
         settings["guidance_until"] = s.guidance.until;
+    if (s.guidance.radius < s.model.config.attention_radius)
+        settings["guidance_radius"] = s.guidance.radius;
     if (s.regions.tile_cells)
         settings["tile_cells"] = s.regions.tile_cells;
     return settings;

@@ -24,6 +24,7 @@ struct GenerationOptions {
     std::optional<int> steps, region_size, coverage_threshold, jump_length, jump_n_sample;
     std::optional<float> cfg_scale;
     std::optional<int> cfg_from, cfg_until;
+    std::optional<double> cfg_radius;
     std::optional<KnownTokens> known;
     std::optional<RegionStrategy> strategy;
     int64_t first_cell = 0;

@@ -42,10 +42,10 @@ uint32_t TransformerConfig::condition_width() const
     return width;
 }
 
-int32_t TransformerConfig::radius2() const
+int32_t TransformerConfig::radius2_of(double metres) const
 {
     // 1e-6 m as in the reference: distances between cell centres that equal the radius count
-    const double cells = (double(attention_radius) + 1e-6) / double(voxel_size);
+    const double cells = (metres + 1e-6) / double(voxel_size);
     return int32_t(std::floor(cells * cells));
 }
 

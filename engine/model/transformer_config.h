@@ -48,7 +48,8 @@ struct TransformerConfig {
     uint32_t channels() const { return 6 * points_per_voxel; }
     uint32_t condition_width() const; // numbers of a cell; 0: labels are all that the model knows
     // largest squared distance in cells at which two cells see each other; inclusive
-    int32_t radius2() const;
+    int32_t radius2() const { return radius2_of(attention_radius); }
+    int32_t radius2_of(double metres) const; // squared, in cells
 };
 
 // errors: bad_input; a value that the engine does not implement is refused by name

@@ -67,9 +67,10 @@ Status Transformer::upload_frequencies(Device& device)
     return {};
 }
 
-Tensor Transformer::neighbors(Graph& g, const TokenContext& context) const
+Tensor Transformer::neighbors(Graph& g, const TokenContext& context, uint32_t near_row, double near) const
 {
-    return neighbor_mask(g, context.cells, context.sets, context.longest, config_.radius2());
+    const NeighborRadius radius{config_.radius2(), near_row, config_.radius2_of(near)};
+    return neighbor_mask(g, context.cells, context.sets, context.longest, radius);
 }
 
 Tensor Transformer::positions(Graph& g, const TokenContext& context) const

@@ -9,6 +9,9 @@ namespace semrover {
 // the largest guidance scale; the least is 0
 constexpr float kMaxGuidance = 1000;
 
+// metres: a guidance radius that leaves the attention radius as it is
+constexpr double kWholeRadius = 1000;
+
 // the largest timestep that a schedule may have
 constexpr int kLastTimestep = 10000;
 

@@ -68,7 +68,8 @@ struct TokenSampler::Batch {
         Graph g;
         const Transformer& t = s.transformer_;
         const TokenContext c = context(g, s.halves_);
-        g.keep(t.neighbors(g, c), mask);
+        const double radius = s.options_.guidance.radius;
+        g.keep(radius < t.config().attention_radius ? t.neighbors(g, c, rows, radius) : t.neighbors(g, c), mask);
         const Tensor positions = t.positions(g, c);
         g.keep(positions, pos);
         if (!told.valid())
@@ -144,6 +145,8 @@ Result<std::unique_ptr<TokenSampler>> TokenSampler::create(Device& device, const
     if (!(guidance.until >= guidance.from))
         return fail(ErrorCode::usage, "guidance until timestep {}, which is below {}, from where it begins",
                     guidance.until, guidance.from);
+    if (!(guidance.radius >= 0))
+        return fail(ErrorCode::usage, "guidance radius {}, which is below 0", guidance.radius);
     std::unique_ptr<TokenSampler> s(new TokenSampler(device, transformer, plan, std::move(options)));
     SR_CHECK(s->state_.allocate(device, "sampler tables"));
     SR_CHECK(s->upload_steps());
@@ -322,6 +325,8 @@ uint64_t TokenSampler::key_of(std::span<const RegionInput> regions) const
     add(std::span(&options_.guidance.scale, 1));
     add(std::span(&options_.guidance.from, 1));
     add(std::span(&options_.guidance.until, 1));
+    if (options_.guidance.radius < transformer_.config().attention_radius) // runs without one go on
+        add(std::span(&options_.guidance.radius, 1));
     add(std::span(&options_.seed, 1));
     for (const RegionInput& r : regions) {
         add(r.cells);

@@ -16,6 +16,7 @@ struct VoxfieldDefaults {
     float guidance_scale = 4;
     int guidance_from = 0;              // timestep below which no step is guided
     int guidance_until = kLastTimestep; // and above which none is
+    double guidance_radius = kWholeRadius;
     RegionOptions regions;
     RepaintOptions repaint;
     UsualObjects usual_objects; // to guess objects from labels

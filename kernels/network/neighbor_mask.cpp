@@ -8,11 +8,15 @@
 
 namespace semrover {
 
-Tensor neighbor_mask(Graph& g, Tensor cells, Tensor sets, uint32_t longest_set, int32_t radius2)
+Tensor neighbor_mask(Graph& g, Tensor cells, Tensor sets, uint32_t longest_set, const NeighborRadius& radius)
 {
     const uint32_t words = divide_up(longest_set, 32);
     const Tensor mask = g.array(cells.rows, DType::u32, "mask", words);
-    const NeighborMaskPush push{.rows = cells.rows, .words = words, .radius2 = radius2};
+    const NeighborMaskPush push{.rows = cells.rows,
+                                .words = words,
+                                .radius2 = radius.radius2,
+                                .near_row = radius.near_row,
+                                .near_radius2 = radius.near_radius2};
     g.dispatch(kernel::neighbor_mask, {cells, sets, mask}, push, threads(cells.rows * words));
     return mask;
 }

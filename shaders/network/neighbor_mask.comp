@@ -27,7 +27,7 @@ void main()
         if (j >= set.y)
             break;
         const ivec3 d = min(abs(cells[set.x + j].xyz - own), kFar);
-        if (d.x * d.x + d.y * d.y + d.z * d.z <= p.radius2)
+        if (d.x * d.x + d.y * d.y + d.z * d.z <= (row < p.near_row ? p.radius2 : p.near_radius2))
             bits |= 1u << b;
     }
     mask[row * p.words + word] = bits;

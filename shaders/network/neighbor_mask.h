@@ -6,8 +6,10 @@
 
 struct NeighborMaskPush {
     uint rows;
-    uint words;  // of a row of the mask
-    int radius2; // largest squared distance, in cells
+    uint words;    // of a row of the mask
+    int radius2;   // largest squared distance, in cells
+    uint near_row; // rows from here on have near_radius2
+    int near_radius2;
 };
 
 #endif
