@@ -5,6 +5,7 @@
 #include "kernels/network.h"
 #include "runtime/graph/plan.h"
 
+#include <cstring>
 #include <gtest/gtest.h>
 
 // what graph tests need when there is no device: limits, and external memory that nobody dereferences
@@ -43,6 +44,14 @@ inline Plan planned(const Graph& g, const DeviceLimits& limits = test_limits())
     auto plan = make_plan(g.desc(), limits);
     EXPECT_TRUE(plan) << plan.error().message;
     return plan ? *plan : Plan{};
+}
+
+// a member of what a pass pushes
+inline uint32_t pushed(const Pass& pass, std::string_view member)
+{
+    uint32_t value = 0;
+    std::memcpy(&value, &pass.push.at(pass.variant->push_member(member)->offset), 4);
+    return value;
 }
 
 // kernels in the order they run, with a bar for every barrier: "gelu silu | add"

@@ -2,18 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/graph_memory.h"
 
-#include <cstring>
 #include <gtest/gtest.h>
 
 namespace semrover {
 namespace graph_slice_test {
-
-uint32_t pushed(const Pass& pass, std::string_view member)
-{
-    uint32_t value = 0;
-    std::memcpy(&value, &pass.push.at(pass.variant->push_member(member)->offset), 4);
-    return value;
-}
 
 const PassBinding& binding(const Pass& pass, std::string_view name)
 {

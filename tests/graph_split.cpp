@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/graph_memory.h"
 
-#include <cstring>
 #include <gtest/gtest.h>
 
 namespace semrover {
@@ -31,13 +30,6 @@ Plan conv_plan(uint32_t batch, uint32_t side, uint32_t outputs, const DeviceLimi
     y = y.with(add(g, y.data, fake_external(g, rows, outputs, DType::f16)));
     (void)channel_moments(g, y);
     return planned(g, limits);
-}
-
-uint32_t pushed(const Pass& pass, std::string_view member)
-{
-    uint32_t value = 0;
-    std::memcpy(&value, &pass.push.at(pass.variant->push_member(member)->offset), 4);
-    return value;
 }
 
 // 1: the sums of all of K are made by one workgroup

@@ -447,6 +447,9 @@ TEST(runtime_device, refuses_a_host_device_that_lacks_something)
     host.robust_buffer_access = false;
     EXPECT_TRUE(says(Device::adopt(host, {}), "a host device needs robustBufferAccess"));
     host = whole;
+    host.cooperative_matrix = true;
+    EXPECT_TRUE(says(Device::adopt(host, {}), "with cooperative matrices needs shaderFloat16"));
+    host = whole;
     host.lock = [] {};
     EXPECT_TRUE(says(Device::adopt(host, {}), "needs both of lock and unlock, or neither"));
     EXPECT_TRUE(says(Device::adopt(whole, {.limits = "colour=1"}), "unknown limit 'colour'"));

@@ -96,7 +96,7 @@ Result<Json> settings_json(const GenerationSettings& s, const Device& device, st
     // not there where they say nothing: runs of earlier versions go on
     if (s.guidance.until < kLastTimestep)
         settings["guidance_until"] = s.guidance.until;
-    if (s.guidance.radius < s.model.config.attention_radius)
+    if (s.guidance.narrows(s.model.config.attention_radius))
         settings["guidance_radius"] = s.guidance.radius;
     if (s.regions.tile_cells)
         settings["tile_cells"] = s.regions.tile_cells;

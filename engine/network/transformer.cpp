@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/network/transformer.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace semrover {
@@ -67,8 +68,9 @@ Status Transformer::upload_frequencies(Device& device)
     return {};
 }
 
-Tensor Transformer::neighbors(Graph& g, const TokenContext& context, uint32_t near_row, double near) const
+Tensor Transformer::neighbors(Graph& g, const TokenContext& context, uint32_t near_row, double near_radius) const
 {
+    const double near = std::min<double>(near_radius, config_.attention_radius);
     const NeighborRadius radius{config_.radius2(), near_row, config_.radius2_of(near)};
     return neighbor_mask(g, context.cells, context.sets, context.longest, radius);
 }

@@ -44,8 +44,8 @@ class Transformer {
 
     // mask, pos, told and told_voxels of a context, from its other tensors; once per batch of sets
     [[nodiscard]] Tensor neighbors(Graph& g, const TokenContext& context,
-                                   uint32_t near_row = ~0u, // cells from this row on see others within `near` metres,
-                                   double near = 0) const;  // and not within the attention radius
+                                   uint32_t near_row,         // from this row on cells see no others beyond
+                                   double near_radius) const; // metres, if that is less than the attention radius
     [[nodiscard]] Tensor positions(Graph& g, const TokenContext& context) const;
     [[nodiscard]] ToldTokens tell(Graph& g,
                                   Tensor pos,              // [M, D]

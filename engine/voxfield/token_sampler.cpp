@@ -68,8 +68,7 @@ struct TokenSampler::Batch {
         Graph g;
         const Transformer& t = s.transformer_;
         const TokenContext c = context(g, s.halves_);
-        const double radius = s.options_.guidance.radius;
-        g.keep(radius < t.config().attention_radius ? t.neighbors(g, c, rows, radius) : t.neighbors(g, c), mask);
+        g.keep(t.neighbors(g, c, rows, s.options_.guidance.radius), mask);
         const Tensor positions = t.positions(g, c);
         g.keep(positions, pos);
         if (!told.valid())
@@ -325,7 +324,7 @@ uint64_t TokenSampler::key_of(std::span<const RegionInput> regions) const
     add(std::span(&options_.guidance.scale, 1));
     add(std::span(&options_.guidance.from, 1));
     add(std::span(&options_.guidance.until, 1));
-    if (options_.guidance.radius < transformer_.config().attention_radius) // runs without one go on
+    if (options_.guidance.narrows(transformer_.config().attention_radius)) // runs without one go on
         add(std::span(&options_.guidance.radius, 1));
     add(std::span(&options_.seed, 1));
     for (const RegionInput& r : regions) {

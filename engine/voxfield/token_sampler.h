@@ -34,6 +34,7 @@ struct Guidance {
     double until = kLastTimestep;
     double radius = kWholeRadius; // metres; from the attention radius on it changes nothing
 
+    bool narrows(double attention_radius) const { return radius < attention_radius; }
     bool at(double timestep) const { return scale != 1.f && timestep >= from && timestep <= until; }
 };
 

@@ -71,6 +71,30 @@ tl::unexpected<Error> too_large(const Plan& plan, const Pass& pass, size_t b, ui
                 pass.kernel->name, rows, binding.name, tensor, rows * pass.tensors[b].row_bytes(), limit);
 }
 
+// the pass for rows [first, first + count) of `total` only
+Pass band_of(const Pass& whole, uint32_t first, uint32_t count, uint32_t total, const DeviceLimits& limits)
+{
+    Pass pass = whole;
+    for (size_t b = 0; b < pass.bindings.size(); ++b) {
+        const BandedBinding* band = banded(pass, pass.bindings[b].name);
+        if (!band)
+            continue;
+        const auto [begin, end] = binding_rows(*band, pass.tensors[b], first, count, limits);
+        pass.tensors[b] = pass.tensors[b].row_range(uint32_t(begin), uint32_t(end - begin));
+        pass.bindings[b].offset = pass.tensors[b].offset;
+        pass.bindings[b].bytes = pass.tensors[b].bytes();
+        if (band->window.out_width)
+            pass.set_push(protocol::first_member(band->name), uint32_t(begin));
+    }
+    pass.set_push(protocol::kRows, count);
+    if (pass.variant->push_member(protocol::kFirstRow))
+        pass.set_push(protocol::kFirstRow, first);
+    pass.grid.x = pass.grid.unit == Grid::Unit::tiles ? count : uint32_t(uint64_t(whole.grid.x) * count / total);
+    pass.options.flops = whole.options.flops * count / total;
+    pass.options.most_operations = whole.options.most_operations * count / total;
+    return pass;
+}
+
 } // namespace
 
 uint32_t rows_of(const Pass& pass)
@@ -121,28 +145,13 @@ Result<uint32_t> band_rows(const Plan& plan, const Pass& pass, const DeviceLimit
     return uint32_t(std::max(band / unit * unit, unit));
 }
 
-Pass band_of(const Pass& whole, uint32_t first, uint32_t count, const DeviceLimits& limits)
+std::vector<Pass> bands_of(const Pass& whole, uint32_t rows, const DeviceLimits& limits)
 {
+    std::vector<Pass> bands;
     const uint32_t total = rows_of(whole);
-    Pass pass = whole;
-    for (size_t b = 0; b < pass.bindings.size(); ++b) {
-        const BandedBinding* band = banded(pass, pass.bindings[b].name);
-        if (!band)
-            continue;
-        const auto [begin, end] = binding_rows(*band, pass.tensors[b], first, count, limits);
-        pass.tensors[b] = pass.tensors[b].row_range(uint32_t(begin), uint32_t(end - begin));
-        pass.bindings[b].offset = pass.tensors[b].offset;
-        pass.bindings[b].bytes = pass.tensors[b].bytes();
-        if (band->window.out_width)
-            pass.set_push(protocol::first_member(band->name), uint32_t(begin));
-    }
-    pass.set_push(protocol::kRows, count);
-    if (pass.variant->push_member(protocol::kFirstRow))
-        pass.set_push(protocol::kFirstRow, first);
-    pass.grid.x = pass.grid.unit == Grid::Unit::tiles ? count : uint32_t(uint64_t(whole.grid.x) * count / total);
-    pass.options.flops = whole.options.flops * count / total;
-    pass.options.most_operations = whole.options.most_operations * count / total;
-    return pass;
+    for (uint32_t first = 0; first < total; first += rows)
+        bands.push_back(band_of(whole, first, std::min(rows, total - first), total, limits));
+    return bands;
 }
 
 } // namespace semrover

@@ -20,7 +20,7 @@ bool binds(const Pass& pass, const DeviceLimits& limits);
 // cannot be cut, or of which not even the fewest rows fit.
 Result<uint32_t> band_rows(const Plan& plan, const Pass& pass, const DeviceLimits& limits);
 
-// the pass for rows [first, first + count) only
-Pass band_of(const Pass& whole, uint32_t first, uint32_t count, const DeviceLimits& limits);
+// the pass in bands of `rows` rows, the last of which may have fewer
+std::vector<Pass> bands_of(const Pass& whole, uint32_t rows, const DeviceLimits& limits);
 
 } // namespace semrover

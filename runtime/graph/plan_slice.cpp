@@ -4,6 +4,7 @@
 #include "runtime/graph/plan_bands.h"
 
 #include <algorithm>
+#include <iterator>
 
 namespace semrover::stage {
 
@@ -45,13 +46,10 @@ Status slice(Plan& plan, const DeviceLimits& limits)
     std::vector<Pass> passes;
     for (const Pass& pass : plan.passes) {
         SR_TRY(const uint32_t band, band_rows(plan, pass, limits));
-        const uint32_t rows = rows_of(pass);
-        if (band == rows) {
+        if (band == rows_of(pass))
             passes.push_back(pass);
-            continue;
-        }
-        for (uint32_t first = 0; first < rows; first += band)
-            passes.push_back(band_of(pass, first, std::min(band, rows - first), limits));
+        else
+            std::ranges::move(bands_of(pass, band, limits), std::back_inserter(passes));
     }
     for (Pass& pass : passes)
         SR_CHECK(count_groups(pass, limits));

@@ -73,14 +73,6 @@ void keep_product(Pass& pass, const Tensor& sums, uint32_t slices)
     pass.grid.z = slices;
 }
 
-bool binds_in_bands(const Pass& pass, uint32_t rows, uint32_t band, const DeviceLimits& limits)
-{
-    for (uint32_t first = 0; first < rows; first += band)
-        if (!binds(band_of(pass, first, std::min(band, rows - first), limits), limits))
-            return false;
-    return true;
-}
-
 // Rows of whole images, of as many as the device can bind with the sums of their slices. 0: not of the fewest that
 // begin aligned, which says nothing of how many there are.
 uint32_t rows_at_once(const Pass& pass, uint64_t row_bytes, const DeviceLimits& limits)
@@ -88,7 +80,8 @@ uint32_t rows_at_once(const Pass& pass, uint64_t row_bytes, const DeviceLimits& 
     const uint32_t rows = rows_of(pass);
     const uint64_t step = std::lcm<uint64_t>(pass.options.image_rows, aligned_rows(pass, limits));
     uint64_t count = std::min(limits.max_storage_range / row_bytes / step, (rows + step - 1) / step) * step;
-    while (count && !binds_in_bands(pass, rows, uint32_t(count), limits))
+    const auto bound = [&](const Pass& band) { return binds(band, limits); };
+    while (count && !std::ranges::all_of(bands_of(pass, uint32_t(count), limits), bound))
         count -= step;
     return uint32_t(std::min<uint64_t>(count, rows));
 }
@@ -120,10 +113,9 @@ void stage::split(Plan& plan, const DeviceLimits& limits)
         const Tensor sums{uint32_t(plan.resources.size()), DType::f32, slices * rows, cols, ld, 0};
         plan.resources.push_back({"slices", sums.bytes(), false, {}});
         plan.placements.emplace_back();
-        for (uint32_t first = 0; first < pass.grid.x; first += rows) {
-            const uint32_t count = std::min(rows, pass.grid.x - first);
-            append_sliced(passes, band_of(pass, first, count, limits), sums.row_range(0, slices * count), slices,
-                          limits);
+        for (Pass& band : bands_of(pass, rows, limits)) {
+            const Tensor some = sums.row_range(0, slices * band.grid.x);
+            append_sliced(passes, std::move(band), some, slices, limits);
         }
     }
     plan.passes = std::move(passes);
