@@ -346,6 +346,23 @@ class CliRefineRefuses : public CliRefine {
         EXPECT_EQ(std::ranges::count(result.err, '\n'), 1) << result.err;
         EXPECT_EQ(folder_.entries(), entries) << line << ": something was left behind";
     }
+    void fill_vae_tensor(std::string_view name, float value)
+    {
+        const fs::path weights = folder_ / "model" / "vae" / "diffusion_pytorch_model.safetensors";
+        const auto file = Safetensors::open(weights);
+        std::vector<TensorData> tensors;
+        std::vector<float> filled;
+        for (const TensorInfo& t : file->tensors()) {
+            tensors.push_back({t.name, t.dtype, t.shape, file->bytes(t)});
+            if (t.name == name) {
+                filled.assign(t.elements(), value);
+                tensors.back() = {t.name, DType::f32, t.shape, std::as_bytes(std::span(filled))};
+            }
+        }
+        ASSERT_FALSE(filled.empty());
+        ASSERT_TRUE(write_safetensors(folder_ / "changed", tensors));
+        fs::rename(folder_ / "changed", weights);
+    }
 };
 
 TEST_F(CliRefineRefuses, buffers_that_are_not_whole)
@@ -376,22 +393,17 @@ TEST_F(CliRefineRefuses, models_that_cannot_render)
     expect_refusal("refine " + path("in") + " -o " + path("out") + " -m " + path("nowhere"), 3, "nowhere");
 }
 
+TEST_F(CliRefineRefuses, weights_that_half_precision_cannot_hold)
+{
+    fill_vae_tensor("decoder.conv_out.weight", 70000);
+    expect_refusal(arguments("out"), 3,
+                   "tensor 'decoder.conv_out.weight' holds 70000, which F16 cannot hold: use --precision fp32");
+}
+
 TEST_F(CliRefineRefuses, results_that_are_not_numbers)
 {
     // finite weights whose products are not: the decoder's last layer
-    const fs::path weights = folder_ / "model" / "vae" / "diffusion_pytorch_model.safetensors";
-    const auto file = Safetensors::open(weights);
-    std::vector<TensorData> tensors;
-    std::vector<uint16_t> huge;
-    for (const TensorInfo& t : file->tensors()) {
-        tensors.push_back({t.name, t.dtype, t.shape, file->bytes(t)});
-        if (t.name == "decoder.conv_norm_out.weight") {
-            huge.assign(t.bytes() / 2, float_to_half(65000));
-            tensors.back().bytes = std::as_bytes(std::span(huge));
-        }
-    }
-    ASSERT_TRUE(write_safetensors(folder_ / "changed", tensors));
-    fs::rename(folder_ / "changed", weights);
+    fill_vae_tensor("decoder.conv_norm_out.weight", 65000);
     const ProgramResult result = refine("out", "--frames 1:1");
     EXPECT_EQ(result.code, 70);
     EXPECT_NE(result.err.find("frame 1: the decoded frame holds "), std::string::npos) << result.err;

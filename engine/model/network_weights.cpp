@@ -3,7 +3,6 @@
 #include "engine/model/network_weights.h"
 
 #include <cmath>
-#include <cstring>
 #include <map>
 
 namespace semrover {
@@ -26,24 +25,6 @@ uint32_t packed_row(uint32_t row, uint32_t rows, uint32_t heads, bool geglu)
 uint32_t packed_rows(uint32_t rows, uint32_t heads, bool geglu)
 {
     return geglu ? 2 * round_up(rows / 2, kRowPadding) : heads ? padded_heads(rows, heads) : rows;
-}
-
-// errors: a value that fp16 cannot hold
-Result<std::vector<std::byte>> to_dtype(const std::vector<float>& values, DType dtype, const std::string& name)
-{
-    std::vector<std::byte> bytes(values.size() * dtype_bytes(dtype));
-    if (dtype == DType::f32) {
-        std::memcpy(bytes.data(), values.data(), bytes.size());
-        return bytes;
-    }
-    auto* halves = reinterpret_cast<uint16_t*>(bytes.data());
-    for (size_t i = 0; i < values.size(); ++i) {
-        halves[i] = float_to_half(values[i]);
-        if ((halves[i] & 0x7c00) == 0x7c00)
-            return fail(ErrorCode::bad_input, "tensor '{}' holds {}, which fp16 cannot: use --precision fp32", name,
-                        values[i]);
-    }
-    return bytes;
 }
 
 float share_of(float mix_factor, bool switched)
@@ -196,24 +177,30 @@ Status NetworkWeights::read(const Checkpoint& checkpoint, const Source& source, 
     return {};
 }
 
-Status NetworkWeights::upload(Device& device, const Checkpoint& checkpoint, const Entry& entry) const
+Status NetworkWeights::upload(Device& device, const Checkpoint& checkpoint, const Entry& entry, Scratch& scratch) const
 {
     const uint32_t ld = entry.weight.ld();
-    std::vector<float> rows(size_t(entry.weight.rows()) * ld, 0.f), values;
+    scratch.rows.assign(size_t(entry.weight.rows()) * ld, 0.f);
     for (const Source& source : entry.sources) {
-        SR_CHECK(read(checkpoint, source, values));
-        source.pack(values, rows.data(), ld);
+        SR_CHECK(read(checkpoint, source, scratch.values));
+        source.pack(scratch.values, scratch.rows.data(), ld);
     }
-    SR_TRY(const auto bytes, to_dtype(rows, entry.weight.dtype(), entry.sources.front().spec.name));
-    return entry.weight.write(device, bytes);
+    const DType dtype = entry.weight.dtype();
+    scratch.bytes.resize(scratch.rows.size() * dtype_bytes(dtype));
+    from_float(scratch.rows, dtype, scratch.bytes.data());
+    if (const auto bad = first_non_finite(scratch.bytes, dtype))
+        return fail(ErrorCode::bad_input, "tensor '{}' holds {}, which {} cannot hold: use --precision fp32",
+                    entry.sources.front().spec.name, scratch.rows[*bad], dtype_name(dtype));
+    return entry.weight.write(device, scratch.bytes);
 }
 
 Status NetworkWeights::load(Device& device, const Checkpoint& checkpoint, std::span<const TensorSpec> schema)
 {
     SR_CHECK(checkpoint.require(schema));
     SR_CHECK(state_.allocate(device, "network weights"));
+    Scratch scratch;
     for (const Entry& entry : entries_)
-        SR_CHECK(upload(device, checkpoint, entry));
+        SR_CHECK(upload(device, checkpoint, entry, scratch));
     return {};
 }
 

@@ -83,7 +83,12 @@ class NetworkWeights {
     Entry& add(const std::string& name, uint32_t rows, uint32_t cols, DType dtype);
     void add_vector(Entry& entry, const std::string& name, uint32_t size, uint32_t first, uint32_t heads, bool geglu,
                     float gain);
-    Status upload(Device& device, const Checkpoint& checkpoint, const Entry& entry) const;
+    // kept from weight to weight: new memory costs more than what is written to it
+    struct Scratch {
+        std::vector<float> values, rows;
+        std::vector<std::byte> bytes;
+    };
+    Status upload(Device& device, const Checkpoint& checkpoint, const Entry& entry, Scratch& scratch) const;
     Status read(const Checkpoint& checkpoint, const Source& source, std::vector<float>& values) const;
 
     DType precision_;

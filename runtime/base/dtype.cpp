@@ -35,20 +35,15 @@ uint16_t float_to_half(float f)
     std::memcpy(&bits, &f, 4);
     const uint32_t sign = (bits >> 16) & 0x8000u;
     bits &= 0x7fffffffu;
-    if (bits >= 0x7f800000u) // inf, nan
-        return uint16_t(sign | 0x7c00u | (bits > 0x7f800000u ? 0x200u : 0u));
-    if (bits >= 0x477ff000u) // rounds to 65536 or more
-        return uint16_t(sign | 0x7c00u);
-    if (bits < 0x38800000u) { // subnormal: value / 2^-24, rounded to even by the float adder
-        float magnitude;
-        std::memcpy(&magnitude, &bits, 4);
-        magnitude += 0.5f; // ulp of [0.5, 1) is 2^-24
-        uint32_t rounded;
-        std::memcpy(&rounded, &magnitude, 4);
-        return uint16_t(sign | (rounded - 0x3f000000u));
-    }
-    const uint32_t round = 0xfffu + ((bits >> 13) & 1u);
-    return uint16_t(sign | ((bits + round - 0x38000000u) >> 13));
+    float magnitude;
+    std::memcpy(&magnitude, &bits, 4);
+    magnitude += 0.5f; // ulp of [0.5, 1) is 2^-24: the adder rounds a subnormal to even
+    uint32_t small;
+    std::memcpy(&small, &magnitude, 4);
+    small -= 0x3f000000u;
+    const uint32_t normal = (bits + 0xfffu + ((bits >> 13) & 1u) - 0x38000000u) >> 13;
+    const uint32_t special = bits > 0x7f800000u ? 0x7e00u : 0x7c00u; // NaN; infinite, or rounds to 65536 or more
+    return uint16_t(sign | (bits >= 0x477ff000u ? special : bits < 0x38800000u ? small : normal));
 }
 
 uint16_t float_to_bf16(float f)
@@ -90,6 +85,49 @@ void from_float(std::span<const float> values, DType dtype, std::byte* out)
     for (size_t i = 0; i < values.size(); ++i) {
         const uint16_t word = dtype == DType::f16 ? float_to_half(values[i]) : float_to_bf16(values[i]);
         std::memcpy(out + 2 * i, &word, 2);
+    }
+}
+
+namespace {
+
+// numbers whose exponent bits are all ones are NaN or infinite
+template <typename Bits>
+std::optional<uint64_t> first_with_exponent(std::span<const std::byte> bytes, Bits mask)
+{
+    const auto matches = [&](uint64_t i) {
+        Bits value;
+        std::memcpy(&value, bytes.data() + i * sizeof(Bits), sizeof(Bits));
+        return (value & mask) == mask;
+    };
+    constexpr uint64_t kBlock = 4096; // without a way out, so that its loop becomes vectors
+    const uint64_t count = bytes.size() / sizeof(Bits);
+    for (uint64_t first = 0; first < count; first += kBlock) {
+        const uint64_t end = std::min(first + kBlock, count);
+        Bits any = 0;
+        for (uint64_t i = first; i < end; ++i)
+            any |= Bits(matches(i));
+        for (uint64_t i = first; any && i < end; ++i)
+            if (matches(i))
+                return i;
+    }
+    return std::nullopt;
+}
+
+} // namespace
+
+std::optional<uint64_t> first_non_finite(std::span<const std::byte> bytes, DType dtype)
+{
+    switch (dtype) {
+    case DType::f16:
+        return first_with_exponent<uint16_t>(bytes, 0x7c00);
+    case DType::bf16:
+        return first_with_exponent<uint16_t>(bytes, 0x7f80);
+    case DType::f32:
+        return first_with_exponent<uint32_t>(bytes, 0x7f800000);
+    case DType::f64:
+        return first_with_exponent<uint64_t>(bytes, 0x7ff0000000000000);
+    default:
+        return std::nullopt;
     }
 }
 

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 namespace semrover {
@@ -52,5 +53,8 @@ uint16_t float_to_bf16(float f); // round to nearest even
 // a tensor's elements, which may be misaligned, of type f32, f16 or bf16
 void to_float(std::span<const std::byte> bytes, DType dtype, float* out);
 void from_float(std::span<const float> values, DType dtype, std::byte* out);
+
+// index of the first element that is NaN or infinite; none for integers. `bytes` may be misaligned.
+std::optional<uint64_t> first_non_finite(std::span<const std::byte> bytes, DType dtype);
 
 } // namespace semrover

@@ -62,19 +62,6 @@ class Listing {
     size_t count_ = 0;
 };
 
-// numbers whose exponent bits are all ones are NaN or infinite
-template <typename Bits>
-std::optional<uint64_t> first_with_exponent(std::span<const std::byte> bytes, Bits mask)
-{
-    for (uint64_t i = 0; i < bytes.size() / sizeof(Bits); ++i) {
-        Bits value;
-        std::memcpy(&value, bytes.data() + i * sizeof(Bits), sizeof(Bits));
-        if ((value & mask) == mask)
-            return i;
-    }
-    return std::nullopt;
-}
-
 } // namespace
 
 Result<Safetensors> Safetensors::open(const Path& path, const SafetensorsLimits& limits)
@@ -141,22 +128,6 @@ Status SafetensorsSet::require(std::span<const TensorSpec> schema, Unexpected un
     if (lists.empty())
         return {};
     return fail(ErrorCode::bad_input, "{}: tensors do not fit the model{}", quote_path(path_), lists);
-}
-
-std::optional<uint64_t> first_non_finite(std::span<const std::byte> bytes, DType dtype)
-{
-    switch (dtype) {
-    case DType::f16:
-        return first_with_exponent<uint16_t>(bytes, 0x7c00);
-    case DType::bf16:
-        return first_with_exponent<uint16_t>(bytes, 0x7f80);
-    case DType::f32:
-        return first_with_exponent<uint32_t>(bytes, 0x7f800000);
-    case DType::f64:
-        return first_with_exponent<uint64_t>(bytes, 0x7ff0000000000000);
-    default:
-        return std::nullopt;
-    }
 }
 
 Status check_finite(const SafetensorsSet& set, const TensorInfo& tensor)

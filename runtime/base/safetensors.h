@@ -95,9 +95,6 @@ std::vector<T> elements(const SafetensorsSet& file, std::string_view name)
     return values;
 }
 
-// index of the first element that is NaN or infinite; none for integers. `bytes` may be misaligned.
-std::optional<uint64_t> first_non_finite(std::span<const std::byte> bytes, DType dtype);
-
 // bad_input for the first tensor with a NaN or infinity, with its index
 Status check_finite(const SafetensorsSet& set);
 Status check_finite(const SafetensorsSet& set, const TensorInfo& tensor);
