@@ -65,20 +65,23 @@ uint scan(uint value)
     return before;
 }
 
-// rank[j]: as rank_in_subgroup() gives it; becomes the number of the row's pairs before it that have its digit
+// rank[j]: as rank_in_subgroup() gives it; becomes the number of the row's pairs before it that have its digit. Subgroups
+// of a row take turns, and meet every subgroupBarrier() together: Mesa 26's lavapipe makes it wait for the workgroup.
 void rank_in_row(uint key[kOwn], inout uint rank[kOwn])
 {
     const uint counters = thread() / row_threads() * 256, turns = row_threads() / lanes();
     for (uint turn = 0; turn < turns; ++turn) {
-        if (gl_SubgroupID % turns == turn) {
-            [[unroll]] for (uint j = 0; j < kOwn; ++j) {
-                const uint counter = counters + digit_of(key[j]), before = scratch[counter];
-                subgroupBarrier();
-                if (rank[j] >> 16 != 0)
-                    scratch[counter] = before + (rank[j] >> 16);
-                subgroupBarrier();
-                rank[j] = before + (rank[j] & 0xffff);
-            }
+        const bool own = gl_SubgroupID % turns == turn;
+        [[unroll]] for (uint j = 0; j < kOwn; ++j) {
+            const uint counter = counters + digit_of(key[j]);
+            uint before = 0;
+            if (own)
+                before = scratch[counter];
+            subgroupBarrier();
+            if (own && rank[j] >> 16 != 0)
+                scratch[counter] = before + (rank[j] >> 16);
+            subgroupBarrier();
+            rank[j] = own ? before + (rank[j] & 0xffff) : rank[j];
         }
         barrier();
     }
