@@ -6,9 +6,7 @@
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
 
-#include <cmath>
 #include <gtest/gtest.h>
-#include <limits>
 
 namespace semrover {
 namespace safetensors_test {
@@ -126,21 +124,6 @@ TEST(CheckedBytes, a_size_is_exact_or_refused)
     EXPECT_FALSE(checked_bytes(std::vector<uint64_t>{3}, 4u));
     EXPECT_FALSE(checked_bytes(std::vector<uint64_t>{kMaxDim, uint64_t(1) << 21}, DType::u8));
     EXPECT_FALSE(checked_bytes(std::vector<uint64_t>(9, 1), DType::u8));
-}
-
-TEST(FirstNonFinite, nan_and_infinity_are_found_in_every_float_type)
-{
-    const float inf = std::numeric_limits<float>::infinity();
-    EXPECT_EQ(first_non_finite(bytes_of(std::vector<float>{1, std::numeric_limits<float>::max(), -inf}), DType::f32),
-              2u);
-    EXPECT_EQ(first_non_finite(bytes_of(std::vector<float>{std::nanf("")}), DType::f32), 0u);
-    EXPECT_EQ(first_non_finite(bytes_of(std::vector<float>{1, -0.f, 1e-45f}), DType::f32), std::nullopt);
-    EXPECT_EQ(first_non_finite(bytes_of(std::vector<double>{1, std::nan("")}), DType::f64), 1u);
-    EXPECT_EQ(first_non_finite(bytes_of(std::vector<uint16_t>{0x7bff, 0xfbff}), DType::f16), std::nullopt);
-    EXPECT_EQ(first_non_finite(bytes_of(std::vector<uint16_t>{0x7bff, 0xfc00}), DType::f16), 1u);
-    EXPECT_EQ(first_non_finite(bytes_of(std::vector<uint16_t>{0x7f7f, 0x7fc0}), DType::bf16), 1u);
-    EXPECT_EQ(first_non_finite(bytes_of(std::vector<uint16_t>{0x7f7f, 0x7c00}), DType::bf16), std::nullopt);
-    EXPECT_EQ(first_non_finite(bytes_of(std::vector<uint32_t>{0xffffffff}), DType::u32), std::nullopt);
 }
 
 } // namespace safetensors_test
