@@ -67,14 +67,16 @@ uint scan(uint value)
 
 // rank[j]: as rank_in_subgroup() gives it; becomes the number of the row's pairs before it that have its digit. Subgroups
 // of a row take turns, and meet every subgroupBarrier() together: Mesa 26's lavapipe makes it wait for the workgroup.
-// Who waits reads behind the counters, where nobody writes.
 void rank_in_row(uint key[kOwn], inout uint rank[kOwn])
 {
     const uint counters = thread() / row_threads() * 256, turns = row_threads() / lanes();
     for (uint turn = 0; turn < turns; ++turn) {
         const bool own = gl_SubgroupID % turns == turn;
         [[unroll]] for (uint j = 0; j < kOwn; ++j) {
-            const uint counter = own ? counters + digit_of(key[j]) : kRows * 256, before = scratch[counter];
+            const uint counter = counters + digit_of(key[j]);
+            uint before = 0;
+            if (own)
+                before = scratch[counter];
             subgroupBarrier();
             if (own && rank[j] >> 16 != 0)
                 scratch[counter] = before + (rank[j] >> 16);
