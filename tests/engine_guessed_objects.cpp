@@ -231,6 +231,23 @@ TEST(engine_guessed_objects, a_building_without_a_street_has_a_box_around_it)
     EXPECT_NEAR(houses[0].center[1], 3, 1e-6);
 }
 
+TEST(engine_guessed_objects, what_is_seen_of_a_thing_is_too_little_to_tell_of_it_below_a_quarter_of_each_size)
+{
+    Scene s;
+    s.fill(kBuilding, {0, 0, 0}, {4, 4, 7});     // a kiosk: 2.4 m between the outer cells' centres, 4.2 m high
+    s.fill(kBuilding, {20, 0, 0}, {25, 0, 0});   // 3 m long
+    s.fill(kBuilding, {40, 0, 20}, {40, 0, 20}); // of a roof
+    s.fill(kCar, {60, 0, 0}, {61, 0, 0});        // 0.6 m long, as thin as a box may be
+    s.fill(kCar, {80, 0, 0}, {80, 1, 0});        // 0.6 m long or across
+    s.fill(kCar, {90, 0, 0}, {92, 0, 0});        // 1.2 m long
+    std::map<uint8_t, std::vector<double>> along;
+    for (const SceneObject& o : guessed(s.grid(), usual(), 1))
+        along[o.label].push_back(o.center[0]);
+    EXPECT_EQ(along[kBuilding].size(), 2u);
+    ASSERT_EQ(along[kCar].size(), 1u);
+    EXPECT_NEAR(along[kCar][0], 91.5 * 0.6, 1e-4);
+}
+
 TEST(engine_guessed_objects, a_table_of_what_is_usual_is_read_and_mistakes_are_named)
 {
     const auto read = [](const char* text) { return parse_usual_objects(*parse_json(text, "t"), "t"); };

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <ranges>
 
 namespace semrover {
 
@@ -20,6 +21,7 @@ constexpr uint8_t kRoad = 0, kSidewalk = 1, kBuilding = 2, kFirstVehicle = 13, k
 constexpr double kLowestHouse = 4;  // metres; what is lower is a kiosk or a shelter
 constexpr double kThinnest = 0.3;   // metres of a box
 constexpr double kUsuallyOne = 1.5; // usual lengths that are still one thing
+constexpr double kFragment = 0.25;  // of usual sizes: of what is less in all three too little is seen to tell of it
 constexpr double kGap = 0.9;        // metres between things of a row
 constexpr double kCutReach = 1;     // metres to either side of an even cut, where a better one is looked for
 constexpr double kElongated = 1.3;  // length over width from which a box is turned
@@ -138,8 +140,17 @@ class Guess {
             for (const Cells& thing : cut(part, heading, 1)) {
                 const double front =
                     label_ >= kFirstVehicle && label_ <= kLastVehicle ? front_of(thing, heading) : heading;
-                add(thing, extents(thing, front), front);
+                const auto e = extents(thing, front);
+                if (!is_fragment(e))
+                    add(thing, e, front);
             }
+    }
+
+    bool is_fragment(const std::array<Extent, 3>& e) const
+    {
+        const std::array<double, 3>& usual = usual_[label_].size;
+        return std::ranges::all_of(std::views::iota(0u, 3u),
+                                   [&](size_t a) { return e[a].length() < kFragment * usual[a]; });
     }
 
     // along which cells are spread most, seen from above; 0 where that is hardly more than across

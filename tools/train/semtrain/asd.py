@@ -107,7 +107,8 @@ class Export:
         unet = {name[5:]: t for name, t in state.items() if name.startswith("unet.")}
         model = Renderer(self.config).eval()
         model.load_state_dict(state)
-        model_folder.write_component(os.path.join(self.folder, "renderer"), model.unet.config_json(), unet)
+        model_folder.write_component(os.path.join(self.folder, "renderer"), model.unet.config_json(), unet,
+                                     self.config["mantissa_bits"])
         os.makedirs(os.path.join(self.folder, "conditioning"), exist_ok=True)
         safetensors_file.write(os.path.join(self.folder, "conditioning", "conditioning.safetensors"),
                                {"encoder_hidden_states": state["text"].half()})

@@ -9,12 +9,26 @@ from . import safetensors_file
 from .json_file import read_json, write_json
 
 
-def write_component(folder, config, state):
+HALF_BITS = 10  # of an fp16 number's mantissa, its leading one not counted
+
+
+def rounded_half(tensor, bits=HALF_BITS):
+    """fp16 with so many bits of mantissa, 1 to 10, ties to even: the fewer, the smaller what git and zip make of it"""
+    half, drop = tensor.to(torch.float16), HALF_BITS - bits
+    if drop == 0:
+        return half
+    code = half.contiguous().view(torch.int16).int()
+    odd = code >> drop & 1
+    code = (code + (1 << drop - 1) - 1 + odd) >> drop << drop
+    return code.short().view(torch.float16)
+
+
+def write_component(folder, config, state, mantissa_bits=HALF_BITS):
     """FOLDER/config.json and the weights in fp16"""
     os.makedirs(folder, exist_ok=True)
     write_json(os.path.join(folder, "config.json"), config)
     safetensors_file.write(os.path.join(folder, "diffusion_pytorch_model.safetensors"),
-                           {name: t.to(torch.float16) for name, t in state.items()}, {"format": "pt"})
+                           {name: rounded_half(t, mantissa_bits) for name, t in state.items()}, {"format": "pt"})
 
 
 def write_scheduler(folder, config):

@@ -102,7 +102,7 @@ def exporter(folder, config, grids):
     def export(state):
         write_component(os.path.join(folder, "model", "voxfield_transformer"),
                         {"_class_name": "VoxfieldTransformer", **config["network"], **told, "prediction_type": "sample"},
-                        state)
+                        state, config["mantissa_bits"])
         write_scheduler(os.path.join(folder, "model", "voxfield_scheduler"), {
             "_class_name": "DDPMScheduler", "num_train_timesteps": config["num_train_timesteps"],
             "beta_start": config["beta_start"], "beta_end": config["beta_end"], "beta_schedule": "linear",

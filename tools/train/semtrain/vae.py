@@ -118,7 +118,8 @@ class Export:
         model.load_state_dict(state)
         if not self.frozen:
             normalize(model, self.drives)
-        model_folder.write_component(os.path.join(self.folder, "vae"), model.config_json(), state)
+        model_folder.write_component(os.path.join(self.folder, "vae"), model.config_json(), state,
+                                     self.config["mantissa_bits"])
         model_folder.add_to_index(self.folder, LIBRARY)
         if self.held:
             value = measure(model, self.held, os.path.join(self.folder, "held_out.png"))

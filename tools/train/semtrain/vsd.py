@@ -103,7 +103,8 @@ class Export:
         model = Renderer(self.config).eval()
         model.load_state_dict(state)
         vae_class = model_folder.read_component(self.vae_folder)[0].get("_class_name", "AutoencoderKL")
-        model_folder.write_component(os.path.join(self.folder, "renderer"), model.unet.config_json(), unet)
+        model_folder.write_component(os.path.join(self.folder, "renderer"), model.unet.config_json(), unet,
+                                     self.config["mantissa_bits"])
         os.makedirs(os.path.join(self.folder, "conditioning"), exist_ok=True)
         safetensors_file.write(os.path.join(self.folder, "conditioning", "conditioning.safetensors"),
                                {"encoder_hidden_states": state["text"].half()})
