@@ -8,7 +8,6 @@ import torch
 from . import safetensors_file
 from .json_file import read_json, write_json
 
-
 HALF_BITS = 10  # of an fp16 number's mantissa, its leading one not counted
 
 
