@@ -79,6 +79,12 @@ TEST(engine_conditions, parts_are_joined_in_the_order_of_the_config_and_what_is_
         told.row(cell, grid.cells[cell], row);
         EXPECT_EQ(row, std::vector<float>(kWidth, 0.f)) << cell;
     }
+    SceneObject street = painted;
+    street.label = grid.labels[1] = 0; // ground has no front
+    const CellConditions ground = *CellConditions::create(config, grid, std::span(&street, 1));
+    ground.row(1, grid.cells[1], row);
+    EXPECT_EQ(std::vector<float>(row.begin(), row.begin() + 4), (std::vector<float>{1, 1, 0, -1}));
+    EXPECT_EQ(std::vector<float>(row.begin() + 4, row.end()), std::vector<float>(60, 0.f));
     config.condition = {ConditionPart::tint};
     const SceneObject plain = car();
     const CellConditions colors = *CellConditions::create(config, grid, std::span(&plain, 1));

@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 #include <map>
 #include <numbers>
+#include <set>
 
 namespace semrover {
 namespace engine_guessed_objects_test {
@@ -122,6 +123,41 @@ TEST(engine_guessed_objects, a_row_of_cars_is_cut_where_they_touch)
         EXPECT_LT(apart(cars[c].heading, 0), 0.05) << "the sidewalk is nearer on the side of -y, the right";
         EXPECT_TRUE(cars[c].tint);
     }
+}
+
+TEST(engine_guessed_objects, ground_has_one_colour_of_each_class_wherever_a_scene_begins)
+{
+    UsualObjects known = usual();
+    known[kRoad] = {{10, 6, 3}, {{0.3, 0.3, 0.3}, {0.4, 0.4, 0.4}, {0.5, 0.5, 0.5}, {0.6, 0.6, 0.6}}};
+    const VoxelGrid grid = street().grid();
+    const auto found = guessed(grid, known, 1);
+    const auto pieces = of_class(found, kRoad);
+    ASSERT_EQ(pieces.size(), 2u); // in squares of 64 cells, left and right of y = 0
+    for (const SceneObject& o : pieces)
+        EXPECT_EQ(o.tint, pieces[0].tint);
+    EXPECT_TRUE(of_class(found, kSidewalk).empty()) << "whose usual colours are not known";
+    const auto owners = *objects_of_cells(grid, found);
+    for (size_t v = 0; v < owners.size(); ++v)
+        if (grid.labels[v] == kRoad) {
+            ASSERT_NE(owners[v], kNoObject);
+            EXPECT_EQ(found[size_t(owners[v])].label, kRoad);
+        }
+    VoxelGrid part = grid; // without its first 20 metres
+    for (size_t v = grid.cells.size(); v-- > 0;)
+        if (grid.cells[v][0] < 33) {
+            part.cells.erase(part.cells.begin() + ptrdiff_t(v));
+            part.labels.erase(part.labels.begin() + ptrdiff_t(v));
+        }
+    const auto again = of_class(guessed(part, known, 1), kRoad);
+    ASSERT_EQ(again.size(), 2u);
+    for (size_t i = 0; i < 2; ++i) {
+        EXPECT_EQ(again[i].center, pieces[i].center);
+        EXPECT_EQ(again[i].tint, pieces[i].tint);
+    }
+    std::set<std::array<double, 3>> drawn;
+    for (uint64_t seed = 0; seed < 20; ++seed)
+        drawn.insert(*of_class(guessed(grid, known, seed), kRoad)[0].tint);
+    EXPECT_EQ(drawn.size(), 4u);
 }
 
 TEST(engine_guessed_objects, a_car_on_the_other_side_looks_the_other_way)

@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <functional>
 #include <gtest/gtest.h>
+#include <map>
 #include <set>
 
 namespace semrover {
@@ -202,7 +203,53 @@ TEST(engine_streets, objects_are_boxes_around_what_was_drawn)
     }
     EXPECT_EQ(count[label::kCar], street.objects.at("car"));
     EXPECT_EQ(count[label::kPerson], street.objects.at("person"));
-    EXPECT_EQ(count[label::kRoad], 0u);
+}
+
+TEST(engine_streets, pieces_of_ground_hold_what_is_paved_alike)
+{
+    for (uint64_t seed : {1u, 3u, 5u, 8u}) {
+        const Street street = make_street({.seed = seed, .length = 90});
+        std::map<std::pair<uint32_t, uint32_t>, double> areas; // by piece and material
+        double all = 0, held = 0;
+        for (size_t f = 0; f < street.mesh.faces.size(); ++f) {
+            const uint8_t l = street.mesh.face_labels[f];
+            const auto corner = [&](size_t c) {
+                const auto& p = street.mesh.positions[street.mesh.faces[f][c]];
+                return Vector3{p[0], p[1], p[2]};
+            };
+            const Vector3 across = cross(corner(1) - corner(0), corner(2) - corner(0));
+            const Vector3 middle = (corner(0) + corner(1) + corner(2)) * (1.0 / 3);
+            const double area = length(across) / 2, facade = street.road.section().facade();
+            if ((l != label::kRoad && l != label::kSidewalk) || across.z < area || std::abs(middle.y) > facade)
+                continue;
+            all += area;
+            const SceneObject* in = nullptr;
+            double deepest = 0;
+            for (const SceneObject& o : street.boxes) {
+                const std::array<double, 3> at = place_in(o, {middle.x, middle.y, middle.z});
+                double depth = INFINITY;
+                for (size_t a = 0; a < 3; ++a)
+                    depth = std::min(depth, o.size[a] / 2 - std::abs(at[a]));
+                if (o.label == l && depth > deepest) {
+                    deepest = depth;
+                    in = &o;
+                }
+            }
+            if (in) {
+                held += area;
+                areas[{in->id, street.mesh.face_materials[f]}] += area;
+            }
+        }
+        std::map<uint32_t, double> most;
+        for (const auto& [of, area] : areas)
+            most[of.first] = std::max(most[of.first], area);
+        double alike = 0;
+        for (const auto& [id, area] : most)
+            alike += area;
+        EXPECT_GT(held, 0.98 * all) << seed;
+        EXPECT_GT(alike, 0.85 * held) << seed; // the rest are gutters, kerbs, setts along the houses and rails
+        EXPECT_GT(most.size(), 40u) << seed;
+    }
 }
 
 TEST(engine_streets, cars_look_along_the_street_and_houses_at_it)

@@ -62,11 +62,6 @@ std::string_view operation_name(Kind kind)
     return kNames[size_t(kind)];
 }
 
-bool is_ground(uint8_t label)
-{
-    return label == 0 || label == 1 || label == 9 || label == 19;
-}
-
 Status check_operation(const EditOperation& o, std::string_view where)
 {
     const bool places = o.kind == Kind::insert, copies = o.kind == Kind::copy || o.kind == Kind::move;

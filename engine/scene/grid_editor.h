@@ -34,9 +34,6 @@ std::string_view operation_name(EditOperation::Kind kind); // erase is called "d
 // usage: something that the operation needs is missing, or does not apply to it; `where` names the operation
 Status check_operation(const EditOperation& operation, std::string_view where);
 
-// road, sidewalk, terrain and road-lane: what things stand on
-bool is_ground(uint8_t label);
-
 // The grid after an edit. `touched` cells have another label, other occupancy, or points of a stamp; `kept` cells are
 // those with points of a stamp. Both are sorted. Changed cells without points have generated = 0 and zeros.
 struct EditedGrid {

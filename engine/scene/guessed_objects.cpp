@@ -4,6 +4,7 @@
 
 #include "engine/scene/cell_objects.h"
 #include "engine/scene/connected_groups.h"
+#include "engine/scene/object_blocks.h"
 #include "engine/scene/street_fronts.h"
 #include "runtime/base/keyed_random.h"
 
@@ -66,6 +67,7 @@ class Guess {
         for (size_t g = 0; g < groups.size(); ++g)
             if (!done[g] && usual_for(groups[g]) && !std::ranges::all_of(groups[g], in_a_house))
                 add_row(groups[g]);
+        add_ground();
         return std::move(objects_);
     }
 
@@ -73,7 +75,7 @@ class Guess {
     bool usual_for(const Cells& group)
     {
         label_ = grid_.labels[group[0]];
-        return usual_[label_].known();
+        return usual_[label_].known() && !is_ground(label_);
     }
     std::array<double, 3> place(uint32_t v, double heading) const // along the heading, across it, up
     {
@@ -223,16 +225,41 @@ class Guess {
         return left > 0 ? heading + (heading > 0 ? -1 : 1) * std::numbers::pi : heading;
     }
 
+    // of a class one colour, in squares of the world's own: wherever a guess begins, it has the same
+    void add_ground()
+    {
+        const int32_t edge = object_block_cells(grid_.voxel_size);
+        std::map<std::pair<uint8_t, TileIndex>, Extent> heights;
+        for (uint32_t v = 0; v < grid_.cells.size(); ++v)
+            if (const uint8_t label = grid_.labels[v]; is_ground(label) && !usual_[label].tints.empty())
+                heights[{label, tile_of(grid_.cells[v], edge)}].add(place(v, 0)[2]);
+        for (const auto& [of, height] : heights) {
+            const auto& [label, square] = of;
+            SceneObject o{.id = uint32_t(objects_.size()), .label = label};
+            o.center = {(square[0] + 0.5) * edge * size_, (square[1] + 0.5) * edge * size_, height.middle()};
+            o.size = {edge * size_, edge * size_, height.length()};
+            o.tint = drawn_tint(label, {seed_, {label}});
+            if (objects_.size() < kMaxObjects)
+                objects_.push_back(o);
+        }
+    }
+
+    std::array<double, 3> drawn_tint(uint8_t label, KeyedRandom random) const
+    {
+        const auto& tints = usual_[label].tints;
+        return tints[random.below(uint32_t(tints.size()))];
+    }
+
     void add(const Cells& cells, const std::array<Extent, 3>& e, double heading)
     {
         SceneObject o{.id = uint32_t(objects_.size()), .label = label_, .heading = heading};
         const double c = std::cos(heading), s = std::sin(heading), u = e[0].middle(), v = e[1].middle();
         o.center = {c * u - s * v, s * u + c * v, e[2].middle()};
         o.size = {e[0].length(), e[1].length(), e[2].length()};
-        if (const auto& tints = usual_[label_].tints; !tints.empty()) {
+        if (!usual_[label_].tints.empty()) {
             const Cell& lowest = grid_.cells[cells[0]];
-            KeyedRandom random(seed_, {label_, uint32_t(lowest[0]), uint32_t(lowest[1]), uint32_t(lowest[2])});
-            o.tint = tints[random.below(uint32_t(tints.size()))];
+            o.tint =
+                drawn_tint(label_, {seed_, {label_, uint32_t(lowest[0]), uint32_t(lowest[1]), uint32_t(lowest[2])}});
         }
         if (objects_.size() < kMaxObjects)
             objects_.push_back(o);

@@ -42,6 +42,12 @@ constexpr std::array<SemanticClass, kClassCount> kPalette = {{
     {"road-lane", {255, 255, 0}},
 }};
 
+// what things stand on
+constexpr bool is_ground(uint8_t label)
+{
+    return label == 0 || label == 1 || label == 9 || label == 19; // road, sidewalk, terrain, road-lane
+}
+
 // 0..1; an unknown label gets the last class's
 inline std::array<float, 3> label_color(uint32_t label)
 {

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/voxfield/cell_conditions.h"
 
+#include "engine/scene/palette.h"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -69,9 +71,9 @@ void CellConditions::row(uint32_t cell, const Cell& index, std::span<float> out)
     size_t at = 0;
     for (ConditionPart part : parts_) {
         const std::span<float> to = out.subspan(at, condition_width(part));
-        if (part == ConditionPart::object)
+        if (part == ConditionPart::object && !is_ground(object.label))
             object_condition(object, center, to);
-        else if (object.tint)
+        else if (part == ConditionPart::tint && object.tint)
             tint_condition(*object.tint, to);
         at += to.size();
     }

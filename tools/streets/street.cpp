@@ -4,6 +4,7 @@
 
 #include "engine/scene/palette.h"
 #include "tools/streets/furnishing.h"
+#include "tools/streets/ground_objects.h"
 #include "tools/streets/plot.h"
 #include "tools/streets/road_surface.h"
 
@@ -20,6 +21,7 @@ Street make_street(const StreetOptions& options)
     add_traffic(site);
     street.gloss = mesh.gloss();
     street.boxes = std::move(mesh.objects());
+    add_ground_objects(street.road, street.boxes);
     street.mesh = std::move(mesh).take();
     return street;
 }

@@ -24,7 +24,7 @@ struct Street {
     Mesh mesh;                             // every face has a label and a textured material
     std::vector<float> gloss;              // of each material, 0..1 (engine/trace)
     std::map<std::string, size_t> objects; // how many of each kind stand in it
-    std::vector<SceneObject> boxes;        // of vehicles, buildings, people, trees, ... without tints
+    std::vector<SceneObject> boxes;        // of vehicles, houses, trees, pieces of ground, ..., without tints
 };
 
 // The same seed gives the same street on every run; a longer one begins like a shorter one, as far as 60 m before the

@@ -150,14 +150,14 @@ class LocalSets:
         if dropped or not parts:
             return np.zeros((len(cells), width_of(parts)), np.float32)
         config = self.config["telling"]
-        has_box, has_tint = told_boxes(random, owners, config), told_tints(random, owners, config)
+        labels = self.grids.labels[cells]
+        has_box, has_tint = told_boxes(random, owners, labels, config), told_tints(random, owners, config)
         local = self.grids.local_tints[cells] / 255
         whole = self.grids.tints[owners] if len(self.grids.tints) else local
         whole = np.where(np.isnan(whole), local, whole)
         if has_tint[owners >= 0].all():
             colors = tokens.reshape(len(tokens), -1, 6)[..., 3:]
-            made, whole, local = repaint(random, config["repaint"], owners, self.grids.labels[cells], whole,
-                                         (colors + 1) / 2, whole, local)
+            made, whole, local = repaint(random, config["repaint"], owners, labels, whole, (colors + 1) / 2, whole, local)
             colors[...] = 2 * made - 1
         tints = drawn_tints(random, owners, local, whole, config)
         return vector_of(parts, centers, drawn_boxes(random, owners, boxes, config), has_box, tints, has_tint)

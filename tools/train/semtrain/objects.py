@@ -9,6 +9,7 @@ from .json_file import read_json
 
 CLASSES = ("road", "sidewalk", "building", "wall", "fence", "pole", "traffic light", "traffic sign", "vegetation",
            "terrain", "sky", "person", "rider", "car", "truck", "bus", "train", "motorcycle", "bicycle", "road-lane")
+GROUND = tuple(CLASSES.index(name) for name in ("road", "sidewalk", "terrain", "road-lane"))  # told colours, no boxes
 BOX_REACH = 1.5   # metres by which boxes are widened: balconies and mirrors stand out of them
 TINT_REACH = 3.0  # metres within which the points of an object make a local tint
 
@@ -91,17 +92,27 @@ def local_tints(centers, owners, colors):
     return tints
 
 
+def largest_ground(boxes, labels, tints):
+    """of each class of ground only the largest object that has a colour: the ground of a street that is not described
+    has one colour, its lanes' rather than that of a cycle lane"""
+    chosen, areas = ~np.isin(labels, GROUND), np.where(np.isnan(tints).any(1), 0, boxes[:, 3] * boxes[:, 4])
+    for label in np.intersect1d(labels, GROUND):
+        of_class = np.flatnonzero(labels == label)
+        chosen[of_class[areas[of_class].argmax()]] = True
+    return boxes[chosen], labels[chosen], tints[chosen]
+
+
 def usual_objects(grids, most=32, fewest=4):
     """Of the objects.json beside each of some .sgrid files: {class: {size: median in metres, tints: at most `most`
     colours, drawn from all}}, for `objects` of a model's defaults (docs/models.md §8). Classes with fewer than `fewest`
     objects are left out."""
     files = sorted({os.path.join(os.path.dirname(g), "objects.json") for g in grids})
-    parts = [read_objects(f) for f in files if os.path.exists(f)]
+    parts = [largest_ground(*read_objects(f)) for f in files if os.path.exists(f)]
     if not parts:
         return {}
     boxes, labels, tints = (np.concatenate(p) for p in zip(*parts))
     random, usual = np.random.default_rng(1), {}
-    for label in np.unique(labels):
+    for label in sorted(np.unique(labels), key=lambda label: (label in GROUND, label)):
         of_class = tints[(labels == label) & ~np.isnan(tints).any(1)]
         if (labels == label).sum() < fewest:
             continue

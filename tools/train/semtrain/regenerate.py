@@ -13,7 +13,7 @@ from .condition import vector_of, width_of
 from .grids import read_tokens
 from .model_folder import read_component
 from .nets.transformer import VoxfieldTransformer
-from .objects import owners_of, read_objects
+from .objects import GROUND, owners_of, read_objects
 from .precision import autocast
 from .transformer import linear_alphas, noised
 
@@ -63,6 +63,7 @@ class Objects:
         about = os.path.join(os.path.dirname(path), "objects.json")
         self.boxes, of_boxes, self.tints = read_objects(about) if os.path.exists(about) else (np.ones((0, 7)), [], [])
         self.centers, self.owners = centers, owners_of(centers, labels, self.boxes, of_boxes)
+        self.has_box = (self.owners >= 0) & ~np.isin(labels, GROUND)
 
     def tell(self, parts):
         """boxes, and colours of whole objects -> f32 [V, W]"""
@@ -70,7 +71,7 @@ class Objects:
             return np.zeros((len(self.centers), width_of(parts)), np.float32)
         has, of_cells = self.owners >= 0, np.maximum(self.owners, 0)
         tints = self.tints[of_cells]
-        return vector_of(parts, self.centers, self.boxes[of_cells], has, tints, has & ~np.isnan(tints).any(1))
+        return vector_of(parts, self.centers, self.boxes[of_cells], self.has_box, tints, has & ~np.isnan(tints).any(1))
 
     def keep_colors(self, made, true):
         """tokens [V, n, 6]: moves the colours that were made so that those of each object have the true mean"""

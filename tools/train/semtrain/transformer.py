@@ -3,6 +3,7 @@
 """Trains the Σ-Voxfield transformer (docs/method.md §2): x0-prediction, L2, sets of neighbouring cells, of which a part
 may be known; labels dropped in one set of ten."""
 import os
+from fnmatch import fnmatchcase
 
 import torch
 
@@ -92,6 +93,12 @@ def with_new_parts(state, model):
     return {**{name: t for name, t in model.state_dict().items() if name.startswith("condition_embed.")}, **state}
 
 
+def train_only(model, patterns):
+    """the parameters whose names match one of these (`*` stands for anything); all where there are none"""
+    for name, p in model.named_parameters():
+        p.requires_grad_(not patterns or any(fnmatchcase(name, pattern) for pattern in patterns))
+
+
 def exporter(folder, config, grids):
     """grids: Grids, which say how points were placed and how objects usually are"""
     placement, defaults = grids.placement, dict(config["defaults"])
@@ -124,6 +131,7 @@ def main():
     torch.manual_seed(config["seed"])
     model = VoxfieldTransformer(**config["network"])
     model.start_at_zero()
+    train_only(model, config["train_only"])
     trainer = Trainer(options.output, model, config, exporter(options.output, config, sets.grids))
     if options.init:
         trainer.start_from(with_new_parts(read_component(options.init)[1], model))

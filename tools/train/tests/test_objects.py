@@ -19,7 +19,7 @@ from semtrain.grids import Grids, LocalSets, read_tokens
 from semtrain.json_file import read_json
 from semtrain.model_folder import write_component, write_scheduler
 from semtrain.nets.transformer import VoxfieldTransformer
-from semtrain.objects import local_tints, owners_of, paint_near, read_objects
+from semtrain.objects import local_tints, owners_of, paint_near, read_objects, usual_objects
 from semtrain.regenerate import Objects as StreetObjects, load_transformer
 from semtrain.repaint import repainted
 
@@ -163,6 +163,37 @@ class Objects(unittest.TestCase):
         np.testing.assert_array_equal(made[..., :3], before[..., :3])
         np.testing.assert_array_equal(made[objects.owners < 0], before[objects.owners < 0])
 
+    def test_of_the_ground_tell_a_colour_and_no_box(self):
+        about = read_json(self.path("objects.json"))
+        about["objects"].append({"id": 7, "class": "road", "center": [4.2, 0, -0.3], "size": [10, 4, 3], "heading": 0,
+                                 "tint": "#a03020"})
+        with open(self.path("objects.json"), "w") as file:
+            json.dump(about, file)
+        grids = Grids([self.path("truth.sgrid")], self.path("cache"))
+        _, labels, _, _, conditions = LocalSets(grids, config_of()).batch(2)
+        road = labels == 0
+        self.assertTrue(road.any() and (labels == 13).any())
+        self.assertTrue((conditions[..., 0] == ~road).all())
+        self.assertTrue((conditions[road][:, :60] == 0).all())
+        self.assertTrue(np.allclose(conditions[road][:, 60:], [1, *(2 * np.array([160, 48, 32]) / 255 - 1)], atol=1e-6))
+        cells = np.array(grids.cells)
+        told = StreetObjects(self.path("truth.sgrid"), (cells + 0.5) * 0.6, grids.labels).tell(BOTH["condition"])
+        self.assertTrue((told[grids.labels == 0] == conditions[road][0]).all())
+
+    def test_of_the_ground_are_usual_as_the_largest_of_a_street_is(self):
+        paths = []
+        for street in range(4):
+            os.makedirs(self.path(str(street)))
+            paths.append(self.path(f"{street}/truth.sgrid"))
+            parts = [("road", 2, "#903020"), ("road", 6, f"#60606{street}"), ("road", 7, None), ("car", 2, "#ffffff")]
+            objects = [{"id": i, "class": name, "center": [0, 0, 0], "size": [10, width, 3], "heading": 0,
+                        **({"tint": tint} if tint else {})} for i, (name, width, tint) in enumerate(parts)]
+            with open(self.path(f"{street}/objects.json"), "w") as file:
+                json.dump({"format": "semrover.objects", "version": 1, "objects": objects}, file)
+        usual = usual_objects(paths)
+        self.assertEqual(sorted(usual["road"]["tints"]), [f"#60606{street}" for street in range(4)])
+        self.assertEqual(usual["car"]["tints"], ["#ffffff"] * 4)
+
     def test_are_left_out_each_for_itself_and_with_the_labels(self):
         counts = np.zeros((2, 2), int)
         sets = self.sets(telling={**TELL_ALL, "dropout": 0.5}, label_dropout=0.2, batch=64)
@@ -178,7 +209,8 @@ class Objects(unittest.TestCase):
         owners, shares = np.repeat(np.arange(-1, 9), 30), {told_boxes: [], told_tints: []}
         for seed in range(200):
             for tell, seen in shares.items():
-                told = tell(np.random.default_rng(seed), owners, {"dropout": 0.25, "partial": 0.5})
+                labels = (np.full(len(owners), 13),) if tell is told_boxes else ()
+                told = tell(np.random.default_rng(seed), owners, *labels, {"dropout": 0.25, "partial": 0.5})
                 self.assertFalse(told[owners < 0].any())
                 seen.append(told[owners >= 0].mean())
                 if tell is told_boxes:

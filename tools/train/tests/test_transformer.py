@@ -189,6 +189,18 @@ class TheRecipe(unittest.TestCase):
         for name, tensor in whole.items():
             self.assertTrue(torch.equal(tensor, parts[name]), name)
 
+    def test_leaves_all_but_a_part_as_it_was(self):
+        whole = train(self.grid, self.path("whole"), 2)
+        folder = self.path("whole/model/voxfield_transformer")
+        part = train(self.grid, self.path("part"), 3, "--init", folder, "--set", 'train_only=["proj_*", "time_embed.*.bias"]')
+        before = safetensors_file.read(os.path.join(folder, "diffusion_pytorch_model.safetensors"))
+        after = safetensors_file.read(self.path("part/model/voxfield_transformer/diffusion_pytorch_model.safetensors"))
+        self.assertEqual(sorted(before), sorted(after))
+        for name, tensor in before.items():
+            trained = name.startswith("proj_") or (name.startswith("time_embed.") and name.endswith(".bias"))
+            self.assertEqual(torch.equal(tensor, after[name]), not trained, name)
+        self.assertLess(len(part), len(whole))  # no moments of what stands still
+
     def test_says_in_the_model_how_the_points_of_the_data_lay(self):
         def exported(folder, *grids):
             train(self.path(grids[0]), self.path(folder), 1, "--grids", *(self.path(g) for g in grids))

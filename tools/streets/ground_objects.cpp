@@ -1,0 +1,109 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/streets/ground_objects.h"
+
+#include "tools/streets/class_label.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace semrover {
+
+namespace {
+
+constexpr double kPiece = 10; // metres, about
+constexpr double kHigh = 3;   // of a box, with the surface in its middle: more than the street rises along a piece
+
+class Pieces {
+  public:
+    Pieces(const RoadNetwork& road, std::vector<SceneObject>& objects)
+        : road_(road), c_(road.section()), objects_(objects)
+    {
+    }
+
+    void add()
+    {
+        const std::vector<double> cuts = cuts_along();
+        for (size_t i = 0; i + 1 < cuts.size(); ++i)
+            across(cuts[i], cuts[i + 1]);
+        for (const Junction& j : road_.junctions())
+            for (int side : {1, -1})
+                if (j.opens(side))
+                    side_street(j, side);
+    }
+
+  private:
+    // where junctions begin and end, and evenly between
+    std::vector<double> cuts_along() const
+    {
+        std::vector<double> ends{0, road_.length()}, cuts{0};
+        for (const Junction& j : road_.junctions())
+            ends.insert(ends.end(), {j.first(), j.middle - j.half, j.middle + j.half, j.last()});
+        std::ranges::sort(ends);
+        for (size_t i = 0; i + 1 < ends.size(); ++i) {
+            const double length = ends[i + 1] - ends[i];
+            const int count = std::max(1, int(std::lround(length / kPiece)));
+            for (int n = 1; n <= count; ++n)
+                cuts.push_back(ends[i] + length * n / count);
+        }
+        return cuts;
+    }
+
+    void across(double s0, double s1)
+    {
+        const double s = (s0 + s1) / 2, bays = c_.lane + c_.cycle;
+        double asphalt[] = {c_.lane, c_.lane}; // to the left and to the right
+        for (int side : {1, -1}) {
+            const auto strip = [&](uint8_t label, double from, double to) {
+                if (to - from > 0)
+                    add(label, s0, s1, side * from, side * to);
+            };
+            const Junction* j = road_.junction_at(s);
+            if (j && j->opens(side)) {
+                asphalt[side < 0] = c_.kerb();
+            } else {
+                strip(label::kRoad, c_.lane, bays);
+                strip(label::kRoad, bays, c_.kerb());
+                strip(label::kSidewalk, c_.kerb(), c_.facade());
+            }
+        }
+        add(label::kRoad, s0, s1, -asphalt[1], asphalt[0]);
+    }
+
+    void side_street(const Junction& j, int side)
+    {
+        const double from = c_.kerb(), to = c_.facade() + RoadNetwork::kSideReach;
+        const int count = int(std::lround((to - from) / kPiece));
+        for (int n = 0; n < count; ++n) {
+            const double d0 = from + (to - from) * n / count, d1 = from + (to - from) * (n + 1) / count;
+            add(label::kRoad, j.middle - j.half, j.middle + j.half, side * d0, side * d1);
+            add(label::kSidewalk, j.first(), j.middle - j.half, side * d0, side * d1);
+            add(label::kSidewalk, j.middle + j.half, j.last(), side * d0, side * d1);
+        }
+    }
+
+    // between s0 and s1 along the street, d0 and d1 to the left of it
+    void add(uint8_t label, double s0, double s1, double d0, double d1)
+    {
+        const double s = (s0 + s1) / 2;
+        const Vector3 middle = road_.at(s, (d0 + d1) / 2);
+        objects_.push_back({.id = uint32_t(objects_.size()),
+                            .label = label,
+                            .center = {middle.x, middle.y, middle.z},
+                            .size = {s1 - s0, std::abs(d1 - d0), kHigh},
+                            .heading = road_.heading(s)});
+    }
+
+    const RoadNetwork& road_;
+    const CrossSection& c_;
+    std::vector<SceneObject>& objects_;
+};
+
+} // namespace
+
+void add_ground_objects(const RoadNetwork& road, std::vector<SceneObject>& objects)
+{
+    Pieces(road, objects).add();
+}
+
+} // namespace semrover
