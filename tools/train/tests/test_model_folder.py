@@ -7,7 +7,7 @@ import unittest
 import numpy as np
 import torch
 
-from semtrain import model_folder
+from semtrain import model_folder, settings
 
 
 def nearest(values, bits):
@@ -35,6 +35,12 @@ class AWeightOfAModel(unittest.TestCase):
         for name, tensor in weights.items():
             np.testing.assert_array_equal(got[name].double().numpy(),
                                           nearest(tensor.half().double().numpy(), 6), name)
+
+    def test_of_bits_that_there_are_not_is_refused_before_anything_is_trained(self):
+        for bits in ("0", "11", "6.5", "many"):
+            words = ["-o", "unused", "--config", "small", "--set", f"mantissa_bits={bits}"]
+            with self.assertRaisesRegex(SystemExit, "mantissa_bits: expected a whole number from 1 to 10, found"):
+                settings.resolve("transformer", settings.parser("transformer", "").parse_args(words))
 
 
 if __name__ == "__main__":
