@@ -11,8 +11,9 @@ namespace semrover {
 
 namespace {
 
-constexpr double kPiece = 10; // metres, about
-constexpr double kHigh = 3;   // of a box, with the surface in its middle: more than the street rises along a piece
+constexpr double kPiece = 10;     // metres, about
+constexpr double kShortest = 0.1; // metres between two ends that make a piece
+constexpr double kHigh = 3;       // of a box, with the surface in its middle: more than the street rises along a piece
 
 class Pieces {
   public:
@@ -42,6 +43,8 @@ class Pieces {
         std::ranges::sort(ends);
         for (size_t i = 0; i + 1 < ends.size(); ++i) {
             const double length = ends[i + 1] - ends[i];
+            if (length < kShortest)
+                continue;
             const int count = std::max(1, int(std::lround(length / kPiece)));
             for (int n = 1; n <= count; ++n)
                 cuts.push_back(ends[i] + length * n / count);

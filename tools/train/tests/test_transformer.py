@@ -200,6 +200,8 @@ class TheRecipe(unittest.TestCase):
             trained = name.startswith("proj_") or (name.startswith("time_embed.") and name.endswith(".bias"))
             self.assertEqual(torch.equal(tensor, after[name]), not trained, name)
         self.assertLess(len(part), len(whole))  # no moments of what stands still
+        with self.assertRaisesRegex(AssertionError, "train_only: no parameter is called proj;"):
+            train(self.grid, self.path("none"), 1, "--set", 'train_only=["proj"]')
 
     def test_says_in_the_model_how_the_points_of_the_data_lay(self):
         def exported(folder, *grids):
