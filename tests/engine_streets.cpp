@@ -205,6 +205,24 @@ TEST(engine_streets, objects_are_boxes_around_what_was_drawn)
     EXPECT_EQ(count[label::kPerson], street.objects.at("person"));
 }
 
+// the box of a class in which a point lies deepest; null: in none
+const SceneObject* deepest_box(std::span<const SceneObject> boxes, uint8_t label, const std::array<double, 3>& point)
+{
+    const SceneObject* in = nullptr;
+    double deepest = 0;
+    for (const SceneObject& o : boxes) {
+        const std::array<double, 3> at = place_in(o, point);
+        double depth = INFINITY;
+        for (size_t a = 0; a < 3; ++a)
+            depth = std::min(depth, o.size[a] / 2 - std::abs(at[a]));
+        if (o.label == label && depth > deepest) {
+            deepest = depth;
+            in = &o;
+        }
+    }
+    return in;
+}
+
 TEST(engine_streets, pieces_of_ground_hold_what_is_paved_alike)
 {
     for (uint64_t seed : {1u, 3u, 5u, 8u}) {
@@ -223,19 +241,7 @@ TEST(engine_streets, pieces_of_ground_hold_what_is_paved_alike)
             if ((l != label::kRoad && l != label::kSidewalk) || across.z < area || std::abs(middle.y) > facade)
                 continue;
             all += area;
-            const SceneObject* in = nullptr;
-            double deepest = 0;
-            for (const SceneObject& o : street.boxes) {
-                const std::array<double, 3> at = place_in(o, {middle.x, middle.y, middle.z});
-                double depth = INFINITY;
-                for (size_t a = 0; a < 3; ++a)
-                    depth = std::min(depth, o.size[a] / 2 - std::abs(at[a]));
-                if (o.label == l && depth > deepest) {
-                    deepest = depth;
-                    in = &o;
-                }
-            }
-            if (in) {
+            if (const SceneObject* in = deepest_box(street.boxes, l, {middle.x, middle.y, middle.z})) {
                 held += area;
                 areas[{in->id, street.mesh.face_materials[f]}] += area;
             }

@@ -232,15 +232,14 @@ class Guess {
         std::map<std::pair<uint8_t, TileIndex>, Extent> heights;
         for (uint32_t v = 0; v < grid_.cells.size(); ++v)
             if (const uint8_t label = grid_.labels[v]; is_ground(label) && !usual_[label].tints.empty())
-                heights[{label, tile_of(grid_.cells[v], edge)}].add(place(v, 0)[2]);
+                heights[{label, tile_of(grid_.cells[v], edge)}].add((grid_.cells[v][2] + 0.5) * size_);
         for (const auto& [of, height] : heights) {
             const auto& [label, square] = of;
-            SceneObject o{.id = uint32_t(objects_.size()), .label = label};
+            SceneObject o{.label = label};
             o.center = {(square[0] + 0.5) * edge * size_, (square[1] + 0.5) * edge * size_, height.middle()};
             o.size = {edge * size_, edge * size_, height.length()};
             o.tint = drawn_tint(label, {seed_, {label}});
-            if (objects_.size() < kMaxObjects)
-                objects_.push_back(o);
+            keep(o);
         }
     }
 
@@ -252,7 +251,7 @@ class Guess {
 
     void add(const Cells& cells, const std::array<Extent, 3>& e, double heading)
     {
-        SceneObject o{.id = uint32_t(objects_.size()), .label = label_, .heading = heading};
+        SceneObject o{.label = label_, .heading = heading};
         const double c = std::cos(heading), s = std::sin(heading), u = e[0].middle(), v = e[1].middle();
         o.center = {c * u - s * v, s * u + c * v, e[2].middle()};
         o.size = {e[0].length(), e[1].length(), e[2].length()};
@@ -261,6 +260,12 @@ class Guess {
             o.tint =
                 drawn_tint(label_, {seed_, {label_, uint32_t(lowest[0]), uint32_t(lowest[1]), uint32_t(lowest[2])}});
         }
+        keep(o);
+    }
+
+    void keep(SceneObject o)
+    {
+        o.id = uint32_t(objects_.size());
         if (objects_.size() < kMaxObjects)
             objects_.push_back(o);
     }

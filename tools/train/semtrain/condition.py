@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from .objects import GROUND, place_in
+from .objects import has_box, place_in
 
 WIDTHS = {"object": 60, "tint": 4}
 WAVES = (1.0, 2.0, 4.0, 8.0)  # metres
@@ -61,10 +61,10 @@ def share_told(random, config):
 
 
 def told_boxes(random, owners, labels, config):
-    """which cells are told the box of their object -> bool [N]; an object is told as a whole, the ground has no boxes"""
+    """which cells are told the box of their object -> bool [N]; an object is told as a whole"""
     _, of_cells = np.unique(owners, return_inverse=True)
     share = share_told(random, config)
-    return (owners >= 0) & ~np.isin(labels, GROUND) & (random.random(of_cells.max() + 1) < share)[of_cells]
+    return has_box(owners, labels) & (random.random(of_cells.max() + 1) < share)[of_cells]
 
 
 def told_tints(random, owners, config):

@@ -157,7 +157,8 @@ class LocalSets:
         whole = np.where(np.isnan(whole), local, whole)
         if has_tint[owners >= 0].all():
             colors = tokens.reshape(len(tokens), -1, 6)[..., 3:]
-            made, whole, local = repaint(random, config["repaint"], owners, labels, whole, (colors + 1) / 2, whole, local)
+            made, whole, local = repaint(random, config["repaint"], owners, labels, whole,
+                                         (colors + 1) / 2, whole, local)
             colors[...] = 2 * made - 1
         tints = drawn_tints(random, owners, local, whole, config)
         return vector_of(parts, centers, drawn_boxes(random, owners, boxes, config), has_box, tints, has_tint)

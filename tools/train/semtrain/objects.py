@@ -54,6 +54,11 @@ def owners_of(centers, labels, boxes, box_labels):
     return owners
 
 
+def has_box(owners, labels):
+    """which cells can be told the box of their object -> bool [N]: the ground has none"""
+    return (owners >= 0) & ~np.isin(labels, GROUND)
+
+
 LUMA = np.array([2126, 7152, 722])  # of Rec. 709, times 10,000
 
 
@@ -112,6 +117,7 @@ def usual_objects(grids, most=32, fewest=4):
         return {}
     boxes, labels, tints = (np.concatenate(p) for p in zip(*parts))
     random, usual = np.random.default_rng(1), {}
+    # the ground last: what is drawn for the others does not depend on whether a street has any
     for label in sorted(np.unique(labels), key=lambda label: (label in GROUND, label)):
         of_class = tints[(labels == label) & ~np.isnan(tints).any(1)]
         if (labels == label).sum() < fewest:

@@ -13,7 +13,7 @@ from .condition import vector_of, width_of
 from .grids import read_tokens
 from .model_folder import read_component
 from .nets.transformer import VoxfieldTransformer
-from .objects import GROUND, owners_of, read_objects
+from .objects import has_box, owners_of, read_objects
 from .precision import autocast
 from .transformer import linear_alphas, noised
 
@@ -63,7 +63,7 @@ class Objects:
         about = os.path.join(os.path.dirname(path), "objects.json")
         self.boxes, of_boxes, self.tints = read_objects(about) if os.path.exists(about) else (np.ones((0, 7)), [], [])
         self.centers, self.owners = centers, owners_of(centers, labels, self.boxes, of_boxes)
-        self.has_box = (self.owners >= 0) & ~np.isin(labels, GROUND)
+        self.has_box = has_box(self.owners, labels)
 
     def tell(self, parts):
         """boxes, and colours of whole objects -> f32 [V, W]"""

@@ -8,8 +8,8 @@ import numpy as np
 
 from .objects import CLASSES, LUMA
 
-PAINTED = [CLASSES.index(name) for name in ("road", "sidewalk", "building", "wall", "fence", "car", "truck", "bus", "train",
-                                             "motorcycle")]
+PAINTED = [CLASSES.index(name) for name in
+           ("road", "sidewalk", "building", "wall", "fence", "car", "truck", "bus", "train", "motorcycle")]
 DARK, LIGHT = 0.45, 0.7  # of the paint's luma: below the one nothing changes, above the other everything
 
 

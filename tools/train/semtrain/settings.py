@@ -38,7 +38,8 @@ def resolve(recipe, options):
             config[key] = json.loads(text)
         except json.JSONDecodeError:
             config[key] = text
-    if config["mantissa_bits"] not in range(1, HALF_BITS + 1):
-        raise SystemExit(f"mantissa_bits: expected a whole number from 1 to {HALF_BITS}, found {config['mantissa_bits']}")
+    bits = config["mantissa_bits"]
+    if not isinstance(bits, int) or bits not in range(1, HALF_BITS + 1):
+        raise SystemExit(f"mantissa_bits: expected a whole number from 1 to {HALF_BITS}, found {bits}")
     torch.set_num_threads(options.threads or os.cpu_count())
     return config

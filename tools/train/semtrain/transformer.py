@@ -95,11 +95,12 @@ def with_new_parts(state, model):
 
 def train_only(model, patterns):
     """the parameters whose names match one of these (`*` stands for anything); all where there are none"""
-    names = [name for name, _ in model.named_parameters()]
+    parameters = dict(model.named_parameters())
     for pattern in patterns:
-        if not any(fnmatchcase(name, pattern) for name in names):
-            raise SystemExit(f"train_only: no parameter is called {pattern}; there are {', '.join(names[:3])}, ...")
-    for name, p in model.named_parameters():
+        if not any(fnmatchcase(name, pattern) for name in parameters):
+            some = ", ".join([*parameters][:3])
+            raise SystemExit(f"train_only: no parameter is called {pattern}; there are {some}, ...")
+    for name, p in parameters.items():
         p.requires_grad_(not patterns or any(fnmatchcase(name, pattern) for pattern in patterns))
 
 

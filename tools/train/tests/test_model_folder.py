@@ -37,7 +37,7 @@ class AWeightOfAModel(unittest.TestCase):
                                           nearest(tensor.half().double().numpy(), 6), name)
 
     def test_of_bits_that_there_are_not_is_refused_before_anything_is_trained(self):
-        for bits in ("0", "11", "6.5", "many"):
+        for bits in ("0", "11", "6.0", "6.5", "many"):
             words = ["-o", "unused", "--config", "small", "--set", f"mantissa_bits={bits}"]
             with self.assertRaisesRegex(SystemExit, "mantissa_bits: expected a whole number from 1 to 10, found"):
                 settings.resolve("transformer", settings.parser("transformer", "").parse_args(words))

@@ -192,7 +192,8 @@ class TheRecipe(unittest.TestCase):
     def test_leaves_all_but_a_part_as_it_was(self):
         whole = train(self.grid, self.path("whole"), 2)
         folder = self.path("whole/model/voxfield_transformer")
-        part = train(self.grid, self.path("part"), 3, "--init", folder, "--set", 'train_only=["proj_*", "time_embed.*.bias"]')
+        part = train(self.grid, self.path("part"), 3, "--init", folder,
+                     "--set", 'train_only=["proj_*", "time_embed.*.bias"]')
         before = safetensors_file.read(os.path.join(folder, "diffusion_pytorch_model.safetensors"))
         after = safetensors_file.read(self.path("part/model/voxfield_transformer/diffusion_pytorch_model.safetensors"))
         self.assertEqual(sorted(before), sorted(after))
