@@ -94,13 +94,51 @@ TEST(engine_conditions, parts_are_joined_in_the_order_of_the_config_and_what_is_
     EXPECT_TRUE(CellConditions::create(config, grid, {})->empty());
 }
 
+TEST(engine_conditions, a_cell_is_told_the_part_it_lies_in_beside_its_object)
+{
+    VoxelGrid grid;
+    grid.voxel_size = 0.6f;
+    grid.cells = {{0, 0, 0}, {1, 0, 0}, {4, 0, 0}};
+    grid.labels = {2, 2, 2};
+    const SceneObject house{.id = 0, .label = 2, .center = {1, 5, 4}, .size = {10, 8, 8}, .tint = {{0.5, 0.5, 1}}};
+    SceneObject window{.id = 1, .label = 2, .center = {0.2, 0.3, 0.3}, .size = {1, 0.6, 1}, .heading = 0.5};
+    window.part = true;
+    SceneObject lit = window;
+    lit.center[0] = 1.2;
+    lit.tint = {1, 1, 0};
+    const std::vector<SceneObject> objects = {house, window, lit};
+    TransformerConfig config;
+    config.condition = {ConditionPart::tint, ConditionPart::part};
+    const CellConditions told = *CellConditions::create(config, grid, objects);
+    ASSERT_EQ(told.width(), 4u + 64u);
+    for (uint32_t cell : {0u, 1u, 2u}) {
+        std::vector<float> row(told.width(), 9), expected(60, 0.f);
+        told.row(cell, grid.cells[cell], row);
+        EXPECT_EQ(std::vector<float>(row.begin(), row.begin() + 4), (std::vector<float>{1, 0, 0, 1})) << "the house's";
+        if (cell < 2)
+            object_condition(cell ? lit : window,
+                             {(grid.cells[cell][0] + 0.5) * double(grid.voxel_size), 0.5 * double(grid.voxel_size),
+                              0.5 * double(grid.voxel_size)},
+                             expected);
+        EXPECT_EQ(std::vector<float>(row.begin() + 4, row.begin() + 64), expected) << cell;
+        const std::vector<float> tint = cell == 1 ? std::vector<float>{1, 1, 1, -1} : std::vector<float>(4, 0.f);
+        EXPECT_EQ(std::vector<float>(row.begin() + 64, row.end()), tint) << cell;
+    }
+    config.condition = {ConditionPart::tint};
+    std::vector<float> row(4, 9);
+    CellConditions::create(config, grid, objects)->row(0, grid.cells[0], row);
+    EXPECT_EQ(row, (std::vector<float>{1, 0, 0, 1})) << "a model that hears of no parts is told of the rest as ever";
+}
+
 TEST(engine_conditions, a_config_names_each_part_once)
 {
     const auto config = [](const char* list) { return parse_transformer_config(Json{{"condition", json_of(list)}}); };
     EXPECT_EQ(config(R"(["tint", "object"])")->condition_width(), kWidth);
     EXPECT_EQ(config("[]")->condition_width(), 0u);
     EXPECT_EQ(config("null")->condition_width(), 0u);
+    EXPECT_EQ(config(R"(["object", "tint", "part"])")->condition_width(), 128u);
     EXPECT_TRUE(says(config(R"(["tint", "tint"])"), "condition"));
+    EXPECT_TRUE(says(config(R"(["object", "part", "part"])"), "condition"));
     EXPECT_TRUE(says(config(R"(["colour"])"), "condition"));
     EXPECT_TRUE(says(config(R"("tint")"), "condition"));
     const Json unheard = {{"condition_voxels", true}};

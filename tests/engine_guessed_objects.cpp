@@ -184,6 +184,38 @@ TEST(engine_guessed_objects, houses_are_cut_where_their_height_steps_and_look_at
     EXPECT_NEAR(houses[1].size[2] - houses[0].size[2], 6, 0.01);
 }
 
+TEST(engine_guessed_objects, houses_have_rows_of_the_parts_that_are_usual_where_their_wall_is)
+{
+    UsualObjects known = usual();
+    known[kBuilding].parts = UsualParts{{0.9, 1.2, 1.6}, {2.6, 3.1}, 1, {{0.1, 0.1, 0.1}, {0.9, 0.9, 0.9}}};
+    Scene s = street();
+    s.fill(kSidewalk, {40, 10, 2}, {44, 10, 19}); // a hole in the wall
+    const VoxelGrid grid = s.grid();
+    const auto found = guessed(grid, known, 1), without = guessed(grid, usual(), 1);
+    ASSERT_GT(found.size(), without.size() + 40);
+    for (size_t o = 0; o < found.size(); ++o)
+        EXPECT_EQ(found[o].part, o >= without.size()) << "parts come last";
+    const std::vector<int32_t> owners = *objects_of_cells(grid, found);
+    EXPECT_EQ(owners, *objects_of_cells(grid, without));
+    std::map<double, std::map<double, double>> rows; // height -> across -> width
+    for (const SceneObject& part : std::span(found).subspan(without.size())) {
+        EXPECT_LT(apart(part.heading, -kPi / 2), 0.1);
+        EXPECT_NEAR(part.center[1], 6.3, 0.3);
+        EXPECT_EQ(part.id, uint32_t(&part - found.data()));
+        EXPECT_TRUE(part.tint == known[kBuilding].parts->tints[0] || part.tint == known[kBuilding].parts->tints[1]);
+        EXPECT_NEAR(part.size[1], 1.2, 1.2 * 0.15 + 1e-9);
+        EXPECT_NEAR(part.size[2], 1.6, 1.6 * 0.15 + 1e-9);
+        EXPECT_FALSE(part.center[0] > 24.6 && part.center[0] < 26.4 && part.center[2] > 2 && part.center[2] < 11);
+        rows[part.center[2]][part.center[0]] = part.size[1];
+    }
+    EXPECT_GT(rows.size(), 8u);
+    for (const auto& [height, row] : rows)
+        for (auto a = row.begin(), b = std::next(a); b != row.end(); ++a, ++b)
+            EXPECT_GT(b->first - a->first, (a->second + b->second) / 2 + 0.5) << "wall between two of a row";
+    EXPECT_EQ(guessed(grid, known, 1).back().center, found.back().center);
+    EXPECT_NE(guessed(grid, known, 2).back().center, found.back().center);
+}
+
 TEST(engine_guessed_objects, every_cell_of_a_wall_belongs_to_the_house_around_it)
 {
     const VoxelGrid grid = street().grid();
@@ -292,6 +324,18 @@ TEST(engine_guessed_objects, a_table_of_what_is_usual_is_read_and_mistakes_are_n
     EXPECT_EQ((*table)[kCar].size[0], 4.6);
     EXPECT_EQ((*table)[kCar].tints[1], (std::array<double, 3>{0, 0, 1}));
     EXPECT_FALSE((*table)[kBuilding].known());
+    const auto house = [&](const std::string& parts) {
+        return read((R"({"building": {"size": [9, 9, 9], "parts": )" + parts + "}}").c_str());
+    };
+    const auto windows = house(R"({"size": [1, 1.2, 1.6], "pitch": [2.6, 3.1], "low": 0, "tints": ["#ff0000"]})");
+    ASSERT_TRUE(windows) << windows.error().message;
+    EXPECT_EQ((*windows)[kBuilding].parts->pitch[1], 3.1);
+    EXPECT_EQ((*windows)[kBuilding].parts->tints.size(), 1u);
+    EXPECT_FALSE((*table)[kCar].parts);
+    EXPECT_TRUE(says(house("[]"), "building: parts: expected an object"));
+    EXPECT_TRUE(says(house(R"({"size": [1, 1, 1], "low": 0})"), "parts: pitch"));
+    EXPECT_TRUE(says(house(R"({"size": [1, 1, 1], "pitch": [1, 1], "low": -1})"), "low: expected metres from 0"));
+    EXPECT_TRUE(says(house(R"({"size": [1, 1, 1], "pitch": [1, 1], "low": 1, "high": 2})"), "high"));
     EXPECT_TRUE(says(read(R"([])"), "expected an object"));
     EXPECT_TRUE(says(read(R"({"cat": {"size": [1, 1, 1]}})"), "no class 'cat'"));
     EXPECT_TRUE(says(read(R"({"car": {"size": [1, 1]}})"), "car: size: expected 3 numbers"));

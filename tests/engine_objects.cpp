@@ -34,6 +34,7 @@ TEST(engine_objects, what_is_written_is_read_and_written_again_with_the_same_byt
     const ScratchFolder folder;
     std::vector<SceneObject> objects = {car(7, 1.25, -3.5, 0.75), car(2, -100000, 0, -3.14159)};
     objects[0].tint = {0.5, 0.25, 1};
+    objects[1].part = true;
     ASSERT_TRUE(write_objects(folder / "a.json", objects));
     const auto read = read_objects(folder / "a.json");
     ASSERT_TRUE(read) << read.error().message;
@@ -45,6 +46,8 @@ TEST(engine_objects, what_is_written_is_read_and_written_again_with_the_same_byt
     EXPECT_EQ((*read)[0].heading, 0.75);
     EXPECT_EQ((*read)[0].tint, objects[0].tint);
     EXPECT_FALSE((*read)[1].tint);
+    EXPECT_FALSE((*read)[0].part);
+    EXPECT_TRUE((*read)[1].part);
     ASSERT_TRUE(write_objects(folder / "b.json", *read));
     EXPECT_EQ(contents(folder / "a.json"), contents(folder / "b.json"));
     ASSERT_TRUE(write_objects(folder / "none.json", {}));
@@ -66,6 +69,8 @@ TEST(engine_objects, what_is_no_object_is_refused_with_its_number)
     EXPECT_TRUE(says(parse(kOne + "}," + kOne + "}"), "o: object 2: id 3 is given twice"));
     EXPECT_TRUE(says(parse("7"), "object 1: expected an object, found number"));
     EXPECT_TRUE(says(parse(kOne + R"(, "colour": 1})"), "unknown key 'colour'"));
+    EXPECT_TRUE(says(parse(kOne + R"(, "part": 1})"), "part: expected true or false, found 1"));
+    EXPECT_FALSE((*parse(kOne + R"(, "part": false})"))[0].part);
     EXPECT_TRUE(says(parse(kOne + R"(, "tint": [0, 0, 1.5]})"), "tint: expected a number from 0 to 1, found 1.5"));
     for (const char* tint : {"\"#12345\"", "\"#12345g\"", "\"red\"", "\"#+12345\""})
         EXPECT_TRUE(says(parse(kOne + ", \"tint\": " + tint + "}"), "tint: expected #rrggbb")) << tint;
@@ -218,6 +223,45 @@ TEST(engine_objects, a_tint_is_the_median_of_the_lighter_two_fifths_of_the_objec
     objects[0].tint.reset();
     ASSERT_TRUE(tint_objects(objects, grid));
     EXPECT_FALSE(objects[0].tint);
+}
+
+TEST(engine_objects, a_part_owns_no_cells_and_is_that_of_those_up_to_60_cm_from_it)
+{
+    const VoxelGrid grid = slab();
+    SceneObject window{.id = 1, .label = kCar, .center = {0.9, 0.3, 0.3}, .size = {1, 1, 0.6}, .heading = 0.3};
+    window.part = true;
+    const std::vector<SceneObject> objects = {window, car(0, 0, 0, 0)};
+    EXPECT_EQ(*objects_of_cells(grid, objects), [&] {
+        std::vector<int32_t> alone = *objects_of_cells(grid, std::span(objects).subspan(1));
+        std::ranges::for_each(alone, [](int32_t& owner) { owner += owner != kNoObject; });
+        return alone;
+    }());
+    const std::vector<int32_t> parts = *parts_of_cells(grid, objects);
+    for (size_t v = 0; v < grid.cells.size(); ++v) {
+        const auto at = cell_center(grid.cells[v], grid.voxel_size);
+        const auto p = place_in(window, {double(at[0]), double(at[1]), double(at[2])});
+        const double depth = std::min({0.5 - std::abs(p[0]), 0.5 - std::abs(p[1]), 0.3 - std::abs(p[2])});
+        ASSERT_EQ(parts[v], grid.labels[v] == kCar && depth > -0.6 ? 0 : kNoObject) << v;
+    }
+    EXPECT_GT(std::ranges::count(parts, 0), 8);
+}
+
+TEST(engine_objects, the_tint_of_a_part_is_the_median_of_the_points_in_its_box)
+{
+    VoxelGrid grid = slab();
+    for (size_t v = 0; v < grid.cells.size(); ++v)
+        grid.points[v * 3] = float_to_half(0.2f); // 0.2 m towards x of the cell's centre
+    std::vector<SceneObject> objects = {car(0, 0, 0, 0), car(1, 0, 0, 0), car(2, 0, 0, 0)};
+    for (SceneObject& o : std::span(objects).subspan(1)) {
+        o.part = true;
+        o.size = {1.3, 0.4, 0.2};
+        o.center = {0.5, 0.3, 0.3}; // points at x = -0.1, 0.5 and 1.1, red 20, 21, 22
+    }
+    objects[2].center[0] = 0.15; // between points that are 0.6 m apart
+    objects[2].size[0] = 0.1;
+    ASSERT_TRUE(tint_objects(objects, grid));
+    EXPECT_NEAR((*objects[1].tint)[0] * 255, 20, 1e-9);
+    EXPECT_FALSE(objects[2].tint);
 }
 
 } // namespace engine_objects_test

@@ -37,6 +37,8 @@ uint64_t hash_objects(std::span<const SceneObject> objects)
                                                o.size[0],       o.size[1],   o.size[2],   o.heading,
                                                tint[0],         tint[1],     tint[2]};
         hash.add(std::as_bytes(std::span(values)));
+        if (o.part)
+            hash.add(std::as_bytes(std::span(&o.part, 1)));
     }
     return hash.value();
 }

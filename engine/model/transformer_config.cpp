@@ -65,12 +65,13 @@ Result<TransformerConfig> parse_transformer_config(const Json& json)
     fields.number("attention_radius", 0.f, 1e5f, c.attention_radius);
     fields.flag("context_pos_embed", c.context_pos_embed);
     fields.choice<bool>("qk_norm", {{"rms_norm", true}}, c.qk_norm);
-    fields.choices<ConditionPart>("condition", {{"object", ConditionPart::object}, {"tint", ConditionPart::tint}},
-                                  c.condition);
+    fields.choices<ConditionPart>(
+        "condition", {{"object", ConditionPart::object}, {"tint", ConditionPart::tint}, {"part", ConditionPart::part}},
+        c.condition);
     fields.flag("condition_voxels", c.condition_voxels);
     fields.choice<std::string>("placement", {{"shifted", "shifted"}, {"canonical", "canonical"}, {"mixed", "mixed"}},
                                c.placement);
-    if (c.condition.size() > 1 && std::ranges::count(c.condition, c.condition[0]) > 1)
+    if (std::ranges::any_of(c.condition, [&](ConditionPart p) { return std::ranges::count(c.condition, p) > 1; }))
         fields.refuse("condition", "a list of different names");
     if (c.condition_voxels && c.condition.empty())
         fields.refuse("condition_voxels", "false without a condition");

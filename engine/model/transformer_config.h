@@ -15,10 +15,11 @@
 namespace semrover {
 
 // what a transformer may be told of a cell beside its label (docs/method.md §2.1)
-enum class ConditionPart : uint8_t { object, tint };
+enum class ConditionPart : uint8_t { object, tint, part };
 constexpr uint32_t condition_width(ConditionPart part)
 {
-    return part == ConditionPart::object ? 60 : 4;
+    constexpr std::array<uint32_t, 3> kWidths = {60, 4, 64};
+    return kWidths[size_t(part)];
 }
 
 // config.json of a VoxfieldTransformer (docs/models.md §3); nothing assumes the defaults

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/scene/cell_objects.h"
 
+#include "runtime/base/dtype.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -13,6 +15,7 @@ namespace {
 // an object with its heading's cosine and sine, which many cells need
 struct Turned {
     const SceneObject& object;
+    double reach = 0; // metres by which the box is widened
     double cosine = std::cos(object.heading), sine = std::sin(object.heading);
 
     std::array<double, 3> place(const std::array<double, 3>& point) const
@@ -31,7 +34,7 @@ struct Turned {
     // of the widened box, along the world's axis 0 or 1: from, to
     std::pair<double, double> extent(size_t axis) const
     {
-        const double ahead = object.size[0] / 2 + kObjectReach, aside = object.size[1] / 2 + kObjectReach;
+        const double ahead = object.size[0] / 2 + reach, aside = object.size[1] / 2 + reach;
         const double half = axis == 0 ? std::abs(cosine) * ahead + std::abs(sine) * aside
                                       : std::abs(sine) * ahead + std::abs(cosine) * aside;
         return {object.center[axis] - half, object.center[axis] + half};
@@ -68,8 +71,9 @@ auto between(const Items& items, std::pair<double, double> extent, double size, 
 
 class OwnerSearch {
   public:
-    OwnerSearch(const VoxelGrid& grid, uint64_t most)
-        : grid_(grid), owners_(grid.cells.size(), kNoObject), depths_(grid.cells.size(), -kObjectReach), most_(most)
+    OwnerSearch(const VoxelGrid& grid, double reach, uint64_t most)
+        : grid_(grid), owners_(grid.cells.size(), kNoObject), depths_(grid.cells.size(), -reach), reach_(reach),
+          most_(most)
     {
         for (uint32_t v = 0; v < grid.cells.size(); ++v)
             classes_[grid.labels[v]].add(v, grid.cells[v][0]);
@@ -78,7 +82,7 @@ class OwnerSearch {
     // false: more comparisons than are allowed
     bool add(const SceneObject& object, int32_t index)
     {
-        const Turned turned{object};
+        const Turned turned{object, reach_};
         const ClassCells& own = classes_[object.label];
         const double size = double(grid_.voxel_size);
         const auto slices = between(own.slices, turned.extent(0), size, [](const auto& s) { return s.i; });
@@ -113,8 +117,22 @@ class OwnerSearch {
     std::array<ClassCells, 256> classes_;
     std::vector<int32_t> owners_;
     std::vector<double> depths_;
+    double reach_;
     uint64_t most_, pairs_ = 0;
 };
+
+Result<std::vector<int32_t>> owners_among(const VoxelGrid& grid, std::span<const SceneObject> objects, bool parts,
+                                          uint64_t most)
+{
+    OwnerSearch search(grid, parts ? kPartReach : kObjectReach, most);
+    for (size_t o = 0; o < objects.size(); ++o)
+        if (objects[o].part == parts && !search.add(objects[o], int32_t(o)))
+            return fail(ErrorCode::bad_input,
+                        "object {} of {}: the boxes so far lie over more than {} cells of their classes, counted with "
+                        "each box; the grid has {} cells",
+                        o + 1, objects.size(), most, grid.cells.size());
+    return search.take();
+}
 
 using Rgb = std::array<uint8_t, 3>;
 
@@ -148,16 +166,58 @@ std::array<double, 3> median_color(std::span<const Rgb> colors)
     return median;
 }
 
-std::array<double, 3> paint_color(const VoxelGrid& grid, std::span<const uint32_t> cells)
+// the colours of the points of some cells that `chosen` takes: cell and index of the point -> bool
+template <typename Chosen>
+std::vector<Rgb> colors_of(const VoxelGrid& grid, std::span<const uint32_t> cells, const Chosen& chosen)
 {
     const size_t points = size_t(grid.points_per_voxel);
     std::vector<Rgb> colors;
-    colors.reserve(cells.size() * points);
     for (const uint32_t v : cells)
         for (size_t i = v * points; i < (v + 1) * points; ++i)
-            colors.push_back({grid.colors[i * 3], grid.colors[i * 3 + 1], grid.colors[i * 3 + 2]});
+            if (chosen(v, i))
+                colors.push_back({grid.colors[i * 3], grid.colors[i * 3 + 1], grid.colors[i * 3 + 2]});
+    return colors;
+}
+
+std::array<double, 3> paint_color(const VoxelGrid& grid, std::span<const uint32_t> cells)
+{
+    std::vector<Rgb> colors = colors_of(grid, cells, [](uint32_t, size_t) { return true; });
     keep_lighter_part(colors);
     return median_color(colors);
+}
+
+constexpr double kWithin = 0.02; // metres: the sides of an opening lie on its box
+
+// of the points in the box; none where there are none
+std::optional<std::array<double, 3>> color_within(const SceneObject& object, const VoxelGrid& grid,
+                                                  std::span<const uint32_t> cells)
+{
+    const Turned turned{object};
+    const double size = double(grid.voxel_size);
+    const std::vector<Rgb> colors = colors_of(grid, cells, [&](uint32_t v, size_t i) {
+        std::array<double, 3> at{};
+        for (size_t a = 0; a < 3; ++a)
+            at[a] = (grid.cells[v][a] + 0.5) * size + double(half_to_float(grid.points[i * 3 + a]));
+        return turned.depth(at) > kWithin;
+    });
+    return colors.empty() ? std::optional<std::array<double, 3>>() : median_color(colors);
+}
+
+// calls of(owner, cells) for each owner of cells that have points
+template <typename Of>
+void each_owner(const VoxelGrid& grid, std::span<const int32_t> owners, const Of& of)
+{
+    std::vector<uint32_t> cells;
+    for (uint32_t v = 0; v < owners.size(); ++v)
+        if (owners[v] != kNoObject && grid.generated[v])
+            cells.push_back(v);
+    std::ranges::stable_sort(cells, {}, [&](uint32_t v) { return owners[v]; });
+    for (size_t first = 0, last; first < cells.size(); first = last) {
+        const int32_t owner = owners[cells[first]];
+        for (last = first; last < cells.size() && owners[cells[last]] == owner;)
+            ++last;
+        of(size_t(owner), std::span(cells).subspan(first, last - first));
+    }
 }
 
 } // namespace
@@ -170,14 +230,12 @@ std::array<double, 3> place_in(const SceneObject& object, const std::array<doubl
 Result<std::vector<int32_t>> objects_of_cells(const VoxelGrid& grid, std::span<const SceneObject> objects,
                                               uint64_t most)
 {
-    OwnerSearch search(grid, most);
-    for (size_t o = 0; o < objects.size(); ++o)
-        if (!search.add(objects[o], int32_t(o)))
-            return fail(ErrorCode::bad_input,
-                        "object {} of {}: the boxes so far lie over more than {} cells of their classes, counted with "
-                        "each box; the grid has {} cells",
-                        o + 1, objects.size(), most, grid.cells.size());
-    return search.take();
+    return owners_among(grid, objects, false, most);
+}
+
+Result<std::vector<int32_t>> parts_of_cells(const VoxelGrid& grid, std::span<const SceneObject> objects, uint64_t most)
+{
+    return owners_among(grid, objects, true, most);
 }
 
 std::vector<size_t> objects_meant(std::span<const int32_t> owners, size_t objects, std::span<const uint32_t> cells)
@@ -203,17 +261,13 @@ Status tint_objects(std::span<SceneObject> objects, const VoxelGrid& grid)
     if (!grid.has_points())
         return {};
     SR_TRY(const std::vector<int32_t> owners, objects_of_cells(grid, objects));
-    std::vector<uint32_t> cells;
-    for (uint32_t v = 0; v < owners.size(); ++v)
-        if (owners[v] != kNoObject && grid.generated[v])
-            cells.push_back(v);
-    std::ranges::stable_sort(cells, {}, [&](uint32_t v) { return owners[v]; });
-    for (size_t first = 0, last; first < cells.size(); first = last) {
-        const int32_t owner = owners[cells[first]];
-        for (last = first; last < cells.size() && owners[cells[last]] == owner;)
-            ++last;
-        objects[size_t(owner)].tint = paint_color(grid, std::span(cells).subspan(first, last - first));
-    }
+    each_owner(grid, owners,
+               [&](size_t o, std::span<const uint32_t> cells) { objects[o].tint = paint_color(grid, cells); });
+    SR_TRY(const std::vector<int32_t> parts, parts_of_cells(grid, objects));
+    each_owner(grid, parts, [&](size_t o, std::span<const uint32_t> cells) {
+        if (const auto color = color_within(objects[o], grid, cells))
+            objects[o].tint = color;
+    });
     return {};
 }
 

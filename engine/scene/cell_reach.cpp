@@ -11,14 +11,14 @@ namespace semrover {
 namespace {
 
 // cells with the same (i, j) lie one after the other
-struct Column {
+struct CellColumn {
     int32_t i, j;
     uint32_t begin, end;
 };
 
-std::vector<Column> columns_of(std::span<const Cell> cells)
+std::vector<CellColumn> cell_columns(std::span<const Cell> cells)
 {
-    std::vector<Column> columns;
+    std::vector<CellColumn> columns;
     for (uint32_t c = 0; c < cells.size(); ++c) {
         if (columns.empty() || columns.back().i != cells[c][0] || columns.back().j != cells[c][1])
             columns.push_back({cells[c][0], cells[c][1], c, c});
@@ -40,7 +40,7 @@ int64_t floor_root(int64_t square)
 class Marker {
   public:
     Marker(std::span<const Cell> cells, int64_t reach2)
-        : cells_(cells), columns_(columns_of(cells)), reach2_(reach2), reach_(floor_root(reach2)),
+        : cells_(cells), columns_(cell_columns(cells)), reach2_(reach2), reach_(floor_root(reach2)),
           marked_(cells.size(), 0)
     {
     }
@@ -49,9 +49,9 @@ class Marker {
     {
         for (int64_t di = -reach_; di <= reach_; ++di) {
             const int64_t i = source[0] + di, across = floor_root(reach2_ - di * di);
-            auto column = std::ranges::lower_bound(columns_, std::pair(i, source[1] - across), {}, [](const Column& c) {
-                return std::pair(int64_t(c.i), int64_t(c.j));
-            });
+            auto column =
+                std::ranges::lower_bound(columns_, std::pair(i, source[1] - across), {},
+                                         [](const CellColumn& c) { return std::pair(int64_t(c.i), int64_t(c.j)); });
             for (; column != columns_.end() && column->i == i && column->j <= source[1] + across; ++column) {
                 const int64_t dj = column->j - int64_t(source[1]);
                 mark_column(*column, source[2], floor_root(reach2_ - di * di - dj * dj));
@@ -69,7 +69,7 @@ class Marker {
     }
 
   private:
-    void mark_column(const Column& column, int64_t k, int64_t up)
+    void mark_column(const CellColumn& column, int64_t k, int64_t up)
     {
         const auto begin = cells_.begin() + column.begin, end = cells_.begin() + column.end;
         auto cell = std::lower_bound(begin, end, k - up, [](const Cell& c, int64_t low) { return c[2] < low; });
@@ -78,7 +78,7 @@ class Marker {
     }
 
     std::span<const Cell> cells_;
-    std::vector<Column> columns_;
+    std::vector<CellColumn> columns_;
     int64_t reach2_, reach_;
     std::vector<uint8_t> marked_;
 };

@@ -4,6 +4,7 @@
 
 #include "engine/scene/cell_objects.h"
 #include "engine/scene/connected_groups.h"
+#include "engine/scene/front_parts.h"
 #include "engine/scene/object_blocks.h"
 #include "engine/scene/street_fronts.h"
 #include "runtime/base/keyed_random.h"
@@ -68,6 +69,7 @@ class Guess {
             if (!done[g] && usual_for(groups[g]) && !std::ranges::all_of(groups[g], in_a_house))
                 add_row(groups[g]);
         add_ground();
+        std::ranges::for_each(parts_, [&](const SceneObject& part) { keep(part); });
         return std::move(objects_);
     }
 
@@ -104,6 +106,8 @@ class Guess {
             std::array<Extent, 3> e = extents(house.cells, house.heading);
             e[0] = {std::min(e[0].low, house.front - usual[0]), house.front};
             add(house.cells, e, house.heading);
+            if (const auto& parts = usual_[label_].parts)
+                std::ranges::copy(front_parts(grid_, house, *parts, seed_), std::back_inserter(parts_));
         }
         return !houses.empty();
     }
@@ -277,6 +281,7 @@ class Guess {
     const std::set<Column> street_, sidewalk_;
     uint8_t label_ = 0;
     std::vector<SceneObject> objects_;            // houses first
+    std::vector<SceneObject> parts_;              // of houses
     std::map<Column, std::vector<size_t>> walls_; // houses by where they are
 };
 

@@ -19,7 +19,8 @@ using Triple = std::array<double, 3>;
 
 constexpr const char* kFormat = "semrover.objects";
 constexpr std::array<std::string_view, 4> kFileKeys = {"format", "version", "objects", "comment"};
-constexpr std::array<std::string_view, 7> kObjectKeys = {"id", "class", "center", "size", "heading", "tint", "comment"};
+constexpr std::array<std::string_view, 8> kObjectKeys = {"id",      "class", "center", "size",
+                                                         "heading", "tint",  "part",   "comment"};
 constexpr double kFarthest = 1e6, kShortest = 1e-3, kLongest = 1e4, kLargestAngle = 1e3;
 
 Status check_within(double value, double low, double high, std::string_view where)
@@ -81,6 +82,11 @@ Result<SceneObject> parse_object(const Json& json, std::string_view where)
     SR_TRY(o.heading, finite_number(*heading, fmt::format("{}: heading", where)));
     SR_CHECK(check_within(o.heading, -kLargestAngle, kLargestAngle, fmt::format("{}: heading", where)));
     SR_TRY(o.tint, tint_of(json, where));
+    if (const auto part = json.find("part"); part != json.end()) {
+        if (!part->is_boolean())
+            return fail(ErrorCode::bad_input, "{}: part: expected true or false, found {}", where, part->dump());
+        o.part = part->get<bool>();
+    }
     return o;
 }
 
@@ -101,6 +107,8 @@ Json object_json(const SceneObject& object)
                  {"heading", o.heading}};
     if (o.tint)
         json["tint"] = *o.tint;
+    if (o.part)
+        json["part"] = true;
     return json;
 }
 

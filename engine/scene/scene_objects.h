@@ -20,6 +20,7 @@ struct SceneObject {
     std::array<double, 3> size{}; // along the heading, across it, up
     double heading = 0;
     std::optional<std::array<double, 3>> tint = {}; // its colour, sRGB 0..1
+    bool part = false;                              // of an object of its class: a window of a house. Owns no cells
 };
 
 constexpr size_t kMaxObjects = 1 << 20;

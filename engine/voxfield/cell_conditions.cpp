@@ -46,35 +46,53 @@ void tint_condition(const std::array<double, 3>& tint, std::span<float> out)
         out[1 + c] = float(2 * tint[c] - 1);
 }
 
+void part_condition(const SceneObject& part, const std::array<double, 3>& point, std::span<float> out)
+{
+    constexpr size_t kBox = condition_width(ConditionPart::object);
+    object_condition(part, point, out.first(kBox));
+    if (part.tint)
+        tint_condition(*part.tint, out.subspan(kBox));
+}
+
 Result<CellConditions> CellConditions::create(const TransformerConfig& config, const VoxelGrid& grid,
                                               std::span<const SceneObject> objects)
 {
     CellConditions conditions;
-    conditions.parts_ = config.condition;
+    conditions.told_ = config.condition;
     conditions.width_ = config.condition_width();
     conditions.voxel_size_ = double(grid.voxel_size);
     conditions.objects_.assign(objects.begin(), objects.end());
     if (conditions.width_ && !objects.empty()) {
         SR_TRY(conditions.owners_, objects_of_cells(grid, objects));
+        if (std::ranges::count(config.condition, ConditionPart::part)) {
+            SR_TRY(conditions.part_owners_, parts_of_cells(grid, objects));
+        }
     }
     return conditions;
+}
+
+const SceneObject* CellConditions::of_cell(std::span<const int32_t> owners, uint32_t cell) const
+{
+    return owners.empty() || owners[cell] == kNoObject ? nullptr : &objects_[size_t(owners[cell])];
 }
 
 void CellConditions::row(uint32_t cell, const Cell& index, std::span<float> out) const
 {
     std::ranges::fill(out, 0.f);
-    if (empty() || owners_[cell] == kNoObject)
+    if (empty())
         return;
-    const SceneObject& object = objects_[size_t(owners_[cell])];
+    const SceneObject *object = of_cell(owners_, cell), *part = of_cell(part_owners_, cell);
     const std::array<double, 3> center = {(index[0] + 0.5) * voxel_size_, (index[1] + 0.5) * voxel_size_,
                                           (index[2] + 0.5) * voxel_size_};
     size_t at = 0;
-    for (ConditionPart part : parts_) {
-        const std::span<float> to = out.subspan(at, condition_width(part));
-        if (part == ConditionPart::object && !is_ground(object.label))
-            object_condition(object, center, to);
-        else if (part == ConditionPart::tint && object.tint)
-            tint_condition(*object.tint, to);
+    for (const ConditionPart entry : told_) {
+        const std::span<float> to = out.subspan(at, condition_width(entry));
+        if (entry == ConditionPart::object && object && !is_ground(object->label))
+            object_condition(*object, center, to);
+        else if (entry == ConditionPart::tint && object && object->tint)
+            tint_condition(*object->tint, to);
+        else if (entry == ConditionPart::part && part)
+            part_condition(*part, center, to);
         at += to.size();
     }
 }

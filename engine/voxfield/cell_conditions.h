@@ -7,9 +7,10 @@
 
 namespace semrover {
 
-// the numbers of one part, after its flag (docs/method.md §2.1)
+// the numbers of one entry of a model's condition, its flag first (docs/method.md §2.1)
 void object_condition(const SceneObject& object, const std::array<double, 3>& point, std::span<float> out); // 60
 void tint_condition(const std::array<double, 3>& tint, std::span<float> out);                               // 4
+void part_condition(const SceneObject& part, const std::array<double, 3>& point, std::span<float> out);     // 64
 
 // What a model is told of the cells of a grid beside their labels, from the objects that are known.
 class CellConditions {
@@ -26,10 +27,12 @@ class CellConditions {
     void row(uint32_t cell, const Cell& index, std::span<float> out) const;
 
   private:
-    std::vector<ConditionPart> parts_;
+    const SceneObject* of_cell(std::span<const int32_t> owners, uint32_t cell) const; // NULL: none
+
+    std::vector<ConditionPart> told_;
     size_t width_ = 0;
     double voxel_size_ = 0;
-    std::vector<int32_t> owners_; // of each cell
+    std::vector<int32_t> owners_, part_owners_; // of each cell; the second empty for models that hear of no parts
     std::vector<SceneObject> objects_;
 };
 

@@ -11,6 +11,8 @@ namespace semrover {
 
 namespace {
 
+constexpr double kInside = 0.6, kOutside = 0.3; // metres from the wall's face, of an opening's box
+
 // a rectangle of a wall: x to the right, z up
 struct Field {
     double x0, z0, x1, z1;
@@ -74,6 +76,17 @@ class Facade {
         panel(f, {hole.x1, hole.z0, a.x1, hole.z1});
     }
 
+    void note_opening(const Field& a)
+    {
+        const Vector3 middle = at((a.x0 + a.x1) / 2, (kInside - kOutside) / 2, (a.z0 + a.z1) / 2);
+        m_.objects().push_back({.id = uint32_t(m_.objects().size()),
+                                .label = label::kBuilding,
+                                .center = {middle.x, middle.y, middle.z},
+                                .size = {kInside + kOutside, a.width(), a.height()},
+                                .heading = std::atan2(-w_.y.y, -w_.y.x),
+                                .part = true});
+    }
+
     // frame and panes at a depth
     void glazing(const Field& a, double y, WindowKind kind, Finish pane)
     {
@@ -92,6 +105,7 @@ class Facade {
 
     void window(const Field& a)
     {
+        note_opening(a);
         reveal(s_.surrounds ? s_.trim : s_.wall, a, s_.recess + 0.03);
         glazing(a, s_.recess, s_.window, s_.panes[r_.below(uint32_t(s_.panes.size()))]);
         slab(s_.trim, {a.x0 - 0.07, a.z0 - 0.07, a.x1 + 0.07, a.z0}, 0.09);
@@ -159,6 +173,7 @@ class Facade {
         const double z0 = s_.ground_height + s_.storey * (floor - 1), z1 = z0 + s_.storey, sill = z0 + 0.75;
         panel(s_.wall, {0, z0, width_, sill});
         panel(s_.wall, {0, z1 - 0.25, width_, z1});
+        note_opening({0, sill, width_, z1 - 0.25});
         reveal(s_.metal, {0, sill, width_, z1 - 0.25}, 0.1);
         const int count = std::max(1, int(std::lround(width_ / 1.5)));
         for (int i = 0; i < count; ++i) {
@@ -209,6 +224,7 @@ class Facade {
             } else if (s_.garages && b == (door + 1) % bays_ && bay_ > 2.6) {
                 const Field hole{middle - 1.2, 0.02, middle + 1.2, 2.3};
                 wall_around(s_.base, bay, hole);
+                note_opening(hole);
                 reveal(s_.trim, hole, 0.2, false);
                 picture(s_.garage, hole, 0.2);
             } else {
@@ -226,6 +242,7 @@ class Facade {
         const double top = std::min(2.85, bay.z1 - 0.35), light = 2.25;
         const Field hole{middle - wide / 2, 0.02, middle + wide / 2, top};
         wall_around(s_.base, bay, hole);
+        note_opening(hole);
         reveal(s_.trim, hole, 0.28, false);
         picture(s_.ground == GroundFloor::homes ? s_.door : s_.glass_door, {hole.x0, 0.02, hole.x1, light}, 0.28);
         slab(s_.frame, {hole.x0, light, hole.x1, light + 0.07}, 0.03, 0.28);
@@ -248,6 +265,7 @@ class Facade {
             const Field bay{i * wide, 0, (i + 1) * wide, s_.ground_height};
             const Field hole{bay.x0 + 0.22, 0.05, bay.x1 - 0.22, head};
             wall_around(s_.base, bay, hole);
+            note_opening(hole);
             reveal(s_.metal, hole, 0.22, false);
             const double split = i != door ? hole.x0 : left ? hole.x0 + 1.1 : hole.x1 - 1.1;
             const Field display = i != door ? hole

@@ -1,14 +1,14 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
 """What a transformer is told of a cell beside its label (docs/method.md §2.1): where it lies in the box of its object,
-and a colour. Parts that are not given are zeros, and their flag is 0."""
+a colour, and where it lies in the box of a part, a window. What is not given is zeros, and its flag is 0."""
 import math
 
 import numpy as np
 
 from .objects import has_box, place_in
 
-WIDTHS = {"object": 60, "tint": 4}
+WIDTHS = {"object": 60, "tint": 4, "part": 64}
 WAVES = (1.0, 2.0, 4.0, 8.0)  # metres
 NEAREST, FARTHEST = -2.0, 8.0  # metres from a face, beyond which a cell is taken to lie there
 
@@ -38,9 +38,16 @@ def tint_part(tints, given):
     return np.where(given[:, None], np.concatenate([np.ones((len(tints), 1)), 2 * tints - 1], 1), 0).astype(np.float32)
 
 
-def vector_of(condition, centers, boxes, has_box, tints, has_tint):
-    """the parts of `condition` for N cells, in its order -> f32 [N, width_of(condition)]"""
-    parts = {"object": lambda: object_part(centers, boxes, has_box), "tint": lambda: tint_part(tints, has_tint)}
+def part_part(centers, boxes, has_box, tints, has_tint):
+    """of the parts that N cells lie in or beside -> f32 [N, 64]"""
+    return np.concatenate([object_part(centers, boxes, has_box), tint_part(tints, has_tint)], 1)
+
+
+def vector_of(condition, centers, boxes, has_box, tints, has_tint, of_part=None):
+    """what `condition` lists for N cells, in its order; of_part: the same four of the parts that they lie in or beside
+    -> f32 [N, width_of(condition)]"""
+    parts = {"object": lambda: object_part(centers, boxes, has_box), "tint": lambda: tint_part(tints, has_tint),
+             "part": lambda: part_part(centers, *of_part) if of_part else np.zeros((len(centers), WIDTHS["part"]))}
     return np.concatenate([np.zeros((len(centers), 0), np.float32)] + [parts[name]() for name in condition], 1)
 
 
@@ -65,6 +72,13 @@ def told_boxes(random, owners, labels, config):
     _, of_cells = np.unique(owners, return_inverse=True)
     share = share_told(random, config)
     return has_box(owners, labels) & (random.random(of_cells.max() + 1) < share)[of_cells]
+
+
+def told_parts(random, parts, config):
+    """which cells are told the part that they lie in or beside -> bool [N]; a part is told as a whole"""
+    _, of_cells = np.unique(parts, return_inverse=True)
+    share = share_told(random, config)
+    return (parts >= 0) & (random.random(of_cells.max() + 1) < share)[of_cells]
 
 
 def told_tints(random, owners, config):

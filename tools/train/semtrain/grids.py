@@ -7,10 +7,10 @@ import os
 import numpy as np
 
 from . import safetensors_file
-from .condition import drawn_boxes, drawn_tints, mirrored, told_boxes, told_tints, vector_of, width_of
+from .condition import drawn_boxes, drawn_tints, mirrored, told_boxes, told_parts, told_tints, vector_of, width_of
 from .json_file import read_json, write_json
 from .known_cells import draw_known
-from .objects import local_tints, owners_of, read_objects
+from .objects import PART_REACH, local_tints, owners_of, read_objects
 from .repaint import repaint
 
 
@@ -59,23 +59,27 @@ def placement_of(path):
 
 def read_owners(path, cells, labels):
     """the objects.json beside a .sgrid, if there is one -> owners i32 [V], tints near each cell u8 [V, 3], boxes
-    f64 [O, 7], tints of the objects f32 [O, 3]"""
+    f64 [O, 7], tints of the objects f32 [O, 3]; of the parts owners, boxes and tints"""
     about = os.path.join(os.path.dirname(path), "objects.json")
     if not os.path.exists(about):
         none = np.full(len(cells), -1, np.int32)
-        return none, np.zeros((len(cells), 3), np.uint8), np.zeros((0, 7)), np.zeros((0, 3))
+        return none, np.zeros((len(cells), 3), np.uint8), np.zeros((0, 7)), np.zeros((0, 3)), none, \
+            np.zeros((0, 7)), np.zeros((0, 3))
     grid, size = read_grid(path)
     boxes, box_labels, tints = read_objects(about)
     centers = (cells + 0.5) * size
     owners = owners_of(centers, labels, boxes, box_labels)
-    return owners, local_tints(centers, owners, grid["colors"]), boxes, tints
+    part_boxes, part_labels, part_tints = read_objects(about, parts=True)
+    parts = owners_of(centers, labels, part_boxes, part_labels, PART_REACH)
+    return owners, local_tints(centers, owners, grid["colors"]), boxes, tints, parts, part_boxes, part_tints
 
 
 class Grids:
     """All grids of some sources, kept as one file each of cells, labels, tokens and what their objects are under
     `cache`, mapped to memory."""
 
-    ARRAYS = ("cells", "labels", "tokens", "owners", "local_tints", "boxes", "tints")
+    ARRAYS = ("cells", "labels", "tokens", "owners", "local_tints", "boxes", "tints", "parts", "part_boxes", "part_tints")
+    NUMBERED = (("owners", "boxes"), ("parts", "part_boxes"))  # the ones are indices of the others, numbered through
 
     def __init__(self, sources, cache):
         self.files = files = find_grids(sources)
@@ -94,9 +98,9 @@ class Grids:
     @classmethod
     def _fill(cls, files, cache, about):
         parts = [cls._arrays(f) for f in files]
-        counts = np.cumsum([0] + [len(p[5]) for p in parts])  # objects are numbered through
-        for part, first in zip(parts, counts):
-            part[3][part[3] >= 0] += first
+        for numbers, things in (map(cls.ARRAYS.index, names) for names in cls.NUMBERED):
+            for part, first in zip(parts, np.cumsum([0] + [len(p[things]) for p in parts])):
+                part[numbers][part[numbers] >= 0] += first
         for i, name in enumerate(cls.ARRAYS):
             np.save(os.path.join(cache, f"{name}.npy"), np.concatenate([p[i] for p in parts]))
         offsets = np.cumsum([0] + [len(p[1]) for p in parts]).tolist()
@@ -134,16 +138,16 @@ class LocalSets:
         size = int(random.integers(c["set_size"][0], c["set_size"][1] + 1))
         size = min(size, min(len(n) for n in self.near))
         sets = [self._set(random, size) for _ in range(c["batch"])]
-        centers, labels, tokens, cells, boxes = (np.stack(part) for part in zip(*sets))
+        centers, labels, tokens, cells, boxes, part_boxes = (np.stack(part) for part in zip(*sets))
         labels = labels.astype(np.int64)
         dropped = random.random(c["batch"]) < c["label_dropout"]
         labels[dropped] = c["network"]["num_classes"]
         known = np.stack([draw_known(random, set_centers, c["known_share"]) for set_centers in centers])
         conditions = np.stack([self._condition(np.random.default_rng([c["seed"], step, i]), *of_set)
-                               for i, of_set in enumerate(zip(centers, cells, boxes, tokens, dropped))])
+                               for i, of_set in enumerate(zip(centers, cells, boxes, part_boxes, tokens, dropped))])
         return centers, labels, tokens, known, conditions
 
-    def _condition(self, random, centers, cells, boxes, tokens, dropped):
+    def _condition(self, random, centers, cells, boxes, part_boxes, tokens, dropped):
         """what a set is told beside its labels; where these are dropped, nothing. Where all colours are told, some
         things have others than in the grid: changes `tokens`"""
         owners, parts = self.grids.owners[cells], self.config["network"].get("condition", ())
@@ -161,10 +165,22 @@ class LocalSets:
                                          (colors + 1) / 2, whole, local)
             colors[...] = 2 * made - 1
         tints = drawn_tints(random, owners, local, whole, config)
-        return vector_of(parts, centers, drawn_boxes(random, owners, boxes, config), has_box, tints, has_tint)
+        boxes = drawn_boxes(random, owners, boxes, config)
+        of_part = self._of_part(random, cells, part_boxes) if "part" in parts else None
+        return vector_of(parts, centers, boxes, has_box, tints, has_tint, of_part)
+
+    def _of_part(self, random, cells, boxes):
+        """the last argument of vector_of, of a set"""
+        parts, config = self.grids.parts[cells], self.config["telling"]
+        config = {**config, "jitter": config["jitter"] / 3}  # windows are small: more would move them beside their places
+        tints = self.grids.part_tints[parts] if len(self.grids.part_tints) else np.full((len(cells), 3), np.nan)
+        told, has_tint = told_parts(random, parts, config), told_parts(random, parts, config)
+        has_tint &= told & ~np.isnan(tints).any(1)
+        tints = drawn_tints(random, parts, tints, tints, config)
+        return drawn_boxes(random, parts, boxes, config), told, tints, has_tint
 
     def _set(self, random, size):
-        """-> centers, labels, tokens, which cells of the grids these are, and the boxes of their objects"""
+        """-> centers, labels, tokens, which cells of the grids these are, and the boxes of their objects and parts"""
         g = int(random.integers(len(self.near)))
         cells, first = self.near[g], self.grids.offsets[g]
         middle = min(int(np.searchsorted(self.sums[g], random.random())), len(cells) - 1)
@@ -172,15 +188,16 @@ class LocalSets:
         chosen = np.argpartition(apart, size - 1)[:size]
         centers = (cells[chosen] + 0.5) * self.config["network"]["voxel_size"]
         tokens = self.grids.tokens[first + chosen].astype(np.float32).reshape(size, -1, 6)
-        owners = self.grids.owners[first + chosen]
-        boxes = self.grids.boxes[owners] if len(self.grids.boxes) else np.ones((size, 7))
+        boxes, part_boxes = (of[numbers[first + chosen]] if len(of) else np.ones((size, 7))
+                             for of, numbers in ((self.grids.boxes, self.grids.owners),
+                                                 (self.grids.part_boxes, self.grids.parts)))
         turned = [self.config["mirror"] and random.random() < 0.5 for _ in range(2)]
         for axis in np.flatnonzero(turned):  # streets mirrored in either direction are streets
             centers[:, axis] *= -1
             tokens[..., axis] *= -1
-            boxes = mirrored(boxes, axis)
+            boxes, part_boxes = mirrored(boxes, axis), mirrored(part_boxes, axis)
         if any(turned):  # points of a lattice are equally far from the centre: their order turns over, too
             tokens = np.take_along_axis(tokens, token_order(tokens), 1)
         if not self.config["ordered_points"]:
             tokens = np.take_along_axis(tokens, random.random(tokens.shape[:2]).argsort(1)[..., None], 1)
-        return centers, self.grids.labels[first + chosen], tokens.reshape(size, -1), first + chosen, boxes
+        return centers, self.grids.labels[first + chosen], tokens.reshape(size, -1), first + chosen, boxes, part_boxes

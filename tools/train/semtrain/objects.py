@@ -11,18 +11,21 @@ CLASSES = ("road", "sidewalk", "building", "wall", "fence", "pole", "traffic lig
            "terrain", "sky", "person", "rider", "car", "truck", "bus", "train", "motorcycle", "bicycle", "road-lane")
 GROUND = tuple(CLASSES.index(name) for name in ("road", "sidewalk", "terrain", "road-lane"))  # told colours, no boxes
 BOX_REACH = 1.5   # metres by which boxes are widened: balconies and mirrors stand out of them
+PART_REACH = 0.6  # metres by which the boxes of parts are: what lies beside a window sees its edge
 TINT_REACH = 3.0  # metres within which the points of an object make a local tint
 
 
-def read_objects(path):
-    """-> boxes f64 [O, 7] (centre, size, heading), labels i64 [O], tints f32 [O, 3], 0..1, NaN where there is none"""
+def read_objects(path, parts=False):
+    """objects or, if asked for, the parts of objects -> boxes f64 [O, 7] (centre, size, heading), labels i64 [O], tints
+    f32 [O, 3], 0..1, NaN where there is none"""
     about = read_json(path)
     if about.get("format") != "semrover.objects" or about.get("version") != 1:
         raise SystemExit(f"{path}: not a file of objects, version 1")
-    boxes = [[*o["center"], *o["size"], o["heading"]] for o in about["objects"]]
-    tints = [tint_of(o.get("tint")) for o in about["objects"]]
+    objects = [o for o in about["objects"] if o.get("part", False) == parts]
+    boxes = [[*o["center"], *o["size"], o["heading"]] for o in objects]
+    tints = [tint_of(o.get("tint")) for o in objects]
     return (np.array(boxes, np.float64).reshape(-1, 7),
-            np.array([CLASSES.index(o["class"]) for o in about["objects"]], np.int64),
+            np.array([CLASSES.index(o["class"]) for o in objects], np.int64),
             np.array(tints, np.float32).reshape(-1, 3))
 
 
@@ -41,10 +44,10 @@ def place_in(boxes, points):
     return np.stack([c * x + s * y, c * y - s * x, z], -1)
 
 
-def owners_of(centers, labels, boxes, box_labels):
+def owners_of(centers, labels, boxes, box_labels, reach=BOX_REACH):
     """centers [V, 3] metres -> i32 [V]: the object of its class in which each cell lies deepest, among those whose
-    widened box holds its centre; -1 for none"""
-    owners, depths = np.full(len(centers), -1, np.int32), np.full(len(centers), -BOX_REACH)
+    widened box holds its centre; -1 for none. Of parts the reach is PART_REACH"""
+    owners, depths = np.full(len(centers), -1, np.int32), np.full(len(centers), -reach)
     of_class = {label: np.flatnonzero(labels == label) for label in np.unique(box_labels)}
     for o, (box, label) in enumerate(zip(boxes, box_labels)):
         cells = of_class[label]
@@ -95,35 +98,3 @@ def local_tints(centers, owners, colors):
             middle = np.median(colors[cells], 1).astype(np.uint8)
             tints[cells] = paint_near(centers[cells].astype(np.float32), middle, TINT_REACH)
     return tints
-
-
-def largest_ground(boxes, labels, tints):
-    """of each class of ground only the largest object that has a colour: the ground of a street that is not described
-    has one colour, its lanes' rather than that of a cycle lane"""
-    chosen, areas = ~np.isin(labels, GROUND), np.where(np.isnan(tints).any(1), 0, boxes[:, 3] * boxes[:, 4])
-    for label in np.intersect1d(labels, GROUND):
-        of_class = np.flatnonzero(labels == label)
-        chosen[of_class[areas[of_class].argmax()]] = True
-    return boxes[chosen], labels[chosen], tints[chosen]
-
-
-def usual_objects(grids, most=32, fewest=4):
-    """Of the objects.json beside each of some .sgrid files: {class: {size: median in metres, tints: at most `most`
-    colours, drawn from all}}, for `objects` of a model's defaults (docs/models.md §8). Classes with fewer than `fewest`
-    objects are left out."""
-    files = sorted({os.path.join(os.path.dirname(g), "objects.json") for g in grids})
-    parts = [largest_ground(*read_objects(f)) for f in files if os.path.exists(f)]
-    if not parts:
-        return {}
-    boxes, labels, tints = (np.concatenate(p) for p in zip(*parts))
-    random, usual = np.random.default_rng(1), {}
-    # the ground last: what is drawn for the others does not depend on whether a street has any
-    for label in sorted(np.unique(labels), key=lambda label: (label in GROUND, label)):
-        of_class = tints[(labels == label) & ~np.isnan(tints).any(1)]
-        if (labels == label).sum() < fewest:
-            continue
-        chosen = random.permutation(len(of_class))[:most]
-        levels = np.round(of_class[chosen] * 255).astype(int)
-        usual[CLASSES[label]] = {"size": np.median(boxes[labels == label, 3:6], 0).round(2).tolist(),
-                                 "tints": ["#%02x%02x%02x" % tuple(level) for level in levels]}
-    return usual

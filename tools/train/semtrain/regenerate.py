@@ -13,7 +13,7 @@ from .condition import vector_of, width_of
 from .grids import read_tokens
 from .model_folder import read_component
 from .nets.transformer import VoxfieldTransformer
-from .objects import has_box, owners_of, read_objects
+from .objects import PART_REACH, has_box, owners_of, read_objects
 from .precision import autocast
 from .transformer import linear_alphas, noised
 
@@ -61,8 +61,11 @@ class Objects:
 
     def __init__(self, path, centers, labels):
         about = os.path.join(os.path.dirname(path), "objects.json")
-        self.boxes, of_boxes, self.tints = read_objects(about) if os.path.exists(about) else (np.ones((0, 7)), [], [])
+        none = (np.ones((0, 7)), [], [])
+        self.boxes, of_boxes, self.tints = read_objects(about) if os.path.exists(about) else none
+        self.part_boxes, of_parts, self.part_tints = read_objects(about, parts=True) if os.path.exists(about) else none
         self.centers, self.owners = centers, owners_of(centers, labels, self.boxes, of_boxes)
+        self.parts = owners_of(centers, labels, self.part_boxes, of_parts, PART_REACH)
         self.has_box = has_box(self.owners, labels)
 
     def tell(self, parts):
@@ -71,7 +74,13 @@ class Objects:
             return np.zeros((len(self.centers), width_of(parts)), np.float32)
         has, of_cells = self.owners >= 0, np.maximum(self.owners, 0)
         tints = self.tints[of_cells]
-        return vector_of(parts, self.centers, self.boxes[of_cells], self.has_box, tints, has & ~np.isnan(tints).any(1))
+        return vector_of(parts, self.centers, self.boxes[of_cells], self.has_box, tints, has & ~np.isnan(tints).any(1),
+                         self._of_part() if len(self.part_boxes) else None)
+
+    def _of_part(self):
+        has, of_cells = self.parts >= 0, np.maximum(self.parts, 0)
+        tints = self.part_tints[of_cells]
+        return self.part_boxes[of_cells], has, tints, has & ~np.isnan(tints).any(1)
 
     def keep_colors(self, made, true):
         """tokens [V, n, 6]: moves the colours that were made so that those of each object have the true mean"""

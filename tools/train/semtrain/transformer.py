@@ -6,14 +6,15 @@ import os
 from fnmatch import fnmatchcase
 
 import torch
+import torch.nn.functional as F
 
 from .condition import width_of
 from .grids import Grids, LocalSets
 from .model_folder import add_to_index, read_component, write_component, write_scheduler
 from .nets.transformer import VoxfieldTransformer
-from .objects import usual_objects
 from .settings import parser, resolve
 from .trainer import Trainer, generator, timesteps_at
+from .usual_objects import usual_objects
 
 
 def linear_alphas(config):
@@ -89,8 +90,14 @@ def loss_of(sets, config):
 
 
 def with_new_parts(state, model):
-    """weights of a model that is told less than `model`, and those that `model` begins with for the rest"""
-    return {**{name: t for name, t in model.state_dict().items() if name.startswith("condition_embed.")}, **state}
+    """weights of a model that is told less than `model`, and those that `model` begins with for the rest; what it is told
+    more than something says nothing at first"""
+    first = "condition_embed.linear_1.weight"
+    state = {**{name: t for name, t in model.state_dict().items() if name.startswith("condition_embed.")}, **state}
+    more = model.state_dict()[first].shape[1] - state[first].shape[1] if first in state else 0
+    if more > 0:
+        state[first] = F.pad(state[first], (0, more))
+    return state
 
 
 def train_only(model, patterns):

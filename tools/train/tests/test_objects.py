@@ -19,9 +19,10 @@ from semtrain.grids import Grids, LocalSets, read_tokens
 from semtrain.json_file import read_json
 from semtrain.model_folder import write_component, write_scheduler
 from semtrain.nets.transformer import VoxfieldTransformer
-from semtrain.objects import local_tints, owners_of, paint_near, read_objects, usual_objects
+from semtrain.objects import local_tints, owners_of, paint_near, read_objects
 from semtrain.regenerate import Objects as StreetObjects, load_transformer
 from semtrain.repaint import repainted
+from semtrain.usual_objects import usual_objects
 
 NETWORK = {"num_layers": 2, "num_attention_heads": 2, "attention_head_dim": 16, "points_per_voxel": 4,
            "num_classes": 20, "voxel_size": 0.6, "attention_radius": 3.0, "pos_embed_dim": 8,
@@ -133,6 +134,68 @@ class Objects(unittest.TestCase):
         self.assertTrue((swapped[..., :4] == conditions[..., 60:]).all())
         self.assertEqual(vector_of([], centers[0], None, None, None, None).shape, (40, 0))
 
+    def add_parts(self):
+        """a part at either end of the second car, one of them with a colour"""
+        about = read_json(self.path("objects.json"))
+        for x, tint in ((4.6, {}), (8.1, {"tint": "#ff0000"})):
+            about["objects"].append({"id": len(about["objects"]), "class": "car", "center": [x, 0, 0.6],
+                                     "size": [0.5, 2, 1], "heading": 0, "part": True, **tint})
+        with open(self.path("objects.json"), "w") as file:
+            json.dump(about, file)
+
+    def test_have_parts_that_own_no_cells_and_are_told_to_those_up_to_60_cm_from_them(self):
+        config = {**NETWORK, "condition": ["object", "tint", "part"]}
+        before = self.sets().batch(2)
+        self.add_parts()
+        sets = LocalSets(Grids([self.path("truth.sgrid")], self.path("parts")), config_of(network=config))
+        centers, labels, tokens, _, told = sets.batch(2)
+        self.assertTrue((tokens == before[2]).all())
+        self.assertTrue((told[..., :64] == before[4]).all())
+        flags = np.zeros(labels.shape, int)
+        for number, x in ((1, 4.6), (2, 8.1)):
+            depth = np.array([0.25, 1, 0.5]) - np.abs(centers - [x, 0, 0.6])
+            flags[(depth.min(-1) > -0.6 + 1e-6) & (labels == 13)] = number
+        self.assertGreater(min((flags == number).sum() for number in (1, 2)), 10)
+        self.assertTrue(((told[..., 64] == 1) == (flags > 0)).all())
+        self.assertTrue(((told[..., 124] == 1) == (flags == 2)).all())
+        self.assertTrue((told[flags == 2][:, 125:] == [1, -1, -1]).all())
+        self.assertTrue((told[flags == 0][:, 64:] == 0).all())
+        box = np.array([[8.1, 0, 0.6, 0.5, 2, 1, 0]])
+        cell = centers[flags == 2][:1]
+        np.testing.assert_allclose(told[flags == 2][:1, 64:124], object_part(cell, box, np.array([True])), atol=1e-5)
+        street = StreetObjects(self.path("truth.sgrid"), *self.cells())
+        self.assertEqual(street.tell(config["condition"])[:, 64].sum(), len(np.flatnonzero(street.parts >= 0)))
+
+    def cells(self):
+        t = {name: tensor.numpy() for name, tensor in safetensors_file.read(self.path("truth.sgrid")).items()}
+        return (t["cells"] + 0.5) * 0.6, t["labels"]
+
+    def test_have_usual_parts(self):
+        boxes = [[x, 5, z, 0.9, 1.2, 1.6, -np.pi / 2] for z in (2.3, 5.4, 8.5) for x in (-3, 0, 3)]
+        objects = [{"id": 9 + i, "class": "building", "center": b[:3], "size": b[3:6], "heading": b[6], "part": True,
+                    "tint": "#101010"} for i, b in enumerate([*boxes, [0, 5, 1, 0.9, 1, 2, -np.pi / 2]])]
+        objects += [{"id": i, "class": "building", "center": [20 * i, 10, 6], "size": [10, 10, 12],
+                     "heading": -np.pi / 2, "tint": "#ffffff"} for i in range(4)]
+        with open(self.path("objects.json"), "w") as file:
+            json.dump({"format": "semrover.objects", "version": 1, "objects": objects}, file)
+        usual = usual_objects([self.path("truth.sgrid")])["building"]
+        self.assertEqual(usual["size"], [10, 10, 12])
+        self.assertEqual(usual["tints"], ["#ffffff"] * 4)
+        self.assertEqual(usual["parts"], {"size": [0.9, 1.2, 1.6], "pitch": [3, 3.1], "low": 1.5,
+                                          "tints": ["#101010"] * 10})
+
+    def test_may_be_told_of_more_by_a_model_that_went_on_from_one_that_was_told_less(self):
+        torch.manual_seed(1)
+        less, more = VoxfieldTransformer(**BOTH), VoxfieldTransformer(**{**BOTH, "condition": ["object", "tint", "part"]})
+        more.load_state_dict(transformer.with_new_parts(less.state_dict(), more))
+        given = (torch.randn(1, 5, 24), torch.tensor([[13, 13, 0, 0, 2]]), torch.randn(1, 5, 3),
+                 torch.ones(1, 5, dtype=torch.bool), torch.tensor([300]))
+        condition = torch.randn(1, 5, 128)
+        less.proj_out.weight.data.normal_()
+        more.load_state_dict(transformer.with_new_parts(less.state_dict(), more))
+        with torch.no_grad():
+            torch.testing.assert_close(more(*given, condition), less(*given, condition[..., :64]))
+
     def test_are_told_to_a_street_that_is_placed_anew(self):
         """all of them, with their whole colours, as a set of one batch is told in training"""
         path = os.path.join(self.folder.name, "truth.sgrid")
@@ -143,7 +206,7 @@ class Objects(unittest.TestCase):
         grids = Grids([path], os.path.join(self.folder.name, "cache"))
         sets = LocalSets(grids, config_of())
         boxes = grids.boxes[grids.owners]
-        again = sets._condition(np.random.default_rng(1), centers, chosen, boxes, np.array(grids.tokens), False)
+        again = sets._condition(np.random.default_rng(1), centers, chosen, boxes, boxes, np.array(grids.tokens), False)
         np.testing.assert_array_equal(told, again)
         self.assertGreater(told[t["labels"] == 13, -3:].max(), 0.6)
         self.assertEqual(objects.tell(()).shape, (len(t["cells"]), 0))

@@ -1,0 +1,19 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/scene/scene_objects.h"
+#include "engine/scene/street_fronts.h"
+#include "engine/scene/usual_objects.h"
+
+namespace semrover {
+
+// Parts of a house as its street may show them, windows: rows one above the other, evenly across the front. Distances
+// and sizes are the usual ones, longer or shorter by up to kPartsVary, the same for the whole house; each has a colour
+// of the usual ones. All keyed by the seed and the house's lowest cell. Only where cells of the front are. ids are 0.
+std::vector<SceneObject> front_parts(const VoxelGrid& grid, const HouseFront& house, const UsualParts& usual,
+                                     uint64_t seed);
+
+constexpr double kPartsVary = 0.15;
+
+} // namespace semrover
