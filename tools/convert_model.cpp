@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/convert_model.h"
 
+#include "engine/model/low_rank.h"
 #include "engine/model/model_writer.h"
 #include "engine/model/renderer_model.h"
 #include "runtime/base/quote.h"
@@ -121,6 +122,8 @@ Status plan_transformer(const ConvertModelOptions& o, const Path& folder, Conver
         files.tensors.push_back(stream_tensor(shared, tensor, dtype_option(o)));
     plan.index["voxfield_transformer"] = {"semrover", "VoxfieldTransformer"};
     plan.components["voxfield_transformer"] = std::move(files);
+    if (is_there(folder / kAdapterFile))
+        plan.copies[std::string("voxfield_transformer/") + kAdapterFile] = folder / kAdapterFile;
     return {};
 }
 
@@ -242,7 +245,8 @@ class StagingFolder {
         std::vector<Path> old;
         std::error_code ignored; // the folder need not exist
         for (const auto& entry : fs::directory_iterator(folder, ignored))
-            if (entry.path().filename().native().starts_with("diffusion_pytorch_model"))
+            if (entry.path().filename().native().starts_with("diffusion_pytorch_model") ||
+                entry.path().filename() == kAdapterFile)
                 old.push_back(entry.path());
         for (const Path& path : old)
             if (!error)

@@ -5,6 +5,7 @@
 #include "engine/format/camera_path.h"
 #include "engine/model/ldm_config.h"
 #include "engine/model/ldm_names.h"
+#include "engine/model/low_rank.h"
 #include "engine/model/renderer_model.h"
 #include "engine/scene/palette.h"
 #include "engine/scene/scene_objects.h"
@@ -215,6 +216,10 @@ Result<Report> describe_component(const Path& folder, bool with_tensors, Totals&
     SR_TRY(const std::optional<SafetensorsSet> weights, open_weights(folder));
     if (weights)
         report["weights"] = describe_weights(*weights, with_tensors, totals);
+    if (const Path adapter = folder / kAdapterFile; is_there(adapter)) {
+        SR_TRY(const SafetensorsSet set, SafetensorsSet::open(adapter));
+        report["adapter"] = describe_weights(set, with_tensors, totals);
+    }
     return report;
 }
 

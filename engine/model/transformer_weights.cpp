@@ -134,7 +134,7 @@ Status TransformerWeights::upload(Device& device, const Part& part, const float*
     return device.write(memory.part(at, memory.bytes - at), packed);
 }
 
-Status TransformerWeights::load(Device& device, const SafetensorsSet& file)
+Status TransformerWeights::load(Device& device, const SafetensorsSet& file, const LowRankAdapter& adapter)
 {
     std::map<std::string, TensorSpec> specs;
     for (const Part& p : parts_) {
@@ -147,6 +147,7 @@ Status TransformerWeights::load(Device& device, const SafetensorsSet& file)
     for (auto& [name, spec] : specs)
         schema.push_back(std::move(spec));
     SR_CHECK(file.require(schema));
+    SR_CHECK(adapter.require(schema));
     SR_CHECK(state_.allocate(device, "transformer weights"));
     SR_CHECK(check_finite(file));
     std::vector<float> values;
@@ -156,6 +157,7 @@ Status TransformerWeights::load(Device& device, const SafetensorsSet& file)
         const auto bytes = file.bytes(*info).subspan(p.first * row, p.count * row);
         values.resize(bytes.size() / dtype_bytes(info->dtype));
         to_float(bytes, info->dtype, values.data());
+        adapter.add(p.name, p.first, p.cols, values);
         SR_CHECK(upload(device, p, values.data()));
     }
     return {};

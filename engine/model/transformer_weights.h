@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/model/low_rank.h"
 #include "engine/model/transformer_config.h"
 #include "runtime/base/safetensors.h"
 #include "runtime/device/device.h"
@@ -29,8 +30,8 @@ class TransformerWeights {
     uint64_t device_bytes(const DeviceLimits& limits) const { return state_.planned_bytes(limits); }
     uint64_t parameters() const;
 
-    // checks every name and shape, then uploads. Errors: bad_input, out_of_memory
-    Status load(Device& device, const SafetensorsSet& file);
+    // checks every name and shape, then uploads, with what the adapter adds. Errors: bad_input, out_of_memory
+    Status load(Device& device, const SafetensorsSet& file, const LowRankAdapter& adapter = {});
     // seeded values at the scale of a trained model, for benchmarks
     Status randomize(Device& device, uint64_t seed);
 

@@ -35,7 +35,8 @@ Result<std::unique_ptr<Transformer>> Transformer::load(Device& device, const Pat
     SR_TRY(const TransformerConfig config, read_transformer_config(folder));
     SR_TRY(const SafetensorsSet file, SafetensorsSet::open_folder(folder));
     std::unique_ptr<Transformer> t(new Transformer(config, precision));
-    SR_CHECK(t->weights_.load(device, file));
+    SR_TRY(const LowRankAdapter adapter, LowRankAdapter::open_folder(folder));
+    SR_CHECK(t->weights_.load(device, file, adapter));
     SR_CHECK(t->upload_frequencies(device));
     return t;
 }

@@ -28,7 +28,7 @@ struct ToldTokens {
 // to a graph; D = heads * head_dim, C = 6 * points, M tokens of all sets.
 class Transformer {
   public:
-    // reads config.json and the weights of a voxfield_transformer folder
+    // reads config.json and the weights of a voxfield_transformer folder, and its adapter if there is one
     static Result<std::unique_ptr<Transformer>> load(Device& device, const Path& folder, DType precision);
     // random weights of a config, for benchmarks
     static Result<std::unique_ptr<Transformer>> random(Device& device, const TransformerConfig& config,

@@ -7,6 +7,7 @@ import torch
 
 from . import safetensors_file
 from .json_file import read_json, write_json
+from .low_rank import FILE, is_adapter
 
 HALF_BITS = 10  # of an fp16 number's mantissa, its leading one not counted
 
@@ -23,11 +24,16 @@ def rounded_half(tensor, bits=HALF_BITS):
 
 
 def write_component(folder, config, state, mantissa_bits=HALF_BITS):
-    """FOLDER/config.json and the weights in fp16"""
+    """FOLDER/config.json and the weights in fp16; those of adapters in a file of their own"""
     os.makedirs(folder, exist_ok=True)
     write_json(os.path.join(folder, "config.json"), config)
-    safetensors_file.write(os.path.join(folder, "diffusion_pytorch_model.safetensors"),
-                           {name: rounded_half(t, mantissa_bits) for name, t in state.items()}, {"format": "pt"})
+    rounded = {name: rounded_half(t, mantissa_bits) for name, t in state.items()}
+    for file, adapter in (("diffusion_pytorch_model.safetensors", False), (FILE, True)):
+        tensors = {name: t for name, t in rounded.items() if is_adapter(name) == adapter}
+        if tensors or not adapter:
+            safetensors_file.write(os.path.join(folder, file), tensors, {"format": "pt"})
+        elif os.path.exists(os.path.join(folder, file)):
+            os.remove(os.path.join(folder, file))
 
 
 def write_scheduler(folder, config):
@@ -48,6 +54,6 @@ def add_to_index(folder, components, defaults=None):
 
 
 def read_component(folder):
-    """-> (config, {name: tensor})"""
+    """-> (config, {name: tensor}), adapters left out"""
     weights = os.path.join(folder, "diffusion_pytorch_model.safetensors")
     return read_json(os.path.join(folder, "config.json")), safetensors_file.read(weights)

@@ -11,6 +11,7 @@ import torch
 
 from .condition import vector_of, width_of
 from .grids import read_tokens
+from .low_rank import merged, read_adapter
 from .model_folder import read_component
 from .nets.transformer import VoxfieldTransformer
 from .objects import PART_REACH, has_box, owners_of, read_objects
@@ -24,10 +25,11 @@ SETS = 8             # of a batch
 
 
 def load_transformer(folder):
-    """-> VoxfieldTransformer of a voxfield_transformer folder, evaluating"""
+    """-> VoxfieldTransformer of a voxfield_transformer folder, its adapter merged, evaluating"""
     config, state = read_component(folder)
     model = VoxfieldTransformer(**{k: v for k, v in config.items()
                                    if not k.startswith("_") and k not in ("prediction_type", "placement")})
+    state = merged(state, read_adapter(folder))
     model.load_state_dict({name: t.float() for name, t in state.items()})
     return model.eval().requires_grad_(False)
 

@@ -10,6 +10,7 @@ import torch.nn.functional as F
 
 from .condition import width_of
 from .grids import Grids, LocalSets
+from .low_rank import add_low_rank, is_adapter, merged, read_adapter
 from .model_folder import add_to_index, read_component, write_component, write_scheduler
 from .nets.transformer import VoxfieldTransformer
 from .settings import parser, resolve
@@ -93,7 +94,8 @@ def with_new_parts(state, model):
     """weights of a model that is told less than `model`, and those that `model` begins with for the rest; what it is told
     more than something says nothing at first"""
     first = "condition_embed.linear_1.weight"
-    state = {**{name: t for name, t in model.state_dict().items() if name.startswith("condition_embed.")}, **state}
+    new = {name: t for name, t in model.state_dict().items() if name.startswith("condition_embed.") or is_adapter(name)}
+    state = {**new, **state}
     more = model.state_dict()[first].shape[1] - state[first].shape[1] if first in state else 0
     if more > 0:
         state[first] = F.pad(state[first], (0, more))
@@ -101,14 +103,14 @@ def with_new_parts(state, model):
 
 
 def train_only(model, patterns):
-    """the parameters whose names match one of these (`*` stands for anything); all where there are none"""
+    """the parameters whose names match one of these (`*` stands for anything), and adapters; all where there are none"""
     parameters = dict(model.named_parameters())
     for pattern in patterns:
         if not any(fnmatchcase(name, pattern) for name in parameters):
             some = ", ".join([*parameters][:3])
             raise SystemExit(f"train_only: no parameter is called {pattern}; there are {some}, ...")
     for name, p in parameters.items():
-        p.requires_grad_(not patterns or any(fnmatchcase(name, pattern) for pattern in patterns))
+        p.requires_grad_(not patterns or is_adapter(name) or any(fnmatchcase(name, pattern) for pattern in patterns))
 
 
 def exporter(folder, config, grids):
@@ -143,10 +145,12 @@ def main():
     torch.manual_seed(config["seed"])
     model = VoxfieldTransformer(**config["network"])
     model.start_at_zero()
+    add_low_rank(model, config["low_rank"], config["low_rank_of"])
     train_only(model, config["train_only"])
     trainer = Trainer(options.output, model, config, exporter(options.output, config, sets.grids))
     if options.init:
-        trainer.start_from(with_new_parts(read_component(options.init)[1], model))
+        state, adapter = read_component(options.init)[1], read_adapter(options.init)
+        trainer.start_from(with_new_parts({**state, **adapter} if config["low_rank"] else merged(state, adapter), model))
     print(f"{sum(p.numel() for p in model.parameters())} parameters, {len(sets.grids.labels)} cells", flush=True)
     trainer.run(loss_of(sets, config))
 

@@ -1,0 +1,38 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "runtime/base/safetensors.h"
+
+#include <map>
+
+namespace semrover {
+
+constexpr const char* kAdapterFile = "pytorch_lora_weights.safetensors"; // as diffusers calls it
+
+// A low-rank adapter (LoRA, Hu et al. 2021, arXiv 2106.09685): what is added to some of a network's matrices. For
+// NAME.weight [N, K] the file has NAME.lora_A.weight [r, K] and NAME.lora_B.weight [N, r]; B A is added. The rank r may
+// differ from matrix to matrix.
+class LowRankAdapter {
+  public:
+    // of a component's folder; empty where the folder has no such file. bad_input: a file that is damaged
+    static Result<LowRankAdapter> open_folder(const Path& folder);
+
+    bool empty() const { return pairs_.empty(); }
+    // bad_input: one line lists tensors that are no such pair, and what belongs to no matrix of the schema or does not
+    // fit it
+    Status require(std::span<const TensorSpec> schema) const;
+    // adds to rows `first` and following of a matrix of `cols` columns, called `name`, if the adapter has any; values
+    // are these rows. Call after require()
+    void add(const std::string& name, uint32_t first, uint32_t cols, std::span<float> values) const;
+
+  private:
+    struct Pair {
+        uint32_t rank = 0;
+        std::vector<float> down, up; // A, B
+    };
+    Path path_;
+    std::map<std::string, Pair> pairs_; // by the matrix's name
+};
+
+} // namespace semrover
