@@ -216,6 +216,37 @@ TEST(engine_guessed_objects, houses_have_rows_of_the_parts_that_are_usual_where_
     EXPECT_NE(guessed(grid, known, 2).back().center, found.back().center);
 }
 
+TEST(engine_guessed_objects, a_window_is_behind_every_balcony_and_others_in_its_row_and_column)
+{
+    UsualObjects known = usual();
+    known[kBuilding].parts = UsualParts{{0.9, 1.2, 1.6}, {2.6, 3.1}, 1, {}};
+    Scene s = street();
+    const Cell corners[] = {{20, 8, 6}, {20, 8, 11}, {28, 8, 6}, {28, 8, 11}}; // floors at 3.9 and 6.9 m
+    for (const Cell& c : corners)
+        s.fill(kBuilding, c, {c[0] + 3, 9, c[2] + 1});
+    s.fill(kBuilding, {36, 8, 2}, {59, 9, 3}); // an awning: no balcony
+    std::vector<SceneObject> parts = guessed(s.grid(), known, 1);
+    std::erase_if(parts, [](const SceneObject& o) { return !o.part; });
+    for (const SceneObject& part : parts)
+        EXPECT_FALSE(part.tint);
+    for (const Cell& c : corners) {
+        const double middle = (c[0] + 2) * 0.6, floor = (c[2] + 0.5) * 0.6;
+        const auto behind = std::ranges::find_if(parts, [&](const SceneObject& o) {
+            return std::abs(o.center[0] - middle) < 0.1 && std::abs(o.center[2] - o.size[2] / 2 - floor - 0.1) < 0.1;
+        });
+        ASSERT_NE(behind, parts.end()) << middle << " " << floor;
+        const double top = behind->center[2] + behind->size[2] / 2;
+        EXPECT_NEAR(top, floor + 0.9 + 1.6, 1.6 * 0.15 + 0.01);
+        const auto in_row = std::ranges::count_if(parts, [&](const SceneObject& o) {
+            return std::abs(o.center[2] + o.size[2] / 2 - top) < 1e-6 && o.center[0] > 10.8 && o.center[0] < 21.6;
+        });
+        EXPECT_GE(in_row, 3);
+        const auto in_column = std::ranges::count_if(
+            parts, [&](const SceneObject& o) { return std::abs(o.center[0] - behind->center[0]) < 1e-6; });
+        EXPECT_GE(in_column, 4);
+    }
+}
+
 TEST(engine_guessed_objects, every_cell_of_a_wall_belongs_to_the_house_around_it)
 {
     const VoxelGrid grid = street().grid();
