@@ -270,14 +270,23 @@ void describe_video(Report& report, const Path& folder)
                        {"sampler", sampler_name(model->scheduler.sampler)}};
 }
 
+void count_tints(Report& usual)
+{
+    if (!usual.is_object())
+        return;
+    if (usual.contains("tints"))
+        usual["tints"] = usual["tints"].size();
+    if (usual.contains("parts"))
+        count_tints(usual["parts"]);
+}
+
 // with the number of an object's colours in place of these
 Report described_defaults(const Json& defaults)
 {
     Report described = defaults;
     if (described.is_object() && described.contains("objects") && described["objects"].is_object())
         for (auto& [name, usual] : described["objects"].items())
-            if (usual.is_object() && usual.contains("tints"))
-                usual["tints"] = usual["tints"].size();
+            count_tints(usual);
     return described;
 }
 
