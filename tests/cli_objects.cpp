@@ -139,7 +139,17 @@ TEST_F(CliObjects, inspect_counts_objects_and_says_where_those_of_a_grid_are)
     const auto objects = json_of(semrover_program("inspect --json " + path("a.objects.json")).out);
     EXPECT_EQ(objects["count"], 1);
     EXPECT_EQ(objects["tinted"], 1);
+    EXPECT_EQ(objects["parts"], 0);
     EXPECT_EQ(objects["classes"]["building"], 1);
+    std::vector<SceneObject> with_window = *read_objects(folder_ / "a.objects.json");
+    with_window.push_back(with_window[0]);
+    with_window[1].id = 77;
+    with_window[1].part = true;
+    ASSERT_TRUE(write_objects(folder_ / "window.json", with_window));
+    const auto more = json_of(semrover_program("inspect --json " + path("window.json")).out);
+    EXPECT_EQ(more["count"], 2);
+    EXPECT_EQ(more["parts"], 1);
+    EXPECT_EQ(more["classes"]["building"], 1);
     EXPECT_EQ(json_of(semrover_program("inspect --json " + path("a.sgrid")).out)["objects"], path("a.objects.json"));
     EXPECT_FALSE(json_of(semrover_program("inspect --json " + path("in.sgrid")).out).contains("objects"));
     const auto model = json_of(semrover_program("inspect --json " + path("model")).out);

@@ -383,8 +383,9 @@ Result<Report> describe_objects(const Path& path)
     SR_TRY(const std::vector<SceneObject> objects, read_objects(path));
     std::array<uint64_t, kClassCount> counts{};
     for (const SceneObject& o : objects)
-        ++counts[o.label];
+        counts[o.label] += !o.part;
     Report report = {{"objects", path.string()}, {"count", objects.size()}};
+    report["parts"] = std::ranges::count(objects, true, &SceneObject::part);
     report["tinted"] = std::ranges::count_if(objects, [](const SceneObject& o) { return o.tint.has_value(); });
     report["classes"] = counted_by_class(counts);
     return report;
