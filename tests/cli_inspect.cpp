@@ -39,13 +39,14 @@ TEST(CliInspect, a_model_shows_components_config_and_weights)
     EXPECT_EQ(transformer["config"]["num_layers"], 6);
     EXPECT_EQ(transformer["weights"]["dtypes"]["F16"], 178);
     EXPECT_EQ(transformer["weights"]["list"].size(), 178u);
-    EXPECT_EQ(transformer["weights"]["parameters"], 7850040);
-    EXPECT_EQ(transformer["weights"]["bytes"], 2 * 7850040);
+    EXPECT_EQ(transformer["weights"]["parameters"], 7862328);
+    EXPECT_EQ(transformer["weights"]["bytes"], 2 * 7862328);
+    EXPECT_EQ(transformer["adapter"]["parameters"], 235008);
     const int renderer = 12738180, vae = 1424155, text = 32;
-    EXPECT_EQ(json["parameters"], 7850040 + renderer + vae + text);
-    EXPECT_EQ(json["bytes"], 2 * (7850040 + renderer + vae + text));
+    EXPECT_EQ(json["parameters"], 7862328 + 235008 + renderer + vae + text);
+    EXPECT_EQ(json["bytes"], 2 * (7862328 + 235008 + renderer + vae + text));
     const ProgramResult shown = semrover_program("inspect " + kAssets + "/model");
-    EXPECT_NE(shown.out.find("parameters  7850040"), std::string::npos);
+    EXPECT_NE(shown.out.find("parameters  7862328"), std::string::npos);
     EXPECT_EQ(shown.out.find("proj_in.weight"), std::string::npos); // the list needs -v
     EXPECT_NE(semrover_program("inspect -v " + kAssets + "/model").out.find("proj_in.weight"), std::string::npos);
 }
