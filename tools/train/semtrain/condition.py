@@ -38,16 +38,13 @@ def tint_part(tints, given):
     return np.where(given[:, None], np.concatenate([np.ones((len(tints), 1)), 2 * tints - 1], 1), 0).astype(np.float32)
 
 
-def part_part(centers, boxes, has_box, tints, has_tint):
-    """of the parts that N cells lie in or beside -> f32 [N, 64]"""
-    return np.concatenate([object_part(centers, boxes, has_box), tint_part(tints, has_tint)], 1)
-
-
 def vector_of(condition, centers, boxes, has_box, tints, has_tint, of_part=None):
     """what `condition` lists for N cells, in its order; of_part: the same four of the parts that they lie in or beside
     -> f32 [N, width_of(condition)]"""
+    def both(boxes, has_box, tints, has_tint):
+        return np.concatenate([object_part(centers, boxes, has_box), tint_part(tints, has_tint)], 1)
     parts = {"object": lambda: object_part(centers, boxes, has_box), "tint": lambda: tint_part(tints, has_tint),
-             "part": lambda: part_part(centers, *of_part) if of_part else np.zeros((len(centers), WIDTHS["part"]))}
+             "part": lambda: both(*of_part) if of_part else np.zeros((len(centers), WIDTHS["part"]))}
     return np.concatenate([np.zeros((len(centers), 0), np.float32)] + [parts[name]() for name in condition], 1)
 
 
