@@ -205,7 +205,7 @@ TEST(CliConvert, vsd_init_keeps_the_images_weights_for_the_buffer_and_adds_visib
     expect_error(convert(folder / "out", folder / "again", "--vsd-init --asd-init"), 2, "excludes");
 }
 
-TEST(CliConvert, a_transformer_comes_along)
+TEST(CliConvert, a_transformer_comes_along_with_its_adapter)
 {
     const ScratchFolder folder;
     const ProgramResult result = convert(SEMROVER_SOURCE_DIR "/assets/model", folder / "out", "--dtype f32 --json");
@@ -219,6 +219,12 @@ TEST(CliConvert, a_transformer_comes_along)
     const auto set = SafetensorsSet::open_folder(folder / "out/voxfield_transformer");
     ASSERT_TRUE(set) << set.error().message;
     EXPECT_EQ(set->tensors()[0].dtype, DType::f32);
+    const std::string adapter = "voxfield_transformer/pytorch_lora_weights.safetensors";
+    EXPECT_EQ(contents(folder / "out" / adapter), contents(Path(SEMROVER_SOURCE_DIR "/assets/model") / adapter));
+    fs::copy(SEMROVER_SOURCE_DIR "/assets/model", folder / "plain", fs::copy_options::recursive);
+    fs::remove(folder / "plain" / adapter);
+    ASSERT_EQ(convert(folder / "plain", folder / "out", "-y").code, 0);
+    EXPECT_FALSE(fs::exists(folder / "out" / adapter)) << "it belongs to the weights that it came with";
 }
 
 TEST(CliConvert, a_number_beyond_half_precision_is_an_error_that_names_the_tensor)
