@@ -36,8 +36,7 @@ bool is_matrix(const TensorInfo& tensor)
 Result<LowRankAdapter> LowRankAdapter::open_folder(const Path& folder)
 {
     LowRankAdapter adapter;
-    std::error_code ignored;
-    if (!std::filesystem::exists(folder / kAdapterFile, ignored))
+    if (!is_there(folder / kAdapterFile))
         return adapter;
     SR_TRY(SafetensorsSet file, SafetensorsSet::open(folder / kAdapterFile));
     SR_CHECK(check_finite(file));

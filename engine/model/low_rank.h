@@ -18,7 +18,6 @@ class LowRankAdapter {
     // of a component's folder; empty where the folder has no such file. bad_input: a file that is damaged
     static Result<LowRankAdapter> open_folder(const Path& folder);
 
-    bool empty() const { return pairs_.empty(); }
     // bad_input: one line lists tensors that are no such pair, and what belongs to no matrix of the schema or does not
     // fit it
     Status require(std::span<const TensorSpec> schema) const;

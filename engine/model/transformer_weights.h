@@ -31,7 +31,7 @@ class TransformerWeights {
     uint64_t parameters() const;
 
     // checks every name and shape, then uploads, with what the adapter adds. Errors: bad_input, out_of_memory
-    Status load(Device& device, const SafetensorsSet& file, const LowRankAdapter& adapter = {});
+    Status load(Device& device, const SafetensorsSet& file, const LowRankAdapter& adapter);
     // seeded values at the scale of a trained model, for benchmarks
     Status randomize(Device& device, uint64_t seed);
 

@@ -39,12 +39,12 @@ def tint_part(tints, given):
 
 
 def vector_of(condition, centers, boxes, has_box, tints, has_tint, of_part=None):
-    """what `condition` lists for N cells, in its order; of_part: the same four of the parts that they lie in or beside
-    -> f32 [N, width_of(condition)]"""
+    """what `condition` lists for N cells, in its order; of_part: the same four of the parts that they lie in or beside,
+    needed where "part" is listed -> f32 [N, width_of(condition)]"""
     def both(boxes, has_box, tints, has_tint):
         return np.concatenate([object_part(centers, boxes, has_box), tint_part(tints, has_tint)], 1)
     parts = {"object": lambda: object_part(centers, boxes, has_box), "tint": lambda: tint_part(tints, has_tint),
-             "part": lambda: both(*of_part) if of_part else np.zeros((len(centers), WIDTHS["part"]))}
+             "part": lambda: both(*of_part)}
     return np.concatenate([np.zeros((len(centers), 0), np.float32)] + [parts[name]() for name in condition], 1)
 
 

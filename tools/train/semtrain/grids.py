@@ -10,7 +10,7 @@ from . import safetensors_file
 from .condition import drawn_boxes, drawn_tints, mirrored, told_boxes, told_parts, told_tints, vector_of, width_of
 from .json_file import read_json, write_json
 from .known_cells import draw_known
-from .objects import PART_REACH, local_tints, owners_of, read_objects
+from .objects import local_tints, owned
 from .repaint import repaint
 
 
@@ -60,18 +60,10 @@ def placement_of(path):
 def read_owners(path, cells, labels):
     """the objects.json beside a .sgrid, if there is one -> owners i32 [V], tints near each cell u8 [V, 3], boxes
     f64 [O, 7], tints of the objects f32 [O, 3]; of the parts owners, boxes and tints"""
-    about = os.path.join(os.path.dirname(path), "objects.json")
-    if not os.path.exists(about):
-        none = np.full(len(cells), -1, np.int32)
-        return none, np.zeros((len(cells), 3), np.uint8), np.zeros((0, 7)), np.zeros((0, 3)), none, \
-            np.zeros((0, 7)), np.zeros((0, 3))
     grid, size = read_grid(path)
-    boxes, box_labels, tints = read_objects(about)
     centers = (cells + 0.5) * size
-    owners = owners_of(centers, labels, boxes, box_labels)
-    part_boxes, part_labels, part_tints = read_objects(about, parts=True)
-    parts = owners_of(centers, labels, part_boxes, part_labels, PART_REACH)
-    return owners, local_tints(centers, owners, grid["colors"]), boxes, tints, parts, part_boxes, part_tints
+    owners, boxes, tints = owned(path, centers, labels)
+    return owners, local_tints(centers, owners, grid["colors"]), boxes, tints, *owned(path, centers, labels, parts=True)
 
 
 class Grids:

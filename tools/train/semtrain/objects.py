@@ -57,6 +57,16 @@ def owners_of(centers, labels, boxes, box_labels, reach=BOX_REACH):
     return owners
 
 
+def owned(path, centers, labels, parts=False):
+    """of the objects.json beside a .sgrid, if there is one, what its cells are of, or which parts they lie in or beside
+    -> owners i32 [V], boxes f64 [O, 7], tints f32 [O, 3]"""
+    about = os.path.join(os.path.dirname(path), "objects.json")
+    if not os.path.exists(about):
+        return np.full(len(centers), -1, np.int32), np.zeros((0, 7)), np.zeros((0, 3), np.float32)
+    boxes, of_boxes, tints = read_objects(about, parts)
+    return owners_of(centers, labels, boxes, of_boxes, PART_REACH if parts else BOX_REACH), boxes, tints
+
+
 def has_box(owners, labels):
     """which cells can be told the box of their object -> bool [N]: the ground has none"""
     return (owners >= 0) & ~np.isin(labels, GROUND)

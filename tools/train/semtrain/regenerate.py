@@ -4,17 +4,15 @@
 can still be told, and denoised from there. What the transformer cannot draw is then wrong as it is in generated streets.
 A model that may be told of objects and colours is told the street's own, and what it makes of an object gets the
 object's mean colour: a car of another colour than its picture would teach a renderer to leave colours out of account."""
-import os
-
 import numpy as np
 import torch
 
-from .condition import vector_of, width_of
+from .condition import vector_of
 from .grids import read_tokens
 from .low_rank import merged, read_adapter
 from .model_folder import read_component
 from .nets.transformer import VoxfieldTransformer
-from .objects import PART_REACH, has_box, owners_of, read_objects
+from .objects import has_box, owned
 from .precision import autocast
 from .transformer import linear_alphas, noised
 
@@ -58,31 +56,28 @@ def ancestral_step(x, x0, a, b, random):
     return b.sqrt() * x0 + (1 - b - fresh).clamp(min=0).sqrt() * noise + fresh.sqrt() * torch.randn(x.shape, generator=random)
 
 
+def of_owners(owners, boxes, tints):
+    """-> for each cell the box of its owner, whether it has one, its colour, and whether it has one"""
+    if not len(boxes):
+        boxes, tints = np.ones((1, 7)), np.full((1, 3), np.nan)
+    has, of_cells = owners >= 0, np.maximum(owners, 0)
+    return boxes[of_cells], has, tints[of_cells], has & ~np.isnan(tints[of_cells]).any(1)
+
+
 class Objects:
     """the objects.json beside a .sgrid, if there is one: owners i32 [V] of the cells, -1 for none; boxes and tints"""
 
     def __init__(self, path, centers, labels):
-        about = os.path.join(os.path.dirname(path), "objects.json")
-        none = (np.ones((0, 7)), [], [])
-        self.boxes, of_boxes, self.tints = read_objects(about) if os.path.exists(about) else none
-        self.part_boxes, of_parts, self.part_tints = read_objects(about, parts=True) if os.path.exists(about) else none
-        self.centers, self.owners = centers, owners_of(centers, labels, self.boxes, of_boxes)
-        self.parts = owners_of(centers, labels, self.part_boxes, of_parts, PART_REACH)
+        self.centers = centers
+        self.owners, self.boxes, self.tints = owned(path, centers, labels)
+        self.parts, self.part_boxes, self.part_tints = owned(path, centers, labels, parts=True)
         self.has_box = has_box(self.owners, labels)
 
     def tell(self, parts):
         """boxes, and colours of whole objects -> f32 [V, W]"""
-        if not len(self.boxes):
-            return np.zeros((len(self.centers), width_of(parts)), np.float32)
-        has, of_cells = self.owners >= 0, np.maximum(self.owners, 0)
-        tints = self.tints[of_cells]
-        return vector_of(parts, self.centers, self.boxes[of_cells], self.has_box, tints, has & ~np.isnan(tints).any(1),
-                         self._of_part() if len(self.part_boxes) else None)
-
-    def _of_part(self):
-        has, of_cells = self.parts >= 0, np.maximum(self.parts, 0)
-        tints = self.part_tints[of_cells]
-        return self.part_boxes[of_cells], has, tints, has & ~np.isnan(tints).any(1)
+        boxes, _, tints, has_tint = of_owners(self.owners, self.boxes, self.tints)
+        return vector_of(parts, self.centers, boxes, self.has_box, tints, has_tint,
+                         of_owners(self.parts, self.part_boxes, self.part_tints))
 
     def keep_colors(self, made, true):
         """tokens [V, n, 6]: moves the colours that were made so that those of each object have the true mean"""
