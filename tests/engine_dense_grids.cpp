@@ -146,15 +146,108 @@ TEST(LabelMap, a_file_says_what_labels_are)
     EXPECT_EQ(map.left_out("voxels"), std::vector<std::string>{"4 voxels of label 10 are left out"});
     EXPECT_EQ(map(77, 3), kLeftOut);
     EXPECT_EQ(map(99999), kLeftOut);
-    EXPECT_TRUE(says(map.check("here", "voxels"), "here: unknown labels: 77 (3 voxels), 99999 (1 voxels); --map FILE"));
-    EXPECT_TRUE(says(apply("[]"), "expected an object of source label to class, found array"));
     EXPECT_TRUE(
-        says(apply(R"({"lamp": "lamp"})"), "'lamp': expected a class (name or 0 to 19) or null, found \"lamp\""));
+        says(map.check("here", "voxels"), "here: unknown labels: 77 (3 voxels), 99999 (1 voxels); --map NAME or FILE"));
+    EXPECT_TRUE(says(apply("[]"), "expected an object of source label to class, found array"));
+    EXPECT_TRUE(says(apply(R"({"lamp": "lamp"})"),
+                     "'lamp': expected a class (name or 0 to 19), null or \"free\", found \"lamp\""));
     EXPECT_TRUE(says(apply(R"({"lamp": 20})"), "found 20"));
     EXPECT_TRUE(says(apply(R"({"lamp": -1})"), "found -1"));
     EXPECT_TRUE(says(apply(R"({"dog": 1})"), "'dog': the source has no label of that name"));
     EXPECT_TRUE(says(apply(R"({"lamp": 1)"), "map.json"));
-    EXPECT_TRUE(says(LabelMap().apply(folder / "none.json"), "none.json"));
+    EXPECT_TRUE(
+        says(LabelMap().apply(folder / "none.json"), "none.json': expected a file, or one of the tables ours, "));
+    EXPECT_TRUE(says(apply(R"({"lamp": {"name": "a", "class": 1}})"), "of a number"));
+    EXPECT_TRUE(says(apply(R"({"7": {"name": "a"}})"), "expected {\"name\": .., \"class\": ..}"));
+}
+
+TEST(LabelMap, a_table_by_name_is_the_file_of_that_name)
+{
+    constexpr std::array<std::tuple<const char*, uint32_t, uint8_t>, 23> cases = {{
+        {"asprs", 2, 9},
+        {"asprs", 5, 8},
+        {"asprs", 6, 2},
+        {"asprs", 7, kLeftOut},
+        {"asprs", 11, 0},
+        {"carla", 1, 0},
+        {"carla", 24, 19},
+        {"cityscapes", 7, 0},
+        {"cityscapes", 11, 2},
+        {"cityscapes", 26, 13},
+        {"kitti360", 34, 2},
+        {"kitti360", 37, 5},
+        {"nuscenes", 17, 13},
+        {"nuscenes", 24, 0},
+        {"nuscenes", 30, 8},
+        {"nyu40", 1, 3},
+        {"nyu40", 31, 11},
+        {"occ3d", 17, kEmpty},
+        {"occ3d-waymo", 10, 2},
+        {"semantickitti", 50, 2},
+        {"semantickitti-train", 13, 2},
+        {"semantickitti-train", 9, 0},
+        {"ours", 13, 13},
+    }};
+    for (const auto& [name, number, target] : cases) {
+        LabelMap map = *LabelMap::of(name);
+        EXPECT_EQ(map(number), target) << name << ' ' << number;
+        EXPECT_TRUE(map.check("here", "voxels"));
+        EXPECT_EQ(map(200), kLeftOut); // nothing of the numbers from before is left
+        EXPECT_TRUE(says(map.check("here", "voxels"), "unknown labels: 200"));
+        const Path file = Path(SEMROVER_SOURCE_DIR "/assets/label_maps") / (std::string(name) + ".json");
+        if (std::string_view(name) == "ours")
+            continue;
+        LabelMap of_file = LabelMap::identity();
+        ASSERT_TRUE(of_file.apply(file));
+        EXPECT_EQ(of_file(number), target) << file;
+    }
+    LabelMap map = LabelMap::identity();
+    ASSERT_TRUE(map.apply("nuscenes"));
+    EXPECT_EQ(map(0), kLeftOut); // not our road
+    ASSERT_TRUE(map.apply("semantickitti"));
+    EXPECT_EQ(map(2), kLeftOut);
+    EXPECT_TRUE(says(map.check("here", "voxels"), "unknown labels: 2 (1 voxels)"));
+}
+
+TEST(LabelMap, a_column_of_another_program_needs_a_map)
+{
+    const ScratchFolder folder;
+    constexpr LabelColumn las{"classification", "asprs"}, any{"label", ""};
+    const auto ask = [](const Result<LabelMap>& made, std::initializer_list<uint32_t> numbers) {
+        EXPECT_TRUE(made) << made.error().message;
+        LabelMap map = *made;
+        std::vector<uint8_t> targets;
+        for (const uint32_t number : numbers)
+            targets.push_back(map(number));
+        return std::pair(map, targets);
+    };
+    auto [refused, unused] = ask(LabelMap::of_column(las, false, {}), {2, 6, 6, 77});
+    EXPECT_TRUE(says(refused.check("p.ply", "points"),
+                     "p.ply: 'classification': a column of that name holds numbers of asprs, not ours: 2 ground (1 "
+                     "points, terrain), 6 building (2 points), 77 (1 points, unknown); --map asprs takes"));
+    auto [taken, terrain] = ask(LabelMap::of_column(las, false, "asprs"), {2, 6});
+    EXPECT_EQ(terrain, (std::vector<uint8_t>{9, 2}));
+    EXPECT_TRUE(taken.check("p.ply", "points"));
+    auto [ours, same] = ask(LabelMap::of_column(las, false, "ours"), {2, 6});
+    EXPECT_EQ(same, (std::vector<uint8_t>{2, 6}));
+    const Path file = folder.put("map.json", R"({"6": "wall", "ground": "road"})");
+    auto [partly, walls] = ask(LabelMap::of_column(las, false, file), {2, 6, 5});
+    EXPECT_EQ(walls, (std::vector<uint8_t>{0, 3, kLeftOut})); // 5 is no pole: nothing of ours is behind the file
+    EXPECT_TRUE(says(partly.check("p.ply", "points"), "unknown labels: 5 high vegetation (1 points)"));
+
+    auto [anybody, numbers] = ask(LabelMap::of_column(any, false, {}), {2, 2, 5});
+    EXPECT_EQ(numbers, (std::vector<uint8_t>{2, 2, 5}));
+    EXPECT_TRUE(anybody.check("p.ply", "points"));
+    EXPECT_EQ(anybody.assumed("p.ply", "points"),
+              std::vector<std::string>{"p.ply: 'label': the numbers are taken for our own classes: 2 building (2 "
+                                       "points), 5 pole (1 points); --map says what they are if they are another "
+                                       "program's"});
+    auto [own, again] = ask(LabelMap::of_column(any, true, {}), {2, 2, 5});
+    EXPECT_TRUE(own.assumed("p.ply", "points").empty());
+    auto [raw, none] = ask(LabelMap::of_column(any, false, {}), {10, 252});
+    EXPECT_TRUE(says(raw.check("p.ply", "points"),
+                     "unknown labels: 252 (1 points); --map NAME or FILE says what they are; found are 10 sky (1 "
+                     "points), 252 (1 points, unknown); all numbers of the file are in semantickitti"));
 }
 
 // ---- SemanticKITTI

@@ -620,12 +620,20 @@ TEST(MeshFiles, labels_come_from_names_maps_and_faces)
     EXPECT_EQ(unlabelled_text(unknown), fmt::format("'paint' (1 faces, {:.4g} m^2)", face_area(m, 2)));
     for (const auto& [text, error] : std::initializer_list<std::pair<const char*, const char*>>{
              {"[]", "expected an object"},
-             {R"({"a": "grass"})", "'a': expected a class name, a number of 0 to 19 or null, found \"grass\""},
+             {R"({"a": "grass"})", "'a': expected a class (name or 0 to 19), null or \"free\", found \"grass\""},
              {R"({"a": 20})", "found 20"},
              {R"({"a": -1})", "found -1"},
              {R"({"a": 1.5})", "found 1.5"},
              {R"({"a": [1]})", "found [1]"}})
         EXPECT_TRUE(says(MeshLabelMap::read(folder.put("map.json", text)), error)) << text;
+    const auto kitti = MeshLabelMap::read("semantickitti");
+    ASSERT_TRUE(kitti) << kitti.error().message;
+    EXPECT_EQ(kitti->find(int64_t(50)), 2);
+    EXPECT_EQ(kitti->find("lane_marking"), 19);
+    EXPECT_EQ(kitti->find(int64_t(2)), std::nullopt); // no label of theirs, and not ours either
+    EXPECT_EQ(kitti->find(int64_t(-1)), kNoLabel);
+    EXPECT_EQ(MeshLabelMap().find(2), 2);
+    EXPECT_EQ(MeshLabelMap().find(2, true), std::nullopt);
 }
 
 } // namespace engine_mesh_files_test

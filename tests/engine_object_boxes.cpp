@@ -153,7 +153,7 @@ TEST_F(ObjectBoxes, broken_kitti_labels_are_refused_with_their_line)
     text.replace(text.find("20 "), 3, "2e7 ");
     EXPECT_TRUE(says(kitti(text), "center: expected numbers from -1000000 to 1000000"));
     text.replace(0, 3, "Cow");
-    EXPECT_TRUE(says(kitti(kAhead + text), "unknown labels: 1009 Cow (1 objects); --map FILE says what they are"));
+    EXPECT_TRUE(says(kitti(kAhead + text), "unknown labels: 1009 Cow (1 objects); --map NAME or FILE says what they are"));
     const Path map = folder_.put("map.json", R"({"Cow": null, "Misc": "truck", "Car": "road-lane"})");
     const auto mapped = kitti(kAhead + "Misc" + kAhead.substr(3) + text, {.map = map});
     ASSERT_TRUE(mapped) << mapped.error().message;

@@ -99,7 +99,9 @@ void add_scene_input_options(CLI::App& c, SceneInputOptions& o)
 {
     o.command = &c;
     c.add_option("--from", o.from, "format of the input, instead of by its extension: " + names_of_formats());
-    c.add_option("--map", o.map, "JSON: label of the input (number or name) to class (name or number), null: left out");
+    c.add_option(
+        "--map", o.map,
+        "a table by name, or JSON: label of the input (number or name) to class (name or number), null: left out");
     add_number(c, "--voxel-size", o.voxel_size, "metres, of a grid made of another program's voxels or points", 0.001f,
                100.f);
     add_number(c, "--file-voxel-size", o.file_voxel_size,

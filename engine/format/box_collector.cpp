@@ -2,8 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/format/box_collector.h"
 
-#include "runtime/base/json.h"
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -14,11 +12,6 @@ namespace {
 
 constexpr uint32_t kFirstFreeNumber = 1000; // above those of the tables
 constexpr double kLeastUp = std::numbers::sqrt2 / 2;
-
-bool is_number(std::string_view text)
-{
-    return !text.empty() && std::ranges::all_of(text, [](char c) { return c >= '0' && c <= '9'; });
-}
 
 } // namespace
 
@@ -31,12 +24,14 @@ Result<BoxCollector> BoxCollector::create(std::span<const SourceLabel> table, co
         collector.numbers_.emplace(label.name, label.number);
     if (map.empty())
         return collector;
-    SR_TRY(const Json json, read_json(map));
-    if (json.is_object())
-        for (const auto& [name, target] : json.items())
-            if (!is_number(name))
-                collector.number_of(name);
-    SR_CHECK(collector.labels_.apply(map));
+    SR_TRY(LabelTable overrides, read_label_table(map));
+    overrides.whole = false;
+    for (LabelTable::Label& label : overrides.labels)
+        if (!label.name.empty()) { // boxes have names: numbers of a table of other files mean nothing here
+            label.number.reset();
+            collector.number_of(label.name);
+        }
+    SR_CHECK(collector.labels_.apply(overrides));
     return collector;
 }
 

@@ -2,19 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/scene/palette.h"
-#include "runtime/base/file.h"
+#include "engine/format/label_column.h"
+#include "engine/format/label_table.h"
 
 #include <map>
-#include <optional>
 #include <span>
-#include <string>
-#include <vector>
 
 namespace semrover {
-
-constexpr uint8_t kLeftOut = 254; // a source label whose cells stay empty
-constexpr uint8_t kEmpty = 255;   // free space in the source
 
 // what a format calls its classes
 struct SourceLabel {
@@ -23,26 +17,36 @@ struct SourceLabel {
     uint8_t target; // a class, kLeftOut or kEmpty
 };
 
-constexpr std::string_view kMapAdvice = "--map FILE says what they are";
+constexpr std::string_view kMapAdvice = "--map NAME or FILE says what they are";
 
 // Maps source label numbers to classes, and counts the lookups of each.
 class LabelMap {
   public:
     LabelMap() = default;
     explicit LabelMap(std::span<const SourceLabel> labels);
-    static LabelMap identity(); // 0..19 are the classes themselves
+    static LabelMap identity();                         // 0..19 are the classes themselves
+    static Result<LabelMap> of(std::string_view table); // of label_table_names()
+    // Of a column of a file; `ours`: the file says that we wrote it. `map` (empty: none) overrides our classes, and is
+    // all that there is of a column that is another program's. Without a map check() refuses such a column.
+    static Result<LabelMap> of_column(const LabelColumn& column, bool ours, const Path& map);
 
     void set(uint32_t source, std::string name, std::optional<uint8_t> target); // none: known by name only
 
-    // Reads JSON: an object of source label (number, or name in the format's table) to class (name or number), or null
-    // to leave it out. The file's entries override the others. bad_input names the entry.
-    Status apply(const Path& file);
+    // Takes a table of --map. A whole one replaces the others, another's entries override theirs. bad_input names the
+    // entry: also for a name that no label has.
+    Status apply(const LabelTable& table);
+    Status apply(const Path& name_or_file); // read_label_table
+
+    bool knows(uint32_t source) const { return entries_.contains(source); }
 
     // a class, kLeftOut (also for an unknown label) or kEmpty
     uint8_t operator()(uint32_t source, uint64_t count = 1);
 
-    // bad_input if unknown labels were looked up: one line with their counts, `advice` at its end
+    // bad_input if unknown labels were looked up: one line with their counts, `advice` at its end, and the tables that
+    // know all of the numbers; also for a column that of_column refuses, with all numbers and what they would be
     Status check(std::string_view where, std::string_view things, std::string_view advice = kMapAdvice) const;
+    // a line if numbers of anybody's column were taken for ours, which says for which classes; else none
+    std::vector<std::string> assumed(std::string_view where, std::string_view things) const;
     // "4 of label 99 (other-object)", a line for each source label that was left out
     std::vector<std::string> left_out(std::string_view things) const;
     uint64_t dropped() const; // how many were left out
@@ -52,8 +56,14 @@ class LabelMap {
         std::string name;
         std::optional<uint8_t> target; // none: unknown
         uint64_t count = 0;
+        bool assumed = false; // nothing says that the number is ours
     };
+    std::string listed(std::string_view things, bool assumed_only) const;
+    std::string known_to() const;
+
     std::map<uint32_t, Entry> entries_;
+    LabelColumn column_; // of_column
+    bool refused_ = false, numbers_ = false;
 };
 
 } // namespace semrover

@@ -10,35 +10,6 @@ namespace semrover {
 
 namespace {
 
-constexpr SourceLabel kNuscenes[] = {
-    {0, "others", kLeftOut}, {1, "barrier", 4},     {2, "bicycle", 18},
-    {3, "bus", 15},          {4, "car", 13},        {5, "construction_vehicle", 14},
-    {6, "motorcycle", 17},   {7, "pedestrian", 11}, {8, "traffic_cone", 5},
-    {9, "trailer", 14},      {10, "truck", 14},     {11, "driveable_surface", 0},
-    {12, "other_flat", 9},   {13, "sidewalk", 1},   {14, "terrain", 9},
-    {15, "manmade", 2},      {16, "vegetation", 8}, {17, "free", kEmpty},
-};
-
-constexpr SourceLabel kWaymo[] = {
-    {0, "TYPE_GENERALOBJECT", kLeftOut},
-    {1, "TYPE_VEHICLE", 13},
-    {2, "TYPE_PEDESTRIAN", 11},
-    {3, "TYPE_SIGN", 7},
-    {4, "TYPE_CYCLIST", 12},
-    {5, "TYPE_TRAFFIC_LIGHT", 6},
-    {6, "TYPE_POLE", 5},
-    {7, "TYPE_CONSTRUCTION_CONE", 5},
-    {8, "TYPE_BICYCLE", 18},
-    {9, "TYPE_MOTORCYCLE", 17},
-    {10, "TYPE_BUILDING", 2},
-    {11, "TYPE_VEGETATION", 8},
-    {12, "TYPE_TREE_TRUNK", 8},
-    {13, "TYPE_ROAD", 0},
-    {14, "TYPE_WALKABLE", 1},
-    {15, "free", kEmpty},
-    {23, "free", kEmpty},
-};
-
 struct Box {
     std::vector<uint64_t> shape;
     DenseLabels dense; // without labels
@@ -96,7 +67,7 @@ Result<SceneGrid> read_occ3d(const Path& path, Occ3dKind kind, const SceneGridOp
     SR_CHECK(check_array(array, box.shape, fmt::format("{}: {}", where, name)));
     SR_CHECK(apply_mask(file, options.mask, box, array.data, waymo ? 15 : 17, where));
 
-    LabelMap map(waymo ? std::span<const SourceLabel>(kWaymo) : std::span<const SourceLabel>(kNuscenes));
+    SR_TRY(LabelMap map, LabelMap::of(waymo ? "occ3d-waymo" : "occ3d"));
     if (!options.map.empty())
         SR_CHECK(map.apply(options.map));
     std::array<uint64_t, 256> counts{};

@@ -13,43 +13,6 @@ namespace {
 
 constexpr size_t kVoxels = 256 * 256 * 32;
 
-constexpr SourceLabel kLabels[] = {
-    {0, "unlabeled", kEmpty},
-    {1, "outlier", kLeftOut},
-    {10, "car", 13},
-    {11, "bicycle", 18},
-    {13, "bus", 15},
-    {15, "motorcycle", 17},
-    {16, "on-rails", 16},
-    {18, "truck", 14},
-    {20, "other-vehicle", 14},
-    {30, "person", 11},
-    {31, "bicyclist", 12},
-    {32, "motorcyclist", 12},
-    {40, "road", 0},
-    {44, "parking", 0},
-    {48, "sidewalk", 1},
-    {49, "other-ground", 9},
-    {50, "building", 2},
-    {51, "fence", 4},
-    {52, "other-structure", 3},
-    {60, "lane-marking", 19},
-    {70, "vegetation", 8},
-    {71, "trunk", 8},
-    {72, "terrain", 9},
-    {80, "pole", 5},
-    {81, "traffic-sign", 7},
-    {99, "other-object", kLeftOut},
-    {252, "moving-car", 13},
-    {253, "moving-bicyclist", 12},
-    {254, "moving-person", 11},
-    {255, "moving-motorcyclist", 12},
-    {256, "moving-on-rails", 16},
-    {257, "moving-bus", 15},
-    {258, "moving-truck", 14},
-    {259, "moving-other-vehicle", 14},
-};
-
 // by class; 0 has no entry
 constexpr std::array<uint16_t, kClassCount> kRaw = {40, 48, 50, 52, 51, 80, 81, 81, 70, 72,
                                                     0,  30, 31, 10, 18, 13, 16, 15, 11, 60};
@@ -105,7 +68,7 @@ Result<SceneGrid> read_semantic_kitti(const Path& path, const SceneGridOptions& 
         SR_CHECK(keep_bits(raw, path, true));
     if (is_there(invalid))
         SR_CHECK(keep_bits(raw, invalid, false));
-    LabelMap map{std::span<const SourceLabel>(kLabels)};
+    SR_TRY(LabelMap map, LabelMap::of("semantickitti"));
     if (!options.map.empty())
         SR_CHECK(map.apply(options.map));
     DenseLabels dense = empty_box();

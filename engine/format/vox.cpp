@@ -247,7 +247,8 @@ Result<SceneGrid> read_vox(const Path& path, const SceneGridOptions& o)
     if (!o.map.empty())
         SR_CHECK(map.apply(o.map));
     const size_t covered = take_cells(placement.voxels, shift, map, out.grid);
-    SR_CHECK(map.check(where, "voxels", "--map FILE says what they are, --nearest-color takes the nearest class's"));
+    SR_CHECK(
+        map.check(where, "voxels", "--map NAME or FILE says what they are, --nearest-color takes the nearest class's"));
     for (const std::string& line : map.left_out("voxels"))
         out.warnings.push_back(line);
     if (covered)

@@ -127,9 +127,10 @@ Result<FusionFolder> FusionFolder::open(const Path& folder, const FusionFolderOp
     FusionFolder f;
     f.folder_ = folder;
     f.map_ = LabelMap::identity();
-    f.map_.set(kNoLabel, "nothing", kEmpty);
     if (!options.map.empty())
         SR_CHECK(f.map_.apply(options.map));
+    if (!f.map_.knows(kNoLabel))
+        f.map_.set(kNoLabel, "nothing", kEmpty);
     SR_CHECK(f.read_poses(poses, options));
     SR_CHECK(f.find_pictures(poses));
     SR_CHECK(f.check_count(poses));

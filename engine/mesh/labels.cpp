@@ -2,8 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/mesh/labels.h"
 
-#include "engine/scene/palette.h"
-#include "runtime/base/json.h"
+#include "engine/format/label_table.h"
 #include "runtime/base/quote.h"
 
 #include <algorithm>
@@ -45,14 +44,6 @@ std::string folded_text(std::string_view text)
     return out;
 }
 
-std::optional<uint8_t> exact_class(std::string_view name)
-{
-    for (uint8_t i = 0; i < kClassCount; ++i)
-        if (folded_text(name) == folded_text(kPalette[i].name))
-            return i;
-    return std::nullopt;
-}
-
 // '*' stands for any text; greedy with one point to come back to, so that it takes no more than size times size
 bool matches(std::string_view pattern, std::string_view text)
 {
@@ -88,26 +79,17 @@ std::optional<uint8_t> class_of_material(std::string_view name)
     return found;
 }
 
-Result<MeshLabelMap> MeshLabelMap::read(const Path& path)
+Result<MeshLabelMap> MeshLabelMap::read(const Path& name_or_file)
 {
-    const std::string where = quote_path(path);
-    SR_TRY(const Json json, read_json(path, {.bytes = 1 << 20, .depth = 2, .values = 100000}));
-    if (!json.is_object())
-        return fail(ErrorCode::bad_input, "{}: expected an object of names and classes, found {}", where,
-                    json.type_name());
+    SR_TRY(const LabelTable table, read_label_table(name_or_file));
     MeshLabelMap map;
-    for (const auto& [key, value] : json.items()) {
-        std::optional<uint8_t> label;
-        if (value.is_null())
-            label = kNoLabel;
-        else if (value.is_string())
-            label = exact_class(value.get<std::string>());
-        else if (value.is_number_integer() && value >= 0 && value < kClassCount)
-            label = value.get<uint8_t>();
-        if (!label)
-            return fail(ErrorCode::bad_input, "{}: {}: expected a class name, a number of 0 to {} or null, found {}",
-                        where, quote(key), kClassCount - 1, printable(value.dump(-1, ' ', true), 60));
-        map.entries_.push_back({folded_text(key), *label});
+    map.whole_ = table.whole;
+    for (const LabelTable::Label& label : table.labels) {
+        const uint8_t target = label.target < kClassCount ? label.target : kNoLabel;
+        if (label.number)
+            map.entries_.push_back({std::to_string(*label.number), target});
+        if (!label.name.empty())
+            map.entries_.push_back({folded_text(label.name), target});
     }
     // an object's keys come sorted; exact names first
     std::ranges::stable_partition(map.entries_,
@@ -124,12 +106,12 @@ std::optional<uint8_t> MeshLabelMap::find(std::string_view name) const
     return std::nullopt;
 }
 
-std::optional<uint8_t> MeshLabelMap::find(int64_t number) const
+std::optional<uint8_t> MeshLabelMap::find(int64_t number, bool foreign) const
 {
     if (!entries_.empty())
         if (const auto label = find(std::string_view(std::to_string(number))))
             return label;
-    if (number >= 0 && number < int64_t(kClassCount))
+    if (!whole_ && !foreign && number >= 0 && number < int64_t(kClassCount))
         return uint8_t(number);
     return number == kNoLabel || number == -1 ? std::optional(kNoLabel) : std::nullopt;
 }

@@ -14,17 +14,18 @@ namespace semrover {
 // front of something that is no letter ("Traffic_Light", "building.003", "road-lane 2"); the longest one that fits
 std::optional<uint8_t> class_of_material(std::string_view name);
 
-// What other names or numbers of a file mean: a JSON object of "name", "na*e" (* is any text) or "number" to a
-// class name or number, or null for none. Names are compared as above; exact ones come first, then the first pattern.
+// What other names or numbers of a file mean: a LabelTable, whose names may be patterns ("na*e": * is any text). Names
+// are compared as above; exact ones come first, then the first pattern.
 class MeshLabelMap {
   public:
     MeshLabelMap() = default;
-    static Result<MeshLabelMap> read(const Path& path); // bad_input names the key
+    static Result<MeshLabelMap> read(const Path& name_or_file); // read_label_table
 
     bool empty() const { return entries_.empty(); }
     std::optional<uint8_t> find(std::string_view name) const; // kNoLabel where the map says null
-    // of a number in a file: the map's, else a class as it is, else kNoLabel for 255 and -1; none for other numbers
-    std::optional<uint8_t> find(int64_t number) const;
+    // of a number in a file: the map's, else a class as it is (unless the map is a whole table, or the file's column is
+    // another program's: LabelColumn::table), else kNoLabel for 255 and -1; none for other numbers
+    std::optional<uint8_t> find(int64_t number, bool foreign = false) const;
 
   private:
     struct Entry {
@@ -32,6 +33,7 @@ class MeshLabelMap {
         uint8_t label;
     };
     std::vector<Entry> entries_;
+    bool whole_ = false;
 };
 
 enum class LabelSource {

@@ -258,7 +258,8 @@ void add_fuse(CLI::App& app, const Globals& globals, Run& run)
     add_camera_options(*c, o->input);
     add_fusion_options(*c, o->fusion);
     add_number(*c, "--max-depth", o->max_depth, "metres; where a pixel is 0.55 voxels wide, 30 at most", 0.1, 1000.0);
-    c->add_option("--map", o->map, "JSON: label number or name to class, or null for pixels to leave out");
+    c->add_option("--map", o->map,
+                  "a table by name, or JSON: label number or name to class, or null for pixels to leave out");
     c->add_option("--exclude", o->exclude, "classes whose pixels are left out, such as car,person; sky always is")
         ->delimiter(',');
     c->add_option("--default-label", o->default_label, "class of what has no label; none: not in the grids");

@@ -157,7 +157,8 @@ void add_voxelize(CLI::App& app, const Globals& globals, Run& run)
     add_number(*c, "--scale", o->scale, "metres in a unit of the file (1)", 1e-6, 1e6);
     add_choice(*c, "--labels", {"auto", "material", "texture", "face"},
                "where labels come from (auto: faces, material names, label textures)", o->labels);
-    c->add_option("--map", o->map, "JSON object: material name, pattern with * or number -> class name or number");
+    c->add_option("--map", o->map,
+                  "a table by name, or JSON: material name, pattern with * or number -> class name or number");
     c->add_option("--default-label", o->default_label, "class of what has none");
     c->add_option("--ply", o->ply, "also the points, as PLY");
     c->callback([o, &globals, &run] { run = [o, &globals] { return run_voxelize(*o, globals); }; });

@@ -1,0 +1,39 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/scene/palette.h"
+#include "runtime/base/file.h"
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace semrover {
+
+constexpr uint8_t kLeftOut = 254; // a source label whose cells stay empty
+constexpr uint8_t kEmpty = 255;   // free space in the source
+
+// What labels of another program are here. JSON: an object of source label to target. The source is a number or a name,
+// the target a class (name or number), null (left out) or "free". Where it is {"name": .., "class": target} the number
+// has that name.
+struct LabelTable {
+    struct Label {
+        std::optional<uint32_t> number; // none: known by name only
+        std::string name;               // empty: known by number only
+        uint8_t target;                 // a class, kLeftOut or kEmpty
+    };
+    std::string where; // for messages: the file, or the table's name
+    std::vector<Label> labels;
+    // All numbers are named: these are all numbers that there are, and others are unknown. Else the table overrides
+    // what is known without it.
+    bool whole = false;
+};
+
+// The table of --map: a name of label_table_names(), or else a file. bad_input lists the names, or names the entry.
+Result<LabelTable> read_label_table(const Path& name_or_file);
+
+// assets/label_maps/NAME.json, which are compiled in, and `ours`: our own numbers
+std::vector<std::string_view> label_table_names();
+
+} // namespace semrover
