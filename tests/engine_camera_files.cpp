@@ -98,6 +98,28 @@ TEST(CameraFiles, a_path_that_goes_through_all_five_formats_is_the_same)
     }
 }
 
+// as editors of Windows write it in front of text
+TEST(CameraFiles, a_byte_order_mark_is_skipped_in_every_format)
+{
+    const ScratchFolder folder;
+    const CameraPath path = random_path(3);
+    for (const auto& [format, file, texts] :
+         {std::tuple{PathFormat::kitti, "poses.txt", std::vector<std::string>{"poses.txt", "times.txt"}},
+          {PathFormat::transforms, "transforms.json", {"transforms.json"}},
+          {PathFormat::camera_path, "camera_path.json", {"camera_path.json"}},
+          {PathFormat::colmap, "sparse", {"sparse/cameras.txt", "sparse/images.txt"}},
+          {PathFormat::tum, "path.tum", {"path.tum"}}}) {
+        SCOPED_TRACE(file);
+        ASSERT_TRUE(write(format, folder / file, path));
+        for (const std::string& text : texts)
+            folder.put(text, "\xef\xbb\xbf" + contents(folder / text));
+        const auto read = read_camera_path(folder / file, kView);
+        ASSERT_TRUE(read) << read.error().message;
+        expect_same(*read, path);
+    }
+    EXPECT_TRUE(says(read_camera_path(folder.put("w.tum", std::string("\xff\xfe \0", 4)), kView), "UTF-16"));
+}
+
 // every lens through every format that has a place for it
 TEST(CameraFiles, lenses_come_back)
 {

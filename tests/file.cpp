@@ -25,6 +25,20 @@ TEST(File, a_file_reads_back_as_written)
     EXPECT_EQ(folder.entries(), 1u);
 }
 
+TEST(File, text_begins_after_its_byte_order_mark)
+{
+    const ScratchFolder folder;
+    EXPECT_EQ(read_text_file(folder.put("a", "\xef\xbb\xbfone\xef\xbb\xbf"), 100).value(), "one\xef\xbb\xbf");
+    EXPECT_EQ(read_text_file(folder.put("a", "\xef\xbb"), 100).value(), "\xef\xbb");
+    EXPECT_EQ(read_file(folder.put("a", "\xef\xbb\xbfone"), 100).value().size(), 6u); // bytes are no text
+    for (const auto& [bytes, name] : {std::pair{std::string("\xff\xfeo\0", 4), "UTF-16"},
+                                      {std::string("\xfe\xff\0o", 4), "UTF-16"},
+                                      {std::string("\xff\xfe\0\0", 4), "UTF-32"},
+                                      {std::string("\0\0\xfe\xff", 4), "UTF-32"}})
+        EXPECT_TRUE(says(read_text_file(folder.put("a", bytes), 100),
+                         fmt::format("a': starts as text in {} does, expected UTF-8", name)));
+}
+
 TEST(File, what_cannot_be_read_says_why)
 {
     const ScratchFolder folder;

@@ -89,6 +89,8 @@ TEST(Json, a_file_is_read_and_named_in_its_error)
     const ScratchFolder folder;
     EXPECT_EQ(read_json(folder.put("good.json", "[1]")).value(), Json::array({1}));
     EXPECT_TRUE(says(read_json(folder.put("bad.json", "[1")), "bad.json': not valid JSON"));
+    EXPECT_EQ(read_json(folder.put("windows.json", "\xef\xbb\xbf[1]")).value(), Json::array({1}));
+    EXPECT_TRUE(says(read_json(folder.put("wide.json", std::string("\xff\xfe[\0", 4))), "UTF-16"));
     EXPECT_TRUE(says(read_json(folder / "none.json"), "No such file"));
 }
 

@@ -7,11 +7,11 @@
 #include "engine/format/camera_text.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
+#include "runtime/base/text_start.h"
 #include "tools/cli/choice.h"
 
 #include <algorithm>
 #include <CLI/CLI.hpp>
-#include <fstream>
 #include <set>
 
 namespace semrover {
@@ -26,10 +26,7 @@ bool starts_with_a_pose(const Path& path)
     std::error_code ignored;
     if (!fs::is_regular_file(path, ignored))
         return false;
-    std::string text(4096, '\0');
-    std::ifstream file(path, std::ios::binary);
-    file.read(text.data(), std::streamsize(text.size()));
-    text.resize(size_t(file.gcount()));
+    const std::string text = beginning_of_text(path, 4096);
     for (TextLines lines(text); lines.next();) {
         const auto words = words_of(lines.line(), 12);
         if (!words.empty())

@@ -4,8 +4,7 @@
 
 #include "engine/format/camera_text.h"
 #include "runtime/base/quote.h"
-
-#include <fstream>
+#include "runtime/base/text_start.h"
 
 namespace semrover {
 
@@ -27,11 +26,7 @@ constexpr BoxReader kReaders[] = {
 
 std::string beginning_of(const Path& path)
 {
-    std::string text(64 << 10, '\0');
-    std::ifstream file(path, std::ios::binary);
-    file.read(text.data(), std::streamsize(text.size()));
-    text.resize(size_t(file.gcount()));
-    return text;
+    return beginning_of_text(path, 64 << 10);
 }
 
 // the first line that has words is a label

@@ -3,6 +3,7 @@
 #include "engine/format/ply_header.h"
 
 #include "runtime/base/quote.h"
+#include "runtime/base/text_start.h"
 
 #include <algorithm>
 #include <array>
@@ -239,7 +240,10 @@ std::pair<double, double> range_of(PlyType type)
 
 Result<PlyHeader> parse_ply_header(std::string_view bytes, std::string_view where)
 {
-    return HeaderParser(bytes, where).parse();
+    SR_TRY(const std::string_view text, text_after_mark(bytes, where));
+    SR_TRY(PlyHeader header, HeaderParser(text, where).parse());
+    header.bytes += bytes.size() - text.size();
+    return header;
 }
 
 } // namespace semrover

@@ -4,6 +4,7 @@
 
 #include "runtime/base/json_fields.h"
 #include "runtime/base/quote.h"
+#include "runtime/base/text_start.h"
 
 #include <algorithm>
 #include <bit>
@@ -134,8 +135,11 @@ Result<GltfFile> GltfFile::open(const Path& path)
     GltfFile f(path);
     SR_TRY(f.file_, MappedFile::open(path));
     std::string_view text(reinterpret_cast<const char*>(f.file_.bytes().data()), f.file_.bytes().size());
-    if (text.starts_with("glTF"))
+    if (text.starts_with("glTF")) {
         SR_CHECK(f.split_binary(text));
+    } else {
+        SR_TRY(text, text_after_mark(text, f.where_));
+    }
     SR_TRY(f.json_, parse_json(text, f.where_, kJsonLimits));
     if (!f.json_.is_object())
         return fail(ErrorCode::bad_input, "{}: expected glTF, found {}", f.where_, f.json_.type_name());

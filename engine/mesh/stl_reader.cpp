@@ -4,6 +4,7 @@
 #include "engine/mesh/mesh_readers.h"
 #include "engine/mesh/word_lines.h"
 #include "runtime/base/file.h"
+#include "runtime/base/text_start.h"
 
 #include <cstring>
 
@@ -21,11 +22,10 @@ uint32_t count_in(std::span<const std::byte> file)
     return count;
 }
 
-// note: headers of binary files may begin with "solid", too; their length tells them
-bool is_binary_stl(std::span<const std::byte> file, std::string_view text)
+// note: headers of binary files may begin with anything, with "solid", too; their length tells them
+bool has_binary_length(std::span<const std::byte> file)
 {
-    return file.size() >= kStlHeader &&
-           (file.size() == kStlHeader + kStlFacet * uint64_t(count_in(file)) || !text.starts_with("solid"));
+    return file.size() >= kStlHeader && file.size() == kStlHeader + kStlFacet * uint64_t(count_in(file));
 }
 
 Result<Mesh> read_binary_stl(std::span<const std::byte> file, const std::string& where)
@@ -93,9 +93,12 @@ Result<Mesh> read_stl(const Path& path)
 {
     const std::string where = quote_path(path);
     SR_TRY(const MappedFile file, MappedFile::open(path));
-    const std::string_view text(reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size());
-    if (is_binary_stl(file.bytes(), text))
+    const std::string_view bytes(reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size());
+    if (has_binary_length(file.bytes()))
         return read_binary_stl(file.bytes(), where);
+    SR_TRY(const std::string_view text, text_after_mark(bytes, where));
+    if (bytes.size() >= kStlHeader && !text.starts_with("solid"))
+        return read_binary_stl(file.bytes(), where); // which says what it lacks
     if (!text.starts_with("solid"))
         return fail(ErrorCode::bad_input, "{}: expected STL, found {} bytes of something else", where, text.size());
     return read_text_stl(text, where);

@@ -4,6 +4,7 @@
 
 #include "runtime/base/memory_files.h"
 #include "runtime/base/quote.h"
+#include "runtime/base/text_start.h"
 
 #include <algorithm>
 #include <atomic>
@@ -184,7 +185,10 @@ Result<std::vector<std::byte>> read_file(const Path& path, uint64_t max_bytes)
 
 Result<std::string> read_text_file(const Path& path, uint64_t max_bytes)
 {
-    return read_whole<std::string>(path, max_bytes);
+    SR_TRY(std::string bytes, read_whole<std::string>(path, max_bytes));
+    SR_TRY(const std::string_view text, text_after_mark(bytes, quote_path(path)));
+    bytes.erase(0, bytes.size() - text.size());
+    return bytes;
 }
 
 AtomicFile::AtomicFile(Path path, Path temporary, int descriptor, std::unique_ptr<Unfinished> unfinished)
