@@ -324,16 +324,23 @@ TEST(MeshFiles, off_is_read_with_colours)
     const ScratchFolder folder;
     const std::string square = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
     const Mesh m = readable(folder.put("m.off", "OFF # a comment\n\n4 3 0\n" + square +
-                                                    "4 0 1 2 3 255 0 0\n3 0 1 2 0.0 1.0 0.0 1.0\n3 1 2 3\n"));
+                                                    "4 0 1 2 3 1 0 0\n3 0 1 2 0.0 1.0 0.0 1.0\n3 1 2 3\n"));
     ASSERT_EQ(m.faces.size(), 4u);
     EXPECT_EQ(m.face_materials, (std::vector<uint32_t>{0, 0, 1, 2}));
     EXPECT_EQ(m.materials[0].color, (std::array<float, 3>{1, 0, 0}));
     EXPECT_EQ(m.materials[1].color, (std::array<float, 3>{0, 1, 0}));
     EXPECT_EQ(m.materials[2].color, (std::array<float, 3>{1, 1, 1}));
-    const Mesh colored =
-        readable(folder.put("c.off", "COFF 3 1 0\n0 0 0 10 20 30 255\n1 0 0 0.5 0.0 1.0 1\n0 1 0 1 2 3 4\n3 0 1 2\n"));
-    EXPECT_EQ(colored.colors, (std::vector<std::array<uint8_t, 3>>{{10, 20, 30}, {128, 0, 255}, {1, 2, 3}}));
-    EXPECT_TRUE(colored.materials.empty());
+    using Colors = std::vector<std::array<uint8_t, 3>>;
+    const auto colors = [&](const std::string& first, const std::string& second, const std::string& third) {
+        const Mesh colored = readable(folder.put("c.off", "COFF 3 1 0\n0 0 0 " + first + "\n1 0 0 " + second +
+                                                              "\n0 1 0 " + third + "\n3 0 1 2\n"));
+        EXPECT_TRUE(colored.materials.empty());
+        return colored.colors;
+    };
+    EXPECT_EQ(colors("10 20 30 255", "128 0 255 1", "1 2 3 4"), (Colors{{10, 20, 30}, {128, 0, 255}, {1, 2, 3}}));
+    // floats, of which whole ones may lack their point; some programs count them to 255
+    EXPECT_EQ(colors("1 0 0 1", "0.5 0.0 1.0 1", "0 0 1 1"), (Colors{{255, 0, 0}, {128, 0, 255}, {0, 0, 255}}));
+    EXPECT_EQ(colors("128.0 64.0 32.0", "255.0 0 0", "0.5 1 2"), (Colors{{128, 64, 32}, {255, 0, 0}, {1, 1, 2}}));
     for (const auto& [text, error] : std::initializer_list<std::pair<std::string, const char*>>{
              {"", "ends where OFF is expected"},
              {"PLY\n", "line 1: expected OFF, COFF, NOFF or CNOFF, found 'PLY'"},
@@ -410,12 +417,60 @@ TEST(MeshFiles, broken_ply_meshes_are_one_line_that_says_where)
              {plain + faces + "end_header\n" + kSquare, "m.ply"},
              {plain + faces + "end_header\nnan 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n", "nan"},
              {plain + "property float red\nproperty float green\nproperty float blue\n" + faces +
-                  "end_header\n0 0 0 0 0 3\n1 0 0 0 0 0\n1 1 0 0 0 0\n0 1 0 0 0 0\n3 0 1 2\n",
-              "vertex 0 has the colour 3, expected 0 to 1"},
+                  "end_header\n0 0 0 0 0 300\n1 0 0 0 0 0\n1 1 0 0 0 0\n0 1 0 0 0 0\n3 0 1 2\n",
+              "the colour 300, expected 0 to 1, or 0 to 255"},
              {plain + faces + "property list uchar float texcoord\nend_header\n" + kSquare + "3 0 1 2 5 0 0 0 0 0\n",
               "face 0 has 5 texture coordinates for 3 corners"},
              {kPlyVertices + faces + "end_header\n" + kSquare + "3 0 1 2\n", "refers to 't.png', which is missing"}})
         EXPECT_TRUE(says(read_mesh(folder.put("m.ply", text)), error)) << text;
+}
+
+TEST(MeshFiles, colours_of_a_ply_are_counted_as_their_type_and_size_say)
+{
+    const ScratchFolder folder;
+    for (const auto& [type, color] : {std::pair{"uchar", "128 64 32"},
+                                      {"ushort", "32896 16448 8224"},
+                                      {"ushort", "128 64 32"},
+                                      {"float", "128 64 32"},
+                                      {"double", "0.501961 0.25098 0.12549"}}) {
+        std::string text = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+                           "property float z\n";
+        for (const char* channel : {"red", "green", "blue"})
+            text += fmt::format("property {} {}\n", type, channel);
+        const Mesh m = readable(folder.put(
+            "m.ply", text + fmt::format("element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+                                        "0 0 0 {0}\n1 0 0 {0}\n0 1 0 {0}\n3 0 1 2\n",
+                                        color)));
+        ASSERT_EQ(m.colors.size(), 3u);
+        EXPECT_EQ(m.colors[1], (std::array<uint8_t, 3>{128, 64, 32})) << type << ' ' << color;
+        EXPECT_EQ(m.warnings.size(), std::string_view(color) == "128 64 32" && *type == 'u' && type[1] == 's');
+    }
+}
+
+TEST(MeshFiles, text_may_begin_with_a_byte_order_mark)
+{
+    const ScratchFolder folder;
+    const std::string mark = "\xef\xbb\xbf", square = "v 0 0 0\nv 6 0 0\nv 6 6 0\n";
+    folder.put("m.mtl", mark + "newmtl building\nKd 0 1 0\n");
+    const Mesh obj = readable(folder.put("m.obj", mark + "mtllib m.mtl\n" + square + "usemtl building\nf 1 2 3\n"));
+    EXPECT_EQ(obj.materials.at(0).color, (std::array<float, 3>{0, 1, 0}));
+    const Mesh vertex = readable(folder.put("v.obj", mark + square + "v 9 9 0\nf 1 2 3\n"));
+    EXPECT_EQ(vertex.positions.size(), 4u);
+    EXPECT_EQ(readable(folder.put("m.off", mark + "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")).faces.size(), 1u);
+    EXPECT_EQ(readable(folder.put("m.stl", mark +
+                                               "solid a\nfacet\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
+                                               "endfacet\nendsolid\n" +
+                                               std::string(100, ' ')))
+                  .faces.size(),
+              1u);
+    const std::string header = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+                               "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+    EXPECT_EQ(
+        readable(folder.put("m.ply", mark + "ply\nformat ascii 1.0\n" + header + "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"))
+            .faces.size(),
+        1u);
+    for (const char* name : {"w.obj", "w.off", "w.stl", "w.ply", "w.gltf"})
+        EXPECT_TRUE(says(read_mesh(folder.put(name, std::string("\xff\xfev\0 \0", 6))), "text in UTF-16")) << name;
 }
 
 // a triangle strip of four vertices, as text with its buffer inside: 48 bytes of positions
@@ -434,6 +489,7 @@ const std::string kStrip = R"({"attributes":{"POSITION":0},"mode":5})";
 TEST(MeshFiles, gltf_strips_fans_and_nodes_are_read)
 {
     const ScratchFolder folder;
+    EXPECT_EQ(readable(folder.put("mark.gltf", "\xef\xbb\xbf" + gltf(kStrip))).faces.size(), 2u);
     const Mesh strip = readable(folder.put("m.gltf", gltf(kStrip)));
     ASSERT_EQ(strip.faces.size(), 2u);
     EXPECT_EQ(strip.positions[1], (std::array<float, 3>{0, -1, 0})); // x right -> y left

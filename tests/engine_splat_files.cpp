@@ -230,6 +230,11 @@ TEST(SplatPly, higher_harmonics_are_counted_and_rgb_is_taken)
                                       {"0 0 0 -3 -3 1 0 0 0 0 0.25 1 0"})));
     ASSERT_TRUE(rgb) << rgb.error().message;
     EXPECT_EQ(rgb->surfels.color[0], (std::array<float, 3>{0.25f, 1, 0}));
+    const auto large = read_splats_ply(
+        folder.put("s.ply", splat_ply("x y z scale_0 scale_1 rot_0 rot_1 rot_2 rot_3 opacity red green blue",
+                                      {"0 0 0 -3 -3 1 0 0 0 0 51 255 0"})));
+    ASSERT_TRUE(large) << large.error().message;
+    EXPECT_EQ(large->surfels.color[0], (std::array<float, 3>{0.2f, 1, 0}));
 }
 
 TEST(SplatPly, refuses_malformed_files)

@@ -3,6 +3,7 @@
 #include "engine/format/ply.h"
 
 #include "engine/camera/rigid.h"
+#include "engine/format/label_column.h"
 #include "runtime/base/quote.h"
 
 #include <algorithm>
@@ -118,7 +119,7 @@ Status write_points_ply(const Path& path, const Surfels& s)
     SR_CHECK(check_points(path, s));
     const size_t n = s.position.size();
     std::vector<std::byte> bytes =
-        header("", n,
+        header(fmt::format("comment {}\n", kOwnLabelsComment), n,
                "property float x\nproperty float y\nproperty float z\nproperty uchar red\nproperty uchar green\n"
                "property uchar blue\nproperty uchar label\n");
     bytes.reserve(bytes.size() + n * 16);
@@ -147,7 +148,10 @@ Status write_splats_ply(const Path& path, const Surfels& s, SplatPly variant, bo
     if (labels)
         properties += "property uchar label\n";
     const size_t n = s.position.size();
-    std::vector<std::byte> bytes = header(flat ? "comment SplatRenderMode: 2dgs\n" : "", n, properties);
+    std::string comments = flat ? "comment SplatRenderMode: 2dgs\n" : "";
+    if (labels)
+        comments += fmt::format("comment {}\n", kOwnLabelsComment);
+    std::vector<std::byte> bytes = header(comments, n, properties);
     bytes.reserve(bytes.size() + n * ((17 + rest) * sizeof(float) + labels));
     for (size_t i = 0; i < n; ++i) {
         append(bytes, s.position[i].data(), 12);

@@ -17,6 +17,7 @@ class PlyValues {
   public:
     explicit PlyValues(PlyType type) : type_(type) {}
 
+    PlyType type() const { return type_; }
     size_t size() const { return bytes_.size() / size_of(type_); }
     double operator[](size_t i) const;
     void reserve(size_t count) { bytes_.reserve(count * size_of(type_)); }

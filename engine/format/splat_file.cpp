@@ -3,7 +3,7 @@
 #include "engine/format/splat_file.h"
 
 #include "engine/camera/rigid.h"
-#include "engine/format/ply_reader.h"
+#include "engine/format/ply_colors.h"
 #include "runtime/base/quote.h"
 
 #include <algorithm>
@@ -114,7 +114,8 @@ Result<SplatFile> EllipsoidFlattener::finish() &&
 namespace {
 
 struct SplatColumns {
-    std::array<const PlyProperty*, 3> position{}, scale{}, harmonic{}, rgb{};
+    std::array<const PlyProperty*, 3> position{}, scale{}, harmonic{};
+    std::optional<PlyColors> rgb; // where there are no harmonics
     std::array<const PlyProperty*, 4> rotation{};
     const PlyProperty *opacity = nullptr, *label = nullptr;
     std::vector<const PlyProperty*> rest;
@@ -134,7 +135,7 @@ Status find_all(const PlyElement& element, const std::array<const char*, N>& nam
     return {};
 }
 
-Result<SplatColumns> columns_of(const PlyElement& element, const std::string& where)
+Result<SplatColumns> columns_of(const PlyElement& element, const std::string& where, std::vector<std::string>& warnings)
 {
     SplatColumns c;
     SR_CHECK(find_all<3>(element, {"x", "y", "z"}, true, c.position, where));
@@ -142,9 +143,10 @@ Result<SplatColumns> columns_of(const PlyElement& element, const std::string& wh
     SR_CHECK(find_all<3>(element, {"scale_0", "scale_1", "scale_2"}, false, c.scale, where));
     if (!c.scale[0] || !c.scale[1])
         return fail(ErrorCode::bad_input, "{}: splats need the properties scale_0 and scale_1", where);
-    SR_CHECK(find_all<3>(element, {"red", "green", "blue"}, false, c.rgb, where));
-    const bool rgb = c.rgb[0] && c.rgb[1] && c.rgb[2];
-    SR_CHECK(find_all<3>(element, {"f_dc_0", "f_dc_1", "f_dc_2"}, !rgb, c.harmonic, where));
+    if (!element.find("f_dc_2")) {
+        SR_TRY(c.rgb, PlyColors::find(element, where, warnings));
+    }
+    SR_CHECK(find_all<3>(element, {"f_dc_0", "f_dc_1", "f_dc_2"}, !c.rgb, c.harmonic, where));
     std::array<const PlyProperty*, 1> one{};
     SR_CHECK(find_all<1>(element, {"opacity"}, true, one, where));
     c.opacity = one[0];
@@ -162,9 +164,11 @@ Ellipsoid ellipsoid_of(const SplatColumns& c, size_t row)
     for (size_t a = 0; a < 3; ++a) {
         e.position[a] = c.position[a]->values[row];
         e.scale[a] = c.scale[a] ? std::exp(c.scale[a]->values[row]) : 0;
-        e.color[a] = c.harmonic[2] ? 0.5 + double(kHarmonic0) * c.harmonic[a]->values[row]
-                                   : c.rgb[a]->values[row] / (c.rgb[a]->is_float ? 1 : 255);
+        if (!c.rgb)
+            e.color[a] = 0.5 + double(kHarmonic0) * c.harmonic[a]->values[row];
     }
+    if (c.rgb)
+        e.color = c.rgb->fractions(row);
     for (size_t a = 0; a < 4; ++a)
         e.rotation[a] = c.rotation[a]->values[row];
     e.opacity = 1 / (1 + std::exp(-c.opacity->values[row]));
@@ -182,14 +186,17 @@ Result<SplatFile> read_splats_ply(const Path& path)
     const PlyElement* vertices = file.find("vertex");
     if (!vertices)
         return fail(ErrorCode::bad_input, "{}: has no element vertex", where);
-    SR_TRY(const SplatColumns columns, columns_of(*vertices, where));
+    std::vector<std::string> warnings;
+    SR_TRY(const SplatColumns columns, columns_of(*vertices, where, warnings));
     EllipsoidFlattener flattener(where);
     for (size_t row = 0; row < vertices->rows; ++row) {
         flattener.add(ellipsoid_of(columns, row), !columns.scale[2]);
         if (std::ranges::any_of(columns.rest, [&](const PlyProperty* p) { return p->values[row] != 0; }))
             flattener.count_view_dependent();
     }
-    return std::move(flattener).finish();
+    SR_TRY(SplatFile splats, std::move(flattener).finish());
+    splats.warnings.insert(splats.warnings.end(), warnings.begin(), warnings.end());
+    return splats;
 }
 
 Surfels turned_for_viewers(const Surfels& surfels)

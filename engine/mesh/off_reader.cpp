@@ -2,11 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // OFF in text, with colours of vertices (COFF) or of faces. Source: the Geomview manual, "OFF: Object File Format",
 // http://www.geomview.org/docs/html/OFF.html
+#include "engine/format/color_scale.h"
 #include "engine/mesh/mesh_readers.h"
 #include "engine/mesh/polygon.h"
 #include "engine/mesh/word_lines.h"
 #include "engine/scene/srgb.h"
 #include "runtime/base/file.h"
+#include "runtime/base/text_start.h"
 
 #include <map>
 
@@ -15,6 +17,9 @@ namespace semrover {
 namespace {
 
 constexpr size_t kMaxFaceColors = 1 << 16;
+
+using RawColor = std::array<float, 3>; // as the file counts it
+constexpr RawColor kUncolored = {-1, -1, -1};
 
 class OffReader {
   public:
@@ -32,17 +37,19 @@ class OffReader {
     Status next_line(std::string_view expected);
     Status read_kind();
     Result<size_t> count_at(size_t word, size_t most);
-    Result<std::array<uint8_t, 3>> color_at(size_t word);
+    Result<RawColor> color_at(size_t word);
     Status read_vertex();
     Status read_face();
     Result<uint32_t> material_of(size_t word);
+    Status decide_colors();
 
     WordLines lines_;
     std::string where_;
     Mesh mesh_;
     size_t normals_ = 0; // words of a vertex behind its place
-    bool colors_ = false, any_material_ = false;
-    std::map<std::array<uint8_t, 3>, uint32_t> materials_;
+    bool colors_ = false, fractions_ = false;
+    std::vector<RawColor> vertex_colors_;
+    std::map<RawColor, uint32_t> materials_;
 };
 
 // that has words
@@ -79,19 +86,38 @@ Result<size_t> OffReader::count_at(size_t word, size_t most)
     return value;
 }
 
-// whole numbers up to 255, or fractions, which have a point
-Result<std::array<uint8_t, 3>> OffReader::color_at(size_t word)
+// whole numbers up to 255, or floats, of which one in the file has a point
+Result<RawColor> OffReader::color_at(size_t word)
 {
-    std::array<uint8_t, 3> color{};
+    RawColor color{};
     for (size_t a = 0; a < 3; ++a) {
         const std::string_view text = lines_.words[word + a];
-        SR_TRY(const float value, number_of(text, where_, lines_.number));
-        const float scaled = text.find('.') == std::string_view::npos ? value : value * 255;
-        if (!(scaled >= 0 && scaled <= 255.5f))
-            return refuse("the colour {}, expected 0 to 255, or 0.0 to 1.0", value);
-        color[a] = uint8_t(std::min(255l, std::lround(scaled)));
+        SR_TRY(color[a], number_of(text, where_, lines_.number));
+        if (!(color[a] >= 0))
+            return refuse("the colour {}, expected 0 or more", color[a]);
+        fractions_ |= text.find_first_of(".eE") != std::string_view::npos;
     }
     return color;
+}
+
+Status OffReader::decide_colors()
+{
+    ColorScale scale(fractions_ ? ColorType::real : ColorType::byte);
+    for (size_t i = 0; i < vertex_colors_.size(); ++i)
+        for (const float value : vertex_colors_[i])
+            scale.see(double(value), i);
+    for (const auto& [color, material] : materials_)
+        for (const float value : color)
+            if (color != kUncolored)
+                scale.see(double(value), material);
+    SR_CHECK(scale.decide(where_, mesh_.warnings));
+    for (const RawColor& color : vertex_colors_)
+        mesh_.colors.push_back({scale.byte_of(color[0]), scale.byte_of(color[1]), scale.byte_of(color[2])});
+    for (const auto& [color, material] : materials_)
+        for (size_t a = 0; a < 3; ++a)
+            mesh_.materials[material].color[a] =
+                color == kUncolored ? 1 : float(linear_of_srgb(scale.byte_of(color[a]) / 255.0));
+    return {};
 }
 
 Status OffReader::read_vertex()
@@ -106,7 +132,7 @@ Status OffReader::read_vertex()
     }
     mesh_.positions.push_back(p);
     if (colors_) {
-        SR_TRY(mesh_.colors.emplace_back(), color_at(3 + normals_));
+        SR_TRY(vertex_colors_.emplace_back(), color_at(3 + normals_));
     }
     return {};
 }
@@ -114,10 +140,9 @@ Status OffReader::read_vertex()
 // of a face's colour, its first word; one number alone is a place in a map that the file does not have
 Result<uint32_t> OffReader::material_of(size_t word)
 {
-    std::array<uint8_t, 3> color = {255, 255, 255};
+    RawColor color = kUncolored;
     if (lines_.words.size() >= word + 3) {
         SR_TRY(color, color_at(word));
-        any_material_ = true;
     }
     const auto [entry, is_new] = materials_.try_emplace(color, uint32_t(mesh_.materials.size()));
     if (!is_new)
@@ -125,8 +150,6 @@ Result<uint32_t> OffReader::material_of(size_t word)
     if (mesh_.materials.size() >= kMaxFaceColors)
         return refuse("more than {} colours of faces", kMaxFaceColors);
     mesh_.materials.emplace_back();
-    for (size_t a = 0; a < 3; ++a)
-        mesh_.materials.back().color[a] = float(linear_of_srgb(color[a] / 255.0));
     return entry->second;
 }
 
@@ -164,7 +187,8 @@ Result<Mesh> OffReader::read()
         SR_CHECK(read_vertex());
     for (size_t i = 0; i < faces; ++i)
         SR_CHECK(read_face());
-    if (!any_material_) {
+    SR_CHECK(decide_colors());
+    if (materials_.size() == 1 && materials_.contains(kUncolored)) {
         mesh_.materials.clear();
         mesh_.face_materials.clear();
     }
@@ -176,8 +200,9 @@ Result<Mesh> OffReader::read()
 Result<Mesh> read_off(const Path& path)
 {
     SR_TRY(const MappedFile file, MappedFile::open(path));
-    return OffReader({reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size()}, quote_path(path))
-        .read();
+    const std::string_view bytes(reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size());
+    SR_TRY(const std::string_view text, text_after_mark(bytes, quote_path(path)));
+    return OffReader(text, quote_path(path)).read();
 }
 
 } // namespace semrover

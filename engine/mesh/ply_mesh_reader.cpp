@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // PLY meshes as MeshLab, CloudCompare, Open3D and OpenMVS write them
-#include "engine/format/ply_reader.h"
+#include "engine/format/ply_colors.h"
 #include "engine/mesh/asset_folder.h"
 #include "engine/mesh/mesh_readers.h"
 #include "engine/mesh/polygon.h"
@@ -68,20 +68,11 @@ Status PlyMesh::read_vertices(const PlyElement& vertices)
 
 Status PlyMesh::read_colors(const PlyElement& vertices)
 {
-    const Column channels[3] = {first(vertices, {"red", "r", "diffuse_red"}, false),
-                                first(vertices, {"green", "g", "diffuse_green"}, false),
-                                first(vertices, {"blue", "b", "diffuse_blue"}, false)};
-    if (!channels[0] || !channels[1] || !channels[2] || !mesh_.textures.empty())
+    if (!mesh_.textures.empty())
         return {};
-    mesh_.colors.resize(vertices.rows);
-    for (size_t i = 0; i < vertices.rows; ++i)
-        for (size_t a = 0; a < 3; ++a) {
-            const double value = channels[a]->values[i], scaled = channels[a]->is_float ? 255 * value : value;
-            if (!(scaled >= 0 && scaled <= 255.5))
-                return fail(ErrorCode::bad_input, "{}: vertex {} has the colour {}, expected 0 to {}", where_, i, value,
-                            channels[a]->is_float ? 1 : 255);
-            mesh_.colors[i][a] = uint8_t(std::min(255.0, std::round(scaled)));
-        }
+    SR_TRY(const std::optional<PlyColors> colors, PlyColors::find(vertices, where_, mesh_.warnings));
+    for (size_t i = 0; colors && i < vertices.rows; ++i)
+        mesh_.colors.push_back(colors->bytes(i));
     return {};
 }
 
