@@ -32,8 +32,9 @@ constexpr std::array<std::string_view, 1> kDryRun = {"--dry-run"};
 constexpr std::array<std::string_view, 7> kBoxNames = {"--from",  "--map",    "--origin",       "--calib",
                                                        "--frame", "--sample", "--vehicle-frame"};
 constexpr std::array<std::string_view, 3> kModelNames = {"--dtype", "--asd-init", "--vsd-init"};
-constexpr std::array<std::string_view, 8> kPathNames = {"--path-format", "--camera", "--rig",          "--width",
-                                                        "--height",      "--fov-x",  "--camera-model", "--distortion"};
+constexpr std::array<std::string_view, 10> kPathNames = {"--path-format", "--camera", "--rig",          "--width",
+                                                         "--height",      "--fov-x",  "--camera-model", "--distortion",
+                                                         "--calib",       "--origin"};
 constexpr std::array<std::string_view, 2> kGuessNames = {"--model", "--seed"};
 constexpr std::array<std::string_view, 6> kSceneNames = {"--to",      "--seed", "--splat-radius",
                                                          "--opacity", "--up",   "--splat-labels"};
@@ -89,9 +90,14 @@ Status convert(ConvertArguments& o, const Globals& globals)
             fmt::format("{}, which {} is taken for (--from says which format it has)", kind, quote_path(o.model.in)));
     };
     if (is_camera_path(o.model.in)) {
-        SR_CHECK(refuse_but({kDryRun, kPathNames}, "a camera path"));
+        SR_CHECK(refuse_but({kDryRun, kPathNames, placement_options()}, "a camera path"));
+        o.path.placement.calibration = o.objects.calibration;
+        if (o.path.placement.origin.empty())
+            o.path.placement.origin = o.scene.input.origin;
         return convert_path(o.model.in, o.model.out, o.path, o.model.dry_run, globals);
     }
+    if (!is_scene(o) && !is_model(o.model.in))
+        return refuse_unknown_input(o.model.in);
     if (!is_scene(o)) {
         SR_CHECK(refuse_but({kDryRun, kModelNames}, "a model"));
         return convert_model(o.model, globals);
@@ -141,8 +147,12 @@ void add_convert(CLI::App& app, const Globals& globals, Run& run)
                "axis that points up in .ply and .splat files of splats: z, as in the world, or y, for viewers",
                o->scene.up);
     c->add_flag("--splat-labels", o->scene.splat_labels, "a property label in .ply splats");
-    add_path_options(*c, o->path);
     add_box_options(*c, o->objects);
+    add_path_options(*c, o->path);
+    for (const auto& [name, more] : {std::pair{"--calib", "; of KITTI's poses, likewise (of the first frame without "
+                                                          "--relative-to)"},
+                                     {"--origin", "; of a camera path, as --path-origin"}})
+        c->get_option(name)->description(c->get_option(name)->get_description() + more);
     c->add_option(
         "-m,--model", o->guessing_model,
         "of a grid whose OUT is .json: objects are guessed, with the sizes and colours that this model knows");

@@ -344,6 +344,24 @@ void report(const Conversion& plan, const ConvertModelOptions& o, const Globals&
 
 } // namespace
 
+bool is_model(const Path& path)
+{
+    const auto holds_weights = [](const Path& file) {
+        for (const char* extension : {".safetensors", ".ckpt", ".pt", ".pth", ".bin"})
+            if (file.extension() == extension)
+                return true;
+        return file.string().ends_with(".index.json");
+    };
+    if (!is_folder(path))
+        return holds_weights(path);
+    for (const char* part : {"model_index.json", "config.json", "scheduler_config.json", "voxfield_transformer",
+                             "renderer", "unet", "vae"})
+        if (is_there(path / part))
+            return true;
+    const auto files = list_files(path);
+    return files && std::ranges::any_of(*files, holds_weights);
+}
+
 Status convert_model(const ConvertModelOptions& o, const Globals& globals)
 {
     Path out = fs::absolute(o.out).lexically_normal();

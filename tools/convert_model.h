@@ -12,6 +12,9 @@ struct ConvertModelOptions {
     std::string in, out, dtype;
     bool asd_init = false, vsd_init = false, dry_run = false;
 };
+// whether a file or folder has weights of a network, or says that it does
+bool is_model(const Path& path);
+
 Status convert_model(const ConvertModelOptions& options, const Globals& globals);
 
 } // namespace semrover

@@ -4,11 +4,10 @@
 
 #include "engine/camera/rig.h"
 #include "engine/format/camera_path.h"
-#include "engine/format/camera_text.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
-#include "runtime/base/text_start.h"
 #include "tools/cli/choice.h"
+#include "tools/cli/warnings.h"
 
 #include <algorithm>
 #include <CLI/CLI.hpp>
@@ -19,21 +18,6 @@ namespace semrover {
 namespace {
 
 namespace fs = std::filesystem;
-
-// 8 numbers (TUM) or 12 (KITTI) on the first line that has any
-bool starts_with_a_pose(const Path& path)
-{
-    std::error_code ignored;
-    if (!fs::is_regular_file(path, ignored))
-        return false;
-    const std::string text = beginning_of_text(path, 4096);
-    for (TextLines lines(text); lines.next();) {
-        const auto words = words_of(lines.line(), 12);
-        if (!words.empty())
-            return (words.size() == 8 || words.size() == 12) && numbers_of_words(words, "");
-    }
-    return false;
-}
 
 Result<PathFormat> output_format(const Path& out, const ConvertPathOptions& o)
 {
@@ -97,8 +81,12 @@ Status choose_camera(CameraPath& path, const Path& in, const ConvertPathOptions&
 
 Result<CameraPath> read_input(const Path& in, const ConvertPathOptions& o)
 {
-    SR_TRY(const Intrinsics lens, intrinsics_of(o.lens));
-    SR_TRY(CameraPath path, read_camera_path(in, lens, o.lens.size_given));
+    SR_TRY(PathLens lens, path_lens_of(o.lens));
+    lens.matters = o.rig.empty();
+    SR_TRY(const PathPlacement placement, placement_of(o.placement));
+    SR_TRY(CameraPath path, read_camera_path(in, lens, placement));
+    if (path.body && o.rig.empty())
+        path.warnings.push_back(body_text(quote_path(in), *path.body));
     if (o.rig.empty())
         return path;
     SR_TRY(const Rig rig, read_rig(o.rig));
@@ -116,7 +104,7 @@ Status write_output(const Path& out, const CameraPath& path, PathFormat format)
         return write_transforms(out, path);
     case PathFormat::camera_path:
         return write_camera_path_json(out, path);
-    case PathFormat::colmap:
+    default:
         break;
     }
     return write_colmap(out, path);
@@ -131,17 +119,19 @@ void add_path_options(CLI::App& c, ConvertPathOptions& o)
     c.add_option("--camera", o.camera, "of a camera path: only the frames of this camera");
     c.add_option("--rig", o.rig, "of a camera path: every sensor of a rig.json at every pose");
     add_lens_options(c, o.lens);
+    add_placement_options(c, o.placement);
 }
 
 bool is_camera_path(const Path& path)
 {
-    std::error_code ignored;
-    if (fs::is_directory(path, ignored))
-        return is_there(path / "cameras.txt") || is_there(path / "cameras.bin") || is_there(path / "images.txt") ||
-               is_file(path / "poses.txt");
     const Path extension = path.extension();
-    return extension == ".json" || extension == ".tum" || extension == ".kitti" ||
-           ((extension == ".txt" || extension.empty()) && starts_with_a_pose(path));
+    return find_path(path) || extension == ".tum" || extension == ".kitti" || (extension == ".json" && !is_there(path));
+}
+
+Status refuse_unknown_input(const Path& path)
+{
+    return refuse_unknown_path(path, "; or a scene (.sgrid, .npz, .label, .vox, .ply, .glb, .splat), boxes, or a "
+                                     "network's weights (.safetensors, or a folder in the layout of diffusers)");
 }
 
 Status convert_path(const Path& in, const Path& out, const ConvertPathOptions& o, bool dry_run, const Globals& globals)
@@ -153,6 +143,7 @@ Status convert_path(const Path& in, const Path& out, const ConvertPathOptions& o
     SR_CHECK(choose_camera(path, in, o, format));
     if (!dry_run)
         SR_CHECK(write_output(to, path, format));
+    print_warnings(path.warnings, globals);
     if (globals.json)
         fmt::print("{}\n", Json{{"output", printable(to.string())},
                                 {"format", std::string(name_of(format))},

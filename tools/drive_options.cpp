@@ -4,6 +4,7 @@
 
 #include "engine/camera/rig.h"
 #include "engine/format/camera_path.h"
+#include "runtime/base/quote.h"
 #include "tools/cli/number_option.h"
 
 #include <CLI/CLI.hpp>
@@ -26,10 +27,12 @@ Result<std::array<uint8_t, 3>> background_of(const DriveOptions& o)
 
 void add_drive_options(CLI::App& c, DriveOptions& o)
 {
-    c.add_option(
-        "--path", o.path,
-        "camera path: TUM, KITTI, nerfstudio transforms.json or camera_path.json, or a folder of COLMAP's text");
+    c.add_option("--path", o.path,
+                 "camera path: TUM, KITTI, KITTI-360, transforms.json, camera_path.json, COLMAP's folder and others "
+                 "(docs/formats.md §7.1)");
     add_lens_options(c, o);
+    add_placement_options(c, o.placement);
+    c.add_flag("--allow-empty", o.allow_empty, "it is no error if no frame sees anything of the scene");
     c.add_flag("--equirect", o.equirect, "panoramas of W x W/2 in place of the path's cameras");
     c.add_option("--rig", o.rig, "rig.json: every sensor at every pose, in folders of their names");
     c.add_option(
@@ -71,8 +74,12 @@ Result<DrawOptions> draw_options(const DriveOptions& o)
 
 Result<CameraPath> load_cameras(const DriveOptions& o)
 {
-    SR_TRY(const Intrinsics intrinsics, intrinsics_of(o));
-    SR_TRY(CameraPath path, read_camera_path(o.path, intrinsics, o.size_given));
+    SR_TRY(PathLens lens, path_lens_of(o));
+    lens.matters = o.rig.empty() && !o.equirect;
+    SR_TRY(const PathPlacement placement, placement_of(o.placement));
+    SR_TRY(CameraPath path, read_camera_path(o.path, lens, placement));
+    if (path.body && o.rig.empty())
+        path.warnings.push_back(body_text(quote_path(o.path), *path.body));
     if (o.equirect)
         for (CameraFrame& frame : path.frames)
             frame.intrinsics = whole_sphere(o.width, o.width / 2);

@@ -3,16 +3,20 @@
 #pragma once
 
 #include "engine/job/path_drawing.h"
+#include "tools/cli/commands.h"
 #include "tools/cli/lens_options.h"
+#include "tools/cli/path_options.h"
 
 namespace semrover {
 
 // how a grid is driven through and drawn: what `render` and `refine` share
 struct DriveOptions : LensOptions {
+    PathOptions placement;
     std::string path, rig, background = "0,0,0";
     std::string splat_radius; // empty: not given
     bool equirect = false;    // panoramas of width x width / 2 in place of the path's cameras
     float opacity = 1;
+    bool allow_empty = false; // frames that all see nothing are no error
     std::optional<float> visible_alpha;
 };
 void add_drive_options(CLI::App& command, DriveOptions& options);
@@ -22,7 +26,7 @@ Result<SurfelOptions> surfel_options(const std::string& splat_radius, float opac
 
 // what can be said without a look at a file; usage
 Result<DrawOptions> draw_options(const DriveOptions& options);
-// the path, through the rig if any
+// the path, in the grid's world, through the rig if any; warnings are in it
 Result<CameraPath> load_cameras(const DriveOptions& options);
 
 } // namespace semrover

@@ -8,6 +8,7 @@
 #include "tools/cli/choice.h"
 #include "tools/cli/number_option.h"
 #include "tools/cli/option_meaning.h"
+#include "tools/cli/path_options.h"
 #include "tools/cli/run_job.h"
 #include "tools/generation_options.h"
 #include "tools/scene_input.h"
@@ -25,7 +26,8 @@ struct GenerateArguments {
     GenerationArguments generation;
     PlyExports ply;
     SceneInputOptions input;
-    GrowthRequest along; // with a path: --along
+    GrowthRequest along;   // with a path: --along
+    PathOptions placement; // of it
 };
 
 Status generate_along(const GenerateArguments& o, const Globals& globals)
@@ -34,8 +36,14 @@ Status generate_along(const GenerateArguments& o, const Globals& globals)
         return fail(ErrorCode::usage, "--ply and its like have no meaning with --along: convert what it writes");
     if (o.order == "tiles")
         return fail(ErrorCode::usage, "--order tiles has no meaning with --along");
-    SR_CHECK(refuse_given(*o.input.command, scene_input_options(), "--along, whose scaffold is a grid of ours"));
+    for (const std::string_view& name : scene_input_options())
+        if (name != "--origin") // the path's: the scaffold has its place
+            SR_CHECK(refuse_given(*o.input.command, {&name, 1}, "--along, whose scaffold is a grid of ours"));
+    PathOptions placement = o.placement;
+    if (placement.origin.empty())
+        placement.origin = o.input.origin;
     GrowthRequest request = o.along;
+    SR_TRY(request.placement, placement_of(placement));
     request.generation = o.generation.options;
     request.tile_size = o.tile_size.value_or(request.tile_size);
     request.scaffold = o.grid;
@@ -57,6 +65,7 @@ Status generate(const GenerateArguments& o, const Globals& globals)
         return fail(ErrorCode::usage, "--tile-size has a meaning with --order tiles and --along");
     if (!o.along.path.empty())
         return generate_along(o, globals);
+    SR_CHECK(refuse_given(*o.input.command, placement_options(), "a grid without --along"));
     GenerationRequest request{.settings = {}, .seed = o.seed, .output = o.output, .ply = o.ply, .replace = globals.yes};
     if (!o.generation.dry_run)
         SR_CHECK(check_generation_outputs(request));
@@ -110,6 +119,7 @@ void add_generate(CLI::App& app, const Globals& globals, Run& run)
     CLI::Option* along =
         c->add_option("--along", o->along.path,
                       "camera path: grow the scaffold along it into a folder of tiles, with memory that does not grow");
+    add_placement_options(*c, o->placement);
     add_number(*c, "--horizon", o->along.horizon, "--along: metres from the path, seen from above, that are generated",
                0.1, 1000)
         ->needs(along);

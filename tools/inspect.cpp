@@ -9,12 +9,19 @@
 #include "engine/model/renderer_model.h"
 #include "engine/scene/palette.h"
 #include "engine/scene/scene_objects.h"
+#include "engine/scene/tiles.h"
 #include "engine/splat/bounds.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
 #include "runtime/base/safetensors.h"
 #include "tools/cli/commands.h"
+#include "tools/cli/lens_options.h"
+#include "tools/cli/option_meaning.h"
+#include "tools/cli/path_options.h"
 #include "tools/cli/progress.h"
+#include "tools/convert_model.h"
+#include "tools/convert_path.h"
+#include "tools/inspect_path.h"
 #include "tools/scene_input.h"
 
 #include <algorithm>
@@ -25,8 +32,6 @@
 namespace semrover {
 
 namespace {
-
-using Report = nlohmann::ordered_json;
 
 // "a: 1" lines; objects indent, arrays of objects are a line an entry
 void append_text(std::string& out, const Report& report, size_t indent)
@@ -318,14 +323,6 @@ Result<Report> describe_folder(const Path& folder, bool with_tensors)
 
 // ---- a grid
 
-Report metres(const std::array<double, 3>& position)
-{
-    Report list = Report::array();
-    for (const double c : position)
-        list.push_back(std::round(c * 1e4) / 1e4);
-    return list;
-}
-
 void add_input(Report& report, const SceneInput& input)
 {
     if (input.format == SceneFormat::sgrid)
@@ -400,8 +397,13 @@ Result<Report> describe_scene(const Path& path, const SceneInputOptions& options
 Result<Report> describe(const Path& path, const SceneInputOptions& input, const Globals& globals)
 {
     std::error_code ignored;
-    if (std::filesystem::is_directory(path, ignored))
+    if (std::filesystem::is_directory(path, ignored)) {
+        if (TileFolder::is_one(path))
+            return describe_scene(path, input);
+        if (!is_model(path))
+            SR_CHECK(refuse_unknown_input(path));
         return describe_folder(path, globals.verbose || globals.json);
+    }
     if (input.from.empty())
         SR_CHECK(refuse_colmap_file(path));
     if (path.extension() == ".json" && input.from.empty() && !path.string().ends_with(".index.json"))
@@ -410,14 +412,70 @@ Result<Report> describe(const Path& path, const SceneInputOptions& input, const 
     const bool pickle = path.extension() == ".bin" && !is_there(Path(path).replace_extension(".label"));
     if (!input.from.empty() || (has_scene_extension(path) && !pickle))
         return describe_scene(path, input);
+    if (!is_model(path))
+        SR_CHECK(refuse_unknown_input(path));
     SR_TRY(const SafetensorsSet set, SafetensorsSet::open(path));
     Totals totals;
     return describe_weights(set, true, totals);
 }
 
-Status inspect(const Path& path, const SceneInputOptions& input, const Globals& globals)
+// ---- a camera path, and whether it meets a grid
+
+struct InspectArguments {
+    std::string file, other, path; // `path`: --path, in place of one of the two
+    SceneInputOptions input;
+    LensOptions lens;
+    PathOptions placement;
+};
+
+// which of the files is a path
+struct InspectedFiles {
+    Path path, other; // may be empty
+};
+Result<InspectedFiles> sort_out(const InspectArguments& o)
 {
-    SR_TRY(const Report report, describe(path, input, globals));
+    if (!o.path.empty() && !o.other.empty())
+        return fail(ErrorCode::usage, "--path, or two files, of which one is a camera path");
+    if (!o.path.empty())
+        return InspectedFiles{o.path, o.file};
+    const bool first = o.input.from.empty() && find_path(o.file);
+    if (o.other.empty())
+        return first ? InspectedFiles{o.file, {}} : InspectedFiles{{}, o.file};
+    return first ? InspectedFiles{o.file, o.other} : InspectedFiles{o.other, o.file};
+}
+
+Result<Report> describe_both(const InspectArguments& o, const Globals& globals)
+{
+    SR_TRY(const InspectedFiles files, sort_out(o));
+    if (files.path.empty()) {
+        SR_CHECK(refuse_given(*o.input.command, placement_options(), "a file that is no camera path"));
+        return describe(files.other, o.input, globals);
+    }
+    SR_TRY(PathLens lens, path_lens_of(o.lens));
+    lens.matters = o.lens.size_given; // without it, KITTI's calibration says no lens
+    PathOptions placement = o.placement;
+    std::optional<SceneInput> scene;
+    if (!files.other.empty()) {
+        SceneInputOptions input = o.input;
+        input.origin_may_be_of_path = true;
+        SR_TRY(scene, read_scene_input(files.other, input));
+    }
+    if (placement.origin.empty() && (!scene || !has_origin(scene->format)))
+        placement.origin = o.input.origin;
+    SR_TRY(const PathPlacement place, placement_of(placement));
+    SR_TRY(const CameraPath path, read_camera_path(files.path, lens, place));
+    Report report = describe_path(files.path, path);
+    if (!scene)
+        return report;
+    Report both = {{"path", report}};
+    both["scene"] = scene->grid ? describe_grid(files.other, *scene) : describe_splats(files.other, *scene);
+    both["meeting"] = describe_meeting(files.path, path, *scene);
+    return both;
+}
+
+Status inspect(const InspectArguments& o, const Globals& globals)
+{
+    SR_TRY(const Report report, describe_both(o, globals));
     std::string text;
     if (globals.json)
         text = report.dump(-1, ' ', false, Report::error_handler_t::replace) + "\n";
@@ -432,16 +490,19 @@ Status inspect(const Path& path, const SceneInputOptions& input, const Globals& 
 void add_inspect(CLI::App& app, const Globals& globals, Run& run)
 {
     CLI::App* command = app.add_subcommand(
-        "inspect", "show the tensors and config of a model, or what is in a grid or a file of splats");
-    const auto path = std::make_shared<std::string>();
-    const auto input = std::make_shared<SceneInputOptions>();
+        "inspect", "show what is in a model, a scene or a camera path, and whether a path and a scene meet");
+    const auto o = std::make_shared<InspectArguments>();
     command
-        ->add_option("FILE|DIR", *path,
-                     "a .safetensors file or index, a model's folder, a scene in any format, or "
-                     "its objects (.json)")
+        ->add_option("FILE|DIR", o->file,
+                     "a .safetensors file or index, a model's folder, a scene in any format, its objects (.json), or a "
+                     "camera path")
         ->required();
-    add_scene_input_options(*command, *input);
-    command->callback([=, &globals, &run] { run = [=, &globals] { return inspect(*path, *input, globals); }; });
+    command->add_option("OTHER", o->other, "a scene for a camera path, or a path for a scene: whether they meet");
+    command->add_option("--path", o->path, "a camera path, likewise");
+    add_scene_input_options(*command, o->input);
+    add_lens_options(*command, o->lens);
+    add_placement_options(*command, o->placement);
+    command->callback([=, &globals, &run] { run = [=, &globals] { return inspect(*o, globals); }; });
 }
 
 } // namespace semrover

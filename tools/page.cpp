@@ -10,6 +10,7 @@
 #include "tools/cli/commands.h"
 #include "tools/cli/lens_options.h"
 #include "tools/cli/number_option.h"
+#include "tools/cli/path_options.h"
 #include "tools/cli/print_stderr.h"
 #include "tools/cli/progress.h"
 
@@ -24,6 +25,7 @@ constexpr size_t kMaxSets = 8; // more do not fit side by side
 
 struct PageArguments {
     std::string output, grid, truth, title, about, path;
+    PathOptions placement;
     std::vector<std::string> frames, runs, figures;
     PictureOptions pictures;
     uint64_t max_points = 400000;
@@ -59,6 +61,10 @@ std::string command_line(const PageArguments& o)
         for (const std::string& value : *values)
             add(option, value);
     add("--path", o.path);
+    add("--relative-to", o.placement.relative_to);
+    add("--calib", o.placement.calibration);
+    add("--world", o.placement.world);
+    add("--origin", o.placement.origin);
     const PageArguments defaults;
     if (o.pictures.limit != defaults.pictures.limit)
         add("--max-frames", std::to_string(o.pictures.limit));
@@ -134,8 +140,10 @@ Result<PageContent> load_content(const PageArguments& o, const Globals& globals)
         SR_TRY(c.figures.emplace_back(), read_page_figures(figures));
     }
     if (!o.path.empty()) { // where the camera is and looks; its lens does not matter
-        SR_TRY(const Intrinsics lens, intrinsics_of({}));
-        SR_TRY(c.path, read_camera_path(o.path, lens));
+        SR_TRY(PathLens lens, path_lens_of({}));
+        lens.matters = false;
+        SR_TRY(const PathPlacement placement, placement_of(o.placement));
+        SR_TRY(c.path, read_camera_path(o.path, lens, placement));
     }
     SR_TRY(c.pictures, load_pictures(o, globals));
     return c;
@@ -178,6 +186,7 @@ void add_page(CLI::App& app, const Globals& globals, Run& run)
     c->add_option("--run", o->runs, "a run's folder, or its run.json, for the table of settings and results");
     c->add_option("--figures", o->figures, "a JSON object of names and values, for a table of its own");
     c->add_option("--path", o->path, "a camera path of any format, to drive along in the scene");
+    add_placement_options(*c, o->placement);
     add_number(*c, "--max-frames", o->pictures.limit, "moments at most, evenly chosen", 1u, 2000u)->needs(frames);
     add_number(*c, "--quality", o->pictures.quality, "of JPEG", 1, 100)->needs(frames);
     add_number(*c, "--max-points", o->max_points, "points of a scene at most, evenly chosen", uint64_t(1),

@@ -35,6 +35,7 @@ Result<Refinement> resolve(const RefineArguments& o, const Globals& globals, con
     r.radius_given = !o.drive.splat_radius.empty();
     if (o.size_given)
         r.size = ImageSize{o.drive.width, o.drive.height};
+    r.allow_empty = o.drive.allow_empty;
     if (!o.drive.path.empty()) {
         SR_TRY(r.path, load_cameras(o.drive));
     }
@@ -96,6 +97,8 @@ Status refine(const RefineArguments& o, const Globals& globals)
     if (!o.dry_run)
         SR_CHECK(r.check_outputs(video_files(o.videos, r.chains)));
     SR_TRY(const auto device, open_device(globals, o.profile));
+    if (r.options.path)
+        print_warnings(r.options.path->warnings, globals);
     if (o.dry_run)
         return dry_run(*device, r, globals);
     const auto results = run_job(globals, [&](const JobCallbacks& callbacks) {

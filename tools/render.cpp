@@ -66,16 +66,22 @@ Result<DrawingOptions> drawing_options(const RenderArguments& o, const Globals& 
     d.draw.semantic = o.semantic;
     d.floats = o.floats;
     d.visible_depth = o.visible_depth;
-    SR_TRY(SceneInput input, read_scene_input(o.grid, o.input));
+    SceneInputOptions scene = o.input;
+    scene.origin_may_be_of_path = !o.drive.path.empty();
+    SR_TRY(SceneInput input, read_scene_input(o.grid, scene));
     print_warnings(input.warnings, globals);
+    DriveOptions drive = o.drive;
+    if (drive.placement.origin.empty() && !has_origin(input.format))
+        drive.placement.origin = o.input.origin;
     if (input.grid)
         d.scene = std::move(*input.grid);
     else
         d.scene = std::move(*input.splats);
     d.scene_name = o.grid;
     d.folder = o.output;
+    d.allow_empty = o.drive.allow_empty;
     if (!o.drive.path.empty()) {
-        SR_TRY(d.path, load_cameras(o.drive));
+        SR_TRY(d.path, load_cameras(drive));
     }
     if (o.top)
         d.top = {o.drive.width, o.drive.height};
@@ -87,6 +93,7 @@ Status render(const RenderArguments& o, const Globals& globals)
     SR_CHECK(check_outputs(o, globals));
     SR_TRY(DrawingOptions options, drawing_options(o, globals));
     SR_TRY(const auto device, open_device(globals, o.profile));
+    print_warnings(options.path.warnings, globals);
     VideoOfFrames video;
     size_t drawn = 0;
     options.picture = [&](const CameraFrame& frame, std::span<const uint8_t> pixels) {
@@ -122,8 +129,8 @@ void add_render(CLI::App& app, const Globals& globals, Run& run)
                   "a grid (.sgrid, a folder of tiles, .npz, .label, .vox, .ply) or splats (.ply, .glb, .splat)")
         ->required();
     c->add_option("-o,--output", o->output, "folder for {color,depth,normal,label,visible}/000000.png")->required();
-    add_drive_options(*c, o->drive);
     add_scene_input_options(*c, o->input);
+    add_drive_options(*c, o->drive);
     c->add_flag("--semantic", o->semantic, "label colours; a grid without points is drawn as blocks");
     c->add_flag("--top", o->top, "also an overview from above, top.png");
     c->add_flag("--npy", o->floats,

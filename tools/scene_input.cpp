@@ -8,7 +8,7 @@
 #include "tools/cli/class_option.h"
 #include "tools/cli/number_option.h"
 #include "tools/cli/option_meaning.h"
-#include "tools/cli/print_stderr.h"
+#include "tools/cli/path_options.h"
 
 #include <algorithm>
 #include <array>
@@ -56,7 +56,8 @@ Status check_options(const SceneInputOptions& o, SceneFormat format, std::string
         return {};
     const std::vector<std::string_view> meant = options_of(format, o.file_voxel_size > 0);
     for (const std::string_view name : scene_input_options())
-        if (name != "--from" && std::ranges::find(meant, name) == meant.end())
+        if (name != "--from" && std::ranges::find(meant, name) == meant.end() &&
+            !(name == "--origin" && o.origin_may_be_of_path))
             SR_CHECK(refuse_given(*o.command, {&name, 1}, what));
     return {};
 }
@@ -82,17 +83,16 @@ Result<SceneGridOptions> grid_options(const SceneInputOptions& o)
 
 } // namespace
 
+bool has_origin(SceneFormat format)
+{
+    return std::ranges::count(options_of(format, false), "--origin") > 0;
+}
+
 Result<std::array<double, 3>> origin_of(const SceneInputOptions& options)
 {
-    const std::string& text = options.origin;
-    std::array<double, 3> origin{};
-    int used = 0;
-    if (text.empty())
-        return origin;
-    if (std::sscanf(text.c_str(), "%lf,%lf,%lf%n", &origin[0], &origin[1], &origin[2], &used) != 3 ||
-        size_t(used) != text.size() || !std::isfinite(origin[0] + origin[1] + origin[2]))
-        return fail(ErrorCode::usage, "--origin takes X,Y,Z in metres, not {}", quote(text, 60));
-    return origin;
+    if (options.origin.empty())
+        return Point3{};
+    return point_option("--origin", options.origin);
 }
 
 void add_scene_input_options(CLI::App& c, SceneInputOptions& o)
@@ -156,13 +156,6 @@ Result<SceneInput> read_scene_input(const Path& path, const SceneInputOptions& o
         input.dropped = scene.dropped;
     }
     return input;
-}
-
-void print_warnings(const std::vector<std::string>& warnings, const Globals& globals)
-{
-    for (const std::string& warning : warnings)
-        if (!globals.quiet)
-            print_stderr("semrover: warning: {}\n", warning);
 }
 
 Result<VoxelGrid> load_grid(const Path& path, const SceneInputOptions& options, const Globals& globals)

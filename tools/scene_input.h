@@ -3,7 +3,7 @@
 #pragma once
 
 #include "engine/format/scene_file.h"
-#include "tools/cli/commands.h"
+#include "tools/cli/warnings.h"
 
 #include <optional>
 
@@ -21,10 +21,14 @@ struct SceneInputOptions {
     int points_per_voxel = 20;
     uint64_t seed = 0;
     bool labels_only = false, nearest_color = false;
-    const CLI::App* command = nullptr; // that they are options of; none: all have their defaults
+    bool origin_may_be_of_path = false; // --origin is not refused for a grid that has its place already
+    const CLI::App* command = nullptr;  // that they are options of; none: all have their defaults
 };
 void add_scene_input_options(CLI::App& command, SceneInputOptions& options);
 std::span<const std::string_view> scene_input_options(); // their names
+
+// whether --origin says where a grid of this format lies; others have their place already
+bool has_origin(SceneFormat format);
 
 // --origin as numbers; errors: usage
 Result<std::array<double, 3>> origin_of(const SceneInputOptions& options);
@@ -39,8 +43,6 @@ struct SceneInput {
 };
 // usage also for options that have no meaning for this format
 Result<SceneInput> read_scene_input(const Path& path, const SceneInputOptions& options);
-
-void print_warnings(const std::vector<std::string>& warnings, const Globals& globals);
 
 // a grid, with warnings printed; bad_input for splats
 Result<VoxelGrid> load_grid(const Path& path, const SceneInputOptions& options, const Globals& globals);

@@ -113,6 +113,12 @@ std::optional<Projection> project(const CameraFrame& frame, const Point3& world)
     return Lens(frame.intrinsics).project(transform(frame.pose.world_to_camera, world));
 }
 
+Rigid CameraPath::file_pose(size_t frame) const
+{
+    const Rigid camera = frames[frame].pose.camera_to_world();
+    return body ? compose(camera, inverse(body->forward_camera_to_body)) : camera;
+}
+
 bool is_camera_name(std::string_view name)
 {
     const auto allowed = [](char c) {

@@ -42,9 +42,22 @@ struct CameraFrame {
     Intrinsics intrinsics;
 };
 
-// The frames that a run renders, in order. Readers return at least one.
+// what the poses of a file are of, where it is not a camera
+struct PathBody {
+    std::string name;             // "a vehicle (x forward, y left, z up)"
+    Rigid forward_camera_to_body; // a camera at its origin that looks forward
+};
+
+// The frames that a run renders, in order. Readers return at least one. A file of a body's poses has frames of a camera
+// at the body's origin that looks forward.
 struct CameraPath {
     std::vector<CameraFrame> frames;
+    bool numbered = false;             // the times are numbers that the file gives its frames
+    std::optional<PathBody> body;      // of the file's poses; none: a camera
+    std::vector<std::string> warnings; // of the reader
+
+    // a frame's pose to the world, in the axes of the file's own poses
+    Rigid file_pose(size_t frame) const;
 };
 
 // the same view with another number of pixels

@@ -186,11 +186,12 @@ Result<Rig> read_rig(const Path& path)
 
 CameraPath expand_rig(const Rig& rig, const CameraPath& vehicle)
 {
-    CameraPath cameras;
-    for (const CameraFrame& pose : vehicle.frames) {
-        Rigid world_to_vehicle = pose.pose.world_to_camera;
-        if (rig.path_axes == PathAxes::camera)
-            world_to_vehicle = compose(inverse(kVehicleToForwardCamera), world_to_vehicle);
+    CameraPath cameras{.frames = {}, .numbered = vehicle.numbered, .body = {}, .warnings = vehicle.warnings};
+    for (size_t i = 0; i < vehicle.frames.size(); ++i) {
+        const CameraFrame& pose = vehicle.frames[i];
+        const Rigid world_to_vehicle = rig.path_axes == PathAxes::camera
+                                           ? compose(inverse(kVehicleToForwardCamera), pose.pose.world_to_camera)
+                                           : inverse(vehicle.file_pose(i));
         for (const Sensor& sensor : rig.sensors)
             cameras.frames.push_back({pose.time,
                                       sensor.name,

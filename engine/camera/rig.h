@@ -16,7 +16,7 @@ struct Sensor {
 // what the poses of a path are poses of
 enum class PathAxes {
     camera,  // of a camera at the vehicle's origin that looks forward, OpenCV axes, like every path file here
-    vehicle, // of the vehicle's own axes
+    vehicle, // of the vehicle's own axes, which are the file's (CameraPath::body)
 };
 
 struct Rig {

@@ -3,6 +3,7 @@
 #include "engine/format/camera_path.h"
 #include "engine/format/camera_text.h"
 #include "engine/format/colmap_models.h"
+#include "engine/format/natural_order.h"
 #include "runtime/base/quote.h"
 
 #include <algorithm>
@@ -45,19 +46,20 @@ Result<std::map<std::string, Intrinsics>> read_cameras(const Path& path)
     return cameras;
 }
 
-// IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, world to camera
-Result<ColmapPicture> read_image(const std::vector<std::string_view>& words,
-                                 const std::map<std::string, Intrinsics>& cameras, std::string_view where)
+// IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, world to camera; a name may have blanks
+Result<ColmapPicture> read_image(std::string_view line, const std::map<std::string, Intrinsics>& cameras,
+                                 std::string_view where)
 {
-    if (words.size() != 10)
+    const std::vector<std::string_view> words = cut_words(line, 9);
+    if (words.size() != 9 || line.empty())
         return fail(ErrorCode::bad_input,
                     "{}: expected the 10 words IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, found {}", where,
-                    words.size() > 10 ? "more" : fmt::format("{}", words.size()));
+                    words.size());
     SR_TRY(const std::vector<double> v, numbers_of_words({words.begin() + 1, words.begin() + 8}, where));
     const auto camera = cameras.find(std::string(words[8]));
     if (camera == cameras.end())
         return fail(ErrorCode::bad_input, "{}: no camera {} in cameras.txt", where, quote(words[8], 40));
-    return colmap_picture({v[0], v[1], v[2], v[3]}, {v[4], v[5], v[6]}, camera->second, std::string(words[9]), where);
+    return colmap_picture({v[0], v[1], v[2], v[3]}, {v[4], v[5], v[6]}, camera->second, std::string(line), where);
 }
 
 Result<std::vector<ColmapPicture>> read_images(const Path& path, const std::map<std::string, Intrinsics>& cameras)
@@ -66,10 +68,9 @@ Result<std::vector<ColmapPicture>> read_images(const Path& path, const std::map<
     SR_TRY(const std::string text, read_text_file(path, kMaxColmapBytes));
     std::vector<ColmapPicture> frames;
     for (TextLines lines(text); lines.next();) {
-        const std::vector<std::string_view> words = words_of(lines.line(), 10);
-        if (words.empty())
+        if (count_words(lines.line()) == 0)
             continue;
-        SR_TRY(ColmapPicture frame, read_image(words, cameras, fmt::format("{} line {}", name, lines.number())));
+        SR_TRY(ColmapPicture frame, read_image(lines.line(), cameras, fmt::format("{} line {}", name, lines.number())));
         frames.push_back(std::move(frame));
         // the next line is of points in the picture, x y id each, and may be empty
         if (lines.next() && count_words(lines.line()) % 3 != 0)
@@ -107,7 +108,7 @@ Result<CameraPath> read_colmap(const Path& folder)
 {
     SR_TRY(std::vector<ColmapPicture> frames,
            is_there(folder / "cameras.bin") ? read_colmap_binary(folder) : read_colmap_text(folder));
-    std::ranges::stable_sort(frames, {}, &ColmapPicture::name);
+    std::ranges::stable_sort(frames, natural_less, &ColmapPicture::name);
     std::map<std::string, uint32_t> counts; // there are no times: the pictures of each camera are a second apart
     CameraPath path;
     const bool one_folder = std::ranges::all_of(frames, [&](const ColmapPicture& f) {

@@ -5,21 +5,12 @@
 #include "engine/format/camera_text.h"
 #include "runtime/base/quote.h"
 
-#include <algorithm>
+#include <cmath>
+#include <numbers>
 
 namespace semrover {
 
 namespace {
-
-constexpr std::string_view kFormatNames[] = {"tum", "kitti", "transforms", "camera_path", "colmap"};
-
-bool is_kitti(std::string_view text)
-{
-    for (TextLines lines(text); lines.next();)
-        if (const size_t words = count_words(lines.line()); words > 0)
-            return words == 12;
-    return false;
-}
 
 // a file beside the poses, or of poses/NN.txt in sequences/NN, if it is there
 Path beside(const Path& path, const char* name)
@@ -30,57 +21,98 @@ Path beside(const Path& path, const char* name)
     return {};
 }
 
-Result<CameraPath> read_path_folder(const Path& folder, const Intrinsics& fallback, bool size_given)
+// formats without a lens
+Result<CameraPath> read_poses(const FoundPath& found, const Intrinsics& lens)
 {
-    if (is_there(folder / "cameras.bin") || is_there(folder / "cameras.txt"))
-        return read_colmap(folder);
-    if (is_file(folder / "poses.txt"))
-        return read_camera_path(folder / "poses.txt", fallback, size_given);
-    return fail(ErrorCode::bad_input,
-                "{}: a folder without a path, expected COLMAP's cameras.bin or cameras.txt, or KITTI's poses.txt (as "
-                "poses/00.txt it is named itself)",
-                quote_path(folder));
+    switch (found.format) {
+    case PathFormat::kitti360:
+        return read_kitti360(found.path, lens);
+    case PathFormat::matrices:
+        return read_matrices(found.path, lens);
+    case PathFormat::redwood:
+        return read_redwood(found.path, lens);
+    case PathFormat::pose_files:
+        return read_pose_files(found.path, lens);
+    case PathFormat::euroc:
+        return read_euroc(found.path, lens);
+    case PathFormat::nuscenes:
+        return read_nuscenes_poses(found.path, lens);
+    default:
+        return read_tum(found.path, lens);
+    }
+}
+
+// whether the file's own lens was read
+struct ReadPath {
+    CameraPath path;
+    bool own_lens = true;
+};
+Result<ReadPath> read_found(const FoundPath& found, const PathLens& lens)
+{
+    ReadPath read;
+    if (found.format == PathFormat::colmap) {
+        SR_TRY(read.path, read_colmap(found.path));
+        if (found.path.filename() == "0" && is_folder(found.path.parent_path() / "1"))
+            read.path.warnings.push_back(fmt::format("{}: holds several models, of which the first, 0, is read",
+                                                     quote_path(found.path.parent_path())));
+    } else if (found.format == PathFormat::transforms) { // says itself what it takes
+        SR_TRY(read.path, read_transforms(found.path, lens));
+    } else if (found.format == PathFormat::camera_path) {
+        SR_TRY(read.path, read_camera_path_json(found.path));
+    } else if (found.format == PathFormat::pandaset) {
+        SR_TRY(read.path, read_pandaset(found.path, lens));
+        read.own_lens = is_file(found.path.parent_path() / "intrinsics.json");
+    } else if (found.format == PathFormat::kitti) {
+        KittiFiles files{beside(found.path, "times.txt"), {}, lens.size_given};
+        if (lens.matters)
+            files.calibration = beside(found.path, "calib.txt");
+        SR_TRY(read.path, read_kitti(found.path, lens.intrinsics, files));
+        read.own_lens = !files.calibration.empty();
+    } else {
+        SR_TRY(read.path, read_poses(found, lens.intrinsics));
+        read.own_lens = false;
+    }
+    return read;
 }
 
 } // namespace
 
-std::string_view name_of(PathFormat format)
+std::string default_view_text(std::string_view name, const Intrinsics& k)
 {
-    return kFormatNames[size_t(format)];
+    const double degrees = 2 * std::atan(k.width / 2.0 / k.fx) * 180 / std::numbers::pi;
+    return fmt::format("{}: has no intrinsics; the default field of view of {:g} degrees is taken (--fov-x)", name,
+                       std::round(degrees * 100) / 100);
 }
 
-std::optional<PathFormat> path_format_of(std::string_view name)
+std::string body_text(std::string_view name, const PathBody& body)
 {
-    const auto found = std::ranges::find(kFormatNames, name);
-    if (found == std::end(kFormatNames))
-        return std::nullopt;
-    return PathFormat(found - std::begin(kFormatNames));
+    return fmt::format("{}: poses of {}, read as a camera at its origin that looks forward; --rig says where cameras "
+                       "sit on it",
+                       name, body.name);
 }
 
 Status refuse_colmap_file(const Path& path)
 {
-    for (const char* name : {"cameras.bin", "images.bin", "points3D.bin", "rigs.bin", "frames.bin"})
+    for (const char* name : {"cameras.bin", "images.bin", "points3D.bin", "rigs.bin", "frames.bin", "cameras.txt",
+                             "images.txt", "points3D.txt"})
         if (path.filename() == name)
             return fail(ErrorCode::bad_input,
-                        "{}: a part of a COLMAP model, which is read as a whole; give its folder, {}", quote_path(path),
-                        quote_path(path.has_parent_path() ? path.parent_path() : Path(".")));
+                        "{}: a part of a COLMAP reconstruction, which is read as a whole; give its folder, {}",
+                        quote_path(path), quote_path(path.has_parent_path() ? path.parent_path() : Path(".")));
     return {};
 }
 
-Result<CameraPath> read_camera_path(const Path& path, const Intrinsics& fallback, bool size_given)
+Result<CameraPath> read_camera_path(const Path& path, const PathLens& lens, const PathPlacement& placement)
 {
-    if (is_folder(path))
-        return read_path_folder(path, fallback, size_given);
-    if (path.extension() == ".json") {
-        SR_TRY(const Json file, read_json(path));
-        return file.is_object() && file.contains("camera_path") ? parse_camera_path_json(file, quote_path(path))
-                                                                : parse_transforms(file, quote_path(path), fallback);
-    }
     SR_CHECK(refuse_colmap_file(path));
-    SR_TRY(const std::string text, read_text_file(path, kMaxPathBytes));
-    if (is_kitti(text))
-        return read_kitti(path, fallback, {beside(path, "times.txt"), beside(path, "calib.txt"), size_given});
-    return read_tum(path, fallback);
+    const std::optional<FoundPath> found = find_path(path);
+    if (!found)
+        SR_CHECK(refuse_unknown_path(path));
+    SR_TRY(ReadPath read, read_found(*found, lens));
+    if (!read.own_lens && !lens.view_given && lens.matters)
+        read.path.warnings.push_back(default_view_text(quote_path(path), lens.intrinsics));
+    SR_CHECK(place_path(read.path, placement, quote_path(path)));
+    return std::move(read.path);
 }
 
 } // namespace semrover

@@ -2,13 +2,31 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/camera/camera.h"
+#include "engine/camera/path_placement.h"
+#include "engine/format/path_format.h"
 #include "runtime/base/json.h"
 
 namespace semrover {
 
 // camera paths on disk; at most 16 MiB, all numbers finite. Errors are bad_input and name the file and the line or
 // frame; a path without poses is one. A lens whose distortion is 0 is read as a pinhole. The world is the file's.
+
+// the lens of a path that has none in its file
+struct PathLens {
+    PathLens(const Intrinsics& k, bool size = true, bool view = true)
+        : intrinsics(k), size_given(size), view_given(view)
+    {
+    }
+
+    Intrinsics intrinsics;
+    bool size_given, view_given; // else they are defaults: that they are taken is among CameraPath::warnings
+    bool matters = true;         // false: only where cameras are and look; calibrations are not read
+};
+
+// that a default field of view is taken, as CameraPath::warnings say it
+std::string default_view_text(std::string_view name, const Intrinsics& lens);
+// that a body's poses are read as a camera's; where no rig says where cameras sit on it
+std::string body_text(std::string_view name, const PathBody& body);
 
 // TUM: a line `t tx ty tz qx qy qz qw` a pose, camera to world, OpenCV camera axes; `#` starts a comment. All frames
 // get the given intrinsics. Source: https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats
@@ -32,15 +50,18 @@ Result<CameraPath> read_kitti(const Path& path, const Intrinsics& intrinsics, co
 Status write_kitti(const Path& path, const CameraPath& cameras);
 bool has_kitti_calibration(const CameraPath& cameras); // whether calib.txt can hold their lens
 
-// nerfstudio's transforms.json: OpenGL camera axes (x right, y up, z back), camera to world. Intrinsics are w, h, fl_x,
-// fl_y, cx, cy or camera_angle_x, camera_model (OPENCV, PINHOLE, SIMPLE_RADIAL, RADIAL, FULL_OPENCV, OPENCV_FISHEYE,
-// EQUIRECTANGULAR) and k1.., p1, p2, in the file or overridden in a frame; where the file has no size, `fallback` gives
-// it (and the focal lengths, if the file has none either).
-// `time` (seconds) defaults to the frame's index; `camera`, our addition, to no name.
-// Source: https://docs.nerf.studio/quickstart/data_conventions.html
-Result<CameraPath> read_transforms(const Path& path, const std::optional<Intrinsics>& fallback = {});
-Result<CameraPath> parse_transforms(const Json& file, std::string_view name,
-                                    const std::optional<Intrinsics>& fallback = {});
+// transforms.json of nerfstudio, instant-ngp and exporters from Blender: OpenGL camera axes (x right, y up, z back),
+// camera to world. Intrinsics are w, h, fl_x, fl_y, cx, cy, or a field of view in place of a focal length
+// (camera_angle_x, camera_angle_y in radians; x_fov, y_fov in degrees), camera_model (OPENCV, PINHOLE, SIMPLE_PINHOLE,
+// SIMPLE_RADIAL, RADIAL, FULL_OPENCV, OPENCV_FISHEYE, SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE, FISHEYE, SIMPLE_FISHEYE,
+// EQUIRECTANGULAR) or is_fisheye, and k1.., p1, p2, in the file or overridden in a frame. Without w and h the size is
+// that of `lens`, if it is given, or of the picture in `folder`; else the default's, unless the focal length is in
+// pixels. Keys of other lenses are refused by name. `time` (seconds) defaults to the frame's index; `camera`, our
+// addition, to no name.
+// Sources: https://docs.nerf.studio/quickstart/data_conventions.html, src/nerf_loader.cu of NVlabs/instant-ngp
+Result<CameraPath> read_transforms(const Path& path, const std::optional<PathLens>& lens = {});
+Result<CameraPath> parse_transforms(const Json& file, std::string_view name, const std::optional<PathLens>& lens = {},
+                                    const Path& folder = {});
 
 // pictures are named [CAMERA/]color/NNNNNN.png, counted for each camera, as `render` writes them
 Status write_transforms(const Path& path, const CameraPath& cameras);
@@ -56,22 +77,37 @@ Status write_camera_path_json(const Path& path, const CameraPath& cameras);
 
 // a folder of COLMAP's model: cameras.bin and images.bin or, where they are not, cameras.txt and images.txt (at most
 // 256 MiB); w first, world to camera. Lenses: colmap_models.h. Other files are not looked at. Frames come in the order
-// of their pictures' names, moment by moment where the pictures lie in folders of several cameras; the n-th of a camera
-// has the time n. Source: https://colmap.github.io/format.html
+// of their pictures' names (natural_order.h), moment by moment where the pictures lie in folders of several cameras;
+// the n-th of a camera has the time n. Source: https://colmap.github.io/format.html
 Result<CameraPath> read_colmap(const Path& folder);
 // the text model, pictures named as write_transforms does; bad_input where a binary model is in the folder
 Status write_colmap(const Path& folder, const CameraPath& cameras);
-// bad_input for a binary file of such a model, which is read as a folder; its names are cameras.bin and the like
+// bad_input for a file of such a model, which is read as a folder; its names are cameras.bin, images.txt and the like
 Status refuse_colmap_file(const Path& path);
 
-enum class PathFormat { tum, kitti, transforms, camera_path, colmap };
-std::string_view name_of(PathFormat format);
-std::optional<PathFormat> path_format_of(std::string_view name);
+// Paths that are read and not written; see path_format.h for how they are told apart. Poses are a pose to the world.
+// - KITTI-360: a frame's number and 12 (poses.txt, of the IMU: x forward, y right, z down) or 16 numbers a line
+//   (cam0_to_world.txt, of the camera). https://www.cvlibs.net/datasets/kitti-360/documentation.php
+// - matrices: 16 numbers a line (Replica), or four lines of four, of a camera
+// - Redwood and Open3D: a line of three numbers, the first of them the frame's, and four lines of four, of a camera
+// - a folder with a file of four lines of four for each frame (ScanNet, 7-Scenes), of a camera; in the order of the
+//   numbers in their names. Frames without a pose, which ScanNet fills with inf, are left out, with a warning
+// - EuRoC: lines time (ns), p x y z, q w x y z, with commas, of the IMU (x up, y right, z forward); a heading that has
+//   q_w last is followed. https://projects.asl.ethz.ch/datasets/doku.php?id=kmavvisualinertialdatasets
+Result<CameraPath> read_kitti360(const Path& path, const Intrinsics& lens);
+Result<CameraPath> read_matrices(const Path& path, const Intrinsics& lens);
+Result<CameraPath> read_redwood(const Path& path, const Intrinsics& lens);
+Result<CameraPath> read_pose_files(const Path& folder, const Intrinsics& lens);
+Result<CameraPath> read_euroc(const Path& path, const Intrinsics& lens);
+// - PandaSet's poses.json of a camera, with intrinsics.json and timestamps.json where they are beside it, or of the
+//   lidar (x right, y forward, z up), whose folder is called so. https://github.com/scaleapi/pandaset-devkit
+// - nuScenes' ego_pose.json, of the vehicle, in the order of their times. Where sample_data.json is beside it, those of
+//   the key frames of the lidar on the roof. https://www.nuscenes.org/nuscenes#data-format
+Result<CameraPath> read_pandaset(const Path& path, const PathLens& lens);
+Result<CameraPath> read_nuscenes_poses(const Path& path, const Intrinsics& lens);
 
-// Reads a path in the format that its content shows: a folder with cameras.bin, cameras.txt or KITTI's poses.txt, JSON
-// with camera_path or frames, text with 12 or else 8 numbers a line. KITTI's times.txt and calib.txt are read if they
-// are beside the poses, or in ../sequences/NN as the data set has them. `fallback` is used only for formats without
-// intrinsics (TUM, KITTI, a transforms.json of poses); `size_given`: whether its size is meant, see KittiFiles.
-Result<CameraPath> read_camera_path(const Path& path, const Intrinsics& fallback, bool size_given = true);
+// Reads a path in the format that its content shows (path_format.h), and places it in the grid's world. KITTI's
+// times.txt and calib.txt are read if they are beside the poses, or in ../sequences/NN as the data set has them.
+Result<CameraPath> read_camera_path(const Path& path, const PathLens& lens, const PathPlacement& placement = {});
 
 } // namespace semrover

@@ -6,6 +6,9 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
+#include <cstdlib>
+#include <string>
 
 namespace semrover {
 
@@ -49,6 +52,20 @@ std::vector<std::string_view> words_of(std::string_view line, size_t most)
     return words;
 }
 
+std::vector<std::string_view> cut_words(std::string_view& line, size_t count)
+{
+    std::vector<std::string_view> words;
+    while (words.size() < count) {
+        const std::string_view word = take_word(line);
+        if (word.empty())
+            break;
+        words.push_back(word);
+    }
+    line.remove_prefix(std::min(line.find_first_not_of(kBlanks), line.size()));
+    line.remove_suffix(line.size() - std::min(line.find_last_not_of(kBlanks) + 1, line.size()));
+    return words;
+}
+
 size_t count_words(std::string_view line)
 {
     size_t count = 0;
@@ -61,7 +78,10 @@ Result<double> number_of(std::string_view word, std::string_view where)
 {
     double value = 0;
     const std::string_view digits = word.starts_with('+') ? word.substr(1) : word;
-    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+    auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+    if (error == std::errc::result_out_of_range &&
+        std::abs(value = std::strtod(std::string(digits).c_str(), nullptr)) < 1)
+        error = {}; // too small for a double
     if (error != std::errc() || end != digits.data() + digits.size())
         return fail(ErrorCode::bad_input, "{}: expected a number, found {}", where, quote(word, 40));
     return value;

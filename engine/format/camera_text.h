@@ -32,6 +32,9 @@ class TextLines {
 // separated by blanks; from '#' on it is a comment. At most `most`, a word more when there are more.
 std::vector<std::string_view> words_of(std::string_view line, size_t most);
 
+// cuts `count` words off the line, or as many as there are; what is left has no blanks at its ends, and may have '#'
+std::vector<std::string_view> cut_words(std::string_view& line, size_t count);
+
 size_t count_words(std::string_view line);
 
 // bad_input, with `where` in front, for what is not a number

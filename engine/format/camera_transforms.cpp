@@ -1,11 +1,13 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/format/camera_path.h"
+#include "engine/format/image.h"
 #include "runtime/base/json_numbers.h"
 #include "runtime/base/quote.h"
 
 #include <algorithm>
 #include <map>
+#include <numbers>
 
 namespace semrover {
 
@@ -20,6 +22,15 @@ class Settings {
     {
         return optional_number(frame_.contains(key) ? frame_ : file_, key, where_);
     }
+    // true, or a number other than 0
+    Result<bool> flag(const char* key) const
+    {
+        const Json* value = find(key);
+        if (value && !value->is_boolean() && !value->is_number())
+            return fail(ErrorCode::bad_input, "{}: {}: expected true or false, found {}", where_, key,
+                        value->type_name());
+        return value && (value->is_boolean() ? value->get<bool>() : value->get<double>() != 0);
+    }
 
     std::string_view where() const { return where_; }
     const Json* find(const char* key) const
@@ -28,6 +39,8 @@ class Settings {
         const auto entry = owner.find(key);
         return entry == owner.end() ? nullptr : &*entry;
     }
+    const Json& frame() const { return frame_; }
+    const Json& file() const { return file_; }
 
   private:
     const Json& file_;
@@ -51,15 +64,61 @@ const TransformsModel kTransformsModels[] = {
     {"FULL_OPENCV", CameraModel::opencv, {"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"}},
     {"OPENCV_FISHEYE", CameraModel::fisheye, {"k1", "k2", "k3", "k4"}},
     {"EQUIRECTANGULAR", CameraModel::equirectangular, {}},
+    {"SIMPLE_RADIAL_FISHEYE", CameraModel::fisheye, {"k1"}},
+    {"RADIAL_FISHEYE", CameraModel::fisheye, {"k1", "k2"}},
+    {"FISHEYE", CameraModel::fisheye, {}},
+    {"SIMPLE_FISHEYE", CameraModel::fisheye, {}},
 };
+constexpr size_t kFullOpencv = 5, kOpencvFisheye = 6, kEquirectangular = 7;
+
+// what other programs write of lenses and cameras that are not read here
+constexpr const char* kForeignKeys[] = {"ftheta_p0",
+                                        "latlong",
+                                        "equirectangular",
+                                        "rolling_shutter",
+                                        "from_mitsuba",
+                                        "K",
+                                        "intrinsics",
+                                        "intrinsic_matrix",
+                                        "camera_matrix",
+                                        "camera_intrinsics",
+                                        "transform_matrix_start",
+                                        "transform_matrix_end",
+                                        "distortion_params",
+                                        "distortion",
+                                        "shift_x",
+                                        "shift_y"};
+
+// false, null, 0 and zeros say that there is none
+bool says_nothing(const Json& value)
+{
+    if (value.is_array())
+        return std::ranges::all_of(value, says_nothing);
+    return value.is_null() || value == false || value == 0;
+}
+
+Status refuse_foreign_keys(const Settings& settings)
+{
+    for (const char* key : kForeignKeys)
+        if (const Json* value = settings.find(key); value && !says_nothing(*value))
+            return fail(ErrorCode::bad_input,
+                        "{}: {} is not supported; expected fl_x, fl_y, cx, cy, camera_model, k1 and so on, and a "
+                        "transform_matrix",
+                        settings.where(), key);
+    return {};
+}
 
 Result<const TransformsModel*> read_model(const Settings& settings)
 {
+    SR_TRY(const bool fisheye, settings.flag("is_fisheye")); // instant-ngp's, which writes no camera_model
     const Json* model = settings.find("camera_model");
     if (!model)
-        return &kTransformsModels[0];
+        return &kTransformsModels[fisheye ? kOpencvFisheye : 0];
     const std::string name = model->is_string() ? model->get<std::string>() : model->dump(-1, ' ', true);
     const auto found = std::ranges::find(kTransformsModels, name, &TransformsModel::name);
+    if (found != std::end(kTransformsModels) && fisheye && found->model != CameraModel::fisheye)
+        return fail(ErrorCode::bad_input, "{}: is_fisheye, and camera_model {}, which is none", settings.where(),
+                    found->name);
     if (found != std::end(kTransformsModels))
         return found;
     std::vector<const char*> names;
@@ -84,20 +143,74 @@ Status read_lens(const Settings& settings, const TransformsModel& model, Intrins
     return {};
 }
 
-Result<Intrinsics> read_size(const Settings& settings, const std::optional<Intrinsics>& fallback)
+// where a frame's size comes from
+struct TransformsSource {
+    const std::optional<PathLens>& lens;
+    const Path& folder;                              // of the pictures; empty: not to be looked at
+    std::map<Path, ImageSize> sizes{};               // of pictures that were looked at
+    bool default_size = false, default_view = false; // taken somewhere
+};
+
+// Blender's exporters leave the extension out
+std::optional<Path> picture_of(const Json& frame, const Path& folder)
+{
+    const auto name = frame.find("file_path");
+    if (folder.empty() || name == frame.end() || !name->is_string() ||
+        name->get_ref<const std::string&>().find('\0') != std::string::npos)
+        return std::nullopt;
+    for (const char* extension : {"", ".png", ".jpg", ".jpeg"})
+        if (Path path = folder / (name->get<std::string>() + extension); is_file(path))
+            return path;
+    return std::nullopt;
+}
+
+Result<std::optional<ImageSize>> picture_size(const Json& frame, TransformsSource& source)
+{
+    const std::optional<Path> path = picture_of(frame, source.folder);
+    if (!path)
+        return std::optional<ImageSize>();
+    const auto [at, added] = source.sizes.try_emplace(*path);
+    if (added && path->extension() == ".png") {
+        SR_TRY(at->second, read_png_size(*path));
+    } else if (added) {
+        SR_TRY(const ImageRgb8 image, read_image_rgb8(*path));
+        at->second = {image.width, image.height};
+    }
+    return std::optional(at->second);
+}
+
+Result<Intrinsics> read_size(const Settings& settings, TransformsSource& source)
 {
     Intrinsics k;
     SR_TRY(const std::optional<double> w, settings.number("w"));
     SR_TRY(const std::optional<double> h, settings.number("h"));
-    if (w && h) {
+    if (w.has_value() != h.has_value())
+        return fail(ErrorCode::bad_input, "{}: {} is missing beside {}", settings.where(), w ? "h" : "w",
+                    w ? "w" : "h");
+    if (w) {
         SR_TRY(k.width, image_side(*w, fmt::format("{}: w", settings.where())));
         SR_TRY(k.height, image_side(*h, fmt::format("{}: h", settings.where())));
-    } else if (fallback) {
-        k.width = fallback->width;
-        k.height = fallback->height;
-    } else {
-        return fail(ErrorCode::bad_input, "{}: no image size (w, h); give one with -W and -H", settings.where());
+        return k;
     }
+    const std::optional<PathLens>& lens = source.lens;
+    std::optional<ImageSize> size;
+    if (lens && (lens->size_given || !lens->matters)) {
+        size = ImageSize{lens->intrinsics.width, lens->intrinsics.height};
+    } else {
+        SR_TRY(size, picture_size(settings.frame(), source));
+    }
+    const auto in_pixels = [&](const char* key) { return settings.find(key) != nullptr; };
+    if (!size && lens && !in_pixels("fl_x") && !in_pixels("fl_y") && !in_pixels("cx") && !in_pixels("cy")) {
+        size = ImageSize{lens->intrinsics.width, lens->intrinsics.height};
+        source.default_size = true;
+    }
+    if (!size)
+        return fail(ErrorCode::bad_input,
+                    "{}: no image size (w, h), and no picture to take it from; give it with -W "
+                    "and -H",
+                    settings.where());
+    k.width = size->width;
+    k.height = size->height;
     return k;
 }
 
@@ -115,29 +228,57 @@ Result<Intrinsics> read_panorama(const Settings& settings, const Intrinsics& siz
     return whole_sphere(size.width, size.height);
 }
 
-Result<Intrinsics> read_intrinsics(const Settings& settings, const std::optional<Intrinsics>& fallback)
+// Pixels; none where neither says it. note: a field of view gives the focal length as of a pinhole, of a fisheye, too:
+// so do nerfstudio and instant-ngp, whose x_fov is in degrees.
+Result<std::optional<double>> focal_length(const Json& owner, char axis, uint32_t side, std::string_view where)
 {
-    SR_TRY(Intrinsics k, read_size(settings, fallback));
+    SR_TRY(const std::optional<double> pixels, optional_number(owner, fmt::format("fl_{}", axis).c_str(), where));
+    SR_TRY(const std::optional<double> degrees, optional_number(owner, fmt::format("{}_fov", axis).c_str(), where));
+    SR_TRY(std::optional<double> angle, optional_number(owner, fmt::format("camera_angle_{}", axis).c_str(), where));
+    if (pixels)
+        return pixels;
+    if (degrees)
+        angle = *degrees * std::numbers::pi / 180;
+    if (!angle)
+        return std::optional<double>();
+    if (!(*angle > 0 && *angle < std::numbers::pi))
+        return fail(ErrorCode::bad_input, "{}: a field of view of {:.4g} radians along {}, expected less than pi",
+                    where, *angle, axis);
+    return std::optional(side / 2.0 / std::tan(*angle / 2));
+}
+
+// of the frame or, where it says neither, of the file
+Result<std::array<std::optional<double>, 2>> focal_lengths(const Settings& settings, const Intrinsics& size)
+{
+    std::array<std::optional<double>, 2> f;
+    for (const Json* owner : {&settings.frame(), &settings.file()}) {
+        SR_TRY(f[0], focal_length(*owner, 'x', size.width, settings.where()));
+        SR_TRY(f[1], focal_length(*owner, 'y', size.height, settings.where()));
+        if (f[0] || f[1])
+            break;
+    }
+    return f;
+}
+
+Result<Intrinsics> read_intrinsics(const Settings& settings, TransformsSource& source)
+{
+    SR_TRY(Intrinsics k, read_size(settings, source));
     SR_TRY(const TransformsModel* model, read_model(settings));
     SR_CHECK(read_lens(settings, *model, k));
     if (k.model == CameraModel::equirectangular)
         return read_panorama(settings, k);
-    SR_TRY(const std::optional<double> fl_x, settings.number("fl_x"));
-    SR_TRY(const std::optional<double> fl_y, settings.number("fl_y"));
-    SR_TRY(const std::optional<double> angle_x, settings.number("camera_angle_x"));
+    SR_TRY(const auto f, focal_lengths(settings, k));
     SR_TRY(const std::optional<double> cx, settings.number("cx"));
     SR_TRY(const std::optional<double> cy, settings.number("cy"));
-    if (!fl_x && !angle_x && fallback && fallback->model != CameraModel::pinhole && !settings.find("camera_model"))
-        return scaled_to(*fallback, k.width, k.height); // a file of poses
-    if (fl_x)
-        k.fx = *fl_x;
-    else if (angle_x) // radians across the width
-        k.fx = k.model == CameraModel::fisheye ? k.width / *angle_x : k.width / 2.0 / std::tan(*angle_x / 2);
-    else if (fallback)
-        k.fx = scaled_to(*fallback, k.width, k.height).fx;
-    else
+    const auto& lens = source.lens;
+    if (!f[0] && !f[1] && !lens)
         return fail(ErrorCode::bad_input, "{}: no focal length, expected fl_x or camera_angle_x", settings.where());
-    k.fy = fl_y.value_or(k.fx);
+    if (!f[0] && !f[1])
+        source.default_view = source.default_view || !lens->view_given;
+    if (!f[0] && !f[1] && lens->intrinsics.model != CameraModel::pinhole && !settings.find("camera_model"))
+        return scaled_to(lens->intrinsics, k.width, k.height); // a file of poses
+    k.fx = f[0] ? *f[0] : f[1] ? *f[1] : scaled_to(lens->intrinsics, k.width, k.height).fx;
+    k.fy = f[1].value_or(k.fx);
     k.cx = cx.value_or(k.width / 2.0);
     k.cy = cy.value_or(k.height / 2.0);
     SR_CHECK(check_intrinsics(k, settings.where()));
@@ -145,8 +286,10 @@ Result<Intrinsics> read_intrinsics(const Settings& settings, const std::optional
 }
 
 Result<CameraFrame> read_frame(const Json& file, const Json& json, size_t index, std::string_view where,
-                               const std::optional<Intrinsics>& fallback)
+                               TransformsSource& source)
 {
+    if (json.is_object())
+        SR_CHECK(refuse_foreign_keys(Settings(file, json, where)));
     if (!json.is_object() || !json.contains("transform_matrix"))
         return fail(ErrorCode::bad_input, "{}: expected an object with a transform_matrix", where);
     CameraFrame frame;
@@ -154,7 +297,7 @@ Result<CameraFrame> read_frame(const Json& file, const Json& json, size_t index,
     SR_TRY(const std::vector<double> values, numbers_of(json["transform_matrix"], what));
     SR_TRY(const Rigid camera_to_world, rigid_from_matrix(values, what));
     frame.pose.world_to_camera = inverse(compose(camera_to_world, kFlipYZ));
-    SR_TRY(frame.intrinsics, read_intrinsics(Settings(file, json, where), fallback));
+    SR_TRY(frame.intrinsics, read_intrinsics(Settings(file, json, where), source));
     SR_TRY(const std::optional<double> time, optional_number(json, "time", where));
     frame.time = time.value_or(static_cast<double>(index));
     if (const auto camera = json.find("camera"); camera != json.end()) {
@@ -167,16 +310,47 @@ Result<CameraFrame> read_frame(const Json& file, const Json& json, size_t index,
     return frame;
 }
 
+// nerfstudio moves the world, and scales it: poses and what else is in the folder stay together, a grid that was made
+// before does not
+bool is_identity(const Json& matrix)
+{
+    const auto values = numbers_of(matrix, "");
+    for (size_t i = 0; values && i < values->size(); ++i)
+        if ((*values)[i] != kIdentity[i % 16])
+            return false;
+    return values.has_value();
+}
+
+std::vector<std::string> transforms_warnings(const Json& file, std::string_view name, const TransformsSource& source)
+{
+    std::vector<std::string> warnings;
+    if (const auto m = file.find("applied_transform"); m != file.end() && !is_identity(*m))
+        warnings.push_back(fmt::format("{}: its poses are in the world that its applied_transform made; for a grid of "
+                                       "the world before, --world takes the inverse",
+                                       name));
+    if (const auto scale = file.find("applied_scale"); scale != file.end() && *scale != 1)
+        warnings.push_back(fmt::format("{}: its applied_scale is {}: positions are read as metres, and may be others",
+                                       name, printable(scale->dump(-1, ' ', true), 40)));
+    if (source.default_size)
+        warnings.push_back(
+            fmt::format("{}: no image size (w, h) and no picture to take it from; the default of {} x {} "
+                        "is taken (-W, -H)",
+                        name, source.lens->intrinsics.width, source.lens->intrinsics.height));
+    if (source.default_view && source.lens->matters)
+        warnings.push_back(default_view_text(name, source.lens->intrinsics));
+    return warnings;
+}
+
 const TransformsModel& transforms_model_of(const Intrinsics& k)
 {
     switch (k.model) {
     case CameraModel::opencv:
-        return k.distortion[5] != 0 || k.distortion[6] != 0 || k.distortion[7] != 0 ? kTransformsModels[5]
-                                                                                    : kTransformsModels[0];
+        return kTransformsModels[k.distortion[5] != 0 || k.distortion[6] != 0 || k.distortion[7] != 0 ? kFullOpencv
+                                                                                                      : 0];
     case CameraModel::fisheye:
-        return kTransformsModels[6];
+        return kTransformsModels[kOpencvFisheye];
     case CameraModel::equirectangular:
-        return kTransformsModels[7];
+        return kTransformsModels[kEquirectangular];
     case CameraModel::pinhole:
         break;
     }
@@ -205,13 +379,14 @@ void put_intrinsics(nlohmann::ordered_json& object, const Intrinsics& k, bool wi
 
 } // namespace
 
-Result<CameraPath> read_transforms(const Path& path, const std::optional<Intrinsics>& fallback)
+Result<CameraPath> read_transforms(const Path& path, const std::optional<PathLens>& lens)
 {
     SR_TRY(const Json file, read_json(path));
-    return parse_transforms(file, quote_path(path), fallback);
+    return parse_transforms(file, quote_path(path), lens, path.has_parent_path() ? path.parent_path() : Path("."));
 }
 
-Result<CameraPath> parse_transforms(const Json& file, std::string_view name, const std::optional<Intrinsics>& fallback)
+Result<CameraPath> parse_transforms(const Json& file, std::string_view name, const std::optional<PathLens>& lens,
+                                    const Path& folder)
 {
     const auto frames = file.is_object() ? file.find("frames") : file.end();
     if (!file.is_object() || frames == file.end() || !frames->is_array())
@@ -219,10 +394,12 @@ Result<CameraPath> parse_transforms(const Json& file, std::string_view name, con
     if (frames->empty())
         return fail(ErrorCode::bad_input, "{}: a camera path without poses, frames is empty", name);
     CameraPath cameras;
+    TransformsSource source{lens, folder};
     for (size_t i = 0; i < frames->size(); ++i) {
-        SR_TRY(CameraFrame frame, read_frame(file, (*frames)[i], i, fmt::format("{} frame {}", name, i), fallback));
+        SR_TRY(CameraFrame frame, read_frame(file, (*frames)[i], i, fmt::format("{} frame {}", name, i), source));
         cameras.frames.push_back(std::move(frame));
     }
+    cameras.warnings = transforms_warnings(file, name, source);
     return cameras;
 }
 

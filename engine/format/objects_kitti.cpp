@@ -3,6 +3,7 @@
 // KITTI's labels of objects and of tracks. Source: the readme files of the devkits for objects and for tracking,
 // https://www.cvlibs.net/datasets/kitti
 #include "engine/format/camera_text.h"
+#include "engine/format/kitti_calibration.h"
 #include "engine/format/object_boxes.h"
 #include "runtime/base/quote.h"
 
@@ -59,43 +60,6 @@ Rigid pose_of(const KittiLabel& label)
     return {c, s, 0, at[0], 0, 0, -1, at[1] - height / 2, -s, c, 0, at[2], 0, 0, 0, 1};
 }
 
-Result<Rigid> matrix_of(const std::vector<std::string_view>& words, size_t rows_of, std::string_view where)
-{
-    SR_TRY(std::vector<double> v, numbers_of_words({words.begin() + 1, words.end()}, where));
-    if (v.size() != rows_of * 3)
-        return fail(ErrorCode::bad_input, "{}: expected {} numbers, found {}", where, rows_of * 3,
-                    v.size() > rows_of * 3 ? "more" : fmt::format("{}", v.size()));
-    if (rows_of == 3)
-        v = {v[0], v[1], v[2], 0, v[3], v[4], v[5], 0, v[6], v[7], v[8], 0};
-    return rigid_from_matrix(v, where);
-}
-
-// from the rectified camera to the lidar. The calibration of tracking has other names, without a colon
-Result<Rigid> read_calibration(const Path& path)
-{
-    const std::string name = quote_path(path);
-    SR_TRY(const std::string text, read_text_file(path, kMaxPathBytes));
-    std::optional<Rigid> rectify, lidar_to_camera;
-    for (TextLines lines(text); lines.next();) {
-        const std::vector<std::string_view> words = words_of(lines.line(), 13);
-        if (words.empty())
-            continue;
-        const std::string_view key = words[0].substr(0, words[0].find(':'));
-        const std::string where = fmt::format("{} line {}", name, lines.number());
-        if (key == "R0_rect" || key == "R_rect") {
-            SR_TRY(rectify, matrix_of(words, 3, where));
-        } else if (key == "Tr_velo_to_cam" || key == "Tr_velo_cam") {
-            SR_TRY(lidar_to_camera, matrix_of(words, 4, where));
-        }
-    }
-    if (!rectify || !lidar_to_camera)
-        return fail(ErrorCode::bad_input,
-                    "{}: expected lines R0_rect: and Tr_velo_to_cam: (of tracking: R_rect and "
-                    "Tr_velo_cam)",
-                    name);
-    return inverse(compose(*rectify, *lidar_to_camera));
-}
-
 Status add_label(const KittiLabel& label, size_t prefix, const Rigid& to_frame, std::string_view where,
                  BoxCollector& to)
 {
@@ -137,7 +101,8 @@ Status read_kitti_boxes(const Path& path, const BoxOptions& options, BoxCollecto
     const std::string name = quote_path(path);
     Rigid to_frame = kCameraToForward;
     if (!options.calibration.empty()) {
-        SR_TRY(to_frame, read_calibration(options.calibration));
+        SR_TRY(to_frame, read_kitti_lidar(options.calibration));
+        to_frame = inverse(to_frame);
     }
     SR_TRY(const std::string text, read_text_file(path, kMaxLabelBytes));
     std::optional<size_t> prefix;

@@ -151,16 +151,21 @@ Status FusionFolder::read_poses(const Path& poses, const FusionFolderOptions& o)
     } else if (is_file(folder_ / "intrinsics.json")) {
         SR_TRY(fallback, read_intrinsics_file(folder_ / "intrinsics.json"));
     }
+    const std::optional<FoundPath> found = find_path(poses);
     CameraPath path;
-    if (fallback) {
-        SR_TRY(path, read_camera_path(poses, *fallback));
-    } else if (poses.extension() == ".json") {
-        SR_TRY(path, read_transforms(poses));
+    if (fallback || !found || found->format == PathFormat::colmap || found->format == PathFormat::camera_path) {
+        SR_TRY(path, read_camera_path(poses, fallback.value_or(pinhole_from_fov(90, 1, 1)), o.placement));
+    } else if (found->format == PathFormat::transforms) {
+        SR_TRY(path, read_transforms(found->path));
+        SR_CHECK(place_path(path, o.placement, quote_path(poses)));
     } else {
         return fail(ErrorCode::bad_input,
                     "{} has no intrinsics: expected {}, or --fx (and --fy, --cx, --cy), or --fov-x", quote_path(poses),
                     quote_path(folder_ / "intrinsics.json"));
     }
+    warnings_ = std::move(path.warnings);
+    if (path.body)
+        warnings_.push_back(body_text(quote_path(poses), *path.body));
     cameras_ = std::move(path.frames);
     for (size_t i = 0; i < cameras_.size(); ++i) {
         SR_CHECK(apply_options(o, cameras_[i].intrinsics));

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/camera/path_placement.h"
 #include "engine/format/label_map.h"
 #include "engine/fusion/depth_frames.h"
 #include "runtime/base/file.h"
@@ -12,6 +13,7 @@ namespace semrover {
 
 struct FusionFolderOptions {
     Path poses;                           // any camera path; empty: transforms.json in the folder
+    PathPlacement placement;              // of the path
     std::optional<double> fx, fy, cx, cy; // pixels; they override the files
     std::optional<double> fov_x;          // degrees across the width
     Path map;                             // JSON that says what label numbers are (label_map.h)
@@ -36,8 +38,9 @@ class FusionFolder {
     Status check_labels();
 
     const std::vector<CameraFrame>& cameras() const { return cameras_; }
-    size_t labelled() const; // frames with labels
-    size_t colored() const;  // frames with colours
+    const std::vector<std::string>& warnings() const { return warnings_; } // of the camera path
+    size_t labelled() const;                                               // frames with labels
+    size_t colored() const;                                                // frames with colours
 
     DepthFrames frames() const; // good as long as this is
 
@@ -56,6 +59,7 @@ class FusionFolder {
 
     Path folder_;
     std::vector<CameraFrame> cameras_;
+    std::vector<std::string> warnings_;
     std::vector<Pictures> pictures_;
     LabelMap map_;
     std::array<uint8_t, 256> classes_{}; // of label numbers: a class, kLeftOut or kEmpty

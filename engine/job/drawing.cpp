@@ -4,6 +4,7 @@
 
 #include "engine/format/image.h"
 #include "engine/job/budget_meter.h"
+#include "engine/job/empty_frames.h"
 #include "engine/job/float_buffers.h"
 #include "engine/job/outgoing.h"
 #include "engine/scene/palette.h"
@@ -45,6 +46,10 @@ class DrawingJob : public Job {
           drawing_(device, scene_, o_.path, o_.draw.rasterizer()), floats_(device, scene_, o_.draw.rasterizer()),
           out_(std::move(out))
     {
+        if (drawing_.total()) {
+            empty_.emplace(o_.path, o_.scene_name, o_.allow_empty);
+            empty_->set_scene(bounds());
+        }
         say(false);
     }
 
@@ -66,6 +71,8 @@ class DrawingJob : public Job {
             SR_CHECK(draw_overview());
         if (done)
             SR_CHECK(out_->drain());
+        if (done && empty_)
+            SR_CHECK(empty_->report(callbacks_));
         return done;
     }
 
@@ -74,6 +81,7 @@ class DrawingJob : public Job {
         return Json{{"frames", drawing_.total()},
                     {"splats", scene_.size()},
                     {"skipped", scene_.skipped()},
+                    {"empty_frames", empty_ ? empty_->count() : 0},
                     {"peak_device_bytes", device_.peak_bytes()}};
     }
 
@@ -99,6 +107,7 @@ class DrawingJob : public Job {
         if (o_.floats)
             SR_CHECK(floats_.write(folder, number, frame));
         return out_->read(slots, size, [this, frame, folder, number](FramePixels pixels) -> Status {
+            empty_->add(pixels);
             if (o_.visible_depth)
                 clear_hidden_depth(pixels);
             if (o_.picture)
@@ -107,10 +116,13 @@ class DrawingJob : public Job {
                 [folder, number, pixels = std::move(pixels)] { return write_frame_images(folder, number, pixels); });
         });
     }
+    Bounds bounds() const
+    {
+        return std::visit([](const auto& s) { return bounds_of(s); }, o_.scene);
+    }
     Status draw_overview()
     {
-        const CameraFrame camera =
-            overview_camera(std::visit([](const auto& s) { return bounds_of(s); }, o_.scene), o_.top);
+        const CameraFrame camera = overview_camera(bounds(), o_.top);
         return drawing_.draw({&camera, 1}, [this](const CameraFrame&, const SplatPixelSlots& slots) {
             return out_->read(slots, o_.top, [this](const FramePixels& pixels) {
                 return out_->write([this, color = color_pixels(pixels)] { return write_overview(color); });
@@ -131,6 +143,7 @@ class DrawingJob : public Job {
     PathDrawing drawing_;
     FloatBuffers floats_;
     SubmitCost cost_;
+    std::optional<EmptyFrames> empty_;       // of a path
     std::map<std::string, uint32_t> counts_; // frames so far, per camera
     std::unique_ptr<Outgoing> out_;          // last: what it writes is of the others
 };

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/growth.h"
 
+#include "engine/format/path_format.h"
 #include "engine/job/grid_filling.h"
 #include "engine/job/growth_pieces.h"
 #include "engine/job/outputs.h"
@@ -88,9 +89,16 @@ Result<Json> Growth::settings() const
     const GrowthRequest& r = plan_.request;
     SR_TRY(const uint64_t grid, fs::is_directory(r.scaffold) ? hash_folder(r.scaffold) : hash_file(r.scaffold));
     SR_TRY(Json settings, settings_json(plan_.settings, filling_.device(), "generate --along", grid));
-    SR_TRY(const uint64_t path, hash_file(r.path));
+    const Path drive = find_path(r.path).value().path; // plan_growth has read it
+    SR_TRY(const uint64_t path, fs::is_directory(drive) ? hash_folder(drive) : hash_file(drive));
     settings["seed"] = r.seed;
     settings["path"] = hash_text(path);
+    if (const PathPlacement& p = r.placement;
+        p.relative_to || p.lidar_to_camera || p.world != kIdentity || p.origin != Point3{})
+        settings["path_placement"] = {{"relative_to", p.relative_to ? Json(*p.relative_to) : Json()},
+                                      {"lidar_to_camera", p.lidar_to_camera ? Json(*p.lidar_to_camera) : Json()},
+                                      {"world", p.world},
+                                      {"origin", p.origin}};
     settings["horizon"] = r.horizon;
     settings["window"] = r.window;
     settings["tile_cells"] = plan_.source.tile_cells();

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/camera/path_placement.h"
 #include "engine/job/generation_settings.h"
 #include "engine/job/job.h"
 #include "engine/job/told_objects.h"
@@ -14,9 +15,10 @@ namespace semrover {
 // before as known context; only the tiles around the window are in memory.
 struct GrowthRequest {
     GenerationOptions generation;
-    Path scaffold; // a .sgrid or a folder of tiles
-    Path path;     // of the camera
-    Path output;   // a folder of tiles, with the run's state in OUTPUT.run
+    Path scaffold;           // a .sgrid or a folder of tiles
+    Path path;               // of the camera
+    PathPlacement placement; // of it
+    Path output;             // a folder of tiles, with the run's state in OUTPUT.run
     uint64_t seed = 0;
     double horizon = 30; // metres to either side and ahead
     double window = 10;  // metres of path at a time

@@ -42,7 +42,9 @@ Result<GrowthPlan> plan_growth(const GrowthRequest& r, bool writes)
 {
     SR_CHECK(check(r, writes));
     SR_TRY(GenerationSettings settings, resolve_generation(r.generation));
-    SR_TRY(const CameraPath path, read_camera_path(r.path, pinhole_from_fov(73, 616, 424)));
+    PathLens lens(pinhole_from_fov(73, 616, 424));
+    lens.matters = false; // where the camera is
+    SR_TRY(const CameraPath path, read_camera_path(r.path, lens, r.placement));
     SR_TRY(PathWindows windows, PathWindows::cut(path, r.window));
     SR_TRY(const int32_t edge, tile_cells_of(r.tile_size, settings.model.config.voxel_size));
     SR_TRY(TileSource source, TileSource::open(r.scaffold, edge));

@@ -3,6 +3,7 @@
 #include "engine/job/refinement.h"
 
 #include "engine/job/budget_meter.h"
+#include "engine/job/empty_frames.h"
 #include "engine/job/frame_refiner.h"
 #include "engine/job/outputs.h"
 #include "engine/job/window_refiner.h"
@@ -50,11 +51,14 @@ struct BufferDrawing {
     std::map<std::string, uint32_t> counts; // frames so far, per camera
     std::vector<std::string> first_moment;  // its cameras, and what they see
     std::vector<std::pair<std::string, ImageGray16>> first_depths;
+    EmptyFrames empty;
     bool started = false; // the first moment is drawn
 
-    BufferDrawing(Device& device, SurfelScene s, const Refinement& r)
-        : scene(std::move(s)), drawing(device, scene, *r.options.path, r.draw.rasterizer())
+    BufferDrawing(Device& device, SurfelScene s, const Refinement& r, const Bounds& bounds)
+        : scene(std::move(s)), drawing(device, scene, *r.options.path, r.draw.rasterizer()),
+          empty(*r.options.path, r.options.input, r.options.allow_empty)
     {
+        empty.set_scene(bounds);
         for (const RefineChain& c : r.chains)
             seen[c.camera.name] =
                 state.slot(c.size.image_width * c.size.image_height, 1, DType::u32, "seen of a camera", 1);
@@ -144,7 +148,7 @@ class RefinementJob : public Job {
         if (!drawing_) {
             SR_TRY(const VoxelGrid grid, r_.options.grid());
             SR_TRY(SurfelScene scene, splats_of(device_, grid, r_.options.input, r_.draw));
-            drawing_ = std::make_unique<BufferDrawing>(device_, std::move(scene), r_);
+            drawing_ = std::make_unique<BufferDrawing>(device_, std::move(scene), r_, bounds_of(grid));
             SR_CHECK(drawing_->allocate(device_));
         }
         SR_CHECK(out_->poll());
@@ -177,6 +181,7 @@ class RefinementJob : public Job {
                 refiner_->give_depth(camera, depth);
             else if (drawing_ && number == 0)
                 drawing_->first_depths.emplace_back(camera, depth);
+            drawing_->empty.add(pixels);
             SR_CHECK(out_->write([folder = camera_folder(run_.path() / "buffers", camera), number,
                                   pixels = std::move(pixels)] { return write_frame_images(folder, number, pixels); }));
             ++arrived_;
@@ -188,15 +193,19 @@ class RefinementJob : public Job {
     Status end_drawing()
     {
         drawn_ = true;
-        if (!refiner_)
-            drawing_.reset(); // else it stays as it was planned
-        return note_drawn();
+        if (refiner_) // the drawing stays as it was planned
+            return note_drawn();
+        // before anything is refined it is known whether there is anything to see
+        SR_CHECK(arrived_ < taken_ ? out_->drain() : note_drawn());
+        drawing_.reset();
+        return {};
     }
     // in the journal, behind the files of the last frame
     Status note_drawn()
     {
         if (!drawn_ || arrived_ < taken_)
             return {};
+        SR_CHECK(drawing_->empty.report(callbacks_));
         return out_->write([this] { return run_.append({{"rendered", r_.options.path->frames.size()}}); });
     }
     void say_drawn(bool ended)
@@ -224,6 +233,8 @@ class RefinementJob : public Job {
         if (r_.model.video() || !std::ranges::all_of(r_.chains, same_size))
             return {}; // windows of several cameras at a time; what depends on the size would be made again and again
         SR_CHECK(out_->drain());
+        if (drawing_->empty.all())
+            return {};                               // maybe all are: they are drawn before anything is refined
         if (const Status planned = plan(); !planned) // with the splats beside it nothing fits: without them it may
             return planned.error().code == ErrorCode::out_of_memory ? Status{} : planned;
         if (memory_.policy != MemoryPolicy::resident)

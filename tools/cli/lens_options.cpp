@@ -58,8 +58,13 @@ void add_lens_options(CLI::App& c, LensOptions& o)
     };
     add_number_function<uint32_t>(c, "-W,--width", set(o.width), "pixels", {1, 16384});
     add_number_function<uint32_t>(c, "-H,--height", set(o.height), "pixels", {1, 16384});
-    add_number(c, "--fov-x", o.fov, "horizontal field of view in degrees, where the path has no intrinsics", 1.0,
-               360.0);
+    add_number_function<double>(c, "--fov-x",
+                                [&o](double degrees) {
+                                    o.fov = degrees;
+                                    o.view_given = true;
+                                },
+                                "horizontal field of view in degrees, where the path has no intrinsics; 73",
+                                {1.0, 360.0});
     add_choice(c, "--camera-model", {"pinhole", "opencv", "fisheye", "equirectangular"},
                "lens, where the path has no intrinsics", o.camera_model);
     c.add_option("--distortion", o.distortion, "k1,k2,p1,p2[,k3[,k4,k5,k6]] of opencv, k1,k2,k3,k4 of fisheye");
@@ -79,6 +84,12 @@ Result<Intrinsics> intrinsics_of(const LensOptions& o)
     if (const Status status = check_intrinsics(k, "--distortion"); !status)
         return fail(ErrorCode::usage, "{}", status.error().message);
     return simplified(k);
+}
+
+Result<PathLens> path_lens_of(const LensOptions& o)
+{
+    SR_TRY(const Intrinsics intrinsics, intrinsics_of(o));
+    return PathLens(intrinsics, o.size_given, o.view_given || o.camera_model == "equirectangular");
 }
 
 } // namespace semrover

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/camera/camera.h"
+#include "engine/format/camera_path.h"
 
 namespace CLI {
 class App;
@@ -14,11 +14,13 @@ namespace semrover {
 struct LensOptions {
     uint32_t width = 616, height = 424;
     bool size_given = false; // by -W or -H
+    bool view_given = false; // by --fov-x
     double fov = 73.0;       // degrees: the focal length of the reference pictures, 420 pixels at a width of 616
     std::string camera_model = "pinhole", distortion;
 };
 void add_lens_options(CLI::App& command, LensOptions& options);
 
 Result<Intrinsics> intrinsics_of(const LensOptions& options); // usage
+Result<PathLens> path_lens_of(const LensOptions& options);    // the same, and what of it was given; usage
 
 } // namespace semrover

@@ -6,7 +6,9 @@
 #include "runtime/base/quote.h"
 #include "tools/cli/lens_options.h"
 #include "tools/cli/number_option.h"
+#include "tools/cli/path_options.h"
 #include "tools/cli/progress.h"
+#include "tools/cli/warnings.h"
 #include "tools/eval/flicker.h"
 #include "tools/eval/frame_files.h"
 #include "tools/measure/eval.h"
@@ -21,6 +23,7 @@ namespace {
 struct EvalFlickerArguments {
     std::string frames, depth, path, truth;
     LensOptions lens;
+    PathOptions placement;
     FlowOptions flow;
 };
 
@@ -36,6 +39,7 @@ struct Step {
 struct FlickerInputs {
     FrameFiles frames, depth, truth; // the last may be empty
     std::vector<Step> steps;
+    std::vector<std::string> warnings;
 };
 
 // the path's frames that have pictures, next to the ones before them
@@ -84,8 +88,13 @@ Result<FlickerInputs> read_inputs(const EvalFlickerArguments& o)
         lens.width = first.width;
     if (lens.height == 0)
         lens.height = first.height;
-    SR_TRY(const Intrinsics intrinsics, intrinsics_of(lens));
-    SR_TRY(const CameraPath path, read_camera_path(o.path, intrinsics));
+    lens.size_given = true; // the pictures have it
+    SR_TRY(const PathLens camera, path_lens_of(lens));
+    SR_TRY(const PathPlacement placement, placement_of(o.placement));
+    SR_TRY(CameraPath path, read_camera_path(o.path, camera, placement));
+    in.warnings = std::move(path.warnings);
+    if (path.body)
+        in.warnings.push_back(body_text(quote_path(o.path), *path.body));
     SR_TRY(in.steps, steps_of(path, in.frames, o));
     return in;
 }
@@ -165,6 +174,7 @@ void print(const Flicker& f, size_t steps, bool with_truth)
 Status eval_flicker(const EvalFlickerArguments& o, const Globals& globals)
 {
     SR_TRY(const FlickerInputs in, read_inputs(o));
+    print_warnings(in.warnings, globals);
     const bool with_truth = !in.truth.empty();
     StepReader reader(in, o.flow);
     Flicker total;
@@ -213,6 +223,7 @@ void add_eval_flicker(CLI::App& eval, const Globals& globals, Run& run)
     add_number(*c, "--depth-scale", o->flow.depth_scale, "metres of one unit of depth; 0.001", 1e-6, 10.0);
     add_number(*c, "--tolerance", o->flow.tolerance, "relative, of the depths of both frames; 0.01", 1e-6, 1.0);
     add_lens_options(*c, o->lens);
+    add_placement_options(*c, o->placement);
     c->callback([o, &globals, &run] { run = [o, &globals] { return eval_flicker(*o, globals); }; });
 }
 

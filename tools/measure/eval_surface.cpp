@@ -8,6 +8,8 @@
 #include "runtime/base/json.h"
 #include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
+#include "tools/cli/path_options.h"
+#include "tools/cli/warnings.h"
 #include "tools/measure/eval.h"
 
 #include <CLI/CLI.hpp>
@@ -22,6 +24,7 @@ struct EvalSurfaceArguments {
     std::string frames;
     FusionFolderOptions input;
     std::string poses;
+    PathOptions placement;
     double depth_scale = 0.001, radius = 5;
     uint32_t min_views = 2;
 };
@@ -98,7 +101,9 @@ Status run_surface(EvalSurfaceArguments o, const Globals& globals)
     std::vector<uint32_t> views;
     if (!o.frames.empty()) {
         o.input.poses = o.poses;
+        SR_TRY(o.input.placement, placement_of(o.placement));
         SR_TRY(const FusionFolder folder, FusionFolder::open(o.frames, o.input));
+        print_warnings(folder.warnings(), globals);
         DepthFrames frames = folder.frames();
         SR_TRY(views, count_views(mesh, frames, {.depth_scale = o.depth_scale}));
     }
@@ -121,6 +126,7 @@ void add_eval_surface(CLI::App& eval, const Globals& globals, Run& run)
     c->add_option("TRUTH", o->truth, "the true mesh, likewise")->required();
     c->add_option("--frames", o->frames, "folder of depth pictures, as for fuse: only vertices they saw are measured");
     c->add_option("--poses", o->poses, "camera path of these; FRAMES/transforms.json");
+    add_placement_options(*c, o->placement);
     add_number(*c, "--fov-x", o->input.fov_x, "degrees, where files have no intrinsics", 1.0, 179.0);
     add_number(*c, "--depth-scale", o->depth_scale, "metres of one unit of depth; 0.001", 1e-6, 10.0);
     add_number(*c, "--min-views", o->min_views, "frames that must have seen a vertex; 2", 1, 1000);

@@ -15,8 +15,10 @@
 #include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/output_folder.h"
+#include "tools/cli/path_options.h"
 #include "tools/cli/print_stderr.h"
 #include "tools/cli/progress.h"
+#include "tools/cli/warnings.h"
 
 #include <algorithm>
 #include <CLI/CLI.hpp>
@@ -32,6 +34,7 @@ struct FuseArguments {
     std::string folder, output, poses, map, default_label, mesh_format = "glb";
     std::vector<std::string> exclude;
     FusionFolderOptions input;
+    PathOptions placement;
     FusionOptions fusion;
     std::optional<double> max_depth;
     VoxelizeOptions voxels;
@@ -58,6 +61,7 @@ Status resolve(FuseArguments& o, const Globals& globals)
         SR_TRY(o.voxels.default_label, class_option("--default-label", o.default_label));
     }
     o.input.poses = o.poses;
+    SR_TRY(o.input.placement, placement_of(o.placement));
     o.input.map = o.map;
     std::error_code error;
     if (fs::exists(o.output, error) && !fs::is_directory(o.output, error))
@@ -150,6 +154,7 @@ Json settings_of(const FuseArguments& o)
     return {{"command", "fuse"},
             {"input", o.folder},
             {"poses", o.poses},
+            {"path_placement", json_of(o.placement)},
             {"map", o.map},
             {"tsdf_voxel", o.fusion.voxel},
             {"truncation", o.fusion.truncation},
@@ -214,6 +219,7 @@ Status run_fuse(FuseArguments o, const Globals& globals)
                             {"device", device->name()},
                             {"state", "finished"},
                             {"results", figures}}));
+    print_warnings(folder.warnings(), globals);
     if (!globals.quiet)
         print_warnings(folder, fused);
     if (globals.json)
@@ -255,6 +261,7 @@ void add_fuse(CLI::App& app, const Globals& globals, Run& run)
     c->add_option("-o,--output", o->output, "folder for mesh.glb, semantic.sgrid, voxfield.sgrid, run.json")
         ->required();
     c->add_option("--poses", o->poses, "a camera path; DIR/transforms.json");
+    add_placement_options(*c, o->placement);
     add_camera_options(*c, o->input);
     add_fusion_options(*c, o->fusion);
     add_number(*c, "--max-depth", o->max_depth, "metres; where a pixel is 0.55 voxels wide, 30 at most", 0.1, 1000.0);

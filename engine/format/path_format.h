@@ -1,0 +1,42 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "runtime/base/file.h"
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace semrover {
+
+// which camera path a file or folder is, as its content shows; the first five are also written
+enum class PathFormat {
+    tum,
+    kitti,
+    transforms,
+    camera_path,
+    colmap,
+    kitti360,
+    matrices,
+    redwood,
+    pose_files,
+    euroc,
+    pandaset,
+    nuscenes,
+};
+std::string_view name_of(PathFormat format);
+std::optional<PathFormat> path_format_of(std::string_view name);
+
+struct FoundPath {
+    PathFormat format;
+    Path path; // what is read: the file or folder itself, or what a folder holds, such as sparse/0 of a project
+};
+
+// none for what is no camera path, and for what cannot be read
+std::optional<FoundPath> find_path(const Path& path);
+
+// bad_input: what the file or folder looks like, and what was expected: a camera path, or `others`
+Status refuse_unknown_path(const Path& path, std::string_view others = "");
+
+} // namespace semrover

@@ -1,0 +1,71 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/job/empty_frames.h"
+
+#include "runtime/base/quote.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace semrover {
+
+namespace {
+
+constexpr uint32_t kDepthBits = 0xffff, kVisibleShift = 24;
+
+bool sees_nothing(const FramePixels& frame)
+{
+    return std::ranges::none_of(frame.ranges, [](uint32_t word) { return word & kDepthBits; }) &&
+           std::ranges::none_of(frame.seen, [](uint32_t word) { return word >> kVisibleShift; });
+}
+
+} // namespace
+
+std::string extent_text(const Bounds& b)
+{
+    const auto metres = [](double v) { return fmt::format("{:.10g}", std::round(v * 10) / 10 + 0.0); };
+    std::string text;
+    for (size_t axis = 0; axis < 3; ++axis)
+        text += fmt::format("{}{} {} to {}", axis ? ", " : "", "xyz"[axis], metres(b.low[axis]), metres(b.high[axis]));
+    return text + " m";
+}
+
+Bounds bounds_of(const CameraPath& path)
+{
+    Bounds b{translation_of(path.frames.front().pose.camera_to_world()), {}};
+    b.high = b.low;
+    for (const CameraFrame& frame : path.frames) {
+        const Point3 place = translation_of(frame.pose.camera_to_world());
+        for (size_t axis = 0; axis < 3; ++axis) {
+            b.low[axis] = std::min(b.low[axis], place[axis]);
+            b.high[axis] = std::max(b.high[axis], place[axis]);
+        }
+    }
+    return b;
+}
+
+void EmptyFrames::add(const FramePixels& frame)
+{
+    ++frames_;
+    empty_ += sees_nothing(frame);
+}
+
+Status EmptyFrames::report(const JobCallbacks& callbacks) const
+{
+    if (empty_ == 0)
+        return {};
+    const std::string text = fmt::format(
+        "{} of {} frames see nothing of {}: it lies in {}, the cameras in {}; --relative-to, --calib, --world and "
+        "--origin bring a path into the grid's world (docs/scenes.md §3.1), and `semrover inspect PATH GRID` says "
+        "whether "
+        "they meet",
+        all() ? "all" : fmt::format("{}", empty_), frames_, quote_path(scene_name_), extent_text(scene_),
+        extent_text(path_));
+    if (all() && !allowed_)
+        return fail(ErrorCode::bad_input, "{}; --allow-empty draws such frames without an error", text);
+    if (callbacks.warning)
+        callbacks.warning(text);
+    return {};
+}
+
+} // namespace semrover
