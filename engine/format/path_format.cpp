@@ -6,6 +6,7 @@
 #include "engine/format/pose_files.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
+#include "runtime/base/text_start.h"
 
 #include <algorithm>
 
@@ -25,11 +26,12 @@ constexpr std::string_view kExpected =
 
 constexpr size_t kBeginning = 16 << 10;
 
-// of a regular file; empty also where it cannot be read
+// without a byte order mark; of UTF-16, whose zeros say that it is no text that is read here, as it is
 std::string_view beginning_of(const MappedFile& file, size_t most)
 {
     const auto bytes = file.bytes();
-    return {reinterpret_cast<const char*>(bytes.data()), std::min(bytes.size(), most)};
+    const std::string_view all(reinterpret_cast<const char*>(bytes.data()), std::min(bytes.size(), most));
+    return text_after_mark(all, "").value_or(all);
 }
 
 bool holds(std::string_view text, std::string_view what)
@@ -168,6 +170,7 @@ Result<std::string> look_of(const Path& path)
     const std::string_view text = beginning_of(file, kBeginning);
     if (text.empty())
         return std::string("an empty file");
+    SR_CHECK(text_after_mark(text, quote_path(path)));
     if (text.find('\0') != std::string_view::npos)
         return fmt::format("a binary file of {} bytes", file.bytes().size());
     if (path.extension() == ".json") {
