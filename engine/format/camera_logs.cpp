@@ -4,6 +4,7 @@
 #include "engine/format/camera_path.h"
 #include "engine/format/json_boxes.h"
 #include "runtime/base/quote.h"
+#include "runtime/base/text_start.h"
 
 #include <algorithm>
 #include <set>
@@ -85,7 +86,8 @@ Status for_each_pose_record(const Path& path, const std::function<Status(const J
 {
     const std::string name = quote_path(path);
     SR_TRY(const MappedFile file, MappedFile::open(path));
-    const std::string_view text(reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size());
+    const std::string_view bytes(reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size());
+    SR_TRY(const std::string_view text, text_after_mark(bytes, name));
     return parse_json_records(text, name, kPoseTable, [&](const Json& json, size_t number) -> Status {
         const std::string where = fmt::format("{} record {}", name, number);
         if (!json.is_object())
