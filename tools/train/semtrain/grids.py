@@ -124,7 +124,7 @@ class LocalSets:
 
     def batch(self, step):
         """of one size: centers [B, N, 3] metres, labels [B, N], tokens [B, N, 6n], known [B, N], conditions [B, N, W];
-        fp32, i64, fp32, bool, fp32"""
+        fp64, i64, fp32, bool, fp32"""
         c = self.config
         random = np.random.default_rng([c["seed"], step])
         size = int(random.integers(c["set_size"][0], c["set_size"][1] + 1))
@@ -178,7 +178,7 @@ class LocalSets:
         middle = min(int(np.searchsorted(self.sums[g], random.random())), len(cells) - 1)
         apart = ((cells - cells[middle]) ** 2).sum(1)
         chosen = np.argpartition(apart, size - 1)[:size]
-        centers = (cells[chosen] + 0.5) * self.config["network"]["voxel_size"]
+        centers = (cells[chosen].astype(np.float64) + 0.5) * self.config["network"]["voxel_size"]
         tokens = self.grids.tokens[first + chosen].astype(np.float32).reshape(size, -1, 6)
         boxes, part_boxes = (of[numbers[first + chosen]] if len(of) else np.ones((size, 7))
                              for of, numbers in ((self.grids.boxes, self.grids.owners),

@@ -12,8 +12,9 @@ from .condition import WIDTHS
 from .grids import Grids, LocalSets
 from .precision import autocast
 from .regenerate import load_transformer
+from .sampler import linear_alphas
 from .trainer import generator
-from .transformer import linear_alphas, mean_error, noised
+from .transformer import mean_error, noised
 
 LEVELS = (200, 600, 999)
 CONFIG = {"seed": 1, "batch": 8, "label_dropout": 0, "class_balance": 0.35, "mirror": False, "ordered_points": True,

@@ -14,7 +14,8 @@ from .model_folder import read_component
 from .nets.transformer import VoxfieldTransformer
 from .objects import has_box, owned
 from .precision import autocast
-from .transformer import linear_alphas, noised
+from .sampler import linear_alphas, posterior
+from .transformer import noised
 
 LEVELS = (250, 600)  # of 1000 timesteps, between which the noise of a street is drawn
 STEPS = 6
@@ -22,11 +23,16 @@ MOST_CELLS = 160     # of a set
 SETS = 8             # of a batch
 
 
+def network_of(config):
+    """a transformer's config.json -> the arguments of VoxfieldTransformer"""
+    return {name: value for name, value in config.items()
+            if not name.startswith("_") and name not in ("prediction_type", "placement")}
+
+
 def load_transformer(folder):
     """-> VoxfieldTransformer of a voxfield_transformer folder, its adapter merged, evaluating"""
     config, state = read_component(folder)
-    model = VoxfieldTransformer(**{k: v for k, v in config.items()
-                                   if not k.startswith("_") and k not in ("prediction_type", "placement")})
+    model = VoxfieldTransformer(**network_of(config))
     state = merged(state, read_adapter(folder))
     model.load_state_dict({name: t.float() for name, t in state.items()})
     return model.eval().requires_grad_(False)
@@ -51,9 +57,8 @@ def levels_between(first, steps):
 
 def ancestral_step(x, x0, a, b, random):
     """DDPM's step (Ho et al. 2020) between any two levels: x at the share a of the signal's variance -> at b"""
-    noise = (x - a.sqrt() * x0) / (1 - a).sqrt()
-    fresh = (1 - b) / (1 - a) * (1 - a / b)
-    return b.sqrt() * x0 + (1 - b - fresh).clamp(min=0).sqrt() * noise + fresh.sqrt() * torch.randn(x.shape, generator=random)
+    of_x0, of_x, variance = posterior(a, b)
+    return of_x0 * x0 + of_x * x + variance.sqrt() * torch.randn(x.shape, generator=random)
 
 
 def of_owners(owners, boxes, tints):
@@ -111,7 +116,7 @@ def denoise_sets(model, sets, cells, labels, tokens, told, out, first, random):
     rows = np.stack([np.resize(s, MOST_CELLS) for s in sets])  # what fills a row is marked as not there
     valid = torch.stack([torch.arange(MOST_CELLS) < len(s) for s in sets])
     x0 = torch.from_numpy(tokens[rows].astype(np.float32))
-    centers = torch.from_numpy((cells[rows] + 0.5).astype(np.float32) * model.config["voxel_size"])
+    centers = torch.from_numpy((cells[rows] + 0.5) * model.config["voxel_size"])
     of_rows, told = torch.from_numpy(labels[rows].astype(np.int64)), torch.from_numpy(told[rows])
     alphas = linear_alphas({"beta_start": 1e-4, "beta_end": 0.02, "num_train_timesteps": 1000})
     levels = levels_between(first, STEPS)

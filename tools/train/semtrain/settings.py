@@ -41,5 +41,10 @@ def resolve(recipe, options):
     bits = config["mantissa_bits"]
     if not isinstance(bits, int) or bits not in range(1, HALF_BITS + 1):
         raise SystemExit(f"mantissa_bits: expected a whole number from 1 to {HALF_BITS}, found {bits}")
-    torch.set_num_threads(options.threads or os.cpu_count())
+    use_threads(options.threads)
     return config
+
+
+def use_threads(count):
+    """of the CPU, 0: $OMP_NUM_THREADS, or as many as there are"""
+    torch.set_num_threads(count or int(os.environ.get("OMP_NUM_THREADS", 0)) or os.cpu_count())

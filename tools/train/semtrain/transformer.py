@@ -13,15 +13,10 @@ from .grids import Grids, LocalSets
 from .low_rank import add_low_rank, is_adapter, merged, read_adapter
 from .model_folder import add_to_index, read_component, write_component, write_scheduler
 from .nets.transformer import VoxfieldTransformer
+from .sampler import linear_alphas
 from .settings import parser, resolve
 from .trainer import Trainer, generator, timesteps_at
 from .usual_objects import usual_objects
-
-
-def linear_alphas(config):
-    """[T] running products of 1 - beta"""
-    beta = torch.linspace(config["beta_start"], config["beta_end"], config["num_train_timesteps"], dtype=torch.float64)
-    return torch.cumprod(1 - beta, 0).float()
 
 
 def weights_of(alphas, gamma):
@@ -57,6 +52,17 @@ def with_drift(x0, cells, strength, random):
     return tokens.flatten(2)
 
 
+def noised_sets(x0, known, condition, t, alphas, config, random):
+    """tokens x0 [B, N, 6n] as a network sees them at the noise levels t [B]: known cells [B, N] nearly clean, with colours
+    that have drifted where they are told which"""
+    noisy, before = noised(x0, alphas, t, random), x0
+    parts = config["network"].get("condition", [])
+    if config["known_drift"] and "tint" in parts:
+        has_tint = condition[..., width_of(parts[:parts.index("tint")])] > 0
+        before = with_drift(x0, known & has_tint, config["known_drift"], random)
+    return with_known(noisy, before, known, alphas, config["known_levels"], random)
+
+
 def mean_error(made, x0, target, of_hue=1):
     """squared error of tokens [B, N, 6n] of the cells that are targets [B, N] -> of places and of colours, [B] each; that
     of what is left of a colour without its grey counts `of_hue` times"""
@@ -70,17 +76,12 @@ def mean_error(made, x0, target, of_hue=1):
 def loss_of(sets, config):
     alphas, device = linear_alphas(config).to(config["device"]), config["device"]
     weights, of_colors = weights_of(alphas, config["snr_gamma"]), config["color_weight"]
-    parts = config["network"].get("condition", [])
-    tint_flag = width_of(parts[:parts.index("tint")]) if "tint" in parts else None
 
     def loss(model, step):
         centers, labels, x0, known, condition = (torch.from_numpy(a).to(device) for a in sets.batch(step))
         random = generator(config, step)
         t = timesteps_at(torch.rand(len(x0), generator=random), len(alphas), config["timestep_power"]).to(device)
-        noisy, before = noised(x0, alphas, t, random), x0
-        if config["known_drift"] and tint_flag is not None:
-            before = with_drift(x0, known & (condition[..., tint_flag] > 0), config["known_drift"], random)
-        noisy = with_known(noisy, before, known, alphas, config["known_levels"], random)
+        noisy = noised_sets(x0, known, condition, t, alphas, config, random)
         valid = torch.ones(labels.shape, dtype=torch.bool, device=device)
         told = (condition,) if condition.shape[-1] else ()
         places, colors = mean_error(model(noisy, labels, centers, valid, t, *told).float(), x0, ~known,

@@ -174,16 +174,19 @@ class VoxfieldTransformer(nn.Module):
         if self.condition_embed:
             self.condition_embed.start_at_zero()
 
-    def attention_mask(self, centers, valid):
+    @staticmethod
+    def attention_mask(centers, valid, radius):
         """[B, 1, 2N, 2N]: 0 where a token may look, else -1e9; padded rows see themselves"""
         apart = (centers[:, :, None] - centers[:, None]).double().square().sum(-1).sqrt()
-        near = (apart <= self.config["attention_radius"] + 1e-6) & valid[:, None] & valid[:, :, None]
+        near = (apart <= radius + 1e-6) & valid[:, None] & valid[:, :, None]
         near = near | torch.eye(near.shape[1], dtype=torch.bool, device=near.device)
         return torch.zeros(near.shape, device=near.device).masked_fill_(~near, -1e9).repeat(1, 2, 2)[:, None]
 
-    def forward(self, tokens, labels, centers, valid, timestep, condition=None):
-        """tokens [B, N, 6n] noisy; labels [B, N], num_classes = null; centers [B, N, 3] metres; valid [B, N] bool;
-        timestep [B]; condition [B, N, W] or None -> x0 [B, N, 6n]"""
+    def forward(self, tokens, labels, centers, valid, timestep, condition=None, radius=None):
+        """tokens [B, N, 6n] noisy; labels [B, N], num_classes = null; centers [B, N, 3] metres, in double where
+        cells that are just as far apart as the radius have to see each other, as in the engine; valid [B, N] bool;
+        timestep [B]; condition [B, N, W] or None; radius: metres beyond which a cell sees no others, if less than the
+        attention radius -> x0 [B, N, 6n]"""
         w = valid[..., None].to(centers.dtype)
         origin = (centers * w).sum(1, keepdim=True) / w.sum(1, keepdim=True)
         places = sinusoids((centers - origin) / self.config["voxel_size"], self.config["pos_embed_dim"]).flatten(-2)
@@ -196,7 +199,8 @@ class VoxfieldTransformer(nn.Module):
         if self.config["context_pos_embed"]:
             c = c + position
         temb = self.time_embed(timestep)
-        mask = self.attention_mask(centers, valid)
+        widest = self.config["attention_radius"]
+        mask = self.attention_mask(centers, valid, widest if radius is None else min(radius, widest))
         for block in self.transformer_blocks:
             x, c = block(x, c, temb, mask)
         scale, shift = self.norm_out(temb)
