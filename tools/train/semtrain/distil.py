@@ -43,8 +43,8 @@ class Teacher:
 
     @torch.no_grad()
     def x0_of(self, first, count, x, known, random, labels, centers, valid, condition):
-        """x [B, N, 6n] before the steps `first` [B] -> the x0 [B, N, 6n] with which one step has the mean that `count` of
-        the teacher have, with the noise that its sampler adds between them. Known cells stay as they are"""
+        """x [B, N, 6n] before the steps `first` [B] -> the x0 [B, N, 6n] with which one step has the mean that `count`
+        of the teacher have, with the noise that its sampler adds between them. Known cells stay as they are"""
         total, share = torch.zeros_like(x), torch.zeros(len(x), 1, 1, device=x.device)
         for row in range(count):
             t, of_x0, of_x, fresh = (part[first + row] for part in self.steps)
@@ -94,6 +94,7 @@ class Distillation:
 def exporter(folder, config, teacher):
     """a model that needs no guidance, and as many steps as are left"""
     model = os.path.join(folder, "model")
+    parts = {TRANSFORMER: ["semrover", "VoxfieldTransformer"], SCHEDULER: ["semrover", "DDPMScheduler"]}
     left = {name: value for name, value in teacher.defaults.items()
             if not name.startswith("guidance_") and name != "renderer"}
     left.update(num_inference_steps=len(teacher.first_steps(config["teacher_steps"])), guidance_scale=1.0)
@@ -101,8 +102,7 @@ def exporter(folder, config, teacher):
     def export(state):
         write_component(os.path.join(model, TRANSFORMER), teacher.config, state, config["mantissa_bits"])
         write_scheduler(os.path.join(model, SCHEDULER), teacher.scheduler)
-        add_to_index(model, {TRANSFORMER: ["semrover", "VoxfieldTransformer"], SCHEDULER: ["semrover", "DDPMScheduler"]},
-                     left)
+        add_to_index(model, parts, left)
     return export
 
 
@@ -123,9 +123,10 @@ def main(arguments=None):
     init = options.init or os.path.join(options.teacher, TRANSFORMER)
     trainer.start_from(merged(read_component(init)[1], read_adapter(init)))
     sets = LocalSets(Grids(options.grids, os.path.join(options.output, "cache")), config)
-    print(f"{len(teacher.steps.timesteps)} steps of the teacher become {len(teacher.first_steps(config['teacher_steps']))}; "
+    distillation = Distillation(teacher, sets, config)
+    print(f"{len(teacher.steps.timesteps)} steps of the teacher become {len(distillation.first)}; "
           f"{len(sets.grids.labels)} cells", flush=True)
-    trainer.run(Distillation(teacher, sets, config).loss)
+    trainer.run(distillation.loss)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
 """How far one pass of students is from what a teacher's sampler makes of the same sets (`run distil`), on streets that
-neither was trained on: squared errors at the student's timesteps, a table in Markdown. The first row is the teacher's own
-single pass, which is where a student begins."""
+neither was trained on: squared errors at the student's timesteps, a table in Markdown. The first row is the teacher's
+own single pass, which is where a student begins."""
 import argparse
 import os
 import tempfile
@@ -45,7 +45,8 @@ def main(arguments=None):
     p = argparse.ArgumentParser(prog="tools/train/run measure_distilled", description=__doc__)
     p.add_argument("--grids", nargs="+", required=True, help=".sgrid files with points, or folders of them")
     p.add_argument("--teacher", required=True, help="model folder, as `run distil` takes it")
-    p.add_argument("--student", action="append", default=[], metavar="NAME=FOLDER", help="a voxfield_transformer folder")
+    p.add_argument("--student", action="append", default=[], metavar="NAME=FOLDER",
+                   help="a voxfield_transformer folder")
     p.add_argument("--teacher-steps", type=int, default=1, help="that one of the students' replaces")
     p.add_argument("--batches", type=int, default=12, help="of 8 sets")
     p.add_argument("--cells", type=int, default=128, help="of a set")

@@ -14,8 +14,8 @@ def linear_alphas(config):
 
 
 def posterior(a, b):
-    """of DDPM's step from the share a of the signal's variance to b (Ho et al. 2020, formula 7) -> factors of x0 and of x
-    in the mean, and the variance"""
+    """of DDPM's step from the share a of the signal's variance to b (Ho et al. 2020, formula 7) -> factors of x0 and of
+    x in the mean, and the variance"""
     beta = 1 - a / b
     return b.sqrt() * beta / (1 - a), (a / b).sqrt() * (1 - b) / (1 - a), (1 - b) / (1 - a) * beta
 
@@ -77,7 +77,7 @@ class Guidance(NamedTuple):
 
 
 def guided_x0(model, guidance, x, labels, centers, valid, timesteps, condition):
-    """what the sampler takes for x0 [B, N, 6n]: of the sets at guided timesteps also that of a pass that is told nothing"""
+    """what the sampler takes for x0 [B, N, 6n]; at guided timesteps it is led away from a pass that is told nothing"""
     x0 = model(x, labels, centers, valid, timesteps, condition).float()
     rows = guidance.at(timesteps).nonzero()[:, 0]
     if len(rows):
