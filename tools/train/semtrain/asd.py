@@ -14,7 +14,7 @@ from torch import nn
 
 from . import model_folder, safetensors_file, settings
 from .denoising import alphas_cumprod, ddim_timesteps, denoise, input_of, noise_of, scheduler_of
-from .frames import find_drives, to_pixels, write_beside
+from .frames import find_drives, splats_of, to_pixels, write_beside
 from .latents import load_vae, sequences
 from .nets.unet import UNet2DConditionModel
 from .trainer import Trainer, generator, number_below, timesteps_at
@@ -163,7 +163,9 @@ def main(arguments=None):
     state = read_init(options.init, config) if options.init else None
     cache = options.cache or os.path.join(options.output, "latents")
     torch.manual_seed(config["seed"])
-    batches = Batches(sequences(options.vae, find_drives(options.frames), cache, config["mirror"]), config)
+    drives = find_drives(options.frames)
+    config["defaults"] = splats_of(drives, config["defaults"])
+    batches = Batches(sequences(options.vae, drives, cache, config["mirror"]), config)
     held = find_drives(options.held_out)[:1] if options.held_out else []
     held = (sequences(options.vae, held, cache, False)[0], held[0]) if held else None
     print(f"{len(batches.frames)} frames, mirror images counted", flush=True)

@@ -13,7 +13,11 @@ def draw_curve(log, picture):
         rows = [json.loads(line) for line in file]
     if len(rows) < 2:
         return
-    import matplotlib
+    try:
+        import matplotlib
+    except ImportError:
+        print(f"{picture} is not drawn: matplotlib is not installed", flush=True)
+        return
     matplotlib.use("Agg")
     from matplotlib import pyplot
     steps, losses = [r["step"] for r in rows], [r["loss"] for r in rows]

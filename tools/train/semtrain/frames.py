@@ -6,6 +6,7 @@ A drive is a folder anywhere below the root, its frames numbered in the order in
     color/000000.png            the truth, RGB
     buffer/color/000000.png     splats over black, RGB
     buffer/visible/000000.png   grey: 0 where there is no splat
+    buffer/splats.json          how large the splats were, {"splat_radius": "auto" or metres}; `run drives` writes it
 `semrover streets --images` writes the first, `semrover render GRID --path transforms.json -o buffer` the others.
 """
 import os
@@ -13,6 +14,11 @@ import os
 import numpy as np
 import torch
 from PIL import Image
+
+from .json_file import read_json
+
+PARTS = ("color", "buffer/color", "buffer/visible")
+SPLATS = "buffer/splats.json"
 
 
 def picture_name(number):
@@ -24,7 +30,7 @@ class Drive:
 
     def __init__(self, folder):
         self.folder = folder
-        found = [set(_numbers(os.path.join(folder, part))) for part in ("color", "buffer/color", "buffer/visible")]
+        found = [set(_numbers(os.path.join(folder, part))) for part in PARTS]
         self.numbers = sorted(set.intersection(*found))
 
     def truth(self, number):
@@ -43,6 +49,15 @@ class Drive:
     def has_previous(self, number):
         return number - 1 in self.numbers
 
+    def pictures(self):
+        """the files of all frames"""
+        return [os.path.join(self.folder, part, picture_name(n)) for part in PARTS for n in self.numbers]
+
+    def splat_radius(self):
+        """of the buffers: "auto", metres, or None where nothing says it"""
+        path = os.path.join(self.folder, SPLATS)
+        return read_json(path)["splat_radius"] if os.path.exists(path) else None
+
 
 def find_drives(root):
     """all drives below root that have frames, sorted by path"""
@@ -57,6 +72,23 @@ def find_drives(root):
         raise SystemExit(f"{root}: no frames; expected color/, buffer/color/ and buffer/visible/ with 000000.png, ... "
                          "in some folder (make them with tools/train/run drives)")
     return drives
+
+
+def splats_of(drives, defaults):
+    """defaults of a renderer, with the splat_radius that the drives' buffers were drawn with: what it is trained on is
+    what it has to see"""
+    first, radius = drives[0], drives[0].splat_radius()
+    for other in drives:
+        if other.splat_radius() != radius:
+            raise SystemExit(
+                f"buffers of two kinds: {first.folder} was drawn with splat_radius {radius or 'unknown'}, {other.folder} "
+                f"with {other.splat_radius() or 'unknown'} ({SPLATS} says it). Draw one of them again, or write that "
+                "file where you know the radius")
+    if radius is None:
+        print(f"{first.folder}: no {SPLATS} says with which --splat-radius the buffers were drawn; the model will say "
+              f"{defaults.get('splat_radius', 'nothing, which is 0.04')}", flush=True)
+        return defaults
+    return {**defaults, "splat_radius": radius}
 
 
 def read_rgb(path):

@@ -8,9 +8,10 @@ import numpy as np
 
 from . import safetensors_file
 from .condition import drawn_boxes, drawn_tints, mirrored, told_boxes, told_parts, told_tints, vector_of, width_of
+from .content import digest
 from .json_file import read_json, write_json
 from .known_cells import draw_known
-from .objects import local_tints, owned
+from .objects import local_tints, objects_beside, owned
 from .repaint import repaint
 
 
@@ -68,7 +69,7 @@ def read_owners(path, cells, labels):
 
 class Grids:
     """All grids of some sources, kept as one file each of cells, labels, tokens and what their objects are under
-    `cache`, mapped to memory."""
+    `cache`, mapped to memory. They are made anew when the bytes of a grid or of its objects are other ones."""
 
     ARRAYS = ("cells", "labels", "tokens", "owners", "local_tints", "boxes", "tints", "parts", "part_boxes", "part_tints")
     NUMBERED = (("owners", "boxes"), ("parts", "part_boxes"))  # the ones are indices of the others, numbered through
@@ -77,9 +78,9 @@ class Grids:
         self.files = files = find_grids(sources)
         os.makedirs(cache, exist_ok=True)
         about = os.path.join(cache, "grids.json")
-        known = read_json(about) if os.path.exists(about) else {}
-        if known.get("files") != files or known.get("arrays") != list(self.ARRAYS):
-            self._fill(files, cache, about)
+        content = digest([path for f in files for path in (f, objects_beside(f))], " ".join(self.ARRAYS))
+        if not os.path.exists(about) or read_json(about).get("content") != content:
+            self._fill(files, cache, about, content)
         self.offsets = read_json(about)["offsets"]
         placements = {placement_of(f) for f in files}
         self.placement = placements.pop() if len(placements) == 1 else "mixed"
@@ -88,15 +89,17 @@ class Grids:
             setattr(self, name, np.load(os.path.join(cache, f"{name}.npy"), mmap_mode=mode))
 
     @classmethod
-    def _fill(cls, files, cache, about):
+    def _fill(cls, files, cache, about, content):
         parts = [cls._arrays(f) for f in files]
         for numbers, things in (map(cls.ARRAYS.index, names) for names in cls.NUMBERED):
             for part, first in zip(parts, np.cumsum([0] + [len(p[things]) for p in parts])):
                 part[numbers][part[numbers] >= 0] += first
         for i, name in enumerate(cls.ARRAYS):
-            np.save(os.path.join(cache, f"{name}.npy"), np.concatenate([p[i] for p in parts]))
+            path = os.path.join(cache, f"{name}.npy")
+            np.save(path + ".part.npy", np.concatenate([p[i] for p in parts]))
+            os.replace(path + ".part.npy", path)  # who has the former one mapped keeps it
         offsets = np.cumsum([0] + [len(p[1]) for p in parts]).tolist()
-        write_json(about, {"files": files, "arrays": list(cls.ARRAYS), "offsets": offsets})
+        write_json(about, {"files": files, "content": content, "offsets": offsets})
 
     @staticmethod
     def _arrays(path):

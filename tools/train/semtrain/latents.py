@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
 """Latents of drives, encoded once by a trained VAE and kept in a folder."""
-import hashlib
 import os
 
 import torch
 
 from . import model_folder, safetensors_file
+from .content import digest
 from .denoising import block_shares
 from .frames import fill_blocks, to_floats
 from .nets.vae import AutoencoderKL
@@ -20,15 +20,6 @@ def load_vae(folder):
     vae = AutoencoderKLTemporalDecoder(config) if of_videos else AutoencoderKL(config)
     vae.load_state_dict({name: t.float() for name, t in state.items()})
     return vae.eval().requires_grad_(False)
-
-
-def identity(folder):
-    """of a VAE: a digest of its files"""
-    digest = hashlib.sha256()
-    for name in ("config.json", "diffusion_pytorch_model.safetensors"):
-        with open(os.path.join(folder, name), "rb") as file:
-            digest.update(file.read())
-    return digest.hexdigest()[:16]
 
 
 class Sequence:
@@ -61,11 +52,12 @@ def encode_drive(vae, drive, flip):
 def sequences(vae_folder, drives, cache, mirrored=True):
     """-> [Sequence] of the drives, then of their mirror images; what `cache` does not hold yet is encoded"""
     os.makedirs(cache, exist_ok=True)
-    vae, name_of_vae, out = None, identity(vae_folder), []
+    vae, out = None, []
+    of_vae = digest([os.path.join(vae_folder, "config.json"), model_folder.weights_of(vae_folder)])
+    contents = [digest(drive.pictures(), f"{of_vae} {drive.numbers}") for drive in drives]
     for flip in (False, True) if mirrored else (False,):
-        for drive in drives:
-            about = f"{name_of_vae} {os.path.realpath(drive.folder)} {drive.numbers} {flip}"
-            path = os.path.join(cache, hashlib.sha256(about.encode()).hexdigest()[:24] + ".safetensors")
+        for drive, content in zip(drives, contents):
+            path = os.path.join(cache, f"{content}{'-mirrored' if flip else ''}.safetensors")
             if not os.path.exists(path):
                 vae = vae or load_vae(vae_folder)
                 safetensors_file.write(path, encode_drive(vae, drive, flip), {"drive": drive.folder, "flip": flip})

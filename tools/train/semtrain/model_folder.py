@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Components of a model folder, in the diffusers layout that the engine reads (docs/models.md §1)."""
 import os
+import re
 
 import torch
 
@@ -9,6 +10,9 @@ from . import safetensors_file
 from .json_file import read_json, write_json
 from .low_rank import FILE, is_adapter
 
+WEIGHTS = "diffusion_pytorch_model.safetensors"
+HALF_WEIGHTS = "diffusion_pytorch_model.fp16.safetensors"
+OLD_NAMES = {"query": "to_q", "key": "to_k", "value": "to_v", "proj_attn": "to_out.0"}  # of a VAE's attention, in 2022
 HALF_BITS = 10  # of an fp16 number's mantissa, its leading one not counted
 
 
@@ -28,7 +32,7 @@ def write_component(folder, config, state, mantissa_bits=HALF_BITS):
     os.makedirs(folder, exist_ok=True)
     write_json(os.path.join(folder, "config.json"), config)
     rounded = {name: rounded_half(t, mantissa_bits) for name, t in state.items()}
-    for file, adapter in (("diffusion_pytorch_model.safetensors", False), (FILE, True)):
+    for file, adapter in ((WEIGHTS, False), (FILE, True)):
         tensors = {name: t for name, t in rounded.items() if is_adapter(name) == adapter}
         if tensors or not adapter:
             safetensors_file.write(os.path.join(folder, file), tensors, {"format": "pt"})
@@ -53,7 +57,21 @@ def add_to_index(folder, components, defaults=None):
     write_json(path, index)
 
 
+def weights_of(folder):
+    """the file that has a component's weights"""
+    for name in (WEIGHTS, HALF_WEIGHTS):
+        if os.path.exists(os.path.join(folder, name)):
+            return os.path.join(folder, name)
+    raise SystemExit(f"{folder}: expected {WEIGHTS} or {HALF_WEIGHTS}, found neither; `semrover convert MODEL NEW` reads "
+                     "shards and single files, too, and writes the former")
+
+
+def name_today(name):
+    """of a tensor: as diffusers calls it now"""
+    return re.sub(r"(?<=\.)(query|key|value|proj_attn)(?=\.)", lambda found: OLD_NAMES[found[0]], name)
+
+
 def read_component(folder):
     """-> (config, {name: tensor}), adapters left out"""
-    weights = os.path.join(folder, "diffusion_pytorch_model.safetensors")
-    return read_json(os.path.join(folder, "config.json")), safetensors_file.read(weights)
+    state = safetensors_file.read(weights_of(folder))
+    return read_json(os.path.join(folder, "config.json")), {name_today(name): t for name, t in state.items()}

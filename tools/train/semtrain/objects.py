@@ -57,10 +57,15 @@ def owners_of(centers, labels, boxes, box_labels, reach=BOX_REACH):
     return owners
 
 
+def objects_beside(grid):
+    """the file of objects of a .sgrid, whether it is there or not"""
+    return os.path.join(os.path.dirname(grid), "objects.json")
+
+
 def owned(path, centers, labels, parts=False):
     """of the objects.json beside a .sgrid, if there is one, what its cells are of, or which parts they lie in or beside
     -> owners i32 [V], boxes f64 [O, 7], tints f32 [O, 3]"""
-    about = os.path.join(os.path.dirname(path), "objects.json")
+    about = objects_beside(path)
     if not os.path.exists(about):
         return np.full(len(centers), -1, np.int32), np.zeros((0, 7)), np.zeros((0, 3), np.float32)
     boxes, of_boxes, tints = read_objects(about, parts)

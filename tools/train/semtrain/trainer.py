@@ -2,17 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The loop that all recipes share: Adam, warm-up and decay, EMA, checkpoints that a later run continues, loss curves."""
 import json
-import os
 import signal
 import time
 
 import torch
 
 from . import precision, safetensors_file
+from .__main__ import STOPPED
 from .curve import draw_curve
-
-CHECKPOINT = "checkpoint.safetensors"
-LOG = "log.jsonl"
+from .run_folder import CHECKPOINT, LOG, RunFolder
 
 
 def learning_rate(config, step):
@@ -48,10 +46,9 @@ class Trainer:
         self.adam = torch.optim.Adam(self.model.parameters(), lr=config["learning_rate"], betas=(0.9, 0.99))
         self.step = 0
         self.stopped = False
-        os.makedirs(folder, exist_ok=True)
+        self.place = RunFolder(folder)
+        self.place.keep_settings(config)
         self._resume()
-        with open(os.path.join(folder, "config.json"), "w") as file:
-            json.dump(config, file, indent=1)
 
     def start_from(self, state):
         """weights to begin with; nothing when the run has begun before"""
@@ -60,7 +57,8 @@ class Trainer:
             self.average = {name: p.detach().clone() for name, p in self.parameters.items()}
 
     def run(self, loss_of_step):
-        """loss_of_step(model, step) -> (loss, {name: number} for the log); until `steps`, `minutes` or a signal"""
+        """loss_of_step(model, step) -> (loss, {name: number} for the log); until `steps`, `minutes` or a signal, after
+        which the recipe ends with exit code 130"""
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._stop)
         instead = precision.why_not(self.config["precision"], self.config["device"])
@@ -80,6 +78,10 @@ class Trainer:
             if self.config["minutes"] and now - begin > 60 * self.config["minutes"]:
                 break
         self.save()
+        self.place.release()
+        if self.stopped:
+            print(f"stopped at step {self.step} of {self.config['steps']}; the same command goes on", flush=True)
+            raise SystemExit(STOPPED)
 
     def save(self):
         tensors = {f"model.{name}": p for name, p in self.parameters.items()}
@@ -89,9 +91,9 @@ class Trainer:
             if state:
                 tensors[f"adam.exp_avg.{name}"] = state["exp_avg"]
                 tensors[f"adam.exp_avg_sq.{name}"] = state["exp_avg_sq"]
-        safetensors_file.write(os.path.join(self.folder, CHECKPOINT), tensors, {"step": self.step})
+        safetensors_file.write(self.place.file(CHECKPOINT), tensors, {"step": self.step})
         self.export({name: p.detach().cpu() for name, p in self.average.items()})
-        draw_curve(os.path.join(self.folder, LOG), os.path.join(self.folder, "curve.png"))
+        draw_curve(self.place.file(LOG), self.place.file("curve.png"))
 
     def _advance(self, loss_of_step):
         for group in self.adam.param_groups:
@@ -116,14 +118,14 @@ class Trainer:
         row = {"step": self.step, "lr": learning_rate(self.config, self.step - 1), "seconds_per_step": round(seconds, 3)}
         for name in recent[0]:
             row[name] = sum(r[name] for r in recent) / len(recent)
-        with open(os.path.join(self.folder, LOG), "a") as file:
+        with open(self.place.file(LOG), "a") as file:
             file.write(json.dumps(row) + "\n")
         print(" ".join(f"{k} {v:.5g}" for k, v in row.items()), flush=True)
 
     def _resume(self):
-        path = os.path.join(self.folder, CHECKPOINT)
-        if not os.path.exists(path):
+        if not self.place.has_begun():
             return
+        path = self.place.file(CHECKPOINT)
         tensors = safetensors_file.read(path)
         self.step = int(safetensors_file.read_header(path)[1]["step"])
         with torch.no_grad():

@@ -14,7 +14,7 @@ import torch
 from torch import nn
 
 from . import model_folder, safetensors_file, settings
-from .frames import find_drives, to_pixels, write_beside
+from .frames import find_drives, splats_of, to_pixels, write_beside
 from .latents import load_vae, sequences
 from .nets.video_unet import UNetSpatioTemporalConditionModel
 from .trainer import Trainer, generator, number_below
@@ -164,7 +164,9 @@ def main(arguments=None):
     state = read_init(options.init, config) if options.init else None
     cache = options.cache or os.path.join(options.output, "latents")
     torch.manual_seed(config["seed"])
-    batches = Batches(sequences(options.vae, find_drives(options.frames), cache, config["mirror"]), config,
+    drives = find_drives(options.frames)
+    config["defaults"] = splats_of(drives, config["defaults"])
+    batches = Batches(sequences(options.vae, drives, cache, config["mirror"]), config,
                       load_vae(options.vae).config)
     held = find_drives(options.held_out)[:1] if options.held_out else []
     held = (sequences(options.vae, held, cache, False)[0], held[0]) if held else None

@@ -70,6 +70,7 @@ class Recipes(unittest.TestCase):
         cls.folder = cls.holder.name
         for i in range(2):
             draw_drive(cls.path("frames", str(i)), i)
+            write_json(cls.path("frames", str(i), "buffer", "splats.json"), {"splat_radius": "auto"})
         for name, config in (("vae", VAE), ("asd", ASD)):
             with open(cls.path(name + ".json"), "w") as file:
                 json.dump(config, file)
@@ -210,6 +211,7 @@ class Recipes(unittest.TestCase):
     def test_the_engine_loads_the_folder_and_draws_a_frame_with_it(self):
         self.train_asd("model", "--held-out", self.path("frames"))
         self.assertTrue(os.path.exists(self.path("model", "held_out.png")))
+        self.assertEqual(read_json(self.path("model", "model_index.json"))["defaults"]["renderer"]["splat_radius"], "auto")
         self.run_engine("inspect", self.path("model"))
         self.run_engine("refine", self.path("frames", "0", "buffer"), "-m", self.path("model"), "-o",
                         self.path("refined"), "--frames", "0:0")
