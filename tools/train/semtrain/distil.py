@@ -11,6 +11,7 @@ from .json_file import read_json
 from .low_rank import merged, read_adapter
 from .model_folder import add_to_index, read_component, write_component, write_scheduler
 from .nets.transformer import VoxfieldTransformer
+from .prefetch import Prefetched
 from .regenerate import load_transformer, network_of
 from .sampler import Guidance, guided_x0, linear_alphas, steps_of
 from .settings import parser, resolve
@@ -123,7 +124,7 @@ def main(arguments=None):
     init = options.init or os.path.join(options.teacher, TRANSFORMER)
     trainer.start_from(merged(read_component(init)[1], read_adapter(init)))
     sets = LocalSets(Grids(options.grids, os.path.join(options.output, "cache")), config)
-    distillation = Distillation(teacher, sets, config)
+    distillation = Distillation(teacher, Prefetched(sets, config["workers"]), config)
     print(f"{len(teacher.steps.timesteps)} steps of the teacher become {len(distillation.first)}; "
           f"{len(sets.grids.labels)} cells", flush=True)
     trainer.run(distillation.loss)

@@ -26,18 +26,19 @@ CONFIG = {"seed": 7, "batch": 8, "label_dropout": 0, "class_balance": 0.35, "mir
 def errors_of(models, drawn, batches):
     """-> of each model [bands, 2]: mean squared errors of places and of colours against the teacher, NaN in a band that
     has no timestep"""
+    device = drawn.config["device"]
     sums, counts = torch.zeros(len(models), len(BANDS), 2), torch.zeros(len(BANDS))
     for step in range(batches):
         rows = (torch.arange(CONFIG["batch"]) + step * CONFIG["batch"]) % len(drawn.first)  # all in turn
-        with autocast("bf16", "cpu"):
+        with autocast("bf16", device):
             x, t, others, condition, x0, target = drawn.drawn(step, rows)
             made = [model(x, *others, t, condition).float().clamp(-1, 1) for model in models]
         for band, (low, high) in enumerate(BANDS):
             inside = (t >= low) & (t <= high)
-            counts[band] += inside.sum()
+            counts[band] += inside.sum().cpu()
             for i, of_model in enumerate(made):
                 errors = torch.stack(mean_error(of_model, x0, target), 1)
-                sums[i, band] += errors[inside].sum(0)
+                sums[i, band] += errors[inside].sum(0).cpu()
     return sums / counts[:, None]
 
 
@@ -50,18 +51,20 @@ def main(arguments=None):
     p.add_argument("--teacher-steps", type=int, default=1, help="that one of the students' replaces")
     p.add_argument("--batches", type=int, default=12, help="of 8 sets")
     p.add_argument("--cells", type=int, default=128, help="of a set")
+    p.add_argument("--device", default="cpu", help="or cuda")
     p.add_argument("--threads", type=int, default=0, help="of the CPU; 0: all")
     options = p.parse_args(arguments)
     use_threads(options.threads)
-    teacher = Teacher(options.teacher, "cpu")
+    teacher = Teacher(options.teacher, options.device)
     named = [("teacher, one pass", os.path.join(options.teacher, TRANSFORMER)),
              *(item.split("=", 1) for item in options.student)]
     config = {**CONFIG, **{name: teacher.scheduler[name] for name in ("num_train_timesteps", "beta_start", "beta_end")},
-              "set_size": [options.cells] * 2, "teacher_steps": options.teacher_steps,
+              "device": options.device, "set_size": [options.cells] * 2, "teacher_steps": options.teacher_steps,
               "network": network_of(teacher.config)}
     with tempfile.TemporaryDirectory() as cache:
         drawn = Distillation(teacher, LocalSets(Grids(options.grids, cache), config), config)
-        errors = errors_of([load_transformer(folder) for _, folder in named], drawn, options.batches)
+        models = [load_transformer(folder).to(options.device) for _, folder in named]
+        errors = errors_of(models, drawn, options.batches)
     bands = ("t < 200", "200 to 700", "above")
     head = ["model", *(f"{what}, {band}" for what in ("places", "colours") for band in bands)]
     print("| " + " | ".join(head) + " |\n|" + "---|" * len(head))

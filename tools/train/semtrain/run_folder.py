@@ -10,7 +10,8 @@ from .json_file import read_json
 CHECKPOINT = "checkpoint.safetensors"
 LOG = "log.jsonl"
 SETTINGS = "config.json"
-MAY_CHANGE = ("steps", "minutes", "save_minutes", "device", "mantissa_bits", "defaults")  # nothing that has been learnt
+# nothing that has been learnt
+MAY_CHANGE = ("steps", "minutes", "save_minutes", "device", "workers", "mantissa_bits", "defaults")
 
 
 class RunFolder:

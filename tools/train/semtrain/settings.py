@@ -11,7 +11,7 @@ from .model_folder import HALF_BITS
 
 CONFIGS = os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "configs")
 COMMON = {"seed": 1, "precision": "bf16", "device": "cuda" if torch.cuda.is_available() else "cpu", "minutes": 0.0,
-          "save_minutes": 10.0, "warmup": 200, "decay": 0.3, "ema": 0.999, "clip": 1.0, "mantissa_bits": HALF_BITS}
+          "save_minutes": 10.0, "workers": 0, "warmup": 200, "decay": 0.3, "ema": 0.999, "clip": 1.0, "mantissa_bits": HALF_BITS}
 
 
 def parser(recipe, about):

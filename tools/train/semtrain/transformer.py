@@ -13,6 +13,7 @@ from .grids import Grids, LocalSets
 from .low_rank import add_low_rank, is_adapter, merged, read_adapter
 from .model_folder import add_to_index, read_component, write_component, write_scheduler
 from .nets.transformer import VoxfieldTransformer
+from .prefetch import Prefetched
 from .sampler import linear_alphas
 from .settings import parser, resolve
 from .trainer import Trainer, generator, timesteps_at
@@ -153,7 +154,7 @@ def main():
         state, adapter = read_component(options.init)[1], read_adapter(options.init)
         trainer.start_from(with_new_parts({**state, **adapter} if config["low_rank"] else merged(state, adapter), model))
     print(f"{sum(p.numel() for p in model.parameters())} parameters, {len(sets.grids.labels)} cells", flush=True)
-    trainer.run(loss_of(sets, config))
+    trainer.run(loss_of(Prefetched(sets, config["workers"]), config))
 
 
 if __name__ == "__main__":
