@@ -317,7 +317,7 @@ sr_status sr_world_get_info(sr_world* world, sr_world_info* info);
  */
 sr_status sr_world_copy_cells(sr_world* world, const sr_window* window, sr_grid** grid);
 
-/* waits until the cache has all that is finished */
+/* waits until the cache has all that is finished; an error where it cannot be written, as on a full disk */
 sr_status sr_world_flush(sr_world* world);
 
 /* ---- Splats: 2D Gaussians on the device. ---- */

@@ -15,6 +15,8 @@
 namespace semrover {
 namespace engine_job_world_test {
 
+namespace fs = std::filesystem;
+
 constexpr int32_t kEdge = 6; // cells of a tile
 
 Device& device()
@@ -434,6 +436,34 @@ TEST(engine_job_world, far_tiles_have_fewer_and_larger_splats_and_all_of_them_wh
     ASSERT_TRUE(world->focus(looking(-3, 30)));
     run(*world);
     EXPECT_EQ(splats_of(*world, near), (std::pair{all, small}));
+}
+
+// a file that cannot be written stands for a full disk
+TEST(engine_job_world, a_cache_that_cannot_be_written_is_told_once_and_no_splats_are_lost)
+{
+    const ScratchFolder folder;
+    fs::create_directories(folder / "cache" / "tile_0_0.sgrid" / "in the way");
+    WorldRequest r{.settings = *resolve_generation(options()), .cache = folder / "cache"};
+    r.splat_bytes = 4u << 20;
+    r.tiles_at_once = 1;
+    const auto world = *open_world(device(), std::move(r), labels_of_grid(street()));
+    ASSERT_TRUE(world->focus(looking(4, 30)));
+    size_t errors = 0;
+    for (bool done = false; !done;) {
+        const auto step = world->step(JobBudget::one_submit());
+        errors += !step;
+        ASSERT_LT(errors, 2u) << step.error().message;
+        done = step && *step;
+    }
+    EXPECT_EQ(errors, 1u);
+    EXPECT_EQ(world->figures().finished, world->figures().wanted);
+    EXPECT_EQ(world->figures().generated, 18u);
+    expect_same(*world, whole());
+    for (const TileIndex& tile : tiles_of(*world)) {
+        const VoxelGrid& cells = *world->tile(tile);
+        EXPECT_EQ(splats_of(*world, tile).first, size_t(cells.points_per_voxel) * cells.cells.size());
+    }
+    EXPECT_FALSE(world->flush());
 }
 
 TEST(engine_job_world, where_all_splats_of_a_tile_do_not_fit_it_has_coarser_ones)

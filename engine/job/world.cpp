@@ -351,14 +351,14 @@ Status StreamedWorld::fill(bool waits)
 
 Status StreamedWorld::finish()
 {
-    SR_CHECK(tiles_->finish(work_, part_));
-    for (const TileIndex& tile : work_) {
+    const Status stored = tiles_->finish(work_, part_);
+    for (const TileIndex& tile : work_) { // they are here, whether or not the cache has them
         ++generated_;
         came(tile);
     }
     work_.clear();
     cut_ = filled_ = false;
-    return {};
+    return stored;
 }
 
 // after an error, or where what is being made is not wanted any more

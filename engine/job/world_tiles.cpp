@@ -100,7 +100,8 @@ Result<bool> WorldTiles::load(const TileIndex& index)
     std::error_code ignored;
     if (cache_.empty() || !std::filesystem::exists(path_of(index), ignored))
         return false;
-    SR_CHECK(drain());
+    if (stores_)
+        SR_CHECK(drain());
     SR_TRY(WorldTile * tile, bring(index));
     SR_TRY(const uint64_t key, key_of(index));
     const auto stored = read_grid(path_of(index));
@@ -173,10 +174,13 @@ Status WorldTiles::finish(std::span<const TileIndex> targets, const VoxelGrid& p
             tile.cells.generated[c] = 1;
         }
         tile.finished = true;
-        if (files_)
-            SR_CHECK(write(target, tile));
     }
-    return {};
+    if (!files_ || !stores_)
+        return {};
+    for (const TileIndex& target : targets)
+        if (stores_)
+            stores_ = write(target, tiles_.at(target));
+    return stores_;
 }
 
 Status WorldTiles::write(const TileIndex& index, WorldTile& from)
@@ -191,7 +195,9 @@ Status WorldTiles::write(const TileIndex& index, WorldTile& from)
 
 Status WorldTiles::drain()
 {
-    return files_ ? files_->drain() : Status();
+    if (files_ && stores_)
+        stores_ = files_->drain();
+    return stores_;
 }
 
 Result<std::vector<TileIndex>> WorldTiles::edit(const LabelEdits& edits)

@@ -44,9 +44,11 @@ class WorldTiles {
     Result<VoxelGrid> cut(std::span<const TileIndex> tiles);
     // what the model is told of them
     Result<std::vector<SceneObject>> objects_near(std::span<const TileIndex> tiles);
-    // takes the points of the targets of a grid that cut() gave, and hands them to the cache
+    // Takes the points of the targets of a grid that cut() gave, then hands them to the cache. After an error they are
+    // finished nevertheless. A cache that cannot be written is told once, here or by load(), and nothing more goes
+    // there
     Status finish(std::span<const TileIndex> tiles, const VoxelGrid& part);
-    Status drain(); // until the cache has all that is finished
+    Status drain(); // until the cache has all that is finished; an error where it does not
 
     // what is edited, by the tiles whose points it changes
     Result<std::vector<TileIndex>> edit(const LabelEdits& edits);
@@ -68,6 +70,7 @@ class WorldTiles {
     uint64_t base_;
     std::map<TileIndex, WorldTile> tiles_;
     std::map<TileIndex, LabelEdits> edits_;
+    Status stores_;                    // whether the cache takes what is finished
     std::unique_ptr<FileQueue> files_; // of the cache
 };
 
