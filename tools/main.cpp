@@ -10,7 +10,7 @@ int main(int argc, char** argv)
         argc, argv,
         {{"bench", "semrover-eval", "measure kernels and stages on this device"},
          add_convert,
-         {"devices", "semrover-eval", "list devices, their limits and the kernels chosen for them"},
+         add_devices,
          add_doctor,
          add_edit,
          {"eval", "semrover-eval", "measure how far apart two sets of results are, or a result and the truth"},

@@ -6,5 +6,5 @@
 int main(int argc, char** argv)
 {
     using namespace semrover;
-    return run_program(argc, argv, {add_bench, add_devices, add_eval, add_verify});
+    return run_program(argc, argv, {add_bench, add_eval, add_verify});
 }
