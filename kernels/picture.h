@@ -12,7 +12,7 @@ namespace semrover {
 // what splats look like in files: [P] u32 arrays
 struct PixelWords {
     Tensor seen;    // red, green, blue over the background; 255 where it is visible, else 0
-    Tensor ranges;  // depth in millimetres, 16 bits; label, 255 for none
+    Tensor ranges;  // depth in millimetres, 16 bits, 0 from 65.5345 m on; label, 255 for none
     Tensor normals; // 128 + 127 n of each axis, in the low bytes
 };
 struct SplatPixelsOptions {

@@ -29,8 +29,10 @@ inline std::vector<uint8_t> color_pixels(const SplatImage& image, const std::arr
 inline std::vector<uint16_t> depth_pixels(const SplatImage& image)
 {
     std::vector<uint16_t> out(image.depth_expected.size());
-    for (size_t i = 0; i < out.size(); ++i)
-        out[i] = uint16_t(std::lround(std::clamp(image.depth_expected[i] * 1000.f, 0.f, 65535.f)));
+    for (size_t i = 0; i < out.size(); ++i) {
+        const long millimetres = std::lround(image.depth_expected[i] * 1000.f);
+        out[i] = millimetres < 65535 ? uint16_t(millimetres) : 0; // out of range: nothing
+    }
     return out;
 }
 

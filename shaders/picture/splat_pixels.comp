@@ -41,7 +41,9 @@ void main()
     seen[i] = color_byte(c.r, c.a, p.red) | color_byte(c.g, c.a, p.green) << 8 | color_byte(c.b, c.a, p.blue) << 16 |
               (c.a >= p.visible_alpha ? 255u << 24 : 0u);
     precise float millimetres = depth[i].x * 1000.0;
-    ranges[i] = rounded(clamp(millimetres, 0.0, 65535.0)) | min(ids[i].x, 255u) << 16;
+    // what 16 bits cannot hold is not measured: a reader would take the largest number for a wall
+    const bool held = millimetres > 0.0 && millimetres < 65534.5;
+    ranges[i] = (held ? rounded(millimetres) : 0u) | min(ids[i].x, 255u) << 16;
     const vec3 n = surface[i].xyz;
     precise float square = n.x * n.x + n.y * n.y + n.z * n.z;
     const float length = square_root(square);

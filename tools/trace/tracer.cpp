@@ -99,7 +99,7 @@ Result<TracedImage> Tracer::render(const CameraFrame& frame, const Daylight& lig
             image.normal.push_back(direction_byte(normal, c));
         }
         // what 16 bits cannot hold is not measured
-        image.depth.push_back(depth < 65.535f ? uint16_t(std::lround(depth * 1000.f)) : uint16_t(0));
+        image.depth.push_back(depth < 65.5345f ? uint16_t(std::lround(depth * 1000.f)) : uint16_t(0));
         image.label.push_back(uint8_t(label));
         image.visible.push_back(depth > 0 ? 255 : 0);
     }
