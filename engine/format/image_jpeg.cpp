@@ -142,22 +142,40 @@ bool lacks_scans(const Decoder& d)
     return false;
 }
 
+// Photoshop's files say by their marker that they hold what is left of the light; others hold ink
+void rgb_of_cmyk(const uint8_t* cmyk, uint8_t* rgb, uint32_t width, bool is_light)
+{
+    for (uint32_t x = 0; x < width; ++x)
+        for (uint32_t c = 0; c < 3; ++c) {
+            const uint32_t color = cmyk[4 * x + c], black = cmyk[4 * x + 3];
+            const uint32_t product = is_light ? color * black : (255 - color) * (255 - black);
+            rgb[3 * x + c] = uint8_t((product + 127) / 255);
+        }
+}
+
 // rows are appended, so that a cut file takes no memory for those that it lacks; `pixels` has room for all
 bool read_rows(Decoder& d, std::vector<uint8_t>& pixels)
 {
     if (setjmp(d.errors.jump))
         return false;
-    d.info.out_color_space = JCS_RGB;
+    const bool cmyk = d.info.jpeg_color_space == JCS_CMYK || d.info.jpeg_color_space == JCS_YCCK;
+    d.info.out_color_space = cmyk ? JCS_CMYK : JCS_RGB;
     d.info.dct_method = JDCT_ISLOW;
     d.progress.progress_monitor = check_scans;
     d.info.progress = &d.progress;
     jpeg_start_decompress(&d.info);
     const size_t row_bytes = size_t(d.info.output_width) * 3;
+    JSAMPARRAY inks = nullptr; // libjpeg frees it
+    if (cmyk)
+        inks = (*d.info.mem->alloc_sarray)(reinterpret_cast<j_common_ptr>(&d.info), JPOOL_IMAGE,
+                                           d.info.output_width * 4, 1);
     while (d.info.output_scanline < d.info.output_height) {
         const size_t begin = pixels.size();
         pixels.resize(begin + row_bytes);
         uint8_t* row = pixels.data() + begin;
-        jpeg_read_scanlines(&d.info, &row, 1);
+        jpeg_read_scanlines(&d.info, cmyk ? inks : &row, 1);
+        if (cmyk)
+            rgb_of_cmyk(inks[0], row, d.info.output_width, d.info.saw_Adobe_marker);
     }
     if (lacks_scans(d)) {
         std::snprintf(d.errors.message, sizeof(d.errors.message), "it ends before all components were seen");
