@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
 
-# assets/label_maps/NAME.json -> <build>/generated/label_maps.h: the tables that --map NAME knows, without files
+# each file of assets/label_maps -> <build>/generated/label_maps.h: the tables that --map NAME knows, without files
 file(GLOB label_maps CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/assets/label_maps/*.json)
 set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${label_maps})
 set(label_map_entries)

@@ -1,8 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // an option that does nothing with its input is a usage error that names both; advice in messages can be followed
+#include "engine/format/grid_npz.h"
 #include "engine/format/vox.h"
 #include "tests/program.h"
+#include "tests/zip_bytes.h"
 
 namespace semrover {
 namespace cli_option_meaning_test {
@@ -54,6 +56,76 @@ TEST_F(CliOptionMeaning, splats_are_read_as_they_are)
     for (const char* option : {"--origin 1,2,3", "--voxel-size 1", "--splat-radius 0.1", "--opacity 0.5", "--map x"})
         expect_error(semrover_program("convert " + ply + " " + path("o.ply") + " --to 3dgs " + option), 2,
                      "has no meaning for ");
+}
+
+// every option of an input for every format: refused with its name, or it changes what is read, or what is said of it
+TEST_F(CliOptionMeaning, no_option_of_an_input_is_dropped_in_silence)
+{
+    const std::string kXyz = "property float x\nproperty float y\nproperty float z\n";
+    const auto ply = [&](const char* name, const std::string& properties, const std::string& rows) {
+        return folder_
+            .put(name, "ply\nformat ascii 1.0\nelement vertex 2\n" + kXyz + properties + "end_header\n" + rows)
+            .string();
+    };
+    VoxelGrid grid = read_grid(kAssets + "scenes/street.semantic.sgrid").value();
+    for (Cell& cell : grid.cells)
+        cell[0] -= 30;
+    ASSERT_TRUE(write_grid(folder_ / "g.sgrid", grid));
+    ASSERT_TRUE(write_grid_npz(folder_ / "g.npz", grid));
+    const std::string numpy = SEMROVER_SOURCE_DIR "/tests/data/numpy/";
+    const std::string splats = path("s.ply");
+    ASSERT_EQ(semrover_program("convert " + kAssets + "scenes/street.truth.sgrid " + splats +
+                               " --to 3dgs --splat-radius 0.05")
+                  .code,
+              0);
+    // an input, and what it cannot do without
+    const std::vector<std::pair<std::string, std::string>> inputs = {
+        {path("g.sgrid"), ""},
+        {path("g.npz"), ""},
+        {folder_.put("a.npy", npy_bytes("|u1", "(3, 1, 2)", std::string("\x04\x11\x04\x11\x0b\x04", 6))).string(),
+         "--map occ3d --file-voxel-size 0.2"},
+        {numpy + "occ3d_nuscenes.npz", ""},
+        {vox(), ""},
+        {vox(), "--file-voxel-size 0.2"},
+        {ply("l.ply", "property int label\n", "0 0 0 2\n1 0 0 5\n"), ""},
+        {ply("c.ply", "property int label\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n",
+             "0 0 0 2 1 2 3\n1 0 0 5 4 5 6\n"),
+         ""},
+        {ply("n.ply", "", "0 0 0\n1 0 0\n"), "--label car"},
+        {ply("o.ply", "property int ObjTag\n", "0 0 0 2\n1 0 0 5\n"), "--map carla"},
+        {splats, ""}};
+    const std::string map =
+        folder_.put("map.json", R"({"0": "wall", "2": "wall", "4": "wall", "11": "wall"})").string();
+    const std::string vox_map = folder_.put("vox.json", R"({"1": "wall"})").string();
+    const std::vector<std::pair<std::string, std::string>> options = {
+        {"--map", map},        {"--voxel-size", "1.2"},  {"--file-voxel-size", "0.3"}, {"--origin", "1.2,0,0"},
+        {"--min-fill", "0.9"}, {"--mask", "mask_lidar"}, {"--label", "bus"},           {"--points-per-voxel", "7"},
+        {"--labels-only", ""}, {"--nearest-color", ""}};
+    const auto read = [&](const std::string& line) {
+        ProgramResult r = semrover_program(line);
+        if (r.code == 0)
+            r.out = contents(path("o.sgrid"));
+        return r;
+    };
+    for (const auto& [input, needed] : inputs)
+        for (const auto& [option, given] : options) {
+            const bool is_vox = input.ends_with(".vox");
+            const std::string value = is_vox && option == "--map" ? vox_map : given;
+            if (needed.find(option) != std::string::npos || (is_vox && option == "--nearest-color"))
+                continue; // of all colours of this file a class is known
+            const std::string line =
+                "convert " + input + " " + path(input == splats ? "o.ply" : "o.sgrid") + " -y -q " + needed;
+            const ProgramResult plain = input == splats ? semrover_program(line + " --to 3dgs") : read(line);
+            ASSERT_EQ(plain.code, 0) << line << plain.err;
+            const std::string with = line + " " + option + " " + value + (input == splats ? " --to 3dgs" : "");
+            const ProgramResult r = input == splats ? semrover_program(with) : read(with);
+            if (r.code == 0) {
+                EXPECT_NE(r.out, plain.out) << "dropped in silence: " << with;
+            } else {
+                EXPECT_TRUE(r.err.find(option + " has no meaning for ") != std::string::npos || r.code == 3)
+                    << with << ": " << r.err;
+            }
+        }
 }
 
 TEST_F(CliOptionMeaning, paths_and_our_grids_refuse_them_too)

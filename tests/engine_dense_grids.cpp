@@ -125,6 +125,30 @@ TEST(DenseLabels, sizes_that_are_not_tenths_of_a_millimetre_are_refused)
     EXPECT_TRUE(says(resample(empty, 0.6f, 0, "here"), "here: no voxel is occupied"));
 }
 
+// one layer of voxels, which straddle the cells' boundaries, in a box of 8 x 8 columns
+TEST(DenseLabels, a_doubled_ground_is_said)
+{
+    const auto ground = [](uint32_t height, double cell, double min_fill) {
+        DenseLabels dense{{24, 24, 9}, {2000, 2000, 2000}, {0, 0, 0}, {}};
+        dense.labels.assign(24 * 24 * 9, kEmpty);
+        for (uint32_t i = 0; i < 24 * 24; ++i) // flat, or a slope from below a boundary to above it
+            dense.labels[i * 9 + (height ? height : 2 + i % 24 % 3 / 2)] = 0;
+        std::vector<std::string> warnings;
+        const auto grid = resample(dense, float(cell), min_fill, "here", &warnings);
+        EXPECT_TRUE(grid) << grid.error().message;
+        return std::pair(grid->cells.size(), warnings);
+    };
+    EXPECT_EQ(ground(3, 0.6, 0), std::pair(size_t(64), std::vector<std::string>()));
+    const auto [cells, warnings] = ground(0, 0.6, 0); // two of three voxels below the boundary, one above
+    EXPECT_EQ(cells, 128u);
+    EXPECT_EQ(warnings, std::vector<std::string>{
+                            "64 of 64 columns of ground have two layers of cells: voxels of 0.2 m straddle the "
+                            "boundaries of cells of 0.6 m; --voxel-size 0.2 keeps the voxels as they are, --min-fill "
+                            "0.17 leaves out the emptier layer"});
+    EXPECT_EQ(ground(0, 0.6, 0.17), std::pair(size_t(64), std::vector<std::string>()));
+    EXPECT_EQ(ground(0, 0.2, 0), std::pair(size_t(576), std::vector<std::string>()));
+}
+
 // ---- label maps
 
 TEST(LabelMap, a_file_says_what_labels_are)
@@ -370,6 +394,25 @@ TEST(SemanticKitti, what_it_cannot_hold_is_refused_or_said)
                                                   "1 cells of sky are left out"}));
 }
 
+TEST(SemanticKitti, training_ids_are_no_raw_ids)
+{
+    const ScratchFolder folder;
+    Kitti k; // car and road in training ids; 1 is an outlier of the raw ids, and 9 none
+    k.set(0, 128, 10, 1);
+    k.set(3, 128, 10, 9);
+    const Path file = folder.put("0.label", k.labels);
+    EXPECT_TRUE(says(read_semantic_kitti(file, {}), "the largest number is 9: these may be SemanticKITTI's raw ids, or "
+                                                    "its training ids; --map semantickitti or"));
+    SceneGridOptions o;
+    o.map = "semantickitti-train";
+    const auto out = read_semantic_kitti(file, o);
+    ASSERT_TRUE(out) << out.error().message;
+    EXPECT_EQ(label_at(out->grid, {0, 0, 0}), 13);
+    EXPECT_EQ(label_at(out->grid, {1, 0, 0}), 0);
+    o.map = "semantickitti";
+    EXPECT_TRUE(says(read_semantic_kitti(file, o), "unknown labels: 9 (1 voxels)"));
+}
+
 TEST(SemanticKitti, refuses_malformed_files)
 {
     const ScratchFolder folder;
@@ -386,7 +429,7 @@ TEST(SemanticKitti, refuses_malformed_files)
     unknown.set(0, 0, 0, 1000);
     unknown.set(0, 0, 1, 1000);
     unknown.set(0, 0, 2, 41);
-    EXPECT_TRUE(says(read(unknown.labels), "unknown labels: 41 (1 voxels), 1000 (2 voxels); --map FILE"));
+    EXPECT_TRUE(says(read(unknown.labels), "unknown labels: 41 (1 voxels), 1000 (2 voxels); --map NAME or FILE"));
     Kitti good;
     good.set(0, 0, 0, 40);
     EXPECT_TRUE(read(good.labels));
@@ -451,6 +494,27 @@ TEST(Occ3d, waymo_has_classes_of_its_own)
     EXPECT_EQ(label_at(out->grid, {-98, -98, -2}), 0);
 }
 
+TEST(Occ3d, labels_are_of_any_type)
+{
+    const ScratchFolder folder;
+    const auto npy = [](const char* type, auto free, auto car) {
+        std::vector<decltype(free)> numbers(200 * 200 * 16, free);
+        numbers[0] = car;
+        return npy_bytes(type, "(200, 200, 16)",
+                         {reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(free)});
+    };
+    for (const std::string& bytes : {npy("|u1", uint8_t(17), uint8_t(4)), npy("<i8", int64_t(17), int64_t(4)),
+                                     npy("<i4", int32_t(17), int32_t(4)), npy("<f4", 17.f, 4.f)}) {
+        const Path file = folder.put("m.npz", zip_bytes({{"semantics.npy", bytes}}));
+        const auto out = read_occ3d(file, Occ3dKind::nuscenes, {});
+        ASSERT_TRUE(out) << out.error().message;
+        EXPECT_EQ(out->grid.labels[0], 13);
+        EXPECT_EQ(out->grid.cells[0], (Cell{-67, -67, -2})); // 0.4 m at -40, -40, -1: two cells high
+    }
+    const Path half = folder.put("m.npz", zip_bytes({{"semantics.npy", npy("<f4", 17.f, 4.5f)}}));
+    EXPECT_TRUE(says(read_occ3d(half, Occ3dKind::nuscenes, {}), "expected whole numbers of 0 to 255, found another"));
+}
+
 TEST(Occ3d, refuses_malformed_files)
 {
     const ScratchFolder folder;
@@ -462,11 +526,11 @@ TEST(Occ3d, refuses_malformed_files)
     EXPECT_TRUE(says(read_occ3d(folder.put("m.npz", "text"), Occ3dKind::nuscenes, {}), "no .npz archive"));
     EXPECT_TRUE(says(read("labels", ""), "has no array 'semantics', found labels"));
     EXPECT_TRUE(says(read("semantics", npy_bytes("|u1", "(2, 2, 2)", "abcdefgh")),
-                     "semantics: expected shape [200, 200, 16], found [2, 2, 2]"));
+                     "'semantics': expected shape [200, 200, 16], found [2, 2, 2]"));
     EXPECT_TRUE(says(read("semantics", npy_bytes("|u1", "(640000,)", free)), "expected shape [200, 200, 16]"));
-    EXPECT_TRUE(
-        says(read("semantics", npy_bytes("<i8", "(200, 200, 16)", free)), "an array of 5120000 bytes, at most"));
-    EXPECT_TRUE(says(read("semantics", npy_bytes("|i1", "(200, 200, 16)", free)), "expected u8, found I8"));
+    EXPECT_TRUE(says(read("semantics", npy_bytes("<i8", "(200, 200, 16)", free)), "the zip says"));
+    EXPECT_TRUE(says(read("semantics", npy_bytes("|i1", "(200, 200, 16)", "\xff" + free.substr(1))),
+                     "'semantics': expected whole numbers of 0 to 255, found another"));
     EXPECT_TRUE(says(read("semantics", npy_bytes("|u1", "(200, 200, 16)", free.substr(1))), "the zip says"));
     EXPECT_TRUE(says(read("semantics", npy_bytes("|u1", "(200, 200, 16)", free)), "no voxel is occupied"));
     std::string unknown = free;

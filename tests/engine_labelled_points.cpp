@@ -38,7 +38,12 @@ TEST(LabelledPoints, a_cells_label_is_that_of_most_points)
     EXPECT_EQ(out->grid.cells, (std::vector<Cell>{{-1, 0, 0}, {0, 0, 0}, {1, -1, 2}}));
     EXPECT_EQ(out->grid.labels, (std::vector<uint8_t>{3, 8, 19}));
     EXPECT_FALSE(out->grid.has_points());
-    EXPECT_EQ(out->warnings, std::vector<std::string>{"2 points that are not finite are left out"});
+    ASSERT_EQ(out->warnings.size(), 2u); // nothing says that the numbers are ours
+    EXPECT_TRUE(out->warnings[0].ends_with(
+        ": 'label': the numbers are taken for our own classes: 0 road (1 points), 3 wall (1 points), 5 pole (1 "
+        "points), "
+        "8 vegetation (2 points), 19 road-lane (1 points); --map says what they are if they are another program's"));
+    EXPECT_EQ(out->warnings[1], "2 points that are not finite are left out");
     EXPECT_EQ(out->dropped, 2u);
     SceneGridOptions o;
     o.voxel_size = 0.25f;
@@ -76,6 +81,7 @@ TEST(LabelledPoints, any_order_of_properties_any_of_the_names_and_both_byte_orde
             put(uint8_t(2));
             put(int16_t(-2));
             SceneGridOptions o;
+            o.map = "ours"; // semantic and classification are other programs' names
             o.points_per_voxel = 1;
             const auto out = read_labelled_points(folder.put("b.ply", bytes), o);
             ASSERT_TRUE(out) << out.error().message;
@@ -166,6 +172,7 @@ TEST(LabelledPoints, a_grid_comes_back_the_same)
     o.semantic = true;
     const auto semantic = read_labelled_points(folder / "s.ply", o);
     ASSERT_TRUE(semantic) << semantic.error().message;
+    EXPECT_TRUE(semantic->warnings.empty()); // the file says whose the labels are
     EXPECT_EQ(semantic->grid.cells, grid.cells);
     EXPECT_EQ(semantic->grid.labels, grid.labels);
     const auto file = read_ply(folder / "s.ply");
@@ -189,7 +196,7 @@ TEST(LabelledPoints, refuses_what_is_no_labelled_cloud)
     EXPECT_TRUE(says(read(ply(labelled, {})), "there are no points"));
     EXPECT_TRUE(says(read(ply(labelled, {"nan 0 0 1"})), "there are no points"));
     EXPECT_TRUE(says(read(ply(labelled, {"0 0 0 25", "0 0 0 25", "0 0 0 77"})),
-                     "unknown labels: 25 (2 points), 77 (1 points); --map FILE"));
+                     "unknown labels: 25 (2 points), 77 (1 points); --map NAME or FILE"));
     EXPECT_TRUE(says(read(ply(labelled, {"0 0 0 -1"})), "vertex 0: 'label': expected a whole number, found -1"));
     EXPECT_TRUE(says(read(ply(std::string(kXyz) + "property float label\n", {"0 0 0 1.5"})), "found 1.5"));
     EXPECT_TRUE(says(read(ply(labelled, {"0 0 0 1", "1e9 0 0 1"})), "vertex 1: (1000000000, 0, 0) m is absurd"));
@@ -254,6 +261,70 @@ TEST(LabelledPoints, carlas_axes_are_left_handed)
     const auto kept = read_scene_grid(cloud, o, SceneFormat::points_ply);
     EXPECT_EQ(kept->grid.cells[0], (Cell{0, -5, 2}));
     EXPECT_TRUE(kept->warnings.empty());
+}
+
+TEST(LabelledPoints, a_column_of_another_program_is_read_by_its_table)
+{
+    const ScratchFolder folder;
+    const auto cloud = [&](const char* column) {
+        return folder.put("c.ply", ply(fmt::format("{}property float {}\n", kXyz, column),
+                                       {"0 0 0 2", "1 0 0 6", "2 0 0 5", "3 0 0 11"}));
+    };
+    using Labels = std::vector<uint8_t>;
+    for (const auto& [column, table, labels] : {std::tuple{"classification", "asprs", Labels{9, 2, 8, 0}},
+                                                {"scalar_Classification", "asprs", {9, 2, 8, 0}},
+                                                {"semantic", "kitti360", {9, 2}},
+                                                {"ObjTag", "carla", {1, 5, 4, 10}}}) {
+        const auto refused = read_labelled_points(cloud(column), {});
+        EXPECT_TRUE(
+            says(refused, fmt::format("'{}': a column of that name holds numbers of {}, not ours: 2 ", column, table)));
+        EXPECT_TRUE(says(refused, "(1 points")) << column;
+        SceneGridOptions o;
+        o.map = table;
+        const auto read = read_labelled_points(cloud(column), o);
+        ASSERT_TRUE(read) << read.error().message;
+        EXPECT_EQ(read->grid.labels, labels) << column;
+        o.map = "ours";
+        EXPECT_EQ(read_labelled_points(cloud(column), o)->grid.labels, (Labels{2, 6, 5, 11})) << column;
+    }
+}
+
+// as bytes, as LAS and PDAL have them (257 times that, or the byte itself), and as floats of both kinds
+TEST(LabelledPoints, colours_are_counted_as_their_type_and_size_say)
+{
+    const ScratchFolder folder;
+    const auto read = [&](const char* type, const std::vector<std::string>& rows) {
+        std::string properties = std::string(kXyz) + "property uchar label\n";
+        for (const char* channel : {"red", "green", "blue"})
+            properties += fmt::format("property {} {}\n", type, channel);
+        SceneGridOptions o;
+        o.map = "ours";
+        o.points_per_voxel = 1;
+        return read_labelled_points(folder.put("p.ply", ply(properties, rows)), o);
+    };
+    using Bytes = std::vector<uint8_t>;
+    for (const auto& [type, color, warning] : {std::tuple{"uchar", "128 64 32", ""},
+                                               {"ushort", "32896 16448 8224", ""},
+                                               {"ushort", "128 64 32", "at most 128: they are taken for 0 to 255"},
+                                               {"int", "128 64 32", ""},
+                                               {"float", "128 64 32", ""},
+                                               {"double", "0.501961 0.25098 0.12549", ""}}) {
+        const auto out = read(type, {fmt::format("0 0 0 2 {}", color)});
+        ASSERT_TRUE(out) << out.error().message;
+        EXPECT_EQ(out->grid.colors, (Bytes{128, 64, 32})) << type << ' ' << color;
+        EXPECT_EQ(out->warnings.size(), *warning ? 1u : 0u) << type;
+        if (*warning) {
+            EXPECT_NE(out->warnings[0].find(warning), std::string::npos) << out->warnings[0];
+        }
+    }
+    // one number decides for all: a dark point of floats to 255
+    EXPECT_EQ(read("float", {"0 0 0 2 0.5 0 1", "1 0 0 2 200 0 0"})->grid.colors, (Bytes{1, 0, 1, 200, 0, 0}));
+    EXPECT_EQ(read("float", {"0 0 0 2 1.0004 0 -0.0004"})->grid.colors, (Bytes{255, 0, 0}));
+    EXPECT_TRUE(says(read("float", {"0 0 0 2 300 0 0"}), "the colour 300, expected 0 to 1, or 0 to 255"));
+    EXPECT_TRUE(says(read("float", {"0 0 0 2 0 -1 0"}), "the colour -1, expected 0 or more"));
+    EXPECT_TRUE(says(read("float", {"0 0 0 2 0 nan 0"}), "row 0 has a colour that is not finite"));
+    EXPECT_TRUE(says(read("uint", {"0 0 0 2 70000 0 0"}), "the colour 70000, expected 0 to 255, or 0 to 65535"));
+    EXPECT_EQ(read("float", {"0 0 0 2 3 0 0"})->warnings.size(), 1u); // almost black, or brighter than white
 }
 
 TEST(LabelledPoints, no_prefix_of_a_file_reads_or_crashes)

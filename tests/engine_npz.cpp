@@ -3,12 +3,14 @@
 // files by numpy 1.24.2 (tests/data/numpy), and by hand from the formats' specifications
 #include "engine/format/grid_npz.h"
 #include "engine/format/npz.h"
+#include "engine/format/scene_file.h"
 
 #include "tests/grid_case.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
 #include "tests/zip_bytes.h"
 
+#include <cmath>
 #include <numeric>
 
 namespace semrover {
@@ -145,7 +147,9 @@ TEST(Npz, a_bomb_is_refused_before_it_is_inflated)
     const auto bomb = NpzFile::open(kNumpy + "bomb.npz");
     ASSERT_TRUE(bomb) << bomb.error().message;
     EXPECT_TRUE(says(bomb->read("cells"), "the zip says 67109000 bytes, the array's header 136"));
-    EXPECT_TRUE(says(read_grid_npz(kNumpy + "bomb.npz", 0.6f), "cells: expected shape [V, 3], found [8]"));
+    SceneGridOptions sized;
+    sized.voxel_size = 0.6f;
+    EXPECT_TRUE(says(read_grid_npz(kNumpy + "bomb.npz", sized), "cells: expected shape [V, 3], found [8]"));
     const ScratchFolder folder;
     // an array of a terabyte in a few bytes, and one beyond what the reader expects
     const auto read = [&](const std::string& shape, uint64_t most) {
@@ -197,9 +201,10 @@ TEST(GridNpz, a_grid_comes_back_the_same)
     VoxelGrid grid = quoted_grid();
     for (int i = 0; i < 2; ++i) {
         ASSERT_TRUE(write_grid_npz(folder / "g.npz", grid));
-        const auto read = read_grid_npz(folder / "g.npz", 1);
+        const auto read = read_grid_npz(folder / "g.npz", {});
         ASSERT_TRUE(read) << read.error().message;
-        expect_same(*read, grid);
+        expect_same(read->grid, grid);
+        EXPECT_TRUE(read->warnings.empty());
         grid.points.clear();
         grid.colors.clear();
         grid.generated.clear();
@@ -208,8 +213,9 @@ TEST(GridNpz, a_grid_comes_back_the_same)
 
 TEST(GridNpz, numpys_default_types_are_taken)
 {
-    const auto grid = read_grid_npz(kNumpy + "grid.npz", 1);
-    ASSERT_TRUE(grid) << grid.error().message;
+    const auto read = read_grid_npz(kNumpy + "grid.npz", {});
+    ASSERT_TRUE(read) << read.error().message;
+    const VoxelGrid* grid = &read->grid;
     EXPECT_EQ(grid->voxel_size, 0.6f);
     EXPECT_EQ(grid->cells, (std::vector<Cell>{{0, -5, 3}, {2, 0, -1}})); // sorted
     EXPECT_EQ(grid->labels, (std::vector<uint8_t>{4, 19}));
@@ -220,12 +226,193 @@ TEST(GridNpz, numpys_default_types_are_taken)
     EXPECT_EQ(grid->generated, (std::vector<uint8_t>{1, 1}));
 }
 
+// 6 x 3 voxels of 0.2 m, road and car, and a tree alone
+VoxelGrid finer_grid()
+{
+    VoxelGrid grid;
+    grid.voxel_size = 0.2f;
+    for (int32_t i = 0; i < 6; ++i)
+        for (int32_t j = 0; j < 3; ++j) {
+            grid.cells.push_back({i, j, 0});
+            grid.labels.push_back(i < 3 ? 0 : 13);
+        }
+    grid.cells.push_back({6, 0, 0});
+    grid.labels.push_back(8);
+    return grid;
+}
+
+TEST(GridNpz, finer_cells_become_larger_ones)
+{
+    const ScratchFolder folder;
+    VoxelGrid grid = finer_grid();
+    ASSERT_TRUE(write_grid_npz(folder / "g.npz", grid));
+    SceneGridOptions o;
+    const auto read = [&] { return read_grid_npz(folder / "g.npz", o); };
+    EXPECT_EQ(read()->grid.cells.size(), 19u); // their own size
+    EXPECT_EQ(read()->grid.voxel_size, 0.2f);
+    o.voxel_size = 0.6f;
+    EXPECT_EQ(read()->grid.cells, (std::vector<Cell>{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}));
+    EXPECT_EQ(read()->grid.labels, (std::vector<uint8_t>{0, 13, 8}));
+    EXPECT_EQ(read()->grid.voxel_size, 0.6f);
+    o.min_fill = 0.3;
+    EXPECT_EQ(read()->grid.cells.size(), 2u);
+    o.min_fill = 0;
+    o.origin = {-0.2, 0, 0};
+    EXPECT_EQ(read()->grid.cells, (std::vector<Cell>{{-1, 0, 0}, {0, 0, 0}, {1, 0, 0}}));
+    o.origin = {0.1, 0, 0};
+    EXPECT_TRUE(says(read(), "origin: 0.1 m is not a whole number of voxels of 0.2 m"));
+    o = {};
+    o.voxel_size = 0.5f;
+    EXPECT_TRUE(says(read(), "a cell of 0.5 m is not a whole number of voxels of 0.2 m"));
+    o = {};
+    o.file_voxel_size = 0.1;
+    EXPECT_TRUE(says(read(), "says that its voxels are 0.2 m, --file-voxel-size says 0.1 m"));
+    o = {};
+    o.map = folder.put("map.json", R"({"13": null, "0": "terrain"})");
+    EXPECT_EQ(read()->grid.cells.size(), 10u);
+    EXPECT_EQ(read()->grid.labels[0], 9);
+    EXPECT_EQ(read()->dropped, 9u);
+    grid = small_grid();
+    ASSERT_TRUE(write_grid_npz(folder / "g.npz", grid));
+    o = {};
+    o.voxel_size = 2 * grid.voxel_size;
+    EXPECT_TRUE(says(read(), "have points, which cells of 1.2 m cannot take over"));
+}
+
+TEST(GridNpz, a_file_of_others_says_its_size_and_its_classes)
+{
+    const ScratchFolder folder;
+    const std::string cell = std::string("\1\0\0\0\2\0\0\0\3\0\0\0", 12);
+    const auto read = [&](const char* label, const SceneGridOptions& o) {
+        return read_grid_npz(folder.put("m.npz", zip_bytes({{"cells.npy", npy_bytes("<i4", "(1, 3)", cell)},
+                                                            {"labels.npy", npy_bytes("|u1", "(1,)", label)}})),
+                             o);
+    };
+    EXPECT_TRUE(says(read("\3", {}), "does not say how large its voxels are: --voxel-size METRES does"));
+    SceneGridOptions o;
+    o.voxel_size = 0.4f;
+    EXPECT_EQ(read("\3", o)->grid.voxel_size, 0.4f);
+    EXPECT_EQ(read("\3", o)->grid.cells, (std::vector<Cell>{{1, 2, 3}}));
+    ASSERT_EQ(read("\3", o)->warnings.size(), 1u);
+    EXPECT_NE(read("\3", o)->warnings[0].find("taken for our own classes: 3 wall (1 cells)"), std::string::npos);
+    EXPECT_TRUE(says(read("\x28", o), "unknown labels: 40 (1 cells)"));
+    o.map = "semantickitti";
+    EXPECT_EQ(read("\x28", o)->grid.labels, std::vector<uint8_t>{0});
+    o = {};
+    o.file_voxel_size = 0.2;
+    EXPECT_EQ(read("\3", o)->grid.cells, (std::vector<Cell>{{0, 0, 1}})); // of 0.6 m
+}
+
+// ---- arrays of labels
+
+template <typename T>
+std::string npy_of(const char* type, const std::string& shape, const std::vector<T>& values)
+{
+    return npy_bytes(type, shape, {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)});
+}
+
+TEST(LabelArray, a_dense_array_of_any_type_becomes_a_grid)
+{
+    const ScratchFolder folder;
+    SceneGridOptions o;
+    o.map = "occ3d";
+    o.voxel_size = 0.4f;
+    o.origin = {-0.4, 0, 0};
+    const std::vector<int> numbers = {17, 17, 4, 17, 17, 17, 17, 11}; // [2, 2, 2]
+    const auto expect = [&](const std::string& name, const std::string& bytes) {
+        const Path file = folder.put(name, bytes);
+        EXPECT_EQ(detect_scene_format(file).value(), SceneFormat::array);
+        const auto out = read_scene_grid(file, o);
+        ASSERT_TRUE(out) << out.error().message;
+        EXPECT_EQ(out->grid.cells, (std::vector<Cell>{{-1, 1, 0}, {0, 1, 1}}));
+        EXPECT_EQ(out->grid.labels, (std::vector<uint8_t>{13, 0}));
+        EXPECT_EQ(out->grid.voxel_size, 0.4f);
+        EXPECT_TRUE(out->warnings.empty());
+    };
+    const auto as = [&](auto zero) { return std::vector<decltype(zero)>(numbers.begin(), numbers.end()); };
+    expect("a.npy", npy_of("|u1", "(2, 2, 2)", as(uint8_t())));
+    expect("a.npy", npy_of("<i8", "(2, 2, 2)", as(int64_t())));
+    expect("a.npy", npy_of("<u2", "(1, 2, 2, 2)", as(uint16_t())));
+    expect("a.npy", npy_of("<f4", "(2, 2, 2)", as(float())));
+    expect("a.npz", zip_bytes({{"pred.npy", npy_of("<i4", "(2, 2, 2)", as(int32_t()))}}));
+    expect("a.npz", zip_bytes({{"semantics.npy", npy_of("<i4", "(2, 2, 2)", as(int32_t()))},
+                               {"times.npy", npy_of("<f4", "(2,)", std::vector<float>{1, 2})}}));
+    // rows of x, y, z and a label
+    expect("l.npy", npy_of("<i4", "(2, 4)", std::vector<int32_t>{0, 1, 0, 4, 1, 1, 1, 11}));
+
+    o.map = folder.put("map.json", R"({"0": "free", "1": "building"})");
+    const auto occupied =
+        read_scene_grid(folder.put("b.npy", npy_of("|b1", "(2, 1, 1)", std::vector<uint8_t>{0, 1})), o);
+    ASSERT_TRUE(occupied) << occupied.error().message;
+    EXPECT_EQ(occupied->grid.cells, (std::vector<Cell>{{0, 0, 0}}));
+    EXPECT_EQ(occupied->grid.labels, std::vector<uint8_t>{2});
+}
+
+TEST(LabelArray, sizes_are_those_of_options_or_of_the_file)
+{
+    const ScratchFolder folder;
+    std::vector<uint8_t> road(3 * 3 * 3, 0);
+    const std::string array = npy_of("|u1", "(3, 3, 3)", road);
+    const Path npy = folder.put("a.npy", array);
+    SceneGridOptions o;
+    o.map = "ours";
+    EXPECT_TRUE(says(read_scene_grid(npy, o), "does not say how large its voxels are"));
+    o.file_voxel_size = 0.2;
+    const auto cell = read_scene_grid(npy, o);
+    ASSERT_TRUE(cell) << cell.error().message;
+    EXPECT_EQ(cell->grid.cells, (std::vector<Cell>{{0, 0, 0}}));
+    EXPECT_EQ(cell->grid.voxel_size, 0.6f);
+    ASSERT_EQ(cell->warnings.size(), 2u); // where it lies, and that nothing is free
+    EXPECT_NE(cell->warnings[0].find("all voxels are occupied"), std::string::npos);
+    EXPECT_NE(cell->warnings[1].find("its corner lies at (0, 0, 0) m"), std::string::npos);
+    o.file_voxel_size = 0;
+    const Path npz = folder.put(
+        "a.npz", zip_bytes({{"grid.npy", array}, {"voxel_size.npy", npy_of("<f4", "()", std::vector<float>{0.2f})}}));
+    EXPECT_EQ(read_scene_grid(npz, o)->grid.cells.size(), 1u);
+    o.voxel_size = 0.2f;
+    EXPECT_EQ(read_scene_grid(npz, o)->grid.cells.size(), 27u);
+}
+
+TEST(LabelArray, what_is_no_labels_is_refused_with_words)
+{
+    const ScratchFolder folder;
+    SceneGridOptions o;
+    o.voxel_size = 0.4f;
+    const auto read = [&](const std::string& bytes) { return read_scene_grid(folder.put("a.npy", bytes), o); };
+    EXPECT_TRUE(says(read(npy_of("|u1", "(1, 1, 3)", std::vector<uint8_t>{40, 40, 50})),
+                     "unknown labels: 40 (2 voxels), 50 (1 voxels); --map NAME or FILE says what they are; all numbers "
+                     "of the file are in semantickitti"));
+    o.map = "semantickitti";
+    EXPECT_TRUE(says(read(npy_of("|u1", "(2, 2)", std::vector<uint8_t>(4))),
+                     "expected labels [X, Y, Z] or rows [N, 4], found [2, 2]"));
+    EXPECT_TRUE(says(read(npy_of("<f4", "(1, 1, 1)", std::vector<float>{0.5f})), "expected whole numbers"));
+    EXPECT_TRUE(says(read(npy_of("<f4", "(1, 1, 1)", std::vector<float>{NAN})), "expected whole numbers"));
+    EXPECT_TRUE(says(read(npy_of("|i1", "(1, 1, 1)", std::vector<int8_t>{-1})), "expected whole numbers"));
+    EXPECT_TRUE(says(read(npy_of("|u1", "(0, 1, 1)", std::vector<uint8_t>{})), "0 voxels, expected 1 to"));
+    EXPECT_TRUE(says(read(npy_of("|u1", "(1, 1, 2)", std::vector<uint8_t>{0})), "expected 2 bytes of data, found 1"));
+    EXPECT_TRUE(says(read(npy_of("|u1", "(1, 1, 1)", std::vector<uint8_t>{0})), "no voxel is occupied"));
+    EXPECT_TRUE(says(read(npy_of("<u4", "(1, 4)", std::vector<uint32_t>{4294967295, 4294967295, 4294967295, 40})),
+                     "rows reach to voxel (4294967295, "));
+    EXPECT_TRUE(says(read(npy_of("<u4", "(0, 4)", std::vector<uint32_t>{})), "has no rows"));
+    const auto turned = read(npy_of("<i4", "(2, 4)", std::vector<int32_t>{0, 0, 9, 40, 1, 3, 8, 40}));
+    ASSERT_TRUE(turned) << turned.error().message;
+    EXPECT_NE(turned->warnings[0].find("of z y x label (OpenOccupancy) write"), std::string::npos);
+    const std::string bytes = npy_of("|u1", "(1, 1, 1)", std::vector<uint8_t>{40});
+    ASSERT_TRUE(read(bytes));
+    for (size_t n = 0; n < bytes.size(); ++n)
+        EXPECT_FALSE(read(bytes.substr(0, n))) << n;
+    EXPECT_TRUE(says(detect_scene_format(folder.put("a.npz", zip_bytes({{"a.npy", bytes}, {"b.npy", bytes}}))),
+                     "one array [X, Y, Z] or [N, 4] alone, found a, b"));
+}
+
 TEST(GridNpz, refuses_malformed_grids)
 {
     const ScratchFolder folder;
     using Entries = std::vector<std::pair<std::string, std::string>>;
     const auto read = [&](const Entries& entries) {
-        return read_grid_npz(folder.put("m.npz", zip_bytes(entries)), 0.6f);
+        SceneGridOptions o;
+        o.voxel_size = 0.6f;
+        return read_grid_npz(folder.put("m.npz", zip_bytes(entries)), o);
     };
     const std::string cell = std::string("\1\0\0\0\2\0\0\0\3\0\0\0", 12);
     const std::pair<std::string, std::string> cells = {"cells.npy", npy_bytes("<i4", "(1, 3)", cell)},
@@ -236,10 +423,12 @@ TEST(GridNpz, refuses_malformed_grids)
     EXPECT_TRUE(
         says(read({{"cells.npy", npy_bytes("<i4", "(3,)", cell)}, labels}), "expected shape [V, 3], found [3]"));
     EXPECT_TRUE(says(read({{"cells.npy", npy_bytes("<i4", "(3, 1)", cell)}, labels}), "expected shape [3, 3]"));
-    EXPECT_TRUE(says(read({{"cells.npy", npy_bytes("<f4", "(1, 3)", cell)}, labels}), "cells: expected integers"));
+    EXPECT_TRUE(
+        says(read({{"cells.npy", npy_bytes("<f4", "(1, 3)", cell)}, labels}), "cells: expected whole numbers of"));
     EXPECT_TRUE(says(read({{"cells.npy", npy_bytes("<i8", "(1, 3)", std::string(24, '\x7f'))}, labels}),
-                     "cells: a number that does not fit 4 bytes"));
-    EXPECT_TRUE(says(read({cells, {"labels.npy", npy_bytes("|i1", "(1,)", "\xff")}}), "does not fit 1 bytes"));
+                     "cells: expected whole numbers of -2147483648 to 2147483647, found another"));
+    EXPECT_TRUE(says(read({cells, {"labels.npy", npy_bytes("|i1", "(1,)", "\xff")}}),
+                     "labels: expected whole numbers of 0 to"));
     EXPECT_TRUE(says(read({cells, {"labels.npy", npy_bytes("|u1", "(1,)", "\x40")}}), "unknown labels"));
     EXPECT_TRUE(says(read({cells, {"labels.npy", npy_bytes("|u1", "(2,)", "\1\2")}}), "labels: expected shape [1]"));
     EXPECT_TRUE(

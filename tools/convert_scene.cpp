@@ -40,7 +40,7 @@ Status check_meaning(const ConvertSceneOptions& o, const SceneInput& input, Scen
     static constexpr std::array<std::string_view, 1> kSeed = {"--seed"}, kLabels = {"--splat-labels"};
     static constexpr std::array<std::string_view, 2> kSplats = {"--splat-radius", "--opacity"};
     const std::string what = fmt::format("{} to {}", facts_of(input.format).name, facts_of(to).name);
-    if (input.format != SceneFormat::points_ply)
+    if (input.format != SceneFormat::points_ply && input.format != SceneFormat::carla_points)
         SR_CHECK(refuse_given(c, kSeed, what));
     if (to != SceneFormat::gaussian_3d && to != SceneFormat::gaussian_2d)
         SR_CHECK(refuse_given(c, kLabels, what));
@@ -109,6 +109,19 @@ Json summary(const ConvertSceneOptions& o, const SceneInput& input, SceneFormat 
     return json;
 }
 
+void print_summary(const SceneInput& input, const Json& json, SceneFormat to)
+{
+    fmt::print("{} to {}: {}\n", facts_of(input.format).name, facts_of(to).name,
+               input.grid ? fmt::format("{} cells, {} points", json["cells"].dump(), json["points"].dump())
+                          : fmt::format("{} splats", json["splats"].dump()));
+    if (!input.grid)
+        return;
+    const auto counts = json["labels"];
+    for (const SemanticClass& c : kPalette)
+        if (const auto count = counts.find(c.name); count != counts.end())
+            fmt::print("  {:<13} {:>9} cells\n", c.name, count->get<size_t>());
+}
+
 Status write_output(const ConvertSceneOptions& o, SceneInput& input, SceneFormat to, const Globals& globals)
 {
     const bool as_splats = facts_of(to).splats;
@@ -145,9 +158,7 @@ Status convert_scene(const ConvertSceneOptions& o, const Globals& globals)
     if (globals.json)
         fmt::print("{}\n", json.dump(-1, ' ', false, Json::error_handler_t::replace));
     else if (!globals.quiet)
-        fmt::print("{} to {}: {}\n", facts_of(input.format).name, facts_of(to).name,
-                   input.grid ? fmt::format("{} cells, {} points", json["cells"].dump(), json["points"].dump())
-                              : fmt::format("{} splats", json["splats"].dump()));
+        print_summary(input, json, to);
     return {};
 }
 

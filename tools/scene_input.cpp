@@ -28,21 +28,21 @@ std::string names_of_formats()
 }
 
 // what the options mean for a format, beside --from
-std::vector<std::string_view> options_of(SceneFormat format, bool finer)
+std::vector<std::string_view> options_of(SceneFormat format)
 {
     switch (format) {
     case SceneFormat::npz:
-        return {"--voxel-size"};
+    case SceneFormat::array:
+        return {"--map", "--voxel-size", "--file-voxel-size", "--origin", "--min-fill"};
     case SceneFormat::semantickitti:
         return {"--map", "--voxel-size", "--origin", "--min-fill"};
     case SceneFormat::occ3d_nuscenes:
     case SceneFormat::occ3d_waymo:
         return {"--map", "--voxel-size", "--origin", "--min-fill", "--mask"};
     case SceneFormat::vox:
-        if (finer)
-            return {"--map", "--voxel-size", "--origin", "--nearest-color", "--file-voxel-size", "--min-fill"};
-        return {"--map", "--voxel-size", "--origin", "--nearest-color", "--file-voxel-size"};
+        return {"--map", "--voxel-size", "--origin", "--nearest-color", "--file-voxel-size", "--min-fill"};
     case SceneFormat::points_ply:
+    case SceneFormat::carla_points:
         return {"--map", "--voxel-size", "--origin", "--label", "--labels-only", "--points-per-voxel"};
     default: // our own grids, and splats, are read as they are
         return {};
@@ -54,7 +54,7 @@ Status check_options(const SceneInputOptions& o, SceneFormat format, std::string
 {
     if (!o.command)
         return {};
-    const std::vector<std::string_view> meant = options_of(format, o.file_voxel_size > 0);
+    const std::vector<std::string_view> meant = options_of(format);
     for (const std::string_view name : scene_input_options())
         if (name != "--from" && std::ranges::find(meant, name) == meant.end() &&
             !(name == "--origin" && o.origin_may_be_of_path))
@@ -102,10 +102,9 @@ void add_scene_input_options(CLI::App& c, SceneInputOptions& o)
     c.add_option(
         "--map", o.map,
         "a table by name, or JSON: label of the input (number or name) to class (name or number), null: left out");
-    add_number(c, "--voxel-size", o.voxel_size, "metres, of a grid made of another program's voxels or points", 0.001f,
-               100.f);
+    add_number(c, "--voxel-size", o.voxel_size, "metres, of a cell; 0.6, of a .npz its own", 0.001f, 100.f);
     add_number(c, "--file-voxel-size", o.file_voxel_size,
-               "metres of a voxel of a .vox, where several make a cell; as --voxel-size", 0.0001, 100);
+               "metres of a voxel of a .vox, .npy or .npz that does not say it; as --voxel-size", 0.0001, 100);
     c.add_option("--origin", o.origin, "X,Y,Z: where the input's origin lies in the world, metres");
     add_number(c, "--min-fill", o.min_fill, "share of a cell that smaller voxels must fill; 0: any", 0.0, 1.0);
     c.add_option("--mask", o.mask, "array of an Occ3D .npz that says which voxels count: mask_camera, mask_lidar, ...");
@@ -143,7 +142,8 @@ Result<SceneInput> read_scene_input(const Path& path, const SceneInputOptions& o
         SR_TRY(input.format, detect_scene_format(path));
     }
     const SceneFormatFacts& facts = facts_of(input.format);
-    SR_CHECK(check_options(o, input.format, fmt::format("{} of {}", facts.splats ? "splats" : "a grid", facts.name)));
+    const std::string what = fmt::format("{} of {}", facts.splats ? "splats" : "a grid", facts.name);
+    SR_CHECK(check_options(o, input.format, what));
     if (facts.splats) {
         SR_TRY(SplatFile file, read_splats(path, input.format));
         input.splats = std::move(file.surfels);
@@ -151,6 +151,9 @@ Result<SceneInput> read_scene_input(const Path& path, const SceneInputOptions& o
         input.dropped = file.dropped;
     } else {
         SR_TRY(SceneGrid scene, read_scene_grid(path, options, input.format));
+        for (const auto& [option, reason] : scene.unused)
+            if (o.command)
+                SR_CHECK(refuse_given(*o.command, {&option, 1}, fmt::format("{} ({})", what, reason)));
         input.grid = std::move(scene.grid);
         input.warnings = std::move(scene.warnings);
         input.dropped = scene.dropped;

@@ -16,7 +16,7 @@ namespace semrover {
 // how a command reads grids and splats of any format: what `convert`, `render`, `generate` and `inspect` share
 struct SceneInputOptions {
     std::string from, map, origin, mask, label;
-    float voxel_size = 0.6f;
+    std::optional<float> voxel_size;
     double file_voxel_size = 0, min_fill = 0;
     int points_per_voxel = 20;
     uint64_t seed = 0;

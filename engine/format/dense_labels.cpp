@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/format/dense_labels.h"
 
+#include "engine/format/voxel_sizes.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -50,20 +52,25 @@ Axis axis_of(const DenseLabels& dense, size_t axis, int64_t size)
 struct Vote {
     uint8_t label = kEmpty;
     uint64_t volume = 0; // of all labels
+    uint64_t area = 0;   // of the columns that have any
 };
 
 Vote vote(const DenseLabels& dense, const Reach& x, const Reach& y, const Reach& z)
 {
+    Vote result;
     std::array<uint64_t, kClassCount> volumes{};
     for (size_t i = 0; i < x.lengths.size(); ++i)
         for (size_t j = 0; j < y.lengths.size(); ++j) {
             const size_t row = (size_t(x.first) + i) * dense.shape[1] + y.first + j;
             const uint8_t* labels = dense.labels.data() + row * dense.shape[2] + z.first;
+            bool any = false;
             for (size_t k = 0; k < z.lengths.size(); ++k)
-                if (labels[k] < kClassCount)
+                if (labels[k] < kClassCount) {
                     volumes[labels[k]] += x.lengths[i] * y.lengths[j] * z.lengths[k];
+                    any = true;
+                }
+            result.area += any ? x.lengths[i] * y.lengths[j] : 0;
         }
-    Vote result;
     uint64_t largest = 0;
     for (uint8_t label = 0; label < kClassCount; ++label) {
         result.volume += volumes[label];
@@ -86,7 +93,9 @@ Result<int64_t> tenths_of(double metres, std::string_view where)
     return static_cast<int64_t>(std::round(tenths));
 }
 
-Result<VoxelGrid> resample(const DenseLabels& dense, float voxel_size, double min_fill, std::string_view where)
+namespace {
+
+Result<int64_t> size_of_cell(const DenseLabels& dense, float voxel_size, std::string_view where)
 {
     SR_TRY(const int64_t size, tenths_of(voxel_size, fmt::format("{}: voxel size", where)));
     if (size < 10 || size > kMaxEdge)
@@ -99,12 +108,22 @@ Result<VoxelGrid> resample(const DenseLabels& dense, float voxel_size, double mi
                     "{}: a voxel size of {} m makes {:.3g} cells of its box, at most {:g} are "
                     "supported",
                     where, voxel_size, cells, kMaxCells);
+    return size;
+}
+
+} // namespace
+
+Result<VoxelGrid> resample(const DenseLabels& dense, float voxel_size, double min_fill, std::string_view where,
+                           std::vector<std::string>* warnings)
+{
+    SR_TRY(const int64_t size, size_of_cell(dense, voxel_size, where));
     const Axis x = axis_of(dense, 0, size), y = axis_of(dense, 1, size), z = axis_of(dense, 2, size);
     for (const Axis* axis : {&x, &y, &z})
         if (axis->first < -kMaxCoordinate || axis->first + int64_t(axis->cells.size()) > kMaxCoordinate)
             return fail(ErrorCode::bad_input, "{}: cell {} is absurd: expected coordinates within 2^20", where,
                         axis->first);
-    const double least = min_fill * double(size) * double(size) * double(size) * (1 - 1e-9);
+    const double volume = double(size) * double(size) * double(size), least = min_fill * volume * (1 - 1e-9);
+    std::vector<CellFill> fills;
     VoxelGrid grid;
     grid.voxel_size = voxel_size;
     for (size_t i = 0; i < x.cells.size(); ++i)
@@ -116,9 +135,14 @@ Result<VoxelGrid> resample(const DenseLabels& dense, float voxel_size, double mi
                 grid.cells.push_back(
                     {int32_t(x.first + int64_t(i)), int32_t(y.first + int64_t(j)), int32_t(z.first + int64_t(k))});
                 grid.labels.push_back(v.label);
+                fills.push_back(
+                    {float(double(v.volume) / volume), float(double(v.volume) / double(v.area) / double(size))});
             }
     if (grid.cells.empty())
         return fail(ErrorCode::bad_input, "{}: no voxel is occupied", where);
+    if (warnings && size > dense.edge[2])
+        for (const std::string& line : doubled_ground(grid, fills, double(dense.edge[2]) / 1e4))
+            warnings->push_back(line);
     return grid;
 }
 

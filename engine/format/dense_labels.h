@@ -23,8 +23,9 @@ Result<int64_t> tenths_of(double metres, std::string_view where);
 // it, ties to the lower label; empty voxels have no vote. It is a cell where voxels fill any of it, or at least
 // `min_fill` of its volume. Where a cell is 3 x 3 x 3 voxels this is the majority of the 27. bad_input for a voxel size
 // that is not whole tenths of a millimetre, above 100 m or so small that the box has more than 2^28 cells, and when
-// nothing is occupied.
-Result<VoxelGrid> resample(const DenseLabels& dense, float voxel_size, double min_fill, std::string_view where);
+// nothing is occupied. `warnings`: doubled_ground
+Result<VoxelGrid> resample(const DenseLabels& dense, float voxel_size, double min_fill, std::string_view where,
+                           std::vector<std::string>* warnings = nullptr);
 
 // a grid's labels in a box of smaller voxels, `dense` giving shape, edge (a divisor of the cell's) and origin: each
 // cell is split. Parts of cells outside the box are cut off; bad_input when a whole cell is outside, saying how many.

@@ -2,7 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/format/grid_npz.h"
 
+#include "engine/format/label_map.h"
 #include "engine/format/npz.h"
+#include "engine/format/voxel_sizes.h"
+#include "engine/format/whole_numbers.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
 
@@ -27,59 +30,11 @@ std::string shape_of(const std::vector<uint64_t>& shape)
     return fmt::format("[{}]", fmt::join(shape, ", "));
 }
 
-template <typename From>
-bool convert(const NpyArray& array, auto& out)
-{
-    using To = typename std::remove_reference_t<decltype(out)>::value_type;
-    const std::vector<From> values = array.values<From>();
-    out.resize(values.size());
-    for (size_t i = 0; i < values.size(); ++i) {
-        out[i] = static_cast<To>(values[i]);
-        if (static_cast<From>(out[i]) != values[i] || (out[i] < To(0)) != (values[i] < From(0)))
-            return false;
-    }
-    return true;
-}
-
-// integers of any type as T; each must fit
 template <typename T>
 Result<std::vector<T>> integers(const NpzFile& file, const char* name, const std::string& where)
 {
     SR_TRY(const NpyArray array, file.read(name));
-    std::vector<T> out;
-    bool fits = false;
-    switch (array.dtype) {
-    case DType::boolean:
-    case DType::u8:
-        fits = convert<uint8_t>(array, out);
-        break;
-    case DType::i8:
-        fits = convert<int8_t>(array, out);
-        break;
-    case DType::u16:
-        fits = convert<uint16_t>(array, out);
-        break;
-    case DType::i16:
-        fits = convert<int16_t>(array, out);
-        break;
-    case DType::u32:
-        fits = convert<uint32_t>(array, out);
-        break;
-    case DType::i32:
-        fits = convert<int32_t>(array, out);
-        break;
-    case DType::u64:
-        fits = convert<uint64_t>(array, out);
-        break;
-    case DType::i64:
-        fits = convert<int64_t>(array, out);
-        break;
-    default:
-        return fail(ErrorCode::bad_input, "{}: {}: expected integers, found {}", where, name, dtype_name(array.dtype));
-    }
-    if (!fits)
-        return fail(ErrorCode::bad_input, "{}: {}: a number that does not fit {} bytes", where, name, sizeof(T));
-    return out;
+    return whole_numbers<T>(array, fmt::format("{}: {}", where, name));
 }
 
 Result<std::vector<uint16_t>> halves(const NpzFile& file, const char* name, const std::string& where)
@@ -105,21 +60,6 @@ Status expect_shape(const NpzFile& file, const char* name, const std::vector<uin
     if (header.shape != shape)
         return fail(ErrorCode::bad_input, "{}: {}: expected shape {}, found {}", where, name, shape_of(shape),
                     shape_of(header.shape));
-    return {};
-}
-
-Status read_voxel_size(const NpzFile& file, VoxelGrid& grid, const std::string& where)
-{
-    if (!file.has("voxel_size"))
-        return {};
-    SR_TRY(const NpyArray array, file.read("voxel_size", 8));
-    if (array.dtype == DType::f32 && array.elements() == 1)
-        grid.voxel_size = array.values<float>()[0];
-    else if (array.dtype == DType::f64 && array.elements() == 1)
-        grid.voxel_size = static_cast<float>(array.values<double>()[0]);
-    else
-        return fail(ErrorCode::bad_input, "{}: voxel_size: expected one float, found {} of {}", where,
-                    shape_of(array.shape), dtype_name(array.dtype));
     return {};
 }
 
@@ -172,14 +112,50 @@ Status read_points(const NpzFile& file, VoxelGrid& grid, const std::string& wher
     return {};
 }
 
-} // namespace
-
-Result<VoxelGrid> read_grid_npz(const Path& path, float voxel_size)
+Result<VoxelSizes> sizes_of(const NpzFile& file, const SceneGridOptions& o, const std::string& where)
 {
-    const std::string where = quote_path(path);
-    SR_TRY(const NpzFile file, NpzFile::open(path));
-    VoxelGrid grid;
-    grid.voxel_size = voxel_size;
+    std::optional<double> said;
+    if (file.has("voxel_size")) {
+        SR_TRY(said, file.number("voxel_size"));
+        if (!(*said > 0 && std::isfinite(*said)))
+            return fail(ErrorCode::bad_input, "{}: voxel_size: expected metres above 0, found {}", where, *said);
+    }
+    return voxel_sizes(said, o, true, where);
+}
+
+// classes of the file's numbers; kLeftOut and kEmpty are no cells
+Result<std::vector<uint8_t>> read_classes(const NpzFile& file, const SceneGridOptions& o, SceneGrid& out,
+                                          const std::string& where)
+{
+    SR_TRY(const std::vector<uint32_t> numbers, integers<uint32_t>(file, "labels", where));
+    SR_TRY(LabelMap map, LabelMap::of_column({"labels", ""}, file.has("metadata"), o.map));
+    std::vector<uint8_t> labels;
+    for (const uint32_t number : numbers)
+        labels.push_back(map(number));
+    SR_CHECK(map.check(where, "cells"));
+    for (const auto& lines : {map.assumed(where, "cells"), map.left_out("cells")})
+        out.warnings.insert(out.warnings.end(), lines.begin(), lines.end());
+    out.dropped = map.dropped();
+    return labels;
+}
+
+// rows of `width` numbers whose cells stay
+template <typename T>
+void keep_rows(std::vector<T>& values, size_t width, std::span<const uint8_t> labels)
+{
+    if (values.empty())
+        return;
+    size_t kept = 0;
+    for (size_t v = 0; v < labels.size(); ++v)
+        if (labels[v] < kClassCount)
+            for (size_t i = 0; i < width; ++i)
+                values[kept++] = values[v * width + i];
+    values.resize(kept);
+}
+
+Status read_cells(const NpzFile& file, const SceneGridOptions& o, SceneGrid& out, const std::string& where)
+{
+    VoxelGrid& grid = out.grid;
     SR_TRY(const NpyHeader cells, file.header("cells"));
     if (cells.shape.size() != 2)
         return fail(ErrorCode::bad_input, "{}: cells: expected shape [V, 3], found {}", where, shape_of(cells.shape));
@@ -189,16 +165,48 @@ Result<VoxelGrid> read_grid_npz(const Path& path, float voxel_size)
     grid.cells.resize(coordinates.size() / 3);
     for (size_t i = 0; i < coordinates.size(); ++i)
         grid.cells[i / 3][i % 3] = coordinates[i];
-    SR_TRY(grid.labels, integers<uint8_t>(file, "labels", where));
-    SR_CHECK(read_voxel_size(file, grid, where));
-    SR_CHECK(read_metadata(file, grid, where));
+    SR_TRY(grid.labels, read_classes(file, o, out, where));
     if (file.has("points") && !grid.cells.empty())
         SR_CHECK(read_points(file, grid, where));
     else if (file.has("points_per_voxel"))
         SR_CHECK(read_points_per_voxel(file, grid, where));
-    sort_cells(grid);
-    SR_CHECK(check_grid(grid, where));
-    return grid;
+    const std::vector<uint8_t> labels = grid.labels;
+    const size_t width = 3 * size_t(grid.points_per_voxel);
+    keep_rows(grid.cells, 1, labels);
+    keep_rows(grid.points, width, labels);
+    keep_rows(grid.colors, width, labels);
+    keep_rows(grid.generated, 1, labels);
+    keep_rows(grid.labels, 1, labels);
+    return {};
+}
+
+} // namespace
+
+Result<SceneGrid> read_grid_npz(const Path& path, const SceneGridOptions& o)
+{
+    const std::string where = quote_path(path);
+    SR_TRY(const NpzFile file, NpzFile::open(path));
+    SceneGrid out;
+    SR_CHECK(read_cells(file, o, out, where));
+    SR_TRY(const VoxelSizes sizes, sizes_of(file, o, where));
+    out.grid.voxel_size = float(sizes.voxel);
+    SR_CHECK(read_metadata(file, out.grid, where));
+    sort_cells(out.grid);
+    SR_CHECK(check_grid(out.grid, where)); // also for cells that are given twice
+    SR_TRY(const Cell shift, whole_voxels(o.origin, sizes.voxel));
+    for (Cell& cell : out.grid.cells)
+        for (size_t a = 0; a < 3; ++a)
+            cell[a] += shift[a];
+    if (!sizes.same() && out.grid.has_points())
+        return fail(ErrorCode::bad_input,
+                    "{}: its cells of {:.6g} m have points, which cells of {:.6g} m cannot take over: write a .ply and "
+                    "convert that",
+                    where, sizes.voxel, sizes.cell);
+    SR_CHECK(coarsen(out.grid, sizes, o.min_fill, where, out.warnings));
+    if (sizes.same())
+        out.unused.push_back({"--min-fill", "cells stay as large as they are"});
+    SR_CHECK(check_grid(out.grid, where));
+    return out;
 }
 
 Status write_grid_npz(const Path& path, const VoxelGrid& grid)

@@ -60,6 +60,18 @@ Result<LabelMap> LabelMap::of_column(const LabelColumn& column, bool ours, const
     return result;
 }
 
+Result<LabelMap> LabelMap::of_array(const Path& map)
+{
+    LabelMap result;
+    result.numbers_ = true;
+    if (map.empty())
+        return result;
+    SR_CHECK(result.apply(map));
+    if (!result.knows(kNoLabel))
+        result.set(kNoLabel, "nothing", kEmpty);
+    return result;
+}
+
 void LabelMap::set(uint32_t source, std::string name, std::optional<uint8_t> target)
 {
     entries_[source] = {std::move(name), target, 0};
@@ -161,8 +173,10 @@ Status LabelMap::check(std::string_view where, std::string_view things, std::str
         list += fmt::format(" and {} more", unknown - kMostListed);
     if (!numbers_)
         return fail(ErrorCode::bad_input, "{}: unknown labels: {}; {}", where, list, advice);
-    return fail(ErrorCode::bad_input, "{}: unknown labels: {}; {}; found are {}{}", where, list, advice, all,
-                known_to());
+    const bool any_known =
+        std::ranges::any_of(entries_, [](const auto& e) { return e.second.count && e.second.target; });
+    return fail(ErrorCode::bad_input, "{}: unknown labels: {}; {}{}{}", where, list, advice,
+                any_known ? "; found are " + all : "", known_to());
 }
 
 std::vector<std::string> LabelMap::assumed(std::string_view where, std::string_view things) const

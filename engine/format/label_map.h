@@ -30,6 +30,9 @@ class LabelMap {
     // all that there is of a column that is another program's. Without a map check() refuses such a column.
     static Result<LabelMap> of_column(const LabelColumn& column, bool ours, const Path& map);
 
+    // Of an array: only `map` knows its numbers. 255 is empty in a map that does not know it.
+    static Result<LabelMap> of_array(const Path& map);
+
     void set(uint32_t source, std::string name, std::optional<uint8_t> target); // none: known by name only
 
     // Takes a table of --map. A whole one replaces the others, another's entries override theirs. bad_input names the

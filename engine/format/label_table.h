@@ -33,7 +33,7 @@ struct LabelTable {
 // The table of --map: a name of label_table_names(), or else a file. bad_input lists the names, or names the entry.
 Result<LabelTable> read_label_table(const Path& name_or_file);
 
-// assets/label_maps/NAME.json, which are compiled in, and `ours`: our own numbers
+// the names of the files in assets/label_maps, which are compiled in, and `ours`: our own numbers
 std::vector<std::string_view> label_table_names();
 
 } // namespace semrover

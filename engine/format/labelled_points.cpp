@@ -4,7 +4,7 @@
 
 #include "engine/format/label_map.h"
 #include "engine/format/ply.h"
-#include "engine/format/ply_reader.h"
+#include "engine/format/ply_colors.h"
 #include "engine/scene/scene_points.h"
 #include "runtime/base/dtype.h"
 #include "runtime/base/mix64.h"
@@ -48,21 +48,12 @@ Result<Columns> position_columns(const PlyElement& element, const std::string& w
     return columns;
 }
 
-// sRGB
-std::array<uint8_t, 3> color_of(const Columns& columns, size_t row)
+const LabelColumn* label_column(const PlyElement& element)
 {
-    std::array<uint8_t, 3> color;
-    for (size_t a = 0; a < 3; ++a) {
-        const double value = columns[a]->values[row] * (columns[a]->is_float ? 255 : 1);
-        color[a] = value > 0 ? static_cast<uint8_t>(std::lround(std::min(value, 255.0))) : uint8_t(0);
-    }
-    return color;
-}
-
-const PlyProperty* label_column(const PlyElement& element)
-{
-    return first_of(element, {"label", "class", "semantic", "semantic_label", "class_id", "classification", "category",
-                              "objtag", "ObjTag", "scalar_label", "scalar_Classification"});
+    for (const LabelColumn& column : label_columns())
+        if (const PlyProperty* property = element.find(column.name); property && !property->is_list)
+            return &column;
+    return nullptr;
 }
 
 // CloudCompare writes labels as floats
@@ -76,21 +67,24 @@ Result<uint32_t> label_number(const PlyProperty& column, size_t row, const std::
 }
 
 struct CloudColumns {
-    Columns position, color;
-    bool colored = false;
+    Columns position;
+    std::optional<PlyColors> color;
     const PlyProperty* label = nullptr; // none: all points have the default one
+    LabelMap map;
 };
 
-Result<CloudColumns> columns_of(const PlyElement& vertices, const SceneGridOptions& o, const std::string& where)
+Result<CloudColumns> columns_of(const PlyElement& vertices, bool ours, const SceneGridOptions& o,
+                                const std::string& where, std::vector<std::string>& warnings)
 {
     CloudColumns c;
     SR_TRY(c.position, position_columns(vertices, where));
-    c.label = label_column(vertices);
-    if (!c.label && !o.default_label)
+    if (const LabelColumn* column = label_column(vertices)) {
+        c.label = vertices.find(column->name);
+        SR_TRY(c.map, LabelMap::of_column(*column, ours, o.map));
+    } else if (!o.default_label) {
         return fail(ErrorCode::bad_input, "{}: its vertices have no label; --label CLASS gives them one", where);
-    c.color = {first_of(vertices, {"red", "r", "diffuse_red"}), first_of(vertices, {"green", "g", "diffuse_green"}),
-               first_of(vertices, {"blue", "b", "diffuse_blue"})};
-    c.colored = c.color[0] && c.color[1] && c.color[2] && !o.semantic;
+    }
+    SR_TRY(c.color, PlyColors::find(vertices, where, warnings));
     return c;
 }
 
@@ -109,21 +103,34 @@ Result<std::optional<Cell>> cell_of(const std::array<double, 3>& p, size_t row, 
     return std::optional<Cell>({int32_t(c[0]), int32_t(c[1]), int32_t(c[2])});
 }
 
+std::vector<UnusedOption> unused_options(const CloudColumns& columns, const SceneGridOptions& o)
+{
+    std::vector<UnusedOption> unused;
+    if (columns.label)
+        unused.push_back({"--label", "all points have one"});
+    else
+        unused.push_back({"--map", "no point has a label"});
+    if (!columns.color)
+        unused.push_back({"--labels-only", "no point has a colour"});
+    if (!columns.color || o.semantic)
+        unused.push_back({"--points-per-voxel", "the grid gets no points"});
+    return unused;
+}
+
 enum class Handedness : uint8_t { right, left };
 
-Status take_points(const PlyElement& vertices, const SceneGridOptions& o, Handedness handedness,
+Status take_points(const PlyElement& vertices, bool ours, const SceneGridOptions& o, Handedness handedness,
                    const std::string& where, Points& points, SceneGrid& out)
 {
-    SR_TRY(const CloudColumns columns, columns_of(vertices, o, where));
-    LabelMap map = LabelMap::identity();
-    if (!o.map.empty())
-        SR_CHECK(map.apply(o.map));
+    SR_TRY(CloudColumns columns, columns_of(vertices, ours, o, where, out.warnings));
+    out.unused = unused_options(columns, o);
+    LabelMap& map = columns.map;
     uint64_t not_finite = 0;
     for (size_t row = 0; row < vertices.rows; ++row) {
         std::array<double, 3> p;
         for (size_t a = 0; a < 3; ++a)
             p[a] = columns.position[a]->values[row] * (a == 1 && handedness == Handedness::left ? -1 : 1) + o.origin[a];
-        SR_TRY(const std::optional<Cell> cell, cell_of(p, row, double(o.voxel_size), where));
+        SR_TRY(const std::optional<Cell> cell, cell_of(p, row, double(o.cell_size()), where));
         uint8_t target = o.default_label.value_or(0);
         if (cell && columns.label) {
             SR_TRY(const uint32_t number, label_number(*columns.label, row, where));
@@ -135,11 +142,14 @@ Status take_points(const PlyElement& vertices, const SceneGridOptions& o, Handed
         points.positions.push_back(p);
         points.cells.push_back(*cell);
         points.labels.push_back(target);
-        if (columns.colored)
-            points.colors.push_back(color_of(columns.color, row));
+        if (columns.color && !o.semantic)
+            points.colors.push_back(columns.color->bytes(row));
     }
     SR_CHECK(map.check(where, "points"));
-    out.warnings = map.left_out("points");
+    for (const std::string& line : map.assumed(where, "points"))
+        out.warnings.push_back(line);
+    for (const std::string& line : map.left_out("points"))
+        out.warnings.push_back(line);
     out.dropped = map.dropped() + not_finite;
     if (not_finite)
         out.warnings.push_back(fmt::format("{} points that are not finite are left out", not_finite));
@@ -222,13 +232,13 @@ Result<SceneGrid> read_points(const Path& path, const SceneGridOptions& o, Hande
         if (vertices->rows > most) // in 16 bytes, as most programs write them, or more: never
             return fail(ErrorCode::bad_input, "{}: {} vertices in {} bytes, at most {} are supported", where,
                         vertices->rows, file_bytes, most);
-        SR_CHECK(take_points(*vertices, o, handedness, where, points, out));
+        SR_CHECK(take_points(*vertices, says_own_labels(file.comments), o, handedness, where, points, out));
     }
     std::vector<size_t> order(points.cells.size());
     std::iota(order.begin(), order.end(), size_t(0));
     std::ranges::stable_sort(order, {}, [&](size_t i) { return points.cells[i]; });
     VoxelGrid& grid = out.grid;
-    grid.voxel_size = o.voxel_size;
+    grid.voxel_size = o.cell_size();
     grid.points_per_voxel = points.colors.empty() ? 0 : o.points_per_voxel;
     for (size_t begin = 0, end = 0; begin < order.size(); begin = end) {
         while (end < order.size() && points.cells[order[end]] == points.cells[order[begin]])

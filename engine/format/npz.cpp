@@ -192,6 +192,17 @@ Result<NpyArray> NpzFile::read(std::string_view array, uint64_t max_bytes) const
     return decode_npy(header, std::move(data));
 }
 
+Result<double> NpzFile::number(std::string_view name) const
+{
+    SR_TRY(const NpyArray array, read(name, 8));
+    if (array.dtype == DType::f32 && array.elements() == 1)
+        return double(array.values<float>()[0]);
+    if (array.dtype == DType::f64 && array.elements() == 1)
+        return array.values<double>()[0];
+    return fail(ErrorCode::bad_input, "{}: {}: expected one float, found [{}] of {}", archive_->where, name,
+                fmt::join(array.shape, ", "), dtype_name(array.dtype));
+}
+
 namespace {
 
 // the archive's bytes, taken from libzip before its source goes

@@ -30,6 +30,7 @@ class NpzFile {
     Result<NpyHeader> header(std::string_view array) const;
     // bad_input when it is missing, or has more than `max_bytes` of data
     Result<NpyArray> read(std::string_view array, uint64_t max_bytes = kMaxNpzArrayBytes) const;
+    Result<double> number(std::string_view array) const; // bad_input for anything but one float
 
   private:
     struct Archive;

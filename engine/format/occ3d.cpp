@@ -4,6 +4,7 @@
 
 #include "engine/format/dense_labels.h"
 #include "engine/format/npz.h"
+#include "engine/format/whole_numbers.h"
 #include "runtime/base/quote.h"
 
 namespace semrover {
@@ -27,31 +28,38 @@ const Box& fine_box()
     return box;
 }
 
-Status check_array(const NpyArray& array, const std::vector<uint64_t>& shape, std::string_view where)
+// of any type
+Result<std::vector<uint8_t>> read_numbers(const NpzFile& file, std::string_view name, const Box& box,
+                                          const std::string& where)
 {
-    if (array.shape != shape)
-        return fail(ErrorCode::bad_input, "{}: expected shape [{}], found [{}]", where, fmt::join(shape, ", "),
+    const uint64_t voxels = box.shape[0] * box.shape[1] * box.shape[2];
+    SR_TRY(const NpyArray array, file.read(name, 8 * voxels));
+    const std::string what = fmt::format("{}: {}", where, quote(name, 60));
+    if (array.shape != box.shape)
+        return fail(ErrorCode::bad_input, "{}: expected shape [{}], found [{}]", what, fmt::join(box.shape, ", "),
                     fmt::join(array.shape, ", "));
-    if (array.dtype != DType::u8 && array.dtype != DType::boolean)
-        return fail(ErrorCode::bad_input, "{}: expected u8, found {}", where, dtype_name(array.dtype));
-    return {};
+    return whole_numbers<uint8_t>(array, what);
 }
 
 // everything where no mask was asked for
-Status apply_mask(const NpzFile& file, const std::string& mask, const Box& box, std::vector<std::byte>& labels,
+Status apply_mask(const NpzFile& file, const std::string& mask, const Box& box, std::vector<uint8_t>& labels,
                   uint8_t free, const std::string& where)
 {
     if (mask.empty())
         return {};
-    SR_TRY(const NpyArray array, file.read(mask, labels.size()));
-    SR_CHECK(check_array(array, box.shape, fmt::format("{}: {}", where, quote(mask, 60))));
+    SR_TRY(const std::vector<uint8_t> counts, read_numbers(file, mask, box, where));
     for (size_t i = 0; i < labels.size(); ++i)
-        if (array.data[i] == std::byte(0))
-            labels[i] = std::byte(free);
+        if (counts[i] == 0)
+            labels[i] = free;
     return {};
 }
 
 } // namespace
+
+bool is_occ3d_shape(const std::vector<uint64_t>& shape)
+{
+    return shape == coarse_box().shape || shape == fine_box().shape;
+}
 
 Result<SceneGrid> read_occ3d(const Path& path, Occ3dKind kind, const SceneGridOptions& options)
 {
@@ -62,32 +70,29 @@ Result<SceneGrid> read_occ3d(const Path& path, Occ3dKind kind, const SceneGridOp
     SR_TRY(const NpyHeader header, file.header(name));
     const Box& box = waymo && header.shape == fine_box().shape ? fine_box() : coarse_box();
     DenseLabels dense = box.dense;
-    const uint64_t voxels = box.shape[0] * box.shape[1] * box.shape[2];
-    SR_TRY(NpyArray array, file.read(name, voxels));
-    SR_CHECK(check_array(array, box.shape, fmt::format("{}: {}", where, name)));
-    SR_CHECK(apply_mask(file, options.mask, box, array.data, waymo ? 15 : 17, where));
+    SR_TRY(std::vector<uint8_t> numbers, read_numbers(file, name, box, where));
+    SR_CHECK(apply_mask(file, options.mask, box, numbers, waymo ? 15 : 17, where));
 
     SR_TRY(LabelMap map, LabelMap::of(waymo ? "occ3d-waymo" : "occ3d"));
     if (!options.map.empty())
         SR_CHECK(map.apply(options.map));
     std::array<uint64_t, 256> counts{};
-    for (const std::byte label : array.data)
-        ++counts[std::to_integer<uint8_t>(label)];
+    for (const uint8_t number : numbers)
+        ++counts[number];
     std::array<uint8_t, 256> targets{};
     for (uint32_t label = 0; label < 256; ++label)
         targets[label] = counts[label] ? map(label, counts[label]) : kEmpty;
     SR_CHECK(map.check(where, "voxels"));
-    dense.labels.resize(voxels);
-    for (size_t i = 0; i < voxels; ++i)
-        dense.labels[i] = targets[std::to_integer<uint8_t>(array.data[i])];
+    for (const uint8_t number : numbers)
+        dense.labels.push_back(targets[number]);
     for (size_t a = 0; a < 3; ++a) {
         SR_TRY(const int64_t shift, tenths_of(options.origin[a], "origin"));
         dense.origin[a] += shift;
     }
     SceneGrid out;
-    SR_TRY(out.grid, resample(dense, options.voxel_size, options.min_fill, where));
-    out.grid.metadata["source"] = waymo ? "Occ3D-Waymo" : "Occ3D-nuScenes";
     out.warnings = map.left_out("voxels");
+    SR_TRY(out.grid, resample(dense, options.cell_size(), options.min_fill, where, &out.warnings));
+    out.grid.metadata["source"] = waymo ? "Occ3D-Waymo" : "Occ3D-nuScenes";
     out.dropped = map.dropped();
     return out;
 }

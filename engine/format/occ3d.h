@@ -15,6 +15,7 @@ namespace semrover {
 // bad_input for other shapes, types and unknown labels (listed with counts).
 // Source: https://github.com/Tsinghua-MARS-Lab/Occ3D, README.md; class names and Waymo's 23: CVT-Occ, README.md
 enum class Occ3dKind { nuscenes, waymo };
+bool is_occ3d_shape(const std::vector<uint64_t>& shape);
 Result<SceneGrid> read_occ3d(const Path& path, Occ3dKind kind, const SceneGridOptions& options);
 
 } // namespace semrover

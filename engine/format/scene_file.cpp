@@ -4,6 +4,7 @@
 
 #include "engine/format/gltf_splats.h"
 #include "engine/format/grid_npz.h"
+#include "engine/format/label_array.h"
 #include "engine/format/labelled_points.h"
 #include "engine/format/npz.h"
 #include "engine/format/occ3d.h"
@@ -26,6 +27,7 @@ constexpr SceneFormatFacts kFormats[] = {
     {SceneFormat::semantickitti, "semantickitti", ".label .bin", false, true},
     {SceneFormat::occ3d_nuscenes, "occ3d-nuscenes", ".npz", false, false},
     {SceneFormat::occ3d_waymo, "occ3d-waymo", ".npz", false, false},
+    {SceneFormat::array, "array", ".npy", false, false},
     {SceneFormat::vox, "vox", ".vox", false, true},
     {SceneFormat::points_ply, "points-ply", ".ply", false, true},
     {SceneFormat::carla_points, "carla-points", ".ply", false, false},
@@ -92,11 +94,17 @@ Result<SceneFormat> npz_format(const Path& path)
         return SceneFormat::npz;
     if (file.has("voxel_label"))
         return SceneFormat::occ3d_waymo;
+    if (!file.has("semantics") && !only_label_array(file).empty())
+        return SceneFormat::array;
     if (!file.has("semantics"))
-        return fail(ErrorCode::bad_input, "{}: expected an array cells, semantics or voxel_label, found {}",
-                    quote_path(path), printable(fmt::format("{}", fmt::join(file.names(), ", ")), 200));
+        return fail(
+            ErrorCode::bad_input,
+            "{}: expected an array cells, semantics or voxel_label, or one array [X, Y, Z] or [N, 4] alone, found {}",
+            quote_path(path), printable(fmt::format("{}", fmt::join(file.names(), ", ")), 200));
     // both of Occ3D's are distributed so; Waymo's have other masks, or the fine shape
     SR_TRY(const NpyHeader header, file.header("semantics"));
+    if (!is_occ3d_shape(header.shape) && !only_label_array(file).empty())
+        return SceneFormat::array;
     const bool waymo =
         file.has("infov") || file.has("origin_voxel_state") || (header.shape.size() == 3 && header.shape[0] == 1600);
     return waymo ? SceneFormat::occ3d_waymo : SceneFormat::occ3d_nuscenes;
@@ -106,7 +114,7 @@ Result<SceneGrid> plain(Result<VoxelGrid> grid)
 {
     if (!grid)
         return tl::make_unexpected(std::move(grid).error());
-    return SceneGrid{std::move(*grid), {}, 0};
+    return SceneGrid{std::move(*grid), {}, 0, {}};
 }
 
 } // namespace
@@ -163,13 +171,15 @@ Result<SceneGrid> read_scene_grid(const Path& path, const SceneGridOptions& o, s
     case SceneFormat::sgrid:
         return plain(read_grid(path));
     case SceneFormat::npz:
-        return plain(read_grid_npz(path, o.voxel_size));
+        return read_grid_npz(path, o);
     case SceneFormat::semantickitti:
         return read_semantic_kitti(path, o);
     case SceneFormat::occ3d_nuscenes:
         return read_occ3d(path, Occ3dKind::nuscenes, o);
     case SceneFormat::occ3d_waymo:
         return read_occ3d(path, Occ3dKind::waymo, o);
+    case SceneFormat::array:
+        return read_label_array(path, o);
     case SceneFormat::vox:
         return read_vox(path, o);
     case SceneFormat::points_ply:

@@ -15,6 +15,7 @@ enum class SceneFormat : uint8_t {
     semantickitti,
     occ3d_nuscenes,
     occ3d_waymo,
+    array,
     vox,
     points_ply,
     carla_points,
@@ -40,7 +41,8 @@ std::optional<SceneFormat> scene_format_of_name(std::string_view name);
 bool has_scene_extension(const Path& path);
 
 // what a file is: by its extension; of .ply by whether it has splats' properties, of .npz by the names and shapes of
-// its arrays. bad_input for other extensions, and for a .ply or .npz that cannot be read
+// its arrays (an array of labels, where that is the only one). bad_input for other extensions, and for a .ply or .npz
+// that cannot be read
 Result<SceneFormat> detect_scene_format(const Path& path);
 
 // The format to write, by the path's extension: .ply is labelled points. bad_input lists the formats.

@@ -16,6 +16,7 @@ constexpr size_t kVoxels = 256 * 256 * 32;
 // by class; 0 has no entry
 constexpr std::array<uint16_t, kClassCount> kRaw = {40, 48, 50, 52, 51, 80, 81, 81, 70, 72,
                                                     0,  30, 31, 10, 18, 13, 16, 15, 11, 60};
+constexpr uint16_t kOutlier = 1, kLargestTrainId = 19;
 constexpr uint8_t kTrafficLight = 6, kSky = 10;
 
 DenseLabels empty_box()
@@ -47,6 +48,19 @@ Status keep_bits(std::vector<uint16_t>& raw, const Path& path, bool keep)
     return {};
 }
 
+// Raw ids and training ids share numbers below 20. Grounds, buildings and vegetation have raw ids above, and no scene
+// is without them.
+Status check_raw(const std::vector<uint16_t>& raw, std::string_view where)
+{
+    const uint16_t largest = std::ranges::max(raw);
+    if (largest > kLargestTrainId || largest <= kOutlier)
+        return {};
+    return fail(ErrorCode::bad_input,
+                "{}: the largest number is {}: these may be SemanticKITTI's raw ids, or its training ids; --map "
+                "semantickitti or --map semantickitti-train says which",
+                where, largest);
+}
+
 Path sibling(Path path, const char* extension)
 {
     return path.replace_extension(extension);
@@ -64,6 +78,8 @@ Result<SceneGrid> read_semantic_kitti(const Path& path, const SceneGridOptions& 
     std::vector<uint16_t> raw(kVoxels);
     for (size_t i = 0; i < kVoxels; ++i)
         raw[i] = uint16_t(std::to_integer<unsigned>(bytes[2 * i]) | std::to_integer<unsigned>(bytes[2 * i + 1]) << 8);
+    if (options.map.empty())
+        SR_CHECK(check_raw(raw, where));
     if (path.extension() == ".bin")
         SR_CHECK(keep_bits(raw, path, true));
     if (is_there(invalid))
@@ -81,9 +97,9 @@ Result<SceneGrid> read_semantic_kitti(const Path& path, const SceneGridOptions& 
         dense.origin[a] += shift;
     }
     SceneGrid out;
-    SR_TRY(out.grid, resample(dense, options.voxel_size, options.min_fill, where));
-    out.grid.metadata["source"] = "SemanticKITTI";
     out.warnings = map.left_out("voxels");
+    SR_TRY(out.grid, resample(dense, options.cell_size(), options.min_fill, where, &out.warnings));
+    out.grid.metadata["source"] = "SemanticKITTI";
     out.dropped = map.dropped();
     return out;
 }

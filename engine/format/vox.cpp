@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/format/vox.h"
 
-#include "engine/format/dense_labels.h"
 #include "engine/format/label_map.h"
 #include "engine/format/vox_file.h"
+#include "engine/format/voxel_sizes.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
 
@@ -145,24 +145,6 @@ Status place_all(const VoxFile& file, VoxPlacement& placement, std::string_view 
     return {};
 }
 
-double metres_of_voxel(const SceneGridOptions& o)
-{
-    return o.file_voxel_size > 0 ? o.file_voxel_size : double(o.voxel_size);
-}
-
-Result<Cell> whole_voxels(const SceneGridOptions& o)
-{
-    Cell shift;
-    for (size_t a = 0; a < 3; ++a) {
-        const double cells = o.origin[a] / metres_of_voxel(o);
-        if (!(std::abs(cells) < (1 << 20)) || std::abs(cells - std::round(cells)) > 1e-4)
-            return fail(ErrorCode::bad_input, "origin: {} m is not a whole number of voxels of {} m", o.origin[a],
-                        short_number(float(metres_of_voxel(o))).dump());
-        shift[a] = static_cast<int32_t>(std::lround(cells));
-    }
-    return shift;
-}
-
 // how many voxels a later one covers
 size_t take_cells(std::vector<Placed>& voxels, const Cell& shift, LabelMap& map, VoxelGrid& grid)
 {
@@ -185,59 +167,13 @@ size_t take_cells(std::vector<Placed>& voxels, const Cell& shift, LabelMap& map,
     return covered;
 }
 
-// voxels along the edge of a cell
-Result<int32_t> voxels_per_cell(const SceneGridOptions& o, std::string_view where)
-{
-    SR_TRY(const int64_t cell, tenths_of(double(o.voxel_size), fmt::format("{}: size of a cell", where)));
-    SR_TRY(const int64_t voxel, tenths_of(metres_of_voxel(o), fmt::format("{}: size of a voxel", where)));
-    if (voxel < 1 || cell % voxel != 0)
-        return fail(ErrorCode::bad_input, "{}: a cell of {} m is not a whole number of voxels of {} m", where,
-                    double(cell) / 1e4, double(voxel) / 1e4);
-    return static_cast<int32_t>(std::min<int64_t>(cell / voxel, 1 << 20));
-}
-
-// Cells of `edge` voxels a side, by the rule of resample(): the commonest label, ties to the lower one.
-void coarsen(VoxelGrid& grid, int32_t edge, double min_fill)
-{
-    std::vector<std::pair<Cell, uint8_t>> voxels(grid.cells.size());
-    for (size_t i = 0; i < voxels.size(); ++i) {
-        for (size_t a = 0; a < 3; ++a) {
-            const int32_t v = grid.cells[i][a];
-            voxels[i].first[a] = v / edge - (v % edge < 0);
-        }
-        voxels[i].second = grid.labels[i];
-    }
-    std::ranges::sort(voxels);
-    grid.cells.clear();
-    grid.labels.clear();
-    const double least = min_fill * std::pow(double(edge), 3) * (1 - 1e-9);
-    for (size_t first = 0, last; first < voxels.size(); first = last) {
-        size_t most = 0;
-        uint8_t label = 0;
-        for (last = first; last < voxels.size() && voxels[last].first == voxels[first].first;) {
-            size_t end = last;
-            while (end < voxels.size() && voxels[end] == voxels[last])
-                ++end;
-            if (end - last > most) {
-                most = end - last;
-                label = voxels[last].second;
-            }
-            last = end;
-        }
-        if (double(last - first) < least)
-            continue;
-        grid.cells.push_back(voxels[first].first);
-        grid.labels.push_back(label);
-    }
-}
-
 } // namespace
 
 Result<SceneGrid> read_vox(const Path& path, const SceneGridOptions& o)
 {
     const std::string where = quote_path(path);
-    SR_TRY(const Cell shift, whole_voxels(o));
-    SR_TRY(const int32_t edge, voxels_per_cell(o, where));
+    const VoxelSizes sizes{o.file_voxel_size > 0 ? o.file_voxel_size : double(o.cell_size()), o.cell_size()};
+    SR_TRY(const Cell shift, whole_voxels(o.origin, sizes.voxel));
     SR_TRY(const std::vector<std::byte> bytes, read_file(path, kMaxFileBytes));
     SR_TRY(const VoxFile file, parse_vox(bytes, where));
     SceneGrid out;
@@ -254,13 +190,9 @@ Result<SceneGrid> read_vox(const Path& path, const SceneGridOptions& o)
     if (covered)
         out.warnings.push_back(fmt::format("{} voxels under those of a later model are left out", covered));
     out.dropped = map.dropped() + covered;
-    if (edge > 1) {
-        coarsen(out.grid, edge, o.min_fill);
-        if (out.grid.cells.empty())
-            return fail(ErrorCode::bad_input, "{}: no cell of {} m is filled to {} of its volume", where, o.voxel_size,
-                        o.min_fill);
-    }
-    out.grid.voxel_size = o.voxel_size;
+    SR_CHECK(coarsen(out.grid, sizes, o.min_fill, where, out.warnings));
+    if (sizes.same())
+        out.unused.push_back({"--min-fill", "a cell is a voxel"});
     out.grid.metadata["source"] = "MagicaVoxel";
     SR_CHECK(check_grid(out.grid, where));
     return out;
