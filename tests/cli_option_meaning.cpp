@@ -85,6 +85,7 @@ TEST_F(CliOptionMeaning, no_option_of_an_input_is_dropped_in_silence)
         {folder_.put("a.npy", npy_bytes("|u1", "(3, 1, 2)", std::string("\x04\x11\x04\x11\x0b\x04", 6))).string(),
          "--map occ3d --file-voxel-size 0.2"},
         {numpy + "occ3d_nuscenes.npz", ""},
+        {numpy + "occ3d_nuscenes.npz", "--voxel-size 0.4 --origin 0,0,0.2"},
         {vox(), ""},
         {vox(), "--file-voxel-size 0.2"},
         {ply("l.ply", "property int label\n", "0 0 0 2\n1 0 0 5\n"), ""},

@@ -237,6 +237,25 @@ TEST(SplatPly, higher_harmonics_are_counted_and_rgb_is_taken)
     EXPECT_EQ(large->surfels.color[0], (std::array<float, 3>{0.2f, 1, 0}));
 }
 
+TEST(SplatPly, labels_of_other_programs_are_said_or_left_out)
+{
+    const ScratchFolder folder;
+    const auto read = [&](const char* first, const char* second) {
+        const std::string properties =
+                              "x y z scale_0 scale_1 rot_0 rot_1 rot_2 rot_3 opacity f_dc_0 f_dc_1 f_dc_2 label",
+                          row = "0 0 0 -3 -3 1 0 0 0 0 0 0 0 ";
+        return read_splats_ply(folder.put("s.ply", splat_ply(properties, {row + first, row + second}))).value();
+    };
+    const SplatFile ours = read("2", "255");
+    EXPECT_EQ(ours.surfels.label, (std::vector<uint8_t>{2, kNoLabel}));
+    ASSERT_EQ(ours.warnings.size(), 1u);
+    EXPECT_NE(ours.warnings[0].find("taken for our own classes: 2 building (1 splats)"), std::string::npos);
+    const SplatFile foreign = read("2", "40");
+    EXPECT_EQ(foreign.surfels.label, (std::vector<uint8_t>{kNoLabel, kNoLabel}));
+    ASSERT_EQ(foreign.warnings.size(), 1u);
+    EXPECT_NE(foreign.warnings[0].find("unknown labels: 40 (1 splats); all labels are left out"), std::string::npos);
+}
+
 TEST(SplatPly, refuses_malformed_files)
 {
     const ScratchFolder folder;

@@ -146,6 +146,15 @@ Result<VoxelGrid> resample(const DenseLabels& dense, float voxel_size, double mi
     return grid;
 }
 
+std::vector<UnusedOption> unused_options(const DenseLabels& dense, float voxel_size)
+{
+    const auto size = tenths_of(double(voxel_size), "");
+    for (size_t a = 0; a < 3; ++a)
+        if (!size || dense.edge[a] != *size || dense.origin[a] % *size != 0)
+            return {};
+    return {{"--min-fill", "a cell is a voxel"}};
+}
+
 Status split_into(DenseLabels& dense, const VoxelGrid& grid, std::string_view where)
 {
     SR_TRY(const int64_t size, tenths_of(grid.voxel_size, fmt::format("{}: voxel size", where)));

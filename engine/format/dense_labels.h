@@ -27,6 +27,9 @@ Result<int64_t> tenths_of(double metres, std::string_view where);
 Result<VoxelGrid> resample(const DenseLabels& dense, float voxel_size, double min_fill, std::string_view where,
                            std::vector<std::string>* warnings = nullptr);
 
+// --min-fill, where voxels are as large as cells and their boundaries the same
+std::vector<UnusedOption> unused_options(const DenseLabels& dense, float voxel_size);
+
 // a grid's labels in a box of smaller voxels, `dense` giving shape, edge (a divisor of the cell's) and origin: each
 // cell is split. Parts of cells outside the box are cut off; bad_input when a whole cell is outside, saying how many.
 Status split_into(DenseLabels& dense, const VoxelGrid& grid, std::string_view where);

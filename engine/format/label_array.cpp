@@ -179,6 +179,7 @@ Result<SceneGrid> read_label_array(const Path& path, const SceneGridOptions& o)
         out.warnings.push_back(
             fmt::format("{}: its corner lies at (0, 0, 0) m; --origin X,Y,Z says where else", where));
     SR_TRY(out.grid, resample(dense, sizes.cell, o.min_fill, where, &out.warnings));
+    out.unused = unused_options(dense, sizes.cell);
     out.grid.metadata["source"] = "array of labels";
     return out;
 }

@@ -14,6 +14,14 @@ constexpr size_t kMostListed = 20;
 
 } // namespace
 
+std::vector<SourceLabel> source_labels(const LabelTable& whole)
+{
+    std::vector<SourceLabel> labels;
+    for (const LabelTable::Label& label : whole.labels)
+        labels.push_back({label.number.value(), label.name, label.target});
+    return labels;
+}
+
 LabelMap::LabelMap(std::span<const SourceLabel> labels)
 {
     for (const SourceLabel& label : labels)

@@ -17,6 +17,8 @@ struct SourceLabel {
     uint8_t target; // a class, kLeftOut or kEmpty
 };
 
+std::vector<SourceLabel> source_labels(const LabelTable& whole); // views of its names
+
 constexpr std::string_view kMapAdvice = "--map NAME or FILE says what they are";
 
 // Maps source label numbers to classes, and counts the lookups of each.

@@ -18,38 +18,9 @@ namespace {
 
 constexpr JsonLimits kCarlaFile{.bytes = 256u << 20, .values = 1 << 12}; // values of a box
 
-// carla.CityObjectLabel by its numbers since 0.9.14, base types of vehicles, kinds of blueprints, our own names where
-// they are none of these, and blueprints of vehicles
-constexpr SourceLabel kCarlaLabels[] = {
-    {0, "NONE", kLeftOut},
-    {1, "Roads", 0},
-    {2, "Sidewalks", 1},
-    {3, "Buildings", 2},
-    {4, "Walls", 3},
-    {5, "Fences", 4},
-    {6, "Poles", 5},
-    {7, "TrafficLight", 6},
-    {8, "TrafficSigns", 7},
-    {9, "Vegetation", 8},
-    {10, "Terrain", 9},
-    {11, "Sky", 10},
-    {12, "Pedestrians", 11},
-    {13, "Rider", 12},
-    {14, "Car", 13},
-    {15, "Truck", 14},
-    {16, "Bus", 15},
-    {17, "Train", 16},
-    {18, "Motorcycle", 17},
-    {19, "Bicycle", 18},
-    {20, "Static", kLeftOut},
-    {21, "Dynamic", kLeftOut},
-    {22, "Other", kLeftOut},
-    {23, "Water", kLeftOut},
-    {24, "RoadLines", 19},
-    {25, "Ground", 9},
-    {26, "Bridge", 2},
-    {27, "RailTrack", 9},
-    {28, "GuardRail", 4},
+// beside carla.CityObjectLabel, whose numbers and names are a table: base types of vehicles, kinds of blueprints, our
+// own names where they are none of these, and blueprints of vehicles
+constexpr SourceLabel kMoreLabels[] = {
     {100, "car", 13},
     {101, "van", 13},
     {102, "truck", 14},
@@ -171,8 +142,8 @@ const Json* find_attribute(const Json& box, const char* key)
 
 std::string label_of_tag(double tag)
 {
-    for (const SourceLabel& label : kCarlaLabels)
-        if (label.number < 100 && tag == label.number)
+    for (const SourceLabel& label : carla_box_labels())
+        if (label.number < kMoreLabels[0].number && tag == label.number)
             return std::string(label.name);
     return fmt::format("tag {}", tag);
 }
@@ -259,7 +230,13 @@ Status add_box(const Json& json, std::string_view where, BoxCollector& to)
 
 std::span<const SourceLabel> carla_box_labels()
 {
-    return kCarlaLabels;
+    static const LabelTable tags = read_label_table("carla").value();
+    static const std::vector<SourceLabel> labels = [] {
+        std::vector<SourceLabel> all = source_labels(tags);
+        all.insert(all.end(), std::begin(kMoreLabels), std::end(kMoreLabels));
+        return all;
+    }();
+    return labels;
 }
 
 Status read_carla_boxes(const Path& path, const BoxOptions&, BoxCollector& to)

@@ -14,32 +14,6 @@ namespace semrover {
 
 namespace {
 
-constexpr SourceLabel kNuscenesLabels[] = {
-    {0, "animal", kLeftOut},
-    {1, "human.pedestrian.adult", 11},
-    {2, "human.pedestrian.child", 11},
-    {3, "human.pedestrian.construction_worker", 11},
-    {4, "human.pedestrian.personal_mobility", 12},
-    {5, "human.pedestrian.police_officer", 11},
-    {6, "human.pedestrian.stroller", kLeftOut},
-    {7, "human.pedestrian.wheelchair", 12},
-    {8, "movable_object.barrier", 4},
-    {9, "movable_object.debris", kLeftOut},
-    {10, "movable_object.pushable_pullable", kLeftOut},
-    {11, "movable_object.trafficcone", 5},
-    {12, "static_object.bicycle_rack", kLeftOut},
-    {13, "vehicle.bicycle", 18},
-    {14, "vehicle.bus.bendy", 15},
-    {15, "vehicle.bus.rigid", 15},
-    {16, "vehicle.car", 13},
-    {17, "vehicle.construction", 14},
-    {18, "vehicle.emergency.ambulance", 14},
-    {19, "vehicle.emergency.police", 13},
-    {20, "vehicle.motorcycle", 17},
-    {21, "vehicle.trailer", 14},
-    {22, "vehicle.truck", 14},
-};
-
 // the tables of the whole data set have gigabytes; only one record of them is in memory at a time
 constexpr JsonLimits kTable = {.bytes = 4ull << 30, .depth = 8, .values = 1 << 12};
 
@@ -177,7 +151,9 @@ Result<Rigid> read_vehicle_pose(const Path& folder, const std::string& sample)
 
 std::span<const SourceLabel> nuscenes_box_labels()
 {
-    return kNuscenesLabels;
+    static const LabelTable table = read_label_table("nuscenes").value();
+    static const std::vector<SourceLabel> labels = source_labels(table);
+    return labels;
 }
 
 Status read_nuscenes_boxes(const Path& path, const BoxOptions& options, BoxCollector& to)

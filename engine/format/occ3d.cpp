@@ -94,6 +94,7 @@ Result<SceneGrid> read_occ3d(const Path& path, Occ3dKind kind, const SceneGridOp
     SR_TRY(out.grid, resample(dense, options.cell_size(), options.min_fill, where, &out.warnings));
     out.grid.metadata["source"] = waymo ? "Occ3D-Waymo" : "Occ3D-nuScenes";
     out.dropped = map.dropped();
+    out.unused = unused_options(dense, options.cell_size());
     return out;
 }
 

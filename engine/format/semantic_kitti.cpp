@@ -101,6 +101,7 @@ Result<SceneGrid> read_semantic_kitti(const Path& path, const SceneGridOptions& 
     SR_TRY(out.grid, resample(dense, options.cell_size(), options.min_fill, where, &out.warnings));
     out.grid.metadata["source"] = "SemanticKITTI";
     out.dropped = map.dropped();
+    out.unused = unused_options(dense, options.cell_size());
     return out;
 }
 

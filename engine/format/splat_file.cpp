@@ -3,6 +3,7 @@
 #include "engine/format/splat_file.h"
 
 #include "engine/camera/rigid.h"
+#include "engine/format/label_map.h"
 #include "engine/format/ply_colors.h"
 #include "runtime/base/quote.h"
 
@@ -14,7 +15,8 @@ namespace semrover {
 
 namespace {
 
-constexpr double kAcross = 0.05; // correlation between the tangents that counts as lost
+constexpr double kAcross = 0.05;        // correlation between the tangents that counts as lost
+constexpr uint32_t kMostNumber = 65535; // of a label; others count as this one
 constexpr size_t kDotSplatBytes = 32;
 
 template <size_t N>
@@ -117,7 +119,8 @@ struct SplatColumns {
     std::array<const PlyProperty*, 3> position{}, scale{}, harmonic{};
     std::optional<PlyColors> rgb; // where there are no harmonics
     std::array<const PlyProperty*, 4> rotation{};
-    const PlyProperty *opacity = nullptr, *label = nullptr;
+    const PlyProperty* opacity = nullptr;
+    const PlyProperty* label = nullptr; // none where its numbers are not ours
     std::vector<const PlyProperty*> rest;
 };
 
@@ -158,6 +161,25 @@ Result<SplatColumns> columns_of(const PlyElement& element, const std::string& wh
     return c;
 }
 
+// labels that are no classes of ours are left out, with a warning
+Status check_labels(SplatColumns& c, size_t rows, const std::string& where, std::vector<std::string>& warnings)
+{
+    SR_TRY(LabelMap map, LabelMap::of_column({"label", ""}, false, {}));
+    map.set(kNoLabel, "none", kEmpty);
+    for (size_t row = 0; row < rows; ++row) {
+        const double value = c.label->values[row];
+        map(value >= 0 && value <= kMostNumber && value == std::floor(value) ? uint32_t(value) : kMostNumber);
+    }
+    if (const Status known = map.check(where, "splats", "all labels are left out"); !known) {
+        warnings.push_back(known.error().message);
+        c.label = nullptr;
+        return {};
+    }
+    for (const std::string& line : map.assumed(where, "splats"))
+        warnings.push_back(line);
+    return {};
+}
+
 Ellipsoid ellipsoid_of(const SplatColumns& c, size_t row)
 {
     Ellipsoid e;
@@ -172,7 +194,7 @@ Ellipsoid ellipsoid_of(const SplatColumns& c, size_t row)
     for (size_t a = 0; a < 4; ++a)
         e.rotation[a] = c.rotation[a]->values[row];
     e.opacity = 1 / (1 + std::exp(-c.opacity->values[row]));
-    if (c.label && c.label->values[row] >= 0 && c.label->values[row] <= 255)
+    if (c.label && c.label->values[row] >= 0 && c.label->values[row] < kClassCount)
         e.label = static_cast<uint8_t>(c.label->values[row]);
     return e;
 }
@@ -187,7 +209,9 @@ Result<SplatFile> read_splats_ply(const Path& path)
     if (!vertices)
         return fail(ErrorCode::bad_input, "{}: has no element vertex", where);
     std::vector<std::string> warnings;
-    SR_TRY(const SplatColumns columns, columns_of(*vertices, where, warnings));
+    SR_TRY(SplatColumns columns, columns_of(*vertices, where, warnings));
+    if (columns.label && !says_own_labels(file.comments))
+        SR_CHECK(check_labels(columns, vertices->rows, where, warnings));
     EllipsoidFlattener flattener(where);
     for (size_t row = 0; row < vertices->rows; ++row) {
         flattener.add(ellipsoid_of(columns, row), !columns.scale[2]);

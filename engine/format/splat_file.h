@@ -46,8 +46,8 @@ class EllipsoidFlattener {
 };
 
 // 3DGS or 2DGS, by property name in any order, ascii or binary: x y z, scale_0 scale_1 (scale_2) as logarithms,
-// rot_0..3 (w first), opacity as a logit, f_dc_0..2 or red green blue, an integer label if there. Without scale_2 the
-// splats are flat (2DGS). bad_input for files without these
+// rot_0..3 (w first), opacity as a logit, f_dc_0..2 or red green blue, an integer label if there (one that is no class
+// of ours is left out, with a warning). Without scale_2 the splats are flat (2DGS). bad_input for files without these
 Result<SplatFile> read_splats_ply(const Path& path);
 
 // In the axes that viewers of .ply and .splat expect: y down, x and z so that half a turn about z, which they apply,
