@@ -184,7 +184,7 @@ TEST(CliCamera, kitti_keeps_times_and_lens)
     fs::create_directory(folder / "empty");
     expect_error(semrover_program("render " + kGrid + " --path " + (folder / "empty").string() + " -o " +
                                   (folder / "r").string()),
-                 3, "a folder without a path, expected COLMAP's cameras.bin or cameras.txt, or KITTI's poses.txt");
+                 3, "is a folder without files; expected a camera path");
 }
 
 TEST(CliCamera, render_draws_a_rig_of_several_lenses)

@@ -356,7 +356,6 @@ TEST(CameraFiles, a_broken_colmap_folder_is_named)
     EXPECT_TRUE(says(read(good + good, image), "line 2: a second camera '1'"));
     EXPECT_TRUE(says(read(good, ""), "images.txt': a camera path without poses"));
     EXPECT_TRUE(says(read(good, "1 1 0 0 0 0 0 0 1\n"), "images.txt' line 1: expected the 10 words IMAGE_ID QW"));
-    EXPECT_TRUE(says(read(good, "1 1 0 0 0 0 0 0 1 a b.png\n"), "found more"));
     EXPECT_TRUE(says(read(good, "1 1 0 0 0 0 0 0 2 a.png\n"), "no camera '2' in cameras.txt"));
     EXPECT_TRUE(says(read(good, "1 2 0 0 0 0 0 0 1 a.png\n"),
                      "expected a quaternion of norm 1, found 2; the order is w x y z"));
@@ -554,7 +553,7 @@ TEST(CameraFiles, formats_have_names)
     for (const PathFormat format :
          {PathFormat::tum, PathFormat::kitti, PathFormat::transforms, PathFormat::camera_path, PathFormat::colmap})
         EXPECT_EQ(path_format_of(name_of(format)), format);
-    EXPECT_FALSE(path_format_of("euroc"));
+    EXPECT_FALSE(path_format_of("carla"));
 }
 
 // a file of poses alone takes the lens that was asked for

@@ -111,6 +111,19 @@ TEST(RendererModel, pndm_gives_way_to_ddim)
     EXPECT_EQ(m->warnings.size(), 1u);
 }
 
+TEST(RendererModel, an_adapter_that_is_not_read_is_named)
+{
+    const ScratchFolder folder;
+    put_model(folder.path());
+    ASSERT_TRUE(RendererModel::open(folder.path())->warnings.empty());
+    folder.put("pytorch_lora_weights.safetensors", "x");
+    const auto m = RendererModel::open(folder.path());
+    ASSERT_TRUE(m) << m.error().message;
+    ASSERT_EQ(m->warnings.size(), 1u);
+    EXPECT_NE(m->warnings[0].find("pytorch_lora_weights.safetensors': an adapter (LoRA), which a renderer does not"),
+              std::string::npos);
+}
+
 TEST(RendererModel, an_ldm_file_is_a_model_too)
 {
     const ScratchFolder folder;

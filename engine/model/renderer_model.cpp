@@ -225,6 +225,22 @@ tl::unexpected<Error> refuse_image_video_unet(const Path& path, uint32_t latent_
         quote_path(path), 2 * latent_channels, 2 * latent_channels + 1, latent_channels, latent_channels);
 }
 
+// adapters (LoRA) are added to the transformer's weights alone
+void warn_of_adapters(RendererModel& m)
+{
+    for (const Path& folder : {m.folder, m.unet_folder, m.vae_folder}) {
+        const auto files = list_files(folder);
+        for (size_t i = 0; files && i < files->size(); ++i) {
+            std::string name = (*files)[i].filename().string();
+            std::ranges::transform(name, name.begin(), [](unsigned char c) { return std::tolower(c); });
+            if (name.ends_with(".safetensors") && name.find("lora") != std::string::npos)
+                m.warnings.push_back(fmt::format("{}: an adapter (LoRA), which a renderer does not read; merge it into "
+                                                 "the weights first (fuse_lora of diffusers)",
+                                                 quote_path((*files)[i])));
+        }
+    }
+}
+
 Status check_renderer(const RendererModel& m)
 {
     if (m.unet.in_channels == m.vae.latent_channels && !m.video())
@@ -295,6 +311,8 @@ Result<RendererModel> RendererModel::read(const Path& path, std::optional<Sample
     m.warnings.insert(m.warnings.end(), m.unet.warnings.begin(), m.unet.warnings.end());
     m.warnings.insert(m.warnings.end(), m.vae.warnings.begin(), m.vae.warnings.end());
     SR_CHECK(read_conditioning(m));
+    if (!m.ldm)
+        warn_of_adapters(m);
     return m;
 }
 
