@@ -436,5 +436,30 @@ TEST(engine_job_generation, warns_where_points_were_placed_in_another_way_than_t
     EXPECT_EQ(said.size(), 1u);
 }
 
+TEST(engine_job_generation, warns_where_a_distilled_model_is_sampled_in_another_way_than_it_was_trained_for)
+{
+    const ScratchFolder folder;
+    std::filesystem::copy(options().model, folder / "voxfield_transformer");
+    folder.put("model_index.json",
+               R"({"defaults": {"num_inference_steps": 4, "guidance_scale": 1, "distilled_steps": 4}})");
+    const auto warnings = [&](const auto& change) {
+        GenerationOptions o;
+        o.model = folder.path();
+        change(o);
+        return resolve_generation(o)->model.warnings;
+    };
+    EXPECT_TRUE(warnings([](GenerationOptions&) {}).empty());
+    EXPECT_TRUE(warnings([](GenerationOptions& o) { o.steps = 4, o.cfg_scale = 1.f; }).empty());
+    const auto scale = warnings([](GenerationOptions& o) { o.cfg_scale = 2.f; });
+    ASSERT_EQ(scale.size(), 1u);
+    EXPECT_NE(scale[0].find("guided already, and --cfg-scale 2 guides it twice"), std::string::npos) << scale[0];
+    const auto steps = warnings([](GenerationOptions& o) { o.steps = 5; });
+    ASSERT_EQ(steps.size(), 1u);
+    EXPECT_EQ(steps[0], "the model was distilled for 4 steps of ddpm, not 5 of ddpm");
+    const auto sampler = warnings([](GenerationOptions& o) { o.sampler = "ddim"; });
+    ASSERT_EQ(sampler.size(), 1u);
+    EXPECT_EQ(sampler[0], "the model was distilled for 4 steps of ddpm, not 4 of ddim");
+}
+
 } // namespace engine_job_generation_test
 } // namespace semrover

@@ -23,6 +23,21 @@ Status set_tiles(RegionOptions& regions, const TransformerConfig& config, double
     return {};
 }
 
+// a distilled network knows neither labels left out nor other timesteps than its own
+void warn_of_distilled(GenerationSettings& s)
+{
+    const int steps = s.model.defaults.distilled_steps;
+    if (!steps)
+        return;
+    if (s.guidance.scale != 1.f)
+        s.model.warnings.push_back(
+            fmt::format("the model is distilled: its one pass is guided already, and --cfg-scale {} guides it twice",
+                        s.guidance.scale));
+    if (s.steps != steps || s.model.scheduler.sampler != Sampler::ddpm)
+        s.model.warnings.push_back(fmt::format("the model was distilled for {} steps of ddpm, not {} of {}", steps,
+                                               s.steps, sampler_name(s.model.scheduler.sampler)));
+}
+
 } // namespace
 
 Result<GenerationSettings> resolve_generation(const GenerationOptions& o)
@@ -57,6 +72,7 @@ Result<GenerationSettings> resolve_generation(const GenerationOptions& o)
     s.precision = o.precision;
     s.batch = o.batch;
     SR_TRY(s.plan, plan_sampling(s.model.scheduler, s.steps, s.repaint));
+    warn_of_distilled(s);
     return s;
 }
 

@@ -17,6 +17,7 @@ Status read_defaults(const Json& index, VoxfieldDefaults& d)
     fields.integer("guidance_from", 0, kLastTimestep, d.guidance_from);
     fields.integer("guidance_until", 0, kLastTimestep, d.guidance_until);
     fields.number("guidance_radius", 0., kWholeRadius, d.guidance_radius);
+    fields.integer("distilled_steps", 1, kMaxInferenceSteps, d.distilled_steps);
     fields.integer("region_size", 1, 4096, d.regions.region_size);
     fields.integer("coverage_threshold", 1, 4096, d.regions.coverage_threshold);
     fields.choice("strategy", {{"complete", RegionStrategy::complete}, {"rim", RegionStrategy::rim}},

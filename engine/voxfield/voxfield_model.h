@@ -17,6 +17,7 @@ struct VoxfieldDefaults {
     int guidance_from = 0;              // timestep below which no step is guided
     int guidance_until = kLastTimestep; // and above which none is
     double guidance_radius = kWholeRadius;
+    int distilled_steps = 0; // of a model whose one pass is guided already: the steps that it was trained for
     RegionOptions regions;
     RepaintOptions repaint;
     UsualObjects usual_objects; // to guess objects from labels

@@ -98,7 +98,8 @@ def exporter(folder, config, teacher):
     parts = {TRANSFORMER: ["semrover", "VoxfieldTransformer"], SCHEDULER: ["semrover", "DDPMScheduler"]}
     left = {name: value for name, value in teacher.defaults.items()
             if not name.startswith("guidance_") and name != "renderer"}
-    left.update(num_inference_steps=len(teacher.first_steps(config["teacher_steps"])), guidance_scale=1.0)
+    steps = len(teacher.first_steps(config["teacher_steps"]))
+    left.update(num_inference_steps=steps, distilled_steps=steps, guidance_scale=1.0)
 
     def export(state):
         write_component(os.path.join(model, TRANSFORMER), teacher.config, state, config["mantissa_bits"])

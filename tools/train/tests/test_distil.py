@@ -124,7 +124,7 @@ class TheRecipe(unittest.TestCase):
         self.assertLess(after, 0.5 * before)
         defaults = read_json(self.path("student/model/model_index.json"))["defaults"]
         self.assertEqual(defaults["guidance_scale"], 1)
-        self.assertEqual(defaults["num_inference_steps"], 4)
+        self.assertEqual((defaults["num_inference_steps"], defaults["distilled_steps"]), (4, 4))
         self.assertFalse({"guidance_until", "guidance_radius"} & set(defaults))
         semantic = {name: t for name, t in safetensors_file.read(self.grid).items() if name in ("cells", "labels")}
         safetensors_file.write(self.path("semantic.sgrid"), semantic, {"voxel_size": "0.6", "points_per_voxel": "4"})
