@@ -2,8 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/format/camera_path.h"
 #include "engine/format/image.h"
+#include "engine/format/npy.h"
 #include "runtime/base/json.h"
 #include "tests/json_text.h"
+#include "tests/png_file.h"
 #include "tests/program.h"
 
 #include <algorithm>
@@ -79,6 +81,52 @@ TEST(CliEvalFrames, psnr_and_ssim_by_hand)
     const ProgramResult table = eval("frames -q " + folders);
     ASSERT_EQ(table.code, 0) << table.err;
     EXPECT_TRUE(table.out.starts_with("2 frames, PSNR 31.141 dB in the mean of 1 frames, 1 equal\n")) << table.out;
+}
+
+TEST(CliEvalFrames, labels_are_numbers_of_any_kind_of_picture)
+{
+    const Pictures p;
+    p.put("made/000000.png", 110, 100);
+    p.put("true/000000.png", 100, 100);
+    const auto figures = [&](const std::string& more = "") {
+        return eval("frames --json -q " + (p / "made") + " " + (p / "true") + " --labels " + (p / "label") + more);
+    };
+    const auto put = [&](int bits, int kind, uint16_t left, uint16_t right, const std::string& palette = "") {
+        PngFile file{kWidth, kHeight, bits, kind, {}, palette};
+        for (uint32_t i = 0; i < kWidth * kHeight; ++i) {
+            const uint16_t number = i % kWidth < 12 ? left : right;
+            if (bits == 16)
+                file.rows += char(number >> 8);
+            file.rows += char(number & 255);
+        }
+        std::filesystem::create_directories(p.folder / "label");
+        p.folder.put("label/000000.png", file.bytes());
+    };
+    put(8, PngFile::kGray, 2, 13);
+    const Json expect = json_of(figures().out)["labels"];
+    EXPECT_EQ(expect.size(), 2u);
+    EXPECT_NEAR(expect["building"]["psnr"].get<double>(), 10 * std::log10(65025. / 100), 1e-9);
+    EXPECT_TRUE(expect["car"]["psnr"].is_null());
+    put(16, PngFile::kGray, 2, 13);
+    EXPECT_EQ(json_of(figures().out)["labels"], expect);
+    put(8, PngFile::kPalette, 2, 13, std::string(3 * 20, '\x66'));
+    EXPECT_EQ(json_of(figures().out)["labels"], expect);
+    put(16, PngFile::kGray, 11, 26);
+    expect_error(figures(), 3,
+                 "unknown labels: 26 (192 pixels); --map NAME or FILE says what they are; found are 11 person");
+    EXPECT_EQ(json_of(figures(" --map cityscapes").out)["labels"], expect);
+    std::filesystem::remove(p.folder / "label/000000.png");
+    NpyArray array{DType::i16, {kHeight, kWidth}, {}};
+    for (uint32_t i = 0; i < kWidth * kHeight; ++i)
+        array.data.insert(array.data.end(), {std::byte(i % kWidth < 12 ? 2 : 13), std::byte(0)});
+    const std::vector<std::byte> file = encode_npy(array);
+    p.folder.put("label/000000.npy", {reinterpret_cast<const char*>(file.data()), file.size()});
+    EXPECT_EQ(json_of(figures().out)["labels"], expect);
+    std::filesystem::remove(p.folder / "label/000000.npy");
+    p.put("label/000000.png", 2, 13); // gray as three channels
+    EXPECT_EQ(json_of(figures().out)["labels"], expect);
+    ASSERT_TRUE(write_png_rgb8(p.folder / "label/000000.png", 1, 1, std::vector<uint8_t>{128, 64, 128}));
+    expect_error(figures(), 3, "a picture in colour, expected class numbers");
 }
 
 TEST(CliEvalFrames, cameras_are_matched_across_the_layouts_of_refine_and_render)

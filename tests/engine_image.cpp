@@ -1,10 +1,15 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+#include "engine/format/depth_image.h"
 #include "engine/format/image.h"
-
+#include "engine/format/label_image.h"
+#include "engine/format/npy.h"
+#include "runtime/base/dtype.h"
+#include "tests/png_file.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
 
+#include <cmath>
 #include <gtest/gtest.h>
 #include <random>
 
@@ -242,6 +247,159 @@ TEST(Image, the_size_of_a_png_is_read_without_its_pixels)
     EXPECT_EQ(*read_png_size(folder / "a.png"), (ImageSize{7, 5}));
     EXPECT_TRUE(says(read_png_size(folder.put("b.png", "no picture")), "expected a PNG file"));
     EXPECT_TRUE(says(read_png_size(folder.put("c.png", contents(folder / "a.png").substr(0, 20))), "not a valid PNG"));
+}
+
+// ---- class numbers
+
+using Numbers = std::vector<uint16_t>;
+
+std::string npy(DType type, std::vector<uint64_t> shape, const void* data, size_t bytes)
+{
+    NpyArray array{type, std::move(shape), {}};
+    array.data.resize(bytes);
+    std::memcpy(array.data.data(), data, bytes);
+    const std::vector<std::byte> file = encode_npy(array);
+    return {reinterpret_cast<const char*>(file.data()), file.size()};
+}
+
+template <typename T>
+std::string npy(DType type, std::vector<uint64_t> shape, const std::vector<T>& values)
+{
+    return npy(type, std::move(shape), values.data(), values.size() * sizeof(T));
+}
+
+TEST(Image, class_numbers_are_what_any_kind_of_picture_stores)
+{
+    const ScratchFolder folder;
+    const std::string colors = "\x07\x08\x09"
+                               "\xff\x01\x02"
+                               "\x80\x80\x80"
+                               "\x0d\x0d\x0d";
+    struct Case {
+        const char* name;
+        std::string file;
+        Numbers numbers;
+    };
+    const auto png = [](int bits, int kind, const std::string& rows, const std::string& palette = "") {
+        return PngFile{2, 2, bits, kind, rows, palette}.bytes();
+    };
+    const Case cases[] = {
+        {"gray 1", png(1, PngFile::kGray, "\x40\x80"), {0, 1, 1, 0}},
+        {"gray 2", png(2, PngFile::kGray, "\x70\x80"), {1, 3, 2, 0}},
+        {"gray 4", png(4, PngFile::kGray, "\x2d\xf1"), {2, 13, 15, 1}},
+        {"gray 8", png(8, PngFile::kGray, std::string("\x02\x0d\xff\0", 4)), {2, 13, 255, 0}},
+        {"gray 16", png(16, PngFile::kGray, std::string("\0\x02\0\x0d\x04\xb0\xff\xff", 8)), {2, 13, 1200, 65535}},
+        {"palette 2", png(2, PngFile::kPalette, "\xd0\x10", colors), {3, 1, 0, 1}},
+        {"palette 8", png(8, PngFile::kPalette, std::string("\0\x03\x02\x01", 4), colors), {0, 3, 2, 1}},
+        {"gray and alpha",
+         png(8, PngFile::kGrayAlpha, std::string("\x02\xff\x0d\x01\x05\0\0\xff", 8)),
+         {2, 13, 65535, 0}},
+        {"gray and alpha 16",
+         png(16, PngFile::kGrayAlpha, std::string("\0\x02\xff\xff\x01\0\0\x01\0\x05\0\0\0\0\xff\xff", 16)),
+         {2, 256, 65535, 0}},
+        {"rgb", png(8, PngFile::kRgb, std::string("\x02\x02\x02\x0d\x0d\x0d\0\0\0\xff\xff\xff", 12)), {2, 13, 0, 255}},
+        {"rgba",
+         png(8, PngFile::kRgba, std::string("\x02\x02\x02\xff\x0d\x0d\x0d\x01\x05\x06\x07\0\0\0\0\xff", 16)),
+         {2, 13, 65535, 0}},
+        {"npy u1", npy(DType::u8, {2, 2}, std::vector<uint8_t>{2, 13, 255, 0}), {2, 13, 255, 0}},
+        {"npy i4", npy(DType::i32, {2, 2, 1}, std::vector<int32_t>{2, 1200, -1, 0}), {2, 1200, 65535, 0}},
+        {"npy i8", npy(DType::i64, {1, 2, 2}, std::vector<int64_t>{2, 65535, -1, 0}), {2, 65535, 65535, 0}},
+    };
+    for (const Case& c : cases) {
+        const auto image = read_label_image(folder.put("a", c.file));
+        ASSERT_TRUE(image) << c.name << ": " << image.error().message;
+        EXPECT_EQ(image->size, (ImageSize{2, 2})) << c.name;
+        EXPECT_EQ(image->numbers, c.numbers) << c.name;
+    }
+    std::string big_endian = npy(DType::i16, {2, 2}, std::string("\0\x02\0\x0d\x04\xb0\xff\xff", 8).data(), 8);
+    big_endian.replace(big_endian.find("<i2"), 3, ">i2");
+    EXPECT_EQ(read_label_image(folder.put("a", big_endian))->numbers, (Numbers{2, 13, 1200, 65535}));
+}
+
+TEST(Image, pictures_that_hold_no_class_numbers_are_refused_by_name)
+{
+    const ScratchFolder folder;
+    const auto file = [&](const std::string& bytes) { return read_label_image(folder.put("a", bytes)); };
+    const std::string road(std::string("\x80\x40\x80\x80\x40\x80", 6));
+    EXPECT_TRUE(
+        says(file(PngFile{2, 1, 8, PngFile::kRgb, road, ""}.bytes()),
+             "a': a picture in colour, expected class numbers: a PNG of gray values or palette indices (1 to 16 "
+             "bits), or a .npy; found the colour (128, 64, 128) at column 0, row 0"));
+    EXPECT_TRUE(says(file(PngFile{1, 1, 8, PngFile::kRgba, std::string("\x0d\0\0\xff", 4), ""}.bytes()),
+                     "(CARLA's tags are its red channel: save that as gray)"));
+    EXPECT_TRUE(says(file(PngFile{1, 1, 16, PngFile::kRgb, road, ""}.bytes()), "a picture in colour"));
+    ASSERT_TRUE(write_jpeg_rgb8(folder / "a.jpg", 8, 8, std::vector<uint8_t>(192, 13), 95));
+    EXPECT_TRUE(says(read_label_image(folder / "a.jpg"), "a JPEG, whose compression changes numbers"));
+    EXPECT_TRUE(says(file(npy(DType::f32, {1, 1}, std::vector<float>{2})), "an array of fractions"));
+    EXPECT_TRUE(says(file(npy(DType::i32, {1, 2}, std::vector<int32_t>{0, 70000})),
+                     "class number 70000 at column 1, row 0, expected 0 to 65534"));
+    EXPECT_TRUE(
+        says(file(npy(DType::u8, {2, 2, 3}, std::vector<uint8_t>(12))), "of shape (2, 2, 3), expected [height"));
+    EXPECT_TRUE(says(file(npy(DType::u8, {4}, std::vector<uint8_t>(4))), "of shape (4)"));
+    EXPECT_TRUE(says(file(npy(DType::u8, {1, 20000}, std::vector<uint8_t>(20000))), "20000 x 1 pixels"));
+    const std::string whole = npy(DType::u8, {16, 16}, std::vector<uint8_t>(256));
+    EXPECT_TRUE(says(file(whole.substr(0, whole.size() - 1)), "the file is cut"));
+    EXPECT_TRUE(says(file("no picture"), "expected a PNG file"));
+}
+
+// ---- depth
+
+TEST(Image, depth_is_in_metres_whatever_holds_it)
+{
+    const ScratchFolder folder;
+    const auto metres = [&](const std::string& file, const DepthEncoding& e = {}) {
+        const auto depth = read_depth_image(folder.put("a", file), e);
+        EXPECT_TRUE(depth) << depth.error().message;
+        return depth ? depth->metres : std::vector<float>();
+    };
+    const auto near = [](const std::vector<float>& a, const std::vector<float>& b) {
+        ASSERT_EQ(a.size(), b.size());
+        for (size_t i = 0; i < a.size(); ++i)
+            EXPECT_NEAR(a[i], b[i], 1e-4) << i;
+    };
+    const std::string gray = PngFile{3, 1, 16, PngFile::kGray, std::string("\x17\x70\0\0\xff\xff", 6), ""}.bytes();
+    near(metres(gray), {6, 0, 0}); // millimetres
+    near(metres(gray, {{}, 0.0002}), {1.2f, 0, 0});
+    const float nan = std::nanf("");
+    near(metres(npy(DType::f32, {1, 5}, std::vector<float>{6.25f, 0, -1, nan, INFINITY})), {6.25f, 0, 0, 0, 0});
+    near(metres(npy(DType::f64, {1, 1}, std::vector<double>{70.125})), {70.125f});
+    near(metres(npy(DType::f64, {1, 1}, std::vector<double>{600}), {{}, 0.01}), {6}); // Unreal's centimetres
+    near(metres(npy(DType::f16, {1, 1}, std::vector<uint16_t>{float_to_half(6.5f)})), {6.5f});
+    near(metres(npy(DType::u16, {1, 3}, std::vector<uint16_t>{6000, 0, 65535})), {6, 0, 0});
+    // 6 m of CARLA is 100663 = 55 + 256 * 137 + 65536
+    const std::string carla =
+        PngFile{2, 1, 8, PngFile::kRgba, std::string("\x37\x89\x01\xff\xff\xff\xff\xff", 8), ""}.bytes();
+    near(metres(carla), {6, 0});
+    near(metres(carla, {DepthKind::carla, {}}), {6, 0});
+    EXPECT_EQ(read_depth_image(folder.put("a", carla))->kind, DepthKind::carla);
+}
+
+TEST(Image, depth_along_the_ray_becomes_depth_along_the_axis)
+{
+    const Intrinsics k{100, 50, 2, 1, 4, 2};
+    DepthImage depth{{4, 2}, {}, DepthKind::ray};
+    for (uint32_t y = 0; y < 2; ++y)
+        for (uint32_t x = 0; x < 4; ++x)
+            depth.metres.push_back(float(6 * std::hypot((x + 0.5 - 2) / 100, (y + 0.5 - 1) / 50, 1)));
+    make_axial(depth, k);
+    for (const float z : depth.metres)
+        EXPECT_NEAR(z, 6, 1e-6);
+}
+
+TEST(Image, pictures_that_hold_no_depth_are_refused_by_name)
+{
+    const ScratchFolder folder;
+    const auto depth = [&](const std::string& bytes, std::optional<DepthKind> kind = {}) {
+        return read_depth_image(folder.put("a", bytes), {kind, {}});
+    };
+    EXPECT_TRUE(says(depth(PngFile{1, 1, 8, PngFile::kGray, "\x05", ""}.bytes()),
+                     "a': expected a PNG of 16-bit gray, or a .npy, found gray of 8 bits"));
+    EXPECT_TRUE(says(depth(PngFile{1, 1, 8, PngFile::kRgb, "\x05\x05\x05", ""}.bytes()), "made to be looked at"));
+    EXPECT_TRUE(says(depth(PngFile{1, 1, 8, PngFile::kRgb, "\x05\x06\x07", ""}.bytes(), DepthKind::z),
+                     "found colour of 8 bits"));
+    EXPECT_TRUE(says(depth(PngFile{1, 1, 16, PngFile::kGray, "\x05\x06", ""}.bytes(), DepthKind::carla),
+                     "expected CARLA's depth in 8-bit colours, found gray of 16 bits"));
+    EXPECT_TRUE(says(depth(npy(DType::f32, {1, 1}, std::vector<float>{1}), DepthKind::carla), "found a .npy"));
 }
 
 } // namespace engine_image_test

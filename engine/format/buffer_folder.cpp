@@ -3,6 +3,7 @@
 #include "engine/format/buffer_folder.h"
 
 #include "engine/format/camera_path.h"
+#include "engine/format/label_image.h"
 #include "engine/scene/palette.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/quote.h"
@@ -168,16 +169,17 @@ Result<ImageGray16> read_depth(const BufferCamera& camera, uint32_t frame)
 Result<std::vector<uint8_t>> read_label_picture(const BufferCamera& camera, uint32_t frame)
 {
     const Path path = frame_path(camera.folder, "label", frame);
-    SR_TRY(ImageRgb8 labels, read_png_rgb8(path));
-    if (ImageSize{labels.width, labels.height} != camera.size)
+    SR_TRY(const LabelImage labels, read_label_image(path));
+    if (labels.size != camera.size)
         return fail(ErrorCode::bad_input, "{} is {} x {} pixels, the frames of its camera are {} x {}",
-                    quote_path(path), labels.width, labels.height, camera.size.width, camera.size.height);
-    for (size_t i = 0; i < labels.pixels.size(); i += 3) {
-        const uint8_t label = labels.pixels[i];
+                    quote_path(path), labels.size.width, labels.size.height, camera.size.width, camera.size.height);
+    std::vector<uint8_t> pixels;
+    pixels.reserve(3 * labels.numbers.size());
+    for (const uint16_t label : labels.numbers) {
         const std::array<uint8_t, 3> color = label < kClassCount ? kPalette[label].color : std::array<uint8_t, 3>{};
-        std::ranges::copy(color, &labels.pixels[i]);
+        pixels.insert(pixels.end(), color.begin(), color.end());
     }
-    return std::move(labels.pixels);
+    return pixels;
 }
 
 Result<uint64_t> hash_pictures(const BufferCamera& camera, std::initializer_list<const char*> kinds, uint32_t first,

@@ -22,8 +22,9 @@ constexpr int kCompressionLevel = 4;     // 616x424 noisy colour: 46 ms against 
 
 struct Format {
     int color_type;
-    int bit_depth;
+    int bit_depth; // 8 or 16
     uint32_t channels;
+    bool stored = false; // samples as they are in the file, those of fewer bits as 8
 
     size_t row_bytes(uint32_t width) const { return size_t(width) * channels * static_cast<size_t>(bit_depth / 8); }
 };
@@ -153,10 +154,12 @@ bool read_header(Png& p)
 
 void convert_to(png_structp png, const Format& format)
 {
-    if (format.bit_depth == 16) {
+    if (format.bit_depth == 16)
         png_set_swap(png);
+    if (format.stored)
+        png_set_packing(png);
+    if (format.bit_depth == 16 || format.stored)
         return;
-    }
     png_set_scale_16(png);
     png_set_expand(png); // palettes, 1 to 4 bits, transparency
     png_set_gray_to_rgb(png);
@@ -181,31 +184,56 @@ bool read_rows(Png& p, const Format& format, uint32_t width, uint32_t height)
     return true;
 }
 
-// the pixels go where `allocate(width, height)` says
-template <typename Allocate>
-Status decode_png(std::span<const std::byte> file, std::string_view where, const Format& format, uint64_t max_pixels,
-                  Allocate&& allocate)
+Status check_signature(std::span<const std::byte> file, std::string_view where)
 {
     if (file.size() < 8 || png_sig_cmp(reinterpret_cast<png_const_bytep>(file.data()), 0, 8) != 0)
         return fail(ErrorCode::bad_input, "{}: expected a PNG file, found something else", where);
-    Png p;
+    return {};
+}
+
+Result<PngInfo> open_png(Png& p, std::span<const std::byte> file, std::string_view where)
+{
+    SR_CHECK(check_signature(file, where));
     p.input = file;
     if (!read_header(p))
         return fail(ErrorCode::bad_input, "{}: not a valid PNG: {}", where, printable(p.message));
-    const uint32_t width = png_get_image_width(p.png, p.info), height = png_get_image_height(p.png, p.info);
+    const int type = png_get_color_type(p.png, p.info);
+    const PngKind kind = type == PNG_COLOR_TYPE_GRAY         ? PngKind::gray
+                         : type == PNG_COLOR_TYPE_GRAY_ALPHA ? PngKind::gray_alpha
+                         : type == PNG_COLOR_TYPE_PALETTE    ? PngKind::palette
+                         : type == PNG_COLOR_TYPE_RGB        ? PngKind::rgb
+                                                             : PngKind::rgba;
+    return PngInfo{{png_get_image_width(p.png, p.info), png_get_image_height(p.png, p.info)},
+                   kind,
+                   png_get_bit_depth(p.png, p.info)};
+}
+
+// the pixels go where `allocate(width, height)` says
+template <typename Allocate>
+Status decode_rows(Png& p, const PngInfo& info, std::span<const std::byte> file, std::string_view where,
+                   const Format& format, uint64_t max_pixels, Allocate&& allocate)
+{
+    const auto [width, height] = info.size;
     const uint64_t stored = uint64_t(png_get_rowbytes(p.png, p.info)) * height;
     if (stored / kMaxInflation > file.size())
         return fail(ErrorCode::bad_input, "{}: {} x {} pixels cannot come from {} bytes; the file is cut", where, width,
                     height, file.size());
-    SR_CHECK(check_pixels({width, height}, max_pixels, where));
-    const bool is_gray16 =
-        png_get_bit_depth(p.png, p.info) == 16 && png_get_color_type(p.png, p.info) == PNG_COLOR_TYPE_GRAY;
-    if (format.bit_depth == 16 && !is_gray16)
-        return fail(ErrorCode::bad_input, "{}: expected a PNG of 16-bit gray, found another kind", where);
+    SR_CHECK(check_pixels(info.size, max_pixels, where));
     p.pixels = allocate(width, height);
     if (!read_rows(p, format, width, height))
         return fail(ErrorCode::bad_input, "{}: not a valid PNG: {}", where, printable(p.message));
     return {};
+}
+
+template <typename Allocate>
+Status decode_png(std::span<const std::byte> file, std::string_view where, const Format& format, uint64_t max_pixels,
+                  Allocate&& allocate)
+{
+    Png p;
+    SR_TRY(const PngInfo info, open_png(p, file, where));
+    if (format.bit_depth == 16 && (info.bits != 16 || info.kind != PngKind::gray))
+        return fail(ErrorCode::bad_input, "{}: expected a PNG of 16-bit gray, found another kind", where);
+    return decode_rows(p, info, file, where, format, max_pixels, std::forward<Allocate>(allocate));
 }
 
 template <typename Allocate>
@@ -225,6 +253,25 @@ Result<ImageRgb8> decode_png_rgb8(std::span<const std::byte> file, std::string_v
         return image.pixels.data();
     }));
     return image;
+}
+
+void take_numbers(const std::vector<uint8_t>& rows, const Format& format, PngNumbers& image)
+{
+    const bool wide = format.bit_depth == 16, alpha = format.channels % 2 == 0;
+    const auto sample = [&](size_t i) { return uint16_t(wide ? rows[2 * i] | rows[2 * i + 1] << 8 : rows[i]); };
+    const size_t pixels = size_t(image.info.size.width) * image.info.size.height;
+    image.values.reserve(pixels);
+    for (size_t i = 0; i < pixels; ++i) {
+        const size_t at = i * format.channels;
+        image.values.push_back(sample(at));
+        if (alpha)
+            image.transparent.push_back(sample(at + format.channels - 1) == 0);
+        if (format.channels < 3 || image.color || (alpha && image.transparent[i]))
+            continue;
+        const std::array<uint16_t, 3> rgb = {sample(at), sample(at + 1), sample(at + 2)};
+        if (rgb[0] != rgb[1] || rgb[0] != rgb[2])
+            image.color = {i, rgb};
+    }
 }
 
 } // namespace
@@ -286,13 +333,34 @@ Result<ImageRgb8> read_image_rgb8(const Path& path)
 Result<ImageSize> read_png_size(const Path& path)
 {
     SR_TRY(const MappedFile file, MappedFile::open(path));
+    SR_TRY(const PngInfo info, png_info(file.bytes(), quote_path(path)));
+    return info.size;
+}
+
+Result<PngInfo> png_info(std::span<const std::byte> file, std::string_view where)
+{
     Png p;
-    p.input = file.bytes();
-    if (file.bytes().size() < 8 || png_sig_cmp(reinterpret_cast<png_const_bytep>(file.bytes().data()), 0, 8) != 0)
-        return fail(ErrorCode::bad_input, "{}: expected a PNG file, found something else", quote_path(path));
-    if (!read_header(p))
-        return fail(ErrorCode::bad_input, "{}: not a valid PNG: {}", quote_path(path), printable(p.message));
-    return ImageSize{png_get_image_width(p.png, p.info), png_get_image_height(p.png, p.info)};
+    return open_png(p, file, where);
+}
+
+Result<PngNumbers> decode_png_numbers(std::span<const std::byte> file, std::string_view where, uint64_t max_pixels)
+{
+    Png p;
+    PngNumbers image;
+    SR_TRY(image.info, open_png(p, file, where));
+    const Format format{0, image.info.bits == 16 ? 16 : 8, png_get_channels(p.png, p.info), true};
+    std::vector<uint8_t> rows;
+    SR_CHECK(decode_rows(p, image.info, file, where, format, max_pixels, [&](uint32_t width, uint32_t height) {
+        rows.resize(format.row_bytes(width) * height);
+        return rows.data();
+    }));
+    take_numbers(rows, format, image);
+    png_colorp colors = nullptr;
+    int count = 0;
+    if (image.info.kind == PngKind::palette && png_get_PLTE(p.png, p.info, &colors, &count))
+        for (int i = 0; i < count; ++i)
+            image.palette.push_back({colors[i].red, colors[i].green, colors[i].blue});
+    return image;
 }
 
 Result<ImageGray16> read_png_gray16(const Path& path)

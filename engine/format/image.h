@@ -6,7 +6,9 @@
 #include "runtime/base/file.h"
 #include "runtime/base/result.h"
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -47,6 +49,30 @@ Result<ImageRgb8> read_image_rgb8(const Path& path); // likewise, at most 1 GiB
 Status check_pixels(ImageSize size, uint64_t max_pixels, std::string_view where);
 
 Result<ImageSize> read_png_size(const Path& path);
+
+// what a PNG stores
+enum class PngKind { gray, gray_alpha, palette, rgb, rgba };
+struct PngInfo {
+    ImageSize size;
+    PngKind kind = PngKind::gray;
+    int bits = 8; // of a channel
+};
+Result<PngInfo> png_info(std::span<const std::byte> file, std::string_view where);
+
+// The numbers that a PNG stores, as they are: 1 to 16 bits, not scaled, no palette applied
+struct PngNumbers {
+    PngInfo info;
+    std::vector<uint16_t> values;                // [height, width]: gray, the index of a palette's colour, or red
+    std::vector<bool> transparent;               // [height, width] of kinds with alpha: it is 0
+    std::vector<std::array<uint8_t, 3>> palette; // sRGB
+    struct Color {
+        size_t pixel;
+        std::array<uint16_t, 3> rgb;
+    };
+    std::optional<Color> color; // the first pixel, not transparent, whose channels differ
+};
+Result<PngNumbers> decode_png_numbers(std::span<const std::byte> file, std::string_view where,
+                                      uint64_t max_pixels = kMaxImagePixels);
 
 // 16-bit gray as it is (depth in millimetres); another kind of PNG is refused
 struct ImageGray16 {

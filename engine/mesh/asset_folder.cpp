@@ -59,7 +59,9 @@ Result<int32_t> AssetFolder::texture(Mesh& mesh, std::string_view name, std::str
     if (entry != textures_.end())
         return entry->second;
     SR_TRY(ImageRgb8 image, read_texture_rgb8(path, budget_));
-    mesh.textures.push_back({std::move(image), wrap, wrap});
+    SR_TRY(const MappedFile file, MappedFile::open(path));
+    SR_TRY(std::vector<uint16_t> numbers, texture_numbers(file.bytes(), quote_path(path)));
+    mesh.textures.push_back({std::move(image), wrap, wrap, std::move(numbers)});
     return textures_[{path, wrap}] = int32_t(mesh.textures.size() - 1);
 }
 

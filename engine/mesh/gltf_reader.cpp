@@ -147,10 +147,11 @@ Result<int32_t> GltfReader::texture_of(int64_t image, TextureWrap u, TextureWrap
     const auto entry = textures_.find({file.data(), u, v});
     if (entry != textures_.end())
         return entry->second;
-    SR_TRY(ImageRgb8 pixels, decode_image_rgb8(file, fmt::format("{}: images[{}]", where_, image),
-                                               texture_budget_.pixels_left(file.size())));
+    const std::string where = fmt::format("{}: images[{}]", where_, image);
+    SR_TRY(ImageRgb8 pixels, decode_image_rgb8(file, where, texture_budget_.pixels_left(file.size())));
     texture_budget_.take(pixels);
-    mesh_.textures.push_back({std::move(pixels), u, v});
+    SR_TRY(std::vector<uint16_t> numbers, texture_numbers(file, where));
+    mesh_.textures.push_back({std::move(pixels), u, v, std::move(numbers)});
     return textures_[{file.data(), u, v}] = int32_t(mesh_.textures.size() - 1);
 }
 

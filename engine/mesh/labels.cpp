@@ -3,11 +3,13 @@
 #include "engine/mesh/labels.h"
 
 #include "engine/format/label_table.h"
+#include "engine/mesh/texture_atlas.h"
 #include "runtime/base/quote.h"
 
 #include <algorithm>
 #include <functional>
 #include <map>
+#include <set>
 
 namespace semrover {
 
@@ -65,6 +67,29 @@ bool matches(std::string_view pattern, std::string_view text)
     while (p < pattern.size() && pattern[p] == '*')
         ++p;
     return p == pattern.size();
+}
+
+// The numbers of a label texture become classes, as the map says, or kNoLabel; colours of classes stay what they are.
+void map_numbers(Texture& texture, const MeshLabelMap& map)
+{
+    std::map<uint16_t, std::optional<uint8_t>> known;
+    const auto class_of = [&](uint16_t number) {
+        const auto [at, fresh] = known.try_emplace(number);
+        if (fresh)
+            at->second = map.find(int64_t(number));
+        return at->second;
+    };
+    for (uint16_t& number : texture.numbers)
+        number = class_of(number).value_or(kNoLabel);
+    if (!texture.numbers.empty())
+        return;
+    for (size_t i = 0; i < texture.image.pixels.size(); i += 3) {
+        const uint8_t* rgb = &texture.image.pixels[i];
+        const bool gray = rgb[0] == rgb[1] && rgb[1] == rgb[2];
+        const std::optional<uint8_t> mapped = gray ? class_of(rgb[0]) : std::nullopt;
+        const bool number = gray && rgb[0] < kClassCount;
+        texture.numbers.push_back(mapped ? *mapped : number ? kNoLabel : label_of_pixel(rgb));
+    }
 }
 
 } // namespace
@@ -128,6 +153,10 @@ std::vector<UnlabelledFaces> label_faces(Mesh& mesh, LabelSource source, const M
             by_material[i] = mapped ? *mapped : class_of_material(m.name).value_or(kNoLabel);
         }
     }
+    std::set<int32_t> label_textures;
+    for (const Material& m : mesh.materials)
+        if (m.label_texture >= 0 && !map.empty() && label_textures.insert(m.label_texture).second)
+            map_numbers(mesh.textures[size_t(m.label_texture)], map);
     const bool own = source == LabelSource::automatic || source == LabelSource::face;
     const bool textures = (source == LabelSource::automatic || source == LabelSource::texture) && !mesh.uvs.empty();
     std::vector<uint8_t> labels(mesh.faces.size(), kNoLabel);

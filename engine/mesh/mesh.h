@@ -17,13 +17,14 @@ enum class TextureWrap : uint8_t { repeat, mirror, clamp };
 struct Texture {
     ImageRgb8 image; // sRGB
     TextureWrap wrap_u = TextureWrap::repeat, wrap_v = TextureWrap::repeat;
+    std::vector<uint16_t> numbers = {}; // [height, width] of a label texture; empty: its colours or grays say them
 };
 
 struct Material {
     std::string name;
     std::array<float, 3> color = {1, 1, 1}; // linear, 0..1; multiplies texture and vertex colours (glTF)
     int32_t texture = -1;                   // index into Mesh::textures; -1: none
-    int32_t label_texture = -1;             // likewise: pixels in palette colours, or label numbers as gray; nearest
+    int32_t label_texture = -1;             // likewise: colours of classes, or numbers; nearest
 };
 
 // A triangle mesh in the world's frame: metres, x forward, y left, z up. Optional arrays are empty when absent.

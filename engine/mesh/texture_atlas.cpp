@@ -20,12 +20,17 @@ uint64_t texels_of(const Texture& t)
 
 } // namespace
 
+uint8_t label_of_number(uint16_t number)
+{
+    return number < kClassCount ? uint8_t(number) : kNoLabel;
+}
+
 uint8_t label_of_pixel(const uint8_t* rgb)
 {
     for (uint8_t i = 0; i < kClassCount; ++i)
         if (std::equal(rgb, rgb + 3, kPalette[i].color.begin()))
             return i;
-    return rgb[0] == rgb[1] && rgb[1] == rgb[2] && rgb[0] < kClassCount ? rgb[0] : kNoLabel;
+    return rgb[0] == rgb[1] && rgb[1] == rgb[2] ? label_of_number(rgb[0]) : kNoLabel;
 }
 
 Result<TextureAtlas> TextureAtlas::create(Device& device, const Mesh& mesh, uint8_t default_label)
@@ -102,10 +107,12 @@ Status TextureAtlas::upload_texels(Device& device, const Mesh& mesh, const std::
         page.clear();
         return {};
     };
-    const auto add = [&](const ImageRgb8& image, bool labels) -> Status {
-        for (size_t i = 0; i < image.pixels.size(); i += 3) {
-            const uint8_t* p = &image.pixels[i];
-            const uint8_t label = labels ? label_of_pixel(p) : kNoLabel;
+    const auto add = [&](const Texture& texture, bool labels) -> Status {
+        for (size_t i = 0; i < texture.image.pixels.size(); i += 3) {
+            const uint8_t* p = &texture.image.pixels[i];
+            uint8_t label = kNoLabel;
+            if (labels)
+                label = texture.numbers.empty() ? label_of_pixel(p) : label_of_number(texture.numbers[i / 3]);
             page.push_back(labels ? (label == kNoLabel ? unknown : label)
                                   : uint32_t(p[0]) | uint32_t(p[1]) << 8 | uint32_t(p[2]) << 16);
             if (page.size() == page_texels)
@@ -115,9 +122,9 @@ Status TextureAtlas::upload_texels(Device& device, const Mesh& mesh, const std::
     };
     page.reserve(std::min(texels, page_texels));
     for (const Texture& t : mesh.textures)
-        SR_CHECK(add(t.image, false));
+        SR_CHECK(add(t, false));
     for (const int32_t source : label_sources)
-        SR_CHECK(add(mesh.textures[size_t(source)].image, true));
+        SR_CHECK(add(mesh.textures[size_t(source)], true));
     return page.empty() ? Status{} : flush();
 }
 

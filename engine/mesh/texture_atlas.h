@@ -43,5 +43,6 @@ class TextureAtlas {
 // The label of a pixel of a label texture: by its colour in the palette, else by its number as gray; kNoLabel if
 // neither.
 uint8_t label_of_pixel(const uint8_t* rgb);
+uint8_t label_of_number(uint16_t number); // likewise
 
 } // namespace semrover

@@ -5,12 +5,15 @@
 // one that read any of them is refused. Sizes and palettes are checked in front, for the same reason.
 #include "engine/mesh/texture_image.h"
 
+#include "engine/format/label_image.h"
+#include "engine/scene/palette.h"
 #include "engine/scene/srgb.h"
 #include "runtime/base/quote.h"
 
 #include <algorithm>
 #include <array>
 #include <cstdlib>
+#include <cstring>
 #include <memory>
 
 #define STB_IMAGE_IMPLEMENTATION
@@ -210,7 +213,36 @@ Result<ImageRgb8> decode(std::vector<std::byte> file, const std::string& where, 
     return fail(ErrorCode::bad_input, "{}: expected a PNG, JPEG, BMP, HDR or TGA image, found something else", where);
 }
 
+// whether the colours that a picture uses are all classes', or white
+bool in_class_colors(const PngNumbers& image)
+{
+    std::array<bool, 256> used{};
+    for (const uint16_t index : image.values)
+        used[index & 255] = true;
+    const auto known = [](const std::array<uint8_t, 3>& color) {
+        return color == std::array<uint8_t, 3>{255, 255, 255} ||
+               std::ranges::find(kPalette, color, &SemanticClass::color) != kPalette.end();
+    };
+    for (size_t i = 0; i < used.size(); ++i)
+        if (used[i] && !(i < image.palette.size() && known(image.palette[i])))
+            return false;
+    return true;
+}
+
 } // namespace
+
+Result<std::vector<uint16_t>> texture_numbers(std::span<const std::byte> file, std::string_view where)
+{
+    if (file.size() < 4 || std::memcmp(file.data(), "\x89PNG", 4) != 0)
+        return std::vector<uint16_t>();
+    SR_TRY(const PngInfo info, png_info(file, where));
+    if (info.kind == PngKind::rgb || info.kind == PngKind::rgba || (info.kind == PngKind::gray && info.bits == 8))
+        return std::vector<uint16_t>();
+    SR_TRY(PngNumbers image, decode_png_numbers(file, where));
+    if (info.kind == PngKind::palette && in_class_colors(image))
+        return std::vector<uint16_t>();
+    return label_numbers(std::move(image));
+}
 
 Result<ImageRgb8> read_texture_rgb8(const Path& path, TextureBudget& budget)
 {

@@ -30,4 +30,9 @@ class TextureBudget {
 // a file that is cut is refused, like one that exceeds the budget.
 Result<ImageRgb8> read_texture_rgb8(const Path& path, TextureBudget& budget);
 
+// The numbers of a label texture in a PNG whose colours are not its numbers: a palette in other than the classes'
+// colours says its indices; gray of 1, 2, 4 or 16 bits, and gray beside alpha (0: none), says its values. [height,
+// width]; empty for other pictures. bad_input; the file's colours were read before.
+Result<std::vector<uint16_t>> texture_numbers(std::span<const std::byte> file, std::string_view where);
+
 } // namespace semrover

@@ -38,7 +38,7 @@ Result<FrameFiles> list_frames(const Path& folder, std::string_view kind)
         base = folder / "frames";
     else if (is_folder(folder / kind))
         base = folder / kind;
-    SR_TRY(std::vector<Path> paths, list_all_images(base));
+    SR_TRY(std::vector<Path> paths, list_all_images(base, kind == "label"));
     const auto of_kind = [&](const Path& path) { return path.parent_path().filename() == kind; };
     if (std::ranges::any_of(paths, of_kind))
         std::erase_if(paths, [&](const Path& path) { return !of_kind(path); });
@@ -69,6 +69,18 @@ Result<std::vector<uint8_t>> read_gray_frame(const Path& path, ImageSize size)
     for (size_t i = 0; i < values.size(); ++i)
         values[i] = image.pixels[3 * i];
     return values;
+}
+
+Result<std::vector<uint8_t>> read_label_frame(const Path& path, ImageSize size, PictureClasses& map)
+{
+    SR_TRY(const LabelImage image, read_label_image(path));
+    SR_CHECK(check_size(path, image.size, size));
+    map.count(image);
+    std::vector<uint8_t> labels;
+    labels.reserve(image.numbers.size());
+    for (const uint16_t number : image.numbers)
+        labels.push_back(map[number] < kClassCount ? map[number] : kNoLabel);
+    return labels;
 }
 
 Result<ImageRgb8> read_color_frame(const Path& path, ImageSize size)

@@ -46,9 +46,9 @@ Result<std::vector<Path>> files_below(const Path& folder, std::initializer_list<
 
 } // namespace
 
-Result<std::vector<Path>> list_all_images(const Path& folder)
+Result<std::vector<Path>> list_all_images(const Path& folder, bool arrays)
 {
-    SR_TRY(std::vector<Path> files, files_below(folder, {".png", ".jpg", ".jpeg"}));
+    SR_TRY(std::vector<Path> files, files_below(folder, {".png", ".jpg", ".jpeg", arrays ? ".npy" : ".png"}));
     if (files.empty())
         return fail(ErrorCode::bad_input, "{}: no PNG or JPEG images in it", quote_path(folder));
     return files;
@@ -74,10 +74,12 @@ Result<std::vector<Path>> list_grids(const Path& path)
 {
     std::error_code error;
     if (fs::is_directory(path, error)) {
-        SR_TRY(std::vector<Path> files, files_below(path, {".sgrid"}));
-        if (files.empty())
-            return fail(ErrorCode::bad_input, "{}: no .sgrid files in it", quote_path(path));
-        return files;
+        for (const std::string_view kind : {".sgrid", ".ply"}) {
+            SR_TRY(std::vector<Path> files, files_below(path, {kind}));
+            if (!files.empty())
+                return files;
+        }
+        return fail(ErrorCode::bad_input, "{}: no .sgrid or .ply files in it", quote_path(path));
     }
     if (ending(path) != ".txt")
         return std::vector<Path>{path};

@@ -16,7 +16,7 @@ namespace semrover {
 namespace {
 
 struct EvalFramesArguments {
-    std::string frames, truth, visible, labels;
+    std::string frames, truth, visible, labels, map;
 };
 
 struct FrameInputs {
@@ -39,7 +39,7 @@ Result<FrameInputs> list_inputs(const EvalFramesArguments& o)
     return in;
 }
 
-Result<FrameSimilarity> measure_frame(const FrameInputs& in, const std::string& name)
+Result<FrameSimilarity> measure_frame(const FrameInputs& in, const std::string& name, PictureClasses& classes)
 {
     SR_TRY(const ImageRgb8 frame, read_color_frame(in.frames.at(name), {}));
     const ImageSize size{frame.width, frame.height};
@@ -49,7 +49,7 @@ Result<FrameSimilarity> measure_frame(const FrameInputs& in, const std::string& 
         SR_TRY(visible, read_gray_frame(in.visible.at(name), size));
     }
     if (!in.labels.empty()) {
-        SR_TRY(labels, read_gray_frame(in.labels.at(name), size));
+        SR_TRY(labels, read_label_frame(in.labels.at(name), size, classes));
     }
     if (frame.width < kSsimWindow || frame.height < kSsimWindow)
         return fail(ErrorCode::bad_input, "{} is {} x {} pixels, expected {} x {} or more, the window of SSIM",
@@ -116,12 +116,13 @@ void print(const FrameInputs& in, const FrameSimilarity& s, const FrameMean& mea
 Status eval_frames(const EvalFramesArguments& o, const Globals& globals)
 {
     SR_TRY(const FrameInputs in, list_inputs(o));
+    SR_TRY(PictureClasses classes, PictureClasses::create(o.map));
     FrameSimilarity total;
     FrameMean mean;
     Json rows = Json::array();
     Progress progress(progress_to_stderr(globals), "frames", "frames", in.frames.size());
     for (const auto& [name, path] : in.frames) {
-        SR_TRY(const FrameSimilarity s, measure_frame(in, name));
+        SR_TRY(const FrameSimilarity s, measure_frame(in, name, classes));
         total += s;
         if (std::isfinite(s.all.psnr())) {
             mean.psnr += s.all.psnr();
@@ -135,6 +136,7 @@ Status eval_frames(const EvalFramesArguments& o, const Globals& globals)
             return fail(ErrorCode::interrupted, "interrupted after {} of {} frames", rows.size(), in.frames.size());
     }
     progress.finish();
+    SR_CHECK(classes.check(quote_path(o.labels)));
     mean.psnr /= double(std::max<size_t>(mean.frames, 1));
     if (!globals.json) {
         print(in, total, mean);
@@ -160,7 +162,8 @@ void add_eval_frames(CLI::App& eval, const Globals& globals, Run& run)
         ->required();
     c->add_option("TRUTH", o->truth, "likewise: pictures of the same names and sizes")->required();
     c->add_option("--visible", o->visible, "masks of these names: also figures of what is at 128 or above, and below");
-    c->add_option("--labels", o->labels, "class numbers of these names, 8-bit: also figures of each class");
+    c->add_option("--labels", o->labels, "class numbers of these names, PNG or .npy: also figures of each class");
+    c->add_option("--map", o->map, "JSON: label number or name to class, or null for none");
     c->callback([o, &globals, &run] { run = [o, &globals] { return eval_frames(*o, globals); }; });
 }
 

@@ -1,0 +1,108 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/format/npy_image.h"
+
+#include "engine/format/npy.h"
+#include "runtime/base/quote.h"
+
+namespace semrover {
+
+namespace {
+
+struct NpyLayout {
+    NpyHeader header;
+    ImageSize size;
+};
+
+Result<NpyLayout> npy_layout(std::span<const std::byte> file, std::string_view where)
+{
+    const std::string_view text(reinterpret_cast<const char*>(file.data()), file.size());
+    SR_TRY(NpyHeader header, parse_npy_header(text.substr(0, kNpyHeaderBytes), where));
+    std::vector<uint64_t> shape = header.shape;
+    if (shape.size() == 3 && shape.back() == 1)
+        shape.pop_back();
+    else if (shape.size() == 3 && shape.front() == 1)
+        shape.erase(shape.begin());
+    if (shape.size() != 2)
+        return fail(ErrorCode::bad_input, "{}: an array of shape ({}), expected [height, width]", where,
+                    fmt::join(header.shape, ", "));
+    for (const uint64_t side : shape)
+        if (side < 1 || side > kMaxImageSide)
+            return fail(ErrorCode::bad_input, "{}: a picture of {} x {} pixels, expected 1 to {} each way", where,
+                        shape[1], shape[0], kMaxImageSide);
+    if (header.data_bytes > file.size() - header.bytes)
+        return fail(ErrorCode::bad_input, "{}: the file is cut: {} bytes of pixels, expected {}", where,
+                    file.size() - header.bytes, header.data_bytes);
+    const ImageSize size{uint32_t(shape[1]), uint32_t(shape[0])};
+    return NpyLayout{std::move(header), size};
+}
+
+template <typename T>
+std::vector<float> npy_values_as_floats(const NpyArray& array)
+{
+    const std::vector<T> values = array.values<T>();
+    return {values.begin(), values.end()};
+}
+
+std::vector<float> npy_floats(const NpyArray& array)
+{
+    switch (array.dtype) {
+    case DType::f64:
+        return npy_values_as_floats<double>(array);
+    case DType::i64:
+        return npy_values_as_floats<int64_t>(array);
+    case DType::u64:
+        return npy_values_as_floats<uint64_t>(array);
+    case DType::f32:
+        return array.values<float>();
+    case DType::i32:
+        return npy_values_as_floats<int32_t>(array);
+    case DType::u32:
+        return npy_values_as_floats<uint32_t>(array);
+    case DType::i16:
+        return npy_values_as_floats<int16_t>(array);
+    case DType::u16:
+        return npy_values_as_floats<uint16_t>(array);
+    case DType::i8:
+        return npy_values_as_floats<int8_t>(array);
+    case DType::u8:
+    case DType::boolean:
+        return npy_values_as_floats<uint8_t>(array);
+    case DType::f16:
+    case DType::bf16:
+        break;
+    }
+    std::vector<float> values(array.elements());
+    to_float(array.data, array.dtype, values.data());
+    return values;
+}
+
+} // namespace
+
+Result<NpyImage> decode_npy_image(std::span<const std::byte> file, std::string_view where)
+{
+    SR_TRY(const NpyLayout layout, npy_layout(file, where));
+    const auto data = file.subspan(layout.header.bytes, layout.header.data_bytes);
+    const DType type = layout.header.dtype;
+    const bool whole = type != DType::f16 && type != DType::f32 && type != DType::f64;
+    return NpyImage{layout.size, whole, npy_floats(decode_npy(layout.header, {data.begin(), data.end()}))};
+}
+
+bool is_npy(std::span<const std::byte> file)
+{
+    return std::string_view(reinterpret_cast<const char*>(file.data()), file.size()).starts_with("\x93NUMPY");
+}
+
+Result<ImageSize> number_image_size(const Path& path)
+{
+    const std::string where = quote_path(path);
+    SR_TRY(const MappedFile file, MappedFile::open(path));
+    if (is_npy(file.bytes())) {
+        SR_TRY(const NpyLayout layout, npy_layout(file.bytes(), where));
+        return layout.size;
+    }
+    SR_TRY(const PngInfo info, png_info(file.bytes(), where));
+    return info.size;
+}
+
+} // namespace semrover
