@@ -19,7 +19,6 @@ struct TsdfOptions {
     float truncation = 0.4f;                           // metres
     float band = 0.2f;                                 // metres from the surface within which a pixel colours and votes
     float max_depth = 30;                              // metres; pixels beyond it see nothing
-    float depth_scale = 0.001f;                        // metres of one unit of depth
     float min_weight = 0;                              // voxels with less stay unobserved
 
     uint32_t bitmap_words() const { return divide_up(blocks_x * blocks_y * blocks_z, 32); }
@@ -28,7 +27,7 @@ struct TsdfFrames {
     Tensor frames; // [F, kTsdfFrameWords] fp32 array: fx fy cx cy; rotation [3, 3], world to camera; the camera's
                    // centre in voxels from the box's lowest corner, whole (i32 bits) and rest; width, height (0: no
                    // frame), first pixel (u32 bits); two unused
-    Tensor pixels; // [P, 2] u32 array: depth (0 or 65535: nothing), label << 16; rgb
+    Tensor pixels; // [P, 2] u32 array: depth (fp32 bits, metres; 0: nothing); rgb | label << 24
 };
 
 // the plane through every pixel's surface, N p = 1 in camera coordinates

@@ -2,15 +2,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/format/camera_path.h"
 #include "engine/format/image.h"
+#include "engine/format/npy.h"
 #include "engine/scene/grid.h"
 #include "runtime/base/json.h"
 #include "tests/json_text.h"
+#include "tests/png_file.h"
 #include "tests/program.h"
 #include "tests/street_scene.h"
 
+#include <cmath>
 #include <fstream>
 #include <gtest/gtest.h>
 #include <map>
+#include <regex>
 
 namespace semrover {
 namespace cli_fuse_test {
@@ -72,6 +76,14 @@ class Drive {
         folder.put("in/" + std::string(name), text);
     }
 
+    static std::vector<uint16_t> millimetres(const std::vector<float>& metres)
+    {
+        std::vector<uint16_t> out;
+        for (const float d : metres)
+            out.push_back(uint16_t(std::lround(d * 1000)));
+        return out;
+    }
+
     ScratchFolder folder;
     StreetScene street;
     CameraPath path;
@@ -81,7 +93,7 @@ class Drive {
     {
         const DepthImages images = street.render(f);
         const uint32_t w = f.intrinsics.width, h = f.intrinsics.height;
-        EXPECT_TRUE(write_png_gray16(base / "depth" / (name + ".png"), w, h, images.depth));
+        EXPECT_TRUE(write_png_gray16(base / "depth" / (name + ".png"), w, h, millimetres(images.depth)));
         EXPECT_TRUE(write_png_gray8(base / "label" / (name + ".png"), w, h, images.labels));
         EXPECT_TRUE(write_png_rgb8(base / "color" / (name + ".png"), w, h, images.colors));
     }
@@ -205,7 +217,8 @@ TEST(CliFuse, unknown_labels_are_listed_with_counts_and_may_be_mapped)
     std::fill_n(labels.begin(), 5, 77);
     std::fill_n(labels.begin() + 5, 3, 200);
     ASSERT_TRUE(write_png_gray8(drive.in("label/000001.png"), 96, 72, labels));
-    drive.expect_refusal("unknown labels: 77 (5 pixels), 200 (3 pixels); --map FILE");
+    drive.expect_refusal("unknown labels: 77 (5 pixels), 200 (3 pixels); --map NAME or FILE says what they are; found "
+                         "are 0 road (");
     const Path map = drive.folder.put("map.json", R"({"77": "car", "200": null, "pole": 3})");
     EXPECT_EQ(drive.fuse("--map " + map.string()).code, 0);
     const auto grid = read_grid(drive.out() / "semantic.sgrid");
@@ -248,7 +261,7 @@ TEST(CliFuse, bad_input_is_one_line_and_leaves_nothing_behind)
          [&](const Drive& d) { EXPECT_TRUE(write_png_gray8(d.in("label/000000.png"), 50, 40, gray)); }},
         {"expected a PNG of 16-bit gray",
          [&](const Drive& d) { EXPECT_TRUE(write_png_rgb8(d.in("depth/000000.png"), 96, 72, rgb)); }},
-        {"expected class numbers in gray, found the colour (1, 2, 3) at column 0, row 0",
+        {"label/000001.png': a picture in colour, expected class numbers: a PNG of gray values or palette indices",
          [&](const Drive& d) {
              std::vector<uint8_t> colors = rgb;
              for (uint8_t i = 0; i < 3; ++i)
@@ -261,7 +274,7 @@ TEST(CliFuse, bad_input_is_one_line_and_leaves_nothing_behind)
         {"expected a path inside the folder, found '/etc/passwd'",
          [](const Drive& d) { d.replace_in("transforms.json", "color/000001.png", "/etc/passwd"); }},
         {"transform_matrix", [](const Drive& d) { d.replace_in("transforms.json", "transform_matrix", "matrix"); }},
-        {"nothing was observed: no pixel of 3 frames",
+        {"; --max-depth goes further (by default, to where a pixel is 0.55 voxels wide, so a larger --tsdf-voxel",
          [](const Drive& d) {
              const std::vector<uint16_t> none(96 * 72);
              for (const char* n : {"0", "1", "2"})
@@ -290,6 +303,301 @@ TEST(CliFuse, bad_input_is_one_line_and_leaves_nothing_behind)
         c.spoil(drive);
         drive.expect_refusal(c.says, c.more);
     }
+}
+
+// a flat wall 6 m ahead, seen by three cameras at (0, 0, 1.5) that look along x
+class Wall {
+  public:
+    static constexpr uint32_t kWidth = 80, kHeight = 60, kFocal = 60;
+    using Rows = std::function<std::string(uint32_t x, uint32_t y)>; // a pixel as a PNG has it
+
+    ScratchFolder folder;
+
+    Path in(std::string_view name) const { return folder / "in" / name; }
+    void put(const std::string& name, const std::string& bytes) const
+    {
+        fs::create_directories(in(name).parent_path());
+        folder.put("in/" + name, bytes);
+    }
+    void put_png(const std::string& name, int bits, int kind, const Rows& pixel, uint32_t times = 1,
+                 const std::string& palette = "") const
+    {
+        PngFile file{kWidth * times, kHeight * times, bits, kind, {}, palette};
+        for (uint32_t y = 0; y < file.height; ++y)
+            for (uint32_t x = 0; x < file.width; ++x)
+                file.rows += pixel(x / times, y / times);
+        put(name, file.bytes());
+    }
+    static std::string name(size_t i, const char* kind, const char* ending = "png")
+    {
+        return fmt::format("{}/{:06}.{}", kind, i, ending);
+    }
+    void put_depth(const std::string& name) const
+    {
+        put_png(name, 16, PngFile::kGray, [](uint32_t, uint32_t) { return std::string("\x17\x70"); });
+    }
+    void put_all_depth() const
+    {
+        for (size_t i = 0; i < 3; ++i)
+            put_depth(name(i, "depth"));
+    }
+    // `times`: of pictures so many times as wide as depth
+    void put_poses(double times = 1) const
+    {
+        Json frames = Json::array();
+        for (size_t i = 0; i < 3; ++i)
+            frames.push_back({{"file_path", name(i, "color")},
+                              {"transform_matrix", {{0, 0, -1, 0}, {-1, 0, 0, 0}, {0, 1, 0, 1.5}, {0, 0, 0, 1}}}});
+        put("transforms.json", Json{{"w", kWidth * times},
+                                    {"h", kHeight * times},
+                                    {"fl_x", kFocal * times},
+                                    {"cx", kWidth / 2 * times},
+                                    {"cy", kHeight / 2 * times},
+                                    {"frames", frames}}
+                                   .dump());
+    }
+    ProgramResult fuse(const std::string& more = "--default-label building") const
+    {
+        return semrover_program("fuse " + in("").string() + " -y -o " + (folder / "out").string() +
+                                " --max-depth 12 --tsdf-voxel 0.2 " + more);
+    }
+    VoxelGrid grid(const ProgramResult& result) const
+    {
+        EXPECT_EQ(result.code, 0) << result.err;
+        auto read = read_grid(folder / "out/voxfield.sgrid");
+        EXPECT_TRUE(read) << read.error().message;
+        return read ? std::move(*read) : VoxelGrid();
+    }
+    // the points lie where the wall is, 6 m ahead and as wide as it is seen
+    void expect_wall(const ProgramResult& result) const
+    {
+        const VoxelGrid g = grid(result);
+        std::array<double, 3> low{1e9, 1e9, 1e9}, high{-1e9, -1e9, -1e9};
+        for (size_t i = 0; i < g.points.size() / 3; ++i)
+            for (size_t a = 0; a < 3; ++a) {
+                const double x = (g.cells[i / 20][a] + 0.5) * 0.6 + double(half_to_float(g.points[3 * i + a]));
+                low[a] = std::min(low[a], x);
+                high[a] = std::max(high[a], x);
+            }
+        EXPECT_NEAR(low[0], 6, 0.01);
+        EXPECT_NEAR(high[0], 6, 0.01);
+        EXPECT_NEAR(low[1], -4, 0.25); // 40 pixels at 60 a radian: 4 m to each side
+        EXPECT_NEAR(high[1], 4, 0.25);
+        EXPECT_NEAR(low[2], -1.5, 0.25);
+        EXPECT_NEAR(high[2], 4.5, 0.25);
+    }
+    std::map<int, size_t> labels(const ProgramResult& result) const
+    {
+        std::map<int, size_t> counts;
+        for (const uint8_t label : grid(result).labels)
+            ++counts[label];
+        return counts;
+    }
+};
+
+std::string two_bytes(uint16_t value)
+{
+    return {char(value >> 8), char(value & 255)};
+}
+
+bool warns(const ProgramResult& result, std::string_view text)
+{
+    return result.err.find("semrover: warning: ") != std::string::npos && result.err.find(text) != std::string::npos;
+}
+
+TEST(CliFuse, depth_may_be_along_the_ray_in_carlas_colours_or_in_arrays)
+{
+    const Wall w;
+    w.put_poses();
+    w.put_all_depth();
+    w.expect_wall(w.fuse());
+    const auto far = [](uint32_t x, uint32_t y) {
+        return 6 * std::hypot((x + 0.5 - 40) / 60, (y + 0.5 - 30) / 60, 1); // metres along the ray
+    };
+    for (size_t i = 0; i < 3; ++i)
+        w.put_png(Wall::name(i, "depth"), 16, PngFile::kGray,
+                  [&](uint32_t x, uint32_t y) { return two_bytes(uint16_t(std::lround(5000 * far(x, y)))); });
+    w.expect_wall(w.fuse("--default-label building --depth-kind ray --depth-scale 0.0002"));
+    EXPECT_EQ(run_of(w.folder / "out")["settings"]["depth_kind"], "ray");
+    for (size_t i = 0; i < 3; ++i)
+        w.put_png(Wall::name(i, "depth"), 8, PngFile::kRgba,
+                  [](uint32_t, uint32_t) { return std::string("\x37\x89\x01\xff"); });
+    const ProgramResult carla = w.fuse();
+    w.expect_wall(carla);
+    EXPECT_TRUE(warns(carla, "is in 8-bit colour: read as CARLA's depth")) << carla.err;
+    EXPECT_FALSE(warns(w.fuse("--default-label building --depth-kind carla"), "CARLA"));
+    for (size_t i = 0; i < 3; ++i) {
+        fs::remove(w.in(Wall::name(i, "depth")));
+        NpyArray array{DType::f32, {Wall::kHeight, Wall::kWidth}, {}};
+        std::vector<float> metres;
+        for (uint32_t p = 0; p < Wall::kWidth * Wall::kHeight; ++p)
+            metres.push_back(float(far(p % Wall::kWidth, p / Wall::kWidth)));
+        array.data.assign(std::as_bytes(std::span(metres)).begin(), std::as_bytes(std::span(metres)).end());
+        const std::vector<std::byte> file = encode_npy(array);
+        w.put(Wall::name(i, "depth", "npy"), {reinterpret_cast<const char*>(file.data()), file.size()});
+    }
+    w.expect_wall(w.fuse("--default-label building --depth-kind ray"));
+}
+
+TEST(CliFuse, intrinsics_colours_and_labels_of_other_sizes_are_brought_to_depth)
+{
+    const Wall w;
+    w.put_all_depth();
+    // three times as wide: the left half blue and a building, the right red and a car
+    for (size_t i = 0; i < 3; ++i) {
+        w.put_png(
+            Wall::name(i, "color"), 8, PngFile::kRgb,
+            [](uint32_t x, uint32_t) { return x < 40 ? std::string("\0\0\xff", 3) : std::string("\xff\0\0", 3); }, 3);
+        w.put_png(
+            Wall::name(i, "label"), 8, PngFile::kGray,
+            [](uint32_t x, uint32_t) { return std::string(x < 40 ? "\x02" : "\x0d"); }, 2);
+    }
+    for (const double times : {1.0, 3.0}) { // intrinsics of depth, then of colour
+        w.put_poses(times);
+        const ProgramResult result = w.fuse("");
+        w.expect_wall(result);
+        EXPECT_EQ(
+            warns(result, "frame 0: intrinsics are of 240 x 180 pixels, depth has 80 x 60: they are scaled to depth"),
+            times == 3)
+            << result.err;
+        const VoxelGrid g = w.grid(result);
+        for (size_t cell = 0; cell < g.cells.size(); ++cell) {
+            const int j = g.cells[cell][1]; // left is +y
+            if (j >= -1 && j <= 0)
+                continue;
+            EXPECT_EQ(g.labels[cell], j > 0 ? 2 : 13);
+            EXPECT_EQ(g.colors[cell * 60], j > 0 ? 0 : 255);
+            EXPECT_EQ(g.colors[cell * 60 + 2], j > 0 ? 255 : 0);
+        }
+    }
+    w.put_png(Wall::name(1, "color"), 8, PngFile::kRgb, [](uint32_t, uint32_t) { return std::string("\0\0\0", 3); });
+    ASSERT_TRUE(write_png_rgb8(w.in(Wall::name(2, "color")), 80, 45, std::vector<uint8_t>(80 * 45 * 3)));
+    const ProgramResult wide = w.fuse("");
+    EXPECT_EQ(wide.code, 3);
+    EXPECT_NE(wide.err.find("is 80 x 45 pixels, the depth of its frame has 80 x 60: expected the same view"),
+              std::string::npos)
+        << wide.err;
+}
+
+TEST(CliFuse, intrinsics_of_colmap_and_kitti_are_used_and_colmaps_names_find_the_pictures)
+{
+    const Wall w;
+    // COLMAP knows pictures 0, 2 and 7 of eight; its size is twice that of depth
+    for (size_t i = 0; i < 8; ++i)
+        w.put_depth(Wall::name(i, "depth"));
+    for (const size_t i : {1, 3, 4, 5, 6})
+        w.put_png(Wall::name(i, "depth"), 16, PngFile::kGray, [](uint32_t, uint32_t) { return two_bytes(2000); });
+    fs::create_directory(w.folder / "colmap");
+    w.folder.put("colmap/cameras.txt", "1 PINHOLE 160 120 120 120 80 60\n");
+    std::string images;
+    for (const int i : {7, 0, 2})
+        images += fmt::format("{} 0.5 0.5 -0.5 0.5 0 1.5 0 1 {:06}.png\n\n", i + 1, i);
+    w.folder.put("colmap/images.txt", images);
+    const ProgramResult colmap = w.fuse("--default-label building --poses " + (w.folder / "colmap").string());
+    w.expect_wall(colmap);
+    EXPECT_TRUE(warns(colmap, "intrinsics are of 160 x 120 pixels, depth has 80 x 60")) << colmap.err;
+    EXPECT_EQ(run_of(w.folder / "out")["results"]["frames"], 3);
+    w.folder.put("colmap/cameras.txt", "1 OPENCV 160 120 120 120 80 60 0.1 0 0 0\n");
+    const ProgramResult lens = w.fuse("--poses " + (w.folder / "colmap").string());
+    EXPECT_EQ(lens.code, 3);
+    EXPECT_NE(lens.err.find("lens with distortion, expected a pinhole"), std::string::npos) << lens.err;
+
+    for (size_t i = 3; i < 8; ++i)
+        fs::remove(w.in(Wall::name(i, "depth")));
+    w.put_all_depth();
+    fs::create_directory(w.folder / "kitti");
+    std::string poses;
+    for (int i = 0; i < 3; ++i)
+        poses += "0 0 1 0 -1 0 0 0 0 -1 0 1.5\n";
+    const std::string kitti = "--default-label building --poses " + w.folder.put("kitti/poses.txt", poses).string();
+    const std::string projection = "P0: 60 0 39.5 0 0 60 29.5 0 0 0 1 0\n";
+    for (const std::string size : {"S_rect_00: 80 60\n", ""}) { // the odometry set's says none: depth's
+        w.folder.put("kitti/calib.txt", size + projection);
+        w.expect_wall(w.fuse(kitti));
+    }
+    w.folder.put("kitti/calib.txt", "S_rect_00: 160 120\nP0: 120 0 79.5 0 0 120 59.5 0 0 0 1 0\n");
+    w.expect_wall(w.fuse(kitti));
+    fs::remove(w.folder / "kitti/calib.txt");
+    EXPECT_NE(w.fuse(kitti).err.find("has no intrinsics: expected"), std::string::npos);
+}
+
+TEST(CliFuse, pictures_named_by_time_meet_the_poses_nearest_in_time)
+{
+    const Wall w;
+    // TUM RGB-D: depth at 10.00, 10.05, 10.10, 10.50 s; colour 4 ms later; poses each 10 ms up to 10.12 s
+    const auto far = [](uint32_t, uint32_t) { return two_bytes(30000); }; // 5000 a metre
+    for (const char* time : {"1305031110.000000", "1305031110.050000", "1305031110.100000", "1305031110.500000"})
+        w.put_png(fmt::format("depth/{}.png", time), 16, PngFile::kGray, far);
+    for (const char* time : {"1305031110.004000", "1305031110.054000", "1305031110.104000", "1305031110.504000"})
+        w.put_png(fmt::format("rgb/{}.png", time), 8, PngFile::kRgb,
+                  [](uint32_t, uint32_t) { return std::string("\xc8\x64\x32"); });
+    std::string poses = "# ground truth trajectory\n";
+    for (int i = 0; i < 13; ++i) // all but those of the depth pictures look away
+        poses += fmt::format("{:.4f} 0 0 1.5 {}\n", 1305031110.001 + 0.01 * i,
+                             i % 5 == 0 ? "-0.5 0.5 -0.5 0.5" : "0.5 0.5 0.5 0.5");
+    w.put("groundtruth.txt", poses);
+    const std::string lens = "--default-label building --fx 60";
+    const ProgramResult result = w.fuse(lens + " --depth-scale 0.0002");
+    w.expect_wall(result);
+    EXPECT_TRUE(warns(result, "1 of 4 depth pictures have no pose, colour or label within 0.02 s")) << result.err;
+    EXPECT_EQ(run_of(w.folder / "out")["results"]["colored_frames"], 3);
+    EXPECT_EQ(w.grid(result).colors[0], 200);
+    EXPECT_TRUE(warns(w.fuse(lens), "TUM RGB-D's own pictures have 5000 units a metre"));
+    // lists say times of any names
+    std::string list = "# depth maps\n# timestamp filename\n";
+    for (int i = 0; i < 3; ++i) {
+        const std::string name = fmt::format("shots/{}.png", i);
+        w.put_png(name, 16, PngFile::kGray, far);
+        list += fmt::format("{:.4f} {}\n", 1305031110 + 0.05 * i, name);
+    }
+    fs::remove_all(w.in("depth"));
+    fs::create_directories(w.in("depth"));
+    fs::rename(w.in("shots"), w.in("depth/shots"));
+    w.put("depth.txt", std::regex_replace(list, std::regex("shots/"), "depth/shots/"));
+    w.expect_wall(w.fuse(lens + " --depth-scale 0.0002"));
+    w.put("depth.txt", "1305031110.0 ../x.png\n");
+    EXPECT_NE(w.fuse(lens).err.find("depth.txt' line 1: expected a path inside the folder"), std::string::npos);
+    w.put("depth.txt", "5.0 depth/shots/0.png\n");
+    EXPECT_NE(w.fuse(lens).err.find("expected names or times in seconds of one clock"), std::string::npos);
+}
+
+TEST(CliFuse, class_numbers_come_from_every_kind_of_label_picture)
+{
+    const Wall w;
+    w.put_poses();
+    w.put_all_depth();
+    const auto fill = [&](int bits, int kind, const Wall::Rows& pixel, const std::string& palette = "") {
+        for (size_t i = 0; i < 3; ++i)
+            w.put_png(Wall::name(i, "label"), bits, kind, pixel, 1, palette);
+    };
+    const auto number = [](uint16_t left, uint16_t right) {
+        return [=](uint32_t x, uint32_t) { return two_bytes(x < 40 ? left : right); };
+    };
+    const auto byte = [](uint8_t left, uint8_t right) {
+        return [=](uint32_t x, uint32_t) { return std::string(1, char(x < 40 ? left : right)); };
+    };
+    fill(8, PngFile::kGray, byte(2, 13));
+    const std::map<int, size_t> expect = w.labels(w.fuse(""));
+    EXPECT_EQ(expect.size(), 2u);
+    fill(16, PngFile::kGray, number(2, 13));
+    EXPECT_EQ(w.labels(w.fuse("")), expect);
+    fill(8, PngFile::kPalette, byte(2, 13), std::string(3 * 20, '\x55')); // whatever the colours
+    EXPECT_EQ(w.labels(w.fuse("")), expect);
+    fill(16, PngFile::kGray, number(65535, 13)); // nothing on the left
+    EXPECT_EQ(w.labels(w.fuse("")).count(2), 0u);
+
+    fill(8, PngFile::kGray, byte(11, 26)); // building and car of Cityscapes; 11 is person here
+    const ProgramResult foreign = w.fuse("");
+    EXPECT_EQ(foreign.code, 3);
+    EXPECT_NE(foreign.err.find("unknown labels: 26 (7200 pixels); --map NAME or FILE says what they are; found are 11 "
+                               "person (7200 pixels), 26 (7200 pixels, unknown)"),
+              std::string::npos)
+        << foreign.err;
+    EXPECT_NE(foreign.err.find("cityscapes"), std::string::npos) << foreign.err;
+    EXPECT_EQ(w.labels(w.fuse("--map cityscapes")), expect);
+    fill(16, PngFile::kGray, number(300, 301));
+    w.folder.put("map.json", R"({"300": "building", "301": "car"})");
+    EXPECT_EQ(w.labels(w.fuse("--map " + (w.folder / "map.json").string())), expect);
 }
 
 TEST(CliFuse, device_memory_that_does_not_suffice_is_refused_and_little_of_it_gives_the_same)

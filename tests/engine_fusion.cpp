@@ -1,6 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/fusion/fuse.h"
+#include "engine/fusion/resampling.h"
+#include "engine/fusion/timed_pictures.h"
 #include "tests/kernel_case.h"
 #include "tests/says.h"
 #include "tests/street_scene.h"
@@ -179,6 +181,35 @@ TEST(EngineFusion, poses_that_cannot_be_and_empty_pictures_are_bad_input)
     FusionOptions fine = kOptions;
     fine.voxel = 0.02;
     EXPECT_TRUE(says(fuse(test_device(), kStreet.frames(wide), fine), "use a larger --tsdf-voxel"));
+}
+
+TEST(EngineFusion, pixels_of_other_sizes_meet_at_their_centres)
+{
+    const std::vector<uint8_t> wide = {1, 2, 3, 4, 5, 6};
+    EXPECT_EQ(nearest_pixels(wide, {6, 1}, {2, 1}), (std::vector<uint8_t>{2, 5}));
+    EXPECT_EQ(nearest_pixels(wide, {3, 2}, {6, 2}), (std::vector<uint8_t>{1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6}));
+    EXPECT_EQ(nearest_pixels(wide, {6, 1}, {6, 1}), wide);
+    // the mean of light: half of black and white is 188
+    const ImageRgb8 checks{4, 1, {0, 0, 0, 255, 255, 255, 10, 20, 30, 10, 20, 30}};
+    EXPECT_EQ(resampled(checks, {2, 1}).pixels, (std::vector<uint8_t>{188, 188, 188, 10, 20, 30}));
+    EXPECT_EQ(resampled(checks, {4, 1}).pixels, checks.pixels);
+    EXPECT_EQ(resampled(checks, {8, 1}).pixels[3], 0);
+    EXPECT_EQ(resampled(checks, {8, 1}).pixels[6], 255);
+    EXPECT_EQ(resampled(checks, {3, 1}).pixels, (std::vector<uint8_t>{0, 0, 0, 188, 188, 189, 10, 20, 30}));
+    EXPECT_TRUE(same_view({1296, 968}, {640, 480})); // ScanNet
+    EXPECT_FALSE(same_view({1920, 1080}, {640, 480}));
+}
+
+TEST(EngineFusion, times_are_associated_the_closest_first_and_each_once)
+{
+    using Pairs = std::vector<std::pair<size_t, size_t>>;
+    const std::vector<double> a = {0, 0.033, 0.066, 1}, b = {-0.019, 0.012, 0.031, 0.052, 0.9801, 1.1};
+    EXPECT_EQ(*associate_times(a, b), (Pairs{{0, 1}, {1, 2}, {2, 3}, {3, 4}}));
+    // 0.033 is 0.019 from both; the pair of 0.066 is closer
+    EXPECT_EQ(*associate_times(std::vector<double>{0.033, 0.066}, std::vector<double>{0.052}), (Pairs{{1, 0}}));
+    EXPECT_TRUE(associate_times(a, {})->empty());
+    const std::vector<double> same(3000, 5.0);
+    EXPECT_TRUE(says(associate_times(same, same), "more than 4194304 pairs of times are within 0.02 s"));
 }
 
 } // namespace engine_fusion_test

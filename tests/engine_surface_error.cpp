@@ -131,7 +131,7 @@ TEST(engine_surface_error, views_are_counted_where_the_depth_agrees)
     camera.intrinsics = {50, 50, 50, 40, 100, 80};
     DepthFrames frames{{camera, camera}, [](size_t i) -> Result<DepthImages> {
                            DepthImages images;
-                           images.depth.assign(100 * 80, i == 0 ? 5000 : 0);
+                           images.depth.assign(100 * 80, i == 0 ? 5.f : 0.f);
                            return images;
                        }};
     const auto views = count_views(mesh, frames);

@@ -78,8 +78,8 @@ struct Pictures {
                     depth += 3 * o.voxel; // a step
                 const bool hole = random() % 13 == 0;
                 const uint32_t label = random() % 4 == 0 ? 255 : random() % 20;
-                pixels.push_back((hole ? random() % 2 * 65535 : uint32_t(depth / o.depth_scale)) | label << 16);
-                pixels.push_back(uint32_t(random() & 0xffffff));
+                pixels.push_back(std::bit_cast<uint32_t>(hole ? 0.f : float(depth)));
+                pixels.push_back(uint32_t(random() & 0xffffff) | label << 24);
             }
             cameras.push_back(c);
             add_row(c);
@@ -122,8 +122,8 @@ Plane plane_of(const Pictures& pictures, const Camera& c, uint32_t u, uint32_t v
     const auto inverse = [&](int x, int y) { // 0 for nothing, and for all neighbours across a border
         if ((x != int(u) && !inner_x) || (y != int(v) && !inner_y))
             return 0.0;
-        const uint32_t d = pictures.pixels[2 * (c.first + uint32_t(y) * c.width + uint32_t(x))] & 0xffff;
-        return d == 0 || d == 65535 ? 0.0 : 1 / (d * double(o.depth_scale));
+        const auto d = std::bit_cast<float>(pictures.pixels[2 * (c.first + uint32_t(y) * c.width + uint32_t(x))]);
+        return d == 0 ? 0.0 : 1 / double(d);
     };
     const int x = int(u), y = int(v);
     const uint32_t at = c.first + v * c.width + u;
@@ -154,8 +154,8 @@ Plane plane_of(const Pictures& pictures, const Camera& c, uint32_t u, uint32_t v
     for (const bool is_off : {off(w - a, inverse(x - 1, y)), off(w + a, inverse(x + 1, y)),
                               off(w - b, inverse(x, y - 1)), off(w + b, inverse(x, y + 1))})
         plane.edge = plane.edge || is_off;
-    plane.rgb = pictures.pixels[2 * at + 1];
-    plane.label = std::min(pictures.pixels[2 * at] >> 16 & 255, 31u);
+    plane.rgb = pictures.pixels[2 * at + 1] & 0xffffff;
+    plane.label = std::min(pictures.pixels[2 * at + 1] >> 24, 31u);
     return plane;
 }
 
@@ -268,10 +268,10 @@ TEST(kernel_tsdf, one_pixel_touches_its_truncation_and_no_more)
     for (const auto& [at, v] : {std::pair{13, 12}, {14, 12}, {15, 4}, {19, 1}, {20, 1}})
         row[size_t(at)] = std::bit_cast<float>(int32_t(v));
     for (const auto& [depth, expect] :
-         {std::pair{1300u, 0b11000000u}, {650u, 0b01100000u}, {300u, 0b01100000u}, {350u, 0b01100000u}, {0u, 0u}}) {
+         {std::pair{1.3f, 0b11000000u}, {0.65f, 0b01100000u}, {0.3f, 0b01100000u}, {0.35f, 0b01100000u}, {0.f, 0u}}) {
         KernelCase k(test_device());
         const Tensor frames = k.input(row, kTsdfFrameWords);
-        const Tensor pixels = k.input(std::vector<uint32_t>{depth, 0}, 2);
+        const Tensor pixels = k.input(std::vector<uint32_t>{std::bit_cast<uint32_t>(depth), 0}, 2);
         const Tensor bitmap = k.input(std::vector<uint32_t>(1));
         tsdf_touch(k.graph, frames, tsdf_planes(k.graph, {frames, pixels}, o), o, bitmap);
         ASSERT_TRUE(k.compile_and_run());
@@ -470,7 +470,7 @@ TEST(kernel_tsdf, a_counter_stops_at_65535)
         row[size_t(at)] = std::bit_cast<float>(int32_t(v));
     KernelCase k(test_device());
     const Tensor frames = k.input(row, kTsdfFrameWords);
-    const Tensor pixels = k.input(std::vector<uint32_t>{1000 | 4 << 16, 0}, 2);
+    const Tensor pixels = k.input(std::vector<uint32_t>{std::bit_cast<uint32_t>(1.f), 4 << 24}, 2);
     std::vector<uint32_t> votes(512 * kTsdfVoteWords);
     std::fill_n(votes.begin() + 2 * 512, 512, 65534u | 7u << 16);
     const TsdfState state{k.input(std::vector<uint32_t>{0}), k.input(std::vector<float>(512 * kTsdfStateFields)),

@@ -83,7 +83,7 @@ class StreetScene {
                         depth = t;
                         label = s.label;
                     }
-                images.depth.push_back(depth < 65 ? uint16_t(std::lround(depth * 1000)) : uint16_t(0));
+                images.depth.push_back(depth < 65 ? float(std::lround(depth * 1000)) * 0.001f : 0.f);
                 images.labels.push_back(label);
                 images.colors.insert(images.colors.end(), kPalette[label].color.begin(), kPalette[label].color.end());
             }

@@ -40,6 +40,7 @@ struct CameraFrame {
     std::string camera; // name of the sensor; empty when there is one without a name
     Pose pose;
     Intrinsics intrinsics;
+    std::string picture = {}; // what a path calls its picture, with folders; empty: the path names none
 };
 
 // what the poses of a file are of, where it is not a camera

@@ -118,6 +118,7 @@ Result<CameraPath> read_colmap(const Path& folder)
         if (one_folder) // "images/000001.jpg": where the pictures are, no camera's name
             named.frame.camera.clear();
         named.frame.time = counts[named.frame.camera]++;
+        named.frame.picture = std::move(named.name);
         path.frames.push_back(std::move(named.frame));
     }
     std::ranges::stable_sort(path.frames, {}, &CameraFrame::time);

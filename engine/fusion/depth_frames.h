@@ -10,7 +10,7 @@ namespace semrover {
 
 // pictures of one frame, [height, width], top row first
 struct DepthImages {
-    std::vector<uint16_t> depth; // along the optical axis, in units of FusionOptions::depth_scale; 0, 65535: nothing
+    std::vector<float> depth;    // metres along the optical axis; 0: nothing
     std::vector<uint8_t> labels; // class or kNoLabel; empty: no labels
     std::vector<uint8_t> colors; // [.., 3] sRGB; empty: gray
 };

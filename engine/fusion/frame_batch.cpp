@@ -39,7 +39,7 @@ std::array<float, kTsdfFrameWords> table_row(const CameraFrame& frame, const Fus
     return row;
 }
 
-// depth, label << 16; rgb
+// depth; rgb, label << 24
 void pack(const DepthImages& images, uint32_t excluded, uint32_t* out)
 {
     for (size_t i = 0; i < images.depth.size(); ++i) {
@@ -49,8 +49,8 @@ void pack(const DepthImages& images, uint32_t excluded, uint32_t* out)
         if (!images.colors.empty())
             rgb = images.colors[3 * i] | uint32_t(images.colors[3 * i + 1]) << 8 |
                   uint32_t(images.colors[3 * i + 2]) << 16;
-        out[2 * i] = (used ? images.depth[i] : 0u) | label << 16;
-        out[2 * i + 1] = rgb;
+        out[2 * i] = std::bit_cast<uint32_t>(used ? images.depth[i] : 0.f);
+        out[2 * i + 1] = rgb | label << 24;
     }
 }
 

@@ -3,13 +3,15 @@
 #include "engine/fusion/fusion_folder.h"
 
 #include "engine/format/camera_path.h"
-#include "engine/format/image.h"
+#include "engine/format/npy_image.h"
+#include "engine/fusion/resampling.h"
+#include "engine/fusion/timed_pictures.h"
 #include "engine/mesh/mesh.h"
 #include "runtime/base/json_numbers.h"
 #include "runtime/base/quote.h"
 
 #include <algorithm>
-#include <map>
+#include <limits>
 
 namespace semrover {
 
@@ -17,34 +19,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// a path of a file, kept inside the folder
-Result<Path> inside(const Path& folder, const Json& name, std::string_view where)
-{
-    if (!name.is_string())
-        return fail(ErrorCode::bad_input, "{}: expected a text, found {}", where, name.type_name());
-    const std::string& text = name.get_ref<const std::string&>();
-    const Path relative = Path(text).lexically_normal();
-    if (text.empty() || text.find('\0') != std::string::npos || relative.is_absolute() || *relative.begin() == "..")
-        return fail(ErrorCode::bad_input, "{}: expected a path inside the folder, found {}", where, quote(text));
-    return folder / relative;
-}
+// a focal length that no camera has: a path that says none of its own comes back with it
+constexpr double kNotSaid = std::numeric_limits<double>::min();
 
-// what a picture is called in the folder `kind` beside its own; of one that lies in no folder, in the folder itself
-Path sibling(const Path& folder, const Path& picture, const char* kind)
+std::string text_of(ImageSize size)
 {
-    const Path parent = picture.parent_path();
-    return (parent == folder ? folder : parent.parent_path()) / kind / (picture.stem().string() + ".png");
-}
-
-// the picture, whichever of the extensions it has; the name itself where there is none
-Path with_extension(Path picture)
-{
-    if (is_file(picture))
-        return picture;
-    for (const char* extension : {".png", ".jpg", ".jpeg"})
-        if (Path other = picture; is_file(other.replace_extension(extension)))
-            return other;
-    return picture;
+    return fmt::format("{} x {}", size.width, size.height);
 }
 
 bool is_jpeg(const Path& path)
@@ -52,17 +32,12 @@ bool is_jpeg(const Path& path)
     return path.extension() == ".jpg" || path.extension() == ".jpeg";
 }
 
-// pictures of a kind that a camera's folder has; none of a kind that has no folder
-Path optional_picture(const Path& picture)
+Status check_view(const Path& path, ImageSize size, ImageSize depth)
 {
-    return is_folder(picture.parent_path()) ? with_extension(picture) : Path();
-}
-
-Status check_size(const Path& path, uint32_t width, uint32_t height, const Intrinsics& k)
-{
-    if (width != k.width || height != k.height)
-        return fail(ErrorCode::bad_input, "{} is {} x {} pixels, the camera has {} x {}", quote_path(path), width,
-                    height, k.width, k.height);
+    if (!same_view(size, depth))
+        return fail(ErrorCode::bad_input,
+                    "{} is {} pixels, the depth of its frame has {}: expected the same view, of any number of pixels",
+                    quote_path(path), text_of(size), text_of(depth));
     return {};
 }
 
@@ -105,13 +80,28 @@ Result<ImageSize> first_depth_size(const Path& folder)
 {
     std::vector<Path> found;
     std::error_code error;
-    for (const auto& entry : fs::recursive_directory_iterator(folder, error))
-        if (entry.path().parent_path().filename() == "depth" && entry.path().extension() == ".png")
+    for (const auto& entry : fs::recursive_directory_iterator(folder, error)) {
+        const Path relative = entry.path().parent_path().lexically_relative(folder);
+        const bool picture = entry.path().extension() == ".png" || entry.path().extension() == ".npy";
+        if (picture && std::ranges::find(relative, Path("depth")) != relative.end())
             found.push_back(entry.path());
+    }
     if (found.empty())
-        return fail(ErrorCode::bad_input, "{}: no depth/*.png, expected 16-bit gray pictures there",
+        return fail(ErrorCode::bad_input, "{}: no depth/*.png or depth/*.npy, expected 16-bit gray pictures there",
                     quote_path(folder));
-    return read_png_size(*std::ranges::min_element(found));
+    return number_image_size(*std::ranges::min_element(found));
+}
+
+// --poses, transforms.json, or what TUM RGB-D calls them
+Result<Path> poses_of(const Path& folder, const Path& given)
+{
+    if (!given.empty())
+        return given;
+    for (const char* name : {"transforms.json", "groundtruth.txt"})
+        if (is_file(folder / name))
+            return folder / name;
+    return fail(ErrorCode::bad_input, "{} is missing; another camera path may be given with --poses",
+                quote_path(folder / "transforms.json"));
 }
 
 } // namespace
@@ -120,91 +110,77 @@ Result<FusionFolder> FusionFolder::open(const Path& folder, const FusionFolderOp
 {
     if (!is_folder(folder))
         return fail(ErrorCode::bad_input, "{}: expected a folder of depth/, poses and pictures", quote_path(folder));
-    const Path poses = options.poses.empty() ? folder / "transforms.json" : options.poses;
-    if (options.poses.empty() && !is_file(poses))
-        return fail(ErrorCode::bad_input, "{} is missing; another camera path may be given with --poses",
-                    quote_path(poses));
+    SR_TRY(const Path poses, poses_of(folder, options.poses));
     FusionFolder f;
     f.folder_ = folder;
-    f.map_ = LabelMap::identity();
-    if (!options.map.empty())
-        SR_CHECK(f.map_.apply(options.map));
-    if (!f.map_.knows(kNoLabel))
-        f.map_.set(kNoLabel, "nothing", kEmpty);
+    f.encoding_ = options.depth;
+    SR_TRY(f.classes_, PictureClasses::create(options.map));
     SR_CHECK(f.read_poses(poses, options));
-    SR_CHECK(f.find_pictures(poses));
-    SR_CHECK(f.check_count(poses));
+    SR_CHECK(f.find_frames(poses, options));
     SR_CHECK(f.check_pictures());
-    LabelMap lookup = f.map_; // asking counts
-    for (size_t i = 0; i < f.classes_.size(); ++i)
-        f.classes_[i] = lookup(uint32_t(i));
+    SR_CHECK(f.note_encoding());
     return f;
 }
 
 Status FusionFolder::read_poses(const Path& poses, const FusionFolderOptions& o)
 {
-    std::optional<Intrinsics> fallback;
+    const auto size = first_depth_size(folder_);
+    const bool json = poses.extension() == ".json";
+    if (!size && (!json || o.fx || o.fov_x))
+        return tl::unexpected(size.error());
+    Intrinsics fallback{kNotSaid, kNotSaid, 0, 0, size ? size->width : 1, size ? size->height : 1};
     if (o.fx || o.fov_x) {
-        SR_TRY(const ImageSize size, first_depth_size(folder_));
-        fallback = pinhole_from_fov(o.fov_x.value_or(90), size.width, size.height);
-        SR_CHECK(apply_options(o, *fallback));
+        fallback = pinhole_from_fov(o.fov_x.value_or(90), fallback.width, fallback.height);
+        SR_CHECK(apply_options(o, fallback));
     } else if (is_file(folder_ / "intrinsics.json")) {
         SR_TRY(fallback, read_intrinsics_file(folder_ / "intrinsics.json"));
     }
     const std::optional<FoundPath> found = find_path(poses);
     CameraPath path;
-    if (fallback || !found || found->format == PathFormat::colmap || found->format == PathFormat::camera_path) {
-        SR_TRY(path, read_camera_path(poses, fallback.value_or(pinhole_from_fov(90, 1, 1)), o.placement));
-    } else if (found->format == PathFormat::transforms) {
+    if (size || !found || found->format != PathFormat::transforms) {
+        SR_TRY(path, read_camera_path(poses, fallback, o.placement));
+    } else {
         SR_TRY(path, read_transforms(found->path));
         SR_CHECK(place_path(path, o.placement, quote_path(poses)));
-    } else {
-        return fail(ErrorCode::bad_input,
-                    "{} has no intrinsics: expected {}, or --fx (and --fy, --cx, --cy), or --fov-x", quote_path(poses),
-                    quote_path(folder_ / "intrinsics.json"));
     }
     warnings_ = std::move(path.warnings);
     if (path.body)
         warnings_.push_back(body_text(quote_path(poses), *path.body));
     cameras_ = std::move(path.frames);
     for (size_t i = 0; i < cameras_.size(); ++i) {
-        SR_CHECK(apply_options(o, cameras_[i].intrinsics));
-        if (cameras_[i].intrinsics.model != CameraModel::pinhole)
+        Intrinsics& k = cameras_[i].intrinsics;
+        if (k.fx == kNotSaid)
             return fail(ErrorCode::bad_input,
-                        "{}: {} has a lens with distortion, expected a pinhole: undistort its "
-                        "pictures first",
+                        "{} has no intrinsics: expected {}, or --fx (and --fy, --cx, --cy), or --fov-x",
+                        quote_path(poses), quote_path(folder_ / "intrinsics.json"));
+        SR_CHECK(apply_options(o, k));
+        if (k.model != CameraModel::pinhole)
+            return fail(ErrorCode::bad_input,
+                        "{}: {} has a lens with distortion, expected a pinhole: undistort its pictures first (COLMAP: "
+                        "image_undistorter)",
                         quote_path(poses), name_of(i));
     }
     return {};
 }
 
-Status FusionFolder::find_pictures(const Path& poses)
+// by time, where the folder's pictures are named so and the path's are not
+Status FusionFolder::find_frames(const Path& poses, const FusionFolderOptions& o)
 {
-    Json frames;
-    if (poses.extension() == ".json") {
-        SR_TRY(const Json file, read_json(poses));
-        frames = file.is_object() ? file.value("frames", Json()) : Json();
+    const bool named = poses.extension() == ".json" || !cameras_[0].picture.empty();
+    if (named || !has_timed_pictures(folder_)) {
+        SR_TRY(pictures_, find_pictures(folder_, poses, cameras_));
+        return {};
     }
-    std::map<std::string, uint32_t> counts;
-    for (size_t i = 0; i < cameras_.size(); ++i) {
-        const std::string& camera = cameras_[i].camera;
-        const Path base = camera.empty() ? folder_ : folder_ / camera;
-        Path picture = base / "color" / fmt::format("{:06}.png", counts[camera]++);
-        const Json* frame = frames.is_array() && i < frames.size() && frames[i].is_object() ? &frames[i] : nullptr;
-        const auto named = [&](const char* key, Path& path) -> Status {
-            if (frame && frame->contains(key)) {
-                SR_TRY(path, inside(folder_, (*frame)[key], fmt::format("{} frame {}: {}", quote_path(poses), i, key)));
-            }
-            return {};
-        };
-        SR_CHECK(named("file_path", picture));
-        Pictures p{sibling(folder_, picture, "depth"), {}, optional_picture(picture)};
-        Path label = sibling(folder_, picture, "label");
-        SR_CHECK(named("depth_file_path", p.depth));
-        SR_CHECK(named("label_file_path", label));
-        p.label = optional_picture(label);
-        pictures_.push_back(std::move(p));
-    }
+    SR_TRY(TimedFrames timed, find_timed_pictures(folder_, poses, cameras_));
+    cameras_ = std::move(timed.cameras);
+    pictures_ = std::move(timed.pictures);
+    if (cameras_.size() < timed.depths)
+        warnings_.push_back(fmt::format("{} of {} depth pictures have no pose, colour or label within {} s and are "
+                                        "left out",
+                                        timed.depths - cameras_.size(), timed.depths, kSameMoment));
+    if (poses.filename() == "groundtruth.txt" && !o.depth.unit && pictures_[0].depth.extension() == ".png")
+        warnings_.push_back("depth is read as millimetres; TUM RGB-D's own pictures have 5000 units a metre: "
+                            "--depth-scale 0.0002");
     return {};
 }
 
@@ -214,106 +190,117 @@ std::string FusionFolder::name_of(size_t frame) const
     return camera.empty() ? fmt::format("frame {}", frame) : fmt::format("frame {} ({})", frame, printable(camera));
 }
 
-// pictures that are numbered must be as many as poses, else they were paired wrongly
-Status FusionFolder::check_count(const Path& poses) const
-{
-    std::map<Path, size_t> used;
-    for (const Pictures& p : pictures_)
-        if (p.depth.stem().string().size() == 6)
-            ++used[p.depth.parent_path()];
-    for (const auto& [folder, frames] : used) {
-        size_t found = 0;
-        std::error_code error;
-        for (const auto& entry : fs::directory_iterator(folder, error))
-            found += entry.path().extension() == ".png";
-        if (found > frames && poses.extension() != ".json")
-            return fail(ErrorCode::bad_input, "{} holds {} pictures, {} has {} poses", quote_path(folder), found,
-                        quote_path(poses), frames);
-    }
-    return {};
-}
-
-Status FusionFolder::check_pictures() const
+Status FusionFolder::check_pictures()
 {
     for (size_t i = 0; i < cameras_.size(); ++i) {
-        const Pictures& p = pictures_[i];
-        const Intrinsics& k = cameras_[i].intrinsics;
+        const FramePictures& p = pictures_[i];
         for (const Path* path : {&p.depth, &p.label, &p.color})
             if (!path->empty() && !is_file(*path))
                 return fail(ErrorCode::bad_input, "{}: {} is missing", name_of(i), quote_path(*path));
-        for (const Path* path : {&p.depth, &p.label, &p.color}) {
+        SR_CHECK(fit_intrinsics(i));
+        const ImageSize depth = depth_size(i);
+        for (const Path* path : {&p.label, &p.color}) {
             if (path->empty() || is_jpeg(*path))
                 continue;
-            SR_TRY(const ImageSize size, read_png_size(*path));
-            SR_CHECK(check_size(*path, size.width, size.height, k));
+            SR_TRY(const ImageSize size, number_image_size(*path));
+            SR_CHECK(check_view(*path, size, depth));
         }
     }
     return {};
 }
 
-Result<std::vector<uint8_t>> FusionFolder::read_labels(size_t frame) const
+// intrinsics are of pictures of their own size, maybe of the colours: depth of another size has the same view
+Status FusionFolder::fit_intrinsics(size_t frame)
 {
-    const Path& path = pictures_[frame].label;
-    SR_TRY(const ImageRgb8 image, read_png_rgb8(path));
-    SR_CHECK(check_size(path, image.width, image.height, cameras_[frame].intrinsics));
-    std::vector<uint8_t> labels(image.pixels.size() / 3);
-    for (size_t i = 0; i < labels.size(); ++i) {
-        const uint8_t* rgb = &image.pixels[3 * i];
-        if (rgb[0] != rgb[1] || rgb[0] != rgb[2])
-            return fail(ErrorCode::bad_input,
-                        "{}: expected class numbers in gray, found the colour ({}, {}, {}) at column {}, row {}",
-                        quote_path(path), rgb[0], rgb[1], rgb[2], i % image.width, i / image.width);
-        labels[i] = rgb[0];
-    }
-    return labels;
+    const Path& path = pictures_[frame].depth;
+    Intrinsics& k = cameras_[frame].intrinsics;
+    SR_TRY(const ImageSize size, number_image_size(path));
+    const ImageSize said{k.width, k.height};
+    if (size == said)
+        return {};
+    if (!same_view(size, said))
+        return fail(ErrorCode::bad_input,
+                    "{} is {} pixels, the camera has {}: expected the same view, of any number of pixels",
+                    quote_path(path), text_of(size), text_of(said));
+    if (!scaled_)
+        warnings_.push_back(fmt::format("{}: intrinsics are of {} pixels, depth has {}: they are scaled to depth",
+                                        name_of(frame), text_of(said), text_of(size)));
+    scaled_ = true;
+    k = scaled_to(k, size.width, size.height);
+    return {};
+}
+
+// what is taken for granted about depth is said
+Status FusionFolder::note_encoding()
+{
+    SR_TRY(const DepthImage depth, read_depth_image(pictures_[0].depth, encoding_));
+    if (depth.kind == DepthKind::carla && !encoding_.kind)
+        warnings_.push_back(fmt::format("{} is in 8-bit colour: read as CARLA's depth, R + 256 G + 65536 B of 1000 m / "
+                                        "(2^24 - 1) (--depth-kind carla)",
+                                        quote_path(pictures_[0].depth)));
+    return {};
+}
+
+ImageSize FusionFolder::depth_size(size_t frame) const
+{
+    return {cameras_[frame].intrinsics.width, cameras_[frame].intrinsics.height};
 }
 
 Status FusionFolder::check_labels()
 {
-    for (size_t i = 0; i < cameras_.size(); ++i) {
-        if (pictures_[i].label.empty())
-            continue;
-        SR_TRY(const std::vector<uint8_t> labels, read_labels(i));
-        std::array<uint64_t, 256> counts{};
-        for (const uint8_t label : labels)
-            ++counts[label];
-        for (size_t label = 0; label < counts.size(); ++label)
-            if (counts[label])
-                map_(uint32_t(label), counts[label]);
-    }
-    return map_.check(quote_path(folder_), "pixels");
+    for (const FramePictures& p : pictures_)
+        if (!p.label.empty()) {
+            SR_TRY(const LabelImage labels, read_label_image(p.label));
+            classes_.count(labels);
+        }
+    return classes_.check(quote_path(folder_));
 }
 
 size_t FusionFolder::labelled() const
 {
-    return size_t(std::ranges::count_if(pictures_, [](const Pictures& p) { return !p.label.empty(); }));
+    return size_t(std::ranges::count_if(pictures_, [](const FramePictures& p) { return !p.label.empty(); }));
 }
 
 size_t FusionFolder::colored() const
 {
-    return size_t(std::ranges::count_if(pictures_, [](const Pictures& p) { return !p.color.empty(); }));
+    return size_t(std::ranges::count_if(pictures_, [](const FramePictures& p) { return !p.color.empty(); }));
+}
+
+Status FusionFolder::load_labels(size_t frame, DepthImages& images) const
+{
+    const Path& path = pictures_[frame].label;
+    SR_TRY(LabelImage label, read_label_image(path));
+    SR_CHECK(check_view(path, label.size, depth_size(frame)));
+    if (label.size != depth_size(frame))
+        label.numbers = nearest_pixels(label.numbers, label.size, depth_size(frame));
+    images.labels.resize(label.numbers.size());
+    for (size_t i = 0; i < images.labels.size(); ++i) {
+        const uint8_t target = classes_[label.numbers[i]];
+        if (target == kLeftOut)
+            images.depth[i] = 0;
+        images.labels[i] = target < kClassCount ? target : kNoLabel;
+    }
+    return {};
 }
 
 Result<DepthImages> FusionFolder::load(size_t frame) const
 {
-    const Pictures& p = pictures_[frame];
-    const Intrinsics& k = cameras_[frame].intrinsics;
+    const FramePictures& p = pictures_[frame];
     DepthImages images;
-    SR_TRY(ImageGray16 depth, read_png_gray16(p.depth));
-    SR_CHECK(check_size(p.depth, depth.width, depth.height, k));
-    images.depth = std::move(depth.pixels);
-    if (!p.label.empty()) {
-        SR_TRY(images.labels, read_labels(frame));
-        for (size_t i = 0; i < images.labels.size(); ++i) {
-            const uint8_t label = classes_[images.labels[i]];
-            if (label == kLeftOut)
-                images.depth[i] = 0;
-            images.labels[i] = label < kClassCount ? label : kNoLabel;
-        }
-    }
+    SR_TRY(DepthImage depth, read_depth_image(p.depth, encoding_));
+    if (depth.size != depth_size(frame))
+        return fail(ErrorCode::bad_input, "{} changed its size", quote_path(p.depth));
+    if (depth.kind == DepthKind::ray)
+        make_axial(depth, cameras_[frame].intrinsics);
+    images.depth = std::move(depth.metres);
+    if (!p.label.empty() && classes_.counted())
+        SR_CHECK(load_labels(frame, images));
     if (!p.color.empty()) {
-        SR_TRY(ImageRgb8 color, is_jpeg(p.color) ? read_jpeg_rgb8(p.color) : read_png_rgb8(p.color));
-        SR_CHECK(check_size(p.color, color.width, color.height, k));
+        SR_TRY(ImageRgb8 color, read_image_rgb8(p.color));
+        const ImageSize size{color.width, color.height};
+        SR_CHECK(check_view(p.color, size, depth_size(frame)));
+        if (size != depth_size(frame))
+            color = resampled(color, depth_size(frame));
         images.colors = std::move(color.pixels);
     }
     return images;

@@ -10,12 +10,11 @@
 namespace semrover {
 
 struct FusionOptions {
-    double voxel = 0.1;         // metres
-    double truncation = 4;      // voxels; a pixel colours and votes within half of it
-    double max_depth = 30;      // metres; pixels beyond it are not used
-    double depth_scale = 0.001; // metres of one unit of depth
-    double min_weight = 0;      // of a voxel, else it is unobserved; a frame adds at most 1 / (1 + z)
-    uint32_t min_views = 2;     // frames that saw a cell's surface, else it is dropped; at most 7
+    double voxel = 0.1;     // metres
+    double truncation = 4;  // voxels; a pixel colours and votes within half of it
+    double max_depth = 30;  // metres; pixels beyond it are not used
+    double min_weight = 0;  // of a voxel, else it is unobserved; a frame adds at most 1 / (1 + z)
+    uint32_t min_views = 2; // frames that saw a cell's surface, else it is dropped; at most 7
     // voxels between the distances of a cell's corners: a surface that was seen makes at most 1.8, the edge of what it
     // hides more. Where they are further apart there is no surface, for nobody saw it; what is as thin as two voxels
     // loses much of itself.

@@ -12,7 +12,7 @@ namespace semrover {
 namespace {
 
 // is a depth of `z` metres within those of a pixel and its neighbours?
-bool seen_at(const DepthImages& images, const Intrinsics& k, const Projection& at, double depth_scale)
+bool seen_at(const DepthImages& images, const Intrinsics& k, const Projection& at)
 {
     if (!(at.x >= 0 && at.y >= 0 && at.x < k.width && at.y < k.height))
         return false;
@@ -20,11 +20,11 @@ bool seen_at(const DepthImages& images, const Intrinsics& k, const Projection& a
     double low = 1e300, high = 0;
     for (int y = std::max(row - 1, 0); y <= std::min(row + 1, int(k.height) - 1); ++y)
         for (int x = std::max(column - 1, 0); x <= std::min(column + 1, int(k.width) - 1); ++x) {
-            const uint16_t d = images.depth[size_t(y) * k.width + size_t(x)];
-            if (d == 0 || d == 65535)
+            const double d = images.depth[size_t(y) * k.width + size_t(x)];
+            if (d == 0)
                 continue;
-            low = std::min(low, d * depth_scale);
-            high = std::max(high, d * depth_scale);
+            low = std::min(low, d);
+            high = std::max(high, d);
         }
     const double slack = std::max(0.1, 0.02 * at.depth);
     return at.depth >= low - slack && at.depth <= high + slack;
@@ -79,7 +79,7 @@ double SurfaceError::percentile(double share, uint8_t label) const
     return percentile_of(std::move(of_class), share);
 }
 
-Result<std::vector<uint32_t>> count_views(const Mesh& mesh, const DepthFrames& frames, const ViewOptions& options)
+Result<std::vector<uint32_t>> count_views(const Mesh& mesh, const DepthFrames& frames)
 {
     std::vector<uint32_t> views(mesh.positions.size());
     for (size_t f = 0; f < frames.cameras.size(); ++f) {
@@ -88,7 +88,7 @@ Result<std::vector<uint32_t>> count_views(const Mesh& mesh, const DepthFrames& f
         for (size_t v = 0; v < views.size(); ++v) {
             const auto& p = mesh.positions[v];
             const auto at = project(camera, {p[0], p[1], p[2]});
-            views[v] += at && seen_at(images, camera.intrinsics, *at, options.depth_scale);
+            views[v] += at && seen_at(images, camera.intrinsics, *at);
         }
     }
     return views;

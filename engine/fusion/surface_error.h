@@ -10,10 +10,7 @@ namespace semrover {
 
 // how many frames saw each vertex of a mesh: it projects to a pixel, and its depth lies within the depths of that pixel
 // and its neighbours, give or take 0.1 m or 2 % of the depth
-struct ViewOptions {
-    double depth_scale = 0.001; // metres of one unit of depth
-};
-Result<std::vector<uint32_t>> count_views(const Mesh& mesh, const DepthFrames& frames, const ViewOptions& options = {});
+Result<std::vector<uint32_t>> count_views(const Mesh& mesh, const DepthFrames& frames);
 
 struct SurfaceError {
     std::vector<float> distances; // [vertices that are measured] metres to the nearest true face, or the radius

@@ -82,7 +82,6 @@ TsdfOptions TsdfVolume::kernel_options() const
     o.truncation = float(options_.voxel * options_.truncation);
     o.band = o.truncation / 2;
     o.max_depth = float(options_.max_depth);
-    o.depth_scale = float(options_.depth_scale);
     o.min_weight = float(options_.min_weight);
     return o;
 }
@@ -160,7 +159,10 @@ Status TsdfVolume::list_blocks()
     SR_TRY(const std::vector<uint32_t> total, total_.read<uint32_t>(*device_));
     const uint32_t blocks = total.front();
     if (blocks == 0)
-        return fail(ErrorCode::bad_input, "nothing was observed: no pixel of {} frames has a depth within {} m",
+        return fail(ErrorCode::bad_input,
+                    "nothing was observed: no pixel of {} frames has a depth within {} m; --max-depth goes further (by "
+                    "default, to where a pixel is 0.55 voxels wide, so a larger --tsdf-voxel does, too); or is "
+                    "--depth-scale another?",
                     reach_.size(), options_.max_depth);
     const uint64_t most = std::min(device_->limits().max_storage_range, device_->limits().max_allocation) / kBlockBytes;
     if (blocks > most)

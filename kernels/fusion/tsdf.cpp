@@ -19,9 +19,9 @@ namespace {
 
 TsdfPush make_push(const TsdfOptions& o, uint32_t rows, uint32_t frames)
 {
-    SR_ASSERT(
-        o.voxel > 0 && o.truncation > 0 && o.band > 0 && o.band <= o.truncation && o.max_depth > 0 && o.depth_scale > 0,
-        "tsdf: voxels of {} m, truncation {} m, band {} m, depth to {} m", o.voxel, o.truncation, o.band, o.max_depth);
+    SR_ASSERT(o.voxel > 0 && o.truncation > 0 && o.band > 0 && o.band <= o.truncation && o.max_depth > 0,
+              "tsdf: voxels of {} m, truncation {} m, band {} m, depth to {} m", o.voxel, o.truncation, o.band,
+              o.max_depth);
     SR_ASSERT(uint64_t(o.blocks_x) * o.blocks_y * o.blocks_z < 1ull << 32, "tsdf: a box of {} x {} x {} blocks",
               o.blocks_x, o.blocks_y, o.blocks_z);
     return {.rows = rows,
@@ -33,7 +33,6 @@ TsdfPush make_push(const TsdfOptions& o, uint32_t rows, uint32_t frames)
             .truncation = o.truncation,
             .band = o.band,
             .max_depth = o.max_depth,
-            .depth_scale = o.depth_scale,
             .min_weight = o.min_weight};
 }
 

@@ -12,7 +12,6 @@ struct TsdfPush {
     float truncation;                  // metres
     float band;                        // metres from the surface within which a pixel votes and colours
     float max_depth;                   // metres
-    float depth_scale;                 // metres of one unit of depth
     float min_weight;                  // a voxel with less is unobserved
 };
 

@@ -13,7 +13,7 @@
 layout(local_size_x = 64) in;
 layout(push_constant) uniform Push { TsdfPush p; };
 layout(binding = 0) readonly buffer Frames { float frame_words[]; }; // [frames, kFrameWords]
-layout(binding = 1) readonly buffer Pixels { uvec2 pixels[]; };      // [rows] depth, label << 16; rgb
+layout(binding = 1) readonly buffer Pixels { uvec2 pixels[]; };      // [rows] depth, fp32; rgb, label << 24
 layout(binding = 2) writeonly buffer Planes { uvec4 planes[]; };     // [rows] N, 0 for nothing; rgb, label << 24, edge << 31
 
 const uint kNoLabel = 31;
@@ -21,8 +21,8 @@ const float kLeastCosine = 0.02; // between ray and normal: below it the slope i
 
 float inverse_depth(uint i)
 {
-    const uint d = pixels[i].x & 0xffffu;
-    return d == 0 || d == 0xffffu ? 0.0 : 1.0 / (float(d) * p.depth_scale);
+    const float d = uintBitsToFloat(pixels[i].x);
+    return d > 0.0 ? 1.0 / d : 0.0;
 }
 
 float slope(float before, float own, float after)
@@ -65,6 +65,6 @@ void main()
     const bool edge = off_plane(w - s.x, before.x) || off_plane(w + s.x, after.x) || off_plane(w - s.y, before.y) ||
                       off_plane(w + s.y, after.y);
     const uvec2 pixel = pixels[i];
-    const uint label = min(pixel.x >> 16 & 0xffu, kNoLabel);
+    const uint label = min(pixel.y >> 24, kNoLabel);
     planes[i] = uvec4(floatBitsToUint(n), (pixel.y & 0xffffffu) | label << 24 | uint(edge) << 31);
 }

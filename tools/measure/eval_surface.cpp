@@ -6,6 +6,7 @@
 #include "engine/mesh/mesh_files.h"
 #include "engine/scene/palette.h"
 #include "runtime/base/json.h"
+#include "tools/cli/depth_options.h"
 #include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/path_options.h"
@@ -25,7 +26,7 @@ struct EvalSurfaceArguments {
     FusionFolderOptions input;
     std::string poses;
     PathOptions placement;
-    double depth_scale = 0.001, radius = 5;
+    double radius = 5;
     uint32_t min_views = 2;
 };
 
@@ -105,7 +106,7 @@ Status run_surface(EvalSurfaceArguments o, const Globals& globals)
         SR_TRY(const FusionFolder folder, FusionFolder::open(o.frames, o.input));
         print_warnings(folder.warnings(), globals);
         DepthFrames frames = folder.frames();
-        SR_TRY(views, count_views(mesh, frames, {.depth_scale = o.depth_scale}));
+        SR_TRY(views, count_views(mesh, frames));
     }
     SR_TRY(const auto device, open_device(globals));
     SR_TRY(const SurfaceError error, measure_surface(*device, mesh, truth, views, o.min_views, o.radius));
@@ -128,7 +129,7 @@ void add_eval_surface(CLI::App& eval, const Globals& globals, Run& run)
     c->add_option("--poses", o->poses, "camera path of these; FRAMES/transforms.json");
     add_placement_options(*c, o->placement);
     add_number(*c, "--fov-x", o->input.fov_x, "degrees, where files have no intrinsics", 1.0, 179.0);
-    add_number(*c, "--depth-scale", o->depth_scale, "metres of one unit of depth; 0.001", 1e-6, 10.0);
+    add_depth_options(*c, o->input.depth);
     add_number(*c, "--min-views", o->min_views, "frames that must have seen a vertex; 2", 1, 1000);
     add_number(*c, "--radius", o->radius, "metres, of the search for the true surface; 5", 0.01, 1e3);
     c->callback([o, &globals, &run] { run = [o, &globals] { return run_surface(*o, globals); }; });

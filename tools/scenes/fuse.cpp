@@ -12,6 +12,7 @@
 #include "tools/cli/choice.h"
 #include "tools/cli/class_option.h"
 #include "tools/cli/commands.h"
+#include "tools/cli/depth_options.h"
 #include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/output_folder.h"
@@ -159,7 +160,8 @@ Json settings_of(const FuseArguments& o)
             {"tsdf_voxel", o.fusion.voxel},
             {"truncation", o.fusion.truncation},
             {"max_depth", o.fusion.max_depth},
-            {"depth_scale", o.fusion.depth_scale},
+            {"depth_kind", name_of(o.input.depth.kind)},
+            {"depth_scale", o.input.depth.unit ? Json(*o.input.depth.unit) : Json()},
             {"max_jump", o.fusion.max_jump},
             {"min_weight", o.fusion.min_weight},
             {"min_views", o.fusion.min_views},
@@ -241,7 +243,6 @@ void add_camera_options(CLI::App& c, FusionFolderOptions& o)
 
 void add_fusion_options(CLI::App& c, FusionOptions& o)
 {
-    add_number(c, "--depth-scale", o.depth_scale, "metres of one unit of depth; 0.001", 1e-6, 10.0);
     add_number(c, "--tsdf-voxel", o.voxel, "metres, of the distance field; 0.1", 0.005, 10.0);
     add_number(c, "--truncation", o.truncation, "voxels, of the distance field; 4", 3.5, 32.0);
     add_number(c, "--max-jump", o.max_jump,
@@ -260,9 +261,10 @@ void add_fuse(CLI::App& app, const Globals& globals, Run& run)
     c->add_option("DIR", o->folder, "[CAMERA/]{depth,label,color}/000000.png and transforms.json")->required();
     c->add_option("-o,--output", o->output, "folder for mesh.glb, semantic.sgrid, voxfield.sgrid, run.json")
         ->required();
-    c->add_option("--poses", o->poses, "a camera path; DIR/transforms.json");
+    c->add_option("--poses", o->poses, "a camera path; DIR/transforms.json or groundtruth.txt");
     add_placement_options(*c, o->placement);
     add_camera_options(*c, o->input);
+    add_depth_options(*c, o->input.depth);
     add_fusion_options(*c, o->fusion);
     add_number(*c, "--max-depth", o->max_depth, "metres; where a pixel is 0.55 voxels wide, 30 at most", 0.1, 1000.0);
     c->add_option("--map", o->map,
