@@ -2,12 +2,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/format/image.h"
 #include "engine/scene/grid.h"
+#include "engine/scene/scene_points.h"
 #include "tests/inception_reference.h"
 #include "tests/json_text.h"
 #include "tests/pointnet_files.h"
 #include "tests/program.h"
+#include "tools/eval/features.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace semrover {
 namespace cli_eval_test {
@@ -112,7 +115,7 @@ TEST(CliEval, folders_of_images_go_through_a_network_and_their_features_are_kept
     const Json report = json_of(fid.out);
     EXPECT_GT(report["value"], 0);
     EXPECT_EQ(report["a"]["samples"], 5);
-    EXPECT_EQ(report["b"]["width"], 50);
+    EXPECT_EQ(report["b"]["sizes"], Json::parse(R"([{"width": 50, "height": 20, "samples": 5}])"));
     EXPECT_EQ(report["network"]["kind"], "inception_v3");
     // what was kept gives the same figure without a device, and one set of each kind too
     const std::string kept_a = (folder / "out/a.safetensors").string(),
@@ -128,14 +131,86 @@ TEST(CliEval, folders_of_images_go_through_a_network_and_their_features_are_kept
     expect_error(eval("fid " + sets + " --save-features " + (folder / "out").string()), 2,
                  "a.safetensors\' exists; -y");
 
-    put_image(folder / "b/late.jpg", 51, 20, 3);
-    expect_error(eval("fid -q " + sets), 3, "late.jpg\' has 51x20 pixels");
     folder.put("b/late.jpg", "no image");
     expect_error(eval("kid -q " + sets), 3, "late.jpg");
     put_tensors(folder / "other.safetensors", {{"features", {{3, 1}, {1, 2, 3}}}}, {{"network", "x"}});
     expect_error(eval("fid -q " + kept_a + " " + (folder / "other.safetensors").string()), 3,
                  "has 1: of different networks");
     expect_error(eval("f3d -q " + sets), 3, "a PointNet++ is needed here, this is an Inception v3 network");
+}
+
+TEST(CliEval, images_of_a_set_may_have_any_sizes)
+{
+    const ScratchFolder folder;
+    InceptionWeights(32).weights.write(folder / "net.safetensors");
+    // eight cameras, sizes in turn: more than are kept ready; and the images of one camera as a set of their own
+    for (uint32_t i = 0; i < 24; ++i) {
+        put_image(folder / fmt::format("mixed/{:06}.png", i), 40 + i % 8, 30, i);
+        put_image(folder / fmt::format("alone/{}/{:06}.png", i % 8, i), 40 + i % 8, 30, i);
+    }
+    const std::string features = " --features " + (folder / "net.safetensors").string();
+    const auto path = [&](const std::string& name) { return (folder / name).string(); };
+    const ProgramResult fid = eval("fid -q --json --batch 2 " + path("mixed") + " " + path("alone/1") + features +
+                                   " --save-features " + path("kept"));
+    ASSERT_EQ(fid.code, 0) << fid.err;
+    const Json a = json_of(fid.out)["a"];
+    EXPECT_EQ(a["samples"], 24);
+    EXPECT_EQ(a["sizes"].size(), 8u);
+    EXPECT_EQ(a["sizes"][1], Json::parse(R"({"width": 41, "height": 30, "samples": 3})"));
+    const auto kept = read_features(folder / "kept/a.safetensors"), one = read_features(folder / "kept/b.safetensors");
+    ASSERT_TRUE(kept && one);
+    for (size_t i = 0; i < 3; ++i) // rows lie in the order of the files
+        for (size_t c = 0; c < one->cols; ++c)
+            ASSERT_EQ(kept->row(8 * i + 1)[c], one->row(i)[c]) << i << " " << c;
+    EXPECT_EQ(eval("kid -q --json --subsets 3 " + path("mixed") + " " + path("mixed") + features).code, 0);
+}
+
+std::string cloud(const ScenePoints& points, const std::string& type, double scale, bool colored)
+{
+    std::string text = fmt::format("ply\nformat ascii 1.0\nelement vertex {}\n", points.size());
+    for (const char* axis : {"x", "y", "z"})
+        text += fmt::format("property float {}\n", axis);
+    for (const char* color : {"red", "green", "blue"})
+        text += colored ? fmt::format("property {} {}\n", type, color) : "";
+    text += "end_header\n";
+    for (size_t i = 0; i < points.size(); ++i) {
+        text += fmt::format("{}", fmt::join(points.positions[i], " "));
+        for (size_t c = 0; c < 3 && colored; ++c) {
+            const double value = double(points.colors[i][c]) * scale;
+            text += fmt::format(" {}", type == "float" ? value : std::round(value));
+        }
+        text += "\n";
+    }
+    return text;
+}
+
+TEST(CliEval, clouds_of_points_go_through_a_network_of_points)
+{
+    const ScratchFolder folder;
+    write_pointnet(folder / "net.safetensors", tiny_pointnet_config());
+    put_grid(folder / "one.sgrid", 1, 0.5f);
+    const ScenePoints points = points_of(*read_grid(folder / "one.sgrid"));
+    const std::string one = (folder / "one.sgrid").string(), ply = (folder / "clouds/a.ply").string();
+    const std::string features = " --features " + (folder / "net.safetensors").string();
+    std::filesystem::create_directory(folder / "clouds");
+    for (const auto& [type, scale] : {std::pair{"uchar", 255}, {"ushort", 65535}, {"float", 1}}) {
+        folder.put("clouds/a.ply", cloud(points, type, scale, true));
+        const ProgramResult f3d = eval("f3d -q --json " + one + " " + (folder / "clouds").string() + features);
+        ASSERT_EQ(f3d.code, 0) << f3d.err;
+        EXPECT_EQ(json_of(f3d.out)["b"]["samples"], 8) << type;
+        EXPECT_NEAR(json_of(f3d.out)["value"].get<double>(), 0, 1e-6) << type;
+    }
+    EXPECT_EQ(eval("mmd -q " + one + " " + ply + features).code, 0);
+    folder.put("clouds/a.ply", cloud(points, "float", 255, true));
+    expect_error(eval("f3d -q " + one + " " + ply + features), 3, "expected 0 to 1 of a float");
+    folder.put("clouds/a.ply", cloud(points, "uchar", 255, false));
+    expect_error(eval("f3d -q " + one + " " + ply + features), 3,
+                 "a.ply': points without colours, which the network looks at");
+    folder.put("clouds/a.ply",
+               "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty "
+               "float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 "
+               "0\n0 1 0\n3 0 1 2\n");
+    expect_error(eval("f3d -q " + one + " " + ply + features), 3, "expected a cloud of points, a .ply without faces");
 }
 
 TEST(CliEval, grids_go_through_a_network_of_points)

@@ -1,8 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/scene/grid.h"
+#include "engine/scene/palette.h"
 #include "runtime/base/json.h"
 #include "tests/json_text.h"
+#include "tests/png_file.h"
 #include "tests/program.h"
 
 #include <gtest/gtest.h>
@@ -82,6 +84,45 @@ TEST(CliVoxelize, scale_axes_and_a_default_label_apply)
     expect_error(semrover_program("voxelize " + (folder / "none.obj").string() + " -o " + out + " -y"), 3, "none.obj");
 }
 
+TEST(CliVoxelize, label_textures_say_classes_in_every_kind_of_png)
+{
+    const ScratchFolder folder;
+    folder.put("m.mtl", "newmtl x\nmap_Kd label.png\n");
+    const std::string mesh = folder
+                                 .put("m.obj", "mtllib m.mtl\nv 0 0 0\nv 6 0 0\nv 6 3 0\nv 0 3 0\nvt 0 0\nvt 1 0\nvt 1 "
+                                               "1\nvt 0 1\nusemtl x\nf 1/1 2/2 3/3 4/4\n")
+                                 .string();
+    const auto labels = [&](const PngFile& png, const std::string& more = "") {
+        folder.put("label.png", png.bytes());
+        const std::string out = (folder / "m.sgrid").string();
+        const ProgramResult made =
+            semrover_program("voxelize " + mesh + " -y -q --labels texture -o " + out + " " + more);
+        if (made.code != 0)
+            return std::pair(made.err, made.err);
+        const auto grid = read_grid(out);
+        EXPECT_TRUE(grid) << grid.error().message;
+        const auto name = [&](const Cell& cell) { return label_name(grid->labels[*find_cell(*grid, cell)]); };
+        return std::pair(name({1, 2, 0}), name({8, 2, 0}));
+    };
+    const std::pair<std::string, std::string> expect{"building", "car"};
+    using P = PngFile;
+    EXPECT_EQ(labels({2, 1, 8, P::kGray, "\x02\x0d", ""}), expect);
+    EXPECT_EQ(labels({2, 1, 16, P::kGray, std::string("\0\x02\0\x0d", 4), ""}), expect);
+    EXPECT_EQ(labels({2, 1, 4, P::kGray, "\x2d", ""}), expect);
+    EXPECT_EQ(labels({2, 1, 8, P::kGrayAlpha, "\x02\xff\x0d\xff", ""}), expect);
+    EXPECT_EQ(labels({2, 1, 8, P::kPalette, "\x02\x0d", std::string(3 * 20, '\x55')}), expect); // whatever the colours
+    // colours of classes, as before: also as those of a palette, whose indices are then any
+    const std::string building = "\x46\x46\x46", car("\0\0\x8e", 3);
+    EXPECT_EQ(labels({2, 1, 8, P::kRgb, building + car, ""}), expect);
+    EXPECT_EQ(labels({2, 1, 8, P::kPalette, std::string("\x01\0", 2), car + building}), expect);
+    EXPECT_EQ(labels({2, 1, 8, P::kGray, "\x46\x0d", ""}), expect);
+    // other programs' numbers
+    const P kitti{2, 1, 16, P::kGray, std::string("\0\x0b\0\x1a", 4), ""};
+    EXPECT_NE(labels(kitti).first.find("pixels of label textures have no label"), std::string::npos);
+    EXPECT_EQ(labels(kitti, "--map cityscapes"), expect);
+    EXPECT_EQ(labels({2, 1, 8, P::kGray, "\x0b\x1a", ""}, "--map cityscapes"), expect);
+}
+
 TEST(CliVoxelize, eval_chamfer_measures_a_grid_or_sweeps)
 {
     const ScratchFolder folder;
@@ -106,7 +147,42 @@ TEST(CliVoxelize, eval_chamfer_measures_a_grid_or_sweeps)
     EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), 6);
     expect_error(semrover_program("eval chamfer " + mesh + " --sweep 4-32"), 2, "expected FIRST..LAST");
     expect_error(semrover_program("eval chamfer " + mesh + " " + grid + " --sweep 4..32"), 2,
-                 "either a GRID or --sweep");
+                 "either POINTS or --sweep");
+}
+
+// n x n points 0.1 m apart at a height
+std::string cloud(const ScratchFolder& folder, const std::string& name, double z, int n, double x = 500000,
+                  double y = 4000000)
+{
+    std::string text = fmt::format("ply\nformat ascii 1.0\nelement vertex {}\nproperty double x\nproperty double y\n"
+                                   "property double z\nend_header\nnan 0 0\n",
+                                   n * n + 1);
+    for (int i = 0; i < n * n; ++i)
+        text += fmt::format("{:.3f} {:.3f} {}\n", x + 0.1 * (i % n), y + 0.1 * (i / n), z);
+    return folder.put(name, text).string();
+}
+
+TEST(CliVoxelize, eval_chamfer_takes_clouds_of_points)
+{
+    const ScratchFolder folder;
+    const std::string a = cloud(folder, "a.ply", 0, 20), b = cloud(folder, "b.ply", 0.3, 20);
+    const ProgramResult result = semrover_program("eval chamfer " + a + " " + b + " --json");
+    ASSERT_EQ(result.code, 0) << result.err;
+    EXPECT_NE(result.err.find("a.ply': 1 points are not finite and left out"), std::string::npos) << result.err;
+    const Json c = json_of(result.out)["grids"][0];
+    EXPECT_EQ(c["points"], 400);
+    EXPECT_NEAR(c["chamfer"].get<double>(), 0.3, 1e-5);
+    EXPECT_NEAR(c["squares"].get<double>(), 0.09 + 0.09, 1e-5); // PyTorch3D's
+    // a cloud and a mesh: a plane 0.3 m below
+    const std::string mesh = folder.put("m.obj", "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nf 1 2 3 4\n").string();
+    const std::string above = cloud(folder, "c.ply", 0.3, 20, 0, 0);
+    const ProgramResult plane = semrover_program("eval chamfer -q " + mesh + " " + above + " --samples 1000 --json");
+    ASSERT_EQ(plane.code, 0) << plane.err;
+    EXPECT_NEAR(json_of(plane.out)["grids"][0]["points_to_surface"].get<double>(), 0.3, 1e-4);
+    EXPECT_GT(json_of(plane.out)["grids"][0]["surface_to_points"], 0.3);
+    EXPECT_NE(semrover_program("eval chamfer -q " + a).code, 0); // a cloud alone
+    const ProgramResult table = semrover_program("eval chamfer -q " + a + " " + b);
+    EXPECT_NE(table.out.find("PyTorch3D's chamfer_distance"), std::string::npos) << table.out;
 }
 
 } // namespace cli_voxelize_test

@@ -286,7 +286,8 @@ TEST(EngineVoxelizer, canonical_points_lie_on_the_surface_and_as_near_to_it_as_s
     add_quad(walls, {0, 0.2f, 0.31f}, {12, 0, 0}, {0, 12, 0});
     add_quad(walls, {0, 12.2f, 0.31f}, {12, 0, 0}, {0, 0, 6});
     const auto mean = [&](PointPlacement placement) {
-        return chamfer(test_device(), walls, voxelized(walls, {.placement = placement}).grid, {.samples = 20000})
+        return chamfer(test_device(), walls, measured_points(voxelized(walls, {.placement = placement}).grid),
+                       {.samples = 20000})
             ->mean();
     };
     EXPECT_LT(mean(PointPlacement::canonical), 1.02 * mean(PointPlacement::shifted));
@@ -447,7 +448,7 @@ TEST(EngineVoxelizer, chamfer_is_the_mean_of_both_distances)
     VoxelGrid moved = v.grid; // so that distances to the surface are not all nearly 0
     for (size_t i = 2; i < moved.points.size(); i += 3)
         moved.points[i] = float_to_half(std::clamp(half_to_float(moved.points[i]) + 0.1f, -0.3f, 0.3f));
-    const auto c = chamfer(test_device(), m, moved, {.samples = 20000});
+    const auto c = chamfer(test_device(), m, measured_points(moved), {.samples = 20000});
     ASSERT_TRUE(c) << c.error().message;
     double to_surface = 0;
     for (size_t cell = 0; cell < moved.cells.size(); ++cell)
@@ -468,7 +469,7 @@ TEST(EngineVoxelizer, chamfer_of_a_plane_is_that_of_points_strewn_over_it_and_fa
     double last = 1;
     for (const int n : {2, 8, 20}) {
         const VoxelizedMesh v = voxelized(m, {.points_per_voxel = n});
-        const auto c = chamfer(test_device(), m, v.grid, {.samples = 20000, .seed = 3});
+        const auto c = chamfer(test_device(), m, measured_points(v.grid), {.samples = 20000, .seed = 3});
         ASSERT_TRUE(c) << c.error().message;
         EXPECT_LT(c->to_surface, 2e-4); // half precision
         // mean distance to the nearest point at density d: 0.5 / sqrt(d) of independent ones (Poisson), 0.377 / sqrt(d)
@@ -480,7 +481,7 @@ TEST(EngineVoxelizer, chamfer_of_a_plane_is_that_of_points_strewn_over_it_and_fa
         last = c->mean();
     }
     VoxelGrid empty;
-    EXPECT_TRUE(says(chamfer(test_device(), m, empty), "no points"));
+    EXPECT_TRUE(says(chamfer(test_device(), m, measured_points(empty)), "no points"));
 }
 
 } // namespace engine_voxelizer_test

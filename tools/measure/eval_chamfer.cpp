@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// semrover eval chamfer MESH [GRID]: how far a grid's points and the mesh are from each other
+// semrover eval chamfer TRUTH [POINTS]: how far points of a grid or cloud are from a mesh, or from another cloud
 #include "engine/mesh/chamfer.h"
 #include "engine/mesh/mesh_files.h"
 #include "engine/mesh/voxelizer.h"
@@ -9,7 +9,9 @@
 #include "tools/cli/choice.h"
 #include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
+#include "tools/cli/print_stderr.h"
 #include "tools/cli/progress.h"
+#include "tools/eval/point_files.h"
 #include "tools/measure/eval.h"
 
 #include <charconv>
@@ -27,8 +29,8 @@ struct EvalChamferArguments {
 };
 
 struct Measure {
-    int points; // of a cell
-    size_t cells;
+    size_t points; // of a cell; of a cloud, in all
+    size_t cells;  // of a cloud none
     Chamfer chamfer;
 };
 
@@ -75,16 +77,61 @@ Result<Mesh> load_surface(const EvalChamferArguments& o)
     return surface;
 }
 
+bool is_mesh(const Path& path, bool cloud)
+{
+    return !cloud && path.extension() != ".sgrid" && !is_folder(path);
+}
+
+// of a grid, or of a cloud in metres
+Result<MeasuredPoints> load_points(const std::string& path, double scale, const Globals& globals, Measure& m)
+{
+    MeasuredPoints points;
+    SR_TRY(const bool cloud, is_cloud(path));
+    if (cloud) {
+        SR_TRY(PointCloud read, read_cloud(path));
+        if (read.dropped && !globals.quiet)
+            print_stderr("semrover: warning: {}: {} points are not finite and left out\n", quote_path(path),
+                         read.dropped);
+        for (Point3& p : read.positions)
+            for (double& x : p)
+                x *= scale;
+        points = measured_points(std::move(read.positions));
+        m.points = points.positions.size();
+    } else {
+        SR_TRY(const VoxelGrid grid, read_grid(path));
+        points = measured_points(grid);
+        m.points = size_t(grid.points_per_voxel);
+        m.cells = grid.cells.size();
+    }
+    if (points.positions.empty())
+        return fail(ErrorCode::bad_input, "{}: no cell has points yet", quote_path(path));
+    return points;
+}
+
+Result<Measure> measure_points(const EvalChamferArguments& o, const Globals& globals, Device& device)
+{
+    Measure m{}, unused{};
+    SR_TRY(const MeasuredPoints points, load_points(o.grid, 1, globals, m));
+    SR_TRY(const bool cloud, is_cloud(o.mesh));
+    if (is_mesh(o.mesh, cloud)) {
+        SR_TRY(const Mesh mesh, load_surface(o));
+        SR_TRY(m.chamfer, chamfer(device, mesh, points, o.chamfer));
+        return m;
+    }
+    SR_TRY(const MeasuredPoints truth, load_points(o.mesh, o.scale, globals, unused));
+    SR_TRY(m.chamfer, chamfer(device, truth, points));
+    return m;
+}
+
 Result<std::vector<Measure>> measure_all(const EvalChamferArguments& o, const Globals& globals, Device& device)
 {
     std::vector<Measure> measures;
-    SR_TRY(const Mesh mesh, load_surface(o));
     if (!o.grid.empty()) {
-        SR_TRY(const VoxelGrid grid, read_grid(o.grid));
-        SR_TRY(const Chamfer c, chamfer(device, mesh, grid, o.chamfer));
-        measures.push_back({grid.points_per_voxel, grid.cells.size(), c});
+        SR_TRY(const Measure m, measure_points(o, globals, device));
+        measures.push_back(m);
         return measures;
     }
+    SR_TRY(const Mesh mesh, load_surface(o));
     std::vector<int> list = {o.voxelize.points_per_voxel};
     if (!o.sweep.empty()) {
         SR_TRY(list, points_of_sweep(o.sweep));
@@ -97,8 +144,8 @@ Result<std::vector<Measure>> measure_all(const EvalChamferArguments& o, const Gl
         options.points_per_voxel = n;
         options.default_label = 0;
         SR_TRY(const VoxelizedMesh v, voxelize(device, mesh, options));
-        SR_TRY(const Chamfer c, chamfer(device, mesh, v.grid, o.chamfer));
-        measures.push_back({n, v.grid.cells.size(), c});
+        SR_TRY(const Chamfer c, chamfer(device, mesh, measured_points(v.grid), o.chamfer));
+        measures.push_back({size_t(n), v.grid.cells.size(), c});
         progress.update(measures.size(), device.allocated_bytes());
     }
     progress.finish();
@@ -113,31 +160,34 @@ void report(const EvalChamferArguments& o, const Globals& globals, const std::ve
             list.push_back({{"points", m.points},
                             {"cells", m.cells},
                             {"chamfer", m.chamfer.mean()},
+                            {"squares", m.chamfer.squares},
                             {"points_to_surface", m.chamfer.to_surface},
                             {"surface_to_points", m.chamfer.to_points}});
         fmt::print("{}\n", Json{{"samples", o.chamfer.samples}, {"grids", list}}.dump());
         return;
     }
-    fmt::print("{:>6} {:>9} {:>11} {:>19} {:>19}\n", "points", "cells", "chamfer (m)", "points to surface",
-               "surface to points");
+    fmt::print("{:>6} {:>9} {:>11} {:>19} {:>19} {:>13}\n", "points", "cells", "chamfer (m)", "points to surface",
+               "surface to points", "squares (m2)");
     for (const Measure& m : measures)
-        fmt::print("{:>6} {:>9} {:>11.5f} {:>19.6f} {:>19.5f}\n", m.points, m.cells, m.chamfer.mean(),
-                   m.chamfer.to_surface, m.chamfer.to_points);
+        fmt::print("{:>6} {:>9} {:>11.5f} {:>19.6f} {:>19.5f} {:>13.4g}\n", m.points, m.cells, m.chamfer.mean(),
+                   m.chamfer.to_surface, m.chamfer.to_points, m.chamfer.squares);
+    fmt::print("chamfer is half the sum of both mean distances; squares is the sum of both means of squared distances, "
+               "PyTorch3D's chamfer_distance\n");
 }
 
 Status write_csv(const std::string& path, const std::vector<Measure>& measures)
 {
-    std::string text = "points,cells,chamfer_m,points_to_surface_m,surface_to_points_m\n";
+    std::string text = "points,cells,chamfer_m,points_to_surface_m,surface_to_points_m,squares_m2\n";
     for (const Measure& m : measures)
-        text += fmt::format("{},{},{:.7g},{:.7g},{:.7g}\n", m.points, m.cells, m.chamfer.mean(), m.chamfer.to_surface,
-                            m.chamfer.to_points);
+        text += fmt::format("{},{},{:.7g},{:.7g},{:.7g},{:.7g}\n", m.points, m.cells, m.chamfer.mean(),
+                            m.chamfer.to_surface, m.chamfer.to_points, m.chamfer.squares);
     return write_file_atomically(path, text);
 }
 
 Status eval_chamfer(const EvalChamferArguments& o, const Globals& globals)
 {
     if (!o.grid.empty() && !o.sweep.empty())
-        return fail(ErrorCode::usage, "--sweep makes its own grids; give either a GRID or --sweep");
+        return fail(ErrorCode::usage, "--sweep makes its own grids; give either POINTS or --sweep");
     if (!o.csv.empty() && std::filesystem::exists(o.csv) && !globals.yes)
         return fail(ErrorCode::usage, "{} exists; -y replaces it", quote_path(o.csv));
     if (!o.sweep.empty()) {
@@ -156,9 +206,11 @@ Status eval_chamfer(const EvalChamferArguments& o, const Globals& globals)
 void add_eval_chamfer(CLI::App& eval, const Globals& globals, Run& run)
 {
     auto o = std::make_shared<EvalChamferArguments>();
-    CLI::App* c = eval.add_subcommand("chamfer", "how far a grid's points and a mesh are from each other, in metres");
-    c->add_option("MESH", o->mesh, ".obj, .ply, .glb or .gltf")->required();
-    c->add_option("GRID", o->grid, ".sgrid; without one the mesh is voxelized");
+    CLI::App* c =
+        eval.add_subcommand("chamfer", "how far points and a mesh, or other points, are from each other, in metres");
+    c->add_option("TRUTH", o->mesh, "a mesh (.obj, .ply, .glb or .gltf), a cloud (a .ply without faces), or an .sgrid")
+        ->required();
+    c->add_option("POINTS", o->grid, ".sgrid, or a cloud; without one the mesh is voxelized");
     c->add_option("--sweep", o->sweep, "grids of FIRST..LAST points a cell, doubled each time (and 20), or ..:STEP");
     add_number(*c, "--points", o->voxelize.points_per_voxel, "of a cell (20)", 1, 4096);
     add_number(*c, "--voxel-size", o->voxelize.voxel_size, "metres (0.6)", 0.001, 1000.0);

@@ -10,7 +10,8 @@
 #include "tools/cli/open_device.h"
 #include "tools/cli/print_stderr.h"
 #include "tools/cli/progress.h"
-#include "tools/eval/inception.h"
+#include "tools/eval/image_batches.h"
+#include "tools/eval/point_files.h"
 #include "tools/eval/pointnet.h"
 #include "tools/eval/sample_files.h"
 
@@ -54,54 +55,39 @@ Status interrupted()
 
 // ---- images
 
-Result<ImageRgb8> read_image_of_size(const Path& path, const Path& first, ImageSize size)
-{
-    SR_TRY(ImageRgb8 image, read_image(path));
-    if (size.width && (image.width != size.width || image.height != size.height))
-        return fail(ErrorCode::bad_input, "{} has {}x{} pixels, {} has {}x{}: images of a set have one size",
-                    quote_path(path), image.width, image.height, quote_path(first), size.width, size.height);
-    return image;
-}
-
 Status image_features(const EvalOptions& o, size_t side, Device& device, const Inception& network,
                       const Globals& globals, EvalSet& set)
 {
     SR_TRY(const std::vector<Path> files, list_images(o.sets[side]));
     if (files.size() < 2)
         return too_few(o.sets[side], files.size(), "image");
-    std::unique_ptr<ImageFeatures> extractor;
-    ImageSize size;
-    Features& features = set.features.emplace();
+    const uint32_t batch = std::min<uint32_t>(o.batch ? o.batch : kImageBatch, uint32_t(files.size()));
+    ImageBatches batches(device, network, batch, files.size());
     Progress progress(progress_to_stderr(globals), fmt::format("features of {}", kNames[side]), "images", files.size());
-    for (size_t first = 0; first < files.size();) {
-        std::vector<ImageRgb8> images;
-        const size_t wanted = extractor ? extractor->batch() : 1;
-        for (size_t i = first; i < std::min(first + wanted, files.size()); ++i) {
-            SR_TRY(ImageRgb8 image, read_image_of_size(files[i], files[0], size));
-            images.push_back(std::move(image));
-        }
-        if (!extractor) { // the first image tells the size; it is read again with its batch
-            size = {images[0].width, images[0].height};
-            const uint32_t batch = std::min<uint32_t>(o.batch ? o.batch : kImageBatch, uint32_t(files.size()));
-            SR_TRY(extractor, ImageFeatures::create(device, network, size, batch));
-            continue;
-        }
-        SR_CHECK(extractor->append(images, features));
-        first += images.size();
-        progress.update(first, device.allocated_bytes());
+    for (const Path& file : files) {
+        SR_TRY(ImageRgb8 image, read_image(file));
+        SR_CHECK(batches.add(std::move(image)));
+        progress.update(batches.done(), device.allocated_bytes());
         if (interrupt_requested())
             return interrupted();
     }
+    SR_TRY(set.features, batches.finish());
     progress.finish();
-    set.description = {{"path", o.sets[side]},
-                       {"kind", "images"},
-                       {"samples", files.size()},
-                       {"width", size.width},
-                       {"height", size.height}};
+    set.description = {{"path", o.sets[side]}, {"kind", "images"}, {"samples", files.size()}};
+    for (const auto& [size, images] : batches.sizes())
+        set.description["sizes"].push_back({{"width", size.first}, {"height", size.second}, {"samples", images}});
     return {};
 }
 
 // ---- grids
+
+Status check_colors(const ScenePoints& points, const PointnetConfig& config, const Path& file)
+{
+    if (points.colors.empty() && std::ranges::find(config.inputs, PointnetConfig::Input::rgb) != config.inputs.end())
+        return fail(ErrorCode::bad_input, "{}: points without colours, which the network looks at (inputs: rgb)",
+                    quote_path(file));
+    return {};
+}
 
 Status chunk_features(const EvalOptions& o, size_t side, Device& device, const Pointnet& network,
                       const Globals& globals, EvalSet& set)
@@ -113,10 +99,13 @@ Status chunk_features(const EvalOptions& o, size_t side, Device& device, const P
     uint32_t left_out = 0;
     std::optional<Progress> progress; // of a single grid, in chunks
     for (size_t i = 0; i < files.size(); ++i) {
-        SR_TRY(const VoxelGrid grid, read_grid(files[i]));
-        if (!grid.has_points())
-            return fail(ErrorCode::bad_input, "{}: a semantic grid without points", quote_path(files[i]));
-        SR_TRY(const PointChunks chunks, cut_chunks(points_of(grid), network.config(), o.seed));
+        SR_TRY(const PointFile file, read_points(files[i]));
+        const ScenePoints& points = file.points;
+        SR_CHECK(check_colors(points, network.config(), files[i]));
+        if (file.dropped && !globals.quiet)
+            print_stderr("semrover: warning: {}: {} points are not finite and left out\n", quote_path(files[i]),
+                         file.dropped);
+        SR_TRY(const PointChunks chunks, cut_chunks(points, network.config(), o.seed));
         left_out += chunks.left_out;
         const bool single = files.size() == 1;
         if (!progress)
@@ -225,7 +214,8 @@ uint32_t width_of(const EvalSet& set)
 
 void add_eval_options(CLI::App& command, EvalOptions& o)
 {
-    command.add_option("A", o.sets[0], "images, grids, or a .safetensors file of features or moments")->required();
+    command.add_option("A", o.sets[0], "images, grids, clouds (.ply), or a .safetensors file of features or moments")
+        ->required();
     command.add_option("B", o.sets[1], "the set to compare with, of the same kind")->required();
     command.add_option("--features", o.network, "the network: safetensors (docs/eval.md has the layouts)");
     command.add_option("--save-features", o.save, "a folder to write a.safetensors and b.safetensors to");
