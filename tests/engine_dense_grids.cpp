@@ -128,8 +128,8 @@ TEST(DenseLabels, sizes_that_are_not_tenths_of_a_millimetre_are_refused)
 // one layer of voxels, which straddle the cells' boundaries, in a box of 8 x 8 columns
 TEST(DenseLabels, a_doubled_ground_is_said)
 {
-    const auto ground = [](uint32_t height, double cell, double min_fill) {
-        DenseLabels dense{{24, 24, 9}, {2000, 2000, 2000}, {0, 0, 0}, {}};
+    const auto ground = [](uint32_t height, double cell, double min_fill, int64_t shift = 0) {
+        DenseLabels dense{{24, 24, 9}, {2000, 2000, 2000}, {0, 0, shift}, {}};
         dense.labels.assign(24 * 24 * 9, kEmpty);
         for (uint32_t i = 0; i < 24 * 24; ++i) // flat, or a slope from below a boundary to above it
             dense.labels[i * 9 + (height ? height : 2 + i % 24 % 3 / 2)] = 0;
@@ -147,6 +147,10 @@ TEST(DenseLabels, a_doubled_ground_is_said)
                             "0.17 leaves out the emptier layer"});
     EXPECT_EQ(ground(0, 0.6, 0.17), std::pair(size_t(64), std::vector<std::string>()));
     EXPECT_EQ(ground(0, 0.2, 0), std::pair(size_t(576), std::vector<std::string>()));
+    const auto [twice, shifted] = ground(3, 0.2, 0, 1000); // half a voxel higher
+    EXPECT_EQ(twice, 1152u);
+    ASSERT_EQ(shifted.size(), 1u);
+    EXPECT_TRUE(shifted[0].ends_with("; --origin in whole cells keeps the voxels as they are")) << shifted[0];
 }
 
 // ---- label maps

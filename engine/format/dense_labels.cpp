@@ -140,7 +140,7 @@ Result<VoxelGrid> resample(const DenseLabels& dense, float voxel_size, double mi
             }
     if (grid.cells.empty())
         return fail(ErrorCode::bad_input, "{}: no voxel is occupied", where);
-    if (warnings && size > dense.edge[2])
+    if (warnings)
         for (const std::string& line : doubled_ground(grid, fills, double(dense.edge[2]) / 1e4))
             warnings->push_back(line);
     return grid;

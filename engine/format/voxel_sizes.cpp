@@ -130,12 +130,15 @@ std::vector<std::string> doubled_ground(const VoxelGrid& grid, std::span<const C
     }
     if (double(doubled) <= kManyDoubled * double(columns))
         return {};
-    const double between = (fuller + emptier) / 2 / double(doubled);
-    return {fmt::format(
-        "{} of {} columns of ground have two layers of cells: voxels of {:.6g} m straddle the "
-        "boundaries of cells of {:.6g} m; --voxel-size {:.6g} keeps the voxels as they are{}",
-        doubled, columns, voxel, grid.voxel_size, voxel,
-        fuller > kFuller * emptier ? fmt::format(", --min-fill {:.2g} leaves out the emptier layer", between) : "")};
+    const bool shifted = VoxelSizes{voxel, grid.voxel_size}.same();
+    std::string advice = shifted ? "--origin in whole cells" : fmt::format("--voxel-size {:.6g}", voxel);
+    advice += " keeps the voxels as they are";
+    if (fuller > kFuller * emptier)
+        advice +=
+            fmt::format(", --min-fill {:.2g} leaves out the emptier layer", (fuller + emptier) / 2 / double(doubled));
+    return {fmt::format("{} of {} columns of ground have two layers of cells: voxels of {:.6g} m straddle the "
+                        "boundaries of cells of {:.6g} m; {}",
+                        doubled, columns, voxel, grid.voxel_size, advice)};
 }
 
 } // namespace semrover
