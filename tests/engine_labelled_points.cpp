@@ -289,6 +289,21 @@ TEST(LabelledPoints, a_column_of_another_program_is_read_by_its_table)
     }
 }
 
+TEST(LabelledPoints, a_second_column_of_labels_is_said)
+{
+    const ScratchFolder folder;
+    SceneGridOptions o;
+    o.map = "ours";
+    const auto out = read_labelled_points(
+        folder.put("p.ply",
+                   ply(std::string(kXyz) + "property int classification\nproperty int label\n", {"0 0 0 6 2"})),
+        o);
+    ASSERT_TRUE(out) << out.error().message;
+    EXPECT_EQ(out->grid.labels, std::vector<uint8_t>{2});
+    ASSERT_EQ(out->warnings.size(), 1u);
+    EXPECT_TRUE(out->warnings[0].ends_with("'label' has the labels, 'classification' is not read"));
+}
+
 // as bytes, as LAS and PDAL have them (257 times that, or the byte itself), and as floats of both kinds
 TEST(LabelledPoints, colours_are_counted_as_their_type_and_size_say)
 {

@@ -371,6 +371,11 @@ TEST(LabelArray, sizes_are_those_of_options_or_of_the_file)
     EXPECT_EQ(read_scene_grid(npz, o)->grid.cells.size(), 1u);
     o.voxel_size = 0.2f;
     EXPECT_EQ(read_scene_grid(npz, o)->grid.cells.size(), 27u);
+    for (const float metres : {0.f, -1.f, 1e7f, INFINITY, NAN}) {
+        const Path absurd = folder.put(
+            "x.npz", zip_bytes({{"grid.npy", array}, {"voxel_size.npy", npy_of("<f4", "()", std::vector{metres})}}));
+        EXPECT_FALSE(read_scene_grid(absurd, o)) << metres;
+    }
 }
 
 TEST(LabelArray, what_is_no_labels_is_refused_with_words)

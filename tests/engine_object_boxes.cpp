@@ -139,6 +139,7 @@ TEST_F(ObjectBoxes, broken_kitti_labels_are_refused_with_their_line)
     std::string score = kAhead;
     score.replace(score.find('\n'), 1, " 0.87\n");
     EXPECT_EQ(kitti(score)->objects.size(), 1u);
+    EXPECT_EQ(kitti("\xef\xbb\xbf" + kAhead)->objects.size(), 1u);
     EXPECT_TRUE(kitti("")->objects.empty());
     EXPECT_TRUE(says(kitti(kAhead + "Car 1 2\n"), "000001.txt' line 2: expected 15 words of a label"));
     EXPECT_TRUE(says(kitti(kAhead + kAhead.substr(0, 60) + "\n"), "line 2"));
@@ -432,6 +433,7 @@ TEST_F(ObjectBoxes, a_format_is_found_only_where_there_is_no_doubt)
     EXPECT_EQ(found("e.json", "{\"laserLabels\": []}"), BoxFormat::waymo);
     EXPECT_EQ(found("f.json", "[]"), std::nullopt);
     EXPECT_EQ(found("g.csv", kWaymoHeader), BoxFormat::waymo);
+    EXPECT_EQ(found("i.txt", "\xef\xbb\xbf" + kAhead), BoxFormat::kitti); // a byte order mark in front
     EXPECT_EQ(found("h.csv", "a,b\n"), std::nullopt);
     EXPECT_EQ(detect_box_format(folder_ / "missing.txt"), std::nullopt);
     EXPECT_EQ(detect_box_format(folder_.path()), std::nullopt);

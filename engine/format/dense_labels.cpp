@@ -11,7 +11,6 @@ namespace semrover {
 
 namespace {
 
-constexpr int64_t kMaxEdge = 1'000'000; // 100 m: a cell's volume stays within 64 bits
 constexpr double kMaxCells = 1 << 28;   // of the box, empty ones too
 
 int64_t floor_div(int64_t a, int64_t b)

@@ -7,6 +7,8 @@
 
 namespace semrover {
 
+constexpr int64_t kMaxEdge = 1'000'000; // of a voxel and of a cell, 100 m: a cell's volume stays within 64 bits
+
 // A box of labelled voxels. Lengths are whole tenths of a millimetre, so that boundaries of voxels and cells that
 // should agree do, and votes are exact.
 struct DenseLabels {

@@ -173,8 +173,8 @@ Result<SceneGrid> read_label_array(const Path& path, const SceneGridOptions& o)
         SR_TRY(dense.edge[a], tenths_of(sizes.voxel, fmt::format("{}: size of a voxel", where)));
         SR_TRY(dense.origin[a], tenths_of(o.origin[a], "origin"));
     }
-    if (dense.edge[0] < 1)
-        return fail(ErrorCode::bad_input, "{}: voxels of {} m, expected 0.0001 m or more", where, sizes.voxel);
+    if (dense.edge[0] < 1 || dense.edge[0] > kMaxEdge)
+        return fail(ErrorCode::bad_input, "{}: voxels of {} m, expected 0.0001 to 100 m", where, sizes.voxel);
     if (o.origin == std::array<double, 3>{})
         out.warnings.push_back(
             fmt::format("{}: its corner lies at (0, 0, 0) m; --origin X,Y,Z says where else", where));

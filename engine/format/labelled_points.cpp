@@ -48,12 +48,20 @@ Result<Columns> position_columns(const PlyElement& element, const std::string& w
     return columns;
 }
 
-const LabelColumn* label_column(const PlyElement& element)
+// the first of those that there are
+const LabelColumn* label_column(const PlyElement& element, const std::string& where, std::vector<std::string>& warnings)
 {
-    for (const LabelColumn& column : label_columns())
-        if (const PlyProperty* property = element.find(column.name); property && !property->is_list)
-            return &column;
-    return nullptr;
+    const LabelColumn* found = nullptr;
+    for (const LabelColumn& column : label_columns()) {
+        if (const PlyProperty* property = element.find(column.name); !property || property->is_list)
+            continue;
+        if (found)
+            warnings.push_back(
+                fmt::format("{}: '{}' has the labels, '{}' is not read", where, found->name, column.name));
+        else
+            found = &column;
+    }
+    return found;
 }
 
 // CloudCompare writes labels as floats
@@ -78,7 +86,7 @@ Result<CloudColumns> columns_of(const PlyElement& vertices, bool ours, const Sce
 {
     CloudColumns c;
     SR_TRY(c.position, position_columns(vertices, where));
-    if (const LabelColumn* column = label_column(vertices)) {
+    if (const LabelColumn* column = label_column(vertices, where, warnings)) {
         c.label = vertices.find(column->name);
         SR_TRY(c.map, LabelMap::of_column(*column, ours, o.map));
     } else if (!o.default_label) {
