@@ -452,8 +452,14 @@ TEST(CliFuse, intrinsics_colours_and_labels_of_other_sizes_are_brought_to_depth)
             Wall::name(i, "label"), 8, PngFile::kGray,
             [](uint32_t x, uint32_t) { return std::string(x < 40 ? "\x02" : "\x0d"); }, 2);
     }
-    for (const double times : {1.0, 3.0}) { // intrinsics of depth, then of colour
+    // intrinsics of depth, then of colour; without a size they are of colour
+    for (const auto& [times, sized] : {std::pair{1.0, true}, {3.0, true}, {3.0, false}}) {
         w.put_poses(times);
+        Json poses = json_of(contents(w.in("transforms.json")));
+        for (const char* side : {"w", "h"})
+            if (!sized)
+                poses.erase(side);
+        w.put("transforms.json", poses.dump());
         const ProgramResult result = w.fuse("");
         w.expect_wall(result);
         EXPECT_EQ(

@@ -75,21 +75,40 @@ Status apply_options(const FusionFolderOptions& o, Intrinsics& k)
     return check_intrinsics(k, "--fx, --fy, --cx, --cy");
 }
 
-// the size of the first depth picture that there is
-Result<ImageSize> first_depth_size(const Path& folder)
+// the first picture below a folder of one of these names; empty: none
+Path first_picture(const Path& folder, std::initializer_list<const char*> kinds)
 {
     std::vector<Path> found;
     std::error_code error;
     for (const auto& entry : fs::recursive_directory_iterator(folder, error)) {
         const Path relative = entry.path().parent_path().lexically_relative(folder);
-        const bool picture = entry.path().extension() == ".png" || entry.path().extension() == ".npy";
-        if (picture && std::ranges::find(relative, Path("depth")) != relative.end())
+        const bool picture =
+            std::ranges::find(kPictureEndings, entry.path().extension().string()) != std::end(kPictureEndings);
+        if (picture && std::ranges::any_of(kinds, [&](const char* kind) {
+                return std::ranges::find(relative, Path(kind)) != relative.end();
+            }))
             found.push_back(entry.path());
     }
-    if (found.empty())
+    return found.empty() ? Path() : *std::ranges::min_element(found);
+}
+
+Result<ImageSize> first_depth_size(const Path& folder)
+{
+    const Path picture = first_picture(folder, {"depth"});
+    if (picture.empty())
         return fail(ErrorCode::bad_input, "{}: no depth/*.png or depth/*.npy, expected 16-bit gray pictures there",
                     quote_path(folder));
-    return number_image_size(*std::ranges::min_element(found));
+    return number_image_size(picture);
+}
+
+// of the pictures that a path without sizes means: the colours, where there are some
+Result<ImageSize> first_color_size(const Path& folder, ImageSize depth)
+{
+    const Path picture = first_picture(folder, {"color", "rgb", "images"});
+    if (picture.empty())
+        return depth;
+    SR_TRY(const ImageRgb8 image, read_image_rgb8(picture));
+    return ImageSize{image.width, image.height};
 }
 
 // --poses, transforms.json, or what TUM RGB-D calls them
@@ -128,12 +147,16 @@ Status FusionFolder::read_poses(const Path& poses, const FusionFolderOptions& o)
     const bool json = poses.extension() == ".json";
     if (!size && (!json || o.fx || o.fov_x))
         return tl::unexpected(size.error());
-    Intrinsics fallback{kNotSaid, kNotSaid, 0, 0, size ? size->width : 1, size ? size->height : 1};
+    Intrinsics fallback{kNotSaid, kNotSaid, 0, 0, 1, 1};
     if (o.fx || o.fov_x) {
-        fallback = pinhole_from_fov(o.fov_x.value_or(90), fallback.width, fallback.height);
+        fallback = pinhole_from_fov(o.fov_x.value_or(90), size->width, size->height);
         SR_CHECK(apply_options(o, fallback));
     } else if (is_file(folder_ / "intrinsics.json")) {
         SR_TRY(fallback, read_intrinsics_file(folder_ / "intrinsics.json"));
+    } else if (size) {
+        SR_TRY(const ImageSize color, first_color_size(folder_, *size));
+        fallback.width = color.width;
+        fallback.height = color.height;
     }
     const std::optional<FoundPath> found = find_path(poses);
     CameraPath path;
