@@ -85,7 +85,7 @@ Result<SceneGridOptions> grid_options(const SceneInputOptions& o)
 
 bool has_origin(SceneFormat format)
 {
-    return std::ranges::count(options_of(format, false), "--origin") > 0;
+    return std::ranges::count(options_of(format), "--origin") > 0;
 }
 
 Result<std::array<double, 3>> origin_of(const SceneInputOptions& options)
