@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // camera paths and grids of data sets whose frames differ, in the data sets' own layouts: what is drawn has the depth
 // that rays through the voxels have
-#include "engine/camera/camera.h"
+#include "engine/format/camera_path.h"
 #include "engine/format/image.h"
 #include "tests/program.h"
 #include "tests/zip_bytes.h"
@@ -87,22 +87,30 @@ double ray_depth(const Voxels& v, const Rigid& camera, const Intrinsics& k, uint
     return 0;
 }
 
-// share of pixels that show what their rays hit: nothing, or the same depth to `edge`
+// share of the pixels in which something is or should be that show the depth which their rays have, to a voxel. Of
+// every eighth pixel: splats are as wide as a pixel at least, which makes edges fat
 double agreement(const Path& picture, const Voxels& v, const Rigid& camera, const Intrinsics& k)
 {
     const auto depth = read_png_gray16(picture);
     EXPECT_TRUE(depth) << picture;
     if (!depth || depth->width != k.width || depth->height != k.height)
         return 0;
-    size_t right = 0, hits = 0;
-    for (uint32_t y = 0; y < k.height; ++y)
-        for (uint32_t x = 0; x < k.width; ++x) {
+    size_t right = 0, asked = 0;
+    for (uint32_t y = 0; y < k.height; y += 8)
+        for (uint32_t x = 0; x < k.width; x += 8) {
             const double expected = ray_depth(v, camera, k, x, y), found = depth->pixels[y * k.width + x] / 1000.0;
-            hits += expected > 0;
-            right += std::abs(found - expected) <= v.edge / 2;
+            asked += expected > 0 || found > 0;
+            right += expected > 0 && found > 0 && std::abs(found - expected) <= v.edge;
         }
-    EXPECT_GT(hits, size_t(k.width) * k.height / 2) << "the test's own camera looks past the scene";
-    return double(right) / (k.width * k.height);
+    EXPECT_GT(asked, size_t(k.width) * k.height / 64 / 3) << "the test's own camera looks past the scene";
+    return double(right) / double(asked);
+}
+
+void expect_agreement(const Path& picture, const Voxels& v, const Rigid& camera, const Intrinsics& k)
+{
+    EXPECT_GT(agreement(picture, v, camera, k), 0.8) << picture; // 0.82 to 0.9 were measured
+    const Rigid elsewhere = {1, 0, 0, 0.5, 0, 1, 0, -0.5, 0, 0, 1, 1, 0, 0, 0, 1}; // to the right, up and ahead
+    EXPECT_LT(agreement(picture, v, compose(camera, elsewhere), k), 0.5) << picture;
 }
 
 std::string row(const Rigid& m, size_t numbers)
@@ -127,6 +135,9 @@ std::string label_bytes(const Voxels& v)
 
 const Rigid kTr = {0, -1, 0, 0.01, 0, 0, -1, -0.08, 1, 0, 0, -0.27, 0, 0, 0, 1}; // lidar to camera
 
+// of a drive's first camera in the poses' world: the identity, but for errors
+const Rigid kFirstPose = {0.8, 0, 0.6, 0.1, 0, 1, 0, 0.2, -0.6, 0, 0.8, 0.3, 0, 0, 0, 1};
+
 // the cameras of a drive in the frame of its lidar at frame 0
 std::vector<Rigid> lidar_drive()
 {
@@ -146,19 +157,19 @@ TEST(CliPathWorlds, semantickitti_with_the_poses_of_odometry)
     const Path grid = folder.put("sequences/00/voxels/000000.label", label_bytes(volume));
     std::string poses;
     for (const Rigid& camera : lidar_drive()) // P_i = P_0 Tr C_i, and P_0 is no identity in every sequence
-        poses += row(compose(looking({5, 6, 7}, 0.3), compose(kTr, camera)), 12);
+        poses += row(compose(kFirstPose, compose(kTr, camera)), 12);
     const Path path = folder.put("poses/00.txt", poses);
-    const Path calib = folder.put("sequences/00/calib.txt", "P0: 60 0 47.5 0 0 60 31.5 0 0 0 1 0\nTr: " + row(kTr, 12));
+    const Path calib =
+        folder.put("sequences/00/calib.txt", "P0: 240 0 191.5 0 0 240 127.5 0 0 0 1 0\nTr: " + row(kTr, 12));
     const std::string render =
-        fmt::format("render {} --voxel-size 0.2 --path {} -W 96 -H 64 --semantic ", grid.string(), path.string());
+        fmt::format("render {} --voxel-size 0.2 --path {} -W 384 -H 256 --semantic ", grid.string(), path.string());
     const ProgramResult result =
         semrover_program(render + "--calib " + calib.string() + " -o " + (folder / "frames").string());
     ASSERT_EQ(result.code, 0) << result.err;
     EXPECT_EQ(result.err.find("see nothing"), std::string::npos) << result.err;
-    const Intrinsics k{60, 60, 48, 32, 96, 64};
+    const Intrinsics k{240, 240, 192, 128, 384, 256};
     for (size_t i = 0; i < 3; ++i)
-        EXPECT_GT(agreement(folder / fmt::format("frames/depth/00000{}.png", i), volume, lidar_drive()[i], k), 0.9)
-            << i;
+        expect_agreement(folder / fmt::format("frames/depth/00000{}.png", i), volume, lidar_drive()[i], k);
 
     // the volume of frame 1: its lidar is where Tr^-1 P_1 says
     const Rigid lidar = compose(lidar_drive()[1], kTr);
@@ -166,8 +177,8 @@ TEST(CliPathWorlds, semantickitti_with_the_poses_of_odometry)
         semrover_program(render + "--relative-to 1 --calib " + calib.string() + " -o " + (folder / "one").string())
             .code,
         0);
-    EXPECT_GT(agreement(folder / "one/depth/000001.png", volume, inverse(kTr), k), 0.9);
-    EXPECT_GT(agreement(folder / "one/depth/000002.png", volume, compose(inverse(lidar), lidar_drive()[2]), k), 0.9);
+    expect_agreement(folder / "one/depth/000001.png", volume, inverse(kTr), k);
+    expect_agreement(folder / "one/depth/000002.png", volume, compose(inverse(lidar), lidar_drive()[2]), k);
 
     // and without: no frame sees anything, which is said and is an error
     const ProgramResult blind = semrover_program(render + "-o " + (folder / "blind").string());
@@ -180,9 +191,9 @@ TEST(CliPathWorlds, semantickitti_with_the_poses_of_odometry)
     const ProgramResult meet = semrover_program("inspect " + path.string() + " " + grid.string());
     EXPECT_EQ(meet.code, 0) << meet.err;
     EXPECT_NE(meet.out.find("--calib CALIB.TXT"), std::string::npos) << meet.out;
-    EXPECT_NE(semrover_program("inspect " + grid.string() + " --path " + path.string() + " --calib " + calib.string())
-                  .out.find("meet                    yes"),
-              std::string::npos);
+    const ProgramResult met =
+        semrover_program("inspect --json " + grid.string() + " --path " + path.string() + " --calib " + calib.string());
+    EXPECT_NE(met.out.find(R"("meet":"yes")"), std::string::npos) << met.out;
 }
 
 TEST(CliPathWorlds, kitti_360_with_its_calibration_as_the_world)
@@ -197,12 +208,12 @@ TEST(CliPathWorlds, kitti_360_with_its_calibration_as_the_world)
     const Path path = folder.put("cam0_to_world.txt", "1 " + row(looking({990, 2000, 115}, 0), 16) + poses);
     const Path velo = folder.put("calib_cam_to_velo.txt", row(inverse(kTr), 12));
     const ProgramResult result = semrover_program(fmt::format(
-        "render {} --voxel-size 0.2 --path {} --relative-to 250 --world {} -W 96 -H 64 --fov-x 77 --semantic -o {}",
+        "render {} --voxel-size 0.2 --path {} --relative-to 250 --world {} -W 384 -H 256 --fov-x 77 --semantic -o {}",
         grid.string(), path.string(), velo.string(), (folder / "frames").string()));
     ASSERT_EQ(result.code, 0) << result.err;
-    const Intrinsics k = pinhole_from_fov(77, 96, 64);
+    const Intrinsics k = pinhole_from_fov(77, 384, 256);
     for (size_t i = 0; i < 3; ++i) // frame 1 is the file's first
-        EXPECT_GT(agreement(folder / fmt::format("frames/depth/00000{}.png", i + 1), volume, lidar_drive()[i], k), 0.9);
+        expect_agreement(folder / fmt::format("frames/depth/00000{}.png", i + 1), volume, lidar_drive()[i], k);
 }
 
 std::string npy(const std::vector<uint8_t>& values, const char* shape)
@@ -256,32 +267,29 @@ TEST(CliPathWorlds, occ3d_with_the_ego_poses_of_nuscenes_through_a_rig)
             poses.empty() ? "[" : ",", i, 1532402927600000 + 500000 * i, q[3], q[0], q[1], q[2], ego(i)[3], ego(i)[7]);
     }
     const Path path = folder.put("v1.0-mini/ego_pose.json", poses + "]");
-    const Path rig = folder.put("rig.json", R"({"path_axes":"vehicle","sensors":[{"name":"front","width":96,"height":64,
-        "fx":60,"fy":60,"cx":48,"cy":32,"sensor_to_vehicle":[0,0,1,1.7, -1,0,0,0.1, 0,-1,0,1.5, 0,0,0,1]}]})");
+    const Path rig =
+        folder.put("rig.json", R"({"path_axes":"vehicle","sensors":[{"name":"front","width":384,"height":256,
+        "fx":240,"fy":240,"cx":192,"cy":128,"sensor_to_vehicle":[0,0,1,1.7, -1,0,0,0.1, 0,-1,0,1.5, 0,0,0,1]}]})");
     const std::string render =
-        fmt::format("render {} --voxel-size 0.4 --path {} --semantic ", grid.string(), path.string());
+        fmt::format("render {} --voxel-size 0.2 --path {} --semantic ", grid.string(), path.string());
     const ProgramResult result = semrover_program(
         fmt::format("{}--relative-to 1 --rig {} -o {}", render, rig.string(), (folder / "frames").string()));
     ASSERT_EQ(result.code, 0) << result.err;
     EXPECT_EQ(result.err.find("read as a camera"), std::string::npos) << result.err; // the rig says where it sits
     const Rigid sensor = {0, 0, 1, 1.7, -1, 0, 0, 0.1, 0, -1, 0, 1.5, 0, 0, 0, 1};
     for (int i = 0; i < 3; ++i)
-        EXPECT_GT(agreement(folder / fmt::format("frames/front/depth/00000{}.png", i), volume,
-                            compose(compose(inverse(ego(1)), ego(i)), sensor), {60, 60, 48, 32, 96, 64}),
-                  0.9)
-            << i;
+        expect_agreement(folder / fmt::format("frames/front/depth/00000{}.png", i), volume,
+                         compose(compose(inverse(ego(1)), ego(i)), sensor), {240, 240, 192, 128, 384, 256});
     // without a rig: a camera at the vehicle's origin that looks forward, and that is said. The road is at its height
     const ProgramResult bare = semrover_program(fmt::format(
-        "{}--relative-to 1 --origin 0,0,1.5 -W 96 -H 64 --fov-x 80 -o {}", render, (folder / "bare").string()));
+        "{}--relative-to 1 --origin 0,0,1.5 -W 384 -H 256 --fov-x 80 -o {}", render, (folder / "bare").string()));
     EXPECT_EQ(bare.code, 0) << bare.err; // note: a grid in another program's format takes --origin for itself
     EXPECT_NE(bare.err.find("poses of a vehicle (x forward, y left, z up), read as a camera"), std::string::npos);
-    ASSERT_EQ(semrover_program(fmt::format("{}--relative-to 1 --path-origin 0,0,1.5 -W 96 -H 64 --fov-x 80 -o {}",
+    ASSERT_EQ(semrover_program(fmt::format("{}--relative-to 1 --path-origin 0,0,1.5 -W 384 -H 256 --fov-x 80 -o {}",
                                            render, (folder / "bare").string() + " -y"))
                   .code,
               0);
-    EXPECT_GT(
-        agreement(folder / "bare/depth/000001.png", volume, looking({0, 0, 1.5}, 0), pinhole_from_fov(80, 96, 64)),
-        0.9);
+    expect_agreement(folder / "bare/depth/000001.png", volume, looking({0, 0, 1.5}, 0), pinhole_from_fov(80, 384, 256));
 }
 
 TEST(CliPathWorlds, a_drive_in_utm_comes_by_its_origin)
@@ -313,7 +321,11 @@ TEST(CliPathWorlds, a_drive_in_utm_comes_by_its_origin)
     const Path out = folder / "moved.tum";
     ASSERT_EQ(semrover_program("convert " + utm.string() + " " + out.string() + " --origin=-458074,-5429380,-163").code,
               0);
-    EXPECT_NE(contents(out).find("\n0 1 0 1.7"), std::string::npos) << contents(out);
+    const auto moved = read_tum(out, pinhole_from_fov(60, 8, 8));
+    ASSERT_TRUE(moved);
+    const Point3 place = translation_of(moved->frames[0].pose.camera_to_world());
+    for (size_t axis = 0; axis < 3; ++axis)
+        EXPECT_NEAR(place[axis], (Point3{1, 0, 1.7})[axis], 1e-9);
     expect_error(render(utm, "x", "--world 2,0,0,0,0,2,0,0,0,0,2,0"), 3, "expected a rotation without scale or mirror");
     expect_error(render(utm, "x", "--world 1,0,0,0"), 3, "expected a 4x4 or 3x4 matrix, found 4 numbers");
     expect_error(render(utm, "x", "--relative-to 1"), 3,

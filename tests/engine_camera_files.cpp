@@ -72,10 +72,9 @@ Status write(PathFormat format, const Path& path, const CameraPath& cameras)
         return write_transforms(path, cameras);
     case PathFormat::camera_path:
         return write_camera_path_json(path, cameras);
-    case PathFormat::colmap:
-        break;
+    default:
+        return write_colmap(path, cameras);
     }
-    return write_colmap(path, cameras);
 }
 
 // docs/formats.md §7.1: a path means the same in every format
