@@ -108,7 +108,7 @@ double agreement(const Path& picture, const Voxels& v, const Rigid& camera, cons
 
 void expect_agreement(const Path& picture, const Voxels& v, const Rigid& camera, const Intrinsics& k)
 {
-    EXPECT_GT(agreement(picture, v, camera, k), 0.8) << picture; // 0.82 to 0.9 were measured
+    EXPECT_GT(agreement(picture, v, camera, k), 0.8) << picture;                   // 0.82 to 0.9 were measured
     const Rigid elsewhere = {1, 0, 0, 0.5, 0, 1, 0, -0.5, 0, 0, 1, 1, 0, 0, 0, 1}; // to the right, up and ahead
     EXPECT_LT(agreement(picture, v, compose(camera, elsewhere), k), 0.5) << picture;
 }
@@ -331,6 +331,20 @@ TEST(CliPathWorlds, a_drive_in_utm_comes_by_its_origin)
     expect_error(render(utm, "x", "--relative-to 1"), 3,
                  "no frame 1, expected one of 1 frames, counted from 0: 0 to 0");
     expect_error(render(utm, "x", "--relative-to last"), 2, "--relative-to takes first or the number of a frame");
+}
+
+TEST(CliPathWorlds, every_command_that_reads_a_path_takes_the_same_options)
+{
+    for (const char* command :
+         {"render", "refine", "convert", "generate", "inspect", "page", "fuse", "eval surface", "eval flicker"}) {
+        const ProgramResult help = semrover_program(std::string(command) + " --help");
+        EXPECT_EQ(help.code, 0);
+        for (const char* option : {"--relative-to", "--calib", "--world", "--path-origin", "--origin"})
+            EXPECT_NE(help.out.find(option), std::string::npos) << command << " " << option;
+    }
+    expect_error(semrover_program("inspect " SEMROVER_SOURCE_DIR "/assets/scenes/street.semantic.sgrid --fov-x 60"), 2,
+                 "--fov-x has no meaning for a file that is no camera path");
+    expect_error(semrover_program("render x.sgrid --top -o x --relative-to first"), 2, "are of a camera path: --path");
 }
 
 } // namespace cli_path_worlds_test

@@ -64,6 +64,8 @@ Result<DrawOptions> draw_options(const DriveOptions& o)
     draw.visible_alpha = o.visible_alpha;
     SR_TRY(draw.surfels, surfel_options(o.splat_radius, o.opacity));
     SR_CHECK(intrinsics_of(o).map([](const auto&) {}));
+    if (o.path.empty() && o.placement.any())
+        return fail(ErrorCode::usage, "--relative-to, --calib, --world and --path-origin are of a camera path: --path");
     if (o.equirect && !o.rig.empty())
         return fail(ErrorCode::usage, "--equirect or --rig; a rig.json may have an equirectangular sensor");
     if (o.equirect && o.width % 2)

@@ -448,7 +448,8 @@ Result<Report> describe_both(const InspectArguments& o, const Globals& globals)
 {
     SR_TRY(const InspectedFiles files, sort_out(o));
     if (files.path.empty()) {
-        SR_CHECK(refuse_given(*o.input.command, placement_options(), "a file that is no camera path"));
+        for (const auto names : {placement_options(), lens_options()})
+            SR_CHECK(refuse_given(*o.input.command, names, "a file that is no camera path"));
         return describe(files.other, o.input, globals);
     }
     SR_TRY(PathLens lens, path_lens_of(o.lens));

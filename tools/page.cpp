@@ -151,6 +151,8 @@ Result<PageContent> load_content(const PageArguments& o, const Globals& globals)
 
 Status page(const PageArguments& o, const Globals& globals)
 {
+    if (o.path.empty() && o.placement.any())
+        return fail(ErrorCode::usage, "--relative-to, --calib, --world and --origin are of a camera path: --path");
     SR_CHECK(check_writable(o.output, globals.yes));
     SR_TRY(const PageContent content, load_content(o, globals));
     const std::string html = page_html(content);

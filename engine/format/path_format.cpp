@@ -110,7 +110,7 @@ std::optional<PathFormat> format_of_text(std::string_view text)
 
 std::optional<FoundPath> find_in_folder(const Path& folder)
 {
-    for (const char* model : {".", "sparse/0", "sparse", "colmap/sparse/0"})
+    for (const char* model : {".", "sparse/0", "sparse", "0", "colmap/sparse/0"})
         for (const char* file : {"cameras.bin", "cameras.txt", "images.txt"})
             if (const Path at = (folder / model).lexically_normal(); is_there(at / file))
                 return FoundPath{PathFormat::colmap, at};

@@ -6,6 +6,7 @@
 #include "tools/cli/choice.h"
 #include "tools/cli/number_option.h"
 
+#include <array>
 #include <charconv>
 #include <CLI/CLI.hpp>
 #include <cmath>
@@ -68,6 +69,13 @@ void add_lens_options(CLI::App& c, LensOptions& o)
     add_choice(c, "--camera-model", {"pinhole", "opencv", "fisheye", "equirectangular"},
                "lens, where the path has no intrinsics", o.camera_model);
     c.add_option("--distortion", o.distortion, "k1,k2,p1,p2[,k3[,k4,k5,k6]] of opencv, k1,k2,k3,k4 of fisheye");
+}
+
+std::span<const std::string_view> lens_options()
+{
+    static constexpr std::array<std::string_view, 5> kNames = {"--width", "--height", "--fov-x", "--camera-model",
+                                                               "--distortion"};
+    return kNames;
 }
 
 Result<Intrinsics> intrinsics_of(const LensOptions& o)

@@ -4,6 +4,8 @@
 
 #include "engine/format/camera_path.h"
 
+#include <span>
+
 namespace CLI {
 class App;
 }
@@ -19,6 +21,7 @@ struct LensOptions {
     std::string camera_model = "pinhole", distortion;
 };
 void add_lens_options(CLI::App& command, LensOptions& options);
+std::span<const std::string_view> lens_options(); // their names
 
 Result<Intrinsics> intrinsics_of(const LensOptions& options); // usage
 Result<PathLens> path_lens_of(const LensOptions& options);    // the same, and what of it was given; usage

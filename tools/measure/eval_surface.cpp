@@ -99,6 +99,8 @@ Status run_surface(EvalSurfaceArguments o, const Globals& globals)
 {
     SR_TRY(const Mesh mesh, read_mesh(o.mesh));
     SR_TRY(const Mesh truth, read_mesh(o.truth));
+    if (o.frames.empty() && o.placement.any())
+        return fail(ErrorCode::usage, "--relative-to, --calib, --world and --origin are of a camera path: --frames");
     std::vector<uint32_t> views;
     if (!o.frames.empty()) {
         o.input.poses = o.poses;
