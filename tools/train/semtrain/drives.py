@@ -9,6 +9,7 @@ import argparse
 import os
 import shutil
 
+from .content import digest, keep_made_of
 from .frames import SPLATS
 from .json_file import write_json
 from .program import semrover
@@ -41,6 +42,13 @@ def daylight(options):
     """the sky's options of `semrover streets`, for those that are given"""
     given = {"--sun-azimuth": options.sun_azimuth, "--sun-elevation": options.sun_elevation, "--clouds": options.clouds}
     return [word for name, value in given.items() if value is not None for word in (name, value)]
+
+
+def made_of(grid, options):
+    """what the frames of a drive depend on beside its seed"""
+    names = ("frames", "length", "samples", "shift", "sun_azimuth", "sun_elevation", "clouds", "splat_radius", "width",
+             "height")
+    return {"grid": digest([grid]), **{name: getattr(options, name) for name in names}}
 
 
 def make_frames(grid, folder, seed, options):
@@ -79,10 +87,17 @@ def main(arguments=None):
     first, _, last = options.seeds.partition(":")
     for seed in range(int(first), int(last or first) + 1):
         street, folder = (os.path.join(root, str(seed)) for root in (options.streets, options.output))
-        if os.path.exists(os.path.join(folder, DONE)):
+        grid, done = os.path.join(street, "truth.sgrid"), os.path.exists(os.path.join(folder, DONE))
+        if not os.path.exists(grid):
+            if done:
+                continue  # its street is not needed any more
+            make_street(street, seed, options.length)
+        about = made_of(grid, options)
+        if done:
+            keep_made_of(folder, about)
             continue
-        make_street(street, seed, options.length)
-        make_frames(os.path.join(street, "truth.sgrid"), folder, seed, options)
+        make_frames(grid, folder, seed, options)
+        keep_made_of(folder, about)
         print(folder, flush=True)
 
 

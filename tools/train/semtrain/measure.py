@@ -1,13 +1,15 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""Generates held-back streets with several models, samplers, steps and guidance scales, and compares the points with the
-true ones (semrover eval points): a table in Markdown, and all figures as JSON. Whatever is there already is kept."""
+"""Generates held-back streets with several models, samplers, steps and guidance scales, and compares the points with
+the true ones (semrover eval points): a table in Markdown, and all figures as JSON. Whatever is there already is kept;
+what was made with another model of the same name, or of other cuts, is refused."""
 import argparse
 import itertools
 import json
 import os
 import time
 
+from .content import digest_of_folder, keep_made_of
 from .json_file import read_json, write_json
 from .program import semrover
 
@@ -81,6 +83,8 @@ def main(arguments=None):
     p.add_argument("--objects", nargs="+", choices=["none", "auto", "street"], default=["none"], help="what is told")
     options = p.parse_args(arguments)
     models = [item.split("=", 1) for item in options.model]
+    keep_made_of(options.output, {"cuts": digest_of_folder(options.cuts),
+                                  **{f"model {name}": digest_of_folder(folder) for name, folder in models}})
     head = ["model", "sampler", "steps", "guidance", "told", *CLASSES, "cell colour", "Chamfer m", "windows", "markings",
             "detail", "of cars", "spread of cars", "ms a cell"]
     print("| " + " | ".join(head) + " |\n|" + "---|" * len(head))

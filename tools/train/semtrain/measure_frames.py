@@ -2,12 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Refines drives that a renderer was not trained on, each frame from the one before and each alone, along the drive and
 beside it, and compares the frames with the true ones (semrover eval frames, flicker, kid): a table in Markdown, and all
-figures as JSON. What is there already is kept."""
+figures as JSON. What is there already is kept; what was made with another model, other frames or settings is
+refused."""
 import argparse
 import json
 import os
 import shutil
 
+from .content import digest, digest_of_folder, keep_made_of
 from .frames import find_drives, picture_name
 from .json_file import read_json, write_json
 from .program import semrover
@@ -123,6 +125,10 @@ def main(arguments=None):
     p.add_argument("--frame-noise", choices=("fresh", "warped"), help="default: as the model says")
     p.add_argument("--features", help="network for KID (docs/eval.md)")
     options = p.parse_args(arguments)
+    keep_made_of(options.output, {
+        "model": digest_of_folder(options.model), "steps": options.steps, "frame_noise": options.frame_noise,
+        "frames": digest([path for drive in find_drives(options.frames) for path in drive.pictures()]),
+        "features": options.features and digest([options.features])})
     lines = ["| poses | frames | PSNR dB | where splats are | SSIM | KID x 1000 | flicker | truth's |", "|" + "---|" * 8]
     for pose in poses_of(options.frames, options.output):
         for make in (splats, refined, alone):

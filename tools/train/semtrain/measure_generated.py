@@ -2,12 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Generates held-back streets, refines drives through them, and compares the frames with those that the same renderer
 makes of the streets' true points (semrover eval frames, kid, flicker): a table in Markdown, and all figures as JSON.
-What is there already is kept."""
+What is there already is kept; what was made with another model of the same name, or with other settings, is refused."""
 import argparse
 import itertools
 import json
 import os
 
+from .content import digest, digest_of_folder, keep_made_of
 from .drives import drive_of, make_buffers
 from .json_file import read_json, write_json
 from .measure_frames import gather, mean_flicker
@@ -112,8 +113,12 @@ def main(arguments=None):
     p.add_argument("-W", "--width", type=int, default=616)
     p.add_argument("-H", "--height", type=int, default=424)
     options = p.parse_args(arguments)
+    keep_made_of(options.output, {
+        **{name: getattr(options, name) for name in ("seeds", "frames", "length", "reach", "width", "height")},
+        "features": options.features and digest([options.features])})
     streets = [Street(seed, os.path.join(options.output, "streets", str(seed)), options) for seed in options.seeds]
     models = [item.split("=", 1) for item in options.model]
+    keep_made_of(options.output, {f"model {name}": digest_of_folder(folder) for name, folder in models})
     lines = measure(streets, models, options.objects, options)
     with open(os.path.join(options.output, "table.md"), "w") as file:
         file.write("\n".join(lines) + "\n")

@@ -10,6 +10,7 @@ import numpy as np
 import torch
 
 from . import safetensors_file
+from .content import digest_of_folder, keep_made_of
 from .drives import make_buffers
 from .frames import find_drives
 from .regenerate import load_transformer, regenerate
@@ -57,7 +58,9 @@ def main():
     p.add_argument("--splat-radius", default="auto", help="of the buffers, as `semrover render` takes it")
     options = p.parse_args()
     transformer = load_transformer(options.transformer) if options.transformer else None
-    os.makedirs(options.output, exist_ok=True)
+    keep_made_of(options.output, {
+        "transformer": digest_of_folder(options.transformer) if options.transformer else "none",
+        "splat_radius": options.splat_radius})
 
     def name_of(drive):
         return os.path.relpath(drive.folder, options.frames)

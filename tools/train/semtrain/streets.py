@@ -1,22 +1,26 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
 """Makes procedural streets to train on: FOLDER/SEED/truth.sgrid and semantic.sgrid, a drive, the mesh. A street that is
-there is left as it is."""
+there is left as it is, and one of other settings refused."""
 import argparse
 import os
 
+from .content import keep_made_of
 from .program import semrover
 
 
 def make_street(folder, seed, length, keep_mesh=False, placement="shifted"):
     """FOLDER/truth.sgrid holds what drives along the whole street see. -> whether it was made now"""
+    about = {"length": float(length), "placement": placement}
     if os.path.exists(os.path.join(folder, "truth.sgrid")):
+        keep_made_of(folder, about)
         return False
     os.makedirs(os.path.dirname(os.path.abspath(folder)), exist_ok=True)
     semrover("streets", "--seed", seed, "--length", length, "--end-margin", 12, "--spacing", 2, "--seen", "--placement",
              placement, "-o", folder, "--quiet", "-y")
     if not keep_mesh:
         os.remove(os.path.join(folder, "mesh.glb"))
+    keep_made_of(folder, about)
     return True
 
 

@@ -61,6 +61,9 @@ class Pieces(unittest.TestCase):
         made = os.stat(self.path("table", "tiny-ddpm-2-1", "7.sgrid")).st_mtime_ns
         self.assertEqual(self.measure()[2:], rows)
         self.assertEqual(os.stat(self.path("table", "tiny-ddpm-2-1", "7.sgrid")).st_mtime_ns, made)
+        train(self.street, self.path("run"), 4)  # another model of the same name
+        with self.assertRaisesRegex(SystemExit, "table was made with model tiny .*, now it is"):
+            self.measure()
 
 
 class GeneratedStreets(unittest.TestCase):

@@ -18,7 +18,7 @@ from PIL import Image
 
 from recipe import RUN
 from semtrain import latents, model_folder, safetensors_file
-from semtrain.content import digest
+from semtrain.content import digest, digest_of_folder, keep_made_of
 from semtrain.curve import draw_curve
 from semtrain.frames import find_drives, splats_of
 from semtrain.grids import Grids
@@ -26,6 +26,7 @@ from semtrain.json_file import read_json, write_json
 from semtrain.nets.vae import AutoencoderKL
 from semtrain.run_folder import RunFolder
 from semtrain.safetensors_file import read_header
+from semtrain.streets import make_street
 from test_recipes_asd import VAE, draw_drive
 from test_transformer import TINY, train, write_street
 
@@ -172,6 +173,35 @@ class WhatIsKept(InAFolder):
             with_bytes_of_another_time(self.path("frames", "0", part, "000001.png"), blacken)
             changed = (getattr(buffers(), kept) != before).flatten(1).any(1)
             self.assertEqual(changed.tolist(), [False, True, False], part)
+
+
+class Results(InAFolder):
+    def test_of_other_inputs_are_refused_by_name(self):
+        keep_made_of(self.path("out"), {"model a": "1", "cuts": "2"})
+        keep_made_of(self.path("out"), {"model a": "1", "model b": "3"})  # one more
+        for about, line in (({"model b": "4"}, "with model b 3, now it is 4"), ({"cuts": "3"}, "with cuts 2, now")):
+            with self.assertRaisesRegex(SystemExit, f"out was made {line}"):
+                keep_made_of(self.path("out"), about)
+        self.assertEqual(read_json(self.path("out/made_of.json")), {"model a": "1", "model b": "3", "cuts": "2"})
+
+    def test_of_a_folder_are_named_by_all_of_its_files(self):
+        def put(name, text):
+            os.makedirs(os.path.dirname(self.path("of", name)), exist_ok=True)
+            with open(self.path("of", name), "w") as file:
+                file.write(text)
+            return digest_of_folder(self.path("of"))
+        keys = [put("a", "1"), put("b/c", "1"), put("b/c", "2"), put("b/d", "2")]
+        self.assertEqual(len(set(keys)), 4)
+        self.assertEqual(put("b/d", "2"), keys[-1])
+
+    def test_a_street_of_another_length_or_placement_is_not_taken_for_what_was_asked(self):
+        write_street(self.path("truth.sgrid"))
+        with mock.patch("semtrain.streets.semrover") as engine:
+            self.assertFalse(make_street(self.holder.name, 1, 60, placement="canonical"))
+            for length, placement in ((40, "canonical"), (60, "shifted")):
+                with self.assertRaisesRegex(SystemExit, "was made with (length 60.0|placement canonical), now it is"):
+                    make_street(self.holder.name, 1, length, placement=placement)
+            engine.assert_not_called()
 
 
 class SplatsOfBuffers(InAFolder):
