@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
 """The sampler as the recipes know it, and a student that gives in one pass what a teacher gives in several."""
+import contextlib
+import io
 import os
 import subprocess
 import tempfile
@@ -10,12 +12,14 @@ import torch
 
 import golden
 from recipe import run_recipe
-from semtrain import measure_distilled, safetensors_file
+from semtrain import adapter, measure_distilled, safetensors_file
 from semtrain.distil import Distillation, Teacher
 from semtrain.grids import Grids, LocalSets
 from semtrain.json_file import read_json, write_json
+from semtrain.model_folder import read_component
 from semtrain.nets.transformer import VoxfieldTransformer
 from semtrain.program import semrover_path
+from semtrain.regenerate import load_transformer
 from semtrain.sampler import Guidance, guided_x0, linear_alphas, posterior, steps_of, timesteps_of
 from test_transformer import train, write_street
 
@@ -90,7 +94,9 @@ class TheRecipe(unittest.TestCase):
         write_street(cls.grid)
         train(cls.grid, cls.path("first"), 120, "--set", "learning_rate=0.01", "--set", "ema=0.9", "--set",
               "known_share=0.75")
-        cls.teacher = cls.path("first/model")
+        cls.teacher, cls.semantic = cls.path("first/model"), cls.path("semantic.sgrid")
+        semantic = {name: t for name, t in safetensors_file.read(cls.grid).items() if name in ("cells", "labels")}
+        safetensors_file.write(cls.semantic, semantic, {"voxel_size": "0.6", "points_per_voxel": "4"})
         index = read_json(os.path.join(cls.teacher, "model_index.json"))
         index["defaults"].update(num_inference_steps=4, guidance_scale=2.5, guidance_until=900, guidance_radius=0.6,
                                  known_tokens="clean")
@@ -126,10 +132,8 @@ class TheRecipe(unittest.TestCase):
         self.assertEqual(defaults["guidance_scale"], 1)
         self.assertEqual((defaults["num_inference_steps"], defaults["distilled_steps"]), (4, 4))
         self.assertFalse({"guidance_until", "guidance_radius"} & set(defaults))
-        semantic = {name: t for name, t in safetensors_file.read(self.grid).items() if name in ("cells", "labels")}
-        safetensors_file.write(self.path("semantic.sgrid"), semantic, {"voxel_size": "0.6", "points_per_voxel": "4"})
-        subprocess.run([semrover_path(), "generate", self.path("semantic.sgrid"), "-m", self.path("student/model"),
-                        "-o", self.path("made.sgrid"), "--quiet"], check=True)
+        subprocess.run([semrover_path(), "generate", self.semantic, "-m", self.path("student/model"), "-o",
+                        self.path("made.sgrid"), "--quiet"], check=True)
         made = safetensors_file.read(self.path("made.sgrid"))
         colors = made["colors"].float().mean((1, 2))
         floor, wall = colors[made["labels"] == 0].mean(), colors[made["labels"] == 2].mean()
@@ -158,6 +162,28 @@ class TheRecipe(unittest.TestCase):
         labels, condition = torch.zeros(2, 5, dtype=torch.long), torch.zeros(2, 5, 0)
         x0 = teacher.x0_of(first, 2, x, known, random, labels, torch.zeros(2, 5, 3), ~known, condition)
         torch.testing.assert_close(x0, torch.full_like(x, 0.3))  # one x0 throughout is that x0
+
+    def test_what_a_student_has_learnt_is_an_adapter_beside_its_teachers_weights(self):
+        self.distil("apart", 100)
+        base, student = (os.path.join(folder, "voxfield_transformer")
+                         for folder in (self.teacher, self.path("apart/model")))
+        errors = []
+        for rank in (1, 4, 64):
+            folder = self.path(f"rank{rank}/voxfield_transformer")
+            with contextlib.redirect_stdout(io.StringIO()):
+                adapter.main(["-o", folder, "--base", base, "--trained", student, "--rank", str(rank)])
+            for name, tensor in read_component(base)[1].items():
+                self.assertTrue(torch.equal(tensor, read_component(folder)[1][name]), name)
+            errors.append(self.errors(self.path(f"rank{rank}"))[1])
+        before, after = self.errors(self.path("apart/model"))
+        self.assertTrue(before > errors[0] > errors[1] > errors[2], (before, errors))
+        self.assertLess(errors[2], 0.5 * (before + after))  # but for biases it is the student
+        whole, of_student = load_transformer(folder).state_dict(), load_transformer(student).state_dict()
+        for name, tensor in of_student.items():
+            if name.startswith("transformer_blocks.0.attn.") and name.endswith("weight"):
+                torch.testing.assert_close(whole[name], tensor, atol=2e-3, rtol=0)
+        subprocess.run([semrover_path(), "generate", self.semantic, "-m", self.path("rank4/voxfield_transformer"), "-o",
+                        self.path("adapted.sgrid"), "--steps", "2", "--quiet"], check=True)
 
     def test_goes_on_where_it_stopped(self):
         whole = self.distil("run", 12)
