@@ -546,6 +546,56 @@ TEST(CameraFiles, pictures_of_colmap_give_order_and_cameras)
     EXPECT_EQ(rig->frames[2].time, 1);
 }
 
+TEST(CameraFiles, a_transforms_file_has_at_the_top_what_all_frames_share)
+{
+    const ScratchFolder folder;
+    const auto written = [&](const std::vector<Intrinsics>& views) {
+        CameraPath path;
+        for (const Intrinsics& k : views)
+            path.frames.emplace_back().intrinsics = k;
+        EXPECT_TRUE(write_transforms(folder / "t.json", path));
+        const auto read = read_transforms(folder / "t.json");
+        EXPECT_TRUE(read) << read.error().message;
+        for (size_t i = 0; i < path.frames.size(); ++i)
+            expect_near(read->frames[i].intrinsics, path.frames[i].intrinsics, 1e-9);
+        return *read_json(folder / "t.json");
+    };
+    const Intrinsics plain = pinhole_from_fov(60, 64, 40),
+                     lens{50, 51, 31, 20, 64, 40, CameraModel::opencv, {0.1, 0.2}},
+                     rational{50, 51, 31, 20, 64, 40, CameraModel::opencv, {0.1, 0, 0, 0, 0, 0.3}},
+                     fisheye{20, 20, 32, 20, 64, 40, CameraModel::fisheye, {0.01}};
+    const Json shared = written({lens, lens});
+    EXPECT_EQ(shared["k2"], 0.2);
+    EXPECT_FALSE(shared["frames"][0].contains("k2") || shared["frames"][0].contains("w"));
+    for (const auto& [views, model] :
+         {std::pair{std::vector{plain, lens}, "OPENCV"}, {std::vector{lens, rational}, "FULL_OPENCV"}}) {
+        const Json file = written(views);
+        EXPECT_EQ(file["camera_model"], model);
+        for (const char* key : {"w", "h", "fl_x", "fl_y", "cx", "cy", "k1", "k2", "k3", "p1", "p2"})
+            EXPECT_FALSE(file.contains(key)) << key; // nerfstudio would take it for all frames
+        EXPECT_EQ(file["frames"][1]["fl_y"], 51);
+    }
+    const Json mixed = written({lens, fisheye});
+    EXPECT_FALSE(mixed.contains("camera_model"));
+    EXPECT_EQ(mixed["frames"][1]["camera_model"], "OPENCV_FISHEYE");
+}
+
+TEST(CameraFiles, colmap_names_of_several_cameras_differ_at_their_end)
+{
+    const ScratchFolder folder;
+    CameraPath path = random_path(4);
+    for (size_t i = 0; i < 4; ++i)
+        path.frames[i].camera = i % 2 ? "left" : "front";
+    ASSERT_TRUE(write_colmap(folder / "rig", path));
+    const std::string rig = contents(folder / "rig/images.txt");
+    for (const char* name : {" front/front_000000.png\n", " left/left_000000.png\n", " left/left_000001.png\n"})
+        EXPECT_NE(rig.find(name), std::string::npos) << name;
+    for (CameraFrame& f : path.frames)
+        f.camera.clear();
+    ASSERT_TRUE(write_colmap(folder / "one", path));
+    EXPECT_NE(contents(folder / "one/images.txt").find(" color/000003.png\n"), std::string::npos); // as `render` does
+}
+
 TEST(CameraFiles, formats_have_names)
 {
     for (const PathFormat format :

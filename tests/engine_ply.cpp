@@ -85,7 +85,7 @@ TEST(Ply, points_carry_colour_and_label)
     s.opacity.clear();
     ASSERT_TRUE(write_points_ply(folder / "p.ply", s));
     PlyFile file = read_ply(folder / "p.ply");
-    EXPECT_EQ(file.names, (std::vector<std::string>{"x", "y", "z", "red", "green", "blue", "label"}));
+    EXPECT_EQ(file.names, (std::vector<std::string>{"x", "y", "z", "nx", "ny", "nz", "red", "green", "blue", "label"}));
     EXPECT_EQ(file.columns["y"], (std::vector<double>{2, 5.5}));
     EXPECT_EQ(file.columns["red"], (std::vector<double>{0, 51}));
     EXPECT_EQ(file.columns["green"], (std::vector<double>{128, 102}));

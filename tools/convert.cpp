@@ -32,9 +32,9 @@ constexpr std::array<std::string_view, 1> kDryRun = {"--dry-run"};
 constexpr std::array<std::string_view, 7> kBoxNames = {"--from",  "--map",    "--origin",       "--calib",
                                                        "--frame", "--sample", "--vehicle-frame"};
 constexpr std::array<std::string_view, 3> kModelNames = {"--dtype", "--asd-init", "--vsd-init"};
-constexpr std::array<std::string_view, 10> kPathNames = {"--path-format", "--camera", "--rig",          "--width",
+constexpr std::array<std::string_view, 12> kPathNames = {"--path-format", "--camera", "--rig",          "--width",
                                                          "--height",      "--fov-x",  "--camera-model", "--distortion",
-                                                         "--calib",       "--origin"};
+                                                         "--calib",       "--origin", "--points",       "--images"};
 constexpr std::array<std::string_view, 2> kGuessNames = {"--model", "--seed"};
 constexpr std::array<std::string_view, 6> kSceneNames = {"--to",      "--seed", "--splat-radius",
                                                          "--opacity", "--up",   "--splat-labels"};

@@ -2,15 +2,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/convert_path.h"
 
-#include "engine/camera/rig.h"
 #include "engine/format/camera_path.h"
+#include "engine/format/labelled_points.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/choice.h"
 #include "tools/cli/warnings.h"
+#include "tools/scene_input.h"
 
 #include <algorithm>
 #include <CLI/CLI.hpp>
+#include <map>
 #include <set>
 
 namespace semrover {
@@ -40,7 +42,18 @@ Result<PathFormat> output_format(const Path& out, const ConvertPathOptions& o)
         quote_path(out));
 }
 
-Status check_output(const Path& in, const Path& out, PathFormat format, const Globals& globals)
+// where trainers look for pictures: beside sparse/0, else in the model's folder
+Path images_folder(const Path& model)
+{
+    const Path parent = model.parent_path();
+    if (model.filename() == "sparse")
+        return parent / "images";
+    return model.filename() == "0" && parent.filename() == "sparse" ? parent.parent_path() / "images"
+                                                                    : model / "images";
+}
+
+Status check_output(const Path& in, const Path& out, const ConvertPathOptions& o, PathFormat format,
+                    const Globals& globals)
 {
     std::error_code ignored;
     if (fs::equivalent(in, out, ignored))
@@ -52,7 +65,11 @@ Status check_output(const Path& in, const Path& out, PathFormat format, const Gl
         return fail(ErrorCode::bad_input, "{} is a folder, expected a file to write", quote_path(out));
     std::vector<Path> files{out};
     if (format == PathFormat::colmap)
-        files = {out / "cameras.txt", out / "images.txt"};
+        files = {out / "cameras.txt", out / "images.txt", out / "points3D.txt"};
+    if (format == PathFormat::transforms && !o.points.empty())
+        files.push_back(out.parent_path() / "points.ply");
+    if (!o.images.empty())
+        files.push_back(images_folder(out));
     if (format == PathFormat::kitti)
         files = {out, out.parent_path() / "times.txt", out.parent_path() / "calib.txt"};
     for (const Path& path : files)
@@ -79,18 +96,61 @@ Status choose_camera(CameraPath& path, const Path& in, const ConvertPathOptions&
     return {};
 }
 
-Result<CameraPath> read_input(const Path& in, const ConvertPathOptions& o)
+// a picture that `render` or `refine` wrote
+Result<Path> find_picture(const Path& folder, const std::string& camera, uint32_t number)
 {
-    SR_TRY(PathLens lens, path_lens_of(o.lens));
-    lens.matters = o.rig.empty();
-    SR_TRY(const PathPlacement placement, placement_of(o.placement));
-    SR_TRY(CameraPath path, read_camera_path(in, lens, placement));
-    if (path.body && o.rig.empty())
-        path.warnings.push_back(body_text(quote_path(in), *path.body));
-    if (o.rig.empty())
-        return path;
-    SR_TRY(const Rig rig, read_rig(o.rig));
-    return expand_rig(rig, path);
+    const Path rendered = folder / picture_name(camera, "color", number);
+    const Path refined = folder / "frames" / camera / fmt::format("{:06}", number);
+    for (const Path& path : {rendered, Path(refined.string() + ".png"), Path(refined.string() + ".jpg")})
+        if (is_file(path))
+            return path;
+    return fail(ErrorCode::bad_input, "--images: {} is missing, and so is {}.png", quote_path(rendered),
+                quote_path(refined));
+}
+
+// Links, or copies where the file system has none. Also without folders: the first loader of 3DGS looks there.
+Status link_images(const Path& model, const CameraPath& path, const Path& from)
+{
+    std::map<std::string, uint32_t> counts;
+    for (const CameraFrame& f : path.frames)
+        counts[f.camera] = 0;
+    for (const CameraFrame& f : path.frames) {
+        const uint32_t number = counts[f.camera]++;
+        SR_TRY(const Path picture, find_picture(from, f.camera, number));
+        const Path name = colmap_picture_name(f.camera, number, counts.size());
+        for (const Path& to : {images_folder(model) / name, images_folder(model) / name.filename()}) {
+            SR_CHECK(make_folder(to.parent_path()));
+            std::error_code error;
+            fs::remove(to, error);
+            fs::create_hard_link(picture, to, error);
+            if (error)
+                fs::copy_file(picture, to, error);
+            if (error)
+                return fail(ErrorCode::bad_input, "cannot write {}: {}", quote_path(to), error.message());
+        }
+    }
+    return {};
+}
+
+Status write_with_points(const Path& out, const CameraPath& path, const ConvertPathOptions& o, PathFormat format,
+                         const Globals& globals)
+{
+    if (format != PathFormat::colmap && format != PathFormat::transforms)
+        return fail(ErrorCode::usage, "--points and --images: a {} file has no place for them", name_of(format));
+    if (format != PathFormat::colmap && !o.images.empty())
+        return fail(ErrorCode::usage, "--images: the pictures of a transforms.json lie beside it");
+    Surfels points;
+    if (!o.points.empty()) {
+        SR_TRY(const VoxelGrid grid, load_grid(o.points, {}, globals));
+        points = labelled_points(grid);
+    }
+    if (format == PathFormat::transforms) {
+        SR_CHECK(write_points_ply(out.parent_path() / "points.ply", points));
+        return write_transforms(out, path, {{}, "points.ply"});
+    }
+    if (!o.images.empty())
+        SR_CHECK(link_images(out, path, o.images));
+    return write_colmap(out, path, points);
 }
 
 Status write_output(const Path& out, const CameraPath& path, PathFormat format)
@@ -118,6 +178,11 @@ void add_path_options(CLI::App& c, ConvertPathOptions& o)
                "of a camera path that is written; by default OUT's name tells", o.format);
     c.add_option("--camera", o.camera, "of a camera path: only the frames of this camera");
     c.add_option("--rig", o.rig, "of a camera path: every sensor of a rig.json at every pose");
+    c.add_option(
+        "--points", o.points,
+        "of a camera path: a grid whose points go along, to points3D.txt of COLMAP or, for nerfstudio, points.ply");
+    c.add_option("--images", o.images,
+                 "of a camera path to COLMAP: a folder of `render` or `refine`, whose pictures get links in images/");
     add_lens_options(c, o.lens);
     add_placement_options(c, o.placement);
 }
@@ -138,11 +203,13 @@ Status convert_path(const Path& in, const Path& out, const ConvertPathOptions& o
 {
     const Path to = out.has_filename() ? out : out.parent_path(); // "sparse/"
     SR_TRY(const PathFormat format, output_format(to, o));
-    SR_CHECK(check_output(in, to, format, globals));
-    SR_TRY(CameraPath path, read_input(in, o));
+    SR_CHECK(check_output(in, to, o, format, globals));
+    SR_TRY(const PathPlacement placement, placement_of(o.placement));
+    SR_TRY(CameraPath path, read_cameras(in, o.rig, o.lens, placement));
     SR_CHECK(choose_camera(path, in, o, format));
+    const bool more = !o.points.empty() || !o.images.empty();
     if (!dry_run)
-        SR_CHECK(write_output(to, path, format));
+        SR_CHECK(more ? write_with_points(to, path, o, format, globals) : write_output(to, path, format));
     print_warnings(path.warnings, globals);
     if (globals.json)
         fmt::print("{}\n", Json{{"output", printable(to.string())},

@@ -16,6 +16,8 @@ struct ConvertPathOptions {
     std::string format; // of the result; empty: by its name
     std::string camera; // only this one's frames
     std::string rig;    // every sensor at every pose
+    std::string points; // a grid, whose points go along
+    std::string images; // a folder of `render` or `refine`, whose pictures go along
 };
 void add_path_options(CLI::App& command, ConvertPathOptions& options);
 

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/drive_options.h"
 
-#include "engine/camera/rig.h"
 #include "engine/format/camera_path.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/number_option.h"
@@ -76,19 +75,17 @@ Result<DrawOptions> draw_options(const DriveOptions& o)
 
 Result<CameraPath> load_cameras(const DriveOptions& o)
 {
-    SR_TRY(PathLens lens, path_lens_of(o));
-    lens.matters = o.rig.empty() && !o.equirect;
     SR_TRY(const PathPlacement placement, placement_of(o.placement));
+    if (!o.equirect)
+        return read_cameras(o.path, o.rig, o, placement);
+    SR_TRY(PathLens lens, path_lens_of(o));
+    lens.matters = false;
     SR_TRY(CameraPath path, read_camera_path(o.path, lens, placement));
-    if (path.body && o.rig.empty())
+    if (path.body)
         path.warnings.push_back(body_text(quote_path(o.path), *path.body));
-    if (o.equirect)
-        for (CameraFrame& frame : path.frames)
-            frame.intrinsics = whole_sphere(o.width, o.width / 2);
-    if (o.rig.empty())
-        return path;
-    SR_TRY(const Rig rig, read_rig(o.rig));
-    return expand_rig(rig, path);
+    for (CameraFrame& frame : path.frames)
+        frame.intrinsics = whole_sphere(o.width, o.width / 2);
+    return path;
 }
 
 } // namespace semrover

@@ -49,13 +49,21 @@ struct PathBody {
     Rigid forward_camera_to_body; // a camera at its origin that looks forward
 };
 
+// A camera of a rig. Vehicle axes: x forward, y left, z up; sensor axes are OpenCV's.
+struct Sensor {
+    std::string name; // is_camera_name, unique in the rig
+    Intrinsics intrinsics;
+    Rigid sensor_to_vehicle = kIdentity;
+};
+
 // The frames that a run renders, in order. Readers return at least one. A file of a body's poses has frames of a camera
 // at the body's origin that looks forward.
 struct CameraPath {
     std::vector<CameraFrame> frames;
-    bool numbered = false;             // the times are numbers that the file gives its frames
-    std::optional<PathBody> body;      // of the file's poses; none: a camera
-    std::vector<std::string> warnings; // of the reader
+    std::vector<Sensor> sensors = {};       // of the rig that the frames are of, if they are of one
+    bool numbered = false;                  // the times are numbers that the file gives its frames
+    std::optional<PathBody> body = {};      // of the file's poses; none: a camera
+    std::vector<std::string> warnings = {}; // of the reader
 
     // a frame's pose to the world, in the axes of the file's own poses
     Rigid file_pose(size_t frame) const;

@@ -184,9 +184,27 @@ Result<Rig> read_rig(const Path& path)
     return rig;
 }
 
+Json rig_json(std::span<const Sensor> sensors)
+{
+    Json list = Json::array();
+    for (const Sensor& s : sensors) {
+        const Intrinsics& k = s.intrinsics;
+        Json sensor{
+            {"name", s.name}, {"model", std::string(name_of(k.model))}, {"width", k.width}, {"height", k.height}};
+        if (k.model != CameraModel::equirectangular)
+            sensor.update({{"fx", k.fx}, {"fy", k.fy}, {"cx", k.cx}, {"cy", k.cy}});
+        if (k.model == CameraModel::opencv || k.model == CameraModel::fisheye)
+            sensor["distortion"] = std::span(k.distortion).first(k.model == CameraModel::opencv ? 8 : 4);
+        for (size_t row = 0; row < 4; ++row)
+            sensor["sensor_to_vehicle"].push_back(std::span(s.sensor_to_vehicle).subspan(4 * row, 4));
+        list.push_back(std::move(sensor));
+    }
+    return {{"sensors", list}};
+}
+
 CameraPath expand_rig(const Rig& rig, const CameraPath& vehicle)
 {
-    CameraPath cameras{.frames = {}, .numbered = vehicle.numbered, .body = {}, .warnings = vehicle.warnings};
+    CameraPath cameras{.sensors = rig.sensors, .numbered = vehicle.numbered, .warnings = vehicle.warnings};
     for (size_t i = 0; i < vehicle.frames.size(); ++i) {
         const CameraFrame& pose = vehicle.frames[i];
         const Rigid world_to_vehicle = rig.path_axes == PathAxes::camera

@@ -3,15 +3,11 @@
 #pragma once
 
 #include "engine/camera/camera.h"
+#include "runtime/base/json.h"
+
+#include <span>
 
 namespace semrover {
-
-// cameras fixed to a vehicle. Vehicle axes: x forward, y left, z up; sensor axes are OpenCV's.
-struct Sensor {
-    std::string name; // is_camera_name, unique in the rig
-    Intrinsics intrinsics;
-    Rigid sensor_to_vehicle = kIdentity;
-};
 
 // what the poses of a path are poses of
 enum class PathAxes {
@@ -36,6 +32,9 @@ struct Rig {
 // A key "comment" of text is allowed beside the others. bad_input for anything else, unknown keys included; at most 64
 // sensors, 16 MiB
 Result<Rig> read_rig(const Path& path);
+
+// the sensors as an object that read_rig reads
+Json rig_json(std::span<const Sensor> sensors);
 
 // the frames of all sensors at every pose of the vehicle: pose by pose, sensors in the rig's order
 CameraPath expand_rig(const Rig& rig, const CameraPath& vehicle);

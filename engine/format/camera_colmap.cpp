@@ -7,6 +7,7 @@
 #include "runtime/base/quote.h"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <map>
 
@@ -96,6 +97,20 @@ std::string camera_line(const Intrinsics& k, size_t id)
     return line + "\n";
 }
 
+// POINT3D_ID X Y Z R G B ERROR TRACK[], the track of no picture
+std::string points_text(const Surfels& points)
+{
+    std::string text = "# POINT3D_ID X Y Z R G B ERROR TRACK[]\n";
+    for (size_t i = 0; i < points.position.size(); ++i) {
+        std::array<int, 3> color;
+        std::ranges::transform(points.color[i], color.begin(),
+                               [](float c) { return int(std::lround(std::clamp(c, 0.f, 1.f) * 255)); });
+        fmt::format_to(std::back_inserter(text), "{} {} {} 0\n", i + 1, fmt::join(points.position[i], " "),
+                       fmt::join(color, " "));
+    }
+    return text;
+}
+
 Result<std::vector<ColmapPicture>> read_colmap_text(const Path& folder)
 {
     SR_TRY(const auto cameras, read_cameras(folder / "cameras.txt"));
@@ -125,7 +140,12 @@ Result<CameraPath> read_colmap(const Path& folder)
     return path;
 }
 
-Status write_colmap(const Path& folder, const CameraPath& cameras)
+std::string colmap_picture_name(const std::string& camera, uint32_t number, size_t cameras)
+{
+    return cameras > 1 ? fmt::format("{0}/{0}_{1:06}.png", camera, number) : picture_name(camera, "color", number);
+}
+
+Status write_colmap(const Path& folder, const CameraPath& cameras, const Surfels& points)
 {
     SR_ASSERT(!cameras.frames.empty(), "a camera path without frames");
     if (is_there(folder / "cameras.bin"))
@@ -135,7 +155,9 @@ Status write_colmap(const Path& folder, const CameraPath& cameras)
     std::string camera_text = "# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n";
     std::string image_text =
         "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME   world to camera\n# points of the image\n";
-    std::map<std::string, size_t> counts;
+    std::map<std::string, uint32_t> counts;
+    for (const CameraFrame& frame : cameras.frames)
+        counts[frame.camera] = 0;
     size_t image = 0;
     for (const CameraFrame& frame : cameras.frames) {
         size_t id = size_t(std::ranges::find(distinct, frame.intrinsics) - distinct.begin()) + 1;
@@ -144,15 +166,15 @@ Status write_colmap(const Path& folder, const CameraPath& cameras)
             camera_text += camera_line(frame.intrinsics, id);
         }
         const Quaternion q = quaternion_of(frame.pose.world_to_camera);
-        fmt::format_to(std::back_inserter(image_text), "{} {} {} {} {} {}{}color/{:06}.png\n\n", ++image, q[3],
+        fmt::format_to(std::back_inserter(image_text), "{} {} {} {} {} {}\n\n", ++image, q[3],
                        fmt::join(std::span(q).first(3), " "),
-                       fmt::join(translation_of(frame.pose.world_to_camera), " "), id, frame.camera,
-                       frame.camera.empty() ? "" : "/", counts[frame.camera]++);
+                       fmt::join(translation_of(frame.pose.world_to_camera), " "), id,
+                       colmap_picture_name(frame.camera, counts[frame.camera]++, counts.size()));
     }
     std::error_code error;
     const bool made = std::filesystem::create_directories(folder, error);
     std::vector<Path> written;
-    for (const auto& [file, text] : {std::pair{"points3D.txt", std::string("# none\n")}, // readers ask for it
+    for (const auto& [file, text] : {std::pair{"points3D.txt", points_text(points)}, // readers ask for it
                                      {"cameras.txt", camera_text},
                                      {"images.txt", image_text}}) {
         const bool there = std::filesystem::exists(folder / file, error);

@@ -4,7 +4,10 @@
 
 #include "engine/camera/path_placement.h"
 #include "engine/format/path_format.h"
+#include "engine/format/ply.h"
 #include "runtime/base/json.h"
+
+#include <functional>
 
 namespace semrover {
 
@@ -63,8 +66,25 @@ Result<CameraPath> read_transforms(const Path& path, const std::optional<PathLen
 Result<CameraPath> parse_transforms(const Json& file, std::string_view name, const std::optional<PathLens>& lens = {},
                                     const Path& folder = {});
 
-// pictures are named [CAMERA/]color/NNNNNN.png, counted for each camera, as `render` writes them
-Status write_transforms(const Path& path, const CameraPath& cameras);
+// [CAMERA/]KIND/NNNNNN.png, as `render` writes them
+std::string picture_name(const std::string& camera, std::string_view kind, uint32_t number);
+
+// What lies beside a transforms.json, from its folder on.
+struct PictureNames {
+    std::string color, depth, label; // empty: there is none
+};
+struct TransformsFiles {
+    // of a frame of a camera (its number in the file); empty: colours only, named by picture_name
+    std::function<PictureNames(const std::string& camera, uint32_t number)> pictures;
+    std::string points; // a .ply in the path's world; empty: none
+};
+// The names that `render` gives to pictures.
+PictureNames rendered_pictures(const std::string& camera, uint32_t number);
+
+// Intrinsics are at the top where all frames share them, else in every frame: nerfstudio takes what is at the top for
+// all frames. depth_unit_scale_factor is 0.001: depth pictures hold millimetres. `rig`, our addition, has the sensors
+// as a rig.json does.
+Status write_transforms(const Path& path, const CameraPath& cameras, const TransformsFiles& files = {});
 
 // nerfstudio's camera_path.json: OpenGL camera axes; camera_type perspective, fisheye or equirectangular, one size, a
 // vertical field of view in degrees for each frame (of a fisheye too it gives the focal length as of a pinhole). Times
@@ -80,8 +100,11 @@ Status write_camera_path_json(const Path& path, const CameraPath& cameras);
 // of their pictures' names (natural_order.h), moment by moment where the pictures lie in folders of several cameras;
 // the n-th of a camera has the time n. Source: https://colmap.github.io/format.html
 Result<CameraPath> read_colmap(const Path& folder);
-// the text model, pictures named as write_transforms does; bad_input where a binary model is in the folder
-Status write_colmap(const Path& folder, const CameraPath& cameras);
+// The text model; bad_input where a binary model is in the folder. Pictures of one camera are named as `render` names
+// them; of several, front/front_000000.png: loaders that take the last part of a name tell them apart. Of `points`,
+// positions and colours go to points3D.txt, where training begins.
+Status write_colmap(const Path& folder, const CameraPath& cameras, const Surfels& points = {});
+std::string colmap_picture_name(const std::string& camera, uint32_t number, size_t cameras);
 // bad_input for a file of such a model, which is read as a folder; its names are cameras.bin, images.txt and the like
 Status refuse_colmap_file(const Path& path);
 

@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+#include "engine/camera/rig.h"
 #include "engine/format/camera_path.h"
 #include "engine/format/image.h"
 #include "runtime/base/json_numbers.h"
@@ -357,8 +358,22 @@ const TransformsModel& transforms_model_of(const Intrinsics& k)
     return kTransformsModels[0]; // without distortion
 }
 
-// with all coefficients, so that a frame's hide the file's
-void put_intrinsics(nlohmann::ordered_json& object, const Intrinsics& k, bool with_lens)
+// the model that all frames have; nullptr: they differ
+const TransformsModel* shared_model(const std::vector<CameraFrame>& frames)
+{
+    const TransformsModel* shared = nullptr;
+    for (const CameraFrame& f : frames) {
+        const TransformsModel* model = &transforms_model_of(f.intrinsics);
+        const bool plane = model->model == CameraModel::opencv;
+        if (shared && shared->model != model->model)
+            return nullptr;
+        if (!shared || (plane && model->coefficients.size() > shared->coefficients.size()))
+            shared = model; // the longer one of OpenCV's holds what the shorter one does
+    }
+    return shared;
+}
+
+void put_intrinsics(nlohmann::ordered_json& object, const Intrinsics& k, const TransformsModel& model)
 {
     const bool panorama = k.model == CameraModel::equirectangular;
     object["w"] = k.width;
@@ -367,14 +382,27 @@ void put_intrinsics(nlohmann::ordered_json& object, const Intrinsics& k, bool wi
     object["fl_y"] = panorama ? double(k.height) : k.fy;
     object["cx"] = k.cx;
     object["cy"] = k.cy;
-    if (!with_lens)
-        return;
-    const TransformsModel& model = transforms_model_of(k);
-    object["camera_model"] = model.name;
-    for (const char* key : {"k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"}) {
-        const auto at = std::ranges::find(model.coefficients, std::string_view(key));
-        object[key] = at == model.coefficients.end() ? 0.0 : k.distortion[size_t(at - model.coefficients.begin())];
-    }
+    for (size_t i = 0; i < model.coefficients.size() && k.model != CameraModel::pinhole; ++i)
+        object[model.coefficients[i]] = k.distortion[i];
+}
+
+void put_names(nlohmann::ordered_json& entry, const PictureNames& names)
+{
+    entry["file_path"] = names.color;
+    if (!names.depth.empty())
+        entry["depth_file_path"] = names.depth;
+    if (!names.label.empty())
+        entry["label_file_path"] = names.label;
+}
+
+void put_pose(nlohmann::ordered_json& entry, const CameraFrame& frame)
+{
+    if (!frame.camera.empty())
+        entry["camera"] = frame.camera;
+    entry["time"] = frame.time;
+    const Rigid m = compose(frame.pose.camera_to_world(), kFlipYZ);
+    for (size_t row = 0; row < 4; ++row)
+        entry["transform_matrix"].push_back({m[row * 4], m[row * 4 + 1], m[row * 4 + 2], m[row * 4 + 3]});
 }
 
 } // namespace
@@ -403,32 +431,52 @@ Result<CameraPath> parse_transforms(const Json& file, std::string_view name, con
     return cameras;
 }
 
-Status write_transforms(const Path& path, const CameraPath& cameras)
+std::string picture_name(const std::string& camera, std::string_view kind, uint32_t number)
+{
+    return fmt::format("{}{}{}/{:06}.png", camera, camera.empty() ? "" : "/", kind, number);
+}
+
+PictureNames rendered_pictures(const std::string& camera, uint32_t number)
+{
+    return {picture_name(camera, "color", number), picture_name(camera, "depth", number),
+            picture_name(camera, "label", number)};
+}
+
+Status write_transforms(const Path& path, const CameraPath& cameras, const TransformsFiles& files)
 {
     SR_ASSERT(!cameras.frames.empty(), "a camera path without frames");
-    nlohmann::ordered_json file;
-    const Intrinsics& shared = cameras.frames[0].intrinsics;
-    const bool lenses = std::ranges::any_of(
-        cameras.frames, [](const CameraFrame& f) { return f.intrinsics.model != CameraModel::pinhole; });
-    if (!lenses)
-        file["camera_model"] = "OPENCV";
-    put_intrinsics(file, shared, lenses);
-    file["frames"] = nlohmann::ordered_json::array();
-    std::map<std::string, size_t> counts;
-    for (const CameraFrame& frame : cameras.frames) {
+    const auto& frames = cameras.frames;
+    const bool one_view =
+        std::ranges::all_of(frames, [&](const CameraFrame& f) { return f.intrinsics == frames[0].intrinsics; });
+    const TransformsModel* model = shared_model(frames);
+    nlohmann::ordered_json file, list = nlohmann::ordered_json::array();
+    if (model)
+        file["camera_model"] = model->name;
+    if (one_view)
+        put_intrinsics(file, frames[0].intrinsics, *model);
+    std::map<std::string, uint32_t> counts;
+    bool depths = false;
+    for (const CameraFrame& frame : frames) {
+        const uint32_t number = counts[frame.camera]++;
+        const PictureNames names = files.pictures ? files.pictures(frame.camera, number)
+                                                  : PictureNames{picture_name(frame.camera, "color", number), {}, {}};
+        depths |= !names.depth.empty();
         nlohmann::ordered_json entry;
-        entry["file_path"] =
-            fmt::format("{}{}color/{:06}.png", frame.camera, frame.camera.empty() ? "" : "/", counts[frame.camera]++);
-        if (!frame.camera.empty())
-            entry["camera"] = frame.camera;
-        entry["time"] = frame.time;
-        if (frame.intrinsics != shared)
-            put_intrinsics(entry, frame.intrinsics, lenses);
-        const Rigid m = compose(frame.pose.camera_to_world(), kFlipYZ);
-        for (size_t row = 0; row < 4; ++row)
-            entry["transform_matrix"].push_back({m[row * 4], m[row * 4 + 1], m[row * 4 + 2], m[row * 4 + 3]});
-        file["frames"].push_back(std::move(entry));
+        put_names(entry, names);
+        put_pose(entry, frame);
+        if (!model)
+            entry["camera_model"] = transforms_model_of(frame.intrinsics).name;
+        if (!one_view)
+            put_intrinsics(entry, frame.intrinsics, model ? *model : transforms_model_of(frame.intrinsics));
+        list.push_back(std::move(entry));
     }
+    if (depths)
+        file["depth_unit_scale_factor"] = 0.001; // metres of a unit
+    if (!files.points.empty())
+        file["ply_file_path"] = files.points;
+    if (!cameras.sensors.empty())
+        file["rig"] = rig_json(cameras.sensors);
+    file["frames"] = std::move(list);
     return write_file_atomically(path, file.dump(1) + "\n");
 }
 

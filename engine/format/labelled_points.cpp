@@ -278,9 +278,8 @@ Result<SceneGrid> read_carla_points(const Path& path, const SceneGridOptions& o)
     return out;
 }
 
-Status write_labelled_points(const Path& path, const VoxelGrid& grid)
+Surfels labelled_points(const VoxelGrid& grid)
 {
-    SR_CHECK(check_grid(grid, quote_path(path)));
     const ScenePoints points = points_of(grid);
     Surfels s{points.positions, {}, points.colors, {}, {}, {}, {}};
     for (size_t i = 0; i < points.size(); ++i) {
@@ -294,7 +293,13 @@ Status write_labelled_points(const Path& path, const VoxelGrid& grid)
         s.color.push_back(label_color(grid.labels[v]));
         s.label.push_back(grid.labels[v]);
     }
-    return write_points_ply(path, s);
+    return s;
+}
+
+Status write_labelled_points(const Path& path, const VoxelGrid& grid)
+{
+    SR_CHECK(check_grid(grid, quote_path(path)));
+    return write_points_ply(path, labelled_points(grid));
 }
 
 } // namespace semrover

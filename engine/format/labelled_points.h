@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/format/ply.h"
 #include "engine/scene/scene_grid.h"
 
 namespace semrover {
@@ -24,6 +25,7 @@ Result<SceneGrid> read_carla_points(const Path& path, const SceneGridOptions& op
 // the grid's points with colours and labels, those on a cell's faces moved inside by 1e-4 of its size, so that reading
 // finds the same cells; of a grid without points, or cells that have none, their centres in the
 // colours of their labels
+Surfels labelled_points(const VoxelGrid& grid); // without normals, sizes and opacities
 Status write_labelled_points(const Path& path, const VoxelGrid& grid);
 
 } // namespace semrover

@@ -120,11 +120,14 @@ Status write_points_ply(const Path& path, const Surfels& s)
     const size_t n = s.position.size();
     std::vector<std::byte> bytes =
         header(fmt::format("comment {}\n", kOwnLabelsComment), n,
-               "property float x\nproperty float y\nproperty float z\nproperty uchar red\nproperty uchar green\n"
-               "property uchar blue\nproperty uchar label\n");
-    bytes.reserve(bytes.size() + n * 16);
+               "property float x\nproperty float y\nproperty float z\nproperty float nx\nproperty float ny\n"
+               "property float nz\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
+               "property uchar label\n");
+    bytes.reserve(bytes.size() + n * 28);
+    constexpr std::array<float, 3> kUnknown{}; // 3DGS' trainers ask for normals and do not use them
     for (size_t i = 0; i < n; ++i) {
         append(bytes, s.position[i].data(), 12);
+        append(bytes, (s.normal.empty() ? kUnknown : s.normal[i]).data(), 12);
         for (const float c : s.color[i])
             bytes.push_back(static_cast<std::byte>(std::lround(std::clamp(c, 0.f, 1.f) * 255)));
         bytes.push_back(static_cast<std::byte>(s.label[i]));

@@ -2,10 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/cli/lens_options.h"
 
+#include "engine/camera/rig.h"
+#include "engine/format/camera_path.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/choice.h"
 #include "tools/cli/number_option.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <CLI/CLI.hpp>
@@ -51,23 +54,27 @@ Status put_distortion(const LensOptions& o, Intrinsics& k)
 
 void add_lens_options(CLI::App& c, LensOptions& o)
 {
-    const auto set = [&o](uint32_t& to) {
-        return [&o, &to](uint32_t pixels) {
-            to = pixels;
-            o.size_given = true;
+    const auto set = [&o](auto& to, bool& given) {
+        return [&o, &to, &given](auto value) {
+            to = value;
+            given = true;
+            o.size_given = o.width_given || o.height_given;
         };
     };
-    add_number_function<uint32_t>(c, "-W,--width", set(o.width), "pixels", {1, 16384});
-    add_number_function<uint32_t>(c, "-H,--height", set(o.height), "pixels", {1, 16384});
+    add_number_function<uint32_t>(c, "-W,--width", set(o.width, o.width_given),
+                                  "pixels; cameras of a path or rig are scaled to it", {1, 16384});
+    add_number_function<uint32_t>(c, "-H,--height", set(o.height, o.height_given),
+                                  "pixels; with one of both, theirs keep their shape", {1, 16384});
     add_number_function<double>(c, "--fov-x",
                                 [&o](double degrees) {
                                     o.fov = degrees;
-                                    o.view_given = true;
+                                    o.view_given = o.lens_given = true;
                                 },
                                 "horizontal field of view in degrees, where the path has no intrinsics; 73",
                                 {1.0, 360.0});
     add_choice(c, "--camera-model", {"pinhole", "opencv", "fisheye", "equirectangular"},
-               "lens, where the path has no intrinsics", o.camera_model);
+               "lens, where the path has no intrinsics",
+               [set = set(o.camera_model, o.lens_given)](const std::string& model) { set(model); });
     c.add_option("--distortion", o.distortion, "k1,k2,p1,p2[,k3[,k4,k5,k6]] of opencv, k1,k2,k3,k4 of fisheye");
 }
 
@@ -97,7 +104,68 @@ Result<Intrinsics> intrinsics_of(const LensOptions& o)
 Result<PathLens> path_lens_of(const LensOptions& o)
 {
     SR_TRY(const Intrinsics intrinsics, intrinsics_of(o));
-    return PathLens(intrinsics, o.size_given, o.view_given || o.camera_model == "equirectangular");
+    return PathLens(intrinsics, o.size_given, o.view_given || intrinsics.model == CameraModel::equirectangular);
+}
+
+namespace {
+
+// Whether the reader took the lens of the options: another one is the path's own.
+bool takes_lens(const CameraFrame& frame, const Intrinsics& lens)
+{
+    const Intrinsics &k = frame.intrinsics, expected = scaled_to(lens, k.width, k.height);
+    return k.model == lens.model && k.distortion == lens.distortion && std::abs(k.fx - expected.fx) <= 1e-9 * k.fx;
+}
+
+Status refuse_lens(const LensOptions& o, std::string_view whose)
+{
+    if (!o.lens_given && o.distortion.empty())
+        return {};
+    return fail(
+        ErrorCode::usage,
+        "{} has lenses of its own: --fov-x, --camera-model and --distortion mean nothing (-W and -H scale them)",
+        whose);
+}
+
+Status scale(Intrinsics& k, const LensOptions& o)
+{
+    const double shape = double(k.height) / k.width;
+    const double width = o.width_given ? o.width : o.height / shape, height = o.height_given ? o.height : width * shape;
+    const uint32_t w = uint32_t(std::max(1.0, std::round(width))), h = uint32_t(std::max(1.0, std::round(height)));
+    if (w == k.width && h == k.height)
+        return {};
+    k = scaled_to(k, w, h);
+    if (const Status status = check_intrinsics(k, "-W and -H"); !status)
+        return fail(ErrorCode::usage, "{}", status.error().message);
+    return {};
+}
+
+} // namespace
+
+Result<CameraPath> read_cameras(const Path& file, const Path& rig_file, const LensOptions& o,
+                                const PathPlacement& placement)
+{
+    SR_TRY(PathLens lens, path_lens_of(o));
+    lens.matters = rig_file.empty();
+    SR_TRY(CameraPath path, read_camera_path(file, lens, placement));
+    if (path.body && rig_file.empty())
+        path.warnings.push_back(body_text(quote_path(file), *path.body));
+    const auto own = [&](const CameraFrame& f) { return !takes_lens(f, lens.intrinsics); };
+    if (!rig_file.empty()) {
+        SR_CHECK(refuse_lens(o, quote_path(rig_file)));
+        SR_TRY(const Rig rig, read_rig(rig_file));
+        path = expand_rig(rig, path);
+    } else if (std::ranges::any_of(path.frames, own)) {
+        SR_CHECK(refuse_lens(o, quote_path(file)));
+    } else if (path.frames[0].intrinsics.width == o.width && path.frames[0].intrinsics.height == o.height) {
+        return path; // it has no size of its own either
+    }
+    if (!o.size_given)
+        return path;
+    for (CameraFrame& frame : path.frames)
+        SR_CHECK(scale(frame.intrinsics, o));
+    for (Sensor& sensor : path.sensors)
+        SR_CHECK(scale(sensor.intrinsics, o));
+    return path;
 }
 
 } // namespace semrover

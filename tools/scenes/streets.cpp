@@ -89,6 +89,14 @@ Status draw(const StreetsArguments& o, const Globals& globals, Device& device, S
     return {};
 }
 
+TransformsFiles files_of(bool pictures)
+{
+    TransformsFiles files;
+    if (pictures)
+        files.pictures = rendered_pictures;
+    return files;
+}
+
 Status check_drive(const StreetsArguments& o)
 {
     constexpr double kMostFrames = 100000; // each has its lines in two camera paths
@@ -113,10 +121,10 @@ Status streets(const StreetsArguments& o, const Globals& globals)
     const CameraPath shifted = drive_along(street.road, beside, lens);
     SR_CHECK(write_glb(out / "mesh.glb", street.mesh));
     SR_CHECK(write_tum(out / "drive.tum", path));
-    SR_CHECK(write_transforms(out / "transforms.json", path));
+    SR_CHECK(write_transforms(out / "transforms.json", path, files_of(o.pictures)));
     std::error_code error;
     std::filesystem::create_directory(out / "shifted", error);
-    SR_CHECK(write_transforms(out / "shifted/transforms.json", shifted));
+    SR_CHECK(write_transforms(out / "shifted/transforms.json", shifted, files_of(o.pictures && o.shift != 0)));
     const Json about = street_json(o, street, path);
     SR_CHECK(write_file_atomically(out / "street.json", about.dump(2) + "\n"));
     if (o.pictures || !o.no_grids) {
