@@ -3,6 +3,7 @@
 #include "engine/camera/lens.h"
 #include "engine/camera/rig.h"
 #include "engine/format/camera_path.h"
+#include "engine/refine/frame_images.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
 
@@ -232,6 +233,33 @@ TEST(Camera, a_path_file_over_16_mib_is_refused)
     const auto file = folder.put("a.tum", std::string((16u << 20) + 1, '\n'));
     EXPECT_TRUE(says(read_tum(file, kView), "expected at most 16777216 bytes"));
     EXPECT_TRUE(says(read_transforms(file, kView), "expected at most 16777216 bytes"));
+}
+
+TEST(Camera, sky_is_where_a_ray_goes_up_and_meets_nothing)
+{
+    const Intrinsics lenses[] = {
+        pinhole_from_fov(70, 101, 66), // no ray is exactly level
+        {60, 60, 50, 33, 101, 67, CameraModel::opencv, {-0.25, 0.06, 0.01, 0.002}},
+        {22, 22, 50, 33, 101, 67, CameraModel::fisheye, {0.01}}, // blind in its corners
+        whole_sphere(120, 60),
+    };
+    const Quaternion turns[] = {{-0.5, 0.5, -0.5, 0.5}, {0.1, -0.7, 0.3, 0.64}, {0, 0, 0, 1}, {1, 0, 0, 0}};
+    for (const Intrinsics& k : lenses)
+        for (const Quaternion& q : turns) {
+            const CameraFrame frame{0, "", {inverse(*rigid_from_quaternion({1, 2, 3}, q, "turn"))}, k};
+            FramePixels pixels{k.width, k.height, {}, std::vector<uint32_t>(k.width * k.height, 255u << 16 | 7), {}};
+            for (size_t i = 0; i < pixels.ranges.size(); i += 3)
+                pixels.ranges[i] = 2u << 16; // a building
+            mark_sky(pixels, frame);
+            const Lens lens(k);
+            const Rigid m = frame.pose.camera_to_world();
+            for (uint32_t i = 0; i < pixels.ranges.size(); ++i) {
+                const auto ray = lens.ray(i % k.width + 0.5, i / k.width + 0.5);
+                const bool up = ray && m[8] * (*ray)[0] + m[9] * (*ray)[1] + m[10] * (*ray)[2] > 0;
+                const uint32_t expected = i % 3 == 0 ? 2u << 16 : (up ? 10u : 255u) << 16 | 7;
+                ASSERT_EQ(pixels.ranges[i], expected) << name_of(k.model) << " pixel " << i;
+            }
+        }
 }
 
 TEST(Rigid, an_inverse_undoes_and_a_quaternion_returns)

@@ -2,13 +2,48 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/refine/frame_images.h"
 
+#include "engine/camera/lens.h"
 #include "engine/format/image.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
 
 namespace semrover {
 
 namespace {
+
+constexpr uint32_t kNothing = 255, kSky = 10; // of a picture
+
+constexpr uint32_t kSkyBlock = 16; // pixels
+
+// which way the rays of a camera go; a lens takes long to ask for every pixel
+class SkySide {
+  public:
+    explicit SkySide(const CameraFrame& frame) : lens_(frame.intrinsics), m_(frame.pose.world_to_camera) {}
+
+    // how far up the unit ray through a position goes; NaN where the lens does not look
+    double up(double x, double y) const
+    {
+        const auto ray = lens_.ray(x, y); // the third column of the rotation is the world's z axis
+        return ray ? m_[2] * (*ray)[0] + m_[6] * (*ray)[1] + m_[10] * (*ray)[2] : std::nan("");
+    }
+    // of all rays of a block, where they are farther from the horizon than its corners are apart
+    std::optional<bool> of_block(uint32_t left, uint32_t top, uint32_t right, uint32_t bottom) const
+    {
+        const std::array<double, 4> corners = {up(left, top), up(right, top), up(left, bottom), up(right, bottom)};
+        const auto [low, high] = std::ranges::minmax(corners);
+        const bool seen = std::ranges::none_of(corners, [](double c) { return std::isnan(c); });
+        if (seen && std::min(std::abs(low), std::abs(high)) > high - low && (low > 0) == (high > 0))
+            return low > 0;
+        return std::nullopt;
+    }
+
+  private:
+    Lens lens_;
+    Rigid m_;
+};
 
 std::vector<uint8_t> three_bytes(std::span<const uint32_t> words)
 {
@@ -52,6 +87,23 @@ std::vector<uint8_t> label_pixels(const FramePixels& pixels)
 std::vector<uint8_t> visible_pixels(const FramePixels& pixels)
 {
     return shifted<uint8_t>(pixels.seen, 24);
+}
+
+void mark_sky(FramePixels& pixels, const CameraFrame& frame)
+{
+    const SkySide side(frame);
+    for (uint32_t y = 0; y < pixels.height; y += kSkyBlock)
+        for (uint32_t x = 0; x < pixels.width; x += kSkyBlock) {
+            const uint32_t right = std::min(x + kSkyBlock, pixels.width),
+                           bottom = std::min(y + kSkyBlock, pixels.height);
+            const std::optional<bool> whole = side.of_block(x, y, right, bottom);
+            for (uint32_t row = y; row < bottom; ++row)
+                for (uint32_t column = x; column < right; ++column) {
+                    uint32_t& word = pixels.ranges[size_t(row) * pixels.width + column];
+                    if (word >> 16 == kNothing && (whole ? *whole : side.up(column + 0.5, row + 0.5) > 0))
+                        word = (word & 0xffff) | kSky << 16;
+                }
+        }
 }
 
 void clear_hidden_depth(FramePixels& pixels)

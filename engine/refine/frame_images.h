@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/camera/camera.h"
 #include "engine/splat/rasterizer.h"
 #include "runtime/base/file.h"
 
@@ -9,8 +10,8 @@ namespace semrover {
 
 // What splats look like in files, as the device makes it: PixelWords (kernels/picture.h). color: sRGB, over a
 // background where the splats leave room; depth: 16-bit millimetres along z, or from the camera where
-// Lens::radial_depth says so, 0 for nothing; normal: camera frame, 128 + 127 n; label: class number, 255 for nothing;
-// visible: 0 or 255.
+// Lens::radial_depth says so, 0 for nothing and from 65.5345 m on; normal: camera frame, 128 + 127 n; label: class
+// number, 255 for nothing; visible: 0 or 255.
 struct FramePixels {
     uint32_t width = 0, height = 0;
     std::vector<uint32_t> seen, ranges, normals;
@@ -20,6 +21,10 @@ std::vector<uint16_t> depth_pixels(const FramePixels& pixels);  // [height, widt
 std::vector<uint8_t> normal_pixels(const FramePixels& pixels);  // [height, width, 3]
 std::vector<uint8_t> label_pixels(const FramePixels& pixels);   // [height, width]
 std::vector<uint8_t> visible_pixels(const FramePixels& pixels); // [height, width]
+
+// Label 10, sky, where a ray goes up and meets no splat: the world is a street under the open sky. Where a ray goes
+// down and meets none, the label stays 255.
+void mark_sky(FramePixels& pixels, const CameraFrame& frame);
 
 void clear_hidden_depth(FramePixels& pixels); // 0 where a pixel is not visible
 
