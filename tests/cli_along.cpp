@@ -251,7 +251,8 @@ TEST_F(CliAlong, what_makes_no_sense_is_refused)
         EXPECT_EQ(std::ranges::count(result.err, '\n'), 1) << result.err;
         EXPECT_EQ(folder_.entries(), entries) << command;
     };
-    refused(line("out"), 2, "-y replaces it");
+    EXPECT_EQ(run(line("out")), json_of(contents(path("out.run/run.json")))["results"]); // done before
+    refused(line("out", "--seed 5"), 2, "-y replaces it");
     refused(line("x", "--first-cell 3"), 2, "--first-cell");
     refused(line("x", "--horizon 0"), 2, "--horizon");
     refused(line("x", "--window=-1"), 2, "--window");

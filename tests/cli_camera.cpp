@@ -1,16 +1,25 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+#include "engine/camera/rig.h"
 #include "engine/format/camera_path.h"
 #include "engine/format/image.h"
 #include "engine/format/npy.h"
+#include "engine/scene/grid.h"
+#include "tests/child_program.h"
+#include "tests/json_text.h"
 #include "tests/program.h"
 
+#include <algorithm>
 #include <gtest/gtest.h>
+#include <map>
+#include <set>
+#include <sstream>
 
 namespace semrover {
 namespace cli_camera_test {
 
 namespace fs = std::filesystem;
+using Json = nlohmann::json;
 
 const std::string kDrive = SEMROVER_SOURCE_DIR "/assets/scenes/street.tum";
 const std::string kGrid = SEMROVER_SOURCE_DIR "/assets/scenes/street.truth.sgrid";
@@ -185,6 +194,251 @@ TEST(CliCamera, kitti_keeps_times_and_lens)
     expect_error(semrover_program("render " + kGrid + " --path " + (folder / "empty").string() + " -o " +
                                   (folder / "r").string()),
                  3, "is a folder without files; expected a camera path");
+}
+
+// two poses, and a rig of three cameras of which two differ in size, two in focal length and one has a lens
+struct RigDrive {
+    ScratchFolder folder;
+    std::string options;
+
+    RigDrive()
+    {
+        const std::string ahead = R"("sensor_to_vehicle":{"rotation":[-0.5,0.5,-0.5,0.5]})";
+        const Path rig =
+            folder.put("rig.json", R"({"sensors":[{"name":"front","width":64,"height":40,"fov":90,)" + ahead +
+                                       R"(},{"name":"tele","width":48,"height":48,"fov":40,)" + ahead +
+                                       R"(},{"name":"lens","width":64,"height":40,"fov":90,"model":"opencv",)" +
+                                       R"("distortion":[-0.2,0.05,0.01,0],)" + ahead + "}]}");
+        const Path drive = folder.put("two.tum", "3 1 0 1.7 -0.5 0.5 -0.5 0.5\n4.5 2 0 1.7 -0.5 0.5 -0.5 0.5\n");
+        options = "--path " + drive.string() + " --rig " + rig.string() + " ";
+    }
+};
+
+// what nerfstudio's parser takes: the file's value for every frame, where there is one
+Json nerfstudio_value(const Json& file, const Json& frame, const char* key)
+{
+    return file.contains(key) ? file[key] : frame.value(key, Json(0.0));
+}
+
+TEST(CliCamera, render_says_its_cameras_and_other_programs_read_them_right)
+{
+    const RigDrive d;
+    const ProgramResult result = render(d.folder / "out", d.options + "--points");
+    ASSERT_EQ(result.code, 0) << result.err;
+    const Json file = json_of(contents(d.folder / "out/transforms.json"));
+    ASSERT_EQ(file["frames"].size(), 6u);
+    const Rig rig = *read_rig(d.folder / "rig.json");
+    for (size_t i = 0; i < 6; ++i) {
+        const Json& frame = file["frames"][i];
+        const Intrinsics& k = rig.sensors[i % 3].intrinsics;
+        EXPECT_EQ(nerfstudio_value(file, frame, "w"), k.width);
+        EXPECT_EQ(nerfstudio_value(file, frame, "h"), k.height);
+        EXPECT_EQ(nerfstudio_value(file, frame, "fl_x"), k.fx);
+        EXPECT_EQ(nerfstudio_value(file, frame, "cy"), k.cy);
+        EXPECT_EQ(nerfstudio_value(file, frame, "k1"), k.distortion[0]);
+        EXPECT_EQ(nerfstudio_value(file, frame, "p1"), k.distortion[2]);
+        EXPECT_EQ(frame["camera"], rig.sensors[i % 3].name);
+        EXPECT_EQ(frame["time"], i < 3 ? 3 : 4.5);
+        EXPECT_EQ(frame["transform_matrix"][0][3], i < 3 ? 1 : 2); // in the grid's frame
+        for (const char* key : {"file_path", "depth_file_path", "label_file_path"})
+            EXPECT_TRUE(fs::exists(d.folder / "out" / frame[key].get<std::string>())) << frame[key];
+    }
+    EXPECT_EQ(file["camera_model"], "OPENCV");
+    EXPECT_EQ(file["depth_unit_scale_factor"], 0.001);
+    EXPECT_EQ(file["ply_file_path"], "points.ply");
+    EXPECT_TRUE(fs::exists(d.folder / "out/points.ply"));
+    const auto sensors = read_rig(d.folder.put("again.json", file["rig"].dump()));
+    ASSERT_TRUE(sensors) << sensors.error().message;
+    for (size_t i = 0; i < 3; ++i)
+        EXPECT_EQ(sensors->sensors[i].intrinsics, rig.sensors[i].intrinsics);
+    // one view: nerfstudio takes it from the top
+    ASSERT_EQ(render(d.folder / "one", "--path " + (d.folder / "two.tum").string() + " -W 64 -H 40").code, 0);
+    const Json one = json_of(contents(d.folder / "one/transforms.json"));
+    EXPECT_NEAR(one["fl_x"].get<double>(), pinhole_from_fov(73, 64, 40).fx, 1e-12);
+    EXPECT_FALSE(one["frames"][0].contains("fl_x"));
+}
+
+TEST(CliCamera, a_rig_is_drawn_at_another_size_and_sees_the_same)
+{
+    const RigDrive d;
+    ASSERT_EQ(render(d.folder / "wide", d.options + "-W 32").code, 0);
+    ASSERT_EQ(render(d.folder / "both", d.options + "-W 40 -H 20").code, 0);
+    EXPECT_EQ(*read_png_size(d.folder / "wide/front/color/000000.png"), (ImageSize{32, 20})); // as it was: 64 x 40
+    EXPECT_EQ(*read_png_size(d.folder / "wide/tele/color/000000.png"), (ImageSize{32, 32}));
+    EXPECT_EQ(*read_png_size(d.folder / "both/tele/color/000001.png"), (ImageSize{40, 20}));
+    const auto path = read_transforms(d.folder / "both/transforms.json");
+    const Intrinsics tele = (*read_rig(d.folder / "rig.json")).sensors[1].intrinsics;
+    EXPECT_EQ(path->frames[1].intrinsics, scaled_to(tele, 40, 20));
+    // cameras that a path brings along, too; one without a size takes it
+    ASSERT_EQ(convert((d.folder / "both/transforms.json").string(), d.folder / "c.json", "-H 40").code, 0);
+    EXPECT_EQ(read_transforms(d.folder / "c.json")->frames[0].intrinsics,
+              scaled_to(path->frames[0].intrinsics, 80, 40));
+    for (const char* lens : {"--fov-x 60", "--camera-model fisheye", "--camera-model opencv --distortion=0.1,0,0,0"}) {
+        expect_error(render(d.folder / "x", d.options + lens), 2, "rig.json' has lenses of its own");
+        expect_error(convert((d.folder / "both/transforms.json").string(), d.folder / "x.json", lens), 2,
+                     "transforms.json' has lenses of its own");
+    }
+    EXPECT_FALSE(fs::exists(d.folder / "x"));
+}
+
+TEST(CliCamera, a_drawing_that_is_done_is_done_and_another_wants_yes)
+{
+    const RigDrive d;
+    const std::string rig = d.options + "-W 32 ";
+    ASSERT_EQ(render(d.folder / "out", rig + "--npy --top").code, 0);
+    const std::string run = contents(d.folder / "out/run.json"),
+                      picture = contents(d.folder / "out/front/color/000000.png");
+    const ProgramResult again = render(d.folder / "out", rig + "--npy --top --json");
+    EXPECT_EQ(again.code, 0) << again.err;
+    EXPECT_EQ(json_of(again.out), json_of(run)["results"]);
+    EXPECT_EQ(contents(d.folder / "out/run.json"), run);
+    expect_error(render(d.folder / "out", d.options + "-W 33 --npy --top"), 2, "-y replaces it");
+    expect_error(render(d.folder / "out", rig + "--npy --top --background 9,9,9"), 2, "-y replaces it");
+    EXPECT_EQ(contents(d.folder / "out/front/color/000000.png"), picture);
+    // what only the other drawing had goes, what is not of a drawing stays
+    d.folder.put("out/front/color/mine.png", "x");
+    ASSERT_EQ(render(d.folder / "out", "--path " + (d.folder / "two.tum").string() + " -W 32 -H 20 -y").code, 0);
+    EXPECT_FALSE(fs::exists(d.folder / "out/front/alpha"));
+    EXPECT_FALSE(fs::exists(d.folder / "out/tele"));
+    EXPECT_FALSE(fs::exists(d.folder / "out/top.png"));
+    EXPECT_FALSE(fs::exists(d.folder / "out/front/color/000000.png"));
+    EXPECT_EQ(contents(d.folder / "out/front/color/mine.png"), "x");
+    // pictures of nobody's run
+    for (const char* theirs : {"tele/color", "front/alpha", "top.png", "transforms.json"}) {
+        fs::remove_all(d.folder / "theirs");
+        fs::create_directories(d.folder / "theirs" / theirs);
+        expect_error(render(d.folder / "theirs", rig), 2, "exists; -y replaces what is there");
+    }
+}
+
+TEST(CliCamera, a_drawing_that_was_killed_goes_on_to_the_same_bytes)
+{
+    const RigDrive d;
+    std::string poses;
+    for (int i = 0; i < 12; ++i)
+        poses += fmt::format("{} {} 0 1.7 -0.5 0.5 -0.5 0.5\n", i, 0.5 * i);
+    d.folder.put("two.tum", poses);
+    const auto bytes = [&](const Path& folder) {
+        std::map<std::string, std::string> files;
+        for (const auto& entry : fs::recursive_directory_iterator(folder))
+            if (entry.is_regular_file() && entry.path().filename() != "journal.jsonl" &&
+                entry.path().filename() != "run.json" && entry.path().filename() != "lock")
+                files[entry.path().lexically_relative(folder)] = contents(entry.path());
+        return files;
+    };
+    const std::string line = d.options + "--npy --video ";
+    ASSERT_EQ(render(d.folder / "whole", line + (d.folder / "whole.mp4").string()).code, 0);
+    const auto whole = bytes(d.folder / "whole");
+    EXPECT_EQ(whole.size(), 12u * 3 * 8 + 1);
+    for (const size_t pieces : {0, 1, 8, 30}) {
+        const Path out = d.folder / fmt::format("killed{}", pieces), video = out.string() + ".mp4";
+        {
+            ChildProgram child("render " + kGrid + " -q --splat-radius auto -o " + out.string() + " " + line +
+                               video.string());
+            while (size_t(std::ranges::count(contents(out / "journal.jsonl"), '\n')) < pieces && child.running())
+                usleep(500);
+            EXPECT_EQ(child.stop(SIGKILL), 128 + SIGKILL) << pieces;
+        }
+        if (pieces == 8) { // damaged meanwhile
+            fs::resize_file(out / "front/color/000000.png", 20);
+            fs::remove(out / "lens/alpha/000001.npy");
+        }
+        if (pieces == 30)
+            expect_error(render(out, line + video.string() + " --semantic"), 3, "holds a run with other settings");
+        const ProgramResult resumed = render(out, line + video.string());
+        EXPECT_EQ(resumed.code, 0) << resumed.err;
+        EXPECT_TRUE(whole == bytes(out)) << pieces;
+        EXPECT_EQ(contents(d.folder / "whole.mp4"), contents(video)) << pieces;
+    }
+}
+
+// a wall whose nearest face is 58.2 m ahead at the left and 88.2 m at the right, and nothing else
+TEST(CliCamera, depth_that_16_bits_do_not_hold_is_nothing_and_what_is_above_is_sky)
+{
+    const ScratchFolder folder;
+    VoxelGrid grid;
+    grid.voxel_size = 0.6f;
+    for (int j = -100; j < 100; ++j)
+        for (int k = -100; k < 20; ++k) {
+            grid.cells.push_back({j < 0 ? 147 : 97, j, k});
+            grid.labels.push_back(2);
+        }
+    sort_cells(grid);
+    ASSERT_TRUE(write_grid(folder / "wall.sgrid", grid));
+    const Path one = folder.put("one.tum", "0 0 0 0 -0.5 0.5 -0.5 0.5\n");
+    const ProgramResult result = semrover_program("render " + (folder / "wall.sgrid").string() +
+                                                  " -q --semantic --npy -W 60 -H 40 --fov-x 60 -o " +
+                                                  (folder / "out").string() + " --path " + one.string());
+    ASSERT_EQ(result.code, 0) << result.err;
+    const auto depth = read_png_gray16(folder / "out/depth/000000.png");
+    const auto label = read_png_rgb8(folder / "out/label/000000.png");
+    const auto metres = plane(folder / "out/depth_expected/000000.npy", {60, 40});
+    const auto at = [](size_t x, size_t y) { return y * 60 + x; };
+    EXPECT_NEAR(depth->pixels[at(10, 25)], 58200, 60); // y is left: j of 0 and more
+    EXPECT_NEAR(metres[at(50, 25)], 88.2, 0.06);
+    EXPECT_EQ(depth->pixels[at(50, 25)], 0);
+    EXPECT_EQ(label->pixels[3 * at(50, 25)], 2);
+    EXPECT_EQ(label->pixels[3 * at(30, 0)], 10);
+    for (const uint16_t d : depth->pixels)
+        EXPECT_NE(d, 65535);
+    // the same without the lower half: what is below is not sky
+    VoxelGrid above = grid;
+    above.cells.clear();
+    above.labels.clear();
+    for (size_t c = 0; c < grid.cells.size(); ++c)
+        if (grid.cells[c][2] >= 0)
+            append_cell(above, grid, c);
+    ASSERT_TRUE(write_grid(folder / "above.sgrid", above));
+    ASSERT_EQ(semrover_program("render " + (folder / "above.sgrid").string() + " -q --semantic -W 60 -H 40 -o " +
+                               (folder / "b").string() + " --path " + one.string())
+                  .code,
+              0);
+    const auto below = read_png_rgb8(folder / "b/label/000000.png");
+    EXPECT_EQ(below->pixels[3 * at(30, 0)], 10);
+    EXPECT_EQ(below->pixels[3 * at(30, 39)], 255);
+}
+
+TEST(CliCamera, colmap_takes_points_and_pictures_along)
+{
+    const RigDrive d;
+    ASSERT_EQ(render(d.folder / "out", d.options).code, 0);
+    const std::string frames = (d.folder / "out/transforms.json").string();
+    const ProgramResult result =
+        convert(frames, d.folder / "data/sparse/0", "--points " + kGrid + " --images " + (d.folder / "out").string());
+    ASSERT_EQ(result.code, 0) << result.err;
+    std::set<std::string> last;
+    std::istringstream images(contents(d.folder / "data/sparse/0/images.txt"));
+    for (std::string line; std::getline(images, line);)
+        if (line.ends_with(".png")) {
+            const Path name = line.substr(line.rfind(' ') + 1);
+            EXPECT_TRUE(last.insert(name.filename()).second) << name; // 3DGS' first loader takes no more of it
+            EXPECT_TRUE(fs::exists(d.folder / "data/images" / name)) << name;
+            EXPECT_TRUE(fs::exists(d.folder / "data/images" / name.filename())) << name;
+        }
+    EXPECT_EQ(last.size(), 6u);
+    EXPECT_EQ(contents(d.folder / "data/images/tele/tele_000001.png"),
+              contents(d.folder / "out/tele/color/000001.png"));
+    const auto grid = read_grid(kGrid);
+    std::istringstream points(contents(d.folder / "data/sparse/0/points3D.txt"));
+    size_t count = 0;
+    for (std::string line; std::getline(points, line);) {
+        if (line.starts_with("#"))
+            continue;
+        std::istringstream words(line);
+        double id, x, y, z, r, g, b, error;
+        ASSERT_TRUE(words >> id >> x >> y >> z >> r >> g >> b >> error) << line;
+        EXPECT_TRUE(r >= 0 && r <= 255 && z > -10 && z < 40) << line;
+        ++count;
+    }
+    EXPECT_EQ(count, grid->cells.size() * size_t(grid->points_per_voxel));
+    const auto back = read_colmap(d.folder / "data/sparse/0");
+    EXPECT_EQ(back->frames[1].camera, "lens"); // by name, moment by moment
+    ASSERT_EQ(convert(frames, d.folder / "t.json", "--points " + kGrid).code, 0);
+    EXPECT_EQ(json_of(contents(d.folder / "t.json"))["ply_file_path"], "points.ply");
+    EXPECT_TRUE(fs::exists(d.folder / "points.ply"));
+    expect_error(convert(frames, d.folder / "u.json", "--points " + kGrid), 2, "points.ply' exists; -y replaces it");
+    expect_error(convert(frames, d.folder / "a.tum", "--camera tele --points " + kGrid), 2, "has no place for them");
+    expect_error(convert(frames, d.folder / "c", "--images " + d.folder.path().string()), 3, "is missing, and so is");
 }
 
 TEST(CliCamera, render_draws_a_rig_of_several_lenses)

@@ -250,6 +250,19 @@ TEST_F(CliGenerate, known_cells_stay_as_they_are)
     EXPECT_EQ(changed, 150u);
 }
 
+TEST_F(CliGenerate, a_finished_run_is_done)
+{
+    const std::string first = bytes_of("out.sgrid"), run = contents(path("out.sgrid.run/run.json"));
+    const ProgramResult again = generate("out.sgrid", "--json");
+    EXPECT_EQ(again.code, 0) << again.err;
+    EXPECT_EQ(json_of(again.out), json_of(run)["results"]);
+    EXPECT_TRUE(first == contents(path("out.sgrid")));
+    EXPECT_EQ(run, contents(path("out.sgrid.run/run.json")));
+    // not what the run wrote any more
+    std::ofstream(path("out.sgrid"), std::ios::app) << "x";
+    expect_error(generate("out.sgrid"), 2, "-y replaces it");
+}
+
 TEST_F(CliGenerate, an_existing_output_needs_yes)
 {
     const std::string first = bytes_of("out.sgrid");

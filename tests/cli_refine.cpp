@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+#include "engine/format/camera_path.h"
 #include "tests/child_program.h"
 #include "tests/json_text.h"
 #include "tests/program.h"
@@ -116,6 +117,62 @@ TEST_F(CliRefine, a_run_that_was_killed_goes_on_to_the_same_bytes)
         EXPECT_EQ(stop_after(output, lines, SIGKILL), 128 + SIGKILL) << lines;
         EXPECT_TRUE(whole == refined(output)) << "killed after " << lines << " pieces";
     }
+}
+
+TEST_F(CliRefine, a_finished_run_is_done_and_one_that_is_not_whole_any_more_is_refused)
+{
+    const auto whole = refined("out", "--video " + path("a.mp4"));
+    const std::string run = contents(folder_ / "out/run.json"), video = contents(folder_ / "a.mp4");
+    const Json first = json_of(run)["results"];
+    EXPECT_EQ(report("out", "--video " + path("a.mp4")), first);
+    EXPECT_EQ(contents(folder_ / "out/run.json"), run);
+    EXPECT_EQ(contents(folder_ / "a.mp4"), video);
+    EXPECT_TRUE(whole == results("out"));
+    ASSERT_EQ(refine("out", "--side-by-side " + path("b.mp4")).code, 0); // one that was not asked for before
+    EXPECT_GT(fs::file_size(folder_ / "b.mp4"), 500u);
+    expect_error(refine("out", "--seed 9"), 2, "-y replaces it");
+    fs::remove(folder_ / "out/frames/000001.png");
+    expect_error(refine("out"), 2, "frames/000001.png is not as it was; -y replaces it");
+    EXPECT_TRUE(whole == refined("out", "-y"));
+}
+
+TEST_F(CliRefine, frames_say_their_cameras)
+{
+    const std::string drive = put_drive({0, 0.5, 1});
+    refined("one", drive + "--frames 1: ", "street.sgrid");
+    const auto path_of_frames = read_transforms(folder_ / "one/transforms.json");
+    ASSERT_TRUE(path_of_frames) << path_of_frames.error().message;
+    const auto all = read_tum(folder_ / "path.tum", pinhole_from_fov(73, 56, 40));
+    ASSERT_EQ(path_of_frames->frames.size(), 2u);
+    for (size_t i = 0; i < 2; ++i) {
+        EXPECT_EQ(path_of_frames->frames[i].time, all->frames[i + 1].time);
+        EXPECT_EQ(path_of_frames->frames[i].intrinsics, all->frames[i + 1].intrinsics);
+        for (size_t j = 0; j < 16; ++j)
+            EXPECT_NEAR(path_of_frames->frames[i].pose.world_to_camera[j], all->frames[i + 1].pose.world_to_camera[j],
+                        1e-12);
+    }
+    const Json file = json_of(contents(folder_ / "one/transforms.json"));
+    EXPECT_EQ(file["depth_unit_scale_factor"], 0.001);
+    EXPECT_EQ(file["frames"][0]["file_path"], "frames/000001.png");
+    EXPECT_EQ(file["frames"][0]["depth_file_path"], "buffers/depth/000001.png");
+    for (const Json& frame : file["frames"])
+        for (const char* key : {"file_path", "depth_file_path", "label_file_path"})
+            EXPECT_TRUE(fs::exists(folder_ / "one" / frame[key].get<std::string>())) << frame[key];
+    // a ray that goes up and meets nothing is sky, one that goes down is not known
+    const auto label = read_png_rgb8(folder_ / "one/buffers/label/000001.png");
+    EXPECT_EQ(label->pixels[0], 10);
+    // buffers that `render` wrote know their cameras, those of nobody do not
+    ASSERT_EQ(semrover_program("render " + path("street.sgrid") + drive + "-q -o " + path("drawn")).code, 0);
+    refined("two", "", "drawn");
+    EXPECT_EQ(json_of(contents(folder_ / "two/transforms.json"))["frames"].size(), 3u);
+    refined("three");
+    EXPECT_FALSE(fs::exists(folder_ / "three/transforms.json"));
+    fs::remove(folder_ / "drawn/color/000002.png");
+    fs::remove(folder_ / "drawn/visible/000002.png");
+    const ProgramResult part =
+        semrover_program("refine " + path("drawn") + " -m " + path("model") + " -o " + path("part") + kSettings);
+    EXPECT_EQ(part.code, 0) << part.err;
+    EXPECT_NE(part.err.find("transforms.json' is not used: "), std::string::npos) << part.err;
 }
 
 TEST_F(CliRefine, an_interrupt_saves_what_is_done_and_exits_with_130)
@@ -446,7 +503,7 @@ TEST_F(CliRefineRefuses, outputs_devices_and_options_that_cannot_be)
     ASSERT_TRUE(write_grid(folder_ / "street.sgrid", street()));
     expect_refusal(arguments("out", "street.sgrid"), 2, "--path is required");
     refined("done");
-    expect_refusal(arguments("done"), 2, "-y replaces it");
+    expect_refusal(arguments("done") + "--seed 9", 2, "-y replaces it");
     ASSERT_EQ(stop_after("stopped", 1, SIGKILL), 128 + SIGKILL);
     expect_refusal(arguments("stopped") + "--seed 9", 3, "other settings");
     EXPECT_TRUE(refined("stopped", "--seed 9 -y") == refined("other", "--seed 9"));

@@ -322,8 +322,10 @@ TEST_F(JobRefinement, what_cannot_be_is_refused_before_any_work)
     EXPECT_EQ(resolve_refinement(o, {}).error().code, ErrorCode::usage);
     EXPECT_FALSE(fs::exists(folder_ / "out"));
     whole(options("done"), "done");
-    const auto again = begin_refinement(device(), *resolve_refinement(options("done"), {}), {});
-    EXPECT_EQ(again.error().code, ErrorCode::usage);
+    o = options("done");
+    o.seed = 77;
+    const auto other = begin_refinement(device(), *resolve_refinement(o, {}), {});
+    EXPECT_EQ(other.error().code, ErrorCode::usage);
     o = options("done");
     o.replace = true;
     EXPECT_TRUE(begin_refinement(device(), *resolve_refinement(o, {}), {}));

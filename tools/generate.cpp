@@ -4,6 +4,7 @@
 // grows it along a camera path into a folder of tiles
 #include "engine/job/generation.h"
 #include "engine/job/growth.h"
+#include "engine/job/outputs.h"
 #include "runtime/base/hash.h"
 #include "tools/cli/choice.h"
 #include "tools/cli/number_option.h"
@@ -67,7 +68,7 @@ Status generate(const GenerateArguments& o, const Globals& globals)
         return generate_along(o, globals);
     SR_CHECK(refuse_given(*o.input.command, placement_options(), "a grid without --along"));
     GenerationRequest request{.settings = {}, .seed = o.seed, .output = o.output, .ply = o.ply, .replace = globals.yes};
-    if (!o.generation.dry_run)
+    if (!o.generation.dry_run && !finished_results(o.output + ".run", Json())) // that one may be the same
         SR_CHECK(check_generation_outputs(request));
     GenerationOptions options = o.generation.options;
     if (o.order == "tiles")

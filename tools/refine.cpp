@@ -12,6 +12,7 @@
 #include "tools/refine_video.h"
 #include "tools/scene_input.h"
 
+#include <algorithm>
 #include <CLI/CLI.hpp>
 
 namespace semrover {
@@ -96,6 +97,8 @@ Status refine(const RefineArguments& o, const Globals& globals)
     SR_TRY(Refinement r, resolve(o, globals, display.callbacks()));
     if (!o.dry_run)
         SR_CHECK(r.check_outputs(video_files(o.videos, r.chains)));
+    const bool finished = r.was_finished() && !globals.yes;
+    const bool has_videos = finished && std::ranges::all_of(video_files(o.videos, r.chains), is_there);
     SR_TRY(const auto device, open_device(globals, o.profile));
     if (r.options.path)
         print_warnings(r.options.path->warnings, globals);
@@ -105,7 +108,7 @@ Status refine(const RefineArguments& o, const Globals& globals)
         RefinementCallbacks c{callbacks, {}, {}};
         c.planned = [&](const Refinement& of, const MemoryPlan& plan) { print_plan(of, plan, globals); };
         c.refined = [&](const RefineStore& store, std::span<const RefineChain> chains) {
-            return write_videos(o.videos, store, chains);
+            return has_videos ? Status{} : write_videos(o.videos, store, chains);
         };
         return begin_refinement(*device, std::move(r), c);
     });

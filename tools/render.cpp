@@ -23,21 +23,19 @@ struct RenderArguments {
     DriveOptions drive;
     SceneInputOptions input;
     int frames_per_second = 10;
-    bool top = false, semantic = false, floats = false, visible_depth = false;
+    bool top = false, semantic = false, floats = false, points = false, visible_depth = false;
 };
 
 Status check_outputs(const RenderArguments& o, const Globals& globals)
 {
     if (o.drive.path.empty() && !o.top)
         return fail(ErrorCode::usage, "--path (a camera path) or --top is required");
-    for (const Path& existing : {o.output / "color", o.output / "top.png"})
-        if (std::filesystem::exists(existing) && !globals.yes)
-            return fail(ErrorCode::usage, "{} exists; -y replaces pictures there", quote_path(existing));
     if (o.video.empty())
         return {};
     if (o.drive.path.empty())
         return fail(ErrorCode::usage, "--video needs --path");
-    return check_writable(o.video, globals.yes);
+    // where a run is there, the settings say whether it is this one, and whose the video is
+    return check_writable(o.video, globals.yes || finished_results(o.output, Json()));
 }
 
 // of the first camera, from where the job hands pictures over
@@ -65,7 +63,11 @@ Result<DrawingOptions> drawing_options(const RenderArguments& o, const Globals& 
     SR_TRY(d.draw, draw_options(o.drive));
     d.draw.semantic = o.semantic;
     d.floats = o.floats;
+    d.points = o.points;
     d.visible_depth = o.visible_depth;
+    d.folder = o.output;
+    d.replace = globals.yes;
+    d.allow_empty = o.drive.allow_empty;
     SceneInputOptions scene = o.input;
     scene.origin_may_be_of_path = !o.drive.path.empty();
     SR_TRY(SceneInput input, read_scene_input(o.grid, scene));
@@ -78,11 +80,10 @@ Result<DrawingOptions> drawing_options(const RenderArguments& o, const Globals& 
     else
         d.scene = std::move(*input.splats);
     d.scene_name = o.grid;
-    d.folder = o.output;
-    d.allow_empty = o.drive.allow_empty;
     if (!o.drive.path.empty()) {
         SR_TRY(d.path, load_cameras(drive));
     }
+    SR_CHECK(check_drawing_outputs(d));
     if (o.top)
         d.top = {o.drive.width, o.drive.height};
     return d;
@@ -95,26 +96,22 @@ Status render(const RenderArguments& o, const Globals& globals)
     SR_TRY(const auto device, open_device(globals, o.profile));
     print_warnings(options.path.warnings, globals);
     VideoOfFrames video;
-    size_t drawn = 0;
     options.picture = [&](const CameraFrame& frame, std::span<const uint8_t> pixels) {
-        ++drawn;
         return video.add(frame, pixels);
     };
-    const auto results = run_job(globals, [&](const JobCallbacks& callbacks) -> Result<std::unique_ptr<Job>> {
-        const CameraPath path = options.path;
-        SR_TRY(auto job, begin_drawing(*device, std::move(options), callbacks));
-        if (!o.video.empty())
-            SR_CHECK(video.open(o, path.frames.front()));
-        return job;
-    });
-    if (!results && results.error().code == ErrorCode::interrupted)
-        return fail(ErrorCode::interrupted, "interrupted after {} frames; they are in {}", drawn, quote_path(o.output));
-    SR_CHECK(results);
+    const bool has_video = finished_results(o.output, Json()) && !globals.yes && is_there(o.video);
+    SR_TRY(const Json results, run_job(globals, [&](const JobCallbacks& callbacks) -> Result<std::unique_ptr<Job>> {
+               const CameraPath path = options.path;
+               SR_TRY(auto job, begin_drawing(*device, std::move(options), callbacks));
+               if (!o.video.empty() && !has_video)
+                   SR_CHECK(video.open(o, path.frames.front()));
+               return job;
+           }));
     if (video.video)
         SR_CHECK(video.video->finish());
     SR_CHECK(write_profile(*device, o.profile, globals));
     if (globals.json)
-        fmt::print("{}\n", results->dump());
+        fmt::print("{}\n", results.dump());
     return {};
 }
 
@@ -128,19 +125,22 @@ void add_render(CLI::App& app, const Globals& globals, Run& run)
     c->add_option("GRID", o->grid,
                   "a grid (.sgrid, a folder of tiles, .npz, .label, .vox, .ply) or splats (.ply, .glb, .splat)")
         ->required();
-    c->add_option("-o,--output", o->output, "folder for {color,depth,normal,label,visible}/000000.png")->required();
+    c->add_option("-o,--output", o->output,
+                  "folder for {color,depth,normal,label,visible}/000000.png, transforms.json and the run's state")
+        ->required();
     add_scene_input_options(*c, o->input);
     add_drive_options(*c, o->drive);
     c->add_flag("--semantic", o->semantic, "label colours; a grid without points is drawn as blocks");
     c->add_flag("--top", o->top, "also an overview from above, top.png");
     c->add_flag("--npy", o->floats,
                 "also float32 arrays {depth_expected,depth_median,alpha}/000000.npy, depths in metres");
+    c->add_flag("--points", o->points, "also points.ply, the scene's points, which transforms.json names");
     c->add_flag("--visible-depth", o->visible_depth, "depth pictures are 0 where a pixel is not visible");
     CLI::Option* video =
         c->add_option("--video", o->video, "also an MP4 of the colour frames (of the first camera), through ffmpeg");
     add_number(*c, "--fps", o->frames_per_second, "frames a second of the video", 1, 240)->needs(video);
     c->add_option("--profile", o->profile, "write device times as a Chrome trace");
-    c->callback([o, &globals, &run] { run = [o, &globals] { return render(*o, globals); }; });
+    c->callback([o, &globals, &run] { run = resuming(globals, [o, &globals] { return render(*o, globals); }); });
 }
 
 } // namespace semrover

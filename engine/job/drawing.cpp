@@ -2,13 +2,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/drawing.h"
 
+#include "engine/format/buffer_folder.h"
 #include "engine/format/image.h"
+#include "engine/format/labelled_points.h"
 #include "engine/job/budget_meter.h"
+#include "engine/job/drawing_store.h"
 #include "engine/job/empty_frames.h"
 #include "engine/job/float_buffers.h"
+#include "engine/job/input_hashes.h"
 #include "engine/job/outgoing.h"
+#include "engine/job/version.h"
 #include "engine/scene/palette.h"
 #include "engine/splat/bounds.h"
+#include "runtime/base/hash.h"
 
 namespace semrover {
 
@@ -40,34 +46,81 @@ Result<SurfelScene> load_scene(Device& device, DrawingOptions& o)
 
 class DrawingJob : public Job {
   public:
-    DrawingJob(Device& device, DrawingOptions options, SurfelScene scene, std::unique_ptr<Outgoing> out,
-               const JobCallbacks& callbacks)
+    DrawingJob(Device& device, DrawingOptions options, SurfelScene scene, std::unique_ptr<DrawingStore> store,
+               std::unique_ptr<Outgoing> out, const JobCallbacks& callbacks)
         : device_(device), o_(std::move(options)), scene_(std::move(scene)), callbacks_(callbacks),
           drawing_(device, scene_, o_.path, o_.draw.rasterizer()), floats_(device, scene_, o_.draw.rasterizer()),
-          out_(std::move(out))
+          store_(std::move(store)), out_(std::move(out))
     {
         if (drawing_.total()) {
             empty_.emplace(o_.path, o_.scene_name, o_.allow_empty);
             empty_->set_scene(bounds());
         }
+        find_whole();
         say(false);
     }
 
     Result<bool> step(const JobBudget& budget) override
     {
+        Result<bool> done = advance(budget);
+        if (!done) {
+            (void)out_->drain(); // of two errors the first one counts
+            store_->drop_if_empty();
+        }
+        return done;
+    }
+
+    Result<Json> finish() override
+    {
+        if (store_->run().results() && !drew_)
+            return *store_->run().results();
+        const Json results{{"output", o_.folder.string()},
+                           {"frames", drawing_.total()},
+                           {"splats", scene_.size()},
+                           {"skipped", scene_.skipped()},
+                           {"empty_frames", empty_ ? empty_->count() : 0},
+                           {"peak_device_bytes", device_.peak_bytes()}};
+        SR_CHECK(store_->finish(results));
+        return results;
+    }
+
+    // what was drawn is written
+    void cancel() override { (void)out_->drain(); }
+    Path kept_in() const override { return o_.folder; }
+
+  private:
+    // frames that an earlier start has drawn
+    void find_whole()
+    {
+        std::map<std::string, uint32_t> counts;
+        for (const CameraFrame& f : o_.path.frames)
+            whole_.push_back(store_->has(f.camera, counts[f.camera]++));
+        before_ = size_t(std::ranges::count(whole_, true));
+        top_left_ = o_.top.width && !store_->has_top();
+    }
+    Result<bool> advance(const JobBudget& budget)
+    {
         BudgetMeter meter(budget, cost_);
         bool done = drawing_.total() == 0;
         while (!done) {
             SR_CHECK(out_->poll());
-            SR_TRY(done, drawing_.step([this](const CameraFrame& frame, const SplatPixelSlots& pixels) {
-                return take(frame, pixels);
-            }));
+            const auto moment = drawing_.next();
+            const auto whole = whole_.begin() + ptrdiff_t(drawing_.done());
+            if (std::all_of(whole, whole + ptrdiff_t(moment.size()), [](bool w) { return w; })) {
+                SR_CHECK(pass_on(moment));
+                done = drawing_.skip();
+            } else {
+                drew_ = true;
+                SR_TRY(done, drawing_.step([this](const CameraFrame& frame, const SplatPixelSlots& pixels) {
+                    return take(frame, pixels);
+                }));
+            }
             say(done);
             meter.submitted();
             if (!meter.room())
                 break;
         }
-        if (done && o_.top.width)
+        if (done && top_left_)
             SR_CHECK(draw_overview());
         if (done)
             SR_CHECK(out_->drain());
@@ -75,20 +128,6 @@ class DrawingJob : public Job {
             SR_CHECK(empty_->report(callbacks_));
         return done;
     }
-
-    Result<Json> finish() override
-    {
-        return Json{{"frames", drawing_.total()},
-                    {"splats", scene_.size()},
-                    {"skipped", scene_.skipped()},
-                    {"empty_frames", empty_ ? empty_->count() : 0},
-                    {"peak_device_bytes", device_.peak_bytes()}};
-    }
-
-    // what was drawn is written
-    void cancel() override { (void)out_->drain(); }
-
-  private:
     void say(bool ended)
     {
         if (callbacks_.progress && drawing_.total())
@@ -96,24 +135,41 @@ class DrawingJob : public Job {
                                  .unit = "frames",
                                  .done = drawing_.done(),
                                  .total = drawing_.total(),
+                                 .done_before = before_,
                                  .device_bytes = device_.allocated_bytes(),
                                  .ended = ended});
     }
+    // frames that were drawn before, as they were written
+    Status pass_on(std::span<const CameraFrame> frames)
+    {
+        SR_CHECK(out_->arrive()); // pictures go on in the path's order
+        for (const CameraFrame& frame : frames) {
+            const uint32_t number = counts_[frame.camera]++;
+            SR_TRY(const bool nothing, store_->saw_nothing(frame.camera, number));
+            empty_->add(nothing);
+            if (!o_.picture)
+                continue;
+            SR_TRY(const ImageRgb8 color, read_png_rgb8(frame_path(store_->folder(frame.camera), "color", number)));
+            SR_CHECK(o_.picture(frame, color.pixels));
+        }
+        return {};
+    }
     Status take(const CameraFrame& frame, const SplatPixelSlots& slots)
     {
-        const Path folder = camera_folder(o_.folder, frame.camera);
         const ImageSize size{frame.intrinsics.width, frame.intrinsics.height};
         const uint32_t number = counts_[frame.camera]++;
         if (o_.floats)
-            SR_CHECK(floats_.write(folder, number, frame));
-        return out_->read(slots, size, [this, frame, folder, number](FramePixels pixels) -> Status {
-            empty_->add(pixels);
+            SR_CHECK(floats_.write(store_->folder(frame.camera), number, frame));
+        return out_->read(slots, size, [this, frame, number](FramePixels pixels) -> Status {
+            empty_->add(sees_nothing(pixels));
             if (o_.visible_depth)
                 clear_hidden_depth(pixels);
             if (o_.picture)
                 SR_CHECK(o_.picture(frame, color_pixels(pixels)));
-            return out_->write(
-                [folder, number, pixels = std::move(pixels)] { return write_frame_images(folder, number, pixels); });
+            return out_->write([this, frame, number, pixels = std::move(pixels)]() mutable {
+                mark_sky(pixels, frame);
+                return store_->save(frame.camera, number, pixels);
+            });
         });
     }
     Bounds bounds() const
@@ -122,18 +178,13 @@ class DrawingJob : public Job {
     }
     Status draw_overview()
     {
+        drew_ = true;
         const CameraFrame camera = overview_camera(bounds(), o_.top);
         return drawing_.draw({&camera, 1}, [this](const CameraFrame&, const SplatPixelSlots& slots) {
             return out_->read(slots, o_.top, [this](const FramePixels& pixels) {
-                return out_->write([this, color = color_pixels(pixels)] { return write_overview(color); });
+                return out_->write([this, color = color_pixels(pixels)] { return store_->save_top(o_.top, color); });
             });
         });
-    }
-    Status write_overview(std::span<const uint8_t> color) const
-    {
-        std::error_code error;
-        std::filesystem::create_directories(o_.folder, error);
-        return write_png_rgb8(o_.folder / "top.png", o_.top.width, o_.top.height, color);
     }
 
     Device& device_;
@@ -145,8 +196,36 @@ class DrawingJob : public Job {
     SubmitCost cost_;
     std::optional<EmptyFrames> empty_;       // of a path
     std::map<std::string, uint32_t> counts_; // frames so far, per camera
-    std::unique_ptr<Outgoing> out_;          // last: what it writes is of the others
+    std::vector<bool> whole_;                // of each frame of the path
+    size_t before_ = 0;                      // how many of them
+    bool top_left_ = false, drew_ = false;
+    std::unique_ptr<DrawingStore> store_;
+    std::unique_ptr<Outgoing> out_; // last: what it writes is of the others
 };
+
+// all that decides the bytes of the pictures
+Json drawing_settings(const DrawingOptions& o, const Device& device)
+{
+    const auto* grid = std::get_if<VoxelGrid>(&o.scene);
+    const uint64_t scene = grid ? hash_grid(*grid) : hash_splats(std::get<Surfels>(o.scene));
+    return {{"command", "render"},
+            {"version", kVersion},
+            {"device", device.name()},
+            {"driver", device.driver()},
+            {"scene", hash_text(scene)},
+            {"path", hash_text(hash_cameras(o.path))},
+            {"drive", drawing_json(o.draw)},
+            {"semantic", o.draw.semantic},
+            {"visible_depth", o.visible_depth},
+            {"top", {o.top.width, o.top.height}}};
+}
+
+Status write_points(const Path& path, const DrawingOptions& o)
+{
+    if (const auto* grid = std::get_if<VoxelGrid>(&o.scene))
+        return write_labelled_points(path, *grid);
+    return write_points_ply(path, std::get<Surfels>(o.scene));
+}
 
 uint64_t largest_read(const DrawingOptions& o)
 {
@@ -158,13 +237,30 @@ uint64_t largest_read(const DrawingOptions& o)
 
 } // namespace
 
+Status check_drawing_outputs(const DrawingOptions& o)
+{
+    return DrawingStore::check(o.folder, o.path, o.replace);
+}
+
 Result<std::unique_ptr<Job>> begin_drawing(Device& device, DrawingOptions options, const JobCallbacks& callbacks)
 {
-    SR_TRY(SurfelScene scene, load_scene(device, options));
+    DrawingOptions& o = options;
+    SR_CHECK(check_drawing_outputs(o));
+    const Json settings = drawing_settings(o, device);
+    SR_TRY(SurfelScene scene, load_scene(device, o));
     if (scene.skipped() && callbacks.warning)
         callbacks.warning(fmt::format("{} of {} splats are degenerate and not drawn", scene.skipped(), scene.size()));
-    SR_TRY(auto out, Outgoing::create(device, largest_read(options)));
-    return std::make_unique<DrawingJob>(device, std::move(options), std::move(scene), std::move(out), callbacks);
+    SR_TRY(auto out, Outgoing::create(device, largest_read(o)));
+    const DrawnFiles files{.floats = o.floats, .top = o.top.width > 0, .points = o.points};
+    SR_TRY(auto store, DrawingStore::open(o.folder, settings, o.path, files, o.replace));
+    if (!store->run().results()) {
+        if (!o.path.frames.empty())
+            SR_CHECK(store->write_cameras(o.path));
+        if (o.points)
+            SR_CHECK(write_points(o.folder / "points.ply", o));
+    }
+    return std::make_unique<DrawingJob>(device, std::move(options), std::move(scene), std::move(store), std::move(out),
+                                        callbacks);
 }
 
 } // namespace semrover

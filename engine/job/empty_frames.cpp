@@ -13,13 +13,13 @@ namespace {
 
 constexpr uint32_t kDepthBits = 0xffff, kVisibleShift = 24;
 
+} // namespace
+
 bool sees_nothing(const FramePixels& frame)
 {
     return std::ranges::none_of(frame.ranges, [](uint32_t word) { return word & kDepthBits; }) &&
            std::ranges::none_of(frame.seen, [](uint32_t word) { return word >> kVisibleShift; });
 }
-
-} // namespace
 
 std::string extent_text(const Bounds& b)
 {
@@ -42,12 +42,6 @@ Bounds bounds_of(const CameraPath& path)
         }
     }
     return b;
-}
-
-void EmptyFrames::add(const FramePixels& frame)
-{
-    ++frames_;
-    empty_ += sees_nothing(frame);
 }
 
 Status EmptyFrames::report(const JobCallbacks& callbacks) const

@@ -13,6 +13,8 @@ namespace semrover {
 std::string extent_text(const Bounds& bounds);
 Bounds bounds_of(const CameraPath& path); // of the cameras' positions
 
+bool sees_nothing(const FramePixels& frame);
+
 // Counts the frames of a drive that see nothing of the scene: most often path and grid lie in different frames.
 class EmptyFrames {
   public:
@@ -23,7 +25,11 @@ class EmptyFrames {
     }
     void set_scene(const Bounds& bounds) { scene_ = bounds; }
 
-    void add(const FramePixels& frame);
+    void add(bool sees_nothing)
+    {
+        ++frames_;
+        empty_ += sees_nothing;
+    }
     size_t count() const { return empty_; }
     bool all() const { return frames_ > 0 && empty_ == frames_; }
 

@@ -3,6 +3,7 @@
 #include "engine/job/generation.h"
 
 #include "engine/job/grid_filling.h"
+#include "engine/job/input_hashes.h"
 #include "engine/job/outputs.h"
 #include "engine/job/told_objects.h"
 #include "engine/job/version.h"
@@ -12,16 +13,14 @@ namespace semrover {
 
 namespace {
 
-uint64_t hash_grid(const VoxelGrid& grid)
+std::vector<Path> written_files(const GenerationRequest& r, bool with_objects)
 {
-    Hash hash;
-    hash.add(fmt::format("{}", grid.voxel_size));
-    hash.add(std::as_bytes(std::span(grid.cells)));
-    hash.add(std::as_bytes(std::span(grid.labels)));
-    hash.add(std::as_bytes(std::span(grid.points)));
-    hash.add(std::as_bytes(std::span(grid.colors)));
-    hash.add(std::as_bytes(std::span(grid.generated)));
-    return hash.value();
+    std::vector<Path> files;
+    for (const Path& path : {r.output, with_objects && !r.output.empty() ? objects_beside(r.output) : Path(),
+                             Path(r.ply.points), Path(r.ply.splats_3d), Path(r.ply.splats_2d)})
+        if (!path.empty())
+            files.push_back(path);
+    return files;
 }
 
 class GridGeneration : public GenerationJob {
@@ -31,6 +30,9 @@ class GridGeneration : public GenerationJob {
     {
     }
 
+    Status look(); // at what decides the bytes
+    // the same was generated before, and what it wrote is there
+    bool finished_before();
     Status load();
     Status start(std::optional<GenerationState> saved);
     Result<Json> estimate() { return filling_.estimate(); }
@@ -49,29 +51,48 @@ class GridGeneration : public GenerationJob {
     const JobCallbacks callbacks_;
     VoxelGrid grid_;
     GridFilling filling_;
-    uint64_t grid_hash_ = 0;
     std::vector<SceneObject> objects_; // that the model is told of
     Json settings_;
+    std::optional<Json> finished_; // results of such a run
     std::optional<RunFolder> run_;
 };
 
 // the grid's hash is taken before it gets room for points
-Status GridGeneration::load()
+Status GridGeneration::look()
 {
-    grid_hash_ = request_.grid_hash ? *request_.grid_hash : hash_grid(grid_);
-    warn_of_placement(request_.settings.model, grid_, callbacks_);
+    const uint64_t grid_hash = request_.grid_hash ? *request_.grid_hash : hash_grid(grid_);
     const bool by_blocks = request_.settings.regions.tile_cells > 0;
     SR_TRY(objects_, told_objects(request_.settings.model, request_.objects, grid_, request_.seed, by_blocks));
+    SR_TRY(settings_, settings_json(request_.settings, filling_.device(), "generate", grid_hash));
+    settings_["seed"] = request_.seed;
+    if (!objects_.empty())
+        settings_["objects"] = hash_text(hash_objects(objects_));
+    return {};
+}
+
+bool GridGeneration::finished_before()
+{
+    if (request_.output.empty() || request_.replace)
+        return false;
+    finished_ = finished_results(run_folder(), settings_);
+    const auto hash = hash_file(request_.output);
+    if (!finished_ || !hash || finished_->value("xxh64", Json()) != hash_text(*hash))
+        finished_.reset();
+    for (const Path& path : written_files(request_, !objects_.empty()))
+        if (!std::filesystem::exists(path))
+            finished_.reset();
+    return finished_.has_value();
+}
+
+Status GridGeneration::load()
+{
+    warn_of_placement(request_.settings.model, grid_, callbacks_);
     SR_CHECK(filling_.cut(grid_, request_.settings.regions, objects_));
     return filling_.load(request_.seed, callbacks_);
 }
 
 Status GridGeneration::start(std::optional<GenerationState> saved)
 {
-    SR_TRY(settings_, settings_json(request_.settings, filling_.device(), "generate", grid_hash_));
-    settings_["seed"] = request_.seed;
-    if (!objects_.empty())
-        settings_["objects"] = hash_text(hash_objects(objects_));
     if (!request_.output.empty()) {
         SR_TRY(RunFolder run, open_run(run_folder(), settings_, request_.replace));
         run_.emplace(std::move(run));
@@ -85,6 +106,8 @@ Status GridGeneration::start(std::optional<GenerationState> saved)
 
 Result<bool> GridGeneration::step(const JobBudget& budget)
 {
+    if (finished_)
+        return true;
     SR_TRY(const bool filled, filling_.step(budget, [this] { filling_.say(callbacks_); }));
     if (filled)
         filling_.say(callbacks_, true);
@@ -99,6 +122,8 @@ Result<GenerationState> GridGeneration::save()
 
 Result<Json> GridGeneration::finish()
 {
+    if (finished_)
+        return *finished_;
     grid_.metadata["seed"] = std::to_string(request_.seed);
     grid_.metadata["tool"] = kProgram;
     grid_.metadata["model"] = settings_["model"];
@@ -125,11 +150,9 @@ Result<Json> GridGeneration::finish()
 
 Status check_generation_outputs(const GenerationRequest& request)
 {
-    const bool told = !request.output.empty() && !request.settings.model.config.condition.empty();
-    for (const Path& path : {request.output, told ? objects_beside(request.output) : Path(), Path(request.ply.points),
-                             Path(request.ply.splats_3d), Path(request.ply.splats_2d)})
-        if (!path.empty())
-            SR_CHECK(check_writable(path, request.replace));
+    const bool told = !request.settings.model.config.condition.empty();
+    for (const Path& path : written_files(request, told))
+        SR_CHECK(check_writable(path, request.replace));
     return {};
 }
 
@@ -138,8 +161,11 @@ Result<std::unique_ptr<GenerationJob>> begin_generation(Device& device, VoxelGri
                                                         std::optional<GenerationState> saved)
 {
     SR_ASSERT(!saved || request.output.empty(), "a run with an output keeps its state there");
-    SR_CHECK(check_generation_outputs(request));
     auto job = std::make_unique<GridGeneration>(device, std::move(grid), request, callbacks);
+    SR_CHECK(job->look());
+    if (job->finished_before())
+        return job;
+    SR_CHECK(check_generation_outputs(request));
     SR_CHECK(job->load());
     SR_CHECK(job->start(std::move(saved)));
     return job;
@@ -149,6 +175,7 @@ Result<Json> estimate_generation(Device& device, VoxelGrid grid, const Generatio
                                  const JobCallbacks& callbacks)
 {
     GridGeneration job(device, std::move(grid), request, callbacks);
+    SR_CHECK(job.look());
     SR_CHECK(job.load());
     return job.estimate();
 }

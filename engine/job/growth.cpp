@@ -45,6 +45,8 @@ class Growth : public Job {
     {
     }
 
+    // results of the same run, where it is done and its tiles are there. usage: tiles of another
+    Result<std::optional<Json>> finished_before() const;
     Status begin();
     Result<Json> estimate();
 
@@ -54,6 +56,7 @@ class Growth : public Job {
     Path kept_in() const override { return plan_.request.output; }
 
   private:
+    Path run_folder() const { return plan_.request.output.string() + ".run"; }
     int points_per_voxel() const { return int(plan_.settings.model.config.points_per_voxel); }
     Result<Json> settings() const;
     Status clear_output() const;
@@ -105,6 +108,18 @@ Result<Json> Growth::settings() const
     if (!plan_.objects.empty())
         settings["objects"] = hash_text(hash_objects(plan_.objects));
     return settings;
+}
+
+Result<std::optional<Json>> Growth::finished_before() const
+{
+    const GrowthRequest& r = plan_.request;
+    if (r.replace || !TileFolder::is_one(r.output))
+        return std::optional<Json>();
+    SR_TRY(const Json wanted, settings());
+    std::optional<Json> results = finished_results(run_folder(), wanted);
+    if (!results)
+        return fail(ErrorCode::usage, "{} exists; -y replaces it", quote_path(r.output));
+    return results;
 }
 
 // a run that begins finds no tiles of another
@@ -191,8 +206,7 @@ Status Growth::begin_window()
 Status Growth::begin()
 {
     SR_TRY(const Json wanted, settings());
-    SR_TRY(RunFolder run,
-           open_run(plan_.request.output.string() + ".run", wanted, plan_.request.replace, {{"windows"}, {}}));
+    SR_TRY(RunFolder run, open_run(run_folder(), wanted, plan_.request.replace, {{"windows"}}));
     run_.emplace(std::move(run));
     SR_CHECK(take_up());
     begun_ = leg_begun_ = seconds_now();
@@ -369,11 +383,25 @@ Result<Json> Growth::finish()
     return results;
 }
 
+class FinishedGrowth : public Job {
+  public:
+    explicit FinishedGrowth(Json results) : results_(std::move(results)) {}
+    Result<bool> step(const JobBudget&) override { return true; }
+    Result<Json> finish() override { return results_; }
+    void cancel() override {}
+
+  private:
+    Json results_;
+};
+
 } // namespace
 
 Result<std::unique_ptr<Job>> begin_growth(Device& device, GrowthPlan plan, const JobCallbacks& callbacks)
 {
     auto job = std::make_unique<Growth>(device, std::move(plan), callbacks);
+    SR_TRY(std::optional<Json> finished, job->finished_before());
+    if (finished)
+        return std::make_unique<FinishedGrowth>(std::move(*finished));
     SR_CHECK(job->begin());
     return job;
 }

@@ -3,6 +3,7 @@
 #include "engine/job/growth.h"
 
 #include "engine/format/camera_path.h"
+#include "engine/job/outputs.h"
 #include "runtime/base/quote.h"
 
 namespace semrover {
@@ -21,7 +22,8 @@ Status check(const GrowthRequest& r, bool writes)
         return fail(ErrorCode::usage, "--window: expected metres above 0 and up to 1000, found {}", r.window);
     if (!writes)
         return {};
-    if (TileFolder::is_one(r.output) && !r.replace)
+    // of a finished run, the settings say whether it is this one
+    if (TileFolder::is_one(r.output) && !r.replace && !finished_results(r.output.string() + ".run", Json()))
         return fail(ErrorCode::usage, "'{}' exists; -y replaces it", r.output.string());
     if (fs::exists(r.output) && !fs::is_directory(r.output))
         return fail(ErrorCode::bad_input, "{} is a file; --along writes a folder of tiles", quote(r.output.string()));

@@ -13,14 +13,26 @@ Status check_writable(const Path& path, bool replace)
     return AtomicFile::create(path).map([](const AtomicFile&) {});
 }
 
-Result<RunFolder> open_run(const Path& folder, const Json& settings, bool replace, const RunContents& contents)
+std::optional<Json> finished_results(const Path& folder, const Json& settings)
 {
-    if (!replace)
-        return RunFolder::open(folder, settings, false, contents);
-    const auto before = read_json(folder / "run.json");
-    const bool same = before && before->is_object() && before->value("settings", Json()) == settings &&
-                      before->value("state", Json()) == "running";
-    return RunFolder::open(folder, settings, !same, contents);
+    const auto run = read_json(folder / "run.json");
+    if (!run || !run->is_object() || run->value("state", Json()) != "finished" ||
+        (!settings.is_null() && run->value("settings", Json()) != settings))
+        return std::nullopt;
+    const Json results = run->value("results", Json::object());
+    return results.is_object() ? std::optional(results) : std::nullopt;
+}
+
+Result<RunFolder> open_run(const Path& folder, const Json& settings, bool replace, const RunContents& contents,
+                           bool keep_finished)
+{
+    bool restart = false;
+    if (replace) {
+        const auto before = read_json(folder / "run.json");
+        restart = !(before && before->is_object() && before->value("settings", Json()) == settings &&
+                    before->value("state", Json()) == "running");
+    }
+    return RunFolder::open(folder, settings, restart, contents, keep_finished);
 }
 
 } // namespace semrover

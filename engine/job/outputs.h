@@ -10,8 +10,13 @@ namespace semrover {
 // bad_input when it cannot be written
 Status check_writable(const Path& path, bool replace);
 
+// Results of a run that is finished, with these settings (null: any); none where `folder` holds no such run.
+std::optional<Json> finished_results(const Path& folder, const Json& settings);
+
 // The run folder of an output. With `replace`, a finished or different run there is started over, while an interrupted
-// one with the same settings goes on.
-Result<RunFolder> open_run(const Path& folder, const Json& settings, bool replace, const RunContents& contents = {});
+// one with the same settings goes on. A finished one with the same settings starts over, too, unless `keep_finished`:
+// then it is as it was, with RunFolder::results().
+Result<RunFolder> open_run(const Path& folder, const Json& settings, bool replace, const RunContents& contents = {},
+                           bool keep_finished = false);
 
 } // namespace semrover

@@ -67,13 +67,22 @@ Status PathDrawing::draw(std::span<const CameraFrame> frames, const Drawn& drawn
     return {};
 }
 
-Result<bool> PathDrawing::step(const Drawn& drawn)
+std::span<const CameraFrame> PathDrawing::next() const
 {
     SR_ASSERT(done_ < total(), "all {} frames are drawn", total());
-    const size_t end = end_of_moment(path_, done_);
-    SR_CHECK(draw(std::span(path_.frames).subspan(done_, end - done_), drawn));
-    done_ = end;
+    return std::span(path_.frames).subspan(done_, end_of_moment(path_, done_) - done_);
+}
+
+bool PathDrawing::skip()
+{
+    done_ += next().size();
     return done_ == total();
+}
+
+Result<bool> PathDrawing::step(const Drawn& drawn)
+{
+    SR_CHECK(draw(next(), drawn));
+    return skip();
 }
 
 Path camera_folder(const Path& folder, const std::string& camera)

@@ -43,7 +43,9 @@ class PathDrawing {
 
     // `drawn` gets every frame of the next moment; true when that was the last one. At least one frame must be left.
     Result<bool> step(const Drawn& drawn);
-    size_t done() const { return done_; } // frames so far
+    std::span<const CameraFrame> next() const; // of the next moment
+    bool skip();                               // it; true when that was the last one
+    size_t done() const { return done_; }      // frames so far
     size_t total() const { return path_.frames.size(); }
 
     // frames of one size and camera model, apart from the path

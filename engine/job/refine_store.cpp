@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/refine_store.h"
 
-#include "runtime/base/hash.h"
 #include "runtime/base/quote.h"
 #include "runtime/base/safetensors.h"
 
@@ -40,15 +39,9 @@ Result<std::vector<float>> read_latent(const Path& path, const LatentSize& size,
 }
 
 RefineStore::RefineStore(RunFolder& run, FrameFormat format, uint32_t channels)
-    : run_(run), format_(format), channels_(channels)
+    : folder_(run.path()), format_(format), channels_(channels),
+      record_(run, [folder = run.path()](const std::string& piece) { return std::vector<Path>{folder / piece}; })
 {
-    for (const Json& entry : run.entries()) {
-        if (!entry.is_object() || !entry.value("piece", Json()).is_string())
-            continue;
-        const std::string piece = entry["piece"];
-        const auto hash = hash_file(run.path() / piece);
-        done_[piece] = hash && entry.value("xxh64", Json()) == hash_text(*hash);
-    }
 }
 
 std::string RefineStore::name(PieceKind kind, const BufferCamera& camera, uint32_t frame) const
@@ -59,21 +52,12 @@ std::string RefineStore::name(PieceKind kind, const BufferCamera& camera, uint32
 
 Path RefineStore::path(PieceKind kind, const BufferCamera& camera, uint32_t frame) const
 {
-    return run_.path() / name(kind, camera, frame);
+    return folder_ / name(kind, camera, frame);
 }
 
 bool RefineStore::has(PieceKind kind, const BufferCamera& camera, uint32_t frame) const
 {
-    const auto found = done_.find(name(kind, camera, frame));
-    return found != done_.end() && found->second;
-}
-
-Status RefineStore::record(const std::string& name)
-{
-    SR_TRY(const uint64_t hash, hash_file(run_.path() / name));
-    SR_CHECK(run_.append({{"piece", name}, {"xxh64", hash_text(hash)}}));
-    done_[name] = true;
-    return {};
+    return record_.has(name(kind, camera, frame));
 }
 
 Status RefineStore::save_latent(PieceKind kind, const BufferCamera& camera, uint32_t frame, const LatentSize& size,
@@ -82,7 +66,7 @@ Status RefineStore::save_latent(PieceKind kind, const BufferCamera& camera, uint
     const Path to = path(kind, camera, frame);
     SR_CHECK(make_folder(to.parent_path()));
     SR_CHECK(write_latent(to, size, latent));
-    return record(name(kind, camera, frame));
+    return record_.add(name(kind, camera, frame));
 }
 
 Result<std::vector<float>> RefineStore::load_latent(PieceKind kind, const BufferCamera& camera, uint32_t frame,
@@ -97,7 +81,7 @@ Status RefineStore::save_frame(const BufferCamera& camera, uint32_t frame, std::
     SR_CHECK(make_folder(to.parent_path()));
     SR_CHECK(format_.jpeg ? write_jpeg_rgb8(to, camera.size.width, camera.size.height, pixels, format_.quality)
                           : write_png_rgb8(to, camera.size.width, camera.size.height, pixels));
-    return record(name(PieceKind::frame, camera, frame));
+    return record_.add(name(PieceKind::frame, camera, frame));
 }
 
 Result<ImageRgb8> RefineStore::load_frame(const BufferCamera& camera, uint32_t frame) const

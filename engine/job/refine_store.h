@@ -3,10 +3,8 @@
 #pragma once
 
 #include "engine/format/buffer_folder.h"
-#include "engine/job/run_folder.h"
+#include "engine/job/piece_record.h"
 #include "engine/refine/latent_codec.h"
-
-#include <map>
 
 namespace semrover {
 
@@ -34,6 +32,7 @@ class RefineStore {
     RefineStore(RunFolder& run, FrameFormat format, uint32_t channels); // reads the journal
 
     bool lossless() const { return !format_.jpeg; } // a frame that is loaded is the one that was saved
+    std::string name(PieceKind kind, const BufferCamera& camera, uint32_t frame) const; // from the run's folder on
     Path path(PieceKind kind, const BufferCamera& camera, uint32_t frame) const;
     bool has(PieceKind kind, const BufferCamera& camera, uint32_t frame) const;
 
@@ -45,13 +44,10 @@ class RefineStore {
     Result<ImageRgb8> load_frame(const BufferCamera& camera, uint32_t frame) const;
 
   private:
-    std::string name(PieceKind kind, const BufferCamera& camera, uint32_t frame) const;
-    Status record(const std::string& name);
-
-    RunFolder& run_;
+    Path folder_;
     FrameFormat format_;
     uint32_t channels_;
-    std::map<std::string, bool> done_; // by path in the run's folder
+    PieceRecord record_; // by path in the run's folder
 };
 
 } // namespace semrover

@@ -7,6 +7,7 @@
 #include "engine/job/frame_refiner.h"
 #include "engine/job/outputs.h"
 #include "engine/job/window_refiner.h"
+#include "runtime/base/quote.h"
 
 namespace semrover {
 
@@ -175,15 +176,18 @@ class RefinementJob : public Job {
             drawing_->first_moment.push_back(camera);
         const ImageSize size{frame.intrinsics.width, frame.intrinsics.height};
         const uint32_t number = drawing_->counts[camera]++;
-        SR_CHECK(out_->read(slots, size, [this, camera, number](FramePixels pixels) -> Status {
+        SR_CHECK(out_->read(slots, size, [this, frame, camera, number](FramePixels pixels) -> Status {
             const ImageGray16 depth{pixels.width, pixels.height, depth_pixels(pixels)};
             if (refiner_)
                 refiner_->give_depth(camera, depth);
             else if (drawing_ && number == 0)
                 drawing_->first_depths.emplace_back(camera, depth);
-            drawing_->empty.add(pixels);
-            SR_CHECK(out_->write([folder = camera_folder(run_.path() / "buffers", camera), number,
-                                  pixels = std::move(pixels)] { return write_frame_images(folder, number, pixels); }));
+            drawing_->empty.add(sees_nothing(pixels));
+            SR_CHECK(out_->write([folder = camera_folder(run_.path() / "buffers", camera), number, frame,
+                                  pixels = std::move(pixels)]() mutable {
+                mark_sky(pixels, frame);
+                return write_frame_images(folder, number, pixels);
+            }));
             ++arrived_;
             return note_drawn();
         }));
@@ -340,6 +344,49 @@ class RefinementJob : public Job {
     std::unique_ptr<Refiner> refiner_; // while drawing_ is there: frames are refined as they are drawn
 };
 
+// a run that was finished before, and whose frames are there
+class FinishedRefinement : public Job {
+  public:
+    FinishedRefinement(Refinement refinement, RunFolder run, const RefinementCallbacks& callbacks)
+        : r_(std::move(refinement)), run_(std::move(run)), callbacks_(callbacks),
+          store_(run_, r_.options.format, r_.model.vae.latent_channels)
+    {
+    }
+    Status check() const
+    {
+        for (const RefineChain& c : r_.chains)
+            for (uint32_t f = c.range.first; f <= c.range.last; ++f)
+                for (const PieceKind kind : {PieceKind::latent, PieceKind::frame})
+                    if (!store_.has(kind, c.camera, f))
+                        return fail(ErrorCode::usage,
+                                    "{} exists, a finished run of which {} is not as it was; -y replaces it",
+                                    quote_path(r_.options.output), store_.name(kind, c.camera, f));
+        return {};
+    }
+    Result<bool> step(const JobBudget&) override { return true; }
+    Result<Json> finish() override
+    {
+        if (callbacks_.refined)
+            SR_CHECK(callbacks_.refined(store_, r_.chains));
+        return *run_.results();
+    }
+    void cancel() override {}
+    Path kept_in() const override { return r_.options.output; }
+
+  private:
+    Refinement r_;
+    RunFolder run_;
+    RefinementCallbacks callbacks_;
+    RefineStore store_;
+};
+
+Result<std::unique_ptr<Job>> finished_refinement(Refinement r, RunFolder run, const RefinementCallbacks& callbacks)
+{
+    auto job = std::make_unique<FinishedRefinement>(std::move(r), std::move(run), callbacks);
+    SR_CHECK(job->check());
+    return job;
+}
+
 } // namespace
 
 Result<MemoryPlan> plan_renderer(Device& device, const Refinement& r, std::span<const RendererWork> work,
@@ -367,17 +414,20 @@ Result<MemoryPlan> plan_refinement(Device& device, const Refinement& r)
 Result<std::unique_ptr<Job>> begin_refinement(Device& device, Refinement r, const RefinementCallbacks& callbacks)
 {
     SR_CHECK(r.check_outputs({}));
-    if (r.was_stopped()) {
+    if (r.was_stopped() || (r.was_finished() && !r.options.replace)) {
         SR_CHECK(settle_device(device));
         device.reset_peak();
     } else { // what does not fit is refused before anything is replaced
         SR_CHECK(plan_refinement(device, r));
     }
     SR_TRY(const Json settings, refinement_settings(r, device));
-    RunContents contents{{"encoded"}, {"latents", "frames"}};
+    RunContents contents{{"encoded"}, {"latents", "frames", "transforms.json"}};
     if (r.options.from_grid())
         contents.results.push_back("buffers");
-    SR_TRY(RunFolder run, open_run(r.options.output, settings, r.options.replace, contents));
+    SR_TRY(RunFolder run, open_run(r.options.output, settings, r.options.replace, contents, true));
+    if (run.results())
+        return finished_refinement(std::move(r), std::move(run), callbacks);
+    SR_CHECK(write_frame_cameras(r));
     auto out = Outgoing::create(device, largest_read(r));
     if (!out) {
         run.drop_if_empty();

@@ -55,12 +55,16 @@ struct Refinement {
     size_t frames() const;
     // depth and cameras say which surfaces a frame shares with the one before
     bool follows_surfaces() const { return frame_noise == FrameNoise::warped || frame_history > 0; }
-    // true when `output` holds a run that was stopped
+    // true when `output` holds a run that was stopped, or is finished
     bool was_stopped() const;
-    // what would be replaced is refused (usage), and so are `beside`, which the caller will write; a run that was
-    // stopped may go on
+    bool was_finished() const;
+    // what would be replaced is refused (usage), and so are `beside`, which the caller will write; a run that is there
+    // may go on, or be done
     Status check_outputs(std::span<const Path> beside) const;
 };
+
+// transforms.json of the frames that a run makes, in its output. Nothing where their cameras are not known
+Status write_frame_cameras(const Refinement& r);
 
 // Opens the model and settles how it denoises and draws; chains and inputs stay empty. Errors: bad_input, usage
 Result<Refinement> open_renderer(RefinementOptions options, const JobCallbacks& callbacks);
@@ -84,15 +88,15 @@ Json describe(const Device& device, const Refinement& r, const MemoryPlan& plan)
 struct RefinementCallbacks : JobCallbacks {
     // when what is left to do is known, before frames are refined
     std::function<void(const Refinement&, const MemoryPlan&)> planned;
-    // all frames are there; before the run counts as finished
+    // all frames are there; before the run counts as finished, and again where it was finished before
     std::function<Status(const RefineStore&, std::span<const RefineChain>)> refined;
 };
 
 // Stages: "render" counts frames that are drawn of a grid, "refine" denoising steps of frames, or of windows; with the
 // staged policy "encode" and "decode" count frames. What is done is in the output's folder: begun again after a cancel
-// or a kill, the job goes on to the same bytes. Figures: output, frames, steps, seconds, policy, planned_device_bytes,
-// peak_device_bytes, and of a grid render_device_bytes. Errors: as check_outputs and plan_refinement; bad_input for
-// another run in the folder
+// or a kill, the job goes on to the same bytes; where all is done it has nothing to do. Figures: output, frames, steps,
+// seconds, policy, planned_device_bytes, peak_device_bytes, and of a grid render_device_bytes. Errors: as check_outputs
+// and plan_refinement; bad_input for another run in the folder
 Result<std::unique_ptr<Job>> begin_refinement(Device& device, Refinement refinement,
                                               const RefinementCallbacks& callbacks);
 

@@ -1,5 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+#include "engine/format/camera_path.h"
+#include "engine/job/input_hashes.h"
+#include "engine/job/outputs.h"
 #include "engine/job/refinement.h"
 #include "engine/job/version.h"
 #include "runtime/base/hash.h"
@@ -136,15 +139,32 @@ Status find_windows(const Refinement& r, RefineChain& chain)
     return {};
 }
 
+// the path that lies beside buffers, if it is theirs
+void take_path_beside(RefinementOptions& o, std::span<const BufferCamera> cameras, const JobCallbacks& callbacks)
+{
+    const Path file = o.input / "transforms.json";
+    if (!is_file(file))
+        return;
+    Result<CameraPath> path = read_transforms(file);
+    const Status fits = path ? check_against_path(cameras, *path) : tl::make_unexpected(path.error());
+    if (fits)
+        o.path = std::move(*path);
+    else if (callbacks.warning)
+        callbacks.warning(fmt::format("{} is not used: {}", quote_path(file), fits.error().message));
+}
+
 // the cameras, their frames and, with --from, what came before those
-Status find_chains(Refinement& r)
+Status find_chains(Refinement& r, const JobCallbacks& callbacks)
 {
     const RefinementOptions& o = r.options;
     SR_TRY(const std::vector<BufferCamera> cameras, cameras_of(o));
-    if (o.path)
+    const bool path_given = o.path.has_value();
+    if (path_given)
         SR_CHECK(check_against_path(cameras, *o.path));
+    else
+        take_path_beside(r.options, cameras, callbacks);
     for (const BufferCamera& camera : cameras) {
-        if (o.size && !o.path && camera.size != *o.size)
+        if (o.size && !path_given && camera.size != *o.size)
             return fail(ErrorCode::bad_input, "the pictures in {} are {} x {} pixels, -W and -H say {} x {}",
                         quote_path(camera.folder), camera.size.width, camera.size.height, o.size->width,
                         o.size->height);
@@ -205,20 +225,6 @@ Status find_motion(Refinement& r, const JobCallbacks& callbacks)
     return {};
 }
 
-uint64_t hash_cameras(const CameraPath& path)
-{
-    Hash hash;
-    for (const CameraFrame& f : path.frames) {
-        const Intrinsics& k = f.intrinsics;
-        const double view[] = {f.time, k.fx, k.fy, k.cx, k.cy, double(k.width), double(k.height), double(k.model)};
-        hash.add(f.camera);
-        hash.add(std::as_bytes(std::span(view)));
-        hash.add(std::as_bytes(std::span(k.distortion)));
-        hash.add(std::as_bytes(std::span(f.pose.world_to_camera)));
-    }
-    return hash.value();
-}
-
 Result<Json> chain_json(const Refinement& r, const RefineChain& c)
 {
     Json camera{{"name", c.camera.name},
@@ -260,11 +266,7 @@ Result<Json> input_json(const Refinement& r)
         return input;
     SR_TRY(const uint64_t grid, hash_file(o.input));
     input["grid"] = hash_text(grid);
-    const SurfelOptions& s = r.draw.surfels;
-    input["drive"] = {{"splat_radius", s.auto_sigma ? "auto" : fmt::format("{}", s.sigma)},
-                      {"opacity", s.opacity},
-                      {"visible_alpha", *r.draw.visible_alpha},
-                      {"background", fmt::format("{}", fmt::join(r.draw.background, ","))}};
+    input["drive"] = drawing_json(r.draw);
     return input;
 }
 
@@ -289,7 +291,7 @@ Json video_settings(const Refinement& r)
 Result<Refinement> resolve_refinement(RefinementOptions options, const JobCallbacks& callbacks)
 {
     SR_TRY(Refinement r, open_renderer(std::move(options), callbacks));
-    SR_CHECK(find_chains(r));
+    SR_CHECK(find_chains(r, callbacks));
     SR_CHECK(find_motion(r, callbacks));
     return r;
 }
@@ -308,12 +310,49 @@ bool Refinement::was_stopped() const
     return before && before->is_object() && before->value("state", Json()) == "running";
 }
 
+bool Refinement::was_finished() const
+{
+    return finished_results(options.output, Json()).has_value();
+}
+
+Status write_frame_cameras(const Refinement& r)
+{
+    const RefinementOptions& o = r.options;
+    if (!o.path)
+        return {};
+    const auto range_of = [&](const std::string& camera) {
+        return std::ranges::find(r.chains, camera, [](const RefineChain& c) { return c.camera.name; })->range;
+    };
+    CameraPath refined{{}, o.path->sensors};
+    std::map<std::string, uint32_t> counts;
+    for (const CameraFrame& f : o.path->frames) {
+        const uint32_t number = counts[f.camera]++;
+        if (number >= range_of(f.camera).first && number <= range_of(f.camera).last)
+            refined.frames.push_back(f);
+    }
+    TransformsFiles files;
+    files.pictures = [&](const std::string& camera, uint32_t at) {
+        const uint32_t number = range_of(camera).first + at;
+        PictureNames names{
+            fmt::format("frames/{}{}{:06}.{}", camera, camera.empty() ? "" : "/", number, o.format.extension()),
+            {},
+            {}};
+        if (o.from_grid()) {
+            const PictureNames drawn = rendered_pictures(camera, number);
+            names.depth = "buffers/" + drawn.depth;
+            names.label = "buffers/" + drawn.label;
+        }
+        return names;
+    };
+    return write_transforms(o.output / "transforms.json", refined, files);
+}
+
 Status Refinement::check_outputs(std::span<const Path> beside) const
 {
-    if (options.replace || was_stopped())
+    if (options.replace || was_stopped() || was_finished()) // the settings say whether that one is this one
         return {};
     const Path& out = options.output;
-    std::vector<Path> files{out / "run.json", out / "frames", out / "latents"};
+    std::vector<Path> files{out / "run.json", out / "frames", out / "latents", out / "transforms.json"};
     files.insert(files.end(), beside.begin(), beside.end());
     if (options.from_grid())
         files.push_back(out / "buffers");

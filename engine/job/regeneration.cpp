@@ -30,13 +30,9 @@ Path undo_of(const Path& output)
 // a seed of several that an earlier start of the same command has finished; its results
 std::optional<Json> finished_before(const Path& output, const Json& settings)
 {
-    const auto run = read_json(run_folder_of(output) / "run.json");
-    if (!run || !run->is_object() || run->value("state", Json()) != "finished" ||
-        (!settings.is_null() && run->value("settings", Json()) != settings) || !fs::exists(undo_of(output)))
-        return std::nullopt;
+    const auto results = finished_results(run_folder_of(output), settings);
     const auto hash = hash_file(output);
-    const Json results = run->value("results", Json::object());
-    if (!hash || !results.is_object() || results.value("xxh64", Json()) != hash_text(*hash))
+    if (!results || !hash || results->value("xxh64", Json()) != hash_text(*hash) || !fs::exists(undo_of(output)))
         return std::nullopt;
     return results;
 }

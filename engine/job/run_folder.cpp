@@ -4,6 +4,7 @@
 
 #include "runtime/base/quote.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fcntl.h>
@@ -57,12 +58,41 @@ Result<Json> read_summary(const Path& path)
     return summary;
 }
 
+tl::unexpected<Error> other_settings(const Path& folder, bool finished)
+{
+    if (finished)
+        return fail(ErrorCode::usage, "{} exists, a run with other settings, model, input or device; -y replaces it",
+                    quote_path(folder));
+    return fail(ErrorCode::bad_input,
+                "{} holds a run with other settings, model, input or device; finish that one, name another output, or "
+                "start over with -y",
+                quote_path(folder));
+}
+
+// NNNNNN.png and NNNNNN.npy, then the folder and the camera's around it if there is nothing else. The run's own folder
+// holds its lock.
+void remove_numbered(const Path& folder)
+{
+    std::error_code ignored;
+    std::vector<Path> files;
+    for (const auto& entry : fs::directory_iterator(folder, ignored)) {
+        const std::string stem = entry.path().stem().string();
+        const bool ours = entry.path().extension() == ".png" || entry.path().extension() == ".npy";
+        if (ours && stem.size() == 6 && std::ranges::all_of(stem, ::isdigit))
+            files.push_back(entry.path());
+    }
+    for (const Path& file : files)
+        fs::remove(file, ignored);
+    fs::remove(folder, ignored); // stays if it holds anything else
+    fs::remove(folder.parent_path(), ignored);
+}
+
 } // namespace
 
 RunFolder::RunFolder(RunFolder&& other) noexcept
     : path_(std::move(other.path_)), settings_(std::move(other.settings_)), contents_(std::move(other.contents_)),
-      entries_(std::move(other.entries_)), appended_(other.appended_), lock_(std::exchange(other.lock_, -1)),
-      journal_(std::exchange(other.journal_, -1))
+      entries_(std::move(other.entries_)), results_(std::move(other.results_)), appended_(other.appended_),
+      lock_(std::exchange(other.lock_, -1)), journal_(std::exchange(other.journal_, -1))
 {
 }
 
@@ -70,11 +100,15 @@ RunFolder::~RunFolder()
 {
     if (journal_ >= 0)
         ::close(journal_);
+    std::error_code ignored;
+    if (lock_ >= 0 && results_) // finish() removed it before
+        fs::remove(path_ / "lock", ignored);
     if (lock_ >= 0)
         ::close(lock_); // the kernel drops the lock, also when the process is killed
 }
 
-Result<RunFolder> RunFolder::open(const Path& folder, const Json& settings, bool restart, const RunContents& contents)
+Result<RunFolder> RunFolder::open(const Path& folder, const Json& settings, bool restart, const RunContents& contents,
+                                  bool keep_finished)
 {
     RunFolder run;
     run.path_ = folder;
@@ -85,19 +119,17 @@ Result<RunFolder> RunFolder::open(const Path& folder, const Json& settings, bool
     SR_CHECK(run.lock());
     if (fs::exists(folder / "run.json") && !restart) {
         SR_TRY(const Json before, read_summary(folder / "run.json"));
+        const bool finished = before.value("state", Json()) == "finished";
         if (before.value("settings", Json()) != settings)
-            return fail(ErrorCode::bad_input,
-                        "{} holds a run with other settings, model, input or device; finish that one, name another "
-                        "output, or start over with -y",
-                        quote_path(folder));
-        // pieces of a finished run are gone: what is asked for now is made from the start
-        SR_CHECK(before.value("state", Json()) == "finished" ? run.start(settings) : run.read_journal());
+            return other_settings(folder, finished);
+        if (finished && keep_finished)
+            run.results_ = before.value("results", Json::object());
+        SR_CHECK(finished && !keep_finished ? run.start() : run.read_journal());
     } else {
-        SR_CHECK(run.start(settings));
+        SR_CHECK(run.start());
     }
-    for (const auto* names : {&contents.pieces, &contents.results})
-        for (const std::string& name : *names)
-            remove_temporary_files(folder / name);
+    for (const std::string& name : run.names())
+        remove_temporary_files(folder / name);
     SR_TRY(run.journal_, open_own(folder / "journal.jsonl", O_WRONLY | O_APPEND));
     return run;
 }
@@ -105,8 +137,7 @@ Result<RunFolder> RunFolder::open(const Path& folder, const Json& settings, bool
 Status RunFolder::refuse_links() const
 {
     std::vector<std::string> names = {"run.json", "journal.jsonl", "lock"};
-    for (const auto* more : {&contents_.pieces, &contents_.results})
-        names.insert(names.end(), more->begin(), more->end());
+    std::ranges::copy(this->names(), std::back_inserter(names));
     std::error_code ignored;
     for (const std::string& name : names) {
         if (fs::is_symlink(path_ / name, ignored))
@@ -128,16 +159,27 @@ Status RunFolder::lock()
     return {};
 }
 
+std::vector<std::string> RunFolder::names() const
+{
+    std::vector<std::string> names = contents_.pieces;
+    names.insert(names.end(), contents_.results.begin(), contents_.results.end());
+    names.insert(names.end(), contents_.numbered.begin(), contents_.numbered.end());
+    return names;
+}
+
 // removes what an earlier run left: only names that runs make
-Status RunFolder::start(const Json& settings)
+Status RunFolder::start()
 {
     std::error_code ignored;
     for (const auto* names : {&contents_.pieces, &contents_.results})
         for (const std::string& name : *names)
             fs::remove_all(path_ / name, ignored);
+    for (const std::string& name : contents_.numbered)
+        remove_numbered(path_ / name);
     fs::remove(path_ / "journal.jsonl", ignored);
     fs::remove(path_ / "run.json", ignored);
-    return write_file_atomically(path_ / "run.json", Json{{"settings", settings}, {"state", "running"}}.dump(1) + "\n");
+    return write_file_atomically(path_ / "run.json",
+                                 Json{{"settings", settings_}, {"state", "running"}}.dump(1) + "\n");
 }
 
 // a line that is not whole (the process died while writing it) ends the journal; the file is cut there
@@ -186,7 +228,9 @@ void RunFolder::drop_if_empty()
     std::error_code ignored;
     for (const char* name : {"run.json", "journal.jsonl", "lock"})
         fs::remove(path_ / name, ignored);
-    fs::remove(path_, ignored); // stays if it holds anything else
+    for (const std::string& name : contents_.results)
+        fs::remove(path_ / name, ignored); // a file, or a folder that is empty
+    fs::remove(path_, ignored);            // stays if it holds anything else
 }
 
 Status RunFolder::finish(const Json& results)

@@ -4,13 +4,16 @@
 
 #include "runtime/base/json.h"
 
+#include <optional>
 #include <vector>
 
 namespace semrover {
 
-// Folders inside a run's folder. Pieces are removed when the run is finished, results are kept; a restart removes both.
+// Files and folders inside a run's folder. Pieces are removed when the run is finished, results are kept; a restart
+// removes both. `numbered` are folders of results which a restart must not take for its own: of the files there it
+// removes NNNNNN.png and NNNNNN.npy.
 struct RunContents {
-    std::vector<std::string> pieces = {"regions"}, results;
+    std::vector<std::string> pieces = {"regions"}, results = {}, numbered = {};
 };
 
 // A run's folder: run.json (resolved settings, versions, device, hashes), journal.jsonl (one line per finished piece)
@@ -19,10 +22,12 @@ struct RunContents {
 // refused, so that nothing outside the folder is read or written.
 class RunFolder {
   public:
-    // Creates the folder, or reopens it if its run.json has the same `settings`. With `restart` it is emptied first.
-    // Errors: bad_input, also for other settings without `restart`, and for links
+    // Creates the folder, or reopens it if its run.json has the same `settings`. With `restart` it is emptied first,
+    // and so is a finished run, whose pieces are gone, unless `keep_finished`: then it is as it was, with results().
+    // Errors: bad_input, also for other settings without `restart`, and for links; usage for other settings of a run
+    // that is finished
     static Result<RunFolder> open(const Path& folder, const Json& settings, bool restart,
-                                  const RunContents& contents = {});
+                                  const RunContents& contents = {}, bool keep_finished = false);
     RunFolder(RunFolder&& other) noexcept;
     RunFolder& operator=(RunFolder&&) = delete;
     ~RunFolder();
@@ -31,11 +36,13 @@ class RunFolder {
     // the journal as it was when the folder was opened: whole lines, in order
     const std::vector<Json>& entries() const { return entries_; }
     bool resumed() const { return !entries_.empty(); }
+    // what finish() was given, where a run with these settings came to its end before this one was opened
+    const std::optional<Json>& results() const { return results_; }
 
     Status append(const Json& entry); // on the disk when it returns
     // Adds `results` to run.json and removes the pieces.
     Status finish(const Json& results);
-    // After an error: removes the folder if the run has no piece yet.
+    // After an error: removes the folder, and files among the results, if the run has no piece yet.
     void drop_if_empty();
 
   private:
@@ -43,12 +50,14 @@ class RunFolder {
     Status refuse_links() const;
     Status lock();
     Status read_journal();
-    Status start(const Json& settings);
+    Status start();
+    std::vector<std::string> names() const; // of all contents
 
     Path path_;
     Json settings_;
     RunContents contents_;
     std::vector<Json> entries_;
+    std::optional<Json> results_;
     bool appended_ = false;
     int lock_ = -1, journal_ = -1;
 };

@@ -1,0 +1,153 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/job/drawing_store.h"
+
+#include "engine/format/camera_path.h"
+#include "engine/format/image.h"
+#include "engine/job/outputs.h"
+#include "engine/job/path_drawing.h"
+#include "runtime/base/quote.h"
+
+#include <algorithm>
+#include <set>
+
+namespace semrover {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kPictures[] = {"color", "depth", "normal", "label", "visible"};
+constexpr const char* kArrays[] = {"depth_expected", "depth_median", "alpha"};
+constexpr const char* kTop = "top.png";
+constexpr const char* kPoints = "points.ply";
+constexpr const char* kCameras = "transforms.json";
+
+std::set<std::string> cameras_of(const CameraPath& path)
+{
+    std::set<std::string> cameras;
+    for (const CameraFrame& f : path.frames)
+        cameras.insert(f.camera);
+    return cameras;
+}
+
+// the folders of these cameras' pictures, from the run's folder on
+std::vector<std::string> picture_folders(const std::set<std::string>& cameras)
+{
+    std::vector<std::string> folders;
+    for (const std::string& camera : cameras) {
+        for (const char* kind : kPictures)
+            folders.push_back((camera_folder("", camera) / kind).string());
+        for (const char* kind : kArrays)
+            folders.push_back((camera_folder("", camera) / kind).string());
+    }
+    return folders;
+}
+
+// of a drawing that is there already, whichever it is
+std::set<std::string> cameras_before(const Path& folder)
+{
+    std::set<std::string> cameras;
+    const auto run = read_json(folder / "run.json");
+    const Json settings = run && run->is_object() ? run->value("settings", Json()) : Json();
+    if (!settings.is_object() || settings.value("command", Json()) != "render")
+        return cameras;
+    for (const Json& camera : settings.value("cameras", Json::array()))
+        if (camera.is_string() && (camera == "" || is_camera_name(camera.get_ref<const std::string&>())))
+            cameras.insert(camera.get<std::string>());
+    return cameras;
+}
+
+std::string piece_name(const std::string& camera, uint32_t number)
+{
+    return fmt::format("{}{}{:06}", camera, camera.empty() ? "" : "/", number);
+}
+
+} // namespace
+
+Status DrawingStore::check(const Path& folder, const CameraPath& path, bool replace)
+{
+    if (replace || fs::exists(folder / "run.json")) // whether it may go on is known by its settings
+        return {};
+    std::vector<std::string> names = picture_folders(cameras_of(path));
+    names.insert(names.end(), {kTop, kPoints, kCameras});
+    for (const std::string& name : names)
+        if (fs::exists(folder / name))
+            return fail(ErrorCode::usage, "{} exists; -y replaces what is there", quote_path(folder / name));
+    return {};
+}
+
+Result<std::unique_ptr<DrawingStore>> DrawingStore::open(const Path& folder, const Json& settings,
+                                                         const CameraPath& path, const DrawnFiles& files, bool replace)
+{
+    SR_CHECK(check(folder, path, replace));
+    std::set<std::string> cameras = cameras_of(path);
+    Json with_cameras = settings;
+    with_cameras["cameras"] = cameras;
+    with_cameras["files"] = {{"npy", files.floats}, {"top", files.top}, {"points", files.points}};
+    cameras.merge(cameras_before(folder));
+    const RunContents contents{{}, {kTop, kPoints, kCameras}, picture_folders(cameras)};
+    SR_TRY(RunFolder run, open_run(folder, with_cameras, replace, contents, true));
+    return std::unique_ptr<DrawingStore>(new DrawingStore(std::move(run), files));
+}
+
+DrawingStore::DrawingStore(RunFolder run, const DrawnFiles& files)
+    : run_(std::move(run)), files_(files), record_(run_, [this](const std::string& piece) { return files_of(piece); })
+{
+}
+
+Path DrawingStore::folder(const std::string& camera) const
+{
+    return camera_folder(run_.path(), camera);
+}
+
+std::vector<Path> DrawingStore::files_of(const std::string& piece) const
+{
+    if (piece == kTop)
+        return {run_.path() / kTop};
+    const Path name = run_.path() / piece;
+    std::vector<Path> files;
+    for (const char* kind : kPictures)
+        files.push_back(name.parent_path() / kind / (name.filename().string() + ".png"));
+    for (const char* kind : kArrays)
+        if (files_.floats)
+            files.push_back(name.parent_path() / kind / (name.filename().string() + ".npy"));
+    return files;
+}
+
+bool DrawingStore::has(const std::string& camera, uint32_t number) const
+{
+    return record_.has(piece_name(camera, number));
+}
+
+bool DrawingStore::has_top() const
+{
+    return record_.has(kTop);
+}
+
+Result<bool> DrawingStore::saw_nothing(const std::string& camera, uint32_t number) const
+{
+    SR_TRY(const ImageGray16 depth, read_png_gray16(frame_path(folder(camera), "depth", number)));
+    SR_TRY(const ImageRgb8 visible, read_png_rgb8(frame_path(folder(camera), "visible", number)));
+    const auto is_zero = [](auto value) { return value == 0; };
+    return std::ranges::all_of(depth.pixels, is_zero) && std::ranges::all_of(visible.pixels, is_zero);
+}
+
+Status DrawingStore::save(const std::string& camera, uint32_t number, const FramePixels& pixels)
+{
+    SR_CHECK(write_frame_images(folder(camera), number, pixels));
+    return record_.add(piece_name(camera, number));
+}
+
+Status DrawingStore::save_top(const ImageSize& size, std::span<const uint8_t> color)
+{
+    SR_CHECK(write_png_rgb8(run_.path() / kTop, size.width, size.height, color));
+    return record_.add(kTop);
+}
+
+Status DrawingStore::write_cameras(const CameraPath& path) const
+{
+    return write_transforms(run_.path() / kCameras, path, {rendered_pictures, files_.points ? kPoints : ""});
+}
+
+} // namespace semrover

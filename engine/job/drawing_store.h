@@ -1,0 +1,51 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/camera/camera.h"
+#include "engine/job/piece_record.h"
+#include "engine/refine/frame_images.h"
+
+namespace semrover {
+
+// what a drawing writes, beside the path's pictures
+struct DrawnFiles {
+    bool floats = false; // {depth_expected,depth_median,alpha}/000000.npy
+    bool top = false;    // top.png
+    bool points = false; // points.ply
+};
+
+// The pictures of a drawing in its folder, and which of them are done. A piece is a frame, with all its files.
+class DrawingStore {
+  public:
+    // usage for what is there and is not of a drawing that may go on
+    static Status check(const Path& folder, const CameraPath& path, bool replace);
+
+    // The run with these settings; what is of no use for it is removed. `floats`, `top` and `points` are settings.
+    static Result<std::unique_ptr<DrawingStore>> open(const Path& folder, const Json& settings, const CameraPath& path,
+                                                      const DrawnFiles& files, bool replace);
+
+    const RunFolder& run() const { return run_; }
+    Path folder(const std::string& camera) const; // of its pictures
+    bool has(const std::string& camera, uint32_t number) const;
+    bool has_top() const;
+    // whether the pictures of a frame that is there show nothing of the scene
+    Result<bool> saw_nothing(const std::string& camera, uint32_t number) const;
+    // on another thread than has(), or after the last call of it
+    Status save(const std::string& camera, uint32_t number, const FramePixels& pixels);
+    Status save_top(const ImageSize& size, std::span<const uint8_t> color);
+    // transforms.json of the path
+    Status write_cameras(const CameraPath& path) const;
+    Status finish(const Json& results) { return run_.finish(results); }
+    void drop_if_empty() { run_.drop_if_empty(); }
+
+  private:
+    DrawingStore(RunFolder run, const DrawnFiles& files);
+    std::vector<Path> files_of(const std::string& piece) const;
+
+    RunFolder run_;
+    DrawnFiles files_;
+    PieceRecord record_;
+};
+
+} // namespace semrover

@@ -1,0 +1,18 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/job/path_drawing.h"
+#include "runtime/base/json.h"
+
+namespace semrover {
+
+// What runs are known by, beside files: what was read, whatever files and options it came from.
+uint64_t hash_grid(const VoxelGrid& grid);
+uint64_t hash_splats(const Surfels& splats);
+uint64_t hash_cameras(const CameraPath& path);
+
+// what of DrawOptions decides pictures
+Json drawing_json(const DrawOptions& options);
+
+} // namespace semrover
