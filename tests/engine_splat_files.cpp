@@ -399,6 +399,21 @@ Json hand_made()
       "buffers": [{"byteLength": 48}]})");
 }
 
+TEST(GltfSplats, hidden_nodes_are_left_out_and_instances_are_refused)
+{
+    const ScratchFolder folder;
+    const auto read = [&](const Json& json) { return read_splats_glb(folder.put("s.glb", glb(json.dump(), kBinary))); };
+    Json json = hand_made();
+    json["nodes"][0]["children"] = {1, 2};
+    json["nodes"].push_back({{"mesh", 0}, {"extensions", {{"KHR_node_visibility", {{"visible", true}}}}}});
+    ASSERT_TRUE(read(json));
+    EXPECT_EQ(read(json)->surfels.position.size(), 2u);
+    json["nodes"][2]["extensions"]["KHR_node_visibility"]["visible"] = false;
+    EXPECT_EQ(read(json)->surfels.position.size(), 1u);
+    json["nodes"][1]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]["TRANSLATION"] = 0;
+    EXPECT_TRUE(says(read(json), "splats of mesh 0 are repeated by EXT_mesh_gpu_instancing, which is not supported"));
+}
+
 TEST(GltfSplats, a_file_by_hand_means_what_the_extension_says)
 {
     const ScratchFolder folder;

@@ -111,6 +111,16 @@ std::optional<std::array<double, 16>> local_transform(const Json& node)
     return m;
 }
 
+// an extension of a node; null when it has none of that name
+const Json* extension_of(const Json& node, const char* name)
+{
+    const auto all = node.find("extensions");
+    if (all == node.end() || !all->is_object())
+        return nullptr;
+    const auto found = all->find(name);
+    return found != all->end() && found->is_object() ? &*found : nullptr;
+}
+
 } // namespace
 
 Result<GltfDocument> GltfDocument::open(const Path& path)
@@ -177,11 +187,14 @@ Status GltfDocument::walk(const Json& index, const std::array<double, 16>& paren
         for (size_t col = 0; col < 4; ++col)
             for (size_t k = 0; k < 4; ++k)
                 m[4 * row + col] += parent[4 * row + k] * (*local)[4 * k + col];
+    const Json* visibility = extension_of(*node, "KHR_node_visibility");
+    if (visibility && visibility->value("visible", Json(true)) == false)
+        return {};
     if (const auto mesh = node->find("mesh"); mesh != node->end()) {
         if (!entry("meshes", *mesh))
             return fail(ErrorCode::bad_input, "{}: node {}: there is no mesh {}", where_, index.get<uint64_t>(),
                         printable(mesh->dump(-1, ' ', true), 60));
-        out.push_back({mesh->get<uint64_t>(), m});
+        out.push_back({mesh->get<uint64_t>(), m, extension_of(*node, "EXT_mesh_gpu_instancing") != nullptr});
     }
     if (const auto children = node->find("children"); children != node->end()) {
         SR_CHECK(check_array(*children, "children", where_));
@@ -209,7 +222,7 @@ Result<std::vector<GltfInstance>> GltfDocument::instances() const
     if (meshes != json_.end())
         SR_CHECK(check_array(*meshes, "meshes", where_));
     for (uint64_t i = 0; meshes != json_.end() && i < std::min(meshes->size(), kMaxInstances); ++i)
-        out.push_back({i, kIdentity});
+        out.push_back({i, kIdentity, false});
     return out;
 }
 

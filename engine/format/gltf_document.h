@@ -13,6 +13,7 @@ namespace semrover {
 struct GltfInstance {
     uint64_t mesh = 0;
     std::array<double, 16> transform = kIdentity;
+    bool repeated = false; // the node has EXT_mesh_gpu_instancing, whose places are not read here
 };
 
 // A binary glTF 2.0 file: its JSON, and accessors as floats. Untrusted input: every offset is checked against the
@@ -26,7 +27,7 @@ class GltfDocument {
     // an entry of one of the document's lists; null when it is not there
     const Json* entry(const char* list, const Json& index) const;
 
-    // meshes of the default scene (or the first, or of all nodes); at most 65536
+    // meshes of the default scene (or the first, or of all nodes) that are not hidden; at most 65536
     Result<std::vector<GltfInstance>> instances() const;
 
     // [count, components]; normalized integers as fractions. bad_input unless the type is one of `types` ("VEC3")

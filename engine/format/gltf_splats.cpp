@@ -161,6 +161,11 @@ Result<SplatFile> read_splats_glb(const Path& path)
             continue;
         for (const Json& primitive : *primitives)
             if (has_splats(primitive)) {
+                if (instance.repeated)
+                    return fail(ErrorCode::bad_input,
+                                "{}: splats of mesh {} are repeated by EXT_mesh_gpu_instancing, which is not "
+                                "supported; write the file with a node for each",
+                                where, instance.mesh);
                 SR_TRY(const SplatPlacement placement, placement_of(instance.transform, where));
                 SR_CHECK(add_primitive(d, primitive, placement, flattener, where));
                 found = true;
