@@ -10,7 +10,10 @@
 #include "tests/scratch_folder.h"
 
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <gtest/gtest.h>
+#include <jpeglib.h>
 #include <random>
 
 namespace semrover {
@@ -142,6 +145,11 @@ TEST(Image, a_palette_with_transparency_becomes_rgb)
     ASSERT_TRUE(image) << image.error().message;
     EXPECT_EQ(image->pixels,
               (std::vector<uint8_t>{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 9, 10, 11, 6, 7, 8, 3, 4, 5, 0, 1, 2}));
+    const std::string file = bytes_of_hex(kHex);
+    const auto with_alpha = decode_image_with_alpha(std::as_bytes(std::span(file)), "a.png");
+    ASSERT_TRUE(with_alpha) << with_alpha.error().message;
+    EXPECT_EQ(with_alpha->color.pixels, image->pixels);
+    EXPECT_EQ(with_alpha->alpha, (std::vector<uint8_t>{128, 255, 255, 255, 255, 255, 255, 128}));
 }
 
 // ---- JPEG
@@ -163,6 +171,80 @@ TEST(Image, jpeg_pixels_come_back_nearly_the_same_and_always_as_the_same_bytes)
         ASSERT_NEAR(image->pixels[i], pixels[i], 8) << i; // chroma is halved: 5 at most here
     ASSERT_TRUE(write_jpeg_rgb8(folder / "c.jpg", 77, 53, pixels, 20));
     EXPECT_LT(std::filesystem::file_size(folder / "c.jpg"), std::filesystem::file_size(folder / "a.jpg"));
+}
+
+// 16 x 16 pixels of one colour in four inks, as they are stored
+std::string four_inks(const std::array<uint8_t, 4>& stored, J_COLOR_SPACE space, bool adobe)
+{
+    jpeg_compress_struct info{};
+    jpeg_error_mgr errors{};
+    info.err = jpeg_std_error(&errors);
+    jpeg_create_compress(&info);
+    unsigned char* bytes = nullptr;
+    unsigned long size = 0;
+    jpeg_mem_dest(&info, &bytes, &size);
+    info.image_width = info.image_height = 16;
+    info.input_components = 4;
+    info.in_color_space = JCS_CMYK;
+    jpeg_set_defaults(&info);
+    jpeg_set_colorspace(&info, space);
+    jpeg_set_quality(&info, 100, TRUE);
+    info.write_Adobe_marker = adobe;
+    jpeg_start_compress(&info, TRUE);
+    std::vector<uint8_t> row;
+    for (int x = 0; x < 16; ++x)
+        row.insert(row.end(), stored.begin(), stored.end());
+    uint8_t* rows = row.data();
+    while (info.next_scanline < 16)
+        jpeg_write_scanlines(&info, &rows, 1);
+    jpeg_finish_compress(&info);
+    std::string out(reinterpret_cast<char*>(bytes), size);
+    jpeg_destroy_compress(&info);
+    std::free(bytes);
+    return out;
+}
+
+TEST(Image, a_jpeg_of_four_inks_is_read_whichever_way_it_stores_them)
+{
+    // 20 % cyan, 60 % magenta, 100 % yellow, 10 % black on white paper
+    const std::array<uint8_t, 4> ink = {51, 153, 255, 26}, light = {204, 102, 0, 229};
+    const std::array<double, 3> rgb = {255 * 0.8 * 0.898, 255 * 0.4 * 0.898, 0};
+    const std::string ycck = four_inks(light, JCS_YCCK, true);
+    for (const std::string& file : {four_inks(light, JCS_CMYK, true), ycck, four_inks(ink, JCS_CMYK, false)}) {
+        const auto image = decode_jpeg_rgb8(std::as_bytes(std::span(file)), "a.jpg");
+        ASSERT_TRUE(image) << image.error().message;
+        ASSERT_EQ(image->pixels.size(), 16u * 16 * 3);
+        for (size_t i = 0; i < image->pixels.size(); ++i)
+            ASSERT_NEAR(image->pixels[i], rgb[i % 3], 2.5) << i;
+    }
+    const std::string cut = ycck.substr(0, ycck.size() - 20);
+    EXPECT_TRUE(says(decode_jpeg_rgb8(std::as_bytes(std::span(cut)), "a.jpg"), "not a valid JPEG"));
+}
+
+TEST(Image, alpha_is_kept_where_it_is_asked_for_and_not_everywhere_opaque)
+{
+    // 2 x 1 pixels: (1, 2, 3, 0) and (4, 5, 6, 255); the same, both opaque; gray 9 with 0 and 7 with 128
+    const std::string
+        holes = bytes_of_hex(
+            "89504e470d0a1a0a0000000d4948445200000002000000010806000000f4227f8a0000001149444154789c6360646266"
+            "606165fb0f00015b0115ba7c712b0000000049454e44ae426082"),
+        opaque = bytes_of_hex(
+            "89504e470d0a1a0a0000000d4948445200000002000000010806000000f4227f8a0000001149444154789c63606462fe"
+            "cfc2caf61f0006560214849bd08b0000000049454e44ae426082"),
+        gray = bytes_of_hex(
+            "89504e470d0a1a0a0000000d49484452000000020000000108040000005e2bb7010000000d49444154789c63e064606f"
+            "000000b70091de82d49e0000000049454e44ae426082");
+    const auto decoded = [](const std::string& file) {
+        auto image = decode_image_with_alpha(std::as_bytes(std::span(file)), "a.png");
+        EXPECT_TRUE(image) << image.error().message;
+        return image ? std::move(*image) : ImageWithAlpha{};
+    };
+    EXPECT_EQ(decoded(holes).color.pixels, (std::vector<uint8_t>{1, 2, 3, 4, 5, 6}));
+    EXPECT_EQ(decoded(holes).alpha, (std::vector<uint8_t>{0, 255}));
+    EXPECT_EQ(decoded(opaque).color.pixels, (std::vector<uint8_t>{1, 2, 3, 4, 5, 6}));
+    EXPECT_TRUE(decoded(opaque).alpha.empty());
+    EXPECT_EQ(decoded(gray).color.pixels, (std::vector<uint8_t>{9, 9, 9, 7, 7, 7}));
+    EXPECT_EQ(decoded(gray).alpha, (std::vector<uint8_t>{0, 128}));
 }
 
 TEST(Image, what_is_not_a_jpeg_is_refused)

@@ -30,6 +30,7 @@ struct Format {
 };
 
 constexpr Format kRgb8{PNG_COLOR_TYPE_RGB, 8, 3};
+constexpr Format kRgba8{PNG_COLOR_TYPE_RGBA, 8, 4};
 constexpr Format kGray8{PNG_COLOR_TYPE_GRAY, 8, 1};
 constexpr Format kGray16{PNG_COLOR_TYPE_GRAY, 16, 1};
 
@@ -163,7 +164,10 @@ void convert_to(png_structp png, const Format& format)
     png_set_scale_16(png);
     png_set_expand(png); // palettes, 1 to 4 bits, transparency
     png_set_gray_to_rgb(png);
-    png_set_strip_alpha(png);
+    if (format.channels == 4)
+        png_set_add_alpha(png, 0xff, PNG_FILLER_AFTER);
+    else
+        png_set_strip_alpha(png);
 }
 
 // false also when the file's kind does not come out as `format`
@@ -274,6 +278,27 @@ void take_numbers(const std::vector<uint8_t>& rows, const Format& format, PngNum
     }
 }
 
+// whether a PNG can have transparent pixels: by its colour type, or a tRNS chunk in front of the pixels
+bool may_have_alpha(std::span<const std::byte> file)
+{
+    if (file.size() < 26 || std::memcmp(file.data(), "\x89PNG", 4) != 0)
+        return false;
+    if ((uint32_t(file[25]) & PNG_COLOR_MASK_ALPHA) != 0)
+        return true;
+    for (size_t at = 8; at + 12 <= file.size();) {
+        uint32_t length = 0;
+        for (size_t i = 0; i < 4; ++i)
+            length = length << 8 | uint32_t(file[at + i]);
+        const char* type = reinterpret_cast<const char*>(file.data()) + at + 4;
+        if (std::memcmp(type, "IDAT", 4) == 0)
+            return false;
+        if (std::memcmp(type, "tRNS", 4) == 0)
+            return true;
+        at += size_t(length) + 12;
+    }
+    return false;
+}
+
 } // namespace
 
 Status write_png_rgb8(const Path& path, uint32_t width, uint32_t height, std::span<const uint8_t> pixels)
@@ -322,6 +347,41 @@ Result<ImageRgb8> decode_image_rgb8(std::span<const std::byte> file, std::string
     if (starts_with({0xff, 0xd8, 0xff}))
         return decode_jpeg_rgb8(file, where, max_pixels);
     return fail(ErrorCode::bad_input, "{}: expected a PNG or JPEG image, found something else", where);
+}
+
+// in place: no more memory than the file's own pixels and their alpha
+ImageWithAlpha split_alpha(ImageSize size, std::vector<uint8_t> rgba)
+{
+    ImageWithAlpha out{{size.width, size.height, std::move(rgba)}, {}};
+    std::vector<uint8_t>& pixels = out.color.pixels;
+    out.alpha.resize(pixels.size() / 4);
+    bool opaque = true;
+    for (size_t i = 0; i < out.alpha.size(); ++i) {
+        out.alpha[i] = pixels[4 * i + 3];
+        opaque = opaque && out.alpha[i] == 255;
+        std::memmove(&pixels[3 * i], &pixels[4 * i], 3);
+    }
+    pixels.resize(3 * out.alpha.size());
+    if (opaque)
+        out.alpha = {};
+    return out;
+}
+
+Result<ImageWithAlpha> decode_image_with_alpha(std::span<const std::byte> file, std::string_view where,
+                                               uint64_t max_pixels)
+{
+    if (!may_have_alpha(file)) {
+        SR_TRY(ImageRgb8 image, decode_image_rgb8(file, where, max_pixels));
+        return ImageWithAlpha{std::move(image), {}};
+    }
+    ImageSize size;
+    std::vector<uint8_t> rgba;
+    SR_CHECK(decode_png(file, where, kRgba8, max_pixels, [&](uint32_t width, uint32_t height) {
+        size = {width, height};
+        rgba.resize(kRgba8.row_bytes(width) * height);
+        return rgba.data();
+    }));
+    return split_alpha(size, std::move(rgba));
 }
 
 Result<ImageRgb8> read_image_rgb8(const Path& path)

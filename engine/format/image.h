@@ -45,6 +45,15 @@ Result<ImageRgb8> decode_image_rgb8(std::span<const std::byte> file, std::string
                                     uint64_t max_pixels = kMaxImagePixels);
 Result<ImageRgb8> read_image_rgb8(const Path& path); // likewise, at most 1 GiB
 
+// with alpha: [height, width], empty where all pixels are opaque. Only a PNG has any
+struct ImageWithAlpha {
+    ImageRgb8 color;
+    std::vector<uint8_t> alpha;
+};
+Result<ImageWithAlpha> decode_image_with_alpha(std::span<const std::byte> file, std::string_view where,
+                                               uint64_t max_pixels = kMaxImagePixels);
+ImageWithAlpha split_alpha(ImageSize size, std::vector<uint8_t> rgba); // [height, width, 4]
+
 // bad_input, with `where` in front
 Status check_pixels(ImageSize size, uint64_t max_pixels, std::string_view where);
 
