@@ -8,7 +8,7 @@
 #include "tools/cli/class_option.h"
 #include "tools/cli/number_option.h"
 #include "tools/cli/option_meaning.h"
-#include "tools/cli/path_options.h"
+#include "tools/cli/origin_option.h"
 
 #include <algorithm>
 #include <array>
@@ -90,9 +90,7 @@ bool has_origin(SceneFormat format)
 
 Result<std::array<double, 3>> origin_of(const SceneInputOptions& options)
 {
-    if (options.origin.empty())
-        return Point3{};
-    return point_option("--origin", options.origin);
+    return origin_from(options.origin);
 }
 
 void add_scene_input_options(CLI::App& c, SceneInputOptions& o)
@@ -105,7 +103,7 @@ void add_scene_input_options(CLI::App& c, SceneInputOptions& o)
     add_number(c, "--voxel-size", o.voxel_size, "metres, of a cell; 0.6, of a .npz its own", 0.001f, 100.f);
     add_number(c, "--file-voxel-size", o.file_voxel_size,
                "metres of a voxel of a .vox, .npy or .npz that does not say it; as --voxel-size", 0.0001, 100);
-    c.add_option("--origin", o.origin, "X,Y,Z: where the input's origin lies in the world, metres");
+    add_origin(c, o.origin);
     add_number(c, "--min-fill", o.min_fill, "share of a cell that smaller voxels must fill; 0: any", 0.0, 1.0);
     c.add_option("--mask", o.mask, "array of an Occ3D .npz that says which voxels count: mask_camera, mask_lidar, ...");
     add_number(c, "--points-per-voxel", o.points_per_voxel, "of a grid made of points with colours", 1, 4096);

@@ -6,6 +6,7 @@
 #include "engine/format/rigid_file.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/number_option.h"
+#include "tools/cli/origin_option.h"
 
 #include <array>
 #include <CLI/CLI.hpp>
@@ -69,16 +70,6 @@ std::span<const std::string_view> placement_options()
     return kNames;
 }
 
-Result<Point3> point_option(std::string_view option, const std::string& text)
-{
-    Point3 point{};
-    int used = 0;
-    if (std::sscanf(text.c_str(), "%lf,%lf,%lf%n", &point[0], &point[1], &point[2], &used) != 3 ||
-        size_t(used) != text.size() || !std::isfinite(point[0] + point[1] + point[2]))
-        return fail(ErrorCode::usage, "{} takes X,Y,Z in metres, not {}", option, quote(text, 60));
-    return point;
-}
-
 nlohmann::json json_of(const PathOptions& o)
 {
     nlohmann::json json = nlohmann::json::object();
@@ -103,9 +94,7 @@ Result<PathPlacement> placement_of(const PathOptions& o)
     if (!o.world.empty()) {
         SR_TRY(placement.world, world_option(o.world));
     }
-    if (!o.origin.empty()) {
-        SR_TRY(placement.origin, point_option("--origin", o.origin));
-    }
+    SR_TRY(placement.origin, origin_from(o.origin));
     return placement;
 }
 

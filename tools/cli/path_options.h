@@ -29,7 +29,4 @@ nlohmann::json json_of(const PathOptions& options); // those that are given, for
 
 Result<PathPlacement> placement_of(const PathOptions& options); // usage; bad_input
 
-// X,Y,Z in metres; usage, with the option in front
-Result<Point3> point_option(std::string_view option, const std::string& text);
-
 } // namespace semrover
