@@ -13,9 +13,13 @@ constexpr uint32_t kSurfaceBlock = 8, kSurfaceBlockCells = 512, kNoSurfaceLabel 
 struct SurfaceTriangles { // words: u32, or the bits of a float
     Tensor records;    // [T, 12]: three corners in cells from the block's corner (floats within +-16); slot; its range
                        // of cells (four bits each: first x, y, z, end x, y, z); material | label << 24
-    Tensor attributes; // [T, 16]: u, v of the corners (floats); their linear r, g, b (floats); unused
-    Tensor materials;  // [M, 8]: linear r, g, b (floats); texture, label texture (2^32 - 1: none); unused
+    Tensor attributes; // [T, 16]: u, v of the corners (floats); their linear r, g, b (floats); their alpha (bytes)
+    Tensor materials;  // [M, 8]: linear r, g, b (floats); texture, label texture, texture of alpha (2^32 - 1: none);
+                       // alpha that texture times corners reach where there is a surface (float; 0: everywhere); 1 if
+                       // alpha and colour are of one texture
     Tensor textures;   // [X, 4]: width, height, address of the first texel, wrap of u | wrap of v << 2 (TextureWrap)
+    Tensor alphas;     // [N] of those that materials name for alpha, a byte a texel, four a word
+    bool masked = false; // whether any material has a threshold; else alpha is not looked at
 };
 
 // the cells that a triangle may have area in: those that its box and its plane touch
@@ -32,7 +36,8 @@ struct SurfacePairs {
 // y[i] = x[i] >> kSurfacePlaceBits: the cells alone, once pairs are sorted
 [[nodiscard]] Tensor pair_cells(Graph& g, Tensor keys); // [N] u32 -> [N] u32
 
-// the area of each pair's triangle within its cell, by exact clipping
+// the area of each pair's triangle within its cell, by exact clipping; of masked ones the share with a surface, of 64
+// places
 struct SurfaceAreas {
     Tensor areas;           // [capacity] fp32, in squares of a cell's edge
     Tensor labels;          // [capacity] u32, of the triangles; kNoSurfaceLabel: none

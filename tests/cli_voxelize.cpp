@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/scene/grid.h"
 #include "engine/scene/palette.h"
+#include "runtime/base/dtype.h"
 #include "runtime/base/json.h"
 #include "tests/json_text.h"
 #include "tests/png_file.h"
@@ -121,6 +122,51 @@ TEST(CliVoxelize, label_textures_say_classes_in_every_kind_of_png)
     EXPECT_NE(labels(kitti).first.find("pixels of label textures have no label"), std::string::npos);
     EXPECT_EQ(labels(kitti, "--map cityscapes"), expect);
     EXPECT_EQ(labels({2, 1, 8, P::kGray, "\x0b\x1a", ""}, "--map cityscapes"), expect);
+}
+
+TEST(CliVoxelize, a_mesh_in_map_coordinates_says_how_to_move_it_and_is_moved)
+{
+    const ScratchFolder folder;
+    const std::string out = (folder / "m.sgrid").string();
+    const std::string mesh = folder
+                                 .put("m.obj", "v 500123.4 4649000.7 12\nv 500129.4 4649000.7 12\nv 500129.4 4649000.7 "
+                                               "15\nv 500123.4 4649000.7 15\nusemtl wall\nf 1 2 3 4\n")
+                                 .string();
+    const ProgramResult far = semrover_program("voxelize " + mesh + " -o " + out);
+    EXPECT_EQ(far.code, 3);
+    EXPECT_NE(far.err.find("--origin=-500126,-4649001,-14 moves it to the origin"), std::string::npos) << far.err;
+    EXPECT_NE(far.err.find("beyond 2^20 cells of 0.6 m"), std::string::npos) << far.err;
+    expect_error(semrover_program("voxelize " + mesh + " -q -o " + out + " --ply " + (folder / "m.ply").string()), 3,
+                 "the 32-bit floats of --ply are too coarse");
+    const std::string origin = " --origin=-500123.4,-4649000.4,-12";
+    ASSERT_EQ(semrover_program("voxelize " + mesh + " -q -o " + out + origin).code, 0);
+    const auto grid = read_grid(out);
+    ASSERT_TRUE(grid);
+    EXPECT_EQ(grid->cells.size(), 50u);
+    EXPECT_EQ(grid->cells.front(), (Cell{0, 0, 0}));
+    EXPECT_NEAR(half_to_float(grid->points[1]), 0, 1e-3); // 0.3 is the middle of a cell
+    const ProgramResult chamfer =
+        semrover_program("eval chamfer " + mesh + " " + out + " --samples 5000 --json" + origin);
+    ASSERT_EQ(chamfer.code, 0) << chamfer.err;
+    EXPECT_LT(json_of(chamfer.out)["grids"][0]["points_to_surface"].get<double>(), 5e-4);
+    expect_error(semrover_program("voxelize " + mesh + " -y -o " + out + " --origin 1,2"), 2,
+                 "--origin takes X,Y,Z in metres");
+}
+
+TEST(CliVoxelize, transparent_and_untextured_parts_have_options)
+{
+    const ScratchFolder folder;
+    const std::string mesh = scene(folder), out = (folder / "m.sgrid").string();
+    folder.put("m.mtl", "newmtl Road.001\nmap_Kd C:\\maps\\road.png\nnewmtl glass\nd 0.2\n");
+    expect_error(semrover_program("voxelize " + mesh + " -q -o " + out), 3, "--missing-textures white goes on without");
+    const std::string line = "voxelize " + mesh + " -y --missing-textures white -o " + out;
+    const ProgramResult clear = semrover_program(line); // glass needs no label
+    ASSERT_EQ(clear.code, 0) << clear.err;
+    EXPECT_NE(clear.err.find("transparent, and so no surface: 'glass' (8 m^2)"), std::string::npos) << clear.err;
+    EXPECT_EQ(read_grid(out)->colors[0], 255);
+    const ProgramResult opaque = semrover_program(line + " --opaque --json --default-label wall");
+    ASSERT_EQ(opaque.code, 0) << opaque.err;
+    EXPECT_NEAR(json_of(opaque.out)["area"].get<double>(), 24, 1e-4);
 }
 
 TEST(CliVoxelize, eval_chamfer_measures_a_grid_or_sweeps)

@@ -104,6 +104,49 @@ TEST(Amplifiers, nodes_and_primitives_repeat_a_mesh_a_limited_number_of_times)
     EXPECT_LE(added_mib([&] { static_cast<void>(read_mesh(file)); }), 64);
 }
 
+// a strip whose nodes and primitives are what is given
+Path strip_of(const ScratchFolder& folder, const std::string& nodes, const std::string& primitive,
+              const std::string& more = "")
+{
+    folder.put("s.bin", strip_buffer());
+    return folder.put("m.gltf", R"({"asset":{"version":"2.0"},"buffers":[{"byteLength":12000,"uri":"s.bin"}],)"
+                                R"("bufferViews":[{"buffer":0,"byteLength":12000}],)"
+                                R"("accessors":[{"bufferView":0,"componentType":5126,"count":1000,"type":"VEC3"}],)"
+                                R"("meshes":[{"primitives":[{)" +
+                                    primitive + R"(}]}],"nodes":[{)" + nodes + "}]" + more + "}");
+}
+
+TEST(Amplifiers, instances_joints_and_morph_targets_are_counted)
+{
+    const ScratchFolder folder;
+    const std::string node = R"("mesh":0,"extensions":{"EXT_mesh_gpu_instancing":{"attributes":{"TRANSLATION":0}}})";
+    const auto refused = [&](const Path& file, const char* what) {
+        EXPECT_TRUE(says(read_mesh(file), what));
+        EXPECT_LE(added_mib([&] { static_cast<void>(read_mesh(file)); }), 320);
+    };
+    // meshes of points, which have no vertices
+    refused(strip_of(folder, node + repeated("},{" + node, 20000), R"("attributes":{"POSITION":0},"mode":0)"),
+            "instances with instances, joints and morphed vertices before them, at most 9");
+    std::string joints = "0";
+    for (int i = 1; i < 4000; ++i)
+        joints += fmt::format(",{}", i);
+    refused(strip_of(folder, R"("mesh":0,"skin":0)" + repeated(R"(},{"mesh":0,"skin":0)", 3999),
+                     R"("attributes":{"POSITION":0},"mode":0)", R"(,"skins":[{"joints":[)" + joints + "]}]"),
+            "joints with instances, joints and morphed vertices before them, at most 8");
+    refused(strip_of(folder, R"("mesh":0,"weights":[1)" + repeated(",1", 20000) + "]",
+                     R"("attributes":{"POSITION":0},"mode":5,"targets":[{"POSITION":0})" +
+                         repeated(R"(,{"POSITION":0})", 20000) + "]"),
+            "vertices of morph targets with instances, joints");
+}
+
+TEST(Amplifiers, libraries_of_an_obj_are_looked_for_a_limited_number_of_times)
+{
+    const ScratchFolder folder;
+    const Path file =
+        folder.put("m.obj", repeated("mtllib a b c d e f g h i j k l m n o p q r s t u v w x y z\n", 5000));
+    EXPECT_TRUE(says(read_mesh(file), "line 4097: more than 4096 lines of mtllib"));
+}
+
 TEST(Amplifiers, an_image_is_decoded_once_and_all_have_a_budget)
 {
     const ScratchFolder folder;

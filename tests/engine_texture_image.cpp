@@ -14,7 +14,7 @@ namespace engine_texture_image_test {
 Result<ImageRgb8> picture_of(const Path& path)
 {
     TextureBudget budget;
-    return read_texture_rgb8(path, budget);
+    return read_texture(path, budget).map([](ImageWithAlpha image) { return std::move(image.color); });
 }
 
 using Bytes = std::vector<uint8_t>;
@@ -194,6 +194,20 @@ TEST(TextureImage, what_a_file_is_is_told_by_its_first_bytes_and_only_a_tga_by_i
     EXPECT_TRUE(says(picture_of(folder.put("e.tga", "no picture")), "e.tga': not a valid TGA"));
     EXPECT_TRUE(says(picture_of(folder.put("f.tga", "")), "not a valid TGA"));
     EXPECT_TRUE(says(picture_of(folder / "none.bmp"), "none.bmp"));
+}
+
+TEST(TextureImage, alpha_of_a_tga_is_kept)
+{
+    const ScratchFolder folder;
+    // 2 x 1 pixels of 32 bits, blue first: (3, 2, 1) at 0, (30, 20, 10) at 255
+    Bytes file = {0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 0, 1, 0, 32, 0x28, 1, 2, 3, 0, 10, 20, 30, 255};
+    TextureBudget budget;
+    const auto image = read_texture(folder.put("a.tga", text_of(file)), budget);
+    ASSERT_TRUE(image) << image.error().message;
+    EXPECT_EQ(image->color.pixels, (Bytes{3, 2, 1, 30, 20, 10}));
+    EXPECT_EQ(image->alpha, (Bytes{0, 255}));
+    file[21] = 255;
+    EXPECT_TRUE(read_texture(folder.put("a.tga", text_of(file)), budget)->alpha.empty());
 }
 
 TEST(TextureImage, a_file_cut_anywhere_is_refused)

@@ -385,6 +385,105 @@ TEST(EngineVoxelizer, vertex_colours_are_interpolated_in_linear_light)
     }
 }
 
+// 12 m of checks of 0.4 m, of which every second one is transparent and black
+Mesh checks(float cutoff)
+{
+    Mesh m;
+    add_quad(m, {0, 0, 0.31f}, {12, 0, 0}, {0, 12, 0});
+    m.uvs = {{{{0, 0}, {1, 0}, {1, 1}}}, {{{0, 0}, {1, 1}, {0, 1}}}};
+    m.face_materials = {0, 0};
+    m.materials = {{.name = "leaves", .texture = 0, .alpha_cutoff = cutoff, .alpha_texture = 0}};
+    Texture t{{30, 30, {}}, TextureWrap::clamp, TextureWrap::clamp};
+    for (int i = 0; i < 900; ++i) {
+        const bool opaque = (i / 30 + i % 30) % 2 == 0;
+        t.image.pixels.insert(t.image.pixels.end(), {0, uint8_t(opaque ? 255 : 0), 0});
+        t.alpha.push_back(opaque ? 200 : 100);
+    }
+    m.textures = {t};
+    return m;
+}
+
+TEST(EngineVoxelizer, no_point_lies_where_alpha_makes_no_surface_and_its_area_does_not_count)
+{
+    for (const PointPlacement placement : {PointPlacement::shifted, PointPlacement::canonical}) {
+        const VoxelizedMesh v = voxelized(checks(0.5f), {.placement = placement});
+        ASSERT_EQ(v.grid.cells.size(), 400u);
+        double sum = 0;
+        for (size_t cell = 0; cell < 400; ++cell) {
+            sum += v.area[cell];
+            for (size_t i = 0; i < 20; ++i) {
+                const Point3d p = point_of(v.grid, cell, i);
+                // to the millimetre that half precision may move a point over an edge
+                const auto near_edge = [](double x) { return std::abs(x / 0.4 - std::round(x / 0.4)) < 0.0025; };
+                const bool opaque = (int(p[0] / 0.4) + int(p[1] / 0.4)) % 2 == 0;
+                ASSERT_TRUE(opaque || near_edge(p[0]) || near_edge(p[1])) << p[0] << " " << p[1];
+                ASSERT_EQ(v.grid.colors[(cell * 20 + i) * 3 + 1], 255); // transparent texels do not darken it
+            }
+        }
+        EXPECT_NEAR(sum, 72, 1.5); // of 144; areas are measured at 64 places of a triangle in a cell
+    }
+    const VoxelizedMesh opaque = voxelized(checks(0.3f), {}), all = voxelized(checks(0), {});
+    EXPECT_EQ(opaque.grid.points, all.grid.points);
+    EXPECT_EQ(opaque.area, all.area);
+    EXPECT_TRUE(says(voxelize(test_device(), checks(0.9f), {.default_label = 0}), "has no surface"));
+}
+
+TEST(EngineVoxelizer, what_is_transparent_does_not_vote_for_a_label)
+{
+    Mesh m; // leaves that are three quarters transparent over half as much wall
+    add_quad(m, {0, 0, 0.1f}, {0.6f, 0, 0}, {0, 0.6f, 0});
+    add_quad(m, {0, 0, 0.2f}, {0.6f, 0, 0}, {0, 0.3f, 0});
+    m.uvs = {{{{0, 0}, {1, 0}, {1, 1}}}, {{{0, 0}, {1, 1}, {0, 1}}}, {}, {}};
+    m.face_labels = {8, 8, 3, 3};
+    m.face_materials = {0, 0, 1, 1};
+    m.materials = {{.name = "leaves", .alpha_cutoff = 0.5f, .alpha_texture = 0}, {.name = "wall"}};
+    m.textures = {{{4, 1, std::vector<uint8_t>(12, 99)}, TextureWrap::clamp, TextureWrap::clamp, {255, 0, 0, 0}}};
+    const VoxelizedMesh v = voxelized(m, {});
+    ASSERT_EQ(v.grid.labels, std::vector<uint8_t>{3});
+    EXPECT_NEAR(v.area[0], 0.18 + 0.09, 0.01);
+    m.materials[0].alpha_cutoff = 0;
+    EXPECT_EQ(voxelized(m, {}).grid.labels, std::vector<uint8_t>{8});
+    // alpha of vertices: it falls from 1 to 0 along x
+    Mesh fading;
+    add_quad(fading, {0, 0, 0.1f}, {6, 0, 0}, {0, 0.6f, 0});
+    fading.alphas = {255, 0, 0, 255};
+    fading.face_materials = {0, 0};
+    fading.materials = {{.name = "fog", .alpha_cutoff = 0.45f}};
+    const VoxelizedMesh faded = voxelized(fading, {});
+    for (size_t cell = 0; cell < faded.grid.cells.size(); ++cell)
+        for (size_t i = 0; i < 20; ++i)
+            ASSERT_LT(point_of(faded.grid, cell, i)[0], 3.32); // alpha has 256 steps
+    EXPECT_EQ(faded.grid.cells.size(), 6u);
+}
+
+TEST(EngineVoxelizer, a_mesh_far_from_the_origin_gets_the_cells_and_points_of_its_place)
+{
+    Mesh near;
+    add_quad(near, {0.1f, 0.3f, 0}, {5.9f, 0, 0}, {0, 0, 3});
+    Mesh far = near;
+    far.origin = {530000.4, -180000.25, 12};
+    const VoxelizedMesh v = voxelized(far, {});
+    double low = 1e9, high = -1e9;
+    for (size_t cell = 0; cell < v.grid.cells.size(); ++cell)
+        for (size_t i = 0; i < 20; ++i) {
+            std::array<double, 3> p; // the voxel size in decimals, as the file says it
+            for (size_t a = 0; a < 3; ++a)
+                p[a] = (v.grid.cells[cell][a] + 0.5) * 0.6 + half_to_float(v.grid.points[(cell * 20 + i) * 3 + a]);
+            ASSERT_NEAR(p[1], -179999.95, 1e-3);
+            low = std::min(low, p[0]);
+            high = std::max(high, p[0]);
+        }
+    EXPECT_NEAR(low, 530000.5, 0.05);
+    EXPECT_NEAR(high, 530006.4, 0.05);
+    const auto c = chamfer(test_device(), far, v.grid, {.samples = 20000});
+    ASSERT_TRUE(c);
+    EXPECT_LT(c->to_surface, 1e-3);
+    EXPECT_LT(c->to_points, 0.1);
+    far.origin = {500123, 4649000, 0};
+    EXPECT_TRUE(says(voxelize(test_device(), far, {.default_label = 0}),
+                     "beyond 2^20 cells of 0.6 m; move it to the origin (--origin), or take a larger voxel size"));
+}
+
 TEST(EngineVoxelizer, label_textures_say_labels_where_faces_do_not)
 {
     Mesh m;

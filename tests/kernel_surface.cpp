@@ -61,7 +61,7 @@ const std::vector<uint32_t> kTextures = {5, 3, 7, 0 | 1 << 2};
 SurfaceTriangles surface_in(KernelCase& k, const std::vector<Triangle>& triangles)
 {
     return {k.input(records_of(triangles), 12), k.input(attributes_of(triangles), 16), k.input(kMaterials, 8),
-            k.input(kTextures, 4)};
+            k.input(kTextures, 4), k.input(std::vector<uint32_t>{0})};
 }
 
 // corners on multiples of 2^-20, as the voxelizer rounds them

@@ -191,6 +191,30 @@ TEST(kernel_trace_rays, edges_and_corners_of_a_closed_surface_let_nothing_throug
     }
 }
 
+TEST(kernel_trace_rays, rays_go_through_what_alpha_makes_transparent)
+{
+    Mesh m; // a square metre whose right half is transparent
+    m.positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+    m.faces = {{0, 1, 2}, {0, 2, 3}};
+    m.uvs = {{{{0, 0}, {1, 0}, {1, 1}}}, {{{0, 0}, {1, 1}, {0, 1}}}};
+    m.face_materials = {0, 0};
+    m.materials = {{.name = "leaf", .texture = 0, .alpha_cutoff = 0.5f, .alpha_texture = 0}};
+    m.textures = {{{2, 1, {9, 9, 9, 9, 9, 9}}, TextureWrap::clamp, TextureWrap::clamp, {255, 0}}};
+    const std::vector<RayCase> rays = {{{0.3f, 0.2f, 1}, 0, {0, 0, -1}, 10},
+                                       {{0.45f, 0.8f, 1}, 0, {0, 0, -1}, 10},
+                                       {{0.55f, 0.3f, 1}, 0, {0, 0, -1}, 10},
+                                       {{0.9f, 0.7f, 1}, 0, {0, 0, -1}, 10}};
+    const Traced cut = trace(m, rays, false);
+    for (size_t i = 0; i < 4; ++i)
+        EXPECT_EQ(cut.hits[i][3] == 0xffffffff, i >= 2) << i;
+    EXPECT_EQ(cut.tables.triangles[cut.hits[0][3]][3], 0u); // the face that the piece is of
+    EXPECT_EQ(cut.tables.triangles[cut.hits[1][3]][3], 1u);
+    m.materials[0].alpha_cutoff = 0;
+    const Traced whole = trace(m, rays, false);
+    for (size_t i = 0; i < 4; ++i)
+        EXPECT_NE(whole.hits[i][3], 0xffffffff) << i;
+}
+
 TEST(kernel_trace_rays, an_empty_scene_is_missed)
 {
     Mesh empty;

@@ -3,6 +3,7 @@
 #include "engine/fusion/surface_error.h"
 
 #include "engine/mesh/nearest_surface.h"
+#include "engine/mesh/transparency.h"
 
 #include <algorithm>
 #include <cmath>
@@ -38,7 +39,7 @@ std::array<float, 4> point_of(const Mesh& mesh, std::span<const uint32_t> vertic
         double sum = 0;
         for (const uint32_t v : vertices)
             sum += mesh.positions[v][axis];
-        point[axis] = float(sum / double(vertices.size()) - origin[axis]);
+        point[axis] = float(sum / double(vertices.size()) + (mesh.origin[axis] - origin[axis]));
     }
     return point;
 }
@@ -87,7 +88,8 @@ Result<std::vector<uint32_t>> count_views(const Mesh& mesh, const DepthFrames& f
         const CameraFrame& camera = frames.cameras[f];
         for (size_t v = 0; v < views.size(); ++v) {
             const auto& p = mesh.positions[v];
-            const auto at = project(camera, {p[0], p[1], p[2]});
+            const auto& o = mesh.origin;
+            const auto at = project(camera, {o[0] + p[0], o[1] + p[1], o[2] + p[2]});
             views[v] += at && seen_at(images, camera.intrinsics, *at);
         }
     }
@@ -99,6 +101,8 @@ Result<SurfaceError> measure_surface(Device& device, const Mesh& mesh, const Mes
 {
     SR_ASSERT(views.empty() || views.size() == mesh.positions.size(), "views of {} vertices for {}", views.size(),
               mesh.positions.size());
+    if (has_transparency(truth))
+        return measure_surface(device, mesh, opaque_parts(truth).mesh, views, min_views, radius);
     std::vector<uint32_t> vertices;
     for (uint32_t v = 0; v < mesh.positions.size(); ++v)
         if (views.empty() || views[v] >= min_views)

@@ -4,6 +4,8 @@
 
 #include "engine/mesh/nearest_points.h"
 #include "engine/mesh/nearest_surface.h"
+#include "engine/mesh/surface_blocks.h"
+#include "engine/mesh/transparency.h"
 #include "runtime/base/dtype.h"
 #include "runtime/base/mix64.h"
 
@@ -52,7 +54,7 @@ Result<std::vector<PointRow>> surface_samples(const Mesh& mesh, const Origin& or
         PointRow row{};
         for (size_t a = 0; a < 3; ++a)
             row[a] = float((1 - r) * mesh.positions[f[0]][a] + r * (1 - t) * mesh.positions[f[1]][a] +
-                           r * t * mesh.positions[f[2]][a] - origin[a]);
+                           r * t * mesh.positions[f[2]][a] + (mesh.origin[a] - origin[a]));
         rows.push_back(row);
     }
     return rows;
@@ -104,9 +106,10 @@ Origin middle_of(const MeasuredPoints& points)
 
 } // namespace
 
-MeasuredPoints measured_points(const VoxelGrid& grid)
+MeasuredPoints measured_points(const VoxelGrid& grid, std::optional<double> cell_edge)
 {
-    MeasuredPoints out{{}, double(grid.voxel_size)};
+    const double edge = cell_edge.value_or(grid.voxel_size);
+    MeasuredPoints out{{}, edge};
     const auto n = size_t(grid.points_per_voxel);
     for (size_t cell = 0; cell < grid.cells.size() && grid.has_points(); ++cell) {
         if (!grid.generated[cell])
@@ -114,7 +117,7 @@ MeasuredPoints measured_points(const VoxelGrid& grid)
         for (size_t i = cell * n; i < (cell + 1) * n; ++i) {
             Point3& p = out.positions.emplace_back();
             for (size_t a = 0; a < 3; ++a)
-                p[a] = (grid.cells[cell][a] + 0.5) * double(grid.voxel_size) + half_to_float(grid.points[3 * i + a]);
+                p[a] = (grid.cells[cell][a] + 0.5) * edge + half_to_float(grid.points[3 * i + a]);
         }
     }
     return out;
@@ -140,6 +143,8 @@ Result<Chamfer> chamfer(Device& device, const Mesh& mesh, const MeasuredPoints& 
         return fail(ErrorCode::bad_input, "there are no points");
     if (options.samples < 1 || options.samples > 1u << 26)
         return fail(ErrorCode::bad_input, "expected 1 to 2^26 samples of the surface, found {}", options.samples);
+    if (has_transparency(mesh))
+        return chamfer(device, opaque_parts(mesh).mesh, points, options);
     SR_TRY(const NearestSurface surface, NearestSurface::create(device, mesh));
     const std::vector<PointRow> rows = rows_from(points, surface.origin());
     SR_TRY(const std::vector<PointRow> samples, surface_samples(mesh, surface.origin(), options));

@@ -27,7 +27,8 @@ struct MeasuredPoints {
     std::vector<Point3> positions; // world, metres
     double spacing = 0.6;
 };
-MeasuredPoints measured_points(const VoxelGrid& grid); // of cells that have some
+// of cells that have some. cell_edge: of a mesh far from the origin (surface_blocks.h); none: the grid's voxel size
+MeasuredPoints measured_points(const VoxelGrid& grid, std::optional<double> cell_edge = {});
 MeasuredPoints measured_points(std::vector<Point3> positions);
 
 // How far points are from a mesh, or from other points, which then are all samples of the surface.

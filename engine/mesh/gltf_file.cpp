@@ -3,6 +3,7 @@
 #include "engine/mesh/gltf_file.h"
 
 #include "runtime/base/json_fields.h"
+#include "runtime/base/json_numbers.h"
 #include "runtime/base/quote.h"
 #include "runtime/base/text_start.h"
 
@@ -41,7 +42,7 @@ uint32_t components_of(const Json& type)
     for (uint32_t i = 0; i < 4; ++i)
         if (type == kTypes[i])
             return i + 1;
-    return 0;
+    return type == "MAT4" ? 16 : 0;
 }
 
 template <typename T>
@@ -128,11 +129,14 @@ uint32_t GltfAccessor::index(size_t element) const
     return component == 5121 ? read_as<uint8_t>(at) : component == 5123 ? read_as<uint16_t>(at) : read_as<uint32_t>(at);
 }
 
-GltfFile::GltfFile(const Path& path) : where_(quote_path(path)), folder_(path) {}
-
-Result<GltfFile> GltfFile::open(const Path& path)
+GltfFile::GltfFile(const Path& path, MissingTextures missing_textures)
+    : where_(quote_path(path)), folder_(path, missing_textures)
 {
-    GltfFile f(path);
+}
+
+Result<GltfFile> GltfFile::open(const Path& path, MissingTextures missing_textures)
+{
+    GltfFile f(path, missing_textures);
     SR_TRY(f.file_, MappedFile::open(path));
     std::string_view text(reinterpret_cast<const char*>(f.file_.bytes().data()), f.file_.bytes().size());
     if (text.starts_with("glTF")) {
@@ -181,7 +185,8 @@ Status GltfFile::check_version() const
     SR_TRY(const size_t required, count("extensionsRequired"));
     for (size_t i = 0; i < required; ++i) {
         const Json& name = json_["extensionsRequired"][i];
-        constexpr const char* kKnown[] = {"KHR_texture_transform", "KHR_mesh_quantization", "KHR_lights_punctual"};
+        constexpr const char* kKnown[] = {"KHR_texture_transform", "KHR_mesh_quantization",   "KHR_lights_punctual",
+                                          "KHR_node_visibility",   "EXT_mesh_gpu_instancing", "MSFT_lod"};
         const bool material = name.is_string() && name.get_ref<const std::string&>().starts_with("KHR_materials_");
         if (!material && std::ranges::find(kKnown, name) == std::end(kKnown))
             return fail(ErrorCode::bad_input, "{}: needs the extension {}, which is not supported", where_,
@@ -220,6 +225,18 @@ Result<std::optional<int64_t>> GltfFile::integer(const Json& object, const char*
         return fail(ErrorCode::bad_input, "{}: {}: expected a whole number, found {}", where_, key,
                     printable(found->dump(-1, ' ', true), 40));
     return std::optional(found->get<int64_t>());
+}
+
+Result<std::vector<double>> GltfFile::numbers(const Json& object, const char* key, size_t count,
+                                              std::string_view where) const
+{
+    const auto found = object.find(key);
+    if (found == object.end())
+        return std::vector<double>();
+    SR_TRY(std::vector<double> values, numbers_of(*found, fmt::format("{}: {}", where, key)));
+    if (values.size() != count)
+        return fail(ErrorCode::bad_input, "{}: {}: expected {} numbers, found {}", where, key, count, values.size());
+    return values;
 }
 
 Result<std::span<const std::byte>> GltfFile::load_uri(const std::string& uri, std::string_view where)

@@ -15,7 +15,7 @@ struct GltfAccessor {
     const std::byte* data = nullptr;
     size_t count = 0, stride = 0; // elements, bytes
     int component = 0;            // 5120 i8, 5121 u8, 5122 i16, 5123 u16, 5125 u32, 5126 f32
-    uint32_t components = 0;      // of an element
+    uint32_t components = 0;      // of an element, 16 of a MAT4
     bool normalized = false;
 
     double number(size_t element, uint32_t c) const;
@@ -26,7 +26,7 @@ struct GltfAccessor {
 // followed. Source: https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html
 class GltfFile {
   public:
-    static Result<GltfFile> open(const Path& path);
+    static Result<GltfFile> open(const Path& path, MissingTextures missing_textures = MissingTextures::refuse);
 
     const Json& json() const { return json_; }
     const std::string& where() const { return where_; }
@@ -39,6 +39,10 @@ class GltfFile {
     // a member of an object that is a whole number, none when it is absent
     Result<std::optional<int64_t>> integer(const Json& object, const char* key) const;
 
+    // `count` numbers of an object, none when they are absent
+    Result<std::vector<double>> numbers(const Json& object, const char* key, size_t count,
+                                        std::string_view where) const;
+
     // sparse ones are refused, and those without a buffer view (Draco has them)
     Result<GltfAccessor> accessor(int64_t index) const;
     Result<std::span<const std::byte>> view(int64_t index) const;
@@ -46,9 +50,10 @@ class GltfFile {
     Result<std::span<const std::byte>> image_file(int64_t index);
     // of the file and those that it names, each counted once
     uint64_t bytes() const;
+    AssetFolder& folder() { return folder_; }
 
   private:
-    explicit GltfFile(const Path& path);
+    GltfFile(const Path& path, MissingTextures missing_textures);
     Status split_binary(std::string_view& text);
     Status check_version() const;
     Status load_buffers();

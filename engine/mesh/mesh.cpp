@@ -4,6 +4,7 @@
 
 #include "engine/scene/palette.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace semrover {
@@ -23,6 +24,7 @@ Status check_sizes(const Mesh& m, std::string_view where)
         return {};
     };
     SR_CHECK(check(m.colors.size(), v, "vertex colours"));
+    SR_CHECK(check(m.alphas.size(), v, "vertices with an alpha"));
     SR_CHECK(check(m.uvs.size(), f, "faces with texture coordinates"));
     SR_CHECK(check(m.face_materials.size(), f, "faces with a material"));
     return check(m.face_labels.size(), f, "faces with a label");
@@ -64,7 +66,7 @@ Status check_indices(const Mesh& m, std::string_view where)
             return fail(ErrorCode::bad_input, "{}: face {} refers to material {}, the mesh has {}", where, i,
                         m.face_materials[i], m.materials.size());
     for (size_t i = 0; i < m.materials.size(); ++i)
-        for (const int32_t t : {m.materials[i].texture, m.materials[i].label_texture})
+        for (const int32_t t : {m.materials[i].texture, m.materials[i].label_texture, m.materials[i].alpha_texture})
             if (t < -1 || t >= int64_t(m.textures.size()))
                 return fail(ErrorCode::bad_input, "{}: material {} refers to texture {}, the mesh has {}", where, i, t,
                             m.textures.size());
@@ -83,6 +85,10 @@ Status check_materials(const Mesh& m, std::string_view where)
             image.pixels.size() != size_t(image.width) * image.height * 3)
             return fail(ErrorCode::bad_input, "{}: texture {} has {} x {} pixels in {} bytes", where, i, image.width,
                         image.height, image.pixels.size());
+        const size_t alphas = m.textures[i].alpha.size();
+        if (alphas && alphas != size_t(image.width) * image.height)
+            return fail(ErrorCode::bad_input, "{}: texture {} of {} x {} pixels has {} values of alpha", where, i,
+                        image.width, image.height, alphas);
     }
     return {};
 }
@@ -112,6 +118,15 @@ double face_area(const Mesh& mesh, size_t face)
         v[a] = double(mesh.positions[f[2]][a]) - mesh.positions[f[0]][a];
     }
     return std::hypot(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]) / 2;
+}
+
+void add_warning(std::vector<std::string>& warnings, std::string line)
+{
+    constexpr size_t kMost = 12;
+    if (warnings.size() < kMost && std::ranges::find(warnings, line) == warnings.end())
+        warnings.push_back(std::move(line));
+    if (warnings.size() == kMost)
+        warnings.back() = "there are more warnings of this mesh, which are left out";
 }
 
 Status check_mesh(const Mesh& mesh, std::string_view where)

@@ -29,7 +29,7 @@ std::array<double, 3> middle_of(const Mesh& mesh)
                 high[a] = std::max(high[a], double(mesh.positions[v][a]));
             }
     for (size_t a = 0; a < 3; ++a)
-        middle[a] = std::round((low[a] + high[a]) / 2);
+        middle[a] = std::round((low[a] + high[a]) / 2) + mesh.origin[a];
     return middle;
 }
 
@@ -40,7 +40,7 @@ std::vector<TriangleCorners> corners_of(const Mesh& mesh, size_t first, size_t c
     for (size_t f = 0; f < count; ++f)
         for (size_t c = 0; c < 3; ++c)
             for (size_t a = 0; a < 3; ++a)
-                corners[f][c][a] = float(mesh.positions[mesh.faces[first + f][c]][a] - origin[a]);
+                corners[f][c][a] = float(mesh.positions[mesh.faces[first + f][c]][a] + (mesh.origin[a] - origin[a]));
     return corners;
 }
 

@@ -25,7 +25,7 @@ class OffReader {
   public:
     OffReader(std::string_view text, std::string where) : lines_(text), where_(std::move(where)) {}
 
-    Result<Mesh> read();
+    Result<FileMesh> read();
 
   private:
     template <typename... Args>
@@ -46,6 +46,7 @@ class OffReader {
     WordLines lines_;
     std::string where_;
     Mesh mesh_;
+    std::vector<std::array<double, 3>> positions_;
     size_t normals_ = 0; // words of a vertex behind its place
     bool colors_ = false, fractions_ = false;
     std::vector<RawColor> vertex_colors_;
@@ -126,11 +127,11 @@ Status OffReader::read_vertex()
     const size_t expected = 3 + normals_ + (colors_ ? 3 : 0);
     if (lines_.words.size() < expected)
         return refuse("a vertex of {} numbers, expected {}", lines_.words.size(), expected);
-    std::array<float, 3> p{};
+    std::array<double, 3> p{};
     for (size_t a = 0; a < 3; ++a) {
         SR_TRY(p[a], number_of(lines_.words[a], where_, lines_.number));
     }
-    mesh_.positions.push_back(p);
+    positions_.push_back(p);
     if (colors_) {
         SR_TRY(vertex_colors_.emplace_back(), color_at(3 + normals_));
     }
@@ -160,11 +161,11 @@ Status OffReader::read_face()
     if (corners < 3 || lines_.words.size() < corners + 1)
         return refuse("a face of {} corners with {} numbers behind it", corners, lines_.words.size() - 1);
     std::vector<uint32_t> indices;
-    std::vector<std::array<float, 3>> positions;
+    std::vector<std::array<double, 3>> positions;
     for (size_t i = 1; i <= corners; ++i) {
-        SR_TRY(const size_t vertex, count_at(i, mesh_.positions.size() - 1));
+        SR_TRY(const size_t vertex, count_at(i, positions_.size() - 1));
         indices.push_back(uint32_t(vertex));
-        positions.push_back(mesh_.positions[vertex]);
+        positions.push_back(positions_[vertex]);
     }
     SR_TRY(const uint32_t material, material_of(corners + 1));
     for (const auto& t : triangulated(positions)) {
@@ -176,7 +177,7 @@ Status OffReader::read_face()
     return {};
 }
 
-Result<Mesh> OffReader::read()
+Result<FileMesh> OffReader::read()
 {
     SR_CHECK(read_kind());
     SR_TRY(const size_t vertices, count_at(0, kMaxMeshElements));
@@ -192,12 +193,12 @@ Result<Mesh> OffReader::read()
         mesh_.materials.clear();
         mesh_.face_materials.clear();
     }
-    return std::move(mesh_);
+    return FileMesh{std::move(mesh_), std::move(positions_)};
 }
 
 } // namespace
 
-Result<Mesh> read_off(const Path& path)
+Result<FileMesh> read_off(const Path& path)
 {
     SR_TRY(const MappedFile file, MappedFile::open(path));
     const std::string_view bytes(reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size());

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // PLY meshes as MeshLab, CloudCompare, Open3D and OpenMVS write them
+#include "engine/format/label_map.h"
 #include "engine/format/ply_colors.h"
 #include "engine/mesh/asset_folder.h"
 #include "engine/mesh/mesh_readers.h"
@@ -17,14 +18,18 @@ namespace {
 
 using Column = const PlyProperty*;
 
+constexpr int64_t kNoNumber = INT64_MIN; // in a column of labels
+constexpr size_t kMostNumbers = 4096;    // that are counted
+
 class PlyMesh {
   public:
-    PlyMesh(const Path& path, const PlyFile& file, const MeshLabelMap& map)
-        : where_(quote_path(path)), file_(file), map_(map), folder_(path)
+    PlyMesh(const Path& path, const PlyFile& file, const MeshReadOptions& options)
+        : where_(quote_path(path)), file_(file), map_(options.map), wants_labels_(options.labels),
+          folder_(path, options.missing_textures)
     {
     }
 
-    Result<Mesh> read();
+    Result<FileMesh> read();
 
   private:
     static Column first(const PlyElement& e, std::initializer_list<std::string_view> names, bool list);
@@ -33,16 +38,22 @@ class PlyMesh {
     Status read_faces(const PlyElement& vertices, const PlyElement& faces);
     Status read_textures();
     Status read_face(size_t row);
-    Result<uint8_t> label_of(size_t row);
-    Status check_labels() const;
+    Status read_labels(const PlyElement& vertices, const PlyElement& faces);
+    std::vector<uint8_t> labels_in(const PlyProperty& column, bool foreign);
+    uint8_t label_of_corners(uint64_t begin, uint64_t count) const;
+    Status check_labels(const LabelColumn& column, bool ours);
 
     std::string where_;
     const PlyFile& file_;
     const MeshLabelMap& map_;
+    bool wants_labels_;
     AssetFolder folder_;
     Mesh mesh_;
+    std::vector<std::array<double, 3>> positions_;
+    std::vector<uint8_t> face_labels_, vertex_labels_; // of the file's polygons, or of its vertices
     Column indices_ = nullptr, labels_ = nullptr, texcoord_ = nullptr, texnumber_ = nullptr, u_ = nullptr, v_ = nullptr;
-    std::map<int64_t, size_t> unknown_; // labels and how many faces have them
+    std::map<int64_t, size_t> numbers_; // in the column of labels, and how many rows have them
+    bool of_vertices_ = false, known_ = true;
 };
 
 Column PlyMesh::first(const PlyElement& e, std::initializer_list<std::string_view> names, bool list)
@@ -59,10 +70,10 @@ Status PlyMesh::read_vertices(const PlyElement& vertices)
                             first(vertices, {"z"}, false)};
     if (!axes[0] || !axes[1] || !axes[2])
         return fail(ErrorCode::bad_input, "{}: the vertices have no x, y and z", where_);
-    mesh_.positions.resize(vertices.rows);
+    positions_.resize(vertices.rows);
     for (size_t i = 0; i < vertices.rows; ++i)
         for (size_t a = 0; a < 3; ++a)
-            mesh_.positions[i][a] = float(axes[a]->values[i]);
+            positions_[i][a] = axes[a]->values[i];
     return {};
 }
 
@@ -98,26 +109,74 @@ Status PlyMesh::read_textures()
     return {};
 }
 
-Result<uint8_t> PlyMesh::label_of(size_t row)
+// and counts them
+std::vector<uint8_t> PlyMesh::labels_in(const PlyProperty& column, bool foreign)
 {
-    const double value = labels_->values[row];
-    const int64_t number = std::isfinite(value) && std::abs(value) < 1e15 ? std::llround(value) : -2;
-    const auto label = map_.find(number);
-    if (!label)
-        ++unknown_[number];
-    return label.value_or(kNoLabel);
+    std::vector<uint8_t> labels;
+    for (size_t row = 0; row < column.values.size(); ++row) {
+        const double value = column.values[row];
+        const bool whole = std::abs(value) < 4e9 && value == std::round(value);
+        const int64_t number = whole ? std::llround(value) : kNoNumber;
+        const auto label = map_.find(number, foreign);
+        known_ = known_ && label;
+        if (numbers_.size() < kMostNumbers || numbers_.contains(number))
+            ++numbers_[number];
+        labels.push_back(label.value_or(kNoLabel));
+    }
+    return labels;
 }
 
-Status PlyMesh::check_labels() const
+// what LabelMap says of numbers that are not ours or not known
+Status PlyMesh::check_labels(const LabelColumn& column, bool ours)
 {
-    std::string text;
-    for (const auto& [number, count] : unknown_)
-        if (text.size() < 400)
-            text += fmt::format("{}{} ({} faces)", text.empty() ? "" : ", ", number, count);
-    if (text.empty())
+    const char* things = of_vertices_ ? "vertices" : "faces";
+    if (numbers_.contains(kNoNumber))
+        return fail(ErrorCode::bad_input, "{}: {}: {} {} have something else than whole numbers", where_,
+                    quote(column.name, 60), numbers_[kNoNumber], things);
+    if (!map_.empty() && known_)
         return {};
-    return fail(ErrorCode::bad_input, "{}: unknown labels in '{}', expected 0 to 19 or a map: {}", where_,
-                printable(labels_->name, 40), text);
+    SR_TRY(LabelMap labels, LabelMap::of_column(column, ours, {}));
+    std::string unknown;
+    for (const auto& [number, count] : numbers_) {
+        if (number >= 0 && number != kNoLabel)
+            labels(uint32_t(number), count);
+        if (!map_.find(number, !ours && !column.table.empty()) && unknown.size() < 400)
+            unknown += fmt::format("{}{} ({} {})", unknown.empty() ? "" : ", ", number, count, things);
+    }
+    if (!map_.empty() || (!known_ && numbers_.begin()->first < 0 && column.table.empty()))
+        return fail(ErrorCode::bad_input, "{}: {}: unknown labels, which {} does not say: {}; --map says what they are",
+                    where_, quote(column.name, 60), map_.empty() ? "the file" : "the map", unknown);
+    SR_CHECK(labels.check(where_, things));
+    for (std::string& line : labels.assumed(where_, things))
+        add_warning(mesh_.warnings, std::move(line));
+    return {};
+}
+
+// of faces, else of vertices
+Status PlyMesh::read_labels(const PlyElement& vertices, const PlyElement& faces)
+{
+    if (!wants_labels_)
+        return {};
+    const bool ours = says_own_labels(file_.comments);
+    for (const PlyElement* element : {&faces, &vertices})
+        for (const LabelColumn& column : label_columns()) {
+            labels_ = first(*element, {column.name}, false);
+            if (!labels_)
+                continue;
+            of_vertices_ = element == &vertices;
+            (of_vertices_ ? vertex_labels_ : face_labels_) = labels_in(*labels_, !ours && !column.table.empty());
+            return check_labels(column, ours);
+        }
+    return {};
+}
+
+// that most corners have; ties go to a class, and to the lower one
+uint8_t PlyMesh::label_of_corners(uint64_t begin, uint64_t count) const
+{
+    std::array<uint32_t, 256> votes{};
+    for (uint64_t i = begin; i < begin + count; ++i)
+        ++votes[vertex_labels_[size_t(indices_->values[i])]];
+    return uint8_t(std::ranges::max_element(votes) - votes.begin());
 }
 
 Status PlyMesh::read_face(size_t row)
@@ -128,13 +187,13 @@ Status PlyMesh::read_face(size_t row)
     if (count > kMaxFaceCorners)
         return fail(ErrorCode::bad_input, "{}: face {} has {} corners, at most {} are supported", where_, row, count,
                     kMaxFaceCorners);
-    std::vector<std::array<float, 3>> corners;
+    std::vector<std::array<double, 3>> corners;
     for (uint64_t i = begin; i < begin + count; ++i) {
         const double index = indices_->values[i];
-        if (!(index >= 0 && index < double(mesh_.positions.size())))
+        if (!(index >= 0 && index < double(positions_.size())))
             return fail(ErrorCode::bad_input, "{}: face {} refers to vertex {}, the mesh has {}", where_, row, index,
-                        mesh_.positions.size());
-        corners.push_back(mesh_.positions[size_t(index)]);
+                        positions_.size());
+        corners.push_back(positions_[size_t(index)]);
     }
     const uint64_t uv_begin = texcoord_ ? texcoord_->starts[row] : 0;
     const uint64_t uv_count = texcoord_ ? texcoord_->starts[row + 1] - uv_begin : 0;
@@ -146,9 +205,8 @@ Status PlyMesh::read_face(size_t row)
         return fail(ErrorCode::bad_input, "{}: face {} refers to texture {}, the file names {}", where_, row, number,
                     mesh_.materials.size());
     uint8_t label = kNoLabel;
-    if (labels_) {
-        SR_TRY(label, label_of(row));
-    }
+    if (labels_)
+        label = of_vertices_ ? label_of_corners(begin, count) : face_labels_[row];
     for (const auto& t : triangulated(corners)) {
         std::array<uint32_t, 3> face;
         std::array<std::array<float, 2>, 3> uv{};
@@ -176,10 +234,7 @@ Status PlyMesh::read_faces(const PlyElement& vertices, const PlyElement& faces)
     indices_ = first(faces, {"vertex_indices", "vertex_index"}, true);
     if (!indices_)
         return fail(ErrorCode::bad_input, "{}: the faces have no list vertex_indices", where_);
-    labels_ = first(
-        faces,
-        {"label", "class", "class_id", "semantic", "category", "category_id", "scalar_Classification", "scalar_label"},
-        false);
+    SR_CHECK(read_labels(vertices, faces));
     texcoord_ = first(faces, {"texcoord"}, true);
     texnumber_ = first(faces, {"texnumber"}, false);
     u_ = first(vertices, {"s", "u", "texture_u"}, false);
@@ -188,10 +243,10 @@ Status PlyMesh::read_faces(const PlyElement& vertices, const PlyElement& faces)
         u_ = v_ = nullptr;
     for (size_t row = 0; row < faces.rows; ++row)
         SR_CHECK(read_face(row));
-    return check_labels();
+    return {};
 }
 
-Result<Mesh> PlyMesh::read()
+Result<FileMesh> PlyMesh::read()
 {
     const PlyElement *vertices = file_.find("vertex"), *faces = file_.find("face");
     if (!vertices || !faces || !faces->rows)
@@ -203,15 +258,17 @@ Result<Mesh> PlyMesh::read()
     SR_CHECK(read_textures());
     SR_CHECK(read_colors(*vertices));
     SR_CHECK(read_faces(*vertices, *faces));
-    return std::move(mesh_);
+    for (std::string& warning : folder_.warnings)
+        add_warning(mesh_.warnings, std::move(warning));
+    return FileMesh{std::move(mesh_), std::move(positions_)};
 }
 
 } // namespace
 
-Result<Mesh> read_ply_mesh(const Path& path, const MeshLabelMap& map)
+Result<FileMesh> read_ply_mesh(const Path& path, const MeshReadOptions& options)
 {
     SR_TRY(const PlyFile file, read_ply(path));
-    return PlyMesh(path, file, map).read();
+    return PlyMesh(path, file, options).read();
 }
 
 } // namespace semrover

@@ -16,14 +16,14 @@ using Flat = std::array<double, 2>;
 using Triangles = std::vector<std::array<uint32_t, 3>>;
 
 // along the normal's largest axis (Newell), counter-clockwise
-std::vector<Flat> flattened(std::span<const std::array<float, 3>> p)
+std::vector<Flat> flattened(std::span<const std::array<double, 3>> p)
 {
     std::array<double, 3> n{};
     for (size_t i = 0; i < p.size(); ++i) {
         const auto &a = p[i], &b = p[(i + 1) % p.size()];
         for (size_t k = 0; k < 3; ++k) {
             const size_t u = (k + 1) % 3, v = (k + 2) % 3;
-            n[k] += (double(a[u]) - b[u]) * (double(a[v]) + b[v]);
+            n[k] += (a[u] - b[u]) * (a[v] + b[v]);
         }
     }
     size_t axis = 0;
@@ -32,7 +32,7 @@ std::vector<Flat> flattened(std::span<const std::array<float, 3>> p)
             axis = k;
     std::vector<Flat> flat;
     for (const auto& c : p)
-        flat.push_back({c[(axis + 1) % 3], n[axis] < 0 ? -double(c[(axis + 2) % 3]) : double(c[(axis + 2) % 3])});
+        flat.push_back({c[(axis + 1) % 3], n[axis] < 0 ? -c[(axis + 2) % 3] : c[(axis + 2) % 3]});
     return flat;
 }
 
@@ -102,7 +102,7 @@ class EarCutter {
 
 } // namespace
 
-Triangles triangulated(std::span<const std::array<float, 3>> corners)
+Triangles triangulated(std::span<const std::array<double, 3>> corners)
 {
     const auto count = uint32_t(corners.size());
     if (count <= 3 || count > kMaxEars)

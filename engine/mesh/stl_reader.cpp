@@ -28,7 +28,7 @@ bool has_binary_length(std::span<const std::byte> file)
     return file.size() >= kStlHeader && file.size() == kStlHeader + kStlFacet * uint64_t(count_in(file));
 }
 
-Result<Mesh> read_binary_stl(std::span<const std::byte> file, const std::string& where)
+Result<FileMesh> read_binary_stl(std::span<const std::byte> file, const std::string& where)
 {
     const uint64_t facets = count_in(file), room = (file.size() - kStlHeader) / kStlFacet;
     if (facets > room)
@@ -37,20 +37,24 @@ Result<Mesh> read_binary_stl(std::span<const std::byte> file, const std::string&
     if (3 * facets > kMaxMeshElements)
         return fail(ErrorCode::bad_input, "{}: {} triangles, at most {} are supported", where, facets,
                     kMaxMeshElements / 3);
-    Mesh mesh;
-    mesh.positions.resize(3 * facets);
-    mesh.faces.resize(facets);
+    FileMesh out;
+    out.positions.resize(3 * facets);
+    out.mesh.faces.resize(facets);
     for (uint32_t f = 0; f < facets; ++f) {
-        std::memcpy(mesh.positions[3 * f].data(), file.data() + kStlHeader + f * kStlFacet + 12, 36);
-        mesh.faces[f] = {3 * f, 3 * f + 1, 3 * f + 2};
+        std::array<float, 9> corners;
+        std::memcpy(corners.data(), file.data() + kStlHeader + f * kStlFacet + 12, 36);
+        for (size_t i = 0; i < 9; ++i)
+            out.positions[3 * f + i / 3][i % 3] = double(corners[i]);
+        out.mesh.faces[f] = {3 * f, 3 * f + 1, 3 * f + 2};
     }
-    return mesh;
+    return out;
 }
 
 // a solid's name is a material's, so that it may say a class
-Result<Mesh> read_text_stl(std::string_view text, const std::string& where)
+Result<FileMesh> read_text_stl(std::string_view text, const std::string& where)
 {
-    Mesh mesh;
+    FileMesh out;
+    Mesh& mesh = out.mesh;
     size_t facet = 0; // its first corner
     for (WordLines lines(text); lines.next();) {
         const std::string_view key = lines.words.empty() ? "" : lines.words[0];
@@ -64,16 +68,16 @@ Result<Mesh> read_text_stl(std::string_view text, const std::string& where)
         } else if (key == "vertex") {
             if (lines.words.size() != 4)
                 return refuse(fmt::format("a vertex of {} numbers, expected 3", lines.words.size() - 1));
-            std::array<float, 3> p{};
+            std::array<double, 3> p{};
             for (size_t a = 0; a < 3; ++a) {
                 SR_TRY(p[a], number_of(lines.words[a + 1], where, lines.number));
             }
-            mesh.positions.push_back(p);
+            out.positions.push_back(p);
         } else if (key == "endfacet") {
             const auto first = uint32_t(facet);
-            if (mesh.positions.size() != facet + 3)
-                return refuse(fmt::format("a facet of {} vertices, expected 3", mesh.positions.size() - facet));
-            if (mesh.positions.size() > kMaxMeshElements || mesh.materials.empty())
+            if (out.positions.size() != facet + 3)
+                return refuse(fmt::format("a facet of {} vertices, expected 3", out.positions.size() - facet));
+            if (out.positions.size() > kMaxMeshElements || mesh.materials.empty())
                 return refuse(mesh.materials.empty() ? "a facet in front of the first solid" : "too many facets");
             mesh.faces.push_back({first, first + 1, first + 2});
             mesh.face_materials.push_back(uint32_t(mesh.materials.size() - 1));
@@ -82,14 +86,14 @@ Result<Mesh> read_text_stl(std::string_view text, const std::string& where)
             return refuse(fmt::format("expected STL, found {}", quote(key, 40)));
         }
     }
-    if (mesh.positions.size() != facet)
+    if (out.positions.size() != facet)
         return fail(ErrorCode::bad_input, "{}: ends within a facet; the file is cut", where);
-    return mesh;
+    return out;
 }
 
 } // namespace
 
-Result<Mesh> read_stl(const Path& path)
+Result<FileMesh> read_stl(const Path& path)
 {
     const std::string where = quote_path(path);
     SR_TRY(const MappedFile file, MappedFile::open(path));

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/mesh/surface_blocks.h"
 
+#include "engine/scene/cell_reach.h"
 #include "engine/scene/srgb.h"
 #include "kernels/mesh.h"
 #include "kernels/network.h"
@@ -68,6 +69,26 @@ Cell corner_of(uint64_t key)
 
 } // namespace
 
+double cell_edge(const Mesh& mesh, float voxel_size)
+{
+    return mesh.origin == std::array<double, 3>{} ? double(voxel_size) : decimal_voxel_size(voxel_size);
+}
+
+SurfaceBlocks::SurfaceBlocks(const Mesh& mesh, std::span<const uint8_t> labels, float voxel_size)
+    : mesh_(&mesh), labels_(labels), voxel_size_(cell_edge(mesh, voxel_size))
+{
+    for (size_t a = 0; a < 3; ++a) { // a base beyond the grid is found with the faces
+        const double block = std::floor(mesh.origin[a] / voxel_size_ / kEdge);
+        base_[a] = int32_t(std::clamp(block, -kMaxCell, kMaxCell)) * kEdge;
+        rest_[a] = mesh.origin[a] - base_[a] * voxel_size_;
+    }
+}
+
+Cell SurfaceBlocks::in_grid(const Cell& cell) const
+{
+    return {cell[0] + base_[0], cell[1] + base_[1], cell[2] + base_[2]};
+}
+
 uint64_t SurfaceBlocks::Walk::cells() const
 {
     uint64_t n = 1;
@@ -94,7 +115,8 @@ SurfaceBlocks::Corners SurfaceBlocks::corners_of(uint32_t face) const
     for (uint32_t i = 0; i < 3; ++i)
         for (size_t a = 0; a < 3; ++a)
             corners[i][a] =
-                std::round(double(mesh_->positions[mesh_->faces[face][(i + rotation) % 3]][a]) / voxel_size_ * kStep) /
+                std::round((double(mesh_->positions[mesh_->faces[face][(i + rotation) % 3]][a]) + rest_[a]) /
+                           voxel_size_ * kStep) /
                 kStep;
     return corners;
 }
@@ -124,6 +146,8 @@ uint64_t SurfaceBlocks::looks_of(uint32_t item) const
         if (!mesh_->colors.empty())
             for (const uint8_t x : mesh_->colors[mesh_->faces[face][corner]])
                 h = mixed(h, x);
+        if (!mesh_->alphas.empty())
+            h = mixed(h, mesh_->alphas[mesh_->faces[face][corner]]);
     }
     return h;
 }
@@ -134,10 +158,11 @@ Status SurfaceBlocks::check_extent(std::string_view where)
     for (uint32_t f = 0; f < mesh_->faces.size(); ++f) {
         const Corners c = corners_of(f);
         for (const Vector& p : c)
-            for (const double x : p)
-                if (std::abs(x) >= kMaxCell)
+            for (size_t a = 0; a < 3; ++a)
+                if (const double x = p[a] + base_[a]; std::abs(x) >= kMaxCell)
                     return fail(ErrorCode::bad_input,
-                                "{}: face {} reaches {:.6g} m, beyond 2^20 cells of {} m; take a larger voxel size",
+                                "{}: face {} reaches {:.6g} m, beyond 2^20 cells of {} m; move it to the origin "
+                                "(--origin), or take a larger voxel size",
                                 where, f, x * voxel_size_, float(voxel_size_));
         const double area = area_of(c[0], c[1], c[2]);
         area_ += area * voxel_size_ * voxel_size_;
@@ -255,6 +280,20 @@ SurfaceBlocks::Walk SurfaceBlocks::walk_of(const Piece& piece, const Cell& block
     return walk;
 }
 
+// of a piece's corners
+uint32_t SurfaceBlocks::alphas_of(const Piece& piece) const
+{
+    const uint32_t rotation = rotation_of(piece.face);
+    uint32_t packed = 0;
+    for (uint32_t c = 0; c < 3; ++c) {
+        double alpha = 0;
+        for (uint32_t k = 0; k < 3; ++k)
+            alpha += piece.weights[c][k] * mesh_->alphas[mesh_->faces[piece.face][(k + rotation) % 3]];
+        packed |= uint32_t(std::lround(alpha)) << (8 * c);
+    }
+    return packed;
+}
+
 // the part's triangles as a new slot
 void SurfaceBlocks::append(const Part& part, SurfaceChunk& chunk) const
 {
@@ -287,10 +326,12 @@ void SurfaceBlocks::append(const Part& part, SurfaceChunk& chunk) const
             at.uv[c] = {float(uv[0]), float(uv[1])};
             at.color[c] = {float(color[0]), float(color[1]), float(color[2])};
         }
+        if (!mesh_->alphas.empty())
+            at.alphas = alphas_of(piece);
         chunk.records.push_back(r);
         chunk.attributes.push_back(at);
     }
-    chunk.blocks.push_back(block);
+    chunk.blocks.push_back(in_grid(block));
 }
 
 SurfaceBlocks::Part SurfaceBlocks::next_part()
@@ -333,8 +374,8 @@ Result<std::optional<SurfaceChunk>> SurfaceBlocks::next(const SurfaceLimits& lim
         if (edge == 1)
             return fail(ErrorCode::bad_input,
                         "{} triangles touch cell ({}, {}, {}), at most {} fit on the device; take a smaller voxel size",
-                        triangles, block[0] + int(part.low[0]), block[1] + int(part.low[1]),
-                        block[2] + int(part.low[2]), std::min(limits.triangles, limits.pairs));
+                        triangles, in_grid(block)[0] + int(part.low[0]), in_grid(block)[1] + int(part.low[1]),
+                        in_grid(block)[2] + int(part.low[2]), std::min(limits.triangles, limits.pairs));
         for (uint32_t octant = 8; octant-- > 0;) {
             Part smaller = part;
             for (uint32_t a = 0; a < 3; ++a) {

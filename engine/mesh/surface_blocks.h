@@ -22,7 +22,7 @@ struct SurfaceRecord {
 struct SurfaceAttributes {
     std::array<std::array<float, 2>, 3> uv;
     std::array<std::array<float, 3>, 3> color; // linear
-    uint32_t unused = 0;
+    uint32_t alphas = 0xffffff;                // of the corners, a byte each
 };
 
 struct SurfaceChunk {
@@ -35,6 +35,10 @@ struct SurfaceChunk {
 struct SurfaceLimits { // of a portion
     uint64_t triangles = 1 << 20, pairs = 1 << 21, slots = 4096;
 };
+
+// the edge of the cells that a mesh is cut into, in metres. Far from the origin that is the size in decimals, 0.6 and
+// not 0.60000002384: the difference would add up to centimetres.
+double cell_edge(const Mesh& mesh, float voxel_size);
 
 class SurfaceBlocks {
   public:
@@ -70,11 +74,9 @@ class SurfaceBlocks {
         uint64_t cells() const;
     };
 
-    SurfaceBlocks(const Mesh& mesh, std::span<const uint8_t> labels, float voxel_size)
-        : mesh_(&mesh), labels_(labels), voxel_size_(voxel_size)
-    {
-    }
+    SurfaceBlocks(const Mesh& mesh, std::span<const uint8_t> labels, float voxel_size);
     Corners corners_of(uint32_t face) const;
+    Cell in_grid(const Cell& cell) const;
     uint32_t rotation_of(uint32_t face) const;
     uint64_t order_of(uint32_t face) const;
     uint64_t looks_of(uint32_t item) const;
@@ -84,12 +86,15 @@ class SurfaceBlocks {
     void add_instances(uint32_t item, const Corners& corners, uint64_t order);
     Piece piece_of(uint32_t item) const;
     Walk walk_of(const Piece& piece, const Cell& block, const Part& part) const;
+    uint32_t alphas_of(const Piece& piece) const;
     void append(const Part& part, SurfaceChunk& chunk) const;
     Part next_part();
 
     const Mesh* mesh_;
     std::span<const uint8_t> labels_;
     double voxel_size_, area_ = 0;
+    std::array<int32_t, 3> base_{}; // cells, whole blocks: where positions are counted from
+    std::array<double, 3> rest_{};  // metres from there to the mesh's origin
     std::vector<Piece> pieces_;
     std::vector<Instance> instances_; // by block, then by their content
     std::vector<Part> pending_;       // last first

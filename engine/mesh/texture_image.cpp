@@ -60,16 +60,17 @@ class StbFile {
         rewind();
     }
 
-    Result<ImageRgb8> bmp();
-    Result<ImageRgb8> tga();
-    Result<ImageRgb8> hdr();
+    Result<ImageWithAlpha> bmp();
+    Result<ImageWithAlpha> tga();
+    Result<ImageWithAlpha> hdr();
 
   private:
     void rewind();
     Result<ImageSize> size_as(const StbFormat& format);
     Status check_bmp_palette(ImageSize size) const;
     Status check_end(const void* pixels, const StbFormat& format) const;
-    Result<ImageRgb8> image_of(stbi_uc* pixels, ImageSize size, const StbFormat& format) const;
+    int wanted_channels() const { return channels_ == 2 || channels_ == 4 ? 4 : 3; }
+    Result<ImageWithAlpha> image_of(stbi_uc* pixels, ImageSize size, int channels, const StbFormat& format) const;
     uint32_t byte(size_t at) const { return uint32_t(bytes_[at]); }
     uint32_t word(size_t at) const { return byte(at) | byte(at + 1) << 8 | byte(at + 2) << 16 | byte(at + 3) << 24; }
 
@@ -113,11 +114,14 @@ Status StbFile::check_end(const void* pixels, const StbFormat& format) const
     return {};
 }
 
-Result<ImageRgb8> StbFile::image_of(stbi_uc* pixels, ImageSize size, const StbFormat& format) const
+Result<ImageWithAlpha> StbFile::image_of(stbi_uc* pixels, ImageSize size, int channels, const StbFormat& format) const
 {
     const std::unique_ptr<stbi_uc, StbFree> owner(pixels);
     SR_CHECK(check_end(pixels, format));
-    return ImageRgb8{size.width, size.height, {pixels, pixels + size_t(size.width) * size.height * 3}};
+    std::vector<uint8_t> values(pixels, pixels + size_t(size.width) * size.height * size_t(channels));
+    if (channels == 4)
+        return split_alpha(size, std::move(values));
+    return ImageWithAlpha{{size.width, size.height, std::move(values)}, {}};
 }
 
 // stb_image looks pixels up beyond the palette. Its palette is what lies in front of the pixels.
@@ -143,16 +147,17 @@ Status StbFile::check_bmp_palette(ImageSize size) const
     return {};
 }
 
-Result<ImageRgb8> StbFile::bmp()
+Result<ImageWithAlpha> StbFile::bmp()
 {
     SR_TRY(const ImageSize size, size_as(kBmp));
     SR_CHECK(check_bmp_palette(size));
+    const int channels = wanted_channels();
     stbi__result_info info{};
-    auto* pixels = static_cast<stbi_uc*>(stbi__bmp_load(&context_, &width_, &height_, &channels_, 3, &info));
-    return image_of(pixels, size, kBmp);
+    auto* pixels = static_cast<stbi_uc*>(stbi__bmp_load(&context_, &width_, &height_, &channels_, channels, &info));
+    return image_of(pixels, size, channels, kBmp);
 }
 
-Result<ImageRgb8> StbFile::tga()
+Result<ImageWithAlpha> StbFile::tga()
 {
     SR_TRY(const ImageSize size, size_as(kTga));
     // stb_image would mirror the one, and skip bytes for the other's entries
@@ -161,9 +166,10 @@ Result<ImageRgb8> StbFile::tga()
     if (byte(1) && (byte(3) | byte(4)))
         return fail(ErrorCode::bad_input, "{}: a TGA whose palette begins at {}, expected 0", where_,
                     byte(3) | byte(4) << 8);
+    const int channels = wanted_channels();
     stbi__result_info info{};
-    auto* pixels = static_cast<stbi_uc*>(stbi__tga_load(&context_, &width_, &height_, &channels_, 3, &info));
-    return image_of(pixels, size, kTga);
+    auto* pixels = static_cast<stbi_uc*>(stbi__tga_load(&context_, &width_, &height_, &channels_, channels, &info));
+    return image_of(pixels, size, channels, kTga);
 }
 
 // the nearest sRGB value of linear light: as many thresholds are not above it
@@ -178,7 +184,7 @@ uint8_t srgb8_of_linear(float value)
     return uint8_t(std::ranges::upper_bound(kThresholds, value) - kThresholds.begin());
 }
 
-Result<ImageRgb8> StbFile::hdr()
+Result<ImageWithAlpha> StbFile::hdr()
 {
     SR_TRY(const ImageSize size, size_as(kHdr));
     stbi__result_info info{};
@@ -187,7 +193,7 @@ Result<ImageRgb8> StbFile::hdr()
     ImageRgb8 image{size.width, size.height, {}};
     image.pixels.resize(size_t(size.width) * size.height * 3);
     std::transform(pixels.get(), pixels.get() + image.pixels.size(), image.pixels.begin(), srgb8_of_linear);
-    return image;
+    return ImageWithAlpha{std::move(image), {}};
 }
 
 bool is_named_tga(const Path& path)
@@ -198,12 +204,13 @@ bool is_named_tga(const Path& path)
     return extension == ".tga";
 }
 
-Result<ImageRgb8> decode(std::vector<std::byte> file, const std::string& where, bool named_tga, TextureBudget& budget)
+Result<ImageWithAlpha> decode(std::vector<std::byte> file, const std::string& where, bool named_tga,
+                              TextureBudget& budget)
 {
     const uint64_t max_pixels = budget.pixels_left(file.size());
     const std::string_view text(reinterpret_cast<const char*>(file.data()), file.size());
     if (text.starts_with("\x89PNG") || text.starts_with("\xff\xd8\xff"))
-        return decode_image_rgb8(file, where, max_pixels);
+        return decode_image_with_alpha(file, where, max_pixels);
     if (text.starts_with("BM"))
         return StbFile(std::move(file), where, max_pixels).bmp();
     if (text.starts_with("#?RADIANCE\n") || text.starts_with("#?RGBE\n"))
@@ -244,12 +251,12 @@ Result<std::vector<uint16_t>> texture_numbers(std::span<const std::byte> file, s
     return label_numbers(std::move(image));
 }
 
-Result<ImageRgb8> read_texture_rgb8(const Path& path, TextureBudget& budget)
+Result<ImageWithAlpha> read_texture(const Path& path, TextureBudget& budget)
 {
     const std::string where = quote_path(path);
     SR_TRY(std::vector<std::byte> file, read_file(path, kMaxTextureBytes));
-    SR_TRY(ImageRgb8 image, decode(std::move(file), where, is_named_tga(path), budget));
-    budget.take(image);
+    SR_TRY(ImageWithAlpha image, decode(std::move(file), where, is_named_tga(path), budget));
+    budget.take(image.color);
     return image;
 }
 

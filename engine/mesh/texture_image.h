@@ -25,10 +25,10 @@ class TextureBudget {
 };
 
 // Reads an image file of a mesh's texture: PNG, JPEG, BMP or Radiance HDR, told by its first bytes, or TGA, which has
-// no such bytes and is told by its name. Alpha is dropped. HDR holds linear light: it is clamped to 0..1 and becomes
+// no such bytes and is told by its name. HDR holds linear light: it is clamped to 0..1 and becomes
 // sRGB. Untrusted input: at most 1 GiB and kMaxImageSide, nothing is allocated that the file is too short to fill, and
 // a file that is cut is refused, like one that exceeds the budget.
-Result<ImageRgb8> read_texture_rgb8(const Path& path, TextureBudget& budget);
+Result<ImageWithAlpha> read_texture(const Path& path, TextureBudget& budget);
 
 // The numbers of a label texture in a PNG whose colours are not its numbers: a palette in other than the classes'
 // colours says its indices; gray of 1, 2, 4 or 16 bits, and gray beside alpha (0: none), says its values. [height,

@@ -133,7 +133,7 @@ Voxelizer::ChunkMemory::ChunkMemory(uint32_t triangle_count, uint32_t pair_count
 
 SurfaceTriangles Voxelizer::ChunkMemory::in(Graph& g, const TextureAtlas& atlas) const
 {
-    return {records.in(g), attributes.in(g), atlas.materials(g), atlas.textures(g)};
+    return {records.in(g), attributes.in(g), atlas.materials(g), atlas.textures(g), atlas.alphas(g), atlas.masked()};
 }
 
 SurfaceLimits Voxelizer::limits() const

@@ -71,15 +71,26 @@ class WordLines {
     const char* end_ = nullptr; // of the last word
 };
 
-// finite or not; bad_input for what is no number
-inline Result<float> number_of(std::string_view word, std::string_view where, size_t line)
+// `where` is made where it is needed: an OBJ has millions of numbers
+template <typename Where>
+Result<double> parse_number(std::string_view word, const Where& where)
 {
     const char* begin = word.data() + (word.starts_with('+') ? 1 : 0);
     double value = 0;
     const auto [end, error] = std::from_chars(begin, word.data() + word.size(), value);
     if (error != std::errc() || end != word.data() + word.size())
-        return fail(ErrorCode::bad_input, "{}: line {}: expected a number, found {}", where, line, quote(word, 40));
-    return float(value); // what is not finite is refused with the mesh
+        return fail(ErrorCode::bad_input, "{}: expected a number, found {}", where(), quote(word, 40));
+    return value; // what is not finite is refused with the mesh
+}
+
+// finite or not; bad_input for what is no number
+inline Result<double> number_of(std::string_view word, std::string_view where)
+{
+    return parse_number(word, [&] { return where; });
+}
+inline Result<double> number_of(std::string_view word, std::string_view where, size_t line)
+{
+    return parse_number(word, [&] { return fmt::format("{}: line {}", where, line); });
 }
 
 } // namespace semrover

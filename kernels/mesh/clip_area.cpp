@@ -8,7 +8,8 @@
 
 namespace semrover {
 
-constexpr double kOperationsPerPair = 4000; // six planes, up to eleven corners
+constexpr double kOperationsPerPair = 4000;        // six planes, up to eleven corners
+constexpr double kOperationsPerMaskedPair = 20000; // and 64 places
 
 SurfaceAreas clip_area(Graph& g, const SurfaceTriangles& s, const SurfacePairs& pairs)
 {
@@ -21,8 +22,10 @@ SurfaceAreas clip_area(Graph& g, const SurfaceTriangles& s, const SurfacePairs& 
                          g.array(size, DType::u32, "label addresses")};
     g.dispatch(kernel::clip_area,
                {s.records, s.attributes, s.materials, s.textures, pairs.count, pairs.keys, pairs.triangles, y.areas,
-                y.labels, y.label_addresses},
-               ClipAreaPush{.size = size}, threads(size), {.most_operations = size * kOperationsPerPair});
+                y.labels, y.label_addresses, s.alphas},
+               ClipAreaPush{.size = size}, threads(size),
+               {.constants = {{"kMasked", s.masked}},
+                .most_operations = size * (s.masked ? kOperationsPerMaskedPair : kOperationsPerPair)});
     return y;
 }
 

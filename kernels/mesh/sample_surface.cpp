@@ -14,6 +14,7 @@
 namespace semrover {
 
 constexpr double kOperationsPerSample = 5000; // a triangle is clipped to the cell
+constexpr double kMaskedAttempts = 4;         // of which most succeed at once
 
 SurfaceSamples sample_surface(Graph& g, const SurfaceTriangles& s, Tensor triangles, Tensor sums, Tensor starts,
                               Tensor cells, uint32_t samples, uint64_t seed, bool canonical)
@@ -25,10 +26,12 @@ SurfaceSamples sample_surface(Graph& g, const SurfaceTriangles& s, Tensor triang
     const SurfaceSamples y{g.array(size, DType::f32, "samples", 8), g.array(size, DType::u32, "texel addresses", 4)};
     const SampleSurfacePush push{
         .cells = cells.rows, .samples = samples, .seed_low = uint32_t(seed), .seed_high = uint32_t(seed >> 32)};
-    g.dispatch(
-        kernel::sample_surface,
-        {s.records, s.attributes, s.materials, s.textures, triangles, sums, starts, cells, y.points, y.addresses}, push,
-        threads(size), {.constants = {{"kCanonical", canonical}}, .most_operations = size * kOperationsPerSample});
+    g.dispatch(kernel::sample_surface,
+               {s.records, s.attributes, s.materials, s.textures, triangles, sums, starts, cells, y.points, y.addresses,
+                s.alphas},
+               push, threads(size),
+               {.constants = {{"kCanonical", canonical}, {"kMasked", s.masked}},
+                .most_operations = size * kOperationsPerSample * (s.masked ? kMaskedAttempts : 1)});
     return y;
 }
 

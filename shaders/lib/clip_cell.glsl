@@ -62,3 +62,17 @@ float polygon_area()
         sum += fan_area(i);
     return sum;
 }
+
+// where `into` of the polygon's area is behind, seen from its first corner
+vec3 point_in_polygon(float into, float outward)
+{
+    const float target = into * polygon_area();
+    uint i = 1;
+    float before = 0.0, area = fan_area(1);
+    while (before + area <= target && i + 2 < polygon_size) {
+        before += area;
+        area = fan_area(++i);
+    }
+    const float r = sqrt(outward), s = area > 0.0 ? clamp((target - before) / area, 0.0, 1.0) : 0.0;
+    return (1.0 - r) * polygon[0] + (r * (1.0 - s)) * polygon[i] + (r * s) * polygon[i + 1];
+}

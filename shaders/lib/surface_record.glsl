@@ -33,6 +33,9 @@ ivec3 cell_of_key(uint key)
          uintBitsToFloat(attributes[(t) * kAttributes + 7 + 3 * (corner)]),                                            \
          uintBitsToFloat(attributes[(t) * kAttributes + 8 + 3 * (corner)]))
 
+#define CORNER_ALPHA(attributes, t, corner)                                                                             \
+    (float(attributes[(t) * kAttributes + 15] >> (8 * (corner)) & 255u) * (1.0 / 255.0))
+
 // weights of the corners for a point of the triangle; the centre's for one without area
 vec3 barycentric(vec3 point, vec3 a, vec3 b, vec3 c)
 {

@@ -10,6 +10,7 @@
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
+layout(constant_id = 0) const bool kMasked = false; // materials have alpha: areas are those of what is a surface
 layout(push_constant) uniform Push { ClipAreaPush p; };
 layout(binding = 0) readonly buffer Triangles { uint triangles[]; };      // [T, 12]
 layout(binding = 1) readonly buffer Attributes { uint attributes[]; };     // [T, 16]
@@ -21,15 +22,9 @@ layout(binding = 6) readonly buffer Values { uint values[]; };             // [s
 layout(binding = 7) writeonly buffer Areas { float areas[]; };             // [size]
 layout(binding = 8) writeonly buffer Labels { uint labels[]; };            // [size]
 layout(binding = 9) writeonly buffer Addresses { uint label_address[]; }; // [size], 2^32 - 1: none
+layout(binding = 10) readonly buffer Alphas { uint alphas[]; };            // four bytes each
 
-uint nearest_texel(uint texture, vec2 uv)
-{
-    const ivec2 size = ivec2(textures[4 * texture], textures[4 * texture + 1]);
-    const uint wraps = textures[4 * texture + 3];
-    const vec2 at = vec2(wrap_coordinate(uv.x, wraps & 3u), wrap_coordinate(uv.y, wraps >> 2)) * vec2(size);
-    const uvec2 texel = uvec2(min(ivec2(at), size - 1));
-    return textures[4 * texture + 2] + texel.y * uint(size.x) + texel.x;
-}
+#include "lib/surface_alpha.glsl"
 
 uint address_of_label(uint t, vec3 a, vec3 b, vec3 c)
 {
@@ -46,6 +41,17 @@ uint address_of_label(uint t, vec3 a, vec3 b, vec3 c)
     return nearest_texel(texture, uv);
 }
 
+// of the clipped polygon
+float share_with_surface(uint t, vec3 a, vec3 b, vec3 c)
+{
+    if (!kMasked || !(material_threshold(t) > 0.0) || polygon_size < 3)
+        return 1.0;
+    uint found = 0;
+    for (uint i = 0; i < kProbes; ++i)
+        found += uint(has_surface(t, barycentric(clamp(probe(i), 0.0, 1.0), a, b, c)));
+    return float(found) / float(kProbes);
+}
+
 void main()
 {
     const uint i = linear_thread();
@@ -56,7 +62,7 @@ void main()
     const vec3 a = RECORD_CORNER(triangles, t, 0) - origin, b = RECORD_CORNER(triangles, t, 1) - origin,
                c = RECORD_CORNER(triangles, t, 2) - origin;
     clip_to_cell(a, b, c);
-    areas[i] = polygon_area();
+    areas[i] = polygon_area() * share_with_surface(t, a, b, c);
     labels[i] = RECORD_LABEL(triangles, t);
     label_address[i] = address_of_label(t, a, b, c);
 }

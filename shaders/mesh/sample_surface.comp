@@ -6,6 +6,8 @@
 // 1976). x is the share of the area before the point, across pairs and the fans of their polygons; the root of y how far
 // it lies from the fan's corner. Each point by itself is uniform; together they leave smaller gaps than independent
 // ones. And what a point's colour is made of.
+// kMasked: materials have alpha. Areas are those of what is a surface; a point that falls on none is drawn again within
+// its share of the area.
 // kCanonical: nothing is random. Where a cell's surface faces one axis, sample k lies at place k of a grid of rows over
 // the cell, seen along that axis, on what is outermost there. Elsewhere, and where nothing is, the lattice's shift is a
 // constant.
@@ -18,6 +20,7 @@
 
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const bool kCanonical = false;
+layout(constant_id = 1) const bool kMasked = false;
 layout(push_constant) uniform Push { SampleSurfacePush p; };
 layout(binding = 0) readonly buffer Triangles { uint triangles[]; };  // [T, 12]
 layout(binding = 1) readonly buffer Attributes { uint attributes[]; }; // [T, 16]
@@ -29,6 +32,9 @@ layout(binding = 6) readonly buffer Starts { uint starts[]; };         // [keys 
 layout(binding = 7) readonly buffer Cells { ivec4 cells[]; };          // [cells] i, j, k, key
 layout(binding = 8) writeonly buffer Samples { float samples[]; };     // [cells * samples, 8]
 layout(binding = 9) writeonly buffer Addresses { uvec4 addresses[]; }; // [cells * samples] of texels
+layout(binding = 10) readonly buffer Alphas { uint alphas[]; };         // four bytes each
+
+#include "lib/surface_alpha.glsl"
 
 float unit(uint word) { return float(word >> 8) * (1.0 / 16777216.0); } // [0, 1)
 
@@ -53,21 +59,8 @@ uint pick_pair(uint key, float share, out float into)
     return low;
 }
 
-// where `into` of the polygon's area is behind, seen from its first corner
-vec3 point_in_polygon(float into, float outward)
-{
-    const float target = into * polygon_area();
-    uint i = 1;
-    float before = 0.0, area = fan_area(1);
-    while (before + area <= target && i + 2 < polygon_size) {
-        before += area;
-        area = fan_area(++i);
-    }
-    const float r = sqrt(outward), s = area > 0.0 ? clamp((target - before) / area, 0.0, 1.0) : 0.0;
-    return (1.0 - r) * polygon[0] + (r * (1.0 - s)) * polygon[i] + (r * s) * polygon[i + 1];
-}
-
 const uint kMostPairs = 4096; // of a cell that is looked at as a whole: one with more is no wall
+const uint kAttempts = 32;    // to find a place with a surface
 const float kFlat = 0.85;     // mean of |normal| along an axis from which on a surface faces it
 
 #define CORNERS(t, origin, a, b, c)                                                                                    \
@@ -117,6 +110,8 @@ bool outermost(uint key, vec3 origin, uint axis, float side, vec2 place, out uin
         const float height = a[axis] + wb * (b[axis] - a[axis]) + wc * (c[axis] - a[axis]);
         if (height < 0.0 || height >= 1.0 || height * side <= best)
             continue;
+        if (kMasked && !has_surface(values[i], vec3(1.0 - wb - wc, wb, wc)))
+            continue;
         best = height * side;
         found = values[i];
         point[u] = place.x;
@@ -140,6 +135,20 @@ uvec4 texels_around(uint texture, vec2 uv, out vec2 between)
     return textures[4 * texture + 2] + uvec4(y0 + x0, y0 + x1, y1 + x0, y1 + x1);
 }
 
+// texels without a surface do not colour their neighbours: where colour and alpha are one texture
+uvec4 opaque_texels(uvec4 around, uint t, vec3 weights, vec2 between)
+{
+    const uint m = RECORD_MATERIAL(triangles, t) * 8, color = materials[m + 3], alpha = materials[m + 5];
+    if (!kMasked || materials[m + 7] == 0u)
+        return around;
+    const uint nearest = around[(between.y < 0.5 ? 0 : 2) + (between.x < 0.5 ? 0 : 1)];
+    const float vertices = vertex_alpha(t, weights), threshold = material_threshold(t);
+    for (uint i = 0; i < 4; ++i)
+        if (vertices * alpha_at(around[i] - textures[4 * color + 2] + textures[4 * alpha + 2]) < threshold)
+            around[i] = nearest;
+    return around;
+}
+
 void write_color(uint to, uint t, vec3 weights)
 {
     vec2 uv = vec2(0), between = vec2(0);
@@ -149,7 +158,10 @@ void write_color(uint to, uint t, vec3 weights)
         color += weights[corner] * CORNER_COLOR(attributes, t, corner);
     }
     const uint m = RECORD_MATERIAL(triangles, t) * 8, texture = materials[m + 3];
-    addresses[to] = texture == kNoTexture ? uvec4(kNoTexture) : texels_around(texture, uv, between);
+    uvec4 around = uvec4(kNoTexture);
+    if (texture != kNoTexture)
+        around = opaque_texels(texels_around(texture, uv, between), t, weights, between);
+    addresses[to] = around;
     const vec3 factor = vec3(uintBitsToFloat(materials[m]), uintBitsToFloat(materials[m + 1]),
                              uintBitsToFloat(materials[m + 2])) * color;
     samples[8 * to + 3] = between.x;
@@ -169,6 +181,27 @@ void place_by_area(uint key, vec3 origin, float x, float y, out uint t, out vec3
     point = clamp(point_in_polygon(into, y), 0.0, 1.0);
 }
 
+// place_by_area() again with other numbers of the same share, until there is a surface
+void place_on_surface(uint key, vec3 origin, uvec2 random, uint k, out uint t, out vec3 point)
+{
+    const uint share = 0xffffffffu / p.samples;
+    for (uint attempt = 0; attempt < (kMasked ? kAttempts : 1); ++attempt) {
+        place_by_area(key, origin, unit(random.x + k * share + attempt * 0xC13FA9A9u / p.samples),
+                      unit(random.y + k * 0x9E3779B9u + attempt * 0x91E10DA5u), t, point);
+        CORNERS(t, origin, a, b, c);
+        if (!kMasked || has_surface(t, barycentric(point, a, b, c)))
+            return;
+    }
+    CORNERS(t, origin, a, b, c);
+    for (uint i = 0; i < kProbes; ++i) { // one of them is: the triangle has an area
+        const vec3 place = clamp(probe((i + 37 * k) % kProbes), 0.0, 1.0);
+        if (has_surface(t, barycentric(place, a, b, c))) {
+            point = place;
+            return;
+        }
+    }
+}
+
 void main()
 {
     const uint to = linear_thread();
@@ -184,8 +217,7 @@ void main()
         !outermost(key, origin, axis, side, place_in_rows(k, p.samples), t, point)) {
         const uvec4 random = kCanonical ? uvec4(0x80000000u / p.samples, 0x80000000u, 0, 0)
                                         : philox(uvec4(uvec3(cell.xyz), 0), uvec2(p.seed_low, p.seed_high));
-        place_by_area(key, origin, unit(random.x + k * (0xffffffffu / p.samples)), unit(random.y + k * 0x9E3779B9u), t,
-                      point);
+        place_on_surface(key, origin, random.xy, k, t, point);
     }
     CORNERS(t, origin, a, b, c);
     samples[8 * to] = point.x - 0.5;

@@ -3,12 +3,14 @@
 // semrover eval chamfer TRUTH [POINTS]: how far points of a grid or cloud are from a mesh, or from another cloud
 #include "engine/mesh/chamfer.h"
 #include "engine/mesh/mesh_files.h"
+#include "engine/mesh/surface_blocks.h"
 #include "engine/mesh/voxelizer.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/choice.h"
 #include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
+#include "tools/cli/origin_option.h"
 #include "tools/cli/print_stderr.h"
 #include "tools/cli/progress.h"
 #include "tools/eval/point_files.h"
@@ -22,7 +24,7 @@ namespace semrover {
 namespace {
 
 struct EvalChamferArguments {
-    std::string mesh, grid, sweep, csv, up;
+    std::string mesh, grid, sweep, csv, up, origin;
     VoxelizeOptions voxelize;
     ChamferOptions chamfer;
     double scale = 1;
@@ -64,17 +66,17 @@ Result<std::vector<int>> points_of_sweep(const std::string& text)
     return list;
 }
 
-Result<Mesh> load_surface(const EvalChamferArguments& o)
+Result<Mesh> load_surface(const EvalChamferArguments& o, const Globals& globals)
 {
-    const UpAxis up = o.up == "y" ? UpAxis::y : o.up == "z" ? UpAxis::z : UpAxis::file;
-    SR_TRY(const Mesh mesh, read_mesh(o.mesh, up));
-    Mesh surface; // colours and labels do not matter here
-    surface.positions = mesh.positions;
-    surface.faces = mesh.faces;
-    for (auto& p : surface.positions)
-        for (float& x : p)
-            x = float(x * o.scale);
-    return surface;
+    // colours and labels do not matter here
+    MeshReadOptions options{.scale = o.scale, .missing_textures = MissingTextures::white, .labels = false};
+    options.up = o.up == "y" ? UpAxis::y : o.up == "z" ? UpAxis::z : UpAxis::file;
+    SR_TRY(options.origin, origin_from(o.origin));
+    SR_TRY(Mesh mesh, read_mesh(o.mesh, options));
+    for (const std::string& warning : mesh.warnings)
+        if (!globals.quiet)
+            print_stderr("semrover: warning: {}\n", warning);
+    return mesh;
 }
 
 bool is_mesh(const Path& path, bool cloud)
@@ -82,8 +84,9 @@ bool is_mesh(const Path& path, bool cloud)
     return !cloud && path.extension() != ".sgrid" && !is_folder(path);
 }
 
-// of a grid, or of a cloud in metres
-Result<MeasuredPoints> load_points(const std::string& path, double scale, const Globals& globals, Measure& m)
+// of a grid, whose cells may lie as those of a mesh, or of a cloud in metres
+Result<MeasuredPoints> load_points(const std::string& path, double scale, const Globals& globals, Measure& m,
+                                   const Mesh* mesh = nullptr)
 {
     MeasuredPoints points;
     SR_TRY(const bool cloud, is_cloud(path));
@@ -99,7 +102,7 @@ Result<MeasuredPoints> load_points(const std::string& path, double scale, const 
         m.points = points.positions.size();
     } else {
         SR_TRY(const VoxelGrid grid, read_grid(path));
-        points = measured_points(grid);
+        points = measured_points(grid, mesh ? cell_edge(*mesh, grid.voxel_size) : double(grid.voxel_size));
         m.points = size_t(grid.points_per_voxel);
         m.cells = grid.cells.size();
     }
@@ -111,13 +114,14 @@ Result<MeasuredPoints> load_points(const std::string& path, double scale, const 
 Result<Measure> measure_points(const EvalChamferArguments& o, const Globals& globals, Device& device)
 {
     Measure m{}, unused{};
-    SR_TRY(const MeasuredPoints points, load_points(o.grid, 1, globals, m));
     SR_TRY(const bool cloud, is_cloud(o.mesh));
     if (is_mesh(o.mesh, cloud)) {
-        SR_TRY(const Mesh mesh, load_surface(o));
+        SR_TRY(const Mesh mesh, load_surface(o, globals));
+        SR_TRY(const MeasuredPoints points, load_points(o.grid, 1, globals, m, &mesh));
         SR_TRY(m.chamfer, chamfer(device, mesh, points, o.chamfer));
         return m;
     }
+    SR_TRY(const MeasuredPoints points, load_points(o.grid, 1, globals, m));
     SR_TRY(const MeasuredPoints truth, load_points(o.mesh, o.scale, globals, unused));
     SR_TRY(m.chamfer, chamfer(device, truth, points));
     return m;
@@ -131,7 +135,7 @@ Result<std::vector<Measure>> measure_all(const EvalChamferArguments& o, const Gl
         measures.push_back(m);
         return measures;
     }
-    SR_TRY(const Mesh mesh, load_surface(o));
+    SR_TRY(const Mesh mesh, load_surface(o, globals));
     std::vector<int> list = {o.voxelize.points_per_voxel};
     if (!o.sweep.empty()) {
         SR_TRY(list, points_of_sweep(o.sweep));
@@ -144,7 +148,8 @@ Result<std::vector<Measure>> measure_all(const EvalChamferArguments& o, const Gl
         options.points_per_voxel = n;
         options.default_label = 0;
         SR_TRY(const VoxelizedMesh v, voxelize(device, mesh, options));
-        SR_TRY(const Chamfer c, chamfer(device, mesh, measured_points(v.grid), o.chamfer));
+        SR_TRY(const Chamfer c,
+               chamfer(device, mesh, measured_points(v.grid, cell_edge(mesh, v.grid.voxel_size)), o.chamfer));
         measures.push_back({size_t(n), v.grid.cells.size(), c});
         progress.update(measures.size(), device.allocated_bytes());
     }
@@ -219,6 +224,7 @@ void add_eval_chamfer(CLI::App& eval, const Globals& globals, Run& run)
                                   "of points and samples (0)", {0, UINT64_MAX});
     add_choice(*c, "--up", {"y", "z"}, "axis of the file that points up", o->up);
     add_number(*c, "--scale", o->scale, "metres in a unit of the file (1)", 1e-6, 1e6);
+    add_origin(*c, o->origin);
     c->add_option("--csv", o->csv, "also write the table there");
     c->callback([o, &globals, &run] { run = [o, &globals] { return eval_chamfer(*o, globals); }; });
 }

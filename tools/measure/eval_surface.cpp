@@ -4,6 +4,7 @@
 #include "engine/fusion/fusion_folder.h"
 #include "engine/fusion/surface_error.h"
 #include "engine/mesh/mesh_files.h"
+#include "engine/mesh/transparency.h"
 #include "engine/scene/palette.h"
 #include "runtime/base/json.h"
 #include "tools/cli/depth_options.h"
@@ -97,10 +98,16 @@ void print(const SurfaceError& error, const EvalSurfaceArguments& o)
 
 Status run_surface(EvalSurfaceArguments o, const Globals& globals)
 {
-    SR_TRY(const Mesh mesh, read_mesh(o.mesh));
-    SR_TRY(const Mesh truth, read_mesh(o.truth));
     if (o.frames.empty() && o.placement.any())
         return fail(ErrorCode::usage, "--relative-to, --calib, --world and --origin are of a camera path: --frames");
+    // colours do not matter here
+    const MeshReadOptions options{.missing_textures = MissingTextures::white};
+    SR_TRY(Mesh mesh, read_mesh(o.mesh, options));
+    SR_TRY(const Mesh truth, read_mesh(o.truth, options));
+    print_warnings(mesh.warnings, globals);
+    print_warnings(truth.warnings, globals);
+    if (has_transparency(mesh))
+        mesh = opaque_parts(mesh).mesh;
     std::vector<uint32_t> views;
     if (!o.frames.empty()) {
         o.input.poses = o.poses;

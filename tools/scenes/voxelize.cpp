@@ -14,6 +14,7 @@
 #include "tools/cli/commands.h"
 #include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
+#include "tools/cli/origin_option.h"
 #include "tools/cli/print_stderr.h"
 #include "tools/scenes/placement_option.h"
 
@@ -24,9 +25,10 @@ namespace semrover {
 namespace {
 
 struct VoxelizeArguments {
-    std::string mesh, output, labels = "auto", map, default_label, up, ply;
+    std::string mesh, output, labels = "auto", map, default_label, up, origin, missing_textures, ply;
     VoxelizeOptions voxelize;
     double scale = 1;
+    bool opaque = false;
 };
 
 LabelSource source_of(const std::string& name)
@@ -45,6 +47,15 @@ Status check_outputs(const VoxelizeArguments& o, const Globals& globals)
     return {};
 }
 
+// a key that a map could have
+std::string name_for_map(const std::vector<UnlabelledFaces>& unknown)
+{
+    for (const UnlabelledFaces& faces : unknown)
+        if (!faces.name.empty())
+            return printable(faces.name, 40);
+    return "NAME";
+}
+
 // what says no label: an error, or a warning where there is a default
 Status label_mesh(Mesh& mesh, const VoxelizeArguments& o, const MeshLabelMap& map, const Globals& globals)
 {
@@ -52,31 +63,55 @@ Status label_mesh(Mesh& mesh, const VoxelizeArguments& o, const MeshLabelMap& ma
     if (unknown.empty())
         return {};
     if (o.voxelize.default_label == kNoLabel)
-        return fail(ErrorCode::bad_input,
-                    "{}: no class is known for {}; --map gives classes to names, --default-label "
-                    "to the rest",
-                    quote_path(o.mesh), unlabelled_text(unknown));
+        return fail(
+            ErrorCode::bad_input,
+            "{}: no class is known for {}; --map gives classes to names (a file with {{\"{}\": \"building\"}} or the "
+            "like), --default-label one to the rest",
+            quote_path(o.mesh), unlabelled_text(unknown), name_for_map(unknown));
     if (!globals.quiet)
         print_stderr("semrover: warning: labelled {}: {}\n", kPalette[o.voxelize.default_label].name,
                      unlabelled_text(unknown));
     return {};
 }
 
+// far from the origin, files and commands that hold floats do not have what the grid has
+Status check_place(const Mesh& mesh, const std::array<double, 3>& origin, const VoxelizeArguments& o,
+                   const Globals& globals)
+{
+    if (mesh.origin == std::array<double, 3>{})
+        return {};
+    const auto& at = mesh.origin;
+    const std::string move =
+        fmt::format("--origin={:.0f},{:.0f},{:.0f}", origin[0] - at[0], origin[1] - at[1], origin[2] - at[2]);
+    if (!o.ply.empty())
+        return fail(ErrorCode::bad_input,
+                    "{}: lies about ({:.0f}, {:.0f}, {:.0f}) m, where the 32-bit floats of --ply "
+                    "are too coarse; {} moves it to the origin",
+                    quote_path(o.mesh), at[0], at[1], at[2], move);
+    if (!globals.quiet)
+        print_stderr("semrover: warning: {}: lies about ({:.0f}, {:.0f}, {:.0f}) m; the grid holds it to 1 mm, but "
+                     "drawing has 32-bit floats: {} moves it to the origin\n",
+                     quote_path(o.mesh), at[0], at[1], at[2], move);
+    return {};
+}
+
 Result<Mesh> load_mesh(const VoxelizeArguments& o, const Globals& globals)
 {
-    MeshLabelMap map;
+    MeshReadOptions options{.scale = o.scale, .opaque = o.opaque};
     if (!o.map.empty()) {
-        SR_TRY(map, MeshLabelMap::read(o.map));
+        SR_TRY(options.map, MeshLabelMap::read(o.map));
     }
-    const UpAxis up = o.up == "y" ? UpAxis::y : o.up == "z" ? UpAxis::z : UpAxis::file;
-    SR_TRY(Mesh mesh, read_mesh(o.mesh, up, map));
+    options.up = o.up == "y" ? UpAxis::y : o.up == "z" ? UpAxis::z : UpAxis::file;
+    SR_TRY(options.origin, origin_from(o.origin));
+    options.labels = o.labels == "auto" || o.labels == "face";
+    if (o.missing_textures == "white")
+        options.missing_textures = MissingTextures::white;
+    SR_TRY(Mesh mesh, read_mesh(o.mesh, options));
     for (const std::string& warning : mesh.warnings)
         if (!globals.quiet)
             print_stderr("semrover: warning: {}\n", warning);
-    for (auto& p : mesh.positions)
-        for (float& x : p)
-            x = float(x * o.scale);
-    SR_CHECK(label_mesh(mesh, o, map, globals));
+    SR_CHECK(label_mesh(mesh, o, options.map, globals));
+    SR_CHECK(check_place(mesh, options.origin, o, globals));
     return mesh;
 }
 
@@ -157,6 +192,10 @@ void add_voxelize(CLI::App& app, const Globals& globals, Run& run)
     add_number(*c, "--scale", o->scale, "metres in a unit of the file (1)", 1e-6, 1e6);
     add_choice(*c, "--labels", {"auto", "material", "texture", "face"},
                "where labels come from (auto: faces, material names, label textures)", o->labels);
+    add_origin(*c, o->origin);
+    add_choice(*c, "--missing-textures", {"refuse", "white"},
+               "what a texture that is missing or cannot be read does (refuse)", o->missing_textures);
+    c->add_flag("--opaque", o->opaque, "transparent parts are a surface, too");
     c->add_option("--map", o->map,
                   "a table by name, or JSON: material name, pattern with * or number -> class name or number");
     c->add_option("--default-label", o->default_label, "class of what has none");

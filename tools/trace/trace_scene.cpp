@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/trace/trace_scene.h"
 
+#include "engine/mesh/transparency.h"
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -108,13 +110,14 @@ float texture_density(const std::array<std::array<float, 2>, 3>& uv, float area2
     return area2 > 0 ? std::sqrt(std::abs(u1 * v2 - u2 * v1) / area2) : 0;
 }
 
-void add_triangle(TraceTables& t, const Mesh& m, const Neighbours& around, uint32_t face)
+// source: the face's number in tables
+void add_triangle(TraceTables& t, const Mesh& m, const Neighbours& around, uint32_t face, uint32_t source)
 {
     const auto& f = m.faces[face];
     const Float3 a = m.positions[f[0]], e1 = minus(m.positions[f[1]], a), e2 = minus(m.positions[f[2]], a);
     const uint32_t material = m.face_materials.empty() ? 0 : m.face_materials[face];
     const uint32_t label = m.face_labels.empty() ? kNoLabel : m.face_labels[face];
-    t.triangles.push_back({bits(a[0]), bits(a[1]), bits(a[2]), face, bits(e1[0]), bits(e1[1]), bits(e1[2]), material,
+    t.triangles.push_back({bits(a[0]), bits(a[1]), bits(a[2]), source, bits(e1[0]), bits(e1[1]), bits(e1[2]), material,
                            bits(e2[0]), bits(e2[1]), bits(e2[2]), label});
     const Float3 area = area_normal(m, face), flat = unit(area);
     std::array<std::array<float, 2>, 3> uv{};
@@ -201,13 +204,21 @@ void add_materials(TraceTables& t, const Mesh& mesh, std::span<const float> glos
 
 } // namespace
 
-TraceTables trace_tables(const Mesh& mesh, std::span<const float> gloss, std::span<const uint32_t> faces)
+TraceTables trace_tables(const Mesh& whole, std::span<const float> gloss, std::span<const uint32_t> faces)
 {
     std::vector<uint32_t> chosen(faces.begin(), faces.end());
-    if (chosen.empty()) {
+    const bool all = chosen.empty();
+    OpaqueParts parts; // of a mesh that alpha cuts holes into
+    const bool cut = has_transparency(whole);
+    if (cut)
+        parts = opaque_parts(whole);
+    const Mesh& mesh = cut ? parts.mesh : whole;
+    if (all || cut) {
         chosen.resize(mesh.faces.size());
         std::iota(chosen.begin(), chosen.end(), 0u);
     }
+    if (cut && !all)
+        std::erase_if(chosen, [&](uint32_t f) { return std::ranges::find(faces, parts.sources[f]) == faces.end(); });
     std::vector<std::array<uint32_t, 3>> corners;
     for (uint32_t f : chosen)
         corners.push_back(mesh.faces[f]);
@@ -217,7 +228,7 @@ TraceTables trace_tables(const Mesh& mesh, std::span<const float> gloss, std::sp
     t.triangles.reserve(chosen.size());
     t.corners.reserve(chosen.size());
     for (uint32_t i : bvh.order)
-        add_triangle(t, mesh, around, chosen[i]);
+        add_triangle(t, mesh, around, chosen[i], cut ? parts.sources[chosen[i]] : chosen[i]);
     add_materials(t, mesh, gloss);
     return t;
 }

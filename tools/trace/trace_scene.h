@@ -14,7 +14,7 @@
 namespace semrover {
 
 // A mesh as rays see it, on the host: the tables of TraceScene (kernels/trace.h). Where faces meet they are smooth if
-// they bend by less than 44 degrees.
+// they bend by less than 44 degrees. Transparent parts are left out; rays are relative to Mesh::origin.
 struct TraceTables {
     std::vector<std::array<uint32_t, 16>> nodes = {};
     std::vector<std::array<uint32_t, 12>> triangles = {}, corners = {};
