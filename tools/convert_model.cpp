@@ -352,8 +352,11 @@ bool is_model(const Path& path)
                 return true;
         return file.string().ends_with(".index.json");
     };
-    if (!is_folder(path))
-        return holds_weights(path);
+    if (!is_folder(path)) {
+        const auto file = MappedFile::open(path);
+        const bool safetensors = file && file->bytes().size() > 8 && file->bytes()[8] == std::byte('{');
+        return holds_weights(path) || safetensors; // whose header begins there
+    }
     for (const char* part : {"model_index.json", "config.json", "scheduler_config.json", "voxfield_transformer",
                              "renderer", "unet", "vae"})
         if (is_there(path / part))
