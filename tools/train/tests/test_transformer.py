@@ -216,7 +216,7 @@ class TheRecipe(unittest.TestCase):
         self.assertEqual(exported("both", "a.sgrid", "c.sgrid"), "mixed")
 
     def test_writes_a_model_that_the_engine_generates_with(self):
-        train(self.grid, self.path("run"), 250, "--set", "learning_rate=0.01", "--set", "ema=0.9")
+        train(self.grid, self.path("run"), 300, "--set", "learning_rate=0.003", "--set", "ema=0.9")
         semantic = {name: t for name, t in safetensors_file.read(self.grid).items() if name in ("cells", "labels")}
         safetensors_file.write(self.path("semantic.sgrid"), semantic, {"voxel_size": "0.6", "points_per_voxel": "4"})
         subprocess.run([semrover_path(), "generate", self.path("semantic.sgrid"), "-m", self.path("run/model"), "-o",
