@@ -77,6 +77,8 @@ class Trainer:
                 saved = time.time()
             if self.config["minutes"] and now - begin > 60 * self.config["minutes"]:
                 break
+        if recent:
+            self._tell(recent, (time.time() - told) / len(recent))
         self.save()
         self.place.release()
         if self.stopped:
