@@ -3,6 +3,7 @@
 #include "engine/mesh/voxelizer.h"
 
 #include "engine/mesh/chamfer.h"
+#include "engine/mesh/surface_blocks.h"
 #include "tests/clip_reference.h"
 #include "tests/kernel_case.h"
 #include "tests/says.h"
@@ -475,7 +476,8 @@ TEST(EngineVoxelizer, a_mesh_far_from_the_origin_gets_the_cells_and_points_of_it
         }
     EXPECT_NEAR(low, 530000.5, 0.05);
     EXPECT_NEAR(high, 530006.4, 0.05);
-    const auto c = chamfer(test_device(), far, v.grid, {.samples = 20000});
+    const auto c =
+        chamfer(test_device(), far, measured_points(v.grid, cell_edge(far, v.grid.voxel_size)), {.samples = 20000});
     ASSERT_TRUE(c);
     EXPECT_LT(c->to_surface, 1e-3);
     EXPECT_LT(c->to_points, 0.1);

@@ -204,7 +204,8 @@ Json rig_json(std::span<const Sensor> sensors)
 
 CameraPath expand_rig(const Rig& rig, const CameraPath& vehicle)
 {
-    CameraPath cameras{.sensors = rig.sensors, .numbered = vehicle.numbered, .warnings = vehicle.warnings};
+    CameraPath cameras{
+        .frames = {}, .sensors = rig.sensors, .numbered = vehicle.numbered, .warnings = vehicle.warnings};
     for (size_t i = 0; i < vehicle.frames.size(); ++i) {
         const CameraFrame& pose = vehicle.frames[i];
         const Rigid world_to_vehicle = rig.path_axes == PathAxes::camera
