@@ -143,7 +143,7 @@ TEST(CliEvalPoints, what_cannot_be_compared_is_one_clear_line)
     expect_error(eval_points((files / "one.txt") + " " + (files / "two.txt")), 3,
                  "expected lists of equal length, found 1 grids");
     std::filesystem::create_directory(files.folder / "empty");
-    expect_error(eval_points((files / "empty") + " " + (files / "folder")), 3, "no .sgrid files in it");
+    expect_error(eval_points((files / "empty") + " " + (files / "folder")), 3, "no .sgrid or .ply files in it");
     expect_error(eval_points(truth + " " + truth + " --radius 2"), 3, "expected a radius of at most 3 cells");
     expect_error(eval_points(truth + " " + truth + " --radius 0"), 2, "--radius");
     expect_error(eval_points(truth), 2, "TRUTH is required");

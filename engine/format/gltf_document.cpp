@@ -111,17 +111,16 @@ std::optional<std::array<double, 16>> local_transform(const Json& node)
     return m;
 }
 
-// an extension of a node; null when it has none of that name
-const Json* extension_of(const Json& node, const char* name)
+} // namespace
+
+const Json* extension_of(const Json& object, const char* name)
 {
-    const auto all = node.find("extensions");
-    if (all == node.end() || !all->is_object())
+    const auto all = object.find("extensions");
+    if (all == object.end() || !all->is_object())
         return nullptr;
     const auto found = all->find(name);
     return found != all->end() && found->is_object() ? &*found : nullptr;
 }
-
-} // namespace
 
 Result<GltfDocument> GltfDocument::open(const Path& path)
 {

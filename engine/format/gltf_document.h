@@ -16,6 +16,9 @@ struct GltfInstance {
     bool repeated = false; // the node has EXT_mesh_gpu_instancing, whose places are not read here
 };
 
+// an extension of a node or primitive; null when it has none of that name
+const Json* extension_of(const Json& object, const char* name);
+
 // A binary glTF 2.0 file: its JSON, and accessors as floats. Untrusted input: every offset is checked against the
 // buffer. Only what lies in the file itself is read. Source: the glTF 2.0 specification
 class GltfDocument {

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/mesh/gltf_pose.h"
 
+#include "engine/format/gltf_document.h"
 #include "runtime/base/json_fields.h"
 #include "runtime/base/json_numbers.h"
 #include "runtime/base/quote.h"
@@ -28,16 +29,6 @@ std::array<double, N> numbers_in(const GltfAccessor& a, size_t i)
     for (uint32_t c = 0; c < N; ++c)
         out[c] = a.number(i, c);
     return out;
-}
-
-// an extension of a node or primitive; null when it has none of that name
-const Json* extension(const Json& object, const char* name)
-{
-    const auto all = object.find("extensions");
-    if (all == object.end() || !all->is_object())
-        return nullptr;
-    const auto found = all->find(name);
-    return found != all->end() && found->is_object() ? &*found : nullptr;
 }
 
 // that are read, or that change neither where a surface is nor how it looks by itself
@@ -143,7 +134,7 @@ Result<std::vector<int64_t>> GltfPose::orphans() const
         SR_TRY(const Json* node, file_.entry("nodes", int64_t(i)));
         SR_TRY(const std::vector<int64_t> children, indices_in(*node, "children"));
         mark(children);
-        if (const Json* lod = extension(*node, "MSFT_lod")) {
+        if (const Json* lod = extension_of(*node, "MSFT_lod")) {
             SR_TRY(const std::vector<int64_t> shapes, indices_in(*lod, "ids"));
             mark(shapes);
         }
@@ -217,7 +208,7 @@ Status GltfPose::walk(const std::vector<int64_t>& from, bool in_scene, std::vect
         const GltfMatrix matrix = product_of(next.parent, own);
         if (!matrices_.empty())
             matrices_[size_t(next.node)] = matrix;
-        const Json* visibility = extension(*node, "KHR_node_visibility");
+        const Json* visibility = extension_of(*node, "KHR_node_visibility");
         const bool visible = next.visible && !(visibility && visibility->value("visible", Json(true)) == false);
         SR_TRY(const auto mesh, file_.integer(*node, "mesh"));
         if (visible)
@@ -252,7 +243,7 @@ Result<std::vector<GltfPlacement>> GltfPose::placements()
 Result<GltfInstances> GltfPose::instances(const Json& node)
 {
     GltfInstances out;
-    const Json* json = extension(node, "EXT_mesh_gpu_instancing");
+    const Json* json = extension_of(node, "EXT_mesh_gpu_instancing");
     if (!json)
         return out;
     const std::string where = where_ + ": EXT_mesh_gpu_instancing";

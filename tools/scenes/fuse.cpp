@@ -207,6 +207,7 @@ Status run_fuse(FuseArguments o, const Globals& globals)
 {
     SR_CHECK(resolve(o, globals));
     SR_TRY(FusionFolder folder, FusionFolder::open(o.folder, o.input));
+    print_warnings(folder.warnings(), globals);
     SR_CHECK(folder.check_labels());
     o.fusion.max_depth = o.max_depth.value_or(suitable_max_depth(folder.cameras(), o.fusion.voxel));
     SR_TRY(const auto device, open_device(globals));
@@ -221,7 +222,6 @@ Status run_fuse(FuseArguments o, const Globals& globals)
                             {"device", device->name()},
                             {"state", "finished"},
                             {"results", figures}}));
-    print_warnings(folder.warnings(), globals);
     if (!globals.quiet)
         print_warnings(folder, fused);
     if (globals.json)
