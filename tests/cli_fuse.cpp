@@ -527,6 +527,24 @@ TEST(CliFuse, intrinsics_of_colmap_and_kitti_are_used_and_colmaps_names_find_the
     EXPECT_NE(w.fuse(kitti).err.find("has no intrinsics: expected"), std::string::npos);
 }
 
+TEST(CliFuse, poses_in_a_file_each_find_the_pictures_of_their_names)
+{
+    const Wall w; // ScanNet: numbers without leading zeros, a frame without a pose
+    for (const int frame : {2, 9, 10}) {
+        w.put_depth(fmt::format("depth/{}.png", frame));
+        const bool lost = frame == 9;
+        w.put(fmt::format("pose/{}.txt", frame), lost
+                                                     ? "-inf -inf -inf -inf\n-inf -inf -inf -inf\n-inf -inf -inf -inf\n"
+                                                       "-inf -inf -inf -inf\n"
+                                                     : "0 0 1 0\n-1 0 0 0\n0 -1 0 1.5\n0 0 0 1\n");
+    }
+    const std::string line = "--default-label building --fx 60 --poses ";
+    const ProgramResult result = w.fuse(line + w.in("pose").string());
+    w.expect_wall(result);
+    EXPECT_TRUE(warns(result, "1 of 3 files have no pose (inf)")) << result.err;
+    EXPECT_EQ(run_of(w.folder / "out")["results"]["frames"], 2);
+}
+
 TEST(CliFuse, pictures_named_by_time_meet_the_poses_nearest_in_time)
 {
     const Wall w;

@@ -31,6 +31,14 @@ Result<std::vector<double>> read_sixteen(const Path& path)
     return values;
 }
 
+// what the pictures of the same frame are called, without their ending: "0" of 0.txt, "frame-000000" of
+// frame-000000.pose.txt
+std::string picture_of(const Path& file)
+{
+    const Path stem = file.stem();
+    return stem.extension() == ".pose" ? stem.stem().string() : stem.string();
+}
+
 } // namespace
 
 std::vector<Path> pose_files_in(const Path& folder)
@@ -77,7 +85,8 @@ Result<CameraPath> read_pose_files(const Path& folder, const Intrinsics& lens)
         if (!std::ranges::all_of(values, [](double v) { return std::isfinite(v); }))
             continue;
         SR_TRY(const Rigid camera_to_world, rigid_from_matrix(values, quote_path(file)));
-        path.frames.push_back({double(number_in_name(file).value_or(0)), "", {inverse(camera_to_world)}, lens});
+        path.frames.push_back(
+            {double(number_in_name(file).value_or(0)), "", {inverse(camera_to_world)}, lens, picture_of(file)});
     }
     if (path.frames.empty())
         return fail(ErrorCode::bad_input, "{}: a camera path without poses, expected files of a 4x4 matrix each",

@@ -74,7 +74,7 @@ class NumberedPictures {
     std::map<std::string, uint32_t> counts_;
 };
 
-// COLMAP's picture FOLDERS/NAME is beside depth/, or depth/ has the same folders
+// COLMAP's picture FOLDERS/NAME is beside depth/, or depth/ has the same folders; of ScanNet's 0 it has 0.png
 Result<FramePictures> pictures_of_name(const Path& folder, const CameraFrame& frame)
 {
     SR_TRY(const Path picture, path_inside(folder, frame.picture, "the name of a picture"));
