@@ -97,11 +97,11 @@ Result<uint64_t> WorldTiles::key_of(const TileIndex& index)
 
 Result<bool> WorldTiles::load(const TileIndex& index)
 {
+    if (stores_ && waiting_.contains(index))
+        SR_CHECK(drain());
     std::error_code ignored;
     if (cache_.empty() || !std::filesystem::exists(path_of(index), ignored))
         return false;
-    if (stores_)
-        SR_CHECK(drain());
     SR_TRY(WorldTile * tile, bring(index));
     SR_TRY(const uint64_t key, key_of(index));
     const auto stored = read_grid(path_of(index));
@@ -190,6 +190,7 @@ Status WorldTiles::write(const TileIndex& index, WorldTile& from)
     file.metadata = {{"key", hash_text(key)}, {"tool", kProgram}};
     SR_CHECK(files_->push([path = path_of(index), file = std::move(file)] { return write_grid(path, file); }));
     from.stored = true;
+    waiting_.insert(index);
     return {};
 }
 
@@ -197,6 +198,7 @@ Status WorldTiles::drain()
 {
     if (files_ && stores_)
         stores_ = files_->drain();
+    waiting_.clear();
     return stores_;
 }
 

@@ -70,6 +70,7 @@ class WorldTiles {
     uint64_t base_;
     std::map<TileIndex, WorldTile> tiles_;
     std::map<TileIndex, LabelEdits> edits_;
+    std::set<TileIndex> waiting_;      // handed to the cache since it was drained, which may not have their files yet
     Status stores_;                    // whether the cache takes what is finished
     std::unique_ptr<FileQueue> files_; // of the cache
 };
