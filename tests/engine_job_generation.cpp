@@ -89,10 +89,9 @@ Json finish(Job& job)
     return results.value_or(Json());
 }
 
-std::unique_ptr<GenerationJob> begin(const GenerationRequest& request, std::optional<GenerationState> saved = {},
-                                     const JobCallbacks& callbacks = {})
+std::unique_ptr<GenerationJob> begin(const GenerationRequest& request, const JobCallbacks& callbacks = {})
 {
-    auto job = begin_generation(device(), street(), request, callbacks, std::move(saved));
+    auto job = begin_generation(device(), street(), request, callbacks);
     EXPECT_TRUE(job) << job.error().message;
     return std::move(*job);
 }
@@ -158,27 +157,6 @@ TEST(engine_job_generation, cancelled_at_any_step_it_is_begun_again_to_the_same_
     }
 }
 
-TEST(engine_job_generation, saved_at_any_step_and_taken_up_by_another_job_it_gives_the_same_bytes)
-{
-    size_t all = 0;
-    {
-        const auto job = begin(request());
-        all = run(*job);
-    }
-    for (size_t steps = 0; steps <= all; ++steps) {
-        auto job = begin(request());
-        run_some(*job, steps);
-        auto state = job->save();
-        ASSERT_TRUE(state) << state.error().message;
-        job->cancel();
-        job.reset();
-        const auto again = begin(request(), std::move(*state));
-        const size_t left = run(*again);
-        EXPECT_EQ(left, std::max<size_t>(all - steps, 1)) << "at step " << steps; // nothing is done twice
-        expect_same(again->grid(), whole(), steps);
-    }
-}
-
 TEST(engine_job_generation, a_run_folder_gives_back_what_was_finished_before_the_job_was_dropped)
 {
     const ScratchFolder folder;
@@ -196,7 +174,7 @@ TEST(engine_job_generation, a_run_folder_gives_back_what_was_finished_before_the
         JobProgress first{};
         JobCallbacks callbacks;
         callbacks.progress = [&](const JobProgress& p) { first = first.total ? first : p; };
-        const auto again = begin(request(0, output), {}, callbacks);
+        const auto again = begin(request(0, output), callbacks);
         EXPECT_EQ(first.done_before > 0, steps >= 3) << steps; // a batch takes three submits
         run(*again);
         const Json report = finish(*again);
@@ -225,7 +203,7 @@ TEST(engine_job_generation, progress_is_told_once_before_and_once_after_all)
     std::vector<JobProgress> heard;
     JobCallbacks callbacks;
     callbacks.progress = [&](const JobProgress& p) { heard.push_back(p); };
-    const auto job = begin(request(), {}, callbacks);
+    const auto job = begin(request(), callbacks);
     ASSERT_EQ(heard.size(), 1u);
     EXPECT_EQ(heard.front().done, 0u);
     EXPECT_EQ(heard.front().total, street().cells.size());
@@ -241,9 +219,9 @@ TEST(engine_job_generation, progress_is_told_once_before_and_once_after_all)
 }
 
 void expect_refusal(const GenerationRequest& request, ErrorCode code, std::string_view text,
-                    std::optional<GenerationState> saved = {}, const VoxelGrid& grid = street())
+                    const VoxelGrid& grid = street())
 {
-    const auto job = begin_generation(device(), grid, request, {}, std::move(saved));
+    const auto job = begin_generation(device(), grid, request);
     ASSERT_FALSE(job);
     EXPECT_EQ(job.error().code, code);
     EXPECT_NE(job.error().message.find(text), std::string::npos) << job.error().message;
@@ -264,33 +242,11 @@ TEST(engine_job_generation, what_cannot_be_is_refused_before_any_work)
     expect_refusal(odd, ErrorCode::bad_input, "region");
     VoxelGrid coarse = street();
     coarse.voxel_size = 1.2f;
-    expect_refusal(request(0, folder / "out.sgrid"), ErrorCode::bad_input, "1.2 m", {}, coarse);
+    expect_refusal(request(0, folder / "out.sgrid"), ErrorCode::bad_input, "1.2 m", coarse);
     EXPECT_EQ(folder.entries(), entries);
     GenerationOptions unknown = options();
     unknown.sampler = "heun";
     EXPECT_EQ(resolve_generation(unknown).error().code, ErrorCode::usage);
-}
-
-TEST(engine_job_generation, a_state_of_another_run_is_refused)
-{
-    const auto job = begin(request(1));
-    run_some(*job, 4);
-    const GenerationState state = *job->save();
-    expect_refusal(request(2), ErrorCode::bad_input, "other settings", state);
-    GenerationState damaged = state;
-    ASSERT_FALSE(damaged.work.in_flight.empty());
-    damaged.work.in_flight.push_back(100000);
-    expect_refusal(request(1), ErrorCode::bad_input, "does not belong", damaged);
-    damaged = state;
-    damaged.work.sampler.resize(damaged.work.sampler.size() / 2);
-    expect_refusal(request(1), ErrorCode::bad_input, "", damaged);
-    damaged = state;
-    ASSERT_FALSE(damaged.work.finished.empty());
-    damaged.work.finished[0].points.pop_back();
-    expect_refusal(request(1), ErrorCode::bad_input, "does not belong", damaged);
-    const auto again = begin(request(1), state);
-    run(*again);
-    expect_same(again->grid(), whole(1));
 }
 
 TEST(engine_job_generation, a_budget_of_memory_is_kept_or_refused)

@@ -72,7 +72,6 @@ struct TokenRun {
         return std::move(*TokenSampler::create(device(), transformer(), plan, options));
     }
     Status begin(TokenSampler& s) const { return s.begin(regions); }
-    Status resume(TokenSampler& s, const std::vector<std::byte>& saved) const { return s.resume(regions, saved); }
     static size_t done(const TokenSampler& s) { return s.rows_done(); }
     static size_t rows(const TokenSampler& s) { return s.rows(); }
 };
@@ -100,7 +99,6 @@ struct FrameRun {
         return std::move(*AsdRenderer::create(device(), unet(), plan, {5, text}, kSize, options));
     }
     Status begin(AsdRenderer& r) const { return r.begin(frame); }
-    Status resume(AsdRenderer& r, const std::vector<std::byte>& saved) const { return r.resume(frame, saved); }
     static size_t done(const AsdRenderer& r) { return r.steps_done(); }
     static size_t rows(const AsdRenderer& r) { return r.steps(); }
 };
@@ -160,49 +158,6 @@ TYPED_TEST(engine_replay, stopped_after_any_row_the_next_run_is_as_if_there_had_
     EXPECT_EQ(this->rest(*s, 1), whole);
 }
 
-TYPED_TEST(engine_replay, saved_after_any_row_another_takes_it_up)
-{
-    const std::vector<float> whole = this->uninterrupted();
-    const size_t rows = this->run.rows(*this->run.make());
-    for (size_t row = 0; row <= rows; ++row) {
-        std::vector<std::byte> saved;
-        {
-            const auto first = this->run.make();
-            ASSERT_TRUE(this->run.begin(*first));
-            for (size_t i = 0; i < row; ++i)
-                ASSERT_TRUE(first->step(1));
-            saved = *first->save();
-        }
-        const auto second = this->run.make();
-        const Status taken = this->run.resume(*second, saved);
-        ASSERT_TRUE(taken) << taken.error().message;
-        EXPECT_EQ(this->run.done(*second), row);
-        EXPECT_EQ(this->rest(*second, 2), whole) << "after row " << row;
-    }
-}
-
-TYPED_TEST(engine_replay, takes_up_nothing_that_is_another_runs)
-{
-    const auto s = this->run.make();
-    ASSERT_TRUE(this->run.begin(*s));
-    ASSERT_TRUE(s->step(2));
-    const std::vector<std::byte> saved = *s->save();
-    this->run.seed = 6;
-    const auto other = this->run.make();
-    const Status refused = this->run.resume(*other, saved);
-    ASSERT_FALSE(refused);
-    EXPECT_EQ(refused.error().code, ErrorCode::bad_input);
-    EXPECT_EQ(refused.error().message, "the saved run is another one: other inputs, plan, seed or options");
-    std::vector<std::byte> wrong = saved;
-    wrong[0] ^= std::byte(1);
-    EXPECT_EQ(this->run.resume(*s, wrong).error().message, "these are not the bytes of a saved run");
-    wrong.pop_back();
-    EXPECT_EQ(this->run.resume(*s, wrong).error().code, ErrorCode::bad_input);
-    EXPECT_EQ(this->run.resume(*s, {}).error().code, ErrorCode::bad_input);
-    ASSERT_TRUE(this->run.resume(*s, saved)); // and is as good as before
-    EXPECT_EQ(this->run.done(*s), 2u);
-}
-
 TEST(engine_replay_of_two, in_turns_on_one_device_disturb_each_other_in_nothing)
 {
     const TokenRun tokens;
@@ -235,7 +190,6 @@ TEST(engine_replay_of_two, a_step_without_a_run_is_the_callers_mistake)
     EXPECT_DEATH((void)sampler->finish(), "a run is finished after 0 of ");
     ASSERT_TRUE(sampler->cancel());
     EXPECT_DEATH((void)sampler->step(1), "a step of a run that has not begun, or has ended");
-    EXPECT_DEATH((void)sampler->save(), "a run is saved that has not begun, or has ended");
 }
 
 } // namespace engine_replay_test

@@ -71,7 +71,7 @@ void generate(VoxelGrid& grid, uint32_t batch, const RegionOptions& regions = op
     ASSERT_TRUE(outpainter) << outpainter.error().message;
     auto sampler = TokenSampler::create(device(), transformer(), *plan, sampling_options(2, 5));
     ASSERT_TRUE(sampler) << sampler.error().message;
-    ASSERT_TRUE((*outpainter)->begin(**sampler, batch));
+    (*outpainter)->begin(**sampler, batch);
     for (bool filled = false; !filled;) {
         const auto step = (*outpainter)->step(~size_t(0));
         ASSERT_TRUE(step) << step.error().message;

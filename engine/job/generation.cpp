@@ -34,7 +34,7 @@ class GridGeneration : public GenerationJob {
     // the same was generated before, and what it wrote is there
     bool finished_before();
     Status load();
-    Status start(std::optional<GenerationState> saved);
+    Status start();
     Result<Json> estimate() { return filling_.estimate(); }
 
     Result<bool> step(const JobBudget& budget) override;
@@ -42,7 +42,6 @@ class GridGeneration : public GenerationJob {
     void cancel() override { (void)filling_.cancel(); } // what fails then will fail again
     Path kept_in() const override { return request_.output.empty() ? Path() : run_folder(); }
     const VoxelGrid& grid() const override { return grid_; }
-    Result<GenerationState> save() override;
 
   private:
     Path run_folder() const { return request_.output.string() + ".run"; }
@@ -91,15 +90,13 @@ Status GridGeneration::load()
     return filling_.load(request_.seed, callbacks_);
 }
 
-Status GridGeneration::start(std::optional<GenerationState> saved)
+Status GridGeneration::start()
 {
     if (!request_.output.empty()) {
         SR_TRY(RunFolder run, open_run(run_folder(), settings_, request_.replace));
         run_.emplace(std::move(run));
     }
-    if (saved && saved->settings != settings_)
-        return fail(ErrorCode::bad_input, "the saved state is of a run with other settings, model, input or device");
-    SR_CHECK(saved ? filling_.start(std::move(saved->work)) : filling_.start(run_ ? &*run_ : nullptr));
+    SR_CHECK(filling_.start(run_ ? &*run_ : nullptr));
     filling_.say(callbacks_);
     return {};
 }
@@ -112,12 +109,6 @@ Result<bool> GridGeneration::step(const JobBudget& budget)
     if (filled)
         filling_.say(callbacks_, true);
     return filled;
-}
-
-Result<GenerationState> GridGeneration::save()
-{
-    SR_TRY(OutpaintState work, filling_.save());
-    return GenerationState{settings_, std::move(work)};
 }
 
 Result<Json> GridGeneration::finish()
@@ -157,17 +148,15 @@ Status check_generation_outputs(const GenerationRequest& request)
 }
 
 Result<std::unique_ptr<GenerationJob>> begin_generation(Device& device, VoxelGrid grid,
-                                                        const GenerationRequest& request, const JobCallbacks& callbacks,
-                                                        std::optional<GenerationState> saved)
+                                                        const GenerationRequest& request, const JobCallbacks& callbacks)
 {
-    SR_ASSERT(!saved || request.output.empty(), "a run with an output keeps its state there");
     auto job = std::make_unique<GridGeneration>(device, std::move(grid), request, callbacks);
     SR_CHECK(job->look());
     if (job->finished_before())
         return job;
     SR_CHECK(check_generation_outputs(request));
     SR_CHECK(job->load());
-    SR_CHECK(job->start(std::move(saved)));
+    SR_CHECK(job->start());
     return job;
 }
 

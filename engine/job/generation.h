@@ -25,29 +25,20 @@ struct GenerationRequest {
     GivenObjects objects = {};
 };
 
-// what a generation without an output has done, for another of the same request
-struct GenerationState {
-    Json settings;
-    OutpaintState work;
-};
-
 class GenerationJob : public Job {
   public:
-    virtual const VoxelGrid& grid() const = 0;  // filled as far as it is done
-    virtual Result<GenerationState> save() = 0; // between two steps
+    virtual const VoxelGrid& grid() const = 0; // filled as far as it is done
 };
 
 // usage, bad_input: an output that exists or cannot be written
 Status check_generation_outputs(const GenerationRequest& request);
 
-// Fills the cells of `grid` that have no points. With an output, an interrupted run of the same request goes on;
-// without one, `saved` does, if given. The device outlives the job, and other jobs may use it too. finish() gives
-// cells, regions, seconds, planned_device_bytes, peak_device_bytes, output and xxh64.
-// Errors: usage, bad_input (outputs, a grid that does not go with the model, a state of another run), out_of_memory
-Result<std::unique_ptr<GenerationJob>> begin_generation(Device& device, VoxelGrid grid,
-                                                        const GenerationRequest& request,
-                                                        const JobCallbacks& callbacks = {},
-                                                        std::optional<GenerationState> saved = {});
+// Fills the cells of `grid` that have no points. With an output, an interrupted run of the same request goes on. The
+// device outlives the job, and other jobs may use it too. finish() gives cells, regions, seconds, planned_device_bytes,
+// peak_device_bytes, output and xxh64. Errors: usage, bad_input (outputs, a grid that does not go with the model, a
+// state of another run), out_of_memory
+Result<std::unique_ptr<GenerationJob>>
+begin_generation(Device& device, VoxelGrid grid, const GenerationRequest& request, const JobCallbacks& callbacks = {});
 
 // what it would take, as GridFilling::estimate says it
 Result<Json> estimate_generation(Device& device, VoxelGrid grid, const GenerationRequest& request,

@@ -81,24 +81,18 @@ Result<uint64_t> GridFilling::bound_bytes() const
 
 Status GridFilling::start(RunFolder* run)
 {
-    if (!run)
-        return outpainter_->begin(*sampler_, batch_);
+    if (!run) {
+        outpainter_->begin(*sampler_, batch_);
+        return {};
+    }
     for (const RegionResult& region : load_regions(*run)) {
         SR_CHECK(outpainter_->restore(region));
         restored_ += region.targets.size();
     }
     if (restored_)
         SR_CHECK(fit_batch()); // what is left may come in smaller batches
-    return outpainter_->begin(*sampler_, batch_, [run](const RegionResult& r) { return save_region(*run, r); });
-}
-
-Status GridFilling::start(OutpaintState state)
-{
-    for (const RegionResult& region : state.finished)
-        restored_ += region.targets.size();
-    SR_CHECK(outpainter_->resume(std::move(state)));
-    SR_CHECK(fit_batch());
-    return outpainter_->begin(*sampler_, batch_);
+    outpainter_->begin(*sampler_, batch_, [run](const RegionResult& r) { return save_region(*run, r); });
+    return {};
 }
 
 Result<bool> GridFilling::step(const JobBudget& budget, const std::function<void()>& submitted)

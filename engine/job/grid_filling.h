@@ -24,13 +24,10 @@ class GridFilling {
     Status load(uint64_t seed, const JobCallbacks& callbacks);
     // Takes over what `run` holds already; every region that is finished is saved there. null: nothing is kept.
     Status start(RunFolder* run);
-    // takes over what save() gave; nothing is kept elsewhere
-    Status start(OutpaintState state);
 
     // true: the grid is filled. `submitted` is called after each submit.
     Result<bool> step(const JobBudget& budget, const std::function<void()>& submitted = {});
     Status cancel();
-    Result<OutpaintState> save() { return outpainter_->save(); }
 
     // Measures a step and says what `runs` such fillings would take: regions, cells, batch, steps, peak_device_bytes,
     // seconds, device. Instead of start().

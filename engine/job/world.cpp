@@ -41,7 +41,6 @@ class StreamedWorld : public World {
     std::vector<TileIndex> tiles_with_points() const override;
     int32_t tile_cells() const override { return request_.settings.regions.tile_cells; }
     WorldFigures figures() const override;
-    std::vector<WorldChange> take_changes() override { return std::exchange(changes_, {}); }
     const SplatPool* splats() const override { return splats_.get(); }
     Status flush() override { return tiles_->drain(); }
 
@@ -95,7 +94,6 @@ class StreamedWorld : public World {
     std::vector<TileIndex> bare_;           // finished tiles whose splats are made next
     std::map<TileIndex, uint32_t> details_; // that the splats of tiles were made for
     std::array<SubmitCost, kPieces> costs_;
-    std::vector<WorldChange> changes_;
     uint64_t generated_ = 0, loaded_ = 0, dropped_ = 0;
 };
 
@@ -372,14 +370,12 @@ void StreamedWorld::give_up()
 
 void StreamedWorld::came(const TileIndex& tile)
 {
-    changes_.push_back({tile, true});
     if (splats_)
         bare_.push_back(tile);
 }
 
 Status StreamedWorld::went(const TileIndex& tile)
 {
-    changes_.push_back({tile, false});
     std::erase(bare_, tile);
     return splats_ ? drop_splats(tile) : Status();
 }

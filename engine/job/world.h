@@ -38,12 +38,6 @@ struct WorldFigures {
     bool full = false;                               // a budget has no room for more of what is wanted
 };
 
-// a finished tile that came, or one that went
-struct WorldChange {
-    TileIndex tile;
-    bool there = false;
-};
-
 class World {
   public:
     virtual ~World() = default;
@@ -66,8 +60,6 @@ class World {
     virtual std::vector<TileIndex> tiles_with_points() const = 0;
     virtual int32_t tile_cells() const = 0;
     virtual WorldFigures figures() const = 0;
-    // tiles that came or went since it was asked for the last time, in order
-    virtual std::vector<WorldChange> take_changes() = 0;
 
     // splats of finished tiles, each made of the tile's own points; null without splat_bytes
     virtual const SplatPool* splats() const = 0;

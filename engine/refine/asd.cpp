@@ -5,7 +5,6 @@
 #include "engine/sampling/guidance.h"
 #include "engine/sampling/step_rows.h"
 #include "kernels/picture.h"
-#include "runtime/base/hash.h"
 
 #include <algorithm>
 
@@ -209,38 +208,15 @@ Status AsdRenderer::upload_keys(const AsdStart& start)
     return m.previous_noise.write_rows(device_, previous);
 }
 
-// of everything but the network and the latents that decides the result
-uint64_t AsdRenderer::key_of(const AsdStart& start) const
-{
-    Hash hash;
-    const auto add = [&](const auto& values) { hash.add(std::as_bytes(std::span(values))); };
-    add_plan(hash, plan_);
-    const float settings[] = {options_.guidance_scale, options_.previous_noise};
-    add(settings);
-    const uint64_t what[] = {options_.seed, start.number, start.chain, start.first};
-    add(what);
-    return hash.value();
-}
-
-namespace {
-
-AsdStart start_of(const AsdFrame& frame)
-{
-    return {frame.number, frame.chain, frame.previous.empty(), frame.keys};
-}
-
-} // namespace
-
 Status AsdRenderer::begin(const AsdFrame& frame)
 {
     SR_CHECK(upload(frame));
-    return begin(start_of(frame));
+    return begin(AsdStart{frame.number, frame.chain, frame.previous.empty(), frame.keys});
 }
 
 Status AsdRenderer::begin(const AsdStart& start)
 {
     SR_CHECK(make_programs());
-    key_ = key_of(start);
     SR_CHECK(replay_->begin(kNoiseRows));
     SR_CHECK(upload_keys(start));
     SR_CHECK(begin_->run());
@@ -262,24 +238,6 @@ Result<bool> AsdRenderer::step(size_t submits)
 Status AsdRenderer::cancel()
 {
     return replay_ ? replay_->cancel() : Status{};
-}
-
-Result<std::vector<std::byte>> AsdRenderer::save()
-{
-    SR_ASSERT(replay_, "a renderer is saved that has not begun a frame");
-    return replay_->save(key_);
-}
-
-Status AsdRenderer::resume(const AsdFrame& frame, std::span<const std::byte> saved)
-{
-    SR_CHECK(upload(frame));
-    return resume(start_of(frame), saved);
-}
-
-Status AsdRenderer::resume(const AsdStart& start, std::span<const std::byte> saved)
-{
-    SR_CHECK(begin(start));
-    return replay_->resume(saved, key_);
 }
 
 Status AsdRenderer::end()

@@ -47,7 +47,7 @@ struct AsdSlots {
 // Autoregressive renderer: the UNet sees the noisy latent, the previous frame's latent with noise on it, the splat
 // buffer's latent and its visibility. The graph is built once per picture size and replayed for every step, one submit
 // a step; embeddings of the timesteps and keys and values of the text are computed once. The result depends on nothing
-// but the frame, the plan and the seed: not on where it stopped and was taken up again.
+// but the frame, the plan and the seed.
 class AsdRenderer {
   public:
     // errors: usage for a guidance scale or noise out of range; bad_input for a UNet of other channels; device errors
@@ -85,13 +85,6 @@ class AsdRenderer {
     size_t steps_done() const { return replay_ ? replay_->row() : 0; }
     size_t steps() const { return plan_.rows.size(); }
 
-    // between two steps: what another renderer with the same network, text, plan and options needs to go on, to the
-    // same bytes
-    Result<std::vector<std::byte>> save();
-    // in place of begin. Errors: bad_input for what was saved of another frame, plan, seed or options
-    Status resume(const AsdFrame& frame, std::span<const std::byte> saved);
-    Status resume(const AsdStart& start, std::span<const std::byte> saved);
-
     // makes the programs, which begin() does otherwise
     Status make_programs();
     // drops the programs and their memory until the next frame; between frames only
@@ -108,7 +101,6 @@ class AsdRenderer {
     Status make_tables(const Conditioning& text);
     Status upload(const AsdFrame& frame);
     Status upload_keys(const AsdStart& start);
-    uint64_t key_of(const AsdStart& start) const;
 
     Device& device_;
     SamplingPlan plan_;
@@ -116,7 +108,6 @@ class AsdRenderer {
     std::unique_ptr<Memory> memory_;
     std::unique_ptr<Program> begin_, step_, check_;
     std::optional<Replay> replay_;
-    uint64_t key_ = 0; // what the frame is
 
   public:
     ~AsdRenderer();

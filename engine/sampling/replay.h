@@ -20,7 +20,7 @@ struct ReplayMemory {
 };
 
 // The step loop of everything that is sampled: rows of a step table, one submit each, a few of them ahead of the
-// device. It may be stopped after any row, and taken up again: by the next call, or from bytes, by another Replay.
+// device. It may be stopped after any row; the next call goes on.
 class Replay {
   public:
     // makes ready for a row - its timestep, noise that is given - and says which program runs it, which must end with
@@ -43,11 +43,6 @@ class Replay {
     size_t row() const { return row_; }     // the next one to submit
     size_t rows() const { return rows_; }
     void end() { active_ = false; }
-
-    // the state between two rows, as bytes. key: what the run is; another one's bytes are refused (bad_input). A run
-    // that is taken up must have begun, with the same inputs.
-    Result<std::vector<std::byte>> save(uint64_t key);
-    Status resume(std::span<const std::byte> saved, uint64_t key);
 
   private:
     size_t ahead() const;

@@ -48,15 +48,4 @@ StepRow more_noise_row(double scale, uint32_t draw)
     return r;
 }
 
-void add_plan(Hash& hash, const SamplingPlan& plan)
-{
-    for (const PlanRow& row : plan.rows) {
-        const StepRow values = step_row(row);
-        hash.add(std::as_bytes(std::span(&values, 1)));
-    }
-    hash.add(std::as_bytes(std::span(plan.timesteps)));
-    const double settings[] = {plan.init_noise_sigma, plan.clip, double(plan.known)};
-    hash.add(std::as_bytes(std::span(settings)));
-}
-
 } // namespace semrover

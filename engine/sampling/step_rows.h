@@ -3,7 +3,6 @@
 #pragma once
 
 #include "engine/sampling/repaint.h"
-#include "runtime/base/hash.h"
 #include "shaders/lib/step_row.h"
 
 namespace semrover {
@@ -20,8 +19,5 @@ bool draws_noise(const SamplingPlan& plan);
 // x = scale z, and x += scale z: rows for step_renoise, with noise of the stream of all tokens
 StepRow first_noise_row(double scale, uint32_t draw);
 StepRow more_noise_row(double scale, uint32_t draw);
-
-// everything of a plan that decides what comes out
-void add_plan(Hash& hash, const SamplingPlan& plan);
 
 } // namespace semrover

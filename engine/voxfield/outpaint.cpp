@@ -118,22 +118,6 @@ void Outpainter::store(const RegionResult& result)
     graph_->done(result.region);
 }
 
-// as it is in the grid
-RegionResult Outpainter::stored(uint32_t region) const
-{
-    const size_t per_cell = size_t(config_.points_per_voxel) * 3;
-    RegionResult out;
-    out.region = region;
-    const auto targets = graph_->targets(region);
-    out.targets.assign(targets.begin(), targets.end());
-    for (const size_t cell : targets) {
-        const auto at = ptrdiff_t(cell * per_cell), end = ptrdiff_t((cell + 1) * per_cell);
-        out.points.insert(out.points.end(), grid_.points.begin() + at, grid_.points.begin() + end);
-        out.colors.insert(out.colors.end(), grid_.colors.begin() + at, grid_.colors.begin() + end);
-    }
-    return out;
-}
-
 double Outpainter::part() const
 {
     return flight_.empty() || !sampler_ ? 0 : double(sampler_->rows_done()) / double(sampler_->rows());
@@ -142,9 +126,7 @@ double Outpainter::part() const
 uint32_t Outpainter::widest_batch(uint32_t limit) const
 {
     RegionGraph graph = *graph_;
-    uint32_t widest = flight_.size() <= limit ? uint32_t(flight_.size()) : 0;
-    for (const uint32_t region : flight_) // a batch that is too large is not taken up
-        widest ? graph.done(region) : graph.give_back(region);
+    uint32_t widest = 0;
     while (!graph.finished()) {
         uint32_t fresh = 0;
         const std::vector<uint32_t> taken = graph.take(limit);
@@ -157,39 +139,11 @@ uint32_t Outpainter::widest_batch(uint32_t limit) const
     return widest;
 }
 
-Status Outpainter::resume(OutpaintState state)
-{
-    SR_ASSERT(flight_.empty() && !sampler_, "work has begun");
-    for (const RegionResult& region : state.finished)
-        SR_CHECK(restore(region));
-    // all into the grid now: the batch knows it, and later batches are those of a run that was not cut off
-    std::vector<uint32_t> others;
-    for (std::vector<uint32_t> taken; !(taken = graph_->take(regions_.size())).empty();)
-        for (const uint32_t region : taken) {
-            if (!restored_[region].targets.empty())
-                store(restored_[region]);
-            else if (std::ranges::count(state.in_flight, region))
-                flight_.push_back(region);
-            else
-                others.push_back(region);
-        }
-    for (const uint32_t region : others)
-        graph_->give_back(region);
-    if (!std::ranges::is_permutation(flight_, state.in_flight))
-        return fail(ErrorCode::bad_input, "the saved batch does not belong to this run");
-    flight_ = std::move(state.in_flight); // in the order that the sampler has them
-    resumed_ = std::move(state.sampler);
-    return {};
-}
-
-Status Outpainter::begin(TokenSampler& sampler, uint32_t batch, FinishedRegion finished)
+void Outpainter::begin(TokenSampler& sampler, uint32_t batch, FinishedRegion finished)
 {
     sampler_ = &sampler;
     batch_ = batch;
     finished_ = std::move(finished);
-    if (flight_.size() > batch)
-        return cancel(); // it does not fit any more
-    return flight_.empty() ? Status() : sampler_->resume(inputs(), std::exchange(resumed_, {}));
 }
 
 std::vector<RegionInput> Outpainter::inputs() const
@@ -243,27 +197,7 @@ Status Outpainter::cancel()
 {
     for (const uint32_t region : std::exchange(flight_, {}))
         graph_->give_back(region);
-    resumed_.clear();
     return sampler_ ? sampler_->cancel() : Status();
-}
-
-Result<OutpaintState> Outpainter::save()
-{
-    OutpaintState state;
-    for (uint32_t region = 0; region < regions_.size(); ++region) {
-        if (graph_->is_done(region))
-            state.finished.push_back(stored(region));
-        else if (!restored_[region].targets.empty())
-            state.finished.push_back(restored_[region]);
-    }
-    if (flight_.empty())
-        return state;
-    state.in_flight = flight_;
-    state.sampler = resumed_; // not begun yet
-    if (sampler_) {
-        SR_TRY(state.sampler, sampler_->save());
-    }
-    return state;
 }
 
 } // namespace semrover

@@ -19,18 +19,11 @@ struct RegionResult {
     std::vector<uint8_t> colors;   // [targets, n, 3]
 };
 
-// what has been done of a grid: taken up by another Outpainter of the same grid
-struct OutpaintState {
-    std::vector<RegionResult> finished;
-    std::vector<uint32_t> in_flight; // regions of the batch at work; empty: between two batches
-    std::vector<std::byte> sampler;  // how far it is
-};
-
 // called before dependents start: the place to save
 using FinishedRegion = std::function<Status(const RegionResult&)>;
 
 // Fills a grid region by region (docs/method.md §4): cells with generated = 1 are known and never change. In order:
-// restore or resume what is done already, begin, then step until it says true.
+// restore what is done already, begin, then step until it says true.
 class Outpainter {
   public:
     // grid: made ready for points (arrays allocated, n and voxel size of the model); errors: bad_input
@@ -57,24 +50,20 @@ class Outpainter {
 
     // takes over a region that an earlier run finished; its targets must be those of this run
     Status restore(const RegionResult& result);
-    // takes over what save() gave, before begin(). Errors: bad_input for the state of another grid
-    Status resume(OutpaintState state);
 
     // the rest, in batches of up to `batch` ready regions. The sampler outlives the work and does nothing else while a
-    // batch is in flight. Errors: bad_input when the sampler's part of a resumed state is not of this run
-    Status begin(TokenSampler& sampler, uint32_t batch, FinishedRegion finished = {});
+    // batch is in flight.
+    void begin(TokenSampler& sampler, uint32_t batch, FinishedRegion finished = {});
     // Up to `submits` submits of the batch in flight, or of a new one; what is complete is stored in the grid. true:
     // the grid is filled. Errors: as TokenSampler; those of `finished`
     Result<bool> step(size_t submits);
     // gives up the batch in flight; the grid keeps what is finished, and begin() may follow
     Status cancel();
-    Result<OutpaintState> save(); // between two steps
 
   private:
     Outpainter(VoxelGrid& grid, const TransformerConfig& config) : grid_(grid), config_(config) {}
     RegionInput input(uint32_t region) const;
     RegionResult result(uint32_t region, const float* tokens) const;
-    RegionResult stored(uint32_t region) const;
     void store(const RegionResult& result);
     std::vector<RegionInput> inputs() const;
     Status begin_batch();
@@ -91,8 +80,7 @@ class Outpainter {
     TokenSampler* sampler_ = nullptr; // from begin() on
     uint32_t batch_ = 1;
     FinishedRegion finished_;
-    std::vector<uint32_t> flight_;   // regions of the batch at work
-    std::vector<std::byte> resumed_; // the sampler's part of it, until begin()
+    std::vector<uint32_t> flight_; // regions of the batch at work
 
   public:
     ~Outpainter();

@@ -36,7 +36,6 @@ class RegionGraph {
 
     size_t region_count() const { return run_count_; } // with targets: those that run
     size_t done_count() const { return done_count_; }
-    bool is_done(uint32_t region) const { return states_[region] == State::done; }
     bool finished() const { return done_count_ == run_count_; }
 
     // cells the region generates, nearest to its seed first; empty for a dropped region

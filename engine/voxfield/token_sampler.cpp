@@ -4,7 +4,6 @@
 
 #include "engine/sampling/guidance.h"
 #include "engine/sampling/step_rows.h"
-#include "runtime/base/hash.h"
 
 #include <cmath>
 #include <numeric>
@@ -315,28 +314,6 @@ Result<Program*> TokenSampler::program_of(size_t row)
     return batch_->unguided && !guided(plan_.rows[row - 1]) ? batch_->unguided.get() : batch_->step.get();
 }
 
-// of everything but the model that decides the result
-uint64_t TokenSampler::key_of(std::span<const RegionInput> regions) const
-{
-    Hash hash;
-    const auto add = [&](const auto& values) { hash.add(std::as_bytes(std::span(values))); };
-    add_plan(hash, plan_);
-    add(std::span(&options_.guidance.scale, 1));
-    add(std::span(&options_.guidance.from, 1));
-    add(std::span(&options_.guidance.until, 1));
-    if (options_.guidance.narrows(transformer_.config().attention_radius)) // runs without one go on
-        add(std::span(&options_.guidance.radius, 1));
-    add(std::span(&options_.seed, 1));
-    for (const RegionInput& r : regions) {
-        add(r.cells);
-        add(r.labels);
-        add(r.known);
-        add(r.fixed);
-        add(r.told);
-    }
-    return hash.value();
-}
-
 Status TokenSampler::begin(std::span<const RegionInput> regions)
 {
     const TokenSets sets = pack(regions);
@@ -346,7 +323,6 @@ Status TokenSampler::begin(std::span<const RegionInput> regions)
     cells_.clear();
     for (const RegionInput& r : regions)
         cells_.push_back(uint32_t(r.cells.size()));
-    key_ = key_of(regions);
     SR_CHECK(upload(*b, sets, regions));
     SR_CHECK(b->prepare->run());
     return replay_->begin();
@@ -361,18 +337,6 @@ Result<bool> TokenSampler::step(size_t submits)
 Status TokenSampler::cancel()
 {
     return replay_ ? replay_->cancel() : Status{};
-}
-
-Result<std::vector<std::byte>> TokenSampler::save()
-{
-    SR_ASSERT(replay_, "a sampler is saved that has not begun");
-    return replay_->save(key_);
-}
-
-Status TokenSampler::resume(std::span<const RegionInput> regions, std::span<const std::byte> saved)
-{
-    SR_CHECK(begin(regions));
-    return replay_->resume(saved, key_);
 }
 
 Result<std::vector<float>> TokenSampler::finish()

@@ -63,7 +63,7 @@ using StepCallback = std::function<bool(size_t done, size_t total)>;
 
 // Denoises batches of regions with the transformer: the graphs are built once per batch shape and replayed for every
 // step, one submit a step. The result of a region depends on nothing but its own input, the plan and the seed: not on
-// where its run stopped and was taken up again.
+// where its run stopped and went on.
 class TokenSampler {
   public:
     static Result<std::unique_ptr<TokenSampler>> create(Device& device, const Transformer& transformer,
@@ -86,11 +86,6 @@ class TokenSampler {
     size_t rows_done() const { return replay_ ? replay_->row() : 0; }
     size_t rows() const { return plan_.rows.size() + 1; }
 
-    // between two steps: what another sampler with the same model, plan and options needs to go on, to the same bytes
-    Result<std::vector<std::byte>> save();
-    // in place of begin. Errors: bad_input for what was saved of other regions, another plan, seed or guidance
-    Status resume(std::span<const RegionInput> regions, std::span<const std::byte> saved);
-
     // of the batch shape of the last run: passes and barriers of a step, host time of one submit
     uint32_t step_passes() const;
     uint32_t step_barriers() const;
@@ -102,7 +97,6 @@ class TokenSampler {
     TokenSampler(Device& device, const Transformer& transformer, const SamplingPlan& plan, SamplerOptions options);
     bool guided(const PlanRow& step) const;
     Status upload_steps();
-    uint64_t key_of(std::span<const RegionInput> regions) const;
     Status make_modulations();
     StepTable step_table(Graph& g) const;
     TokenSets pack(std::span<const RegionInput> regions) const;
@@ -127,7 +121,6 @@ class TokenSampler {
     std::unique_ptr<Batch> batch_;
     std::optional<Replay> replay_; // over the batch
     std::vector<uint32_t> cells_;  // of each region of the run
-    uint64_t key_ = 0;             // what the run is
 
   public:
     ~TokenSampler();
