@@ -3,8 +3,8 @@
 // poses in the JSON of data sets of drives: PandaSet's poses.json, nuScenes' ego_pose.json
 #include "engine/format/camera_path.h"
 #include "engine/format/json_boxes.h"
+#include "engine/format/nuscenes_table.h"
 #include "runtime/base/quote.h"
-#include "runtime/base/text_start.h"
 
 #include <algorithm>
 #include <set>
@@ -13,8 +13,6 @@ namespace semrover {
 
 namespace {
 
-// nuScenes' table of poses has gigabytes; one record is in memory at a time
-constexpr JsonLimits kPoseTable = {.bytes = 4ull << 30, .depth = 8, .values = 1 << 12};
 constexpr size_t kMostPoses = 4u << 20;
 constexpr double kSceneGap = 5; // seconds between two scenes; key frames of one are half a second apart
 
@@ -82,25 +80,11 @@ struct EgoPose {
     Rigid pose;
 };
 
-Status for_each_pose_record(const Path& path, const std::function<Status(const Json&, std::string_view)>& record)
-{
-    const std::string name = quote_path(path);
-    SR_TRY(const MappedFile file, MappedFile::open(path));
-    const std::string_view bytes(reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size());
-    SR_TRY(const std::string_view text, text_after_mark(bytes, name));
-    return parse_json_records(text, name, kPoseTable, [&](const Json& json, size_t number) -> Status {
-        const std::string where = fmt::format("{} record {}", name, number);
-        if (!json.is_object())
-            return fail(ErrorCode::bad_input, "{}: expected an object, found {}", where, json.type_name());
-        return record(json, where);
-    });
-}
-
 // tokens of the poses at which the lidar on the roof has its key frames
 Result<std::set<std::string>> key_poses(const Path& sample_data)
 {
     std::set<std::string> tokens;
-    const Status read = for_each_pose_record(sample_data, [&](const Json& json, std::string_view where) -> Status {
+    const Status read = for_each_record(sample_data, [&](const Json& json, std::string_view where) -> Status {
         const auto key = json.find("is_key_frame");
         if (key == json.end() || *key != true)
             return {};
@@ -118,7 +102,7 @@ Result<std::set<std::string>> key_poses(const Path& sample_data)
 Result<std::vector<EgoPose>> read_ego_poses(const Path& path, const std::optional<std::set<std::string>>& wanted)
 {
     std::vector<EgoPose> poses;
-    const Status read = for_each_pose_record(path, [&](const Json& json, std::string_view where) -> Status {
+    const Status read = for_each_record(path, [&](const Json& json, std::string_view where) -> Status {
         if (wanted) {
             SR_TRY(const std::string token, text_at(json, "token", where));
             if (!wanted->contains(token))

@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // nuScenes' tables of annotations. Source: the page of the schema, and Box, of nutonomy/nuscenes-devkit
 #include "engine/format/json_boxes.h"
+#include "engine/format/nuscenes_table.h"
 #include "engine/format/object_boxes.h"
 #include "runtime/base/json_numbers.h"
 #include "runtime/base/quote.h"
-#include "runtime/base/text_start.h"
 
 #include <algorithm>
 #include <set>
@@ -13,9 +13,6 @@
 namespace semrover {
 
 namespace {
-
-// the tables of the whole data set have gigabytes; only one record of them is in memory at a time
-constexpr JsonLimits kTable = {.bytes = 4ull << 30, .depth = 8, .values = 1 << 12};
 
 struct Annotation {
     size_t number = 0; // of the record
@@ -26,20 +23,6 @@ struct Annotation {
 };
 
 using Tokens = std::map<std::string, std::string, std::less<>>;
-
-Status for_each_record(const Path& path, const std::function<Status(const Json&, std::string_view where)>& record)
-{
-    const std::string name = quote_path(path);
-    SR_TRY(const MappedFile file, MappedFile::open(path));
-    const std::string_view bytes(reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size());
-    SR_TRY(const std::string_view text, text_after_mark(bytes, name));
-    return parse_json_records(text, name, kTable, [&](const Json& json, size_t number) -> Status {
-        const std::string where = fmt::format("{} record {}", name, number);
-        if (!json.is_object())
-            return fail(ErrorCode::bad_input, "{}: expected an object, found {}", where, json.type_name());
-        return record(json, where);
-    });
-}
 
 Result<Rigid> pose_of_record(const Json& json, std::string_view where)
 {

@@ -48,16 +48,6 @@ bool is_known(std::string_view name)
 
 } // namespace
 
-GltfMatrix product_of(const GltfMatrix& a, const GltfMatrix& b)
-{
-    GltfMatrix m{};
-    for (size_t r = 0; r < 4; ++r)
-        for (size_t c = 0; c < 4; ++c)
-            for (size_t k = 0; k < 4; ++k)
-                m[4 * r + c] += a[4 * r + k] * b[4 * k + c];
-    return m;
-}
-
 std::array<double, 3> transformed(const GltfMatrix& m, const std::array<double, 3>& p)
 {
     std::array<double, 3> to;
@@ -205,7 +195,7 @@ Status GltfPose::walk(const std::vector<int64_t>& from, bool in_scene, std::vect
         pending_.pop_back();
         SR_TRY(const Json* node, file_.entry("nodes", next.node));
         SR_TRY(const GltfMatrix own, matrix_of(*node, fmt::format("{}: nodes[{}]", where_, next.node)));
-        const GltfMatrix matrix = product_of(next.parent, own);
+        const GltfMatrix matrix = compose(next.parent, own);
         if (!matrices_.empty())
             matrices_[size_t(next.node)] = matrix;
         const Json* visibility = extension_of(*node, "KHR_node_visibility");
@@ -300,7 +290,7 @@ Result<std::vector<GltfMatrix>> GltfPose::joints(int64_t index)
         GltfMatrix bind = kGltfIdentity;
         for (uint32_t c = 0; c < 16 && inverse; ++c)
             bind[4 * (c % 4) + c / 4] = inverse->number(i, c); // columns in the file
-        out.push_back(product_of(matrices_[size_t(nodes[i])], bind));
+        out.push_back(compose(matrices_[size_t(nodes[i])], bind));
     }
     if (out.empty())
         return fail(ErrorCode::bad_input, "{}: has no joints", where);

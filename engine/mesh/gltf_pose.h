@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/camera/rigid.h"
 #include "engine/mesh/gltf_file.h"
 
 #include <set>
@@ -11,7 +12,6 @@ namespace semrover {
 using GltfMatrix = std::array<double, 16>; // row-major
 constexpr GltfMatrix kGltfIdentity = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
 
-GltfMatrix product_of(const GltfMatrix& a, const GltfMatrix& b);
 std::array<double, 3> transformed(const GltfMatrix& m, const std::array<double, 3>& p);
 double determinant(const GltfMatrix& m);
 

@@ -76,7 +76,7 @@ Status GltfReader::read_placement(const GltfPlacement& p)
         return read_mesh(*mesh, p.mesh, pose);
     }
     for (size_t i = 0; i < instances.count; ++i) {
-        pose.matrix = product_of(p.matrix, instances.matrix(i));
+        pose.matrix = compose(p.matrix, instances.matrix(i));
         SR_CHECK(read_mesh(*mesh, p.mesh, pose));
     }
     return {};

@@ -13,6 +13,7 @@
 #include "tools/cli/origin_option.h"
 #include "tools/cli/print_stderr.h"
 #include "tools/cli/progress.h"
+#include "tools/cli/warnings.h"
 #include "tools/eval/point_files.h"
 #include "tools/measure/eval.h"
 
@@ -73,9 +74,7 @@ Result<Mesh> load_surface(const EvalChamferArguments& o, const Globals& globals)
     options.up = o.up == "y" ? UpAxis::y : o.up == "z" ? UpAxis::z : UpAxis::file;
     SR_TRY(options.origin, origin_from(o.origin));
     SR_TRY(Mesh mesh, read_mesh(o.mesh, options));
-    for (const std::string& warning : mesh.warnings)
-        if (!globals.quiet)
-            print_stderr("semrover: warning: {}\n", warning);
+    print_warnings(mesh.warnings, globals);
     return mesh;
 }
 

@@ -16,6 +16,7 @@
 #include "tools/cli/open_device.h"
 #include "tools/cli/origin_option.h"
 #include "tools/cli/print_stderr.h"
+#include "tools/cli/warnings.h"
 #include "tools/scenes/placement_option.h"
 
 #include <CLI/CLI.hpp>
@@ -107,9 +108,7 @@ Result<Mesh> load_mesh(const VoxelizeArguments& o, const Globals& globals)
     if (o.missing_textures == "white")
         options.missing_textures = MissingTextures::white;
     SR_TRY(Mesh mesh, read_mesh(o.mesh, options));
-    for (const std::string& warning : mesh.warnings)
-        if (!globals.quiet)
-            print_stderr("semrover: warning: {}\n", warning);
+    print_warnings(mesh.warnings, globals);
     SR_CHECK(label_mesh(mesh, o, options.map, globals));
     SR_CHECK(check_place(mesh, options.origin, o, globals));
     return mesh;
