@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 # <folder>/<op>[.<variant>].comp -> SPIR-V -> <build>/generated/<op>.spv.h, one header per op with all its variants. Debian
-# 12's compiler does not know cooperative matrices: SPIR-V of .coopmat variants lies in shaders/spirv (tools/spirv)
+# 12's compiler does not know cooperative matrices: SPIR-V of .coopmat variants lies in shaders/spirv (tools/dev/spirv)
 find_program(GLSLANG glslangValidator REQUIRED)
 add_executable(reflect cmake/reflect/main.cpp cmake/reflect/module.cpp cmake/reflect/protocol.cpp)
 target_include_directories(reflect PRIVATE ${CMAKE_SOURCE_DIR})

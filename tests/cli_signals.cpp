@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// every command ends soon after a signal, with code 130 and nothing half-written. tools/signals measures more moments.
+// every command ends soon after a signal, with code 130 and nothing half-written. tools/dev/signals measures more moments.
 #include "tests/child_program.h"
 #include "tests/program.h"
 

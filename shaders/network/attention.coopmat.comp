@@ -3,7 +3,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // y = softmax(q k^T scale + mask) v over both streams of a set, of fp16 inputs, for GPUs with matrix units: a workgroup
 // of four subgroups holds 32 queries of one head. Two subgroups share 16 queries: one looks at the voxel stream's keys,
-// the other at the semantic one's, and what they summed is joined at the end. tools/spirv compiles it.
+// the other at the semantic one's, and what they summed is joined at the end. tools/dev/spirv compiles it.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_EXT_shader_explicit_arithmetic_types : require

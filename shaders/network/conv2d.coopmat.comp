@@ -2,7 +2,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // y[n] = epilogue(sum over taps and channels of w[n, tap, c] x[pixel at tap, c]) of fp16 factors, for GPUs with matrix
-// units: an implicit GEMM with the tiles of gemm.coopmat.comp, kStep channels of a tap at a time. tools/spirv compiles it.
+// units: an implicit GEMM with the tiles of gemm.coopmat.comp, kStep channels of a tap at a time.
+// tools/dev/spirv compiles it.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_EXT_shader_explicit_arithmetic_types : require

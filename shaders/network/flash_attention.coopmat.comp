@@ -3,7 +3,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // y = softmax(q k^T scale) v of fp16 inputs, for GPUs with matrix units: a workgroup of four subgroups has 128 queries
 // of one head, 32 a subgroup (heads of more than 40: 16 in each of two turns). Queries and sums stay in registers.
-// tools/spirv compiles it.
+// tools/dev/spirv compiles it.
 //
 // Scores become weights in registers, although the extension does not say which element lies where: what is subtracted
 // from a row's scores is a matrix that has the same number in all of its columns. It need not be the row's largest

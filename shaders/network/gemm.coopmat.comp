@@ -1,7 +1,7 @@
 #version 460
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// y = epilogue(x w^T) of fp16 factors, for GPUs with matrix units (VK_KHR_cooperative_matrix). tools/spirv compiles it.
+// y = epilogue(x w^T) of fp16 factors, for GPUs with matrix units (VK_KHR_cooperative_matrix). tools/dev/spirv compiles it.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_EXT_shader_explicit_arithmetic_types : require

@@ -6,10 +6,10 @@
 #include "tools/cli/choice.h"
 #include "tools/cli/number_option.h"
 #include "tools/cli/option_meaning.h"
-#include "tools/convert_model.h"
-#include "tools/convert_objects.h"
-#include "tools/convert_path.h"
-#include "tools/convert_scene.h"
+#include "tools/commands/convert_model.h"
+#include "tools/commands/convert_objects.h"
+#include "tools/commands/convert_path.h"
+#include "tools/commands/convert_scene.h"
 
 #include <array>
 #include <CLI/CLI.hpp>

@@ -3,7 +3,7 @@
 // semrover inpaint GRID -m MODEL -o OUT --box ...: regenerates chosen cells, the rest staying byte for byte
 #include "engine/job/editing.h"
 #include "tools/cli/run_job.h"
-#include "tools/generation_options.h"
+#include "tools/commands/generation_options.h"
 
 #include <CLI/CLI.hpp>
 

@@ -19,10 +19,10 @@
 #include "tools/cli/option_meaning.h"
 #include "tools/cli/path_options.h"
 #include "tools/cli/progress.h"
-#include "tools/convert_model.h"
-#include "tools/convert_path.h"
-#include "tools/inspect_path.h"
-#include "tools/scene_input.h"
+#include "tools/commands/convert_model.h"
+#include "tools/commands/convert_path.h"
+#include "tools/commands/inspect_path.h"
+#include "tools/commands/scene_input.h"
 
 #include <algorithm>
 #include <CLI/CLI.hpp>

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/convert_path.h"
+#include "tools/commands/convert_path.h"
 
 #include "engine/format/camera_path.h"
 #include "engine/format/labelled_points.h"
@@ -8,7 +8,7 @@
 #include "runtime/base/quote.h"
 #include "tools/cli/choice.h"
 #include "tools/cli/warnings.h"
-#include "tools/scene_input.h"
+#include "tools/commands/scene_input.h"
 
 #include <algorithm>
 #include <CLI/CLI.hpp>

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/scene_input.h"
+#include "tools/commands/scene_input.h"
 
 #include "engine/scene/palette.h"
 #include "engine/scene/tiles.h"

@@ -7,9 +7,9 @@
 #include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/run_job.h"
-#include "tools/drive_options.h"
-#include "tools/scene_input.h"
-#include "tools/video.h"
+#include "tools/commands/drive_options.h"
+#include "tools/commands/scene_input.h"
+#include "tools/commands/video.h"
 
 #include <CLI/CLI.hpp>
 

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "engine/camera/camera.h"
-#include "tools/scene_input.h"
+#include "tools/commands/scene_input.h"
 
 #include <nlohmann/json.hpp>
 

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "engine/format/object_boxes.h"
-#include "tools/scene_input.h"
+#include "tools/commands/scene_input.h"
 
 namespace semrover {
 

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/inspect_path.h"
+#include "tools/commands/inspect_path.h"
 
 #include "engine/format/path_format.h"
 #include "engine/job/empty_frames.h"

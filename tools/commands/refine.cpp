@@ -8,9 +8,9 @@
 #include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/run_job.h"
-#include "tools/drive_options.h"
-#include "tools/refine_video.h"
-#include "tools/scene_input.h"
+#include "tools/commands/drive_options.h"
+#include "tools/commands/refine_video.h"
+#include "tools/commands/scene_input.h"
 
 #include <algorithm>
 #include <CLI/CLI.hpp>

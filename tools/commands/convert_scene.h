@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "tools/scene_input.h"
+#include "tools/commands/scene_input.h"
 
 namespace semrover {
 

@@ -1,13 +1,13 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/convert_scene.h"
+#include "tools/commands/convert_scene.h"
 
 #include "engine/scene/palette.h"
 #include "engine/splat/blocks.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/option_meaning.h"
-#include "tools/drive_options.h"
+#include "tools/commands/drive_options.h"
 
 namespace semrover {
 

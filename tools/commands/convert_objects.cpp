@@ -1,12 +1,12 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/convert_objects.h"
+#include "tools/commands/convert_objects.h"
 
 #include "engine/job/told_objects.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/number_option.h"
-#include "tools/scene_input.h"
+#include "tools/commands/scene_input.h"
 
 #include <CLI/CLI.hpp>
 

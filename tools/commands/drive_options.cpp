@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/drive_options.h"
+#include "tools/commands/drive_options.h"
 
 #include "engine/format/camera_path.h"
 #include "runtime/base/quote.h"

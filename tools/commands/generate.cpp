@@ -11,8 +11,8 @@
 #include "tools/cli/option_meaning.h"
 #include "tools/cli/path_options.h"
 #include "tools/cli/run_job.h"
-#include "tools/generation_options.h"
-#include "tools/scene_input.h"
+#include "tools/commands/generation_options.h"
+#include "tools/commands/scene_input.h"
 
 #include <CLI/CLI.hpp>
 

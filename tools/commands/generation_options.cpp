@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/generation_options.h"
+#include "tools/commands/generation_options.h"
 
 #include "tools/cli/choice.h"
 #include "tools/cli/number_option.h"

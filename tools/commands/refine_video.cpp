@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/refine_video.h"
+#include "tools/commands/refine_video.h"
 
-#include "tools/video.h"
+#include "tools/commands/video.h"
 
 #include <optional>
 

@@ -8,7 +8,7 @@
 #include "engine/scene/scene_objects.h"
 #include "tools/cli/number_option.h"
 #include "tools/cli/run_job.h"
-#include "tools/generation_options.h"
+#include "tools/commands/generation_options.h"
 
 #include <CLI/CLI.hpp>
 

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/video.h"
+#include "tools/commands/video.h"
 
 #include "runtime/base/quote.h"
 
