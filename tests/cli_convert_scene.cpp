@@ -108,7 +108,7 @@ TEST(CliConvertScene, unknown_labels_are_listed_and_a_map_says_what_they_are)
                                               "0 0 0 24\n1 0 0 24\n2 0 0 7\n")
                                 .string();
     const std::string out = (folder / "o.sgrid").string();
-    expect_error(convert(ply, out), 3, "unknown labels: 24 (2 points); --map NAME or FILE says what they are");
+    expect_error(convert(ply, out), 3, "unknown labels: 24 (2 points); --map says what they are");
     EXPECT_FALSE(std::filesystem::exists(out));
     const std::string map = folder.put("map.json", R"({"24": "road-lane"})").string();
     ASSERT_EQ(convert(ply, out, "--map " + map + " --voxel-size 0.5 --origin 1,-0.5,0").code, 0);

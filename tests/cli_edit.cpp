@@ -266,8 +266,8 @@ TEST_F(CliEdit, what_makes_no_sense_is_refused_in_one_line)
     expect_refusal(edit("--remove all --sphere 0,0,0,0"), 2, "radius above 0");
     expect_refusal(edit("--paint road --box 0,0,0:900,900,900 --fill"), 3, "too many to fill");
     expect_refusal(edit("--paint road --class car --fill"), 2, "what is filled is a box");
-    expect_refusal(edit("--copy --class car"), 2, "--by x,y,z is missing");
-    expect_refusal(edit("--insert " + path("in.sgrid")), 2, "--at x,y,z is missing");
+    expect_refusal(edit("--copy --class car"), 2, "--by is missing");
+    expect_refusal(edit("--insert " + path("in.sgrid")), 2, "--at is missing");
     expect_refusal(edit("--insert " + path("none.sgrid") + " --at 0,0,0"), 3, "none.sgrid");
     expect_refusal(edit("--insert " + path("in.sgrid") + " --at 0,0,0 --rotate 30"), 2, "0, 90, 180 or 270");
     expect_refusal(edit("--copy --class car --by 1e7,0,0"), 3, "absurd");

@@ -112,8 +112,7 @@ TEST(CliEvalFrames, labels_are_numbers_of_any_kind_of_picture)
     put(8, PngFile::kPalette, 2, 13, std::string(3 * 20, '\x66'));
     EXPECT_EQ(json_of(figures().out)["labels"], expect);
     put(16, PngFile::kGray, 11, 26);
-    expect_error(figures(), 3,
-                 "unknown labels: 26 (192 pixels); --map NAME or FILE says what they are; found are 11 person");
+    expect_error(figures(), 3, "unknown labels: 26 (192 pixels); --map says what they are; found are 11 person");
     EXPECT_EQ(json_of(figures(" --map cityscapes").out)["labels"], expect);
     std::filesystem::remove(p.folder / "label/000000.png");
     NpyArray array{DType::i16, {kHeight, kWidth}, {}};

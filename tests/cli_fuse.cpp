@@ -217,7 +217,7 @@ TEST(CliFuse, unknown_labels_are_listed_with_counts_and_may_be_mapped)
     std::fill_n(labels.begin(), 5, 77);
     std::fill_n(labels.begin() + 5, 3, 200);
     ASSERT_TRUE(write_png_gray8(drive.in("label/000001.png"), 96, 72, labels));
-    drive.expect_refusal("unknown labels: 77 (5 pixels), 200 (3 pixels); --map NAME or FILE says what they are; found "
+    drive.expect_refusal("unknown labels: 77 (5 pixels), 200 (3 pixels); --map says what they are; found "
                          "are 0 road (");
     const Path map = drive.folder.put("map.json", R"({"77": "car", "200": null, "pole": 3})");
     EXPECT_EQ(drive.fuse("--map " + map.string()).code, 0);
@@ -613,7 +613,7 @@ TEST(CliFuse, class_numbers_come_from_every_kind_of_label_picture)
     fill(8, PngFile::kGray, byte(11, 26)); // building and car of Cityscapes; 11 is person here
     const ProgramResult foreign = w.fuse("");
     EXPECT_EQ(foreign.code, 3);
-    EXPECT_NE(foreign.err.find("unknown labels: 26 (7200 pixels); --map NAME or FILE says what they are; found are 11 "
+    EXPECT_NE(foreign.err.find("unknown labels: 26 (7200 pixels); --map says what they are; found are 11 "
                                "person (7200 pixels), 26 (7200 pixels, unknown)"),
               std::string::npos)
         << foreign.err;

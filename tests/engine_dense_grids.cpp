@@ -143,14 +143,14 @@ TEST(DenseLabels, a_doubled_ground_is_said)
     EXPECT_EQ(cells, 128u);
     EXPECT_EQ(warnings, std::vector<std::string>{
                             "64 of 64 columns of ground have two layers of cells: voxels of 0.2 m straddle the "
-                            "boundaries of cells of 0.6 m; --voxel-size 0.2 keeps the voxels as they are, --min-fill "
+                            "boundaries of cells of 0.6 m; `voxel_size` 0.2 keeps the voxels as they are, `min_fill` "
                             "0.17 leaves out the emptier layer"});
     EXPECT_EQ(ground(0, 0.6, 0.17), std::pair(size_t(64), std::vector<std::string>()));
     EXPECT_EQ(ground(0, 0.2, 0), std::pair(size_t(576), std::vector<std::string>()));
     const auto [twice, shifted] = ground(3, 0.2, 0, 1000); // half a voxel higher
     EXPECT_EQ(twice, 1152u);
     ASSERT_EQ(shifted.size(), 1u);
-    EXPECT_TRUE(shifted[0].ends_with("; --origin in whole cells keeps the voxels as they are")) << shifted[0];
+    EXPECT_TRUE(shifted[0].ends_with("; `origin` in whole cells keeps the voxels as they are")) << shifted[0];
 }
 
 // ---- label maps
@@ -174,8 +174,7 @@ TEST(LabelMap, a_file_says_what_labels_are)
     EXPECT_EQ(map.left_out("voxels"), std::vector<std::string>{"4 voxels of label 10 are left out"});
     EXPECT_EQ(map(77, 3), kLeftOut);
     EXPECT_EQ(map(99999), kLeftOut);
-    EXPECT_TRUE(
-        says(map.check("here", "voxels"), "here: unknown labels: 77 (3 voxels), 99999 (1 voxels); --map NAME or FILE"));
+    EXPECT_TRUE(says(map.check("here", "voxels"), "here: unknown labels: 77 (3 voxels), 99999 (1 voxels); `map` says"));
     EXPECT_TRUE(says(apply("[]"), "expected an object of source label to class, found array"));
     EXPECT_TRUE(says(apply(R"({"lamp": "lamp"})"),
                      "'lamp': expected a class (name or 0 to 19), null or \"free\", found \"lamp\""));
@@ -252,7 +251,7 @@ TEST(LabelMap, a_column_of_another_program_needs_a_map)
     auto [refused, unused] = ask(LabelMap::of_column(las, false, {}), {2, 6, 6, 77});
     EXPECT_TRUE(says(refused.check("p.ply", "points"),
                      "p.ply: 'classification': a column of that name holds numbers of asprs, not ours: 2 ground (1 "
-                     "points, terrain), 6 building (2 points), 77 (1 points, unknown); --map asprs takes"));
+                     "points, terrain), 6 building (2 points), 77 (1 points, unknown); `map` asprs takes"));
     auto [taken, terrain] = ask(LabelMap::of_column(las, false, "asprs"), {2, 6});
     EXPECT_EQ(terrain, (std::vector<uint8_t>{9, 2}));
     EXPECT_TRUE(taken.check("p.ply", "points"));
@@ -268,13 +267,13 @@ TEST(LabelMap, a_column_of_another_program_needs_a_map)
     EXPECT_TRUE(anybody.check("p.ply", "points"));
     EXPECT_EQ(anybody.assumed("p.ply", "points"),
               std::vector<std::string>{"p.ply: 'label': the numbers are taken for our own classes: 2 building (2 "
-                                       "points), 5 pole (1 points); --map says what they are if they are another "
+                                       "points), 5 pole (1 points); `map` says what they are if they are another "
                                        "program's"});
     auto [own, again] = ask(LabelMap::of_column(any, true, {}), {2, 2, 5});
     EXPECT_TRUE(own.assumed("p.ply", "points").empty());
     auto [raw, none] = ask(LabelMap::of_column(any, false, {}), {10, 252});
     EXPECT_TRUE(says(raw.check("p.ply", "points"),
-                     "unknown labels: 252 (1 points); --map NAME or FILE says what they are; found are 10 sky (1 "
+                     "unknown labels: 252 (1 points); `map` says what they are; found are 10 sky (1 "
                      "points), 252 (1 points, unknown); all numbers of the file are in semantickitti"));
 }
 
@@ -406,7 +405,7 @@ TEST(SemanticKitti, training_ids_are_no_raw_ids)
     k.set(3, 128, 10, 9);
     const Path file = folder.put("0.label", k.labels);
     EXPECT_TRUE(says(read_semantic_kitti(file, {}), "the largest number is 9: these may be SemanticKITTI's raw ids, or "
-                                                    "its training ids; --map semantickitti or"));
+                                                    "its training ids; `map` semantickitti or"));
     SceneGridOptions o;
     o.map = "semantickitti-train";
     const auto out = read_semantic_kitti(file, o);
@@ -433,7 +432,7 @@ TEST(SemanticKitti, refuses_malformed_files)
     unknown.set(0, 0, 0, 1000);
     unknown.set(0, 0, 1, 1000);
     unknown.set(0, 0, 2, 41);
-    EXPECT_TRUE(says(read(unknown.labels), "unknown labels: 41 (1 voxels), 1000 (2 voxels); --map NAME or FILE"));
+    EXPECT_TRUE(says(read(unknown.labels), "unknown labels: 41 (1 voxels), 1000 (2 voxels); `map` says"));
     Kitti good;
     good.set(0, 0, 0, 40);
     EXPECT_TRUE(read(good.labels));

@@ -160,7 +160,7 @@ TEST(EngineFusion, without_labels_and_colours_the_mesh_is_gray_and_unlabelled)
 TEST(EngineFusion, what_one_frame_saw_is_dropped_unless_asked_for)
 {
     const DepthFrames frames = kStreet.frames(StreetScene::drive(1));
-    EXPECT_TRUE(says(fuse(test_device(), frames, kOptions), "no surface was seen by 2 of them (--min-views)"));
+    EXPECT_TRUE(says(fuse(test_device(), frames, kOptions), "no surface was seen by 2 of them (`min_views`)"));
     FusionOptions lenient = kOptions;
     lenient.min_views = 1;
     EXPECT_GT(fused(frames, lenient).mesh.faces.size(), 1000u);
@@ -180,7 +180,7 @@ TEST(EngineFusion, poses_that_cannot_be_and_empty_pictures_are_bad_input)
     wide[1] = StreetScene::camera({9000, 9000, 900}, 0, 0.1, wide[0].intrinsics);
     FusionOptions fine = kOptions;
     fine.voxel = 0.02;
-    EXPECT_TRUE(says(fuse(test_device(), kStreet.frames(wide), fine), "use a larger --tsdf-voxel"));
+    EXPECT_TRUE(says(fuse(test_device(), kStreet.frames(wide), fine), "use a larger `voxel`"));
 }
 
 TEST(EngineFusion, pixels_of_other_sizes_meet_at_their_centres)

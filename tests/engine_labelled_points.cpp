@@ -42,7 +42,7 @@ TEST(LabelledPoints, a_cells_label_is_that_of_most_points)
     EXPECT_TRUE(out->warnings[0].ends_with(
         ": 'label': the numbers are taken for our own classes: 0 road (1 points), 3 wall (1 points), 5 pole (1 "
         "points), "
-        "8 vegetation (2 points), 19 road-lane (1 points); --map says what they are if they are another program's"));
+        "8 vegetation (2 points), 19 road-lane (1 points); `map` says what they are if they are another program's"));
     EXPECT_EQ(out->warnings[1], "2 points that are not finite are left out");
     EXPECT_EQ(out->dropped, 2u);
     SceneGridOptions o;
@@ -192,11 +192,11 @@ TEST(LabelledPoints, refuses_what_is_no_labelled_cloud)
     EXPECT_TRUE(says(read(ply("property float x\nproperty float y\n", {"1 2"})), "its vertices have no property z"));
     EXPECT_TRUE(says(read(ply("property list uchar float x\nproperty float y\nproperty float z\n", {"1 2 3 4"})),
                      "its vertices have no property x"));
-    EXPECT_TRUE(says(read(ply(kXyz, {"1 2 3"})), "its vertices have no label; --label CLASS"));
+    EXPECT_TRUE(says(read(ply(kXyz, {"1 2 3"})), "its vertices have no label; `default_label` gives"));
     EXPECT_TRUE(says(read(ply(labelled, {})), "there are no points"));
     EXPECT_TRUE(says(read(ply(labelled, {"nan 0 0 1"})), "there are no points"));
     EXPECT_TRUE(says(read(ply(labelled, {"0 0 0 25", "0 0 0 25", "0 0 0 77"})),
-                     "unknown labels: 25 (2 points), 77 (1 points); --map NAME or FILE"));
+                     "unknown labels: 25 (2 points), 77 (1 points); `map` says"));
     EXPECT_TRUE(says(read(ply(labelled, {"0 0 0 -1"})), "vertex 0: 'label': expected a whole number, found -1"));
     EXPECT_TRUE(says(read(ply(std::string(kXyz) + "property float label\n", {"0 0 0 1.5"})), "found 1.5"));
     EXPECT_TRUE(says(read(ply(labelled, {"0 0 0 1", "1e9 0 0 1"})), "vertex 1: (1000000000, 0, 0) m is absurd"));
@@ -247,7 +247,7 @@ TEST(LabelledPoints, carlas_axes_are_left_handed)
     EXPECT_EQ(out->grid.cells, (std::vector<Cell>{{0, 6, 2}, {5, -1, -1}, {8, -6, 0}}));
     EXPECT_EQ(out->grid.labels, (std::vector<uint8_t>{3, 0, 13})); // wall, road, car
     ASSERT_EQ(out->warnings.size(), 1u);
-    EXPECT_NE(out->warnings[0].find("--from points-ply keeps it"), std::string::npos);
+    EXPECT_NE(out->warnings[0].find("`format` points-ply keeps it"), std::string::npos);
 
     const auto boxes = read_box_file(
         folder.put("boxes.json", R"([{"type_id": "vehicle.audi.tt", "location": {"x": 5.2, "y": 3.1, "z": 0.5},

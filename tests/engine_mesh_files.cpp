@@ -390,7 +390,7 @@ TEST(MeshFiles, ply_polygons_textures_and_labels_are_read)
                                                           "property list uchar int vertex_indices\nproperty int label\n"
                                                           "end_header\n0 0 0 0 0\n1 0 0 1 0\n1 1 0 1 1\n0 1 0 0 1\n"
                                                           "3 0 1 2 77\n");
-    EXPECT_TRUE(says(read_mesh(other), "unknown labels: 77 (1 faces); --map NAME or FILE says what they are"));
+    EXPECT_TRUE(says(read_mesh(other), "unknown labels: 77 (1 faces); `map` says what they are"));
     const auto map = MeshLabelMap::read(folder.put("map.json", R"({"77": "Terrain", "glass*": null})"));
     ASSERT_TRUE(map) << map.error().message;
     const auto mapped = read_mesh(other, {.map = *map});

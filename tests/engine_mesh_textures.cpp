@@ -117,7 +117,7 @@ TEST(MeshTextures, a_mesh_can_be_read_without_textures_that_are_missing_or_broke
     folder.put("text.png", "no picture");
     folder.put("m.mtl", "newmtl wall\nKd 0 1 0\nmap_Kd none.png\nnewmtl road\nmap_Kd text.png\n");
     const Path obj = folder.put("m.obj", square("m.mtl", "usemtl road\nf 1/1 2/2 3/3\n"));
-    EXPECT_TRUE(says(read_mesh(obj), "--missing-textures white goes on without"));
+    EXPECT_TRUE(says(read_mesh(obj), "`missing_textures` white goes on without"));
     const Mesh m = readable(obj, {.missing_textures = MissingTextures::white});
     EXPECT_TRUE(m.textures.empty());
     EXPECT_EQ(m.materials.at(0).color, (std::array<float, 3>{0, 1, 0}));
@@ -164,7 +164,7 @@ TEST(MeshTextures, what_an_mtl_makes_transparent_is_no_surface)
     };
     const Mesh glass = with("", "d 0.3\n");
     EXPECT_NEAR(area_of(glass), 36, 1e-6);
-    EXPECT_TRUE(warns(glass, "transparent, and so no surface: 'glass' (18 m^2); --opaque makes it one"));
+    EXPECT_TRUE(warns(glass, "transparent, and so no surface: 'glass' (18 m^2); `opaque` makes it one"));
     EXPECT_NEAR(area_of(with("", "d 0.5\n")), 54, 1e-6);
     EXPECT_NEAR(area_of(with("", "d -halo 0.2\n")), 36, 1e-6);
     EXPECT_NEAR(area_of(with("", "Tr 0.7\n")), 36, 1e-6);

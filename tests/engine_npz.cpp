@@ -266,7 +266,7 @@ TEST(GridNpz, finer_cells_become_larger_ones)
     EXPECT_TRUE(says(read(), "a cell of 0.5 m is not a whole number of voxels of 0.2 m"));
     o = {};
     o.file_voxel_size = 0.1;
-    EXPECT_TRUE(says(read(), "says that its voxels are 0.2 m, --file-voxel-size says 0.1 m"));
+    EXPECT_TRUE(says(read(), "says that its voxels are 0.2 m, `file_voxel_size` says 0.1 m"));
     o = {};
     o.map = folder.put("map.json", R"({"13": null, "0": "terrain"})");
     EXPECT_EQ(read()->grid.cells.size(), 10u);
@@ -288,7 +288,7 @@ TEST(GridNpz, a_file_of_others_says_its_size_and_its_classes)
                                                             {"labels.npy", npy_bytes("|u1", "(1,)", label)}})),
                              o);
     };
-    EXPECT_TRUE(says(read("\3", {}), "does not say how large its voxels are: --voxel-size METRES does"));
+    EXPECT_TRUE(says(read("\3", {}), "does not say how large its voxels are: `voxel_size` does"));
     SceneGridOptions o;
     o.voxel_size = 0.4f;
     EXPECT_EQ(read("\3", o)->grid.voxel_size, 0.4f);
@@ -385,7 +385,7 @@ TEST(LabelArray, what_is_no_labels_is_refused_with_words)
     o.voxel_size = 0.4f;
     const auto read = [&](const std::string& bytes) { return read_scene_grid(folder.put("a.npy", bytes), o); };
     EXPECT_TRUE(says(read(npy_of("|u1", "(1, 1, 3)", std::vector<uint8_t>{40, 40, 50})),
-                     "unknown labels: 40 (2 voxels), 50 (1 voxels); --map NAME or FILE says what they are; all numbers "
+                     "unknown labels: 40 (2 voxels), 50 (1 voxels); `map` says what they are; all numbers "
                      "of the file are in semantickitti"));
     o.map = "semantickitti";
     EXPECT_TRUE(says(read(npy_of("|u1", "(2, 2)", std::vector<uint8_t>(4))),

@@ -128,8 +128,8 @@ TEST_F(ObjectBoxes, kitti_tracking_has_many_frames_and_keeps_the_ids)
     EXPECT_EQ(file->objects[1].id, 9u);
     EXPECT_TRUE(kitti(tracks, {.frame = 2})->objects.empty());
     EXPECT_TRUE(says(kitti(tracks, {.frame = 4}), "there is no frame 4, the last is 3"));
-    EXPECT_TRUE(says(kitti(tracks), "000001.txt' line 3: frame 3 after frame 0: choose one with --frame"));
-    EXPECT_TRUE(says(kitti(kAhead, {.frame = 0}), "--frame is for labels of tracking"));
+    EXPECT_TRUE(says(kitti(tracks), "000001.txt' line 3: frame 3 after frame 0: choose one with `frame`"));
+    EXPECT_TRUE(says(kitti(kAhead, {.frame = 0}), "`frame` is for labels of tracking"));
     EXPECT_TRUE(says(kitti("0 7 " + kAhead + "0 7 " + kAhead), "line 2: id 7 is given twice"));
     EXPECT_TRUE(says(kitti("0 1.5 " + kAhead), "track id: expected a whole number, found 1.5"));
 }
@@ -154,7 +154,7 @@ TEST_F(ObjectBoxes, broken_kitti_labels_are_refused_with_their_line)
     text.replace(text.find("20 "), 3, "2e7 ");
     EXPECT_TRUE(says(kitti(text), "center: expected numbers from -1000000 to 1000000"));
     text.replace(0, 3, "Cow");
-    EXPECT_TRUE(says(kitti(kAhead + text), "unknown labels: 1009 Cow (1 objects); --map NAME or FILE says what they are"));
+    EXPECT_TRUE(says(kitti(kAhead + text), "unknown labels: 1009 Cow (1 objects); `map` says what they are"));
     const Path map = folder_.put("map.json", R"({"Cow": null, "Misc": "truck", "Car": "road-lane"})");
     const auto mapped = kitti(kAhead + "Misc" + kAhead.substr(3) + text, {.map = map});
     ASSERT_TRUE(mapped) << mapped.error().message;
@@ -162,7 +162,7 @@ TEST_F(ObjectBoxes, broken_kitti_labels_are_refused_with_their_line)
     EXPECT_EQ(mapped->objects.at(1).label, kTruck);
     EXPECT_EQ(mapped->dropped, 1u);
     EXPECT_TRUE(says(kitti(kAhead, {.map = folder_.put("map.json", R"({"Car": "cart"})")}), "expected a class"));
-    EXPECT_TRUE(says(kitti(kAhead, {.sample = "t"}), "--sample has no meaning for kitti-boxes"));
+    EXPECT_TRUE(says(kitti(kAhead, {.sample = "t"}), "`sample` has no meaning for kitti-boxes"));
 }
 
 class NuscenesBoxes : public ObjectBoxes {
@@ -224,7 +224,7 @@ TEST_F(NuscenesBoxes, boxes_come_into_the_vehicles_frame)
     ASSERT_TRUE(file) << file.error().message;
     expect_box(file->objects.at(0), kCar, {10, 0, 1}, {4.5, 1.9, 1.6}, 0);
     expect_box(file->objects.at(1), kPerson, {110, -5, 1}, {4.5, 1.9, 1.6}, -kPi / 2);
-    EXPECT_TRUE(says(boxes(records_, {.vehicle_frame = true}), "--vehicle-frame needs --sample"));
+    EXPECT_TRUE(says(boxes(records_, {.vehicle_frame = true}), "`vehicle_frame` needs `sample`"));
     EXPECT_TRUE(says(boxes(records_, {.sample = "s1", .vehicle_frame = true}), "no key frame of LIDAR_TOP"));
 }
 
@@ -283,7 +283,7 @@ TEST_F(ObjectBoxes, broken_waymo_labels_are_refused_with_their_number)
     EXPECT_TRUE(
         says(waymo(R"({"laserLabels": [], "pose": {"transform": [1, 2]}})"), "pose: transform: expected a 4x4"));
     EXPECT_TRUE(says(waymo(R"({"laserLabels": [], "pose": {}})"), "pose: transform: expected 16 numbers"));
-    EXPECT_TRUE(says(waymo("[]", {.frame = 1}), "--frame is for tables"));
+    EXPECT_TRUE(says(waymo("[]", {.frame = 1}), "`frame` is for tables"));
 }
 
 const std::string kWaymoHeader =

@@ -250,8 +250,8 @@ TEST(PathFiles, a_placement_applies_in_its_order)
     EXPECT_TRUE(
         says(place_path(path, frame, "a"), "no frame 1, expected one of 2 frames, which the file numbers 10 to 13"));
     path.body = PathBody{"a vehicle", kIdentity};
-    EXPECT_TRUE(
-        says(place_path(path, lidar, "a"), "--calib brings a camera's poses into the lidar's frame, and these"));
+    EXPECT_TRUE(says(place_path(path, lidar, "a"),
+                     "`lidar_to_camera` brings a camera's poses into the lidar's frame, and these"));
 }
 
 // transforms.json with these keys in the file and in its frame; -W, -H and --fov-x are not given
@@ -339,7 +339,7 @@ TEST(PathFiles, a_default_field_of_view_is_said)
     const Path path = folder.put("a.tum", "0 0 0 0 0 0 0 1\n");
     const auto read = read_camera_path(path, PathLens(pinhole_from_fov(73, 616, 424), false, false));
     ASSERT_EQ(read->warnings.size(), 1u);
-    EXPECT_NE(read->warnings[0].find("has no intrinsics; the default field of view of 73 degrees is taken (--fov-x)"),
+    EXPECT_NE(read->warnings[0].find("has no intrinsics; the default field of view of 73 degrees is taken (`fov_x`)"),
               std::string::npos);
     EXPECT_TRUE(read_camera_path(path, kView)->warnings.empty());
 }

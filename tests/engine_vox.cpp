@@ -194,8 +194,8 @@ TEST(Vox, colours_of_no_class_need_a_map_or_the_nearest)
     const std::string bytes =
         file(size(4, 1, 1) + voxels({{0, 0, 0, 200}, {1, 0, 0, 201}, {2, 0, 0, 201}, {3, 0, 0, 9}}) + palette());
     EXPECT_TRUE(says(read(folder, bytes),
-                     "unknown labels: 200 #814080 (1 voxels), 201 #01fefd (2 voxels); --map NAME or FILE says what they are, "
-                     "--nearest-color"));
+                     "unknown labels: 200 #814080 (1 voxels), 201 #01fefd (2 voxels); `map` says what they are, "
+                     "`nearest_color`"));
     SceneGridOptions o;
     o.nearest_color = true;
     const auto nearest = read(folder, bytes, o);

@@ -483,7 +483,7 @@ TEST(EngineVoxelizer, a_mesh_far_from_the_origin_gets_the_cells_and_points_of_it
     EXPECT_LT(c->to_points, 0.1);
     far.origin = {500123, 4649000, 0};
     EXPECT_TRUE(says(voxelize(test_device(), far, {.default_label = 0}),
-                     "beyond 2^20 cells of 0.6 m; move it to the origin (--origin), or take a larger voxel size"));
+                     "beyond 2^20 cells of 0.6 m; move it to the origin (`origin`), or take a larger voxel size"));
 }
 
 TEST(EngineVoxelizer, label_textures_say_labels_where_faces_do_not)

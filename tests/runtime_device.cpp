@@ -154,8 +154,7 @@ TEST(runtime_device, refuses_memory_beyond_the_budget_with_numbers)
     const uint64_t used = device->allocated_bytes();
     EXPECT_GE(used, 300000u);
     const auto more = Buffer::create(*device, 900096, MemoryKind::device, "weights");
-    EXPECT_TRUE(
-        says(more, fmt::format("weights: 900096 bytes do not fit: {} in use, budget (--max-vram) 1048576", used)));
+    EXPECT_TRUE(says(more, fmt::format("weights: 900096 bytes do not fit: {} in use, `max_bytes` 1048576", used)));
     EXPECT_EQ(more.error().code, ErrorCode::out_of_memory);
     EXPECT_EQ(device->allocated_bytes(), used);
     Graph g;

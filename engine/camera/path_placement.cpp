@@ -16,7 +16,7 @@ Result<size_t> index_of_frame(const CameraPath& path, uint64_t frame, std::strin
     for (size_t i = 0; path.numbered && i < count; ++i)
         if (path.frames[i].time == double(frame))
             return i;
-    return fail(ErrorCode::bad_input, "{}: --relative-to: no frame {}, expected one of {} frames{} {} to {}", where,
+    return fail(ErrorCode::bad_input, "{}: `relative_to`: no frame {}, expected one of {} frames{} {} to {}", where,
                 frame, count, path.numbered ? ", which the file numbers" : ", counted from 0:",
                 path.numbered ? path.frames.front().time : 0.0,
                 path.numbered ? path.frames.back().time : double(count - 1));
@@ -32,11 +32,10 @@ Status place_path(CameraPath& path, const PathPlacement& placement, std::string_
         to_grid = inverse(path.file_pose(frame));
     }
     if (placement.lidar_to_camera && path.body)
-        return fail(
-            ErrorCode::bad_input,
-            "{}: --calib brings a camera's poses into the lidar's frame, and these are of {}; --world takes any "
-            "matrix",
-            where, path.body->name);
+        return fail(ErrorCode::bad_input,
+                    "{}: `lidar_to_camera` brings a camera's poses into the lidar's frame, and these are of {}; "
+                    "`world` takes any matrix",
+                    where, path.body->name);
     if (placement.lidar_to_camera)
         to_grid = compose(inverse(*placement.lidar_to_camera), to_grid);
     to_grid = compose(placement.world, to_grid);

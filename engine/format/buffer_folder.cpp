@@ -56,8 +56,7 @@ Result<BufferCamera> open_camera(const Path& folder, std::string name)
     for (uint32_t i = 0; i < c.frames; ++i) {
         const Path visible = frame_path(folder, "visible", i);
         if (!fs::exists(visible))
-            return fail(ErrorCode::bad_input,
-                        "{} has no {}: a buffer is color/ and visible/, as `semrover render` writes them",
+            return fail(ErrorCode::bad_input, "{} has no {}: a buffer is color/ and visible/",
                         quote_path(frame_path(folder, "color", i)), quote_path(visible));
         SR_CHECK(check_size(frame_path(folder, "color", i), c.size));
         SR_CHECK(check_size(visible, c.size));
@@ -98,8 +97,8 @@ Result<std::vector<BufferCamera>> open_buffers(const Path& folder)
     }
     if (cameras.empty())
         return fail(ErrorCode::bad_input,
-                    "{} has no color/ nor folders of cameras with color/: expected what "
-                    "`semrover render` writes",
+                    "{} has no color/ nor folders of cameras with color/: expected a splat "
+                    "buffer, or a rig of them",
                     quote_path(folder));
     return cameras;
 }

@@ -62,7 +62,8 @@ Result<ImageSize> read_size(std::string_view text, const Intrinsics& given, bool
 {
     SR_TRY(const auto size, numbers_of_key(text, "S_rect_00:", 2, name));
     if (!size && !size_given)
-        return fail(ErrorCode::bad_input, "{}: has no size of the pictures (S_rect_00); give it with -W and -H", name);
+        return fail(ErrorCode::bad_input,
+                    "{}: has no size of the pictures (S_rect_00); give it with `width` and `height`", name);
     if (!size)
         return ImageSize{given.width, given.height};
     SR_TRY(const uint32_t width, image_side((*size)[0], name + ": S_rect_00: width"));
@@ -95,7 +96,7 @@ Result<Intrinsics> read_projection(const KittiFiles& files, const Intrinsics& gi
     if (!(x > 0.25 && x < 0.75 && y > 0.25 && y < 0.75)) // of other pictures than the calibrated ones
         return fail(ErrorCode::bad_input,
                     "{} the principal point ({:.1f}, {:.1f}) is far from the middle of {} x {} pixels; give the "
-                    "size of the calibrated pictures with -W and -H",
+                    "size of the calibrated pictures with `width` and `height`",
                     where, k.cx, k.cy, k.width, k.height);
     return k;
 }

@@ -80,13 +80,13 @@ Result<ReadPath> read_found(const FoundPath& found, const PathLens& lens)
 std::string default_view_text(std::string_view name, const Intrinsics& k)
 {
     const double degrees = 2 * std::atan(k.width / 2.0 / k.fx) * 180 / std::numbers::pi;
-    return fmt::format("{}: has no intrinsics; the default field of view of {:g} degrees is taken (--fov-x)", name,
+    return fmt::format("{}: has no intrinsics; the default field of view of {:g} degrees is taken (`fov_x`)", name,
                        std::round(degrees * 100) / 100);
 }
 
 std::string body_text(std::string_view name, const PathBody& body)
 {
-    return fmt::format("{}: poses of {}, read as a camera at its origin that looks forward; --rig says where cameras "
+    return fmt::format("{}: poses of {}, read as a camera at its origin that looks forward; `rig` says where cameras "
                        "sit on it",
                        name, body.name);
 }

@@ -207,8 +207,8 @@ Result<Intrinsics> read_size(const Settings& settings, TransformsSource& source)
     }
     if (!size)
         return fail(ErrorCode::bad_input,
-                    "{}: no image size (w, h), and no picture to take it from; give it with -W "
-                    "and -H",
+                    "{}: no image size (w, h), and no picture to take it from; give it with `width` "
+                    "and `height`",
                     settings.where());
     k.width = size->width;
     k.height = size->height;
@@ -327,7 +327,7 @@ std::vector<std::string> transforms_warnings(const Json& file, std::string_view 
     std::vector<std::string> warnings;
     if (const auto m = file.find("applied_transform"); m != file.end() && !is_identity(*m))
         warnings.push_back(fmt::format("{}: its poses are in the world that its applied_transform made; for a grid of "
-                                       "the world before, --world takes the inverse",
+                                       "the world before, `world` takes the inverse",
                                        name));
     if (const auto scale = file.find("applied_scale"); scale != file.end() && *scale != 1)
         warnings.push_back(fmt::format("{}: its applied_scale is {}: positions are read as metres, and may be others",
@@ -335,7 +335,7 @@ std::vector<std::string> transforms_warnings(const Json& file, std::string_view 
     if (source.default_size)
         warnings.push_back(
             fmt::format("{}: no image size (w, h) and no picture to take it from; the default of {} x {} "
-                        "is taken (-W, -H)",
+                        "is taken (`width`, `height`)",
                         name, source.lens->intrinsics.width, source.lens->intrinsics.height));
     if (source.default_view && source.lens->matters)
         warnings.push_back(default_view_text(name, source.lens->intrinsics));

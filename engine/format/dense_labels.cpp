@@ -151,7 +151,7 @@ std::vector<UnusedOption> unused_options(const DenseLabels& dense, float voxel_s
     for (size_t a = 0; a < 3; ++a)
         if (!size || dense.edge[a] != *size || dense.origin[a] % *size != 0)
             return {};
-    return {{"--min-fill", "a cell is a voxel"}};
+    return {{"min_fill", "a cell is a voxel"}};
 }
 
 Status split_into(DenseLabels& dense, const VoxelGrid& grid, std::string_view where)

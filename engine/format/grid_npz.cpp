@@ -204,7 +204,7 @@ Result<SceneGrid> read_grid_npz(const Path& path, const SceneGridOptions& o)
                     where, sizes.voxel, sizes.cell);
     SR_CHECK(coarsen(out.grid, sizes, o.min_fill, where, out.warnings));
     if (sizes.same())
-        out.unused.push_back({"--min-fill", "cells stay as large as they are"});
+        out.unused.push_back({"min_fill", "cells stay as large as they are"});
     SR_CHECK(check_grid(out.grid, where));
     return out;
 }

@@ -176,8 +176,7 @@ Result<SceneGrid> read_label_array(const Path& path, const SceneGridOptions& o)
     if (dense.edge[0] < 1 || dense.edge[0] > kMaxEdge)
         return fail(ErrorCode::bad_input, "{}: voxels of {} m, expected 0.0001 to 100 m", where, sizes.voxel);
     if (o.origin == std::array<double, 3>{})
-        out.warnings.push_back(
-            fmt::format("{}: its corner lies at (0, 0, 0) m; --origin X,Y,Z says where else", where));
+        out.warnings.push_back(fmt::format("{}: its corner lies at (0, 0, 0) m; `origin` says where else", where));
     SR_TRY(out.grid, resample(dense, sizes.cell, o.min_fill, where, &out.warnings));
     out.unused = unused_options(dense, sizes.cell);
     out.grid.metadata["source"] = "array of labels";

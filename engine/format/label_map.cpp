@@ -166,8 +166,8 @@ Status LabelMap::check(std::string_view where, std::string_view things, std::str
     const std::string all = listed(things, false);
     if (refused_ && !all.empty())
         return fail(ErrorCode::bad_input,
-                    "{}: {}: a column of that name holds numbers of {}, not ours: {}; --map {} takes them so, --map "
-                    "ours as our own, --map FILE as it says",
+                    "{}: {}: a column of that name holds numbers of {}, not ours: {}; `map` {} takes them so, `map` "
+                    "ours as our own, `map` of a file as it says",
                     where, quote(column_.name, 60), column_.table, all, column_.table);
     std::string list;
     size_t unknown = 0;
@@ -192,7 +192,7 @@ std::vector<std::string> LabelMap::assumed(std::string_view where, std::string_v
     const std::string list = listed(things, true);
     if (list.empty())
         return {};
-    return {fmt::format("{}: {}: the numbers are taken for our own classes: {}; --map says what they are if they are "
+    return {fmt::format("{}: {}: the numbers are taken for our own classes: {}; `map` says what they are if they are "
                         "another program's",
                         where, quote(column_.name, 60), list)};
 }

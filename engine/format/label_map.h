@@ -19,7 +19,7 @@ struct SourceLabel {
 
 std::vector<SourceLabel> source_labels(const LabelTable& whole); // views of its names
 
-constexpr std::string_view kMapAdvice = "--map NAME or FILE says what they are";
+constexpr std::string_view kMapAdvice = "`map` says what they are";
 
 // Maps source label numbers to classes, and counts the lookups of each.
 class LabelMap {

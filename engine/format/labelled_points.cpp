@@ -90,7 +90,7 @@ Result<CloudColumns> columns_of(const PlyElement& vertices, bool ours, const Sce
         c.label = vertices.find(column->name);
         SR_TRY(c.map, LabelMap::of_column(*column, ours, o.map));
     } else if (!o.default_label) {
-        return fail(ErrorCode::bad_input, "{}: its vertices have no label; --label CLASS gives them one", where);
+        return fail(ErrorCode::bad_input, "{}: its vertices have no label; `default_label` gives them one", where);
     }
     SR_TRY(c.color, PlyColors::find(vertices, where, warnings));
     return c;
@@ -115,13 +115,13 @@ std::vector<UnusedOption> unused_options(const CloudColumns& columns, const Scen
 {
     std::vector<UnusedOption> unused;
     if (columns.label)
-        unused.push_back({"--label", "all points have one"});
+        unused.push_back({"default_label", "all points have one"});
     else
-        unused.push_back({"--map", "no point has a label"});
+        unused.push_back({"map", "no point has a label"});
     if (!columns.color)
-        unused.push_back({"--labels-only", "no point has a colour"});
+        unused.push_back({"semantic", "no point has a colour"});
     if (!columns.color || o.semantic)
-        unused.push_back({"--points-per-voxel", "the grid gets no points"});
+        unused.push_back({"points_per_voxel", "the grid gets no points"});
     return unused;
 }
 
@@ -274,7 +274,7 @@ Result<SceneGrid> read_carla_points(const Path& path, const SceneGridOptions& o)
 {
     SR_TRY(SceneGrid out, read_points(path, o, Handedness::left));
     out.warnings.push_back(
-        fmt::format("{}: CARLA's y points right: it is turned over; --from points-ply keeps it", quote_path(path)));
+        fmt::format("{}: CARLA's y points right: it is turned over; `format` points-ply keeps it", quote_path(path)));
     return out;
 }
 

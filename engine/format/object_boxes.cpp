@@ -41,13 +41,13 @@ bool starts_with_a_kitti_label(std::string_view text)
 Status check_options(BoxFormat format, const BoxOptions& o)
 {
     const std::tuple<bool, const char*, bool> uses[] = {
-        {!o.calibration.empty(), "--calib", format == BoxFormat::kitti},
-        {o.frame.has_value(), "--frame", format == BoxFormat::kitti || format == BoxFormat::waymo},
-        {!o.sample.empty(), "--sample", format == BoxFormat::nuscenes},
-        {o.vehicle_frame, "--vehicle-frame", format == BoxFormat::nuscenes || format == BoxFormat::waymo}};
+        {!o.calibration.empty(), "calibration", format == BoxFormat::kitti},
+        {o.frame.has_value(), "frame", format == BoxFormat::kitti || format == BoxFormat::waymo},
+        {!o.sample.empty(), "sample", format == BoxFormat::nuscenes},
+        {o.vehicle_frame, "vehicle_frame", format == BoxFormat::nuscenes || format == BoxFormat::waymo}};
     for (const auto& [given, name, has_place] : uses)
         if (given && !has_place)
-            return fail(ErrorCode::usage, "{} has no meaning for {}", name, name_of(format));
+            return fail(ErrorCode::usage, "`{}` has no meaning for {}", name, name_of(format));
     return {};
 }
 

@@ -118,14 +118,14 @@ Status read_kitti_boxes(const Path& path, const BoxOptions& options, BoxCollecto
             prefix = kitti_label_prefix(lines.line()).value_or(0);
         SR_TRY(const KittiLabel label, parse_label(lines.line(), *prefix, where));
         if (*prefix == 0 && options.frame)
-            return fail(ErrorCode::usage, "{}: --frame is for labels of tracking, these are of one frame", name);
+            return fail(ErrorCode::usage, "{}: `frame` is for labels of tracking, these are of one frame", name);
         if (*prefix && !frame)
             frame = label.frame;
         last = std::max(last, label.frame);
         if (*prefix && label.frame != *frame) {
             if (options.frame)
                 continue;
-            return fail(ErrorCode::bad_input, "{}: frame {} after frame {}: choose one with --frame", where,
+            return fail(ErrorCode::bad_input, "{}: frame {} after frame {}: choose one with `frame`", where,
                         label.frame, *frame);
         }
         SR_CHECK(add_label(label, *prefix, to_frame, where, to));

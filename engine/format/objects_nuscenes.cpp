@@ -142,7 +142,7 @@ std::span<const SourceLabel> nuscenes_box_labels()
 Status read_nuscenes_boxes(const Path& path, const BoxOptions& options, BoxCollector& to)
 {
     if (options.vehicle_frame && options.sample.empty())
-        return fail(ErrorCode::usage, "--vehicle-frame needs --sample: the vehicle moves");
+        return fail(ErrorCode::usage, "`vehicle_frame` needs `sample`: the vehicle moves");
     const Path folder = path.parent_path();
     SR_TRY(const std::vector<Annotation> annotations, read_annotations(path, options.sample));
     std::set<std::string, std::less<>> wanted;

@@ -102,7 +102,7 @@ Status read_json_labels(const Path& path, const BoxOptions& options, BoxCollecto
         return fail(ErrorCode::bad_input, "{}: expected an array of labels, or an object with one as laserLabels",
                     name);
     if (options.frame)
-        return fail(ErrorCode::usage, "{}: --frame is for tables, this is one frame", name);
+        return fail(ErrorCode::usage, "{}: `frame` is for tables, this is one frame", name);
     for (size_t i = 0; i < labels->size(); ++i)
         SR_CHECK(add_label((*labels)[i], to_frame, fmt::format("{} label {}", name, i), to));
     return {};
@@ -169,7 +169,7 @@ Status read_table(const Path& path, const BoxOptions& options, BoxCollector& to)
         if (time != *frame && options.frame)
             continue;
         if (time != *frame)
-            return fail(ErrorCode::bad_input, "{}: frame {} after frame {}: choose one with --frame", rows.where(),
+            return fail(ErrorCode::bad_input, "{}: frame {} after frame {}: choose one with `frame`", rows.where(),
                         time, *frame);
         if (columns.segment && segment.value_or(rows.value(*columns.segment)) != rows.value(*columns.segment))
             return fail(ErrorCode::bad_input, "{}: another segment: expected a table of one", rows.where());

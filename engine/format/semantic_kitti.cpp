@@ -56,8 +56,8 @@ Status check_raw(const std::vector<uint16_t>& raw, std::string_view where)
     if (largest > kLargestTrainId || largest <= kOutlier)
         return {};
     return fail(ErrorCode::bad_input,
-                "{}: the largest number is {}: these may be SemanticKITTI's raw ids, or its training ids; --map "
-                "semantickitti or --map semantickitti-train says which",
+                "{}: the largest number is {}: these may be SemanticKITTI's raw ids, or its training ids; `map` "
+                "semantickitti or `map` semantickitti-train says which",
                 where, largest);
 }
 

@@ -183,8 +183,7 @@ Result<SceneGrid> read_vox(const Path& path, const SceneGridOptions& o)
     if (!o.map.empty())
         SR_CHECK(map.apply(o.map));
     const size_t covered = take_cells(placement.voxels, shift, map, out.grid);
-    SR_CHECK(
-        map.check(where, "voxels", "--map NAME or FILE says what they are, --nearest-color takes the nearest class's"));
+    SR_CHECK(map.check(where, "voxels", "`map` says what they are, `nearest_color` takes the nearest class's"));
     for (const std::string& line : map.left_out("voxels"))
         out.warnings.push_back(line);
     if (covered)
@@ -192,7 +191,7 @@ Result<SceneGrid> read_vox(const Path& path, const SceneGridOptions& o)
     out.dropped = map.dropped() + covered;
     SR_CHECK(coarsen(out.grid, sizes, o.min_fill, where, out.warnings));
     if (sizes.same())
-        out.unused.push_back({"--min-fill", "a cell is a voxel"});
+        out.unused.push_back({"min_fill", "a cell is a voxel"});
     out.grid.metadata["source"] = "MagicaVoxel";
     SR_CHECK(check_grid(out.grid, where));
     return out;

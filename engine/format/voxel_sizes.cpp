@@ -44,14 +44,14 @@ std::vector<InCell> in_cells(const VoxelGrid& grid, int32_t edge)
 Result<VoxelSizes> voxel_sizes(std::optional<double> said, const SceneGridOptions& o, bool keep, std::string_view where)
 {
     if (said && o.file_voxel_size > 0 && std::abs(*said - o.file_voxel_size) > 1e-6 * *said)
-        return fail(ErrorCode::bad_input, "{}: says that its voxels are {:.6g} m, --file-voxel-size says {} m", where,
+        return fail(ErrorCode::bad_input, "{}: says that its voxels are {:.6g} m, `file_voxel_size` says {} m", where,
                     *said, o.file_voxel_size);
     keep &= said.has_value();
     if (!said && o.file_voxel_size > 0)
         said = o.file_voxel_size;
     if (!said && !o.voxel_size)
         return fail(ErrorCode::bad_input,
-                    "{}: does not say how large its voxels are: --voxel-size METRES does, and --file-voxel-size where "
+                    "{}: does not say how large its voxels are: `voxel_size` does, and `file_voxel_size` where "
                     "cells are larger",
                     where);
     if (!said)
@@ -131,11 +131,11 @@ std::vector<std::string> doubled_ground(const VoxelGrid& grid, std::span<const C
     if (double(doubled) <= kManyDoubled * double(columns))
         return {};
     const bool shifted = VoxelSizes{voxel, grid.voxel_size}.same();
-    std::string advice = shifted ? "--origin in whole cells" : fmt::format("--voxel-size {:.6g}", voxel);
+    std::string advice = shifted ? "`origin` in whole cells" : fmt::format("`voxel_size` {:.6g}", voxel);
     advice += " keeps the voxels as they are";
     if (fuller > kFuller * emptier)
         advice +=
-            fmt::format(", --min-fill {:.2g} leaves out the emptier layer", (fuller + emptier) / 2 / double(doubled));
+            fmt::format(", `min_fill` {:.2g} leaves out the emptier layer", (fuller + emptier) / 2 / double(doubled));
     return {fmt::format("{} of {} columns of ground have two layers of cells: voxels of {:.6g} m straddle the "
                         "boundaries of cells of {:.6g} m; {}",
                         doubled, columns, voxel, grid.voxel_size, advice)};

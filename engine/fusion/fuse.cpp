@@ -54,7 +54,7 @@ Result<FusedMesh> fuse(Device& device, const DepthFrames& frames, const FusionOp
     if (surface.faces.empty())
         return fail(ErrorCode::bad_input,
                     "nothing was observed: {} frames touch {} blocks, but no surface was seen by {} of them "
-                    "(--min-views) with weight {} (--min-weight); do the poses fit the pictures?",
+                    "(`min_views`) with weight {} (`min_weight`); do the poses fit the pictures?",
                     frames.cameras.size(), volume.blocks().size(), options.min_views, options.min_weight);
     FusedMesh out;
     out.figures = {volume.blocks().size(), volume.chunks(), 0};

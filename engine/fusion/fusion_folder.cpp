@@ -72,7 +72,7 @@ Status apply_options(const FusionFolderOptions& o, Intrinsics& k)
     k.fy = o.fy ? *o.fy : o.fx.value_or(k.fy);
     k.cx = o.cx.value_or(k.cx);
     k.cy = o.cy.value_or(k.cy);
-    return check_intrinsics(k, "--fx, --fy, --cx, --cy");
+    return check_intrinsics(k, "`fx`, `fy`, `cx`, `cy`");
 }
 
 // the first picture below a folder of one of these names; empty: none
@@ -119,7 +119,7 @@ Result<Path> poses_of(const Path& folder, const Path& given)
     for (const char* name : {"transforms.json", "groundtruth.txt"})
         if (is_file(folder / name))
             return folder / name;
-    return fail(ErrorCode::bad_input, "{} is missing; another camera path may be given with --poses",
+    return fail(ErrorCode::bad_input, "{} is missing; another camera path may be given with `poses`",
                 quote_path(folder / "transforms.json"));
 }
 
@@ -174,7 +174,7 @@ Status FusionFolder::read_poses(const Path& poses, const FusionFolderOptions& o)
         Intrinsics& k = cameras_[i].intrinsics;
         if (k.fx == kNotSaid)
             return fail(ErrorCode::bad_input,
-                        "{} has no intrinsics: expected {}, or --fx (and --fy, --cx, --cy), or --fov-x",
+                        "{} has no intrinsics: expected {}, or `fx` (and `fy`, `cx`, `cy`), or `fov_x`",
                         quote_path(poses), quote_path(folder_ / "intrinsics.json"));
         SR_CHECK(apply_options(o, k));
         if (k.model != CameraModel::pinhole)
@@ -203,7 +203,7 @@ Status FusionFolder::find_frames(const Path& poses, const FusionFolderOptions& o
                                         timed.depths - cameras_.size(), timed.depths, kSameMoment));
     if (poses.filename() == "groundtruth.txt" && !o.depth.unit && pictures_[0].depth.extension() == ".png")
         warnings_.push_back("depth is read as millimetres; TUM RGB-D's own pictures have 5000 units a metre: "
-                            "--depth-scale 0.0002");
+                            "`depth.unit` 0.0002");
     return {};
 }
 
@@ -259,7 +259,7 @@ Status FusionFolder::note_encoding()
     SR_TRY(const DepthImage depth, read_depth_image(pictures_[0].depth, encoding_));
     if (depth.kind == DepthKind::carla && !encoding_.kind)
         warnings_.push_back(fmt::format("{} is in 8-bit colour: read as CARLA's depth, R + 256 G + 65536 B of 1000 m / "
-                                        "(2^24 - 1) (--depth-kind carla)",
+                                        "(2^24 - 1) (`depth.kind` carla)",
                                         quote_path(pictures_[0].depth)));
     return {};
 }

@@ -119,7 +119,7 @@ Status TsdfVolume::plan_box(const DepthFrames& frames)
     if (all > most)
         return fail(ErrorCode::bad_input,
                     "the cameras see {:.0f} x {:.0f} x {:.0f} m, {:.3g} blocks of {:.3g} m; this device keeps track of "
-                    "{:.3g}: fuse parts of the path, or use a larger --tsdf-voxel or a smaller --max-depth",
+                    "{:.3g}: fuse parts of the path, or use a larger `voxel` or a smaller `max_depth`",
                     box_.blocks[0] * block, box_.blocks[1] * block, box_.blocks[2] * block, all, block, most);
     return {};
 }
@@ -160,15 +160,15 @@ Status TsdfVolume::list_blocks()
     const uint32_t blocks = total.front();
     if (blocks == 0)
         return fail(ErrorCode::bad_input,
-                    "nothing was observed: no pixel of {} frames has a depth within {} m; --max-depth goes further (by "
-                    "default, to where a pixel is 0.55 voxels wide, so a larger --tsdf-voxel does, too); or is "
-                    "--depth-scale another?",
+                    "nothing was observed: no pixel of {} frames has a depth within {} m; `max_depth` goes further (by "
+                    "default, to where a pixel is 0.55 voxels wide, so a larger `voxel` does, too); or is "
+                    "`depth.unit` another?",
                     reach_.size(), options_.max_depth);
     const uint64_t most = std::min(device_->limits().max_storage_range, device_->limits().max_allocation) / kBlockBytes;
     if (blocks > most)
         return fail(ErrorCode::out_of_memory,
                     "the surface fills {} blocks of 8^3 voxels; this device has room for {}: fuse parts of the path, "
-                    "or use a larger --tsdf-voxel or a smaller --max-depth",
+                    "or use a larger `voxel` or a smaller `max_depth`",
                     blocks, most);
     block_ids_ = field_.slot(blocks, 1, DType::u32, "blocks", 1);
     distances_ = field_.slot(blocks * kTsdfBlockVoxels, 1, DType::f32, "distances", 1);
@@ -197,7 +197,7 @@ Result<uint32_t> TsdfVolume::chunk_blocks(const FrameBatch& batch) const
         const uint64_t left = device_->budget() > used ? device_->budget() - used : 0;
         if (left < each)
             return fail(ErrorCode::out_of_memory,
-                        "--max-vram: {} bytes are needed besides votes and {} bytes for every block of them, {} are "
+                        "`max_bytes`: {} bytes are needed besides votes and {} bytes for every block of them, {} are "
                         "allowed",
                         used, each, device_->budget());
         most = std::min(most, left / each);

@@ -125,7 +125,7 @@ Result<int32_t> AssetFolder::texture_or_white(Result<int32_t> texture)
     if (texture || texture.error().code != ErrorCode::bad_input)
         return texture;
     if (missing_textures_ == MissingTextures::refuse)
-        return fail(ErrorCode::bad_input, "{}; --missing-textures white goes on without", texture.error().message);
+        return fail(ErrorCode::bad_input, "{}; `missing_textures` white goes on without", texture.error().message);
     add_warning(warnings, texture.error().message + "; it is white");
     return -1;
 }

@@ -144,7 +144,7 @@ Status PlyMesh::check_labels(const LabelColumn& column, bool ours)
             unknown += fmt::format("{}{} ({} {})", unknown.empty() ? "" : ", ", number, count, things);
     }
     if (!map_.empty() || (!known_ && numbers_.begin()->first < 0 && column.table.empty()))
-        return fail(ErrorCode::bad_input, "{}: {}: unknown labels, which {} does not say: {}; --map says what they are",
+        return fail(ErrorCode::bad_input, "{}: {}: unknown labels, which {} does not say: {}; `map` says what they are",
                     where_, quote(column.name, 60), map_.empty() ? "the file" : "the map", unknown);
     SR_CHECK(labels.check(where_, things));
     for (std::string& line : labels.assumed(where_, things))

@@ -162,7 +162,7 @@ Status SurfaceBlocks::check_extent(std::string_view where)
                 if (const double x = p[a] + base_[a]; std::abs(x) >= kMaxCell)
                     return fail(ErrorCode::bad_input,
                                 "{}: face {} reaches {:.6g} m, beyond 2^20 cells of {} m; move it to the origin "
-                                "(--origin), or take a larger voxel size",
+                                "(`origin`), or take a larger voxel size",
                                 where, f, x * voxel_size_, float(voxel_size_));
         const double area = area_of(c[0], c[1], c[2]);
         area_ += area * voxel_size_ * voxel_size_;

@@ -274,8 +274,8 @@ Status drop_transparent(Mesh& m, std::string_view where)
     keep_chosen(m.face_materials, keep);
     keep_chosen(m.face_labels, keep);
     if (m.faces.empty())
-        return fail(ErrorCode::bad_input, "{}: all of it is transparent: {}; --opaque makes it a surface", where, text);
-    add_warning(m.warnings, fmt::format("{}: transparent, and so no surface: {}; --opaque makes it one", where, text));
+        return fail(ErrorCode::bad_input, "{}: all of it is transparent: {}; `opaque` makes it a surface", where, text);
+    add_warning(m.warnings, fmt::format("{}: transparent, and so no surface: {}; `opaque` makes it one", where, text));
     return {};
 }
 

@@ -147,8 +147,8 @@ tl::unexpected<Error> refuse_plain_unet(const Path& path)
     return fail(
         ErrorCode::bad_input,
         "{}: conv_in takes {} channels, a plain Stable Diffusion UNet; the deferred renderer needs {}: the noisy "
-        "latent (4) and 9 more: previous latent (4), buffer latent (4), visibility (1). 'semrover convert IN OUT "
-        "--asd-init' adds them with zero weights, to be trained",
+        "latent (4) and 9 more: previous latent (4), buffer latent (4), visibility (1). `asd_init` adds "
+        "them with zero weights, to be trained",
         quote_path(path), kPlainChannels, kRendererChannels);
 }
 

@@ -189,7 +189,7 @@ Status NetworkWeights::upload(Device& device, const Checkpoint& checkpoint, cons
     scratch.bytes.resize(scratch.rows.size() * dtype_bytes(dtype));
     from_float(scratch.rows, dtype, scratch.bytes.data());
     if (const auto bad = first_non_finite(scratch.bytes, dtype))
-        return fail(ErrorCode::bad_input, "tensor '{}' holds {}, which {} cannot hold: use --precision fp32",
+        return fail(ErrorCode::bad_input, "tensor '{}' holds {}, which {} cannot hold: use `precision` fp32",
                     entry.sources.front().spec.name, scratch.rows[*bad], dtype_name(dtype));
     return entry.weight.write(device, scratch.bytes);
 }

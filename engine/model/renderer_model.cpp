@@ -220,8 +220,8 @@ tl::unexpected<Error> refuse_image_video_unet(const Path& path, uint32_t latent_
     return fail(
         ErrorCode::bad_input,
         "{}: conv_in takes {} channels, a plain Stable Video Diffusion UNet; the video renderer needs {}: noisy "
-        "latent ({}), buffer latent ({}) in place of the image, and visibility (1). 'semrover convert IN OUT "
-        "--vsd-init' makes it so, to be trained",
+        "latent ({}), buffer latent ({}) in place of the image, and visibility (1). `vsd_init` makes "
+        "it so, to be trained",
         quote_path(path), 2 * latent_channels, 2 * latent_channels + 1, latent_channels, latent_channels);
 }
 

@@ -73,9 +73,9 @@ Status check_operation(const EditOperation& o, std::string_view where)
     if (places && o.stamp.empty())
         return wrong("the stamp is missing");
     if (places != o.at.has_value())
-        return wrong(places ? "--at x,y,z is missing" : "--at has a meaning for an inserted stamp only");
+        return wrong(places ? "`at` is missing" : "`at` has a meaning for an inserted stamp only");
     if (copies != o.by.has_value())
-        return wrong(copies ? "--by x,y,z is missing" : "--by has a meaning for copies and moves only");
+        return wrong(copies ? "`by` is missing" : "`by` has a meaning for copies and moves only");
     if (!places && !copies && (o.quarter_turns || o.keep_points))
         return wrong("only a stamp, a copy or a move can be rotated or bring its points");
     if (o.fill && o.kind != Kind::paint)

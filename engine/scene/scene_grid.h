@@ -28,9 +28,9 @@ struct SceneGridOptions {
     float cell_size() const { return voxel_size.value_or(kDefaultVoxelSize); }
 };
 
-// an option that a file has no use for, by its name on the command line, and why
+// a field of SceneGridOptions that a file has no use for, and why
 struct UnusedOption {
-    std::string_view option, reason;
+    std::string_view field, reason;
 };
 
 struct SceneGrid {

@@ -282,7 +282,7 @@ Device::~Device()
 Status Device::account(int64_t bytes, const char* what)
 {
     if (budget_ && allocated_ + uint64_t(bytes) > budget_)
-        return fail(ErrorCode::out_of_memory, "{}: {} bytes do not fit: {} in use, budget (--max-vram) {}", what, bytes,
+        return fail(ErrorCode::out_of_memory, "{}: {} bytes do not fit: {} in use, `max_bytes` {}", what, bytes,
                     allocated_, budget_);
     allocated_ += uint64_t(bytes);
     peak_ = std::max(peak_, allocated_);

@@ -6,6 +6,7 @@
 #include "engine/scene/tiles.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/class_option.h"
+#include "tools/cli/field_options.h"
 #include "tools/cli/number_option.h"
 #include "tools/cli/option_meaning.h"
 #include "tools/cli/origin_option.h"
@@ -149,9 +150,12 @@ Result<SceneInput> read_scene_input(const Path& path, const SceneInputOptions& o
         input.dropped = file.dropped;
     } else {
         SR_TRY(SceneGrid scene, read_scene_grid(path, options, input.format));
-        for (const auto& [option, reason] : scene.unused)
+        for (const auto& [field, reason] : scene.unused) {
+            const std::string option = option_of(field);
+            const std::string_view name = option;
             if (o.command)
-                SR_CHECK(refuse_given(*o.command, {&option, 1}, fmt::format("{} ({})", what, reason)));
+                SR_CHECK(refuse_given(*o.command, {&name, 1}, fmt::format("{} ({})", what, reason)));
+        }
         input.grid = std::move(scene.grid);
         input.warnings = std::move(scene.warnings);
         input.dropped = scene.dropped;
