@@ -2,7 +2,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // y = epilogue(x w^T), for devices that are CPUs: no shared memory, no barrier; x and w come through texel buffers,
-// the fastest loads of lavapipe (docs/benchmarks.md); K unrolled by a texel; each of 8 lanes owns 16 x 16 outputs, and
+// the fastest loads of lavapipe (docs/lab/benchmarks.md); K unrolled by a texel; each of 8 lanes owns 16 x 16 outputs, and
 // p.col_lanes of them lie side by side. Correct at any subgroup size.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
