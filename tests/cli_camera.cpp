@@ -74,7 +74,7 @@ TEST(CliCamera, a_rig_becomes_one_file_or_a_file_of_one_camera)
 TEST(CliCamera, what_cannot_be_converted_is_told_in_one_line)
 {
     const ScratchFolder folder;
-    expect_error(convert(kDrive, folder / "a.dat"), 2, "does not tell which format is meant");
+    expect_error(convert(kDrive, folder / "a.dat"), 2, "does not show which format is meant");
     expect_error(convert(kDrive, kDrive), 2, "IN and OUT are the same");
     expect_error(convert(kDrive, folder.put("there.tum", "")), 2, "exists; -y replaces it");
     expect_error(convert(kDrive, folder / "there.tum", "--path-format colmap"), 3, "COLMAP's model is a folder");

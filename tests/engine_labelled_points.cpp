@@ -132,7 +132,7 @@ TEST(LabelledPoints, n_points_of_a_cell_are_drawn_and_too_few_repeated)
     const std::vector<int> all = numbers(0);
     EXPECT_EQ(all[59], 59);
     EXPECT_GE(all[60], 60);
-    o.semantic = true;
+    o.labels_only = true;
     EXPECT_FALSE(read_labelled_points(path, o)->grid.has_points());
 }
 
@@ -169,7 +169,7 @@ TEST(LabelledPoints, a_grid_comes_back_the_same)
     grid.colors.clear();
     grid.generated.clear();
     ASSERT_TRUE(write_labelled_points(folder / "s.ply", grid));
-    o.semantic = true;
+    o.labels_only = true;
     const auto semantic = read_labelled_points(folder / "s.ply", o);
     ASSERT_TRUE(semantic) << semantic.error().message;
     EXPECT_TRUE(semantic->warnings.empty()); // the file says whose the labels are

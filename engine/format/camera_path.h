@@ -101,14 +101,14 @@ Status write_camera_path_json(const Path& path, const CameraPath& cameras);
 // the n-th of a camera has the time n. Source: https://colmap.github.io/format.html
 Result<CameraPath> read_colmap(const Path& folder);
 // The text model; bad_input where a binary model is in the folder. Pictures of one camera are named as `render` names
-// them; of several, front/front_000000.png: loaders that take the last part of a name tell them apart. Of `points`,
+// them; of several, front/front_000000.png: loaders that take the last part of a name keep them apart. Of `points`,
 // positions and colours go to points3D.txt, where training begins.
 Status write_colmap(const Path& folder, const CameraPath& cameras, const Surfels& points = {});
 std::string colmap_picture_name(const std::string& camera, uint32_t number, size_t cameras);
 // bad_input for a file of such a model, which is read as a folder; its names are cameras.bin, images.txt and the like
 Status refuse_colmap_file(const Path& path);
 
-// Paths that are read and not written; see path_format.h for how they are told apart. Poses are a pose to the world.
+// Paths that are read and not written; see path_format.h for how they are recognised. Poses are a pose to the world.
 // - KITTI-360: a frame's number and 12 (poses.txt, of the IMU: x forward, y right, z down) or 16 numbers a line
 //   (cam0_to_world.txt, of the camera). https://www.cvlibs.net/datasets/kitti-360/documentation.php
 // - matrices: 16 numbers a line (Replica), or four lines of four, of a camera

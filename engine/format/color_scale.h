@@ -12,7 +12,7 @@
 
 namespace semrover {
 
-// What the numbers of a file's colours are counted in: the one rule of points, meshes and splats, told by their type
+// What the numbers of a file's colours are counted in: the one rule of points, meshes and splats, known by their type
 // and by the largest of all three channels.
 //   bytes            0 to 255
 //   larger integers  0 to 255 where none is more (with a warning for 16 bits, whose white is 65535), else 0 to 65535,

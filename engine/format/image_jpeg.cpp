@@ -133,7 +133,7 @@ void check_scans(j_common_ptr info)
 }
 
 // a progressive file whose end marker comes before the first scan of a component;
-// jpeg_finish_decompress frees what tells
+// jpeg_finish_decompress frees what shows it
 bool lacks_scans(const Decoder& d)
 {
     for (int c = 0; d.info.coef_bits && c < d.info.num_components; ++c)

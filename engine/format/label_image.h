@@ -6,7 +6,7 @@
 
 namespace semrover {
 
-constexpr uint16_t kNoNumber = 65535; // no class is told
+constexpr uint16_t kNoNumber = 65535; // no class is given
 constexpr size_t kLabelNumbers = 65536;
 
 // class numbers of a picture, whoever's they are

@@ -119,8 +119,8 @@ std::vector<UnusedOption> unused_options(const CloudColumns& columns, const Scen
     else
         unused.push_back({"map", "no point has a label"});
     if (!columns.color)
-        unused.push_back({"semantic", "no point has a colour"});
-    if (!columns.color || o.semantic)
+        unused.push_back({"labels_only", "no point has a colour"});
+    if (!columns.color || o.labels_only)
         unused.push_back({"points_per_voxel", "the grid gets no points"});
     return unused;
 }
@@ -150,7 +150,7 @@ Status take_points(const PlyElement& vertices, bool ours, const SceneGridOptions
         points.positions.push_back(p);
         points.cells.push_back(*cell);
         points.labels.push_back(target);
-        if (columns.color && !o.semantic)
+        if (columns.color && !o.labels_only)
             points.colors.push_back(columns.color->bytes(row));
     }
     SR_CHECK(map.check(where, "points"));

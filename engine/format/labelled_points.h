@@ -10,10 +10,11 @@ namespace semrover {
 // A point cloud as PLY: vertices with x y z, a label (an integer property label, class, semantic, semantic_label,
 // class_id, classification, category or objtag), and perhaps red green blue (0..255, or 0..1 as floats). A cell is
 // where a point is; its label is that of most of its points, ties to the lower.
-// With colours (unless `options.semantic`) the result is a Sigma-Voxfield grid of options.points_per_voxel = n: where a
-// cell has more points, n are drawn by random numbers keyed by (seed, cell, place in the file), those of the cell's
-// label first; where it has fewer, they are repeated in turn. Points keep the file's order. Points that are not finite
-// are dropped with a warning. bad_input for files without these properties, and unknown labels (listed with counts).
+// With colours (unless `options.labels_only`) the result is a Sigma-Voxfield grid of options.points_per_voxel = n:
+// where a cell has more points, n are drawn by random numbers keyed by (seed, cell, place in the file), those of the
+// cell's label first; where it has fewer, they are repeated in turn. Points keep the file's order. Points that are not
+// finite are dropped with a warning. bad_input for files without these properties, and unknown labels (listed with
+// counts).
 Result<SceneGrid> read_labelled_points(const Path& path, const SceneGridOptions& options);
 
 // The same for what CARLA's semantic lidar writes (save_to_disk: x y z CosAngle ObjIdx ObjTag). Its axes are x forward,

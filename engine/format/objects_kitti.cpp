@@ -114,7 +114,7 @@ Status read_kitti_boxes(const Path& path, const BoxOptions& options, BoxCollecto
         if (count_words(lines.line()) == 0)
             continue;
         const std::string where = fmt::format("{} line {}", name, lines.number());
-        if (!prefix) // the first line tells which labels these are
+        if (!prefix) // the first line shows which labels these are
             prefix = kitti_label_prefix(lines.line()).value_or(0);
         SR_TRY(const KittiLabel label, parse_label(lines.line(), *prefix, where));
         if (*prefix == 0 && options.frame)

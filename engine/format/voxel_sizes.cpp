@@ -13,7 +13,7 @@ namespace semrover {
 namespace {
 
 constexpr double kManyDoubled = 0.2; // of the columns that have ground
-constexpr double kFuller = 1.3;      // times as full as the other layer: a share tells them apart
+constexpr double kFuller = 1.3;      // times as full as the other layer: a share separates them
 
 struct InCell {
     Cell cell;

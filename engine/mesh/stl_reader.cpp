@@ -22,7 +22,7 @@ uint32_t count_in(std::span<const std::byte> file)
     return count;
 }
 
-// note: headers of binary files may begin with anything, with "solid", too; their length tells them
+// note: headers of binary files may begin with anything, with "solid", too; their length shows which they are
 bool has_binary_length(std::span<const std::byte> file)
 {
     return file.size() >= kStlHeader && file.size() == kStlHeader + kStlFacet * uint64_t(count_in(file));

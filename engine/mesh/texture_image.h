@@ -24,8 +24,8 @@ class TextureBudget {
     uint64_t bytes_ = 0, pixels_ = 0;
 };
 
-// Reads an image file of a mesh's texture: PNG, JPEG, BMP or Radiance HDR, told by its first bytes, or TGA, which has
-// no such bytes and is told by its name. HDR holds linear light: it is clamped to 0..1 and becomes
+// Reads an image file of a mesh's texture: PNG, JPEG, BMP or Radiance HDR, known by its first bytes, or TGA, which has
+// no such bytes and is known by its name. HDR holds linear light: it is clamped to 0..1 and becomes
 // sRGB. Untrusted input: at most 1 GiB and kMaxImageSide, nothing is allocated that the file is too short to fill, and
 // a file that is cut is refused, like one that exceeds the budget.
 Result<ImageWithAlpha> read_texture(const Path& path, TextureBudget& budget);

@@ -23,13 +23,13 @@ constexpr uint8_t kRoad = 0, kSidewalk = 1, kBuilding = 2, kFirstVehicle = 13, k
 constexpr double kLowestHouse = 4;  // metres; what is lower is a kiosk or a shelter
 constexpr double kThinnest = 0.3;   // metres of a box
 constexpr double kUsuallyOne = 1.5; // usual lengths that are still one thing
-constexpr double kFragment = 0.25;  // of usual sizes: of what is less in all three too little is seen to tell of it
+constexpr double kFragment = 0.25;  // of usual sizes: of what is less in all three too little is seen to make an object
 constexpr double kGap = 0.9;        // metres between things of a row
 constexpr double kCutReach = 1;     // metres to either side of an even cut, where a better one is looked for
 constexpr double kElongated = 1.3;  // length over width from which a box is turned
 constexpr double kBlock = 32;       // metres, in which houses near a thing are looked for
 constexpr double kParallel = 0.4;   // radians from a wall's direction, within which things are taken to stand along it
-constexpr int kSidewalkReach = 8;   // cells from a vehicle to the sidewalk that tells its front
+constexpr int kSidewalkReach = 8;   // cells from a vehicle to the sidewalk that decides its front
 
 using Cells = std::vector<uint32_t>;
 

@@ -21,7 +21,7 @@ struct SceneGridOptions {
     std::string mask;                     // .npz: an array of 0 and 1 that says which voxels count
     int points_per_voxel = 20;            // of points with colours
     uint64_t seed = 0;                    // which points stay where a cell has more
-    bool semantic = false;                // labels only, whatever the points' colours
+    bool labels_only = false;             // whatever the points' colours
     bool nearest_color = false;           // .vox: a colour of no class counts as the nearest class's
     std::optional<uint8_t> default_label; // of points without one
 

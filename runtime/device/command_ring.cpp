@@ -25,7 +25,7 @@ Result<std::unique_ptr<CommandRing>> CommandRing::create(Device& device, size_t 
 CommandRing::~CommandRing()
 {
     for (uint64_t ticket : tickets_)
-        (void)device_.wait(ticket); // a lost device is told elsewhere
+        (void)device_.wait(ticket); // a lost device is reported elsewhere
     if (pool_)
         device_.vk().DestroyCommandPool(device_.handle(), pool_, device_.vk().allocator());
 }

@@ -135,7 +135,7 @@ Result<int> Buffer::descriptor() const
 Buffer::~Buffer()
 {
     if (memory_ || piece_.memory)
-        (void)device_.wait(device_.last_ticket()); // commands in flight may use it; a lost device is told elsewhere
+        (void)device_.wait(device_.last_ticket()); // commands in flight may use it; a lost device is reported elsewhere
     if (buffer_)
         device_.vk().DestroyBuffer(device_.handle(), buffer_, device_.vk().allocator());
     if (memory_)

@@ -31,7 +31,7 @@ Result<std::unique_ptr<Program>> Program::create(Device& device, Plan plan)
 
 Program::~Program()
 {
-    (void)device_.wait(device_.last_ticket()); // command buffers may be in flight; a lost device is told elsewhere
+    (void)device_.wait(device_.last_ticket()); // command buffers may be in flight; a lost device is reported elsewhere
     for (VkBufferView view : views_)
         device_.vk().DestroyBufferView(device_.handle(), view, device_.vk().allocator());
     if (queries_)

@@ -72,7 +72,7 @@ SharedSemaphore::~SharedSemaphore()
 {
     if (!semaphore_)
         return;
-    (void)device_.wait(device_.last_ticket()); // a lost device is told elsewhere
+    (void)device_.wait(device_.last_ticket()); // a lost device is reported elsewhere
     device_.vk().DestroySemaphore(device_.handle(), semaphore_, device_.vk().allocator());
 }
 

@@ -66,7 +66,7 @@ Tensor Graph::placed(Tensor t) const
     return t;
 }
 
-// do two tensors lie in the same bytes? Before memory is allocated, resources alone tell it apart.
+// do two tensors lie in the same bytes? Before memory is allocated, only resources show it.
 bool Graph::share_bytes(const Tensor& a, const Tensor& b) const
 {
     const Resource &ra = desc_.resources[a.resource], &rb = desc_.resources[b.resource];

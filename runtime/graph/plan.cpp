@@ -75,7 +75,7 @@ bool overlaps(const Plan& plan, const PassBinding& a, const PassBinding& b)
             return false;
     } else if (ra.external) {
         if (a.resource != b.resource && (!ra.memory.buffer || ra.memory.buffer != rb.memory.buffer))
-            return false; // without memory, when only planning, names are all that tells them apart
+            return false; // without memory, when only planning, they differ by name only
         start_a += ra.memory.offset;
         start_b += rb.memory.offset;
     } else {

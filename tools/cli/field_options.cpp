@@ -23,7 +23,6 @@ constexpr FieldOption kFieldOptions[] = {
     {"height", "-H"},
     {"lidar_to_camera", "--calib"},
     {"max_bytes", "--max-vram"},
-    {"semantic", "--labels-only"},
     {"voxel", "--tsdf-voxel"},
     {"vsd_init", "semrover convert IN OUT --vsd-init"},
     {"width", "-W"},

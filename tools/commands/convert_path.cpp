@@ -37,7 +37,7 @@ Result<PathFormat> output_format(const Path& out, const ConvertPathOptions& o)
         return PathFormat::colmap;
     return fail(
         ErrorCode::usage,
-        "{} does not tell which format is meant: say it with --path-format, or write to .tum, poses.txt (KITTI), "
+        "{} does not show which format is meant: say it with --path-format, or write to .tum, poses.txt (KITTI), "
         "transforms.json, camera_path.json or a folder (COLMAP)",
         quote_path(out));
 }
@@ -175,7 +175,7 @@ Status write_output(const Path& out, const CameraPath& path, PathFormat format)
 void add_path_options(CLI::App& c, ConvertPathOptions& o)
 {
     add_choice(c, "--path-format", {"tum", "kitti", "transforms", "camera_path", "colmap"},
-               "of a camera path that is written; by default OUT's name tells", o.format);
+               "of a camera path that is written; by default OUT's name decides", o.format);
     c.add_option("--camera", o.camera, "of a camera path: only the frames of this camera");
     c.add_option("--rig", o.rig, "of a camera path: every sensor of a rig.json at every pose");
     c.add_option(

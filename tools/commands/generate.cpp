@@ -102,7 +102,7 @@ void add_generate(CLI::App& app, const Globals& globals, Run& run)
     add_seed(*c, "-s,--seed", o->seed, "noise seed");
     c->add_option(
         "--objects", o->objects,
-        "boxes and colours that the model is told of: objects.json, auto (guessed from the labels and the seed) "
+        "boxes and colours that condition the model: objects.json, auto (guessed from the labels and the seed) "
         "or none; they are written beside OUTPUT");
     add_generation_options(*c, o->generation);
     add_choice(*c, "--strategy", {"rim", "complete", "paper"},

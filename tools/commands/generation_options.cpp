@@ -113,7 +113,7 @@ void add_regeneration_options(CLI::App& c, RegenerationArguments& o)
     c.add_option("-o,--output", o.output, "what to write; OUTPUT.undo beside it takes it back");
     c.add_option(
         "--objects", o.objects,
-        "boxes and colours that the model is told of: objects.json, auto (guessed from the labels and the seed) "
+        "boxes and colours that condition the model: objects.json, auto (guessed from the labels and the seed) "
         "or none; by default the file beside GRID, or else auto");
     add_seed(c, "-s,--seed", o.seed, "noise seed");
     add_seeds(c, "--seeds", o.seeds, "several seeds, such as 1,2,3: writes OUTPUT-seedN.sgrid for each");

@@ -13,7 +13,7 @@ struct GenerationArguments {
     std::string profile;
     bool dry_run = false;
 };
-// boxes and colours that a model is told of: a file, "auto" (guessed of labels) or "none"
+// boxes and colours that condition a model: a file, "auto" (guessed of labels) or "none"
 Result<GivenObjects> given_objects(const std::string& option);
 
 void add_generation_options(CLI::App& command, GenerationArguments& o);

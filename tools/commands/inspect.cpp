@@ -103,7 +103,7 @@ std::string renderer_text(uint64_t in_channels, bool video)
     return fmt::format("no: {} input channels, expected {}", in_channels, expected);
 }
 
-// both networks of a single file, with the configs that its shapes tell
+// both networks of a single file, with the configs that its shapes give
 void describe_ldm(Report& report, const SafetensorsSet& set)
 {
     const auto unet = ldm_unet_config(set);
@@ -259,7 +259,7 @@ Result<Report> describe_components(const Path& folder, const Json& index, bool w
     return components;
 }
 
-// of a renderer of videos: how `refine` cuts drives, and what it tells the network; nothing of others
+// of a renderer of videos: how `refine` cuts trajectories, and what conditions the network; nothing of others
 void describe_video(Report& report, const Path& folder)
 {
     const auto model = RendererModel::read(folder);

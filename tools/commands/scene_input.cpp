@@ -74,7 +74,7 @@ Result<SceneGridOptions> grid_options(const SceneInputOptions& o)
     g.mask = o.mask;
     g.points_per_voxel = o.points_per_voxel;
     g.seed = o.seed;
-    g.semantic = o.labels_only;
+    g.labels_only = o.labels_only;
     g.nearest_color = o.nearest_color;
     if (!o.label.empty()) {
         SR_TRY(g.default_label, class_option("--label", o.label));

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 
-// what both passes are told of the camera, and of a cube; scene.c has the same
+// what both passes need of the camera, and of a cube; scene.c has the same
 layout(push_constant) uniform Push {
     vec4 rows[3]; // world to camera
     vec4 lens;    // to clip space: scale of x and y, offset of x and y

@@ -154,7 +154,7 @@ void add_world_options(CLI::App& c, ViewArguments& o)
     c.add_option("-m,--model", r.street.model, "model folder")->required();
     c.add_option("--renderer", o.renderer, "a renderer's folder, to refine views with; else that of --model");
     c.add_option("--cache", r.street.cache, "a folder that keeps finished tiles for later");
-    c.add_option("--objects", r.street.objects, "boxes and colours that the model is told of; else guessed");
+    c.add_option("--objects", r.street.objects, "boxes and colours that condition the model; else guessed");
     add_seed(c, "-s,--seed", r.street.seed, "noise seed");
     add_number(c, "--steps", r.street.steps, "denoising steps of points; else as the model says", 1u, 10000u);
     add_number(c, "--refine-steps", r.refiner.steps, "denoising steps of a refined frame; else as the model says", 1u,
