@@ -13,10 +13,10 @@
  * the library but where it is said. Strings that the library returns are static. Everything that a call is given is
  * copied before it returns, but for what belongs to Vulkan, and models in memory (sr_file).
  *
- * Which calls block: sr_context_create (drivers), sr_world_create and sr_chain_create (load a model and compile
- * shaders: seconds, the first time), sr_world_step and sr_chain_step (for their budget), sr_world_flush (for the disk),
- * sr_world_draw, sr_chain_begin and sr_chain_take (for the device), sr_world_record and sr_world_submit (the first time
- * with a size, to compile).
+ * Which calls block: sr_context_create (drivers), sr_model_load (the disk), sr_world_create and sr_chain_create
+ * (compile shaders: seconds, the first time), sr_world_step and sr_chain_step (for their budget), sr_world_flush (for
+ * the disk), sr_world_draw, sr_chain_begin and sr_chain_take (for the device), sr_world_record and sr_world_submit (the
+ * first time with a size, to compile).
  *
  * docs/embedding.md has a complete example. Chains, which refine frames, are in semrover_chain.h, which this header
  * includes; OpenGL is in semrover_gl.h, which it does not.
@@ -212,7 +212,8 @@ sr_status sr_grid_write(const sr_grid* grid, const char* path);
 sr_status sr_grid_get_info(const sr_grid* grid, sr_grid_info* info);
 
 /* Adds cells, changes labels, or takes cells away (SR_NO_CELL); of equal cells the last counts. Cells whose label
- * changes lose their points. SR_ERR_BAD_INPUT: coordinates, labels; nothing is changed then. */
+ * changes lose their points. Cheap in pieces, too: the grid is put together when it is next read. SR_ERR_BAD_INPUT:
+ * coordinates, labels; nothing is changed then. */
 sr_status sr_grid_set_cells(sr_grid* grid, const sr_cell* cells, uint64_t count);
 
 /* The cells from number `first` on, sorted by i, j, k. cells: room for `count`; *written: how many there were. */
@@ -223,17 +224,72 @@ sr_status sr_grid_get_cells(const sr_grid* grid, uint64_t first, uint64_t count,
  * without points. */
 sr_status sr_grid_get_points(const sr_grid* grid, uint64_t first, uint64_t count, float* points, uint64_t* written);
 
-/* ---- Worlds: a street of any extent, generated around a camera as it moves. ---- */
+/* ---- Models: networks on the device, loaded once for any number of worlds and chains. ---- */
 
-typedef struct sr_world sr_world;
+typedef struct sr_model sr_model;
 
-/* A file of a model that the host has in memory. The bytes are not copied: they stay where they are, and as they are,
- * until the world or chain is destroyed. */
+/* A file of a model that the application has in memory. The bytes are not copied: they stay where they are, and as they
+ * are, until the model and all that is made with it are destroyed. */
 typedef struct sr_file {
     const char* path; /* below the model's folder: "voxfield_transformer/config.json" */
     const void* data;
     uint64_t bytes;
 } sr_file;
+
+#define SR_MODEL_VOXFIELD 1u /* the voxfield transformer, which makes points */
+#define SR_MODEL_RENDERER 2u /* the deferred renderer, which makes frames */
+
+#define SR_FP16 0u
+#define SR_FP32 1u
+
+typedef struct sr_model_desc {
+    uint32_t struct_size;
+    uint32_t parts; /* SR_MODEL_.., all of which must be there; 0: what the model has */
+    const void* next;
+    const char* path;     /* a folder (docs/models.md), or a renderer's .safetensors file of the LDM layout */
+    const sr_file* files; /* the folder in memory; `path` is NULL then, or a folder or file among them */
+    uint64_t file_count;
+    uint32_t precision; /* SR_FP16, or SR_FP32 with twice the memory */
+    uint32_t reserved;
+    /* Bytes that are on the device, of all that will be: at the beginning, after each tensor and at the end. What is
+     * not 0 gives up: sr_model_load returns SR_ERR_INTERRUPTED. NULL: none */
+    uint32_t (*progress)(void* user, uint64_t done, uint64_t total);
+    void* user; /* for the callback */
+} sr_model_desc;
+
+/* Reads the weights and copies them to the device: seconds for a large model. Where sr_context_desc.max_bytes has no
+ * room for both networks of a renderer, chains load them in turn. context: outlives the model. On failure *model is
+ * NULL, and nothing stays on the device. SR_ERR_USAGE: a NULL, files; SR_ERR_BAD_INPUT: the model's files;
+ * SR_ERR_OUT_OF_MEMORY, SR_ERR_INTERRUPTED. */
+sr_status sr_model_load(sr_context* context, const sr_model_desc* desc, sr_model** model);
+
+/* Worlds and chains that are made with it go on: the last of them frees the weights. NULL is fine. */
+void sr_model_destroy(sr_model* model);
+
+/* what a voxfield transformer can be conditioned on beside labels */
+#define SR_CONDITION_OBJECTS 1u /* boxes: a voxel's place in its object */
+#define SR_CONDITION_COLORS 2u  /* the object's colour */
+#define SR_CONDITION_PARTS 4u   /* windows, wheels, lamps */
+
+typedef struct sr_model_info {
+    uint32_t struct_size;
+    uint32_t parts;           /* SR_MODEL_.. that are loaded */
+    uint32_t precision;       /* SR_FP16 or SR_FP32 */
+    uint32_t conditions;      /* SR_CONDITION_.. */
+    uint64_t device_bytes;    /* of the weights */
+    double voxel_size;        /* metres */
+    uint32_t points_per_cell; /* 0: no voxfield transformer, and so on */
+    uint32_t steps;           /* of denoising points, where a world does not say */
+    uint32_t renderer_steps;  /* of denoising a frame, where a chain does not say; 0: no renderer, and so on */
+    uint32_t window_frames;   /* made together: 1, or more of a renderer of videos, which chains cannot use yet */
+    double splat_radius;      /* metres, that the renderer was trained on; 0: from the points' distance */
+} sr_model_info;
+
+sr_status sr_model_get_info(const sr_model* model, sr_model_info* info);
+
+/* ---- Worlds: a street of any extent, generated around a camera as it moves. ---- */
+
+typedef struct sr_world sr_world;
 
 /* cells low <= (i, j) <= high, all k */
 typedef struct sr_window {
@@ -250,9 +306,9 @@ typedef struct sr_world_desc {
     uint32_t struct_size;
     uint32_t steps; /* of denoising; 0: as the model says */
     const void* next;
-    const char* model;   /* a folder */
-    const sr_grid* grid; /* its labels are copied */
-    const char* folder;  /* of tiles */
+    const sr_model* model; /* of the same context, with a voxfield transformer */
+    const sr_grid* grid;   /* its labels are copied */
+    const char* folder;    /* of tiles */
     sr_status (*labels)(void* user, const sr_window* window, sr_grid* grid);
     void (*message)(void* user, const char* line); /* warnings, during sr_world_create; NULL: none */
     void* user;                                    /* for the callbacks */
@@ -267,15 +323,13 @@ typedef struct sr_world_desc {
     double splat_radius;    /* metres; 0: from the distance of the points */
     uint32_t tiles_at_once; /* generated together; 0: as suits the device. Does not change the bytes */
     uint32_t reserved;
-    const sr_file* model_files; /* the model's folder in memory; `model` is NULL then, or a folder among them */
-    uint64_t model_file_count;
     double detail_distance; /* metres: a tile within it has a splat of each point, up to twice as far one of each half
                                cell, up to four times one of each cell, and so on. So a kilometre takes little more than
                                what is near. 0: each point has one everywhere */
 } sr_world_desc;
 
-/* Loads the model and compiles shaders, so that no step does. context: outlives the world, and is not destroyed before
- * it. On failure *world is NULL. SR_ERR_USAGE, SR_ERR_BAD_INPUT (files, a grid that does not go with the model),
+/* Compiles shaders, so that no step does. context: outlives the world, and is not destroyed before it. On failure
+ * *world is NULL. SR_ERR_USAGE, SR_ERR_BAD_INPUT (files, a grid that does not go with the model),
  * SR_ERR_OUT_OF_MEMORY. */
 sr_status sr_world_create(sr_context* context, const sr_world_desc* desc, sr_world** world);
 void sr_world_destroy(sr_world* world); /* gives up what is at work, waits for the device and the cache; NULL is fine */

@@ -26,22 +26,20 @@ typedef struct sr_chain_desc {
     uint32_t struct_size;
     uint32_t steps; /* of denoising a frame; 0: as the model says */
     const void* next;
-    const char* model;      /* a renderer of single frames: a folder, or a .safetensors file of the LDM layout */
+    const sr_model* model;  /* of the same context, with a renderer of single frames */
     uint32_t width, height; /* of the frames, pixels, 1..16384 */
     uint64_t seed;
     const char* camera; /* NULL: the only one. Cameras of a rig have a chain each, and their noise differs by name */
     uint32_t noise;     /* SR_NOISE_.. */
-    uint32_t fp32;      /* 1: networks in fp32, with twice the memory */
+    uint32_t reserved;
     void (*message)(void* user, const char* line); /* warnings, during sr_chain_create; NULL: none */
     void* user;                                    /* for the callback */
-    const sr_file* model_files; /* the model in memory; `model` is NULL then, or a folder or file among them */
-    uint64_t model_file_count;
 } sr_chain_desc;
 
-/* Loads the networks and compiles them. Where sr_context_desc.max_bytes has no room for all of it, they are loaded in
+/* Compiles the model's networks. Where sr_context_desc.max_bytes has no room for all that they need, they are loaded in
  * turn for every frame, to the same bytes. context: outlives the chain, and is not destroyed before it. On failure
- * *chain is NULL. SR_ERR_USAGE: a NULL, a size, a renderer of videos; SR_ERR_BAD_INPUT: the model's files;
- * SR_ERR_OUT_OF_MEMORY: with what it would take. */
+ * *chain is NULL. SR_ERR_USAGE: a NULL, a size, a model without a renderer of frames; SR_ERR_BAD_INPUT: the model's
+ * files; SR_ERR_OUT_OF_MEMORY: with what it would take. */
 sr_status sr_chain_create(sr_context* context, const sr_chain_desc* desc, sr_chain** chain);
 void sr_chain_destroy(sr_chain* chain); /* gives up a frame that is at work; NULL is fine */
 

@@ -214,7 +214,7 @@ static float color[PIXELS * 4], expected[PIXELS * 4];
 static sr_status run(sr_context* context, sr_grid* grid, sr_world** world)
 {
     const double position[3] = {1, 0, 1.5}, forward[3] = {1, 0, 0};
-    sr_world_desc desc = world_of(model);
+    sr_world_desc desc = street_world();
     sr_draw_desc draw = camera_at(-1, WIDTH, HEIGHT);
     uint32_t done = 0;
     sr_status status;
@@ -222,7 +222,7 @@ static sr_status run(sr_context* context, sr_grid* grid, sr_world** world)
     desc.grid = grid;
     desc.steps = 1;
     desc.splat_bytes = 1 << 18;
-    status = sr_world_create(context, &desc, world);
+    status = create_world(context, model, &desc, world);
     if (status != SR_OK) {
         CHECK(!*world);
         return status;
@@ -314,7 +314,7 @@ static void worlds_are_refused_at_every_call(sr_context* context, sr_grid* grid)
 static void a_step_is_taken_again(sr_context* context, sr_grid* grid, uint64_t calls_of_a_run)
 {
     const double position[3] = {1, 0, 1.5}, forward[3] = {1, 0, 0};
-    sr_world_desc desc = world_of(model);
+    sr_world_desc desc = street_world();
     sr_world* world = NULL;
     uint32_t done = 0;
     uint64_t n;
@@ -324,7 +324,7 @@ static void a_step_is_taken_again(sr_context* context, sr_grid* grid, uint64_t c
     desc.steps = 1;
     desc.splat_bytes = 1 << 18;
     arm(0);
-    CHECK_OK(context, sr_world_create(context, &desc, &world));
+    CHECK_OK(context, create_world(context, model, &desc, &world));
     CHECK_OK(context, sr_world_focus(world, position, forward, 1));
     for (n = 1; !done && n <= calls_of_a_run;) { /* an error begins the tile again: so n does not begin again */
         sr_status status;

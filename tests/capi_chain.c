@@ -29,7 +29,6 @@ static sr_chain_desc description(uint32_t noise)
     sr_chain_desc desc;
     memset(&desc, 0, sizeof desc);
     desc.struct_size = sizeof desc;
-    desc.model = renderer;
     desc.width = WIDTH;
     desc.height = HEIGHT;
     desc.steps = STEPS;
@@ -68,9 +67,9 @@ static sr_chain_info info_of(sr_chain* chain)
 
 static sr_chain* make_chain(sr_context* context, uint32_t noise)
 {
-    const sr_chain_desc desc = description(noise);
+    sr_chain_desc desc = description(noise);
     sr_chain* chain = NULL;
-    CHECK_OK(context, sr_chain_create(context, &desc, &chain));
+    CHECK_OK(context, create_chain(context, renderer, &desc, &chain));
     return chain;
 }
 
@@ -208,30 +207,27 @@ static void refuses_wrong_chains(sr_context* context)
     desc.next = &desc;
     CHECK(sr_chain_create(context, &desc, &chain) == SR_ERR_USAGE && says(context, "next is not NULL"));
     desc = description(3);
-    CHECK(sr_chain_create(context, &desc, &chain) == SR_ERR_USAGE && says(context, "noise is 3"));
+    CHECK(create_chain(context, renderer, &desc, &chain) == SR_ERR_USAGE && says(context, "noise is 3"));
     desc = description(SR_NOISE_FRESH);
     desc.width = 0;
     CHECK(sr_chain_create(context, &desc, &chain) == SR_ERR_USAGE && says(context, "0 x 40"));
     desc = description(SR_NOISE_FRESH);
-    desc.fp32 = 2;
-    CHECK(sr_chain_create(context, &desc, &chain) == SR_ERR_USAGE && says(context, "fp32 is 2"));
+    desc.reserved = 2;
+    CHECK(create_chain(context, renderer, &desc, &chain) == SR_ERR_USAGE && says(context, "reserved"));
     desc = description(SR_NOISE_FRESH);
     desc.camera = "../up";
-    CHECK(sr_chain_create(context, &desc, &chain) == SR_ERR_USAGE && says(context, "camera's name"));
+    CHECK(create_chain(context, renderer, &desc, &chain) == SR_ERR_USAGE && says(context, "camera's name"));
     desc = description(SR_NOISE_FRESH);
-    desc.model = NULL;
     CHECK(sr_chain_create(context, &desc, &chain) == SR_ERR_USAGE && says(context, "model is NULL"));
-    desc.model = "/nonesuch";
-    CHECK(sr_chain_create(context, &desc, &chain) == SR_ERR_BAD_INPUT && says(context, "nonesuch"));
-    desc.model = video;
-    CHECK(sr_chain_create(context, &desc, &chain) == SR_ERR_USAGE && says(context, "windows of them") && !chain);
+    CHECK(create_chain(context, model, &desc, &chain) == SR_ERR_USAGE && says(context, "the model has no renderer"));
+    CHECK(create_chain(context, video, &desc, &chain) == SR_ERR_USAGE && says(context, "windows of them") && !chain);
 }
 
 static void refuses_wrong_frames(sr_context* context, sr_world* world)
 {
     sr_chain* chain = make_chain(context, SR_NOISE_ON_SURFACES);
     sr_frame_desc frame = buffers_of(0);
-    sr_world_desc bare = world_of(model);
+    sr_world_desc bare = street_world();
     sr_world* without = NULL;
     sr_chain_info info;
     sr_target target;
@@ -258,7 +254,7 @@ static void refuses_wrong_frames(sr_context* context, sr_world* world)
     frame.world_to_camera[3] = INFINITY;
     CHECK(sr_chain_begin(chain, &frame) == SR_ERR_BAD_INPUT && says(context, "not finite"));
     bare.splat_bytes = 0;
-    CHECK_OK(context, sr_world_create(context, &bare, &without));
+    CHECK_OK(context, create_world(context, model, &bare, &without));
     frame = camera_of(0);
     frame.world = without;
     CHECK(sr_chain_begin(chain, &frame) == SR_ERR_USAGE && says(context, "without splat_bytes"));
@@ -398,7 +394,8 @@ static void keeps_to_a_budget_of_memory(uint64_t resident_bytes)
     sr_context_destroy(context);
     desc.max_bytes = 100000;
     CHECK(sr_context_create(&desc, &context) == SR_OK);
-    CHECK(sr_chain_create(context, &wanted, &chain) == SR_ERR_OUT_OF_MEMORY && says(context, "bytes staged") && !chain);
+    CHECK(create_chain(context, renderer, &wanted, &chain) == SR_ERR_OUT_OF_MEMORY && says(context, "bytes staged") &&
+          !chain);
     sr_context_destroy(context);
 }
 
@@ -463,8 +460,8 @@ int main(int argc, char** argv)
     sr_set_diagnostic_callback(print_line, stderr);
     CHECK(sr_context_create(NULL, &context) == SR_OK);
     refuses_wrong_chains(context);
-    desc = world_of(model);
-    CHECK_OK(context, sr_world_create(context, &desc, &world));
+    desc = street_world();
+    CHECK_OK(context, create_world(context, model, &desc, &world));
     walk(context, world, 4, 6);
     draw_buffers(context, world);
     write_buffers();

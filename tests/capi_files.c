@@ -77,12 +77,35 @@ static struct files renderer_in_memory(void)
     return files;
 }
 
-static sr_world_desc with_files(const struct files* files)
+static sr_model_desc with_files(const struct files* files)
 {
-    sr_world_desc desc = world_of(NULL);
-    desc.model_files = files->files;
-    desc.model_file_count = files->count;
+    sr_model_desc desc = model_at(NULL);
+    desc.files = files->files;
+    desc.file_count = files->count;
     return desc;
+}
+
+static sr_status try_load(sr_context* context, const sr_model_desc* desc)
+{
+    sr_model* loaded = NULL;
+    const sr_status status = sr_model_load(context, desc, &loaded);
+    CHECK(!loaded == (status != SR_OK));
+    sr_model_destroy(loaded);
+    return status;
+}
+
+/* a world of a model that is loaded for it */
+static sr_world* open_world(sr_context* context, const sr_model_desc* model_desc, const char* cache)
+{
+    sr_world_desc desc = street_world();
+    sr_world* world = NULL;
+    sr_model* loaded = NULL;
+    CHECK_OK(context, sr_model_load(context, model_desc, &loaded));
+    desc.model = loaded;
+    desc.cache = cache;
+    CHECK_OK(context, sr_world_create(context, &desc, &world));
+    sr_model_destroy(loaded);
+    return world;
 }
 
 static void draw(sr_context* context, sr_world* world, float* color)
@@ -95,11 +118,9 @@ static void draw(sr_context* context, sr_world* world, float* color)
 static float from_folder[PIXELS * 4], from_memory[PIXELS * 4];
 
 /* a world that finds all of its tiles there; they come in another order, so that sums of splats round in another way */
-static void from_cache(sr_context* context, sr_world_desc desc, float* color)
+static void from_cache(sr_context* context, const sr_model_desc* desc, float* color)
 {
-    sr_world* world = NULL;
-    desc.cache = folder;
-    CHECK_OK(context, sr_world_create(context, &desc, &world));
+    sr_world* world = open_world(context, desc, folder);
     walk(context, world, 2, 2);
     draw(context, world, color);
     CHECK(world_info(world).generated == 0 && world_info(world).loaded > 0);
@@ -109,25 +130,23 @@ static void from_cache(sr_context* context, sr_world_desc desc, float* color)
 /* generated from the folder into a cache, generated from memory, and read from the folder's cache */
 static sr_world* worlds_are_the_same(sr_context* context, struct files* files)
 {
-    sr_world_desc desc = world_of(model);
-    sr_world *read = NULL, *made = NULL;
+    const sr_model_desc on_disk = model_at(model), in_memory = with_files(files);
+    sr_world *read, *made;
     char command[1024];
     snprintf(command, sizeof command, "rm -rf '%s'", folder);
     CHECK(system(command) == 0);
-    desc.cache = folder;
-    CHECK_OK(context, sr_world_create(context, &desc, &read));
+    read = open_world(context, &on_disk, folder);
     walk(context, read, 2, 2);
     draw(context, read, from_folder);
     CHECK(from_folder[4 * PIXELS - 1] > 0.5f);
     CHECK_OK(context, sr_world_flush(read));
     sr_world_destroy(read);
-    desc = with_files(files);
-    CHECK_OK(context, sr_world_create(context, &desc, &made));
+    made = open_world(context, &in_memory, NULL);
     walk(context, made, 2, 2);
     draw(context, made, from_memory);
     CHECK(world_info(made).generated > 0 && !memcmp(from_folder, from_memory, sizeof from_folder));
-    from_cache(context, world_of(model), from_folder);
-    from_cache(context, with_files(files), from_memory);
+    from_cache(context, &on_disk, from_folder);
+    from_cache(context, &in_memory, from_memory);
     CHECK(!memcmp(from_folder, from_memory, sizeof from_folder));
     return made;
 }
@@ -136,55 +155,51 @@ static sr_world* worlds_are_the_same(sr_context* context, struct files* files)
 static void a_model_may_lie_deeper(sr_context* context)
 {
     struct files files = model_in_memory();
-    sr_world_desc desc = with_files(&files);
-    sr_world* world = NULL;
+    sr_model_desc desc;
     files.files[0].path = "models/street/voxfield_transformer/config.json";
     files.files[1].path = "models/street/voxfield_transformer/diffusion_pytorch_model.safetensors";
     desc = with_files(&files);
-    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_BAD_INPUT && says(context, "diffusers layout"));
-    desc.model = "models/street";
-    CHECK_OK(context, sr_world_create(context, &desc, &world));
-    sr_world_destroy(world);
+    CHECK(try_load(context, &desc) == SR_ERR_BAD_INPUT && says(context, "diffusers layout"));
+    desc.path = "models/street";
+    CHECK_OK(context, try_load(context, &desc));
     free_files(&files);
 }
 
 static void refuses_wrong_files(sr_context* context)
 {
     struct files files = model_in_memory();
-    sr_world_desc desc = with_files(&files);
-    sr_world* world = NULL;
-    desc.model_file_count = 0;
-    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "come together"));
+    sr_model_desc desc = with_files(&files);
+    desc.file_count = 0;
+    CHECK(try_load(context, &desc) == SR_ERR_USAGE && says(context, "come together"));
     desc = with_files(&files);
-    desc.model_files = NULL;
-    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "come together"));
-    desc.model_file_count = 0;
-    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "model is NULL"));
+    desc.files = NULL;
+    CHECK(try_load(context, &desc) == SR_ERR_USAGE && says(context, "come together"));
+    desc.file_count = 0;
+    CHECK(try_load(context, &desc) == SR_ERR_USAGE && says(context, "path is NULL"));
     desc = with_files(&files);
     files.files[0].path = "../config.json";
-    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "../config.json"));
+    CHECK(try_load(context, &desc) == SR_ERR_USAGE && says(context, "../config.json"));
     files.files[0].path = "a/../../config.json";
-    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "expected one below"));
+    CHECK(try_load(context, &desc) == SR_ERR_USAGE && says(context, "expected one below"));
     files.files[0].path = "/config.json";
-    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "expected one below"));
+    CHECK(try_load(context, &desc) == SR_ERR_USAGE && says(context, "expected one below"));
     files.files[0].path = "";
-    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "expected one below"));
+    CHECK(try_load(context, &desc) == SR_ERR_USAGE && says(context, "expected one below"));
     files.files[0].path = NULL;
-    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "file 0 of 2 has no path"));
+    CHECK(try_load(context, &desc) == SR_ERR_USAGE && says(context, "file 0 of 2 has no path"));
     files.files[0].path = "./diffusion_pytorch_model.safetensors";
-    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "two files"));
+    CHECK(try_load(context, &desc) == SR_ERR_USAGE && says(context, "two files"));
     files.files[0].path = "config.json";
-    desc.model_file_count = 1;
-    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_BAD_INPUT && says(context, "safetensors"));
+    desc.file_count = 1;
+    CHECK(try_load(context, &desc) == SR_ERR_BAD_INPUT && says(context, "safetensors"));
     desc = with_files(&files);
     files.files[1].bytes -= 4;
-    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_BAD_INPUT && says(context, "safetensors"));
+    CHECK(try_load(context, &desc) == SR_ERR_BAD_INPUT && says(context, "safetensors"));
     files.files[1].bytes = 0;
-    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_BAD_INPUT && says(context, "safetensors"));
+    CHECK(try_load(context, &desc) == SR_ERR_BAD_INPUT && says(context, "safetensors"));
     files.files[1].bytes = 4;
     files.files[1].data = NULL;
-    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "file 1 of 2"));
-    CHECK(!world);
+    CHECK(try_load(context, &desc) == SR_ERR_USAGE && says(context, "file 1 of 2"));
     free(files.memory[0]);
     free(files.memory[1]);
 }
@@ -229,41 +244,47 @@ static uint64_t device_bytes(sr_chain* chain)
     return info.device_bytes;
 }
 
+static sr_chain* open_chain(sr_context* context, const sr_model_desc* model_desc)
+{
+    sr_chain_desc desc = chain_desc();
+    sr_chain* chain = NULL;
+    sr_model* loaded = NULL;
+    CHECK_OK(context, sr_model_load(context, model_desc, &loaded));
+    desc.model = loaded;
+    CHECK_OK(context, sr_chain_create(context, &desc, &chain));
+    sr_model_destroy(loaded);
+    return chain;
+}
+
 /* also where networks are loaded in turn, and so are read again for every frame */
 static void chains_are_the_same(sr_context* context)
 {
     static uint8_t expected[PIXELS * 4], found[PIXELS * 4];
     struct files files = renderer_in_memory();
-    sr_chain_desc desc = chain_desc();
+    const sr_model_desc on_disk = model_at(renderer), in_memory = with_files(&files);
+    sr_model_desc desc = in_memory;
     sr_context_desc small;
     sr_context* in_turns = NULL;
-    sr_chain* chain = NULL;
-    desc.model = renderer;
-    CHECK_OK(context, sr_chain_create(context, &desc, &chain));
+    sr_chain* chain = open_chain(context, &on_disk);
     refine(context, chain, expected);
     memset(&small, 0, sizeof small);
     small.struct_size = sizeof small;
     small.max_bytes = device_bytes(chain) - 1;
     sr_chain_destroy(chain);
-    desc.model = NULL;
-    desc.model_files = files.files;
-    desc.model_file_count = files.count;
-    CHECK_OK(context, sr_chain_create(context, &desc, &chain));
+    chain = open_chain(context, &in_memory);
     refine(context, chain, found);
     CHECK(!memcmp(found, expected, sizeof found));
     sr_chain_destroy(chain);
     CHECK_OK(NULL, sr_context_create(&small, &in_turns));
-    CHECK_OK(in_turns, sr_chain_create(in_turns, &desc, &chain));
+    chain = open_chain(in_turns, &in_memory);
     CHECK(device_bytes(chain) < small.max_bytes);
     refine(in_turns, chain, found);
     CHECK(!memcmp(found, expected, sizeof found));
     refine(in_turns, chain, found);
     sr_chain_destroy(chain);
     sr_context_destroy(in_turns);
-    desc.model_file_count = 1;
-    CHECK(sr_chain_create(context, &desc, &chain) == SR_ERR_BAD_INPUT && says(context, "has no"));
-    desc.model_files = NULL;
-    CHECK(sr_chain_create(context, &desc, &chain) == SR_ERR_USAGE && says(context, "come together") && !chain);
+    desc.file_count = 1;
+    CHECK(try_load(context, &desc) == SR_ERR_BAD_INPUT && says(context, "has no"));
     free_files(&files);
 }
 

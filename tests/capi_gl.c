@@ -198,7 +198,7 @@ static void refuses_wrong_draws(sr_context* context, sr_gl* gl, sr_world* world)
 {
     const struct textures t = make_textures(WIDTH, HEIGHT);
     const struct texture small = make_texture(WIDTH - 1, HEIGHT, GL_RGBA32F, GL_RGBA, GL_FLOAT);
-    sr_world_desc bare = world_of(model);
+    sr_world_desc bare = street_world();
     sr_world* without = NULL;
     sr_gl_draw_desc draw = gl_camera(1, &t);
     sr_gl_splats splats;
@@ -228,7 +228,7 @@ static void refuses_wrong_draws(sr_context* context, sr_gl* gl, sr_world* world)
     check_strange_state(&strange);
     end_strange_state(&strange);
     bare.splat_bytes = 0;
-    CHECK_OK(context, sr_world_create(context, &bare, &without));
+    CHECK_OK(context, create_world(context, model, &bare, &without));
     memset(&splats, 0, sizeof splats);
     CHECK(sr_gl_draw(gl, without, &draw) == SR_ERR_USAGE && says(context, "without splat_bytes"));
     CHECK(sr_gl_get_splats(gl, without, &splats) == SR_ERR_USAGE && says(context, "without splat_bytes"));
@@ -246,7 +246,7 @@ static void refuses_wrong_draws(sr_context* context, sr_gl* gl, sr_world* world)
 /* splats follow the world: they change when it does, and another world takes the place */
 static void splats_follow_the_world(sr_context* context, sr_gl* gl, sr_world* world)
 {
-    sr_world_desc desc = world_of(model);
+    sr_world_desc desc = street_world();
     const sr_cell gone = {4, 0, 0, SR_NO_CELL};
     const sr_gl_splats first = gl_splats(context, gl, world);
     sr_gl_splats splats = gl_splats(context, gl, world);
@@ -259,7 +259,7 @@ static void splats_follow_the_world(sr_context* context, sr_gl* gl, sr_world* wo
     splats = gl_splats(context, gl, world);
     CHECK(splats.version > first.version && splats.positions.buffer == first.positions.buffer);
     check_splats(context, gl, world);
-    CHECK_OK(context, sr_world_create(context, &desc, &second));
+    CHECK_OK(context, create_world(context, model, &desc, &second));
     splats = gl_splats(context, gl, second);
     CHECK(splats.count == 0);
     walk(context, second, 2, 2);
@@ -280,7 +280,6 @@ static void takes_frames(sr_context* context, sr_gl* gl, sr_world* world)
     uint32_t done = 0;
     memset(&desc, 0, sizeof desc);
     desc.struct_size = sizeof desc;
-    desc.model = renderer;
     desc.width = WIDTH;
     desc.height = HEIGHT;
     desc.steps = 1;
@@ -293,7 +292,7 @@ static void takes_frames(sr_context* context, sr_gl* gl, sr_world* world)
     look(1, frame.world_to_camera);
     memset(&target, 0, sizeof target);
     target.memory = expected;
-    CHECK_OK(context, sr_chain_create(context, &desc, &chain));
+    CHECK_OK(context, create_chain(context, renderer, &desc, &chain));
     CHECK(sr_gl_take(gl, chain, t.name) == SR_ERR_USAGE && says(context, "no frame is finished"));
     CHECK_OK(context, sr_chain_begin(chain, &frame));
     while (!done)
@@ -442,8 +441,8 @@ int main(int argc, char** argv)
     sr_set_diagnostic_callback(print_line, stderr);
     context = make_sharing_context();
     needs_a_current_context(context);
-    desc = world_of(model);
-    CHECK_OK(context, sr_world_create(context, &desc, &world));
+    desc = street_world();
+    CHECK_OK(context, create_world(context, model, &desc, &world));
     walk(context, world, 4, 4);
     for (i = 0; i < 2; ++i) {
         const struct egl egl = make_egl(kinds[i].api, kinds[i].major, kinds[i].minor);

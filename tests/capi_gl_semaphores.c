@@ -331,8 +331,8 @@ int main(int argc, char** argv)
         return 77;
     }
     CHECK(!info.reason[0] && exported_count == 2 && described == 2 && imported_count == 2);
-    desc = world_of(argv[1]);
-    CHECK_OK(context, sr_world_create(context, &desc, &world));
+    desc = street_world();
+    CHECK_OK(context, create_world(context, argv[1], &desc, &world));
     walk(context, world, 3, 3);
     refuses_a_wrong_texture(context, gl, world);
     draws_without_waiting(context, gl, world);

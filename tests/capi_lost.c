@@ -14,8 +14,8 @@ static const char* model;
 
 static sr_status open_street(sr_context* context, sr_world** world)
 {
-    const sr_world_desc desc = world_of(model);
-    return sr_world_create(context, &desc, world);
+    sr_world_desc desc = street_world();
+    return create_world(context, model, &desc, world);
 }
 
 /* until the street around the origin is there, or a call fails; then a picture of it */

@@ -21,10 +21,10 @@ static sr_draw_desc camera(double x)
     return camera_at(x, WIDTH, HEIGHT);
 }
 
-static sr_world* make_world(sr_context* context, const sr_world_desc* desc)
+static sr_world* make_world(sr_context* context, sr_world_desc* desc)
 {
     sr_world* world = NULL;
-    CHECK_OK(context, sr_world_create(context, desc, &world));
+    CHECK_OK(context, create_world(context, model, desc, &world));
     walk(context, world, 4, 6);
     return world;
 }
@@ -47,7 +47,7 @@ static void refuses_what_cannot_be_recorded(sr_context* context, sr_world* world
     sr_sync sync;
     sr_context_desc own_desc;
     sr_context* own = NULL;
-    sr_world_desc desc = world_of(model);
+    sr_world_desc desc = street_world();
     sr_world* of_own = NULL;
     memset(&sync, 0, sizeof sync);
     sync.struct_size = sizeof sync;
@@ -85,14 +85,14 @@ static void refuses_what_cannot_be_recorded(sr_context* context, sr_world* world
     own_desc.pipeline_cache_bytes = 8;
     CHECK_OK(NULL, sr_context_create(&own_desc, &own));
     desc.splat_bytes = 1 << 16;
-    CHECK_OK(own, sr_world_create(own, &desc, &of_own));
+    CHECK_OK(own, create_world(own, model, &desc, &of_own));
     CHECK(sr_world_record(of_own, &draw, commands) == SR_ERR_USAGE && says(own, "not on a device of the host's"));
     CHECK(sr_world_submit(of_own, &draw, &sync) == SR_ERR_USAGE && says(own, "not on a device of the host's"));
     CHECK(sr_world_check_draws(of_own) == SR_OK);
     sr_world_destroy(of_own);
     sr_context_destroy(own);
     desc.splat_bytes = 0;
-    CHECK_OK(context, sr_world_create(context, &desc, &of_own));
+    CHECK_OK(context, create_world(context, model, &desc, &of_own));
     CHECK(sr_world_record(of_own, &draw, commands) == SR_ERR_USAGE && says(context, "without splat_bytes"));
     sr_world_destroy(of_own);
 }
@@ -340,7 +340,7 @@ static void tells_of_splats_that_are_missing(const struct host* host, sr_context
 {
     static float whole[16 * PIXELS * 4];
     struct host_buffer buffer = make_buffer(host, sizeof whole);
-    sr_world_desc desc = world_of(model);
+    sr_world_desc desc = street_world();
     sr_draw_desc draw = camera(1), waited;
     sr_world* world;
     int time;
@@ -470,7 +470,7 @@ static void takes_the_hosts_way_to_vulkan(const struct host* host)
     sr_vulkan_device vulkan = lent(host);
     sr_context_desc desc;
     sr_context* context = NULL;
-    sr_world_desc world_desc = world_of(model);
+    sr_world_desc world_desc = street_world();
     sr_world* world;
     memset(&desc, 0, sizeof desc);
     desc.struct_size = sizeof desc;
@@ -505,7 +505,7 @@ int main(int argc, char** argv)
     host = make_host();
     takes_the_hosts_way_to_vulkan(&host);
     context = adopt_host(&host);
-    desc = world_of(model);
+    desc = street_world();
     world = make_world(context, &desc);
     draw_colors(context, world, 1, first);
     draw_colors(context, world, 2, second);

@@ -43,19 +43,58 @@ static sr_status labels(void* user, const sr_window* window, sr_grid* grid)
     return sr_grid_set_cells(grid, cells, cells_of(window, cells));
 }
 
-/* of a world with splats: small tiles, two steps */
-static sr_world_desc world_of(const char* model)
+/* of a world with splats: small tiles, two steps; the model is still to be said */
+static inline sr_world_desc street_world(void)
 {
     sr_world_desc desc;
     memset(&desc, 0, sizeof desc);
     desc.struct_size = sizeof desc;
-    desc.model = model;
     desc.steps = 2;
     desc.tile_size = 4.8;
     desc.labels = labels;
     desc.user = &calls;
     desc.splat_bytes = 2u << 20;
     return desc;
+}
+
+static inline sr_model_desc model_at(const char* path)
+{
+    sr_model_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.struct_size = sizeof desc;
+    desc.path = path;
+    return desc;
+}
+static inline sr_model* load_model(sr_context* context, const char* path)
+{
+    const sr_model_desc desc = model_at(path);
+    sr_model* model = NULL;
+    CHECK_OK(context, sr_model_load(context, &desc, &model));
+    return model;
+}
+
+/* with a model of its own, which stays as long as what is made with it */
+static inline sr_status create_world(sr_context* context, const char* path, sr_world_desc* desc, sr_world** world)
+{
+    const sr_model_desc model_desc = model_at(path);
+    sr_model* model = NULL;
+    sr_status status = sr_model_load(context, &model_desc, &model);
+    desc->model = model;
+    if (status == SR_OK)
+        status = sr_world_create(context, desc, world);
+    sr_model_destroy(model);
+    return status;
+}
+static inline sr_status create_chain(sr_context* context, const char* path, sr_chain_desc* desc, sr_chain** chain)
+{
+    const sr_model_desc model_desc = model_at(path);
+    sr_model* model = NULL;
+    sr_status status = sr_model_load(context, &model_desc, &model);
+    desc->model = model;
+    if (status == SR_OK)
+        status = sr_chain_create(context, desc, chain);
+    sr_model_destroy(model);
+    return status;
 }
 
 /* until all around x is there */

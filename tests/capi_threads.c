@@ -31,10 +31,10 @@ static sr_status labels_for(void* user, const sr_window* window, sr_grid* grid)
 static void open_world(visitor* self)
 {
     const double position[3] = {1, 0, 1.5}, forward[3] = {1, 0, 0};
-    sr_world_desc desc = world_of(model);
+    sr_world_desc desc = street_world();
     desc.labels = labels_for;
     desc.user = self;
-    CHECK_OK(self->context, sr_world_create(self->context, &desc, &self->world));
+    CHECK_OK(self->context, create_world(self->context, model, &desc, &self->world));
     CHECK_OK(self->context, sr_world_focus(self->world, position, forward, 6));
 }
 

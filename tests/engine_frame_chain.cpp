@@ -137,7 +137,8 @@ struct Job {
     {
         AsdOptions options;
         options.guidance_scale = 2;
-        auto r = std::make_unique<FrameRenderer>(device(), model, plan, DType::f16, options, MemoryPolicy::resident);
+        auto networks = std::make_shared<LoadedNetworks>(device(), model, DType::f16);
+        auto r = std::make_unique<FrameRenderer>(device(), networks, plan, options, MemoryPolicy::resident);
         EXPECT_TRUE(r->start(work, work));
         return r;
     }

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // chains: frames of splat buffers, one after the other
 #include "engine/capi/exchange.h"
-#include "engine/capi/model_files.h"
 
 using namespace semrover;
 using namespace semrover::capi;
@@ -34,18 +33,18 @@ Result<std::optional<FrameNoise>> noise_of(uint32_t noise)
     }
 }
 
-Result<RefinementOptions> options_of(const sr_chain_desc& d, std::unique_ptr<MemoryFolder>& folder)
+Result<RefinementOptions> options_of(const sr_chain_desc& d, const Model& model)
 {
     if (d.steps > 1'000'000)
         return fail(ErrorCode::usage, "sr_chain_desc: {} steps", d.steps);
-    if (d.fp32 > 1)
-        return fail(ErrorCode::usage, "sr_chain_desc: fp32 is {}, expected 0 or 1", d.fp32);
+    if (d.reserved)
+        return fail(ErrorCode::usage, "sr_chain_desc: reserved is not 0");
     RefinementOptions o;
-    SR_TRY(o.model, model_path(d.model, d.model_files, d.model_file_count, "sr_chain_desc", folder));
+    o.model = model.path();
     if (d.steps)
         o.steps = int(d.steps);
     o.seed = d.seed;
-    o.precision = d.fp32 ? DType::f32 : DType::f16;
+    o.precision = model.precision();
     SR_TRY(o.frame_noise, noise_of(d.noise));
     if (d.noise == SR_NOISE_FRESH)
         o.frame_history = 0; // neither needs to know what frames share
@@ -58,7 +57,11 @@ Result<std::unique_ptr<sr_chain>> make_chain(sr_context& context, const sr_chain
     chain->context = &context;
     chain->size = {d.width, d.height};
     SR_CHECK(check_size(chain->size, "sr_chain_desc"));
-    SR_TRY(RefinementOptions options, options_of(d, chain->files));
+    SR_TRY(chain->model, model_of(context, d.model, "sr_chain_desc"));
+    const auto& networks = chain->model->renderer();
+    if (!networks)
+        return fail(ErrorCode::usage, "sr_chain_desc: the model has no renderer");
+    SR_TRY(RefinementOptions options, options_of(d, *chain->model));
     JobCallbacks callbacks;
     if (d.message)
         callbacks.warning = [&d](std::string_view line) { d.message(d.user, std::string(line).c_str()); };
@@ -66,7 +69,7 @@ Result<std::unique_ptr<sr_chain>> make_chain(sr_context& context, const sr_chain
     const std::string camera = d.camera ? d.camera : "";
     if (!camera.empty() && !is_camera_name(camera))
         return fail(ErrorCode::usage, "sr_chain_desc: a camera's name has 1 to 64 of A-Z a-z 0-9 . _ -");
-    SR_TRY(chain->chain, FrameChain::create(*context.device, std::move(renderer), chain->size, camera));
+    SR_TRY(chain->chain, FrameChain::create(*context.device, networks, std::move(renderer), chain->size, camera));
     return chain;
 }
 
@@ -220,4 +223,4 @@ sr_status sr_chain_get_info(sr_chain* chain, sr_chain_info* info)
 } // extern "C"
 
 static_assert(sizeof(sr_source) == 24 && sizeof(sr_frame_desc) == 200);
-static_assert(sizeof(sr_chain_desc) == 88 && sizeof(sr_chain_info) == 48);
+static_assert(sizeof(sr_chain_desc) == 72 && sizeof(sr_chain_info) == 48);

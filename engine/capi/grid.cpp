@@ -45,7 +45,7 @@ Result<std::pair<size_t, size_t>> range_of(const sr_grid* grid, uint64_t first, 
 {
     if (!grid || !written || (count && !to))
         return fail(ErrorCode::usage, "{}: NULL", name);
-    const size_t all = grid->grid.cells.size();
+    const size_t all = grid->read().cells.size();
     const size_t begin = size_t(std::min<uint64_t>(first, all));
     return std::pair(begin, begin + size_t(std::min<uint64_t>(count, all - begin)));
 }
@@ -90,7 +90,7 @@ sr_status sr_grid_read(const char* path, sr_grid** grid)
             return fail(ErrorCode::usage, "sr_grid_read: NULL");
         *grid = nullptr;
         SR_TRY(VoxelGrid read, read_grid_or_tiles(path));
-        *grid = new sr_grid{std::move(read)};
+        *grid = new sr_grid{std::move(read), {}};
         return {};
     });
 }
@@ -105,7 +105,7 @@ sr_status sr_grid_write(const sr_grid* grid, const char* path)
     return guarded(nullptr, [&]() -> Status {
         if (!grid || !path)
             return fail(ErrorCode::usage, "sr_grid_write: NULL");
-        return write_grid(path, grid->grid);
+        return write_grid(path, grid->read());
     });
 }
 
@@ -114,10 +114,11 @@ sr_status sr_grid_get_info(const sr_grid* grid, sr_grid_info* info)
     return guarded(nullptr, [&]() -> Status {
         if (!grid)
             return fail(ErrorCode::usage, "sr_grid_get_info: grid is NULL");
+        const VoxelGrid& read = grid->read();
         sr_grid_info known{};
-        known.points_per_cell = grid->grid.has_points() ? uint32_t(grid->grid.points_per_voxel) : 0;
-        known.cells = grid->grid.cells.size();
-        known.voxel_size = decimal_voxel_size(grid->grid.voxel_size);
+        known.points_per_cell = read.has_points() ? uint32_t(read.points_per_voxel) : 0;
+        known.cells = read.cells.size();
+        known.voxel_size = decimal_voxel_size(read.voxel_size);
         return write_result(known, info, "sr_grid_get_info");
     });
 }
@@ -128,7 +129,8 @@ sr_status sr_grid_set_cells(sr_grid* grid, const sr_cell* cells, uint64_t count)
         if (!grid)
             return fail(ErrorCode::usage, "sr_grid_set_cells: grid is NULL");
         SR_TRY(const LabelEdits edits, edits_of(cells, count, "sr_grid_set_cells"));
-        grid->grid = with_edits(grid->grid, edits);
+        for (const auto& [cell, label] : edits)
+            grid->edits.insert_or_assign(cell, label);
         return {};
     });
 }

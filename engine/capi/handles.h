@@ -4,9 +4,10 @@
 
 #include "engine/capi/sized_rasterizer.h"
 #include "engine/job/frame_chain.h"
+#include "engine/job/model.h"
 #include "engine/job/world.h"
+#include "engine/scene/label_edits.h"
 #include "engine/semrover.h"
-#include "runtime/base/memory_files.h"
 #include "runtime/device/device.h"
 #include "runtime/device/host_copies.h"
 
@@ -19,14 +20,28 @@ struct sr_context {
     uint64_t worlds = 0;                          // made so far
 };
 
+// Cells that are set are put into the grid when it is next read: one by one each would cost the whole grid.
 struct sr_grid {
-    semrover::VoxelGrid grid; // always sorted
+    mutable semrover::VoxelGrid grid; // sorted
+    mutable semrover::LabelEdits edits;
+
+    semrover::VoxelGrid& read() const
+    {
+        if (!edits.empty())
+            grid = with_edits(grid, std::exchange(edits, {}));
+        return grid;
+    }
+};
+
+struct sr_model {
+    sr_context* context = nullptr;
+    std::shared_ptr<semrover::Model> model;
 };
 
 struct sr_world {
     sr_context* context = nullptr;
-    uint64_t number = 0;                           // of the context's worlds, from 1 on
-    std::unique_ptr<semrover::MemoryFolder> files; // of its model, where the host has them in memory
+    uint64_t number = 0; // of the context's worlds, from 1 on
+    std::shared_ptr<semrover::Model> model;
     semrover::GenerationSettings settings;
     std::unique_ptr<semrover::World> world;
     semrover::capi::SizedRasterizer pixels;                 // of chains that draw
@@ -36,7 +51,14 @@ struct sr_world {
 
 struct sr_chain {
     sr_context* context = nullptr;
-    std::unique_ptr<semrover::MemoryFolder> files; // of its model, where the host has them in memory
+    std::shared_ptr<semrover::Model> model;
     semrover::ImageSize size;
     std::unique_ptr<semrover::FrameChain> chain;
 };
+
+namespace semrover::capi {
+
+// Errors: usage for NULL, and for a model of another context. name: of the structure
+Result<std::shared_ptr<Model>> model_of(const sr_context& context, const sr_model* model, const char* name);
+
+} // namespace semrover::capi

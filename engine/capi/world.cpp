@@ -3,7 +3,6 @@
 // worlds: opened, walked through, edited
 #include "engine/capi/edits.h"
 #include "engine/capi/exchange.h"
-#include "engine/capi/model_files.h"
 #include "engine/scene/cell_reach.h"
 #include "engine/scene/tiles.h"
 
@@ -12,12 +11,13 @@ using namespace semrover::capi;
 
 namespace {
 
-Result<GenerationSettings> settings_of(const sr_world_desc& d, std::unique_ptr<MemoryFolder>& folder)
+Result<GenerationSettings> settings_of(const sr_world_desc& d, const Model& model)
 {
     if (d.steps > 1'000'000)
         return fail(ErrorCode::usage, "sr_world_desc: {} steps", d.steps);
     GenerationOptions o;
-    SR_TRY(o.model, model_path(d.model, d.model_files, d.model_file_count, "sr_world_desc", folder));
+    o.model = model.path();
+    o.precision = model.precision();
     if (d.steps)
         o.steps = int(d.steps);
     o.tile_size = d.tile_size == 0 ? kUsualTileSize : d.tile_size;
@@ -35,8 +35,8 @@ LabelCallback labels_callback(const sr_world_desc& d, float voxel_size)
         const sr_window asked{{window.low[0], window.low[1]}, {window.high[0], window.high[1]}};
         if (const sr_status status = labels(user, &asked, &cells); status != SR_OK)
             return fail(ErrorCode(status), "the host's labels callback returned {}", sr_status_name(status));
-        grid.cells = std::move(cells.grid.cells);
-        grid.labels = std::move(cells.grid.labels);
+        grid.cells = std::move(cells.read().cells);
+        grid.labels = std::move(cells.read().labels);
         return {};
     };
 }
@@ -50,9 +50,9 @@ Result<std::unique_ptr<WorldLabels>> labels_of(const sr_world_desc& d, float vox
     if (d.labels)
         return labels_of_callback(voxel_size, labels_callback(d, voxel_size));
     VoxelGrid grid;
-    grid.voxel_size = d.grid->grid.voxel_size;
-    grid.cells = d.grid->grid.cells;
-    grid.labels = d.grid->grid.labels;
+    grid.voxel_size = d.grid->read().voxel_size;
+    grid.cells = d.grid->read().cells;
+    grid.labels = d.grid->read().labels;
     return labels_of_grid(std::move(grid));
 }
 
@@ -61,9 +61,12 @@ Result<std::unique_ptr<sr_world>> make_world(sr_context& context, const sr_world
     auto world = std::make_unique<sr_world>();
     world->context = &context;
     world->number = ++context.worlds;
-    SR_TRY(world->settings, settings_of(d, world->files));
+    SR_TRY(world->model, model_of(context, d.model, "sr_world_desc"));
+    if (!world->model->voxfield())
+        return fail(ErrorCode::usage, "sr_world_desc: the model has no voxfield transformer");
+    SR_TRY(world->settings, settings_of(d, *world->model));
     SR_TRY(auto labels, labels_of(d, world->settings.model.config.voxel_size));
-    WorldRequest request{.settings = world->settings, .seed = d.seed};
+    WorldRequest request{.settings = world->settings, .transformer = world->model->transformer(), .seed = d.seed};
     if (d.objects) {
         SR_TRY(std::vector<SceneObject> objects, read_objects(d.objects));
         request.objects = std::move(objects);
@@ -197,7 +200,8 @@ sr_status sr_world_copy_cells(sr_world* world, const sr_window* window, sr_grid*
         if (!window || !grid)
             return fail(ErrorCode::usage, "sr_world_copy_cells: NULL");
         *grid = nullptr;
-        *grid = new sr_grid{cells_in(*world, {{window->low[0], window->low[1]}, {window->high[0], window->high[1]}})};
+        *grid =
+            new sr_grid{cells_in(*world, {{window->low[0], window->low[1]}, {window->high[0], window->high[1]}}), {}};
         return {};
     });
 }
@@ -209,4 +213,4 @@ sr_status sr_world_flush(sr_world* world)
 
 } // extern "C"
 
-static_assert(sizeof(sr_world_desc) == 152 && sizeof(sr_world_info) == 88);
+static_assert(sizeof(sr_world_desc) == 136 && sizeof(sr_world_info) == 88);

@@ -40,7 +40,8 @@ FrameChain::FrameChain(Device& device, Refinement renderer, const ImageSize& siz
                         "latent of the frame before");
 }
 
-Result<std::unique_ptr<FrameChain>> FrameChain::create(Device& device, Refinement renderer, const ImageSize& size,
+Result<std::unique_ptr<FrameChain>> FrameChain::create(Device& device, std::shared_ptr<LoadedNetworks> networks,
+                                                       Refinement renderer, const ImageSize& size,
                                                        const std::string& camera)
 {
     if (renderer.model.video())
@@ -49,15 +50,16 @@ Result<std::unique_ptr<FrameChain>> FrameChain::create(Device& device, Refinemen
         return fail(ErrorCode::usage, "frames of {} x {} pixels; 1 to {} are possible", size.width, size.height,
                     kMaxImageSide);
     std::unique_ptr<FrameChain> chain(new FrameChain(device, std::move(renderer), size, camera));
-    SR_CHECK(chain->make());
+    SR_CHECK(chain->make(std::move(networks)));
     return chain;
 }
 
-Status FrameChain::make()
+Status FrameChain::make(std::shared_ptr<LoadedNetworks> networks)
 {
     const RendererWork work{.size = size_};
     const uint64_t history = r_.frame_history > 0 ? FrameHistory::planned_bytes(device_.limits(), size_) : 0;
-    SR_TRY(memory_, plan_renderer(device_, r_, {&work, 1}, state_.planned_bytes(device_.limits()) + history));
+    const uint64_t beside = state_.planned_bytes(device_.limits()) + history;
+    SR_TRY(memory_, plan_renderer(device_, r_, {&work, 1}, beside, networks->loaded()));
     SR_CHECK(state_.allocate(device_, "a chain's pictures"));
     if (r_.frame_history > 0) {
         SR_TRY(history_, FrameHistory::create(device_, size_, CameraModel::pinhole, r_.frame_history));
@@ -66,8 +68,7 @@ Status FrameChain::make()
     Graph g;
     g.keep(picture_texels(g, bytes_.in(g), size_.image_width * size_.image_height), texels_);
     SR_TRY(to_texels_, Program::create(device_, g));
-    renderer_ =
-        std::make_unique<FrameRenderer>(device_, r_.model, r_.plan, r_.options.precision, r_.asd, memory_.policy);
+    renderer_ = std::make_unique<FrameRenderer>(device_, std::move(networks), r_.plan, r_.asd, memory_.policy);
     SR_CHECK(renderer_->start(work, work));
     return resident() ? renderer_->compile() : Status{};
 }

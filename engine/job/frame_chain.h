@@ -14,10 +14,12 @@ namespace semrover {
 // networks stay on the device where they fit its budget, and are loaded in turn for every frame where they do not.
 class FrameChain {
   public:
-    // Loads the networks and compiles them, where they stay. renderer: of open_renderer(), for a model of single
-    // frames. camera: its name, part of the noise key; empty: the only one. Errors: usage for a renderer of videos;
-    // bad_input for weights that do not fit the model; out_of_memory when no policy fits
-    static Result<std::unique_ptr<FrameChain>> create(Device& device, Refinement renderer, const ImageSize& size,
+    // Loads the networks, unless others have, and compiles them, where they stay. renderer: of open_renderer(), for the
+    // model of the networks, of single frames. camera: its name, part of the noise key; empty: the only one. Errors:
+    // usage for a renderer of videos; bad_input for weights that do not fit the model; out_of_memory when no policy
+    // fits
+    static Result<std::unique_ptr<FrameChain>> create(Device& device, std::shared_ptr<LoadedNetworks> networks,
+                                                      Refinement renderer, const ImageSize& size,
                                                       const std::string& camera);
 
     // the splat buffer of the next frame, PixelWords::seen: to be filled before begin(), and left alone until the frame
@@ -48,7 +50,7 @@ class FrameChain {
   private:
     enum class Stage { idle, encode, denoise, decode };
     FrameChain(Device& device, Refinement renderer, const ImageSize& size, const std::string& camera);
-    Status make();
+    Status make(std::shared_ptr<LoadedNetworks> networks);
     Status submit();
     Status encode();
     Status denoise();

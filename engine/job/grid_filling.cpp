@@ -22,10 +22,11 @@ Status GridFilling::cut(VoxelGrid& grid, const RegionOptions& regions, std::span
 
 Status GridFilling::load(uint64_t seed, const JobCallbacks& callbacks)
 {
-    if (!transformer_) {
+    if (!sampler_)
         for (const std::string& warning : settings_.model.warnings)
             if (callbacks.warning)
                 callbacks.warning(warning);
+    if (!transformer_) {
         SR_TRY(transformer_, Transformer::load(device_, settings_.model.transformer, settings_.precision));
     }
     if (!sampler_ || seed_ != seed) {

@@ -13,8 +13,11 @@ namespace semrover {
 // seed: cut, load, start, then step until it says true.
 class GridFilling {
   public:
-    // settings: outlive the filling
-    GridFilling(Device& device, const GenerationSettings& settings) : device_(device), settings_(settings) {}
+    // settings: outlive the filling. transformer: of their model; none: loaded when it is wanted
+    GridFilling(Device& device, const GenerationSettings& settings, std::shared_ptr<const Transformer> transformer = {})
+        : device_(device), settings_(settings), transformer_(std::move(transformer))
+    {
+    }
 
     // cuts the grid, which must outlive the filling, into regions; cells with generated = 0 are the targets
     // and are made with what `objects` say of them, if the model can be told
@@ -50,7 +53,7 @@ class GridFilling {
 
     Device& device_;
     const GenerationSettings& settings_;
-    std::unique_ptr<Transformer> transformer_;
+    std::shared_ptr<const Transformer> transformer_;
     std::unique_ptr<TokenSampler> sampler_;
     std::unique_ptr<Outpainter> outpainter_;
     std::optional<uint64_t> seed_;

@@ -290,14 +290,14 @@ class RefinementJob : public Job {
             callbacks_.planned(r_, memory_);
         const Refiner::Parts parts{device_, *store_, *out_, r_.chains};
         const RefineOrder order{memory_.policy, r_.plan.rows.size(), drawn};
-        const DType precision = r_.options.precision;
+        auto networks = std::make_shared<LoadedNetworks>(device_, r_.model, r_.options.precision);
         if (r_.model.video())
             refiner_ = std::make_unique<WindowRefiner>(
-                parts, std::make_unique<WindowRenderer>(device_, r_.model, r_.plan, precision, r_.vsd, memory_.policy),
+                parts, std::make_unique<WindowRenderer>(device_, std::move(networks), r_.plan, r_.vsd, memory_.policy),
                 order, callbacks_);
         else
             refiner_ = std::make_unique<FrameRefiner>(
-                parts, std::make_unique<FrameRenderer>(device_, r_.model, r_.plan, precision, r_.asd, memory_.policy),
+                parts, std::make_unique<FrameRenderer>(device_, std::move(networks), r_.plan, r_.asd, memory_.policy),
                 order, callbacks_);
         return {};
     }
@@ -390,14 +390,18 @@ Result<std::unique_ptr<Job>> finished_refinement(Refinement r, RunFolder run, co
 } // namespace
 
 Result<MemoryPlan> plan_renderer(Device& device, const Refinement& r, std::span<const RendererWork> work,
-                                 uint64_t beside)
+                                 uint64_t beside, const LoadedNetworks::Loaded& loaded)
 {
     const auto unet = Unet::plan(r.model.unet, r.options.precision, device.limits());
     const auto vae = Vae::plan(r.model.vae, r.options.precision, device.limits());
     const RendererNetworks networks{*unet, *vae, r.plan, r.model.conditioning_tokens, r.asd.guidance_scale, r.vsd};
     SR_TRY(RendererBytes parts, renderer_bytes(device.limits(), networks, work));
     parts.outgoing = beside;
-    return plan_memory(std::move(parts), device.allocated_bytes(), device.budget());
+    if (loaded.unet)
+        parts.unet = 0;
+    if (loaded.vae)
+        parts.vae = 0;
+    return plan_memory(std::move(parts), device.allocated_bytes() - loaded.kept, device.budget());
 }
 
 Result<MemoryPlan> plan_refinement(Device& device, const Refinement& r)

@@ -6,6 +6,7 @@
 #include "engine/job/path_drawing.h"
 #include "engine/job/refine_store.h"
 #include "engine/model/renderer_model.h"
+#include "engine/refine/loaded_networks.h"
 #include "engine/refine/memory_plan.h"
 #include "engine/refine/refine_chain.h"
 
@@ -75,9 +76,10 @@ Result<Refinement> resolve_refinement(RefinementOptions options, const JobCallba
 // everything that decides the bytes of the frames
 Result<Json> refinement_settings(const Refinement& r, const Device& device);
 
-// The memory of a renderer at work, with `beside` bytes that stay beside it. Errors: out_of_memory when no policy fits
+// The memory of a renderer at work, with `beside` bytes that stay beside it; of what is `loaded`, networks that others
+// use count once, and those that are only kept may be dropped. Errors: out_of_memory when no policy fits
 Result<MemoryPlan> plan_renderer(Device& device, const Refinement& r, std::span<const RendererWork> work,
-                                 uint64_t beside);
+                                 uint64_t beside, const LoadedNetworks::Loaded& loaded = {});
 
 // the memory of a run of which nothing is done yet; out_of_memory when no policy fits
 Result<MemoryPlan> plan_refinement(Device& device, const Refinement& r);

@@ -28,7 +28,7 @@ class StreamedWorld : public World {
     StreamedWorld(Device& device, WorldRequest request, std::unique_ptr<WorldLabels> labels,
                   const JobCallbacks& callbacks)
         : request_(std::move(request)), callbacks_(callbacks), labels_(std::move(labels)),
-          filling_(device, request_.settings)
+          filling_(device, request_.settings, request_.transformer)
     {
     }
     ~StreamedWorld() override { (void)filling_.cancel(); }

@@ -16,7 +16,8 @@ namespace semrover {
 // bytes of a place depend on model, seed, labels and edits near it. Which way the camera came, what was dropped and how
 // much was done at a time do not matter.
 struct WorldRequest {
-    GenerationSettings settings; // with tile_cells: GenerationOptions::tile_size
+    GenerationSettings settings;                         // with tile_cells: GenerationOptions::tile_size
+    std::shared_ptr<const Transformer> transformer = {}; // of the settings' model, shared; none: one of its own
     uint64_t seed = 0;
     GivenObjects objects = {}; // what the model is told; none: guessed of the source's labels, block by block
     Path cache = {};           // a folder that keeps finished tiles, for other sessions too; empty: none

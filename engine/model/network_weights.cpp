@@ -194,13 +194,17 @@ Status NetworkWeights::upload(Device& device, const Checkpoint& checkpoint, cons
     return entry.weight.write(device, scratch.bytes);
 }
 
-Status NetworkWeights::load(Device& device, const Checkpoint& checkpoint, std::span<const TensorSpec> schema)
+Status NetworkWeights::load(Device& device, const Checkpoint& checkpoint, std::span<const TensorSpec> schema,
+                            const LoadProgress& progress)
 {
     SR_CHECK(checkpoint.require(schema));
     SR_CHECK(state_.allocate(device, "network weights"));
     Scratch scratch;
-    for (const Entry& entry : entries_)
+    for (const Entry& entry : entries_) {
         SR_CHECK(upload(device, checkpoint, entry, scratch));
+        if (progress)
+            SR_CHECK(progress(entry.weight.bytes()));
+    }
     return {};
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "engine/model/checkpoint.h"
+#include "engine/model/load_progress.h"
 #include "runtime/device/device.h"
 #include "runtime/device/state.h"
 
@@ -67,7 +68,8 @@ class NetworkWeights {
 
     uint64_t parameters() const; // as in the file
     uint64_t device_bytes(const DeviceLimits& limits) const { return state_.planned_bytes(limits); }
-    Status load(Device& device, const Checkpoint& checkpoint, std::span<const TensorSpec> schema);
+    Status load(Device& device, const Checkpoint& checkpoint, std::span<const TensorSpec> schema,
+                const LoadProgress& progress = {});
 
   private:
     // one tensor of the checkpoint and its way into a weight's rows

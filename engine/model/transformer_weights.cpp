@@ -134,7 +134,8 @@ Status TransformerWeights::upload(Device& device, const Part& part, const float*
     return device.write(memory.part(at, memory.bytes - at), packed);
 }
 
-Status TransformerWeights::load(Device& device, const SafetensorsSet& file, const LowRankAdapter& adapter)
+Status TransformerWeights::load(Device& device, const SafetensorsSet& file, const LowRankAdapter& adapter,
+                                const LoadProgress& progress)
 {
     std::map<std::string, TensorSpec> specs;
     for (const Part& p : parts_) {
@@ -149,16 +150,19 @@ Status TransformerWeights::load(Device& device, const SafetensorsSet& file, cons
     SR_CHECK(file.require(schema));
     SR_CHECK(adapter.require(schema));
     SR_CHECK(state_.allocate(device, "transformer weights"));
-    SR_CHECK(check_finite(file));
     std::vector<float> values;
     for (const Part& p : parts_) {
         const TensorInfo* info = file.find(p.name);
+        if (!p.first)
+            SR_CHECK(check_finite(file, *info));
         const uint64_t row = (p.vector ? 1 : p.cols) * dtype_bytes(info->dtype);
         const auto bytes = file.bytes(*info).subspan(p.first * row, p.count * row);
         values.resize(bytes.size() / dtype_bytes(info->dtype));
         to_float(bytes, info->dtype, values.data());
         adapter.add(p.name, p.first, p.cols, values);
         SR_CHECK(upload(device, p, values.data()));
+        if (progress)
+            SR_CHECK(progress(values.size() * dtype_bytes(p.target.dtype())));
     }
     return {};
 }

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/model/load_progress.h"
 #include "engine/model/low_rank.h"
 #include "engine/model/transformer_config.h"
 #include "runtime/base/safetensors.h"
@@ -31,7 +32,8 @@ class TransformerWeights {
     uint64_t parameters() const;
 
     // checks every name and shape, then uploads, with what the adapter adds. Errors: bad_input, out_of_memory
-    Status load(Device& device, const SafetensorsSet& file, const LowRankAdapter& adapter);
+    Status load(Device& device, const SafetensorsSet& file, const LowRankAdapter& adapter,
+                const LoadProgress& progress = {});
     // seeded values at the scale of a trained model, for benchmarks
     Status randomize(Device& device, uint64_t seed);
 

@@ -29,7 +29,8 @@ struct ToldTokens {
 class Transformer {
   public:
     // reads config.json and the weights of a voxfield_transformer folder, and its adapter if there is one
-    static Result<std::unique_ptr<Transformer>> load(Device& device, const Path& folder, DType precision);
+    static Result<std::unique_ptr<Transformer>> load(Device& device, const Path& folder, DType precision,
+                                                     const LoadProgress& progress = {});
     // random weights of a config, for benchmarks
     static Result<std::unique_ptr<Transformer>> random(Device& device, const TransformerConfig& config,
                                                        DType precision);

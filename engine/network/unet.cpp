@@ -299,10 +299,10 @@ std::unique_ptr<Unet> Unet::plan(const UnetConfig& config, DType precision, cons
 }
 
 Result<std::unique_ptr<Unet>> Unet::load(Device& device, const UnetConfig& config, const Checkpoint& weights,
-                                         DType precision)
+                                         DType precision, const LoadProgress& progress)
 {
     std::unique_ptr<Unet> unet = plan(config, precision, device.limits());
-    SR_CHECK(unet->impl_->weights.load(device, weights, unet_schema(config)));
+    SR_CHECK(unet->impl_->weights.load(device, weights, unet_schema(config), progress));
     SR_CHECK(unet->impl_->upload_frequencies(device));
     return unet;
 }

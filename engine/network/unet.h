@@ -3,6 +3,7 @@
 #pragma once
 
 #include "engine/model/checkpoint.h"
+#include "engine/model/load_progress.h"
 #include "engine/model/unet_config.h"
 #include "engine/network/transformer_2d.h"
 #include "kernels/network.h"
@@ -18,7 +19,7 @@ class Unet {
   public:
     ~Unet();
     static Result<std::unique_ptr<Unet>> load(Device& device, const UnetConfig& config, const Checkpoint& weights,
-                                              DType precision);
+                                              DType precision, const LoadProgress& progress = {});
     // lays out the weights without loading them, to plan memory
     static std::unique_ptr<Unet> plan(const UnetConfig& config, DType precision, const DeviceLimits& limits);
 

@@ -289,11 +289,11 @@ std::unique_ptr<Vae> Vae::plan(const VaeConfig& config, DType precision, const D
 }
 
 Result<std::unique_ptr<Vae>> Vae::load(Device& device, const VaeConfig& config, const Checkpoint& weights,
-                                       DType precision)
+                                       DType precision, const LoadProgress& progress)
 {
     std::unique_ptr<Vae> vae = plan(config, precision, device.limits());
     for (VaeHalf* half : {&vae->impl_->encoder, &vae->impl_->decoder})
-        SR_CHECK(half->weights.load(device, weights, vae_schema(config)));
+        SR_CHECK(half->weights.load(device, weights, vae_schema(config), progress));
     return vae;
 }
 

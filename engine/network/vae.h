@@ -3,6 +3,7 @@
 #pragma once
 
 #include "engine/model/checkpoint.h"
+#include "engine/model/load_progress.h"
 #include "engine/model/vae_config.h"
 #include "kernels/network.h"
 #include "runtime/device/device.h"
@@ -18,7 +19,7 @@ class Vae {
   public:
     ~Vae();
     static Result<std::unique_ptr<Vae>> load(Device& device, const VaeConfig& config, const Checkpoint& weights,
-                                             DType precision);
+                                             DType precision, const LoadProgress& progress = {});
     // lays out the weights without loading them, to plan memory
     static std::unique_ptr<Vae> plan(const VaeConfig& config, DType precision, const DeviceLimits& limits);
 

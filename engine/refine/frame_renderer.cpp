@@ -4,10 +4,9 @@
 
 namespace semrover {
 
-FrameRenderer::FrameRenderer(Device& device, const RendererModel& model, const SamplingPlan& plan, DType precision,
+FrameRenderer::FrameRenderer(Device& device, std::shared_ptr<LoadedNetworks> networks, const SamplingPlan& plan,
                              AsdOptions options, MemoryPolicy policy)
-    : device_(device), model_(model), plan_(plan), options_(std::move(options)), policy_(policy),
-      networks_(device, model, precision)
+    : device_(device), plan_(plan), options_(std::move(options)), policy_(policy), networks_(std::move(networks))
 {
 }
 FrameRenderer::~FrameRenderer() = default;
@@ -64,7 +63,7 @@ Status FrameRenderer::make_asd()
 {
     if (asd_)
         return {};
-    const Conditioning text{model_.conditioning_tokens, model_.conditioning};
+    const Conditioning text{networks_.model().conditioning_tokens, networks_.model().conditioning};
     SR_TRY(const Unet* unet, networks_.unet());
     SR_TRY(asd_, AsdRenderer::create(device_, *unet, plan_, text, size_, options_));
     return {};

@@ -12,8 +12,8 @@ namespace semrover {
 // not keep is dropped when other work begins, and made again when it is wanted; the results do not depend on it.
 class FrameRenderer {
   public:
-    // loads nothing yet; the model must outlive it
-    FrameRenderer(Device& device, const RendererModel& model, const SamplingPlan& plan, DType precision,
+    // loads nothing yet; the plan must outlive it
+    FrameRenderer(Device& device, std::shared_ptr<LoadedNetworks> networks, const SamplingPlan& plan,
                   AsdOptions options, MemoryPolicy policy);
     ~FrameRenderer();
 
@@ -55,12 +55,11 @@ class FrameRenderer {
     Status encoded(const LatentCodec& codec);
 
     Device& device_;
-    const RendererModel& model_;
     const SamplingPlan& plan_;
     AsdOptions options_;
     MemoryPolicy policy_;
     LatentSize size_;
-    LoadedNetworks networks_;
+    NetworksInUse networks_;
     std::unique_ptr<AsdRenderer> asd_;
     std::unique_ptr<LatentCodec> codec_;
     CodecDirection direction_ = CodecDirection::encode; // of codec_

@@ -4,10 +4,9 @@
 
 namespace semrover {
 
-WindowRenderer::WindowRenderer(Device& device, const RendererModel& model, const SamplingPlan& plan, DType precision,
+WindowRenderer::WindowRenderer(Device& device, std::shared_ptr<LoadedNetworks> networks, const SamplingPlan& plan,
                                VsdOptions options, MemoryPolicy policy)
-    : device_(device), model_(model), plan_(plan), options_(std::move(options)), policy_(policy),
-      networks_(device, model, precision)
+    : device_(device), plan_(plan), options_(std::move(options)), policy_(policy), networks_(std::move(networks))
 {
     options_.halves_apart = policy == MemoryPolicy::staged;
 }
@@ -58,8 +57,8 @@ Status WindowRenderer::make_vsd()
 {
     if (vsd_)
         return {};
-    const VideoConditioning conditioning{{model_.conditioning_tokens, model_.conditioning},
-                                         model_.defaults.video.added_numbers};
+    const VideoConditioning conditioning{{networks_.model().conditioning_tokens, networks_.model().conditioning},
+                                         networks_.model().defaults.video.added_numbers};
     SR_TRY(const Unet* unet, networks_.unet());
     SR_TRY(vsd_, VsdRenderer::create(device_, *unet, plan_, conditioning, work_.size, work_.frames, options_));
     return {};

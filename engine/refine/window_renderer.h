@@ -19,8 +19,8 @@ struct EncodedBuffer {
 // it is wanted; the results do not depend on it.
 class WindowRenderer {
   public:
-    // loads nothing yet; the model must outlive it
-    WindowRenderer(Device& device, const RendererModel& model, const SamplingPlan& plan, DType precision,
+    // loads nothing yet; the plan must outlive it
+    WindowRenderer(Device& device, std::shared_ptr<LoadedNetworks> networks, const SamplingPlan& plan,
                    VsdOptions options, MemoryPolicy policy);
     ~WindowRenderer();
 
@@ -44,12 +44,11 @@ class WindowRenderer {
     Status make_vsd();
 
     Device& device_;
-    const RendererModel& model_;
     const SamplingPlan& plan_;
     VsdOptions options_;
     MemoryPolicy policy_;
     RendererWork work_;
-    LoadedNetworks networks_;
+    NetworksInUse networks_;
     std::unique_ptr<VsdRenderer> vsd_;
     std::unique_ptr<LatentCodec> encoder_;
     std::unique_ptr<VideoDecoder> decoder_;

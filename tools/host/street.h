@@ -35,15 +35,22 @@ static sr_status street_labels(void* user, const sr_window* window, sr_grid* gri
     return SR_OK;
 }
 
+/* model: a folder. Its weights stay as long as the world */
 static sr_status make_street(sr_context* context, const char* model, sr_world** world)
 {
-    const sr_world_desc desc = {.struct_size = sizeof desc,
-                                .model = model,
-                                .steps = 4, /* for a quick look; 0: as the model says */
-                                .labels = street_labels,
-                                .host_bytes = 256u << 20,
-                                .splat_bytes = 32u << 20};
-    return sr_world_create(context, &desc, world);
+    const sr_model_desc model_desc = {.struct_size = sizeof model_desc, .path = model, .parts = SR_MODEL_VOXFIELD};
+    sr_world_desc desc = {.struct_size = sizeof desc,
+                          .steps = 4, /* for a quick look; 0: as the model says */
+                          .labels = street_labels,
+                          .host_bytes = 256u << 20,
+                          .splat_bytes = 32u << 20};
+    sr_model* loaded = NULL;
+    sr_status status = sr_model_load(context, &model_desc, &loaded);
+    desc.model = loaded;
+    if (status == SR_OK)
+        status = sr_world_create(context, &desc, world);
+    sr_model_destroy(loaded);
+    return status;
 }
 
 #endif

@@ -9,6 +9,7 @@ namespace semrover::view {
 Refiner::~Refiner()
 {
     sr_chain_destroy(chain_);
+    sr_model_destroy(model_);
 }
 
 Status Refiner::open(uint32_t width, uint32_t height)
@@ -17,10 +18,13 @@ Status Refiner::open(uint32_t width, uint32_t height)
         return {};
     sr_chain_destroy(chain_);
     chain_ = nullptr;
+    if (!model_) {
+        SR_TRY(model_, load_model(context_, request_.model, SR_MODEL_RENDERER));
+    }
     sr_chain_desc desc{};
     desc.struct_size = sizeof desc;
     desc.steps = request_.steps;
-    desc.model = request_.model.c_str();
+    desc.model = model_;
     desc.width = width_ = width;
     desc.height = height_ = height;
     desc.seed = request_.seed;

@@ -34,6 +34,7 @@ class Refiner {
 
     sr_context* context_;
     RefinerRequest request_;
+    sr_model* model_ = nullptr; // from the first frame on
     sr_chain* chain_ = nullptr;
     uint32_t width_ = 0, height_ = 0, steps_ = 0;
     bool busy_ = false;

@@ -93,6 +93,17 @@ Result<Path> a_tile_of(const Path& folder)
 
 } // namespace
 
+Result<sr_model*> load_model(sr_context* context, const std::string& folder, uint32_t part)
+{
+    sr_model_desc desc{};
+    desc.struct_size = sizeof desc;
+    desc.path = folder.c_str();
+    desc.parts = part;
+    sr_model* model = nullptr;
+    SR_CHECK(checked(sr_model_load(context, &desc, &model), context));
+    return model;
+}
+
 Result<std::unique_ptr<Street>> Street::open(sr_context* context, const StreetRequest& request)
 {
     std::unique_ptr<Street> street(new Street(context));
@@ -119,9 +130,10 @@ Status Street::create(const StreetRequest& r)
     if (info.points_per_cell && r.warning)
         r.warning("the points of " + quote_path(r.grid) + " are not shown: a world generates its own");
 
+    SR_TRY(sr_model* const model, load_model(context_, r.model, SR_MODEL_VOXFIELD));
     sr_world_desc desc{};
     desc.struct_size = sizeof desc;
-    desc.model = r.model.c_str();
+    desc.model = model;
     desc.steps = r.steps;
     desc.grid = tiles ? nullptr : grid.get();
     desc.folder = tiles ? r.grid.c_str() : nullptr;
@@ -137,7 +149,9 @@ Status Street::create(const StreetRequest& r)
     desc.splat_bytes = r.splat_bytes;
     desc.splat_radius = r.splat_radius;
     desc.detail_distance = r.detail_distance;
-    return checked(sr_world_create(context_, &desc, &world_), context_);
+    const Status created = checked(sr_world_create(context_, &desc, &world_), context_);
+    sr_model_destroy(model); // the world has it, too
+    return created;
 }
 
 Status Street::focus(const Camera& camera)

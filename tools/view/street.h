@@ -29,6 +29,8 @@ struct PlacedCell {
     std::vector<std::array<float, 6>> points; // x, y, z, r, g, b
 };
 
+Result<sr_model*> load_model(sr_context* context, const std::string& folder, uint32_t part);
+
 // The world that is looked at: a sr_world of the library.
 class Street {
   public:

@@ -1,0 +1,128 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// models: loaded once, shared by worlds and chains
+#include "engine/capi/call.h"
+#include "engine/capi/handles.h"
+
+using namespace semrover;
+using namespace semrover::capi;
+
+namespace {
+
+// the files that the application has in memory
+Result<std::unique_ptr<MemoryFolder>> folder_of(const sr_model_desc& d)
+{
+    auto folder = std::make_unique<MemoryFolder>();
+    for (uint64_t i = 0; i < d.file_count; ++i) {
+        const sr_file& file = d.files[i];
+        if (!file.path || (!file.data && file.bytes))
+            return fail(ErrorCode::usage, "sr_model_desc: file {} of {} has no path or no data", i, d.file_count);
+        SR_CHECK(folder->add(file.path, {static_cast<const std::byte*>(file.data), size_t(file.bytes)}));
+    }
+    return folder;
+}
+
+Result<ModelRequest> request_of(const sr_model_desc& d)
+{
+    if (!d.files != !d.file_count)
+        return fail(ErrorCode::usage, "sr_model_desc: files and their count come together");
+    if (!d.files && !d.path)
+        return fail(ErrorCode::usage, "sr_model_desc: path is NULL");
+    if (d.parts > (SR_MODEL_VOXFIELD | SR_MODEL_RENDERER))
+        return fail(ErrorCode::usage, "sr_model_desc: parts is {}, expected SR_MODEL_..", d.parts);
+    if (d.precision > SR_FP32)
+        return fail(ErrorCode::usage, "sr_model_desc: precision is {}, expected SR_FP16 or SR_FP32", d.precision);
+    ModelRequest request{.path = d.path ? d.path : ""};
+    if (d.files) {
+        SR_TRY(request.files, folder_of(d));
+        request.path = d.path ? request.files->path() / d.path : request.files->path();
+    }
+    request.precision = d.precision == SR_FP32 ? DType::f32 : DType::f16;
+    if (d.parts) {
+        request.voxfield = d.parts & SR_MODEL_VOXFIELD;
+        request.renderer = d.parts & SR_MODEL_RENDERER;
+    }
+    return request;
+}
+
+void describe(const VoxfieldModel& voxfield, sr_model_info& info)
+{
+    info.parts |= SR_MODEL_VOXFIELD;
+    for (const ConditionPart part : voxfield.config.condition)
+        info.conditions |= 1u << uint32_t(part);
+    info.voxel_size = decimal_voxel_size(voxfield.config.voxel_size);
+    info.points_per_cell = voxfield.config.points_per_voxel;
+    info.steps = uint32_t(voxfield.defaults.num_inference_steps);
+}
+
+void describe(const RendererModel& renderer, sr_model_info& info)
+{
+    info.parts |= SR_MODEL_RENDERER;
+    info.renderer_steps = uint32_t(renderer.defaults.num_inference_steps);
+    info.window_frames = renderer.video() ? renderer.defaults.video.window_frames : 1;
+    info.splat_radius = renderer.defaults.splat_radius.value_or(0);
+}
+
+sr_model_info info_of(const Model& model)
+{
+    sr_model_info info{};
+    info.precision = model.precision() == DType::f32 ? SR_FP32 : SR_FP16;
+    info.device_bytes = model.device_bytes();
+    if (model.voxfield())
+        describe(*model.voxfield(), info);
+    if (model.renderer())
+        describe(model.renderer()->model(), info);
+    return info;
+}
+
+} // namespace
+
+namespace semrover::capi {
+
+Result<std::shared_ptr<Model>> model_of(const sr_context& context, const sr_model* model, const char* name)
+{
+    if (!model)
+        return fail(ErrorCode::usage, "{}: model is NULL", name);
+    if (model->context != &context)
+        return fail(ErrorCode::usage, "{}: the model belongs to another context", name);
+    return model->model;
+}
+
+} // namespace semrover::capi
+
+extern "C" {
+
+sr_status sr_model_load(sr_context* context, const sr_model_desc* desc, sr_model** model)
+{
+    return guarded(context, [&]() -> Status {
+        if (!context || !model)
+            return fail(ErrorCode::usage, "sr_model_load: NULL");
+        *model = nullptr;
+        SR_TRY(const sr_model_desc known, read_struct(desc, "sr_model_desc"));
+        SR_TRY(ModelRequest request, request_of(known));
+        const auto progress = [&](uint64_t done, uint64_t total) {
+            return !known.progress || known.progress(known.user, done, total) == 0;
+        };
+        SR_TRY(auto loaded, Model::load(*context->device, std::move(request), progress));
+        *model = new sr_model{context, std::move(loaded)};
+        return {};
+    });
+}
+
+void sr_model_destroy(sr_model* model)
+{
+    delete model;
+}
+
+sr_status sr_model_get_info(const sr_model* model, sr_model_info* info)
+{
+    return guarded(model ? model->context : nullptr, [&]() -> Status {
+        if (!model)
+            return fail(ErrorCode::usage, "sr_model_get_info: model is NULL");
+        return write_result(info_of(*model->model), info, "sr_model_get_info");
+    });
+}
+
+} // extern "C"
+
+static_assert(sizeof(sr_file) == 24 && sizeof(sr_model_desc) == 64 && sizeof(sr_model_info) == 64);
