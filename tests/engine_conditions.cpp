@@ -1,7 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/voxfield/cell_conditions.h"
-#include "engine/voxfield/outpaint.h"
 #include "engine/voxfield/token_sampler.h"
 #include "tests/json_text.h"
 #include "tests/says.h"
@@ -160,10 +159,10 @@ RegionInput patch(int32_t x, uint32_t cells, bool told)
     for (uint32_t i = 0; i < cells; ++i) {
         r.cells.push_back({x + int32_t(i % 7), int32_t(i / 7), 0});
         r.labels.push_back(i % 20);
-        r.told.resize((i + 1) * kWidth);
+        r.condition.resize((i + 1) * kWidth);
         if (told && i % 2) {
-            object_condition(object, {0.1 * i, 0, 0}, std::span(r.told).last(kWidth));
-            tint_condition({0.9, 0.2, 0.1 * (i % 10)}, std::span(r.told).last(4));
+            object_condition(object, {0.1 * i, 0, 0}, std::span(r.condition).last(kWidth));
+            tint_condition({0.9, 0.2, 0.1 * (i % 10)}, std::span(r.condition).last(4));
         }
     }
     r.fixed.resize(cells * transformer().config().channels());
@@ -175,8 +174,7 @@ std::vector<float> run(const std::vector<RegionInput>& regions, float guidance)
     SchedulerConfig config;
     config.prediction = Prediction::sample;
     config.spacing = TimestepSpacing::trailing;
-    auto sampler =
-        TokenSampler::create(device(), transformer(), *plan_sampling(config, 3), sampling_options(guidance, 7));
+    auto sampler = TokenSampler::create(device(), transformer(), *plan_sampling(config, 3), {{guidance}, 7});
     EXPECT_TRUE(sampler) << sampler.error().message;
     auto tokens = (*sampler)->run(regions);
     EXPECT_TRUE(tokens) << tokens.error().message;
@@ -188,7 +186,7 @@ TEST(engine_conditions, zeros_and_nothing_are_the_same_and_what_is_told_is_heard
     for (float guidance : {1.f, 2.f}) {
         const RegionInput told = patch(0, 33, true), zeros = patch(0, 33, false);
         RegionInput nothing = zeros;
-        nothing.told.clear();
+        nothing.condition.clear();
         const std::vector<float> silent = run({nothing}, guidance);
         EXPECT_EQ(run({zeros}, guidance), silent);
         EXPECT_NE(run({told}, guidance), silent);
@@ -198,7 +196,7 @@ TEST(engine_conditions, zeros_and_nothing_are_the_same_and_what_is_told_is_heard
 TEST(engine_conditions, a_region_is_the_same_alone_and_beside_one_that_is_told_nothing)
 {
     RegionInput nothing = patch(90, 20, false);
-    nothing.told.clear();
+    nothing.condition.clear();
     const RegionInput told = patch(0, 33, true);
     const std::vector<float> alone = run({told}, 2), batched = run({nothing, told}, 2);
     const int64_t channels = transformer().config().channels();

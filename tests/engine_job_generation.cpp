@@ -405,8 +405,8 @@ TEST(engine_job_generation, warns_where_a_distilled_model_is_sampled_in_another_
         return resolve_generation(o)->model.warnings;
     };
     EXPECT_TRUE(warnings([](GenerationOptions&) {}).empty());
-    EXPECT_TRUE(warnings([](GenerationOptions& o) { o.steps = 4, o.cfg_scale = 1.f; }).empty());
-    const auto scale = warnings([](GenerationOptions& o) { o.cfg_scale = 2.f; });
+    EXPECT_TRUE(warnings([](GenerationOptions& o) { o.steps = 4, o.guidance_scale = 1.f; }).empty());
+    const auto scale = warnings([](GenerationOptions& o) { o.guidance_scale = 2.f; });
     ASSERT_EQ(scale.size(), 1u);
     EXPECT_NE(scale[0].find("guided already, and --cfg-scale 2 guides it twice"), std::string::npos) << scale[0];
     const auto steps = warnings([](GenerationOptions& o) { o.steps = 5; });

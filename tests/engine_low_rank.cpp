@@ -75,7 +75,7 @@ std::vector<float> run(const Path& model)
     region.fixed.resize(20 * (*transformer)->config().channels());
     SchedulerConfig config;
     config.prediction = Prediction::sample;
-    auto sampler = TokenSampler::create(device(), **transformer, *plan_sampling(config, 2), sampling_options(1.f, 7));
+    auto sampler = TokenSampler::create(device(), **transformer, *plan_sampling(config, 2), {{1}, 7});
     EXPECT_TRUE(sampler) << sampler.error().message;
     return *(*sampler)->run(std::vector{region});
 }

@@ -35,7 +35,7 @@ class BruteForce {
     {
         regions_.offsets.push_back(0);
         std::vector<bool> deferred(cloud_.size(), false);
-        add(uint32_t(options_.first_seed), region(uint32_t(options_.first_seed)));
+        add(uint32_t(options_.first_cell), region(uint32_t(options_.first_cell)));
         while (true) {
             const int64_t seed = nearest(deferred);
             if (seed < 0)
@@ -167,7 +167,7 @@ class Clouds {
         options.coverage_threshold = uniform(1, options.region_size);
         options.strategy =
             std::array{RegionStrategy::paper, RegionStrategy::complete, RegionStrategy::rim}[uniform(0, 2)];
-        options.first_seed = uniform(0, int(cloud.size()) - 1);
+        options.first_cell = uniform(0, int(cloud.size()) - 1);
         return options;
     }
 
@@ -213,7 +213,7 @@ TEST(Regions, GoldenCasesAreReproducedExactly)
         RegionOptions options;
         options.region_size = golden.params.at("region_size");
         options.coverage_threshold = golden.params.at("coverage_threshold");
-        options.first_seed = golden.params.at("first_seed");
+        options.first_cell = golden.params.at("first_seed");
         options.strategy = golden.params.at("strategy") == "paper" ? RegionStrategy::paper : RegionStrategy::complete;
         const auto regions = extract_regions(cells_of(golden), options);
         ASSERT_TRUE(regions) << regions.error().message;
@@ -326,8 +326,8 @@ TEST(Regions, BadInputIsRefusedWithTheReason)
     EXPECT_NE(message(two, {.region_size = 0}).find("region_size"), std::string::npos);
     EXPECT_NE(message(two, {.coverage_threshold = 0}).find("coverage_threshold"), std::string::npos);
     EXPECT_NE(message(two, {.coverage_threshold = 129}).find("coverage_threshold"), std::string::npos);
-    EXPECT_NE(message(two, {.first_seed = 2}).find("first_cell"), std::string::npos);
-    EXPECT_NE(message(two, {.first_seed = -1}).find("first_cell"), std::string::npos);
+    EXPECT_NE(message(two, {.first_cell = 2}).find("first_cell"), std::string::npos);
+    EXPECT_NE(message(two, {.first_cell = -1}).find("first_cell"), std::string::npos);
     EXPECT_NE(message({{INT32_MIN, 0, 0}, {INT32_MAX, 0, 0}, {0, 0, 0}}, {}).find("too wide"), std::string::npos);
 }
 

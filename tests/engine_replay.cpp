@@ -67,7 +67,7 @@ struct TokenRun {
     }
     std::unique_ptr<TokenSampler> make() const
     {
-        SamplerOptions options = sampling_options(Guidance{2.5f, 500}, seed);
+        SamplerOptions options{{2.5f, 500}, seed};
         options.modulation_window = 2;
         return std::move(*TokenSampler::create(device(), transformer(), plan, options));
     }
@@ -185,7 +185,7 @@ TEST(engine_replay_of_two, a_step_without_a_run_is_the_callers_mistake)
 {
     const TokenRun tokens;
     const auto sampler = tokens.make();
-    EXPECT_DEATH((void)sampler->step(1), "a step of a sampler that has not begun");
+    EXPECT_DEATH((void)sampler->step(1), "a step of a run that has not begun");
     ASSERT_TRUE(tokens.begin(*sampler));
     EXPECT_DEATH((void)sampler->finish(), "a run is finished after 0 of ");
     ASSERT_TRUE(sampler->cancel());

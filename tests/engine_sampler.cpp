@@ -59,8 +59,8 @@ TEST(engine_sampler, a_region_is_the_same_alone_and_in_any_batch)
 {
     const SamplingPlan p = plan(Sampler::ddpm, 3, {2, 2});
     const RegionInput a = patch(0, 50, 20), b = patch(40, 33, 0), c = patch(-90, 17, 5);
-    const std::vector<float> alone = run(p, sampling_options(2, 7), {b});
-    const std::vector<float> batched = run(p, sampling_options(2, 7), {a, b, c});
+    const std::vector<float> alone = run(p, {{2}, 7}, {b});
+    const std::vector<float> batched = run(p, {{2}, 7}, {a, b, c});
     const size_t channels = transformer().config().channels();
     const std::vector<float> part(batched.begin() + int64_t(50 * channels), batched.begin() + int64_t(83 * channels));
     EXPECT_EQ(alone, part);
@@ -70,7 +70,7 @@ TEST(engine_sampler, known_tokens_leave_as_they_came_with_every_sampler)
 {
     const RegionInput region = patch(3, 40, 25);
     for (Sampler sampler : {Sampler::ddpm, Sampler::ddim, Sampler::dpmpp_2m}) {
-        const std::vector<float> tokens = run(plan(sampler, 4, {2, 2}), sampling_options(3, 1), {region});
+        const std::vector<float> tokens = run(plan(sampler, 4, {2, 2}), {{3}, 1}, {region});
         for (size_t i = 0; i < 25 * size_t(transformer().config().channels()); ++i)
             ASSERT_EQ(tokens[i], region.fixed[i]) << sampler_name(sampler) << " element " << i;
     }
@@ -82,12 +82,12 @@ TEST(engine_sampler, clean_known_tokens_leave_as_they_came_and_are_seen_without_
     const RegionInput region = patch(3, 40, 25);
     const size_t given = 25 * size_t(transformer().config().channels());
     for (const RepaintOptions& repaint : {RepaintOptions{0, 1, KnownTokens::clean}, {2, 2, KnownTokens::clean}}) {
-        const std::vector<float> clean = run(plan(Sampler::ddpm, 4, repaint), sampling_options(3, 1), {region});
+        const std::vector<float> clean = run(plan(Sampler::ddpm, 4, repaint), {{3}, 1}, {region});
         for (size_t i = 0; i < given; ++i)
             ASSERT_EQ(clean[i], region.fixed[i]);
         RepaintOptions other = repaint;
         other.known = KnownTokens::noised;
-        EXPECT_NE(clean, run(plan(Sampler::ddpm, 4, other), sampling_options(3, 1), {region}));
+        EXPECT_NE(clean, run(plan(Sampler::ddpm, 4, other), {{3}, 1}, {region}));
     }
 }
 
@@ -96,7 +96,7 @@ TEST(engine_sampler, from_the_first_step_on_clean_tokens_have_no_noise)
 {
     const RegionInput region = patch(0, 12, 11);
     const auto one = [&](uint64_t seed, KnownTokens known) {
-        SamplerOptions options = sampling_options(1, seed);
+        SamplerOptions options{{1}, seed};
         const size_t channels = transformer().config().channels();
         options.noise = [=](size_t, std::span<float> normals) {
             for (size_t i = 0; i < normals.size(); ++i) // only the noise of known tokens depends on the seed
@@ -112,23 +112,23 @@ TEST(engine_sampler, a_small_window_of_modulations_changes_nothing)
 {
     const SamplingPlan p = plan(Sampler::ddpm, 9, {3, 2});
     const RegionInput region = patch(0, 30, 10);
-    SamplerOptions small = sampling_options(2, 5);
+    SamplerOptions small{{2}, 5};
     small.modulation_window = 2;
-    EXPECT_EQ(run(p, small, {region}), run(p, sampling_options(2, 5), {region}));
+    EXPECT_EQ(run(p, small, {region}), run(p, {{2}, 5}, {region}));
 }
 
 TEST(engine_sampler, guides_the_steps_from_a_timestep_on)
 {
     const std::vector<RegionInput> regions{patch(0, 50, 20), patch(40, 33, 0)};
     const SamplingPlan p = plan(Sampler::ddpm, 4, {2, 2}); // timesteps 999, 749, 499, 249
-    const auto from = [&](double timestep) { return run(p, sampling_options(Guidance{2, timestep}, 7), regions); };
+    const auto from = [&](double timestep) { return run(p, {{2, timestep}, 7}, regions); };
     const std::vector<float> some = from(500);
     EXPECT_EQ(from(250), from(499));
-    EXPECT_EQ(from(0), run(p, sampling_options(2, 7), regions));
-    EXPECT_EQ(from(1000), run(p, sampling_options(1, 7), regions));
+    EXPECT_EQ(from(0), run(p, {{2}, 7}, regions));
+    EXPECT_EQ(from(1000), run(p, {{1}, 7}, regions));
     EXPECT_NE(some, from(0));
     EXPECT_NE(some, from(1000));
-    const std::vector<float> alone = run(p, sampling_options(Guidance{2, 500}, 7), {regions[0]});
+    const std::vector<float> alone = run(p, {{2, 500}, 7}, {regions[0]});
     EXPECT_TRUE(std::equal(alone.begin(), alone.end(), some.begin()));
 }
 
@@ -136,14 +136,12 @@ TEST(engine_sampler, guides_the_steps_up_to_a_timestep)
 {
     const std::vector<RegionInput> regions{patch(0, 50, 20)};
     const SamplingPlan p = plan(Sampler::ddpm, 4, {}); // timesteps 999, 749, 499, 249
-    const auto between = [&](double from, double until) {
-        return run(p, sampling_options(Guidance{2, from, until}, 7), regions);
-    };
-    EXPECT_EQ(between(0, 999), run(p, sampling_options(2, 7), regions));
+    const auto between = [&](double from, double until) { return run(p, {{2, from, until}, 7}, regions); };
+    EXPECT_EQ(between(0, 999), run(p, {{2}, 7}, regions));
     EXPECT_EQ(between(0, 998), between(0, 749));
     EXPECT_NE(between(0, 998), between(0, 999));
-    EXPECT_EQ(between(300, 400), run(p, sampling_options(1, 7), regions));
-    const auto backwards = TokenSampler::create(device(), transformer(), p, sampling_options(Guidance{2, 500, 400}, 7));
+    EXPECT_EQ(between(300, 400), run(p, {{1}, 7}, regions));
+    const auto backwards = TokenSampler::create(device(), transformer(), p, {{2, 500, 400}, 7});
     ASSERT_FALSE(backwards);
     EXPECT_EQ(backwards.error().code, ErrorCode::usage);
 }
@@ -160,15 +158,12 @@ TEST(engine_sampler, lets_cells_without_labels_see_none_beyond_the_guidance_radi
     narrow.attention_radius = float(radius);
     const std::unique_ptr<Transformer> whole = std::move(*Transformer::random(device(), config, DType::f16)),
                                        near = std::move(*Transformer::random(device(), narrow, DType::f16));
-    const auto unlabelled = [&](double r) {
-        return run(p, sampling_options(Guidance{0, 0, kLastTimestep, r}, 7), {region}, *whole);
-    };
-    EXPECT_EQ(unlabelled(radius), run(p, sampling_options(1, 7), {bare}, *near));
-    EXPECT_EQ(unlabelled(config.attention_radius), run(p, sampling_options(1, 7), {bare}, *whole));
+    const auto unlabelled = [&](double r) { return run(p, {{0, 0, kLastTimestep, r}, 7}, {region}, *whole); };
+    EXPECT_EQ(unlabelled(radius), run(p, {{1}, 7}, {bare}, *near));
+    EXPECT_EQ(unlabelled(config.attention_radius), run(p, {{1}, 7}, {bare}, *whole));
     EXPECT_NE(unlabelled(radius), unlabelled(config.attention_radius));
     // the labelled half sees as far as ever
-    EXPECT_EQ(run(p, sampling_options(Guidance{1, 0, kLastTimestep, radius}, 7), {region}, *whole),
-              run(p, sampling_options(1, 7), {region}, *whole));
+    EXPECT_EQ(run(p, {{1, 0, kLastTimestep, radius}, 7}, {region}, *whole), run(p, {{1}, 7}, {region}, *whole));
 }
 
 // a guided step and one that is not, each a run of its own that begins with what the one before left
@@ -179,7 +174,7 @@ TEST(engine_sampler, steps_that_are_guided_and_not_follow_each_other)
     const auto part = [&](size_t first, size_t count, float scale, double from, const std::vector<float>& begin) {
         SamplingPlan p = both;
         p.rows = {both.rows.begin() + ptrdiff_t(first), both.rows.begin() + ptrdiff_t(first + count)};
-        SamplerOptions options = sampling_options(Guidance{scale, from}, 0);
+        SamplerOptions options{{scale, from}, 0};
         options.noise = [=](size_t row, std::span<float> normals) {
             for (size_t i = 0; i < normals.size(); ++i)
                 normals[i] = row == 0 && i < begin.size() ? begin[i] : float((i * 13) % 31) / 15.5f - 1;
@@ -197,10 +192,10 @@ TEST(engine_sampler, the_seed_and_only_the_seed_changes_the_result)
 {
     const SamplingPlan p = plan(Sampler::ddpm, 2, {});
     const RegionInput region = patch(0, 20, 0);
-    const auto first = run(p, sampling_options(1, 5), {region});
-    EXPECT_EQ(first, run(p, sampling_options(1, 5), {region}));
-    EXPECT_NE(first, run(p, sampling_options(1, 6), {region}));
-    EXPECT_NE(first, run(p, sampling_options(1, 5ull << 32), {region}));
+    const auto first = run(p, {{1}, 5}, {region});
+    EXPECT_EQ(first, run(p, {{1}, 5}, {region}));
+    EXPECT_NE(first, run(p, {{1}, 6}, {region}));
+    EXPECT_NE(first, run(p, {{1}, 5ull << 32}, {region}));
 }
 
 TEST(engine_sampler, planned_memory_is_the_memory_in_use)
@@ -208,21 +203,11 @@ TEST(engine_sampler, planned_memory_is_the_memory_in_use)
     const SamplingPlan p = plan(Sampler::ddpm, 2, {});
     for (const double from : {0., 600.}) {
         const uint64_t before = device().allocated_bytes();
-        auto sampler = *TokenSampler::create(device(), transformer(), p, sampling_options(Guidance{2, from}, 5));
+        auto sampler = *TokenSampler::create(device(), transformer(), p, {{2, from}, 5});
         const uint64_t planned = *sampler->planned_bytes(2, 40);
         ASSERT_TRUE(sampler->run(std::vector<RegionInput>{patch(0, 40, 0), patch(50, 40, 0)}));
         EXPECT_EQ(device().allocated_bytes() - before, planned);
     }
-}
-
-TEST(engine_sampler, stops_when_the_callback_says_so)
-{
-    const SamplingPlan p = plan(Sampler::ddpm, 6, {});
-    auto sampler = *TokenSampler::create(device(), transformer(), p, sampling_options(2, 5));
-    const auto result =
-        sampler->run(std::vector<RegionInput>{patch(0, 10, 0)}, [](size_t done, size_t) { return done < 3; });
-    ASSERT_FALSE(result);
-    EXPECT_EQ(result.error().code, ErrorCode::interrupted);
 }
 
 } // namespace engine_sampler_test

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/voxfield/sub_grid.h"
 
+#include "engine/job/grid_filling.h"
 #include "engine/scene/cell_reach.h"
-#include "engine/voxfield/outpaint.h"
 #include "runtime/base/dtype.h"
 
 #include <algorithm>
@@ -22,11 +22,7 @@ Device& device()
     return *d;
 }
 
-const Transformer& transformer()
-{
-    static const std::unique_ptr<Transformer> t = std::move(*Transformer::load(device(), kModel, DType::f16));
-    return *t;
-}
+constexpr int kPoints = 20; // of the model
 
 // a road of 60 x 16 cells with a wall beside it, every cell with points of its own
 VoxelGrid street()
@@ -39,7 +35,7 @@ VoxelGrid street()
                 grid.cells.push_back({i, j, k});
                 grid.labels.push_back(j == 15 ? 2 : 0);
             }
-    make_room_for_points(grid, int(transformer().config().points_per_voxel));
+    make_room_for_points(grid, kPoints);
     for (size_t v = 0; v < grid.points.size(); ++v) {
         grid.points[v] = float_to_half(float(v * 7 % 501) / 1000 - 0.25f);
         grid.colors[v] = uint8_t(v * 13);
@@ -65,18 +61,19 @@ RegionOptions options(RegionStrategy strategy = RegionStrategy::complete)
 
 void generate(VoxelGrid& grid, uint32_t batch, const RegionOptions& regions = options())
 {
-    const auto plan = plan_sampling(SchedulerConfig{.sampler = Sampler::ddpm, .prediction = Prediction::sample}, 2);
-    ASSERT_TRUE(plan) << plan.error().message;
-    auto outpainter = Outpainter::create(grid, transformer().config(), regions);
-    ASSERT_TRUE(outpainter) << outpainter.error().message;
-    auto sampler = TokenSampler::create(device(), transformer(), *plan, sampling_options(2, 5));
-    ASSERT_TRUE(sampler) << sampler.error().message;
-    (*outpainter)->begin(**sampler, batch);
-    for (bool filled = false; !filled;) {
-        const auto step = (*outpainter)->step(~size_t(0));
-        ASSERT_TRUE(step) << step.error().message;
-        filled = *step;
-    }
+    GenerationSettings settings;
+    settings.model = *VoxfieldModel::open(kModel, Sampler::ddpm);
+    settings.plan = *plan_sampling(settings.model.scheduler, 2);
+    settings.guidance.scale = 2;
+    settings.batch = batch;
+    GridFilling filling(device(), settings);
+    const Status cut = filling.cut(grid, regions);
+    ASSERT_TRUE(cut) << cut.error().message;
+    ASSERT_TRUE(filling.load(5, {}));
+    ASSERT_TRUE(filling.start(nullptr));
+    const auto filled = filling.step(JobBudget::unlimited());
+    ASSERT_TRUE(filled) << filled.error().message;
+    EXPECT_TRUE(*filled);
 }
 
 void expect_a_part_gives_the_bytes_of_the_whole(const RegionOptions& regions)
@@ -158,7 +155,7 @@ TEST(engine_sub_grid, a_grid_without_points_gets_room_for_them)
     generate(part->grid, 2);
     put_back(grid, *part, targets);
     EXPECT_EQ(std::ranges::count(grid.generated, 1), int64_t(targets.size()));
-    EXPECT_EQ(grid.points.size(), grid.cells.size() * size_t(transformer().config().points_per_voxel) * 3);
+    EXPECT_EQ(grid.points.size(), grid.cells.size() * size_t(kPoints) * 3);
 }
 
 // ---- regions that grow from what is known, against the algorithm written down plainly

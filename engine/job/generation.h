@@ -6,7 +6,7 @@
 #include "engine/job/generation_settings.h"
 #include "engine/job/job.h"
 #include "engine/job/told_objects.h"
-#include "engine/voxfield/outpaint.h"
+#include "engine/scene/grid.h"
 
 namespace semrover {
 

@@ -16,7 +16,7 @@ namespace {
 // attention does not reach farther than its radius, and more known cells would only be looked at
 Status set_tiles(RegionOptions& regions, const TransformerConfig& config, double tile_size)
 {
-    if (regions.first_seed != 0)
+    if (regions.first_cell != 0)
         return fail(ErrorCode::usage, "--first-cell has no meaning with --order tiles");
     SR_TRY(regions.tile_cells, tile_cells_of(tile_size, config.voxel_size));
     regions.halo_cells = int32_t(std::sqrt(double(config.radius2())));
@@ -55,8 +55,9 @@ Result<GenerationSettings> resolve_generation(const GenerationOptions& o)
     SR_TRY(s.model, VoxfieldModel::open(o.model, sampler));
     const VoxfieldDefaults& d = s.model.defaults;
     s.steps = o.steps.value_or(preset.steps ? preset.steps : d.num_inference_steps);
-    s.guidance = {o.cfg_scale.value_or(d.guidance_scale), double(o.cfg_from.value_or(d.guidance_from)),
-                  double(o.cfg_until.value_or(d.guidance_until)), o.cfg_radius.value_or(d.guidance_radius)};
+    s.guidance = {o.guidance_scale.value_or(d.guidance.scale), double(o.guidance_from.value_or(int(d.guidance.from))),
+                  double(o.guidance_until.value_or(int(d.guidance.until))),
+                  o.guidance_radius.value_or(d.guidance.radius)};
     s.repaint = preset.steps ? preset.repaint : d.repaint;
     s.repaint.jump_length = o.jump_length.value_or(s.repaint.jump_length);
     s.repaint.jump_n_sample = o.jump_n_sample.value_or(s.repaint.jump_n_sample);
@@ -66,7 +67,7 @@ Result<GenerationSettings> resolve_generation(const GenerationOptions& o)
     s.regions.coverage_threshold =
         std::min(o.coverage_threshold.value_or(d.regions.coverage_threshold), s.regions.region_size);
     s.regions.strategy = o.strategy.value_or(d.regions.strategy);
-    s.regions.first_seed = o.first_cell;
+    s.regions.first_cell = o.first_cell;
     if (o.tile_size > 0)
         SR_CHECK(set_tiles(s.regions, s.model.config, o.tile_size));
     s.precision = o.precision;
@@ -105,7 +106,7 @@ Result<Json> settings_json(const GenerationSettings& s, const Device& device, st
                   {"region_size", s.regions.region_size},
                   {"coverage_threshold", s.regions.coverage_threshold},
                   {"strategy", std::string(region_strategy_name(s.regions.strategy))},
-                  {"first_cell", s.regions.first_seed},
+                  {"first_cell", s.regions.first_cell},
                   {"jump_length", s.repaint.jump_length},
                   {"jump_n_sample", s.repaint.jump_n_sample},
                   {"known_tokens", s.repaint.known == KnownTokens::clean ? "clean" : "noised"}};

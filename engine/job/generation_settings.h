@@ -22,9 +22,9 @@ struct GenerationOptions {
     Path model;                  // a folder
     std::string sampler, preset; // names; empty: the model's
     std::optional<int> steps, region_size, coverage_threshold, jump_length, jump_n_sample;
-    std::optional<float> cfg_scale;
-    std::optional<int> cfg_from, cfg_until;
-    std::optional<double> cfg_radius;
+    std::optional<float> guidance_scale;
+    std::optional<int> guidance_from, guidance_until;
+    std::optional<double> guidance_radius;
     std::optional<KnownTokens> known;
     std::optional<RegionStrategy> strategy;
     int64_t first_cell = 0;

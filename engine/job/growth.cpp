@@ -180,7 +180,7 @@ Status Growth::cut_window()
     RegionOptions regions = plan_.settings.regions;
     SR_TRY(part_, cut_sub_grid(around_, targets_, cells_considered(regions)));
     regions.from_known = true;
-    regions.first_seed = nearest_cell(part_.grid, piece.front());
+    regions.first_cell = nearest_cell(part_.grid, piece.front());
     return filling_.cut(part_.grid, regions, plan_.objects);
 }
 
@@ -265,7 +265,7 @@ Result<bool> Growth::advance(const JobBudget& budget)
 Status Growth::finish_window()
 {
     const GrownCells grown = grown_cells(part_, targets_);
-    const size_t regions = filling_.outpainter().region_count();
+    const size_t regions = filling_.region_count();
     SR_CHECK(save_piece(*run_, window_, grown));
     SR_TRY(const uint64_t hash, hash_file(piece_path(*run_, window_)));
     SR_CHECK(run_->append(
@@ -330,7 +330,7 @@ Result<Json> Growth::estimate()
             continue;
         SR_CHECK(load());
         cells_ += targets_.size();
-        regions_ += filling_.outpainter().region_count();
+        regions_ += filling_.region_count();
         SR_CHECK(cache_.mark(grown_cells(part_, targets_)));
     }
     return Json{{"metres", plan_.windows.length()},

@@ -3,9 +3,16 @@
 #pragma once
 
 #include "engine/job/run_folder.h"
-#include "engine/voxfield/outpaint.h"
 
 namespace semrover {
+
+// stored points and colours of the target cells of a finished region
+struct RegionResult {
+    uint32_t region = 0;
+    std::vector<uint32_t> targets; // indices of cells
+    std::vector<uint16_t> points;  // [targets, n, 3] f16 bits
+    std::vector<uint8_t> colors;   // [targets, n, 3]
+};
 
 // Saves a finished region in a run folder: regions/<region>.safetensors, and a line with its hash in the journal.
 Status save_region(RunFolder& run, const RegionResult& result);

@@ -188,8 +188,7 @@ Piece StreamedWorld::next_piece() const
         return Piece::cut;
     if (filled_)
         return Piece::finish;
-    const Outpainter& outpainter = filling_.outpainter();
-    return outpainter.begins_batch() ? Piece::first_row : outpainter.ends_batch() ? Piece::last_row : Piece::row;
+    return filling_.begins_batch() ? Piece::first_row : filling_.ends_batch() ? Piece::last_row : Piece::row;
 }
 
 Result<bool> StreamedWorld::step(const JobBudget& budget)

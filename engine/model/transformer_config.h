@@ -14,7 +14,7 @@
 
 namespace semrover {
 
-// what a transformer may be told of a cell beside its label (docs/method.md §2.1)
+// what a transformer may be conditioned on beside a cell's label (docs/method.md §2.1)
 enum class ConditionPart : uint8_t { object, tint, part };
 constexpr uint32_t condition_width(ConditionPart part)
 {
@@ -35,7 +35,7 @@ struct TransformerConfig {
     bool context_pos_embed = true;
     bool qk_norm = false; // rms_norm
     std::vector<ConditionPart> condition;
-    bool condition_voxels = false;     // voxel tokens are told it too, not only semantic tokens
+    bool condition_voxels = false;     // of voxel tokens too, not only of semantic tokens
     std::string placement = "shifted"; // of the points that it was trained on: shifted, canonical, mixed
 
     // per-channel x, y, z, r, g, b: token = (value - mean) / std, after the scaling to [-1, 1]

@@ -39,7 +39,7 @@ class TransformerWeights {
 
     Slot proj_in, proj_in_bias, pos_embed, pos_embed_bias, semantic_embed;
     Slot condition_in, condition_out;                    // [D, W], [D, D]; none without a condition
-    Slot condition_voxels;                               // [D, D]; none where semantic tokens alone are told
+    Slot condition_voxels;                               // [D, D]; none where semantic tokens alone are conditioned
     Slot time_in, time_in_bias, time_out, time_out_bias; // fp32: their input reaches 1000 radians
     Slot norm_out, norm_out_bias;                        // [2D, D]: shift, scale
     Slot proj_out, proj_out_bias;

@@ -16,6 +16,36 @@ constexpr uint32_t kColumnAlignment = 64;
 
 } // namespace
 
+void TokenSets::add(std::span<const CellIndex> set_cells, std::span<const uint32_t> set_labels)
+{
+    SR_ASSERT(!set_cells.empty() && set_cells.size() == set_labels.size(), "a set of {} cells with {} labels",
+              set_cells.size(), set_labels.size());
+    const uint32_t first = rows(), count = uint32_t(set_cells.size());
+    double mean[3] = {};
+    for (const CellIndex& c : set_cells)
+        for (int a = 0; a < 3; ++a)
+            mean[a] += double(c[a]) / count;
+    for (uint32_t i = 0; i < count; ++i) {
+        labels.push_back(set_labels[i]);
+        sets.insert(sets.end(), {first, count});
+        cells.insert(cells.end(), {set_cells[i][0], set_cells[i][1], set_cells[i][2], 0});
+        for (int a = 0; a < 3; ++a)
+            coords.push_back(float(set_cells[i][a] - mean[a]));
+    }
+    for (uint32_t at = 0; at < count; at += kAttentionTile)
+        tiles.insert(tiles.end(), {first + at, std::min(kAttentionTile, count - at), first, count});
+    longest = std::max(longest, count);
+}
+
+void TokenSets::pad(uint32_t null_label)
+{
+    const std::vector<CellIndex> nowhere(round_up(rows(), kRowAlignment) - rows());
+    if (nowhere.empty())
+        tiles.insert(tiles.end(), 4, 0);
+    else
+        add(nowhere, std::vector<uint32_t>(nowhere.size(), null_label));
+}
+
 Transformer::Transformer(const TransformerConfig& config, DType precision)
     : config_(config), precision_(precision), weights_(config, precision)
 {
@@ -83,14 +113,14 @@ Tensor Transformer::positions(Graph& g, const TokenContext& context) const
     return gemm(g, waves, weights_.pos_embed.in(g), weights_.pos_embed_bias.in(g), {.dtype = precision_});
 }
 
-ToldTokens Transformer::tell(Graph& g, Tensor pos, Tensor condition) const
+Conditioned Transformer::condition(Graph& g, Tensor pos, Tensor condition) const
 {
     const Tensor hidden = silu(g, gemm(g, condition, weights_.condition_in.in(g), {}, {.dtype = precision_}));
-    const Tensor told = gemm(g, hidden, weights_.condition_out.in(g), {}, {.dtype = precision_});
-    ToldTokens tokens{.semantic = config_.context_pos_embed ? add(g, told, pos) : told, .voxels = {}};
+    const Tensor out = gemm(g, hidden, weights_.condition_out.in(g), {}, {.dtype = precision_});
+    Conditioned made{.semantic = config_.context_pos_embed ? add(g, out, pos) : out, .voxels = {}};
     if (config_.condition_voxels)
-        tokens.voxels = add(g, gemm(g, hidden, weights_.condition_voxels.in(g), {}, {.dtype = precision_}), pos);
-    return tokens;
+        made.voxels = add(g, gemm(g, hidden, weights_.condition_voxels.in(g), {}, {.dtype = precision_}), pos);
+    return made;
 }
 
 void Transformer::modulations(Graph& g, Tensor timesteps, Tensor table) const
@@ -139,8 +169,10 @@ Tensor Transformer::forward(Graph& g, Tensor tokens, const TokenContext& context
     const uint32_t rows = tokens.rows;
     Tensor x = g.matrix(2 * rows, config_.dim(), precision_, "tokens");
     const Tensor embedded = gemm(g, tokens, weights_.proj_in.in(g), weights_.proj_in_bias.in(g), {.dtype = precision_});
-    add(g, embedded, context.told_voxels.valid() ? context.told_voxels : context.pos, {x});
-    const Tensor beside = context.told.valid() ? context.told : config_.context_pos_embed ? context.pos : Tensor{};
+    add(g, embedded, context.voxel_conditioning.valid() ? context.voxel_conditioning : context.pos, {x});
+    const Tensor beside = context.conditioning.valid() ? context.conditioning
+                          : config_.context_pos_embed  ? context.pos
+                                                       : Tensor{};
     embedding(g, context.labels, weights_.semantic_embed.in(g), beside, precision_, {x, rows});
     for (uint32_t i = 0; i < config_.num_layers; ++i)
         x = block(g, i, x, context, table, table_row);

@@ -82,7 +82,7 @@ class AsdRenderer {
     Status begin(const AsdStart& start);
     Status end(); // errors: internal when the network returned NaN or infinity
 
-    size_t steps_done() const { return replay_ ? replay_->row() : 0; }
+    size_t steps_done() const { return replay_ ? replay_->rows_done() : 0; }
     size_t steps() const { return plan_.rows.size(); }
 
     // makes the programs, which begin() does otherwise

@@ -2,8 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/refine/denoiser_tables.h"
 
-#include "engine/sampling/step_rows.h"
-
 #include <algorithm>
 
 namespace semrover {

@@ -6,7 +6,6 @@
 #include "engine/refine/frame_slots.h"
 #include "engine/refine/known_frames.h"
 #include "engine/sampling/guidance.h"
-#include "engine/sampling/step_rows.h"
 
 #include <algorithm>
 
@@ -223,8 +222,7 @@ Status VsdRenderer::make_programs()
     SR_TRY(begin_, Program::create(device_, memory_->begin_graph()));
     SR_TRY(step_, Program::create(device_, memory_->step_graph()));
     SR_TRY(check_, Program::create(device_, memory_->check_graph()));
-    replay_.emplace(device_, ReplayMemory{memory_->tables.clock, memory_->x, memory_->x0}, plan_.rows.size(),
-                    [this](size_t) -> Result<Program*> { return step_.get(); });
+    replay_.emplace(device_, plan_.rows.size(), [this](size_t) -> Result<Program*> { return step_.get(); });
     return {};
 }
 
@@ -284,7 +282,7 @@ Status VsdRenderer::upload_keys(const VsdWindow& w)
 Status VsdRenderer::begin(const VsdWindow& window)
 {
     SR_CHECK(make_programs());
-    SR_CHECK(replay_->begin(kFirstRows));
+    SR_CHECK(replay_->begin({memory_->tables.clock, memory_->x, memory_->x0}));
     SR_CHECK(upload(window));
     return begin_->run();
 }
@@ -310,7 +308,7 @@ Status VsdRenderer::check()
 
 Result<std::vector<float>> VsdRenderer::finish()
 {
-    SR_ASSERT(replay_ && replay_->active() && replay_->row() == steps(), "a window is finished before its last step");
+    SR_ASSERT(replay_, "a window is finished that has not begun");
     replay_->end();
     SR_CHECK(check());
     return state();
@@ -326,7 +324,7 @@ Result<std::vector<float>> VsdRenderer::render(const VsdWindow& window, const St
     SR_CHECK(begin(window));
     for (bool done = false; !done;) {
         SR_TRY(done, step(1));
-        if (callback && !callback(replay_->row(), steps())) {
+        if (callback && !callback(replay_->rows_done(), steps())) {
             SR_CHECK(cancel());
             return fail(ErrorCode::interrupted, "interrupted");
         }

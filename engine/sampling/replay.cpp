@@ -3,7 +3,6 @@
 #include "engine/sampling/replay.h"
 
 #include <cstddef>
-#include <cstring>
 
 namespace semrover {
 
@@ -19,19 +18,14 @@ size_t Replay::ahead() const
     return device_.limits().type == DeviceType::cpu || device_.profile() ? 0 : kInFlight;
 }
 
-Status Replay::set_clock(uint32_t row)
-{
-    const BufferSlice word = memory_.clock.slice().part(offsetof(StepClock, row), sizeof(row));
-    return device_.write(word, std::as_bytes(std::span(&row, 1)));
-}
-
-Status Replay::begin(uint32_t first)
+Status Replay::begin(const ReplayMemory& memory)
 {
     SR_CHECK(cancel());
-    SR_CHECK(memory_.x.clear(device_));
-    SR_CHECK(memory_.x0.clear(device_));
-    SR_CHECK(set_clock(0));
-    first_ = first;
+    SR_CHECK(memory.x.clear(device_));
+    SR_CHECK(memory.x0.clear(device_));
+    const uint32_t row = 0;
+    const BufferSlice word = memory.clock.slice().part(offsetof(StepClock, row), sizeof(row));
+    SR_CHECK(device_.write(word, std::as_bytes(std::span(&row, 1))));
     row_ = 0;
     active_ = true;
     return {};
@@ -57,6 +51,12 @@ Result<bool> Replay::step(size_t submits)
         SR_CHECK(device_.wait(flight_.back()));
     flight_.clear();
     return true;
+}
+
+void Replay::end()
+{
+    SR_ASSERT(active_ && row_ == rows_, "a run is finished after {} of {} rows", row_, rows_);
+    active_ = false;
 }
 
 Status Replay::cancel()

@@ -27,32 +27,28 @@ class Replay {
     // step_advance
     using Row = std::function<Result<Program*>(size_t row)>;
 
-    Replay(Device& device, const ReplayMemory& memory, size_t rows, Row row)
-        : device_(device), memory_(memory), rows_(rows), row_program_(std::move(row))
-    {
-    }
+    Replay(Device& device, size_t rows, Row row) : device_(device), rows_(rows), row_program_(std::move(row)) {}
 
-    // x and x0 become zero. Row 0 of the run is row `first` of the table: those before it are the caller's to run.
-    Status begin(uint32_t first = 0);
+    // x, x0 and the clock become zero; rows of the table before the run's are the caller's to run
+    Status begin(const ReplayMemory& memory);
     // submits at most that many rows; true when all are done and the device has finished them
     Result<bool> step(size_t submits);
     // ends the run where it is, after waiting for what was submitted
     Status cancel();
+    // ends it after its last row
+    void end();
 
-    bool active() const { return active_; } // begun, and neither cancelled nor ended
-    size_t row() const { return row_; }     // the next one to submit
+    size_t rows_done() const { return row_; }
     size_t rows() const { return rows_; }
-    void end() { active_ = false; }
+
+  protected:
+    Device& device_;
 
   private:
     size_t ahead() const;
-    Status set_clock(uint32_t row);
 
-    Device& device_;
-    ReplayMemory memory_;
     size_t rows_, row_ = 0;
-    uint32_t first_ = 0;
-    bool active_ = false;
+    bool active_ = false; // begun, and neither cancelled nor ended
     Row row_program_;
     std::deque<uint64_t> flight_; // tickets of rows that the device may still work on
 };

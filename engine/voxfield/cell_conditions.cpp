@@ -58,7 +58,7 @@ Result<CellConditions> CellConditions::create(const TransformerConfig& config, c
                                               std::span<const SceneObject> objects)
 {
     CellConditions conditions;
-    conditions.told_ = config.condition;
+    conditions.parts_ = config.condition;
     conditions.width_ = config.condition_width();
     conditions.voxel_size_ = double(grid.voxel_size);
     conditions.objects_.assign(objects.begin(), objects.end());
@@ -85,7 +85,7 @@ void CellConditions::row(uint32_t cell, const Cell& index, std::span<float> out)
     const std::array<double, 3> center = {(index[0] + 0.5) * voxel_size_, (index[1] + 0.5) * voxel_size_,
                                           (index[2] + 0.5) * voxel_size_};
     size_t at = 0;
-    for (const ConditionPart entry : told_) {
+    for (const ConditionPart entry : parts_) {
         const std::span<float> to = out.subspan(at, condition_width(entry));
         if (entry == ConditionPart::object && object && !is_ground(object->label))
             object_condition(*object, center, to);

@@ -12,10 +12,10 @@ void object_condition(const SceneObject& object, const std::array<double, 3>& po
 void tint_condition(const std::array<double, 3>& tint, std::span<float> out);                               // 4
 void part_condition(const SceneObject& part, const std::array<double, 3>& point, std::span<float> out);     // 64
 
-// What a model is told of the cells of a grid beside their labels, from the objects that are known.
+// What a model is conditioned on beside the labels of a grid's cells, from the objects that are known.
 class CellConditions {
   public:
-    CellConditions() = default; // tells nothing
+    CellConditions() = default; // unconditioned
 
     // of the grid's cells as they are now, in their order. Errors: as objects_of_cells
     static Result<CellConditions> create(const TransformerConfig& config, const VoxelGrid& grid,
@@ -29,10 +29,10 @@ class CellConditions {
   private:
     const SceneObject* of_cell(std::span<const int32_t> owners, uint32_t cell) const; // NULL: none
 
-    std::vector<ConditionPart> told_;
+    std::vector<ConditionPart> parts_;
     size_t width_ = 0;
     double voxel_size_ = 0;
-    std::vector<int32_t> owners_, part_owners_; // of each cell; the second empty for models that hear of no parts
+    std::vector<int32_t> owners_, part_owners_; // of each cell; the second empty for models without parts
     std::vector<SceneObject> objects_;
 };
 

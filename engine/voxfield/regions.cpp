@@ -75,7 +75,7 @@ class Cover {
     Regions run()
     {
         if (tree_.free_count() == tree_.size())
-            accept(uint32_t(options_.first_seed));
+            accept(uint32_t(options_.first_cell));
         std::vector<uint32_t> set_aside;
         while (tree_.free_count() > 0) {
             const uint32_t seed = frontier_.seed();
@@ -224,8 +224,8 @@ Result<Regions> extract_regions(std::span<const std::array<int32_t, 3>> cells, c
         return fail(ErrorCode::bad_input, "{} cells in regions of {} need more than 32-bit offsets: split the scene",
                     cells.size(), options.region_size);
     SR_TRY(CellTree tree, CellTree::build(cells));
-    if (options.first_seed < 0 || options.first_seed >= int64_t(cells.size()))
-        return fail(ErrorCode::bad_input, "first_cell is {}, but the grid has {} cells", options.first_seed,
+    if (options.first_cell < 0 || options.first_cell >= int64_t(cells.size()))
+        return fail(ErrorCode::bad_input, "first_cell is {}, but the grid has {} cells", options.first_cell,
                     cells.size());
     SR_ASSERT((!options.from_known && known.empty()) || known.size() == cells.size(), "{} flags for {} cells",
               known.size(), cells.size());

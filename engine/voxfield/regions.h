@@ -25,12 +25,12 @@ struct RegionOptions {
     int region_size = 128;       // K, 1..4096: cells in a region; fewer with strategy rim, or if the cloud has fewer
     int coverage_threshold = 32; // T, 1..K: a region with fewer uncovered cells is not accepted
     RegionStrategy strategy = RegionStrategy::complete;
-    int64_t first_seed = 0; // index of the cell the first region grows around
+    int64_t first_cell = 0; // index of the cell the first region grows around
     // cells that have points already count as covered: regions grow from them into what is missing, and none is made
     // where nothing is. extract_regions needs the cells' flags for it.
     bool from_known = false;
     // Above 0: in the order of tiles (tile_regions.h), square ones of so many cells; known cells up to halo_cells away
-    // from a tile are seen by its regions. first_seed and from_known have no meaning then.
+    // from a tile are seen by its regions. first_cell and from_known have no meaning then.
     int32_t tile_cells = 0, halo_cells = 0;
 };
 
@@ -61,7 +61,7 @@ struct Regions {
 // 1 s on one core of a 2-core Xeon, the slowest cloud tried (a solid lattice with T = K) 13 s.
 // Bad input: no cells, equal cells, options out of range, more than 2^32 / K cells, a cloud too wide for 64-bit keys.
 // known [n], read with options.from_known and with strategy rim: cells with a value other than 0 are covered from the
-// start, and the first seed is the cell nearest to them; without any, first_seed.
+// start, and the first seed is the cell nearest to them; without any, first_cell.
 Result<Regions> extract_regions(std::span<const std::array<int32_t, 3>> cells, const RegionOptions& options,
                                 std::span<const uint8_t> known = {});
 

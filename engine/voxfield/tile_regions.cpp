@@ -71,7 +71,7 @@ class TileCover {
         }
         RegionOptions options = options_;
         options.from_known = true;
-        options.first_seed = 0;
+        options.first_cell = 0;
         SR_TRY(const Regions found, extract_regions(cells, options, known));
         for (size_t r = 0; r < found.size(); ++r) {
             for (const uint32_t member : found.region(r))

@@ -2,11 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/voxfield/token_sampler.h"
 
-#include "engine/sampling/guidance.h"
-#include "engine/sampling/step_rows.h"
-
 #include <cmath>
-#include <numeric>
 
 namespace semrover {
 
@@ -14,7 +10,7 @@ struct TokenSampler::Batch {
     uint32_t rows, tiles, longest; // rows: of one guidance half
     State state;
     Slot labels, cells, sets, tile_list, coords, pos, mask, known, fixed, x, x0, z, table_row; // z: noise that is given
-    Slot condition, told, told_voxels;                      // none where the model is told nothing
+    Slot condition, conditioning, voxel_conditioning;       // none where the model takes labels alone
     std::unique_ptr<Program> prepare, step, unguided, undo; // unguided: of the first half, where steps differ
 
     Batch(const TokenSampler& s, const TokenSets& packed)
@@ -35,10 +31,10 @@ struct TokenSampler::Batch {
         x0 = state.slot(rows, channels, DType::f32, "x0");
         if (const uint32_t width = t.config().condition_width()) {
             condition = state.slot(m, width, t.precision(), "condition");
-            told = state.slot(m, t.config().dim(), t.precision(), "told");
+            conditioning = state.slot(m, t.config().dim(), t.precision(), "conditioning");
         }
         if (t.config().condition_voxels)
-            told_voxels = state.slot(m, t.config().dim(), t.precision(), "told_voxels");
+            voxel_conditioning = state.slot(m, t.config().dim(), t.precision(), "voxel conditioning");
         if (s.options_.noise)
             z = state.slot(rows, channels, DType::f32, "z");
         table_row = state.slot(2 * m, 1, DType::u32, "table_row", 1);
@@ -54,10 +50,10 @@ struct TokenSampler::Batch {
         c.tiles = tile_list.row_range(0, tiles * m / all).in(g);
         c.coords = coords.row_range(0, m).in(g);
         c.pos = pos.row_range(0, m).in(g);
-        if (told.valid())
-            c.told = told.row_range(0, m).in(g);
-        if (told_voxels.valid())
-            c.told_voxels = told_voxels.row_range(0, m).in(g);
+        if (conditioning.valid())
+            c.conditioning = conditioning.row_range(0, m).in(g);
+        if (voxel_conditioning.valid())
+            c.voxel_conditioning = voxel_conditioning.row_range(0, m).in(g);
         c.mask = mask.row_range(0, m).in(g);
         c.longest = longest;
         return c;
@@ -70,12 +66,12 @@ struct TokenSampler::Batch {
         g.keep(t.neighbors(g, c, rows, s.options_.guidance.radius), mask);
         const Tensor positions = t.positions(g, c);
         g.keep(positions, pos);
-        if (!told.valid())
+        if (!conditioning.valid())
             return g;
-        const ToldTokens tokens = t.tell(g, positions, condition.in(g));
-        g.keep(tokens.semantic, told);
-        if (tokens.voxels.valid())
-            g.keep(tokens.voxels, told_voxels);
+        const Conditioned made = t.condition(g, positions, condition.in(g));
+        g.keep(made.semantic, conditioning);
+        if (made.voxels.valid())
+            g.keep(made.voxels, voxel_conditioning);
         return g;
     }
     Tensor noise(Graph& g, const TokenSampler& s, const StepTable& steps) const
@@ -115,7 +111,8 @@ TokenSampler::~TokenSampler() = default;
 
 TokenSampler::TokenSampler(Device& device, const Transformer& transformer, const SamplingPlan& plan,
                            SamplerOptions options)
-    : device_(device), transformer_(transformer), plan_(plan), options_(std::move(options)), halves_(1),
+    : Replay(device, plan.rows.size() + 1, [this](size_t row) { return program_of(row); }), transformer_(transformer),
+      plan_(plan), options_(std::move(options)), halves_(1),
       window_(uint32_t(std::min<size_t>(options_.modulation_window, plan.timesteps.size())))
 {
     for (const PlanRow& row : plan_.rows) {
@@ -198,7 +195,6 @@ Result<TokenSampler::Batch*> TokenSampler::batch_for(const TokenSets& sets)
     const uint32_t rows = sets.rows() / halves_, tiles = uint32_t(sets.tiles.size() / 4);
     if (batch_ && batch_->rows == rows && batch_->tiles == tiles && batch_->longest == sets.longest)
         return batch_.get();
-    replay_.reset();
     batch_.reset(); // memory of the old shape goes before the new one's comes
     auto b = std::make_unique<Batch>(*this, sets);
     SR_CHECK(b->state.allocate(device_, "sampler state"));
@@ -209,8 +205,6 @@ Result<TokenSampler::Batch*> TokenSampler::batch_for(const TokenSets& sets)
     }
     SR_TRY(b->undo, Program::create(device_, b->undo_graph(*this)));
     batch_ = std::move(b);
-    replay_.emplace(device_, ReplayMemory{clock_, batch_->x, batch_->x0}, this->rows(),
-                    [this](size_t row) { return program_of(row); });
     return batch_.get();
 }
 
@@ -240,19 +234,19 @@ uint64_t TokenSampler::table_bytes() const
     return state_.planned_bytes(device_.limits()) + modulations_->plan().arena_bytes();
 }
 
-// of the half with labels; that without is told nothing
-std::vector<float> TokenSampler::told_rows(uint32_t rows, std::span<const RegionInput> regions) const
+// of the half with labels; that without is unconditioned
+std::vector<float> TokenSampler::conditions(uint32_t rows, std::span<const RegionInput> regions) const
 {
     const size_t width = transformer_.config().condition_width();
-    std::vector<float> told(rows * width, 0.f);
+    std::vector<float> all(rows * width, 0.f);
     size_t row = 0;
     for (const RegionInput& r : regions) {
-        SR_ASSERT(r.told.empty() || r.told.size() == r.cells.size() * width, "{} numbers tell {} cells", r.told.size(),
-                  r.cells.size());
-        std::ranges::copy(r.told, told.begin() + ptrdiff_t(row * width));
+        SR_ASSERT(r.condition.empty() || r.condition.size() == r.cells.size() * width, "{} numbers condition {} cells",
+                  r.condition.size(), r.cells.size());
+        std::ranges::copy(r.condition, all.begin() + ptrdiff_t(row * width));
         row += r.cells.size();
     }
-    return told;
+    return all;
 }
 
 Status TokenSampler::upload(Batch& b, const TokenSets& sets, std::span<const RegionInput> regions)
@@ -274,7 +268,7 @@ Status TokenSampler::upload(Batch& b, const TokenSets& sets, std::span<const Reg
         }
     SR_CHECK(b.known.write(device_, known));
     SR_CHECK(b.fixed.write_rows(device_, fixed));
-    return b.condition.valid() ? b.condition.write_rows(device_, told_rows(b.rows, regions)) : Status();
+    return b.condition.valid() ? b.condition.write_rows(device_, conditions(b.rows, regions)) : Status();
 }
 
 // the modulation table holds a window of the schedule's timesteps; jumps may leave it either way
@@ -317,36 +311,21 @@ Result<Program*> TokenSampler::program_of(size_t row)
 Status TokenSampler::begin(std::span<const RegionInput> regions)
 {
     const TokenSets sets = pack(regions);
-    if (replay_)
-        SR_CHECK(replay_->cancel());
+    SR_CHECK(cancel());
     SR_TRY(Batch * b, batch_for(sets));
-    cells_.clear();
+    tokens_ = 0;
     for (const RegionInput& r : regions)
-        cells_.push_back(uint32_t(r.cells.size()));
+        tokens_ += uint32_t(r.cells.size());
     SR_CHECK(upload(*b, sets, regions));
     SR_CHECK(b->prepare->run());
-    return replay_->begin();
-}
-
-Result<bool> TokenSampler::step(size_t submits)
-{
-    SR_ASSERT(replay_, "a step of a sampler that has not begun");
-    return replay_->step(submits);
-}
-
-Status TokenSampler::cancel()
-{
-    return replay_ ? replay_->cancel() : Status{};
+    return Replay::begin({clock_, b->x, b->x0});
 }
 
 Result<std::vector<float>> TokenSampler::finish()
 {
-    SR_ASSERT(replay_ && replay_->active() && replay_->row() == rows(), "a run is finished after {} of {} rows",
-              rows_done(), rows());
-    replay_->end();
+    end();
     const size_t channels = transformer_.config().channels();
-    SR_TRY(std::vector<float> tokens,
-           batch_->x.read_rows(device_, std::accumulate(cells_.begin(), cells_.end(), uint32_t(0))));
+    SR_TRY(std::vector<float> tokens, batch_->x.read_rows(device_, tokens_));
     for (size_t i = 0; i < tokens.size(); ++i)
         if (!std::isfinite(tokens[i]))
             return fail(ErrorCode::internal,
@@ -355,37 +334,16 @@ Result<std::vector<float>> TokenSampler::finish()
     return tokens;
 }
 
-Result<std::vector<float>> TokenSampler::run(std::span<const RegionInput> regions, const StepCallback& callback)
+Result<std::vector<float>> TokenSampler::run(std::span<const RegionInput> regions)
 {
     SR_CHECK(begin(regions));
-    for (bool done = false; !done;) {
-        SR_TRY(done, step(1));
-        if (callback && !callback(rows_done(), rows())) {
-            SR_CHECK(cancel());
-            return fail(ErrorCode::interrupted, "interrupted");
-        }
-    }
+    SR_CHECK(step(rows()).map([](bool) {}));
     return finish();
 }
 
-uint32_t TokenSampler::step_passes() const
+const Program& TokenSampler::step_program() const
 {
-    return batch_ ? uint32_t(batch_->step->plan().passes.size()) : 0;
-}
-uint32_t TokenSampler::step_barriers() const
-{
-    return batch_ ? batch_->step->plan().barriers() : 0;
-}
-double TokenSampler::step_flops() const
-{
-    double flops = 0;
-    for (const Pass& pass : batch_ ? batch_->step->plan().passes : std::vector<Pass>{})
-        flops += pass.options.flops;
-    return flops;
-}
-double TokenSampler::host_us_per_step() const
-{
-    return batch_ ? batch_->step->host_us() : 0;
+    return *batch_->step;
 }
 
 } // namespace semrover

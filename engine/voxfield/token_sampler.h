@@ -11,7 +11,6 @@
 
 #include <functional>
 #include <memory>
-#include <optional>
 
 namespace semrover {
 
@@ -19,23 +18,9 @@ namespace semrover {
 struct RegionInput {
     std::vector<CellIndex> cells;
     std::vector<uint32_t> labels;
-    std::vector<uint32_t> known; // 1: the token is given in `fixed`
-    std::vector<float> fixed;    // [cells, C]; read where known
-    std::vector<float> told;     // [cells, W], the condition of each cell; or nothing
-};
-
-// Classifier-free guidance: m = u + scale (c - u), u without labels. Below timestep `from` and above `until` the
-// network runs on c alone, which costs half: there guidance changes little (Kynkäänniemi et al. 2024, arXiv
-// 2404.07724). With a `radius` cells of u see no others beyond it, so that c - u is also what neighbors say of each
-// other (docs/method.md §3.1).
-struct Guidance {
-    float scale = 4; // 1: no unconditional half
-    double from = 0;
-    double until = kLastTimestep;
-    double radius = kWholeRadius; // metres; from the attention radius on it changes nothing
-
-    bool narrows(double attention_radius) const { return radius < attention_radius; }
-    bool at(double timestep) const { return scale != 1.f && timestep >= from && timestep <= until; }
+    std::vector<uint32_t> known;  // 1: the token is given in `fixed`
+    std::vector<float> fixed;     // [cells, C]; read where known
+    std::vector<float> condition; // [cells, W]; or nothing
 };
 
 struct SamplerOptions {
@@ -43,28 +28,13 @@ struct SamplerOptions {
     uint64_t seed = 0;
     uint32_t modulation_window = 64; // timesteps whose modulations are kept at a time: 40 MB for the full-size model
     // golden cases only: normals come from the caller, who fills [rows, C] before plan row r (0: the first noise)
-    std::function<void(size_t row, std::span<float> normals)> noise;
+    std::function<void(size_t row, std::span<float> normals)> noise = {};
 };
-
-inline SamplerOptions sampling_options(Guidance guidance, uint64_t seed)
-{
-    SamplerOptions o;
-    o.guidance = guidance;
-    o.seed = seed;
-    return o;
-}
-inline SamplerOptions sampling_options(float guidance_scale, uint64_t seed)
-{
-    return sampling_options(Guidance{guidance_scale}, seed);
-}
-
-// called after plan rows; returning false stops the run (ErrorCode::interrupted)
-using StepCallback = std::function<bool(size_t done, size_t total)>;
 
 // Denoises batches of regions with the transformer: the graphs are built once per batch shape and replayed for every
 // step, one submit a step. The result of a region depends on nothing but its own input, the plan and the seed: not on
 // where its run stopped and went on.
-class TokenSampler {
+class TokenSampler : public Replay {
   public:
     static Result<std::unique_ptr<TokenSampler>> create(Device& device, const Transformer& transformer,
                                                         const SamplingPlan& plan, SamplerOptions options);
@@ -74,23 +44,16 @@ class TokenSampler {
     uint64_t table_bytes() const; // the part of it that is allocated from the start
 
     // tokens [cells, C] of each region, region after region, known ones as given.
-    // Errors: internal when the network returns NaN or infinity; interrupted; device errors
-    Result<std::vector<float>> run(std::span<const RegionInput> regions, const StepCallback& callback = {});
+    // Errors: internal when the network returns NaN or infinity; device errors
+    Result<std::vector<float>> run(std::span<const RegionInput> regions);
 
     // the same, piecewise: begin, step until it says true, finish. A run that has begun ends with finish, cancel, or
     // the next begin. One row of the plan is one submit, and one more comes before them.
     Status begin(std::span<const RegionInput> regions);
-    Result<bool> step(size_t submits);
     Result<std::vector<float>> finish();
-    Status cancel();
-    size_t rows_done() const { return replay_ ? replay_->row() : 0; }
-    size_t rows() const { return plan_.rows.size() + 1; }
 
-    // of the batch shape of the last run: passes and barriers of a step, host time of one submit
-    uint32_t step_passes() const;
-    uint32_t step_barriers() const;
-    double host_us_per_step() const;
-    double step_flops() const; // dense: masked attention counts in full
+    // of the batch shape of the last run; its arithmetic is dense: masked attention counts in full
+    const Program& step_program() const;
 
   private:
     struct Batch; // memory and programs of one batch shape
@@ -101,13 +64,12 @@ class TokenSampler {
     StepTable step_table(Graph& g) const;
     TokenSets pack(std::span<const RegionInput> regions) const;
     Result<Batch*> batch_for(const TokenSets& sets);
-    std::vector<float> told_rows(uint32_t rows, std::span<const RegionInput> regions) const;
+    std::vector<float> conditions(uint32_t rows, std::span<const RegionInput> regions) const;
     Status upload(Batch& batch, const TokenSets& sets, std::span<const RegionInput> regions);
     Status use_timestep(uint32_t index);
     Status feed_noise(Batch& batch, size_t row);
     Result<Program*> program_of(size_t row);
 
-    Device& device_;
     const Transformer& transformer_;
     SamplingPlan plan_;
     SamplerOptions options_;
@@ -119,8 +81,7 @@ class TokenSampler {
     Slot steps_, clock_, timesteps_, table_;
     std::unique_ptr<Program> modulations_;
     std::unique_ptr<Batch> batch_;
-    std::optional<Replay> replay_; // over the batch
-    std::vector<uint32_t> cells_;  // of each region of the run
+    uint32_t tokens_ = 0; // of the run's regions
 
   public:
     ~TokenSampler();

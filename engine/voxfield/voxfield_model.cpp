@@ -13,10 +13,13 @@ Status read_defaults(const Json& index, VoxfieldDefaults& d)
     const Json defaults = index.value("defaults", Json::object());
     JsonFields fields(defaults, "model_index.json: defaults");
     fields.integer("num_inference_steps", 1, kMaxInferenceSteps, d.num_inference_steps);
-    fields.number("guidance_scale", 0.f, kMaxGuidance, d.guidance_scale);
-    fields.integer("guidance_from", 0, kLastTimestep, d.guidance_from);
-    fields.integer("guidance_until", 0, kLastTimestep, d.guidance_until);
-    fields.number("guidance_radius", 0., kWholeRadius, d.guidance_radius);
+    int from = 0, until = kLastTimestep;
+    fields.number("guidance_scale", 0.f, kMaxGuidance, d.guidance.scale);
+    fields.integer("guidance_from", 0, kLastTimestep, from);
+    fields.integer("guidance_until", 0, kLastTimestep, until);
+    fields.number("guidance_radius", 0., kWholeRadius, d.guidance.radius);
+    d.guidance.from = from;
+    d.guidance.until = until;
     fields.integer("distilled_steps", 1, kMaxInferenceSteps, d.distilled_steps);
     fields.integer("region_size", 1, 4096, d.regions.region_size);
     fields.integer("coverage_threshold", 1, 4096, d.regions.coverage_threshold);

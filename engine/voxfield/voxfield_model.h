@@ -13,10 +13,7 @@ namespace semrover {
 // "defaults" of model_index.json: what a command uses where no option overrides it
 struct VoxfieldDefaults {
     int num_inference_steps = 50;
-    float guidance_scale = 4;
-    int guidance_from = 0;              // timestep below which no step is guided
-    int guidance_until = kLastTimestep; // and above which none is
-    double guidance_radius = kWholeRadius;
+    Guidance guidance;
     int distilled_steps = 0; // of a model whose one pass is guided already: the steps that it was trained for
     RegionOptions regions;
     RepaintOptions repaint;

@@ -50,7 +50,7 @@ Status bench_transformer(const BenchTransformerArguments& o, const Globals& glob
     scheduler.prediction = Prediction::sample;
     SR_TRY(const SamplingPlan plan, plan_sampling(scheduler, int(o.steps)));
     const float guidance = o.unguided ? 1.f : 4.f;
-    SR_TRY(const auto sampler, TokenSampler::create(*device, *transformer, plan, sampling_options(guidance, 1)));
+    SR_TRY(const auto sampler, TokenSampler::create(*device, *transformer, plan, {{guidance}, 1}));
     SR_TRY(const uint64_t planned, sampler->planned_bytes(o.batch, o.cells));
     const uint64_t predicted = transformer->device_bytes(device->limits()) + planned;
     const std::vector<RegionInput> regions = make_regions(o, config.num_classes);
@@ -62,11 +62,8 @@ Status bench_transformer(const BenchTransformerArguments& o, const Globals& glob
     report["cells"] = o.cells;
     report["batch"] = o.batch;
     report["guided"] = !o.unguided;
-    report["gflop"] = sampler->step_flops() / 1e9;
-    report["gflops"] = sampler->step_flops() / timing.ms_median / 1e6;
-    report["dispatches"] = sampler->step_passes();
-    report["barriers"] = sampler->step_barriers();
-    report["host_us_per_step"] = sampler->host_us_per_step();
+    add_rate(report, flops_of(sampler->step_program()), timing);
+    add_program(report, sampler->step_program());
     print_report(report, globals);
     return write_profile(*device, o.profile);
 }

@@ -69,11 +69,11 @@ void add_generation_options(CLI::App& c, GenerationArguments& a)
 {
     GenerationOptions& o = a.options;
     add_number(c, "--steps", o.steps, "denoising steps", 1, 10000);
-    add_number(c, "--cfg-scale", o.cfg_scale, "guidance towards the labels; 1: none", 0, 1000);
-    add_number(c, "--cfg-from", o.cfg_from, "timestep below which steps are not guided, which halves their cost", 0,
+    add_number(c, "--cfg-scale", o.guidance_scale, "guidance towards the labels; 1: none", 0, 1000);
+    add_number(c, "--cfg-from", o.guidance_from, "timestep below which steps are not guided, which halves their cost", 0,
                kLastTimestep);
-    add_number(c, "--cfg-until", o.cfg_until, "timestep above which steps are not guided", 0, kLastTimestep);
-    add_number(c, "--cfg-radius", o.cfg_radius,
+    add_number(c, "--cfg-until", o.guidance_until, "timestep above which steps are not guided", 0, kLastTimestep);
+    add_number(c, "--cfg-radius", o.guidance_radius,
                "metres beyond which cells without labels see no others: guidance towards what neighbors agree on", 0,
                kWholeRadius);
     add_choice(c, "--sampler", {"ddpm", "ddim", "dpm++2m"}, "of the noise schedule", o.sampler);

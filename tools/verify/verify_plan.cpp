@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // golden kinds scheduler, repaint_timesteps and region_extraction
-#include "engine/sampling/step_rows.h"
+#include "engine/sampling/repaint.h"
 #include "engine/voxfield/regions.h"
 #include "kernels/sampling.h"
 #include "runtime/device/program.h"
@@ -115,7 +115,7 @@ Result<GoldenOutputs> run_region_extraction(Device&, const GoldenCase& c, DType)
     SR_TRY(const double seed, c.number("first_seed"));
     options.region_size = int(size);
     options.coverage_threshold = int(threshold);
-    options.first_seed = int64_t(seed);
+    options.first_cell = int64_t(seed);
     options.strategy = c.params().value("strategy", "") == "paper" ? RegionStrategy::paper : RegionStrategy::complete;
     const auto flat = c.integers("input.cells");
     std::vector<std::array<int32_t, 3>> cells(flat.size() / 3);

@@ -67,12 +67,12 @@ Result<std::vector<float>> evaluate(Device& device, const Transformer& t, const 
                tokens = state.slot(m, c, t.precision(), "tokens"),
                modulations = state.slot(times, t.modulation_width(), DType::f32, "modulations"),
                out = state.slot(m, c, DType::f32, "out");
-    Slot condition, told, told_voxels;
+    Slot condition, conditioning, voxel_conditioning;
     if (!in.condition.empty()) {
         condition = state.slot(m, t.config().condition_width(), t.precision(), "condition");
-        told = state.slot(m, d, t.precision(), "told");
+        conditioning = state.slot(m, d, t.precision(), "conditioning");
         if (t.config().condition_voxels)
-            told_voxels = state.slot(m, d, t.precision(), "told_voxels");
+            voxel_conditioning = state.slot(m, d, t.precision(), "voxel conditioning");
     }
     SR_CHECK(state.allocate(device, "golden case"));
     SR_CHECK(labels.write(device, in.sets.labels));
@@ -88,15 +88,16 @@ Result<std::vector<float>> evaluate(Device& device, const Transformer& t, const 
         SR_CHECK(condition.write_rows(device, in.condition));
 
     Graph g;
-    TokenContext context{labels.in(g), cells.in(g), sets.in(g),        tiles.in(g), coords.in(g),
-                         pos.in(g),    told.in(g),  told_voxels.in(g), mask.in(g),  in.sets.longest};
+    TokenContext context{labels.in(g), cells.in(g),    sets.in(g),         tiles.in(g),
+                         coords.in(g), pos.in(g),      conditioning.in(g), voxel_conditioning.in(g),
+                         mask.in(g),   in.sets.longest};
     const Tensor positions = t.positions(g, context);
     g.keep(positions, pos);
-    if (told.valid()) {
-        const ToldTokens heard = t.tell(g, positions, condition.in(g));
-        g.keep(heard.semantic, told);
-        if (told_voxels.valid())
-            g.keep(heard.voxels, told_voxels);
+    if (conditioning.valid()) {
+        const Conditioned made = t.condition(g, positions, condition.in(g));
+        g.keep(made.semantic, conditioning);
+        if (voxel_conditioning.valid())
+            g.keep(made.voxels, voxel_conditioning);
     }
     t.modulations(g, timesteps.in(g), modulations.in(g));
     g.keep(t.forward(g, tokens.in(g), context, modulations.in(g), rows.in(g)), out);
@@ -111,16 +112,17 @@ Result<GoldenOutputs> run_voxfield_transformer(Device& device, const GoldenCase&
 {
     SR_TRY(const auto transformer, Transformer::load(device, c.model(), precision));
     const auto tokens = c.floats("input.tokens"), centers = c.floats("input.centers"),
-               times = c.floats("input.timestep"), told = c.floats("input.condition"); // of models that are told
+               times = c.floats("input.timestep"),
+               conditioning = c.floats("input.condition"); // of models with one
     const auto labels = c.integers("input.labels"), valid = c.integers("input.valid");
     const auto shape = c.shape("input.tokens"); // [B, N, C]
     if (shape.size() != 3 || shape[2] != transformer->config().channels() || valid.size() != shape[0] * shape[1] ||
         labels.size() != valid.size() || centers.size() != 3 * valid.size() || times.size() != shape[0])
         return fail(ErrorCode::bad_input, "{}: inputs do not belong together", c.name());
     const size_t n = shape[1], channels = shape[2], width = transformer->config().condition_width();
-    if (told.size() != valid.size() * width)
-        return fail(ErrorCode::bad_input, "{}: input.condition has {} numbers, expected {}", c.name(), told.size(),
-                    valid.size() * width);
+    if (conditioning.size() != valid.size() * width)
+        return fail(ErrorCode::bad_input, "{}: input.condition has {} numbers, expected {}", c.name(),
+                    conditioning.size(), valid.size() * width);
     EvaluationInput in;
     in.timesteps = times;
     std::vector<float> packed_centers;
@@ -134,8 +136,8 @@ Result<GoldenOutputs> run_voxfield_transformer(Device& device, const GoldenCase&
             cells.push_back(cells_of(centers, i, 1, transformer->config().voxel_size)[0]);
             set_labels.push_back(uint32_t(labels[i]));
             in.tokens.insert(in.tokens.end(), &tokens[i * channels], &tokens[i * channels] + channels);
-            in.condition.insert(in.condition.end(), told.begin() + ptrdiff_t(i * width),
-                                told.begin() + ptrdiff_t((i + 1) * width));
+            in.condition.insert(in.condition.end(), conditioning.begin() + ptrdiff_t(i * width),
+                                conditioning.begin() + ptrdiff_t((i + 1) * width));
             packed_centers.insert(packed_centers.end(), &centers[3 * i], &centers[3 * i] + 3);
             in.table_row.push_back(uint32_t(b));
             source.push_back(i);
