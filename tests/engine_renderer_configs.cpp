@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/model/random_weights.h"
+#include "engine/model/checkpoint.h"
 #include "engine/model/unet_config.h"
 #include "engine/model/vae_config.h"
 #include "runtime/base/json.h"

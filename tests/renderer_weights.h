@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/model/checkpoint.h"
 #include "engine/model/ldm_names.h"
 #include "engine/model/model_writer.h"
-#include "engine/model/random_weights.h"
 
 #include <gtest/gtest.h>
 

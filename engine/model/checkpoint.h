@@ -44,6 +44,11 @@ class Checkpoint {
     uint64_t seed_ = 0;
 };
 
+// Fills a tensor of an untrained network as a function of (seed, name, shape), the same on every machine. Weights are
+// uniform with variance 1 / fan-in, so that activations neither grow nor fade with depth; norms are 1 +- 0.1, biases
+// +- 0.05.
+void random_tensor(uint64_t seed, const TensorSpec& spec, std::vector<float>& values);
+
 // bad_input for Stable Diffusion's own UNet, which has 4 input channels and not the deferred renderer's 13. The message
 // says which command adds the others.
 tl::unexpected<Error> refuse_plain_unet(const Path& path);

@@ -3,13 +3,84 @@
 #include "engine/model/unet_config.h"
 
 #include "engine/model/schema.h"
-#include "engine/model/unet_fields.h"
+#include "runtime/base/json_fields.h"
 
 #include <algorithm>
 
 namespace semrover {
 
 namespace {
+
+constexpr const char* kVideoUnetClass = "UNetSpatioTemporalConditionModel";
+using BlockTypes = JsonFields::Names<bool>; // name, and whether such a block has attention
+
+bool has_attention(const UnetConfig& c, size_t level)
+{
+    return c.down_attention[level] || c.up_attention[c.levels() - 1 - level] ||
+           (level + 1 == c.levels() && c.mid_attention);
+}
+
+void read_block_types(JsonFields& fields, BlockTypes down, BlockTypes up, UnetConfig& c)
+{
+    fields.list("block_out_channels", kMaxLevels, 1, kMaxChannels, c.block_out_channels);
+    fields.choices<bool>("down_block_types", down, c.down_attention);
+    fields.choices<bool>("up_block_types", up, c.up_attention);
+}
+
+// refuses lists of another length than block_out_channels
+void read_layers(JsonFields& fields, UnetConfig& c)
+{
+    const std::string count = fmt::format("as many as block_out_channels, {}", c.levels());
+    if (c.down_attention.size() != c.levels())
+        fields.refuse("down_block_types", count);
+    if (c.up_attention.size() != c.levels())
+        fields.refuse("up_block_types", count);
+    c.layers_per_block.assign(c.levels(), 2);
+    fields.integers("layers_per_block", c.levels(), 1, 64, c.layers_per_block);
+}
+
+// layers of a transformer; the text's width, one number: lists of other networks differ per level
+void read_transformers(JsonFields& fields, UnetConfig& c)
+{
+    c.transformer_layers.assign(c.levels(), 1);
+    fields.integers("transformer_layers_per_block", c.levels(), 1, 64, c.transformer_layers);
+    std::vector<uint32_t> widths(c.levels(), c.cross_attention_dim);
+    fields.integers("cross_attention_dim", c.levels(), 1, kMaxChannels, widths);
+    if (std::ranges::adjacent_find(widths, std::ranges::not_equal_to()) != widths.end())
+        fields.refuse("cross_attention_dim", "the same number at every level");
+    c.cross_attention_dim = widths[0];
+}
+
+// one number where they are all the same
+Json per_level_json(const std::vector<uint32_t>& values)
+{
+    const bool same = std::ranges::count(values, values[0]) == std::ptrdiff_t(values.size());
+    return same ? Json(values[0]) : Json(values);
+}
+
+// name: of a block without attention
+Json block_types_json(const std::vector<bool>& attention, const char* name)
+{
+    Json list = Json::array();
+    for (const bool a : attention)
+        list.push_back((a ? "CrossAttn" : "") + std::string(name));
+    return list;
+}
+
+// channels divide into groups and heads. what: begins a message; of_heads: ends the one about heads
+Status check_channels(const UnetConfig& c, std::string_view what, std::string_view of_heads)
+{
+    for (size_t i = 0; i < c.levels(); ++i) {
+        const uint32_t channels = c.block_out_channels[i];
+        if (channels % c.norm_num_groups)
+            return fail(ErrorCode::bad_input, "{}: {} channels at level {} do not divide into {} groups", what,
+                        channels, i, c.norm_num_groups);
+        if (has_attention(c, i) && channels % c.heads[i])
+            return fail(ErrorCode::bad_input, "{}: {} channels at level {} do not divide into {} heads{}", what,
+                        channels, i, c.heads[i], of_heads);
+    }
+    return {};
+}
 
 void read_blocks(JsonFields& fields, UnetConfig& c)
 {
@@ -61,6 +132,46 @@ Status check_together(const UnetConfig& c)
         return fail(ErrorCode::bad_input, "unet config: block_out_channels[0] {} must be even",
                     c.block_out_channels[0]);
     return {};
+}
+
+void read_video_attention(JsonFields& fields, UnetConfig& c)
+{
+    c.heads = {5, 10, 20, 20};
+    if (c.heads.size() != c.levels() && !fields.find("num_attention_heads"))
+        fields.refuse("num_attention_heads", fmt::format("as many as block_out_channels, {}", c.levels()));
+    fields.integers("num_attention_heads", c.levels(), 1, 1024, c.heads);
+    read_transformers(fields, c);
+}
+
+void read_added_numbers(JsonFields& fields, UnetConfig& c)
+{
+    uint32_t width = 768;
+    c.added_embed_dim = 256;
+    fields.integer("addition_time_embed_dim", 2u, kMaxChannels, c.added_embed_dim);
+    fields.integer("projection_class_embeddings_input_dim", 2u, kMaxChannels, width);
+    if (c.added_embed_dim % 2)
+        fields.refuse("addition_time_embed_dim", "an even number");
+    if (width % c.added_embed_dim)
+        fields.refuse("projection_class_embeddings_input_dim",
+                      fmt::format("a multiple of addition_time_embed_dim, {}", c.added_embed_dim));
+    c.added_numbers = width / c.added_embed_dim;
+}
+
+Json video_unet_config_json(const UnetConfig& c)
+{
+    return {{"_class_name", kVideoUnetClass},
+            {"in_channels", c.in_channels},
+            {"out_channels", c.out_channels},
+            {"block_out_channels", c.block_out_channels},
+            {"layers_per_block", per_level_json(c.layers_per_block)},
+            {"down_block_types", block_types_json(c.down_attention, "DownBlockSpatioTemporal")},
+            {"up_block_types", block_types_json(c.up_attention, "UpBlockSpatioTemporal")},
+            {"num_attention_heads", c.heads},
+            {"transformer_layers_per_block", per_level_json(c.transformer_layers)},
+            {"cross_attention_dim", c.cross_attention_dim},
+            {"addition_time_embed_dim", c.added_embed_dim},
+            {"projection_class_embeddings_input_dim", c.added_embed_dim * c.added_numbers},
+            {"num_frames", c.num_frames}};
 }
 
 // ---- the weights
@@ -158,6 +269,30 @@ Result<UnetConfig> parse_unet_config(const Json& json)
     fields.integer("num_class_embeds", 0u, kMaxChannels, c.num_class_embeds);
     SR_CHECK(fields.finish(c.warnings));
     SR_CHECK(check_together(c));
+    return c;
+}
+
+Result<UnetConfig> parse_video_unet_config(const Json& json)
+{
+    UnetConfig c;
+    c.video = true;
+    c.in_channels = 8;
+    c.use_linear_projection = true;
+    c.cross_attention_dim = 1024;
+    c.num_frames = 25;
+    JsonFields fields(json, "video unet config");
+    fields.only("_class_name", kVideoUnetClass);
+    fields.integer("in_channels", 1u, 4096u, c.in_channels);
+    fields.integer("out_channels", 1u, 4096u, c.out_channels);
+    read_block_types(fields, {{"CrossAttnDownBlockSpatioTemporal", true}, {"DownBlockSpatioTemporal", false}},
+                     {{"CrossAttnUpBlockSpatioTemporal", true}, {"UpBlockSpatioTemporal", false}}, c);
+    read_layers(fields, c);
+    read_video_attention(fields, c);
+    read_added_numbers(fields, c);
+    fields.integer("num_frames", 1u, 4096u, c.num_frames);
+    fields.ignore({"sample_size", "dropout"});
+    SR_CHECK(fields.finish(c.warnings));
+    SR_CHECK(check_channels(c, "video unet config", ""));
     return c;
 }
 
