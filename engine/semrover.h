@@ -8,18 +8,18 @@
  * be zero, or the call fails with SR_ERR_USAGE, so that nothing asked for is silently ignored. `next` is reserved:
  * NULL.
  *
- * Threads: different contexts may be used at the same time; one context, with the worlds and chains on it, by one
+ * Threads: different contexts may be used at the same time; one context, with the worlds and renderers on it, by one
  * thread at a time; a grid likewise. Callbacks run on the thread that calls, before the call returns, and must not call
  * the library but where it is said. Strings that the library returns are static. Everything that a call is given is
  * copied before it returns, but for what belongs to Vulkan, and models in memory (sr_file).
  *
- * Which calls block: sr_context_create (drivers), sr_model_load (the disk), sr_world_create and sr_chain_create
- * (compile shaders: seconds, the first time), sr_world_step and sr_chain_step (for their budget), sr_world_flush (for
- * the disk), sr_world_draw, sr_chain_begin and sr_chain_take (for the device), sr_world_record and sr_world_submit (the
- * first time with a size, to compile).
+ * Which calls block: sr_context_create (drivers), sr_model_load (the disk), sr_world_create and sr_renderer_create
+ * (compile shaders: seconds, the first time), sr_world_step and sr_renderer_step (for their budget), sr_world_flush
+ * (for the disk), sr_world_draw, sr_renderer_begin and sr_renderer_take (for the device), sr_world_record and
+ * sr_world_submit (the first time with a size, to compile).
  *
- * docs/embedding.md has a complete example. Chains, which refine frames, are in semrover_chain.h, which this header
- * includes; OpenGL is in semrover_gl.h, which it does not.
+ * docs/embedding.md has a complete example. Renderers, which refine frames, are in semrover_renderer.h, which this
+ * header includes; OpenGL is in semrover_gl.h, which it does not.
  */
 #ifndef SEMROVER_H
 #define SEMROVER_H
@@ -54,9 +54,9 @@ uint32_t sr_abi_version(void);                /* of the library; compare with SR
 const char* sr_version(void);                 /* "0.1.0" */
 const char* sr_status_name(sr_status status); /* "SR_ERR_USAGE"; "unknown" for others */
 
-/* One line about the last call that failed: with this context or a world or chain on it, or, for NULL, in this thread
- * without a context, as calls with grids are. Writes at most `size` bytes with the terminating zero and returns the
- * length that the whole line has. buffer may be NULL with 0. */
+/* One line about the last call that failed: with this context or a world or renderer on it, or, for NULL, in this
+ * thread without a context, as calls with grids are. Writes at most `size` bytes with the terminating zero and returns
+ * the length that the whole line has. buffer may be NULL with 0. */
 size_t sr_last_error(const sr_context* context, char* buffer, size_t size);
 
 /* Lines that no call returns: of the validation that sr_context_desc asks for. (A failed assertion, a bug of ours,
@@ -224,7 +224,7 @@ sr_status sr_grid_get_cells(const sr_grid* grid, uint64_t first, uint64_t count,
  * without points. */
 sr_status sr_grid_get_points(const sr_grid* grid, uint64_t first, uint64_t count, float* points, uint64_t* written);
 
-/* ---- Models: networks on the device, loaded once for any number of worlds and chains. ---- */
+/* ---- Models: networks on the device, loaded once for any number of worlds and renderers. ---- */
 
 typedef struct sr_model sr_model;
 
@@ -258,12 +258,12 @@ typedef struct sr_model_desc {
 } sr_model_desc;
 
 /* Reads the weights and copies them to the device: seconds for a large model. Where sr_context_desc.max_bytes has no
- * room for both networks of a renderer, chains load them in turn. context: outlives the model. On failure *model is
- * NULL, and nothing stays on the device. SR_ERR_USAGE: a NULL, files; SR_ERR_BAD_INPUT: the model's files;
+ * room for both networks of a renderer, sr_renderers load them in turn. context: outlives the model. On failure *model
+ * is NULL, and nothing stays on the device. SR_ERR_USAGE: a NULL, files; SR_ERR_BAD_INPUT: the model's files;
  * SR_ERR_OUT_OF_MEMORY, SR_ERR_INTERRUPTED. */
 sr_status sr_model_load(sr_context* context, const sr_model_desc* desc, sr_model** model);
 
-/* Worlds and chains that are made with it go on: the last of them frees the weights. NULL is fine. */
+/* Worlds and renderers that are made with it go on: the last of them frees the weights. NULL is fine. */
 void sr_model_destroy(sr_model* model);
 
 /* what a voxfield transformer can be conditioned on beside labels */
@@ -280,8 +280,8 @@ typedef struct sr_model_info {
     double voxel_size;        /* metres */
     uint32_t points_per_cell; /* 0: no voxfield transformer, and so on */
     uint32_t steps;           /* of denoising points, where a world does not say */
-    uint32_t renderer_steps;  /* of denoising a frame, where a chain does not say; 0: no renderer, and so on */
-    uint32_t window_frames;   /* made together: 1, or more of a renderer of videos, which chains cannot use yet */
+    uint32_t renderer_steps;  /* of denoising a frame, where sr_renderer_desc does not say; 0: no renderer, and so on */
+    uint32_t window_frames;   /* made together: 1, or more of a renderer of videos, which sr_renderer cannot use yet */
     double splat_radius;      /* metres, that the renderer was trained on; 0: from the points' distance */
 } sr_model_info;
 
@@ -489,5 +489,5 @@ sr_status sr_world_check_draws(sr_world* world);
 }
 #endif
 
-#include "semrover_chain.h"
+#include "semrover_renderer.h"
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-FileCopyrightText: semrover authors
  * SPDX-License-Identifier: Apache-2.0
  *
- * Worlds and chains in an OpenGL or OpenGL ES context: pictures in textures of the host's, splats in buffer objects.
+ * Worlds and renderers in an OpenGL or OpenGL ES context: pictures in textures of the host's, splats in buffer objects.
  * GL 3.1 or GLES 3.0. The library links neither GL nor EGL and includes no header of theirs: the host gives a loader.
  *
  * Bytes come to GL in one of three ways, which the calls do not show and sr_gl_get_info tells. All of them give the
@@ -108,9 +108,9 @@ typedef struct sr_gl_draw_desc {
  * halves is rounded. SR_ERR_BAD_INPUT: a camera that is not finite; SR_ERR_OUT_OF_MEMORY. */
 sr_status sr_gl_draw(sr_gl* gl, sr_world* world, const sr_gl_draw_desc* draw);
 
-/* The last finished frame of a chain, as sr_chain_take gives it, into a GL_TEXTURE_2D of the host's: GL_RGBA8 or
- * GL_SRGB8_ALPHA8, of the chain's size. Blocks as sr_gl_draw does. */
-sr_status sr_gl_take(sr_gl* gl, sr_chain* chain, uint32_t texture);
+/* The last finished frame of a renderer, as sr_renderer_take gives it, into a GL_TEXTURE_2D of the host's: GL_RGBA8 or
+ * GL_SRGB8_ALPHA8, of the renderer's size. Blocks as sr_gl_draw does. */
+sr_status sr_gl_take(sr_gl* gl, sr_renderer* renderer, uint32_t texture);
 
 typedef struct sr_gl_array {
     uint32_t buffer; /* name of a buffer object of the library's, only to be read */

@@ -1,15 +1,15 @@
 /* SPDX-FileCopyrightText: semrover authors
  * SPDX-License-Identifier: Apache-2.0
  *
- * A host in C that has models in memory: worlds and chains have the bytes that they have from a folder, and share its
- * cache; and what a host may get wrong.
+ * A host in C that has models in memory: worlds and renderers have the bytes that they have from a folder, and share
+ * its cache; and what a host may get wrong.
  *
  *     capi_files MODEL RENDERER FOLDER     FOLDER: for the cache, which is emptied */
 #include "tests/capi_street.h"
 
 enum { WIDTH = 24, HEIGHT = 16, PIXELS = WIDTH * HEIGHT, MOST_FILES = 8 };
 
-static const char *model, *renderer, *folder;
+static const char *model, *weights, *folder;
 
 /* files of a model, at odd addresses */
 struct files {
@@ -73,7 +73,7 @@ static struct files renderer_in_memory(void)
     size_t i;
     memset(&files, 0, sizeof files);
     for (i = 0; i < sizeof paths / sizeof *paths; ++i)
-        read_one(&files, renderer, paths[i]);
+        read_one(&files, weights, paths[i]);
     return files;
 }
 
@@ -204,9 +204,9 @@ static void refuses_wrong_files(sr_context* context)
     free(files.memory[1]);
 }
 
-static sr_chain_desc chain_desc(void)
+static sr_renderer_desc renderer_desc(void)
 {
-    sr_chain_desc desc;
+    sr_renderer_desc desc;
     memset(&desc, 0, sizeof desc);
     desc.struct_size = sizeof desc;
     desc.width = WIDTH;
@@ -216,7 +216,7 @@ static sr_chain_desc chain_desc(void)
     return desc;
 }
 
-static void refine(sr_context* context, sr_chain* chain, uint8_t* frame)
+static void refine(sr_context* context, sr_renderer* renderer, uint8_t* frame)
 {
     static uint8_t seen[PIXELS * 4];
     sr_frame_desc desc;
@@ -229,35 +229,35 @@ static void refine(sr_context* context, sr_chain* chain, uint8_t* frame)
     desc.seen.memory = seen;
     memset(&target, 0, sizeof target);
     target.memory = frame;
-    CHECK_OK(context, sr_chain_begin(chain, &desc));
+    CHECK_OK(context, sr_renderer_begin(renderer, &desc));
     while (!done)
-        CHECK_OK(context, sr_chain_step(chain, 20000, &done));
-    CHECK_OK(context, sr_chain_take(chain, &target));
+        CHECK_OK(context, sr_renderer_step(renderer, 20000, &done));
+    CHECK_OK(context, sr_renderer_take(renderer, &target));
 }
 
-static uint64_t device_bytes(sr_chain* chain)
+static uint64_t device_bytes(sr_renderer* renderer)
 {
-    sr_chain_info info;
+    sr_renderer_info info;
     memset(&info, 0, sizeof info);
     info.struct_size = sizeof info;
-    CHECK(sr_chain_get_info(chain, &info) == SR_OK);
+    CHECK(sr_renderer_get_info(renderer, &info) == SR_OK);
     return info.device_bytes;
 }
 
-static sr_chain* open_chain(sr_context* context, const sr_model_desc* model_desc)
+static sr_renderer* open_renderer(sr_context* context, const sr_model_desc* model_desc)
 {
-    sr_chain_desc desc = chain_desc();
-    sr_chain* chain = NULL;
+    sr_renderer_desc desc = renderer_desc();
+    sr_renderer* renderer = NULL;
     sr_model* loaded = NULL;
     CHECK_OK(context, sr_model_load(context, model_desc, &loaded));
     desc.model = loaded;
-    CHECK_OK(context, sr_chain_create(context, &desc, &chain));
+    CHECK_OK(context, sr_renderer_create(context, &desc, &renderer));
     sr_model_destroy(loaded);
-    return chain;
+    return renderer;
 }
 
 /* also where networks are loaded in turn, and so are read again for every frame */
-static void chains_are_the_same(sr_context* context)
+static void renderers_are_the_same(sr_context* context)
 {
     static uint8_t expected[PIXELS * 4], found[PIXELS * 4];
     struct files files = renderer_in_memory();
@@ -265,23 +265,23 @@ static void chains_are_the_same(sr_context* context)
     sr_model_desc desc = in_memory;
     sr_context_desc small;
     sr_context* in_turns = NULL;
-    sr_chain* chain = open_chain(context, &on_disk);
-    refine(context, chain, expected);
+    sr_renderer* renderer = open_renderer(context, &on_disk);
+    refine(context, renderer, expected);
     memset(&small, 0, sizeof small);
     small.struct_size = sizeof small;
-    small.max_bytes = device_bytes(chain) - 1;
-    sr_chain_destroy(chain);
-    chain = open_chain(context, &in_memory);
-    refine(context, chain, found);
+    small.max_bytes = device_bytes(renderer) - 1;
+    sr_renderer_destroy(renderer);
+    renderer = open_renderer(context, &in_memory);
+    refine(context, renderer, found);
     CHECK(!memcmp(found, expected, sizeof found));
-    sr_chain_destroy(chain);
+    sr_renderer_destroy(renderer);
     CHECK_OK(NULL, sr_context_create(&small, &in_turns));
-    chain = open_chain(in_turns, &in_memory);
-    CHECK(device_bytes(chain) < small.max_bytes);
-    refine(in_turns, chain, found);
+    renderer = open_renderer(in_turns, &in_memory);
+    CHECK(device_bytes(renderer) < small.max_bytes);
+    refine(in_turns, renderer, found);
     CHECK(!memcmp(found, expected, sizeof found));
-    refine(in_turns, chain, found);
-    sr_chain_destroy(chain);
+    refine(in_turns, renderer, found);
+    sr_renderer_destroy(renderer);
     sr_context_destroy(in_turns);
     desc.file_count = 1;
     CHECK(try_load(context, &desc) == SR_ERR_BAD_INPUT && says(context, "has no"));
@@ -298,7 +298,7 @@ int main(int argc, char** argv)
     struct files files;
     CHECK(argc == 4);
     model = argv[1];
-    renderer = argv[2];
+    weights = argv[2];
     folder = argv[3];
     sr_set_diagnostic_callback(print_line, stderr);
     memset(&desc, 0, sizeof desc);
@@ -311,7 +311,7 @@ int main(int argc, char** argv)
     a_model_may_lie_deeper(context);
     sr_world_destroy(world);
     free_files(&files);
-    chains_are_the_same(context);
+    renderers_are_the_same(context);
     sr_context_destroy(context);
     destroy_host(&host);
     return 0;

@@ -7,7 +7,7 @@
  *     capi_gl MODEL RENDERER */
 #include "tests/capi_gl.h"
 
-static const char *model, *renderer;
+static const char *model, *weights;
 
 static sr_gl* make_gl(sr_context* context, uint32_t best)
 {
@@ -237,7 +237,7 @@ static void refuses_wrong_draws(sr_context* context, sr_gl* gl, sr_world* world)
     CHECK(sr_gl_get_splats(NULL, world, &splats) == SR_ERR_USAGE && says(NULL, "gl is NULL"));
     memset(&info, 0, sizeof info);
     CHECK(sr_gl_get_info(gl, &info) == SR_ERR_USAGE && says(context, "struct_size"));
-    CHECK(sr_gl_take(gl, NULL, 1) == SR_ERR_USAGE && says(context, "chain is NULL"));
+    CHECK(sr_gl_take(gl, NULL, 1) == SR_ERR_USAGE && says(context, "renderer is NULL"));
     sr_world_destroy(without);
     test_glDeleteTextures(1, &small.name);
     delete_textures(&t);
@@ -268,15 +268,15 @@ static void splats_follow_the_world(sr_context* context, sr_gl* gl, sr_world* wo
     sr_world_destroy(second);
 }
 
-/* frames of a chain, in a texture */
+/* frames of a renderer, in a texture */
 static void takes_frames(sr_context* context, sr_gl* gl, sr_world* world)
 {
     static uint8_t expected[PIXELS * 4], found[PIXELS * 4];
     const struct texture t = make_texture(WIDTH, HEIGHT, GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE);
-    sr_chain_desc desc;
+    sr_renderer_desc desc;
     sr_frame_desc frame;
     sr_target target;
-    sr_chain* chain = NULL;
+    sr_renderer* renderer = NULL;
     uint32_t done = 0;
     memset(&desc, 0, sizeof desc);
     desc.struct_size = sizeof desc;
@@ -292,17 +292,17 @@ static void takes_frames(sr_context* context, sr_gl* gl, sr_world* world)
     look(1, frame.world_to_camera);
     memset(&target, 0, sizeof target);
     target.memory = expected;
-    CHECK_OK(context, create_chain(context, renderer, &desc, &chain));
-    CHECK(sr_gl_take(gl, chain, t.name) == SR_ERR_USAGE && says(context, "no frame is finished"));
-    CHECK_OK(context, sr_chain_begin(chain, &frame));
+    CHECK_OK(context, create_renderer(context, weights, &desc, &renderer));
+    CHECK(sr_gl_take(gl, renderer, t.name) == SR_ERR_USAGE && says(context, "no frame is finished"));
+    CHECK_OK(context, sr_renderer_begin(renderer, &frame));
     while (!done)
-        CHECK_OK(context, sr_chain_step(chain, 0, &done));
-    CHECK(sr_gl_take(gl, chain, 0) == SR_ERR_USAGE && says(context, "texture is 0"));
-    CHECK_OK(context, sr_gl_take(gl, chain, t.name));
-    CHECK_OK(context, sr_chain_take(chain, &target));
+        CHECK_OK(context, sr_renderer_step(renderer, 0, &done));
+    CHECK(sr_gl_take(gl, renderer, 0) == SR_ERR_USAGE && says(context, "texture is 0"));
+    CHECK_OK(context, sr_gl_take(gl, renderer, t.name));
+    CHECK_OK(context, sr_renderer_take(renderer, &target));
     read_texture(&t, found);
     CHECK(!memcmp(found, expected, sizeof found) && found[3] == 255);
-    sr_chain_destroy(chain);
+    sr_renderer_destroy(renderer);
     test_glDeleteTextures(1, &t.name);
 }
 
@@ -437,7 +437,7 @@ int main(int argc, char** argv)
     int i;
     CHECK(argc == 3);
     model = argv[1];
-    renderer = argv[2];
+    weights = argv[2];
     sr_set_diagnostic_callback(print_line, stderr);
     context = make_sharing_context();
     needs_a_current_context(context);

@@ -2,7 +2,7 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * An application in C that loads models: what they hold, progress, loads that are given up, and weights that worlds and
- * chains share.
+ * renderers share.
  *
  *     capi_model MODEL RENDERER RENDERER_OF_VIDEOS BOTH     MODEL: a voxfield transformer alone; BOTH: that and a
  * renderer, conditioned on objects */
@@ -139,25 +139,25 @@ static void loads_can_be_given_up(sr_context* context, const char* both)
     printf("given up at %d of %u calls\n", GIVEN_UP, (unsigned)whole.calls);
 }
 
-/* bytes of a world or chain without its weights */
+/* bytes of a world or renderer without its weights */
 static void weights_are_there_once(sr_context* context, const char* both)
 {
     const uint64_t empty = used_bytes(context);
     sr_model* model = load_model(context, both);
     const uint64_t weights = info_of(model).device_bytes;
     sr_world_desc world_desc = street_world();
-    sr_chain_desc chain_desc;
+    sr_renderer_desc renderer_desc;
     sr_world* worlds[2] = {NULL, NULL};
-    sr_chain* chains[2] = {NULL, NULL};
+    sr_renderer* cameras[2] = {NULL, NULL};
     uint64_t bytes[5];
     int i;
     world_desc.model = model;
-    memset(&chain_desc, 0, sizeof chain_desc);
-    chain_desc.struct_size = sizeof chain_desc;
-    chain_desc.model = model;
-    chain_desc.width = 24;
-    chain_desc.height = 16;
-    chain_desc.steps = 1;
+    memset(&renderer_desc, 0, sizeof renderer_desc);
+    renderer_desc.struct_size = sizeof renderer_desc;
+    renderer_desc.model = model;
+    renderer_desc.width = 24;
+    renderer_desc.height = 16;
+    renderer_desc.steps = 1;
     bytes[0] = used_bytes(context);
     CHECK(bytes[0] == empty + weights);
     for (i = 0; i < 2; ++i) {
@@ -165,18 +165,18 @@ static void weights_are_there_once(sr_context* context, const char* both)
         bytes[1 + i] = used_bytes(context);
     }
     for (i = 0; i < 2; ++i) {
-        CHECK_OK(context, sr_chain_create(context, &chain_desc, &chains[i]));
+        CHECK_OK(context, sr_renderer_create(context, &renderer_desc, &cameras[i]));
         bytes[3 + i] = used_bytes(context);
     }
     CHECK(bytes[2] - bytes[1] == bytes[1] - bytes[0]); /* the second takes what the first took beside the weights */
     CHECK(bytes[4] - bytes[3] == bytes[3] - bytes[2]);
-    printf("weights %lu bytes, a world beside them %lu, a chain %lu\n", (unsigned long)weights,
+    printf("weights %lu bytes, a world beside them %lu, a renderer %lu\n", (unsigned long)weights,
            (unsigned long)(bytes[1] - bytes[0]), (unsigned long)(bytes[3] - bytes[2]));
     sr_model_destroy(model);
     CHECK(used_bytes(context) == bytes[4]); /* they go on */
     walk(context, worlds[1], 1, 1);
     for (i = 0; i < 2; ++i) {
-        sr_chain_destroy(chains[i]);
+        sr_renderer_destroy(cameras[i]);
         sr_world_destroy(worlds[i]);
     }
     CHECK(used_bytes(context) == empty);
@@ -187,17 +187,18 @@ static void belongs_to_its_context(sr_context* context, const char* both)
     sr_context* other = NULL;
     sr_model* model = load_model(context, both);
     sr_world_desc world_desc = street_world();
-    sr_chain_desc chain_desc;
+    sr_renderer_desc renderer_desc;
     sr_world* world = NULL;
-    sr_chain* chain = NULL;
+    sr_renderer* renderer = NULL;
     CHECK(sr_context_create(NULL, &other) == SR_OK);
     world_desc.model = model;
     CHECK(sr_world_create(other, &world_desc, &world) == SR_ERR_USAGE && says(other, "another context") && !world);
-    memset(&chain_desc, 0, sizeof chain_desc);
-    chain_desc.struct_size = sizeof chain_desc;
-    chain_desc.model = model;
-    chain_desc.width = chain_desc.height = 16;
-    CHECK(sr_chain_create(other, &chain_desc, &chain) == SR_ERR_USAGE && says(other, "another context") && !chain);
+    memset(&renderer_desc, 0, sizeof renderer_desc);
+    renderer_desc.struct_size = sizeof renderer_desc;
+    renderer_desc.model = model;
+    renderer_desc.width = renderer_desc.height = 16;
+    CHECK(sr_renderer_create(other, &renderer_desc, &renderer) == SR_ERR_USAGE && says(other, "another context") &&
+          !renderer);
     sr_context_destroy(other);
     sr_model_destroy(model);
 }

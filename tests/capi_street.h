@@ -85,14 +85,15 @@ static inline sr_status create_world(sr_context* context, const char* path, sr_w
     sr_model_destroy(model);
     return status;
 }
-static inline sr_status create_chain(sr_context* context, const char* path, sr_chain_desc* desc, sr_chain** chain)
+static inline sr_status create_renderer(sr_context* context, const char* path, sr_renderer_desc* desc,
+                                        sr_renderer** renderer)
 {
     const sr_model_desc model_desc = model_at(path);
     sr_model* model = NULL;
     sr_status status = sr_model_load(context, &model_desc, &model);
     desc->model = model;
     if (status == SR_OK)
-        status = sr_chain_create(context, desc, chain);
+        status = sr_renderer_create(context, desc, renderer);
     sr_model_destroy(model);
     return status;
 }

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/refine/asd.h"
-#include "engine/refine/memory_plan.h"
+#include "engine/deferred/frame_codec.h"
+#include "engine/deferred/memory_plan.h"
 #include "tests/golden_renderer.h"
 
 #include <cmath>
@@ -93,7 +93,6 @@ TEST(engine_asd, a_chain_gives_the_same_bytes_again_and_from_a_stored_latent)
         const auto first = renderer(options(), plan(sampler)), second = renderer(options(), plan(sampler));
         const Latent a = render(*first, 0), b = render(*first, 1, a), c = render(*first, 2, b);
         EXPECT_EQ(c, render(*second, 2, b)) << sampler_name(sampler); // as if a run had gone on at frame 2
-        second->rest();
         EXPECT_EQ(b, render(*second, 1, a)) << sampler_name(sampler);
     }
 }
@@ -159,19 +158,17 @@ TEST(engine_asd, planned_memory_is_the_memory_in_use)
         ASSERT_TRUE(bytes) << bytes.error().message;
         device().reset_peak();
         const auto r = renderer(options(guidance), p);
-        EXPECT_EQ(device().allocated_bytes() - before, bytes->state);
         render(*r, 0);
-        EXPECT_EQ(device().peak_bytes() - before, bytes->state + bytes->programs);
-        r->rest();
-        EXPECT_EQ(device().allocated_bytes() - before, bytes->state);
+        EXPECT_EQ(device().allocated_bytes() - before, bytes->bytes());
+        EXPECT_EQ(device().peak_bytes() - before, bytes->bytes());
     }
-    for (CodecDirection direction : {CodecDirection::encode, CodecDirection::decode}) {
-        const uint64_t before = device().allocated_bytes();
-        const auto codec = LatentCodec::create(device(), vae(), kSize, direction);
-        ASSERT_TRUE(codec) << codec.error().message;
-        EXPECT_EQ(device().allocated_bytes() - before,
-                  *LatentCodec::planned_bytes(device().limits(), vae(), kSize, direction));
-    }
+    const uint64_t before = device().allocated_bytes();
+    const auto encoded = *FrameEncoder::planned_bytes(device().limits(), vae(), kSize),
+               decoded = *FrameDecoder::planned_bytes(device().limits(), vae(), kSize, 1);
+    const auto encoder = *FrameEncoder::create(device(), vae(), kSize, false);
+    EXPECT_EQ(device().allocated_bytes() - before, encoded.bytes());
+    const auto decoder = *FrameDecoder::create(device(), vae(), kSize, 1);
+    EXPECT_EQ(device().allocated_bytes() - before, encoded.bytes() + decoded.bytes());
 }
 
 TEST(engine_asd, a_latent_with_nan_is_an_error_and_no_picture)
@@ -183,7 +180,7 @@ TEST(engine_asd, a_latent_with_nan_is_an_error_and_no_picture)
     ASSERT_FALSE(latent);
     EXPECT_EQ(latent.error().code, ErrorCode::internal);
     EXPECT_NE(latent.error().message.find("nan"), std::string::npos) << latent.error().message;
-    const auto decoder = *LatentCodec::create(device(), vae(), kSize, CodecDirection::decode);
+    const auto decoder = *FrameDecoder::create(device(), vae(), kSize, 1);
     const auto image = decoder->decode(scene.buffer);
     ASSERT_FALSE(image);
     EXPECT_EQ(image.error().code, ErrorCode::internal);
@@ -213,7 +210,7 @@ TEST(engine_asd, a_network_of_other_channels_is_refused)
     EXPECT_EQ(guided.error().code, ErrorCode::usage);
 }
 
-TEST(engine_latent_codec, a_picture_that_does_not_fill_its_blocks_is_continued_at_its_edges)
+TEST(engine_frame_codec, a_picture_that_does_not_fill_its_blocks_is_continued_at_its_edges)
 {
     const uint32_t w = kSize.image_width, h = kSize.image_height;
     std::vector<float> image, padded;
@@ -225,20 +222,20 @@ TEST(engine_latent_codec, a_picture_that_does_not_fill_its_blocks_is_continued_a
                 if (x < w && y < h)
                     image.push_back(value(x, y, c));
             }
-    const auto odd = *LatentCodec::create(device(), vae(), kSize, CodecDirection::encode);
-    const auto even = *LatentCodec::create(device(), vae(), {56, 40, 8}, CodecDirection::encode);
+    const auto odd = *FrameEncoder::create(device(), vae(), kSize, false);
+    const auto even = *FrameEncoder::create(device(), vae(), {56, 40, 8}, false);
     const auto latent = odd->encode(image);
     ASSERT_TRUE(latent) << latent.error().message;
     EXPECT_EQ(*latent, *even->encode(padded));
-    const auto cut = (*LatentCodec::create(device(), vae(), kSize, CodecDirection::decode))->decode(*latent);
-    const auto whole = (*LatentCodec::create(device(), vae(), {56, 40, 8}, CodecDirection::decode))->decode(*latent);
+    const auto cut = (*FrameDecoder::create(device(), vae(), kSize, 1))->decode(*latent);
+    const auto whole = (*FrameDecoder::create(device(), vae(), {56, 40, 8}, 1))->decode(*latent);
     ASSERT_EQ(cut->size(), size_t(w) * h * 3);
     for (uint32_t y = 0; y < h; ++y)
         for (uint32_t i = 0; i < w * 3; ++i)
             ASSERT_EQ((*cut)[size_t(y) * w * 3 + i], (*whole)[size_t(y) * 56 * 3 + i]);
 }
 
-TEST(engine_latent_codec, visibility_is_the_share_of_a_block)
+TEST(engine_frame_codec, visibility_is_the_share_of_a_block)
 {
     const LatentSize size{10, 8, 4};
     std::vector<uint8_t> visible(80, 0);
@@ -254,20 +251,22 @@ TEST(engine_memory_plan, takes_the_first_policy_that_fits_and_says_what_each_nee
     RendererBytes parts;
     parts.unet = 1000;
     parts.vae = 100;
-    parts.sizes = {{10, 50, 70, 90, 60}};
-    EXPECT_EQ(parts.peak(MemoryPolicy::resident), 1200u);
+    // the programs of all parts share an arena; one network at a time has its own
+    parts.sizes = {{{kSize}, {5, {{65}}}, {10, {{50, 6}}}, {15, {{70}}}, {10, {{50}}}}};
+    EXPECT_EQ(parts.peak(MemoryPolicy::resident), 1206u);
     EXPECT_EQ(parts.peak(MemoryPolicy::staged), 1060u);
+    EXPECT_EQ(&parts.of({kSize}), &parts.sizes[0]);
     EXPECT_EQ(plan_memory(parts, 5, 0)->policy, MemoryPolicy::resident);
-    EXPECT_EQ(plan_memory(parts, 5, 1205)->bytes, 1205u);
-    EXPECT_EQ(plan_memory(parts, 5, 1204)->policy, MemoryPolicy::staged);
+    EXPECT_EQ(plan_memory(parts, 5, 1211)->bytes, 1211u);
+    EXPECT_EQ(plan_memory(parts, 5, 1210)->policy, MemoryPolicy::staged);
     const auto refused = plan_memory(parts, 5, 1064);
     ASSERT_FALSE(refused);
     EXPECT_EQ(refused.error().code, ErrorCode::out_of_memory);
-    for (const char* number : {"1205 bytes resident", "1065 bytes staged", "1064"})
+    for (const char* number : {"1211 bytes resident", "1065 bytes staged", "1064"})
         EXPECT_NE(refused.error().message.find(number), std::string::npos) << refused.error().message;
     // only latents are left to decode: the UNet is not needed
     parts.unet = 0;
-    parts.sizes = {{0, 0, 0, 90}};
+    parts.sizes = {{{kSize, false, false, true}, {}, {}, {20, {{70}}}, {}}};
     EXPECT_EQ(plan_memory(parts, 0, 0)->bytes, 190u);
 }
 

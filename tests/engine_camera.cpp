@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/camera/lens.h"
 #include "engine/camera/rig.h"
+#include "engine/deferred/frame_images.h"
 #include "engine/format/camera_path.h"
-#include "engine/refine/frame_images.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
 

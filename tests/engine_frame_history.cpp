@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/refine/frame_history.h"
+#include "engine/deferred/frame_history.h"
 #include "tests/kernel_case.h"
 
 namespace semrover {

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/refine/refine_chain.h"
+#include "engine/deferred/frame_windows.h"
 
 #include <gtest/gtest.h>
 
@@ -51,14 +51,10 @@ TEST(engine_frame_windows, that_go_on_after_a_window_are_those_of_the_whole_driv
 
 TEST(engine_frame_windows, are_decoded_in_parts_that_begin_with_a_frame_before_them)
 {
-    RefineChain chain;
-    chain.shape = {12, 4, 4};
-    EXPECT_EQ(decode_windows(chain, {0, 12, 0}), (Windows{{0, 4, 0}, {3, 4, 1}, {6, 4, 1}, {8, 4, 2}}));
-    EXPECT_EQ(decode_windows(chain, {8, 12, 4}), (Windows{{11, 4, 1}, {14, 4, 1}, {16, 4, 2}}));
-    chain.shape.decode_frames = 12;
-    EXPECT_EQ(decode_windows(chain, {8, 12, 4}), (Windows{{8, 12, 4}}));
-    chain.shape = {};
-    EXPECT_EQ(decode_windows(chain, {7, 1, 0}), (Windows{{7, 1, 0}}));
+    EXPECT_EQ(decode_windows({0, 12, 0}, 4), (Windows{{0, 4, 0}, {3, 4, 1}, {6, 4, 1}, {8, 4, 2}}));
+    EXPECT_EQ(decode_windows({8, 12, 4}, 4), (Windows{{11, 4, 1}, {14, 4, 1}, {16, 4, 2}}));
+    EXPECT_EQ(decode_windows({8, 12, 4}, 12), (Windows{{8, 12, 4}}));
+    EXPECT_EQ(decode_windows({7, 1, 0}, 1), (Windows{{7, 1, 0}}));
 }
 
 } // namespace engine_frame_windows_test

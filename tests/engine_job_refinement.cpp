@@ -50,7 +50,7 @@ class JobRefinement : public testing::Test {
         o.input = folder_ / "in";
         o.model = folder_ / "model";
         o.output = folder_ / output;
-        o.steps = kSteps;
+        o.renderer.steps = kSteps;
         return o;
     }
     RefinementOptions options_of_grid(std::string_view output) const
@@ -59,8 +59,8 @@ class JobRefinement : public testing::Test {
         o.input = folder_ / "street.sgrid";
         o.path = drive();
         o.grid = [] { return street(); };
-        o.frame_noise = FrameNoise::warped;
-        o.frame_history = 0.6f;
+        o.renderer.frame_noise = FrameNoise::warped;
+        o.renderer.frame_history = 0.6f;
         return o;
     }
     std::unique_ptr<Job> begin(const RefinementOptions& o, const RefinementCallbacks& callbacks = {},
@@ -141,7 +141,7 @@ TEST_F(JobRefinement, budgets_of_time_stop_as_well_and_change_no_byte)
 TEST_F(JobRefinement, refinements_take_turns_on_one_device_and_do_not_know_of_each_other)
 {
     RefinementOptions other = options_of_grid("other");
-    other.seed = 5;
+    other.renderer.seed = 5;
     const auto first = whole(options("first"), "first"), second = whole(other, "other");
     RefinementOptions other_again = other;
     other_again.output = folder_ / "b";
@@ -256,7 +256,7 @@ TEST_F(JobRefinement, where_drawing_needs_more_than_is_left_the_rest_is_drawn_be
 {
     const auto of_two_lenses = [&](std::string_view output) {
         RefinementOptions o = options_of_grid(output);
-        o.frame_noise = FrameNoise::fresh;
+        o.renderer.frame_noise = FrameNoise::fresh;
         o.path->frames.back().intrinsics.model = CameraModel::fisheye; // drawn by another rasterizer
         return o;
     };
@@ -294,8 +294,8 @@ TEST_F(JobRefinement, callbacks_tell_stages_counts_and_the_plan_and_may_refuse_t
     callbacks.planned = [&](const Refinement& r, const MemoryPlan& plan) {
         told.push_back(fmt::format("{} frames, {}", r.frames(), policy_name(plan.policy)));
     };
-    callbacks.refined = [](const RefineStore& store, std::span<const RefineChain> chains) -> Status {
-        EXPECT_TRUE(store.load_frame(chains[0].camera, 1));
+    callbacks.refined = [](const RefineStore& store, std::span<const RefinedCamera> cameras) -> Status {
+        EXPECT_TRUE(store.load_frame(cameras[0].buffers, 1));
         return fail(ErrorCode::bad_input, "no room for a video");
     };
     const auto job = begin(options_of_grid("out"), callbacks);
@@ -312,10 +312,10 @@ TEST_F(JobRefinement, callbacks_tell_stages_counts_and_the_plan_and_may_refuse_t
 TEST_F(JobRefinement, what_cannot_be_is_refused_before_any_work)
 {
     RefinementOptions o = options("out");
-    o.frames = "2:";
+    o.first_frame = 2;
     EXPECT_EQ(resolve_refinement(o, {}).error().code, ErrorCode::usage);
     o = options("out");
-    o.steps = 0;
+    o.renderer.steps = 0;
     EXPECT_EQ(resolve_refinement(o, {}).error().code, ErrorCode::bad_input);
     o = options_of_grid("out");
     o.path.reset();
@@ -323,7 +323,7 @@ TEST_F(JobRefinement, what_cannot_be_is_refused_before_any_work)
     EXPECT_FALSE(fs::exists(folder_ / "out"));
     whole(options("done"), "done");
     o = options("done");
-    o.seed = 77;
+    o.renderer.seed = 77;
     const auto other = begin_refinement(device(), *resolve_refinement(o, {}), {});
     EXPECT_EQ(other.error().code, ErrorCode::usage);
     o = options("done");

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/refine/known_frames.h"
+#include "engine/deferred/vsd.h"
 
 #include <cmath>
 #include <gtest/gtest.h>

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/refine/noise_trail.h"
+#include "engine/deferred/noise_trail.h"
 
 #include <gtest/gtest.h>
 #include <set>

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // runs of tokens and of frames, stopped between rows: the bytes are those of the uninterrupted run
-#include "engine/refine/asd.h"
+#include "engine/deferred/asd.h"
 #include "engine/voxfield/token_sampler.h"
 #include "runtime/base/json.h"
 
@@ -82,7 +82,7 @@ struct FrameRun {
     uint64_t seed = 5;
     std::vector<float> text = wave(5 * unet().config().cross_attention_dim, 1), buffer = wave(kSize.pixels() * 4, 0.7f),
                        previous = wave(kSize.pixels() * 4, 0.3f), visible = std::vector<float>(kSize.pixels(), 0.5f);
-    AsdFrame frame{3, 0, buffer, visible, previous};
+    DenoiserWindow frame{3, 0, buffer, visible, previous};
 
     static std::vector<float> wave(size_t count, float step)
     {

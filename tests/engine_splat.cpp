@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/refine/frame_images.h"
+#include "engine/deferred/frame_images.h"
 #include "tests/frame_pixels_reference.h"
 #include "tests/golden_tensors.h"
 #include "tests/json_text.h"

@@ -9,7 +9,7 @@
 #include <cmath>
 #include <vector>
 
-// what splat_pixels makes on the device (kernels/picture.h, engine/refine/frame_images.h), on the host
+// what splat_pixels makes on the device (kernels/picture.h, engine/deferred/frame_images.h), on the host
 namespace semrover {
 
 inline uint8_t to_byte(float v)

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/deferred/latent_size.h"
 #include "engine/network/unet.h"
 #include "engine/network/vae.h"
-#include "engine/refine/latent_size.h"
 #include "runtime/base/json.h"
 
 #include <cmath>

@@ -3,8 +3,8 @@
 // ops between pictures and networks: to the bit what the host does, which writes and reads the same pictures as files
 #include "kernels/picture.h"
 
-#include "engine/refine/frame_images.h"
-#include "engine/refine/latent_codec.h"
+#include "engine/deferred/frame_codec.h"
+#include "engine/deferred/frame_images.h"
 #include "tests/frame_pixels_reference.h"
 #include "tests/kernel_case.h"
 
@@ -99,7 +99,7 @@ TEST(kernel_picture, bytes_become_the_numbers_that_a_network_is_given)
                 const uint32_t x = std::min(row % s.padded_width, s.width - 1),
                                line = std::min(row / s.padded_width, s.height - 1);
                 const auto byte = uint8_t(seen[line * s.width + x] >> 8 * c);
-                const float expected = row < y.pixels() ? floats_of_pixels({&byte, 1})[0] : 0;
+                const float expected = row < y.pixels() ? float(byte) / 127.5f - 1 : 0;
                 ASSERT_EQ(got.at(row, c), expected) << "row " << row << " channel " << c;
             }
     }

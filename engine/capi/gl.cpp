@@ -159,21 +159,22 @@ Status draw(sr_gl& gl, sr_world& world, const sr_gl_draw_desc& d)
     return upload(link, wanted);
 }
 
-Status take(sr_gl& gl, sr_chain& chain, GlName texture)
+Status take(sr_gl& gl, sr_renderer& renderer, GlName texture)
 {
     GlLink& link = *gl.link;
-    if (chain.context != gl.context)
-        return fail(ErrorCode::usage, "sr_gl_take: the chain belongs to another context");
+    if (renderer.context != gl.context)
+        return fail(ErrorCode::usage, "sr_gl_take: the renderer belongs to another context");
     if (!texture)
         return fail(ErrorCode::usage, "sr_gl_take: texture is 0");
-    if (!chain.chain->frames())
+    if (!renderer.camera->frames())
         return fail(ErrorCode::usage, "sr_gl_take: no frame is finished");
     SR_CHECK(link.gl().take_errors("was set before sr_gl_take"));
     const GlStateKept kept(link.gl());
-    const std::vector<Wanted> wanted{{chain.chain->texels(),
-                                      &gl.frame,
-                                      {texture, chain.size.width, chain.size.height, gl::kRgba, gl::kUnsignedByte},
-                                      "uploading a frame"}};
+    const std::vector<Wanted> wanted{
+        {renderer.camera->texels(),
+         &gl.frame,
+         {texture, renderer.size.width, renderer.size.height, gl::kRgba, gl::kUnsignedByte},
+         "uploading a frame"}};
     SR_TRY(const std::vector<GlLink::Piece> pieces, pieces_of(link, wanted));
     SR_CHECK(link.send(pieces));
     return upload(link, wanted);
@@ -259,12 +260,12 @@ sr_status sr_gl_draw(sr_gl* gl, sr_world* world, const sr_gl_draw_desc* desc)
     });
 }
 
-sr_status sr_gl_take(sr_gl* gl, sr_chain* chain, uint32_t texture)
+sr_status sr_gl_take(sr_gl* gl, sr_renderer* renderer, uint32_t texture)
 {
     return with_gl(gl, "sr_gl_take", [&]() -> Status {
-        if (!chain)
-            return fail(ErrorCode::usage, "sr_gl_take: chain is NULL");
-        return take(*gl, *chain, texture);
+        if (!renderer)
+            return fail(ErrorCode::usage, "sr_gl_take: renderer is NULL");
+        return take(*gl, *renderer, texture);
     });
 }
 

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/capi/camera_renderer.h"
 #include "engine/capi/sized_rasterizer.h"
-#include "engine/job/frame_chain.h"
 #include "engine/job/model.h"
 #include "engine/job/world.h"
 #include "engine/scene/label_edits.h"
@@ -44,16 +44,16 @@ struct sr_world {
     std::shared_ptr<semrover::Model> model;
     semrover::GenerationSettings settings;
     std::unique_ptr<semrover::World> world;
-    semrover::capi::SizedRasterizer pixels;                 // of chains that draw
+    semrover::capi::SizedRasterizer pixels;                 // of renderers that draw
     semrover::capi::SizedRasterizer images[2], recorded[2]; // of draws; the second with depth test
     std::unique_ptr<semrover::CommandRing> commands;        // of sr_world_submit, from the first on
 };
 
-struct sr_chain {
+struct sr_renderer {
     sr_context* context = nullptr;
     std::shared_ptr<semrover::Model> model;
     semrover::ImageSize size;
-    std::unique_ptr<semrover::FrameChain> chain;
+    std::unique_ptr<semrover::CameraRenderer> camera;
 };
 
 namespace semrover::capi {

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// models: loaded once, shared by worlds and chains
+// models: loaded once, shared by worlds and renderers
 #include "engine/capi/call.h"
 #include "engine/capi/handles.h"
 

@@ -3,8 +3,8 @@
 #pragma once
 
 #include "engine/camera/camera.h"
+#include "engine/deferred/frame_images.h"
 #include "engine/job/job.h"
-#include "engine/refine/frame_images.h"
 #include "engine/splat/bounds.h"
 
 namespace semrover {

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/deferred/loaded_networks.h"
 #include "engine/network/transformer.h"
-#include "engine/refine/loaded_networks.h"
 #include "engine/voxfield/voxfield_model.h"
 #include "runtime/base/memory_files.h"
 

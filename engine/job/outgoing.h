@@ -3,8 +3,8 @@
 #pragma once
 
 #include "engine/camera/image_size.h"
+#include "engine/deferred/frame_images.h"
 #include "engine/job/file_queue.h"
-#include "engine/refine/frame_images.h"
 #include "runtime/device/readback_ring.h"
 
 namespace semrover {

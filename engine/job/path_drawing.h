@@ -3,7 +3,7 @@
 #pragma once
 
 #include "engine/camera/camera.h"
-#include "engine/refine/frame_images.h"
+#include "engine/deferred/frame_images.h"
 #include "engine/scene/grid.h"
 #include "engine/splat/rasterizer.h"
 

@@ -4,9 +4,8 @@
 
 #include "engine/job/budget_meter.h"
 #include "engine/job/empty_frames.h"
-#include "engine/job/frame_refiner.h"
 #include "engine/job/outputs.h"
-#include "engine/job/window_refiner.h"
+#include "engine/job/refine_schedule.h"
 #include "runtime/base/quote.h"
 
 namespace semrover {
@@ -26,9 +25,9 @@ uint64_t largest_read(const Refinement& r)
 {
     uint64_t bytes = 0;
     const uint32_t channels = round_up(r.model.vae.latent_channels, kRowPadding);
-    for (const RefineChain& c : r.chains)
-        bytes = std::max({bytes, uint64_t(c.size.image_width) * c.size.image_height * 4,
-                          uint64_t(round_up(c.size.pixels(), kImageRowPadding)) * channels * 4});
+    for (const RefinedCamera& c : r.cameras)
+        bytes = std::max({bytes, uint64_t(c.size().image_width) * c.size().image_height * 4,
+                          uint64_t(round_up(c.size().pixels(), kImageRowPadding)) * channels * 4});
     return bytes;
 }
 
@@ -36,9 +35,9 @@ uint64_t largest_read(const Refinement& r)
 uint64_t history_bytes(const Device& device, const Refinement& r)
 {
     uint64_t bytes = 0;
-    for (const RefineChain& c : r.chains)
+    for (const RefinedCamera& c : r.cameras)
         if (c.history > 0)
-            bytes += FrameHistory::planned_bytes(device.limits(), c.size);
+            bytes += FrameHistory::planned_bytes(device.limits(), c.size());
     return bytes;
 }
 
@@ -50,19 +49,17 @@ struct BufferDrawing {
     std::map<std::string, Slot> seen; // SplatPixelSlots::seen of each camera's last frame
     std::unique_ptr<CopyRing> copies;
     std::map<std::string, uint32_t> counts; // frames so far, per camera
-    std::vector<std::string> first_moment;  // its cameras, and what they see
-    std::vector<std::pair<std::string, ImageGray16>> first_depths;
     EmptyFrames empty;
     bool started = false; // the first moment is drawn
 
     BufferDrawing(Device& device, SurfelScene s, const Refinement& r, const Bounds& bounds)
-        : scene(std::move(s)), drawing(device, scene, *r.options.path, r.draw.rasterizer()),
+        : scene(std::move(s)), drawing(device, scene, *r.options.path, r.options.draw.rasterizer()),
           empty(*r.options.path, r.options.input, r.options.allow_empty)
     {
         empty.set_scene(bounds);
-        for (const RefineChain& c : r.chains)
-            seen[c.camera.name] =
-                state.slot(c.size.image_width * c.size.image_height, 1, DType::u32, "seen of a camera", 1);
+        for (const RefinedCamera& c : r.cameras)
+            seen[c.name] =
+                state.slot(c.size().image_width * c.size().image_height, 1, DType::u32, "seen of a camera", 1);
     }
     Status allocate(Device& device)
     {
@@ -76,7 +73,10 @@ class RefinementJob : public Job {
   public:
     RefinementJob(Device& device, Refinement refinement, RunFolder run, std::unique_ptr<Outgoing> out,
                   const RefinementCallbacks& callbacks)
-        : device_(device), r_(std::move(refinement)), run_(std::move(run)), callbacks_(callbacks), out_(std::move(out))
+        : device_(device), r_(std::move(refinement)), run_(std::move(run)), callbacks_(callbacks),
+          networks_(std::make_shared<LoadedNetworks>(device, r_.model, r_.options.precision)),
+          store_(run_, r_.options.format, r_.model.vae.latent_channels), files_(device, store_, *out),
+          out_(std::move(out))
     {
         drawn_ = !r_.options.from_grid() || was_drawn();
         host_bytes_ = device.host_bytes();
@@ -89,8 +89,8 @@ class RefinementJob : public Job {
     void cancel() override
     {
         // note: an error of the device is no longer of interest; the frame is begun again from its files
-        if (refiner_)
-            (void)refiner_->cancel();
+        if (renderer_)
+            (void)renderer_->cancel();
         (void)out_->drain();
     }
     Path kept_in() const override { return r_.options.output; }
@@ -111,7 +111,7 @@ class RefinementJob : public Job {
         bool done = false;
         do {
             const Result<bool> unit = submit();
-            if (!unit && unit.error().code == ErrorCode::out_of_memory && drawing_ && refiner_) {
+            if (!unit && unit.error().code == ErrorCode::out_of_memory && drawing_ && renderer_) {
                 SR_CHECK(part_ways());
                 continue;
             }
@@ -123,15 +123,36 @@ class RefinementJob : public Job {
     // one submit of the device; true: all is done
     Result<bool> submit()
     {
-        const bool drawing = !drawn_ && (!refiner_ || refined_ || refiner_->waits());
-        if (drawing) {
+        if (!drawn_ && (!renderer_ || refined_ || waits())) {
             SR_CHECK(draw());
             return drawn_ && refined_;
         }
-        if (!refiner_)
-            SR_CHECK(begin_refiner());
-        SR_TRY(refined_, refiner_->step());
+        if (!renderer_)
+            SR_CHECK(begin_renderer());
+        SR_TRY(refined_, refine());
         return refined_ && drawn_;
+    }
+    bool waits() const { return schedule_->task() && files_.waits_for(*schedule_->task()); }
+    Result<bool> refine()
+    {
+        SR_CHECK(out_->poll());
+        SR_TRY(const bool over, settle());
+        if (over)
+            return true;
+        SR_TRY(const bool done, renderer_->step(*schedule_->task()));
+        schedule_->count(done);
+        return settle();
+    }
+    // at the next task; true: none is left
+    Result<bool> settle()
+    {
+        for (;;) {
+            schedule_->enter();
+            if (!schedule_->at_end_of_stage())
+                return !schedule_->task();
+            SR_CHECK(out_->drain()); // the next stage reads what this one wrote
+            schedule_->leave();
+        }
     }
 
     // by an earlier start of the run
@@ -148,7 +169,7 @@ class RefinementJob : public Job {
     {
         if (!drawing_) {
             SR_TRY(const VoxelGrid grid, r_.options.grid());
-            SR_TRY(SurfelScene scene, splats_of(device_, grid, r_.options.input, r_.draw));
+            SR_TRY(SurfelScene scene, splats_of(device_, grid, r_.options.input, r_.options.draw));
             drawing_ = std::make_unique<BufferDrawing>(device_, std::move(scene), r_, bounds_of(grid));
             SR_CHECK(drawing_->allocate(device_));
         }
@@ -162,7 +183,7 @@ class RefinementJob : public Job {
         }
         if (!std::exchange(drawing_->started, true))
             SR_CHECK(try_to_refine_while_drawing());
-        if (!refiner_)
+        if (!renderer_)
             say_drawn(*last);
         return *last ? end_drawing() : Status{};
     }
@@ -170,18 +191,11 @@ class RefinementJob : public Job {
     {
         const std::string& camera = frame.camera;
         SR_CHECK(drawing_->copies->copy(slots.seen, drawing_->seen[camera]).map([](uint64_t) {}));
-        if (refiner_)
-            refiner_->give_buffer(camera, drawing_->seen[camera]);
-        else if (!drawing_->started)
-            drawing_->first_moment.push_back(camera);
         const ImageSize size{frame.intrinsics.width, frame.intrinsics.height};
         const uint32_t number = drawing_->counts[camera]++;
+        files_.give_buffer(camera, number, drawing_->seen[camera]);
         SR_CHECK(out_->read(slots, size, [this, frame, camera, number](FramePixels pixels) -> Status {
-            const ImageGray16 depth{pixels.width, pixels.height, depth_pixels(pixels)};
-            if (refiner_)
-                refiner_->give_depth(camera, depth);
-            else if (drawing_ && number == 0)
-                drawing_->first_depths.emplace_back(camera, depth);
+            files_.give_depth(camera, number, {pixels.width, pixels.height, depth_pixels(pixels)});
             drawing_->empty.add(sees_nothing(pixels));
             SR_CHECK(out_->write([folder = camera_folder(run_.path() / "buffers", camera), number, frame,
                                   pixels = std::move(pixels)]() mutable {
@@ -197,7 +211,7 @@ class RefinementJob : public Job {
     Status end_drawing()
     {
         drawn_ = true;
-        if (refiner_) // the drawing stays as it was planned
+        if (renderer_) // the drawing stays as it was planned
             return note_drawn();
         // before anything is refined it is known whether there is anything to see
         SR_CHECK(arrived_ < taken_ ? out_->drain() : note_drawn());
@@ -233,37 +247,33 @@ class RefinementJob : public Job {
 
     Status try_to_refine_while_drawing()
     {
-        const auto same_size = [&](const RefineChain& c) { return c.size == r_.chains[0].size; };
-        if (r_.model.video() || !std::ranges::all_of(r_.chains, same_size))
+        const auto same_size = [&](const RefinedCamera& c) { return c.size() == r_.cameras[0].size(); };
+        if (r_.model.video() || !std::ranges::all_of(r_.cameras, same_size))
             return {}; // windows of several cameras at a time; what depends on the size would be made again and again
         SR_CHECK(out_->drain());
         if (drawing_->empty.all())
-            return {};                               // maybe all are: they are drawn before anything is refined
-        if (const Status planned = plan(); !planned) // with the splats beside it nothing fits: without them it may
-            return planned.error().code == ErrorCode::out_of_memory ? Status{} : planned;
-        if (memory_.policy != MemoryPolicy::resident)
-            return {};
-        SR_CHECK(begin_planned(&*r_.options.path));
-        for (const std::string& camera : drawing_->first_moment)
-            refiner_->give_buffer(camera, drawing_->seen[camera]);
-        for (const auto& [camera, depth] : drawing_->first_depths)
-            refiner_->give_depth(camera, depth);
-        return {};
+            return {}; // maybe all are: they are drawn before anything is refined
+        Status begun = plan();
+        if (begun && memory_.policy == MemoryPolicy::resident)
+            begun = begin_planned(&*r_.options.path);
+        // with the splats beside it nothing fits: without them it may
+        return !begun && begun.error().code == ErrorCode::out_of_memory ? Status{} : begun;
     }
     // there is no room for drawing and refining at a time after all: draw what is left, then refine what is left
     Status part_ways()
     {
-        SR_CHECK(refiner_->cancel());
+        SR_CHECK(renderer_->cancel());
         SR_CHECK(out_->drain());
-        refiner_->close();
+        if (schedule_->task())
+            schedule_->leave();
         if (drawn_)
             drawing_.reset();
-        refiner_.reset();
+        renderer_.reset();
         refined_ = false;
         return {};
     }
 
-    Status begin_refiner()
+    Status begin_renderer()
     {
         SR_CHECK(out_->drain());
         SR_CHECK(plan());
@@ -272,14 +282,13 @@ class RefinementJob : public Job {
     // what is left to do, and what it takes
     Status plan()
     {
-        if (!store_)
-            store_.emplace(run_, r_.options.format, r_.model.vae.latent_channels);
         std::vector<RendererWork> work;
-        for (const RefineChain& c : r_.chains)
-            work.push_back(work_left(*store_, c));
-        SR_TRY(memory_, plan_renderer(device_, r_, work, history_bytes(device_, r_)));
+        for (const RefinedCamera& c : r_.cameras)
+            work.push_back(work_left(store_, c));
+        SR_TRY(memory_, plan_renderer(device_, *networks_, r_.settings, work, history_bytes(device_, r_)));
         return {};
     }
+    // drawn: the path whose buffers are being drawn
     Status begin_planned(const CameraPath* drawn)
     {
         if (r_.options.from_grid()) {
@@ -288,28 +297,24 @@ class RefinementJob : public Job {
         }
         if (callbacks_.planned)
             callbacks_.planned(r_, memory_);
-        const Refiner::Parts parts{device_, *store_, *out_, r_.chains};
-        const RefineOrder order{memory_.policy, r_.plan.rows.size(), drawn};
-        auto networks = std::make_shared<LoadedNetworks>(device_, r_.model, r_.options.precision);
-        if (r_.model.video())
-            refiner_ = std::make_unique<WindowRefiner>(
-                parts, std::make_unique<WindowRenderer>(device_, std::move(networks), r_.plan, r_.vsd, memory_.policy),
-                order, callbacks_);
-        else
-            refiner_ = std::make_unique<FrameRefiner>(
-                parts, std::make_unique<FrameRenderer>(device_, std::move(networks), r_.plan, r_.asd, memory_.policy),
-                order, callbacks_);
+        files_.set_drawn(drawn != nullptr);
+        std::vector<const CameraChain*> chains;
+        for (const RefinedCamera& c : r_.cameras)
+            chains.push_back(&c);
+        SR_TRY(renderer_, DeferredRenderer::create(device_, networks_, r_.settings, memory_, chains, files_));
+        schedule_.emplace(store_, r_.cameras, RefineOrder{memory_.policy, r_.settings.plan.rows.size(), drawn},
+                          callbacks_, device_);
         return {};
     }
     Result<Json> finish_run()
     {
         SR_CHECK(out_->drain());
         const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-        refiner_.reset();
+        renderer_.reset();
         drawing_.reset();
         Json results{{"output", r_.options.output.string()},
                      {"frames", r_.frames()},
-                     {"steps", r_.steps},
+                     {"steps", r_.settings.steps},
                      {"seconds", seconds},
                      {"policy", policy_name(memory_.policy)},
                      {"planned_device_bytes", memory_.bytes},
@@ -319,7 +324,7 @@ class RefinementJob : public Job {
         if (render_bytes_)
             results["render_device_bytes"] = render_bytes_;
         if (callbacks_.refined)
-            SR_CHECK(callbacks_.refined(*store_, r_.chains));
+            SR_CHECK(callbacks_.refined(store_, r_.cameras));
         SR_CHECK(run_.finish(results));
         return results;
     }
@@ -338,10 +343,13 @@ class RefinementJob : public Job {
     HostBytes host_bytes_;           // of the device, before this job
     uint64_t render_bytes_ = 0;      // device memory at most while buffers were rendered
 
-    std::optional<RefineStore> store_;
+    std::shared_ptr<LoadedNetworks> networks_;
     MemoryPlan memory_;
-    std::unique_ptr<Outgoing> out_;    // what it writes goes through the ones above
-    std::unique_ptr<Refiner> refiner_; // while drawing_ is there: frames are refined as they are drawn
+    RefineStore store_;
+    RefineFiles files_;
+    std::unique_ptr<Outgoing> out_; // what it writes goes through the ones above
+    std::optional<RefineSchedule> schedule_;
+    std::unique_ptr<DeferredRenderer> renderer_; // while drawing_ is there: frames are refined as they are drawn
 };
 
 // a run that was finished before, and whose frames are there
@@ -354,20 +362,20 @@ class FinishedRefinement : public Job {
     }
     Status check() const
     {
-        for (const RefineChain& c : r_.chains)
+        for (const RefinedCamera& c : r_.cameras)
             for (uint32_t f = c.range.first; f <= c.range.last; ++f)
                 for (const PieceKind kind : {PieceKind::latent, PieceKind::frame})
-                    if (!store_.has(kind, c.camera, f))
+                    if (!store_.has(kind, c.buffers, f))
                         return fail(ErrorCode::usage,
                                     "{} exists, a finished run of which {} is not as it was; -y replaces it",
-                                    quote_path(r_.options.output), store_.name(kind, c.camera, f));
+                                    quote_path(r_.options.output), store_.name(kind, c.buffers, f));
         return {};
     }
     Result<bool> step(const JobBudget&) override { return true; }
     Result<Json> finish() override
     {
         if (callbacks_.refined)
-            SR_CHECK(callbacks_.refined(store_, r_.chains));
+            SR_CHECK(callbacks_.refined(store_, r_.cameras));
         return *run_.results();
     }
     void cancel() override {}
@@ -389,30 +397,16 @@ Result<std::unique_ptr<Job>> finished_refinement(Refinement r, RunFolder run, co
 
 } // namespace
 
-Result<MemoryPlan> plan_renderer(Device& device, const Refinement& r, std::span<const RendererWork> work,
-                                 uint64_t beside, const LoadedNetworks::Loaded& loaded)
-{
-    const auto unet = Unet::plan(r.model.unet, r.options.precision, device.limits());
-    const auto vae = Vae::plan(r.model.vae, r.options.precision, device.limits());
-    const RendererNetworks networks{*unet, *vae, r.plan, r.model.conditioning_tokens, r.asd.guidance_scale, r.vsd};
-    SR_TRY(RendererBytes parts, renderer_bytes(device.limits(), networks, work));
-    parts.outgoing = beside;
-    if (loaded.unet)
-        parts.unet = 0;
-    if (loaded.vae)
-        parts.vae = 0;
-    return plan_memory(std::move(parts), device.allocated_bytes() - loaded.kept, device.budget());
-}
-
 Result<MemoryPlan> plan_refinement(Device& device, const Refinement& r)
 {
     SR_CHECK(settle_device(device));
     device.reset_peak();
     std::vector<RendererWork> work;
-    for (const RefineChain& c : r.chains)
-        work.push_back(whole_work(c));
+    for (const RefinedCamera& c : r.cameras)
+        work.push_back(c.work);
     const uint64_t outgoing = Outgoing::planned_bytes(device.limits(), largest_read(r));
-    return plan_renderer(device, r, work, outgoing + history_bytes(device, r));
+    return plan_renderer(device, LoadedNetworks(device, r.model, r.options.precision), r.settings, work,
+                         outgoing + history_bytes(device, r));
 }
 
 Result<std::unique_ptr<Job>> begin_refinement(Device& device, Refinement r, const RefinementCallbacks& callbacks)

@@ -5,28 +5,17 @@
 #include "engine/job/job.h"
 #include "engine/job/path_drawing.h"
 #include "engine/job/refine_store.h"
-#include "engine/model/renderer_model.h"
-#include "engine/refine/loaded_networks.h"
-#include "engine/refine/memory_plan.h"
-#include "engine/refine/refine_chain.h"
 
 namespace semrover {
 
 // what `refine` does: splat buffers to frames, each from the one before, or windows of them together
 struct RefinementOptions {
     Path input, model, output;      // input: a folder of buffers, or a grid
-    std::optional<Sampler> sampler; // this and what is optional below: as the model says
-    std::optional<int> steps;       // of denoising a frame
-    std::optional<float> guidance_scale, previous_noise, frame_history;
-    std::optional<FrameNoise> frame_noise;
-    // of a renderer of videos: guidance of a window's first frame (guidance_scale is that of the last), frames of a
-    // window, frames that it knows of the one before, frames that are decoded together
-    std::optional<float> first_guidance_scale;
-    std::optional<uint32_t> window_frames, window_overlap, decode_frames;
-    uint64_t seed = 0;
+    std::optional<Sampler> sampler; // as the model says
+    RendererOptions renderer;
     DType precision = DType::f16;
-    std::string frames; // "FIRST:LAST", both included, either may be left out; empty: all
-    Path from;          // output of an earlier run, whose latents come before FIRST
+    std::optional<uint32_t> first_frame, last_frame; // of every camera, both included; the camera's first, and last
+    Path from;                                       // output of an earlier run, whose latents come before first_frame
     FrameFormat format;
     std::optional<ImageSize> size;           // of the pictures, refused where it is another
     std::optional<CameraPath> path;          // of the pictures, or through the grid
@@ -41,21 +30,12 @@ struct RefinementOptions {
 
 // what a run will do, as far as it can be known without a device
 struct Refinement {
-    RefinementOptions options;
+    RefinementOptions options; // with the path that lies beside the buffers, and how the model wants splats drawn
     RendererModel model;
-    SamplingPlan plan;
-    int steps = 0;
-    AsdOptions asd;
-    VsdOptions vsd; // of a renderer of videos, in place of `asd`
-    WindowShape shape;
-    FrameNoise frame_noise = FrameNoise::fresh;
-    float frame_history = 0; // share of the frame before in a finished one
-    DrawOptions draw;
-    std::vector<RefineChain> chains;
+    RendererSettings settings;
+    std::vector<RefinedCamera> cameras;
 
     size_t frames() const;
-    // depth and cameras say which surfaces a frame shares with the one before
-    bool follows_surfaces() const { return frame_noise == FrameNoise::warped || frame_history > 0; }
     // true when `output` holds a run that was stopped, or is finished
     bool was_stopped() const;
     bool was_finished() const;
@@ -67,19 +47,11 @@ struct Refinement {
 // transforms.json of the frames that a run makes, in its output. Nothing where their cameras are not known
 Status write_frame_cameras(const Refinement& r);
 
-// Opens the model and settles how it denoises and draws; chains and inputs stay empty. Errors: bad_input, usage
-Result<Refinement> open_renderer(RefinementOptions options, const JobCallbacks& callbacks);
-
-// The same, and looks at the buffers. Errors: bad_input, usage
+// Opens the model, settles how it draws and denoises, and looks at the buffers. Errors: bad_input, usage
 Result<Refinement> resolve_refinement(RefinementOptions options, const JobCallbacks& callbacks);
 
 // everything that decides the bytes of the frames
 Result<Json> refinement_settings(const Refinement& r, const Device& device);
-
-// The memory of a renderer at work, with `beside` bytes that stay beside it; of what is `loaded`, networks that others
-// use count once, and those that are only kept may be dropped. Errors: out_of_memory when no policy fits
-Result<MemoryPlan> plan_renderer(Device& device, const Refinement& r, std::span<const RendererWork> work,
-                                 uint64_t beside, const LoadedNetworks::Loaded& loaded = {});
 
 // the memory of a run of which nothing is done yet; out_of_memory when no policy fits
 Result<MemoryPlan> plan_refinement(Device& device, const Refinement& r);
@@ -91,7 +63,7 @@ struct RefinementCallbacks : JobCallbacks {
     // when what is left to do is known, before frames are refined
     std::function<void(const Refinement&, const MemoryPlan&)> planned;
     // all frames are there; before the run counts as finished, and again where it was finished before
-    std::function<Status(const RefineStore&, std::span<const RefineChain>)> refined;
+    std::function<Status(const RefineStore&, std::span<const RefinedCamera>)> refined;
 };
 
 // Stages: "render" counts frames that are drawn of a grid, "refine" denoising steps of frames, or of windows; with the

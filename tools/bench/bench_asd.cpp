@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // semrover bench asd: one frame of the autoregressive renderer, random weights: a denoising step with guidance, and the
 // encoding and decoding around the steps
+#include "engine/deferred/asd.h"
+#include "engine/deferred/frame_codec.h"
 #include "engine/model/renderer_model.h"
-#include "engine/refine/asd.h"
 #include "runtime/base/json.h"
 #include "tools/bench/bench.h"
 #include "tools/cli/choice.h"
@@ -43,13 +44,18 @@ Result<Networks> read_networks(const BenchAsdArguments& o)
 }
 
 // a picture through one direction of the VAE, whose memory is gone afterwards
-Result<Timing> time_codec(Device& device, const Vae& vae, const LatentSize& size, CodecDirection direction)
+Result<Timing> time_encoder(Device& device, const Vae& vae, const LatentSize& size)
 {
-    SR_TRY(const auto codec, LatentCodec::create(device, vae, size, direction));
-    const bool encode = direction == CodecDirection::encode;
+    SR_TRY(const auto encoder, FrameEncoder::create(device, vae, size, false));
     const std::vector<float> image(size_t(size.image_width) * size.image_height * vae.config().in_channels, 0.25f);
+    return measure([&] { return encoder->encode(image).map([](const auto&) {}); });
+}
+
+Result<Timing> time_decoder(Device& device, const Vae& vae, const LatentSize& size)
+{
+    SR_TRY(const auto decoder, FrameDecoder::create(device, vae, size, 1));
     const std::vector<float> latent(size_t(size.pixels()) * vae.config().latent_channels, 0.25f);
-    return measure([&] { return (encode ? codec->encode(image) : codec->decode(latent)).map([](const auto&) {}); });
+    return measure([&] { return decoder->decode(latent).map([](const auto&) {}); });
 }
 
 Status bench_asd(const BenchAsdArguments& o, const Globals& globals)
@@ -59,8 +65,8 @@ Status bench_asd(const BenchAsdArguments& o, const Globals& globals)
     const DType dtype = o.precision == "fp32" ? DType::f32 : DType::f16;
     const LatentSize size{o.width, o.height, n.vae.downscale()};
     SR_TRY(const auto vae, Vae::load(*device, n.vae, Checkpoint::random(1), dtype));
-    SR_TRY(const Timing encode, time_codec(*device, *vae, size, CodecDirection::encode));
-    SR_TRY(const Timing decode, time_codec(*device, *vae, size, CodecDirection::decode));
+    SR_TRY(const Timing encode, time_encoder(*device, *vae, size));
+    SR_TRY(const Timing decode, time_decoder(*device, *vae, size));
     device->reset_peak();
     SR_TRY(const auto unet, Unet::load(*device, n.unet, Checkpoint::random(1), dtype));
     SR_TRY(const SamplingPlan plan, plan_sampling(stable_diffusion_scheduler(), 1));
@@ -69,21 +75,19 @@ Status bench_asd(const BenchAsdArguments& o, const Globals& globals)
     options.guidance_scale = o.cfg_scale;
     SR_TRY(const auto asd, AsdRenderer::create(*device, *unet, plan, {o.tokens, text}, size, options));
     const std::vector<float> latent(size_t(size.pixels()) * n.unet.out_channels, 0.25f), visible(size.pixels(), 1.f);
-    const AsdFrame frame{1, 0, latent, visible, latent};
+    const DenoiserWindow frame{1, 0, latent, visible, latent};
     SR_TRY(const Timing step, measure([&] { return asd->render(frame).map([](const auto&) {}); }));
-    SR_TRY(const AsdRenderer::Bytes planned,
+    SR_TRY(const PartBytes planned,
            AsdRenderer::planned_bytes(device->limits(), *unet, plan, o.tokens, size, o.cfg_scale));
     const uint64_t weights = vae->device_bytes(device->limits()) + unet->device_bytes(device->limits());
-    Json report = bench_report("asd", *device, dtype, step, weights + planned.state + planned.programs);
+    Json report = bench_report("asd", *device, dtype, step, weights + planned.bytes());
     report["width"] = o.width;
     report["height"] = o.height;
     report["guidance_scale"] = o.cfg_scale;
     report["encode_ms"] = encode.ms_median;
     report["decode_ms"] = decode.ms_median;
-    add_rate(report, asd->step_flops(), step);
-    report["dispatches"] = asd->step_passes();
-    report["barriers"] = asd->step_barriers();
-    report["host_us_per_step"] = asd->host_us_per_step();
+    add_rate(report, flops_of(asd->step_program()), step);
+    add_program(report, asd->step_program());
     print_report(report, globals);
     return {};
 }

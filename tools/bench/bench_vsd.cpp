@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // semrover bench vsd: a window of the video renderer, random weights: one evaluation of its UNet with guidance, the
 // encoding of a frame and the decoding of some, and a GEMM in the same run
+#include "engine/deferred/frame_codec.h"
+#include "engine/deferred/memory_plan.h"
 #include "engine/model/renderer_model.h"
-#include "engine/refine/memory_plan.h"
-#include "engine/refine/video_decoder.h"
 #include "runtime/base/json.h"
 #include "tools/bench/bench.h"
 #include "tools/cli/choice.h"
@@ -61,18 +61,17 @@ Result<Timing> measure_runs(uint32_t runs, const std::function<Status()>& work)
     return times.empty() ? Timing{} : Timing{times[times.size() / 2], times.front(), times.size()};
 }
 
-Result<Timing> time_encoder(Device& device, const Vae& vae, const LatentSize& size, uint32_t runs)
+Result<Timing> time_encoder(FrameEncoder& encoder, const Vae& vae, const LatentSize& size, uint32_t runs)
 {
-    SR_TRY(const auto codec, LatentCodec::create(device, vae, size, CodecDirection::encode_unscaled));
     const std::vector<float> image(size_t(size.image_width) * size.image_height * vae.config().in_channels, 0.25f);
-    return measure_runs(runs, [&] { return codec->encode(image).map([](const auto&) {}); });
+    return measure_runs(runs, [&] { return encoder.encode(image).map([](const auto&) {}); });
 }
 
-Result<Timing> time_decoder(Device& device, const Vae& vae, const LatentSize& size, uint32_t frames, uint32_t runs)
+Result<Timing> time_decoder(FrameDecoder& decoder, const Vae& vae, const LatentSize& size, uint32_t frames,
+                            uint32_t runs)
 {
-    SR_TRY(const auto decoder, VideoDecoder::create(device, vae, size, frames));
     const std::vector<float> latents(size_t(size.pixels()) * vae.config().latent_channels * frames, 0.25f);
-    return measure_runs(runs, [&] { return decoder->decode(latents).map([](const auto&) {}); });
+    return measure_runs(runs, [&] { return decoder.decode(latents).map([](const auto&) {}); });
 }
 
 // the other networks' memory is gone afterwards
@@ -106,7 +105,7 @@ Result<Timing> time_window(VsdRenderer& vsd, const LatentSize& size, uint32_t ch
 {
     const std::vector<float> buffers(size_t(vsd.frames()) * size.pixels() * channels, 0.25f),
         visible(size_t(vsd.frames()) * size.pixels(), 1.f);
-    const VsdWindow window{0, 0, buffers, visible};
+    const DenoiserWindow window{0, 0, buffers, visible};
     SR_CHECK(vsd.begin(window));
     SR_TRY(const Timing step, measure_runs(runs, [&]() -> Status {
                SR_CHECK(vsd.begin(window));
@@ -134,11 +133,14 @@ Status bench_vsd(const BenchVsdArguments& o, const Globals& globals)
     const RendererWork work{size, true, true, true, o.frames, o.decode_frames};
     SR_TRY(const RendererBytes planned,
            renderer_bytes(device->limits(), {*unet, *vae, plan, o.tokens, 1, options}, std::span(&work, 1)));
+    SR_TRY(const auto arena, Arena::create(*device, planned.sizes.front().arena()));
     SR_TRY(const auto vsd,
-           VsdRenderer::create(*device, *unet, plan, {{o.tokens, text}, added}, size, o.frames, options));
+           VsdRenderer::create(*device, *unet, plan, {o.tokens, text, added}, size, o.frames, options, arena));
+    SR_TRY(const auto encoder, FrameEncoder::create(*device, *vae, size, true, arena));
+    SR_TRY(const auto decoder, FrameDecoder::create(*device, *vae, size, o.decode_frames, arena));
     want_profile(*device, o.profile);
-    SR_TRY(const Timing encode, time_encoder(*device, *vae, size, o.evaluations));
-    SR_TRY(const Timing decode, time_decoder(*device, *vae, size, o.decode_frames, o.evaluations));
+    SR_TRY(const Timing encode, time_encoder(*encoder, *vae, size, o.evaluations));
+    SR_TRY(const Timing decode, time_decoder(*decoder, *vae, size, o.decode_frames, o.evaluations));
     SR_TRY(const Timing step, time_window(*vsd, size, n.unet.out_channels, o.evaluations));
     Json report = bench_report("vsd", *device, dtype, step, before + planned.peak(MemoryPolicy::resident));
     report["staged_bytes"] = before + planned.peak(MemoryPolicy::staged);
@@ -146,10 +148,10 @@ Status bench_vsd(const BenchVsdArguments& o, const Globals& globals)
     add_shape(report, o, encode, decode);
     report["gemm_gflops"] = gemm;
     if (step.runs) {
-        add_rate(report, flops_of(*vsd->step_program()), step);
+        add_rate(report, flops_of(vsd->step_program()), step);
         report["share_of_gemm"] = report["gflops"].get<double>() / gemm;
     }
-    add_program(report, *vsd->step_program());
+    add_program(report, vsd->step_program());
     print_report(report, globals);
     return write_profile(*device, o.profile);
 }

@@ -21,17 +21,37 @@ namespace {
 
 struct RefineArguments {
     RefinementOptions options;
+    std::string frames;
     RefineVideos videos;
     DriveOptions drive;
     std::string profile;
     bool size_given = false, dry_run = false;
 };
 
+// "FIRST:LAST", either may be left out
+Status parse_frames(const std::string& text, RefinementOptions& o)
+{
+    if (text.empty())
+        return {};
+    const size_t colon = text.find(':');
+    const std::string parts[] = {text.substr(0, colon), colon == std::string::npos ? "" : text.substr(colon + 1)};
+    std::optional<uint32_t>* numbers[] = {&o.first_frame, &o.last_frame};
+    for (size_t i = 0; i < 2; ++i) {
+        const bool digits = parts[i].size() <= 6 && parts[i].find_first_not_of("0123456789") == std::string::npos;
+        if (colon == std::string::npos || !digits)
+            return fail(ErrorCode::usage, "--frames takes FIRST:LAST, found {}", quote(text));
+        if (!parts[i].empty())
+            *numbers[i] = uint32_t(std::stoul(parts[i]));
+    }
+    return {};
+}
+
 Result<Refinement> resolve(const RefineArguments& o, const Globals& globals, const JobCallbacks& callbacks)
 {
     if (o.options.output.empty() && !o.dry_run)
         return fail(ErrorCode::usage, "-o/--output is required");
     RefinementOptions r = o.options;
+    SR_CHECK(parse_frames(o.frames, r));
     SR_TRY(r.draw, draw_options(o.drive));
     r.radius_given = !o.drive.splat_radius.empty();
     if (o.size_given)
@@ -54,20 +74,20 @@ Result<Refinement> resolve(const RefineArguments& o, const Globals& globals, con
 std::string windows_text(const Refinement& r)
 {
     size_t windows = 0;
-    for (const RefineChain& c : r.chains)
+    for (const RefinedCamera& c : r.cameras)
         windows += c.windows.size();
     if (!r.model.video())
         return "";
-    return fmt::format("{} window{} of up to {}, ", windows, windows == 1 ? "" : "s", r.shape.frames);
+    return fmt::format("{} window{} of up to {}, ", windows, windows == 1 ? "" : "s", r.settings.shape.frames);
 }
 
 void print_plan(const Refinement& r, const MemoryPlan& plan, const Globals& globals)
 {
     if (globals.json || globals.quiet)
         return;
-    const ImageSize& size = r.chains.front().camera.size;
+    const ImageSize& size = r.cameras.front().buffers.size;
     fmt::print("{} frames of {} x {}, {}{} steps each\nplanned device memory {} bytes ({}), {}\n", r.frames(),
-               size.width, size.height, windows_text(r), r.steps, plan.bytes, bytes_text(plan.bytes),
+               size.width, size.height, windows_text(r), r.settings.steps, plan.bytes, bytes_text(plan.bytes),
                policy_name(plan.policy));
     std::fflush(stdout);
 }
@@ -96,9 +116,9 @@ Status refine(const RefineArguments& o, const Globals& globals)
     JobDisplay display(globals);
     SR_TRY(Refinement r, resolve(o, globals, display.callbacks()));
     if (!o.dry_run)
-        SR_CHECK(r.check_outputs(video_files(o.videos, r.chains)));
+        SR_CHECK(r.check_outputs(video_files(o.videos, r.cameras)));
     const bool finished = r.was_finished() && !globals.yes;
-    const bool has_videos = finished && std::ranges::all_of(video_files(o.videos, r.chains), is_there);
+    const bool has_videos = finished && std::ranges::all_of(video_files(o.videos, r.cameras), is_there);
     SR_TRY(const auto device, open_device(globals, o.profile));
     if (r.options.path)
         print_warnings(r.options.path->warnings, globals);
@@ -107,8 +127,8 @@ Status refine(const RefineArguments& o, const Globals& globals)
     const auto results = run_job(globals, [&](const JobCallbacks& callbacks) {
         RefinementCallbacks c{callbacks, {}, {}};
         c.planned = [&](const Refinement& of, const MemoryPlan& plan) { print_plan(of, plan, globals); };
-        c.refined = [&](const RefineStore& store, std::span<const RefineChain> chains) {
-            return has_videos ? Status{} : write_videos(o.videos, store, chains);
+        c.refined = [&](const RefineStore& store, std::span<const RefinedCamera> cameras) {
+            return has_videos ? Status{} : write_videos(o.videos, store, cameras);
         };
         return begin_refinement(*device, std::move(r), c);
     });
@@ -124,33 +144,34 @@ Status refine(const RefineArguments& o, const Globals& globals)
 void add_options(CLI::App& c, RefineArguments& a)
 {
     RefinementOptions& o = a.options;
+    RendererOptions& r = o.renderer;
     c.add_option("DIR|GRID", o.input, "folder that `semrover render` wrote, or a grid with --path")->required();
     c.add_option("-m,--model", o.model, "model with a renderer: folder, or LDM file")->required();
     c.add_option("-o,--output", o.output, "folder for frames/, latents/ and the run's state");
-    add_seed(c, "-s,--seed", o.seed, "noise seed");
-    add_number(c, "--steps", o.steps, "denoising steps of a frame", 1, 10000);
-    add_number(c, "--cfg-scale", o.guidance_scale,
+    add_seed(c, "-s,--seed", r.seed, "noise seed");
+    add_number(c, "--steps", r.steps, "denoising steps of a frame", 1, 10000);
+    add_number(c, "--cfg-scale", r.guidance_scale,
                "guidance towards the previous frame and what is visible; 1: none; of a window's last frame", 0, 1000);
-    add_number(c, "--cfg-first", o.first_guidance_scale, "guidance of a window's first frame; linear in between", 0,
+    add_number(c, "--cfg-first", r.first_guidance_scale, "guidance of a window's first frame; linear in between", 0,
                1000);
-    add_number(c, "--window", o.window_frames, "frames that a renderer of videos makes together", 1, kMostWindowFrames);
-    add_number(c, "--window-overlap", o.window_overlap, "of these, how many are known from the window before", 0,
+    add_number(c, "--window", r.window_frames, "frames that a renderer of videos makes together", 1, kMostWindowFrames);
+    add_number(c, "--window-overlap", r.window_overlap, "of these, how many are known from the window before", 0,
                kMostWindowFrames - 1);
-    add_number(c, "--decode-frames", o.decode_frames, "frames that its VAE decodes together: less memory with fewer", 1,
+    add_number(c, "--decode-frames", r.decode_frames, "frames that its VAE decodes together: less memory with fewer", 1,
                kMostWindowFrames);
     add_choice(c, "--sampler", {"ddim", "dpm++2m", "euler"}, "ddim, dpm++2m or euler",
                [&o](const std::string& text) { o.sampler = *sampler_from_name(text); });
-    add_number(c, "--previous-noise", o.previous_noise, "noise on the previous frame's latent", 0, 1000);
+    add_number(c, "--previous-noise", r.previous_noise, "noise on the previous frame's latent", 0, 1000);
     add_choice(
         c, "--frame-noise", {"fresh", "warped"},
         "of a frame: fresh, or warped, as it was on the surfaces of the frame before (wants --path)",
-        [&o](const std::string& text) { o.frame_noise = text == "warped" ? FrameNoise::warped : FrameNoise::fresh; });
-    add_number(c, "--frame-history", o.frame_history,
+        [&r](const std::string& text) { r.frame_noise = text == "warped" ? FrameNoise::warped : FrameNoise::fresh; });
+    add_number(c, "--frame-history", r.frame_history,
                "share of the frame before, where both show the same surface: flickers less (wants --path)", 0,
                kMostFrameHistory);
     add_precision_option(c, o.precision);
     CLI::Option* frames =
-        c.add_option("--frames", o.frames, "FIRST:LAST, both included, either may be left out; FIRST is a first frame");
+        c.add_option("--frames", a.frames, "FIRST:LAST, both included, either may be left out; FIRST is a first frame");
     c.add_option("--from", o.from, "output of an earlier run: FIRST goes on from its latents of the frames before")
         ->needs(frames);
     add_choice(c, "--format", {"png", "jpeg"}, "of the frames",

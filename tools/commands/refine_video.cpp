@@ -30,33 +30,33 @@ Path video_path(const Path& file, const std::string& camera, size_t cameras)
     return path.replace_filename(fmt::format("{}-{}{}", file.stem().string(), camera, file.extension().string()));
 }
 
-Result<Video> open_video(const Path& file, const RefineChain& chain, size_t chains, uint32_t pictures, int rate)
+Result<Video> open_video(const Path& file, const RefinedCamera& camera, size_t cameras, uint32_t pictures, int rate)
 {
-    const ImageSize& size = chain.camera.size;
-    return Video::create(video_path(file, chain.camera.name, chains), size.width * pictures, size.height, rate);
+    const ImageSize& size = camera.buffers.size;
+    return Video::create(video_path(file, camera.buffers.name, cameras), size.width * pictures, size.height, rate);
 }
 
-Status write_chain(const RefineVideos& videos, const RefineStore& store, const RefineChain& chain, size_t chains)
+Status write_camera(const RefineVideos& videos, const RefineStore& store, const RefinedCamera& camera, size_t cameras)
 {
     std::optional<Video> plain, beside;
     if (!videos.frames.empty()) {
-        SR_TRY(Video video, open_video(videos.frames, chain, chains, 1, videos.frames_per_second));
+        SR_TRY(Video video, open_video(videos.frames, camera, cameras, 1, videos.frames_per_second));
         plain.emplace(std::move(video));
     }
     if (!videos.side_by_side.empty()) {
-        SR_TRY(Video video, open_video(videos.side_by_side, chain, chains, 3, videos.frames_per_second));
+        SR_TRY(Video video, open_video(videos.side_by_side, camera, cameras, 3, videos.frames_per_second));
         beside.emplace(std::move(video));
     }
-    for (uint32_t f = chain.range.first; f <= chain.range.last; ++f) {
-        SR_TRY(const ImageRgb8 frame, store.load_frame(chain.camera, f));
+    for (uint32_t f = camera.range.first; f <= camera.range.last; ++f) {
+        SR_TRY(const ImageRgb8 frame, store.load_frame(camera.buffers, f));
         if (plain)
             SR_CHECK(plain->add(frame.pixels));
         if (!beside)
             continue;
-        SR_TRY(const std::vector<uint8_t> labels, read_label_picture(chain.camera, f));
-        SR_TRY(const BufferFrame buffer, read_buffer(chain.camera, f));
+        SR_TRY(const std::vector<uint8_t> labels, read_label_picture(camera.buffers, f));
+        SR_TRY(const BufferFrame buffer, read_buffer(camera.buffers, f));
         const std::span<const uint8_t> pictures[] = {labels, buffer.color, frame.pixels};
-        SR_CHECK(beside->add(joined(pictures, chain.camera.size)));
+        SR_CHECK(beside->add(joined(pictures, camera.buffers.size)));
     }
     if (plain)
         SR_CHECK(plain->finish());
@@ -65,21 +65,21 @@ Status write_chain(const RefineVideos& videos, const RefineStore& store, const R
 
 } // namespace
 
-std::vector<Path> video_files(const RefineVideos& videos, std::span<const RefineChain> chains)
+std::vector<Path> video_files(const RefineVideos& videos, std::span<const RefinedCamera> cameras)
 {
     std::vector<Path> files;
     for (const Path& video : {videos.frames, videos.side_by_side})
-        for (const RefineChain& c : chains)
+        for (const RefinedCamera& c : cameras)
             if (!video.empty())
-                files.push_back(video_path(video, c.camera.name, chains.size()));
+                files.push_back(video_path(video, c.name, cameras.size()));
     return files;
 }
 
-Status write_videos(const RefineVideos& videos, const RefineStore& store, std::span<const RefineChain> chains)
+Status write_videos(const RefineVideos& videos, const RefineStore& store, std::span<const RefinedCamera> cameras)
 {
-    for (const RefineChain& chain : chains)
+    for (const RefinedCamera& camera : cameras)
         if (videos.any())
-            SR_CHECK(write_chain(videos, store, chain, chains.size()));
+            SR_CHECK(write_camera(videos, store, camera, cameras.size()));
     return {};
 }
 

@@ -3,7 +3,6 @@
 #pragma once
 
 #include "engine/job/refine_store.h"
-#include "engine/refine/refine_chain.h"
 
 namespace semrover {
 
@@ -16,9 +15,9 @@ struct RefineVideos {
 };
 
 // what write_videos will write: FILE.mp4 each, or FILE-CAMERA.mp4 when there are several cameras
-std::vector<Path> video_files(const RefineVideos& videos, std::span<const RefineChain> chains);
+std::vector<Path> video_files(const RefineVideos& videos, std::span<const RefinedCamera> cameras);
 
 // from the finished frames of the store
-Status write_videos(const RefineVideos& videos, const RefineStore& store, std::span<const RefineChain> chains);
+Status write_videos(const RefineVideos& videos, const RefineStore& store, std::span<const RefinedCamera> cameras);
 
 } // namespace semrover

@@ -23,8 +23,8 @@ struct Daylight {
 // a daylight for a seed: from morning to evening, more or less cloudy
 Daylight daylight_of_seed(uint64_t seed);
 
-// one frame, in the encodings that `render` writes (engine/refine/frame_images.h); where there is sky: depth 0, normal
-// 128, label 10, visible 0
+// one frame, in the encodings that `render` writes (engine/deferred/frame_images.h); where there is sky: depth 0,
+// normal 128, label 10, visible 0
 struct TracedImage {
     uint32_t width = 0, height = 0;
     std::vector<uint8_t> color = {}, normal = {}, label = {}, visible = {}; // color and normal [height, width, 3]

@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // golden kind asd_rollout: a chain of frames through encoder, denoiser and decoder
-#include "engine/refine/asd.h"
+#include "engine/deferred/asd.h"
+#include "engine/deferred/frame_codec.h"
 #include "tools/verify/golden_case.h"
 #include "tools/verify/golden_networks.h"
 #include "tools/verify/planar.h"
@@ -40,8 +41,8 @@ Result<GoldenOutputs> run_asd_rollout(Device& device, const GoldenCase& c, DType
         std::ranges::copy(latent.interleaved(previous_noise, frame), more.begin());
     };
     SR_TRY(const auto asd, AsdRenderer::create(device, *n.unet, plan, {uint32_t(text_shape[1]), text}, size, options));
-    SR_TRY(const auto encoder, LatentCodec::create(device, *n.vae, size, CodecDirection::encode));
-    SR_TRY(const auto decoder, LatentCodec::create(device, *n.vae, size, CodecDirection::decode));
+    SR_TRY(const auto encoder, FrameEncoder::create(device, *n.vae, size, false));
+    SR_TRY(const auto decoder, FrameDecoder::create(device, *n.vae, size, 1));
     GoldenOutputs out;
     std::vector<float> previous;
     for (uint32_t f = 0; f < shape[0]; ++f) {

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // golden kind vsd_window: the frames of a window through encoder, denoiser and decoder
-#include "engine/refine/video_decoder.h"
-#include "engine/refine/vsd.h"
+#include "engine/deferred/frame_codec.h"
+#include "engine/deferred/vsd.h"
 #include "tools/verify/golden_case.h"
 #include "tools/verify/golden_networks.h"
 #include "tools/verify/planar.h"
@@ -50,7 +50,7 @@ Result<WindowInputs> window_inputs(const GoldenCase& c, const GoldenNetworks& n)
 Status encode_window(Device& device, const Vae& vae, const WindowInputs& in, std::vector<float>& buffers,
                      std::vector<float>& shares)
 {
-    SR_TRY(const auto encoder, LatentCodec::create(device, vae, in.size, CodecDirection::encode_unscaled));
+    SR_TRY(const auto encoder, FrameEncoder::create(device, vae, in.size, true));
     for (uint32_t f = 0; f < in.frames; ++f) {
         SR_TRY(const std::vector<float> latent, encoder->encode(in.image.interleaved(in.buffers, f)));
         buffers.insert(buffers.end(), latent.begin(), latent.end());
@@ -87,9 +87,9 @@ Result<GoldenOutputs> run_vsd_window(Device& device, const GoldenCase& c, DType 
     std::vector<float> buffers, shares;
     SR_CHECK(encode_window(device, *n.vae, in, buffers, shares));
     SR_TRY(const auto vsd,
-           VsdRenderer::create(device, *n.unet, plan, {{in.tokens, in.text}, in.added}, in.size, in.frames, options));
+           VsdRenderer::create(device, *n.unet, plan, {in.tokens, in.text, in.added}, in.size, in.frames, options));
     SR_TRY(const std::vector<float> latents, vsd->render({0, 0, buffers, shares}));
-    SR_TRY(const auto decoder, VideoDecoder::create(device, *n.vae, in.size, in.frames));
+    SR_TRY(const auto decoder, FrameDecoder::create(device, *n.vae, in.size, in.frames));
     SR_TRY(const std::vector<float> images, decoder->decode(latents));
     GoldenOutputs out;
     for (uint32_t f = 0; f < in.frames; ++f) {

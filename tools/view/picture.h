@@ -23,7 +23,7 @@ class Picture {
     VkImage image() const { return image_->handle; }
 
     void aim(sr_draw_desc& draw) const; // its targets
-    sr_target refined() const;          // where a chain's frame goes
+    sr_target refined() const;          // where a renderer's frame goes
 
     // shades what was drawn, with panels over it; leaves the image to be copied from
     void record(VkCommandBuffer commands, Look look, ImDrawData* panels) const;

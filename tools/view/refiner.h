@@ -13,7 +13,7 @@ struct RefinerRequest {
     uint32_t steps = 0; // 0: as the model says
 };
 
-// Makes one frame of what the camera sees: a sr_chain of the library, which is opened for the first frame of a size.
+// Makes one frame of what the camera sees: a sr_renderer of the library, which is opened for the first frame of a size.
 class Refiner {
   public:
     Refiner(sr_context* context, RefinerRequest request) : context_(context), request_(std::move(request)) {}
@@ -35,7 +35,7 @@ class Refiner {
     sr_context* context_;
     RefinerRequest request_;
     sr_model* model_ = nullptr; // from the first frame on
-    sr_chain* chain_ = nullptr;
+    sr_renderer* renderer_ = nullptr;
     uint32_t width_ = 0, height_ = 0, steps_ = 0;
     bool busy_ = false;
     double step_ms_ = 0;

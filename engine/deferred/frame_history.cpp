@@ -1,0 +1,126 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/deferred/frame_history.h"
+
+#include "engine/splat/rasterizer.h"
+#include "kernels/picture.h"
+
+namespace semrover {
+
+namespace {
+
+std::vector<uint32_t> depth_words(const ImageGray16& depth)
+{
+    return {depth.pixels.begin(), depth.pixels.end()};
+}
+
+// the world in the first one's own frame, where numbers are small and fp32 is enough
+std::vector<float> camera_rows(const CameraFrame& now, const CameraFrame& past)
+{
+    std::vector<float> rows(2 * kLensCameraFloats);
+    const Pose between{compose(past.pose.world_to_camera, now.pose.camera_to_world())};
+    const std::span<float> table(rows);
+    write_row(splat_camera(now.intrinsics, Pose{}), table.first(kLensCameraFloats));
+    write_row(splat_camera(past.intrinsics, between), table.last(kLensCameraFloats));
+    return rows;
+}
+
+} // namespace
+
+FrameHistory::Memory::Memory(const LatentSize& latent_size) : size(latent_size)
+{
+    const uint32_t pixels = size.image_width * size.image_height;
+    const auto words = [&](uint32_t count, const char* name) { return state.slot(count, 1, DType::u32, name, 1); };
+    const auto bytes = [&](const char* name) {
+        return words(picture_words(size.image_width, size.image_height), name);
+    };
+    cameras = state.slot(2, kLensCameraFloats, DType::f32, "cameras", kLensCameraFloats);
+    now = {bytes("frame"), words(pixels, "depth")};
+    past = {bytes("frame before"), words(pixels, "depth before")};
+    made = bytes("accumulated frame");
+}
+
+Graph FrameHistory::Memory::graph(SplatLens lens, float share) const
+{
+    Graph g;
+    const AccumulateOptions options{
+        .width = size.image_width, .height = size.image_height, .lens = lens, .share = share};
+    g.keep(
+        accumulate(g, cameras.in(g), {now.bytes.in(g), now.depth.in(g)}, {past.bytes.in(g), past.depth.in(g)}, options),
+        made);
+    return g;
+}
+
+Result<std::unique_ptr<FrameHistory>> FrameHistory::create(Device& device, const LatentSize& size, CameraModel model,
+                                                           float share)
+{
+    std::unique_ptr<FrameHistory> h(new FrameHistory(device, size, share));
+    SR_CHECK(h->memory_.state.allocate(device, "the frame before"));
+    SR_TRY(h->copies_, CopyRing::create(device));
+    SR_CHECK(h->use_lens(model));
+    return h;
+}
+
+Status FrameHistory::use_lens(CameraModel model)
+{
+    if (program_ && model_ == model)
+        return {};
+    SR_TRY(program_, Program::create(device_, memory_.graph(lens_of(model), share_)));
+    model_ = model;
+    return {};
+}
+
+uint64_t FrameHistory::planned_bytes(const DeviceLimits& limits, const LatentSize& size)
+{
+    return Memory(size).state.planned_bytes(limits);
+}
+
+Status FrameHistory::copy(const Slot& from, const Slot& to)
+{
+    return copies_->copy(from, to).map([](uint64_t) {});
+}
+
+Status FrameHistory::add(const Slot& bytes, const CameraFrame& camera, const ImageGray16& depth)
+{
+    SR_CHECK(copy(bytes, memory_.now.bytes));
+    return accumulate_now(camera, depth);
+}
+
+Status FrameHistory::add(std::span<const uint8_t> pixels, const CameraFrame& camera, const ImageGray16& depth)
+{
+    SR_CHECK(write_pixels(pixels));
+    return accumulate_now(camera, depth);
+}
+
+// to the words of the frame; the last one may lie beyond the pixels
+Status FrameHistory::write_pixels(std::span<const uint8_t> pixels)
+{
+    std::vector<uint8_t> words(pixels.begin(), pixels.end());
+    words.resize(memory_.now.bytes.bytes());
+    return memory_.now.bytes.write(device_, words);
+}
+
+Status FrameHistory::accumulate_now(const CameraFrame& camera, const ImageGray16& depth)
+{
+    const bool alone = frames_ == 0 || camera.intrinsics.model != camera_.intrinsics.model;
+    if (!alone) {
+        SR_CHECK(copy(memory_.made, memory_.past.bytes));
+        SR_CHECK(copy(memory_.now.depth, memory_.past.depth));
+        SR_CHECK(memory_.cameras.write(device_, camera_rows(camera, camera_)));
+    }
+    SR_CHECK(memory_.now.depth.write(device_, depth_words(depth)));
+    camera_ = camera;
+    ++frames_;
+    if (alone)
+        return copy(memory_.now.bytes, memory_.made);
+    SR_CHECK(use_lens(camera.intrinsics.model));
+    return program_->run();
+}
+
+Status FrameHistory::restore(std::span<const uint8_t> pixels, const CameraFrame& camera, const ImageGray16& depth)
+{
+    restart();
+    return add(pixels, camera, depth);
+}
+
+} // namespace semrover

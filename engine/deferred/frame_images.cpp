@@ -1,0 +1,129 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/deferred/frame_images.h"
+
+#include "engine/camera/lens.h"
+#include "engine/format/image.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+
+namespace semrover {
+
+namespace {
+
+constexpr uint32_t kNothing = 255, kSky = 10; // of a picture
+
+constexpr uint32_t kSkyBlock = 16; // pixels
+
+// which way the rays of a camera go; a lens takes long to ask for every pixel
+class SkySide {
+  public:
+    explicit SkySide(const CameraFrame& frame) : lens_(frame.intrinsics), m_(frame.pose.world_to_camera) {}
+
+    // how far up the unit ray through a position goes; NaN where the lens does not look
+    double up(double x, double y) const
+    {
+        const auto ray = lens_.ray(x, y); // the third column of the rotation is the world's z axis
+        return ray ? m_[2] * (*ray)[0] + m_[6] * (*ray)[1] + m_[10] * (*ray)[2] : std::nan("");
+    }
+    // of all rays of a block, where they are farther from the horizon than its corners are apart
+    std::optional<bool> of_block(uint32_t left, uint32_t top, uint32_t right, uint32_t bottom) const
+    {
+        const std::array<double, 4> corners = {up(left, top), up(right, top), up(left, bottom), up(right, bottom)};
+        const auto [low, high] = std::ranges::minmax(corners);
+        const bool seen = std::ranges::none_of(corners, [](double c) { return std::isnan(c); });
+        if (seen && std::min(std::abs(low), std::abs(high)) > high - low && (low > 0) == (high > 0))
+            return low > 0;
+        return std::nullopt;
+    }
+
+  private:
+    Lens lens_;
+    Rigid m_;
+};
+
+std::vector<uint8_t> three_bytes(std::span<const uint32_t> words)
+{
+    std::vector<uint8_t> bytes;
+    bytes.reserve(words.size() * 3);
+    for (const uint32_t word : words)
+        bytes.insert(bytes.end(), {uint8_t(word), uint8_t(word >> 8), uint8_t(word >> 16)});
+    return bytes;
+}
+
+template <typename T>
+std::vector<T> shifted(std::span<const uint32_t> words, uint32_t shift)
+{
+    std::vector<T> values(words.size());
+    std::ranges::transform(words, values.begin(), [&](uint32_t word) { return T(word >> shift); });
+    return values;
+}
+
+} // namespace
+
+std::vector<uint8_t> color_pixels(const FramePixels& pixels)
+{
+    return three_bytes(pixels.seen);
+}
+
+std::vector<uint16_t> depth_pixels(const FramePixels& pixels)
+{
+    return shifted<uint16_t>(pixels.ranges, 0);
+}
+
+std::vector<uint8_t> normal_pixels(const FramePixels& pixels)
+{
+    return three_bytes(pixels.normals);
+}
+
+std::vector<uint8_t> label_pixels(const FramePixels& pixels)
+{
+    return shifted<uint8_t>(pixels.ranges, 16);
+}
+
+std::vector<uint8_t> visible_pixels(const FramePixels& pixels)
+{
+    return shifted<uint8_t>(pixels.seen, 24);
+}
+
+void mark_sky(FramePixels& pixels, const CameraFrame& frame)
+{
+    const SkySide side(frame);
+    for (uint32_t y = 0; y < pixels.height; y += kSkyBlock)
+        for (uint32_t x = 0; x < pixels.width; x += kSkyBlock) {
+            const uint32_t right = std::min(x + kSkyBlock, pixels.width),
+                           bottom = std::min(y + kSkyBlock, pixels.height);
+            const std::optional<bool> whole = side.of_block(x, y, right, bottom);
+            for (uint32_t row = y; row < bottom; ++row)
+                for (uint32_t column = x; column < right; ++column) {
+                    uint32_t& word = pixels.ranges[size_t(row) * pixels.width + column];
+                    if (word >> 16 == kNothing && (whole ? *whole : side.up(column + 0.5, row + 0.5) > 0))
+                        word = (word & 0xffff) | kSky << 16;
+                }
+        }
+}
+
+void clear_hidden_depth(FramePixels& pixels)
+{
+    for (size_t i = 0; i < pixels.ranges.size(); ++i)
+        if (pixels.seen[i] >> 24 == 0)
+            pixels.ranges[i] &= 0xffff0000u;
+}
+
+Status write_frame_images(const Path& folder, uint32_t number, const FramePixels& pixels)
+{
+    const std::string name = fmt::format("{:06}.png", number);
+    for (const char* kind : {"color", "depth", "normal", "label", "visible"})
+        SR_CHECK(make_folder(folder / kind));
+    const uint32_t w = pixels.width, h = pixels.height;
+    SR_CHECK(write_png_rgb8(folder / "color" / name, w, h, color_pixels(pixels)));
+    SR_CHECK(write_png_gray16(folder / "depth" / name, w, h, depth_pixels(pixels)));
+    SR_CHECK(write_png_rgb8(folder / "normal" / name, w, h, normal_pixels(pixels)));
+    SR_CHECK(write_png_gray8(folder / "label" / name, w, h, label_pixels(pixels)));
+    return write_png_gray8(folder / "visible" / name, w, h, visible_pixels(pixels));
+}
+
+} // namespace semrover
