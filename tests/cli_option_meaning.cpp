@@ -1,10 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // an option that does nothing with its input is a usage error that names both; advice in messages can be followed
-#include "engine/format/grid_npz.h"
-#include "engine/format/vox.h"
 #include "tests/program.h"
 #include "tests/zip_bytes.h"
+#include "tools/dataset/scene_readers.h"
 
 namespace semrover {
 namespace cli_option_meaning_test {

@@ -3,14 +3,14 @@
 // Small files that name much: each is refused, or read, within a stated share of memory (SECURITY.md, Limits)
 #include "engine/format/labelled_points.h"
 #include "engine/format/ply_reader.h"
-#include "engine/format/vox.h"
-#include "engine/format/vox_file.h"
 #include "engine/mesh/mesh_files.h"
 #include "engine/mesh/surface_blocks.h"
 #include "engine/scene/palette.h"
 #include "engine/scene/scene_objects.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
+#include "tools/dataset/scene_readers.h"
+#include "tools/dataset/vox_file.h"
 
 #include <cmath>
 #include <fstream>

@@ -1,9 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // SemanticKITTI's files by hand from its README, Occ3D's by numpy 1.24.2 (tests/data/numpy)
-#include "engine/format/dense_labels.h"
-#include "engine/format/occ3d.h"
-#include "engine/format/semantic_kitti.h"
+#include "tools/dataset/dense_labels.h"
+#include "tools/dataset/scene_readers.h"
 
 #include "tests/says.h"
 #include "tests/scratch_folder.h"

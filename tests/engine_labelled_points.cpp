@@ -2,13 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/format/labelled_points.h"
 
-#include "engine/format/object_boxes.h"
 #include "engine/format/ply_reader.h"
-#include "engine/format/scene_file.h"
 #include "engine/scene/palette.h"
 #include "runtime/base/dtype.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
+#include "tools/dataset/object_boxes.h"
+#include "tools/dataset/scene_file.h"
 
 #include <cmath>
 #include <set>

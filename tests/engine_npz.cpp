@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // files by numpy 1.24.2 (tests/data/numpy), and by hand from the formats' specifications
-#include "engine/format/grid_npz.h"
-#include "engine/format/npz.h"
-#include "engine/format/scene_file.h"
+#include "tools/dataset/npz.h"
+#include "tools/dataset/scene_file.h"
+#include "tools/dataset/scene_readers.h"
 
 #include "tests/grid_case.h"
 #include "tests/says.h"

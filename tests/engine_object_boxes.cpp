@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/format/object_boxes.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
+#include "tools/dataset/object_boxes.h"
 
 #include <gtest/gtest.h>
 #include <numbers>

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // files by hand from MagicaVoxel-file-format-vox.txt and -vox-extension.txt
-#include "engine/format/vox.h"
-#include "engine/format/vox_file.h"
+#include "tools/dataset/scene_readers.h"
+#include "tools/dataset/vox_file.h"
 
 #include "engine/scene/palette.h"
 #include "tests/says.h"

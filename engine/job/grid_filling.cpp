@@ -112,7 +112,7 @@ Status GridFilling::fit_batch()
         if (!device_.budget() || planned_bytes_ <= device_.budget())
             return {};
         if (batch_ == 1)
-            return fail(ErrorCode::out_of_memory, "one region of {} cells needs {} in all, --max-vram allows {}",
+            return fail(ErrorCode::out_of_memory, "one region of {} cells needs {} in all, `max_bytes` allows {}",
                         work_->largest, bytes_text(planned_bytes_), bytes_text(device_.budget()));
     }
 }

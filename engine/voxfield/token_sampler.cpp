@@ -329,7 +329,7 @@ Result<std::vector<float>> TokenSampler::finish()
     for (size_t i = 0; i < tokens.size(); ++i)
         if (!std::isfinite(tokens[i]))
             return fail(ErrorCode::internal,
-                        "the network returned {} for channel {} of token {}: overflow; try --precision fp32", tokens[i],
+                        "the network returned {} for channel {} of token {}: overflow; try `precision` fp32", tokens[i],
                         i % channels, i / channels);
     return tokens;
 }

@@ -2,11 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/cli/path_options.h"
 
-#include "engine/format/kitti_calibration.h"
-#include "engine/format/rigid_file.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/number_option.h"
 #include "tools/cli/origin_option.h"
+#include "tools/dataset/rigid_file.h"
 
 #include <array>
 #include <CLI/CLI.hpp>

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/format/object_boxes.h"
 #include "tools/commands/scene_input.h"
+#include "tools/dataset/object_boxes.h"
 
 namespace semrover {
 

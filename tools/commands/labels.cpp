@@ -1,11 +1,11 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover labels: the classes of a grid's cells, with their numbers and colours; --vox FILE: as MagicaVoxel's palette
-#include "engine/format/vox.h"
 #include "engine/job/outputs.h"
 #include "engine/scene/palette.h"
 #include "runtime/base/json.h"
 #include "tools/cli/commands.h"
+#include "tools/dataset/scene_readers.h"
 
 #include <CLI/CLI.hpp>
 

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/format/scene_file.h"
 #include "tools/cli/warnings.h"
+#include "tools/dataset/scene_file.h"
 
 #include <optional>
 

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/format/dense_labels.h"
+#include "tools/dataset/dense_labels.h"
 
-#include "engine/format/voxel_sizes.h"
+#include "tools/dataset/voxel_sizes.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +11,7 @@ namespace semrover {
 
 namespace {
 
-constexpr double kMaxCells = 1 << 28;   // of the box, empty ones too
+constexpr double kMaxCells = 1 << 28; // of the box, empty ones too
 
 int64_t floor_div(int64_t a, int64_t b)
 {

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/format/box_collector.h"
+#include "tools/dataset/box_collector.h"
 
 namespace semrover {
 

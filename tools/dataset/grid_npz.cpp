@@ -1,13 +1,11 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/format/grid_npz.h"
+#include "tools/dataset/scene_readers.h"
 
 #include "engine/format/label_map.h"
-#include "engine/format/npz.h"
-#include "engine/format/voxel_sizes.h"
-#include "engine/format/whole_numbers.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
+#include "tools/dataset/voxel_sizes.h"
 
 #include <algorithm>
 #include <cmath>

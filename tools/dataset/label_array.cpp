@@ -1,11 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/format/label_array.h"
+#include "tools/dataset/scene_readers.h"
 
-#include "engine/format/dense_labels.h"
-#include "engine/format/voxel_sizes.h"
-#include "engine/format/whole_numbers.h"
 #include "runtime/base/quote.h"
+#include "tools/dataset/dense_labels.h"
+#include "tools/dataset/voxel_sizes.h"
 
 #include <algorithm>
 #include <unordered_map>

@@ -2,10 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Waymo's labels of the lidar: a frame or a list of labels in protocol buffers' JSON, or the table of lidar boxes as
 // text. Source: label.proto, dataset.proto and v2/perception/box.py of waymo-research/waymo-open-dataset
-#include "engine/format/csv_rows.h"
 #include "engine/format/json_boxes.h"
-#include "engine/format/object_boxes.h"
 #include "runtime/base/quote.h"
+#include "tools/dataset/object_boxes.h"
 
 #include <charconv>
 #include <cmath>
@@ -13,6 +12,100 @@
 namespace semrover {
 
 namespace {
+
+constexpr size_t kMostColumns = 4096;
+
+// The rows of a table as text: a line with names, then lines of values, with commas between. Values may stand in double
+// quotes, but hold neither commas nor quotes. Views into the text.
+class CsvRows {
+  public:
+    // reads the names; bad_input for names given twice, and for more than 4096
+    static Result<CsvRows> open(std::string_view text, std::string_view where);
+
+    std::optional<size_t> column(std::string_view name) const;
+    Result<size_t> need(std::string_view name) const; // bad_input when there is no such column
+
+    // To the first row, and on; false at the end. Skips empty lines. bad_input for a row with another number of values
+    Result<bool> next();
+    std::string_view value(size_t column) const { return values_[column]; }
+    std::string where() const; // "'t.csv' line 3"
+
+  private:
+    CsvRows(std::string_view text, std::string_view where) : lines_(text), where_(where) {}
+    Status split();
+
+    TextLines lines_;
+    std::string where_;
+    std::vector<std::string_view> names_, values_;
+};
+
+Result<CsvRows> CsvRows::open(std::string_view text, std::string_view where)
+{
+    CsvRows rows(text, where);
+    if (!rows.lines_.next())
+        return fail(ErrorCode::bad_input, "{}: expected a line with the names of columns, found nothing", where);
+    SR_CHECK(rows.split());
+    rows.names_ = rows.values_;
+    for (size_t i = 0; i < rows.names_.size(); ++i)
+        if (rows.column(rows.names_[i]) != i)
+            return fail(ErrorCode::bad_input, "{}: column {} is given twice", rows.where(), quote(rows.names_[i], 60));
+    return rows;
+}
+
+std::string CsvRows::where() const
+{
+    return fmt::format("{} line {}", where_, lines_.number());
+}
+
+std::optional<size_t> CsvRows::column(std::string_view name) const
+{
+    const auto found = std::ranges::find(names_, name);
+    if (found == names_.end())
+        return std::nullopt;
+    return size_t(found - names_.begin());
+}
+
+Result<size_t> CsvRows::need(std::string_view name) const
+{
+    if (const auto at = column(name))
+        return *at;
+    return fail(ErrorCode::bad_input, "{}: there is no column {}", where_, name);
+}
+
+Status CsvRows::split()
+{
+    values_.clear();
+    std::string_view line = lines_.line();
+    if (line.ends_with('\r'))
+        line.remove_suffix(1);
+    for (bool more = true; more;) {
+        const size_t comma = line.find(',');
+        std::string_view value = line.substr(0, comma);
+        more = comma != std::string_view::npos;
+        line.remove_prefix(more ? comma + 1 : line.size());
+        if (value.size() >= 2 && value.starts_with('"') && value.ends_with('"'))
+            value = value.substr(1, value.size() - 2);
+        if (value.find('"') != std::string_view::npos)
+            return fail(ErrorCode::bad_input, "{}: a value with a quote or a comma inside: {}", where(),
+                        quote(value, 60));
+        if (values_.size() == kMostColumns)
+            return fail(ErrorCode::bad_input, "{}: expected at most {} values, found more", where(), kMostColumns);
+        values_.push_back(value);
+    }
+    return {};
+}
+
+Result<bool> CsvRows::next()
+{
+    do {
+        if (!lines_.next())
+            return false;
+    } while (count_words(lines_.line()) == 0);
+    SR_CHECK(split());
+    if (values_.size() != names_.size())
+        return fail(ErrorCode::bad_input, "{}: expected {} values, found {}", where(), names_.size(), values_.size());
+    return true;
+}
 
 constexpr SourceLabel kWaymoLabels[] = {
     {0, "TYPE_UNKNOWN", kLeftOut}, {1, "TYPE_VEHICLE", 13}, {2, "TYPE_PEDESTRIAN", 11},

@@ -4,9 +4,9 @@
 // carla.BoundingBox, carla.Transform and carla.Actor. Source: the Python API's reference and the catalogue of vehicles,
 // https://carla.readthedocs.io
 #include "engine/format/json_boxes.h"
-#include "engine/format/object_boxes.h"
 #include "runtime/base/json_fields.h"
 #include "runtime/base/quote.h"
+#include "tools/dataset/object_boxes.h"
 
 #include <charconv>
 #include <cmath>

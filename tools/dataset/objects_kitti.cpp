@@ -3,9 +3,9 @@
 // KITTI's labels of objects and of tracks. Source: the readme files of the devkits for objects and for tracking,
 // https://www.cvlibs.net/datasets/kitti
 #include "engine/format/camera_text.h"
-#include "engine/format/kitti_calibration.h"
-#include "engine/format/object_boxes.h"
 #include "runtime/base/quote.h"
+#include "tools/dataset/object_boxes.h"
+#include "tools/dataset/rigid_file.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/format/semantic_kitti.h"
+#include "tools/dataset/scene_readers.h"
 
-#include "engine/format/dense_labels.h"
 #include "runtime/base/quote.h"
+#include "tools/dataset/dense_labels.h"
 
 #include <algorithm>
 

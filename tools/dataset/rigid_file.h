@@ -12,4 +12,8 @@ namespace semrover {
 Result<Rigid> parse_rigid(std::string_view text, std::string_view where);
 Result<Rigid> read_rigid(const Path& path);
 
+// From the lidar to the rectified camera 0: Tr of odometry, or R0_rect and Tr_velo_to_cam of objects (of tracking:
+// R_rect and Tr_velo_cam). bad_input: neither is there
+Result<Rigid> read_kitti_lidar(const Path& path);
+
 } // namespace semrover

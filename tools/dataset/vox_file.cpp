@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/format/vox_file.h"
+#include "tools/dataset/vox_file.h"
 
 #include "runtime/base/quote.h"
 

@@ -3,9 +3,9 @@
 // nuScenes' tables of annotations. Source: the page of the schema, and Box, of nutonomy/nuscenes-devkit
 #include "engine/format/json_boxes.h"
 #include "engine/format/nuscenes_table.h"
-#include "engine/format/object_boxes.h"
 #include "runtime/base/json_numbers.h"
 #include "runtime/base/quote.h"
+#include "tools/dataset/object_boxes.h"
 
 #include <algorithm>
 #include <set>

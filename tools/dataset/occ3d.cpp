@@ -1,11 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/format/occ3d.h"
+#include "tools/dataset/scene_readers.h"
 
-#include "engine/format/dense_labels.h"
-#include "engine/format/npz.h"
-#include "engine/format/whole_numbers.h"
 #include "runtime/base/quote.h"
+#include "tools/dataset/dense_labels.h"
 
 namespace semrover {
 

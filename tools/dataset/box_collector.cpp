@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/format/box_collector.h"
+#include "tools/dataset/box_collector.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/format/voxel_sizes.h"
+#include "tools/dataset/voxel_sizes.h"
 
-#include "engine/format/dense_labels.h"
 #include "engine/scene/palette.h"
+#include "tools/dataset/dense_labels.h"
 
 #include <algorithm>
 #include <cmath>

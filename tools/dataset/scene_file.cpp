@@ -1,17 +1,12 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/format/scene_file.h"
+#include "tools/dataset/scene_file.h"
 
 #include "engine/format/gltf_splats.h"
-#include "engine/format/grid_npz.h"
-#include "engine/format/label_array.h"
 #include "engine/format/labelled_points.h"
-#include "engine/format/npz.h"
-#include "engine/format/occ3d.h"
 #include "engine/format/ply_header.h"
-#include "engine/format/semantic_kitti.h"
-#include "engine/format/vox.h"
 #include "runtime/base/quote.h"
+#include "tools/dataset/scene_readers.h"
 
 #include <algorithm>
 #include <cctype>

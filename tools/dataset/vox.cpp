@@ -1,12 +1,12 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/format/vox.h"
+#include "tools/dataset/scene_readers.h"
 
 #include "engine/format/label_map.h"
-#include "engine/format/vox_file.h"
-#include "engine/format/voxel_sizes.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
+#include "tools/dataset/vox_file.h"
+#include "tools/dataset/voxel_sizes.h"
 
 #include <algorithm>
 #include <cmath>
