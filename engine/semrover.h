@@ -43,6 +43,7 @@ typedef enum sr_status {
     SR_ERR_OUT_OF_MEMORY = 5, /* of the device, of the budget, or of the host */
     SR_ERR_DEVICE_LOST = 6,
     SR_ERR_PARTIAL = 7,   /* there was more than fitted */
+    SR_NOT_YET = 8,       /* of a labels callback: ask again after sr_world_labels_ready */
     SR_ERR_INTERNAL = 70, /* a bug of ours */
     SR_ERR_INTERRUPTED = 130,
     SR_STATUS_IS_32_BIT = 0x7fffffff
@@ -298,7 +299,9 @@ typedef struct sr_window {
 
 /* Labels come from one of grid, folder and labels. The callback adds the cells of a window to a grid, with
  * sr_grid_set_cells and nothing else of the library; it is asked again for a window that was dropped, and answers
- * alike. What it returns beside SR_OK ends the call that needed the labels, with that status.
+ * alike. Where it does not know the labels yet it returns SR_NOT_YET: the tiles that need them wait for
+ * sr_world_labels_ready, and no others. What it returns beside these ends the call that needed the labels, with that
+ * status.
  *
  * Order-free: the bytes of a place depend on model, seed, the labels near it and edits, not on the way of the camera.
  * One device and driver are meant: others round in other ways. */
@@ -310,10 +313,11 @@ typedef struct sr_world_desc {
     const sr_grid* grid;   /* its labels are copied */
     const char* folder;    /* of tiles */
     sr_status (*labels)(void* user, const sr_window* window, sr_grid* grid);
-    void (*message)(void* user, const char* line); /* warnings, during sr_world_create; NULL: none */
+    void (*message)(void* user, const char* line); /* warnings, during sr_world_create and steps; NULL: none */
     void* user;                                    /* for the callbacks */
-    const char* cache;   /* a folder for finished tiles, made where it is missing, also for later sessions; NULL: none.
-                            One world at a time */
+    const char* cache;   /* a folder for finished tiles, made where it is missing, also for later sessions and worlds
+                            of other seeds, settings or edits; one that cannot be written is read. NULL: none. One
+                            world at a time */
     const char* objects; /* boxes and colours that the model is told of, a .json file (docs/formats.md, section 2.8);
                             NULL: guessed of the labels, where the model can be told */
     uint64_t seed;
@@ -346,14 +350,17 @@ sr_status sr_world_focus(sr_world* world, const double position[3], const double
 sr_status sr_world_step(sr_world* world, uint64_t budget_us, uint32_t* done);
 
 /* Changes labels as sr_grid_set_cells does. The tiles of these cells, and those beside them that saw their points, are
- * generated anew by the next steps; their points and splats are gone at once. */
+ * generated anew by the next steps. Their points are gone at once; their splats stay until the new ones are there. */
 sr_status sr_world_edit(sr_world* world, const sr_cell* cells, uint64_t count);
+
+/* The callback knows the labels of a window for which it returned SR_NOT_YET. */
+sr_status sr_world_labels_ready(sr_world* world, const sr_window* window);
 
 typedef struct sr_world_info {
     uint32_t struct_size;
     uint32_t full;       /* 1: host_bytes or splat_bytes has no room for more of what is wanted */
     uint64_t wanted;     /* tiles of the focus */
-    uint64_t finished;   /* of these */
+    uint64_t finished;   /* of these, as far as steps have looked */
     uint64_t in_memory;  /* tiles */
     uint64_t host_bytes; /* of these */
     uint64_t generated;  /* tiles so far, and so on */

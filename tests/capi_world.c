@@ -156,7 +156,7 @@ static void refuses_wrong_worlds(sr_context* context)
 /* a grid and a callback that say the same give the same world, whichever way the camera came */
 static void labels_of_a_grid_and_of_a_callback_give_the_same_points(sr_context* context)
 {
-    const sr_window place = {{0, -6}, {15, 6}};
+    const sr_window place = {{0, -6}, {15, 6}}, everywhere = {{-999, -999}, {999, 999}};
     sr_world_desc desc = street_world();
     sr_world *called = NULL, *read = NULL;
     sr_grid* grid = street();
@@ -170,8 +170,14 @@ static void labels_of_a_grid_and_of_a_callback_give_the_same_points(sr_context* 
         CHECK(sr_world_step(called, 0, NULL) == SR_ERR_BAD_INPUT &&
               says(context, "callback returned SR_ERR_BAD_INPUT"));
     }
-    broken = 0;
+    broken = SR_NOT_YET;
     walk(context, called, 20, 2);
+    CHECK(world_info(called).finished == 0 && world_info(called).wanted > 0);
+    broken = 0;
+    CHECK(sr_world_labels_ready(called, NULL) == SR_ERR_USAGE && says(context, "NULL"));
+    CHECK_OK(context, sr_world_labels_ready(called, &everywhere));
+    walk(context, called, 20, 2);
+    CHECK(world_info(called).finished == world_info(called).wanted);
     walk(context, called, 14, 3);
     walk(context, called, 4.8, 5);
     CHECK(calls > 10);

@@ -39,6 +39,13 @@ VoxelGrid street()
     return grid;
 }
 
+size_t files_in(const Path& folder)
+{
+    std::error_code ignored;
+    const std::filesystem::directory_iterator files(folder, ignored);
+    return size_t(std::distance(begin(files), end(files)));
+}
+
 class CliGenerate : public testing::Test {
   protected:
     CliGenerate() { EXPECT_TRUE(write_grid(folder_ / "in.sgrid", street())); }
@@ -99,10 +106,12 @@ TEST_F(CliGenerate, in_the_order_of_tiles_a_part_killed_runs_and_batches_give_th
     EXPECT_FALSE(first == bytes_of("c.sgrid", "--order scene"));
     EXPECT_FALSE(first == bytes_of("d.sgrid", "--order tiles --tile-size 4.2"));
     ChildProgram child(arguments("e.sgrid") + tiles + "--batch 1");
-    while (journal_lines("e.sgrid") < 3 && child.running())
+    while (files_in(path("e.sgrid.run/tiles")) < 3 && child.running())
         usleep(500);
     child.stop(SIGKILL);
+    EXPECT_FALSE(std::filesystem::exists(path("e.sgrid")));
     EXPECT_TRUE(first == bytes_of("e.sgrid", tiles));
+    EXPECT_FALSE(std::filesystem::exists(path("e.sgrid.run/tiles")));
     VoxelGrid part; // tiles 0 and 1 along i, of which tile 0 has all its neighbours
     part.voxel_size = 0.6f;
     for (size_t c = 0; c < street().cells.size(); ++c)
@@ -458,7 +467,7 @@ TEST_F(CliGenerateRefuses, devices_and_options_that_cannot_be)
     expect_refusal(line + "--order tiles --first-cell 3", 2, "--first-cell");
     expect_refusal(line + "--order tiles --tile-size 2.4", 2, "narrower than its halo");
     expect_refusal(line + "--order tiles --strategy paper", 2, "leaves cells empty");
-    expect_refusal(line + "--order tiles --along " + path("in.sgrid"), 2, "--order tiles");
+    expect_refusal(line + "--order tiles --along " + path("in.sgrid"), 2, "--order");
 }
 
 } // namespace cli_generate_test

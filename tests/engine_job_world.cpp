@@ -3,8 +3,7 @@
 // worlds that are generated around a camera: the way there, budgets, caches and edits change no byte
 #include "engine/job/world.h"
 
-#include "engine/job/generation.h"
-#include "engine/voxfield/tile_regions.h"
+#include "runtime/base/hash.h"
 #include "tests/json_text.h"
 #include "tests/scratch_folder.h"
 
@@ -54,22 +53,18 @@ VoxelGrid street(int32_t begin = -12, int32_t end = 24)
     return grid;
 }
 
-// what `generate --order tiles` makes of a grid
+// all tiles of a grid as one part: what worlds must give tile by tile
 VoxelGrid generated(VoxelGrid grid, uint32_t batch = 2)
 {
-    GenerationRequest r;
     GenerationOptions o = options();
     o.batch = batch;
-    r.settings = *resolve_generation(o);
-    auto job = begin_generation(device(), std::move(grid), r);
-    EXPECT_TRUE(job) << job.error().message;
-    for (bool done = false; !done;) {
-        const auto step = (*job)->step(JobBudget::unlimited());
-        EXPECT_TRUE(step) << step.error().message;
-        done = !step || *step;
-    }
-    EXPECT_TRUE((*job)->finish());
-    return (*job)->grid();
+    const GenerationSettings settings = *resolve_generation(o);
+    GridFilling filling(device(), settings);
+    EXPECT_TRUE(filling.cut(grid, settings.regions));
+    EXPECT_TRUE(filling.load(0, {}));
+    EXPECT_TRUE(filling.start(nullptr));
+    EXPECT_TRUE(*filling.step(JobBudget::unlimited()));
+    return grid;
 }
 
 const VoxelGrid& whole()
@@ -81,7 +76,7 @@ const VoxelGrid& whole()
 std::unique_ptr<World> open(const Path& cache = {}, uint64_t host_bytes = 0, uint32_t at_once = 1,
                             VoxelGrid grid = street())
 {
-    WorldRequest r{.settings = *resolve_generation(options()), .cache = cache};
+    WorldRequest r{.settings = *resolve_generation(options()), .store = cache};
     r.host_bytes = host_bytes;
     r.tiles_at_once = at_once;
     auto world = open_world(device(), std::move(r), labels_of_grid(std::move(grid)));
@@ -140,9 +135,9 @@ void expect_same(const World& world, const VoxelGrid& grid)
     }
 }
 
-// ---- the order of tiles, by `generate`
+// ---- the order of tiles
 
-TEST(engine_job_world, generate_by_tiles_gives_the_same_bytes_for_every_batch)
+TEST(engine_job_world, every_batch_gives_the_same_bytes)
 {
     for (const uint32_t batch : {1u, 5u}) {
         const VoxelGrid other = generated(street(), batch);
@@ -251,6 +246,12 @@ TEST(engine_job_world, what_was_dropped_comes_back_with_the_same_bytes_from_the_
     }
 }
 
+// the file of a tile in a folder that an index names
+std::string tile_file(const Path& folder, const TileIndex& tile)
+{
+    return tile_name(tile, TileFolder::open(folder)->tiles().at(tile).key);
+}
+
 TEST(engine_job_world, a_cache_serves_another_session_and_no_other_world)
 {
     const ScratchFolder folder;
@@ -268,7 +269,7 @@ TEST(engine_job_world, a_cache_serves_another_session_and_no_other_world)
     EXPECT_EQ(again->figures().loaded, 18u);
     expect_same(*again, whole());
     // one file is damaged, and one label is another: these tiles and those that see them are made anew
-    folder.put("cache/tile_-2_-1.sgrid", "nothing");
+    folder.put("cache/" + tile_file(cache, {-2, -1}), "nothing");
     VoxelGrid other = street();
     other.labels[*find_cell(other, {8, 8, 0})] = 1; // of tile (1, 1), which nobody sees
     const auto changed = open(cache, 0, 1, other);
@@ -379,6 +380,220 @@ TEST(engine_job_world, an_error_of_the_source_is_told_and_the_next_step_tries_ag
     expect_same(**world, whole());
 }
 
+// ---- what is wanted
+
+TEST(engine_job_world, a_focus_finds_its_tiles_nearest_first_and_counts_them_before)
+{
+    for (const double radius : {0., 1., 7.3, 40.})
+        for (const double direction : {0., 1.}) {
+            const WorldFocus focus{
+                .position = {3.1, -7.9, 1}, .direction = {direction, -0.3 * direction, 0}, .radius = radius};
+            TileOrder order(focus, 3.6);
+            const size_t size = order.size();
+            std::set<TileIndex> expected, found;
+            for (int32_t x = -15; x < 16; ++x)
+                for (int32_t y = -15; y < 16; ++y)
+                    if (distance_to_tile({3.1, -7.9}, {x, y}, 3.6) <= radius)
+                        expected.insert({x, y});
+            double last = 0;
+            for (size_t rank = 0; const auto tile = order.at(rank); ++rank) {
+                EXPECT_TRUE(found.insert(*tile).second);
+                EXPECT_EQ(order.rank_of(*tile), rank);
+                const double x = ((*tile)[0] + 0.5) * 3.6 - 3.1, y = ((*tile)[1] + 0.5) * 3.6 + 7.9;
+                const double length = std::hypot(direction, 0.3 * direction);
+                const double ahead = length > 0 ? (x - 0.3 * y) * direction / (std::hypot(x, y) * length) : 1;
+                const double weight = std::hypot(x, y) * (2 - ahead);
+                EXPECT_GE(weight, last - 1e-9) << rank;
+                last = weight;
+            }
+            EXPECT_EQ(found, expected);
+            EXPECT_EQ(size, expected.size());
+            EXPECT_EQ(order.size(), expected.size());
+        }
+}
+
+TEST(engine_job_world, tiles_along_a_track_are_those_within_the_horizon_in_the_order_of_the_way)
+{
+    const std::vector<GroundPoint> track = {{-10, 2}, {7, 2}, {12, 14}, {12, -9}};
+    for (const double horizon : {0.2, 5.}) {
+        const std::vector<TileIndex> tiles = tiles_along(track, horizon, 3.6);
+        const std::set<TileIndex> found(tiles.begin(), tiles.end());
+        EXPECT_EQ(found.size(), tiles.size());
+        for (int32_t x = -10; x < 10; ++x)
+            for (int32_t y = -10; y < 10; ++y) {
+                double nearest = 1e9;
+                for (size_t i = 0; i + 1 < track.size(); ++i)
+                    for (double t = 0; t <= 1; t += 1. / 4096)
+                        nearest =
+                            std::min(nearest, distance_to_tile({track[i][0] + t * (track[i + 1][0] - track[i][0]),
+                                                                track[i][1] + t * (track[i + 1][1] - track[i][1])},
+                                                               {x, y}, 3.6));
+                if (std::abs(nearest - horizon) > 0.01) {
+                    EXPECT_EQ(found.contains({x, y}), nearest < horizon) << x << ", " << y;
+                }
+            }
+        const auto rank = [&](const TileIndex& tile) { return std::ranges::find(tiles, tile) - tiles.begin(); };
+        EXPECT_LT(rank({-3, 0}), rank({0, 0}));
+        EXPECT_LT(rank({0, 0}), rank({3, 3}));
+        EXPECT_LT(rank({3, 3}), rank({3, -2}));
+    }
+    EXPECT_EQ(tiles_along({{{1, 1}}}, 0.5, 3.6), (std::vector<TileIndex>{{0, 0}}));
+}
+
+TEST(engine_job_world, a_track_gives_the_bytes_of_everywhere_and_its_tiles_leave_memory)
+{
+    const ScratchFolder folder;
+    const auto along = open(folder / "along"), everywhere = open(folder / "all");
+    ASSERT_TRUE(along->follow({{{-5, 1.5}, {11, 1.5}}}, 1));
+    size_t most = 0;
+    for (bool done = false; !done;) {
+        done = *along->step(JobBudget::one_submit());
+        most = std::max(most, along->figures().in_memory);
+    }
+    EXPECT_LE(most, 9u);
+    EXPECT_EQ(along->figures().finished, along->figures().wanted);
+    EXPECT_EQ(along->figures().in_memory, 0u);
+    ASSERT_TRUE(along->flush());
+    ASSERT_TRUE(everywhere->everywhere());
+    run(*everywhere);
+    expect_same(*everywhere, whole());
+    const VoxelGrid kept = *read_grid_or_tiles(folder / "along");
+    EXPECT_EQ(same_cells(kept, whole()), kept.cells.size());
+    for (int32_t x = -2; x < 4; ++x)
+        EXPECT_TRUE(find_cell(kept, {x * kEdge, 2, 0}));
+    EXPECT_FALSE(along->follow({{{0, 0}}}, 0));
+}
+
+// ---- points of the source
+
+TEST(engine_job_world, points_that_the_source_has_stay_and_are_known_around)
+{
+    VoxelGrid half = whole();
+    for (size_t c = 0; c < half.cells.size(); ++c)
+        if (half.cells[c][0] % 5 > 1 || half.cells[c][0] < 0) {
+            half.generated[c] = 0;
+            std::fill_n(&half.points[c * 60], 60, uint16_t(0));
+        }
+    const VoxelGrid expected = generated(half);
+    EXPECT_NE(expected.points, whole().points);
+    const ScratchFolder folder;
+    for (const int session : {0, 1}) {
+        const auto world = open(folder / "store", 0, 1, half);
+        ASSERT_TRUE(world->everywhere());
+        run(*world);
+        expect_same(*world, expected);
+        EXPECT_EQ(world->figures().generated > 0, session == 0);
+        ASSERT_TRUE(world->flush());
+    }
+    const VoxelGrid kept = *read_grid_or_tiles(folder / "store");
+    EXPECT_EQ(kept.cells, expected.cells);
+    EXPECT_EQ(kept.points, expected.points);
+}
+
+TEST(engine_job_world, worlds_of_two_seeds_share_a_store_and_the_last_one_is_named_by_the_index)
+{
+    const ScratchFolder folder;
+    const auto session = [&](uint64_t seed) {
+        WorldRequest r{.settings = *resolve_generation(options()), .seed = seed, .store = folder / "store"};
+        auto world = *open_world(device(), std::move(r), labels_of_grid(street()));
+        EXPECT_TRUE(world->focus(looking(4, 6)));
+        run(*world);
+        EXPECT_TRUE(world->flush());
+        const VoxelGrid kept = *read_grid_or_tiles(folder / "store");
+        EXPECT_EQ(same_cells(kept, whole()) == kept.cells.size(), seed == 0);
+        return world->figures().generated;
+    };
+    EXPECT_GT(session(0), 0u);
+    EXPECT_GT(session(5), 0u);
+    EXPECT_EQ(session(0), 0u);
+    EXPECT_EQ(session(5), 0u);
+}
+
+TEST(engine_job_world, a_store_that_cannot_be_written_is_read)
+{
+    const ScratchFolder folder;
+    const Path store = folder / "store";
+    const auto session = [&](double x) {
+        const auto world = open(store);
+        EXPECT_TRUE(world->focus(looking(x, 2)));
+        run(*world);
+        EXPECT_TRUE(world->flush());
+        expect_same(*world, whole());
+        return std::pair{world->figures().generated, world->figures().loaded};
+    };
+    const auto [made, read] = session(-4);
+    fs::create_directory(store / "writable"); // where it tries to write
+    const uint64_t before = *hash_folder(store);
+    EXPECT_EQ(session(-4), (std::pair{uint64_t(0), made}));
+    EXPECT_GT(session(8).first, 0u);
+    EXPECT_EQ(*hash_folder(store), before);
+}
+
+// ---- labels that come later
+
+TEST(engine_job_world, tiles_whose_labels_are_not_there_yet_wait_and_no_others)
+{
+    const VoxelGrid all = street();
+    bool late = true;
+    size_t asked = 0;
+    auto world = *open_world(device(), {.settings = *resolve_generation(options()), .tiles_at_once = 4},
+                             labels_of_callback(0.6f, [&](const CellWindow& window, VoxelGrid& grid) -> Status {
+                                 ++asked;
+                                 if (late && window.holds({kEdge, 0, 0})) // of tile (1, 0), which two others see
+                                     return fail(kNotYet, "later");
+                                 for (size_t c = 0; c < all.cells.size(); ++c)
+                                     if (window.holds(all.cells[c]))
+                                         append_cell(grid, all, c);
+                                 return {};
+                             }));
+    ASSERT_TRUE(world->focus(looking(4, 30)));
+    run(*world);
+    EXPECT_EQ(world->figures().generated, 18u - 1 - 2); // (1, -1) and (1, 1)
+    EXPECT_FALSE(world->tile({1, 0}) || world->tile({1, 1}) || world->tile({1, -1}));
+    EXPECT_EQ(world->figures().finished, world->figures().wanted - 3);
+    expect_same(*world, whole());
+    const size_t before = asked;
+    run(*world);
+    EXPECT_EQ(asked, before);
+    late = false;
+    world->labels_ready({{kEdge, 0}, {kEdge, 0}});
+    run(*world);
+    EXPECT_EQ(world->figures().generated, 18u);
+    EXPECT_EQ(world->figures().finished, world->figures().wanted);
+    expect_same(*world, whole());
+}
+
+// ---- what a frame costs
+
+TEST(engine_job_world, a_wide_focus_over_nothing_looks_at_some_tiles_a_piece_and_keeps_none)
+{
+    size_t asked = 0;
+    auto world = *open_world(device(), {.settings = *resolve_generation(options()), .host_bytes = 1},
+                             labels_of_callback(0.6f, [&](const CellWindow&, VoxelGrid&) {
+                                 ++asked;
+                                 return Status();
+                             }));
+    ASSERT_TRUE(world->focus(looking(0, 100)));
+    EXPECT_EQ(asked, 0u);
+    const size_t wanted = world->figures().wanted;
+    EXPECT_GT(wanted, 2000u);
+    size_t steps = 0;
+    for (bool done = false; !done; ++steps) {
+        const size_t before = asked;
+        done = *world->step({~0u, 0});
+        EXPECT_LE(asked - before, 64u);
+    }
+    EXPECT_GT(steps, wanted / 64);
+    EXPECT_EQ(asked, wanted);
+    EXPECT_EQ(world->figures().finished, wanted);
+    EXPECT_EQ(world->figures().host_bytes, 0u);
+    EXPECT_EQ(world->figures().in_memory, 0u);
+    EXPECT_FALSE(world->figures().full);
+    ASSERT_TRUE(world->focus(looking(0.1, 100))); // an eighth of a tile is 0.45 m
+    EXPECT_EQ(run(*world), 1u);
+    EXPECT_EQ(asked, wanted);
+}
+
 // ---- splats
 
 // how many splats a tile has, and the largest sigma
@@ -436,23 +651,30 @@ TEST(engine_job_world, far_tiles_have_fewer_and_larger_splats_and_all_of_them_wh
 }
 
 // a file that cannot be written stands for a full disk
-TEST(engine_job_world, a_cache_that_cannot_be_written_is_told_once_and_no_splats_are_lost)
+TEST(engine_job_world, a_store_that_cannot_be_written_is_a_warning_and_no_splats_are_lost)
 {
     const ScratchFolder folder;
-    fs::create_directories(folder / "cache" / "tile_0_0.sgrid" / "in the way");
-    WorldRequest r{.settings = *resolve_generation(options()), .cache = folder / "cache"};
+    const Path store = folder / "cache";
+    {
+        const auto world = open(store);
+        ASSERT_TRUE(world->focus(looking(4, 30)));
+        run(*world);
+        ASSERT_TRUE(world->flush());
+    }
+    const std::string file = tile_file(store, {0, 0});
+    fs::remove_all(store);
+    fs::create_directories(store / file / "in the way");
+    WorldRequest r{.settings = *resolve_generation(options()), .store = store};
     r.splat_bytes = 4u << 20;
     r.tiles_at_once = 1;
-    const auto world = *open_world(device(), std::move(r), labels_of_grid(street()));
+    std::vector<std::string> warnings;
+    const JobCallbacks callbacks{
+        .progress = {}, .warning = [&](std::string_view text) { warnings.emplace_back(text); }, .detail = {}};
+    const auto world = *open_world(device(), std::move(r), labels_of_grid(street()), callbacks);
     ASSERT_TRUE(world->focus(looking(4, 30)));
-    size_t errors = 0;
-    for (bool done = false; !done;) {
-        const auto step = world->step(JobBudget::one_submit());
-        errors += !step;
-        ASSERT_LT(errors, 2u) << step.error().message;
-        done = step && *step;
-    }
-    EXPECT_EQ(errors, 1u);
+    run(*world, JobBudget::one_submit());
+    ASSERT_EQ(warnings.size(), 1u);
+    EXPECT_NE(warnings[0].find(file), std::string::npos) << warnings[0];
     EXPECT_EQ(world->figures().finished, world->figures().wanted);
     EXPECT_EQ(world->figures().generated, 18u);
     expect_same(*world, whole());
@@ -460,7 +682,57 @@ TEST(engine_job_world, a_cache_that_cannot_be_written_is_told_once_and_no_splats
         const VoxelGrid& cells = *world->tile(tile);
         EXPECT_EQ(splats_of(*world, tile).first, size_t(cells.points_per_voxel) * cells.cells.size());
     }
+    EXPECT_FALSE(world->stored());
     EXPECT_FALSE(world->flush());
+}
+
+TEST(engine_job_world, splats_from_before_an_edit_stay_until_the_new_ones_are_there)
+{
+    WorldRequest r{.settings = *resolve_generation(options())};
+    r.splat_bytes = 4u << 20;
+    const auto world = *open_world(device(), std::move(r), labels_of_grid(street()));
+    ASSERT_TRUE(world->focus(looking(4, 30)));
+    run(*world);
+    const auto tiles = tiles_of(*world);
+    const size_t before = world->splats()->surfels(), of_tile = splats_of(*world, {0, 0}).first;
+    const Cell added = {1, 2, 1};
+    LabelEdits edits = {{added, uint8_t(13)}};
+    ASSERT_TRUE(world->edit(edits));
+    EXPECT_FALSE(world->tile({0, 0}));
+    EXPECT_EQ(world->splats()->surfels(), before);
+    for (bool done = false; !done;) {
+        done = *world->step(JobBudget::one_submit());
+        for (const TileIndex& tile : tiles)
+            EXPECT_TRUE(world->splats()->has(tile));
+    }
+    EXPECT_EQ(splats_of(*world, {0, 0}).first, of_tile + size_t(world->tile({0, 0})->points_per_voxel));
+    edits.clear();
+    for (const Cell& cell : world->tile({3, 1})->cells) // nothing is left of this one
+        edits[cell] = std::nullopt;
+    ASSERT_TRUE(world->edit(edits));
+    EXPECT_TRUE(world->splats()->has({3, 1}));
+    run(*world);
+    EXPECT_FALSE(world->splats()->has({3, 1}));
+}
+
+TEST(engine_job_world, without_a_model_a_world_shows_the_points_that_its_grid_has)
+{
+    VoxelGrid some = whole();
+    const size_t without = *find_cell(some, {1, 2, 0});
+    some.generated[without] = 0;
+    WorldRequest r;
+    r.settings.regions.tile_cells = kEdge;
+    r.splat_bytes = 4u << 20;
+    const auto world = *open_world(device(), std::move(r), labels_of_grid(some));
+    ASSERT_TRUE(world->focus(looking(4, 30)));
+    run(*world);
+    EXPECT_EQ(world->figures().generated, 0u);
+    expect_same(*world, whole());
+    EXPECT_FALSE(find_cell(*world->tile({0, 0}), {1, 2, 0}));
+    EXPECT_EQ(world->splats()->surfels(), (some.cells.size() - 1) * size_t(some.points_per_voxel));
+    ASSERT_TRUE(world->edit({{{2, 2, 0}, std::nullopt}}));
+    run(*world);
+    EXPECT_EQ(world->splats()->surfels(), (some.cells.size() - 2) * size_t(some.points_per_voxel));
 }
 
 TEST(engine_job_world, where_all_splats_of_a_tile_do_not_fit_it_has_coarser_ones)

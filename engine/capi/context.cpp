@@ -161,6 +161,8 @@ const char* sr_status_name(sr_status status)
         return "SR_ERR_DEVICE_LOST";
     case SR_ERR_PARTIAL:
         return "SR_ERR_PARTIAL";
+    case SR_NOT_YET:
+        return "SR_NOT_YET";
     case SR_ERR_INTERNAL:
         return "SR_ERR_INTERNAL";
     case SR_ERR_INTERRUPTED:

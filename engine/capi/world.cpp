@@ -33,7 +33,10 @@ LabelCallback labels_callback(const sr_world_desc& d, float voxel_size)
         sr_grid cells;
         cells.grid.voxel_size = voxel_size;
         const sr_window asked{{window.low[0], window.low[1]}, {window.high[0], window.high[1]}};
-        if (const sr_status status = labels(user, &asked, &cells); status != SR_OK)
+        const sr_status status = labels(user, &asked, &cells);
+        if (status == SR_NOT_YET)
+            return fail(kNotYet, "the labels are not there yet");
+        if (status != SR_OK)
             return fail(ErrorCode(status), "the host's labels callback returned {}", sr_status_name(status));
         grid.cells = std::move(cells.read().cells);
         grid.labels = std::move(cells.read().labels);
@@ -71,7 +74,7 @@ Result<std::unique_ptr<sr_world>> make_world(sr_context& context, const sr_world
         SR_TRY(std::vector<SceneObject> objects, read_objects(d.objects));
         request.objects = std::move(objects);
     }
-    request.cache = d.cache ? Path(d.cache) : Path();
+    request.store = d.cache ? Path(d.cache) : Path();
     request.host_bytes = d.host_bytes;
     request.splat_bytes = d.splat_bytes;
     request.tiles_at_once = d.tiles_at_once;
@@ -80,7 +83,9 @@ Result<std::unique_ptr<sr_world>> make_world(sr_context& context, const sr_world
         request.surfels = {.sigma = float(d.splat_radius)};
     JobCallbacks callbacks;
     if (d.message)
-        callbacks.warning = [&d](std::string_view line) { d.message(d.user, std::string(line).c_str()); };
+        callbacks.warning = [message = d.message, user = d.user](std::string_view line) {
+            message(user, std::string(line).c_str());
+        };
     SR_TRY(world->world, open_world(*context.device, std::move(request), std::move(labels), callbacks));
     return world;
 }
@@ -114,20 +119,6 @@ sr_world_info info_of(const sr_world& world)
     info.tile_cells = uint32_t(world.world->tile_cells());
     info.points_per_cell = world.settings.model.config.points_per_voxel;
     return info;
-}
-
-VoxelGrid cells_in(const sr_world& world, const CellWindow& window)
-{
-    VoxelGrid out;
-    out.voxel_size = world.settings.model.config.voxel_size;
-    out.points_per_voxel = int(world.settings.model.config.points_per_voxel);
-    for (const TileIndex& index : world.world->tiles_with_points())
-        if (const VoxelGrid* tile = world.world->tile(index))
-            for (size_t c = 0; c < tile->cells.size(); ++c)
-                if (window.holds(tile->cells[c]))
-                    append_cell(out, *tile, c);
-    sort_cells(out);
-    return out;
 }
 
 } // namespace
@@ -188,6 +179,16 @@ sr_status sr_world_edit(sr_world* world, const sr_cell* cells, uint64_t count)
     });
 }
 
+sr_status sr_world_labels_ready(sr_world* world, const sr_window* window)
+{
+    return with_world(world, "sr_world_labels_ready", [&]() -> Status {
+        if (!window)
+            return fail(ErrorCode::usage, "sr_world_labels_ready: NULL");
+        world->world->labels_ready({{window->low[0], window->low[1]}, {window->high[0], window->high[1]}});
+        return {};
+    });
+}
+
 sr_status sr_world_get_info(sr_world* world, sr_world_info* info)
 {
     return with_world(world, "sr_world_get_info",
@@ -200,8 +201,8 @@ sr_status sr_world_copy_cells(sr_world* world, const sr_window* window, sr_grid*
         if (!window || !grid)
             return fail(ErrorCode::usage, "sr_world_copy_cells: NULL");
         *grid = nullptr;
-        *grid =
-            new sr_grid{cells_in(*world, {{window->low[0], window->low[1]}, {window->high[0], window->high[1]}}), {}};
+        const CellWindow asked{{window->low[0], window->low[1]}, {window->high[0], window->high[1]}};
+        *grid = new sr_grid{world->world->cells(asked), {}};
         return {};
     });
 }

@@ -2,10 +2,24 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/job/regeneration.h"
+#include "engine/job/told_objects.h"
 #include "engine/scene/grid_editor.h"
+#include "runtime/base/json.h"
 
 namespace semrover {
+
+// a grid of which some cells are to be generated anew, all the rest staying byte for byte: the end of edit and inpaint
+struct Regeneration {
+    std::string command; // "edit"
+    Path input;          // the file that `before` was read from
+    VoxelGrid before;
+    VoxelGrid grid;                // what is written, but for the targets
+    std::vector<uint32_t> targets; // ascending indices into `grid`
+    GivenObjects objects = {};     // what a model is told; written beside each output (objects_beside)
+    bool needs_objects = false;    // a model that cannot be told of them is an error
+    Json request;                  // what was asked for, for the settings of the run
+    Json counts;                   // for the report
+};
 
 // what `edit` asks for: operations in order, and how far around what they change is generated anew
 struct EditRequest {

@@ -228,9 +228,10 @@ void RunFolder::drop_if_empty()
     std::error_code ignored;
     for (const char* name : {"run.json", "journal.jsonl", "lock"})
         fs::remove(path_ / name, ignored);
-    for (const std::string& name : contents_.results)
-        fs::remove(path_ / name, ignored); // a file, or a folder that is empty
-    fs::remove(path_, ignored);            // stays if it holds anything else
+    for (const auto* names : {&contents_.pieces, &contents_.results})
+        for (const std::string& name : *names)
+            fs::remove(path_ / name, ignored); // a file, or a folder that is empty
+    fs::remove(path_, ignored);                // stays if it holds anything else
 }
 
 Status RunFolder::finish(const Json& results)

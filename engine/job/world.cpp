@@ -2,9 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/world.h"
 
-#include "engine/job/grid_filling.h"
-#include "engine/job/world_tiles.h"
 #include "engine/scene/cell_reach.h"
+#include "engine/scene/object_blocks.h"
 #include "engine/scene/palette.h"
 #include "runtime/base/hash.h"
 
@@ -16,113 +15,93 @@ namespace semrover {
 namespace {
 
 constexpr double kMostRadius = 2000;         // metres; some 140,000 tiles
+constexpr double kMostHorizon = 1000;        // likewise
 constexpr int32_t kFarthestCell = 1 << 19;   // of a focus
 constexpr uint64_t kNoDeadline = 1ull << 60; // microseconds
+constexpr size_t kTilesALook = 64;           // most of which need nothing
 
-// pieces of work, which take different times
-enum class Piece : uint8_t { look, load, cut, first_row, row, last_row, finish, splats };
-constexpr size_t kPieces = 8;
+} // namespace
 
-class StreamedWorld : public World {
-  public:
-    StreamedWorld(Device& device, WorldRequest request, std::unique_ptr<WorldLabels> labels,
-                  const JobCallbacks& callbacks)
-        : request_(std::move(request)), callbacks_(callbacks), labels_(std::move(labels)),
-          filling_(device, request_.settings, request_.transformer)
-    {
-    }
-    ~StreamedWorld() override { (void)filling_.cancel(); }
-
-    Status open();
-    Status focus(const WorldFocus& focus) override;
-    Result<bool> step(const JobBudget& budget) override;
-    Status edit(const LabelEdits& edits) override;
-    const VoxelGrid* tile(const TileIndex& tile) const override;
-    std::vector<TileIndex> tiles_with_points() const override;
-    int32_t tile_cells() const override { return request_.settings.regions.tile_cells; }
-    WorldFigures figures() const override;
-    const SplatPool* splats() const override { return splats_.get(); }
-    Status flush() override { return tiles_->drain(); }
-
-  private:
-    float voxel_size() const { return request_.settings.model.config.voxel_size; }
-    bool finished(const TileIndex& tile) const
-    {
-        const auto there = tiles_->all().find(tile);
-        return there != tiles_->all().end() && there->second.finished;
-    }
-    Status warm_up();
-    Status do_piece(Piece piece, bool waits);
-    Piece next_piece() const;
-    Status look();
-    Result<std::optional<TileIndex>> missing(const TileIndex& tile);
-    Result<bool> room_for(const TileIndex& wanted, size_t rank);
-    Status drop(const TileIndex& tile);
-    Status cut();
-    Status fill(bool waits);
-    Status finish();
-    uint32_t detail(const TileIndex& tile) const
-    {
-        return detail_of(distance_to_tile(focus_, tile, tile_cells(), voxel_size()), request_.detail_distance);
-    }
-    bool has_splats(const TileIndex& tile) const { return splats_->has(tile) && details_.at(tile) == detail(tile); }
-    void find_bare();
-    Result<SurfelScene> splats_of(const VoxelGrid& cells, uint32_t detail);
-    Result<bool> add_splats(const TileIndex& tile, const SurfelScene& surfels);
-    Status make_splats(const TileIndex& tile);
-    Status drop_splats(const TileIndex& tile);
-    void give_up();
-    void came(const TileIndex& tile);
-    Status went(const TileIndex& tile);
-
-    const WorldRequest request_;
-    const JobCallbacks callbacks_;
-    std::unique_ptr<WorldLabels> labels_;
-    std::unique_ptr<WorldTiles> tiles_;
-    GridFilling filling_;
-    WorldFocus focus_;
-    std::vector<TileIndex> wanted_; // first in front
-    size_t done_ = 0;               // of wanted_, from the front on
-    uint32_t at_once_ = 1;
-    bool idle_ = true, full_ = false;
-    std::vector<TileIndex> loading_;    // taken from the cache next
-    std::set<TileIndex> not_stored_;    // the cache does not have them
-    std::vector<TileIndex> work_;       // tiles that are being generated
-    bool cut_ = false, filled_ = false; // how far they are
-    VoxelGrid part_;                    // they, and what they know
-    std::unique_ptr<SplatPool> splats_;
-    std::vector<TileIndex> bare_;           // finished tiles whose splats are made next
-    std::map<TileIndex, uint32_t> details_; // that the splats of tiles were made for
-    std::array<SubmitCost, kPieces> costs_;
-    uint64_t generated_ = 0, loaded_ = 0, dropped_ = 0;
-};
-
-// names model, settings and seed: what the keys of tiles are made of beside labels and objects
-Status StreamedWorld::open()
+World::World(Device& device, WorldRequest request, std::unique_ptr<WorldLabels> labels, const JobCallbacks& callbacks)
+    : request_(std::move(request)), callbacks_(callbacks), labels_(std::move(labels)),
+      filling_(device, request_.settings, request_.transformer)
 {
-    const GenerationSettings& s = request_.settings;
-    if (!s.regions.tile_cells)
-        return fail(ErrorCode::usage, "a world is generated in the order of tiles: its settings need a tile size");
-    SR_CHECK(check_tile_options(s.regions));
+}
+
+double World::edge() const
+{
+    return tile_cells() * decimal_voxel_size(voxel_size());
+}
+
+double World::away(const TileIndex& tile) const
+{
+    return focus_ ? distance_to_tile({focus_->position[0], focus_->position[1]}, tile, edge()) : 0;
+}
+
+bool World::finished(const TileIndex& tile) const
+{
+    const WorldTile* there = tiles_->find(tile);
+    return (there && there->finished) || tiles_->is_empty(tile) || released_.contains(tile);
+}
+
+Status World::open()
+{
     if (!(request_.detail_distance >= 0 && std::isfinite(request_.detail_distance)))
         return fail(ErrorCode::usage, "a detail distance of {} m", request_.detail_distance);
+    return tile_cells() ? open_tiles() : open_scene();
+}
+
+Status World::open_scene()
+{
+    const GenerationSettings& s = request_.settings;
+    scene_.emplace();
+    SR_TRY(scene_->grid, labels_->take());
+    SR_TRY(const std::vector<SceneObject> objects,
+           told_objects(s.model, request_.objects, scene_->grid, request_.seed));
+    RegionOptions regions = s.regions;
+    if (!request_.targets.empty()) {
+        SR_TRY(scene_->part, cut_sub_grid(scene_->grid, request_.targets, cells_considered(regions)));
+        regions.from_known = true;
+    }
+    SR_CHECK(filling_.cut(request_.targets.empty() ? scene_->grid : scene_->part.grid, regions, objects));
+    return filling_.load(request_.seed, callbacks_);
+}
+
+// names model, settings and seed: what the keys of tiles are made of beside labels and objects
+Status World::open_tiles()
+{
+    const GenerationSettings& s = request_.settings;
+    if (!has_model()) {
+        tiles_ = std::make_unique<WorldTiles>(s, *labels_, WorldObjects::none(s.model), nullptr, 0);
+        return warm_up();
+    }
+    SR_CHECK(check_tile_options(s.regions));
+    const int points = int(s.model.config.points_per_voxel);
     if (std::abs(labels_->voxel_size() - voxel_size()) > 1e-4f * voxel_size())
         return fail(ErrorCode::bad_input, "the labels have cells of {} m, the model was trained on {} m",
                     labels_->voxel_size(), voxel_size());
+    if (labels_->points_per_voxel() && labels_->points_per_voxel() != points)
+        return fail(ErrorCode::bad_input, "the labels come with {} points a cell, the model makes {}",
+                    labels_->points_per_voxel(), points);
     SR_TRY(const Json settings, settings_json(s, filling_.device(), "world", 0));
     Hash base;
     base.add(settings.dump());
     base.add(std::as_bytes(std::span(&request_.seed, 1)));
     SR_TRY(WorldObjects objects, WorldObjects::create(s.model, request_.objects, request_.seed));
-    SR_TRY(tiles_, WorldTiles::create(s, *labels_, std::move(objects), request_.cache, base.value()));
+    std::unique_ptr<TileStore> store;
+    if (!request_.store.empty()) {
+        const TileFolderInfo info{labels_->voxel_size(), tile_cells(), points, true, request_.metadata};
+        SR_TRY(store, TileStore::open(request_.store, info, base.value()));
+    }
+    tiles_ = std::make_unique<WorldTiles>(s, *labels_, std::move(objects), std::move(store), base.value());
     at_once_ = request_.tiles_at_once;
     if (!at_once_) // a GPU wants more regions at once than one tile has ready; not measured
         at_once_ = filling_.device().limits().type == DeviceType::cpu ? 1 : 4;
     return warm_up();
 }
 
-// the first step of a region as large as regions get
-Status StreamedWorld::warm_up()
+// the first step of a region as large as regions get, and splats
+Status World::warm_up()
 {
     RegionOptions options = request_.settings.regions;
     options.tile_cells = 0;
@@ -131,11 +110,16 @@ Status StreamedWorld::warm_up()
     for (int32_t i = 0; i < options.region_size; ++i)
         grid.cells.push_back({i / 16, i % 16, 0});
     grid.labels.assign(grid.cells.size(), 0);
-    SR_CHECK(filling_.cut(grid, options));
-    SR_CHECK(filling_.load(request_.seed, callbacks_));
-    SR_CHECK(filling_.start(nullptr));
-    SR_CHECK(filling_.step({.submits = 2, .microseconds = kNoDeadline}).map([](bool) {}));
-    SR_CHECK(filling_.cancel());
+    make_room_for_points(grid, has_model() ? int(request_.settings.model.config.points_per_voxel)
+                                           : std::max(labels_->points_per_voxel(), 1));
+    if (has_model()) {
+        SR_CHECK(filling_.cut(grid, options));
+        SR_CHECK(filling_.load(request_.seed, callbacks_));
+        SR_TRY(planned_bytes_, filling_.bound_bytes());
+        SR_CHECK(filling_.start(nullptr));
+        SR_CHECK(filling_.step({.submits = 2, .microseconds = kNoDeadline}).map([](bool) {}));
+        SR_CHECK(filling_.cancel());
+    }
     if (!request_.splat_bytes)
         return {};
     SR_TRY(splats_, SplatPool::create(filling_.device(), request_.splat_bytes));
@@ -143,8 +127,9 @@ Status StreamedWorld::warm_up()
     return SurfelScene::create(filling_.device(), points_of(grid), request_.surfels).map([](const auto&) {});
 }
 
-Status StreamedWorld::focus(const WorldFocus& focus)
+Status World::focus(const WorldFocus& focus)
 {
+    SR_ASSERT(tiles_, "a focus needs the order of tiles");
     bool finite = std::isfinite(focus.radius);
     for (size_t a = 0; a < 3; ++a)
         finite = finite && std::isfinite(focus.position[a]) && std::isfinite(focus.direction[a]);
@@ -154,31 +139,76 @@ Status StreamedWorld::focus(const WorldFocus& focus)
     for (size_t a = 0; a < 2; ++a)
         if (std::abs(focus.position[a]) > kFarthestCell * double(voxel_size()))
             return fail(ErrorCode::usage, "a focus at {} m is too far out", focus.position[a]);
+    if (focus_ && is_nearly(*focus_, focus, edge()))
+        return {};
     focus_ = focus;
-    wanted_ = tiles_in_order(focus, tile_cells(), voxel_size());
-    done_ = 0;
-    idle_ = full_ = false;
-    loading_.clear();
+    releases_ = false;
+    want(TileOrder(focus, edge()));
     find_bare();
-    const double reach = focus.radius + 2 * tile_cells() * double(voxel_size());
+    const double reach = focus.radius + 2 * edge();
+    if (!has_model())
+        return {};
     const Cell low = cell_at({focus.position[0] - reach, focus.position[1] - reach, 0}, voxel_size());
     const Cell high = cell_at({focus.position[0] + reach, focus.position[1] + reach, 0}, voxel_size());
     tiles_->keep_objects_near({{low[0], low[1]}, {high[0], high[1]}});
     return {};
 }
 
+Status World::follow(std::span<const GroundPoint> track, double horizon)
+{
+    SR_ASSERT(tiles_ && !track.empty(), "a track needs the order of tiles");
+    if (!(horizon > 0 && horizon <= kMostHorizon))
+        return fail(ErrorCode::usage, "a horizon: expected metres above 0 and up to {}, found {}", kMostHorizon,
+                    horizon);
+    focus_.reset();
+    releases_ = true;
+    want(TileOrder(tiles_along(track, horizon, edge())));
+    say();
+    return {};
+}
+
+Status World::everywhere(RunFolder* run)
+{
+    if (scene_) {
+        SR_CHECK(filling_.start(run));
+        work_.emplace_back();
+        cut_ = true;
+        filling_.say(callbacks_);
+        return {};
+    }
+    SR_TRY(std::vector<TileIndex> all, labels_->tiles(tile_cells()));
+    focus_.reset();
+    releases_ = false;
+    want(TileOrder(std::move(all)));
+    say();
+    return {};
+}
+
+void World::want(TileOrder order)
+{
+    order_ = std::move(order);
+    released_.clear();
+    waiting_.clear();
+    full_ = false;
+    look_again();
+}
+
 // tiles that get fewer splats first: they make room for the others
-void StreamedWorld::find_bare()
+void World::find_bare()
 {
     bare_.clear();
-    for (const TileIndex& tile : wanted_)
-        if (splats_ && this->tile(tile) && !has_splats(tile))
-            bare_.push_back(tile);
+    std::vector<std::pair<double, TileIndex>> bare;
+    for (const auto& [index, there] : tiles_->all())
+        if (splats_ && away(index) <= focus_->radius && tile(index) && !has_splats(index))
+            bare.emplace_back(away(index), index);
+    std::ranges::sort(bare);
+    for (const auto& [away, index] : bare)
+        bare_.push_back(index);
     std::ranges::stable_partition(bare_,
                                   [this](const TileIndex& t) { return splats_->has(t) && details_.at(t) < detail(t); });
 }
 
-Piece StreamedWorld::next_piece() const
+World::Piece World::next_piece() const
 {
     if (!bare_.empty())
         return Piece::splats;
@@ -191,42 +221,45 @@ Piece StreamedWorld::next_piece() const
     return filling_.begins_batch() ? Piece::first_row : filling_.ends_batch() ? Piece::last_row : Piece::row;
 }
 
-Result<bool> StreamedWorld::step(const JobBudget& budget)
+Result<bool> World::step(const JobBudget& budget)
 {
     BudgetMeter meter(budget);
     bool spent = false; // something was done already
     while (!idle_ || !work_.empty() || !bare_.empty()) {
         const Piece piece = next_piece();
+        const bool submits = piece == Piece::first_row || piece == Piece::row || piece == Piece::last_row;
         SubmitCost& cost = costs_[size_t(piece)];
         if (spent && !meter.room_for(cost.bound()))
             return false;
-        if (const Status status = do_piece(piece, budget.timed()); !status) {
+        Status status;
+        if (submits) {
+            const auto filled = filling_.step({.submits = 1, .microseconds = budget.timed() ? kNoDeadline : ~0ull});
+            status = filled ? Status() : tl::make_unexpected(filled.error());
+            filled_ = filled && *filled;
+        } else {
+            status = do_piece(piece);
+        }
+        if (status && scene_ && filled_)
+            status = finish();
+        if (!status) {
             give_up();
             return tl::make_unexpected(status.error());
         }
-        meter.spent(cost, piece == Piece::first_row || piece == Piece::row || piece == Piece::last_row);
+        say();
+        meter.spent(cost, submits);
         spent = true;
     }
+    say(true);
     return true;
 }
 
-Status StreamedWorld::do_piece(Piece piece, bool waits)
+Status World::do_piece(Piece piece)
 {
     switch (piece) {
     case Piece::look:
         return look();
-    case Piece::load: {
-        const TileIndex tile = loading_.back();
-        loading_.pop_back();
-        SR_TRY(const bool there, tiles_->load(tile));
-        if (!there) {
-            not_stored_.insert(tile);
-            return {};
-        }
-        ++loaded_;
-        came(tile);
-        return {};
-    }
+    case Piece::load:
+        return load_next();
     case Piece::splats: {
         const TileIndex tile = bare_.front();
         bare_.erase(bare_.begin());
@@ -241,17 +274,54 @@ Status StreamedWorld::do_piece(Piece piece, bool waits)
     case Piece::last_row:
         break;
     }
-    return fill(waits);
+    SR_ASSERT(false, "a row is a step of the filling");
+    return {};
+}
+
+Status World::load_next()
+{
+    const TileIndex tile = loading_.back();
+    loading_.pop_back();
+    const auto there = tiles_->load(tile);
+    if (!there && there.error().code == kNotYet) {
+        waiting_.insert(tile);
+        return {};
+    }
+    SR_CHECK(there.map([](bool) {}));
+    if (!*there) {
+        not_stored_.insert(tile);
+        return {};
+    }
+    ++loaded_;
+    cells_ += tiles_->find(tile)->cells.cells.size();
+    came(tile);
+    return {};
 }
 
 // the first tile that is not finished among `tile` and those that it sees, lower colours first
-Result<std::optional<TileIndex>> StreamedWorld::missing(const TileIndex& tile)
+Result<std::optional<TileIndex>> World::missing(const TileIndex& tile)
 {
-    SR_TRY(const WorldTile* own, tiles_->bring(tile));
-    if (own->finished)
+    if (released_.contains(tile))
         return std::optional<TileIndex>();
-    if (!request_.cache.empty() && !not_stored_.contains(tile))
-        return std::optional(tile); // the cache may have it
+    if (waiting_.contains(tile))
+        return fail(kNotYet, "labels of tile ({}, {}) are not there yet", tile[0], tile[1]);
+    SR_TRY(WorldTile * own, tiles_->bring(tile));
+    if (!own) {
+        if (stale_.contains(tile)) // an edit took its last cell away
+            SR_CHECK(went(tile));
+        return std::optional<TileIndex>();
+    }
+    if (own->finished) {
+        if (std::exchange(own->fresh, false)) {
+            ++loaded_;
+            cells_ += own->cells.cells.size();
+            (void)tiles_->keep(tile); // the store's error is stored()
+            came(tile);
+        }
+        return std::optional<TileIndex>();
+    }
+    if (tiles_->store() && !not_stored_.contains(tile))
+        return std::optional(tile); // the store may have it
     for (const TileIndex& seen : tiles_seen_by(tile)) {
         SR_TRY(const auto first, missing(seen));
         if (first)
@@ -260,132 +330,223 @@ Result<std::optional<TileIndex>> StreamedWorld::missing(const TileIndex& tile)
     return std::optional(tile);
 }
 
-// finds what to do next: a tile of the cache, or tiles of one colour that wait for none
-Status StreamedWorld::look()
+// finds what to do next: a tile of the store, or tiles of one colour that wait for none
+Status World::look()
 {
-    while (done_ < wanted_.size() && finished(wanted_[done_]))
-        ++done_;
-    for (size_t rank = done_; rank < wanted_.size(); ++rank) {
-        SR_TRY(const auto first, missing(wanted_[rank]));
-        if (!first || std::ranges::count(work_, *first))
-            continue;
-        const bool stored = !request_.cache.empty() && !not_stored_.contains(*first);
-        if (!work_.empty() && (stored || tile_colour(*first) != tile_colour(work_[0])))
-            continue;
-        SR_TRY(const bool room, room_for(*first, rank));
-        if (!room) {
-            full_ = true;
-            break;
-        }
-        if (stored) {
-            loading_.push_back(*first);
+    for (size_t looked = 0; looked < kTilesALook; ++looked) {
+        const std::optional<TileIndex> tile = order_.at(rank_);
+        const bool far = !found_.empty() && rank_ > done_ + 4 * at_once_; // it would come before what is near
+        if (!tile || far || found_.size() >= at_once_) {
+            end_look();
             return {};
         }
-        work_.push_back(*first);
-        if (work_.size() >= at_once_)
+        SR_TRY(const bool goes_on, look_at(*tile));
+        if (!goes_on)
             return {};
-        if (rank >= done_ + 4 * at_once_) // what is far would come before what is near
-            break;
     }
-    idle_ = work_.empty();
     return {};
 }
 
+// at the tile whose turn it is; false: something was found that is done at once
+Result<bool> World::look_at(const TileIndex& tile)
+{
+    auto missed = missing(tile);
+    if (!missed && missed.error().code == kNotYet) {
+        waiting_.insert(tile);
+        passed();
+        return true;
+    }
+    SR_TRY(const auto first, std::move(missed));
+    if (!first) {
+        passed();
+        if (releases_)
+            release_around(tile);
+        return true;
+    }
+    const bool stored = tiles_->store() && !not_stored_.contains(*first);
+    const bool fits = found_.empty() ||
+                      (!stored && !std::ranges::count(found_, *first) && tile_colour(*first) == tile_colour(found_[0]));
+    if (!fits) {
+        ++rank_;
+        return true;
+    }
+    SR_TRY(const bool room, room_for(*first, rank_));
+    if (!room) {
+        full_ = true;
+        end_look();
+        return false;
+    }
+    if (stored) {
+        loading_.push_back(*first);
+        return false;
+    }
+    found_.push_back(*first);
+    ++rank_;
+    return true;
+}
+
+// there is nothing to do for a wanted tile
+void World::passed()
+{
+    if (rank_ == done_) {
+        ahead_.erase(done_);
+        ++done_;
+    } else {
+        ahead_.insert(rank_);
+    }
+    ++rank_;
+}
+
+void World::end_look()
+{
+    std::swap(work_, found_);
+    found_.clear();
+    rank_ = done_;
+    idle_ = work_.empty();
+}
+
+// it is wanted up to a rank, or seen by one that is, or at work
+bool World::is_kept(const TileIndex& tile, size_t rank) const
+{
+    const auto wanted = [&](const TileIndex& t) { return order_.rank_of(t).value_or(rank + 1) <= rank; };
+    return wanted(tile) || std::ranges::any_of(tiles_that_see(tile), wanted) || std::ranges::count(found_, tile) > 0;
+}
+
 // Drops what is out of reach, farthest first, then what is wanted after `rank`, until a tile fits. false: it does not.
-Result<bool> StreamedWorld::room_for(const TileIndex& tile, size_t rank)
+Result<bool> World::room_for(const TileIndex& tile, size_t rank)
 {
     if (!request_.host_bytes)
         return true;
-    std::set<TileIndex> kept(wanted_.begin(), wanted_.begin() + ptrdiff_t(rank) + 1);
-    for (const TileIndex& wanted : std::vector<TileIndex>(kept.begin(), kept.end()))
-        for (const TileIndex& seen : tiles_seen_by(wanted))
-            kept.insert(seen);
-    for (const TileIndex& busy : work_)
-        kept.insert(busy);
     SR_TRY(const WorldTile* own, tiles_->bring(tile));
     uint64_t needed = tiles_->bytes_with_points(*own);
-    for (const TileIndex& busy : work_)
-        needed += tiles_->bytes_with_points(tiles_->all().at(busy));
+    for (const TileIndex& busy : found_)
+        needed += tiles_->bytes_with_points(*tiles_->find(busy));
+    if (tiles_->bytes() + needed <= request_.host_bytes)
+        return true;
     std::vector<std::pair<double, TileIndex>> others;
     for (const auto& [index, there] : tiles_->all())
-        if (!kept.contains(index))
-            others.emplace_back(distance_to_tile(focus_, index, tile_cells(), voxel_size()), index);
+        if (!is_kept(index, rank))
+            others.emplace_back(away(index), index);
     std::ranges::sort(others);
     for (; tiles_->bytes() + needed > request_.host_bytes && !others.empty(); others.pop_back())
         SR_CHECK(drop(others.back().second));
     return tiles_->bytes() + needed <= request_.host_bytes;
 }
 
-Status StreamedWorld::drop(const TileIndex& tile)
+Status World::drop(const TileIndex& tile)
 {
-    const WorldTile& there = tiles_->all().at(tile);
+    const WorldTile& there = *tiles_->find(tile);
     if (there.stored)
         not_stored_.erase(tile);
-    if (there.finished && !there.cells.cells.empty()) {
+    if (there.finished) {
         ++dropped_;
         SR_CHECK(went(tile));
     }
+    if (const auto rank = order_.rank_of(tile))
+        ahead_.erase(*rank);
     tiles_->drop(tile);
     return {};
 }
 
-Status StreamedWorld::cut()
+// a tile and those beside it, where nothing wanted that is not finished lies beside them, and the store has them
+void World::release_around(const TileIndex& tile)
+{
+    const auto around = [](const TileIndex& middle) {
+        std::vector<TileIndex> tiles;
+        for (int32_t x = -1; x <= 1; ++x)
+            for (int32_t y = -1; y <= 1; ++y)
+                tiles.push_back({middle[0] + x, middle[1] + y});
+        return tiles;
+    };
+    const auto waits = [this](const TileIndex& t) { return order_.rank_of(t).has_value() && !finished(t); };
+    for (const TileIndex& other : around(tile)) {
+        const WorldTile* there = tiles_->find(other);
+        if (!there || (there->finished && !there->stored) || std::ranges::any_of(around(other), waits))
+            continue;
+        if (there->finished)
+            released_.insert(other);
+        not_stored_.erase(other);
+        tiles_->drop(other);
+    }
+}
+
+// labels around some of the tiles at work, of which their objects are guessed, are not there yet
+Status World::leave_out_work()
+{
+    for (const TileIndex& tile : work_)
+        if (const auto objects = tiles_->objects_near({&tile, 1}); !objects)
+            waiting_.insert(tile);
+    give_up();
+    return {};
+}
+
+Status World::cut()
 {
     SR_TRY(part_, tiles_->cut(work_));
-    SR_TRY(const std::vector<SceneObject> objects, tiles_->objects_near(work_));
-    SR_CHECK(filling_.cut(part_, request_.settings.regions, objects));
+    auto objects = tiles_->objects_near(work_);
+    if (!objects && objects.error().code == kNotYet)
+        return leave_out_work();
+    SR_CHECK(objects.map([](const auto&) {}));
+    SR_CHECK(filling_.cut(part_, request_.settings.regions, *objects));
     SR_CHECK(filling_.load(request_.seed, callbacks_));
     SR_CHECK(filling_.start(nullptr));
     cut_ = true;
     return {};
 }
 
-Status StreamedWorld::fill(bool waits)
+Status World::finish()
 {
-    SR_TRY(filled_, filling_.step({.submits = 1, .microseconds = waits ? kNoDeadline : ~0ull}));
-    return {};
-}
-
-Status StreamedWorld::finish()
-{
-    const Status stored = tiles_->finish(work_, part_);
-    for (const TileIndex& tile : work_) { // they are here, whether or not the cache has them
-        ++generated_;
-        came(tile);
+    if (scene_ && !request_.targets.empty())
+        put_back(scene_->grid, scene_->part, request_.targets);
+    if (!scene_) {
+        const Status stored = tiles_->finish(work_, part_);
+        for (const TileIndex& tile : work_) { // they are here, whether or not the store has them
+            ++generated_;
+            cells_ += tiles_->find(tile)->cells.cells.size();
+            came(tile);
+        }
+        if (!stored && !warned_ && callbacks_.warning)
+            callbacks_.warning(fmt::format("finished tiles are not kept: {}", stored.error().message));
+        warned_ = warned_ || !stored;
     }
     work_.clear();
     cut_ = filled_ = false;
-    return stored;
+    return {};
 }
 
 // after an error, or where what is being made is not wanted any more
-void StreamedWorld::give_up()
+void World::give_up()
 {
     if (cut_)
         (void)filling_.cancel(); // what fails then will fail again
     work_.clear();
+    found_.clear();
+    rank_ = done_;
     cut_ = filled_ = false;
 }
 
-void StreamedWorld::came(const TileIndex& tile)
+void World::came(const TileIndex& tile)
 {
     if (splats_)
         bare_.push_back(tile);
+    if (const auto rank = order_.rank_of(tile); rank && *rank >= done_)
+        ahead_.insert(*rank);
 }
 
-Status StreamedWorld::went(const TileIndex& tile)
+Status World::went(const TileIndex& tile)
 {
     std::erase(bare_, tile);
+    stale_.erase(tile);
     return splats_ ? drop_splats(tile) : Status();
 }
 
-Status StreamedWorld::drop_splats(const TileIndex& tile)
+Status World::drop_splats(const TileIndex& tile)
 {
     details_.erase(tile);
     return splats_->remove(tile);
 }
 
-Result<SurfelScene> StreamedWorld::splats_of(const VoxelGrid& cells, uint32_t detail)
+Result<SurfelScene> World::splats_of(const VoxelGrid& cells, uint32_t detail)
 {
     const ScenePoints points = points_of(cells);
     if (!detail)
@@ -399,13 +560,13 @@ Result<SurfelScene> StreamedWorld::splats_of(const VoxelGrid& cells, uint32_t de
 }
 
 // those out of reach make room, farthest first; false: there is none
-Result<bool> StreamedWorld::add_splats(const TileIndex& index, const SurfelScene& surfels)
+Result<bool> World::add_splats(const TileIndex& index, const SurfelScene& surfels)
 {
     details_.erase(index);
     SR_TRY(bool there, splats_->add(index, surfels));
     std::vector<std::pair<double, TileIndex>> others;
     for (const auto& [other, place] : splats_->places())
-        if (const double away = distance_to_tile(focus_, other, tile_cells(), voxel_size()); away > focus_.radius)
+        if (const double away = this->away(other); focus_ && away > focus_->radius)
             others.emplace_back(away, other);
     std::ranges::sort(others);
     for (; !there && !others.empty(); others.pop_back()) {
@@ -416,7 +577,7 @@ Result<bool> StreamedWorld::add_splats(const TileIndex& index, const SurfelScene
 }
 
 // One that is dropped meanwhile has none. Where there is no room, coarser ones may fit.
-Status StreamedWorld::make_splats(const TileIndex& index)
+Status World::make_splats(const TileIndex& index)
 {
     const VoxelGrid* cells = tile(index);
     if (!cells || has_splats(index))
@@ -430,58 +591,95 @@ Status StreamedWorld::make_splats(const TileIndex& index)
     }
     if (there)
         details_[index] = wanted;
+    stale_.erase(index);
     return {};
 }
 
-Status StreamedWorld::edit(const LabelEdits& edits)
+Status World::edit(const LabelEdits& edits)
 {
     for (const auto& [cell, label] : edits) {
         for (const int32_t c : cell)
             if (c < -kMaxCoordinate || c > kMaxCoordinate)
                 return fail(ErrorCode::bad_input, "an edit of cell ({}, {}, {}): beyond 2^20", cell[0], cell[1],
                             cell[2]);
-        if (label && *label >= request_.settings.model.config.num_classes)
+        const uint32_t classes = has_model() ? uint32_t(request_.settings.model.config.num_classes) : kClassCount;
+        if (label && *label >= classes)
             return fail(ErrorCode::bad_input, "an edit of cell ({}, {}, {}): label {}, the model knows {} classes",
-                        cell[0], cell[1], cell[2], *label, request_.settings.model.config.num_classes);
+                        cell[0], cell[1], cell[2], *label, classes);
     }
-    std::set<TileIndex> before;
-    for (const auto& [index, there] : tiles_->all())
-        if (there.finished && !there.cells.cells.empty())
-            before.insert(index);
-    SR_TRY(const std::vector<TileIndex> spoiled, tiles_->edit(edits));
+    const std::vector<TileIndex> spoiled = tiles_->edit(edits);
     for (const TileIndex& tile : spoiled) {
-        not_stored_.erase(tile); // the cache may have it as it was before another edit
-        if (before.contains(tile))
-            SR_CHECK(went(tile));
+        not_stored_.erase(tile); // the store may have it as it was before another edit
+        released_.erase(tile);
+        std::erase(bare_, tile);
+        if (splats_ && splats_->has(tile))
+            stale_.insert(tile);
     }
     if (std::ranges::any_of(work_, [&](const TileIndex& t) { return std::ranges::count(spoiled, t) > 0; }))
         give_up();
-    loading_.clear();
-    done_ = 0;
-    idle_ = false;
+    look_again();
     return {};
 }
 
-const VoxelGrid* StreamedWorld::tile(const TileIndex& tile) const
+void World::labels_ready(const CellWindow& window)
 {
-    const auto there = tiles_->all().find(tile);
-    const bool has_points = there != tiles_->all().end() && there->second.finished && there->second.cells.has_points();
-    return has_points ? &there->second.cells : nullptr;
+    const int32_t reach = 2 * object_block_cells(voxel_size()); // of labels that objects are guessed from
+    std::erase_if(waiting_, [&](const TileIndex& tile) {
+        const CellWindow around = tile_window(tile, tile_cells(), reach);
+        return around.low[0] <= window.high[0] && around.high[0] >= window.low[0] && around.low[1] <= window.high[1] &&
+               around.high[1] >= window.low[1];
+    });
+    look_again();
 }
 
-std::vector<TileIndex> StreamedWorld::tiles_with_points() const
+// from the front on
+void World::look_again()
+{
+    loading_.clear();
+    found_.clear();
+    ahead_.clear();
+    done_ = rank_ = 0;
+    idle_ = false;
+}
+
+const VoxelGrid* World::tile(const TileIndex& tile) const
+{
+    const WorldTile* there = tiles_->find(tile);
+    return there && there->finished ? &there->cells : nullptr;
+}
+
+std::vector<TileIndex> World::tiles_with_points() const
 {
     std::vector<TileIndex> tiles;
     for (const auto& [index, there] : tiles_->all())
-        if (tile(index))
+        if (there.finished)
             tiles.push_back(index);
     return tiles;
 }
 
-WorldFigures StreamedWorld::figures() const
+VoxelGrid World::cells(const CellWindow& window) const
 {
-    WorldFigures f{.wanted = wanted_.size(), .in_memory = tiles_->all().size(), .host_bytes = tiles_->bytes()};
-    f.finished = size_t(std::ranges::count_if(wanted_, [this](const TileIndex& t) { return finished(t); }));
+    VoxelGrid out;
+    out.voxel_size = voxel_size();
+    out.points_per_voxel =
+        has_model() ? int(request_.settings.model.config.points_per_voxel) : labels_->points_per_voxel();
+    for (const TileIndex& index : tiles_in(tiles_->all(), window, tile_cells()))
+        if (const VoxelGrid* there = tile(index))
+            for (size_t c = 0; c < there->cells.size(); ++c)
+                if (window.holds(there->cells[c]))
+                    append_cell(out, *there, c);
+    sort_cells(out);
+    return out;
+}
+
+WorldFigures World::figures() const
+{
+    WorldFigures f{.wanted = order_.size(), .in_memory = tiles_->all().size(), .host_bytes = tiles_->bytes()};
+    const auto passed = [this](const TileIndex& tile) {
+        const auto rank = order_.rank_of(tile);
+        return rank && (*rank < done_ || ahead_.contains(*rank));
+    };
+    f.finished = done_ + ahead_.size() - size_t(std::ranges::count_if(waiting_, passed));
     f.generated = generated_;
     f.loaded = loaded_;
     f.dropped = dropped_;
@@ -489,13 +687,67 @@ WorldFigures StreamedWorld::figures() const
     return f;
 }
 
-} // namespace
+void World::say(bool ended) const
+{
+    if (!callbacks_.progress)
+        return;
+    if (scene_)
+        return filling_.say(callbacks_, ended);
+    JobProgress p{.stage = "generate", .unit = "tiles"};
+    p.done = done_ + ahead_.size();
+    p.total = order_.size();
+    p.device_bytes = ended ? 0 : filling_.device().allocated_bytes();
+    p.ended = ended;
+    callbacks_.progress(p);
+}
+
+Json World::results() const
+{
+    if (scene_)
+        return filling_.results();
+    return {{"cells", cells_},
+            {"tiles", generated_ + loaded_},
+            {"planned_device_bytes", planned_bytes_},
+            {"peak_device_bytes", filling_.device().peak_bytes()}};
+}
+
+Result<Json> World::estimate(size_t runs)
+{
+    SR_TRY(Json report, filling_.estimate(runs)); // in the order of tiles of the region that open() began
+    if (scene_)
+        return report;
+    size_t cells = 0, regions = 0, tiles = 0;
+    const size_t most = size_t(most_targets(request_.settings.regions));
+    for (size_t rank = 0; const auto index = order_.at(rank); ++rank) {
+        SR_TRY(const WorldTile* tile, tiles_->bring(*index));
+        if (!tile || tile->finished)
+            continue;
+        const auto known = std::ranges::count_if(tile->known, [](uint8_t k) { return k != 0; });
+        const size_t missing = tile->cells.cells.size() - size_t(known);
+        cells += missing;
+        regions += (missing + most - 1) / most;
+        ++tiles;
+        tiles_->drop(*index);
+    }
+    const double seconds = report["seconds"].get<double>() / report["regions"].get<double>();
+    report.update({{"tiles", tiles},
+                   {"cells", cells},
+                   {"regions", regions},
+                   {"seconds", seconds * double(regions)},
+                   {"peak_device_bytes", planned_bytes_}});
+    return report;
+}
+
+Status World::flush()
+{
+    return tiles_->store() ? tiles_->store()->flush() : Status();
+}
 
 Result<std::unique_ptr<World>> open_world(Device& device, WorldRequest request, std::unique_ptr<WorldLabels> labels,
                                           const JobCallbacks& callbacks)
 {
     SR_ASSERT(labels, "a world needs labels");
-    auto world = std::make_unique<StreamedWorld>(device, std::move(request), std::move(labels), callbacks);
+    auto world = std::make_unique<World>(device, std::move(request), std::move(labels), callbacks);
     SR_CHECK(world->open());
     return world;
 }

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <deque>
+#include <set>
 
 namespace semrover {
 
@@ -13,11 +14,24 @@ namespace {
 
 constexpr size_t kTilesKept = 9; // of a folder: a place and what is around it
 
-VoxelGrid empty_grid(float voxel_size)
+VoxelGrid empty_grid(float voxel_size, int points_per_voxel = 0)
 {
     VoxelGrid grid;
     grid.voxel_size = voxel_size;
+    grid.points_per_voxel = points_per_voxel;
     return grid;
+}
+
+// adds the cells of `from`, which is sorted, that a window holds
+void append_window(VoxelGrid& to, const VoxelGrid& from, const CellWindow& window)
+{
+    if (!from.has_points())
+        return append_labels(to, from, window);
+    const auto begin = std::ranges::lower_bound(from.cells, Cell{window.low[0], INT32_MIN, INT32_MIN});
+    for (size_t c = size_t(begin - from.cells.begin()); c < from.cells.size() && from.cells[c][0] <= window.high[0];
+         ++c)
+        if (window.holds(from.cells[c]))
+            append_cell(to, from, c);
 }
 
 class GridLabels : public WorldLabels {
@@ -25,12 +39,21 @@ class GridLabels : public WorldLabels {
     explicit GridLabels(VoxelGrid grid) : grid_(std::move(grid)) { sort_cells(grid_); }
 
     float voxel_size() const override { return grid_.voxel_size; }
+    int points_per_voxel() const override { return grid_.has_points() ? grid_.points_per_voxel : 0; }
     Result<VoxelGrid> read(const CellWindow& window) override
     {
-        VoxelGrid out = empty_grid(grid_.voxel_size);
-        append_labels(out, grid_, window);
+        VoxelGrid out = empty_grid(grid_.voxel_size, points_per_voxel());
+        append_window(out, grid_, window);
         return out;
     }
+    Result<std::vector<TileIndex>> tiles(int32_t tile_cells) const override
+    {
+        std::set<TileIndex> tiles;
+        for (const Cell& cell : grid_.cells)
+            tiles.insert(tile_of(cell, tile_cells));
+        return std::vector<TileIndex>(tiles.begin(), tiles.end());
+    }
+    Result<VoxelGrid> take() override { return std::move(grid_); }
 
   private:
     VoxelGrid grid_;
@@ -41,16 +64,31 @@ class FolderLabels : public WorldLabels {
     explicit FolderLabels(TileFolder folder) : folder_(std::move(folder)) {}
 
     float voxel_size() const override { return folder_.voxel_size(); }
+    int points_per_voxel() const override { return folder_.has_points() ? folder_.points_per_voxel() : 0; }
     Result<VoxelGrid> read(const CellWindow& window) override
     {
-        VoxelGrid out = empty_grid(folder_.voxel_size());
+        VoxelGrid out = empty_grid(folder_.voxel_size(), points_per_voxel());
         for (const TileIndex& index : folder_.tiles_in(window)) {
             SR_TRY(const VoxelGrid* tile, tile_at(index));
-            append_labels(out, *tile, window);
+            append_window(out, *tile, window);
         }
         sort_cells(out);
         return out;
     }
+    Result<std::vector<TileIndex>> tiles(int32_t tile_cells) const override
+    {
+        std::set<TileIndex> tiles;
+        for (const auto& [index, entry] : folder_.tiles()) {
+            const CellWindow held = tile_window(index, folder_.tile_cells());
+            const TileIndex low = tile_of({held.low[0], held.low[1], 0}, tile_cells);
+            const TileIndex high = tile_of({held.high[0], held.high[1], 0}, tile_cells);
+            for (int32_t x = low[0]; x <= high[0]; ++x)
+                for (int32_t y = low[1]; y <= high[1]; ++y)
+                    tiles.insert({x, y});
+        }
+        return std::vector<TileIndex>(tiles.begin(), tiles.end());
+    }
+    Result<VoxelGrid> take() override { return folder_.read_all(); }
 
   private:
     Result<const VoxelGrid*> tile_at(const TileIndex& index)
@@ -99,7 +137,15 @@ class CallbackLabels : public WorldLabels {
         return grid;
     }
 
+    Result<std::vector<TileIndex>> tiles(int32_t) const override { return without_end(); }
+    Result<VoxelGrid> take() override { return without_end(); }
+
   private:
+    static tl::unexpected<Error> without_end()
+    {
+        return fail(ErrorCode::usage, "labels of a callback have no end: not all of them can be generated");
+    }
+
     float voxel_size_;
     LabelCallback callback_;
 };

@@ -14,6 +14,8 @@ class WorldObjects {
     // model: outlives this. Errors: bad_input for objects that it cannot be told of
     static Result<WorldObjects> create(const VoxfieldModel& model, const GivenObjects& given, uint64_t seed);
 
+    static WorldObjects none(const VoxfieldModel& model) { return {model, 0}; } // of a world without a model
+
     // Those that may reach a cell of the window, always in the same order. Errors: of the source; as guess_objects
     Result<std::vector<SceneObject>> near(WorldLabels& labels, const CellWindow& window);
     void keep_near(const CellWindow& window); // forgets the blocks that do not reach it

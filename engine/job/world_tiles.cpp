@@ -13,103 +13,167 @@ namespace semrover {
 
 namespace {
 
-constexpr size_t kFilesWaiting = 16; // for the disk
+constexpr size_t kMostEmpty = 1 << 20; // places that are remembered
+
+// cells that have points already
+std::vector<uint8_t> known_of(const VoxelGrid& cells)
+{
+    return std::ranges::count(cells.generated, 0) == int64_t(cells.generated.size()) ? std::vector<uint8_t>()
+                                                                                     : cells.generated;
+}
+
+// those of its cells that have points
+VoxelGrid with_points(const VoxelGrid& cells)
+{
+    VoxelGrid out;
+    out.voxel_size = cells.voxel_size;
+    out.points_per_voxel = cells.points_per_voxel;
+    for (size_t c = 0; c < cells.generated.size(); ++c)
+        if (cells.generated[c])
+            append_cell(out, cells, c);
+    return out;
+}
+
+std::vector<TileIndex> beside(const TileIndex& tile)
+{
+    std::vector<TileIndex> tiles = tiles_seen_by(tile);
+    for (int32_t x = -1; x <= 1; ++x)
+        for (int32_t y = -1; y <= 1; ++y)
+            if (const TileIndex other{tile[0] + x, tile[1] + y}; other != tile && !std::ranges::count(tiles, other))
+                tiles.push_back(other);
+    return tiles;
+}
 
 } // namespace
 
-uint64_t WorldTile::bytes() const
+WorldTiles::WorldTiles(const GenerationSettings& settings, WorldLabels& labels, WorldObjects objects,
+                       std::unique_ptr<TileStore> store, uint64_t base)
+    : settings_(settings), labels_(labels), objects_(std::move(objects)), store_(std::move(store)), base_(base)
 {
-    return sizeof(*this) + cells.cells.size() * sizeof(Cell) + cells.labels.size() + cells.points.size() * 2 +
-           cells.colors.size() + cells.generated.size();
-}
-
-WorldTiles::WorldTiles(const GenerationSettings& settings, WorldLabels& labels, WorldObjects objects, const Path& cache,
-                       uint64_t base)
-    : settings_(settings), labels_(labels), objects_(std::move(objects)), cache_(cache), base_(base)
-{
-}
-
-Result<std::unique_ptr<WorldTiles>> WorldTiles::create(const GenerationSettings& settings, WorldLabels& labels,
-                                                       WorldObjects objects, const Path& cache, uint64_t base)
-{
-    std::unique_ptr<WorldTiles> t(new WorldTiles(settings, labels, std::move(objects), cache, base));
-    if (cache.empty())
-        return t;
-    SR_CHECK(make_folder(cache));
-    SR_CHECK(AtomicFile::create(cache / "writable").map([](const AtomicFile&) {}));
-    t->files_ = std::make_unique<FileQueue>(kFilesWaiting);
-    return t;
 }
 
 Result<WorldTile*> WorldTiles::bring(const TileIndex& tile)
 {
     if (const auto there = tiles_.find(tile); there != tiles_.end())
         return &there->second;
+    if (empty_.contains(tile))
+        return nullptr;
     SR_TRY(const VoxelGrid labels, labels_.read(tile_window(tile, edge())));
     const auto edits = edits_.find(tile);
     WorldTile made{.cells = edits == edits_.end() ? labels : with_edits(labels, edits->second)};
-    made.finished = made.cells.cells.empty();
-    return &tiles_.emplace(tile, std::move(made)).first->second;
+    if (settings_.model.folder.empty())
+        made.cells = with_points(made.cells);
+    if (made.cells.cells.empty()) {
+        if (empty_.size() == kMostEmpty)
+            empty_.clear();
+        empty_.insert(tile);
+        return nullptr;
+    }
+    made.known = known_of(made.cells);
+    made.finished = made.fresh = !made.known.empty() && !std::ranges::count(made.known, 0);
+    WorldTile& there = tiles_.emplace(tile, std::move(made)).first->second;
+    count(there);
+    return &there;
 }
 
-uint64_t WorldTiles::bytes() const
+const WorldTile* WorldTiles::find(const TileIndex& tile) const
 {
-    uint64_t bytes = 0;
-    for (const auto& [index, tile] : tiles_)
-        bytes += tile.bytes();
-    return bytes;
+    const auto there = tiles_.find(tile);
+    return there == tiles_.end() ? nullptr : &there->second;
+}
+
+void WorldTiles::count(WorldTile& tile)
+{
+    const VoxelGrid& c = tile.cells;
+    bytes_ -= tile.bytes;
+    tile.bytes = sizeof(tile) + c.cells.size() * sizeof(Cell) + c.labels.size() + c.points.size() * 2 +
+                 c.colors.size() + c.generated.size() + tile.known.size();
+    bytes_ += tile.bytes;
 }
 
 uint64_t WorldTiles::bytes_with_points(const WorldTile& tile) const
 {
     const size_t n = settings_.model.config.points_per_voxel;
-    return sizeof(tile) + tile.cells.cells.size() * (sizeof(Cell) + 2 + n * 9);
+    return sizeof(tile) + tile.known.size() + tile.cells.cells.size() * (sizeof(Cell) + 2 + n * 9);
 }
 
-// of the tile's labels, of what the model is told of them, and of the tiles that it sees
+void WorldTiles::drop(const TileIndex& tile)
+{
+    const auto there = tiles_.find(tile);
+    if (there == tiles_.end())
+        return;
+    bytes_ -= there->second.bytes;
+    tiles_.erase(there);
+}
+
+// of the tile's cells and of what the model is told of them, of the tiles that it sees, and of the points around it
+// that the source has
 Result<uint64_t> WorldTiles::key_of(const TileIndex& index)
 {
-    SR_TRY(WorldTile * tile, bring(index));
-    if (tile->key)
-        return *tile->key;
     Hash hash;
     const auto add = [&hash](const auto& values) { hash.add(std::as_bytes(std::span(values))); };
     add(std::array{base_});
     add(index);
+    SR_TRY(WorldTile * tile, bring(index));
+    if (!tile)
+        return hash.value();
+    if (tile->key)
+        return *tile->key;
     add(tile->cells.cells);
     add(tile->cells.labels);
-    if (!tile->cells.cells.empty()) {
-        SR_TRY(const std::vector<SceneObject> objects, objects_near({&index, 1}));
-        SR_TRY(const CellConditions told, CellConditions::create(settings_.model.config, tile->cells, objects));
-        std::vector<float> row(told.width());
-        for (uint32_t c = 0; c < tile->cells.cells.size() && !told.empty(); ++c) {
-            told.row(c, tile->cells.cells[c], row);
-            add(row);
-        }
+    SR_TRY(const std::vector<SceneObject> objects, objects_near({&index, 1}));
+    SR_TRY(const CellConditions told, CellConditions::create(settings_.model.config, tile->cells, objects));
+    std::vector<float> row(told.width());
+    for (uint32_t c = 0; c < tile->cells.cells.size() && !told.empty(); ++c) {
+        told.row(c, tile->cells.cells[c], row);
+        add(row);
     }
     for (const TileIndex& seen : tiles_seen_by(index)) {
         SR_TRY(const uint64_t key, key_of(seen));
         add(std::array{key});
     }
+    if (labels_.points_per_voxel()) {
+        VoxelGrid known;
+        SR_CHECK(add_known(known, index, {&index, 1}, false));
+        for (const TileIndex& other : beside(index))
+            SR_CHECK(add_known(known, other, {&index, 1}, false));
+        add(known.cells);
+        add(known.points);
+        add(known.colors);
+    }
     tile->key = hash.value(); // note: what a map holds stays where it is while others are brought
     return *tile->key;
 }
 
+// Adds what targets know of another tile: all cells of one that they see, those with points in the source of others.
+Status WorldTiles::add_known(VoxelGrid& part, const TileIndex& index, std::span<const TileIndex> targets, bool seen)
+{
+    SR_TRY(const WorldTile* tile, bring(index));
+    if (!tile)
+        return {};
+    SR_ASSERT(!seen || tile->finished, "tile ({}, {}) is seen before it is finished", index[0], index[1]);
+    for (size_t c = 0; c < tile->cells.cells.size(); ++c) {
+        const Cell& cell = tile->cells.cells[c];
+        if (!seen && (tile->known.empty() || !tile->known[c]))
+            continue;
+        if (std::ranges::any_of(targets, [&](const TileIndex& target) {
+                return tile_window(target, edge(), settings_.regions.halo_cells).holds(cell);
+            }))
+            append_cell(part, tile->cells, c);
+    }
+    return {};
+}
+
 Result<bool> WorldTiles::load(const TileIndex& index)
 {
-    if (stores_ && waiting_.contains(index))
-        SR_CHECK(drain());
-    std::error_code ignored;
-    if (cache_.empty() || !std::filesystem::exists(path_of(index), ignored))
+    if (!store_)
         return false;
     SR_TRY(WorldTile * tile, bring(index));
-    SR_TRY(const uint64_t key, key_of(index));
-    const auto stored = read_grid(path_of(index));
-    if (!stored) // damaged: it is made anew
+    if (!tile)
         return false;
-    const auto entry = stored->metadata.find("key");
-    const bool same = entry != stored->metadata.end() && entry->second == hash_text(key) &&
-                      stored->cells == tile->cells.cells && stored->labels == tile->cells.labels &&
+    SR_TRY(const uint64_t key, key_of(index));
+    const std::optional<VoxelGrid> stored = store_->read(index, key);
+    const bool same = stored && stored->cells == tile->cells.cells && stored->labels == tile->cells.labels &&
                       stored->points_per_voxel == int(settings_.model.config.points_per_voxel);
     if (!same || !stored->has_points() || std::ranges::count(stored->generated, 0))
         return false;
@@ -118,6 +182,7 @@ Result<bool> WorldTiles::load(const TileIndex& index)
     tile->cells.colors = stored->colors;
     tile->cells.generated = stored->generated;
     tile->finished = tile->stored = true;
+    count(*tile);
     return true;
 }
 
@@ -126,24 +191,23 @@ Result<VoxelGrid> WorldTiles::cut(std::span<const TileIndex> targets)
     VoxelGrid part;
     part.voxel_size = labels_.voxel_size();
     part.points_per_voxel = int(settings_.model.config.points_per_voxel);
-    std::set<TileIndex> seen;
+    std::map<TileIndex, bool> around; // true: seen
     for (const TileIndex& target : targets) {
         SR_ASSERT(tile_colour(target) == tile_colour(targets[0]), "tiles of two colours at a time");
         SR_TRY(WorldTile * tile, bring(target));
         make_room_for_points(tile->cells, part.points_per_voxel);
+        count(*tile);
         append_cells(part, tile->cells);
+        if (labels_.points_per_voxel())
+            for (const TileIndex& other : beside(target))
+                around.emplace(other, false);
         for (const TileIndex& other : tiles_seen_by(target))
-            seen.insert(other);
+            around[other] = true;
     }
-    for (const TileIndex& other : seen) {
-        SR_TRY(const WorldTile* tile, bring(other));
-        SR_ASSERT(tile->finished, "tile ({}, {}) is seen before it is finished", other[0], other[1]);
-        for (size_t c = 0; c < tile->cells.cells.size(); ++c)
-            if (std::ranges::any_of(targets, [&](const TileIndex& target) {
-                    return tile_window(target, edge(), settings_.regions.halo_cells).holds(tile->cells.cells[c]);
-                }))
-                append_cell(part, tile->cells, c);
-    }
+    for (const TileIndex& target : targets)
+        around.erase(target);
+    for (const auto& [other, seen] : around)
+        SR_CHECK(add_known(part, other, targets, seen));
     sort_cells(part);
     return part;
 }
@@ -175,34 +239,30 @@ Status WorldTiles::finish(std::span<const TileIndex> targets, const VoxelGrid& p
         }
         tile.finished = true;
     }
-    if (!files_ || !stores_)
+    if (!store_)
         return {};
     for (const TileIndex& target : targets)
-        if (stores_)
-            stores_ = write(target, tiles_.at(target));
-    return stores_;
+        SR_CHECK(write(target, tiles_.at(target)));
+    return {};
+}
+
+Status WorldTiles::keep(const TileIndex& index)
+{
+    WorldTile& tile = tiles_.at(index);
+    return store_ && !tile.stored ? write(index, tile) : Status();
 }
 
 Status WorldTiles::write(const TileIndex& index, WorldTile& from)
 {
     SR_TRY(const uint64_t key, key_of(index));
     VoxelGrid file = from.cells;
-    file.metadata = {{"key", hash_text(key)}, {"tool", kProgram}};
-    SR_CHECK(files_->push([path = path_of(index), file = std::move(file)] { return write_grid(path, file); }));
-    from.stored = true;
-    waiting_.insert(index);
+    file.metadata = {{"tool", kProgram}};
+    SR_CHECK(store_->write(index, key, std::move(file)));
+    from.stored = !store_->read_only();
     return {};
 }
 
-Status WorldTiles::drain()
-{
-    if (files_ && stores_)
-        stores_ = files_->drain();
-    waiting_.clear();
-    return stores_;
-}
-
-Result<std::vector<TileIndex>> WorldTiles::edit(const LabelEdits& edits)
+std::vector<TileIndex> WorldTiles::edit(const LabelEdits& edits)
 {
     std::set<TileIndex> changed;
     for (const auto& [cell, label] : edits) {
@@ -212,10 +272,14 @@ Result<std::vector<TileIndex>> WorldTiles::edit(const LabelEdits& edits)
     }
     std::set<TileIndex> spoiled = changed;
     for (const TileIndex& tile : changed)
-        for (const TileIndex& other : tiles_that_see(tile))
+        for (const TileIndex& other : labels_.points_per_voxel() ? beside(tile) : tiles_that_see(tile))
             spoiled.insert(other);
-    for (const TileIndex& tile : spoiled)
-        tiles_.erase(tile); // its labels are read again
+    for (const TileIndex& tile : spoiled) {
+        drop(tile); // its labels are read again
+        empty_.erase(tile);
+        if (store_)
+            store_->forget(tile);
+    }
     return std::vector<TileIndex>(spoiled.begin(), spoiled.end());
 }
 

@@ -6,7 +6,6 @@
 #include "runtime/base/json.h"
 #include "runtime/base/json_numbers.h"
 #include "runtime/base/quote.h"
-#include "runtime/base/safetensors.h"
 
 #include <algorithm>
 
@@ -41,21 +40,36 @@ Result<const Json*> member(const Json& object, const char* key, std::string_view
     return &*entry;
 }
 
-Result<std::map<TileIndex, uint64_t>> parse_tiles(const Json& list, int32_t edge, std::string_view where)
+Result<TileEntry> parse_entry(const Json& item, std::string_view where)
+{
+    TileEntry entry;
+    SR_TRY(const int64_t cells, whole_number(item[2], 1, 4294967295.0, where));
+    entry.cells = uint64_t(cells);
+    if (item.size() == 3)
+        return entry;
+    if (item[3].is_string())
+        entry.key = item[3].get<std::string>();
+    // note: it becomes part of a path
+    if (entry.key.size() != 16 || entry.key.find_first_not_of("0123456789abcdef") != std::string::npos)
+        return fail(ErrorCode::bad_input, "{}: expected a key of 16 hexadecimal digits", where);
+    return entry;
+}
+
+Result<std::map<TileIndex, TileEntry>> parse_tiles(const Json& list, int32_t edge, std::string_view where)
 {
     if (!list.is_array() || list.empty())
         return fail(ErrorCode::bad_input, "{}: tiles: expected an array of [X, Y, cells], found {}", where,
                     list.is_array() ? "an empty one" : list.type_name());
-    std::map<TileIndex, uint64_t> tiles;
+    std::map<TileIndex, TileEntry> tiles;
     const double reach = std::ceil(kFarthestCell / edge) + 1;
     for (const Json& item : list) {
         const std::string here = fmt::format("{}: tiles: entry {}", where, tiles.size());
-        if (!item.is_array() || item.size() != 3)
-            return fail(ErrorCode::bad_input, "{}: expected [X, Y, cells]", here);
+        if (!item.is_array() || (item.size() != 3 && item.size() != 4))
+            return fail(ErrorCode::bad_input, "{}: expected [X, Y, cells] or [X, Y, cells, key]", here);
         SR_TRY(const int64_t x, whole_number(item[0], -reach, reach, here));
         SR_TRY(const int64_t y, whole_number(item[1], -reach, reach, here));
-        SR_TRY(const int64_t cells, whole_number(item[2], 1, 4294967295.0, here));
-        if (!tiles.emplace(TileIndex{int32_t(x), int32_t(y)}, uint64_t(cells)).second)
+        SR_TRY(const TileEntry entry, parse_entry(item, here));
+        if (!tiles.emplace(TileIndex{int32_t(x), int32_t(y)}, entry).second)
             return fail(ErrorCode::bad_input, "{}: tile ({}, {}) is given twice", here, x, y);
     }
     return tiles;
@@ -90,9 +104,9 @@ Result<int32_t> tile_cells_of(double metres, float voxel_size)
     return int32_t(cells);
 }
 
-std::string tile_name(const TileIndex& tile)
+std::string tile_name(const TileIndex& tile, std::string_view key)
 {
-    return fmt::format("tile_{}_{}.sgrid", tile[0], tile[1]);
+    return fmt::format("tile_{}_{}{}{}.sgrid", tile[0], tile[1], key.empty() ? "" : ".", key);
 }
 
 bool TileFolder::is_one(const Path& path)
@@ -126,10 +140,11 @@ Result<TileFolder> TileFolder::open(const Path& folder)
     SR_CHECK(parse_metadata(index, f.metadata_, where));
     SR_TRY(const Json* tiles, member(index, "tiles", where));
     SR_TRY(f.tiles_, parse_tiles(*tiles, f.tile_cells_, where));
-    for (const auto& [tile, cells] : f.tiles_) {
+    for (const auto& [tile, entry] : f.tiles_) {
         std::error_code ignored;
-        if (!fs::is_regular_file(folder / tile_name(tile), ignored))
-            return fail(ErrorCode::bad_input, "{} names {}, which is not there", where, quote(tile_name(tile)));
+        const std::string name = tile_name(tile, entry.key);
+        if (!fs::is_regular_file(folder / name, ignored))
+            return fail(ErrorCode::bad_input, "{} names {}, which is not there", where, quote(name));
     }
     return f;
 }
@@ -137,8 +152,8 @@ Result<TileFolder> TileFolder::open(const Path& folder)
 uint64_t TileFolder::cell_count() const
 {
     uint64_t count = 0;
-    for (const auto& [tile, cells] : tiles_)
-        count += cells;
+    for (const auto& [tile, entry] : tiles_)
+        count += entry.cells;
     return count;
 }
 
@@ -151,7 +166,7 @@ Result<VoxelGrid> TileFolder::read(const TileIndex& tile) const
 {
     const auto entry = tiles_.find(tile);
     SR_ASSERT(entry != tiles_.end(), "tile ({}, {}) is not in the index", tile[0], tile[1]);
-    const Path path = path_ / tile_name(tile);
+    const Path path = path_ / tile_name(tile, entry->second.key);
     const std::string where = quote_path(path);
     SR_TRY(VoxelGrid grid, read_grid(path));
     if (grid.voxel_size != voxel_size_)
@@ -160,35 +175,14 @@ Result<VoxelGrid> TileFolder::read(const TileIndex& tile) const
     if (grid.has_points() != has_points_ || (has_points_ && grid.points_per_voxel != points_per_voxel_))
         return fail(ErrorCode::bad_input, "{} has {} points a cell, the index says {}", where,
                     grid.has_points() ? grid.points_per_voxel : 0, has_points_ ? points_per_voxel_ : 0);
-    if (grid.cells.size() != entry->second)
+    if (grid.cells.size() != entry->second.cells)
         return fail(ErrorCode::bad_input, "{} has {} cells, the index says {}", where, grid.cells.size(),
-                    entry->second);
+                    entry->second.cells);
     for (const Cell& cell : grid.cells)
         if (tile_of(cell, tile_cells_) != tile)
             return fail(ErrorCode::bad_input, "{} holds cell ({}, {}, {}), which belongs to tile ({}, {})", where,
                         cell[0], cell[1], cell[2], tile_of(cell, tile_cells_)[0], tile_of(cell, tile_cells_)[1]);
     return grid;
-}
-
-Result<VoxelGrid> TileFolder::read(const CellWindow& window) const
-{
-    VoxelGrid out;
-    out.voxel_size = voxel_size_;
-    out.points_per_voxel = points_per_voxel_;
-    out.metadata = metadata_;
-    for (const TileIndex& tile : tiles_in(window)) {
-        SR_TRY(const VoxelGrid part, read(tile));
-        append_cells(out, part);
-    }
-    VoxelGrid inside;
-    inside.voxel_size = out.voxel_size;
-    inside.points_per_voxel = out.points_per_voxel;
-    inside.metadata = out.metadata;
-    for (size_t c = 0; c < out.cells.size(); ++c)
-        if (window.holds(out.cells[c]))
-            append_cell(inside, out, c);
-    sort_cells(inside);
-    return inside;
 }
 
 Result<VoxelGrid> TileFolder::read_all() const
@@ -197,7 +191,7 @@ Result<VoxelGrid> TileFolder::read_all() const
     out.voxel_size = voxel_size_;
     out.points_per_voxel = points_per_voxel_;
     out.metadata = metadata_;
-    for (const auto& [tile, cells] : tiles_) {
+    for (const auto& [tile, entry] : tiles_) {
         SR_TRY(const VoxelGrid part, read(tile));
         append_cells(out, part);
     }
@@ -234,11 +228,14 @@ void append_cells(VoxelGrid& grid, const VoxelGrid& part)
     append(grid.generated, part.generated);
 }
 
-Status write_tile_index(const Path& folder, const TileFolderInfo& info, const std::map<TileIndex, uint64_t>& tiles)
+Status write_tile_index(const Path& folder, const TileFolderInfo& info, const std::map<TileIndex, TileEntry>& tiles)
 {
     Json list = Json::array();
-    for (const auto& [tile, cells] : tiles)
-        list.push_back({tile[0], tile[1], cells});
+    for (const auto& [tile, entry] : tiles) {
+        list.push_back({tile[0], tile[1], entry.cells});
+        if (!entry.key.empty())
+            list.back().push_back(entry.key);
+    }
     const Json index{{"format", "semrover.tiles"},
                      {"version", 1},
                      {"voxel_size", short_number(info.voxel_size)},
@@ -266,20 +263,13 @@ Status write_tiles(const Path& folder, const VoxelGrid& grid, int32_t edge)
 {
     SR_ASSERT(edge >= 1 && edge <= kMostTileCells, "tiles of {} cells", edge);
     SR_CHECK(make_folder(folder));
-    std::map<TileIndex, uint64_t> counts;
+    std::map<TileIndex, TileEntry> entries;
     for (const auto& [index, tile] : cut_tiles(grid, edge)) {
         SR_CHECK(write_grid(folder / tile_name(index), tile));
-        counts[index] = tile.cells.size();
+        entries[index] = {.cells = tile.cells.size()};
     }
     return write_tile_index(folder, {grid.voxel_size, edge, grid.points_per_voxel, grid.has_points(), grid.metadata},
-                            counts);
-}
-
-Result<uint64_t> cells_in_file(const Path& path)
-{
-    SR_TRY(const Safetensors file, Safetensors::open(path));
-    SR_TRY(const TensorInfo* cells, file.get("cells"));
-    return cells->shape.empty() ? 0 : cells->shape[0];
+                            entries);
 }
 
 Result<VoxelGrid> read_grid_or_tiles(const Path& path)

@@ -8,18 +8,26 @@
 
 namespace semrover {
 
-// A scene that is larger than memory: a folder with index.json and one .sgrid a tile. Tile (X, Y) is tile_X_Y.sgrid and
-// holds the cells with floor(i / edge) = X and floor(j / edge) = Y, all k, at their places in the whole scene. Every
-// tile has the index's voxel size; either all have points or none.
+// A scene that is larger than memory: a folder with index.json and one .sgrid a tile. Tile (X, Y) is tile_X_Y.sgrid or,
+// where its entry has a key, tile_X_Y.KEY.sgrid: so tiles of several worlds lie in one folder, and the index names
+// those of one. A tile holds the cells with floor(i / edge) = X and floor(j / edge) = Y, all k, at their places in the
+// whole scene. Every tile has the index's voxel size; either all have points or none.
 //   {"format": "semrover.tiles", "version": 1, "voxel_size": 0.6, "tile_cells": 64, "points_per_voxel": 20,
-//    "has_points": true, "metadata": {...}, "tiles": [[X, Y, cells], ...]}
+//    "has_points": true, "metadata": {...}, "tiles": [[X, Y, cells], [X, Y, cells, "0123456789abcdef"], ...]}
 using TileIndex = std::array<int32_t, 2>;
+
+// what an index says of a tile
+struct TileEntry {
+    uint64_t cells = 0;
+    std::string key = {}; // names all that the tile was made of, in 16 hexadecimal digits; empty: none
+    bool operator==(const TileEntry&) const = default;
+};
 
 // the edge of a tile in cells for one in metres, rounded; bad_input for less than a cell or more than 65536
 Result<int32_t> tile_cells_of(double metres, float voxel_size);
 
 TileIndex tile_of(const Cell& cell, int32_t edge);
-std::string tile_name(const TileIndex& tile); // "tile_-1_3.sgrid"
+std::string tile_name(const TileIndex& tile, std::string_view key = {}); // "tile_-1_3.sgrid"
 
 // cells low <= (i, j) <= high
 struct CellWindow {
@@ -62,14 +70,12 @@ class TileFolder {
     int points_per_voxel() const { return points_per_voxel_; }
     bool has_points() const { return has_points_; }
     const std::map<std::string, std::string>& metadata() const { return metadata_; }
-    const std::map<TileIndex, uint64_t>& tiles() const { return tiles_; } // and their number of cells
+    const std::map<TileIndex, TileEntry>& tiles() const { return tiles_; }
     uint64_t cell_count() const;
     std::vector<TileIndex> tiles_in(const CellWindow& window) const; // in order
 
     // one tile, checked against the index
     Result<VoxelGrid> read(const TileIndex& tile) const;
-    // the cells in a window, reading only the tiles that it touches; no cells when it is empty
-    Result<VoxelGrid> read(const CellWindow& window) const;
     Result<VoxelGrid> read_all() const;
 
   private:
@@ -79,7 +85,7 @@ class TileFolder {
     int points_per_voxel_ = 0;
     bool has_points_ = false;
     std::map<std::string, std::string> metadata_;
-    std::map<TileIndex, uint64_t> tiles_;
+    std::map<TileIndex, TileEntry> tiles_;
 };
 
 // The fields of index.json beside the list of tiles. It is written last, so a folder without it is not whole.
@@ -90,7 +96,7 @@ struct TileFolderInfo {
     bool has_points = false;
     std::map<std::string, std::string> metadata;
 };
-Status write_tile_index(const Path& folder, const TileFolderInfo& info, const std::map<TileIndex, uint64_t>& tiles);
+Status write_tile_index(const Path& folder, const TileFolderInfo& info, const std::map<TileIndex, TileEntry>& tiles);
 
 // cuts a grid into tiles and writes the folder, which must not exist or be empty
 Status write_tiles(const Path& folder, const VoxelGrid& grid, int32_t tile_cells);
@@ -98,9 +104,6 @@ std::map<TileIndex, VoxelGrid> cut_tiles(const VoxelGrid& grid, int32_t tile_cel
 
 // cells of `part` behind those of `grid`, whose voxel size and points fit; sort_cells puts them in order
 void append_cells(VoxelGrid& grid, const VoxelGrid& part);
-
-// number of cells of a .sgrid, from its header
-Result<uint64_t> cells_in_file(const Path& path);
 
 // Reads a .sgrid, or all tiles of a folder.
 Result<VoxelGrid> read_grid_or_tiles(const Path& path);

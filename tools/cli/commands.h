@@ -28,7 +28,17 @@ struct Globals {
 };
 
 // what main runs once the command line is understood; an error becomes one line and the exit code of its ErrorCode
-using Run = std::function<Status()>;
+struct Run {
+    Run() = default;
+    template <typename F>
+    Run(F work) : work(std::move(work))
+    {
+    }
+    std::function<Status()> work;
+    // its run folder keeps what is done: where the device is lost, it runs again and goes on with a new one
+    bool resumes = false;
+};
+Run resuming(std::function<Status()> work);
 
 // one a file: declares the subcommand's options and, when it is the one given, sets `run`. Options live in a
 // std::shared_ptr that the callback holds.

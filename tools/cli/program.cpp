@@ -19,6 +19,7 @@
 #include <fcntl.h>
 #include <iostream>
 #include <new>
+#include <optional>
 #include <system_error>
 #include <unistd.h>
 
@@ -101,7 +102,7 @@ void add_neighbour(CLI::App& app, const Command& command, char** argv, Run& run)
     c->prefix_command(); // what follows is the other program's
     c->fallthrough(false);
     c->set_help_flag();
-    c->callback([&command, argv, &run] { run = [&command, argv] { return run_neighbour(command, argv); }; });
+    c->callback([&command, argv, &run] { run = Run([&command, argv] { return run_neighbour(command, argv); }); });
 }
 
 // an empty text is a variable that was not set, in a script: it names no file and means nothing
@@ -133,7 +134,8 @@ int show_help(const CLI::App& app, const CLI::ParseError& request)
     return report_output();
 }
 
-int parse_and_run(CLI::App& app, int argc, char** argv, const Run& run)
+// the exit code of a command line that names nothing to run: help, or a mistake
+std::optional<int> parse(CLI::App& app, int argc, char** argv, const Run& run)
 {
     try {
         app.parse(argc, argv);
@@ -143,12 +145,12 @@ int parse_and_run(CLI::App& app, int argc, char** argv, const Run& run)
         return report(ErrorCode::usage,
                       fmt::format("{} (semrover --help lists commands and options)", printable(e.what(), 400)));
     }
-    if (!run)
+    if (!run.work)
         return report(ErrorCode::usage, "no command given (semrover --help lists them)");
-    if (const Status status = run(); !status)
-        return report(status.error().code, status.error().message);
-    return report_output();
+    return std::nullopt;
 }
+
+constexpr int kMostDevices = 3; // that are lost, before the error stands
 
 } // namespace
 
@@ -173,7 +175,17 @@ int run_program(int argc, char** argv, std::initializer_list<Command> commands)
             else
                 add_neighbour(app, command, argv, run);
         refuse_empty_values(app);
-        return parse_and_run(app, argc, argv, run);
+        if (const std::optional<int> code = parse(app, argc, argv, run))
+            return *code;
+        Status status = run.work();
+        for (int lost = 1;
+             run.resumes && !status && status.error().code == ErrorCode::device_lost && lost < kMostDevices; ++lost) {
+            if (!globals.quiet)
+                print_stderr("semrover: warning: {}; going on with a new device from what is done\n",
+                             status.error().message);
+            status = run.work();
+        }
+        return status ? report_output() : report(status.error().code, status.error().message);
     } catch (const std::bad_alloc&) {
         return report(ErrorCode::out_of_memory, "the host's memory is exhausted");
     } catch (const std::system_error& e) { // of a write to a closed or full output

@@ -39,45 +39,50 @@ void JobDisplay::show(const JobProgress& p)
 
 namespace {
 
-std::string words_when_interrupted(const Job& job)
+std::string words_when_interrupted(const Path& folder)
 {
-    if (job.kept_in().empty())
+    if (folder.empty())
         return "interrupted";
-    return fmt::format("interrupted; what is done is in {}, the same command goes on", quote_path(job.kept_in()));
+    return fmt::format("interrupted; what is done is in {}, the same command goes on", quote_path(folder));
 }
 
 } // namespace
+
+void keep_in(const Path& folder)
+{
+    set_interrupt_message(words_when_interrupted(folder));
+}
+
+tl::unexpected<Error> stopped(const Error& error, const Path& folder)
+{
+    if (error.code != ErrorCode::interrupted)
+        return tl::make_unexpected(error);
+    return fail(ErrorCode::interrupted, "{}", words_when_interrupted(folder));
+}
 
 Result<Json> run_job(const Globals& globals, const BeginJob& begin)
 {
     JobDisplay display(globals);
     SR_TRY(const auto job, begin(display.callbacks()));
-    set_interrupt_message(words_when_interrupted(*job));
+    keep_in(job->kept_in());
     for (bool done = false; !done;) {
-        Result<bool> step =
+        const Result<bool> step =
             interrupt_requested() ? fail(ErrorCode::interrupted, "") : job->step(JobBudget::one_submit());
-        if (!step && step.error().code == ErrorCode::interrupted) { // by us, or by the device, which asks the same
-            job->cancel();
-            return fail(ErrorCode::interrupted, "{}", words_when_interrupted(*job));
+        if (!step) {
+            if (step.error().code == ErrorCode::interrupted)
+                job->cancel();
+            return stopped(step.error(), job->kept_in());
         }
-        SR_TRY(done, std::move(step));
+        done = *step;
     }
     return job->finish();
 }
 
-Run resuming(const Globals& globals, Run work)
+Run resuming(std::function<Status()> work)
 {
-    return [&globals, work = std::move(work)]() -> Status {
-        constexpr int kMostDevices = 3;
-        for (int devices = 1;; ++devices) {
-            Status status = work();
-            if (status || status.error().code != ErrorCode::device_lost || devices == kMostDevices)
-                return status;
-            if (!globals.quiet)
-                print_stderr("semrover: warning: {}; going on with a new device from what is done\n",
-                             status.error().message);
-        }
-    };
+    Run run(std::move(work));
+    run.resumes = true;
+    return run;
 }
 
 } // namespace semrover

@@ -32,8 +32,10 @@ class JobDisplay {
 // says where what is done is kept.
 Result<Json> run_job(const Globals& globals, const BeginJob& begin);
 
-// The work of a command whose run folder keeps what is done. Where its device is lost, it runs again and goes on with a
-// new one: at most three devices, then the error stands.
-Run resuming(const Globals& globals, Run work);
+// For work that a command steps itself, and keeps in a folder (empty: nowhere): what Ctrl-C says from now on
+void keep_in(const Path& folder);
+// The error that a step ended with. Where the user stopped it, or the device that asks the same, it says where what is
+// done is kept
+tl::unexpected<Error> stopped(const Error& error, const Path& folder);
 
 } // namespace semrover

@@ -1,14 +1,13 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover edit GRID -o OUT [-m MODEL] OPERATION...: changes labels or occupancy and regenerates only that and a halo
-#include "engine/job/editing.h"
 #include "engine/job/outputs.h"
 #include "engine/scene/edit_script.h"
 #include "engine/scene/edit_undo.h"
 #include "engine/scene/scene_objects.h"
 #include "tools/cli/number_option.h"
 #include "tools/cli/run_job.h"
-#include "tools/commands/generation_options.h"
+#include "tools/commands/regeneration.h"
 
 #include <CLI/CLI.hpp>
 
@@ -161,8 +160,8 @@ Status edit(const EditArguments& o, const Globals& globals)
     SR_CHECK(check_edit(request));
     SR_CHECK(check_outputs(o.grid, o.out, globals));
     SR_TRY(request.objects, objects_of(o.grid, o.out));
-    SR_TRY(Regeneration what, edit_grid(request));
-    return regenerate(std::move(what), o.out, globals);
+    SR_TRY(const Regeneration what, edit_grid(request));
+    return regenerate(what, o.out, globals);
 }
 
 } // namespace
@@ -185,7 +184,7 @@ void add_edit(CLI::App& app, const Globals& globals, Run& run)
     add_number(*c, "--halo", o->edit.halo, "metres around what changed that are generated anew (with -m)", 0, 30);
     c->add_option("--undo", o->undo, "OUTPUT.undo of an edit: gives back the file that was edited");
     add_regeneration_options(*c, o->out);
-    c->callback([o, &globals, &run] { run = resuming(globals, [o, &globals] { return edit(*o, globals); }); });
+    c->callback([o, &globals, &run] { run = resuming([o, &globals] { return edit(*o, globals); }); });
 }
 
 } // namespace semrover

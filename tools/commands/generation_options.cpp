@@ -4,47 +4,11 @@
 
 #include "tools/cli/choice.h"
 #include "tools/cli/number_option.h"
-#include "tools/cli/open_device.h"
 #include "tools/cli/progress.h"
-#include "tools/cli/run_job.h"
 
 #include <CLI/CLI.hpp>
 
 namespace semrover {
-
-namespace {
-
-RegenerationOutputs outputs_of(const RegenerationArguments& o, const Globals& globals)
-{
-    return {o.output, o.seeds.empty() ? std::vector<uint64_t>{o.seed.value_or(0)} : o.seeds, globals.yes};
-}
-
-void print_estimate(const Json& e, const Globals& globals)
-{
-    const auto count = [&e](const char* name) { return e[name].get<size_t>(); };
-    if (globals.json)
-        fmt::print("{}\n", e.dump());
-    else if (e.contains("metres"))
-        fmt::print("{:.0f} m in {} windows: {} cells in {} regions\npeak device memory {} at most\n",
-                   e["metres"].get<double>(), count("windows"), count("cells"), count("regions"),
-                   bytes_text(count("peak_device_bytes")));
-    else
-        fmt::print(
-            "{} cells in {} regions, {} at a time, {} network steps each\npeak device memory {}\nabout {} on {}\n",
-            count("cells"), count("regions"), count("batch"), count("steps"), bytes_text(count("peak_device_bytes")),
-            duration_text(e["seconds"]), e["device"].get<std::string>());
-}
-
-void report(const Json& results, const Globals& globals)
-{
-    if (globals.json)
-        fmt::print("{}\n", results.dump());
-    else if (!globals.quiet)
-        for (const Json& output : results.value("outputs", Json::array()))
-            fmt::print("{}\n", output["output"].get<std::string>());
-}
-
-} // namespace
 
 Result<GivenObjects> given_objects(const std::string& option)
 {
@@ -54,15 +18,6 @@ Result<GivenObjects> given_objects(const std::string& option)
         return GivenObjects(std::in_place);
     return read_objects(option).map(
         [](std::vector<SceneObject>&& objects) { return GivenObjects(std::move(objects)); });
-}
-
-Result<GivenObjects> objects_of(const Path& grid, const RegenerationArguments& o)
-{
-    std::error_code ignored;
-    const Path beside = objects_beside(grid);
-    if (!o.objects.empty())
-        return given_objects(o.objects);
-    return given_objects(std::filesystem::exists(beside, ignored) ? beside.string() : "auto");
 }
 
 void add_generation_options(CLI::App& c, GenerationArguments& a)
@@ -92,64 +47,25 @@ void add_generation_options(CLI::App& c, GenerationArguments& a)
     c.add_flag("--dry-run", a.dry_run, "only say how many regions, how much memory, how long");
 }
 
-Status run_on_device(const GenerationArguments& o, const Globals& globals, const BeginOnDevice& begin,
-                     const EstimateOnDevice& estimate)
+void print_estimate(const Json& e, const Globals& globals)
 {
-    SR_TRY(const auto device, open_device(globals, o.profile));
-    if (o.dry_run) {
-        SR_TRY(const Json expected, estimate(*device, JobDisplay(globals).callbacks()));
-        print_estimate(expected, globals);
-        return {};
-    }
-    SR_TRY(const Json results, run_job(globals, [&](const JobCallbacks& c) { return begin(*device, c); }));
-    SR_CHECK(write_profile(*device, o.profile, globals));
-    report(results, globals);
-    return {};
+    const auto count = [&e](const char* name) { return e[name].get<size_t>(); };
+    if (globals.json)
+        fmt::print("{}\n", e.dump());
+    else
+        fmt::print(
+            "{} cells in {} regions, {} at a time, {} network steps each\npeak device memory {}\nabout {} on {}\n",
+            count("cells"), count("regions"), count("batch"), count("steps"), bytes_text(count("peak_device_bytes")),
+            duration_text(e["seconds"]), e["device"].get<std::string>());
 }
 
-void add_regeneration_options(CLI::App& c, RegenerationArguments& o)
+void print_results(const Json& results, const Globals& globals)
 {
-    c.add_option("-m,--model", o.generation.options.model, "model folder");
-    c.add_option("-o,--output", o.output, "what to write; OUTPUT.undo beside it takes it back");
-    c.add_option(
-        "--objects", o.objects,
-        "boxes and colours that condition the model: objects.json, auto (guessed from the labels and the seed) "
-        "or none; by default the file beside GRID, or else auto");
-    add_seed(c, "-s,--seed", o.seed, "noise seed");
-    add_seeds(c, "--seeds", o.seeds, "several seeds, such as 1,2,3: writes OUTPUT-seedN.sgrid for each");
-    add_generation_options(c, o.generation);
-}
-
-Status check_outputs(const Path& input, const RegenerationArguments& o, const Globals& globals)
-{
-    if (!o.seeds.empty() && o.seed)
-        return fail(ErrorCode::usage, "--seed and --seeds exclude each other");
-    SR_CHECK(check_seeds(o.seeds));
-    if (o.generation.options.model.empty() && (!o.seeds.empty() || o.seed || o.generation.dry_run))
-        return fail(ErrorCode::usage, "--seed, --seeds and --dry-run need a model: without -m nothing is generated");
-    return o.generation.dry_run ? Status() : check_regeneration_outputs(input, outputs_of(o, globals));
-}
-
-Status regenerate(Regeneration what, const RegenerationArguments& o, const Globals& globals)
-{
-    const GenerationArguments& g = o.generation;
-    const RegenerationOutputs outputs = outputs_of(o, globals);
-    if (g.options.model.empty() || what.targets.empty()) {
-        if (g.dry_run) {
-            fmt::print("nothing to generate\n");
-            return {};
-        }
-        SR_TRY(const Json results, leave_without_points(what, outputs));
-        report(results, globals);
-        return {};
-    }
-    SR_TRY(const GenerationSettings settings, resolve_generation(g.options));
-    return run_on_device(
-        g, globals,
-        [&](Device& d, const JobCallbacks& c) { return begin_regeneration(d, std::move(what), outputs, settings, c); },
-        [&](Device& d, const JobCallbacks& c) {
-            return estimate_regeneration(d, std::move(what), outputs, settings, c);
-        });
+    if (globals.json)
+        fmt::print("{}\n", results.dump());
+    else if (!globals.quiet)
+        for (const Json& output : results.value("outputs", Json::array()))
+            fmt::print("{}\n", output["output"].get<std::string>());
 }
 
 } // namespace semrover

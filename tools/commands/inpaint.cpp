@@ -1,9 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover inpaint GRID -m MODEL -o OUT --box ...: regenerates chosen cells, the rest staying byte for byte
-#include "engine/job/editing.h"
 #include "tools/cli/run_job.h"
-#include "tools/commands/generation_options.h"
+#include "tools/commands/regeneration.h"
 
 #include <CLI/CLI.hpp>
 
@@ -36,8 +35,8 @@ Status inpaint(const InpaintArguments& o, const Globals& globals)
         return fail(ErrorCode::usage, "say which cells: --box, --sphere, --class, --object or --mask");
     SR_CHECK(check_outputs(o.grid, o.out, globals));
     SR_TRY(request.objects, objects_of(o.grid, o.out));
-    SR_TRY(Regeneration what, select_for_inpainting(request));
-    return regenerate(std::move(what), o.out, globals);
+    SR_TRY(const Regeneration what, select_for_inpainting(request));
+    return regenerate(what, o.out, globals);
 }
 
 } // namespace
@@ -54,7 +53,7 @@ void add_inpaint(CLI::App& app, const Globals& globals, Run& run)
     c->add_option("--mask", o->mask, "cells that this .sgrid has, too; of several conditions all must hold");
     add_regeneration_options(*c, o->out);
     c->get_option("--model")->required();
-    c->callback([o, &globals, &run] { run = resuming(globals, [o, &globals] { return inpaint(*o, globals); }); });
+    c->callback([o, &globals, &run] { run = resuming([o, &globals] { return inpaint(*o, globals); }); });
 }
 
 } // namespace semrover

@@ -194,7 +194,7 @@ void add_refine(CLI::App& app, const Globals& globals, Run& run)
     add_options(*c, *o);
     c->callback([o, c, &globals, &run] {
         o->size_given = c->count("--width") + c->count("--height") > 0;
-        run = resuming(globals, [o, &globals] { return refine(*o, globals); });
+        run = resuming([o, &globals] { return refine(*o, globals); });
     });
 }
 

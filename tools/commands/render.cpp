@@ -140,7 +140,7 @@ void add_render(CLI::App& app, const Globals& globals, Run& run)
         c->add_option("--video", o->video, "also an MP4 of the colour frames (of the first camera), through ffmpeg");
     add_number(*c, "--fps", o->frames_per_second, "frames a second of the video", 1, 240)->needs(video);
     c->add_option("--profile", o->profile, "write device times as a Chrome trace");
-    c->callback([o, &globals, &run] { run = resuming(globals, [o, &globals] { return render(*o, globals); }); });
+    c->callback([o, &globals, &run] { run = resuming([o, &globals] { return render(*o, globals); }); });
 }
 
 } // namespace semrover

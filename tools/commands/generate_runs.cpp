@@ -1,0 +1,362 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/commands/generate_runs.h"
+
+#include "engine/format/camera_path.h"
+#include "engine/format/path_format.h"
+#include "engine/job/input_hashes.h"
+#include "engine/job/outputs.h"
+#include "engine/job/version.h"
+#include "runtime/base/hash.h"
+#include "runtime/base/host_memory.h"
+#include "runtime/base/quote.h"
+#include "tools/cli/open_device.h"
+#include "tools/cli/option_meaning.h"
+
+#include <chrono>
+
+namespace semrover {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+double seconds_now()
+{
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+Result<uint64_t> hash_input(const Path& path)
+{
+    return fs::is_directory(path) ? hash_folder(path) : hash_file(path);
+}
+
+} // namespace
+
+std::vector<Path> GridRun::written_files(bool with_objects) const
+{
+    std::vector<Path> files = {o_.output};
+    if (with_objects)
+        files.push_back(objects_beside(o_.output));
+    for (const std::string& path : {o_.ply.points, o_.ply.splats_3d, o_.ply.splats_2d})
+        if (!path.empty())
+            files.emplace_back(path);
+    return files;
+}
+
+Status GridRun::check_outputs() const
+{
+    for (const Path& path : written_files(!generation_.model.config.condition.empty()))
+        SR_CHECK(check_writable(path, globals_.yes));
+    return {};
+}
+
+Result<bool> GridRun::begin()
+{
+    const bool dry_run = o_.generation.dry_run;
+    if (o_.output.empty() && !dry_run)
+        return fail(ErrorCode::usage, "-o/--output is required");
+    if (o_.order == "scene" && o_.tile_size)
+        return fail(ErrorCode::usage, "--tile-size has a meaning with --order tiles and --along");
+    SR_CHECK(refuse_given(*o_.input.command, placement_options(), "a grid without --along"));
+    if (!dry_run && !finished_results(folder(), Json())) // that one may be the same
+        SR_CHECK(check_outputs());
+    SR_CHECK(read());
+    SR_TRY(device_, open_device(globals_, o_.generation.profile));
+    SR_CHECK(look());
+    if (!dry_run && finished_before())
+        return true;
+    if (!dry_run)
+        SR_CHECK(check_outputs());
+    warn_of_placement(generation_.model, grid_, display_.callbacks());
+    SR_CHECK(open_world_in_run());
+    if (!dry_run)
+        return false;
+    SR_TRY(const Json expected, world_->estimate());
+    print_estimate(expected, globals_);
+    return true;
+}
+
+Status GridRun::read()
+{
+    GenerationOptions options = o_.generation.options;
+    if (o_.order == "tiles")
+        options.tile_size = o_.tile_size.value_or(kUsualTileSize);
+    SR_TRY(generation_, resolve_generation(options));
+    SR_TRY(objects_, given_objects(o_.objects));
+    SR_TRY(grid_, load_grid(o_.grid, o_.input, globals_));
+    // what another program's file became depends on options and on other files
+    const bool is_ours = o_.input.from.empty() && Path(o_.grid).extension() == ".sgrid";
+    grid_hash_ = is_ours ? 0 : hash_grid(grid_);
+    if (is_ours) {
+        SR_TRY(grid_hash_, hash_file(o_.grid));
+    }
+    return {};
+}
+
+// at what decides the bytes
+Status GridRun::look()
+{
+    const bool by_blocks = generation_.regions.tile_cells > 0;
+    SR_TRY(objects_, told_objects(generation_.model, objects_, grid_, o_.seed, by_blocks));
+    SR_TRY(settings_, settings_json(generation_, *device_, "generate", grid_hash_));
+    settings_["seed"] = o_.seed;
+    if (!objects_->empty())
+        settings_["objects"] = hash_text(hash_objects(*objects_));
+    return {};
+}
+
+// the same was generated before, and what it wrote is there
+bool GridRun::finished_before()
+{
+    if (globals_.yes)
+        return false;
+    finished_ = finished_results(folder(), settings_);
+    const auto hash = hash_file(o_.output);
+    if (!finished_ || !hash || finished_->value("xxh64", Json()) != hash_text(*hash))
+        finished_.reset();
+    for (const Path& path : written_files(!objects_->empty()))
+        if (!std::filesystem::exists(path))
+            finished_.reset();
+    return finished_.has_value();
+}
+
+// regions are kept in the run's folder, or tiles
+Status GridRun::open_world_in_run()
+{
+    const bool by_tiles = generation_.regions.tile_cells > 0;
+    WorldRequest request{.settings = generation_, .seed = o_.seed, .objects = objects_};
+    request.tiles_at_once = o_.generation.options.batch;
+    if (!o_.generation.dry_run) {
+        SR_TRY(RunFolder run, open_run(folder(), settings_, globals_.yes, {{"regions", "tiles"}}));
+        run_.emplace(std::move(run));
+        if (by_tiles)
+            request.store = folder() / "tiles";
+    }
+    auto metadata = grid_.metadata;
+    auto world =
+        open_world(*device_, std::move(request), labels_of_grid(std::exchange(grid_, {})), display_.callbacks());
+    if (!world && run_)
+        run_->drop_if_empty();
+    SR_TRY(world_, std::move(world));
+    grid_.metadata = std::move(metadata);
+    if (by_tiles && run_ && !run_->resumed())
+        SR_CHECK(run_->append({{"order", "tiles"}}));
+    if (by_tiles || run_)
+        SR_CHECK(world_->everywhere(run_ ? &*run_ : nullptr));
+    if (run_)
+        keep_in(folder());
+    begun_ = seconds_now();
+    return {};
+}
+
+VoxelGrid GridRun::filled() const
+{
+    constexpr CellWindow kAll{{-kMaxCoordinate, -kMaxCoordinate}, {kMaxCoordinate, kMaxCoordinate}};
+    VoxelGrid grid = world_->tile_cells() ? world_->cells(kAll) : world_->scene();
+    grid.metadata = grid_.metadata;
+    grid.metadata["seed"] = std::to_string(o_.seed);
+    grid.metadata["tool"] = kProgram;
+    grid.metadata["model"] = settings_["model"];
+    if (const std::string& placement = generation_.model.config.placement; placement != "shifted")
+        grid.metadata["placement"] = placement;
+    if (const int32_t edge = world_->tile_cells())
+        grid.metadata["tile_cells"] = std::to_string(edge);
+    return grid;
+}
+
+Status GridRun::end()
+{
+    if (o_.generation.dry_run)
+        return {};
+    if (!finished_) {
+        const VoxelGrid grid = filled();
+        if (o_.ply.any())
+            SR_CHECK(export_ply(*device_, grid, o_.ply));
+        Json results = world_->results();
+        results.emplace("seconds", seconds_now() - begun_);
+        SR_CHECK(write_grid(o_.output, grid));
+        if (!objects_->empty())
+            SR_CHECK(write_objects(objects_beside(o_.output), *objects_));
+        SR_TRY(const uint64_t hash, hash_file(o_.output));
+        results["output"] = Path(o_.output).filename().string();
+        results["xxh64"] = hash_text(hash);
+        (void)world_->flush(); // the grid has them: no matter if the store has not
+        SR_CHECK(run_->finish(results));
+        finished_ = results;
+    }
+    SR_CHECK(write_profile(*device_, o_.generation.profile, globals_));
+    print_results(*finished_, globals_);
+    return {};
+}
+
+Status TilesRun::check() const
+{
+    if (o_.output.empty() && !o_.generation.dry_run)
+        return fail(ErrorCode::usage, "-o/--output is required");
+    if (o_.ply.any())
+        return fail(ErrorCode::usage, "--ply and its like have no meaning with --along: convert what it writes");
+    if (is_given(*o_.input.command, "--order"))
+        return fail(ErrorCode::usage, "--order has no meaning with --along, which is in the order of tiles");
+    for (const std::string_view& name : scene_input_options())
+        if (name != "--origin") // the path's: the scaffold has its place
+            SR_CHECK(refuse_given(*o_.input.command, {&name, 1}, "--along, whose scaffold is a grid of ours"));
+    if (o_.generation.dry_run)
+        return {};
+    // of a finished run, the settings say whether it is this one
+    if (TileFolder::is_one(o_.output) && !globals_.yes && !finished_results(folder(), Json()))
+        return fail(ErrorCode::usage, "{} exists; -y replaces it", quote(o_.output));
+    if (fs::exists(o_.output) && !fs::is_directory(o_.output))
+        return fail(ErrorCode::bad_input, "{} is a file; --along writes a folder of tiles", quote(o_.output));
+    return {};
+}
+
+Status TilesRun::read()
+{
+    GenerationOptions options = o_.generation.options;
+    options.tile_size = o_.tile_size.value_or(kUsualTileSize);
+    SR_TRY(generation_, resolve_generation(options));
+    SR_TRY(objects_, given_objects(o_.objects));
+    PathOptions placement = o_.placement;
+    if (placement.origin.empty())
+        placement.origin = o_.input.origin;
+    SR_TRY(placement_, placement_of(placement));
+    PathLens lens(pinhole_from_fov(73, 616, 424));
+    lens.matters = false; // where the camera is
+    SR_TRY(const CameraPath path, read_camera_path(o_.along, lens, placement_));
+    track_ = ground_track(path);
+    if (fs::is_directory(o_.grid)) {
+        SR_TRY(const TileFolder tiles, TileFolder::open(o_.grid));
+        metadata_ = tiles.metadata();
+        SR_TRY(labels_, labels_of_folder(o_.grid));
+        return {};
+    }
+    SR_TRY(VoxelGrid grid, read_grid(o_.grid));
+    metadata_ = grid.metadata;
+    labels_ = labels_of_grid(std::move(grid));
+    return {};
+}
+
+Result<Json> TilesRun::settings() const
+{
+    SR_TRY(const uint64_t grid, hash_input(o_.grid));
+    SR_TRY(Json settings, settings_json(generation_, *device_, "generate --along", grid));
+    SR_TRY(const uint64_t path, hash_input(find_path(o_.along).value().path)); // read() has read it
+    settings["seed"] = o_.seed;
+    settings["path"] = hash_text(path);
+    if (const PathPlacement& p = placement_;
+        p.relative_to || p.lidar_to_camera || p.world != kIdentity || p.origin != Point3{})
+        settings["path_placement"] = {{"relative_to", p.relative_to ? Json(*p.relative_to) : Json()},
+                                      {"lidar_to_camera", p.lidar_to_camera ? Json(*p.lidar_to_camera) : Json()},
+                                      {"world", p.world},
+                                      {"origin", p.origin}};
+    settings["horizon"] = o_.horizon;
+    if (objects_)
+        settings["objects"] = hash_text(hash_objects(*objects_));
+    return settings;
+}
+
+// the same run is done and its tiles are there. usage: tiles of another
+Result<bool> TilesRun::finished_before()
+{
+    if (globals_.yes || !TileFolder::is_one(o_.output))
+        return false;
+    SR_TRY(const Json wanted, settings());
+    finished_ = finished_results(folder(), wanted);
+    if (!finished_)
+        return fail(ErrorCode::usage, "{} exists; -y replaces it", quote(o_.output));
+    return true;
+}
+
+// a run that begins finds no tiles of another
+Status TilesRun::clear_output() const
+{
+    SR_CHECK(make_folder(o_.output));
+    std::error_code error;
+    for (const auto& entry : fs::directory_iterator(o_.output, error)) {
+        if (!globals_.yes)
+            return fail(ErrorCode::usage, "{} is not empty; -y replaces the tiles in it", quote(o_.output));
+        const std::string name = entry.path().filename().string();
+        if (name == "index.json" || (name.starts_with("tile_") && name.ends_with(".sgrid")))
+            fs::remove(entry.path(), error);
+    }
+    return {};
+}
+
+// nothing was generated: nothing is left behind
+void TilesRun::remove_run()
+{
+    run_->drop_if_empty();
+    std::error_code ignored;
+    fs::remove(o_.output, ignored); // only when nothing is in it
+}
+
+Status TilesRun::open()
+{
+    WorldRequest request{.settings = generation_, .seed = o_.seed, .objects = objects_};
+    request.tiles_at_once = o_.generation.options.batch;
+    request.metadata = metadata_;
+    request.metadata["seed"] = std::to_string(o_.seed);
+    request.metadata["tool"] = kProgram;
+    if (run_) {
+        SR_CHECK(run_->resumed() ? Status() : clear_output());
+        remove_temporary_files(o_.output);
+        request.store = o_.output;
+    }
+    SR_TRY(world_, open_world(*device_, std::move(request), std::move(labels_), display_.callbacks()));
+    SR_CHECK(world_->follow(track_, o_.horizon));
+    return run_ && !run_->resumed() ? run_->append({{"order", "tiles"}}) : Status();
+}
+
+Result<bool> TilesRun::begin()
+{
+    SR_CHECK(check());
+    SR_CHECK(read());
+    SR_TRY(device_, open_device(globals_, o_.generation.profile));
+    if (o_.generation.dry_run) {
+        SR_CHECK(open());
+        SR_TRY(const Json expected, world_->estimate());
+        print_estimate(expected, globals_);
+        return true;
+    }
+    SR_TRY(const bool finished, finished_before());
+    if (finished)
+        return true;
+    SR_TRY(const Json wanted, settings());
+    SR_TRY(RunFolder run, open_run(folder(), wanted, globals_.yes, {{}}));
+    run_.emplace(std::move(run));
+    if (const Status opened = open(); !opened) {
+        remove_run();
+        return tl::make_unexpected(opened.error());
+    }
+    keep_in(o_.output);
+    begun_ = seconds_now();
+    return false;
+}
+
+Status TilesRun::end()
+{
+    if (o_.generation.dry_run)
+        return {};
+    if (!finished_) {
+        Json results = world_->results();
+        if (results["tiles"] == 0) {
+            world_.reset();
+            std::error_code ignored;
+            fs::remove_all(folder(), ignored);
+            fs::remove(o_.output, ignored); // empty
+            return fail(ErrorCode::bad_input, "no cell of {} lies within {} m of the path", quote(o_.grid), o_.horizon);
+        }
+        SR_CHECK(world_->flush());
+        results["metres"] = length_of(track_);
+        results["seconds"] = seconds_now() - begun_;
+        results["peak_host_bytes"] = host_memory().peak;
+        SR_CHECK(run_->finish(results));
+        finished_ = results;
+    }
+    SR_CHECK(write_profile(*device_, o_.generation.profile, globals_));
+    print_results(*finished_, globals_);
+    return {};
+}
+
+} // namespace semrover
