@@ -193,7 +193,7 @@ TEST(CliCamera, kitti_keeps_times_and_lens)
     fs::create_directory(folder / "empty");
     expect_error(semrover_program("render " + kGrid + " --path " + (folder / "empty").string() + " -o " +
                                   (folder / "r").string()),
-                 3, "is a folder without files; expected a camera path");
+                 3, "is a folder without files; expected a trajectory");
 }
 
 // two poses, and a rig of three cameras of which two differ in size, two in focal length and one has a lens

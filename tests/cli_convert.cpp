@@ -263,7 +263,7 @@ TEST(CliConvert, what_is_no_model_is_bad_input)
 {
     const ScratchFolder folder;
     expect_error(convert(folder / "none", folder / "out"), 3, "No such file");
-    expect_error(convert(folder.path(), folder / "out"), 3, "is a folder without files; expected a camera path");
+    expect_error(convert(folder.path(), folder / "out"), 3, "is a folder without files; expected a trajectory");
     expect_error(convert(folder.put("x.ckpt", "x"), folder / "out"), 3, "convert it with Python");
     expect_error(convert(folder.path(), folder / "out"), 3, "convert it with Python");
     for (const char* name : {"cameras.bin", "images.bin", "points3D.bin"}) { // no pickles, and no clouds

@@ -133,7 +133,7 @@ TEST(CliInspect, what_it_cannot_show_ends_with_one_line_and_code_3)
     const ScratchFolder folder;
     expect_error(semrover_program("inspect " + (folder / "none").string()), 3, "No such file");
     expect_error(semrover_program("inspect " + folder.path().string()), 3,
-                 "is a folder without files; expected a camera path");
+                 "is a folder without files; expected a trajectory");
     expect_error(semrover_program("inspect " + folder.put("m.ckpt", "x").string()), 3, "convert it with Python");
     expect_error(semrover_program("inspect " + folder.put("g.sgrid", safetensors_bytes("{}")).string()), 3,
                  "2 missing: cells [0, 3], labels [0]");

@@ -132,7 +132,7 @@ TEST_F(CliOptionMeaning, paths_and_our_grids_refuse_them_too)
 {
     const std::string tum = kAssets + "scenes/street.tum ", grid = kAssets + "scenes/street.semantic.sgrid ";
     expect_error(semrover_program("convert " + tum + path("o.json") + " --min-fill 0.5"), 2,
-                 "--min-fill has no meaning for a camera path, which '");
+                 "--min-fill has no meaning for a trajectory, which '");
     EXPECT_EQ(semrover_program("convert " + tum + path("o.json") + " --dry-run").code, 0);
     EXPECT_FALSE(std::filesystem::exists(path("o.json")));
     expect_error(semrover_program("inspect " + grid + "--nearest-color"), 2, "--nearest-color has no meaning for ");

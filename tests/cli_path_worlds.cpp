@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// camera paths and grids of data sets whose frames differ, in the data sets' own layouts: what is drawn has the depth
+// trajectories and grids of data sets whose frames differ, in the data sets' own layouts: what is drawn has the depth
 // that rays through the voxels have
 #include "engine/format/camera_path.h"
 #include "engine/format/image.h"
@@ -343,8 +343,8 @@ TEST(CliPathWorlds, every_command_that_reads_a_path_takes_the_same_options)
             EXPECT_NE(help.out.find(option), std::string::npos) << command << " " << option;
     }
     expect_error(semrover_program("inspect " SEMROVER_SOURCE_DIR "/assets/scenes/street.semantic.sgrid --fov-x 60"), 2,
-                 "--fov-x has no meaning for a file that is no camera path");
-    expect_error(semrover_program("render x.sgrid --top -o x --relative-to first"), 2, "are of a camera path: --path");
+                 "--fov-x has no meaning for a file that is no trajectory");
+    expect_error(semrover_program("render x.sgrid --top -o x --relative-to first"), 2, "are of a trajectory: --path");
 }
 
 } // namespace cli_path_worlds_test

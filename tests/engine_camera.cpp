@@ -190,7 +190,7 @@ TEST(Camera, a_transforms_file_of_another_form_is_refused)
     };
     EXPECT_TRUE(says(read("[]"), "expected an object with an array of frames"));
     EXPECT_TRUE(says(read("{\"frames\":7}"), "expected an object with an array of frames"));
-    EXPECT_TRUE(says(read("{\"frames\":[]}"), "a camera path without poses"));
+    EXPECT_TRUE(says(read("{\"frames\":[]}"), "a trajectory without poses"));
     EXPECT_TRUE(says(read("{\"frames\":[7]}"), "frame 0: expected an object with a transform_matrix"));
     EXPECT_TRUE(says(pose("7"), "transform_matrix: expected an array of numbers"));
     EXPECT_TRUE(says(pose("[[1,0,0,0]]"), "expected a 4x4 or 3x4 matrix, found 4 numbers"));
@@ -205,8 +205,8 @@ TEST(Camera, a_broken_tum_line_is_named)
 {
     const ScratchFolder folder;
     const auto read = [&](const char* text) { return read_tum(folder.put("a.tum", text), kView); };
-    EXPECT_TRUE(says(read(""), "a camera path without poses"));
-    EXPECT_TRUE(says(read("# only\n\n  # comments\n"), "a camera path without poses"));
+    EXPECT_TRUE(says(read(""), "a trajectory without poses"));
+    EXPECT_TRUE(says(read("# only\n\n  # comments\n"), "a trajectory without poses"));
     EXPECT_TRUE(
         says(read("# c\n0 0 0 0 0 0 0\n"), "a.tum' line 2: expected the 8 numbers t tx ty tz qx qy qz qw, found 7"));
     EXPECT_TRUE(says(read("0 0 0 0 0 0 0 1 9\n"), "line 1: expected the 8 numbers t tx ty tz qx qy qz qw, found more"));

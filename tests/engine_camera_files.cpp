@@ -249,8 +249,8 @@ TEST(CameraFiles, a_broken_kitti_file_is_named)
 {
     const ScratchFolder folder;
     const auto read = [&](std::string_view text) { return read_kitti(folder.put("poses.txt", text), kView); };
-    EXPECT_TRUE(says(read(""), "a camera path without poses"));
-    EXPECT_TRUE(says(read("\n\n# nothing\n"), "a camera path without poses"));
+    EXPECT_TRUE(says(read(""), "a trajectory without poses"));
+    EXPECT_TRUE(says(read("\n\n# nothing\n"), "a trajectory without poses"));
     EXPECT_TRUE(
         says(read("1 0 0 0 0 1 0 0 0 0 1\n"), "poses.txt' line 1: expected the 12 numbers of a 3x4 matrix, found 11"));
     EXPECT_TRUE(says(read("1 0 0 0 0 1 0 0 0 0 1 0 0\n"), "found more"));
@@ -278,7 +278,7 @@ TEST(CameraFiles, a_broken_camera_path_is_named)
     EXPECT_TRUE(read(size, pose + R"("fov":50)"));
     EXPECT_TRUE(says(whole("[]"), "expected an object with an array camera_path"));
     EXPECT_TRUE(says(whole(R"({"camera_path":5})"), "expected an object with an array camera_path"));
-    EXPECT_TRUE(says(whole(R"({"camera_path":[]})"), "a camera path without poses, camera_path is empty"));
+    EXPECT_TRUE(says(whole(R"({"camera_path":[]})"), "a trajectory without poses, camera_path is empty"));
     EXPECT_TRUE(says(whole(R"({"camera_path":[)"), "a.json"));
     EXPECT_TRUE(says(read("", pose + R"("fov":50)"), "render_width is missing"));
     EXPECT_TRUE(says(read(R"("render_width":8,)", pose + R"("fov":50)"), "render_height is missing"));
@@ -353,7 +353,7 @@ TEST(CameraFiles, a_broken_colmap_folder_is_named)
     EXPECT_TRUE(says(read("1 PINHOLE 8 6 x 4 4 3\n", image), "expected a number, found 'x'"));
     EXPECT_TRUE(says(read("1 EQUIRECTANGULAR 8 4 16 8\n", image), "a panorama of 16 x 8 in a picture of 8 x 4"));
     EXPECT_TRUE(says(read(good + good, image), "line 2: a second camera '1'"));
-    EXPECT_TRUE(says(read(good, ""), "images.txt': a camera path without poses"));
+    EXPECT_TRUE(says(read(good, ""), "images.txt': a trajectory without poses"));
     EXPECT_TRUE(says(read(good, "1 1 0 0 0 0 0 0 1\n"), "images.txt' line 1: expected the 10 words IMAGE_ID QW"));
     EXPECT_TRUE(says(read(good, "1 1 0 0 0 0 0 0 2 a.png\n"), "no camera '2' in cameras.txt"));
     EXPECT_TRUE(says(read(good, "1 2 0 0 0 0 0 0 1 a.png\n"),
@@ -479,7 +479,7 @@ TEST(CameraFiles, a_broken_binary_model_is_named)
                      "image 0 at byte 8: expected a quaternion of norm 1, found 2"));
     EXPECT_TRUE(says(read(good, BinaryModel().put(uint64_t(1)).image(1, {1, 0, 0, 0, NAN, 0, 0}, 1, "a.png", 0)),
                      "not finite"));
-    EXPECT_TRUE(says(read(good, BinaryModel().put(uint64_t(0))), "images.bin': a camera path without poses"));
+    EXPECT_TRUE(says(read(good, BinaryModel().put(uint64_t(0))), "images.bin': a trajectory without poses"));
     EXPECT_TRUE(says(read(good, BinaryModel().put(uint64_t(1)).image(1, pose, 1, std::string(5000, 'a'), 0)),
                      "a name of more than 4096 bytes"));
     BinaryModel points = image; // says it has 2^61 points

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// camera paths that other programs and data sets write
+// trajectories that other programs and data sets write
 #include "engine/camera/rig.h"
 #include "engine/format/camera_path.h"
 #include "engine/format/image.h"
@@ -196,8 +196,8 @@ TEST(PathFiles, broken_paths_of_data_sets_are_named)
     EXPECT_TRUE(says(read(R"([{"timestamp":1,"rotation":[1,0,0],"translation":[1,2,3]}])", "ego_pose.json"),
                      "record 0: rotation: expected an array of 4 numbers"));
     // what is no path says what it looks like
-    EXPECT_TRUE(says(read("1 2 3 4 5\n"), "is text whose first line has 5 numbers; expected a camera path: TUM (8"));
-    EXPECT_TRUE(says(read("hello world\n"), "is text that begins with 'hello world'; expected a camera path"));
+    EXPECT_TRUE(says(read("1 2 3 4 5\n"), "is text whose first line has 5 numbers; expected a trajectory: TUM (8"));
+    EXPECT_TRUE(says(read("hello world\n"), "is text that begins with 'hello world'; expected a trajectory"));
     EXPECT_TRUE(says(read(""), "is an empty file; expected"));
     EXPECT_TRUE(says(read(std::string_view("a\0b", 3)), "is a binary file of 3 bytes; expected"));
     EXPECT_TRUE(says(read(R"({"poses":[]})", "b.json"), "is JSON, an object with the keys poses; expected"));

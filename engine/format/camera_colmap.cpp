@@ -80,7 +80,7 @@ Result<std::vector<ColmapPicture>> read_images(const Path& path, const std::map<
                         name, lines.number());
     }
     if (frames.empty())
-        return fail(ErrorCode::bad_input, "{}: a camera path without poses, no images", name);
+        return fail(ErrorCode::bad_input, "{}: a trajectory without poses, no images", name);
     return frames;
 }
 
@@ -147,7 +147,7 @@ std::string colmap_picture_name(const std::string& camera, uint32_t number, size
 
 Status write_colmap(const Path& folder, const CameraPath& cameras, const Surfels& points)
 {
-    SR_ASSERT(!cameras.frames.empty(), "a camera path without frames");
+    SR_ASSERT(!cameras.frames.empty(), "a trajectory without frames");
     if (is_there(folder / "cameras.bin"))
         return fail(ErrorCode::bad_input, "{}: holds a binary model, which programs would read instead of the text",
                     quote_path(folder));

@@ -133,7 +133,7 @@ Result<std::vector<ColmapPicture>> read_colmap_binary(const Path& folder)
         pictures.push_back(std::move(picture));
     }
     if (pictures.empty())
-        return fail(ErrorCode::bad_input, "{}: a camera path without poses, no images", name);
+        return fail(ErrorCode::bad_input, "{}: a trajectory without poses, no images", name);
     if (bytes.left())
         return fail(ErrorCode::bad_input, "{}: {} bytes follow the last image", name, bytes.left());
     return pictures;

@@ -94,7 +94,7 @@ Result<CameraPath> read_euroc(const Path& path, const Intrinsics& lens)
         }
     }
     if (cameras.frames.empty())
-        return fail(ErrorCode::bad_input, "{}: a camera path without poses", name);
+        return fail(ErrorCode::bad_input, "{}: a trajectory without poses", name);
     return cameras;
 }
 

@@ -125,7 +125,7 @@ Result<CameraPath> read_kitti(const Path& path, const Intrinsics& intrinsics, co
         cameras.frames.push_back({double(cameras.frames.size()), "", {inverse(camera_to_world)}, k});
     }
     if (cameras.frames.empty())
-        return fail(ErrorCode::bad_input, "{}: a camera path without poses, expected lines of 12 numbers", name);
+        return fail(ErrorCode::bad_input, "{}: a trajectory without poses, expected lines of 12 numbers", name);
     if (!files.times.empty()) {
         SR_TRY(const std::vector<double> times, read_times(files.times, cameras.frames.size()));
         for (size_t i = 0; i < times.size(); ++i)

@@ -119,7 +119,7 @@ Result<std::vector<EgoPose>> read_ego_poses(const Path& path, const std::optiona
     });
     SR_CHECK(read);
     if (poses.empty())
-        return fail(ErrorCode::bad_input, "{}: a camera path without poses", quote_path(path));
+        return fail(ErrorCode::bad_input, "{}: a trajectory without poses", quote_path(path));
     std::ranges::stable_sort(poses, {}, &EgoPose::time);
     return poses;
 }
@@ -149,7 +149,7 @@ Result<CameraPath> read_pandaset(const Path& path, const PathLens& lens)
         cameras.frames.push_back({double(i), "", {inverse(pose)}, k});
     }
     if (cameras.frames.empty())
-        return fail(ErrorCode::bad_input, "{}: a camera path without poses", name);
+        return fail(ErrorCode::bad_input, "{}: a trajectory without poses", name);
     if (is_file(folder / "timestamps.json")) {
         SR_TRY(const std::vector<double> times, pandaset_times(folder / "timestamps.json", cameras.frames.size()));
         for (size_t i = 0; i < times.size(); ++i)

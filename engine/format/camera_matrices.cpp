@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// camera paths of matrices: KITTI-360's, a 4x4 matrix a line or in four lines, Redwood's
+// trajectories of matrices: KITTI-360's, a 4x4 matrix a line or in four lines, Redwood's
 #include "engine/format/camera_path.h"
 #include "engine/format/camera_text.h"
 #include "runtime/base/quote.h"
@@ -29,7 +29,7 @@ Result<std::vector<NumberedLine>> lines_of_numbers(const Path& path, size_t most
             rows.push_back(std::move(row));
     }
     if (rows.empty())
-        return fail(ErrorCode::bad_input, "{}: a camera path without poses", name);
+        return fail(ErrorCode::bad_input, "{}: a trajectory without poses", name);
     return rows;
 }
 

@@ -117,7 +117,7 @@ Result<CameraPath> parse_camera_path_json(const Json& file, std::string_view nam
     if (!file.is_object() || frames == file.end() || !frames->is_array())
         return fail(ErrorCode::bad_input, "{}: expected an object with an array camera_path", name);
     if (frames->empty())
-        return fail(ErrorCode::bad_input, "{}: a camera path without poses, camera_path is empty", name);
+        return fail(ErrorCode::bad_input, "{}: a trajectory without poses, camera_path is empty", name);
     Intrinsics size;
     SR_TRY(size.model, read_type(file, name));
     SR_TRY(size.width, read_side(file, "render_width", name));
@@ -139,7 +139,7 @@ Result<CameraPath> read_camera_path_json(const Path& path)
 
 Status write_camera_path_json(const Path& path, const CameraPath& cameras)
 {
-    SR_ASSERT(!cameras.frames.empty(), "a camera path without frames");
+    SR_ASSERT(!cameras.frames.empty(), "a trajectory without frames");
     SR_CHECK(check_writable(cameras, quote_path(path)));
     const Intrinsics& first = cameras.frames[0].intrinsics;
     const size_t count = cameras.frames.size();

@@ -420,7 +420,7 @@ Result<CameraPath> parse_transforms(const Json& file, std::string_view name, con
     if (!file.is_object() || frames == file.end() || !frames->is_array())
         return fail(ErrorCode::bad_input, "{}: expected an object with an array of frames", name);
     if (frames->empty())
-        return fail(ErrorCode::bad_input, "{}: a camera path without poses, frames is empty", name);
+        return fail(ErrorCode::bad_input, "{}: a trajectory without poses, frames is empty", name);
     CameraPath cameras;
     TransformsSource source{lens, folder};
     for (size_t i = 0; i < frames->size(); ++i) {
@@ -444,7 +444,7 @@ PictureNames rendered_pictures(const std::string& camera, uint32_t number)
 
 Status write_transforms(const Path& path, const CameraPath& cameras, const TransformsFiles& files)
 {
-    SR_ASSERT(!cameras.frames.empty(), "a camera path without frames");
+    SR_ASSERT(!cameras.frames.empty(), "a trajectory without frames");
     const auto& frames = cameras.frames;
     const bool one_view =
         std::ranges::all_of(frames, [&](const CameraFrame& f) { return f.intrinsics == frames[0].intrinsics; });

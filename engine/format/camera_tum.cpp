@@ -44,7 +44,7 @@ Result<CameraPath> read_tum(const Path& path, const Intrinsics& intrinsics)
             cameras.frames.push_back(*frame);
     }
     if (cameras.frames.empty())
-        return fail(ErrorCode::bad_input, "{}: a camera path without poses, expected lines of {}", name, kFields);
+        return fail(ErrorCode::bad_input, "{}: a trajectory without poses, expected lines of {}", name, kFields);
     return cameras;
 }
 

@@ -19,7 +19,7 @@ constexpr std::string_view kPathNames[] = {"tum",      "kitti",   "transforms", 
                                            "matrices", "redwood", "pose_files", "euroc",       "pandaset", "nuscenes"};
 
 constexpr std::string_view kExpected =
-    "a camera path: TUM (8 numbers a line), KITTI (12), KITTI-360 (13 or 17), 4x4 matrices (16), EuRoC's .csv, "
+    "a trajectory: TUM (8 numbers a line), KITTI (12), KITTI-360 (13 or 17), 4x4 matrices (16), EuRoC's .csv, "
     "Redwood's .log, transforms.json, camera_path.json, PandaSet's poses.json, nuScenes' ego_pose.json, or a folder: "
     "COLMAP's (cameras.bin or cameras.txt, also in sparse/0), one with poses.txt, or one with a file of a 4x4 matrix "
     "for each frame";

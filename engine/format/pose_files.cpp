@@ -89,7 +89,7 @@ Result<CameraPath> read_pose_files(const Path& folder, const Intrinsics& lens)
             {double(number_in_name(file).value_or(0)), "", {inverse(camera_to_world)}, lens, picture_of(file)});
     }
     if (path.frames.empty())
-        return fail(ErrorCode::bad_input, "{}: a camera path without poses, expected files of a 4x4 matrix each",
+        return fail(ErrorCode::bad_input, "{}: a trajectory without poses, expected files of a 4x4 matrix each",
                     quote_path(folder));
     if (path.frames.size() < files.size())
         path.warnings.push_back(fmt::format("{}: {} of {} files have no pose (inf), and are left out",

@@ -119,7 +119,7 @@ Result<Path> poses_of(const Path& folder, const Path& given)
     for (const char* name : {"transforms.json", "groundtruth.txt"})
         if (is_file(folder / name))
             return folder / name;
-    return fail(ErrorCode::bad_input, "{} is missing; another camera path may be given with `poses`",
+    return fail(ErrorCode::bad_input, "{} is missing; another trajectory may be given with `poses`",
                 quote_path(folder / "transforms.json"));
 }
 

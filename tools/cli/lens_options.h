@@ -28,7 +28,7 @@ std::span<const std::string_view> lens_options(); // their names
 Result<Intrinsics> intrinsics_of(const LensOptions& options); // usage
 Result<PathLens> path_lens_of(const LensOptions& options);    // the same, and what of it was given; usage
 
-// A camera path as read_camera_path reads it, or the cameras of a rig (empty: none) along it. -W and -H are the size of
+// A trajectory as read_camera_path reads it, or the cameras of a rig (empty: none) along it. -W and -H are the size of
 // every picture. Cameras that bring their own along are scaled to it and see what they saw; with one of both, the other
 // follows from the shape of each camera's picture. Errors: usage for another lens than what the cameras have; as the
 // readers say

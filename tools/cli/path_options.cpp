@@ -42,7 +42,7 @@ Result<uint64_t> frame_option(const std::string& text)
 
 void add_placement_options(CLI::App& c, PathOptions& o)
 {
-    const std::string group = "Where the camera path lies in the grid's world, in the order that they apply";
+    const std::string group = "Where the trajectory lies in the grid's world, in the order that they apply";
     c.add_option(
          "--relative-to", o.relative_to,
          "first or FRAME: poses relative to that frame's, for a grid in its frame. FRAME is the number that the "

@@ -13,7 +13,7 @@ class App;
 
 namespace semrover {
 
-// How a camera path comes into the grid's world: one group of options of every command that reads a path.
+// How a trajectory comes into the grid's world: one group of options of every command that reads a path.
 // docs/formats.md §7.4
 struct PathOptions {
     std::string world, relative_to, calibration, origin;

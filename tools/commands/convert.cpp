@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// semrover convert IN OUT: a model in another layout; or a scene, a camera path or boxes in another format, as IN says
+// semrover convert IN OUT: a model in another layout; or a scene, a trajectory or boxes in another format, as IN says
 #include "engine/format/camera_path.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/choice.h"
@@ -90,7 +90,7 @@ Status convert(ConvertArguments& o, const Globals& globals)
             fmt::format("{}, which {} is taken for (--from says which format it has)", kind, quote_path(o.model.in)));
     };
     if (is_camera_path(o.model.in)) {
-        SR_CHECK(refuse_but({kDryRun, kPathNames, placement_options()}, "a camera path"));
+        SR_CHECK(refuse_but({kDryRun, kPathNames, placement_options()}, "a trajectory"));
         o.path.placement.calibration = o.objects.calibration;
         if (o.path.placement.origin.empty())
             o.path.placement.origin = o.scene.input.origin;
@@ -151,7 +151,7 @@ void add_convert(CLI::App& app, const Globals& globals, Run& run)
     add_path_options(*c, o->path);
     for (const auto& [name, more] : {std::pair{"--calib", "; of KITTI's poses, likewise (of the first frame without "
                                                           "--relative-to)"},
-                                     {"--origin", "; of a camera path, as --path-origin"}})
+                                     {"--origin", "; of a trajectory, as --path-origin"}})
         c->get_option(name)->description(c->get_option(name)->get_description() + more);
     c->add_option(
         "-m,--model", o->guessing_model,

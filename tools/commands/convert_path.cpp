@@ -175,14 +175,14 @@ Status write_output(const Path& out, const CameraPath& path, PathFormat format)
 void add_path_options(CLI::App& c, ConvertPathOptions& o)
 {
     add_choice(c, "--path-format", {"tum", "kitti", "transforms", "camera_path", "colmap"},
-               "of a camera path that is written; by default OUT's name decides", o.format);
-    c.add_option("--camera", o.camera, "of a camera path: only the frames of this camera");
-    c.add_option("--rig", o.rig, "of a camera path: every sensor of a rig.json at every pose");
+               "of a trajectory that is written; by default OUT's name decides", o.format);
+    c.add_option("--camera", o.camera, "of a trajectory: only the frames of this camera");
+    c.add_option("--rig", o.rig, "of a trajectory: every sensor of a rig.json at every pose");
     c.add_option(
         "--points", o.points,
-        "of a camera path: a grid whose points go along, to points3D.txt of COLMAP or, for nerfstudio, points.ply");
+        "of a trajectory: a grid whose points go along, to points3D.txt of COLMAP or, for nerfstudio, points.ply");
     c.add_option("--images", o.images,
-                 "of a camera path to COLMAP: a folder of `render` or `refine`, whose pictures get links in images/");
+                 "of a trajectory to COLMAP: a folder of `render` or `refine`, whose pictures get links in images/");
     add_lens_options(c, o.lens);
     add_placement_options(c, o.placement);
 }

@@ -9,7 +9,7 @@
 
 namespace semrover {
 
-// camera paths of any format that is read to TUM, KITTI, nerfstudio's two and COLMAP's text model
+// trajectories of any format that is read to TUM, KITTI, nerfstudio's two and COLMAP's text model
 struct ConvertPathOptions {
     PathOptions placement;
     LensOptions lens;   // where the path has none
@@ -21,7 +21,7 @@ struct ConvertPathOptions {
 };
 void add_path_options(CLI::App& command, ConvertPathOptions& options);
 
-// is this a camera path, and not a scene or a model? By what it holds, and of a file that is not there by its name
+// is this a trajectory, and not a scene or a model? By what it holds, and of a file that is not there by its name
 bool is_camera_path(const Path& path);
 
 // bad_input, for what is no path, no scene and no model: what it looks like, and what was expected

@@ -27,7 +27,7 @@ Result<std::array<uint8_t, 3>> background_of(const DriveOptions& o)
 void add_drive_options(CLI::App& c, DriveOptions& o)
 {
     c.add_option("--path", o.path,
-                 "camera path: TUM, KITTI, KITTI-360, transforms.json, camera_path.json, COLMAP's folder and others "
+                 "trajectory: TUM, KITTI, KITTI-360, transforms.json, camera_path.json, COLMAP's folder and others "
                  "(docs/formats.md §7.1)");
     add_lens_options(c, o);
     add_placement_options(c, o.placement);
@@ -64,7 +64,7 @@ Result<DrawOptions> draw_options(const DriveOptions& o)
     SR_TRY(draw.surfels, surfel_options(o.splat_radius, o.opacity));
     SR_CHECK(intrinsics_of(o).map([](const auto&) {}));
     if (o.path.empty() && o.placement.any())
-        return fail(ErrorCode::usage, "--relative-to, --calib, --world and --path-origin are of a camera path: --path");
+        return fail(ErrorCode::usage, "--relative-to, --calib, --world and --path-origin are of a trajectory: --path");
     if (o.equirect && !o.rig.empty())
         return fail(ErrorCode::usage, "--equirect or --rig; a rig.json may have an equirectangular sensor");
     if (o.equirect && o.width % 2)

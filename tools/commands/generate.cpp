@@ -76,7 +76,7 @@ void add_generate(CLI::App& app, const Globals& globals, Run& run)
     c->add_option("--ply-3dgs", o->ply.splats_3d, "also write the splats as a 3DGS PLY");
     c->add_option("--ply-2dgs", o->ply.splats_2d, "also write the splats as a 2DGS PLY");
     CLI::Option* along = c->add_option("--along", o->along,
-                                       "camera path: generate the tiles near it, in the order of tiles, into a folder "
+                                       "trajectory: generate the tiles near it, in the order of tiles, into a folder "
                                        "of tiles, with memory that does not grow");
     add_placement_options(*c, o->placement);
     add_number(*c, "--horizon", o->horizon, "--along: metres from the path, seen from above, that are generated", 0.1,

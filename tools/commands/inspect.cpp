@@ -419,7 +419,7 @@ Result<Report> describe(const Path& path, const SceneInputOptions& input, const 
     return describe_weights(set, true, totals);
 }
 
-// ---- a camera path, and whether it meets a grid
+// ---- a trajectory, and whether it meets a grid
 
 struct InspectArguments {
     std::string file, other, path; // `path`: --path, in place of one of the two
@@ -435,7 +435,7 @@ struct InspectedFiles {
 Result<InspectedFiles> sort_out(const InspectArguments& o)
 {
     if (!o.path.empty() && !o.other.empty())
-        return fail(ErrorCode::usage, "--path, or two files, of which one is a camera path");
+        return fail(ErrorCode::usage, "--path, or two files, of which one is a trajectory");
     if (!o.path.empty())
         return InspectedFiles{o.path, o.file};
     const bool first = o.input.from.empty() && find_path(o.file);
@@ -449,7 +449,7 @@ Result<Report> describe_both(const InspectArguments& o, const Globals& globals)
     SR_TRY(const InspectedFiles files, sort_out(o));
     if (files.path.empty()) {
         for (const auto names : {placement_options(), lens_options()})
-            SR_CHECK(refuse_given(*o.input.command, names, "a file that is no camera path"));
+            SR_CHECK(refuse_given(*o.input.command, names, "a file that is no trajectory"));
         return describe(files.other, o.input, globals);
     }
     SR_TRY(PathLens lens, path_lens_of(o.lens));
@@ -491,15 +491,15 @@ Status inspect(const InspectArguments& o, const Globals& globals)
 void add_inspect(CLI::App& app, const Globals& globals, Run& run)
 {
     CLI::App* command = app.add_subcommand(
-        "inspect", "show what is in a model, a scene or a camera path, and whether a path and a scene meet");
+        "inspect", "show what is in a model, a scene or a trajectory, and whether a path and a scene meet");
     const auto o = std::make_shared<InspectArguments>();
     command
         ->add_option("FILE|DIR", o->file,
                      "a .safetensors file or index, a model's folder, a scene in any format, its objects (.json), or a "
-                     "camera path")
+                     "trajectory")
         ->required();
-    command->add_option("OTHER", o->other, "a scene for a camera path, or a path for a scene: whether they meet");
-    command->add_option("--path", o->path, "a camera path, likewise");
+    command->add_option("OTHER", o->other, "a scene for a trajectory, or a path for a scene: whether they meet");
+    command->add_option("--path", o->path, "a trajectory, likewise");
     add_scene_input_options(*command, o->input);
     add_lens_options(*command, o->lens);
     add_placement_options(*command, o->placement);

@@ -152,7 +152,7 @@ Result<PageContent> load_content(const PageArguments& o, const Globals& globals)
 Status page(const PageArguments& o, const Globals& globals)
 {
     if (o.path.empty() && o.placement.any())
-        return fail(ErrorCode::usage, "--relative-to, --calib, --world and --origin are of a camera path: --path");
+        return fail(ErrorCode::usage, "--relative-to, --calib, --world and --origin are of a trajectory: --path");
     SR_CHECK(check_writable(o.output, globals.yes));
     SR_TRY(const PageContent content, load_content(o, globals));
     const std::string html = page_html(content);
@@ -187,7 +187,7 @@ void add_page(CLI::App& app, const Globals& globals, Run& run)
         c->add_option("--frames", o->frames, "NAME=FOLDER of pictures 000000.png; several lie beside each other");
     c->add_option("--run", o->runs, "a run's folder, or its run.json, for the table of settings and results");
     c->add_option("--figures", o->figures, "a JSON object of names and values, for a table of its own");
-    c->add_option("--path", o->path, "a camera path of any format, to drive along in the scene");
+    c->add_option("--path", o->path, "a trajectory of any format, to follow in the scene");
     add_placement_options(*c, o->placement);
     add_number(*c, "--max-frames", o->pictures.limit, "moments at most, evenly chosen", 1u, 2000u)->needs(frames);
     add_number(*c, "--quality", o->pictures.quality, "of JPEG", 1, 100)->needs(frames);

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// semrover render GRID --path FILE -o DIR: splat buffers of a camera path: colour, depth, normal, label, visibility
+// semrover render GRID --path FILE -o DIR: splat buffers of a trajectory: colour, depth, normal, label, visibility
 #include "engine/job/drawing.h"
 #include "engine/job/outputs.h"
 #include "runtime/base/quote.h"
@@ -29,7 +29,7 @@ struct RenderArguments {
 Status check_outputs(const RenderArguments& o, const Globals& globals)
 {
     if (o.drive.path.empty() && !o.top)
-        return fail(ErrorCode::usage, "--path (a camera path) or --top is required");
+        return fail(ErrorCode::usage, "--path (a trajectory) or --top is required");
     if (o.video.empty())
         return {};
     if (o.drive.path.empty())
@@ -121,7 +121,7 @@ void add_render(CLI::App& app, const Globals& globals, Run& run)
 {
     auto o = std::make_shared<RenderArguments>();
     CLI::App* c =
-        app.add_subcommand("render", "splat buffers of a camera path: colour, depth, normal, label, visibility");
+        app.add_subcommand("render", "splat buffers of a trajectory: colour, depth, normal, label, visibility");
     c->add_option("GRID", o->grid,
                   "a grid (.sgrid, a folder of tiles, .npz, .label, .vox, .ply) or splats (.ply, .glb, .splat)")
         ->required();

@@ -218,7 +218,7 @@ void add_eval_flicker(CLI::App& eval, const Globals& globals, Run& run)
     c->add_option("FRAMES", o->frames, "a folder of pictures 000000 and so on, or what `refine` or `render` wrote")
         ->required();
     c->add_option("--depth", o->depth, "16-bit depth of these names; 0 and 65535: nothing")->required();
-    c->add_option("--path", o->path, "camera path of the frames, in any format that `render` reads")->required();
+    c->add_option("--path", o->path, "trajectory of the frames, in any format that `render` reads")->required();
     c->add_option("--truth", o->truth, "true pictures of these names: also their figure, which is the floor");
     add_number(*c, "--depth-scale", o->flow.depth_scale, "metres of one unit of depth; 0.001", 1e-6, 10.0);
     add_number(*c, "--tolerance", o->flow.tolerance, "relative, of the depths of both frames; 0.01", 1e-6, 1.0);

@@ -99,7 +99,7 @@ void print(const SurfaceError& error, const EvalSurfaceArguments& o)
 Status run_surface(EvalSurfaceArguments o, const Globals& globals)
 {
     if (o.frames.empty() && o.placement.any())
-        return fail(ErrorCode::usage, "--relative-to, --calib, --world and --origin are of a camera path: --frames");
+        return fail(ErrorCode::usage, "--relative-to, --calib, --world and --origin are of a trajectory: --frames");
     // colours do not matter here
     const MeshReadOptions options{.missing_textures = MissingTextures::white};
     SR_TRY(Mesh mesh, read_mesh(o.mesh, options));
@@ -135,7 +135,7 @@ void add_eval_surface(CLI::App& eval, const Globals& globals, Run& run)
     c->add_option("MESH", o->mesh, "what was made: .glb, .ply or .obj")->required();
     c->add_option("TRUTH", o->truth, "the true mesh, likewise")->required();
     c->add_option("--frames", o->frames, "folder of depth pictures, as for fuse: only vertices they saw are measured");
-    c->add_option("--poses", o->poses, "camera path of these; FRAMES/transforms.json");
+    c->add_option("--poses", o->poses, "trajectory of these; FRAMES/transforms.json");
     add_placement_options(*c, o->placement);
     add_number(*c, "--fov-x", o->input.fov_x, "degrees, where files have no intrinsics", 1.0, 179.0);
     add_depth_options(*c, o->input.depth);

@@ -261,7 +261,7 @@ void add_fuse(CLI::App& app, const Globals& globals, Run& run)
     c->add_option("DIR", o->folder, "[CAMERA/]{depth,label,color}/000000.png and transforms.json")->required();
     c->add_option("-o,--output", o->output, "folder for mesh.glb, semantic.sgrid, voxfield.sgrid, run.json")
         ->required();
-    c->add_option("--poses", o->poses, "a camera path; DIR/transforms.json or groundtruth.txt");
+    c->add_option("--poses", o->poses, "a trajectory; DIR/transforms.json or groundtruth.txt");
     add_placement_options(*c, o->placement);
     add_camera_options(*c, o->input);
     add_depth_options(*c, o->input.depth);

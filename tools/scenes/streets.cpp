@@ -99,7 +99,7 @@ TransformsFiles files_of(bool pictures)
 
 Status check_drive(const StreetsArguments& o)
 {
-    constexpr double kMostFrames = 100000; // each has its lines in two camera paths
+    constexpr double kMostFrames = 100000; // each has its lines in two trajectories
     if (o.drive.first > o.street.length)
         return fail(ErrorCode::usage, "--first: {} m is behind the end of the street, which is {} m long",
                     o.drive.first, o.street.length);
