@@ -261,7 +261,7 @@ static void renderers_are_the_same(sr_context* context)
 {
     static uint8_t expected[PIXELS * 4], found[PIXELS * 4];
     struct files files = renderer_in_memory();
-    const sr_model_desc on_disk = model_at(renderer), in_memory = with_files(&files);
+    const sr_model_desc on_disk = model_at(weights), in_memory = with_files(&files);
     sr_model_desc desc = in_memory;
     sr_context_desc small;
     sr_context* in_turns = NULL;

@@ -126,7 +126,7 @@ static void loads_can_be_given_up(sr_context* context, const char* both)
     desc.progress = on_progress;
     desc.user = &whole;
     CHECK_OK(context, sr_model_load(context, &desc, &model));
-    CHECK(whole.calls > GIVEN_UP && whole.done == whole.total && whole.total == info_of(model).device_bytes);
+    CHECK(whole.calls > GIVEN_UP && whole.done == whole.total && whole.total <= info_of(model).device_bytes);
     sr_model_destroy(model);
     for (i = 0; i < GIVEN_UP; ++i) {
         memset(&part, 0, sizeof part);

@@ -3,6 +3,7 @@
 // models: loaded once, shared by worlds and renderers
 #include "engine/capi/call.h"
 #include "engine/capi/handles.h"
+#include "engine/scene/cell_reach.h"
 
 using namespace semrover;
 using namespace semrover::capi;
@@ -125,4 +126,4 @@ sr_status sr_model_get_info(const sr_model* model, sr_model_info* info)
 
 } // extern "C"
 
-static_assert(sizeof(sr_file) == 24 && sizeof(sr_model_desc) == 64 && sizeof(sr_model_info) == 64);
+static_assert(sizeof(sr_file) == 24 && sizeof(sr_model_desc) == 64 && sizeof(sr_model_info) == 56);

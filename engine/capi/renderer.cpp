@@ -225,4 +225,4 @@ sr_status sr_renderer_get_info(sr_renderer* renderer, sr_renderer_info* info)
 } // extern "C"
 
 static_assert(sizeof(sr_source) == 24 && sizeof(sr_frame_desc) == 200);
-static_assert(sizeof(sr_renderer_desc) == 88 && sizeof(sr_renderer_info) == 48);
+static_assert(sizeof(sr_renderer_desc) == 72 && sizeof(sr_renderer_info) == 48);

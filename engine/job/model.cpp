@@ -72,7 +72,10 @@ Status Model::upload(Device& device, const Progress& progress)
     // without room for both they are loaded in turn, by who renders
     if (renderer_ && (!device.budget() || device.allocated_bytes() + renderer_bytes_ <= device.budget()))
         SR_CHECK(renderer_->keep(added));
-    return say(bytes_);
+    SR_CHECK(say(bytes_));
+    if (transformer_) // frequencies beside the weights
+        bytes_ += transformer_->device_bytes(device.limits()) - transformer_->weights().device_bytes(device.limits());
+    return {};
 }
 
 } // namespace semrover
