@@ -1,25 +1,28 @@
 /* SPDX-FileCopyrightText: semrover authors
  * SPDX-License-Identifier: Apache-2.0
  *
- * The C interface of semrover: C99, no other header of ours, no exception and no exit across it.
+ * The C interface of semrover: C99, no other header of ours, no exception and no exit across it. "The application" is
+ * the program that calls it. docs/embedding.md has a complete example. Refined frames are in semrover_renderer.h, which
+ * this header includes; a Vulkan device of the application's in semrover_vulkan.h, OpenGL in semrover_gl.h, which it
+ * does not.
  *
- * Structures start with struct_size, which the caller sets to sizeof of the structure it was compiled with. The library
- * reads and writes no more than that; members that are missing are zero. Members that this library does not know must
- * be zero, or the call fails with SR_ERR_USAGE, so that nothing asked for is silently ignored. `next` is reserved:
- * NULL.
+ * Structures start with struct_size: `sr_world_desc desc = SR_INIT(sr_world_desc);` sets it, and all else to zero. The
+ * library reads and writes no more than that; members that are missing are zero. Members that this library does not
+ * know must be zero, or the call fails with SR_ERR_USAGE, so that nothing asked for is silently ignored. `next` is
+ * reserved: NULL.
  *
- * Threads: different contexts may be used at the same time; one context, with the worlds and renderers on it, by one
- * thread at a time; a grid likewise. Callbacks run on the thread that calls, before the call returns, and must not call
- * the library but where it is said. Strings that the library returns are static. Everything that a call is given is
- * copied before it returns, but for what belongs to Vulkan, and models in memory (sr_file).
+ * Threads and waiting are said at each call, in these words:
+ * - "Any thread": at any time. Where nothing is said, one thread at a time for a context with the models, worlds and
+ *   renderers on it; and one for a grid.
+ * - "Waits for" the disk, the device (until what was submitted has finished), the compiler (of shaders: seconds at the
+ *   first time, then from a cache), drivers, a callback. Where nothing is said, a call returns at once.
+ * Different contexts may be used at the same time. A call that meets another one with the same context, on another
+ * thread or around the callback that makes it, returns SR_ERR_USAGE, of which sr_last_error(NULL, ..) has the line;
+ * sr_.._destroy does nothing then.
  *
- * Which calls block: sr_context_create (drivers), sr_model_load (the disk), sr_world_create and sr_renderer_create
- * (compile shaders: seconds, the first time), sr_world_step and sr_renderer_step (for their budget), sr_world_flush
- * (for the disk), sr_world_draw, sr_renderer_begin and sr_renderer_take (for the device), sr_world_record and
- * sr_world_submit (the first time with a size, to compile).
- *
- * docs/embedding.md has a complete example. Renderers, which refine frames, are in semrover_renderer.h, which this
- * header includes; OpenGL is in semrover_gl.h, which it does not.
+ * Callbacks run on the thread that calls, before the call returns. Strings that the library returns are static.
+ * Everything that a call is given is copied before it returns, but for what belongs to Vulkan, and models in memory
+ * (sr_file). Handles are destroyed before what they were made with, but for models.
  */
 #ifndef SEMROVER_H
 #define SEMROVER_H
@@ -28,8 +31,25 @@
 #include <stdint.h>
 
 #ifdef __cplusplus
+/* a structure with its struct_size, all else zero */
+template <typename T>
+inline T sr_init()
+{
+    T made{};
+    made.struct_size = sizeof made;
+    return made;
+}
+#define SR_INIT(type) sr_init<type>()
 extern "C" {
+#else
+#define SR_INIT(type) ((type){.struct_size = sizeof(type)})
 #endif
+
+#ifndef SR_API
+#define SR_API __attribute__((visibility("default")))
+#endif
+
+#define SR_VERSION 100u /* 10000 major + 100 minor + patch, of this header */
 
 /* raised when a binary built against an older header could misbehave; never within a soname */
 #define SR_ABI_VERSION 0u
@@ -51,20 +71,21 @@ typedef enum sr_status {
 
 typedef struct sr_context sr_context; /* one device and what lives on it */
 
-uint32_t sr_abi_version(void);                /* of the library; compare with SR_ABI_VERSION */
-const char* sr_version(void);                 /* "0.1.0" */
-const char* sr_status_name(sr_status status); /* "SR_ERR_USAGE"; "unknown" for others */
+/* Any thread. */
+SR_API uint32_t sr_abi_version(void);                /* of the library; compare with SR_ABI_VERSION */
+SR_API const char* sr_version(void);                 /* "0.1.0" */
+SR_API const char* sr_status_name(sr_status status); /* "SR_ERR_USAGE"; "unknown" for others */
 
-/* One line about the last call that failed: with this context or a world or renderer on it, or, for NULL, in this
- * thread without a context, as calls with grids are. Writes at most `size` bytes with the terminating zero and returns
- * the length that the whole line has. buffer may be NULL with 0. */
-size_t sr_last_error(const sr_context* context, char* buffer, size_t size);
+/* Any thread, but for a context that another one uses. One line about the last call that failed: with this context or a
+ * world or renderer on it, or, for NULL, in this thread without a context, as calls with grids are. Writes at most
+ * `size` bytes with the terminating zero and returns the length that the whole line has. buffer may be NULL with 0. */
+SR_API size_t sr_last_error(const sr_context* context, char* buffer, size_t size);
 
 /* Lines that no call returns: of the validation that sr_context_desc asks for. (A failed assertion, a bug of ours,
  * makes its call return SR_ERR_INTERNAL with its text; its context should not be used further.) The library itself
  * prints nothing. The callback counts for the whole process, runs on the thread that has something to say, one line at
- * a time, and must not call the library. NULL, as at the beginning: lines are dropped. */
-void sr_set_diagnostic_callback(void (*callback)(void* user, const char* line), void* user);
+ * a time, and must not call the library. NULL, as at the beginning: lines are dropped. Any thread. */
+SR_API void sr_set_diagnostic_callback(void (*callback)(void* user, const char* line), void* user);
 
 typedef struct sr_device_info {
     uint32_t struct_size;
@@ -77,87 +98,39 @@ typedef struct sr_device_info {
     uint64_t memory_bytes; /* of the largest device-local heap */
 } sr_device_info;
 
-/* All Vulkan devices, best first. devices NULL: only the count. Otherwise *count is the room in `devices`, whose first
- * element has struct_size set, which is then the distance between elements; *count becomes the number written.
- * SR_ERR_PARTIAL when there are more. */
-sr_status sr_list_devices(sr_device_info* devices, uint32_t* count);
+/* Any thread; waits for drivers. All Vulkan devices, best first. devices NULL: only the count. Otherwise *count is the
+ * room in `devices`, whose first element has struct_size set, which is then the distance between elements; *count
+ * becomes the number written. SR_ERR_PARTIAL when there are more. */
+SR_API sr_status sr_list_devices(sr_device_info* devices, uint32_t* count);
 
-/* Memory that the library asks an allocator of the host's for: of one buffer, for as long as it lives. */
-typedef struct sr_memory_request {
-    uint32_t struct_size;
-    uint32_t memory_type; /* index in VkPhysicalDeviceMemoryProperties */
-    uint64_t bytes;
-    uint64_t alignment; /* of the offset, bytes */
-    uint32_t mapped;    /* 1: the host's pointer to it is needed, for as long as it lives */
-    uint32_t reserved;
-} sr_memory_request;
-
-typedef struct sr_memory_piece {
-    void* memory;    /* VkDeviceMemory of the type that was asked for */
-    uint64_t offset; /* bytes */
-    void* mapped;    /* where the host sees the piece; NULL where `mapped` was 0 */
-    void* handle;    /* the allocator's own; the library only hands it back */
-} sr_memory_piece;
-
-/* A device that belongs to the host program. It outlives the context. For a context on it the library writes no file
- * and reads no variable of the environment. Vulkan 1.2 with timelineSemaphore and robustBufferAccess enabled: files
- * decide what shaders read. Vulkan cannot be asked which features a device was made with, so the host says it.
- * SR_ERR_USAGE without robust_buffer_access. */
-typedef struct sr_vulkan_device {
-    uint32_t struct_size;
-    uint32_t queue_family; /* with compute */
-    const void* next;
-    void* instance;                 /* VkInstance */
-    void* physical_device;          /* VkPhysicalDevice */
-    void* device;                   /* VkDevice */
-    void* queue;                    /* VkQueue */
-    void* user;                     /* for the callbacks */
-    void (*lock_queue)(void* user); /* around every use of the queue, from the thread that calls; both or neither */
-    void (*unlock_queue)(void* user);
-    uint32_t shader_float16;       /* 1: shaderFloat16 is enabled too */
-    uint32_t robust_buffer_access; /* 1: robustBufferAccess is enabled; anything else is refused */
-    /* PFN_vkGetInstanceProcAddr of the host's, through which every call is found; NULL: the loader's */
-    void (*get_instance_proc_addr)(void);
-    /* Instead of vkAllocateMemory, but for memory that semrover_gl.h shares. Both or neither. allocate_memory fills
-     * *piece, which is zero; a status beside SR_OK (SR_ERR_OUT_OF_MEMORY) ends the call that needed the memory, with
-     * that status. free_memory gets the piece back when the device has finished with it. */
-    sr_status (*allocate_memory)(void* user, const sr_memory_request* request, sr_memory_piece* piece);
-    void (*free_memory)(void* user, const sr_memory_piece* piece);
-    uint32_t external_memory_fd;    /* 1: VK_KHR_external_memory_fd is enabled, for semrover_gl.h */
-    uint32_t external_semaphore_fd; /* 1: VK_KHR_external_semaphore_fd is enabled, likewise */
-    /* 1: what matrix units need is enabled: VK_KHR_cooperative_matrix and VK_EXT_subgroup_size_control (or Vulkan 1.3)
-     * with cooperativeMatrix, subgroupSizeControl, computeFullSubgroups, vulkanMemoryModel and
-     * vulkanMemoryModelDeviceScope; shader_float16 must be 1, too. Without them large networks take several times as
-     * long on a GPU that has them. */
-    uint32_t cooperative_matrix;
-    uint32_t reserved;
-} sr_vulkan_device;
+typedef struct sr_vulkan_device sr_vulkan_device; /* semrover_vulkan.h */
 
 typedef struct sr_context_desc {
     uint32_t struct_size;
-    uint32_t validation; /* 1: Khronos validation, see sr_set_diagnostic_callback; not with a host's device */
+    uint32_t validation; /* 1: Khronos validation, see sr_set_diagnostic_callback; not with `vulkan` */
     const void* next;
     const char* device;             /* NULL: the best; an index, or a part of a name */
-    const sr_vulkan_device* vulkan; /* not NULL: the host's, instead of one of our own */
+    const sr_vulkan_device* vulkan; /* the application's device; NULL: one of the library's own */
     uint64_t max_bytes;             /* of device memory; 0: no budget */
     /* What sr_context_get_pipeline_cache gave another process, read before the call returns. One that is damaged, or of
      * another driver, is ignored. NULL: a context of our own keeps a file in $XDG_CACHE_HOME/semrover. */
     const void* pipeline_cache;
     uint64_t pipeline_cache_bytes;
-    /* VkAllocationCallbacks, copied, for every Vulkan object that the library makes, with a host's device too. Called
-     * from the threads that call the library, and from threads of the driver. NULL: the driver's own. */
-    const void* allocation_callbacks;
-    uint32_t share_by_fd; /* 1: enables what semrover_gl.h shares memory by, where there is it. Not with a host's
-                             device, which says by itself what it has */
+    /* Copied; for every Vulkan object that the library makes, with `vulkan` too. Called from the threads that call the
+     * library, and from threads of the driver. NULL: the driver's own. */
+    const struct VkAllocationCallbacks* allocation_callbacks;
+    uint32_t share_by_fd; /* 1: enables what the device has of what semrover_gl.h shares memory by. Not with `vulkan`,
+                             which says by itself what it has */
     uint32_t reserved;
 } sr_context_desc;
 
-/* desc may be NULL: the best device. On failure *context is NULL; sr_last_error(NULL, ..) says why. */
-sr_status sr_context_create(const sr_context_desc* desc, sr_context** context);
-void sr_context_destroy(sr_context* context); /* waits for what it has submitted; NULL is fine */
+/* desc may be NULL: the best device. On failure *context is NULL; sr_last_error(NULL, ..) says why. Any thread; waits
+ * for drivers. */
+SR_API sr_status sr_context_create(const sr_context_desc* desc, sr_context** context);
+SR_API void sr_context_destroy(sr_context* context); /* waits for the device; NULL is fine */
 
-/* the device of a context; index is 0 for a host's */
-sr_status sr_context_device(sr_context* context, sr_device_info* device);
+/* index is 0 for the application's */
+SR_API sr_status sr_context_get_device(sr_context* context, sr_device_info* device);
 
 typedef struct sr_memory_info {
     uint32_t struct_size;
@@ -167,27 +140,28 @@ typedef struct sr_memory_info {
     uint64_t budget_bytes; /* 0: none */
 } sr_memory_info;
 
-sr_status sr_context_memory(sr_context* context, sr_memory_info* memory);
+SR_API sr_status sr_context_get_memory(sr_context* context, sr_memory_info* memory);
 
-/* What the driver compiled so far, to be kept by the host: shaders are compiled again in a process that does not get
- * it. data NULL: only the size. Otherwise *bytes is the room at `data`; it becomes the size. SR_ERR_PARTIAL: there is
- * less room than that, and nothing is written. */
-sr_status sr_context_get_pipeline_cache(sr_context* context, void* data, uint64_t* bytes);
+/* What the driver compiled so far, to be kept by the application: shaders are compiled again in a process that does not
+ * get it. data NULL: only the size. Otherwise *bytes is the room at `data`; it becomes the size. SR_ERR_PARTIAL: there
+ * is less room than that, and nothing is written. */
+SR_API sr_status sr_context_get_pipeline_cache(sr_context* context, void* data, uint64_t* bytes);
 
-/* ---- Grids: labelled cells of one size, each with coloured points or none. Host memory only. ---- */
+/* ---- Grids: labelled voxels of one size, each with coloured points or none. Host memory only. ---- */
 
 typedef struct sr_grid sr_grid;
 
 #define SR_NO_CELL 0xffffffffu
-#define SR_LABELS 20u
+#define SR_CLASSES 20u
 
-/* The name of a label, "road", static, or NULL where there is no such label; and its colour in the palette: r, g, b,
- * 0..255. SR_ERR_USAGE: a NULL, no such label. */
-const char* sr_label_name(uint32_t label);
-sr_status sr_label_color(uint32_t label, uint8_t rgb[3]);
+/* Any thread. The name of a class, "road", static, or NULL where there is no such class; and its colour in the palette:
+ * r, g, b, 0..255. SR_ERR_USAGE: a NULL, no such class. */
+SR_API const char* sr_class_name(uint32_t class_id);
+SR_API sr_status sr_class_color(uint32_t class_id, uint8_t rgb[3]);
 
 /* Cell (i, j, k) spans [i, i+1) x [j, j+1) x [k, k+1) voxel sizes, x forward, y left, z up. Coordinates: -2^20..2^20.
- * label: 0 road, 1 sidewalk, 2 building, ... 19 road-lane (docs/method.md, section 1.1); SR_NO_CELL: there is none. */
+ * label: a class, 0 road, 1 sidewalk, 2 building, ... 19 road-lane (docs/method.md, section 1.1); SR_NO_CELL: there is
+ * no voxel. */
 typedef struct sr_cell {
     int32_t i, j, k;
     uint32_t label;
@@ -195,35 +169,37 @@ typedef struct sr_cell {
 
 typedef struct sr_grid_info {
     uint32_t struct_size;
-    uint32_t points_per_cell; /* 0: cells have labels only */
+    uint32_t points_per_voxel; /* 0: there are labels only */
     uint64_t cells;
     double voxel_size; /* metres */
 } sr_grid_info;
 
-/* On failure *grid is NULL. read: a .sgrid file, or a folder of tiles (docs/formats.md, section 2).
+/* On failure *grid is NULL. read: a .sgrid file, or a folder of tiles (docs/formats.md, section 2); waits for the disk.
  * SR_ERR_USAGE: a NULL; SR_ERR_BAD_INPUT: a voxel size outside 1 mm..1 km, a file or its content. */
-sr_status sr_grid_create(double voxel_size, sr_grid** grid);
-sr_status sr_grid_read(const char* path, sr_grid** grid);
-void sr_grid_destroy(sr_grid* grid); /* NULL is fine */
+SR_API sr_status sr_grid_create(double voxel_size, sr_grid** grid);
+SR_API sr_status sr_grid_read(const char* path, sr_grid** grid);
+SR_API void sr_grid_destroy(sr_grid* grid); /* NULL is fine */
 
-/* Writes a .sgrid, whole or not at all; a file that is there is replaced. SR_ERR_BAD_INPUT: a grid without cells, the
- * disk. */
-sr_status sr_grid_write(const sr_grid* grid, const char* path);
+/* Writes a .sgrid, whole or not at all; a file that is there is replaced. Waits for the disk. SR_ERR_BAD_INPUT: a grid
+ * without cells, the disk. */
+SR_API sr_status sr_grid_write(const sr_grid* grid, const char* path);
 
-sr_status sr_grid_get_info(const sr_grid* grid, sr_grid_info* info);
+SR_API sr_status sr_grid_get_info(const sr_grid* grid, sr_grid_info* info);
 
 /* Adds cells, changes labels, or takes cells away (SR_NO_CELL); of equal cells the last counts. Cells whose label
  * changes lose their points. Cheap in pieces, too: the grid is put together when it is next read. SR_ERR_BAD_INPUT:
  * coordinates, labels; nothing is changed then. */
-sr_status sr_grid_set_cells(sr_grid* grid, const sr_cell* cells, uint64_t count);
+SR_API sr_status sr_grid_set_cells(sr_grid* grid, const sr_cell* cells, uint64_t count);
 
 /* The cells from number `first` on, sorted by i, j, k. cells: room for `count`; *written: how many there were. */
-sr_status sr_grid_get_cells(const sr_grid* grid, uint64_t first, uint64_t count, sr_cell* cells, uint64_t* written);
+SR_API sr_status sr_grid_get_cells(const sr_grid* grid, uint64_t first, uint64_t count, sr_cell* cells,
+                                   uint64_t* written);
 
-/* The points of the same cells, points_per_cell each: x, y, z in metres in the world's frame, then r, g, b (sRGB,
- * 0..1). points: room for count * points_per_cell * 6 floats. Cells without points have zeros. SR_ERR_BAD_INPUT: a grid
- * without points. */
-sr_status sr_grid_get_points(const sr_grid* grid, uint64_t first, uint64_t count, float* points, uint64_t* written);
+/* The points of the same cells, points_per_voxel each: x, y, z in metres in the world's frame, then r, g, b (sRGB,
+ * 0..1). points: room for count * points_per_voxel * 6 floats. Cells without points have zeros. SR_ERR_BAD_INPUT: a
+ * grid without points. */
+SR_API sr_status sr_grid_get_points(const sr_grid* grid, uint64_t first, uint64_t count, float* points,
+                                    uint64_t* written);
 
 /* ---- Models: networks on the device, loaded once for any number of worlds and renderers. ---- */
 
@@ -258,14 +234,14 @@ typedef struct sr_model_desc {
     void* user; /* for the callback */
 } sr_model_desc;
 
-/* Reads the weights and copies them to the device: seconds for a large model. Where sr_context_desc.max_bytes has no
- * room for both networks of a renderer, sr_renderers load them in turn. context: outlives the model. On failure *model
- * is NULL, and nothing stays on the device. SR_ERR_USAGE: a NULL, files; SR_ERR_BAD_INPUT: the model's files;
- * SR_ERR_OUT_OF_MEMORY, SR_ERR_INTERRUPTED. */
-sr_status sr_model_load(sr_context* context, const sr_model_desc* desc, sr_model** model);
+/* Reads the weights and copies them to the device: waits for the disk and the device, seconds for a large model. Where
+ * sr_context_desc.max_bytes has no room for both networks of a renderer, sr_renderers load them in turn. context:
+ * outlives the model. On failure *model is NULL, and nothing stays on the device. SR_ERR_USAGE: a NULL, files;
+ * SR_ERR_BAD_INPUT: the model's files; SR_ERR_OUT_OF_MEMORY, SR_ERR_INTERRUPTED. */
+SR_API sr_status sr_model_load(sr_context* context, const sr_model_desc* desc, sr_model** model);
 
 /* Worlds and renderers that are made with it go on: the last of them frees the weights. NULL is fine. */
-void sr_model_destroy(sr_model* model);
+SR_API void sr_model_destroy(sr_model* model);
 
 /* what a voxfield transformer can be conditioned on beside labels */
 #define SR_CONDITION_OBJECTS 1u /* boxes: a voxel's place in its object */
@@ -274,31 +250,31 @@ void sr_model_destroy(sr_model* model);
 
 typedef struct sr_model_info {
     uint32_t struct_size;
-    uint32_t parts;           /* SR_MODEL_.. that are loaded */
-    uint32_t precision;       /* SR_FP16 or SR_FP32 */
-    uint32_t conditions;      /* SR_CONDITION_.. */
-    uint64_t device_bytes;    /* of the weights */
-    double voxel_size;        /* metres */
-    uint32_t points_per_cell; /* 0: no voxfield transformer, and so on */
-    uint32_t steps;           /* of denoising points, where a world does not say */
-    uint32_t renderer_steps;  /* of denoising a frame, where sr_renderer_desc does not say; 0: no renderer, and so on */
-    uint32_t window_frames;   /* made together: 1, or more of a renderer of videos, which sr_renderer cannot use yet */
-    double splat_radius;      /* metres, that the renderer was trained on; 0: from the points' distance */
+    uint32_t parts;            /* SR_MODEL_.. that are loaded */
+    uint32_t precision;        /* SR_FP16 or SR_FP32 */
+    uint32_t conditions;       /* SR_CONDITION_.. */
+    uint64_t device_bytes;     /* of the weights */
+    double voxel_size;         /* metres */
+    uint32_t points_per_voxel; /* 0: no voxfield transformer, and so on */
+    uint32_t steps;            /* of denoising points, where a world does not say */
+    uint32_t renderer_steps; /* of denoising a frame, where sr_renderer_desc does not say; 0: no renderer, and so on */
+    uint32_t window_frames;  /* made together: 1, or more of a renderer of videos, which sr_renderer cannot use yet */
+    double splat_radius;     /* metres, that the renderer was trained on; 0: from the points' distance */
 } sr_model_info;
 
-sr_status sr_model_get_info(const sr_model* model, sr_model_info* info);
+SR_API sr_status sr_model_get_info(const sr_model* model, sr_model_info* info);
 
 /* ---- Worlds: a street of any extent, generated around a camera as it moves. ---- */
 
 typedef struct sr_world sr_world;
 
 /* cells low <= (i, j) <= high, all k */
-typedef struct sr_window {
+typedef struct sr_cell_rect {
     int32_t low[2], high[2];
-} sr_window;
+} sr_cell_rect;
 
-/* Labels come from one of grid, folder and labels. The callback adds the cells of a window to a grid, with
- * sr_grid_set_cells and nothing else of the library; it is asked again for a window that was dropped, and answers
+/* Labels come from one of grid, folder and labels. The callback adds the cells of a rectangle to a grid, with
+ * sr_grid_set_cells and nothing else of the library; it is asked again for a rectangle that was dropped, and answers
  * alike. Where it does not know the labels yet it returns SR_NOT_YET: the tiles that need them wait for
  * sr_world_labels_ready, and no others. What it returns beside these ends the call that needed the labels, with that
  * status.
@@ -312,7 +288,7 @@ typedef struct sr_world_desc {
     const sr_model* model; /* of the same context, with a voxfield transformer */
     const sr_grid* grid;   /* its labels are copied */
     const char* folder;    /* of tiles */
-    sr_status (*labels)(void* user, const sr_window* window, sr_grid* grid);
+    sr_status (*labels)(void* user, const sr_cell_rect* rect, sr_grid* grid);
     void (*message)(void* user, const char* line); /* warnings, during sr_world_create and steps; NULL: none */
     void* user;                                    /* for the callbacks */
     const char* cache;   /* a folder for finished tiles, made where it is missing, also for later sessions and worlds
@@ -332,29 +308,31 @@ typedef struct sr_world_desc {
                                what is near. 0: each point has one everywhere */
 } sr_world_desc;
 
-/* Compiles shaders, so that no step does. context: outlives the world, and is not destroyed before it. On failure
- * *world is NULL. SR_ERR_USAGE, SR_ERR_BAD_INPUT (files, a grid that does not go with the model),
- * SR_ERR_OUT_OF_MEMORY. */
-sr_status sr_world_create(sr_context* context, const sr_world_desc* desc, sr_world** world);
-void sr_world_destroy(sr_world* world); /* gives up what is at work, waits for the device and the cache; NULL is fine */
+/* Waits for the compiler and the device, so that no step compiles, and for the disk. On failure *world is NULL.
+ * SR_ERR_USAGE, SR_ERR_BAD_INPUT (files, a grid that does not go with the model), SR_ERR_OUT_OF_MEMORY. */
+SR_API sr_status sr_world_create(sr_context* context, const sr_world_desc* desc, sr_world** world);
+/* Gives up what is at work. Waits for the device and the disk. NULL is fine. */
+SR_API void sr_world_destroy(sr_world* world);
 
 /* What is wanted from now on: all tiles within `radius` metres of the position, seen from above; nearest first, and
  * what lies in `direction` before what lies behind. Cheap: may be called every frame. SR_ERR_USAGE: numbers that are
  * not finite, a radius that is not 0..2000 m. */
-sr_status sr_world_focus(sr_world* world, const double position[3], const double direction[3], double radius);
+SR_API sr_status sr_world_focus(sr_world* world, const double position[3], const double direction[3], double radius);
 
 /* Works for about budget_us microseconds and returns; 0: one piece of work. It stops when the next piece is expected
  * not to fit, going by those of its kind before, but does one at least. A piece is a denoising step of a few regions at
- * most, or a tile read, written or turned into splats. The device is idle when it returns. *done (may be NULL): 1 when
- * all that is wanted and fits the budgets is finished. After an error the next step tries again. */
-sr_status sr_world_step(sr_world* world, uint64_t budget_us, uint32_t* done);
+ * most, or a tile read, written or turned into splats. Waits for the device, which is idle when it returns, for the
+ * disk and for the labels callback. *done (may be NULL): 1 when all that is wanted and fits the budgets is finished.
+ * After an error the next step tries again. */
+SR_API sr_status sr_world_step(sr_world* world, uint64_t budget_us, uint32_t* done);
 
 /* Changes labels as sr_grid_set_cells does. The tiles of these cells, and those beside them that saw their points, are
- * generated anew by the next steps. Their points are gone at once; their splats stay until the new ones are there. */
-sr_status sr_world_edit(sr_world* world, const sr_cell* cells, uint64_t count);
+ * generated anew by the next steps. Their points are gone at once; their splats stay until the new ones are there.
+ * Waits for the device. */
+SR_API sr_status sr_world_edit(sr_world* world, const sr_cell* cells, uint64_t count);
 
-/* The callback knows the labels of a window for which it returned SR_NOT_YET. */
-sr_status sr_world_labels_ready(sr_world* world, const sr_window* window);
+/* The callback knows the labels of a rectangle for which it returned SR_NOT_YET. */
+SR_API sr_status sr_world_labels_ready(sr_world* world, const sr_cell_rect* rect);
 
 typedef struct sr_world_info {
     uint32_t struct_size;
@@ -369,62 +347,39 @@ typedef struct sr_world_info {
     uint64_t splats;     /* on the device */
     double voxel_size;   /* metres */
     uint32_t tile_cells; /* edge of a tile */
-    uint32_t points_per_cell;
+    uint32_t points_per_voxel;
 } sr_world_info;
 
-sr_status sr_world_get_info(sr_world* world, sr_world_info* info);
+SR_API sr_status sr_world_get_info(sr_world* world, sr_world_info* info);
 
-/* A copy of the finished cells of a window that are in memory, with their points; maybe none. The caller destroys it.
- */
-sr_status sr_world_copy_cells(sr_world* world, const sr_window* window, sr_grid** grid);
+/* Copies; the time goes with the cells. The finished cells of a rectangle that are in memory, with their points; maybe
+ * none. The application destroys it. */
+SR_API sr_status sr_world_copy_cells(sr_world* world, const sr_cell_rect* rect, sr_grid** grid);
 
 /* waits until the cache has all that is finished; an error where it cannot be written, as on a full disk */
-sr_status sr_world_flush(sr_world* world);
+SR_API sr_status sr_world_flush(sr_world* world);
 
-/* ---- Splats: 2D Gaussians on the device. ---- */
+/* ---- Pictures. struct VkBuffer_T* is Vulkan's VkBuffer, and so on. ---- */
 
-typedef struct sr_array {
-    void* buffer; /* VkBuffer, with usage STORAGE_BUFFER and TRANSFER_SRC */
-    uint64_t offset;
-    uint64_t bytes;
-} sr_array;
-
-/* Splat n has element n of each array. Axes: t_u = normalize(e x normal) with e the axis least aligned with the normal,
- * t_v = normal x t_u. Splats with opacity 0 are places that no tile has. Buffers stay the same for the life of a world.
- * They belong to the queue family of the context. A step or an edit writes them: the host's reads must have finished
- * before those calls, and see all that was written once they have returned. */
-typedef struct sr_splats {
-    uint32_t struct_size;
-    uint32_t count;     /* elements to look at */
-    uint64_t version;   /* moves when splats come or go */
-    sr_array positions; /* 4 floats: x, y, z in metres, opacity */
-    sr_array normals;   /* 4 floats: unit normal, sigma along t_u in metres */
-    sr_array colors;    /* 4 floats: r, g, b (sRGB, 0..1), sigma along t_v in metres */
-    sr_array labels;    /* uint32 */
-} sr_splats;
-
-/* SR_ERR_USAGE: a world without splat_bytes */
-sr_status sr_world_get_splats(sr_world* world, sr_splats* splats);
-
-/* Where a picture goes: host memory, a buffer of the host's, or an image of its own, which has the picture's size, one
- * level and one layer, TRANSFER_DST usage, and belongs to the context's queue family. All of them may be NULL. */
+/* Where a picture goes: host memory, a buffer of the application's, or an image of its own, which has the picture's
+ * size, one level and one layer, TRANSFER_DST usage, and belongs to the context's queue family. All may be NULL. */
 typedef struct sr_target {
     void* memory;
-    void* buffer; /* VkBuffer with TRANSFER_DST usage */
+    struct VkBuffer_T* buffer; /* with TRANSFER_DST usage */
     uint64_t buffer_offset;
-    void* image;            /* VkImage of the format that sr_draw_desc says */
-    uint32_t layout_before; /* VkImageLayout: as it is; VK_IMAGE_LAYOUT_UNDEFINED is fine, all is written */
-    uint32_t layout_after;  /* VkImageLayout: as it will be */
+    struct VkImage_T* image; /* of the format that sr_draw_desc says */
+    uint32_t layout_before;  /* VkImageLayout: as it is; VK_IMAGE_LAYOUT_UNDEFINED is fine, all is written */
+    uint32_t layout_after;   /* VkImageLayout: as it will be */
 } sr_target;
 
-/* A z-buffer of the host's: splats behind it are not drawn. Metres along z are scale / (d - offset) for the number d of
- * a pixel. With 0 at the near plane n and 1 at the far plane f: scale = f n / (n - f), offset = f / (f - n). Reversed,
- * without a far plane (d = n / z): scale = n, offset = 0. */
+/* A z-buffer of the application's: splats behind it are not drawn. Metres along z are scale / (d - offset) for the
+ * number d of a pixel. With 0 at the near plane n and 1 at the far plane f: scale = f n / (n - f), offset = f / (f -
+ * n). Reversed, without a far plane (d = n / z): scale = n, offset = 0. */
 typedef struct sr_depth_image {
-    void* image;     /* VkImage of the picture's size, one level and one layer, TRANSFER_SRC usage, of the context's
-                        queue family; NULL: no test */
-    uint32_t format; /* VkFormat: D32_SFLOAT or R32_SFLOAT */
-    uint32_t layout_before; /* VkImageLayout, not UNDEFINED */
+    struct VkImage_T* image; /* of the picture's size, one level and one layer, TRANSFER_SRC usage, of the context's
+                                queue family; NULL: no test */
+    uint32_t format;         /* VkFormat: D32_SFLOAT or R32_SFLOAT */
+    uint32_t layout_before;  /* VkImageLayout, not UNDEFINED */
     uint32_t layout_after;
     uint32_t reserved;
     double scale, offset;
@@ -447,50 +402,9 @@ typedef struct sr_draw_desc {
     sr_depth_image depth_test;
 } sr_draw_desc;
 
-/* Draws the splats that are there, and waits for it. The first draw of a size compiles it. SR_ERR_USAGE: a world
+/* Draws the splats that are there. Waits for the device; for the compiler, the first time. SR_ERR_USAGE: a world
  * without splat_bytes, sizes that are not 1..16384; SR_ERR_BAD_INPUT: a camera that is not finite. */
-sr_status sr_world_draw(sr_world* world, const sr_draw_desc* draw);
-
-/* The next two need a context on a device of the host's, and neither waits nor reads back. Targets are buffers and
- * images: `memory` is NULL. Errors are those of sr_world_draw; the first call of a size compiles it.
- *
- * Records the drawing into a primary VkCommandBuffer that the host is recording, outside a render pass, from a pool of
- * the context's queue family. It begins with a barrier after all that was recorded or submitted before it, and ends
- * with one that lets everything after it use the targets; images go from layout_before to layout_after. Binding of a
- * compute pipeline, its descriptor set 0 and push constants are left changed.
- *
- * The camera is copied; splats are those that are there when the commands are executed. They may be executed any number
- * of times, but executions share memory: on one queue, one after the other, or ordered by the host's semaphores. They
- * stay valid until the world is destroyed, a call of sr_world_record or sr_world_submit for another size (draws with
- * depth test and those without count apart), or an SR_ERR_PARTIAL of sr_world_check_draws. Like the host's own reads of
- * splats, executions must have finished before those calls and before sr_world_step and sr_world_edit. */
-sr_status sr_world_record(sr_world* world, const sr_draw_desc* draw, void* command_buffer);
-
-typedef struct sr_semaphore {
-    void* semaphore; /* VkSemaphore of type TIMELINE */
-    uint64_t value;
-} sr_semaphore;
-
-typedef struct sr_sync {
-    uint32_t struct_size;
-    uint32_t reserved;
-    const void* next;
-    const sr_semaphore* waits; /* the drawing begins when all of them have reached their values */
-    uint32_t wait_count;
-    uint32_t signal_count;
-    const sr_semaphore* signals; /* reach their values when the targets are written */
-} sr_sync;
-
-/* The same in a command buffer of the library's, submitted to the context's queue at once. Calls that wait for the
- * device wait for it too, and so for what it waits for: what signals `waits` must be submitted already, or come from
- * another thread. Of eight draws that are on their way the ninth waits for the first. */
-sr_status sr_world_submit(sr_world* world, const sr_draw_desc* draw, const sr_sync* sync);
-
-/* How many tiles of the picture splats touch is known only when they are drawn. sr_world_draw repeats a picture that
- * there was too little room for; what is recorded cannot be repeated, and lacks the farthest splats then. Call this
- * when what was recorded or submitted has finished. SR_OK: the last 16 pictures were whole. SR_ERR_PARTIAL: one was
- * not; there is more room from now on, and what was recorded before is no longer valid. */
-sr_status sr_world_check_draws(sr_world* world);
+SR_API sr_status sr_world_draw(sr_world* world, const sr_draw_desc* draw);
 
 #ifdef __cplusplus
 }

@@ -36,17 +36,17 @@ typedef struct sr_renderer_desc {
     void* user;                                    /* for the callback */
 } sr_renderer_desc;
 
-/* Compiles the model's networks. Where sr_context_desc.max_bytes has no room for all that they need, they are loaded in
- * turn for every frame, to the same bytes. context: outlives the renderer, and is not destroyed before it. On
- * failure *renderer is NULL. SR_ERR_USAGE: a NULL, a size, a model without a renderer of frames; SR_ERR_BAD_INPUT: the
- * model's files; SR_ERR_OUT_OF_MEMORY: with what it would take. */
-sr_status sr_renderer_create(sr_context* context, const sr_renderer_desc* desc, sr_renderer** renderer);
-void sr_renderer_destroy(sr_renderer* renderer); /* gives up a frame that is at work; NULL is fine */
+/* Waits for the compiler and the device. Compiles the model's networks. Where sr_context_desc.max_bytes has no room for
+ * all that they need, they are loaded in turn for every frame, to the same bytes. context: outlives the renderer, and
+ * is not destroyed before it. On failure *renderer is NULL. SR_ERR_USAGE: a NULL, a size, a model without a renderer of
+ * frames; SR_ERR_BAD_INPUT: the model's files; SR_ERR_OUT_OF_MEMORY: with what it would take. */
+SR_API sr_status sr_renderer_create(sr_context* context, const sr_renderer_desc* desc, sr_renderer** renderer);
+SR_API void sr_renderer_destroy(sr_renderer* renderer); /* gives up a frame that is at work; NULL is fine */
 
 /* Host memory, or a buffer of the application's that belongs to the context's queue family. One of the two. */
 typedef struct sr_source {
     const void* memory;
-    void* buffer; /* VkBuffer with TRANSFER_SRC usage */
+    struct VkBuffer_T* buffer; /* with TRANSFER_SRC usage */
     uint64_t buffer_offset;
 } sr_source;
 
@@ -64,27 +64,28 @@ typedef struct sr_frame_desc {
     double world_to_camera[12]; /* [3, 4] row by row: a rotation and metres */
 } sr_frame_desc;
 
-/* Begins a frame: draws the world, or copies the buffers, which the application may change once it has returned.
- * SR_ERR_USAGE: a frame is at work, a world without splat_bytes or of another context, none or both of memory and
- * buffer; SR_ERR_BAD_INPUT: a camera that is not finite. */
-sr_status sr_renderer_begin(sr_renderer* renderer, const sr_frame_desc* frame);
+/* Waits for the device. Begins a frame: draws the world, or copies the buffers, which the application may change once
+ * it has returned. SR_ERR_USAGE: a frame is at work, a world without splat_bytes or of another context, none or both of
+ * memory and buffer; SR_ERR_BAD_INPUT: a camera that is not finite. */
+SR_API sr_status sr_renderer_begin(sr_renderer* renderer, const sr_frame_desc* frame);
 
 /* Works on the frame for about budget_us microseconds and returns; 0: one piece of work. It stops when the next piece
- * is expected not to fit, but does one at least. Pieces are the encoder, each step of denoising, and the decoder. The
- * device is idle when it returns. *done (may be NULL): 1 when the frame is finished. After an error the frame is given
- * up, as by sr_renderer_cancel. SR_ERR_USAGE: no frame has begun; SR_ERR_INTERNAL: numbers overflow in fp16, try fp32.
+ * is expected not to fit, but does one at least. Pieces are the encoder, each step of denoising, and the decoder. It
+ * waits for the device, which is idle when it returns. *done (may be NULL): 1 when the frame is finished. After an
+ * error the frame is given up, as by sr_renderer_cancel. SR_ERR_USAGE: no frame has begun; SR_ERR_INTERNAL: numbers
+ * overflow in fp16, try fp32.
  */
-sr_status sr_renderer_step(sr_renderer* renderer, uint64_t budget_us, uint32_t* done);
+SR_API sr_status sr_renderer_step(sr_renderer* renderer, uint64_t budget_us, uint32_t* done);
 
 /* The last finished frame, 4 bytes a pixel: r, g, b (sRGB), 255. An image has format R8G8B8A8_UNORM or _SRGB; the
- * target is else as for draws. Blocks until it is there. SR_ERR_USAGE: none is finished. */
-sr_status sr_renderer_take(sr_renderer* renderer, const sr_target* target);
+ * target is else as for draws. Waits for the device. SR_ERR_USAGE: none is finished. */
+SR_API sr_status sr_renderer_take(sr_renderer* renderer, const sr_target* target);
 
 /* Gives up the frame that is at work; the camera is as before sr_renderer_begin. Without one it does nothing. */
-sr_status sr_renderer_cancel(sr_renderer* renderer);
+SR_API sr_status sr_renderer_cancel(sr_renderer* renderer);
 
 /* The next frame has none before it, as the first one: after a cut. SR_ERR_USAGE: a frame is at work. */
-sr_status sr_renderer_restart(sr_renderer* renderer);
+SR_API sr_status sr_renderer_restart(sr_renderer* renderer);
 
 typedef struct sr_renderer_info {
     uint32_t struct_size;
@@ -99,7 +100,7 @@ typedef struct sr_renderer_info {
     float reserved;
 } sr_renderer_info;
 
-sr_status sr_renderer_get_info(sr_renderer* renderer, sr_renderer_info* info);
+SR_API sr_status sr_renderer_get_info(sr_renderer* renderer, sr_renderer_info* info);
 
 #ifdef __cplusplus
 }

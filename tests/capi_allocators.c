@@ -172,7 +172,7 @@ static VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL instance_call(VkInstance instanc
 static sr_vulkan_device vulkan_of_host(void)
 {
     sr_vulkan_device vulkan = lent(&host);
-    vulkan.get_instance_proc_addr = (void (*)(void))instance_call;
+    vulkan.get_instance_proc_addr = instance_call;
     vulkan.user = &pieces;
     vulkan.allocate_memory = allocate_memory;
     vulkan.free_memory = free_memory;

@@ -16,13 +16,13 @@ static void names_labels(void)
 {
     uint8_t rgb[3] = {0, 0, 0};
     uint32_t label;
-    CHECK(!strcmp(sr_label_name(0), "road") && !strcmp(sr_label_name(19), "road-lane"));
-    CHECK(!sr_label_name(SR_LABELS) && !sr_label_name(SR_NO_CELL));
-    for (label = 0; label < SR_LABELS; ++label)
-        CHECK(sr_label_name(label) && sr_label_color(label, rgb) == SR_OK);
+    CHECK(!strcmp(sr_class_name(0), "road") && !strcmp(sr_class_name(19), "road-lane"));
+    CHECK(!sr_class_name(SR_CLASSES) && !sr_class_name(SR_NO_CELL));
+    for (label = 0; label < SR_CLASSES; ++label)
+        CHECK(sr_class_name(label) && sr_class_color(label, rgb) == SR_OK);
     CHECK(rgb[0] == 255 && rgb[1] == 255 && rgb[2] == 0);
-    CHECK(sr_label_color(SR_LABELS, rgb) == SR_ERR_USAGE && says(NULL, "there is no label 20"));
-    CHECK(sr_label_color(0, NULL) == SR_ERR_USAGE && says(NULL, "rgb is NULL"));
+    CHECK(sr_class_color(SR_CLASSES, rgb) == SR_ERR_USAGE && says(NULL, "there is no class 20"));
+    CHECK(sr_class_color(0, NULL) == SR_ERR_USAGE && says(NULL, "rgb is NULL"));
 }
 
 static void lists_devices(void)
@@ -99,12 +99,12 @@ static void makes_a_context_of_its_own(void)
     desc.max_bytes = 1 << 30;
     CHECK(sr_context_create(&desc, &context) == SR_OK);
     memset(&device, 0, sizeof device);
-    CHECK(sr_context_device(context, &device) == SR_ERR_USAGE && says(context, "struct_size is not set"));
+    CHECK(sr_context_get_device(context, &device) == SR_ERR_USAGE && says(context, "struct_size is not set"));
     device.struct_size = sizeof device;
-    CHECK(sr_context_device(context, &device) == SR_OK && device.name[0] && !device.refusal[0]);
+    CHECK(sr_context_get_device(context, &device) == SR_OK && device.name[0] && !device.refusal[0]);
     memset(&memory, 0, sizeof memory);
     memory.struct_size = sizeof memory;
-    CHECK(sr_context_memory(context, &memory) == SR_OK);
+    CHECK(sr_context_get_memory(context, &memory) == SR_OK);
     CHECK(memory.used_bytes == 0 && memory.budget_bytes == 1 << 30);
     CHECK(sr_last_error(context, NULL, 0) > 0);
     sr_context_destroy(context);

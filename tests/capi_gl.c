@@ -372,7 +372,7 @@ static uint64_t used_bytes(sr_context* context)
     sr_memory_info memory;
     memset(&memory, 0, sizeof memory);
     memory.struct_size = sizeof memory;
-    CHECK(sr_context_memory(context, &memory) == SR_OK);
+    CHECK(sr_context_get_memory(context, &memory) == SR_OK);
     return memory.used_bytes;
 }
 
@@ -418,7 +418,7 @@ static int shares_for_sure(sr_context* context)
     sr_device_info device;
     memset(&device, 0, sizeof device);
     device.struct_size = sizeof device;
-    CHECK_OK(context, sr_context_device(context, &device));
+    CHECK_OK(context, sr_context_get_device(context, &device));
     return strstr(gl_name, "llvmpipe") && strstr(device.name, "llvmpipe");
 }
 

@@ -248,7 +248,7 @@ static sr_context* make_context(void)
     sr_vulkan_device vulkan = lent(&host);
     sr_context_desc desc;
     sr_context* context = NULL;
-    vulkan.get_instance_proc_addr = (void (*)(void))instance_call;
+    vulkan.get_instance_proc_addr = instance_call;
     vulkan.external_memory_fd = vulkan.external_semaphore_fd = 1;
     memset(&desc, 0, sizeof desc);
     desc.struct_size = sizeof desc;

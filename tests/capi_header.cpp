@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // the C headers alone, in C++
 #include "engine/semrover_gl.h"
+#include "engine/semrover_vulkan.h"
 
 #include <type_traits>
 

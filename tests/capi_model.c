@@ -15,7 +15,7 @@ static uint64_t used_bytes(sr_context* context)
     sr_memory_info memory;
     memset(&memory, 0, sizeof memory);
     memory.struct_size = sizeof memory;
-    CHECK_OK(context, sr_context_memory(context, &memory));
+    CHECK_OK(context, sr_context_get_memory(context, &memory));
     return memory.used_bytes;
 }
 
@@ -41,7 +41,7 @@ static void says_what_it_holds(sr_context* context, const char* voxfield, const 
         const sr_model_info info = info_of(model);
         CHECK(info.parts == parts[i] && info.precision == SR_FP16);
         CHECK(used_bytes(context) == before + info.device_bytes && info.device_bytes > 0);
-        CHECK((info.voxel_size == 0.6) == (i % 3 == 0) && (info.points_per_cell == 20) == (i % 3 == 0));
+        CHECK((info.voxel_size == 0.6) == (i % 3 == 0) && (info.points_per_voxel == 20) == (i % 3 == 0));
         CHECK((info.steps > 0) == (i % 3 == 0) && (info.renderer_steps > 0) == (i > 0));
         CHECK(info.window_frames == (i == 0   ? 0u
                                      : i == 2 ? info.window_frames
@@ -100,6 +100,7 @@ static void refuses_wrong_models(sr_context* context, const char* voxfield)
 
 /* of a load: how often it was called, and when it gives up */
 struct progress {
+    sr_context* context;
     uint64_t done, total;
     uint32_t calls, last_call;
 };
@@ -107,6 +108,8 @@ struct progress {
 static uint32_t on_progress(void* user, uint64_t done, uint64_t total)
 {
     struct progress* p = user;
+    sr_memory_info memory = SR_INIT(sr_memory_info);
+    CHECK(sr_context_get_memory(p->context, &memory) == SR_ERR_USAGE && says(NULL, "another call is at work"));
     CHECK(done >= p->done && done <= total && (!p->calls || total == p->total));
     p->done = done;
     p->total = total;
@@ -123,6 +126,7 @@ static void loads_can_be_given_up(sr_context* context, const char* both)
     sr_model* model = NULL;
     uint32_t i;
     memset(&whole, 0, sizeof whole);
+    whole.context = context;
     desc.progress = on_progress;
     desc.user = &whole;
     CHECK_OK(context, sr_model_load(context, &desc, &model));
@@ -130,6 +134,7 @@ static void loads_can_be_given_up(sr_context* context, const char* both)
     sr_model_destroy(model);
     for (i = 0; i < GIVEN_UP; ++i) {
         memset(&part, 0, sizeof part);
+        part.context = context;
         part.last_call = 1 + i * (whole.calls - 1) / (GIVEN_UP - 1);
         desc.user = &part;
         CHECK(sr_model_load(context, &desc, &model) == SR_ERR_INTERRUPTED && says(context, "cancelled") && !model);

@@ -475,9 +475,9 @@ static void takes_the_hosts_way_to_vulkan(const struct host* host)
     memset(&desc, 0, sizeof desc);
     desc.struct_size = sizeof desc;
     desc.vulkan = &vulkan;
-    vulkan.get_instance_proc_addr = (void (*)(void))no_call;
+    vulkan.get_instance_proc_addr = no_call;
     CHECK(sr_context_create(&desc, &context) == SR_ERR_NO_DEVICE && says(NULL, "this Vulkan has no vk") && !context);
-    vulkan.get_instance_proc_addr = (void (*)(void))instance_call;
+    vulkan.get_instance_proc_addr = instance_call;
     vulkan.lock_queue = lock_queue;
     vulkan.unlock_queue = unlock_queue;
     vulkan.user = &locks;

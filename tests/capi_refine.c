@@ -390,7 +390,7 @@ static void keeps_to_a_budget_of_memory(uint64_t resident_bytes)
     }
     memset(&memory, 0, sizeof memory);
     memory.struct_size = sizeof memory;
-    CHECK_OK(context, sr_context_memory(context, &memory));
+    CHECK_OK(context, sr_context_get_memory(context, &memory));
     CHECK(memory.peak_bytes <= info_of(renderer).device_bytes);
     sr_renderer_destroy(renderer);
     sr_context_destroy(context);

@@ -14,7 +14,7 @@ static uint32_t label_of(int32_t j)
 {
     return j == 6 ? 2 : 0;
 }
-static uint64_t cells_of(const sr_window* window, sr_cell* cells)
+static uint64_t cells_of(const sr_cell_rect* window, sr_cell* cells)
 {
     uint64_t count = 0;
     int32_t i, j, k;
@@ -33,7 +33,7 @@ static uint64_t cells_of(const sr_window* window, sr_cell* cells)
 
 /* the labels callback; `broken` makes it fail, with SR_NOT_YET where it is that */
 static int broken, calls;
-static sr_status labels(void* user, const sr_window* window, sr_grid* grid)
+static sr_status labels(void* user, const sr_cell_rect* window, sr_grid* grid)
 {
     static sr_cell cells[MOST_CELLS];
     CHECK(user == &calls);

@@ -22,7 +22,7 @@ typedef struct visitor {
     uint32_t label[2 * PIXELS];
 } visitor;
 
-static sr_status labels_for(void* user, const sr_window* window, sr_grid* grid)
+static sr_status labels_for(void* user, const sr_cell_rect* window, sr_grid* grid)
 {
     visitor* self = user;
     return sr_grid_set_cells(grid, self->cells, cells_of(window, self->cells));
@@ -65,7 +65,7 @@ static void look_around(visitor* self)
     CHECK_OK(self->context, sr_world_get_info(self->world, &info));
     memset(&memory, 0, sizeof memory);
     memory.struct_size = sizeof memory;
-    CHECK_OK(self->context, sr_context_memory(self->context, &memory));
+    CHECK_OK(self->context, sr_context_get_memory(self->context, &memory));
     CHECK(memory.used_bytes > 0 && info.struct_size == sizeof info);
 }
 
@@ -268,6 +268,39 @@ static void* fail_here(void* user)
     return NULL;
 }
 
+/* calls as fast as they come: each works or is refused */
+static void* ask_often(void* user)
+{
+    visitor* self = user;
+    sr_world_info info = SR_INIT(sr_world_info);
+    int i;
+    for (i = 0; i < 20000; ++i) {
+        const sr_status status = sr_world_get_info(self->world, &info);
+        CHECK(status == SR_OK || (status == SR_ERR_USAGE && says(NULL, "another call is at work")));
+    }
+    return NULL;
+}
+
+static void two_threads_get_a_status(void)
+{
+    visitor* self = &visitors[0];
+    sr_context_desc desc = SR_INIT(sr_context_desc);
+    pthread_t other;
+    int refused = 0;
+    self->done = 0;
+    CHECK_OK(NULL, sr_context_create(&desc, &self->context));
+    open_world(self);
+    other = start(ask_often, self);
+    while (!self->done) {
+        const sr_status status = sr_world_step(self->world, 5000, &self->done);
+        CHECK(status == SR_OK || status == SR_ERR_USAGE);
+        refused += status == SR_ERR_USAGE;
+    }
+    CHECK(pthread_join(other, NULL) == 0);
+    printf("steps refused beside another thread: %d\n", refused);
+    leave(self);
+}
+
 /* without a context, each thread has an error of its own */
 static void keeps_errors_apart(void)
 {
@@ -288,5 +321,6 @@ int main(int argc, char** argv)
     runs_contexts_in_parallel();
     shares_a_queue();
     goes_from_thread_to_thread();
+    two_threads_get_a_status();
     return 0;
 }

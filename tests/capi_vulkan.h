@@ -5,7 +5,7 @@
 #ifndef SEMROVER_TESTS_CAPI_VULKAN_H
 #define SEMROVER_TESTS_CAPI_VULKAN_H
 
-#include "engine/semrover.h"
+#include "engine/semrover_vulkan.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -16,7 +16,7 @@ static const char* model;
 static sr_grid* street(void)
 {
     static sr_cell cells[MOST_CELLS];
-    const sr_window all = {{-40, -40}, {40, 40}};
+    const sr_cell_rect all = {{-40, -40}, {40, 40}};
     sr_grid* grid = NULL;
     CHECK(sr_grid_create(0.6, &grid) == SR_OK);
     CHECK(sr_grid_set_cells(grid, cells, cells_of(&all, cells)) == SR_OK);
@@ -58,7 +58,7 @@ static void grids_grow_in_pieces(void)
 }
 
 /* all numbers of a window's points; the caller frees them */
-static float* points_of(sr_world* world, const sr_window* window, uint64_t* cells)
+static float* points_of(sr_world* world, const sr_cell_rect* window, uint64_t* cells)
 {
     sr_grid* grid = NULL;
     sr_grid_info info;
@@ -70,7 +70,7 @@ static float* points_of(sr_world* world, const sr_window* window, uint64_t* cell
     CHECK(sr_grid_get_info(grid, &info) == SR_OK);
     points = malloc((size_t)(info.cells * 20 * 6 * sizeof(float)) + 1);
     if (info.cells) {
-        CHECK(info.points_per_cell == 20);
+        CHECK(info.points_per_voxel == 20);
         CHECK(sr_grid_get_points(grid, 0, info.cells, points, &written) == SR_OK && written == info.cells);
     }
     sr_grid_destroy(grid);
@@ -98,7 +98,7 @@ static void edits_grids_cell_by_cell(void)
     memset(&info, 0, sizeof info);
     CHECK(sr_grid_get_info(grid, &info) == SR_ERR_USAGE && says(NULL, "struct_size"));
     info.struct_size = sizeof info;
-    CHECK(sr_grid_get_info(grid, &info) == SR_OK && info.cells == 2 && info.points_per_cell == 0);
+    CHECK(sr_grid_get_info(grid, &info) == SR_OK && info.cells == 2 && info.points_per_voxel == 0);
     CHECK(info.voxel_size == 0.6);
     CHECK(sr_grid_get_cells(grid, 0, 4, cells, &written) == SR_OK && written == 2);
     CHECK(cells[0].i == 0 && cells[0].label == 2 && cells[1].i == 1 && cells[1].label == 1);
@@ -156,7 +156,7 @@ static void refuses_wrong_worlds(sr_context* context)
 /* a grid and a callback that say the same give the same world, whichever way the camera came */
 static void labels_of_a_grid_and_of_a_callback_give_the_same_points(sr_context* context)
 {
-    const sr_window place = {{0, -6}, {15, 6}}, everywhere = {{-999, -999}, {999, 999}};
+    const sr_cell_rect place = {{0, -6}, {15, 6}}, everywhere = {{-999, -999}, {999, 999}};
     sr_world_desc desc = street_world();
     sr_world *called = NULL, *read = NULL;
     sr_grid* grid = street();
@@ -199,7 +199,7 @@ static void labels_of_a_grid_and_of_a_callback_give_the_same_points(sr_context* 
 
 static void an_edit_makes_its_place_anew(sr_context* context)
 {
-    const sr_window place = {{8, -6}, {15, 6}};
+    const sr_cell_rect place = {{8, -6}, {15, 6}};
     const sr_cell wall = {10, 0, 1, 2}, wrong = {0, 0, 0, 77};
     sr_world_desc desc = street_world();
     sr_world* world = NULL;
@@ -316,6 +316,42 @@ static void draws_into_buffers_and_images_of_a_host(void)
     destroy_host(&host);
 }
 
+/* what a labels callback must not call: nothing happens but a status */
+static struct {
+    sr_context* context;
+    sr_world* world;
+    int calls;
+} forbidden;
+
+static sr_status calls_back(void* user, const sr_cell_rect* rect, sr_grid* grid)
+{
+    const sr_cell gone = {0, 0, 0, SR_NO_CELL};
+    const double origin[3] = {0, 0, 0};
+    sr_world_info info = SR_INIT(sr_world_info);
+    sr_memory_info memory = SR_INIT(sr_memory_info);
+    (void)user;
+    ++forbidden.calls;
+    CHECK(sr_world_edit(forbidden.world, &gone, 1) == SR_ERR_USAGE && says(NULL, "another call is at work"));
+    CHECK(sr_world_step(forbidden.world, 0, NULL) == SR_ERR_USAGE);
+    CHECK(sr_world_focus(forbidden.world, origin, origin, 1) == SR_ERR_USAGE);
+    CHECK(sr_world_get_info(forbidden.world, &info) == SR_ERR_USAGE);
+    CHECK(sr_context_get_memory(forbidden.context, &memory) == SR_ERR_USAGE);
+    sr_world_destroy(forbidden.world);
+    sr_context_destroy(forbidden.context);
+    return labels(&calls, rect, grid);
+}
+
+static void calls_of_callbacks_are_refused(sr_context* context)
+{
+    sr_world_desc desc = street_world();
+    desc.labels = calls_back;
+    forbidden.context = context;
+    CHECK_OK(context, create_world(context, model, &desc, &forbidden.world));
+    walk(context, forbidden.world, 0, 1);
+    CHECK(forbidden.calls > 0 && world_info(forbidden.world).splats > 0);
+    sr_world_destroy(forbidden.world);
+}
+
 int main(int argc, char** argv)
 {
     sr_context* context = NULL;
@@ -329,6 +365,7 @@ int main(int argc, char** argv)
     labels_of_a_grid_and_of_a_callback_give_the_same_points(context);
     an_edit_makes_its_place_anew(context);
     draws_into_host_memory(context);
+    calls_of_callbacks_are_refused(context);
     sr_context_destroy(context);
     draws_into_buffers_and_images_of_a_host();
     return 0;

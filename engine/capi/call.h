@@ -17,10 +17,48 @@ namespace semrover::capi {
 // where the line of a call that failed goes: into its context, or else into the thread
 sr_status remember(sr_context* context, sr_status status, std::string message) noexcept;
 
+// What a call uses of its context. Two calls that use the same part do not meet: those of a worker and those that draw
+// may be at work at the same time, others alone, and those that lock for themselves at any time.
+enum Use : uint32_t { kAnyTime = 0, kWork = 1, kDraw = 2, kAlone = 3 };
+
+// A call's right to its context, if any. Not taken: another call uses that part, or this one is made by a callback of
+// another one with the same context, on whichever part.
+class Turn {
+  public:
+    Turn(sr_context* context, Use use) noexcept;
+    ~Turn();
+    Turn(const Turn&) = delete;
+    Turn& operator=(const Turn&) = delete;
+
+    bool taken() const { return taken_; }
+    static sr_status refuse() noexcept; // leaves the line with the thread: the context's is being written
+
+  private:
+    sr_context* context_;
+    Use use_;
+    bool taken_ = false;
+    const Turn* outer_ = nullptr; // of this thread
+};
+
+// destroys a handle of a context, or does nothing where another call is at work
+template <typename T>
+void destroy(T* handle) noexcept
+{
+    if (!handle)
+        return;
+    if (const Turn turn(handle->context, kAlone); turn.taken())
+        delete handle;
+    else
+        Turn::refuse();
+}
+
 // calls f, which returns Status; nothing it throws gets past
-template <typename F>
+template <Use use = kAlone, typename F>
 sr_status guarded(sr_context* context, F f) noexcept
 {
+    const Turn turn(context, use);
+    if (!turn.taken())
+        return Turn::refuse();
     try {
         const AssertionsThrow assertions;
         if (Status status = f(); !status)

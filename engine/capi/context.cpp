@@ -38,7 +38,7 @@ MemorySource memory_source(const sr_vulkan_device& v)
             sr_memory_piece piece{};
             if (const sr_status status = v.allocate_memory(v.user, &request, &piece); status != SR_OK)
                 return fail(ErrorCode(status), "the host's allocator returned {}", sr_status_name(status));
-            return MemoryPiece{static_cast<VkDeviceMemory>(piece.memory), piece.offset, piece.mapped, piece.handle};
+            return MemoryPiece{piece.memory, piece.offset, piece.mapped, piece.handle};
         };
     if (v.free_memory)
         source.release = [=](const MemoryPiece& p) {
@@ -53,11 +53,11 @@ Result<std::unique_ptr<Device>> adopt(const sr_vulkan_device& v, const DeviceOpt
     if (v.reserved)
         return fail(ErrorCode::usage, "sr_vulkan_device: reserved is not 0");
     HostDevice host;
-    host.get_instance_proc_addr = reinterpret_cast<PFN_vkGetInstanceProcAddr>(v.get_instance_proc_addr);
-    host.instance = static_cast<VkInstance>(v.instance);
-    host.physical = static_cast<VkPhysicalDevice>(v.physical_device);
-    host.device = static_cast<VkDevice>(v.device);
-    host.queue = static_cast<VkQueue>(v.queue);
+    host.get_instance_proc_addr = v.get_instance_proc_addr;
+    host.instance = v.instance;
+    host.physical = v.physical_device;
+    host.device = v.device;
+    host.queue = v.queue;
     host.queue_family = v.queue_family;
     host.float16 = v.shader_float16;
     host.cooperative_matrix = v.cooperative_matrix;
@@ -77,7 +77,7 @@ Result<std::unique_ptr<sr_context>> make_context(const sr_context_desc& desc)
     options.max_bytes = desc.max_bytes;
     options.validation = desc.validation;
     options.select = desc.device ? desc.device : "";
-    options.allocation = static_cast<const VkAllocationCallbacks*>(desc.allocation_callbacks);
+    options.allocation = desc.allocation_callbacks;
     options.share_by_fd = desc.share_by_fd == 1;
     if (desc.share_by_fd > 1 || desc.reserved)
         return fail(ErrorCode::usage, "sr_context_desc: share_by_fd is 0 or 1, reserved 0");
@@ -123,6 +123,41 @@ Status list(sr_device_info* devices, uint32_t& count)
 } // namespace
 
 namespace semrover::capi {
+
+namespace {
+
+thread_local const Turn* innermost = nullptr;
+
+}
+
+Turn::Turn(sr_context* context, Use use) noexcept : context_(context), use_(use)
+{
+    for (const Turn* outer = innermost; context && outer; outer = outer->outer_)
+        if (outer->context_ == context)
+            return;
+    uint32_t now = context ? context->in_use.load() : 0;
+    while (context && !(now & use) && !context->in_use.compare_exchange_weak(now, now | use)) {
+    }
+    taken_ = !(now & use);
+    if (taken_)
+        outer_ = std::exchange(innermost, this);
+}
+
+Turn::~Turn()
+{
+    if (!taken_)
+        return;
+    innermost = outer_;
+    if (context_)
+        context_->in_use &= ~uint32_t(use_);
+}
+
+sr_status Turn::refuse() noexcept
+{
+    return remember(nullptr, SR_ERR_USAGE,
+                    "another call is at work with this context: of another thread, or the one "
+                    "whose callback this is");
+}
 
 sr_status remember(sr_context* context, sr_status status, std::string message) noexcept
 {
@@ -215,24 +250,30 @@ sr_status sr_context_create(const sr_context_desc* desc, sr_context** context)
 
 void sr_context_destroy(sr_context* context)
 {
-    delete context;
+    bool alone = !context;
+    if (context)
+        alone = Turn(context, kAlone).taken();
+    if (alone)
+        delete context;
+    else
+        Turn::refuse();
 }
 
-sr_status sr_context_device(sr_context* context, sr_device_info* device)
+sr_status sr_context_get_device(sr_context* context, sr_device_info* device)
 {
     return guarded(context, [&]() -> Status {
         if (!context || !device || device->struct_size < 8)
-            return fail(ErrorCode::usage, "sr_context_device: NULL, or struct_size is not set");
+            return fail(ErrorCode::usage, "sr_context_get_device: NULL, or struct_size is not set");
         write_struct(info_of(context->summary), device, device->struct_size);
         return {};
     });
 }
 
-sr_status sr_context_memory(sr_context* context, sr_memory_info* memory)
+sr_status sr_context_get_memory(sr_context* context, sr_memory_info* memory)
 {
     return guarded(context, [&]() -> Status {
         if (!context || !memory || memory->struct_size < 8)
-            return fail(ErrorCode::usage, "sr_context_memory: NULL, or struct_size is not set");
+            return fail(ErrorCode::usage, "sr_context_get_memory: NULL, or struct_size is not set");
         sr_memory_info info{};
         info.used_bytes = context->device->allocated_bytes();
         info.peak_bytes = context->device->peak_bytes();
@@ -259,6 +300,19 @@ sr_status sr_context_get_pipeline_cache(sr_context* context, void* data, uint64_
 }
 
 } // extern "C"
+
+// "0.1.0" as SR_VERSION has it
+static constexpr uint32_t number_of(std::string_view version)
+{
+    uint32_t number = 0, part = 0;
+    for (const char c : version)
+        if (c == '.')
+            number = (number + std::exchange(part, 0)) * 100;
+        else
+            part = part * 10 + uint32_t(c - '0');
+    return number + part;
+}
+static_assert(number_of(SEMROVER_VERSION) == SR_VERSION);
 
 // the layout that programs were built against: a change here is a new ABI
 static_assert(sizeof(sr_device_info) == 816 && offsetof(sr_device_info, memory_bytes) == 808);

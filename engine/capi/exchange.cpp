@@ -67,9 +67,8 @@ Status hand_over(sr_context& context, const Slot& pixels, const ImageSize& size,
 
 HostTarget host_target(const sr_target& to, const ImageSize& size)
 {
-    HostTarget target{.buffer = static_cast<VkBuffer>(to.buffer), .offset = to.buffer_offset};
-    target.image = {static_cast<VkImage>(to.image), size.width, size.height, VkImageLayout(to.layout_before),
-                    VkImageLayout(to.layout_after)};
+    HostTarget target{.buffer = to.buffer, .offset = to.buffer_offset};
+    target.image = {to.image, size.width, size.height, VkImageLayout(to.layout_before), VkImageLayout(to.layout_after)};
     return target;
 }
 
@@ -82,8 +81,7 @@ Result<HostFloats> host_depth(const sr_depth_image& d, const ImageSize& size)
     if (!std::isfinite(d.scale) || !std::isfinite(d.offset))
         return fail(ErrorCode::bad_input, "sr_depth_image: scale {} and offset {} are not finite", d.scale, d.offset);
     const bool depth = d.format == VK_FORMAT_D32_SFLOAT;
-    return HostFloats{{static_cast<VkImage>(d.image), size.width, size.height, VkImageLayout(d.layout_before),
-                       VkImageLayout(d.layout_after)},
+    return HostFloats{{d.image, size.width, size.height, VkImageLayout(d.layout_before), VkImageLayout(d.layout_after)},
                       VkImageAspectFlags(depth ? VK_IMAGE_ASPECT_DEPTH_BIT : VK_IMAGE_ASPECT_COLOR_BIT)};
 }
 
@@ -100,7 +98,7 @@ Status take_in(sr_context& context, const sr_source& from, const Slot& to, uint6
     if (from.memory)
         return context.device->write(slice, {static_cast<const std::byte*>(from.memory), size_t(bytes)});
     SR_TRY(HostCopies * copies, copies_of(context));
-    return copies->fetch(static_cast<VkBuffer>(from.buffer), from.buffer_offset, slice);
+    return copies->fetch(from.buffer, from.buffer_offset, slice);
 }
 
 Result<const SplatPool*> splats_of(const sr_world& world, const char* name)

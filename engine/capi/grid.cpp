@@ -116,7 +116,7 @@ sr_status sr_grid_get_info(const sr_grid* grid, sr_grid_info* info)
             return fail(ErrorCode::usage, "sr_grid_get_info: grid is NULL");
         const VoxelGrid& read = grid->read();
         sr_grid_info known{};
-        known.points_per_cell = read.has_points() ? uint32_t(read.points_per_voxel) : 0;
+        known.points_per_voxel = read.has_points() ? uint32_t(read.points_per_voxel) : 0;
         known.cells = read.cells.size();
         known.voxel_size = decimal_voxel_size(read.voxel_size);
         return write_result(known, info, "sr_grid_get_info");

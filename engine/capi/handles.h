@@ -7,12 +7,15 @@
 #include "engine/job/model.h"
 #include "engine/job/world.h"
 #include "engine/scene/label_edits.h"
-#include "engine/semrover.h"
+#include "engine/semrover_vulkan.h"
 #include "runtime/device/device.h"
 #include "runtime/device/host_copies.h"
 
+#include <atomic>
+
 // what the handles of the C interface hold
 struct sr_context {
+    std::atomic<uint32_t> in_use = 0; // what calls at work use of it (capi::Use)
     std::unique_ptr<semrover::Device> device;
     semrover::DeviceSummary summary;
     std::string error;

@@ -52,7 +52,7 @@ void describe(const VoxfieldModel& voxfield, sr_model_info& info)
     for (const ConditionPart part : voxfield.config.condition)
         info.conditions |= 1u << uint32_t(part);
     info.voxel_size = decimal_voxel_size(voxfield.config.voxel_size);
-    info.points_per_cell = voxfield.config.points_per_voxel;
+    info.points_per_voxel = voxfield.config.points_per_voxel;
     info.steps = uint32_t(voxfield.defaults.num_inference_steps);
 }
 
@@ -112,7 +112,7 @@ sr_status sr_model_load(sr_context* context, const sr_model_desc* desc, sr_model
 
 void sr_model_destroy(sr_model* model)
 {
-    delete model;
+    destroy(model);
 }
 
 sr_status sr_model_get_info(const sr_model* model, sr_model_info* info)

@@ -42,7 +42,7 @@ Result<std::vector<TimelinePoint>> points_of(const sr_semaphore* semaphores, uin
     for (uint32_t i = 0; i < count; ++i) {
         if (!semaphores[i].semaphore)
             return fail(ErrorCode::usage, "sr_sync: semaphore {} of {} is NULL", i, name);
-        points.push_back({static_cast<VkSemaphore>(semaphores[i].semaphore), semaphores[i].value});
+        points.push_back({semaphores[i].semaphore, semaphores[i].value});
     }
     return points;
 }
@@ -86,13 +86,13 @@ Result<SplatSlots> record_splats(sr_world& world, const sr_draw_desc& d, VkComma
 
 extern "C" {
 
-sr_status sr_world_record(sr_world* world, const sr_draw_desc* draw, void* command_buffer)
+sr_status sr_world_record(sr_world* world, const sr_draw_desc* draw, VkCommandBuffer commands)
 {
     return guarded(world ? world->context : nullptr, [&]() -> Status {
-        if (!world || !command_buffer)
+        if (!world || !commands)
             return fail(ErrorCode::usage, "sr_world_record: NULL");
         SR_TRY(const sr_draw_desc known, read_struct(draw, "sr_draw_desc"));
-        return record(*world, known, static_cast<VkCommandBuffer>(command_buffer), "sr_world_record");
+        return record(*world, known, commands, "sr_world_record");
     });
 }
 

@@ -167,7 +167,7 @@ sr_status sr_renderer_create(sr_context* context, const sr_renderer_desc* desc, 
 
 void sr_renderer_destroy(sr_renderer* renderer)
 {
-    delete renderer;
+    destroy(renderer);
 }
 
 sr_status sr_renderer_begin(sr_renderer* renderer, const sr_frame_desc* frame)

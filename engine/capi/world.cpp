@@ -32,7 +32,7 @@ LabelCallback labels_callback(const sr_world_desc& d, float voxel_size)
     return [labels = d.labels, user = d.user, voxel_size](const CellWindow& window, VoxelGrid& grid) -> Status {
         sr_grid cells;
         cells.grid.voxel_size = voxel_size;
-        const sr_window asked{{window.low[0], window.low[1]}, {window.high[0], window.high[1]}};
+        const sr_cell_rect asked{{window.low[0], window.low[1]}, {window.high[0], window.high[1]}};
         const sr_status status = labels(user, &asked, &cells);
         if (status == SR_NOT_YET)
             return fail(kNotYet, "the labels are not there yet");
@@ -117,7 +117,7 @@ sr_world_info info_of(const sr_world& world)
     info.splats = splats ? splats->surfels() : 0;
     info.voxel_size = decimal_voxel_size(world.settings.model.config.voxel_size);
     info.tile_cells = uint32_t(world.world->tile_cells());
-    info.points_per_cell = world.settings.model.config.points_per_voxel;
+    info.points_per_voxel = world.settings.model.config.points_per_voxel;
     return info;
 }
 
@@ -142,7 +142,7 @@ sr_status sr_world_create(sr_context* context, const sr_world_desc* desc, sr_wor
 
 void sr_world_destroy(sr_world* world)
 {
-    delete world;
+    destroy(world);
 }
 
 sr_status sr_world_focus(sr_world* world, const double position[3], const double direction[3], double radius)
@@ -179,7 +179,7 @@ sr_status sr_world_edit(sr_world* world, const sr_cell* cells, uint64_t count)
     });
 }
 
-sr_status sr_world_labels_ready(sr_world* world, const sr_window* window)
+sr_status sr_world_labels_ready(sr_world* world, const sr_cell_rect* window)
 {
     return with_world(world, "sr_world_labels_ready", [&]() -> Status {
         if (!window)
@@ -195,7 +195,7 @@ sr_status sr_world_get_info(sr_world* world, sr_world_info* info)
                       [&]() -> Status { return write_result(info_of(*world), info, "sr_world_get_info"); });
 }
 
-sr_status sr_world_copy_cells(sr_world* world, const sr_window* window, sr_grid** grid)
+sr_status sr_world_copy_cells(sr_world* world, const sr_cell_rect* window, sr_grid** grid)
 {
     return with_world(world, "sr_world_copy_cells", [&]() -> Status {
         if (!window || !grid)

@@ -13,9 +13,9 @@ import subprocess
 import sys
 import tempfile
 
-HEADERS = ("semrover.h", "semrover_renderer.h", "semrover_gl.h")
+HEADERS = ("semrover.h", "semrover_renderer.h", "semrover_vulkan.h", "semrover_gl.h")
 RECORDED = os.path.join(os.path.dirname(os.path.abspath(__file__)), "semrover.abi")
-PROTOTYPE = re.compile(r"^(?!typedef)[a-z][\w *]*[ *]sr_\w+\([^;]*\);", re.M)
+PROTOTYPE = re.compile(r"^SR_API ([\w *]+[ *]sr_\w+\([^;]*\));", re.M)
 QUIET = ("--no-show-locs", "--no-comp-dir-path", "--no-corpus-path", "--no-architecture", "--no-elf-needed")
 
 
@@ -25,7 +25,7 @@ def make_empty(headers, folder):
     for name in HEADERS:
         with open(os.path.join(headers, name), encoding="utf-8") as file:
             text += re.sub(r"/\*.*?\*/", "", file.read(), flags=re.S)
-    functions = [m[0][:-1] + " { __builtin_trap(); }" for m in PROTOTYPE.finditer(text)]
+    functions = [m[1] + " { __builtin_trap(); }" for m in PROTOTYPE.finditer(text)]
     library = os.path.join(folder, "libsemrover.so")
     with open(os.path.join(folder, "empty.c"), "w", encoding="utf-8") as file:
         file.write("\n".join([f'#include "{name}"' for name in HEADERS] + functions) + "\n")

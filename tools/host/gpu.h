@@ -6,7 +6,7 @@
 #ifndef HOST_GPU_H
 #define HOST_GPU_H
 
-#include <semrover.h>
+#include <semrover_vulkan.h>
 #include <vulkan/vulkan.h>
 
 struct gpu {

@@ -11,7 +11,7 @@
 #define VOXEL 0.6 /* metres, of the models */
 
 /* one column of cells of a window at a time; how high it is depends on j, across the street */
-static sr_status street_labels(void* user, const sr_window* window, sr_grid* grid)
+static sr_status street_labels(void* user, const sr_cell_rect* window, sr_grid* grid)
 {
     int32_t i, j, k;
     (void)user;

@@ -9,7 +9,7 @@ namespace semrover::view {
 
 namespace {
 
-sr_window around(int32_t i, int32_t j, int reach)
+sr_cell_rect around(int32_t i, int32_t j, int reach)
 {
     return {{i - reach, j - reach}, {i + reach, j + reach}};
 }

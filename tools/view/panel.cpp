@@ -25,14 +25,14 @@ void line(fmt::format_string<Args...> format, Args&&... args)
 
 const char* name_of(uint32_t label)
 {
-    const char* name = sr_label_name(label);
+    const char* name = sr_class_name(label);
     return name ? name : "none";
 }
 
 ImVec4 color_of(uint32_t label)
 {
     uint8_t rgb[3] = {};
-    sr_label_color(label, rgb);
+    sr_class_color(label, rgb);
     return {float(rgb[0]) / 255, float(rgb[1]) / 255, float(rgb[2]) / 255, 1};
 }
 
@@ -111,8 +111,8 @@ void label_choice(Brush& brush)
 {
     if (!ImGui::BeginCombo("label", name_of(brush.label)))
         return;
-    for (uint32_t label = 0; label <= SR_LABELS; ++label) {
-        const uint32_t value = label < SR_LABELS ? label : SR_NO_CELL; // the last takes cells away
+    for (uint32_t label = 0; label <= SR_CLASSES; ++label) {
+        const uint32_t value = label < SR_CLASSES ? label : SR_NO_CELL; // the last takes cells away
         ImGui::PushStyleColor(ImGuiCol_Text, value == SR_NO_CELL ? ImVec4(1, 1, 1, 1) : color_of(value));
         ImGui::TextUnformatted("#");
         ImGui::PopStyleColor();

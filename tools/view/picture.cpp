@@ -31,11 +31,11 @@ Status Picture::make_buffers()
     SR_TRY(label_, gpu_.buffer(pixels * 8, usage, false));
     SR_TRY(refined_, gpu_.buffer(pixels * 4, usage, false));
     SR_TRY(copied_, gpu_.buffer(pixels * 4, usage, true));
-    SR_TRY(palette_, gpu_.buffer(SR_LABELS * 16, usage, true));
+    SR_TRY(palette_, gpu_.buffer(SR_CLASSES * 16, usage, true));
     auto* colors = static_cast<float*>(palette_->mapped);
-    for (uint32_t label = 0; label < SR_LABELS; ++label) {
+    for (uint32_t label = 0; label < SR_CLASSES; ++label) {
         uint8_t rgb[3];
-        SR_CHECK(checked(sr_label_color(label, rgb), gpu_.context()));
+        SR_CHECK(checked(sr_class_color(label, rgb), gpu_.context()));
         for (uint32_t c = 0; c < 3; ++c)
             colors[4 * label + c] = float(rgb[c]) / 255;
     }

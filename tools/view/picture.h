@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/semrover.h"
+#include "engine/semrover_vulkan.h"
 #include "tools/view/shading.h"
 
 #include <vector>

@@ -127,7 +127,7 @@ Status Street::create(const StreetRequest& r)
     SR_TRY(const Grid grid, read_grid(looked_at));
     SR_TRY(start_, start_over(grid.get()));
     SR_TRY(const sr_grid_info info, info_of(grid.get()));
-    if (info.points_per_cell && r.warning)
+    if (info.points_per_voxel && r.warning)
         r.warning("the points of " + quote_path(r.grid) + " are not shown: a world generates its own");
 
     SR_TRY(sr_model* const model, load_model(context_, r.model, SR_MODEL_VOXFIELD));
@@ -174,21 +174,21 @@ Result<sr_world_info> Street::info() const
     return info;
 }
 
-Result<std::vector<PlacedCell>> Street::cells(const sr_window& window) const
+Result<std::vector<PlacedCell>> Street::cells(const sr_cell_rect& window) const
 {
     sr_grid* copy = nullptr;
     SR_CHECK(checked(sr_world_copy_cells(world_, &window, &copy), context_));
     const Grid grid(copy);
     SR_TRY(const std::vector<sr_cell> found, cells_of(grid.get()));
     SR_TRY(const sr_grid_info info, info_of(grid.get()));
-    std::vector<std::array<float, 6>> points(found.size() * info.points_per_cell);
+    std::vector<std::array<float, 6>> points(found.size() * info.points_per_voxel);
     uint64_t written = 0;
     if (!points.empty())
         SR_CHECK(grid_call(sr_grid_get_points(grid.get(), 0, found.size(), points.data()->data(), &written)));
     std::vector<PlacedCell> cells;
     for (size_t c = 0; c < found.size(); ++c) {
-        const auto first = points.begin() + ptrdiff_t(c * info.points_per_cell);
-        cells.push_back({found[c], {first, first + info.points_per_cell}});
+        const auto first = points.begin() + ptrdiff_t(c * info.points_per_voxel);
+        cells.push_back({found[c], {first, first + info.points_per_voxel}});
     }
     return cells;
 }
@@ -200,7 +200,7 @@ Status Street::edit(const std::vector<sr_cell>& cells)
 
 Status Street::save(const Path& path) const
 {
-    const sr_window all = {{-(1 << 20), -(1 << 20)}, {1 << 20, 1 << 20}};
+    const sr_cell_rect all = {{-(1 << 20), -(1 << 20)}, {1 << 20, 1 << 20}};
     sr_grid* copy = nullptr;
     SR_CHECK(checked(sr_world_copy_cells(world_, &all, &copy), context_));
     const Grid grid(copy);

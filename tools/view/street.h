@@ -44,7 +44,7 @@ class Street {
     Status focus(const Camera& camera);
     Result<bool> step(uint64_t budget_us); // true: all that is wanted is there
     Result<sr_world_info> info() const;
-    Result<std::vector<PlacedCell>> cells(const sr_window& window) const; // those that are finished
+    Result<std::vector<PlacedCell>> cells(const sr_cell_rect& window) const; // those that are finished
     Status edit(const std::vector<sr_cell>& cells);
     Status save(const Path& path) const; // all finished cells in memory, as .sgrid
 

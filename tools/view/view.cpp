@@ -124,7 +124,7 @@ Json results_of(const view::Viewer& viewer)
                  {"path_cameras", viewer.recorder.size()}};
     if (viewer.picked())
         json["cell"] = {{"ijk", {viewer.picked()->cell.i, viewer.picked()->cell.j, viewer.picked()->cell.k}},
-                        {"label", sr_label_name(viewer.picked()->cell.label)},
+                        {"label", sr_class_name(viewer.picked()->cell.label)},
                         {"tile", viewer.picked()->tile},
                         {"points", viewer.picked()->points.size()}};
     return json;

@@ -226,7 +226,7 @@ Status Viewer::count_frame(double ms)
     SR_TRY(figures_.world, street_->info());
     figures_.memory = {};
     figures_.memory.struct_size = sizeof figures_.memory;
-    SR_CHECK(checked(sr_context_memory(gpu_->context(), &figures_.memory), gpu_->context()));
+    SR_CHECK(checked(sr_context_get_memory(gpu_->context(), &figures_.memory), gpu_->context()));
     // without somebody who looks, time goes by frames, so that a script gives the same path on any device
     frame_seconds_ = window_ ? ms / 1000 : 1.0 / 30;
     seconds_ += frame_seconds_;
