@@ -264,6 +264,56 @@ typedef struct sr_model_info {
 
 SR_API sr_status sr_model_get_info(const sr_model* model, sr_model_info* info);
 
+#define SR_SAMPLER_DDPM 0u
+#define SR_SAMPLER_DDIM 1u
+#define SR_SAMPLER_DPMPP_2M 2u
+
+#define SR_KNOWN_NOISED 0u /* the network sees finished voxels with the noise of the step, as in RePaint */
+#define SR_KNOWN_CLEAN 1u  /* as they are: for a network that was trained so */
+
+#define SR_REGIONS_COMPLETE 0u /* docs/method.md, section 4.1 */
+#define SR_REGIONS_RIM 1u
+
+/* How points are denoised, beside the number of steps (docs/method.md, sections 3 and 4). All of it decides the bytes.
+ */
+typedef struct sr_generation {
+    uint32_t struct_size;
+    uint32_t sampler;         /* SR_SAMPLER_.. */
+    uint32_t known;           /* SR_KNOWN_.. */
+    uint32_t regions;         /* SR_REGIONS_.. */
+    uint32_t region_size;     /* voxels that are denoised together, at most */
+    uint32_t least_uncovered; /* voxels of a region that no other has, at least */
+    uint32_t jump_length;     /* RePaint's jumps back, in steps; 0: none */
+    uint32_t jump_count;      /* rounds that each of them goes; 1: none */
+    double eta;               /* share of fresh noise in a step of DDIM, 0..1 */
+    double guidance_scale;    /* 1: no guidance */
+    double guidance_from;     /* timesteps from.. */
+    double guidance_until;    /* ..until which steps are guided */
+    double guidance_radius;   /* metres within which the unguided half sees other voxels */
+} sr_generation;
+
+/* What a world takes whose desc does not say it: to be changed, and given to sr_world_desc.generation. SR_ERR_USAGE: a
+ * model without a voxfield transformer */
+SR_API sr_status sr_model_get_generation(const sr_model* model, sr_generation* generation);
+
+/* An upright box of one class that conditions the voxels in it. Metres, in the world's frame. */
+typedef struct sr_object {
+    uint32_t id;    /* unique among them: each has noise of its own */
+    uint32_t label; /* its class */
+    double center[3];
+    double size[3];   /* along the heading, across it, up */
+    double heading;   /* where its front looks: radians from x towards y */
+    float color[3];   /* r, g, b (sRGB, 0..1) */
+    uint32_t colored; /* 1: it has this colour */
+    uint32_t part;    /* 1: of an object of its class, as a window is of a house */
+    uint32_t reserved;
+} sr_object;
+
+/* Objects of a .json file (docs/formats.md, section 2.8). objects NULL: only the count. Otherwise *count is the room;
+ * it becomes the number written. SR_ERR_PARTIAL when there are more; SR_ERR_BAD_INPUT: the file. Any thread; waits for
+ * the disk. */
+SR_API sr_status sr_read_objects(const char* path, sr_object* objects, uint64_t* count);
+
 /* ---- Worlds: a street of any extent, generated around a camera as it moves. ---- */
 
 typedef struct sr_world sr_world;
@@ -281,6 +331,10 @@ typedef struct sr_cell_rect {
  *
  * Order-free: the bytes of a place depend on model, seed, the labels near it and edits, not on the way of the camera.
  * One device and driver are meant: others round in other ways. */
+#define SR_CONDITIONING_GUESSED 0u /* objects are guessed of the labels, where the model can be conditioned */
+#define SR_CONDITIONING_NONE 1u    /* labels alone */
+#define SR_CONDITIONING_GIVEN 2u   /* `objects`; SR_ERR_BAD_INPUT where the model cannot be conditioned on them */
+
 typedef struct sr_world_desc {
     uint32_t struct_size;
     uint32_t steps; /* of denoising; 0: as the model says */
@@ -291,18 +345,19 @@ typedef struct sr_world_desc {
     sr_status (*labels)(void* user, const sr_cell_rect* rect, sr_grid* grid);
     void (*message)(void* user, const char* line); /* warnings, during sr_world_create and steps; NULL: none */
     void* user;                                    /* for the callbacks */
-    const char* cache;   /* a folder for finished tiles, made where it is missing, also for later sessions and worlds
-                            of other seeds, settings or edits; one that cannot be written is read. NULL: none. One
-                            world at a time */
-    const char* objects; /* boxes and colours that the model is told of, a .json file (docs/formats.md, section 2.8);
-                            NULL: guessed of the labels, where the model can be told */
+    const char* cache; /* a folder for finished tiles, made where it is missing, also for later sessions and worlds
+                          of other seeds, settings or edits; one that cannot be written is read. NULL: none. One
+                          world at a time */
+    const sr_generation* generation; /* NULL: as the model says */
+    const sr_object* objects;        /* SR_CONDITIONING_GIVEN */
+    uint64_t object_count;
     uint64_t seed;
     uint64_t host_bytes;    /* for tiles in memory; 0: no budget */
     uint64_t splat_bytes;   /* for splats on the device, 56 bytes each, 20 a cell; allocated here. 0: no splats */
     double tile_size;       /* metres; 0: 9.6. Another size gives another world */
     double splat_radius;    /* metres; 0: from the distance of the points */
     uint32_t tiles_at_once; /* generated together; 0: as suits the device. Does not change the bytes */
-    uint32_t reserved;
+    uint32_t conditioning;  /* SR_CONDITIONING_.. */
     double detail_distance; /* metres: a tile within it has a splat of each point, up to twice as far one of each half
                                cell, up to four times one of each cell, and so on. So a kilometre takes little more than
                                what is near. 0: each point has one everywhere */

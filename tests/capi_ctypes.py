@@ -22,9 +22,9 @@ class ModelDesc(ctypes.Structure):
 class WorldDesc(ctypes.Structure):
     _fields_ = [("struct_size", c_uint32), ("steps", c_uint32), ("next", c_void_p), ("model", c_void_p),
                 ("grid", c_void_p), ("folder", c_char_p), ("labels", c_void_p), ("message", c_void_p),
-                ("user", c_void_p), ("cache", c_char_p), ("objects", c_char_p), ("seed", c_uint64),
-                ("host_bytes", c_uint64), ("splat_bytes", c_uint64), ("tile_size", c_double),
-                ("splat_radius", c_double), ("tiles_at_once", c_uint32), ("reserved", c_uint32)]
+                ("user", c_void_p), ("cache", c_char_p), ("generation", c_void_p), ("objects", c_void_p),
+                ("object_count", c_uint64), ("seed", c_uint64), ("host_bytes", c_uint64), ("splat_bytes", c_uint64),
+                ("tile_size", c_double), ("splat_radius", c_double), ("tiles_at_once", c_uint32), ("conditioning", c_uint32)]
 
 
 library = ctypes.CDLL(sys.argv[1])

@@ -132,8 +132,10 @@ static void refuses_wrong_worlds(sr_context* context)
     desc.tile_size = 1.2;
     CHECK(create_world(context, model, &desc, &world) == SR_ERR_USAGE && says(context, "narrower than its halo"));
     desc = street_world();
-    desc.reserved = 1;
-    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "reserved"));
+    desc.conditioning = 3;
+    CHECK(create_world(context, model, &desc, &world) == SR_ERR_USAGE && says(context, "conditioning is 3"));
+    desc.conditioning = SR_CONDITIONING_GIVEN;
+    CHECK(create_world(context, model, &desc, &world) == SR_ERR_USAGE && says(context, "come together"));
     desc = street_world();
     desc.detail_distance = -1;
     CHECK(create_world(context, model, &desc, &world) == SR_ERR_USAGE && says(context, "detail distance"));
@@ -195,6 +197,122 @@ static void labels_of_a_grid_and_of_a_callback_give_the_same_points(sr_context* 
     free(b);
     sr_world_destroy(read);
     sr_world_destroy(called);
+}
+
+/* points of a world with these settings; the caller frees them */
+static float* generated_with(sr_context* context, sr_model* loaded, const sr_generation* generation, uint64_t* cells)
+{
+    const sr_cell_rect rect = {{0, -6}, {7, 6}};
+    sr_world_desc desc = street_world();
+    sr_world* world = NULL;
+    float* points;
+    desc.model = loaded;
+    desc.generation = generation;
+    CHECK_OK(context, sr_world_create(context, &desc, &world));
+    walk(context, world, 1, 1);
+    points = points_of(world, &rect, cells);
+    sr_world_destroy(world);
+    return points;
+}
+
+/* a model's own settings give what a world without settings has; each of them that is changed, something else */
+static void settings_decide_the_points(sr_context* context)
+{
+    sr_model* loaded = load_model(context, model);
+    sr_generation own = SR_INIT(sr_generation), changed[5], wrong;
+    uint64_t cells = 0, others = 0;
+    float *points = generated_with(context, loaded, NULL, &cells), *other;
+    sr_world_desc desc = street_world();
+    sr_world* world = NULL;
+    size_t i;
+    CHECK(sr_model_get_generation(NULL, &own) == SR_ERR_USAGE && says(NULL, "model is NULL"));
+    CHECK_OK(context, sr_model_get_generation(loaded, &own));
+    other = generated_with(context, loaded, &own, &others);
+    CHECK(cells > 0 && others == cells && !memcmp(points, other, cells * 20 * 6 * sizeof(float)));
+    free(other);
+    for (i = 0; i < 5; ++i)
+        changed[i] = own;
+    changed[0].guidance_scale += 1;
+    changed[1].sampler = SR_SAMPLER_DPMPP_2M;
+    changed[2].region_size = 64;
+    changed[3].guidance_from = 500;
+    changed[4].sampler = SR_SAMPLER_DDIM;
+    changed[4].eta = 0.5;
+    for (i = 0; i < 5; ++i) {
+        other = generated_with(context, loaded, &changed[i], &others);
+        CHECK(others == cells && memcmp(points, other, cells * 20 * 6 * sizeof(float)) != 0);
+        free(other);
+    }
+    free(points);
+    desc.model = loaded;
+    desc.generation = &wrong;
+    wrong = own;
+    wrong.sampler = 3;
+    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "sampler is 3"));
+    wrong = own;
+    wrong.region_size = 0;
+    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "region_size is 0"));
+    wrong = own;
+    wrong.guidance_scale = -1;
+    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "guidance scale"));
+    wrong = own;
+    wrong.eta = 2;
+    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "eta 2") && !world);
+    sr_model_destroy(loaded);
+}
+
+/* none, guessed and given objects; a file of them */
+static void objects_condition_the_points(sr_context* context, const char* conditioned, const char* path)
+{
+    const sr_cell_rect rect = {{0, -6}, {7, 6}};
+    sr_model* loaded = load_model(context, conditioned);
+    sr_object house = {.label = 2, .center = {2, 4, 1.2}, .size = {9, 1.2, 2.4}, .color = {1, 0, 0}, .colored = 1};
+    sr_object read[2];
+    sr_world_desc desc = street_world();
+    sr_world* world = NULL;
+    float* points[3];
+    uint64_t cells[3], count = 0;
+    FILE* file;
+    uint32_t i, k;
+    desc.model = loaded;
+    for (i = 0; i < 3; ++i) {
+        desc.conditioning = i;
+        desc.objects = i == SR_CONDITIONING_GIVEN ? &house : NULL;
+        desc.object_count = i == SR_CONDITIONING_GIVEN;
+        CHECK_OK(context, sr_world_create(context, &desc, &world));
+        walk(context, world, 1, 1);
+        points[i] = points_of(world, &rect, &cells[i]);
+        sr_world_destroy(world);
+    }
+    for (i = 0; i < 3; ++i)
+        for (k = 0; k < i; ++k)
+            CHECK(cells[i] == cells[k] && memcmp(points[i], points[k], cells[i] * 20 * 6 * sizeof(float)) != 0);
+    for (i = 0; i < 3; ++i)
+        free(points[i]);
+    house.size[0] = -1;
+    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_BAD_INPUT && says(context, "object 0"));
+    house.size[0] = 9;
+    house.color[1] = 2;
+    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_BAD_INPUT && says(context, "a colour of 2"));
+    sr_model_destroy(loaded);
+    house.color[1] = 0;
+    CHECK(create_world(context, model, &desc, &world) == SR_ERR_BAD_INPUT && says(context, "object"));
+
+    file = fopen(path, "w");
+    CHECK(file);
+    fputs("{\"format\": \"semrover.objects\", \"version\": 1, \"objects\": [", file);
+    fputs("{\"id\": 7, \"class\": \"building\", \"center\": [1, 2, 3], \"size\": [4, 5, 6], \"heading\": 0.5, ", file);
+    fputs("\"tint\": [1, 0.5, 0]}, ", file);
+    fputs("{\"id\": 8, \"class\": \"road\", \"center\": [0, 0, 0], \"size\": [1, 1, 1], \"heading\": 0}]}", file);
+    fclose(file);
+    CHECK(sr_read_objects(path, NULL, &count) == SR_OK && count == 2);
+    count = 1;
+    CHECK(sr_read_objects(path, read, &count) == SR_ERR_PARTIAL && says(NULL, "2 objects") && count == 1);
+    count = 2;
+    CHECK(sr_read_objects(path, read, &count) == SR_OK && count == 2 && read[1].id == 8 && !read[1].colored);
+    CHECK(read[0].id == 7 && read[0].label == 2 && read[0].center[2] == 3 && read[0].size[1] == 5);
+    CHECK(read[0].heading == 0.5 && read[0].colored && read[0].color[1] == 0.5f && !read[0].part);
+    CHECK(sr_read_objects("/nonesuch", NULL, &count) == SR_ERR_BAD_INPUT && says(NULL, "nonesuch"));
 }
 
 static void an_edit_makes_its_place_anew(sr_context* context)
@@ -355,7 +473,7 @@ static void calls_of_callbacks_are_refused(sr_context* context)
 int main(int argc, char** argv)
 {
     sr_context* context = NULL;
-    CHECK(argc == 2);
+    CHECK(argc == 4);
     model = argv[1];
     sr_set_diagnostic_callback(print_line, stderr);
     edits_grids_cell_by_cell();
@@ -363,6 +481,8 @@ int main(int argc, char** argv)
     CHECK(sr_context_create(NULL, &context) == SR_OK);
     refuses_wrong_worlds(context);
     labels_of_a_grid_and_of_a_callback_give_the_same_points(context);
+    settings_decide_the_points(context);
+    objects_condition_the_points(context, argv[2], argv[3]);
     an_edit_makes_its_place_anew(context);
     draws_into_host_memory(context);
     calls_of_callbacks_are_refused(context);

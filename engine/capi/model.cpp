@@ -64,6 +64,27 @@ void describe(const RendererModel& renderer, sr_model_info& info)
     info.splat_radius = renderer.defaults.splat_radius.value_or(0);
 }
 
+sr_generation generation_of(const VoxfieldModel& model)
+{
+    const VoxfieldDefaults& d = model.defaults;
+    sr_generation g{};
+    g.sampler = model.scheduler.sampler == Sampler::ddim       ? SR_SAMPLER_DDIM
+                : model.scheduler.sampler == Sampler::dpmpp_2m ? SR_SAMPLER_DPMPP_2M
+                                                               : SR_SAMPLER_DDPM;
+    g.known = d.repaint.known == KnownTokens::clean ? SR_KNOWN_CLEAN : SR_KNOWN_NOISED;
+    g.regions = d.regions.strategy == RegionStrategy::rim ? SR_REGIONS_RIM : SR_REGIONS_COMPLETE;
+    g.region_size = uint32_t(d.regions.region_size);
+    g.least_uncovered = uint32_t(d.regions.coverage_threshold);
+    g.jump_length = uint32_t(d.repaint.jump_length);
+    g.jump_count = uint32_t(d.repaint.jump_n_sample);
+    g.eta = model.scheduler.eta;
+    g.guidance_scale = d.guidance.scale;
+    g.guidance_from = d.guidance.from;
+    g.guidance_until = d.guidance.until;
+    g.guidance_radius = d.guidance.radius;
+    return g;
+}
+
 sr_model_info info_of(const Model& model)
 {
     sr_model_info info{};
@@ -113,6 +134,16 @@ sr_status sr_model_load(sr_context* context, const sr_model_desc* desc, sr_model
 void sr_model_destroy(sr_model* model)
 {
     destroy(model);
+}
+
+sr_status sr_model_get_generation(const sr_model* model, sr_generation* generation)
+{
+    return guarded(model ? model->context : nullptr, [&]() -> Status {
+        if (!model || !model->model->voxfield())
+            return fail(ErrorCode::usage, "sr_model_get_generation: {}",
+                        model ? "the model has no voxfield transformer" : "model is NULL");
+        return write_result(generation_of(*model->model->voxfield()), generation, "sr_model_get_generation");
+    });
 }
 
 sr_status sr_model_get_info(const sr_model* model, sr_model_info* info)

@@ -4,18 +4,116 @@
 #include "engine/capi/edits.h"
 #include "engine/capi/exchange.h"
 #include "engine/scene/cell_reach.h"
+#include "engine/scene/palette.h"
 #include "engine/scene/tiles.h"
+
+#include <cmath>
+#include <set>
 
 using namespace semrover;
 using namespace semrover::capi;
 
 namespace {
 
+constexpr std::array kSamplers = {"ddpm", "ddim", "dpm++2m"};                       // of SR_SAMPLER_..
+constexpr std::array kStrategies = {RegionStrategy::complete, RegionStrategy::rim}; // of SR_REGIONS_..
+
+// one whole number of sr_generation
+Result<int> number_in(uint64_t value, int low, int high, const char* field)
+{
+    if (value < uint64_t(low) || value > uint64_t(high))
+        return fail(ErrorCode::usage, "sr_generation: {} is {}, expected {} to {}", field, value, low, high);
+    return int(value);
+}
+
+Result<GenerationOptions> options_of(const sr_generation& g)
+{
+    GenerationOptions o;
+    SR_TRY(const int sampler, number_in(g.sampler, 0, kSamplers.size() - 1, "sampler"));
+    o.sampler = kSamplers[size_t(sampler)];
+    SR_TRY(const int known, number_in(g.known, 0, 1, "known"));
+    o.known = known ? KnownTokens::clean : KnownTokens::noised;
+    SR_TRY(const int strategy, number_in(g.regions, 0, kStrategies.size() - 1, "regions"));
+    o.strategy = kStrategies[size_t(strategy)];
+    SR_TRY(o.region_size, number_in(g.region_size, 1, 4096, "region_size"));
+    SR_TRY(o.coverage_threshold, number_in(g.least_uncovered, 1, 4096, "least_uncovered"));
+    SR_TRY(o.jump_length, number_in(g.jump_length, 0, 10000, "jump_length"));
+    SR_TRY(o.jump_n_sample, number_in(g.jump_count, 1, 10000, "jump_count"));
+    SR_TRY(const int from, number_in(uint64_t(std::max(0., g.guidance_from)), 0, kLastTimestep, "guidance_from"));
+    SR_TRY(const int until, number_in(uint64_t(std::max(0., g.guidance_until)), 0, kLastTimestep, "guidance_until"));
+    if (!(g.eta >= 0 && g.eta <= 1) || !(g.guidance_radius >= 0) || !std::isfinite(g.guidance_scale))
+        return fail(ErrorCode::usage, "sr_generation: eta {}, guidance_radius {} or guidance_scale {} is out of range",
+                    g.eta, g.guidance_radius, g.guidance_scale);
+    o.eta = g.eta;
+    o.guidance_scale = float(g.guidance_scale);
+    SR_CHECK(check_guidance(*o.guidance_scale));
+    o.guidance_from = from;
+    o.guidance_until = until;
+    o.guidance_radius = g.guidance_radius;
+    return o;
+}
+
+Result<SceneObject> object_of(const sr_object& o, const std::string& where)
+{
+    SceneObject object{.id = o.id, .heading = o.heading, .part = o.part == 1};
+    if (o.label >= kClassCount || o.colored > 1 || o.part > 1 || o.reserved)
+        return fail(ErrorCode::usage, "{}: label {}, colored {}, part {} or reserved {}", where, o.label, o.colored,
+                    o.part, o.reserved);
+    object.label = uint8_t(o.label);
+    std::ranges::copy(o.center, object.center.begin());
+    std::ranges::copy(o.size, object.size.begin());
+    if (o.colored)
+        object.tint = {o.color[0], o.color[1], o.color[2]};
+    for (const float channel : o.color)
+        if (!(channel >= 0 && channel <= 1))
+            return fail(ErrorCode::bad_input, "{}: a colour of {}, expected 0 to 1", where, channel);
+    SR_CHECK(check_object(object, where));
+    return object;
+}
+
+sr_object described(const SceneObject& object)
+{
+    sr_object o{};
+    o.id = object.id;
+    o.label = object.label;
+    o.heading = object.heading;
+    o.colored = object.tint.has_value();
+    std::ranges::copy(object.center, o.center);
+    std::ranges::copy(object.size, o.size);
+    for (size_t c = 0; c < 3 && object.tint; ++c)
+        o.color[c] = float((*object.tint)[c]);
+    o.part = object.part;
+    return o;
+}
+
+Result<GivenObjects> objects_of(const sr_world_desc& d)
+{
+    if (d.conditioning > SR_CONDITIONING_GIVEN)
+        return fail(ErrorCode::usage, "sr_world_desc: conditioning is {}, expected SR_CONDITIONING_..", d.conditioning);
+    if ((d.conditioning == SR_CONDITIONING_GIVEN) != (d.objects && d.object_count))
+        return fail(ErrorCode::usage, "sr_world_desc: objects and SR_CONDITIONING_GIVEN come together");
+    if (d.conditioning == SR_CONDITIONING_GUESSED)
+        return GivenObjects();
+    std::vector<SceneObject> objects;
+    std::set<uint32_t> ids;
+    for (uint64_t n = 0; n < d.object_count; ++n) {
+        SR_TRY(objects.emplace_back(), object_of(d.objects[n], fmt::format("sr_world_desc: object {}", n)));
+        if (!ids.insert(objects.back().id).second)
+            return fail(ErrorCode::bad_input, "sr_world_desc: object {} has the id {} of another", n,
+                        objects.back().id);
+    }
+    return GivenObjects(std::move(objects));
+}
+
 Result<GenerationSettings> settings_of(const sr_world_desc& d, const Model& model)
 {
     if (d.steps > 1'000'000)
         return fail(ErrorCode::usage, "sr_world_desc: {} steps", d.steps);
     GenerationOptions o;
+    if (d.generation) {
+        SR_TRY(const sr_generation generation, read_struct(d.generation, "sr_generation"));
+        SR_TRY(o, options_of(generation));
+    }
     o.model = model.path();
     o.precision = model.precision();
     if (d.steps)
@@ -70,10 +168,7 @@ Result<std::unique_ptr<sr_world>> make_world(sr_context& context, const sr_world
     SR_TRY(world->settings, settings_of(d, *world->model));
     SR_TRY(auto labels, labels_of(d, world->settings.model.config.voxel_size));
     WorldRequest request{.settings = world->settings, .transformer = world->model->transformer(), .seed = d.seed};
-    if (d.objects) {
-        SR_TRY(std::vector<SceneObject> objects, read_objects(d.objects));
-        request.objects = std::move(objects);
-    }
+    SR_TRY(request.objects, objects_of(d));
     request.store = d.cache ? Path(d.cache) : Path();
     request.host_bytes = d.host_bytes;
     request.splat_bytes = d.splat_bytes;
@@ -125,6 +220,23 @@ sr_world_info info_of(const sr_world& world)
 
 extern "C" {
 
+sr_status sr_read_objects(const char* path, sr_object* objects, uint64_t* count)
+{
+    return guarded(nullptr, [&]() -> Status {
+        if (!path || !count)
+            return fail(ErrorCode::usage, "sr_read_objects: NULL");
+        SR_TRY(const std::vector<SceneObject> all, read_objects(path));
+        const uint64_t room = std::exchange(*count, all.size());
+        if (!objects)
+            return {};
+        *count = std::min<uint64_t>(room, all.size());
+        std::transform(all.begin(), all.begin() + ptrdiff_t(*count), objects, described);
+        if (*count < all.size())
+            return fail(ErrorCode::partial, "sr_read_objects: {} objects, room for {}", all.size(), room);
+        return {};
+    });
+}
+
 sr_status sr_world_create(sr_context* context, const sr_world_desc* desc, sr_world** world)
 {
     return guarded(context, [&]() -> Status {
@@ -132,8 +244,6 @@ sr_status sr_world_create(sr_context* context, const sr_world_desc* desc, sr_wor
             return fail(ErrorCode::usage, "sr_world_create: NULL");
         *world = nullptr;
         SR_TRY(const sr_world_desc known, read_struct(desc, "sr_world_desc"));
-        if (known.reserved)
-            return fail(ErrorCode::usage, "sr_world_desc: reserved is not 0");
         SR_TRY(auto made, make_world(*context, known));
         *world = made.release();
         return {};
@@ -214,4 +324,5 @@ sr_status sr_world_flush(sr_world* world)
 
 } // extern "C"
 
-static_assert(sizeof(sr_world_desc) == 136 && sizeof(sr_world_info) == 88);
+static_assert(sizeof(sr_world_desc) == 152 && sizeof(sr_generation) == 72 && sizeof(sr_object) == 88 &&
+              sizeof(sr_world_info) == 88);

@@ -53,6 +53,9 @@ Result<GenerationSettings> resolve_generation(const GenerationOptions& o)
         SR_TRY(sampler, sampler_from_name(o.sampler));
     }
     SR_TRY(s.model, VoxfieldModel::open(o.model, sampler));
+    const double model_eta = s.model.scheduler.eta;
+    s.model.scheduler.eta = o.eta.value_or(model_eta);
+    s.other_eta = s.model.scheduler.eta != model_eta;
     const VoxfieldDefaults& d = s.model.defaults;
     s.steps = o.steps.value_or(preset.steps ? preset.steps : d.num_inference_steps);
     s.guidance = {o.guidance_scale.value_or(d.guidance.scale), double(o.guidance_from.value_or(int(d.guidance.from))),
@@ -115,6 +118,8 @@ Result<Json> settings_json(const GenerationSettings& s, const Device& device, st
         settings["guidance_until"] = s.guidance.until;
     if (s.guidance.narrows(s.model.config.attention_radius))
         settings["guidance_radius"] = s.guidance.radius;
+    if (s.other_eta)
+        settings["eta"] = s.model.scheduler.eta;
     if (s.regions.tile_cells)
         settings["tile_cells"] = s.regions.tile_cells;
     return settings;

@@ -26,6 +26,7 @@ struct GenerationOptions {
     std::optional<int> guidance_from, guidance_until;
     std::optional<double> guidance_radius;
     std::optional<KnownTokens> known;
+    std::optional<double> eta; // of DDIM, 0..1
     std::optional<RegionStrategy> strategy;
     int64_t first_cell = 0;
     double tile_size = 0;         // metres; above 0: in the order of tiles of this size
@@ -41,6 +42,7 @@ struct GenerationSettings {
     Guidance guidance;
     RegionOptions regions;
     RepaintOptions repaint;
+    bool other_eta = false; // than the model's
     DType precision = DType::f16;
     uint32_t batch = 0;
 };

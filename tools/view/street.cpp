@@ -93,6 +93,19 @@ Result<Path> a_tile_of(const Path& folder)
 
 } // namespace
 
+// none without a path
+Result<std::vector<sr_object>> read_objects(const std::string& path)
+{
+    std::vector<sr_object> objects;
+    uint64_t count = 0;
+    if (path.empty())
+        return objects;
+    SR_CHECK(grid_call(sr_read_objects(path.c_str(), nullptr, &count)));
+    objects.resize(count);
+    SR_CHECK(grid_call(sr_read_objects(path.c_str(), objects.data(), &count)));
+    return objects;
+}
+
 Result<sr_model*> load_model(sr_context* context, const std::string& folder, uint32_t part)
 {
     sr_model_desc desc{};
@@ -143,7 +156,10 @@ Status Street::create(const StreetRequest& r)
     };
     desc.user = const_cast<std::function<void(const std::string&)>*>(&r.warning);
     desc.cache = r.cache.empty() ? nullptr : r.cache.c_str();
-    desc.objects = r.objects.empty() ? nullptr : r.objects.c_str();
+    SR_TRY(const std::vector<sr_object> objects, read_objects(r.objects));
+    desc.conditioning = objects.empty() ? SR_CONDITIONING_GUESSED : SR_CONDITIONING_GIVEN;
+    desc.objects = objects.empty() ? nullptr : objects.data();
+    desc.object_count = objects.size();
     desc.seed = r.seed;
     desc.host_bytes = r.host_bytes;
     desc.splat_bytes = r.splat_bytes;
