@@ -1,6 +1,5 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/format/camera_path.h"
 #include "engine/format/image.h"
 #include "engine/format/npy.h"
 #include "engine/scene/grid.h"
@@ -9,6 +8,7 @@
 #include "tests/png_file.h"
 #include "tests/program.h"
 #include "tests/street_scene.h"
+#include "tools/trajectory/camera_path.h"
 
 #include <cmath>
 #include <fstream>

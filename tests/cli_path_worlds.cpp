@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // trajectories and grids of data sets whose frames differ, in the data sets' own layouts: what is drawn has the depth
 // that rays through the voxels have
-#include "engine/format/camera_path.h"
 #include "engine/format/image.h"
 #include "tests/program.h"
 #include "tests/zip_bytes.h"
+#include "tools/trajectory/camera_path.h"
 
 #include <gtest/gtest.h>
 

@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/format/camera_path.h"
 #include "tests/child_program.h"
 #include "tests/json_text.h"
 #include "tests/program.h"
 #include "tests/renderer_folders.h"
+#include "tools/trajectory/camera_path.h"
 
 #include <algorithm>
 #include <csignal>

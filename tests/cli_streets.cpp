@@ -1,12 +1,12 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/format/camera_path.h"
 #include "engine/format/image.h"
 #include "engine/mesh/mesh_files.h"
 #include "engine/scene/cell_objects.h"
 #include "runtime/base/json.h"
 #include "tests/json_text.h"
 #include "tests/program.h"
+#include "tools/trajectory/camera_path.h"
 
 #include <algorithm>
 #include <gtest/gtest.h>

@@ -1,12 +1,12 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // `semrover view`: pictures with and without a window, cells that are clicked and painted, paths that `render` reads
-#include "engine/format/camera_path.h"
 #include "engine/scene/palette.h"
 #include "runtime/base/json.h"
 #include "tests/json_text.h"
 #include "tests/program.h"
 #include "tests/renderer_folders.h"
+#include "tools/trajectory/camera_path.h"
 
 #include <cmath>
 #include <cstring>

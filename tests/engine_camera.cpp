@@ -3,9 +3,9 @@
 #include "engine/camera/lens.h"
 #include "engine/camera/rig.h"
 #include "engine/deferred/frame_images.h"
-#include "engine/format/camera_path.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
+#include "tools/trajectory/camera_path.h"
 
 #include <cmath>
 #include <gtest/gtest.h>

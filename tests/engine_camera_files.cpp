@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/camera/lens.h"
-#include "engine/format/camera_path.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
+#include "tools/trajectory/camera_path.h"
 
 #include <cmath>
 #include <filesystem>

@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/camera/lens.h"
-#include "engine/format/camera_path.h"
 #include "engine/splat/rasterizer.h"
 #include "tests/kernel_case.h"
 #include "tests/scratch_folder.h"
+#include "tools/trajectory/camera_path.h"
 
 namespace semrover {
 namespace engine_camera_render_test {

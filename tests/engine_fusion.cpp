@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/fusion/fuse.h"
 #include "engine/fusion/resampling.h"
-#include "engine/fusion/timed_pictures.h"
 #include "tests/kernel_case.h"
 #include "tests/says.h"
 #include "tests/street_scene.h"
+#include "tools/fuse/timed_pictures.h"
 
 #include <map>
 

@@ -1,6 +1,5 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/format/depth_image.h"
 #include "engine/format/image.h"
 #include "engine/format/label_image.h"
 #include "engine/format/npy.h"
@@ -8,6 +7,7 @@
 #include "tests/png_file.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
+#include "tools/dataset/depth_image.h"
 
 #include <cmath>
 #include <cstdio>

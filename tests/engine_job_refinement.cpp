@@ -1,11 +1,11 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/format/camera_path.h"
 #include "engine/job/drawing.h"
 #include "engine/job/refinement.h"
 #include "engine/job/world.h"
 #include "tests/json_text.h"
 #include "tests/renderer_folders.h"
+#include "tools/trajectory/camera_path.h"
 
 #include <nlohmann/json.hpp>
 

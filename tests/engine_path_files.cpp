@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // trajectories that other programs and data sets write
 #include "engine/camera/rig.h"
-#include "engine/format/camera_path.h"
 #include "engine/format/image.h"
-#include "engine/format/natural_order.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
+#include "tools/trajectory/camera_path.h"
+#include "tools/trajectory/natural_order.h"
 
 #include <cmath>
 #include <gtest/gtest.h>

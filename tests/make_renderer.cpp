@@ -3,7 +3,7 @@
 // make_renderer OUT --config UNET.json --vae VAE.json: a deferred renderer with random weights, a folder in the
 // diffusers layout or a single LDM file. A config file may be a golden layout: then its "config" is taken.
 #include "engine/model/checkpoint.h"
-#include "engine/model/ldm_names.h"
+#include "engine/model/ldm_config.h"
 #include "engine/model/model_writer.h"
 #include "engine/model/renderer_model.h"
 #include "tests/json_text.h"

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "engine/model/checkpoint.h"
-#include "engine/model/ldm_names.h"
+#include "engine/model/ldm_config.h"
 #include "engine/model/model_writer.h"
 
 #include <gtest/gtest.h>

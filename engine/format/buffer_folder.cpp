@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/format/buffer_folder.h"
 
-#include "engine/format/camera_path.h"
 #include "engine/format/label_image.h"
+#include "engine/format/transforms.h"
 #include "engine/scene/palette.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/quote.h"

@@ -33,6 +33,8 @@ Result<ImageRgb8> read_png_rgb8(const Path& path);
 // baseline JPEG, 4:2:0, quality 1..100; written and refused like PNG. Any JPEG but those with arithmetic coding is
 // read. One that is cut, or lacks pixels for another reason, is refused; so is one of more than 1024 pixels a byte
 Status write_jpeg_rgb8(const Path& path, uint32_t width, uint32_t height, std::span<const uint8_t> pixels, int quality);
+Result<std::vector<std::byte>> encode_jpeg_rgb8(uint32_t width, uint32_t height, std::span<const uint8_t> pixels,
+                                                int quality); // the bytes of such a file
 Result<ImageRgb8> read_jpeg_rgb8(const Path& path);
 
 // the bytes of a PNG file; a PNG or JPEG file in memory, told by its first bytes. `where` is its name in errors. An

@@ -1,8 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/format/image_jpeg.h"
-
 #include "engine/format/image.h"
+
 #include "runtime/base/quote.h"
 
 #include <algorithm>

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/drawing_store.h"
 
-#include "engine/format/camera_path.h"
 #include "engine/format/image.h"
+#include "engine/format/transforms.h"
 #include "engine/job/outputs.h"
 #include "engine/job/path_drawing.h"
 #include "runtime/base/quote.h"

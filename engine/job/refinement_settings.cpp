@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/format/camera_path.h"
+#include "engine/format/transforms.h"
 #include "engine/job/input_hashes.h"
 #include "engine/job/outputs.h"
 #include "engine/job/refinement.h"

@@ -3,7 +3,6 @@
 #include "engine/model/checkpoint.h"
 
 #include "engine/model/ldm_config.h"
-#include "engine/model/ldm_names.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/mix64.h"
 #include "runtime/base/quote.h"

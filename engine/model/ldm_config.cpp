@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/model/ldm_config.h"
 
-#include "engine/model/ldm_names.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
 

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/model/ldm_names.h"
+#include "engine/model/ldm_config.h"
 
 #include <algorithm>
 #include <charconv>

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/network/vae.h"
 
-#include "engine/network/frame_resnet.h"
+#include "engine/network/network_blocks.h"
 
 #include <cmath>
 

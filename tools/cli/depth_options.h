@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/format/depth_image.h"
+#include "tools/dataset/depth_image.h"
 
 namespace CLI {
 class App;

@@ -3,10 +3,10 @@
 #include "tools/cli/lens_options.h"
 
 #include "engine/camera/rig.h"
-#include "engine/format/camera_path.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/choice.h"
 #include "tools/cli/number_option.h"
+#include "tools/trajectory/camera_path.h"
 
 #include <algorithm>
 #include <array>

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/format/camera_path.h"
+#include "tools/trajectory/camera_path.h"
 
 #include <span>
 

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/camera/path_placement.h"
+#include "tools/trajectory/path_placement.h"
 
 #include <nlohmann/json_fwd.hpp>
 #include <span>

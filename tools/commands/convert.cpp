@@ -1,7 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover convert IN OUT: a model in another layout; or a scene, a trajectory or boxes in another format, as IN says
-#include "engine/format/camera_path.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/choice.h"
 #include "tools/cli/number_option.h"
@@ -10,6 +9,7 @@
 #include "tools/commands/convert_objects.h"
 #include "tools/commands/convert_path.h"
 #include "tools/commands/convert_scene.h"
+#include "tools/trajectory/camera_path.h"
 
 #include <array>
 #include <CLI/CLI.hpp>

@@ -2,13 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/commands/convert_path.h"
 
-#include "engine/format/camera_path.h"
 #include "engine/format/labelled_points.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/choice.h"
 #include "tools/cli/warnings.h"
 #include "tools/commands/scene_input.h"
+#include "tools/trajectory/camera_path.h"
 
 #include <algorithm>
 #include <CLI/CLI.hpp>

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/commands/drive_options.h"
 
-#include "engine/format/camera_path.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/number_option.h"
+#include "tools/trajectory/camera_path.h"
 
 #include <CLI/CLI.hpp>
 

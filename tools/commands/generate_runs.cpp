@@ -2,8 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/commands/generate_runs.h"
 
-#include "engine/format/camera_path.h"
-#include "engine/format/path_format.h"
 #include "engine/job/input_hashes.h"
 #include "engine/job/outputs.h"
 #include "engine/job/version.h"
@@ -12,6 +10,8 @@
 #include "runtime/base/quote.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/option_meaning.h"
+#include "tools/trajectory/camera_path.h"
+#include "tools/trajectory/path_format.h"
 
 #include <chrono>
 

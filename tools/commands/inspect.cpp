@@ -2,9 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // semrover inspect FILE|DIR: what is in a model or a scene. The report is one JSON object; without --json it is printed
 // as indented text.
-#include "engine/format/camera_path.h"
 #include "engine/model/ldm_config.h"
-#include "engine/model/ldm_names.h"
 #include "engine/model/low_rank.h"
 #include "engine/model/renderer_model.h"
 #include "engine/scene/palette.h"
@@ -23,6 +21,7 @@
 #include "tools/commands/convert_path.h"
 #include "tools/commands/inspect_path.h"
 #include "tools/commands/scene_input.h"
+#include "tools/trajectory/camera_path.h"
 
 #include <algorithm>
 #include <CLI/CLI.hpp>

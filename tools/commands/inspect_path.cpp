@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/commands/inspect_path.h"
 
-#include "engine/format/path_format.h"
 #include "engine/job/empty_frames.h"
 #include "runtime/base/quote.h"
+#include "tools/trajectory/path_format.h"
 
 #include <algorithm>
 #include <cmath>

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // semrover page -o index.html --grid GRID: one HTML file that shows a finished run
 #include "tools/page/page.h"
-#include "engine/format/camera_path.h"
 #include "engine/job/outputs.h"
 #include "engine/job/version.h"
 #include "runtime/base/hash.h"
@@ -13,6 +12,7 @@
 #include "tools/cli/path_options.h"
 #include "tools/cli/print_stderr.h"
 #include "tools/cli/progress.h"
+#include "tools/trajectory/camera_path.h"
 
 #include <algorithm>
 #include <CLI/CLI.hpp>

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/dataset/object_boxes.h"
 
-#include "engine/format/camera_text.h"
 #include "runtime/base/quote.h"
 #include "runtime/base/text_start.h"
+#include "tools/trajectory/camera_text.h"
 
 namespace semrover {
 

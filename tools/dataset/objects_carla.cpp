@@ -3,10 +3,10 @@
 // Boxes of CARLA, which has no file for them: the layout is ours (docs/formats.md §3.1), its contents are those of
 // carla.BoundingBox, carla.Transform and carla.Actor. Source: the Python API's reference and the catalogue of vehicles,
 // https://carla.readthedocs.io
-#include "engine/format/json_boxes.h"
 #include "runtime/base/json_fields.h"
 #include "runtime/base/quote.h"
 #include "tools/dataset/object_boxes.h"
+#include "tools/trajectory/json_boxes.h"
 
 #include <charconv>
 #include <cmath>

@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // KITTI's labels of objects and of tracks. Source: the readme files of the devkits for objects and for tracking,
 // https://www.cvlibs.net/datasets/kitti
-#include "engine/format/camera_text.h"
 #include "runtime/base/quote.h"
 #include "tools/dataset/object_boxes.h"
 #include "tools/dataset/rigid_file.h"
+#include "tools/trajectory/camera_text.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,11 +1,11 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // nuScenes' tables of annotations. Source: the page of the schema, and Box, of nutonomy/nuscenes-devkit
-#include "engine/format/json_boxes.h"
-#include "engine/format/nuscenes_table.h"
 #include "runtime/base/json_numbers.h"
 #include "runtime/base/quote.h"
 #include "tools/dataset/object_boxes.h"
+#include "tools/trajectory/json_boxes.h"
+#include "tools/trajectory/nuscenes_table.h"
 
 #include <algorithm>
 #include <set>

@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Waymo's labels of the lidar: a frame or a list of labels in protocol buffers' JSON, or the table of lidar boxes as
 // text. Source: label.proto, dataset.proto and v2/perception/box.py of waymo-research/waymo-open-dataset
-#include "engine/format/camera_text.h"
-#include "engine/format/json_boxes.h"
 #include "runtime/base/quote.h"
 #include "tools/dataset/object_boxes.h"
+#include "tools/trajectory/camera_text.h"
+#include "tools/trajectory/json_boxes.h"
 
 #include <charconv>
 #include <cmath>

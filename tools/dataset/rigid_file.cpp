@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/dataset/rigid_file.h"
 
-#include "engine/format/camera_text.h"
 #include "engine/format/npy.h"
 #include "runtime/base/json_numbers.h"
 #include "runtime/base/quote.h"
+#include "tools/trajectory/camera_text.h"
 
 #include <algorithm>
 #include <optional>

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "engine/format/image.h"
-#include "engine/format/picture_classes.h"
+#include "tools/dataset/picture_classes.h"
 
 #include <map>
 #include <string>

@@ -1,7 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover eval flicker FRAMES --depth DIR --path P: what changes from frame to frame although nothing moves
-#include "engine/format/camera_path.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/lens_options.h"
@@ -12,6 +11,7 @@
 #include "tools/eval/flicker.h"
 #include "tools/eval/frame_files.h"
 #include "tools/measure/eval.h"
+#include "tools/trajectory/camera_path.h"
 
 #include <CLI/CLI.hpp>
 #include <map>

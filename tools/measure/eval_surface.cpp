@@ -1,7 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover eval surface MESH TRUTH: how far a mesh's vertices lie from the true surface, and how many labels are right
-#include "engine/fusion/fusion_folder.h"
 #include "engine/fusion/surface_error.h"
 #include "engine/mesh/mesh_files.h"
 #include "engine/mesh/transparency.h"
@@ -12,6 +11,7 @@
 #include "tools/cli/open_device.h"
 #include "tools/cli/path_options.h"
 #include "tools/cli/warnings.h"
+#include "tools/fuse/fusion_folder.h"
 #include "tools/measure/eval.h"
 
 #include <CLI/CLI.hpp>

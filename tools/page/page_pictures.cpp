@@ -3,7 +3,6 @@
 #include "tools/page/page_pictures.h"
 
 #include "engine/format/image.h"
-#include "engine/format/image_jpeg.h"
 #include "runtime/base/quote.h"
 
 #include <algorithm>

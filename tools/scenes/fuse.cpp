@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // semrover fuse DIR -o OUT: depth, poses, labels and colours of frames to a mesh, a semantic grid and a voxfield grid
 #include "engine/fusion/fuse.h"
-#include "engine/fusion/fusion_folder.h"
 #include "engine/job/version.h"
 #include "engine/mesh/mesh_files.h"
 #include "engine/mesh/voxelizer.h"
@@ -20,6 +19,7 @@
 #include "tools/cli/print_stderr.h"
 #include "tools/cli/progress.h"
 #include "tools/cli/warnings.h"
+#include "tools/fuse/fusion_folder.h"
 
 #include <algorithm>
 #include <CLI/CLI.hpp>

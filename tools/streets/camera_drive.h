@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/format/camera_path.h"
 #include "tools/streets/road_network.h"
+#include "tools/trajectory/camera_path.h"
 
 namespace semrover {
 

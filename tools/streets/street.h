@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/format/camera_path.h"
 #include "engine/mesh/mesh.h"
 #include "engine/scene/grid.h"
 #include "engine/scene/scene_objects.h"
 #include "tools/streets/road_network.h"
+#include "tools/trajectory/camera_path.h"
 
 #include <map>
 #include <string>

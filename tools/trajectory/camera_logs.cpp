@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // poses in the JSON of data sets of drives: PandaSet's poses.json, nuScenes' ego_pose.json
-#include "engine/format/camera_path.h"
-#include "engine/format/json_boxes.h"
-#include "engine/format/nuscenes_table.h"
 #include "runtime/base/quote.h"
+#include "tools/trajectory/camera_path.h"
+#include "tools/trajectory/json_boxes.h"
+#include "tools/trajectory/nuscenes_table.h"
 
 #include <algorithm>
 #include <set>

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/format/camera_path.h"
-#include "engine/format/camera_text.h"
 #include "runtime/base/quote.h"
+#include "tools/trajectory/camera_path.h"
+#include "tools/trajectory/camera_text.h"
 
 #include <algorithm>
 #include <cctype>

@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/camera/image_size.h"
-#include "engine/format/camera_path.h"
-#include "engine/format/camera_text.h"
 #include "runtime/base/json_numbers.h"
 #include "runtime/base/quote.h"
+#include "tools/trajectory/camera_path.h"
+#include "tools/trajectory/camera_text.h"
 
 #include <algorithm>
 #include <cmath>

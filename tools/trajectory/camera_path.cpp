@@ -1,12 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/format/camera_path.h"
+#include "tools/trajectory/camera_path.h"
 
-#include "engine/format/camera_text.h"
 #include "runtime/base/quote.h"
-
-#include <cmath>
-#include <numbers>
+#include "tools/trajectory/camera_text.h"
 
 namespace semrover {
 
@@ -76,13 +73,6 @@ Result<ReadPath> read_found(const FoundPath& found, const PathLens& lens)
 }
 
 } // namespace
-
-std::string default_view_text(std::string_view name, const Intrinsics& k)
-{
-    const double degrees = 2 * std::atan(k.width / 2.0 / k.fx) * 180 / std::numbers::pi;
-    return fmt::format("{}: has no intrinsics; the default field of view of {:g} degrees is taken (`fov_x`)", name,
-                       std::round(degrees * 100) / 100);
-}
 
 std::string body_text(std::string_view name, const PathBody& body)
 {

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/fusion/frame_pictures.h"
+#include "tools/fuse/frame_pictures.h"
 
 #include <span>
 

@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/camera/path_placement.h"
-#include "engine/format/depth_image.h"
-#include "engine/format/picture_classes.h"
 #include "engine/fusion/depth_frames.h"
-#include "engine/fusion/frame_pictures.h"
+#include "tools/dataset/depth_image.h"
+#include "tools/dataset/picture_classes.h"
+#include "tools/fuse/frame_pictures.h"
+#include "tools/trajectory/path_placement.h"
 
 namespace semrover {
 

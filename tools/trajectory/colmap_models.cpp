@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/format/colmap_models.h"
+#include "tools/trajectory/colmap_models.h"
 
 #include "runtime/base/json_numbers.h"
 #include "runtime/base/quote.h"

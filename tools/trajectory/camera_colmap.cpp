@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/format/camera_path.h"
-#include "engine/format/camera_text.h"
-#include "engine/format/colmap_models.h"
-#include "engine/format/natural_order.h"
 #include "runtime/base/quote.h"
+#include "tools/trajectory/camera_path.h"
+#include "tools/trajectory/camera_text.h"
+#include "tools/trajectory/colmap_models.h"
+#include "tools/trajectory/natural_order.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/format/camera_path.h"
 #include "runtime/base/json_numbers.h"
 #include "runtime/base/quote.h"
+#include "tools/trajectory/camera_path.h"
 
 #include <algorithm>
 #include <numbers>

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/camera/path_placement.h"
+#include "tools/trajectory/path_placement.h"
 
 namespace semrover {
 

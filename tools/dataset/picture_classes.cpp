@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/format/picture_classes.h"
+#include "tools/dataset/picture_classes.h"
 
 namespace semrover {
 

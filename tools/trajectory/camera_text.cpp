@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/format/camera_text.h"
+#include "tools/trajectory/camera_text.h"
 
 #include "runtime/base/quote.h"
 

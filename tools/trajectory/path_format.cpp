@@ -1,12 +1,12 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/format/path_format.h"
+#include "tools/trajectory/path_format.h"
 
-#include "engine/format/camera_text.h"
-#include "engine/format/pose_files.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
 #include "runtime/base/text_start.h"
+#include "tools/trajectory/camera_text.h"
+#include "tools/trajectory/pose_files.h"
 
 #include <algorithm>
 

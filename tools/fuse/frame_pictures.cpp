@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/fusion/frame_pictures.h"
+#include "tools/fuse/frame_pictures.h"
 
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"

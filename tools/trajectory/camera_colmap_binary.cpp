@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // COLMAP's binary models, which it writes by default. Little endian, without padding.
 // Source: https://colmap.github.io/format.html, and src/colmap/scene/reconstruction_io_binary.cc of its sources
-#include "engine/format/colmap_models.h"
+#include "tools/trajectory/colmap_models.h"
 
 #include "runtime/base/quote.h"
 

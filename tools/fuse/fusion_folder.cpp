@@ -1,14 +1,14 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/fusion/fusion_folder.h"
+#include "tools/fuse/fusion_folder.h"
 
-#include "engine/format/camera_path.h"
 #include "engine/format/npy_image.h"
 #include "engine/fusion/resampling.h"
-#include "engine/fusion/timed_pictures.h"
 #include "engine/mesh/mesh.h"
 #include "runtime/base/json_numbers.h"
 #include "runtime/base/quote.h"
+#include "tools/fuse/timed_pictures.h"
+#include "tools/trajectory/camera_path.h"
 
 #include <algorithm>
 #include <limits>

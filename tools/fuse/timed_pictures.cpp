@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/fusion/timed_pictures.h"
+#include "tools/fuse/timed_pictures.h"
 
-#include "engine/format/camera_text.h"
 #include "runtime/base/quote.h"
+#include "tools/trajectory/camera_text.h"
 
 #include <algorithm>
 #include <cmath>

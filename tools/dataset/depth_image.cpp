@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/format/depth_image.h"
+#include "tools/dataset/depth_image.h"
 
 #include "engine/format/npy_image.h"
 #include "runtime/base/quote.h"

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // trajectories of matrices: KITTI-360's, a 4x4 matrix a line or in four lines, Redwood's
-#include "engine/format/camera_path.h"
-#include "engine/format/camera_text.h"
 #include "runtime/base/quote.h"
+#include "tools/trajectory/camera_path.h"
+#include "tools/trajectory/camera_text.h"
 
 #include <cmath>
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/camera/rig.h"
-#include "engine/format/camera_path.h"
+#include "engine/format/transforms.h"
+
 #include "engine/format/image.h"
 #include "runtime/base/json_numbers.h"
 #include "runtime/base/quote.h"
@@ -406,6 +406,13 @@ void put_pose(nlohmann::ordered_json& entry, const CameraFrame& frame)
 }
 
 } // namespace
+
+std::string default_view_text(std::string_view name, const Intrinsics& k)
+{
+    const double degrees = 2 * std::atan(k.width / 2.0 / k.fx) * 180 / std::numbers::pi;
+    return fmt::format("{}: has no intrinsics; the default field of view of {:g} degrees is taken (`fov_x`)", name,
+                       std::round(degrees * 100) / 100);
+}
 
 Result<CameraPath> read_transforms(const Path& path, const std::optional<PathLens>& lens)
 {
