@@ -1,15 +1,15 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/scene/cell_reach.h"
-#include "engine/scene/edit_script.h"
-#include "engine/scene/edit_undo.h"
-#include "engine/scene/stamp.h"
 #include "runtime/base/dtype.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/safetensors.h"
 #include "tests/json_text.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
+#include "tools/editing/edit_script.h"
+#include "tools/editing/edit_undo.h"
+#include "tools/editing/stamp.h"
 
 #include <algorithm>
 #include <cmath>

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/cli/class_option.h"
 
-#include "engine/scene/cell_selection.h"
+#include "tools/editing/cell_selection.h"
 
 namespace semrover {
 

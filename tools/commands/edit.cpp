@@ -2,12 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // semrover edit GRID -o OUT [-m MODEL] OPERATION...: changes labels or occupancy and regenerates only that and a halo
 #include "engine/job/outputs.h"
-#include "engine/scene/edit_script.h"
-#include "engine/scene/edit_undo.h"
 #include "engine/scene/scene_objects.h"
 #include "tools/cli/number_option.h"
 #include "tools/cli/run_job.h"
 #include "tools/commands/regeneration.h"
+#include "tools/editing/edit_script.h"
+#include "tools/editing/edit_undo.h"
 
 #include <CLI/CLI.hpp>
 

@@ -4,12 +4,12 @@
 
 #include "engine/job/outputs.h"
 #include "engine/job/version.h"
-#include "engine/scene/edit_undo.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/run_job.h"
+#include "tools/editing/edit_undo.h"
 
 #include <algorithm>
 #include <CLI/CLI.hpp>

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/job/editing.h"
 #include "tools/commands/generation_options.h"
+#include "tools/editing/editing.h"
 
 namespace semrover {
 

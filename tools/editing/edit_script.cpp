@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/scene/edit_script.h"
+#include "tools/editing/edit_script.h"
 
 #include "engine/scene/palette.h"
 #include "engine/scene/scene_objects.h"

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/scene/grid_editor.h"
 #include "runtime/base/json.h"
+#include "tools/editing/grid_editor.h"
 
 namespace semrover {
 

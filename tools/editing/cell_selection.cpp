@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/scene/cell_selection.h"
+#include "tools/editing/cell_selection.h"
 
 #include "engine/scene/cell_reach.h"
 #include "engine/scene/palette.h"

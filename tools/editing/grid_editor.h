@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/scene/cell_selection.h"
+#include "tools/editing/cell_selection.h"
 
 #include <map>
 

@@ -1,11 +1,11 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/scene/grid_editor.h"
+#include "tools/editing/grid_editor.h"
 
 #include "engine/scene/cell_reach.h"
 #include "engine/scene/palette.h"
-#include "engine/scene/stamp.h"
 #include "runtime/base/quote.h"
+#include "tools/editing/stamp.h"
 
 #include <algorithm>
 #include <array>

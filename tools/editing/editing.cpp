@@ -1,14 +1,14 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/job/editing.h"
+#include "tools/editing/editing.h"
 
 #include "engine/job/version.h"
 #include "engine/scene/cell_objects.h"
 #include "engine/scene/cell_reach.h"
-#include "engine/scene/edit_script.h"
-#include "engine/scene/stamp.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/quote.h"
+#include "tools/editing/edit_script.h"
+#include "tools/editing/stamp.h"
 
 #include <algorithm>
 

@@ -3,8 +3,8 @@
 #pragma once
 
 #include "engine/job/told_objects.h"
-#include "engine/scene/grid_editor.h"
 #include "runtime/base/json.h"
+#include "tools/editing/grid_editor.h"
 
 namespace semrover {
 
