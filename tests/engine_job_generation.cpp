@@ -305,7 +305,7 @@ TEST(engine_job_generation, warns_where_a_distilled_model_is_sampled_in_another_
     EXPECT_TRUE(warnings([](GenerationOptions& o) { o.steps = 4, o.guidance_scale = 1.f; }).empty());
     const auto scale = warnings([](GenerationOptions& o) { o.guidance_scale = 2.f; });
     ASSERT_EQ(scale.size(), 1u);
-    EXPECT_NE(scale[0].find("guided already, and --cfg-scale 2 guides it twice"), std::string::npos) << scale[0];
+    EXPECT_NE(scale[0].find("guided already, and `cfg_scale` 2 guides it twice"), std::string::npos) << scale[0];
     const auto steps = warnings([](GenerationOptions& o) { o.steps = 5; });
     ASSERT_EQ(steps.size(), 1u);
     EXPECT_EQ(steps[0], "the model was distilled for 4 steps of ddpm, not 5 of ddpm");

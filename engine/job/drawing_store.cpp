@@ -73,7 +73,7 @@ Status DrawingStore::check(const Path& folder, const CameraPath& path, bool repl
     names.insert(names.end(), {kTop, kPoints, kCameras});
     for (const std::string& name : names)
         if (fs::exists(folder / name))
-            return fail(ErrorCode::usage, "{} exists; -y replaces what is there", quote_path(folder / name));
+            return fail(ErrorCode::usage, "{} exists; `replace` replaces what is there", quote_path(folder / name));
     return {};
 }
 

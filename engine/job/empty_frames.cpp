@@ -50,13 +50,12 @@ Status EmptyFrames::report(const JobCallbacks& callbacks) const
         return {};
     if (callbacks.warning)
         callbacks.warning(fmt::format(
-            "{} of {} frames see nothing of {}: it lies in {}, the cameras in {}; --relative-to, --calib, --world and "
-            "--origin bring a path into the grid's world (docs/scenes.md §3.1), and `semrover inspect PATH GRID` says "
-            "whether they meet",
+            "{} of {} frames see nothing of {}: it lies in {}, the cameras in {}; `relative_to`, `lidar_to_camera`, "
+            "`world` and `origin` bring a trajectory into the grid's world (docs/scenes.md §3.1)",
             empty_, frames_, quote_path(scene_name_), extent_text(scene_), extent_text(path_)));
     if (all() && !allowed_)
         return fail(ErrorCode::bad_input,
-                    "no frame of {} sees anything of {}, in {}: the cameras are in {}; --allow-empty draws such frames "
+                    "no frame of {} sees anything of {}, in {}: the cameras are in {}; `allow_empty` draws such frames "
                     "without an error",
                     frames_, quote_path(scene_name_), extent_text(scene_), extent_text(path_));
     return {};

@@ -17,7 +17,7 @@ namespace {
 Status set_tiles(RegionOptions& regions, const TransformerConfig& config, double tile_size)
 {
     if (regions.first_cell != 0)
-        return fail(ErrorCode::usage, "--first-cell has no meaning with --order tiles");
+        return fail(ErrorCode::usage, "`first_cell` has no meaning in the order of tiles");
     SR_TRY(regions.tile_cells, tile_cells_of(tile_size, config.voxel_size));
     regions.halo_cells = int32_t(std::sqrt(double(config.radius2())));
     return {};
@@ -31,7 +31,7 @@ void warn_of_distilled(GenerationSettings& s)
         return;
     if (s.guidance.scale != 1.f)
         s.model.warnings.push_back(
-            fmt::format("the model is distilled: its one pass is guided already, and --cfg-scale {} guides it twice",
+            fmt::format("the model is distilled: its one pass is guided already, and `cfg_scale` {} guides it twice",
                         s.guidance.scale));
     if (s.steps != steps || s.model.scheduler.sampler != Sampler::ddpm)
         s.model.warnings.push_back(fmt::format("the model was distilled for {} steps of ddpm, not {} of {}", steps,

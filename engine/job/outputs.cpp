@@ -9,7 +9,7 @@ namespace semrover {
 Status check_writable(const Path& path, bool replace)
 {
     if (std::filesystem::exists(path) && !replace)
-        return fail(ErrorCode::usage, "{} exists; -y replaces it", quote_path(path));
+        return fail(ErrorCode::usage, "{} exists; `replace` replaces it", quote_path(path));
     return AtomicFile::create(path).map([](const AtomicFile&) {});
 }
 

@@ -37,7 +37,7 @@ Result<SurfelScene> splats_of(Device& device, const VoxelGrid& grid, const Path&
 {
     ScenePoints points = points_of(grid);
     if (points.size() == 0 && !o.semantic)
-        return fail(ErrorCode::bad_input, "{} has no points yet: generate them, or draw its labels with --semantic",
+        return fail(ErrorCode::bad_input, "{} has no points yet: generate them, or draw its labels with `semantic`",
                     quote_path(name));
     if (points.size() == 0)
         return SurfelScene::create(device, block_surfels(grid));

@@ -367,7 +367,7 @@ class FinishedRefinement : public Job {
                 for (const PieceKind kind : {PieceKind::latent, PieceKind::frame})
                     if (!store_.has(kind, c.buffers, f))
                         return fail(ErrorCode::usage,
-                                    "{} exists, a finished run of which {} is not as it was; -y replaces it",
+                                    "{} exists, a finished run of which {} is not as it was; `replace` replaces it",
                                     quote_path(r_.options.output), store_.name(kind, c.buffers, f));
         return {};
     }

@@ -94,7 +94,7 @@ Status find_cameras(Refinement& r, const JobCallbacks& callbacks)
         take_path_beside(r.options, cameras, callbacks);
     for (const BufferCamera& camera : cameras) {
         if (o.size && !path_given && camera.size != *o.size)
-            return fail(ErrorCode::bad_input, "the pictures in {} are {} x {} pixels, -W and -H say {} x {}",
+            return fail(ErrorCode::bad_input, "the pictures in {} are {} x {} pixels, `width` and `height` say {} x {}",
                         quote_path(camera.folder), camera.size.width, camera.size.height, o.size->width,
                         o.size->height);
         RefinedCamera& c = r.cameras.emplace_back();
@@ -296,7 +296,7 @@ Status Refinement::check_outputs(std::span<const Path> beside) const
         files.push_back(out / "buffers");
     for (const Path& file : files)
         if (fs::exists(file))
-            return fail(ErrorCode::usage, "{} exists; -y replaces it", quote_path(file));
+            return fail(ErrorCode::usage, "{} exists; `replace` replaces it", quote_path(file));
     return {};
 }
 

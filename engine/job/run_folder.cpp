@@ -53,7 +53,7 @@ Result<Json> read_summary(const Path& path)
     if (!summary.is_object() || !summary.value("settings", Json()).is_object() ||
         !summary.value("state", Json()).is_string())
         return fail(ErrorCode::bad_input,
-                    "{}: expected an object with the settings and the state of a run; start over with -y",
+                    "{}: expected an object with the settings and the state of a run; start over with `replace`",
                     quote_path(path));
     return summary;
 }
@@ -61,11 +61,12 @@ Result<Json> read_summary(const Path& path)
 tl::unexpected<Error> other_settings(const Path& folder, bool finished)
 {
     if (finished)
-        return fail(ErrorCode::usage, "{} exists, a run with other settings, model, input or device; -y replaces it",
+        return fail(ErrorCode::usage,
+                    "{} exists, a run with other settings, model, input or device; `replace` replaces it",
                     quote_path(folder));
     return fail(ErrorCode::bad_input,
                 "{} holds a run with other settings, model, input or device; finish that one, name another output, or "
-                "start over with -y",
+                "start over with `replace`",
                 quote_path(folder));
 }
 

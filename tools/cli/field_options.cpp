@@ -23,6 +23,8 @@ constexpr FieldOption kFieldOptions[] = {
     {"height", "-H"},
     {"lidar_to_camera", "--calib"},
     {"max_bytes", "--max-vram"},
+    {"output", "-o"},
+    {"replace", "-y"},
     {"voxel", "--tsdf-voxel"},
     {"vsd_init", "semrover convert IN OUT --vsd-init"},
     {"width", "-W"},

@@ -82,7 +82,7 @@ Status keep_masked(std::vector<uint32_t>& cells, const VoxelGrid& grid, const Pa
 Status check_edit(const EditRequest& r)
 {
     if (!(r.halo >= 0 && r.halo <= kWidestHalo))
-        return fail(ErrorCode::usage, "--halo: expected 0 to {} m, found {}", kWidestHalo, r.halo);
+        return fail(ErrorCode::usage, "`halo`: expected 0 to {} m, found {}", kWidestHalo, r.halo);
     for (const EditOperation& operation : r.operations)
         SR_CHECK(check_operation(operation, fmt::format("--{}", operation_name(operation.kind))));
     return {};
@@ -106,7 +106,7 @@ Result<Regeneration> edit_grid(const EditRequest& r)
     what.targets = targets_of(edited, r.generates ? r.halo : 0);
     what.objects = r.objects;
     if (!edited.tints.empty() && !what.objects)
-        return fail(ErrorCode::bad_input, "tint: {} is missing; --objects FILE says which objects there are",
+        return fail(ErrorCode::bad_input, "tint: {} is missing; `objects` says which objects there are",
                     quote_path(objects_beside(r.grid)));
     what.needs_objects = !edited.tints.empty();
     if (what.needs_objects)
