@@ -172,7 +172,7 @@ TEST(CliConvert, a_single_file_of_stable_video_diffusion_becomes_a_renderer_of_v
     EXPECT_EQ(index["renderer"][1], "UNetSpatioTemporalConditionModel");
     EXPECT_EQ(index["vae"][1], "AutoencoderKLTemporalDecoder");
     EXPECT_EQ(index["scheduler"][1], "EulerDiscreteScheduler");
-    EXPECT_TRUE(says(RendererModel::open(folder / "plain"), "--vsd-init' makes it so"));
+    EXPECT_TRUE(says(RendererModel::open(folder / "plain"), "`vsd_init` makes it so"));
     expect_error(convert(folder / "plain", folder / "no", "--asd-init"), 3, "--asd-init wants a UNet of single images");
 }
 
