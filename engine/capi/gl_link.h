@@ -43,7 +43,7 @@ class GlLink {
     Status make_room(GlRoom& room, uint64_t bytes, bool named, const char* name);
     void drop(GlRoom& room);
 
-    // Copies what lies on the device into rooms; what GL is told afterwards sees it. Where memory is shared, commands
+    // Copies what lies on the device into rooms; what GL does afterwards sees it. Where memory is shared, commands
     // that begin() gave may draw before.
     struct Piece {
         BufferSlice from;

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/drawing_store.h"
 
+#include "engine/format/buffer_folder.h"
 #include "engine/format/image.h"
 #include "engine/format/transforms.h"
 #include "engine/job/outputs.h"

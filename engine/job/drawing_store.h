@@ -3,6 +3,7 @@
 #pragma once
 
 #include "engine/camera/camera.h"
+#include "engine/camera/image_size.h"
 #include "engine/deferred/frame_images.h"
 #include "engine/job/piece_record.h"
 

@@ -57,7 +57,7 @@ Status World::open_scene()
     scene_.emplace();
     SR_TRY(scene_->grid, labels_->take());
     SR_TRY(const std::vector<SceneObject> objects,
-           told_objects(s.model, request_.objects, scene_->grid, request_.seed));
+           conditioning_objects(s.model, request_.objects, scene_->grid, request_.seed));
     RegionOptions regions = s.regions;
     if (!request_.targets.empty()) {
         SR_TRY(scene_->part, cut_sub_grid(scene_->grid, request_.targets, cells_considered(regions)));

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/job/conditioning_objects.h"
 #include "engine/job/grid_filling.h"
-#include "engine/job/told_objects.h"
 #include "engine/job/world_order.h"
 #include "engine/job/world_tiles.h"
 #include "engine/splat/splat_pool.h"

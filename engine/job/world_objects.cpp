@@ -12,7 +12,7 @@ Result<WorldObjects> WorldObjects::create(const VoxfieldModel& model, const Give
 {
     WorldObjects objects(model, seed);
     if (given || model.config.condition.empty()) {
-        SR_TRY(objects.given_, told_objects(model, given ? given : GivenObjects(std::in_place), {}, seed));
+        SR_TRY(objects.given_, conditioning_objects(model, given ? given : GivenObjects(std::in_place), {}, seed));
     }
     return objects;
 }

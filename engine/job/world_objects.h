@@ -2,16 +2,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/job/told_objects.h"
+#include "engine/job/conditioning_objects.h"
 #include "engine/job/world_labels.h"
 
 namespace semrover {
 
-// The objects that a world's model is told of: those that were given or, block by block as generation comes near,
+// The objects that condition a world's model: those that were given or, block by block as generation comes near,
 // guessed of the labels as the source has them. Edits change no object.
 class WorldObjects {
   public:
-    // model: outlives this. Errors: bad_input for objects that it cannot be told of
+    // model: outlives this. Errors: bad_input for objects that it cannot be conditioned on
     static Result<WorldObjects> create(const VoxfieldModel& model, const GivenObjects& given, uint64_t seed);
 
     static WorldObjects none(const VoxfieldModel& model) { return {model, 0}; } // of a world without a model

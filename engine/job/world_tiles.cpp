@@ -106,7 +106,7 @@ void WorldTiles::drop(const TileIndex& tile)
     tiles_.erase(there);
 }
 
-// of the tile's cells and of what the model is told of them, of the tiles that it sees, and of the points around it
+// of the tile's cells and of the model's conditioning on them, of the tiles that it sees, and of the points around it
 // that the source has
 Result<uint64_t> WorldTiles::key_of(const TileIndex& index)
 {
@@ -122,10 +122,10 @@ Result<uint64_t> WorldTiles::key_of(const TileIndex& index)
     add(tile->cells.cells);
     add(tile->cells.labels);
     SR_TRY(const std::vector<SceneObject> objects, objects_near({&index, 1}));
-    SR_TRY(const CellConditions told, CellConditions::create(settings_.model.config, tile->cells, objects));
-    std::vector<float> row(told.width());
-    for (uint32_t c = 0; c < tile->cells.cells.size() && !told.empty(); ++c) {
-        told.row(c, tile->cells.cells[c], row);
+    SR_TRY(const CellConditions conditions, CellConditions::create(settings_.model.config, tile->cells, objects));
+    std::vector<float> row(conditions.width());
+    for (uint32_t c = 0; c < tile->cells.cells.size() && !conditions.empty(); ++c) {
+        conditions.row(c, tile->cells.cells[c], row);
         add(row);
     }
     for (const TileIndex& seen : tiles_seen_by(index)) {

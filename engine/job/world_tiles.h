@@ -16,7 +16,7 @@ struct WorldTile {
     VoxelGrid cells; // labels with the edits, and room for points from the time when they are generated on
     std::vector<uint8_t> known = {};  // cells that have points in the source; empty: none
     bool finished = false;            // all cells have points
-    bool fresh = false;               // finished by the source, and nobody was told
+    bool fresh = false;               // finished by the source, and not announced
     bool stored = false;              // the store has it
     std::optional<uint64_t> key = {}; // of all that decides its points; where it is known
     uint64_t bytes = 0;               // on the host
@@ -45,7 +45,7 @@ class WorldTiles {
     Result<bool> load(const TileIndex& tile);
     // The cells of tiles of one colour as targets, with what they know around them. What tiles see must be finished.
     Result<VoxelGrid> cut(std::span<const TileIndex> tiles);
-    // what the model is told of them
+    // the model's conditioning on them
     Result<std::vector<SceneObject>> objects_near(std::span<const TileIndex> tiles);
     // Takes the points of the targets of a grid that cut() gave, then hands them to the store. After an error, which is
     // the store's, they are finished nevertheless

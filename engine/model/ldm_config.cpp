@@ -127,7 +127,7 @@ void read_down_blocks(Shapes& s, UnetConfig& c)
     }
 }
 
-// what shapes do not tell is as in Stable Video Diffusion: three numbers come with a video
+// what shapes do not show is as in Stable Video Diffusion: three numbers come with a video
 void read_video(Shapes& s, UnetConfig& c)
 {
     c.added_numbers = 3;
@@ -223,7 +223,7 @@ Result<VaeConfig> ldm_vae_config(const SafetensorsSet& set)
     std::vector<std::string> warnings;
     if (!c.video)
         c.norm_num_groups = common_groups(c.block_out_channels, warnings);
-    const bool quant_conv = c.use_quant_conv; // which a config of videos does not tell
+    const bool quant_conv = c.use_quant_conv; // which a config of videos does not say
     SR_TRY(c, parse_any_vae_config(vae_config_json(c)));
     c.use_quant_conv = quant_conv;
     c.warnings = std::move(warnings);

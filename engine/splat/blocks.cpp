@@ -11,7 +11,7 @@ namespace {
 constexpr int kPerSide = 5;      // surfels along an edge of a face
 constexpr float kOverlap = 0.7f; // sigma over spacing: alpha stays above 0.98 between four surfels
 
-// faces of different directions get different shades, so that blocks can be told apart
+// faces of different directions get different shades, so that blocks stay apart
 float shade(int axis, int side)
 {
     return axis == 2 ? (side > 0 ? 1.f : 0.6f) : axis == 0 ? 0.8f : 0.9f;

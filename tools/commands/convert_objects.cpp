@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/commands/convert_objects.h"
 
-#include "engine/job/told_objects.h"
+#include "engine/job/conditioning_objects.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/number_option.h"
@@ -55,7 +55,7 @@ Status guess_objects_of(const ObjectsInput& input, const SceneInputOptions& scen
         return fail(ErrorCode::usage, "-m/--model is missing: it says how large objects usually are, and which colour");
     SR_TRY(const VoxfieldModel model, VoxfieldModel::open(model_folder));
     SR_TRY(const VoxelGrid grid, load_grid(input.in, scene, globals));
-    SR_TRY(const std::vector<SceneObject> objects, told_objects(model, {}, grid, scene.seed));
+    SR_TRY(const std::vector<SceneObject> objects, conditioning_objects(model, {}, grid, scene.seed));
     if (objects.empty())
         return fail(ErrorCode::bad_input, "{}: nothing that the model knows the usual size of is in {}",
                     quote(model_folder), quote_path(input.in));

@@ -98,7 +98,7 @@ Status GridRun::read()
 Status GridRun::look()
 {
     const bool by_blocks = generation_.regions.tile_cells > 0;
-    SR_TRY(objects_, told_objects(generation_.model, objects_, grid_, o_.seed, by_blocks));
+    SR_TRY(objects_, conditioning_objects(generation_.model, objects_, grid_, o_.seed, by_blocks));
     SR_TRY(settings_, settings_json(generation_, *device_, "generate", grid_hash_));
     settings_["seed"] = o_.seed;
     if (!objects_->empty())

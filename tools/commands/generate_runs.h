@@ -52,7 +52,7 @@ class GridRun {
     JobDisplay display_;
     std::unique_ptr<Device> device_;
     GenerationSettings generation_;
-    GivenObjects objects_; // that the model is told of, from look() on
+    GivenObjects objects_; // that condition the model, from look() on
     VoxelGrid grid_;       // its metadata alone once the world is there
     uint64_t grid_hash_ = 0;
     Json settings_;

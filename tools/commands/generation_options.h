@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/job/told_objects.h"
+#include "engine/job/conditioning_objects.h"
 #include "engine/job/world.h"
 #include "tools/cli/commands.h"
 

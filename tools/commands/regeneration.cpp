@@ -108,7 +108,7 @@ class SeedRun {
     Device& device_;
     std::shared_ptr<const Transformer> transformer_;
     uint64_t seed_;
-    std::vector<SceneObject> objects_; // that the model is told of
+    std::vector<SceneObject> objects_; // that condition the model
     Json settings_;
     std::optional<RunFolder> run_;
     std::unique_ptr<World> world_;
@@ -128,12 +128,12 @@ Status SeedRun::look()
 Status SeedRun::open(const JobCallbacks& callbacks)
 {
     objects_ = what_.objects.value_or(std::vector<SceneObject>());
-    const bool told = what_.needs_objects || !generation_.model.config.condition.empty();
-    if (told) {
-        SR_TRY(objects_, told_objects(generation_.model, what_.objects, what_.grid, seed_));
+    const bool conditioned = what_.needs_objects || !generation_.model.config.condition.empty();
+    if (conditioned) {
+        SR_TRY(objects_, conditioning_objects(generation_.model, what_.objects, what_.grid, seed_));
     }
     WorldRequest request{.settings = generation_, .transformer = transformer_, .seed = seed_};
-    request.objects = told ? objects_ : std::vector<SceneObject>();
+    request.objects = conditioned ? objects_ : std::vector<SceneObject>();
     request.targets = what_.targets;
     SR_TRY(world_, open_world(device_, std::move(request), labels_of_grid(what_.grid), callbacks));
     return {};
@@ -218,7 +218,7 @@ void add_regeneration_options(CLI::App& c, RegenerationArguments& o)
     c.add_option("-o,--output", o.output, "what to write; OUTPUT.undo beside it takes it back");
     c.add_option(
         "--objects", o.objects,
-        "boxes and colours that the model is told of: objects.json, auto (guessed from the labels and the seed) "
+        "boxes and colours that condition the model: objects.json, auto (guessed from the labels and the seed) "
         "or none; by default the file beside GRID, or else auto");
     add_seed(c, "-s,--seed", o.seed, "noise seed");
     add_seeds(c, "--seeds", o.seeds, "several seeds, such as 1,2,3: writes OUTPUT-seedN.sgrid for each");

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/job/told_objects.h"
+#include "engine/job/conditioning_objects.h"
 #include "runtime/base/json.h"
 #include "tools/editing/grid_editor.h"
 
@@ -15,8 +15,8 @@ struct Regeneration {
     VoxelGrid before;
     VoxelGrid grid;                // what is written, but for the targets
     std::vector<uint32_t> targets; // ascending indices into `grid`
-    GivenObjects objects = {};     // what a model is told; written beside each output (objects_beside)
-    bool needs_objects = false;    // a model that cannot be told of them is an error
+    GivenObjects objects = {};     // what conditions a model; written beside each output (objects_beside)
+    bool needs_objects = false;    // a model that cannot be conditioned on them is an error
     Json request;                  // what was asked for, for the settings of the run
     Json counts;                   // for the report
 };
@@ -26,7 +26,7 @@ struct EditRequest {
     Path grid;
     std::vector<EditOperation> operations;
     double halo = 3;           // metres
-    GivenObjects objects = {}; // of the grid: what a tint is for, and what a model is told
+    GivenObjects objects = {}; // of the grid: what a tint is for, and what conditions a model
     // false: nothing around the change is thrown away, only cells that changed wait for points
     bool generates = true;
 };

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/job/told_objects.h"
+#include "engine/job/conditioning_objects.h"
 
 #include "engine/scene/object_blocks.h"
 #include "runtime/base/hash.h"
@@ -10,20 +10,20 @@
 
 namespace semrover {
 
-Result<std::vector<SceneObject>> told_objects(const VoxfieldModel& model, const GivenObjects& given,
-                                              const VoxelGrid& grid, uint64_t seed, bool by_blocks)
+Result<std::vector<SceneObject>> conditioning_objects(const VoxfieldModel& model, const GivenObjects& given,
+                                                      const VoxelGrid& grid, uint64_t seed, bool by_blocks)
 {
     if (!model.config.condition.empty()) {
-        std::vector<SceneObject> told = given.value_or(std::vector<SceneObject>());
+        std::vector<SceneObject> objects = given.value_or(std::vector<SceneObject>());
         if (!given) {
             const UsualObjects& usual = model.defaults.usual_objects;
-            SR_TRY(told, by_blocks ? guess_blocks(grid, usual, seed) : guess_objects(grid, usual, seed));
+            SR_TRY(objects, by_blocks ? guess_blocks(grid, usual, seed) : guess_objects(grid, usual, seed));
         }
-        std::ranges::transform(told, told.begin(), as_written);
-        return told;
+        std::ranges::transform(objects, objects.begin(), as_written);
+        return objects;
     }
     if (given && !given->empty())
-        return fail(ErrorCode::bad_input, "{}: the model knows labels alone and cannot be told of objects",
+        return fail(ErrorCode::bad_input, "{}: the model knows labels alone and cannot be conditioned on objects",
                     quote_path(model.folder));
     return std::vector<SceneObject>();
 }
