@@ -339,8 +339,9 @@ typedef struct sr_world_desc {
     uint32_t struct_size;
     uint32_t steps; /* of denoising; 0: as the model says */
     const void* next;
-    const sr_model* model; /* of the same context, with a voxfield transformer */
-    const sr_grid* grid;   /* its labels are copied */
+    const sr_model* model; /* of the same context, with a voxfield transformer. NULL: nothing is generated, and the world
+                              shows the points that its grid or folder has */
+    const sr_grid* grid;   /* its labels are copied; without a model its points, too */
     const char* folder;    /* of tiles */
     sr_status (*labels)(void* user, const sr_cell_rect* rect, sr_grid* grid);
     void (*message)(void* user, const char* line); /* warnings, during sr_world_create and steps; NULL: none */

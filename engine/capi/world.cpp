@@ -105,6 +105,11 @@ Result<GivenObjects> objects_of(const sr_world_desc& d)
     return GivenObjects(std::move(objects));
 }
 
+double tile_size_of(const sr_world_desc& d)
+{
+    return d.tile_size == 0 ? kUsualTileSize : d.tile_size;
+}
+
 Result<GenerationSettings> settings_of(const sr_world_desc& d, const Model& model)
 {
     if (d.steps > 1'000'000)
@@ -118,7 +123,7 @@ Result<GenerationSettings> settings_of(const sr_world_desc& d, const Model& mode
     o.precision = model.precision();
     if (d.steps)
         o.steps = int(d.steps);
-    o.tile_size = d.tile_size == 0 ? kUsualTileSize : d.tile_size;
+    o.tile_size = tile_size_of(d);
     if (!(o.tile_size > 0))
         return fail(ErrorCode::usage, "sr_world_desc: a tile_size of {} m", d.tile_size);
     return resolve_generation(o);
@@ -150,6 +155,8 @@ Result<std::unique_ptr<WorldLabels>> labels_of(const sr_world_desc& d, float vox
         return labels_of_folder(d.folder);
     if (d.labels)
         return labels_of_callback(voxel_size, labels_callback(d, voxel_size));
+    if (!d.model)
+        return labels_of_grid(d.grid->read());
     VoxelGrid grid;
     grid.voxel_size = d.grid->read().voxel_size;
     grid.cells = d.grid->read().cells;
@@ -162,12 +169,20 @@ Result<std::unique_ptr<sr_world>> make_world(sr_context& context, const sr_world
     auto world = std::make_unique<sr_world>();
     world->context = &context;
     world->number = ++context.worlds;
-    SR_TRY(world->model, model_of(context, d.model, "sr_world_desc"));
-    if (!world->model->voxfield())
-        return fail(ErrorCode::usage, "sr_world_desc: the model has no voxfield transformer");
-    SR_TRY(world->settings, settings_of(d, *world->model));
-    SR_TRY(auto labels, labels_of(d, world->settings.model.config.voxel_size));
-    WorldRequest request{.settings = world->settings, .transformer = world->model->transformer(), .seed = d.seed};
+    WorldRequest request{.seed = d.seed};
+    if (d.model) {
+        SR_TRY(world->model, model_of(context, d.model, "sr_world_desc"));
+        if (!world->model->voxfield())
+            return fail(ErrorCode::usage, "sr_world_desc: the model has no voxfield transformer");
+        SR_TRY(request.settings, settings_of(d, *world->model));
+        request.transformer = world->model->transformer();
+    } else if (d.labels || d.cache || d.object_count) {
+        return fail(ErrorCode::usage, "sr_world_desc: without a model a world shows the points of a grid or a folder");
+    }
+    SR_TRY(auto labels, labels_of(d, request.settings.model.config.voxel_size));
+    if (!d.model) {
+        SR_TRY(request.settings.regions.tile_cells, tile_cells_of(tile_size_of(d), labels->voxel_size()));
+    }
     SR_TRY(request.objects, objects_of(d));
     request.store = d.cache ? Path(d.cache) : Path();
     request.host_bytes = d.host_bytes;
@@ -210,9 +225,9 @@ sr_world_info info_of(const sr_world& world)
     info.loaded = f.loaded;
     info.dropped = f.dropped;
     info.splats = splats ? splats->surfels() : 0;
-    info.voxel_size = decimal_voxel_size(world.settings.model.config.voxel_size);
+    info.voxel_size = decimal_voxel_size(world.world->voxel_size());
     info.tile_cells = uint32_t(world.world->tile_cells());
-    info.points_per_voxel = world.settings.model.config.points_per_voxel;
+    info.points_per_voxel = uint32_t(world.world->points_per_voxel());
     return info;
 }
 

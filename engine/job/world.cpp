@@ -76,13 +76,12 @@ Status World::open_tiles()
         return warm_up();
     }
     SR_CHECK(check_tile_options(s.regions));
-    const int points = int(s.model.config.points_per_voxel);
     if (std::abs(labels_->voxel_size() - voxel_size()) > 1e-4f * voxel_size())
         return fail(ErrorCode::bad_input, "the labels have cells of {} m, the model was trained on {} m",
                     labels_->voxel_size(), voxel_size());
-    if (labels_->points_per_voxel() && labels_->points_per_voxel() != points)
+    if (labels_->points_per_voxel() && labels_->points_per_voxel() != points_per_voxel())
         return fail(ErrorCode::bad_input, "the labels come with {} points a cell, the model makes {}",
-                    labels_->points_per_voxel(), points);
+                    labels_->points_per_voxel(), points_per_voxel());
     SR_TRY(const Json settings, settings_json(s, filling_.device(), "world", 0));
     Hash base;
     base.add(settings.dump());
@@ -90,7 +89,7 @@ Status World::open_tiles()
     SR_TRY(WorldObjects objects, WorldObjects::create(s.model, request_.objects, request_.seed));
     std::unique_ptr<TileStore> store;
     if (!request_.store.empty()) {
-        const TileFolderInfo info{labels_->voxel_size(), tile_cells(), points, true, request_.metadata};
+        const TileFolderInfo info{labels_->voxel_size(), tile_cells(), points_per_voxel(), true, request_.metadata};
         SR_TRY(store, TileStore::open(request_.store, info, base.value()));
     }
     tiles_ = std::make_unique<WorldTiles>(s, *labels_, std::move(objects), std::move(store), base.value());
@@ -110,8 +109,7 @@ Status World::warm_up()
     for (int32_t i = 0; i < options.region_size; ++i)
         grid.cells.push_back({i / 16, i % 16, 0});
     grid.labels.assign(grid.cells.size(), 0);
-    make_room_for_points(grid, has_model() ? int(request_.settings.model.config.points_per_voxel)
-                                           : std::max(labels_->points_per_voxel(), 1));
+    make_room_for_points(grid, std::max(points_per_voxel(), 1));
     if (has_model()) {
         SR_CHECK(filling_.cut(grid, options));
         SR_CHECK(filling_.load(request_.seed, callbacks_));
@@ -661,8 +659,7 @@ VoxelGrid World::cells(const CellWindow& window) const
 {
     VoxelGrid out;
     out.voxel_size = voxel_size();
-    out.points_per_voxel =
-        has_model() ? int(request_.settings.model.config.points_per_voxel) : labels_->points_per_voxel();
+    out.points_per_voxel = points_per_voxel();
     for (const TileIndex& index : tiles_in(tiles_->all(), window, tile_cells()))
         if (const VoxelGrid* there = tile(index))
             for (size_t c = 0; c < there->cells.size(); ++c)

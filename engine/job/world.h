@@ -89,6 +89,11 @@ class World {
     // the order of the scene: the grid, filled as far as it is done
     const VoxelGrid& scene() const { return scene_->grid; }
     int32_t tile_cells() const { return request_.settings.regions.tile_cells; }
+    float voxel_size() const { return has_model() ? request_.settings.model.config.voxel_size : labels_->voxel_size(); }
+    int points_per_voxel() const
+    {
+        return has_model() ? int(request_.settings.model.config.points_per_voxel) : labels_->points_per_voxel();
+    }
     WorldFigures figures() const;
     // cells, planned_device_bytes, peak_device_bytes, and what the order has beside: tiles, or regions, seconds
     Json results() const;
@@ -116,7 +121,6 @@ class World {
     };
 
     bool has_model() const { return !request_.settings.model.folder.empty(); }
-    float voxel_size() const { return has_model() ? request_.settings.model.config.voxel_size : labels_->voxel_size(); }
     double edge() const;                      // of a tile, metres
     double away(const TileIndex& tile) const; // of the focus; 0 where there is none
     bool finished(const TileIndex& tile) const;

@@ -52,7 +52,7 @@ std::string with_options(std::string_view message)
     std::string text;
     for (size_t begin = 0; begin < message.size();) {
         const size_t open = std::min(message.find('`', begin), message.size());
-        const size_t close = message.find('`', open + 1);
+        const size_t close = open < message.size() ? message.find('`', open + 1) : message.npos;
         text += message.substr(begin, open - begin);
         const std::string_view word = close == message.npos ? "" : message.substr(open + 1, close - open - 1);
         begin = names_field(word) ? close + 1 : open + 1;
