@@ -169,7 +169,8 @@ Result<std::unique_ptr<sr_world>> make_world(sr_context& context, const sr_world
     auto world = std::make_unique<sr_world>();
     world->context = &context;
     world->number = ++context.worlds;
-    WorldRequest request{.seed = d.seed};
+    WorldRequest request;
+    request.seed = d.seed;
     if (d.model) {
         SR_TRY(world->model, model_of(context, d.model, "sr_world_desc"));
         if (!world->model->voxfield())

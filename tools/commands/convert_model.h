@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "runtime/base/file.h"
+
 #include "tools/cli/commands.h"
 
 namespace semrover {
