@@ -76,7 +76,8 @@ std::vector<Picture> by_hand(DType precision)
         const std::vector<float> buffer = *encoder->encode(color), shares = block_shares(kSize, visible);
         previous = *denoiser->render({f, 0, buffer, shares, previous});
         Picture& frame = frames.emplace_back();
-        for (const float v : *decoder->decode(previous))
+        const std::vector<float> image = *decoder->decode(previous);
+        for (const float v : image)
             frame.push_back(uint8_t(std::lround(std::clamp((v + 1) * 127.5f, 0.f, 255.f))));
     }
     return frames;

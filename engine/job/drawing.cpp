@@ -8,7 +8,6 @@
 #include "engine/job/budget_meter.h"
 #include "engine/job/drawing_store.h"
 #include "engine/job/empty_frames.h"
-#include "engine/job/float_buffers.h"
 #include "engine/job/input_hashes.h"
 #include "engine/job/outgoing.h"
 #include "engine/job/version.h"
@@ -33,6 +32,13 @@ CameraFrame overview_camera(const Bounds& b, const ImageSize& size)
     return frame;
 }
 
+RasterizerOptions float_options(const DrawOptions& o)
+{
+    RasterizerOptions options = o.rasterizer();
+    options.pixels_over.reset();
+    return options;
+}
+
 // splats are drawn as they are
 Result<SurfelScene> load_scene(Device& device, DrawingOptions& o)
 {
@@ -49,7 +55,7 @@ class DrawingJob : public Job {
     DrawingJob(Device& device, DrawingOptions options, SurfelScene scene, std::unique_ptr<DrawingStore> store,
                std::unique_ptr<Outgoing> out, const JobCallbacks& callbacks)
         : device_(device), o_(std::move(options)), scene_(std::move(scene)), callbacks_(callbacks),
-          drawing_(device, scene_, o_.path, o_.draw.rasterizer()), floats_(device, scene_, o_.draw.rasterizer()),
+          drawing_(device, scene_, o_.path, o_.draw.rasterizer()), floats_(device, scene_, {}, float_options(o_.draw)),
           store_(std::move(store)), out_(std::move(out))
     {
         if (drawing_.total()) {
@@ -158,8 +164,10 @@ class DrawingJob : public Job {
     {
         const ImageSize size{frame.intrinsics.width, frame.intrinsics.height};
         const uint32_t number = counts_[frame.camera]++;
-        if (o_.floats)
-            SR_CHECK(floats_.write(store_->folder(frame.camera), number, frame));
+        if (o_.floats) {
+            SR_TRY(const SplatImage image, floats_.image(frame));
+            SR_CHECK(write_float_images(store_->folder(frame.camera), number, image));
+        }
         return out_->read(slots, size, [this, frame, number](FramePixels pixels) -> Status {
             empty_->add(sees_nothing(pixels));
             if (o_.visible_depth)
@@ -192,7 +200,7 @@ class DrawingJob : public Job {
     SurfelScene scene_;
     JobCallbacks callbacks_;
     PathDrawing drawing_;
-    FloatBuffers floats_;
+    PathDrawing floats_; // what files of 8 and 16 bits round away
     SubmitCost cost_;
     std::optional<EmptyFrames> empty_;       // of a path
     std::map<std::string, uint32_t> counts_; // frames so far, per camera

@@ -4,6 +4,7 @@
 
 #include "engine/format/buffer_folder.h"
 #include "engine/format/image.h"
+#include "engine/format/npy.h"
 #include "engine/format/transforms.h"
 #include "engine/job/outputs.h"
 #include "engine/job/path_drawing.h"
@@ -65,6 +66,19 @@ std::string piece_name(const std::string& camera, uint32_t number)
 }
 
 } // namespace
+
+Status write_float_images(const Path& folder, uint32_t number, const SplatImage& image)
+{
+    const std::vector<float>* const planes[] = {&image.depth_expected, &image.depth_median, &image.alpha};
+    for (size_t i = 0; i < std::size(planes); ++i) {
+        SR_CHECK(make_folder(folder / kArrays[i]));
+        const auto bytes = std::as_bytes(std::span(*planes[i]));
+        SR_CHECK(
+            write_file_atomically(folder / kArrays[i] / fmt::format("{:06}.npy", number),
+                                  encode_npy({DType::f32, {image.height, image.width}, {bytes.begin(), bytes.end()}})));
+    }
+    return {};
+}
 
 Status DrawingStore::check(const Path& folder, const CameraPath& path, bool replace)
 {

@@ -16,6 +16,10 @@ struct DrawnFiles {
     bool points = false; // points.ply
 };
 
+// Of a frame, as NumPy's arrays of float32, [height, width]: FOLDER/{depth_expected,depth_median,alpha}/NNNNNN.npy.
+// Depths are metres, measured as SplatCamera::radial_depth says, 0 where nothing is drawn (docs/formats.md §6)
+Status write_float_images(const Path& folder, uint32_t number, const SplatImage& image);
+
 // The pictures of a drawing in its folder, and which of them are done. A piece is a frame, with all its files.
 class DrawingStore {
   public:

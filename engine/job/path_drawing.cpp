@@ -46,16 +46,28 @@ Result<SurfelScene> splats_of(Device& device, const VoxelGrid& grid, const Path&
     return SurfelScene::create(device, points, o.surfels);
 }
 
-Status PathDrawing::draw(std::span<const CameraFrame> frames, const Drawn& drawn)
+Result<Rasterizer*> PathDrawing::rasterizer_of(const Intrinsics& size, uint32_t frames)
 {
-    const Intrinsics& size = frames.front().intrinsics;
     auto& rasterizer = rasterizers_[{size.width, size.height, size.model}];
     if (!rasterizer) {
         RasterizerOptions options = options_;
         options.model = size.model;
-        SR_TRY(rasterizer,
-               Rasterizer::create(device_, scene_, size.width, size.height, uint32_t(frames.size()), options));
+        SR_TRY(rasterizer, Rasterizer::create(device_, scene_, size.width, size.height, frames, options));
     }
+    return rasterizer.get();
+}
+
+Result<SplatImage> PathDrawing::image(const CameraFrame& frame)
+{
+    SR_TRY(Rasterizer * rasterizer, rasterizer_of(frame.intrinsics, 1));
+    const SplatCamera camera = splat_camera(frame.intrinsics, frame.pose);
+    SR_TRY(std::vector<SplatImage> images, rasterizer->render({&camera, 1}));
+    return std::move(images.front());
+}
+
+Status PathDrawing::draw(std::span<const CameraFrame> frames, const Drawn& drawn)
+{
+    SR_TRY(Rasterizer * rasterizer, rasterizer_of(frames.front().intrinsics, uint32_t(frames.size())));
     std::vector<SplatCamera> cameras;
     for (const CameraFrame& frame : frames)
         cameras.push_back(splat_camera(frame.intrinsics, frame.pose));

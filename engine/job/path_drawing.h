@@ -50,8 +50,12 @@ class PathDrawing {
 
     // frames of one size and camera model, apart from the path
     Status draw(std::span<const CameraFrame> frames, const Drawn& drawn);
+    // one frame's images on the host, where the options keep no pixels; waits for them
+    Result<SplatImage> image(const CameraFrame& frame);
 
   private:
+    Result<Rasterizer*> rasterizer_of(const Intrinsics& size, uint32_t frames);
+
     Device& device_;
     const SurfelScene& scene_;
     CameraPath path_;
