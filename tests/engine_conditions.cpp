@@ -66,16 +66,16 @@ TEST(engine_conditions, parts_are_joined_in_the_order_of_the_config_and_what_is_
     painted.tint = {1, 0.5, 0};
     TransformerConfig config;
     config.condition = {ConditionPart::tint, ConditionPart::object};
-    const CellConditions told = *CellConditions::create(config, grid, std::span(&painted, 1));
-    ASSERT_EQ(told.width(), kWidth);
+    const CellConditions conditioned = *CellConditions::create(config, grid, std::span(&painted, 1));
+    ASSERT_EQ(conditioned.width(), kWidth);
     std::vector<float> row(kWidth, 9), expected(60);
-    told.row(0, grid.cells[0], row);
+    conditioned.row(0, grid.cells[0], row);
     EXPECT_EQ(std::vector<float>(row.begin(), row.begin() + 4), (std::vector<float>{1, 1, 0, -1}));
     object_condition(painted, {2.7, 0.3, 0.3}, expected);
     for (size_t i = 0; i < 60; ++i)
         EXPECT_NEAR(row[4 + i], expected[i], 1e-6) << i;
     for (uint32_t cell : {1u, 2u}) { // another class; far away
-        told.row(cell, grid.cells[cell], row);
+        conditioned.row(cell, grid.cells[cell], row);
         EXPECT_EQ(row, std::vector<float>(kWidth, 0.f)) << cell;
     }
     SceneObject street = painted;
@@ -108,11 +108,11 @@ TEST(engine_conditions, a_cell_is_told_the_part_it_lies_in_beside_its_object)
     const std::vector<SceneObject> objects = {house, window, lit};
     TransformerConfig config;
     config.condition = {ConditionPart::tint, ConditionPart::part};
-    const CellConditions told = *CellConditions::create(config, grid, objects);
-    ASSERT_EQ(told.width(), 4u + 64u);
+    const CellConditions conditioned = *CellConditions::create(config, grid, objects);
+    ASSERT_EQ(conditioned.width(), 4u + 64u);
     for (uint32_t cell : {0u, 1u, 2u}) {
-        std::vector<float> row(told.width(), 9), expected(60, 0.f);
-        told.row(cell, grid.cells[cell], row);
+        std::vector<float> row(conditioned.width(), 9), expected(60, 0.f);
+        conditioned.row(cell, grid.cells[cell], row);
         EXPECT_EQ(std::vector<float>(row.begin(), row.begin() + 4), (std::vector<float>{1, 0, 0, 1})) << "the house's";
         if (cell < 2)
             object_condition(cell ? lit : window,
@@ -126,7 +126,7 @@ TEST(engine_conditions, a_cell_is_told_the_part_it_lies_in_beside_its_object)
     config.condition = {ConditionPart::tint};
     std::vector<float> row(4, 9);
     CellConditions::create(config, grid, objects)->row(0, grid.cells[0], row);
-    EXPECT_EQ(row, (std::vector<float>{1, 0, 0, 1})) << "a model that hears of no parts is told of the rest as ever";
+    EXPECT_EQ(row, (std::vector<float>{1, 0, 0, 1})) << "a model without parts is conditioned on the rest as ever";
 }
 
 TEST(engine_conditions, a_config_names_each_part_once)
@@ -152,7 +152,7 @@ TEST(engine_conditions, a_config_says_how_points_of_the_training_data_lay)
     EXPECT_TRUE(says(parse_transformer_config(Json{{"placement", "random"}}), "placement"));
 }
 
-RegionInput patch(int32_t x, uint32_t cells, bool told)
+RegionInput patch(int32_t x, uint32_t cells, bool conditioned)
 {
     RegionInput r;
     const SceneObject object = car();
@@ -160,7 +160,7 @@ RegionInput patch(int32_t x, uint32_t cells, bool told)
         r.cells.push_back({x + int32_t(i % 7), int32_t(i / 7), 0});
         r.labels.push_back(i % 20);
         r.condition.resize((i + 1) * kWidth);
-        if (told && i % 2) {
+        if (conditioned && i % 2) {
             object_condition(object, {0.1 * i, 0, 0}, std::span(r.condition).last(kWidth));
             tint_condition({0.9, 0.2, 0.1 * (i % 10)}, std::span(r.condition).last(4));
         }
@@ -184,12 +184,12 @@ std::vector<float> run(const std::vector<RegionInput>& regions, float guidance)
 TEST(engine_conditions, zeros_and_nothing_are_the_same_and_what_is_told_is_heard)
 {
     for (float guidance : {1.f, 2.f}) {
-        const RegionInput told = patch(0, 33, true), zeros = patch(0, 33, false);
+        const RegionInput conditioned = patch(0, 33, true), zeros = patch(0, 33, false);
         RegionInput nothing = zeros;
         nothing.condition.clear();
         const std::vector<float> silent = run({nothing}, guidance);
         EXPECT_EQ(run({zeros}, guidance), silent);
-        EXPECT_NE(run({told}, guidance), silent);
+        EXPECT_NE(run({conditioned}, guidance), silent);
     }
 }
 
@@ -197,8 +197,8 @@ TEST(engine_conditions, a_region_is_the_same_alone_and_beside_one_that_is_told_n
 {
     RegionInput nothing = patch(90, 20, false);
     nothing.condition.clear();
-    const RegionInput told = patch(0, 33, true);
-    const std::vector<float> alone = run({told}, 2), batched = run({nothing, told}, 2);
+    const RegionInput conditioned = patch(0, 33, true);
+    const std::vector<float> alone = run({conditioned}, 2), batched = run({nothing, conditioned}, 2);
     const int64_t channels = transformer().config().channels();
     EXPECT_EQ(std::vector<float>(batched.begin() + 20 * channels, batched.end()), alone);
 }

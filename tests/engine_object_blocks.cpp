@@ -91,14 +91,14 @@ TEST(engine_object_blocks, most_cells_have_the_objects_that_the_whole_scene_give
     const auto blocks = guess_blocks(grid, usual(), 3), whole = guess_objects(grid, usual(), 3);
     ASSERT_TRUE(blocks && whole);
     const std::vector<std::string> a = owners_of(grid, *blocks), b = owners_of(grid, *whole);
-    size_t told = 0, both = 0;
+    size_t conditioned = 0, both = 0;
     for (size_t c = 0; c < a.size(); ++c) {
-        told += !b[c].empty();
+        conditioned += !b[c].empty();
         both += !b[c].empty() && !a[c].empty();
     }
-    RecordProperty("told", int(told));
+    RecordProperty("conditioned", int(conditioned));
     RecordProperty("both", int(both));
-    EXPECT_GT(both, told * 9 / 10);
+    EXPECT_GT(both, conditioned * 9 / 10);
     for (size_t o = 0; o < blocks->size(); ++o)
         EXPECT_EQ((*blocks)[o].id, o);
 }
