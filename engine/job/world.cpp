@@ -737,7 +737,7 @@ Result<Json> World::estimate(size_t runs)
 
 Status World::flush()
 {
-    return tiles_->store() ? tiles_->store()->flush() : Status();
+    return tiles_ && tiles_->store() ? tiles_->store()->flush() : Status();
 }
 
 Result<std::unique_ptr<World>> open_world(Device& device, WorldRequest request, std::unique_ptr<WorldLabels> labels,

@@ -18,7 +18,7 @@ namespace semrover {
 // - 0 the order of the scene: all labels at once, as one part.
 // Without a model (settings.model is none) a world shows the points that the source has, in the order of tiles.
 struct WorldRequest {
-    GenerationSettings settings;
+    GenerationSettings settings = {};
     std::shared_ptr<const Transformer> transformer = {}; // of the settings' model, shared; none: one of its own
     uint64_t seed = 0;
     GivenObjects objects = {};  // that condition the model; none: guessed of the labels, block by block or at once
