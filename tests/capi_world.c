@@ -341,7 +341,7 @@ static void an_edit_makes_its_place_anew(sr_context* context)
 /* what was generated is shown again, with nothing loaded */
 static void a_world_without_a_model_has_the_splats_of_its_grid(sr_context* context)
 {
-    const sr_window everywhere = {{-999, -999}, {999, 999}};
+    const sr_cell_rect everywhere = {{-999, -999}, {999, 999}};
     sr_world_desc desc = street_world();
     sr_world *made = NULL, *shown = NULL;
     sr_grid* grid = NULL;

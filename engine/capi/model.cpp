@@ -31,6 +31,8 @@ Result<ModelRequest> request_of(const sr_model_desc& d)
         return fail(ErrorCode::usage, "sr_model_desc: path is NULL");
     if (d.parts > (SR_MODEL_VOXFIELD | SR_MODEL_RENDERER))
         return fail(ErrorCode::usage, "sr_model_desc: parts is {}, expected SR_MODEL_..", d.parts);
+    if (d.reserved)
+        return fail(ErrorCode::usage, "sr_model_desc: reserved is not 0");
     if (d.precision > SR_FP32)
         return fail(ErrorCode::usage, "sr_model_desc: precision is {}, expected SR_FP16 or SR_FP32", d.precision);
     ModelRequest request{.path = d.path ? d.path : ""};
@@ -40,6 +42,7 @@ Result<ModelRequest> request_of(const sr_model_desc& d)
     }
     request.precision = d.precision == SR_FP32 ? DType::f32 : DType::f16;
     if (d.parts) {
+        request.if_there = false;
         request.voxfield = d.parts & SR_MODEL_VOXFIELD;
         request.renderer = d.parts & SR_MODEL_RENDERER;
     }

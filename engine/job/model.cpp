@@ -34,17 +34,17 @@ Result<std::shared_ptr<Model>> Model::load(Device& device, ModelRequest request,
 Status Model::open(Device& device)
 {
     const Path& path = request_.path;
-    const bool both = request_.voxfield && request_.renderer;
-    if (both && !has_voxfield(path) && !has_renderer(path))
+    const bool all = !request_.if_there;
+    if (!all && !has_voxfield(path) && !has_renderer(path))
         return fail(ErrorCode::bad_input,
                     "'{}' has no voxfield_transformer/config.json and no renderer: a model is a folder in the "
                     "diffusers layout",
                     path.string());
-    if (request_.voxfield && (!both || has_voxfield(path))) {
+    if (request_.voxfield && (all || has_voxfield(path))) {
         SR_TRY(voxfield_, VoxfieldModel::open(path));
         bytes_ += TransformerWeights(voxfield_->config, precision()).device_bytes(device.limits());
     }
-    if (request_.renderer && (!both || has_renderer(path))) {
+    if (request_.renderer && (all || has_renderer(path))) {
         SR_TRY(RendererModel renderer, RendererModel::open(path));
         renderer_bytes_ = Unet::plan(renderer.unet, precision(), device.limits())->device_bytes(device.limits()) +
                           Vae::plan(renderer.vae, precision(), device.limits())->device_bytes(device.limits());

@@ -13,8 +13,8 @@ struct ModelRequest {
     Path path; // a folder; of a renderer alone a .safetensors file of the LDM layout, too
     std::unique_ptr<MemoryFolder> files = {}; // that `path` leads into, where the caller has it in memory
     DType precision = DType::f16;
-    // what is loaded of it. Both: what the folder has, one of them at least
-    bool voxfield = true, renderer = true;
+    bool voxfield = true, renderer = true; // what is loaded of it
+    bool if_there = true;                  // what the folder has of these, one of them at least; else all of them
 };
 
 // A model's networks on a device, loaded once and shared by all worlds and renderers that are made with it. The device
