@@ -159,11 +159,12 @@ TEST(kernel_picture, numbers_become_the_bytes_of_a_picture)
         const Tensor out = k.output(picture_words(s.width, s.height), 1, DType::u32, 1);
         k.graph.keep(picture_bytes(k.graph, k.input(x), s), out);
         ASSERT_TRUE(k.compile_and_run());
-        std::vector<float> cut;
+        std::vector<uint8_t> expected;
         for (uint32_t i = 0; i < s.width * s.height; ++i)
-            for (uint32_t c = 0; c < 3; ++c)
-                cut.push_back(x.at(i / s.width * s.padded_width + i % s.width, c));
-        auto expected = pixels_of_floats(cut);
+            for (uint32_t c = 0; c < 3; ++c) { // in floats, as the kernel's halves are those of floats
+                const auto v = float(x.at(i / s.width * s.padded_width + i % s.width, c));
+                expected.push_back(uint8_t(std::lround(std::clamp((v + 1) * 127.5f, 0.f, 255.f))));
+            }
         expected.resize(out.rows * 4ull); // zeros fill the last word
         EXPECT_EQ(k.read_array<uint8_t>(out), expected) << s.width;
     }
