@@ -12,8 +12,11 @@
  * reserved: NULL.
  *
  * Threads and waiting are said at each call, in these words:
- * - "Any thread": at any time. Where nothing is said, one thread at a time for a context with the models, worlds and
- *   renderers on it; and one for a grid.
+ * - "Any thread": at any time.
+ * - "The worker": a thread that makes things, while another one draws. "The render thread": one that draws, while a
+ *   worker is at work. Each group of calls by one thread at a time, which may be the same.
+ * - Where nothing is said, one thread at a time for a context with the models, worlds and renderers on it, and no
+ * worker and render thread beside it; and one for a grid.
  * - "Waits for" the disk, the device (until what was submitted has finished), the compiler (of shaders: seconds at the
  *   first time, then from a cache), drivers, a callback. Where nothing is said, a call returns at once.
  * Different contexts may be used at the same time. A call that meets another one with the same context, on another
@@ -76,7 +79,7 @@ SR_API uint32_t sr_abi_version(void);                /* of the library; compare 
 SR_API const char* sr_version(void);                 /* "0.1.0" */
 SR_API const char* sr_status_name(sr_status status); /* "SR_ERR_USAGE"; "unknown" for others */
 
-/* Any thread, but for a context that another one uses. One line about the last call that failed: with this context or a
+/* Any thread. One line about the last call that failed: with this context or a
  * world or renderer on it, or, for NULL, in this thread without a context, as calls with grids are. Writes at most
  * `size` bytes with the terminating zero and returns the length that the whole line has. buffer may be NULL with 0. */
 SR_API size_t sr_last_error(const sr_context* context, char* buffer, size_t size);
@@ -129,7 +132,7 @@ typedef struct sr_context_desc {
 SR_API sr_status sr_context_create(const sr_context_desc* desc, sr_context** context);
 SR_API void sr_context_destroy(sr_context* context); /* waits for the device; NULL is fine */
 
-/* index is 0 for the application's */
+/* Any thread. index is 0 for the application's */
 SR_API sr_status sr_context_get_device(sr_context* context, sr_device_info* device);
 
 typedef struct sr_memory_info {
@@ -140,6 +143,7 @@ typedef struct sr_memory_info {
     uint64_t budget_bytes; /* 0: none */
 } sr_memory_info;
 
+/* any thread */
 SR_API sr_status sr_context_get_memory(sr_context* context, sr_memory_info* memory);
 
 /* What the driver compiled so far, to be kept by the application: shaders are compiled again in a process that does not
@@ -339,8 +343,8 @@ typedef struct sr_world_desc {
     uint32_t struct_size;
     uint32_t steps; /* of denoising; 0: as the model says */
     const void* next;
-    const sr_model* model; /* of the same context, with a voxfield transformer. NULL: nothing is generated, and the world
-                              shows the points that its grid or folder has */
+    const sr_model* model; /* of the same context, with a voxfield transformer. NULL: nothing is generated, and the
+                              world shows the points that its grid or folder has */
     const sr_grid* grid;   /* its labels are copied; without a model its points, too */
     const char* folder;    /* of tiles */
     sr_status (*labels)(void* user, const sr_cell_rect* rect, sr_grid* grid);
@@ -364,30 +368,31 @@ typedef struct sr_world_desc {
                                what is near. 0: each point has one everywhere */
 } sr_world_desc;
 
-/* Waits for the compiler and the device, so that no step compiles, and for the disk. On failure *world is NULL.
- * SR_ERR_USAGE, SR_ERR_BAD_INPUT (files, a grid that does not go with the model), SR_ERR_OUT_OF_MEMORY. */
+/* The worker. Waits for the compiler and the device, so that no step compiles, and for the disk. On failure *world is
+ * NULL. SR_ERR_USAGE, SR_ERR_BAD_INPUT (files, a grid that does not go with the model), SR_ERR_OUT_OF_MEMORY. */
 SR_API sr_status sr_world_create(sr_context* context, const sr_world_desc* desc, sr_world** world);
 /* Gives up what is at work. Waits for the device and the disk. NULL is fine. */
 SR_API void sr_world_destroy(sr_world* world);
 
 /* What is wanted from now on: all tiles within `radius` metres of the position, seen from above; nearest first, and
- * what lies in `direction` before what lies behind. Cheap: may be called every frame. SR_ERR_USAGE: numbers that are
- * not finite, a radius that is not 0..2000 m. */
+ * what lies in `direction` before what lies behind. Any thread, every frame: the next step looks at it. SR_ERR_USAGE:
+ * numbers that are not finite, a radius that is not 0..2000 m. */
 SR_API sr_status sr_world_focus(sr_world* world, const double position[3], const double direction[3], double radius);
 
-/* Works for about budget_us microseconds and returns; 0: one piece of work. It stops when the next piece is expected
- * not to fit, going by those of its kind before, but does one at least. A piece is a denoising step of a few regions at
- * most, or a tile read, written or turned into splats. Waits for the device, which is idle when it returns, for the
- * disk and for the labels callback. *done (may be NULL): 1 when all that is wanted and fits the budgets is finished.
- * After an error the next step tries again. */
+/* The worker. Works for about budget_us microseconds and returns; 0: one piece of work. It stops when the next piece is
+ * expected not to fit, going by those of its kind before, but does one at least. A piece is a denoising step of a few
+ * regions at most, or a tile read, written or turned into splats. New splats lie where no draw looks: what is on its
+ * way need not have ended, and sr_world_record_updates (semrover_vulkan.h) or a draw that says so shows them. Waits for
+ * what it submits, for the disk and for the labels callback. *done (may be NULL): 1 when all that is wanted and fits
+ * the budgets is finished; splats that only wait until others have left do not count, but `full` is 1 then. After an
+ * error the next step tries again. */
 SR_API sr_status sr_world_step(sr_world* world, uint64_t budget_us, uint32_t* done);
 
 /* Changes labels as sr_grid_set_cells does. The tiles of these cells, and those beside them that saw their points, are
- * generated anew by the next steps. Their points are gone at once; their splats stay until the new ones are there.
- * Waits for the device. */
+ * generated anew by the next steps. Their splats stay until the new ones are shown. Any thread. */
 SR_API sr_status sr_world_edit(sr_world* world, const sr_cell* cells, uint64_t count);
 
-/* The callback knows the labels of a rectangle for which it returned SR_NOT_YET. */
+/* The callback knows the labels of a rectangle for which it returned SR_NOT_YET. Any thread. */
 SR_API sr_status sr_world_labels_ready(sr_world* world, const sr_cell_rect* rect);
 
 typedef struct sr_world_info {
@@ -406,13 +411,14 @@ typedef struct sr_world_info {
     uint32_t points_per_voxel;
 } sr_world_info;
 
+/* Any thread. While a step is at work: as it was before */
 SR_API sr_status sr_world_get_info(sr_world* world, sr_world_info* info);
 
 /* Copies; the time goes with the cells. The finished cells of a rectangle that are in memory, with their points; maybe
- * none. The application destroys it. */
+ * none. The application destroys it. Any thread; waits for a step that is at work. */
 SR_API sr_status sr_world_copy_cells(sr_world* world, const sr_cell_rect* rect, sr_grid** grid);
 
-/* waits until the cache has all that is finished; an error where it cannot be written, as on a full disk */
+/* The worker. Waits until the cache has all that is finished; an error where it cannot be written, as on a full disk */
 SR_API sr_status sr_world_flush(sr_world* world);
 
 /* ---- Pictures. struct VkBuffer_T* is Vulkan's VkBuffer, and so on. ---- */
@@ -458,8 +464,9 @@ typedef struct sr_draw_desc {
     sr_depth_image depth_test;
 } sr_draw_desc;
 
-/* Draws the splats that are there. Waits for the device; for the compiler, the first time. SR_ERR_USAGE: a world
- * without splat_bytes, sizes that are not 1..16384; SR_ERR_BAD_INPUT: a camera that is not finite. */
+/* The render thread. Shows what is new, and draws. Waits for the device; for the compiler, the first time.
+ * SR_ERR_USAGE: a world without splat_bytes, sizes that are not 1..16384; SR_ERR_BAD_INPUT: a camera that is not
+ * finite. */
 SR_API sr_status sr_world_draw(sr_world* world, const sr_draw_desc* draw);
 
 #ifdef __cplusplus

@@ -129,6 +129,7 @@ typedef struct sr_gl_splats {
     sr_gl_array normals;   /* 4 floats: unit normal, sigma along t_u in metres */
     sr_gl_array colors;    /* 4 floats: r, g, b (sRGB, 0..1), sigma along t_v in metres */
     sr_gl_array labels;    /* uint32 */
+    sr_gl_array blocks;    /* uint32 for 64 splats, as sr_splats has them: 0 where no tile is, not to be looked at */
 } sr_gl_splats;
 
 /* Brings the buffer objects up to date: a copy of all splats on the device (with SR_GL_COPIES through host memory) when

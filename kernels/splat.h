@@ -52,11 +52,12 @@ struct SurfelSize {
 // surfels: 2D Gaussians in the plane across a normal, axes t_u = normalize(e x n) with e the axis least aligned with n,
 // and t_v = n x t_u. One that is not finite, or without normal, size or opacity, is skipped.
 struct SplatScene {
-    Tensor positions; // [N, 4] fp32: metres, opacity
-    Tensor normals;   // [N, 4] fp32: unit normal, sigma_u in metres
-    Tensor colors;    // [N, 4] fp32: rgb, sigma_v in metres
-    Tensor labels;    // [N] u32
-    Tensor cells;     // [N] u32
+    Tensor positions;   // [N, 4] fp32: metres, opacity
+    Tensor normals;     // [N, 4] fp32: unit normal, sigma_u in metres
+    Tensor colors;      // [N, 4] fp32: rgb, sigma_v in metres
+    Tensor labels;      // [N] u32
+    Tensor cells;       // [N] u32
+    Tensor blocks = {}; // [N / 64, rounded up] u32, or none: surfels of a block that has 0 are skipped
 };
 // how rays become pixels, of all cameras of one call: engine/camera/lens.h
 enum class SplatLens : uint32_t { pinhole, opencv, fisheye, equirectangular };

@@ -30,24 +30,27 @@ static void check_splats(sr_context* context, sr_gl* gl, sr_world* world)
     const sr_gl_splats splats = gl_splats(context, gl, world);
     sr_world_info info;
     float *positions, *normals, *colors;
-    uint32_t *labels_found, n, seen = 0, of_wall = 0;
+    uint32_t *labels_found, *blocks, n, seen = 0, of_wall = 0;
     memset(&info, 0, sizeof info);
     info.struct_size = sizeof info;
     CHECK_OK(context, sr_world_get_info(world, &info));
     CHECK(splats.count >= info.splats && info.splats > 1000);
     CHECK(splats.positions.bytes == 16 * (uint64_t)splats.count && splats.labels.bytes == 4 * (uint64_t)splats.count);
+    CHECK(splats.blocks.bytes * 64 == splats.labels.bytes);
     positions = malloc(splats.positions.bytes);
     normals = malloc(splats.normals.bytes);
     colors = malloc(splats.colors.bytes);
     labels_found = malloc(splats.labels.bytes);
+    blocks = malloc(splats.blocks.bytes);
     read_buffer(splats.positions.buffer, splats.positions.bytes, positions);
     read_buffer(splats.normals.buffer, splats.normals.bytes, normals);
     read_buffer(splats.colors.buffer, splats.colors.bytes, colors);
     read_buffer(splats.labels.buffer, splats.labels.bytes, labels_found);
+    read_buffer(splats.blocks.buffer, splats.blocks.bytes, blocks);
     for (n = 0; n < splats.count; ++n) {
         const float *p = positions + 4 * n, *v = normals + 4 * n, *c = colors + 4 * n;
         const float length = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
-        if (p[3] == 0)
+        if (!blocks[n / 64] || p[3] == 0)
             continue; /* a place without a splat */
         ++seen;
         CHECK(p[1] > -4.2f && p[1] < 4.8f && p[2] > -0.1f && p[2] < 2.6f); /* of the street */
@@ -56,6 +59,7 @@ static void check_splats(sr_context* context, sr_gl* gl, sr_world* world)
         of_wall += labels_found[n] == 2;
     }
     CHECK(seen == info.splats && of_wall > 0 && of_wall < seen / 2);
+    free(blocks);
     free(positions);
     free(normals);
     free(colors);

@@ -7,7 +7,7 @@
 
 #include "tests/capi_vulkan.h"
 
-static sr_context* adopt(const sr_vulkan_device* vulkan)
+static inline sr_context* adopt(const sr_vulkan_device* vulkan)
 {
     sr_context_desc desc;
     sr_context* context = NULL;
@@ -18,7 +18,7 @@ static sr_context* adopt(const sr_vulkan_device* vulkan)
     return context;
 }
 
-static sr_context* adopt_host(const struct host* host)
+static inline sr_context* adopt_host(const struct host* host)
 {
     const sr_vulkan_device vulkan = lent(host);
     return adopt(&vulkan);
@@ -37,7 +37,8 @@ struct host_image {
 };
 
 /* of a type with these properties */
-static VkDeviceMemory allocate(const struct host* host, const VkMemoryRequirements* needs, VkMemoryPropertyFlags wanted)
+static inline VkDeviceMemory allocate(const struct host* host, const VkMemoryRequirements* needs,
+                                      VkMemoryPropertyFlags wanted)
 {
     VkPhysicalDeviceMemoryProperties types;
     VkMemoryAllocateInfo info = {0};
@@ -55,7 +56,7 @@ static VkDeviceMemory allocate(const struct host* host, const VkMemoryRequiremen
     return memory;
 }
 
-static struct host_buffer make_buffer(const struct host* host, size_t bytes)
+static inline struct host_buffer make_buffer(const struct host* host, size_t bytes)
 {
     struct host_buffer made;
     VkBufferCreateInfo info = {0};
@@ -72,13 +73,13 @@ static struct host_buffer make_buffer(const struct host* host, size_t bytes)
     return made;
 }
 
-static void destroy_buffer(const struct host* host, const struct host_buffer* buffer)
+static inline void destroy_buffer(const struct host* host, const struct host_buffer* buffer)
 {
     vkDestroyBuffer(host->device, buffer->buffer, NULL);
     vkFreeMemory(host->device, buffer->memory, NULL);
 }
 
-static struct host_image make_image(const struct host* host, uint32_t width, uint32_t height, VkFormat format)
+static inline struct host_image make_image(const struct host* host, uint32_t width, uint32_t height, VkFormat format)
 {
     struct host_image made;
     VkImageCreateInfo info = {0};
@@ -102,7 +103,7 @@ static struct host_image make_image(const struct host* host, uint32_t width, uin
     return made;
 }
 
-static void destroy_image(const struct host* host, const struct host_image* image)
+static inline void destroy_image(const struct host* host, const struct host_image* image)
 {
     vkDestroyImage(host->device, image->image, NULL);
     vkFreeMemory(host->device, image->memory, NULL);
@@ -113,7 +114,7 @@ struct host_commands {
     VkCommandBuffer commands;
 };
 
-static struct host_commands begin_commands(const struct host* host)
+static inline struct host_commands begin_commands(const struct host* host)
 {
     struct host_commands made;
     VkCommandPoolCreateInfo pool = {0};
@@ -131,7 +132,7 @@ static struct host_commands begin_commands(const struct host* host)
 }
 
 /* submits them and waits */
-static void run_commands(const struct host* host, const struct host_commands* commands)
+static inline void run_commands(const struct host* host, const struct host_commands* commands)
 {
     VkSubmitInfo submit = {0};
     submit.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO;
@@ -142,7 +143,7 @@ static void run_commands(const struct host* host, const struct host_commands* co
 }
 
 /* copies an image in layout TRANSFER_SRC_OPTIMAL to the beginning of a buffer, and waits */
-static void read_image(const struct host* host, const struct host_image* image, const struct host_buffer* to)
+static inline void read_image(const struct host* host, const struct host_image* image, const struct host_buffer* to)
 {
     const struct host_commands commands = begin_commands(host);
     VkBufferImageCopy region = {0};
@@ -156,6 +157,29 @@ static void read_image(const struct host* host, const struct host_image* image, 
     CHECK(vkEndCommandBuffer(commands.commands) == VK_SUCCESS);
     run_commands(host, &commands);
     vkDestroyCommandPool(host->device, commands.pool, NULL);
+}
+
+static inline VkSemaphore make_timeline(const struct host* host)
+{
+    VkSemaphoreTypeCreateInfo type = {0};
+    VkSemaphoreCreateInfo info = {0};
+    VkSemaphore made;
+    type.sType = VK_STRUCTURE_TYPE_SEMAPHORE_TYPE_CREATE_INFO;
+    type.semaphoreType = VK_SEMAPHORE_TYPE_TIMELINE;
+    info.sType = VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO;
+    info.pNext = &type;
+    CHECK(vkCreateSemaphore(host->device, &info, NULL, &made) == VK_SUCCESS);
+    return made;
+}
+
+static inline void wait_value(const struct host* host, VkSemaphore semaphore, uint64_t value)
+{
+    VkSemaphoreWaitInfo info = {0};
+    info.sType = VK_STRUCTURE_TYPE_SEMAPHORE_WAIT_INFO;
+    info.semaphoreCount = 1;
+    info.pSemaphores = &semaphore;
+    info.pValues = &value;
+    CHECK(vkWaitSemaphores(host->device, &info, 60000000000u) == VK_SUCCESS);
 }
 
 #endif

@@ -247,19 +247,6 @@ static void refuses_wrong_depth_images(sr_context* context, sr_world* world)
     CHECK(sr_world_draw(world, &draw) == SR_ERR_BAD_INPUT && says(context, "not finite"));
 }
 
-static VkSemaphore make_timeline(const struct host* host)
-{
-    VkSemaphoreTypeCreateInfo type = {0};
-    VkSemaphoreCreateInfo info = {0};
-    VkSemaphore made;
-    type.sType = VK_STRUCTURE_TYPE_SEMAPHORE_TYPE_CREATE_INFO;
-    type.semaphoreType = VK_SEMAPHORE_TYPE_TIMELINE;
-    info.sType = VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO;
-    info.pNext = &type;
-    CHECK(vkCreateSemaphore(host->device, &info, NULL, &made) == VK_SUCCESS);
-    return made;
-}
-
 static uint64_t value_of(const struct host* host, VkSemaphore semaphore)
 {
     uint64_t value = 0;
@@ -274,16 +261,6 @@ static void signal_value(const struct host* host, VkSemaphore semaphore, uint64_
     info.semaphore = semaphore;
     info.value = value;
     CHECK(vkSignalSemaphore(host->device, &info) == VK_SUCCESS);
-}
-
-static void wait_value(const struct host* host, VkSemaphore semaphore, uint64_t value)
-{
-    VkSemaphoreWaitInfo info = {0};
-    info.sType = VK_STRUCTURE_TYPE_SEMAPHORE_WAIT_INFO;
-    info.semaphoreCount = 1;
-    info.pSemaphores = &semaphore;
-    info.pValues = &value;
-    CHECK(vkWaitSemaphores(host->device, &info, 60000000000u) == VK_SUCCESS);
 }
 
 /* draws begin when the host says so, and say when they have ended; more of them than the library keeps command buffers

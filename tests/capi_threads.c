@@ -1,9 +1,10 @@
 /* SPDX-FileCopyrightText: semrover authors
  * SPDX-License-Identifier: Apache-2.0
  *
- * Hosts with threads: contexts in parallel, one queue that two contexts and the host itself submit to, and a context
- * that goes from thread to thread between calls. All of them see the picture that one thread alone sees.
- * `tools/test --threads` runs it under ThreadSanitizer, too. */
+ * Hosts with threads: contexts in parallel, one queue that two contexts and the host itself submit to, a context that
+ * goes from thread to thread between calls, and one whose worker steps while frames are on their way. All of them see
+ * the picture that one thread alone sees. `tools/test --threads` runs it under ThreadSanitizer, too. */
+#include "tests/capi_memory.h"
 #include "tests/capi_street.h"
 
 #include <pthread.h>
@@ -233,6 +234,272 @@ static void shares_a_queue(void)
     destroy_host(&queue.host);
 }
 
+/* ---- one context, two threads: a worker that steps, and one that records and submits frames */
+
+enum { FRAMES_ON_THEIR_WAY = 2, LEAST_FRAMES = 12 };
+
+typedef struct animation {
+    shared_queue queue;
+    visitor* visitor;
+    VkSemaphore timeline; /* frame n reaches n */
+    VkCommandPool pool;
+    VkCommandBuffer commands[FRAMES_ON_THEIR_WAY];
+    struct host_buffer color[FRAMES_ON_THEIR_WAY], label[FRAMES_ON_THEIR_WAY];
+    int settled; /* the worker has nothing left to do; under the mutex */
+    int ended;   /* likewise: it has been told to end */
+} animation;
+
+static int flag_of(animation* self, const int* flag)
+{
+    int value;
+    CHECK(pthread_mutex_lock(&self->queue.mutex) == 0);
+    value = *flag;
+    CHECK(pthread_mutex_unlock(&self->queue.mutex) == 0);
+    return value;
+}
+
+static void set_flag(animation* self, int* flag)
+{
+    CHECK(pthread_mutex_lock(&self->queue.mutex) == 0);
+    *flag = 1;
+    CHECK(pthread_mutex_unlock(&self->queue.mutex) == 0);
+}
+
+static void* work(void* user)
+{
+    animation* self = user;
+    uint32_t done;
+    while (!flag_of(self, &self->ended)) {
+        CHECK_OK(self->visitor->context, sr_world_step(self->visitor->world, 5000, &done));
+        if (done)
+            set_flag(self, &self->settled);
+    }
+    return NULL;
+}
+
+static void open_animation(animation* self)
+{
+    sr_vulkan_device vulkan;
+    sr_context_desc desc;
+    VkCommandPoolCreateInfo pool = {0};
+    VkCommandBufferAllocateInfo commands = {0};
+    int i;
+    CHECK(pthread_mutex_init(&self->queue.mutex, NULL) == 0);
+    self->queue.host = make_host();
+    vulkan = lent(&self->queue.host);
+    vulkan.user = &self->queue;
+    vulkan.lock_queue = lock_queue;
+    vulkan.unlock_queue = unlock_queue;
+    memset(&desc, 0, sizeof desc);
+    desc.struct_size = sizeof desc;
+    desc.vulkan = &vulkan;
+    CHECK_OK(NULL, sr_context_create(&desc, &self->visitor->context));
+    self->timeline = make_timeline(&self->queue.host);
+    pool.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO;
+    pool.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
+    CHECK(vkCreateCommandPool(self->queue.host.device, &pool, NULL, &self->pool) == VK_SUCCESS);
+    commands.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO;
+    commands.commandPool = self->pool;
+    commands.commandBufferCount = FRAMES_ON_THEIR_WAY;
+    CHECK(vkAllocateCommandBuffers(self->queue.host.device, &commands, self->commands) == VK_SUCCESS);
+    for (i = 0; i < FRAMES_ON_THEIR_WAY; ++i) {
+        self->color[i] = make_buffer(&self->queue.host, sizeof alone.color);
+        self->label[i] = make_buffer(&self->queue.host, sizeof alone.label);
+    }
+}
+
+static void close_animation(animation* self)
+{
+    int i;
+    leave(self->visitor);
+    for (i = 0; i < FRAMES_ON_THEIR_WAY; ++i) {
+        destroy_buffer(&self->queue.host, &self->color[i]);
+        destroy_buffer(&self->queue.host, &self->label[i]);
+    }
+    vkDestroyCommandPool(self->queue.host.device, self->pool, NULL);
+    vkDestroySemaphore(self->queue.host.device, self->timeline, NULL);
+    destroy_host(&self->queue.host);
+    CHECK(pthread_mutex_destroy(&self->queue.mutex) == 0);
+}
+
+static void submit_frame(animation* self, VkCommandBuffer commands, uint64_t number)
+{
+    VkTimelineSemaphoreSubmitInfo numbers = {0};
+    VkSubmitInfo submit = {0};
+    numbers.sType = VK_STRUCTURE_TYPE_TIMELINE_SEMAPHORE_SUBMIT_INFO;
+    numbers.signalSemaphoreValueCount = 1;
+    numbers.pSignalSemaphoreValues = &number;
+    submit.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO;
+    submit.pNext = &numbers;
+    submit.commandBufferCount = 1;
+    submit.pCommandBuffers = &commands;
+    submit.signalSemaphoreCount = 1;
+    submit.pSignalSemaphores = &self->timeline;
+    lock_queue(&self->queue);
+    CHECK(vkQueueSubmit(self->queue.host.queue, 1, &submit, VK_NULL_HANDLE) == VK_SUCCESS);
+    unlock_queue(&self->queue);
+}
+
+/* frame `number`, when the one before the last is finished */
+static void animate(animation* self, uint64_t number)
+{
+    const int place = (int)(number % FRAMES_ON_THEIR_WAY);
+    const double position[3] = {1, 0, 1.5}, forward[3] = {1, 0, 0};
+    const sr_semaphore done = {self->timeline, number};
+    const sr_context* context = self->visitor->context;
+    VkCommandBufferBeginInfo begin = {0};
+    sr_draw_desc draw = camera_at(-2, WIDTH, HEIGHT);
+    sr_world* world = self->visitor->world;
+    sr_world_info info;
+    sr_status whole;
+    memset(&info, 0, sizeof info);
+    info.struct_size = sizeof info;
+    draw.fx = draw.fy = 30;
+    draw.color.buffer = self->color[place].buffer;
+    draw.label.buffer = self->label[place].buffer;
+    if (number > FRAMES_ON_THEIR_WAY)
+        wait_value(&self->queue.host, self->timeline, number - FRAMES_ON_THEIR_WAY);
+    CHECK_OK(context, sr_world_focus(world, position, forward, 6));
+    CHECK_OK(context, sr_world_get_info(world, &info));
+    begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
+    CHECK(vkBeginCommandBuffer(self->commands[place], &begin) == VK_SUCCESS);
+    CHECK_OK(context, sr_world_record_updates(world, self->commands[place], &done));
+    whole = sr_world_check_draws(world);
+    CHECK(whole == SR_OK || whole == SR_ERR_PARTIAL);
+    CHECK_OK(context, sr_world_record(world, &draw, self->commands[place]));
+    CHECK(vkEndCommandBuffer(self->commands[place]) == VK_SUCCESS);
+    submit_frame(self, self->commands[place], number);
+}
+
+/* a wall across the road, and away again: the world is as it was, after tiles have left and come */
+static void edit(animation* self, uint32_t label)
+{
+    sr_cell cells[2];
+    int i;
+    for (i = 0; i < 2; ++i) {
+        cells[i].i = 3;
+        cells[i].j = i;
+        cells[i].k = 1;
+        cells[i].label = label;
+    }
+    CHECK_OK(self->visitor->context, sr_world_edit(self->visitor->world, cells, 2));
+}
+
+typedef struct splat {
+    float position[4], normal[4], color[4];
+} splat;
+
+static int compare_splats(const void* a, const void* b)
+{
+    return memcmp(a, b, sizeof(splat));
+}
+
+/* Beyond the focus, tiles may be there or not, and normals at their borders go by them */
+static int is_within_reach(const float* position)
+{
+    const float x = position[0] - 1, y = position[1];
+    return x * x + y * y < 5 * 5;
+}
+
+/* what the world shows within reach, in an order of its own; the caller frees it */
+static splat* splats_of(animation* self, sr_world* world, size_t* count)
+{
+    const struct host* host = &self->queue.host;
+    const struct host_commands commands = begin_commands(host);
+    struct host_buffer read[4];
+    sr_splats splats;
+    splat* out;
+    uint32_t n;
+    int i, a;
+    memset(&splats, 0, sizeof splats);
+    splats.struct_size = sizeof splats;
+    CHECK_OK(self->visitor->context, sr_world_get_splats(world, &splats));
+    for (i = 0; i < 4; ++i) {
+        const sr_array* from = i == 0   ? &splats.positions
+                               : i == 1 ? &splats.normals
+                               : i == 2 ? &splats.colors
+                                        : &splats.blocks;
+        const VkBufferCopy region = {from->offset, 0, from->bytes};
+        read[i] = make_buffer(host, from->bytes);
+        vkCmdCopyBuffer(commands.commands, from->buffer, read[i].buffer, 1, &region);
+    }
+    CHECK(vkEndCommandBuffer(commands.commands) == VK_SUCCESS);
+    run_commands(host, &commands);
+    vkDestroyCommandPool(host->device, commands.pool, NULL);
+    out = malloc((splats.count + 1) * sizeof *out);
+    *count = 0;
+    for (n = 0; n < splats.count; ++n)
+        if (((uint32_t*)read[3].mapped)[n / 64] && ((float*)read[0].mapped)[4 * n + 3] > 0 &&
+            is_within_reach((float*)read[0].mapped + 4 * n)) {
+            splat* to = &out[(*count)++];
+            float* const arrays[3] = {to->position, to->normal, to->color};
+            for (a = 0; a < 3; ++a)
+                memcpy(arrays[a], (float*)read[a].mapped + 4 * n, 4 * sizeof(float));
+        }
+    qsort(out, *count, sizeof *out, compare_splats);
+    for (i = 0; i < 4; ++i)
+        destroy_buffer(host, &read[i]);
+    return out;
+}
+
+/* The splats of a world that one thread makes and shows at once. Pictures may differ a little: where splats are equally
+ * far, the order of tiles in memory counts */
+static void check_same_splats(animation* self)
+{
+    visitor other = *self->visitor;
+    const sr_semaphore done = {self->timeline, 1u << 20};
+    const struct host_commands commands = begin_commands(&self->queue.host);
+    size_t count, other_count;
+    splat *found, *expected;
+    open_world(&other);
+    for (other.done = 0; !other.done;)
+        step(&other);
+    CHECK_OK(other.context, sr_world_record_updates(other.world, commands.commands, &done));
+    CHECK(vkEndCommandBuffer(commands.commands) == VK_SUCCESS);
+    run_commands(&self->queue.host, &commands);
+    vkDestroyCommandPool(self->queue.host.device, commands.pool, NULL);
+    found = splats_of(self, self->visitor->world, &count);
+    expected = splats_of(self, other.world, &other_count);
+    CHECK(count > 1000 && count == other_count);
+    CHECK(!memcmp(found, expected, count * sizeof *found));
+    free(found);
+    free(expected);
+    sr_world_destroy(other.world);
+}
+
+static void draws_while_a_worker_steps(void)
+{
+    static animation a;
+    pthread_t worker;
+    uint64_t number = 0;
+    int last, edited;
+    a.visitor = &visitors[0];
+    open_animation(&a);
+    open_world(a.visitor);
+    worker = start(work, &a);
+    for (edited = 0; edited < 3; ++edited) {
+        const uint64_t least = number + LEAST_FRAMES;
+        if (edited)
+            edit(&a, edited == 1 ? 2 : SR_NO_CELL);
+        CHECK(pthread_mutex_lock(&a.queue.mutex) == 0);
+        a.settled = 0;
+        CHECK(pthread_mutex_unlock(&a.queue.mutex) == 0);
+        while (!flag_of(&a, &a.settled) || number < least)
+            animate(&a, ++number);
+    }
+    set_flag(&a, &a.ended);
+    CHECK(pthread_join(worker, NULL) == 0);
+    CHECK_OK(a.visitor->context, sr_world_step(a.visitor->world, ~0u, &a.visitor->done)); /* what was posted last */
+    CHECK(a.visitor->done);
+    animate(&a, ++number);
+    wait_value(&a.queue.host, a.timeline, number);
+    last = (int)(number % FRAMES_ON_THEIR_WAY);
+    CHECK(!memcmp(a.label[last].mapped, alone.label, sizeof alone.label));
+    check_same_splats(&a);
+    printf("a worker: %u frames beside it\n", (unsigned)number);
+    close_animation(&a);
+}
+
 static void* step_once(void* user)
 {
     step(user);
@@ -272,10 +539,9 @@ static void* fail_here(void* user)
 static void* ask_often(void* user)
 {
     visitor* self = user;
-    sr_world_info info = SR_INIT(sr_world_info);
     int i;
     for (i = 0; i < 20000; ++i) {
-        const sr_status status = sr_world_get_info(self->world, &info);
+        const sr_status status = sr_world_flush(self->world); /* a worker's call, as a step is */
         CHECK(status == SR_OK || (status == SR_ERR_USAGE && says(NULL, "another call is at work")));
     }
     return NULL;
@@ -322,5 +588,6 @@ int main(int argc, char** argv)
     shares_a_queue();
     goes_from_thread_to_thread();
     two_threads_get_a_status();
+    draws_while_a_worker_steps();
     return 0;
 }

@@ -614,6 +614,16 @@ std::pair<size_t, float> splats_of(const World& world, const TileIndex& tile)
     return {place->second.count, largest};
 }
 
+// what the thread that draws does once a frame; false: nothing is new
+bool show(World& world)
+{
+    const auto ring = *CommandRing::create(device(), 1);
+    const uint64_t before = world.splats()->version();
+    world.splats()->record_updates(*ring->begin(), device().next_point());
+    EXPECT_TRUE(device().wait(*ring->submit()));
+    return world.splats()->version() != before;
+}
+
 // tiles are 3.6 m wide and have some 36 cells. The tiny model's points fill space, those of streets lie on surfaces
 TEST(engine_job_world, far_tiles_have_fewer_and_larger_splats_and_all_of_them_when_they_are_near)
 {
@@ -638,10 +648,10 @@ TEST(engine_job_world, far_tiles_have_fewer_and_larger_splats_and_all_of_them_wh
     EXPECT_LT(larger, larger_yet);
     EXPECT_LT(larger_yet, large);
 
-    const uint64_t version = world->splats()->version();
+    EXPECT_TRUE(show(*world));
     ASSERT_TRUE(world->focus(looking(-3, 30)));
     run(*world);
-    EXPECT_EQ(world->splats()->version(), version); // nothing is made again
+    EXPECT_FALSE(show(*world)); // nothing is made again
 
     ASSERT_TRUE(world->focus(looking(12, 30)));
     run(*world);
@@ -650,6 +660,52 @@ TEST(engine_job_world, far_tiles_have_fewer_and_larger_splats_and_all_of_them_wh
     ASSERT_TRUE(world->focus(looking(-3, 30)));
     run(*world);
     EXPECT_EQ(splats_of(*world, near), (std::pair{all, small}));
+}
+
+// of all points that the world has, in one scene, by where they are
+std::multimap<std::array<float, 3>, std::pair<std::array<float, 3>, float>> normals_of_all(const World& world)
+{
+    ScenePoints all;
+    for (const TileIndex& tile : tiles_of(world)) {
+        const ScenePoints points = points_of(*world.tile(tile));
+        all.positions.insert(all.positions.end(), points.positions.begin(), points.positions.end());
+        all.colors.insert(all.colors.end(), points.colors.begin(), points.colors.end());
+        all.labels.insert(all.labels.end(), points.labels.begin(), points.labels.end());
+        all.cells.insert(all.cells.end(), points.cells.begin(), points.cells.end());
+    }
+    const Surfels made = *SurfelScene::create(device(), all, {.auto_sigma = true})->read();
+    std::multimap<std::array<float, 3>, std::pair<std::array<float, 3>, float>> normals;
+    for (size_t i = 0; i < made.position.size(); ++i)
+        normals.emplace(made.position[i], std::pair(made.normal[i], made.sigma_u[i]));
+    return normals;
+}
+
+void expect_normals_of_one_scene(World& world)
+{
+    const auto expected = normals_of_all(world);
+    const Surfels made = *world.splats()->scene().read();
+    size_t count = 0;
+    for (const auto& [tile, place] : world.splats()->places())
+        for (size_t i = place.first; i < place.first + place.count; ++i, ++count) {
+            const auto found = expected.find(made.position[i]);
+            ASSERT_NE(found, expected.end());
+            ASSERT_EQ(made.normal[i], found->second.first) << "tile " << tile[0] << ", " << tile[1];
+            ASSERT_EQ(made.sigma_u[i], found->second.second);
+        }
+    EXPECT_EQ(count, expected.size());
+}
+
+TEST(engine_job_world, normals_at_borders_are_those_of_the_whole_street)
+{
+    WorldRequest r{.settings = *resolve_generation(options())};
+    r.splat_bytes = 4u << 20;
+    const auto world = *open_world(device(), std::move(r), labels_of_grid(street()));
+    ASSERT_TRUE(world->focus(looking(4, 30)));
+    run(*world);
+    expect_normals_of_one_scene(*world);
+    ASSERT_TRUE(world->edit({{{3, 0, 1}, uint8_t(2)}})); // also where a neighbour has other points now
+    run(*world);
+    expect_normals_of_one_scene(*world);
 }
 
 // a file that cannot be written stands for a full disk

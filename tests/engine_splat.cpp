@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/deferred/frame_images.h"
+#include "engine/splat/splat_pool.h"
 #include "tests/frame_pixels_reference.h"
 #include "tests/golden_tensors.h"
 #include "tests/json_text.h"
@@ -359,6 +360,194 @@ TEST(engine_splat, surfels_are_read_back_as_they_are_drawn)
             ASSERT_NEAR(spaced->sigma_v[i], 0.095, 1e-4) << i;
         }
     }
+}
+
+// ---- pools
+
+// a wavy floor that begins at x, of two labels
+ScenePoints floor_at(float x, size_t count)
+{
+    std::mt19937 random(uint32_t(count) + 7);
+    std::uniform_real_distribution<float> along(0, 4);
+    ScenePoints out;
+    for (size_t i = 0; i < count; ++i) {
+        const float u = along(random), v = along(random);
+        out.positions.push_back({x + u, v - 2, 0.3f * std::sin(u)});
+        out.colors.push_back({u / 4, v / 4, 0.5f});
+        out.labels.push_back(u < 2 ? 0 : 2);
+        out.cells.push_back(uint32_t(i));
+    }
+    return out;
+}
+
+// above (2, 0), looking down
+SplatCamera camera_above()
+{
+    return {40, 40, 32, 24, {0, -1, 0, 0, -1, 0, 0, 2, 0, 0, -1, 6}};
+}
+
+std::unique_ptr<SplatPool> pool_of(uint64_t bytes)
+{
+    auto pool = SplatPool::create(test_device(), bytes);
+    SR_ASSERT(bool(pool), "{}", pool.error().message);
+    return std::move(*pool);
+}
+
+void add(SplatPool& pool, const TileIndex& tile, const ScenePoints& points, const SurfelOptions& options = {})
+{
+    const auto added = pool.add(tile, points, points.size(), options);
+    ASSERT_TRUE(added) << added.error().message;
+    ASSERT_EQ(*added, SplatPool::Room::found);
+}
+
+// what the thread that draws does once a frame: the frame has ended when this returns
+void show(SplatPool& pool)
+{
+    Device& device = test_device();
+    ASSERT_TRUE(pool.publish());
+    const auto ring = *CommandRing::create(device, 1);
+    pool.record_updates(*ring->begin(), device.next_point());
+    ASSERT_TRUE(device.wait(*ring->submit()));
+}
+
+std::vector<uint32_t> blocks_of(const SplatPool& pool)
+{
+    return *pool.scene().blocks().read<uint32_t>(test_device());
+}
+
+SplatImage picture_of(const SplatPool& pool)
+{
+    const SplatCamera seen_by = camera_above();
+    const auto rasterizer = *Rasterizer::create(test_device(), pool.scene(), 64, 48, 1, {.rows = pool.end()});
+    return (*rasterizer->render({&seen_by, 1}))[0];
+}
+
+// rows of the pool are those of a scene of these points alone
+void expect_surfels(const SplatPool& pool, const TileIndex& tile, const ScenePoints& points,
+                    const SurfelOptions& options)
+{
+    const Surfels all = *pool.scene().read(), alone = *SurfelScene::create(test_device(), points, options)->read();
+    const SplatPool::Place place = pool.places().at(tile);
+    ASSERT_EQ(place.count, points.size());
+    for (size_t i = 0; i < place.count; ++i) {
+        const size_t row = place.first + i;
+        ASSERT_EQ(all.position[row], alone.position[i]);
+        ASSERT_EQ(all.normal[row], alone.normal[i]) << i;
+        ASSERT_EQ(all.color[row], alone.color[i]);
+        ASSERT_EQ(all.sigma_u[row], alone.sigma_u[i]);
+        ASSERT_EQ(all.opacity[row], alone.opacity[i]);
+        ASSERT_EQ(all.label[row], alone.label[i]);
+    }
+}
+
+TEST(engine_splat, surfels_of_tiles_are_those_of_scenes_of_their_points)
+{
+    const auto pool = pool_of(1u << 20);
+    const SurfelOptions spaced{.auto_sigma = true}, wide{.auto_sigma = true, .neighbor_radius = 0.9f};
+    const ScenePoints tiles[] = {floor_at(0, 300), floor_at(4, 500), floor_at(8, 17), floor_at(12, 256)};
+    for (int32_t i = 0; i < 4; ++i)
+        add(*pool, {i, 0}, tiles[i], i == 1 ? wide : spaced);
+    for (int32_t i = 0; i < 4; ++i)
+        expect_surfels(*pool, {i, 0}, tiles[i], i == 1 ? wide : spaced);
+}
+
+TEST(engine_splat, a_picture_costs_by_the_splats_that_are_there)
+{
+    std::vector<SplatImage> images[2];
+    uint64_t bytes[2][2] = {}, workgroups[2] = {};
+    for (const int large : {0, 1}) {
+        const auto pool = pool_of(large ? 64u << 20 : 1u << 20);
+        const auto rasterizer_now = [&] {
+            return *Rasterizer::create(test_device(), pool->scene(), 64, 48, 1, {.rows = pool->end()});
+        };
+        add(*pool, {0, 0}, floor_at(0, 3000));
+        show(*pool);
+        bytes[large][0] = rasterizer_now()->planned_bytes();
+        add(*pool, {1, 0}, floor_at(4, 3000));
+        show(*pool);
+        const auto rasterizer = rasterizer_now();
+        EXPECT_GE(rasterizer->rows(), 6000u);
+        const SplatCamera seen_by = camera_above();
+        images[large] = *rasterizer->render({&seen_by, 1});
+        bytes[large][1] = rasterizer->planned_bytes();
+        for (const Pass& pass : rasterizer->program().plan().passes)
+            workgroups[large] += uint64_t(pass.group_count[0]) * pass.group_count[1] * pass.group_count[2];
+    }
+    EXPECT_EQ(bytes[0][0], bytes[1][0]);
+    EXPECT_EQ(bytes[0][1], bytes[1][1]);
+    EXPECT_GT(bytes[0][1], bytes[0][0]);
+    EXPECT_EQ(workgroups[0], workgroups[1]);
+    EXPECT_EQ(images[0][0].color, images[1][0].color);
+    EXPECT_EQ(images[0][0].label, images[1][0].label);
+    EXPECT_GT(std::ranges::count(images[0][0].label, 2u), 0);
+}
+
+TEST(engine_splat, what_is_made_is_seen_when_it_is_shown_and_what_was_there_stays_until_then)
+{
+    const auto pool = pool_of(1u << 20);
+    add(*pool, {0, 0}, floor_at(0, 400));
+    EXPECT_EQ(pool->end(), 0u);
+    EXPECT_EQ(blocks_of(*pool)[0], 0u);
+    show(*pool);
+    EXPECT_EQ(pool->end(), 448u); // whole blocks
+    EXPECT_EQ(pool->version(), 1u);
+    const SplatImage before = picture_of(*pool);
+    EXPECT_GT(std::ranges::count(before.label, 2u), 0);
+
+    ScenePoints changed = floor_at(0, 400);
+    changed.labels.assign(changed.size(), 5);
+    add(*pool, {0, 0}, changed); // again, of other points
+    EXPECT_EQ(picture_of(*pool).label, before.label);
+    EXPECT_EQ(pool->surfels(), 400u);
+    show(*pool);
+    const SplatImage after = picture_of(*pool);
+    EXPECT_GT(std::ranges::count(after.label, 5u), 0);
+    EXPECT_EQ(std::ranges::count(after.label, 2u), 0);
+    EXPECT_EQ(pool->places().at({0, 0}).first, 448u);
+    expect_surfels(*pool, {0, 0}, changed, {});
+
+    add(*pool, {1, 0}, floor_at(4, 400)); // where the old ones were
+    EXPECT_EQ(pool->places().at({1, 0}).first, 0u);
+    pool->remove({1, 0}); // before it was ever shown
+    pool->remove({0, 0});
+    show(*pool);
+    EXPECT_EQ(pool->end(), 0u);
+    EXPECT_EQ(pool->surfels(), 0u);
+    EXPECT_EQ(picture_of(*pool).alpha, std::vector<float>(64 * 48, 0));
+    const uint64_t version = pool->version();
+    show(*pool);
+    EXPECT_EQ(pool->version(), version);
+}
+
+TEST(engine_splat, rows_that_left_are_used_again_when_no_draw_looks_at_them)
+{
+    const auto pool = pool_of(512 * SplatPool::kSurfelBytes);
+    const ScenePoints points = floor_at(0, 300), more = floor_at(4, 300);
+    add(*pool, {0, 0}, points);
+    EXPECT_EQ(*pool->add({1, 0}, more, more.size(), {}), SplatPool::Room::none);
+    EXPECT_EQ(*pool->add({1, 0}, floor_at(0, 513), 513, {}), SplatPool::Room::none);
+    pool->remove({0, 0}); // never shown
+    add(*pool, {0, 0}, points);
+    show(*pool);
+    pool->remove({0, 0});
+    EXPECT_EQ(*pool->add({1, 0}, more, more.size(), {}), SplatPool::Room::later);
+    ASSERT_TRUE(pool->publish());
+    EXPECT_EQ(*pool->add({1, 0}, more, more.size(), {}), SplatPool::Room::later);
+    Device& device = test_device();
+    const auto ring = *CommandRing::create(device, 1);
+    pool->record_updates(*ring->begin(), device.next_point());
+    EXPECT_EQ(*pool->add({1, 0}, more, more.size(), {}), SplatPool::Room::later); // a frame is on its way
+    ASSERT_TRUE(device.wait(*ring->submit()));
+    add(*pool, {1, 0}, more);
+    show(*pool);
+
+    // with no room for both, those of before leave first
+    EXPECT_EQ(*pool->add({1, 0}, points, points.size(), {}), SplatPool::Room::later);
+    EXPECT_FALSE(pool->has({1, 0}));
+    show(*pool);
+    add(*pool, {1, 0}, points);
+    show(*pool);
+    expect_surfels(*pool, {1, 0}, points, {});
 }
 
 } // namespace engine_splat_test

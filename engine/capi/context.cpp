@@ -50,8 +50,6 @@ MemorySource memory_source(const sr_vulkan_device& v)
 
 Result<std::unique_ptr<Device>> adopt(const sr_vulkan_device& v, const DeviceOptions& options)
 {
-    if (v.reserved)
-        return fail(ErrorCode::usage, "sr_vulkan_device: reserved is not 0");
     HostDevice host;
     host.get_instance_proc_addr = v.get_instance_proc_addr;
     host.instance = v.instance;
@@ -59,6 +57,8 @@ Result<std::unique_ptr<Device>> adopt(const sr_vulkan_device& v, const DeviceOpt
     host.device = v.device;
     host.queue = v.queue;
     host.queue_family = v.queue_family;
+    host.work_queue = v.work_queue;
+    host.work_queue_family = v.work_queue_family;
     host.float16 = v.shader_float16;
     host.cooperative_matrix = v.cooperative_matrix;
     host.robust_buffer_access = v.robust_buffer_access == 1;
@@ -94,6 +94,7 @@ Result<std::unique_ptr<sr_context>> make_context(const sr_context_desc& desc)
     } else {
         SR_TRY(context->device, Device::create(options));
     }
+    SR_TRY(context->drawing, Device::beside(*context->device));
     context->summary = summarize(context->device->vk(), context->device->instance(), context->device->physical(),
                                  context->device->index());
     return context;
@@ -161,7 +162,12 @@ sr_status Turn::refuse() noexcept
 
 sr_status remember(sr_context* context, sr_status status, std::string message) noexcept
 {
-    (context ? context->error : thread_error) = std::move(message);
+    if (!context) {
+        thread_error = std::move(message);
+        return status;
+    }
+    const std::lock_guard lock(context->error_mutex);
+    context->error = std::move(message);
     return status;
 }
 
@@ -209,6 +215,9 @@ const char* sr_status_name(sr_status status)
 
 size_t sr_last_error(const sr_context* context, char* buffer, size_t size)
 {
+    std::unique_lock<std::mutex> lock;
+    if (context)
+        lock = std::unique_lock(context->error_mutex);
     const std::string& text = context ? context->error : thread_error;
     if (buffer && size) {
         const size_t count = std::min(text.size(), size - 1);
@@ -261,7 +270,7 @@ void sr_context_destroy(sr_context* context)
 
 sr_status sr_context_get_device(sr_context* context, sr_device_info* device)
 {
-    return guarded(context, [&]() -> Status {
+    return guarded<kAnyTime>(context, [&]() -> Status {
         if (!context || !device || device->struct_size < 8)
             return fail(ErrorCode::usage, "sr_context_get_device: NULL, or struct_size is not set");
         write_struct(info_of(context->summary), device, device->struct_size);
@@ -271,7 +280,7 @@ sr_status sr_context_get_device(sr_context* context, sr_device_info* device)
 
 sr_status sr_context_get_memory(sr_context* context, sr_memory_info* memory)
 {
-    return guarded(context, [&]() -> Status {
+    return guarded<kAnyTime>(context, [&]() -> Status {
         if (!context || !memory || memory->struct_size < 8)
             return fail(ErrorCode::usage, "sr_context_get_memory: NULL, or struct_size is not set");
         sr_memory_info info{};
@@ -316,7 +325,7 @@ static_assert(number_of(SEMROVER_VERSION) == SR_VERSION);
 
 // the layout that programs were built against: a change here is a new ABI
 static_assert(sizeof(sr_device_info) == 816 && offsetof(sr_device_info, memory_bytes) == 808);
-static_assert(sizeof(sr_vulkan_device) == 120 && offsetof(sr_vulkan_device, robust_buffer_access) == 76);
+static_assert(sizeof(sr_vulkan_device) == 128 && offsetof(sr_vulkan_device, robust_buffer_access) == 76);
 static_assert(sizeof(sr_context_desc) == 72 && offsetof(sr_context_desc, max_bytes) == 32);
 static_assert(sizeof(sr_memory_info) == 32);
 static_assert(sizeof(sr_memory_request) == 32 && sizeof(sr_memory_piece) == 32);

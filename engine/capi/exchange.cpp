@@ -9,7 +9,7 @@ namespace semrover::capi {
 Result<HostCopies*> copies_of(sr_context& context)
 {
     if (!context.copies) {
-        SR_TRY(context.copies, HostCopies::create(*context.device));
+        SR_TRY(context.copies, HostCopies::create(*context.drawing));
     }
     return context.copies.get();
 }
@@ -58,7 +58,7 @@ Status check_size(const ImageSize& size, const char* name)
 Status hand_over(sr_context& context, const Slot& pixels, const ImageSize& size, const sr_target& to)
 {
     if (to.memory)
-        SR_CHECK(context.device->read(pixels.slice(), {static_cast<std::byte*>(to.memory), size_t(pixels.bytes())}));
+        SR_CHECK(context.drawing->read(pixels.slice(), {static_cast<std::byte*>(to.memory), size_t(pixels.bytes())}));
     if (!to.buffer && !to.image)
         return {};
     SR_TRY(HostCopies * copies, copies_of(context));
@@ -101,9 +101,9 @@ Status take_in(sr_context& context, const sr_source& from, const Slot& to, uint6
     return copies->fetch(from.buffer, from.buffer_offset, slice);
 }
 
-Result<const SplatPool*> splats_of(const sr_world& world, const char* name)
+Result<SplatPool*> splats_of(const sr_world& world, const char* name)
 {
-    const SplatPool* splats = world.world->splats();
+    SplatPool* splats = world.world->splats();
     if (!splats)
         return fail(ErrorCode::usage, "{}: the world was created without splat_bytes", name);
     return splats;

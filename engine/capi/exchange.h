@@ -45,6 +45,11 @@ Result<SplatSlots> draw_splats(sr_world& world, const sr_draw_desc& draw, const 
 Result<SplatSlots> record_splats(sr_world& world, const sr_draw_desc& draw, VkCommandBuffer commands, const char* name);
 
 // Errors: usage for a world without splat_bytes. name: of the call
-Result<const SplatPool*> splats_of(const sr_world& world, const char* name);
+Result<SplatPool*> splats_of(const sr_world& world, const char* name);
+
+// Into commands, or by our own: what was published is shown to what follows. Rasterizers that nothing needs any more
+// go. false: there was nothing. done: as sr_world_record_updates has it
+Result<bool> record_updates(sr_world& world, VkCommandBuffer commands, const TimelinePoint& done);
+Status show_updates(sr_world& world, bool wait);
 
 } // namespace semrover::capi

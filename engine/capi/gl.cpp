@@ -11,7 +11,7 @@ struct sr_gl {
     sr_context* context = nullptr;
     std::unique_ptr<GlLink> link;
     GlRoom pictures[4], frame;
-    GlRoom splats[4];
+    GlRoom splats[5];
     sr_gl_splats known = {};   // what the splats' rooms have
     uint64_t world_number = 0; // of which world; 0: of none yet
 
@@ -36,10 +36,10 @@ struct sr_gl {
 namespace {
 
 // calls f with the context of GL; an error is its sr_context's
-template <typename F>
+template <Use use = kDraw, typename F>
 sr_status with_gl(sr_gl* gl, const char* name, F f) noexcept
 {
-    return guarded(gl ? gl->context : nullptr, [&]() -> Status {
+    return guarded<use>(gl ? gl->context : nullptr, [&]() -> Status {
         if (!gl)
             return fail(ErrorCode::usage, "{}: gl is NULL", name);
         return f();
@@ -54,7 +54,7 @@ Result<std::unique_ptr<sr_gl>> make_gl(sr_context& context, const sr_gl_desc& d)
         return fail(ErrorCode::usage, "sr_gl_desc: best is {}, which is no sr_gl_way", d.best);
     auto gl = std::make_unique<sr_gl>();
     gl->context = &context;
-    SR_TRY(gl->link, GlLink::create(*context.device, d.get_proc_address, sr_gl_way(d.best)));
+    SR_TRY(gl->link, GlLink::create(*context.drawing, d.get_proc_address, sr_gl_way(d.best)));
     return gl;
 }
 
@@ -145,7 +145,10 @@ Status draw(sr_gl& gl, sr_world& world, const sr_gl_draw_desc& d)
     SR_CHECK(link.gl().take_errors("was set before sr_gl_draw"));
     const GlStateKept kept(link.gl());
     if (d.unwaited && link.way() == SR_GL_SHARED) {
+        SR_CHECK(splats_of(world, "sr_gl_draw").map([](SplatPool*) {}));
+        SR_CHECK(show_updates(world, false));
         SR_TRY(const VkCommandBuffer commands, link.begin());
+        world.done = gl.context->drawing->next_point();
         SR_TRY(const SplatSlots images, record_splats(world, camera_of(d), commands, "sr_gl_draw"));
         const std::vector<Wanted> wanted = wanted_of(gl, d, images);
         SR_TRY(const std::vector<GlLink::Piece> pieces, pieces_of(link, wanted));
@@ -168,6 +171,7 @@ Status take(sr_gl& gl, sr_renderer& renderer, GlName texture)
         return fail(ErrorCode::usage, "sr_gl_take: texture is 0");
     if (!renderer.camera->frames())
         return fail(ErrorCode::usage, "sr_gl_take: no frame is finished");
+    SR_CHECK(renderer.context->device->wait(renderer.context->device->last_ticket()));
     SR_CHECK(link.gl().take_errors("was set before sr_gl_take"));
     const GlStateKept kept(link.gl());
     const std::vector<Wanted> wanted{
@@ -185,13 +189,14 @@ Status send_splats(sr_gl& gl, const SplatPool& pool)
 {
     GlLink& link = *gl.link;
     const uint64_t rows = pool.end(), room = pool.scene().size();
-    const auto arrays = pool.scene().arrays();
+    const auto [positions, normals, colors, labels, cells] = pool.scene().arrays();
+    const Slot arrays[] = {positions, normals, colors, labels, pool.scene().blocks()};
     std::vector<GlLink::Piece> pieces;
     for (size_t i = 0; i < std::size(gl.splats); ++i) {
         const BufferSlice all = arrays[i].slice();
         SR_CHECK(link.make_room(gl.splats[i], all.bytes, true, "splats for GL"));
         if (rows)
-            pieces.push_back({all.part(0, all.bytes / room * rows), &gl.splats[i]});
+            pieces.push_back({all.part(0, all.bytes * rows / room), &gl.splats[i]});
     }
     if (pieces.empty())
         return {};
@@ -201,10 +206,11 @@ Status send_splats(sr_gl& gl, const SplatPool& pool)
     return {};
 }
 
-Status update_splats(sr_gl& gl, const sr_world& world)
+Status update_splats(sr_gl& gl, sr_world& world)
 {
     SR_CHECK(check_world(gl, world, "sr_gl_get_splats"));
     SR_TRY(const SplatPool* pool, splats_of(world, "sr_gl_get_splats"));
+    SR_CHECK(show_updates(world, true));
     if (gl.world_number == world.number && gl.known.version == pool->version())
         return {};
     SR_CHECK(gl.link->gl().take_errors("was set before sr_gl_get_splats"));
@@ -217,9 +223,11 @@ Status update_splats(sr_gl& gl, const sr_world& world)
     gl.world_number = world.number;
     gl.known.count = pool->end();
     gl.known.version = pool->version();
-    sr_gl_array* const arrays[] = {&gl.known.positions, &gl.known.normals, &gl.known.colors, &gl.known.labels};
+    sr_gl_array* const arrays[] = {&gl.known.positions, &gl.known.normals, &gl.known.colors, &gl.known.labels,
+                                   &gl.known.blocks};
+    const uint64_t bytes[] = {16, 16, 16, 4, 4}, count = gl.known.count, blocks = count / SurfelScene::kBlock;
     for (size_t i = 0; i < std::size(gl.splats); ++i)
-        *arrays[i] = {gl.splats[i].buffer, 0, uint64_t(gl.known.count) * (i == 3 ? 4 : 16)};
+        *arrays[i] = {gl.splats[i].buffer, 0, (i == 4 ? blocks : count) * bytes[i]};
     return {};
 }
 
@@ -262,7 +270,7 @@ sr_status sr_gl_draw(sr_gl* gl, sr_world* world, const sr_gl_draw_desc* desc)
 
 sr_status sr_gl_take(sr_gl* gl, sr_renderer* renderer, uint32_t texture)
 {
-    return with_gl(gl, "sr_gl_take", [&]() -> Status {
+    return with_gl<kAlone>(gl, "sr_gl_take", [&]() -> Status {
         if (!renderer)
             return fail(ErrorCode::usage, "sr_gl_take: renderer is NULL");
         return take(*gl, *renderer, texture);
@@ -282,4 +290,4 @@ sr_status sr_gl_get_splats(sr_gl* gl, sr_world* world, sr_gl_splats* splats)
 } // extern "C"
 
 static_assert(sizeof(sr_gl_desc) == 24 && sizeof(sr_gl_info) == 296 && sizeof(sr_gl_draw_desc) == 168);
-static_assert(sizeof(sr_gl_array) == 16 && sizeof(sr_gl_splats) == 80);
+static_assert(sizeof(sr_gl_array) == 16 && sizeof(sr_gl_splats) == 96);

@@ -12,14 +12,17 @@
 #include "runtime/device/host_copies.h"
 
 #include <atomic>
+#include <mutex>
 
 // what the handles of the C interface hold
 struct sr_context {
-    std::atomic<uint32_t> in_use = 0; // what calls at work use of it (capi::Use)
-    std::unique_ptr<semrover::Device> device;
+    std::atomic<uint32_t> in_use = 0;          // what calls at work use of it (capi::Use)
+    std::unique_ptr<semrover::Device> device;  // of the calls that generate and refine
+    std::unique_ptr<semrover::Device> drawing; // of those that draw, maybe at the same time: the other queue, if any
     semrover::DeviceSummary summary;
+    mutable std::mutex error_mutex;
     std::string error;
-    std::unique_ptr<semrover::HostCopies> copies; // from the first call that needs them on
+    std::unique_ptr<semrover::HostCopies> copies; // by the drawing device, from the first call that needs them on
     uint64_t worlds = 0;                          // made so far
 };
 
@@ -45,10 +48,21 @@ struct sr_world {
     sr_context* context = nullptr;
     uint64_t number = 0; // of the context's worlds, from 1 on
     std::shared_ptr<semrover::Model> model;
+    // for the call that works; what other threads ask for meanwhile is posted, and done by the next one
+    std::mutex work;
     std::unique_ptr<semrover::World> world;
+    std::mutex post;
+    std::optional<semrover::WorldFocus> focus;
+    semrover::LabelEdits edits;
+    std::vector<semrover::CellWindow> labels_ready;
+    sr_world_info info = {}; // as the last call left it
+    // of the thread that draws
     semrover::capi::SizedRasterizer pixels;                 // of renderers that draw
     semrover::capi::SizedRasterizer images[2], recorded[2]; // of draws; the second with depth test
-    std::unique_ptr<semrover::CommandRing> commands;        // of sr_world_submit, from the first on
+    std::unique_ptr<semrover::CommandRing> commands;        // of our own submits, from the first on
+    bool updated_by_host = false;                           // by sr_world_record_updates
+    semrover::TimelinePoint done;                           // when all that was recorded so far has been executed
+    std::vector<std::pair<semrover::TimelinePoint, std::shared_ptr<semrover::Rasterizer>>> retired;
 };
 
 struct sr_renderer {

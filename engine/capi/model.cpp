@@ -119,7 +119,7 @@ extern "C" {
 
 sr_status sr_model_load(sr_context* context, const sr_model_desc* desc, sr_model** model)
 {
-    return guarded(context, [&]() -> Status {
+    return guarded<kWork>(context, [&]() -> Status {
         if (!context || !model)
             return fail(ErrorCode::usage, "sr_model_load: NULL");
         *model = nullptr;

@@ -16,12 +16,27 @@ Status check_targets(const sr_draw_desc& d)
     return {};
 }
 
+// a command buffer of the world's own, begun
+Result<VkCommandBuffer> begin(sr_world& world)
+{
+    if (!world.commands) {
+        SR_TRY(world.commands, CommandRing::create(*world.context->drawing));
+    }
+    return world.commands->begin();
+}
+
+Status check_device(const sr_world& world, const char* name)
+{
+    if (world.context->device->owned())
+        return fail(ErrorCode::usage, "{}: the context is not on a device of the host's", name);
+    return {};
+}
+
 // draws and copies, into a command buffer that is being recorded
 Status record(sr_world& world, const sr_draw_desc& d, VkCommandBuffer commands, const char* name)
 {
-    Device& device = *world.context->device;
-    if (device.owned())
-        return fail(ErrorCode::usage, "{}: the context is not on a device of the host's", name);
+    Device& device = *world.context->drawing;
+    SR_CHECK(check_device(world, name));
     if (d.reserved)
         return fail(ErrorCode::usage, "sr_draw_desc: reserved is not 0");
     SR_CHECK(check_targets(d));
@@ -54,10 +69,10 @@ Status submit(sr_world& world, const sr_draw_desc& d, const sr_sync& sync)
     TimelinePoints points;
     SR_TRY(points.waits, points_of(sync.waits, sync.wait_count, "waits"));
     SR_TRY(points.signals, points_of(sync.signals, sync.signal_count, "signals"));
-    if (!world.commands) {
-        SR_TRY(world.commands, CommandRing::create(*world.context->device));
-    }
-    SR_TRY(const VkCommandBuffer commands, world.commands->begin());
+    if (world.world->splats())
+        SR_CHECK(show_updates(world, false));
+    SR_TRY(const VkCommandBuffer commands, begin(world));
+    world.done = world.context->drawing->next_point();
     SR_CHECK(record(world, d, commands, "sr_world_submit"));
     return world.commands->submit(points).map([](uint64_t) {});
 }
@@ -68,12 +83,16 @@ namespace semrover::capi {
 
 Result<SplatSlots> record_splats(sr_world& world, const sr_draw_desc& d, VkCommandBuffer commands, const char* name)
 {
-    Device& device = *world.context->device;
+    Device& device = *world.context->drawing;
     SR_TRY(const SplatPool* splats, splats_of(world, name));
     const ImageSize size{d.width, d.height};
     SR_CHECK(check_size(size, "sr_draw_desc"));
     const bool tested = d.depth_test.image;
-    SR_TRY(Rasterizer * rasterizer, world.recorded[tested].of(device, splats->scene(), size, {.depth_tested = tested}));
+    std::vector<std::shared_ptr<Rasterizer>> retired;
+    SR_TRY(Rasterizer * rasterizer,
+           world.recorded[tested].of(device, *splats, size, {.depth_tested = tested}, retired));
+    for (std::shared_ptr<Rasterizer>& last : retired)
+        world.retired.emplace_back(world.done, std::move(last));
     if (tested) {
         SR_TRY(const HostFloats depth, host_depth(d.depth_test, size));
         record_host_floats(device, commands, depth, rasterizer->z_buffer().slice());
@@ -82,13 +101,40 @@ Result<SplatSlots> record_splats(sr_world& world, const sr_draw_desc& d, VkComma
     return rasterizer->images(0);
 }
 
+Result<bool> record_updates(sr_world& world, VkCommandBuffer commands, const TimelinePoint& done)
+{
+    for (size_t i = world.retired.size(); i-- > 0;) {
+        auto& [point, rasterizer] = world.retired[i];
+        if (!point.semaphore) { // recorded before the host has named a point
+            point = done;
+            continue;
+        }
+        SR_TRY(const bool reached, world.context->drawing->reached(point));
+        if (reached)
+            world.retired.erase(world.retired.begin() + ptrdiff_t(i));
+    }
+    return world.world->splats()->record_updates(commands, done);
+}
+
+Status show_updates(sr_world& world, bool wait)
+{
+    Device& device = *world.context->drawing;
+    SR_TRY(const VkCommandBuffer commands, begin(world));
+    SR_TRY(const bool some, record_updates(world, commands, device.next_point()));
+    if (!some)
+        return {};
+    world.done = device.next_point();
+    SR_TRY(const uint64_t ticket, world.commands->submit());
+    return wait ? device.wait(ticket) : Status();
+}
+
 } // namespace semrover::capi
 
 extern "C" {
 
 sr_status sr_world_record(sr_world* world, const sr_draw_desc* draw, VkCommandBuffer commands)
 {
-    return guarded(world ? world->context : nullptr, [&]() -> Status {
+    return guarded<kDraw>(world ? world->context : nullptr, [&]() -> Status {
         if (!world || !commands)
             return fail(ErrorCode::usage, "sr_world_record: NULL");
         SR_TRY(const sr_draw_desc known, read_struct(draw, "sr_draw_desc"));
@@ -96,9 +142,22 @@ sr_status sr_world_record(sr_world* world, const sr_draw_desc* draw, VkCommandBu
     });
 }
 
+sr_status sr_world_record_updates(sr_world* world, VkCommandBuffer commands, const sr_semaphore* done)
+{
+    return guarded<kDraw>(world ? world->context : nullptr, [&]() -> Status {
+        if (!world || !commands || !done || !done->semaphore)
+            return fail(ErrorCode::usage, "sr_world_record_updates: NULL");
+        SR_CHECK(check_device(*world, "sr_world_record_updates"));
+        SR_CHECK(splats_of(*world, "sr_world_record_updates").map([](SplatPool*) {}));
+        world->updated_by_host = true;
+        world->done = {done->semaphore, done->value};
+        return record_updates(*world, commands, world->done).map([](bool) {});
+    });
+}
+
 sr_status sr_world_submit(sr_world* world, const sr_draw_desc* draw, const sr_sync* sync)
 {
-    return guarded(world ? world->context : nullptr, [&]() -> Status {
+    return guarded<kDraw>(world ? world->context : nullptr, [&]() -> Status {
         if (!world)
             return fail(ErrorCode::usage, "sr_world_submit: world is NULL");
         SR_TRY(const sr_draw_desc known, read_struct(draw, "sr_draw_desc"));
@@ -109,15 +168,12 @@ sr_status sr_world_submit(sr_world* world, const sr_draw_desc* draw, const sr_sy
 
 sr_status sr_world_check_draws(sr_world* world)
 {
-    return guarded(world ? world->context : nullptr, [&]() -> Status {
+    return guarded<kDraw>(world ? world->context : nullptr, [&]() -> Status {
         if (!world)
             return fail(ErrorCode::usage, "sr_world_check_draws: world is NULL");
         bool whole = true;
-        for (const SizedRasterizer& recorded : world->recorded)
-            if (Rasterizer* rasterizer = recorded.last()) {
-                SR_TRY(const bool this_one, rasterizer->make_whole());
-                whole = whole && this_one;
-            }
+        for (SizedRasterizer& recorded : world->recorded)
+            whole = recorded.was_whole() && whole;
         if (!whole)
             return fail(ErrorCode::partial, "a picture lacks splats: there is more room for the next one");
         return {};

@@ -10,10 +10,10 @@ using namespace semrover::capi;
 namespace {
 
 // calls f with the camera's renderer; an error is its context's
-template <typename F>
+template <Use use = kWork, typename F>
 sr_status with_renderer(sr_renderer* renderer, const char* name, F f) noexcept
 {
-    return guarded(renderer ? renderer->context : nullptr, [&]() -> Status {
+    return guarded<use>(renderer ? renderer->context : nullptr, [&]() -> Status {
         if (!renderer)
             return fail(ErrorCode::usage, "{}: renderer is NULL", name);
         return f(*renderer->camera);
@@ -80,11 +80,13 @@ Result<ImageGray16> draw_world(sr_renderer& renderer, sr_world& world, const Cam
     if (world.context != renderer.context)
         return fail(ErrorCode::usage, "sr_frame_desc: the world belongs to another context");
     SR_TRY(const SplatPool* splats, splats_of(world, "sr_frame_desc"));
+    if (!world.updated_by_host)
+        SR_CHECK(show_updates(world, true));
     Device& device = *renderer.context->device;
     RasterizerOptions options;
     options.visible_alpha = r.model().defaults.visible_threshold;
     options.pixels_over = std::array<uint8_t, 3>{};
-    SR_TRY(Rasterizer * rasterizer, world.pixels.of(device, splats->scene(), renderer.size, options));
+    SR_TRY(Rasterizer * rasterizer, world.pixels.of(device, *splats, renderer.size, options));
     const SplatCamera seen_by = splat_camera(camera.intrinsics, camera.pose);
     SR_CHECK(rasterizer->draw({&seen_by, 1}).map([](uint32_t) {}));
     const SplatPixelSlots pixels = rasterizer->pixels(0);
@@ -154,7 +156,7 @@ extern "C" {
 
 sr_status sr_renderer_create(sr_context* context, const sr_renderer_desc* desc, sr_renderer** renderer)
 {
-    return guarded(context, [&]() -> Status {
+    return guarded<kWork>(context, [&]() -> Status {
         if (!context || !renderer)
             return fail(ErrorCode::usage, "sr_renderer_create: NULL");
         *renderer = nullptr;
@@ -172,7 +174,7 @@ void sr_renderer_destroy(sr_renderer* renderer)
 
 sr_status sr_renderer_begin(sr_renderer* renderer, const sr_frame_desc* frame)
 {
-    return with_renderer(renderer, "sr_renderer_begin", [&](CameraRenderer&) -> Status {
+    return with_renderer<kAlone>(renderer, "sr_renderer_begin", [&](CameraRenderer&) -> Status {
         SR_TRY(const sr_frame_desc known, read_struct(frame, "sr_frame_desc"));
         return begin_frame(*renderer, known);
     });
@@ -192,11 +194,12 @@ sr_status sr_renderer_step(sr_renderer* renderer, uint64_t budget_us, uint32_t* 
 
 sr_status sr_renderer_take(sr_renderer* renderer, const sr_target* target)
 {
-    return with_renderer(renderer, "sr_renderer_take", [&](CameraRenderer& r) -> Status {
+    return with_renderer<kAlone>(renderer, "sr_renderer_take", [&](CameraRenderer& r) -> Status {
         if (!target)
             return fail(ErrorCode::usage, "sr_renderer_take: target is NULL");
         if (!r.frames())
             return fail(ErrorCode::usage, "sr_renderer_take: no frame is finished");
+        SR_CHECK(renderer->context->device->wait(renderer->context->device->last_ticket()));
         return hand_over(*renderer->context, r.texels(), renderer->size, *target);
     });
 }

@@ -4,31 +4,58 @@
 
 #include "engine/camera/image_size.h"
 #include "engine/splat/rasterizer.h"
+#include "engine/splat/splat_pool.h"
 
 namespace semrover::capi {
 
-// A rasterizer for one camera, of one kind, and the size of the last pictures, made anew when another size is asked
-// for.
+// A rasterizer of a pool's splats for one camera, of one kind, and the size of the last pictures: made anew when
+// another size is asked for, there are more splats than it looks at, or it lacked room.
 class SizedRasterizer {
   public:
-    Result<Rasterizer*> of(Device& device, const SurfelScene& scene, const ImageSize& size,
-                           const RasterizerOptions& options)
+    // errors: as Rasterizer has them
+    Result<Rasterizer*> of(Device& device, const SplatPool& splats, const ImageSize& size, RasterizerOptions options)
     {
-        if (rasterizer_ && size_ == size && alpha_ == options.visible_alpha)
+        const bool sized = rasterizer_ && size_ == size && alpha_ == options.visible_alpha;
+        if (sized && splats.end() <= rasterizer_->rows() && pairs_ <= rasterizer_->max_pairs())
             return rasterizer_.get();
-        rasterizer_.reset(); // its memory goes before the next one's comes
-        SR_TRY(rasterizer_, Rasterizer::create(device, scene, size.width, size.height, 1, options));
+        options.rows = splats.end();
+        if (rasterizer_ && (pairs_ || rasterizer_->rebuilds())) // more than it begins with
+            options.max_pairs = std::max({pairs_, rasterizer_->max_pairs(), 4 * splats.end()});
+        rasterizer_.reset();
+        SR_TRY(rasterizer_, Rasterizer::create(device, splats.scene(), size.width, size.height, 1, options));
+        pairs_ = std::min(pairs_, rasterizer_->max_pairs()); // what the device has room for
         size_ = size;
         alpha_ = options.visible_alpha;
         return rasterizer_.get();
     }
 
-    Rasterizer* last() const { return rasterizer_.get(); } // or null
+    // The same for drawings that are recorded: one that is made anew goes to `retired`, as what it recorded may still
+    // be executed
+    Result<Rasterizer*> of(Device& device, const SplatPool& splats, const ImageSize& size, RasterizerOptions options,
+                           std::vector<std::shared_ptr<Rasterizer>>& retired)
+    {
+        const std::shared_ptr<Rasterizer> last = rasterizer_;
+        const auto found = of(device, splats, size, options);
+        if (last && last != rasterizer_)
+            retired.push_back(last);
+        return found;
+    }
+
+    // Had all of the last drawings room for their splats? If not, that is told once: the next rasterizer has more
+    bool was_whole()
+    {
+        const uint32_t pairs = rasterizer_ ? rasterizer_->recorded_pairs() : 0;
+        if (!rasterizer_ || pairs <= std::max(rasterizer_->max_pairs(), pairs_))
+            return true;
+        pairs_ = pairs + pairs / 4 + 1024;
+        return false;
+    }
 
   private:
-    std::unique_ptr<Rasterizer> rasterizer_;
+    std::shared_ptr<Rasterizer> rasterizer_;
     ImageSize size_;
     float alpha_ = 0;
+    uint32_t pairs_ = 0; // that there must be room for
 };
 
 } // namespace semrover::capi

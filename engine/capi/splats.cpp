@@ -34,15 +34,15 @@ Result<SplatSlots> draw_splats(sr_world& world, const sr_draw_desc& d, const cha
     SR_TRY(const SplatPool* splats, splats_of(world, name));
     const ImageSize size{d.width, d.height};
     SR_CHECK(check_size(size, "sr_draw_desc"));
+    SR_CHECK(show_updates(world, true));
     sr_context& context = *world.context;
     const bool tested = d.depth_test.image;
-    SR_TRY(Rasterizer * rasterizer,
-           world.images[tested].of(*context.device, splats->scene(), size, {.depth_tested = tested}));
+    SR_TRY(Rasterizer * rasterizer, world.images[tested].of(*context.drawing, *splats, size, {.depth_tested = tested}));
     if (tested) {
         SR_TRY(const HostFloats depth, host_depth(d.depth_test, size));
         SR_TRY(HostCopies * copies, copies_of(context));
         SR_CHECK(copies->fetch(depth, rasterizer->z_buffer().slice()));
-        SR_CHECK(rasterizer->z_scale().write(*context.device, z_scale(d.depth_test)));
+        SR_CHECK(rasterizer->z_scale().write(*context.drawing, z_scale(d.depth_test)));
     }
     const SplatCamera camera = pinhole_camera(d, size);
     SR_CHECK(rasterizer->draw({&camera, 1}).map([](uint32_t) {}));
@@ -55,7 +55,7 @@ extern "C" {
 
 sr_status sr_world_get_splats(sr_world* world, sr_splats* splats)
 {
-    return guarded(world ? world->context : nullptr, [&]() -> Status {
+    return guarded<kDraw>(world ? world->context : nullptr, [&]() -> Status {
         if (!world)
             return fail(ErrorCode::usage, "sr_world_get_splats: world is NULL");
         SR_TRY(const SplatPool* pool, splats_of(*world, "sr_world_get_splats"));
@@ -67,13 +67,14 @@ sr_status sr_world_get_splats(sr_world* world, sr_splats* splats)
         known.normals = array_of(arrays[1]);
         known.colors = array_of(arrays[2]);
         known.labels = array_of(arrays[3]);
+        known.blocks = array_of(pool->scene().blocks());
         return write_result(known, splats, "sr_world_get_splats");
     });
 }
 
 sr_status sr_world_draw(sr_world* world, const sr_draw_desc* draw)
 {
-    return guarded(world ? world->context : nullptr, [&]() -> Status {
+    return guarded<kDraw>(world ? world->context : nullptr, [&]() -> Status {
         if (!world)
             return fail(ErrorCode::usage, "sr_world_draw: world is NULL");
         SR_TRY(const sr_draw_desc known, read_struct(draw, "sr_draw_desc"));
@@ -85,5 +86,5 @@ sr_status sr_world_draw(sr_world* world, const sr_draw_desc* draw)
 
 } // extern "C"
 
-static_assert(sizeof(sr_array) == 24 && sizeof(sr_splats) == 112 && sizeof(sr_target) == 40);
+static_assert(sizeof(sr_array) == 24 && sizeof(sr_splats) == 136 && sizeof(sr_target) == 40);
 static_assert(sizeof(sr_depth_image) == 40 && sizeof(sr_draw_desc) == 352);

@@ -202,14 +202,33 @@ Result<std::unique_ptr<sr_world>> make_world(sr_context& context, const sr_world
 }
 
 // calls f with the world; an error is its context's
-template <typename F>
+template <Use use, typename F>
 sr_status with_world(sr_world* world, const char* name, F f) noexcept
 {
-    return guarded(world ? world->context : nullptr, [&]() -> Status {
+    return guarded<use>(world ? world->context : nullptr, [&]() -> Status {
         if (!world)
             return fail(ErrorCode::usage, "{}: world is NULL", name);
         return f();
     });
+}
+
+// what was posted is done; by the call that works
+Status take_posts(sr_world& world)
+{
+    std::optional<WorldFocus> focus;
+    LabelEdits edits;
+    std::vector<CellWindow> ready;
+    {
+        const std::lock_guard lock(world.post);
+        std::swap(focus, world.focus);
+        std::swap(edits, world.edits);
+        std::swap(ready, world.labels_ready);
+    }
+    for (const CellWindow& window : ready)
+        world.world->labels_ready(window);
+    if (!edits.empty())
+        SR_CHECK(world.world->edit(edits));
+    return focus ? world.world->focus(*focus) : Status();
 }
 
 sr_world_info info_of(const sr_world& world)
@@ -230,6 +249,13 @@ sr_world_info info_of(const sr_world& world)
     info.tile_cells = uint32_t(world.world->tile_cells());
     info.points_per_voxel = uint32_t(world.world->points_per_voxel());
     return info;
+}
+
+void keep_info(sr_world& world)
+{
+    const sr_world_info info = info_of(world);
+    const std::lock_guard lock(world.post);
+    world.info = info;
 }
 
 } // namespace
@@ -255,7 +281,7 @@ sr_status sr_read_objects(const char* path, sr_object* objects, uint64_t* count)
 
 sr_status sr_world_create(sr_context* context, const sr_world_desc* desc, sr_world** world)
 {
-    return guarded(context, [&]() -> Status {
+    return guarded<kWork>(context, [&]() -> Status {
         if (!context || !world)
             return fail(ErrorCode::usage, "sr_world_create: NULL");
         *world = nullptr;
@@ -273,60 +299,77 @@ void sr_world_destroy(sr_world* world)
 
 sr_status sr_world_focus(sr_world* world, const double position[3], const double direction[3], double radius)
 {
-    return with_world(world, "sr_world_focus", [&]() -> Status {
+    return with_world<kAnyTime>(world, "sr_world_focus", [&]() -> Status {
         if (!position || !direction)
             return fail(ErrorCode::usage, "sr_world_focus: NULL");
         WorldFocus focus{.radius = radius};
         std::copy_n(position, 3, focus.position.begin());
         std::copy_n(direction, 3, focus.direction.begin());
-        return world->world->focus(focus);
+        SR_CHECK(world->world->check_focus(focus));
+        const std::lock_guard lock(world->post);
+        world->focus = focus;
+        return {};
     });
 }
 
 sr_status sr_world_step(sr_world* world, uint64_t budget_us, uint32_t* done)
 {
-    return with_world(world, "sr_world_step", [&]() -> Status {
-        Device& device = *world->context->device;
-        SR_CHECK(device.wait(device.last_ticket())); // draws that nobody waited for
-        SR_TRY(const bool all, world->world->step(timed_budget(budget_us)));
-        SR_CHECK(device.wait(device.last_ticket())); // splats that were copied last
+    return with_world<kWork>(world, "sr_world_step", [&]() -> Status {
+        const std::lock_guard lock(world->work);
+        SR_CHECK(take_posts(*world));
+        const Result<bool> all = world->world->step(timed_budget(budget_us));
+        keep_info(*world);
+        if (!all)
+            return tl::make_unexpected(all.error());
         if (done)
-            *done = all;
+            *done = *all;
         return {};
     });
 }
 
 sr_status sr_world_edit(sr_world* world, const sr_cell* cells, uint64_t count)
 {
-    return with_world(world, "sr_world_edit", [&]() -> Status {
+    return with_world<kAnyTime>(world, "sr_world_edit", [&]() -> Status {
         SR_TRY(const LabelEdits edits, edits_of(cells, count, "sr_world_edit"));
-        SR_CHECK(world->context->device->wait(world->context->device->last_ticket())); // likewise
-        return world->world->edit(edits);
+        SR_CHECK(world->world->check_edits(edits));
+        const std::lock_guard lock(world->post);
+        for (const auto& [cell, label] : edits)
+            world->edits.insert_or_assign(cell, label);
+        return {};
     });
 }
 
 sr_status sr_world_labels_ready(sr_world* world, const sr_cell_rect* window)
 {
-    return with_world(world, "sr_world_labels_ready", [&]() -> Status {
+    return with_world<kAnyTime>(world, "sr_world_labels_ready", [&]() -> Status {
         if (!window)
             return fail(ErrorCode::usage, "sr_world_labels_ready: NULL");
-        world->world->labels_ready({{window->low[0], window->low[1]}, {window->high[0], window->high[1]}});
+        const std::lock_guard lock(world->post);
+        world->labels_ready.push_back({{window->low[0], window->low[1]}, {window->high[0], window->high[1]}});
         return {};
     });
 }
 
 sr_status sr_world_get_info(sr_world* world, sr_world_info* info)
 {
-    return with_world(world, "sr_world_get_info",
-                      [&]() -> Status { return write_result(info_of(*world), info, "sr_world_get_info"); });
+    return with_world<kAnyTime>(world, "sr_world_get_info", [&]() -> Status {
+        if (const std::unique_lock lock(world->work, std::try_to_lock); lock) {
+            SR_CHECK(take_posts(*world));
+            keep_info(*world);
+        }
+        const std::lock_guard lock(world->post);
+        return write_result(world->info, info, "sr_world_get_info");
+    });
 }
 
 sr_status sr_world_copy_cells(sr_world* world, const sr_cell_rect* window, sr_grid** grid)
 {
-    return with_world(world, "sr_world_copy_cells", [&]() -> Status {
+    return with_world<kAnyTime>(world, "sr_world_copy_cells", [&]() -> Status {
         if (!window || !grid)
             return fail(ErrorCode::usage, "sr_world_copy_cells: NULL");
         *grid = nullptr;
+        const std::lock_guard lock(world->work);
+        SR_CHECK(take_posts(*world));
         const CellWindow asked{{window->low[0], window->low[1]}, {window->high[0], window->high[1]}};
         *grid = new sr_grid{world->world->cells(asked), {}};
         return {};
@@ -335,7 +378,10 @@ sr_status sr_world_copy_cells(sr_world* world, const sr_cell_rect* window, sr_gr
 
 sr_status sr_world_flush(sr_world* world)
 {
-    return with_world(world, "sr_world_flush", [&]() -> Status { return world->world->flush(); });
+    return with_world<kWork>(world, "sr_world_flush", [&]() -> Status {
+        const std::lock_guard lock(world->work);
+        return world->world->flush();
+    });
 }
 
 } // extern "C"

@@ -20,6 +20,18 @@ constexpr int32_t kFarthestCell = 1 << 19;   // of a focus
 constexpr uint64_t kNoDeadline = 1ull << 60; // microseconds
 constexpr size_t kTilesALook = 64;           // most of which need nothing
 
+std::array<TileIndex, 8> tiles_around(const TileIndex& t)
+{
+    return {{{t[0] - 1, t[1] - 1},
+             {t[0] - 1, t[1]},
+             {t[0] - 1, t[1] + 1},
+             {t[0], t[1] - 1},
+             {t[0], t[1] + 1},
+             {t[0] + 1, t[1] - 1},
+             {t[0] + 1, t[1]},
+             {t[0] + 1, t[1] + 1}}};
+}
+
 } // namespace
 
 World::World(Device& device, WorldRequest request, std::unique_ptr<WorldLabels> labels, const JobCallbacks& callbacks)
@@ -122,21 +134,13 @@ Status World::warm_up()
         return {};
     SR_TRY(splats_, SplatPool::create(filling_.device(), request_.splat_bytes));
     grid.generated.assign(grid.cells.size(), 1); // points in the middle of their cells
-    return SurfelScene::create(filling_.device(), points_of(grid), request_.surfels).map([](const auto&) {});
+    return splats_->prepare(points_of(grid).size(), request_.surfels);
 }
 
 Status World::focus(const WorldFocus& focus)
 {
     SR_ASSERT(tiles_, "a focus needs the order of tiles");
-    bool finite = std::isfinite(focus.radius);
-    for (size_t a = 0; a < 3; ++a)
-        finite = finite && std::isfinite(focus.position[a]) && std::isfinite(focus.direction[a]);
-    if (!finite || focus.radius < 0 || focus.radius > kMostRadius)
-        return fail(ErrorCode::usage, "a focus: expected finite numbers and a radius of 0 to {} m, found {} m",
-                    kMostRadius, focus.radius);
-    for (size_t a = 0; a < 2; ++a)
-        if (std::abs(focus.position[a]) > kFarthestCell * double(voxel_size()))
-            return fail(ErrorCode::usage, "a focus at {} m is too far out", focus.position[a]);
+    SR_CHECK(check_focus(focus));
     if (focus_ && is_nearly(*focus_, focus, edge()))
         return {};
     focus_ = focus;
@@ -202,13 +206,15 @@ void World::find_bare()
     std::ranges::sort(bare);
     for (const auto& [away, index] : bare)
         bare_.push_back(index);
-    std::ranges::stable_partition(bare_,
-                                  [this](const TileIndex& t) { return splats_->has(t) && details_.at(t) < detail(t); });
+    std::ranges::stable_partition(bare_, [this](const TileIndex& t) {
+        const auto made = made_for_.find(t);
+        return made != made_for_.end() && made->second.detail < detail(t);
+    });
 }
 
 World::Piece World::next_piece() const
 {
-    if (!bare_.empty())
+    if (!bare_.empty() && !no_room_yet_)
         return Piece::splats;
     if (work_.empty())
         return loading_.empty() ? Piece::look : Piece::load;
@@ -221,9 +227,18 @@ World::Piece World::next_piece() const
 
 Result<bool> World::step(const JobBudget& budget)
 {
+    no_room_yet_ = false;
+    Result<bool> done = work(budget);
+    if (splats_)
+        SR_CHECK(splats_->publish());
+    return done;
+}
+
+Result<bool> World::work(const JobBudget& budget)
+{
     BudgetMeter meter(budget);
     bool spent = false; // something was done already
-    while (!idle_ || !work_.empty() || !bare_.empty()) {
+    while (!idle_ || !work_.empty() || (!bare_.empty() && !no_room_yet_)) {
         const Piece piece = next_piece();
         const bool submits = piece == Piece::first_row || piece == Piece::row || piece == Piece::last_row;
         SubmitCost& cost = costs_[size_t(piece)];
@@ -306,7 +321,7 @@ Result<std::optional<TileIndex>> World::missing(const TileIndex& tile)
     SR_TRY(WorldTile * own, tiles_->bring(tile));
     if (!own) {
         if (stale_.contains(tile)) // an edit took its last cell away
-            SR_CHECK(went(tile));
+            went(tile);
         return std::optional<TileIndex>();
     }
     if (own->finished) {
@@ -401,6 +416,8 @@ void World::end_look()
     found_.clear();
     rank_ = done_;
     idle_ = work_.empty();
+    if (idle_ && focus_)
+        find_bare(); // those whose neighbours turned out to be empty, too
 }
 
 // it is wanted up to a rank, or seen by one that is, or at work
@@ -438,7 +455,7 @@ Status World::drop(const TileIndex& tile)
         not_stored_.erase(tile);
     if (there.finished) {
         ++dropped_;
-        SR_CHECK(went(tile));
+        went(tile);
     }
     if (const auto rank = order_.rank_of(tile))
         ahead_.erase(*rank);
@@ -526,52 +543,116 @@ void World::give_up()
 void World::came(const TileIndex& tile)
 {
     if (splats_)
-        bare_.push_back(tile);
+        splats_came(tile);
     if (const auto rank = order_.rank_of(tile); rank && *rank >= done_)
         ahead_.insert(*rank);
 }
 
-Status World::went(const TileIndex& tile)
+// those beside it have not had these points for neighbours
+void World::splats_came(const TileIndex& tile)
+{
+    bare_.push_back(tile);
+    int bit = 8; // of this tile for the other
+    for (const TileIndex& other : tiles_around(tile)) {
+        --bit;
+        const auto made = made_for_.find(other);
+        if (made == made_for_.end())
+            continue;
+        made->second.neighbours &= uint8_t(~(1u << bit));
+        if (!has_splats(other) && !std::ranges::count(bare_, other))
+            bare_.push_back(other);
+    }
+}
+
+void World::went(const TileIndex& tile)
 {
     std::erase(bare_, tile);
+    if (splats_)
+        drop_splats(tile);
+}
+
+void World::drop_splats(const TileIndex& tile)
+{
     stale_.erase(tile);
-    return splats_ ? drop_splats(tile) : Status();
+    made_for_.erase(tile);
+    splats_->remove(tile);
 }
 
-Status World::drop_splats(const TileIndex& tile)
+// as it is to be now. One whose neighbours are still to come is not made anew for each of them
+bool World::has_splats(const TileIndex& tile) const
 {
-    details_.erase(tile);
-    return splats_->remove(tile);
+    const auto made = made_for_.find(tile);
+    if (made == made_for_.end() || stale_.contains(tile) || made->second.detail != detail(tile))
+        return false;
+    return !(neighbours_with_points(tile) & ~made->second.neighbours) || !neighbours_are_settled(tile);
 }
 
-Result<SurfelScene> World::splats_of(const VoxelGrid& cells, uint32_t detail)
+// a bit for each of tiles_around()
+uint8_t World::neighbours_with_points(const TileIndex& tile) const
 {
-    const ScenePoints points = points_of(cells);
-    if (!detail)
-        return SurfelScene::create(filling_.device(), points, request_.surfels);
-    const float edge = std::ldexp(voxel_size(), int(detail) - 2); // half a cell, a cell, two cells
+    uint8_t bits = 0;
+    int n = 0;
+    for (const TileIndex& other : tiles_around(tile))
+        bits |= uint8_t((this->tile(other) != nullptr) << n++);
+    return bits;
+}
+
+bool World::neighbours_are_settled(const TileIndex& tile) const
+{
+    return std::ranges::all_of(tiles_around(tile),
+                               [this](const TileIndex& t) { return finished(t) || out_of_reach(t); });
+}
+
+// Points of other tiles that may be neighbours of a tile's own, which lie up to a voxel outside of it. thinned_by: the
+// edge of cubes, metres; 0: they are not thinned
+void World::append_neighbours(const TileIndex& tile, float reach, float thinned_by, ScenePoints& points) const
+{
+    const double margin = reach + voxel_size();
+    for (const TileIndex& index : tiles_around(tile)) {
+        const VoxelGrid* cells = this->tile(index);
+        if (!cells)
+            continue;
+        const ScenePoints all = thinned_by > 0 ? thinned(points_of(*cells), thinned_by) : points_of(*cells);
+        for (size_t i = 0; i < all.size(); ++i) {
+            bool near = true;
+            for (size_t a = 0; a < 2; ++a)
+                near = near && all.positions[i][a] > tile[a] * edge() - margin &&
+                       all.positions[i][a] < (tile[a] + 1) * edge() + margin;
+            if (!near)
+                continue;
+            points.positions.push_back(all.positions[i]);
+            points.colors.push_back(all.colors[i]);
+            points.labels.push_back(all.labels[i]);
+            points.cells.push_back(0);
+        }
+    }
+}
+
+// those out of reach make room, farthest first
+Result<SplatPool::Room> World::add_splats(const TileIndex& index, const VoxelGrid& cells, uint32_t detail)
+{
+    ScenePoints points = points_of(cells);
     SurfelOptions options = request_.surfels;
-    options.auto_sigma = true; // they stand for larger pieces
-    options.largest_sigma = 2 * edge;
-    options.neighbor_radius = std::max(options.neighbor_radius, 3 * edge);
-    return SurfelScene::create(filling_.device(), thinned(points, edge), options);
-}
-
-// those out of reach make room, farthest first; false: there is none
-Result<bool> World::add_splats(const TileIndex& index, const SurfelScene& surfels)
-{
-    details_.erase(index);
-    SR_TRY(bool there, splats_->add(index, surfels));
+    const float cube = detail ? std::ldexp(voxel_size(), int(detail) - 2) : 0; // half a cell, a cell, two cells
+    if (detail) {
+        points = thinned(points, cube);
+        options.auto_sigma = true; // they stand for larger pieces
+        options.largest_sigma = 2 * cube;
+        options.neighbor_radius = std::max(options.neighbor_radius, 3 * cube);
+    }
+    const size_t own = points.size();
+    append_neighbours(index, options.neighbor_radius, cube, points);
+    SR_TRY(SplatPool::Room room, splats_->add(index, points, own, options));
     std::vector<std::pair<double, TileIndex>> others;
     for (const auto& [other, place] : splats_->places())
-        if (const double away = this->away(other); focus_ && away > focus_->radius)
-            others.emplace_back(away, other);
+        if (out_of_reach(other))
+            others.emplace_back(away(other), other);
     std::ranges::sort(others);
-    for (; !there && !others.empty(); others.pop_back()) {
-        SR_CHECK(drop_splats(others.back().second));
-        SR_TRY(there, splats_->add(index, surfels));
+    for (; room == SplatPool::Room::none && !others.empty(); others.pop_back()) {
+        drop_splats(others.back().second);
+        SR_TRY(room, splats_->add(index, points, own, options));
     }
-    return there;
+    return room;
 }
 
 // One that is dropped meanwhile has none. Where there is no room, coarser ones may fit.
@@ -581,19 +662,37 @@ Status World::make_splats(const TileIndex& index)
     if (!cells || has_splats(index))
         return {};
     const uint32_t wanted = detail(index), coarsest = request_.detail_distance > 0 ? kCoarsestDetail : 0;
-    bool there = false;
-    for (uint32_t detail = wanted; !there && detail <= coarsest; ++detail) {
-        SR_TRY(const SurfelScene surfels, splats_of(*cells, detail));
-        SR_TRY(there, add_splats(index, surfels));
-        full_ = full_ || !there;
+    SplatPool::Room room = SplatPool::Room::none;
+    for (uint32_t detail = wanted; room == SplatPool::Room::none && detail <= coarsest; ++detail) {
+        SR_TRY(room, add_splats(index, *cells, detail));
+        full_ = full_ || room != SplatPool::Room::found;
     }
-    if (there)
-        details_[index] = wanted;
+    if (room == SplatPool::Room::later) { // in another step, when what leaves has left
+        bare_.insert(bare_.begin(), index);
+        no_room_yet_ = true;
+        return {};
+    }
+    if (room == SplatPool::Room::found)
+        made_for_[index] = {wanted, neighbours_with_points(index)};
     stale_.erase(index);
     return {};
 }
 
-Status World::edit(const LabelEdits& edits)
+Status World::check_focus(const WorldFocus& focus) const
+{
+    bool finite = std::isfinite(focus.radius);
+    for (size_t a = 0; a < 3; ++a)
+        finite = finite && std::isfinite(focus.position[a]) && std::isfinite(focus.direction[a]);
+    if (!finite || focus.radius < 0 || focus.radius > kMostRadius)
+        return fail(ErrorCode::usage, "a focus: expected finite numbers and a radius of 0 to {} m, found {} m",
+                    kMostRadius, focus.radius);
+    for (size_t a = 0; a < 2; ++a)
+        if (std::abs(focus.position[a]) > kFarthestCell * double(voxel_size()))
+            return fail(ErrorCode::usage, "a focus at {} m is too far out", focus.position[a]);
+    return {};
+}
+
+Status World::check_edits(const LabelEdits& edits) const
 {
     for (const auto& [cell, label] : edits) {
         for (const int32_t c : cell)
@@ -605,6 +704,12 @@ Status World::edit(const LabelEdits& edits)
             return fail(ErrorCode::bad_input, "an edit of cell ({}, {}, {}): label {}, the model knows {} classes",
                         cell[0], cell[1], cell[2], *label, classes);
     }
+    return {};
+}
+
+Status World::edit(const LabelEdits& edits)
+{
+    SR_CHECK(check_edits(edits));
     const std::vector<TileIndex> spoiled = tiles_->edit(edits);
     for (const TileIndex& tile : spoiled) {
         not_stored_.erase(tile); // the store may have it as it was before another edit

@@ -57,9 +57,10 @@ class World {
     Status open();
 
     // What is wanted from now on; tiles that are at work are finished first. A focus that moved by less than an eighth
-    // of a tile is the same. Errors: usage for numbers that are not finite, a radius that is not 0..2000 m or a place
-    // beyond 2^19 cells
+    // of a tile is the same. Errors: of check_focus()
     Status focus(const WorldFocus& focus);
+    // usage for numbers that are not finite, a radius that is not 0..2000 m or a place beyond 2^19 cells; any thread
+    Status check_focus(const WorldFocus& focus) const;
     // The tiles within `horizon` metres of a track. Those that nothing wanted needs any more leave memory once the
     // store has them. usage: a horizon that is not above 0 and up to 1000 m
     Status follow(std::span<const GroundPoint> track, double horizon);
@@ -68,15 +69,17 @@ class World {
     Status everywhere(RunFolder* run = nullptr);
 
     // Works as long as the budget allows: one piece of work at least, and no piece that is expected not to fit, going
-    // by those of its kind before. true: nothing is left to do. A step waits for what it submits if the budget is
+    // by those of its kind before. true: nothing is left to do, but for splats that wait for rows which are still
+    // looked at. What became of splats is published at its end. A step waits for what it submits if the budget is
     // timed. Errors: of the source, of the device; those tiles are tried again by the next step. In the order of the
     // scene only the destructor may follow
     Result<bool> step(const JobBudget& budget);
 
     // Sets labels, or takes cells away. Their tiles and those that see them are generated anew; what was finished of
-    // them is gone at once, but their splats stay until the new ones are there. Errors: bad_input for cells beyond 2^20
-    // and unknown labels; nothing is changed then
+    // them is gone at once, but their splats stay until the new ones are there. Errors: of check_edits(); nothing is
+    // changed then
     Status edit(const LabelEdits& edits);
+    Status check_edits(const LabelEdits& edits) const; // bad_input: beyond 2^20, unknown labels; any thread
     // The source knows the labels of a window that it did not know yet (kNotYet): the tiles that wait for them are
     // asked for again
     void labels_ready(const CellWindow& window);
@@ -101,8 +104,9 @@ class World {
     // may follow. runs: as many of the same
     Result<Json> estimate(size_t runs = 1);
 
-    // splats of finished tiles, each made of the tile's own points; null without splat_bytes
-    const SplatPool* splats() const { return splats_.get(); }
+    // splats of finished tiles; at a border, normals and sizes go by the points on both sides, once they are there.
+    // Null without splat_bytes
+    SplatPool* splats() const { return splats_.get(); }
 
     // Whether the store takes what is finished. A world goes on without: its tiles stay in memory, as far as budgets
     // allow, and a warning says so once
@@ -130,6 +134,7 @@ class World {
     void want(TileOrder order);
     void look_again();
     Piece next_piece() const;
+    Result<bool> work(const JobBudget& budget);
     Status do_piece(Piece piece);
     Status load_next();
     Status look();
@@ -146,18 +151,19 @@ class World {
     Status finish();
     void say(bool ended = false) const;
     uint32_t detail(const TileIndex& tile) const { return detail_of(away(tile), request_.detail_distance); }
-    bool has_splats(const TileIndex& tile) const
-    {
-        return splats_->has(tile) && !stale_.contains(tile) && details_.at(tile) == detail(tile);
-    }
+    bool out_of_reach(const TileIndex& tile) const { return focus_ && away(tile) > focus_->radius; }
+    bool has_splats(const TileIndex& tile) const;
+    uint8_t neighbours_with_points(const TileIndex& tile) const;
+    bool neighbours_are_settled(const TileIndex& tile) const;
+    void append_neighbours(const TileIndex& tile, float reach, float thinned_by, ScenePoints& points) const;
     void find_bare();
-    Result<SurfelScene> splats_of(const VoxelGrid& cells, uint32_t detail);
-    Result<bool> add_splats(const TileIndex& tile, const SurfelScene& surfels);
+    Result<SplatPool::Room> add_splats(const TileIndex& tile, const VoxelGrid& cells, uint32_t detail);
     Status make_splats(const TileIndex& tile);
-    Status drop_splats(const TileIndex& tile);
+    void drop_splats(const TileIndex& tile);
     void give_up();
     void came(const TileIndex& tile);
-    Status went(const TileIndex& tile);
+    void splats_came(const TileIndex& tile);
+    void went(const TileIndex& tile);
 
     const WorldRequest request_;
     const JobCallbacks callbacks_;
@@ -181,9 +187,14 @@ class World {
     bool cut_ = false, filled_ = false;                // how far they are
     VoxelGrid part_;                                   // they, and what they know
     std::unique_ptr<SplatPool> splats_;
-    std::vector<TileIndex> bare_;           // finished tiles whose splats are made next
-    std::map<TileIndex, uint32_t> details_; // that the splats of tiles were made for
-    std::set<TileIndex> stale_;             // tiles whose splats are those before an edit
+    std::vector<TileIndex> bare_; // finished tiles whose splats are made next
+    struct MadeFor {              // splats: of which detail, and beside which neighbours
+        uint32_t detail;
+        uint8_t neighbours;
+    };
+    std::map<TileIndex, MadeFor> made_for_;
+    std::set<TileIndex> stale_; // tiles whose splats are those before an edit
+    bool no_room_yet_ = false;  // for splats, in this step
     std::array<SubmitCost, kPieces> costs_;
     uint64_t generated_ = 0, loaded_ = 0, dropped_ = 0, cells_ = 0;
     uint64_t planned_bytes_ = 0;

@@ -8,6 +8,7 @@
 #include "runtime/device/command.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstring>
 
@@ -37,6 +38,14 @@ Result<uint32_t> room_for(uint32_t need, uint32_t bytes_each, const DeviceLimits
     if (need > limit)
         return fail(ErrorCode::out_of_memory, "a frame needs {} {}; this device has room for {}", need, what, limit);
     return uint32_t(std::min<uint64_t>(limit, uint64_t(need) + need / 4 + 1024));
+}
+
+// Rows that are looked at in a scene of `most` with `rows` in use: 1, 2, 3, 4, 6, 8, 12 .. times 4096, so that a
+// rasterizer of one that grows is seldom made anew.
+uint32_t stepped(uint32_t rows, uint32_t most)
+{
+    const uint64_t step = std::max(std::bit_floor(std::max(rows, 1u)) / 2, 4096u);
+    return uint32_t(std::min(round_up64(std::max(rows, 1u), step), uint64_t(most)));
 }
 
 // some texels of what SplatSlots has, in that order
@@ -119,19 +128,20 @@ Result<std::unique_ptr<Rasterizer>> Rasterizer::create(Device& device, const Sur
     r->options_ = options;
     r->width_ = width;
     r->height_ = height;
+    const uint32_t rows = r->rows_ = options.rows ? stepped(*options.rows, scene.size()) : scene.size();
     const uint64_t limit = std::min(device.limits().max_storage_range, device.limits().max_allocation);
     const uint64_t per_camera =
-        std::max(uint64_t(width) * height * 16, uint64_t(scene.size()) * 4); // bytes of the largest tensor
+        std::max(uint64_t(width) * height * 16, uint64_t(rows) * 4); // bytes of the largest tensor
     if (per_camera > limit)
         return fail(ErrorCode::out_of_memory,
                     "{} x {} pixels of {} splats need {} bytes in one tensor; this device takes {}", width, height,
-                    scene.size(), per_camera, limit);
+                    rows, per_camera, limit);
     r->cameras_ = uint32_t(std::min<uint64_t>(max_cameras, limit / per_camera));
     r->max_visible_ =
-        uint32_t(std::min<uint64_t>(std::max(scene.size(), 1024u), limit / splat_record_bytes(lens_of(options.model))));
+        uint32_t(std::min<uint64_t>(std::max(rows, 1024u), limit / splat_record_bytes(lens_of(options.model))));
     // A street of a million surfels has 1.5 pairs a surfel at 616 x 424 and 2.8 at 1920 x 1080. More room makes the
     // blending seem longer than a submit may last, and then it is cut.
-    const uint64_t pairs = options.max_pairs ? options.max_pairs : std::max<uint64_t>(4ull * scene.size(), 65536);
+    const uint64_t pairs = options.max_pairs ? options.max_pairs : std::max<uint64_t>(4ull * rows, 65536);
     r->max_pairs_ = uint32_t(std::min(pairs, limit / kPairBytes));
     SR_CHECK(r->build());
     return r;
@@ -147,7 +157,6 @@ Status Rasterizer::build()
     camera_table_ = state_.slot(cameras_, camera_floats, DType::f32, "cameras", camera_floats);
     visible_ = state_.slot(1, 1, DType::u32, "visible splats", 1);
     pairs_ = state_.slot(1, 1, DType::u32, "splat pairs", 1);
-    recorded_ = state_.slot(kRecordings, 2, DType::u32, "recorded counts", 2);
     if (options_.depth_tested) {
         z_buffer_ = state_.slot(pixels, 1, DType::f32, "z-buffer", 1);
         z_scale_ = state_.slot(1, 2, DType::f32, "scale of the z-buffer", 2);
@@ -161,7 +170,6 @@ Status Rasterizer::build()
                    state_.slot(pixels, 2, DType::f32, "splat depth", 2),
                    state_.slot(pixels, 2, DType::u32, "splat ids", 2)};
     SR_CHECK(state_.allocate(device_, "splat images"));
-    SR_CHECK(recorded_.clear(device_));
     Graph g;
     SplatOptions o{.width = width_,
                    .height = height_,
@@ -177,7 +185,7 @@ Status Rasterizer::build()
     o.cutoff = options_.cutoff;
     if (options_.depth_tested)
         o.limits = splat_limits(g, z_buffer_.in(g), z_scale_.in(g));
-    const SplatImages y = splat(g, scene_.in(g), camera_table_.in(g), o);
+    const SplatImages y = splat(g, scene_.in(g, rows_), camera_table_.in(g), o);
     if (options_.pixels_over) {
         const PixelWords pixels_of_files = splat_pixels(g, y, {*options_.pixels_over, options_.visible_alpha});
         g.keep(pixels_of_files.seen, pixels_.seen);
@@ -237,6 +245,10 @@ Status Rasterizer::record(VkCommandBuffer commands, const SplatCamera& camera, s
     SR_CHECK(check_camera(camera, 0));
     if (!program_) // there was no memory for it the last time
         SR_CHECK(build());
+    if (!recorded_) {
+        SR_TRY(recorded_, Buffer::create(device_, kRecordings * sizeof(uint32_t), MemoryKind::staging, "counts"));
+        std::memset(recorded_->mapped(), 0, kRecordings * sizeof(uint32_t));
+    }
     std::vector<float> table(size_t(cameras_) * splat_camera_floats(lens_of(options_.model)));
     write_row(camera, std::span(table).first(table.size() / cameras_));
     const VulkanCalls& vk = device_.vk();
@@ -248,30 +260,21 @@ Status Rasterizer::record(VkCommandBuffer commands, const SplatCamera& camera, s
         record_update(vk, commands, scale.buffer->handle(), scale.offset, std::as_bytes(std::span(z_scale)));
     }
     program_->record_into(commands);
-    const uint32_t row = recording_++ % kRecordings;
-    const BufferSlice counts = recorded_.row_range(row, 1).slice();
-    uint64_t at = counts.offset;
-    for (const BufferSlice& count : {visible_.slice(), pairs_.slice()}) {
-        record_copy(vk, commands, count.buffer->handle(), count.offset, counts.buffer->handle(), at, sizeof(uint32_t));
-        at += sizeof(uint32_t);
-    }
+    const BufferSlice pairs = pairs_.slice();
+    const uint64_t at = recording_++ % kRecordings * sizeof(uint32_t);
+    record_copy(vk, commands, pairs.buffer->handle(), pairs.offset, recorded_->handle(), at, sizeof(uint32_t));
     return {};
 }
 
-Result<bool> Rasterizer::make_whole()
+uint32_t Rasterizer::recorded_pairs() const
 {
-    if (!program_)
-        return true;
-    SR_TRY(const std::vector<uint32_t> counts, recorded_.read<uint32_t>(device_));
-    uint32_t visible = 0, pairs = 0;
-    for (size_t i = 0; i < counts.size(); i += 2) {
-        visible = std::max(visible, counts[i]);
-        pairs = std::max(pairs, counts[i + 1]);
+    uint32_t most = 0;
+    for (uint32_t i = 0; recorded_ && i < kRecordings; ++i) {
+        // the device may write it at this moment
+        const auto* pairs = reinterpret_cast<const volatile uint32_t*>(recorded_->mapped()) + i;
+        most = std::max(most, uint32_t(*pairs));
     }
-    if (visible <= max_visible_ && pairs <= max_pairs_)
-        return true;
-    SR_CHECK(make_room(visible, pairs));
-    return false;
+    return most;
 }
 
 Result<uint32_t> Rasterizer::draw_some(std::span<const SplatCamera> cameras)

@@ -52,6 +52,7 @@ struct RasterizerOptions {
     float cutoff = 0;                         // sigmas; 0: as far as alpha_min
     uint32_t tile = 16;                       // pixels, a multiple of 16
     uint32_t max_pairs = 0;                   // to begin with; 0: from the number of surfels
+    std::optional<uint32_t> rows = {};        // the scene's first ones at least; none: all of it
     CameraModel model = CameraModel::pinhole; // of all cameras
     // keeps pixels as files have them, over this background, in place of images: draw() and pixels(), not render()
     std::optional<std::array<uint8_t, 3>> pixels_over = {};
@@ -69,7 +70,7 @@ struct SplatPixelSlots {
 
 // Draws a scene from up to max_cameras cameras in one submit; more are drawn in turns. The graph is built once and
 // replayed; when a frame has more splats or tiles than it has room for, it is built again with more, and the frame
-// repeated. The scene must outlive it.
+// repeated. Time and memory go by the rows that it looks at, not by the scene's size. The scene must outlive it.
 class Rasterizer {
   public:
     // errors: usage for sizes that are not 1..65535; out_of_memory
@@ -95,18 +96,20 @@ class Rasterizer {
     const Slot& z_scale() const { return z_scale_; }
 
     // The same by a host's hand: records the drawing into a command buffer, to be executed any number of times, one
-    // after the other, on the device's queue family. camera: copied. What is recorded is good until make_whole()
-    // returns false, and as long as the rasterizer. z_scale: likewise, with depth_tested; z_buffer() is filled by what
-    // was recorded before. Errors: bad_input as render()'s
+    // after the other, on the device's queue family. camera: copied. What is recorded is good as long as the
+    // rasterizer. z_scale: with depth_tested; z_buffer() is filled by what was recorded before. Errors: bad_input as
+    // render()'s
     Status record(VkCommandBuffer commands, const SplatCamera& camera, std::array<float, 2> z_scale = {});
-    // When the executions have ended: had all of the last kRecordings room for their splats? Where one had not, there
-    // is more room from now on, and false is returned. Errors: out_of_memory
-    Result<bool> make_whole();
+    // The most pairs that one of the last kRecordings had, of those that have been executed: where they are more than
+    // max_pairs(), it lacks the farthest splats. Does not wait
+    uint32_t recorded_pairs() const;
     static constexpr uint32_t kRecordings = 16;
 
     const Program& program() const { return *program_; }
     // device memory for what it has room for now, beside the scene's
     uint64_t planned_bytes() const { return state_.planned_bytes(device_.limits()) + program_->plan().arena_bytes(); }
+    uint32_t rows() const { return rows_; } // of the scene that it looks at
+    uint32_t max_pairs() const { return max_pairs_; }
     uint32_t rebuilds() const { return rebuilds_; } // how often there was not enough room
 
   private:
@@ -120,11 +123,11 @@ class Rasterizer {
     Device& device_;
     const SurfelScene& scene_;
     RasterizerOptions options_;
-    uint32_t width_ = 0, height_ = 0, cameras_ = 0;
+    uint32_t width_ = 0, height_ = 0, cameras_ = 0, rows_ = 0;
     uint32_t max_visible_ = 0, max_pairs_ = 0, rebuilds_ = 0;
     State state_;
     Slot camera_table_, visible_, pairs_, z_buffer_, z_scale_;
-    Slot recorded_; // [kRecordings, 2] u32: visible and pairs of what was recorded
+    std::unique_ptr<Buffer> recorded_; // [kRecordings] u32: pairs of what was recorded, where the host sees them
     uint32_t recording_ = 0;
     SplatSlots images_;      // of all cameras, or
     SplatPixelSlots pixels_; // likewise

@@ -2,9 +2,22 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/splat/splat_pool.h"
 
+#include "runtime/device/command.h"
+
 #include <algorithm>
 
 namespace semrover {
+
+namespace {
+
+constexpr uint32_t kBlock = SurfelScene::kBlock;
+
+uint32_t blocks_of(uint32_t count)
+{
+    return round_up(count, kBlock);
+}
+
+} // namespace
 
 Result<std::unique_ptr<SplatPool>> SplatPool::create(Device& device, uint64_t bytes)
 {
@@ -13,52 +26,155 @@ Result<std::unique_ptr<SplatPool>> SplatPool::create(Device& device, uint64_t by
     if (rows < 1 || rows > most)
         return fail(ErrorCode::usage, "splats of {} bytes: expected {} to {}, as much as this device can bind", bytes,
                     kSurfelBytes, most * kSurfelBytes);
-    SR_TRY(SurfelScene scene, SurfelScene::reserve(device, uint32_t(rows)));
+    SR_TRY(SurfelScene scene, SurfelScene::reserve(device, blocks_of(uint32_t(rows)), true));
     std::unique_ptr<SplatPool> pool(new SplatPool(device, std::move(scene)));
-    SR_TRY(pool->copies_, CopyRing::create(device));
+    SR_TRY(pool->commands_, CommandRing::create(device));
     return pool;
 }
 
-uint32_t SplatPool::end() const
+// the first place for rows between those that are used
+std::optional<uint32_t> SplatPool::gap(uint32_t rows, const std::map<uint32_t, uint32_t>& used) const
 {
-    return used_.empty() ? 0 : used_.rbegin()->second;
-}
-
-Result<bool> SplatPool::add(const TileIndex& tile, const SurfelScene& surfels)
-{
-    SR_CHECK(remove(tile));
     uint32_t first = 0;
-    for (const auto& [begin, end] : used_) {
-        if (begin - first >= surfels.size())
+    for (const auto& [begin, end] : used) {
+        if (begin - first >= rows)
             break;
         first = end;
     }
-    if (scene_.size() - first < surfels.size())
-        return false;
-    if (surfels.size()) {
-        SR_CHECK(scene_.put(*copies_, first, surfels));
-        used_[first] = first + surfels.size();
-    }
-    places_[tile] = {first, surfels.size()};
-    surfels_ += surfels.size();
-    ++version_;
-    return true;
+    return scene_.size() - first < rows ? std::optional<uint32_t>() : first;
 }
 
-Status SplatPool::remove(const TileIndex& tile)
+Result<SplatPool::Room> SplatPool::add(const TileIndex& tile, const ScenePoints& points, size_t own,
+                                       const SurfelOptions& options)
+{
+    SR_CHECK(take_back());
+    const auto count = uint32_t(std::min<size_t>(own, scene_.size() + 1ull)); // more never fit
+    const uint32_t rows = blocks_of(count);
+    std::optional<uint32_t> first = gap(rows, used_);
+    if (!first) {
+        if (const Room room = room_later(rows, tile); room != Room::found)
+            return room;
+        first = gap(rows, used_);
+    }
+    if (count) {
+        SR_CHECK(fill(*first, points, count, options));
+        used_[*first] = *first + rows;
+        staged_.shown.push_back({*first, rows});
+    }
+    remove(tile);
+    places_[tile] = {*first, count};
+    surfels_ += count;
+    return Room::found;
+}
+
+// Is there room once what leaves has left? Where there is not, the tile's own rows of before leave as well. found:
+// they have
+SplatPool::Room SplatPool::room_later(uint32_t rows, const TileIndex& tile)
+{
+    std::map<uint32_t, uint32_t> kept;
+    for (const auto& [index, place] : places_)
+        if (place.count)
+            kept[place.first] = place.first + blocks_of(place.count);
+    if (gap(rows, kept))
+        return Room::later;
+    const auto own = places_.find(tile);
+    if (own == places_.end() || !own->second.count)
+        return Room::none;
+    kept.erase(own->second.first);
+    if (!gap(rows, kept))
+        return Room::none;
+    remove(tile);
+    return gap(rows, used_) ? Room::found : Room::later;
+}
+
+// rows that no draw looks at any more
+Status SplatPool::take_back()
+{
+    const std::lock_guard lock(mutex_);
+    for (size_t i = leaving_.size(); i-- > 0;) {
+        SR_TRY(const bool gone, device_.reached(leaving_[i].done));
+        if (!gone)
+            continue;
+        used_.erase(leaving_[i].rows.first);
+        leaving_.erase(leaving_.begin() + ptrdiff_t(i));
+    }
+    return {};
+}
+
+Status SplatPool::fill(uint32_t first, const ScenePoints& points, uint32_t own, const SurfelOptions& options)
+{
+    SR_CHECK(rooms_.prepare(points.size(), options)); // which records commands of its own
+    SR_TRY(const VkCommandBuffer commands, commands_->begin());
+    SR_TRY(const SurfelScene* surfels, rooms_.record(commands, points, own, options));
+    scene_.record_put(commands, first, *surfels, blocks_of(own));
+    SR_TRY(made_, commands_->submit());
+    return {};
+}
+
+void SplatPool::remove(const TileIndex& tile)
 {
     const auto place = places_.find(tile);
     if (place == places_.end())
-        return {};
-    const auto [first, count] = place->second;
-    if (count) {
-        SR_CHECK(scene_.hide(first, count));
-        used_.erase(first);
-    }
-    surfels_ -= count;
+        return;
+    if (place->second.count)
+        leave(place->second);
+    surfels_ -= place->second.count;
     places_.erase(place);
-    ++version_;
+}
+
+// rows that were never shown are free at once
+void SplatPool::leave(const Place& place)
+{
+    const Rows rows{place.first, blocks_of(place.count)};
+    const std::lock_guard lock(mutex_);
+    if (std::erase(staged_.shown, rows) || std::erase(published_.shown, rows))
+        used_.erase(rows.first);
+    else
+        staged_.hidden.push_back(rows);
+}
+
+Status SplatPool::publish()
+{
+    SR_CHECK(device_.wait(made_));
+    const std::lock_guard lock(mutex_);
+    const auto move = [](std::vector<Rows>& from, std::vector<Rows>& to) {
+        to.insert(to.end(), from.begin(), from.end());
+        from.clear();
+    };
+    move(staged_.shown, published_.shown);
+    move(staged_.hidden, published_.hidden);
     return {};
+}
+
+bool SplatPool::record_updates(VkCommandBuffer commands, const TimelinePoint& done)
+{
+    Changes changes;
+    {
+        const std::lock_guard lock(mutex_);
+        std::swap(changes, published_);
+        for (const Rows& rows : changes.hidden)
+            leaving_.push_back({rows, done});
+    }
+    if (changes.shown.empty() && changes.hidden.empty())
+        return false;
+    const BufferSlice blocks = scene_.blocks().slice();
+    const VulkanCalls& vk = device_.vk();
+    const auto fill = [&](const Rows& rows, uint32_t value) {
+        record_fill(vk, commands, blocks.buffer->handle(), blocks.offset + rows.first / kBlock * sizeof(uint32_t),
+                    rows.count / kBlock * sizeof(uint32_t), value);
+    };
+    record_entry_barrier(vk, commands);
+    for (const Rows& rows : changes.shown) {
+        fill(rows, 1);
+        shown_[rows.first] = rows.first + rows.count;
+    }
+    for (const Rows& rows : changes.hidden) {
+        fill(rows, 0);
+        shown_.erase(rows.first);
+    }
+    record_exit_barrier(vk, commands);
+    ++version_;
+    return true;
 }
 
 } // namespace semrover

@@ -3,46 +3,99 @@
 #pragma once
 
 #include "engine/scene/tiles.h"
-#include "engine/splat/surfels.h"
-#include "runtime/device/copy_ring.h"
+#include "engine/splat/surfel_rooms.h"
+#include "runtime/device/command_ring.h"
+
+#include <mutex>
 
 namespace semrover {
 
 // The surfels of a world's tiles in one scene of fixed size: tiles come and go, and the others stay where they are.
-// Rows that no tile has are surfels without opacity, which are not drawn.
+//
+// To make surfels and to show them are two acts, of two threads: one adds and removes tiles, in rows that no draw looks
+// at; the other records what shows those that were published, and hides those that left. Rows are used again when
+// nothing on the device can look at them any more.
 class SplatPool {
   public:
     static constexpr uint32_t kSurfelBytes = 56; // in five arrays
 
-    // bytes: of device memory, for bytes / kSurfelBytes surfels. Errors: usage where not one fits, or an array is
-    // larger than the device can bind; out_of_memory
+    // bytes: of device memory, for bytes / kSurfelBytes surfels, rounded up to a block. Errors: usage where not one
+    // fits, or an array is larger than the device can bind; out_of_memory
     static Result<std::unique_ptr<SplatPool>> create(Device& device, uint64_t bytes);
 
     const SurfelScene& scene() const { return scene_; }
-    uint32_t end() const; // rows from here on have never a tile now: what a draw needs to look at
-    uint64_t version() const { return version_; } // moves with every change
-    size_t surfels() const { return surfels_; }
 
-    // puts a tile's surfels where there is room, behind what was submitted before. false: there is none
-    Result<bool> add(const TileIndex& tile, const SurfelScene& surfels);
-    Status remove(const TileIndex& tile); // one that is not there is fine
+    // ---- by the thread that makes tiles
+
+    // makes what add() of as many points needs, so that it does not. Errors: as add()'s
+    Status prepare(size_t points, const SurfelOptions& options) { return rooms_.prepare(points, options); }
+
+    enum class Room : uint8_t {
+        found,
+        later, // when rows that left are not looked at any more
+        none
+    };
+    // Makes surfels of a tile's points where there is room, and does not wait for it. The tile's own of before are
+    // there until the new ones are shown, but where there is not room for both. Points from number `own` on are those
+    // of other tiles, and only neighbours of the first. Errors: as SurfelScene::create() has them
+    Result<Room> add(const TileIndex& tile, const ScenePoints& points, size_t own, const SurfelOptions& options);
+    void remove(const TileIndex& tile); // one that is not there is fine
     bool has(const TileIndex& tile) const { return places_.contains(tile); }
+    size_t surfels() const { return surfels_; }
+    // What was added and removed since the last call is shown together; waits until it is made
+    Status publish();
 
     struct Place {
         uint32_t first = 0, count = 0; // rows
     };
     const std::map<TileIndex, Place>& places() const { return places_; }
 
+    // ---- by the thread that draws, at the same time
+
+    // Records what shows and hides what was published since the last call, with all that follows in the queue after it.
+    // `done` is reached when that has been executed; its semaphore outlives the pool. false: there was nothing
+    bool record_updates(VkCommandBuffer commands, const TimelinePoint& done);
+    // as of the last record_updates():
+    uint32_t end() const { return shown_.empty() ? 0 : shown_.rbegin()->second; } // no row from here on is shown
+    uint64_t version() const { return version_; }                                 // moves with every change
+
   private:
-    SplatPool(Device& device, SurfelScene scene) : device_(device), scene_(std::move(scene)) {}
+    struct Rows { // whole blocks
+        uint32_t first = 0, count = 0;
+        bool operator==(const Rows&) const = default;
+    };
+    struct Changes {
+        std::vector<Rows> shown, hidden;
+    };
+    struct Leaving {
+        Rows rows;
+        TimelinePoint done; // when no draw looks at them
+    };
+
+    SplatPool(Device& device, SurfelScene scene) : device_(device), scene_(std::move(scene)), rooms_(device) {}
+    std::optional<uint32_t> gap(uint32_t rows, const std::map<uint32_t, uint32_t>& used) const;
+    Room room_later(uint32_t rows, const TileIndex& tile);
+    Status take_back();
+    void leave(const Place& place);
+    Status fill(uint32_t first, const ScenePoints& points, uint32_t own, const SurfelOptions& options);
 
     Device& device_;
     SurfelScene scene_;
-    std::unique_ptr<CopyRing> copies_;
+    // of the thread that makes tiles
+    SurfelRooms rooms_;
+    std::unique_ptr<CommandRing> commands_;
     std::map<TileIndex, Place> places_;
-    std::map<uint32_t, uint32_t> used_; // rows: first, end
-    uint64_t version_ = 0;
+    std::map<uint32_t, uint32_t> used_; // rows: first, end; of places, and of what leaves
+    Changes staged_;
+    uint64_t made_ = 0; // ticket of the last fill
     size_t surfels_ = 0;
+    // of both
+    std::mutex mutex_;
+    Changes published_;
+    std::vector<Leaving> leaving_;
+    // of the thread that draws
+    std::map<uint32_t, uint32_t> shown_; // rows: first, end
+    uint64_t version_ = 0;
 };
 
 } // namespace semrover

@@ -3,7 +3,7 @@
 #include "engine/splat/surfels.h"
 
 #include "engine/scene/palette.h"
-#include "runtime/device/copy_ring.h"
+#include "runtime/device/command.h"
 #include "runtime/device/program.h"
 
 #include <cmath>
@@ -69,15 +69,26 @@ uint32_t label_bits(std::initializer_list<std::string_view> names)
 
 } // namespace
 
-Result<SurfelScene> SurfelScene::create(Device& device, const ScenePoints& points, const SurfelOptions& options)
+Status check_points(const ScenePoints& points)
 {
-    const size_t n = points.size();
-    SR_CHECK(check_count(n, {points.colors.size(), points.labels.size(), points.cells.size()}));
+    return check_count(points.size(), {points.colors.size(), points.labels.size(), points.cells.size()});
+}
+
+Status check_surfel_options(const SurfelOptions& options)
+{
     if (options.neighbors < 1 || options.neighbors > kMaxNeighbors)
         return fail(ErrorCode::usage, "surfels: {} neighbours, 1 to {} are supported", options.neighbors,
                     kMaxNeighbors);
     if (!(options.sigma > 0) || !std::isfinite(options.sigma))
         return fail(ErrorCode::usage, "surfels: a splat radius of {} m", options.sigma);
+    return {};
+}
+
+Result<SurfelScene> SurfelScene::create(Device& device, const ScenePoints& points, const SurfelOptions& options)
+{
+    SR_CHECK(check_points(points));
+    SR_CHECK(check_surfel_options(options));
+    const size_t n = points.size();
     Host host{.labels = points.labels, .cells = points.cells};
     for (size_t i = 0; i < n; ++i) {
         host.positions.push_back(row_of(points.positions[i], options.opacity));
@@ -86,8 +97,12 @@ Result<SurfelScene> SurfelScene::create(Device& device, const ScenePoints& point
     }
     SurfelScene scene(device);
     SR_CHECK(scene.upload(host));
-    if (n)
-        SR_CHECK(scene.derive(options));
+    if (!n)
+        return scene;
+    Graph g;
+    scene.derive(g, options);
+    SR_TRY(const auto program, Program::create(device, g));
+    SR_CHECK(program->run());
     return scene;
 }
 
@@ -108,32 +123,31 @@ Result<SurfelScene> SurfelScene::create(Device& device, const Surfels& s)
     return scene;
 }
 
-Result<SurfelScene> SurfelScene::reserve(Device& device, uint32_t size)
+Result<SurfelScene> SurfelScene::reserve(Device& device, uint32_t size, bool by_blocks)
 {
     SurfelScene scene(device);
     scene.size_ = size;
-    SR_CHECK(scene.allocate());
+    SR_CHECK(scene.allocate(by_blocks));
     for (const Slot& slot : scene.arrays())
         SR_CHECK(slot.clear(device));
+    if (by_blocks)
+        SR_CHECK(scene.blocks_.clear(device));
     return scene;
 }
 
-Status SurfelScene::put(CopyRing& copies, uint32_t first, const SurfelScene& from)
+void SurfelScene::record_put(VkCommandBuffer commands, uint32_t first, const SurfelScene& from, uint32_t count)
 {
-    SR_ASSERT(first + from.size_ <= size_, "{} surfels from {} on in a scene of {}", from.size_, first, size_);
+    SR_ASSERT(first + count <= size_ && count <= from.size_, "{} of {} surfels from {} on in a scene of {}", count,
+              from.size_, first, size_);
     const std::array<Slot, 5> to_arrays = arrays(), from_arrays = from.arrays();
-    for (size_t a = 0; a < to_arrays.size() && from.size_; ++a)
-        SR_CHECK(copies.copy(from_arrays[a].row_range(0, from.size_), to_arrays[a].row_range(first, from.size_))
-                     .map([](uint64_t) {}));
-    return {};
+    for (size_t a = 0; a < to_arrays.size(); ++a) {
+        const BufferSlice to = to_arrays[a].row_range(first, count).slice(), slice = from_arrays[a].slice();
+        record_copy(device_->vk(), commands, slice.buffer->handle(), slice.offset, to.buffer->handle(), to.offset,
+                    to.bytes);
+    }
 }
 
-Status SurfelScene::hide(uint32_t first, uint32_t count)
-{
-    return positions_.row_range(first, count).clear(*device_);
-}
-
-Status SurfelScene::allocate()
+Status SurfelScene::allocate(bool by_blocks)
 {
     const uint32_t rows = std::max(size_, 1u);
     positions_ = state_.slot(rows, 4, DType::f32, "positions", 4);
@@ -141,6 +155,8 @@ Status SurfelScene::allocate()
     colors_ = state_.slot(rows, 4, DType::f32, "colours", 4);
     labels_ = state_.slot(rows, 1, DType::u32, "labels", 1);
     cells_ = state_.slot(rows, 1, DType::u32, "cells", 1);
+    if (by_blocks)
+        blocks_ = state_.slot(divide_up(rows, kBlock), 1, DType::u32, "blocks of splats", 1);
     return state_.allocate(*device_, "surfels");
 }
 
@@ -161,10 +177,8 @@ Status SurfelScene::upload(const Host& host)
     return cells_.write(*device_, host.cells);
 }
 
-// normals from the nearest points, and sigmas if they follow the spacing
-Status SurfelScene::derive(const SurfelOptions& options)
+void SurfelScene::derive(Graph& g, const SurfelOptions& options) const
 {
-    Graph g;
     const Tensor points = positions_.in(g), labels = labels_.in(g);
     KnnOptions near{.neighbors = options.neighbors, .radius = options.neighbor_radius};
     if (options.same_label)
@@ -178,13 +192,15 @@ Status SurfelScene::derive(const SurfelOptions& options)
         size.spacing = kSpacing;
     size.largest = options.largest_sigma;
     g.keep(surfel(g, points, colors_.in(g), neighbors, planes.normals, size), normals_);
-    SR_TRY(const auto program, Program::create(*device_, g));
-    return program->run();
 }
 
-SplatScene SurfelScene::in(Graph& g) const
+SplatScene SurfelScene::in(Graph& g, uint32_t rows) const
 {
-    return {positions_.in(g), normals_.in(g), colors_.in(g), labels_.in(g), cells_.in(g)};
+    const auto first = [&](const Slot& slot) { return slot.row_range(0, std::max(rows, 1u)).in(g); };
+    SplatScene scene{first(positions_), first(normals_), first(colors_), first(labels_), first(cells_)};
+    if (blocks_.valid())
+        scene.blocks = blocks_.row_range(0, divide_up(rows, kBlock)).in(g);
+    return scene;
 }
 
 uint64_t SurfelScene::bytes() const

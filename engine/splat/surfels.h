@@ -11,8 +11,6 @@
 
 namespace semrover {
 
-class CopyRing;
-
 struct SurfelOptions {
     float sigma = 0.04f;        // metres (the paper's splat radius)
     bool auto_sigma = false;    // sigma from the distance of the nearest points, which closes the holes,
@@ -22,32 +20,44 @@ struct SurfelOptions {
     float neighbor_radius = 0.45f; // metres; 0: no limit
     bool same_label = true;        // neighbours of the same label first
     bool fallbacks = true;         // normals of poles and of lonely points (docs/method.md §5.1)
+
+    bool operator==(const SurfelOptions&) const = default;
 };
+// errors: usage for numbers of neighbours and a radius that cannot be; bad_input when arrays disagree in size or there
+// are too many points
+Status check_surfel_options(const SurfelOptions& options);
+Status check_points(const ScenePoints& points);
 
 // Surfels on the device, ready to be drawn: positions, normals, colours, sigmas, opacities, labels, cells.
 class SurfelScene {
   public:
     // of points: normals by PCA over the nearest ones, sigma and opacity by the options
-    // errors: bad_input when arrays disagree in size or there are too many points; usage; out_of_memory
+    // errors: of check_points() and check_surfel_options(); out_of_memory
     static Result<SurfelScene> create(Device& device, const ScenePoints& points, const SurfelOptions& options = {});
 
     // of surfels that are complete; the cell of each is its index
     static Result<SurfelScene> create(Device& device, const Surfels& surfels);
 
-    // room for surfels, all without opacity at first: not drawn
-    static Result<SurfelScene> reserve(Device& device, uint32_t size);
-    // copies a scene's surfels over those from `first` on, without waiting
-    Status put(CopyRing& copies, uint32_t first, const SurfelScene& from);
-    Status hide(uint32_t first, uint32_t count); // takes opacity away
+    // Room for surfels, all without opacity at first: not drawn. by_blocks: and none are drawn of a block of kBlock
+    // whose word in blocks() is 0, as all are at first
+    static constexpr uint32_t kBlock = 64;
+    static Result<SurfelScene> reserve(Device& device, uint32_t size, bool by_blocks);
+    // records the first surfels of another scene over those from `first` on
+    void record_put(VkCommandBuffer commands, uint32_t first, const SurfelScene& from, uint32_t count);
+    // normals from the nearest points, and sigmas if they follow the spacing
+    void derive(Graph& g, const SurfelOptions& options) const;
 
-    // the arrays that in() gives, in its order
+    // the whole arrays, of which in() gives rows, in its order
     std::array<Slot, 5> arrays() const { return {positions_, normals_, colors_, labels_, cells_}; }
+
+    const Slot& blocks() const { return blocks_; } // one that is not valid: there are none
 
     uint32_t size() const { return size_; }       // surfels
     uint32_t skipped() const { return skipped_; } // of these, not drawn: not finite, or without normal, size or opacity
     uint64_t bytes() const;                       // on the device
 
-    SplatScene in(Graph& g) const; // its tensors in a graph; one surfel without opacity if there are none
+    // tensors of its first rows in a graph; one surfel without opacity if there are none
+    SplatScene in(Graph& g, uint32_t rows) const;
 
     Result<Surfels> read() const; // as they are drawn, for export
 
@@ -55,14 +65,13 @@ class SurfelScene {
     struct Host; // the parts, as they are uploaded
 
     explicit SurfelScene(Device& device) : device_(&device) {}
-    Status allocate();
+    Status allocate(bool by_blocks = false);
     Status upload(const Host& host);
-    Status derive(const SurfelOptions& options);
 
     Device* device_;
     uint32_t size_ = 0, skipped_ = 0;
     State state_;
-    Slot positions_, normals_, colors_, labels_, cells_; // as SplatScene has them; of one row at least
+    Slot positions_, normals_, colors_, labels_, cells_, blocks_; // as SplatScene has them
 };
 
 } // namespace semrover

@@ -52,6 +52,8 @@ void check(const SplatScene& scene, Tensor cameras, const SplatOptions& o)
     SR_ASSERT(scene.positions.ld == 4 && scene.normals.ld == 4 && scene.colors.ld == 4 && scene.normals.rows == n &&
                   scene.colors.rows == n && scene.labels.rows == n && scene.cells.rows == n,
               "splat: scene of {} splats with arrays of other sizes", n);
+    SR_ASSERT(!scene.blocks.valid() || scene.blocks.rows == divide_up(n, 64), "splat: {} blocks of {} splats",
+              scene.blocks.rows, n);
     SR_ASSERT(cameras.ld == splat_camera_floats(o.lens) && o.width >= 1 && o.width <= 65535 && o.height >= 1 &&
                   o.height <= 65535,
               "splat: {} x {} pixels, cameras of {} floats", o.width, o.height, cameras.ld);
@@ -76,8 +78,12 @@ Seen project(Graph& g, const SplatScene& scene, Tensor cameras, const SplatOptio
     if (!pinhole)
         lens.constants = {{"kModel", uint32_t(o.lens)}};
     const Tensor keep = g.array(views, DType::u32, "keep");
+    const bool by_blocks = scene.blocks.valid();
+    DispatchOptions cull = lens;
+    cull.constants.push_back({"kBlocks", by_blocks});
     g.dispatch(pinhole ? kernel::splat_cull : kernel::splat_lens_cull,
-               {cameras, scene.positions, scene.normals, scene.colors, keep}, push, threads(views), lens);
+               {cameras, scene.positions, scene.normals, scene.colors, keep, by_blocks ? scene.blocks : scene.labels},
+               push, threads(views), std::move(cull));
     const PrefixSum slots = prefix_sum(g, keep, {.non_zero = true});
     const uint32_t texels = splat_record_bytes(o.lens) / 16;
     const Tensor records = g.array(push.max_visible * texels, DType::u32, "splat records", 4);

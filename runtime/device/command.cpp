@@ -138,6 +138,17 @@ void record_entry_barrier(const VulkanCalls& vk, VkCommandBuffer commands)
     barrier(vk, commands, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, kAnything, kCompute | kTransfer, kShader | kCopy);
 }
 
+void record_exit_barrier(const VulkanCalls& vk, VkCommandBuffer commands)
+{
+    barrier(vk, commands, kTransfer, VK_ACCESS_TRANSFER_WRITE_BIT, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, kAnything);
+}
+
+void record_fill(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer buffer, uint64_t at, uint64_t bytes,
+                 uint32_t value)
+{
+    vk.CmdFillBuffer(commands, buffer, at, bytes, value);
+}
+
 void record_update(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer to, uint64_t at,
                    std::span<const std::byte> bytes)
 {
@@ -159,7 +170,7 @@ void record_share(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer buff
 
 void record_clear(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer buffer, uint64_t at, uint64_t bytes)
 {
-    vk.CmdFillBuffer(commands, buffer, at, bytes, 0);
+    record_fill(vk, commands, buffer, at, bytes, 0);
     barrier(vk, commands, kTransfer, VK_ACCESS_TRANSFER_WRITE_BIT, kCompute | kTransfer | kHost,
             kShader | kCopy | VK_ACCESS_HOST_READ_BIT);
 }

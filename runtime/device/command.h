@@ -35,6 +35,11 @@ void record_image_copy(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer
                        const HostImage& to);
 // into a command buffer of a host's: what follows may use everything that came before, in the queue too
 void record_entry_barrier(const VulkanCalls& vk, VkCommandBuffer commands);
+// and out of it: everything that follows may use what was copied and filled
+void record_exit_barrier(const VulkanCalls& vk, VkCommandBuffer commands);
+// words of one value, without a barrier
+void record_fill(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer buffer, uint64_t at, uint64_t bytes,
+                 uint32_t value);
 // bytes of the command itself: a multiple of 4, at most 65536; with the barrier that lets shaders follow
 void record_update(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer to, uint64_t at,
                    std::span<const std::byte> bytes);

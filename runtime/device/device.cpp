@@ -110,6 +110,9 @@ Result<std::unique_ptr<Device>> Device::adopt(const HostDevice& host, const Devi
     SR_CHECK(d->vk_.load_device(host.device));
     if (!is_compute_family(d->vk_, host.physical, host.queue_family))
         return fail(ErrorCode::usage, "queue family {} of the host device has no compute", host.queue_family);
+    if (host.work_queue && !is_compute_family(d->vk_, host.physical, host.work_queue_family))
+        return fail(ErrorCode::usage, "family {} of the host device's work queue has no compute",
+                    host.work_queue_family);
     if (!host.robust_buffer_access)
         return fail(ErrorCode::usage, "a host device needs robustBufferAccess, and to say so: files decide what "
                                       "shaders read");
@@ -122,10 +125,9 @@ Result<std::unique_ptr<Device>> Device::adopt(const HostDevice& host, const Devi
     d->instance_ = host.instance;
     d->physical_ = host.physical;
     d->device_ = host.device;
-    d->queue_ = host.queue;
-    d->queue_family_ = host.queue_family;
-    d->lock_ = host.lock;
-    d->unlock_ = host.unlock;
+    d->queue_ = d->beside_ = {host.queue, host.queue_family, host.lock, host.unlock};
+    if (host.work_queue)
+        d->queue_ = {host.work_queue, host.work_queue_family};
     d->memory_source_ = host.memory;
     d->sharing_ = host.sharing;
     SR_CHECK(d->finish(options));
@@ -158,10 +160,10 @@ Status Device::create_instance(const DeviceOptions& options)
 
 Status Device::create_device(const DeviceOptions& options, bool matrices)
 {
-    SR_TRY(queue_family_, compute_queue_family(vk_, physical_));
+    SR_TRY(queue_.family, compute_queue_family(vk_, physical_));
     const float priority = 1;
     auto queue = vk_struct<VkDeviceQueueCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO);
-    queue.queueFamilyIndex = queue_family_;
+    queue.queueFamilyIndex = queue_.family;
     queue.queueCount = 1;
     queue.pQueuePriorities = &priority;
     auto have = vk_struct<VkPhysicalDeviceVulkan12Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES);
@@ -205,7 +207,8 @@ Status Device::create_device(const DeviceOptions& options, bool matrices)
     info.ppEnabledExtensionNames = extensions.data();
     SR_VK(vk_.CreateDevice(physical_, &info, vk_.allocator(), &device_));
     SR_CHECK(vk_.load_device(device_));
-    vk_.GetDeviceQueue(device_, queue_family_, 0, &queue_);
+    vk_.GetDeviceQueue(device_, queue_.family, 0, &queue_.queue);
+    beside_ = queue_;
     return {};
 }
 
@@ -241,20 +244,56 @@ Status Device::finish(const DeviceOptions& options)
     SR_CHECK(override_limits(limits_, options.limits));
     VkPhysicalDeviceProperties properties;
     vk_.GetPhysicalDeviceProperties(physical_, &properties);
-    timestamp_ns_ = has_timestamps(vk_, physical_, queue_family_) ? properties.limits.timestampPeriod : 0;
+    timestamp_ns_ = has_timestamps(vk_, physical_, queue_.family) ? properties.limits.timestampPeriod : 0;
+    families_ = {queue_.family};
+    if (beside_.family != queue_.family)
+        families_.push_back(beside_.family);
+    SR_CHECK(make_objects());
+    SR_TRY(pipelines_, PipelineStore::create(*this, options.pipeline_cache));
+    return {};
+}
+
+Result<std::unique_ptr<Device>> Device::beside(Device& first)
+{
+    std::unique_ptr<Device> d(new Device());
+    d->owned_ = false;
+    d->vk_ = first.vk_;
+    d->instance_ = first.instance_;
+    d->physical_ = first.physical_;
+    d->device_ = first.device_;
+    d->queue_ = first.beside_;
+    d->beside_ = first.queue_;
+    d->families_ = first.families_;
+    d->index_ = first.index_;
+    d->sharing_ = first.sharing_;
+    d->memory_source_ = first.memory_source_;
+    d->cancelled_ = first.cancelled_;
+    d->limits_ = first.limits_;
+    d->autotunes_ = false; // what it chose would not be kept
+    d->name_ = first.name_;
+    d->driver_ = first.driver_;
+    d->timestamp_ns_ = has_timestamps(d->vk_, d->physical_, d->queue_.family) ? first.timestamp_ns_ : 0;
+    d->memory_ = first.memory_;
+    d->budget_ = first.budget_;
+    SR_CHECK(d->make_objects());
+    d->pipelines_ = PipelineStore::beside(*d, *first.pipelines_);
+    return d;
+}
+
+Status Device::make_objects()
+{
     auto type = vk_struct<VkSemaphoreTypeCreateInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_TYPE_CREATE_INFO);
     type.semaphoreType = VK_SEMAPHORE_TYPE_TIMELINE;
     auto semaphore = vk_struct<VkSemaphoreCreateInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO, &type);
     SR_VK(vk_.CreateSemaphore(device_, &semaphore, vk_.allocator(), &timeline_));
     auto pool = vk_struct<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
     pool.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
-    pool.queueFamilyIndex = queue_family_;
+    pool.queueFamilyIndex = queue_.family;
     SR_VK(vk_.CreateCommandPool(device_, &pool, vk_.allocator(), &copy_pool_));
     auto commands = vk_struct<VkCommandBufferAllocateInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO);
     commands.commandPool = copy_pool_;
     commands.commandBufferCount = 1;
     SR_VK(vk_.AllocateCommandBuffers(device_, &commands, &copy_commands_));
-    SR_TRY(pipelines_, PipelineStore::create(*this, options.pipeline_cache));
     return {};
 }
 
@@ -279,19 +318,22 @@ Device::~Device()
         vk_.DestroyInstance(instance_, vk_.allocator());
 }
 
-Status Device::account(int64_t bytes, const char* what)
+Status Device::account(uint64_t bytes, const char* what)
 {
-    if (budget_ && allocated_ + uint64_t(bytes) > budget_)
+    const uint64_t used = memory_->used += bytes;
+    if (budget_ && used > budget_) {
+        memory_->used -= bytes;
         return fail(ErrorCode::out_of_memory, "{}: {} bytes do not fit: {} in use, `max_bytes` {}", what, bytes,
-                    allocated_, budget_);
-    allocated_ += uint64_t(bytes);
-    peak_ = std::max(peak_, allocated_);
+                    used - bytes, budget_);
+    }
+    for (uint64_t peak = memory_->peak; peak < used && !memory_->peak.compare_exchange_weak(peak, used);)
+        ;
     return {};
 }
 
 Result<uint64_t> Device::submit(std::span<const VkCommandBuffer> commands, const TimelinePoints& points)
 {
-    const std::lock_guard guard(queue_mutex_);
+    const std::lock_guard guard(*queue_.mutex);
     const uint64_t value = ticket_ + 1;
     SemaphoreValues waits(points.waits), signals(points.signals);
     signals.add({timeline_, value});
@@ -309,11 +351,11 @@ Result<uint64_t> Device::submit(std::span<const VkCommandBuffer> commands, const
     info.pCommandBuffers = commands.data();
     info.signalSemaphoreCount = signals.count();
     info.pSignalSemaphores = signals.semaphores.data();
-    if (lock_)
-        lock_();
-    const VkResult result = vk_.QueueSubmit(queue_, 1, &info, VK_NULL_HANDLE);
-    if (unlock_)
-        unlock_();
+    if (queue_.lock)
+        queue_.lock();
+    const VkResult result = vk_.QueueSubmit(queue_.queue, 1, &info, VK_NULL_HANDLE);
+    if (queue_.unlock)
+        queue_.unlock();
     if (result != VK_SUCCESS)
         return tl::make_unexpected(device_error(vk_, device_, result, "vkQueueSubmit"));
     return ticket_ = value;
@@ -336,9 +378,14 @@ Status Device::wait(uint64_t ticket)
 
 Result<bool> Device::finished(uint64_t ticket) const
 {
+    return reached({timeline_, ticket});
+}
+
+Result<bool> Device::reached(const TimelinePoint& point) const
+{
     uint64_t value = 0;
-    SR_VK(vk_.GetSemaphoreCounterValue(device_, timeline_, &value));
-    return value >= ticket;
+    SR_VK(vk_.GetSemaphoreCounterValue(device_, point.semaphore, &value));
+    return value >= point.value;
 }
 
 Result<Staging*> Device::staging()

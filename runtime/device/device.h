@@ -8,6 +8,7 @@
 #include "runtime/graph/tile_choices.h"
 #include "runtime/graph/work_rates.h"
 
+#include <atomic>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -52,10 +53,12 @@ struct HostDevice {
     VkDevice device = VK_NULL_HANDLE; // Vulkan 1.2 with timelineSemaphore and robustBufferAccess enabled
     VkQueue queue = VK_NULL_HANDLE;   // with compute
     uint32_t queue_family = 0;
+    VkQueue work_queue = VK_NULL_HANDLE; // another one, that nobody else uses: beside() has `queue` then. None: `queue`
+    uint32_t work_queue_family = 0;
     bool robust_buffer_access = false;            // it is enabled, as it must be: files decide what is read
     bool float16 = false;                         // shaderFloat16 is enabled too
     bool cooperative_matrix = false;              // and MatrixFeatures, with the memory model for all of the device
-    std::function<void()> lock = {}, unlock = {}; // around every use of the queue; may be empty
+    std::function<void()> lock = {}, unlock = {}; // around every use of `queue`; may be empty
     Sharing sharing = {};                         // its extensions are enabled
     MemorySource memory = {};                     // instead of vkAllocateMemory
 };
@@ -91,10 +94,14 @@ struct DeviceSummary {
     std::string refusal;                 // why the engine cannot run on it; empty if it can
 };
 
+// A queue of a device, its memory, and what is kept for both. By one thread at a time; see beside().
 class Device {
   public:
     static Result<std::unique_ptr<Device>> create(const DeviceOptions& options);
     static Result<std::unique_ptr<Device>> adopt(const HostDevice& host, const DeviceOptions& options);
+    // The same device for another thread: with tickets, copies and pipelines of its own, on the host's `queue`. What is
+    // allocated counts together, and one may read the other's memory. `first` outlives it.
+    static Result<std::unique_ptr<Device>> beside(Device& first);
     ~Device();
     Device(const Device&) = delete;
     Device& operator=(const Device&) = delete;
@@ -108,7 +115,9 @@ class Device {
     bool owned() const { return owned_; } // not a host's
     VkInstance instance() const { return instance_; }
     VkPhysicalDevice physical() const { return physical_; }
-    uint32_t queue_family() const { return queue_family_; }
+    uint32_t queue_family() const { return queue_.family; }
+    // of all queues that use its memory: one, or two
+    const std::vector<uint32_t>& families() const { return families_; }
     double timestamp_ns() const { return timestamp_ns_; } // of a unit; 0: the queue has none
     const Sharing& sharing() const { return sharing_; }
     const MemorySource& memory_source() const { return memory_source_; }
@@ -135,24 +144,36 @@ class Device {
     Status wait(uint64_t ticket);
     Result<bool> finished(uint64_t ticket) const; // without waiting
     uint64_t last_ticket() const { return ticket_; }
+    TimelinePoint next_point() const { return {timeline_, ticket_ + 1}; } // that the next submit reaches
+    Result<bool> reached(const TimelinePoint& point) const;               // of any timeline, without waiting
 
-    // device memory in use, counted at allocation
-    Status account(int64_t bytes, const char* what);
-    void release(uint64_t bytes) { allocated_ -= bytes; }
-    uint64_t allocated_bytes() const { return allocated_; }
-    uint64_t peak_bytes() const { return peak_; }
-    void reset_peak() { peak_ = allocated_; }
+    // device memory in use, counted at allocation; from any thread
+    Status account(uint64_t bytes, const char* what);
+    void release(uint64_t bytes) { memory_->used -= bytes; }
+    uint64_t allocated_bytes() const { return memory_->used; }
+    uint64_t peak_bytes() const { return memory_->peak; }
+    void reset_peak() { memory_->peak = memory_->used.load(); }
     uint64_t budget() const { return budget_; }
 
     void set_profile(std::shared_ptr<Profile> profile) { profile_ = std::move(profile); }
     Profile* profile() { return profile_.get(); }
 
   private:
+    struct Queue {
+        VkQueue queue = VK_NULL_HANDLE;
+        uint32_t family = 0;
+        std::function<void()> lock = {}, unlock = {};
+        std::shared_ptr<std::mutex> mutex = std::make_shared<std::mutex>();
+    };
+    struct MemoryCount {
+        std::atomic<uint64_t> used = 0, peak = 0;
+    };
     Device();
     void take_allocation(const DeviceOptions& options);
     Status create_instance(const DeviceOptions& options);
     Status create_device(const DeviceOptions& options, bool matrices); // enables cooperative matrices
     Status finish(const DeviceOptions& options);
+    Status make_objects(); // that each thread has its own of
     Result<Staging*> staging();
 
     VulkanCalls vk_;
@@ -160,15 +181,13 @@ class Device {
     VkDebugUtilsMessengerEXT messenger_ = VK_NULL_HANDLE;
     VkPhysicalDevice physical_ = VK_NULL_HANDLE;
     VkDevice device_ = VK_NULL_HANDLE;
-    VkQueue queue_ = VK_NULL_HANDLE;
-    uint32_t queue_family_ = 0;
+    Queue queue_, beside_; // ours, and that of beside(): maybe the same
+    std::vector<uint32_t> families_;
     uint32_t index_ = 0;
     bool owned_ = true;
     Sharing sharing_;
     MemorySource memory_source_;
-    std::function<void()> lock_, unlock_;
     std::function<bool()> cancelled_;
-    std::mutex queue_mutex_;
     VkSemaphore timeline_ = VK_NULL_HANDLE;
     uint64_t ticket_ = 0;
     VkCommandPool copy_pool_ = VK_NULL_HANDLE;
@@ -183,7 +202,8 @@ class Device {
     bool autotunes_ = true;
     std::string name_, driver_;
     double timestamp_ns_ = 1;
-    uint64_t allocated_ = 0, peak_ = 0, budget_ = 0;
+    std::shared_ptr<MemoryCount> memory_ = std::make_shared<MemoryCount>();
+    uint64_t budget_ = 0;
 };
 
 // all physical devices, best first (discrete > integrated > other > CPU, then the loader's order)

@@ -54,6 +54,11 @@ Status Buffer::make_handle(MemoryKind kind)
     info.usage = shared_ ? kSharedUsage : VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
     if (kind == MemoryKind::device)
         info.usage |= VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT;
+    if (device_.families().size() > 1 && !shared_) {
+        info.sharingMode = VK_SHARING_MODE_CONCURRENT;
+        info.queueFamilyIndexCount = uint32_t(device_.families().size());
+        info.pQueueFamilyIndices = device_.families().data();
+    }
     SR_VK(device_.vk().CreateBuffer(device_.handle(), &info, device_.vk().allocator(), &buffer_));
     dedicated_ = shared_ && needs_dedicated_memory(device_);
     return {};
@@ -67,7 +72,7 @@ Status Buffer::make_memory(MemoryKind kind, const char* name)
         return fail(ErrorCode::out_of_memory, "{}: {} bytes exceed the device's largest allocation of {} bytes", name,
                     needs.size, device_.limits().max_allocation);
     if (kind != MemoryKind::transfer) {
-        SR_CHECK(device_.account(int64_t(needs.size), name));
+        SR_CHECK(device_.account(needs.size, name));
         accounted_ = needs.size;
     }
     VkPhysicalDeviceMemoryProperties memory;

@@ -105,12 +105,24 @@ Result<std::unique_ptr<PipelineStore>> PipelineStore::create(Device& device, std
     return store;
 }
 
+std::unique_ptr<PipelineStore> PipelineStore::beside(Device& device, PipelineStore& first)
+{
+    std::unique_ptr<PipelineStore> store(new PipelineStore(device));
+    store->first_ = &first;
+    store->cache_ = first.cache_;
+    return store;
+}
+
 PipelineStore::~PipelineStore()
 {
-    if (unsaved_seconds_ > 0 || device_.tiles().size() != saved_tiles_)
-        save();
     for (auto& [key, p] : pipelines_)
         destroy(p);
+    if (first_) {
+        first_->unsaved_seconds_ += unsaved_seconds_;
+        return;
+    }
+    if (unsaved_seconds_ > 0 || device_.tiles().size() != saved_tiles_)
+        save();
     if (cache_)
         device_.vk().DestroyPipelineCache(device_.handle(), cache_, device_.vk().allocator());
 }
@@ -163,6 +175,8 @@ Result<const Pipeline*> PipelineStore::get(const KernelVariant& variant, const s
 void PipelineStore::save_by_and_by(double seconds)
 {
     unsaved_seconds_ += seconds;
+    if (first_) // which is another thread's
+        return;
     const bool first = pipelines_.empty() && reused_bytes_ == 0;
     if (!first && unsaved_seconds_ < kSaveAfterSeconds)
         return;

@@ -29,6 +29,8 @@ class PipelineStore {
   public:
     // blob: of an earlier process, in place of the file; with a host's device there is no file either way
     static Result<std::unique_ptr<PipelineStore>> create(Device& device, std::span<const std::byte> blob = {});
+    // over the cache of another store, which outlives it, for another thread
+    static std::unique_ptr<PipelineStore> beside(Device& device, PipelineStore& first);
     ~PipelineStore();
 
     // empty: none is kept, or neither HOME nor XDG_CACHE_HOME is set
@@ -49,6 +51,7 @@ class PipelineStore {
     void save_by_and_by(double seconds);
 
     Device& device_;
+    PipelineStore* first_ = nullptr; // whose cache it is, or null
     VkPipelineCache cache_ = VK_NULL_HANDLE;
     std::string cache_path_; // empty: nowhere to keep it
     size_t reused_bytes_ = 0;

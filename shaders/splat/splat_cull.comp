@@ -8,13 +8,20 @@
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
-layout(binding = 4) writeonly buffer Keep { uint keep[]; }; // [cameras, splats]
+layout(constant_id = 0) const bool kBlocks = false;
+layout(binding = 4) writeonly buffer Keep { uint keep[]; };   // [cameras, splats]
+layout(binding = 5) readonly buffer Blocks { uint blocks[]; }; // [splats / 64], or anything without kBlocks
 
 void main()
 {
     const uint i = linear_thread();
     if (i >= p.cameras * p.splats)
         return;
+    const uint splat = i % p.splats;
+    if (kBlocks && blocks[splat / 64] == 0) {
+        keep[i] = 0;
+        return;
+    }
     SplatView s;
-    keep[i] = uint(view_splat(i % p.splats, i / p.splats, s));
+    keep[i] = uint(view_splat(splat, i / p.splats, s));
 }

@@ -47,6 +47,22 @@ static int find_family(struct gpu* gpu)
     return 0;
 }
 
+/* a queue beside it that computes: of another family, which a GPU runs beside ours, or a second one of ours */
+static void find_work_queue(struct gpu* gpu)
+{
+    VkQueueFamilyProperties families[MOST_FAMILIES];
+    uint32_t count = MOST_FAMILIES, i;
+    vkGetPhysicalDeviceQueueFamilyProperties(gpu->physical, &count, families);
+    gpu->work_family = gpu->family;
+    gpu->work_index = families[gpu->family].queueCount > 1;
+    for (i = 0; i < count; ++i)
+        if (i != gpu->family && (families[i].queueFlags & VK_QUEUE_COMPUTE_BIT)) {
+            gpu->work_family = i;
+            gpu->work_index = 0;
+            return;
+        }
+}
+
 static void pick_device(struct gpu* gpu)
 {
     VkPhysicalDevice devices[MOST_DEVICES];
@@ -65,20 +81,25 @@ static void pick_device(struct gpu* gpu)
 static void make_device(struct gpu* gpu)
 {
     const char* extensions[1 + MATRIX_EXTENSIONS] = {"VK_KHR_swapchain"};
-    const float priority = 1;
+    const float priorities[2] = {1, 0.5f};
+    const int other_family = gpu->work_family != gpu->family;
     uint32_t count = gpu->surface ? 1 : 0, i;
     struct matrices matrices;
     VkPhysicalDeviceVulkan12Features features = {.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES,
                                                  .timelineSemaphore = VK_TRUE};
     const VkPhysicalDeviceFeatures robust = {.robustBufferAccess = VK_TRUE};
-    const VkDeviceQueueCreateInfo queue = {.sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO,
-                                           .queueFamilyIndex = gpu->family,
-                                           .queueCount = 1,
-                                           .pQueuePriorities = &priority};
+    const VkDeviceQueueCreateInfo queues[2] = {{.sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO,
+                                                .queueFamilyIndex = gpu->family,
+                                                .queueCount = 1 + gpu->work_index,
+                                                .pQueuePriorities = priorities},
+                                               {.sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO,
+                                                .queueFamilyIndex = gpu->work_family,
+                                                .queueCount = 1,
+                                                .pQueuePriorities = priorities + 1}};
     VkDeviceCreateInfo info = {.sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO,
                                .pNext = &features,
-                               .queueCreateInfoCount = 1,
-                               .pQueueCreateInfos = &queue,
+                               .queueCreateInfoCount = other_family ? 2 : 1,
+                               .pQueueCreateInfos = queues,
                                .ppEnabledExtensionNames = extensions,
                                .pEnabledFeatures = &robust};
     matrices_ask(&matrices, gpu->physical, &features);
@@ -89,9 +110,21 @@ static void make_device(struct gpu* gpu)
     info.enabledExtensionCount = count;
     check(vkCreateDevice(gpu->physical, &info, NULL, &gpu->device) == VK_SUCCESS, "vkCreateDevice");
     vkGetDeviceQueue(gpu->device, gpu->family, 0, &gpu->queue);
+    if (other_family || gpu->work_index)
+        vkGetDeviceQueue(gpu->device, gpu->work_family, gpu->work_index, &gpu->work_queue);
 }
 
-/* the library on this device: it submits to our queue, from our thread */
+static void lock_queue(void* user)
+{
+    pthread_mutex_lock(&((struct gpu*)user)->queue_mutex);
+}
+
+static void unlock_queue(void* user)
+{
+    pthread_mutex_unlock(&((struct gpu*)user)->queue_mutex);
+}
+
+/* the library on this device: it submits to our queue, from the thread that draws and from its worker */
 static void make_context(struct gpu* gpu)
 {
     const sr_vulkan_device vulkan = {.struct_size = sizeof vulkan,
@@ -100,6 +133,11 @@ static void make_context(struct gpu* gpu)
                                      .physical_device = gpu->physical,
                                      .device = gpu->device,
                                      .queue = gpu->queue,
+                                     .user = gpu,
+                                     .lock_queue = lock_queue,
+                                     .unlock_queue = unlock_queue,
+                                     .work_queue = gpu->work_queue,
+                                     .work_queue_family = gpu->work_family,
                                      .shader_float16 = gpu->matrices,
                                      .robust_buffer_access = 1,
                                      .cooperative_matrix = gpu->matrices};
@@ -120,7 +158,9 @@ void gpu_create(struct gpu* gpu, const char* const* extensions, uint32_t count,
     if (make_surface)
         make_surface(gpu, user);
     pick_device(gpu);
+    find_work_queue(gpu);
     make_device(gpu);
+    check(!pthread_mutex_init(&gpu->queue_mutex, NULL), "making a mutex");
     make_context(gpu);
 }
 
@@ -131,6 +171,51 @@ void gpu_destroy(struct gpu* gpu)
     if (gpu->surface)
         vkDestroySurfaceKHR(gpu->instance, gpu->surface, NULL);
     vkDestroyInstance(gpu->instance, NULL);
+    pthread_mutex_destroy(&gpu->queue_mutex);
+}
+
+VkSemaphore gpu_timeline(const struct gpu* gpu)
+{
+    const VkSemaphoreTypeCreateInfo type = {.sType = VK_STRUCTURE_TYPE_SEMAPHORE_TYPE_CREATE_INFO,
+                                            .semaphoreType = VK_SEMAPHORE_TYPE_TIMELINE};
+    const VkSemaphoreCreateInfo info = {.sType = VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO, .pNext = &type};
+    VkSemaphore made;
+    check(vkCreateSemaphore(gpu->device, &info, NULL, &made) == VK_SUCCESS, "vkCreateSemaphore");
+    return made;
+}
+
+void gpu_wait(const struct gpu* gpu, VkSemaphore timeline, uint64_t value)
+{
+    const VkSemaphoreWaitInfo info = {.sType = VK_STRUCTURE_TYPE_SEMAPHORE_WAIT_INFO,
+                                      .semaphoreCount = 1,
+                                      .pSemaphores = &timeline,
+                                      .pValues = &value};
+    check(vkWaitSemaphores(gpu->device, &info, UINT64_MAX) == VK_SUCCESS, "vkWaitSemaphores");
+}
+
+void gpu_submit(struct gpu* gpu, VkCommandBuffer commands, VkSemaphore timeline, uint64_t number, VkSemaphore acquired,
+                VkSemaphore drawn)
+{
+    const VkPipelineStageFlags stage = VK_PIPELINE_STAGE_ALL_COMMANDS_BIT;
+    const uint64_t nothing = 0, values[2] = {number, 0};
+    const VkSemaphore signals[2] = {timeline, drawn};
+    const VkTimelineSemaphoreSubmitInfo numbers = {.sType = VK_STRUCTURE_TYPE_TIMELINE_SEMAPHORE_SUBMIT_INFO,
+                                                   .waitSemaphoreValueCount = acquired ? 1 : 0,
+                                                   .pWaitSemaphoreValues = &nothing,
+                                                   .signalSemaphoreValueCount = drawn ? 2 : 1,
+                                                   .pSignalSemaphoreValues = values};
+    const VkSubmitInfo info = {.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO,
+                               .pNext = &numbers,
+                               .waitSemaphoreCount = numbers.waitSemaphoreValueCount,
+                               .pWaitSemaphores = &acquired,
+                               .pWaitDstStageMask = &stage,
+                               .commandBufferCount = 1,
+                               .pCommandBuffers = &commands,
+                               .signalSemaphoreCount = numbers.signalSemaphoreValueCount,
+                               .pSignalSemaphores = signals};
+    pthread_mutex_lock(&gpu->queue_mutex);
+    check(vkQueueSubmit(gpu->queue, 1, &info, VK_NULL_HANDLE) == VK_SUCCESS, "vkQueueSubmit");
+    pthread_mutex_unlock(&gpu->queue_mutex);
 }
 
 static VkDeviceMemory allocate(const struct gpu* gpu, const VkMemoryRequirements* needs, VkMemoryPropertyFlags wanted)

@@ -6,6 +6,7 @@
 #ifndef HOST_GPU_H
 #define HOST_GPU_H
 
+#include <pthread.h>
 #include <semrover_vulkan.h>
 #include <vulkan/vulkan.h>
 
@@ -14,7 +15,10 @@ struct gpu {
     VkPhysicalDevice physical;
     VkDevice device;
     VkQueue queue;
-    uint32_t family;   /* draws, computes and presents */
+    pthread_mutex_t queue_mutex; /* whoever uses the queue holds it: the library's worker thread does, too */
+    uint32_t family;             /* draws, computes and presents */
+    VkQueue work_queue;          /* for the library's work alone; NULL: this device has no other */
+    uint32_t work_family, work_index;
     uint32_t matrices; /* 1: what the library needs for matrix units is enabled */
     VkSurfaceKHR surface;
     sr_context* context;
@@ -40,6 +44,13 @@ void check_sr(sr_status status, const sr_context* context); /* likewise, with th
 void gpu_create(struct gpu* gpu, const char* const* extensions, uint32_t count,
                 void (*make_surface)(struct gpu* gpu, void* user), void* user);
 void gpu_destroy(struct gpu* gpu);
+
+/* a semaphore of whose values frame n reaches n; and until it has */
+VkSemaphore gpu_timeline(const struct gpu* gpu);
+void gpu_wait(const struct gpu* gpu, VkSemaphore timeline, uint64_t value);
+/* frame `number` of a timeline; acquired and drawn (either may be NULL): semaphores of a swapchain's */
+void gpu_submit(struct gpu* gpu, VkCommandBuffer commands, VkSemaphore timeline, uint64_t number, VkSemaphore acquired,
+                VkSemaphore drawn);
 
 struct buffer gpu_buffer(const struct gpu* gpu, VkDeviceSize bytes, VkBufferUsageFlags usage, int mapped);
 struct image gpu_image(const struct gpu* gpu, uint32_t width, uint32_t height, VkFormat format, VkImageUsageFlags usage,

@@ -301,16 +301,54 @@ static void draw_cubes(const struct scene* s, struct push push, VkCommandBuffer 
     }
 }
 
-void scene_record(const struct scene* s, sr_world* world, const sr_draw_desc* draw, uint32_t picture,
-                  VkCommandBuffer commands)
+struct calls scene_calls[CALLS] = {{.name = "sr_world_focus"},          {.name = "sr_world_edit"},
+                                   {.name = "sr_world_record_updates"}, {.name = "sr_world_record"},
+                                   {.name = "sr_world_check_draws"},    {.name = "waiting for frame n - 2"},
+                                   {.name = "from frame to frame"}};
+
+/* the library's part ends with a barrier, so that all that follows may read the buffers */
+static void record_splats(const struct scene* s, sr_world* world, const sr_draw_desc* draw, const sr_semaphore* done,
+                          VkCommandBuffer commands)
+{
+    double since = clock_now();
+    sr_status whole;
+    check_sr(sr_world_record_updates(world, commands, done), s->gpu->context);
+    calls_add(&scene_calls[CALL_UPDATES], since);
+    since = clock_now();
+    whole = sr_world_check_draws(world);
+    calls_add(&scene_calls[CALL_CHECK], since);
+    if (whole != SR_ERR_PARTIAL) /* else this picture has more room than one before */
+        check_sr(whole, s->gpu->context);
+    since = clock_now();
+    check_sr(sr_world_record(world, draw, commands), s->gpu->context);
+    calls_add(&scene_calls[CALL_RECORD], since);
+}
+
+/* no splats: all is sky */
+static void clear_buffers(const struct scene* s, VkCommandBuffer commands)
+{
+    const VkMemoryBarrier barrier = {.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER,
+                                     .srcAccessMask = VK_ACCESS_MEMORY_WRITE_BIT,
+                                     .dstAccessMask = VK_ACCESS_MEMORY_READ_BIT | VK_ACCESS_MEMORY_WRITE_BIT};
+    const VkPipelineStageFlags all = VK_PIPELINE_STAGE_ALL_COMMANDS_BIT;
+    vkCmdPipelineBarrier(commands, all, all, 0, 1, &barrier, 0, NULL, 0, NULL);
+    vkCmdFillBuffer(commands, s->color.buffer, 0, VK_WHOLE_SIZE, 0);
+    vkCmdFillBuffer(commands, s->depth.buffer, 0, VK_WHOLE_SIZE, 0);
+    vkCmdPipelineBarrier(commands, all, all, 0, 1, &barrier, 0, NULL, 0, NULL);
+}
+
+void scene_record(const struct scene* s, sr_world* world, const sr_draw_desc* draw, const sr_semaphore* done,
+                  uint32_t picture, VkCommandBuffer commands)
 {
     const VkRenderPassBeginInfo begin = {.sType = VK_STRUCTURE_TYPE_RENDER_PASS_BEGIN_INFO,
                                          .renderPass = s->pass,
                                          .framebuffer = s->framebuffers[picture],
                                          .renderArea = {{0, 0}, {s->width, s->height}}};
     const struct push push = view_of(s, draw);
-    /* the library's part ends with a barrier, so that all that follows may read the buffers */
-    check_sr(sr_world_record(world, draw, commands), s->gpu->context);
+    if (world)
+        record_splats(s, world, draw, done, commands);
+    else
+        clear_buffers(s, commands);
     vkCmdBeginRenderPass(commands, &begin, VK_SUBPASS_CONTENTS_INLINE);
     vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, s->splats);
     vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, s->layout, 0, 1, &s->set, 0, NULL);

@@ -6,7 +6,7 @@
 #ifndef HOST_SCENE_H
 #define HOST_SCENE_H
 
-#include "gpu.h"
+#include "flight.h"
 
 enum { MOST_PICTURES = 8 };
 
@@ -33,8 +33,12 @@ void scene_destroy(struct scene* scene); /* the device must have finished with i
 /* what a camera at `position` sees that looks `yaw` radians to the left of x, 90 degrees across */
 void scene_look(const struct scene* scene, const double position[3], double yaw, sr_draw_desc* draw);
 
-/* records a whole frame into a command buffer that has begun */
-void scene_record(const struct scene* scene, sr_world* world, const sr_draw_desc* draw, uint32_t picture,
-                  VkCommandBuffer commands);
+/* what the thread that draws asks of the library, and waits for by itself */
+enum call { CALL_FOCUS, CALL_EDIT, CALL_UPDATES, CALL_RECORD, CALL_CHECK, CALL_FRAME_BEFORE, CALL_FRAME, CALLS };
+extern struct calls scene_calls[CALLS];
+
+/* Records a whole frame into a command buffer that has begun; done: of the frame. world: NULL: only the cubes */
+void scene_record(const struct scene* scene, sr_world* world, const sr_draw_desc* draw, const sr_semaphore* done,
+                  uint32_t picture, VkCommandBuffer commands);
 
 #endif

@@ -1,9 +1,12 @@
 /* SPDX-FileCopyrightText: semrover authors
  * SPDX-License-Identifier: Apache-2.0
  *
- * A host with a window: flies down a street that grows ahead of it. The library has some milliseconds of every frame.
+ * A host with a window: flies down a street that grows ahead of it. Two frames are on their way at a time, and another
+ * thread generates. At its end it says how long the library's calls kept the thread that draws.
  *
  *     vulkan_host MODEL [FRAMES SCREENSHOT.ppm]     with FRAMES it ends by itself, and writes what it saw last
+ *
+ * MODEL -: without the library's splats, to compare.
  *
  * Keys: left and right turn, up and down change the speed, space puts a block onto the road ahead, escape ends. */
 #include "scene.h"
@@ -16,7 +19,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { BUDGET_US = 8000 };
+enum { FRAMES_ON_THEIR_WAY = 2 };
 
 struct window {
     GLFWwindow* glfw;
@@ -26,10 +29,11 @@ struct window {
     VkImage images[MOST_PICTURES];
     VkImageView views[MOST_PICTURES];
     VkSemaphore drawn[MOST_PICTURES]; /* of the picture: may be shown */
-    VkSemaphore acquired;
-    VkFence finished;
+    VkSemaphore timeline;             /* frame n reaches n */
+    uint64_t number;                  /* of the last frame */
+    VkSemaphore acquired[FRAMES_ON_THEIR_WAY];
     VkCommandPool pool;
-    VkCommandBuffer commands;
+    VkCommandBuffer commands[FRAMES_ON_THEIR_WAY];
     struct scene scene;
     struct buffer pixels; /* of the picture, for the screenshot */
 };
@@ -110,7 +114,9 @@ static void free_swapchain(struct window* w)
 {
     const VkDevice device = w->gpu.device;
     uint32_t i;
-    vkDeviceWaitIdle(device);
+    pthread_mutex_lock(&w->gpu.queue_mutex); /* the worker may submit */
+    vkQueueWaitIdle(w->gpu.queue);
+    pthread_mutex_unlock(&w->gpu.queue_mutex);
     gpu_free_buffer(&w->gpu, &w->pixels);
     scene_destroy(&w->scene);
     for (i = 0; i < w->pictures; ++i) {
@@ -123,12 +129,11 @@ static void free_swapchain(struct window* w)
 static void open_window(struct window* w)
 {
     const char* const* extensions;
-    uint32_t count = 0;
-    const VkFenceCreateInfo fence = {.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO};
+    uint32_t count = 0, i;
     VkCommandPoolCreateInfo pool = {.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO,
                                     .flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT};
     VkCommandBufferAllocateInfo commands = {.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO,
-                                            .commandBufferCount = 1};
+                                            .commandBufferCount = FRAMES_ON_THEIR_WAY};
     check(glfwInit(), "glfwInit");
     glfwWindowHint(GLFW_CLIENT_API, GLFW_NO_API);
     w->glfw = glfwCreateWindow(480, 300, "semrover", NULL, NULL);
@@ -136,19 +141,22 @@ static void open_window(struct window* w)
     extensions = glfwGetRequiredInstanceExtensions(&count);
     gpu_create(&w->gpu, extensions, count, make_surface, w);
     pool.queueFamilyIndex = w->gpu.family;
-    check(vkCreateFence(w->gpu.device, &fence, NULL, &w->finished) == VK_SUCCESS, "vkCreateFence");
     check(vkCreateCommandPool(w->gpu.device, &pool, NULL, &w->pool) == VK_SUCCESS, "vkCreateCommandPool");
     commands.commandPool = w->pool;
-    check(vkAllocateCommandBuffers(w->gpu.device, &commands, &w->commands) == VK_SUCCESS, "vkAllocateCommandBuffers");
-    w->acquired = make_semaphore(&w->gpu);
+    check(vkAllocateCommandBuffers(w->gpu.device, &commands, w->commands) == VK_SUCCESS, "vkAllocateCommandBuffers");
+    w->timeline = gpu_timeline(&w->gpu);
+    for (i = 0; i < FRAMES_ON_THEIR_WAY; ++i)
+        w->acquired[i] = make_semaphore(&w->gpu);
     make_swapchain(w);
 }
 
 static void close_window(struct window* w)
 {
+    uint32_t i;
     free_swapchain(w);
-    vkDestroySemaphore(w->gpu.device, w->acquired, NULL);
-    vkDestroyFence(w->gpu.device, w->finished, NULL);
+    for (i = 0; i < FRAMES_ON_THEIR_WAY; ++i)
+        vkDestroySemaphore(w->gpu.device, w->acquired[i], NULL);
+    vkDestroySemaphore(w->gpu.device, w->timeline, NULL);
     vkDestroyCommandPool(w->gpu.device, w->pool, NULL);
     gpu_destroy(&w->gpu);
     glfwDestroyWindow(w->glfw);
@@ -171,7 +179,7 @@ static void turn(VkCommandBuffer commands, VkImage image, VkImageLayout from, Vk
 }
 
 /* a copy of the picture for the screenshot */
-static void copy_picture(const struct window* w, uint32_t picture)
+static void copy_picture(const struct window* w, uint32_t picture, VkCommandBuffer commands)
 {
     const VkImage image = w->images[picture];
     const VkBufferImageCopy region = {.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1},
@@ -179,48 +187,47 @@ static void copy_picture(const struct window* w, uint32_t picture)
     const VkMemoryBarrier seen = {.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER,
                                   .srcAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT,
                                   .dstAccessMask = VK_ACCESS_HOST_READ_BIT};
-    turn(w->commands, image, VK_IMAGE_LAYOUT_PRESENT_SRC_KHR, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL);
-    vkCmdCopyImageToBuffer(w->commands, image, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, w->pixels.buffer, 1, &region);
-    turn(w->commands, image, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, VK_IMAGE_LAYOUT_PRESENT_SRC_KHR);
-    vkCmdPipelineBarrier(w->commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_PIPELINE_STAGE_HOST_BIT, 0, 1, &seen, 0, NULL,
-                         0, NULL);
+    turn(commands, image, VK_IMAGE_LAYOUT_PRESENT_SRC_KHR, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL);
+    vkCmdCopyImageToBuffer(commands, image, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, w->pixels.buffer, 1, &region);
+    turn(commands, image, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, VK_IMAGE_LAYOUT_PRESENT_SRC_KHR);
+    vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_PIPELINE_STAGE_HOST_BIT, 0, 1, &seen, 0, NULL, 0,
+                         NULL);
 }
 
-/* Draws and shows one frame, and waits for the device: the library's next step changes the splats. 0: the window has
- * another size now */
+/* Draws and shows one frame, when the one before the last is finished. 0: the window has another size now */
 static int show(struct window* w, sr_world* world, const sr_draw_desc* draw, int copied)
 {
     const VkCommandBufferBeginInfo begin = {.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO};
-    const VkPipelineStageFlags stage = VK_PIPELINE_STAGE_ALL_COMMANDS_BIT;
-    VkSubmitInfo submit = {.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO,
-                           .waitSemaphoreCount = 1,
-                           .pWaitSemaphores = &w->acquired,
-                           .pWaitDstStageMask = &stage,
-                           .commandBufferCount = 1,
-                           .pCommandBuffers = &w->commands,
-                           .signalSemaphoreCount = 1};
+    const uint64_t number = w->number + 1;
+    const VkCommandBuffer commands = w->commands[number % FRAMES_ON_THEIR_WAY];
+    const VkSemaphore acquired = w->acquired[number % FRAMES_ON_THEIR_WAY];
+    const sr_semaphore done = {w->timeline, number};
+    const double since = clock_now();
     VkPresentInfoKHR present = {.sType = VK_STRUCTURE_TYPE_PRESENT_INFO_KHR,
                                 .waitSemaphoreCount = 1,
                                 .swapchainCount = 1,
                                 .pSwapchains = &w->swapchain};
     uint32_t picture = 0;
-    VkResult result =
-        vkAcquireNextImageKHR(w->gpu.device, w->swapchain, UINT64_MAX, w->acquired, VK_NULL_HANDLE, &picture);
+    VkResult result;
+    if (number > FRAMES_ON_THEIR_WAY)
+        gpu_wait(&w->gpu, w->timeline, number - FRAMES_ON_THEIR_WAY);
+    result = vkAcquireNextImageKHR(w->gpu.device, w->swapchain, UINT64_MAX, acquired, VK_NULL_HANDLE, &picture);
+    calls_add(&scene_calls[CALL_FRAME_BEFORE], since);
     if (result == VK_ERROR_OUT_OF_DATE_KHR)
         return 0;
     check(result == VK_SUCCESS || result == VK_SUBOPTIMAL_KHR, "vkAcquireNextImageKHR");
-    check(vkBeginCommandBuffer(w->commands, &begin) == VK_SUCCESS, "vkBeginCommandBuffer");
-    scene_record(&w->scene, world, draw, picture, w->commands);
+    w->number = number;
+    check(vkBeginCommandBuffer(commands, &begin) == VK_SUCCESS, "vkBeginCommandBuffer");
+    scene_record(&w->scene, world, draw, &done, picture, commands);
     if (copied)
-        copy_picture(w, picture);
-    check(vkEndCommandBuffer(w->commands) == VK_SUCCESS, "vkEndCommandBuffer");
-    submit.pSignalSemaphores = &w->drawn[picture];
-    check(vkQueueSubmit(w->gpu.queue, 1, &submit, w->finished) == VK_SUCCESS, "vkQueueSubmit");
+        copy_picture(w, picture, commands);
+    check(vkEndCommandBuffer(commands) == VK_SUCCESS, "vkEndCommandBuffer");
+    gpu_submit(&w->gpu, commands, w->timeline, number, acquired, w->drawn[picture]);
     present.pWaitSemaphores = &w->drawn[picture];
     present.pImageIndices = &picture;
+    pthread_mutex_lock(&w->gpu.queue_mutex);
     result = vkQueuePresentKHR(w->gpu.queue, &present);
-    check(vkWaitForFences(w->gpu.device, 1, &w->finished, VK_TRUE, UINT64_MAX) == VK_SUCCESS, "vkWaitForFences");
-    check(vkResetFences(w->gpu.device, 1, &w->finished) == VK_SUCCESS, "vkResetFences");
+    pthread_mutex_unlock(&w->gpu.queue_mutex);
     return result == VK_SUCCESS;
 }
 
@@ -228,6 +235,7 @@ static int show(struct window* w, sr_world* world, const sr_draw_desc* draw, int
 static void put_block(struct gpu* gpu, sr_world* world, const struct drive* d)
 {
     sr_cell cells[3];
+    const double since = clock_now();
     int32_t k;
     for (k = 0; k < 3; ++k) {
         cells[k].i = (int32_t)floor((d->position[0] + 4 * cos(d->yaw)) / VOXEL);
@@ -236,6 +244,7 @@ static void put_block(struct gpu* gpu, sr_world* world, const struct drive* d)
         cells[k].label = 2;
     }
     check_sr(sr_world_edit(world, cells, 3), gpu->context);
+    calls_add(&scene_calls[CALL_EDIT], since);
 }
 
 static void steer(struct window* w, sr_world* world, struct drive* d, double seconds)
@@ -247,7 +256,7 @@ static void steer(struct window* w, sr_world* world, struct drive* d, double sec
     d->speed -= seconds * 4 * (glfwGetKey(w->glfw, GLFW_KEY_DOWN) == GLFW_PRESS);
     d->position[0] += seconds * d->speed * cos(d->yaw);
     d->position[1] += seconds * d->speed * sin(d->yaw);
-    if (space && !d->space)
+    if (world && space && !d->space)
         put_block(&w->gpu, world, d);
     d->space = space;
     if (glfwGetKey(w->glfw, GLFW_KEY_ESCAPE) == GLFW_PRESS)
@@ -269,53 +278,66 @@ static void write_ppm(const char* path, const struct window* w)
     check(fclose(file) == 0, path);
 }
 
-/* one frame: what the host does, some milliseconds of the library, and the picture */
+/* one frame: where the camera is, and the picture; the worker generates meanwhile */
 static void run_frame(struct window* w, sr_world* world, struct drive* d, int copied)
 {
-    const double direction[3] = {cos(d->yaw), sin(d->yaw), 0};
+    const double direction[3] = {cos(d->yaw), sin(d->yaw), 0}, since = clock_now();
     sr_draw_desc draw;
-    sr_status whole;
-    check_sr(sr_world_focus(world, d->position, direction, 18), w->gpu.context);
-    check_sr(sr_world_step(world, BUDGET_US, NULL), w->gpu.context);
+    if (world)
+        check_sr(sr_world_focus(world, d->position, direction, 18), w->gpu.context);
+    calls_add(&scene_calls[CALL_FOCUS], since);
     scene_look(&w->scene, d->position, d->yaw, &draw);
     if (!show(w, world, &draw, copied)) {
         free_swapchain(w);
         make_swapchain(w);
     }
-    whole = sr_world_check_draws(world);
-    if (whole != SR_ERR_PARTIAL) /* else the next picture has more room */
-        check_sr(whole, w->gpu.context);
+}
+
+static void fly(struct window* w, sr_world* world, struct drive* d, int frames)
+{
+    double before = clock_now();
+    int n;
+    for (n = 0; n != frames && !glfwWindowShouldClose(w->glfw); ++n) {
+        const double now = clock_now();
+        glfwPollEvents();
+        steer(w, world, d, frames < 0 ? now - before : 0.02);
+        run_frame(w, world, d, n == frames - 1);
+        calls_add(&scene_calls[CALL_FRAME], now);
+        before = now;
+    }
+    gpu_wait(&w->gpu, w->timeline, w->number);
+    calls_print(scene_calls, CALLS);
+}
+
+static void print_world(sr_world* world, const struct gpu* gpu)
+{
+    sr_world_info info = {.struct_size = sizeof info};
+    check_sr(sr_world_get_info(world, &info), gpu->context);
+    printf("%lu tiles, %lu splats\n", (unsigned long)info.generated, (unsigned long)info.splats);
 }
 
 int main(int argc, char** argv)
 {
-    const int frames = argc > 3 ? atoi(argv[2]) : -1;
-    struct window w;
+    static struct window w;
     struct drive d = {{1, 0, 1.7}, 0.1, 3, 0};
-    sr_world* world;
-    sr_world_info info = {.struct_size = sizeof info};
-    double before;
-    int n;
+    struct worker worker;
+    sr_world* world = NULL;
     if (argc != 2 && argc != 4) {
         fprintf(stderr, "usage: %s MODEL [FRAMES SCREENSHOT.ppm]\n", argv[0]);
         return 2;
     }
-    memset(&w, 0, sizeof w);
     open_window(&w);
-    check_sr(make_street(w.gpu.context, argv[1], &world), w.gpu.context);
-    before = glfwGetTime();
-    for (n = 0; n != frames && !glfwWindowShouldClose(w.glfw); ++n) {
-        const double now = glfwGetTime();
-        glfwPollEvents();
-        steer(&w, world, &d, frames < 0 ? now - before : 0.02);
-        before = now;
-        run_frame(&w, world, &d, n == frames - 1);
+    if (strcmp(argv[1], "-") != 0) {
+        check_sr(make_street(w.gpu.context, argv[1], &world), w.gpu.context);
+        worker_begin(&worker, world, w.gpu.context);
     }
+    fly(&w, world, &d, argc > 3 ? atoi(argv[2]) : -1);
     if (argc == 4)
         write_ppm(argv[3], &w);
-    check_sr(sr_world_get_info(world, &info), w.gpu.context);
-    printf("%d frames, %.1f m, %lu tiles, %lu splats\n", n, d.position[0] - 1, (unsigned long)info.generated,
-           (unsigned long)info.splats);
+    if (world) {
+        worker_end(&worker);
+        print_world(world, &w.gpu);
+    }
     sr_world_destroy(world);
     close_window(&w);
     return 0;

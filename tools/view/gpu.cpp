@@ -45,7 +45,7 @@ Gpu::~Gpu()
 {
     sr_context_destroy(context_);
     if (device_) {
-        vkDestroyFence(device_, finished_, nullptr);
+        vkDestroySemaphore(device_, timeline_, nullptr);
         vkDestroyCommandPool(device_, pool_, nullptr);
         vkDestroyDevice(device_, nullptr);
     }
@@ -193,9 +193,13 @@ Status Gpu::open_device()
     commands.commandPool = pool_;
     commands.commandBufferCount = 1;
     SR_CHECK(checked(vkAllocateCommandBuffers(device_, &commands, &commands_), "vkAllocateCommandBuffers"));
-    VkFenceCreateInfo fence{};
-    fence.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO;
-    return checked(vkCreateFence(device_, &fence, nullptr, &finished_), "vkCreateFence");
+    VkSemaphoreTypeCreateInfo type{};
+    type.sType = VK_STRUCTURE_TYPE_SEMAPHORE_TYPE_CREATE_INFO;
+    type.semaphoreType = VK_SEMAPHORE_TYPE_TIMELINE;
+    VkSemaphoreCreateInfo semaphore{};
+    semaphore.sType = VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO;
+    semaphore.pNext = &type;
+    return checked(vkCreateSemaphore(device_, &semaphore, nullptr, &timeline_), "vkCreateSemaphore");
 }
 
 Status Gpu::open_context(uint64_t max_bytes)
@@ -224,18 +228,31 @@ Status Gpu::run(const std::function<Status(VkCommandBuffer)>& record, VkSemaphor
     SR_CHECK(record(commands_));
     SR_CHECK(checked(vkEndCommandBuffer(commands_), "vkEndCommandBuffer"));
     const VkPipelineStageFlags stage = VK_PIPELINE_STAGE_ALL_COMMANDS_BIT;
+    const uint64_t waited = 0, values[] = {++runs_, 0};
+    const VkSemaphore signals[] = {timeline_, signal};
+    VkTimelineSemaphoreSubmitInfo numbers{};
+    numbers.sType = VK_STRUCTURE_TYPE_TIMELINE_SEMAPHORE_SUBMIT_INFO;
+    numbers.waitSemaphoreValueCount = wait ? 1 : 0;
+    numbers.pWaitSemaphoreValues = &waited;
+    numbers.signalSemaphoreValueCount = signal ? 2 : 1;
+    numbers.pSignalSemaphoreValues = values;
     VkSubmitInfo submit{};
     submit.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO;
+    submit.pNext = &numbers;
     submit.waitSemaphoreCount = wait ? 1 : 0;
     submit.pWaitSemaphores = &wait;
     submit.pWaitDstStageMask = &stage;
     submit.commandBufferCount = 1;
     submit.pCommandBuffers = &commands_;
-    submit.signalSemaphoreCount = signal ? 1 : 0;
-    submit.pSignalSemaphores = &signal;
-    SR_CHECK(checked(vkQueueSubmit(queue_, 1, &submit, finished_), "vkQueueSubmit"));
-    SR_CHECK(checked(vkWaitForFences(device_, 1, &finished_, VK_TRUE, UINT64_MAX), "vkWaitForFences"));
-    return checked(vkResetFences(device_, 1, &finished_), "vkResetFences");
+    submit.signalSemaphoreCount = signal ? 2 : 1;
+    submit.pSignalSemaphores = signals;
+    SR_CHECK(checked(vkQueueSubmit(queue_, 1, &submit, VK_NULL_HANDLE), "vkQueueSubmit"));
+    VkSemaphoreWaitInfo done{};
+    done.sType = VK_STRUCTURE_TYPE_SEMAPHORE_WAIT_INFO;
+    done.semaphoreCount = 1;
+    done.pSemaphores = &timeline_;
+    done.pValues = &runs_;
+    return checked(vkWaitSemaphores(device_, &done, UINT64_MAX), "vkWaitSemaphores");
 }
 
 } // namespace semrover::view

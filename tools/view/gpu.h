@@ -64,6 +64,7 @@ class Gpu {
     // Records, submits and waits. wait, signal: semaphores around it, or none
     Status run(const std::function<Status(VkCommandBuffer)>& record, VkSemaphore wait = VK_NULL_HANDLE,
                VkSemaphore signal = VK_NULL_HANDLE);
+    sr_semaphore next_run() const { return {timeline_, runs_ + 1}; } // reached when the next one has ended
 
   private:
     Gpu() = default;
@@ -83,7 +84,8 @@ class Gpu {
     bool float16_ = false;
     VkCommandPool pool_ = VK_NULL_HANDLE;
     VkCommandBuffer commands_ = VK_NULL_HANDLE;
-    VkFence finished_ = VK_NULL_HANDLE;
+    VkSemaphore timeline_ = VK_NULL_HANDLE; // run n reaches n
+    uint64_t runs_ = 0;
     sr_context* context_ = nullptr;
 };
 

@@ -202,6 +202,8 @@ Status Viewer::draw_alone()
 Status Viewer::draw_once(const sr_draw_desc& what, const Look& look, ImDrawData* shown_panels)
 {
     const auto record = [&](VkCommandBuffer commands) -> Status {
+        const sr_semaphore done = gpu_->next_run();
+        SR_CHECK(checked(sr_world_record_updates(street_->world(), commands, &done), gpu_->context()));
         SR_CHECK(checked(sr_world_record(street_->world(), &what, commands), gpu_->context()));
         picture_->record(commands, look, shown_panels);
         return {};
