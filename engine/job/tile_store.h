@@ -26,6 +26,11 @@ class TileStore {
     // Hands a tile to a thread that writes it. After a failure nothing more is written, and each call returns its error
     Status write(const TileIndex& tile, uint64_t key, VoxelGrid cells);
     void forget(const TileIndex& tile); // takes it out of the index
+    template <typename F>
+    void name_only(F wanted) // and all others
+    {
+        changed_ = std::erase_if(entries_, [&](const auto& entry) { return !wanted(entry.first); }) > 0 || changed_;
+    }
     // Waits until all is written, and writes the index. Errors: of any write before it
     Status flush();
 

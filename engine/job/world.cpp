@@ -842,7 +842,12 @@ Result<Json> World::estimate(size_t runs)
 
 Status World::flush()
 {
-    return tiles_ && tiles_->store() ? tiles_->store()->flush() : Status();
+    TileStore* store = tiles_ ? tiles_->store() : nullptr;
+    if (!store)
+        return {};
+    if (releases_) // what wanted tiles see is there, but who goes on after a kill need not have looked at it
+        store->name_only([this](const TileIndex& tile) { return order_.rank_of(tile).has_value(); });
+    return store->flush();
 }
 
 Result<std::unique_ptr<World>> open_world(Device& device, WorldRequest request, std::unique_ptr<WorldLabels> labels,

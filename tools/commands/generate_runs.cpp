@@ -348,6 +348,9 @@ Status TilesRun::end()
             return fail(ErrorCode::bad_input, "no cell of {} lies within {} m of the path", quote(o_.grid), o_.horizon);
         }
         SR_CHECK(world_->flush());
+        SR_TRY(const TileFolder tiles, TileFolder::open(o_.output));
+        results["tiles"] = tiles.tiles().size();
+        results["cells"] = tiles.cell_count();
         results["metres"] = length_of(track_);
         results["seconds"] = seconds_now() - begun_;
         results["peak_host_bytes"] = host_memory().peak;
