@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/view/gpu.h"
 
-#include "engine/semrover_vulkan.h"
 #include "runtime/base/quote.h"
 
 #include <array>

@@ -2,14 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/semrover_vulkan.h"
 #include "runtime/base/result.h"
 
 #include <functional>
 #include <memory>
 #include <string>
 #include <vulkan/vulkan.h>
-
-struct sr_context;
 
 namespace semrover::view {
 
