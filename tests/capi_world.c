@@ -284,9 +284,8 @@ static void objects_condition_the_points(sr_context* context, const char* condit
         points[i] = points_of(world, &rect, &cells[i]);
         sr_world_destroy(world);
     }
-    for (i = 0; i < 3; ++i)
-        for (k = 0; k < i; ++k)
-            CHECK(cells[i] == cells[k] && memcmp(points[i], points[k], cells[i] * 20 * 6 * sizeof(float)) != 0);
+    for (k = 0; k < SR_CONDITIONING_GIVEN; ++k) /* of labels that have no objects none are guessed */
+        CHECK(cells[k] == cells[2] && memcmp(points[k], points[2], cells[k] * 20 * 6 * sizeof(float)) != 0);
     for (i = 0; i < 3; ++i)
         free(points[i]);
     house.size[0] = -1;
@@ -348,6 +347,7 @@ static void a_world_without_a_model_has_the_splats_of_its_grid(sr_context* conte
     CHECK_OK(context, create_world(context, model, &desc, &made));
     walk(context, made, 6, 2);
     CHECK_OK(context, sr_world_copy_cells(made, &everywhere, &grid));
+    desc.model = NULL;
     desc.labels = NULL;
     desc.grid = grid;
     CHECK_OK(context, sr_world_create(context, &desc, &shown));

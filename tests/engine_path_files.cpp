@@ -320,7 +320,7 @@ TEST(PathFiles, a_transforms_file_without_a_size_takes_that_of_its_pictures)
     ASSERT_TRUE(taken) << taken.error().message;
     EXPECT_EQ(taken->frames[0].intrinsics.width, 616u);
     ASSERT_EQ(taken->warnings.size(), 1u);
-    EXPECT_NE(taken->warnings[0].find("the default of 616 x 424 is taken (-W, -H)"), std::string::npos);
+    EXPECT_NE(taken->warnings[0].find("the default of 616 x 424 is taken (`width`, `height`)"), std::string::npos);
     EXPECT_TRUE(says(read_keys(folder, R"("fl_x":555,)", picture), "no image size (w, h), and no picture to take it"));
     EXPECT_EQ(read_keys(folder, "", picture)->warnings.size(), 2u); // size and field of view
     std::filesystem::create_directory(folder / "train");
