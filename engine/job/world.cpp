@@ -50,6 +50,21 @@ double World::away(const TileIndex& tile) const
     return focus_ ? distance_to_tile({focus_->position[0], focus_->position[1]}, tile, edge()) : 0;
 }
 
+// those of a map's tiles that are picked
+template <typename T, typename Picks>
+std::vector<TileIndex> World::nearest_first(const std::map<TileIndex, T>& tiles, Picks picks) const
+{
+    std::vector<std::pair<double, TileIndex>> picked;
+    for (const auto& [index, there] : tiles)
+        if (picks(index))
+            picked.emplace_back(away(index), index);
+    std::ranges::sort(picked);
+    std::vector<TileIndex> indices;
+    for (const auto& [away, index] : picked)
+        indices.push_back(index);
+    return indices;
+}
+
 bool World::finished(const TileIndex& tile) const
 {
     const WorldTile* there = tiles_->find(tile);
@@ -198,14 +213,9 @@ void World::want(TileOrder order)
 // tiles that get fewer splats first: they make room for the others
 void World::find_bare()
 {
-    bare_.clear();
-    std::vector<std::pair<double, TileIndex>> bare;
-    for (const auto& [index, there] : tiles_->all())
-        if (splats_ && away(index) <= focus_->radius && tile(index) && !has_splats(index))
-            bare.emplace_back(away(index), index);
-    std::ranges::sort(bare);
-    for (const auto& [away, index] : bare)
-        bare_.push_back(index);
+    bare_ = nearest_first(tiles_->all(), [this](const TileIndex& t) {
+        return splats_ && away(t) <= focus_->radius && tile(t) && !has_splats(t);
+    });
     std::ranges::stable_partition(bare_, [this](const TileIndex& t) {
         const auto made = made_for_.find(t);
         return made != made_for_.end() && made->second.detail < detail(t);
@@ -225,25 +235,21 @@ World::Piece World::next_piece() const
     return filling_.begins_batch() ? Piece::first_row : filling_.ends_batch() ? Piece::last_row : Piece::row;
 }
 
+// rows are stepped here, not in do_piece(): few calls lie between an application and a submit
 Result<bool> World::step(const JobBudget& budget)
 {
-    no_room_yet_ = false;
-    Result<bool> done = work(budget);
-    if (splats_)
-        SR_CHECK(splats_->publish());
-    return done;
-}
-
-Result<bool> World::work(const JobBudget& budget)
-{
     BudgetMeter meter(budget);
+    no_room_yet_ = false;
     bool spent = false; // something was done already
+    Result<bool> done = true;
     while (!idle_ || !work_.empty() || (!bare_.empty() && !no_room_yet_)) {
         const Piece piece = next_piece();
         const bool submits = piece == Piece::first_row || piece == Piece::row || piece == Piece::last_row;
         SubmitCost& cost = costs_[size_t(piece)];
-        if (spent && !meter.room_for(cost.bound()))
-            return false;
+        if (spent && !meter.room_for(cost.bound())) {
+            done = false;
+            break;
+        }
         Status status;
         if (submits) {
             const auto filled = filling_.step({.submits = 1, .microseconds = budget.timed() ? kNoDeadline : ~0ull});
@@ -256,14 +262,18 @@ Result<bool> World::work(const JobBudget& budget)
             status = finish();
         if (!status) {
             give_up();
-            return tl::make_unexpected(status.error());
+            done = tl::make_unexpected(status.error());
+            break;
         }
         say();
         meter.spent(cost, submits);
         spent = true;
     }
-    say(true);
-    return true;
+    if (done && *done)
+        say(true);
+    if (splats_)
+        SR_CHECK(splats_->publish());
+    return done;
 }
 
 Status World::do_piece(Piece piece)
@@ -438,13 +448,9 @@ Result<bool> World::room_for(const TileIndex& tile, size_t rank)
         needed += tiles_->bytes_with_points(*tiles_->find(busy));
     if (tiles_->bytes() + needed <= request_.host_bytes)
         return true;
-    std::vector<std::pair<double, TileIndex>> others;
-    for (const auto& [index, there] : tiles_->all())
-        if (!is_kept(index, rank))
-            others.emplace_back(away(index), index);
-    std::ranges::sort(others);
+    auto others = nearest_first(tiles_->all(), [&](const TileIndex& t) { return !is_kept(t, rank); });
     for (; tiles_->bytes() + needed > request_.host_bytes && !others.empty(); others.pop_back())
-        SR_CHECK(drop(others.back().second));
+        SR_CHECK(drop(others.back()));
     return tiles_->bytes() + needed <= request_.host_bytes;
 }
 
@@ -466,23 +472,18 @@ Status World::drop(const TileIndex& tile)
 // a tile and those beside it, where nothing wanted that is not finished lies beside them, and the store has them
 void World::release_around(const TileIndex& tile)
 {
-    const auto around = [](const TileIndex& middle) {
-        std::vector<TileIndex> tiles;
-        for (int32_t x = -1; x <= 1; ++x)
-            for (int32_t y = -1; y <= 1; ++y)
-                tiles.push_back({middle[0] + x, middle[1] + y});
-        return tiles;
-    };
     const auto waits = [this](const TileIndex& t) { return order_.rank_of(t).has_value() && !finished(t); };
-    for (const TileIndex& other : around(tile)) {
-        const WorldTile* there = tiles_->find(other);
-        if (!there || (there->finished && !there->stored) || std::ranges::any_of(around(other), waits))
-            continue;
+    const auto release = [&](const TileIndex& t) {
+        const WorldTile* there = tiles_->find(t);
+        if (!there || (there->finished && !there->stored) || waits(t) || std::ranges::any_of(tiles_around(t), waits))
+            return;
         if (there->finished)
-            released_.insert(other);
-        not_stored_.erase(other);
-        tiles_->drop(other);
-    }
+            released_.insert(t);
+        not_stored_.erase(t);
+        tiles_->drop(t);
+    };
+    release(tile);
+    std::ranges::for_each(tiles_around(tile), release);
 }
 
 // labels around some of the tiles at work, of which their objects are guessed, are not there yet
@@ -643,13 +644,11 @@ Result<SplatPool::Room> World::add_splats(const TileIndex& index, const VoxelGri
     const size_t own = points.size();
     append_neighbours(index, options.neighbor_radius, cube, points);
     SR_TRY(SplatPool::Room room, splats_->add(index, points, own, options));
-    std::vector<std::pair<double, TileIndex>> others;
-    for (const auto& [other, place] : splats_->places())
-        if (out_of_reach(other))
-            others.emplace_back(away(other), other);
-    std::ranges::sort(others);
+    if (room != SplatPool::Room::none)
+        return room;
+    auto others = nearest_first(splats_->places(), [this](const TileIndex& t) { return out_of_reach(t); });
     for (; room == SplatPool::Room::none && !others.empty(); others.pop_back()) {
-        drop_splats(others.back().second);
+        drop_splats(others.back());
         SR_TRY(room, splats_->add(index, points, own, options));
     }
     return room;

@@ -134,7 +134,6 @@ class World {
     void want(TileOrder order);
     void look_again();
     Piece next_piece() const;
-    Result<bool> work(const JobBudget& budget);
     Status do_piece(Piece piece);
     Status load_next();
     Status look();
@@ -152,6 +151,8 @@ class World {
     void say(bool ended = false) const;
     uint32_t detail(const TileIndex& tile) const { return detail_of(away(tile), request_.detail_distance); }
     bool out_of_reach(const TileIndex& tile) const { return focus_ && away(tile) > focus_->radius; }
+    template <typename T, typename Picks>
+    std::vector<TileIndex> nearest_first(const std::map<TileIndex, T>& tiles, Picks picks) const;
     bool has_splats(const TileIndex& tile) const;
     uint8_t neighbours_with_points(const TileIndex& tile) const;
     bool neighbours_are_settled(const TileIndex& tile) const;
