@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/outputs.h"
 
+#include "runtime/base/hash.h"
 #include "runtime/base/quote.h"
 
 namespace semrover {
@@ -21,6 +22,17 @@ std::optional<Json> finished_results(const Path& folder, const Json& settings)
         return std::nullopt;
     const Json results = run->value("results", Json::object());
     return results.is_object() ? std::optional(results) : std::nullopt;
+}
+
+std::optional<Json> finished_results(const Path& folder, const Json& settings, const Path& output)
+{
+    std::optional<Json> results = finished_results(folder, settings);
+    if (!results)
+        return results;
+    const auto hash = hash_file(output);
+    if (!hash || results->value("xxh64", Json()) != hash_text(*hash))
+        results.reset();
+    return results;
 }
 
 Result<RunFolder> open_run(const Path& folder, const Json& settings, bool replace, const RunContents& contents,

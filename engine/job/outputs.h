@@ -12,6 +12,8 @@ Status check_writable(const Path& path, bool replace);
 
 // Results of a run that is finished, with these settings (null: any); none where `folder` holds no such run.
 std::optional<Json> finished_results(const Path& folder, const Json& settings);
+// the same of a run that wrote `output`; none where that has other bytes than the run gave it (`xxh64`)
+std::optional<Json> finished_results(const Path& folder, const Json& settings, const Path& output);
 
 // The run folder of an output. With `replace`, a finished or different run there is started over, while an interrupted
 // one with the same settings goes on. A finished one with the same settings starts over, too, unless `keep_finished`:

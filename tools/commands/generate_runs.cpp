@@ -111,12 +111,9 @@ bool GridRun::finished_before()
 {
     if (globals_.yes)
         return false;
-    finished_ = finished_results(folder(), settings_);
-    const auto hash = hash_file(o_.output);
-    if (!finished_ || !hash || finished_->value("xxh64", Json()) != hash_text(*hash))
-        finished_.reset();
+    finished_ = finished_results(folder(), settings_, o_.output);
     for (const Path& path : written_files(!objects_->empty()))
-        if (!std::filesystem::exists(path))
+        if (!fs::exists(path))
             finished_.reset();
     return finished_.has_value();
 }

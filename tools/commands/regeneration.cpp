@@ -46,11 +46,7 @@ Path undo_of(const Path& output)
 // a seed of several that an earlier start of the same command has finished; its results
 std::optional<Json> finished_before(const Path& output, const Json& settings)
 {
-    const auto results = finished_results(run_folder_of(output), settings);
-    const auto hash = hash_file(output);
-    if (!results || !hash || results->value("xxh64", Json()) != hash_text(*hash) || !fs::exists(undo_of(output)))
-        return std::nullopt;
-    return results;
+    return fs::exists(undo_of(output)) ? finished_results(run_folder_of(output), settings, output) : std::nullopt;
 }
 
 // the grid with its objects, then what takes it back
@@ -88,14 +84,15 @@ Result<Json> leave_without_points(const Regeneration& what, const RegenerationAr
 // one seed: begin, then steps of the world until it is done, then end
 class SeedRun {
   public:
-    // transformer: the model's, shared by all seeds
+    // transformer: the model's, shared by all seeds. settings: what decides the bytes of any of them
     SeedRun(const Regeneration& what, const GenerationSettings& generation, Device& device,
-            std::shared_ptr<const Transformer> transformer, uint64_t seed)
-        : what_(what), generation_(generation), device_(device), transformer_(std::move(transformer)), seed_(seed)
+            std::shared_ptr<const Transformer> transformer, Json settings, uint64_t seed)
+        : what_(what), generation_(generation), device_(device), transformer_(std::move(transformer)), seed_(seed),
+          settings_(std::move(settings))
     {
+        settings_["seed"] = seed_;
     }
 
-    Status look(); // at what decides the bytes
     const Json& settings() const { return settings_; }
     Status open(const JobCallbacks& callbacks);
     Status keep_in(const Path& folder, bool replace);
@@ -113,17 +110,6 @@ class SeedRun {
     std::optional<RunFolder> run_;
     std::unique_ptr<World> world_;
 };
-
-Status SeedRun::look()
-{
-    SR_TRY(const uint64_t grid, hash_file(what_.input));
-    SR_TRY(settings_, settings_json(generation_, device_, what_.command, grid));
-    settings_["request"] = what_.request;
-    if (what_.objects && !what_.objects->empty())
-        settings_["objects"] = hash_text(hash_objects(*what_.objects));
-    settings_["seed"] = seed_;
-    return {};
-}
 
 Status SeedRun::open(const JobCallbacks& callbacks)
 {
@@ -168,7 +154,6 @@ Result<Json> run_to_end(SeedRun run, const Path& output, bool several, bool warn
     if (!warns) // of the model, as before
         callbacks.warning = {};
     const Path folder = run_folder_of(output);
-    SR_CHECK(run.look());
     if (const auto results = finished_before(output, run.settings()); results && !globals.yes && several)
         return *results;
     if (fs::exists(output) && !globals.yes)
@@ -191,15 +176,20 @@ Result<Json> generate_targets(const Regeneration& what, const RegenerationArgume
     SR_TRY(const auto device, open_device(globals, o.generation.profile));
     SR_TRY(std::shared_ptr<const Transformer> transformer,
            Transformer::load(*device, generation.model.transformer, generation.precision));
-    const auto run_of = [&](uint64_t seed) { return SeedRun(what, generation, *device, transformer, seed); };
+    SR_TRY(const uint64_t input, hash_file(what.input));
+    SR_TRY(Json settings, settings_json(generation, *device, what.command, input));
+    settings["request"] = what.request;
+    if (what.objects && !what.objects->empty())
+        settings["objects"] = hash_text(hash_objects(*what.objects));
+    const auto run_of = [&](uint64_t seed) { return SeedRun(what, generation, *device, transformer, settings, seed); };
     const std::vector<uint64_t> seeds = seeds_of(o);
-    const JobCallbacks callbacks = JobDisplay(globals).callbacks();
     if (o.generation.dry_run) {
         SeedRun run = run_of(seeds[0]);
         SR_CHECK(run.open({}));
         return run.world().estimate(seeds.size());
     }
-    warn_of_placement(generation.model, what.grid, callbacks);
+    JobDisplay display(globals);
+    warn_of_placement(generation.model, what.grid, display.callbacks());
     Json results = what.counts;
     for (const uint64_t seed : seeds) {
         SR_TRY(const Json one,
