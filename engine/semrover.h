@@ -185,17 +185,17 @@ SR_API sr_status sr_grid_read(const char* path, sr_grid** grid);
 SR_API void sr_grid_destroy(sr_grid* grid); /* NULL is fine */
 
 /* Writes a .sgrid, whole or not at all; a file that is there is replaced. Waits for the disk. SR_ERR_BAD_INPUT: a grid
- * without cells, the disk. */
+ * without voxels, the disk. */
 SR_API sr_status sr_grid_write(const sr_grid* grid, const char* path);
 
 SR_API sr_status sr_grid_get_info(const sr_grid* grid, sr_grid_info* info);
 
-/* Adds cells, changes labels, or takes cells away (SR_NO_CELL); of equal cells the last counts. Cells whose label
+/* Adds voxels, changes labels, or takes voxels away (SR_NO_CELL); of equal voxels the last counts. Voxels whose label
  * changes lose their points. Cheap in pieces, too: the grid is put together when it is next read. SR_ERR_BAD_INPUT:
  * coordinates, labels; nothing is changed then. */
 SR_API sr_status sr_grid_set_cells(sr_grid* grid, const sr_cell* cells, uint64_t count);
 
-/* The cells from number `first` on, sorted by i, j, k. cells: room for `count`; *written: how many there were. */
+/* The voxels from number `first` on, sorted by i, j, k. cells: room for `count`; *written: how many there were. */
 SR_API sr_status sr_grid_get_cells(const sr_grid* grid, uint64_t first, uint64_t count, sr_cell* cells,
                                    uint64_t* written);
 
@@ -322,12 +322,12 @@ SR_API sr_status sr_read_objects(const char* path, sr_object* objects, uint64_t*
 
 typedef struct sr_world sr_world;
 
-/* cells low <= (i, j) <= high, all k */
+/* voxels low <= (i, j) <= high, all k */
 typedef struct sr_cell_rect {
     int32_t low[2], high[2];
 } sr_cell_rect;
 
-/* Labels come from one of grid, folder and labels. The callback adds the cells of a rectangle to a grid, with
+/* Labels come from one of grid, folder and labels. The callback adds the voxels of a rectangle to a grid, with
  * sr_grid_set_cells and nothing else of the library; it is asked again for a rectangle that was dropped, and answers
  * alike. Where it does not know the labels yet it returns SR_NOT_YET: the tiles that need them wait for
  * sr_world_labels_ready, and no others. What it returns beside these ends the call that needed the labels, with that
@@ -358,14 +358,14 @@ typedef struct sr_world_desc {
     uint64_t object_count;
     uint64_t seed;
     uint64_t host_bytes;    /* for tiles in memory; 0: no budget */
-    uint64_t splat_bytes;   /* for splats on the device, 56 bytes each, 20 a cell; allocated here. 0: no splats */
+    uint64_t splat_bytes;   /* for splats on the device, 56 bytes each, 20 a voxel; allocated here. 0: no splats */
     double tile_size;       /* metres; 0: 9.6. Another size gives another world */
     double splat_radius;    /* metres; 0: from the distance of the points */
     uint32_t tiles_at_once; /* generated together; 0: as suits the device. Does not change the bytes */
     uint32_t conditioning;  /* SR_CONDITIONING_.. */
     double detail_distance; /* metres: a tile within it has a splat of each point, up to twice as far one of each half
-                               cell, up to four times one of each cell, and so on. So a kilometre takes little more than
-                               what is near. 0: each point has one everywhere */
+                               voxel, up to four times one of each voxel, and so on. So a kilometre takes little more
+                               than what is near. 0: each point has one everywhere */
 } sr_world_desc;
 
 /* The worker. Waits for the compiler and the device, so that no step compiles, and for the disk. On failure *world is
@@ -388,7 +388,7 @@ SR_API sr_status sr_world_focus(sr_world* world, const double position[3], const
  * error the next step tries again. */
 SR_API sr_status sr_world_step(sr_world* world, uint64_t budget_us, uint32_t* done);
 
-/* Changes labels as sr_grid_set_cells does. The tiles of these cells, and those beside them that saw their points, are
+/* Changes labels as sr_grid_set_cells does. The tiles of these voxels, and those beside them that saw their points, are
  * generated anew by the next steps. Their splats stay until the new ones are shown. Any thread. */
 SR_API sr_status sr_world_edit(sr_world* world, const sr_cell* cells, uint64_t count);
 
@@ -414,8 +414,8 @@ typedef struct sr_world_info {
 /* Any thread. While a step is at work: as it was before */
 SR_API sr_status sr_world_get_info(sr_world* world, sr_world_info* info);
 
-/* Copies; the time goes with the cells. The finished cells of a rectangle that are in memory, with their points; maybe
- * none. The application destroys it. Any thread; waits for a step that is at work. */
+/* Copies; the time goes with the voxels. The finished voxels of a rectangle that are in memory, with their points;
+ * maybe none. The application destroys it. Any thread; waits for a step that is at work. */
 SR_API sr_status sr_world_copy_cells(sr_world* world, const sr_cell_rect* rect, sr_grid** grid);
 
 /* The worker. Waits until the cache has all that is finished; an error where it cannot be written, as on a full disk */

@@ -91,17 +91,17 @@ Tensor embedding(Graph& g,
 // -- masked joint attention ------------------------------------------------------------------------------------------
 
 // Tokens of several sets, packed one after the other without padding; the semantic stream repeats the voxel stream's
-// order. A query sees the tokens of both streams in the cells of its own set that lie within the radius.
+// order. A query sees the tokens of both streams in the voxels of its own set that lie within the radius.
 constexpr uint32_t kAttentionTile = 32; // queries of a tile, at most; a tile stays within one set and may be empty
 
-// squared, in cells; from a row on, if need be, another
+// squared, in voxels; from a row on, if need be, another
 struct NeighborRadius {
     int32_t radius2 = 0;
     uint32_t near_row = ~0u;
     int32_t near_radius2 = 0;
 };
 
-// bit j of row i: cell j of the set of i has di^2 + dj^2 + dk^2 <= radius2
+// bit j of row i: voxel j of the set of i has di^2 + dj^2 + dk^2 <= radius2
 [[nodiscard]] Tensor neighbor_mask(Graph& g,
                                    Tensor cells, // [M, 4] i32 array: i, j, k, unused
                                    Tensor sets,  // [M, 2] u32 array: first row and number of rows of the row's set

@@ -24,7 +24,7 @@ void step_timestep(Graph& g, StepTable steps, Tensor table_row); // [rows] u32
 // y[r] = in_scale x[r mod rows of x]
 [[nodiscard]] Tensor step_input(Graph& g, StepTable steps, Tensor x, uint32_t rows, DType dtype); // [M, N] -> [rows, N]
 
-// standard normals keyed by (seed, cell, draw, known or not, channel), Philox4x32-10
+// standard normals keyed by (seed, voxel, draw, known or not, channel), Philox4x32-10
 [[nodiscard]] Tensor step_noise(Graph& g, StepTable steps,
                                 Tensor cells,                  // [M, 4] i32 array
                                 Tensor known,                  // [M] u32

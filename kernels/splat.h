@@ -4,7 +4,7 @@
 
 #include "runtime/graph/graph.h"
 
-// Ops that make surfels of points and draw them; what ops are and how they are called: kernels/network.h
+// Ops that make splats of points and draw them; what ops are and how they are called: kernels/network.h
 namespace semrover {
 
 // the k nearest points of every point, itself included, nearest first, ties by index; 2^32 - 1 where there is none
@@ -36,28 +36,28 @@ struct PcaNormals {
                                     Tensor neighbors, // [P, k] u32 array, 2^32 - 1 for none
                                     const PcaNormalOptions& options = {});
 
-// normals and sizes of the surfels of points
-struct SurfelSize {
+// normals and sizes of the splats of points
+struct SplatSize {
     float sigma = 0.04f; // metres
     float spacing = 0;   // sigma = spacing times the rms distance of the nearest three points; 0: `sigma`
     float smallest = 0.01f, largest = 0.3f; // of such a sigma, metres
 };
-[[nodiscard]] Tensor surfel(Graph& g,
-                            Tensor points,                // [P, 4] fp32 array
-                            Tensor colors,                // [P, 4] fp32 array: rgb; the fourth number becomes sigma
-                            Tensor neighbors,             // [P, k] u32 array, nearest first
-                            Tensor planes,                // [P, 4] fp32 array: normal
-                            const SurfelSize& size = {}); // [P, 4] fp32: normal, sigma
+[[nodiscard]] Tensor splat_shape(Graph& g,
+                                 Tensor points,               // [P, 4] fp32 array
+                                 Tensor colors,               // [P, 4] fp32 array: rgb; the fourth number becomes sigma
+                                 Tensor neighbors,            // [P, k] u32 array, nearest first
+                                 Tensor planes,               // [P, 4] fp32 array: normal
+                                 const SplatSize& size = {}); // [P, 4] fp32: normal, sigma
 
-// surfels: 2D Gaussians in the plane across a normal, axes t_u = normalize(e x n) with e the axis least aligned with n,
+// splats: 2D Gaussians in the plane across a normal, axes t_u = normalize(e x n) with e the axis least aligned with n,
 // and t_v = n x t_u. One that is not finite, or without normal, size or opacity, is skipped.
-struct SplatScene {
+struct SplatTensors {
     Tensor positions;   // [N, 4] fp32: metres, opacity
     Tensor normals;     // [N, 4] fp32: unit normal, sigma_u in metres
     Tensor colors;      // [N, 4] fp32: rgb, sigma_v in metres
     Tensor labels;      // [N] u32
     Tensor cells;       // [N] u32
-    Tensor blocks = {}; // [N / 64, rounded up] u32, or none: surfels of a block that has 0 are skipped
+    Tensor blocks = {}; // [N / 64, rounded up] u32, or none: splats of a block that has 0 are skipped
 };
 // how rays become pixels, of all cameras of one call: engine/camera/lens.h
 enum class SplatLens : uint32_t { pinhole, opencv, fisheye, equirectangular };
@@ -90,7 +90,7 @@ struct SplatImages { // [cameras * height * width] rows; w = weight of a splat i
     Tensor color;    // [.., 4] fp32: sum of w rgb; alpha = sum of w
     Tensor surface;  // [.., 4] fp32: sum of w normal, camera frame, towards the camera; sum of w depth
     Tensor depth;    // [.., 2] fp32: expected (sum of w depth / alpha), median (of the splat that passes one half)
-    Tensor ids;      // [.., 2] u32: label and cell of the splat with the largest w, 2^32 - 1 for none
+    Tensor ids;      // [.., 2] u32: label and voxel of the splat with the largest w, 2^32 - 1 for none
     Tensor visible, pairs; // [1] u32: the numbers that had to fit the two maxima
 };
 // such limits of z-buffers: scale / (z - offset); infinite where that is not above 0
@@ -98,7 +98,7 @@ struct SplatImages { // [cameras * height * width] rows; w = weight of a splat i
                                   Tensor z,      // [P] fp32 array
                                   Tensor scale); // [1, 2] fp32: scale, offset -> [P] fp32 array
 [[nodiscard]] SplatImages
-splat(Graph& g, const SplatScene& scene,
+splat(Graph& g, const SplatTensors& scene,
       // [C, 16] fp32: fx fy cx cy, world to camera [3, 4]; fx = 0: sees nothing. With another lens [C, 28], then
       // 8 numbers of distortion, limit of the lens, 1 where depth is from the camera instead of along z, 0, 0
       Tensor cameras, const SplatOptions& options);

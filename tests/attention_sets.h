@@ -6,7 +6,7 @@
 
 #include <array>
 
-// sets of cells packed one after the other, and the arrays that tell the attention kernels where each set lies
+// sets of voxels packed one after the other, and the arrays that tell the attention kernels where each set lies
 namespace semrover {
 
 using Cell = std::array<int32_t, 3>;
@@ -45,7 +45,7 @@ struct PackedSets {
     }
 };
 
-// cells of a block, and the last one out of everyone's reach
+// voxels of a block, and the last one out of everyone's reach
 inline CellSet random_set(std::mt19937& random, uint32_t count, bool with_loner)
 {
     CellSet set(count);

@@ -210,7 +210,7 @@ static void check_refusal(const sr_context* context, sr_status status, uint64_t 
 
 static float color[PIXELS * 4], expected[PIXELS * 4];
 
-/* a few cells, generated and drawn: the smallest run that allocates everything. The first call that fails ends it */
+/* a few voxels, generated and drawn: the smallest run that allocates everything. The first call that fails ends it */
 static sr_status run(sr_context* context, sr_grid* grid, sr_world** world)
 {
     const double position[3] = {1, 0, 1.5}, forward[3] = {1, 0, 0};

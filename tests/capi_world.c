@@ -23,7 +23,7 @@ static sr_grid* street(void)
     return grid;
 }
 
-/* 100,000 cells by 16 take no more than a few times as long as at once: each piece costs what it has, not the grid */
+/* 100,000 voxels by 16 take no more than a few times as long as at once: each piece costs what it has, not the grid */
 static void grids_grow_in_pieces(void)
 {
     enum { COUNT = 100000, PIECE = 16 };
@@ -53,7 +53,7 @@ static void grids_grow_in_pieces(void)
         CHECK(sr_grid_get_cells(grids[i], COUNT - 1, 1, &last, &written) == SR_OK && written == 1 && last.i == 316);
         sr_grid_destroy(grids[i]);
     }
-    printf("cells at once %.3f s, in pieces %.3f s\n", seconds[0], seconds[1]);
+    printf("voxels at once %.3f s, in pieces %.3f s\n", seconds[0], seconds[1]);
     CHECK(seconds[1] < 5 * seconds[0] + 0.5);
 }
 
@@ -92,7 +92,7 @@ static void edits_grids_cell_by_cell(void)
     CHECK(sr_grid_read("/nonesuch.sgrid", &grid) == SR_ERR_BAD_INPUT && !grid);
     CHECK(sr_grid_create(0.6, &grid) == SR_OK);
     CHECK(sr_grid_set_cells(grid, set, 4) == SR_OK);
-    CHECK(sr_grid_set_cells(grid, wrong, 2) == SR_ERR_BAD_INPUT && says(NULL, "cell 1 of 2 has label 20"));
+    CHECK(sr_grid_set_cells(grid, wrong, 2) == SR_ERR_BAD_INPUT && says(NULL, "voxel 1 of 2 has label 20"));
     CHECK(sr_grid_set_cells(grid, &far, 1) == SR_ERR_BAD_INPUT && says(NULL, "beyond"));
     CHECK(sr_grid_set_cells(grid, NULL, 1) == SR_ERR_USAGE && says(NULL, "cells is NULL"));
     memset(&info, 0, sizeof info);

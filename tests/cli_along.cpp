@@ -17,7 +17,7 @@ namespace cli_along_test {
 const std::string kModel = SEMROVER_SOURCE_DIR "/tests/golden/sampling_ddpm/model";
 const std::string kSettings = " -m " + kModel + " --steps 1 --region-size 40 --coverage-threshold 12 --quiet ";
 
-// a road of 16 cells across, with a wall, along x
+// a road of 16 voxels across, with a wall, along x
 VoxelGrid road(int32_t cells)
 {
     VoxelGrid grid;
@@ -78,7 +78,7 @@ class CliAlong : public testing::Test {
     ScratchFolder folder_;
 };
 
-// cells of `part` that have the points of `whole`
+// voxels of `part` that have the points of `whole`
 size_t same_cells(const VoxelGrid& part, const VoxelGrid& whole)
 {
     size_t same = 0;
@@ -199,7 +199,7 @@ TEST_F(CliAlong, what_makes_no_sense_is_refused)
     EXPECT_EQ(run(line("out")), json_of(contents(path("out.run/run.json")))["results"]); // done before
     refused(line("out", "--seed 5"), 2, "-y replaces it");
     refused(line("x", "--first-cell 3"), 2, "--first-cell");
-    refused(line("x", "--strategy paper"), 2, "leaves cells empty");
+    refused(line("x", "--strategy paper"), 2, "leaves voxels empty");
     refused(line("x", "--order scene"), 2, "--order");
     refused(line("x", "--horizon 0"), 2, "--horizon");
     refused(line("x", "--ply " + path("x.ply")), 2, "--ply");

@@ -18,7 +18,7 @@ const std::string kModel = SEMROVER_SOURCE_DIR "/tests/golden/sampling_ddpm/mode
 const std::string kSettings = " -m " + kModel + " --steps 2 --region-size 48 --coverage-threshold 12 --quiet ";
 constexpr size_t kPerCell = 60;
 
-// a road of 40 x 12 cells with a facade; a car of 4 x 2 x 2 cells whose lower half replaces road. Every cell has
+// a road of 40 x 12 voxels with a facade; a car of 4 x 2 x 2 voxels whose lower half replaces road. Every voxel has
 // points.
 VoxelGrid street()
 {
@@ -84,7 +84,7 @@ class CliEdit : public testing::Test {
     ScratchFolder folder_;
 };
 
-// distance in cells to the nearest cell of the car
+// distance in voxels to the nearest voxel of the car
 double from_car(const Cell& cell)
 {
     double best = 1e9;
@@ -106,7 +106,7 @@ TEST_F(CliEdit, a_removed_car_changes_its_halo_and_not_a_byte_beyond)
         const size_t was = *find_cell(before, after.cells[c]);
         const bool same = same_content(before, was, after, c);
         if (from_car(after.cells[c]) > 5.0001)
-            EXPECT_TRUE(same) << "cell " << c;
+            EXPECT_TRUE(same) << "voxel " << c;
         else
             near += !same;
     }
@@ -210,7 +210,7 @@ TEST_F(CliEdit, without_a_model_changed_cells_wait_for_generate)
 TEST_F(CliEdit, operations_come_in_the_order_given_from_line_and_script)
 {
     run(line("edit", "--paint road --class car --remove road --box 4,2,0:8,4,1", "a.sgrid"));
-    // painted first, so the car's cells are road when road is removed
+    // painted first, so the car's voxels are road when road is removed
     EXPECT_EQ(std::ranges::count(grid("a.sgrid").labels, 13), 0);
     EXPECT_LT(grid("a.sgrid").cells.size(), street().cells.size());
     folder_.put("edits.json", R"([{"op": "paint", "label": "road", "class": "car"},
@@ -219,7 +219,7 @@ TEST_F(CliEdit, operations_come_in_the_order_given_from_line_and_script)
     EXPECT_EQ(contents(path("a.sgrid")), contents(path("b.sgrid")));
     folder_.put("edits.json", R"([{"op": "remove", "class": "car"}, {"op": "remove", "class": "bicycle"}])");
     expect_refusal(line("edit", "--script " + path("edits.json"), "c.sgrid"), 3,
-                   "operation 2 of 2: remove: no cell of the grid is selected");
+                   "operation 2 of 2: remove: no voxel of the grid is selected");
 }
 
 TEST_F(CliEdit, a_car_is_cut_out_and_set_elsewhere)
@@ -231,7 +231,7 @@ TEST_F(CliEdit, a_car_is_cut_out_and_set_elsewhere)
              "out.sgrid"));
     const VoxelGrid before = street(), after = grid("out.sgrid");
     EXPECT_EQ(std::ranges::count(after.labels, 13), 32);
-    // turned a quarter: 2 x 4 cells from (30, 0, 1) on, points turned with them
+    // turned a quarter: 2 x 4 voxels from (30, 0, 1) on, points turned with them
     const size_t was = *find_cell(before, {8, 4, 0}), is = *find_cell(after, {31, 0, 1});
     EXPECT_EQ(after.labels[is], 13);
     EXPECT_EQ(half_to_float(after.points[is * kPerCell]), -half_to_float(before.points[was * kPerCell + 1]));
@@ -254,10 +254,10 @@ TEST_F(CliEdit, what_makes_no_sense_is_refused_in_one_line)
     expect_refusal(edit(""), 2, "no operation given");
     expect_refusal("edit " + path("in.sgrid") + " --remove car", 2, "-o/--output is required");
     expect_refusal(edit("--remove cat"), 2, "unknown class 'cat'");
-    expect_refusal(edit("--remove all"), 2, "say which cells");
-    expect_refusal(edit("--remove truck"), 3, "no cell of the grid is selected (class truck)");
-    expect_refusal(edit("--remove-object 1,1"), 2, "expected a cell i,j,k, found '1,1'");
-    expect_refusal(edit("--remove-object 1,1,9"), 3, "no cell (1, 1, 9)");
+    expect_refusal(edit("--remove all"), 2, "say which voxels");
+    expect_refusal(edit("--remove truck"), 3, "no voxel of the grid is selected (class truck)");
+    expect_refusal(edit("--remove-object 1,1"), 2, "expected a voxel i,j,k, found '1,1'");
+    expect_refusal(edit("--remove-object 1,1,9"), 3, "no voxel (1, 1, 9)");
     expect_refusal(edit("--box 0,0,0:1,1,1 --remove car"), 2, "comes after the operation");
     expect_refusal(edit("--remove all --box 0,0,0:1,1"), 2, "expected a box");
     expect_refusal(line("edit", "--remove car -y", "in.sgrid"), 2, "input and output are the same");
@@ -275,14 +275,14 @@ TEST_F(CliEdit, what_makes_no_sense_is_refused_in_one_line)
     expect_refusal(edit("--remove car --seeds 1,2"), 2, "need a model");
     expect_refusal(edit("--remove car --seeds 1,1 -m " + kModel), 2, "given twice");
     expect_refusal(edit("--remove car -m " + path("none")), 3, "none");
-    expect_refusal(edit("--remove all --box=-99,-99,-99:99,99,99"), 3, "leaves no cell");
+    expect_refusal(edit("--remove all --box=-99,-99,-99:99,99,99"), 3, "leaves no voxel");
     expect_refusal(edit("--script " + path("none.json")), 2, "none.json");
     expect_refusal(edit("--cut --remove car"), 2, "stands alone");
     expect_refusal(edit("--undo " + path("in.sgrid")), 3, "not an undo record");
     expect_refusal(edit("--remove car --max-vram 600KiB" + kSettings), 5, "--max-vram");
-    expect_refusal(line("inpaint", kSettings, "out.sgrid"), 2, "say which cells");
+    expect_refusal(line("inpaint", kSettings, "out.sgrid"), 2, "say which voxels");
     expect_refusal(line("inpaint", "--class car", "out.sgrid"), 2, "--model");
-    expect_refusal(line("inpaint", "--class truck" + kSettings, "out.sgrid"), 3, "no cell of");
+    expect_refusal(line("inpaint", "--class truck" + kSettings, "out.sgrid"), 3, "no voxel of");
     expect_refusal(line("inpaint", "--mask " + path("none.sgrid") + kSettings, "out.sgrid"), 3, "none.sgrid");
     folder_.put("out.sgrid.undo", "of another time");
     expect_refusal(edit("--remove car"), 2, "out.sgrid.undo' exists; -y replaces it");

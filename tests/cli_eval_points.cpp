@@ -78,7 +78,7 @@ TEST(CliEvalPoints, a_pair_is_measured_by_class)
                 (lane["to_truth"].get<double>() + lane["to_generated"].get<double>()) / 2, 1e-12);
     const ProgramResult table = eval_points(gray + " " + truth);
     ASSERT_EQ(table.code, 0) << table.err;
-    EXPECT_TRUE(table.out.starts_with("1 pair, 32 cells, 0 left out")) << table.out;
+    EXPECT_TRUE(table.out.starts_with("1 pair, 32 voxels, 0 left out")) << table.out;
     EXPECT_NE(table.out.find("road-lane"), std::string::npos) << table.out;
     const Json strong = json_of(eval_points(gray + " " + truth + " --json --strong-step 0.4").out);
     EXPECT_EQ(strong["classes"]["road-lane"]["edges"]["generated"], 0);
@@ -118,13 +118,13 @@ TEST(CliEvalPoints, what_cannot_be_compared_is_one_clear_line)
     expect_error(against_truth(grid), 3, "truth.sgrid': expected one voxel size, found 0.7 m generated and 0.6 m");
     grid = road(1, 0);
     grid.labels[5] = 13;
-    expect_error(against_truth(grid), 3, "found 1 cells that differ: (1, 1, 0) is car generated, road in truth");
+    expect_error(against_truth(grid), 3, "found 1 voxels that differ: (1, 1, 0) is car generated, road in truth");
     grid = road(1, 0);
     grid.cells.back()[2] = 4;
-    expect_error(against_truth(grid), 3, "expected the same cells on both sides, found 32 generated and 32 true ones");
+    expect_error(against_truth(grid), 3, "expected the same voxels on both sides, found 32 generated and 32 true ones");
     grid = road(1, 0);
     grid.generated.assign(32, 0);
-    expect_error(against_truth(grid), 3, "none of 32 cells is generated on both sides");
+    expect_error(against_truth(grid), 3, "none of 32 voxels is generated on both sides");
     expect_error(eval_points(SEMROVER_SOURCE_DIR "/assets/scenes/street.semantic.sgrid " + truth), 3,
                  "the generated grid is a semantic grid without points");
     expect_error(eval_points((files / "none.sgrid") + " " + truth), 3, "none.sgrid': no such file or folder");
@@ -144,7 +144,7 @@ TEST(CliEvalPoints, what_cannot_be_compared_is_one_clear_line)
                  "expected lists of equal length, found 1 grids");
     std::filesystem::create_directory(files.folder / "empty");
     expect_error(eval_points((files / "empty") + " " + (files / "folder")), 3, "no .sgrid or .ply files in it");
-    expect_error(eval_points(truth + " " + truth + " --radius 2"), 3, "expected a radius of at most 3 cells");
+    expect_error(eval_points(truth + " " + truth + " --radius 2"), 3, "expected a radius of at most 3 voxels");
     expect_error(eval_points(truth + " " + truth + " --radius 0"), 2, "--radius");
     expect_error(eval_points(truth), 2, "TRUTH is required");
     expect_error(eval_points(truth + " " + truth + " --device none"), 4, "none");

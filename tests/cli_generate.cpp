@@ -22,7 +22,7 @@ using Json = nlohmann::json;
 const std::string kModel = SEMROVER_SOURCE_DIR "/tests/golden/sampling_ddpm/model";
 constexpr const char* kSettings = " --steps 2 --region-size 48 --coverage-threshold 12 ";
 
-// 300 cells: a road of 12 x 20 and a facade beside it
+// 300 voxels: a road of 12 x 20 and a facade beside it
 VoxelGrid street()
 {
     VoxelGrid grid;
@@ -252,7 +252,7 @@ TEST_F(CliGenerate, known_cells_stay_as_they_are)
                           std::equal(&before.colors[i * per_cell], &before.colors[i * per_cell] + per_cell,
                                      &after->colors[i * per_cell]);
         if (before.cells[i][0] < 10)
-            EXPECT_TRUE(same) << "cell " << i;
+            EXPECT_TRUE(same) << "voxel " << i;
         else
             changed += !same;
     }
@@ -427,7 +427,7 @@ TEST_F(CliGenerateRefuses, models_that_are_not_whole)
 TEST_F(CliGenerateRefuses, grids_that_are_not_sound)
 {
     expect_refusal(with_grid(grid({}, 0, 0)), 3, "empty");
-    expect_refusal(with_grid(grid({{0, 0, 0}}, 200, 0)), 3, "unknown labels, expected 0 to 19: 200 (1 cells)");
+    expect_refusal(with_grid(grid({{0, 0, 0}}, 200, 0)), 3, "unknown labels, expected 0 to 19: 200 (1 voxels)");
     expect_refusal(with_grid(grid({{0, 0, 0}}, 0, 0x7e00)), 3, "nan");
     expect_refusal(with_grid(path("none.sgrid")), 3, "No such file");
     VoxelGrid coarse = street();
@@ -466,7 +466,7 @@ TEST_F(CliGenerateRefuses, devices_and_options_that_cannot_be)
     expect_refusal(line + "--tile-size 4.8", 2, "--order tiles");
     expect_refusal(line + "--order tiles --first-cell 3", 2, "--first-cell");
     expect_refusal(line + "--order tiles --tile-size 2.4", 2, "narrower than its halo");
-    expect_refusal(line + "--order tiles --strategy paper", 2, "leaves cells empty");
+    expect_refusal(line + "--order tiles --strategy paper", 2, "leaves voxels empty");
     expect_refusal(line + "--order tiles --along " + path("in.sgrid"), 2, "--order");
 }
 

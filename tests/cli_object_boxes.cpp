@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/scene/scene_objects.h"
+#include "engine/conditioning/scene_objects.h"
 #include "tests/json_text.h"
 #include "tests/program.h"
 

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/scene/cell_objects.h"
+#include "engine/conditioning/cell_objects.h"
 #include "tests/json_text.h"
 #include "tests/program.h"
 #include "tests/scratch_folder.h"
@@ -174,7 +174,7 @@ TEST_F(CliObjects, a_tint_changes_the_cells_of_its_object_and_no_others)
         else
             EXPECT_EQ(of(before), of(after));
     }
-    EXPECT_EQ(changed, 60u) << "every cell of the one house, though a part of it was selected";
+    EXPECT_EQ(changed, 60u) << "every voxel of the one house, though a part of it was selected";
     EXPECT_EQ(tint_text(*(*read_objects(folder_ / "b.objects.json"))[0].tint), "#0040ff");
     EXPECT_NE(tint_text(*(*read_objects(folder_ / "a.objects.json"))[0].tint), "#0040ff");
     ASSERT_EQ(
@@ -190,7 +190,7 @@ TEST_F(CliObjects, a_tint_without_an_object_or_a_model_that_hears_it_is_refused)
     expect_error(edit("a.sgrid", "b.sgrid", tint + "-m " + kGolden + "sampling_ddpm/model"), 3, "knows labels alone");
     expect_error(edit("a.sgrid", "b.sgrid", "--tint '#0040ff' --class road"), 3, "belong to no object");
     expect_error(edit("a.sgrid", "b.sgrid", "--tint blue --class building"), 2, "#rrggbb");
-    expect_error(edit("a.sgrid", "b.sgrid", "--tint '#0040ff'"), 2, "say which cells");
+    expect_error(edit("a.sgrid", "b.sgrid", "--tint '#0040ff'"), 2, "say which voxels");
     std::filesystem::remove(folder_ / "a.objects.json");
     expect_error(edit("a.sgrid", "b.sgrid", tint), 3, "a.objects.json' is missing");
     EXPECT_FALSE(is_there(folder_ / "b.sgrid"));

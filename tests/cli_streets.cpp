@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+#include "engine/conditioning/cell_objects.h"
 #include "engine/format/image.h"
 #include "engine/mesh/mesh_files.h"
-#include "engine/scene/cell_objects.h"
 #include "runtime/base/json.h"
 #include "tests/json_text.h"
 #include "tests/program.h"

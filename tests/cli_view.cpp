@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// `semrover view`: pictures with and without a window, cells that are clicked and painted, paths that `render` reads
+// `semrover view`: pictures with and without a window, voxels that are clicked and painted, paths that `render` reads
 #include "engine/scene/palette.h"
 #include "runtime/base/json.h"
 #include "tests/json_text.h"

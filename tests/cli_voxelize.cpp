@@ -135,7 +135,7 @@ TEST(CliVoxelize, a_mesh_in_map_coordinates_says_how_to_move_it_and_is_moved)
     const ProgramResult far = semrover_program("voxelize " + mesh + " -o " + out);
     EXPECT_EQ(far.code, 3);
     EXPECT_NE(far.err.find("--origin=-500126,-4649001,-14 moves it to the origin"), std::string::npos) << far.err;
-    EXPECT_NE(far.err.find("beyond 2^20 cells of 0.6 m"), std::string::npos) << far.err;
+    EXPECT_NE(far.err.find("beyond 2^20 voxels of 0.6 m"), std::string::npos) << far.err;
     expect_error(semrover_program("voxelize " + mesh + " -q -o " + out + " --ply " + (folder / "m.ply").string()), 3,
                  "the 32-bit floats of --ply are too coarse");
     const std::string origin = " --origin=-500123.4,-4649000.4,-12";
@@ -144,7 +144,7 @@ TEST(CliVoxelize, a_mesh_in_map_coordinates_says_how_to_move_it_and_is_moved)
     ASSERT_TRUE(grid);
     EXPECT_EQ(grid->cells.size(), 50u);
     EXPECT_EQ(grid->cells.front(), (Cell{0, 0, 0}));
-    EXPECT_NEAR(half_to_float(grid->points[1]), 0, 1e-3); // 0.3 is the middle of a cell
+    EXPECT_NEAR(half_to_float(grid->points[1]), 0, 1e-3); // 0.3 is the middle of a voxel
     const ProgramResult chamfer =
         semrover_program("eval chamfer " + mesh + " " + out + " --samples 5000 --json" + origin);
     ASSERT_EQ(chamfer.code, 0) << chamfer.err;

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-// clipping as textbooks give it, in double: half-open, so that what lies in a cell's upper border is not in it
+// clipping as textbooks give it, in double: half-open, so that what lies in a voxel's upper border is not in it
 namespace semrover {
 
 using Point3d = std::array<double, 3>;

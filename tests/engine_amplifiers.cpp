@@ -1,12 +1,12 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // Small files that name much: each is refused, or read, within a stated share of memory (SECURITY.md, Limits)
+#include "engine/conditioning/scene_objects.h"
 #include "engine/format/labelled_points.h"
 #include "engine/format/ply_reader.h"
 #include "engine/mesh/mesh_files.h"
 #include "engine/mesh/surface_blocks.h"
 #include "engine/scene/palette.h"
-#include "engine/scene/scene_objects.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
 #include "tools/dataset/scene_readers.h"
@@ -191,7 +191,7 @@ TEST(Amplifiers, large_faces_are_cut_into_a_limited_number_of_pieces)
         const auto cut = [&] { return SurfaceBlocks::create(m, labels, 0.6f, "m.obj"); };
         const auto refused = cut();
         EXPECT_TRUE(says(refused, "m.obj: face "));
-        EXPECT_TRUE(says(refused, "cut into more than 1048576 pieces of 8 cells; take a larger voxel size"));
+        EXPECT_TRUE(says(refused, "cut into more than 1048576 pieces of 8 voxels; take a larger voxel size"));
         EXPECT_LE(added_mib([&] { static_cast<void>(cut()); }), 512);
     }
     const Mesh square = polygon(700, 4); // a square kilometre is no problem

@@ -9,14 +9,14 @@
 namespace semrover {
 namespace engine_camera_render_test {
 
-SurfelScene make_scene(Device& device, const Surfels& surfels)
+SplatScene make_scene(Device& device, const Splats& splats)
 {
-    auto scene = SurfelScene::create(device, surfels);
+    auto scene = SplatScene::create(device, splats);
     SR_ASSERT(bool(scene), "{}", scene.error().message);
     return std::move(*scene);
 }
 
-void add(Surfels& s, const std::array<float, 3>& position, const std::array<float, 3>& normal, float sigma,
+void add(Splats& s, const std::array<float, 3>& position, const std::array<float, 3>& normal, float sigma,
          const std::array<float, 3>& color)
 {
     s.position.push_back(position);
@@ -29,9 +29,9 @@ void add(Surfels& s, const std::array<float, 3>& position, const std::array<floa
 }
 
 // the faces of a cube of edge 2 around (4, 0.5, 0.25) that look to the origin's side: -x red, +y green, +z blue
-Surfels cube()
+Splats cube()
 {
-    Surfels s;
+    Splats s;
     for (int i = -20; i <= 20; ++i)
         for (int j = -20; j <= 20; ++j) {
             const float a = float(i) / 20, b = float(j) / 20;
@@ -42,7 +42,7 @@ Surfels cube()
     return s;
 }
 
-SplatImage render(const SurfelScene& scene, const CameraFrame& frame)
+SplatImage render(const SplatScene& scene, const CameraFrame& frame)
 {
     const Intrinsics& k = frame.intrinsics;
     auto rasterizer = Rasterizer::create(test_device(), scene, k.width, k.height, 1, {.model = k.model});
@@ -89,7 +89,7 @@ TEST(engine_camera_render, a_cube_is_the_same_picture_from_every_format)
         folder.put("camera_path.json", R"({"camera_type":"perspective","render_height":72,"render_width":96,"fps":24,
             "camera_path":[{"camera_to_world":[0,0,-1,0,-1,0,0,2.5,0,1,0,2,0,0,0,1],"fov":73.73979529168804,"aspect":1.33}]})"),
         folder / "sparse"};
-    const SurfelScene scene = make_scene(test_device(), cube());
+    const SplatScene scene = make_scene(test_device(), cube());
     std::optional<SplatImage> first;
     for (const Path& file : files) {
         SCOPED_TRACE(file.filename());
@@ -109,7 +109,7 @@ TEST(engine_camera_render, a_cube_is_the_same_picture_from_every_format)
 TEST(engine_camera_render, a_cube_stands_where_each_lens_says)
 {
     const ScratchFolder folder;
-    const SurfelScene scene = make_scene(test_device(), cube());
+    const SplatScene scene = make_scene(test_device(), cube());
     Intrinsics opencv = pinhole_from_fov(90, 160, 120), fisheye = fisheye_from_fov(200, 160, 160);
     opencv.model = CameraModel::opencv;
     opencv.distortion = {-0.2, 0.04, 0.003, -0.002};
@@ -127,14 +127,14 @@ TEST(engine_camera_render, cameras_that_do_not_fit_together_are_drawn_in_turns)
 {
     auto device = Device::create({.limits = "range=524288"}); // room for 131072 pairs
     ASSERT_TRUE(device) << device.error().message;
-    Surfels wall; // 1100 of them over all 16 tiles of each of 8 cameras
+    Splats wall; // 1100 of them over all 16 tiles of each of 8 cameras
     for (int i = 0; i < 1100; ++i)
         add(wall, {0, 0, 2 + 0.01f * float(i)}, {0, 0, -1}, 12, {1, float(i % 2), 0});
     for (const CameraModel model : {CameraModel::pinhole, CameraModel::opencv}) {
         Intrinsics k = pinhole_from_fov(90, 64, 64);
         k.model = model;
         const SplatCamera camera = splat_camera(k, {});
-        const SurfelScene scene = make_scene(**device, wall);
+        const SplatScene scene = make_scene(**device, wall);
         const std::vector<SplatCamera> many(8, camera);
         auto together = Rasterizer::create(**device, scene, 64, 64, 8, {.model = model}),
              one = Rasterizer::create(**device, scene, 64, 64, 1, {.model = model});
@@ -150,7 +150,7 @@ TEST(engine_camera_render, cameras_that_do_not_fit_together_are_drawn_in_turns)
 
 TEST(engine_camera_render, lenses_of_a_panorama_and_of_turns_agree)
 {
-    const SurfelScene scene = make_scene(test_device(), cube());
+    const SplatScene scene = make_scene(test_device(), cube());
     const Intrinsics k = whole_sphere(128, 64);
     std::vector<SplatCamera> cameras;
     for (int i = 0; i < 3; ++i)

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/voxfield/cell_conditions.h"
+#include "engine/conditioning/voxel_conditions.h"
 #include "engine/voxfield/token_sampler.h"
 #include "tests/json_text.h"
 #include "tests/says.h"
@@ -66,7 +66,7 @@ TEST(engine_conditions, parts_are_joined_in_the_order_of_the_config_and_what_is_
     painted.tint = {1, 0.5, 0};
     TransformerConfig config;
     config.condition = {ConditionPart::tint, ConditionPart::object};
-    const CellConditions conditioned = *CellConditions::create(config, grid, std::span(&painted, 1));
+    const VoxelConditions conditioned = *VoxelConditions::create(config, grid, std::span(&painted, 1));
     ASSERT_EQ(conditioned.width(), kWidth);
     std::vector<float> row(kWidth, 9), expected(60);
     conditioned.row(0, grid.cells[0], row);
@@ -80,17 +80,17 @@ TEST(engine_conditions, parts_are_joined_in_the_order_of_the_config_and_what_is_
     }
     SceneObject street = painted;
     street.label = grid.labels[1] = 0; // ground has no front
-    const CellConditions ground = *CellConditions::create(config, grid, std::span(&street, 1));
+    const VoxelConditions ground = *VoxelConditions::create(config, grid, std::span(&street, 1));
     ground.row(1, grid.cells[1], row);
     EXPECT_EQ(std::vector<float>(row.begin(), row.begin() + 4), (std::vector<float>{1, 1, 0, -1}));
     EXPECT_EQ(std::vector<float>(row.begin() + 4, row.end()), std::vector<float>(60, 0.f));
     config.condition = {ConditionPart::tint};
     const SceneObject plain = car();
-    const CellConditions colors = *CellConditions::create(config, grid, std::span(&plain, 1));
+    const VoxelConditions colors = *VoxelConditions::create(config, grid, std::span(&plain, 1));
     row.assign(4, 9);
     colors.row(0, grid.cells[0], row);
     EXPECT_EQ(row, std::vector<float>(4, 0.f));
-    EXPECT_TRUE(CellConditions::create(config, grid, {})->empty());
+    EXPECT_TRUE(VoxelConditions::create(config, grid, {})->empty());
 }
 
 TEST(engine_conditions, a_cell_is_told_the_part_it_lies_in_beside_its_object)
@@ -108,7 +108,7 @@ TEST(engine_conditions, a_cell_is_told_the_part_it_lies_in_beside_its_object)
     const std::vector<SceneObject> objects = {house, window, lit};
     TransformerConfig config;
     config.condition = {ConditionPart::tint, ConditionPart::part};
-    const CellConditions conditioned = *CellConditions::create(config, grid, objects);
+    const VoxelConditions conditioned = *VoxelConditions::create(config, grid, objects);
     ASSERT_EQ(conditioned.width(), 4u + 64u);
     for (uint32_t cell : {0u, 1u, 2u}) {
         std::vector<float> row(conditioned.width(), 9), expected(60, 0.f);
@@ -125,7 +125,7 @@ TEST(engine_conditions, a_cell_is_told_the_part_it_lies_in_beside_its_object)
     }
     config.condition = {ConditionPart::tint};
     std::vector<float> row(4, 9);
-    CellConditions::create(config, grid, objects)->row(0, grid.cells[0], row);
+    VoxelConditions::create(config, grid, objects)->row(0, grid.cells[0], row);
     EXPECT_EQ(row, (std::vector<float>{1, 0, 0, 1})) << "a model without parts is conditioned on the rest as ever";
 }
 

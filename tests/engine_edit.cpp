@@ -35,7 +35,7 @@ VoxelGrid grid_of(const std::map<Cell, uint8_t>& labels, float voxel_size = 0.6f
     return grid;
 }
 
-// two points a cell that tell where they come from
+// two points a voxel that tell where they come from
 void add_points(VoxelGrid& grid)
 {
     grid.points_per_voxel = 2;
@@ -55,7 +55,7 @@ std::map<Cell, uint8_t> labels_of(const VoxelGrid& grid)
     return labels;
 }
 
-// a road of 8 x 6 cells with a pavement along its last row; on it a car whose body, at k = 1, lies over the road but
+// a road of 8 x 6 voxels with a pavement along its last row; on it a car whose body, at k = 1, lies over the road but
 // for its wheels at k = 0, where there is no road
 std::map<Cell, uint8_t> street()
 {
@@ -92,7 +92,7 @@ EditOperation remove_class(uint8_t label)
     return o;
 }
 
-WorldBox box(const Cell& low, const Cell& high) // the cells from low to high
+WorldBox box(const Cell& low, const Cell& high) // the voxels from low to high
 {
     WorldBox b;
     for (size_t a = 0; a < 3; ++a)
@@ -161,7 +161,7 @@ TEST(engine_edit, what_stood_high_above_no_ground_invents_none)
     std::map<Cell, uint8_t> labels = street();
     labels[{20, 2, 6}] = kVegetation; // farther than ground is looked for
     labels[{9, 2, 4}] = kVegetation;  // above the level of the ground beside it
-    labels[{9, 4, 1}] = kVegetation;  // one cell above: it stood there
+    labels[{9, 4, 1}] = kVegetation;  // one voxel above: it stood there
     const EditedGrid out = edited(grid_of(labels), {remove_class(kVegetation)});
     std::map<Cell, uint8_t> expected = street();
     expected[{9, 4, 0}] = kRoad;
@@ -185,14 +185,14 @@ TEST(engine_edit, an_object_is_its_connected_cells_of_one_label)
     s.box = box({2, 2, 0}, {4, 3, 0});
     EXPECT_EQ(select_cells(grid, s)->size(), 4u);
     s.object = Cell{2, 2, 7};
-    EXPECT_TRUE(says(select_cells(grid, s), "no cell (2, 2, 7)"));
+    EXPECT_TRUE(says(select_cells(grid, s), "no voxel (2, 2, 7)"));
 }
 
 TEST(engine_edit, boxes_and_spheres_take_cells_by_their_centres)
 {
     const VoxelGrid grid = grid_of(street());
     CellSelection s;
-    s.box = WorldBox{{0.3, 0.3, 0.3}, {0.9, 0.3, 0.3}}; // through the centres of two cells
+    s.box = WorldBox{{0.3, 0.3, 0.3}, {0.9, 0.3, 0.3}}; // through the centres of two voxels
     EXPECT_EQ(*select_cells(grid, s), (std::vector<uint32_t>{0, 6}));
     s.box.reset();
     s.sphere = WorldSphere{{0.3, 0.3, 0.3}, 0.6};
@@ -326,7 +326,7 @@ TEST(engine_edit, stamps_that_do_not_fit_are_refused)
     o.stamp = folder / "none.sgrid";
     EXPECT_TRUE(says(GridEditor(grid).apply(o), "none.sgrid"));
     o.stamp = folder / "coarse.sgrid";
-    EXPECT_TRUE(says(GridEditor(grid).apply(o), "cells of 1.2 m"));
+    EXPECT_TRUE(says(GridEditor(grid).apply(o), "voxels of 1.2 m"));
     o.stamp = folder / "plain.sgrid";
     o.keep_points = true;
     EXPECT_TRUE(says(GridEditor(grid).apply(o), "points to keep"));
@@ -334,9 +334,9 @@ TEST(engine_edit, stamps_that_do_not_fit_are_refused)
     ASSERT_TRUE(write_grid(folder / "plain.sgrid", plain));
     VoxelGrid three = grid;
     three.points_per_voxel = 20; // what the grid will have
-    EXPECT_TRUE(says(GridEditor(three).apply(o), "2 points a cell, the grid 20"));
+    EXPECT_TRUE(says(GridEditor(three).apply(o), "2 points a voxel, the grid 20"));
     EXPECT_TRUE(
-        says(GridEditor(grid).apply(remove_class(kBuilding)), "no cell of the grid is selected (class building)"));
+        says(GridEditor(grid).apply(remove_class(kBuilding)), "no voxel of the grid is selected (class building)"));
 }
 
 TEST(engine_edit, a_moved_car_leaves_road_and_stands_elsewhere_with_its_points)
@@ -406,7 +406,7 @@ TEST(engine_edit, scripts_that_make_no_sense_are_refused_with_their_place)
         {R"([])", "an empty one"},
         {R"([7])", "operation 1: expected an object, found number"},
         {R"([{"op": "burn"}])", "found 'burn'"},
-        {R"([{"op": "remove"}])", "operation 1: say which cells"},
+        {R"([{"op": "remove"}])", "operation 1: say which voxels"},
         {R"([{"op": "remove", "class": "cat"}])", "unknown class 'cat'"},
         {R"([{"op": "remove", "class": "car"}, {"op": "remove", "klass": "car"}])", "operation 2: unknown key 'klass'"},
         {R"([{"op": "remove", "box": [0, 0, 0, 1, 1]}])", "expected 6 numbers, found 5"},
@@ -414,7 +414,7 @@ TEST(engine_edit, scripts_that_make_no_sense_are_refused_with_their_place)
         {R"([{"op": "remove", "box": "everything"}])", "expected an array of numbers"},
         {R"([{"op": "remove", "sphere": [0, 0, 0, -1]}])", "radius above 0"},
         {R"([{"op": "remove", "sphere": [0, 0, 1e300, 1]}])", "absurd"},
-        {R"([{"op": "remove", "object": [0.5, 0, 0]}])", "index of a cell"},
+        {R"([{"op": "remove", "object": [0.5, 0, 0]}])", "index of a voxel"},
         {R"([{"op": "paint", "class": "car"}])", "has a label"},
         {R"([{"op": "paint", "label": "road", "class": "car", "fill": true}])", "what is filled is a box"},
         {R"([{"op": "paint", "label": "road", "class": "car", "fill": 1}])", "fill: expected true or false"},
@@ -496,7 +496,7 @@ TEST_F(EngineUndo, any_edit_is_taken_back_to_the_byte)
 
 TEST_F(EngineUndo, a_file_that_another_program_wrote_comes_back_as_it_was)
 {
-    // cells in another order, and a key that our reader passes over as metadata
+    // voxels in another order, and a key that our reader passes over as metadata
     const std::vector<int32_t> cells = {5, 0, 0, 4, 0, 0, 4, 0, 1};
     const std::vector<uint8_t> labels = {0, 0, 13};
     const TensorData tensors[] = {{"cells", DType::i32, {3, 3}, std::as_bytes(std::span(cells))},

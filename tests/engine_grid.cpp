@@ -89,7 +89,7 @@ TEST(Grid, unsorted_cells_are_sorted_with_all_that_belongs_to_them)
         std::copy_n(grid.colors.begin() + static_cast<ptrdiff_t>(order[i] * 6), 6,
                     shuffled.colors.begin() + static_cast<ptrdiff_t>(i * 6));
     }
-    EXPECT_TRUE(says(check_grid(shuffled, "g"), "g: cells are not sorted: (-1, 0, 2) follows (0, 0, 0)"));
+    EXPECT_TRUE(says(check_grid(shuffled, "g"), "g: voxels are not sorted: (-1, 0, 2) follows (0, 0, 0)"));
     const auto read = read_raw(shuffled);
     ASSERT_TRUE(read) << read.error().message;
     EXPECT_EQ(read->points, grid.points);
@@ -109,17 +109,17 @@ TEST(Grid, what_is_wrong_with_a_grid_is_named)
         change(grid);
         return read_raw(grid);
     };
-    EXPECT_TRUE(says(broken([](VoxelGrid& g) { g.cells[2] = g.cells[0]; }), "cell (-1, 0, 2) is given twice"));
-    EXPECT_TRUE(says(broken([](VoxelGrid& g) { g.cells[1] = {0, 1 << 21, 0}; }), "cell (0, 2097152, 0) is absurd"));
+    EXPECT_TRUE(says(broken([](VoxelGrid& g) { g.cells[2] = g.cells[0]; }), "voxel (-1, 0, 2) is given twice"));
+    EXPECT_TRUE(says(broken([](VoxelGrid& g) { g.cells[1] = {0, 1 << 21, 0}; }), "voxel (0, 2097152, 0) is absurd"));
     EXPECT_TRUE(says(broken([](VoxelGrid& g) { g.cells[0] = {-(1 << 20) - 1, 0, 0}; }), "is absurd"));
     EXPECT_TRUE(says(broken([](VoxelGrid& g) {
                          g.labels = {20, 255, 20};
                      }),
-                     "unknown labels, expected 0 to 19: 20 (2 cells), 255 (1 cells)"));
+                     "unknown labels, expected 0 to 19: 20 (2 voxels), 255 (1 voxels)"));
     EXPECT_TRUE(says(broken([](VoxelGrid& g) { g.points[6 + 4] = float_to_half(0.302f); }),
-                     "point 1 of cell (0, -5, 0): y = 0.30"));
+                     "point 1 of voxel (0, -5, 0): y = 0.30"));
     EXPECT_TRUE(
-        says(broken([](VoxelGrid& g) { g.points[0] = float_to_half(NAN); }), "point 0 of cell (-1, 0, 2): x = nan"));
+        says(broken([](VoxelGrid& g) { g.points[0] = float_to_half(NAN); }), "point 0 of voxel (-1, 0, 2): x = nan"));
     EXPECT_TRUE(says(broken([](VoxelGrid& g) { g.points[17] = float_to_half(-INFINITY); }), "z = -inf"));
     EXPECT_TRUE(broken([](VoxelGrid& g) { g.points[0] = float_to_half(0.3009f); }));
 }

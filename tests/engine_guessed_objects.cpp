@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/scene/cell_objects.h"
+#include "engine/conditioning/cell_objects.h"
+#include "engine/conditioning/guessed_objects.h"
 #include "engine/scene/connected_groups.h"
-#include "engine/scene/guessed_objects.h"
 #include "tests/says.h"
 
 #include <algorithm>
@@ -37,7 +37,7 @@ class Scene {
         }
         return g;
     }
-    // x and y exchanged, and y turned over: a quarter turn counterclockwise about the corner of cell 0
+    // x and y exchanged, and y turned over: a quarter turn counterclockwise about the corner of voxel 0
     Scene turned() const
     {
         Scene s;
@@ -99,7 +99,7 @@ TEST(engine_guessed_objects, groups_are_connected_cells_of_one_label)
     s.fill(kRoad, {0, 0, 0}, {3, 0, 0});
     s.fill(kCar, {1, 0, 1}, {1, 0, 1});
     s.fill(kCar, {2, 1, 2}, {2, 1, 2}); // over a corner
-    s.fill(kCar, {4, 1, 2}, {4, 1, 2}); // a cell further
+    s.fill(kCar, {4, 1, 2}, {4, 1, 2}); // a voxel further
     const VoxelGrid grid = s.grid();
     const auto groups = connected_groups(grid);
     ASSERT_EQ(groups.size(), 3u);
@@ -132,7 +132,7 @@ TEST(engine_guessed_objects, ground_has_one_colour_of_each_class_wherever_a_scen
     const VoxelGrid grid = street().grid();
     const auto found = guessed(grid, known, 1);
     const auto pieces = of_class(found, kRoad);
-    ASSERT_EQ(pieces.size(), 2u); // in squares of 64 cells, left and right of y = 0
+    ASSERT_EQ(pieces.size(), 2u); // in squares of 64 voxels, left and right of y = 0
     for (const SceneObject& o : pieces)
         EXPECT_EQ(o.tint, pieces[0].tint);
     EXPECT_TRUE(of_class(found, kSidewalk).empty()) << "whose usual colours are not known";

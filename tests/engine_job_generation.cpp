@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // worlds in the order of the scene, taken a piece at a time
 #include "engine/job/outputs.h"
-#include "engine/job/world.h"
+#include "engine/world/world.h"
 #include "tests/json_text.h"
 #include "tests/scratch_folder.h"
 
@@ -19,7 +19,7 @@ Device& device()
     return *d;
 }
 
-// the golden cases' model: two layers; regions of a few dozen cells, two at a time
+// the golden cases' model: two layers; regions of a few dozen voxels, two at a time
 GenerationOptions options()
 {
     GenerationOptions o;

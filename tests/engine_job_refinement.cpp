@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/drawing.h"
 #include "engine/job/refinement.h"
-#include "engine/job/world.h"
+#include "engine/world/world.h"
 #include "tests/json_text.h"
 #include "tests/renderer_folders.h"
 #include "tools/trajectory/camera_path.h"

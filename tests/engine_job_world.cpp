@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // worlds that are generated around a camera: the way there, budgets, caches and edits change no byte
-#include "engine/job/world.h"
+#include "engine/world/world.h"
 
 #include "runtime/base/hash.h"
 #include "tests/json_text.h"
@@ -16,7 +16,7 @@ namespace engine_job_world_test {
 
 namespace fs = std::filesystem;
 
-constexpr int32_t kEdge = 6; // cells of a tile
+constexpr int32_t kEdge = 6; // voxels of a tile
 
 Device& device()
 {
@@ -111,7 +111,7 @@ std::set<TileIndex> tiles_of(const World& world)
     return tiles;
 }
 
-// of a tile's cells, those with the same points as in `grid`
+// of a tile's voxels, those with the same points as in `grid`
 size_t same_cells(const VoxelGrid& tile, const VoxelGrid& grid)
 {
     const size_t width = size_t(tile.points_per_voxel) * 3;
@@ -605,7 +605,7 @@ std::pair<size_t, float> splats_of(const World& world, const TileIndex& tile)
     const auto place = places.find(tile);
     if (place == places.end())
         return {};
-    const Surfels all = *world.splats()->scene().read();
+    const Splats all = *world.splats()->scene().read();
     float largest = 0;
     for (size_t i = place->second.first; i < place->second.first + place->second.count; ++i) {
         EXPECT_GT(all.opacity[i], 0);
@@ -624,7 +624,7 @@ bool show(World& world)
     return world.splats()->version() != before;
 }
 
-// tiles are 3.6 m wide and have some 36 cells. The tiny model's points fill space, those of streets lie on surfaces
+// tiles are 3.6 m wide and have some 36 voxels. The tiny model's points fill space, those of streets lie on surfaces
 TEST(engine_job_world, far_tiles_have_fewer_and_larger_splats_and_all_of_them_when_they_are_near)
 {
     WorldRequest r{.settings = *resolve_generation(options())};
@@ -639,7 +639,7 @@ TEST(engine_job_world, far_tiles_have_fewer_and_larger_splats_and_all_of_them_wh
     EXPECT_EQ(all, size_t(cells.points_per_voxel) * world->tile(near)->cells.size());
     const auto [some, larger] = splats_of(*world, half_cells);       // 3 m away
     const auto [fewer, larger_yet] = splats_of(*world, whole_cells); // 6.6 m
-    const auto [few, large] = splats_of(*world, far);                // 13.8 m, two cells
+    const auto [few, large] = splats_of(*world, far);                // 13.8 m, two voxels
     EXPECT_LT(some, all * 7 / 10);
     EXPECT_LT(fewer, some / 2);
     EXPECT_LT(few, fewer / 2);
@@ -673,7 +673,7 @@ std::multimap<std::array<float, 3>, std::pair<std::array<float, 3>, float>> norm
         all.labels.insert(all.labels.end(), points.labels.begin(), points.labels.end());
         all.cells.insert(all.cells.end(), points.cells.begin(), points.cells.end());
     }
-    const Surfels made = *SurfelScene::create(device(), all, {.auto_sigma = true})->read();
+    const Splats made = *SplatScene::create(device(), all, {.auto_sigma = true})->read();
     std::multimap<std::array<float, 3>, std::pair<std::array<float, 3>, float>> normals;
     for (size_t i = 0; i < made.position.size(); ++i)
         normals.emplace(made.position[i], std::pair(made.normal[i], made.sigma_u[i]));
@@ -683,7 +683,7 @@ std::multimap<std::array<float, 3>, std::pair<std::array<float, 3>, float>> norm
 void expect_normals_of_one_scene(World& world)
 {
     const auto expected = normals_of_all(world);
-    const Surfels made = *world.splats()->scene().read();
+    const Splats made = *world.splats()->scene().read();
     size_t count = 0;
     for (const auto& [tile, place] : world.splats()->places())
         for (size_t i = place.first; i < place.first + place.count; ++i, ++count) {
@@ -752,12 +752,12 @@ TEST(engine_job_world, splats_from_before_an_edit_stay_until_the_new_ones_are_th
     ASSERT_TRUE(world->focus(looking(4, 30)));
     run(*world);
     const auto tiles = tiles_of(*world);
-    const size_t before = world->splats()->surfels(), of_tile = splats_of(*world, {0, 0}).first;
+    const size_t before = world->splats()->splats(), of_tile = splats_of(*world, {0, 0}).first;
     const Cell added = {1, 2, 1};
     LabelEdits edits = {{added, uint8_t(13)}};
     ASSERT_TRUE(world->edit(edits));
     EXPECT_FALSE(world->tile({0, 0}));
-    EXPECT_EQ(world->splats()->surfels(), before);
+    EXPECT_EQ(world->splats()->splats(), before);
     for (bool done = false; !done;) {
         done = *world->step(JobBudget::one_submit());
         for (const TileIndex& tile : tiles)
@@ -787,24 +787,24 @@ TEST(engine_job_world, without_a_model_a_world_shows_the_points_that_its_grid_ha
     EXPECT_EQ(world->figures().generated, 0u);
     expect_same(*world, whole());
     EXPECT_FALSE(find_cell(*world->tile({0, 0}), {1, 2, 0}));
-    EXPECT_EQ(world->splats()->surfels(), (some.cells.size() - 1) * size_t(some.points_per_voxel));
+    EXPECT_EQ(world->splats()->splats(), (some.cells.size() - 1) * size_t(some.points_per_voxel));
     ASSERT_TRUE(world->edit({{{2, 2, 0}, std::nullopt}}));
     run(*world);
-    EXPECT_EQ(world->splats()->surfels(), (some.cells.size() - 2) * size_t(some.points_per_voxel));
+    EXPECT_EQ(world->splats()->splats(), (some.cells.size() - 2) * size_t(some.points_per_voxel));
 }
 
 TEST(engine_job_world, where_all_splats_of_a_tile_do_not_fit_it_has_coarser_ones)
 {
     for (const double distance : {0., 100.}) {
         WorldRequest r{.settings = *resolve_generation(options())};
-        r.splat_bytes = 300 * SplatPool::kSurfelBytes;
+        r.splat_bytes = 300 * SplatPool::kSplatBytes;
         r.detail_distance = distance;
         const auto world = *open_world(device(), std::move(r), labels_of_grid(street()));
         ASSERT_TRUE(world->focus(looking(1.8, 0)));
         run(*world);
         ASSERT_GT(world->tile({0, 0})->cells.size() * size_t(world->tile({0, 0})->points_per_voxel), 300u);
         EXPECT_TRUE(world->figures().full);
-        EXPECT_EQ(world->splats()->surfels() > 0, distance > 0);
+        EXPECT_EQ(world->splats()->splats() > 0, distance > 0);
     }
 }
 

@@ -116,7 +116,7 @@ TEST(LabelledPoints, n_points_of_a_cell_are_drawn_and_too_few_repeated)
     EXPECT_EQ(numbers(1), (std::vector<int>{201, 202, 201, 202, 201}));
     const std::vector<int> first = numbers(0);
     EXPECT_TRUE(std::is_sorted(first.begin(), first.end())); // the file's order
-    EXPECT_LT(first.back(), 60);                             // of the cell's label
+    EXPECT_LT(first.back(), 60);                             // of the voxel's label
     EXPECT_EQ(std::set<int>(first.begin(), first.end()).size(), 5u);
     EXPECT_EQ(numbers(0), first); // the same on every run
     // every point of the label is drawn about as often

@@ -182,7 +182,7 @@ VoxelGrid shuffled_in_cells(VoxelGrid grid)
     return grid;
 }
 
-// colours become the Gaussian mean of those of the class around, up to a cell away
+// colours become the Gaussian mean of those of the class around, up to a voxel away
 VoxelGrid blurred(const VoxelGrid& grid, double sigma)
 {
     VoxelGrid out = grid;
@@ -271,7 +271,7 @@ TEST(EngineLocalContrast, sharpness_ranks_truth_over_colors_that_are_out_of_orde
         // contrast alone does not tell order from disorder: that is what the step is for
         EXPECT_GT(shuffled[label].contrast(), sharp[label].contrast());
     }
-    // 12 shuffles of the 42 cells of markings gave squares of 0 to 0.12 of the truth's, 0.02 in the mean
+    // 12 shuffles of the 42 voxels of markings gave squares of 0 to 0.12 of the truth's, 0.02 in the mean
     EXPECT_LT(shuffled[kLane].sharpness(), 0.5 * sharp[kLane].sharpness());
 }
 
@@ -290,7 +290,7 @@ TEST(EngineLocalContrast, order_of_points_and_place_of_the_grid_change_nothing)
     const VoxelGrid grid = street_of({kLane, kCar});
     VoxelGrid other = grid;
     const auto n = size_t(grid.points_per_voxel);
-    for (size_t i = 0; i < grid.points.size() / 3; ++i) { // backwards within each cell
+    for (size_t i = 0; i < grid.points.size() / 3; ++i) { // backwards within each voxel
         const size_t from = i / n * n + (n - 1 - i % n);
         for (size_t a = 0; a < 3; ++a) {
             other.points[3 * i + a] = grid.points[3 * from + a];

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/scene/object_blocks.h"
+#include "engine/conditioning/object_blocks.h"
 
-#include "engine/scene/cell_objects.h"
+#include "engine/conditioning/cell_objects.h"
 #include "engine/voxfield/voxfield_model.h"
 
 #include <algorithm>
@@ -30,7 +30,7 @@ VoxelGrid avenue(bool twice = false)
     return std::move(*grid);
 }
 
-// box, class and colour of the object that a cell belongs to
+// box, class and colour of the object that a voxel belongs to
 std::vector<std::string> owners_of(const VoxelGrid& grid, const std::vector<SceneObject>& objects)
 {
     const auto owners = objects_of_cells(grid, objects);
@@ -58,7 +58,7 @@ TEST(engine_object_blocks, what_a_cell_belongs_to_depends_on_the_labels_near_it)
     const std::vector<std::string> expected = owners_of(whole, *all);
     EXPECT_GT(std::ranges::count_if(expected, [](const auto& text) { return !text.empty(); }),
               int64_t(whole.cells.size() / 4));
-    // a place of 17 cells, from the blocks that reach it and the labels that these are guessed from
+    // a place of 17 voxels, from the blocks that reach it and the labels that these are guessed from
     const Cell middle = whole.cells[whole.cells.size() / 16];
     const CellWindow place = {{middle[0] - 8, middle[1] - 8}, {middle[0] + 8, middle[1] + 8}};
     std::vector<SceneObject> near;

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/scene/cell_objects.h"
+#include "engine/conditioning/cell_objects.h"
 #include "runtime/base/dtype.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
@@ -140,7 +140,7 @@ TEST(engine_objects, cells_belong_to_the_box_of_their_class_in_which_they_lie_de
     EXPECT_LT(owned, 500u);
 }
 
-// as objects_of_cells, by comparing every object with every cell of its class
+// as objects_of_cells, by comparing every object with every voxel of its class
 std::vector<int32_t> owners_by_product(const VoxelGrid& grid, const std::vector<SceneObject>& objects)
 {
     const double size = double(grid.voxel_size);
@@ -195,16 +195,16 @@ TEST(engine_objects, owners_are_those_of_the_product_of_all_objects_and_cells)
 
 TEST(engine_objects, boxes_that_lie_over_too_many_cells_are_refused)
 {
-    const VoxelGrid grid = slab(); // 800 cells of cars in 40 slices
+    const VoxelGrid grid = slab(); // 800 voxels of cars in 40 slices
     const SceneObject wide = {.id = 0, .label = kCar, .center = {}, .size = {100, 100, 2}, .heading = 0.3};
     std::vector<SceneObject> objects(3, wide);
     EXPECT_TRUE(objects_of_cells(grid, objects, 3 * 840));
     EXPECT_TRUE(
         says(objects_of_cells(grid, objects, 3 * 840 - 1),
-             "object 3 of 3: the boxes so far lie over more than 2519 cells of their classes, counted with each "
-             "box; the grid has 1600 cells"));
+             "object 3 of 3: the boxes so far lie over more than 2519 voxels of their classes, counted with each "
+             "box; the grid has 1600 voxels"));
     EXPECT_TRUE(says(objects_of_cells(grid, objects, 840 + 40 - 1), "object 2 of 3"));
-    objects.assign(1 << 20, car(0, 500, 0, 0)); // far from all cells: nothing to compare
+    objects.assign(1 << 20, car(0, 500, 0, 0)); // far from all voxels: nothing to compare
     EXPECT_TRUE(objects_of_cells(grid, objects, 0));
 }
 
@@ -250,7 +250,7 @@ TEST(engine_objects, the_tint_of_a_part_is_the_median_of_the_points_in_its_box)
 {
     VoxelGrid grid = slab();
     for (size_t v = 0; v < grid.cells.size(); ++v)
-        grid.points[v * 3] = float_to_half(0.2f); // 0.2 m towards x of the cell's centre
+        grid.points[v * 3] = float_to_half(0.2f); // 0.2 m towards x of the voxel's centre
     std::vector<SceneObject> objects = {car(0, 0, 0, 0), car(1, 0, 0, 0), car(2, 0, 0, 0)};
     for (SceneObject& o : std::span(objects).subspan(1)) {
         o.part = true;

@@ -66,7 +66,7 @@ PlyFile read_ply(const std::filesystem::path& path)
     return file;
 }
 
-Surfels two_surfels()
+Splats two_splats()
 {
     return {{{1, 2, 3}, {-4, 5.5f, 1e-3f}},
             {{0, 0, 1}, {-1, 0, 0}},
@@ -80,7 +80,7 @@ Surfels two_surfels()
 TEST(Ply, points_carry_colour_and_label)
 {
     const ScratchFolder folder;
-    Surfels s = two_surfels();
+    Splats s = two_splats();
     s.normal.clear();
     s.opacity.clear();
     ASSERT_TRUE(write_points_ply(folder / "p.ply", s));
@@ -96,7 +96,7 @@ TEST(Ply, points_carry_colour_and_label)
 TEST(Ply, the_3dgs_file_has_a_thin_third_scale_after_the_second)
 {
     const ScratchFolder folder;
-    ASSERT_TRUE(write_splats_ply(folder / "s.ply", two_surfels(), SplatPly::gaussian_3d));
+    ASSERT_TRUE(write_splats_ply(folder / "s.ply", two_splats(), SplatPly::gaussian_3d));
     PlyFile file = read_ply(folder / "s.ply");
     EXPECT_EQ(file.names,
               (std::vector<std::string>{"x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2", "opacity",
@@ -115,7 +115,7 @@ TEST(Ply, the_3dgs_file_has_a_thin_third_scale_after_the_second)
 TEST(Ply, the_2dgs_file_has_two_scales_and_says_so)
 {
     const ScratchFolder folder;
-    ASSERT_TRUE(write_splats_ply(folder / "s.ply", two_surfels(), SplatPly::gaussian_2d));
+    ASSERT_TRUE(write_splats_ply(folder / "s.ply", two_splats(), SplatPly::gaussian_2d));
     PlyFile file = read_ply(folder / "s.ply");
     EXPECT_EQ(file.comments, std::vector<std::string>{"SplatRenderMode: 2dgs"});
     EXPECT_FALSE(file.columns.contains("scale_2"));
@@ -150,7 +150,7 @@ TEST(Ply, the_rotation_takes_z_to_the_normal_and_x_to_the_tangent)
     }
     for (const auto& n : normals) {
         const auto [u, v] = tangents_of(n);
-        const auto q = surfel_rotation(n);
+        const auto q = splat_rotation(n);
         EXPECT_GE(q[0], 0);
         for (size_t axis = 0; axis < 3; ++axis) {
             EXPECT_NEAR(third_axis(q)[axis], n[axis], 1e-6);
@@ -167,25 +167,25 @@ TEST(Ply, splats_that_cannot_be_written_are_named_and_leave_no_file)
 {
     const ScratchFolder folder;
     const auto broken = [&](auto&& change) {
-        Surfels s = two_surfels();
+        Splats s = two_splats();
         change(s);
         return write_splats_ply(folder / "s.ply", s, SplatPly::gaussian_3d);
     };
     EXPECT_TRUE(says(write_points_ply(folder / "s.ply", {}), "there are no points"));
-    EXPECT_TRUE(says(broken([](Surfels& s) { s.position[1][2] = NAN; }), "point 1 has a number that is not finite"));
-    EXPECT_TRUE(says(broken([](Surfels& s) { s.color[0][0] = INFINITY; }), "point 0 has a number that is not finite"));
-    EXPECT_TRUE(says(broken([](Surfels& s) { s.normal[1] = {0, 0, 0}; }), "splat 1 has the normal (0, 0, 0)"));
-    EXPECT_TRUE(says(broken([](Surfels& s) { s.normal[0][0] = NAN; }), "splat 0 has the normal (nan, 0, 1)"));
-    EXPECT_TRUE(says(broken([](Surfels& s) { s.sigma_v[1] = 0; }), "splat 1 has sigmas 0.2 and 0"));
-    EXPECT_TRUE(says(broken([](Surfels& s) { s.sigma_u[1] = INFINITY; }), "splat 1 has sigmas inf"));
-    EXPECT_TRUE(says(broken([](Surfels& s) { s.opacity[0] = NAN; }), "opacity nan"));
-    EXPECT_TRUE(says(write_points_ply(folder / "no" / "s.ply", two_surfels()), "cannot write"));
+    EXPECT_TRUE(says(broken([](Splats& s) { s.position[1][2] = NAN; }), "point 1 has a number that is not finite"));
+    EXPECT_TRUE(says(broken([](Splats& s) { s.color[0][0] = INFINITY; }), "point 0 has a number that is not finite"));
+    EXPECT_TRUE(says(broken([](Splats& s) { s.normal[1] = {0, 0, 0}; }), "splat 1 has the normal (0, 0, 0)"));
+    EXPECT_TRUE(says(broken([](Splats& s) { s.normal[0][0] = NAN; }), "splat 0 has the normal (nan, 0, 1)"));
+    EXPECT_TRUE(says(broken([](Splats& s) { s.sigma_v[1] = 0; }), "splat 1 has sigmas 0.2 and 0"));
+    EXPECT_TRUE(says(broken([](Splats& s) { s.sigma_u[1] = INFINITY; }), "splat 1 has sigmas inf"));
+    EXPECT_TRUE(says(broken([](Splats& s) { s.opacity[0] = NAN; }), "opacity nan"));
+    EXPECT_TRUE(says(write_points_ply(folder / "no" / "s.ply", two_splats()), "cannot write"));
     EXPECT_EQ(folder.entries(), 0u);
 }
 
 TEST(PlyDeathTest, arrays_of_different_lengths_are_a_bug)
 {
-    Surfels s = two_surfels();
+    Splats s = two_splats();
     s.label.pop_back();
     EXPECT_DEATH(static_cast<void>(write_points_ply("/tmp/never.ply", s)), "2 points with 2 colors and 1 labels");
 }

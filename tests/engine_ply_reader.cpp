@@ -141,13 +141,13 @@ TEST(PlyReader, reads_binary_lists_between_scalars_and_elements_in_any_order)
 TEST(PlyReader, reads_what_this_program_writes)
 {
     const ScratchFolder folder;
-    const Surfels s = {{{1, 2, 3}, {-4, 5.5f, 1e-3f}},
-                       {{0, 0, 1}, {-1, 0, 0}},
-                       {{0, 0.5f, 1}, {0.2f, 0.4f, 0.6f}},
-                       {0.1f, 0.2f},
-                       {0.05f, 0.3f},
-                       {0.5f, 1.0f},
-                       {3, 19}};
+    const Splats s = {{{1, 2, 3}, {-4, 5.5f, 1e-3f}},
+                      {{0, 0, 1}, {-1, 0, 0}},
+                      {{0, 0.5f, 1}, {0.2f, 0.4f, 0.6f}},
+                      {0.1f, 0.2f},
+                      {0.05f, 0.3f},
+                      {0.5f, 1.0f},
+                      {3, 19}};
     ASSERT_TRUE(write_points_ply(folder / "p.ply", s));
     const Result<PlyFile> points = read_ply(folder / "p.ply");
     ASSERT_TRUE(points) << points.error().message;

@@ -45,7 +45,7 @@ std::vector<TruePoint> points_in(const VoxelGrid& grid, int label = -1)
     return points;
 }
 
-// cells of a slab at random, some of them apart, with points at random
+// voxels of a slab at random, some of them apart, with points at random
 VoxelGrid random_grid(uint32_t seed, int side, int points, int labels)
 {
     std::mt19937 random(seed);
@@ -105,7 +105,7 @@ double color_error(const std::vector<TruePoint>& a, const std::vector<TruePoint>
 TEST(EnginePointScores, colors_and_distances_match_all_points_one_by_one)
 {
     for (const auto& [side, n, labels] : {std::tuple{1, 1, 1}, {3, 4, 2}, {9, 20, 3}}) {
-        SCOPED_TRACE(fmt::format("{} cells a side, {} points", side, n));
+        SCOPED_TRACE(fmt::format("{} voxels a side, {} points", side, n));
         VoxelGrid truth = random_grid(3, side, n, labels);
         if (truth.cells.empty())
             continue;
@@ -242,24 +242,24 @@ TEST(EnginePointScores, what_cannot_be_compared_says_why)
     VoxelGrid other = good;
     other.voxel_size = 0.5f;
     EXPECT_TRUE(says(score(other, good), "expected one voxel size, found 0.5 m generated and 0.6 m in truth"));
-    EXPECT_TRUE(
-        says(score(random_grid(9, 4, 4, 2), good), "expected as many points a cell, found 4 generated and 3 in truth"));
+    EXPECT_TRUE(says(score(random_grid(9, 4, 4, 2), good),
+                     "expected as many points a voxel, found 4 generated and 3 in truth"));
     other = good;
     other.cells.back()[0] += 7;
-    EXPECT_TRUE(says(score(other, good), "expected the same cells on both sides"));
+    EXPECT_TRUE(says(score(other, good), "expected the same voxels on both sides"));
     EXPECT_TRUE(says(score(other, good), "the truth lacks (7,"));
     other = good;
     other.labels[1] = kBuilding;
-    EXPECT_TRUE(says(score(other, good), "found 1 cells that differ"));
+    EXPECT_TRUE(says(score(other, good), "found 1 voxels that differ"));
     EXPECT_TRUE(says(score(other, good), "is building generated"));
     other = good;
     std::ranges::fill(other.generated, uint8_t(0));
-    EXPECT_TRUE(says(score(other, good), "cells is generated on both sides"));
-    EXPECT_TRUE(says(score(good, good, {.radius = 1.9}), "expected a radius of at most 3 cells, 1.8 m, found 1.9 m"));
+    EXPECT_TRUE(says(score(other, good), "voxels is generated on both sides"));
+    EXPECT_TRUE(says(score(good, good, {.radius = 1.9}), "expected a radius of at most 3 voxels, 1.8 m, found 1.9 m"));
     EXPECT_TRUE(says(score(good, good, {.radius = NAN}), "found nan m"));
 }
 
-// rows of ten cells along x, each cell with two points whose brightness is that of the row -+ its detail
+// rows of ten voxels along x, each voxel with two points whose brightness is that of the row -+ its detail
 VoxelGrid rows_of_cells(const std::vector<std::pair<int, int>>& rows)
 {
     VoxelGrid grid;

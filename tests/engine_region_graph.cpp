@@ -51,7 +51,7 @@ TEST(RegionGraph, ARegionThatIsGivenBackIsReadyAgain)
 
 TEST(RegionGraph, ARegionWaitsForThoseWhoseTargetsItKnows)
 {
-    // 2 knows cells of 0 and of 1; 3 shares with 2 only a cell both know, so it waits for 1 alone; 4 adds nothing
+    // 2 knows voxels of 0 and of 1; 3 shares with 2 only a voxel both know, so it waits for 1 alone; 4 adds nothing
     RegionGraph graph(make_regions({{0, 1, 2}, {3, 4}, {1, 3, 5}, {3, 6}, {0, 5, 6}}), 8);
     EXPECT_EQ(graph.region_count(), 4u);
     EXPECT_EQ(list(graph.targets(2)), (List{5}));
@@ -98,7 +98,7 @@ void run_in_random_order(const Regions& regions, size_t cells, const std::vector
     while (!graph.finished()) {
         for (uint32_t region : graph.take(random() % 7 + 1)) {
             for (uint32_t cell : regions.region(region))
-                EXPECT_NE(graph.is_target(region, cell), bool(known[cell])) << "cell " << cell;
+                EXPECT_NE(graph.is_target(region, cell), bool(known[cell])) << "voxel " << cell;
             running.push_back(region);
         }
         ASSERT_FALSE(running.empty()) << "no region is ready and none is running";
@@ -113,7 +113,7 @@ void run_in_random_order(const Regions& regions, size_t cells, const std::vector
         }
     }
     for (size_t cell = 0; cell < cells; ++cell)
-        EXPECT_EQ(writes[cell], generated[cell] ? 0u : 1u) << "cell " << cell;
+        EXPECT_EQ(writes[cell], generated[cell] ? 0u : 1u) << "voxel " << cell;
 }
 
 TEST(RegionGraph, InAnyOrderEveryCellIsWrittenOnceAndKnownCellsAreThereBefore)

@@ -66,7 +66,7 @@ class BruteForce {
                                                         : knn(seed, options_.region_size);
     }
 
-    // 13 of 16 cells of a region are targets at most; a rim makes it whole, or at least half of one
+    // 13 of 16 voxels of a region are targets at most; a rim makes it whole, or at least half of one
     std::vector<uint32_t> with_rim(const std::vector<uint32_t>& near) const
     {
         std::vector<uint32_t> targets, known;
@@ -138,7 +138,7 @@ class Clouds {
 
     int uniform(int low, int high) { return std::uniform_int_distribution<int>(low, high)(random_); }
 
-    // distinct cells in random order: dense or sparse boxes, planes and lines, near and far clusters, wide negatives
+    // distinct voxels in random order: dense or sparse boxes, planes and lines, near and far clusters, wide negatives
     Cloud draw(int cells)
     {
         Cloud cloud;
@@ -232,7 +232,7 @@ TEST(Regions, EqualBruteForceOnRandomClouds)
         const Regions expected = BruteForce(cloud, options).run();
         const auto regions = extract_regions(cloud, options);
         ASSERT_TRUE(regions) << regions.error().message;
-        ASSERT_EQ(regions->seeds, expected.seeds) << "trial " << trial << ", " << cloud.size() << " cells";
+        ASSERT_EQ(regions->seeds, expected.seeds) << "trial " << trial << ", " << cloud.size() << " voxels";
         ASSERT_EQ(regions->offsets, expected.offsets) << "trial " << trial;
         ASSERT_EQ(regions->members, expected.members) << "trial " << trial;
         ASSERT_EQ(regions->uncovered, expected.uncovered) << "trial " << trial;
@@ -320,7 +320,7 @@ TEST(Regions, BadInputIsRefusedWithTheReason)
         EXPECT_EQ(regions ? ErrorCode::internal : regions.error().code, ErrorCode::bad_input);
         return regions ? std::string() : regions.error().message;
     };
-    EXPECT_NE(message({}, {}).find("no cells"), std::string::npos);
+    EXPECT_NE(message({}, {}).find("no voxels"), std::string::npos);
     EXPECT_NE(message({{4, 5, 6}, {0, 0, 0}, {4, 5, 6}}, {}).find("(4, 5, 6) appears twice"), std::string::npos);
     EXPECT_NE(message(two, {.region_size = 4097}).find("region_size"), std::string::npos);
     EXPECT_NE(message(two, {.region_size = 0}).find("region_size"), std::string::npos);

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // what others put into a run's folder
 #include "engine/job/outputs.h"
-#include "engine/job/region_store.h"
+#include "engine/world/region_store.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
 

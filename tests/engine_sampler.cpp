@@ -20,7 +20,7 @@ const Transformer& transformer()
     return *t;
 }
 
-// a patch of ground whose first `known` cells are given
+// a patch of ground whose first `known` voxels are given
 RegionInput patch(int32_t x, uint32_t cells, uint32_t known)
 {
     RegionInput r;
@@ -146,7 +146,7 @@ TEST(engine_sampler, guides_the_steps_up_to_a_timestep)
     EXPECT_EQ(backwards.error().code, ErrorCode::usage);
 }
 
-// with scale 0 a step is its unlabelled half: what a network of that radius makes of the same cells without labels
+// with scale 0 a step is its unlabelled half: what a network of that radius makes of the same voxels without labels
 TEST(engine_sampler, lets_cells_without_labels_see_none_beyond_the_guidance_radius)
 {
     const SamplingPlan p = plan(Sampler::ddpm, 3, {});

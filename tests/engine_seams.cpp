@@ -7,7 +7,7 @@
 namespace semrover {
 namespace engine_seams_test {
 
-// a row of cells with one colour each
+// a row of voxels with one colour each
 VoxelGrid row(std::initializer_list<uint8_t> levels)
 {
     VoxelGrid grid;
@@ -27,7 +27,7 @@ VoxelGrid row(std::initializer_list<uint8_t> levels)
 
 TEST(engine_seams, steps_across_borders_and_inside_tiles_are_told_apart)
 {
-    const VoxelGrid grid = row({100, 110, 140, 145}); // of two tiles of two cells
+    const VoxelGrid grid = row({100, 110, 140, 145}); // of two tiles of two voxels
     const SeamSteps steps = seam_steps(grid, 2);
     EXPECT_EQ(steps.across.pairs, 1u);
     EXPECT_DOUBLE_EQ(steps.across.mean(), 30);

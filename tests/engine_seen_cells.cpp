@@ -38,7 +38,7 @@ CameraPath path_through(std::initializer_list<Point3> eyes)
 
 class SeenCells : public testing::Test {
   protected:
-    // x indices of the cells seen, with how many there are
+    // x indices of the voxels seen, with how many there are
     std::map<int32_t, size_t> seen(const Mesh& mesh, std::initializer_list<Point3> eyes, SeenOptions options = {})
     {
         const auto voxels = voxelize(test_device(), mesh, {});
@@ -54,11 +54,11 @@ class SeenCells : public testing::Test {
     }
 };
 
-constexpr size_t kWall = 10 * 5; // cells of 0.6 m
+constexpr size_t kWall = 10 * 5; // voxels of 0.6 m
 
 TEST_F(SeenCells, are_those_in_front_and_not_those_behind)
 {
-    const Mesh mesh = walls_at({3.3f, 6.3f}); // in cells 5 and 10
+    const Mesh mesh = walls_at({3.3f, 6.3f}); // in voxels 5 and 10
     EXPECT_EQ(seen(mesh, {{0, 0, 1.5}}), (std::map<int32_t, size_t>{{5, kWall}}));
     EXPECT_EQ(seen(mesh, {{9, 0, 1.5}}), (std::map<int32_t, size_t>{{10, kWall}}));
 }
@@ -83,7 +83,7 @@ TEST_F(SeenCells, are_within_reach)
 
 TEST_F(SeenCells, own_a_surface_that_lies_between_two_cells)
 {
-    const auto found = seen(walls_at({3.f}), {{0, 0, 1.5}}); // between cells 4 and 5
+    const auto found = seen(walls_at({3.f}), {{0, 0, 1.5}}); // between voxels 4 and 5
     EXPECT_EQ(found.size(), 1);
     EXPECT_EQ(found.begin()->second, kWall);
 }

@@ -17,9 +17,9 @@ std::array<float, 3> floats(const Vector& v)
     return {float(v[0]), float(v[1]), float(v[2])};
 }
 
-Surfels surfels_of(const std::vector<HostSplat>& splats)
+Splats splats_of(const std::vector<HostSplat>& splats)
 {
-    Surfels out;
+    Splats out;
     for (const HostSplat& s : splats) {
         out.position.push_back(floats(s.position));
         out.normal.push_back(floats(s.normal));
@@ -53,14 +53,14 @@ SplatCamera device_camera(const HostCamera& c)
 }
 
 template <typename... Args>
-SurfelScene make_scene(const Args&... args)
+SplatScene make_scene(const Args&... args)
 {
-    auto scene = SurfelScene::create(test_device(), args...);
+    auto scene = SplatScene::create(test_device(), args...);
     SR_ASSERT(bool(scene), "{}", scene.error().message);
     return std::move(*scene);
 }
 
-std::vector<SplatImage> render(const SurfelScene& scene, uint32_t width, uint32_t height, uint32_t max_cameras,
+std::vector<SplatImage> render(const SplatScene& scene, uint32_t width, uint32_t height, uint32_t max_cameras,
                                const std::vector<SplatCamera>& cameras, const RasterizerOptions& options = {})
 {
     auto rasterizer = Rasterizer::create(test_device(), scene, width, height, max_cameras, options);
@@ -148,7 +148,7 @@ TEST(engine_splat, a_road_is_as_opaque_as_its_density_says)
     const ScenePoints points = points_only(splats);
     // from 5 m above, straight down
     const SplatCamera camera{300, 300, 100, 100, {1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 5}};
-    const auto mean_alpha = [&](const SurfelOptions& options) {
+    const auto mean_alpha = [&](const PointSplatOptions& options) {
         const auto images = render(make_scene(points, options), 200, 200, 1, {camera});
         double sum = 0;
         for (float a : images[0].alpha)
@@ -164,7 +164,7 @@ TEST(engine_splat, a_road_is_as_opaque_as_its_density_says)
 
 TEST(engine_splat, cameras_in_turns_or_at_once_see_the_same)
 {
-    const SurfelScene scene = make_scene(surfels_of(random_splats(800, 4)));
+    const SplatScene scene = make_scene(splats_of(random_splats(800, 4)));
     std::vector<SplatCamera> cameras;
     for (int i = 0; i < 5; ++i)
         cameras.push_back(device_camera(camera_for(70, 50, 0.1 * i, 0.2 * i)));
@@ -180,7 +180,7 @@ TEST(engine_splat, cameras_in_turns_or_at_once_see_the_same)
 
 TEST(engine_splat, a_frame_that_needs_more_room_is_drawn_again)
 {
-    const SurfelScene scene = make_scene(surfels_of(random_splats(3000, 4)));
+    const SplatScene scene = make_scene(splats_of(random_splats(3000, 4)));
     const std::vector<SplatCamera> cameras = {device_camera(camera_for(200, 100)),
                                               device_camera(camera_for(200, 100, 0.2))};
     auto rasterizer = Rasterizer::create(test_device(), scene, 200, 100, 2, {.max_pairs = 50});
@@ -200,7 +200,7 @@ TEST(engine_splat, a_frame_that_needs_more_room_is_drawn_again)
 
 TEST(engine_splat, pixels_on_the_device_are_those_that_files_of_the_images_hold)
 {
-    const SurfelScene scene = make_scene(surfels_of(random_splats(400, 9)));
+    const SplatScene scene = make_scene(splats_of(random_splats(400, 9)));
     std::vector<SplatCamera> cameras;
     for (int i = 0; i < 3; ++i)
         cameras.push_back(device_camera(camera_for(75, 41, 0.1 * i, 0.2 * i)));
@@ -241,7 +241,7 @@ TEST(engine_splat, a_large_image_holds_the_texels_of_the_device_also_in_memory_o
     for (const char* limits : {"", "staging=1"}) {
         auto device = Device::create({.limits = limits});
         ASSERT_TRUE(device);
-        auto scene = SurfelScene::create(**device, surfels_of(random_splats(300, 9)));
+        auto scene = SplatScene::create(**device, splats_of(random_splats(300, 9)));
         ASSERT_TRUE(scene);
         auto rasterizer = Rasterizer::create(**device, *scene, kWidth, kHeight, 1);
         ASSERT_TRUE(rasterizer);
@@ -274,7 +274,7 @@ TEST(engine_splat, a_large_image_holds_the_texels_of_the_device_also_in_memory_o
 
 TEST(engine_splat, visible_pixels_are_those_that_reach_the_threshold)
 {
-    const SurfelScene scene = make_scene(surfels_of(random_splats(300, 9)));
+    const SplatScene scene = make_scene(splats_of(random_splats(300, 9)));
     const SplatImage image = render(scene, 60, 40, 1, {device_camera(camera_for(60, 40))}, {.visible_alpha = 0.3f})[0];
     size_t count = 0;
     for (size_t i = 0; i < image.alpha.size(); ++i) {
@@ -287,9 +287,9 @@ TEST(engine_splat, visible_pixels_are_those_that_reach_the_threshold)
     EXPECT_LT(count, image.alpha.size());
 }
 
-TEST(engine_splat, a_scene_without_surfels_and_an_image_of_one_pixel_work)
+TEST(engine_splat, a_scene_without_splats_and_an_image_of_one_pixel_work)
 {
-    const SurfelScene nothing = make_scene(ScenePoints{});
+    const SplatScene nothing = make_scene(ScenePoints{});
     EXPECT_EQ(nothing.size(), 0u);
     const auto empty = render(nothing, 17, 3, 2, {device_camera(camera_for(17, 3)), device_camera(camera_for(17, 3))});
     ASSERT_EQ(empty.size(), 2u);
@@ -299,7 +299,7 @@ TEST(engine_splat, a_scene_without_surfels_and_an_image_of_one_pixel_work)
     one.position = {0, 0, 2};
     one.normal = {0, 0, 1};
     const SplatCamera camera{1, 1, 0.5f, 0.5f, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
-    const auto pixel = render(make_scene(surfels_of({one})), 1, 1, 1, {camera});
+    const auto pixel = render(make_scene(splats_of({one})), 1, 1, 1, {camera});
     EXPECT_NEAR(pixel[0].alpha[0], std::min(0.99, one.opacity), 1e-6);
     EXPECT_NEAR(pixel[0].depth_median[0], 2, 1e-6);
     EXPECT_EQ(pixel[0].cell[0], 0u);
@@ -313,16 +313,16 @@ TEST(engine_splat, what_is_not_a_splat_is_counted)
     splats[7].sigma_v = 0;
     splats[9].normal = {0, 0, 0};
     splats[11].color[2] = INFINITY;
-    EXPECT_EQ(make_scene(surfels_of(splats)).skipped(), 5u);
+    EXPECT_EQ(make_scene(splats_of(splats)).skipped(), 5u);
     EXPECT_EQ(make_scene(points_only(splats)).skipped(), 2u); // normals, sigmas and opacities are ours then
 }
 
 TEST(engine_splat, wrong_inputs_are_told)
 {
-    Surfels points = surfels_of(random_splats(4, 2));
+    Splats points = splats_of(random_splats(4, 2));
     points.color.pop_back();
-    EXPECT_EQ(SurfelScene::create(test_device(), points).error().code, ErrorCode::bad_input);
-    const SurfelScene scene = make_scene(surfels_of(random_splats(4, 2)));
+    EXPECT_EQ(SplatScene::create(test_device(), points).error().code, ErrorCode::bad_input);
+    const SplatScene scene = make_scene(splats_of(random_splats(4, 2)));
     EXPECT_EQ(Rasterizer::create(test_device(), scene, 0, 10, 1).error().code, ErrorCode::usage);
     EXPECT_EQ(Rasterizer::create(test_device(), scene, 60000, 60000, 1).error().code, ErrorCode::out_of_memory);
     auto rasterizer = Rasterizer::create(test_device(), scene, 10, 10, 1);
@@ -333,9 +333,9 @@ TEST(engine_splat, wrong_inputs_are_told)
     EXPECT_EQ((*rasterizer)->render({}).value().size(), 0u);
 }
 
-TEST(engine_splat, surfels_are_read_back_as_they_are_drawn)
+TEST(engine_splat, splats_are_read_back_as_they_are_drawn)
 {
-    const Surfels made = surfels_of(random_splats(50, 6));
+    const Splats made = splats_of(random_splats(50, 6));
     const auto complete = make_scene(made).read();
     ASSERT_TRUE(complete) << complete.error().message;
     EXPECT_EQ(complete->position, made.position);
@@ -349,8 +349,8 @@ TEST(engine_splat, surfels_are_read_back_as_they_are_drawn)
         wall.labels.push_back(2);
         wall.cells.push_back(0);
     }
-    const auto derived = make_scene(wall, SurfelOptions{.opacity = 0.5f}).read(),
-               spaced = make_scene(wall, SurfelOptions{.auto_sigma = true}).read();
+    const auto derived = make_scene(wall, PointSplatOptions{.opacity = 0.5f}).read(),
+               spaced = make_scene(wall, PointSplatOptions{.auto_sigma = true}).read();
     for (size_t i = 0; i < 400; ++i) {
         ASSERT_NEAR(derived->normal[i][0], 1, 1e-5);
         ASSERT_EQ(derived->sigma_u[i], 0.04f);
@@ -393,7 +393,7 @@ std::unique_ptr<SplatPool> pool_of(uint64_t bytes)
     return std::move(*pool);
 }
 
-void add(SplatPool& pool, const TileIndex& tile, const ScenePoints& points, const SurfelOptions& options = {})
+void add(SplatPool& pool, const TileIndex& tile, const ScenePoints& points, const PointSplatOptions& options = {})
 {
     const auto added = pool.add(tile, points, points.size(), options);
     ASSERT_TRUE(added) << added.error().message;
@@ -423,10 +423,10 @@ SplatImage picture_of(const SplatPool& pool)
 }
 
 // rows of the pool are those of a scene of these points alone
-void expect_surfels(const SplatPool& pool, const TileIndex& tile, const ScenePoints& points,
-                    const SurfelOptions& options)
+void expect_splats(const SplatPool& pool, const TileIndex& tile, const ScenePoints& points,
+                   const PointSplatOptions& options)
 {
-    const Surfels all = *pool.scene().read(), alone = *SurfelScene::create(test_device(), points, options)->read();
+    const Splats all = *pool.scene().read(), alone = *SplatScene::create(test_device(), points, options)->read();
     const SplatPool::Place place = pool.places().at(tile);
     ASSERT_EQ(place.count, points.size());
     for (size_t i = 0; i < place.count; ++i) {
@@ -440,15 +440,15 @@ void expect_surfels(const SplatPool& pool, const TileIndex& tile, const ScenePoi
     }
 }
 
-TEST(engine_splat, surfels_of_tiles_are_those_of_scenes_of_their_points)
+TEST(engine_splat, splats_of_tiles_are_those_of_scenes_of_their_points)
 {
     const auto pool = pool_of(1u << 20);
-    const SurfelOptions spaced{.auto_sigma = true}, wide{.auto_sigma = true, .neighbor_radius = 0.9f};
+    const PointSplatOptions spaced{.auto_sigma = true}, wide{.auto_sigma = true, .neighbor_radius = 0.9f};
     const ScenePoints tiles[] = {floor_at(0, 300), floor_at(4, 500), floor_at(8, 17), floor_at(12, 256)};
     for (int32_t i = 0; i < 4; ++i)
         add(*pool, {i, 0}, tiles[i], i == 1 ? wide : spaced);
     for (int32_t i = 0; i < 4; ++i)
-        expect_surfels(*pool, {i, 0}, tiles[i], i == 1 ? wide : spaced);
+        expect_splats(*pool, {i, 0}, tiles[i], i == 1 ? wide : spaced);
 }
 
 TEST(engine_splat, a_picture_costs_by_the_splats_that_are_there)
@@ -498,13 +498,13 @@ TEST(engine_splat, what_is_made_is_seen_when_it_is_shown_and_what_was_there_stay
     changed.labels.assign(changed.size(), 5);
     add(*pool, {0, 0}, changed); // again, of other points
     EXPECT_EQ(picture_of(*pool).label, before.label);
-    EXPECT_EQ(pool->surfels(), 400u);
+    EXPECT_EQ(pool->splats(), 400u);
     show(*pool);
     const SplatImage after = picture_of(*pool);
     EXPECT_GT(std::ranges::count(after.label, 5u), 0);
     EXPECT_EQ(std::ranges::count(after.label, 2u), 0);
     EXPECT_EQ(pool->places().at({0, 0}).first, 448u);
-    expect_surfels(*pool, {0, 0}, changed, {});
+    expect_splats(*pool, {0, 0}, changed, {});
 
     add(*pool, {1, 0}, floor_at(4, 400)); // where the old ones were
     EXPECT_EQ(pool->places().at({1, 0}).first, 0u);
@@ -512,7 +512,7 @@ TEST(engine_splat, what_is_made_is_seen_when_it_is_shown_and_what_was_there_stay
     pool->remove({0, 0});
     show(*pool);
     EXPECT_EQ(pool->end(), 0u);
-    EXPECT_EQ(pool->surfels(), 0u);
+    EXPECT_EQ(pool->splats(), 0u);
     EXPECT_EQ(picture_of(*pool).alpha, std::vector<float>(64 * 48, 0));
     const uint64_t version = pool->version();
     show(*pool);
@@ -521,7 +521,7 @@ TEST(engine_splat, what_is_made_is_seen_when_it_is_shown_and_what_was_there_stay
 
 TEST(engine_splat, rows_that_left_are_used_again_when_no_draw_looks_at_them)
 {
-    const auto pool = pool_of(512 * SplatPool::kSurfelBytes);
+    const auto pool = pool_of(512 * SplatPool::kSplatBytes);
     const ScenePoints points = floor_at(0, 300), more = floor_at(4, 300);
     add(*pool, {0, 0}, points);
     EXPECT_EQ(*pool->add({1, 0}, more, more.size(), {}), SplatPool::Room::none);
@@ -547,7 +547,7 @@ TEST(engine_splat, rows_that_left_are_used_again_when_no_draw_looks_at_them)
     show(*pool);
     add(*pool, {1, 0}, points);
     show(*pool);
-    expect_surfels(*pool, {1, 0}, points, {});
+    expect_splats(*pool, {1, 0}, points, {});
 }
 
 } // namespace engine_splat_test

@@ -20,12 +20,12 @@
 namespace semrover {
 namespace engine_splat_files_test {
 
-Surfels random_surfels(size_t n)
+Splats random_splats(size_t n)
 {
     std::mt19937 random(5);
     std::normal_distribution<float> normal;
     std::uniform_real_distribution<float> uniform(0.02f, 0.98f);
-    Surfels s;
+    Splats s;
     for (size_t i = 0; i < n; ++i) {
         std::array<float, 3> direction = {normal(random), normal(random), normal(random)};
         const float length = std::hypot(direction[0], direction[1], direction[2]);
@@ -46,7 +46,7 @@ struct Tolerance {
     float position = 0, normal = 2e-6f, color = 1e-6f, sigma = 2e-6f, opacity = 1e-6f;
 };
 
-void expect_near(const Surfels& a, const Surfels& b, const Tolerance& t, bool labels)
+void expect_near(const Splats& a, const Splats& b, const Tolerance& t, bool labels)
 {
     ASSERT_EQ(a.position.size(), b.position.size());
     for (size_t i = 0; i < a.position.size(); ++i) {
@@ -67,14 +67,14 @@ void expect_near(const Surfels& a, const Surfels& b, const Tolerance& t, bool la
 TEST(SplatPly, splats_come_back_from_every_variant)
 {
     const ScratchFolder folder;
-    const Surfels s = random_surfels(200);
+    const Splats s = random_splats(200);
     for (const SplatPly variant : {SplatPly::gaussian_3d, SplatPly::gaussian_2d, SplatPly::inria_62})
         for (const bool labels : {false, true}) {
             ASSERT_TRUE(write_splats_ply(folder / "s.ply", s, variant, labels));
             const auto file = read_splats_ply(folder / "s.ply");
             ASSERT_TRUE(file) << file.error().message;
             EXPECT_TRUE(file->warnings.empty());
-            expect_near(file->surfels, s, {}, labels);
+            expect_near(file->splats, s, {}, labels);
         }
 }
 
@@ -82,18 +82,18 @@ TEST(SplatPly, splats_come_back_from_every_variant)
 TEST(SplatPly, viewers_get_their_axes)
 {
     const ScratchFolder folder;
-    Surfels s = random_surfels(200);
+    Splats s = random_splats(200);
     s.normal[0] = {0, 0, 1}; // two equal numbers: the tangents of the turned normal are others
     s.normal[1] = {0, 1, 0};
     s.normal[2] = {-1, 0, 0};
     const float third = std::sqrt(1 / 3.f);
     s.normal[3] = {third, third, third};
-    const Surfels turned = turned_for_viewers(s);
+    const Splats turned = turned_for_viewers(s);
     ASSERT_TRUE(write_splats_ply(folder / "s.ply", turned, SplatPly::gaussian_3d));
     ASSERT_TRUE(write_splats_glb(folder / "s.glb", s));
     const auto shown = read_splats_ply(folder / "s.ply"), world = read_splats_glb(folder / "s.glb");
     ASSERT_TRUE(shown && world);
-    const auto covariance = [](const Surfels& from, size_t i) {
+    const auto covariance = [](const Splats& from, size_t i) {
         const Tangents t = tangents_of(from.normal[i]);
         std::array<float, 9> c{};
         for (size_t row = 0; row < 3; ++row)
@@ -105,21 +105,21 @@ TEST(SplatPly, viewers_get_their_axes)
     constexpr size_t kAxis[3] = {1, 2, 0}; // of the world, in the file's x, y, z
     constexpr float kSign[3] = {1, -1, -1};
     for (size_t i = 0; i < s.position.size(); ++i) {
-        const auto before = covariance(world->surfels, i), after = covariance(shown->surfels, i);
+        const auto before = covariance(world->splats, i), after = covariance(shown->splats, i);
         for (size_t a = 0; a < 3; ++a) {
-            EXPECT_NEAR(shown->surfels.position[i][a], kSign[a] * s.position[i][kAxis[a]], 1e-5);
-            EXPECT_NEAR(shown->surfels.normal[i][a], kSign[a] * s.normal[i][kAxis[a]], 2e-6);
+            EXPECT_NEAR(shown->splats.position[i][a], kSign[a] * s.position[i][kAxis[a]], 1e-5);
+            EXPECT_NEAR(shown->splats.normal[i][a], kSign[a] * s.normal[i][kAxis[a]], 2e-6);
             for (size_t b = 0; b < 3 && i != 3; ++b) // the corner of a cube has no tangents that turn with it
                 EXPECT_NEAR(after[3 * a + b], kSign[a] * kSign[b] * before[3 * kAxis[a] + kAxis[b]], 2e-5) << i;
         }
     }
-    EXPECT_GT(shown->surfels.sigma_u[3], 0);
+    EXPECT_GT(shown->splats.sigma_u[3], 0);
 }
 
 TEST(SplatPly, the_rigid_variant_has_the_62_floats_of_the_first_program)
 {
     const ScratchFolder folder;
-    const Surfels s = random_surfels(3);
+    const Splats s = random_splats(3);
     ASSERT_TRUE(write_splats_ply(folder / "s.ply", s, SplatPly::inria_62));
     const auto file = read_ply(folder / "s.ply");
     ASSERT_TRUE(file) << file.error().message;
@@ -165,7 +165,7 @@ TEST(SplatPly, properties_in_any_order_mean_what_the_first_program_wrote)
         fmt::format("0 {} {} {} 2 2 2 2 -1 0 1 3 2 1", std::log(0.2), std::log(0.001), std::log(0.05));
     const auto file = read_splats_ply(folder.put("s.ply", splat_ply(kProperties, {row})));
     ASSERT_TRUE(file) << file.error().message;
-    const Surfels& s = file->surfels;
+    const Splats& s = file->splats;
     EXPECT_EQ(s.position[0], (std::array<float, 3>{1, 2, 3}));
     for (size_t c = 0; c < 3; ++c)
         EXPECT_NEAR(s.normal[0][c], c == 2, 1e-6);
@@ -199,7 +199,7 @@ TEST(SplatPly, what_a_flat_splat_cannot_be_is_counted)
                                                     row(0.2, 0.2, "-inf", "1 0 0 0", "7")})));
     ASSERT_TRUE(file) << file.error().message;
     std::vector<float> kept;
-    for (const auto& p : file->surfels.position)
+    for (const auto& p : file->splats.position)
         kept.push_back(p[0]);
     EXPECT_EQ(kept, (std::vector<float>{1, 2, 3, 4, 7}));
     EXPECT_EQ(file->dropped, 3u);
@@ -210,9 +210,9 @@ TEST(SplatPly, what_a_flat_splat_cannot_be_is_counted)
             "1 splats are longer than wide and lie across the tangents: drawn with the same extent along these",
             "1 splats are thick: drawn flat"}));
     // across at 45 degrees: the extent along each tangent is sqrt((0.2^2 + 0.1^2) / 2)
-    EXPECT_NEAR(file->surfels.sigma_u[1], std::sqrt(0.025), 1e-6);
-    EXPECT_NEAR(file->surfels.sigma_v[1], std::sqrt(0.025), 1e-6);
-    EXPECT_NEAR(file->surfels.sigma_u[2], 0.1, 1e-6);
+    EXPECT_NEAR(file->splats.sigma_u[1], std::sqrt(0.025), 1e-6);
+    EXPECT_NEAR(file->splats.sigma_v[1], std::sqrt(0.025), 1e-6);
+    EXPECT_NEAR(file->splats.sigma_u[2], 0.1, 1e-6);
 }
 
 TEST(SplatPly, higher_harmonics_are_counted_and_rgb_is_taken)
@@ -229,12 +229,12 @@ TEST(SplatPly, higher_harmonics_are_counted_and_rgb_is_taken)
         folder.put("s.ply", splat_ply("x y z scale_0 scale_1 rot_0 rot_1 rot_2 rot_3 opacity red green blue",
                                       {"0 0 0 -3 -3 1 0 0 0 0 0.25 1 0"})));
     ASSERT_TRUE(rgb) << rgb.error().message;
-    EXPECT_EQ(rgb->surfels.color[0], (std::array<float, 3>{0.25f, 1, 0}));
+    EXPECT_EQ(rgb->splats.color[0], (std::array<float, 3>{0.25f, 1, 0}));
     const auto large = read_splats_ply(
         folder.put("s.ply", splat_ply("x y z scale_0 scale_1 rot_0 rot_1 rot_2 rot_3 opacity red green blue",
                                       {"0 0 0 -3 -3 1 0 0 0 0 51 255 0"})));
     ASSERT_TRUE(large) << large.error().message;
-    EXPECT_EQ(large->surfels.color[0], (std::array<float, 3>{0.2f, 1, 0}));
+    EXPECT_EQ(large->splats.color[0], (std::array<float, 3>{0.2f, 1, 0}));
 }
 
 TEST(SplatPly, labels_of_other_programs_are_said_or_left_out)
@@ -247,11 +247,11 @@ TEST(SplatPly, labels_of_other_programs_are_said_or_left_out)
         return read_splats_ply(folder.put("s.ply", splat_ply(properties, {row + first, row + second}))).value();
     };
     const SplatFile ours = read("2", "255");
-    EXPECT_EQ(ours.surfels.label, (std::vector<uint8_t>{2, kNoLabel}));
+    EXPECT_EQ(ours.splats.label, (std::vector<uint8_t>{2, kNoLabel}));
     ASSERT_EQ(ours.warnings.size(), 1u);
     EXPECT_NE(ours.warnings[0].find("taken for our own classes: 2 building (1 splats)"), std::string::npos);
     const SplatFile foreign = read("2", "40");
-    EXPECT_EQ(foreign.surfels.label, (std::vector<uint8_t>{kNoLabel, kNoLabel}));
+    EXPECT_EQ(foreign.splats.label, (std::vector<uint8_t>{kNoLabel, kNoLabel}));
     ASSERT_EQ(foreign.warnings.size(), 1u);
     EXPECT_NE(foreign.warnings[0].find("unknown labels: 40 (1 splats); all labels are left out"), std::string::npos);
 }
@@ -280,7 +280,7 @@ TEST(SplatPly, refuses_malformed_files)
     EXPECT_TRUE(says(read(splat_ply(kProperties, {"nan 0 0 0 1 0 0 0 0 0 0 0 0 0"})), "no splat is left of 1"));
     EXPECT_TRUE(
         says(read(splat_ply(kProperties, {"0.25 1.23456789 1.23456789 1.23456789"})), "the row ends before 'rot_0'"));
-    ASSERT_TRUE(write_splats_ply(folder / "s.ply", random_surfels(2), SplatPly::gaussian_2d));
+    ASSERT_TRUE(write_splats_ply(folder / "s.ply", random_splats(2), SplatPly::gaussian_2d));
     const std::string bytes = contents(folder / "s.ply");
     for (size_t n = 0; n < bytes.size(); ++n)
         EXPECT_FALSE(read(bytes.substr(0, n))) << n;
@@ -291,7 +291,7 @@ TEST(SplatPly, refuses_malformed_files)
 TEST(DotSplat, has_32_bytes_a_splat)
 {
     const ScratchFolder folder;
-    Surfels s = random_surfels(1);
+    Splats s = random_splats(1);
     s.position[0] = {1, 2, 3};
     s.normal[0] = {0, 0, 1}; // u = -y, v = x: turned by -90 degrees about z
     s.sigma_u[0] = 0.5f;
@@ -307,19 +307,19 @@ TEST(DotSplat, has_32_bytes_a_splat)
     EXPECT_EQ(contents(folder / "s.splat"), expected);
     const auto file = read_dot_splat(folder / "s.splat");
     ASSERT_TRUE(file) << file.error().message;
-    expect_near(file->surfels, s, {0, 2e-2f, 2.1e-3f, 1e-2f, 2e-3f}, false);
+    expect_near(file->splats, s, {0, 2e-2f, 2.1e-3f, 1e-2f, 2e-3f}, false);
 }
 
 TEST(DotSplat, splats_come_back_as_well_as_bytes_hold_them)
 {
     const ScratchFolder folder;
-    Surfels s = random_surfels(300);
+    Splats s = random_splats(300);
     s.sigma_v = s.sigma_u; // a coarse rotation moves variance between the tangents
     ASSERT_TRUE(write_dot_splat(folder / "s.splat", s));
     const auto file = read_dot_splat(folder / "s.splat");
     ASSERT_TRUE(file) << file.error().message;
     // a quaternion of 1/128 steps: half a step in each of 4 numbers turns by up to 2 * 2 * 0.5 / 128 = 0.016
-    expect_near(file->surfels, s, {0, 0.017f, 2.1e-3f, 1e-3f, 2.1e-3f}, false);
+    expect_near(file->splats, s, {0, 0.017f, 2.1e-3f, 1e-3f, 2.1e-3f}, false);
 }
 
 TEST(DotSplat, refuses_malformed_files)
@@ -407,9 +407,9 @@ TEST(GltfSplats, hidden_nodes_are_left_out_and_instances_are_refused)
     json["nodes"][0]["children"] = {1, 2};
     json["nodes"].push_back({{"mesh", 0}, {"extensions", {{"KHR_node_visibility", {{"visible", true}}}}}});
     ASSERT_TRUE(read(json));
-    EXPECT_EQ(read(json)->surfels.position.size(), 2u);
+    EXPECT_EQ(read(json)->splats.position.size(), 2u);
     json["nodes"][2]["extensions"]["KHR_node_visibility"]["visible"] = false;
-    EXPECT_EQ(read(json)->surfels.position.size(), 1u);
+    EXPECT_EQ(read(json)->splats.position.size(), 1u);
     json["nodes"][1]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]["TRANSLATION"] = 0;
     EXPECT_TRUE(says(read(json), "splats of mesh 0 are repeated by EXT_mesh_gpu_instancing, which is not supported"));
 }
@@ -419,7 +419,7 @@ TEST(GltfSplats, a_file_by_hand_means_what_the_extension_says)
     const ScratchFolder folder;
     const auto file = read_splats_glb(folder.put("s.glb", glb(hand_made().dump(), kBinary)));
     ASSERT_TRUE(file) << file.error().message;
-    const Surfels& s = file->surfels;
+    const Splats& s = file->splats;
     // 2 (1, 2, 3), a quarter turn about y (x to -z, z to x): (6, 4, -2), moved: (16, 4, -2); the world's (-z, -x, y)
     EXPECT_NEAR(s.position[0][0], 2, 1e-5);
     EXPECT_NEAR(s.position[0][1], -16, 1e-5);
@@ -439,18 +439,18 @@ TEST(GltfSplats, a_file_by_hand_means_what_the_extension_says)
     attributes.erase("KHR_gaussian_splatting:SH_DEGREE_0_COEF_0");
     const auto fallback = read_splats_glb(folder.put("s.glb", glb(json.dump(), kBinary)));
     ASSERT_TRUE(fallback) << fallback.error().message;
-    EXPECT_EQ(fallback->surfels.color[0], (std::array<float, 3>{0, 1, 0}));
+    EXPECT_EQ(fallback->splats.color[0], (std::array<float, 3>{0, 1, 0}));
 }
 
 TEST(GltfSplats, splats_come_back)
 {
     const ScratchFolder folder;
-    Surfels s = random_surfels(200);
+    Splats s = random_splats(200);
     ASSERT_TRUE(write_splats_glb(folder / "s.glb", s));
     const auto file = read_splats_glb(folder / "s.glb");
     ASSERT_TRUE(file) << file.error().message;
     EXPECT_TRUE(file->warnings.empty());
-    expect_near(file->surfels, s, {.position = 1e-5f}, true);
+    expect_near(file->splats, s, {.position = 1e-5f}, true);
     // up is y, and the header says how long it is
     const std::string bytes = contents(folder / "s.glb");
     const Json json =

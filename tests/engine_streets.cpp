@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/scene/cell_objects.h"
+#include "engine/conditioning/cell_objects.h"
 #include "engine/scene/palette.h"
 #include "runtime/base/hash.h"
 #include "tools/streets/camera_drive.h"

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/voxfield/sub_grid.h"
 
-#include "engine/job/grid_filling.h"
 #include "engine/scene/cell_reach.h"
+#include "engine/world/grid_filling.h"
 #include "runtime/base/dtype.h"
 
 #include <algorithm>
@@ -24,7 +24,7 @@ Device& device()
 
 constexpr int kPoints = 20; // of the model
 
-// a road of 60 x 16 cells with a wall beside it, every cell with points of its own
+// a road of 60 x 16 voxels with a wall beside it, every voxel with points of its own
 VoxelGrid street()
 {
     VoxelGrid grid;
@@ -128,7 +128,7 @@ TEST(engine_sub_grid, cells_without_points_that_nobody_asked_for_stay_out)
 
 TEST(engine_sub_grid, the_reach_grows_until_regions_are_whole)
 {
-    VoxelGrid line; // a wire: 40 cells lie 20 to either side
+    VoxelGrid line; // a wire: 40 voxels lie 20 to either side
     line.voxel_size = 0.6f;
     for (int32_t i = 0; i < 400; ++i) {
         line.cells.push_back({i, 0, 0});
@@ -139,7 +139,7 @@ TEST(engine_sub_grid, the_reach_grows_until_regions_are_whole)
     const std::vector<uint32_t> targets = {200};
     EXPECT_EQ(cut_sub_grid(line, targets, 10)->cells.size(), 17u);
     EXPECT_EQ(cut_sub_grid(line, targets, 40)->cells.size(), 65u);
-    EXPECT_EQ(cut_sub_grid(line, targets, 400)->cells.size(), 129u); // 64 cells are the end
+    EXPECT_EQ(cut_sub_grid(line, targets, 400)->cells.size(), 129u); // 64 voxels are the end
 }
 
 TEST(engine_sub_grid, a_grid_without_points_gets_room_for_them)

@@ -68,7 +68,7 @@ Mesh random_mesh(const NearestCase& c, std::mt19937& random)
 
 TEST(engine_surface_error, distances_match_all_triangles_one_by_one)
 {
-    // one triangle; small ones; ones much longer than a cell; points far outside; a radius
+    // one triangle; small ones; ones much longer than a voxel; points far outside; a radius
     for (const NearestCase& c :
          {NearestCase{1, 50, 0, 1, 100}, NearestCase{300, 700, 4, 0.3, 100}, NearestCase{60, 500, 6, 9, 100},
           NearestCase{40, 301, 2, 0.2, 1000}, NearestCase{200, 700, 8, 0.3, 0.7}}) {

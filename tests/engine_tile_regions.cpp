@@ -36,7 +36,7 @@ std::vector<Cell> ground()
     return cells;
 }
 
-// regions as cells, so that those of different clouds compare
+// regions as voxels, so that those of different clouds compare
 std::vector<std::vector<Cell>> regions_of(const std::vector<Cell>& cells, const TileIndex& tile, const RegionOptions& o)
 {
     const auto regions = extract_tile_regions(cells, o);
@@ -144,10 +144,10 @@ TEST(engine_tile_regions, refuses_what_leaves_cells_empty_or_reaches_over_a_tile
         const auto regions = extract_tile_regions(cells, o);
         return regions ? std::string() : regions.error().message;
     };
-    EXPECT_NE(message(options(RegionStrategy::paper)).find("leaves cells empty"), std::string::npos);
+    EXPECT_NE(message(options(RegionStrategy::paper)).find("leaves voxels empty"), std::string::npos);
     RegionOptions narrow = options();
     narrow.tile_cells = 4;
-    EXPECT_NE(message(narrow).find("narrower than its halo of 5 cells"), std::string::npos);
+    EXPECT_NE(message(narrow).find("narrower than its halo of 5 voxels"), std::string::npos);
     EXPECT_FALSE(extract_tile_regions({}, options()));
 }
 

@@ -123,18 +123,18 @@ TEST(engine_tiles, folders_that_are_not_sound_are_refused)
     with([](Json& j) { j["tile_cells"] = 4.5; }, "expected a whole number");
     with([](Json& j) { j["tile_cells"] = 5; }, "belongs to tile");
     with([](Json& j) { j["voxel_size"] = -1; }, "voxel size of 0.001 to 1000");
-    with([](Json& j) { j["voxel_size"] = 0.3; }, "cells of 0.6 m, the index says 0.3 m");
-    with([](Json& j) { j["points_per_voxel"] = 3; }, "2 points a cell, the index says 3");
-    with([](Json& j) { j["has_points"] = false; }, "2 points a cell, the index says 0");
+    with([](Json& j) { j["voxel_size"] = 0.3; }, "voxels of 0.6 m, the index says 0.3 m");
+    with([](Json& j) { j["points_per_voxel"] = 3; }, "2 points a voxel, the index says 3");
+    with([](Json& j) { j["has_points"] = false; }, "2 points a voxel, the index says 0");
     with([](Json& j) { j["has_points"] = "yes"; }, "expected true or false");
     with([](Json& j) { j["metadata"] = 3; }, "metadata: expected an object");
     with([](Json& j) { j["metadata"]["name"] = 3; }, "'name': expected a string");
     with([](Json& j) { j["tiles"] = Json::array(); }, "an empty one");
-    with([](Json& j) { j["tiles"][1] = {1}; }, "entry 1: expected [X, Y, cells]");
+    with([](Json& j) { j["tiles"][1] = {1}; }, "entry 1: expected [X, Y, voxels]");
     with([](Json& j) { j["tiles"][1] = j["tiles"][0]; }, "is given twice");
     with([](Json& j) { j["tiles"][1].push_back("../../../../etc/"); }, "a key of 16 hexadecimal digits");
     with([](Json& j) { j["tiles"][1].push_back(7); }, "a key of 16 hexadecimal digits");
-    with([](Json& j) { j["tiles"][0][2] = 1; }, "cells, the index says 1");
+    with([](Json& j) { j["tiles"][0][2] = 1; }, "voxels, the index says 1");
     with([](Json& j) { j["tiles"][0][0] = 1e9; }, "expected a whole number");
     with([](Json& j) { j["tiles"].push_back({9, 9, 4}); }, "names 'tile_9_9.sgrid', which is not there");
     folder.put("tiles/index.json", "{");
@@ -143,7 +143,7 @@ TEST(engine_tiles, folders_that_are_not_sound_are_refused)
     EXPECT_TRUE(says(TileFolder::open(tiles), "index.json"));
     folder.put("tiles/index.json", index);
     std::filesystem::copy_file(tiles / "tile_0_0.sgrid", tiles / "tile_1_1.sgrid",
-                               std::filesystem::copy_options::overwrite_existing); // overlapping cells
+                               std::filesystem::copy_options::overwrite_existing); // overlapping voxels
     EXPECT_TRUE(says(read_grid_or_tiles(tiles), "which belongs to tile (0, 0)"));
     std::filesystem::remove(tiles / "tile_1_1.sgrid");
     EXPECT_TRUE(says(read_grid_or_tiles(tiles), "'tile_1_1.sgrid', which is not there"));

@@ -115,7 +115,8 @@ TEST(EngineVoxelizer, cells_and_areas_are_those_of_clipping_in_double)
         const Mesh m = street(at, 3);
         const VoxelizedMesh v = voxelized(m, {.voxel_size = size, .points_per_voxel = 1, .min_area = 0});
         const std::map<Cell, double> expected = cells_of(m, double(size));
-        // positions are rounded to 2^-20 of a cell, and seen from a cell to 5e-7 of one: a few edges of a cell's length
+        // positions are rounded to 2^-20 of a voxel, and seen from a voxel to 5e-7 of one: a few edges of a voxel's
+        // length
         const double error = 2e-5 * double(size) * double(size);
         for (const auto& [cell, area] : expected) {
             const auto found = find_cell(v.grid, cell);
@@ -151,8 +152,8 @@ TEST(EngineVoxelizer, points_lie_in_their_cell_on_the_surface_in_the_order_of_a_
                 double nearest = 1;
                 for (size_t f = 0; f < m.faces.size(); ++f)
                     nearest = std::min(nearest, triangle_distance(point_of(v.grid, cell, i), corners_of(m, f)));
-                // half precision rounds up to 0.3 m by 0.122 mm an axis, towards the cell by twice that at its border
-                ASSERT_LT(nearest, 1e-4 + 1.23e-4 * std::sqrt(3.0)) << "cell " << cell << " point " << i;
+                // half precision rounds up to 0.3 m by 0.122 mm an axis, towards the voxel by twice that at its border
+                ASSERT_LT(nearest, 1e-4 + 1.23e-4 * std::sqrt(3.0)) << "voxel " << cell << " point " << i;
             }
         }
     }
@@ -191,7 +192,7 @@ TEST(EngineVoxelizer, a_surface_between_two_cells_counts_once_in_the_upper_one)
 
 TEST(EngineVoxelizer, points_are_uniform_over_the_area_of_a_cell)
 {
-    Mesh m; // a fan of unequal triangles over a square of one cell and more
+    Mesh m; // a fan of unequal triangles over a square of one voxel and more
     m.positions = {{0.25f, 0.21f, 0.3f}, {-1, -1, 0.3f}, {2, -1, 0.3f}, {2, 2, 0.3f}, {-1, 2, 0.3f}};
     m.faces = {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 1}};
     const VoxelizedMesh v = voxelized(m, {.points_per_voxel = 4096, .seed = 11});
@@ -208,7 +209,7 @@ TEST(EngineVoxelizer, points_are_uniform_over_the_area_of_a_cell)
     EXPECT_LT(chi2, 63); // the mean for independent points; these are more even
 }
 
-// of many cells, which are shifted independently
+// of many voxels, which are shifted independently
 TEST(EngineVoxelizer, points_of_many_cells_are_uniform_over_the_area_of_a_cell)
 {
     Mesh m;
@@ -255,7 +256,7 @@ TEST(EngineVoxelizer, canonical_points_of_a_flat_cell_are_the_same_four_rows_of_
     const std::vector<float> first = places(v.grid, {3, 1, 3});
     for (size_t i = 0; i < 20; ++i) {
         const double x = first[3 * i] / 0.6 + 0.5, z = first[3 * i + 2] / 0.6 + 0.5;
-        EXPECT_NEAR(first[3 * i + 1], 0, 1e-4); // 0.9 is the middle of cells of 0.6
+        EXPECT_NEAR(first[3 * i + 1], 0, 1e-4); // 0.9 is the middle of voxels of 0.6
         texels.insert({int(std::lround(z * 4 - 0.5)), int(std::lround(x * 5 - 0.5))});
         EXPECT_NEAR(z * 4 - 0.5, std::round(z * 4 - 0.5), 1e-2);
         EXPECT_NEAR(x * 5 - 0.5, std::round(x * 5 - 0.5), 1e-2);
@@ -281,7 +282,7 @@ TEST(EngineVoxelizer, canonical_points_lie_on_the_surface_and_as_near_to_it_as_s
             double nearest = 1;
             for (size_t f = 0; f < m.faces.size(); ++f)
                 nearest = std::min(nearest, triangle_distance(point_of(v.grid, cell, i), corners_of(m, f)));
-            ASSERT_LT(nearest, 1e-4 + 1.23e-4 * std::sqrt(3.0)) << "cell " << cell << " point " << i;
+            ASSERT_LT(nearest, 1e-4 + 1.23e-4 * std::sqrt(3.0)) << "voxel " << cell << " point " << i;
         }
     Mesh walls;
     add_quad(walls, {0, 0.2f, 0.31f}, {12, 0, 0}, {0, 12, 0});
@@ -421,7 +422,7 @@ TEST(EngineVoxelizer, no_point_lies_where_alpha_makes_no_surface_and_its_area_do
                 ASSERT_EQ(v.grid.colors[(cell * 20 + i) * 3 + 1], 255); // transparent texels do not darken it
             }
         }
-        EXPECT_NEAR(sum, 72, 1.5); // of 144; areas are measured at 64 places of a triangle in a cell
+        EXPECT_NEAR(sum, 72, 1.5); // of 144; areas are measured at 64 places of a triangle in a voxel
     }
     const VoxelizedMesh opaque = voxelized(checks(0.3f), {}), all = voxelized(checks(0), {});
     EXPECT_EQ(opaque.grid.points, all.grid.points);
@@ -483,7 +484,7 @@ TEST(EngineVoxelizer, a_mesh_far_from_the_origin_gets_the_cells_and_points_of_it
     EXPECT_LT(c->to_points, 0.1);
     far.origin = {500123, 4649000, 0};
     EXPECT_TRUE(says(voxelize(test_device(), far, {.default_label = 0}),
-                     "beyond 2^20 cells of 0.6 m; move it to the origin (`origin`), or take a larger voxel size"));
+                     "beyond 2^20 voxels of 0.6 m; move it to the origin (`origin`), or take a larger voxel size"));
 }
 
 TEST(EngineVoxelizer, label_textures_say_labels_where_faces_do_not)
@@ -534,7 +535,7 @@ TEST(EngineVoxelizer, what_cannot_be_voxelized_is_one_line)
     Mesh far;
     far.positions = {{9e5f, 0, 0}, {9e5f, 1, 0}, {9e5f, 0, 1}};
     far.faces = {{0, 1, 2}};
-    EXPECT_TRUE(says(voxelize(d, far, good), "beyond 2^20 cells"));
+    EXPECT_TRUE(says(voxelize(d, far, good), "beyond 2^20 voxels"));
     Mesh wide;
     wide.positions = {{-3e5f, -3e5f, 0}, {3e5f, -3e5f, 0}, {0, 3e5f, 0}};
     wide.faces = {{0, 1, 2}};

@@ -9,7 +9,7 @@
 
 namespace semrover {
 
-// three cells with two points each, one of them not generated
+// three voxels with two points each, one of them not generated
 inline VoxelGrid small_grid()
 {
     VoxelGrid grid;

@@ -16,7 +16,7 @@ constexpr uint32_t kNone = 0xffffffff;
 constexpr uint32_t kWholeBlock = 8u << 12 | 8u << 16 | 8u << 20;
 
 struct Triangle {
-    std::array<Point3d, 3> corners; // cells, exact as floats
+    std::array<Point3d, 3> corners; // voxels, exact as floats
     uint32_t slot = 0, range = kWholeBlock, material = 0, label = 3;
     std::array<std::array<float, 2>, 3> uv{};
     std::array<std::array<float, 3>, 3> color = {{{1, 1, 1}, {1, 1, 1}, {1, 1, 1}}};
@@ -139,13 +139,13 @@ TEST(kernel_surface, triangle_cells_finds_every_cell_with_area_once_and_none_out
                     in_range = in_range && cell[a] >= int(triangles[i].range >> (4 * a) & 15) &&
                                cell[a] < int(triangles[i].range >> (12 + 4 * a) & 15);
                 if (in_range && polygon_area(clipped(triangles[i].corners, cell, 1)) > 1e-9) {
-                    ASSERT_TRUE(seen.contains({i, triangles[i].slot * 512 + c})) << "triangle " << i << " cell " << c;
+                    ASSERT_TRUE(seen.contains({i, triangles[i].slot * 512 + c})) << "triangle " << i << " voxel " << c;
                 }
             }
     }
 }
 
-// all cells of all triangles
+// all voxels of all triangles
 std::pair<std::vector<uint32_t>, std::vector<uint32_t>> all_pairs(const std::vector<Triangle>& triangles)
 {
     std::vector<uint32_t> keys, values;
@@ -192,7 +192,8 @@ TEST(kernel_surface, clip_area_matches_clipping_in_double)
         double sum = 0, expected_sum = 0;
         for (size_t i = 0; i < keys.size(); ++i) {
             const double expected = polygon_area(clipped(triangles[values[i]].corners, cell_of(keys[i]), 1));
-            // corners within 16 cells round by 5e-7 when they are seen from a cell, and its border is 5.7 long at most
+            // corners within 16 voxels round by 5e-7 when they are seen from a voxel, and its border is 5.7 long at
+            // most
             ASSERT_NEAR(got.areas[i], expected, 4e-6) << "pair " << i;
             ASSERT_EQ(got.labels[i], triangles[values[i]].label);
             sum += got.areas[i];
@@ -221,20 +222,21 @@ TEST(kernel_surface, clip_area_counts_a_triangle_in_the_plane_between_two_cells_
     for (size_t i = 0; i < keys.size(); ++i) {
         std::array<int, 3> home = {2, 2, 2};
         home[values[i]] = 3;
-        ASSERT_EQ(got.areas[i], cell_of(keys[i]) == home ? 0.125f : 0.f) << "axis " << values[i] << " cell " << keys[i];
+        ASSERT_EQ(got.areas[i], cell_of(keys[i]) == home ? 0.125f : 0.f)
+            << "axis " << values[i] << " voxel " << keys[i];
     }
 }
 
 TEST(kernel_surface, clip_area_says_where_a_label_texture_has_the_label_of_what_is_in_the_cell)
 {
-    Triangle t; // u runs along x from 0 to 1 over 5 cells, v along y from 0 to 1 over 3
+    Triangle t; // u runs along x from 0 to 1 over 5 voxels, v along y from 0 to 1 over 3
     t.corners = {{{0, 0, 0.5}, {5, 0, 0.5}, {0, 3, 0.5}}};
     t.uv = {{{0, 0}, {1, 0}, {0, 1}}};
     t.material = 2;
     t.label = kNoSurfaceLabel;
     Triangle labelled = t;
     labelled.label = 4;
-    // cells at the left border, wholly inside: their middle is half a texel from the texel's borders
+    // voxels at the left border, wholly inside: their middle is half a texel from the texel's borders
     const std::vector<uint32_t> keys = {0, 64, 8, 0}, values = {0, 0, 0, 1};
     const Clipped got = clip({t, labelled}, keys, values);
     EXPECT_EQ(got.addresses, (std::vector<uint32_t>{7, 8, 12, kNone}));
@@ -276,8 +278,8 @@ TEST(kernel_surface, cell_area_sums_in_order_and_gives_ties_to_the_lower_label)
         for (uint32_t l = kNoSurfaceLabel; l-- > 0;)
             if (share[l] > 0 && (best == kNoSurfaceLabel || share[l] >= share[best]))
                 best = l;
-        ASSERT_NEAR(got[c], sum, 1e-7 * sum) << "cell " << c;
-        ASSERT_EQ(got_labels[c], best) << "cell " << c;
+        ASSERT_NEAR(got[c], sum, 1e-7 * sum) << "voxel " << c;
+        ASSERT_EQ(got_labels[c], best) << "voxel " << c;
         ASSERT_EQ(got_unlabelled[c], share[kNoSurfaceLabel]);
     }
 }
@@ -294,7 +296,7 @@ struct Drawn {
     double slack;        // of the point, because of rounding
 };
 
-// the point of sample k of n of the lattice that the cell's words shift, among triangles in a cell
+// the point of sample k of n of the lattice that the voxel's words shift, among triangles in a voxel
 Drawn draw(const std::vector<Triangle>& triangles, const std::vector<uint32_t>& in_cell, const std::array<int, 3>& cell,
            const Words4& words, uint32_t k, uint32_t n)
 {
@@ -391,7 +393,7 @@ TEST(kernel_surface, sample_surface_finds_the_four_texels_around_a_point)
 {
     Triangle t;
     t.corners = {{{0, 0, 0.5}, {8, 0, 0.5}, {0, 8, 0.5}}};
-    t.uv = {{{-3, -3}, {5, -3}, {-3, 5}}}; // one repetition a cell, from (-3, -3) on
+    t.uv = {{{-3, -3}, {5, -3}, {-3, 5}}}; // one repetition a voxel, from (-3, -3) on
     t.color = {{{1, 0.5, 0}, {1, 0.5, 0.25}, {1, 0.5, 0.5}}};
     t.material = 1;
     KernelCase k(test_device());

@@ -12,7 +12,7 @@
 
 namespace semrover {
 
-// a piece of street: road, sidewalks, and walls on both sides; four points a cell, three cells without
+// a piece of street: road, sidewalks, and walls on both sides; four points a voxel, three voxels without
 inline VoxelGrid street_of_cells()
 {
     VoxelGrid grid;

@@ -55,7 +55,7 @@ inline void put_buffers(const std::filesystem::path& folder, uint32_t frames, ui
     }
 }
 
-// a road of 12 x 20 cells, each with points
+// a road of 12 x 20 voxels, each with points
 inline VoxelGrid street()
 {
     VoxelGrid grid;

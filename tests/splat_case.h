@@ -14,8 +14,8 @@ struct SplatPixels {
     uint32_t visible = 0, pairs = 0;
 };
 
-// label of splat i is i % 20, its cell 1000 + i
-inline SplatScene scene_of(KernelCase& k, const std::vector<HostSplat>& splats)
+// label of splat i is i % 20, its voxel 1000 + i
+inline SplatTensors scene_of(KernelCase& k, const std::vector<HostSplat>& splats)
 {
     std::vector<float> positions, normals, colors;
     std::vector<uint32_t> labels, cells;
@@ -44,7 +44,7 @@ inline SplatPixels run_splats(const std::vector<HostSplat>& splats, const std::v
 {
     KernelCase k(test_device());
     const uint32_t floats = splat_camera_floats(options.lens);
-    const SplatScene scene = scene_of(k, splats);
+    const SplatTensors scene = scene_of(k, splats);
     if (!options.max_visible)
         options.max_visible = uint32_t(splats.size() * table.size() / floats);
     if (!options.max_pairs)

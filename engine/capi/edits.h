@@ -7,7 +7,7 @@
 
 namespace semrover::capi {
 
-// what a caller sets, the last of equal cells; none: SR_NO_CELL. name: of the call.
+// what a caller sets, the last of equal voxels; none: SR_NO_CELL. name: of the call.
 // Errors: usage; bad_input for coordinates and labels
 Result<LabelEdits> edits_of(const sr_cell* cells, uint64_t count, const char* name);
 

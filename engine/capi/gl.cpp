@@ -225,7 +225,7 @@ Status update_splats(sr_gl& gl, sr_world& world)
     gl.known.version = pool->version();
     sr_gl_array* const arrays[] = {&gl.known.positions, &gl.known.normals, &gl.known.colors, &gl.known.labels,
                                    &gl.known.blocks};
-    const uint64_t bytes[] = {16, 16, 16, 4, 4}, count = gl.known.count, blocks = count / SurfelScene::kBlock;
+    const uint64_t bytes[] = {16, 16, 16, 4, 4}, count = gl.known.count, blocks = count / SplatScene::kBlock;
     for (size_t i = 0; i < std::size(gl.splats); ++i)
         *arrays[i] = {gl.splats[i].buffer, 0, (i == 4 ? blocks : count) * bytes[i]};
     return {};

@@ -22,10 +22,10 @@ Result<LabelEdits> edits_of(const sr_cell* cells, uint64_t count, const char* na
         const sr_cell& c = cells[n];
         for (const int32_t coordinate : {c.i, c.j, c.k})
             if (coordinate < -kMaxCoordinate || coordinate > kMaxCoordinate)
-                return fail(ErrorCode::bad_input, "{}: cell {} of {}, ({}, {}, {}), lies beyond 2^20", name, n, count,
+                return fail(ErrorCode::bad_input, "{}: voxel {} of {}, ({}, {}, {}), lies beyond 2^20", name, n, count,
                             c.i, c.j, c.k);
         if (c.label >= kClassCount && c.label != SR_NO_CELL)
-            return fail(ErrorCode::bad_input, "{}: cell {} of {} has label {}, there are {}", name, n, count, c.label,
+            return fail(ErrorCode::bad_input, "{}: voxel {} of {} has label {}, there are {}", name, n, count, c.label,
                         kClassCount);
         std::optional<uint8_t>& edit = edits[{c.i, c.j, c.k}];
         edit.reset();
@@ -39,7 +39,7 @@ Result<LabelEdits> edits_of(const sr_cell* cells, uint64_t count, const char* na
 
 namespace {
 
-// numbers of the cells that a caller asks for
+// numbers of the voxels that a caller asks for
 Result<std::pair<size_t, size_t>> range_of(const sr_grid* grid, uint64_t first, uint64_t count, const void* to,
                                            const uint64_t* written, const char* name)
 {
@@ -50,7 +50,7 @@ Result<std::pair<size_t, size_t>> range_of(const sr_grid* grid, uint64_t first, 
     return std::pair(begin, begin + size_t(std::min<uint64_t>(count, all - begin)));
 }
 
-// x, y, z, r, g, b of each point of a cell
+// x, y, z, r, g, b of each point of a voxel
 void write_points(const VoxelGrid& grid, size_t cell, float* to)
 {
     const double edge = decimal_voxel_size(grid.voxel_size);
@@ -153,7 +153,7 @@ sr_status sr_grid_get_points(const sr_grid* grid, uint64_t first, uint64_t count
     return guarded(nullptr, [&]() -> Status {
         SR_TRY(const auto range, range_of(grid, first, count, points, written, "sr_grid_get_points"));
         if (!grid->grid.has_points())
-            return fail(ErrorCode::bad_input, "sr_grid_get_points: the grid's cells have no points");
+            return fail(ErrorCode::bad_input, "sr_grid_get_points: the grid's voxels have no points");
         const size_t width = size_t(grid->grid.points_per_voxel) * 6;
         for (size_t c = range.first; c < range.second; ++c) {
             float* to = points + (c - range.first) * width;

@@ -5,9 +5,9 @@
 #include "engine/capi/camera_renderer.h"
 #include "engine/capi/sized_rasterizer.h"
 #include "engine/job/model.h"
-#include "engine/job/world.h"
 #include "engine/scene/label_edits.h"
 #include "engine/semrover_vulkan.h"
+#include "engine/world/world.h"
 #include "runtime/device/device.h"
 #include "runtime/device/host_copies.h"
 
@@ -26,7 +26,7 @@ struct sr_context {
     uint64_t worlds = 0;                          // made so far
 };
 
-// Cells that are set are put into the grid when it is next read: one by one each would cost the whole grid.
+// Voxels that are set are put into the grid when it is next read: one by one each would cost the whole grid.
 struct sr_grid {
     mutable semrover::VoxelGrid grid; // sorted
     mutable semrover::LabelEdits edits;

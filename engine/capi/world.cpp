@@ -191,7 +191,7 @@ Result<std::unique_ptr<sr_world>> make_world(sr_context& context, const sr_world
     request.tiles_at_once = d.tiles_at_once;
     request.detail_distance = d.detail_distance;
     if (d.splat_radius != 0)
-        request.surfels = {.sigma = float(d.splat_radius)};
+        request.splats = {.sigma = float(d.splat_radius)};
     JobCallbacks callbacks;
     if (d.message)
         callbacks.warning = [message = d.message, user = d.user](std::string_view line) {
@@ -244,7 +244,7 @@ sr_world_info info_of(const sr_world& world)
     info.generated = f.generated;
     info.loaded = f.loaded;
     info.dropped = f.dropped;
-    info.splats = splats ? splats->surfels() : 0;
+    info.splats = splats ? splats->splats() : 0;
     info.voxel_size = decimal_voxel_size(world.world->voxel_size());
     info.tile_cells = uint32_t(world.world->tile_cells());
     info.points_per_voxel = uint32_t(world.world->points_per_voxel());

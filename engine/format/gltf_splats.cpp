@@ -213,7 +213,7 @@ void add_bounds(Json& accessor, const std::vector<float>& positions)
     accessor["max"] = high;
 }
 
-AttributeWriter attributes_of(const Surfels& s)
+AttributeWriter attributes_of(const Splats& s)
 {
     const size_t n = s.position.size();
     const std::array<double, 4> turn = quaternion_of(kToFile);
@@ -221,7 +221,7 @@ AttributeWriter attributes_of(const Surfels& s)
     for (size_t i = 0; i < n; ++i) {
         const auto& p = s.position[i];
         positions.insert(positions.end(), {-p[1], p[2], -p[0]});
-        const auto [w, x, y, z] = surfel_rotation(s.normal[i]);
+        const auto [w, x, y, z] = splat_rotation(s.normal[i]);
         for (const double q : product(turn, {x, y, z, w}))
             rotations.push_back(static_cast<float>(q));
         scales.insert(scales.end(), {s.sigma_u[i], s.sigma_v[i], kThinScale});
@@ -257,7 +257,7 @@ void append_u32(std::string& out, uint64_t value)
 
 } // namespace
 
-Status write_splats_glb(const Path& path, const Surfels& s)
+Status write_splats_glb(const Path& path, const Splats& s)
 {
     SR_CHECK(check_splats(path, s));
     const AttributeWriter w = attributes_of(s);

@@ -18,6 +18,6 @@ Result<SplatFile> read_splats_glb(const Path& path);
 
 // kernel ellipse, colour space srgb_rec709_display, a third scale of 1e-4 m; the same splats give the same bytes;
 // atomic
-Status write_splats_glb(const Path& path, const Surfels& surfels);
+Status write_splats_glb(const Path& path, const Splats& splats);
 
 } // namespace semrover

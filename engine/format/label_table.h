@@ -11,7 +11,7 @@
 
 namespace semrover {
 
-constexpr uint8_t kLeftOut = 254; // a source label whose cells stay empty
+constexpr uint8_t kLeftOut = 254; // a source label whose voxels stay empty
 constexpr uint8_t kEmpty = 255;   // free space in the source
 
 // What labels of another program are here. JSON: an object of source label to target. The source is a number or a name,

@@ -20,7 +20,7 @@ namespace {
 
 constexpr size_t kMaxPoints = 1u << 30;
 constexpr uint64_t kPointBytes = 48; // of a point, sorted
-constexpr double kFaceMargin = 1e-4; // of a cell; less than half of what 16 bits resolve at its face
+constexpr double kFaceMargin = 1e-4; // of a voxel; less than half of what 16 bits resolve at its face
 
 struct Points {
     std::vector<std::array<double, 3>> positions; // metres, in the world
@@ -96,7 +96,7 @@ Result<CloudColumns> columns_of(const PlyElement& vertices, bool ours, const Sce
     return c;
 }
 
-// the cell of a point, none if it is not finite
+// the voxel of a point, none if it is not finite
 Result<std::optional<Cell>> cell_of(const std::array<double, 3>& p, size_t row, double voxel_size,
                                     const std::string& where)
 {
@@ -106,7 +106,7 @@ Result<std::optional<Cell>> cell_of(const std::array<double, 3>& p, size_t row, 
     if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2]))
         return std::optional<Cell>();
     if (!std::ranges::all_of(c, [](double v) { return std::abs(v) <= kMaxCoordinate; }))
-        return fail(ErrorCode::bad_input, "{}: vertex {}: ({}, {}, {}) m is absurd: expected within 2^20 cells", where,
+        return fail(ErrorCode::bad_input, "{}: vertex {}: ({}, {}, {}) m is absurd: expected within 2^20 voxels", where,
                     row, p[0], p[1], p[2]);
     return std::optional<Cell>({int32_t(c[0]), int32_t(c[1]), int32_t(c[2])});
 }
@@ -182,7 +182,7 @@ uint8_t majority(const Points& points, std::span<const size_t> members)
     return static_cast<uint8_t>(std::ranges::max_element(votes) - votes.begin()); // the first of the largest
 }
 
-// n of a cell's points, in the file's order
+// n of a voxel's points, in the file's order
 std::vector<size_t> chosen(const Points& points, std::span<const size_t> members, uint8_t label, size_t n,
                            uint64_t seed)
 {
@@ -213,7 +213,7 @@ void append_points(VoxelGrid& grid, const Points& points, std::span<const size_t
     grid.generated.push_back(1);
 }
 
-// points may lie on their cell's faces, and by rounding 1 mm beyond: a reader would find them in the next cell
+// points may lie on their voxel's faces, and by rounding 1 mm beyond: a reader would find them in the next voxel
 void move_inside(std::array<float, 3>& position, const Cell& cell, double voxel_size)
 {
     for (size_t a = 0; a < 3; ++a) {
@@ -278,10 +278,10 @@ Result<SceneGrid> read_carla_points(const Path& path, const SceneGridOptions& o)
     return out;
 }
 
-Surfels labelled_points(const VoxelGrid& grid)
+Splats labelled_points(const VoxelGrid& grid)
 {
     const ScenePoints points = points_of(grid);
-    Surfels s{points.positions, {}, points.colors, {}, {}, {}, {}};
+    Splats s{points.positions, {}, points.colors, {}, {}, {}, {}};
     for (size_t i = 0; i < points.size(); ++i) {
         move_inside(s.position[i], grid.cells[points.cells[i]], grid.voxel_size);
         s.label.push_back(static_cast<uint8_t>(points.labels[i]));

@@ -58,7 +58,7 @@ std::vector<std::byte> header(std::string_view comments, size_t count, std::stri
     return bytes;
 }
 
-Status check_points(const Path& path, const Surfels& s)
+Status check_points(const Path& path, const Splats& s)
 {
     const size_t n = s.position.size();
     SR_ASSERT(s.color.size() == n && s.label.size() == n, "{} points with {} colors and {} labels", n, s.color.size(),
@@ -74,7 +74,7 @@ Status check_points(const Path& path, const Surfels& s)
 
 } // namespace
 
-Status check_splats(const Path& path, const Surfels& s)
+Status check_splats(const Path& path, const Splats& s)
 {
     SR_CHECK(check_points(path, s));
     const size_t n = s.position.size();
@@ -106,7 +106,7 @@ Tangents tangents_of(const Float3& normal)
     return {u, cross(n, u)};
 }
 
-std::array<float, 4> surfel_rotation(const Float3& normal)
+std::array<float, 4> splat_rotation(const Float3& normal)
 {
     const auto [u, v] = tangents_of(normal);
     const Float3 n = normalized(normal);
@@ -114,7 +114,7 @@ std::array<float, 4> surfel_rotation(const Float3& normal)
     return {static_cast<float>(q[3]), static_cast<float>(q[0]), static_cast<float>(q[1]), static_cast<float>(q[2])};
 }
 
-Status write_points_ply(const Path& path, const Surfels& s)
+Status write_points_ply(const Path& path, const Splats& s)
 {
     SR_CHECK(check_points(path, s));
     const size_t n = s.position.size();
@@ -135,7 +135,7 @@ Status write_points_ply(const Path& path, const Surfels& s)
     return write_file_atomically(path, bytes);
 }
 
-Status write_splats_ply(const Path& path, const Surfels& s, SplatPly variant, bool labels)
+Status write_splats_ply(const Path& path, const Splats& s, SplatPly variant, bool labels)
 {
     SR_CHECK(check_splats(path, s));
     const bool flat = variant == SplatPly::gaussian_2d;
@@ -166,7 +166,7 @@ Status write_splats_ply(const Path& path, const Surfels& s, SplatPly variant, bo
         append(bytes, {std::log(opacity / (1 - opacity)), std::log(s.sigma_u[i]), std::log(s.sigma_v[i])});
         if (!flat)
             append(bytes, {std::log(kThinScale)});
-        append(bytes, surfel_rotation(s.normal[i]).data(), 16);
+        append(bytes, splat_rotation(s.normal[i]).data(), 16);
         if (labels)
             bytes.push_back(static_cast<std::byte>(s.label[i]));
     }

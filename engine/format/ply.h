@@ -13,7 +13,7 @@
 namespace semrover {
 
 // N flat Gaussian splats; every array has N entries, but writing points needs only position, color and label
-struct Surfels {
+struct Splats {
     std::vector<std::array<float, 3>> position = {}; // metres
     std::vector<std::array<float, 3>> normal = {};   // unit
     std::vector<std::array<float, 3>> color = {};    // sRGB, 0..1
@@ -22,7 +22,7 @@ struct Surfels {
     std::vector<uint8_t> label = {};
 };
 
-// the tangents of a surfel: u = normalize(e x n), e the axis that n leans on least (x before y before z); v = n x u, so
+// the tangents of a splat: u = normalize(e x n), e the axis that n leans on least (x before y before z); v = n x u, so
 // (u, v, n) is right-handed
 struct Tangents {
     std::array<float, 3> u, v;
@@ -30,17 +30,17 @@ struct Tangents {
 Tangents tangents_of(const std::array<float, 3>& normal);
 
 // rotation that takes x, y, z to u, v, n; w, x, y, z with w >= 0
-std::array<float, 4> surfel_rotation(const std::array<float, 3>& normal);
+std::array<float, 4> splat_rotation(const std::array<float, 3>& normal);
 
 // binary little-endian PLY, written atomically, the same bytes for the same splats. bad_input for no splats, or a
 // number that is not finite (or a sigma not above 0), naming the splat. Arrays of different lengths are the caller's
 // bug.
 
 // x y z (float), red green blue label (uchar): CloudCompare, MeshLab, Open3D
-Status write_points_ply(const Path& path, const Surfels& surfels);
+Status write_points_ply(const Path& path, const Splats& splats);
 
 // bad_input as above: what every writer of splats refuses
-Status check_splats(const Path& path, const Surfels& surfels);
+Status check_splats(const Path& path, const Splats& splats);
 
 // what splat viewers read: x y z nx ny nz f_dc_0..2 opacity scale_* rot_0..3, all float, colour as the degree 0
 // harmonic (rgb - 0.5) / 0.28209479, opacity as a logit, scales as logarithms, the quaternion w first. 3DGS readers
@@ -50,8 +50,8 @@ Status check_splats(const Path& path, const Surfels& surfels);
 // save_ply
 enum class SplatPly { gaussian_3d, gaussian_2d, inria_62 };
 constexpr float kHarmonic0 = 0.28209479177387814f; // sqrt(1 / (4 pi))
-constexpr float kThinScale = 1e-4f;                // metres: what a surfel's third scale is in formats that want one
+constexpr float kThinScale = 1e-4f;                // metres: what a splat's third scale is in formats that want one
 // `labels`: a last property, uchar label, which rigid readers do not expect
-Status write_splats_ply(const Path& path, const Surfels& surfels, SplatPly variant, bool labels = false);
+Status write_splats_ply(const Path& path, const Splats& splats, SplatPly variant, bool labels = false);
 
 } // namespace semrover

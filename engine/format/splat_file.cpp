@@ -82,7 +82,7 @@ void EllipsoidFlattener::add(const Ellipsoid& e, bool flat)
     }
     across_ += std::abs(uv) > kAcross * std::sqrt(uu * vv);
     thick_ += !flat && e.scale[axis] > 0.5 * std::min(e.scale[first], e.scale[second]);
-    Surfels& s = out_.surfels;
+    Splats& s = out_.splats;
     s.position.push_back({float(e.position[0]), float(e.position[1]), float(e.position[2])});
     s.normal.push_back(normal);
     s.sigma_u.push_back(static_cast<float>(std::sqrt(uu)));
@@ -106,7 +106,7 @@ Result<SplatFile> EllipsoidFlattener::finish() &&
     warn(thick_, "are thick: drawn flat");
     warn(view_dependent_, "change their colour with the direction: drawn in the mean");
     out_.dropped = not_finite_ + without_size_;
-    if (out_.surfels.position.empty())
+    if (out_.splats.position.empty())
         return fail(ErrorCode::bad_input, "{}: no splat is left of {}", where_, out_.dropped);
     return std::move(out_);
 }
@@ -223,22 +223,22 @@ Result<SplatFile> read_splats_ply(const Path& path)
     return splats;
 }
 
-Surfels turned_for_viewers(const Surfels& surfels)
+Splats turned_for_viewers(const Splats& splats)
 {
     const auto turned = [](const std::array<float, 3>& p) { return std::array<float, 3>{p[1], -p[2], -p[0]}; };
     const auto along = [](const std::array<float, 3>& a, const std::array<float, 3>& b) {
         return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     };
-    Surfels s = surfels;
+    Splats s = splats;
     for (size_t i = 0; i < s.position.size(); ++i) {
-        const Tangents before = tangents_of(surfels.normal[i]);
-        s.position[i] = turned(surfels.position[i]);
-        s.normal[i] = turned(surfels.normal[i]);
+        const Tangents before = tangents_of(splats.normal[i]);
+        s.position[i] = turned(splats.position[i]);
+        s.normal[i] = turned(splats.normal[i]);
         // the tangents follow from the normal: where two of its numbers are equal, others than the turned ones
         const Tangents after = tangents_of(s.normal[i]);
         const auto u = turned(before.u), v = turned(before.v);
-        s.sigma_u[i] = std::hypot(surfels.sigma_u[i] * along(u, after.u), surfels.sigma_v[i] * along(v, after.u));
-        s.sigma_v[i] = std::hypot(surfels.sigma_u[i] * along(u, after.v), surfels.sigma_v[i] * along(v, after.v));
+        s.sigma_u[i] = std::hypot(splats.sigma_u[i] * along(u, after.u), splats.sigma_v[i] * along(v, after.u));
+        s.sigma_v[i] = std::hypot(splats.sigma_u[i] * along(u, after.v), splats.sigma_v[i] * along(v, after.v));
     }
     return s;
 }
@@ -272,7 +272,7 @@ Result<SplatFile> read_dot_splat(const Path& path)
     return std::move(flattener).finish();
 }
 
-Status write_dot_splat(const Path& path, const Surfels& s)
+Status write_dot_splat(const Path& path, const Splats& s)
 {
     SR_CHECK(check_splats(path, s));
     const auto byte = [](float v) { return static_cast<uint8_t>(std::lround(std::clamp(v, 0.f, 255.f))); };
@@ -281,7 +281,7 @@ Status write_dot_splat(const Path& path, const Surfels& s)
         const auto& p = s.position[i];
         const std::array<float, 6> floats = {p[0], p[1], p[2], s.sigma_u[i], s.sigma_v[i], kThinScale};
         std::array<uint8_t, 8> rest;
-        const std::array<float, 4> q = surfel_rotation(s.normal[i]);
+        const std::array<float, 4> q = splat_rotation(s.normal[i]);
         for (size_t a = 0; a < 3; ++a)
             rest[a] = byte(s.color[i][a] * 255);
         rest[3] = byte(s.opacity[i] * 255);

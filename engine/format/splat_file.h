@@ -12,7 +12,7 @@ namespace semrover {
 
 // splats of a file as flat ones
 struct SplatFile {
-    Surfels surfels;
+    Splats splats;
     std::vector<std::string> warnings; // a line each
     uint64_t dropped = 0;
 };
@@ -27,8 +27,8 @@ struct Ellipsoid {
     uint8_t label = kNoLabel;
 };
 
-// Makes surfels of ellipsoids: the axis of the smallest scale (of equal ones the last) is the normal. The tangents of a
-// surfel follow from its normal (tangents_of), so the variances along them are kept, and the correlation between them
+// Makes splats of ellipsoids: the axis of the smallest scale (of equal ones the last) is the normal. The tangents of a
+// splat follow from its normal (tangents_of), so the variances along them are kept, and the correlation between them
 // is lost: splats that are longer than wide and lie across the tangents are counted. So are thick ones (third scale
 // above half the second). Splats that are not finite, or without a rotation or a size, are dropped and counted.
 class EllipsoidFlattener {
@@ -53,11 +53,11 @@ Result<SplatFile> read_splats_ply(const Path& path);
 // In the axes that viewers of .ply and .splat expect: y down, x and z so that half a turn about z, which they apply,
 // shows what a .glb of the same scene shows. (x, y, z) of the world becomes (y, -z, -x).
 // Source: PlayCanvas' splat-transform, Transform.PLY
-Surfels turned_for_viewers(const Surfels& surfels);
+Splats turned_for_viewers(const Splats& splats);
 
 // antimatter15's .splat: 32 bytes a splat: position 3 f32, scale 3 f32 in metres, RGBA u8, quaternion u8 (w first,
 // 128 q + 128). Source: https://github.com/antimatter15/splat, README.md and convert.py
 Result<SplatFile> read_dot_splat(const Path& path);
-Status write_dot_splat(const Path& path, const Surfels& surfels);
+Status write_dot_splat(const Path& path, const Splats& splats);
 
 } // namespace semrover

@@ -40,19 +40,19 @@ RasterizerOptions float_options(const DrawOptions& o)
 }
 
 // splats are drawn as they are
-Result<SurfelScene> load_scene(Device& device, DrawingOptions& o)
+Result<SplatScene> load_scene(Device& device, DrawingOptions& o)
 {
     if (const auto* grid = std::get_if<VoxelGrid>(&o.scene))
         return splats_of(device, *grid, o.scene_name, o.draw);
-    Surfels& splats = std::get<Surfels>(o.scene);
+    Splats& splats = std::get<Splats>(o.scene);
     for (size_t i = 0; o.draw.semantic && i < splats.label.size(); ++i)
         splats.color[i] = label_color(splats.label[i]);
-    return SurfelScene::create(device, splats);
+    return SplatScene::create(device, splats);
 }
 
 class DrawingJob : public Job {
   public:
-    DrawingJob(Device& device, DrawingOptions options, SurfelScene scene, std::unique_ptr<DrawingStore> store,
+    DrawingJob(Device& device, DrawingOptions options, SplatScene scene, std::unique_ptr<DrawingStore> store,
                std::unique_ptr<Outgoing> out, const JobCallbacks& callbacks)
         : device_(device), o_(std::move(options)), scene_(std::move(scene)), callbacks_(callbacks),
           drawing_(device, scene_, o_.path, o_.draw.rasterizer()), floats_(device, scene_, {}, float_options(o_.draw)),
@@ -197,7 +197,7 @@ class DrawingJob : public Job {
 
     Device& device_;
     DrawingOptions o_;
-    SurfelScene scene_;
+    SplatScene scene_;
     JobCallbacks callbacks_;
     PathDrawing drawing_;
     PathDrawing floats_; // what files of 8 and 16 bits round away
@@ -215,7 +215,7 @@ class DrawingJob : public Job {
 Json drawing_settings(const DrawingOptions& o, const Device& device)
 {
     const auto* grid = std::get_if<VoxelGrid>(&o.scene);
-    const uint64_t scene = grid ? hash_grid(*grid) : hash_splats(std::get<Surfels>(o.scene));
+    const uint64_t scene = grid ? hash_grid(*grid) : hash_splats(std::get<Splats>(o.scene));
     return {{"command", "render"},
             {"version", kVersion},
             {"device", device.name()},
@@ -232,7 +232,7 @@ Status write_points(const Path& path, const DrawingOptions& o)
 {
     if (const auto* grid = std::get_if<VoxelGrid>(&o.scene))
         return write_labelled_points(path, *grid);
-    return write_points_ply(path, std::get<Surfels>(o.scene));
+    return write_points_ply(path, std::get<Splats>(o.scene));
 }
 
 uint64_t largest_read(const DrawingOptions& o)
@@ -255,7 +255,7 @@ Result<std::unique_ptr<Job>> begin_drawing(Device& device, DrawingOptions option
     DrawingOptions& o = options;
     SR_CHECK(check_drawing_outputs(o));
     const Json settings = drawing_settings(o, device);
-    SR_TRY(SurfelScene scene, load_scene(device, o));
+    SR_TRY(SplatScene scene, load_scene(device, o));
     if (scene.skipped() && callbacks.warning)
         callbacks.warning(fmt::format("{} of {} splats are degenerate and not drawn", scene.skipped(), scene.size()));
     SR_TRY(auto out, Outgoing::create(device, largest_read(o)));

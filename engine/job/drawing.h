@@ -13,7 +13,7 @@ namespace semrover {
 
 // what `render` does: splat buffers of a camera path, and a picture from above
 struct DrawingOptions {
-    std::variant<VoxelGrid, Surfels> scene;
+    std::variant<VoxelGrid, Splats> scene;
     Path scene_name;      // for errors
     CameraPath path;      // without frames: nothing is driven
     ImageSize top;        // of top.png; 0 x 0: none

@@ -3,14 +3,14 @@
 #include "engine/job/export_ply.h"
 
 #include "engine/format/ply.h"
-#include "engine/splat/surfels.h"
+#include "engine/splat/splat_scene.h"
 
 namespace semrover {
 
 Status export_ply(Device& device, const VoxelGrid& grid, const PlyExports& exports)
 {
-    SR_TRY(const SurfelScene scene, SurfelScene::create(device, points_of(grid)));
-    SR_TRY(const Surfels s, scene.read());
+    SR_TRY(const SplatScene scene, SplatScene::create(device, points_of(grid)));
+    SR_TRY(const Splats s, scene.read());
     if (!exports.points.empty())
         SR_CHECK(write_points_ply(exports.points, s));
     if (!exports.splats_3d.empty())

@@ -25,7 +25,7 @@ uint64_t hash_grid(const VoxelGrid& grid)
                        grid.generated);
 }
 
-uint64_t hash_splats(const Surfels& s)
+uint64_t hash_splats(const Splats& s)
 {
     return hash_arrays("splats", s.position, s.normal, s.color, s.sigma_u, s.sigma_v, s.opacity, s.label);
 }
@@ -46,7 +46,7 @@ uint64_t hash_cameras(const CameraPath& path)
 
 Json drawing_json(const DrawOptions& o)
 {
-    const SurfelOptions& s = o.surfels;
+    const PointSplatOptions& s = o.splats;
     return {{"splat_radius", s.auto_sigma ? "auto" : fmt::format("{}", s.sigma)},
             {"opacity", s.opacity},
             {"visible_alpha", o.rasterizer().visible_alpha},

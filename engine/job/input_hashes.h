@@ -9,7 +9,7 @@ namespace semrover {
 
 // What runs are known by, beside files: what was read, whatever files and options it came from.
 uint64_t hash_grid(const VoxelGrid& grid);
-uint64_t hash_splats(const Surfels& splats);
+uint64_t hash_splats(const Splats& splats);
 uint64_t hash_cameras(const CameraPath& path);
 
 // what of DrawOptions decides pictures

@@ -33,17 +33,17 @@ RasterizerOptions DrawOptions::rasterizer() const
     return options;
 }
 
-Result<SurfelScene> splats_of(Device& device, const VoxelGrid& grid, const Path& name, const DrawOptions& o)
+Result<SplatScene> splats_of(Device& device, const VoxelGrid& grid, const Path& name, const DrawOptions& o)
 {
     ScenePoints points = points_of(grid);
     if (points.size() == 0 && !o.semantic)
         return fail(ErrorCode::bad_input, "{} has no points yet: generate them, or draw its labels with `semantic`",
                     quote_path(name));
     if (points.size() == 0)
-        return SurfelScene::create(device, block_surfels(grid));
+        return SplatScene::create(device, block_splats(grid));
     if (o.semantic)
         color_by_label(points);
-    return SurfelScene::create(device, points, o.surfels);
+    return SplatScene::create(device, points, o.splats);
 }
 
 Result<Rasterizer*> PathDrawing::rasterizer_of(const Intrinsics& size, uint32_t frames)

@@ -16,7 +16,7 @@ namespace semrover {
 
 // how points become pictures
 struct DrawOptions {
-    SurfelOptions surfels;
+    PointSplatOptions splats;
     std::array<uint8_t, 3> background{};
     std::optional<float> visible_alpha; // alpha from which a pixel counts as visible; 0.5, or what a model says
     bool semantic = false;              // in label colours; a grid without points as blocks
@@ -26,7 +26,7 @@ struct DrawOptions {
 
 // Splats of a grid: points as generated, or as DrawOptions::semantic says. `name` is the grid's, for errors: bad_input
 // for a grid without points, out_of_memory
-Result<SurfelScene> splats_of(Device& device, const VoxelGrid& grid, const Path& name, const DrawOptions& options);
+Result<SplatScene> splats_of(Device& device, const VoxelGrid& grid, const Path& name, const DrawOptions& options);
 
 // Draws a camera path in order, a moment a step: what the cameras of a rig see at one time is drawn in one submit, with
 // one rasterizer for each image size and camera model. Pictures stay on the device, as files have them.
@@ -36,7 +36,7 @@ class PathDrawing {
     using Drawn = std::function<Status(const CameraFrame&, const SplatPixelSlots&)>;
 
     // the scene must outlive it
-    PathDrawing(Device& device, const SurfelScene& scene, CameraPath path, const RasterizerOptions& options)
+    PathDrawing(Device& device, const SplatScene& scene, CameraPath path, const RasterizerOptions& options)
         : device_(device), scene_(scene), path_(std::move(path)), options_(options)
     {
     }
@@ -57,7 +57,7 @@ class PathDrawing {
     Result<Rasterizer*> rasterizer_of(const Intrinsics& size, uint32_t frames);
 
     Device& device_;
-    const SurfelScene& scene_;
+    const SplatScene& scene_;
     CameraPath path_;
     RasterizerOptions options_;
     size_t done_ = 0;

@@ -43,7 +43,7 @@ uint64_t history_bytes(const Device& device, const Refinement& r)
 
 // a grid's pictures on their way into OUT/buffers, as `semrover render` would write them
 struct BufferDrawing {
-    SurfelScene scene;
+    SplatScene scene;
     PathDrawing drawing;
     State state;
     std::map<std::string, Slot> seen; // SplatPixelSlots::seen of each camera's last frame
@@ -52,7 +52,7 @@ struct BufferDrawing {
     EmptyFrames empty;
     bool started = false; // the first moment is drawn
 
-    BufferDrawing(Device& device, SurfelScene s, const Refinement& r, const Bounds& bounds)
+    BufferDrawing(Device& device, SplatScene s, const Refinement& r, const Bounds& bounds)
         : scene(std::move(s)), drawing(device, scene, *r.options.path, r.options.draw.rasterizer()),
           empty(*r.options.path, r.options.input, r.options.allow_empty)
     {
@@ -169,7 +169,7 @@ class RefinementJob : public Job {
     {
         if (!drawing_) {
             SR_TRY(const VoxelGrid grid, r_.options.grid());
-            SR_TRY(SurfelScene scene, splats_of(device_, grid, r_.options.input, r_.options.draw));
+            SR_TRY(SplatScene scene, splats_of(device_, grid, r_.options.input, r_.options.draw));
             drawing_ = std::make_unique<BufferDrawing>(device_, std::move(scene), r_, bounds_of(grid));
             SR_CHECK(drawing_->allocate(device_));
         }

@@ -21,7 +21,7 @@ struct RefinementOptions {
     std::optional<CameraPath> path;          // of the pictures, or through the grid
     DrawOptions draw;                        // of a grid
     bool allow_empty = false;                // it is no error if no buffer of a grid shows anything
-    bool radius_given = false;               // draw.surfels says how wide splats are, not the model
+    bool radius_given = false;               // draw.splats says how wide splats are, not the model
     std::function<Result<VoxelGrid>()> grid; // of `input`, called when it is drawn
     bool replace = false;                    // what is in `output`
 

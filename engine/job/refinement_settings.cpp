@@ -22,8 +22,8 @@ void draw_as_trained(RefinementOptions& o, const RendererDefaults& d)
     o.draw.visible_alpha = o.draw.visible_alpha.value_or(d.visible_threshold);
     if (o.radius_given)
         return;
-    o.draw.surfels.auto_sigma = !d.splat_radius;
-    o.draw.surfels.sigma = d.splat_radius.value_or(o.draw.surfels.sigma);
+    o.draw.splats.auto_sigma = !d.splat_radius;
+    o.draw.splats.sigma = d.splat_radius.value_or(o.draw.splats.sigma);
 }
 
 // the frames of a camera that are asked for

@@ -131,7 +131,7 @@ MeasuredPoints measured_points(std::vector<Point3> positions)
         extent[a] = high[a] - low[a];
     }
     std::ranges::sort(extent, std::greater());
-    // as if they lay on the box's largest side, and of an edge that holds as many as a grid's cell
+    // as if they lay on the box's largest side, and of an edge that holds as many as a grid's voxel
     const double apart = std::sqrt(extent[0] * extent[1] / double(std::max<size_t>(positions.size(), 1)));
     return {std::move(positions), std::clamp(4 * apart, 0.05, 5.0)};
 }

@@ -22,7 +22,7 @@ struct Chamfer {
     double mean() const { return (to_surface + to_points) / 2; }
 };
 
-// points to be measured, and about how far apart they lie, metres: the edge of a cell of several
+// points to be measured, and about how far apart they lie, metres: the edge of a voxel of several
 struct MeasuredPoints {
     std::vector<Point3> positions; // world, metres
     double spacing = 0.6;

@@ -66,7 +66,7 @@ Result<std::vector<double>> nearest_distances(Device& device, std::span<const Po
 {
     SR_ASSERT(!points.empty(), "distances from no points");
     std::vector<double> best(queries.size(), kFar);
-    // within a radius the search ends after a few cells
+    // within a radius the search ends after a few voxels
     SR_CHECK(search(device, queries, points, options.cell_size, options.first_radius, best));
     std::vector<PointRow> lonely;
     for (size_t i = 0; i < queries.size(); ++i)

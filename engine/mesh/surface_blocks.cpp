@@ -16,10 +16,10 @@ namespace semrover {
 
 namespace {
 
-constexpr double kStep = 1 << 20;         // steps of a cell that positions are rounded to
+constexpr double kStep = 1 << 20;         // steps of a voxel that positions are rounded to
 constexpr double kMaxCell = 1 << 20;      // as in grids
 constexpr double kMaxCells = 1 << 28;     // of the whole surface
-constexpr int kEdge = int(kSurfaceBlock); // cells
+constexpr int kEdge = int(kSurfaceBlock); // voxels
 constexpr size_t kMaxPieces = 1 << 20;    // of all faces, 152 bytes each
 
 using Vector = std::array<double, 3>;
@@ -161,7 +161,7 @@ Status SurfaceBlocks::check_extent(std::string_view where)
             for (size_t a = 0; a < 3; ++a)
                 if (const double x = p[a] + base_[a]; std::abs(x) >= kMaxCell)
                     return fail(ErrorCode::bad_input,
-                                "{}: face {} reaches {:.6g} m, beyond 2^20 cells of {} m; move it to the origin "
+                                "{}: face {} reaches {:.6g} m, beyond 2^20 voxels of {} m; move it to the origin "
                                 "(`origin`), or take a larger voxel size",
                                 where, f, x * voxel_size_, float(voxel_size_));
         const double area = area_of(c[0], c[1], c[2]);
@@ -170,7 +170,7 @@ Status SurfaceBlocks::check_extent(std::string_view where)
     }
     if (cells > kMaxCells)
         return fail(ErrorCode::bad_input,
-                    "{}: the surface crosses about {:.3g} cells of {} m, at most {:.3g} are supported; take a larger "
+                    "{}: the surface crosses about {:.3g} voxels of {} m, at most {:.3g} are supported; take a larger "
                     "voxel size",
                     where, cells, float(voxel_size_), kMaxCells);
     return {};
@@ -248,7 +248,7 @@ Result<SurfaceBlocks> SurfaceBlocks::create(const Mesh& mesh, std::span<const ui
         blocks.add_face(f);
         if (blocks.pieces_.size() > kMaxPieces)
             return fail(ErrorCode::bad_input,
-                        "{}: face {} of {:.4g} m^2 and those before it are cut into more than {} pieces of {} cells; "
+                        "{}: face {} of {:.4g} m^2 and those before it are cut into more than {} pieces of {} voxels; "
                         "take a larger voxel size",
                         where, f, face_area(mesh, f), kMaxPieces, kEdge);
     }

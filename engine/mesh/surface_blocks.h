@@ -11,12 +11,12 @@
 
 namespace semrover {
 
-// A mesh's triangles by the blocks of 8^3 cells that they touch, in portions that fit a device. What a cell gets, and
+// A mesh's triangles by the blocks of 8^3 voxels that they touch, in portions that fit a device. What a voxel gets, and
 // in which order, depends on neither the order of the mesh's faces nor the size of the portions.
 
 // the words of kernels/mesh.h, SurfaceTriangles
 struct SurfaceRecord {
-    std::array<std::array<float, 3>, 3> corners; // cells from the block's corner
+    std::array<std::array<float, 3>, 3> corners; // voxels from the block's corner
     uint32_t slot, range, material_label;
 };
 struct SurfaceAttributes {
@@ -28,35 +28,35 @@ struct SurfaceAttributes {
 struct SurfaceChunk {
     std::vector<SurfaceRecord> records;
     std::vector<SurfaceAttributes> attributes;
-    std::vector<Cell> blocks; // [slots] the cell at the block's corner
-    uint64_t pairs = 0;       // of a triangle and a cell that their boxes share: no fewer than are found exactly
+    std::vector<Cell> blocks; // [slots] the voxel at the block's corner
+    uint64_t pairs = 0;       // of a triangle and a voxel that their boxes share: no fewer than are found exactly
 };
 
 struct SurfaceLimits { // of a portion
     uint64_t triangles = 1 << 20, pairs = 1 << 21, slots = 4096;
 };
 
-// the edge of the cells that a mesh is cut into, in metres. Far from the origin that is the size in decimals, 0.6 and
+// the edge of the voxels that a mesh is cut into, in metres. Far from the origin that is the size in decimals, 0.6 and
 // not 0.60000002384: the difference would add up to centimetres.
 double cell_edge(const Mesh& mesh, float voxel_size);
 
 class SurfaceBlocks {
   public:
-    // labels [F]: a class or kNoSurfaceLabel. bad_input, with `where` in front, for vertices beyond 2^20 cells, a
-    // surface of more than 2^28 cells, and large faces that make more than 2^20 pieces of a block. The mesh outlives
+    // labels [F]: a class or kNoSurfaceLabel. bad_input, with `where` in front, for vertices beyond 2^20 voxels, a
+    // surface of more than 2^28 voxels, and large faces that make more than 2^20 pieces of a block. The mesh outlives
     // this.
     static Result<SurfaceBlocks> create(const Mesh& mesh, std::span<const uint8_t> labels, float voxel_size,
                                         std::string_view where);
 
-    // the next portion, none after the last; bad_input if the triangles of one cell exceed the limits
+    // the next portion, none after the last; bad_input if the triangles of one voxel exceed the limits
     Result<std::optional<SurfaceChunk>> next(const SurfaceLimits& limits);
 
     double area() const { return area_; } // of the whole mesh, m^2
 
   private:
-    using Corners = std::array<std::array<double, 3>, 3>; // cells; multiples of 2^-20, so that floats hold them exactly
-                                                          // wherever they are seen from
-    struct Piece {                                        // of a face, at most a block wide
+    using Corners = std::array<std::array<double, 3>, 3>; // voxels; multiples of 2^-20, so that floats hold them
+                                                          // exactly wherever they are seen from
+    struct Piece { // of a face, at most a block wide
         uint32_t face;
         Corners corners;
         std::array<std::array<double, 3>, 3> weights; // of the face's corners
@@ -69,7 +69,7 @@ class SurfaceBlocks {
         size_t first, last; // instances
         std::array<uint32_t, 3> low = {0, 0, 0}, high = {8, 8, 8};
     };
-    struct Walk { // cells of a block, high included
+    struct Walk { // voxels of a block, high included
         std::array<int, 3> low, high;
         uint64_t cells() const;
     };
@@ -93,7 +93,7 @@ class SurfaceBlocks {
     const Mesh* mesh_;
     std::span<const uint8_t> labels_;
     double voxel_size_, area_ = 0;
-    std::array<int32_t, 3> base_{}; // cells, whole blocks: where positions are counted from
+    std::array<int32_t, 3> base_{}; // voxels, whole blocks: where positions are counted from
     std::array<double, 3> rest_{};  // metres from there to the mesh's origin
     std::vector<Piece> pieces_;
     std::vector<Instance> instances_; // by block, then by their content

@@ -30,7 +30,7 @@ Status check_options(const VoxelizeOptions& o)
     if (!(o.voxel_size >= 1e-3f && o.voxel_size <= 1e3f))
         return fail(ErrorCode::bad_input, "expected a voxel size of 0.001 to 1000 m, found {}", o.voxel_size);
     if (o.points_per_voxel < 1 || o.points_per_voxel > 4096)
-        return fail(ErrorCode::bad_input, "expected 1 to 4096 points in a cell, found {}", o.points_per_voxel);
+        return fail(ErrorCode::bad_input, "expected 1 to 4096 points in a voxel, found {}", o.points_per_voxel);
     if (!(o.min_area >= 0 && o.min_area <= 1))
         return fail(ErrorCode::bad_input, "expected a least area of 0 to 1 squares of the voxel size, found {}",
                     o.min_area);
@@ -69,7 +69,7 @@ Result<std::vector<uint8_t>> labels_of_faces(const Mesh& mesh, uint8_t default_l
     return labels;
 }
 
-// half precision, on the cell's side of its border
+// half precision, on the voxel's side of its border
 uint16_t half_within(float value, float limit)
 {
     uint16_t half = float_to_half(value);
@@ -93,7 +93,7 @@ class Voxelizer {
         uint32_t pairs, cells;
         Slot records, attributes;
         Slot triangles, sums;                         // of pairs
-        Slot starts, areas, labels, unlabelled_areas; // of cells
+        Slot starts, areas, labels, unlabelled_areas; // of voxels
 
         ChunkMemory(uint32_t triangles, uint32_t pairs, uint32_t cells);
         SurfaceTriangles in(Graph& g, const TextureAtlas& atlas) const;
@@ -157,13 +157,13 @@ Result<Voxelizer::ChunkMemory> Voxelizer::upload(const SurfaceChunk& chunk)
     return m;
 }
 
-// pairs by cell, their areas, areas and labels of cells
+// pairs by voxel, their areas, areas and labels of voxels
 Status Voxelizer::measure(const ChunkMemory& m)
 {
     Graph g;
     const SurfaceTriangles surface = m.in(g, atlas_);
     const SurfacePairs found = triangle_cells(g, surface.records, m.pairs);
-    // within a cell along a curve, so that samples that follow each other in area lie beside each other
+    // within a voxel along a curve, so that samples that follow each other in area lie beside each other
     const uint32_t bits = uint32_t(std::bit_width(m.cells - 1)) + kSurfacePlaceBits;
     const SortedPairs sorted = radix_sort(g, found.keys, found.triangles, {.bits = bits, .count = found.count});
     const Tensor keys = pair_cells(g, sorted.keys);
@@ -243,7 +243,7 @@ void Voxelizer::store(std::span<const std::array<uint32_t, 4>> samples, size_t c
     }
 }
 
-// cells in order
+// voxels in order
 VoxelizedMesh Voxelizer::finish()
 {
     VoxelGrid& grid = out_.grid;
@@ -274,7 +274,7 @@ Result<VoxelizedMesh> Voxelizer::run(std::span<const uint8_t> labels)
     const SurfaceLimits limits = this->limits();
     SR_TRY(SurfaceBlocks blocks, SurfaceBlocks::create(mesh_, labels, options_.voxel_size, options_.name));
     const auto n = uint64_t(options_.points_per_voxel);
-    const uint64_t batch = std::max<uint64_t>(1, limits.pairs / 2 / n); // cells
+    const uint64_t batch = std::max<uint64_t>(1, limits.pairs / 2 / n); // voxels
     while (true) {
         SR_TRY(const auto chunk, blocks.next(limits));
         if (!chunk)
@@ -291,7 +291,7 @@ Result<VoxelizedMesh> Voxelizer::run(std::span<const uint8_t> labels)
     if (unlabelled_ > 0)
         return no_label(unlabelled_, "pixels of label textures");
     if (out_.grid.cells.empty())
-        return fail(ErrorCode::bad_input, "{}: has no surface: {:.4g} m^2 in {} faces, at least {:.4g} in a cell",
+        return fail(ErrorCode::bad_input, "{}: has no surface: {:.4g} m^2 in {} faces, at least {:.4g} in a voxel",
                     options_.name, blocks.area(), mesh_.faces.size(),
                     double(options_.min_area) * options_.voxel_size * options_.voxel_size);
     return finish();

@@ -44,7 +44,7 @@ uint32_t TransformerConfig::condition_width() const
 
 int32_t TransformerConfig::radius2_of(double metres) const
 {
-    // 1e-6 m as in the reference: distances between cell centres that equal the radius count
+    // 1e-6 m as in the reference: distances between voxel centres that equal the radius count
     const double cells = (metres + 1e-6) / double(voxel_size);
     return int32_t(std::floor(cells * cells));
 }

@@ -14,7 +14,7 @@
 
 namespace semrover {
 
-// what a transformer may be conditioned on beside a cell's label (docs/method.md §2.1)
+// what a transformer may be conditioned on beside a voxel's label (docs/method.md §2.1)
 enum class ConditionPart : uint8_t { object, tint, part };
 constexpr uint32_t condition_width(ConditionPart part)
 {
@@ -47,10 +47,10 @@ struct TransformerConfig {
 
     uint32_t dim() const { return num_attention_heads * attention_head_dim; }
     uint32_t channels() const { return 6 * points_per_voxel; }
-    uint32_t condition_width() const; // numbers of a cell; 0: labels are all that the model knows
-    // largest squared distance in cells at which two cells see each other; inclusive
+    uint32_t condition_width() const; // numbers of a voxel; 0: labels are all that the model knows
+    // largest squared distance in voxels at which two voxels see each other; inclusive
     int32_t radius2() const { return radius2_of(attention_radius); }
-    int32_t radius2_of(double metres) const; // squared, in cells
+    int32_t radius2_of(double metres) const; // squared, in voxels
 };
 
 // errors: bad_input; a value that the engine does not implement is refused by name

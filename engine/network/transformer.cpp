@@ -18,7 +18,7 @@ constexpr uint32_t kColumnAlignment = 64;
 
 void TokenSets::add(std::span<const CellIndex> set_cells, std::span<const uint32_t> set_labels)
 {
-    SR_ASSERT(!set_cells.empty() && set_cells.size() == set_labels.size(), "a set of {} cells with {} labels",
+    SR_ASSERT(!set_cells.empty() && set_cells.size() == set_labels.size(), "a set of {} voxels with {} labels",
               set_cells.size(), set_labels.size());
     const uint32_t first = rows(), count = uint32_t(set_cells.size());
     double mean[3] = {};

@@ -69,7 +69,7 @@ class Transformer {
 
     // mask, pos and the conditionings of a context, from its other tensors; once per batch of sets
     [[nodiscard]] Tensor neighbors(Graph& g, const TokenContext& context,
-                                   uint32_t near_row,         // from this row on cells see no others beyond
+                                   uint32_t near_row,         // from this row on voxels see no others beyond
                                    double near_radius) const; // metres, if that is less than the attention radius
     [[nodiscard]] Tensor positions(Graph& g, const TokenContext& context) const;
     [[nodiscard]] Conditioned condition(Graph& g,

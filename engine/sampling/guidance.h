@@ -17,7 +17,7 @@ constexpr int kLastTimestep = 10000;
 
 // Classifier-free guidance: m = u + scale (c - u), u without labels. Below timestep `from` and above `until` the
 // network runs on c alone, which costs half: there guidance changes little (Kynkäänniemi et al. 2024, arXiv
-// 2404.07724). With a `radius` cells of u see no others beyond it, so that c - u is also what neighbors say of each
+// 2404.07724). With a `radius` voxels of u see no others beyond it, so that c - u is also what neighbors say of each
 // other (docs/method.md §3.1).
 struct Guidance {
     float scale = 4; // 1: no unconditional half

@@ -53,7 +53,7 @@ struct PlanRow {
     uint32_t timestep_index = 0; // into SamplingPlan::timesteps; in an undo row, of the timestep gone up to
 };
 
-// A whole sampling run, row by row. One plan is used for any number of cells.
+// A whole sampling run, row by row. One plan is used for any number of voxels.
 struct SamplingPlan {
     std::vector<PlanRow> rows;
     std::vector<double> timesteps; // distinct ones, in the order they are first visited

@@ -10,7 +10,7 @@ namespace semrover {
 
 namespace {
 
-// cells with the same (i, j) lie one after the other
+// voxels with the same (i, j) lie one after the other
 struct CellColumn {
     int32_t i, j;
     uint32_t begin, end;
@@ -110,7 +110,7 @@ int64_t reach_squared(double metres, float voxel_size)
 
 std::vector<uint32_t> cells_within(std::span<const Cell> cells, std::span<const Cell> sources, int64_t reach2)
 {
-    SR_ASSERT(reach2 >= 0 && std::ranges::is_sorted(cells), "cells must be sorted, a reach of {} squared", reach2);
+    SR_ASSERT(reach2 >= 0 && std::ranges::is_sorted(cells), "voxels must be sorted, a reach of {} squared", reach2);
     Marker marker(cells, reach2);
     for (const Cell& source : sources)
         marker.mark_around(source);

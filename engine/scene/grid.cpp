@@ -57,7 +57,7 @@ Status check_tensors(const SafetensorsSet& file, std::string_view where)
         schema.push_back({"generated", {v}, true, {DType::u8}});
     }
     if (n > kMaxPointsPerVoxel)
-        return fail(ErrorCode::bad_input, "{}: {} points in a cell, at most {} are allowed", where, n,
+        return fail(ErrorCode::bad_input, "{}: {} points in a voxel, at most {} are allowed", where, n,
                     kMaxPointsPerVoxel);
     return file.require(schema);
 }
@@ -99,7 +99,7 @@ Status check_sizes(const VoxelGrid& grid, std::string_view where)
 {
     const size_t v = grid.cells.size();
     if (v == 0)
-        return fail(ErrorCode::bad_input, "{}: the grid is empty, expected at least one cell", where);
+        return fail(ErrorCode::bad_input, "{}: the grid is empty, expected at least one voxel", where);
     if (!(grid.voxel_size >= 1e-3f && grid.voxel_size <= 1e3f))
         return fail(ErrorCode::bad_input, "{}: expected a voxel size of 0.001 to 1000 m, found {}", where,
                     grid.voxel_size);
@@ -107,7 +107,7 @@ Status check_sizes(const VoxelGrid& grid, std::string_view where)
     if (grid.labels.size() != v || grid.points.size() != v * n * 3 || grid.colors.size() != v * n * 3 ||
         grid.generated.size() != (grid.has_points() ? v : 0))
         return fail(ErrorCode::bad_input,
-                    "{}: arrays disagree: {} cells of {} points, {} labels, {} points, {} colors, {} generated", where,
+                    "{}: arrays disagree: {} voxels of {} points, {} labels, {} points, {} colors, {} generated", where,
                     v, grid.points_per_voxel, grid.labels.size(), grid.points.size(), grid.colors.size(),
                     grid.generated.size());
     return {};
@@ -119,12 +119,12 @@ Status check_cells(const VoxelGrid& grid, std::string_view where)
         const Cell& cell = grid.cells[i];
         for (const int32_t c : cell)
             if (c < -kMaxCoordinate || c > kMaxCoordinate)
-                return fail(ErrorCode::bad_input, "{}: cell {} is absurd: expected coordinates within 2^20", where,
+                return fail(ErrorCode::bad_input, "{}: voxel {} is absurd: expected coordinates within 2^20", where,
                             cell_text(cell));
         if (i > 0 && grid.cells[i - 1] == cell)
-            return fail(ErrorCode::bad_input, "{}: cell {} is given twice", where, cell_text(cell));
+            return fail(ErrorCode::bad_input, "{}: voxel {} is given twice", where, cell_text(cell));
         if (i > 0 && cell < grid.cells[i - 1])
-            return fail(ErrorCode::bad_input, "{}: cells are not sorted: {} follows {}", where, cell_text(cell),
+            return fail(ErrorCode::bad_input, "{}: voxels are not sorted: {} follows {}", where, cell_text(cell),
                         cell_text(grid.cells[i - 1]));
     }
     return {};
@@ -138,7 +138,7 @@ Status check_labels(const VoxelGrid& grid, std::string_view where)
     std::string unknown;
     for (size_t label = kClassCount; label < counts.size(); ++label)
         if (counts[label])
-            unknown += fmt::format("{}{} ({} cells)", unknown.empty() ? "" : ", ", label, counts[label]);
+            unknown += fmt::format("{}{} ({} voxels)", unknown.empty() ? "" : ", ", label, counts[label]);
     if (!unknown.empty())
         return fail(ErrorCode::bad_input, "{}: unknown labels, expected 0 to {}: {}", where, kClassCount - 1, unknown);
     return {};
@@ -152,7 +152,7 @@ Status check_points(const VoxelGrid& grid, std::string_view where)
         if (std::abs(offset) <= limit) // false for NaN
             continue;
         const size_t point = i / 3, n = static_cast<size_t>(grid.points_per_voxel);
-        return fail(ErrorCode::bad_input, "{}: point {} of cell {}: {} = {} m, expected within {} m of the centre",
+        return fail(ErrorCode::bad_input, "{}: point {} of voxel {}: {} = {} m, expected within {} m of the centre",
                     where, point % n, cell_text(grid.cells[point / n]), "xyz"[i % 3], offset, limit);
     }
     return {};
@@ -197,7 +197,7 @@ void sort_cells(VoxelGrid& grid)
     const size_t width = grid.points.size() / v;
     SR_ASSERT(grid.labels.size() == v && grid.points.size() == v * width && grid.colors.size() == grid.points.size() &&
                   (grid.generated.empty() || grid.generated.size() == v),
-              "arrays of a grid of {} cells disagree", v);
+              "arrays of a grid of {} voxels disagree", v);
     std::vector<size_t> order(v);
     std::iota(order.begin(), order.end(), size_t(0));
     std::ranges::stable_sort(order, {}, [&](size_t i) { return grid.cells[i]; });

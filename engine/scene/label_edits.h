@@ -9,10 +9,10 @@
 
 namespace semrover {
 
-// labels of cells; none: the cell is not there
+// labels of voxels; none: the voxel is not there
 using LabelEdits = std::map<Cell, std::optional<uint8_t>>;
 
-// A grid with its labels edited, sorted. Cells whose label changes, and new ones, have no points.
+// A grid with its labels edited, sorted. Voxels whose label changes, and new ones, have no points.
 VoxelGrid with_edits(const VoxelGrid& grid, const LabelEdits& edits);
 
 } // namespace semrover

@@ -11,12 +11,12 @@ struct ScenePoints {
     std::vector<std::array<float, 3>> positions; // metres
     std::vector<std::array<float, 3>> colors;    // sRGB, 0..1
     std::vector<uint32_t> labels;
-    std::vector<uint32_t> cells; // index of the cell in the grid
+    std::vector<uint32_t> cells; // index of the voxel in the grid
 
     size_t size() const { return positions.size(); }
 };
 
-// points of the cells that have them
+// points of the voxels that have them
 ScenePoints points_of(const VoxelGrid& grid);
 
 // One point of each label and cube of the lattice whose cubes have edges of `edge` metres, at the mean place and with

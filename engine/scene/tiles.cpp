@@ -58,14 +58,14 @@ Result<TileEntry> parse_entry(const Json& item, std::string_view where)
 Result<std::map<TileIndex, TileEntry>> parse_tiles(const Json& list, int32_t edge, std::string_view where)
 {
     if (!list.is_array() || list.empty())
-        return fail(ErrorCode::bad_input, "{}: tiles: expected an array of [X, Y, cells], found {}", where,
+        return fail(ErrorCode::bad_input, "{}: tiles: expected an array of [X, Y, voxels], found {}", where,
                     list.is_array() ? "an empty one" : list.type_name());
     std::map<TileIndex, TileEntry> tiles;
     const double reach = std::ceil(kFarthestCell / edge) + 1;
     for (const Json& item : list) {
         const std::string here = fmt::format("{}: tiles: entry {}", where, tiles.size());
         if (!item.is_array() || (item.size() != 3 && item.size() != 4))
-            return fail(ErrorCode::bad_input, "{}: expected [X, Y, cells] or [X, Y, cells, key]", here);
+            return fail(ErrorCode::bad_input, "{}: expected [X, Y, voxels] or [X, Y, voxels, key]", here);
         SR_TRY(const int64_t x, whole_number(item[0], -reach, reach, here));
         SR_TRY(const int64_t y, whole_number(item[1], -reach, reach, here));
         SR_TRY(const TileEntry entry, parse_entry(item, here));
@@ -99,7 +99,7 @@ Result<int32_t> tile_cells_of(double metres, float voxel_size)
 {
     const double cells = std::round(metres / decimal_voxel_size(voxel_size));
     if (!(cells >= 1 && cells <= kMostTileCells))
-        return fail(ErrorCode::bad_input, "a tile of {} m is {} cells wide, expected 1 to {}", metres, cells,
+        return fail(ErrorCode::bad_input, "a tile of {} m is {} voxels wide, expected 1 to {}", metres, cells,
                     kMostTileCells);
     return int32_t(cells);
 }
@@ -170,17 +170,17 @@ Result<VoxelGrid> TileFolder::read(const TileIndex& tile) const
     const std::string where = quote_path(path);
     SR_TRY(VoxelGrid grid, read_grid(path));
     if (grid.voxel_size != voxel_size_)
-        return fail(ErrorCode::bad_input, "{} has cells of {} m, the index says {} m", where, grid.voxel_size,
+        return fail(ErrorCode::bad_input, "{} has voxels of {} m, the index says {} m", where, grid.voxel_size,
                     voxel_size_);
     if (grid.has_points() != has_points_ || (has_points_ && grid.points_per_voxel != points_per_voxel_))
-        return fail(ErrorCode::bad_input, "{} has {} points a cell, the index says {}", where,
+        return fail(ErrorCode::bad_input, "{} has {} points a voxel, the index says {}", where,
                     grid.has_points() ? grid.points_per_voxel : 0, has_points_ ? points_per_voxel_ : 0);
     if (grid.cells.size() != entry->second.cells)
-        return fail(ErrorCode::bad_input, "{} has {} cells, the index says {}", where, grid.cells.size(),
+        return fail(ErrorCode::bad_input, "{} has {} voxels, the index says {}", where, grid.cells.size(),
                     entry->second.cells);
     for (const Cell& cell : grid.cells)
         if (tile_of(cell, tile_cells_) != tile)
-            return fail(ErrorCode::bad_input, "{} holds cell ({}, {}, {}), which belongs to tile ({}, {})", where,
+            return fail(ErrorCode::bad_input, "{} holds voxel ({}, {}, {}), which belongs to tile ({}, {})", where,
                         cell[0], cell[1], cell[2], tile_of(cell, tile_cells_)[0], tile_of(cell, tile_cells_)[1]);
     return grid;
 }
@@ -261,7 +261,7 @@ std::map<TileIndex, VoxelGrid> cut_tiles(const VoxelGrid& grid, int32_t edge)
 
 Status write_tiles(const Path& folder, const VoxelGrid& grid, int32_t edge)
 {
-    SR_ASSERT(edge >= 1 && edge <= kMostTileCells, "tiles of {} cells", edge);
+    SR_ASSERT(edge >= 1 && edge <= kMostTileCells, "tiles of {} voxels", edge);
     SR_CHECK(make_folder(folder));
     std::map<TileIndex, TileEntry> entries;
     for (const auto& [index, tile] : cut_tiles(grid, edge)) {

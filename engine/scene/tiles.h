@@ -10,10 +10,10 @@ namespace semrover {
 
 // A scene that is larger than memory: a folder with index.json and one .sgrid a tile. Tile (X, Y) is tile_X_Y.sgrid or,
 // where its entry has a key, tile_X_Y.KEY.sgrid: so tiles of several worlds lie in one folder, and the index names
-// those of one. A tile holds the cells with floor(i / edge) = X and floor(j / edge) = Y, all k, at their places in the
+// those of one. A tile holds the voxels with floor(i / edge) = X and floor(j / edge) = Y, all k, at their places in the
 // whole scene. Every tile has the index's voxel size; either all have points or none.
 //   {"format": "semrover.tiles", "version": 1, "voxel_size": 0.6, "tile_cells": 64, "points_per_voxel": 20,
-//    "has_points": true, "metadata": {...}, "tiles": [[X, Y, cells], [X, Y, cells, "0123456789abcdef"], ...]}
+//    "has_points": true, "metadata": {...}, "tiles": [[X, Y, voxels], [X, Y, voxels, "0123456789abcdef"], ...]}
 using TileIndex = std::array<int32_t, 2>;
 
 // what an index says of a tile
@@ -23,13 +23,13 @@ struct TileEntry {
     bool operator==(const TileEntry&) const = default;
 };
 
-// the edge of a tile in cells for one in metres, rounded; bad_input for less than a cell or more than 65536
+// the edge of a tile in voxels for one in metres, rounded; bad_input for less than a voxel or more than 65536
 Result<int32_t> tile_cells_of(double metres, float voxel_size);
 
 TileIndex tile_of(const Cell& cell, int32_t edge);
 std::string tile_name(const TileIndex& tile, std::string_view key = {}); // "tile_-1_3.sgrid"
 
-// cells low <= (i, j) <= high
+// voxels low <= (i, j) <= high
 struct CellWindow {
     std::array<int32_t, 2> low, high;
     bool holds(const Cell& cell) const
@@ -38,10 +38,10 @@ struct CellWindow {
     }
 };
 
-// the cells of a tile and those up to `halo` cells from it, along i and j
+// the voxels of a tile and those up to `halo` voxels from it, along i and j
 CellWindow tile_window(const TileIndex& tile, int32_t tile_cells, int32_t halo = 0);
 
-// adds the cells of `from`, which is sorted, that a window holds, with their labels only
+// adds the voxels of `from`, which is sorted, that a window holds, with their labels only
 void append_labels(VoxelGrid& to, const VoxelGrid& from, const CellWindow& window);
 
 // the tiles of a map by index that a window touches, in order

@@ -8,8 +8,8 @@ namespace semrover {
 
 namespace {
 
-constexpr int kPerSide = 5;      // surfels along an edge of a face
-constexpr float kOverlap = 0.7f; // sigma over spacing: alpha stays above 0.98 between four surfels
+constexpr int kPerSide = 5;      // splats along an edge of a face
+constexpr float kOverlap = 0.7f; // sigma over spacing: alpha stays above 0.98 between four splats
 
 // faces of different directions get different shades, so that blocks stay apart
 float shade(int axis, int side)
@@ -17,7 +17,7 @@ float shade(int axis, int side)
     return axis == 2 ? (side > 0 ? 1.f : 0.6f) : axis == 0 ? 0.8f : 0.9f;
 }
 
-void add_face(Surfels& out, const VoxelGrid& grid, size_t cell, int axis, int side)
+void add_face(Splats& out, const VoxelGrid& grid, size_t cell, int axis, int side)
 {
     const std::array<float, 3> center = cell_center(grid.cells[cell], grid.voxel_size),
                                color = label_color(grid.labels[cell]);
@@ -27,7 +27,7 @@ void add_face(Surfels& out, const VoxelGrid& grid, size_t cell, int axis, int si
             std::array<float, 3> p = center, n{};
             n[size_t(axis)] = float(side);
             p[size_t(axis)] +=
-                float(side) * grid.voxel_size * 0.499f; // inside the cell: faces of neighbours do not tie
+                float(side) * grid.voxel_size * 0.499f; // inside the voxel: faces of neighbours do not tie
             p[size_t(axis + 1) % 3] += (float(u) - (kPerSide - 1) / 2.f) * spacing;
             p[size_t(axis + 2) % 3] += (float(v) - (kPerSide - 1) / 2.f) * spacing;
             out.position.push_back(p);
@@ -43,9 +43,9 @@ void add_face(Surfels& out, const VoxelGrid& grid, size_t cell, int axis, int si
 
 } // namespace
 
-Surfels block_surfels(const VoxelGrid& grid)
+Splats block_splats(const VoxelGrid& grid)
 {
-    Surfels out;
+    Splats out;
     for (size_t cell = 0; cell < grid.cells.size(); ++cell)
         for (int axis = 0; axis < 3; ++axis)
             for (int side : {-1, 1}) {

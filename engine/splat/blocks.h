@@ -7,8 +7,8 @@
 
 namespace semrover {
 
-// A semantic grid drawn as blocks: 5 x 5 surfels on every face of a cell that borders an empty cell, in label colours,
+// A semantic grid drawn as blocks: 5 x 5 splats on every face of a voxel that borders an empty voxel, in label colours,
 // large enough to leave no hole.
-Surfels block_surfels(const VoxelGrid& grid);
+Splats block_splats(const VoxelGrid& grid);
 
 } // namespace semrover

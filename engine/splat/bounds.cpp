@@ -17,7 +17,7 @@ Bounds bounds_of(const VoxelGrid& grid)
     return b;
 }
 
-Bounds bounds_of(const Surfels& splats)
+Bounds bounds_of(const Splats& splats)
 {
     SR_ASSERT(!splats.position.empty(), "no splats");
     Bounds b;

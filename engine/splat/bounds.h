@@ -11,10 +11,10 @@ struct Bounds {
     std::array<double, 3> low, high; // metres
 };
 
-// the box around all cells of a grid
+// the box around all voxels of a grid
 Bounds bounds_of(const VoxelGrid& grid);
 
 // the box around the centres of splats, at least one
-Bounds bounds_of(const Surfels& splats);
+Bounds bounds_of(const Splats& splats);
 
 } // namespace semrover

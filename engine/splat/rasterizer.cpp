@@ -116,7 +116,7 @@ SplatCamera splat_camera(const Intrinsics& i, const Pose& pose)
     return c;
 }
 
-Result<std::unique_ptr<Rasterizer>> Rasterizer::create(Device& device, const SurfelScene& scene, uint32_t width,
+Result<std::unique_ptr<Rasterizer>> Rasterizer::create(Device& device, const SplatScene& scene, uint32_t width,
                                                        uint32_t height, uint32_t max_cameras,
                                                        const RasterizerOptions& options)
 {
@@ -139,7 +139,7 @@ Result<std::unique_ptr<Rasterizer>> Rasterizer::create(Device& device, const Sur
     r->cameras_ = uint32_t(std::min<uint64_t>(max_cameras, limit / per_camera));
     r->max_visible_ =
         uint32_t(std::min<uint64_t>(std::max(rows, 1024u), limit / splat_record_bytes(lens_of(options.model))));
-    // A street of a million surfels has 1.5 pairs a surfel at 616 x 424 and 2.8 at 1920 x 1080. More room makes the
+    // A street of a million splats has 1.5 pairs a splat at 616 x 424 and 2.8 at 1920 x 1080. More room makes the
     // blending seem longer than a submit may last, and then it is cut.
     const uint64_t pairs = options.max_pairs ? options.max_pairs : std::max<uint64_t>(4ull * rows, 65536);
     r->max_pairs_ = uint32_t(std::min(pairs, limit / kPairBytes));

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "engine/camera/camera.h"
-#include "engine/splat/surfels.h"
+#include "engine/splat/splat_scene.h"
 #include "runtime/device/program.h"
 
 #include <array>
@@ -51,7 +51,7 @@ struct RasterizerOptions {
     float screen_variance = 0.5f;             // pixels^2; 0: no screen filter
     float cutoff = 0;                         // sigmas; 0: as far as alpha_min
     uint32_t tile = 16;                       // pixels, a multiple of 16
-    uint32_t max_pairs = 0;                   // to begin with; 0: from the number of surfels
+    uint32_t max_pairs = 0;                   // to begin with; 0: from the number of splats
     std::optional<uint32_t> rows = {};        // the scene's first ones at least; none: all of it
     CameraModel model = CameraModel::pinhole; // of all cameras
     // keeps pixels as files have them, over this background, in place of images: draw() and pixels(), not render()
@@ -74,7 +74,7 @@ struct SplatPixelSlots {
 class Rasterizer {
   public:
     // errors: usage for sizes that are not 1..65535; out_of_memory
-    static Result<std::unique_ptr<Rasterizer>> create(Device& device, const SurfelScene& scene, uint32_t width,
+    static Result<std::unique_ptr<Rasterizer>> create(Device& device, const SplatScene& scene, uint32_t width,
                                                       uint32_t height, uint32_t max_cameras,
                                                       const RasterizerOptions& options = {});
 
@@ -113,7 +113,7 @@ class Rasterizer {
     uint32_t rebuilds() const { return rebuilds_; } // how often there was not enough room
 
   private:
-    Rasterizer(Device& device, const SurfelScene& scene) : device_(device), scene_(scene) {}
+    Rasterizer(Device& device, const SplatScene& scene) : device_(device), scene_(scene) {}
     Status build();
     Status make_room(uint32_t visible, uint32_t pairs);
     Result<uint32_t> draw_some(std::span<const SplatCamera> cameras);
@@ -121,7 +121,7 @@ class Rasterizer {
     Status read_images(std::span<SplatImage> images);
 
     Device& device_;
-    const SurfelScene& scene_;
+    const SplatScene& scene_;
     RasterizerOptions options_;
     uint32_t width_ = 0, height_ = 0, cameras_ = 0, rows_ = 0;
     uint32_t max_visible_ = 0, max_pairs_ = 0, rebuilds_ = 0;

@@ -10,7 +10,7 @@ namespace semrover {
 
 namespace {
 
-constexpr uint32_t kBlock = SurfelScene::kBlock;
+constexpr uint32_t kBlock = SplatScene::kBlock;
 
 uint32_t blocks_of(uint32_t count)
 {
@@ -21,12 +21,12 @@ uint32_t blocks_of(uint32_t count)
 
 Result<std::unique_ptr<SplatPool>> SplatPool::create(Device& device, uint64_t bytes)
 {
-    const uint64_t rows = bytes / kSurfelBytes;
+    const uint64_t rows = bytes / kSplatBytes;
     const uint64_t most = std::min(device.limits().max_storage_range, device.limits().max_allocation) / 16;
     if (rows < 1 || rows > most)
         return fail(ErrorCode::usage, "splats of {} bytes: expected {} to {}, as much as this device can bind", bytes,
-                    kSurfelBytes, most * kSurfelBytes);
-    SR_TRY(SurfelScene scene, SurfelScene::reserve(device, blocks_of(uint32_t(rows)), true));
+                    kSplatBytes, most * kSplatBytes);
+    SR_TRY(SplatScene scene, SplatScene::reserve(device, blocks_of(uint32_t(rows)), true));
     std::unique_ptr<SplatPool> pool(new SplatPool(device, std::move(scene)));
     SR_TRY(pool->commands_, CommandRing::create(device));
     return pool;
@@ -45,7 +45,7 @@ std::optional<uint32_t> SplatPool::gap(uint32_t rows, const std::map<uint32_t, u
 }
 
 Result<SplatPool::Room> SplatPool::add(const TileIndex& tile, const ScenePoints& points, size_t own,
-                                       const SurfelOptions& options)
+                                       const PointSplatOptions& options)
 {
     SR_CHECK(take_back());
     const auto count = uint32_t(std::min<size_t>(own, scene_.size() + 1ull)); // more never fit
@@ -63,7 +63,7 @@ Result<SplatPool::Room> SplatPool::add(const TileIndex& tile, const ScenePoints&
     }
     remove(tile);
     places_[tile] = {*first, count};
-    surfels_ += count;
+    splats_ += count;
     return Room::found;
 }
 
@@ -101,12 +101,12 @@ Status SplatPool::take_back()
     return {};
 }
 
-Status SplatPool::fill(uint32_t first, const ScenePoints& points, uint32_t own, const SurfelOptions& options)
+Status SplatPool::fill(uint32_t first, const ScenePoints& points, uint32_t own, const PointSplatOptions& options)
 {
     SR_CHECK(rooms_.prepare(points.size(), options)); // which records commands of its own
     SR_TRY(const VkCommandBuffer commands, commands_->begin());
-    SR_TRY(const SurfelScene* surfels, rooms_.record(commands, points, own, options));
-    scene_.record_put(commands, first, *surfels, blocks_of(own));
+    SR_TRY(const SplatScene* splats, rooms_.record(commands, points, own, options));
+    scene_.record_put(commands, first, *splats, blocks_of(own));
     SR_TRY(made_, commands_->submit());
     return {};
 }
@@ -118,7 +118,7 @@ void SplatPool::remove(const TileIndex& tile)
         return;
     if (place->second.count)
         leave(place->second);
-    surfels_ -= place->second.count;
+    splats_ -= place->second.count;
     places_.erase(place);
 }
 

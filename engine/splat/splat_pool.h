@@ -3,45 +3,45 @@
 #pragma once
 
 #include "engine/scene/tiles.h"
-#include "engine/splat/surfel_rooms.h"
+#include "engine/splat/splat_rooms.h"
 #include "runtime/device/command_ring.h"
 
 #include <mutex>
 
 namespace semrover {
 
-// The surfels of a world's tiles in one scene of fixed size: tiles come and go, and the others stay where they are.
+// The splats of a world's tiles in one scene of fixed size: tiles come and go, and the others stay where they are.
 //
-// To make surfels and to show them are two acts, of two threads: one adds and removes tiles, in rows that no draw looks
+// To make splats and to show them are two acts, of two threads: one adds and removes tiles, in rows that no draw looks
 // at; the other records what shows those that were published, and hides those that left. Rows are used again when
 // nothing on the device can look at them any more.
 class SplatPool {
   public:
-    static constexpr uint32_t kSurfelBytes = 56; // in five arrays
+    static constexpr uint32_t kSplatBytes = 56; // in five arrays
 
-    // bytes: of device memory, for bytes / kSurfelBytes surfels, rounded up to a block. Errors: usage where not one
+    // bytes: of device memory, for bytes / kSplatBytes splats, rounded up to a block. Errors: usage where not one
     // fits, or an array is larger than the device can bind; out_of_memory
     static Result<std::unique_ptr<SplatPool>> create(Device& device, uint64_t bytes);
 
-    const SurfelScene& scene() const { return scene_; }
+    const SplatScene& scene() const { return scene_; }
 
     // ---- by the thread that makes tiles
 
     // makes what add() of as many points needs, so that it does not. Errors: as add()'s
-    Status prepare(size_t points, const SurfelOptions& options) { return rooms_.prepare(points, options); }
+    Status prepare(size_t points, const PointSplatOptions& options) { return rooms_.prepare(points, options); }
 
     enum class Room : uint8_t {
         found,
         later, // when rows that left are not looked at any more
         none
     };
-    // Makes surfels of a tile's points where there is room, and does not wait for it. The tile's own of before are
+    // Makes splats of a tile's points where there is room, and does not wait for it. The tile's own of before are
     // there until the new ones are shown, but where there is not room for both. Points from number `own` on are those
-    // of other tiles, and only neighbours of the first. Errors: as SurfelScene::create() has them
-    Result<Room> add(const TileIndex& tile, const ScenePoints& points, size_t own, const SurfelOptions& options);
+    // of other tiles, and only neighbours of the first. Errors: as SplatScene::create() has them
+    Result<Room> add(const TileIndex& tile, const ScenePoints& points, size_t own, const PointSplatOptions& options);
     void remove(const TileIndex& tile); // one that is not there is fine
     bool has(const TileIndex& tile) const { return places_.contains(tile); }
-    size_t surfels() const { return surfels_; }
+    size_t splats() const { return splats_; }
     // What was added and removed since the last call is shown together; waits until it is made
     Status publish();
 
@@ -72,23 +72,23 @@ class SplatPool {
         TimelinePoint done; // when no draw looks at them
     };
 
-    SplatPool(Device& device, SurfelScene scene) : device_(device), scene_(std::move(scene)), rooms_(device) {}
+    SplatPool(Device& device, SplatScene scene) : device_(device), scene_(std::move(scene)), rooms_(device) {}
     std::optional<uint32_t> gap(uint32_t rows, const std::map<uint32_t, uint32_t>& used) const;
     Room room_later(uint32_t rows, const TileIndex& tile);
     Status take_back();
     void leave(const Place& place);
-    Status fill(uint32_t first, const ScenePoints& points, uint32_t own, const SurfelOptions& options);
+    Status fill(uint32_t first, const ScenePoints& points, uint32_t own, const PointSplatOptions& options);
 
     Device& device_;
-    SurfelScene scene_;
+    SplatScene scene_;
     // of the thread that makes tiles
-    SurfelRooms rooms_;
+    SplatRooms rooms_;
     std::unique_ptr<CommandRing> commands_;
     std::map<TileIndex, Place> places_;
     std::map<uint32_t, uint32_t> used_; // rows: first, end; of places, and of what leaves
     Changes staged_;
     uint64_t made_ = 0; // ticket of the last fill
-    size_t surfels_ = 0;
+    size_t splats_ = 0;
     // of both
     std::mutex mutex_;
     Changes published_;

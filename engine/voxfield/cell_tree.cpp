@@ -9,7 +9,7 @@ namespace semrover {
 
 namespace {
 
-constexpr uint32_t kLeafSize = 32; // 1 M street cells: 8 takes 1.25 s, 16 0.93 s, 32 0.85 s
+constexpr uint32_t kLeafSize = 32; // 1 M street voxels: 8 takes 1.25 s, 16 0.93 s, 32 0.85 s
 constexpr int kMaxDepth = 64;      // median splits: depth is log2(n / kLeafSize) + 1
 
 // nodes still to visit, with a bound below which they hold nothing
@@ -43,9 +43,10 @@ Result<CellTree> CellTree::build(std::span<const std::array<int32_t, 3>> cells)
 Status CellTree::measure(std::span<const std::array<int32_t, 3>> cells)
 {
     if (cells.empty())
-        return fail(ErrorCode::bad_input, "the cloud has no cells");
+        return fail(ErrorCode::bad_input, "the cloud has no voxels");
     if (cells.size() > UINT32_MAX)
-        return fail(ErrorCode::bad_input, "the cloud has {} cells, at most {} are supported", cells.size(), UINT32_MAX);
+        return fail(ErrorCode::bad_input, "the cloud has {} voxels, at most {} are supported", cells.size(),
+                    UINT32_MAX);
     std::array<int64_t, 3> high;
     for (int axis = 0; axis < 3; ++axis) {
         origin_[axis] = high[axis] = cells[0][axis];
@@ -62,12 +63,12 @@ Status CellTree::measure(std::span<const std::array<int32_t, 3>> cells)
         diagonal += double(high[axis] - origin_[axis]) * double(high[axis] - origin_[axis]);
     if (diagonal >= limit)
         return fail(ErrorCode::bad_input,
-                    "{} cells span {} x {} x {} cells, too wide for exact distances: split the scene", cells.size(),
+                    "{} voxels span {} x {} x {} voxels, too wide for exact distances: split the scene", cells.size(),
                     high[0] - origin_[0] + 1, high[1] - origin_[1] + 1, high[2] - origin_[2] + 1);
     std::vector<std::array<int32_t, 3>> sorted(cells.begin(), cells.end());
     std::sort(sorted.begin(), sorted.end());
     if (auto twin = std::adjacent_find(sorted.begin(), sorted.end()); twin != sorted.end())
-        return fail(ErrorCode::bad_input, "cell ({}, {}, {}) appears twice", (*twin)[0], (*twin)[1], (*twin)[2]);
+        return fail(ErrorCode::bad_input, "voxel ({}, {}, {}) appears twice", (*twin)[0], (*twin)[1], (*twin)[2]);
     return {};
 }
 
@@ -219,7 +220,7 @@ uint64_t CellTree::nearest_free(uint32_t leaf) const
     return best;
 }
 
-// lowers best to the smallest key from the source slots, all inside box, to the free cells of a leaf
+// lowers best to the smallest key from the source slots, all inside box, to the free voxels of a leaf
 void CellTree::scan_free(const Node& node, const Box& box, std::span<const uint32_t> sources, uint64_t& best) const
 {
     for (uint32_t i = node.begin; i < node.end; ++i) {

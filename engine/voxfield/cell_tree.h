@@ -12,7 +12,7 @@
 namespace semrover {
 
 // k-d tree over integer cells, with exact order: nearer first, then lower cell index. Each cell is free, set aside or
-// covered; the tree counts free cells per node so that searches for them skip the rest.
+// covered; the tree counts free voxels per node so that searches for them skip the rest.
 //
 // A (squared distance, cell index) pair is packed into one 64-bit key, distance << index_bits | index, so that
 // comparing keys is comparing pairs.
@@ -21,8 +21,8 @@ class CellTree {
     enum class State : uint8_t { free, set_aside, covered };
     static constexpr uint64_t kNoKey = UINT64_MAX;
 
-    // bad input: no cells, two equal cells, or more cells over a wider extent than one key can hold
-    // (1 M cells may span 2^20 cells along every axis)
+    // bad input: no voxels, two equal voxels, or more voxels over a wider extent than one key can hold
+    // (1 M voxels may span 2^20 voxels along every axis)
     static Result<CellTree> build(std::span<const std::array<int32_t, 3>> cells);
 
     uint32_t size() const { return uint32_t(points_.size()); }
@@ -34,11 +34,11 @@ class CellTree {
     void set_state(uint32_t cell, State state);
     uint32_t free_count() const { return nodes_[0].free; }
 
-    // keys of the min(count, size()) cells nearest to `cell`, itself included, in no particular order
+    // keys of the min(count, size()) voxels nearest to `cell`, itself included, in no particular order
     void nearest(uint32_t cell, uint32_t count, std::vector<uint64_t>& keys) const;
 
-    // smallest key (squared distance from the nearest covered cell of `leaf`, free cell) over all free cells;
-    // kNoKey if there is no free cell, or the leaf has no covered one
+    // smallest key (squared distance from the nearest covered voxel of `leaf`, free voxel) over all free voxels;
+    // kNoKey if there is no free voxel, or the leaf has no covered one
     uint64_t nearest_free(uint32_t leaf) const;
 
   private:

@@ -15,7 +15,7 @@ constexpr uint32_t kNobody = UINT32_MAX;
 RegionGraph::RegionGraph(const Regions& regions, size_t cell_count, std::span<const uint8_t> generated)
     : owner_(cell_count, kNobody), states_(regions.size(), State::dropped)
 {
-    SR_ASSERT(generated.empty() || generated.size() == cell_count, "{} flags for {} cells", generated.size(),
+    SR_ASSERT(generated.empty() || generated.size() == cell_count, "{} flags for {} voxels", generated.size(),
               cell_count);
     find_owners(regions, generated);
     link(regions);
@@ -35,7 +35,7 @@ void RegionGraph::find_owners(const Regions& regions, std::span<const uint8_t> g
 {
     for (uint32_t region = 0; region < regions.size(); ++region) {
         for (uint32_t cell : regions.region(region)) {
-            SR_ASSERT(cell < owner_.size(), "region {} holds cell {} of {}", region, cell, owner_.size());
+            SR_ASSERT(cell < owner_.size(), "region {} holds voxel {} of {}", region, cell, owner_.size());
             if (owner_[cell] != kNobody || (!generated.empty() && generated[cell] != 0))
                 continue;
             owner_[cell] = region;

@@ -11,19 +11,19 @@
 
 namespace semrover {
 
-// Which regions may run now. A cell is the target of the first region that holds it; every later region that holds it
+// Which regions may run now. A voxel is the target of the first region that holds it; every later region that holds it
 // knows it. A region waits for the regions whose targets it knows. Regions without targets are dropped.
-// note: two regions that share only cells known to both do not wait for each other: known cells are read, never
+// note: two regions that share only voxels known to both do not wait for each other: known voxels are read, never
 // written, so either order gives the same bytes and more regions fit one batch. Any order in which regions become
-// ready gives each the same known cells as the order of Algorithm 1.
+// ready gives each the same known voxels as the order of Algorithm 1.
 //
 //     RegionGraph graph(regions, cells.size(), generated);
 //     while (!graph.finished())
 //         for (uint32_t region : graph.take(batch)) { ...; graph.done(region); }
 class RegionGraph {
   public:
-    // generated [cell_count] or empty: cells with a value other than 0 are known from the start and no region's target.
-    // Asserts that members are below cell_count and that `generated` has the right length.
+    // generated [cell_count] or empty: voxels with a value other than 0 are known from the start and no region's
+    // target. Asserts that members are below cell_count and that `generated` has the right length.
     RegionGraph(const Regions& regions, size_t cell_count, std::span<const uint8_t> generated = {});
 
     // Returns up to `limit` ready regions, lowest first, each only once. Empty with limit > 0 only while regions that
@@ -38,7 +38,7 @@ class RegionGraph {
     size_t done_count() const { return done_count_; }
     bool finished() const { return done_count_ == run_count_; }
 
-    // cells the region generates, nearest to its seed first; empty for a dropped region
+    // voxels the region generates, nearest to its seed first; empty for a dropped region
     std::span<const uint32_t> targets(uint32_t region) const { return targets_.row(region); }
     bool is_target(uint32_t region, uint32_t cell) const { return owner_[cell] == region; }
     // regions that must be done before this one, ascending
@@ -61,7 +61,7 @@ class RegionGraph {
     void link(const Regions& regions);
     void invert_waits();
 
-    std::vector<uint32_t> owner_; // [cells] region that generates the cell, or kNobody
+    std::vector<uint32_t> owner_; // [voxels] region that generates the voxel, or kNobody
     Rows targets_;
     Rows waits_;
     Rows dependents_;                  // waits_, seen from the other side

@@ -15,10 +15,10 @@ using CellState = CellTree::State;
 
 constexpr int kMaxRegionSize = 4096; // the paper's sets hold 50 to 150; attention over a set is quadratic
 
-// The next seed is the smallest (distance to a covered cell, index) over the free cells. Each leaf of the tree keeps in
-// a queue the smallest such key seen from its own covered cells. Between two coverings free cells only disappear, so a
-// leaf's true key only grows and the queued one stays a lower bound: it is computed again only when it reaches the
-// front and the cell it names is gone. A leaf that gains a covered cell is queued again with key 0.
+// The next seed is the smallest (distance to a covered voxel, index) over the free voxels. Each leaf of the tree keeps
+// in a queue the smallest such key seen from its own covered voxels. Between two coverings free voxels only disappear,
+// so a leaf's true key only grows and the queued one stays a lower bound: it is computed again only when it reaches the
+// front and the voxel it names is gone. A leaf that gains a covered voxel is queued again with key 0.
 class Frontier {
   public:
     explicit Frontier(const CellTree& tree) : tree_(tree), keys_(tree.leaf_count(), CellTree::kNoKey) {}
@@ -29,7 +29,7 @@ class Frontier {
             push(0, leaf);
     }
 
-    // the free cell nearest to the covered ones; there must be a free and a covered cell
+    // the free voxel nearest to the covered ones; there must be a free and a covered voxel
     uint32_t seed()
     {
         while (true) {
@@ -195,7 +195,7 @@ std::string_view region_strategy_name(RegionStrategy strategy)
     return std::array<std::string_view, 3>{"paper", "complete", "rim"}[size_t(strategy)];
 }
 
-// more than the region, so that a seed at the edge of what is covered finds as many uncovered cells as it may have
+// more than the region, so that a seed at the edge of what is covered finds as many uncovered voxels as it may have
 int cells_considered(const RegionOptions& o)
 {
     return o.strategy == RegionStrategy::rim ? o.region_size * 5 / 2 : o.region_size;
@@ -221,13 +221,13 @@ Result<Regions> extract_regions(std::span<const std::array<int32_t, 3>> cells, c
         return fail(ErrorCode::bad_input, "coverage_threshold is {}, expected 1 to region_size, {}",
                     options.coverage_threshold, options.region_size);
     if (cells.size() > UINT32_MAX / uint32_t(options.region_size))
-        return fail(ErrorCode::bad_input, "{} cells in regions of {} need more than 32-bit offsets: split the scene",
+        return fail(ErrorCode::bad_input, "{} voxels in regions of {} need more than 32-bit offsets: split the scene",
                     cells.size(), options.region_size);
     SR_TRY(CellTree tree, CellTree::build(cells));
     if (options.first_cell < 0 || options.first_cell >= int64_t(cells.size()))
-        return fail(ErrorCode::bad_input, "first_cell is {}, but the grid has {} cells", options.first_cell,
+        return fail(ErrorCode::bad_input, "first_cell is {}, but the grid has {} voxels", options.first_cell,
                     cells.size());
-    SR_ASSERT((!options.from_known && known.empty()) || known.size() == cells.size(), "{} flags for {} cells",
+    SR_ASSERT((!options.from_known && known.empty()) || known.size() == cells.size(), "{} flags for {} voxels",
               known.size(), cells.size());
     Cover cover(tree, cells, options);
     if (options.from_known || options.strategy == RegionStrategy::rim)

@@ -11,9 +11,9 @@ namespace semrover {
 
 namespace {
 
-constexpr int64_t kFirstReach = 8, kLastReach = 64; // cells
+constexpr int64_t kFirstReach = 8, kLastReach = 64; // voxels
 
-// every target has `count` of the cells within `reach`
+// every target has `count` of the voxels within `reach`
 Result<bool> reach_is_enough(const std::vector<Cell>& cells, std::span<const uint32_t> targets, uint32_t count,
                              int64_t reach)
 {
@@ -36,7 +36,7 @@ Result<bool> reach_is_enough(const std::vector<Cell>& cells, std::span<const uin
     return true;
 }
 
-// cells that are targets or known, of the whole
+// voxels that are targets or known, of the whole
 struct Candidates {
     std::vector<Cell> cells;
     std::vector<uint32_t> indices, targets; // targets: positions among the candidates

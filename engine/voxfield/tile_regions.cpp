@@ -40,7 +40,7 @@ class TileCover {
   private:
     bool is_known(uint32_t cell) const { return !known_.empty() && known_[cell]; }
 
-    // cells that the tile's regions may have: its own, and the known ones within the halo
+    // voxels that the tile's regions may have: its own, and the known ones within the halo
     std::vector<uint32_t> considered(const TileIndex& tile, const std::vector<uint32_t>& own) const
     {
         std::vector<uint32_t> all = own;
@@ -77,7 +77,7 @@ class TileCover {
             for (const uint32_t member : found.region(r))
                 regions_.members.push_back(all[member]);
             if (regions_.members.size() > UINT32_MAX)
-                return fail(ErrorCode::bad_input, "regions of {} cells need more than 32-bit offsets: split the scene",
+                return fail(ErrorCode::bad_input, "regions of {} voxels need more than 32-bit offsets: split the scene",
                             cells_.size());
             regions_.offsets.push_back(uint32_t(regions_.members.size()));
             regions_.seeds.push_back(all[found.seeds[r]]);
@@ -117,9 +117,9 @@ std::vector<TileIndex> tiles_seen_by(const TileIndex& tile)
 Status check_tile_options(const RegionOptions& options)
 {
     if (options.strategy == RegionStrategy::paper)
-        return fail(ErrorCode::usage, "strategy paper leaves cells empty: the order of tiles takes rim or complete");
+        return fail(ErrorCode::usage, "strategy paper leaves voxels empty: the order of tiles takes rim or complete");
     if (options.tile_cells < std::max(options.halo_cells, 1))
-        return fail(ErrorCode::usage, "a tile of {} cells is narrower than its halo of {} cells", options.tile_cells,
+        return fail(ErrorCode::usage, "a tile of {} voxels is narrower than its halo of {} voxels", options.tile_cells,
                     options.halo_cells);
     return {};
 }
@@ -127,11 +127,11 @@ Status check_tile_options(const RegionOptions& options)
 Result<Regions> extract_tile_regions(std::span<const Cell> cells, const RegionOptions& options,
                                      std::span<const uint8_t> known)
 {
-    SR_ASSERT(known.empty() || known.size() == cells.size(), "{} flags for {} cells", known.size(), cells.size());
-    SR_ASSERT(std::ranges::is_sorted(cells), "cells of tiles are in order");
+    SR_ASSERT(known.empty() || known.size() == cells.size(), "{} flags for {} voxels", known.size(), cells.size());
+    SR_ASSERT(std::ranges::is_sorted(cells), "voxels of tiles are in order");
     SR_CHECK(check_tile_options(options));
     if (cells.empty())
-        return fail(ErrorCode::bad_input, "the cloud has no cells");
+        return fail(ErrorCode::bad_input, "the cloud has no voxels");
     return TileCover(cells, options, known).run();
 }
 

@@ -8,7 +8,7 @@
 namespace semrover {
 
 // The order of tiles (docs/method.md §4.4), in which the points of a place depend on the labels near it and not on the
-// way that generation came. The plane is cut into square tiles, as TileFolder's. A tile sees the finished cells of
+// way that generation came. The plane is cut into square tiles, as TileFolder's. A tile sees the finished voxels of
 // tiles of lower colours.
 
 constexpr int kTileColours = 3;
@@ -26,10 +26,10 @@ std::vector<TileIndex> tiles_that_see(const TileIndex& tile);
 // neighbours of `tile`, too.
 std::vector<TileIndex> tiles_seen_by(const TileIndex& tile);
 
-// Covers each tile with regions of its own (extract_regions), colour after colour: from its lowest cell or, where cells
-// within the halo are known, from those. Those are the cells that `known` says, and those of tiles of lower colours.
-// cells [n]: sorted. options: with tile_cells and halo_cells.
-// Errors: as extract_regions and check_tile_options
+// Covers each tile with regions of its own (extract_regions), colour after colour: from its lowest voxel or, where
+// voxels within the halo are known, from those. Those are the voxels that `known` says, and those of tiles of lower
+// colours. cells [n]: sorted. options: with tile_cells and halo_cells. Errors: as extract_regions and
+// check_tile_options
 Result<Regions> extract_tile_regions(std::span<const Cell> cells, const RegionOptions& options,
                                      std::span<const uint8_t> known = {});
 

@@ -16,7 +16,7 @@ namespace {
 
 using Point = std::array<float, 3>;
 
-// order of a cell's points in its token
+// order of a voxel's points in its token
 std::vector<uint32_t> distance_order(const std::vector<Point>& points)
 {
     std::vector<uint32_t> order(points.size());

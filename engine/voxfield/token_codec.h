@@ -9,7 +9,7 @@
 
 namespace semrover {
 
-// Stored points <-> model tokens (docs/method.md §1.2). A token is the cell's n points by increasing distance to its
+// Stored points <-> model tokens (docs/method.md §1.2). A token is the voxel's n points by increasing distance to its
 // centre (ties by x, y, z, then source order), each x, y, z, r, g, b; offsets / (voxel_size / 2), 2 * rgb - 1, then the
 // model's normalization. All known tokens are made from stored values, so a resumed run sees the same ones.
 
@@ -20,7 +20,7 @@ void sort_by_distance(std::span<uint16_t> points, std::span<uint8_t> colors);
 void encode_token(const TransformerConfig& config, std::span<const uint16_t> points, std::span<const uint8_t> colors,
                   std::span<float> token);
 
-// token [6n] -> points and colours in stored form, clamped to the cell and sorted as above
+// token [6n] -> points and colours in stored form, clamped to the voxel and sorted as above
 void decode_token(const TransformerConfig& config, std::span<const float> token, std::span<uint16_t> points,
                   std::span<uint8_t> colors);
 

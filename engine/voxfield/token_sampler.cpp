@@ -241,7 +241,7 @@ std::vector<float> TokenSampler::conditions(uint32_t rows, std::span<const Regio
     std::vector<float> all(rows * width, 0.f);
     size_t row = 0;
     for (const RegionInput& r : regions) {
-        SR_ASSERT(r.condition.empty() || r.condition.size() == r.cells.size() * width, "{} numbers condition {} cells",
+        SR_ASSERT(r.condition.empty() || r.condition.size() == r.cells.size() * width, "{} numbers condition {} voxels",
                   r.condition.size(), r.cells.size());
         std::ranges::copy(r.condition, all.begin() + ptrdiff_t(row * width));
         row += r.cells.size();

@@ -19,8 +19,8 @@ struct RegionInput {
     std::vector<CellIndex> cells;
     std::vector<uint32_t> labels;
     std::vector<uint32_t> known;  // 1: the token is given in `fixed`
-    std::vector<float> fixed;     // [cells, C]; read where known
-    std::vector<float> condition; // [cells, W]; or nothing
+    std::vector<float> fixed;     // [voxels, C]; read where known
+    std::vector<float> condition; // [voxels, W]; or nothing
 };
 
 struct SamplerOptions {
@@ -39,11 +39,11 @@ class TokenSampler : public Replay {
     static Result<std::unique_ptr<TokenSampler>> create(Device& device, const Transformer& transformer,
                                                         const SamplingPlan& plan, SamplerOptions options);
 
-    // device memory of the sampler for `regions` regions of `cells` cells at most, beside the transformer's own
+    // device memory of the sampler for `regions` regions of `cells` voxels at most, beside the transformer's own
     Result<uint64_t> planned_bytes(uint32_t regions, uint32_t cells) const;
     uint64_t table_bytes() const; // the part of it that is allocated from the start
 
-    // tokens [cells, C] of each region, region after region, known ones as given.
+    // tokens [voxels, C] of each region, region after region, known ones as given.
     // Errors: internal when the network returns NaN or infinity; device errors
     Result<std::vector<float>> run(std::span<const RegionInput> regions);
 

@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/conditioning/usual_objects.h"
 #include "engine/model/transformer_config.h"
 #include "engine/sampling/guidance.h"
 #include "engine/sampling/repaint.h"
-#include "engine/scene/usual_objects.h"
 #include "engine/voxfield/regions.h"
 
 namespace semrover {

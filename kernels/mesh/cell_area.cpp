@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// areas and labels of cells from those of their pairs, one thread per cell, in the order of the pairs
+// areas and labels of voxels from those of their pairs, one thread per voxel, in the order of the pairs
 #include "kernels/mesh.h"
 
 #include "cell_area.spv.h"
@@ -12,8 +12,8 @@ CellAreas cell_area(Graph& g, Tensor areas, Tensor labels, Tensor starts, uint32
 {
     SR_ASSERT(areas.rows == labels.rows && starts.rows == cells + 1, "cell_area: {} areas, {} labels, {} starts",
               areas.rows, labels.rows, starts.rows);
-    const CellAreas y{g.array(areas.rows, DType::f32, "area sums"), g.array(cells, DType::f32, "cell areas"),
-                      g.array(cells, DType::u32, "cell labels"), g.array(cells, DType::f32, "unlabelled areas")};
+    const CellAreas y{g.array(areas.rows, DType::f32, "area sums"), g.array(cells, DType::f32, "voxel areas"),
+                      g.array(cells, DType::u32, "voxel labels"), g.array(cells, DType::f32, "unlabelled areas")};
     g.dispatch(kernel::cell_area, {areas, labels, starts, y.sums, y.areas, y.labels, y.unlabelled},
                CellAreaPush{.cells = cells}, threads(cells));
     return y;

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// area of triangles within cells, and where the texels that say their labels are
+// area of triangles within voxels, and where the texels that say their labels are
 #include "kernels/mesh.h"
 
 #include "clip_area.spv.h"

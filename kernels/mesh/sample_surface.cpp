@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// points drawn uniformly from the surface in cells: the point first, its texels from whichever page holds them, then
+// points drawn uniformly from the surface in voxels: the point first, its texels from whichever page holds them, then
 // the colour
 #include "kernels/mesh.h"
 
@@ -13,7 +13,7 @@
 
 namespace semrover {
 
-constexpr double kOperationsPerSample = 5000; // a triangle is clipped to the cell
+constexpr double kOperationsPerSample = 5000; // a triangle is clipped to the voxel
 constexpr double kMaskedAttempts = 4;         // of which most succeed at once
 
 SurfaceSamples sample_surface(Graph& g, const SurfaceTriangles& s, Tensor triangles, Tensor sums, Tensor starts,

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// the cells that triangles may have area in: counted per triangle, then written where the prefix sum of counts says
+// the voxels that triangles may have area in: counted per triangle, then written where the prefix sum of counts says
 #include "kernels/mesh.h"
 
 #include "kernels/sort.h"
@@ -15,10 +15,10 @@ SurfacePairs triangle_cells(Graph& g, Tensor records, uint32_t capacity)
     SR_ASSERT(records.dtype == DType::u32 && records.ld == 12 && capacity, "triangle_cells: records [{}, {}] {}",
               records.rows, records.ld, dtype_name(records.dtype));
     const TriangleCellsPush push{.size = records.rows, .capacity = capacity};
-    const Tensor counts = g.array(records.rows, DType::u32, "cells of triangles");
+    const Tensor counts = g.array(records.rows, DType::u32, "voxels of triangles");
     g.dispatch(kernel::triangle_cells_count, {records, counts}, push, threads(records.rows));
     const PrefixSum first = prefix_sum(g, counts);
-    SurfacePairs pairs{g.array(capacity, DType::u32, "pair cells"), g.array(capacity, DType::u32, "pair triangles"),
+    SurfacePairs pairs{g.array(capacity, DType::u32, "pair voxels"), g.array(capacity, DType::u32, "pair triangles"),
                        first.total};
     g.dispatch(kernel::triangle_cells_emit, {records, first.sums, pairs.keys, pairs.triangles}, push,
                threads(records.rows));

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// z = normals of Philox4x32-10, key (seed), counter (cell, draw | stream | channel / 4): -> [M, N]
+// z = normals of Philox4x32-10, key (seed), counter (voxel, draw | stream | channel / 4): -> [M, N]
 #include "kernels/sampling.h"
 
 #include "shaders/sampling/step_noise.h"

@@ -4,7 +4,7 @@
 // gaps, sort them by depth (equal depths by camera and splat), make a pair for every tile that a record touches, sort
 // those by tile, blend every pixel front to back:
 //   alpha = min(alpha_max, o exp(-r^2 / 2)), w = alpha T, T' = T (1 - alpha)
-// Cameras with a lens take other records and meet every surfel with the ray of a pixel (docs/method.md §5.4).
+// Cameras with a lens take other records and meet every splat with the ray of a pixel (docs/method.md §5.4).
 #include "kernels/splat.h"
 
 #include "kernels/sort.h"
@@ -25,7 +25,7 @@ namespace semrover {
 
 namespace {
 
-SplatPush make_push(const SplatScene& scene, Tensor cameras, const SplatOptions& o)
+SplatPush make_push(const SplatTensors& scene, Tensor cameras, const SplatOptions& o)
 {
     SplatPush push{};
     push.splats = scene.positions.rows;
@@ -46,7 +46,7 @@ SplatPush make_push(const SplatScene& scene, Tensor cameras, const SplatOptions&
     return push;
 }
 
-void check(const SplatScene& scene, Tensor cameras, const SplatOptions& o)
+void check(const SplatTensors& scene, Tensor cameras, const SplatOptions& o)
 {
     const uint32_t n = scene.positions.rows;
     SR_ASSERT(scene.positions.ld == 4 && scene.normals.ld == 4 && scene.colors.ld == 4 && scene.normals.rows == n &&
@@ -70,7 +70,7 @@ struct Seen {
     Tensor records, sources, depths, count;
 };
 
-Seen project(Graph& g, const SplatScene& scene, Tensor cameras, const SplatOptions& o, const SplatPush& push)
+Seen project(Graph& g, const SplatTensors& scene, Tensor cameras, const SplatOptions& o, const SplatPush& push)
 {
     const bool pinhole = o.lens == SplatLens::pinhole;
     const uint32_t views = push.splats * push.cameras;
@@ -123,7 +123,7 @@ Tiled sort_into_tiles(Graph& g, const Seen& seen, const SplatOptions& o, const S
 
 } // namespace
 
-SplatImages splat(Graph& g, const SplatScene& scene, Tensor cameras, const SplatOptions& options)
+SplatImages splat(Graph& g, const SplatTensors& scene, Tensor cameras, const SplatOptions& options)
 {
     check(scene, cameras, options);
     const SplatPush push = make_push(scene, cameras, options);

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // A triangle clipped to the unit cell [0, 1)^3 (Sutherland and Hodgman, 1974). Half-open: what lies in a plane between
-// two cells belongs to the upper one, so that no area is counted twice or lost. Everything is `precise`: two shaders
+// two voxels belongs to the upper one, so that no area is counted twice or lost. Everything is `precise`: two shaders
 // that clip the same triangle get the same polygon.
 
 const uint kMaxCorners = 11; // 3 and one for each plane; the rest is for corners that rounding puts astride a plane

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 
-// a surfel as a camera with a lens sees it, and the pixels that it can reach (docs/method.md §5.4)
+// a splat as a camera with a lens sees it, and the pixels that it can reach (docs/method.md §5.4)
 #include "lib/lens.glsl"
-#include "lib/splat_surfel.glsl"
+#include "lib/splat_tangents.glsl"
 
 layout(constant_id = 0) const uint kModel = 1;
 layout(push_constant) uniform Push { SplatPush p; };

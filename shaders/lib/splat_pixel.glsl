@@ -13,7 +13,7 @@ layout(binding = 5) readonly buffer Cells { uint cells[]; };      // [splats]
 layout(binding = 6) writeonly buffer Color { vec4 color[]; };     // [cameras, height, width] sum of w rgb; alpha
 layout(binding = 7) writeonly buffer Surface { vec4 surface[]; }; // sum of w normal, camera frame; sum of w depth
 layout(binding = 8) writeonly buffer Depth { vec2 depth[]; };     // expected, median
-layout(binding = 9) writeonly buffer Ids { uvec2 ids[]; };        // label and cell of the largest w
+layout(binding = 9) writeonly buffer Ids { uvec2 ids[]; };        // label and voxel of the largest w
 
 const uint kNone = 0xffffffffu;
 

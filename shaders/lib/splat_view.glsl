@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 
-// a surfel as a camera sees it, and the pixels that it can reach (docs/method.md §5.3)
-#include "lib/splat_surfel.glsl"
+// a splat as a camera sees it, and the pixels that it can reach (docs/method.md §5.3)
+#include "lib/splat_tangents.glsl"
 
 layout(push_constant) uniform Push { SplatPush p; };
 layout(binding = 0) readonly buffer Cameras { vec4 cameras[]; };     // [cameras, 4] fx fy cx cy; world to camera

@@ -5,9 +5,9 @@
 
 const uint kRecord = 12;     // words of a triangle
 const uint kAttributes = 16; // and of its corners' attributes
-const uint kBlockEdge = 8;   // cells
+const uint kBlockEdge = 8;   // voxels
 const uint kBlockCells = 512;
-const uint kPlaceBits = 9; // of a triangle's place within a cell, 8 along each axis
+const uint kPlaceBits = 9; // of a triangle's place within a voxel, 8 along each axis
 const uint kNoTexture = 0xffffffffu;
 const uint kUnlabelled = 20; // one behind the last class
 

@@ -1,13 +1,13 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 
-// The cells whose box the triangle's box and plane touch, within the range of its record. One pass counts them, another
-// writes them: sums are `precise`, so that no compiler contracts them in one of the two alone.
+// The voxels whose box the triangle's box and plane touch, within the range of its record. One pass counts them,
+// another writes them: sums are `precise`, so that no compiler contracts them in one of the two alone.
 struct CellWalk {
     ivec3 low, high; // high is included
     vec3 normal;     // not unit
     float level;     // of the plane along the normal
-    float reach;     // of a cell's half diagonal along the normal, and a little for rounding
+    float reach;     // of a voxel's half diagonal along the normal, and a little for rounding
 };
 
 float plane_dot(vec3 a, vec3 b)

@@ -1,7 +1,7 @@
 #version 460
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// one thread per cell, over its pairs in their order: the area up to and with each pair (compensated, Kahan 1965), all
+// one thread per voxel, over its pairs in their order: the area up to and with each pair (compensated, Kahan 1965), all
 // of it, and the label with the largest share; ties go to the lower one, no label loses to any
 #extension GL_GOOGLE_include_directive : require
 #include "cell_area.h"
@@ -12,11 +12,11 @@ layout(local_size_x = 64) in;
 layout(push_constant) uniform Push { CellAreaPush p; };
 layout(binding = 0) readonly buffer Areas { float areas[]; };         // [pairs]
 layout(binding = 1) readonly buffer Labels { uint labels[]; };        // [pairs]
-layout(binding = 2) readonly buffer Starts { uint starts[]; };        // [cells + 1]
+layout(binding = 2) readonly buffer Starts { uint starts[]; };        // [voxels + 1]
 layout(binding = 3) writeonly buffer Sums { float sums[]; };          // [pairs]
-layout(binding = 4) writeonly buffer Cells { float cell_areas[]; };   // [cells]
-layout(binding = 5) writeonly buffer CellLabels { uint cell_labels[]; }; // [cells]
-layout(binding = 6) writeonly buffer Unlabelled { float unlabelled[]; }; // [cells]
+layout(binding = 4) writeonly buffer Cells { float cell_areas[]; };   // [voxels]
+layout(binding = 5) writeonly buffer CellLabels { uint cell_labels[]; }; // [voxels]
+layout(binding = 6) writeonly buffer Unlabelled { float unlabelled[]; }; // [voxels]
 
 void main()
 {

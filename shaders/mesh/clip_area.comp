@@ -1,7 +1,7 @@
 #version 460
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// area[i] = area of a triangle within a cell, in squares of the cell's edge; label[i] = the triangle's, or where the
+// area[i] = area of a triangle within a voxel, in squares of the voxel's edge; label[i] = the triangle's, or where the
 // texel that says it lies: the nearest to the middle of the clipped polygon
 #extension GL_GOOGLE_include_directive : require
 #include "clip_area.h"

@@ -1,7 +1,7 @@
 #version 460
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// y[i] = the cell's part of x[i]: what lies above a triangle's place in the cell
+// y[i] = the voxel's part of x[i]: what lies above a triangle's place in the voxel
 #extension GL_GOOGLE_include_directive : require
 #include "lib/surface_record.glsl"
 #include "lib/thread.glsl"

@@ -1,16 +1,16 @@
 #version 460
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// points drawn uniformly from the surface in a cell, evenly: sample k of n of a cell is (x + k / n, y + k / phi) modulo 1,
-// a lattice (Kronecker's, with the golden ratio phi) that two random words of the cell shift (Cranley and Patterson
-// 1976). x is the share of the area before the point, across pairs and the fans of their polygons; the root of y how far
-// it lies from the fan's corner. Each point by itself is uniform; together they leave smaller gaps than independent
-// ones. And what a point's colour is made of.
+// points drawn uniformly from the surface in a voxel, evenly: sample k of n of a voxel is (x + k / n, y + k / phi)
+// modulo 1, a lattice (Kronecker's, with the golden ratio phi) that two random words of the voxel shift (Cranley and
+// Patterson 1976). x is the share of the area before the point, across pairs and the fans of their polygons; the root
+// of y how far it lies from the fan's corner. Each point by itself is uniform; together they leave smaller gaps than
+// independent ones. And what a point's colour is made of.
 // kMasked: materials have alpha. Areas are those of what is a surface; a point that falls on none is drawn again within
 // its share of the area.
-// kCanonical: nothing is random. Where a cell's surface faces one axis, sample k lies at place k of a grid of rows over
-// the cell, seen along that axis, on what is outermost there. Elsewhere, and where nothing is, the lattice's shift is a
-// constant.
+// kCanonical: nothing is random. Where a voxel's surface faces one axis, sample k lies at place k of a grid of rows
+// over the voxel, seen along that axis, on what is outermost there. Elsewhere, and where nothing is, the lattice's
+// shift is a constant.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/clip_cell.glsl"
 #include "lib/philox.glsl"
@@ -29,16 +29,16 @@ layout(binding = 3) readonly buffer Textures { uint textures[]; };     // [textu
 layout(binding = 4) readonly buffer Values { uint values[]; };         // [pairs]
 layout(binding = 5) readonly buffer Sums { float sums[]; };            // [pairs]
 layout(binding = 6) readonly buffer Starts { uint starts[]; };         // [keys + 1]
-layout(binding = 7) readonly buffer Cells { ivec4 cells[]; };          // [cells] i, j, k, key
-layout(binding = 8) writeonly buffer Samples { float samples[]; };     // [cells * samples, 8]
-layout(binding = 9) writeonly buffer Addresses { uvec4 addresses[]; }; // [cells * samples] of texels
+layout(binding = 7) readonly buffer Cells { ivec4 cells[]; };          // [voxels] i, j, k, key
+layout(binding = 8) writeonly buffer Samples { float samples[]; };     // [voxels * samples, 8]
+layout(binding = 9) writeonly buffer Addresses { uvec4 addresses[]; }; // [voxels * samples] of texels
 layout(binding = 10) readonly buffer Alphas { uint alphas[]; };         // four bytes each
 
 #include "lib/surface_alpha.glsl"
 
 float unit(uint word) { return float(word >> 8) * (1.0 / 16777216.0); } // [0, 1)
 
-// the first pair of the cell whose sum exceeds a share of the whole, and how far into its area that is, 0..1; pairs
+// the first pair of the voxel whose sum exceeds a share of the whole, and how far into its area that is, 0..1; pairs
 // without area are never that
 uint pick_pair(uint key, float share, out float into)
 {
@@ -59,7 +59,7 @@ uint pick_pair(uint key, float share, out float into)
     return low;
 }
 
-const uint kMostPairs = 4096; // of a cell that is looked at as a whole: one with more is no wall
+const uint kMostPairs = 4096; // of a voxel that is looked at as a whole: one with more is no wall
 const uint kAttempts = 32;    // to find a place with a surface
 const float kFlat = 0.85;     // mean of |normal| along an axis from which on a surface faces it
 
@@ -67,7 +67,7 @@ const float kFlat = 0.85;     // mean of |normal| along an axis from which on a 
     const vec3 a = RECORD_CORNER(triangles, t, 0) - origin, b = RECORD_CORNER(triangles, t, 1) - origin,               \
                c = RECORD_CORNER(triangles, t, 2) - origin
 
-// the axis that most of a cell's surface faces, and to which side; false if it is bent
+// the axis that most of a voxel's surface faces, and to which side; false if it is bent
 bool faced_axis(uint key, vec3 origin, out uint axis, out float side)
 {
     vec3 along = vec3(0), signed_along = vec3(0);
@@ -94,7 +94,7 @@ vec2 place_in_rows(uint k, uint n)
     return vec2((float(row) + 0.5) / float(rows), (float(k - first) + 0.5) / float(next - first));
 }
 
-// the triangle of a cell that is outermost at a place seen along an axis; false if there is none
+// the triangle of a voxel that is outermost at a place seen along an axis; false if there is none
 bool outermost(uint key, vec3 origin, uint axis, float side, vec2 place, out uint found, out vec3 point)
 {
     const uint u = (axis + 1) % 3, v = (axis + 2) % 3;

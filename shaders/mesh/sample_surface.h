@@ -6,7 +6,7 @@
 
 struct SampleSurfacePush {
     uint cells;
-    uint samples; // of a cell
+    uint samples; // of a voxel
     uint seed_low;
     uint seed_high;
 };

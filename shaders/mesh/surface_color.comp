@@ -11,7 +11,7 @@ layout(push_constant) uniform Push { SurfaceColorPush p; };
 layout(binding = 0) readonly buffer Samples { float samples[]; };  // [size, 8]
 layout(binding = 1) readonly buffer Texels { uvec4 texels[]; };    // [size]
 layout(binding = 2) readonly buffer Linear { float linear_of[]; }; // [512] of sRGB bytes; then of bytes and a half
-layout(binding = 3) writeonly buffer Y { uvec4 y[]; };             // [size] bits of the offset from the centre, in cells; rgb
+layout(binding = 3) writeonly buffer Y { uvec4 y[]; };             // [size] bits of the offset from the centre, in voxels; rgb
 
 vec3 linear_texel(uint c)
 {

@@ -1,7 +1,7 @@
 #version 460
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// counts[t] = how many cells triangle t may have area in
+// counts[t] = how many voxels triangle t may have area in
 #extension GL_GOOGLE_include_directive : require
 #include "lib/surface_record.glsl"
 #include "lib/thread.glsl"

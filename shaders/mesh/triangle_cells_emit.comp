@@ -1,8 +1,8 @@
 #version 460
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// the pairs of triangle t, from first[t] on: a cell's key, and below it the triangle's place in the cell, so that sorted
-// pairs of a cell follow a Morton curve through it; the triangle
+// the pairs of triangle t, from first[t] on: a voxel's key, and below it the triangle's place in the voxel, so that
+// sorted pairs of a voxel follow a Morton curve through it; the triangle
 #extension GL_GOOGLE_include_directive : require
 #include "lib/surface_record.glsl"
 #include "lib/thread.glsl"

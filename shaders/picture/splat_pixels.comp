@@ -12,7 +12,7 @@ layout(push_constant) uniform Push { SplatPixelsPush p; };
 layout(binding = 0) readonly buffer Color { vec4 color[]; };     // [pixels] sum of w rgb; alpha
 layout(binding = 1) readonly buffer Surface { vec4 surface[]; }; // [pixels] sum of w normal; of w depth
 layout(binding = 2) readonly buffer Depth { vec2 depth[]; };     // [pixels] expected, median
-layout(binding = 3) readonly buffer Ids { uvec2 ids[]; };        // [pixels] label, cell
+layout(binding = 3) readonly buffer Ids { uvec2 ids[]; };        // [pixels] label, voxel
 layout(binding = 4) writeonly buffer Seen { uint seen[]; };      // [pixels] red, green, blue, visible or not
 layout(binding = 5) writeonly buffer Ranges { uint ranges[]; };  // [pixels] depth, 16 bits; label
 layout(binding = 6) writeonly buffer Normals { uint normals[]; };

@@ -1,7 +1,7 @@
 #version 460
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// z = standard normals of Philox4x32-10, key (seed), counter (cell, draw | stream | channel / 4): the same for a cell
+// z = standard normals of Philox4x32-10, key (seed), counter (voxel, draw | stream | channel / 4): the same for a voxel
 // whatever batch or order it is computed in. Four channels a thread.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/philox.glsl"

@@ -18,7 +18,7 @@ struct BenchRegionsArguments {
     int region_size = 128, coverage_threshold = 32;
 };
 
-// ground that rises and falls, and a facade every 25 cells
+// ground that rises and falls, and a facade every 25 voxels
 std::vector<std::array<int32_t, 3>> street_cloud(uint32_t count)
 {
     const int32_t width = std::max(1, int32_t(std::sqrt(count / 1.5)));
@@ -64,9 +64,9 @@ void add_bench_regions(CLI::App& bench, const Globals& globals, Run& run)
 {
     auto o = std::make_shared<BenchRegionsArguments>();
     CLI::App* c = bench.add_subcommand("regions", "region extraction and the dependency graph (host, one core)");
-    add_number(*c, "--cells", o->cells, "cells of the cloud", 1u, 20000000u);
-    add_number(*c, "--region-size", o->region_size, "cells of a region", 1, 4096);
-    add_number(*c, "--coverage-threshold", o->coverage_threshold, "new cells that a region must have", 1, 4096);
+    add_number(*c, "--cells", o->cells, "voxels of the cloud", 1u, 20000000u);
+    add_number(*c, "--region-size", o->region_size, "voxels of a region", 1, 4096);
+    add_number(*c, "--coverage-threshold", o->coverage_threshold, "new voxels that a region must have", 1, 4096);
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_regions(*o, globals); }; });
 }
 

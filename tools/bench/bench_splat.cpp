@@ -49,9 +49,9 @@ Status bench_sort(const SortOptions& o, const Globals& globals)
 }
 
 // a street: ground, two facades and blobs between them, in front of a camera at the origin that looks along x
-Surfels street_surfels(uint32_t count, float sigma)
+Splats street_splats(uint32_t count, float sigma)
 {
-    Surfels s;
+    Splats s;
     uint32_t state = 777;
     const auto random = [&] {
         state = state * 1664525u + 1013904223u;
@@ -92,7 +92,7 @@ Status bench_splat(const SplatBenchOptions& o, const Globals& globals)
 {
     SR_TRY(const auto device, open_device(globals));
     want_profile(*device, o.profile);
-    SR_TRY(const SurfelScene scene, SurfelScene::create(*device, street_surfels(o.splats, o.sigma)));
+    SR_TRY(const SplatScene scene, SplatScene::create(*device, street_splats(o.splats, o.sigma)));
     const CameraModel model = camera_model_of(o.model).value_or(CameraModel::pinhole);
     SR_TRY(const auto rasterizer, Rasterizer::create(*device, scene, o.width, o.height, 1, {.model = model}));
     const SplatCamera camera =

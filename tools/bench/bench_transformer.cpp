@@ -75,7 +75,7 @@ void add_bench_transformer(CLI::App& bench, const Globals& globals, Run& run)
     auto o = std::make_shared<BenchTransformerArguments>();
     CLI::App* c = bench.add_subcommand("transformer", "one denoising step of the Σ-Voxfield transformer");
     c->add_option("--config", o->config, "config.json; default: the full-size model, 12 layers of 8 heads of 128");
-    add_number(*c, "--cells", o->cells, "cells of a region", 1u, 4096u);
+    add_number(*c, "--cells", o->cells, "voxels of a region", 1u, 4096u);
     add_number(*c, "--batch", o->batch, "regions", 1u, 1024u);
     add_choice(*c, "--precision", {"fp16", "fp32"}, "storage", o->precision);
     add_number(*c, "--steps", o->steps, "of a measured run, which sets up and reads back once", 1u, 1000u);

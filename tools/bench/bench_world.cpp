@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover bench world: a flight down a street without end that grows ahead of the camera, a budget at a time
-#include "engine/job/world.h"
+#include "engine/world/world.h"
 #include "tools/bench/bench.h"
 #include "tools/bench/call_times.h"
 #include "tools/cli/number_option.h"
@@ -65,7 +65,7 @@ Json memory_at(double metres, const World& world, const Device& device)
             {"tile_bytes", f.host_bytes},
             {"tiles_in_memory", f.in_memory},
             {"tiles_generated", f.generated},
-            {"splats", world.splats()->surfels()}};
+            {"splats", world.splats()->splats()}};
 }
 
 // One frame: what is wanted, a step, and how much is there. A host that is done early waits for its screen.

@@ -163,7 +163,7 @@ class Peers:
         """a step of the denoiser for `regions` regions, each with its labels and, for guidance, without"""
         sizes = {"num_layers": 2, "num_attention_heads": 2, "attention_head_dim": 16} if self.tiny else {}
         net = self.built(f"transformer {regions}", lambda: transformer.VoxfieldTransformer(**sizes))
-        side = math.ceil(math.sqrt(cells * 0.6))  # of the ground, a square; the other cells are a wall
+        side = math.ceil(math.sqrt(cells * 0.6))  # of the ground, a square; the other voxels are a wall
         places = [(i % side, min(i // side, side), max(i // side - side, 0)) for i in range(cells)]
         centers = (torch.tensor(places, device=self.device).float() * 0.6).repeat(2 * regions, 1, 1)
         valid = torch.ones(2 * regions, cells, dtype=torch.bool, device=self.device)

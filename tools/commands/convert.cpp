@@ -139,7 +139,7 @@ void add_convert(CLI::App& app, const Globals& globals, Run& run)
     o->command = c;
     add_scene_input_options(*c, o->scene.input);
     add_seed(*c, "--seed", o->scene.input.seed,
-             "which points stay where a cell has more; of objects, which are guessed");
+             "which points stay where a voxel has more; of objects, which are guessed");
     c->add_option("--splat-radius", o->scene.splat_radius,
                   "grid to splats: standard deviation in metres, or auto: from the spacing of the points");
     add_number(*c, "--opacity", o->scene.opacity, "grid to splats: of every splat", 0.01f, 1.f);

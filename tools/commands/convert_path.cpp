@@ -139,7 +139,7 @@ Status write_with_points(const Path& out, const CameraPath& path, const ConvertP
         return fail(ErrorCode::usage, "--points and --images: a {} file has no place for them", name_of(format));
     if (format != PathFormat::colmap && !o.images.empty())
         return fail(ErrorCode::usage, "--images: the pictures of a transforms.json lie beside it");
-    Surfels points;
+    Splats points;
     if (!o.points.empty()) {
         SR_TRY(const VoxelGrid grid, load_grid(o.points, {}, globals));
         points = labelled_points(grid);

@@ -7,7 +7,7 @@
 #include "runtime/base/quote.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/option_meaning.h"
-#include "tools/commands/drive_options.h"
+#include "tools/commands/trajectory_options.h"
 
 namespace semrover {
 
@@ -71,14 +71,14 @@ Status check_output(const ConvertSceneOptions& o, SceneFormat format, const Glob
 }
 
 // normals come from the device; the blocks of a grid without points need none
-Result<Surfels> splats_of(const ConvertSceneOptions& o, const VoxelGrid& grid, const Globals& globals)
+Result<Splats> splats_of(const ConvertSceneOptions& o, const VoxelGrid& grid, const Globals& globals)
 {
     const ScenePoints points = points_of(grid);
     if (points.size() == 0)
-        return block_surfels(grid);
-    SR_TRY(const SurfelOptions options, surfel_options(o.splat_radius, o.opacity));
+        return block_splats(grid);
+    SR_TRY(const PointSplatOptions options, point_splat_options(o.splat_radius, o.opacity));
     SR_TRY(const auto device, open_device(globals));
-    SR_TRY(const SurfelScene scene, SurfelScene::create(*device, points, options));
+    SR_TRY(const SplatScene scene, SplatScene::create(*device, points, options));
     return scene.read();
 }
 
@@ -112,14 +112,14 @@ Json summary(const ConvertSceneOptions& o, const SceneInput& input, SceneFormat 
 void print_summary(const SceneInput& input, const Json& json, SceneFormat to)
 {
     fmt::print("{} to {}: {}\n", facts_of(input.format).name, facts_of(to).name,
-               input.grid ? fmt::format("{} cells, {} points", json["cells"].dump(), json["points"].dump())
+               input.grid ? fmt::format("{} voxels, {} points", json["cells"].dump(), json["points"].dump())
                           : fmt::format("{} splats", json["splats"].dump()));
     if (!input.grid)
         return;
     const auto counts = json["labels"];
     for (const SemanticClass& c : kPalette)
         if (const auto count = counts.find(c.name); count != counts.end())
-            fmt::print("  {:<13} {:>9} cells\n", c.name, count->get<size_t>());
+            fmt::print("  {:<13} {:>9} voxels\n", c.name, count->get<size_t>());
 }
 
 Status write_output(const ConvertSceneOptions& o, SceneInput& input, SceneFormat to, const Globals& globals)
@@ -139,7 +139,7 @@ Status write_output(const ConvertSceneOptions& o, SceneInput& input, SceneFormat
 
 Status convert_scene(const ConvertSceneOptions& o, const Globals& globals)
 {
-    SR_CHECK(surfel_options(o.splat_radius, o.opacity).map([](const SurfelOptions&) {}));
+    SR_CHECK(point_splat_options(o.splat_radius, o.opacity).map([](const PointSplatOptions&) {}));
     SR_TRY(SceneInput input, read_scene_input(o.in, o.input));
     SR_TRY(const SceneFormat to, output_format(o, input));
     if (!o.up.empty() && (!facts_of(to).splats || to == SceneFormat::gltf_splats))

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover edit GRID -o OUT [-m MODEL] OPERATION...: changes labels or occupancy and regenerates only that and a halo
+#include "engine/conditioning/scene_objects.h"
 #include "engine/job/outputs.h"
-#include "engine/scene/scene_objects.h"
 #include "tools/cli/number_option.h"
 #include "tools/cli/run_job.h"
 #include "tools/commands/regeneration.h"
@@ -68,37 +68,37 @@ using Name = const char*;
 
 constexpr bool kFlag = true;
 constexpr OrderedOption kOperations[] = {
-    {"--remove", "class or all: cells go, and the ground under them closes",
+    {"--remove", "class or all: voxels go, and the ground under them closes",
      [](A& o, Text& t, Name n) { add(o, Kind::remove).where.label = class_or_all(t, n); }},
-    {"--remove-object", "i,j,k: removes the connected cells of one label that hold this cell",
+    {"--remove-object", "i,j,k: removes the connected voxels of one label that hold this voxel",
      [](A& o, Text& t, Name n) { add(o, Kind::remove).where.object = parsed(parse_cell(t), n); }},
-    {"--delete", "class or all: cells go, nothing else",
+    {"--delete", "class or all: voxels go, nothing else",
      [](A& o, Text& t, Name n) { add(o, Kind::erase).where.label = class_or_all(t, n); }},
-    {"--paint", "class that the selected cells get",
+    {"--paint", "class that the selected voxels get",
      [](A& o, Text& t, Name n) { add(o, Kind::paint).label = parsed(parse_class(t), n); }},
-    {"--tint", "#rrggbb: the colour of the objects that most of the selected cells belong to",
+    {"--tint", "#rrggbb: the colour of the objects that most of the selected voxels belong to",
      [](A& o, Text& t, Name n) { add(o, Kind::tint).color = parsed(parse_tint(t, n), n); }},
     {"--insert", "stamp (.sgrid) that is set --at x,y,z", [](A& o, Text& t, Name) { add(o, Kind::insert).stamp = t; }},
-    {"--copy", "the selected cells once more, moved --by x,y,z", [](A& o, Text&, Name) { add(o, Kind::copy); }, kFlag},
+    {"--copy", "the selected voxels once more, moved --by x,y,z", [](A& o, Text&, Name) { add(o, Kind::copy); }, kFlag},
     {"--move", "the same, and they are removed where they were", [](A& o, Text&, Name) { add(o, Kind::move); }, kFlag},
-    {"--cut", "write the selected cells as a stamp instead", [](A& o, Text&, Name) { o.cut = true; }, kFlag},
+    {"--cut", "write the selected voxels as a stamp instead", [](A& o, Text&, Name) { o.cut = true; }, kFlag},
     {"--script", "operations as JSON",
      [](A& o, Text& t, Name n) {
          std::ranges::move(parsed(read_edit_script(t), n), std::back_inserter(o.edit.operations));
      }},
-    {"--class", "of the operation before it: only cells of this class",
+    {"--class", "of the operation before it: only voxels of this class",
      [](A& o, Text& t, Name n) { where(o, n).label = class_or_all(t, n); }},
-    {"--box", "x0,y0,z0:x1,y1,z1 in metres: only cells whose centres lie inside",
+    {"--box", "x0,y0,z0:x1,y1,z1 in metres: only voxels whose centres lie inside",
      [](A& o, Text& t, Name n) { where(o, n).box = parsed(parse_box(t), n); }},
     {"--sphere", "x,y,z,radius in metres, likewise",
      [](A& o, Text& t, Name n) { where(o, n).sphere = parsed(parse_sphere(t), n); }},
-    {"--object", "i,j,k: only the connected cells of one label that hold this cell",
+    {"--object", "i,j,k: only the connected voxels of one label that hold this voxel",
      [](A& o, Text& t, Name n) { where(o, n).object = parsed(parse_cell(t), n); }},
-    {"--fill", "of paint: empty places of the box or sphere become cells too",
+    {"--fill", "of paint: empty places of the box or sphere become voxels too",
      [](A& o, Text&, Name n) { last(o, n).fill = true; }, kFlag},
-    {"--at", "of insert: the cell there (metres) gets the stamp's lowest corner",
+    {"--at", "of insert: the voxel there (metres) gets the stamp's lowest corner",
      [](A& o, Text& t, Name n) { last(o, n).at = parsed(parse_point(t), n); }},
-    {"--by", "of copy and move: metres, rounded to whole cells",
+    {"--by", "of copy and move: metres, rounded to whole voxels",
      [](A& o, Text& t, Name n) { last(o, n).by = parsed(parse_point(t), n); }},
 };
 constexpr OrderedOption kPoints = {"--points",
@@ -137,7 +137,7 @@ Status cut(const EditArguments& o, const Globals& globals)
 {
     SR_CHECK(check_alone(o, false, "--cut stands alone: it writes a stamp and changes nothing"));
     if (!o.cut_where.any())
-        return fail(ErrorCode::usage, "--cut: say which cells: a class, a box, a sphere or an object");
+        return fail(ErrorCode::usage, "--cut: say which voxels: a class, a box, a sphere or an object");
     SR_CHECK(check_writable(o.out.output, globals.yes));
     SR_TRY(const Json stamp, write_stamp(o.grid, o.cut_where, o.out.output));
     if (globals.json)

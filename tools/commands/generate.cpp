@@ -51,7 +51,7 @@ void add_generate(CLI::App& app, const Globals& globals, Run& run)
     CLI::App* c = app.add_subcommand("generate", "semantic grid to coloured points, region by region");
     c->add_option(
          "GRID", o->grid,
-         ".sgrid, .npz, .label, .vox or .ply (cells that have points are kept as they are), or a folder of tiles")
+         ".sgrid, .npz, .label, .vox or .ply (voxels that have points are kept as they are), or a folder of tiles")
         ->required();
     add_scene_input_options(*c, o->input);
     c->add_option("-m,--model", o->generation.options.model, "model folder")->required();
@@ -63,15 +63,16 @@ void add_generate(CLI::App& app, const Globals& globals, Run& run)
         "boxes and colours that condition the model: objects.json, auto (guessed from the labels and the seed) "
         "or none; they are written beside OUTPUT");
     add_generation_options(*c, o->generation);
-    add_choice(*c, "--strategy", {"rim", "complete", "paper"},
-               "which cells make a region: new ones and a rim of known ones; the nearest; or as Algorithm 1 is printed "
-               "(may leave cells empty)",
-               [o](const std::string& text) {
-                   for (const auto s : {RegionStrategy::rim, RegionStrategy::complete, RegionStrategy::paper})
-                       if (text == region_strategy_name(s))
-                           o->generation.options.strategy = s;
-               });
-    add_number(*c, "--first-cell", o->generation.options.first_cell, "index of the cell to start from", 0, 1ll << 40);
+    add_choice(
+        *c, "--strategy", {"rim", "complete", "paper"},
+        "which voxels make a region: new ones and a rim of known ones; the nearest; or as Algorithm 1 is printed "
+        "(may leave voxels empty)",
+        [o](const std::string& text) {
+            for (const auto s : {RegionStrategy::rim, RegionStrategy::complete, RegionStrategy::paper})
+                if (text == region_strategy_name(s))
+                    o->generation.options.strategy = s;
+        });
+    add_number(*c, "--first-cell", o->generation.options.first_cell, "index of the voxel to start from", 0, 1ll << 40);
     c->add_option("--ply", o->ply.points, "also write the points with colour and label as PLY");
     c->add_option("--ply-3dgs", o->ply.splats_3d, "also write the splats as a 3DGS PLY");
     c->add_option("--ply-2dgs", o->ply.splats_2d, "also write the splats as a 2DGS PLY");

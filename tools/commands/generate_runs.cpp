@@ -342,7 +342,8 @@ Status TilesRun::end()
             std::error_code ignored;
             fs::remove_all(folder(), ignored);
             fs::remove(o_.output, ignored); // empty
-            return fail(ErrorCode::bad_input, "no cell of {} lies within {} m of the path", quote(o_.grid), o_.horizon);
+            return fail(ErrorCode::bad_input, "no voxel of {} lies within {} m of the path", quote(o_.grid),
+                        o_.horizon);
         }
         SR_CHECK(world_->flush());
         SR_TRY(const TileFolder tiles, TileFolder::open(o_.output));

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// semrover inpaint GRID -m MODEL -o OUT --box ...: regenerates chosen cells, the rest staying byte for byte
+// semrover inpaint GRID -m MODEL -o OUT --box ...: regenerates chosen voxels, the rest staying byte for byte
 #include "tools/cli/run_job.h"
 #include "tools/commands/regeneration.h"
 
@@ -32,7 +32,7 @@ Status inpaint(const InpaintArguments& o, const Globals& globals)
     SR_CHECK(parse_into(request.where.sphere, o.sphere, parse_sphere));
     SR_CHECK(parse_into(request.where.object, o.object, parse_cell));
     if (!request.where.any() && o.mask.empty())
-        return fail(ErrorCode::usage, "say which cells: --box, --sphere, --class, --object or --mask");
+        return fail(ErrorCode::usage, "say which voxels: --box, --sphere, --class, --object or --mask");
     SR_CHECK(check_outputs(o.grid, o.out, globals));
     SR_TRY(request.objects, objects_of(o.grid, o.out));
     SR_TRY(const Regeneration what, select_for_inpainting(request));
@@ -44,13 +44,13 @@ Status inpaint(const InpaintArguments& o, const Globals& globals)
 void add_inpaint(CLI::App& app, const Globals& globals, Run& run)
 {
     auto o = std::make_shared<InpaintArguments>();
-    CLI::App* c = app.add_subcommand("inpaint", "regenerate chosen cells, all others staying as they are");
+    CLI::App* c = app.add_subcommand("inpaint", "regenerate chosen voxels, all others staying as they are");
     c->add_option("GRID", o->grid, ".sgrid")->required();
-    c->add_option("--class", o->label, "cells of this class");
-    c->add_option("--box", o->box, "x0,y0,z0:x1,y1,z1 in metres: cells whose centres lie inside");
+    c->add_option("--class", o->label, "voxels of this class");
+    c->add_option("--box", o->box, "x0,y0,z0:x1,y1,z1 in metres: voxels whose centres lie inside");
     c->add_option("--sphere", o->sphere, "x,y,z,radius in metres, likewise");
-    c->add_option("--object", o->object, "i,j,k: the connected cells of one label that hold this cell");
-    c->add_option("--mask", o->mask, "cells that this .sgrid has, too; of several conditions all must hold");
+    c->add_option("--object", o->object, "i,j,k: the connected voxels of one label that hold this voxel");
+    c->add_option("--mask", o->mask, "voxels that this .sgrid has, too; of several conditions all must hold");
     add_regeneration_options(*c, o->out);
     c->get_option("--model")->required();
     c->callback([o, &globals, &run] { run = resuming([o, &globals] { return inpaint(*o, globals); }); });

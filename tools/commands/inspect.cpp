@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // semrover inspect FILE|DIR: what is in a model or a scene. The report is one JSON object; without --json it is printed
 // as indented text.
+#include "engine/conditioning/scene_objects.h"
 #include "engine/model/ldm_config.h"
 #include "engine/model/low_rank.h"
 #include "engine/model/renderer_model.h"
 #include "engine/scene/palette.h"
-#include "engine/scene/scene_objects.h"
 #include "engine/scene/tiles.h"
 #include "engine/splat/bounds.h"
 #include "runtime/base/json.h"
@@ -333,7 +333,7 @@ void add_input(Report& report, const SceneInput& input)
 
 Report describe_splats(const Path& path, const SceneInput& input)
 {
-    const Surfels& s = *input.splats;
+    const Splats& s = *input.splats;
     const Bounds bounds = bounds_of(s);
     Report report = {{"splats", path.string()}, {"count", s.position.size()}};
     report["labelled"] = s.label.size() - static_cast<size_t>(std::ranges::count(s.label, kNoLabel));

@@ -53,7 +53,7 @@ Status labels(const std::string& vox, const Globals& globals)
 void add_labels(CLI::App& app, const Globals& globals, Run& run)
 {
     auto vox = std::make_shared<std::string>();
-    CLI::App* c = app.add_subcommand("labels", "the classes of cells: number, name and colour");
+    CLI::App* c = app.add_subcommand("labels", "the classes of voxels: number, name and colour");
     c->add_option("--vox", *vox, "also a MagicaVoxel file with one voxel of each class, and so its palette");
     c->callback([vox, &globals, &run] { run = [vox, &globals] { return labels(*vox, globals); }; });
 }

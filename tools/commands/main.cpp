@@ -28,5 +28,5 @@ int main(int argc, char** argv)
          {"view", "semrover-view", "look at a street, fly through it, paint it, refine a view",
           "it needs the packages libglfw3-dev and libimgui-dev (tools/setup --view); then cmake --preset release && "
           "cmake --build --preset release --target programs builds it"},
-         {"voxelize", "semrover-scenes", "a textured mesh as a grid of labelled cells and coloured points"}});
+         {"voxelize", "semrover-scenes", "a textured mesh as a grid of labelled voxels and coloured points"}});
 }

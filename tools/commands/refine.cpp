@@ -8,9 +8,9 @@
 #include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/run_job.h"
-#include "tools/commands/drive_options.h"
 #include "tools/commands/refine_video.h"
 #include "tools/commands/scene_input.h"
+#include "tools/commands/trajectory_options.h"
 
 #include <algorithm>
 #include <CLI/CLI.hpp>
@@ -23,7 +23,7 @@ struct RefineArguments {
     RefinementOptions options;
     std::string frames;
     RefineVideos videos;
-    DriveOptions drive;
+    TrajectoryOptions trajectory;
     std::string profile;
     bool size_given = false, dry_run = false;
 };
@@ -52,13 +52,13 @@ Result<Refinement> resolve(const RefineArguments& o, const Globals& globals, con
         return fail(ErrorCode::usage, "-o/--output is required");
     RefinementOptions r = o.options;
     SR_CHECK(parse_frames(o.frames, r));
-    SR_TRY(r.draw, draw_options(o.drive));
-    r.radius_given = !o.drive.splat_radius.empty();
+    SR_TRY(r.draw, draw_options(o.trajectory));
+    r.radius_given = !o.trajectory.splat_radius.empty();
     if (o.size_given)
-        r.size = ImageSize{o.drive.width, o.drive.height};
-    r.allow_empty = o.drive.allow_empty;
-    if (!o.drive.path.empty()) {
-        SR_TRY(r.path, load_cameras(o.drive));
+        r.size = ImageSize{o.trajectory.width, o.trajectory.height};
+    r.allow_empty = o.trajectory.allow_empty;
+    if (!o.trajectory.path.empty()) {
+        SR_TRY(r.path, load_cameras(o.trajectory));
     }
     r.grid = [&o, &globals]() -> Result<VoxelGrid> {
         Result<VoxelGrid> grid = load_grid(o.options.input, {}, globals);
@@ -182,7 +182,7 @@ void add_options(CLI::App& c, RefineArguments& a)
     add_number(c, "--fps", a.videos.frames_per_second, "frames a second of the videos", 1, 240);
     c.add_option("--profile", a.profile, "write device times as a Chrome trace");
     c.add_flag("--dry-run", a.dry_run, "only say how many frames and how much memory");
-    add_drive_options(c, a.drive);
+    add_trajectory_options(c, a.trajectory);
 }
 
 } // namespace

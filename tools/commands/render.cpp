@@ -7,8 +7,8 @@
 #include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/run_job.h"
-#include "tools/commands/drive_options.h"
 #include "tools/commands/scene_input.h"
+#include "tools/commands/trajectory_options.h"
 #include "tools/commands/video.h"
 
 #include <CLI/CLI.hpp>
@@ -20,7 +20,7 @@ namespace {
 struct RenderArguments {
     Path grid, output, video;
     std::string profile;
-    DriveOptions drive;
+    TrajectoryOptions trajectory;
     SceneInputOptions input;
     int frames_per_second = 10;
     bool top = false, semantic = false, floats = false, points = false, visible_depth = false;
@@ -28,11 +28,11 @@ struct RenderArguments {
 
 Status check_outputs(const RenderArguments& o, const Globals& globals)
 {
-    if (o.drive.path.empty() && !o.top)
+    if (o.trajectory.path.empty() && !o.top)
         return fail(ErrorCode::usage, "--path (a trajectory) or --top is required");
     if (o.video.empty())
         return {};
-    if (o.drive.path.empty())
+    if (o.trajectory.path.empty())
         return fail(ErrorCode::usage, "--video needs --path");
     // where a run is there, the settings say whether it is this one, and whose the video is
     return check_writable(o.video, globals.yes || finished_results(o.output, Json()));
@@ -60,32 +60,32 @@ struct VideoOfFrames {
 Result<DrawingOptions> drawing_options(const RenderArguments& o, const Globals& globals)
 {
     DrawingOptions d;
-    SR_TRY(d.draw, draw_options(o.drive));
+    SR_TRY(d.draw, draw_options(o.trajectory));
     d.draw.semantic = o.semantic;
     d.floats = o.floats;
     d.points = o.points;
     d.visible_depth = o.visible_depth;
     d.folder = o.output;
     d.replace = globals.yes;
-    d.allow_empty = o.drive.allow_empty;
+    d.allow_empty = o.trajectory.allow_empty;
     SceneInputOptions scene = o.input;
-    scene.origin_may_be_of_path = !o.drive.path.empty();
+    scene.origin_may_be_of_path = !o.trajectory.path.empty();
     SR_TRY(SceneInput input, read_scene_input(o.grid, scene));
     print_warnings(input.warnings, globals);
-    DriveOptions drive = o.drive;
-    if (drive.placement.origin.empty() && !has_origin(input.format))
-        drive.placement.origin = o.input.origin;
+    TrajectoryOptions trajectory = o.trajectory;
+    if (trajectory.placement.origin.empty() && !has_origin(input.format))
+        trajectory.placement.origin = o.input.origin;
     if (input.grid)
         d.scene = std::move(*input.grid);
     else
         d.scene = std::move(*input.splats);
     d.scene_name = o.grid;
-    if (!o.drive.path.empty()) {
-        SR_TRY(d.path, load_cameras(drive));
+    if (!o.trajectory.path.empty()) {
+        SR_TRY(d.path, load_cameras(trajectory));
     }
     SR_CHECK(check_drawing_outputs(d));
     if (o.top)
-        d.top = {o.drive.width, o.drive.height};
+        d.top = {o.trajectory.width, o.trajectory.height};
     return d;
 }
 
@@ -129,7 +129,7 @@ void add_render(CLI::App& app, const Globals& globals, Run& run)
                   "folder for {color,depth,normal,label,visible}/000000.png, transforms.json and the run's state")
         ->required();
     add_scene_input_options(*c, o->input);
-    add_drive_options(*c, o->drive);
+    add_trajectory_options(*c, o->trajectory);
     c->add_flag("--semantic", o->semantic, "label colours; a grid without points is drawn as blocks");
     c->add_flag("--top", o->top, "also an overview from above, top.png");
     c->add_flag("--npy", o->floats,

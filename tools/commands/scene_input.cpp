@@ -101,7 +101,7 @@ void add_scene_input_options(CLI::App& c, SceneInputOptions& o)
     c.add_option(
         "--map", o.map,
         "a table by name, or JSON: label of the input (number or name) to class (name or number), null: left out");
-    add_number(c, "--voxel-size", o.voxel_size, "metres, of a cell; 0.6, of a .npz its own", 0.001f, 100.f);
+    add_number(c, "--voxel-size", o.voxel_size, "metres, of a voxel; 0.6, of a .npz its own", 0.001f, 100.f);
     add_number(c, "--file-voxel-size", o.file_voxel_size,
                "metres of a voxel of a .vox, .npy or .npz that does not say it; as --voxel-size", 0.0001, 100);
     add_origin(c, o.origin);
@@ -145,7 +145,7 @@ Result<SceneInput> read_scene_input(const Path& path, const SceneInputOptions& o
     SR_CHECK(check_options(o, input.format, what));
     if (facts.splats) {
         SR_TRY(SplatFile file, read_splats(path, input.format));
-        input.splats = std::move(file.surfels);
+        input.splats = std::move(file.splats);
         input.warnings = std::move(file.warnings);
         input.dropped = file.dropped;
     } else {

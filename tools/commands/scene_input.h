@@ -37,7 +37,7 @@ Result<std::array<double, 3>> origin_of(const SceneInputOptions& options);
 struct SceneInput {
     SceneFormat format = SceneFormat::sgrid;
     std::optional<VoxelGrid> grid;
-    std::optional<Surfels> splats;
+    std::optional<Splats> splats;
     std::vector<std::string> warnings;
     uint64_t dropped = 0;
 };

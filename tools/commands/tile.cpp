@@ -60,7 +60,7 @@ void add_tile(CLI::App& app, const Globals& globals, Run& run)
     c->add_option("INPUT", o->input, ".sgrid, or with --join a folder of tiles")->required();
     c->add_option("-o,--output", o->output, "folder, or with --join a .sgrid")->required();
     CLI::Option* size =
-        add_number(*c, "--tile-size", o->tile_size, "metres of a tile's edge, rounded to whole cells", 0.01, 1e6);
+        add_number(*c, "--tile-size", o->tile_size, "metres of a tile's edge, rounded to whole voxels", 0.01, 1e6);
     c->add_flag("--join", o->join, "put tiles together to one grid")->excludes(size);
     c->callback(
         [o, &globals, &run] { run = [o, &globals] { return o->join ? join(*o, globals) : cut(*o, globals); }; });

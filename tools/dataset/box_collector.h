@@ -3,8 +3,8 @@
 #pragma once
 
 #include "engine/camera/rigid.h"
+#include "engine/conditioning/scene_objects.h"
 #include "engine/format/label_map.h"
-#include "engine/scene/scene_objects.h"
 
 #include <set>
 

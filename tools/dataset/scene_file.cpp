@@ -228,21 +228,21 @@ Result<SplatFile> read_splats(const Path& path, SceneFormat format)
     }
 }
 
-Status write_splats(const Path& path, const Surfels& surfels, SceneFormat format, bool labels)
+Status write_splats(const Path& path, const Splats& splats, SceneFormat format, bool labels)
 {
     switch (format) {
     case SceneFormat::points_ply:
-        return write_points_ply(path, surfels);
+        return write_points_ply(path, splats);
     case SceneFormat::gaussian_3d:
-        return write_splats_ply(path, surfels, SplatPly::gaussian_3d, labels);
+        return write_splats_ply(path, splats, SplatPly::gaussian_3d, labels);
     case SceneFormat::gaussian_2d:
-        return write_splats_ply(path, surfels, SplatPly::gaussian_2d, labels);
+        return write_splats_ply(path, splats, SplatPly::gaussian_2d, labels);
     case SceneFormat::inria62:
-        return write_splats_ply(path, surfels, SplatPly::inria_62, false);
+        return write_splats_ply(path, splats, SplatPly::inria_62, false);
     case SceneFormat::gltf_splats:
-        return write_splats_glb(path, surfels);
+        return write_splats_glb(path, splats);
     case SceneFormat::splat:
-        return write_dot_splat(path, surfels);
+        return write_dot_splat(path, splats);
     default:
         return fail(ErrorCode::bad_input, "cannot write splats as {}", facts_of(format).name);
     }

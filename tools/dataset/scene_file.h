@@ -57,6 +57,6 @@ Status write_scene_grid(const Path& path, const VoxelGrid& grid, SceneFormat for
 
 Result<SplatFile> read_splats(const Path& path, SceneFormat format);
 // `labels`: also a label in PLY files, for readers by property name
-Status write_splats(const Path& path, const Surfels& surfels, SceneFormat format, bool labels);
+Status write_splats(const Path& path, const Splats& splats, SceneFormat format, bool labels);
 
 } // namespace semrover

@@ -107,7 +107,7 @@ Result<std::vector<uint32_t>> select_cells(const VoxelGrid& grid, const CellSele
     }
     const auto start = find_cell(grid, *s.object);
     if (!start)
-        return fail(ErrorCode::bad_input, "there is no cell ({}, {}, {}) in the grid", (*s.object)[0], (*s.object)[1],
+        return fail(ErrorCode::bad_input, "there is no voxel ({}, {}, {}) in the grid", (*s.object)[0], (*s.object)[1],
                     (*s.object)[2]);
     for (const Cell& cell : connected_cells(*s.object, [&](const Cell& c) {
              const auto at = find_cell(grid, c);
@@ -135,7 +135,7 @@ Result<std::vector<Cell>> places_in(const CellSelection& s, float voxel_size)
     for (size_t a = 0; a < 3; ++a)
         count *= std::max(0.0, double(high[a]) - low[a] + 1);
     if (count > double(kMostPlaces))
-        return fail(ErrorCode::bad_input, "{:.0f} cells are too many to fill at once, at most {} are allowed", count,
+        return fail(ErrorCode::bad_input, "{:.0f} voxels are too many to fill at once, at most {} are allowed", count,
                     kMostPlaces);
     for (int32_t i = low[0]; i <= high[0]; ++i)
         for (int32_t j = low[1]; j <= high[1]; ++j)
@@ -182,7 +182,7 @@ Result<WorldSphere> parse_sphere(std::string_view text)
 
 Result<Cell> parse_cell(std::string_view text)
 {
-    SR_TRY(const auto v, numbers<int32_t>(text, 3, "a cell i,j,k"));
+    SR_TRY(const auto v, numbers<int32_t>(text, 3, "a voxel i,j,k"));
     return Cell{v[0], v[1], v[2]};
 }
 

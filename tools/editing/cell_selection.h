@@ -16,23 +16,23 @@ struct WorldSphere {
     double radius = 0; // metres
 };
 
-// Selects the cells for which all given conditions hold. A cell is in a box or sphere when its centre is, surface
+// Selects the voxels for which all given conditions hold. A voxel is in a box or sphere when its centre is, surface
 // included.
 struct CellSelection {
     std::optional<uint8_t> label;
     std::optional<WorldBox> box;
     std::optional<WorldSphere> sphere;
-    std::optional<Cell> object; // the 26-connected component of equal label that holds this cell
+    std::optional<Cell> object; // the 26-connected component of equal label that holds this voxel
 
     bool any() const { return label || box || sphere || object; }
     bool bounded() const { return box || sphere; }
     bool holds_place(const Cell& cell, float voxel_size) const; // box and sphere only
 };
 
-// indices into `grid` of the cells selected, ascending. bad_input when `object` names a place that is empty.
+// indices into `grid` of the voxels selected, ascending. bad_input when `object` names a place that is empty.
 Result<std::vector<uint32_t>> select_cells(const VoxelGrid& grid, const CellSelection& selection);
 
-// cells connected with `start` through faces, edges and corners for which `same` holds, sorted; `start` is one
+// voxels connected with `start` through faces, edges and corners for which `same` holds, sorted; `start` is one
 std::vector<Cell> connected_cells(const Cell& start, const std::function<bool(const Cell&)>& same);
 
 // every place, occupied or not, inside the box and sphere of a bounded selection, sorted; bad_input for more than 2^22

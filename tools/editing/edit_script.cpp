@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/editing/edit_script.h"
 
+#include "engine/conditioning/scene_objects.h"
 #include "engine/scene/palette.h"
-#include "engine/scene/scene_objects.h"
 #include "runtime/base/json_fields.h"
 #include "runtime/base/json_numbers.h"
 #include "runtime/base/quote.h"
@@ -80,7 +80,7 @@ Result<CellSelection> parse_selection(const Json& json, std::string_view where)
     s.object.emplace();
     for (size_t a = 0; a < 3; ++a) {
         if (object[a] != std::floor(object[a]) || std::abs(object[a]) > 1 << 20)
-            return fail(ErrorCode::bad_input, "{}: object: expected the index of a cell, found {}", where, object[a]);
+            return fail(ErrorCode::bad_input, "{}: object: expected the index of a voxel, found {}", where, object[a]);
         (*s.object)[a] = int32_t(object[a]);
     }
     return s;

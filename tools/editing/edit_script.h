@@ -13,7 +13,7 @@ namespace semrover {
 //   {"op": "insert", "stamp": "car.sgrid", "at": [x,y,z], "rotate": 90, "points": "keep"|"regenerate"}
 //   {"op": "tint", "color": "#aa4433", "class": "building", ...}
 //   {"op": "copy"|"move", ..., "by": [x,y,z], "rotate": 90, "points": "keep"|"regenerate"}
-// Metres, cells for "object", degrees; a stamp's path is relative to the file's folder and stays
+// Metres, voxels for "object", degrees; a stamp's path is relative to the file's folder and stays
 // inside it. Unknown keys are refused.
 // Errors: bad_input, with the number of the operation.
 Result<std::vector<EditOperation>> read_edit_script(const Path& path);

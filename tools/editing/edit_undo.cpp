@@ -50,11 +50,11 @@ bool same_cell(const VoxelGrid& a, size_t i, const VoxelGrid& b, size_t j)
 }
 
 struct Difference {
-    std::vector<size_t> before; // indices of cells that are gone or differ
+    std::vector<size_t> before; // indices of voxels that are gone or differ
     std::vector<Cell> added;
 };
 
-// note: where one of the grids has points and the other none, points of cells without any are zeros and do not count
+// note: where one of the grids has points and the other none, points of voxels without any are zeros and do not count
 Difference difference(const VoxelGrid& before, const VoxelGrid& after)
 {
     Difference d;
@@ -171,7 +171,7 @@ Result<Record> read_record(const Path& path)
     r.added = cells_of(elements<int32_t>(file, "added"));
     r.original = elements<uint8_t>(file, "original");
     if (!std::ranges::is_sorted(r.part.cells) || !std::ranges::is_sorted(r.added))
-        return fail(ErrorCode::bad_input, "{}: cells are not sorted", where);
+        return fail(ErrorCode::bad_input, "{}: voxels are not sorted", where);
     return r;
 }
 

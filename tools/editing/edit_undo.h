@@ -7,9 +7,9 @@
 namespace semrover {
 
 // What an edit changed, and what was there before: a safetensors file (metadata format "semrover.undo", version "1").
-//   cells [C, 3] i32, labels [C] u8, points [C, n, 3] f16, colors [C, n, 3] u8, generated [C] u8: cells of the grid
+//   cells [C, 3] i32, labels [C] u8, points [C, n, 3] f16, colors [C, n, 3] u8, generated [C] u8: voxels of the grid
 //   before that are gone or differ; points, colors and generated when that grid had points
-//   added [A, 3] i32: cells that were not there
+//   added [A, 3] i32: voxels that were not there
 //   original [B] u8: all bytes of the file before, when it was not as write_grid writes (another program's): only then
 // metadata: before and after (hashes of the two files), voxel_size and points_per_voxel of the grid before, metadata
 // (its own, as JSON).

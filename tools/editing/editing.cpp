@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/editing/editing.h"
 
+#include "engine/conditioning/cell_objects.h"
 #include "engine/job/version.h"
-#include "engine/scene/cell_objects.h"
 #include "engine/scene/cell_reach.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/quote.h"
@@ -42,7 +42,7 @@ std::vector<uint32_t> targets_of(const EditedGrid& edited, double halo)
     return targets;
 }
 
-// colours of the objects that the tints are for. The cells of these are targets; what lies around them is not.
+// colours of the objects that the tints are for. The voxels of these are targets; what lies around them is not.
 Status apply_tints(const EditedGrid& edited, std::vector<SceneObject>& objects, std::vector<uint32_t>& targets)
 {
     SR_TRY(const std::vector<int32_t> owners, objects_of_cells(edited.grid, objects));
@@ -53,7 +53,7 @@ Status apply_tints(const EditedGrid& edited, std::vector<SceneObject>& objects, 
                 cells.push_back(uint32_t(*found));
         const std::vector<size_t> meant = objects_meant(owners, objects.size(), cells);
         if (meant.empty())
-            return fail(ErrorCode::bad_input, "tint {}: the cells that are selected belong to no object",
+            return fail(ErrorCode::bad_input, "tint {}: the voxels that are selected belong to no object",
                         tint_text(tint.color));
         for (const size_t o : meant)
             objects[o].tint = tint.color;
@@ -66,12 +66,12 @@ Status apply_tints(const EditedGrid& edited, std::vector<SceneObject>& objects, 
     return {};
 }
 
-// the cells that a second grid has, too
+// the voxels that a second grid has, too
 Status keep_masked(std::vector<uint32_t>& cells, const VoxelGrid& grid, const Path& path)
 {
     SR_TRY(const VoxelGrid mask, read_grid(path));
     if (mask.voxel_size != grid.voxel_size)
-        return fail(ErrorCode::bad_input, "{} has cells of {} m, the grid has cells of {} m", quote_path(path),
+        return fail(ErrorCode::bad_input, "{} has voxels of {} m, the grid has voxels of {} m", quote_path(path),
                     mask.voxel_size, grid.voxel_size);
     std::erase_if(cells, [&](uint32_t c) { return !find_cell(mask, grid.cells[c]); });
     return {};
@@ -102,7 +102,7 @@ Result<Regeneration> edit_grid(const EditRequest& r)
                         applied.error().message);
     EditedGrid edited = editor.finish();
     if (edited.grid.cells.empty())
-        return fail(ErrorCode::bad_input, "the edit leaves no cell in {}", quote(r.grid.string()));
+        return fail(ErrorCode::bad_input, "the edit leaves no voxel in {}", quote(r.grid.string()));
     what.targets = targets_of(edited, r.generates ? r.halo : 0);
     what.objects = r.objects;
     if (!edited.tints.empty() && !what.objects)
@@ -137,7 +137,7 @@ Result<Regeneration> select_for_inpainting(const InpaintRequest& r)
         what.request["mask"] = hash_text(hash);
     }
     if (what.targets.empty())
-        return fail(ErrorCode::bad_input, "no cell of {} is selected", quote(r.grid.string()));
+        return fail(ErrorCode::bad_input, "no voxel of {} is selected", quote(r.grid.string()));
     what.grid = what.before;
     what.counts = {{"cells", what.grid.cells.size()}, {"regenerated", what.targets.size()}};
     return what;
@@ -148,7 +148,7 @@ Result<Json> write_stamp(const Path& path, const CellSelection& where, const Pat
     SR_TRY(const VoxelGrid grid, read_grid(path));
     SR_TRY(const std::vector<uint32_t> cells, select_cells(grid, where));
     if (cells.empty())
-        return fail(ErrorCode::bad_input, "cut: no cell of the grid is selected");
+        return fail(ErrorCode::bad_input, "cut: no voxel of the grid is selected");
     VoxelGrid stamp = cut_stamp(grid, cells);
     stamp.metadata["tool"] = kProgram;
     SR_CHECK(write_grid(output, stamp));

@@ -18,22 +18,22 @@ namespace {
 
 using Kind = EditOperation::Kind;
 
-constexpr int32_t kGroundReach = 6; // cells across
-constexpr int32_t kGroundStep = 2;  // cells up or down to the nearest ground
-constexpr int32_t kOwnGround = 3;   // cells within which a column's own ground is looked for
+constexpr int32_t kGroundReach = 6; // voxels across
+constexpr int32_t kGroundStep = 2;  // voxels up or down to the nearest ground
+constexpr int32_t kOwnGround = 3;   // voxels within which a column's own ground is looked for
 
 Cell shifted(const Cell& cell, const Cell& by)
 {
     return {cell[0] + by[0], cell[1] + by[1], cell[2] + by[2]};
 }
 
-// first cell of the column (i, j) at or above k
+// first voxel of the column (i, j) at or above k
 size_t column_at(const VoxelGrid& grid, int32_t i, int32_t j, int32_t k)
 {
     return size_t(std::ranges::lower_bound(grid.cells, Cell{i, j, k}) - grid.cells.begin());
 }
 
-// calls visit(index) for the ground cells of a column with a level of k - reach to k + reach
+// calls visit(index) for the ground voxels of a column with a level of k - reach to k + reach
 template <typename Visit>
 void visit_ground(const VoxelGrid& grid, int32_t i, int32_t j, int32_t k, int32_t reach, const Visit& visit)
 {
@@ -69,7 +69,7 @@ Status check_operation(const EditOperation& o, std::string_view where)
     if (places && o.where.any())
         return wrong("a box, sphere, class or object has no meaning for what is inserted: cut the stamp with them");
     if (!places && !o.where.any())
-        return wrong("say which cells: a class, a box, a sphere or an object");
+        return wrong("say which voxels: a class, a box, a sphere or an object");
     if (places && o.stamp.empty())
         return wrong("the stamp is missing");
     if (places != o.at.has_value())
@@ -97,7 +97,7 @@ Status GridEditor::apply(const EditOperation& o)
     if (o.kind == Kind::insert) {
         SR_TRY(const VoxelGrid stamp, read_grid(o.stamp));
         if (stamp.voxel_size != base_.voxel_size)
-            return fail(ErrorCode::bad_input, "{} has cells of {} m, the grid has cells of {} m", quote_path(o.stamp),
+            return fail(ErrorCode::bad_input, "{} has voxels of {} m, the grid has voxels of {} m", quote_path(o.stamp),
                         stamp.voxel_size, base_.voxel_size);
         return insert(turned(stamp, o.quarter_turns), o, cell_at(*o.at, view_.voxel_size));
     }
@@ -124,7 +124,7 @@ Result<std::vector<uint32_t>> GridEditor::selected(const EditOperation& o) const
 {
     SR_TRY(std::vector<uint32_t> cells, select_cells(view_, o.where));
     if (cells.empty())
-        return fail(ErrorCode::bad_input, "{}: no cell of the grid is selected{}", operation_name(o.kind),
+        return fail(ErrorCode::bad_input, "{}: no voxel of the grid is selected{}", operation_name(o.kind),
                     o.where.label ? fmt::format(" (class {})", kPalette[*o.where.label].name) : "");
     return cells;
 }
@@ -135,7 +135,7 @@ Status GridEditor::paint(const EditOperation& o)
     if (o.fill) {
         SR_TRY(const std::vector<Cell> places, places_in(o.where, view_.voxel_size));
         if (places.empty())
-            return fail(ErrorCode::bad_input, "paint: no cell's centre lies in the selection");
+            return fail(ErrorCode::bad_input, "paint: no voxel's centre lies in the selection");
         for (const Cell& cell : places)
             labels[cell] = o.label;
     } else {
@@ -152,11 +152,11 @@ Status GridEditor::insert(const VoxelGrid& stamp, const EditOperation& o, const 
 {
     const bool keep = o.keep_points;
     if (keep && (!stamp.has_points() || std::ranges::count(stamp.generated, 0)))
-        return fail(ErrorCode::bad_input, "{}: not every cell has points to keep", operation_name(o.kind));
+        return fail(ErrorCode::bad_input, "{}: not every voxel has points to keep", operation_name(o.kind));
     if (keep && points_per_voxel_ == 0)
         points_per_voxel_ = stamp.points_per_voxel;
     if (keep && stamp.points_per_voxel != points_per_voxel_)
-        return fail(ErrorCode::bad_input, "{}: the stamp has {} points a cell, the grid {}", operation_name(o.kind),
+        return fail(ErrorCode::bad_input, "{}: the stamp has {} points a voxel, the grid {}", operation_name(o.kind),
                     stamp.points_per_voxel, points_per_voxel_);
     std::map<Cell, uint8_t> labels;
     const Cell low = lowest_corner(stamp.cells), by = {at[0] - low[0], at[1] - low[1], at[2] - low[2]};
@@ -195,7 +195,7 @@ const GridEditor::Content* GridEditor::kept_content(const Cell& cell) const
     return kept == kept_.end() ? nullptr : &kept->second;
 }
 
-// cells of the view with the points that they would have now
+// voxels of the view with the points that they would have now
 VoxelGrid GridEditor::with_points(std::span<const uint32_t> cells) const
 {
     VoxelGrid out;
@@ -243,7 +243,7 @@ void GridEditor::drop(std::span<const uint32_t> cells)
     view_ = std::move(rest);
 }
 
-// labels of cells that are there or not; what was kept at these places is not any more
+// labels of voxels that are there or not; what was kept at these places is not any more
 void GridEditor::put(const std::map<Cell, uint8_t>& labels)
 {
     VoxelGrid merged;

@@ -11,13 +11,13 @@ namespace semrover {
 // one step of an edit
 struct EditOperation {
     enum class Kind {
-        remove, // cells go, and the ground under them closes: what a car stood on is road again
-        erase,  // cells go, nothing else
-        paint,  // cells get a label; with `fill` empty places of the selection become cells too
-        insert, // a stamp's cells replace what is at their places
+        remove, // voxels go, and the ground under them closes: what a car stood on is road again
+        erase,  // voxels go, nothing else
+        paint,  // voxels get a label; with `fill` empty places of the selection become voxels too
+        insert, // a stamp's voxels replace what is at their places
         copy,   // the selection once more, elsewhere
         move,   // the same, and the selection is removed where it was
-        tint,   // objects get a colour; cells stay as they are
+        tint,   // objects get a colour; voxels stay as they are
     };
     Kind kind = Kind::remove;
     CellSelection where;           // all but insert
@@ -25,8 +25,8 @@ struct EditOperation {
     std::array<double, 3> color{}; // tint: sRGB 0..1
     bool fill = false;
     Path stamp;                              // insert
-    std::optional<std::array<double, 3>> at; // insert: metres; the cell there gets the stamp's lowest corner
-    std::optional<std::array<double, 3>> by; // copy and move: metres, rounded to whole cells
+    std::optional<std::array<double, 3>> at; // insert: metres; the voxel there gets the stamp's lowest corner
+    std::optional<std::array<double, 3>> by; // copy and move: metres, rounded to whole voxels
     int quarter_turns = 0;                   // counterclockwise seen from above
     bool keep_points = false;                // of the stamp or the copy; else they are generated anew
 };
@@ -34,8 +34,8 @@ std::string_view operation_name(EditOperation::Kind kind); // erase is called "d
 // usage: something that the operation needs is missing, or does not apply to it; `where` names the operation
 Status check_operation(const EditOperation& operation, std::string_view where);
 
-// The grid after an edit. `touched` cells have another label, other occupancy, or points of a stamp; `kept` cells are
-// those with points of a stamp. Both are sorted. Changed cells without points have generated = 0 and zeros.
+// The grid after an edit. `touched` voxels have another label, other occupancy, or points of a stamp; `kept` voxels are
+// those with points of a stamp. Both are sorted. Changed voxels without points have generated = 0 and zeros.
 struct EditedGrid {
     struct Tint {
         std::vector<Cell> cells; // sorted
@@ -46,15 +46,15 @@ struct EditedGrid {
     std::vector<Tint> tints; // in order; for the caller, who knows the objects
 };
 
-// Applies operations in order, each to what the one before left. The ground closes thus: a column of removed cells that
-// has no ground within three cells of its lowest removed cell, and stood at most a cell above the level of the nearest
-// ground (6 cells away at most, 2 up or down; the most frequent label of the nearest, the lower one of equals), gets
-// one cell of that ground at that level.
+// Applies operations in order, each to what the one before left. The ground closes thus: a column of removed voxels
+// that has no ground within three voxels of its lowest removed voxel, and stood at most a voxel above the level of the
+// nearest ground (6 voxels away at most, 2 up or down; the most frequent label of the nearest, the lower one of
+// equals), gets one voxel of that ground at that level.
 class GridEditor {
   public:
     explicit GridEditor(const VoxelGrid& grid); // kept by reference
 
-    // errors: bad_input (a stamp that cannot be read or has other cells, a selection without cells, places beyond all
+    // errors: bad_input (a stamp that cannot be read or has other voxels, a selection without voxels, places beyond all
     // bounds)
     Status apply(const EditOperation& operation);
 
@@ -77,7 +77,7 @@ class GridEditor {
     const Content* kept_content(const Cell& cell) const;
 
     const VoxelGrid& base_;
-    VoxelGrid view_; // cells and labels as they are now
+    VoxelGrid view_; // voxels and labels as they are now
     std::map<Cell, Content> kept_;
     std::vector<EditedGrid::Tint> tints_;
     int points_per_voxel_;

@@ -29,7 +29,7 @@ Cell lowest_corner(std::span<const Cell> cells)
 
 VoxelGrid cut_stamp(const VoxelGrid& grid, std::span<const uint32_t> cells)
 {
-    SR_ASSERT(!cells.empty(), "a stamp of no cells");
+    SR_ASSERT(!cells.empty(), "a stamp of no voxels");
     VoxelGrid stamp;
     stamp.voxel_size = grid.voxel_size;
     stamp.points_per_voxel = grid.points_per_voxel;

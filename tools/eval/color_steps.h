@@ -6,7 +6,7 @@
 
 namespace semrover {
 
-// differences of colour from one cell to the next, 0..255: the mean over the channels of |mean colour of a cell's
+// differences of colour from one voxel to the next, 0..255: the mean over the channels of |mean colour of a voxel's
 // points
 // - that of its neighbour's|
 struct ColorSteps {
@@ -27,7 +27,7 @@ struct SeamSteps {
     ColorSteps across, inside; // of pairs over the border of two tiles, of those within a tile
 };
 
-// Of all pairs of neighbours along i and j that have points and one label; `edge`: cells of a tile's edge
+// Of all pairs of neighbours along i and j that have points and one label; `edge`: voxels of a tile's edge
 SeamSteps seam_steps(const VoxelGrid& grid, int32_t edge);
 
 } // namespace semrover

@@ -13,9 +13,9 @@ namespace semrover {
 namespace {
 
 struct BrightPoint {
-    std::array<double, 3> at; // metres from the centre of the cell that is looked at
+    std::array<double, 3> at; // metres from the centre of the voxel that is looked at
     double brightness;
-    uint64_t key; // of its place within its cell
+    uint64_t key; // of its place within its voxel
 
     auto operator<=>(const BrightPoint&) const = default;
 };
@@ -39,7 +39,7 @@ void append_points(const VoxelGrid& grid, size_t cell, const std::array<double, 
     }
 }
 
-// all of the class that may lie within `reach` cells of a cell's points
+// all of the class that may lie within `reach` voxels of a voxel's points
 void collect(const VoxelGrid& grid, std::span<const uint8_t> used, size_t cell, int reach,
              std::vector<BrightPoint>& points)
 {
@@ -159,9 +159,9 @@ double best_step(std::span<const std::array<double, 3>> positions, std::span<con
 std::array<ContrastSums, kClassCount> local_contrast(const VoxelGrid& grid, std::span<const uint8_t> used,
                                                      const ContrastOptions& options)
 {
-    constexpr double kOutside = 2e-3; // metres that two points may lie outside of their cells, together
+    constexpr double kOutside = 2e-3; // metres that two points may lie outside of their voxels, together
     const double reach = std::ceil((options.radius + kOutside) / double(grid.voxel_size));
-    SR_ASSERT(used.size() == grid.cells.size() && grid.has_points(), "{} of {} cells", used.size(), grid.cells.size());
+    SR_ASSERT(used.size() == grid.cells.size() && grid.has_points(), "{} of {} voxels", used.size(), grid.cells.size());
     SR_ASSERT(options.radius > 0 && options.radius <= kMostReach * double(grid.voxel_size), "a radius of {} m",
               options.radius);
     std::array<ContrastSums, kClassCount> sums;

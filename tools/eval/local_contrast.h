@@ -28,7 +28,7 @@ struct ContrastSums {
 };
 
 struct ContrastOptions {
-    double radius = 0.3; // metres, at most kMostReach cells
+    double radius = 0.3; // metres, at most kMostReach voxels
     double strong_step = 0.25;
 };
 constexpr size_t kFewestPoints = 6;
@@ -40,8 +40,8 @@ constexpr double kMostReach = 3;
 // such cut.
 double best_step(std::span<const std::array<double, 3>> positions, std::span<const double> brightness);
 
-// by class, of the cells with a `used` that is not 0 [cells of the grid]; a grid with points. What lies in other cells
-// is nobody's neighbour. Does not depend on the order of a cell's points, nor on where the grid lies.
+// by class, of the voxels with a `used` that is not 0 [voxels of the grid]; a grid with points. What lies in other
+// voxels is nobody's neighbour. Does not depend on the order of a voxel's points, nor on where the grid lies.
 std::array<ContrastSums, kClassCount> local_contrast(const VoxelGrid& grid, std::span<const uint8_t> used,
                                                      const ContrastOptions& options = {});
 

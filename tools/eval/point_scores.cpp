@@ -25,7 +25,7 @@ Status check_cells(const VoxelGrid& generated, const VoxelGrid& truth)
         for (const Cell& cell : a->cells)
             if (!find_cell(*b, cell))
                 return fail(ErrorCode::bad_input,
-                            "expected the same cells on both sides, found {} generated and {} true ones: {} lacks {}",
+                            "expected the same voxels on both sides, found {} generated and {} true ones: {} lacks {}",
                             generated.cells.size(), truth.cells.size(), name, text_of(cell));
     size_t different = 0, first = 0;
     for (size_t i = truth.cells.size(); i-- > 0;)
@@ -35,7 +35,7 @@ Status check_cells(const VoxelGrid& generated, const VoxelGrid& truth)
         }
     if (different)
         return fail(ErrorCode::bad_input,
-                    "expected the same labels on both sides, found {} cells that differ: {} is {} "
+                    "expected the same labels on both sides, found {} voxels that differ: {} is {} "
                     "generated, {} in truth",
                     different, text_of(truth.cells[first]), kPalette[generated.labels[first]].name,
                     kPalette[truth.labels[first]].name);
@@ -51,11 +51,11 @@ Status check_comparable(const VoxelGrid& generated, const VoxelGrid& truth, cons
         return fail(ErrorCode::bad_input, "expected one voxel size, found {} m generated and {} m in truth",
                     generated.voxel_size, truth.voxel_size);
     if (generated.points_per_voxel != truth.points_per_voxel)
-        return fail(ErrorCode::bad_input, "expected as many points a cell, found {} generated and {} in truth",
+        return fail(ErrorCode::bad_input, "expected as many points a voxel, found {} generated and {} in truth",
                     generated.points_per_voxel, truth.points_per_voxel);
     const double farthest = kMostReach * double(truth.voxel_size);
     if (!(o.radius > 0 && o.radius <= farthest))
-        return fail(ErrorCode::bad_input, "expected a radius of at most {} cells, {:.6g} m, found {} m", kMostReach,
+        return fail(ErrorCode::bad_input, "expected a radius of at most {} voxels, {:.6g} m, found {} m", kMostReach,
                     farthest, o.radius);
     return check_cells(generated, truth);
 }
@@ -77,7 +77,7 @@ void add_colors(const VoxelGrid& generated, const VoxelGrid& truth, size_t cell,
     }
 }
 
-// points of the used cells of a class (kNoLabel: of all), metres from the middle of the grid
+// points of the used voxels of a class (kNoLabel: of all), metres from the middle of the grid
 std::vector<PointRow> rows_of(const VoxelGrid& grid, std::span<const uint8_t> used, uint8_t label,
                               const std::array<double, 3>& middle)
 {
@@ -97,7 +97,7 @@ std::vector<PointRow> rows_of(const VoxelGrid& grid, std::span<const uint8_t> us
     return rows;
 }
 
-std::array<double, 3> middle_of(const VoxelGrid& grid) // in cells
+std::array<double, 3> middle_of(const VoxelGrid& grid) // in voxels
 {
     std::array<double, 3> middle;
     for (size_t a = 0; a < 3; ++a) {
@@ -112,7 +112,7 @@ Status add_distances(Device& device, const VoxelGrid& generated, const VoxelGrid
 {
     const std::array<double, 3> middle = middle_of(truth);
     const std::vector<PointRow> a = rows_of(generated, used, label, middle), b = rows_of(truth, used, label, middle);
-    // both sides have points in the same cells, so that none is further away than the diagonal of a cell
+    // both sides have points in the same voxels, so that none is further away than the diagonal of a voxel
     const NearestPointsOptions search{.cell_size = truth.voxel_size / 2, .first_radius = 1.75f * truth.voxel_size};
     const auto sum = [](const std::vector<double>& d) { return std::accumulate(d.begin(), d.end(), 0.0); };
     SR_TRY(const std::vector<double> there, nearest_distances(device, a, b, search));
@@ -183,7 +183,7 @@ Result<PointScores> score_points(Device& device, const VoxelGrid& generated, con
             ++scores.left_out;
     }
     if (scores.left_out == used.size())
-        return fail(ErrorCode::bad_input, "none of {} cells is generated on both sides", used.size());
+        return fail(ErrorCode::bad_input, "none of {} voxels is generated on both sides", used.size());
     const auto contrast_of_generated = local_contrast(generated, used, options);
     const auto contrast_of_truth = local_contrast(truth, used, options);
     const auto variety_of_generated = color_variety(generated, used), variety_of_truth = color_variety(truth, used);

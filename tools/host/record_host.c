@@ -101,7 +101,7 @@ static const struct frame* run_frame(struct host* host, double x)
     return frame;
 }
 
-/* a block of cells ahead is set anew from time to time, as by a player */
+/* a block of voxels ahead is set anew from time to time, as by a player */
 static void put_block(struct host* host, double x)
 {
     const sr_cell cell = {(int32_t)(x / VOXEL) + 6, 2, 0, 2};

@@ -10,7 +10,7 @@
 
 #define VOXEL 0.6 /* metres, of the models */
 
-/* one column of cells of a window at a time; how high it is depends on j, across the street */
+/* one column of voxels of a window at a time; how high it is depends on j, across the street */
 static sr_status street_labels(void* user, const sr_cell_rect* window, sr_grid* grid)
 {
     int32_t i, j, k;

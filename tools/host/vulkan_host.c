@@ -231,7 +231,7 @@ static int show(struct window* w, sr_world* world, const sr_draw_desc* draw, int
     return result == VK_SUCCESS;
 }
 
-/* a block of three cells where the camera looks, four metres ahead */
+/* a block of three voxels where the camera looks, four metres ahead */
 static void put_block(struct gpu* gpu, sr_world* world, const struct drive* d)
 {
     sr_cell cells[3];

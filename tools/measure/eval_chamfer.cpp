@@ -32,7 +32,7 @@ struct EvalChamferArguments {
 };
 
 struct Measure {
-    size_t points; // of a cell; of a cloud, in all
+    size_t points; // of a voxel; of a cloud, in all
     size_t cells;  // of a cloud none
     Chamfer chamfer;
 };
@@ -83,7 +83,7 @@ bool is_mesh(const Path& path, bool cloud)
     return !cloud && path.extension() != ".sgrid" && !is_folder(path);
 }
 
-// of a grid, whose cells may lie as those of a mesh, or of a cloud in metres
+// of a grid, whose voxels may lie as those of a mesh, or of a cloud in metres
 Result<MeasuredPoints> load_points(const std::string& path, double scale, const Globals& globals, Measure& m,
                                    const Mesh* mesh = nullptr)
 {
@@ -106,7 +106,7 @@ Result<MeasuredPoints> load_points(const std::string& path, double scale, const 
         m.cells = grid.cells.size();
     }
     if (points.positions.empty())
-        return fail(ErrorCode::bad_input, "{}: no cell has points yet", quote_path(path));
+        return fail(ErrorCode::bad_input, "{}: no voxel has points yet", quote_path(path));
     return points;
 }
 
@@ -215,8 +215,8 @@ void add_eval_chamfer(CLI::App& eval, const Globals& globals, Run& run)
     c->add_option("TRUTH", o->mesh, "a mesh (.obj, .ply, .glb or .gltf), a cloud (a .ply without faces), or an .sgrid")
         ->required();
     c->add_option("POINTS", o->grid, ".sgrid, or a cloud; without one the mesh is voxelized");
-    c->add_option("--sweep", o->sweep, "grids of FIRST..LAST points a cell, doubled each time (and 20), or ..:STEP");
-    add_number(*c, "--points", o->voxelize.points_per_voxel, "of a cell (20)", 1, 4096);
+    c->add_option("--sweep", o->sweep, "grids of FIRST..LAST points a voxel, doubled each time (and 20), or ..:STEP");
+    add_number(*c, "--points", o->voxelize.points_per_voxel, "of a voxel (20)", 1, 4096);
     add_number(*c, "--voxel-size", o->voxelize.voxel_size, "metres (0.6)", 0.001, 1000.0);
     add_number(*c, "--samples", o->chamfer.samples, "of the surface (200000)", 1, 1 << 26);
     add_number_function<uint64_t>(*c, "--seed", [o](uint64_t seed) { o->voxelize.seed = o->chamfer.seed = seed; },

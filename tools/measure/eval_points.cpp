@@ -132,7 +132,7 @@ void print_row(std::string_view name, const ClassScores& s)
 
 void print(const PointScores& s, size_t pairs)
 {
-    fmt::print("{} pair{}, {} cells, {} left out\n", pairs, pairs == 1 ? "" : "s", s.all.cells, s.left_out);
+    fmt::print("{} pair{}, {} voxels, {} left out\n", pairs, pairs == 1 ? "" : "s", s.all.cells, s.left_out);
     fmt::print("{:>22} {:>15} {:>9} {:>24} {:>17} {:>17}\n", "", "colour error", "Chamfer", "sharpness", "contrast",
                "edges");
     fmt::print("{:13} {:>8} {:>7} {:>7} {:>9} {:>9} {:>7} {:>6} {:>9} {:>7} {:>9} {:>7}\n", "class", "cells", "mean",

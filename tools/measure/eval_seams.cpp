@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// semrover eval seams GRID: how far colours differ from one cell to the next, across the borders of tiles and inside
-#include "engine/job/generation_settings.h"
+// semrover eval seams GRID: how far colours differ from one voxel to the next, across the borders of tiles and inside
 #include "engine/scene/tiles.h"
+#include "engine/world/generation_settings.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/number_option.h"
@@ -52,7 +52,7 @@ Status eval_seams(const EvalSeamsArguments& o, const Globals& globals)
 void add_eval_seams(CLI::App& eval, const Globals& globals, Run& run)
 {
     auto o = std::make_shared<EvalSeamsArguments>();
-    CLI::App* c = eval.add_subcommand("seams", "steps of colour between neighbouring cells, across tiles and inside");
+    CLI::App* c = eval.add_subcommand("seams", "steps of colour between neighbouring voxels, across tiles and inside");
     c->add_option("GRID", o->grid, ".sgrid with points, or a folder of tiles")->required();
     add_number(*c, "--tile-size", o->tile_size, "metres of a tile's edge (9.6)", 0.01, 1e6);
     c->callback([o, &globals, &run] { run = [o, &globals] { return eval_seams(*o, globals); }; });

@@ -48,7 +48,7 @@ std::string about_text(const PageContent& c)
     if (!c.about.empty())
         return c.about;
     const auto& [name, grid, hash, points] = c.scenes[0];
-    std::string out = fmt::format("{} labelled cells of {:g} m", counted(grid.cells.size()), grid.voxel_size);
+    std::string out = fmt::format("{} labelled voxels of {:g} m", counted(grid.cells.size()), grid.voxel_size);
     if (!points.centers)
         out += fmt::format(", with {} coloured points on their surfaces", counted(points.total));
     if (!c.pictures.names.empty())
@@ -75,7 +75,7 @@ std::string orbit_html(const PagePoints& points)
 {
     std::string caption;
     if (points.centers)
-        caption = "Each dot is the middle of a cell. ";
+        caption = "Each dot is the middle of a voxel. ";
     else if (points.count < points.total)
         caption = fmt::format("{} of {} points. ", counted(points.count), counted(points.total));
     caption += "Drag to turn, drag with the right button or two fingers to move, click and then scroll to come closer, "

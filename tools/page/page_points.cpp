@@ -25,7 +25,7 @@ ScenePoints centers_of(const VoxelGrid& grid)
     return out;
 }
 
-// a surface of about a face a cell, with all its points scattered on it: twice the spacing leaves
+// a surface of about a face a voxel, with all its points scattered on it: twice the spacing leaves
 // 4% of it open
 double diameter_of(const VoxelGrid& grid, const PagePoints& p)
 {
@@ -50,7 +50,7 @@ void set_scale(PagePoints& p, const ScenePoints& points)
 
 PagePoints page_points(const VoxelGrid& grid, uint64_t limit)
 {
-    SR_ASSERT(limit > 0 && !grid.cells.empty(), "{} points of {} cells", limit, grid.cells.size());
+    SR_ASSERT(limit > 0 && !grid.cells.empty(), "{} points of {} voxels", limit, grid.cells.size());
     ScenePoints points = points_of(grid);
     PagePoints p;
     p.centers = points.size() == 0;

@@ -8,13 +8,13 @@
 
 namespace semrover {
 
-// the points of a grid as a page draws them. Where no cell has points, the cells' centres stand for them, in the
+// the points of a grid as a page draws them. Where no voxel has points, the cells' centres stand for them, in the
 // colours of their labels.
 struct PagePoints {
     uint64_t count = 0, total = 0;     // points kept, points of the grid
     std::array<double, 3> low{}, step; // metres: a coordinate q is low + q * step, q of 0..65535
     double diameter = 0;               // metres, of a point, so that neighbours touch
-    bool centers = false;              // not points but cells
+    bool centers = false;              // not points but voxels
     std::vector<std::byte> bytes;      // [count, 3] u16 little endian, [count, 3] u8 sRGB, [count] u8 label
 };
 

@@ -168,7 +168,7 @@ std::string class_table(const VoxelGrid& grid)
     std::iota(order.begin(), order.end(), size_t(0));
     std::ranges::stable_sort(order, std::greater(), [&](size_t i) { return counts[i]; });
     std::string out = "<table class=\"classes\"><thead><tr><th scope=\"col\">Class</th><th></th>"
-                      "<th scope=\"col\" class=\"number\">Cells</th><th scope=\"col\" class=\"number\">Share</th></tr>"
+                      "<th scope=\"col\" class=\"number\">Voxels</th><th scope=\"col\" class=\"number\">Share</th></tr>"
                       "</thead>\n<tbody>\n";
     for (const size_t i : order) {
         if (counts[i] == 0)
@@ -193,9 +193,9 @@ std::string grid_facts(const VoxelGrid& grid, std::string_view xxh64)
     append_fact(out, "voxel size", fmt::format("{:g} m", grid.voxel_size));
     if (grid.has_points()) {
         const uint64_t points = (grid.cells.size() - without) * uint64_t(grid.points_per_voxel);
-        append_fact(out, "points", fmt::format("{}, {} in a cell", counted(points), grid.points_per_voxel));
+        append_fact(out, "points", fmt::format("{}, {} in a voxel", counted(points), grid.points_per_voxel));
         if (without)
-            append_fact(out, "cells without points", counted(without));
+            append_fact(out, "voxels without points", counted(without));
     } else {
         append_fact(out, "points", "none, only labels");
     }

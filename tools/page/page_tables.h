@@ -12,7 +12,7 @@ namespace semrover {
 
 // tables of a page, as HTML
 
-std::string class_table(const VoxelGrid& grid);                        // cells of each class, most first
+std::string class_table(const VoxelGrid& grid);                        // voxels of each class, most first
 std::string grid_facts(const VoxelGrid& grid, std::string_view xxh64); // sizes, extent, and what its metadata says
 
 // run.json of a run folder (run_folder.h)

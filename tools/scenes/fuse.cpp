@@ -227,7 +227,7 @@ Status run_fuse(FuseArguments o, const Globals& globals)
     if (globals.json)
         fmt::print("{}\n", figures.dump());
     else
-        fmt::print("{} frames: {} faces, {} cells in {}\n", folder.cameras().size(), fused.mesh.faces.size(),
+        fmt::print("{} frames: {} faces, {} voxels in {}\n", folder.cameras().size(), fused.mesh.faces.size(),
                    grids.semantic.cells.size(), quote_path(o.output));
     return {};
 }
@@ -273,7 +273,7 @@ void add_fuse(CLI::App& app, const Globals& globals, Run& run)
         ->delimiter(',');
     c->add_option("--default-label", o->default_label, "class of what has no label; none: not in the grids");
     add_number(*c, "--voxel-size", o->voxels.voxel_size, "metres, of the grids; 0.6", 0.05, 100.0);
-    add_number(*c, "--points", o->voxels.points_per_voxel, "points of a cell; 20", 1, 4096);
+    add_number(*c, "--points", o->voxels.points_per_voxel, "points of a voxel; 20", 1, 4096);
     add_seed(*c, "-s,--seed", o->voxels.seed, "of the points; 0");
     add_choice(*c, "--mesh-format", {"glb", "ply"}, "glb or ply; glb", o->mesh_format);
     c->callback([o, &globals, &run] { run = [o, &globals] { return run_fuse(*o, globals); }; });

@@ -10,11 +10,12 @@ namespace semrover {
 // --placement of the commands that place points
 inline CLI::Option* add_placement(CLI::App& c, VoxelizeOptions& o)
 {
-    return add_choice(c, "--placement", {"shifted", "canonical"},
-                      "shifted (a lattice with a random shift in each cell) or canonical (the same in every flat cell)",
-                      [&o](const std::string& text) {
-                          o.placement = text == "canonical" ? PointPlacement::canonical : PointPlacement::shifted;
-                      });
+    return add_choice(
+        c, "--placement", {"shifted", "canonical"},
+        "shifted (a lattice with a random shift in each voxel) or canonical (the same in every flat voxel)",
+        [&o](const std::string& text) {
+            o.placement = text == "canonical" ? PointPlacement::canonical : PointPlacement::shifted;
+        });
 }
 
 } // namespace semrover

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover streets -o DIR: makes up a street: a textured, labelled mesh, its grids, a drive, and with --images pictures
+#include "engine/conditioning/cell_objects.h"
 #include "engine/mesh/mesh_files.h"
-#include "engine/scene/cell_objects.h"
 #include "engine/scene/palette.h"
 #include "runtime/base/json.h"
 #include "tools/cli/commands.h"
@@ -161,7 +161,7 @@ void add_streets(CLI::App& app, const Globals& globals, Run& run)
     seen->excludes(no_grids);
     add_number(*c, "--reach", o->sight.reach, "metres that --seen looks", 1.0, 1000.0)->needs(seen);
     add_number(*c, "--voxel-size", o->voxels.voxel_size, "metres", 0.05f, 10.f)->excludes(no_grids);
-    add_number(*c, "--points", o->voxels.points_per_voxel, "points of a cell", 1, 4096)->excludes(no_grids);
+    add_number(*c, "--points", o->voxels.points_per_voxel, "points of a voxel", 1, 4096)->excludes(no_grids);
     add_placement(*c, o->voxels)->excludes(no_grids);
     CLI::Option* images = c->add_flag("--images", o->pictures,
                                       "also pictures of both drives: {color,depth,normal,label,visible}/000000.png");

@@ -117,7 +117,7 @@ Result<Mesh> load_mesh(const VoxelizeArguments& o, const Globals& globals)
 Status write_points(const std::string& path, const VoxelGrid& grid)
 {
     const ScenePoints points = points_of(grid);
-    Surfels s;
+    Splats s;
     s.position = points.positions;
     s.color = points.colors;
     s.label.assign(points.labels.begin(), points.labels.end());
@@ -144,7 +144,7 @@ void report(const VoxelizeArguments& o, const Globals& globals, const VoxelizedM
                                 {"labels", labels}}
                                .dump());
     } else if (!globals.quiet) {
-        fmt::print("{}: {} cells of {} m, {} points each, {:.6g} m^2 of {} faces\n", printable(o.output),
+        fmt::print("{}: {} voxels of {} m, {} points each, {:.6g} m^2 of {} faces\n", printable(o.output),
                    v.grid.cells.size(), v.grid.voxel_size, v.grid.points_per_voxel, area, mesh.faces.size());
         for (size_t i = 0; i < kClassCount; ++i)
             if (counts[i])
@@ -178,11 +178,11 @@ Status run_voxelize(VoxelizeArguments o, const Globals& globals)
 void add_voxelize(CLI::App& app, const Globals& globals, Run& run)
 {
     auto o = std::make_shared<VoxelizeArguments>();
-    CLI::App* c = app.add_subcommand("voxelize", "a textured mesh as a grid of labelled cells and coloured points");
+    CLI::App* c = app.add_subcommand("voxelize", "a textured mesh as a grid of labelled voxels and coloured points");
     c->add_option("MESH", o->mesh, ".obj, .ply, .stl, .off, .glb or .gltf")->required();
     c->add_option("-o,--output", o->output, ".sgrid")->required();
     add_number(*c, "--voxel-size", o->voxelize.voxel_size, "metres (0.6)", 0.001, 1000.0);
-    add_number(*c, "--points", o->voxelize.points_per_voxel, "of a cell (20)", 1, 4096);
+    add_number(*c, "--points", o->voxelize.points_per_voxel, "of a voxel (20)", 1, 4096);
     add_seed(*c, "--seed", o->voxelize.seed, "of the points (0)");
     add_placement(*c, o->voxelize);
     add_number(*c, "--min-area", o->voxelize.min_area,

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/scene/scene_objects.h"
+#include "engine/conditioning/scene_objects.h"
 #include "tools/streets/road_network.h"
 
 namespace semrover {

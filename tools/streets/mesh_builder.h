@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/conditioning/scene_objects.h"
 #include "engine/mesh/mesh.h"
-#include "engine/scene/scene_objects.h"
 #include "tools/streets/pattern.h"
 #include "tools/streets/vector3.h"
 

@@ -108,7 +108,7 @@ void PatternCanvas::letters(double u0, double v0, double u1, double v1, int coun
 
 void PatternCanvas::sign_text(std::string_view text, double u0, double v0, double u1, double v1, const Rgb& color)
 {
-    // segments of a letter on a grid of 2 x 4 half cells: pairs of points "xy", x 0..2, y 0..4
+    // segments of a letter on a grid of 2 x 4 half voxels: pairs of points "xy", x 0..2, y 0..4
     const auto strokes = [](char c) -> std::string_view {
         switch (c) {
         case 'S':

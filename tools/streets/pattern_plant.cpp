@@ -9,7 +9,7 @@ namespace semrover::paint {
 
 namespace {
 
-// many leaves over each other: cells of a noise, each with a tone of its own, dark where they part
+// many leaves over each other: voxels of a noise, each with a tone of its own, dark where they part
 void leaves(PatternCanvas& canvas, int cells, double depth)
 {
     canvas.each([&](double u, double v, const Rgb&) {

@@ -53,7 +53,7 @@ std::vector<Point3> eyes_along(std::span<const CameraPath> paths, double spacing
     return eyes;
 }
 
-// the cell of a hit; a surface that lies between two cells belongs to the occupied one
+// the voxel of a hit; a surface that lies between two voxels belongs to the occupied one
 std::optional<size_t> cell_of(const VoxelGrid& grid, const Ray& ray, double t)
 {
     for (double step : {0.0, 1e-3, -1e-3}) {

@@ -15,8 +15,8 @@ struct SeenOptions {
     double pose_spacing = 0.9; // metres; poses of the path that are nearer to the last one taken are left out
 };
 
-// Indices of the cells, ascending, that somebody who moves along the paths sees: those that hold the nearest surface on
-// some ray. What a drive records is no more than that; the backs of houses are not in it. Errors: device_lost,
+// Indices of the voxels, ascending, that somebody who moves along the paths sees: those that hold the nearest surface
+// on some ray. What a drive records is no more than that; the backs of houses are not in it. Errors: device_lost,
 // out_of_memory
 Result<std::vector<uint32_t>> seen_cells(Device& device, const Mesh& mesh, const VoxelGrid& grid,
                                          std::span<const CameraPath> paths, const SeenOptions& options = {});

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/conditioning/scene_objects.h"
 #include "engine/mesh/mesh.h"
 #include "engine/scene/grid.h"
-#include "engine/scene/scene_objects.h"
 #include "tools/streets/road_network.h"
 #include "tools/trajectory/camera_path.h"
 

@@ -24,7 +24,7 @@ Mesh part_of(const Mesh& mesh, uint8_t wanted)
     return part;
 }
 
-// Cells with enough of a mesh; none, where cells are so large that it is too narrow for all of them: an error of the
+// Voxels with enough of a mesh; none, where voxels are so large that it is too narrow for all of them: an error of the
 // voxelizer then, unless cells with as little as `least` of it are found.
 Result<std::vector<Cell>> cells_of(Device& device, const Mesh& mesh, VoxelizeOptions options, float least)
 {

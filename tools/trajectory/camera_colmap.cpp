@@ -98,7 +98,7 @@ std::string camera_line(const Intrinsics& k, size_t id)
 }
 
 // POINT3D_ID X Y Z R G B ERROR TRACK[], the track of no picture
-std::string points_text(const Surfels& points)
+std::string points_text(const Splats& points)
 {
     std::string text = "# POINT3D_ID X Y Z R G B ERROR TRACK[]\n";
     for (size_t i = 0; i < points.position.size(); ++i) {
@@ -145,7 +145,7 @@ std::string colmap_picture_name(const std::string& camera, uint32_t number, size
     return cameras > 1 ? fmt::format("{0}/{0}_{1:06}.png", camera, number) : picture_name(camera, "color", number);
 }
 
-Status write_colmap(const Path& folder, const CameraPath& cameras, const Surfels& points)
+Status write_colmap(const Path& folder, const CameraPath& cameras, const Splats& points)
 {
     SR_ASSERT(!cameras.frames.empty(), "a trajectory without frames");
     if (is_there(folder / "cameras.bin"))

@@ -21,16 +21,16 @@ Result<SplatImage> run_splat_render(Device& device, const SplatRenderCase& c)
     if (c.view.size() != 16 || c.intrinsics.size() != 9)
         return fail(ErrorCode::bad_input, "splat_render: view of {} numbers, intrinsics of {}", c.view.size(),
                     c.intrinsics.size());
-    Surfels surfels{.position = triples(c.positions),
-                    .normal = triples(c.normals),
-                    .color = triples(c.colors),
-                    .opacity = c.opacities};
+    Splats splats{.position = triples(c.positions),
+                  .normal = triples(c.normals),
+                  .color = triples(c.colors),
+                  .opacity = c.opacities};
     for (size_t i = 0; i + 1 < c.scales.size(); i += 2) {
-        surfels.sigma_u.push_back(c.scales[i]);
-        surfels.sigma_v.push_back(c.scales[i + 1]);
+        splats.sigma_u.push_back(c.scales[i]);
+        splats.sigma_v.push_back(c.scales[i + 1]);
     }
-    surfels.label.resize(surfels.position.size());
-    SR_TRY(const SurfelScene scene, SurfelScene::create(device, surfels));
+    splats.label.resize(splats.position.size());
+    SR_TRY(const SplatScene scene, SplatScene::create(device, splats));
     RasterizerOptions options{.near = c.near,
                               .alpha_min = c.alpha_min,
                               .alpha_max = c.alpha_max,

@@ -29,7 +29,7 @@ Result<Mesh> mesh_of(const GoldenCase& c)
 
 } // namespace
 
-// a cell below min_area may be missing; any other must be there, and none of that size may be there besides
+// a voxel below min_area may be missing; any other must be there, and none of that size may be there besides
 Result<GoldenOutputs> run_mesh_voxelization(Device& device, const GoldenCase& c, DType)
 {
     SR_TRY(const double voxel_size, c.number("voxel_size"));

@@ -29,8 +29,8 @@ struct EvaluationInput {
     std::vector<float> condition;    // [M, W], or nothing
 };
 
-// The reference compares distances of centres that were rounded to float, up to 30 m from the origin: of two cells 3 m
-// apart some then lie beyond 3 m + 1e-6. Cells of the product are integers (neighbor_mask); here the given centres
+// The reference compares distances of centres that were rounded to float, up to 30 m from the origin: of two voxels 3 m
+// apart some then lie beyond 3 m + 1e-6. Voxels of the product are integers (neighbor_mask); here the given centres
 // decide.
 std::vector<uint32_t> mask_of(const TokenSets& sets, const std::vector<float>& centers, float radius)
 {

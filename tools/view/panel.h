@@ -6,7 +6,7 @@ namespace semrover::view {
 
 class Viewer;
 
-// The panels over the picture: figures, what is shown, the picked cell, brush, path, refinement. Between the beginning
+// The panels over the picture: figures, what is shown, the picked voxel, brush, path, refinement. Between the beginning
 // and the end of the overlay's frame
 void draw_panels(Viewer& viewer);
 

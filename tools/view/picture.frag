@@ -8,7 +8,7 @@ layout(push_constant) uniform Push // as in shading.cpp
     vec4 lens;    // fx, fy, cx, cy
     uvec2 size;   // pixels
     uint shown;
-    int brush; // cells around the marked one, -1: none is marked
+    int brush; // voxels around the marked one, -1: none is marked
     ivec3 marked;
     float voxel; // metres
     float range; // metres, at which the depth picture has faded to a third
@@ -35,7 +35,7 @@ vec3 place_of(float z)
     return to_world(at - vec3(rows[0].w, rows[1].w, rows[2].w));
 }
 
-// how near the pixel is to a border of its cell, across the surface: a border that it lies along does not count
+// how near the pixel is to a border of its voxel, across the surface: a border that it lies along does not count
 float border_of(vec3 place, vec3 facing)
 {
     const vec3 inside = fract(place / voxel), away = min(inside, 1 - inside) * voxel;

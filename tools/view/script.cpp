@@ -55,7 +55,7 @@ Done click(Viewer& v, const Given& g)
 {
     SR_CHECK(v.click(g.numbers[0], g.numbers[1]));
     if (!v.picked())
-        return fail(ErrorCode::bad_input, "no cell at pixel ({}, {})", g.numbers[0], g.numbers[1]);
+        return fail(ErrorCode::bad_input, "no voxel at pixel ({}, {})", g.numbers[0], g.numbers[1]);
     return true;
 }
 
@@ -64,7 +64,7 @@ Done paint(Viewer& v, const Given&)
     const size_t before = v.brush.strokes();
     SR_CHECK(v.paint());
     if (v.brush.strokes() == before)
-        return fail(ErrorCode::bad_input, "no cell was changed");
+        return fail(ErrorCode::bad_input, "no voxel was changed");
     return true;
 }
 

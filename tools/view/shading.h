@@ -18,7 +18,7 @@ struct Look {
     std::array<float, 4> lens{};    // fx, fy, cx, cy
     std::array<uint32_t, 2> size{}; // pixels
     Shown shown = Shown::color;
-    int32_t brush = -1; // cells around the marked one; -1: none is marked
+    int32_t brush = -1; // voxels around the marked one; -1: none is marked
     std::array<int32_t, 3> marked{};
     float voxel = 0.6f; // metres
     float range = 15;   // metres, at which the depth picture has faded to a third

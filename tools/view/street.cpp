@@ -47,7 +47,7 @@ Result<std::vector<sr_cell>> cells_of(const sr_grid* grid)
     return cells;
 }
 
-// a road's cell near the middle of all of them, or any cell
+// a road's voxel near the middle of all of them, or any voxel
 sr_cell middle_of(const std::vector<sr_cell>& cells)
 {
     constexpr uint32_t kRoad = 0;
@@ -72,7 +72,7 @@ Result<Camera> start_over(const sr_grid* grid)
     SR_TRY(const sr_grid_info info, info_of(grid));
     SR_TRY(const std::vector<sr_cell> cells, cells_of(grid));
     if (cells.empty())
-        return fail(ErrorCode::bad_input, "a grid without cells");
+        return fail(ErrorCode::bad_input, "a grid without voxels");
     const sr_cell at = middle_of(cells);
     Camera camera;
     camera.position = {(at.i + 0.5) * info.voxel_size, (at.j + 0.5) * info.voxel_size, at.k * info.voxel_size + 1.9};

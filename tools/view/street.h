@@ -23,7 +23,7 @@ struct StreetRequest {
     std::function<void(const std::string&)> warning;
 };
 
-// a finished cell
+// a finished voxel
 struct PlacedCell {
     sr_cell cell{};
     std::vector<std::array<float, 6>> points; // x, y, z, r, g, b
@@ -46,7 +46,7 @@ class Street {
     Result<sr_world_info> info() const;
     Result<std::vector<PlacedCell>> cells(const sr_cell_rect& window) const; // those that are finished
     Status edit(const std::vector<sr_cell>& cells);
-    Status save(const Path& path) const; // all finished cells in memory, as .sgrid
+    Status save(const Path& path) const; // all finished voxels in memory, as .sgrid
 
   private:
     explicit Street(sr_context* context) : context_(context) {}

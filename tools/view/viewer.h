@@ -48,7 +48,7 @@ class Viewer {
     Shown shown() const { return shown_; }
     Status show(Shown shown);         // usage: no refined frame yet
     Status click(double x, double y); // a pixel of the last picture; picked() is none where nothing is
-    Status paint();                   // around the picked cell. usage: none is picked
+    Status paint();                   // around the picked voxel. usage: none is picked
     Status undo();
     Status refine(); // what the camera sees; shown when it is finished, until the camera moves
     Status save_path(const Path& path) const;
@@ -96,7 +96,7 @@ class Viewer {
     Shown shown_ = Shown::color, before_refined_ = Shown::color;
     Camera drawn_camera_, refined_camera_;
     bool refined_there_ = false, quitting_ = false;
-    bool repick_ = false; // the picked cell may have another label and other points once all is finished
+    bool repick_ = false; // the picked voxel may have another label and other points once all is finished
     std::optional<size_t> playing_;
     std::optional<PickedCell> picked_;
     Path wanted_picture_;

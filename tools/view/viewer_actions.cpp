@@ -43,10 +43,10 @@ Status Viewer::click(double x, double y)
 Status Viewer::paint()
 {
     if (!picked_)
-        return fail(ErrorCode::usage, "no cell is picked");
+        return fail(ErrorCode::usage, "no voxel is picked");
     SR_TRY(const size_t cells, brush.paint(*street_, picked_->cell));
     repick_ = true;
-    note(fmt::format("{} cells changed", cells));
+    note(fmt::format("{} voxels changed", cells));
     return {};
 }
 
@@ -54,7 +54,7 @@ Status Viewer::undo()
 {
     SR_TRY(const size_t cells, brush.undo(*street_));
     repick_ = true;
-    note(fmt::format("{} cells changed back", cells));
+    note(fmt::format("{} voxels changed back", cells));
     return {};
 }
 

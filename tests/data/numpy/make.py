@@ -13,7 +13,7 @@ def path(name):
     return os.path.join(here, name)
 
 
-# a grid as numpy users would write it: int64 by default, cells unsorted, points in float32
+# a grid as numpy users would write it: int64 by default, voxels unsorted, points in float32
 cells = np.array([[2, 0, -1], [0, -5, 3]])
 labels = np.array([19, 4])
 points = (np.arange(18).reshape(2, 3, 3) - 9).astype(np.float32) / 32

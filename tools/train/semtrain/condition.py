@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a transformer is told of a cell beside its label (docs/method.md §2.1): where it lies in the box of its object,
+"""What a transformer is told of a voxel beside its label (docs/method.md §2.1): where it lies in the box of its object,
 a colour, and where it lies in the box of a part, a window. What is not given is zeros, and its flag is 0."""
 import math
 
@@ -10,11 +10,11 @@ from .objects import has_box, place_in
 
 WIDTHS = {"object": 60, "tint": 4, "part": 64}
 WAVES = (1.0, 2.0, 4.0, 8.0)  # metres
-NEAREST, FARTHEST = -2.0, 8.0  # metres from a face, beyond which a cell is taken to lie there
+NEAREST, FARTHEST = -2.0, 8.0  # metres from a face, beyond which a voxel is taken to lie there
 
 
 def width_of(condition):
-    """numbers of a cell, for a list of parts"""
+    """numbers of a voxel, for a list of parts"""
     return sum(WIDTHS[part] for part in condition)
 
 
@@ -39,7 +39,7 @@ def tint_part(tints, given):
 
 
 def vector_of(condition, centers, boxes, has_box, tints, has_tint, of_part=None):
-    """what `condition` lists for N cells, in its order; of_part: the same four of the parts that they lie in or beside,
+    """what `condition` lists for N voxels, in its order; of_part: the same four of the parts that they lie in or beside,
     needed where "part" is listed -> f32 [N, width_of(condition)]"""
     def both(boxes, has_box, tints, has_tint):
         return np.concatenate([object_part(centers, boxes, has_box), tint_part(tints, has_tint)], 1)
@@ -57,7 +57,7 @@ def mirrored(boxes, axis):
 
 
 def share_told(random, config):
-    """of the objects or cells of a set: none with a chance of `dropout`; else all, but with a chance of `partial` any
+    """of the objects or voxels of a set: none with a chance of `dropout`; else all, but with a chance of `partial` any
     share"""
     if random.random() < config["dropout"]:
         return 0.0
@@ -65,21 +65,21 @@ def share_told(random, config):
 
 
 def told_boxes(random, owners, labels, config):
-    """which cells are told the box of their object -> bool [N]; an object is told as a whole"""
+    """which voxels are told the box of their object -> bool [N]; an object is told as a whole"""
     _, of_cells = np.unique(owners, return_inverse=True)
     share = share_told(random, config)
     return has_box(owners, labels) & (random.random(of_cells.max() + 1) < share)[of_cells]
 
 
 def told_parts(random, parts, config):
-    """which cells are told the part that they lie in or beside -> bool [N]; a part is told as a whole"""
+    """which voxels are told the part that they lie in or beside -> bool [N]; a part is told as a whole"""
     _, of_cells = np.unique(parts, return_inverse=True)
     share = share_told(random, config)
     return (parts >= 0) & (random.random(of_cells.max() + 1) < share)[of_cells]
 
 
 def told_tints(random, owners, config):
-    """which cells are told a colour -> bool [N]"""
+    """which voxels are told a colour -> bool [N]"""
     share = share_told(random, config)
     return (owners >= 0) & (random.random(len(owners)) < share)
 
@@ -97,7 +97,7 @@ def drawn_boxes(random, owners, boxes, config):
 
 
 def drawn_tints(random, owners, local, whole, config):
-    """colours 0..1 as somebody might give them: of the whole object or, with a chance of `local`, those near the cell;
+    """colours 0..1 as somebody might give them: of the whole object or, with a chance of `local`, those near the voxel;
     each object's off by `noise`"""
     tints = (local if random.random() < config["local"] else whole).astype(np.float64)
     _, of_cells = np.unique(owners, return_inverse=True)

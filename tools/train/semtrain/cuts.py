@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""Pieces of streets: the cells of a grid in a slab across it, or in a part of one, as a true and as a semantic grid.
+"""Pieces of streets: the voxels of a grid in a slab across it, or in a part of one, as a true and as a semantic grid.
 Small enough to generate with many settings."""
 import argparse
 import math
@@ -14,7 +14,7 @@ from .grids import find_grids
 
 
 def cut_grid(path, folder, along, across):
-    """cells whose centres lie within along = (low, high) metres of x, and within across of y
+    """voxels whose centres lie within along = (low, high) metres of x, and within across of y
     -> FOLDER/truth/NAME.sgrid, FOLDER/semantic/NAME.sgrid; NAME is that of the grid's folder. The street's objects and
     labels go whole to FOLDER/objects/NAME.json and FOLDER/street/NAME.sgrid"""
     tensors, metadata = safetensors_file.read(path), safetensors_file.read_header(path)[1]

@@ -45,7 +45,7 @@ class Teacher:
     @torch.no_grad()
     def x0_of(self, first, count, x, known, random, labels, centers, valid, condition):
         """x [B, N, 6n] before the steps `first` [B] -> the x0 [B, N, 6n] with which one step has the mean that `count`
-        of the teacher have, with the noise that its sampler adds between them. Known cells stay as they are"""
+        of the teacher have, with the noise that its sampler adds between them. Known voxels stay as they are"""
         total, share = torch.zeros_like(x), torch.zeros(len(x), 1, 1, device=x.device)
         for row in range(count):
             t, of_x0, of_x, fresh = (part[first + row] for part in self.steps)
@@ -60,7 +60,7 @@ class Teacher:
 
 
 class Distillation:
-    """what a step trains on: sets of real cells with noise on them, and what the teacher makes of these"""
+    """what a step trains on: sets of real voxels with noise on them, and what the teacher makes of these"""
 
     def __init__(self, teacher, sets, config):
         self.teacher, self.sets, self.config = teacher, sets, config
@@ -70,7 +70,7 @@ class Distillation:
 
     def drawn(self, step, rows=None):
         """rows [B]: which of the student's steps, drawn where it is None -> x, t, the other inputs of a network, the
-        teacher's x0, the cells that are not known"""
+        teacher's x0, the voxels that are not known"""
         config, random = self.config, generator(self.config, step)
         centers, labels, tokens, known, condition = (
             torch.from_numpy(part).to(config["device"]) for part in self.sets.batch(step))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""Σ-Voxfield grids (.sgrid) as training data: tokens of all cells of many grids in one array, and local sets of them."""
+"""Σ-Voxfield grids (.sgrid) as training data: tokens of all voxels of many grids in one array, and local sets of them."""
 import glob
 import os
 
@@ -27,7 +27,7 @@ def find_grids(sources):
 
 
 def read_grid(path):
-    """-> {cells i32 [V, 3], labels u8 [V], points f16 [V, n, 3], colors u8 [V, n, 3]} of the cells that have points, and
+    """-> {cells i32 [V, 3], labels u8 [V], points f16 [V, n, 3], colors u8 [V, n, 3]} of the voxels that have points, and
     voxel size in metres"""
     t = {name: tensor.numpy() for name, tensor in safetensors_file.read(path).items()}
     if "points" not in t:
@@ -37,14 +37,14 @@ def read_grid(path):
 
 
 def token_order(points):
-    """points [V, n, 3 or more] -> [V, n, 1]: nearest to the cell's centre first, ties by x, y, z"""
+    """points [V, n, 3 or more] -> [V, n, 1]: nearest to the voxel's centre first, ties by x, y, z"""
     x, y, z = points[..., 0], points[..., 1], points[..., 2]
     return np.lexsort((z, y, x, (points[..., :3] ** 2).sum(-1)), axis=-1)[..., None]
 
 
 def read_tokens(path):
-    """-> cells i32 [V, 3], labels u8 [V], tokens f16 [V, 6n] in [-1, 1], the point nearest the cell's centre first
-    (ties by x, y, z); only cells that have points"""
+    """-> voxels i32 [V, 3], labels u8 [V], tokens f16 [V, 6n] in [-1, 1], the point nearest the voxel's centre first
+    (ties by x, y, z); only voxels that have points"""
     t, size = read_grid(path)
     points, colors = t["points"].astype(np.float32), t["colors"].astype(np.float32)
     order = token_order(points)
@@ -59,7 +59,7 @@ def placement_of(path):
 
 
 def read_owners(path, cells, labels):
-    """the objects.json beside a .sgrid, if there is one -> owners i32 [V], tints near each cell u8 [V, 3], boxes
+    """the objects.json beside a .sgrid, if there is one -> owners i32 [V], tints near each voxel u8 [V, 3], boxes
     f64 [O, 7], tints of the objects f32 [O, 3]; of the parts owners, boxes and tints"""
     grid, size = read_grid(path)
     centers = (cells + 0.5) * size
@@ -68,7 +68,7 @@ def read_owners(path, cells, labels):
 
 
 class Grids:
-    """All grids of some sources, kept as one file each of cells, labels, tokens and what their objects are under
+    """All grids of some sources, kept as one file each of voxels, labels, tokens and what their objects are under
     `cache`, mapped to memory. They are made anew when the bytes of a grid or of its objects are other ones."""
 
     ARRAYS = ("cells", "labels", "tokens", "owners", "local_tints", "boxes", "tints", "parts", "part_boxes", "part_tints")
@@ -107,7 +107,7 @@ class Grids:
         return (cells, labels, tokens, *read_owners(path, cells, labels))
 
     def balance(self, power):
-        """for each grid, how likely its cells are the middle of a set: frequency of the class to -power"""
+        """for each grid, how likely its voxels are the middle of a set: frequency of the class to -power"""
         counts = np.bincount(self.labels, minlength=256).astype(np.float64)
         weights = np.where(counts > 0, np.maximum(counts, 1) ** -power, 0)
         sums = []
@@ -118,7 +118,7 @@ class Grids:
 
 
 class LocalSets:
-    """Batches of sets of neighbouring cells: the `size` cells that are nearest to one that is drawn."""
+    """Batches of sets of neighbouring voxels: the `size` voxels that are nearest to one that is drawn."""
 
     def __init__(self, grids, config):
         self.grids, self.config = grids, config
@@ -175,7 +175,7 @@ class LocalSets:
         return drawn_boxes(random, parts, boxes, config), told, tints, has_tint
 
     def _set(self, random, size):
-        """-> centers, labels, tokens, which cells of the grids these are, and the boxes of their objects and parts"""
+        """-> centers, labels, tokens, which voxels of the grids these are, and the boxes of their objects and parts"""
         g = int(random.integers(len(self.near)))
         cells, first = self.near[g], self.grids.offsets[g]
         middle = min(int(np.searchsorted(self.sums[g], random.random())), len(cells) - 1)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""Cells of a training set that are given, as where a region borders on what has been generated before."""
+"""Voxels of a training set that are given, as where a region borders on what has been generated before."""
 import numpy as np
 
 

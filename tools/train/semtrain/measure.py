@@ -57,8 +57,8 @@ def measure(cuts, models, samplers, steps, guidances, tellings, output):
 
 
 def line_of(row):
-    """| model | sampler | steps | guidance | told | mean colour error of CLASSES | all: cell colour error | Chamfer |
-    sharpness of windows and markings, detail of buildings and cars, spread of cars, against the truth's | ms a cell |"""
+    """| model | sampler | steps | guidance | told | mean colour error of CLASSES | all: voxel colour error | Chamfer |
+    sharpness of windows and markings, detail of buildings and cars, spread of cars, against the truth's | ms a voxel |"""
     classes, every = row["scores"]["classes"], row["scores"]["all"]
 
     def ratio(name, figure="sharpness"):
@@ -85,8 +85,8 @@ def main(arguments=None):
     models = [item.split("=", 1) for item in options.model]
     keep_made_of(options.output, {"cuts": digest_of_folder(options.cuts),
                                   **{f"model {name}": digest_of_folder(folder) for name, folder in models}})
-    head = ["model", "sampler", "steps", "guidance", "told", *CLASSES, "cell colour", "Chamfer m", "windows", "markings",
-            "detail", "of cars", "spread of cars", "ms a cell"]
+    head = ["model", "sampler", "steps", "guidance", "told", *CLASSES, "voxel colour", "Chamfer m", "windows", "markings",
+            "detail", "of cars", "spread of cars", "ms a voxel"]
     print("| " + " | ".join(head) + " |\n|" + "---|" * len(head))
     rows = measure(options.cuts, models, options.sampler, options.steps, options.guidance, options.objects,
                    options.output)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""Objects of a scene (docs/formats.md §2.8): which cells are theirs, and which colours these have."""
+"""Objects of a scene (docs/formats.md §2.8): which voxels are theirs, and which colours these have."""
 import os
 
 import numpy as np
@@ -45,7 +45,7 @@ def place_in(boxes, points):
 
 
 def owners_of(centers, labels, boxes, box_labels, reach=BOX_REACH):
-    """centers [V, 3] metres -> i32 [V]: the object of its class in which each cell lies deepest, among those whose
+    """centers [V, 3] metres -> i32 [V]: the object of its class in which each voxel lies deepest, among those whose
     widened box holds its centre; -1 for none. Of parts the reach is PART_REACH"""
     owners, depths = np.full(len(centers), -1, np.int32), np.full(len(centers), -reach)
     of_class = {label: np.flatnonzero(labels == label) for label in np.unique(box_labels)}
@@ -63,7 +63,7 @@ def objects_beside(grid):
 
 
 def owned(path, centers, labels, parts=False):
-    """of the objects.json beside a .sgrid, if there is one, what its cells are of, or which parts they lie in or beside
+    """of the objects.json beside a .sgrid, if there is one, what its voxels are of, or which parts they lie in or beside
     -> owners i32 [V], boxes f64 [O, 7], tints f32 [O, 3]"""
     about = objects_beside(path)
     if not os.path.exists(about):
@@ -73,7 +73,7 @@ def owned(path, centers, labels, parts=False):
 
 
 def has_box(owners, labels):
-    """which cells can be told the box of their object -> bool [N]: the ground has none"""
+    """which voxels can be told the box of their object -> bool [N]: the ground has none"""
     return (owners >= 0) & ~np.isin(labels, GROUND)
 
 
@@ -103,8 +103,8 @@ def at_rank(chosen, ranks):
 
 
 def local_tints(centers, owners, colors):
-    """colors u8 [V, n, 3] of points -> u8 [V, 3]: for a cell of an object the paint among the medians of the object's
-    cells within 3 m; 0 for others"""
+    """colors u8 [V, n, 3] of points -> u8 [V, 3]: for a voxel of an object the paint among the medians of the object's
+    voxels within 3 m; 0 for others"""
     tints = np.zeros((len(centers), 3), np.uint8)
     order = np.argsort(owners, kind="stable")
     order = order[np.searchsorted(owners[order], 0):]

@@ -11,7 +11,7 @@ from .json_file import read_json, write_json
 
 
 def read_points(path):
-    """-> positions f32 [P, 3] metres, colors u8 [P, 3], labels u8 [P], in the engine's order: by cell"""
+    """-> positions f32 [P, 3] metres, colors u8 [P, 3], labels u8 [P], in the engine's order: by voxel"""
     t, size = read_grid(path)
     order = np.lexsort(t["cells"].T[::-1])
     centers = ((t["cells"][order] + 0.5) * np.float64(np.float32(size))).astype(np.float32)

@@ -62,7 +62,7 @@ def ancestral_step(x, x0, a, b, random):
 
 
 def of_owners(owners, boxes, tints):
-    """-> for each cell the box of its owner, whether it has one, its colour, and whether it has one"""
+    """-> for each voxel the box of its owner, whether it has one, its colour, and whether it has one"""
     if not len(boxes):
         boxes, tints = np.ones((1, 7)), np.full((1, 3), np.nan)
     has, of_cells = owners >= 0, np.maximum(owners, 0)
@@ -70,7 +70,7 @@ def of_owners(owners, boxes, tints):
 
 
 class Objects:
-    """the objects.json beside a .sgrid, if there is one: owners i32 [V] of the cells, -1 for none; boxes and tints"""
+    """the objects.json beside a .sgrid, if there is one: owners i32 [V] of the voxels, -1 for none; boxes and tints"""
 
     def __init__(self, path, centers, labels):
         self.centers = centers
@@ -93,7 +93,7 @@ class Objects:
 
 @torch.no_grad()
 def regenerate(model, path, seed):
-    """the .sgrid's cells that have points -> {cells, labels, points, colors}, as the file has them"""
+    """the .sgrid's voxels that have points -> {cells, labels, points, colors}, as the file has them"""
     cells, labels, tokens = read_tokens(path)
     size, n = model.config["voxel_size"], model.config["points_per_voxel"]
     objects = Objects(path, (cells + 0.5) * size, labels)

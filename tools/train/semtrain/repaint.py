@@ -31,7 +31,7 @@ def repainted(colors, paint, other):
 
 
 def repaint(random, chance, owners, labels, paints, *colors):
-    """each painted object with this chance; owners, labels [N] of cells, paints [N, 3], NaN where there is none -> the
+    """each painted object with this chance; owners, labels [N] of voxels, paints [N, 3], NaN where there is none -> the
     `colors`, each [N, ..., 3], as then"""
     colors = [c.copy() for c in colors]
     for owner in np.unique(owners[(owners >= 0) & np.isin(labels, PAINTED) & ~np.isnan(paints).any(1)]):

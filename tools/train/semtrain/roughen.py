@@ -17,8 +17,8 @@ from .regenerate import load_transformer, regenerate
 
 
 def roughened(tensors, half, random):
-    """points moved by up to 2.5 cm (standard deviation) and kept inside their cells of half size `half`; colours drawn
-    towards their cell's mean; cells, and points, a little off in colour. How much of all that is drawn at random."""
+    """points moved by up to 2.5 cm (standard deviation) and kept inside their voxels of half size `half`; colours drawn
+    towards their voxel's mean; voxels, and points, a little off in colour. How much of all that is drawn at random."""
     points, colors = tensors["points"].numpy().astype(np.float32), tensors["colors"].numpy().astype(np.float32)
     cells = len(points)
     strength = random.random()

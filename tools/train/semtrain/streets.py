@@ -31,7 +31,7 @@ def main():
     p.add_argument("--count", type=int, default=110)
     p.add_argument("--length", type=float, default=60, help="metres of each street")
     p.add_argument("--keep-mesh", action="store_true", help="keep mesh.glb too: 8 MB a street")
-    p.add_argument("--placement", choices=["shifted", "canonical"], default="shifted", help="of points in flat cells")
+    p.add_argument("--placement", choices=["shifted", "canonical"], default="shifted", help="of points in flat voxels")
     options = p.parse_args()
     for seed in range(options.first_seed, options.first_seed + options.count):
         folder = os.path.join(options.output, str(seed))

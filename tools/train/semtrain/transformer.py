@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""Trains the Σ-Voxfield transformer (docs/method.md §2): x0-prediction, L2, sets of neighbouring cells, of which a part
+"""Trains the Σ-Voxfield transformer (docs/method.md §2): x0-prediction, L2, sets of neighbouring voxels, of which a part
 may be known; labels dropped in one set of ten."""
 import os
 from fnmatch import fnmatchcase
@@ -35,7 +35,7 @@ def noised(x0, alphas, t, random):
 
 
 def with_known(noisy, x0, known, alphas, top, random):
-    """noisy, but cells that are known [B, N] have the noise of a level below `top` only: what was generated before is a
+    """noisy, but voxels that are known [B, N] have the noise of a level below `top` only: what was generated before is a
     little worse than the truth"""
     if not known.any():
         return noisy
@@ -65,7 +65,7 @@ def noised_sets(x0, known, condition, t, alphas, config, random):
 
 
 def mean_error(made, x0, target, of_hue=1):
-    """squared error of tokens [B, N, 6n] of the cells that are targets [B, N] -> of places and of colours, [B] each; that
+    """squared error of tokens [B, N, 6n] of the voxels that are targets [B, N] -> of places and of colours, [B] each; that
     of what is left of a colour without its grey counts `of_hue` times"""
     off = (made - x0).unflatten(2, (-1, 6))
     grey = off[..., 3:].mean(-1, keepdim=True)

@@ -32,7 +32,7 @@ def random_weights(model):
 
 
 def condition_of(centers, labels):
-    """[B, N, 64]: in each set two boxes of the commonest class, one with a colour; cells elsewhere are told nothing"""
+    """[B, N, 64]: in each set two boxes of the commonest class, one with a colour; voxels elsewhere are told nothing"""
     random, rows = np.random.default_rng(5), []
     for places, of_cells in zip(centers.numpy().astype(np.float64), labels.numpy()):
         common = np.bincount(of_cells).argmax()

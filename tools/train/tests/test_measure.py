@@ -32,7 +32,7 @@ class Pieces(unittest.TestCase):
         return os.path.join(self.folder.name, *names)
 
     def test_hold_the_cells_whose_centres_lie_between_the_bounds(self):
-        # cells of 0.6 m have their centres at 0.3, 0.9, 1.5, ...
+        # voxels of 0.6 m have their centres at 0.3, 0.9, 1.5, ...
         self.assertEqual(cuts.cut_grid(self.street, self.path("pieces"), (0.85, 2.05), (-math.inf, 1.2)), 4)
         for kind in ("truth", "semantic"):
             cells = cells_of(self.path("pieces", kind, "7.sgrid"))

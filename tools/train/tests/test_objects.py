@@ -79,7 +79,7 @@ class Objects(unittest.TestCase):
         self.assertTrue((g.owners[g.labels == 0] == -1).all())
         cars = g.cells[g.labels == 13]
         self.assertTrue((g.owners[g.labels == 13] == (cars[:, 0] >= 7)).all())
-        turned = np.array([[*CAR[:6], math.pi / 2]])  # across: only the cells within 0.9 m of x = 2.4, and 1.5 beyond
+        turned = np.array([[*CAR[:6], math.pi / 2]])  # across: only the voxels within 0.9 m of x = 2.4, and 1.5 beyond
         centers = np.array([[x, 0.0, 0.6] for x in np.arange(-1.2, 6, 0.7)])
         owners = owners_of(centers, np.full(len(centers), 13), turned, np.array([13]))
         self.assertEqual(owners.tolist(), [0 if abs(x - 2.4) < 2.4 else -1 for x in centers[:, 0]])

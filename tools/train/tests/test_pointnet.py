@@ -26,7 +26,7 @@ TINY = {"inputs": ["xyz", "rgb", "normalized"], "chunk": 2.4, "points": 100, "mi
 
 
 def write_street(path, seed=0):
-    """a floor of 16 x 12 cells before a wall of 16 x 3, and poles in front of it; six points a cell, a colour a class
+    """a floor of 16 x 12 voxels before a wall of 16 x 3, and poles in front of it; six points a voxel, a colour a class
     with noise"""
     random = np.random.default_rng(seed)
     floor = [(i, j, 0, 0) for i in range(-4, 12) for j in range(12)]

@@ -73,7 +73,7 @@ def of_module(name, bound, module, *inputs, blind=()):
 
 
 def transformer_cases():
-    """transformer.small.json: 12 sets of up to 224 cells, width 192, 3 heads of 64"""
+    """transformer.small.json: 12 sets of up to 224 voxels, width 192, 3 heads of 64"""
     tokens, labels = random(12, 224, 192), torch.randint(21, (12, 224))
     mask = torch.zeros(12, 1, 448, 448).masked_fill_(torch.rand(12, 1, 448, 448) < 0.5, -1e9)
     embed, joint = nn.Embedding(21, 192), transformer.Attention(192, 3, last=False)

@@ -75,7 +75,7 @@ class Regenerating(unittest.TestCase):
         self.assertAlmostEqual(float(after.var()), 0.3, delta=5e-3)
 
     def test_a_network_decides_what_comes_out(self):
-        """one that says 0 always puts every point in the middle of its cell, in grey; what is known of a street stays"""
+        """one that says 0 always puts every point in the middle of its voxel, in grey; what is known of a street stays"""
         model = VoxfieldTransformer(1, 1, 8, 20, 20, 0.6, 3.0, 8).eval()
         model.start_at_zero()
         before = street()

@@ -30,7 +30,7 @@ def from_config(config):
 
 
 def write_street(path, seed=0):
-    """a floor of 6 x 6 cells under a wall of 6 x 3, four points a cell, one colour a class"""
+    """a floor of 6 x 6 voxels under a wall of 6 x 3, four points a voxel, one colour a class"""
     random = np.random.default_rng(seed)
     floor = [(i, j, 0) for i in range(6) for j in range(6)]
     wall = [(i, 6, k) for i in range(6) for k in range(3)]
@@ -176,7 +176,7 @@ class TheRecipe(unittest.TestCase):
             self.assertTrue(0.05 < known.mean() < 0.95)
             near = np.abs(cells[:, None] - cells[None]).sum(-1) == 1
             touching.append((near & (known[:, None] == known)).sum() / near.sum())
-        self.assertGreater(np.mean(touching), 0.7)  # half of them, if cells were drawn one by one
+        self.assertGreater(np.mean(touching), 0.7)  # half of them, if voxels were drawn one by one
         self.assertFalse(draw_known(random, cells, 0).any())
 
     def test_learns_and_goes_on_where_it_stopped(self):

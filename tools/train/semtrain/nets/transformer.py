@@ -184,8 +184,8 @@ class VoxfieldTransformer(nn.Module):
 
     def forward(self, tokens, labels, centers, valid, timestep, condition=None, radius=None):
         """tokens [B, N, 6n] noisy; labels [B, N], num_classes = null; centers [B, N, 3] metres, in double where
-        cells that are just as far apart as the radius have to see each other, as in the engine; valid [B, N] bool;
-        timestep [B]; condition [B, N, W] or None; radius: metres beyond which a cell sees no others, if less than the
+        voxels that are just as far apart as the radius have to see each other, as in the engine; valid [B, N] bool;
+        timestep [B]; condition [B, N, W] or None; radius: metres beyond which a voxel sees no others, if less than the
         attention radius -> x0 [B, N, 6n]"""
         w = valid[..., None].to(centers.dtype)
         origin = (centers * w).sum(1, keepdim=True) / w.sum(1, keepdim=True)

@@ -1,0 +1,861 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/world/world.h"
+
+#include "engine/conditioning/object_blocks.h"
+#include "engine/scene/cell_reach.h"
+#include "engine/scene/palette.h"
+#include "runtime/base/hash.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace semrover {
+
+namespace {
+
+constexpr double kMostRadius = 2000;         // metres; some 140,000 tiles
+constexpr double kMostHorizon = 1000;        // likewise
+constexpr int32_t kFarthestCell = 1 << 19;   // of a focus
+constexpr uint64_t kNoDeadline = 1ull << 60; // microseconds
+constexpr size_t kTilesALook = 64;           // most of which need nothing
+
+std::array<TileIndex, 8> tiles_around(const TileIndex& t)
+{
+    return {{{t[0] - 1, t[1] - 1},
+             {t[0] - 1, t[1]},
+             {t[0] - 1, t[1] + 1},
+             {t[0], t[1] - 1},
+             {t[0], t[1] + 1},
+             {t[0] + 1, t[1] - 1},
+             {t[0] + 1, t[1]},
+             {t[0] + 1, t[1] + 1}}};
+}
+
+} // namespace
+
+World::World(Device& device, WorldRequest request, std::unique_ptr<WorldLabels> labels, const JobCallbacks& callbacks)
+    : request_(std::move(request)), callbacks_(callbacks), labels_(std::move(labels)),
+      filling_(device, request_.settings, request_.transformer)
+{
+}
+
+double World::edge() const
+{
+    return tile_cells() * decimal_voxel_size(voxel_size());
+}
+
+double World::away(const TileIndex& tile) const
+{
+    return focus_ ? distance_to_tile({focus_->position[0], focus_->position[1]}, tile, edge()) : 0;
+}
+
+// those of a map's tiles that are picked
+template <typename T, typename Picks>
+std::vector<TileIndex> World::nearest_first(const std::map<TileIndex, T>& tiles, Picks picks) const
+{
+    std::vector<std::pair<double, TileIndex>> picked;
+    for (const auto& [index, there] : tiles)
+        if (picks(index))
+            picked.emplace_back(away(index), index);
+    std::ranges::sort(picked);
+    std::vector<TileIndex> indices;
+    for (const auto& [away, index] : picked)
+        indices.push_back(index);
+    return indices;
+}
+
+bool World::finished(const TileIndex& tile) const
+{
+    const WorldTile* there = tiles_->find(tile);
+    return (there && there->finished) || tiles_->is_empty(tile) || released_.contains(tile);
+}
+
+Status World::open()
+{
+    if (!(request_.detail_distance >= 0 && std::isfinite(request_.detail_distance)))
+        return fail(ErrorCode::usage, "a detail distance of {} m", request_.detail_distance);
+    return tile_cells() ? open_tiles() : open_scene();
+}
+
+Status World::open_scene()
+{
+    const GenerationSettings& s = request_.settings;
+    scene_.emplace();
+    SR_TRY(scene_->grid, labels_->take());
+    SR_TRY(const std::vector<SceneObject> objects,
+           conditioning_objects(s.model, request_.objects, scene_->grid, request_.seed));
+    RegionOptions regions = s.regions;
+    if (!request_.targets.empty()) {
+        SR_TRY(scene_->part, cut_sub_grid(scene_->grid, request_.targets, cells_considered(regions)));
+        regions.from_known = true;
+    }
+    SR_CHECK(filling_.cut(request_.targets.empty() ? scene_->grid : scene_->part.grid, regions, objects));
+    return filling_.load(request_.seed, callbacks_);
+}
+
+// names model, settings and seed: what the keys of tiles are made of beside labels and objects
+Status World::open_tiles()
+{
+    const GenerationSettings& s = request_.settings;
+    if (!has_model()) {
+        tiles_ = std::make_unique<WorldTiles>(s, *labels_, WorldObjects::none(s.model), nullptr, 0);
+        return warm_up();
+    }
+    SR_CHECK(check_tile_options(s.regions));
+    if (std::abs(labels_->voxel_size() - voxel_size()) > 1e-4f * voxel_size())
+        return fail(ErrorCode::bad_input, "the labels have voxels of {} m, the model was trained on {} m",
+                    labels_->voxel_size(), voxel_size());
+    if (labels_->points_per_voxel() && labels_->points_per_voxel() != points_per_voxel())
+        return fail(ErrorCode::bad_input, "the labels come with {} points a voxel, the model makes {}",
+                    labels_->points_per_voxel(), points_per_voxel());
+    SR_TRY(const Json settings, settings_json(s, filling_.device(), "world", 0));
+    Hash base;
+    base.add(settings.dump());
+    base.add(std::as_bytes(std::span(&request_.seed, 1)));
+    SR_TRY(WorldObjects objects, WorldObjects::create(s.model, request_.objects, request_.seed));
+    std::unique_ptr<TileStore> store;
+    if (!request_.store.empty()) {
+        const TileFolderInfo info{labels_->voxel_size(), tile_cells(), points_per_voxel(), true, request_.metadata};
+        SR_TRY(store, TileStore::open(request_.store, info, base.value()));
+    }
+    tiles_ = std::make_unique<WorldTiles>(s, *labels_, std::move(objects), std::move(store), base.value());
+    at_once_ = request_.tiles_at_once;
+    if (!at_once_) // a GPU wants more regions at once than one tile has ready; not measured
+        at_once_ = filling_.device().limits().type == DeviceType::cpu ? 1 : 4;
+    return warm_up();
+}
+
+// the first step of a region as large as regions get, and splats
+Status World::warm_up()
+{
+    RegionOptions options = request_.settings.regions;
+    options.tile_cells = 0;
+    VoxelGrid grid;
+    grid.voxel_size = voxel_size();
+    for (int32_t i = 0; i < options.region_size; ++i)
+        grid.cells.push_back({i / 16, i % 16, 0});
+    grid.labels.assign(grid.cells.size(), 0);
+    make_room_for_points(grid, std::max(points_per_voxel(), 1));
+    if (has_model()) {
+        SR_CHECK(filling_.cut(grid, options));
+        SR_CHECK(filling_.load(request_.seed, callbacks_));
+        SR_TRY(planned_bytes_, filling_.bound_bytes());
+        SR_CHECK(filling_.start(nullptr));
+        SR_CHECK(filling_.step({.submits = 2, .microseconds = kNoDeadline}).map([](bool) {}));
+        SR_CHECK(filling_.cancel());
+    }
+    if (!request_.splat_bytes)
+        return {};
+    SR_TRY(splats_, SplatPool::create(filling_.device(), request_.splat_bytes));
+    grid.generated.assign(grid.cells.size(), 1); // points in the middle of their voxels
+    return splats_->prepare(points_of(grid).size(), request_.splats);
+}
+
+Status World::focus(const WorldFocus& focus)
+{
+    SR_ASSERT(tiles_, "a focus needs the order of tiles");
+    SR_CHECK(check_focus(focus));
+    if (focus_ && is_nearly(*focus_, focus, edge()))
+        return {};
+    focus_ = focus;
+    releases_ = false;
+    want(TileOrder(focus, edge()));
+    find_bare();
+    const double reach = focus.radius + 2 * edge();
+    if (!has_model())
+        return {};
+    const Cell low = cell_at({focus.position[0] - reach, focus.position[1] - reach, 0}, voxel_size());
+    const Cell high = cell_at({focus.position[0] + reach, focus.position[1] + reach, 0}, voxel_size());
+    tiles_->keep_objects_near({{low[0], low[1]}, {high[0], high[1]}});
+    return {};
+}
+
+Status World::follow(std::span<const GroundPoint> track, double horizon)
+{
+    SR_ASSERT(tiles_ && !track.empty(), "a track needs the order of tiles");
+    if (!(horizon > 0 && horizon <= kMostHorizon))
+        return fail(ErrorCode::usage, "a horizon: expected metres above 0 and up to {}, found {}", kMostHorizon,
+                    horizon);
+    focus_.reset();
+    releases_ = true;
+    want(TileOrder(tiles_along(track, horizon, edge())));
+    say();
+    return {};
+}
+
+Status World::everywhere(RunFolder* run)
+{
+    if (scene_) {
+        SR_CHECK(filling_.start(run));
+        work_.emplace_back();
+        cut_ = true;
+        filling_.say(callbacks_);
+        return {};
+    }
+    SR_TRY(std::vector<TileIndex> all, labels_->tiles(tile_cells()));
+    focus_.reset();
+    releases_ = false;
+    want(TileOrder(std::move(all)));
+    say();
+    return {};
+}
+
+void World::want(TileOrder order)
+{
+    order_ = std::move(order);
+    released_.clear();
+    waiting_.clear();
+    full_ = false;
+    look_again();
+}
+
+// tiles that get fewer splats first: they make room for the others
+void World::find_bare()
+{
+    bare_ = nearest_first(tiles_->all(), [this](const TileIndex& t) {
+        return splats_ && away(t) <= focus_->radius && tile(t) && !has_splats(t);
+    });
+    std::ranges::stable_partition(bare_, [this](const TileIndex& t) {
+        const auto made = made_for_.find(t);
+        return made != made_for_.end() && made->second.detail < detail(t);
+    });
+}
+
+World::Piece World::next_piece() const
+{
+    if (!bare_.empty() && !no_room_yet_)
+        return Piece::splats;
+    if (work_.empty())
+        return loading_.empty() ? Piece::look : Piece::load;
+    if (!cut_)
+        return Piece::cut;
+    if (filled_)
+        return Piece::finish;
+    return filling_.begins_batch() ? Piece::first_row : filling_.ends_batch() ? Piece::last_row : Piece::row;
+}
+
+// rows are stepped here, not in do_piece(): few calls lie between an application and a submit
+Result<bool> World::step(const JobBudget& budget)
+{
+    BudgetMeter meter(budget);
+    no_room_yet_ = false;
+    bool spent = false; // something was done already
+    Result<bool> done = true;
+    while (!idle_ || !work_.empty() || (!bare_.empty() && !no_room_yet_)) {
+        const Piece piece = next_piece();
+        const bool submits = piece == Piece::first_row || piece == Piece::row || piece == Piece::last_row;
+        SubmitCost& cost = costs_[size_t(piece)];
+        if (spent && !meter.room_for(cost.bound())) {
+            done = false;
+            break;
+        }
+        Status status;
+        if (submits) {
+            const auto filled = filling_.step({.submits = 1, .microseconds = budget.timed() ? kNoDeadline : ~0ull});
+            status = filled ? Status() : tl::make_unexpected(filled.error());
+            filled_ = filled && *filled;
+        } else {
+            status = do_piece(piece);
+        }
+        if (status && scene_ && filled_)
+            status = finish();
+        if (!status) {
+            give_up();
+            done = tl::make_unexpected(status.error());
+            break;
+        }
+        say();
+        meter.spent(cost, submits);
+        spent = true;
+    }
+    if (done && *done)
+        say(true);
+    if (splats_)
+        SR_CHECK(splats_->publish());
+    return done;
+}
+
+Status World::do_piece(Piece piece)
+{
+    switch (piece) {
+    case Piece::look:
+        return look();
+    case Piece::load:
+        return load_next();
+    case Piece::splats: {
+        const TileIndex tile = bare_.front();
+        bare_.erase(bare_.begin());
+        return make_splats(tile);
+    }
+    case Piece::cut:
+        return cut();
+    case Piece::finish:
+        return finish();
+    case Piece::first_row:
+    case Piece::row:
+    case Piece::last_row:
+        break;
+    }
+    SR_ASSERT(false, "a row is a step of the filling");
+    return {};
+}
+
+Status World::load_next()
+{
+    const TileIndex tile = loading_.back();
+    loading_.pop_back();
+    const auto there = tiles_->load(tile);
+    if (!there && there.error().code == kNotYet) {
+        waiting_.insert(tile);
+        return {};
+    }
+    SR_CHECK(there.map([](bool) {}));
+    if (!*there) {
+        not_stored_.insert(tile);
+        return {};
+    }
+    ++loaded_;
+    cells_ += tiles_->find(tile)->cells.cells.size();
+    came(tile);
+    return {};
+}
+
+// the first tile that is not finished among `tile` and those that it sees, lower colours first
+Result<std::optional<TileIndex>> World::missing(const TileIndex& tile)
+{
+    if (released_.contains(tile))
+        return std::optional<TileIndex>();
+    if (waiting_.contains(tile))
+        return fail(kNotYet, "labels of tile ({}, {}) are not there yet", tile[0], tile[1]);
+    SR_TRY(WorldTile * own, tiles_->bring(tile));
+    if (!own) {
+        if (stale_.contains(tile)) // an edit took its last voxel away
+            went(tile);
+        return std::optional<TileIndex>();
+    }
+    if (own->finished) {
+        if (std::exchange(own->fresh, false)) {
+            ++loaded_;
+            cells_ += own->cells.cells.size();
+            (void)tiles_->keep(tile); // the store's error is stored()
+            came(tile);
+        }
+        return std::optional<TileIndex>();
+    }
+    if (tiles_->store() && !not_stored_.contains(tile))
+        return std::optional(tile); // the store may have it
+    for (const TileIndex& seen : tiles_seen_by(tile)) {
+        SR_TRY(const auto first, missing(seen));
+        if (first)
+            return first;
+    }
+    return std::optional(tile);
+}
+
+// finds what to do next: a tile of the store, or tiles of one colour that wait for none
+Status World::look()
+{
+    for (size_t looked = 0; looked < kTilesALook; ++looked) {
+        const std::optional<TileIndex> tile = order_.at(rank_);
+        const bool far = !found_.empty() && rank_ > done_ + 4 * at_once_; // it would come before what is near
+        if (!tile || far || found_.size() >= at_once_) {
+            end_look();
+            return {};
+        }
+        SR_TRY(const bool goes_on, look_at(*tile));
+        if (!goes_on)
+            return {};
+    }
+    return {};
+}
+
+// at the tile whose turn it is; false: something was found that is done at once
+Result<bool> World::look_at(const TileIndex& tile)
+{
+    auto missed = missing(tile);
+    if (!missed && missed.error().code == kNotYet) {
+        waiting_.insert(tile);
+        passed();
+        return true;
+    }
+    SR_TRY(const auto first, std::move(missed));
+    if (!first) {
+        passed();
+        if (releases_)
+            release_around(tile);
+        return true;
+    }
+    const bool stored = tiles_->store() && !not_stored_.contains(*first);
+    const bool fits = found_.empty() ||
+                      (!stored && !std::ranges::count(found_, *first) && tile_colour(*first) == tile_colour(found_[0]));
+    if (!fits) {
+        ++rank_;
+        return true;
+    }
+    SR_TRY(const bool room, room_for(*first, rank_));
+    if (!room) {
+        full_ = true;
+        end_look();
+        return false;
+    }
+    if (stored) {
+        loading_.push_back(*first);
+        return false;
+    }
+    found_.push_back(*first);
+    ++rank_;
+    return true;
+}
+
+// there is nothing to do for a wanted tile
+void World::passed()
+{
+    if (rank_ == done_) {
+        ahead_.erase(done_);
+        ++done_;
+    } else {
+        ahead_.insert(rank_);
+    }
+    ++rank_;
+}
+
+void World::end_look()
+{
+    std::swap(work_, found_);
+    found_.clear();
+    rank_ = done_;
+    idle_ = work_.empty();
+    if (idle_ && focus_)
+        find_bare(); // those whose neighbours turned out to be empty, too
+}
+
+// it is wanted up to a rank, or seen by one that is, or at work
+bool World::is_kept(const TileIndex& tile, size_t rank) const
+{
+    const auto wanted = [&](const TileIndex& t) { return order_.rank_of(t).value_or(rank + 1) <= rank; };
+    return wanted(tile) || std::ranges::any_of(tiles_that_see(tile), wanted) || std::ranges::count(found_, tile) > 0;
+}
+
+// Drops what is out of reach, farthest first, then what is wanted after `rank`, until a tile fits. false: it does not.
+Result<bool> World::room_for(const TileIndex& tile, size_t rank)
+{
+    if (!request_.host_bytes)
+        return true;
+    SR_TRY(const WorldTile* own, tiles_->bring(tile));
+    uint64_t needed = tiles_->bytes_with_points(*own);
+    for (const TileIndex& busy : found_)
+        needed += tiles_->bytes_with_points(*tiles_->find(busy));
+    if (tiles_->bytes() + needed <= request_.host_bytes)
+        return true;
+    auto others = nearest_first(tiles_->all(), [&](const TileIndex& t) { return !is_kept(t, rank); });
+    for (; tiles_->bytes() + needed > request_.host_bytes && !others.empty(); others.pop_back())
+        SR_CHECK(drop(others.back()));
+    return tiles_->bytes() + needed <= request_.host_bytes;
+}
+
+Status World::drop(const TileIndex& tile)
+{
+    const WorldTile& there = *tiles_->find(tile);
+    if (there.stored)
+        not_stored_.erase(tile);
+    if (there.finished) {
+        ++dropped_;
+        went(tile);
+    }
+    if (const auto rank = order_.rank_of(tile))
+        ahead_.erase(*rank);
+    tiles_->drop(tile);
+    return {};
+}
+
+// a tile and those beside it, where nothing wanted that is not finished lies beside them, and the store has them
+void World::release_around(const TileIndex& tile)
+{
+    const auto waits = [this](const TileIndex& t) { return order_.rank_of(t).has_value() && !finished(t); };
+    const auto release = [&](const TileIndex& t) {
+        const WorldTile* there = tiles_->find(t);
+        if (!there || (there->finished && !there->stored) || waits(t) || std::ranges::any_of(tiles_around(t), waits))
+            return;
+        if (there->finished)
+            released_.insert(t);
+        not_stored_.erase(t);
+        tiles_->drop(t);
+    };
+    release(tile);
+    std::ranges::for_each(tiles_around(tile), release);
+}
+
+// labels around some of the tiles at work, of which their objects are guessed, are not there yet
+Status World::leave_out_work()
+{
+    for (const TileIndex& tile : work_)
+        if (const auto objects = tiles_->objects_near({&tile, 1}); !objects)
+            waiting_.insert(tile);
+    give_up();
+    return {};
+}
+
+Status World::cut()
+{
+    SR_TRY(part_, tiles_->cut(work_));
+    auto objects = tiles_->objects_near(work_);
+    if (!objects && objects.error().code == kNotYet)
+        return leave_out_work();
+    SR_CHECK(objects.map([](const auto&) {}));
+    SR_CHECK(filling_.cut(part_, request_.settings.regions, *objects));
+    SR_CHECK(filling_.load(request_.seed, callbacks_));
+    SR_CHECK(filling_.start(nullptr));
+    cut_ = true;
+    return {};
+}
+
+Status World::finish()
+{
+    if (scene_ && !request_.targets.empty())
+        put_back(scene_->grid, scene_->part, request_.targets);
+    if (!scene_) {
+        const Status stored = tiles_->finish(work_, part_);
+        for (const TileIndex& tile : work_) { // they are here, whether or not the store has them
+            ++generated_;
+            cells_ += tiles_->find(tile)->cells.cells.size();
+            came(tile);
+        }
+        if (!stored && !warned_ && callbacks_.warning)
+            callbacks_.warning(fmt::format("finished tiles are not kept: {}", stored.error().message));
+        warned_ = warned_ || !stored;
+    }
+    work_.clear();
+    cut_ = filled_ = false;
+    return {};
+}
+
+// after an error, or where what is being made is not wanted any more
+void World::give_up()
+{
+    if (cut_)
+        (void)filling_.cancel(); // what fails then will fail again
+    work_.clear();
+    found_.clear();
+    rank_ = done_;
+    cut_ = filled_ = false;
+}
+
+void World::came(const TileIndex& tile)
+{
+    if (splats_)
+        splats_came(tile);
+    if (const auto rank = order_.rank_of(tile); rank && *rank >= done_)
+        ahead_.insert(*rank);
+}
+
+// those beside it have not had these points for neighbours
+void World::splats_came(const TileIndex& tile)
+{
+    bare_.push_back(tile);
+    int bit = 8; // of this tile for the other
+    for (const TileIndex& other : tiles_around(tile)) {
+        --bit;
+        const auto made = made_for_.find(other);
+        if (made == made_for_.end())
+            continue;
+        made->second.neighbours &= uint8_t(~(1u << bit));
+        if (!has_splats(other) && !std::ranges::count(bare_, other))
+            bare_.push_back(other);
+    }
+}
+
+void World::went(const TileIndex& tile)
+{
+    std::erase(bare_, tile);
+    if (splats_)
+        drop_splats(tile);
+}
+
+void World::drop_splats(const TileIndex& tile)
+{
+    stale_.erase(tile);
+    made_for_.erase(tile);
+    splats_->remove(tile);
+}
+
+// as it is to be now. One whose neighbours are still to come is not made anew for each of them
+bool World::has_splats(const TileIndex& tile) const
+{
+    const auto made = made_for_.find(tile);
+    if (made == made_for_.end() || stale_.contains(tile) || made->second.detail != detail(tile))
+        return false;
+    return !(neighbours_with_points(tile) & ~made->second.neighbours) || !neighbours_are_settled(tile);
+}
+
+// a bit for each of tiles_around()
+uint8_t World::neighbours_with_points(const TileIndex& tile) const
+{
+    uint8_t bits = 0;
+    int n = 0;
+    for (const TileIndex& other : tiles_around(tile))
+        bits |= uint8_t((this->tile(other) != nullptr) << n++);
+    return bits;
+}
+
+bool World::neighbours_are_settled(const TileIndex& tile) const
+{
+    return std::ranges::all_of(tiles_around(tile),
+                               [this](const TileIndex& t) { return finished(t) || out_of_reach(t); });
+}
+
+// Points of other tiles that may be neighbours of a tile's own, which lie up to a voxel outside of it. thinned_by: the
+// edge of cubes, metres; 0: they are not thinned
+void World::append_neighbours(const TileIndex& tile, float reach, float thinned_by, ScenePoints& points) const
+{
+    const double margin = reach + voxel_size();
+    for (const TileIndex& index : tiles_around(tile)) {
+        const VoxelGrid* cells = this->tile(index);
+        if (!cells)
+            continue;
+        const ScenePoints all = thinned_by > 0 ? thinned(points_of(*cells), thinned_by) : points_of(*cells);
+        for (size_t i = 0; i < all.size(); ++i) {
+            bool near = true;
+            for (size_t a = 0; a < 2; ++a)
+                near = near && all.positions[i][a] > tile[a] * edge() - margin &&
+                       all.positions[i][a] < (tile[a] + 1) * edge() + margin;
+            if (!near)
+                continue;
+            points.positions.push_back(all.positions[i]);
+            points.colors.push_back(all.colors[i]);
+            points.labels.push_back(all.labels[i]);
+            points.cells.push_back(0);
+        }
+    }
+}
+
+// those out of reach make room, farthest first
+Result<SplatPool::Room> World::add_splats(const TileIndex& index, const VoxelGrid& cells, uint32_t detail)
+{
+    ScenePoints points = points_of(cells);
+    PointSplatOptions options = request_.splats;
+    const float cube = detail ? std::ldexp(voxel_size(), int(detail) - 2) : 0; // half a voxel, a voxel, two voxels
+    if (detail) {
+        points = thinned(points, cube);
+        options.auto_sigma = true; // they stand for larger pieces
+        options.largest_sigma = 2 * cube;
+        options.neighbor_radius = std::max(options.neighbor_radius, 3 * cube);
+    }
+    const size_t own = points.size();
+    append_neighbours(index, options.neighbor_radius, cube, points);
+    SR_TRY(SplatPool::Room room, splats_->add(index, points, own, options));
+    if (room != SplatPool::Room::none)
+        return room;
+    auto others = nearest_first(splats_->places(), [this](const TileIndex& t) { return out_of_reach(t); });
+    for (; room == SplatPool::Room::none && !others.empty(); others.pop_back()) {
+        drop_splats(others.back());
+        SR_TRY(room, splats_->add(index, points, own, options));
+    }
+    return room;
+}
+
+// One that is dropped meanwhile has none. Where there is no room, coarser ones may fit.
+Status World::make_splats(const TileIndex& index)
+{
+    const VoxelGrid* cells = tile(index);
+    if (!cells || has_splats(index))
+        return {};
+    const uint32_t wanted = detail(index), coarsest = request_.detail_distance > 0 ? kCoarsestDetail : 0;
+    SplatPool::Room room = SplatPool::Room::none;
+    for (uint32_t detail = wanted; room == SplatPool::Room::none && detail <= coarsest; ++detail) {
+        SR_TRY(room, add_splats(index, *cells, detail));
+        full_ = full_ || room != SplatPool::Room::found;
+    }
+    if (room == SplatPool::Room::later) { // in another step, when what leaves has left
+        bare_.insert(bare_.begin(), index);
+        no_room_yet_ = true;
+        return {};
+    }
+    if (room == SplatPool::Room::found)
+        made_for_[index] = {wanted, neighbours_with_points(index)};
+    stale_.erase(index);
+    return {};
+}
+
+Status World::check_focus(const WorldFocus& focus) const
+{
+    bool finite = std::isfinite(focus.radius);
+    for (size_t a = 0; a < 3; ++a)
+        finite = finite && std::isfinite(focus.position[a]) && std::isfinite(focus.direction[a]);
+    if (!finite || focus.radius < 0 || focus.radius > kMostRadius)
+        return fail(ErrorCode::usage, "a focus: expected finite numbers and a radius of 0 to {} m, found {} m",
+                    kMostRadius, focus.radius);
+    for (size_t a = 0; a < 2; ++a)
+        if (std::abs(focus.position[a]) > kFarthestCell * double(voxel_size()))
+            return fail(ErrorCode::usage, "a focus at {} m is too far out", focus.position[a]);
+    return {};
+}
+
+Status World::check_edits(const LabelEdits& edits) const
+{
+    for (const auto& [cell, label] : edits) {
+        for (const int32_t c : cell)
+            if (c < -kMaxCoordinate || c > kMaxCoordinate)
+                return fail(ErrorCode::bad_input, "an edit of voxel ({}, {}, {}): beyond 2^20", cell[0], cell[1],
+                            cell[2]);
+        const uint32_t classes = has_model() ? uint32_t(request_.settings.model.config.num_classes) : kClassCount;
+        if (label && *label >= classes)
+            return fail(ErrorCode::bad_input, "an edit of voxel ({}, {}, {}): label {}, the model knows {} classes",
+                        cell[0], cell[1], cell[2], *label, classes);
+    }
+    return {};
+}
+
+Status World::edit(const LabelEdits& edits)
+{
+    SR_CHECK(check_edits(edits));
+    const std::vector<TileIndex> spoiled = tiles_->edit(edits);
+    for (const TileIndex& tile : spoiled) {
+        not_stored_.erase(tile); // the store may have it as it was before another edit
+        released_.erase(tile);
+        std::erase(bare_, tile);
+        if (splats_ && splats_->has(tile))
+            stale_.insert(tile);
+    }
+    if (std::ranges::any_of(work_, [&](const TileIndex& t) { return std::ranges::count(spoiled, t) > 0; }))
+        give_up();
+    look_again();
+    return {};
+}
+
+void World::labels_ready(const CellWindow& window)
+{
+    const int32_t reach = 2 * object_block_cells(voxel_size()); // of labels that objects are guessed from
+    std::erase_if(waiting_, [&](const TileIndex& tile) {
+        const CellWindow around = tile_window(tile, tile_cells(), reach);
+        return around.low[0] <= window.high[0] && around.high[0] >= window.low[0] && around.low[1] <= window.high[1] &&
+               around.high[1] >= window.low[1];
+    });
+    look_again();
+}
+
+// from the front on
+void World::look_again()
+{
+    loading_.clear();
+    found_.clear();
+    ahead_.clear();
+    done_ = rank_ = 0;
+    idle_ = false;
+}
+
+const VoxelGrid* World::tile(const TileIndex& tile) const
+{
+    const WorldTile* there = tiles_->find(tile);
+    return there && there->finished ? &there->cells : nullptr;
+}
+
+std::vector<TileIndex> World::tiles_with_points() const
+{
+    std::vector<TileIndex> tiles;
+    for (const auto& [index, there] : tiles_->all())
+        if (there.finished)
+            tiles.push_back(index);
+    return tiles;
+}
+
+VoxelGrid World::cells(const CellWindow& window) const
+{
+    VoxelGrid out;
+    out.voxel_size = voxel_size();
+    out.points_per_voxel = points_per_voxel();
+    for (const TileIndex& index : tiles_in(tiles_->all(), window, tile_cells()))
+        if (const VoxelGrid* there = tile(index))
+            for (size_t c = 0; c < there->cells.size(); ++c)
+                if (window.holds(there->cells[c]))
+                    append_cell(out, *there, c);
+    sort_cells(out);
+    return out;
+}
+
+WorldFigures World::figures() const
+{
+    WorldFigures f{.wanted = order_.size(), .in_memory = tiles_->all().size(), .host_bytes = tiles_->bytes()};
+    const auto passed = [this](const TileIndex& tile) {
+        const auto rank = order_.rank_of(tile);
+        return rank && (*rank < done_ || ahead_.contains(*rank));
+    };
+    f.finished = done_ + ahead_.size() - size_t(std::ranges::count_if(waiting_, passed));
+    f.generated = generated_;
+    f.loaded = loaded_;
+    f.dropped = dropped_;
+    f.full = full_;
+    return f;
+}
+
+void World::say(bool ended) const
+{
+    if (!callbacks_.progress)
+        return;
+    if (scene_)
+        return filling_.say(callbacks_, ended);
+    JobProgress p{.stage = "generate", .unit = "tiles"};
+    p.done = done_ + ahead_.size();
+    p.total = order_.size();
+    p.device_bytes = ended ? 0 : filling_.device().allocated_bytes();
+    p.ended = ended;
+    callbacks_.progress(p);
+}
+
+Json World::results() const
+{
+    if (scene_)
+        return filling_.results();
+    return {{"cells", cells_},
+            {"tiles", generated_ + loaded_},
+            {"planned_device_bytes", planned_bytes_},
+            {"peak_device_bytes", filling_.device().peak_bytes()}};
+}
+
+Result<Json> World::estimate(size_t runs)
+{
+    SR_TRY(Json report, filling_.estimate(runs)); // in the order of tiles of the region that open() began
+    if (scene_)
+        return report;
+    size_t cells = 0, regions = 0, tiles = 0;
+    const size_t most = size_t(most_targets(request_.settings.regions));
+    for (size_t rank = 0; const auto index = order_.at(rank); ++rank) {
+        SR_TRY(const WorldTile* tile, tiles_->bring(*index));
+        if (!tile || tile->finished)
+            continue;
+        const auto known = std::ranges::count_if(tile->known, [](uint8_t k) { return k != 0; });
+        const size_t missing = tile->cells.cells.size() - size_t(known);
+        cells += missing;
+        regions += (missing + most - 1) / most;
+        ++tiles;
+        tiles_->drop(*index);
+    }
+    const double seconds = report["seconds"].get<double>() / report["regions"].get<double>();
+    report.update({{"tiles", tiles},
+                   {"cells", cells},
+                   {"regions", regions},
+                   {"seconds", seconds * double(regions)},
+                   {"peak_device_bytes", planned_bytes_}});
+    return report;
+}
+
+Status World::flush()
+{
+    TileStore* store = tiles_ ? tiles_->store() : nullptr;
+    if (!store)
+        return {};
+    if (releases_) // what wanted tiles see is there, but who goes on after a kill need not have looked at it
+        store->name_only([this](const TileIndex& tile) { return order_.rank_of(tile).has_value(); });
+    return store->flush();
+}
+
+Result<std::unique_ptr<World>> open_world(Device& device, WorldRequest request, std::unique_ptr<WorldLabels> labels,
+                                          const JobCallbacks& callbacks)
+{
+    SR_ASSERT(labels, "a world needs labels");
+    auto world = std::make_unique<World>(device, std::move(request), std::move(labels), callbacks);
+    SR_CHECK(world->open());
+    return world;
+}
+
+} // namespace semrover

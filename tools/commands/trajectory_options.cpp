@@ -1,0 +1,91 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/commands/trajectory_options.h"
+
+#include "runtime/base/quote.h"
+#include "tools/cli/number_option.h"
+#include "tools/trajectory/camera_path.h"
+
+#include <CLI/CLI.hpp>
+
+namespace semrover {
+
+namespace {
+
+Result<std::array<uint8_t, 3>> background_of(const TrajectoryOptions& o)
+{
+    unsigned r, g, b;
+    int used = 0;
+    if (std::sscanf(o.background.c_str(), "%u,%u,%u%n", &r, &g, &b, &used) != 3 ||
+        size_t(used) != o.background.size() || r > 255 || g > 255 || b > 255)
+        return fail(ErrorCode::usage, "--background takes R,G,B in 0..255, not '{}'", o.background);
+    return std::array<uint8_t, 3>{uint8_t(r), uint8_t(g), uint8_t(b)};
+}
+
+} // namespace
+
+void add_trajectory_options(CLI::App& c, TrajectoryOptions& o)
+{
+    c.add_option("--path", o.path,
+                 "trajectory: TUM, KITTI, KITTI-360, transforms.json, camera_path.json, COLMAP's folder and others "
+                 "(docs/formats.md §7.1)");
+    add_lens_options(c, o);
+    add_placement_options(c, o.placement);
+    c.add_flag("--allow-empty", o.allow_empty, "it is no error if no frame sees anything of the scene");
+    c.add_flag("--equirect", o.equirect, "panoramas of W x W/2 in place of the path's cameras");
+    c.add_option("--rig", o.rig, "rig.json: every sensor at every pose, in folders of their names");
+    c.add_option(
+        "--splat-radius", o.splat_radius,
+        "standard deviation of a splat in metres (0.04, or what the renderer says), or auto: from the spacing of "
+        "the points");
+    add_number(c, "--opacity", o.opacity, "of every splat", 0.01f, 1.f);
+    add_number(c, "--visible-alpha", o.visible_alpha, "alpha from which a pixel counts as visible", 0.f, 1.f);
+    c.add_option("--background", o.background, "R,G,B behind the splats");
+}
+
+Result<PointSplatOptions> point_splat_options(const std::string& splat_radius, float opacity)
+{
+    PointSplatOptions s;
+    s.opacity = opacity;
+    s.auto_sigma = splat_radius == "auto";
+    if (s.auto_sigma || splat_radius.empty())
+        return s;
+    char* end = nullptr;
+    s.sigma = std::strtof(splat_radius.c_str(), &end);
+    if (*end || !(s.sigma > 0 && s.sigma < 100))
+        return fail(ErrorCode::usage, "--splat-radius takes metres (0..100) or auto, not '{}'", splat_radius);
+    return s;
+}
+
+Result<DrawOptions> draw_options(const TrajectoryOptions& o)
+{
+    DrawOptions draw;
+    draw.visible_alpha = o.visible_alpha;
+    SR_TRY(draw.splats, point_splat_options(o.splat_radius, o.opacity));
+    SR_CHECK(intrinsics_of(o).map([](const auto&) {}));
+    if (o.path.empty() && o.placement.any())
+        return fail(ErrorCode::usage, "--relative-to, --calib, --world and --path-origin are of a trajectory: --path");
+    if (o.equirect && !o.rig.empty())
+        return fail(ErrorCode::usage, "--equirect or --rig; a rig.json may have an equirectangular sensor");
+    if (o.equirect && o.width % 2)
+        return fail(ErrorCode::usage, "--equirect draws W x W/2 pixels, and {} is odd", o.width);
+    SR_TRY(draw.background, background_of(o));
+    return draw;
+}
+
+Result<CameraPath> load_cameras(const TrajectoryOptions& o)
+{
+    SR_TRY(const PathPlacement placement, placement_of(o.placement));
+    if (!o.equirect)
+        return read_cameras(o.path, o.rig, o, placement);
+    SR_TRY(PathLens lens, path_lens_of(o));
+    lens.matters = false;
+    SR_TRY(CameraPath path, read_camera_path(o.path, lens, placement));
+    if (path.body)
+        path.warnings.push_back(body_text(quote_path(o.path), *path.body));
+    for (CameraFrame& frame : path.frames)
+        frame.intrinsics = whole_sphere(o.width, o.width / 2);
+    return path;
+}
+
+} // namespace semrover

@@ -1,0 +1,32 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/job/path_drawing.h"
+#include "tools/cli/commands.h"
+#include "tools/cli/lens_options.h"
+#include "tools/cli/path_options.h"
+
+namespace semrover {
+
+// how a grid is driven through and drawn: what `render` and `refine` share
+struct TrajectoryOptions : LensOptions {
+    PathOptions placement;
+    std::string path, rig, background = "0,0,0";
+    std::string splat_radius; // empty: not given
+    bool equirect = false;    // panoramas of width x width / 2 in place of the path's cameras
+    float opacity = 1;
+    bool allow_empty = false; // frames that all see nothing are no error
+    std::optional<float> visible_alpha;
+};
+void add_trajectory_options(CLI::App& command, TrajectoryOptions& options);
+
+// of `--splat-radius` (empty: 0.04) and `--opacity`; usage
+Result<PointSplatOptions> point_splat_options(const std::string& splat_radius, float opacity);
+
+// what can be said without a look at a file; usage
+Result<DrawOptions> draw_options(const TrajectoryOptions& options);
+// the path, in the grid's world, through the rig if any; warnings are in it
+Result<CameraPath> load_cameras(const TrajectoryOptions& options);
+
+} // namespace semrover
