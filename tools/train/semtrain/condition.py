@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a transformer is told of a voxel beside its label (docs/method.md §2.1): where it lies in the box of its object,
-a colour, and where it lies in the box of a part, a window. What is not given is zeros, and its flag is 0."""
+"""What a transformer is conditioned on beside a voxel's label (docs/method.md §2.1): where it lies in the box of its
+object, a colour, and where it lies in the box of a part, a window. What is not given is zeros, and its flag is 0."""
 import math
 
 import numpy as np
@@ -56,7 +56,7 @@ def mirrored(boxes, axis):
     return boxes
 
 
-def share_told(random, config):
+def share_given(random, config):
     """of the objects or voxels of a set: none with a chance of `dropout`; else all, but with a chance of `partial` any
     share"""
     if random.random() < config["dropout"]:
@@ -64,23 +64,23 @@ def share_told(random, config):
     return random.random() if random.random() < config["partial"] else 1.0
 
 
-def told_boxes(random, owners, labels, config):
-    """which voxels are told the box of their object -> bool [N]; an object is told as a whole"""
+def given_boxes(random, owners, labels, config):
+    """which voxels are given the box of their object -> bool [N]; an object is given as a whole"""
     _, of_cells = np.unique(owners, return_inverse=True)
-    share = share_told(random, config)
+    share = share_given(random, config)
     return has_box(owners, labels) & (random.random(of_cells.max() + 1) < share)[of_cells]
 
 
-def told_parts(random, parts, config):
-    """which voxels are told the part that they lie in or beside -> bool [N]; a part is told as a whole"""
+def given_parts(random, parts, config):
+    """which voxels are given the part that they lie in or beside -> bool [N]; a part is given as a whole"""
     _, of_cells = np.unique(parts, return_inverse=True)
-    share = share_told(random, config)
+    share = share_given(random, config)
     return (parts >= 0) & (random.random(of_cells.max() + 1) < share)[of_cells]
 
 
-def told_tints(random, owners, config):
-    """which voxels are told a colour -> bool [N]"""
-    share = share_told(random, config)
+def given_tints(random, owners, config):
+    """which voxels are given a colour -> bool [N]"""
+    share = share_given(random, config)
     return (owners >= 0) & (random.random(len(owners)) < share)
 
 

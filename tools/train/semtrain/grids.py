@@ -7,7 +7,7 @@ import os
 import numpy as np
 
 from . import safetensors_file
-from .condition import drawn_boxes, drawn_tints, mirrored, told_boxes, told_parts, told_tints, vector_of, width_of
+from .condition import drawn_boxes, drawn_tints, mirrored, given_boxes, given_parts, given_tints, vector_of, width_of
 from .content import digest
 from .json_file import read_json, write_json
 from .known_cells import draw_known
@@ -143,14 +143,14 @@ class LocalSets:
         return centers, labels, tokens, known, conditions
 
     def _condition(self, random, centers, cells, boxes, part_boxes, tokens, dropped):
-        """what a set is told beside its labels; where these are dropped, nothing. Where all colours are told, some
+        """what a set is conditioned on beside its labels; where these are dropped, nothing. With all colours given, some
         things have others than in the grid: changes `tokens`"""
         owners, parts = self.grids.owners[cells], self.config["network"].get("condition", ())
         if dropped or not parts:
             return np.zeros((len(cells), width_of(parts)), np.float32)
         config = self.config["telling"]
         labels = self.grids.labels[cells]
-        has_box, has_tint = told_boxes(random, owners, labels, config), told_tints(random, owners, config)
+        has_box, has_tint = given_boxes(random, owners, labels, config), given_tints(random, owners, config)
         local = self.grids.local_tints[cells] / 255
         whole = self.grids.tints[owners] if len(self.grids.tints) else local
         whole = np.where(np.isnan(whole), local, whole)
@@ -169,10 +169,10 @@ class LocalSets:
         parts, config = self.grids.parts[cells], self.config["telling"]
         config = {**config, "jitter": config["jitter"] / 3}  # windows are small: more would move them beside their places
         tints = self.grids.part_tints[parts] if len(self.grids.part_tints) else np.full((len(cells), 3), np.nan)
-        told, has_tint = told_parts(random, parts, config), told_parts(random, parts, config)
-        has_tint &= told & ~np.isnan(tints).any(1)
+        has_part, has_tint = given_parts(random, parts, config), given_parts(random, parts, config)
+        has_tint &= has_part & ~np.isnan(tints).any(1)
         tints = drawn_tints(random, parts, tints, tints, config)
-        return drawn_boxes(random, parts, boxes, config), told, tints, has_tint
+        return drawn_boxes(random, parts, boxes, config), has_part, tints, has_tint
 
     def _set(self, random, size):
         """-> centers, labels, tokens, which voxels of the grids these are, and the boxes of their objects and parts"""

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
 """Squared errors of transformers on streets that they were not trained on, at three noise levels, nothing known, with
-labels alone and with what each can be told beside them: a table in Markdown. All see the same sets and noise."""
+labels alone and with what else each can be conditioned on: a table in Markdown. All see the same sets and noise."""
 import argparse
 import os
 import tempfile
@@ -22,18 +22,18 @@ CONFIG = {"seed": 1, "batch": 8, "label_dropout": 0, "class_balance": 0.35, "mir
           "num_train_timesteps": 1000, "beta_start": 1e-4, "beta_end": 0.02}
 
 
-def told_of(conditions, parts, told):
-    """conditions [B, N, W] of a model that can be told `parts`, only those of `told` left"""
+def only_given(conditions, parts, given):
+    """conditions [B, N, W] of a model that takes `parts`, only those of `given` left"""
     kept, at = conditions.clone(), 0
     for part in parts:
-        if part not in told:
+        if part not in given:
             kept[..., at:at + WIDTHS[part]] = 0
         at += WIDTHS[part]
     return kept
 
 
 @torch.no_grad()
-def errors_of(model, sets, batches, told, levels=LEVELS):
+def errors_of(model, sets, batches, given, levels=LEVELS):
     """-> [(places, colours) of each level]"""
     alphas, sums = linear_alphas(CONFIG), torch.zeros(len(levels), 2)
     for step in range(batches):
@@ -43,13 +43,13 @@ def errors_of(model, sets, batches, told, levels=LEVELS):
             t = torch.full((len(x0),), level)
             noisy = noised(x0, alphas, t, generator(CONFIG, step, i))
             with autocast("bf16", "cpu"):
-                made = model(noisy, labels, centers, valid, t, told_of(conditions, parts, told))
+                made = model(noisy, labels, centers, valid, t, only_given(conditions, parts, given))
             sums[i] += torch.stack([e.mean() for e in mean_error(made.float(), x0, ~known)]) / batches
     return sums.tolist()
 
 
-def tellings(parts):
-    """what is told, from nothing to everything"""
+def choices(parts):
+    """what is given, from nothing to everything"""
     return [(), *((part,) for part in parts if len(parts) > 1), *([tuple(parts)] if parts else [])]
 
 
@@ -63,7 +63,7 @@ def main(arguments=None):
     p.add_argument("--threads", type=int, default=0, help="of the CPU; 0: all")
     options = p.parse_args(arguments)
     torch.set_num_threads(options.threads or os.cpu_count())
-    head = ["model", "told", *(f"{what}, t = {t}" for what in ("places", "colours") for t in LEVELS)]
+    head = ["model", "given", *(f"{what}, t = {t}" for what in ("places", "colours") for t in LEVELS)]
     print("| " + " | ".join(head) + " |\n|" + "---|" * len(head))
     with tempfile.TemporaryDirectory() as cache:
         grids = Grids(options.grids, cache)
@@ -71,9 +71,9 @@ def main(arguments=None):
             model = load_transformer(folder)
             config = {**CONFIG, "set_size": [options.cells] * 2, "network": model.config}
             sets = LocalSets(grids, config)
-            for told in tellings(model.config["condition"]):
-                errors = errors_of(model, sets, options.batches, told)
-                row = [name, " and ".join(told) or "labels", *(f"{e[i]:.4f}" for i in range(2) for e in errors)]
+            for given in choices(model.config["condition"]):
+                errors = errors_of(model, sets, options.batches, given)
+                row = [name, " and ".join(given) or "labels", *(f"{e[i]:.4f}" for i in range(2) for e in errors)]
                 print("| " + " | ".join(row) + " |", flush=True)
 
 

@@ -164,7 +164,7 @@ def judge(shares, said_shares, strengths, said_strengths):
 def main(arguments=None):
     p = settings.parser("inception", __doc__.splitlines()[0])
     p.add_argument("--frames", required=True, help="folder of drives (see semtrain/frames.py) with label/000000.png")
-    p.add_argument("--heldout", help="the same, to report at the end how much is told right")
+    p.add_argument("--heldout", help="the same, to report at the end the share of right answers")
     options = p.parse_args(arguments)
     config = settings.resolve("inception", options)
     torch.manual_seed(config["seed"])

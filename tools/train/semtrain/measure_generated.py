@@ -36,24 +36,24 @@ class Street:
         return os.path.join(self.folder, name)
 
 
-def generate(street, model, told, grid):
+def generate(street, model, objects, grid):
     """the street's labels -> GRID"""
-    objects = street.path("objects.json") if told == "street" else told
+    objects = street.path("objects.json") if objects == "street" else objects
     semrover("generate", street.path("semantic.sgrid"), "-m", model, "-o", grid, "--seed", 1, "--objects", objects, "-y",
              "--quiet")
 
 
-def frames_of(street, model, told, folder, size):
-    """FOLDER/SEED: points of the street (true ones where `told` is so), their buffers, and refined frames"""
+def frames_of(street, model, objects, folder, size):
+    """FOLDER/SEED: points of the street (true ones where `objects` is so), their buffers, and refined frames"""
     base = os.path.join(folder, str(street.seed))
     frames = os.path.join(folder, "frames", str(street.seed))
     if os.path.exists(os.path.join(frames, "color")):
         return
     os.makedirs(base, exist_ok=True)
     grid = street.path("truth.sgrid")
-    if told != TRUE:
+    if objects != TRUE:
         grid = os.path.join(base, "points.sgrid")
-        generate(street, model, told, grid)
+        generate(street, model, objects, grid)
     make_buffers(grid, street.folder, base, size, "auto")
     semrover("refine", os.path.join(base, "buffer"), "-m", model, "-o", os.path.join(base, "refined"), "--seed", 1,
              "--path", street.path("transforms.json"), "--quiet", "-y")
@@ -77,25 +77,25 @@ def judge(streets, folder, truth, features):
     return out
 
 
-def line_of(name, told, figures):
-    """| model | told | PSNR dB | SSIM | KID x 1000 | flicker |"""
+def line_of(name, objects, figures):
+    """| model | objects | PSNR dB | SSIM | KID x 1000 | flicker |"""
     cells = ["-", "-", "-"]
     if "frames" in figures:
         cells[:2] = [f"{figures['frames']['psnr']:.2f}", f"{figures['frames']['ssim']:.3f}"]
     if "kid" in figures:
         cells[2] = f"{1000 * figures['kid']['full']:.1f}"
-    return f"| {name} | {told} | {' | '.join(cells)} | {mean_flicker(figures['flicker']):.2f} |"
+    return f"| {name} | {objects} | {' | '.join(cells)} | {mean_flicker(figures['flicker']):.2f} |"
 
 
-def measure(streets, models, tellings, options):
-    lines = ["| model | told | PSNR dB | SSIM | KID x 1000 | flicker |", "|" + "---|" * 6]
-    for (name, model), told in itertools.product(models, [TRUE, *tellings]):
-        folder, truth = (os.path.join(options.output, f"{name}-{what.replace(' ', '-')}") for what in (told, TRUE))
+def measure(streets, models, choices, options):
+    lines = ["| model | objects | PSNR dB | SSIM | KID x 1000 | flicker |", "|" + "---|" * 6]
+    for (name, model), objects in itertools.product(models, [TRUE, *choices]):
+        folder, truth = (os.path.join(options.output, f"{name}-{what.replace(' ', '-')}") for what in (objects, TRUE))
         for street in streets:
-            frames_of(street, model, told, folder, (options.width, options.height))
+            frames_of(street, model, objects, folder, (options.width, options.height))
         if not os.path.exists(folder + ".json"):
             write_json(folder + ".json", judge(streets, folder, truth, options.features))
-        lines.append(line_of(name, told, read_json(folder + ".json")))
+        lines.append(line_of(name, objects, read_json(folder + ".json")))
         print(lines[-1], flush=True)
     return lines
 
@@ -105,7 +105,8 @@ def main(arguments=None):
     p.add_argument("-o", "--output", required=True, help="folder")
     p.add_argument("--model", action="append", required=True, metavar="NAME=FOLDER", help="model with a renderer")
     p.add_argument("--seeds", type=int, nargs="+", required=True, help="of streets that nothing was trained on")
-    p.add_argument("--objects", nargs="+", choices=["none", "auto", "street"], default=["none"], help="what is told")
+    p.add_argument("--objects", nargs="+", choices=["none", "auto", "street"], default=["none"],
+                   help="what the model is conditioned on")
     p.add_argument("--features", help="network for KID (docs/eval.md)")
     p.add_argument("--frames", type=int, default=12, help="of a street, 1 m apart")
     p.add_argument("--length", type=int, default=60, help="of a street, metres")

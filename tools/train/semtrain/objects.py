@@ -9,7 +9,7 @@ from .json_file import read_json
 
 CLASSES = ("road", "sidewalk", "building", "wall", "fence", "pole", "traffic light", "traffic sign", "vegetation",
            "terrain", "sky", "person", "rider", "car", "truck", "bus", "train", "motorcycle", "bicycle", "road-lane")
-GROUND = tuple(CLASSES.index(name) for name in ("road", "sidewalk", "terrain", "road-lane"))  # told colours, no boxes
+GROUND = tuple(CLASSES.index(name) for name in ("road", "sidewalk", "terrain", "road-lane"))  # given colours, no boxes
 BOX_REACH = 1.5   # metres by which boxes are widened: balconies and mirrors stand out of them
 PART_REACH = 0.6  # metres by which the boxes of parts are: what lies beside a window sees its edge
 TINT_REACH = 3.0  # metres within which the points of an object make a local tint
@@ -73,7 +73,7 @@ def owned(path, centers, labels, parts=False):
 
 
 def has_box(owners, labels):
-    """which voxels can be told the box of their object -> bool [N]: the ground has none"""
+    """which voxels can be given the box of their object -> bool [N]: the ground has none"""
     return (owners >= 0) & ~np.isin(labels, GROUND)
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""Trains a PointNet++ to tell the classes of a street's points; `semrover eval f3d` and `mmd` take its encoder as
+"""Trains a PointNet++ to recognise the classes of a street's points; `semrover eval f3d` and `mmd` take its encoder as
 --features (docs/eval.md)."""
 import json
 import os

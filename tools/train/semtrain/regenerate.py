@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
 """A street as a trained transformer would have placed it: noise on the truth's tokens, up to a level at which the street
-can still be told, and denoised from there. What the transformer cannot draw is then wrong as it is in generated streets.
-A model that may be told of objects and colours is told the street's own, and what it makes of an object gets the
+can still be seen, and denoised from there. What the transformer cannot draw is then wrong as it is in generated streets.
+A model that is conditioned on objects and colours is given the street's own, and what it makes of an object gets the
 object's mean colour: a car of another colour than its picture would teach a renderer to leave colours out of account."""
 import numpy as np
 import torch
@@ -78,7 +78,7 @@ class Objects:
         self.parts, self.part_boxes, self.part_tints = owned(path, centers, labels, parts=True)
         self.has_box = has_box(self.owners, labels)
 
-    def tell(self, parts):
+    def conditions(self, parts):
         """boxes, and colours of whole objects -> f32 [V, W]"""
         boxes, _, tints, has_tint = of_owners(self.owners, self.boxes, self.tints)
         return vector_of(parts, self.centers, boxes, self.has_box, tints, has_tint,
@@ -97,12 +97,12 @@ def regenerate(model, path, seed):
     cells, labels, tokens = read_tokens(path)
     size, n = model.config["voxel_size"], model.config["points_per_voxel"]
     objects = Objects(path, (cells + 0.5) * size, labels)
-    told = objects.tell(model.config["condition"])
+    conditions = objects.conditions(model.config["condition"])
     random = torch.Generator().manual_seed(seed)
     first = int(torch.randint(*LEVELS, (1,), generator=random))
     out, sets = np.empty(tokens.shape, np.float32), bisected(cells, MOST_CELLS)
     for i in range(0, len(sets), SETS):
-        denoise_sets(model, sets[i:i + SETS], cells, labels, tokens, told, out, first, random)
+        denoise_sets(model, sets[i:i + SETS], cells, labels, tokens, conditions, out, first, random)
     out = out.reshape(len(cells), n, 6)
     objects.keep_colors(out, tokens.astype(np.float32).reshape(out.shape))
     out = torch.from_numpy(out).clamp(-1, 1)
@@ -111,19 +111,19 @@ def regenerate(model, path, seed):
             "colors": ((out[..., 3:] + 1) * 127.5).round().to(torch.uint8)}
 
 
-def denoise_sets(model, sets, cells, labels, tokens, told, out, first, random):
+def denoise_sets(model, sets, cells, labels, tokens, conditions, out, first, random):
     """one batch of sets, from timestep `first` on -> written to out"""
     rows = np.stack([np.resize(s, MOST_CELLS) for s in sets])  # what fills a row is marked as not there
     valid = torch.stack([torch.arange(MOST_CELLS) < len(s) for s in sets])
     x0 = torch.from_numpy(tokens[rows].astype(np.float32))
     centers = torch.from_numpy((cells[rows] + 0.5) * model.config["voxel_size"])
-    of_rows, told = torch.from_numpy(labels[rows].astype(np.int64)), torch.from_numpy(told[rows])
+    of_rows, conditions = torch.from_numpy(labels[rows].astype(np.int64)), torch.from_numpy(conditions[rows])
     alphas = linear_alphas({"beta_start": 1e-4, "beta_end": 0.02, "num_train_timesteps": 1000})
     levels = levels_between(first, STEPS)
     x = noised(x0, alphas, torch.full((len(x0),), first), random)
     for t, after in zip(levels, levels[1:]):
         with autocast("bf16", "cpu"):
-            made = model(x, of_rows, centers, valid, torch.full((len(x),), t), told).float().clamp(-1, 1)
+            made = model(x, of_rows, centers, valid, torch.full((len(x),), t), conditions).float().clamp(-1, 1)
         x = made if after < 0 else ancestral_step(x, made, alphas[t], alphas[after], random)
     for s, made in zip(sets, x.numpy()):
         out[s] = made[:len(s)]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""Things of a training set in other colours: a network that saw few blue houses learns what it means to be told blue.
+"""Things of a training set in other colours: a network that saw few blue houses learns what a condition of blue means.
 Only the paint changes: windows, tyres and shadows are darker than it and stay."""
 import colorsys
 

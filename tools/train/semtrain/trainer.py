@@ -64,21 +64,21 @@ class Trainer:
         instead = precision.why_not(self.config["precision"], self.config["device"])
         if instead:
             print(instead, flush=True)
-        begin = saved = told = time.time()
+        begin = saved = reported = time.time()
         recent = []
         while self.step < self.config["steps"] and not self.stopped:
             recent.append(self._advance(loss_of_step))
             now = time.time()
-            if now - told > 20 or self.step == self.config["steps"]:
-                self._tell(recent, (now - told) / len(recent))
-                recent, told = [], now
+            if now - reported > 20 or self.step == self.config["steps"]:
+                self._report(recent, (now - reported) / len(recent))
+                recent, reported = [], now
             if now - saved > 60 * self.config["save_minutes"]:
                 self.save()
                 saved = time.time()
             if self.config["minutes"] and now - begin > 60 * self.config["minutes"]:
                 break
         if recent:
-            self._tell(recent, (time.time() - told) / len(recent))
+            self._report(recent, (time.time() - reported) / len(recent))
         self.save()
         self.place.release()
         if self.stopped:
@@ -116,7 +116,7 @@ class Trainer:
             torch._foreach_add_([self.average[n] for n in names], [self.parameters[n] for n in names], alpha=1 - keep)
         return {"loss": float(loss.detach()), **about}
 
-    def _tell(self, recent, seconds):
+    def _report(self, recent, seconds):
         row = {"step": self.step, "lr": learning_rate(self.config, self.step - 1), "seconds_per_step": round(seconds, 3)}
         for name in recent[0]:
             row[name] = sum(r[name] for r in recent) / len(recent)

@@ -45,7 +45,7 @@ def with_known(noisy, x0, known, alphas, top, random):
 
 def with_drift(x0, cells, strength, random):
     """tokens x0 [B, N, 6n]; in every other set the colours of the cells [B, N] are off, all by the same. What was
-    generated before may have drifted away from what it was told, and is not to lead away what comes next"""
+    generated before may have drifted away from its conditions, and is not to lead away what comes next"""
     off = strength * torch.randn((len(x0), 1, 1, 3), generator=random)
     off *= (torch.rand((len(x0), 1, 1, 1), generator=random) < 0.5)
     tokens = x0.unflatten(2, (-1, 6)).clone()
@@ -55,7 +55,7 @@ def with_drift(x0, cells, strength, random):
 
 def noised_sets(x0, known, condition, t, alphas, config, random):
     """tokens x0 [B, N, 6n] as a network sees them at the noise levels t [B]: known cells [B, N] nearly clean, with colours
-    that have drifted where they are told which"""
+    that have drifted where they are given"""
     noisy, before = noised(x0, alphas, t, random), x0
     parts = config["network"].get("condition", [])
     if config["known_drift"] and "tint" in parts:
@@ -84,8 +84,8 @@ def loss_of(sets, config):
         t = timesteps_at(torch.rand(len(x0), generator=random), len(alphas), config["timestep_power"]).to(device)
         noisy = noised_sets(x0, known, condition, t, alphas, config, random)
         valid = torch.ones(labels.shape, dtype=torch.bool, device=device)
-        told = (condition,) if condition.shape[-1] else ()
-        places, colors = mean_error(model(noisy, labels, centers, valid, t, *told).float(), x0, ~known,
+        conditions = (condition,) if condition.shape[-1] else ()
+        places, colors = mean_error(model(noisy, labels, centers, valid, t, *conditions).float(), x0, ~known,
                                     config["hue_weight"])
         loss = ((places + of_colors * colors) / (1 + of_colors) * weights[t]).mean()
         return loss, {"places": float(places.mean()), "colors": float(colors.mean())}
@@ -93,8 +93,8 @@ def loss_of(sets, config):
 
 
 def with_new_parts(state, model):
-    """weights of a model that is told less than `model`, and those that `model` begins with for the rest; what it is told
-    more than something says nothing at first"""
+    """weights of a model with fewer conditions than `model`, and what `model` begins with for the rest: conditions that
+    are new change nothing at first"""
     first = "condition_embed.linear_1.weight"
     new = {name: t for name, t in model.state_dict().items() if name.startswith("condition_embed.") or is_adapter(name)}
     state = {**new, **state}
@@ -120,11 +120,11 @@ def exporter(folder, config, grids):
     placement, defaults = grids.placement, dict(config["defaults"])
     if config["network"].get("condition"):
         defaults["objects"] = usual_objects(grids.files)
-    told = {} if placement == "shifted" else {"placement": placement}
+    placed = {} if placement == "shifted" else {"placement": placement}
 
     def export(state):
         write_component(os.path.join(folder, "model", "voxfield_transformer"),
-                        {"_class_name": "VoxfieldTransformer", **config["network"], **told, "prediction_type": "sample"},
+                        {"_class_name": "VoxfieldTransformer", **config["network"], **placed, "prediction_type": "sample"},
                         state, config["mantissa_bits"])
         write_scheduler(os.path.join(folder, "model", "voxfield_scheduler"), {
             "_class_name": "DDPMScheduler", "num_train_timesteps": config["num_train_timesteps"],

@@ -19,7 +19,7 @@ def karras_sigmas(steps, low=SCHEDULER["sigma_min"], high=SCHEDULER["sigma_max"]
 
 
 def timestep_of(sigma):
-    """what the network is told of a level of noise"""
+    """the network's input for a level of noise"""
     return 0.25 * torch.log(sigma)
 
 

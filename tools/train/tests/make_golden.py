@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""make_golden.py: writes the golden cases transformer_objects and transformer_voxels, transformers that are told of
+"""make_golden.py: writes the golden cases transformer_objects and transformer_voxels, transformers conditioned on
 objects, as the module of the recipe computes them: semantic tokens alone, and voxel tokens too. The inputs but the
 condition are those of transformer_tiny; the weights are random."""
 import json
@@ -32,7 +32,7 @@ def random_weights(model):
 
 
 def condition_of(centers, labels):
-    """[B, N, 64]: in each set two boxes of the commonest class, one with a colour; voxels elsewhere are told nothing"""
+    """[B, N, 64]: in each set two boxes of the commonest class, one with a colour; others have no conditions"""
     random, rows = np.random.default_rng(5), []
     for places, of_cells in zip(centers.numpy().astype(np.float64), labels.numpy()):
         common = np.bincount(of_cells).argmax()

@@ -66,7 +66,7 @@ class TheSampler(unittest.TestCase):
 
 
 class Guided(unittest.TestCase):
-    def test_compares_with_a_pass_that_is_told_nothing_and_sees_little_where_a_timestep_is_guided(self):
+    def test_compares_with_an_unconditioned_pass_that_sees_little_where_a_timestep_is_guided(self):
         torch.manual_seed(1)
         model = VoxfieldTransformer(2, 2, 16, 4, pos_embed_dim=8, condition=["tint"]).eval()
         centers = (torch.stack(torch.meshgrid(*[torch.arange(3.0)] * 3, indexing="ij"), -1).reshape(1, 27, 3).double()
@@ -74,13 +74,13 @@ class Guided(unittest.TestCase):
         x, labels, valid = torch.randn(2, 27, 24) / 4, torch.full((2, 27), 2), torch.ones(2, 27, dtype=torch.bool)
         condition, t = torch.rand(2, 27, 4), torch.tensor([300, 800])
         with torch.no_grad():
-            told = model(x, labels, centers, valid, t, condition)
+            conditioned = model(x, labels, centers, valid, t, condition)
             nothing = torch.zeros_like(condition)
             blind = {radius: model(x, torch.full_like(labels, 20), centers, valid, t, nothing, radius)
                      for radius in (None, 0.6, 9)}
             for radius in blind:
                 got = guided_x0(model, Guidance(2, 0, 700, radius), x, labels, centers, valid, t, condition)
-                expected = torch.stack([(2 * told - blind[radius])[0], told[1]]).clamp(-1, 1)
+                expected = torch.stack([(2 * conditioned - blind[radius])[0], conditioned[1]]).clamp(-1, 1)
                 torch.testing.assert_close(got, expected, atol=1e-5, rtol=0)
         self.assertTrue(torch.equal(blind[None], blind[9]))  # the attention radius stays
         self.assertGreater(float((blind[None] - blind[0.6]).abs().max()), 1e-3)

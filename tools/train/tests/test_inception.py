@@ -175,14 +175,14 @@ class TheRecipe(unittest.TestCase):
         class Fixed(torch.nn.Module):
             def forward(self, _):
                 return (answer[0] + 1e-6).log(), answer[1].clamp(1e-6, 1 - 1e-6).logit()
-        told = {}
+        losses = {}
         for name, answer in {"right": (shares, strengths), "classes": (shares.roll(1, 1), strengths),
                              "damage": (shares, strengths.roll(1, 1))}.items():
-            told[name] = loss_of(frames, {**TINY, "damage_weight": 2})(Fixed(), 0)
-        self.assertLess(max(told["right"][1].values()), 1e-4)
+            losses[name] = loss_of(frames, {**TINY, "damage_weight": 2})(Fixed(), 0)
+        self.assertLess(max(losses["right"][1].values()), 1e-4)
         for name in ("classes", "damage"):
-            self.assertGreater(float(told[name][0]), float(told["right"][0]) + 0.1)
-            self.assertGreater(told[name][1][name], 0.02)
+            self.assertGreater(float(losses[name][0]), float(losses["right"][0]) + 0.1)
+            self.assertGreater(losses[name][1][name], 0.02)
 
     def test_refuses_frames_without_labels(self):
         for drive in "ab":
@@ -204,7 +204,7 @@ class TheRecipe(unittest.TestCase):
         self.assertAlmostEqual(idle["damage"]["all_right"], 1 / 3, places=3)
         self.assertEqual(idle["damage"]["kinds"]["splats"], {"found": 0, "invented": 0, "error": 0.5})
 
-    def test_learns_to_tell_two_streets_apart_and_reports_it(self):
+    def test_learns_what_two_streets_differ_by_and_reports_it(self):
         train(self.path("drives"), self.path("run"), 60, "--heldout", self.path("drives"), "--set", "ema=0.8",
               "--set", "learning_rate=0.01", "--set", "clean=1", "--set", "twice=0")
         with open(self.path("run/held_out.json")) as file:
@@ -244,7 +244,7 @@ class TheRecipe(unittest.TestCase):
             with torch.no_grad():
                 own = exact(resized(pixels.double()))
             self.assertEqual(engine.shape, own.shape)
-            self.assertGreater(float(own.std(0).max()), 0.1)  # pictures are told apart
+            self.assertGreater(float(own.std(0).max()), 0.1)  # pictures differ
             self.assertLess(float((engine - own).abs().max() / own.abs().max()), 2e-6, name)
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a transformer is told beside labels: boxes and colours of objects, from objects.json to a trained model."""
+"""What conditions a transformer beside labels: boxes and colours of objects, from objects.json to a trained model."""
 import contextlib
 import io
 import json
@@ -14,7 +14,7 @@ import torch
 
 from recipe import run_recipe
 from semtrain import held_out, safetensors_file, transformer, variance
-from semtrain.condition import drawn_boxes, mirrored, object_part, told_boxes, told_tints, vector_of, width_of
+from semtrain.condition import drawn_boxes, mirrored, object_part, given_boxes, given_tints, vector_of, width_of
 from semtrain.grids import Grids, LocalSets, read_tokens
 from semtrain.json_file import read_json
 from semtrain.model_folder import write_component, write_scheduler
@@ -28,7 +28,7 @@ NETWORK = {"num_layers": 2, "num_attention_heads": 2, "attention_head_dim": 16, 
            "num_classes": 20, "voxel_size": 0.6, "attention_radius": 3.0, "pos_embed_dim": 8,
            "context_pos_embed": True}
 BOTH = {**NETWORK, "condition": ["object", "tint"]}
-TELL_ALL = {"dropout": 0, "partial": 0, "local": 0, "noise": 0, "jitter": 0, "repaint": 0}
+GIVE_ALL = {"dropout": 0, "partial": 0, "local": 0, "noise": 0, "jitter": 0, "repaint": 0}
 CAR = [2.4, 0.0, 0.6, 4.2, 1.8, 1.2, 0.0]  # centre, size, heading
 
 
@@ -50,7 +50,7 @@ def write_cars(folder):
 
 def config_of(**more):
     return {"seed": 3, "set_size": [40, 40], "batch": 8, "label_dropout": 0, "class_balance": 0.5, "mirror": False,
-            "ordered_points": True, "known_share": 0, "network": BOTH, "telling": TELL_ALL, **more}
+            "ordered_points": True, "known_share": 0, "network": BOTH, "telling": GIVE_ALL, **more}
 
 
 class Objects(unittest.TestCase):
@@ -95,7 +95,7 @@ class Objects(unittest.TestCase):
         tints = local_tints(centers * 10, owners, points)
         self.assertEqual(tints[:, 0].tolist(), [1, 2, 3, 4, 200, 201, 202, 203, 204, 0])
 
-    def test_tell_a_cell_how_far_it_lies_from_each_face(self):
+    def test_say_how_far_a_voxel_lies_from_each_face(self):
         part = object_part(np.array([[3.4, 0.5, 0.6], [-20, 0, 0.6]]), np.array([CAR] * 2), np.array([True, True]))
         self.assertEqual(part.shape, (2, 60))
         self.assertTrue(np.allclose(part[0, 1:7] * 4, [1.1, 3.1, 0.4, 1.4, 0.6, 0.6], atol=1e-5))
@@ -118,7 +118,7 @@ class Objects(unittest.TestCase):
                                         np.array([math.cos(0.4), math.sin(0.4)]) * np.eye(2)[1 - axis] * 2 -
                                         np.array([math.cos(0.4), math.sin(0.4)])), axis)
 
-    def test_are_told_to_a_set_with_tints_in_the_order_of_the_config(self):
+    def test_condition_a_set_with_tints_in_the_order_of_the_config(self):
         sets = self.sets()
         centers, labels, tokens, _, conditions = sets.batch(2)
         self.assertEqual(conditions.shape, (8, 40, 64))
@@ -126,9 +126,9 @@ class Objects(unittest.TestCase):
         self.assertTrue((conditions[..., 0] == is_car).all())
         self.assertTrue((conditions[..., 60] == is_car).all())
         self.assertTrue((conditions[~is_car] == 0).all())
-        told = (conditions[..., 61:][is_car] + 1) / 2 * 255
+        given = (conditions[..., 61:][is_car] + 1) / 2 * 255
         true = (tokens.reshape(8, 40, 4, 6)[..., 3:].mean(2)[is_car] + 1) / 2 * 255
-        self.assertLess(np.abs(told - true).max(), 1)
+        self.assertLess(np.abs(given - true).max(), 1)
         swapped = LocalSets(sets.grids, config_of(network={**NETWORK, "condition": ["tint", "object"]})).batch(2)[4]
         self.assertTrue((swapped[..., 4:] == conditions[..., :60]).all())
         self.assertTrue((swapped[..., :4] == conditions[..., 60:]).all())
@@ -143,28 +143,28 @@ class Objects(unittest.TestCase):
         with open(self.path("objects.json"), "w") as file:
             json.dump(about, file)
 
-    def test_have_parts_that_own_no_cells_and_are_told_to_those_up_to_60_cm_from_them(self):
+    def test_have_parts_that_own_no_voxels_and_condition_those_up_to_60_cm_from_them(self):
         config = {**NETWORK, "condition": ["object", "tint", "part"]}
         before = self.sets().batch(2)
         self.add_parts()
         sets = LocalSets(Grids([self.path("truth.sgrid")], self.path("parts")), config_of(network=config))
-        centers, labels, tokens, _, told = sets.batch(2)
+        centers, labels, tokens, _, given = sets.batch(2)
         self.assertTrue((tokens == before[2]).all())
-        self.assertTrue((told[..., :64] == before[4]).all())
+        self.assertTrue((given[..., :64] == before[4]).all())
         flags = np.zeros(labels.shape, int)
         for number, x in ((1, 4.6), (2, 8.1)):
             depth = np.array([0.25, 1, 0.5]) - np.abs(centers - [x, 0, 0.6])
             flags[(depth.min(-1) > -0.6 + 1e-6) & (labels == 13)] = number
         self.assertGreater(min((flags == number).sum() for number in (1, 2)), 10)
-        self.assertTrue(((told[..., 64] == 1) == (flags > 0)).all())
-        self.assertTrue(((told[..., 124] == 1) == (flags == 2)).all())
-        self.assertTrue((told[flags == 2][:, 125:] == [1, -1, -1]).all())
-        self.assertTrue((told[flags == 0][:, 64:] == 0).all())
+        self.assertTrue(((given[..., 64] == 1) == (flags > 0)).all())
+        self.assertTrue(((given[..., 124] == 1) == (flags == 2)).all())
+        self.assertTrue((given[flags == 2][:, 125:] == [1, -1, -1]).all())
+        self.assertTrue((given[flags == 0][:, 64:] == 0).all())
         box = np.array([[8.1, 0, 0.6, 0.5, 2, 1, 0]])
         cell = centers[flags == 2][:1]
-        np.testing.assert_allclose(told[flags == 2][:1, 64:124], object_part(cell, box, np.array([True])), atol=1e-5)
+        np.testing.assert_allclose(given[flags == 2][:1, 64:124], object_part(cell, box, np.array([True])), atol=1e-5)
         street = StreetObjects(self.path("truth.sgrid"), *self.cells())
-        self.assertEqual(street.tell(config["condition"])[:, 64].sum(), len(np.flatnonzero(street.parts >= 0)))
+        self.assertEqual(street.conditions(config["condition"])[:, 64].sum(), len(np.flatnonzero(street.parts >= 0)))
 
     def cells(self):
         t = {name: tensor.numpy() for name, tensor in safetensors_file.read(self.path("truth.sgrid")).items()}
@@ -184,7 +184,7 @@ class Objects(unittest.TestCase):
         self.assertEqual(usual["parts"], {"size": [0.9, 1.2, 1.6], "pitch": [3, 3.1], "low": 1.5,
                                           "tints": ["#101010"] * 10})
 
-    def test_may_be_told_of_more_by_a_model_that_went_on_from_one_that_was_told_less(self):
+    def test_more_conditions_come_with_a_model_that_went_on_from_one_with_fewer(self):
         torch.manual_seed(1)
         less, more = VoxfieldTransformer(**BOTH), VoxfieldTransformer(**{**BOTH, "condition": ["object", "tint", "part"]})
         more.load_state_dict(transformer.with_new_parts(less.state_dict(), more))
@@ -196,20 +196,20 @@ class Objects(unittest.TestCase):
         with torch.no_grad():
             torch.testing.assert_close(more(*given, condition), less(*given, condition[..., :64]))
 
-    def test_are_told_to_a_street_that_is_placed_anew(self):
-        """all of them, with their whole colours, as a set of one batch is told in training"""
+    def test_condition_a_street_that_is_placed_anew(self):
+        """all of them, with their whole colours, as a set of one batch is given in training"""
         path = os.path.join(self.folder.name, "truth.sgrid")
         t = {name: tensor.numpy() for name, tensor in safetensors_file.read(path).items()}
         centers, chosen = (t["cells"] + 0.5) * 0.6, np.arange(len(t["cells"]))
         objects = StreetObjects(path, centers, t["labels"])
-        told = objects.tell(BOTH["condition"])
+        given = objects.conditions(BOTH["condition"])
         grids = Grids([path], os.path.join(self.folder.name, "cache"))
         sets = LocalSets(grids, config_of())
         boxes = grids.boxes[grids.owners]
         again = sets._condition(np.random.default_rng(1), centers, chosen, boxes, boxes, np.array(grids.tokens), False)
-        np.testing.assert_array_equal(told, again)
-        self.assertGreater(told[t["labels"] == 13, -3:].max(), 0.6)
-        self.assertEqual(objects.tell(()).shape, (len(t["cells"]), 0))
+        np.testing.assert_array_equal(given, again)
+        self.assertGreater(given[t["labels"] == 13, -3:].max(), 0.6)
+        self.assertEqual(objects.conditions(()).shape, (len(t["cells"]), 0))
 
     def test_keep_their_mean_colour_where_a_street_is_placed_anew(self):
         path = os.path.join(self.folder.name, "truth.sgrid")
@@ -226,7 +226,7 @@ class Objects(unittest.TestCase):
         np.testing.assert_array_equal(made[..., :3], before[..., :3])
         np.testing.assert_array_equal(made[objects.owners < 0], before[objects.owners < 0])
 
-    def test_of_the_ground_tell_a_colour_and_no_box(self):
+    def test_of_the_ground_have_a_colour_and_no_box(self):
         about = read_json(self.path("objects.json"))
         about["objects"].append({"id": 7, "class": "road", "center": [4.2, 0, -0.3], "size": [10, 4, 3], "heading": 0,
                                  "tint": "#a03020"})
@@ -240,8 +240,8 @@ class Objects(unittest.TestCase):
         self.assertTrue((conditions[road][:, :60] == 0).all())
         self.assertTrue(np.allclose(conditions[road][:, 60:], [1, *(2 * np.array([160, 48, 32]) / 255 - 1)], atol=1e-6))
         cells = np.array(grids.cells)
-        told = StreetObjects(self.path("truth.sgrid"), (cells + 0.5) * 0.6, grids.labels).tell(BOTH["condition"])
-        self.assertTrue((told[grids.labels == 0] == conditions[road][0]).all())
+        given = StreetObjects(self.path("truth.sgrid"), (cells + 0.5) * 0.6, grids.labels).conditions(BOTH["condition"])
+        self.assertTrue((given[grids.labels == 0] == conditions[road][0]).all())
 
     def test_of_the_ground_are_usual_as_the_largest_of_a_street_is(self):
         paths = []
@@ -259,7 +259,7 @@ class Objects(unittest.TestCase):
 
     def test_are_left_out_each_for_itself_and_with_the_labels(self):
         counts = np.zeros((2, 2), int)
-        sets = self.sets(telling={**TELL_ALL, "dropout": 0.5}, label_dropout=0.2, batch=64)
+        sets = self.sets(telling={**GIVE_ALL, "dropout": 0.5}, label_dropout=0.2, batch=64)
         _, labels, _, _, conditions = sets.batch(0)
         for of_set, set_labels in zip(conditions, labels):
             if (set_labels == 20).all():
@@ -268,16 +268,16 @@ class Objects(unittest.TestCase):
                 counts[int(of_set[:, 0].any()), int(of_set[:, 60].any())] += 1
         self.assertTrue((counts > 4).all(), counts)
 
-    def test_may_be_told_in_part(self):
-        owners, shares = np.repeat(np.arange(-1, 9), 30), {told_boxes: [], told_tints: []}
+    def test_may_be_given_in_part(self):
+        owners, shares = np.repeat(np.arange(-1, 9), 30), {given_boxes: [], given_tints: []}
         for seed in range(200):
-            for tell, seen in shares.items():
-                labels = (np.full(len(owners), 13),) if tell is told_boxes else ()
-                told = tell(np.random.default_rng(seed), owners, *labels, {"dropout": 0.25, "partial": 0.5})
-                self.assertFalse(told[owners < 0].any())
-                seen.append(told[owners >= 0].mean())
-                if tell is told_boxes:
-                    self.assertTrue(all(len(set(told[owners == o])) == 1 for o in range(9)))
+            for draw, seen in shares.items():
+                labels = (np.full(len(owners), 13),) if draw is given_boxes else ()
+                given = draw(np.random.default_rng(seed), owners, *labels, {"dropout": 0.25, "partial": 0.5})
+                self.assertFalse(given[owners < 0].any())
+                seen.append(given[owners >= 0].mean())
+                if draw is given_boxes:
+                    self.assertTrue(all(len(set(given[owners == o])) == 1 for o in range(9)))
         for seen in shares.values():
             none, every = np.mean(np.array(seen) == 0), np.mean(np.array(seen) == 1)
             self.assertTrue(0.15 < none < 0.4 and 0.25 < every < 0.5, (none, every))
@@ -326,19 +326,19 @@ class Objects(unittest.TestCase):
             self.assertFalse(torch.equal(model(*given, condition), silent))
             self.assertTrue(torch.equal(model(*given, torch.zeros_like(condition)), silent))
 
-    def test_are_told_with_the_colours_of_what_was_repainted(self):
+    def test_condition_with_the_colours_of_what_was_repainted(self):
         plain = self.sets(batch=16).batch(2)
-        painted = self.sets(batch=16, telling={**TELL_ALL, "repaint": 0.5}).batch(2)
+        painted = self.sets(batch=16, telling={**GIVE_ALL, "repaint": 0.5}).batch(2)
         is_car = plain[1] == 13
         before, after = (((b[2].reshape(16, 40, 4, 6)[..., 3:].mean(2) + 1) / 2)[is_car] for b in (plain, painted))
-        told = ((painted[4][..., 61:] + 1) / 2)[is_car]
+        given = ((painted[4][..., 61:] + 1) / 2)[is_car]
         changed = np.abs(after - before).max(1) > 0.02
         self.assertTrue(0.2 < changed.mean() < 0.7, changed.mean())
-        self.assertLess(np.abs(told - after).max(), 0.01)
+        self.assertLess(np.abs(given - after).max(), 0.01)
         self.assertTrue((painted[2][~is_car] == plain[2][~is_car]).all())
         self.assertTrue((painted[2].reshape(16, 40, 4, 6)[..., :3] == plain[2].reshape(16, 40, 4, 6)[..., :3]).all())
-        some = self.sets(telling={**TELL_ALL, "partial": 1, "repaint": 1}).batch(2)[2]
-        self.assertTrue((some == self.sets(telling={**TELL_ALL, "partial": 1}).batch(2)[2]).all())
+        some = self.sets(telling={**GIVE_ALL, "partial": 1, "repaint": 1}).batch(2)[2]
+        self.assertTrue((some == self.sets(telling={**GIVE_ALL, "partial": 1}).batch(2)[2]).all())
 
     def test_keep_dark_parts_when_repainted(self):
         paint, red = np.array([0.6, 0.6, 0.6]), np.array([0.6, 0.2, 0.2])
@@ -352,7 +352,7 @@ class Objects(unittest.TestCase):
         config = {**BOTH, "condition": ["tint"]}
         settings = ["--config", "objects", "--set", f"network={json.dumps(config)}", "--set", "batch=4", "--set", "set_size=[24,30]",
                     "--set", "warmup=2", "--set", "precision=fp32", "--set", "known_share=0", "--set", "ema=0.9",
-                    "--set", f"telling={json.dumps(TELL_ALL)}", "--set", "learning_rate=0.01", "--set", "steps=150",
+                    "--set", f"telling={json.dumps(GIVE_ALL)}", "--set", "learning_rate=0.01", "--set", "steps=150",
                     "--set", "mirror=false", "--set", "label_dropout=0"]
         run_recipe("transformer", self.path("run"), "--grids", self.path("truth.sgrid"), *settings)
         with open(self.path("run/model/voxfield_transformer/config.json")) as file:
@@ -363,9 +363,9 @@ class Objects(unittest.TestCase):
         centers, labels, tokens, known, conditions = (torch.from_numpy(a) for a in sets.batch(4))
         noise, cars = torch.randn(tokens.shape), labels[0] == 13
 
-        def brightness(told):
+        def brightness(given):
             condition = torch.zeros_like(conditions)
-            condition[0, cars] = torch.tensor([1.0, told, told, told])
+            condition[0, cars] = torch.tensor([1.0, given, given, given])
             with torch.no_grad():
                 made = model(noise, labels, centers, ~known, torch.tensor([999]), condition)
             return float(made.unflatten(2, (-1, 6))[0, cars][..., 3:].mean())
@@ -378,16 +378,16 @@ class TheTable(unittest.TestCase):
             write_cars(folder)
             torch.manual_seed(1)
             state = {n: torch.randn(t.shape) * 0.1 for n, t in VoxfieldTransformer(**BOTH).state_dict().items()}
-            told, plain = os.path.join(folder, "told"), os.path.join(folder, "plain")
-            write_component(told, BOTH, state)
+            given, plain = os.path.join(folder, "given"), os.path.join(folder, "plain")
+            write_component(given, BOTH, state)
             write_component(plain, NETWORK, {n: t for n, t in state.items() if not n.startswith("condition_embed.")})
             out = io.StringIO()
             with contextlib.redirect_stdout(out):
                 held_out.main(["--grids", os.path.join(folder, "truth.sgrid"), "--model", f"plain={plain}", "--model",
-                               f"told={told}", "--batches", "1", "--cells", "30", "--threads", "1"])
+                               f"given={given}", "--batches", "1", "--cells", "30", "--threads", "1"])
             rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in out.getvalue().splitlines()[2:]]
-            self.assertEqual([r[:2] for r in rows], [["plain", "labels"], ["told", "labels"], ["told", "object"],
-                                                     ["told", "tint"], ["told", "object and tint"]])
+            self.assertEqual([r[:2] for r in rows], [["plain", "labels"], ["given", "labels"], ["given", "object"],
+                                                     ["given", "tint"], ["given", "object and tint"]])
             self.assertEqual(rows[0][2:], rows[1][2:])
             self.assertEqual(len({tuple(r[2:]) for r in rows}), 4)
 

@@ -176,7 +176,7 @@ class TheRecipe(unittest.TestCase):
                 with torch.no_grad():
                     own = model.describe(positions, inputs)
                 self.assertEqual(engine.shape, own.shape)
-                self.assertGreater(float(own.std(0).max()), 0.1)  # chunks are told apart
+                self.assertGreater(float(own.std(0).max()), 0.1)  # chunks differ
                 self.assertLess(float((engine - own).abs().max() / own.abs().max()), 1e-4, (pool, name))
 
 

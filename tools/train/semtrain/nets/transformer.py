@@ -121,8 +121,8 @@ class TimeEmbedding(nn.Module):
 
 
 class ConditionEmbedding(nn.Module):
-    """What is told of cells, for semantic tokens and, if `voxels`, for voxel tokens. Without bias: a cell of which nothing
-    is told gets exactly nothing."""
+    """Conditions of voxels, for semantic tokens and, if `voxels`, for voxel tokens. Without bias: a voxel without
+    conditions gets exactly nothing."""
 
     def __init__(self, parts, width, voxels):
         super().__init__()
