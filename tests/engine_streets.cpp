@@ -5,9 +5,9 @@
 #include "runtime/base/hash.h"
 #include "tools/streets/camera_drive.h"
 #include "tools/streets/class_label.h"
-#include "tools/streets/road_surface.h"
 #include "tools/streets/street.h"
-#include "tools/streets/vehicle.h"
+#include "tools/streets/street_objects.h"
+#include "tools/streets/street_parts.h"
 
 #include <algorithm>
 #include <functional>

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/streets/building.h"
+#include "tools/streets/facade.h"
 
 #include "tools/streets/class_label.h"
 

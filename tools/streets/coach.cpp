@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // trucks, buses and trams: long boxes with rounded edges
 #include "tools/streets/class_label.h"
-#include "tools/streets/vehicle.h"
+#include "tools/streets/street_objects.h"
 
 #include <algorithm>
 #include <numbers>

@@ -1,11 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/streets/furnishing.h"
+#include "tools/streets/street_parts.h"
 
-#include "tools/streets/person.h"
-#include "tools/streets/road_surface.h"
-#include "tools/streets/street_furniture.h"
-#include "tools/streets/tree.h"
+#include "tools/streets/street_objects.h"
 
 #include <algorithm>
 #include <numbers>

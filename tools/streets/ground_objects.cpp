@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/streets/ground_objects.h"
+#include "tools/streets/street_parts.h"
 
 #include "tools/streets/class_label.h"
 

@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/streets/plot.h"
+#include "tools/streets/street_parts.h"
 
-#include "tools/streets/building.h"
 #include "tools/streets/class_label.h"
-#include "tools/streets/tree.h"
+#include "tools/streets/facade.h"
+#include "tools/streets/street_objects.h"
 
 #include <algorithm>
 

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/streets/road_surface.h"
+#include "tools/streets/street_parts.h"
 
 #include "runtime/base/keyed_random.h"
 #include "tools/streets/class_label.h"

@@ -3,10 +3,7 @@
 #include "tools/streets/street.h"
 
 #include "engine/scene/palette.h"
-#include "tools/streets/furnishing.h"
-#include "tools/streets/ground_objects.h"
-#include "tools/streets/plot.h"
-#include "tools/streets/road_surface.h"
+#include "tools/streets/street_parts.h"
 
 namespace semrover {
 

@@ -1,10 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/streets/street_furniture.h"
+#include "tools/streets/street_objects.h"
 
 #include "tools/streets/class_label.h"
-#include "tools/streets/person.h"
-#include "tools/streets/tree.h"
 
 #include <algorithm>
 #include <numbers>

@@ -1,9 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/streets/furnishing.h"
-#include "tools/streets/person.h"
-#include "tools/streets/road_surface.h"
-#include "tools/streets/vehicle.h"
+#include "tools/streets/street_objects.h"
+#include "tools/streets/street_parts.h"
 
 #include <algorithm>
 #include <numbers>
