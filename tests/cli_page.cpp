@@ -7,7 +7,6 @@
 #include "tests/page_inputs.h"
 #include "tests/program.h"
 #include "tools/page/page.h"
-#include "tools/page/page_text.h"
 
 #include <algorithm>
 #include <cstring>

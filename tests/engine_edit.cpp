@@ -7,9 +7,8 @@
 #include "tests/json_text.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
-#include "tools/editing/edit_script.h"
-#include "tools/editing/edit_undo.h"
-#include "tools/editing/stamp.h"
+#include "tools/editing/editing.h"
+#include "tools/editing/grid_editor.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/deferred/frame_windows.h"
+#include "engine/deferred/renderer_settings.h"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 #include "tests/kernel_case.h"
 #include "tests/says.h"
 #include "tests/street_scene.h"
-#include "tools/fuse/timed_pictures.h"
+#include "tools/fuse/frame_pictures.h"
 
 #include <map>
 

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/conditioning/cell_objects.h"
 #include "engine/conditioning/guessed_objects.h"
-#include "engine/scene/connected_groups.h"
 #include "tests/says.h"
 
 #include <algorithm>

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/base/dtype.h"
-#include "tools/eval/local_contrast.h"
+#include "tools/eval/point_scores.h"
 
 #include <algorithm>
 #include <cmath>

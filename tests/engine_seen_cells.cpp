@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/mesh/voxelizer.h"
 #include "tests/kernel_case.h"
-#include "tools/streets/seen_cells.h"
+#include "tools/streets/street_grid.h"
 
 #include <gtest/gtest.h>
 

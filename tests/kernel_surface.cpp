@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/mesh/triangle_tree.h"
+#include "engine/mesh/nearest_surface.h"
 #include "kernels/mesh.h"
 #include "tests/clip_reference.h"
 #include "tests/kernel_case.h"

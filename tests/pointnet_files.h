@@ -4,7 +4,7 @@
 
 #include "runtime/base/json.h"
 #include "tests/state_dict.h"
-#include "tools/eval/pointnet_config.h"
+#include "tools/eval/pointnet.h"
 
 #include <fstream>
 

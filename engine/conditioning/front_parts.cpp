@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/conditioning/front_parts.h"
+#include "engine/conditioning/street_fronts.h"
 
 #include "runtime/base/keyed_random.h"
 

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/format/label_column.h"
 #include "engine/format/label_table.h"
 
 #include <map>

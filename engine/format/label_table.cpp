@@ -13,6 +13,28 @@ namespace semrover {
 
 namespace {
 
+// CloudCompare writes scalar_ in front of a name; classification is what LAS calls it, semantic what KITTI-360 does,
+// ObjTag what CARLA's semantic lidar does
+constexpr LabelColumn kColumns[] = {
+    {"label", ""},
+    {"class", ""},
+    {"semantic", "kitti360"},
+    {"semantic_label", ""},
+    {"class_id", ""},
+    {"classification", "asprs"},
+    {"Classification", "asprs"},
+    {"category", ""},
+    {"category_id", ""},
+    {"objtag", "carla"},
+    {"ObjTag", "carla"},
+    {"scalar_label", ""},
+    {"scalar_Label", ""},
+    {"scalar_class", ""},
+    {"scalar_semantic", "kitti360"},
+    {"scalar_Classification", "asprs"},
+    {"scalar_classification", "asprs"},
+};
+
 constexpr std::string_view kOurs = "ours";
 constexpr JsonLimits kTableLimits{.bytes = 1 << 20, .depth = 2, .values = 100000};
 
@@ -84,6 +106,16 @@ LabelTable our_table()
 }
 
 } // namespace
+
+std::span<const LabelColumn> label_columns()
+{
+    return kColumns;
+}
+
+bool says_own_labels(const std::vector<std::string>& comments)
+{
+    return std::ranges::find(comments, kOwnLabelsComment) != comments.end();
+}
 
 Result<LabelTable> read_label_table(const Path& name_or_file)
 {

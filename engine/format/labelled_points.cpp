@@ -7,7 +7,7 @@
 #include "engine/format/ply_colors.h"
 #include "engine/scene/scene_points.h"
 #include "runtime/base/dtype.h"
-#include "runtime/base/mix64.h"
+#include "runtime/base/keyed_random.h"
 #include "runtime/base/quote.h"
 
 #include <algorithm>

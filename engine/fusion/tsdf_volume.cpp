@@ -307,14 +307,4 @@ MarchingCubesField TsdfVolume::in(Graph& g) const
             .max_jump = float(options_.max_jump / options_.truncation)};
 }
 
-Result<std::vector<float>> TsdfVolume::read_distances() const
-{
-    return distances_.read<float>(*device_);
-}
-
-Result<std::vector<uint32_t>> TsdfVolume::read_attributes() const
-{
-    return attributes_.read<uint32_t>(*device_);
-}
-
 } // namespace semrover

@@ -23,9 +23,6 @@ class TsdfVolume {
     uint32_t chunks() const { return chunks_; }
     MarchingCubesField in(Graph& g) const;
 
-    Result<std::vector<float>> read_distances() const;     // [blocks, 512] in truncations; 2: unobserved
-    Result<std::vector<uint32_t>> read_attributes() const; // [blocks, 512] as tsdf_finish makes them
-
   private:
     struct ChunkState; // sums and votes of the blocks of a chunk
 

@@ -7,7 +7,7 @@
 #include "engine/mesh/surface_blocks.h"
 #include "engine/mesh/transparency.h"
 #include "runtime/base/dtype.h"
-#include "runtime/base/mix64.h"
+#include "runtime/base/keyed_random.h"
 
 #include <algorithm>
 #include <cmath>

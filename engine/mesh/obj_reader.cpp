@@ -3,7 +3,6 @@
 // Wavefront OBJ: vertices with or without colours, polygons, names of materials
 #include "engine/mesh/mesh_readers.h"
 #include "engine/mesh/obj_materials.h"
-#include "engine/mesh/polygon.h"
 #include "engine/mesh/word_lines.h"
 #include "runtime/base/quote.h"
 

@@ -4,7 +4,6 @@
 // http://www.geomview.org/docs/html/OFF.html
 #include "engine/format/color_scale.h"
 #include "engine/mesh/mesh_readers.h"
-#include "engine/mesh/polygon.h"
 #include "engine/mesh/word_lines.h"
 #include "engine/scene/srgb.h"
 #include "runtime/base/file.h"

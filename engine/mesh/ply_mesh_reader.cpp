@@ -5,7 +5,6 @@
 #include "engine/format/ply_colors.h"
 #include "engine/mesh/asset_folder.h"
 #include "engine/mesh/mesh_readers.h"
-#include "engine/mesh/polygon.h"
 #include "runtime/base/quote.h"
 
 #include <algorithm>

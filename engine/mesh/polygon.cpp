@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/mesh/polygon.h"
+#include "engine/mesh/mesh_readers.h"
 
 #include <algorithm>
 #include <cmath>

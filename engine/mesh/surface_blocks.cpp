@@ -6,7 +6,7 @@
 #include "engine/scene/srgb.h"
 #include "kernels/mesh.h"
 #include "kernels/network.h"
-#include "runtime/base/mix64.h"
+#include "runtime/base/keyed_random.h"
 
 #include <algorithm>
 #include <bit>

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/mesh/polygon.h"
+#include "engine/mesh/mesh_readers.h"
 #include "runtime/base/quote.h"
 
 #include <algorithm>

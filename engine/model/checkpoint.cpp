@@ -4,7 +4,7 @@
 
 #include "engine/model/ldm_config.h"
 #include "runtime/base/hash.h"
-#include "runtime/base/mix64.h"
+#include "runtime/base/keyed_random.h"
 #include "runtime/base/quote.h"
 
 #include <algorithm>

@@ -378,18 +378,6 @@ Result<std::string_view> header_text(std::span<const std::byte> file, std::strin
 
 } // namespace
 
-std::optional<DType> dtype_from_name(std::string_view name)
-{
-    const DTypeName* dtype = find_dtype(name);
-    return dtype ? dtype->dtype : std::nullopt;
-}
-
-std::optional<uint32_t> dtype_bits(std::string_view name)
-{
-    const DTypeName* dtype = find_dtype(name);
-    return dtype ? std::optional(dtype->bits) : std::nullopt;
-}
-
 std::string shape_text(std::span<const uint64_t> shape)
 {
     return fmt::format("[{}]", fmt::join(shape, ", "));

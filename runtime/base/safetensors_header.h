@@ -56,12 +56,6 @@ struct SafetensorsHeader {
     uint64_t data_begin = 0; // where the data section starts in the file
 };
 
-// the element type of a safetensors name ("F16"), none for one that the engine does not read
-std::optional<DType> dtype_from_name(std::string_view name);
-
-// bits of one element of any dtype the format defines (4 for F4, 64 for C64); none for an unknown name
-std::optional<uint32_t> dtype_bits(std::string_view name);
-
 // bytes of a dense tensor: the only place where a shape becomes a size. An error says which limit is broken: rank over
 // kMaxRank, a dimension over kMaxDim, a product over 2^64 bits, or a size that is no whole number of bytes.
 Result<uint64_t> checked_bytes(std::span<const uint64_t> shape, uint32_t bits_per_element);

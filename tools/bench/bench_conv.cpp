@@ -3,9 +3,8 @@
 // semrover bench conv: one 3x3 convolution
 #include "kernels/network.h"
 #include "tools/bench/bench.h"
-#include "tools/cli/choice.h"
-#include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
+#include "tools/cli/value_options.h"
 
 #include <CLI/CLI.hpp>
 

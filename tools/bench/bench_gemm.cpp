@@ -3,9 +3,8 @@
 // semrover bench gemm: y = x w^T, x [m, k], w [n, k]
 #include "kernels/network.h"
 #include "tools/bench/bench.h"
-#include "tools/cli/choice.h"
-#include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
+#include "tools/cli/value_options.h"
 
 #include <CLI/CLI.hpp>
 

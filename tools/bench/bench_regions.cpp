@@ -3,7 +3,7 @@
 // semrover bench regions: Algorithm 1 over a street-like cloud, one core, no device
 #include "engine/voxfield/region_graph.h"
 #include "tools/bench/bench.h"
-#include "tools/cli/number_option.h"
+#include "tools/cli/value_options.h"
 
 #include <chrono>
 #include <CLI/CLI.hpp>

@@ -4,9 +4,8 @@
 #include "engine/splat/rasterizer.h"
 #include "kernels/sort.h"
 #include "tools/bench/bench.h"
-#include "tools/cli/choice.h"
-#include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
+#include "tools/cli/value_options.h"
 
 #include <CLI/CLI.hpp>
 

@@ -3,9 +3,8 @@
 // semrover bench transformer: one denoising step of a batch of regions, both guidance halves, random weights
 #include "engine/voxfield/token_sampler.h"
 #include "tools/bench/bench.h"
-#include "tools/cli/choice.h"
-#include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
+#include "tools/cli/value_options.h"
 
 #include <CLI/CLI.hpp>
 #include <cmath>

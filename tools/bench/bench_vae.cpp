@@ -3,9 +3,8 @@
 // semrover bench vae: one picture through the decoder, or the encoder, of a VAE with random weights
 #include "engine/network/vae.h"
 #include "tools/bench/bench.h"
-#include "tools/cli/choice.h"
-#include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
+#include "tools/cli/value_options.h"
 
 #include <CLI/CLI.hpp>
 

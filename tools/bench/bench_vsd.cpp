@@ -7,9 +7,8 @@
 #include "engine/model/renderer_model.h"
 #include "runtime/base/json.h"
 #include "tools/bench/bench.h"
-#include "tools/cli/choice.h"
-#include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
+#include "tools/cli/value_options.h"
 
 #include <chrono>
 #include <CLI/CLI.hpp>

@@ -4,8 +4,8 @@
 #include "engine/world/world.h"
 #include "tools/bench/bench.h"
 #include "tools/bench/call_times.h"
-#include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
+#include "tools/cli/value_options.h"
 
 #include <CLI/CLI.hpp>
 #include <fstream>

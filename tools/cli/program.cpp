@@ -7,9 +7,9 @@
 #include "runtime/base/file.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/interrupt.h"
-#include "tools/cli/memory_size.h"
 #include "tools/cli/option_facts.h"
 #include "tools/cli/print_stderr.h"
+#include "tools/cli/value_options.h"
 
 #include <cerrno>
 #include <CLI/CLI.hpp>

@@ -65,16 +65,10 @@ Result<Json> run_job(const Globals& globals, const BeginJob& begin)
     JobDisplay display(globals);
     SR_TRY(const auto job, begin(display.callbacks()));
     keep_in(job->kept_in());
-    for (bool done = false; !done;) {
-        const Result<bool> step =
-            interrupt_requested() ? fail(ErrorCode::interrupted, "") : job->step(JobBudget::one_submit());
-        if (!step) {
-            if (step.error().code == ErrorCode::interrupted)
-                job->cancel();
-            return stopped(step.error(), job->kept_in());
-        }
-        done = *step;
-    }
+    const Status ended = step_to_end(*job, job->kept_in());
+    if (!ended && ended.error().code == ErrorCode::interrupted)
+        job->cancel();
+    SR_CHECK(ended);
     return job->finish();
 }
 

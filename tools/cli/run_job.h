@@ -38,4 +38,18 @@ void keep_in(const Path& folder);
 // done is kept
 tl::unexpected<Error> stopped(const Error& error, const Path& folder);
 
+// Steps a job or a world to its end. Errors as stopped() says them
+template <typename Work>
+Status step_to_end(Work& work, const Path& folder)
+{
+    for (bool done = false; !done;) {
+        const Result<bool> step =
+            interrupt_requested() ? fail(ErrorCode::interrupted, "") : work.step(JobBudget::one_submit());
+        if (!step)
+            return stopped(step.error(), folder);
+        done = *step;
+    }
+    return {};
+}
+
 } // namespace semrover

@@ -1,14 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover convert IN OUT: a model in another layout; or a scene, a trajectory or boxes in another format, as IN says
+#include "tools/commands/convert.h"
 #include "runtime/base/quote.h"
-#include "tools/cli/choice.h"
-#include "tools/cli/number_option.h"
-#include "tools/cli/option_meaning.h"
-#include "tools/commands/convert_model.h"
-#include "tools/commands/convert_objects.h"
-#include "tools/commands/convert_path.h"
-#include "tools/commands/convert_scene.h"
+#include "tools/cli/option_facts.h"
+#include "tools/cli/value_options.h"
 #include "tools/trajectory/camera_path.h"
 
 #include <array>

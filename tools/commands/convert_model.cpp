@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/commands/convert_model.h"
+#include "tools/commands/convert.h"
 
 #include "engine/model/low_rank.h"
 #include "engine/model/model_writer.h"

@@ -1,11 +1,11 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/commands/convert_objects.h"
+#include "tools/commands/convert.h"
 
 #include "engine/world/conditioning_objects.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
-#include "tools/cli/number_option.h"
+#include "tools/cli/value_options.h"
 #include "tools/commands/scene_input.h"
 
 #include <CLI/CLI.hpp>

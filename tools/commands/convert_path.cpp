@@ -1,12 +1,12 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/commands/convert_path.h"
+#include "tools/commands/convert.h"
 
 #include "engine/format/labelled_points.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
-#include "tools/cli/choice.h"
-#include "tools/cli/warnings.h"
+#include "tools/cli/print_stderr.h"
+#include "tools/cli/value_options.h"
 #include "tools/commands/scene_input.h"
 #include "tools/trajectory/camera_path.h"
 

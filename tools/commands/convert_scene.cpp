@@ -1,12 +1,12 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/commands/convert_scene.h"
+#include "tools/commands/convert.h"
 
 #include "engine/scene/palette.h"
 #include "engine/splat/blocks.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/open_device.h"
-#include "tools/cli/option_meaning.h"
+#include "tools/cli/option_facts.h"
 #include "tools/commands/trajectory_options.h"
 
 namespace semrover {

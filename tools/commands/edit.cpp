@@ -3,11 +3,10 @@
 // semrover edit GRID -o OUT [-m MODEL] OPERATION...: changes labels or occupancy and regenerates only that and a halo
 #include "engine/conditioning/scene_objects.h"
 #include "engine/job/outputs.h"
-#include "tools/cli/number_option.h"
 #include "tools/cli/run_job.h"
+#include "tools/cli/value_options.h"
 #include "tools/commands/regeneration.h"
-#include "tools/editing/edit_script.h"
-#include "tools/editing/edit_undo.h"
+#include "tools/editing/editing.h"
 
 #include <CLI/CLI.hpp>
 

@@ -1,9 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover generate GRID -m MODEL -o OUT: fills a semantic grid with points; with --along, the tiles along a trajectory
-#include "tools/cli/choice.h"
-#include "tools/cli/number_option.h"
 #include "tools/cli/run_job.h"
+#include "tools/cli/value_options.h"
 #include "tools/commands/generate_runs.h"
 
 #include <CLI/CLI.hpp>
@@ -12,35 +11,23 @@ namespace semrover {
 
 namespace {
 
-using Arguments = std::shared_ptr<GenerateArguments>;
-
-Status generate(const Arguments& o, const Globals& globals)
+Status generate(const std::shared_ptr<GenerateArguments>& o, const Globals& globals)
 {
-    GridRun run(*o, globals);
-    SR_TRY(bool done, run.begin());
+    std::unique_ptr<GenerateRun> run;
+    if (o->along.empty())
+        run = std::make_unique<GridRun>(*o, globals);
+    else
+        run = std::make_unique<TilesRun>(*o, globals);
+    SR_TRY(bool done, run->begin());
     while (!done) {
         const Result<bool> step =
-            interrupt_requested() ? fail(ErrorCode::interrupted, "") : run.world().step(JobBudget::one_submit());
+            interrupt_requested() ? fail(ErrorCode::interrupted, "") : run->world().step(JobBudget::one_submit());
         if (!step)
-            return stopped(step.error(), run.folder());
+            return stopped(step.error(), run->kept_in());
+        SR_CHECK(run->check_step());
         done = *step;
     }
-    return run.end();
-}
-
-Status generate_along(const Arguments& o, const Globals& globals)
-{
-    TilesRun run(*o, globals);
-    SR_TRY(bool done, run.begin());
-    while (!done) {
-        const Result<bool> step =
-            interrupt_requested() ? fail(ErrorCode::interrupted, "") : run.world().step(JobBudget::one_submit());
-        if (!step)
-            return stopped(step.error(), o->output);
-        SR_CHECK(run.world().stored()); // it is what the run is for
-        done = *step;
-    }
-    return run.end();
+    return run->end();
 }
 
 } // namespace
@@ -89,9 +76,7 @@ void add_generate(CLI::App& app, const Globals& globals, Run& run)
                o->order);
     add_number(*c, "--tile-size", o->tile_size,
                "metres of a tile's edge in the order of tiles; another value gives other points", 0.01, 1e6);
-    c->callback([o, &globals, &run] {
-        run = resuming(std::bind_front(o->along.empty() ? generate : generate_along, o, std::cref(globals)));
-    });
+    c->callback([o, &globals, &run] { run = resuming(std::bind_front(generate, o, std::cref(globals))); });
 }
 
 } // namespace semrover

@@ -2,20 +2,35 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/commands/generate_runs.h"
 
+#include "engine/format/ply.h"
 #include "engine/job/input_hashes.h"
 #include "engine/job/outputs.h"
 #include "engine/job/version.h"
+#include "engine/splat/splat_scene.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/host_memory.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/open_device.h"
-#include "tools/cli/option_meaning.h"
+#include "tools/cli/option_facts.h"
 #include "tools/trajectory/camera_path.h"
 #include "tools/trajectory/path_format.h"
 
 #include <chrono>
 
 namespace semrover {
+
+Status export_ply(Device& device, const VoxelGrid& grid, const PlyExports& exports)
+{
+    SR_TRY(const SplatScene scene, SplatScene::create(device, points_of(grid)));
+    SR_TRY(const Splats s, scene.read());
+    if (!exports.points.empty())
+        SR_CHECK(write_points_ply(exports.points, s));
+    if (!exports.splats_3d.empty())
+        SR_CHECK(write_splats_ply(exports.splats_3d, s, SplatPly::gaussian_3d));
+    if (!exports.splats_2d.empty())
+        SR_CHECK(write_splats_ply(exports.splats_2d, s, SplatPly::gaussian_2d));
+    return {};
+}
 
 namespace {
 
@@ -32,6 +47,20 @@ Result<uint64_t> hash_input(const Path& path)
 }
 
 } // namespace
+
+Status GenerateRun::end()
+{
+    if (o_.generation.dry_run)
+        return {};
+    if (!finished_) {
+        SR_TRY(const Json results, write());
+        SR_CHECK(run_->finish(results));
+        finished_ = results;
+    }
+    SR_CHECK(write_profile(*device_, o_.generation.profile, globals_));
+    print_results(*finished_, globals_);
+    return {};
+}
 
 std::vector<Path> GridRun::written_files(bool with_objects) const
 {
@@ -162,29 +191,21 @@ VoxelGrid GridRun::filled() const
     return grid;
 }
 
-Status GridRun::end()
+Result<Json> GridRun::write()
 {
-    if (o_.generation.dry_run)
-        return {};
-    if (!finished_) {
-        const VoxelGrid grid = filled();
-        if (o_.ply.any())
-            SR_CHECK(export_ply(*device_, grid, o_.ply));
-        Json results = world_->results();
-        results.emplace("seconds", seconds_now() - begun_);
-        SR_CHECK(write_grid(o_.output, grid));
-        if (!objects_->empty())
-            SR_CHECK(write_objects(objects_beside(o_.output), *objects_));
-        SR_TRY(const uint64_t hash, hash_file(o_.output));
-        results["output"] = Path(o_.output).filename().string();
-        results["xxh64"] = hash_text(hash);
-        (void)world_->flush(); // the grid has them: no matter if the store has not
-        SR_CHECK(run_->finish(results));
-        finished_ = results;
-    }
-    SR_CHECK(write_profile(*device_, o_.generation.profile, globals_));
-    print_results(*finished_, globals_);
-    return {};
+    const VoxelGrid grid = filled();
+    if (o_.ply.any())
+        SR_CHECK(export_ply(*device_, grid, o_.ply));
+    Json results = world_->results();
+    results.emplace("seconds", seconds_now() - begun_);
+    SR_CHECK(write_grid(o_.output, grid));
+    if (!objects_->empty())
+        SR_CHECK(write_objects(objects_beside(o_.output), *objects_));
+    SR_TRY(const uint64_t hash, hash_file(o_.output));
+    results["output"] = Path(o_.output).filename().string();
+    results["xxh64"] = hash_text(hash);
+    (void)world_->flush(); // the grid has them: no matter if the store has not
+    return results;
 }
 
 Status TilesRun::check() const
@@ -331,33 +352,24 @@ Result<bool> TilesRun::begin()
     return false;
 }
 
-Status TilesRun::end()
+Result<Json> TilesRun::write()
 {
-    if (o_.generation.dry_run)
-        return {};
-    if (!finished_) {
-        Json results = world_->results();
-        if (results["tiles"] == 0) {
-            world_.reset();
-            std::error_code ignored;
-            fs::remove_all(folder(), ignored);
-            fs::remove(o_.output, ignored); // empty
-            return fail(ErrorCode::bad_input, "no voxel of {} lies within {} m of the path", quote(o_.grid),
-                        o_.horizon);
-        }
-        SR_CHECK(world_->flush());
-        SR_TRY(const TileFolder tiles, TileFolder::open(o_.output));
-        results["tiles"] = tiles.tiles().size();
-        results["cells"] = tiles.cell_count();
-        results["metres"] = length_of(track_);
-        results["seconds"] = seconds_now() - begun_;
-        results["peak_host_bytes"] = host_memory().peak;
-        SR_CHECK(run_->finish(results));
-        finished_ = results;
+    Json results = world_->results();
+    if (results["tiles"] == 0) {
+        world_.reset();
+        std::error_code ignored;
+        fs::remove_all(folder(), ignored);
+        fs::remove(o_.output, ignored); // empty
+        return fail(ErrorCode::bad_input, "no voxel of {} lies within {} m of the path", quote(o_.grid), o_.horizon);
     }
-    SR_CHECK(write_profile(*device_, o_.generation.profile, globals_));
-    print_results(*finished_, globals_);
-    return {};
+    SR_CHECK(world_->flush());
+    SR_TRY(const TileFolder tiles, TileFolder::open(o_.output));
+    results["tiles"] = tiles.tiles().size();
+    results["cells"] = tiles.cell_count();
+    results["metres"] = length_of(track_);
+    results["seconds"] = seconds_now() - begun_;
+    results["peak_host_bytes"] = host_memory().peak;
+    return results;
 }
 
 } // namespace semrover

@@ -2,9 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/commands/generation_options.h"
 
-#include "tools/cli/choice.h"
-#include "tools/cli/number_option.h"
 #include "tools/cli/progress.h"
+#include "tools/cli/value_options.h"
 
 #include <CLI/CLI.hpp>
 

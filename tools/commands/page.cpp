@@ -6,12 +6,11 @@
 #include "engine/job/version.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/quote.h"
+#include "tools/cli/camera_options.h"
 #include "tools/cli/commands.h"
-#include "tools/cli/lens_options.h"
-#include "tools/cli/number_option.h"
-#include "tools/cli/path_options.h"
 #include "tools/cli/print_stderr.h"
 #include "tools/cli/progress.h"
+#include "tools/cli/value_options.h"
 #include "tools/trajectory/camera_path.h"
 
 #include <algorithm>

@@ -6,10 +6,10 @@
 #include "engine/job/version.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/quote.h"
-#include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/run_job.h"
-#include "tools/editing/edit_undo.h"
+#include "tools/cli/value_options.h"
+#include "tools/editing/editing.h"
 
 #include <algorithm>
 #include <CLI/CLI.hpp>
@@ -160,13 +160,7 @@ Result<Json> run_to_end(SeedRun run, const Path& output, bool several, bool warn
         return fail(ErrorCode::usage, "{} exists; -y replaces it", quote_path(output));
     SR_CHECK(run.open(callbacks));
     SR_CHECK(run.keep_in(folder, globals.yes));
-    for (bool done = false; !done;) {
-        const Result<bool> step =
-            interrupt_requested() ? fail(ErrorCode::interrupted, "") : run.world().step(JobBudget::one_submit());
-        if (!step)
-            return stopped(step.error(), folder);
-        done = *step;
-    }
+    SR_CHECK(step_to_end(run.world(), folder));
     return run.end(output);
 }
 

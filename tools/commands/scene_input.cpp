@@ -5,11 +5,10 @@
 #include "engine/scene/palette.h"
 #include "engine/scene/tiles.h"
 #include "runtime/base/quote.h"
-#include "tools/cli/class_option.h"
-#include "tools/cli/field_options.h"
-#include "tools/cli/number_option.h"
-#include "tools/cli/option_meaning.h"
-#include "tools/cli/origin_option.h"
+#include "tools/cli/camera_options.h"
+#include "tools/cli/option_facts.h"
+#include "tools/cli/print_stderr.h"
+#include "tools/cli/value_options.h"
 
 #include <algorithm>
 #include <array>

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "tools/cli/warnings.h"
+#include "tools/cli/print_stderr.h"
 #include "tools/dataset/scene_file.h"
 
 #include <optional>

@@ -5,7 +5,7 @@
 #include "engine/scene/tiles.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/commands.h"
-#include "tools/cli/number_option.h"
+#include "tools/cli/value_options.h"
 
 #include <CLI/CLI.hpp>
 

@@ -3,7 +3,7 @@
 #include "tools/commands/trajectory_options.h"
 
 #include "runtime/base/quote.h"
-#include "tools/cli/number_option.h"
+#include "tools/cli/value_options.h"
 #include "tools/trajectory/camera_path.h"
 
 #include <CLI/CLI.hpp>

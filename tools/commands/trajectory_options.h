@@ -3,9 +3,8 @@
 #pragma once
 
 #include "engine/job/path_drawing.h"
+#include "tools/cli/camera_options.h"
 #include "tools/cli/commands.h"
-#include "tools/cli/lens_options.h"
-#include "tools/cli/path_options.h"
 
 namespace semrover {
 

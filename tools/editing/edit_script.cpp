@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/editing/edit_script.h"
+#include "tools/editing/editing.h"
 
 #include "engine/conditioning/scene_objects.h"
 #include "engine/scene/palette.h"

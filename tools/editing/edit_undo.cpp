@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/editing/edit_undo.h"
+#include "tools/editing/editing.h"
 
 #include "runtime/base/hash.h"
 #include "runtime/base/json.h"

@@ -7,8 +7,7 @@
 #include "engine/scene/cell_reach.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/quote.h"
-#include "tools/editing/edit_script.h"
-#include "tools/editing/stamp.h"
+#include "tools/editing/grid_editor.h"
 
 #include <algorithm>
 

@@ -5,7 +5,6 @@
 #include "engine/scene/cell_reach.h"
 #include "engine/scene/palette.h"
 #include "runtime/base/quote.h"
-#include "tools/editing/stamp.h"
 
 #include <algorithm>
 #include <array>

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/editing/stamp.h"
+#include "tools/editing/grid_editor.h"
 
 #include <algorithm>
 

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/eval/color_variety.h"
+#include "tools/eval/point_scores.h"
 
 #include <cmath>
 

@@ -1,6 +1,5 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/eval/frame_files.h"
 
 #include "runtime/base/quote.h"
 #include "tools/eval/sample_files.h"

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/eval/local_contrast.h"
+#include "tools/eval/point_scores.h"
 
 #include "runtime/base/dtype.h"
-#include "runtime/base/mix64.h"
+#include "runtime/base/keyed_random.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/eval/point_files.h"
+#include "tools/eval/sample_files.h"
 
 #include "engine/format/ply.h"
 #include "engine/format/ply_reader.h"

@@ -2,14 +2,65 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/scene/scene_points.h"
 #include "kernels/network.h"
+#include "runtime/base/file.h"
+#include "runtime/base/result.h"
 #include "runtime/device/device.h"
 #include "tools/eval/features.h"
-#include "tools/eval/point_chunks.h"
 
+#include <cstdint>
 #include <memory>
+#include <string>
+#include <vector>
 
 namespace semrover {
+
+// one set abstraction of PointNet++: `npoint` points far from one another, of each up to `nsample` neighbours within
+// `radius`, a shared network of `mlp` widths over them, the maximum
+struct SetAbstraction {
+    uint32_t npoint = 0, nsample = 0;
+    float radius = 0; // metres
+    std::vector<uint32_t> mlp;
+};
+
+// The JSON file beside a PointNet++'s weights, NAME.json of NAME.safetensors:
+//   {"inputs": ["xyz", "rgb"], "chunk": 4.0, "points": 4096, "min_points": 256, "pool": "max",
+//    "layers": [{"npoint": 1024, "radius": 0.1, "nsample": 32, "mlp": [32, 32, 64]}, ..]}
+// `layers` are sa1, sa2, .. of the weights; the rest may be left out and is then as above.
+struct PointnetConfig {
+    enum class Input {
+        xyz,        // metres: x and y from the middle of the chunk, z from its lowest point
+        rgb,        // sRGB, 0..1
+        normalized, // xyz within the bounds of the whole grid, 0..1
+    };
+    enum class Pool { max, mean }; // over the points of the last layer
+    std::vector<Input> inputs = {Input::xyz, Input::rgb};
+    double chunk = 4;          // metres, side of the columns that a grid is cut into
+    uint32_t points = 4096;    // of a chunk
+    uint32_t min_points = 256; // a chunk with fewer is left out
+    Pool pool = Pool::max;
+    std::vector<SetAbstraction> layers;
+
+    uint32_t input_width() const { return uint32_t(3 * inputs.size()); }
+};
+
+// errors: bad_input, with the field; names that nobody knows go to `warnings`
+Result<PointnetConfig> read_pointnet_config(const Path& path, std::vector<std::string>& warnings);
+
+// columns of a grid as sets of equally many points, for a network of points
+struct PointChunks {
+    uint32_t count = 0, points = 0, width = 0;
+    std::vector<float> positions; // [count * points, 4] xyz as PointnetConfig::Input::xyz, 0
+    std::vector<float> inputs;    // [count * points, width]
+    uint32_t left_out = 0;        // chunks with fewer than min_points
+};
+
+// Chunk (i, j) holds the points with floor(x / chunk) = i, floor(y / chunk) = j; chunks come in that order. Of more
+// than config.points, that many are drawn; fewer are repeated from the start. Points are in a random order that depends
+// on the seed and their number in the grid only, since a ball takes the first ones it meets. bad_input when a point is
+// not finite or 2^30 chunks away.
+Result<PointChunks> cut_chunks(const ScenePoints& scene, const PointnetConfig& config, uint64_t seed = 0);
 
 // The encoder of PointNet++ with single-scale grouping (Qi et al. 2017): set abstractions one after the other, then the
 // maximum or mean over the last one's points. Layer i reads saI.mlp_convs.J.{weight [N, C, 1, 1], bias [N]} and

@@ -7,7 +7,7 @@
 #include "engine/mesh/mesh.h"
 #include "runtime/base/json_numbers.h"
 #include "runtime/base/quote.h"
-#include "tools/fuse/timed_pictures.h"
+#include "tools/fuse/frame_pictures.h"
 #include "tools/trajectory/camera_path.h"
 
 #include <algorithm>

@@ -6,7 +6,7 @@
 #include "tools/dataset/depth_image.h"
 #include "tools/dataset/picture_classes.h"
 #include "tools/fuse/frame_pictures.h"
-#include "tools/trajectory/path_placement.h"
+#include "tools/trajectory/camera_path.h"
 
 namespace semrover {
 
@@ -27,7 +27,7 @@ struct FusionFolderOptions {
 //   [CAMERA/]color/NNNNNN.png  or .jpg, likewise
 // numbered by the frames of each camera. A frame of transforms.json may name its picture (file_path, relative to the
 // folder): depth and label then have its name in depth/ and label/ beside the picture's folder, unless depth_file_path
-// and label_file_path name them. COLMAP's pictures have names, too, and TUM RGB-D's times (timed_pictures.h).
+// and label_file_path name them. COLMAP's pictures have names, too, and TUM RGB-D's times.
 // Intrinsics are of pictures of the size that they say; they are scaled to depth, and so are colours and labels.
 class FusionFolder {
   public:

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/fuse/timed_pictures.h"
+#include "tools/fuse/frame_pictures.h"
 
 #include "runtime/base/quote.h"
 #include "tools/trajectory/camera_text.h"

@@ -6,7 +6,7 @@
 
 namespace semrover {
 
-// subcommands of `semrover eval`, one a file
+// subcommands of `semrover eval`
 void add_eval_chamfer(CLI::App& eval, const Globals& globals, Run& run);
 void add_eval_f3d(CLI::App& eval, const Globals& globals, Run& run);
 void add_eval_fid(CLI::App& eval, const Globals& globals, Run& run);

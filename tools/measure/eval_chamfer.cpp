@@ -7,14 +7,12 @@
 #include "engine/mesh/voxelizer.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
-#include "tools/cli/choice.h"
-#include "tools/cli/number_option.h"
+#include "tools/cli/camera_options.h"
 #include "tools/cli/open_device.h"
-#include "tools/cli/origin_option.h"
 #include "tools/cli/print_stderr.h"
 #include "tools/cli/progress.h"
-#include "tools/cli/warnings.h"
-#include "tools/eval/point_files.h"
+#include "tools/cli/value_options.h"
+#include "tools/eval/sample_files.h"
 #include "tools/measure/eval.h"
 
 #include <charconv>

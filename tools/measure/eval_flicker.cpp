@@ -3,13 +3,12 @@
 // semrover eval flicker FRAMES --depth DIR --path P: what changes from frame to frame although nothing moves
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
-#include "tools/cli/lens_options.h"
-#include "tools/cli/number_option.h"
-#include "tools/cli/path_options.h"
+#include "tools/cli/camera_options.h"
+#include "tools/cli/print_stderr.h"
 #include "tools/cli/progress.h"
-#include "tools/cli/warnings.h"
+#include "tools/cli/value_options.h"
 #include "tools/eval/flicker.h"
-#include "tools/eval/frame_files.h"
+#include "tools/eval/sample_files.h"
 #include "tools/measure/eval.h"
 #include "tools/trajectory/camera_path.h"
 

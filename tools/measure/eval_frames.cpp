@@ -4,8 +4,8 @@
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/progress.h"
-#include "tools/eval/frame_files.h"
 #include "tools/eval/frame_similarity.h"
+#include "tools/eval/sample_files.h"
 #include "tools/measure/eval.h"
 
 #include <CLI/CLI.hpp>

@@ -1,9 +1,13 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/measure/eval_frechet.h"
-
+// semrover eval fid A B --features inception.safetensors: Frechet Inception distance of two sets of images
+// semrover eval f3d A B --features pointnet2.safetensors: Frechet distance of two sets of grids
 #include "tools/cli/print_stderr.h"
 #include "tools/eval/frechet.h"
+#include "tools/measure/eval.h"
+#include "tools/measure/eval_sets.h"
+
+#include <CLI/CLI.hpp>
 
 namespace semrover {
 
@@ -24,8 +28,7 @@ void warn_of_small_sets(const EvalSets& sets)
             fewest, features);
 }
 
-} // namespace
-
+// the distance of two sets, printed under the metric's name
 Status eval_frechet(const EvalOptions& o, std::string_view metric, EvalNetwork network, const Globals& globals)
 {
     SR_TRY(EvalSets sets, load_eval_sets(o, network, globals));
@@ -52,6 +55,26 @@ Status eval_frechet(const EvalOptions& o, std::string_view metric, EvalNetwork n
     fmt::print("{} {:.6g}  (means {:.6g}, covariances {:.6g}; {})\n", metric, d.distance, d.mean_part,
                d.covariance_part, sets_text(sets));
     return {};
+}
+
+} // namespace
+
+void add_eval_fid(CLI::App& eval, const Globals& globals, Run& run)
+{
+    auto o = std::make_shared<EvalOptions>();
+    CLI::App* c = eval.add_subcommand("fid", "Frechet Inception distance of two sets of images");
+    add_eval_options(*c, *o);
+    c->callback(
+        [o, &globals, &run] { run = [o, &globals] { return eval_frechet(*o, "fid", EvalNetwork::images, globals); }; });
+}
+
+void add_eval_f3d(CLI::App& eval, const Globals& globals, Run& run)
+{
+    auto o = std::make_shared<EvalOptions>();
+    CLI::App* c = eval.add_subcommand("f3d", "Frechet distance of PointNet++ features of two sets of grids");
+    add_eval_options(*c, *o);
+    c->callback(
+        [o, &globals, &run] { run = [o, &globals] { return eval_frechet(*o, "f3d", EvalNetwork::points, globals); }; });
 }
 
 } // namespace semrover

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover eval kid A B --features inception.safetensors: kernel Inception distance of two sets of images
-#include "tools/cli/number_option.h"
 #include "tools/cli/progress.h"
+#include "tools/cli/value_options.h"
 #include "tools/eval/kernel_distance.h"
 #include "tools/measure/eval.h"
 #include "tools/measure/eval_sets.h"

@@ -1,8 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover eval mmd A B --features NETWORK.safetensors: maximum mean discrepancy of two sets of grids or images
-#include "tools/cli/choice.h"
-#include "tools/cli/number_option.h"
+#include "tools/cli/value_options.h"
 #include "tools/eval/kernel_distance.h"
 #include "tools/measure/eval.h"
 #include "tools/measure/eval_sets.h"

@@ -4,9 +4,9 @@
 // sharpness
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
-#include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/progress.h"
+#include "tools/cli/value_options.h"
 #include "tools/eval/point_scores.h"
 #include "tools/eval/sample_files.h"
 #include "tools/measure/eval.h"

@@ -5,7 +5,7 @@
 #include "engine/world/generation_settings.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
-#include "tools/cli/number_option.h"
+#include "tools/cli/value_options.h"
 #include "tools/eval/color_steps.h"
 #include "tools/measure/eval.h"
 

@@ -6,20 +6,114 @@
 #include "runtime/base/hash.h"
 #include "runtime/base/quote.h"
 #include "runtime/base/safetensors.h"
-#include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/print_stderr.h"
 #include "tools/cli/progress.h"
-#include "tools/eval/image_batches.h"
-#include "tools/eval/point_files.h"
+#include "tools/cli/value_options.h"
+#include "tools/eval/inception.h"
 #include "tools/eval/pointnet.h"
 #include "tools/eval/sample_files.h"
 
+#include <algorithm>
 #include <CLI/CLI.hpp>
+#include <map>
 
 namespace semrover {
 
 namespace {
+
+// Features of images of one or several sizes: those of one size wait until they fill a batch, rows come in the order of
+// the images. At most six sizes are kept ready at a time.
+class ImageBatches {
+  public:
+    // `images`: how many there will be
+    ImageBatches(Device& device, const Inception& network, uint32_t batch, size_t images);
+
+    Status add(ImageRgb8 image);          // the next one
+    Result<Features> finish();            // once, after the last
+    size_t done() const { return done_; } // that went through the network
+
+    const std::map<std::pair<uint32_t, uint32_t>, size_t>& sizes() const { return sizes_; } // width, height: images
+
+  private:
+    struct Waiting {
+        ImageSize size;
+        std::unique_ptr<ImageFeatures> extractor;
+        std::vector<ImageRgb8> images;
+        std::vector<size_t> rows;
+    };
+    Status prepare(ImageSize size); // its Waiting is the last one
+    Status flush(Waiting& waiting);
+
+    Device* device_;
+    const Inception* network_;
+    uint32_t batch_;
+    size_t images_, added_ = 0, done_ = 0;
+    std::vector<Waiting> waiting_; // by last use
+    std::map<std::pair<uint32_t, uint32_t>, size_t> sizes_;
+    Features features_;
+};
+
+constexpr size_t kMostReady = 6; // sizes: each has a program and arrays on the device
+
+ImageBatches::ImageBatches(Device& device, const Inception& network, uint32_t batch, size_t images)
+    : device_(&device), network_(&network), batch_(batch), images_(images)
+{
+}
+
+Status ImageBatches::add(ImageRgb8 image)
+{
+    SR_ASSERT(added_ < images_, "more than {} images", images_);
+    const ImageSize size{image.width, image.height};
+    SR_CHECK(prepare(size));
+    ++sizes_[{size.width, size.height}];
+    Waiting& w = waiting_.back();
+    w.images.push_back(std::move(image));
+    w.rows.push_back(added_++);
+    return w.images.size() == w.extractor->batch() ? flush(w) : Status{};
+}
+
+Status ImageBatches::prepare(ImageSize size)
+{
+    const auto found = std::ranges::find(waiting_, size, &Waiting::size);
+    if (found != waiting_.end()) {
+        std::rotate(found, found + 1, waiting_.end());
+        return {};
+    }
+    if (waiting_.size() == kMostReady) {
+        SR_CHECK(flush(waiting_.front()));
+        waiting_.erase(waiting_.begin());
+    }
+    Waiting w{size, nullptr, {}, {}};
+    SR_TRY(w.extractor, ImageFeatures::create(*device_, *network_, size, batch_));
+    waiting_.push_back(std::move(w));
+    return {};
+}
+
+Status ImageBatches::flush(Waiting& w)
+{
+    if (w.images.empty())
+        return {};
+    Features rows;
+    SR_CHECK(w.extractor->append(w.images, rows));
+    features_.cols = rows.cols;
+    features_.values.resize(images_ * rows.cols);
+    for (size_t i = 0; i < w.rows.size(); ++i)
+        std::copy_n(rows.row(i), rows.cols, &features_.values[w.rows[i] * rows.cols]);
+    done_ += w.rows.size();
+    w.images.clear();
+    w.rows.clear();
+    return {};
+}
+
+Result<Features> ImageBatches::finish()
+{
+    SR_ASSERT(added_ == images_, "{} images of {}", added_, images_);
+    for (Waiting& w : waiting_)
+        SR_CHECK(flush(w));
+    features_.rows = uint32_t(images_);
+    return std::move(features_);
+}
 
 namespace fs = std::filesystem;
 

@@ -4,7 +4,6 @@
 
 #include "engine/scene/palette.h"
 #include "page_assets.h"
-#include "tools/page/page_text.h"
 
 #include <cmath>
 #include <map>

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/page/page_pictures.h"
+#include "tools/page/page.h"
 
 #include "engine/format/image.h"
 #include "runtime/base/quote.h"

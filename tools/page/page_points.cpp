@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/page/page_points.h"
+#include "tools/page/page.h"
 
 #include "engine/scene/palette.h"
 #include "engine/scene/scene_points.h"

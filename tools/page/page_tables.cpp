@@ -1,11 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/page/page_tables.h"
+#include "tools/page/page.h"
 
 #include "engine/scene/palette.h"
 #include "engine/splat/bounds.h"
 #include "runtime/base/quote.h"
-#include "tools/page/page_text.h"
 
 #include <algorithm>
 #include <array>

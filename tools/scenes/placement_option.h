@@ -3,7 +3,7 @@
 #pragma once
 
 #include "engine/mesh/voxelizer.h"
-#include "tools/cli/choice.h"
+#include "tools/cli/value_options.h"
 
 namespace semrover {
 

@@ -9,14 +9,11 @@
 #include "engine/scene/scene_points.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
-#include "tools/cli/choice.h"
-#include "tools/cli/class_option.h"
+#include "tools/cli/camera_options.h"
 #include "tools/cli/commands.h"
-#include "tools/cli/number_option.h"
 #include "tools/cli/open_device.h"
-#include "tools/cli/origin_option.h"
 #include "tools/cli/print_stderr.h"
-#include "tools/cli/warnings.h"
+#include "tools/cli/value_options.h"
 #include "tools/scenes/placement_option.h"
 
 #include <CLI/CLI.hpp>

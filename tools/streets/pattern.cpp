@@ -3,7 +3,7 @@
 #include "tools/streets/pattern.h"
 
 #include "runtime/base/result.h"
-#include "tools/streets/pattern_painters.h"
+#include "tools/streets/pattern_canvas.h"
 
 namespace semrover {
 

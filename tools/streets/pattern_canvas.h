@@ -3,6 +3,7 @@
 #pragma once
 
 #include "engine/format/image.h"
+#include "tools/streets/pattern.h"
 
 #include <array>
 #include <vector>
@@ -65,3 +66,15 @@ class PatternCanvas {
 };
 
 } // namespace semrover
+
+namespace semrover::paint {
+
+// each paints its patterns onto a canvas of the pattern's size
+void ground(PatternCanvas& canvas, Pattern pattern);
+void wall(PatternCanvas& canvas, Pattern pattern);
+void opening(PatternCanvas& canvas, Pattern pattern); // windows, doors, shops
+void plant(PatternCanvas& canvas, Pattern pattern);
+void vehicle(PatternCanvas& canvas, Pattern pattern);
+void sign(PatternCanvas& canvas, Pattern pattern);
+
+} // namespace semrover::paint

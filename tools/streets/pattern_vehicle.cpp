@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/streets/pattern_painters.h"
+#include "tools/streets/pattern_canvas.h"
 
 #include <algorithm>
 #include <cmath>

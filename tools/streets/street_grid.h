@@ -2,7 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/camera/camera.h"
 #include "engine/mesh/voxelizer.h"
+#include "engine/scene/grid.h"
+#include "runtime/device/device.h"
 #include "tools/streets/street.h"
 
 #include <span>
@@ -20,5 +23,17 @@ Result<StreetGrids> street_grids(Device& device, const Street& street, const Vox
 
 // those of the `cells` (indices, ascending)
 StreetGrids part_of(const StreetGrids& grids, std::span<const uint32_t> cells);
+
+struct SeenOptions {
+    double reach = 45;         // metres
+    uint32_t rays = 1u << 16;  // from each pose, evenly over the sphere: 0.6 m apart at 45 m
+    double pose_spacing = 0.9; // metres; poses of the path that are nearer to the last one taken are left out
+};
+
+// Indices of the voxels, ascending, that somebody who moves along the paths sees: those that hold the nearest surface
+// on some ray. What a drive records is no more than that; the backs of houses are not in it. Errors: device_lost,
+// out_of_memory
+Result<std::vector<uint32_t>> seen_cells(Device& device, const Mesh& mesh, const VoxelGrid& grid,
+                                         std::span<const CameraPath> paths, const SeenOptions& options = {});
 
 } // namespace semrover

@@ -6,7 +6,6 @@
 #include "runtime/base/quote.h"
 #include "runtime/base/text_start.h"
 #include "tools/trajectory/camera_text.h"
-#include "tools/trajectory/pose_files.h"
 
 #include <algorithm>
 

@@ -39,4 +39,8 @@ std::optional<FoundPath> find_path(const Path& path);
 // bad_input: what the file or folder looks like, and what was expected: a camera path, or `others`
 Status refuse_unknown_path(const Path& path, std::string_view others = "");
 
+// Files of a 4x4 matrix each, by the numbers in their names: NNN.txt of ScanNet, frame-NNNNNN.pose.txt of 7-Scenes.
+// Where names end in .pose.txt, others do not count. Empty where the first of them is no matrix.
+std::vector<Path> pose_files_in(const Path& folder);
+
 } // namespace semrover

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/trajectory/pose_files.h"
+#include "tools/trajectory/path_format.h"
 
 #include "runtime/base/quote.h"
 #include "tools/trajectory/camera_path.h"
@@ -39,6 +39,21 @@ std::string picture_of(const Path& file)
     return stem.extension() == ".pose" ? stem.stem().string() : stem.string();
 }
 
+// the last number in a file's name; none without one, and for one of more than 15 digits
+std::optional<uint64_t> number_in_name(const Path& file)
+{
+    const std::string name = file.filename().string();
+    const size_t last = name.find_last_of("0123456789");
+    if (last == std::string::npos)
+        return std::nullopt;
+    const size_t before = name.find_last_not_of("0123456789", last);
+    const std::string digits = name.substr(before == std::string::npos ? 0 : before + 1,
+                                           last - (before == std::string::npos ? 0 : before + 1) + 1);
+    if (digits.size() > 15)
+        return std::nullopt;
+    return std::stoull(digits);
+}
+
 } // namespace
 
 std::vector<Path> pose_files_in(const Path& folder)
@@ -60,20 +75,6 @@ std::vector<Path> pose_files_in(const Path& folder)
     if (files.empty() || !read_sixteen(files.front()))
         return {};
     return files;
-}
-
-std::optional<uint64_t> number_in_name(const Path& file)
-{
-    const std::string name = file.filename().string();
-    const size_t last = name.find_last_of("0123456789");
-    if (last == std::string::npos)
-        return std::nullopt;
-    const size_t before = name.find_last_not_of("0123456789", last);
-    const std::string digits = name.substr(before == std::string::npos ? 0 : before + 1,
-                                           last - (before == std::string::npos ? 0 : before + 1) + 1);
-    if (digits.size() > 15)
-        return std::nullopt;
-    return std::stoull(digits);
 }
 
 Result<CameraPath> read_pose_files(const Path& folder, const Intrinsics& lens)

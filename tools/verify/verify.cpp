@@ -3,9 +3,9 @@
 // semrover verify CASE...: runs golden cases, one line a case
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
-#include "tools/cli/choice.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/open_device.h"
+#include "tools/cli/value_options.h"
 #include "tools/verify/golden_case.h"
 
 #include <algorithm>

@@ -5,7 +5,6 @@
 #include "engine/deferred/vsd.h"
 #include "tools/verify/golden_case.h"
 #include "tools/verify/golden_networks.h"
-#include "tools/verify/planar.h"
 
 #include <algorithm>
 

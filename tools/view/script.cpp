@@ -3,8 +3,7 @@
 #include "tools/view/script.h"
 
 #include "runtime/base/quote.h"
-#include "tools/cli/class_option.h"
-#include "tools/cli/number_option.h"
+#include "tools/cli/value_options.h"
 #include "tools/view/viewer.h"
 
 #include <sstream>

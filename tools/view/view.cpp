@@ -3,11 +3,9 @@
 // semrover view GRID -m MODEL: a window on a street that is generated around the camera; --screenshot: a picture of it
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
-#include "tools/cli/choice.h"
 #include "tools/cli/commands.h"
-#include "tools/cli/memory_size.h"
-#include "tools/cli/number_option.h"
 #include "tools/cli/print_stderr.h"
+#include "tools/cli/value_options.h"
 #include "tools/view/script.h"
 #include "tools/view/viewer.h"
 

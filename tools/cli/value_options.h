@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "runtime/base/dtype.h"
 #include "runtime/base/result.h"
 
 #include <cstdint>
@@ -9,6 +10,7 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <vector>
 
@@ -60,5 +62,21 @@ CLI::Option* add_seed(CLI::App& command, const std::string& name, Seed& value, c
 }
 CLI::Option* add_seeds(CLI::App& command, const std::string& name, std::vector<uint64_t>& values,
                        const std::string& help);
+
+// an option that takes one of these words; `set` gets it
+CLI::Option* add_choice(CLI::App& command, const char* name, std::vector<std::string> words, const std::string& help,
+                        std::function<void(const std::string&)> set);
+CLI::Option* add_choice(CLI::App& command, const char* name, std::vector<std::string> words, const std::string& help,
+                        std::string& value);
+
+// --precision: how weights and activations are stored
+void add_precision_option(CLI::App& command, DType& precision);
+
+// a class by its name or number, as the value of an option. usage names the option and the classes
+Result<uint8_t> class_option(std::string_view option, const std::string& text);
+
+// "6GiB", "500MB", "2.2" (a number below 4096 without a unit: GB), "2200000000" (bytes). K, M, G and T alone or with B
+// are powers of 1000, with iB powers of 1024; case does not matter. Errors: usage
+Result<uint64_t> parse_memory_size(std::string_view text);
 
 } // namespace semrover

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/cli/field_options.h"
+#include "tools/cli/print_stderr.h"
 
 #include <algorithm>
 
@@ -62,6 +62,13 @@ std::string with_options(std::string_view message)
             text += message.substr(open, 1);
     }
     return text;
+}
+
+void print_warnings(const std::vector<std::string>& warnings, const Globals& globals)
+{
+    for (const std::string& warning : warnings)
+        if (!globals.quiet)
+            print_stderr("semrover: warning: {}\n", warning);
 }
 
 } // namespace semrover

@@ -2,9 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "runtime/base/result.h"
+#include "tools/dataset/depth_image.h"
 #include "tools/trajectory/camera_path.h"
 
+#include <array>
+#include <nlohmann/json_fwd.hpp>
 #include <span>
+#include <string>
 
 namespace CLI {
 class App;
@@ -34,5 +39,32 @@ Result<PathLens> path_lens_of(const LensOptions& options);    // the same, and w
 // readers say
 Result<CameraPath> read_cameras(const Path& path, const Path& rig, const LensOptions& options,
                                 const PathPlacement& placement);
+
+// How a trajectory comes into the grid's world: one group of options of every command that reads a path.
+// docs/formats.md §7.4
+struct PathOptions {
+    std::string world, relative_to, calibration, origin;
+
+    bool any() const { return !world.empty() || !relative_to.empty() || !calibration.empty() || !origin.empty(); }
+};
+// note: a command that has --calib or --origin for its other inputs keeps them, and hands them over itself; the path's
+// origin is then --path-origin
+void add_placement_options(CLI::App& command, PathOptions& options);
+std::span<const std::string_view> placement_options(); // their names
+
+nlohmann::json json_of(const PathOptions& options); // those that are given, for a run's settings
+
+Result<PathPlacement> placement_of(const PathOptions& options); // usage; bad_input
+
+// --origin X,Y,Z
+void add_origin(CLI::App& command, std::string& text);
+
+// bad use for what is not three numbers; 0, 0, 0 where the text is empty
+Result<std::array<double, 3>> origin_from(const std::string& text);
+
+// --depth-kind and --depth-scale: how pictures hold depth
+void add_depth_options(CLI::App& command, DepthEncoding& encoding);
+
+std::string_view name_of(std::optional<DepthKind> kind); // "auto" where there is none
 
 } // namespace semrover

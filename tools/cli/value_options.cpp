@@ -1,10 +1,12 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/cli/number_option.h"
+#include "tools/cli/value_options.h"
 
 #include "runtime/base/quote.h"
 #include "tools/cli/option_facts.h"
+#include "tools/editing/cell_selection.h"
 
+#include <algorithm>
 #include <charconv>
 #include <CLI/CLI.hpp>
 #include <cmath>
@@ -63,6 +65,25 @@ void show_range(CLI::Option& option, const NumberRange<T>& range)
     set_option_facts(option, std::move(facts));
 }
 
+constexpr double kGigabytesBelow = 4096; // nobody means so few bytes
+
+// bytes of a unit; 0 for one that is not known
+double unit_bytes(std::string_view unit)
+{
+    constexpr std::string_view kPrefixes = "kmgt";
+    std::string u(unit);
+    std::ranges::transform(u, u.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+    if (u == "b")
+        return 1;
+    const size_t power = u.empty() ? std::string_view::npos : kPrefixes.find(u[0]);
+    if (power == std::string_view::npos)
+        return 0;
+    const std::string_view rest = std::string_view(u).substr(1);
+    if (rest == "ib")
+        return std::pow(1024., double(power + 1));
+    return rest.empty() || rest == "b" ? std::pow(1000., double(power + 1)) : 0;
+}
+
 } // namespace
 
 template <typename T>
@@ -119,5 +140,46 @@ SR_NUMBER(uint64_t)
 SR_NUMBER(float)
 SR_NUMBER(double)
 #undef SR_NUMBER
+
+CLI::Option* add_choice(CLI::App& c, const char* name, std::vector<std::string> words, const std::string& help,
+                        std::function<void(const std::string&)> set)
+{
+    CLI::Option* option = c.add_option_function<std::string>(name, std::move(set), help);
+    set_option_facts(*option, {{"kind", "choice"}, {"words", words}});
+    return option->check(CLI::IsMember(std::move(words)));
+}
+
+CLI::Option* add_choice(CLI::App& c, const char* name, std::vector<std::string> words, const std::string& help,
+                        std::string& value)
+{
+    return add_choice(c, name, std::move(words), help, [&value](const std::string& word) { value = word; });
+}
+
+void add_precision_option(CLI::App& c, DType& precision)
+{
+    add_choice(c, "--precision", {"fp16", "fp32"}, "storage of weights and activations",
+               [&precision](const std::string& text) { precision = text == "fp32" ? DType::f32 : DType::f16; });
+}
+
+Result<uint8_t> class_option(std::string_view option, const std::string& text)
+{
+    const Result<uint8_t> label = parse_class(text);
+    if (!label)
+        return fail(ErrorCode::usage, "{}: {}", option, label.error().message);
+    return *label;
+}
+
+Result<uint64_t> parse_memory_size(std::string_view text)
+{
+    double number = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    std::string_view unit = text.substr(size_t(end - text.data()));
+    unit.remove_prefix(std::min(unit.find_first_not_of(' '), unit.size()));
+    const double scale = unit.empty() ? (number < kGigabytesBelow ? 1e9 : 1) : unit_bytes(unit);
+    if (error != std::errc() || !(number >= 0) || scale == 0 || number * scale > 1e18)
+        return fail(ErrorCode::usage, "expected an amount of memory such as 6GiB, 500MB or 2.2 (GB), found {}",
+                    quote(text));
+    return uint64_t(std::llround(number * scale));
+}
 
 } // namespace semrover
