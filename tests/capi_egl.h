@@ -1,7 +1,8 @@
 /* SPDX-FileCopyrightText: semrover authors
  * SPDX-License-Identifier: Apache-2.0
  *
- * GL contexts without a window for tests in C, and the functions of GL that they call: by EGL, as a host finds them. */
+ * GL contexts without a window for tests in C, and the functions of GL that they call: by EGL, as an application finds
+ * them. */
 #ifndef SEMROVER_TESTS_CAPI_EGL_H
 #define SEMROVER_TESTS_CAPI_EGL_H
 

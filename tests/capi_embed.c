@@ -139,7 +139,7 @@ static void lends_its_own_device(void)
     CHECK(sr_context_create(&desc, &context) == SR_ERR_USAGE && says(NULL, "both of lock and unlock"));
     vulkan.unlock_queue = unlock_queue;
     desc.device = "0";
-    CHECK(sr_context_create(&desc, &context) == SR_ERR_USAGE && says(NULL, "do not go with a host's device"));
+    CHECK(sr_context_create(&desc, &context) == SR_ERR_USAGE && says(NULL, "do not go with the application's device"));
     desc.device = NULL;
     vulkan.queue = NULL;
     CHECK(sr_context_create(&desc, &context) == SR_ERR_USAGE && says(NULL, "needs instance, physical device"));
@@ -147,7 +147,7 @@ static void lends_its_own_device(void)
     CHECK(sr_context_create(&desc, &context) == SR_OK);
     sr_context_destroy(context);
     CHECK(locks == unlocks);
-    CHECK(vkDeviceWaitIdle(host.device) == VK_SUCCESS); /* still the host's */
+    CHECK(vkDeviceWaitIdle(host.device) == VK_SUCCESS); /* still the application's */
     destroy_host(&host);
 }
 

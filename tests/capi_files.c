@@ -2,7 +2,7 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * A host in C that has models in memory: worlds and renderers have the bytes that they have from a folder, and share
- * its cache; and what a host may get wrong.
+ * its cache; and what an application may get wrong.
  *
  *     capi_files MODEL RENDERER FOLDER     FOLDER: for the cache, which is emptied */
 #include "tests/capi_street.h"

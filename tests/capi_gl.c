@@ -393,7 +393,7 @@ static sr_context* make_sharing_context(void)
     return context;
 }
 
-/* a context that was not told to share copies; so does one on a host's device that has nothing enabled */
+/* a context that was not told to share copies; so does one on the application's device that has nothing enabled */
 static void copies_where_nobody_asked_to_share(void)
 {
     struct host host = make_host();

@@ -2,9 +2,9 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * The way of sr_gl that shares semaphores, where no driver here has them: memory is shared by the real drivers, and
- * semaphores by stand-ins. The host's way to Vulkan says that there is VK_KHR_external_semaphore_fd, and its loader of
- * GL that there is GL_EXT_semaphore_fd; what GL signals and waits for, this test signals and waits for on the queue.
- * Every semaphore is signalled and waited for in turns, and the bytes are those without GL.
+ * semaphores by stand-ins. The application's way to Vulkan says that there is VK_KHR_external_semaphore_fd, and its
+ * loader of GL that there is GL_EXT_semaphore_fd; what GL signals and waits for, this test signals and waits for on the
+ * queue. Every semaphore is signalled and waited for in turns, and the bytes are those without GL.
  *
  *     capi_gl_semaphores MODEL */
 #include "tests/capi_gl.h"

@@ -1,7 +1,7 @@
 /* SPDX-FileCopyrightText: semrover authors
  * SPDX-License-Identifier: Apache-2.0
  *
- * A context on a host's device in C, and buffers and images of the host's. */
+ * A context on the application's device in C, and buffers and images of its own. */
 #ifndef SEMROVER_TESTS_CAPI_MEMORY_H
 #define SEMROVER_TESTS_CAPI_MEMORY_H
 

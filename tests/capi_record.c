@@ -86,8 +86,9 @@ static void refuses_what_cannot_be_recorded(sr_context* context, sr_world* world
     CHECK_OK(NULL, sr_context_create(&own_desc, &own));
     desc.splat_bytes = 1 << 16;
     CHECK_OK(own, create_world(own, model, &desc, &of_own));
-    CHECK(sr_world_record(of_own, &draw, commands) == SR_ERR_USAGE && says(own, "not on a device of the host's"));
-    CHECK(sr_world_submit(of_own, &draw, &sync) == SR_ERR_USAGE && says(own, "not on a device of the host's"));
+    CHECK(sr_world_record(of_own, &draw, commands) == SR_ERR_USAGE &&
+          says(own, "not on a device of the application's"));
+    CHECK(sr_world_submit(of_own, &draw, &sync) == SR_ERR_USAGE && says(own, "not on a device of the application's"));
     CHECK(sr_world_check_draws(of_own) == SR_OK);
     sr_world_destroy(of_own);
     sr_context_destroy(own);
@@ -134,7 +135,7 @@ static void records_draws(const struct host* host, sr_context* context, sr_world
     destroy_buffer(host, &read);
 }
 
-/* every pixel the same, as a pass of the host's would leave it */
+/* every pixel the same, as a pass of the application's would leave it */
 static struct host_image make_depth(const struct host* host, VkFormat format, float value)
 {
     const int depth = format == VK_FORMAT_D32_SFLOAT;
@@ -348,7 +349,7 @@ static void tells_of_splats_that_are_missing(const struct host* host, sr_context
     destroy_buffer(host, &buffer);
 }
 
-/* the host's way to Vulkan, on which it counts two of the calls */
+/* the application's way to Vulkan, on which it counts two of the calls */
 static uint64_t dispatches, submits;
 static PFN_vkCmdDispatch real_dispatch;
 static PFN_vkQueueSubmit real_submit;
@@ -400,7 +401,7 @@ static VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL no_call(VkInstance instance, con
     return NULL;
 }
 
-/* what drivers compiled, in the host's keeping: whole, damaged, of no driver */
+/* what drivers compiled, in the application's keeping: whole, damaged, of no driver */
 static void keeps_what_drivers_compile(const struct host* host, sr_context* context)
 {
     const sr_vulkan_device vulkan = lent(host);

@@ -102,7 +102,7 @@ static uint16_t millimetres_of(float metres)
     return (uint16_t)lroundf(fminf(fmaxf(metres * 1000, 0), 65535));
 }
 
-/* draws the drive through sr_world_draw, as a host would that has its own idea of what a buffer is */
+/* draws the drive through sr_world_draw, as an application would that has its own idea of what a buffer is */
 static void draw_buffers(sr_context* context, sr_world* world)
 {
     static float color[PIXELS * 4], metres[PIXELS * 2];
@@ -402,7 +402,7 @@ static void keeps_to_a_budget_of_memory(uint64_t resident_bytes)
     sr_context_destroy(context);
 }
 
-/* buffers and images of the host's own device, in and out */
+/* buffers and images of the application's own device, in and out */
 static void trades_with_a_host_on_the_device(void)
 {
     struct host host = make_host();

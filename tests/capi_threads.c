@@ -44,7 +44,7 @@ static void step(visitor* self)
     CHECK_OK(self->context, sr_world_step(self->world, 5000, &self->done));
 }
 
-/* what a host asks between steps */
+/* what an application asks between steps */
 static void look_around(visitor* self)
 {
     sr_draw_desc draw;

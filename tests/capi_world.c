@@ -423,7 +423,7 @@ static void draws_into_host_memory(sr_context* context)
     sr_world_destroy(world);
 }
 
-/* the same pictures through buffers and images of the host's own device */
+/* the same pictures through buffers and images of the application's own device */
 static void draws_into_buffers_and_images_of_a_host(void)
 {
     struct host host = make_host();

@@ -28,7 +28,7 @@ sr_device_info info_of(const DeviceSummary& d)
     return info;
 }
 
-// the host's allocator as Buffer calls it
+// the application's allocator as Buffer calls it
 MemorySource memory_source(const sr_vulkan_device& v)
 {
     MemorySource source;
@@ -37,7 +37,7 @@ MemorySource memory_source(const sr_vulkan_device& v)
             const sr_memory_request request{sizeof request, r.type, r.bytes, r.alignment, r.mapped, 0};
             sr_memory_piece piece{};
             if (const sr_status status = v.allocate_memory(v.user, &request, &piece); status != SR_OK)
-                return fail(ErrorCode(status), "the host's allocator returned {}", sr_status_name(status));
+                return fail(ErrorCode(status), "the application's allocator returned {}", sr_status_name(status));
             return MemoryPiece{piece.memory, piece.offset, piece.mapped, piece.handle};
         };
     if (v.free_memory)
@@ -88,7 +88,7 @@ Result<std::unique_ptr<sr_context>> make_context(const sr_context_desc& desc)
     if (desc.vulkan) {
         if (desc.device || desc.validation || desc.share_by_fd)
             return fail(ErrorCode::usage,
-                        "sr_context_desc: device, validation and share_by_fd do not go with a host's device");
+                        "sr_context_desc: device, validation and share_by_fd do not go with the application's device");
         SR_TRY(const sr_vulkan_device vulkan, read_struct(desc.vulkan, "sr_vulkan_device"));
         SR_TRY(context->device, adopt(vulkan, options));
     } else {

@@ -5,7 +5,7 @@
 #include "engine/capi/call.h"
 #include "engine/capi/handles.h"
 
-// pictures on their way between our memory and what a host gives: its memory, buffers and images
+// pictures on their way between our memory and what an application gives: its memory, buffers and images
 namespace semrover::capi {
 
 constexpr uint32_t kMostPixels = 16384; // of a side
@@ -31,12 +31,12 @@ HostTarget host_target(const sr_target& to, const ImageSize& size);
 Result<HostFloats> host_depth(const sr_depth_image& depth, const ImageSize& size);
 std::array<float, 2> z_scale(const sr_depth_image& depth);
 
-// A picture to where the host wants it; waits for it
+// A picture to where the application wants it; waits for it
 Result<HostCopies*> copies_of(sr_context& context);
 Status hand_over(sr_context& context, const Slot& pixels, const ImageSize& size, const sr_target& to);
 
-// `bytes` of the host's to the beginning of a slot; waits for it. Errors: usage unless there is one of memory and
-// buffer. name: of the member
+// `bytes` of the application's to the beginning of a slot; waits for it. Errors: usage unless there is one of memory
+// and buffer. name: of the member
 Status take_in(sr_context& context, const sr_source& from, const Slot& to, uint64_t bytes, const char* name);
 
 // What a camera sees, on the device, until the next draw of the world: at once, or by commands that are being recorded.

@@ -14,7 +14,7 @@ Status set(Call& call, GlLoader loader, const char* name)
 {
     call = reinterpret_cast<Call>(loader(name));
     if (!call)
-        return fail(ErrorCode::usage, "the host's loader does not have {}", name);
+        return fail(ErrorCode::usage, "the application's loader does not have {}", name);
     return {};
 }
 

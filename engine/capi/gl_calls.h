@@ -7,7 +7,7 @@
 
 #include <cstddef>
 
-// What is called of OpenGL and OpenGL ES, found by a host's loader: no header or library of theirs is needed
+// What is called of OpenGL and OpenGL ES, found by the application's loader: no header or library of theirs is needed
 namespace semrover::capi {
 
 using GlName = uint32_t; // of a buffer, texture, memory object or semaphore; 0: none

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// draws that nobody waits for: in a command buffer of the host's, or submitted between semaphores of the host's
+// draws that nobody waits for: in a command buffer of the application's, or submitted between its semaphores
 #include "engine/capi/exchange.h"
 
 using namespace semrover;
@@ -28,7 +28,7 @@ Result<VkCommandBuffer> begin(sr_world& world)
 Status check_device(const sr_world& world, const char* name)
 {
     if (world.context->device->owned())
-        return fail(ErrorCode::usage, "{}: the context is not on a device of the host's", name);
+        return fail(ErrorCode::usage, "{}: the context is not on a device of the application's", name);
     return {};
 }
 
@@ -105,7 +105,7 @@ Result<bool> record_updates(sr_world& world, VkCommandBuffer commands, const Tim
 {
     for (size_t i = world.retired.size(); i-- > 0;) {
         auto& [point, rasterizer] = world.retired[i];
-        if (!point.semaphore) { // recorded before the host has named a point
+        if (!point.semaphore) { // recorded before the application has named a point
             point = done;
             continue;
         }

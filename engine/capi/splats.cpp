@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// splats of a world, and pictures of them in the host's memory
+// splats of a world, and pictures of them in host memory
 #include "engine/capi/exchange.h"
 
 using namespace semrover;

@@ -95,8 +95,8 @@ class Rasterizer {
     const Slot& z_buffer() const { return z_buffer_; }
     const Slot& z_scale() const { return z_scale_; }
 
-    // The same by a host's hand: records the drawing into a command buffer, to be executed any number of times, one
-    // after the other, on the device's queue family. camera: copied. What is recorded is good as long as the
+    // The same by an application's hand: records the drawing into a command buffer, to be executed any number of times,
+    // one after the other, on the device's queue family. camera: copied. What is recorded is good as long as the
     // rasterizer. z_scale: with depth_tested; z_buffer() is filled by what was recorded before. Errors: bad_input as
     // render()'s
     Status record(VkCommandBuffer commands, const SplatCamera& camera, std::array<float, 2> z_scale = {});

@@ -10,7 +10,7 @@
 
 namespace semrover {
 
-// Files that a host program has in memory, below a folder that is on no disk: what reads files (file.h) finds them by
+// Files that an application has in memory, below a folder that is on no disk: what reads files (file.h) finds them by
 // their paths. The bytes are not copied, and stay where they are as long as the folder. Any thread.
 class MemoryFolder {
   public:

@@ -23,7 +23,7 @@ void barrier(const VulkanCalls& vk, VkCommandBuffer commands, VkPipelineStageFla
 
 constexpr VkAccessFlags kAnything = VK_ACCESS_MEMORY_READ_BIT | VK_ACCESS_MEMORY_WRITE_BIT;
 
-// what a copy needs an image of a host's to be
+// what a copy needs an image of the application's to be
 struct ImageTransfer {
     const HostImage& image;
     VkImageAspectFlags aspect;
@@ -102,7 +102,8 @@ void record_copy(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer from,
 void record_host_copy(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer from, uint64_t from_at, VkBuffer to,
                       uint64_t to_at, uint64_t bytes)
 {
-    barrier(vk, commands, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, kAnything, kTransfer, kCopy); // what the host did with it
+    barrier(vk, commands, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, kAnything, kTransfer,
+            kCopy); // what the application did with it
     const VkBufferCopy region{from_at, to_at, bytes};
     vk.CmdCopyBuffer(commands, from, to, 1, &region);
     barrier(vk, commands, kTransfer, VK_ACCESS_TRANSFER_WRITE_BIT, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT | kHost,

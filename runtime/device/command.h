@@ -19,7 +19,7 @@ void record_final_barrier(const VulkanCalls& vk, VkCommandBuffer commands);
 // with the barrier that lets shaders, copies and the host follow
 void record_copy(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer from, uint64_t from_at, VkBuffer to,
                  uint64_t to_at, uint64_t bytes);
-// Into memory that belongs to a host program: everything that follows in the queue may use it. An image has one level
+// Into memory that belongs to an application: everything that follows in the queue may use it. An image has one level
 // and one layer, and comes in one layout and goes in another; its whole content is replaced.
 void record_host_copy(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer from, uint64_t from_at, VkBuffer to,
                       uint64_t to_at, uint64_t bytes);
@@ -33,7 +33,7 @@ void record_image_fetch(const VulkanCalls& vk, VkCommandBuffer commands, const H
                         VkImageAspectFlags aspect, VkBuffer to, uint64_t to_at);
 void record_image_copy(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer from, uint64_t from_at,
                        const HostImage& to);
-// into a command buffer of a host's: what follows may use everything that came before, in the queue too
+// into a command buffer of the application's: what follows may use everything that came before, in the queue too
 void record_entry_barrier(const VulkanCalls& vk, VkCommandBuffer commands);
 // and out of it: everything that follows may use what was copied and filled
 void record_exit_barrier(const VulkanCalls& vk, VkCommandBuffer commands);

@@ -30,13 +30,13 @@ struct DeviceOptions {
     // ErrorCode::interrupted. From any thread that uses the device.
     std::function<bool()> cancelled = {};
     bool validation = false; // Khronos validation with synchronization checks; also SEMROVER_VALIDATION=1 or =fatal
-    // PipelineStore::blob() of an earlier process, read while the device is made; with a host's device, or with a blob,
-    // no file is kept
+    // PipelineStore::blob() of an earlier process, read while the device is made; with an application's device, or with
+    // a blob, no file is kept
     std::span<const std::byte> pipeline_cache = {};
     // for every Vulkan object, read while the device is made; null: the driver's own
     const VkAllocationCallbacks* allocation = nullptr;
     bool autotune = true;     // programs try tiles in their first runs, where a device has a watchdog
-    bool share_by_fd = false; // enables what Sharing needs, where there is it; a host's device says what it has
+    bool share_by_fd = false; // enables what Sharing needs, where there is it; an application's device says what it has
 };
 
 // what other APIs can be given by file descriptor
@@ -99,8 +99,8 @@ class Device {
   public:
     static Result<std::unique_ptr<Device>> create(const DeviceOptions& options);
     static Result<std::unique_ptr<Device>> adopt(const HostDevice& host, const DeviceOptions& options);
-    // The same device for another thread: with tickets, copies and pipelines of its own, on the host's `queue`. What is
-    // allocated counts together, and one may read the other's memory. `first` outlives it.
+    // The same device for another thread: with tickets, copies and pipelines of its own, on the application's `queue`.
+    // What is allocated counts together, and one may read the other's memory. `first` outlives it.
     static Result<std::unique_ptr<Device>> beside(Device& first);
     ~Device();
     Device(const Device&) = delete;
@@ -109,10 +109,10 @@ class Device {
     const DeviceLimits& limits() const { return limits_; }
     const std::string& name() const { return name_; }
     const std::string& driver() const { return driver_; }
-    uint32_t index() const { return index_; } // in list_devices(); 0 for a host's
+    uint32_t index() const { return index_; } // in list_devices(); 0 for an application's
     VkDevice handle() const { return device_; }
     const VulkanCalls& vk() const { return vk_; }
-    bool owned() const { return owned_; } // not a host's
+    bool owned() const { return owned_; } // not an application's
     VkInstance instance() const { return instance_; }
     VkPhysicalDevice physical() const { return physical_; }
     uint32_t queue_family() const { return queue_.family; }

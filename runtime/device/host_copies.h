@@ -7,14 +7,14 @@
 
 namespace semrover {
 
-// where a copy goes that a host program sees: one of its buffers or images, of the device's queue family
+// where a copy goes that an application sees: one of its buffers or images, of the device's queue family
 struct HostTarget {
     VkBuffer buffer = VK_NULL_HANDLE;
     uint64_t offset = 0;
     HostImage image = {};
 };
 
-// an image of 32-bit floats that a host program has
+// an image of 32-bit floats that an application has
 struct HostFloats {
     HostImage image;
     VkImageAspectFlags aspect = VK_IMAGE_ASPECT_DEPTH_BIT;
@@ -26,7 +26,7 @@ void record_host_floats(const Device& device, VkCommandBuffer commands, const Ho
 // into a command buffer that is being recorded. to.image: texels of the slice's rows, as many as it has
 void record_host_target(const Device& device, VkCommandBuffer commands, const BufferSlice& from, const HostTarget& to);
 
-// Copies what lies on the device into a host program's memory, and back, and waits for it.
+// Copies what lies on the device into an application's memory, and back, and waits for it.
 class HostCopies {
   public:
     static Result<std::unique_ptr<HostCopies>> create(Device& device);

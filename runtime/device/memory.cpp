@@ -119,7 +119,8 @@ Status Buffer::borrow(const VkMemoryRequirements& needs, uint32_t type, bool see
         return fail(piece.error().code, "{}: {} bytes: {}", name, needs.size, piece.error().message);
     piece_ = *piece;
     if (!piece_.memory || piece_.offset % needs.alignment || (seen && !piece_.mapped))
-        return fail(ErrorCode::usage, "{}: the host's allocator gave no memory, not aligned to {}, or not mapped", name,
+        return fail(ErrorCode::usage,
+                    "{}: the application's allocator gave no memory, not aligned to {}, or not mapped", name,
                     needs.alignment);
     mapped_ = seen ? static_cast<std::byte*>(piece_.mapped) : nullptr;
     SR_VK(device_.vk().BindBufferMemory(device_.handle(), buffer_, piece_.memory, piece_.offset));

@@ -20,7 +20,7 @@ class Device;
 // shared: what another API sees, too (Device::sharing); only copied to and from.
 enum class MemoryKind : uint8_t { device, staging, transfer, shared };
 
-// memory of a host's allocator
+// memory of an application's allocator
 struct MemoryRequest {
     uint64_t bytes = 0, alignment = 1;
     uint32_t type = 0;   // index of VkMemoryType

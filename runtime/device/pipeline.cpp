@@ -47,7 +47,8 @@ Checksum checksum(std::string_view bytes)
     return std::bit_cast<Checksum>(hash.value());
 }
 
-// A file, or a host's blob: a checksum, and under it the bytes of the tiles' text, that text, and the driver's data.
+// A file, or an application's blob: a checksum, and under it the bytes of the tiles' text, that text, and the driver's
+// data.
 struct Kept {
     std::string_view tiles, data; // empty: none, or none that can be used
 };

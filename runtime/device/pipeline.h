@@ -27,7 +27,7 @@ struct Pipeline {
 // programs chose (TileChoices) are kept with it.
 class PipelineStore {
   public:
-    // blob: of an earlier process, in place of the file; with a host's device there is no file either way
+    // blob: of an earlier process, in place of the file; with an application's device there is no file either way
     static Result<std::unique_ptr<PipelineStore>> create(Device& device, std::span<const std::byte> blob = {});
     // over the cache of another store, which outlives it, for another thread
     static std::unique_ptr<PipelineStore> beside(Device& device, PipelineStore& first);

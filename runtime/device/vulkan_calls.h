@@ -79,7 +79,7 @@
 
 namespace semrover {
 
-// Vulkan as a host program has it, or as the loader does: nothing but what leads to an instance is called by name.
+// Vulkan as an application has it, or as the loader does: nothing but what leads to an instance is called by name.
 struct VulkanCalls {
     PFN_vkGetInstanceProcAddr GetInstanceProcAddr = nullptr;
 #define SR_DECLARE(name) PFN_vk##name name = nullptr;
@@ -87,7 +87,7 @@ struct VulkanCalls {
     SR_DEVICE_CALLS(SR_DECLARE)
     SR_EXTENSION_CALLS(SR_DECLARE)
 #undef SR_DECLARE
-    VkAllocationCallbacks allocation = {}; // of a host's, for every object; without pfnAllocation: none
+    VkAllocationCallbacks allocation = {}; // of an application's, for every object; without pfnAllocation: none
 
     const VkAllocationCallbacks* allocator() const
     {
