@@ -60,7 +60,7 @@ extern "C" {
 /* values are the exit codes of the program and never change; 8..69 are kept free */
 typedef enum sr_status {
     SR_OK = 0,
-    SR_ERR_USAGE = 2,         /* the call is wrong: a NULL, a size, an unknown option */
+    SR_ERR_USAGE = 2,         /* the call is wrong: a NULL, a size, a number out of range or not finite */
     SR_ERR_BAD_INPUT = 3,     /* a file or its content */
     SR_ERR_NO_DEVICE = 4,     /* no Vulkan device that can do it */
     SR_ERR_OUT_OF_MEMORY = 5, /* of the device, of the budget, or of the host */
@@ -289,10 +289,10 @@ typedef struct sr_generation {
     uint32_t least_uncovered; /* voxels of a region that no other has, at least */
     uint32_t jump_length;     /* RePaint's jumps back, in steps; 0: none */
     uint32_t jump_count;      /* rounds that each of them goes; 1: none */
+    uint32_t guidance_from;   /* timesteps from.. */
+    uint32_t guidance_until;  /* ..until which steps are guided, 0..10000 */
     double eta;               /* share of fresh noise in a step of DDIM, 0..1 */
-    double guidance_scale;    /* 1: no guidance */
-    double guidance_from;     /* timesteps from.. */
-    double guidance_until;    /* ..until which steps are guided */
+    double guidance_scale;    /* 0..1000; 1: no guidance */
     double guidance_radius;   /* metres within which the unguided half sees other voxels */
 } sr_generation;
 

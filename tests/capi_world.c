@@ -138,7 +138,7 @@ static void refuses_wrong_worlds(sr_context* context)
     CHECK(create_world(context, model, &desc, &world) == SR_ERR_USAGE && says(context, "come together"));
     desc = street_world();
     desc.detail_distance = -1;
-    CHECK(create_world(context, model, &desc, &world) == SR_ERR_USAGE && says(context, "detail distance"));
+    CHECK(create_world(context, model, &desc, &world) == SR_ERR_USAGE && says(context, "detail_distance is -1"));
     desc = street_world();
     desc.splat_bytes = 0;
     CHECK_OK(context, create_world(context, model, &desc, &world));
@@ -254,10 +254,10 @@ static void settings_decide_the_points(sr_context* context)
     CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "region_size is 0"));
     wrong = own;
     wrong.guidance_scale = -1;
-    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "guidance scale"));
+    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "guidance_scale is -1"));
     wrong = own;
     wrong.eta = 2;
-    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "eta 2") && !world);
+    CHECK(sr_world_create(context, &desc, &world) == SR_ERR_USAGE && says(context, "eta is 2") && !world);
     sr_model_destroy(loaded);
 }
 

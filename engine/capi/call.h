@@ -92,6 +92,15 @@ Result<T> read_struct(const T* given, const char* name)
     return known;
 }
 
+// A number of the application's, low..high. Errors: usage for another one, and for what is none. name: of the structure
+template <typename To = double>
+Result<To> number_in(double value, double low, double high, const char* name, const char* field)
+{
+    if (!(value >= low && value <= high))
+        return fail(ErrorCode::usage, "{}: {} is {}, expected {} to {}", name, field, value, low, high);
+    return To(value);
+}
+
 // `size` bytes of the caller's, of which the first four stay
 template <typename T>
 void write_struct(const T& known, void* to, uint32_t size)

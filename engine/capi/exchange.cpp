@@ -3,6 +3,7 @@
 #include "engine/capi/exchange.h"
 
 #include <cmath>
+#include <limits>
 
 namespace semrover::capi {
 
@@ -78,8 +79,9 @@ Result<HostFloats> host_depth(const sr_depth_image& d, const ImageSize& size)
         return fail(ErrorCode::usage, "sr_depth_image: format {} is neither D32_SFLOAT nor R32_SFLOAT", d.format);
     if (d.layout_before == VK_IMAGE_LAYOUT_UNDEFINED || d.layout_after == VK_IMAGE_LAYOUT_UNDEFINED || d.reserved)
         return fail(ErrorCode::usage, "sr_depth_image: {}", d.reserved ? "reserved is not 0" : "a layout is UNDEFINED");
-    if (!std::isfinite(d.scale) || !std::isfinite(d.offset))
-        return fail(ErrorCode::bad_input, "sr_depth_image: scale {} and offset {} are not finite", d.scale, d.offset);
+    constexpr double most = std::numeric_limits<float>::max();
+    SR_CHECK(number_in(d.scale, -most, most, "sr_depth_image", "scale").map([](double) {}));
+    SR_CHECK(number_in(d.offset, -most, most, "sr_depth_image", "offset").map([](double) {}));
     const bool depth = d.format == VK_FORMAT_D32_SFLOAT;
     return HostFloats{{d.image, size.width, size.height, VkImageLayout(d.layout_before), VkImageLayout(d.layout_after)},
                       VkImageAspectFlags(depth ? VK_IMAGE_ASPECT_DEPTH_BIT : VK_IMAGE_ASPECT_COLOR_BIT)};

@@ -26,8 +26,8 @@ Status check_size(const ImageSize& size, const char* name);
 
 HostTarget host_target(const sr_target& to, const ImageSize& size);
 
-// What a draw is tested against. Errors: usage for another format than two, and a layout before that is UNDEFINED;
-// bad_input for numbers that are not finite
+// What a draw is tested against. Errors: usage for another format than two, layouts that are UNDEFINED, and numbers
+// that are not finite
 Result<HostFloats> host_depth(const sr_depth_image& depth, const ImageSize& size);
 std::array<float, 2> z_scale(const sr_depth_image& depth);
 

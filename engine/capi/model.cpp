@@ -82,8 +82,8 @@ sr_generation generation_of(const VoxfieldModel& model)
     g.jump_count = uint32_t(d.repaint.jump_n_sample);
     g.eta = model.scheduler.eta;
     g.guidance_scale = d.guidance.scale;
-    g.guidance_from = d.guidance.from;
-    g.guidance_until = d.guidance.until;
+    g.guidance_from = uint32_t(d.guidance.from);
+    g.guidance_until = uint32_t(d.guidance.until);
     g.guidance_radius = d.guidance.radius;
     return g;
 }

@@ -7,7 +7,6 @@
 #include "engine/scene/palette.h"
 #include "engine/scene/tiles.h"
 
-#include <cmath>
 #include <set>
 
 using namespace semrover;
@@ -15,41 +14,36 @@ using namespace semrover::capi;
 
 namespace {
 
+constexpr double kMostMetres = 1e6; // of lengths
+
 constexpr std::array kSamplers = {"ddpm", "ddim", "dpm++2m"};                       // of SR_SAMPLER_..
 constexpr std::array kStrategies = {RegionStrategy::complete, RegionStrategy::rim}; // of SR_REGIONS_..
 
-// one whole number of sr_generation
-Result<int> number_in(uint64_t value, int low, int high, const char* field)
-{
-    if (value < uint64_t(low) || value > uint64_t(high))
-        return fail(ErrorCode::usage, "sr_generation: {} is {}, expected {} to {}", field, value, low, high);
-    return int(value);
-}
-
 Result<GenerationOptions> options_of(const sr_generation& g)
 {
+    const auto whole = [](double value, double low, double high, const char* field) {
+        return number_in<int>(value, low, high, "sr_generation", field);
+    };
+    const auto real = [](double value, double high, const char* field) {
+        return number_in(value, 0, high, "sr_generation", field);
+    };
     GenerationOptions o;
-    SR_TRY(const int sampler, number_in(g.sampler, 0, kSamplers.size() - 1, "sampler"));
+    SR_TRY(const int sampler, whole(g.sampler, 0, kSamplers.size() - 1, "sampler"));
     o.sampler = kSamplers[size_t(sampler)];
-    SR_TRY(const int known, number_in(g.known, 0, 1, "known"));
+    SR_TRY(const int known, whole(g.known, 0, 1, "known"));
     o.known = known ? KnownTokens::clean : KnownTokens::noised;
-    SR_TRY(const int strategy, number_in(g.regions, 0, kStrategies.size() - 1, "regions"));
+    SR_TRY(const int strategy, whole(g.regions, 0, kStrategies.size() - 1, "regions"));
     o.strategy = kStrategies[size_t(strategy)];
-    SR_TRY(o.region_size, number_in(g.region_size, 1, 4096, "region_size"));
-    SR_TRY(o.coverage_threshold, number_in(g.least_uncovered, 1, 4096, "least_uncovered"));
-    SR_TRY(o.jump_length, number_in(g.jump_length, 0, 10000, "jump_length"));
-    SR_TRY(o.jump_n_sample, number_in(g.jump_count, 1, 10000, "jump_count"));
-    SR_TRY(const int from, number_in(uint64_t(std::max(0., g.guidance_from)), 0, kLastTimestep, "guidance_from"));
-    SR_TRY(const int until, number_in(uint64_t(std::max(0., g.guidance_until)), 0, kLastTimestep, "guidance_until"));
-    if (!(g.eta >= 0 && g.eta <= 1) || !(g.guidance_radius >= 0) || !std::isfinite(g.guidance_scale))
-        return fail(ErrorCode::usage, "sr_generation: eta {}, guidance_radius {} or guidance_scale {} is out of range",
-                    g.eta, g.guidance_radius, g.guidance_scale);
-    o.eta = g.eta;
-    o.guidance_scale = float(g.guidance_scale);
-    SR_CHECK(check_guidance(*o.guidance_scale));
-    o.guidance_from = from;
-    o.guidance_until = until;
-    o.guidance_radius = g.guidance_radius;
+    SR_TRY(o.region_size, whole(g.region_size, 1, 4096, "region_size"));
+    SR_TRY(o.coverage_threshold, whole(g.least_uncovered, 1, 4096, "least_uncovered"));
+    SR_TRY(o.jump_length, whole(g.jump_length, 0, 10000, "jump_length"));
+    SR_TRY(o.jump_n_sample, whole(g.jump_count, 1, 10000, "jump_count"));
+    SR_TRY(o.guidance_from, whole(g.guidance_from, 0, kLastTimestep, "guidance_from"));
+    SR_TRY(o.guidance_until, whole(g.guidance_until, 0, kLastTimestep, "guidance_until"));
+    SR_TRY(o.eta, real(g.eta, 1, "eta"));
+    SR_TRY(const double scale, real(g.guidance_scale, kMaxGuidance, "guidance_scale"));
+    o.guidance_scale = float(scale);
+    SR_TRY(o.guidance_radius, real(g.guidance_radius, kMostMetres, "guidance_radius"));
     return o;
 }
 
@@ -124,8 +118,6 @@ Result<GenerationSettings> settings_of(const sr_world_desc& d, const Model& mode
     if (d.steps)
         o.steps = int(d.steps);
     o.tile_size = tile_size_of(d);
-    if (!(o.tile_size > 0))
-        return fail(ErrorCode::usage, "sr_world_desc: a tile_size of {} m", d.tile_size);
     return resolve_generation(o);
 }
 
@@ -169,7 +161,13 @@ Result<std::unique_ptr<sr_world>> make_world(sr_context& context, const sr_world
     auto world = std::make_unique<sr_world>();
     world->context = &context;
     world->number = ++context.worlds;
+    const auto metres = [](double value, const char* field) {
+        return number_in(value, 0, kMostMetres, "sr_world_desc", field);
+    };
+    SR_CHECK(metres(d.tile_size, "tile_size").map([](double) {}));
+    SR_TRY(const double splat_radius, metres(d.splat_radius, "splat_radius"));
     WorldRequest request;
+    SR_TRY(request.detail_distance, metres(d.detail_distance, "detail_distance"));
     request.seed = d.seed;
     if (d.model) {
         SR_TRY(world->model, model_of(context, d.model, "sr_world_desc"));
@@ -189,9 +187,8 @@ Result<std::unique_ptr<sr_world>> make_world(sr_context& context, const sr_world
     request.host_bytes = d.host_bytes;
     request.splat_bytes = d.splat_bytes;
     request.tiles_at_once = d.tiles_at_once;
-    request.detail_distance = d.detail_distance;
-    if (d.splat_radius != 0)
-        request.splats = {.sigma = float(d.splat_radius)};
+    if (splat_radius > 0)
+        request.splats = {.sigma = float(splat_radius)};
     JobCallbacks callbacks;
     if (d.message)
         callbacks.warning = [message = d.message, user = d.user](std::string_view line) {
@@ -386,5 +383,5 @@ sr_status sr_world_flush(sr_world* world)
 
 } // extern "C"
 
-static_assert(sizeof(sr_world_desc) == 152 && sizeof(sr_generation) == 72 && sizeof(sr_object) == 88 &&
+static_assert(sizeof(sr_world_desc) == 152 && sizeof(sr_generation) == 64 && sizeof(sr_object) == 88 &&
               sizeof(sr_world_info) == 88);

@@ -73,8 +73,6 @@ bool World::finished(const TileIndex& tile) const
 
 Status World::open()
 {
-    if (!(request_.detail_distance >= 0 && std::isfinite(request_.detail_distance)))
-        return fail(ErrorCode::usage, "a detail distance of {} m", request_.detail_distance);
     return tile_cells() ? open_tiles() : open_scene();
 }
 
