@@ -121,7 +121,7 @@ Result<GenerationSettings> settings_of(const sr_world_desc& d, const Model& mode
     return resolve_generation(o);
 }
 
-// the host's callback as the engine calls it
+// the application's callback as the engine calls it
 LabelCallback labels_callback(const sr_world_desc& d, float voxel_size)
 {
     return [labels = d.labels, user = d.user, voxel_size](const CellWindow& window, VoxelGrid& grid) -> Status {
@@ -132,7 +132,7 @@ LabelCallback labels_callback(const sr_world_desc& d, float voxel_size)
         if (status == SR_NOT_YET)
             return fail(kNotYet, "the labels are not there yet");
         if (status != SR_OK)
-            return fail(ErrorCode(status), "the host's labels callback returned {}", sr_status_name(status));
+            return fail(ErrorCode(status), "the application's labels callback returned {}", sr_status_name(status));
         grid.cells = std::move(cells.read().cells);
         grid.labels = std::move(cells.read().labels);
         return {};
