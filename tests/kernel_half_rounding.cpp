@@ -4,7 +4,6 @@
 #include "half_rounding.spv.h"
 #include "kernels/network.h"
 #include "tests/kernel_case.h"
-#include "tests/shaders/half_rounding.h"
 
 #include <cmath>
 #include <filesystem>

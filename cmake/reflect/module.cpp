@@ -213,18 +213,22 @@ class Reader {
         }
     }
 
-    // the block holds one struct (shared with C++) whose members are 32-bit scalars
+    // the block, or a struct that it holds, is that of C++: 32-bit scalars one after the other
     void push(const Id& block)
     {
         const Id* s = &block;
         while (s->op == kOpTypeStruct && s->operands.size() == 1 && ids_[s->operands[0]].op == kOpTypeStruct)
             s = &ids_[s->operands[0]];
+        module_.push_name = s->name;
         for (size_t i = 0; i < s->operands.size(); ++i) {
             const Id& type = ids_[s->operands[i]];
             if (type.op != kOpTypeInt && type.op != kOpTypeFloat)
                 throw std::runtime_error("push member '" + s->member_names[i] + "' is not a scalar");
-            module_.push.push_back({s->member_names[i], s->member_offsets.at(uint32_t(i))});
-            module_.push_bytes = std::max(module_.push_bytes, module_.push.back().offset + 4);
+            if (s->member_offsets.at(uint32_t(i)) != module_.push_bytes)
+                throw std::runtime_error("push member '" + s->member_names[i] + "' does not follow the one before it");
+            const char* cpp = type.op == kOpTypeFloat ? "float" : type.operands.at(1) ? "int32_t" : "uint32_t";
+            module_.push.push_back({s->member_names[i], cpp, module_.push_bytes});
+            module_.push_bytes += 4;
         }
     }
 

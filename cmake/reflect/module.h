@@ -21,6 +21,7 @@ struct Constant {
 
 struct Member {
     std::string name;
+    std::string type; // in C++
     uint32_t offset = 0;
 };
 
@@ -28,6 +29,7 @@ struct Module {
     std::vector<uint32_t> code;
     std::vector<Binding> bindings; // sorted by binding
     std::vector<Constant> constants;
+    std::string push_name;
     std::vector<Member> push;
     uint32_t push_bytes = 0;
     uint32_t local_size[3] = {1, 1, 1};

@@ -7,7 +7,6 @@
 #include "marching_cubes_count.spv.h"
 #include "marching_cubes_faces.spv.h"
 #include "marching_cubes_vertices.spv.h"
-#include "shaders/fusion/marching_cubes.h"
 
 namespace semrover {
 

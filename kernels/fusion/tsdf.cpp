@@ -5,7 +5,6 @@
 #include "kernels/fusion.h"
 
 #include "kernels/sort.h"
-#include "shaders/fusion/tsdf.h"
 #include "tsdf_count.spv.h"
 #include "tsdf_finish.spv.h"
 #include "tsdf_integrate.spv.h"

@@ -4,7 +4,6 @@
 #include "kernels/mesh.h"
 
 #include "cell_area.spv.h"
-#include "shaders/mesh/cell_area.h"
 
 namespace semrover {
 

@@ -4,7 +4,6 @@
 #include "kernels/mesh.h"
 
 #include "clip_area.spv.h"
-#include "shaders/mesh/clip_area.h"
 
 namespace semrover {
 

@@ -4,7 +4,6 @@
 #include "kernels/mesh.h"
 
 #include "pair_cells.spv.h"
-#include "shaders/mesh/pair_cells.h"
 
 namespace semrover {
 

@@ -6,9 +6,6 @@
 
 #include "gather_texels.spv.h"
 #include "sample_surface.spv.h"
-#include "shaders/mesh/gather_texels.h"
-#include "shaders/mesh/sample_surface.h"
-#include "shaders/mesh/surface_color.h"
 #include "surface_color.spv.h"
 
 namespace semrover {

@@ -3,7 +3,6 @@
 // the nearest triangle of points and its distance, exact, through a tree of boxes
 #include "kernels/mesh.h"
 
-#include "shaders/mesh/surface_distance.h"
 #include "surface_distance.spv.h"
 
 namespace semrover {

@@ -4,7 +4,6 @@
 #include "kernels/mesh.h"
 
 #include "kernels/sort.h"
-#include "shaders/mesh/triangle_cells.h"
 #include "triangle_cells_count.spv.h"
 #include "triangle_cells_emit.spv.h"
 

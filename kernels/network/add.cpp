@@ -4,7 +4,6 @@
 #include "kernels/network.h"
 
 #include "add.spv.h"
-#include "shaders/network/add.h"
 
 namespace semrover {
 

@@ -4,7 +4,6 @@
 #include "kernels/network.h"
 
 #include "blend.spv.h"
-#include "shaders/network/blend.h"
 
 namespace semrover {
 

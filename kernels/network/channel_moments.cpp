@@ -5,7 +5,6 @@
 #include "kernels/network.h"
 
 #include "channel_moments.spv.h"
-#include "shaders/network/channel_moments.h"
 
 namespace semrover {
 

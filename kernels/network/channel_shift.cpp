@@ -4,7 +4,6 @@
 #include "kernels/network.h"
 
 #include "channel_shift.spv.h"
-#include "shaders/network/channel_shift.h"
 
 namespace semrover {
 

@@ -6,7 +6,6 @@
 
 #include "conv2d.spv.h"
 #include "kernels/network/depth_step.h"
-#include "shaders/network/conv2d.h"
 
 namespace semrover {
 

@@ -5,7 +5,6 @@
 #include "kernels/network.h"
 
 #include "flash_attention.spv.h"
-#include "shaders/network/flash_attention.h"
 
 #include <cmath>
 

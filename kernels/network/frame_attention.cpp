@@ -5,7 +5,6 @@
 #include "kernels/network.h"
 
 #include "frame_attention.spv.h"
-#include "shaders/network/frame_attention.h"
 
 #include <cmath>
 

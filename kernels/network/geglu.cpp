@@ -4,7 +4,6 @@
 #include "kernels/network.h"
 
 #include "geglu.spv.h"
-#include "shaders/network/geglu.h"
 
 namespace semrover {
 

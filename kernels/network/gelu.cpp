@@ -4,7 +4,6 @@
 #include "kernels/network.h"
 
 #include "gelu.spv.h"
-#include "shaders/network/gelu.h"
 
 namespace semrover {
 

@@ -7,7 +7,6 @@
 #include "group_norm_apply.spv.h"
 #include "group_norm_merge.spv.h"
 #include "group_norm_scale.spv.h"
-#include "shaders/network/group_norm.h"
 
 namespace semrover {
 

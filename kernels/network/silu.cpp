@@ -3,7 +3,6 @@
 // y = x / (1 + exp(-x)): [M, N] -> [M, N]
 #include "kernels/network.h"
 
-#include "shaders/network/silu.h"
 #include "silu.spv.h"
 
 namespace semrover {

@@ -3,7 +3,6 @@
 // y = softmax(scale x) over the first `count` columns: [M, N] -> [M, N]
 #include "kernels/network.h"
 
-#include "shaders/network/softmax.h"
 #include "softmax.spv.h"
 
 #include <cmath>

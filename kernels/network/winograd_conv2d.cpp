@@ -4,8 +4,6 @@
 // V = B^T x B [36 * tiles, C], m = V U^T per product [36 * tiles, N], y = A^T m A + bias + shift + residual
 #include "kernels/network.h"
 
-#include "shaders/network/winograd_input.h"
-#include "shaders/network/winograd_output.h"
 #include "winograd_input.spv.h"
 #include "winograd_output.spv.h"
 

@@ -3,7 +3,6 @@
 // U = G w G^T: w [N, 9 * C] -> [36 * N, C] fp32
 #include "kernels/network.h"
 
-#include "shaders/network/winograd_weight.h"
 #include "winograd_weight.spv.h"
 
 namespace semrover {

@@ -5,7 +5,6 @@
 #include "kernels/picture.h"
 
 #include "accumulate.spv.h"
-#include "shaders/picture/accumulate.h"
 
 namespace semrover {
 

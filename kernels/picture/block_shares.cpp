@@ -4,7 +4,6 @@
 #include "kernels/picture.h"
 
 #include "block_shares.spv.h"
-#include "shaders/picture/block_shares.h"
 
 namespace semrover {
 

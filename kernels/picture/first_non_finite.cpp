@@ -5,7 +5,6 @@
 
 #include "first_non_finite.spv.h"
 #include "kernels/sort.h"
-#include "shaders/picture/first_non_finite.h"
 
 namespace semrover {
 

@@ -4,7 +4,6 @@
 #include "kernels/picture.h"
 
 #include "picture_bytes.spv.h"
-#include "shaders/picture/picture_bytes.h"
 
 namespace semrover {
 

@@ -4,7 +4,6 @@
 #include "kernels/picture.h"
 
 #include "picture_input.spv.h"
-#include "shaders/picture/picture_input.h"
 
 namespace semrover {
 

@@ -4,7 +4,6 @@
 #include "kernels/picture.h"
 
 #include "picture_texels.spv.h"
-#include "shaders/picture/picture_texels.h"
 
 namespace semrover {
 

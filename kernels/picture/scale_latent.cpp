@@ -4,7 +4,6 @@
 #include "kernels/picture.h"
 
 #include "scale_latent.spv.h"
-#include "shaders/picture/scale_latent.h"
 
 namespace semrover {
 

@@ -3,7 +3,6 @@
 // bytes, millimetres, labels and directions of what splats look like: [P, ..] -> three words a pixel
 #include "kernels/picture.h"
 
-#include "shaders/picture/splat_pixels.h"
 #include "splat_pixels.spv.h"
 
 namespace semrover {

@@ -5,7 +5,6 @@
 #include "kernels/recognition.h"
 
 #include "ball_query.spv.h"
-#include "shaders/recognition/point_groups.h"
 
 namespace semrover {
 

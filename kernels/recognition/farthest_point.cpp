@@ -6,7 +6,6 @@
 #include "farthest_point.spv.h"
 #include "kernels/sort.h"
 #include "kernels/splat.h"
-#include "shaders/recognition/point_groups.h"
 
 #include <algorithm>
 

@@ -5,7 +5,6 @@
 #include "kernels/recognition.h"
 
 #include "group_points.spv.h"
-#include "shaders/recognition/point_groups.h"
 
 namespace semrover {
 

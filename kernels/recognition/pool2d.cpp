@@ -4,7 +4,6 @@
 #include "kernels/recognition.h"
 
 #include "pool2d.spv.h"
-#include "shaders/recognition/pool2d.h"
 
 namespace semrover {
 

@@ -4,7 +4,6 @@
 #include "kernels/network.h"
 
 #include "relu.spv.h"
-#include "shaders/recognition/relu.h"
 
 namespace semrover {
 

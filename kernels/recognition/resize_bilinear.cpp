@@ -4,7 +4,6 @@
 #include "kernels/recognition.h"
 
 #include "resize_bilinear.spv.h"
-#include "shaders/recognition/resize_bilinear.h"
 
 namespace semrover {
 

@@ -4,7 +4,6 @@
 #include "kernels/sort.h"
 
 #include "bucket_starts.spv.h"
-#include "shaders/sort/bucket_starts.h"
 
 namespace semrover {
 

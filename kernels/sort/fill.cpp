@@ -4,7 +4,6 @@
 #include "kernels/sort.h"
 
 #include "fill.spv.h"
-#include "shaders/sort/fill.h"
 
 namespace semrover {
 

@@ -7,7 +7,6 @@
 #include "prefix_sum_apply.spv.h"
 #include "prefix_sum_reduce.spv.h"
 #include "prefix_sum_spine.spv.h"
-#include "shaders/sort/prefix_sum.h"
 
 #include <algorithm>
 

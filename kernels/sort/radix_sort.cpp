@@ -6,7 +6,6 @@
 
 #include "radix_sort_count.spv.h"
 #include "radix_sort_scatter.spv.h"
-#include "shaders/sort/radix_sort.h"
 
 #include <algorithm>
 

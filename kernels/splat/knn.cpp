@@ -7,7 +7,6 @@
 #include "knn_gather.spv.h"
 #include "knn_hash.spv.h"
 #include "knn_search.spv.h"
-#include "shaders/splat/knn.h"
 
 #include <bit>
 

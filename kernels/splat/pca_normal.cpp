@@ -5,7 +5,6 @@
 #include "kernels/splat.h"
 
 #include "pca_normal.spv.h"
-#include "shaders/splat/pca_normal.h"
 
 namespace semrover {
 

@@ -5,10 +5,8 @@
 // those by tile, blend every pixel front to back:
 //   alpha = min(alpha_max, o exp(-r^2 / 2)), w = alpha T, T' = T (1 - alpha)
 // Cameras with a lens take other records and meet every splat with the ray of a pixel (docs/method.md §5.4).
-#include "kernels/splat.h"
 
 #include "kernels/sort.h"
-#include "shaders/splat/splat.h"
 #include "splat_blend.spv.h"
 #include "splat_count.spv.h"
 #include "splat_cull.spv.h"

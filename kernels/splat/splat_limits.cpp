@@ -3,7 +3,6 @@
 // metres = scale / (z - offset): [pixels], [1, 2] -> [pixels]
 #include "kernels/splat.h"
 
-#include "shaders/splat/splat_limits.h"
 #include "splat_limits.spv.h"
 
 namespace semrover {

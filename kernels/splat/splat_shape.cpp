@@ -4,7 +4,6 @@
 // nearest three points
 #include "kernels/splat.h"
 
-#include "shaders/splat/splat_shape.h"
 #include "splat_shape.spv.h"
 
 namespace semrover {

@@ -6,7 +6,6 @@
 
 #include "shade.spv.h"
 #include "shade_resolve.spv.h"
-#include "shaders/trace/shade.h"
 
 namespace semrover {
 

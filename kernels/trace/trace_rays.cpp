@@ -3,7 +3,6 @@
 // the nearest triangle along each ray, by descent of a tree of boxes: rays [R, 8] -> hits [R, 4]
 #include "kernels/trace.h"
 
-#include "shaders/trace/trace_rays.h"
 #include "trace_rays.spv.h"
 
 namespace semrover {

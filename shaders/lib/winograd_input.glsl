@@ -5,13 +5,25 @@
 //   CHANNELS           vec4 or vec2
 //   PARTS              how many of these are four channels
 //   PART(value, part)  those of a vec4
-#include "shaders/network/winograd_input.h"
 #include "lib/thread.glsl"
 #include "lib/winograd.glsl"
 
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const bool kHalfX = false;
-layout(push_constant) uniform Push { WinogradInputPush p; };
+layout(push_constant) uniform WinogradInputPush {
+    uint first_tile; // of the band
+    uint tiles;      // of the band
+    uint tiles_x;    // of an image
+    uint image_tiles;
+    uint image_rows;  // of x
+    uint width;       // of x
+    uint seen_height; // of the image that the taps see
+    uint seen_width;
+    uint shift; // 1: every pixel of x stands for two by two
+    uint cols;  // channels, padded
+    uint x_ld;  // elements
+    uint v_ld;
+} p;
 layout(binding = 0) uniform usamplerBuffer X;             // [images * image_rows, cols]
 layout(binding = 1) writeonly buffer V { CHANNELS v[]; }; // [36 * tiles, cols]
 

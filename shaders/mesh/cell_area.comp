@@ -4,12 +4,13 @@
 // one thread per voxel, over its pairs in their order: the area up to and with each pair (compensated, Kahan 1965), all
 // of it, and the label with the largest share; ties go to the lower one, no label loses to any
 #extension GL_GOOGLE_include_directive : require
-#include "cell_area.h"
 #include "lib/surface_record.glsl"
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
-layout(push_constant) uniform Push { CellAreaPush p; };
+layout(push_constant) uniform CellAreaPush {
+    uint cells;
+} p;
 layout(binding = 0) readonly buffer Areas { float areas[]; };         // [pairs]
 layout(binding = 1) readonly buffer Labels { uint labels[]; };        // [pairs]
 layout(binding = 2) readonly buffer Starts { uint starts[]; };        // [voxels + 1]

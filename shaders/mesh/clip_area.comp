@@ -4,14 +4,15 @@
 // area[i] = area of a triangle within a voxel, in squares of the voxel's edge; label[i] = the triangle's, or where the
 // texel that says it lies: the nearest to the middle of the clipped polygon
 #extension GL_GOOGLE_include_directive : require
-#include "clip_area.h"
 #include "lib/clip_cell.glsl"
 #include "lib/surface_record.glsl"
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const bool kMasked = false; // materials have alpha: areas are those of what is a surface
-layout(push_constant) uniform Push { ClipAreaPush p; };
+layout(push_constant) uniform ClipAreaPush {
+    uint size; // capacity of pairs
+} p;
 layout(binding = 0) readonly buffer Triangles { uint triangles[]; };      // [T, 12]
 layout(binding = 1) readonly buffer Attributes { uint attributes[]; };     // [T, 16]
 layout(binding = 2) readonly buffer Materials { uint materials[]; };       // [M, 8]

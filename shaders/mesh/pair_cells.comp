@@ -5,10 +5,11 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lib/surface_record.glsl"
 #include "lib/thread.glsl"
-#include "pair_cells.h"
 
 layout(local_size_x = 64) in;
-layout(push_constant) uniform Push { PairCellsPush p; };
+layout(push_constant) uniform PairCellsPush {
+    uint size; // keys
+} p;
 layout(binding = 0) readonly buffer X { uint x[]; };  // [size]
 layout(binding = 1) writeonly buffer Y { uint y[]; }; // [size]
 

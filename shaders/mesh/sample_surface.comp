@@ -16,12 +16,16 @@
 #include "lib/philox.glsl"
 #include "lib/surface_record.glsl"
 #include "lib/thread.glsl"
-#include "sample_surface.h"
 
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const bool kCanonical = false;
 layout(constant_id = 1) const bool kMasked = false;
-layout(push_constant) uniform Push { SampleSurfacePush p; };
+layout(push_constant) uniform SampleSurfacePush {
+    uint cells;
+    uint samples; // of a voxel
+    uint seed_low;
+    uint seed_high;
+} p;
 layout(binding = 0) readonly buffer Triangles { uint triangles[]; };  // [T, 12]
 layout(binding = 1) readonly buffer Attributes { uint attributes[]; }; // [T, 16]
 layout(binding = 2) readonly buffer Materials { uint materials[]; };   // [M, 8]

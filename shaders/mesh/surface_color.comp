@@ -4,10 +4,11 @@
 // a sample's colour: its four texels, bilinearly in linear light, times its factor, as sRGB bytes
 #extension GL_GOOGLE_include_directive : require
 #include "lib/thread.glsl"
-#include "surface_color.h"
 
 layout(local_size_x = 64) in;
-layout(push_constant) uniform Push { SurfaceColorPush p; };
+layout(push_constant) uniform SurfaceColorPush {
+    uint size; // samples
+} p;
 layout(binding = 0) readonly buffer Samples { float samples[]; };  // [size, 8]
 layout(binding = 1) readonly buffer Texels { uvec4 texels[]; };    // [size]
 layout(binding = 2) readonly buffer Linear { float linear_of[]; }; // [512] of sRGB bytes; then of bytes and a half

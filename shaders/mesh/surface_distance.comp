@@ -5,10 +5,12 @@
 // child first
 #extension GL_GOOGLE_include_directive : require
 #include "lib/thread.glsl"
-#include "surface_distance.h"
 
 layout(local_size_x = 64) in;
-layout(push_constant) uniform Push { SurfaceDistancePush p; };
+layout(push_constant) uniform SurfaceDistancePush {
+    uint size; // points
+    uint points_ld;
+} p;
 layout(binding = 0) readonly buffer Points { float points[]; };       // [size, points_ld]
 layout(binding = 1) readonly buffer Nodes { uvec4 nodes[]; };         // [2 * nodes] as kernels/mesh.h, SurfaceTree
 layout(binding = 2) readonly buffer Triangles { uint triangles[]; };  // [T, 10]

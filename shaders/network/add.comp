@@ -3,7 +3,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // y = residual + x, eight elements a thread
 #extension GL_GOOGLE_include_directive : require
-#include "add.h"
 #include "lib/pack.glsl"
 #include "lib/thread.glsl"
 
@@ -11,7 +10,13 @@ layout(local_size_x = 64) in;
 layout(constant_id = 0) const bool kHalfX = false;
 layout(constant_id = 1) const bool kHalfY = false;
 layout(constant_id = 2) const bool kHalfResidual = false;
-layout(push_constant) uniform Push { AddPush p; };
+layout(push_constant) uniform AddPush {
+    uint rows;
+    uint cols;
+    uint x_ld; // elements
+    uint y_ld;
+    uint residual_ld;
+} p;
 layout(binding = 0) readonly buffer X { uvec4 x[]; };               // [rows, cols]
 layout(binding = 1) readonly buffer Residual { uvec4 residual[]; }; // [rows, cols]
 layout(binding = 2) writeonly buffer Y { uvec4 y[]; };              // [rows, cols]

@@ -3,7 +3,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // y = x + share (z - x), eight elements a thread
 #extension GL_GOOGLE_include_directive : require
-#include "blend.h"
 #include "lib/pack.glsl"
 #include "lib/thread.glsl"
 
@@ -11,7 +10,13 @@ layout(local_size_x = 64) in;
 layout(constant_id = 0) const bool kHalfX = false;
 layout(constant_id = 1) const bool kHalfZ = false;
 layout(constant_id = 2) const bool kHalfY = false;
-layout(push_constant) uniform Push { BlendPush p; };
+layout(push_constant) uniform BlendPush {
+    uint rows;
+    uint cols;
+    uint x_ld;
+    uint z_ld;
+    uint y_ld;
+} p;
 layout(binding = 0) readonly buffer X { uvec4 x[]; };         // [rows, cols]
 layout(binding = 1) readonly buffer Z { uvec4 z[]; };         // [rows, cols]
 layout(binding = 2) readonly buffer Share { float share[]; }; // [1]

@@ -4,14 +4,21 @@
 // mean and m2 of 16 rows of eight channels, one thread each: where no pass that made x could take them
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
-#include "channel_moments.h"
 #include "lib/moments.glsl"
 #include "lib/pack.glsl"
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const bool kHalfX = false;
-layout(push_constant) uniform Push { ChannelMomentsPush p; };
+layout(push_constant) uniform ChannelMomentsPush {
+    uint rows;
+    uint cols;
+    uint first_row;
+    uint x_ld;
+    uint moments_ld;
+    uint moments_pixels;
+    uint moments_image_rows;
+} p;
 layout(binding = 0) readonly buffer X { uvec4 x[]; };             // [rows, cols]
 layout(binding = 1) writeonly buffer Moments { vec4 moments[]; }; // [rows / 16, cols] pairs: mean, m2
 

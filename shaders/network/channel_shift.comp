@@ -3,14 +3,22 @@
 // SPDX-License-Identifier: Apache-2.0
 // y = x + shift[shift_row[image], col + channel], eight channels a thread
 #extension GL_GOOGLE_include_directive : require
-#include "channel_shift.h"
 #include "lib/pack.glsl"
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const bool kHalfX = false;
 layout(constant_id = 1) const bool kHalfY = false;
-layout(push_constant) uniform Push { ChannelShiftPush p; };
+layout(push_constant) uniform ChannelShiftPush {
+    uint rows;
+    uint cols;
+    uint first_row;
+    uint image_rows;
+    uint x_ld;
+    uint y_ld;
+    uint shift_ld;
+    uint shift_col;
+} p;
 layout(binding = 0) readonly buffer X { uvec4 x[]; };               // [rows, cols]
 layout(binding = 1) readonly buffer Shift { vec4 shift[]; };        // [timesteps, shift_ld]
 layout(binding = 2) readonly buffer ShiftRow { uint shift_row[]; }; // [images]

@@ -5,7 +5,6 @@
 // head, and the scores of all frames in registers; threads side by side share keys and values, which are few enough to
 // stay in the cache.
 #extension GL_GOOGLE_include_directive : require
-#include "frame_attention.h"
 #include "lib/pack.glsl"
 #include "lib/thread.glsl"
 
@@ -13,7 +12,14 @@ layout(local_size_x = 64) in;
 layout(constant_id = 0) const bool kHalfQkv = false;
 layout(constant_id = 1) const bool kHalfY = false;
 layout(constant_id = 2) const uint kFrames = 1;
-layout(push_constant) uniform Push { FrameAttentionPush p; };
+layout(push_constant) uniform FrameAttentionPush {
+    uint image_rows; // from one frame to the next
+    uint heads;
+    uint chunks; // head_dim / 8
+    uint qkv_ld; // elements
+    uint y_ld;
+    float scale; // log2(e) times that of the scores: the exponential is one of base 2
+} p;
 layout(binding = 0) readonly buffer Qkv { uvec4 qkv[]; }; // [frames * image_rows, 3 * heads * head_dim]
 layout(binding = 1) writeonly buffer Y { uvec4 y[]; };    // [frames * image_rows, heads * head_dim]
 

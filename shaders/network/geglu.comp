@@ -3,7 +3,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // y = h gelu(gate), blocks of eight columns of h and gate alternating in x; eight elements a thread
 #extension GL_GOOGLE_include_directive : require
-#include "geglu.h"
 #include "lib/activation.glsl"
 #include "lib/pack.glsl"
 #include "lib/thread.glsl"
@@ -11,7 +10,12 @@
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const bool kHalfX = false;
 layout(constant_id = 1) const bool kHalfY = false;
-layout(push_constant) uniform Push { GegluPush p; };
+layout(push_constant) uniform GegluPush {
+    uint rows;
+    uint cols; // of y, a multiple of 8
+    uint x_ld; // elements
+    uint y_ld;
+} p;
 layout(binding = 0) readonly buffer X { uvec4 x[]; };  // [rows, 2 * cols]
 layout(binding = 1) writeonly buffer Y { uvec4 y[]; }; // [rows, cols]
 

@@ -3,7 +3,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // y = 0.5 x (1 + tanh(sqrt(2/pi) (x + 0.044715 x^3))), eight elements a thread
 #extension GL_GOOGLE_include_directive : require
-#include "gelu.h"
 #include "lib/activation.glsl"
 #include "lib/pack.glsl"
 #include "lib/thread.glsl"
@@ -11,7 +10,12 @@
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const bool kHalfX = false;
 layout(constant_id = 1) const bool kHalfY = false;
-layout(push_constant) uniform Push { GeluPush p; };
+layout(push_constant) uniform GeluPush {
+    uint rows;
+    uint x_ld; // elements, a multiple of 8
+    uint y_ld;
+    uint width; // elements of a row that are worked on, a multiple of 8
+} p;
 layout(binding = 0) readonly buffer X { uvec4 x[]; };  // [rows, x_ld]
 layout(binding = 1) writeonly buffer Y { uvec4 y[]; }; // [rows, y_ld]
 

@@ -3,7 +3,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // y = softmax(scale x) over the columns of every row, a workgroup a row
 #extension GL_GOOGLE_include_directive : require
-#include "softmax.h"
 #include "lib/pack.glsl"
 #include "lib/thread.glsl"
 
@@ -11,7 +10,14 @@ layout(local_size_x = 128) in;
 layout(constant_id = 0) const bool kHalfX = false;
 layout(constant_id = 1) const bool kHalfY = false;
 layout(constant_id = 2) const uint kTileM = 1;
-layout(push_constant) uniform Push { SoftmaxPush p; };
+layout(push_constant) uniform SoftmaxPush {
+    uint rows;
+    uint cols;  // that count
+    uint width; // columns of y that are written, a multiple of 8: zeros from `cols` on
+    uint x_ld;  // elements
+    uint y_ld;
+    float scale; // of x, times log2(e)
+} p;
 layout(binding = 0) readonly buffer X { uvec4 x[]; };  // [rows, cols]
 layout(binding = 1) writeonly buffer Y { uvec4 y[]; }; // [rows, width]
 

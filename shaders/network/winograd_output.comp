@@ -4,7 +4,6 @@
 // y = A^T m A + bias + shift + residual per tile of 4 x 4 pixels and channel, four channels a thread
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
-#include "winograd_output.h"
 #include "lib/half.glsl"
 #include "lib/thread.glsl"
 #include "lib/winograd.glsl"
@@ -15,7 +14,22 @@ layout(constant_id = 1) const bool kBias = false;
 layout(constant_id = 2) const bool kShift = false;
 layout(constant_id = 3) const bool kAdd = false;
 layout(constant_id = 4) const bool kHalfResidual = false;
-layout(push_constant) uniform Push { WinogradOutputPush p; };
+layout(push_constant) uniform WinogradOutputPush {
+    uint first_tile; // of the band
+    uint tiles;      // of the band
+    uint tiles_x;    // of an image
+    uint image_tiles;
+    uint image_rows; // of y
+    uint height;
+    uint width;
+    uint cols;    // channels, padded
+    uint outputs; // channels
+    uint m_ld; // elements
+    uint y_ld;
+    uint shift_ld;
+    uint shift_col;
+    uint residual_ld;
+} p;
 layout(binding = 0) uniform usamplerBuffer M;                       // [36 * tiles, cols]
 layout(binding = 1) readonly buffer Bias { vec4 bias[]; };          // [1, cols]
 layout(binding = 2) writeonly buffer Y { uvec2 y[]; };              // [images * image_rows, cols]

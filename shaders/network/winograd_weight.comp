@@ -4,13 +4,17 @@
 // U = G w G^T per output and channel, four channels a thread
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
-#include "winograd_weight.h"
 #include "lib/thread.glsl"
 #include "lib/winograd.glsl"
 
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const bool kHalfW = false;
-layout(push_constant) uniform Push { WinogradWeightPush p; };
+layout(push_constant) uniform WinogradWeightPush {
+    uint outputs;
+    uint cols; // channels, padded
+    uint w_ld; // elements
+    uint u_ld;
+} p;
 layout(binding = 0) uniform usamplerBuffer W;         // [outputs, 9 * cols]
 layout(binding = 1) writeonly buffer U { vec4 u[]; }; // [36 * outputs, cols]
 

@@ -3,14 +3,19 @@
 // SPDX-License-Identifier: Apache-2.0
 // a frame and the one before it where both see the same surface, four pixels a thread (docs/method.md §6.5)
 #extension GL_GOOGLE_include_directive : require
-#include "accumulate.h"
 #include "lib/lens.glsl"
 #include "lib/rounding.glsl"
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint kModel = 0; // CameraModel
-layout(push_constant) uniform Push { AccumulatePush p; };
+layout(push_constant) uniform AccumulatePush {
+    uint width, height;
+    uint words;      // of a picture
+    float share;     // of the frame before
+    float tolerance; // of depth, relative
+    float spread;    // standard deviations around the mean that the frame before is cut to
+} p;
 layout(binding = 0) readonly buffer Cameras { vec4 cameras[]; };       // [2, kCameraVectors] of the frame and the one before
 layout(binding = 1) readonly buffer Now { uint now[]; };               // [words] bytes
 layout(binding = 2) readonly buffer Past { uint past[]; };             // [words] bytes

@@ -3,12 +3,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // share of the visible pixels of a block, a block a thread; the picture goes on with its last column and row
 #extension GL_GOOGLE_include_directive : require
-#include "block_shares.h"
 #include "lib/rounding.glsl"
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
-layout(push_constant) uniform Push { BlockSharesPush p; };
+layout(push_constant) uniform BlockSharesPush {
+    uint rows;          // of y
+    uint width, height; // of the picture
+    uint block;         // pixels on a side
+    uint y_width, y_height;
+} p;
 layout(binding = 0) readonly buffer Pixels { uint pixels[]; }; // [height, width] visible: the high byte
 layout(binding = 1) writeonly buffer Y { float y[]; };         // [rows]
 

@@ -5,10 +5,14 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lib/rounding.glsl"
 #include "lib/thread.glsl"
-#include "picture_bytes.h"
 
 layout(local_size_x = 64) in;
-layout(push_constant) uniform Push { PictureBytesPush p; };
+layout(push_constant) uniform PictureBytesPush {
+    uint words;         // of y
+    uint width, height; // of the picture
+    uint x_width;       // pixels from one line of x to the next
+    uint x_ld;
+} p;
 layout(binding = 0) readonly buffer X { float x[]; };      // [rows, 3]
 layout(binding = 1) writeonly buffer Bytes { uint bytes[]; }; // [words]
 

@@ -5,10 +5,14 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lib/rounding.glsl"
 #include "lib/thread.glsl"
-#include "picture_input.h"
 
 layout(local_size_x = 64) in;
-layout(push_constant) uniform Push { PictureInputPush p; };
+layout(push_constant) uniform PictureInputPush {
+    uint rows;          // of y
+    uint width, height; // of the picture
+    uint y_width, y_height;
+    uint y_ld;
+} p;
 layout(binding = 0) readonly buffer Pixels { uint pixels[]; }; // [height, width] red, green, blue in the low bytes
 layout(binding = 1) writeonly buffer Y { vec4 y[]; };          // [rows, 3]
 

@@ -4,10 +4,11 @@
 // three bytes a pixel to four, as images have them; one pixel a thread
 #extension GL_GOOGLE_include_directive : require
 #include "lib/thread.glsl"
-#include "picture_texels.h"
 
 layout(local_size_x = 64) in;
-layout(push_constant) uniform Push { PictureTexelsPush p; };
+layout(push_constant) uniform PictureTexelsPush {
+    uint pixels;
+} p;
 layout(binding = 0) readonly buffer Bytes { uint bytes[]; };    // [words] red, green, blue, without padding
 layout(binding = 1) writeonly buffer Texels { uint texels[]; }; // [pixels] red, green, blue, 255
 

@@ -5,11 +5,17 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lib/rounding.glsl"
 #include "lib/thread.glsl"
-#include "scale_latent.h"
 
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const bool kBack = false; // y = x / factor + shift
-layout(push_constant) uniform Push { ScaleLatentPush p; };
+layout(push_constant) uniform ScaleLatentPush {
+    uint rows;   // of y
+    uint pixels; // rows that are not padding
+    uint cols;   // of y
+    uint x_ld;   // elements, of x
+    uint y_ld;
+    float factor, shift;
+} p;
 layout(binding = 0) readonly buffer X { float x[]; };  // [rows, cols or more]
 layout(binding = 1) writeonly buffer Y { float y[]; }; // [rows, cols]
 

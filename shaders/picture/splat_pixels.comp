@@ -5,10 +5,13 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lib/rounding.glsl"
 #include "lib/thread.glsl"
-#include "splat_pixels.h"
 
 layout(local_size_x = 64) in;
-layout(push_constant) uniform Push { SplatPixelsPush p; };
+layout(push_constant) uniform SplatPixelsPush {
+    uint pixels;
+    float red, green, blue; // of the background, 0..255
+    float visible_alpha;
+} p;
 layout(binding = 0) readonly buffer Color { vec4 color[]; };     // [pixels] sum of w rgb; alpha
 layout(binding = 1) readonly buffer Surface { vec4 surface[]; }; // [pixels] sum of w normal; of w depth
 layout(binding = 2) readonly buffer Depth { vec2 depth[]; };     // [pixels] expected, median

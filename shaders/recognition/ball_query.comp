@@ -4,11 +4,16 @@
 // the first points of the center's set, in their order, within the radius of it (d^2 <= r^2); where there are fewer, the
 // first of them again and again; where there is none, the set's first point. A thread has a center.
 #extension GL_GOOGLE_include_directive : require
-#include "point_groups.h"
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
-layout(push_constant) uniform Push { BallQueryPush p; };
+layout(push_constant) uniform BallQueryPush {
+    uint rows;    // centers of all sets
+    uint count;   // points of a set
+    uint samples; // centers of a set
+    uint neighbors;
+    float radius2;
+} p;
 layout(binding = 0) readonly buffer Points { vec4 points[]; };   // [sets * count] xyz
 layout(binding = 1) readonly buffer Centers { vec4 centers[]; }; // [rows] xyz
 layout(binding = 2) writeonly buffer Index { uint index[]; };    // [rows, neighbors] of points, over all sets

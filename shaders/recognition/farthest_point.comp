@@ -5,10 +5,14 @@
 // workgroup has a set; every thread keeps the distances of every 64th point. Dispatches follow one another with the
 // distances.
 #extension GL_GOOGLE_include_directive : require
-#include "point_groups.h"
 
 layout(local_size_x = 64) in;
-layout(push_constant) uniform Push { FarthestPointPush p; };
+layout(push_constant) uniform FarthestPointPush {
+    uint count;   // points of a set
+    uint samples; // of a set, to choose
+    uint first;   // of the samples, those of this dispatch
+    uint end;
+} p;
 layout(binding = 0) readonly buffer Points { vec4 points[]; };      // [sets * count] xyz
 layout(binding = 1) buffer Distances { uint distances[]; };         // [sets * count] squared, bits of floats
 layout(binding = 2) writeonly buffer Index { uint chosen_index[]; }; // [sets * samples] within the set

@@ -3,11 +3,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // y = [point - center, features of the point], a row per member of a group, eight columns a thread
 #extension GL_GOOGLE_include_directive : require
-#include "point_groups.h"
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
-layout(push_constant) uniform Push { GroupPointsPush p; };
+layout(push_constant) uniform GroupPointsPush {
+    uint rows; // members of all groups
+    uint first_row;
+    uint neighbors; // members of a group
+    uint features;  // columns
+    uint features_ld;
+    uint y_ld;
+} p;
 layout(binding = 0) readonly buffer Points { vec4 points[]; };      // [P] xyz
 layout(binding = 1) readonly buffer Centers { vec4 centers[]; };    // [all rows / neighbors] xyz
 layout(binding = 2) readonly buffer Features { float features[]; }; // [P, features_ld]

@@ -3,7 +3,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // y = max or mean of the pixels of a window that lie inside the image, eight channels a thread; a window without any is 0
 #extension GL_GOOGLE_include_directive : require
-#include "pool2d.h"
 #include "lib/pack.glsl"
 #include "lib/thread.glsl"
 
@@ -11,7 +10,27 @@ layout(local_size_x = 64) in;
 layout(constant_id = 0) const bool kHalfX = false;
 layout(constant_id = 1) const bool kHalfY = false;
 layout(constant_id = 2) const bool kMean = false;
-layout(push_constant) uniform Push { Pool2dPush p; };
+layout(push_constant) uniform Pool2dPush {
+    uint rows; // of the output, all images, padding included
+    uint first_row;
+    uint x_first; // rows of x in front of the one that is bound first
+    uint out_width;
+    uint out_pixels; // of an image
+    uint image_rows; // rows of an output image
+    uint in_width;
+    uint in_height;
+    uint in_image_rows;
+    uint kernel_height;
+    uint kernel_width;
+    uint stride_y;
+    uint stride_x;
+    uint padding_y; // above
+    uint padding_x; // to the left
+    uint x_ld;
+    uint y_ld;
+    uint y_col; // first column written, a multiple of 8
+    uint width; // columns worked on, a multiple of 8
+} p;
 layout(binding = 0) readonly buffer X { uvec4 x[]; };  // [images * in_image_rows, x_ld]
 layout(binding = 1) writeonly buffer Y { uvec4 y[]; }; // [images * image_rows, y_ld]
 

@@ -3,14 +3,19 @@
 // SPDX-License-Identifier: Apache-2.0
 // y = max(x, 0), eight elements a thread
 #extension GL_GOOGLE_include_directive : require
-#include "relu.h"
 #include "lib/pack.glsl"
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const bool kHalfX = false;
 layout(constant_id = 1) const bool kHalfY = false;
-layout(push_constant) uniform Push { ReluPush p; };
+layout(push_constant) uniform ReluPush {
+    uint rows;
+    uint x_ld; // elements, a multiple of 8
+    uint y_ld;
+    uint y_col; // first column written, a multiple of 8
+    uint width; // elements of a row that are worked on, a multiple of 8
+} p;
 layout(binding = 0) readonly buffer X { uvec4 x[]; };  // [rows, x_ld]
 layout(binding = 1) writeonly buffer Y { uvec4 y[]; }; // [rows, y_ld]
 

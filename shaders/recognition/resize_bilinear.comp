@@ -4,13 +4,22 @@
 // y = 2 / 255 bilinear(image) - 1, a pixel a thread. Output pixel i lies at s = max((i + 1/2) in / out - 1/2, 0) of the
 // input (align_corners = False, no antialiasing), and s = n / d with integers, so that its fraction is exact.
 #extension GL_GOOGLE_include_directive : require
-#include "resize_bilinear.h"
 #include "lib/pack.glsl"
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
 layout(constant_id = 1) const bool kHalfY = false;
-layout(push_constant) uniform Push { ResizeBilinearPush p; };
+layout(push_constant) uniform ResizeBilinearPush {
+    uint rows; // of the output, all images, padding included
+    uint first_row;
+    uint in_height;
+    uint in_width;
+    uint in_words; // from one image to the next
+    uint out_height;
+    uint out_width;
+    uint image_rows; // rows of an output image
+    uint y_ld;
+} p;
 layout(binding = 0) readonly buffer Pixels { uint pixels[]; }; // [images, in_words], four bytes a word: RGB RGB ..
 layout(binding = 1) writeonly buffer Y { uvec4 y[]; };         // [images * image_rows, y_ld]
 

@@ -6,14 +6,18 @@
 // a plane, up.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
-#include "pca_normal.h"
 #include "lib/eigen3.glsl"
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const bool kFallbacks = false;
 layout(constant_id = 1) const bool kLabels = false;
-layout(push_constant) uniform Push { PcaNormalPush p; };
+layout(push_constant) uniform PcaNormalPush {
+    uint rows;        // points
+    uint points_ld;   // floats from one point to the next
+    uint neighbors;   // of a point
+    uint line_labels; // bit per label: long and thin things
+} p;
 layout(binding = 0) readonly buffer Points { float points[]; };         // [rows, points_ld]
 layout(binding = 1) readonly buffer Neighbors { uint neighbors[]; };    // [rows, neighbors]
 layout(binding = 2) readonly buffer Labels { uint labels[]; };          // [rows]

@@ -4,10 +4,11 @@
 // a z-buffer in metres along z, one pixel a thread: scale / (z - offset), infinite where that is not above 0
 #extension GL_GOOGLE_include_directive : require
 #include "lib/thread.glsl"
-#include "splat_limits.h"
 
 layout(local_size_x = 64) in;
-layout(push_constant) uniform Push { SplatLimitsPush p; };
+layout(push_constant) uniform SplatLimitsPush {
+    uint pixels;
+} p;
 layout(binding = 0) readonly buffer Z { float z[]; };            // [pixels]
 layout(binding = 1) readonly buffer Scale { vec2 scale[]; };     // [1] scale, offset
 layout(binding = 2) writeonly buffer Limits { float limits[]; }; // [pixels]

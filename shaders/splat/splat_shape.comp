@@ -4,11 +4,17 @@
 // normal and size of a point's splat: sigma, or spacing sqrt((d1^2 + d2^2 + d3^2) / 3), d the distances of its nearest
 // three points, within limits
 #extension GL_GOOGLE_include_directive : require
-#include "splat_shape.h"
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
-layout(push_constant) uniform Push { SplatShapePush p; };
+layout(push_constant) uniform SplatShapePush {
+    uint rows;      // points
+    uint neighbors; // of a point
+    float sigma;    // metres
+    float spacing;  // sigma = spacing times the distance of the nearest points; 0: always `sigma`
+    float smallest; // of such a sigma, metres
+    float largest;
+} p;
 layout(binding = 0) readonly buffer Points { vec4 points[]; };       // [rows] xyz, opacity
 layout(binding = 1) buffer Colors { vec4 colors[]; };                // [rows] rgb, sigma
 layout(binding = 2) readonly buffer Neighbors { uint neighbors[]; }; // [rows, neighbors] nearest first

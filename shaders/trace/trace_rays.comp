@@ -4,11 +4,12 @@
 // what each ray hits first, or, kAny, whether it hits anything
 #extension GL_GOOGLE_include_directive : require
 #include "lib/thread.glsl"
-#include "trace_rays.h"
 
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const bool kAny = false;
-layout(push_constant) uniform Push { TraceRaysPush p; };
+layout(push_constant) uniform TraceRaysPush {
+    uint rows; // rays
+} p;
 layout(binding = 0) readonly buffer Nodes { uvec4 nodes[]; };        // [nodes, 4]
 layout(binding = 1) readonly buffer Triangles { vec4 triangles[]; }; // [triangles, 3]
 layout(binding = 2) readonly buffer Rays { vec4 rays[]; };           // [rows, 2] origin, near; direction, far

@@ -3,7 +3,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // y = what fp16 stores make of x where the device packs to the nearest number, and where it packs toward zero
 #extension GL_GOOGLE_include_directive : require
-#include "half_rounding.h"
 #include "lib/thread.glsl"
 
 uint toward_zero(float x)
@@ -24,7 +23,9 @@ uint pack_toward_zero(vec2 v)
 }
 
 layout(local_size_x = 64) in;
-layout(push_constant) uniform Push { HalfRoundingPush p; };
+layout(push_constant) uniform HalfRoundingPush {
+    uint count; // pairs
+} p;
 
 // lib/half.glsl twice: with the device's packHalf2x16 and with one that AMD's compilers might have
 #define nearest_half nearest_half_here
