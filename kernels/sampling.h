@@ -38,6 +38,15 @@ void step_hold(Graph& g,
                Tensor known,            // [M] u32
                Tensor fixed, Tensor x); // [M, N] fp32; x in place
 
+// The points of voxels from their tokens (docs/method.md §1.2), by increasing distance to the centre, ties by x, y, z,
+// then in the token's order; each three words: x | y << 16, fp16 metres from the centre; z, and bit 31 where a number
+// of the point was not finite; r | g << 8 | b << 16, sRGB
+constexpr float kMostHalfVoxel = 125; // metres: squared distances of the points stay within 64 bits
+[[nodiscard]] Tensor decode_tokens(Graph& g,
+                                   Tensor tokens,        // [M, 6n] fp32
+                                   Tensor normalization, // [2, 6] fp32 array: mean, standard deviation
+                                   float half_voxel);    // metres -> [M, 3n] u32 array
+
 // how far the conditional prediction is followed: the same everywhere, or linear over the frames of a video
 struct FrameGuidance {
     float first = 1, last = 1; // of the first and the last frame

@@ -61,7 +61,7 @@ Result<TransformerConfig> parse_transformer_config(const Json& json)
     fields.integer("points_per_voxel", 1u, 682u, c.points_per_voxel);
     fields.integer("num_classes", 1u, 65536u, c.num_classes);
     fields.integer("pos_embed_dim", 2u, 65536u, c.pos_embed_dim);
-    fields.number("voxel_size", 1e-4f, 1e4f, c.voxel_size);
+    fields.number("voxel_size", 1e-4f, 250.f, c.voxel_size);
     fields.number("attention_radius", 0.f, 1e5f, c.attention_radius);
     fields.flag("context_pos_embed", c.context_pos_embed);
     fields.choice<bool>("qk_norm", {{"rms_norm", true}}, c.qk_norm);

@@ -34,12 +34,6 @@ float normalized(const TransformerConfig& c, uint32_t channel, float v)
     return c.normalization ? (v - c.normalization->mean[channel]) / c.normalization->std[channel] : v;
 }
 
-float denormalized(const TransformerConfig& c, uint32_t channel, float v)
-{
-    return std::clamp(c.normalization ? v * c.normalization->std[channel] + c.normalization->mean[channel] : v, -1.f,
-                      1.f);
-}
-
 } // namespace
 
 void sort_by_distance(std::span<uint16_t> points, std::span<uint8_t> colors)
@@ -74,22 +68,14 @@ void encode_token(const TransformerConfig& config, std::span<const uint16_t> poi
     }
 }
 
-void decode_token(const TransformerConfig& config, std::span<const float> token, std::span<uint16_t> points,
-                  std::span<uint8_t> colors)
+void unpack_points(std::span<const uint32_t> words, std::span<uint16_t> points, std::span<uint8_t> colors)
 {
-    const float half_voxel = config.voxel_size / 2;
-    std::vector<Point> offsets(config.points_per_voxel);
-    for (size_t i = 0; i < offsets.size(); ++i)
-        for (uint32_t a = 0; a < 3;
-             ++a) // rounded to storage before sorting, so that a stored token is in its own order
-            offsets[i][a] = half_to_float(float_to_half(denormalized(config, a, token[6 * i + a]) * half_voxel));
-    size_t to = 0;
-    for (uint32_t i : distance_order(offsets)) {
-        for (uint32_t a = 0; a < 3; ++a, ++to) {
-            points[to] = float_to_half(offsets[i][a]);
-            const float v = denormalized(config, 3 + a, token[6 * i + 3 + a]);
-            colors[to] = uint8_t(std::lround((v + 1) * 127.5f));
-        }
+    for (size_t i = 0; i < words.size(); i += 3) {
+        points[i] = uint16_t(words[i]);
+        points[i + 1] = uint16_t(words[i] >> 16);
+        points[i + 2] = uint16_t(words[i + 1]);
+        for (size_t c = 0; c < 3; ++c)
+            colors[i + c] = uint8_t(words[i + 2] >> 8 * c);
     }
 }
 

@@ -20,8 +20,7 @@ void sort_by_distance(std::span<uint16_t> points, std::span<uint8_t> colors);
 void encode_token(const TransformerConfig& config, std::span<const uint16_t> points, std::span<const uint8_t> colors,
                   std::span<float> token);
 
-// token [6n] -> points and colours in stored form, clamped to the voxel and sorted as above
-void decode_token(const TransformerConfig& config, std::span<const float> token, std::span<uint16_t> points,
-                  std::span<uint8_t> colors);
+// words [3n] of decode_tokens (kernels/sampling.h) -> points and colours in stored form
+void unpack_points(std::span<const uint32_t> words, std::span<uint16_t> points, std::span<uint8_t> colors);
 
 } // namespace semrover

@@ -10,8 +10,9 @@ struct TokenSampler::Batch {
     uint32_t rows, tiles, longest; // rows: of one guidance half
     State state;
     Slot labels, cells, sets, tile_list, coords, pos, mask, known, fixed, x, x0, z, table_row; // z: noise that is given
-    Slot condition, conditioning, voxel_conditioning;       // none where the model takes labels alone
-    std::unique_ptr<Program> prepare, step, unguided, undo; // unguided: of the first half, where steps differ
+    Slot condition, conditioning, voxel_conditioning; // none where the model takes labels alone
+    Slot points;
+    std::unique_ptr<Program> prepare, step, unguided, undo, decode; // unguided: of the first half, where steps differ
 
     Batch(const TokenSampler& s, const TokenSets& packed)
         : rows(packed.rows() / s.halves_), tiles(uint32_t(packed.tiles.size() / 4)), longest(packed.longest)
@@ -38,6 +39,7 @@ struct TokenSampler::Batch {
         if (s.options_.noise)
             z = state.slot(rows, channels, DType::f32, "z");
         table_row = state.slot(2 * m, 1, DType::u32, "table_row", 1);
+        points = state.slot(rows, channels / 2, DType::u32, "points", channels / 2);
     }
     // of both halves, or of the first one
     TokenContext context(Graph& g, uint32_t halves) const
@@ -105,6 +107,12 @@ struct TokenSampler::Batch {
         step_advance(g, steps.clock);
         return g;
     }
+    Graph decode_graph(const TokenSampler& s) const
+    {
+        Graph g;
+        g.keep(decode_tokens(g, x.in(g), s.normalization_.in(g), s.transformer_.config().voxel_size / 2), points);
+        return g;
+    }
 };
 
 TokenSampler::~TokenSampler() = default;
@@ -128,6 +136,7 @@ TokenSampler::TokenSampler(Device& device, const Transformer& transformer, const
     clock_ = ReplayMemory::clock_slot(state_);
     timesteps_ = state_.slot(window_, 1, DType::f32, "timesteps", 1);
     table_ = state_.slot(window_, transformer.modulation_width(), DType::f32, "modulations");
+    normalization_ = state_.slot(2, 6, DType::f32, "normalization", 6);
 }
 
 Result<std::unique_ptr<TokenSampler>> TokenSampler::create(Device& device, const Transformer& transformer,
@@ -145,6 +154,7 @@ Result<std::unique_ptr<TokenSampler>> TokenSampler::create(Device& device, const
     std::unique_ptr<TokenSampler> s(new TokenSampler(device, transformer, plan, std::move(options)));
     SR_CHECK(s->state_.allocate(device, "sampler tables"));
     SR_CHECK(s->upload_steps());
+    SR_CHECK(s->upload_normalization());
     SR_CHECK(s->make_modulations());
     return s;
 }
@@ -162,6 +172,18 @@ Status TokenSampler::upload_steps()
         rows.push_back(step_row(row));
     SR_CHECK(clock_.clear(device_));
     return steps_.write(device_, rows);
+}
+
+// of a model without it: what leaves every number as it is, -0 too
+Status TokenSampler::upload_normalization()
+{
+    const auto& given = transformer_.config().normalization;
+    std::array<float, 12> values;
+    for (size_t c = 0; c < 6; ++c) {
+        values[c] = given ? given->mean[c] : -0.f;
+        values[6 + c] = given ? given->std[c] : 1.f;
+    }
+    return normalization_.write(device_, values);
 }
 
 Status TokenSampler::make_modulations()
@@ -204,6 +226,7 @@ Result<TokenSampler::Batch*> TokenSampler::batch_for(const TokenSets& sets)
         SR_TRY(b->unguided, Program::create(device_, b->step_graph(*this, 1)));
     }
     SR_TRY(b->undo, Program::create(device_, b->undo_graph(*this)));
+    SR_TRY(b->decode, Program::create(device_, b->decode_graph(*this)));
     batch_ = std::move(b);
     return batch_.get();
 }
@@ -220,6 +243,7 @@ Result<uint64_t> TokenSampler::planned_bytes(uint32_t regions, uint32_t cells) c
     graphs.push_back(b.prepare_graph(*this));
     graphs.push_back(b.step_graph(*this, halves_));
     graphs.push_back(b.undo_graph(*this));
+    graphs.push_back(b.decode_graph(*this));
     if (halves_ == 2 && unguided_steps_)
         graphs.push_back(b.step_graph(*this, 1));
     for (const Graph& g : graphs) {
@@ -321,9 +345,9 @@ Status TokenSampler::begin(std::span<const RegionInput> regions)
     return Replay::begin({clock_, b->x, b->x0});
 }
 
-Result<std::vector<float>> TokenSampler::finish()
+// errors: internal for numbers that are not finite
+Result<std::vector<float>> TokenSampler::read_tokens() const
 {
-    end();
     const size_t channels = transformer_.config().channels();
     SR_TRY(std::vector<float> tokens, batch_->x.read_rows(device_, tokens_));
     for (size_t i = 0; i < tokens.size(); ++i)
@@ -332,6 +356,23 @@ Result<std::vector<float>> TokenSampler::finish()
                         "the network returned {} for channel {} of token {}: overflow; try `precision` fp32", tokens[i],
                         i % channels, i / channels);
     return tokens;
+}
+
+Result<std::vector<float>> TokenSampler::finish()
+{
+    end();
+    return read_tokens();
+}
+
+Result<std::vector<uint32_t>> TokenSampler::finish_points()
+{
+    end();
+    SR_CHECK(batch_->decode->run());
+    SR_TRY(std::vector<uint32_t> words, batch_->points.row_range(0, tokens_).read<uint32_t>(device_));
+    for (size_t i = 1; i < words.size(); i += 3)
+        if (words[i] >> 31)
+            SR_CHECK(read_tokens().map([](const auto&) {}));
+    return words;
 }
 
 Result<std::vector<float>> TokenSampler::run(std::span<const RegionInput> regions)

@@ -51,6 +51,8 @@ class TokenSampler : public Replay {
     // the next begin. One row of the plan is one submit, and one more comes before them.
     Status begin(std::span<const RegionInput> regions);
     Result<std::vector<float>> finish();
+    // the same end, with the points of the tokens: words [voxels, 3n] of decode_tokens (kernels/sampling.h)
+    Result<std::vector<uint32_t>> finish_points();
 
     // of the batch shape of the last run; its arithmetic is dense: masked attention counts in full
     const Program& step_program() const;
@@ -61,6 +63,7 @@ class TokenSampler : public Replay {
     bool guided(const PlanRow& step) const;
     Status upload_steps();
     Status make_modulations();
+    Status upload_normalization();
     StepTable step_table(Graph& g) const;
     TokenSets pack(std::span<const RegionInput> regions) const;
     Result<Batch*> batch_for(const TokenSets& sets);
@@ -69,6 +72,7 @@ class TokenSampler : public Replay {
     Status use_timestep(uint32_t index);
     Status feed_noise(Batch& batch, size_t row);
     Result<Program*> program_of(size_t row);
+    Result<std::vector<float>> read_tokens() const;
 
     const Transformer& transformer_;
     SamplingPlan plan_;
@@ -78,7 +82,7 @@ class TokenSampler : public Replay {
     uint32_t window_; // timesteps that the modulation table holds at a time
     uint32_t first_timestep_ = ~0u;
     State state_; // what does not depend on the batch
-    Slot steps_, clock_, timesteps_, table_;
+    Slot steps_, clock_, timesteps_, table_, normalization_;
     std::unique_ptr<Program> modulations_;
     std::unique_ptr<Batch> batch_;
     uint32_t tokens_ = 0; // of the run's regions

@@ -218,16 +218,15 @@ RegionResult GridFilling::result(uint32_t region) const
 Status GridFilling::end_batch()
 {
     Work& w = *work_;
-    const TransformerConfig& config = settings_.model.config;
-    const size_t width = size_t(config.points_per_voxel) * 3, channels = config.channels();
-    SR_TRY(const std::vector<float> tokens, sampler_->finish());
-    std::span<const float> rest = tokens;
+    const size_t width = size_t(settings_.model.config.points_per_voxel) * 3;
+    SR_TRY(const std::vector<uint32_t> words, sampler_->finish_points());
+    std::span<const uint32_t> rest = words;
     for (const uint32_t region : std::exchange(w.flight, {})) {
         for (const uint32_t cell : w.regions.region(region)) {
             if (w.graph.is_target(region, cell))
-                decode_token(config, rest.first(channels), std::span(w.grid.points).subspan(cell * width, width),
-                             std::span(w.grid.colors).subspan(cell * width, width));
-            rest = rest.subspan(channels);
+                unpack_points(rest.first(width), std::span(w.grid.points).subspan(cell * width, width),
+                              std::span(w.grid.colors).subspan(cell * width, width));
+            rest = rest.subspan(width);
         }
         if (run_)
             SR_CHECK(save_region(*run_, result(region)));
