@@ -366,6 +366,11 @@ typedef struct sr_world_desc {
     double detail_distance; /* metres: a tile within it has a splat of each point, up to twice as far one of each half
                                voxel, up to four times one of each voxel, and so on. So a kilometre takes little more
                                than what is near. 0: each point has one everywhere */
+
+    uint32_t portable_cache; /* 1: what another device or driver put into the cache is taken, too, so that it can be
+                                shipped. Points that are made beside it are rounded in another way. 0 and 1 do not find
+                                each other's tiles */
+    uint32_t reserved;
 } sr_world_desc;
 
 /* The worker. Waits for the compiler and the device, so that no step compiles, and for the disk. On failure *world is

@@ -164,10 +164,13 @@ Result<std::unique_ptr<sr_world>> make_world(sr_context& context, const sr_world
     const auto metres = [](double value, const char* field) {
         return number_in(value, 0, kMostMetres, "sr_world_desc", field);
     };
+    if (d.reserved)
+        return fail(ErrorCode::usage, "sr_world_desc: reserved is not 0");
     SR_CHECK(metres(d.tile_size, "tile_size").map([](double) {}));
     SR_TRY(const double splat_radius, metres(d.splat_radius, "splat_radius"));
     WorldRequest request;
     SR_TRY(request.detail_distance, metres(d.detail_distance, "detail_distance"));
+    SR_TRY(request.any_device, number_in<bool>(d.portable_cache, 0, 1, "sr_world_desc", "portable_cache"));
     request.seed = d.seed;
     if (d.model) {
         SR_TRY(world->model, model_of(context, d.model, "sr_world_desc"));
@@ -383,5 +386,5 @@ sr_status sr_world_flush(sr_world* world)
 
 } // extern "C"
 
-static_assert(sizeof(sr_world_desc) == 152 && sizeof(sr_generation) == 64 && sizeof(sr_object) == 88 &&
+static_assert(sizeof(sr_world_desc) == 160 && sizeof(sr_generation) == 64 && sizeof(sr_object) == 88 &&
               sizeof(sr_world_info) == 88);

@@ -107,7 +107,11 @@ Status World::open_tiles()
     if (labels_->points_per_voxel() && labels_->points_per_voxel() != points_per_voxel())
         return fail(ErrorCode::bad_input, "the labels come with {} points a voxel, the model makes {}",
                     labels_->points_per_voxel(), points_per_voxel());
-    SR_TRY(const Json settings, settings_json(s, filling_.device(), "world", 0));
+    SR_TRY(Json settings, settings_json(s, filling_.device(), "world", 0));
+    if (request_.any_device) {
+        settings.erase("device");
+        settings.erase("driver");
+    }
     Hash base;
     base.add(settings.dump());
     base.add(std::as_bytes(std::span(&request_.seed, 1)));

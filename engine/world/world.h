@@ -24,6 +24,7 @@ struct WorldRequest {
     GivenObjects objects = {};  // that condition the model; none: guessed of the labels, block by block or at once
     uint32_t tiles_at_once = 0; // that are generated together; 0: what suits the device. Does not change the bytes
     Path store = {};            // a folder that keeps finished tiles (TileStore), for other sessions too; empty: none
+    bool any_device = false;    // what another device or driver left there is taken, too
     std::map<std::string, std::string> metadata = {}; // of the store's index
     uint64_t host_bytes = 0;                          // of tiles in memory; 0: no budget
     uint64_t splat_bytes = 0; // of splats on the device, all allocated at the beginning; 0: none are made
