@@ -384,6 +384,17 @@ SR_API void sr_world_destroy(sr_world* world);
  * numbers that are not finite, a radius that is not 0..2000 m. */
 SR_API sr_status sr_world_focus(sr_world* world, const double position[3], const double direction[3], double radius);
 
+/* a place that a world is wanted around, as sr_world_focus has it */
+typedef struct sr_focus {
+    double position[3], direction[3];
+    double radius;
+} sr_focus;
+
+/* Several at once, for players or cameras that are apart: all tiles within the radius of any of them; what is nearest
+ * to one of them first. The last call of this one and of sr_world_focus counts. Else as sr_world_focus. SR_ERR_USAGE: a
+ * count that is not 1..64, too. */
+SR_API sr_status sr_world_foci(sr_world* world, const sr_focus* foci, uint32_t count);
+
 /* The worker. Works for about budget_us microseconds and returns; 0: one piece of work. It stops when the next piece is
  * expected not to fit, going by those of its kind before, but does one at least. A piece is a denoising step of a few
  * regions at most, or a tile read, written or turned into splats. New splats lie where no draw looks: what is on its
@@ -403,7 +414,7 @@ SR_API sr_status sr_world_labels_ready(sr_world* world, const sr_cell_rect* rect
 typedef struct sr_world_info {
     uint32_t struct_size;
     uint32_t full;       /* 1: host_bytes or splat_bytes has no room for more of what is wanted */
-    uint64_t wanted;     /* tiles of the focus */
+    uint64_t wanted;     /* tiles of the focus, or of all foci */
     uint64_t finished;   /* of these, as far as steps have looked */
     uint64_t in_memory;  /* tiles */
     uint64_t host_bytes; /* of these */

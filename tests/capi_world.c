@@ -314,6 +314,55 @@ static void objects_condition_the_points(sr_context* context, const char* condit
     CHECK(sr_read_objects("/nonesuch", NULL, &count) == SR_ERR_BAD_INPUT && says(NULL, "nonesuch"));
 }
 
+static uint64_t wanted_by(sr_context* context, sr_world* world, const sr_focus* foci, uint32_t count)
+{
+    uint32_t done = 0, steps = 0;
+    CHECK_OK(context, sr_world_foci(world, foci, count));
+    for (; !done; ++steps) {
+        CHECK_OK(context, sr_world_step(world, 20000, &done));
+        CHECK(steps < 10000);
+    }
+    CHECK(world_info(world).finished == world_info(world).wanted);
+    return world_info(world).wanted;
+}
+
+/* two players far apart, a third one beside the first: what each of them has around, once, and nothing between */
+static void several_foci_are_generated_at_once(sr_context* context)
+{
+    const sr_focus foci[3] = {{{2, 0, 1.5}, {1, 0, 0}, 2}, {{60, 0, 1.5}, {-1, 0, 0}, 3}, {{3, 0, 1.5}, {0, 0, 0}, 1}};
+    const sr_cell_rect near_first = {{3, 0}, {3, 0}}, near_second = {{100, 0}, {100, 0}}, between = {{30, -6}, {70, 6}};
+    const double behind[3] = {-20, 0, 0};
+    sr_focus wrong[65];
+    sr_world_desc desc = street_world();
+    sr_world* world = NULL;
+    uint64_t cells[3], all, generated, i;
+    CHECK_OK(context, create_world(context, model, &desc, &world));
+    all = wanted_by(context, world, foci, 2);
+    generated = world_info(world).generated;
+    free(points_of(world, &near_first, &cells[0]));
+    free(points_of(world, &near_second, &cells[1]));
+    free(points_of(world, &between, &cells[2]));
+    CHECK(cells[0] == 1 && cells[1] == 1 && cells[2] == 0);
+    CHECK(all == wanted_by(context, world, foci, 1) + wanted_by(context, world, foci + 1, 1));
+    CHECK(world_info(world).generated == generated);  /* they are there */
+    CHECK(wanted_by(context, world, foci, 3) == all); /* of the same tiles as the first */
+    CHECK_OK(context, sr_world_focus(world, behind, behind, 1));
+    CHECK_OK(context, sr_world_foci(world, foci, 2)); /* the last call counts */
+    CHECK_OK(context, sr_world_step(world, 0, NULL));
+    CHECK(world_info(world).wanted == all);
+    for (i = 0; i < 65; ++i)
+        wrong[i] = foci[0];
+    CHECK(sr_world_foci(world, wrong, 65) == SR_ERR_USAGE && says(context, "65 foci"));
+    CHECK(sr_world_foci(world, wrong, 0) == SR_ERR_USAGE && says(context, "0 foci"));
+    CHECK(sr_world_foci(world, NULL, 1) == SR_ERR_USAGE && says(context, "foci is NULL"));
+    CHECK(sr_world_foci(NULL, foci, 1) == SR_ERR_USAGE && says(NULL, "world is NULL"));
+    wrong[63].direction[2] = NAN;
+    CHECK(sr_world_foci(world, wrong, 64) == SR_ERR_USAGE && says(context, "finite"));
+    wrong[63].direction[2] = 0;
+    CHECK_OK(context, sr_world_foci(world, wrong, 64));
+    sr_world_destroy(world);
+}
+
 static void an_edit_makes_its_place_anew(sr_context* context)
 {
     const sr_cell_rect place = {{8, -6}, {15, 6}};
@@ -507,6 +556,7 @@ int main(int argc, char** argv)
     labels_of_a_grid_and_of_a_callback_give_the_same_points(context);
     settings_decide_the_points(context);
     objects_condition_the_points(context, argv[2], argv[3]);
+    several_foci_are_generated_at_once(context);
     an_edit_makes_its_place_anew(context);
     a_world_without_a_model_has_the_splats_of_its_grid(context);
     draws_into_host_memory(context);

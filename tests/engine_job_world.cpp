@@ -84,9 +84,9 @@ std::unique_ptr<World> open(const Path& cache = {}, uint64_t host_bytes = 0, uin
     return std::move(*world);
 }
 
-WorldFocus looking(double x, double radius, double direction = 1)
+WorldFoci looking(double x, double radius, double direction = 1)
 {
-    return {.position = {x, 1.5, 1.5}, .direction = {direction, 0, 0}, .radius = radius};
+    return {{.position = {x, 1.5, 1.5}, .direction = {direction, 0, 0}, .radius = radius}};
 }
 
 size_t run(World& world, const JobBudget& budget = JobBudget::unlimited())
@@ -388,7 +388,7 @@ TEST(engine_job_world, a_focus_finds_its_tiles_nearest_first_and_counts_them_bef
         for (const double direction : {0., 1.}) {
             const WorldFocus focus{
                 .position = {3.1, -7.9, 1}, .direction = {direction, -0.3 * direction, 0}, .radius = radius};
-            TileOrder order(focus, 3.6);
+            TileOrder order({focus}, 3.6);
             const size_t size = order.size();
             std::set<TileIndex> expected, found;
             for (int32_t x = -15; x < 16; ++x)
@@ -410,6 +410,44 @@ TEST(engine_job_world, a_focus_finds_its_tiles_nearest_first_and_counts_them_bef
             EXPECT_EQ(size, expected.size());
             EXPECT_EQ(order.size(), expected.size());
         }
+}
+
+// brute force over all tiles; two disks that overlap, one within another, one far from all
+TEST(engine_job_world, several_foci_find_the_tiles_of_each_once_nearest_to_any_first)
+{
+    const WorldFoci foci = {{.position = {3.1, -7.9, 1}, .direction = {1, -0.3, 0}, .radius = 12},
+                            {.position = {13, -2, 0}, .direction = {0, 0, 0}, .radius = 9},
+                            {.position = {4, -6, 0}, .direction = {0, 0, 0}, .radius = 2},
+                            {.position = {-200, 40, 3}, .direction = {0, 2, 0}, .radius = 7.3}};
+    std::map<TileIndex, double> expected; // with the weight of the nearest focus
+    for (int32_t x = -70; x < 16; ++x)
+        for (int32_t y = -15; y < 20; ++y)
+            for (const WorldFocus& focus : foci) {
+                const double px = focus.position[0], py = focus.position[1];
+                const double left = x * 3.6, low = y * 3.6;
+                const double dx = std::max({0., left - px, px - left - 3.6});
+                const double dy = std::max({0., low - py, py - low - 3.6});
+                if (std::hypot(dx, dy) > focus.radius)
+                    continue;
+                const double mx = left + 1.8 - px, my = low + 1.8 - py, away = std::hypot(mx, my);
+                const double length = std::hypot(focus.direction[0], focus.direction[1]);
+                const double ahead = (mx * focus.direction[0] + my * focus.direction[1]) / (away * length);
+                const double weight = length > 0 ? away * (2 - ahead) : away;
+                const auto [entry, added] = expected.emplace(TileIndex{x, y}, weight);
+                entry->second = std::min(entry->second, weight);
+            }
+    TileOrder order(foci, 3.6);
+    EXPECT_EQ(order.size(), expected.size());
+    double last = 0;
+    size_t count = 0;
+    for (; const auto tile = order.at(count); ++count) {
+        ASSERT_TRUE(expected.contains(*tile));
+        EXPECT_EQ(order.rank_of(*tile), count);
+        EXPECT_NEAR(expected.at(*tile), std::max(expected.at(*tile), last), 1e-9) << count;
+        last = expected.at(*tile);
+    }
+    EXPECT_EQ(count, expected.size());
+    EXPECT_EQ(order.size(), expected.size());
 }
 
 TEST(engine_job_world, tiles_along_a_track_are_those_within_the_horizon_in_the_order_of_the_way)

@@ -52,7 +52,7 @@ struct sr_world {
     std::mutex work;
     std::unique_ptr<semrover::World> world;
     std::mutex post;
-    std::optional<semrover::WorldFocus> focus;
+    semrover::WorldFoci foci; // none: they are as before
     semrover::LabelEdits edits;
     std::vector<semrover::CellWindow> labels_ready;
     sr_world_info info = {}; // as the last call left it

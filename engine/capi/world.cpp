@@ -215,12 +215,12 @@ sr_status with_world(sr_world* world, const char* name, F f) noexcept
 // what was posted is done; by the call that works
 Status take_posts(sr_world& world)
 {
-    std::optional<WorldFocus> focus;
+    WorldFoci foci;
     LabelEdits edits;
     std::vector<CellWindow> ready;
     {
         const std::lock_guard lock(world.post);
-        std::swap(focus, world.focus);
+        std::swap(foci, world.foci);
         std::swap(edits, world.edits);
         std::swap(ready, world.labels_ready);
     }
@@ -228,7 +228,22 @@ Status take_posts(sr_world& world)
         world.world->labels_ready(window);
     if (!edits.empty())
         SR_CHECK(world.world->edit(edits));
-    return focus ? world.world->focus(*focus) : Status();
+    return foci.empty() ? Status() : world.world->focus(foci);
+}
+
+Status post_foci(sr_world& world, std::span<const sr_focus> given)
+{
+    WorldFoci foci;
+    for (const sr_focus& one : given) {
+        WorldFocus& focus = foci.emplace_back();
+        std::ranges::copy(one.position, focus.position.begin());
+        std::ranges::copy(one.direction, focus.direction.begin());
+        focus.radius = one.radius;
+    }
+    SR_CHECK(world.world->check_foci(foci));
+    const std::lock_guard lock(world.post);
+    world.foci = std::move(foci);
+    return {};
 }
 
 sr_world_info info_of(const sr_world& world)
@@ -302,13 +317,19 @@ sr_status sr_world_focus(sr_world* world, const double position[3], const double
     return with_world<kAnyTime>(world, "sr_world_focus", [&]() -> Status {
         if (!position || !direction)
             return fail(ErrorCode::usage, "sr_world_focus: NULL");
-        WorldFocus focus{.radius = radius};
-        std::copy_n(position, 3, focus.position.begin());
-        std::copy_n(direction, 3, focus.direction.begin());
-        SR_CHECK(world->world->check_focus(focus));
-        const std::lock_guard lock(world->post);
-        world->focus = focus;
-        return {};
+        sr_focus one{{}, {}, radius};
+        std::copy_n(position, 3, one.position);
+        std::copy_n(direction, 3, one.direction);
+        return post_foci(*world, {&one, 1});
+    });
+}
+
+sr_status sr_world_foci(sr_world* world, const sr_focus* foci, uint32_t count)
+{
+    return with_world<kAnyTime>(world, "sr_world_foci", [&]() -> Status {
+        if (!foci && count)
+            return fail(ErrorCode::usage, "sr_world_foci: foci is NULL");
+        return post_foci(*world, {foci, count});
     });
 }
 
@@ -387,4 +408,4 @@ sr_status sr_world_flush(sr_world* world)
 } // extern "C"
 
 static_assert(sizeof(sr_world_desc) == 160 && sizeof(sr_generation) == 64 && sizeof(sr_object) == 88 &&
-              sizeof(sr_world_info) == 88);
+              sizeof(sr_focus) == 56 && sizeof(sr_world_info) == 88);

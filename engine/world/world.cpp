@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace semrover {
 
@@ -32,6 +33,20 @@ std::array<TileIndex, 8> tiles_around(const TileIndex& t)
              {t[0] + 1, t[1] + 1}}};
 }
 
+// what foci reach, with a margin in metres around it
+CellWindow window_around(const WorldFoci& foci, double margin, float voxel_size)
+{
+    constexpr double none = std::numeric_limits<double>::infinity();
+    Point3 low = {none, none, 0}, high = {-none, -none, 0};
+    for (const WorldFocus& focus : foci)
+        for (size_t a = 0; a < 2; ++a) {
+            low[a] = std::min(low[a], focus.position[a] - focus.radius - margin);
+            high[a] = std::max(high[a], focus.position[a] + focus.radius + margin);
+        }
+    const Cell first = cell_at(low, voxel_size), last = cell_at(high, voxel_size);
+    return {{first[0], first[1]}, {last[0], last[1]}};
+}
+
 } // namespace
 
 World::World(Device& device, WorldRequest request, std::unique_ptr<WorldLabels> labels, const JobCallbacks& callbacks)
@@ -47,7 +62,16 @@ double World::edge() const
 
 double World::away(const TileIndex& tile) const
 {
-    return focus_ ? distance_to_tile({focus_->position[0], focus_->position[1]}, tile, edge()) : 0;
+    double nearest = foci_.empty() ? 0 : std::numeric_limits<double>::infinity();
+    for (const WorldFocus& focus : foci_)
+        nearest = std::min(nearest, distance_to_tile(focus, tile, edge()));
+    return nearest;
+}
+
+bool World::out_of_reach(const TileIndex& tile) const
+{
+    const auto reaches = [&](const WorldFocus& focus) { return distance_to_tile(focus, tile, edge()) <= focus.radius; };
+    return !foci_.empty() && std::ranges::none_of(foci_, reaches);
 }
 
 // those of a map's tiles that are picked
@@ -154,22 +178,18 @@ Status World::warm_up()
     return splats_->prepare(points_of(grid).size(), request_.splats);
 }
 
-Status World::focus(const WorldFocus& focus)
+Status World::focus(const WorldFoci& foci)
 {
-    SR_ASSERT(tiles_, "a focus needs the order of tiles");
-    SR_CHECK(check_focus(focus));
-    if (focus_ && is_nearly(*focus_, focus, edge()))
+    SR_ASSERT(tiles_, "foci need the order of tiles");
+    SR_CHECK(check_foci(foci));
+    if (std::ranges::equal(foci_, foci, [&](const auto& a, const auto& b) { return is_nearly(a, b, edge()); }))
         return {};
-    focus_ = focus;
+    foci_ = foci;
     releases_ = false;
-    want(TileOrder(focus, edge()));
+    want(TileOrder(foci, edge()));
     find_bare();
-    const double reach = focus.radius + 2 * edge();
-    if (!has_model())
-        return {};
-    const Cell low = cell_at({focus.position[0] - reach, focus.position[1] - reach, 0}, voxel_size());
-    const Cell high = cell_at({focus.position[0] + reach, focus.position[1] + reach, 0}, voxel_size());
-    tiles_->keep_objects_near({{low[0], low[1]}, {high[0], high[1]}});
+    if (has_model())
+        tiles_->keep_objects_near(window_around(foci, 2 * edge(), voxel_size()));
     return {};
 }
 
@@ -179,7 +199,7 @@ Status World::follow(std::span<const GroundPoint> track, double horizon)
     if (!(horizon > 0 && horizon <= kMostHorizon))
         return fail(ErrorCode::usage, "a horizon: expected metres above 0 and up to {}, found {}", kMostHorizon,
                     horizon);
-    focus_.reset();
+    foci_.clear();
     releases_ = true;
     want(TileOrder(tiles_along(track, horizon, edge())));
     say();
@@ -196,7 +216,7 @@ Status World::everywhere(RunFolder* run)
         return {};
     }
     SR_TRY(std::vector<TileIndex> all, labels_->tiles(tile_cells()));
-    focus_.reset();
+    foci_.clear();
     releases_ = false;
     want(TileOrder(std::move(all)));
     say();
@@ -215,9 +235,8 @@ void World::want(TileOrder order)
 // tiles that get fewer splats first: they make room for the others
 void World::find_bare()
 {
-    bare_ = nearest_first(tiles_->all(), [this](const TileIndex& t) {
-        return splats_ && away(t) <= focus_->radius && tile(t) && !has_splats(t);
-    });
+    bare_ = nearest_first(
+        tiles_->all(), [this](const TileIndex& t) { return splats_ && !out_of_reach(t) && tile(t) && !has_splats(t); });
     std::ranges::stable_partition(bare_, [this](const TileIndex& t) {
         const auto made = made_for_.find(t);
         return made != made_for_.end() && made->second.detail < detail(t);
@@ -428,7 +447,7 @@ void World::end_look()
     found_.clear();
     rank_ = done_;
     idle_ = work_.empty();
-    if (idle_ && focus_)
+    if (idle_ && !foci_.empty())
         find_bare(); // those whose neighbours turned out to be empty, too
 }
 
@@ -679,17 +698,21 @@ Status World::make_splats(const TileIndex& index)
     return {};
 }
 
-Status World::check_focus(const WorldFocus& focus) const
+Status World::check_foci(const WorldFoci& foci) const
 {
-    bool finite = std::isfinite(focus.radius);
-    for (size_t a = 0; a < 3; ++a)
-        finite = finite && std::isfinite(focus.position[a]) && std::isfinite(focus.direction[a]);
-    if (!finite || focus.radius < 0 || focus.radius > kMostRadius)
-        return fail(ErrorCode::usage, "a focus: expected finite numbers and a radius of 0 to {} m, found {} m",
-                    kMostRadius, focus.radius);
-    for (size_t a = 0; a < 2; ++a)
-        if (std::abs(focus.position[a]) > kFarthestCell * double(voxel_size()))
-            return fail(ErrorCode::usage, "a focus at {} m is too far out", focus.position[a]);
+    if (foci.empty() || foci.size() > kMostFoci)
+        return fail(ErrorCode::usage, "{} foci, expected 1 to {}", foci.size(), kMostFoci);
+    for (const WorldFocus& focus : foci) {
+        bool finite = std::isfinite(focus.radius);
+        for (size_t a = 0; a < 3; ++a)
+            finite = finite && std::isfinite(focus.position[a]) && std::isfinite(focus.direction[a]);
+        if (!finite || focus.radius < 0 || focus.radius > kMostRadius)
+            return fail(ErrorCode::usage, "a focus: expected finite numbers and a radius of 0 to {} m, found {} m",
+                        kMostRadius, focus.radius);
+        for (size_t a = 0; a < 2; ++a)
+            if (std::abs(focus.position[a]) > kFarthestCell * double(voxel_size()))
+                return fail(ErrorCode::usage, "a focus at {} m is too far out", focus.position[a]);
+    }
     return {};
 }
 

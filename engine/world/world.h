@@ -47,6 +47,8 @@ struct WorldFigures {
     bool full = false;                   // a budget has no room for more of what is wanted
 };
 
+constexpr size_t kMostFoci = 64;
+
 // The only driver of generation: points for labels, as far as they are wanted, a piece of work at a time.
 class World {
   public:
@@ -57,11 +59,12 @@ class World {
     // Loads the model, plans memory and compiles, so that no step does. See open_world.
     Status open();
 
-    // What is wanted from now on; tiles that are at work are finished first. A focus that moved by less than an eighth
-    // of a tile is the same. Errors: of check_focus()
-    Status focus(const WorldFocus& focus);
-    // usage for numbers that are not finite, a radius that is not 0..2000 m or a place beyond 2^19 voxels; any thread
-    Status check_focus(const WorldFocus& focus) const;
+    // What is wanted from now on; tiles that are at work are finished first. Foci that moved by less than an eighth of
+    // a tile are the same. Errors: of check_foci()
+    Status focus(const WorldFoci& foci);
+    // usage for numbers that are not finite, a radius that is not 0..2000 m, a place beyond 2^19 voxels, and others
+    // than 1 to kMostFoci; any thread
+    Status check_foci(const WorldFoci& foci) const;
     // The tiles within `horizon` metres of a track. Those that nothing wanted needs any more leave memory once the
     // store has them. usage: a horizon that is not above 0 and up to 1000 m
     Status follow(std::span<const GroundPoint> track, double horizon);
@@ -126,8 +129,9 @@ class World {
     };
 
     bool has_model() const { return !request_.settings.model.folder.empty(); }
-    double edge() const;                      // of a tile, metres
-    double away(const TileIndex& tile) const; // of the focus; 0 where there is none
+    double edge() const;                            // of a tile, metres
+    double away(const TileIndex& tile) const;       // of the nearest focus; 0 where there is none
+    bool out_of_reach(const TileIndex& tile) const; // of all foci
     bool finished(const TileIndex& tile) const;
     Status open_scene();
     Status open_tiles();
@@ -151,7 +155,6 @@ class World {
     Status finish();
     void say(bool ended = false) const;
     uint32_t detail(const TileIndex& tile) const { return detail_of(away(tile), request_.detail_distance); }
-    bool out_of_reach(const TileIndex& tile) const { return focus_ && away(tile) > focus_->radius; }
     template <typename T, typename Picks>
     std::vector<TileIndex> nearest_first(const std::map<TileIndex, T>& tiles, Picks picks) const;
     bool has_splats(const TileIndex& tile) const;
@@ -173,7 +176,7 @@ class World {
     std::unique_ptr<WorldTiles> tiles_; // the order of tiles
     std::optional<Scene> scene_;        // or that of the scene
     GridFilling filling_;
-    std::optional<WorldFocus> focus_;
+    WorldFoci foci_;
     bool releases_ = false; // what is finished leaves memory
     TileOrder order_;
     size_t done_ = 0, rank_ = 0;   // of order_: finished from the front on, and where to look next

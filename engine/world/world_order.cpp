@@ -24,15 +24,27 @@ double weight(const WorldFocus& focus, const TileIndex& tile, double edge)
     return away * (2 - (x * focus.direction[0] + y * focus.direction[1]) / (away * length));
 }
 
-// how many tiles a focus has: a row of them for each index along x
-size_t tiles_within(const WorldFocus& focus, double edge)
+// how many tiles foci have together: a row of them for each focus and index along x
+size_t tiles_within(const WorldFoci& foci, double edge)
 {
-    const auto& [x, y, z] = focus.position;
+    std::vector<std::array<int32_t, 3>> rows; // index along x; first and last along y
+    for (const WorldFocus& focus : foci) {
+        const auto& [x, y, z] = focus.position;
+        for (int32_t i = tile_at(x - focus.radius, edge); i <= tile_at(x + focus.radius, edge); ++i) {
+            const double away = std::max({0.0, i * edge - x, x - (i + 1) * edge});
+            const double half = std::sqrt(std::max(0.0, focus.radius * focus.radius - away * away));
+            rows.push_back({i, tile_at(y - half, edge), tile_at(y + half, edge)});
+        }
+    }
+    std::ranges::sort(rows);
     size_t count = 0;
-    for (int32_t i = tile_at(x - focus.radius, edge); i <= tile_at(x + focus.radius, edge); ++i) {
-        const double away = std::max({0.0, i * edge - x, x - (i + 1) * edge});
-        const double half = std::sqrt(std::max(0.0, focus.radius * focus.radius - away * away));
-        count += size_t(tile_at(y + half, edge) - tile_at(y - half, edge) + 1);
+    std::optional<int32_t> column;
+    int32_t end = 0; // last of the column that is counted
+    for (const auto& [i, from, to] : rows) {
+        const int32_t first = column == i ? std::max(from, end + 1) : from;
+        count += size_t(std::max(0, to - first + 1));
+        end = column == i ? std::max(end, to) : to;
+        column = i;
     }
     return count;
 }
@@ -114,6 +126,11 @@ double distance_to_tile(const GroundPoint& point, const TileIndex& tile, double 
     return std::hypot(outside[0], outside[1]);
 }
 
+double distance_to_tile(const WorldFocus& focus, const TileIndex& tile, double edge)
+{
+    return distance_to_tile(GroundPoint{focus.position[0], focus.position[1]}, tile, edge);
+}
+
 std::vector<GroundPoint> ground_track(const CameraPath& path)
 {
     std::vector<GroundPoint> track;
@@ -156,13 +173,15 @@ TileOrder::TileOrder(std::vector<TileIndex> tiles) : found_(std::move(tiles)), s
         ranks_.emplace(found_[rank], rank);
 }
 
-TileOrder::TileOrder(const WorldFocus& focus, double edge)
-    : focus_(focus), edge_(edge),
-      size_(tiles_within(focus, edge)), first_{tile_at(focus.position[0], edge), tile_at(focus.position[1], edge)},
-      span_(int32_t(std::ceil(focus.radius / edge)) + 2)
+TileOrder::TileOrder(const WorldFoci& foci, double edge) : edge_(edge), size_(tiles_within(foci, edge))
 {
-    reached_.resize(size_t(2 * span_ + 1) * size_t(2 * span_ + 1));
-    reach(first_);
+    for (const WorldFocus& focus : foci) {
+        const int32_t span = int32_t(std::ceil(focus.radius / edge)) + 2;
+        disks_.push_back({focus, {tile_at(focus.position[0], edge), tile_at(focus.position[1], edge)}, span, {}});
+        disks_.back().reached.resize(size_t(2 * span + 1) * size_t(2 * span + 1));
+    }
+    for (size_t d = 0; d < disks_.size(); ++d)
+        reach(disks_[d].first);
 }
 
 // note: the nearest tiles come at once, as the one under the camera need not be the first
@@ -171,13 +190,21 @@ void TileOrder::reach(const TileIndex& tile)
     for (int32_t x = -1; x <= 1; ++x)
         for (int32_t y = -1; y <= 1; ++y) {
             const TileIndex beside{tile[0] + x, tile[1] + y};
-            const int32_t column = beside[0] - first_[0] + span_, row = beside[1] - first_[1] + span_;
-            if (distance_to_tile({focus_.position[0], focus_.position[1]}, beside, edge_) > focus_.radius)
+            const auto has = [&](const Disk& d) { return distance_to_tile(d.focus, beside, edge_) <= d.focus.radius; };
+            const auto first = std::ranges::find_if(disks_, has); // which remembers it
+            if (first == disks_.end())
                 continue;
-            const size_t bit = size_t(column) * size_t(2 * span_ + 1) + size_t(row);
-            if (!reached_[bit])
-                border_.emplace(weight(focus_, beside, edge_), beside);
-            reached_[bit] = true;
+            const int32_t column = beside[0] - first->first[0] + first->span;
+            const int32_t row = beside[1] - first->first[1] + first->span;
+            const size_t bit = size_t(column) * size_t(2 * first->span + 1) + size_t(row);
+            if (first->reached[bit])
+                continue;
+            first->reached[bit] = true;
+            double nearest = weight(first->focus, beside, edge_);
+            for (auto other = first + 1; other != disks_.end(); ++other)
+                if (has(*other))
+                    nearest = std::min(nearest, weight(other->focus, beside, edge_));
+            border_.emplace(nearest, beside);
         }
 }
 

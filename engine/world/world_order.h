@@ -19,12 +19,14 @@ struct WorldFocus {
     std::array<double, 3> direction{}; // of any length; only its part along the ground counts, zero: none
     double radius = 0;                 // metres, seen from above
 };
+using WorldFoci = std::vector<WorldFocus>;
 
 // so little moved and turned that what is wanted stays the same: by less than an eighth of a tile, and some ten degrees
 bool is_nearly(const WorldFocus& a, const WorldFocus& b, double edge);
 
 // metres from a point to the nearest place of a tile
 double distance_to_tile(const GroundPoint& point, const TileIndex& tile, double edge);
+double distance_to_tile(const WorldFocus& focus, const TileIndex& tile, double edge);
 
 // The places of a trajectory's cameras, without those that do not move. Cameras of one moment count one after the
 // other.
@@ -41,19 +43,27 @@ class TileOrder {
   public:
     TileOrder() = default; // none
     explicit TileOrder(std::vector<TileIndex> tiles);
-    // The tiles with a place within the radius, by the distance of their middle from the position, which counts up to
-    // three times as much behind it as ahead. edge: of a tile, in metres
-    TileOrder(const WorldFocus& focus, double edge);
+    // The tiles with a place within the radius of a focus, by the distance of their middle from its position, which
+    // counts up to three times as much behind it as ahead; of several foci the nearest counts. edge: of a tile, in
+    // metres
+    TileOrder(const WorldFoci& foci, double edge);
 
     size_t size() const { return size_; }                       // of all
     std::optional<TileIndex> at(size_t rank);                   // none: there are no more
     std::optional<size_t> rank_of(const TileIndex& tile) const; // of one that was found
 
   private:
+    struct Disk {
+        WorldFocus focus;
+        TileIndex first; // under the focus
+        int32_t span;
+        std::vector<bool> reached; // of the square of tiles around first, 2 * span + 1 wide
+    };
+
     void reach(const TileIndex& tile);
     void find();
 
-    WorldFocus focus_;
+    std::vector<Disk> disks_;
     double edge_ = 0;
     std::vector<TileIndex> found_;
     std::map<TileIndex, size_t> ranks_;
@@ -61,9 +71,6 @@ class TileOrder {
     // tiles beside those that were found, with their weights
     using Weighed = std::pair<double, TileIndex>;
     std::priority_queue<Weighed, std::vector<Weighed>, std::greater<>> border_;
-    std::vector<bool> reached_; // of the square of tiles around first_, 2 * span_ + 1 wide
-    TileIndex first_{};
-    int32_t span_ = 0;
 };
 
 // How coarse a tile at that distance is: 0 within `detail_distance`, 1 up to twice as far, 2 up to four times, and so

@@ -74,7 +74,7 @@ Status fly_frame(World& world, double metres, const BenchWorldArguments& o, doub
     const CallTimer frame;
     const WorldFocus focus{.position = {metres, 0, 1.7}, .direction = {1, 0, 0}, .radius = o.radius};
     const CallTimer focusing;
-    SR_CHECK(world.focus(focus));
+    SR_CHECK(world.focus({focus}));
     flight.focuses.add(focusing.ms());
     const CallTimer stepping;
     SR_TRY(const bool all, world.step({~0u, uint64_t(budget_ms * 1000)}));
