@@ -63,7 +63,7 @@ typedef enum sr_status {
     SR_ERR_USAGE = 2,         /* the call is wrong: a NULL, a size, a number out of range or not finite */
     SR_ERR_BAD_INPUT = 3,     /* a file or its content */
     SR_ERR_NO_DEVICE = 4,     /* no Vulkan device that can do it */
-    SR_ERR_OUT_OF_MEMORY = 5, /* of the device, of the budget, or of the host */
+    SR_ERR_OUT_OF_MEMORY = 5, /* of the device, of the budget, or host memory */
     SR_ERR_DEVICE_LOST = 6,
     SR_ERR_PARTIAL = 7,   /* there was more than fitted */
     SR_NOT_YET = 8,       /* of a labels callback: ask again after sr_world_labels_ready */

@@ -139,7 +139,8 @@ static void lends_its_own_device(void)
     CHECK(sr_context_create(&desc, &context) == SR_ERR_USAGE && says(NULL, "both of lock and unlock"));
     vulkan.unlock_queue = unlock_queue;
     desc.device = "0";
-    CHECK(sr_context_create(&desc, &context) == SR_ERR_USAGE && says(NULL, "do not go with the application's device"));
+    CHECK(sr_context_create(&desc, &context) == SR_ERR_USAGE &&
+          says(NULL, "do not go with a device of the application's"));
     desc.device = NULL;
     vulkan.queue = NULL;
     CHECK(sr_context_create(&desc, &context) == SR_ERR_USAGE && says(NULL, "needs instance, physical device"));
@@ -147,7 +148,7 @@ static void lends_its_own_device(void)
     CHECK(sr_context_create(&desc, &context) == SR_OK);
     sr_context_destroy(context);
     CHECK(locks == unlocks);
-    CHECK(vkDeviceWaitIdle(host.device) == VK_SUCCESS); /* still the application's */
+    CHECK(vkDeviceWaitIdle(host.device) == VK_SUCCESS); /* still the host's */
     destroy_host(&host);
 }
 

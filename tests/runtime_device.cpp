@@ -438,13 +438,14 @@ TEST(runtime_device, refuses_a_host_device_that_lacks_something)
     const HostDevice whole = host_of(vulkan);
     HostDevice host = whole;
     host.queue = VK_NULL_HANDLE;
-    EXPECT_TRUE(says(Device::adopt(host, {}), "a host device needs instance, physical device, device and queue"));
+    EXPECT_TRUE(says(Device::adopt(host, {}),
+                     "a device of the application's needs instance, physical device, device and queue"));
     host = whole;
     host.queue_family = 77;
-    EXPECT_TRUE(says(Device::adopt(host, {}), "queue family 77 of the host device has no compute"));
+    EXPECT_TRUE(says(Device::adopt(host, {}), "queue family 77 of the application's device has no compute"));
     host = whole;
     host.robust_buffer_access = false;
-    EXPECT_TRUE(says(Device::adopt(host, {}), "a host device needs robustBufferAccess"));
+    EXPECT_TRUE(says(Device::adopt(host, {}), "a device of the application's needs robustBufferAccess"));
     host = whole;
     host.cooperative_matrix = true;
     EXPECT_TRUE(says(Device::adopt(host, {}), "with cooperative matrices needs shaderFloat16"));

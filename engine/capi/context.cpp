@@ -87,8 +87,9 @@ Result<std::unique_ptr<sr_context>> make_context(const sr_context_desc& desc)
     auto context = std::make_unique<sr_context>();
     if (desc.vulkan) {
         if (desc.device || desc.validation || desc.share_by_fd)
-            return fail(ErrorCode::usage,
-                        "sr_context_desc: device, validation and share_by_fd do not go with the application's device");
+            return fail(
+                ErrorCode::usage,
+                "sr_context_desc: device, validation and share_by_fd do not go with a device of the application's");
         SR_TRY(const sr_vulkan_device vulkan, read_struct(desc.vulkan, "sr_vulkan_device"));
         SR_TRY(context->device, adopt(vulkan, options));
     } else {

@@ -60,7 +60,7 @@ struct sr_world {
     semrover::capi::SizedRasterizer pixels;                 // of renderers that draw
     semrover::capi::SizedRasterizer images[2], recorded[2]; // of draws; the second with depth test
     std::unique_ptr<semrover::CommandRing> commands;        // of our own submits, from the first on
-    bool updated_by_host = false;                           // by sr_world_record_updates
+    bool updated_by_application = false;                    // by sr_world_record_updates
     semrover::TimelinePoint done;                           // when all that was recorded so far has been executed
     std::vector<std::pair<semrover::TimelinePoint, std::shared_ptr<semrover::Rasterizer>>> retired;
 };

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// draws that nobody waits for: in a command buffer of the application's, or submitted between its semaphores
+// draws that nobody waits for: in a command buffer of the application's, or submitted between semaphores of its own
 #include "engine/capi/exchange.h"
 
 using namespace semrover;
@@ -149,7 +149,7 @@ sr_status sr_world_record_updates(sr_world* world, VkCommandBuffer commands, con
             return fail(ErrorCode::usage, "sr_world_record_updates: NULL");
         SR_CHECK(check_device(*world, "sr_world_record_updates"));
         SR_CHECK(splats_of(*world, "sr_world_record_updates").map([](SplatPool*) {}));
-        world->updated_by_host = true;
+        world->updated_by_application = true;
         world->done = {done->semaphore, done->value};
         return record_updates(*world, commands, world->done).map([](bool) {});
     });

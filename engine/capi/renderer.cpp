@@ -80,7 +80,7 @@ Result<ImageGray16> draw_world(sr_renderer& renderer, sr_world& world, const Cam
     if (world.context != renderer.context)
         return fail(ErrorCode::usage, "sr_frame_desc: the world belongs to another context");
     SR_TRY(const SplatPool* splats, splats_of(world, "sr_frame_desc"));
-    if (!world.updated_by_host)
+    if (!world.updated_by_application)
         SR_CHECK(show_updates(world, true));
     Device& device = *renderer.context->device;
     RasterizerOptions options;

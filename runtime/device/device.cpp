@@ -102,7 +102,8 @@ Result<std::unique_ptr<Device>> Device::create(const DeviceOptions& options)
 Result<std::unique_ptr<Device>> Device::adopt(const HostDevice& host, const DeviceOptions& options)
 {
     if (!host.instance || !host.physical || !host.device || !host.queue)
-        return fail(ErrorCode::usage, "an application's device needs instance, physical device, device and queue");
+        return fail(ErrorCode::usage,
+                    "a device of the application's needs instance, physical device, device and queue");
     std::unique_ptr<Device> d(new Device());
     d->owned_ = false;
     d->take_allocation(options);
@@ -111,20 +112,19 @@ Result<std::unique_ptr<Device>> Device::adopt(const HostDevice& host, const Devi
     if (!is_compute_family(d->vk_, host.physical, host.queue_family))
         return fail(ErrorCode::usage, "queue family {} of the application's device has no compute", host.queue_family);
     if (host.work_queue && !is_compute_family(d->vk_, host.physical, host.work_queue_family))
-        return fail(ErrorCode::usage, "family {} of the application's work queue has no compute",
+        return fail(ErrorCode::usage, "family {} of the work queue of the application's device has no compute",
                     host.work_queue_family);
     if (!host.robust_buffer_access)
         return fail(ErrorCode::usage,
-                    "an application's device needs robustBufferAccess, and to say so: files decide what "
+                    "a device of the application's needs robustBufferAccess, and to say so: files decide what "
                     "shaders read");
     if (host.cooperative_matrix && !host.float16)
-        return fail(ErrorCode::usage,
-                    "an application's device with cooperative matrices needs shaderFloat16, and to say so");
+        return fail(ErrorCode::usage, "a device with cooperative matrices needs shaderFloat16, and to say so");
     if (bool(host.lock) != bool(host.unlock))
-        return fail(ErrorCode::usage, "an application's device needs both of lock and unlock, or neither");
+        return fail(ErrorCode::usage, "a device of the application's needs both of lock and unlock, or neither");
     if (bool(host.memory.allocate) != bool(host.memory.release))
         return fail(ErrorCode::usage,
-                    "an application's device needs both of allocate_memory and free_memory, or neither");
+                    "a device of the application's needs both of allocate_memory and free_memory, or neither");
     d->instance_ = host.instance;
     d->physical_ = host.physical;
     d->device_ = host.device;
@@ -134,7 +134,7 @@ Result<std::unique_ptr<Device>> Device::adopt(const HostDevice& host, const Devi
     d->memory_source_ = host.memory;
     d->sharing_ = host.sharing;
     SR_CHECK(d->finish(options));
-    // what the hardware could do is not what the application asked for
+    // what the hardware could do is not what the host asked for
     if (!host.cooperative_matrix)
         d->limits_.needs_supported &= ~uint32_t(kNeedsCooperativeMatrix);
     if (!host.float16)
@@ -236,7 +236,7 @@ Status Device::finish(const DeviceOptions& options)
     name_ = summary.name;
     driver_ = summary.driver;
     limits_ = summary.limits;
-    const Sharing can = sharing_of(vk_, physical_); // an application may have enabled what cannot be exported
+    const Sharing can = sharing_of(vk_, physical_); // a host may have enabled what cannot be exported
     sharing_.memory = sharing_.memory && can.memory && vk_.GetMemoryFdKHR;
     sharing_.semaphores = sharing_.semaphores && can.semaphores && vk_.GetSemaphoreFdKHR;
     budget_ = options.max_bytes;
