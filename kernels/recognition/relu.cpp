@@ -13,7 +13,7 @@ Tensor relu(Graph& g, Tensor x, const PartOf& part)
     const Tensor y = part.valid() ? part.whole.row_range(part.row, x.rows) : g.matrix(x.rows, x.cols, x.dtype, "relu");
     SR_ASSERT(part.col % 8 == 0 && part.col + width <= round_up(y.cols, kRowPadding),
               "relu: [{}, {}] written into [{}, {}] from column {}", x.rows, x.cols, y.rows, y.cols, part.col);
-    const ReluPush push{.rows = x.rows, .x_ld = x.ld, .y_ld = y.ld, .y_col = part.col, .width = width};
+    const ElementwisePush push{.rows = x.rows, .x_ld = x.ld, .y_ld = y.ld, .y_col = part.col, .width = width};
     DispatchOptions options;
     options.absorbed_as = "kRelu";
     options.banded = {"X", "Y"};

@@ -5,7 +5,6 @@
 #include "kernels/sampling.h"
 
 #include "renderer_input.spv.h"
-#include "shaders/sampling/renderer_input.h"
 
 namespace semrover {
 

@@ -4,7 +4,6 @@
 // where a frame is not known
 #include "kernels/sampling.h"
 
-#include "shaders/sampling/step_carry.h"
 #include "step_carry.spv.h"
 
 namespace semrover {

@@ -1,34 +1,8 @@
 #version 460
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// y = 0.5 x (1 + tanh(sqrt(2/pi) (x + 0.044715 x^3))), eight elements a thread
+// y = 0.5 x (1 + tanh(sqrt(2/pi) (x + 0.044715 x^3)))
 #extension GL_GOOGLE_include_directive : require
 #include "lib/activation.glsl"
-#include "lib/pack.glsl"
-#include "lib/thread.glsl"
-
-layout(local_size_x = 64) in;
-layout(constant_id = 0) const bool kHalfX = false;
-layout(constant_id = 1) const bool kHalfY = false;
-layout(push_constant) uniform GeluPush {
-    uint rows;
-    uint x_ld; // elements, a multiple of 8
-    uint y_ld;
-    uint width; // elements of a row that are worked on, a multiple of 8
-} p;
-layout(binding = 0) readonly buffer X { uvec4 x[]; };  // [rows, x_ld]
-layout(binding = 1) writeonly buffer Y { uvec4 y[]; }; // [rows, y_ld]
-
-void main()
-{
-    const uint per_row = p.width / 8;
-    const uint row = linear_thread() / per_row, col = linear_thread() % per_row * 8;
-    if (row >= p.rows)
-        return;
-    const uint from = row * p.x_ld + col, to = row * p.y_ld + col;
-    vec4 lo, hi;
-    LOAD8(x, kHalfX, from, lo, hi);
-    lo = gelu_tanh(lo);
-    hi = gelu_tanh(hi);
-    STORE8(y, kHalfY, to, lo, hi);
-}
+#define FUNCTION gelu_tanh
+#include "lib/elementwise.glsl"

@@ -1,33 +1,7 @@
 #version 460
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// y = max(x, 0), eight elements a thread
+// y = max(x, 0)
 #extension GL_GOOGLE_include_directive : require
-#include "lib/pack.glsl"
-#include "lib/thread.glsl"
-
-layout(local_size_x = 64) in;
-layout(constant_id = 0) const bool kHalfX = false;
-layout(constant_id = 1) const bool kHalfY = false;
-layout(push_constant) uniform ReluPush {
-    uint rows;
-    uint x_ld; // elements, a multiple of 8
-    uint y_ld;
-    uint y_col; // first column written, a multiple of 8
-    uint width; // elements of a row that are worked on, a multiple of 8
-} p;
-layout(binding = 0) readonly buffer X { uvec4 x[]; };  // [rows, x_ld]
-layout(binding = 1) writeonly buffer Y { uvec4 y[]; }; // [rows, y_ld]
-
-void main()
-{
-    const uint per_row = p.width / 8;
-    const uint row = linear_thread() / per_row, col = linear_thread() % per_row * 8;
-    if (row >= p.rows)
-        return;
-    vec4 lo, hi;
-    LOAD8(x, kHalfX, row * p.x_ld + col, lo, hi);
-    lo = max(lo, 0.0);
-    hi = max(hi, 0.0);
-    STORE8(y, kHalfY, row * p.y_ld + p.y_col + col, lo, hi);
-}
+#define FUNCTION(v) max(v, 0.0)
+#include "lib/elementwise.glsl"

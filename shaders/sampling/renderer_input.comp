@@ -7,11 +7,18 @@
 #include "lib/pack.glsl"
 #include "lib/step_row.h"
 #include "lib/thread.glsl"
-#include "renderer_input.h"
 
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const bool kHalfY = false;
-layout(push_constant) uniform Push { RendererInputPush p; };
+layout(push_constant) uniform RendererInputPush {
+    uint rows; // of y
+    uint x_rows;
+    uint channels;  // of a latent
+    uint latents;   // in a row: 3, or 2 without the previous one
+    uint latent_ld; // elements, of x, previous and buffer
+    uint visible_ld;
+    uint y_ld;
+} p;
 layout(binding = 0) readonly buffer Clock { StepClock clock; };
 layout(binding = 1) readonly buffer Steps { StepRow steps[]; };
 layout(binding = 2) readonly buffer X { float x[]; };               // [x_rows, channels]

@@ -7,10 +7,15 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lib/step_row.h"
 #include "lib/thread.glsl"
-#include "step_carry.h"
 
 layout(local_size_x = 64) in;
-layout(push_constant) uniform Push { StepCarryPush p; };
+layout(push_constant) uniform StepCarryPush {
+    uint rows; // of x
+    uint ld;   // elements, of fixed, x and x0
+    uint frames;
+    uint frame_rows; // of a frame
+    uint first_row;  // of the step table, whose weights come first
+} p;
 layout(binding = 0) readonly buffer Clock { StepClock clock; };
 layout(binding = 1) readonly buffer Steps { StepRow steps[]; };
 layout(binding = 2) readonly buffer Weights { float weights[]; };   // [steps, frames, frames]

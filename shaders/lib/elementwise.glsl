@@ -1,0 +1,32 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+
+// y = FUNCTION(x) of each element, eight of them a thread. To be included after FUNCTION, of a vec4
+#include "lib/pack.glsl"
+#include "lib/thread.glsl"
+
+layout(local_size_x = 64) in;
+layout(constant_id = 0) const bool kHalfX = false;
+layout(constant_id = 1) const bool kHalfY = false;
+layout(push_constant) uniform ElementwisePush {
+    uint rows;
+    uint x_ld; // elements, a multiple of 8
+    uint y_ld;
+    uint y_col; // first column written, a multiple of 8
+    uint width; // elements of a row that are worked on, a multiple of 8
+} p;
+layout(binding = 0) readonly buffer X { uvec4 x[]; };  // [rows, x_ld]
+layout(binding = 1) writeonly buffer Y { uvec4 y[]; }; // [rows, y_ld]
+
+void main()
+{
+    const uint per_row = p.width / 8;
+    const uint row = linear_thread() / per_row, col = linear_thread() % per_row * 8;
+    if (row >= p.rows)
+        return;
+    vec4 lo, hi;
+    LOAD8(x, kHalfX, row * p.x_ld + col, lo, hi);
+    lo = FUNCTION(lo);
+    hi = FUNCTION(hi);
+    STORE8(y, kHalfY, row * p.y_ld + p.y_col + col, lo, hi);
+}
