@@ -87,11 +87,9 @@ struct SurfaceSamples {
                                    Tensor linear); // [512] fp32: linear value of sRGB bytes v, then of v + 0.5
                                                    // -> [voxels * samples, 4] u32
 
-// Boxes around triangles. A node is eight words: least x, y, z (floats), link; largest x, y, z (floats), count. With a
-// count, a leaf: link is the first of so many triangles; without, the left child is the next node, link the right one.
-// At most 40 levels.
+// Boxes around triangles, as engine/mesh/bvh.h makes them, at most 48 levels
 struct SurfaceTree {
-    Tensor nodes;     // [nodes, 8]
+    Tensor nodes;     // [nodes, 16]
     Tensor triangles; // [T, 10] u32: three corners (floats as bits), face
 };
 

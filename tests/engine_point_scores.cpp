@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/mesh/nearest_points.h"
+#include "engine/mesh/nearest.h"
 #include "tests/kernel_case.h"
 #include "tests/says.h"
 #include "tools/eval/point_scores.h"

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/mesh/nearest_surface.h"
+#include "engine/mesh/bvh.h"
 #include "kernels/mesh.h"
 #include "tests/clip_reference.h"
 #include "tests/kernel_case.h"
@@ -502,21 +502,26 @@ TEST(kernel_surface, surface_distance_matches_all_triangles_in_double)
     for (const auto& [count, extent] : {std::pair{1u, 2.0}, {5u, 0.5}, {700u, 0.3}, {200u, 6.0}}) {
         std::vector<Triangle> list = random_triangles(count, extent, 12);
         list[0].corners[1] = list[0].corners[0]; // one that is a line
-        std::vector<TriangleCorners> corners;
+        std::vector<std::array<float, 3>> positions;
+        std::vector<std::array<uint32_t, 3>> faces;
         for (const Triangle& t : list) {
-            TriangleCorners c;
-            for (size_t i = 0; i < 3; ++i)
-                for (size_t a = 0; a < 3; ++a)
-                    c[i][a] = float(t.corners[i][a]);
-            corners.push_back(c);
+            const auto first = uint32_t(positions.size());
+            faces.push_back({first, first + 1, first + 2});
+            for (const auto& c : t.corners)
+                positions.push_back({float(c[0]), float(c[1]), float(c[2])});
         }
         KernelCase k(test_device());
-        const TriangleTree tree = triangle_tree(corners);
-        std::vector<uint32_t> nodes(tree.nodes.size() * 8);
-        std::memcpy(nodes.data(), tree.nodes.data(), nodes.size() * 4);
-        std::vector<uint32_t> triangles(corners.size() * 10);
+        const Bvh tree = build_bvh(positions, faces);
+        std::vector<uint32_t> nodes, triangles;
+        for (const auto& node : tree.nodes)
+            nodes.insert(nodes.end(), node.begin(), node.end());
+        for (const uint32_t face : tree.order) {
+            for (const uint32_t v : faces[face])
+                for (const float x : positions[v])
+                    triangles.push_back(std::bit_cast<uint32_t>(x));
+            triangles.push_back(face);
+        }
         std::vector<float> points;
-        std::memcpy(triangles.data(), tree.triangles.data(), triangles.size() * 4);
         std::mt19937 random(4);
         std::uniform_real_distribution<float> place(-8, 16);
         for (int i = 0; i < 3 * 501; ++i)
@@ -525,7 +530,7 @@ TEST(kernel_surface, surface_distance_matches_all_triangles_in_double)
         for (int i = 0; i < 501; ++i)
             held.insert(held.end(), {bits_of(6.5), kNone});
         const Tensor y = k.input(held, 2);
-        surface_distance(k.graph, k.input(points, 3), {k.input(nodes, 8), k.input(triangles, 10)}, y);
+        surface_distance(k.graph, k.input(points, 3), {k.input(nodes, 16), k.input(triangles, 10)}, y);
         ASSERT_TRUE(k.compile_and_run());
         const auto got = k.read_array<uint32_t>(y);
         ASSERT_EQ(got.size(), 1002u);

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/fusion/surface_error.h"
 
-#include "engine/mesh/nearest_surface.h"
+#include "engine/mesh/nearest.h"
 #include "engine/mesh/transparency.h"
 
 #include <algorithm>

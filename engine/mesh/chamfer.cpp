@@ -2,8 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/mesh/chamfer.h"
 
-#include "engine/mesh/nearest_points.h"
-#include "engine/mesh/nearest_surface.h"
+#include "engine/mesh/nearest.h"
 #include "engine/mesh/surface_blocks.h"
 #include "engine/mesh/transparency.h"
 #include "runtime/base/dtype.h"

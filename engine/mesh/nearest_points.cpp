@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/mesh/nearest_points.h"
+#include "engine/mesh/nearest.h"
 
 #include "kernels/network.h"
 #include "kernels/splat.h"

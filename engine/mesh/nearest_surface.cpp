@@ -1,12 +1,13 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/mesh/nearest_surface.h"
+#include "engine/mesh/nearest.h"
 
+#include "engine/mesh/bvh.h"
 #include "kernels/mesh.h"
-#include "runtime/base/result.h"
 #include "runtime/device/program.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -14,43 +15,9 @@ namespace semrover {
 
 namespace {
 
-constexpr size_t kLeaf = 4;
-
-// three times the centre: its order is all that matters
-float center_of(const TreeTriangle& t, size_t axis)
-{
-    return t.corners[0][axis] + t.corners[1][axis] + t.corners[2][axis];
-}
-
-struct Span {
-    size_t first, last, parent; // parent: the node whose right child this is, if there is one
-    bool is_right;
-};
-
-TriangleTree::Node box_of(const std::vector<TreeTriangle>& triangles, const Span& s)
-{
-    const std::array<float, 3>& any = triangles[s.first].corners[0];
-    TriangleTree::Node node{any, uint32_t(s.first), any, uint32_t(s.last - s.first)};
-    for (size_t i = s.first; i < s.last; ++i)
-        for (const auto& corner : triangles[i].corners)
-            for (size_t a = 0; a < 3; ++a) {
-                node.low[a] = std::min(node.low[a], corner[a]);
-                node.high[a] = std::max(node.high[a], corner[a]);
-            }
-    return node;
-}
-
-size_t longest_axis(const TriangleTree::Node& node)
-{
-    size_t axis = 0;
-    for (size_t a = 1; a < 3; ++a)
-        if (node.high[a] - node.low[a] > node.high[axis] - node.low[axis])
-            axis = a;
-    return axis;
-}
-
 constexpr size_t kPointBatch = 1 << 20; // points at once
 constexpr size_t kMostFaces = 1 << 20;  // of a tree
+constexpr uint64_t kFaceBytes = 64;     // in its larger array: a node has two faces at least
 
 std::array<double, 3> middle_of(const Mesh& mesh)
 {
@@ -68,61 +35,49 @@ std::array<double, 3> middle_of(const Mesh& mesh)
     return middle;
 }
 
-std::vector<TriangleCorners> corners_of(const Mesh& mesh, size_t first, size_t count,
-                                        const std::array<double, 3>& origin)
+using Positions = std::vector<std::array<float, 3>>;
+
+Positions positions_from(const Mesh& mesh, const std::array<double, 3>& origin)
 {
-    std::vector<TriangleCorners> corners(count);
-    for (size_t f = 0; f < count; ++f)
-        for (size_t c = 0; c < 3; ++c)
-            for (size_t a = 0; a < 3; ++a)
-                corners[f][c][a] = float(mesh.positions[mesh.faces[first + f][c]][a] + (mesh.origin[a] - origin[a]));
-    return corners;
+    Positions positions = mesh.positions;
+    for (auto& p : positions)
+        for (size_t a = 0; a < 3; ++a)
+            p[a] = float(p[a] + (mesh.origin[a] - origin[a]));
+    return positions;
+}
+
+// as kernels/mesh.h, SurfaceTree, has them
+std::vector<uint32_t> rows_of(std::span<const uint32_t> order, const Positions& positions, const Mesh& mesh,
+                              size_t first_face)
+{
+    std::vector<uint32_t> rows;
+    rows.reserve(order.size() * 10);
+    for (const uint32_t t : order) {
+        for (const uint32_t v : mesh.faces[first_face + t])
+            for (const float x : positions[v])
+                rows.push_back(std::bit_cast<uint32_t>(x));
+        rows.push_back(uint32_t(first_face) + t);
+    }
+    return rows;
 }
 
 } // namespace
-
-TriangleTree triangle_tree(const std::vector<TriangleCorners>& corners, uint32_t first_face)
-{
-    SR_ASSERT(!corners.empty(), "a tree of no triangles");
-    TriangleTree tree;
-    std::vector<TreeTriangle>& triangles = tree.triangles;
-    for (const TriangleCorners& c : corners)
-        triangles.push_back({c, first_face + uint32_t(triangles.size())});
-    std::vector<Span> pending = {{0, triangles.size(), 0, false}};
-    while (!pending.empty()) {
-        const Span s = pending.back();
-        pending.pop_back();
-        const size_t at = tree.nodes.size();
-        if (s.is_right)
-            tree.nodes[s.parent].link = uint32_t(at);
-        tree.nodes.push_back(box_of(triangles, s));
-        if (s.last - s.first <= kLeaf)
-            continue;
-        const size_t axis = longest_axis(tree.nodes[at]), middle = (s.first + s.last) / 2;
-        std::nth_element(triangles.begin() + ptrdiff_t(s.first), triangles.begin() + ptrdiff_t(middle),
-                         triangles.begin() + ptrdiff_t(s.last),
-                         [&](const auto& a, const auto& b) { return center_of(a, axis) < center_of(b, axis); });
-        tree.nodes[at].count = 0;
-        pending.push_back({middle, s.last, at, true});
-        pending.push_back({s.first, middle, at, false});
-    }
-    return tree;
-}
 
 Result<NearestSurface> NearestSurface::create(Device& device, const Mesh& mesh)
 {
     NearestSurface s(device);
     s.origin_ = middle_of(mesh);
-    const size_t most = std::min<uint64_t>(kMostFaces, device.limits().max_storage_range / sizeof(TreeTriangle));
+    const Positions positions = positions_from(mesh, s.origin_);
+    const size_t most = std::min<uint64_t>(kMostFaces, device.limits().max_storage_range / kFaceBytes);
     for (size_t first = 0; first < mesh.faces.size(); first += most) {
         const size_t count = std::min(most, mesh.faces.size() - first);
-        const TriangleTree tree = triangle_tree(corners_of(mesh, first, count, s.origin_), uint32_t(first));
+        const Bvh tree = build_bvh(positions, std::span(mesh.faces).subspan(first, count));
         Tree& t = s.trees_.emplace_back();
-        t.nodes = t.state.slot(uint32_t(tree.nodes.size()), 8, DType::u32, "nodes", 8);
-        t.triangles = t.state.slot(uint32_t(tree.triangles.size()), 10, DType::u32, "triangles", 10);
+        t.nodes = t.state.slot(uint32_t(tree.nodes.size()), 16, DType::u32, "nodes", 16);
+        t.triangles = t.state.slot(uint32_t(count), 10, DType::u32, "triangles", 10);
         SR_CHECK(t.state.allocate(device, "triangles"));
         SR_CHECK(t.nodes.write(device, tree.nodes));
-        SR_CHECK(t.triangles.write(device, tree.triangles));
+        SR_CHECK(t.triangles.write(device, rows_of(tree.order, positions, mesh, first)));
     }
     return s;
 }

@@ -11,7 +11,7 @@ constexpr double kOperationsPerPoint = 10000; // some hundred nodes of the tree,
 
 void surface_distance(Graph& g, Tensor points, const SurfaceTree& tree, Tensor y)
 {
-    SR_ASSERT(points.dtype == DType::f32 && points.cols >= 3 && y.rows == points.rows && tree.nodes.ld == 8 &&
+    SR_ASSERT(points.dtype == DType::f32 && points.cols >= 3 && y.rows == points.rows && tree.nodes.ld == 16 &&
                   tree.triangles.ld == 10 && y.ld == 2,
               "surface_distance: points [{}, {}], {} results", points.rows, points.cols, y.rows);
     g.dispatch(kernel::surface_distance, {points, tree.nodes, tree.triangles, y},

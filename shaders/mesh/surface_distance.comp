@@ -12,11 +12,11 @@ layout(push_constant) uniform SurfaceDistancePush {
     uint points_ld;
 } p;
 layout(binding = 0) readonly buffer Points { float points[]; };       // [size, points_ld]
-layout(binding = 1) readonly buffer Nodes { uvec4 nodes[]; };         // [2 * nodes] as kernels/mesh.h, SurfaceTree
+layout(binding = 1) readonly buffer Nodes { uvec4 nodes[]; };         // [4 * nodes] as engine/mesh/bvh.h
 layout(binding = 2) readonly buffer Triangles { uint triangles[]; };  // [T, 10]
 layout(binding = 3) buffer Y { uvec2 y[]; };                          // [size] distance as bits, face
 
-const uint kStack = 48; // levels of the tree
+const uint kStack = 48, kLeafBit = 0x80000000u; // engine/mesh/bvh.h: kBvhDepth, kBvhLeaf
 
 vec3 corner(uint t, uint c)
 {
@@ -48,10 +48,9 @@ float triangle2(vec3 p, vec3 a, vec3 b, vec3 c)
     return min(min(segment2(p, a, b), segment2(p, b, c)), segment2(p, c, a));
 }
 
-float box2(uint node, vec3 p)
+float box2(uvec4 low, uvec4 high, vec3 p)
 {
-    const vec3 low = uintBitsToFloat(nodes[2 * node].xyz), high = uintBitsToFloat(nodes[2 * node + 1].xyz);
-    return square(max(max(low - p, p - high), vec3(0)));
+    return square(max(max(uintBitsToFloat(low.xyz) - p, p - uintBitsToFloat(high.xyz)), vec3(0)));
 }
 
 void main()
@@ -64,28 +63,39 @@ void main()
     float best = uintBitsToFloat(y[i].x);
     best *= best;
     bool found = false;
-    uint stack[kStack];
-    uint top = 0;
-    stack[top++] = 0;
-    while (top > 0) {
-        const uint node = stack[--top];
-        if (box2(node, point) > best)
-            continue;
-        const uint link = nodes[2 * node].w, count = nodes[2 * node + 1].w;
-        for (uint t = link; t < link + count; ++t) {
-            const float square = triangle2(point, corner(t, 0), corner(t, 1), corner(t, 2));
-            const uint own = triangles[10 * t + 9];
-            if (square > best || (square == best && own >= face))
+    uint stack[kStack]; // nodes that wait, and how far away their boxes are
+    float away[kStack];
+    uint top = 0, at = 0;
+    for (;;) {
+        if ((at & kLeafBit) != 0) {
+            const uint first = at & 0x0fffffffu, count = (at >> 28) & 7u;
+            for (uint t = first; t < first + count; ++t) {
+                const float square = triangle2(point, corner(t, 0), corner(t, 1), corner(t, 2));
+                const uint own = triangles[10 * t + 9];
+                if (square > best || (square == best && own >= face))
+                    continue;
+                best = square;
+                face = own;
+                found = true;
+            }
+        } else {
+            const uvec4 a = nodes[4 * at], b = nodes[4 * at + 1], c = nodes[4 * at + 2], d = nodes[4 * at + 3];
+            const float left = box2(a, b, point), right = box2(c, d, point);
+            const bool left_first = left <= right;
+            if (max(left, right) <= best && top < kStack) {
+                stack[top] = left_first ? b.w : a.w;
+                away[top++] = max(left, right);
+            }
+            if (min(left, right) <= best) {
+                at = left_first ? a.w : b.w;
                 continue;
-            best = square;
-            face = own;
-            found = true;
+            }
         }
-        if (count > 0 || top + 2 > kStack)
-            continue;
-        const bool left_first = box2(node + 1, point) <= box2(link, point);
-        stack[top++] = left_first ? link : node + 1;
-        stack[top++] = left_first ? node + 1 : link;
+        while (top > 0 && away[top - 1] > best)
+            --top;
+        if (top == 0)
+            break;
+        at = stack[--top];
     }
     if (found)
         y[i] = uvec2(floatBitsToUint(sqrt(best)), face);

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/eval/point_scores.h"
 
-#include "engine/mesh/nearest_points.h"
+#include "engine/mesh/nearest.h"
 #include "runtime/base/dtype.h"
 
 #include <algorithm>

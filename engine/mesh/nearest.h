@@ -14,27 +14,18 @@
 
 namespace semrover {
 
-using TriangleCorners = std::array<std::array<float, 3>, 3>;
-struct TreeTriangle {
-    TriangleCorners corners;
-    uint32_t face;
+using PointRow = std::array<float, 4>; // metres, near the origin where floats are exact enough; the last is unused
+
+struct NearestPointsOptions {
+    float cell_size = 0.3f;    // metres, of the search grid
+    float first_radius = 0.9f; // metres that are searched first; only queries with no point there see all of them
 };
 
-// boxes around boxes around triangles, as kernels/mesh.h, SurfaceTree, has them: halves by the median of centres
-// along the longest axis, at most four triangles in a leaf, the left child behind its parent
-struct TriangleTree {
-    struct Node {
-        std::array<float, 3> low;
-        uint32_t link; // first triangle of a leaf, else the right child
-        std::array<float, 3> high;
-        uint32_t count; // triangles; 0: no leaf
-    };
-    std::vector<Node> nodes;
-    std::vector<TreeTriangle> triangles; // in the order of leaves
-};
-
-// at least one; its face is `first_face`, the next one's one more
-TriangleTree triangle_tree(const std::vector<TriangleCorners>& corners, uint32_t first_face = 0);
+// metres from each query to the nearest of the points (at least one of them), exact, in double.
+// Errors: out_of_memory, device_lost
+Result<std::vector<double>> nearest_distances(Device& device, std::span<const PointRow> queries,
+                                              std::span<const PointRow> points,
+                                              const NearestPointsOptions& options = {});
 
 struct NearestFace {
     float distance; // metres, or the radius of the search
