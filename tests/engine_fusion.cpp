@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+#include "engine/fusion/depth_frames.h"
 #include "engine/fusion/fuse.h"
-#include "engine/fusion/resampling.h"
 #include "tests/kernel_case.h"
 #include "tests/says.h"
 #include "tests/street_scene.h"

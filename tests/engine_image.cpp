@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/format/image.h"
-#include "engine/format/label_image.h"
 #include "engine/format/npy.h"
+#include "engine/format/number_image.h"
 #include "runtime/base/dtype.h"
 #include "tests/png_file.h"
 #include "tests/says.h"

@@ -6,7 +6,7 @@
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
 #include "tools/trajectory/camera_path.h"
-#include "tools/trajectory/natural_order.h"
+#include "tools/trajectory/camera_text.h"
 
 #include <cmath>
 #include <gtest/gtest.h>

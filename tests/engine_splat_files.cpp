@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // splats of .ply, .glb and .splat files: written by hand from the formats' descriptions, and by this program
 #include "engine/camera/rigid.h"
-#include "engine/format/gltf_splats.h"
 #include "engine/format/ply_reader.h"
 #include "engine/format/splat_file.h"
 

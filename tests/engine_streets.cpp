@@ -3,7 +3,6 @@
 #include "engine/conditioning/cell_objects.h"
 #include "engine/scene/palette.h"
 #include "runtime/base/hash.h"
-#include "tools/streets/camera_drive.h"
 #include "tools/streets/class_label.h"
 #include "tools/streets/street.h"
 #include "tools/streets/street_objects.h"

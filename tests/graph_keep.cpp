@@ -30,7 +30,7 @@ TEST(graph_keep, a_slot_is_one_resource_of_a_graph_however_often_it_is_asked_for
     EXPECT_FALSE(Slot().in(c.g).valid());
 }
 
-TEST(graph_keep, a_slot_says_its_shape_and_its_view_in_another)
+TEST(graph_keep, a_slot_says_its_shape)
 {
     State state;
     const Slot words = state.slot(10, 1, DType::u32, "words", 1), rows = state.slot(3, 5, DType::f16, "rows");
@@ -38,10 +38,6 @@ TEST(graph_keep, a_slot_says_its_shape_and_its_view_in_another)
     EXPECT_EQ(rows.ld(), 8u);
     EXPECT_EQ(rows.bytes(), 3u * 8 * 2);
     EXPECT_EQ(rows.name(), "rows");
-    const Slot view = words.as(2, 5, DType::f32, 5);
-    EXPECT_EQ(view.bytes(), 40u);
-    EXPECT_EQ(view.slice().offset, words.slice().offset);
-    EXPECT_DEATH((void)words.as(2, 6, DType::f32, 6), "'words' of 40 bytes seen as 48");
     EXPECT_DEATH((void)words.row_range(8, 3), "rows 8 to 11 of 'words', which has 10");
     EXPECT_DEATH((void)state.slot(0, 4, DType::f32, "none"), "slot 'none' is \\[0, 4\\]");
 }

@@ -118,18 +118,6 @@ TEST(graph_plan, runs_what_can_wait_as_late_as_it_may)
     EXPECT_LE(plan.arena_bytes(), 4 * 16 * 64 * 4u);
 }
 
-TEST(graph_plan, prints_passes_levels_bytes_and_places)
-{
-    Graph g;
-    const Tensor x = fake_external(g, 16, 64);
-    (void)silu(g, gelu(g, x));
-    EXPECT_EQ(planned(g).print(), "2 passes, 0 fused, 2 barriers, 1 submits; arena 8192 bytes (8192 without aliasing)\n"
-                                  "-- level 0\n"
-                                  "   0 gelu [2 1 1] X:r=input(ext +4096) Y:w=gelu(0@0 +4096)\n"
-                                  "-- level 1\n"
-                                  "   1 silu [2 1 1] X:r=gelu(0@0 +4096) Y:w=silu(0@4096 +4096)\n");
-}
-
 // Runs the plan over tags instead of numbers: whoever writes 16 bytes of the arena owns them, and whoever reads them
 // must find the owner that it asked for.
 void expect_owned_reads(const Plan& plan)

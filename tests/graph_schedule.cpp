@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "kernels/network.h"
 #include "kernels/sort.h"
-#include "runtime/graph/work_rates.h"
+#include "runtime/graph/measurements.h"
 #include "tests/graph_memory.h"
 
 #include <gtest/gtest.h>

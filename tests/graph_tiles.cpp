@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/graph/tile_trial.h"
+#include "runtime/graph/measurements.h"
 #include "tests/graph_memory.h"
 
 namespace semrover {

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // accumulate() against docs/method.md §6.5 in double, for every lens
-#include "engine/camera/reprojection.h"
+#include "engine/camera/lens.h"
 #include "engine/splat/rasterizer.h"
 #include "kernels/picture.h"
 #include "tests/kernel_case.h"

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/format/buffer_folder.h"
 
-#include "engine/format/label_image.h"
+#include "engine/format/number_image.h"
 #include "engine/format/transforms.h"
 #include "engine/scene/palette.h"
 #include "runtime/base/hash.h"

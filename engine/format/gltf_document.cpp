@@ -154,12 +154,6 @@ Result<GltfDocument> GltfDocument::open(const Path& path)
     return d;
 }
 
-bool GltfDocument::uses(std::string_view extension) const
-{
-    const auto used = json_.find("extensionsUsed");
-    return used != json_.end() && used->is_array() && std::ranges::find(*used, Json(extension)) != used->end();
-}
-
 const Json* GltfDocument::entry(const char* list, const Json& index) const
 {
     const auto found = json_.find(list);

@@ -26,7 +26,6 @@ class GltfDocument {
     static Result<GltfDocument> open(const Path& path);
 
     const Json& json() const { return json_; }
-    bool uses(std::string_view extension) const; // extensionsUsed
     // an entry of one of the document's lists; null when it is not there
     const Json* entry(const char* list, const Json& index) const;
 

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/format/gltf_splats.h"
+#include "engine/format/splat_file.h"
 
 #include "engine/format/gltf_document.h"
 #include "engine/scene/srgb.h"

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/format/label_table.h"
+#include "engine/format/label_map.h"
 
 #include "label_maps.h"
 #include "runtime/base/json.h"

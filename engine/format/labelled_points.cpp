@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/format/labelled_points.h"
 
+#include "engine/format/file_colors.h"
 #include "engine/format/label_map.h"
 #include "engine/format/ply.h"
-#include "engine/format/ply_colors.h"
 #include "engine/scene/scene_points.h"
 #include "runtime/base/dtype.h"
 #include "runtime/base/keyed_random.h"

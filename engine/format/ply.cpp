@@ -3,7 +3,7 @@
 #include "engine/format/ply.h"
 
 #include "engine/camera/rigid.h"
-#include "engine/format/label_table.h"
+#include "engine/format/label_map.h"
 #include "runtime/base/quote.h"
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/format/ply_header.h"
+#include "engine/format/ply_reader.h"
 
 #include "runtime/base/quote.h"
 #include "runtime/base/text_start.h"

@@ -3,8 +3,8 @@
 #include "engine/format/splat_file.h"
 
 #include "engine/camera/rigid.h"
+#include "engine/format/file_colors.h"
 #include "engine/format/label_map.h"
-#include "engine/format/ply_colors.h"
 #include "runtime/base/quote.h"
 
 #include <algorithm>

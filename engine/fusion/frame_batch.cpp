@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/fusion/frame_batch.h"
+#include "engine/fusion/tsdf_volume.h"
 
 #include <algorithm>
 #include <bit>

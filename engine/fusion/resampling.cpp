@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/fusion/resampling.h"
+#include "engine/fusion/depth_frames.h"
 
 #include "engine/scene/srgb.h"
 

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/mesh/labels.h"
 
-#include "engine/format/label_table.h"
+#include "engine/format/label_map.h"
 #include "engine/mesh/texture_atlas.h"
 #include "runtime/base/quote.h"
 

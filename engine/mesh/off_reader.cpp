@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // OFF in text, with colours of vertices (COFF) or of faces. Source: the Geomview manual, "OFF: Object File Format",
 // http://www.geomview.org/docs/html/OFF.html
-#include "engine/format/color_scale.h"
+#include "engine/format/file_colors.h"
 #include "engine/mesh/mesh_readers.h"
 #include "engine/mesh/word_lines.h"
 #include "engine/scene/srgb.h"

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // PLY meshes as MeshLab, CloudCompare, Open3D and OpenMVS write them
+#include "engine/format/file_colors.h"
 #include "engine/format/label_map.h"
-#include "engine/format/ply_colors.h"
 #include "engine/mesh/asset_folder.h"
 #include "engine/mesh/mesh_readers.h"
 #include "runtime/base/quote.h"

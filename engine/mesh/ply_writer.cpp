@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/format/label_table.h"
+#include "engine/format/label_map.h"
 #include "engine/mesh/mesh_files.h"
 #include "runtime/base/quote.h"
 

@@ -5,7 +5,7 @@
 // one that read any of them is refused. Sizes and palettes are checked in front, for the same reason.
 #include "engine/mesh/texture_image.h"
 
-#include "engine/format/label_image.h"
+#include "engine/format/number_image.h"
 #include "engine/scene/palette.h"
 #include "engine/scene/srgb.h"
 #include "runtime/base/quote.h"

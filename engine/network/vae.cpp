@@ -301,10 +301,6 @@ const VaeConfig& Vae::config() const
 {
     return impl_->config;
 }
-DType Vae::precision() const
-{
-    return impl_->decoder.weights.precision();
-}
 uint64_t Vae::parameters() const
 {
     return impl_->encoder.weights.parameters() + impl_->decoder.weights.parameters();

@@ -24,7 +24,6 @@ class Vae {
     static std::unique_ptr<Vae> plan(const VaeConfig& config, DType precision, const DeviceLimits& limits);
 
     const VaeConfig& config() const;
-    DType precision() const; // of the decoder
     uint64_t parameters() const;
     uint64_t device_bytes(const DeviceLimits& limits) const; // of the weights
 

@@ -13,7 +13,7 @@ constexpr float kDefaultVoxelSize = 0.6f; // metres
 
 // Options for reading other programs' files as a grid; each format uses those that concern it.
 struct SceneGridOptions {
-    Path map;                             // what source labels are: a table's name, or JSON (label_table.h)
+    Path map;                             // what source labels are: a table's name, or JSON (label_map.h)
     std::optional<float> voxel_size;      // metres, of the grid; none: as the file's own voxels, else 0.6
     std::array<double, 3> origin{};       // metres: where the file's origin lies in the world
     double file_voxel_size = 0;           // metres of a voxel of a file that does not say it; 0: as voxel_size

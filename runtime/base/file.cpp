@@ -203,18 +203,6 @@ AtomicFile::AtomicFile(AtomicFile&& other) noexcept
 {
 }
 
-AtomicFile& AtomicFile::operator=(AtomicFile&& other) noexcept
-{
-    if (this != &other) {
-        discard();
-        path_ = std::move(other.path_);
-        temporary_ = std::exchange(other.temporary_, {});
-        descriptor_ = std::exchange(other.descriptor_, -1);
-        unfinished_ = std::move(other.unfinished_);
-    }
-    return *this;
-}
-
 AtomicFile::~AtomicFile()
 {
     discard();

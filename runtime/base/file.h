@@ -46,7 +46,6 @@ class AtomicFile {
     static Result<AtomicFile> create(const Path& path);
 
     AtomicFile(AtomicFile&& other) noexcept;
-    AtomicFile& operator=(AtomicFile&& other) noexcept;
     ~AtomicFile();
 
     // Appends. bad_input when the disk is full or fails; the file is then discarded.

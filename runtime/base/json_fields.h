@@ -103,7 +103,6 @@ class JsonFields {
 
     const Json* find(const char* name); // null when absent or null
     void refuse(const char* name, std::string_view expected);
-    bool good() const { return !error_; }
 
     // bad_input for the first field that was wrong; else adds a warning for each field that was not read
     Status finish(std::vector<std::string>& warnings) const;

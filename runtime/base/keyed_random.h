@@ -32,8 +32,6 @@ class KeyedRandom {
     double uniform(double low, double high) { return low + (high - low) * uniform(); }
     uint32_t below(uint32_t n) { return uint32_t((uint64_t(bits()) * n) >> 32); }
     bool chance(double p) { return uniform() < p; }
-    // about normal: the sum of four uniform numbers, with mean 0 and deviation 1
-    double spread() { return (uniform() + uniform() + uniform() + uniform() - 2) * 1.7320508075688772; }
     template <typename T, std::size_t N>
     const T& pick(const T (&values)[N])
     {

@@ -5,12 +5,12 @@
 #include "runtime/base/diagnostics.h"
 #include "runtime/device/command.h"
 #include "runtime/device/cooperative_matrix.h"
+#include "runtime/device/copy_ring.h"
 #include "runtime/device/device_fault.h"
 #include "runtime/device/physical_device.h"
 #include "runtime/device/pipeline.h"
 #include "runtime/device/profile.h"
 #include "runtime/device/sharing.h"
-#include "runtime/device/staging.h"
 #include "runtime/graph/kernel.h"
 
 #include <algorithm>

@@ -5,8 +5,7 @@
 #include "runtime/device/memory.h"
 #include "runtime/device/vulkan_calls.h"
 #include "runtime/graph/limits.h"
-#include "runtime/graph/tile_choices.h"
-#include "runtime/graph/work_rates.h"
+#include "runtime/graph/measurements.h"
 
 #include <atomic>
 #include <functional>

@@ -3,8 +3,8 @@
 #pragma once
 
 #include "runtime/device/device.h"
+#include "runtime/graph/measurements.h"
 #include "runtime/graph/plan.h"
-#include "runtime/graph/tile_trial.h"
 
 #include <memory>
 #include <vector>

@@ -64,13 +64,6 @@ Slot Slot::row_range(uint32_t first, uint32_t count) const
     return {memory_, item_, shape_.row_range(first, count)};
 }
 
-Slot Slot::as(uint32_t rows, uint32_t cols, DType dtype, uint32_t ld) const
-{
-    const Tensor shape{Tensor::kNone, dtype, rows, cols, ld ? ld : round_up(cols, kRowPadding), shape_.offset};
-    SR_ASSERT(shape.bytes() <= bytes(), "'{}' of {} bytes seen as {}", name(), bytes(), shape.bytes());
-    return {memory_, item_, shape};
-}
-
 Status Slot::write_bytes(Device& device, std::span<const std::byte> bytes) const
 {
     SR_ASSERT(bytes.size() == this->bytes(), "{} bytes written to '{}', which has {}", bytes.size(), name(),

@@ -35,8 +35,6 @@ class Slot {
     BufferSlice slice() const;
 
     Slot row_range(uint32_t first, uint32_t count) const;
-    // the same bytes in another shape, from the first on; ld = 0: rows padded to kRowPadding
-    Slot as(uint32_t rows, uint32_t cols, DType dtype, uint32_t ld = 0) const;
 
     // Copies, after everything submitted so far. Elements as they lie, rows() * ld() of them:
     template <typename Range>

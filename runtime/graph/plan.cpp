@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/graph/plan.h"
 
-#include "runtime/graph/work_rates.h"
+#include "runtime/graph/measurements.h"
 
 #include <numeric>
 
@@ -95,30 +95,6 @@ bool conflict(const Plan& plan, const Pass& a, const Pass& b)
             if (((uint8_t(x.access) | uint8_t(y.access)) & uint8_t(Access::write)) && overlaps(plan, x, y))
                 return true;
     return false;
-}
-
-std::string Plan::print() const
-{
-    std::string out =
-        fmt::format("{} passes, {} fused, {} barriers, {} submits; arena {} bytes ({} without aliasing)\n",
-                    passes.size(), fused, barriers(), submits, arena_bytes(), transient_bytes());
-    uint32_t level = ~0u;
-    for (size_t i = 0; i < passes.size(); ++i) {
-        const Pass& p = passes[i];
-        if (p.level != level)
-            out += fmt::format("-- level {}\n", level = p.level);
-        out += fmt::format("{:4} {}{}{} [{} {} {}]", i, p.kernel->name, p.variant->name.empty() ? "" : ".",
-                           p.variant->name, p.group_count[0], p.group_count[1], p.group_count[2]);
-        for (const PassBinding& b : p.bindings) {
-            const Resource& r = resources[b.resource];
-            const Placement& where = placements[b.resource];
-            const char* mark = b.access == Access::read ? "r" : b.access == Access::write ? "w" : "rw";
-            const std::string place = r.external ? "ext" : fmt::format("{}@{}", where.block, where.offset + b.offset);
-            out += fmt::format(" {}:{}={}({} +{})", b.name, mark, r.name.empty() ? "_" : r.name, place, b.bytes);
-        }
-        out += "\n";
-    }
-    return out;
 }
 
 } // namespace semrover

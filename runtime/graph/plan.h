@@ -71,7 +71,6 @@ struct Plan {
     uint64_t arena_bytes() const;
     uint64_t transient_bytes() const; // what it would be without aliasing
     uint32_t barriers() const { return levels; }
-    std::string print() const;
 };
 
 class WorkRates;

@@ -4,34 +4,33 @@
 #include "tools/bench/bench.h"
 
 #include "runtime/device/profile.h"
+#include "tools/bench/call_times.h"
 #include "tools/cli/print_stderr.h"
 
 #include <algorithm>
-#include <chrono>
 #include <CLI/CLI.hpp>
 
 namespace semrover {
 
 Result<Timing> measure(const std::function<Status()>& work)
 {
-    using Clock = std::chrono::steady_clock;
-    const auto seconds_since = [](Clock::time_point t) {
-        return std::chrono::duration<double>(Clock::now() - t).count();
-    };
-    const auto warm_up = Clock::now();
-    for (int run = 0; run < 10 && (run == 0 || seconds_since(warm_up) < 1); ++run) // a GPU's first runs try tiles
+    const CallTimer warm_up;
+    for (int run = 0; run < 10 && (run == 0 || warm_up.ms() < 1000); ++run) // a GPU's first runs try tiles
         SR_CHECK(work());
-    const auto start = Clock::now();
+    const CallTimer all;
     std::vector<double> times;
-    for (double total = 0; (times.size() < 5 || total < 1) && total < 30;) {
-        const auto begin = Clock::now();
+    while ((times.size() < 5 || all.ms() < 1000) && all.ms() < 30000) {
+        const CallTimer one;
         SR_CHECK(work());
-        const auto end = Clock::now();
-        times.push_back(std::chrono::duration<double, std::milli>(end - begin).count());
-        total = seconds_since(start);
+        times.push_back(one.ms());
     }
-    std::sort(times.begin(), times.end());
-    return Timing{times[times.size() / 2], times.front(), times.size()};
+    return timing_of(std::move(times));
+}
+
+Timing timing_of(std::vector<double> times)
+{
+    std::ranges::sort(times);
+    return times.empty() ? Timing{} : Timing{times[times.size() / 2], times.front(), times.size()};
 }
 
 Json bench_report(const char* kind, const Device& device, DType precision, const Timing& timing,

@@ -18,6 +18,8 @@ struct Timing {
     size_t runs = 0;
 };
 
+Timing timing_of(std::vector<double> times); // milliseconds; none: zeros
+
 // runs `work` ten times or for a second to warm up, then until 5 runs and a second have passed, or 30 s
 Result<Timing> measure(const std::function<Status()>& work);
 
@@ -32,6 +34,17 @@ void add_network(Json& report, const Program& program, const Timing& timing, uin
                  uint64_t weight_bytes);
 // multiplications and additions of a program, as its plan counts them
 double flops_of(const Program& program);
+// a network's config.json; `config` as it is where there is no path
+template <typename Config, typename Parse>
+Status read_config(const std::string& path, Parse parse, Config& config)
+{
+    if (path.empty())
+        return {};
+    SR_TRY(const Json json, read_json(path));
+    SR_TRY(config, parse(json));
+    return {};
+}
+
 // device times where --profile asked for them: a Chrome trace, and their sums to stderr
 void add_profile(CLI::App& command, std::string& path);
 void want_profile(Device& device, const std::string& path);

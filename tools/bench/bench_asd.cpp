@@ -22,26 +22,6 @@ struct BenchAsdArguments {
     float cfg_scale = 1.5f;
 };
 
-struct Networks {
-    UnetConfig unet;
-    VaeConfig vae;
-};
-
-Result<Networks> read_networks(const BenchAsdArguments& o)
-{
-    Networks n;
-    n.unet.in_channels = renderer_channels(n.vae);
-    if (!o.unet.empty()) {
-        SR_TRY(const Json json, read_json(o.unet));
-        SR_TRY(n.unet, parse_unet_config(json));
-    }
-    if (!o.vae.empty()) {
-        SR_TRY(const Json json, read_json(o.vae));
-        SR_TRY(n.vae, parse_vae_config(json));
-    }
-    return n;
-}
-
 // a picture through one direction of the VAE, whose memory is gone afterwards
 Result<Timing> time_encoder(Device& device, const Vae& vae, const LatentSize& size)
 {
@@ -59,21 +39,26 @@ Result<Timing> time_decoder(Device& device, const Vae& vae, const LatentSize& si
 
 Status bench_asd(const BenchAsdArguments& o, const Globals& globals)
 {
-    SR_TRY(const Networks n, read_networks(o));
+    VaeConfig vae_config;
+    UnetConfig unet_config;
+    unet_config.in_channels = renderer_channels(vae_config);
+    SR_CHECK(read_config(o.unet, parse_unet_config, unet_config));
+    SR_CHECK(read_config(o.vae, parse_vae_config, vae_config));
     SR_TRY(const auto device, open_device(globals));
     const DType dtype = o.precision == "fp32" ? DType::f32 : DType::f16;
-    const LatentSize size{o.width, o.height, n.vae.downscale()};
-    SR_TRY(const auto vae, Vae::load(*device, n.vae, Checkpoint::random(1), dtype));
+    const LatentSize size{o.width, o.height, vae_config.downscale()};
+    SR_TRY(const auto vae, Vae::load(*device, vae_config, Checkpoint::random(1), dtype));
     SR_TRY(const Timing encode, time_encoder(*device, *vae, size));
     SR_TRY(const Timing decode, time_decoder(*device, *vae, size));
     device->reset_peak();
-    SR_TRY(const auto unet, Unet::load(*device, n.unet, Checkpoint::random(1), dtype));
+    SR_TRY(const auto unet, Unet::load(*device, unet_config, Checkpoint::random(1), dtype));
     SR_TRY(const SamplingPlan plan, plan_sampling(stable_diffusion_scheduler(), 1));
-    const std::vector<float> text(size_t(o.tokens) * n.unet.cross_attention_dim, 0.f);
+    const std::vector<float> text(size_t(o.tokens) * unet_config.cross_attention_dim, 0.f);
     AsdOptions options;
     options.guidance_scale = o.cfg_scale;
     SR_TRY(const auto asd, AsdRenderer::create(*device, *unet, plan, {o.tokens, text}, size, options));
-    const std::vector<float> latent(size_t(size.pixels()) * n.unet.out_channels, 0.25f), visible(size.pixels(), 1.f);
+    const std::vector<float> latent(size_t(size.pixels()) * unet_config.out_channels, 0.25f),
+        visible(size.pixels(), 1.f);
     const DenoiserWindow frame{1, 0, latent, visible, latent};
     SR_TRY(const Timing step, measure([&] { return asd->render(frame).map([](const auto&) {}); }));
     SR_TRY(const PartBytes planned,

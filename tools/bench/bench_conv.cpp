@@ -20,8 +20,7 @@ struct BenchConvArguments {
 
 Status bench_conv(const BenchConvArguments& o, const Globals& globals)
 {
-    SR_TRY(const auto device, open_device(globals));
-    want_profile(*device, o.profile);
+    SR_TRY(const auto device, open_device(globals, o.profile));
     const DType dtype = o.precision == "fp32" ? DType::f32 : DType::f16;
     BenchInputs inputs(*device);
     FeatureMap map{{}, 1, o.height, o.width};

@@ -19,8 +19,7 @@ struct BenchGemmArguments {
 
 Status bench_gemm(const BenchGemmArguments& o, const Globals& globals)
 {
-    SR_TRY(const auto device, open_device(globals));
-    want_profile(*device, o.profile);
+    SR_TRY(const auto device, open_device(globals, o.profile));
     const DType dtype = o.precision == "fp32" ? DType::f32 : DType::f16;
     BenchInputs inputs(*device);
     SR_TRY(const auto program, gemm_program(*device, inputs, o.shape, dtype));

@@ -3,9 +3,9 @@
 // semrover bench regions: Algorithm 1 over a street-like cloud, one core, no device
 #include "engine/voxfield/region_graph.h"
 #include "tools/bench/bench.h"
+#include "tools/bench/call_times.h"
 #include "tools/cli/value_options.h"
 
-#include <chrono>
 #include <CLI/CLI.hpp>
 #include <cmath>
 
@@ -40,20 +40,19 @@ Status bench_regions(const BenchRegionsArguments& o, const Globals& globals)
     RegionOptions options;
     options.region_size = o.region_size;
     options.coverage_threshold = std::min(o.coverage_threshold, o.region_size);
-    const auto begin = std::chrono::steady_clock::now();
+    const CallTimer all;
     SR_TRY(const Regions regions, extract_regions(cells, options));
-    const auto middle = std::chrono::steady_clock::now();
+    const double extract = all.ms() / 1000;
     const RegionGraph graph(regions, cells.size());
-    const auto end = std::chrono::steady_clock::now();
-    const auto seconds = [](auto a, auto b) { return std::chrono::duration<double>(b - a).count(); };
+    const double seconds = all.ms() / 1000;
     print_report({{"kind", "regions"},
                   {"cells", cells.size()},
                   {"regions", regions.size()},
                   {"uncovered", regions.uncovered.size()},
-                  {"seconds", seconds(begin, end)},
-                  {"seconds_extract", seconds(begin, middle)},
-                  {"seconds_graph", seconds(middle, end)},
-                  {"cells_per_second", double(cells.size()) / seconds(begin, end)}},
+                  {"seconds", seconds},
+                  {"seconds_extract", extract},
+                  {"seconds_graph", seconds - extract},
+                  {"cells_per_second", double(cells.size()) / seconds}},
                  globals);
     return {};
 }

@@ -26,8 +26,7 @@ struct SplatBenchOptions {
 
 Status bench_sort(const SortOptions& o, const Globals& globals)
 {
-    SR_TRY(const auto device, open_device(globals));
-    want_profile(*device, o.profile);
+    SR_TRY(const auto device, open_device(globals, o.profile));
     BenchInputs inputs(*device);
     const Slot keys = inputs.add(o.pairs, 1, DType::u32), values = inputs.add(o.pairs, 1, DType::u32);
     const uint64_t predicted = inputs.bytes();
@@ -89,8 +88,7 @@ Intrinsics bench_camera(CameraModel model, uint32_t width, uint32_t height)
 
 Status bench_splat(const SplatBenchOptions& o, const Globals& globals)
 {
-    SR_TRY(const auto device, open_device(globals));
-    want_profile(*device, o.profile);
+    SR_TRY(const auto device, open_device(globals, o.profile));
     SR_TRY(const SplatScene scene, SplatScene::create(*device, street_splats(o.splats, o.sigma)));
     const CameraModel model = camera_model_of(o.model).value_or(CameraModel::pinhole);
     SR_TRY(const auto rasterizer, Rasterizer::create(*device, scene, o.width, o.height, 1, {.model = model}));

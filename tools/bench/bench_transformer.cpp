@@ -37,12 +37,8 @@ std::vector<RegionInput> make_regions(const BenchTransformerArguments& o, uint32
 Status bench_transformer(const BenchTransformerArguments& o, const Globals& globals)
 {
     TransformerConfig config;
-    if (!o.config.empty()) {
-        SR_TRY(const Json json, read_json(o.config));
-        SR_TRY(config, parse_transformer_config(json));
-    }
-    SR_TRY(const auto device, open_device(globals));
-    want_profile(*device, o.profile);
+    SR_CHECK(read_config(o.config, parse_transformer_config, config));
+    SR_TRY(const auto device, open_device(globals, o.profile));
     const DType dtype = o.precision == "fp32" ? DType::f32 : DType::f16;
     SR_TRY(const auto transformer, Transformer::random(*device, config, dtype));
     SchedulerConfig scheduler;

@@ -17,21 +17,11 @@ struct BenchUnetArguments {
     uint32_t width = 77, height = 53, batch = 1, tokens = 77;
 };
 
-// Stable Diffusion 1.5's, with the channels of the deferred renderer
-UnetConfig default_config()
-{
-    UnetConfig c;
-    c.in_channels = 13;
-    return c;
-}
-
 Status bench_unet(const BenchUnetArguments& o, const Globals& globals)
 {
-    UnetConfig config = default_config();
-    if (!o.config.empty()) {
-        SR_TRY(const Json json, read_json(o.config));
-        SR_TRY(config, parse_unet_config(json));
-    }
+    UnetConfig config; // Stable Diffusion 1.5's, with the channels of the deferred renderer
+    config.in_channels = 13;
+    SR_CHECK(read_config(o.config, parse_unet_config, config));
     SR_TRY(const auto device, open_device(globals));
     const DType dtype = o.precision == "fp32" ? DType::f32 : DType::f16;
     SR_TRY(const auto unet, Unet::load(*device, config, Checkpoint::random(1), dtype));

@@ -21,10 +21,7 @@ struct BenchVaeArguments {
 Status bench_vae(const BenchVaeArguments& o, const Globals& globals)
 {
     VaeConfig config; // Stable Diffusion 1.5's
-    if (!o.config.empty()) {
-        SR_TRY(const Json json, read_json(o.config));
-        SR_TRY(config, parse_vae_config(json));
-    }
+    SR_CHECK(read_config(o.config, parse_vae_config, config));
     SR_TRY(const auto device, open_device(globals));
     const DType dtype = o.precision == "fp32" ? DType::f32 : DType::f16;
     SR_TRY(const auto vae, Vae::load(*device, config, Checkpoint::random(1), dtype));

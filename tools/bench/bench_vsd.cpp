@@ -7,10 +7,10 @@
 #include "engine/model/renderer_model.h"
 #include "runtime/base/json.h"
 #include "tools/bench/bench.h"
+#include "tools/bench/call_times.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/value_options.h"
 
-#include <chrono>
 #include <CLI/CLI.hpp>
 
 namespace semrover {
@@ -50,14 +50,13 @@ Result<Timing> measure_runs(uint32_t runs, const std::function<Status()>& work)
 {
     std::vector<double> times;
     for (uint32_t i = 0; i < runs; ++i) {
-        const auto begin = std::chrono::steady_clock::now();
+        const CallTimer one;
         SR_CHECK(work());
-        times.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
+        times.push_back(one.ms());
     }
     if (times.size() > 1)
         times.erase(times.begin());
-    std::ranges::sort(times);
-    return times.empty() ? Timing{} : Timing{times[times.size() / 2], times.front(), times.size()};
+    return timing_of(std::move(times));
 }
 
 Result<Timing> time_encoder(FrameEncoder& encoder, const Vae& vae, const LatentSize& size, uint32_t runs)

@@ -2,15 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // semrover bench world: a flight down a street without end that grows ahead of the camera, a budget at a time
 #include "engine/world/world.h"
+#include "runtime/base/host_memory.h"
 #include "tools/bench/bench.h"
 #include "tools/bench/call_times.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/value_options.h"
 
 #include <CLI/CLI.hpp>
-#include <fstream>
 #include <thread>
-#include <unistd.h>
 
 namespace semrover {
 
@@ -48,20 +47,12 @@ struct Flight {
     Json memory = Json::array();
 };
 
-// of this process, in memory; 0 where the system does not say
-uint64_t resident_bytes()
-{
-    uint64_t pages = 0, resident = 0;
-    std::ifstream("/proc/self/statm") >> pages >> resident;
-    return resident * uint64_t(sysconf(_SC_PAGESIZE));
-}
-
 Json memory_at(double metres, const World& world, const Device& device)
 {
     const WorldFigures f = world.figures();
     return {{"metres", metres},
             {"device_bytes", device.allocated_bytes()},
-            {"process_bytes", resident_bytes()},
+            {"process_bytes", host_memory().resident},
             {"tile_bytes", f.host_bytes},
             {"tiles_in_memory", f.in_memory},
             {"tiles_generated", f.generated},

@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <initializer_list>
 #include <string>
 
 namespace CLI {
@@ -61,5 +62,24 @@ void add_streets(CLI::App& app, const Globals& globals, Run& run);
 void add_verify(CLI::App& app, const Globals& globals, Run& run);
 void add_view(CLI::App& app, const Globals& globals, Run& run);
 void add_voxelize(CLI::App& app, const Globals& globals, Run& run);
+
+using AddCommand = void (*)(CLI::App& app, const Globals& globals, Run& run);
+
+// One of this program's commands, or one that another of our programs runs: `semrover` finds that program beside
+// itself, as git does, so that who builds only `semrover` compiles only what it runs.
+struct Command {
+    Command(AddCommand add) : add(add) {}
+    // advice: how to get that program where it is not there; nullptr: the target `programs` builds it
+    Command(const char* name, const char* program, const char* help, const char* advice = nullptr)
+        : name(name), program(program), help(help), advice(advice)
+    {
+    }
+
+    AddCommand add = nullptr;
+    const char *name = nullptr, *program = nullptr, *help = nullptr, *advice = nullptr;
+};
+
+// Reads the command line, runs the command that it names, and prints an error as one line. Returns the exit code.
+int run_program(int argc, char** argv, std::initializer_list<Command> commands);
 
 } // namespace semrover

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/cli/program.h"
+#include "tools/cli/commands.h"
 
 #include "engine/job/version.h"
 #include "runtime/base/diagnostics.h"

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover: what a newcomer runs; the rest is in programs beside it
-#include "tools/cli/program.h"
+#include "tools/cli/commands.h"
 
 int main(int argc, char** argv)
 {

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/dataset/depth_image.h"
 
-#include "engine/format/npy_image.h"
+#include "engine/format/number_image.h"
 #include "runtime/base/quote.h"
 
 #include <cmath>

@@ -169,7 +169,6 @@ Result<NpyHeader> NpzFile::Archive::read_header(zip_file_t* entry, const std::st
 
 NpzFile::NpzFile(std::unique_ptr<Archive> archive) : archive_(std::move(archive)) {}
 NpzFile::NpzFile(NpzFile&&) noexcept = default;
-NpzFile& NpzFile::operator=(NpzFile&&) noexcept = default;
 NpzFile::~NpzFile() = default;
 
 Result<NpzFile> NpzFile::open(const Path& path)

@@ -21,7 +21,6 @@ class NpzFile {
   public:
     static Result<NpzFile> open(const Path& path);
     NpzFile(NpzFile&&) noexcept;
-    NpzFile& operator=(NpzFile&&) noexcept;
     ~NpzFile();
 
     bool has(std::string_view array) const;

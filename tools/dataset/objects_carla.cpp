@@ -6,7 +6,7 @@
 #include "runtime/base/json_fields.h"
 #include "runtime/base/quote.h"
 #include "tools/dataset/object_boxes.h"
-#include "tools/trajectory/json_boxes.h"
+#include "tools/trajectory/json_tables.h"
 
 #include <charconv>
 #include <cmath>

@@ -4,8 +4,7 @@
 #include "runtime/base/json_numbers.h"
 #include "runtime/base/quote.h"
 #include "tools/dataset/object_boxes.h"
-#include "tools/trajectory/json_boxes.h"
-#include "tools/trajectory/nuscenes_table.h"
+#include "tools/trajectory/json_tables.h"
 
 #include <algorithm>
 #include <set>

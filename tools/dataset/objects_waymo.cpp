@@ -5,7 +5,7 @@
 #include "runtime/base/quote.h"
 #include "tools/dataset/object_boxes.h"
 #include "tools/trajectory/camera_text.h"
-#include "tools/trajectory/json_boxes.h"
+#include "tools/trajectory/json_tables.h"
 
 #include <charconv>
 #include <cmath>

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/format/label_image.h"
 #include "engine/format/label_map.h"
+#include "engine/format/number_image.h"
 
 namespace semrover {
 

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/dataset/scene_file.h"
 
-#include "engine/format/gltf_splats.h"
 #include "engine/format/labelled_points.h"
-#include "engine/format/ply_header.h"
+#include "engine/format/ply_reader.h"
+#include "engine/format/splat_file.h"
 #include "runtime/base/quote.h"
 #include "tools/dataset/scene_readers.h"
 

@@ -56,15 +56,6 @@ void FoldedWeights::allow(const std::string& name)
     schema_.push_back(std::move(spec));
 }
 
-uint64_t FoldedWeights::parameters() const
-{
-    uint64_t sum = 0;
-    for (const TensorSpec& spec : schema_)
-        sum +=
-            spec.optional ? 0 : std::accumulate(spec.shape.begin(), spec.shape.end(), uint64_t(1), std::multiplies{});
-    return sum;
-}
-
 Status FoldedWeights::load(Device& device, std::string_view prefix)
 {
     const auto there = [&](const TensorSpec& spec) { return !spec.optional && file_.find(spec.name); };

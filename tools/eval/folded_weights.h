@@ -28,8 +28,6 @@ class FoldedWeights {
     // a tensor that is not used and may be there
     void allow(const std::string& name);
 
-    uint64_t device_bytes(const DeviceLimits& limits) const { return state_.planned_bytes(limits); }
-    uint64_t parameters() const;
     // Errors, bad_input: missing, misshapen and unexpected tensors (of those with `prefix`) in one line; NaN or
     // infinity; a variance below zero
     Status load(Device& device, std::string_view prefix = {});

@@ -267,11 +267,6 @@ uint32_t Inception::features() const
     return std::accumulate(impl_->channels.begin(), impl_->channels.end(), 0u);
 }
 
-uint64_t Inception::parameters() const
-{
-    return impl_->weights.parameters();
-}
-
 FeatureMap Inception::forward(Graph& g, FeatureMap x) const
 {
     for (const Block& block : impl_->blocks) {

@@ -30,8 +30,7 @@ class Inception {
     static Result<std::unique_ptr<Inception>> load(Device& device, const Path& path);
     ~Inception();
 
-    uint32_t features() const;   // D, 2048 in the usual network
-    uint64_t parameters() const; // without the classifier
+    uint32_t features() const; // D, 2048 in the usual network
     // images: 3 channels, -1..1, fp32, 75 pixels a side or more -> 1 x 1 pixels of all branches of the last block, each
     // padded to kRowPadding
     [[nodiscard]] FeatureMap forward(Graph& g, FeatureMap images) const;

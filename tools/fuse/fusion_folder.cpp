@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/fuse/fusion_folder.h"
 
-#include "engine/format/npy_image.h"
-#include "engine/fusion/resampling.h"
+#include "engine/format/number_image.h"
+#include "engine/fusion/depth_frames.h"
 #include "engine/mesh/mesh.h"
 #include "runtime/base/json_numbers.h"
 #include "runtime/base/quote.h"

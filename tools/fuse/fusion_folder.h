@@ -23,7 +23,7 @@ struct FusionFolderOptions {
 //   transforms.json, or another camera path
 //   intrinsics.json {"fx", "fy", "cx", "cy", "width", "height"}, where the path has none and no option gives them
 //   [CAMERA/]depth/NNNNNN.png  or .npy: depth_image.h
-//   [CAMERA/]label/NNNNNN.png  or .npy: label_image.h; a folder without label/ has none at all
+//   [CAMERA/]label/NNNNNN.png  or .npy: number_image.h; a folder without label/ has none at all
 //   [CAMERA/]color/NNNNNN.png  or .jpg, likewise
 // numbered by the frames of each camera. A frame of transforms.json may name its picture (file_path, relative to the
 // folder): depth and label then have its name in depth/ and label/ beside the picture's folder, unless depth_file_path

@@ -28,6 +28,19 @@ void check_sr(sr_status status, const sr_context* context)
     exit((int)status);
 }
 
+void write_ppm(const char* path, uint32_t width, uint32_t height, const unsigned char* rgba, int swapped)
+{
+    FILE* file = fopen(path, "wb");
+    size_t i;
+    int c;
+    check(file != NULL, path);
+    fprintf(file, "P6 %u %u 255\n", (unsigned)width, (unsigned)height);
+    for (i = 0; i < (size_t)width * height; ++i)
+        for (c = 0; c < 3; ++c)
+            fputc(rgba[4 * i + (swapped ? 2 - c : c)], file);
+    check(fclose(file) == 0, path);
+}
+
 /* a queue family that does all that a frame needs; 0 where there is none */
 static int find_family(struct gpu* gpu)
 {
@@ -216,6 +229,18 @@ void gpu_submit(struct gpu* gpu, VkCommandBuffer commands, VkSemaphore timeline,
     pthread_mutex_lock(&gpu->queue_mutex);
     check(vkQueueSubmit(gpu->queue, 1, &info, VK_NULL_HANDLE) == VK_SUCCESS, "vkQueueSubmit");
     pthread_mutex_unlock(&gpu->queue_mutex);
+}
+
+void gpu_commands(const struct gpu* gpu, uint32_t count, VkCommandPool* pool, VkCommandBuffer* commands)
+{
+    const VkCommandPoolCreateInfo info = {.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO,
+                                          .flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT,
+                                          .queueFamilyIndex = gpu->family};
+    VkCommandBufferAllocateInfo wanted = {.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO,
+                                          .commandBufferCount = count};
+    check(vkCreateCommandPool(gpu->device, &info, NULL, pool) == VK_SUCCESS, "vkCreateCommandPool");
+    wanted.commandPool = *pool;
+    check(vkAllocateCommandBuffers(gpu->device, &wanted, commands) == VK_SUCCESS, "vkAllocateCommandBuffers");
 }
 
 static VkDeviceMemory allocate(const struct gpu* gpu, const VkMemoryRequirements* needs, VkMemoryPropertyFlags wanted)

@@ -39,6 +39,9 @@ struct image {
 void check(int fine, const char* what);                     /* else the program ends */
 void check_sr(sr_status status, const sr_context* context); /* likewise, with the line of the library */
 
+/* width x height pixels of four bytes, the top row first; swapped: blue comes first */
+void write_ppm(const char* path, uint32_t width, uint32_t height, const unsigned char* rgba, int swapped);
+
 /* extensions: of the instance. make_surface: gives gpu->surface, which the device must be able to present to, once
  * there is an instance; NULL: no window */
 void gpu_create(struct gpu* gpu, const char* const* extensions, uint32_t count,
@@ -51,6 +54,9 @@ void gpu_wait(const struct gpu* gpu, VkSemaphore timeline, uint64_t value);
 /* frame `number` of a timeline; acquired and drawn (either may be NULL): semaphores of a swapchain's */
 void gpu_submit(struct gpu* gpu, VkCommandBuffer commands, VkSemaphore timeline, uint64_t number, VkSemaphore acquired,
                 VkSemaphore drawn);
+
+/* a pool, and command buffers that can be recorded again */
+void gpu_commands(const struct gpu* gpu, uint32_t count, VkCommandPool* pool, VkCommandBuffer* commands);
 
 struct buffer gpu_buffer(const struct gpu* gpu, VkDeviceSize bytes, VkBufferUsageFlags usage, int mapped);
 struct image gpu_image(const struct gpu* gpu, uint32_t width, uint32_t height, VkFormat format, VkImageUsageFlags usage,

@@ -23,8 +23,6 @@ struct frame {
     struct buffer pixels; /* of the picture, where the host sees them */
 };
 
-enum { FRAMES_ON_THEIR_WAY = 2 };
-
 struct host {
     struct gpu gpu;
     struct scene scene;
@@ -36,14 +34,7 @@ struct host {
 
 static void make_frame(struct frame* frame, const struct gpu* gpu, uint32_t width, uint32_t height)
 {
-    const VkCommandPoolCreateInfo pool = {.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO,
-                                          .flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT,
-                                          .queueFamilyIndex = gpu->family};
-    VkCommandBufferAllocateInfo commands = {.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO,
-                                            .commandBufferCount = 1};
-    check(vkCreateCommandPool(gpu->device, &pool, NULL, &frame->pool) == VK_SUCCESS, "vkCreateCommandPool");
-    commands.commandPool = frame->pool;
-    check(vkAllocateCommandBuffers(gpu->device, &commands, &frame->commands) == VK_SUCCESS, "vkAllocateCommandBuffers");
+    gpu_commands(gpu, 1, &frame->pool, &frame->commands);
     frame->picture =
         gpu_image(gpu, width, height, VK_FORMAT_R8G8B8A8_UNORM,
                   VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT | VK_IMAGE_USAGE_TRANSFER_SRC_BIT, VK_IMAGE_ASPECT_COLOR_BIT);
@@ -62,22 +53,10 @@ static void submit_frame(const struct frame* frame, struct host* host, const sr_
 {
     const struct scene* scene = &host->scene;
     const VkCommandBufferBeginInfo begin = {.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO};
-    const VkBufferImageCopy region = {.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1},
-                                      .imageExtent = {scene->width, scene->height, 1}};
-    const VkBufferMemoryBarrier seen = {.sType = VK_STRUCTURE_TYPE_BUFFER_MEMORY_BARRIER,
-                                        .srcAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT,
-                                        .dstAccessMask = VK_ACCESS_HOST_READ_BIT,
-                                        .srcQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED,
-                                        .dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED,
-                                        .buffer = frame->pixels.buffer,
-                                        .size = VK_WHOLE_SIZE};
     const sr_semaphore done = {host->timeline, host->number};
     check(vkBeginCommandBuffer(frame->commands, &begin) == VK_SUCCESS, "vkBeginCommandBuffer");
     scene_record(scene, host->world, draw, &done, (uint32_t)(frame - host->frames), frame->commands);
-    vkCmdCopyImageToBuffer(frame->commands, frame->picture.image, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL,
-                           frame->pixels.buffer, 1, &region);
-    vkCmdPipelineBarrier(frame->commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_PIPELINE_STAGE_HOST_BIT, 0, 0, NULL, 1,
-                         &seen, 0, NULL);
+    scene_copy(scene, frame->picture.image, &frame->pixels, frame->commands);
     check(vkEndCommandBuffer(frame->commands) == VK_SUCCESS, "vkEndCommandBuffer");
     gpu_submit(&host->gpu, frame->commands, host->timeline, host->number, VK_NULL_HANDLE, VK_NULL_HANDLE);
 }
@@ -127,20 +106,6 @@ static double fly(struct host* host, double seconds)
     }
     calls_print(scene_calls, CALLS);
     return x;
-}
-
-static void write_ppm(const char* folder, uint32_t number, uint32_t width, uint32_t height, const unsigned char* rgba)
-{
-    char path[1024];
-    FILE* file;
-    size_t i;
-    snprintf(path, sizeof path, "%s/%06u.ppm", folder, (unsigned)number);
-    file = fopen(path, "wb");
-    check(file != NULL, path);
-    fprintf(file, "P6 %u %u 255\n", (unsigned)width, (unsigned)height);
-    for (i = 0; i < (size_t)width * height; ++i)
-        fwrite(rgba + 4 * i, 1, 3, file);
-    check(fclose(file) == 0, path);
 }
 
 /* a picture of all that is wanted around the camera, whole */
@@ -211,7 +176,9 @@ int main(int argc, char** argv)
         x = fly(&host, atof(argv[6]));
     for (n = 0; n < frames; ++n) {
         const struct frame* frame = run_whole_frame(&host, &worker, x + 0.5 * n);
-        write_ppm(argv[2], n, width, height, frame->pixels.mapped);
+        char path[1024];
+        snprintf(path, sizeof path, "%s/%06u.ppm", argv[2], (unsigned)n);
+        write_ppm(path, width, height, frame->pixels.mapped, 0);
     }
     printf("%u frames of %u x %u\n", (unsigned)frames, (unsigned)width, (unsigned)height);
     if (host.world)

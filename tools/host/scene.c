@@ -357,3 +357,15 @@ void scene_record(const struct scene* s, sr_world* world, const sr_draw_desc* dr
     draw_cubes(s, push, commands);
     vkCmdEndRenderPass(commands);
 }
+
+void scene_copy(const struct scene* s, VkImage picture, const struct buffer* pixels, VkCommandBuffer commands)
+{
+    const VkBufferImageCopy region = {.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1},
+                                      .imageExtent = {s->width, s->height, 1}};
+    const VkMemoryBarrier seen = {.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER,
+                                  .srcAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT,
+                                  .dstAccessMask = VK_ACCESS_HOST_READ_BIT};
+    vkCmdCopyImageToBuffer(commands, picture, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, pixels->buffer, 1, &region);
+    vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_PIPELINE_STAGE_HOST_BIT, 0, 1, &seen, 0, NULL, 0,
+                         NULL);
+}

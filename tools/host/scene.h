@@ -8,7 +8,7 @@
 
 #include "flight.h"
 
-enum { MOST_PICTURES = 8 };
+enum { MOST_PICTURES = 8, FRAMES_ON_THEIR_WAY = 2 };
 
 struct scene {
     const struct gpu* gpu;
@@ -40,5 +40,8 @@ extern struct calls scene_calls[CALLS];
 /* Records a whole frame into a command buffer that has begun; done: of the frame. world: NULL: only the cubes */
 void scene_record(const struct scene* scene, sr_world* world, const sr_draw_desc* draw, const sr_semaphore* done,
                   uint32_t picture, VkCommandBuffer commands);
+
+/* A copy of a picture that lies in TRANSFER_SRC_OPTIMAL, for the host to see when the commands are done */
+void scene_copy(const struct scene* scene, VkImage picture, const struct buffer* pixels, VkCommandBuffer commands);
 
 #endif

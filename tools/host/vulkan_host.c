@@ -19,8 +19,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { FRAMES_ON_THEIR_WAY = 2 };
-
 struct window {
     GLFWwindow* glfw;
     struct gpu gpu;
@@ -130,20 +128,13 @@ static void open_window(struct window* w)
 {
     const char* const* extensions;
     uint32_t count = 0, i;
-    VkCommandPoolCreateInfo pool = {.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO,
-                                    .flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT};
-    VkCommandBufferAllocateInfo commands = {.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO,
-                                            .commandBufferCount = FRAMES_ON_THEIR_WAY};
     check(glfwInit(), "glfwInit");
     glfwWindowHint(GLFW_CLIENT_API, GLFW_NO_API);
     w->glfw = glfwCreateWindow(480, 300, "semrover", NULL, NULL);
     check(w->glfw != NULL, "opening a window");
     extensions = glfwGetRequiredInstanceExtensions(&count);
     gpu_create(&w->gpu, extensions, count, make_surface, w);
-    pool.queueFamilyIndex = w->gpu.family;
-    check(vkCreateCommandPool(w->gpu.device, &pool, NULL, &w->pool) == VK_SUCCESS, "vkCreateCommandPool");
-    commands.commandPool = w->pool;
-    check(vkAllocateCommandBuffers(w->gpu.device, &commands, w->commands) == VK_SUCCESS, "vkAllocateCommandBuffers");
+    gpu_commands(&w->gpu, FRAMES_ON_THEIR_WAY, &w->pool, w->commands);
     w->timeline = gpu_timeline(&w->gpu);
     for (i = 0; i < FRAMES_ON_THEIR_WAY; ++i)
         w->acquired[i] = make_semaphore(&w->gpu);
@@ -182,16 +173,9 @@ static void turn(VkCommandBuffer commands, VkImage image, VkImageLayout from, Vk
 static void copy_picture(const struct window* w, uint32_t picture, VkCommandBuffer commands)
 {
     const VkImage image = w->images[picture];
-    const VkBufferImageCopy region = {.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1},
-                                      .imageExtent = {w->scene.width, w->scene.height, 1}};
-    const VkMemoryBarrier seen = {.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER,
-                                  .srcAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT,
-                                  .dstAccessMask = VK_ACCESS_HOST_READ_BIT};
     turn(commands, image, VK_IMAGE_LAYOUT_PRESENT_SRC_KHR, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL);
-    vkCmdCopyImageToBuffer(commands, image, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, w->pixels.buffer, 1, &region);
+    scene_copy(&w->scene, image, &w->pixels, commands);
     turn(commands, image, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, VK_IMAGE_LAYOUT_PRESENT_SRC_KHR);
-    vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_PIPELINE_STAGE_HOST_BIT, 0, 1, &seen, 0, NULL, 0,
-                         NULL);
 }
 
 /* Draws and shows one frame, when the one before the last is finished. 0: the window has another size now */
@@ -263,21 +247,6 @@ static void steer(struct window* w, sr_world* world, struct drive* d, double sec
         glfwSetWindowShouldClose(w->glfw, GLFW_TRUE);
 }
 
-static void write_ppm(const char* path, const struct window* w)
-{
-    const unsigned char* pixels = w->pixels.mapped;
-    const int swapped = pick_format(&w->gpu).format == VK_FORMAT_B8G8R8A8_UNORM;
-    FILE* file = fopen(path, "wb");
-    size_t i;
-    int c;
-    check(file != NULL, path);
-    fprintf(file, "P6 %u %u 255\n", (unsigned)w->scene.width, (unsigned)w->scene.height);
-    for (i = 0; i < (size_t)w->scene.width * w->scene.height; ++i)
-        for (c = 0; c < 3; ++c)
-            fputc(pixels[4 * i + (swapped ? 2 - c : c)], file);
-    check(fclose(file) == 0, path);
-}
-
 /* one frame: where the camera is, and the picture; the worker generates meanwhile */
 static void run_frame(struct window* w, sr_world* world, struct drive* d, int copied)
 {
@@ -333,7 +302,8 @@ int main(int argc, char** argv)
     }
     fly(&w, world, &d, argc > 3 ? atoi(argv[2]) : -1);
     if (argc == 4)
-        write_ppm(argv[3], &w);
+        write_ppm(argv[3], w.scene.width, w.scene.height, w.pixels.mapped,
+                  pick_format(&w.gpu).format == VK_FORMAT_B8G8R8A8_UNORM);
     if (world) {
         worker_end(&worker);
         print_world(world, &w.gpu);

@@ -11,7 +11,6 @@
 #include "tools/cli/progress.h"
 #include "tools/cli/value_options.h"
 #include "tools/scenes/placement_option.h"
-#include "tools/streets/camera_drive.h"
 #include "tools/streets/street.h"
 #include "tools/streets/street_grid.h"
 #include "tools/trace/tracer.h"

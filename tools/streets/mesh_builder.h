@@ -69,7 +69,6 @@ class MeshBuilder {
     std::vector<SceneObject>& objects() { return objects_; }
 
     size_t faces() const { return mesh_.faces.size(); }
-    const Mesh& mesh() const { return mesh_; }
     // smoothness of materials, 0..1 (what they mirror of the sky at right angles), by number
     const std::vector<float>& gloss() const { return gloss_; }
     Mesh take() &&;

@@ -138,13 +138,6 @@ void PatternCanvas::sign_text(std::string_view text, double u0, double v0, doubl
     }
 }
 
-void PatternCanvas::grain(double strength, uint32_t seed)
-{
-    each([&](double u, double v, const Rgb& was) {
-        return was * (1 + strength * (hash_unit(int(u * side_), int(v * side_), seed) - 0.5));
-    });
-}
-
 ImageRgb8 PatternCanvas::image() const
 {
     ImageRgb8 out{side_, side_, {}};

@@ -57,7 +57,6 @@ class PatternCanvas {
     void letters(double u0, double v0, double u1, double v1, int count, uint32_t seed, const Rgb& color);
     // digits and capital letters that signs need, as strokes within a rectangle
     void sign_text(std::string_view text, double u0, double v0, double u1, double v1, const Rgb& color);
-    void grain(double strength, uint32_t seed); // brightness of single pixels
     ImageRgb8 image() const;
 
   private:

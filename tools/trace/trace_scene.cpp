@@ -251,7 +251,6 @@ Result<DeviceTraceScene> DeviceTraceScene::create(Device& device, const TraceTab
     SR_CHECK(declare(s.corners_, t.corners, DType::u32, "corners"));
     SR_CHECK(declare(s.materials_, t.materials, DType::u32, "materials"));
     SR_CHECK(declare(s.texels_, t.texels, DType::u32, "texels"));
-    s.triangle_count_ = t.triangles.size();
     SR_CHECK(s.memory_.allocate(device, "traced scene"));
     const auto write = [&](const Slot& slot, const auto& rows) {
         return rows.empty() ? Status{} : slot.write(device, rows);

@@ -33,12 +33,10 @@ class DeviceTraceScene {
     static Result<DeviceTraceScene> create(Device& device, const TraceTables& tables);
 
     TraceScene in(Graph& g) const;
-    size_t triangles() const { return triangle_count_; }
 
   private:
     State memory_;
     Slot nodes_, triangles_, corners_, materials_, texels_; // of one row at least
-    size_t triangle_count_ = 0;
 };
 
 } // namespace semrover

@@ -4,7 +4,6 @@
 #include "tools/trajectory/camera_path.h"
 #include "tools/trajectory/camera_text.h"
 #include "tools/trajectory/colmap_models.h"
-#include "tools/trajectory/natural_order.h"
 
 #include <algorithm>
 #include <cmath>

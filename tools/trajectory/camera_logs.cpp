@@ -3,8 +3,7 @@
 // poses in the JSON of data sets of drives: PandaSet's poses.json, nuScenes' ego_pose.json
 #include "runtime/base/quote.h"
 #include "tools/trajectory/camera_path.h"
-#include "tools/trajectory/json_boxes.h"
-#include "tools/trajectory/nuscenes_table.h"
+#include "tools/trajectory/json_tables.h"
 
 #include <algorithm>
 #include <set>

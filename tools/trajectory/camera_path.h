@@ -62,7 +62,7 @@ Status write_camera_path_json(const Path& path, const CameraPath& cameras);
 
 // a folder of COLMAP's model: cameras.bin and images.bin or, where they are not, cameras.txt and images.txt (at most
 // 256 MiB); w first, world to camera. Lenses: colmap_models.h. Other files are not looked at. Frames come in the order
-// of their pictures' names (natural_order.h), moment by moment where the pictures lie in folders of several cameras;
+// of their pictures' names (natural_less), moment by moment where the pictures lie in folders of several cameras;
 // the n-th of a camera has the time n. Source: https://colmap.github.io/format.html
 Result<CameraPath> read_colmap(const Path& folder);
 // The text model; bad_input where a binary model is in the folder. Pictures of one camera are named as `render` names

@@ -5,7 +5,6 @@
 #include "runtime/base/quote.h"
 #include "tools/trajectory/camera_path.h"
 #include "tools/trajectory/camera_text.h"
-#include "tools/trajectory/natural_order.h"
 
 #include <algorithm>
 #include <cmath>

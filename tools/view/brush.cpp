@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/view/brush.h"
+#include "tools/view/street.h"
 
 #include <cmath>
 #include <limits>

@@ -26,7 +26,6 @@ class Stopwatch {
 class Times {
   public:
     void add(double ms) { last_[count_++ % last_.size()] = float(ms); }
-    double last() const { return count_ ? last_[(count_ - 1) % last_.size()] : 0; }
     double mean() const
     {
         double sum = 0;

@@ -1,6 +1,5 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/view/input.h"
 
 #include "tools/view/viewer.h"
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover-view: what looks at a world through a window
-#include "tools/cli/program.h"
+#include "tools/cli/commands.h"
 
 int main(int argc, char** argv)
 {

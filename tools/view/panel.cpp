@@ -1,6 +1,5 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/view/panel.h"
 
 #include "runtime/base/bytes_text.h"
 #include "tools/view/viewer.h"

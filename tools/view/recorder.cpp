@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/view/recorder.h"
+#include "tools/view/camera.h"
 
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"

@@ -5,8 +5,6 @@
 #include "runtime/base/file.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/interrupt.h"
-#include "tools/view/input.h"
-#include "tools/view/panel.h"
 #include "tools/view/script.h"
 
 #include <png.h>

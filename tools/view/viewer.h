@@ -2,11 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "tools/view/brush.h"
+#include "tools/view/camera.h"
 #include "tools/view/figures.h"
-#include "tools/view/overlay.h"
-#include "tools/view/recorder.h"
 #include "tools/view/refiner.h"
+#include "tools/view/street.h"
 #include "tools/view/window.h"
 
 namespace semrover::view {
@@ -106,5 +105,12 @@ class Viewer {
     Stopwatch since_resize_;
     std::array<uint32_t, 2> window_size_{};
 };
+
+// what mouse and keys do, where no panel takes them. Between the beginning and the end of the overlay's frame
+void take_input(Viewer& viewer);
+
+// The panels over the picture: figures, what is shown, the picked voxel, brush, path, refinement. Between the beginning
+// and the end of the overlay's frame
+void draw_panels(Viewer& viewer);
 
 } // namespace semrover::view

@@ -2,12 +2,49 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "runtime/graph/tile_choices.h"
+#include "runtime/graph/plan.h"
 
+#include <map>
 #include <span>
+#include <string>
+#include <string_view>
 #include <vector>
 
 namespace semrover {
+
+// Which tile passes ran fastest with, as programs have measured it on a device. All tiles of a pass give the same bits.
+class TileChoices {
+  public:
+    // of passes that take alike: their shader, its constants but for the tile, the output, the bytes that they bind
+    using Key = uint64_t;
+    static Key key(const Pass& pass);
+
+    std::optional<uint32_t> best(Key key) const;
+    void set(Key key, uint32_t tile) { best_[key] = tile; }
+    size_t size() const { return best_.size(); }
+
+    std::string text() const;         // a line each
+    void read(std::string_view text); // in addition to those that are there; leaves out what text() does not write
+
+  private:
+    std::map<Key, uint32_t> best_;
+};
+
+// How long the passes of a device take, beside what was estimated, by shader: what programs have measured so far.
+class WorkRates {
+  public:
+    // a pass took that long
+    void learn(const Pass& pass, double seconds);
+    // that it will take: as measured, or as estimated while nothing was
+    double seconds(const Pass& pass) const;
+    std::vector<double> seconds(const Plan& plan) const; // of each pass
+
+  private:
+    struct Measured {
+        double estimated = 0, seconds = 0; // sums
+    };
+    std::map<const KernelVariant*, Measured> measured_;
+};
 
 // Autotuning: the first runs of a program are made with each tile in turn, twice, where its passes have a choice and
 // nothing is known of them; from then on they keep what was fastest. Runs give the same bits meanwhile.

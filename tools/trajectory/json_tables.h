@@ -3,10 +3,21 @@
 #pragma once
 
 #include "runtime/base/json.h"
+#include "runtime/base/json_numbers.h"
 #include "runtime/base/quote.h"
 #include "runtime/base/text_start.h"
 
 namespace semrover {
+
+// fields of boxes in JSON; bad_input with `where` and the key in front
+
+inline Result<std::string> text_at(const Json& object, const char* key, std::string_view where)
+{
+    const auto entry = object.find(key);
+    if (entry == object.end() || !entry->is_string())
+        return fail(ErrorCode::bad_input, "{}: {}: expected a string", where, key);
+    return entry->get<std::string>();
+}
 
 // Calls `record` with each record of a table of nuScenes' and with its place, for errors. The tables of the whole data
 // set have gigabytes; only one record of them is in memory at a time. Errors: bad_input; of `record`
