@@ -148,7 +148,7 @@ static void lends_its_own_device(void)
     CHECK(sr_context_create(&desc, &context) == SR_OK);
     sr_context_destroy(context);
     CHECK(locks == unlocks);
-    CHECK(vkDeviceWaitIdle(host.device) == VK_SUCCESS); /* still the host's */
+    CHECK(vkDeviceWaitIdle(host.device) == VK_SUCCESS); /* still the application's */
     destroy_host(&host);
 }
 

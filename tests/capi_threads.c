@@ -137,7 +137,7 @@ static void runs_contexts_in_parallel(void)
     }
 }
 
-/* the host's queue: whoever uses it holds the mutex */
+/* the application's queue: whoever uses it holds the mutex */
 typedef struct shared_queue {
     struct host host;
     pthread_mutex_t mutex;
@@ -186,7 +186,7 @@ static void* visit_on_the_host_s_queue(void* user)
     return NULL;
 }
 
-/* the host's own submits, one after the other; how many */
+/* the application's own submits, one after the other; how many */
 static unsigned submit_until_finished(shared_queue* queue)
 {
     VkSubmitInfo nothing = {0};
@@ -228,7 +228,7 @@ static void shares_a_queue(void)
         CHECK(pthread_join(threads[i], NULL) == 0);
         check_same(&visitors[i]);
     }
-    printf("one queue: %u submits of the host's, %u locks by both contexts\n", submits, queue.locks - submits - 2);
+    printf("one queue: %u submits of the application's, %u locks by both contexts\n", submits, queue.locks - submits - 2);
     CHECK(queue.users == 0 && queue.locks > submits + 2);
     CHECK(pthread_mutex_destroy(&queue.mutex) == 0);
     destroy_host(&queue.host);
