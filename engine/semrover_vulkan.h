@@ -34,9 +34,9 @@ typedef struct sr_memory_piece {
 } sr_memory_piece;
 
 /* It outlives the context. For a context on it the library writes no file and reads no variable of the environment.
- * Vulkan 1.2 with timelineSemaphore and robustBufferAccess enabled: files decide what shaders read. Vulkan cannot be
- * asked which features a device was made with, so the application says it. SR_ERR_USAGE without robust_buffer_access.
- */
+ * Vulkan 1.2 with timelineSemaphore enabled, and one of robustBufferAccess and pipelineRobustness: files decide what
+ * shaders read. Vulkan cannot be asked which features a device was made with, so the application says it. SR_ERR_USAGE
+ * where it says neither of the two. */
 struct sr_vulkan_device {
     uint32_t struct_size;
     uint32_t queue_family; /* with compute */
@@ -49,7 +49,9 @@ struct sr_vulkan_device {
     void (*lock_queue)(void* user); /* around every use of `queue`, from the thread that calls; both or neither */
     void (*unlock_queue)(void* user);
     uint32_t shader_float16;       /* 1: shaderFloat16 is enabled */
-    uint32_t robust_buffer_access; /* 1: robustBufferAccess is enabled */
+    uint32_t robust_buffer_access; /* 1: robustBufferAccess is enabled, for all shaders of the device */
+    uint32_t pipeline_robustness;  /* 1: VK_EXT_pipeline_robustness is, with pipelineRobustness: the library's shaders
+                                      ask for it, and no others */
     uint32_t work_queue_family;    /* with compute; another one than queue_family, or the same */
     /* 1: what matrix units need is enabled: VK_KHR_cooperative_matrix and VK_EXT_subgroup_size_control (or Vulkan 1.3)
      * with cooperativeMatrix, subgroupSizeControl, computeFullSubgroups, vulkanMemoryModel and
@@ -58,6 +60,7 @@ struct sr_vulkan_device {
     uint32_t cooperative_matrix;
     uint32_t external_memory_fd;    /* 1: VK_KHR_external_memory_fd is enabled, for semrover_gl.h */
     uint32_t external_semaphore_fd; /* 1: VK_KHR_external_semaphore_fd is enabled, likewise */
+    uint32_t reserved;
     /* through which every call is found; NULL: the loader's */
     PFN_vkGetInstanceProcAddr get_instance_proc_addr;
     /* Another queue, which nobody but the library uses, so that the worker's submits and the application's frames do

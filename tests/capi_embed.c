@@ -135,6 +135,9 @@ static void lends_its_own_device(void)
     desc.struct_size = sizeof desc;
     desc.vulkan = &vulkan;
     CHECK(sr_context_create(&desc, &context) == SR_ERR_USAGE && says(NULL, "robustBufferAccess"));
+    vulkan.reserved = 1;
+    CHECK(sr_context_create(&desc, &context) == SR_ERR_USAGE && says(NULL, "reserved"));
+    vulkan.reserved = 0;
     vulkan.robust_buffer_access = 1;
     CHECK(sr_context_create(&desc, &context) == SR_ERR_USAGE && says(NULL, "both of lock and unlock"));
     vulkan.unlock_queue = unlock_queue;

@@ -110,16 +110,21 @@ static VkInstance make_instance(int validation)
     return instance;
 }
 
-/* extension: enabled; NULL: none */
+/* extension: enabled; NULL: none. VK_EXT_pipeline_robustness takes the place of robustBufferAccess */
 static VkDevice make_device(VkPhysicalDevice physical, const char* extension)
 {
     const float priority = 1;
     VkPhysicalDeviceVulkan12Features features = {0};
     VkDeviceQueueCreateInfo queue = {0};
     VkPhysicalDeviceFeatures robust = {0};
+    VkPhysicalDevicePipelineRobustnessFeaturesEXT of_pipelines = {0};
     VkDeviceCreateInfo info = {0};
     VkDevice device;
-    robust.robustBufferAccess = VK_TRUE;
+    const int by_pipelines = extension && !strcmp(extension, VK_EXT_PIPELINE_ROBUSTNESS_EXTENSION_NAME);
+    robust.robustBufferAccess = !by_pipelines;
+    of_pipelines.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PIPELINE_ROBUSTNESS_FEATURES_EXT;
+    of_pipelines.pipelineRobustness = VK_TRUE;
+    features.pNext = by_pipelines ? &of_pipelines : NULL;
     features.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES;
     features.timelineSemaphore = VK_TRUE;
     queue.sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO;

@@ -445,7 +445,8 @@ TEST(runtime_device, refuses_a_host_device_that_lacks_something)
     EXPECT_TRUE(says(Device::adopt(host, {}), "queue family 77 of the application's device has no compute"));
     host = whole;
     host.robust_buffer_access = false;
-    EXPECT_TRUE(says(Device::adopt(host, {}), "a device of the application's needs robustBufferAccess"));
+    EXPECT_TRUE(
+        says(Device::adopt(host, {}), "a device of the application's needs robustBufferAccess or pipelineRobustness"));
     host = whole;
     host.cooperative_matrix = true;
     EXPECT_TRUE(says(Device::adopt(host, {}), "with cooperative matrices needs shaderFloat16"));

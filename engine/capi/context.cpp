@@ -50,6 +50,8 @@ MemorySource memory_source(const sr_vulkan_device& v)
 
 Result<std::unique_ptr<Device>> adopt(const sr_vulkan_device& v, const DeviceOptions& options)
 {
+    if (v.reserved)
+        return fail(ErrorCode::usage, "sr_vulkan_device: reserved is not 0");
     HostDevice host;
     host.get_instance_proc_addr = v.get_instance_proc_addr;
     host.instance = v.instance;
@@ -62,6 +64,7 @@ Result<std::unique_ptr<Device>> adopt(const sr_vulkan_device& v, const DeviceOpt
     host.float16 = v.shader_float16;
     host.cooperative_matrix = v.cooperative_matrix;
     host.robust_buffer_access = v.robust_buffer_access == 1;
+    host.pipeline_robustness = v.pipeline_robustness == 1;
     host.sharing = {v.external_memory_fd == 1, v.external_semaphore_fd == 1};
     host.memory = memory_source(v);
     if (v.lock_queue)
@@ -326,7 +329,7 @@ static_assert(number_of(SEMROVER_VERSION) == SR_VERSION);
 
 // the layout that programs were built against: a change here is a new ABI
 static_assert(sizeof(sr_device_info) == 816 && offsetof(sr_device_info, memory_bytes) == 808);
-static_assert(sizeof(sr_vulkan_device) == 128 && offsetof(sr_vulkan_device, robust_buffer_access) == 76);
+static_assert(sizeof(sr_vulkan_device) == 136 && offsetof(sr_vulkan_device, robust_buffer_access) == 76);
 static_assert(sizeof(sr_context_desc) == 72 && offsetof(sr_context_desc, max_bytes) == 32);
 static_assert(sizeof(sr_memory_info) == 32);
 static_assert(sizeof(sr_memory_request) == 32 && sizeof(sr_memory_piece) == 32);

@@ -114,10 +114,9 @@ Result<std::unique_ptr<Device>> Device::adopt(const HostDevice& host, const Devi
     if (host.work_queue && !is_compute_family(d->vk_, host.physical, host.work_queue_family))
         return fail(ErrorCode::usage, "family {} of the work queue of the application's device has no compute",
                     host.work_queue_family);
-    if (!host.robust_buffer_access)
-        return fail(ErrorCode::usage,
-                    "a device of the application's needs robustBufferAccess, and to say so: files decide what "
-                    "shaders read");
+    if (!host.robust_buffer_access && !host.pipeline_robustness)
+        return fail(ErrorCode::usage, "a device of the application's needs robustBufferAccess or pipelineRobustness, "
+                                      "and to say so: files decide what shaders read");
     if (host.cooperative_matrix && !host.float16)
         return fail(ErrorCode::usage, "a device with cooperative matrices needs shaderFloat16, and to say so");
     if (bool(host.lock) != bool(host.unlock))
@@ -133,6 +132,7 @@ Result<std::unique_ptr<Device>> Device::adopt(const HostDevice& host, const Devi
         d->queue_ = {host.work_queue, host.work_queue_family};
     d->memory_source_ = host.memory;
     d->sharing_ = host.sharing;
+    d->pipeline_robustness_ = host.pipeline_robustness;
     SR_CHECK(d->finish(options));
     // what the hardware could do is not what the host asked for
     if (!host.cooperative_matrix)
@@ -176,9 +176,18 @@ Status Device::create_device(const DeviceOptions& options, bool matrices)
     f12.timelineSemaphore = VK_TRUE;
     f12.shaderFloat16 = have.shaderFloat16;
     auto features = vk_struct<VkPhysicalDeviceFeatures2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2, &f12);
-    // gathers use indices that came from files: out of bounds must not leave the buffer
-    features.features.robustBufferAccess = available.features.robustBufferAccess;
     std::vector<const char*> extensions;
+    // gathers use indices that came from files: out of bounds must not leave the buffer
+    auto robust = vk_struct<VkPhysicalDevicePipelineRobustnessFeaturesEXT>(
+        VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PIPELINE_ROBUSTNESS_FEATURES_EXT);
+    pipeline_robustness_ = has_pipeline_robustness(vk_, physical_);
+    if (pipeline_robustness_) {
+        robust.pipelineRobustness = VK_TRUE;
+        robust.pNext = std::exchange(features.pNext, &robust);
+        extensions.push_back(VK_EXT_PIPELINE_ROBUSTNESS_EXTENSION_NAME);
+    } else {
+        features.features.robustBufferAccess = available.features.robustBufferAccess;
+    }
     if (has_extension(vk_, physical_, "VK_KHR_portability_subset")) // must be enabled where there is one: MoltenVK's
         extensions.push_back("VK_KHR_portability_subset");
     if (options.share_by_fd) {
@@ -191,8 +200,7 @@ Status Device::create_device(const DeviceOptions& options, bool matrices)
     auto faults = vk_struct<VkPhysicalDeviceFaultFeaturesEXT>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FAULT_FEATURES_EXT);
     if (tells_faults(vk_, physical_)) {
         faults.deviceFault = VK_TRUE;
-        features.pNext = &faults;
-        faults.pNext = &f12;
+        faults.pNext = std::exchange(features.pNext, &faults);
         extensions.push_back(VK_EXT_DEVICE_FAULT_EXTENSION_NAME);
     }
     MatrixFeatures matrix;
@@ -269,6 +277,7 @@ Result<std::unique_ptr<Device>> Device::beside(Device& first)
     d->families_ = first.families_;
     d->index_ = first.index_;
     d->sharing_ = first.sharing_;
+    d->pipeline_robustness_ = first.pipeline_robustness_;
     d->memory_source_ = first.memory_source_;
     d->cancelled_ = first.cancelled_;
     d->limits_ = first.limits_;

@@ -49,12 +49,14 @@ struct HostDevice {
     PFN_vkGetInstanceProcAddr get_instance_proc_addr = nullptr; // its way to Vulkan; null: the loader's
     VkInstance instance = VK_NULL_HANDLE;
     VkPhysicalDevice physical = VK_NULL_HANDLE;
-    VkDevice device = VK_NULL_HANDLE; // Vulkan 1.2 with timelineSemaphore and robustBufferAccess enabled
+    VkDevice device = VK_NULL_HANDLE; // Vulkan 1.2 with timelineSemaphore enabled
     VkQueue queue = VK_NULL_HANDLE;   // with compute
     uint32_t queue_family = 0;
     VkQueue work_queue = VK_NULL_HANDLE; // another one, that nobody else uses: beside() has `queue` then. None: `queue`
     uint32_t work_queue_family = 0;
-    bool robust_buffer_access = false;            // it is enabled, as it must be: files decide what is read
+    // one of them is enabled, as it must be: files decide what is read
+    bool robust_buffer_access = false;            // for all shaders of the device
+    bool pipeline_robustness = false;             // VK_EXT_pipeline_robustness: for ours
     bool float16 = false;                         // shaderFloat16 is enabled too
     bool cooperative_matrix = false;              // and MatrixFeatures, with the memory model for all of the device
     std::function<void()> lock = {}, unlock = {}; // around every use of `queue`; may be empty
@@ -111,7 +113,8 @@ class Device {
     uint32_t index() const { return index_; } // in list_devices(); 0 for an application's
     VkDevice handle() const { return device_; }
     const VulkanCalls& vk() const { return vk_; }
-    bool owned() const { return owned_; } // not an application's
+    bool owned() const { return owned_; }                             // not an application's
+    bool pipeline_robustness() const { return pipeline_robustness_; } // pipelines ask for it, and the device does not
     VkInstance instance() const { return instance_; }
     VkPhysicalDevice physical() const { return physical_; }
     uint32_t queue_family() const { return queue_.family; }
@@ -184,6 +187,7 @@ class Device {
     std::vector<uint32_t> families_;
     uint32_t index_ = 0;
     bool owned_ = true;
+    bool pipeline_robustness_ = false;
     Sharing sharing_;
     MemorySource memory_source_;
     std::function<bool()> cancelled_;

@@ -202,6 +202,17 @@ bool has_extension(const VulkanCalls& vk, VkPhysicalDevice physical, const char*
     });
 }
 
+bool has_pipeline_robustness(const VulkanCalls& vk, VkPhysicalDevice physical)
+{
+    if (!has_extension(vk, physical, VK_EXT_PIPELINE_ROBUSTNESS_EXTENSION_NAME))
+        return false;
+    auto robust = vk_struct<VkPhysicalDevicePipelineRobustnessFeaturesEXT>(
+        VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PIPELINE_ROBUSTNESS_FEATURES_EXT);
+    auto features = vk_struct<VkPhysicalDeviceFeatures2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2, &robust);
+    vk.GetPhysicalDeviceFeatures2(physical, &features);
+    return robust.pipelineRobustness;
+}
+
 namespace {
 
 std::vector<VkQueueFamilyProperties> queue_families(const VulkanCalls& vk, VkPhysicalDevice physical)

@@ -17,6 +17,7 @@ Result<VkInstance> process_instance(bool validation);
 Result<std::vector<VkPhysicalDevice>> physical_devices(const VulkanCalls& vk, VkInstance instance); // best first
 DeviceSummary summarize(const VulkanCalls& vk, VkInstance instance, VkPhysicalDevice physical, uint32_t index);
 bool has_extension(const VulkanCalls& vk, VkPhysicalDevice physical, const char* name);
+bool has_pipeline_robustness(const VulkanCalls& vk, VkPhysicalDevice physical); // VK_EXT_pipeline_robustness
 Result<uint32_t> compute_queue_family(const VulkanCalls& vk, VkPhysicalDevice physical);
 bool has_timestamps(const VulkanCalls& vk, VkPhysicalDevice physical, uint32_t family);
 bool is_compute_family(const VulkanCalls& vk, VkPhysicalDevice physical, uint32_t family);

@@ -245,6 +245,10 @@ Status PipelineStore::make(const KernelVariant& variant, const std::map<uint32_t
         &specialization};
     info.layout = out.layout;
     info.flags = VK_PIPELINE_CREATE_DISPATCH_BASE_BIT; // long passes are cut
+    auto robust = vk_struct<VkPipelineRobustnessCreateInfoEXT>(VK_STRUCTURE_TYPE_PIPELINE_ROBUSTNESS_CREATE_INFO_EXT);
+    robust.storageBuffers = robust.uniformBuffers = VK_PIPELINE_ROBUSTNESS_BUFFER_BEHAVIOR_ROBUST_BUFFER_ACCESS_EXT;
+    if (device_.pipeline_robustness())
+        info.pNext = &robust;
     const VkResult result = device_.vk().CreateComputePipelines(device_.handle(), cache_, 1, &info,
                                                                 device_.vk().allocator(), &out.pipeline);
     device_.vk().DestroyShaderModule(device_.handle(), module, device_.vk().allocator());
