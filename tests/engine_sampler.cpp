@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/voxfield/token_sampler.h"
+#include "tests/says.h"
 
 #include <gtest/gtest.h>
 
@@ -74,6 +75,18 @@ TEST(engine_sampler, known_tokens_leave_as_they_came_with_every_sampler)
         for (size_t i = 0; i < 25 * size_t(transformer().config().channels()); ++i)
             ASSERT_EQ(tokens[i], region.fixed[i]) << sampler_name(sampler) << " element " << i;
     }
+}
+
+TEST(engine_sampler, names_the_first_number_that_is_none)
+{
+    RegionInput broken = patch(60, 1, 1);
+    broken.fixed[5] = broken.fixed[9] = std::numeric_limits<float>::infinity();
+    const auto sampler = *TokenSampler::create(device(), transformer(), plan(Sampler::ddpm, 2, {}), {{2}, 1});
+    const std::vector<RegionInput> regions = {patch(0, 40, 0), broken};
+    EXPECT_TRUE(says(sampler->run(regions), "the network returned inf for channel 5 of token 40"));
+    ASSERT_TRUE(sampler->begin(regions));
+    ASSERT_TRUE(*sampler->step(sampler->rows()));
+    EXPECT_TRUE(says(sampler->finish_points(), "the network returned inf for channel 5 of token 40"));
 }
 
 // what a network makes of noise is not what it makes of the tokens themselves, so the others see how known ones come

@@ -240,7 +240,7 @@ Status post_foci(sr_world& world, std::span<const sr_focus> given)
         std::ranges::copy(one.direction, focus.direction.begin());
         focus.radius = one.radius;
     }
-    SR_CHECK(world.world->check_foci(foci));
+    SR_CHECK(check_foci(foci, world.world->voxel_size()));
     const std::lock_guard lock(world.post);
     world.foci = std::move(foci);
     return {};

@@ -280,4 +280,16 @@ Result<VoxelGrid> read_grid_or_tiles(const Path& path)
     return folder.read_all();
 }
 
+std::array<TileIndex, 8> tiles_around(const TileIndex& t)
+{
+    return {{{t[0] - 1, t[1] - 1},
+             {t[0] - 1, t[1]},
+             {t[0] - 1, t[1] + 1},
+             {t[0], t[1] - 1},
+             {t[0], t[1] + 1},
+             {t[0] + 1, t[1] - 1},
+             {t[0] + 1, t[1]},
+             {t[0] + 1, t[1] + 1}}};
+}
+
 } // namespace semrover

@@ -108,4 +108,6 @@ void append_cells(VoxelGrid& grid, const VoxelGrid& part);
 // Reads a .sgrid, or all tiles of a folder.
 Result<VoxelGrid> read_grid_or_tiles(const Path& path);
 
+std::array<TileIndex, 8> tiles_around(const TileIndex& tile); // those beside it, in order
+
 } // namespace semrover

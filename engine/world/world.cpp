@@ -9,43 +9,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace semrover {
 
 namespace {
 
-constexpr double kMostRadius = 2000;         // metres; some 140,000 tiles
 constexpr double kMostHorizon = 1000;        // likewise
-constexpr int32_t kFarthestCell = 1 << 19;   // of a focus
 constexpr uint64_t kNoDeadline = 1ull << 60; // microseconds
 constexpr size_t kTilesALook = 64;           // most of which need nothing
-
-std::array<TileIndex, 8> tiles_around(const TileIndex& t)
-{
-    return {{{t[0] - 1, t[1] - 1},
-             {t[0] - 1, t[1]},
-             {t[0] - 1, t[1] + 1},
-             {t[0], t[1] - 1},
-             {t[0], t[1] + 1},
-             {t[0] + 1, t[1] - 1},
-             {t[0] + 1, t[1]},
-             {t[0] + 1, t[1] + 1}}};
-}
-
-// what foci reach, with a margin in metres around it
-CellWindow window_around(const WorldFoci& foci, double margin, float voxel_size)
-{
-    constexpr double none = std::numeric_limits<double>::infinity();
-    Point3 low = {none, none, 0}, high = {-none, -none, 0};
-    for (const WorldFocus& focus : foci)
-        for (size_t a = 0; a < 2; ++a) {
-            low[a] = std::min(low[a], focus.position[a] - focus.radius - margin);
-            high[a] = std::max(high[a], focus.position[a] + focus.radius + margin);
-        }
-    const Cell first = cell_at(low, voxel_size), last = cell_at(high, voxel_size);
-    return {{first[0], first[1]}, {last[0], last[1]}};
-}
 
 } // namespace
 
@@ -58,35 +29,6 @@ World::World(Device& device, WorldRequest request, std::unique_ptr<WorldLabels> 
 double World::edge() const
 {
     return tile_cells() * decimal_voxel_size(voxel_size());
-}
-
-double World::away(const TileIndex& tile) const
-{
-    double nearest = foci_.empty() ? 0 : std::numeric_limits<double>::infinity();
-    for (const WorldFocus& focus : foci_)
-        nearest = std::min(nearest, distance_to_tile(focus, tile, edge()));
-    return nearest;
-}
-
-bool World::out_of_reach(const TileIndex& tile) const
-{
-    const auto reaches = [&](const WorldFocus& focus) { return distance_to_tile(focus, tile, edge()) <= focus.radius; };
-    return !foci_.empty() && std::ranges::none_of(foci_, reaches);
-}
-
-// those of a map's tiles that are picked
-template <typename T, typename Picks>
-std::vector<TileIndex> World::nearest_first(const std::map<TileIndex, T>& tiles, Picks picks) const
-{
-    std::vector<std::pair<double, TileIndex>> picked;
-    for (const auto& [index, there] : tiles)
-        if (picks(index))
-            picked.emplace_back(away(index), index);
-    std::ranges::sort(picked);
-    std::vector<TileIndex> indices;
-    for (const auto& [away, index] : picked)
-        indices.push_back(index);
-    return indices;
 }
 
 bool World::finished(const TileIndex& tile) const
@@ -173,21 +115,25 @@ Status World::warm_up()
     }
     if (!request_.splat_bytes)
         return {};
-    SR_TRY(splats_, SplatPool::create(filling_.device(), request_.splat_bytes));
+    SR_TRY(splats_, WorldSplats::create(filling_.device(), *tiles_,
+                                        {.bytes = request_.splat_bytes,
+                                         .points = request_.splats,
+                                         .detail_distance = request_.detail_distance,
+                                         .voxel_size = voxel_size(),
+                                         .edge = edge()}));
     grid.generated.assign(grid.cells.size(), 1); // points in the middle of their voxels
-    return splats_->prepare(points_of(grid).size(), request_.splats);
+    return splats_->pool().prepare(points_of(grid).size(), request_.splats);
 }
 
 Status World::focus(const WorldFoci& foci)
 {
     SR_ASSERT(tiles_, "foci need the order of tiles");
-    SR_CHECK(check_foci(foci));
-    if (std::ranges::equal(foci_, foci, [&](const auto& a, const auto& b) { return is_nearly(a, b, edge()); }))
+    SR_CHECK(check_foci(foci, voxel_size()));
+    if (is_nearly(foci_, foci, edge()))
         return {};
     foci_ = foci;
     releases_ = false;
     want(TileOrder(foci, edge()));
-    find_bare();
     if (has_model())
         tiles_->keep_objects_near(window_around(foci, 2 * edge(), voxel_size()));
     return {};
@@ -229,23 +175,14 @@ void World::want(TileOrder order)
     released_.clear();
     waiting_.clear();
     full_ = false;
+    if (splats_)
+        splats_->want(foci_);
     look_again();
-}
-
-// tiles that get fewer splats first: they make room for the others
-void World::find_bare()
-{
-    bare_ = nearest_first(
-        tiles_->all(), [this](const TileIndex& t) { return splats_ && !out_of_reach(t) && tile(t) && !has_splats(t); });
-    std::ranges::stable_partition(bare_, [this](const TileIndex& t) {
-        const auto made = made_for_.find(t);
-        return made != made_for_.end() && made->second.detail < detail(t);
-    });
 }
 
 World::Piece World::next_piece() const
 {
-    if (!bare_.empty() && !no_room_yet_)
+    if (wants_splats())
         return Piece::splats;
     if (work_.empty())
         return loading_.empty() ? Piece::look : Piece::load;
@@ -260,10 +197,11 @@ World::Piece World::next_piece() const
 Result<bool> World::step(const JobBudget& budget)
 {
     BudgetMeter meter(budget);
-    no_room_yet_ = false;
+    if (splats_)
+        splats_->begin_step();
     bool spent = false; // something was done already
     Result<bool> done = true;
-    while (!idle_ || !work_.empty() || (!bare_.empty() && !no_room_yet_)) {
+    while (!idle_ || !work_.empty() || wants_splats()) {
         const Piece piece = next_piece();
         const bool submits = piece == Piece::first_row || piece == Piece::row || piece == Piece::last_row;
         SubmitCost& cost = costs_[size_t(piece)];
@@ -293,7 +231,7 @@ Result<bool> World::step(const JobBudget& budget)
     if (done && *done)
         say(true);
     if (splats_)
-        SR_CHECK(splats_->publish());
+        SR_CHECK(splats_->pool().publish());
     return done;
 }
 
@@ -304,11 +242,8 @@ Status World::do_piece(Piece piece)
         return look();
     case Piece::load:
         return load_next();
-    case Piece::splats: {
-        const TileIndex tile = bare_.front();
-        bare_.erase(bare_.begin());
-        return make_splats(tile);
-    }
+    case Piece::splats:
+        return splats_->make_next();
     case Piece::cut:
         return cut();
     case Piece::finish:
@@ -351,8 +286,8 @@ Result<std::optional<TileIndex>> World::missing(const TileIndex& tile)
         return fail(kNotYet, "labels of tile ({}, {}) are not there yet", tile[0], tile[1]);
     SR_TRY(WorldTile * own, tiles_->bring(tile));
     if (!own) {
-        if (stale_.contains(tile)) // an edit took its last voxel away
-            went(tile);
+        if (splats_ && splats_->is_stale(tile)) // an edit took its last voxel away
+            splats_->went(tile);
         return std::optional<TileIndex>();
     }
     if (own->finished) {
@@ -447,8 +382,8 @@ void World::end_look()
     found_.clear();
     rank_ = done_;
     idle_ = work_.empty();
-    if (idle_ && !foci_.empty())
-        find_bare(); // those whose neighbours turned out to be empty, too
+    if (idle_ && splats_ && !foci_.empty())
+        splats_->find_bare(); // those whose neighbours turned out to be empty, too
 }
 
 // it is wanted up to a rank, or seen by one that is, or at work
@@ -469,7 +404,7 @@ Result<bool> World::room_for(const TileIndex& tile, size_t rank)
         needed += tiles_->bytes_with_points(*tiles_->find(busy));
     if (tiles_->bytes() + needed <= request_.host_bytes)
         return true;
-    auto others = nearest_first(tiles_->all(), [&](const TileIndex& t) { return !is_kept(t, rank); });
+    auto others = nearest_first(tiles_->all(), foci_, edge(), [&](const TileIndex& t) { return !is_kept(t, rank); });
     for (; tiles_->bytes() + needed > request_.host_bytes && !others.empty(); others.pop_back())
         SR_CHECK(drop(others.back()));
     return tiles_->bytes() + needed <= request_.host_bytes;
@@ -482,7 +417,8 @@ Status World::drop(const TileIndex& tile)
         not_stored_.erase(tile);
     if (there.finished) {
         ++dropped_;
-        went(tile);
+        if (splats_)
+            splats_->went(tile);
     }
     if (const auto rank = order_.rank_of(tile))
         ahead_.erase(*rank);
@@ -565,155 +501,9 @@ void World::give_up()
 void World::came(const TileIndex& tile)
 {
     if (splats_)
-        splats_came(tile);
+        splats_->came(tile);
     if (const auto rank = order_.rank_of(tile); rank && *rank >= done_)
         ahead_.insert(*rank);
-}
-
-// those beside it have not had these points for neighbours
-void World::splats_came(const TileIndex& tile)
-{
-    bare_.push_back(tile);
-    int bit = 8; // of this tile for the other
-    for (const TileIndex& other : tiles_around(tile)) {
-        --bit;
-        const auto made = made_for_.find(other);
-        if (made == made_for_.end())
-            continue;
-        made->second.neighbours &= uint8_t(~(1u << bit));
-        if (!has_splats(other) && !std::ranges::count(bare_, other))
-            bare_.push_back(other);
-    }
-}
-
-void World::went(const TileIndex& tile)
-{
-    std::erase(bare_, tile);
-    if (splats_)
-        drop_splats(tile);
-}
-
-void World::drop_splats(const TileIndex& tile)
-{
-    stale_.erase(tile);
-    made_for_.erase(tile);
-    splats_->remove(tile);
-}
-
-// as it is to be now. One whose neighbours are still to come is not made anew for each of them
-bool World::has_splats(const TileIndex& tile) const
-{
-    const auto made = made_for_.find(tile);
-    if (made == made_for_.end() || stale_.contains(tile) || made->second.detail != detail(tile))
-        return false;
-    return !(neighbours_with_points(tile) & ~made->second.neighbours) || !neighbours_are_settled(tile);
-}
-
-// a bit for each of tiles_around()
-uint8_t World::neighbours_with_points(const TileIndex& tile) const
-{
-    uint8_t bits = 0;
-    int n = 0;
-    for (const TileIndex& other : tiles_around(tile))
-        bits |= uint8_t((this->tile(other) != nullptr) << n++);
-    return bits;
-}
-
-bool World::neighbours_are_settled(const TileIndex& tile) const
-{
-    return std::ranges::all_of(tiles_around(tile),
-                               [this](const TileIndex& t) { return finished(t) || out_of_reach(t); });
-}
-
-// Points of other tiles that may be neighbours of a tile's own, which lie up to a voxel outside of it. thinned_by: the
-// edge of cubes, metres; 0: they are not thinned
-void World::append_neighbours(const TileIndex& tile, float reach, float thinned_by, ScenePoints& points) const
-{
-    const double margin = reach + voxel_size();
-    for (const TileIndex& index : tiles_around(tile)) {
-        const VoxelGrid* cells = this->tile(index);
-        if (!cells)
-            continue;
-        const ScenePoints all = thinned_by > 0 ? thinned(points_of(*cells), thinned_by) : points_of(*cells);
-        for (size_t i = 0; i < all.size(); ++i) {
-            bool near = true;
-            for (size_t a = 0; a < 2; ++a)
-                near = near && all.positions[i][a] > tile[a] * edge() - margin &&
-                       all.positions[i][a] < (tile[a] + 1) * edge() + margin;
-            if (!near)
-                continue;
-            points.positions.push_back(all.positions[i]);
-            points.colors.push_back(all.colors[i]);
-            points.labels.push_back(all.labels[i]);
-            points.cells.push_back(0);
-        }
-    }
-}
-
-// those out of reach make room, farthest first
-Result<SplatPool::Room> World::add_splats(const TileIndex& index, const VoxelGrid& cells, uint32_t detail)
-{
-    ScenePoints points = points_of(cells);
-    PointSplatOptions options = request_.splats;
-    const float cube = detail ? std::ldexp(voxel_size(), int(detail) - 2) : 0; // half a voxel, a voxel, two voxels
-    if (detail) {
-        points = thinned(points, cube);
-        options.auto_sigma = true; // they stand for larger pieces
-        options.largest_sigma = 2 * cube;
-        options.neighbor_radius = std::max(options.neighbor_radius, 3 * cube);
-    }
-    const size_t own = points.size();
-    append_neighbours(index, options.neighbor_radius, cube, points);
-    SR_TRY(SplatPool::Room room, splats_->add(index, points, own, options));
-    if (room != SplatPool::Room::none)
-        return room;
-    auto others = nearest_first(splats_->places(), [this](const TileIndex& t) { return out_of_reach(t); });
-    for (; room == SplatPool::Room::none && !others.empty(); others.pop_back()) {
-        drop_splats(others.back());
-        SR_TRY(room, splats_->add(index, points, own, options));
-    }
-    return room;
-}
-
-// One that is dropped meanwhile has none. Where there is no room, coarser ones may fit.
-Status World::make_splats(const TileIndex& index)
-{
-    const VoxelGrid* cells = tile(index);
-    if (!cells || has_splats(index))
-        return {};
-    const uint32_t wanted = detail(index), coarsest = request_.detail_distance > 0 ? kCoarsestDetail : 0;
-    SplatPool::Room room = SplatPool::Room::none;
-    for (uint32_t detail = wanted; room == SplatPool::Room::none && detail <= coarsest; ++detail) {
-        SR_TRY(room, add_splats(index, *cells, detail));
-        full_ = full_ || room != SplatPool::Room::found;
-    }
-    if (room == SplatPool::Room::later) { // in another step, when what leaves has left
-        bare_.insert(bare_.begin(), index);
-        no_room_yet_ = true;
-        return {};
-    }
-    if (room == SplatPool::Room::found)
-        made_for_[index] = {wanted, neighbours_with_points(index)};
-    stale_.erase(index);
-    return {};
-}
-
-Status World::check_foci(const WorldFoci& foci) const
-{
-    if (foci.empty() || foci.size() > kMostFoci)
-        return fail(ErrorCode::usage, "{} foci, expected 1 to {}", foci.size(), kMostFoci);
-    for (const WorldFocus& focus : foci) {
-        bool finite = std::isfinite(focus.radius);
-        for (size_t a = 0; a < 3; ++a)
-            finite = finite && std::isfinite(focus.position[a]) && std::isfinite(focus.direction[a]);
-        if (!finite || focus.radius < 0 || focus.radius > kMostRadius)
-            return fail(ErrorCode::usage, "a focus: expected finite numbers and a radius of 0 to {} m, found {} m",
-                        kMostRadius, focus.radius);
-        for (size_t a = 0; a < 2; ++a)
-            if (std::abs(focus.position[a]) > kFarthestCell * double(voxel_size()))
-                return fail(ErrorCode::usage, "a focus at {} m is too far out", focus.position[a]);
-    }
-    return {};
 }
 
 Status World::check_edits(const LabelEdits& edits) const
@@ -738,9 +528,8 @@ Status World::edit(const LabelEdits& edits)
     for (const TileIndex& tile : spoiled) {
         not_stored_.erase(tile); // the store may have it as it was before another edit
         released_.erase(tile);
-        std::erase(bare_, tile);
-        if (splats_ && splats_->has(tile))
-            stale_.insert(tile);
+        if (splats_)
+            splats_->edited(tile);
     }
     if (std::ranges::any_of(work_, [&](const TileIndex& t) { return std::ranges::count(spoiled, t) > 0; }))
         give_up();
@@ -775,15 +564,6 @@ const VoxelGrid* World::tile(const TileIndex& tile) const
     return there && there->finished ? &there->cells : nullptr;
 }
 
-std::vector<TileIndex> World::tiles_with_points() const
-{
-    std::vector<TileIndex> tiles;
-    for (const auto& [index, there] : tiles_->all())
-        if (there.finished)
-            tiles.push_back(index);
-    return tiles;
-}
-
 VoxelGrid World::cells(const CellWindow& window) const
 {
     VoxelGrid out;
@@ -809,7 +589,7 @@ WorldFigures World::figures() const
     f.generated = generated_;
     f.loaded = loaded_;
     f.dropped = dropped_;
-    f.full = full_;
+    f.full = full_ || (splats_ && splats_->full());
     return f;
 }
 

@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/splat/splat_pool.h"
 #include "engine/voxfield/sub_grid.h"
 #include "engine/world/conditioning_objects.h"
 #include "engine/world/grid_filling.h"
 #include "engine/world/world_order.h"
+#include "engine/world/world_splats.h"
 #include "engine/world/world_tiles.h"
 
 namespace semrover {
@@ -47,8 +47,6 @@ struct WorldFigures {
     bool full = false;                   // a budget has no room for more of what is wanted
 };
 
-constexpr size_t kMostFoci = 64;
-
 // The only driver of generation: points for labels, as far as they are wanted, a piece of work at a time.
 class World {
   public:
@@ -62,9 +60,6 @@ class World {
     // What is wanted from now on; tiles that are at work are finished first. Foci that moved by less than an eighth of
     // a tile are the same. Errors: of check_foci()
     Status focus(const WorldFoci& foci);
-    // usage for numbers that are not finite, a radius that is not 0..2000 m, a place beyond 2^19 voxels, and others
-    // than 1 to kMostFoci; any thread
-    Status check_foci(const WorldFoci& foci) const;
     // The tiles within `horizon` metres of a track. Those that nothing wanted needs any more leave memory once the
     // store has them. usage: a horizon that is not above 0 and up to 1000 m
     Status follow(std::span<const GroundPoint> track, double horizon);
@@ -90,7 +85,6 @@ class World {
 
     // voxels of a finished tile that is in memory, or null: sorted, each with points. Valid until the next call.
     const VoxelGrid* tile(const TileIndex& tile) const;
-    std::vector<TileIndex> tiles_with_points() const;
     // copies of the finished voxels of a window that are in memory; all of them
     VoxelGrid cells(const CellWindow& window) const;
     // the order of the scene: the grid, filled as far as it is done
@@ -110,7 +104,7 @@ class World {
 
     // splats of finished tiles; at a border, normals and sizes go by the points on both sides, once they are there.
     // Null without splat_bytes
-    SplatPool* splats() const { return splats_.get(); }
+    SplatPool* splats() const { return splats_ ? &splats_->pool() : nullptr; }
 
     // Whether the store takes what is finished. A world goes on without: its tiles stay in memory, as far as budgets
     // allow, and a warning says so once
@@ -129,9 +123,7 @@ class World {
     };
 
     bool has_model() const { return !request_.settings.model.folder.empty(); }
-    double edge() const;                            // of a tile, metres
-    double away(const TileIndex& tile) const;       // of the nearest focus; 0 where there is none
-    bool out_of_reach(const TileIndex& tile) const; // of all foci
+    double edge() const; // of a tile, metres
     bool finished(const TileIndex& tile) const;
     Status open_scene();
     Status open_tiles();
@@ -154,21 +146,9 @@ class World {
     Status cut();
     Status finish();
     void say(bool ended = false) const;
-    uint32_t detail(const TileIndex& tile) const { return detail_of(away(tile), request_.detail_distance); }
-    template <typename T, typename Picks>
-    std::vector<TileIndex> nearest_first(const std::map<TileIndex, T>& tiles, Picks picks) const;
-    bool has_splats(const TileIndex& tile) const;
-    uint8_t neighbours_with_points(const TileIndex& tile) const;
-    bool neighbours_are_settled(const TileIndex& tile) const;
-    void append_neighbours(const TileIndex& tile, float reach, float thinned_by, ScenePoints& points) const;
-    void find_bare();
-    Result<SplatPool::Room> add_splats(const TileIndex& tile, const VoxelGrid& cells, uint32_t detail);
-    Status make_splats(const TileIndex& tile);
-    void drop_splats(const TileIndex& tile);
     void give_up();
     void came(const TileIndex& tile);
-    void splats_came(const TileIndex& tile);
-    void went(const TileIndex& tile);
+    bool wants_splats() const { return splats_ && splats_->has_work(); }
 
     const WorldRequest request_;
     const JobCallbacks callbacks_;
@@ -191,15 +171,7 @@ class World {
     std::vector<TileIndex> work_;                      // tiles that are being generated
     bool cut_ = false, filled_ = false;                // how far they are
     VoxelGrid part_;                                   // they, and what they know
-    std::unique_ptr<SplatPool> splats_;
-    std::vector<TileIndex> bare_; // finished tiles whose splats are made next
-    struct MadeFor {              // splats: of which detail, and beside which neighbours
-        uint32_t detail;
-        uint8_t neighbours;
-    };
-    std::map<TileIndex, MadeFor> made_for_;
-    std::set<TileIndex> stale_; // tiles whose splats are those before an edit
-    bool no_room_yet_ = false;  // for splats, in this step
+    std::unique_ptr<WorldSplats> splats_;
     std::array<SubmitCost, kPieces> costs_;
     uint64_t generated_ = 0, loaded_ = 0, dropped_ = 0, cells_ = 0;
     uint64_t planned_bytes_ = 0;

@@ -109,28 +109,6 @@ void add_near(std::vector<TileIndex>& tiles, std::set<TileIndex>& seen, const Gr
 
 } // namespace
 
-bool is_nearly(const WorldFocus& a, const WorldFocus& b, double edge)
-{
-    const double moved = apart({a.position[0], a.position[1]}, {b.position[0], b.position[1]});
-    const double lengths = std::hypot(a.direction[0], a.direction[1]) * std::hypot(b.direction[0], b.direction[1]);
-    const double along = a.direction[0] * b.direction[0] + a.direction[1] * b.direction[1];
-    const bool same = a.direction[0] == b.direction[0] && a.direction[1] == b.direction[1];
-    return a.radius == b.radius && moved < edge / 8 && (same || (lengths > 0 && along > 0.985 * lengths));
-}
-
-double distance_to_tile(const GroundPoint& point, const TileIndex& tile, double edge)
-{
-    double outside[2];
-    for (size_t a = 0; a < 2; ++a)
-        outside[a] = std::max({0.0, tile[a] * edge - point[a], point[a] - (tile[a] + 1) * edge});
-    return std::hypot(outside[0], outside[1]);
-}
-
-double distance_to_tile(const WorldFocus& focus, const TileIndex& tile, double edge)
-{
-    return distance_to_tile(GroundPoint{focus.position[0], focus.position[1]}, tile, edge);
-}
-
 std::vector<GroundPoint> ground_track(const CameraPath& path)
 {
     std::vector<GroundPoint> track;
@@ -230,14 +208,6 @@ std::optional<size_t> TileOrder::rank_of(const TileIndex& tile) const
 {
     const auto entry = ranks_.find(tile);
     return entry == ranks_.end() ? std::nullopt : std::optional(entry->second);
-}
-
-uint32_t detail_of(double away, double detail_distance)
-{
-    uint32_t detail = 0;
-    for (double reach = detail_distance; reach > 0 && away > reach && detail < kCoarsestDetail; reach *= 2)
-        ++detail;
-    return detail;
 }
 
 } // namespace semrover

@@ -3,30 +3,13 @@
 #pragma once
 
 #include "engine/camera/camera.h"
-#include "engine/scene/tiles.h"
+#include "engine/world/world_foci.h"
 
 #include <optional>
 #include <queue>
 #include <span>
 
 namespace semrover {
-
-using GroundPoint = std::array<double, 2>; // metres, seen from above
-
-// what a camera looks at
-struct WorldFocus {
-    std::array<double, 3> position{};  // metres
-    std::array<double, 3> direction{}; // of any length; only its part along the ground counts, zero: none
-    double radius = 0;                 // metres, seen from above
-};
-using WorldFoci = std::vector<WorldFocus>;
-
-// so little moved and turned that what is wanted stays the same: by less than an eighth of a tile, and some ten degrees
-bool is_nearly(const WorldFocus& a, const WorldFocus& b, double edge);
-
-// metres from a point to the nearest place of a tile
-double distance_to_tile(const GroundPoint& point, const TileIndex& tile, double edge);
-double distance_to_tile(const WorldFocus& focus, const TileIndex& tile, double edge);
 
 // The places of a trajectory's cameras, without those that do not move. Cameras of one moment count one after the
 // other.
@@ -72,10 +55,5 @@ class TileOrder {
     using Weighed = std::pair<double, TileIndex>;
     std::priority_queue<Weighed, std::vector<Weighed>, std::greater<>> border_;
 };
-
-// How coarse a tile at that distance is: 0 within `detail_distance`, 1 up to twice as far, 2 up to four times, and so
-// on to kCoarsestDetail; always 0 where detail_distance is 0.
-constexpr uint32_t kCoarsestDetail = 5;
-uint32_t detail_of(double away, double detail_distance);
 
 } // namespace semrover

@@ -4,7 +4,6 @@
 #include "kernels/network.h"
 
 #include "embedding.spv.h"
-#include "shaders/network/embedding.h"
 
 namespace semrover {
 

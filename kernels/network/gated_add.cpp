@@ -4,7 +4,6 @@
 #include "kernels/network.h"
 
 #include "gated_add.spv.h"
-#include "shaders/network/gated_add.h"
 
 namespace semrover {
 

@@ -4,7 +4,6 @@
 #include "kernels/network.h"
 
 #include "head_rms_norm.spv.h"
-#include "shaders/network/head_rms_norm.h"
 
 namespace semrover {
 

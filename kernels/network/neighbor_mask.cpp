@@ -4,7 +4,6 @@
 #include "kernels/network.h"
 
 #include "neighbor_mask.spv.h"
-#include "shaders/network/neighbor_mask.h"
 
 namespace semrover {
 

@@ -3,7 +3,6 @@
 // y = per axis [sin(x w_0), .., cos(x w_0), ..], or cosines first: [M, A], [F] -> [M, A * 2F]
 #include "kernels/network.h"
 
-#include "shaders/network/sinusoid.h"
 #include "sinusoid.spv.h"
 
 namespace semrover {

@@ -3,7 +3,6 @@
 // x = fixed where known: [M, N], in place
 #include "kernels/sampling.h"
 
-#include "shaders/sampling/step_hold.h"
 #include "step_hold.spv.h"
 
 namespace semrover {

@@ -3,7 +3,6 @@
 // y[r] = in_scale x[r mod x_rows]: [R, N] -> [rows, N]
 #include "kernels/sampling.h"
 
-#include "shaders/sampling/step_input.h"
 #include "step_input.spv.h"
 
 namespace semrover {

@@ -3,7 +3,6 @@
 // z = normals of Philox4x32-10, key (seed), counter (voxel, draw | stream | channel / 4): -> [M, N]
 #include "kernels/sampling.h"
 
-#include "shaders/sampling/step_noise.h"
 #include "step_noise.spv.h"
 
 namespace semrover {

@@ -3,7 +3,6 @@
 // x' = c_x x + c_z z: [M, N], in place
 #include "kernels/sampling.h"
 
-#include "shaders/sampling/step_renoise.h"
 #include "step_renoise.spv.h"
 
 namespace semrover {

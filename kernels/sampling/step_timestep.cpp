@@ -3,7 +3,6 @@
 // table_row[r] = steps[clock.row].timestep_index - clock.first_timestep: -> [rows]
 #include "kernels/sampling.h"
 
-#include "shaders/sampling/step_timestep.h"
 #include "step_timestep.spv.h"
 
 namespace semrover {

@@ -4,7 +4,6 @@
 // x' = c_x0 x0 + c_x x + c_m m + c_prev x0_prev + c_z z;  known tokens: x' = known_scale fixed + known_noise z
 #include "kernels/sampling.h"
 
-#include "shaders/sampling/step_update.h"
 #include "step_update.spv.h"
 
 namespace semrover {

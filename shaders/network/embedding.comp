@@ -3,7 +3,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // y = table[index] + x, or table[index] alone; eight elements a thread
 #extension GL_GOOGLE_include_directive : require
-#include "embedding.h"
 #include "lib/pack.glsl"
 #include "lib/thread.glsl"
 
@@ -12,7 +11,14 @@ layout(constant_id = 0) const bool kHalfTable = false;
 layout(constant_id = 1) const bool kHalfX = false;
 layout(constant_id = 2) const bool kHalfY = false;
 layout(constant_id = 3) const bool kAddX = false;
-layout(push_constant) uniform Push { EmbeddingPush p; };
+layout(push_constant) uniform EmbeddingPush {
+    uint rows;
+    uint cols;
+    uint table_rows;
+    uint table_ld; // elements
+    uint x_ld;
+    uint y_ld;
+} p;
 layout(binding = 0) readonly buffer Index { uint index[]; };  // [rows]
 layout(binding = 1) readonly buffer Table { uvec4 table[]; }; // [table_rows, cols]
 layout(binding = 2) readonly buffer X { uvec4 x[]; };         // [rows, cols]

@@ -3,7 +3,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // y = residual + gate[gate_row[row], gate_col + group * gate_step + col] * x, one row-column pair of 8 a thread
 #extension GL_GOOGLE_include_directive : require
-#include "gated_add.h"
 #include "lib/pack.glsl"
 #include "lib/thread.glsl"
 
@@ -11,7 +10,17 @@ layout(local_size_x = 64) in;
 layout(constant_id = 0) const bool kHalfX = false;
 layout(constant_id = 1) const bool kHalfY = false;
 layout(constant_id = 2) const bool kHalfResidual = false;
-layout(push_constant) uniform Push { GatedAddPush p; };
+layout(push_constant) uniform GatedAddPush {
+    uint rows; // of one group
+    uint cols;
+    uint groups;
+    uint x_ld; // elements
+    uint y_ld;
+    uint residual_ld;
+    uint gate_ld;
+    uint gate_col;
+    uint gate_step;
+} p;
 layout(binding = 0) readonly buffer X { uvec4 x[]; };               // [groups * rows, cols]
 layout(binding = 1) readonly buffer Gate { float gate[]; };         // [timesteps, gate_ld]
 layout(binding = 2) readonly buffer GateRow { uint gate_row[]; };   // [groups * rows]

@@ -4,14 +4,22 @@
 // per head of q and k: y = x / sqrt(mean(x^2) + eps) * weight; v is copied. One head of one row a thread.
 // weight rows: 2 * group for q, 2 * group + 1 for k
 #extension GL_GOOGLE_include_directive : require
-#include "head_rms_norm.h"
 #include "lib/pack.glsl"
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const bool kHalfX = false;
 layout(constant_id = 1) const bool kHalfY = false;
-layout(push_constant) uniform Push { HeadRmsNormPush p; };
+layout(push_constant) uniform HeadRmsNormPush {
+    uint rows; // of one group
+    uint groups;
+    uint heads;
+    uint head_dim; // a multiple of 8
+    uint x_ld;     // elements
+    uint y_ld;
+    uint weight_ld;
+    float eps;
+} p;
 layout(binding = 0) readonly buffer X { uvec4 x[]; };          // [groups * rows, 3 * heads * head_dim]
 layout(binding = 1) readonly buffer Weight { float weight[]; }; // [2 * groups, head_dim]
 layout(binding = 2) writeonly buffer Y { uvec4 y[]; };         // as x

@@ -3,11 +3,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // bit j of row i: cell j of i's set lies within the radius, di^2 + dj^2 + dk^2 <= radius2; 32 keys a thread
 #extension GL_GOOGLE_include_directive : require
-#include "neighbor_mask.h"
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
-layout(push_constant) uniform Push { NeighborMaskPush p; };
+layout(push_constant) uniform NeighborMaskPush {
+    uint rows;
+    uint words;    // of a row of the mask
+    int radius2;   // largest squared distance, in cells
+    uint near_row; // rows from here on have near_radius2
+    int near_radius2;
+} p;
 layout(binding = 0) readonly buffer Cells { ivec4 cells[]; };   // [rows] i, j, k, unused
 layout(binding = 1) readonly buffer Sets { uvec2 sets[]; };     // [rows] first row and number of rows of the row's set
 layout(binding = 2) writeonly buffer Mask { uint mask[]; };     // [rows, words]

@@ -3,14 +3,19 @@
 // SPDX-License-Identifier: Apache-2.0
 // y = per axis [sin(x w_0), sin(x w_1), .., cos(x w_0), cos(x w_1), ..], or cosines first; one element a thread pair
 #extension GL_GOOGLE_include_directive : require
-#include "sinusoid.h"
 #include "lib/half.glsl"
 #include "lib/thread.glsl"
 #include "lib/trigonometry.glsl"
 
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const bool kHalfY = false;
-layout(push_constant) uniform Push { SinusoidPush p; };
+layout(push_constant) uniform SinusoidPush {
+    uint rows;
+    uint axes;        // values of a row of x
+    uint frequencies; // per axis
+    uint y_ld;        // elements
+    uint cosines_lead;   // 1: [cos, sin] per axis, 0: [sin, cos]
+} p;
 layout(binding = 0) readonly buffer X { float x[]; };                   // [rows, axes]
 layout(binding = 1) readonly buffer Frequencies { float frequency[]; }; // [frequencies]
 layout(binding = 2) writeonly buffer Y { uint y[]; };                   // [rows, axes * 2 * frequencies]

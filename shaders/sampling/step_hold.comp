@@ -4,10 +4,12 @@
 // x = fixed where a token is known: for networks that see known tokens without noise; four elements a thread
 #extension GL_GOOGLE_include_directive : require
 #include "lib/thread.glsl"
-#include "step_hold.h"
 
 layout(local_size_x = 64) in;
-layout(push_constant) uniform Push { StepHoldPush p; };
+layout(push_constant) uniform StepHoldPush {
+    uint rows;
+    uint ld; // elements, of fixed and x
+} p;
 layout(binding = 0) readonly buffer Known { uint known[]; };        // [rows] 1: a token that is given
 layout(binding = 1) readonly buffer Fixed { vec4 fixed_tokens[]; }; // [rows, ld]
 layout(binding = 2) buffer X { vec4 x[]; };                         // [rows, ld]

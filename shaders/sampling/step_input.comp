@@ -6,11 +6,16 @@
 #include "lib/pack.glsl"
 #include "lib/step_row.h"
 #include "lib/thread.glsl"
-#include "step_input.h"
 
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const bool kHalfY = false;
-layout(push_constant) uniform Push { StepInputPush p; };
+layout(push_constant) uniform StepInputPush {
+    uint rows; // of y
+    uint cols;
+    uint x_rows;
+    uint x_ld; // elements
+    uint y_ld;
+} p;
 layout(binding = 0) readonly buffer Clock { StepClock clock; };
 layout(binding = 1) readonly buffer Steps { StepRow steps[]; };
 layout(binding = 2) readonly buffer X { vec4 x[]; };   // [x_rows, cols]

@@ -7,10 +7,15 @@
 #include "lib/philox.glsl"
 #include "lib/step_row.h"
 #include "lib/thread.glsl"
-#include "step_noise.h"
 
 layout(local_size_x = 64) in;
-layout(push_constant) uniform Push { StepNoisePush p; };
+layout(push_constant) uniform StepNoisePush {
+    uint rows;
+    uint cols;
+    uint z_ld; // elements
+    uint seed_low;
+    uint seed_high;
+} p;
 layout(binding = 0) readonly buffer Clock { StepClock clock; };
 layout(binding = 1) readonly buffer Steps { StepRow steps[]; };
 layout(binding = 2) readonly buffer Cells { ivec4 cells[]; }; // [rows] i, j, k, unused

@@ -5,10 +5,12 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lib/step_row.h"
 #include "lib/thread.glsl"
-#include "step_renoise.h"
 
 layout(local_size_x = 64) in;
-layout(push_constant) uniform Push { StepRenoisePush p; };
+layout(push_constant) uniform StepRenoisePush {
+    uint rows;
+    uint ld; // elements, of x and z
+} p;
 layout(binding = 0) readonly buffer Clock { StepClock clock; };
 layout(binding = 1) readonly buffer Steps { StepRow steps[]; };
 layout(binding = 2) readonly buffer Z { vec4 z[]; }; // [rows, ld]

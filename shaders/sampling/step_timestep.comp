@@ -5,10 +5,11 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lib/step_row.h"
 #include "lib/thread.glsl"
-#include "step_timestep.h"
 
 layout(local_size_x = 64) in;
-layout(push_constant) uniform Push { StepTimestepPush p; };
+layout(push_constant) uniform StepTimestepPush {
+    uint rows;
+} p;
 layout(binding = 0) readonly buffer Clock { StepClock clock; };
 layout(binding = 1) readonly buffer Steps { StepRow steps[]; };
 layout(binding = 2) writeonly buffer TableRow { uint table_row[]; }; // [rows]

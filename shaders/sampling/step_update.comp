@@ -9,10 +9,17 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lib/step_row.h"
 #include "lib/thread.glsl"
-#include "step_update.h"
 
 layout(local_size_x = 64) in;
-layout(push_constant) uniform Push { StepUpdatePush p; };
+layout(push_constant) uniform StepUpdatePush {
+    uint rows;
+    uint ld;             // elements, of every matrix
+    uint guided;         // 1: rows [rows, 2 rows) of m are the unconditional half
+    float guidance;      // of the first frame
+    float guidance_step; // from one frame to the next
+    uint frame_rows;     // of a frame
+    float clip;
+} p;
 layout(binding = 0) readonly buffer Clock { StepClock clock; };
 layout(binding = 1) readonly buffer Steps { StepRow steps[]; };
 layout(binding = 2) readonly buffer M { vec4 m[]; };         // [(1 + guided) rows, ld]
