@@ -10,7 +10,7 @@ target_include_directories(semrover_c INTERFACE $<INSTALL_INTERFACE:${CMAKE_INST
 install(TARGETS semrover_c EXPORT semrover COMPONENT library
     LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT library)
 install(DIRECTORY tools/host DESTINATION ${CMAKE_INSTALL_DATADIR}/semrover COMPONENT library)
-install(FILES engine/semrover.h engine/semrover_renderer.h engine/semrover_vulkan.h engine/semrover_gl.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT library)
+install(FILES engine/semrover.h engine/semrover_draw.h engine/semrover_renderer.h engine/semrover_vulkan.h engine/semrover_gl.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT library)
 set(semrover_cmake_folder ${CMAKE_INSTALL_LIBDIR}/cmake/semrover)
 install(EXPORT semrover NAMESPACE semrover:: FILE semroverConfig.cmake DESTINATION ${semrover_cmake_folder}
     COMPONENT library)

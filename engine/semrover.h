@@ -2,9 +2,9 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * The C interface of semrover: C99, no other header of ours, no exception and no exit across it. "The application" is
- * the program that calls it. docs/embedding.md has a complete example. Refined frames are in semrover_renderer.h, which
- * this header includes; a Vulkan device of the application's in semrover_vulkan.h, OpenGL in semrover_gl.h, which it
- * does not.
+ * the program that calls it. docs/embedding.md has a complete example. Pictures are in semrover_draw.h and refined
+ * frames in semrover_renderer.h, which this header includes; a Vulkan device of the application's in semrover_vulkan.h,
+ * OpenGL in semrover_gl.h, which it does not.
  *
  * Structures start with struct_size: `sr_world_desc desc = SR_INIT(sr_world_desc);` sets it, and all else to zero. The
  * library reads and writes no more than that; members that are missing are zero. Members that this library does not
@@ -437,57 +437,10 @@ SR_API sr_status sr_world_copy_cells(sr_world* world, const sr_cell_rect* rect, 
 /* The worker. Waits until the cache has all that is finished; an error where it cannot be written, as on a full disk */
 SR_API sr_status sr_world_flush(sr_world* world);
 
-/* ---- Pictures. struct VkBuffer_T* is Vulkan's VkBuffer, and so on. ---- */
-
-/* Where a picture goes: host memory, a buffer of the application's, or an image of its own, which has the picture's
- * size, one level and one layer, TRANSFER_DST usage, and belongs to the context's queue family. All may be NULL. */
-typedef struct sr_target {
-    void* memory;
-    struct VkBuffer_T* buffer; /* with TRANSFER_DST usage */
-    uint64_t buffer_offset;
-    struct VkImage_T* image; /* of the format that sr_draw_desc says */
-    uint32_t layout_before;  /* VkImageLayout: as it is; VK_IMAGE_LAYOUT_UNDEFINED is fine, all is written */
-    uint32_t layout_after;   /* VkImageLayout: as it will be */
-} sr_target;
-
-/* A z-buffer of the application's: splats behind it are not drawn. Metres along z are scale / (d - offset) for the
- * number d of a pixel. With 0 at the near plane n and 1 at the far plane f: scale = f n / (n - f), offset = f / (f -
- * n). Reversed, without a far plane (d = n / z): scale = n, offset = 0. */
-typedef struct sr_depth_image {
-    struct VkImage_T* image; /* of the picture's size, one level and one layer, TRANSFER_SRC usage, of the context's
-                                queue family; NULL: no test */
-    uint32_t format;         /* VkFormat: D32_SFLOAT or R32_SFLOAT */
-    uint32_t layout_before;  /* VkImageLayout, not UNDEFINED */
-    uint32_t layout_after;
-    uint32_t reserved;
-    double scale, offset;
-} sr_depth_image;
-
-/* A pinhole camera in OpenCV's convention: x right, y down, z forward; the centre of pixel (x, y) lies at
- * (x + 0.5, y + 0.5). Pixels are stored row by row from the top. */
-typedef struct sr_draw_desc {
-    uint32_t struct_size;
-    uint32_t width; /* pixels */
-    const void* next;
-    uint32_t height;
-    uint32_t reserved;
-    double fx, fy, cx, cy;      /* pixels */
-    double world_to_camera[12]; /* [3, 4] row by row: a rotation and metres */
-    sr_target color;            /* R32G32B32A32_SFLOAT: r, g, b times alpha (sRGB), alpha */
-    sr_target normal; /* R32G32B32A32_SFLOAT: sum of w normal in the camera's frame, towards it; sum of w depth */
-    sr_target depth;  /* R32G32_SFLOAT: metres along z, mean and median of the splats; 0 where nothing is */
-    sr_target label;  /* R32G32_UINT: label of the splat with most weight, SR_NO_CELL for none; a number to ignore */
-    sr_depth_image depth_test;
-} sr_draw_desc;
-
-/* The render thread. Shows what is new, and draws. Waits for the device; for the compiler, the first time.
- * SR_ERR_USAGE: a world without splat_bytes, sizes that are not 1..16384; SR_ERR_BAD_INPUT: a camera that is not
- * finite. */
-SR_API sr_status sr_world_draw(sr_world* world, const sr_draw_desc* draw);
-
 #ifdef __cplusplus
 }
 #endif
 
+#include "semrover_draw.h"
 #include "semrover_renderer.h"
 #endif

@@ -77,8 +77,9 @@ SR_API sr_status sr_renderer_begin(sr_renderer* renderer, const sr_frame_desc* f
  */
 SR_API sr_status sr_renderer_step(sr_renderer* renderer, uint64_t budget_us, uint32_t* done);
 
-/* The last finished frame, 4 bytes a pixel: r, g, b (sRGB), 255. An image has format R8G8B8A8_UNORM or _SRGB; the
- * target is else as for draws. Waits for the device. SR_ERR_USAGE: none is finished. */
+/* The last finished frame, 4 bytes a pixel: r, g, b (sRGB), 255. The format is R8G8B8A8_UNORM (or 0) or _SRGB, whose
+ * bytes are the same; the target is else as for draws. Waits for the device. SR_ERR_USAGE: none is finished, another
+ * format. */
 SR_API sr_status sr_renderer_take(sr_renderer* renderer, const sr_target* target);
 
 /* Gives up the frame that is at work; the camera is as before sr_renderer_begin. Without one it does nothing. */

@@ -21,6 +21,37 @@ struct SplatPixelsOptions {
 };
 [[nodiscard]] PixelWords splat_pixels(Graph& g, const SplatImages& images, const SplatPixelsOptions& options);
 
+// How a picture of splats lies in memory: as splat() makes it, or as an image of a format has it; or it is not wanted.
+// The shader knows the values.
+enum class Texels : uint32_t {
+    none,
+    whole,
+    unorm8, // four numbers, cut to 0..1: 255 v, halves up
+    snorm8, // three, cut to -1..1: 127 v, halves away from 0; a fourth of 0
+    half4,  // four, the nearest, ties to even; and so on
+    float4,
+    half1, // the first
+    float1,
+    byte, // the first, of labels: 255 from there on
+    word  // likewise, all of it
+};
+struct PictureFormat {
+    Texels texels = Texels::whole;
+    bool linear = false; // light in place of sRGB numbers: r, g, b = alpha light(v / alpha)
+    bool scaled = false; // the first number z as scale / z + offset, cut to 0..1; offset where it is 0
+    bool operator==(const PictureFormat&) const = default;
+};
+uint32_t texel_bytes(Texels texels); // of a pixel; 0 for none and whole
+inline uint32_t texel_words(Texels texels, uint32_t pixels)
+{
+    return uint32_t((uint64_t(pixels) * texel_bytes(texels) + 3) / 4);
+}
+// pictures begin with whole words; zeros fill their last ones
+[[nodiscard]] Tensor splat_texels(Graph& g,
+                                  Tensor x,                                      // of SplatImages
+                                  uint32_t cameras, const PictureFormat& format, // neither none nor whole
+                                  Tensor scale = {}); // [1, 2] fp32 where it is scaled -> [cameras * words] u32 array
+
 // a picture and the blocks that cover it: it goes on with its last column and row where they are not full
 struct PictureShape {
     uint32_t width = 0, height = 0;               // pixels

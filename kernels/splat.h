@@ -4,6 +4,8 @@
 
 #include "runtime/graph/graph.h"
 
+#include <array>
+
 // Ops that make splats of points and draw them; what ops are and how they are called: kernels/network.h
 namespace semrover {
 
@@ -85,6 +87,8 @@ struct SplatOptions {
     float cutoff = 0;             // sigmas; 0: as far as alpha_min
     // [cameras * height * width] fp32 array, or none, of pinholes: metres along z, what lies farther is not seen
     Tensor limits = {};
+    // which of color, surface, depth and ids are made; the others are [1] and nothing is written to them
+    std::array<bool, 4> made = {true, true, true, true};
 };
 struct SplatImages { // [cameras * height * width] rows; w = weight of a splat in a pixel
     Tensor color;    // [.., 4] fp32: sum of w rgb; alpha = sum of w

@@ -143,11 +143,12 @@ static inline void run_commands(const struct host* host, const struct host_comma
 }
 
 /* copies an image in layout TRANSFER_SRC_OPTIMAL to the beginning of a buffer, and waits */
-static inline void read_image(const struct host* host, const struct host_image* image, const struct host_buffer* to)
+static inline void read_aspect(const struct host* host, const struct host_image* image, VkImageAspectFlags aspect,
+                               const struct host_buffer* to)
 {
     const struct host_commands commands = begin_commands(host);
     VkBufferImageCopy region = {0};
-    region.imageSubresource.aspectMask = VK_IMAGE_ASPECT_COLOR_BIT;
+    region.imageSubresource.aspectMask = aspect;
     region.imageSubresource.layerCount = 1;
     region.imageExtent.width = image->width;
     region.imageExtent.height = image->height;
@@ -157,6 +158,10 @@ static inline void read_image(const struct host* host, const struct host_image* 
     CHECK(vkEndCommandBuffer(commands.commands) == VK_SUCCESS);
     run_commands(host, &commands);
     vkDestroyCommandPool(host->device, commands.pool, NULL);
+}
+static inline void read_image(const struct host* host, const struct host_image* image, const struct host_buffer* to)
+{
+    read_aspect(host, image, VK_IMAGE_ASPECT_COLOR_BIT, to);
 }
 
 static inline VkSemaphore make_timeline(const struct host* host)

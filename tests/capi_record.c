@@ -136,10 +136,11 @@ static void records_draws(const struct host* host, sr_context* context, sr_world
 }
 
 /* every pixel the same, as a pass of the application's would leave it */
-static struct host_image make_depth(const struct host* host, VkFormat format, float value)
+static struct host_image make_depth(const struct host* host, uint32_t width, uint32_t height, VkFormat format,
+                                    float value)
 {
     const int depth = format == VK_FORMAT_D32_SFLOAT;
-    const struct host_image made = make_image(host, WIDTH, HEIGHT, format);
+    const struct host_image made = make_image(host, width, height, format);
     const struct host_commands commands = begin_commands(host);
     VkImageMemoryBarrier barrier = {0};
     VkClearDepthStencilValue z = {0};
@@ -208,7 +209,7 @@ static void tests_against_the_hosts_depth(const struct host* host, sr_context* c
     CHECK_OK(context, sr_world_draw(world, &draw));
     for (i = 0; i < 4; ++i) {
         const VkFormat format = i % 2 ? VK_FORMAT_R32_SFLOAT : VK_FORMAT_D32_SFLOAT;
-        struct host_image image = make_depth(host, format, z_of(metres[i]));
+        struct host_image image = make_depth(host, WIDTH, HEIGHT, format, z_of(metres[i]));
         const struct host_commands commands = begin_commands(host);
         draw = tested_camera(&image, format);
         draw.color.memory = color;
@@ -347,6 +348,42 @@ static void tells_of_splats_that_are_missing(const struct host* host, sr_context
     CHECK(!memcmp(buffer.mapped, whole, sizeof whole));
     sr_world_destroy(world);
     destroy_buffer(host, &buffer);
+}
+
+/* a first draw that lacks room is drawn again, against the same z-buffer and to the same scale */
+static void draws_again_against_the_same_depth(const struct host* host, sr_context* context)
+{
+    enum { LARGE = 16 * PIXELS };
+    static float color[2][LARGE * 4], z[2][LARGE];
+    const VkFormat format = VK_FORMAT_D32_SFLOAT;
+    struct host_image image = make_depth(host, 4 * WIDTH, 4 * HEIGHT, format, z_of(3));
+    sr_world_desc desc = street_world();
+    sr_world* world;
+    int time, i, seen = 0;
+    desc.splat_radius = 0.7;
+    world = make_world(context, &desc);
+    for (time = 0; time < 2; ++time) {
+        sr_draw_desc draw = tested_camera(&image, format);
+        draw.depth_test.layout_before = time ? VK_IMAGE_LAYOUT_GENERAL : VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL;
+        draw.width *= 4;
+        draw.height *= 4;
+        draw.fx = draw.fy = draw.cx = draw.width / 2;
+        draw.cy = draw.height / 2;
+        draw.color.memory = color[time];
+        draw.depth.memory = z[time];
+        draw.depth.format = format;
+        draw.depth_scale = draw.depth_test.scale;
+        draw.depth_offset = draw.depth_test.offset;
+        CHECK_OK(context, sr_world_draw(world, &draw));
+    }
+    CHECK(!memcmp(color[0], color[1], sizeof color[0]) && !memcmp(z[0], z[1], sizeof z[0]));
+    for (i = 0; i < LARGE; ++i) {
+        seen += color[0][4 * i + 3] > 0;
+        CHECK(z[0][i] == 1 || z[0][i] <= z_of(3) * 1.0001f);
+    }
+    CHECK(seen > LARGE / 8);
+    sr_world_destroy(world);
+    destroy_image(host, &image);
 }
 
 /* the application's way to Vulkan, on which it counts two of the calls */
@@ -494,6 +531,7 @@ int main(int argc, char** argv)
     tests_against_the_hosts_depth(&host, context, world);
     sr_world_destroy(world);
     tells_of_splats_that_are_missing(&host, context);
+    draws_again_against_the_same_depth(&host, context);
     sr_context_destroy(context);
     destroy_host(&host);
     CHECK(!fopen(cache, "r")); /* nothing is kept but what the host keeps */

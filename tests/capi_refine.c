@@ -90,6 +90,12 @@ static void check_frame(sr_context* context, sr_renderer* renderer, int frame)
     target.memory = found;
     CHECK_OK(context, sr_renderer_take(renderer, &target));
     CHECK(!memcmp(found, expected[frame], sizeof found));
+    target.format = VK_FORMAT_R8G8B8A8_SRGB; /* the same bytes */
+    memset(found, 0, sizeof found);
+    CHECK_OK(context, sr_renderer_take(renderer, &target));
+    CHECK(!memcmp(found, expected[frame], sizeof found));
+    target.format = VK_FORMAT_R32G32B32A32_SFLOAT;
+    CHECK(sr_renderer_take(renderer, &target) == SR_ERR_USAGE && says(context, "format 109"));
 }
 
 /* 0..1 as files have it, and metres */

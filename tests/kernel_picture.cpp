@@ -188,6 +188,137 @@ TEST(kernel_picture, bytes_become_texels)
     }
 }
 
+// numbers that formats cut, those beside which they round in another way, and others
+std::vector<float> texel_numbers(size_t count, uint32_t seed)
+{
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<float> unit(-1.2f, 1.2f);
+    const float hard[] = {0,     -0.f,     1,       -1,       2,      65519.9f,   65520,       -70000,    1e-8f,
+                          3e-8f, 2.98e-8f, 6.1e-5f, 2.5e-45f, 1e-38f, 0.5f / 255, -0.5f / 127, 1 - 6e-8f, 1e30f};
+    std::vector<float> numbers(std::begin(hard), std::end(hard));
+    for (int k = 0; k < 255; ++k) // the float nearest to a boundary, and those beside it
+        for (const float most : {255.f, 127.f}) {
+            const float v = (float(k) + 0.5f) / most;
+            numbers.insert(numbers.end(), {v, std::nextafter(v, 0.f), std::nextafter(v, 2.f), -v});
+        }
+    while (numbers.size() < count)
+        numbers.push_back(unit(random));
+    numbers.resize(count);
+    return numbers;
+}
+
+// [cameras, pixels, width] as a format has it, by the rounding that picture.h says, in double
+std::vector<uint8_t> texels_reference(const std::vector<float>& x, uint32_t cameras, uint32_t width, Texels texels)
+{
+    std::vector<uint8_t> bytes;
+    const auto put = [&](uint32_t word, uint32_t count) {
+        for (uint32_t i = 0; i < count; ++i)
+            bytes.push_back(uint8_t(word >> 8 * i));
+    };
+    const auto whole = [](double v, double low, double most) {
+        return uint32_t(int(std::round(most * std::clamp(v, low, 1.0)))) & 255;
+    };
+    const size_t numbers = x.size() / cameras;
+    for (uint32_t camera = 0; camera < cameras; ++camera) {
+        for (size_t i = 0; i < numbers; i += width) {
+            const float* v = &x[camera * numbers + i];
+            for (uint32_t c = 0; c < 4; ++c)
+                switch (texels) {
+                case Texels::unorm8:
+                    put(whole(v[c], 0, 255), 1);
+                    break;
+                case Texels::snorm8:
+                    put(c < 3 ? whole(v[c], -1, 127) : 0, 1);
+                    break;
+                case Texels::half4:
+                    put(float_to_half(v[c]), 2);
+                    break;
+                case Texels::float4:
+                    put(std::bit_cast<uint32_t>(v[c]), 4);
+                    break;
+                default:
+                    break;
+                }
+            const auto bits = std::bit_cast<uint32_t>(v[0]);
+            if (texels == Texels::half1)
+                put(float_to_half(v[0]), 2);
+            else if (texels == Texels::byte)
+                put(std::min(bits, 255u), 1);
+            else if (texels == Texels::float1 || texels == Texels::word)
+                put(bits, 4);
+        }
+        bytes.resize(round_up(uint32_t(bytes.size()), 4)); // zeros fill a camera's last word
+    }
+    return bytes;
+}
+
+TEST(kernel_picture, numbers_become_texels_of_every_format)
+{
+    struct Case {
+        Texels texels;
+        uint32_t width;
+    };
+    for (const auto& [texels, width] : {Case{Texels::unorm8, 4},
+                                        {Texels::snorm8, 4},
+                                        {Texels::half4, 4},
+                                        {Texels::float4, 4},
+                                        {Texels::half1, 2},
+                                        {Texels::float1, 2},
+                                        {Texels::byte, 2},
+                                        {Texels::word, 2}})
+        for (const uint32_t pixels : {1u, 2u, 3u, 4u, 64u, 51u * 37})
+            for (const uint32_t cameras : {1u, 3u}) {
+                KernelCase k(test_device());
+                std::vector<float> x = texel_numbers(size_t(cameras) * pixels * width, pixels);
+                for (size_t i = 0; texels == Texels::byte && i < x.size(); i += 3)
+                    x[i] = std::bit_cast<float>(uint32_t(i % 300)); // labels, too
+                const Tensor y = splat_texels(k.graph, k.input(x, width), cameras, {texels});
+                const Tensor out = k.output(y.rows, 1, DType::u32, 1);
+                k.graph.keep(y, out);
+                ASSERT_TRUE(k.compile_and_run());
+                EXPECT_EQ(k.read_array<uint8_t>(out), texels_reference(x, cameras, width, texels))
+                    << int(texels) << ": " << pixels << " of " << cameras;
+            }
+}
+
+TEST(kernel_picture, colours_become_light)
+{
+    KernelCase k(test_device());
+    std::vector<float> x = texel_numbers(4 * 1000, 1);
+    for (size_t i = 0; i < x.size(); ++i) // colours of 0..1.02 and alpha, 0, too
+        x[i] = i % 4 == 3 ? (i % 32 == 3 ? 0 : std::min(std::abs(x[i]), 1.f)) : float(i % 1021) / 1000;
+    for (size_t i = 0; i < x.size(); ++i)
+        x[i] *= i % 4 == 3 ? 1 : x[i / 4 * 4 + 3];
+    const Tensor out = k.output(uint32_t(x.size()), 1, DType::u32, 1);
+    k.graph.keep(splat_texels(k.graph, k.input(x, 4), 1, {.texels = Texels::float4, .linear = true}), out);
+    ASSERT_TRUE(k.compile_and_run());
+    const std::vector<float> got = k.read_array<float>(out);
+    for (size_t i = 0; i < x.size(); ++i) {
+        const double alpha = x[i / 4 * 4 + 3], v = alpha > 0 ? x[i] / alpha : 0;
+        const double light = v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
+        const double expected = i % 4 == 3 ? alpha : alpha * light;
+        ASSERT_NEAR(got[i], expected, 1e-6 * expected + 1e-38) << i; // some ten roundings
+    }
+}
+
+TEST(kernel_picture, depths_become_numbers_of_a_z_buffer)
+{
+    for (const auto& [scale, offset] : {std::pair{-1.01f, 1.01f}, {0.2f, 0.f}, {-0.3f, 0.9f}}) {
+        KernelCase k(test_device());
+        std::vector<float> x = texel_numbers(2 * 1000, 7);
+        for (size_t i = 0; i < x.size(); ++i)
+            x[i] = i % 10 == 0 ? 0 : std::clamp(std::abs(x[i]) * 40, 0.2f, 1e6f); // metres
+        const Tensor numbers = k.input(std::vector<float>{scale, offset}, 2), out = k.output(1000, 1, DType::u32, 1);
+        k.graph.keep(splat_texels(k.graph, k.input(x, 2), 1, {.texels = Texels::float1, .scaled = true}, numbers), out);
+        ASSERT_TRUE(k.compile_and_run());
+        const std::vector<float> got = k.read_array<float>(out);
+        for (size_t i = 0; i < got.size(); ++i) {
+            const double z = x[2 * i], d = double(offset) + (z > 0 ? scale / z : 0);
+            ASSERT_NEAR(got[i], std::clamp(d, 0.0, 1.0), 1.3e-7) << z; // of a quotient below 2 and a sum below 1
+        }
+    }
+}
+
 TEST(kernel_picture, finds_the_first_number_that_is_none)
 {
     const PictureShape s{51, 38, 56, 40};

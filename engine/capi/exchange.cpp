@@ -7,6 +7,15 @@
 
 namespace semrover::capi {
 
+namespace {
+
+VkImageAspectFlags aspect_of(uint32_t format)
+{
+    return format == VK_FORMAT_D32_SFLOAT ? VK_IMAGE_ASPECT_DEPTH_BIT : VK_IMAGE_ASPECT_COLOR_BIT;
+}
+
+} // namespace
+
 Result<HostCopies*> copies_of(sr_context& context)
 {
     if (!context.copies) {
@@ -56,24 +65,41 @@ Status check_size(const ImageSize& size, const char* name)
     return {};
 }
 
-Status hand_over(sr_context& context, const Slot& pixels, const ImageSize& size, const sr_target& to)
+Status hand_over(sr_context& context, const BufferSlice& pixels, const ImageSize& size, const sr_target& to)
 {
     if (to.memory)
-        SR_CHECK(context.drawing->read(pixels.slice(), {static_cast<std::byte*>(to.memory), size_t(pixels.bytes())}));
+        SR_CHECK(context.drawing->read(pixels, {static_cast<std::byte*>(to.memory), size_t(pixels.bytes)}));
     if (!to.buffer && !to.image)
         return {};
     SR_TRY(HostCopies * copies, copies_of(context));
-    return copies->copy(pixels.slice(), host_target(to, size));
+    return copies->copy(pixels, host_target(to, size));
 }
 
 HostTarget host_target(const sr_target& to, const ImageSize& size)
 {
     HostTarget target{.buffer = to.buffer, .offset = to.buffer_offset};
-    target.image = {to.image, size.width, size.height, VkImageLayout(to.layout_before), VkImageLayout(to.layout_after)};
+    target.image = {to.image,
+                    size.width,
+                    size.height,
+                    VkImageLayout(to.layout_before),
+                    VkImageLayout(to.layout_after),
+                    aspect_of(to.format)};
     return target;
 }
 
-Result<HostFloats> host_depth(const sr_depth_image& d, const ImageSize& size)
+std::vector<WantedPicture> wanted_pictures(const sr_draw_desc& draw, const PictureFormats& formats, SplatSlots kept)
+{
+    std::vector<WantedPicture> wanted;
+    const auto targets = targets_of(draw);
+    const auto slots = kept.all();
+    for (size_t i = 0; i < slots.size(); ++i)
+        if (slots[i]->valid())
+            wanted.push_back({slots[i]->slice().part(0, picture_bytes(formats[i], *slots[i], draw.width * draw.height)),
+                              targets[i]});
+    return wanted;
+}
+
+Result<HostImage> host_depth(const sr_depth_image& d, const ImageSize& size)
 {
     if (d.format != VK_FORMAT_D32_SFLOAT && d.format != VK_FORMAT_R32_SFLOAT)
         return fail(ErrorCode::usage, "sr_depth_image: format {} is neither D32_SFLOAT nor R32_SFLOAT", d.format);
@@ -82,14 +108,22 @@ Result<HostFloats> host_depth(const sr_depth_image& d, const ImageSize& size)
     constexpr double most = std::numeric_limits<float>::max();
     SR_CHECK(number_in(d.scale, -most, most, "sr_depth_image", "scale").map([](double) {}));
     SR_CHECK(number_in(d.offset, -most, most, "sr_depth_image", "offset").map([](double) {}));
-    const bool depth = d.format == VK_FORMAT_D32_SFLOAT;
-    return HostFloats{{d.image, size.width, size.height, VkImageLayout(d.layout_before), VkImageLayout(d.layout_after)},
-                      VkImageAspectFlags(depth ? VK_IMAGE_ASPECT_DEPTH_BIT : VK_IMAGE_ASPECT_COLOR_BIT)};
+    return HostImage{d.image,
+                     size.width,
+                     size.height,
+                     VkImageLayout(d.layout_before),
+                     VkImageLayout(d.layout_after),
+                     aspect_of(d.format)};
 }
 
 std::array<float, 2> z_scale(const sr_depth_image& d)
 {
     return {float(d.scale), float(d.offset)};
+}
+
+std::array<float, 2> depth_scale(const sr_draw_desc& d)
+{
+    return {float(d.depth_scale), float(d.depth_offset)};
 }
 
 Status take_in(sr_context& context, const sr_source& from, const Slot& to, uint64_t bytes, const char* name)

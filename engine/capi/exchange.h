@@ -4,6 +4,7 @@
 
 #include "engine/capi/call.h"
 #include "engine/capi/handles.h"
+#include "engine/capi/picture_formats.h"
 
 // pictures on their way between our memory and what an application gives: its memory, buffers and images
 namespace semrover::capi {
@@ -26,14 +27,15 @@ Status check_size(const ImageSize& size, const char* name);
 
 HostTarget host_target(const sr_target& to, const ImageSize& size);
 
-// What a draw is tested against. Errors: usage for another format than two, layouts that are UNDEFINED, and numbers
+// What a draw is tested against. Errors: usage for another format than two, a layout before that is UNDEFINED, and numbers
 // that are not finite
-Result<HostFloats> host_depth(const sr_depth_image& depth, const ImageSize& size);
+Result<HostImage> host_depth(const sr_depth_image& depth, const ImageSize& size);
 std::array<float, 2> z_scale(const sr_depth_image& depth);
+std::array<float, 2> depth_scale(const sr_draw_desc& draw); // of the picture
 
-// A picture to where the application wants it; waits for it
+// The first bytes of a slot to where the application wants them; waits for it
 Result<HostCopies*> copies_of(sr_context& context);
-Status hand_over(sr_context& context, const Slot& pixels, const ImageSize& size, const sr_target& to);
+Status hand_over(sr_context& context, const BufferSlice& pixels, const ImageSize& size, const sr_target& to);
 
 // `bytes` of the application's to the beginning of a slot; waits for it. Errors: usage unless there is one of memory
 // and buffer. name: of the member
@@ -41,8 +43,17 @@ Status take_in(sr_context& context, const sr_source& from, const Slot& to, uint6
 
 // What a camera sees, on the device, until the next draw of the world: at once, or by commands that are being recorded.
 // Targets are not looked at. Errors: as sr_world_draw has them. name: of the call
-Result<SplatSlots> draw_splats(sr_world& world, const sr_draw_desc& draw, const char* name);
-Result<SplatSlots> record_splats(sr_world& world, const sr_draw_desc& draw, VkCommandBuffer commands, const char* name);
+Result<SplatSlots> draw_splats(sr_world& world, const sr_draw_desc& draw, const PictureFormats& formats,
+                               const char* name);
+Result<SplatSlots> record_splats(sr_world& world, const sr_draw_desc& draw, const PictureFormats& formats,
+                                 VkCommandBuffer commands, const char* name);
+
+// What is wanted of it, with the target that it goes to. kept: as draw_splats() returns it
+struct WantedPicture {
+    BufferSlice pixels;
+    const sr_target* target;
+};
+std::vector<WantedPicture> wanted_pictures(const sr_draw_desc& draw, const PictureFormats& formats, SplatSlots kept);
 
 // Errors: usage for a world without splat_bytes. name: of the call
 Result<SplatPool*> splats_of(const sr_world& world, const char* name);

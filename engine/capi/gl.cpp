@@ -86,6 +86,12 @@ sr_draw_desc camera_of(const sr_gl_draw_desc& d)
     return draw;
 }
 
+PictureFormats formats_of(const sr_gl_draw_desc& d)
+{
+    const auto format = [](GlName texture) { return PictureFormat{texture ? Texels::whole : Texels::none}; };
+    return {format(d.color), format(d.normal), format(d.depth), format(d.label)};
+}
+
 // a picture, the room that it goes through, and the texture that wants it
 struct Wanted {
     Slot from;
@@ -149,13 +155,13 @@ Status draw(sr_gl& gl, sr_world& world, const sr_gl_draw_desc& d)
         SR_CHECK(show_updates(world, false));
         SR_TRY(const VkCommandBuffer commands, link.begin());
         world.done = gl.context->drawing->next_point();
-        SR_TRY(const SplatSlots images, record_splats(world, camera_of(d), commands, "sr_gl_draw"));
+        SR_TRY(const SplatSlots images, record_splats(world, camera_of(d), formats_of(d), commands, "sr_gl_draw"));
         const std::vector<Wanted> wanted = wanted_of(gl, d, images);
         SR_TRY(const std::vector<GlLink::Piece> pieces, pieces_of(link, wanted));
         SR_CHECK(link.finish(commands, pieces));
         return upload(link, wanted);
     }
-    SR_TRY(const SplatSlots images, draw_splats(world, camera_of(d), "sr_gl_draw"));
+    SR_TRY(const SplatSlots images, draw_splats(world, camera_of(d), formats_of(d), "sr_gl_draw"));
     const std::vector<Wanted> wanted = wanted_of(gl, d, images);
     SR_TRY(const std::vector<GlLink::Piece> pieces, pieces_of(link, wanted));
     SR_CHECK(link.send(pieces));

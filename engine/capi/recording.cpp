@@ -10,7 +10,7 @@ namespace {
 
 Status check_targets(const sr_draw_desc& d)
 {
-    for (const sr_target* target : {&d.color, &d.normal, &d.depth, &d.label})
+    for (const sr_target* target : targets_of(d))
         if (target->memory)
             return fail(ErrorCode::usage, "sr_draw_desc: what is recorded goes to buffers and images, not to memory");
     return {};
@@ -37,15 +37,11 @@ Status record(sr_world& world, const sr_draw_desc& d, VkCommandBuffer commands, 
 {
     Device& device = *world.context->drawing;
     SR_CHECK(check_device(world, name));
-    if (d.reserved)
-        return fail(ErrorCode::usage, "sr_draw_desc: reserved is not 0");
     SR_CHECK(check_targets(d));
-    SR_TRY(const SplatSlots images, record_splats(world, d, commands, name));
-    const ImageSize size{d.width, d.height};
-    record_host_target(device, commands, images.color.slice(), host_target(d.color, size));
-    record_host_target(device, commands, images.surface.slice(), host_target(d.normal, size));
-    record_host_target(device, commands, images.depth.slice(), host_target(d.depth, size));
-    record_host_target(device, commands, images.ids.slice(), host_target(d.label, size));
+    SR_TRY(const PictureFormats formats, formats_of(d));
+    SR_TRY(const SplatSlots images, record_splats(world, d, formats, commands, name));
+    for (const WantedPicture& wanted : wanted_pictures(d, formats, images))
+        record_host_target(device, commands, wanted.pixels, host_target(*wanted.target, {d.width, d.height}));
     return {};
 }
 
@@ -81,7 +77,8 @@ Status submit(sr_world& world, const sr_draw_desc& d, const sr_sync& sync)
 
 namespace semrover::capi {
 
-Result<SplatSlots> record_splats(sr_world& world, const sr_draw_desc& d, VkCommandBuffer commands, const char* name)
+Result<SplatSlots> record_splats(sr_world& world, const sr_draw_desc& d, const PictureFormats& formats,
+                                 VkCommandBuffer commands, const char* name)
 {
     Device& device = *world.context->drawing;
     SR_TRY(const SplatPool* splats, splats_of(world, name));
@@ -90,14 +87,15 @@ Result<SplatSlots> record_splats(sr_world& world, const sr_draw_desc& d, VkComma
     const bool tested = d.depth_test.image;
     std::vector<std::shared_ptr<Rasterizer>> retired;
     SR_TRY(Rasterizer * rasterizer,
-           world.recorded[tested].of(device, *splats, size, {.depth_tested = tested}, retired));
+           world.recorded[tested].of(device, *splats, size, {.depth_tested = tested, .formats = formats}, retired));
     for (std::shared_ptr<Rasterizer>& last : retired)
         world.retired.emplace_back(world.done, std::move(last));
     if (tested) {
-        SR_TRY(const HostFloats depth, host_depth(d.depth_test, size));
-        record_host_floats(device, commands, depth, rasterizer->z_buffer().slice());
+        SR_TRY(const HostImage depth, host_depth(d.depth_test, size));
+        const BufferSlice z = rasterizer->z_buffer().slice();
+        record_image_fetch(device.vk(), commands, depth, z.buffer->handle(), z.offset);
     }
-    SR_CHECK(rasterizer->record(commands, pinhole_camera(d, size), z_scale(d.depth_test)));
+    SR_CHECK(rasterizer->record(commands, pinhole_camera(d, size), z_scale(d.depth_test), depth_scale(d)));
     return rasterizer->images(0);
 }
 

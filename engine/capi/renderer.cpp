@@ -100,6 +100,15 @@ Result<ImageGray16> draw_world(sr_renderer& renderer, sr_world& world, const Cam
     return depth;
 }
 
+Status check_frame_target(const sr_target& target)
+{
+    const bool known =
+        !target.format || target.format == VK_FORMAT_R8G8B8A8_UNORM || target.format == VK_FORMAT_R8G8B8A8_SRGB;
+    if (!known || target.reserved)
+        return fail(ErrorCode::usage, "sr_target: a frame cannot have format {}, or reserved is not 0", target.format);
+    return {};
+}
+
 // what the application gives
 Result<ImageGray16> take_buffers(sr_renderer& renderer, const sr_frame_desc& d)
 {
@@ -199,8 +208,9 @@ sr_status sr_renderer_take(sr_renderer* renderer, const sr_target* target)
             return fail(ErrorCode::usage, "sr_renderer_take: target is NULL");
         if (!r.frames())
             return fail(ErrorCode::usage, "sr_renderer_take: no frame is finished");
+        SR_CHECK(check_frame_target(*target));
         SR_CHECK(renderer->context->device->wait(renderer->context->device->last_ticket()));
-        return hand_over(*renderer->context, r.texels(), renderer->size, *target);
+        return hand_over(*renderer->context, r.texels().slice(), renderer->size, *target);
     });
 }
 

@@ -9,13 +9,14 @@
 namespace semrover::capi {
 
 // A rasterizer of a pool's splats for one camera, of one kind, and the size of the last pictures: made anew when
-// another size is asked for, there are more splats than it looks at, or it lacked room.
+// another size or format is asked for, there are more splats than it looks at, or it lacked room.
 class SizedRasterizer {
   public:
     // errors: as Rasterizer has them
     Result<Rasterizer*> of(Device& device, const SplatPool& splats, const ImageSize& size, RasterizerOptions options)
     {
-        const bool sized = rasterizer_ && size_ == size && alpha_ == options.visible_alpha;
+        const bool sized =
+            rasterizer_ && size_ == size && alpha_ == options.visible_alpha && formats_ == options.formats;
         if (sized && splats.end() <= rasterizer_->rows() && pairs_ <= rasterizer_->max_pairs())
             return rasterizer_.get();
         options.rows = splats.end();
@@ -26,6 +27,7 @@ class SizedRasterizer {
         pairs_ = std::min(pairs_, rasterizer_->max_pairs()); // what the device has room for
         size_ = size;
         alpha_ = options.visible_alpha;
+        formats_ = options.formats;
         return rasterizer_.get();
     }
 
@@ -55,6 +57,7 @@ class SizedRasterizer {
     std::shared_ptr<Rasterizer> rasterizer_;
     ImageSize size_;
     float alpha_ = 0;
+    std::array<PictureFormat, 4> formats_ = {};
     uint32_t pairs_ = 0; // that there must be room for
 };
 

@@ -4,7 +4,6 @@
 
 #include "engine/camera/lens.h"
 #include "engine/splat/planes.h"
-#include "kernels/picture.h"
 #include "runtime/device/command.h"
 
 #include <algorithm>
@@ -17,6 +16,7 @@ namespace semrover {
 namespace {
 
 constexpr uint32_t kPairBytes = 4;
+constexpr const char* kImageNames[] = {"splat colour", "splat surface", "splat depth", "splat ids"};
 
 Status check_camera(const SplatCamera& c, size_t index)
 {
@@ -165,10 +165,7 @@ Status Rasterizer::build()
         pixels_ = {state_.slot(pixels, 1, DType::u32, "seen", 1), state_.slot(pixels, 1, DType::u32, "ranges", 1),
                    state_.slot(pixels, 1, DType::u32, "normals", 1)};
     else
-        images_ = {state_.slot(pixels, 4, DType::f32, "splat colour", 4),
-                   state_.slot(pixels, 4, DType::f32, "splat surface", 4),
-                   state_.slot(pixels, 2, DType::f32, "splat depth", 2),
-                   state_.slot(pixels, 2, DType::u32, "splat ids", 2)};
+        declare_images(pixels);
     SR_CHECK(state_.allocate(device_, "splat images"));
     Graph g;
     SplatOptions o{.width = width_,
@@ -185,6 +182,8 @@ Status Rasterizer::build()
     o.cutoff = options_.cutoff;
     if (options_.depth_tested)
         o.limits = splat_limits(g, z_buffer_.in(g), z_scale_.in(g));
+    for (size_t i = 0; i < o.made.size(); ++i)
+        o.made[i] = options_.pixels_over || options_.formats[i].texels != Texels::none;
     const SplatImages y = splat(g, scene_.in(g, rows_), camera_table_.in(g), o);
     if (options_.pixels_over) {
         const PixelWords pixels_of_files = splat_pixels(g, y, {*options_.pixels_over, options_.visible_alpha});
@@ -192,15 +191,44 @@ Status Rasterizer::build()
         g.keep(pixels_of_files.ranges, pixels_.ranges);
         g.keep(pixels_of_files.normals, pixels_.normals);
     } else {
-        g.keep(y.color, images_.color);
-        g.keep(y.surface, images_.surface);
-        g.keep(y.depth, images_.depth);
-        g.keep(y.ids, images_.ids);
+        keep_images(g, y);
     }
     g.keep(y.visible, visible_);
     g.keep(y.pairs, pairs_);
     SR_TRY(program_, Program::create(device_, g));
     return {};
+}
+
+// slots of what is wanted
+void Rasterizer::declare_images(uint32_t pixels)
+{
+    const std::array<Slot*, 4> slots = images_.all();
+    for (size_t i = 0; i < slots.size(); ++i) {
+        const auto& [texels, linear, scaled] = options_.formats[i];
+        const uint32_t numbers = i < 2 ? 4 : 2;
+        if (texels == Texels::none)
+            *slots[i] = {};
+        else if (texels == Texels::whole)
+            *slots[i] = state_.slot(pixels, numbers, i == 3 ? DType::u32 : DType::f32, kImageNames[i], numbers);
+        else
+            *slots[i] = state_.slot(texel_words(texels, width_ * height_) * cameras_, 1, DType::u32, kImageNames[i], 1);
+        if (scaled)
+            format_scale_ = state_.slot(1, 2, DType::f32, "scale of a picture", 2);
+    }
+}
+
+void Rasterizer::keep_images(Graph& g, const SplatImages& y)
+{
+    const std::array<Slot*, 4> slots = images_.all();
+    const std::array<Tensor, 4> made = {y.color, y.surface, y.depth, y.ids};
+    for (size_t i = 0; i < slots.size(); ++i) {
+        const PictureFormat& format = options_.formats[i];
+        if (format.texels == Texels::none)
+            continue;
+        const bool whole = format.texels == Texels::whole;
+        const Tensor scale = format.scaled ? format_scale_.in(g) : Tensor{};
+        g.keep(whole ? made[i] : splat_texels(g, made[i], cameras_, format, scale), *slots[i]);
+    }
 }
 
 Status Rasterizer::make_room(uint32_t visible, uint32_t pairs)
@@ -240,7 +268,8 @@ Status Rasterizer::draw_together(std::span<const SplatCamera> cameras)
     }
 }
 
-Status Rasterizer::record(VkCommandBuffer commands, const SplatCamera& camera, std::array<float, 2> z_scale)
+Status Rasterizer::record(VkCommandBuffer commands, const SplatCamera& camera, std::array<float, 2> z_scale,
+                          std::array<float, 2> format_scale)
 {
     SR_CHECK(check_camera(camera, 0));
     if (!program_) // there was no memory for it the last time
@@ -255,9 +284,11 @@ Status Rasterizer::record(VkCommandBuffer commands, const SplatCamera& camera, s
     const BufferSlice cameras = camera_table_.slice();
     record_entry_barrier(vk, commands);
     record_update(vk, commands, cameras.buffer->handle(), cameras.offset, std::as_bytes(std::span(table)));
-    if (options_.depth_tested) {
-        const BufferSlice scale = z_scale_.slice();
-        record_update(vk, commands, scale.buffer->handle(), scale.offset, std::as_bytes(std::span(z_scale)));
+    for (const auto& [slot, numbers] : {std::pair{&z_scale_, &z_scale}, {&format_scale_, &format_scale}}) {
+        if (!slot->valid())
+            continue;
+        const BufferSlice scale = slot->slice();
+        record_update(vk, commands, scale.buffer->handle(), scale.offset, std::as_bytes(std::span(*numbers)));
     }
     program_->record_into(commands);
     const BufferSlice pairs = pairs_.slice();
@@ -309,9 +340,11 @@ SplatPixelSlots Rasterizer::pixels(uint32_t camera) const
 
 SplatSlots Rasterizer::images(uint32_t camera) const
 {
-    const uint32_t pixels = width_ * height_, first = camera * pixels;
-    return {images_.color.row_range(first, pixels), images_.surface.row_range(first, pixels),
-            images_.depth.row_range(first, pixels), images_.ids.row_range(first, pixels)};
+    SplatSlots of_camera = images_;
+    for (Slot* slot : of_camera.all())
+        if (slot->valid())
+            *slot = slot->row_range(camera * (slot->rows() / cameras_), slot->rows() / cameras_);
+    return of_camera;
 }
 
 Status Rasterizer::read_images(std::span<SplatImage> images)
@@ -339,7 +372,8 @@ Status Rasterizer::read_images(std::span<SplatImage> images)
 
 Status Rasterizer::render(std::span<const SplatCamera> cameras, std::vector<SplatImage>& images)
 {
-    SR_ASSERT(!options_.pixels_over, "this rasterizer keeps pixels, not images");
+    SR_ASSERT(!options_.pixels_over && options_.formats == RasterizerOptions().formats,
+              "this rasterizer does not keep whole images");
     for (size_t i = 0; i < cameras.size(); ++i)
         SR_CHECK(check_camera(cameras[i], i));
     images.resize(cameras.size());

@@ -4,6 +4,7 @@
 
 #include "engine/camera/camera.h"
 #include "engine/splat/splat_scene.h"
+#include "kernels/picture.h"
 #include "runtime/device/program.h"
 
 #include <array>
@@ -57,12 +58,15 @@ struct RasterizerOptions {
     // keeps pixels as files have them, over this background, in place of images: draw() and pixels(), not render()
     std::optional<std::array<uint8_t, 3>> pixels_over = {};
     bool depth_tested = false; // against z_buffer(), of pinholes
+    // of color, surface, depth and ids: how images() has them, and whether it has. render() needs them whole
+    std::array<PictureFormat, 4> formats = {};
 };
 
-// what one camera sees, on the device, a row a pixel: as SplatImages (kernels/splat.h) has it, or as files have it
-// (PixelWords, kernels/picture.h)
+// what one camera sees, on the device: as SplatImages (kernels/splat.h) has it, a row a pixel, or in words, where
+// another format was asked for, or nothing; or as files have it (PixelWords, kernels/picture.h)
 struct SplatSlots {
     Slot color, surface, depth, ids;
+    std::array<Slot*, 4> all() { return {&color, &surface, &depth, &ids}; }
 };
 struct SplatPixelSlots {
     Slot seen, ranges, normals;
@@ -94,12 +98,15 @@ class Rasterizer {
     // scale / (z - offset) metres along z are not drawn. To be filled before each draw
     const Slot& z_buffer() const { return z_buffer_; }
     const Slot& z_scale() const { return z_scale_; }
+    // [1, 2] fp32, where a format is scaled, likewise
+    const Slot& format_scale() const { return format_scale_; }
 
-    // The same by an application's hand: records the drawing into a command buffer, to be executed any number of times,
-    // one after the other, on the device's queue family. camera: copied. What is recorded is good as long as the
-    // rasterizer. z_scale: with depth_tested; z_buffer() is filled by what was recorded before. Errors: bad_input as
-    // render()'s
-    Status record(VkCommandBuffer commands, const SplatCamera& camera, std::array<float, 2> z_scale = {});
+    // The same by an application's hand: records the drawing into a command buffer, to be executed any number of times, one
+    // after the other, on the device's queue family. camera: copied. What is recorded is good as long as the
+    // rasterizer. z_scale, format_scale: where there are such slots; z_buffer() is filled by what was recorded before.
+    // Errors: bad_input as render()'s
+    Status record(VkCommandBuffer commands, const SplatCamera& camera, std::array<float, 2> z_scale = {},
+                  std::array<float, 2> format_scale = {});
     // The most pairs that one of the last kRecordings had, of those that have been executed: where they are more than
     // max_pairs(), it lacks the farthest splats. Does not wait
     uint32_t recorded_pairs() const;
@@ -115,6 +122,8 @@ class Rasterizer {
   private:
     Rasterizer(Device& device, const SplatScene& scene) : device_(device), scene_(scene) {}
     Status build();
+    void declare_images(uint32_t pixels);
+    void keep_images(Graph& g, const SplatImages& images);
     Status make_room(uint32_t visible, uint32_t pairs);
     Result<uint32_t> draw_some(std::span<const SplatCamera> cameras);
     Status draw_together(std::span<const SplatCamera> cameras);
@@ -126,7 +135,7 @@ class Rasterizer {
     uint32_t width_ = 0, height_ = 0, cameras_ = 0, rows_ = 0;
     uint32_t max_visible_ = 0, max_pairs_ = 0, rebuilds_ = 0;
     State state_;
-    Slot camera_table_, visible_, pairs_, z_buffer_, z_scale_;
+    Slot camera_table_, visible_, pairs_, z_buffer_, z_scale_, format_scale_;
     std::unique_ptr<Buffer> recorded_; // [kRecordings] u32: pairs of what was recorded, where the host sees them
     uint32_t recording_ = 0;
     SplatSlots images_;      // of all cameras, or

@@ -23,6 +23,8 @@ namespace semrover {
 
 namespace {
 
+constexpr const char* kMade[] = {"kColor", "kSurface", "kDepth", "kIds"}; // of SplatOptions::made
+
 SplatPush make_push(const SplatTensors& scene, Tensor cameras, const SplatOptions& o)
 {
     SplatPush push{};
@@ -128,27 +130,31 @@ SplatImages splat(Graph& g, const SplatTensors& scene, Tensor cameras, const Spl
     const uint32_t pixels = options.width * options.height * push.cameras;
     const Seen seen = project(g, scene, cameras, options, push);
     const Tiled by_tile = sort_into_tiles(g, seen, options, push);
-    const SplatImages y = {g.array(pixels, DType::f32, "splat colour", 4),
-                           g.array(pixels, DType::f32, "splat surface", 4),
-                           g.array(pixels, DType::f32, "splat depth", 2),
-                           g.array(pixels, DType::u32, "splat ids", 2),
+    const auto rows = [&](size_t picture) { return options.made[picture] ? pixels : 1; };
+    const SplatImages y = {g.array(rows(0), DType::f32, "splat colour", 4),
+                           g.array(rows(1), DType::f32, "splat surface", 4),
+                           g.array(rows(2), DType::f32, "splat depth", 2),
+                           g.array(rows(3), DType::u32, "splat ids", 2),
                            seen.count,
                            by_tile.pairs};
     DispatchOptions blend;
     blend.most_operations = 40.0 * push.max_pairs * options.tile * options.tile; // no pixel is done early
+    for (size_t picture = 0; picture < options.made.size(); ++picture)
+        blend.constants.push_back({kMade[picture], options.made[picture]});
     const Grid grid = tiles(options.height, options.width, push.cameras);
     if (options.lens == SplatLens::pinhole) {
         const bool limited = options.limits.valid();
-        blend.constants = {{"kLimited", limited}};
+        blend.constants.push_back({"kLimited", limited});
         g.dispatch(kernel::splat_blend,
                    {seen.records, by_tile.records, by_tile.starts, seen.sources, scene.labels, scene.cells, y.color,
                     y.surface, y.depth, y.ids, limited ? options.limits : scene.positions},
                    push, grid, std::move(blend));
         return y;
     }
-    blend.constants = {{"kModel", uint32_t(options.lens)}};
+    const ConstantValue model{"kModel", uint32_t(options.lens)};
+    blend.constants.push_back(model);
     const Tensor rays = g.array(pixels, DType::f32, "rays", 4);
-    g.dispatch(kernel::splat_rays, {cameras, rays}, push, threads(pixels), {.constants = blend.constants});
+    g.dispatch(kernel::splat_rays, {cameras, rays}, push, threads(pixels), {.constants = {model}});
     g.dispatch(kernel::splat_ray_blend,
                {seen.records, by_tile.records, by_tile.starts, seen.sources, scene.labels, scene.cells, y.color,
                 y.surface, y.depth, y.ids, rays},

@@ -26,7 +26,6 @@ constexpr VkAccessFlags kAnything = VK_ACCESS_MEMORY_READ_BIT | VK_ACCESS_MEMORY
 // what a copy needs an image of the application's to be
 struct ImageTransfer {
     const HostImage& image;
-    VkImageAspectFlags aspect;
     VkImageLayout layout;
     VkAccessFlags access;
 };
@@ -36,7 +35,7 @@ void move_image(const VulkanCalls& vk, VkCommandBuffer commands, const ImageTran
 {
     image.srcQueueFamilyIndex = image.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
     image.image = t.image.image;
-    image.subresourceRange = {t.aspect, 0, 1, 0, 1};
+    image.subresourceRange = {t.image.aspect, 0, 1, 0, 1};
     vk.CmdPipelineBarrier(commands, from, to, 0, 0, nullptr, 0, nullptr, 1, &image);
 }
 
@@ -64,7 +63,7 @@ VkBufferImageCopy whole_image(const ImageTransfer& t, uint64_t offset)
 {
     VkBufferImageCopy region{};
     region.bufferOffset = offset;
-    region.imageSubresource = {t.aspect, 0, 0, 1};
+    region.imageSubresource = {t.image.aspect, 0, 0, 1};
     region.imageExtent = {t.image.width, t.image.height, 1};
     return region;
 }
@@ -113,20 +112,19 @@ void record_host_copy(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer 
 void record_image_copy(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer from, uint64_t from_at,
                        const HostImage& to)
 {
-    const ImageTransfer transfer{to, VK_IMAGE_ASPECT_COLOR_BIT, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
-                                 VK_ACCESS_TRANSFER_WRITE_BIT};
+    const ImageTransfer transfer{to, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, VK_ACCESS_TRANSFER_WRITE_BIT};
     begin_transfer(vk, commands, transfer);
     const VkBufferImageCopy region = whole_image(transfer, from_at);
     vk.CmdCopyBufferToImage(commands, from, to.image, transfer.layout, 1, &region);
     end_transfer(vk, commands, transfer, VK_ACCESS_TRANSFER_WRITE_BIT);
 }
 
-void record_image_fetch(const VulkanCalls& vk, VkCommandBuffer commands, const HostImage& from,
-                        VkImageAspectFlags aspect, VkBuffer to, uint64_t to_at)
+void record_image_fetch(const VulkanCalls& vk, VkCommandBuffer commands, const HostImage& from, VkBuffer to,
+                        uint64_t to_at)
 {
     // what was read of the buffer before, too
     barrier(vk, commands, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, kAnything, kTransfer, kCopy);
-    const ImageTransfer transfer{from, aspect, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, VK_ACCESS_TRANSFER_READ_BIT};
+    const ImageTransfer transfer{from, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, VK_ACCESS_TRANSFER_READ_BIT};
     begin_transfer(vk, commands, transfer);
     const VkBufferImageCopy region = whole_image(transfer, to_at);
     vk.CmdCopyImageToBuffer(commands, from.image, transfer.layout, to, 1, &region);

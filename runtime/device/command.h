@@ -27,10 +27,11 @@ struct HostImage {
     VkImage image = VK_NULL_HANDLE;
     uint32_t width = 0, height = 0;
     VkImageLayout before = VK_IMAGE_LAYOUT_UNDEFINED, after = VK_IMAGE_LAYOUT_GENERAL;
+    VkImageAspectFlags aspect = VK_IMAGE_ASPECT_COLOR_BIT;
 };
-// the other way, of a depth or color image of 32-bit floats: row by row. `before` is not UNDEFINED
-void record_image_fetch(const VulkanCalls& vk, VkCommandBuffer commands, const HostImage& from,
-                        VkImageAspectFlags aspect, VkBuffer to, uint64_t to_at);
+// the other way: row by row. `before` is not UNDEFINED
+void record_image_fetch(const VulkanCalls& vk, VkCommandBuffer commands, const HostImage& from, VkBuffer to,
+                        uint64_t to_at);
 void record_image_copy(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer from, uint64_t from_at,
                        const HostImage& to);
 // into a command buffer of the application's: what follows may use everything that came before, in the queue too

@@ -12,11 +12,6 @@ void record_host_target(const Device& device, VkCommandBuffer commands, const Bu
         record_image_copy(device.vk(), commands, from.buffer->handle(), from.offset, to.image);
 }
 
-void record_host_floats(const Device& device, VkCommandBuffer commands, const HostFloats& from, const BufferSlice& to)
-{
-    record_image_fetch(device.vk(), commands, from.image, from.aspect, to.buffer->handle(), to.offset);
-}
-
 Result<std::unique_ptr<HostCopies>> HostCopies::create(Device& device)
 {
     std::unique_ptr<HostCopies> c(new HostCopies(device));
@@ -38,10 +33,10 @@ Status HostCopies::fetch(VkBuffer from, uint64_t offset, const BufferSlice& to)
     return submit();
 }
 
-Status HostCopies::fetch(const HostFloats& from, const BufferSlice& to)
+Status HostCopies::fetch(const HostImage& from, const BufferSlice& to)
 {
     SR_TRY(const VkCommandBuffer commands, commands_->begin());
-    record_host_floats(device_, commands, from, to);
+    record_image_fetch(device_.vk(), commands, from, to.buffer->handle(), to.offset);
     return submit();
 }
 

@@ -14,15 +14,6 @@ struct HostTarget {
     HostImage image = {};
 };
 
-// an image of 32-bit floats that an application has
-struct HostFloats {
-    HostImage image;
-    VkImageAspectFlags aspect = VK_IMAGE_ASPECT_DEPTH_BIT;
-};
-
-// into a command buffer that is being recorded, too
-void record_host_floats(const Device& device, VkCommandBuffer commands, const HostFloats& from, const BufferSlice& to);
-
 // into a command buffer that is being recorded. to.image: texels of the slice's rows, as many as it has
 void record_host_target(const Device& device, VkCommandBuffer commands, const BufferSlice& from, const HostTarget& to);
 
@@ -34,7 +25,7 @@ class HostCopies {
     Status copy(const BufferSlice& from, const HostTarget& to); // as record_host_target()
     // as many bytes as the slice has, from a buffer with TRANSFER_SRC usage
     Status fetch(VkBuffer from, uint64_t offset, const BufferSlice& to);
-    Status fetch(const HostFloats& from, const BufferSlice& to); // pixels, row by row
+    Status fetch(const HostImage& from, const BufferSlice& to); // pixels, row by row
 
   private:
     explicit HostCopies(Device& device) : device_(device) {}

@@ -4,6 +4,10 @@
 // what all blending shares: a pixel's state, what a splat adds to it, and the outputs
 #include "lib/splat_record.glsl"
 
+layout(constant_id = 3) const bool kColor = true; // made, and so on
+layout(constant_id = 4) const bool kSurface = true;
+layout(constant_id = 5) const bool kDepth = true;
+layout(constant_id = 6) const bool kIds = true;
 layout(push_constant) uniform Push { SplatPush p; };
 layout(binding = 1) readonly buffer Pairs { uint pairs[]; };      // [max_pairs] records by tile, nearest first
 layout(binding = 2) readonly buffer Starts { uint starts[]; };    // [tiles + 1] first pair of each tile
@@ -50,9 +54,14 @@ void store(Pixel pixel, uvec2 at, uint camera)
         return;
     const uint i = (camera * p.height + at.y) * p.width + at.x;
     const float alpha = 1.0 - abs(pixel.transmittance);
-    color[i] = vec4(pixel.color, alpha);
-    surface[i] = vec4(pixel.normal, pixel.depth);
-    depth[i] = vec2(alpha > 0.0 ? pixel.depth / alpha : 0.0, pixel.median);
+    if (kColor)
+        color[i] = vec4(pixel.color, alpha);
+    if (kSurface)
+        surface[i] = vec4(pixel.normal, pixel.depth);
+    if (kDepth)
+        depth[i] = vec2(alpha > 0.0 ? pixel.depth / alpha : 0.0, pixel.median);
+    if (!kIds)
+        return;
     const uint splat = pixel.record == kNone ? 0 : sources[pixel.record] % p.splats;
     ids[i] = pixel.record == kNone ? uvec2(kNone) : uvec2(labels[splat], cells[splat]);
 }

@@ -13,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 
-HEADERS = ("semrover.h", "semrover_renderer.h", "semrover_vulkan.h", "semrover_gl.h")
+HEADERS = ("semrover.h", "semrover_draw.h", "semrover_renderer.h", "semrover_vulkan.h", "semrover_gl.h")
 RECORDED = os.path.join(os.path.dirname(os.path.abspath(__file__)), "semrover.abi")
 PROTOTYPE = re.compile(r"^SR_API ([\w *]+[ *]sr_\w+\([^;]*\));", re.M)
 QUIET = ("--no-show-locs", "--no-comp-dir-path", "--no-corpus-path", "--no-architecture", "--no-elf-needed")
