@@ -74,6 +74,12 @@ typedef struct sr_draw_desc {
  * the picture cannot have; SR_ERR_BAD_INPUT: a camera that is not finite. */
 SR_API sr_status sr_world_draw(sr_world* world, const sr_draw_desc* draw);
 
+/* The same of several cameras: what is new is shown once, and cameras that follow each other with the same size,
+ * formats and depth_scale, without depth_test, are drawn by one submit where the device has room. draws: `count` of
+ * them, as far apart as the struct_size of the first says, which all have. The pictures are those of sr_world_draw, and
+ * so are errors; SR_ERR_USAGE: a count of 0, too. After an error some of them may be drawn. */
+SR_API sr_status sr_world_draws(sr_world* world, const sr_draw_desc* draws, uint32_t count);
+
 #ifdef __cplusplus
 }
 #endif

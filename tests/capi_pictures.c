@@ -338,6 +338,63 @@ static void makes_what_is_asked_for(sr_context* context)
         CHECK(bytes[i] == (labels[2 * i] == SR_NO_CELL ? 255 : labels[2 * i]));
 }
 
+/* three cameras alike, one of another size, one with other formats, and two tested against depth */
+static void draws_several_cameras(const struct host* host, sr_context* context, sr_world* world)
+{
+    enum { CAMERAS = 7 };
+    static float colors[2][CAMERAS][PIXELS * 4];
+    static uint8_t labels[2][CAMERAS][PIXELS];
+    const size_t bytes = sizeof colors[0][0];
+    struct host_buffer buffer = make_buffer(host, CAMERAS * bytes);
+    struct host_image image = make_image(host, WIDTH, HEIGHT, VK_FORMAT_D32_SFLOAT);
+    sr_draw_desc draws[CAMERAS], far = draw_of(VK_FORMAT_D32_SFLOAT, 2);
+    int all, i;
+    far.depth_scale = 1; /* a z-buffer without a far plane, of this camera */
+    far.depth.image = image.image;
+    far.depth.layout_after = VK_IMAGE_LAYOUT_GENERAL;
+    CHECK_OK(context, sr_world_draw(world, &far));
+    for (all = 0; all < 2; ++all) {
+        for (i = 0; i < CAMERAS; ++i) {
+            draws[i] = camera_at(1 + 0.4 * i, i == 3 ? WIDTH - 5 : WIDTH, HEIGHT);
+            draws[i].color.memory = colors[all][i];
+            draws[i].label.memory = labels[all][i];
+            draws[i].label.format = VK_FORMAT_R8_UINT;
+            if (all) {
+                draws[i].color.buffer = buffer.buffer;
+                draws[i].color.buffer_offset = (size_t)i * bytes;
+            }
+        }
+        draws[4].color.format = VK_FORMAT_R16G16B16A16_SFLOAT;
+        for (i = 5; i < CAMERAS; ++i) {
+            draws[i].depth_test.image = image.image;
+            draws[i].depth_test.format = VK_FORMAT_D32_SFLOAT;
+            draws[i].depth_test.layout_before = draws[i].depth_test.layout_after = VK_IMAGE_LAYOUT_GENERAL;
+            draws[i].depth_test.scale = 1;
+        }
+        for (i = 0; !all && i < CAMERAS; ++i)
+            CHECK_OK(context, sr_world_draw(world, &draws[i]));
+    }
+    CHECK_OK(context, sr_world_draws(world, draws, CAMERAS));
+    CHECK(!memcmp(colors[0], colors[1], sizeof colors[0]) && !memcmp(labels[0], labels[1], sizeof labels[0]));
+    for (i = 0; i < CAMERAS; ++i) {
+        const size_t written = (size_t)draws[i].width * HEIGHT * (i == 4 ? 8 : 16);
+        CHECK(!memcmp((char*)buffer.mapped + (size_t)i * bytes, colors[0][i], written));
+        CHECK(i == 0 || memcmp(colors[0][i], colors[0][i - 1], bytes) != 0);
+    }
+    CHECK(sr_world_draws(world, draws, 0) == SR_ERR_USAGE && says(context, "count is 0"));
+    CHECK(sr_world_draws(world, NULL, 1) == SR_ERR_USAGE && says(context, "NULL"));
+    CHECK(sr_world_draws(NULL, draws, 1) == SR_ERR_USAGE && says(NULL, "world is NULL"));
+    draws[2].struct_size -= 8;
+    CHECK(sr_world_draws(world, draws, CAMERAS) == SR_ERR_USAGE && says(context, "draw 2 has struct_size"));
+    draws[2].struct_size += 8;
+    draws[2].fx = NAN;
+    CHECK(sr_world_draws(world, draws, CAMERAS) == SR_ERR_BAD_INPUT && says(context, "camera 2"));
+    draws[2].height = 0;
+    CHECK(sr_world_draws(world, draws, CAMERAS) == SR_ERR_USAGE && says(context, "63 x 0"));
+    destroy_image(host, &image);
+    destroy_buffer(host, &buffer);
+}
+
 int main(int argc, char** argv)
 {
     struct host host;
@@ -355,6 +412,7 @@ int main(int argc, char** argv)
     draws_light(context, world);
     draws_z_buffers(&host, context, world);
     refuses_other_formats(context, world);
+    draws_several_cameras(&host, context, world);
     sr_world_destroy(world);
     makes_what_is_asked_for(context);
     sr_context_destroy(context);

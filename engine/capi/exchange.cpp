@@ -65,14 +65,26 @@ Status check_size(const ImageSize& size, const char* name)
     return {};
 }
 
-Status hand_over(sr_context& context, const BufferSlice& pixels, const ImageSize& size, const sr_target& to)
+Status hand_over(sr_context& context, std::span<const WantedPicture> pictures)
 {
-    if (to.memory)
-        SR_CHECK(context.drawing->read(pixels, {static_cast<std::byte*>(to.memory), size_t(pixels.bytes)}));
-    if (!to.buffer && !to.image)
+    std::vector<BufferSlice> read;
+    std::vector<std::byte*> memory; // of these
+    std::vector<HostCopy> copied;
+    for (const auto& [pixels, target, size] : pictures) {
+        if (target->memory) {
+            read.push_back(pixels);
+            memory.push_back(static_cast<std::byte*>(target->memory));
+        }
+        if (target->buffer || target->image)
+            copied.push_back({pixels, host_target(*target, size)});
+    }
+    if (!read.empty())
+        SR_CHECK(context.drawing->read(
+            read, [&](const ReadPiece& piece) { std::ranges::copy(piece.bytes, memory[piece.slice] + piece.at); }));
+    if (copied.empty())
         return {};
     SR_TRY(HostCopies * copies, copies_of(context));
-    return copies->copy(pixels, host_target(to, size));
+    return copies->copy(copied);
 }
 
 HostTarget host_target(const sr_target& to, const ImageSize& size)
@@ -95,7 +107,8 @@ std::vector<WantedPicture> wanted_pictures(const sr_draw_desc& draw, const Pictu
     for (size_t i = 0; i < slots.size(); ++i)
         if (slots[i]->valid())
             wanted.push_back({slots[i]->slice().part(0, picture_bytes(formats[i], *slots[i], draw.width * draw.height)),
-                              targets[i]});
+                              targets[i],
+                              {draw.width, draw.height}});
     return wanted;
 }
 

@@ -27,32 +27,36 @@ Status check_size(const ImageSize& size, const char* name);
 
 HostTarget host_target(const sr_target& to, const ImageSize& size);
 
-// What a draw is tested against. Errors: usage for another format than two, a layout before that is UNDEFINED, and numbers
+// What a draw is tested against. Errors: usage for another format than two, layouts that are UNDEFINED, and numbers
 // that are not finite
 Result<HostImage> host_depth(const sr_depth_image& depth, const ImageSize& size);
 std::array<float, 2> z_scale(const sr_depth_image& depth);
 std::array<float, 2> depth_scale(const sr_draw_desc& draw); // of the picture
 
-// The first bytes of a slot to where the application wants them; waits for it
 Result<HostCopies*> copies_of(sr_context& context);
-Status hand_over(sr_context& context, const BufferSlice& pixels, const ImageSize& size, const sr_target& to);
+
+// a picture, and where the application wants it
+struct WantedPicture {
+    BufferSlice pixels;
+    const sr_target* target;
+    ImageSize size;
+};
+Status hand_over(sr_context& context, std::span<const WantedPicture> pictures); // waits for it
 
 // `bytes` of the application's to the beginning of a slot; waits for it. Errors: usage unless there is one of memory
 // and buffer. name: of the member
 Status take_in(sr_context& context, const sr_source& from, const Slot& to, uint64_t bytes, const char* name);
 
-// What a camera sees, on the device, until the next draw of the world: at once, or by commands that are being recorded.
-// Targets are not looked at. Errors: as sr_world_draw has them. name: of the call
-Result<SplatSlots> draw_splats(sr_world& world, const sr_draw_desc& draw, const PictureFormats& formats,
-                               const char* name);
+// What cameras see, on the device, until the next draw of the world: at once, or by commands that are being recorded.
+// Targets are not looked at. draws: they differ in camera and targets alone; as many of the first are drawn as there is
+// room for, one at least. What is new is shown before, by show_updates(). Errors: as sr_world_draw has them. name: of
+// the call
+Result<std::vector<SplatSlots>> draw_splats(sr_world& world, std::span<const sr_draw_desc> draws,
+                                            const PictureFormats& formats, const char* name);
 Result<SplatSlots> record_splats(sr_world& world, const sr_draw_desc& draw, const PictureFormats& formats,
                                  VkCommandBuffer commands, const char* name);
 
-// What is wanted of it, with the target that it goes to. kept: as draw_splats() returns it
-struct WantedPicture {
-    BufferSlice pixels;
-    const sr_target* target;
-};
+// What is wanted of it. kept: as draw_splats() returns it
 std::vector<WantedPicture> wanted_pictures(const sr_draw_desc& draw, const PictureFormats& formats, SplatSlots kept);
 
 // Errors: usage for a world without splat_bytes. name: of the call

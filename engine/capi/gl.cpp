@@ -150,19 +150,21 @@ Status draw(sr_gl& gl, sr_world& world, const sr_gl_draw_desc& d)
         return fail(ErrorCode::usage, "sr_gl_draw_desc: unwaited is {}, expected 0 or 1", d.unwaited);
     SR_CHECK(link.gl().take_errors("was set before sr_gl_draw"));
     const GlStateKept kept(link.gl());
-    if (d.unwaited && link.way() == SR_GL_SHARED) {
-        SR_CHECK(splats_of(world, "sr_gl_draw").map([](SplatPool*) {}));
-        SR_CHECK(show_updates(world, false));
+    const bool unwaited = d.unwaited && link.way() == SR_GL_SHARED;
+    SR_CHECK(splats_of(world, "sr_gl_draw").map([](SplatPool*) {}));
+    SR_CHECK(show_updates(world, !unwaited));
+    const sr_draw_desc camera = camera_of(d);
+    if (unwaited) {
         SR_TRY(const VkCommandBuffer commands, link.begin());
         world.done = gl.context->drawing->next_point();
-        SR_TRY(const SplatSlots images, record_splats(world, camera_of(d), formats_of(d), commands, "sr_gl_draw"));
+        SR_TRY(const SplatSlots images, record_splats(world, camera, formats_of(d), commands, "sr_gl_draw"));
         const std::vector<Wanted> wanted = wanted_of(gl, d, images);
         SR_TRY(const std::vector<GlLink::Piece> pieces, pieces_of(link, wanted));
         SR_CHECK(link.finish(commands, pieces));
         return upload(link, wanted);
     }
-    SR_TRY(const SplatSlots images, draw_splats(world, camera_of(d), formats_of(d), "sr_gl_draw"));
-    const std::vector<Wanted> wanted = wanted_of(gl, d, images);
+    SR_TRY(const std::vector<SplatSlots> images, draw_splats(world, {&camera, 1}, formats_of(d), "sr_gl_draw"));
+    const std::vector<Wanted> wanted = wanted_of(gl, d, images[0]);
     SR_TRY(const std::vector<GlLink::Piece> pieces, pieces_of(link, wanted));
     SR_CHECK(link.send(pieces));
     return upload(link, wanted);

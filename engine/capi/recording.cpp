@@ -40,8 +40,8 @@ Status record(sr_world& world, const sr_draw_desc& d, VkCommandBuffer commands, 
     SR_CHECK(check_targets(d));
     SR_TRY(const PictureFormats formats, formats_of(d));
     SR_TRY(const SplatSlots images, record_splats(world, d, formats, commands, name));
-    for (const WantedPicture& wanted : wanted_pictures(d, formats, images))
-        record_host_target(device, commands, wanted.pixels, host_target(*wanted.target, {d.width, d.height}));
+    for (const auto& [pixels, target, size] : wanted_pictures(d, formats, images))
+        record_host_target(device, commands, pixels, host_target(*target, size));
     return {};
 }
 

@@ -210,7 +210,8 @@ sr_status sr_renderer_take(sr_renderer* renderer, const sr_target* target)
             return fail(ErrorCode::usage, "sr_renderer_take: no frame is finished");
         SR_CHECK(check_frame_target(*target));
         SR_CHECK(renderer->context->device->wait(renderer->context->device->last_ticket()));
-        return hand_over(*renderer->context, r.texels().slice(), renderer->size, *target);
+        const WantedPicture frame{r.texels().slice(), target, renderer->size};
+        return hand_over(*renderer->context, {&frame, 1});
     });
 }
 

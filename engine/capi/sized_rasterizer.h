@@ -8,26 +8,28 @@
 
 namespace semrover::capi {
 
-// A rasterizer of a pool's splats for one camera, of one kind, and the size of the last pictures: made anew when
-// another size or format is asked for, there are more splats than it looks at, or it lacked room.
+// A rasterizer of a pool's splats, of one kind, for a number of cameras and the size of the last pictures: made anew
+// when another size or format is asked for, there are more splats than it looks at, or it lacked room.
 class SizedRasterizer {
   public:
     // errors: as Rasterizer has them
-    Result<Rasterizer*> of(Device& device, const SplatPool& splats, const ImageSize& size, RasterizerOptions options)
+    Result<Rasterizer*> of(Device& device, const SplatPool& splats, const ImageSize& size, RasterizerOptions options,
+                           uint32_t cameras = 1)
     {
-        const bool sized =
-            rasterizer_ && size_ == size && alpha_ == options.visible_alpha && formats_ == options.formats;
+        const bool sized = rasterizer_ && size_ == size && alpha_ == options.visible_alpha &&
+                           formats_ == options.formats && cameras_ == cameras;
         if (sized && splats.end() <= rasterizer_->rows() && pairs_ <= rasterizer_->max_pairs())
             return rasterizer_.get();
         options.rows = splats.end();
         if (rasterizer_ && (pairs_ || rasterizer_->rebuilds())) // more than it begins with
             options.max_pairs = std::max({pairs_, rasterizer_->max_pairs(), 4 * splats.end()});
         rasterizer_.reset();
-        SR_TRY(rasterizer_, Rasterizer::create(device, splats.scene(), size.width, size.height, 1, options));
+        SR_TRY(rasterizer_, Rasterizer::create(device, splats.scene(), size.width, size.height, cameras, options));
         pairs_ = std::min(pairs_, rasterizer_->max_pairs()); // what the device has room for
         size_ = size;
         alpha_ = options.visible_alpha;
         formats_ = options.formats;
+        cameras_ = cameras;
         return rasterizer_.get();
     }
 
@@ -56,6 +58,7 @@ class SizedRasterizer {
   private:
     std::shared_ptr<Rasterizer> rasterizer_;
     ImageSize size_;
+    uint32_t cameras_ = 0;
     float alpha_ = 0;
     std::array<PictureFormat, 4> formats_ = {};
     uint32_t pairs_ = 0; // that there must be room for

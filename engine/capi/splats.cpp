@@ -27,40 +27,89 @@ Status fill_inputs(sr_context& context, Rasterizer& rasterizer, const sr_draw_de
     return rasterizer.z_scale().write(*context.drawing, z_scale(d.depth_test));
 }
 
-Status draw_world(sr_world& world, const sr_draw_desc& d)
+// what cameras that are drawn together have in common
+bool go_together(const sr_draw_desc& a, const PictureFormats& a_formats, const sr_draw_desc& b,
+                 const PictureFormats& b_formats)
 {
-    SR_TRY(const PictureFormats formats, formats_of(d));
-    SR_TRY(const SplatSlots images, draw_splats(world, d, formats, "sr_world_draw"));
-    for (const WantedPicture& wanted : wanted_pictures(d, formats, images))
-        SR_CHECK(hand_over(*world.context, wanted.pixels, {d.width, d.height}, *wanted.target));
+    return a.width == b.width && a.height == b.height && a_formats == b_formats && !a.depth_test.image &&
+           !b.depth_test.image && depth_scale(a) == depth_scale(b);
+}
+
+Status draw_world(sr_world& world, std::span<const sr_draw_desc> draws, const char* name)
+{
+    std::vector<PictureFormats> formats(draws.size());
+    for (size_t i = 0; i < draws.size(); ++i) {
+        SR_TRY(formats[i], formats_of(draws[i]));
+    }
+    SR_CHECK(splats_of(world, name).map([](SplatPool*) {}));
+    SR_CHECK(show_updates(world, true));
+    for (size_t i = 0, end = 0; i < draws.size();) {
+        for (end = i + 1; end < draws.size() && go_together(draws[i], formats[i], draws[end], formats[end]);)
+            ++end;
+        SR_TRY(const std::vector<SplatSlots> drawn, draw_splats(world, draws.subspan(i, end - i), formats[i], name));
+        std::vector<WantedPicture> pictures;
+        for (const SplatSlots& images : drawn) {
+            const std::vector<WantedPicture> wanted = wanted_pictures(draws[i], formats[i], images);
+            pictures.insert(pictures.end(), wanted.begin(), wanted.end());
+            ++i;
+        }
+        SR_CHECK(hand_over(*world.context, pictures));
+    }
     return {};
+}
+
+// of an array of the caller's, whose elements may be smaller than ours
+Result<std::vector<sr_draw_desc>> read_draws(const sr_draw_desc* draws, uint32_t count)
+{
+    if (!count)
+        return fail(ErrorCode::usage, "sr_world_draws: count is 0");
+    SR_TRY(const sr_draw_desc first, read_struct(draws, "sr_draw_desc"));
+    std::vector<sr_draw_desc> known{first};
+    for (uint32_t i = 1; i < count; ++i) {
+        const auto* at = reinterpret_cast<const unsigned char*>(draws) + size_t(i) * first.struct_size;
+        uint32_t size = 0;
+        std::memcpy(&size, at, sizeof size);
+        if (size != first.struct_size || size % alignof(sr_draw_desc))
+            return fail(ErrorCode::usage, "sr_world_draws: draw {} has struct_size {}, the first has {}", i, size,
+                        first.struct_size);
+        SR_TRY(known.emplace_back(), read_struct(reinterpret_cast<const sr_draw_desc*>(at), "sr_draw_desc"));
+    }
+    return known;
 }
 
 } // namespace
 
 namespace semrover::capi {
 
-Result<SplatSlots> draw_splats(sr_world& world, const sr_draw_desc& d, const PictureFormats& formats, const char* name)
+Result<std::vector<SplatSlots>> draw_splats(sr_world& world, std::span<const sr_draw_desc> draws,
+                                            const PictureFormats& formats, const char* name)
 {
     SR_TRY(const SplatPool* splats, splats_of(world, name));
+    const sr_draw_desc& d = draws[0];
     const ImageSize size{d.width, d.height};
     SR_CHECK(check_size(size, "sr_draw_desc"));
-    SR_CHECK(show_updates(world, true));
     sr_context& context = *world.context;
     const bool tested = d.depth_test.image;
+    const RasterizerOptions options{.depth_tested = tested, .formats = formats};
     SR_TRY(Rasterizer * rasterizer,
-           world.images[tested].of(*context.drawing, *splats, size, {.depth_tested = tested, .formats = formats}));
+           world.images[tested].of(*context.drawing, *splats, size, options, uint32_t(draws.size())));
     HostImage z;
     if (tested) {
         SR_TRY(z, host_depth(d.depth_test, size));
     }
-    const SplatCamera camera = pinhole_camera(d, size);
+    std::vector<SplatCamera> cameras;
+    for (const sr_draw_desc& draw : draws)
+        cameras.push_back(pinhole_camera(draw, size));
+    uint32_t drawn = 0;
     for (uint32_t rebuilds = ~0u; rebuilds != rasterizer->rebuilds();) { // with what is filled in memory of its own
         rebuilds = rasterizer->rebuilds();
         SR_CHECK(fill_inputs(context, *rasterizer, d, z));
-        SR_CHECK(rasterizer->draw({&camera, 1}).map([](uint32_t) {}));
+        SR_TRY(drawn, rasterizer->draw(cameras));
     }
-    return rasterizer->images(0);
+    std::vector<SplatSlots> images;
+    for (uint32_t camera = 0; camera < drawn; ++camera)
+        images.push_back(rasterizer->images(camera));
+    return images;
 }
 
 } // namespace semrover::capi
@@ -92,7 +141,17 @@ sr_status sr_world_draw(sr_world* world, const sr_draw_desc* draw)
         if (!world)
             return fail(ErrorCode::usage, "sr_world_draw: world is NULL");
         SR_TRY(const sr_draw_desc known, read_struct(draw, "sr_draw_desc"));
-        return draw_world(*world, known);
+        return draw_world(*world, {&known, 1}, "sr_world_draw");
+    });
+}
+
+sr_status sr_world_draws(sr_world* world, const sr_draw_desc* draws, uint32_t count)
+{
+    return guarded<kDraw>(world ? world->context : nullptr, [&]() -> Status {
+        if (!world)
+            return fail(ErrorCode::usage, "sr_world_draws: world is NULL");
+        SR_TRY(const std::vector<sr_draw_desc> known, read_draws(draws, count));
+        return draw_world(*world, known, "sr_world_draws");
     });
 }
 

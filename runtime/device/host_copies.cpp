@@ -19,10 +19,11 @@ Result<std::unique_ptr<HostCopies>> HostCopies::create(Device& device)
     return c;
 }
 
-Status HostCopies::copy(const BufferSlice& from, const HostTarget& to)
+Status HostCopies::copy(std::span<const HostCopy> copies)
 {
     SR_TRY(const VkCommandBuffer commands, commands_->begin());
-    record_host_target(device_, commands, from, to);
+    for (const auto& [from, to] : copies)
+        record_host_target(device_, commands, from, to);
     return submit();
 }
 

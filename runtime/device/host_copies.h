@@ -14,6 +14,11 @@ struct HostTarget {
     HostImage image = {};
 };
 
+struct HostCopy {
+    BufferSlice from;
+    HostTarget to;
+};
+
 // into a command buffer that is being recorded. to.image: texels of the slice's rows, as many as it has
 void record_host_target(const Device& device, VkCommandBuffer commands, const BufferSlice& from, const HostTarget& to);
 
@@ -22,7 +27,7 @@ class HostCopies {
   public:
     static Result<std::unique_ptr<HostCopies>> create(Device& device);
 
-    Status copy(const BufferSlice& from, const HostTarget& to); // as record_host_target()
+    Status copy(std::span<const HostCopy> copies); // as record_host_target(), in one submit
     // as many bytes as the slice has, from a buffer with TRANSFER_SRC usage
     Status fetch(VkBuffer from, uint64_t offset, const BufferSlice& to);
     Status fetch(const HostImage& from, const BufferSlice& to); // pixels, row by row
