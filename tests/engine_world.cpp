@@ -120,11 +120,6 @@ TEST(engine_world, what_was_dropped_comes_back_with_the_same_bytes_from_the_cach
 }
 
 // the file of a tile in a folder that an index names
-std::string tile_file(const Path& folder, const TileIndex& tile)
-{
-    return tile_name(tile, TileFolder::open(folder)->tiles().at(tile).key);
-}
-
 TEST(engine_world, a_cache_serves_another_session_and_no_other_world)
 {
     const ScratchFolder folder;

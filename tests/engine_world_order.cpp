@@ -19,7 +19,7 @@ TEST(engine_world_order, a_focus_finds_its_tiles_nearest_first_and_counts_them_b
             std::set<TileIndex> expected, found;
             for (int32_t x = -15; x < 16; ++x)
                 for (int32_t y = -15; y < 16; ++y)
-                    if (distance_to_tile({3.1, -7.9}, {x, y}, 3.6) <= radius)
+                    if (distance_to_tile(GroundPoint{3.1, -7.9}, {x, y}, 3.6) <= radius)
                         expected.insert({x, y});
             double last = 0;
             for (size_t rank = 0; const auto tile = order.at(rank); ++rank) {
@@ -88,10 +88,10 @@ TEST(engine_world_order, tiles_along_a_track_are_those_within_the_horizon_in_the
                 double nearest = 1e9;
                 for (size_t i = 0; i + 1 < track.size(); ++i)
                     for (double t = 0; t <= 1; t += 1. / 4096)
-                        nearest =
-                            std::min(nearest, distance_to_tile({track[i][0] + t * (track[i + 1][0] - track[i][0]),
-                                                                track[i][1] + t * (track[i + 1][1] - track[i][1])},
-                                                               {x, y}, 3.6));
+                        nearest = std::min(
+                            nearest, distance_to_tile(GroundPoint{track[i][0] + t * (track[i + 1][0] - track[i][0]),
+                                                                  track[i][1] + t * (track[i + 1][1] - track[i][1])},
+                                                      {x, y}, 3.6));
                 if (std::abs(nearest - horizon) > 0.01) {
                     EXPECT_EQ(found.contains({x, y}), nearest < horizon) << x << ", " << y;
                 }

@@ -133,4 +133,9 @@ inline void expect_same(const World& world, const VoxelGrid& grid)
     }
 }
 
+inline std::string tile_file(const Path& folder, const TileIndex& tile)
+{
+    return tile_name(tile, TileFolder::open(folder)->tiles().at(tile).key);
+}
+
 } // namespace semrover::world_case
