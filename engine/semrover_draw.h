@@ -52,8 +52,9 @@ typedef struct sr_depth_image {
  *   alone: R32_SFLOAT, R16_SFLOAT. With depth_scale these, and D32_SFLOAT, hold the number of a z-buffer, as
  *   sr_depth_image says, cut to 0..1: depth_scale / metres + depth_offset; depth_offset where nothing is. To an image
  *   of D32_SFLOAT only a queue family with graphics copies.
- * - label: of the splat with most weight, SR_NO_CELL for none; a number to ignore. R32G32_UINT; the label alone:
- *   R32_UINT, or R8_UINT with 255 for none.
+ * - label: of the splat with most weight, SR_NO_CELL for none; low bits of its voxel: 12 of i, 12 of j above them, then
+ * 8 of k. The voxel is the nearest with these to where the depth says. R32G32_UINT; the label alone: R32_UINT, or
+ *   R8_UINT with 255 for none.
  * Numbers of SFLOAT are rounded to the nearest, ties to even. UNORM has 255 v and SNORM 127 v of numbers that are cut
  * to 0..1 and -1..1, rounded to the nearest, halves away from 0. */
 typedef struct sr_draw_desc {
@@ -79,6 +80,19 @@ SR_API sr_status sr_world_draw(sr_world* world, const sr_draw_desc* draw);
  * them, as far apart as the struct_size of the first says, which all have. The pictures are those of sr_world_draw, and
  * so are errors; SR_ERR_USAGE: a count of 0, too. After an error some of them may be drawn. */
 SR_API sr_status sr_world_draws(sr_world* world, const sr_draw_desc* draws, uint32_t count);
+
+typedef struct sr_pick {
+    uint32_t struct_size;
+    uint32_t reserved;
+    sr_cell cell; /* voxel and class of the splat with most weight. Label SR_NO_CELL: there is none, all else is 0. A
+                     splat that stands for several voxels (sr_world_desc.detail_distance) names one of them */
+    double position[3]; /* metres, in the world's frame: the pixel's centre at its median depth */
+    double alpha;       /* how much all splats cover the pixel, 0..1 */
+} sr_pick;
+
+/* What is under pixel (x, y) of a picture. Targets and depth_test are not looked at. Shows what is new, and draws the
+ * pixel alone. The render thread. Waits and errors as sr_world_draw; SR_ERR_USAGE: a pixel outside, too. */
+SR_API sr_status sr_world_pick(sr_world* world, const sr_draw_desc* draw, uint32_t x, uint32_t y, sr_pick* found);
 
 #ifdef __cplusplus
 }

@@ -93,7 +93,7 @@ typedef struct sr_gl_draw_desc {
     uint32_t color;             /* GL_RGBA32F: r, g, b times alpha (sRGB), alpha */
     uint32_t normal;            /* GL_RGBA32F */
     uint32_t depth;             /* GL_RG32F: metres along z, mean and median of the splats; 0 where nothing is */
-    uint32_t label;             /* GL_RG32UI: label, SR_NO_CELL for none; a number to ignore */
+    uint32_t label;             /* GL_RG32UI: label, SR_NO_CELL for none; low bits of its voxel */
 } sr_gl_draw_desc;
 
 /* Draws the splats that are there into the textures. GL commands that the application issues from then on see the

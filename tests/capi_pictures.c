@@ -395,6 +395,84 @@ static void draws_several_cameras(const struct host* host, sr_context* context, 
     destroy_buffer(host, &buffer);
 }
 
+static double distance_to(const sr_cell* cell, const double position[3])
+{
+    const int32_t low[3] = {cell->i, cell->j, cell->k};
+    double square = 0;
+    int axis;
+    for (axis = 0; axis < 3; ++axis) {
+        const double at = position[axis] / 0.6, away = fmax(fmax(low[axis] - at, at - low[axis] - 1), 0);
+        square += away * away;
+    }
+    return 0.6 * sqrt(square);
+}
+
+/* how far the ray from `eye` through a place passes the voxel */
+static double ray_distance_to(const sr_cell* cell, const double eye[3], const double position[3])
+{
+    double nearest = 1e9, at[3], t;
+    int axis;
+    for (t = 0.02; t < 20; t *= 1.005) {
+        for (axis = 0; axis < 3; ++axis)
+            at[axis] = eye[axis] + t * (position[axis] - eye[axis]);
+        nearest = fmin(nearest, distance_to(cell, at));
+    }
+    return nearest;
+}
+
+/* some pixels: as whole pictures have it, a voxel of the world with that label, which the pixel's ray meets */
+static void picks_voxels(sr_context* context, double x)
+{
+    static sr_cell cells[MOST_CELLS];
+    const sr_cell_rect around = {{(int32_t)(x / 0.6) - 15, -9}, {(int32_t)(x / 0.6) + 40, 9}};
+    sr_world_desc desc = street_world();
+    sr_world* world = NULL;
+    sr_grid* grid = NULL;
+    sr_draw_desc draw = camera_at(x + 1, WIDTH, HEIGHT);
+    sr_pick found = SR_INIT(sr_pick);
+    uint64_t count = 0, c;
+    double z;
+    const double eye[3] = {x + 1, 0, 1.5};
+    int i, picked = 0, none = 0;
+    CHECK_OK(context, create_world(context, model, &desc, &world));
+    walk(context, world, x + 4, 6);
+    CHECK_OK(context, sr_world_copy_cells(world, &around, &grid));
+    CHECK(sr_grid_get_cells(grid, 0, MOST_CELLS, cells, &count) == SR_OK && count > 100 && count < MOST_CELLS);
+    sr_grid_destroy(grid);
+    draw.color.memory = color;
+    draw.depth.memory = depth;
+    draw.label.memory = label;
+    CHECK_OK(context, sr_world_draw(world, &draw));
+    for (i = 3; i < PIXELS; i += 37) {
+        CHECK_OK(context, sr_world_pick(world, &draw, (uint32_t)i % WIDTH, (uint32_t)i / WIDTH, &found));
+        CHECK(found.cell.label == label[2 * i]);
+        if (found.cell.label == SR_NO_CELL) {
+            CHECK(found.alpha == 0 && found.position[0] == 0 && found.cell.i == 0);
+            ++none;
+            continue;
+        }
+        CHECK(label[2 * i + 1] ==
+              (((uint32_t)found.cell.i & 4095) | ((uint32_t)found.cell.j & 4095) << 12 | (uint32_t)found.cell.k << 24));
+        CHECK(fabs(found.alpha - color[4 * i + 3]) < 1e-3);
+        z = found.position[0] - eye[0]; /* and the place lies on the ray */
+        CHECK(fabs(z - depth[2 * i + 1]) < 1e-3);
+        CHECK(fabs(draw.cx - draw.fx * found.position[1] / z - (i % WIDTH + 0.5)) < 1e-3);
+        CHECK(fabs(draw.cy - draw.fy * (found.position[2] - eye[2]) / z - (i / WIDTH + 0.5)) < 1e-3);
+        /* splats reach as far from their points on the surface, or on the screen as its filter does */
+        CHECK(ray_distance_to(&found.cell, eye, found.position) < 0.6 + 2.4 * z / draw.fx);
+        for (c = 0; c < count && memcmp(&cells[c], &found.cell, sizeof found.cell) != 0; ++c) {
+        }
+        CHECK(c < count);
+        ++picked;
+    }
+    CHECK(picked > 25 && none > 5);
+    CHECK(sr_world_pick(world, &draw, WIDTH, 0, &found) == SR_ERR_USAGE && says(context, "pixel 63, 0 of 63 x 41"));
+    CHECK(sr_world_pick(world, &draw, 0, 0, NULL) == SR_ERR_USAGE && says(context, "found is NULL"));
+    CHECK(sr_world_pick(NULL, &draw, 0, 0, &found) == SR_ERR_USAGE && says(NULL, "world is NULL"));
+    CHECK(sr_world_pick(world, NULL, 0, 0, &found) == SR_ERR_USAGE && says(context, "sr_draw_desc: NULL"));
+    sr_world_destroy(world);
+}
+
 int main(int argc, char** argv)
 {
     struct host host;
@@ -415,6 +493,8 @@ int main(int argc, char** argv)
     draws_several_cameras(&host, context, world);
     sr_world_destroy(world);
     makes_what_is_asked_for(context);
+    picks_voxels(context, 0);
+    picks_voxels(context, -3000); /* beyond the bits that a splat has of its voxel */
     sr_context_destroy(context);
     CHECK(vkDeviceWaitIdle(host.device) == VK_SUCCESS);
     destroy_host(&host);

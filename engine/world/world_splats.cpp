@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/world/world_splats.h"
 
+#include "engine/scene/cell_number.h"
+
 #include <cmath>
 
 namespace semrover {
@@ -173,6 +175,8 @@ Result<SplatPool::Room> WorldSplats::add(const TileIndex& index, const VoxelGrid
         options.neighbor_radius = std::max(options.neighbor_radius, 3 * cube);
     }
     const size_t own = points.size();
+    for (uint32_t& cell : points.cells)
+        cell = cell_number(cells.cells[cell]);
     append_neighbours(index, options.neighbor_radius, cube, points);
     SR_TRY(SplatPool::Room room, pool_->add(index, points, own, options));
     if (room != SplatPool::Room::none)
