@@ -53,7 +53,7 @@ typedef struct sr_depth_image {
  *   sr_depth_image says, cut to 0..1: depth_scale / metres + depth_offset; depth_offset where nothing is. To an image
  *   of D32_SFLOAT only a queue family with graphics copies.
  * - label: of the splat with most weight, SR_NO_CELL for none; low bits of its voxel: 12 of i, 12 of j above them, then
- * 8 of k. The voxel is the nearest with these to where the depth says. R32G32_UINT; the label alone: R32_UINT, or
+ *   8 of k. The voxel is the nearest with these to where the depth says. R32G32_UINT; the label alone: R32_UINT, or
  *   R8_UINT with 255 for none.
  * Numbers of SFLOAT are rounded to the nearest, ties to even. UNORM has 255 v and SNORM 127 v of numbers that are cut
  * to 0..1 and -1..1, rounded to the nearest, halves away from 0. */

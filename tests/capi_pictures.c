@@ -395,6 +395,33 @@ static void draws_several_cameras(const struct host* host, sr_context* context, 
     destroy_buffer(host, &buffer);
 }
 
+static uint64_t used_after(sr_context* context, sr_world* world, uint32_t width)
+{
+    sr_memory_info memory = SR_INIT(sr_memory_info);
+    sr_draw_desc draw = camera_at(1, width, HEIGHT);
+    draw.color.memory = color;
+    CHECK_OK(context, sr_world_draw(world, &draw));
+    CHECK_OK(context, sr_context_get_memory(context, &memory));
+    return memory.used_bytes;
+}
+
+/* pictures of two sizes in turn: what both need stays; of many sizes the last four */
+static void keeps_the_last_sizes(sr_context* context)
+{
+    sr_world* world = make_world(context);
+    const uint64_t one = used_after(context, world, 40), both = used_after(context, world, 50);
+    uint64_t four, all = 0;
+    uint32_t width;
+    CHECK(both > one);
+    CHECK(used_after(context, world, 40) == both && used_after(context, world, 50) == both);
+    (void)used_after(context, world, 51);
+    four = used_after(context, world, 52);
+    for (width = 53; width < 61; ++width)
+        all = used_after(context, world, width);
+    CHECK(four > both && all < four + (four - both));
+    sr_world_destroy(world);
+}
+
 static double distance_to(const sr_cell* cell, const double position[3])
 {
     const int32_t low[3] = {cell->i, cell->j, cell->k};
@@ -493,6 +520,7 @@ int main(int argc, char** argv)
     draws_several_cameras(&host, context, world);
     sr_world_destroy(world);
     makes_what_is_asked_for(context);
+    keeps_the_last_sizes(context);
     picks_voxels(context, 0);
     picks_voxels(context, -3000); /* beyond the bits that a splat has of its voxel */
     sr_context_destroy(context);

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "engine/capi/camera_renderer.h"
-#include "engine/capi/sized_rasterizer.h"
+#include "engine/capi/rasterizers.h"
 #include "engine/job/model.h"
 #include "engine/scene/label_edits.h"
 #include "engine/semrover_vulkan.h"
@@ -57,11 +57,11 @@ struct sr_world {
     std::vector<semrover::CellWindow> labels_ready;
     sr_world_info info = {}; // as the last call left it
     // of the thread that draws
-    semrover::capi::SizedRasterizer pixels;                 // of renderers that draw
-    semrover::capi::SizedRasterizer images[2], recorded[2]; // of draws; the second with depth test
-    std::unique_ptr<semrover::CommandRing> commands;        // of our own submits, from the first on
-    bool updated_by_application = false;                    // by sr_world_record_updates
-    semrover::TimelinePoint done;                           // when all that was recorded so far has been executed
+    semrover::capi::Rasterizers pixels;              // of renderers that draw
+    semrover::capi::Rasterizers images, recorded;    // of draws
+    std::unique_ptr<semrover::CommandRing> commands; // of our own submits, from the first on
+    bool updated_by_application = false;             // by sr_world_record_updates
+    semrover::TimelinePoint done;                    // when all that was recorded so far has been executed
     std::vector<std::pair<semrover::TimelinePoint, std::shared_ptr<semrover::Rasterizer>>> retired;
 };
 

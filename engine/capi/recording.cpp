@@ -85,11 +85,12 @@ Result<SplatSlots> record_splats(sr_world& world, const sr_draw_desc& d, const P
     const ImageSize size{d.width, d.height};
     SR_CHECK(check_size(size, "sr_draw_desc"));
     const bool tested = d.depth_test.image;
-    std::vector<std::shared_ptr<Rasterizer>> retired;
-    SR_TRY(Rasterizer * rasterizer,
-           world.recorded[tested].of(device, *splats, size, {.depth_tested = tested, .formats = formats}, retired));
+    Rasterizers::Retired retired;
+    const auto found =
+        world.recorded.of(device, *splats, size, {.depth_tested = tested, .formats = formats}, 1, &retired);
     for (std::shared_ptr<Rasterizer>& last : retired)
         world.retired.emplace_back(world.done, std::move(last));
+    SR_TRY(Rasterizer * rasterizer, found);
     if (tested) {
         SR_TRY(const HostImage depth, host_depth(d.depth_test, size));
         const BufferSlice z = rasterizer->z_buffer().slice();
@@ -169,10 +170,7 @@ sr_status sr_world_check_draws(sr_world* world)
     return guarded<kDraw>(world ? world->context : nullptr, [&]() -> Status {
         if (!world)
             return fail(ErrorCode::usage, "sr_world_check_draws: world is NULL");
-        bool whole = true;
-        for (SizedRasterizer& recorded : world->recorded)
-            whole = recorded.was_whole() && whole;
-        if (!whole)
+        if (!world->recorded.were_whole())
             return fail(ErrorCode::partial, "a picture lacks splats: there is more room for the next one");
         return {};
     });

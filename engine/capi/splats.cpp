@@ -91,8 +91,7 @@ Result<std::vector<SplatSlots>> draw_splats(sr_world& world, std::span<const sr_
     sr_context& context = *world.context;
     const bool tested = d.depth_test.image;
     const RasterizerOptions options{.depth_tested = tested, .formats = formats};
-    SR_TRY(Rasterizer * rasterizer,
-           world.images[tested].of(*context.drawing, *splats, size, options, uint32_t(draws.size())));
+    SR_TRY(Rasterizer * rasterizer, world.images.of(*context.drawing, *splats, size, options, uint32_t(draws.size())));
     HostImage z;
     if (tested) {
         SR_TRY(z, host_depth(d.depth_test, size));

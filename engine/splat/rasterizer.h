@@ -60,6 +60,8 @@ struct RasterizerOptions {
     bool depth_tested = false; // against z_buffer(), of pinholes
     // of color, surface, depth and ids: how images() has them, and whether it has. render() needs them whole
     std::array<PictureFormat, 4> formats = {};
+
+    bool operator==(const RasterizerOptions&) const = default;
 };
 
 // what one camera sees, on the device: as SplatImages (kernels/splat.h) has it, a row a pixel, or in words, where
@@ -101,8 +103,8 @@ class Rasterizer {
     // [1, 2] fp32, where a format is scaled, likewise
     const Slot& format_scale() const { return format_scale_; }
 
-    // The same by an application's hand: records the drawing into a command buffer, to be executed any number of times, one
-    // after the other, on the device's queue family. camera: copied. What is recorded is good as long as the
+    // The same by an application's hand: records the drawing into a command buffer, to be executed any number of times,
+    // one after the other, on the device's queue family. camera: copied. What is recorded is good as long as the
     // rasterizer. z_scale, format_scale: where there are such slots; z_buffer() is filled by what was recorded before.
     // Errors: bad_input as render()'s
     Status record(VkCommandBuffer commands, const SplatCamera& camera, std::array<float, 2> z_scale = {},
