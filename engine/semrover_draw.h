@@ -85,7 +85,8 @@ typedef struct sr_pick {
     uint32_t struct_size;
     uint32_t reserved;
     sr_cell cell; /* voxel and class of the splat with most weight. Label SR_NO_CELL: there is none, all else is 0. A
-                     splat that stands for several voxels (sr_world_desc.detail_distance) names one of them */
+                     splat that stands for several voxels (sr_world_desc.detail_distance) names one of them.
+                     Where splats of several surfaces meet, it need not lie at `position` */
     double position[3]; /* metres, in the world's frame: the pixel's centre at its median depth */
     double alpha;       /* how much all splats cover the pixel, 0..1 */
 } sr_pick;

@@ -23,7 +23,8 @@ class Rasterizers {
                            const RasterizerOptions& options, uint32_t cameras = 1, Retired* retired = nullptr)
     {
         Kept& kept = kept_for(size, options, cameras, retired);
-        if (kept.rasterizer && splats.end() <= kept.rasterizer->rows() && kept.pairs <= kept.rasterizer->max_pairs())
+        if (kept.rasterizer && kept.rasterizer->is_built() && splats.end() <= kept.rasterizer->rows() &&
+            kept.pairs <= kept.rasterizer->max_pairs())
             return kept.rasterizer.get();
         RasterizerOptions now = options;
         now.rows = splats.end();

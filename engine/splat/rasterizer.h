@@ -115,6 +115,7 @@ class Rasterizer {
     static constexpr uint32_t kRecordings = 16;
 
     const Program& program() const { return *program_; }
+    bool is_built() const { return program_ != nullptr; } // false: the last time there was no memory for it
     // device memory for what it has room for now, beside the scene's
     uint64_t planned_bytes() const { return state_.planned_bytes(device_.limits()) + program_->plan().arena_bytes(); }
     uint32_t rows() const { return rows_; } // of the scene that it looks at
