@@ -4,9 +4,9 @@
 // diffusers layout or a single LDM file. A config file may be a golden layout: then its "config" is taken.
 #include "engine/model/checkpoint.h"
 #include "engine/model/ldm_config.h"
-#include "engine/model/model_writer.h"
 #include "engine/model/renderer_model.h"
 #include "tests/json_text.h"
+#include "tools/dataset/model_writer.h"
 
 #include <CLI/CLI.hpp>
 

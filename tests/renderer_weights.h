@@ -4,7 +4,7 @@
 
 #include "engine/model/checkpoint.h"
 #include "engine/model/ldm_config.h"
-#include "engine/model/model_writer.h"
+#include "tools/dataset/model_writer.h"
 
 #include <gtest/gtest.h>
 

@@ -3,7 +3,6 @@
 #pragma once
 
 #include "engine/voxfield/sub_grid.h"
-#include "engine/world/conditioning_objects.h"
 #include "engine/world/grid_filling.h"
 #include "engine/world/world_order.h"
 #include "engine/world/world_splats.h"

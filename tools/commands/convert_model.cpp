@@ -3,11 +3,11 @@
 #include "tools/commands/convert.h"
 
 #include "engine/model/low_rank.h"
-#include "engine/model/model_writer.h"
 #include "engine/model/renderer_model.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/print_stderr.h"
 #include "tools/cli/progress.h"
+#include "tools/dataset/model_writer.h"
 
 #include <algorithm>
 #include <optional>

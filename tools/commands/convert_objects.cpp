@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/commands/convert.h"
 
-#include "engine/world/conditioning_objects.h"
+#include "engine/world/world_objects.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/value_options.h"

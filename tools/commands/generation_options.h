@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/world/conditioning_objects.h"
 #include "engine/world/world.h"
+#include "engine/world/world_objects.h"
 #include "tools/cli/commands.h"
 
 namespace semrover {

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "engine/scene/grid.h"
-#include "engine/world/conditioning_objects.h"
+#include "engine/world/world_objects.h"
 #include "runtime/base/json.h"
 #include "tools/editing/grid_editor.h"
 

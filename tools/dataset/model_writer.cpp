@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/model/model_writer.h"
+#include "tools/dataset/model_writer.h"
 
 #include "runtime/base/quote.h"
 
