@@ -18,6 +18,10 @@ layout(binding = 3) buffer Y { uvec2 y[]; };                          // [size] 
 
 const uint kStack = 48, kLeafBit = 0x80000000u; // engine/mesh/bvh.h: kBvhDepth, kBvhLeaf
 
+// nodes that wait, a column for each thread, as in lib/bvh.glsl
+shared uint waiting[kStack * gl_WorkGroupSize.x];
+#define WAITING(depth) waiting[(depth) * gl_WorkGroupSize.x + gl_LocalInvocationIndex]
+
 vec3 corner(uint t, uint c)
 {
     const uint at = 10 * t + 3 * c;
@@ -63,8 +67,6 @@ void main()
     float best = uintBitsToFloat(y[i].x);
     best *= best;
     bool found = false;
-    uint stack[kStack]; // nodes that wait, and how far away their boxes are
-    float away[kStack];
     uint top = 0, at = 0;
     for (;;) {
         if ((at & kLeafBit) != 0) {
@@ -82,20 +84,16 @@ void main()
             const uvec4 a = nodes[4 * at], b = nodes[4 * at + 1], c = nodes[4 * at + 2], d = nodes[4 * at + 3];
             const float left = box2(a, b, point), right = box2(c, d, point);
             const bool left_first = left <= right;
-            if (max(left, right) <= best && top < kStack) {
-                stack[top] = left_first ? b.w : a.w;
-                away[top++] = max(left, right);
-            }
+            if (max(left, right) <= best && top < kStack)
+                WAITING(top++) = left_first ? b.w : a.w;
             if (min(left, right) <= best) {
                 at = left_first ? a.w : b.w;
                 continue;
             }
         }
-        while (top > 0 && away[top - 1] > best)
-            --top;
         if (top == 0)
             break;
-        at = stack[--top];
+        at = WAITING(--top);
     }
     if (found)
         y[i] = uvec2(floatBitsToUint(sqrt(best)), face);
