@@ -1,8 +1,9 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""Makes frames to train the renderer with: streets, drives through them, traced pictures and splat buffers.
+"""Makes frames to train the renderer with: streets, trajectories through them, traced pictures and splat buffers.
 
-Calls the engine: `streets` (grids, then pictures of a short drive at a place that varies with the seed) and `render`.
+Calls the engine: `streets` (grids, then pictures along a short trajectory at a place that varies with the seed) and
+`render`.
 OUT/SEED is laid out as semtrain/frames.py says; a seed whose folder is complete is left alone.
 """
 import argparse
@@ -21,7 +22,7 @@ BESIDE = (3, 8)           # likewise: half of the frames, and as many from 1.5 m
 
 
 def drive_of(seed, frames, length):
-    """where the drive of a seed runs -> {first, end margin, yaw, shift} in metres and radians; frames are 1 m apart"""
+    """where a seed's trajectory runs -> {first, end margin, yaw, shift} in metres and radians; frames are 1 m apart"""
     shift = 1.5 if seed % 10 in BESIDE else 0
     count = max(1, frames // 2) if shift else frames
     first = 8 + seed * 7 % max(1, int(length) - 31)
@@ -52,7 +53,7 @@ def made_of(grid, options):
 
 
 def make_frames(grid, folder, seed, options):
-    """pictures of the drive, and the splat buffers of the same cameras"""
+    """pictures along the trajectory, and the splat buffers of the same cameras"""
     where = drive_of(seed, options.frames, options.length)
     if options.shift is not None:
         where["shift"], where["yaw"] = options.shift, 0
@@ -75,7 +76,7 @@ def main(arguments=None):
     p.add_argument("--frames", type=int, default=8, help="of a street")
     p.add_argument("--length", type=int, default=60, help="of a street, metres")
     p.add_argument("--samples", type=int, default=2, help="rays a pixel")
-    p.add_argument("--shift", type=float, help="metres to the left of a second drive, in place of what the seed says")
+    p.add_argument("--shift", type=float, help="metres to the left of a second trajectory; default: as the seed has it")
     p.add_argument("--sun-azimuth", type=float, help="degrees to the left of the street; default: as the seed has it")
     p.add_argument("--sun-elevation", type=float, help="degrees")
     p.add_argument("--clouds", type=float, help="0 to 1")

@@ -143,8 +143,8 @@ class LocalSets:
         return centers, labels, tokens, known, conditions
 
     def _condition(self, random, centers, cells, boxes, part_boxes, tokens, dropped):
-        """what a set is conditioned on beside its labels; where these are dropped, nothing. With all colours given, some
-        things have others than in the grid: changes `tokens`"""
+        """what a set is conditioned on beside its labels; where these are dropped, nothing. With all colours given,
+        some things have others than in the grid: changes `tokens`"""
         owners, parts = self.grids.owners[cells], self.config["network"].get("condition", ())
         if dropped or not parts:
             return np.zeros((len(cells), width_of(parts)), np.float32)

@@ -57,8 +57,9 @@ def measure(cuts, models, samplers, steps, guidances, choices, output):
 
 
 def line_of(row):
-    """| model | sampler | steps | guidance | objects | mean colour error of CLASSES | all: voxel colour error | Chamfer |
-    sharpness of windows and markings, detail of buildings and cars, spread of cars, against the truth's | ms a voxel |"""
+    """| model | sampler | steps | guidance | objects | mean colour error of CLASSES | all: voxel colour error |
+    Chamfer | sharpness of windows and markings, detail of buildings and cars, spread of cars, against the truth's |
+    ms a voxel |"""
     classes, every = row["scores"]["classes"], row["scores"]["all"]
 
     def ratio(name, figure="sharpness"):

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""Refines drives that a renderer was not trained on, each frame from the one before and each alone, along the drive and
-beside it, and compares the frames with the true ones (semrover eval frames, flicker, kid): a table in Markdown, and all
-figures as JSON. What is there already is kept; what was made with another model, other frames or settings is
-refused."""
+"""Refines drives that a renderer was not trained on, each frame from the one before and each alone, along the
+trajectory and beside it, and compares the frames with the true ones (semrover eval frames, flicker, kid): a table in
+Markdown, and all figures as JSON. What is there already is kept; what was made with another model, other frames or
+settings is refused."""
 import argparse
 import json
 import os

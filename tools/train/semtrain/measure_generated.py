@@ -1,8 +1,9 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""Generates held-back streets, refines drives through them, and compares the frames with those that the same renderer
-makes of the streets' true points (semrover eval frames, kid, flicker): a table in Markdown, and all figures as JSON.
-What is there already is kept; what was made with another model of the same name, or with other settings, is refused."""
+"""Generates held-back streets, refines trajectories through them, and compares the frames with those that the same
+renderer makes of the streets' true points (semrover eval frames, kid, flicker): a table in Markdown, and all figures as
+JSON. What is there already is kept; what was made with another model of the same name, or with other settings, is
+refused."""
 import argparse
 import itertools
 import json
@@ -18,7 +19,7 @@ TRUE = "true points"
 
 
 class Street:
-    """what a short drive along a made street sees: FOLDER/{truth,semantic}.sgrid, objects.json, transforms.json"""
+    """a made street as a short trajectory sees it: FOLDER/{truth,semantic}.sgrid, objects.json, transforms.json"""
 
     def __init__(self, seed, folder, options):
         self.seed, self.folder = seed, folder
@@ -44,7 +45,7 @@ def generate(street, model, objects, grid):
 
 
 def frames_of(street, model, objects, folder, size):
-    """FOLDER/SEED: points of the street (true ones where `objects` is so), their buffers, and refined frames"""
+    """FOLDER/SEED: points of the street (the truth's where `objects` is TRUE), their buffers, and refined frames"""
     base = os.path.join(folder, str(street.seed))
     frames = os.path.join(folder, "frames", str(street.seed))
     if os.path.exists(os.path.join(frames, "color")):

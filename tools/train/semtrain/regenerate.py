@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""A street as a trained transformer would have placed it: noise on the truth's tokens, up to a level at which the street
-can still be seen, and denoised from there. What the transformer cannot draw is then wrong as it is in generated streets.
-A model that is conditioned on objects and colours is given the street's own, and what it makes of an object gets the
-object's mean colour: a car of another colour than its picture would teach a renderer to leave colours out of account."""
+"""A street as a trained transformer would have placed it: noise on the truth's tokens, up to a level at which the
+street can still be seen, and denoised from there. What the transformer cannot draw is then wrong as it is in generated
+streets. A model that is conditioned on objects and colours is given the street's own, and what it makes of an object
+gets the object's mean colour: a car of another colour than its picture would teach a renderer to leave colours out of
+account."""
 import numpy as np
 import torch
 

@@ -77,7 +77,7 @@ class Guidance(NamedTuple):
 
 
 def guided_x0(model, guidance, x, labels, centers, valid, timesteps, condition):
-    """what the sampler takes for x0 [B, N, 6n]; at guided timesteps it is led away from a pass without conditions"""
+    """what the sampler takes for x0 [B, N, 6n]; at guided timesteps it is led away from an unconditional pass"""
     x0 = model(x, labels, centers, valid, timesteps, condition).float()
     rows = guidance.at(timesteps).nonzero()[:, 0]
     if len(rows):

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""Makes procedural streets to train on: FOLDER/SEED/truth.sgrid and semantic.sgrid, a drive, the mesh. A street that is
-there is left as it is, and one of other settings refused."""
+"""Makes procedural streets to train on: FOLDER/SEED/truth.sgrid and semantic.sgrid, a trajectory, the mesh. A street
+that is there is left as it is, and one of other settings refused."""
 import argparse
 import os
 
@@ -10,7 +10,7 @@ from .program import semrover
 
 
 def make_street(folder, seed, length, keep_mesh=False, placement="shifted"):
-    """FOLDER/truth.sgrid holds what drives along the whole street see. -> whether it was made now"""
+    """FOLDER/truth.sgrid holds what is seen from trajectories along the whole street. -> whether it was made now"""
     about = {"length": float(length), "placement": placement}
     if os.path.exists(os.path.join(folder, "truth.sgrid")):
         keep_made_of(folder, about)

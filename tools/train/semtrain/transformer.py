@@ -45,7 +45,7 @@ def with_known(noisy, x0, known, alphas, top, random):
 
 def with_drift(x0, cells, strength, random):
     """tokens x0 [B, N, 6n]; in every other set the colours of the cells [B, N] are off, all by the same. What was
-    generated before may have drifted away from its conditions, and is not to lead away what comes next"""
+    generated before may have drifted away from its conditions, and must not lead away what comes next"""
     off = strength * torch.randn((len(x0), 1, 1, 3), generator=random)
     off *= (torch.rand((len(x0), 1, 1, 1), generator=random) < 0.5)
     tokens = x0.unflatten(2, (-1, 6)).clone()
@@ -54,8 +54,8 @@ def with_drift(x0, cells, strength, random):
 
 
 def noised_sets(x0, known, condition, t, alphas, config, random):
-    """tokens x0 [B, N, 6n] as a network sees them at the noise levels t [B]: known cells [B, N] nearly clean, with colours
-    that have drifted where they are given"""
+    """tokens x0 [B, N, 6n] as a network sees them at the noise levels t [B]: known cells [B, N] nearly clean; their
+    colours have drifted where a colour is given"""
     noisy, before = noised(x0, alphas, t, random), x0
     parts = config["network"].get("condition", [])
     if config["known_drift"] and "tint" in parts:
@@ -124,7 +124,8 @@ def exporter(folder, config, grids):
 
     def export(state):
         write_component(os.path.join(folder, "model", "voxfield_transformer"),
-                        {"_class_name": "VoxfieldTransformer", **config["network"], **placed, "prediction_type": "sample"},
+                        {"_class_name": "VoxfieldTransformer", **config["network"], **placed,
+                         "prediction_type": "sample"},
                         state, config["mantissa_bits"])
         write_scheduler(os.path.join(folder, "model", "voxfield_scheduler"), {
             "_class_name": "DDPMScheduler", "num_train_timesteps": config["num_train_timesteps"],

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""How far a transformer's x0 is off at each timestep, on streets that it was not trained on, with all conditions and none
-known; written into its model's scheduler as variance_type "analytic" (docs/method.md §3.2)."""
+"""How far a transformer's x0 is off at each timestep, on streets that it was not trained on, with all conditions and no
+voxel known; written into its model's scheduler as variance_type "analytic" (docs/method.md §3.2)."""
 import argparse
 import os
 import tempfile

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""The video renderer's noise levels, its Euler sampler, and windows over a drive (docs/method.md §6.3, §6.4)."""
+"""The video renderer's noise levels, its Euler sampler, and windows over a trajectory (docs/method.md §6.3, §6.4)."""
 import torch
 
 from .denoising import block_shares
@@ -91,7 +91,7 @@ def window_denoiser(unet, text, added, buffer, visible, first, last):
 
 
 def windows(frames, length, overlap):
-    """-> [(first, known, end)]: as the engine cuts a drive"""
+    """-> [(first, known, end)]: as the engine cuts a trajectory"""
     out, after = [], 0
     while after < frames:
         first = max(0, min(after - min(overlap, after), frames - length))

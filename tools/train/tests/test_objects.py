@@ -373,7 +373,7 @@ class Objects(unittest.TestCase):
 
 
 class TheTable(unittest.TestCase):
-    def test_has_a_row_for_each_telling_and_the_same_errors_where_nothing_is_told(self):
+    def test_has_a_row_for_each_choice_and_the_same_errors_where_nothing_is_given(self):
         with tempfile.TemporaryDirectory() as folder:
             write_cars(folder)
             torch.manual_seed(1)
