@@ -49,7 +49,7 @@ def measure(cuts, models, samplers, steps, guidances, choices, output):
             seconds = generate(cuts, model, sampler, n, guidance, objects, os.path.join(output, setting))
             scores = json.loads(semrover("eval", "points", os.path.join(output, setting), os.path.join(cuts, "truth"),
                                          "--json"))
-            write_json(result, {"model": name, "sampler": sampler, "steps": n, "guidance": guidance, "objects": objects,
+            write_json(result, {"model": name, "sampler": sampler, "steps": n, "guidance": guidance, "told": objects,
                                 "seconds": seconds, "scores": scores})
         rows.append(read_json(result))
         print(line_of(rows[-1]), flush=True)
@@ -65,7 +65,7 @@ def line_of(row):
     def ratio(name, figure="sharpness"):
         value = classes.get(name, {}).get(figure, {}).get("ratio")
         return "-" if value is None else f"{value:.2f}"
-    cells = [row["model"], row["sampler"], str(row["steps"]), f"{row['guidance']:g}", row["objects"]]
+    cells = [row["model"], row["sampler"], str(row["steps"]), f"{row['guidance']:g}", row["told"]]
     cells += [f"{classes[c]['color_error']:.3f}" if c in classes else "-" for c in CLASSES]
     cells += [f"{every['cell_color_error']:.3f}", f"{every['chamfer']:.4f}", ratio("building"), ratio("road-lane"),
               ratio("building", "detail"), ratio("car", "detail"), ratio("car", "spread"),
