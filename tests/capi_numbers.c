@@ -40,13 +40,19 @@ static const struct number object_numbers[] = {
     NUMBER(sr_object, color[1], 1, 0, SR_ERR_BAD_INPUT),  NUMBER(sr_object, color[2], 1, 0, SR_ERR_BAD_INPUT),
 };
 static const struct number draw_numbers[] = {
-    NUMBER(sr_draw_desc, fx, 0, 1, SR_ERR_BAD_INPUT),
-    NUMBER(sr_draw_desc, fy, 0, 1, SR_ERR_BAD_INPUT),
-    NUMBER(sr_draw_desc, cx, 0, 1, SR_ERR_BAD_INPUT),
-    NUMBER(sr_draw_desc, cy, 0, 1, SR_ERR_BAD_INPUT),
-    NUMBER(sr_draw_desc, world_to_camera[0], 0, 1, SR_ERR_BAD_INPUT),
-    NUMBER(sr_draw_desc, world_to_camera[5], 0, 1, SR_ERR_BAD_INPUT),
-    NUMBER(sr_draw_desc, world_to_camera[11], 0, 1, SR_ERR_BAD_INPUT),
+    NUMBER(sr_draw_desc, fx, 0, 1, SR_ERR_BAD_INPUT),      NUMBER(sr_draw_desc, fy, 0, 1, SR_ERR_BAD_INPUT),
+    NUMBER(sr_draw_desc, cx, 0, 1, SR_ERR_BAD_INPUT),      NUMBER(sr_draw_desc, cy, 0, 1, SR_ERR_BAD_INPUT),
+    NUMBER(sr_draw_desc, depth_scale, 0, 1, SR_ERR_USAGE), NUMBER(sr_draw_desc, depth_offset, 0, 1, SR_ERR_USAGE),
+};
+/* whose line says "focus", whichever number is wrong */
+#define FOCUS_NUMBER(member, below_zero)                                                                               \
+    {                                                                                                                  \
+        "focus", offsetof(sr_focus, member), 0, below_zero, SR_ERR_USAGE                                               \
+    }
+static const struct number focus_numbers[] = {
+    FOCUS_NUMBER(position[0], 1),  FOCUS_NUMBER(position[1], 1),  FOCUS_NUMBER(position[2], 1),
+    FOCUS_NUMBER(direction[0], 1), FOCUS_NUMBER(direction[1], 1), FOCUS_NUMBER(direction[2], 1),
+    FOCUS_NUMBER(radius, 0),
 };
 static const struct number depth_numbers[] = {
     NUMBER(sr_depth_image, scale, 0, 1, SR_ERR_USAGE),
@@ -117,6 +123,12 @@ static sr_status draw(sr_context* context, void* desc)
     return sr_world_draw(drawn, desc);
 }
 
+static sr_status look_around(sr_context* context, void* focus)
+{
+    (void)context;
+    return sr_world_foci(drawn, focus, 1);
+}
+
 static sr_status draw_behind(sr_context* context, void* depth_image)
 {
     sr_draw_desc picture = camera_at(1, 64, 40);
@@ -143,6 +155,8 @@ int main(int argc, char** argv)
     sr_generation generation = SR_INIT(sr_generation);
     sr_object object = {.label = 2, .size = {9, 1.2, 2.4}, .colored = 1};
     sr_draw_desc picture = camera_at(1, 64, 40);
+    sr_focus focus = {.position = {1, 0, 1.5}, .direction = {1, 0, 0}, .radius = 3};
+    size_t i;
     sr_depth_image depth_image = {.image = (VkImage)(size_t)1, /* which nobody looks at */
                                   .format = VK_FORMAT_R32_SFLOAT,
                                   .layout_before = VK_IMAGE_LAYOUT_GENERAL,
@@ -166,6 +180,13 @@ int main(int argc, char** argv)
     CHECK(sr_world_create(context, &right_desc, &drawn) == SR_OK);
     CHECK_OK(context, sr_world_draw(drawn, &picture));
     EACH_IS_REFUSED(context, draw_numbers, picture, draw);
+    for (i = 0; i < 12; ++i) {
+        struct number number = NUMBER(sr_draw_desc, world_to_camera, 0, 1, SR_ERR_BAD_INPUT);
+        number.at += i * sizeof(double);
+        each_is_refused(context, &number, 1, &picture, draw);
+    }
+    CHECK_OK(context, look_around(context, &focus));
+    EACH_IS_REFUSED(context, focus_numbers, focus, look_around);
     EACH_IS_REFUSED(context, depth_numbers, depth_image, draw_behind);
     sr_world_destroy(drawn);
     sr_model_destroy(model);
