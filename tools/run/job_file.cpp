@@ -98,7 +98,7 @@ tl::unexpected<Error> JobReader::unknown(const JobValue& at, std::string_view ke
 {
     const auto nearest =
         std::ranges::min_element(known, {}, [&](const std::string& k) { return edit_distance(key, k); });
-    if (nearest != known.end() && edit_distance(key, *nearest) <= std::max<size_t>(1, key.size() / 3))
+    if (nearest != known.end() && edit_distance(key, *nearest) <= (key.size() < 5 ? 1 : 2))
         return refuse(at, fmt::format("unknown key {}; is it {}?", quote(key), quote(*nearest)));
     if (known.size() > 16)
         return refuse(at, fmt::format("unknown key {}", quote(key)));

@@ -57,7 +57,9 @@ Status forget_missing_pictures(const Path& folder)
     if (!is_file(path))
         return {};
     SR_TRY(Json json, read_json(path));
-    for (Json& frame : json.value("frames", Json()).is_array() ? json["frames"] : Json())
+    if (!json.is_object() || !json.value("frames", Json()).is_array())
+        return {};
+    for (Json& frame : json["frames"])
         for (auto member = frame.begin(); member != frame.end();) {
             const bool names_file = member.key().ends_with("_path") && member->is_string();
             member = names_file && !is_file(folder / member->get<std::string>()) ? frame.erase(member) : ++member;
