@@ -57,7 +57,8 @@ extern "C" {
 /* raised when a binary built against an older header could misbehave; never within a soname */
 #define SR_ABI_VERSION 0u
 
-/* values are the exit codes of the program and never change; 8..69 are kept free */
+/* values are the exit codes of the program and never change; 8..69 are kept free. The program's 75, another process at
+ * work in the same folder, is of no call */
 typedef enum sr_status {
     SR_OK = 0,
     SR_ERR_USAGE = 2,         /* the call is wrong: a NULL, a size, a number out of range or not finite */
