@@ -113,7 +113,7 @@ typedef struct sr_context_desc {
     uint32_t struct_size;
     uint32_t validation; /* 1: Khronos validation, see sr_set_diagnostic_callback; not with `vulkan` */
     const void* next;
-    const char* device;             /* NULL: the best; an index, or a part of a name */
+    const char* device; /* NULL: the best; an index, UUID, PCI address or part of a name; "auto": as --device auto */
     const sr_vulkan_device* vulkan; /* the application's device; NULL: one of the library's own */
     uint64_t max_bytes;             /* of device memory; 0: no budget */
     /* What sr_context_get_pipeline_cache gave another process, read before the call returns. One that is damaged, or of

@@ -2,15 +2,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/cli/open_device.h"
 
+#include "runtime/device/device_choice.h"
 #include "runtime/device/profile.h"
 #include "tools/cli/print_stderr.h"
+
+#include <cstdlib>
 
 namespace semrover {
 
 Result<std::unique_ptr<Device>> open_device(const Globals& globals, const std::string& profile)
 {
     DeviceOptions options;
-    options.select = globals.device;
+    const bool engine = is_under_engine(std::getenv);
+    options.select = globals.device.empty() && engine ? "auto" : globals.device;
+    options.require_gpu = globals.require == "gpu" || (globals.require.empty() && engine);
     options.max_bytes = globals.max_vram;
     options.autotune = globals.autotune;
     options.cancelled = interrupt_requested;

@@ -7,7 +7,7 @@
 
 namespace semrover {
 
-// the device that --device and --max-vram ask for; with a profile, it measures what runs on it
+// the device that --device, --require and --max-vram ask for; with a profile, it measures what runs on it
 Result<std::unique_ptr<Device>> open_device(const Globals& globals, const std::string& profile = {});
 
 // --profile: a Chrome trace, and with --verbose a summary; nothing where `path` is empty
