@@ -20,6 +20,12 @@ Status settle_device(Device& device)
     return device.write(probe->slice(), std::as_bytes(std::span(&word, 1)));
 }
 
+std::shared_ptr<LoadedNetworks> networks_of(Device& device, const Refinement& r)
+{
+    return r.options.networks ? r.options.networks
+                              : std::make_shared<LoadedNetworks>(device, r.model, r.options.precision);
+}
+
 // words of a picture, the largest that is read back: a frame has three bytes for each of them, a latent less
 uint64_t largest_read(const Refinement& r)
 {
@@ -74,9 +80,8 @@ class RefinementJob : public Job {
     RefinementJob(Device& device, Refinement refinement, RunFolder run, std::unique_ptr<Outgoing> out,
                   const RefinementCallbacks& callbacks)
         : device_(device), r_(std::move(refinement)), run_(std::move(run)), callbacks_(callbacks),
-          networks_(std::make_shared<LoadedNetworks>(device, r_.model, r_.options.precision)),
-          store_(run_, r_.options.format, r_.model.vae.latent_channels), files_(device, store_, *out),
-          out_(std::move(out))
+          networks_(networks_of(device, r_)), store_(run_, r_.options.format, r_.model.vae.latent_channels),
+          files_(device, store_, *out), out_(std::move(out))
     {
         drawn_ = !r_.options.from_grid() || was_drawn();
         host_bytes_ = device.host_bytes();
@@ -405,8 +410,7 @@ Result<MemoryPlan> plan_refinement(Device& device, const Refinement& r)
     for (const RefinedCamera& c : r.cameras)
         work.push_back(c.work);
     const uint64_t outgoing = Outgoing::planned_bytes(device.limits(), largest_read(r));
-    return plan_renderer(device, LoadedNetworks(device, r.model, r.options.precision), r.settings, work,
-                         outgoing + history_bytes(device, r));
+    return plan_renderer(device, *networks_of(device, r), r.settings, work, outgoing + history_bytes(device, r));
 }
 
 Result<std::unique_ptr<Job>> begin_refinement(Device& device, Refinement r, const RefinementCallbacks& callbacks)

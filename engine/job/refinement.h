@@ -15,6 +15,7 @@ struct RefinementOptions {
     RendererOptions renderer;
     DType precision = DType::f16;
     std::optional<uint32_t> first_frame, last_frame; // of every camera, both included; the camera's first, and last
+    std::shared_ptr<LoadedNetworks> networks = {};   // of the model, in that precision, shared; none: loaded
     Path from;                                       // output of an earlier run, whose latents come before first_frame
     FrameFormat format;
     std::optional<ImageSize> size;           // of the pictures, refused where it is another

@@ -19,7 +19,7 @@ enum class ErrorCode : int {
     device_lost = 6,
     partial = 7,
     internal = 70,
-    busy = 75, // another process works there, or what it made is not visible yet: the same again later
+    busy = 75, // another process has it, or it cannot be seen yet: try again
     interrupted = 130,
 };
 

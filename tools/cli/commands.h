@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <functional>
 #include <initializer_list>
+#include <memory>
 #include <string>
 
 namespace CLI {
@@ -15,6 +16,8 @@ class App;
 }
 
 namespace semrover {
+
+class Session;
 
 // options that every subcommand takes, before or after its name
 struct Globals {
@@ -27,6 +30,9 @@ struct Globals {
     bool verbose = false;
     bool json = false;     // results as one JSON object on standard output
     bool log_json = false; // progress as JSON lines on standard error
+
+    // of commands that are parts of another, which says what came of them; none: each has a device of its own
+    std::shared_ptr<Session> session = {};
 };
 
 // what main runs once the command line is understood; an error becomes one line and the exit code of its ErrorCode
@@ -58,6 +64,7 @@ void add_labels(CLI::App& app, const Globals& globals, Run& run);
 void add_page(CLI::App& app, const Globals& globals, Run& run);
 void add_refine(CLI::App& app, const Globals& globals, Run& run);
 void add_render(CLI::App& app, const Globals& globals, Run& run);
+void add_run(CLI::App& app, const Globals& globals, Run& run);
 void add_tile(CLI::App& app, const Globals& globals, Run& run);
 void add_streets(CLI::App& app, const Globals& globals, Run& run);
 void add_verify(CLI::App& app, const Globals& globals, Run& run);

@@ -5,13 +5,16 @@
 #include "runtime/device/device_choice.h"
 #include "runtime/device/profile.h"
 #include "tools/cli/print_stderr.h"
+#include "tools/cli/session.h"
 
 #include <cstdlib>
 
 namespace semrover {
 
-Result<std::unique_ptr<Device>> open_device(const Globals& globals, const std::string& profile)
+Result<std::shared_ptr<Device>> open_device(const Globals& globals, const std::string& profile)
 {
+    if (globals.session && globals.session->device)
+        return globals.session->device;
     DeviceOptions options;
     const bool engine = is_under_engine(std::getenv);
     options.select = globals.device.empty() && engine ? "auto" : globals.device;
@@ -19,7 +22,9 @@ Result<std::unique_ptr<Device>> open_device(const Globals& globals, const std::s
     options.max_bytes = globals.max_vram;
     options.autotune = globals.autotune;
     options.cancelled = interrupt_requested;
-    SR_TRY(auto device, Device::create(options));
+    SR_TRY(std::shared_ptr<Device> device, Device::create(options));
+    if (globals.session)
+        globals.session->device = device;
     if (!profile.empty())
         device->set_profile(std::make_shared<Profile>());
     return device;

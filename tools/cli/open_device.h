@@ -7,8 +7,9 @@
 
 namespace semrover {
 
-// the device that --device, --require and --max-vram ask for; with a profile, it measures what runs on it
-Result<std::unique_ptr<Device>> open_device(const Globals& globals, const std::string& profile = {});
+// The device that --device, --require and --max-vram ask for, or that the session has; with a profile, it measures what
+// runs on it
+Result<std::shared_ptr<Device>> open_device(const Globals& globals, const std::string& profile = {});
 
 // --profile: a Chrome trace, and with --verbose a summary; nothing where `path` is empty
 Status write_profile(Device& device, const std::string& path, const Globals& globals);

@@ -49,7 +49,7 @@ Finding validation_finding(const LoaderSummary& loader)
 }
 
 // a device that was asked for by name and is not there is no matter of packages
-Finding device_finding(const Result<std::unique_ptr<Device>>& device, const std::string& asked)
+Finding device_finding(const Result<std::shared_ptr<Device>>& device, const std::string& asked)
 {
     if (!device)
         return {"device", false, with_options(device.error().message), asked.empty() ? "mesa-vulkan-drivers" : ""};

@@ -12,6 +12,7 @@
 #include "runtime/base/quote.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/option_facts.h"
+#include "tools/cli/session.h"
 #include "tools/trajectory/camera_path.h"
 #include "tools/trajectory/path_format.h"
 
@@ -153,6 +154,9 @@ Status GridRun::open_world_in_run()
     const bool by_tiles = generation_.regions.tile_cells > 0;
     WorldRequest request{.settings = generation_, .seed = o_.seed, .objects = objects_};
     request.tiles_at_once = o_.generation.options.batch;
+    if (globals_.session) {
+        SR_TRY(request.transformer, globals_.session->transformer(o_.generation.options.model, generation_.precision));
+    }
     if (!o_.generation.dry_run) {
         SR_TRY(RunFolder run, open_run(folder(), settings_, globals_.yes, {{"regions", "tiles"}}));
         run_.emplace(std::move(run));

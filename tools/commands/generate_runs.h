@@ -60,7 +60,7 @@ class GenerateRun {
     const GenerateArguments& o_;
     const Globals& globals_;
     JobDisplay display_;
-    std::unique_ptr<Device> device_;
+    std::shared_ptr<Device> device_;
     GenerationSettings generation_;
     GivenObjects objects_;
     std::optional<Json> finished_; // results of a run that was finished before

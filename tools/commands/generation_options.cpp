@@ -60,6 +60,8 @@ void print_estimate(const Json& e, const Globals& globals)
 
 void print_results(const Json& results, const Globals& globals)
 {
+    if (globals.session)
+        return;
     if (globals.json)
         fmt::print("{}\n", results.dump());
     else if (!globals.quiet)

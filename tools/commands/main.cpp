@@ -22,6 +22,7 @@ int main(int argc, char** argv)
          add_page,
          add_refine,
          add_render,
+         add_run,
          add_tile,
          {"streets", "semrover-scenes", "make up a street: mesh, grids, a drive, and pictures to train with"},
          {"verify", "semrover-eval", "run golden cases: what public reference code gives for known inputs"},

@@ -7,6 +7,7 @@
 #include "runtime/base/quote.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/run_job.h"
+#include "tools/cli/session.h"
 #include "tools/cli/value_options.h"
 #include "tools/commands/scene_input.h"
 #include "tools/commands/trajectory_options.h"
@@ -165,7 +166,7 @@ std::string windows_text(const Refinement& r)
 
 void print_plan(const Refinement& r, const MemoryPlan& plan, const Globals& globals)
 {
-    if (globals.json || globals.quiet)
+    if (globals.json || globals.quiet || globals.session)
         return;
     const ImageSize& size = r.cameras.front().buffers.size;
     fmt::print("{} frames of {} x {}, {}{} steps each\nplanned device memory {} bytes ({}), {}\n", r.frames(),
@@ -186,6 +187,8 @@ Status dry_run(Device& device, const Refinement& r, const Globals& globals)
 void print_results(const RefineArguments& o, const Globals& globals, const Json& results)
 {
     const uint64_t peak = results["peak_device_bytes"];
+    if (globals.session)
+        return;
     if (globals.json)
         fmt::print("{}\n", results.dump());
     else if (!globals.quiet)
@@ -206,6 +209,9 @@ Status refine(const RefineArguments& o, const Globals& globals)
         print_warnings(r.options.path->warnings, globals);
     if (o.dry_run)
         return dry_run(*device, r, globals);
+    if (globals.session) {
+        SR_TRY(r.options.networks, globals.session->renderer(r.options.model, r.options.precision));
+    }
     const auto results = run_job(globals, [&](const JobCallbacks& callbacks) {
         RefinementCallbacks c{callbacks, {}, {}};
         c.planned = [&](const Refinement& of, const MemoryPlan& plan) { print_plan(of, plan, globals); };

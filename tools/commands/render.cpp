@@ -110,7 +110,7 @@ Status render(const RenderArguments& o, const Globals& globals)
     if (video.video)
         SR_CHECK(video.video->finish());
     SR_CHECK(write_profile(*device, o.profile, globals));
-    if (globals.json)
+    if (globals.json && !globals.session)
         fmt::print("{}\n", results.dump());
     return {};
 }

@@ -1,0 +1,265 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/run/attempt.h"
+
+#include "runtime/base/hash.h"
+#include "runtime/base/quote.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstring>
+#include <fcntl.h>
+#include <random>
+#include <unistd.h>
+
+namespace semrover {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kWork = ".work";
+
+Path attempts_of(const Path& out)
+{
+    return out / kWork;
+}
+
+// KEY.HOST.PID.RANDOM
+struct AttemptName {
+    std::string key, host;
+    long pid = 0;
+};
+
+std::optional<AttemptName> parse_name(const std::string& name)
+{
+    std::vector<std::string> parts;
+    for (size_t at = 0; at <= name.size();) {
+        const size_t dot = std::min(name.find('.', at), name.size());
+        parts.push_back(name.substr(at, dot - at));
+        at = dot + 1;
+    }
+    if (parts.size() != 4)
+        return std::nullopt;
+    return AttemptName{parts[0], parts[1], std::strtol(parts[2].c_str(), nullptr, 10)};
+}
+
+bool is_known_dead(const Path& attempt)
+{
+    const auto name = parse_name(attempt.filename().string());
+    return name && name->host == host_in_names() && name->pid > 0 && ::kill(pid_t(name->pid), 0) != 0 && errno == ESRCH;
+}
+
+// a hard link, or a copy where the file system has none
+bool take_file(const Path& from, const Path& to)
+{
+    std::error_code error;
+    fs::create_directories(to.parent_path(), error);
+    fs::create_hard_link(from, to, error);
+    if (error)
+        fs::copy_file(from, to, fs::copy_options::overwrite_existing, error);
+    return !error;
+}
+
+bool is_state(const std::string& name)
+{
+    return name == "run.json" || name == "journal.jsonl";
+}
+
+// What a run goes on from. Its journal is taken first: what it names is there then. The other process may still append
+// to its own.
+void take_run(const Path& from, const Path& to)
+{
+    std::error_code error;
+    std::vector<Path> files;
+    for (fs::recursive_directory_iterator i(from, error), end; i != end; i.increment(error)) {
+        const std::string name = i->path().filename().string();
+        if (i->is_symlink(error) || !i->is_regular_file(error) || name == "lock" || name.starts_with(".semrover-"))
+            continue;
+        const Path target = to / i->path().lexically_relative(from);
+        if (is_state(name)) {
+            std::error_code ignored;
+            fs::create_directories(target.parent_path(), ignored);
+            fs::copy_file(i->path(), target, fs::copy_options::overwrite_existing, ignored);
+        } else {
+            files.push_back(i->path());
+        }
+    }
+    for (const Path& file : files)
+        (void)take_file(file, to / file.lexically_relative(from));
+}
+
+void flush_folder(const Path& folder)
+{
+    const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (fd < 0)
+        return;
+    (void)::fsync(fd);
+    ::close(fd);
+}
+
+double seconds_since_change(const Path& folder)
+{
+    std::error_code error;
+    fs::file_time_type last = fs::last_write_time(folder, error);
+    for (fs::recursive_directory_iterator i(folder, error), end; i != end; i.increment(error))
+        last = std::max(last, i->last_write_time(error));
+    return std::chrono::duration<double>(fs::file_time_type::clock::now() - last).count();
+}
+
+} // namespace
+
+std::string host_in_names()
+{
+    char name[256] = "";
+    (void)::gethostname(name, sizeof name - 1);
+    std::string host = name;
+    for (char& c : host)
+        c = std::isalnum(static_cast<unsigned char>(c)) || c == '_' ? c : '-';
+    return host.empty() ? "host" : host.substr(0, 60);
+}
+
+Attempt::Attempt(Path out, std::string name)
+    : out_(std::move(out)), folder_(attempts_of(out_) / name), work_(folder_ / "work"), files_(folder_ / "files"),
+      name_(std::move(name))
+{
+}
+
+Attempt::Attempt(Attempt&& other) noexcept = default;
+
+Attempt::~Attempt()
+{
+    std::error_code ignored; // folders that hold anything stay
+    for (const Path& folder : {work_, files_, folder_})
+        if (!folder.empty())
+            fs::remove(folder, ignored);
+}
+
+Result<Attempt> Attempt::create(const Path& out, const std::string& key)
+{
+    std::random_device random;
+    const uint64_t number = uint64_t(random()) << 32 | random();
+    Attempt attempt(out, fmt::format("{}.{}.{}.{}", key, host_in_names(), ::getpid(), hash_text(number)));
+    SR_CHECK(make_folder(attempt.folder_));
+    return attempt;
+}
+
+std::vector<Path> Attempt::older() const
+{
+    const std::string key = name_.substr(0, name_.find('.'));
+    std::vector<std::pair<fs::file_time_type, Path>> found;
+    std::error_code error;
+    for (fs::directory_iterator i(attempts_of(out_), error), end; i != end; i.increment(error))
+        if (const auto name = parse_name(i->path().filename().string());
+            name && name->key == key && i->path() != folder_)
+            found.emplace_back(i->last_write_time(error), i->path());
+    std::ranges::sort(found, std::greater());
+    std::vector<Path> paths;
+    for (auto& [time, path] : found)
+        paths.push_back(std::move(path));
+    return paths;
+}
+
+bool Attempt::adopt(const Path& run, const std::string& device, const std::string& driver,
+                    const std::function<void(const std::string&)>& say)
+{
+    for (const Path& other : older()) {
+        const auto summary = read_json(other / "work" / run);
+        if (!summary || !summary->is_object() || !summary->value("settings", Json()).is_object())
+            continue;
+        const Json& settings = (*summary)["settings"];
+        if (settings.value("device", "") != device || settings.value("driver", "") != driver) {
+            say(fmt::format("{} is of another device, {}: it is not gone on with", quote_path(other),
+                            quote(settings.value("device", ""))));
+            continue;
+        }
+        take_run(other / "work", work_);
+        if (is_known_dead(other)) {
+            std::error_code ignored;
+            fs::remove_all(other, ignored);
+        }
+        return true;
+    }
+    return false;
+}
+
+// into files(); false: it has not all of it
+bool Attempt::take_finished(const Path& from, const std::string& key)
+{
+    const auto manifest = read_manifest(from);
+    if (!manifest || manifest->key != key || !differences(from, *manifest).empty())
+        return false;
+    const bool all = std::ranges::all_of(
+        manifest->files, [&](const Manifest::File& file) { return take_file(from / file.path, files_ / file.path); });
+    Manifest own = *manifest;
+    own.attempt = name_;
+    own.adopted = true;
+    if (all && differences(files_, own).empty() && write_manifest(files_, own))
+        return true;
+    std::error_code ignored;
+    fs::remove_all(files_, ignored);
+    return false;
+}
+
+bool Attempt::adopt_finished(const std::string& key)
+{
+    const std::vector<Path> others = older();
+    return std::ranges::any_of(others, [&](const Path& other) {
+        return take_finished(other / "files", key) || take_finished(other / "work", key);
+    });
+}
+
+// note: over a network an answer may be lost, so that a rename which happened seems to fail
+Result<Attempt::Published> Attempt::publish(const std::string& name, const std::string& key)
+{
+    const Path to = out_ / name;
+    SR_CHECK(make_folder(to.parent_path()));
+    const int failed = ::rename(files_.c_str(), to.c_str()) == 0 ? 0 : errno;
+    flush_folder(to.parent_path());
+    const auto there = read_manifest(to);
+    std::error_code ignored;
+    if (there && there->attempt == name_) {
+        for (const Path& other : older())
+            if (is_known_dead(other))
+                fs::remove_all(other, ignored);
+        fs::remove_all(folder_, ignored);
+        return Published::by_this;
+    }
+    if (there && there->key == key) {
+        fs::remove_all(folder_, ignored);
+        return Published::by_another;
+    }
+    if (there)
+        return fail(ErrorCode::bad_input, "{} was made with other settings; -y moves it aside", quote_path(to));
+    return fail(ErrorCode::bad_input, "cannot rename {} to {}: {}", quote_path(files_), quote_path(to),
+                std::strerror(failed ? failed : ENOENT));
+}
+
+size_t Attempt::clean(const Path& out, double seconds, const std::function<bool(const std::string& key)>& is_done)
+{
+    size_t removed = 0;
+    std::error_code error;
+    std::vector<Path> all;
+    for (fs::directory_iterator i(attempts_of(out), error), end; i != end; i.increment(error))
+        all.push_back(i->path());
+    for (const Path& attempt : all) {
+        const auto name = parse_name(attempt.filename().string());
+        if (name && is_done(name->key) && seconds_since_change(attempt) >= seconds)
+            removed += fs::remove_all(attempt, error) > 0;
+    }
+    return removed;
+}
+
+std::set<std::string> Attempt::keys(const Path& out)
+{
+    std::set<std::string> keys;
+    std::error_code error;
+    for (fs::directory_iterator i(attempts_of(out), error), end; i != end; i.increment(error))
+        if (const auto name = parse_name(i->path().filename().string()))
+            keys.insert(name->key);
+    return keys;
+}
+
+} // namespace semrover
