@@ -57,7 +57,8 @@ extern "C" {
 /* raised when a binary built against an older header could misbehave; never within a soname */
 #define SR_ABI_VERSION 0u
 
-/* values are the exit codes of the program and never change; 8..69 are kept free */
+/* values are the exit codes of the program and never change; 8..69 are kept free. The program's 75, another process at
+ * work in the same folder, is of no call */
 typedef enum sr_status {
     SR_OK = 0,
     SR_ERR_USAGE = 2,         /* the call is wrong: a NULL, a size, a number out of range or not finite */
@@ -112,7 +113,7 @@ typedef struct sr_context_desc {
     uint32_t struct_size;
     uint32_t validation; /* 1: Khronos validation, see sr_set_diagnostic_callback; not with `vulkan` */
     const void* next;
-    const char* device;             /* NULL: the best; an index, or a part of a name */
+    const char* device; /* NULL: the best; an index, UUID, PCI address or part of a name; "auto": as --device auto */
     const sr_vulkan_device* vulkan; /* the application's device; NULL: one of the library's own */
     uint64_t max_bytes;             /* of device memory; 0: no budget */
     /* What sr_context_get_pipeline_cache gave another process, read before the call returns. One that is damaged, or of

@@ -28,6 +28,15 @@ TEST(Catalogue, has_every_op_of_the_shaders_once)
     EXPECT_EQ(found, ops);
 }
 
+void expect_refusal(const std::string& arguments)
+{
+    const ProgramResult refused = semrover_program(arguments);
+    EXPECT_EQ(refused.code, 4) << arguments;
+    EXPECT_EQ(std::ranges::count(refused.err, '\n'), 1) << refused.err;
+    EXPECT_NE(refused.err.find("GPU"), std::string::npos) << refused.err;
+    EXPECT_NE(refused.err.find("(cpu, UUID "), std::string::npos) << refused.err;
+}
+
 TEST(CliDevices, every_device_is_listed_with_limits_and_kernels)
 {
     const ProgramResult text = semrover_program("devices");
@@ -38,6 +47,9 @@ TEST(CliDevices, every_device_is_listed_with_limits_and_kernels)
         EXPECT_EQ(devices[i]["index"], i);
         EXPECT_GT(devices[i]["storage_range_bytes"], 0);
         EXPECT_NE(text.out.find(devices[i]["name"]), std::string::npos) << text.out;
+        EXPECT_EQ(devices[i]["uuid"].get<std::string>().size(), 36u);
+        EXPECT_NE(text.out.find(devices[i]["uuid"]), std::string::npos) << text.out;
+        EXPECT_TRUE(devices[i]["pci"].is_string());
         EXPECT_TRUE(devices[i]["kernels"]["gemm"].is_string());
         EXPECT_TRUE(devices[i]["kernels"]["attention"].is_string());
     }
@@ -72,6 +84,28 @@ TEST(CliDoctor, without_a_driver_it_says_what_to_install_and_exits_with_4)
     EXPECT_EQ(std::ranges::count(doctor.err, '\n'), 1);
     EXPECT_EQ(devices.code, 4);
     EXPECT_EQ(devices.out, "");
+}
+
+// a variable for the programs that a test starts
+struct Variable {
+    const char* name;
+    Variable(const char* name, const char* value) : name(name) { setenv(name, value, 1); }
+    ~Variable() { unsetenv(name); }
+};
+
+TEST(CliDevices, under_an_engine_a_cpu_is_never_taken_in_silence)
+{
+    const Variable only_a_cpu("CUDA_VISIBLE_DEVICES", ""); // whatever else this machine has
+    EXPECT_EQ(semrover_program("doctor --device auto").code, 0);
+    EXPECT_EQ(semrover_program("doctor --device auto --require any").code, 0);
+    expect_refusal("doctor --device auto --require gpu");
+    for (const char* engine :
+         {"SLURM_JOB_ID", "JOB_COMPLETION_INDEX", "AWS_BATCH_JOB_ARRAY_INDEX", "KUBERNETES_SERVICE_HOST"}) {
+        const Variable variable(engine, "1");
+        expect_refusal("doctor");
+        EXPECT_EQ(semrover_program("doctor --require any").code, 0) << engine;
+    }
+    EXPECT_EQ(semrover_program("doctor --require cuda").code, 2);
 }
 
 } // namespace cli_devices_test

@@ -9,9 +9,12 @@
 #include <algorithm>
 #include <csignal>
 #include <cstring>
+#include <fcntl.h>
 #include <fstream>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <sys/file.h>
+#include <unistd.h>
 
 namespace semrover {
 namespace cli_generate_test {
@@ -44,6 +47,15 @@ size_t files_in(const Path& folder)
     std::error_code ignored;
     const std::filesystem::directory_iterator files(folder, ignored);
     return size_t(std::distance(begin(files), end(files)));
+}
+
+// as a process that works there
+int hold_lock(const Path& folder)
+{
+    std::filesystem::create_directories(folder);
+    const int lock = ::open((folder / "lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+    EXPECT_EQ(::flock(lock, LOCK_EX | LOCK_NB), 0);
+    return lock;
 }
 
 class CliGenerate : public testing::Test {
@@ -332,6 +344,16 @@ TEST_F(CliGenerate, a_budget_makes_batches_smaller_and_the_bytes_stay)
     EXPECT_TRUE(contents(path("one.sgrid")) == contents(path("small.sgrid")));
     EXPECT_EQ(generate("less.sgrid", fmt::format("--batch 8 --max-vram {}", bytes - 1)).code, 5);
     EXPECT_EQ(generate("", fmt::format("--dry-run --max-vram {}", bytes)).code, 0);
+}
+
+TEST_F(CliGenerate, a_folder_where_another_process_works_is_busy)
+{
+    const int lock = hold_lock(path("out.sgrid.run"));
+    const ProgramResult busy = generate("out.sgrid");
+    ::close(lock);
+    EXPECT_EQ(busy.code, 75);
+    EXPECT_NE(busy.err.find("another process works in"), std::string::npos) << busy.err;
+    EXPECT_EQ(generate("out.sgrid").code, 0);
 }
 
 // ---- bad input: one line, the exit code, nothing left behind

@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+#include "runtime/base/host_name.h"
 #include "tests/child_program.h"
 #include "tests/json_text.h"
 #include "tests/program.h"
@@ -189,7 +190,7 @@ TEST_F(CliRefine, damaged_pieces_are_done_again)
     std::ofstream(path("out/journal.jsonl"), std::ios::app) << R"({"piece":"frames/0000)"; // died while writing
     fs::resize_file(folder_ / "out" / "latents" / "000000.safetensors", 40);
     fs::remove(folder_ / "out" / "frames" / "000000.png");
-    folder_.put("out/frames/.semrover-1-2.tmp", "half a picture");
+    folder_.put("out/frames/.semrover-" + host_name() + "-2147483647-2.tmp", "half a picture");
     EXPECT_TRUE(whole == refined("out"));
 }
 

@@ -3,10 +3,23 @@
 // what others put into a run's folder
 #include "engine/job/outputs.h"
 #include "engine/world/region_store.h"
+#include "runtime/base/diagnostics.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
 
+#include <dlfcn.h>
+#include <sys/file.h>
 #include <sys/stat.h>
+
+// a file system without locks: this program's own flock fails so; 0: it is libc's
+static int flock_error = 0;
+extern "C" int flock(int fd, int operation) noexcept
+{
+    if (!flock_error)
+        return reinterpret_cast<int (*)(int, int)>(dlsym(RTLD_NEXT, "flock"))(fd, operation);
+    errno = flock_error;
+    return -1;
+}
 
 namespace semrover {
 namespace engine_run_folder_test {
@@ -57,6 +70,36 @@ TEST(engine_run_folder, a_pipe_is_not_waited_for)
         const bool begins = std::string_view(name) == "journal.jsonl";
         EXPECT_TRUE(begins ? testing::AssertionResult(opened.has_value()) : says(opened, name)) << name;
     }
+}
+
+TEST(engine_run_folder, a_second_process_finds_it_busy)
+{
+    const ScratchFolder folder;
+    const auto first = RunFolder::open(folder / "run", kSettings, false);
+    ASSERT_TRUE(first);
+    for (const bool restart : {false, true}) {
+        const auto second = RunFolder::open(folder / "run", kSettings, restart);
+        EXPECT_TRUE(says(second, "another process works in"));
+        EXPECT_EQ(second.error().code, ErrorCode::busy);
+    }
+}
+
+TEST(engine_run_folder, goes_on_without_locks_and_says_so_once)
+{
+    static std::vector<std::string> said;
+    set_diagnostic_callback([](void*, const char* line) { said.push_back(line); });
+    const ScratchFolder folder;
+    for (const int error : {ENOLCK, ENOSYS, EOPNOTSUPP, EBADF}) {
+        flock_error = error;
+        EXPECT_TRUE(RunFolder::open(folder / "run", kSettings, false)) << error;
+    }
+    flock_error = EIO;
+    EXPECT_TRUE(says(RunFolder::open(folder / "run", kSettings, false), "cannot lock"));
+    flock_error = 0;
+    set_diagnostic_callback(nullptr);
+    ASSERT_EQ(said.size(), 1u);
+    EXPECT_NE(said.front().find("warning: "), std::string::npos);
+    EXPECT_NE(said.front().find("a file system without locks"), std::string::npos);
 }
 
 TEST(engine_run_folder, a_run_json_that_is_none_is_an_error_and_yes_starts_over)

@@ -2,10 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/base/file.h"
 
+#include "runtime/base/host_name.h"
 #include "runtime/base/quote.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
 
+#include <chrono>
 #include <csignal>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -14,6 +16,8 @@
 
 namespace semrover {
 namespace file_test {
+
+using std::chrono_literals::operator""h;
 
 TEST(File, a_file_reads_back_as_written)
 {
@@ -118,16 +122,33 @@ TEST(AtomicFile, what_a_killed_process_left_can_be_swept_away)
 {
     ScratchFolder folder;
     std::filesystem::create_directories(folder / "a" / "b");
-    folder.put("a/b/.semrover-17-0.tmp", "half");
-    folder.put("a/.semrover-17-1.tmp", "half");
-    folder.put("a/b/whole.tmp", "kept");
-    folder.put(".semrover-17-2.tmp", "elsewhere");
+    const std::string host = host_name(), us = unfinished_name(), parent = std::to_string(::getppid());
+    EXPECT_TRUE(us.starts_with(fmt::format(".semrover-{}-{}-", host, ::getpid()))) << us;
+    EXPECT_NE(us, unfinished_name());
+    // 2147483647 is above any number that Linux gives a process
+    const std::vector<std::string> gone = {"a/.semrover-" + host + "-2147483647-0.tmp",
+                                           "a/b/.semrover-" + host + "-2147483647-1.tmp"};
+    const std::vector<std::string> old = {"a/.semrover-elsewhere-17-0.tmp", "a/.semrover-17-1.tmp"};
+    const std::vector<std::string> kept = {"a/b/whole.tmp",
+                                           "a/.semrover-x",
+                                           "a/" + us,
+                                           "a/.semrover-" + host + "-" + parent + "-0.tmp",
+                                           "a/.semrover-" + host + "-2147483647.tmp",
+                                           "a/.semrover-" + host + "-2-2147483647-0.tmp", // another host
+                                           "a/.semrover-elsewhere-2147483647-0.tmp",
+                                           ".semrover-" + host + "-2147483647-2.tmp"};
+    for (const auto& names : {gone, old, kept})
+        for (const std::string& name : names)
+            folder.put(name, "half");
+    for (const std::string& name : old)
+        std::filesystem::last_write_time(folder / name, std::filesystem::file_time_type::clock::now() - 25h);
     remove_temporary_files(folder / "a");
     remove_temporary_files(folder / "missing");
-    for (const char* kept : {"a/b/whole.tmp", ".semrover-17-2.tmp"})
-        EXPECT_TRUE(std::filesystem::exists(folder / kept)) << kept;
-    for (const char* gone : {"a/b/.semrover-17-0.tmp", "a/.semrover-17-1.tmp"})
-        EXPECT_FALSE(std::filesystem::exists(folder / gone)) << gone;
+    for (const std::string& name : kept)
+        EXPECT_TRUE(std::filesystem::exists(folder / name)) << name;
+    for (const auto& names : {gone, old})
+        for (const std::string& name : names)
+            EXPECT_FALSE(std::filesystem::exists(folder / name)) << name;
 }
 
 TEST(AtomicFile, a_name_of_255_bytes_works)

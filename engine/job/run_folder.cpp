@@ -2,12 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/run_folder.h"
 
+#include "runtime/base/diagnostics.h"
 #include "runtime/base/quote.h"
 
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fcntl.h>
+#include <mutex>
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -44,6 +46,23 @@ Result<int> open_own(const Path& path, int flags)
         return fd;
     ::close(fd);
     return fail(ErrorCode::bad_input, "cannot open {}: expected a file, found a device or pipe", quote_path(path));
+}
+
+// of flock: the file system has none, as NFS and Lustre often are mounted
+bool says_no_locks(int error)
+{
+    return error == ENOLCK || error == ENOSYS || error == EOPNOTSUPP || error == EBADF;
+}
+
+void warn_without_locks(const Path& folder, int error)
+{
+    static std::once_flag said;
+    std::call_once(said, [&] {
+        diagnose(
+            fmt::format("semrover: warning: {} is on a file system without locks ({}): a second process that works "
+                        "there at the same time is not noticed",
+                        quote_path(folder), std::strerror(error)));
+    });
 }
 
 // the settings and the state of a run.json
@@ -155,8 +174,13 @@ Status RunFolder::lock()
 {
     const Path path = path_ / "lock";
     SR_TRY(lock_, open_own(path, O_RDWR));
-    if (::flock(lock_, LOCK_EX | LOCK_NB) != 0)
-        return fail(ErrorCode::bad_input, "another process works in {}", quote_path(path_));
+    if (::flock(lock_, LOCK_EX | LOCK_NB) == 0)
+        return {};
+    if (errno == EWOULDBLOCK)
+        return fail(ErrorCode::busy, "another process works in {}", quote_path(path_));
+    if (!says_no_locks(errno))
+        return system_failure("lock", path);
+    warn_without_locks(path_, errno);
     return {};
 }
 

@@ -18,14 +18,15 @@ struct RunContents {
 
 // A run's folder: run.json (resolved settings, versions, device, hashes), journal.jsonl (one line per finished piece)
 // and the pieces' files. A process may be killed at any time: the next open() finds every finished piece. One process
-// at a time, by a lock. What others left there is not trusted: a link in place of one of these files or folders is
-// refused, so that nothing outside the folder is read or written.
+// at a time, by a lock; where the file system has none, a line of diagnostics.h says so once, and the caller sees to
+// it. What others left there is not trusted: a link in place of one of these files or folders is refused, so that
+// nothing outside the folder is read or written.
 class RunFolder {
   public:
     // Creates the folder, or reopens it if its run.json has the same `settings`. With `restart` it is emptied first,
     // and so is a finished run, whose pieces are gone, unless `keep_finished`: then it is as it was, with results().
-    // Errors: bad_input, also for other settings without `restart`, and for links; usage for other settings of a run
-    // that is finished
+    // Errors: busy while another process has it open; bad_input, also for other settings without `restart`, and for
+    // links; usage for other settings of a run that is finished
     static Result<RunFolder> open(const Path& folder, const Json& settings, bool restart,
                                   const RunContents& contents = {}, bool keep_finished = false);
     RunFolder(RunFolder&& other) noexcept;

@@ -7,7 +7,6 @@
 #include "runtime/base/text_start.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cerrno>
 #include <cstring>
 #include <fcntl.h>
@@ -227,10 +226,9 @@ Result<AtomicFile> AtomicFile::create(const Path& path)
     if (::stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode))
         return fail(ErrorCode::bad_input, "cannot write {}: it is {}, not a file", quote_path(path),
                     S_ISDIR(status.st_mode) ? "a folder" : "a device or pipe");
-    static std::atomic<unsigned> counter{0};
     for (int attempt = 0; attempt < 100; ++attempt) { // a killed run with the same pid may have left its name
         // the name is short whatever the length of the final one (NAME_MAX is 255)
-        Path temporary = folder_of(path) / fmt::format(".semrover-{}-{}.tmp", ::getpid(), counter++);
+        Path temporary = folder_of(path) / unfinished_name();
         const Together created_and_known;
         const int fd = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
         if (fd >= 0) {
@@ -294,8 +292,7 @@ void remove_temporary_files(const Path& folder)
 {
     std::error_code error;
     for (std::filesystem::recursive_directory_iterator i(folder, error), end; !error && i != end; i.increment(error)) {
-        const std::string name = i->path().filename().string();
-        if (name.starts_with(".semrover-") && name.ends_with(".tmp"))
+        if (is_abandoned(i->path()))
             ::unlink(i->path().c_str());
     }
 }

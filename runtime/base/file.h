@@ -67,7 +67,7 @@ class AtomicFile {
 Status write_file_atomically(const Path& path, std::span<const std::byte> bytes);
 Status write_file_atomically(const Path& path, std::string_view text);
 
-// Removes what killed processes were writing below `folder`. Only where nobody else writes at the same time.
+// Removes what killed processes were writing below `folder`: files that is_abandoned() of unfinished.h.
 void remove_temporary_files(const Path& folder);
 
 // A regular file mapped for reading. Its length is fixed when it is opened.

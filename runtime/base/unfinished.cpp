@@ -2,8 +2,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/base/unfinished.h"
 
+#include "runtime/base/host_name.h"
+
+#include <atomic>
+#include <cerrno>
+#include <charconv>
+#include <chrono>
 #include <condition_variable>
+#include <csignal>
+#include <fmt/format.h>
 #include <mutex>
+#include <string_view>
+#include <unistd.h>
 
 namespace semrover {
 
@@ -31,7 +41,42 @@ Registry& registry()
 
 thread_local size_t nested = 0; // of this thread's Togethers
 
+constexpr std::string_view kBefore = ".semrover-", kAfter = ".tmp";
+constexpr auto kAbandonedAfter = std::chrono::hours(24);
+
+// of HOST-PID-N: whether it is of this host, and of no process there
+bool process_is_gone(std::string_view middle)
+{
+    const std::string& host = host_name();
+    if (!middle.starts_with(host) || middle.substr(host.size(), 1) != "-")
+        return false;
+    const std::string_view numbers = middle.substr(host.size() + 1);
+    pid_t pid = 0;
+    const auto [end, error] = std::from_chars(numbers.data(), numbers.data() + numbers.size(), pid);
+    if (error != std::errc() || pid <= 0 || end == numbers.data() + numbers.size() || *end != '-')
+        return false; // of a host whose name begins with this one's
+    return ::kill(pid, 0) != 0 && errno == ESRCH;
+}
+
 } // namespace
+
+std::string unfinished_name()
+{
+    static std::atomic<unsigned> count = 0;
+    return fmt::format("{}{}-{}-{}{}", kBefore, host_name(), ::getpid(), count++, kAfter);
+}
+
+bool is_abandoned(const std::filesystem::path& path)
+{
+    const std::string name = path.filename().string();
+    if (!name.starts_with(kBefore) || !name.ends_with(kAfter) || name.size() < kBefore.size() + kAfter.size())
+        return false;
+    if (process_is_gone(std::string_view(name).substr(kBefore.size(), name.size() - kBefore.size() - kAfter.size())))
+        return true;
+    std::error_code unknown;
+    const auto written = std::filesystem::last_write_time(path, unknown);
+    return !unknown && std::filesystem::file_time_type::clock::now() - written > kAbandonedAfter;
+}
 
 Unfinished::Unfinished(std::filesystem::path path, std::function<void()> stop)
 {

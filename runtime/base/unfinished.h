@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <list>
+#include <string>
 
 namespace semrover {
 
@@ -27,6 +28,13 @@ class Unfinished {
   private:
     std::list<Entry>::iterator entry_;
 };
+
+// The name of what is unfinished, `.semrover-HOST-PID-N.tmp`: another one at each call. Threads: any.
+std::string unfinished_name();
+
+// Whether nobody works on what has this name any more: it is of this host, and its process is gone; or it is of any
+// host, and older than a day. Other names: false.
+bool is_abandoned(const std::filesystem::path& path);
 
 // remove_unfinished() waits while any of these lives: around what must happen together, such as the renames of the
 // files of one result. They nest.

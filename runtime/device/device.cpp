@@ -6,6 +6,7 @@
 #include "runtime/device/command.h"
 #include "runtime/device/cooperative_matrix.h"
 #include "runtime/device/copy_ring.h"
+#include "runtime/device/device_choice.h"
 #include "runtime/device/device_fault.h"
 #include "runtime/device/physical_device.h"
 #include "runtime/device/pipeline.h"
@@ -39,28 +40,6 @@ VKAPI_ATTR VkBool32 VKAPI_CALL on_validation(VkDebugUtilsMessageSeverityFlagBits
     return VK_FALSE;
 }
 
-Result<uint32_t> select_device(const std::vector<DeviceSummary>& all, const std::string& select)
-{
-    std::string names;
-    for (const DeviceSummary& d : all)
-        names += fmt::format("{}{}: {}{}", names.empty() ? "" : ", ", d.index, d.name,
-                             d.refusal.empty() ? "" : " (" + d.refusal + ")");
-    const bool numeric = !select.empty() && select.find_first_not_of("0123456789") == std::string::npos;
-    for (const DeviceSummary& d : all) {
-        const bool match =
-            select.empty() || (numeric ? std::to_string(d.index) == select : d.name.find(select) != std::string::npos);
-        if (!match)
-            continue;
-        if (d.refusal.empty())
-            return d.index;
-        if (!select.empty())
-            return fail(ErrorCode::no_device, "device '{}' cannot be used: {}", d.name, d.refusal);
-    }
-    if (all.empty())
-        return fail(ErrorCode::no_device, "no Vulkan device found; install a driver (Debian: mesa-vulkan-drivers)");
-    return fail(ErrorCode::no_device, "no usable device matches '{}'; there are: {}", select, names);
-}
-
 // points of timelines as a submit takes them
 struct SemaphoreValues {
     std::vector<VkSemaphore> semaphores;
@@ -92,7 +71,7 @@ Result<std::unique_ptr<Device>> Device::create(const DeviceOptions& options)
     std::vector<DeviceSummary> summaries;
     for (size_t i = 0; i < physical.size(); ++i)
         summaries.push_back(summarize(d->vk_, d->instance_, physical[i], uint32_t(i)));
-    SR_TRY(d->index_, select_device(summaries, options.select));
+    SR_TRY(d->index_, choose_device(summaries, options.select, options.require_gpu, std::getenv));
     d->physical_ = physical[d->index_];
     SR_CHECK(d->create_device(options, summaries[d->index_].limits.matrix.m != 0));
     SR_CHECK(d->finish(options));

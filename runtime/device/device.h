@@ -22,9 +22,10 @@ class Profile;
 class Staging;
 
 struct DeviceOptions {
-    std::string select = {}; // "", an index of list_devices(), or part of a name
-    std::string limits = {}; // override_limits(); also from SEMROVER_LIMITS
-    uint64_t max_bytes = 0;  // refuse to allocate more device memory than this; 0: no budget
+    std::string select = {};  // choose_device()
+    bool require_gpu = false; // no_device rather than a CPU
+    std::string limits = {};  // override_limits(); also from SEMROVER_LIMITS
+    uint64_t max_bytes = 0;   // refuse to allocate more device memory than this; 0: no budget
     // Asked before a pipeline is compiled and before work is submitted; true: those calls fail with
     // ErrorCode::interrupted. From any thread that uses the device.
     std::function<bool()> cancelled = {};
@@ -87,9 +88,12 @@ struct HostBytes {
 };
 
 struct DeviceSummary {
-    uint32_t index;
+    uint32_t index = 0;
     std::string name, driver, type, api;
-    uint64_t memory_bytes; // largest device-local heap
+    std::string uuid;          // 8-4-4-4-12 hexadecimal digits; NVIDIA's tools write GPU- before it
+    std::string pci;           // "0000:3b:00.0"; empty where the driver does not say
+    uint32_t vendor = 0;       // as PCI has it: 0x10de is NVIDIA
+    uint64_t memory_bytes = 0; // largest device-local heap
     DeviceLimits limits;
     std::vector<std::string> extensions; // the optional ones that matter: cooperative matrices and the like
     std::string refusal;                 // why the engine cannot run on it; empty if it can

@@ -253,6 +253,29 @@ Result<uint32_t> compute_queue_family(const VulkanCalls& vk, VkPhysicalDevice ph
     return fail(ErrorCode::no_device, "the device has no compute queue");
 }
 
+namespace {
+
+std::string uuid_text(const uint8_t (&bytes)[VK_UUID_SIZE])
+{
+    std::string text;
+    for (size_t i = 0; i < VK_UUID_SIZE; ++i)
+        text += fmt::format("{}{:02x}", i == 4 || i == 6 || i == 8 || i == 10 ? "-" : "", bytes[i]);
+    return text;
+}
+
+std::string pci_text(const VulkanCalls& vk, VkPhysicalDevice physical)
+{
+    if (!has_extension(vk, physical, VK_EXT_PCI_BUS_INFO_EXTENSION_NAME))
+        return "";
+    auto pci = vk_struct<VkPhysicalDevicePCIBusInfoPropertiesEXT>(
+        VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PCI_BUS_INFO_PROPERTIES_EXT);
+    auto p = vk_struct<VkPhysicalDeviceProperties2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2, &pci);
+    vk.GetPhysicalDeviceProperties2(physical, &p);
+    return fmt::format("{:04x}:{:02x}:{:02x}.{}", pci.pciDomain, pci.pciBus, pci.pciDevice, pci.pciFunction);
+}
+
+} // namespace
+
 DeviceSummary summarize(const VulkanCalls& vk, VkInstance instance, VkPhysicalDevice physical, uint32_t index)
 {
     auto p12 = vk_struct<VkPhysicalDeviceVulkan12Properties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_PROPERTIES);
@@ -267,6 +290,9 @@ DeviceSummary summarize(const VulkanCalls& vk, VkInstance instance, VkPhysicalDe
     s.driver = fmt::format("{} {}", p12.driverName, p12.driverInfo);
     s.type = kTypes[int(device_type(p.properties.deviceType))];
     s.api = api_version_text(p.properties.apiVersion);
+    s.uuid = uuid_text(p11.deviceUUID);
+    s.pci = pci_text(vk, physical);
+    s.vendor = p.properties.vendorID;
     s.refusal = refusal(vk, physical, p.properties);
     s.limits = limits_of(vk, physical, p.properties, p11);
     s.limits.matrix = matrix_shape(vk, instance, physical);
@@ -276,7 +302,6 @@ DeviceSummary summarize(const VulkanCalls& vk, VkInstance instance, VkPhysicalDe
         s.limits.needs_supported |= kNeedsHalfSums;
     VkPhysicalDeviceMemoryProperties memory;
     vk.GetPhysicalDeviceMemoryProperties(physical, &memory);
-    s.memory_bytes = 0;
     for (uint32_t i = 0; i < memory.memoryHeapCount; ++i)
         if (memory.memoryHeaps[i].flags & VK_MEMORY_HEAP_DEVICE_LOCAL_BIT)
             s.memory_bytes = std::max<uint64_t>(s.memory_bytes, memory.memoryHeaps[i].size);

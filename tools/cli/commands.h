@@ -21,7 +21,8 @@ class Session;
 
 // options that every subcommand takes, before or after its name
 struct Globals {
-    std::string device;    // name or index; empty: the best there is
+    std::string device;    // DeviceOptions::select; empty: the best there is, or "auto" under an engine
+    std::string require;   // "gpu", "any"; empty: any, or gpu under an engine
     uint64_t max_vram = 0; // bytes; 0: what the device has
     bool autotune = true;  // measure which tiles run fastest
     bool yes = false;      // replace existing files

@@ -2,9 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/cli/open_device.h"
 
+#include "runtime/device/device_choice.h"
 #include "runtime/device/profile.h"
 #include "tools/cli/print_stderr.h"
 #include "tools/cli/session.h"
+
+#include <cstdlib>
 
 namespace semrover {
 
@@ -13,7 +16,9 @@ Result<std::shared_ptr<Device>> open_device(const Globals& globals, const std::s
     if (globals.session && globals.session->device)
         return globals.session->device;
     DeviceOptions options;
-    options.select = globals.device;
+    const bool engine = is_under_engine(std::getenv);
+    options.select = globals.device.empty() && engine ? "auto" : globals.device;
+    options.require_gpu = globals.require == "gpu" || (globals.require.empty() && engine);
     options.max_bytes = globals.max_vram;
     options.autotune = globals.autotune;
     options.cancelled = interrupt_requested;

@@ -7,7 +7,8 @@
 
 namespace semrover {
 
-// The device that --device and --max-vram ask for, or that the session has; with a profile, it measures what runs on it
+// The device that --device, --require and --max-vram ask for, or that the session has; with a profile, it measures what
+// runs on it
 Result<std::shared_ptr<Device>> open_device(const Globals& globals, const std::string& profile = {});
 
 // --profile: a Chrome trace, and with --verbose a summary; nothing where `path` is empty

@@ -6,7 +6,6 @@
 
 #include <cerrno>
 #include <sys/stat.h>
-#include <unistd.h>
 
 namespace semrover {
 
@@ -24,7 +23,7 @@ Result<OutputFolder> OutputFolder::create(const Path& path, bool replace)
     if (fs::exists(f.path_, error) && !replace)
         return fail(ErrorCode::usage, "{} exists; -y replaces what is written there", quote_path(path));
     for (int attempt = 0; attempt < 100; ++attempt) { // a killed run with the same pid may have left its name
-        const Path name = f.path_.parent_path() / fmt::format(".semrover-{}-{}.tmp", getpid(), attempt);
+        const Path name = f.path_.parent_path() / unfinished_name();
         const Together created_and_known;
         if (mkdir(name.c_str(), 0777) == 0) { // the umask decides, as for files
             f.temporary_ = name;

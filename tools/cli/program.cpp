@@ -44,7 +44,10 @@ void fill_standard_streams()
 
 void add_globals(CLI::App& app, Globals& globals)
 {
-    app.add_option("--device", globals.device, "device name or index (see: semrover devices)");
+    app.add_option("--device", globals.device,
+                   "device name, index, UUID or PCI address (see: semrover devices), or auto");
+    add_choice(app, "--require", {"gpu", "any"},
+               "gpu: a CPU is an error, as it is under Slurm, Kubernetes and AWS Batch; any", globals.require);
     const auto set_max_vram = [&globals](const std::string& text) {
         const auto bytes = parse_memory_size(text);
         if (!bytes)

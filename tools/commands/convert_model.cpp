@@ -11,7 +11,6 @@
 
 #include <algorithm>
 #include <optional>
-#include <unistd.h>
 
 namespace semrover {
 
@@ -195,7 +194,7 @@ Result<Conversion> plan_conversion(const ConvertModelOptions& o)
 class StagingFolder {
   public:
     explicit StagingFolder(const Path& out)
-        : out_(out), path_(out.parent_path() / fmt::format(".semrover-{}-model.tmp", getpid())), unfinished_(path_)
+        : out_(out), path_(out.parent_path() / unfinished_name()), unfinished_(path_)
     {
     }
     StagingFolder(const StagingFolder&) = delete;

@@ -49,6 +49,8 @@ Report describe(const DeviceSummary& d)
             {"driver", d.driver},
             {"type", d.type},
             {"api", d.api},
+            {"uuid", d.uuid},
+            {"pci", d.pci},
             {"memory_bytes", d.memory_bytes},
             {"subgroup_size", l.subgroup_size},
             {"shared_bytes", l.max_shared_bytes},
@@ -68,6 +70,7 @@ void print_text(const DeviceSummary& d)
     if (!d.refusal.empty())
         fmt::print("   cannot be used  {}\n", d.refusal);
     fmt::print("   driver          {}\n", d.driver);
+    fmt::print("   UUID            {}{}\n", d.uuid, d.pci.empty() ? "" : ", PCI " + d.pci);
     fmt::print("   memory          {}, {} in one allocation\n", bytes_text(d.memory_bytes),
                bytes_text(l.max_allocation));
     fmt::print("   buffers         {} of storage, {} texels\n", bytes_text(l.max_storage_range), l.max_texel_elements);

@@ -3,10 +3,12 @@
 // semrover doctor: one page on what works here, what is missing and how to get it
 #include "engine/job/version.h"
 #include "runtime/base/json.h"
+#include "runtime/device/driver_gaps.h"
 #include "runtime/device/loader.h"
 #include "runtime/device/pipeline.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/open_device.h"
+#include "tools/cli/print_stderr.h"
 #include "tools/cli/progress.h"
 
 #include <CLI/CLI.hpp>
@@ -50,7 +52,7 @@ Finding validation_finding(const LoaderSummary& loader)
 Finding device_finding(const Result<std::shared_ptr<Device>>& device, const std::string& asked)
 {
     if (!device)
-        return {"device", false, device.error().message, asked.empty() ? "mesa-vulkan-drivers" : ""};
+        return {"device", false, with_options(device.error().message), asked.empty() ? "mesa-vulkan-drivers" : ""};
     const Device& d = **device;
     const bool cpu = d.limits().type == DeviceType::cpu;
     return {"device", true, fmt::format("{}, {}{}", d.name(), d.driver(), cpu ? "; a CPU, so generating is slow" : ""),
@@ -83,6 +85,14 @@ Finding ffmpeg_finding()
     return {"ffmpeg", found, found ? "found" : "--video needs it", "ffmpeg"};
 }
 
+std::vector<Finding> gap_findings(const LoaderSummary& loader)
+{
+    std::vector<Finding> findings;
+    for (const DriverGap& gap : find_driver_gaps(loader.drivers, "/", std::getenv))
+        findings.push_back({"GPU driver", false, gap.text, gap.package});
+    return findings;
+}
+
 void print_page(const std::vector<Finding>& findings)
 {
     fmt::print("{}\n", kProgram);
@@ -113,6 +123,8 @@ Status doctor(const Globals& globals)
     const auto device = open_device(globals);
     std::vector<Finding> findings{loader_finding(loader), driver_finding(loader), validation_finding(loader),
                                   device_finding(device, globals.device)};
+    for (Finding& gap : gap_findings(loader))
+        findings.push_back(std::move(gap));
     if (device)
         findings.push_back(cache_finding(**device));
     findings.push_back(ffmpeg_finding());

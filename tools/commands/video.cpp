@@ -45,9 +45,7 @@ Result<Video> Video::create(const Path& path, uint32_t width, uint32_t height, i
 {
     Video v;
     v.path_ = path;
-    v.temporary_ = path;
-    static int count = 0;
-    v.temporary_.replace_filename(fmt::format(".semrover-{}-video{}.tmp", getpid(), count++));
+    v.temporary_ = path.parent_path() / unfinished_name();
     const std::vector<std::string> arguments = {
         "ffmpeg", "-loglevel", "error", "-y", "-f", "rawvideo", "-pixel_format", "rgb24", "-video_size",
         fmt::format("{}x{}", width, height), "-framerate", std::to_string(frames_per_second), "-i", "-",

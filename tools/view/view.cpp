@@ -54,6 +54,8 @@ Result<uint64_t> bytes_of(const char* option, const std::string& text)
 
 Result<view::ViewRequest> request_of(const ViewArguments& o, const Globals& globals)
 {
+    if (!globals.require.empty())
+        return fail(ErrorCode::usage, "`require`: view draws on any device; `device` names one");
     view::ViewRequest r = o.request;
     r.device = globals.device;
     r.max_bytes = globals.max_vram;

@@ -1,0 +1,35 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#include "runtime/base/host_name.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cstdlib>
+#include <unistd.h>
+
+namespace semrover {
+
+namespace {
+
+constexpr size_t kMostLength = 64; // as much as Linux allows
+
+std::string read_host_name()
+{
+    char name[kMostLength + 1] = {};
+    const char* given = std::getenv("SEMROVER_HOST");
+    std::string host = given && *given ? given : ::gethostname(name, kMostLength) == 0 && *name ? name : "unknown";
+    host.resize(std::min(host.size(), kMostLength));
+    const auto unsafe = [](unsigned char c) { return !std::isalnum(c) && c != '.' && c != '-'; };
+    std::ranges::replace_if(host, unsafe, '.'); // a name in a file's name
+    return host;
+}
+
+} // namespace
+
+const std::string& host_name()
+{
+    static const std::string name = read_host_name();
+    return name;
+}
+
+} // namespace semrover
