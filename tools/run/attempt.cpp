@@ -3,6 +3,7 @@
 #include "tools/run/attempt.h"
 
 #include "runtime/base/hash.h"
+#include "runtime/base/host_name.h"
 #include "runtime/base/quote.h"
 
 #include <algorithm>
@@ -27,7 +28,7 @@ Path attempts_of(const Path& out)
     return out / kWork;
 }
 
-// KEY.HOST.PID.RANDOM
+// KEY.HOST.PID.RANDOM; a host's name may have dots, too
 struct AttemptName {
     std::string key, host;
     long pid = 0;
@@ -35,21 +36,18 @@ struct AttemptName {
 
 std::optional<AttemptName> parse_name(const std::string& name)
 {
-    std::vector<std::string> parts;
-    for (size_t at = 0; at <= name.size();) {
-        const size_t dot = std::min(name.find('.', at), name.size());
-        parts.push_back(name.substr(at, dot - at));
-        at = dot + 1;
-    }
-    if (parts.size() != 4)
+    const size_t random = name.rfind('.'), pid = random == 0 ? name.npos : name.rfind('.', random - 1);
+    const size_t host = name.find('.');
+    if (random == name.npos || pid == name.npos || pid <= host)
         return std::nullopt;
-    return AttemptName{parts[0], parts[1], std::strtol(parts[2].c_str(), nullptr, 10)};
+    return AttemptName{name.substr(0, host), name.substr(host + 1, pid - host - 1),
+                       std::strtol(name.c_str() + pid + 1, nullptr, 10)};
 }
 
 bool is_known_dead(const Path& attempt)
 {
     const auto name = parse_name(attempt.filename().string());
-    return name && name->host == host_in_names() && name->pid > 0 && ::kill(pid_t(name->pid), 0) != 0 && errno == ESRCH;
+    return name && name->host == host_name() && name->pid > 0 && ::kill(pid_t(name->pid), 0) != 0 && errno == ESRCH;
 }
 
 // a hard link, or a copy where the file system has none
@@ -111,16 +109,6 @@ double seconds_since_change(const Path& folder)
 
 } // namespace
 
-std::string host_in_names()
-{
-    char name[256] = "";
-    (void)::gethostname(name, sizeof name - 1);
-    std::string host = name;
-    for (char& c : host)
-        c = std::isalnum(static_cast<unsigned char>(c)) || c == '_' ? c : '-';
-    return host.empty() ? "host" : host.substr(0, 60);
-}
-
 Attempt::Attempt(Path out, std::string name)
     : out_(std::move(out)), folder_(attempts_of(out_) / name), work_(folder_ / "work"), files_(folder_ / "files"),
       name_(std::move(name))
@@ -141,7 +129,7 @@ Result<Attempt> Attempt::create(const Path& out, const std::string& key)
 {
     std::random_device random;
     const uint64_t number = uint64_t(random()) << 32 | random();
-    Attempt attempt(out, fmt::format("{}.{}.{}.{}", key, host_in_names(), ::getpid(), hash_text(number)));
+    Attempt attempt(out, fmt::format("{}.{}.{}.{}", key, host_name(), ::getpid(), hash_text(number)));
     SR_CHECK(make_folder(attempt.folder_));
     return attempt;
 }
