@@ -296,7 +296,7 @@ TEST(CliPage, what_cannot_be_shown_is_named_and_nothing_is_left)
         {grid + "--frames labels", 2, "--frames: expected NAME=FOLDER, found 'labels'"},
         {grid + "--frames =x", 2, "expected NAME=FOLDER"},
         {grid + "--frames a=" + at + "labels --frames a=" + at + "labels", 2, "two sets have the name 'a'"},
-        {grid + "--frames a=" + at + "none", 3, "expected a folder of pictures: No such file"},
+        {grid + "--frames a=" + at + "none", 3, "expected a folder of pictures: cannot list"},
         {grid + "--frames a=" + at + "drive", 3, "expected pictures named 000000.png, found none; there is '"},
         {grid + "--frames a=" + at + "labels --frames b=" + at + "late", 3,
          "no moment is in all sets of pictures: 'a' has 0 to 1, 'b' has 7 to 9"},

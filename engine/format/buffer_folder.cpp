@@ -15,16 +15,13 @@ namespace semrover {
 
 namespace {
 
-namespace fs = std::filesystem;
-
 // numbers of the pictures in a folder, ascending; other names are not looked at
 std::vector<uint32_t> picture_numbers(const Path& folder)
 {
     std::vector<uint32_t> numbers;
-    std::error_code error;
-    for (const auto& entry : fs::directory_iterator(folder, error)) {
-        const std::string stem = entry.path().stem().string();
-        if (entry.path().extension() == ".png" && stem.size() == 6 && std::ranges::all_of(stem, ::isdigit))
+    for (const Path& path : list_files(folder).value_or(std::vector<Path>())) {
+        const std::string stem = path.stem().string();
+        if (path.extension() == ".png" && stem.size() == 6 && std::ranges::all_of(stem, ::isdigit))
             numbers.push_back(uint32_t(std::stoul(stem)));
     }
     std::ranges::sort(numbers);
@@ -42,7 +39,7 @@ Status check_size(const Path& path, const ImageSize& expected)
 
 Result<BufferCamera> open_camera(const Path& folder, std::string name)
 {
-    BufferCamera c{std::move(name), folder, {}, 0};
+    BufferCamera c{std::move(name), folder, {}};
     const std::vector<uint32_t> numbers = picture_numbers(folder / "color");
     if (numbers.empty())
         return fail(ErrorCode::bad_input, "{} holds no pictures 000000.png, 000001.png, ..",
@@ -55,7 +52,7 @@ Result<BufferCamera> open_camera(const Path& folder, std::string name)
     SR_TRY(c.size, read_png_size(frame_path(folder, "color", 0)));
     for (uint32_t i = 0; i < c.frames; ++i) {
         const Path visible = frame_path(folder, "visible", i);
-        if (!fs::exists(visible))
+        if (!is_there(visible))
             return fail(ErrorCode::bad_input, "{} has no {}: a buffer is color/ and visible/",
                         quote_path(frame_path(folder, "color", i)), quote_path(visible));
         SR_CHECK(check_size(frame_path(folder, "color", i), c.size));
@@ -78,28 +75,27 @@ std::string frame_text(const std::string& camera, uint32_t frame)
 
 Result<std::vector<BufferCamera>> open_buffers(const Path& folder)
 {
-    std::error_code error;
-    if (!fs::is_directory(folder, error))
+    SR_TRY(const ShardsOrNone shards, open_if_shards(folder));
+    if (!is_folder(folder))
         return fail(ErrorCode::bad_input, "{}: expected a folder of splat buffers or an .sgrid file",
                     quote_path(folder));
     std::vector<BufferCamera> cameras;
-    if (fs::exists(folder / "color")) {
+    if (is_there(folder / "color")) {
         SR_TRY(cameras.emplace_back(), open_camera(folder, ""));
-        return cameras;
-    }
-    std::vector<Path> inside;
-    for (const auto& entry : fs::directory_iterator(folder, error))
-        if (fs::exists(entry.path() / "color", error) && is_camera_name(entry.path().filename().string()))
-            inside.push_back(entry.path());
-    std::ranges::sort(inside);
-    for (const Path& path : inside) {
-        SR_TRY(cameras.emplace_back(), open_camera(path, path.filename().string()));
+    } else {
+        SR_TRY(const std::vector<Path> inside, list_folders(folder));
+        for (const Path& path : inside)
+            if (is_there(path / "color") && is_camera_name(path.filename().string())) {
+                SR_TRY(cameras.emplace_back(), open_camera(path, path.filename().string()));
+            }
     }
     if (cameras.empty())
         return fail(ErrorCode::bad_input,
                     "{} has no color/ nor folders of cameras with color/: expected a splat "
                     "buffer, or a rig of them",
                     quote_path(folder));
+    for (BufferCamera& camera : cameras)
+        camera.shards = shards;
     return cameras;
 }
 

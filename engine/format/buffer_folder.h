@@ -4,6 +4,7 @@
 
 #include "engine/camera/camera.h"
 #include "engine/format/image.h"
+#include "engine/shards/shard_set.h"
 
 #include <string>
 
@@ -15,7 +16,8 @@ struct BufferCamera {
     std::string name; // empty: the folder's own pictures
     Path folder;
     ImageSize size;
-    uint32_t frames = 0; // 0 .. frames - 1
+    uint32_t frames = 0;      // 0 .. frames - 1
+    ShardsOrNone shards = {}; // that the pictures are in
 };
 
 struct BufferFrame {
@@ -25,8 +27,9 @@ struct BufferFrame {
 
 Path frame_path(const Path& folder, const char* kind, uint32_t number, std::string_view extension = "png");
 
-// the cameras of a folder: itself when it has color/, else its sub-folders that have, by name. Errors: bad_input for a
-// gap in the numbers, for colour without visibility, for pictures of another size than the first
+// the cameras of a folder or of a shard set: itself when it has color/, else its sub-folders that have, by name.
+// Errors: bad_input for a gap in the numbers, for colour without visibility, for pictures of another size than the
+// first, and as open_if_shards()
 Result<std::vector<BufferCamera>> open_buffers(const Path& folder);
 
 // the cameras of a path, before their buffers exist

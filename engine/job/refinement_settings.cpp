@@ -14,8 +14,6 @@ namespace semrover {
 
 namespace {
 
-namespace fs = std::filesystem;
-
 // how wide splats are, and from which alpha they cover a pixel, unless the caller says so
 void draw_as_trained(RefinementOptions& o, const RendererDefaults& d)
 {
@@ -114,7 +112,7 @@ Status find_picture_before(const Refinement& r, RefinedCamera& c)
     if (c.before == 0)
         return {};
     const Path picture = r.options.from / "frames" / c.name / fmt::format("{:06}.png", c.first - 1);
-    if (!fs::exists(picture))
+    if (!is_there(picture))
         return {};
     SR_TRY(ImageRgb8 image, read_png_rgb8(picture));
     if (image.width != c.size().image_width || image.height != c.size().image_height)
@@ -229,6 +227,10 @@ Result<Refinement> resolve_refinement(RefinementOptions options, const JobCallba
             callbacks.warning(warning);
     SR_TRY(r.settings, settle_renderer(r.model, r.options.renderer));
     draw_as_trained(r.options, r.model.defaults);
+    ShardsOrNone from; // what is read of an earlier run is read here
+    if (!r.options.from.empty()) {
+        SR_TRY(from, open_if_shards(r.options.from));
+    }
     SR_CHECK(find_cameras(r, callbacks));
     SR_CHECK(find_motion(r, callbacks));
     return r;
@@ -295,7 +297,7 @@ Status Refinement::check_outputs(std::span<const Path> beside) const
     if (options.from_grid())
         files.push_back(out / "buffers");
     for (const Path& file : files)
-        if (fs::exists(file))
+        if (is_there(file))
             return fail(ErrorCode::usage, "{} exists; `replace` replaces it", quote_path(file));
     return {};
 }

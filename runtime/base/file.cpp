@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <cstring>
 #include <fcntl.h>
+#include <functional>
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <system_error>
@@ -18,6 +19,8 @@
 namespace semrover {
 
 namespace {
+
+constexpr size_t kMostListed = size_t(1) << 22; // of one folder
 
 std::string system_message(int error)
 {
@@ -129,6 +132,35 @@ tl::unexpected<Error> cannot_write(const Path& path, int error)
     return fail(ErrorCode::bad_input, "cannot write {}: {}", quote_path(path), system_message(error));
 }
 
+// Paths in a folder that pass the test, sorted: what an iterator finds on the disk, and what `part` makes of the names
+// in memory below it (empty: nothing)
+template <typename Iterator, typename Part, typename Test>
+Result<std::vector<Path>> list(const Path& folder, Part part, Test test)
+{
+    std::vector<Path> found;
+    const auto add = [&](Path path) {
+        if (found.size() < kMostListed)
+            found.push_back(std::move(path));
+        return found.size() < kMostListed;
+    };
+    const std::vector<std::string> names = names_in_memory(folder);
+    for (const std::string& name : names)
+        if (const std::string kept = part(name); !kept.empty() && (found.empty() || found.back() != folder / kept))
+            add(folder / kept);
+    std::error_code error;
+    for (Iterator i(folder, error), end; !error && i != end; i.increment(error))
+        if (test(i->path()) && !add(i->path()))
+            break;
+    if (error && names.empty())
+        return fail(ErrorCode::bad_input, "cannot list {}: {}", quote_path(folder), error.message());
+    if (found.size() == kMostListed)
+        return fail(ErrorCode::bad_input, "cannot list {}: expected fewer than {} files", quote_path(folder),
+                    kMostListed);
+    std::ranges::sort(found);
+    found.erase(std::ranges::unique(found).begin(), found.end());
+    return found;
+}
+
 } // namespace
 
 bool is_there(const Path& path)
@@ -155,17 +187,22 @@ bool is_folder(const Path& path)
 
 Result<std::vector<Path>> list_files(const Path& folder)
 {
-    if (find_in_memory(folder))
-        return list_in_memory(folder);
-    std::vector<Path> files;
-    std::error_code error;
-    for (const auto& entry : std::filesystem::directory_iterator(folder, error))
-        if (is_file(entry.path()))
-            files.push_back(entry.path());
-    if (error)
-        return fail(ErrorCode::bad_input, "cannot list {}: {}", quote_path(folder), error.message());
-    std::ranges::sort(files);
-    return files;
+    const auto directly = [](const std::string& name) { return name.find('/') == std::string::npos ? name : ""; };
+    return list<std::filesystem::directory_iterator>(folder, directly, is_file);
+}
+
+Result<std::vector<Path>> list_folders(const Path& folder)
+{
+    const auto first = [](const std::string& name) {
+        const size_t end = name.find('/');
+        return end == std::string::npos ? "" : name.substr(0, end);
+    };
+    return list<std::filesystem::directory_iterator>(folder, first, is_folder);
+}
+
+Result<std::vector<Path>> list_tree(const Path& folder)
+{
+    return list<std::filesystem::recursive_directory_iterator>(folder, std::identity(), is_file);
 }
 
 Status make_folder(const Path& path)

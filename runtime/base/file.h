@@ -18,7 +18,8 @@ namespace semrover {
 
 using Path = std::filesystem::path;
 
-// Paths are of the disk, or of a folder in memory (memory_files.h), which can be read and not written.
+// Paths are of the disk, or of a folder in memory (memory_files.h), which can be read and not written. A folder may have
+// files of both; of two at one path the one in memory is read.
 
 // false when it is absent, or cannot be examined
 bool is_there(const Path& path);
@@ -27,6 +28,11 @@ bool is_folder(const Path& path);
 
 // The regular files directly in a folder, sorted. bad_input: it cannot be listed.
 Result<std::vector<Path>> list_files(const Path& folder);
+// The folders directly in a folder, links to folders among them, sorted. bad_input: it cannot be listed.
+Result<std::vector<Path>> list_folders(const Path& folder);
+// The regular files in a folder and below it, sorted; links to folders are not followed. bad_input: it cannot be
+// listed, or holds 2^22 files or more.
+Result<std::vector<Path>> list_tree(const Path& folder);
 
 // Makes a folder and those above it; it may exist.
 Status make_folder(const Path& path);

@@ -4,6 +4,7 @@
 
 #include "runtime/base/quote.h"
 
+#include <atomic>
 #include <mutex>
 
 namespace semrover {
@@ -16,7 +17,8 @@ constexpr std::string_view kPrefix = "memory:";
 struct AllFiles {
     std::mutex mutex;
     std::map<std::string, std::span<const std::byte>> files;
-    uint64_t folders = 0; // made so far
+    uint64_t folders = 0;         // made so far
+    std::atomic<size_t> disk = 0; // how many lie at folders of the disk
 };
 AllFiles& all_files()
 {
@@ -24,17 +26,20 @@ AllFiles& all_files()
     return all;
 }
 
+bool is_ours(const Path& path)
+{
+    return path.native().starts_with(kPrefix);
+}
+
+// whatever way a path is written
 std::string key_of(const Path& path)
 {
-    std::string key = path.lexically_normal().generic_string();
+    std::error_code ignored;
+    const Path whole = is_ours(path) ? path : std::filesystem::absolute(path, ignored);
+    std::string key = whole.lexically_normal().generic_string();
     if (key.ends_with('/'))
         key.pop_back();
     return key;
-}
-
-bool may_be_ours(const Path& path)
-{
-    return path.native().starts_with(kPrefix);
 }
 
 } // namespace
@@ -46,11 +51,18 @@ MemoryFolder::MemoryFolder()
     path_ = std::string(kPrefix) + std::to_string(++all.folders);
 }
 
+MemoryFolder::MemoryFolder(Path path) : path_(std::move(path))
+{
+    ++all_files().disk;
+}
+
 MemoryFolder::~MemoryFolder()
 {
     AllFiles& all = all_files();
+    const std::string key = key_of(path_);
     const std::lock_guard guard(all.mutex);
-    std::erase_if(all.files, [&](const auto& file) { return file.first.starts_with(path_.native() + "/"); });
+    all.files.erase(all.files.lower_bound(key + "/"), all.files.lower_bound(key + "0")); // the character after '/'
+    all.disk -= is_ours(path_) ? 0 : 1;
 }
 
 Status MemoryFolder::add(std::string_view path, std::span<const std::byte> bytes)
@@ -68,9 +80,9 @@ Status MemoryFolder::add(std::string_view path, std::span<const std::byte> bytes
 
 std::optional<MemoryEntry> find_in_memory(const Path& path)
 {
-    if (!may_be_ours(path))
-        return std::nullopt;
     AllFiles& all = all_files();
+    if (!is_ours(path) && all.disk == 0)
+        return std::nullopt;
     const std::string key = key_of(path);
     const std::lock_guard guard(all.mutex);
     if (const auto file = all.files.find(key); file != all.files.end())
@@ -81,16 +93,17 @@ std::optional<MemoryEntry> find_in_memory(const Path& path)
     return std::nullopt;
 }
 
-std::vector<Path> list_in_memory(const Path& folder)
+std::vector<std::string> names_in_memory(const Path& folder)
 {
     AllFiles& all = all_files();
+    if (!is_ours(folder) && all.disk == 0)
+        return {};
     const std::string key = key_of(folder) + "/";
     const std::lock_guard guard(all.mutex);
-    std::vector<Path> files;
+    std::vector<std::string> names;
     for (auto file = all.files.lower_bound(key); file != all.files.end() && file->first.starts_with(key); ++file)
-        if (file->first.find('/', key.size()) == std::string::npos)
-            files.emplace_back(file->first);
-    return files;
+        names.push_back(file->first.substr(key.size()));
+    return names;
 }
 
 } // namespace semrover

@@ -10,8 +10,8 @@
 
 namespace semrover {
 
-// Files that an application has in memory, below a folder that is on no disk: what reads files (file.h) finds them by
-// their paths. The bytes are not copied, and stay where they are as long as the folder. Any thread.
+// Files in memory, below a folder that is on no disk, or beside the files of one that is: what reads files (file.h)
+// finds them by their paths. The bytes are not copied, and stay where they are as long as the folder. Any thread.
 class MemoryFolder {
   public:
     // Adds a file with a path below the folder: "unet/config.json". Errors: usage for a path that is empty or absolute,
@@ -19,6 +19,7 @@ class MemoryFolder {
     Status add(std::string_view path, std::span<const std::byte> bytes);
 
     MemoryFolder();
+    explicit MemoryFolder(Path path); // a folder of the disk, which has one at a time
     ~MemoryFolder();
     MemoryFolder(const MemoryFolder&) = delete;
     MemoryFolder& operator=(const MemoryFolder&) = delete;
@@ -35,6 +36,6 @@ struct MemoryEntry {
     std::span<const std::byte> bytes = {}; // of a file
 };
 std::optional<MemoryEntry> find_in_memory(const Path& path);
-std::vector<Path> list_in_memory(const Path& folder); // files directly in it, sorted
+std::vector<std::string> names_in_memory(const Path& folder); // of the files below it, from it on, sorted
 
 } // namespace semrover

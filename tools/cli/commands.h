@@ -52,6 +52,7 @@ Run resuming(std::function<Status()> work);
 // std::shared_ptr that the callback holds.
 void add_bench(CLI::App& app, const Globals& globals, Run& run);
 void add_convert(CLI::App& app, const Globals& globals, Run& run);
+void add_dataset(CLI::App& app, const Globals& globals, Run& run);
 void add_devices(CLI::App& app, const Globals& globals, Run& run);
 void add_doctor(CLI::App& app, const Globals& globals, Run& run);
 void add_edit(CLI::App& app, const Globals& globals, Run& run);

@@ -10,6 +10,7 @@ int main(int argc, char** argv)
         argc, argv,
         {{"bench", "semrover-eval", "measure kernels and stages on this device"},
          add_convert,
+         add_dataset,
          add_devices,
          add_doctor,
          add_edit,

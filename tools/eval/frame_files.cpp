@@ -32,6 +32,8 @@ std::string name_of(const Path& relative, std::string_view kind)
 
 Result<FrameFiles> list_frames(const Path& folder, std::string_view kind)
 {
+    FrameFiles files;
+    SR_TRY(files.shards, open_if_shards(folder));
     Path base = folder;
     if (kind == "color" && is_folder(folder / "frames"))
         base = folder / "frames";
@@ -41,7 +43,6 @@ Result<FrameFiles> list_frames(const Path& folder, std::string_view kind)
     const auto of_kind = [&](const Path& path) { return path.parent_path().filename() == kind; };
     if (std::ranges::any_of(paths, of_kind))
         std::erase_if(paths, [&](const Path& path) { return !of_kind(path); });
-    FrameFiles files;
     for (const Path& path : paths) {
         const auto [at, fresh] = files.emplace(name_of(path.lexically_relative(base), kind), path);
         if (!fresh)

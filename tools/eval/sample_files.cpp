@@ -12,9 +12,6 @@ namespace semrover {
 
 namespace {
 
-namespace fs = std::filesystem;
-
-constexpr size_t kMaxFiles = 1 << 22;
 constexpr uint64_t kMaxListBytes = 64 << 20;
 
 std::string ending(const Path& path)
@@ -27,20 +24,10 @@ std::string ending(const Path& path)
 // regular files below a folder with one of these endings; links to folders are not followed
 Result<std::vector<Path>> files_below(const Path& folder, std::initializer_list<std::string_view> endings)
 {
-    std::error_code error;
-    if (!fs::is_directory(folder, error))
+    if (!is_folder(folder))
         return fail(ErrorCode::bad_input, "{}: expected a folder, this is none", quote_path(folder));
-    std::vector<Path> files;
-    for (fs::recursive_directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
-        std::error_code unreadable;
-        if (at->is_regular_file(unreadable) && std::ranges::find(endings, ending(at->path())) != endings.end())
-            files.push_back(at->path());
-        if (files.size() > kMaxFiles)
-            return fail(ErrorCode::bad_input, "{}: more than {} files", quote_path(folder), kMaxFiles);
-    }
-    if (error)
-        return fail(ErrorCode::bad_input, "cannot read {}: {}", quote_path(folder), printable(error.message()));
-    std::ranges::sort(files);
+    SR_TRY(std::vector<Path> files, list_tree(folder));
+    std::erase_if(files, [&](const Path& path) { return std::ranges::find(endings, ending(path)) == endings.end(); });
     return files;
 }
 
@@ -56,8 +43,7 @@ Result<std::vector<Path>> list_all_images(const Path& folder, bool arrays)
 
 Result<std::vector<Path>> list_images(const Path& folder)
 {
-    std::error_code error;
-    const bool refined = fs::is_directory(folder / "frames", error);
+    const bool refined = is_folder(folder / "frames");
     SR_TRY(std::vector<Path> files, list_all_images(refined ? folder / "frames" : folder));
     const auto is_color = [](const Path& path) { return path.parent_path().filename() == "color"; };
     if (!refined && std::ranges::any_of(files, is_color))
@@ -72,8 +58,7 @@ Result<ImageRgb8> read_image(const Path& path)
 
 Result<std::vector<Path>> list_grids(const Path& path)
 {
-    std::error_code error;
-    if (fs::is_directory(path, error)) {
+    if (is_folder(path)) {
         for (const std::string_view kind : {".sgrid", ".ply"}) {
             SR_TRY(std::vector<Path> files, files_below(path, {kind}));
             if (!files.empty())
@@ -92,7 +77,7 @@ Result<std::vector<Path>> list_grids(const Path& path)
         if (line.empty())
             continue;
         files.push_back(path.parent_path() / line);
-        if (!fs::is_regular_file(files.back(), error))
+        if (!is_file(files.back()))
             return fail(ErrorCode::bad_input, "{}: line names {}, which is no file", quote_path(path),
                         quote_path(files.back()));
     }

@@ -4,6 +4,7 @@
 
 #include "engine/format/image.h"
 #include "engine/scene/scene_points.h"
+#include "engine/shards/shard_set.h"
 #include "runtime/base/file.h"
 #include "tools/dataset/picture_classes.h"
 
@@ -12,9 +13,9 @@
 
 namespace semrover {
 
-// The images of a folder, sorted by path: all .png, .jpg and .jpeg files in it and below. Of a folder that `refine`
-// wrote only those in frames/, of one that `render` wrote only those in color/ (of every camera), since depth, labels
-// and the like are no pictures. Errors, bad_input: no such folder, none in it
+// The images of a folder (or of a shard set that is open), sorted by path: all .png, .jpg and .jpeg files in it and
+// below. Of a folder that `refine` wrote only those in frames/, of one that `render` wrote only those in color/ (of
+// every camera), since depth, labels and the like are no pictures. Errors, bad_input: no such folder, none in it
 Result<std::vector<Path>> list_images(const Path& folder);
 // whatever the names of folders; `arrays`: and .npy files
 Result<std::vector<Path>> list_all_images(const Path& folder, bool arrays = false);
@@ -50,12 +51,14 @@ struct PointFile {
 Result<PointFile> read_points(const Path& path);
 
 // pictures by what they are called among those of their kind: [CAMERA/]NNNNNN, without an ending, in order
-using FrameFiles = std::map<std::string, Path>;
+struct FrameFiles : std::map<std::string, Path> {
+    ShardsOrNone shards; // that they are in
+};
 
 // The .png, .jpg and .jpeg files (of labels .npy, too) of a kind ("color", "depth", "label", "visible"): those in
 // FOLDER/KIND, or in CAMERA/KIND of folders of cameras, as `render` and `streets` write them; colour also in
-// FOLDER/frames, as `refine` writes it; else all in FOLDER and below. Errors: bad_input: no such folder, none in it,
-// two of one name
+// FOLDER/frames, as `refine` writes it; else all in FOLDER and below; FOLDER may be a shard set, or in one. Errors:
+// bad_input: no such folder, none in it, two of one name, and as open_if_shards()
 Result<FrameFiles> list_frames(const Path& folder, std::string_view kind);
 
 // bad_input unless `other` has a picture of each of these names; `exactly`: and no more

@@ -11,8 +11,6 @@ namespace semrover {
 
 namespace {
 
-namespace fs = std::filesystem;
-
 // what a picture is called in the folder `kind` beside its own; of one that lies in no folder, in the folder itself
 Path sibling(const Path& folder, const Path& picture, const char* kind)
 {
@@ -104,9 +102,8 @@ Status check_count(const std::vector<FramePictures>& pictures, const Path& poses
             ++used[p.depth.parent_path()];
     for (const auto& [folder, frames] : used) {
         size_t found = 0;
-        std::error_code error;
-        for (const auto& entry : fs::directory_iterator(folder, error))
-            found += entry.path().extension() == ".png" || entry.path().extension() == ".npy";
+        for (const Path& path : list_files(folder).value_or(std::vector<Path>()))
+            found += path.extension() == ".png" || path.extension() == ".npy";
         if (found > frames)
             return fail(ErrorCode::bad_input, "{} holds {} pictures, {} has {} poses", quote_path(folder), found,
                         quote_path(poses), frames);

@@ -17,8 +17,6 @@ namespace semrover {
 
 namespace {
 
-namespace fs = std::filesystem;
-
 // a focal length that no camera has: a path that says none of its own comes back with it
 constexpr double kNotSaid = std::numeric_limits<double>::min();
 
@@ -78,18 +76,15 @@ Status apply_options(const FusionFolderOptions& o, Intrinsics& k)
 // the first picture below a folder of one of these names; empty: none
 Path first_picture(const Path& folder, std::initializer_list<const char*> kinds)
 {
-    std::vector<Path> found;
-    std::error_code error;
-    for (const auto& entry : fs::recursive_directory_iterator(folder, error)) {
-        const Path relative = entry.path().parent_path().lexically_relative(folder);
-        const bool picture =
-            std::ranges::find(kPictureEndings, entry.path().extension().string()) != std::end(kPictureEndings);
+    for (const Path& path : list_tree(folder).value_or(std::vector<Path>())) {
+        const Path relative = path.parent_path().lexically_relative(folder);
+        const bool picture = std::ranges::find(kPictureEndings, path.extension().string()) != std::end(kPictureEndings);
         if (picture && std::ranges::any_of(kinds, [&](const char* kind) {
                 return std::ranges::find(relative, Path(kind)) != relative.end();
             }))
-            found.push_back(entry.path());
+            return path;
     }
-    return found.empty() ? Path() : *std::ranges::min_element(found);
+    return {};
 }
 
 Result<ImageSize> first_depth_size(const Path& folder)
@@ -127,10 +122,11 @@ Result<Path> poses_of(const Path& folder, const Path& given)
 
 Result<FusionFolder> FusionFolder::open(const Path& folder, const FusionFolderOptions& options)
 {
+    FusionFolder f;
+    SR_TRY(f.shards_, open_if_shards(folder));
     if (!is_folder(folder))
         return fail(ErrorCode::bad_input, "{}: expected a folder of depth/, poses and pictures", quote_path(folder));
     SR_TRY(const Path poses, poses_of(folder, options.poses));
-    FusionFolder f;
     f.folder_ = folder;
     f.encoding_ = options.depth;
     SR_TRY(f.classes_, PictureClasses::create(options.map));

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "engine/fusion/depth_frames.h"
+#include "engine/shards/shard_set.h"
 #include "tools/dataset/depth_image.h"
 #include "tools/dataset/picture_classes.h"
 #include "tools/fuse/frame_pictures.h"
@@ -19,7 +20,7 @@ struct FusionFolderOptions {
     Path map; // JSON that says what label numbers are (label_map.h)
 };
 
-// A folder of pictures and poses:
+// A folder of pictures and poses, or a shard set of one:
 //   transforms.json, or another camera path
 //   intrinsics.json {"fx", "fy", "cx", "cy", "width", "height"}, where the path has none and no option gives them
 //   [CAMERA/]depth/NNNNNN.png  or .npy: depth_image.h
@@ -57,6 +58,7 @@ class FusionFolder {
     Status load_labels(size_t frame, DepthImages& images) const;
     std::string name_of(size_t frame) const;
 
+    ShardsOrNone shards_;
     Path folder_;
     DepthEncoding encoding_;
     std::vector<CameraFrame> cameras_;

@@ -152,6 +152,7 @@ Status interrupted()
 Status image_features(const EvalOptions& o, size_t side, Device& device, const Inception& network,
                       const Globals& globals, EvalSet& set)
 {
+    SR_TRY(const ShardsOrNone shards, open_if_shards(o.sets[side]));
     SR_TRY(const std::vector<Path> files, list_images(o.sets[side]));
     if (files.size() < 2)
         return too_few(o.sets[side], files.size(), "image");

@@ -3,6 +3,7 @@
 #include "tools/page/page.h"
 
 #include "engine/format/image.h"
+#include "engine/shards/shard_set.h"
 #include "runtime/base/quote.h"
 
 #include <algorithm>
@@ -14,8 +15,6 @@
 namespace semrover {
 
 namespace {
-
-namespace fs = std::filesystem;
 
 using Files = std::map<uint32_t, Path>;
 
@@ -46,22 +45,19 @@ std::string advice(const Path& folder)
 
 Result<Files> list_pictures(const PictureSet& set)
 {
-    std::error_code error;
     Files files;
-    for (fs::directory_iterator i(set.folder, error), end; !error && i != end; i.increment(error)) {
-        const Path& file = i->path();
+    const auto listed = list_files(set.folder);
+    if (!listed)
+        return fail(ErrorCode::bad_input, "expected a folder of pictures: {}", listed.error().message);
+    for (const Path& file : *listed) {
         const auto number = number_of(file);
         if (!number)
             continue;
         const auto [other, added] = files.emplace(*number, file);
-        if (!added) // in the order of names, whatever the folder's
+        if (!added)
             return fail(ErrorCode::bad_input, "{}: two pictures have the number {}: {} and {}", quote_path(set.folder),
-                        *number, quote_path(std::min(file, other->second).filename()),
-                        quote_path(std::max(file, other->second).filename()));
+                        *number, quote_path(other->second.filename()), quote_path(file.filename()));
     }
-    if (error)
-        return fail(ErrorCode::bad_input, "{}: expected a folder of pictures: {}", quote_path(set.folder),
-                    error.message());
     if (files.empty())
         return fail(ErrorCode::bad_input, "{}: expected pictures named 000000.png, found none{}",
                     quote_path(set.folder), advice(set.folder));
@@ -165,6 +161,10 @@ Result<PictureTable> read_pictures(const std::vector<PictureSet>& sets, const Pi
     PictureTable t;
     if (sets.empty())
         return t;
+    std::vector<ShardsOrNone> shards; // that the pictures are in
+    for (const PictureSet& set : sets) {
+        SR_TRY(shards.emplace_back(), open_if_shards(set.folder));
+    }
     SR_TRY(std::vector<Files> files, list_sets(sets, t));
     t.moments = spread(shared_moments(files), options.limit);
     uint64_t count = 0;

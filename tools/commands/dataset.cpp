@@ -1,0 +1,225 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// semrover dataset pack|list|verify|unpack: folders of pictures as archives of many moments each, and back
+#include "engine/shards/check_shards.h"
+#include "engine/shards/pack.h"
+#include "runtime/base/hash.h"
+#include "runtime/base/json.h"
+#include "runtime/base/quote.h"
+#include "tools/cli/output_folder.h"
+#include "tools/cli/progress.h"
+#include "tools/cli/value_options.h"
+
+#include <CLI/CLI.hpp>
+#include <map>
+#include <set>
+
+namespace semrover {
+
+namespace {
+
+// how far bytes are; an error where the user stops it
+class BytesProgress {
+  public:
+    BytesProgress(const Globals& globals, const char* stage) : globals_(globals), stage_(stage) {}
+
+    Status operator()(uint64_t done, uint64_t total)
+    {
+        if (!progress_)
+            progress_.emplace(progress_to_stderr(globals_), stage_, "bytes", total);
+        progress_->update(done);
+        if (interrupt_requested())
+            return fail(ErrorCode::interrupted, "interrupted after {} of {} bytes", done, total);
+        return {};
+    }
+
+  private:
+    const Globals& globals_;
+    const char* stage_;
+    std::optional<Progress> progress_;
+};
+
+// ---- pack
+
+struct PackArguments {
+    std::string folder, output;
+    ShardOptions options;
+};
+
+Status pack(const PackArguments& o, const Globals& globals)
+{
+    BytesProgress progress(globals, "pack");
+    ShardOptions options = o.options;
+    options.replace = globals.yes;
+    options.progress = std::ref(progress);
+    SR_TRY(const ShardSetInfo info, pack_shards(o.folder, o.output, options));
+    if (globals.json)
+        fmt::print("{}\n", Json{{"moments", info.moments},
+                                {"pictures", info.pictures},
+                                {"shards", info.shards},
+                                {"bytes", info.bytes},
+                                {"files", info.files}}
+                               .dump());
+    else if (!globals.quiet)
+        fmt::print("{}: {} moments, {} pictures in {} shards of {}, {} other files\n", quote_path(o.output),
+                   info.moments, info.pictures, info.shards, bytes_text(info.bytes), info.files);
+    return {};
+}
+
+// ---- list
+
+struct CameraContents {
+    uint32_t first = UINT32_MAX, last = 0;
+    std::map<std::string, uint64_t> kinds; // pictures
+};
+
+Json contents_json(const ShardIndex& index)
+{
+    std::map<std::string, CameraContents> cameras;
+    std::set<uint32_t> moments;
+    uint64_t bytes = 0, pictures = 0;
+    for (const Shard& shard : index.shards) {
+        bytes += shard.bytes;
+        pictures += shard.members.size();
+        for (const ShardMember& member : shard.members) {
+            const PictureName name = *picture_name(member.path);
+            CameraContents& c = cameras[name.camera];
+            c.first = std::min(c.first, name.moment);
+            c.last = std::max(c.last, name.moment);
+            ++c.kinds[name.kind];
+            moments.insert(name.moment);
+        }
+    }
+    Json report{{"key_prefix", index.key_prefix},
+                {"moments", moments.size()},
+                {"pictures", pictures},
+                {"shards", index.shards.size()},
+                {"bytes", bytes},
+                {"files", Json::array()}};
+    for (const auto& [name, c] : cameras)
+        report["cameras"].push_back({{"name", name}, {"first", c.first}, {"last", c.last}, {"kinds", c.kinds}});
+    for (const ShardMember& file : index.files)
+        report["files"].push_back(file.path);
+    return report;
+}
+
+Status list(const std::string& folder, const Globals& globals)
+{
+    SR_TRY(const auto set, ShardSet::open(folder));
+    const Json report = contents_json(set->index());
+    if (globals.json) {
+        fmt::print("{}\n", report.dump());
+        return {};
+    }
+    fmt::print("{} moments, {} pictures in {} shards of {}, {} other files\n", report["moments"].get<uint64_t>(),
+               report["pictures"].get<uint64_t>(), report["shards"].get<uint64_t>(),
+               bytes_text(report["bytes"].get<uint64_t>()), report["files"].size());
+    for (const Json& camera : report["cameras"]) {
+        const std::string name = camera["name"];
+        fmt::print("{:<16} {:06} to {:06}", name.empty() ? "(no name)" : name, camera["first"].get<uint32_t>(),
+                   camera["last"].get<uint32_t>());
+        for (const auto& [kind, pictures] : camera["kinds"].items())
+            fmt::print("  {} {}", pictures.get<uint64_t>(), kind);
+        fmt::print("\n");
+    }
+    return {};
+}
+
+// ---- verify
+
+Status verify_set(const std::string& folder, const Globals& globals)
+{
+    SR_TRY(const auto set, ShardSet::open(folder));
+    BytesProgress progress(globals, "verify");
+    SR_TRY(const std::vector<ShardFault> faults, check_shards(*set, std::ref(progress)));
+    Json report{{"shards", set->index().shards.size()}, {"faults", Json::array()}};
+    for (const ShardFault& fault : faults) {
+        report["faults"].push_back({{"path", fault.path}, {"what", fault.what}});
+        if (!globals.json)
+            fmt::print("{}: {}\n", printable(fault.path), fault.what);
+    }
+    if (globals.json)
+        fmt::print("{}\n", report.dump());
+    if (!faults.empty())
+        return fail(ErrorCode::bad_input, "{}: {} faults, the first: {}: {}", quote_path(folder), faults.size(),
+                    printable(faults[0].path), faults[0].what);
+    if (!globals.json && !globals.quiet)
+        fmt::print("{}: all is as the index says\n", quote_path(folder));
+    return {};
+}
+
+// ---- unpack
+
+Status unpack_file(const Path& to, const ShardMember& member, std::span<const std::byte> bytes)
+{
+    Hash hash;
+    hash.add(bytes);
+    if (bytes.size() != member.size || hash.value() != member.hash)
+        return fail(ErrorCode::bad_input, "{} is not as the index says: its size or hash is another",
+                    quote(member.path));
+    SR_CHECK(make_folder(to.parent_path()));
+    return write_file_atomically(to, bytes);
+}
+
+Status unpack(const std::string& folder, const std::string& output, const Globals& globals)
+{
+    SR_TRY(const auto set, ShardSet::open(folder));
+    SR_TRY(OutputFolder out, OutputFolder::create(output, globals.yes));
+    BytesProgress progress(globals, "unpack");
+    uint64_t total = 0, done = 0;
+    for (const Shard& shard : set->index().shards)
+        total += shard.bytes;
+    for (size_t i = 0; i < set->index().shards.size(); ++i)
+        for (const ShardMember& member : set->index().shards[i].members) {
+            SR_CHECK(unpack_file(out / member.path, member, set->bytes(i, member)));
+            SR_CHECK(progress(done += member.size, total));
+        }
+    for (const ShardMember& member : set->index().files) {
+        SR_TRY(const MappedFile file, MappedFile::open(set->folder() / member.path));
+        SR_CHECK(unpack_file(out / member.path, member, file.bytes()));
+    }
+    return out.commit();
+}
+
+} // namespace
+
+void add_dataset(CLI::App& app, const Globals& globals, Run& run)
+{
+    CLI::App* dataset = app.add_subcommand("dataset", "folders of pictures as a few archives, and back");
+    dataset->require_subcommand(1);
+    dataset->fallthrough();
+
+    auto o = std::make_shared<PackArguments>();
+    CLI::App* c = dataset->add_subcommand("pack", "a folder of pictures to a shard set: archives and their index");
+    c->add_option("DIR", o->folder, "what `render` or `refine` wrote, or pictures laid out so")->required();
+    c->add_option("-o,--output", o->output, "folder of the set")->required();
+    c->add_option("--key", o->options.key_prefix, "in front of each moment's number, such as SCENE_DRIVE_");
+    c->add_option_function<std::string>(
+         "--shard-size",
+         [o](const std::string& text) {
+             const auto bytes = parse_memory_size(text);
+             if (!bytes)
+                 throw CLI::ValidationError("--shard-size", bytes.error().message);
+             o->options.shard_bytes = *bytes;
+         },
+         "bytes of an archive at most: 512MiB, 1G; a moment is never in two")
+        ->default_str("512MiB");
+    c->callback([o, &globals, &run] { run = [o, &globals] { return pack(*o, globals); }; });
+
+    auto set = std::make_shared<std::string>(), output = std::make_shared<std::string>();
+    c = dataset->add_subcommand("list", "moments, cameras, kinds of pictures and archives of a shard set");
+    c->add_option("SET", *set, "folder of a shard set")->required();
+    c->callback([set, &globals, &run] { run = [set, &globals] { return list(*set, globals); }; });
+
+    c = dataset->add_subcommand("verify", "compare all bytes of a shard set with its index");
+    c->add_option("SET", *set, "folder of a shard set")->required();
+    c->callback([set, &globals, &run] { run = [set, &globals] { return verify_set(*set, globals); }; });
+
+    c = dataset->add_subcommand("unpack", "the folder that a shard set was packed from");
+    c->add_option("SET", *set, "folder of a shard set")->required();
+    c->add_option("-o,--output", *output, "folder")->required();
+    c->callback(
+        [set, output, &globals, &run] { run = [set, output, &globals] { return unpack(*set, *output, globals); }; });
+}
+
+} // namespace semrover
