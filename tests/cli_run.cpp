@@ -276,6 +276,26 @@ TEST_F(CliRun, only_the_buffers_that_are_asked_for_are_kept)
     }
 }
 
+TEST_F(CliRun, a_drive_can_be_shards)
+{
+    put_job("[output]\nlayout = \"shards\"\nshard_bytes = \"64K\"\n");
+    for (const char* output : {"out", "again"}) // the second in parts
+        for (int part = 0; part < (output[0] == 'o' ? 1 : 3); ++part)
+            EXPECT_EQ(run(fmt::format("-o {} --part {}/{}", path(output), part, output[0] == 'o' ? 1 : 3)).code, 0);
+    EXPECT_TRUE(published("again") == published());
+    const std::string set = path("out/drives/a/ahead");
+    EXPECT_EQ(semrover_program("dataset verify --quiet " + set).code, 0);
+    const ProgramResult unpacked = semrover_program("dataset unpack --quiet " + set + " -o " + path("unpacked"));
+    EXPECT_EQ(unpacked.code, 0) << unpacked.err;
+    put_job();
+    EXPECT_EQ(run("-o " + path("folders")).code, 0);
+    for (const auto& entry : fs::recursive_directory_iterator(folder_ / "folders/drives/a/ahead"))
+        if (entry.is_regular_file() && entry.path().filename() != "manifest.json") {
+            const fs::path name = entry.path().lexically_relative(folder_ / "folders/drives/a/ahead");
+            EXPECT_TRUE(contents(entry.path()) == contents(folder_ / "unpacked" / name)) << name;
+        }
+}
+
 TEST_F(CliRun, a_scene_that_has_points_is_drawn_as_it_is)
 {
     EXPECT_TRUE(write_grid(folder_ / "street.sgrid", street()));

@@ -61,19 +61,23 @@ Status add_file(const Path& path, std::string relative, const std::string& key_p
 }
 
 // what killed processes were writing is left out
-Result<PackedFolder> find_files(const Path& folder, const std::string& key_prefix)
+Result<PackedFolder> find_files(const Path& folder, const ShardOptions& options)
 {
     PackedFolder found;
     std::error_code error;
     for (fs::recursive_directory_iterator i(folder, error), end; !error && i != end; i.increment(error)) {
         std::error_code ignored;
-        if (i->is_directory(ignored) && !i->is_symlink(ignored))
+        const bool skipped = i.depth() == 0 && std::ranges::count(options.skip, i->path().filename().string());
+        if (skipped)
+            i.disable_recursion_pending();
+        if (skipped || (i->is_directory(ignored) && !i->is_symlink(ignored)))
             continue;
         if (!i->is_regular_file(ignored))
             return fail(ErrorCode::bad_input, "{}: expected a file or a folder, found a link or a device",
                         quote_path(i->path()));
         if (!is_temporary(i->path()))
-            SR_CHECK(add_file(i->path(), i->path().lexically_relative(folder).generic_string(), key_prefix, found));
+            SR_CHECK(
+                add_file(i->path(), i->path().lexically_relative(folder).generic_string(), options.key_prefix, found));
     }
     if (error)
         return fail(ErrorCode::bad_input, "cannot list {}: {}", quote_path(folder), error.message());
@@ -252,7 +256,7 @@ Result<ShardSetInfo> pack_shards(const Path& folder, const Path& output, const S
         return fail(ErrorCode::usage, "`key` is {}, expected up to 48 letters, digits, '_' and '-'",
                     quote(options.key_prefix));
     SR_CHECK(check_folders(folder, output));
-    SR_TRY(const PackedFolder found, find_files(folder, options.key_prefix));
+    SR_TRY(const PackedFolder found, find_files(folder, options));
     SR_CHECK(empty_output(output, found.files, options.replace));
     Packer packer(folder, output, options, found.bytes);
     for (auto p = found.pictures.begin(); p != found.pictures.end();) {

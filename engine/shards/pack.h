@@ -12,6 +12,7 @@ struct ShardOptions {
     std::string key_prefix;              // in front of each moment's number: "SCENE_DRIVE_"
     uint64_t shard_bytes = 512ull << 20; // an archive ends before it has more, unless one moment alone has
     bool replace = false;                // a set that is there
+    std::vector<std::string> skip = {};  // files and folders directly in the folder that are left out
     std::function<Status(uint64_t bytes, uint64_t total)> progress = {}; // an error of it ends the work
 };
 

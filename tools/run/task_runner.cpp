@@ -2,12 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/run/task_runner.h"
 
+#include "engine/shards/pack.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/host_name.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/interrupt.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/print_stderr.h"
+#include "tools/cli/value_options.h"
 #include "tools/run/command_options.h"
 
 #include <algorithm>
@@ -235,11 +237,36 @@ Status TaskRunner::make(const Task& task, const Attempt& attempt) const
     return run_command(scene_line(task, attempt.work()), globals_);
 }
 
+// a picture's name in an archive says where it is of
+std::string key_prefix(const Task& task)
+{
+    std::string prefix = fmt::format("{}_{}_", task.scene->name, task.drive->name);
+    std::ranges::replace(prefix, '.', '-');
+    return is_key_prefix(prefix) ? prefix : "";
+}
+
+// beside the pictures, which stay as they are until this is published
+Status TaskRunner::seal_shards(const Task& task, const Attempt& attempt, Manifest manifest) const
+{
+    ShardOptions options;
+    options.key_prefix = key_prefix(task);
+    options.replace = true;
+    options.skip.assign(std::begin(kState), std::end(kState));
+    if (!job_.shard_bytes.empty()) {
+        SR_TRY(options.shard_bytes, parse_memory_size(job_.shard_bytes));
+    }
+    SR_CHECK(pack_shards(attempt.work(), attempt.files(), options).map([](const auto&) {}));
+    SR_TRY(manifest.files, list_contents(attempt.files()));
+    return write_manifest(attempt.files(), manifest);
+}
+
 // what is published, with a manifest; as long as it has none, the run's state stays
 Status TaskRunner::seal(const Task& task, const Attempt& attempt, Manifest manifest) const
 {
     if (task.drive)
         SR_CHECK(drop_pictures(attempt.work(), job_.buffers));
+    if (task.drive && job_.layout == JobLayout::shards)
+        return seal_shards(task, attempt, std::move(manifest));
     SR_TRY(manifest.files, list_contents(attempt.work()));
     std::erase_if(manifest.files, [](const Manifest::File& file) {
         return std::ranges::count(kState, file.path.substr(0, file.path.find('/'))) > 0;

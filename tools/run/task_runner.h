@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "tools/cli/commands.h"
 #include "tools/cli/session.h"
 #include "tools/run/attempt.h"
 #include "tools/run/task.h"
@@ -29,6 +30,7 @@ class TaskRunner {
     std::vector<std::string> scene_line(const Task& task, const Path& work) const;
     std::vector<std::string> drive_line(const Task& task, const Path& work) const;
     Status make_street(const JobScene& scene, const Path& folder) const;
+    Status seal_shards(const Task& task, const Attempt& attempt, Manifest manifest) const;
     Status seal(const Task& task, const Attempt& attempt, Manifest manifest) const;
 
     const JobFile& job_;
