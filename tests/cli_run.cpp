@@ -142,6 +142,31 @@ TEST_F(CliRun, the_bytes_do_not_depend_on_parts)
     EXPECT_EQ(again["were_done"], 9);
 }
 
+TEST_F(CliRun, a_dry_run_says_what_is_left)
+{
+    const ProgramResult dry = run("--dry-run --json");
+    EXPECT_EQ(dry.code, 0) << dry.err;
+    const Json all = Json::parse(dry.out, nullptr, false);
+    EXPECT_EQ(all["scenes"], 3);
+    EXPECT_EQ(all["drives"], 6);
+    EXPECT_EQ(all["frames"], 3 * (3 + 2));
+    EXPECT_EQ(all["done"], 0);
+    EXPECT_GT(all["seconds"], 0.0);
+    EXPECT_GT(all["device_bytes"], 1 << 16);
+    EXPECT_FALSE(fs::exists(folder_ / "out")) << "the trial leaves nothing";
+    EXPECT_EQ(run().code, 0);
+    uint64_t bytes = 0, files = 0;
+    for (const char* stage : {"scenes", "drives"})
+        for (const auto& entry : fs::recursive_directory_iterator(folder_ / "out" / stage))
+            if (entry.is_regular_file() && entry.path().filename() != "manifest.json") {
+                bytes += entry.file_size();
+                ++files;
+            }
+    EXPECT_NEAR(all["bytes"].get<double>(), double(bytes), 0.4 * double(bytes));
+    EXPECT_NEAR(all["files"].get<double>(), double(files), 0.3 * double(files));
+    EXPECT_EQ(Json::parse(run("--dry-run --json").out, nullptr, false)["done"], 9);
+}
+
 TEST_F(CliRun, stages_can_be_apart)
 {
     const ProgramResult early = run("--stage drive --wait 0");

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "engine/job/model.h"
+#include "runtime/base/json.h"
 
 #include <map>
 
@@ -13,6 +14,7 @@ namespace semrover {
 class Session {
   public:
     std::shared_ptr<Device> device; // null until a command has opened one
+    Json results;                   // of the last command that has any, in place of printing them
 
     // Errors: as Model::load()
     Result<std::shared_ptr<const Transformer>> transformer(const Path& model, DType precision);

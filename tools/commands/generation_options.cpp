@@ -3,6 +3,7 @@
 #include "tools/commands/generation_options.h"
 
 #include "tools/cli/progress.h"
+#include "tools/cli/session.h"
 #include "tools/cli/value_options.h"
 
 #include <CLI/CLI.hpp>
@@ -49,7 +50,9 @@ void add_generation_options(CLI::App& c, GenerationArguments& a)
 void print_estimate(const Json& e, const Globals& globals)
 {
     const auto count = [&e](const char* name) { return e[name].get<size_t>(); };
-    if (globals.json)
+    if (globals.session)
+        globals.session->results = e;
+    else if (globals.json)
         fmt::print("{}\n", e.dump());
     else
         fmt::print(
@@ -61,8 +64,8 @@ void print_estimate(const Json& e, const Globals& globals)
 void print_results(const Json& results, const Globals& globals)
 {
     if (globals.session)
-        return;
-    if (globals.json)
+        globals.session->results = results;
+    else if (globals.json)
         fmt::print("{}\n", results.dump());
     else if (!globals.quiet)
         for (const Json& output : results.value("outputs", Json::array()))

@@ -188,8 +188,8 @@ void print_results(const RefineArguments& o, const Globals& globals, const Json&
 {
     const uint64_t peak = results["peak_device_bytes"];
     if (globals.session)
-        return;
-    if (globals.json)
+        globals.session->results = results;
+    else if (globals.json)
         fmt::print("{}\n", results.dump());
     else if (!globals.quiet)
         fmt::print("peak device memory {} bytes ({}); frames are in {}\n", peak, bytes_text(peak),

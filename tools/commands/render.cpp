@@ -6,6 +6,7 @@
 #include "runtime/base/quote.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/run_job.h"
+#include "tools/cli/session.h"
 #include "tools/cli/value_options.h"
 #include "tools/commands/scene_input.h"
 #include "tools/commands/trajectory_options.h"
@@ -110,7 +111,9 @@ Status render(const RenderArguments& o, const Globals& globals)
     if (video.video)
         SR_CHECK(video.video->finish());
     SR_CHECK(write_profile(*device, o.profile, globals));
-    if (globals.json && !globals.session)
+    if (globals.session)
+        globals.session->results = results;
+    else if (globals.json)
         fmt::print("{}\n", results.dump());
     return {};
 }

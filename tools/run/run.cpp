@@ -1,10 +1,13 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover run JOB: many scenes and drives of one file, here or a part of them on each of many machines
+#include "runtime/base/bytes_text.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/print_stderr.h"
+#include "tools/cli/progress.h"
 #include "tools/cli/run_job.h"
 #include "tools/cli/value_options.h"
+#include "tools/run/estimate.h"
 #include "tools/run/task_runner.h"
 
 #include <algorithm>
@@ -25,7 +28,7 @@ struct RunArguments {
     std::string part, stage;
     std::optional<double> wait;
     uint32_t most = kMostParts;
-    bool list = false, parts = false, status = false, check = false, clean = false, strict = false;
+    bool dry_run = false, list = false, parts = false, status = false, check = false, clean = false, strict = false;
 };
 
 // "2/7": the parts are 0 to 6
@@ -186,6 +189,33 @@ Status move_aside(const JobFile& job, const std::vector<Task>& tasks)
     return {};
 }
 
+Status dry_run(const JobFile& job, std::vector<Task> tasks, const Globals& globals)
+{
+    TaskKeys keys(job);
+    size_t done = 0;
+    for (auto task = tasks.begin(); task != tasks.end();) {
+        SR_TRY(const std::string key, keys.key(*task));
+        const auto manifest = read_manifest(job.out / task->name());
+        const bool there = manifest && manifest->key == key;
+        done += there;
+        task = there ? tasks.erase(task) : task + 1;
+    }
+    SR_TRY(Json e, estimate(job, tasks, globals));
+    e["done"] = done;
+    if (globals.json) {
+        fmt::print("{}\n", e.dump());
+        return {};
+    }
+    fmt::print("{} scenes to generate, {} drives of {} frames to draw{}; {} tasks are done\n",
+               e["scenes"].get<size_t>(), e["drives"].get<size_t>(), e["frames"].get<size_t>(),
+               job.refined ? " and refine" : "", done);
+    if (!tasks.empty())
+        fmt::print("about {} on {}, of which scenes {}\nabout {} in {} files; device memory {} at most\n",
+                   duration_text(e["seconds"]), e["device"].get<std::string>(), duration_text(e["scene_seconds"]),
+                   bytes_text(e["bytes"]), e["files"].get<uint64_t>(), bytes_text(e["device_bytes"]));
+    return {};
+}
+
 struct Tally {
     size_t done = 0, were_done = 0, by_others = 0, failed = 0, waiting = 0;
 };
@@ -273,6 +303,8 @@ Status run(const RunArguments& o, const Globals& globals)
         return {};
     }
     const std::vector<Task> tasks = tasks_of(job, choice);
+    if (o.dry_run)
+        return dry_run(job, tasks, globals);
     if (o.list)
         return list_tasks(job, tasks, globals);
     if (o.status)
@@ -297,6 +329,8 @@ void add_run(CLI::App& app, const Globals& globals, Run& command)
     add_choice(*c, "--stage", {"scene", "drive"}, "only the scenes, or only the drives through them", o->stage);
     add_number(*c, "--wait", o->wait,
                "seconds for a scene that another process makes to be seen; 120 with --stage drive", 0, 86400);
+    CLI::Option* dry = c->add_flag("--dry-run", o->dry_run,
+                                   "only say what is left to do, about how long it takes, how much memory and disk");
     CLI::Option* list = c->add_flag("--list", o->list, "only list the tasks; with --json a line each");
     CLI::Option* parts = c->add_flag("--parts", o->parts, "only say in how many parts the job can be cut");
     add_number(*c, "--most", o->most, "--parts: at most", 1u, kMostParts)->needs(parts);
@@ -305,7 +339,7 @@ void add_run(CLI::App& app, const Globals& globals, Run& command)
     c->add_flag("--same-device", o->strict, "--check: refuse what several kinds of devices have made")->needs(check);
     CLI::Option* clean =
         c->add_flag("--clean", o->clean, "only remove attempts that were given up a day ago, at tasks that are done");
-    CLI::Option* const only[] = {list, parts, status, check, clean};
+    CLI::Option* const only[] = {dry, list, parts, status, check, clean};
     for (CLI::Option* a : only)
         for (CLI::Option* b : only)
             if (a != b)

@@ -227,6 +227,21 @@ std::vector<std::string> TaskRunner::drive_line(const Task& task, const Path& wo
     return line;
 }
 
+Result<Json> TaskRunner::expect(const Task& task)
+{
+    SR_TRY(const std::string key, keys_.key(task));
+    SR_TRY(const Attempt attempt, Attempt::create(job_.out, key));
+    if (task.scene->source == JobScene::Source::street)
+        SR_CHECK(make_street(*task.scene, attempt.work() / "street"));
+    std::vector<std::string> line = scene_line(task, attempt.work());
+    line.push_back("--dry-run");
+    const Status done = run_command(line, globals_);
+    std::error_code ignored;
+    fs::remove_all(attempt.work(), ignored);
+    SR_CHECK(done);
+    return globals_.session->results;
+}
+
 Status TaskRunner::make(const Task& task, const Attempt& attempt) const
 {
     SR_CHECK(make_folder(attempt.work()));

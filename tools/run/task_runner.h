@@ -20,6 +20,10 @@ class TaskRunner {
     // Does a task and publishes it, unless it is published already. Errors: busy where a scene that it needs is not
     // there (yet); the command's
     Result<Outcome> run(const Task& task);
+    // What generating a scene would take: the figures of `generate --dry-run`. Errors: as run()
+    Result<Json> expect(const Task& scene);
+    uint64_t peak_device_bytes() const { return globals_.session->results.value("peak_device_bytes", uint64_t(0)); }
+    std::string device_name() const { return globals_.session->device ? globals_.session->device->name() : ""; }
     void drop_models() { globals_.session->drop_models(); } // of the tasks so far
 
   private:
