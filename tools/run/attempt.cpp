@@ -3,6 +3,7 @@
 #include "tools/run/attempt.h"
 
 #include "runtime/base/hash.h"
+#include "runtime/base/host_name.h"
 #include "runtime/base/quote.h"
 
 #include <algorithm>
@@ -49,7 +50,7 @@ std::optional<AttemptName> parse_name(const std::string& name)
 bool is_known_dead(const Path& attempt)
 {
     const auto name = parse_name(attempt.filename().string());
-    return name && name->host == host_in_names() && name->pid > 0 && ::kill(pid_t(name->pid), 0) != 0 && errno == ESRCH;
+    return name && name->host == host_name() && name->pid > 0 && ::kill(pid_t(name->pid), 0) != 0 && errno == ESRCH;
 }
 
 // a hard link, or a copy where the file system has none
@@ -111,16 +112,6 @@ double seconds_since_change(const Path& folder)
 
 } // namespace
 
-std::string host_in_names()
-{
-    char name[256] = "";
-    (void)::gethostname(name, sizeof name - 1);
-    std::string host = name;
-    for (char& c : host)
-        c = std::isalnum(static_cast<unsigned char>(c)) || c == '_' ? c : '-';
-    return host.empty() ? "host" : host.substr(0, 60);
-}
-
 Attempt::Attempt(Path out, std::string name)
     : out_(std::move(out)), folder_(attempts_of(out_) / name), work_(folder_ / "work"), files_(folder_ / "files"),
       name_(std::move(name))
@@ -141,7 +132,7 @@ Result<Attempt> Attempt::create(const Path& out, const std::string& key)
 {
     std::random_device random;
     const uint64_t number = uint64_t(random()) << 32 | random();
-    Attempt attempt(out, fmt::format("{}.{}.{}.{}", key, host_in_names(), ::getpid(), hash_text(number)));
+    Attempt attempt(out, fmt::format("{}.{}.{}.{}", key, host_name(), ::getpid(), hash_text(number)));
     SR_CHECK(make_folder(attempt.folder_));
     return attempt;
 }

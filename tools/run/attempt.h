@@ -51,7 +51,4 @@ class Attempt {
     std::string name_;
 };
 
-// what this machine is called in the names of files, where [A-Za-z0-9_-] stand for themselves
-std::string host_in_names();
-
 } // namespace semrover

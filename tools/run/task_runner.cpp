@@ -3,6 +3,7 @@
 #include "tools/run/task_runner.h"
 
 #include "runtime/base/hash.h"
+#include "runtime/base/host_name.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/interrupt.h"
 #include "tools/cli/open_device.h"
@@ -162,7 +163,7 @@ Result<TaskRunner::Outcome> TaskRunner::attempt(const Task& task, const std::str
         manifest.task = task.name();
         manifest.key = key;
         manifest.attempt = attempt.name();
-        manifest.host = host_in_names();
+        manifest.host = host_name();
         manifest.device = device->name();
         manifest.driver = device->driver();
         manifest.begun = utc_now();
@@ -259,7 +260,7 @@ void keep_failure(const Path& out, const Task& task, const Error& error)
     const Json json{{"task", task.name()},
                     {"code", int(error.code)},
                     {"message", error.message},
-                    {"host", host_in_names()},
+                    {"host", host_name()},
                     {"time", utc_now()}};
     (void)write_file_atomically(file, json.dump(1) + "\n"); // the exit code says it, too
 }
