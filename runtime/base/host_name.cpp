@@ -19,8 +19,8 @@ std::string read_host_name()
     const char* given = std::getenv("SEMROVER_HOST");
     std::string host = given && *given ? given : ::gethostname(name, kMostLength) == 0 && *name ? name : "unknown";
     host.resize(std::min(host.size(), kMostLength));
-    const auto unsafe = [](unsigned char c) { return !std::isalnum(c) && c != '.' && c != '-'; };
-    std::ranges::replace_if(host, unsafe, '.'); // a name in a file's name
+    const auto unsafe = [](unsigned char c) { return !std::isalnum(c) && c != '_'; };
+    std::ranges::replace_if(host, unsafe, '-');
     return host;
 }
 

@@ -6,8 +6,8 @@
 
 namespace semrover {
 
-// This machine among those that share a folder: at most 64 letters, digits, points and minus signs. SEMROVER_HOST
-// overrides it, for tests that play several.
+// This machine among those that share a folder, for names of files: 1 to 64 of [A-Za-z0-9_-]. SEMROVER_HOST overrides
+// it, for tests that play several.
 const std::string& host_name();
 
 } // namespace semrover
