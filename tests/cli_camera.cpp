@@ -263,9 +263,9 @@ TEST(CliCamera, a_rig_is_drawn_at_another_size_and_sees_the_same)
     const RigDrive d;
     ASSERT_EQ(render(d.folder / "wide", d.options + "-W 32").code, 0);
     ASSERT_EQ(render(d.folder / "both", d.options + "-W 40 -H 20").code, 0);
-    EXPECT_EQ(*read_png_size(d.folder / "wide/front/color/000000.png"), (ImageSize{32, 20})); // as it was: 64 x 40
-    EXPECT_EQ(*read_png_size(d.folder / "wide/tele/color/000000.png"), (ImageSize{32, 32}));
-    EXPECT_EQ(*read_png_size(d.folder / "both/tele/color/000001.png"), (ImageSize{40, 20}));
+    EXPECT_EQ(*read_image_size(d.folder / "wide/front/color/000000.png"), (ImageSize{32, 20})); // as it was: 64 x 40
+    EXPECT_EQ(*read_image_size(d.folder / "wide/tele/color/000000.png"), (ImageSize{32, 32}));
+    EXPECT_EQ(*read_image_size(d.folder / "both/tele/color/000001.png"), (ImageSize{40, 20}));
     const auto path = read_transforms(d.folder / "both/transforms.json");
     const Intrinsics tele = (*read_rig(d.folder / "rig.json")).sensors[1].intrinsics;
     EXPECT_EQ(path->frames[1].intrinsics, scaled_to(tele, 40, 20));
@@ -311,6 +311,66 @@ TEST(CliCamera, a_drawing_that_is_done_is_done_and_another_wants_yes)
     }
 }
 
+// of a run, by name, without its state
+std::map<std::string, std::string> bytes(const Path& folder)
+{
+    std::map<std::string, std::string> files;
+    for (const auto& entry : fs::recursive_directory_iterator(folder))
+        if (entry.is_regular_file() && entry.path().filename() != "journal.jsonl" &&
+            entry.path().filename() != "run.json" && entry.path().filename() != "lock")
+            files[entry.path().lexically_relative(folder)] = contents(entry.path());
+    return files;
+}
+
+TEST(CliCamera, files_and_their_order_do_not_depend_on_how_many_threads_make_them)
+{
+    const RigDrive d;
+    std::map<std::string, std::string> whole;
+    std::string journal;
+    for (const char* threads : {"1", "2", "8"}) {
+        const Path out = d.folder / threads;
+        const ProgramResult result = render(out, d.options + "--npy --top --json --threads " + threads);
+        ASSERT_EQ(result.code, 0) << result.err;
+        const Json figures = json_of(result.out);
+        EXPECT_GT(figures["seconds"], figures["file_wait_seconds"]);
+        EXPECT_GE(figures["file_wait_seconds"], 0);
+        if (whole.empty()) {
+            whole = bytes(out);
+            journal = contents(out / "journal.jsonl");
+        }
+        EXPECT_TRUE(bytes(out) == whole) << threads;
+        EXPECT_EQ(contents(out / "journal.jsonl"), journal) << threads;
+    }
+    EXPECT_EQ(whole.size(), 6u * 8 + 2);
+    EXPECT_EQ(std::ranges::count(journal, '\n'), 7); // a line a frame, and one for top.png
+}
+
+TEST(CliCamera, colours_can_be_jpegs_and_pngs_smaller)
+{
+    const RigDrive d;
+    ASSERT_EQ(render(d.folder / "png", d.options).code, 0);
+    ASSERT_EQ(render(d.folder / "jpeg", d.options + "--format jpeg --quality 95").code, 0);
+    ASSERT_EQ(render(d.folder / "stored", d.options + "--png-level 0").code, 0);
+    const auto color = read_image_rgb8(d.folder / "png/front/color/000001.png"),
+               lossy = read_image_rgb8(d.folder / "jpeg/front/color/000001.jpg");
+    ASSERT_TRUE(color && lossy);
+    double difference = 0;
+    for (size_t i = 0; i < color->pixels.size(); ++i)
+        difference += std::abs(int(color->pixels[i]) - int(lossy->pixels[i]));
+    EXPECT_LT(difference / double(color->pixels.size()), 8);
+    EXPECT_GT(difference, 0);
+    EXPECT_FALSE(fs::exists(d.folder / "jpeg/front/color/000001.png"));
+    EXPECT_EQ(contents(d.folder / "jpeg/front/label/000001.png"), contents(d.folder / "png/front/label/000001.png"));
+    EXPECT_EQ(json_of(contents(d.folder / "jpeg/transforms.json"))["frames"][0]["file_path"], "front/color/000000.jpg");
+    EXPECT_EQ(read_image_rgb8(d.folder / "stored/front/color/000001.png")->pixels, color->pixels);
+    EXPECT_GT(fs::file_size(d.folder / "stored/front/color/000001.png"), 64u * 40 * 3);
+    // one that is done is done, another wants -y and takes the JPEGs away
+    EXPECT_EQ(render(d.folder / "jpeg", d.options + "--format jpeg --quality 95").code, 0);
+    expect_error(render(d.folder / "jpeg", d.options + "--format jpeg --quality 94"), 2, "-y replaces it");
+    ASSERT_EQ(render(d.folder / "jpeg", d.options + "-y").code, 0);
+    EXPECT_TRUE(bytes(d.folder / "jpeg") == bytes(d.folder / "png"));
+}
+
 TEST(CliCamera, a_drawing_that_was_killed_goes_on_to_the_same_bytes)
 {
     const RigDrive d;
@@ -318,14 +378,6 @@ TEST(CliCamera, a_drawing_that_was_killed_goes_on_to_the_same_bytes)
     for (int i = 0; i < 12; ++i)
         poses += fmt::format("{} {} 0 1.7 -0.5 0.5 -0.5 0.5\n", i, 0.5 * i);
     d.folder.put("two.tum", poses);
-    const auto bytes = [&](const Path& folder) {
-        std::map<std::string, std::string> files;
-        for (const auto& entry : fs::recursive_directory_iterator(folder))
-            if (entry.is_regular_file() && entry.path().filename() != "journal.jsonl" &&
-                entry.path().filename() != "run.json" && entry.path().filename() != "lock")
-                files[entry.path().lexically_relative(folder)] = contents(entry.path());
-        return files;
-    };
     const std::string line = d.options + "--npy --video ";
     ASSERT_EQ(render(d.folder / "whole", line + (d.folder / "whole.mp4").string()).code, 0);
     const auto whole = bytes(d.folder / "whole");

@@ -4,6 +4,7 @@
 #include "engine/scene/grid.h"
 #include "engine/scene/scene_points.h"
 #include "tests/inception_reference.h"
+#include "tests/jpeg_file.h"
 #include "tests/json_text.h"
 #include "tests/pointnet_files.h"
 #include "tests/program.h"

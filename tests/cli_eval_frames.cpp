@@ -3,6 +3,7 @@
 #include "engine/format/image.h"
 #include "engine/format/npy.h"
 #include "runtime/base/json.h"
+#include "tests/jpeg_file.h"
 #include "tests/json_text.h"
 #include "tests/png_file.h"
 #include "tests/program.h"

@@ -4,6 +4,7 @@
 #include "engine/format/npy.h"
 #include "engine/scene/grid.h"
 #include "runtime/base/json.h"
+#include "tests/jpeg_file.h"
 #include "tests/json_text.h"
 #include "tests/png_file.h"
 #include "tests/program.h"

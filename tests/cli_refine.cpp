@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/base/host_name.h"
 #include "tests/child_program.h"
+#include "tests/jpeg_file.h"
 #include "tests/json_text.h"
 #include "tests/program.h"
 #include "tests/renderer_folders.h"
@@ -92,7 +93,7 @@ TEST_F(CliRefine, a_run_writes_frames_and_latents_the_same_again_and_others_with
 {
     const auto first = refined("a");
     EXPECT_EQ(first.size(), 2 * kFrames);
-    EXPECT_EQ(read_png_size(folder_ / "a" / "frames" / "000002.png")->width, kWidth);
+    EXPECT_EQ(read_image_size(folder_ / "a" / "frames" / "000002.png")->width, kWidth);
     EXPECT_TRUE(first == refined("b"));
     EXPECT_FALSE(first == refined("c", "--seed 8"));
     EXPECT_FALSE(first == refined("d", "--sampler dpm++2m"));
@@ -282,6 +283,29 @@ TEST_F(CliRefine, frames_can_be_jpegs_and_videos)
     EXPECT_EQ(frame->height, kHeight);
     EXPECT_GT(fs::file_size(folder_ / "out.mp4"), 500u);
     EXPECT_GT(fs::file_size(folder_ / "side.mp4"), fs::file_size(folder_ / "out.mp4"));
+}
+
+TEST_F(CliRefine, buffers_may_have_jpegs_of_one_kind_and_any_threads_write_the_same)
+{
+    for (uint32_t i = 0; i < kFrames; ++i) {
+        const Path png = folder_ / fmt::format("in/color/{:06}.png", i);
+        const auto color = read_png_rgb8(png);
+        ASSERT_TRUE(color);
+        ASSERT_TRUE(
+            write_jpeg_rgb8(folder_ / fmt::format("in/color/{:06}.jpg", i), kWidth, kHeight, color->pixels, 90));
+        if (i != 1)
+            fs::remove(png);
+    }
+    expect_error(refine("out"), 3, "000001.jpg' are one picture in two formats");
+    fs::remove(folder_ / "in/color/000001.png");
+    const auto whole = refined("one", " --threads 1");
+    EXPECT_EQ(whole.size(), 2u * kFrames);
+    EXPECT_TRUE(refined("eight", " --threads 8") == whole);
+    EXPECT_EQ(contents(folder_ / "eight/journal.jsonl"), contents(folder_ / "one/journal.jsonl"));
+    const auto stored = refined("stored", " --png-level 0");
+    EXPECT_GT(stored.at("frames/000001.png").size(), whole.at("frames/000001.png").size());
+    EXPECT_EQ(stored.at("latents/000001.safetensors"), whole.at("latents/000001.safetensors"));
+    EXPECT_TRUE(report("waits").contains("file_wait_seconds"));
 }
 
 TEST_F(CliRefine, straight_from_a_grid_is_render_and_refine)

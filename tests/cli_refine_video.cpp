@@ -79,7 +79,7 @@ TEST_F(CliRefineVideo, a_run_writes_frames_and_latents_the_same_again_and_others
 {
     const Files first = refined("a");
     EXPECT_EQ(first.size(), 2 * kFrames);
-    EXPECT_EQ(read_png_size(folder_ / "a" / "frames" / "000006.png")->width, kWidth);
+    EXPECT_EQ(read_image_size(folder_ / "a" / "frames" / "000006.png")->width, kWidth);
     EXPECT_TRUE(first == refined("b"));
     for (const char* more : {"--seed 8", "--cfg-scale 5", "--cfg-first 2", "--window-overlap 1", "--window 5"})
         EXPECT_FALSE(first == refined("other", std::string("-y ") + more)) << more;

@@ -4,6 +4,7 @@
 #include "engine/format/npy.h"
 #include "engine/format/number_image.h"
 #include "runtime/base/dtype.h"
+#include "tests/jpeg_file.h"
 #include "tests/png_file.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
@@ -326,9 +327,9 @@ TEST(Image, the_size_of_a_png_is_read_without_its_pixels)
 {
     const ScratchFolder folder;
     ASSERT_TRUE(write_png_gray8(folder / "a.png", 7, 5, noise<uint8_t>(35)));
-    EXPECT_EQ(*read_png_size(folder / "a.png"), (ImageSize{7, 5}));
-    EXPECT_TRUE(says(read_png_size(folder.put("b.png", "no picture")), "expected a PNG file"));
-    EXPECT_TRUE(says(read_png_size(folder.put("c.png", contents(folder / "a.png").substr(0, 20))), "not a valid PNG"));
+    EXPECT_EQ(*read_image_size(folder / "a.png"), (ImageSize{7, 5}));
+    EXPECT_TRUE(says(read_image_size(folder.put("b.png", "no picture")), "expected a PNG file"));
+    EXPECT_TRUE(says(read_image_size(folder.put("c.png", contents(folder / "a.png").substr(0, 20))), "not a valid PNG"));
 }
 
 // ---- class numbers

@@ -3,7 +3,6 @@
 #include "engine/deferred/frame_images.h"
 
 #include "engine/camera/lens.h"
-#include "engine/format/image.h"
 
 #include <algorithm>
 #include <array>
@@ -113,17 +112,21 @@ void clear_hidden_depth(FramePixels& pixels)
             pixels.ranges[i] &= 0xffff0000u;
 }
 
-Status write_frame_images(const Path& folder, uint32_t number, const FramePixels& pixels)
+Status make_frame_images(const Path& folder, uint32_t number, const FramePixels& pixels,
+                         const PictureEncoding& encoding, MadeFiles& files)
 {
-    const std::string name = fmt::format("{:06}.png", number);
-    for (const char* kind : {"color", "depth", "normal", "label", "visible"})
-        SR_CHECK(make_folder(folder / kind));
     const uint32_t w = pixels.width, h = pixels.height;
-    SR_CHECK(write_png_rgb8(folder / "color" / name, w, h, color_pixels(pixels)));
-    SR_CHECK(write_png_gray16(folder / "depth" / name, w, h, depth_pixels(pixels)));
-    SR_CHECK(write_png_rgb8(folder / "normal" / name, w, h, normal_pixels(pixels)));
-    SR_CHECK(write_png_gray8(folder / "label" / name, w, h, label_pixels(pixels)));
-    return write_png_gray8(folder / "visible" / name, w, h, visible_pixels(pixels));
+    const int level = encoding.png_level;
+    const auto add = [&](const char* kind, std::string_view extension,
+                         const Result<std::vector<std::byte>>& bytes) -> Status {
+        SR_CHECK(bytes);
+        return files.add(folder / kind / fmt::format("{:06}.{}", number, extension), *bytes);
+    };
+    SR_CHECK(add("color", encoding.color_extension(), encode_color(encoding, {w, h}, color_pixels(pixels))));
+    SR_CHECK(add("depth", "png", encode_png_gray16(w, h, depth_pixels(pixels), level)));
+    SR_CHECK(add("normal", "png", encode_png_rgb8(w, h, normal_pixels(pixels), level)));
+    SR_CHECK(add("label", "png", encode_png_gray8(w, h, label_pixels(pixels), level)));
+    return add("visible", "png", encode_png_gray8(w, h, visible_pixels(pixels), level));
 }
 
 } // namespace semrover

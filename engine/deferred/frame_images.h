@@ -3,8 +3,9 @@
 #pragma once
 
 #include "engine/camera/camera.h"
+#include "engine/format/picture_encoding.h"
 #include "engine/splat/rasterizer.h"
-#include "runtime/base/file.h"
+#include "runtime/base/made_files.h"
 
 namespace semrover {
 
@@ -15,6 +16,8 @@ namespace semrover {
 struct FramePixels {
     uint32_t width = 0, height = 0;
     std::vector<uint32_t> seen, ranges, normals;
+
+    uint64_t bytes() const { return 12 * uint64_t(width) * height; }
 };
 std::vector<uint8_t> color_pixels(const FramePixels& pixels);   // [height, width, 3]
 std::vector<uint16_t> depth_pixels(const FramePixels& pixels);  // [height, width]
@@ -28,7 +31,8 @@ void mark_sky(FramePixels& pixels, const CameraFrame& frame);
 
 void clear_hidden_depth(FramePixels& pixels); // 0 where a pixel is not visible
 
-// FOLDER/{color,depth,normal,label,visible}/NNNNNN.png; folders are made. Errors: bad_input
-Status write_frame_images(const Path& folder, uint32_t number, const FramePixels& pixels);
+// FOLDER/{color,depth,normal,label,visible}/NNNNNN.png, colour as it is encoded. Errors: bad_input
+Status make_frame_images(const Path& folder, uint32_t number, const FramePixels& pixels,
+                         const PictureEncoding& encoding, MadeFiles& files);
 
 } // namespace semrover

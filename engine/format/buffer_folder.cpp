@@ -10,27 +10,31 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 
 namespace semrover {
 
 namespace {
 
+constexpr const char* kExtensions[] = {"png", "jpg"};
+
 // numbers of the pictures in a folder, ascending; other names are not looked at
 std::vector<uint32_t> picture_numbers(const Path& folder)
 {
-    std::vector<uint32_t> numbers;
+    std::set<uint32_t> numbers;
     for (const Path& path : list_files(folder).value_or(std::vector<Path>())) {
         const std::string stem = path.stem().string();
-        if (path.extension() == ".png" && stem.size() == 6 && std::ranges::all_of(stem, ::isdigit))
-            numbers.push_back(uint32_t(std::stoul(stem)));
+        const bool picture =
+            std::ranges::any_of(kExtensions, [&](const char* e) { return path.extension() == std::string(".") + e; });
+        if (picture && stem.size() == 6 && std::ranges::all_of(stem, ::isdigit))
+            numbers.insert(uint32_t(std::stoul(stem)));
     }
-    std::ranges::sort(numbers);
-    return numbers;
+    return {numbers.begin(), numbers.end()};
 }
 
 Status check_size(const Path& path, const ImageSize& expected)
 {
-    SR_TRY(const ImageSize size, read_png_size(path));
+    SR_TRY(const ImageSize size, read_image_size(path));
     if (size != expected)
         return fail(ErrorCode::bad_input, "{} is {} x {} pixels, the first frame of its camera is {} x {}",
                     quote_path(path), size.width, size.height, expected.width, expected.height);
@@ -49,13 +53,16 @@ Result<BufferCamera> open_camera(const Path& folder, std::string name)
         if (numbers[i] != i)
             return fail(ErrorCode::bad_input, "{} is missing: there are frames up to {:06}",
                         quote_path(frame_path(folder, "color", i)), numbers.back());
-    SR_TRY(c.size, read_png_size(frame_path(folder, "color", 0)));
     for (uint32_t i = 0; i < c.frames; ++i) {
+        SR_TRY(const Path color, find_picture(folder, "color", i));
         const Path visible = frame_path(folder, "visible", i);
         if (!is_there(visible))
-            return fail(ErrorCode::bad_input, "{} has no {}: a buffer is color/ and visible/",
-                        quote_path(frame_path(folder, "color", i)), quote_path(visible));
-        SR_CHECK(check_size(frame_path(folder, "color", i), c.size));
+            return fail(ErrorCode::bad_input, "{} has no {}: a buffer is color/ and visible/", quote_path(color),
+                        quote_path(visible));
+        if (i == 0) {
+            SR_TRY(c.size, read_image_size(color));
+        }
+        SR_CHECK(check_size(color, c.size));
         SR_CHECK(check_size(visible, c.size));
     }
     return c;
@@ -66,6 +73,18 @@ Result<BufferCamera> open_camera(const Path& folder, std::string name)
 Path frame_path(const Path& folder, const char* kind, uint32_t number, std::string_view extension)
 {
     return folder / kind / fmt::format("{:06}.{}", number, extension);
+}
+
+Result<Path> find_picture(const Path& folder, const char* kind, uint32_t number)
+{
+    std::vector<Path> found;
+    for (const char* extension : kExtensions)
+        if (Path path = frame_path(folder, kind, number, extension); is_file(path))
+            found.push_back(std::move(path));
+    if (found.size() > 1)
+        return fail(ErrorCode::bad_input, "{} and {} are one picture in two formats: expected one of them",
+                    quote_path(found[0]), quote_path(found[1]));
+    return found.empty() ? frame_path(folder, kind, number) : found[0];
 }
 
 std::string frame_text(const std::string& camera, uint32_t frame)
@@ -138,7 +157,8 @@ Status check_against_path(std::span<const BufferCamera> cameras, const CameraPat
 
 Result<BufferFrame> read_buffer(const BufferCamera& camera, uint32_t frame)
 {
-    SR_TRY(ImageRgb8 color, read_png_rgb8(frame_path(camera.folder, "color", frame)));
+    SR_TRY(const Path color_path, find_picture(camera.folder, "color", frame));
+    SR_TRY(ImageRgb8 color, read_image_rgb8(color_path));
     SR_TRY(const ImageRgb8 visible, read_png_rgb8(frame_path(camera.folder, "visible", frame)));
     for (const ImageRgb8* image : {&std::as_const(color), &visible})
         if (ImageSize{image->width, image->height} != camera.size)
@@ -183,7 +203,8 @@ Result<uint64_t> hash_pictures(const BufferCamera& camera, std::initializer_list
     Hash hash;
     for (uint32_t i = first; i <= last; ++i)
         for (const char* kind : kinds) {
-            SR_TRY(const MappedFile file, MappedFile::open(frame_path(camera.folder, kind, i)));
+            SR_TRY(const Path path, find_picture(camera.folder, kind, i));
+            SR_TRY(const MappedFile file, MappedFile::open(path));
             hash.add(file.bytes());
         }
     return hash.value();

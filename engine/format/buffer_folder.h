@@ -10,7 +10,8 @@
 
 namespace semrover {
 
-// the splat buffers of one camera: FOLDER/{color,visible}/000000.png and so on, as `render` writes them. The colour is
+// the splat buffers of one camera: FOLDER/{color,visible}/000000.png and so on, as `render` writes them; colours may be
+// JPEGs, 000000.jpg. The colour is
 // over the background that `render` was given, black by default; where visible is 0 the renderer is not to trust it.
 struct BufferCamera {
     std::string name; // empty: the folder's own pictures
@@ -26,10 +27,12 @@ struct BufferFrame {
 };
 
 Path frame_path(const Path& folder, const char* kind, uint32_t number, std::string_view extension = "png");
+// the one that is there of the formats a picture may have, else its path as a PNG. bad_input: it is there twice
+Result<Path> find_picture(const Path& folder, const char* kind, uint32_t number);
 
 // the cameras of a folder or of a shard set: itself when it has color/, else its sub-folders that have, by name.
-// Errors: bad_input for a gap in the numbers, for colour without visibility, for pictures of another size than the
-// first, and as open_if_shards()
+// Errors: bad_input for a gap in the numbers, for a picture in two formats, for colour without visibility, for pictures
+// of another size than the first, and as open_if_shards()
 Result<std::vector<BufferCamera>> open_buffers(const Path& folder);
 
 // the cameras of a path, before their buffers exist

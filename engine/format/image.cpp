@@ -18,7 +18,6 @@ static_assert(std::endian::native == std::endian::little, "16-bit rows are swapp
 
 constexpr uint64_t kMaxPngBytes = 1u << 30;
 constexpr uint64_t kMaxInflation = 1032; // deflate: 258 bytes from 2 bits at best
-constexpr int kCompressionLevel = 4;     // 616x424 noisy colour: 46 ms against 69 at level 6, the same size
 
 struct Format {
     int color_type;
@@ -42,7 +41,7 @@ struct Png {
     bool writing = false;
     char message[200] = "libpng: out of memory";
 
-    std::vector<uint8_t> output;      // writing
+    std::vector<std::byte> output;    // writing
     std::span<const std::byte> input; // reading: what is left
     uint8_t* pixels = nullptr;        // reading: where rows go
 
@@ -72,7 +71,8 @@ void on_write(png_structp png, png_bytep data, size_t size)
     auto* self = static_cast<Png*>(png_get_io_ptr(png));
     bool full = false;
     try {
-        self->output.insert(self->output.end(), data, data + size);
+        const auto* bytes = reinterpret_cast<const std::byte*>(data);
+        self->output.insert(self->output.end(), bytes, bytes + size);
     } catch (const std::bad_alloc&) {
         full = true; // the jump must not leave a handler
     }
@@ -91,7 +91,7 @@ void on_read(png_structp png, png_bytep data, size_t size)
     self->input = self->input.subspan(size);
 }
 
-bool encode(Png& p, const Format& format, uint32_t width, uint32_t height, const uint8_t* pixels)
+bool encode(Png& p, const Format& format, uint32_t width, uint32_t height, const uint8_t* pixels, int level)
 {
     p.writing = true;
     p.png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &p, on_error, on_warning);
@@ -103,7 +103,7 @@ bool encode(Png& p, const Format& format, uint32_t width, uint32_t height, const
         return false;
     png_set_write_fn(p.png, &p, on_write, on_flush);
     png_set_user_limits(p.png, kMaxImageSide, kMaxImageSide);
-    png_set_compression_level(p.png, kCompressionLevel);
+    png_set_compression_level(p.png, level);
     png_set_IHDR(p.png, p.info, width, height, format.bit_depth, format.color_type, PNG_INTERLACE_NONE,
                  PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
     png_write_info(p.png, p.info);
@@ -116,8 +116,8 @@ bool encode(Png& p, const Format& format, uint32_t width, uint32_t height, const
 }
 
 // the bytes of a PNG file
-Result<std::vector<uint8_t>> encode_png(std::string_view where, const Format& format, uint32_t width, uint32_t height,
-                                        std::span<const std::byte> pixels)
+Result<std::vector<std::byte>> encode_png(std::string_view where, const Format& format, uint32_t width, uint32_t height,
+                                          std::span<const std::byte> pixels, int level = kPngLevel)
 {
     if (width == 0 || height == 0 || width > kMaxImageSide || height > kMaxImageSide)
         return fail(ErrorCode::bad_input, "cannot write {}: an image of {} x {} pixels, expected 1 to {} each way",
@@ -125,7 +125,7 @@ Result<std::vector<uint8_t>> encode_png(std::string_view where, const Format& fo
     SR_ASSERT(pixels.size() == format.row_bytes(width) * height, "{} x {} pixels given with {} bytes", width, height,
               pixels.size());
     Png p;
-    if (!encode(p, format, width, height, reinterpret_cast<const uint8_t*>(pixels.data())))
+    if (!encode(p, format, width, height, reinterpret_cast<const uint8_t*>(pixels.data()), level))
         return fail(ErrorCode::out_of_memory, "cannot write {}: {}", where, p.message);
     return std::move(p.output);
 }
@@ -133,8 +133,8 @@ Result<std::vector<uint8_t>> encode_png(std::string_view where, const Format& fo
 Status write_png(const Path& path, const Format& format, uint32_t width, uint32_t height,
                  std::span<const std::byte> pixels)
 {
-    SR_TRY(const std::vector<uint8_t> file, encode_png(quote_path(path), format, width, height, pixels));
-    return write_file_atomically(path, std::as_bytes(std::span(file)));
+    SR_TRY(const std::vector<std::byte> file, encode_png(quote_path(path), format, width, height, pixels));
+    return write_file_atomically(path, file);
 }
 
 bool read_header(Png& p)
@@ -278,6 +278,11 @@ void take_numbers(const std::vector<uint8_t>& rows, const Format& format, PngNum
     }
 }
 
+bool starts_with(std::span<const std::byte> file, std::initializer_list<uint8_t> magic)
+{
+    return file.size() >= magic.size() && std::memcmp(file.data(), magic.begin(), magic.size()) == 0;
+}
+
 // whether a PNG can have transparent pixels: by its colour type, or a tRNS chunk in front of the pixels
 bool may_have_alpha(std::span<const std::byte> file)
 {
@@ -322,11 +327,22 @@ Result<ImageRgb8> read_png_rgb8(const Path& path)
     return decode_png_rgb8(file, quote_path(path), kMaxImagePixels);
 }
 
-Result<std::vector<std::byte>> encode_png_rgb8(uint32_t width, uint32_t height, std::span<const uint8_t> pixels)
+Result<std::vector<std::byte>> encode_png_rgb8(uint32_t width, uint32_t height, std::span<const uint8_t> pixels,
+                                               int level)
 {
-    SR_TRY(const std::vector<uint8_t> file, encode_png("a PNG", kRgb8, width, height, std::as_bytes(pixels)));
-    const auto bytes = std::as_bytes(std::span(file));
-    return std::vector<std::byte>(bytes.begin(), bytes.end());
+    return encode_png("a PNG", kRgb8, width, height, std::as_bytes(pixels), level);
+}
+
+Result<std::vector<std::byte>> encode_png_gray8(uint32_t width, uint32_t height, std::span<const uint8_t> pixels,
+                                                int level)
+{
+    return encode_png("a PNG", kGray8, width, height, std::as_bytes(pixels), level);
+}
+
+Result<std::vector<std::byte>> encode_png_gray16(uint32_t width, uint32_t height, std::span<const uint16_t> pixels,
+                                                 int level)
+{
+    return encode_png("a PNG", kGray16, width, height, std::as_bytes(pixels), level);
 }
 
 Status check_pixels(ImageSize size, uint64_t max_pixels, std::string_view where)
@@ -339,12 +355,9 @@ Status check_pixels(ImageSize size, uint64_t max_pixels, std::string_view where)
 
 Result<ImageRgb8> decode_image_rgb8(std::span<const std::byte> file, std::string_view where, uint64_t max_pixels)
 {
-    const auto starts_with = [&](std::initializer_list<uint8_t> magic) {
-        return file.size() >= magic.size() && std::memcmp(file.data(), magic.begin(), magic.size()) == 0;
-    };
-    if (starts_with({0x89, 'P', 'N', 'G'}))
+    if (starts_with(file, {0x89, 'P', 'N', 'G'}))
         return decode_png_rgb8(file, where, max_pixels);
-    if (starts_with({0xff, 0xd8, 0xff}))
+    if (starts_with(file, {0xff, 0xd8, 0xff}))
         return decode_jpeg_rgb8(file, where, max_pixels);
     return fail(ErrorCode::bad_input, "{}: expected a PNG or JPEG image, found something else", where);
 }
@@ -390,11 +403,13 @@ Result<ImageRgb8> read_image_rgb8(const Path& path)
     return decode_image_rgb8(file, quote_path(path));
 }
 
-Result<ImageSize> read_png_size(const Path& path)
+Result<ImageSize> read_image_size(const Path& path)
 {
     SR_TRY(const MappedFile file, MappedFile::open(path));
-    SR_TRY(const PngInfo info, png_info(file.bytes(), quote_path(path)));
-    return info.size;
+    const std::string where = quote_path(path);
+    if (starts_with(file.bytes(), {0xff, 0xd8, 0xff}))
+        return jpeg_size(file.bytes(), where);
+    return png_info(file.bytes(), where).map([](const PngInfo& info) { return info.size; });
 }
 
 Result<PngInfo> png_info(std::span<const std::byte> file, std::string_view where)

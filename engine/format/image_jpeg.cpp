@@ -88,16 +88,15 @@ bool encode_rows(Encoder& e, uint32_t width, uint32_t height, const uint8_t* pix
     return true;
 }
 
-Status encode(Encoder& e, std::string_view where, uint32_t width, uint32_t height, std::span<const uint8_t> pixels,
-              int quality)
+Status encode(Encoder& e, uint32_t width, uint32_t height, std::span<const uint8_t> pixels, int quality)
 {
     SR_ASSERT(pixels.size() == size_t(width) * height * 3 && quality >= 1 && quality <= 100,
               "{} x {} pixels given with {} bytes, quality {}", width, height, pixels.size(), quality);
     if (width == 0 || height == 0 || width > kMaxImageSide || height > kMaxImageSide)
-        return fail(ErrorCode::bad_input, "cannot write {}: an image of {} x {} pixels, expected 1 to {} each way",
-                    where, width, height, kMaxImageSide);
+        return fail(ErrorCode::bad_input, "cannot write a JPEG: an image of {} x {} pixels, expected 1 to {} each way",
+                    width, height, kMaxImageSide);
     if (!encode_rows(e, width, height, pixels.data(), quality))
-        return fail(ErrorCode::out_of_memory, "cannot write {}: {}", where, printable(e.errors.message));
+        return fail(ErrorCode::out_of_memory, "cannot write a JPEG: {}", printable(e.errors.message));
     return {};
 }
 
@@ -120,6 +119,14 @@ bool read_header(Decoder& d, std::span<const std::byte> file)
     jpeg_mem_src(&d.info, reinterpret_cast<const unsigned char*>(file.data()), static_cast<unsigned long>(file.size()));
     jpeg_read_header(&d.info, TRUE);
     return true;
+}
+
+Status open_jpeg(Decoder& d, std::span<const std::byte> file, std::string_view where)
+{
+    if (file.empty() || !read_header(d, file))
+        return fail(ErrorCode::bad_input, "{}: not a valid JPEG: {}", where,
+                    file.empty() ? "the file is empty" : printable(d.errors.message));
+    return {};
 }
 
 void check_scans(j_common_ptr info)
@@ -186,18 +193,11 @@ bool read_rows(Decoder& d, std::vector<uint8_t>& pixels)
 
 } // namespace
 
-Status write_jpeg_rgb8(const Path& path, uint32_t width, uint32_t height, std::span<const uint8_t> pixels, int quality)
-{
-    Encoder e;
-    SR_CHECK(encode(e, quote_path(path), width, height, pixels, quality));
-    return write_file_atomically(path, e.file());
-}
-
 Result<std::vector<std::byte>> encode_jpeg_rgb8(uint32_t width, uint32_t height, std::span<const uint8_t> pixels,
                                                 int quality)
 {
     Encoder e;
-    SR_CHECK(encode(e, "a JPEG", width, height, pixels, quality));
+    SR_CHECK(encode(e, width, height, pixels, quality));
     return std::vector<std::byte>(e.file().begin(), e.file().end());
 }
 
@@ -207,12 +207,17 @@ Result<ImageRgb8> read_jpeg_rgb8(const Path& path)
     return decode_jpeg_rgb8(file, quote_path(path));
 }
 
+Result<ImageSize> jpeg_size(std::span<const std::byte> file, std::string_view where)
+{
+    Decoder d;
+    SR_CHECK(open_jpeg(d, file, where));
+    return ImageSize{d.info.image_width, d.info.image_height};
+}
+
 Result<ImageRgb8> decode_jpeg_rgb8(std::span<const std::byte> file, std::string_view where, uint64_t max_pixels)
 {
     Decoder d;
-    if (file.empty() || !read_header(d, file))
-        return fail(ErrorCode::bad_input, "{}: not a valid JPEG: {}", where,
-                    file.empty() ? "the file is empty" : printable(d.errors.message));
+    SR_CHECK(open_jpeg(d, file, where));
     const uint64_t pixels = uint64_t(d.info.image_width) * d.info.image_height;
     if (d.info.image_width > kMaxImageSide || d.info.image_height > kMaxImageSide ||
         pixels / kMaxExpansion > file.size())

@@ -171,11 +171,8 @@ Result<std::optional<ImageSize>> picture_size(const Json& frame, TransformsSourc
     if (!path)
         return std::optional<ImageSize>();
     const auto [at, added] = source.sizes.try_emplace(*path);
-    if (added && path->extension() == ".png") {
-        SR_TRY(at->second, read_png_size(*path));
-    } else if (added) {
-        SR_TRY(const ImageRgb8 image, read_image_rgb8(*path));
-        at->second = {image.width, image.height};
+    if (added) {
+        SR_TRY(at->second, read_image_size(*path));
     }
     return std::optional(at->second);
 }
@@ -438,14 +435,14 @@ Result<CameraPath> parse_transforms(const Json& file, std::string_view name, con
     return cameras;
 }
 
-std::string picture_name(const std::string& camera, std::string_view kind, uint32_t number)
+std::string picture_name(const std::string& camera, std::string_view kind, uint32_t number, std::string_view extension)
 {
-    return fmt::format("{}{}{}/{:06}.png", camera, camera.empty() ? "" : "/", kind, number);
+    return fmt::format("{}{}{}/{:06}.{}", camera, camera.empty() ? "" : "/", kind, number, extension);
 }
 
-PictureNames rendered_pictures(const std::string& camera, uint32_t number)
+PictureNames rendered_pictures(const std::string& camera, uint32_t number, const PictureEncoding& encoding)
 {
-    return {picture_name(camera, "color", number), picture_name(camera, "depth", number),
+    return {picture_name(camera, "color", number, encoding.color_extension()), picture_name(camera, "depth", number),
             picture_name(camera, "label", number)};
 }
 

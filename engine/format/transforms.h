@@ -3,6 +3,7 @@
 #pragma once
 
 #include "engine/camera/rig.h"
+#include "engine/format/picture_encoding.h"
 #include "runtime/base/json.h"
 
 #include <functional>
@@ -37,7 +38,8 @@ Result<CameraPath> parse_transforms(const Json& file, std::string_view name, con
                                     const Path& folder = {});
 
 // [CAMERA/]KIND/NNNNNN.png, as `render` writes them
-std::string picture_name(const std::string& camera, std::string_view kind, uint32_t number);
+std::string picture_name(const std::string& camera, std::string_view kind, uint32_t number,
+                         std::string_view extension = "png");
 
 // What lies beside a transforms.json, from its folder on.
 struct PictureNames {
@@ -49,7 +51,7 @@ struct TransformsFiles {
     std::string points; // a .ply in the path's world; empty: none
 };
 // The names that `render` gives to pictures.
-PictureNames rendered_pictures(const std::string& camera, uint32_t number);
+PictureNames rendered_pictures(const std::string& camera, uint32_t number, const PictureEncoding& encoding = {});
 
 // Intrinsics are at the top where all frames share them, else in every frame: nerfstudio takes what is at the top for
 // all frames. depth_unit_scale_factor is 0.001: depth pictures hold millimetres. `rig`, our addition, has the sensors

@@ -9,6 +9,11 @@
 
 namespace semrover {
 
+inline double seconds_since(std::chrono::steady_clock::time_point start)
+{
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
 // what a submit of a job, or another piece of work of one kind, takes
 class SubmitCost {
   public:

@@ -19,6 +19,8 @@ namespace semrover {
 
 namespace {
 
+constexpr uint64_t kFloatsMore = 5; // a SplatImage beside FramePixels
+
 // straight down from above the middle, x to the right in the picture, with a narrow view so that heights hardly shift
 CameraFrame overview_camera(const Bounds& b, const ImageSize& size)
 {
@@ -85,6 +87,8 @@ class DrawingJob : public Job {
                            {"splats", scene_.size()},
                            {"skipped", scene_.skipped()},
                            {"empty_frames", empty_ ? empty_->count() : 0},
+                           {"seconds", seconds_since(start_)},
+                           {"file_wait_seconds", out_->file_wait_seconds()},
                            {"peak_device_bytes", device_.peak_bytes()}};
         SR_CHECK(store_->finish(results));
         return results;
@@ -95,12 +99,13 @@ class DrawingJob : public Job {
     Path kept_in() const override { return o_.folder; }
 
   private:
-    // frames that an earlier start has drawn
+    // frames that an earlier start has drawn; of a JPEG the colours are not known any more
     void find_whole()
     {
         std::map<std::string, uint32_t> counts;
+        const bool draw_all = o_.encoding.jpeg && o_.picture;
         for (const CameraFrame& f : o_.path.frames)
-            whole_.push_back(store_->has(f.camera, counts[f.camera]++));
+            whole_.push_back(store_->has(f.camera, counts[f.camera]++) && !draw_all);
         before_ = size_t(std::ranges::count(whole_, true));
         top_left_ = o_.top.width && !store_->has_top();
     }
@@ -155,7 +160,8 @@ class DrawingJob : public Job {
             empty_->add(nothing);
             if (!o_.picture)
                 continue;
-            SR_TRY(const ImageRgb8 color, read_png_rgb8(frame_path(store_->folder(frame.camera), "color", number)));
+            SR_TRY(const Path path, find_picture(store_->folder(frame.camera), "color", number));
+            SR_TRY(const ImageRgb8 color, read_image_rgb8(path));
             SR_CHECK(o_.picture(frame, color.pixels));
         }
         return {};
@@ -164,19 +170,21 @@ class DrawingJob : public Job {
     {
         const ImageSize size{frame.intrinsics.width, frame.intrinsics.height};
         const uint32_t number = counts_[frame.camera]++;
+        std::shared_ptr<const SplatImage> floats;
         if (o_.floats) {
-            SR_TRY(const SplatImage image, floats_.image(frame));
-            SR_CHECK(write_float_images(store_->folder(frame.camera), number, image));
+            SR_TRY(SplatImage image, floats_.image(frame));
+            floats = std::make_shared<const SplatImage>(std::move(image));
         }
-        return out_->read(slots, size, [this, frame, number](FramePixels pixels) -> Status {
+        return out_->read(slots, size, [this, frame, number, floats](FramePixels pixels) -> Status {
             empty_->add(sees_nothing(pixels));
             if (o_.visible_depth)
                 clear_hidden_depth(pixels);
             if (o_.picture)
                 SR_CHECK(o_.picture(frame, color_pixels(pixels)));
-            return out_->write([this, frame, number, pixels = std::move(pixels)]() mutable {
+            const uint64_t bytes = pixels.bytes() * (floats ? kFloatsMore : 1);
+            return out_->write(bytes, [this, frame, number, floats, pixels = std::move(pixels)]() mutable {
                 mark_sky(pixels, frame);
-                return store_->save(frame.camera, number, pixels);
+                return store_->make(frame.camera, number, pixels, floats.get());
             });
         });
     }
@@ -190,7 +198,8 @@ class DrawingJob : public Job {
         const CameraFrame camera = overview_camera(bounds(), o_.top);
         return drawing_.draw({&camera, 1}, [this](const CameraFrame&, const SplatPixelSlots& slots) {
             return out_->read(slots, o_.top, [this](const FramePixels& pixels) {
-                return out_->write([this, color = color_pixels(pixels)] { return store_->save_top(o_.top, color); });
+                return out_->write(pixels.bytes(),
+                                   [this, color = color_pixels(pixels)] { return store_->make_top(o_.top, color); });
             });
         });
     }
@@ -202,6 +211,7 @@ class DrawingJob : public Job {
     PathDrawing drawing_;
     PathDrawing floats_; // what files of 8 and 16 bits round away
     SubmitCost cost_;
+    std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
     std::optional<EmptyFrames> empty_;       // of a path
     std::map<std::string, uint32_t> counts_; // frames so far, per camera
     std::vector<bool> whole_;                // of each frame of the path
@@ -216,16 +226,18 @@ Json drawing_settings(const DrawingOptions& o, const Device& device)
 {
     const auto* grid = std::get_if<VoxelGrid>(&o.scene);
     const uint64_t scene = grid ? hash_grid(*grid) : hash_splats(std::get<Splats>(o.scene));
-    return {{"command", "render"},
-            {"version", kVersion},
-            {"device", device.name()},
-            {"driver", device.driver()},
-            {"scene", hash_text(scene)},
-            {"path", hash_text(hash_cameras(o.path))},
-            {"drive", drawing_json(o.draw)},
-            {"semantic", o.draw.semantic},
-            {"visible_depth", o.visible_depth},
-            {"top", {o.top.width, o.top.height}}};
+    Json settings{{"command", "render"},
+                  {"version", kVersion},
+                  {"device", device.name()},
+                  {"driver", device.driver()},
+                  {"scene", hash_text(scene)},
+                  {"path", hash_text(hash_cameras(o.path))},
+                  {"drive", drawing_json(o.draw)},
+                  {"semantic", o.draw.semantic},
+                  {"visible_depth", o.visible_depth},
+                  {"top", {o.top.width, o.top.height}}};
+    settings.update(encoding_json(o.encoding));
+    return settings;
 }
 
 Status write_points(const Path& path, const DrawingOptions& o)
@@ -258,8 +270,8 @@ Result<std::unique_ptr<Job>> begin_drawing(Device& device, DrawingOptions option
     SR_TRY(SplatScene scene, load_scene(device, o));
     if (scene.skipped() && callbacks.warning)
         callbacks.warning(fmt::format("{} of {} splats are degenerate and not drawn", scene.skipped(), scene.size()));
-    SR_TRY(auto out, Outgoing::create(device, largest_read(o)));
-    const DrawnFiles files{.floats = o.floats, .top = o.top.width > 0, .points = o.points};
+    SR_TRY(auto out, Outgoing::create(device, largest_read(o), o.threads));
+    const DrawnFiles files{.floats = o.floats, .top = o.top.width > 0, .points = o.points, .encoding = o.encoding};
     SR_TRY(auto store, DrawingStore::open(o.folder, settings, o.path, files, o.replace));
     if (!store->run().results()) {
         if (!o.path.frames.empty())

@@ -21,6 +21,8 @@ struct DrawingOptions {
                           // transforms.json of the path
     bool replace = false; // what is there
     DrawOptions draw;
+    PictureEncoding encoding;
+    uint32_t threads = 0;       // that make files; 0: usable_threads()
     bool floats = false;        // also {depth_expected,depth_median,alpha}/000000.npy
     bool points = false;        // also points.ply, the scene's points or splats
     bool visible_depth = false; // depth is 0 where a pixel is not visible
@@ -35,9 +37,10 @@ Status check_drawing_outputs(const DrawingOptions& options);
 
 // Stage "render" counts frames; a step is a moment of the path at least. What is done is in the folder: begun again
 // after a cancel or a kill, the job draws what is missing, to the same bytes; one that is done draws nothing. Figures:
-// output, frames, splats, skipped, peak_device_bytes, empty_frames, which see nothing: a warning, and bad_input when
-// all frames are drawn and none sees anything. Errors: as check_drawing_outputs; bad_input for a grid without points,
-// and for another drawing in the folder; out_of_memory; device errors
+// output, frames, splats, skipped, peak_device_bytes, seconds and, of them, file_wait_seconds, in which nothing could
+// be drawn as files waited to be made; empty_frames, which see nothing: a warning, and bad_input when all frames are
+// drawn and none sees anything. Errors: as check_drawing_outputs; bad_input for a grid without points, and for another
+// drawing in the folder; out_of_memory; device errors
 Result<std::unique_ptr<Job>> begin_drawing(Device& device, DrawingOptions options, const JobCallbacks& callbacks);
 
 } // namespace semrover

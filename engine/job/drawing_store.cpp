@@ -65,20 +65,18 @@ std::string piece_name(const std::string& camera, uint32_t number)
     return fmt::format("{}{}{:06}", camera, camera.empty() ? "" : "/", number);
 }
 
-} // namespace
-
-Status write_float_images(const Path& folder, uint32_t number, const SplatImage& image)
+Status make_float_images(const Path& folder, uint32_t number, const SplatImage& image, MadeFiles& files)
 {
     const std::vector<float>* const planes[] = {&image.depth_expected, &image.depth_median, &image.alpha};
     for (size_t i = 0; i < std::size(planes); ++i) {
-        SR_CHECK(make_folder(folder / kArrays[i]));
         const auto bytes = std::as_bytes(std::span(*planes[i]));
-        SR_CHECK(
-            write_file_atomically(folder / kArrays[i] / fmt::format("{:06}.npy", number),
-                                  encode_npy({DType::f32, {image.height, image.width}, {bytes.begin(), bytes.end()}})));
+        SR_CHECK(files.add(frame_path(folder, kArrays[i], number, "npy"),
+                           encode_npy({DType::f32, {image.height, image.width}, {bytes.begin(), bytes.end()}})));
     }
     return {};
 }
+
+} // namespace
 
 Status DrawingStore::check(const Path& folder, const CameraPath& path, bool replace)
 {
@@ -122,8 +120,10 @@ std::vector<Path> DrawingStore::files_of(const std::string& piece) const
         return {run_.path() / kTop};
     const Path name = run_.path() / piece;
     std::vector<Path> files;
-    for (const char* kind : kPictures)
-        files.push_back(name.parent_path() / kind / (name.filename().string() + ".png"));
+    for (const std::string kind : kPictures) {
+        const std::string_view extension = kind == "color" ? files_.encoding.color_extension() : "png";
+        files.push_back(name.parent_path() / kind / fmt::format("{}.{}", name.filename().string(), extension));
+    }
     for (const char* kind : kArrays)
         if (files_.floats)
             files.push_back(name.parent_path() / kind / (name.filename().string() + ".npy"));
@@ -148,21 +148,31 @@ Result<bool> DrawingStore::saw_nothing(const std::string& camera, uint32_t numbe
     return std::ranges::all_of(depth.pixels, is_zero) && std::ranges::all_of(visible.pixels, is_zero);
 }
 
-Status DrawingStore::save(const std::string& camera, uint32_t number, const FramePixels& pixels)
+Result<FileQueue::Commit> DrawingStore::make(const std::string& camera, uint32_t number, const FramePixels& pixels,
+                                             const SplatImage* floats)
 {
-    SR_CHECK(write_frame_images(folder(camera), number, pixels));
-    return record_.add(piece_name(camera, number));
+    const auto files = std::make_shared<MadeFiles>();
+    SR_CHECK(make_frame_images(folder(camera), number, pixels, files_.encoding, *files));
+    if (floats)
+        SR_CHECK(make_float_images(folder(camera), number, *floats, *files));
+    return [this, piece = piece_name(camera, number), files] { return record_.add(piece, *files); };
 }
 
-Status DrawingStore::save_top(const ImageSize& size, std::span<const uint8_t> color)
+Result<FileQueue::Commit> DrawingStore::make_top(const ImageSize& size, std::span<const uint8_t> color)
 {
-    SR_CHECK(write_png_rgb8(run_.path() / kTop, size.width, size.height, color));
-    return record_.add(kTop);
+    const auto files = std::make_shared<MadeFiles>();
+    SR_TRY(const std::vector<std::byte> png,
+           encode_png_rgb8(size.width, size.height, color, files_.encoding.png_level));
+    SR_CHECK(files->add(run_.path() / kTop, png));
+    return [this, files] { return record_.add(kTop, *files); };
 }
 
 Status DrawingStore::write_cameras(const CameraPath& path) const
 {
-    return write_transforms(run_.path() / kCameras, path, {rendered_pictures, files_.points ? kPoints : ""});
+    const auto pictures = [this](const std::string& camera, uint32_t number) {
+        return rendered_pictures(camera, number, files_.encoding);
+    };
+    return write_transforms(run_.path() / kCameras, path, {pictures, files_.points ? kPoints : ""});
 }
 
 } // namespace semrover

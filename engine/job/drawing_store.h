@@ -5,20 +5,20 @@
 #include "engine/camera/camera.h"
 #include "engine/camera/image_size.h"
 #include "engine/deferred/frame_images.h"
+#include "engine/job/file_queue.h"
 #include "engine/job/piece_record.h"
 
 namespace semrover {
 
 // what a drawing writes, beside the path's pictures
 struct DrawnFiles {
-    bool floats = false; // {depth_expected,depth_median,alpha}/000000.npy
+    // {depth_expected,depth_median,alpha}/000000.npy of float32, [height, width]: depths are metres, measured as
+    // SplatCamera::radial_depth says, 0 where nothing is drawn (docs/formats.md §6)
+    bool floats = false;
     bool top = false;    // top.png
     bool points = false; // points.ply
+    PictureEncoding encoding = {};
 };
-
-// Of a frame, as NumPy's arrays of float32, [height, width]: FOLDER/{depth_expected,depth_median,alpha}/NNNNNN.npy.
-// Depths are metres, measured as SplatCamera::radial_depth says, 0 where nothing is drawn (docs/formats.md §6)
-Status write_float_images(const Path& folder, uint32_t number, const SplatImage& image);
 
 // The pictures of a drawing in its folder, and which of them are done. A piece is a frame, with all its files.
 class DrawingStore {
@@ -36,9 +36,11 @@ class DrawingStore {
     bool has_top() const;
     // whether the pictures of a frame that is there show nothing of the scene
     Result<bool> saw_nothing(const std::string& camera, uint32_t number) const;
-    // on another thread than has(), or after the last call of it
-    Status save(const std::string& camera, uint32_t number, const FramePixels& pixels);
-    Status save_top(const ImageSize& size, std::span<const uint8_t> color);
+    // On any thread; what they return is called on another one than has(), or after the last call of it.
+    // floats: of the frame, where DrawnFiles has them
+    Result<FileQueue::Commit> make(const std::string& camera, uint32_t number, const FramePixels& pixels,
+                                   const SplatImage* floats);
+    Result<FileQueue::Commit> make_top(const ImageSize& size, std::span<const uint8_t> color);
     // transforms.json of the path
     Status write_cameras(const CameraPath& path) const;
     Status finish(const Json& results) { return run_.finish(results); }

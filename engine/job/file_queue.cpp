@@ -2,9 +2,31 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/file_queue.h"
 
+#include "engine/job/budget_meter.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cstdlib>
+#include <sched.h>
+#include <string_view>
+
 namespace semrover {
 
-FileQueue::FileQueue(size_t room) : room_(room), thread_([this] { work(); }) {}
+namespace {
+
+constexpr uint32_t kMostThreads = 16;
+constexpr size_t kRoom = 8; // tasks that wait, beside two a thread
+constexpr uint64_t kMostBytes = 512ull << 20;
+
+} // namespace
+
+FileQueue::FileQueue(uint32_t threads)
+{
+    const uint32_t count = threads ? threads : usable_threads();
+    room_ = kRoom + 2 * (count - 1);
+    for (uint32_t i = 0; i < count; ++i)
+        threads_.emplace_back([this] { work(); });
+}
 
 FileQueue::~FileQueue()
 {
@@ -13,43 +35,92 @@ FileQueue::~FileQueue()
         closed_ = true;
     }
     changed_.notify_all();
-    thread_.join();
+    for (std::thread& thread : threads_)
+        thread.join();
 }
 
-Status FileQueue::push(std::function<Status()> write)
+template <typename F>
+void FileQueue::wait(Lock& lock, F until)
 {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [this] { return writes_.size() < room_; });
+    const auto start = std::chrono::steady_clock::now();
+    changed_.wait(lock, until);
+    waited_ += seconds_since(start);
+}
+
+Status FileQueue::push(uint64_t bytes, Make make)
+{
+    Lock lock(mutex_);
+    wait(lock, [&] { return tasks_.empty() || (tasks_.size() < room_ && bytes_ + bytes <= kMostBytes); });
     SR_CHECK(status_);
-    writes_.push_back(std::move(write));
+    tasks_.push_back({bytes, std::move(make)});
+    bytes_ += bytes;
     changed_.notify_all();
     return {};
 }
 
 Status FileQueue::drain()
 {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [this] { return writes_.empty(); });
+    Lock lock(mutex_);
+    wait(lock, [this] { return tasks_.empty(); });
     return status_;
 }
 
 void FileQueue::work()
 {
-    std::unique_lock lock(mutex_);
+    Lock lock(mutex_);
     for (;;) {
-        changed_.wait(lock, [this] { return closed_ || !writes_.empty(); });
-        if (writes_.empty())
+        changed_.wait(lock, [this] { return may_commit() || begun_ < tasks_.size() || (closed_ && tasks_.empty()); });
+        if (may_commit())
+            commit_first(lock);
+        else if (begun_ < tasks_.size())
+            make_next(lock);
+        else
             return;
-        if (status_) {
-            const auto& write = writes_.front(); // note: push() at the back leaves it where it is
-            lock.unlock();
-            Status status = write();
-            lock.lock();
-            status_ = std::move(status);
-        }
-        writes_.pop_front();
-        changed_.notify_all();
     }
+}
+
+void FileQueue::make_next(Lock& lock)
+{
+    Task& task = tasks_[begun_++];
+    Result<Commit> made = Commit();
+    if (status_) {
+        lock.unlock();
+        made = task.make();
+        task.make = {}; // with what it held
+        lock.lock();
+    }
+    task.made = std::move(made);
+    changed_.notify_all();
+}
+
+void FileQueue::commit_first(Lock& lock)
+{
+    committing_ = true;
+    Task& task = tasks_.front();
+    if (status_) {
+        lock.unlock();
+        Status done = *task.made ? (**task.made)() : tl::make_unexpected(task.made->error());
+        lock.lock();
+        status_ = std::move(done);
+    }
+    bytes_ -= task.bytes;
+    tasks_.pop_front();
+    --begun_;
+    committing_ = false;
+    changed_.notify_all();
+}
+
+uint32_t usable_threads()
+{
+    cpu_set_t set;
+    uint32_t count = ::sched_getaffinity(0, sizeof set, &set) == 0 ? uint32_t(CPU_COUNT(&set)) : 1;
+    if (const char* text = std::getenv("SLURM_CPUS_PER_TASK")) {
+        const std::string_view given(text);
+        uint32_t task = 0;
+        std::from_chars(given.data(), given.data() + given.size(), task);
+        count = task ? std::min(count, task) : count;
+    }
+    return std::clamp(count, 1u, kMostThreads);
 }
 
 } // namespace semrover

@@ -8,31 +8,57 @@
 #include <deque>
 #include <functional>
 #include <mutex>
+#include <optional>
 #include <thread>
+#include <vector>
 
 namespace semrover {
 
-// Writes files on a thread of its own, in the order in which they are handed over, while the caller makes the next
-// ones. After an error nothing more is written, so what a journal names is there with all that comes before it.
+// Makes files on threads of its own, several at a time, while the caller makes what the next ones hold; they appear in
+// the order in which they were handed over. After an error nothing more appears, so what a journal names is there with
+// all that comes before it.
 class FileQueue {
   public:
-    explicit FileQueue(size_t room); // writes that may wait at a time
-    ~FileQueue();                    // after everything that was handed over
+    using Commit = std::function<Status()>;       // lets a file appear; one at a time, in order
+    using Make = std::function<Result<Commit>()>; // on any thread
 
-    // waits for room. Errors: of a write before this one
-    Status push(std::function<Status()> write);
-    Status drain(); // until all is written; likewise
+    // 0: usable_threads()
+    explicit FileQueue(uint32_t threads);
+    ~FileQueue(); // after everything that was handed over
+
+    // bytes: of host memory that `make` holds, what waits is limited by. Waits for room. Errors: of one before this one
+    Status push(uint64_t bytes, Make make);
+    Status drain();                                 // until all has appeared; likewise
+    double wait_seconds() const { return waited_; } // that the caller of both has spent in them
 
   private:
-    void work();
+    struct Task {
+        uint64_t bytes;
+        Make make;
+        std::optional<Result<Commit>> made = {};
+    };
+    using Lock = std::unique_lock<std::mutex>;
 
-    size_t room_;
+    void work();
+    bool may_commit() const { return !committing_ && !tasks_.empty() && tasks_.front().made; }
+    void make_next(Lock& lock);
+    void commit_first(Lock& lock);
+    template <typename F>
+    void wait(Lock& lock, F until);
+
+    size_t room_; // tasks
     std::mutex mutex_;
     std::condition_variable changed_;
-    std::deque<std::function<Status()>> writes_; // the first one is at work
+    std::deque<Task> tasks_; // note: what is added or removed at the ends leaves the others where they are
+    size_t begun_ = 0;       // of the first ones
+    uint64_t bytes_ = 0;     // of all
+    bool committing_ = false, closed_ = false;
     Status status_;
-    bool closed_ = false;
-    std::thread thread_; // last: it uses the others
+    double waited_ = 0;
+    std::vector<std::thread> threads_; // last: they use the others
 };
+
+// CPUs that this process may use, 16 at most; $SLURM_CPUS_PER_TASK where that is fewer
+uint32_t usable_threads();
 
 } // namespace semrover

@@ -53,4 +53,14 @@ Json drawing_json(const DrawOptions& o)
             {"background", fmt::format("{}", fmt::join(o.background, ","))}};
 }
 
+Json encoding_json(const PictureEncoding& e)
+{
+    Json settings = Json::object();
+    if (e.jpeg)
+        settings = {{"format", "jpeg"}, {"quality", e.quality}};
+    if (e.png_level != kPngLevel)
+        settings["png_level"] = e.png_level;
+    return settings;
+}
+
 } // namespace semrover

@@ -15,4 +15,7 @@ uint64_t hash_cameras(const CameraPath& path);
 // what of DrawOptions decides pictures
 Json drawing_json(const DrawOptions& options);
 
+// what of it decides the bytes of pictures and is not as usual
+Json encoding_json(const PictureEncoding& encoding);
+
 } // namespace semrover

@@ -8,7 +8,7 @@ namespace semrover {
 
 namespace {
 
-constexpr size_t kReads = 4, kFiles = 8; // on their way at a time
+constexpr size_t kReads = 4; // on their way at a time
 
 std::vector<uint32_t> words_of(std::span<const std::byte> bytes)
 {
@@ -19,12 +19,12 @@ std::vector<uint32_t> words_of(std::span<const std::byte> bytes)
 
 } // namespace
 
-Outgoing::Outgoing(std::unique_ptr<ReadbackRing> ring) : ring_(std::move(ring)), files_(kFiles) {}
+Outgoing::Outgoing(std::unique_ptr<ReadbackRing> ring, uint32_t threads) : ring_(std::move(ring)), files_(threads) {}
 
-Result<std::unique_ptr<Outgoing>> Outgoing::create(Device& device, uint64_t bytes)
+Result<std::unique_ptr<Outgoing>> Outgoing::create(Device& device, uint64_t bytes, uint32_t threads)
 {
     SR_TRY(auto ring, ReadbackRing::create(device, bytes, kReads));
-    return std::unique_ptr<Outgoing>(new Outgoing(std::move(ring)));
+    return std::unique_ptr<Outgoing>(new Outgoing(std::move(ring), threads));
 }
 
 uint64_t Outgoing::planned_bytes(const DeviceLimits& limits, uint64_t bytes)

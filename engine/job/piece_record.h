@@ -3,6 +3,7 @@
 #pragma once
 
 #include "engine/job/run_folder.h"
+#include "runtime/base/made_files.h"
 
 #include <functional>
 #include <map>
@@ -14,16 +15,14 @@ class PieceRecord {
   public:
     using FilesOf = std::function<std::vector<Path>(const std::string& piece)>;
 
-    PieceRecord(RunFolder& run, FilesOf files); // reads the journal, and the files that it names
+    PieceRecord(RunFolder& run, const FilesOf& files); // reads the journal, and the files that it names
 
     bool has(const std::string& piece) const;
-    Status add(const std::string& piece); // its files are written
+    // Names its files, in the order of FilesOf, then it is in the journal.
+    Status add(const std::string& piece, MadeFiles& files);
 
   private:
-    Result<uint64_t> hash(const std::string& piece) const;
-
     RunFolder& run_;
-    FilesOf files_;
     std::map<std::string, bool> done_;
 };
 

@@ -14,13 +14,6 @@ namespace {
 constexpr const char* kFolders[] = {"encoded", "latents", "frames"};
 constexpr uint32_t kDepthsKept = 3; // of a camera: the renderer asks for a frame's and for that of the one before
 
-Status write_latent(const Path& path, const LatentSize& size, std::span<const float> latent)
-{
-    const uint64_t channels = latent.size() / size.pixels();
-    const TensorData tensor{"latent", DType::f32, {size.height(), size.width(), channels}, std::as_bytes(latent)};
-    return write_safetensors(path, {&tensor, 1});
-}
-
 const RefinedCamera& camera_of(const CameraChain& chain)
 {
     return static_cast<const RefinedCamera&>(chain);
@@ -54,8 +47,8 @@ Result<std::vector<float>> read_latent(const Path& path, const LatentSize& size,
     return latent;
 }
 
-RefineStore::RefineStore(RunFolder& run, FrameFormat format, uint32_t channels)
-    : folder_(run.path()), format_(format), channels_(channels),
+RefineStore::RefineStore(RunFolder& run, const PictureEncoding& encoding, uint32_t channels)
+    : folder_(run.path()), encoding_(encoding), channels_(channels),
       record_(run, [folder = run.path()](const std::string& piece) { return std::vector<Path>{folder / piece}; })
 {
 }
@@ -63,7 +56,7 @@ RefineStore::RefineStore(RunFolder& run, FrameFormat format, uint32_t channels)
 std::string RefineStore::name(PieceKind kind, const BufferCamera& camera, uint32_t frame) const
 {
     return fmt::format("{}/{}{}{:06}.{}", kFolders[int(kind)], camera.name, camera.name.empty() ? "" : "/", frame,
-                       kind == PieceKind::frame ? format_.extension() : "safetensors");
+                       kind == PieceKind::frame ? encoding_.color_extension() : "safetensors");
 }
 
 Path RefineStore::path(PieceKind kind, const BufferCamera& camera, uint32_t frame) const
@@ -76,13 +69,19 @@ bool RefineStore::has(PieceKind kind, const BufferCamera& camera, uint32_t frame
     return record_.has(name(kind, camera, frame));
 }
 
-Status RefineStore::save_latent(PieceKind kind, const BufferCamera& camera, uint32_t frame, const LatentSize& size,
-                                std::span<const float> latent)
+Result<FileQueue::Commit> RefineStore::make(std::string piece, std::span<const std::byte> bytes)
 {
-    const Path to = path(kind, camera, frame);
-    SR_CHECK(make_folder(to.parent_path()));
-    SR_CHECK(write_latent(to, size, latent));
-    return record_.add(name(kind, camera, frame));
+    const auto files = std::make_shared<MadeFiles>();
+    SR_CHECK(files->add(folder_ / piece, bytes));
+    return [this, piece = std::move(piece), files] { return record_.add(piece, *files); };
+}
+
+Result<FileQueue::Commit> RefineStore::make_latent(PieceKind kind, const BufferCamera& camera, uint32_t frame,
+                                                   const LatentSize& size, std::span<const float> latent)
+{
+    const uint64_t channels = latent.size() / size.pixels();
+    const TensorData tensor{"latent", DType::f32, {size.height(), size.width(), channels}, std::as_bytes(latent)};
+    return make(name(kind, camera, frame), encode_safetensors({&tensor, 1}));
 }
 
 Result<std::vector<float>> RefineStore::load_latent(PieceKind kind, const BufferCamera& camera, uint32_t frame,
@@ -91,19 +90,16 @@ Result<std::vector<float>> RefineStore::load_latent(PieceKind kind, const Buffer
     return read_latent(path(kind, camera, frame), size, channels_);
 }
 
-Status RefineStore::save_frame(const BufferCamera& camera, uint32_t frame, std::span<const uint8_t> pixels)
+Result<FileQueue::Commit> RefineStore::make_frame(const BufferCamera& camera, uint32_t frame,
+                                                  std::span<const uint8_t> pixels)
 {
-    const Path to = path(PieceKind::frame, camera, frame);
-    SR_CHECK(make_folder(to.parent_path()));
-    SR_CHECK(format_.jpeg ? write_jpeg_rgb8(to, camera.size.width, camera.size.height, pixels, format_.quality)
-                          : write_png_rgb8(to, camera.size.width, camera.size.height, pixels));
-    return record_.add(name(PieceKind::frame, camera, frame));
+    SR_TRY(const std::vector<std::byte> file, encode_color(encoding_, camera.size, pixels));
+    return make(name(PieceKind::frame, camera, frame), file);
 }
 
 Result<ImageRgb8> RefineStore::load_frame(const BufferCamera& camera, uint32_t frame) const
 {
-    const Path from = path(PieceKind::frame, camera, frame);
-    return format_.jpeg ? read_jpeg_rgb8(from) : read_png_rgb8(from);
+    return read_image_rgb8(path(PieceKind::frame, camera, frame));
 }
 
 void RefineFiles::give_buffer(const std::string& camera, uint32_t frame, const Slot& seen)
@@ -165,16 +161,17 @@ Status RefineFiles::save_frame(const CameraChain& chain, uint32_t frame, const S
     return out_.read(pixels, [this, &c = camera_of(chain), frame](std::span<const std::byte> read) {
         const auto* first = reinterpret_cast<const uint8_t*>(read.data());
         const size_t count = size_t(c.size().image_width) * c.size().image_height * 3;
-        return out_.write([this, &c, frame, bytes = std::vector<uint8_t>(first, first + count)] {
-            return store_.save_frame(c.buffers, frame, bytes);
+        return out_.write(count, [this, &c, frame, bytes = std::vector<uint8_t>(first, first + count)] {
+            return store_.make_frame(c.buffers, frame, bytes);
         });
     });
 }
 
 Status RefineFiles::save(PieceKind kind, const CameraChain& chain, uint32_t frame, std::vector<float> latent)
 {
-    return out_.write([this, kind, &c = camera_of(chain), frame, values = std::move(latent)] {
-        return store_.save_latent(kind, c.buffers, frame, c.size(), values);
+    const uint64_t bytes = latent.size() * 4;
+    return out_.write(bytes, [this, kind, &c = camera_of(chain), frame, values = std::move(latent)] {
+        return store_.make_latent(kind, c.buffers, frame, c.size(), values);
     });
 }
 

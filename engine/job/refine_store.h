@@ -28,35 +28,30 @@ enum class PieceKind {
     frame,   // frames/CAMERA/000000.png or .jpg
 };
 
-struct FrameFormat {
-    bool jpeg = false;
-    int quality = 92;
-
-    std::string_view extension() const { return jpeg ? "jpg" : "png"; }
-};
-
 // The pieces of a run in its folder, and which of them are done: those that the journal names with the hash that the
 // file has. A camera without a name has no folder of its own.
 class RefineStore {
   public:
-    RefineStore(RunFolder& run, FrameFormat format, uint32_t channels); // reads the journal
+    RefineStore(RunFolder& run, const PictureEncoding& encoding, uint32_t channels); // reads the journal
 
-    bool lossless() const { return !format_.jpeg; } // a frame that is loaded is the one that was saved
+    bool lossless() const { return !encoding_.jpeg; } // a frame that is loaded is the one that was saved
     std::string name(PieceKind kind, const BufferCamera& camera, uint32_t frame) const; // from the run's folder on
     bool has(PieceKind kind, const BufferCamera& camera, uint32_t frame) const;
 
-    Status save_latent(PieceKind kind, const BufferCamera& camera, uint32_t frame, const LatentSize& size,
-                       std::span<const float> latent);
+    // on any thread; what they return is called on one at a time
+    Result<FileQueue::Commit> make_latent(PieceKind kind, const BufferCamera& camera, uint32_t frame,
+                                          const LatentSize& size, std::span<const float> latent);
+    Result<FileQueue::Commit> make_frame(const BufferCamera& camera, uint32_t frame, std::span<const uint8_t> pixels);
     Result<std::vector<float>> load_latent(PieceKind kind, const BufferCamera& camera, uint32_t frame,
                                            const LatentSize& size) const;
-    Status save_frame(const BufferCamera& camera, uint32_t frame, std::span<const uint8_t> pixels);
     Result<ImageRgb8> load_frame(const BufferCamera& camera, uint32_t frame) const;
 
   private:
     Path path(PieceKind kind, const BufferCamera& camera, uint32_t frame) const;
+    Result<FileQueue::Commit> make(std::string piece, std::span<const std::byte> bytes);
 
     Path folder_;
-    FrameFormat format_;
+    PictureEncoding encoding_;
     uint32_t channels_;
     PieceRecord record_; // by path in the run's folder
 };

@@ -80,7 +80,7 @@ class RefinementJob : public Job {
     RefinementJob(Device& device, Refinement refinement, RunFolder run, std::unique_ptr<Outgoing> out,
                   const RefinementCallbacks& callbacks)
         : device_(device), r_(std::move(refinement)), run_(std::move(run)), callbacks_(callbacks),
-          networks_(networks_of(device, r_)), store_(run_, r_.options.format, r_.model.vae.latent_channels),
+          networks_(networks_of(device, r_)), store_(run_, r_.options.encoding, r_.model.vae.latent_channels),
           files_(device, store_, *out), out_(std::move(out))
     {
         drawn_ = !r_.options.from_grid() || was_drawn();
@@ -202,16 +202,23 @@ class RefinementJob : public Job {
         SR_CHECK(out_->read(slots, size, [this, frame, camera, number](FramePixels pixels) -> Status {
             files_.give_depth(camera, number, {pixels.width, pixels.height, depth_pixels(pixels)});
             drawing_->empty.add(sees_nothing(pixels));
-            SR_CHECK(out_->write([folder = camera_folder(run_.path() / "buffers", camera), number, frame,
-                                  pixels = std::move(pixels)]() mutable {
+            const uint64_t bytes = pixels.bytes();
+            SR_CHECK(out_->write(bytes, [this, number, frame, pixels = std::move(pixels)]() mutable {
                 mark_sky(pixels, frame);
-                return write_frame_images(folder, number, pixels);
+                return make_buffer(frame.camera, number, pixels);
             }));
             ++arrived_;
             return note_drawn();
         }));
         ++taken_;
         return {};
+    }
+    Result<FileQueue::Commit> make_buffer(const std::string& camera, uint32_t number, const FramePixels& pixels) const
+    {
+        const auto files = std::make_shared<MadeFiles>();
+        const Path folder = camera_folder(run_.path() / "buffers", camera);
+        SR_CHECK(make_frame_images(folder, number, pixels, {.png_level = r_.options.encoding.png_level}, *files));
+        return [files] { return files->commit(); };
     }
     Status end_drawing()
     {
@@ -229,7 +236,9 @@ class RefinementJob : public Job {
         if (!drawn_ || arrived_ < taken_)
             return {};
         SR_CHECK(drawing_->empty.report(callbacks_));
-        return out_->write([this] { return run_.append({{"rendered", r_.options.path->frames.size()}}); });
+        return out_->write(0, [this]() -> Result<FileQueue::Commit> {
+            return [this] { return run_.append({{"rendered", r_.options.path->frames.size()}}); };
+        });
     }
     void say_drawn(bool ended)
     {
@@ -314,13 +323,13 @@ class RefinementJob : public Job {
     Result<Json> finish_run()
     {
         SR_CHECK(out_->drain());
-        const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
         renderer_.reset();
         drawing_.reset();
         Json results{{"output", r_.options.output.string()},
                      {"frames", r_.frames()},
                      {"steps", r_.settings.steps},
-                     {"seconds", seconds},
+                     {"seconds", seconds_since(start_)},
+                     {"file_wait_seconds", out_->file_wait_seconds()},
                      {"policy", policy_name(memory_.policy)},
                      {"planned_device_bytes", memory_.bytes},
                      {"peak_device_bytes", device_.peak_bytes()},
@@ -362,7 +371,7 @@ class FinishedRefinement : public Job {
   public:
     FinishedRefinement(Refinement refinement, RunFolder run, const RefinementCallbacks& callbacks)
         : r_(std::move(refinement)), run_(std::move(run)), callbacks_(callbacks),
-          store_(run_, r_.options.format, r_.model.vae.latent_channels)
+          store_(run_, r_.options.encoding, r_.model.vae.latent_channels)
     {
     }
     Status check() const
@@ -430,7 +439,7 @@ Result<std::unique_ptr<Job>> begin_refinement(Device& device, Refinement r, cons
     if (run.results())
         return finished_refinement(std::move(r), std::move(run), callbacks);
     SR_CHECK(write_frame_cameras(r));
-    auto out = Outgoing::create(device, largest_read(r));
+    auto out = Outgoing::create(device, largest_read(r), r.options.threads);
     if (!out) {
         run.drop_if_empty();
         return tl::make_unexpected(out.error());

@@ -17,14 +17,15 @@ struct RefinementOptions {
     std::optional<uint32_t> first_frame, last_frame; // of every camera, both included; the camera's first, and last
     std::shared_ptr<LoadedNetworks> networks = {};   // of the model, in that precision, shared; none: loaded
     Path from;                                       // output of an earlier run, whose latents come before first_frame
-    FrameFormat format;
-    std::optional<ImageSize> size;           // of the pictures, refused where it is another
-    std::optional<CameraPath> path;          // of the pictures, or through the grid
-    DrawOptions draw;                        // of a grid
-    bool allow_empty = false;                // it is no error if no buffer of a grid shows anything
-    bool radius_given = false;               // draw.splats says how wide splats are, not the model
-    std::function<Result<VoxelGrid>()> grid; // of `input`, called when it is drawn
-    bool replace = false;                    // what is in `output`
+    PictureEncoding encoding;                        // of the frames
+    uint32_t threads = 0;                            // that make files; 0: usable_threads()
+    std::optional<ImageSize> size;                   // of the pictures, refused where it is another
+    std::optional<CameraPath> path;                  // of the pictures, or through the grid
+    DrawOptions draw;                                // of a grid
+    bool allow_empty = false;                        // it is no error if no buffer of a grid shows anything
+    bool radius_given = false;                       // draw.splats says how wide splats are, not the model
+    std::function<Result<VoxelGrid>()> grid;         // of `input`, called when it is drawn
+    bool replace = false;                            // what is in `output`
 
     bool from_grid() const { return is_file(input); }
 };

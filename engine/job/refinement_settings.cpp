@@ -274,7 +274,7 @@ Status write_frame_cameras(const Refinement& r)
     files.pictures = [&](const std::string& camera, uint32_t at) {
         const uint32_t number = range_of(camera).first + at;
         PictureNames names{
-            fmt::format("frames/{}{}{:06}.{}", camera, camera.empty() ? "" : "/", number, o.format.extension()),
+            fmt::format("frames/{}{}{:06}.{}", camera, camera.empty() ? "" : "/", number, o.encoding.color_extension()),
             {},
             {}};
         if (o.from_grid()) {
@@ -318,10 +318,11 @@ Result<Json> refinement_settings(const Refinement& r, const Device& device)
                   {"steps", r.settings.steps},
                   {"frame_noise", r.settings.frame_noise == FrameNoise::warped ? "warped" : "fresh"},
                   {"seed", o.renderer.seed},
-                  {"format", o.format.jpeg ? "jpeg" : "png"},
-                  {"quality", o.format.jpeg ? o.format.quality : 0}};
+                  {"format", o.encoding.jpeg ? "jpeg" : "png"},
+                  {"quality", o.encoding.jpeg ? o.encoding.quality : 0}};
     if (r.settings.frame_history > 0) // not there without, so that runs of earlier versions go on
         settings["frame_history"] = r.settings.frame_history;
+    settings.update(encoding_json(o.encoding)); // likewise
     settings.update(r.model.video() ? video_settings(r)
                                     : Json{{"guidance_scale", r.settings.asd.guidance_scale},
                                            {"previous_noise", r.settings.asd.previous_noise}});

@@ -89,7 +89,7 @@ tl::unexpected<Error> other_settings(const Path& folder, bool finished)
                 quote_path(folder));
 }
 
-// NNNNNN.png and NNNNNN.npy, then the folder and the camera's around it if there is nothing else. The run's own folder
+// NNNNNN.png, .jpg and .npy, then the folder and the camera's around it if there is nothing else. The run's own folder
 // holds its lock.
 void remove_numbered(const Path& folder)
 {
@@ -97,7 +97,8 @@ void remove_numbered(const Path& folder)
     std::vector<Path> files;
     for (const auto& entry : fs::directory_iterator(folder, ignored)) {
         const std::string stem = entry.path().stem().string();
-        const bool ours = entry.path().extension() == ".png" || entry.path().extension() == ".npy";
+        const std::string extension = entry.path().extension().string();
+        const bool ours = extension == ".png" || extension == ".jpg" || extension == ".npy";
         if (ours && stem.size() == 6 && std::ranges::all_of(stem, ::isdigit))
             files.push_back(entry.path());
     }

@@ -8,7 +8,10 @@ namespace semrover {
 
 namespace {
 
-constexpr size_t kFilesWaiting = 16; // for the disk
+uint64_t bytes_of(const VoxelGrid& g)
+{
+    return g.cells.size() * sizeof(Cell) + g.labels.size() + g.points.size() * 2 + g.colors.size() + g.generated.size();
+}
 
 } // namespace
 
@@ -22,7 +25,7 @@ Result<std::unique_ptr<TileStore>> TileStore::open(const Path& folder, const Til
         if (const auto of = before->metadata().find("world");
             of != before->metadata().end() && of->second == hash_text(world))
             store->entries_ = before->tiles();
-    store->files_ = std::make_unique<FileQueue>(kFilesWaiting);
+    store->files_ = std::make_unique<FileQueue>(1);
     return store;
 }
 
@@ -53,9 +56,13 @@ Status TileStore::write(const TileIndex& tile, uint64_t key, VoxelGrid cells)
     entries_[tile] = {cells.cells.size(), hash_text(key)};
     changed_ = true;
     waiting_.insert(tile);
-    status_ = files_->push([path = folder_ / tile_name(tile, hash_text(key)), cells = std::move(cells)] {
-        return write_grid(path, cells);
-    });
+    const uint64_t bytes = bytes_of(cells);
+    status_ =
+        files_->push(bytes,
+                     [path = folder_ / tile_name(tile, hash_text(key)),
+                      cells = std::move(cells)]() mutable -> Result<FileQueue::Commit> {
+                         return [path = std::move(path), cells = std::move(cells)] { return write_grid(path, cells); };
+                     });
     return status_;
 }
 

@@ -295,16 +295,28 @@ Status AtomicFile::write(std::span<const std::byte> bytes)
     return {};
 }
 
-Status AtomicFile::commit()
+Status AtomicFile::flush()
 {
-    SR_ASSERT(descriptor_ >= 0, "commit of {} after commit, move or error", path_.native());
+    SR_ASSERT(descriptor_ >= 0, "flush of {} after flush, commit, move or error", path_.native());
     // note: close may report a late write error (NFS, quota), so it is checked before the rename
     const bool flushed = ::fsync(descriptor_) == 0 || errno == EINVAL;
     const int flush_error = errno;
     const bool closed = ::close(std::exchange(descriptor_, -1)) == 0;
+    if (flushed && closed)
+        return {};
+    const int error = flushed ? errno : flush_error;
+    discard();
+    return cannot_write(path_, error);
+}
+
+Status AtomicFile::commit()
+{
+    SR_ASSERT(!temporary_.empty(), "commit of {} after commit, move or error", path_.native());
+    if (descriptor_ >= 0)
+        SR_CHECK(flush());
     const Together renamed_and_forgotten;
-    if (!flushed || !closed || ::rename(temporary_.c_str(), path_.c_str()) != 0) {
-        const int error = flushed ? errno : flush_error;
+    if (::rename(temporary_.c_str(), path_.c_str()) != 0) {
+        const int error = errno;
         discard();
         return cannot_write(path_, error);
     }

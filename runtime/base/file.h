@@ -58,6 +58,9 @@ class AtomicFile {
     Status write(std::span<const std::byte> bytes);
     Status write(std::string_view text) { return write(std::as_bytes(std::span(text.data(), text.size()))); }
 
+    // After the last write: the bytes are on the disk, still under the temporary name. commit() does it where it was
+    // not done. Errors: as write()
+    Status flush();
     Status commit(); // once, after the last write
 
   private:
@@ -65,8 +68,8 @@ class AtomicFile {
     void discard() noexcept;
 
     Path path_;
-    Path temporary_; // empty when there is nothing to remove
-    int descriptor_ = -1;
+    Path temporary_;      // empty when there is nothing to remove
+    int descriptor_ = -1; // none from flush() on
     std::unique_ptr<Unfinished> unfinished_;
 };
 

@@ -111,6 +111,9 @@ struct TensorData {
 // a name given twice or one that the reader would refuse is the caller's bug.
 Status write_safetensors(const Path& path, std::span<const TensorData> tensors,
                          const std::map<std::string, std::string>& metadata = {});
+// the bytes of such a file
+std::vector<std::byte> encode_safetensors(std::span<const TensorData> tensors,
+                                          const std::map<std::string, std::string>& metadata = {});
 
 // a tensor that makes its bytes when they are written, so that a file may be larger than memory
 struct TensorStream {

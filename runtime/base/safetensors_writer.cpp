@@ -54,10 +54,9 @@ bool is_float(DType dtype)
     return dtype == DType::f32 || dtype == DType::f16 || dtype == DType::bf16;
 }
 
-} // namespace
-
-Status stream_safetensors(const Path& path, std::span<const TensorStream> tensors,
-                          const std::map<std::string, std::string>& metadata)
+// sink: takes the next bytes of the file
+template <typename Sink>
+Status put_file(std::span<const TensorStream> tensors, const std::map<std::string, std::string>& metadata, Sink&& sink)
 {
     std::vector<const TensorStream*> order;
     std::set<std::string_view> names;
@@ -74,28 +73,54 @@ Status stream_safetensors(const Path& path, std::span<const TensorStream> tensor
     std::byte length[8];
     for (int i = 0; i < 8; ++i)
         length[i] = static_cast<std::byte>(uint64_t(header.size()) >> (8 * i));
-    SR_TRY(AtomicFile file, AtomicFile::create(path));
-    SR_CHECK(file.write(length));
-    SR_CHECK(file.write(header));
+    SR_CHECK(sink(std::span<const std::byte>(length)));
+    SR_CHECK(sink(std::as_bytes(std::span(header))));
     std::vector<std::byte> scratch;
     for (const TensorStream* t : order) {
         SR_TRY(const std::span<const std::byte> bytes, t->bytes(scratch));
         SR_ASSERT(bytes.size() == bytes_of(*t), "tensor {}: {} {} given with {} bytes", t->name, dtype_name(t->dtype),
                   shape_text(t->shape), bytes.size());
-        SR_CHECK(file.write(bytes));
+        SR_CHECK(sink(bytes));
     }
-    return file.commit();
+    return {};
 }
 
-Status write_safetensors(const Path& path, std::span<const TensorData> tensors,
-                         const std::map<std::string, std::string>& metadata)
+std::vector<TensorStream> streams_of(std::span<const TensorData> tensors)
 {
     std::vector<TensorStream> streams;
     streams.reserve(tensors.size());
     for (const TensorData& t : tensors)
         streams.push_back(
             {t.name, t.dtype, t.shape, [&t](auto&) -> Result<std::span<const std::byte>> { return t.bytes; }});
-    return stream_safetensors(path, streams, metadata);
+    return streams;
+}
+
+} // namespace
+
+Status stream_safetensors(const Path& path, std::span<const TensorStream> tensors,
+                          const std::map<std::string, std::string>& metadata)
+{
+    SR_TRY(AtomicFile file, AtomicFile::create(path));
+    SR_CHECK(put_file(tensors, metadata, [&](std::span<const std::byte> bytes) { return file.write(bytes); }));
+    return file.commit();
+}
+
+Status write_safetensors(const Path& path, std::span<const TensorData> tensors,
+                         const std::map<std::string, std::string>& metadata)
+{
+    return stream_safetensors(path, streams_of(tensors), metadata);
+}
+
+std::vector<std::byte> encode_safetensors(std::span<const TensorData> tensors,
+                                          const std::map<std::string, std::string>& metadata)
+{
+    std::vector<std::byte> file;
+    const Status put = put_file(streams_of(tensors), metadata, [&](std::span<const std::byte> bytes) -> Status {
+        file.insert(file.end(), bytes.begin(), bytes.end());
+        return {};
+    });
+    SR_ASSERT(put, "bytes that are in memory");
+    return file;
 }
 
 Result<std::span<const std::byte>> encode_floats(std::span<const float> values, DType dtype, std::string_view what,

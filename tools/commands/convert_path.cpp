@@ -100,11 +100,12 @@ Status choose_camera(CameraPath& path, const Path& in, const ConvertPathOptions&
 Result<Path> find_picture(const Path& folder, const std::string& camera, uint32_t number)
 {
     const Path rendered = folder / picture_name(camera, "color", number);
-    const Path refined = folder / "frames" / camera / fmt::format("{:06}", number);
-    for (const Path& path : {rendered, Path(refined.string() + ".png"), Path(refined.string() + ".jpg")})
-        if (is_file(path))
-            return path;
-    return fail(ErrorCode::bad_input, "--images: {} is missing, and so is {}.png", quote_path(rendered),
+    const Path refined = folder / "frames" / camera / fmt::format("{:06}.png", number);
+    for (Path path : {rendered, refined})
+        for (const char* extension : {".png", ".jpg"})
+            if (is_file(path.replace_extension(extension)))
+                return path;
+    return fail(ErrorCode::bad_input, "--images: {} is missing, and so is {}", quote_path(rendered),
                 quote_path(refined));
 }
 

@@ -9,6 +9,7 @@
 #include "tools/cli/run_job.h"
 #include "tools/cli/session.h"
 #include "tools/cli/value_options.h"
+#include "tools/commands/picture_options.h"
 #include "tools/commands/scene_input.h"
 #include "tools/commands/trajectory_options.h"
 #include "tools/commands/video.h"
@@ -262,9 +263,7 @@ void add_options(CLI::App& c, RefineArguments& a)
         c.add_option("--frames", a.frames, "FIRST:LAST, both included, either may be left out; FIRST is a first frame");
     c.add_option("--from", o.from, "output of an earlier run: FIRST goes on from its latents of the frames before")
         ->needs(frames);
-    add_choice(c, "--format", {"png", "jpeg"}, "of the frames",
-               [&o](const std::string& text) { o.format.jpeg = text == "jpeg"; });
-    add_number(c, "--quality", o.format.quality, "of JPEG frames", 1, 100);
+    add_picture_options(c, o.encoding, o.threads);
     c.add_option("--video", a.videos.frames, "also an MP4 of the frames, one per camera, through ffmpeg");
     c.add_option("--side-by-side", a.videos.side_by_side, "also an MP4 of label, buffer and frame");
     add_number(c, "--fps", a.videos.frames_per_second, "frames a second of the videos", 1, 240);

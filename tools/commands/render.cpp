@@ -8,6 +8,7 @@
 #include "tools/cli/run_job.h"
 #include "tools/cli/session.h"
 #include "tools/cli/value_options.h"
+#include "tools/commands/picture_options.h"
 #include "tools/commands/scene_input.h"
 #include "tools/commands/trajectory_options.h"
 #include "tools/commands/video.h"
@@ -23,6 +24,8 @@ struct RenderArguments {
     std::string profile;
     TrajectoryOptions trajectory;
     SceneInputOptions input;
+    PictureEncoding encoding;
+    uint32_t threads = 0;
     int frames_per_second = 10;
     bool top = false, semantic = false, floats = false, points = false, visible_depth = false;
 };
@@ -66,6 +69,8 @@ Result<DrawingOptions> drawing_options(const RenderArguments& o, const Globals& 
     d.floats = o.floats;
     d.points = o.points;
     d.visible_depth = o.visible_depth;
+    d.encoding = o.encoding;
+    d.threads = o.threads;
     d.folder = o.output;
     d.replace = globals.yes;
     d.allow_empty = o.trajectory.allow_empty;
@@ -97,14 +102,16 @@ Status render(const RenderArguments& o, const Globals& globals)
     SR_TRY(const auto device, open_device(globals, o.profile));
     print_warnings(options.path.warnings, globals);
     VideoOfFrames video;
-    options.picture = [&](const CameraFrame& frame, std::span<const uint8_t> pixels) {
-        return video.add(frame, pixels);
-    };
     const bool has_video = finished_results(o.output, Json()) && !globals.yes && is_there(o.video);
+    const bool wants_video = !o.video.empty() && !has_video;
+    if (wants_video)
+        options.picture = [&](const CameraFrame& frame, std::span<const uint8_t> pixels) {
+            return video.add(frame, pixels);
+        };
     SR_TRY(const Json results, run_job(globals, [&](const JobCallbacks& callbacks) -> Result<std::unique_ptr<Job>> {
                const CameraPath path = options.path;
                SR_TRY(auto job, begin_drawing(*device, std::move(options), callbacks));
-               if (!o.video.empty() && !has_video)
+               if (wants_video)
                    SR_CHECK(video.open(o, path.frames.front()));
                return job;
            }));
@@ -138,6 +145,7 @@ void add_render(CLI::App& app, const Globals& globals, Run& run)
     c->add_flag("--npy", o->floats,
                 "also float32 arrays {depth_expected,depth_median,alpha}/000000.npy, depths in metres");
     c->add_flag("--points", o->points, "also points.ply, the scene's points, which transforms.json names");
+    add_picture_options(*c, o->encoding, o->threads);
     c->add_flag("--visible-depth", o->visible_depth, "depth pictures are 0 where a pixel is not visible");
     CLI::Option* video =
         c->add_option("--video", o->video, "also an MP4 of the colour frames (of the first camera), through ffmpeg");

@@ -167,7 +167,7 @@ TransformsFiles files_of(bool pictures)
 {
     TransformsFiles files;
     if (pictures)
-        files.pictures = rendered_pictures;
+        files.pictures = [](const std::string& camera, uint32_t number) { return rendered_pictures(camera, number); };
     return files;
 }
 
