@@ -4,6 +4,7 @@
 
 #include "runtime/base/memory_files.h"
 #include "runtime/base/quote.h"
+#include "runtime/base/renaming.h"
 #include "runtime/base/text_start.h"
 
 #include <algorithm>
@@ -262,12 +263,13 @@ Status AtomicFile::commit()
 {
     SR_ASSERT(descriptor_ >= 0, "commit of {} after commit, move or error", path_.native());
     // note: close may report a late write error (NFS, quota), so it is checked before the rename
-    const bool flushed = ::fsync(descriptor_) == 0 || errno == EINVAL;
-    const int flush_error = errno;
-    const bool closed = ::close(std::exchange(descriptor_, -1)) == 0;
+    int error = ::fsync(descriptor_) == 0 || errno == EINVAL ? 0 : errno;
+    if (::close(std::exchange(descriptor_, -1)) != 0 && !error)
+        error = errno;
     const Together renamed_and_forgotten;
-    if (!flushed || !closed || ::rename(temporary_.c_str(), path_.c_str()) != 0) {
-        const int error = flushed ? errno : flush_error;
+    if (!error)
+        error = rename_surely(temporary_, path_);
+    if (error) {
         discard();
         return cannot_write(path_, error);
     }
