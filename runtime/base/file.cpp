@@ -4,6 +4,7 @@
 
 #include "runtime/base/memory_files.h"
 #include "runtime/base/quote.h"
+#include "runtime/base/renaming.h"
 #include "runtime/base/text_start.h"
 
 #include <algorithm>
@@ -299,12 +300,11 @@ Status AtomicFile::flush()
 {
     SR_ASSERT(descriptor_ >= 0, "flush of {} after flush, commit, move or error", path_.native());
     // note: close may report a late write error (NFS, quota), so it is checked before the rename
-    const bool flushed = ::fsync(descriptor_) == 0 || errno == EINVAL;
-    const int flush_error = errno;
-    const bool closed = ::close(std::exchange(descriptor_, -1)) == 0;
-    if (flushed && closed)
+    int error = ::fsync(descriptor_) == 0 || errno == EINVAL ? 0 : errno;
+    if (::close(std::exchange(descriptor_, -1)) != 0 && !error)
+        error = errno;
+    if (!error)
         return {};
-    const int error = flushed ? errno : flush_error;
     discard();
     return cannot_write(path_, error);
 }
@@ -315,8 +315,7 @@ Status AtomicFile::commit()
     if (descriptor_ >= 0)
         SR_CHECK(flush());
     const Together renamed_and_forgotten;
-    if (::rename(temporary_.c_str(), path_.c_str()) != 0) {
-        const int error = errno;
+    if (const int error = rename_surely(temporary_, path_)) {
         discard();
         return cannot_write(path_, error);
     }

@@ -5,6 +5,7 @@
 #include "runtime/base/hash.h"
 #include "runtime/base/host_name.h"
 #include "runtime/base/quote.h"
+#include "runtime/base/renaming.h"
 
 #include <algorithm>
 #include <cerrno>
@@ -199,12 +200,11 @@ bool Attempt::adopt_finished(const std::string& key)
     });
 }
 
-// note: over a network an answer may be lost, so that a rename which happened seems to fail
 Result<Attempt::Published> Attempt::publish(const std::string& name, const std::string& key)
 {
     const Path to = out_ / name;
     SR_CHECK(make_folder(to.parent_path()));
-    const int failed = ::rename(files_.c_str(), to.c_str()) == 0 ? 0 : errno;
+    const int failed = rename_surely(files_, to);
     flush_folder(to.parent_path());
     const auto there = read_manifest(to);
     std::error_code ignored;

@@ -6,6 +6,7 @@
 #include "runtime/base/hash.h"
 #include "runtime/base/host_name.h"
 #include "runtime/base/quote.h"
+#include "runtime/base/renaming.h"
 #include "tools/cli/interrupt.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/print_stderr.h"
@@ -14,6 +15,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstring>
 #include <thread>
 
 namespace semrover {
@@ -290,9 +292,8 @@ Status TaskRunner::seal(const Task& task, const Attempt& attempt, Manifest manif
     std::error_code error;
     for (const char* name : kState)
         fs::remove_all(attempt.work() / name, error);
-    fs::rename(attempt.work(), attempt.files(), error);
-    if (error)
-        return fail(ErrorCode::bad_input, "cannot rename {}: {}", quote_path(attempt.work()), error.message());
+    if (const int failed = rename_surely(attempt.work(), attempt.files()))
+        return fail(ErrorCode::bad_input, "cannot rename {}: {}", quote_path(attempt.work()), std::strerror(failed));
     return {};
 }
 

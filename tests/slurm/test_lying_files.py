@@ -1,0 +1,71 @@
+# SPDX-FileCopyrightText: semrover authors
+# SPDX-License-Identifier: Apache-2.0
+"""A job on a file system that hides new names, has no locks, loses answers and is full: lying_files.c plays it."""
+import os
+import random
+import tempfile
+import time
+import unittest
+
+from small_job import SmallJob
+
+LIBRARY = os.environ["LYING_FILES"]
+
+
+class LyingFiles(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory(prefix="semrover-lying-")
+        cls.addClassCleanup(cls.folder.cleanup)
+        cls.job = SmallJob(cls.folder.name + "/job", scenes=2)
+        honest = cls.job.run(out="honest")
+        assert honest.returncode == 0, honest.stderr
+        cls.honest = cls.job.published("honest")
+
+    def lied_to(self, *options, **lies):
+        return self.job.run(*options, out=self.id(), LD_PRELOAD=LIBRARY, **lies)
+
+    def expect_whole(self):
+        self.assertEqual(self.job.published(self.id()), self.honest)
+        self.assertGreater(len(self.honest), 2 * 3 * 4)
+
+    def test_a_scene_that_is_not_seen_yet_is_waited_for(self):
+        self.assertEqual(self.job.run("--stage", "scene", out=self.id()).returncode, 0)
+        hide = f"{self.job.folder / self.id()}/scenes:5"
+        early = self.lied_to("--stage", "drive", "--wait", "0", LYING_HIDE=hide)
+        self.assertEqual(early.returncode, 75, early.stderr)
+        begin = time.monotonic()
+        late = self.lied_to("--stage", "drive", LYING_HIDE=hide)
+        self.assertEqual(late.returncode, 0, late.stderr)
+        self.assertGreater(time.monotonic() - begin, 1)
+        self.expect_whole()
+
+    def test_without_locks_it_goes_on_and_says_so(self):
+        done = self.lied_to(LYING_LOCKS="1")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(done.stderr.count("without locks"), 1, done.stderr)
+        self.expect_whole()
+
+    def test_a_rename_that_worked_and_failed(self):
+        """of every folder once: four tasks, each renamed to be sealed and to be published"""
+        for k in range(1, 9):
+            with self.subTest(k=k):
+                done = self.job.run(out=f"{self.id()}.{k}", LD_PRELOAD=LIBRARY, LYING_RENAME=str(k))
+                self.assertEqual(done.returncode, 0, done.stderr)
+                self.assertEqual(self.job.published(f"{self.id()}.{k}"), self.honest)
+                self.assertEqual(self.job.attempts(f"{self.id()}.{k}"), [])
+
+    def test_a_full_disk_publishes_nothing_that_is_not_whole(self):
+        chance = random.Random(3)
+        for k in (1, *(chance.randrange(2, 60) for _ in range(5))):
+            full = self.lied_to(LYING_WRITE=str(k))
+            self.assertIn(full.returncode, (3, 7), full.stderr)
+            self.assertIn("No space left on device", full.stderr)
+            for name, value in self.job.published(self.id()).items():
+                self.assertEqual(self.honest.get(name), value, f"{name} after write {k}")
+        self.assertEqual(self.job.run(out=self.id()).returncode, 0)
+        self.expect_whole()
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
