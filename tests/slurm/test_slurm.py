@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""tools/cluster/slurm on a real Slurm of two nodes: exit codes, equal bytes, kills, and a task that runs twice at once."""
+"""tools/cluster/slurm on a real Slurm of two nodes: exit codes, equal bytes, kills, a task that runs twice at once."""
 import json
 import os
 import pathlib
