@@ -3,7 +3,8 @@
 // A library to preload: file systems that are shared over a network, as they may be. What it lies about:
 //   LYING_HIDE=FOLDER:SECONDS  what is in the folder is not found, until it is that old there (cached absence)
 //   LYING_LOCKS=1              flock fails with ENOSYS (Lustre without `flock`)
-//   LYING_RENAME=K             the Kth rename of a folder happens, and fails with ENOENT (a lost answer, a second try)
+//   LYING_FILE=K               the Kth rename of a file happens, and fails with ENOENT (a lost answer, a second try)
+//   LYING_FOLDER=K             the same of a folder
 //   LYING_WRITE=K              the Kth write to a file, and all after it, fail with ENOSPC
 #define _GNU_SOURCE
 #include <dirent.h>
@@ -90,12 +91,14 @@ int flock(int fd, int operation)
 
 int rename(const char* from, const char* to)
 {
-    static atomic_long folders;
+    static atomic_long files, folders;
     struct stat status;
     const int folder = NEXT(stat)(from, &status) == 0 && S_ISDIR(status.st_mode);
     const int failed = NEXT(rename)(from, to);
-    if (failed || !folder || ++folders != number("LYING_RENAME"))
+    if (failed || (folder ? ++folders != number("LYING_FOLDER") : ++files != number("LYING_FILE")))
         return failed;
+    static const char said[] = "lying_files: a rename\n";
+    (void)!NEXT(write)(STDERR_FILENO, said, sizeof said - 1);
     errno = ENOENT;
     return -1;
 }

@@ -47,13 +47,16 @@ class LyingFiles(unittest.TestCase):
         self.expect_whole()
 
     def test_a_rename_that_worked_and_failed(self):
-        """of every folder once: four tasks, each renamed to be sealed and to be published"""
-        for k in range(1, 9):
-            with self.subTest(k=k):
-                done = self.job.run(out=f"{self.id()}.{k}", LD_PRELOAD=LIBRARY, LYING_RENAME=str(k))
+        """of every folder, each of which is sealed and published, and of some files"""
+        lies = [("LYING_FOLDER", k) for k in range(1, 9)] + [("LYING_FILE", k) for k in (1, 2, 17, 35, 50, 70)]
+        for lie, k in lies:
+            with self.subTest(lie=lie, k=k):
+                out = f"{self.id()}.{lie}.{k}"
+                done = self.job.run(out=out, LD_PRELOAD=LIBRARY, **{lie: str(k)})
                 self.assertEqual(done.returncode, 0, done.stderr)
-                self.assertEqual(self.job.published(f"{self.id()}.{k}"), self.honest)
-                self.assertEqual(self.job.attempts(f"{self.id()}.{k}"), [])
+                self.assertIn("lying_files: a rename", done.stderr)
+                self.assertEqual(self.job.published(out), self.honest)
+                self.assertEqual(self.job.attempts(out), [])
 
     def test_a_full_disk_publishes_nothing_that_is_not_whole(self):
         chance = random.Random(3)
