@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/format/image.h"
+#include "engine/format/depth_picture.h"
 #include "engine/scene/scene_points.h"
 #include "runtime/base/file.h"
 #include "tools/dataset/picture_classes.h"
@@ -52,8 +52,8 @@ Result<PointFile> read_points(const Path& path);
 // pictures by what they are called among those of their kind: [CAMERA/]NNNNNN, without an ending, in order
 using FrameFiles = std::map<std::string, Path>;
 
-// The .png, .jpg and .jpeg files (of labels .npy, too) of a kind ("color", "depth", "label", "visible"): those in
-// FOLDER/KIND, or in CAMERA/KIND of folders of cameras, as `render` and `streets` write them; colour also in
+// The .png, .jpg and .jpeg files (of labels and depth .npy, too) of a kind ("color", "depth", "label", "visible"):
+// those in FOLDER/KIND, or in CAMERA/KIND of folders of cameras, as `render` and `streets` write them; colour also in
 // FOLDER/frames, as `refine` writes it; else all in FOLDER and below. Errors: bad_input: no such folder, none in it,
 // two of one name
 Result<FrameFiles> list_frames(const Path& folder, std::string_view kind);
@@ -67,6 +67,6 @@ Result<std::vector<uint8_t>> read_gray_frame(const Path& path, ImageSize size);
 // classes, or kNoLabel; `map` counts the numbers that it looks up
 Result<std::vector<uint8_t>> read_label_frame(const Path& path, ImageSize size, PictureClasses& map);
 Result<ImageRgb8> read_color_frame(const Path& path, ImageSize size); // likewise; a width of 0: any size
-Result<ImageGray16> read_depth_frame(const Path& path, ImageSize size);
+Result<DepthPicture> read_depth_frame(const Path& path, ImageSize size, double unit); // of read_depth_picture()
 
 } // namespace semrover
