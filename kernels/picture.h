@@ -12,12 +12,13 @@ namespace semrover {
 // what splats look like in files: [P] u32 arrays
 struct PixelWords {
     Tensor seen;    // red, green, blue over the background; 255 where it is visible, else 0
-    Tensor ranges;  // depth in millimetres, 16 bits, 0 from 65.5345 m on; label, 255 for none
-    Tensor normals; // 128 + 127 n of each axis, in the low bytes
+    Tensor depths;  // whole units, 0 from 65534.5 on, or fp32 metres; 0 for nothing
+    Tensor normals; // 128 + 127 n of each axis; label, 255 for none
 };
 struct SplatPixelsOptions {
     std::array<uint8_t, 3> background{};
     float visible_alpha = 0.5f; // from which on a pixel is visible
+    float depth_units = 1000;   // to a metre; 0: fp32 metres
 };
 [[nodiscard]] PixelWords splat_pixels(Graph& g, const SplatImages& images, const SplatPixelsOptions& options);
 
@@ -96,7 +97,7 @@ constexpr uint32_t picture_words(uint32_t width, uint32_t height)
 // same surface, a share of the frame before
 struct FrameAndDepth {
     Tensor bytes; // [picture_words()] u32 array
-    Tensor depth; // [height * width] u32 array: millimetres in the low 16 bits; 0 and 65535: infinitely far away
+    Tensor depth; // [height * width] fp32 array: metres; 0: infinitely far away
 };
 struct AccumulateOptions {
     uint32_t width = 0, height = 0;

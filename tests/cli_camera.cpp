@@ -418,9 +418,12 @@ TEST(CliCamera, depth_that_16_bits_do_not_hold_is_nothing_and_what_is_above_is_s
     sort_cells(grid);
     ASSERT_TRUE(write_grid(folder / "wall.sgrid", grid));
     const Path one = folder.put("one.tum", "0 0 0 0 -0.5 0.5 -0.5 0.5\n");
-    const ProgramResult result = semrover_program("render " + (folder / "wall.sgrid").string() +
-                                                  " -q --semantic --npy -W 60 -H 40 --fov-x 60 -o " +
-                                                  (folder / "out").string() + " --path " + one.string());
+    const auto draw = [&](const Path& out, const std::string& more) {
+        return semrover_program("render " + (folder / "wall.sgrid").string() +
+                                " -q --semantic -W 60 -H 40 --fov-x 60 -o " + out.string() + " --path " + one.string() +
+                                " " + more);
+    };
+    const ProgramResult result = draw(folder / "out", "--npy");
     ASSERT_EQ(result.code, 0) << result.err;
     const auto depth = read_png_gray16(folder / "out/depth/000000.png");
     const auto label = read_png_rgb8(folder / "out/label/000000.png");
@@ -433,6 +436,23 @@ TEST(CliCamera, depth_that_16_bits_do_not_hold_is_nothing_and_what_is_above_is_s
     EXPECT_EQ(label->pixels[3 * at(30, 0)], 10);
     for (const uint16_t d : depth->pixels)
         EXPECT_NE(d, 65535);
+    // other units hold it
+    for (const auto& [name, units] : {std::pair{"cm", 100.}, {"kitti256", 256.}}) {
+        const Path other = folder / name;
+        ASSERT_EQ(draw(other, std::string("--depth ") + name).code, 0);
+        const auto d = read_png_gray16(other / "depth/000000.png");
+        for (size_t i = 0; i < metres.size(); ++i)
+            ASSERT_NEAR(d->pixels[i] / units, metres[i], 0.5001 / units) << name << " " << i;
+        EXPECT_GT(d->pixels[at(50, 25)], 88 * units);
+        EXPECT_EQ(json_of(contents(other / "transforms.json"))["depth_unit_scale_factor"], 1 / units);
+        EXPECT_EQ(contents(other / "label/000000.png"), contents(folder / "out/label/000000.png"));
+        EXPECT_EQ(draw(other, std::string("--depth ") + name).code, 0); // done, and others are other settings
+        expect_error(draw(other, ""), 2, "-y replaces it");
+    }
+    ASSERT_EQ(draw(folder / "npy", "--npy --depth npy").code, 0);
+    EXPECT_EQ(contents(folder / "npy/depth/000000.npy"), contents(folder / "npy/depth_expected/000000.npy"));
+    EXPECT_EQ(json_of(contents(folder / "npy/transforms.json"))["depth_unit_scale_factor"], 1.0);
+    EXPECT_FALSE(fs::exists(folder / "npy/depth/000000.png"));
     // the same without the lower half: what is below is not sky
     VoxelGrid above = grid;
     above.cells.clear();

@@ -224,6 +224,18 @@ TEST(CliEvalFlicker, change_without_cause_is_measured_and_the_truth_beside_it)
     const ProgramResult table =
         eval("flicker -q " + (p / "made") + " --depth " + drive + " --path " + drive + "/transforms.json");
     EXPECT_TRUE(table.out.starts_with("2 pairs of frames, 95.8 % of pixels can be compared\n")) << table.out;
+    // depth in another unit, which transforms.json beside it says
+    CameraPath both = *read_transforms(p.folder / "drive/transforms.json");
+    TransformsFiles files{[](const std::string& camera, uint32_t i) { return rendered_pictures(camera, i); }, "", 0.01};
+    EXPECT_TRUE(write_transforms(p.folder / "drive/transforms.json", both, files));
+    for (const uint32_t i : {0, 1, 2})
+        p.put_depth(fmt::format("drive/depth/{:06}.png", i), 200);
+    for (const char* where : {"", "/depth"}) {
+        const ProgramResult cm = eval("flicker --json -q " + (p / "made") + " --depth " + drive + where + " --path " +
+                                      drive + "/transforms.json");
+        ASSERT_EQ(cm.code, 0) << cm.err;
+        EXPECT_NEAR(json_of(cm.out)["mean"].get<double>(), 4, 1e-9);
+    }
     // part of a drive: only neighbours of the path are pairs
     std::filesystem::remove(p.folder / "made/000002.png");
     const ProgramResult part =

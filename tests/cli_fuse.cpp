@@ -107,6 +107,33 @@ Json run_of(const Path& folder)
     return run ? *run : Json();
 }
 
+TEST(CliFuse, depth_is_in_the_unit_that_transforms_json_says)
+{
+    const Drive drive;
+    TransformsFiles files;
+    files.pictures = [](const std::string& camera, uint32_t number) { return rendered_pictures(camera, number); };
+    const auto change = [&](const auto& depth_of) {
+        for (uint32_t i = 0; i < drive.path.frames.size(); ++i) {
+            const Path picture = drive.in(fmt::format("depth/{:06}.png", i));
+            auto depth = read_png_gray16(picture);
+            ASSERT_TRUE(depth) << depth.error().message;
+            for (uint16_t& d : depth->pixels)
+                d = depth_of(d);
+            ASSERT_TRUE(write_png_gray16(picture, depth->width, depth->height, depth->pixels));
+        }
+    };
+    change([](uint16_t d) { return uint16_t(d < 32000 ? d : 0); });
+    ASSERT_EQ(drive.fuse().code, 0);
+    const std::string mesh = contents(drive.out() / "mesh.glb");
+    change([](uint16_t d) { return uint16_t(2 * d); });
+    files.depth_unit = 0.0005;
+    ASSERT_TRUE(write_transforms(drive.in("transforms.json"), drive.path, files));
+    ASSERT_EQ(drive.fuse("-y").code, 0);
+    EXPECT_TRUE(contents(drive.out() / "mesh.glb") == mesh);
+    ASSERT_EQ(drive.fuse("-y --depth-scale 0.001").code, 0); // an option overrides it
+    EXPECT_FALSE(contents(drive.out() / "mesh.glb") == mesh);
+}
+
 TEST(CliFuse, a_drive_becomes_a_mesh_and_two_grids_of_the_same_cells)
 {
     const Drive drive;

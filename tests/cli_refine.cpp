@@ -179,6 +179,7 @@ TEST_F(CliRefine, frames_say_their_cameras)
 
 TEST_F(CliRefine, an_interrupt_saves_what_is_done_and_exits_with_130)
 {
+    put_buffers(folder_ / "in", 12, kWidth, kHeight); // more pieces than may wait for their files
     EXPECT_EQ(stop_after("out", 2, SIGINT), 130);
     EXPECT_GE(journal_lines("out"), 2u);
     EXPECT_TRUE(refined("whole") == refined("out"));
@@ -371,6 +372,42 @@ TEST_F(CliRefine, noise_stays_on_surfaces_where_the_model_or_the_option_says_so)
     EXPECT_NE(without.err.find("without --path it is not known which surfaces frames share"), std::string::npos)
         << without.err;
     EXPECT_TRUE(fresh == results("without"));
+}
+
+TEST_F(CliRefine, depth_is_in_the_unit_that_lies_beside_it)
+{
+    const std::string drive = put_drive({0, 0.2, 0.4}), motion = drive + "--frame-noise warped --frame-history 0.6 ";
+    const auto draw = [&](const std::string& depth) {
+        const ProgramResult result = semrover_program("render " + path("street.sgrid") + drive + "--quiet -o " +
+                                                      path(depth) + " --depth " + depth);
+        EXPECT_EQ(result.code, 0) << result.err;
+    };
+    for (const char* depth : {"cm", "npy"})
+        draw(depth);
+    // the same depths in millimetres
+    fs::copy(folder_ / "cm", folder_ / "mm", fs::copy_options::recursive);
+    std::string cameras = contents(folder_ / "mm/transforms.json");
+    const std::string key = "\"depth_unit_scale_factor\": 0.0";
+    ASSERT_NE(cameras.find(key + "1"), std::string::npos);
+    folder_.put("mm/transforms.json", cameras.replace(cameras.find(key), key.size(), key + "0"));
+    for (uint32_t f = 0; f < 3; ++f) {
+        const Path picture = folder_ / fmt::format("mm/depth/{:06}.png", f);
+        auto depth = read_png_gray16(picture);
+        ASSERT_TRUE(depth) << depth.error().message;
+        for (uint16_t& d : depth->pixels)
+            d = uint16_t(10 * d);
+        ASSERT_TRUE(write_png_gray16(picture, depth->width, depth->height, depth->pixels));
+    }
+    const auto millimetres = refined("of_mm", motion, "mm"), centimetres = refined("of_cm", motion, "cm");
+    EXPECT_TRUE(millimetres.at("latents/000002.safetensors") == centimetres.at("latents/000002.safetensors"));
+    EXPECT_EQ(refined("of_npy", motion, "npy").size(), millimetres.size());
+    EXPECT_EQ(json_of(contents(folder_ / "of_cm/run.json"))["settings"]["input"]["cameras"][0]["depth_unit"], 0.01);
+    // read in the wrong unit it would be another
+    fs::copy(folder_ / "mm/transforms.json", folder_ / "cm/transforms.json", fs::copy_options::overwrite_existing);
+    EXPECT_FALSE(refined("wrong", motion, "cm").at("latents/000002.safetensors") ==
+                 centimetres.at("latents/000002.safetensors"));
+    fs::copy(folder_ / "npy/depth/000001.npy", folder_ / "mm/depth/000001.npy");
+    expect_error(refine("twice", motion, "mm"), 3, "000001.npy' are one picture in two formats");
 }
 
 TEST_F(CliRefine, finished_frames_take_a_share_of_the_one_before_and_latents_do_not)

@@ -247,17 +247,17 @@ TEST(Camera, sky_is_where_a_ray_goes_up_and_meets_nothing)
     for (const Intrinsics& k : lenses)
         for (const Quaternion& q : turns) {
             const CameraFrame frame{0, "", {inverse(*rigid_from_quaternion({1, 2, 3}, q, "turn"))}, k};
-            FramePixels pixels{k.width, k.height, {}, std::vector<uint32_t>(k.width * k.height, 255u << 16 | 7), {}};
-            for (size_t i = 0; i < pixels.ranges.size(); i += 3)
-                pixels.ranges[i] = 2u << 16; // a building
+            FramePixels pixels{k.width, k.height, {}, {}, std::vector<uint32_t>(k.width * k.height, 255u << 24 | 7)};
+            for (size_t i = 0; i < pixels.normals.size(); i += 3)
+                pixels.normals[i] = 2u << 24; // a building
             mark_sky(pixels, frame);
             const Lens lens(k);
             const Rigid m = frame.pose.camera_to_world();
-            for (uint32_t i = 0; i < pixels.ranges.size(); ++i) {
+            for (uint32_t i = 0; i < pixels.normals.size(); ++i) {
                 const auto ray = lens.ray(i % k.width + 0.5, i / k.width + 0.5);
                 const bool up = ray && m[8] * (*ray)[0] + m[9] * (*ray)[1] + m[10] * (*ray)[2] > 0;
-                const uint32_t expected = i % 3 == 0 ? 2u << 16 : (up ? 10u : 255u) << 16 | 7;
-                ASSERT_EQ(pixels.ranges[i], expected) << name_of(k.model) << " pixel " << i;
+                const uint32_t expected = i % 3 == 0 ? 2u << 24 : (up ? 10u : 255u) << 24 | 7;
+                ASSERT_EQ(pixels.normals[i], expected) << name_of(k.model) << " pixel " << i;
             }
         }
 }

@@ -19,9 +19,9 @@ CameraFrame camera_at(double x, double z = 0)
     return frame;
 }
 
-ImageGray16 even_depth(uint16_t millimetres, uint32_t width = kWidth, uint32_t height = kHeight)
+DepthPicture even_depth(uint32_t millimetres, uint32_t width = kWidth, uint32_t height = kHeight)
 {
-    return {width, height, std::vector<uint16_t>(size_t(width) * height, millimetres)};
+    return {width, height, std::vector<uint32_t>(size_t(width) * height, millimetres)};
 }
 
 ImageRgb8 random_image(uint32_t seed, uint32_t width = kWidth, uint32_t height = kHeight)
@@ -86,18 +86,18 @@ double depth_seen(double x, double z, double u, double v)
     return std::abs(x + a * near) <= 1 && std::abs(b * near) <= 1 ? near : far;
 }
 
-ImageGray16 depth_of_card(double x, double z)
+DepthPicture depth_of_card(double x, double z)
 {
-    ImageGray16 depth{kWidth, kHeight, {}};
+    DepthPicture depth{kWidth, kHeight, {}};
     for (uint32_t i = 0; i < kWidth * kHeight; ++i)
-        depth.pixels.push_back(uint16_t(std::lround(1000 * depth_seen(x, z, i % kWidth + 0.5, i / kWidth + 0.5))));
+        depth.pixels.push_back(uint32_t(std::lround(1000 * depth_seen(x, z, i % kWidth + 0.5, i / kWidth + 0.5))));
     return depth;
 }
 
 TEST(EngineFlicker, what_was_hidden_before_or_lies_on_an_outline_is_left_out)
 {
     const double step = 0.5, forward = 0.7;
-    const ImageGray16 before = depth_of_card(0, 0), after = depth_of_card(step, forward);
+    const DepthPicture before = depth_of_card(0, 0), after = depth_of_card(step, forward);
     const Flow flow = flow_between(camera_at(0), before, camera_at(step, forward), after);
     uint64_t hidden = 0, outside = 0, valid = 0;
     for (uint32_t i = 0; i < kWidth * kHeight; ++i) {
@@ -139,10 +139,10 @@ TEST(EngineFlicker, a_slanting_road_agrees_with_itself_where_depth_grows_by_much
 {
     // the ground 1.5 m below a camera that drives 0.6 m: depth 45 / (v - 12), up to 40 m
     const auto road = [] {
-        ImageGray16 depth = even_depth(0);
+        DepthPicture depth = even_depth(0);
         for (uint32_t i = 0; i < kWidth * kHeight; ++i)
             if (const double below = i / kWidth + 0.5 - 12; below > 1)
-                depth.pixels[i] = uint16_t(std::lround(45000 / below));
+                depth.pixels[i] = uint32_t(std::lround(45000 / below));
         return depth;
     }();
     const Flow flow = flow_between(camera_at(0), road, camera_at(0, 0.6), road);
@@ -157,11 +157,11 @@ TEST(EngineFlicker, a_slanting_road_agrees_with_itself_where_depth_grows_by_much
 
 TEST(EngineFlicker, sky_has_no_flow)
 {
-    ImageGray16 before = even_depth(5000), after = even_depth(5000);
+    DepthPicture before = even_depth(5000), after = even_depth(5000);
     after.pixels[3] = 0;
-    after.pixels[4] = 65535;
+    after.pixels[4] = 0;
     before.pixels[100] = 0;
-    before.pixels[101] = 65535;
+    before.pixels[101] = 0;
     const Flow flow = flow_between(camera_at(0), before, camera_at(0), after);
     EXPECT_EQ(flow.with_depth, uint64_t(kWidth * kHeight - 2));
     for (size_t i = 0; i < flow.sources.size(); ++i)
@@ -179,12 +179,12 @@ TEST(EngineFlicker, a_panorama_that_turns_by_whole_pixels_is_the_same_picture_sh
     const double angle = 3 * 2 * 3.14159265358979323846 / 64; // to the right: 3 pixels
     to.pose.world_to_camera = {std::cos(angle), 0, -std::sin(angle), 0, 0, 1, 0, 0,
                                std::sin(angle), 0, std::cos(angle),  0, 0, 0, 0, 1};
-    ImageGray16 depth = even_depth(0, 64, 32);
+    DepthPicture depth = even_depth(0, 64, 32);
     std::mt19937 random(4);
     for (uint32_t y = 0; y < 32; ++y)
         for (uint32_t x = 0; x < 64; ++x)
-            depth.pixels[y * 64 + x] = uint16_t(4000 + random() % 9000);
-    ImageGray16 turned = depth;
+            depth.pixels[y * 64 + x] = uint32_t(4000 + random() % 9000);
+    DepthPicture turned = depth;
     for (uint32_t y = 0; y < 32; ++y)
         for (uint32_t x = 0; x < 64; ++x)
             turned.pixels[y * 64 + x] = depth.pixels[y * 64 + (x + 3) % 64];

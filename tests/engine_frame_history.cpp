@@ -19,9 +19,9 @@ CameraFrame camera(uint32_t number)
 }
 
 // a wall across the way
-ImageGray16 depth(uint32_t number)
+DepthPicture depth(uint32_t number)
 {
-    return {kSize.image_width, kSize.image_height, std::vector<uint16_t>(kBytes / 3, uint16_t(12000 - 250 * number))};
+    return {kSize.image_width, kSize.image_height, std::vector<uint32_t>(kBytes / 3, 12000 - 250 * number)};
 }
 
 // the wall's picture, seen from nearer every time, and noise

@@ -77,6 +77,7 @@ TEST(Image, sixteen_bits_keep_every_value_and_are_big_endian_in_the_file)
     EXPECT_EQ(read_png_rgb8(folder / "a.png")->pixels[3 * 0xab34], 0xab);
     ASSERT_TRUE(write_png_gray8(folder / "b.png", 1, 1, std::vector<uint8_t>{1}));
     EXPECT_TRUE(says(read_png_gray16(folder / "b.png"), "expected a PNG of 16-bit gray"));
+    EXPECT_TRUE(says(read_depth_picture(folder / "b.png", 0.001), "expected a PNG of 16-bit gray"));
 }
 
 TEST(Image, the_same_pixels_give_the_same_bytes)
@@ -329,7 +330,8 @@ TEST(Image, the_size_of_a_png_is_read_without_its_pixels)
     ASSERT_TRUE(write_png_gray8(folder / "a.png", 7, 5, noise<uint8_t>(35)));
     EXPECT_EQ(*read_image_size(folder / "a.png"), (ImageSize{7, 5}));
     EXPECT_TRUE(says(read_image_size(folder.put("b.png", "no picture")), "expected a PNG file"));
-    EXPECT_TRUE(says(read_image_size(folder.put("c.png", contents(folder / "a.png").substr(0, 20))), "not a valid PNG"));
+    EXPECT_TRUE(
+        says(read_image_size(folder.put("c.png", contents(folder / "a.png").substr(0, 20))), "not a valid PNG"));
 }
 
 // ---- class numbers
@@ -483,6 +485,30 @@ TEST(Image, pictures_that_hold_no_depth_are_refused_by_name)
     EXPECT_TRUE(says(depth(PngFile{1, 1, 16, PngFile::kGray, "\x05\x06", ""}.bytes(), DepthKind::carla),
                      "expected CARLA's depth in 8-bit colours, found gray of 16 bits"));
     EXPECT_TRUE(says(depth(npy(DType::f32, {1, 1}, std::vector<float>{1}), DepthKind::carla), "found a .npy"));
+}
+
+TEST(engine_image, depth_has_the_unit_of_its_file_and_of_fractions_its_own)
+{
+    const ScratchFolder folder;
+    const std::vector<uint16_t> whole = {0, 1, 65534, 65535};
+    ASSERT_TRUE(write_png_gray16(folder / "a.png", 2, 2, whole));
+    const auto gray = read_depth_picture(folder / "a.png", 0.01);
+    ASSERT_TRUE(gray) << gray.error().message;
+    EXPECT_EQ(gray->pixels, (std::vector<uint32_t>{0, 1, 65534, 0})); // 65535 is nothing
+    EXPECT_EQ(gray->unit, 0.01);
+    const auto put = [&](const char* name, DType type, std::span<const std::byte> bytes) {
+        const auto file = encode_npy({type, {2, 2}, {bytes.begin(), bytes.end()}});
+        return folder.put(name, {reinterpret_cast<const char*>(file.data()), file.size()});
+    };
+    const auto same = read_depth_picture(put("b.npy", DType::u16, std::as_bytes(std::span(whole))), 0.01);
+    ASSERT_TRUE(same) << same.error().message;
+    EXPECT_EQ(same->pixels, gray->pixels);
+    EXPECT_EQ(same->unit, 0.01);
+    const std::vector<float> metres = {0.5f, 700.25f, -1, std::numeric_limits<float>::infinity()};
+    const auto fine = read_depth_picture(put("c.npy", DType::f32, std::as_bytes(std::span(metres))), 0.01);
+    ASSERT_TRUE(fine) << fine.error().message;
+    for (size_t i = 0; i < 4; ++i)
+        EXPECT_EQ(fine->pixels[i] * fine->unit, i < 2 ? metres[i] : 0.);
 }
 
 } // namespace engine_image_test

@@ -21,10 +21,10 @@ CameraFrame camera(double x, double y, double z, double turn = 0)
     return c;
 }
 
-ImageGray16 depth_of(uint16_t millimetres)
+DepthPicture depth_of(uint32_t millimetres)
 {
     return {kSize.image_width, kSize.image_height,
-            std::vector<uint16_t>(size_t(kSize.image_width) * kSize.image_height, millimetres)};
+            std::vector<uint32_t>(size_t(kSize.image_width) * kSize.image_height, millimetres)};
 }
 
 uint32_t pixel(uint32_t column, uint32_t row)
@@ -69,16 +69,27 @@ TEST(engine_noise_trail, stays_on_a_wall_that_moves_past)
 
 TEST(engine_noise_trail, what_has_no_depth_is_infinitely_far_away)
 {
-    for (const uint16_t nothing : {0, 65535}) {
-        NoiseTrail trail(kSize);
-        trail.follow(camera(0, 0, 0), depth_of(nothing));
-        trail.follow(camera(3, 1, 2), depth_of(nothing));
-        EXPECT_EQ(carried(trail), kSize.pixels());
-        EXPECT_EQ(trail.keys()[pixel(7, 3)], (NoiseKey{pixel(7, 3), 0}));
-        // to the right by a latent pixel at the centre: tan = 4 / 32
-        trail.follow(camera(3, 1, 2, std::atan(0.125)), depth_of(nothing));
-        EXPECT_EQ(trail.keys()[pixel(8, 6)], (NoiseKey{pixel(9, 6), 0}));
+    NoiseTrail trail(kSize);
+    trail.follow(camera(0, 0, 0), depth_of(0));
+    trail.follow(camera(3, 1, 2), depth_of(0));
+    EXPECT_EQ(carried(trail), kSize.pixels());
+    EXPECT_EQ(trail.keys()[pixel(7, 3)], (NoiseKey{pixel(7, 3), 0}));
+    // to the right by a latent pixel at the centre: tan = 4 / 32
+    trail.follow(camera(3, 1, 2, std::atan(0.125)), depth_of(0));
+    EXPECT_EQ(trail.keys()[pixel(8, 6)], (NoiseKey{pixel(9, 6), 0}));
+}
+
+TEST(engine_noise_trail, depth_in_another_unit_is_the_same_depth)
+{
+    NoiseTrail millimetres(kSize), centimetres(kSize);
+    for (uint32_t i = 0; i < 4; ++i) {
+        DepthPicture depth = depth_of(800 - 90 * i);
+        depth.unit = 0.01;
+        millimetres.follow(camera(0.2 * i, 0.1, 0.9 * i), depth_of(8000 - 900 * i));
+        centimetres.follow(camera(0.2 * i, 0.1, 0.9 * i), depth);
     }
+    EXPECT_TRUE(std::ranges::equal(millimetres.keys(), centimetres.keys()));
+    EXPECT_LT(carried(millimetres), kSize.pixels());
 }
 
 TEST(engine_noise_trail, no_noise_is_used_twice)

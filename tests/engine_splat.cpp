@@ -215,7 +215,7 @@ TEST(engine_splat, pixels_on_the_device_are_those_that_files_of_the_images_hold)
         for (uint32_t i = 0; i < drawn; ++i, ++next) {
             const SplatPixelSlots slots = rasterizer->pixels(i);
             const auto seen = *slots.seen.read<uint32_t>(test_device()),
-                       ranges = *slots.ranges.read<uint32_t>(test_device()),
+                       depths = *slots.depths.read<uint32_t>(test_device()),
                        normals = *slots.normals.read<uint32_t>(test_device());
             const auto color = color_pixels(images[next], background), normal = normal_pixels(images[next]),
                        label = label_pixels(images[next]), visible = visible_pixels(images[next]);
@@ -226,8 +226,8 @@ TEST(engine_splat, pixels_on_the_device_are_those_that_files_of_the_images_hold)
                     ASSERT_EQ(normals[p] >> 8 * c & 255, normal[3 * p + c]);
                 }
                 ASSERT_EQ(seen[p] >> 24, visible[p]);
-                ASSERT_EQ(ranges[p] & 0xffff, depth[p]);
-                ASSERT_EQ(ranges[p] >> 16, label[p]);
+                ASSERT_EQ(depths[p], depth[p]);
+                ASSERT_EQ(normals[p] >> 24, label[p]);
             }
         }
     }

@@ -26,12 +26,13 @@ inline std::vector<uint8_t> color_pixels(const SplatImage& image, const std::arr
     return out;
 }
 
-inline std::vector<uint16_t> depth_pixels(const SplatImage& image)
+// whole units, of which so many are a metre
+inline std::vector<uint16_t> depth_pixels(const SplatImage& image, float units_per_metre = 1000)
 {
     std::vector<uint16_t> out(image.depth_expected.size());
     for (size_t i = 0; i < out.size(); ++i) {
-        const long millimetres = std::lround(image.depth_expected[i] * 1000.f);
-        out[i] = millimetres < 65535 ? uint16_t(millimetres) : 0; // out of range: nothing
+        const long units = std::lround(image.depth_expected[i] * units_per_metre);
+        out[i] = units < 65535 ? uint16_t(units) : 0; // out of range: nothing
     }
     return out;
 }

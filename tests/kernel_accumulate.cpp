@@ -18,7 +18,7 @@ constexpr Pose kHere{};
 struct View {
     CameraFrame camera; // world to camera, where the world is the frame of the camera of `now`
     std::vector<uint8_t> pixels;
-    std::vector<uint32_t> depth; // millimetres, and a label above them that is not to be read
+    std::vector<float> depth; // metres; 0: nothing
 };
 
 Intrinsics lens(CameraModel model, uint32_t width, uint32_t height)
@@ -72,8 +72,7 @@ View view(const Intrinsics& k, const Pose& pose, uint32_t seed)
                 v.pixels.push_back(uint8_t(128 + 90 * std::sin(0.2 * x + 0.13 * y + c) + double(random() % 60) - 30));
             const auto ray = lens.ray(x + 0.5, y + 0.5);
             const double depth = ray ? street_depth(lens, pose, *ray) : kFar;
-            const uint32_t nothing = (x + y) % 2 ? 65535 : 0;
-            v.depth.push_back((random() % 20) << 16 | (depth < 65 ? uint32_t(std::lround(depth * 1000)) : nothing));
+            v.depth.push_back(depth < 65 ? float(depth) : 0.f);
         }
     return v;
 }
@@ -90,11 +89,7 @@ struct Reference {
             x = (x % width + width) % width;
         return uint32_t(std::clamp(y, 0, height - 1) * width + std::clamp(x, 0, width - 1));
     }
-    static double metres(uint32_t word)
-    {
-        const uint32_t millimetres = word & 0xffff;
-        return millimetres == 0 || millimetres == 65535 ? kFar : millimetres * 1e-3;
-    }
+    static double metres(float depth) { return depth > 0 ? depth : kFar; }
     // none: too close to a decision for fp32 to be asked for it
     std::optional<bool> is_shared(const Projection& source, double depth) const
     {
@@ -245,8 +240,8 @@ TEST(kernel_accumulate, leaves_a_frame_alone_where_nothing_is_shared)
     View past = view(k, kHere, 2);
     const AccumulateOptions o{.width = 37, .height = 21, .share = 0.6f};
     EXPECT_NE(accumulated(now, past, o), now.pixels);
-    for (uint32_t& depth : past.depth)
-        depth = 100; // something right before the camera
+    for (float& depth : past.depth)
+        depth = 0.1f; // something right before the camera
     EXPECT_EQ(accumulated(now, past, o), now.pixels);
     past = view(k, moved(0, 0, 2.5), 2); // looks back
     EXPECT_EQ(accumulated(now, past, o), now.pixels);

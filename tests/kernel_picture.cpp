@@ -56,28 +56,36 @@ SplatImages on_device(KernelCase& k, const SplatImage& image)
 
 TEST(kernel_picture, splats_become_the_bytes_that_files_of_them_hold)
 {
-    for (const std::array<uint8_t, 3> background : {std::array<uint8_t, 3>{0, 0, 0}, {255, 128, 3}}) {
+    struct Case {
+        std::array<uint8_t, 3> background;
+        float depth_units;
+    };
+    for (const auto& [background, units] :
+         {Case{{0, 0, 0}, 1000}, Case{{255, 128, 3}, 1000}, Case{{0, 9, 0}, 100}, Case{{1, 1, 1}, 256}, Case{{}, 0}}) {
         KernelCase k(test_device());
-        const SplatImage image = random_image(251, 133, background[0] + 1);
-        const PixelWords y = splat_pixels(k.graph, on_device(k, image), {background, 0.5f});
+        SplatImage image = random_image(251, 133, background[0] + 1);
+        if (units != 1000) // beyond what millimetres hold, and what the units do
+            for (float& depth : image.depth_expected)
+                depth *= 12;
+        const PixelWords y = splat_pixels(k.graph, on_device(k, image), {background, 0.5f, units});
         const uint32_t pixels = image.width * image.height;
         const auto keep = [&](const Tensor& t) { return k.graph.keep(t, k.output(pixels, 1, DType::u32, 1)); };
-        const Tensor seen = keep(y.seen), ranges = keep(y.ranges), normals = keep(y.normals);
+        const Tensor seen = keep(y.seen), depths = keep(y.depths), normals = keep(y.normals);
         const Status status = k.compile_and_run();
         ASSERT_TRUE(status) << status.error().message;
-        const auto got_seen = k.read_array<uint32_t>(seen), got_ranges = k.read_array<uint32_t>(ranges),
+        const auto got_seen = k.read_array<uint32_t>(seen), got_depths = k.read_array<uint32_t>(depths),
                    got_normals = k.read_array<uint32_t>(normals);
         const auto color = color_pixels(image, background), normal = normal_pixels(image), label = label_pixels(image),
                    visible = visible_pixels(image);
-        const auto depth = depth_pixels(image);
+        const auto depth = depth_pixels(image, units);
         for (uint32_t i = 0; i < pixels; ++i) {
             for (uint32_t c = 0; c < 3; ++c) {
                 ASSERT_EQ(got_seen[i] >> 8 * c & 255, color[3 * i + c]) << i;
                 ASSERT_EQ(got_normals[i] >> 8 * c & 255, normal[3 * i + c]) << i;
             }
             ASSERT_EQ(got_seen[i] >> 24, visible[i]) << i;
-            ASSERT_EQ(got_ranges[i] & 0xffff, depth[i]) << i;
-            ASSERT_EQ(got_ranges[i] >> 16, label[i]) << i;
+            ASSERT_EQ(got_depths[i], units > 0 ? depth[i] : std::bit_cast<uint32_t>(image.depth_expected[i])) << i;
+            ASSERT_EQ(got_normals[i] >> 24, label[i]) << i;
         }
     }
 }

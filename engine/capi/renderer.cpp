@@ -74,7 +74,7 @@ Result<std::unique_ptr<sr_renderer>> make_renderer(sr_context& context, const sr
 }
 
 // what splats of a world look like, into the renderer's memory; depth, where it is wanted
-Result<ImageGray16> draw_world(sr_renderer& renderer, sr_world& world, const CameraFrame& camera)
+Result<DepthPicture> draw_world(sr_renderer& renderer, sr_world& world, const CameraFrame& camera)
 {
     CameraRenderer& r = *renderer.camera;
     if (world.context != renderer.context)
@@ -91,12 +91,10 @@ Result<ImageGray16> draw_world(sr_renderer& renderer, sr_world& world, const Cam
     SR_CHECK(rasterizer->draw({&seen_by, 1}).map([](uint32_t) {}));
     const SplatPixelSlots pixels = rasterizer->pixels(0);
     SR_CHECK(r.fill(pixels.seen));
-    ImageGray16 depth{renderer.size.width, renderer.size.height, {}};
-    if (!r.settings().follows_surfaces())
-        return depth;
-    FramePixels read{renderer.size.width, renderer.size.height, {}, {}, {}};
-    SR_TRY(read.ranges, pixels.ranges.read<uint32_t>(device));
-    depth.pixels = depth_pixels(read);
+    DepthPicture depth{renderer.size.width, renderer.size.height, {}};
+    if (r.settings().follows_surfaces()) {
+        SR_TRY(depth.pixels, pixels.depths.read<uint32_t>(device));
+    }
     return depth;
 }
 
@@ -110,22 +108,22 @@ Status check_frame_target(const sr_target& target)
 }
 
 // what the application gives
-Result<ImageGray16> take_buffers(sr_renderer& renderer, const sr_frame_desc& d)
+Result<DepthPicture> take_buffers(sr_renderer& renderer, const sr_frame_desc& d)
 {
     CameraRenderer& r = *renderer.camera;
     const uint64_t pixels = uint64_t(renderer.size.width) * renderer.size.height;
     SR_CHECK(take_in(*renderer.context, d.seen, r.seen(), pixels * 4, "sr_frame_desc.seen"));
     ImageGray16 depth{renderer.size.width, renderer.size.height, {}};
     if (!r.settings().follows_surfaces())
-        return depth;
+        return depth_of_gray(depth, kMillimetre);
     depth.pixels.resize(pixels);
     if (d.depth.memory && !d.depth.buffer) {
         std::memcpy(depth.pixels.data(), d.depth.memory, pixels * 2);
-        return depth;
+        return depth_of_gray(depth, kMillimetre);
     }
     SR_CHECK(take_in(*renderer.context, d.depth, r.depths(), pixels * 2, "sr_frame_desc.depth"));
     SR_CHECK(renderer.context->device->read(r.depths().slice(), std::as_writable_bytes(std::span(depth.pixels))));
-    return depth;
+    return depth_of_gray(depth, kMillimetre);
 }
 
 Status begin_frame(sr_renderer& renderer, const sr_frame_desc& d)
@@ -140,7 +138,7 @@ Status begin_frame(sr_renderer& renderer, const sr_frame_desc& d)
     const CameraFrame camera = camera_frame({d.fx, d.fy, d.cx, d.cy}, d.world_to_camera, renderer.size);
     if (d.world || r.settings().follows_surfaces())
         SR_CHECK(check_camera(camera, "sr_frame_desc"));
-    SR_TRY(ImageGray16 depth, d.world ? draw_world(renderer, *d.world, camera) : take_buffers(renderer, d));
+    SR_TRY(DepthPicture depth, d.world ? draw_world(renderer, *d.world, camera) : take_buffers(renderer, d));
     return r.begin({camera, std::move(depth)});
 }
 

@@ -38,7 +38,7 @@ struct FrameTask {
 // what a frame shows, where surfaces are followed from one to the next
 struct FrameView {
     CameraFrame camera;
-    ImageGray16 depth; // [image_height, image_width] millimetres, 0 and 65535: nothing
+    DepthPicture depth; // [image_height, image_width]
 };
 
 // Where a renderer's frames come from and go to: files, or an application's memory. Of a chain, frames come in order.

@@ -5,13 +5,18 @@
 #include "engine/splat/rasterizer.h"
 #include "kernels/picture.h"
 
+#include <algorithm>
+
 namespace semrover {
 
 namespace {
 
-std::vector<uint32_t> depth_words(const ImageGray16& depth)
+std::vector<float> metres_of(const DepthPicture& depth)
 {
-    return {depth.pixels.begin(), depth.pixels.end()};
+    std::vector<float> metres(depth.pixels.size());
+    std::ranges::transform(depth.pixels, metres.begin(),
+                           [unit = float(depth.unit)](uint32_t d) { return float(d) * unit; });
+    return metres;
 }
 
 // the world in the first one's own frame, where numbers are small and fp32 is enough
@@ -35,8 +40,9 @@ FrameHistory::Memory::Memory(const LatentSize& latent_size) : size(latent_size)
         return words(picture_words(size.image_width, size.image_height), name);
     };
     cameras = state.slot(2, kLensCameraFloats, DType::f32, "cameras", kLensCameraFloats);
-    now = {bytes("frame"), words(pixels, "depth")};
-    past = {bytes("frame before"), words(pixels, "depth before")};
+    const auto depths = [&](const char* name) { return state.slot(pixels, 1, DType::f32, name, 1); };
+    now = {bytes("frame"), depths("depth")};
+    past = {bytes("frame before"), depths("depth before")};
     made = bytes("accumulated frame");
 }
 
@@ -80,13 +86,13 @@ Status FrameHistory::copy(const Slot& from, const Slot& to)
     return copies_->copy(from, to).map([](uint64_t) {});
 }
 
-Status FrameHistory::add(const Slot& bytes, const CameraFrame& camera, const ImageGray16& depth)
+Status FrameHistory::add(const Slot& bytes, const CameraFrame& camera, const DepthPicture& depth)
 {
     SR_CHECK(copy(bytes, memory_.now.bytes));
     return accumulate_now(camera, depth);
 }
 
-Status FrameHistory::add(std::span<const uint8_t> pixels, const CameraFrame& camera, const ImageGray16& depth)
+Status FrameHistory::add(std::span<const uint8_t> pixels, const CameraFrame& camera, const DepthPicture& depth)
 {
     SR_CHECK(write_pixels(pixels));
     return accumulate_now(camera, depth);
@@ -100,7 +106,7 @@ Status FrameHistory::write_pixels(std::span<const uint8_t> pixels)
     return memory_.now.bytes.write(device_, words);
 }
 
-Status FrameHistory::accumulate_now(const CameraFrame& camera, const ImageGray16& depth)
+Status FrameHistory::accumulate_now(const CameraFrame& camera, const DepthPicture& depth)
 {
     const bool alone = frames_ == 0 || camera.intrinsics.model != camera_.intrinsics.model;
     if (!alone) {
@@ -108,7 +114,7 @@ Status FrameHistory::accumulate_now(const CameraFrame& camera, const ImageGray16
         SR_CHECK(copy(memory_.now.depth, memory_.past.depth));
         SR_CHECK(memory_.cameras.write(device_, camera_rows(camera, camera_)));
     }
-    SR_CHECK(memory_.now.depth.write(device_, depth_words(depth)));
+    SR_CHECK(memory_.now.depth.write(device_, metres_of(depth)));
     camera_ = camera;
     ++frames_;
     if (alone)
@@ -117,7 +123,7 @@ Status FrameHistory::accumulate_now(const CameraFrame& camera, const ImageGray16
     return program_->run();
 }
 
-Status FrameHistory::restore(std::span<const uint8_t> pixels, const CameraFrame& camera, const ImageGray16& depth)
+Status FrameHistory::restore(std::span<const uint8_t> pixels, const CameraFrame& camera, const DepthPicture& depth)
 {
     restart();
     return add(pixels, camera, depth);

@@ -4,7 +4,7 @@
 
 #include "engine/camera/camera.h"
 #include "engine/deferred/latent_size.h"
-#include "engine/format/image.h"
+#include "engine/format/depth_picture.h"
 #include "kernels/splat.h"
 #include "runtime/device/copy_ring.h"
 #include "runtime/device/program.h"
@@ -21,13 +21,12 @@ class FrameHistory {
                                                         float share);
 
     // The next frame of the chain. The first one stays as it is, and so does one through another lens than the frame
-    // before. bytes: as picture_bytes() makes them, pixels: [height,
-    // width, 3]; depth: [height, width] millimetres, 0 and 65535: infinitely far away
-    Status add(const Slot& bytes, const CameraFrame& camera, const ImageGray16& depth);
-    Status add(std::span<const uint8_t> pixels, const CameraFrame& camera, const ImageGray16& depth);
+    // before. bytes: as picture_bytes() makes them, pixels: [height, width, 3]; depth: nothing is infinitely far away
+    Status add(const Slot& bytes, const CameraFrame& camera, const DepthPicture& depth);
+    Status add(std::span<const uint8_t> pixels, const CameraFrame& camera, const DepthPicture& depth);
     void restart() { frames_ = 0; } // the next frame has none before it
     // a frame that was accumulated before: what comes next goes on from it
-    Status restore(std::span<const uint8_t> pixels, const CameraFrame& camera, const ImageGray16& depth);
+    Status restore(std::span<const uint8_t> pixels, const CameraFrame& camera, const DepthPicture& depth);
 
     const Slot& frame() const
     {
@@ -55,7 +54,7 @@ class FrameHistory {
     Status use_lens(CameraModel model);
     Status copy(const Slot& from, const Slot& to);
     Status write_pixels(std::span<const uint8_t> pixels);
-    Status accumulate_now(const CameraFrame& camera, const ImageGray16& depth);
+    Status accumulate_now(const CameraFrame& camera, const DepthPicture& depth);
 
     Device& device_;
     Memory memory_;

@@ -3,6 +3,7 @@
 #include "engine/deferred/frame_images.h"
 
 #include "engine/camera/lens.h"
+#include "engine/format/npy.h"
 
 #include <algorithm>
 #include <array>
@@ -61,6 +62,15 @@ std::vector<T> shifted(std::span<const uint32_t> words, uint32_t shift)
     return values;
 }
 
+Result<std::vector<std::byte>> encode_depth(const FramePixels& pixels, const PictureEncoding& encoding)
+{
+    const uint32_t w = pixels.width, h = pixels.height;
+    if (encoding.depth != DepthFormat::npy)
+        return encode_png_gray16(w, h, shifted<uint16_t>(pixels.depths, 0), encoding.png_level);
+    const auto metres = std::as_bytes(std::span(pixels.depths));
+    return encode_npy({DType::f32, {h, w}, {metres.begin(), metres.end()}});
+}
+
 } // namespace
 
 std::vector<uint8_t> color_pixels(const FramePixels& pixels)
@@ -68,9 +78,9 @@ std::vector<uint8_t> color_pixels(const FramePixels& pixels)
     return three_bytes(pixels.seen);
 }
 
-std::vector<uint16_t> depth_pixels(const FramePixels& pixels)
+DepthPicture depth_picture(const FramePixels& pixels)
 {
-    return shifted<uint16_t>(pixels.ranges, 0);
+    return {pixels.width, pixels.height, pixels.depths};
 }
 
 std::vector<uint8_t> normal_pixels(const FramePixels& pixels)
@@ -80,7 +90,7 @@ std::vector<uint8_t> normal_pixels(const FramePixels& pixels)
 
 std::vector<uint8_t> label_pixels(const FramePixels& pixels)
 {
-    return shifted<uint8_t>(pixels.ranges, 16);
+    return shifted<uint8_t>(pixels.normals, 24);
 }
 
 std::vector<uint8_t> visible_pixels(const FramePixels& pixels)
@@ -98,18 +108,18 @@ void mark_sky(FramePixels& pixels, const CameraFrame& frame)
             const std::optional<bool> whole = side.of_block(x, y, right, bottom);
             for (uint32_t row = y; row < bottom; ++row)
                 for (uint32_t column = x; column < right; ++column) {
-                    uint32_t& word = pixels.ranges[size_t(row) * pixels.width + column];
-                    if (word >> 16 == kNothing && (whole ? *whole : side.up(column + 0.5, row + 0.5) > 0))
-                        word = (word & 0xffff) | kSky << 16;
+                    uint32_t& word = pixels.normals[size_t(row) * pixels.width + column];
+                    if (word >> 24 == kNothing && (whole ? *whole : side.up(column + 0.5, row + 0.5) > 0))
+                        word = (word & 0xffffff) | kSky << 24;
                 }
         }
 }
 
 void clear_hidden_depth(FramePixels& pixels)
 {
-    for (size_t i = 0; i < pixels.ranges.size(); ++i)
+    for (size_t i = 0; i < pixels.depths.size(); ++i)
         if (pixels.seen[i] >> 24 == 0)
-            pixels.ranges[i] &= 0xffff0000u;
+            pixels.depths[i] = 0;
 }
 
 Status make_frame_images(const Path& folder, uint32_t number, const FramePixels& pixels,
@@ -123,7 +133,7 @@ Status make_frame_images(const Path& folder, uint32_t number, const FramePixels&
         return files.add(folder / kind / fmt::format("{:06}.{}", number, extension), *bytes);
     };
     SR_CHECK(add("color", encoding.color_extension(), encode_color(encoding, {w, h}, color_pixels(pixels))));
-    SR_CHECK(add("depth", "png", encode_png_gray16(w, h, depth_pixels(pixels), level)));
+    SR_CHECK(add("depth", encoding.depth_extension(), encode_depth(pixels, encoding)));
     SR_CHECK(add("normal", "png", encode_png_rgb8(w, h, normal_pixels(pixels), level)));
     SR_CHECK(add("label", "png", encode_png_gray8(w, h, label_pixels(pixels), level)));
     return add("visible", "png", encode_png_gray8(w, h, visible_pixels(pixels), level));

@@ -18,16 +18,16 @@ struct Source {
     double distance = 0; // squared, pixels of the latent, from its centre
 };
 
-double metres(const ImageGray16& depth, double x, double y)
+double metres(const DepthPicture& depth, double x, double y)
 {
     const uint32_t column = std::min(uint32_t(x), depth.width - 1), row = std::min(uint32_t(y), depth.height - 1);
-    const uint16_t d = depth.pixels[size_t(row) * depth.width + column];
-    return d == 0 || d == 65535 ? kInfinity : d * 1e-3;
+    const uint32_t d = depth.pixels[size_t(row) * depth.width + column];
+    return d == 0 ? kInfinity : d * depth.unit;
 }
 
 // where the surface of a pixel of the latent was
 std::optional<Source> source_of(uint32_t pixel, const LatentSize& size, const Reprojection& motion,
-                                const ImageGray16& depth)
+                                const DepthPicture& depth)
 {
     const double block = size.downscale;
     const double x = (pixel % size.width() + 0.5) * block, y = (pixel / size.width() + 0.5) * block;
@@ -44,7 +44,7 @@ std::optional<Source> source_of(uint32_t pixel, const LatentSize& size, const Re
 
 } // namespace
 
-void NoiseTrail::follow(const CameraFrame& camera, const ImageGray16& depth)
+void NoiseTrail::follow(const CameraFrame& camera, const DepthPicture& depth)
 {
     SR_ASSERT(depth.width == size_.image_width && depth.height == size_.image_height,
               "depth of {}x{} pixels for frames of {}x{}", depth.width, depth.height, size_.image_width,

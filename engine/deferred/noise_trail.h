@@ -4,7 +4,7 @@
 
 #include "engine/camera/camera.h"
 #include "engine/deferred/latent_size.h"
-#include "engine/format/image.h"
+#include "engine/format/depth_picture.h"
 
 #include <compare>
 #include <span>
@@ -27,8 +27,8 @@ class NoiseTrail {
   public:
     explicit NoiseTrail(const LatentSize& size) : size_(size) {}
 
-    // Computes the keys of the next frame. depth: [image_height, image_width] millimetres, 0 and 65535: nothing
-    void follow(const CameraFrame& camera, const ImageGray16& depth);
+    // Computes the keys of the next frame. depth: [image_height, image_width]
+    void follow(const CameraFrame& camera, const DepthPicture& depth);
 
     uint32_t frames() const { return frames_; }              // followed so far; the next one's number
     std::span<const NoiseKey> keys() const { return keys_; } // [pixels] of the last frame

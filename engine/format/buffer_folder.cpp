@@ -16,7 +16,7 @@ namespace semrover {
 
 namespace {
 
-constexpr const char* kExtensions[] = {"png", "jpg"};
+constexpr const char* kExtensions[] = {"png", "jpg", "npy"};
 
 // numbers of the pictures in a folder, ascending; other names are not looked at
 std::vector<uint32_t> picture_numbers(const Path& folder)
@@ -43,7 +43,9 @@ Status check_size(const Path& path, const ImageSize& expected)
 
 Result<BufferCamera> open_camera(const Path& folder, std::string name)
 {
-    BufferCamera c{std::move(name), folder, {}};
+    BufferCamera c;
+    c.name = std::move(name);
+    c.folder = folder;
     const std::vector<uint32_t> numbers = picture_numbers(folder / "color");
     if (numbers.empty())
         return fail(ErrorCode::bad_input, "{} holds no pictures 000000.png, 000001.png, ..",
@@ -98,6 +100,7 @@ Result<std::vector<BufferCamera>> open_buffers(const Path& folder)
     if (!is_folder(folder))
         return fail(ErrorCode::bad_input, "{}: expected a folder of splat buffers or an .sgrid file",
                     quote_path(folder));
+    SR_TRY(const double unit, read_depth_unit(folder));
     std::vector<BufferCamera> cameras;
     if (is_there(folder / "color")) {
         SR_TRY(cameras.emplace_back(), open_camera(folder, ""));
@@ -113,8 +116,10 @@ Result<std::vector<BufferCamera>> open_buffers(const Path& folder)
                     "{} has no color/ nor folders of cameras with color/: expected a splat "
                     "buffer, or a rig of them",
                     quote_path(folder));
-    for (BufferCamera& camera : cameras)
+    for (BufferCamera& camera : cameras) {
         camera.shards = shards;
+        camera.depth_unit = unit;
+    }
     return cameras;
 }
 
@@ -171,10 +176,10 @@ Result<BufferFrame> read_buffer(const BufferCamera& camera, uint32_t frame)
     return b;
 }
 
-Result<ImageGray16> read_depth(const BufferCamera& camera, uint32_t frame)
+Result<DepthPicture> read_depth(const BufferCamera& camera, uint32_t frame)
 {
-    const Path path = frame_path(camera.folder, "depth", frame);
-    SR_TRY(ImageGray16 depth, read_png_gray16(path));
+    SR_TRY(const Path path, find_picture(camera.folder, "depth", frame));
+    SR_TRY(DepthPicture depth, read_depth_picture(path, camera.depth_unit));
     if (ImageSize{depth.width, depth.height} != camera.size)
         return fail(ErrorCode::bad_input, "{} is {} x {} pixels, the frames of its camera are {} x {}",
                     quote_path(path), depth.width, depth.height, camera.size.width, camera.size.height);

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "engine/camera/camera.h"
-#include "engine/format/image.h"
+#include "engine/format/depth_picture.h"
 #include "engine/shards/shard_set.h"
 
 #include <string>
@@ -17,8 +17,9 @@ struct BufferCamera {
     std::string name; // empty: the folder's own pictures
     Path folder;
     ImageSize size;
-    uint32_t frames = 0;      // 0 .. frames - 1
-    ShardsOrNone shards = {}; // that the pictures are in
+    uint32_t frames = 0;             // 0 .. frames - 1
+    double depth_unit = kMillimetre; // metres, of depth/
+    ShardsOrNone shards = {};        // that the pictures are in
 };
 
 struct BufferFrame {
@@ -30,9 +31,9 @@ Path frame_path(const Path& folder, const char* kind, uint32_t number, std::stri
 // the one that is there of the formats a picture may have, else its path as a PNG. bad_input: it is there twice
 Result<Path> find_picture(const Path& folder, const char* kind, uint32_t number);
 
-// the cameras of a folder or of a shard set: itself when it has color/, else its sub-folders that have, by name.
-// Errors: bad_input for a gap in the numbers, for a picture in two formats, for colour without visibility, for pictures
-// of another size than the first, and as open_if_shards()
+// the cameras of a folder or of a shard set: itself when it has color/, else its sub-folders that have, by name; the
+// unit of depth is what the folder's transforms.json says. Errors: bad_input for a gap in the numbers, for a picture in
+// two formats, for colour without visibility, for pictures of another size than the first, and as open_if_shards()
 Result<std::vector<BufferCamera>> open_buffers(const Path& folder);
 
 // the cameras of a path, before their buffers exist
@@ -42,8 +43,8 @@ Status check_against_path(std::span<const BufferCamera> cameras, const CameraPat
 
 Result<BufferFrame> read_buffer(const BufferCamera& camera, uint32_t frame);
 
-// millimetres; bad_input where it is not there or has another size
-Result<ImageGray16> read_depth(const BufferCamera& camera, uint32_t frame);
+// bad_input where it is not there or has another size
+Result<DepthPicture> read_depth(const BufferCamera& camera, uint32_t frame);
 
 // label colours, black where there is nothing: [height, width, 3]
 Result<std::vector<uint8_t>> read_label_picture(const BufferCamera& camera, uint32_t frame);

@@ -6,13 +6,26 @@
 
 namespace semrover {
 
-// How the pictures of a run are written: colours as PNG or JPEG, what numbers mean never with a loss.
+// depth in whole units of 16 bits, or float32 metres
+enum class DepthFormat : uint8_t { mm, cm, kitti256, npy };
+constexpr const char* kDepthFormats[] = {"mm", "cm", "kitti256", "npy"};
+constexpr double units_per_metre(DepthFormat format) // 0: of none
+{
+    constexpr double kUnits[] = {1000, 100, 256, 0};
+    return kUnits[size_t(format)];
+}
+
+// How the pictures of a run are written: colours as PNG or JPEG, others without a loss.
 struct PictureEncoding {
     bool jpeg = false;         // of colours
     int quality = 92;          // of JPEG, 1 to 100
     int png_level = kPngLevel; // 0 to 9
+    DepthFormat depth = DepthFormat::mm;
 
     std::string_view color_extension() const { return jpeg ? "jpg" : "png"; }
+    std::string_view depth_extension() const { return depth == DepthFormat::npy ? "npy" : "png"; }
+    // metres of what depth pictures hold
+    double depth_unit() const { return depth == DepthFormat::npy ? 1 : 1 / units_per_metre(depth); }
 };
 
 // the bytes of a file of colours, [height, width, 3]

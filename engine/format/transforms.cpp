@@ -14,6 +14,8 @@ namespace semrover {
 
 namespace {
 
+constexpr const char* kDepthUnit = "depth_unit_scale_factor";
+
 // a frame's own value of a key, else the file's
 class Settings {
   public:
@@ -442,8 +444,21 @@ std::string picture_name(const std::string& camera, std::string_view kind, uint3
 
 PictureNames rendered_pictures(const std::string& camera, uint32_t number, const PictureEncoding& encoding)
 {
-    return {picture_name(camera, "color", number, encoding.color_extension()), picture_name(camera, "depth", number),
-            picture_name(camera, "label", number)};
+    return {picture_name(camera, "color", number, encoding.color_extension()),
+            picture_name(camera, "depth", number, encoding.depth_extension()), picture_name(camera, "label", number)};
+}
+
+Result<double> read_depth_unit(const Path& folder)
+{
+    const Path path = folder / "transforms.json";
+    const auto file = read_json(path);
+    if (!file || !file->is_object()) // who needs its cameras says what is wrong
+        return kMillimetre;
+    SR_TRY(const std::optional<double> unit, optional_number(*file, kDepthUnit, quote_path(path)));
+    if (unit && !(*unit > 0))
+        return fail(ErrorCode::bad_input, "{}: {}: expected metres above 0, found {}", quote_path(path), kDepthUnit,
+                    *unit);
+    return unit.value_or(kMillimetre);
 }
 
 Status write_transforms(const Path& path, const CameraPath& cameras, const TransformsFiles& files)
@@ -475,7 +490,7 @@ Status write_transforms(const Path& path, const CameraPath& cameras, const Trans
         list.push_back(std::move(entry));
     }
     if (depths)
-        file["depth_unit_scale_factor"] = 0.001; // metres of a unit
+        file[kDepthUnit] = files.depth_unit;
     if (!files.points.empty())
         file["ply_file_path"] = files.points;
     if (!cameras.sensors.empty())

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "engine/camera/rig.h"
+#include "engine/format/depth_picture.h"
 #include "engine/format/picture_encoding.h"
 #include "runtime/base/json.h"
 
@@ -48,14 +49,17 @@ struct PictureNames {
 struct TransformsFiles {
     // of a frame of a camera (its number in the file); empty: colours only, named by picture_name
     std::function<PictureNames(const std::string& camera, uint32_t number)> pictures;
-    std::string points; // a .ply in the path's world; empty: none
+    std::string points;              // a .ply in the path's world; empty: none
+    double depth_unit = kMillimetre; // metres of what depth pictures hold
 };
 // The names that `render` gives to pictures.
 PictureNames rendered_pictures(const std::string& camera, uint32_t number, const PictureEncoding& encoding = {});
 
+// metres of a unit of depth pictures, as the transforms.json of their folder says; else 0.001. bad_input: not above 0
+Result<double> read_depth_unit(const Path& folder);
+
 // Intrinsics are at the top where all frames share them, else in every frame: nerfstudio takes what is at the top for
-// all frames. depth_unit_scale_factor is 0.001: depth pictures hold millimetres. `rig`, our addition, has the sensors
-// as a rig.json does.
+// all frames. `rig`, our addition, has the sensors as a rig.json does.
 Status write_transforms(const Path& path, const CameraPath& cameras, const TransformsFiles& files = {});
 
 } // namespace semrover

@@ -121,7 +121,9 @@ std::vector<Path> DrawingStore::files_of(const std::string& piece) const
     const Path name = run_.path() / piece;
     std::vector<Path> files;
     for (const std::string kind : kPictures) {
-        const std::string_view extension = kind == "color" ? files_.encoding.color_extension() : "png";
+        const std::string_view extension = kind == "color"   ? files_.encoding.color_extension()
+                                           : kind == "depth" ? files_.encoding.depth_extension()
+                                                             : "png";
         files.push_back(name.parent_path() / kind / fmt::format("{}.{}", name.filename().string(), extension));
     }
     for (const char* kind : kArrays)
@@ -142,7 +144,8 @@ bool DrawingStore::has_top() const
 
 Result<bool> DrawingStore::saw_nothing(const std::string& camera, uint32_t number) const
 {
-    SR_TRY(const ImageGray16 depth, read_png_gray16(frame_path(folder(camera), "depth", number)));
+    SR_TRY(const DepthPicture depth,
+           read_depth_picture(frame_path(folder(camera), "depth", number, files_.encoding.depth_extension()), 1));
     SR_TRY(const ImageRgb8 visible, read_png_rgb8(frame_path(folder(camera), "visible", number)));
     const auto is_zero = [](auto value) { return value == 0; };
     return std::ranges::all_of(depth.pixels, is_zero) && std::ranges::all_of(visible.pixels, is_zero);
@@ -172,7 +175,8 @@ Status DrawingStore::write_cameras(const CameraPath& path) const
     const auto pictures = [this](const std::string& camera, uint32_t number) {
         return rendered_pictures(camera, number, files_.encoding);
     };
-    return write_transforms(run_.path() / kCameras, path, {pictures, files_.points ? kPoints : ""});
+    return write_transforms(run_.path() / kCameras, path,
+                            {pictures, files_.points ? kPoints : "", files_.encoding.depth_unit()});
 }
 
 } // namespace semrover

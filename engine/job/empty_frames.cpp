@@ -11,13 +11,13 @@ namespace semrover {
 
 namespace {
 
-constexpr uint32_t kDepthBits = 0xffff, kVisibleShift = 24;
+constexpr uint32_t kVisibleShift = 24;
 
 } // namespace
 
 bool sees_nothing(const FramePixels& frame)
 {
-    return std::ranges::none_of(frame.ranges, [](uint32_t word) { return word & kDepthBits; }) &&
+    return std::ranges::none_of(frame.depths, [](uint32_t word) { return word; }) &&
            std::ranges::none_of(frame.seen, [](uint32_t word) { return word >> kVisibleShift; });
 }
 

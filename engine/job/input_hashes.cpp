@@ -60,6 +60,8 @@ Json encoding_json(const PictureEncoding& e)
         settings = {{"format", "jpeg"}, {"quality", e.quality}};
     if (e.png_level != kPngLevel)
         settings["png_level"] = e.png_level;
+    if (e.depth != DepthFormat::mm)
+        settings["depth"] = kDepthFormats[size_t(e.depth)];
     return settings;
 }
 

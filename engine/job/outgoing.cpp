@@ -42,7 +42,7 @@ Status Outgoing::read(const SplatPixelSlots& slots, const ImageSize& size, std::
         };
     };
     SR_CHECK(ring_->read(slots.seen, into(&FramePixels::seen)));
-    SR_CHECK(ring_->read(slots.ranges, into(&FramePixels::ranges)));
+    SR_CHECK(ring_->read(slots.depths, into(&FramePixels::depths)));
     return ring_->read(slots.normals, [pixels, sink = std::move(sink)](std::span<const std::byte> bytes) {
         pixels->normals = words_of(bytes);
         return sink(std::move(*pixels));

@@ -109,9 +109,9 @@ void RefineFiles::give_buffer(const std::string& camera, uint32_t frame, const S
     given.buffers = frame + 1;
 }
 
-void RefineFiles::give_depth(const std::string& camera, uint32_t frame, ImageGray16 depth)
+void RefineFiles::give_depth(const std::string& camera, uint32_t frame, DepthPicture depth)
 {
-    std::map<uint32_t, ImageGray16>& latest = given_[camera].latest;
+    std::map<uint32_t, DepthPicture>& latest = given_[camera].latest;
     latest[frame] = std::move(depth);
     if (frame >= kDepthsKept)
         latest.erase(latest.begin(), latest.lower_bound(frame + 1 - kDepthsKept));
@@ -142,13 +142,13 @@ Result<FrameView> RefineFiles::view(const CameraChain& chain, uint32_t frame)
     const RefinedCamera& c = camera_of(chain);
     if (drawn_)
         SR_CHECK(out_.arrive()); // with what was drawn
-    std::map<uint32_t, ImageGray16>& latest = given_[c.name].latest;
+    std::map<uint32_t, DepthPicture>& latest = given_[c.name].latest;
     const auto found = latest.find(frame);
     if (found != latest.end())
         return FrameView{c.cameras[frame], found->second};
     if (drawn_)
         SR_CHECK(out_.drain());
-    SR_TRY(ImageGray16 depth, read_depth(c.buffers, frame));
+    SR_TRY(DepthPicture depth, read_depth(c.buffers, frame));
     if (!drawn_) {
         latest.erase(latest.begin(), latest.lower_bound(frame > 0 ? frame - 1 : 0));
         latest[frame] = depth;

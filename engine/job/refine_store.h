@@ -68,7 +68,7 @@ class RefineFiles : public FrameStore {
     // A buffer of a camera, in order from the first frame on. Its pixels (SplatPixelSlots::seen) stay until the next
     // one's; its depth may come later.
     void give_buffer(const std::string& camera, uint32_t frame, const Slot& seen);
-    void give_depth(const std::string& camera, uint32_t frame, ImageGray16 depth);
+    void give_depth(const std::string& camera, uint32_t frame, DepthPicture depth);
     bool waits_for(const FrameTask& task) const; // a buffer of it that was not given yet
 
     Status read_seen(const CameraChain& chain, uint32_t frame, const Slot& to) override;
@@ -83,9 +83,9 @@ class RefineFiles : public FrameStore {
 
   private:
     struct Given {
-        Slot seen;                              // of the last buffer that was given
-        uint32_t buffers = 0;                   // so far
-        std::map<uint32_t, ImageGray16> latest; // depths, whether given or read
+        Slot seen;                               // of the last buffer that was given
+        uint32_t buffers = 0;                    // so far
+        std::map<uint32_t, DepthPicture> latest; // depths, whether given or read
     };
     Status save(PieceKind kind, const CameraChain& chain, uint32_t frame, std::vector<float> latent);
 

@@ -200,7 +200,7 @@ class RefinementJob : public Job {
         const uint32_t number = drawing_->counts[camera]++;
         files_.give_buffer(camera, number, drawing_->seen[camera]);
         SR_CHECK(out_->read(slots, size, [this, frame, camera, number](FramePixels pixels) -> Status {
-            files_.give_depth(camera, number, {pixels.width, pixels.height, depth_pixels(pixels)});
+            files_.give_depth(camera, number, depth_picture(pixels));
             drawing_->empty.add(sees_nothing(pixels));
             const uint64_t bytes = pixels.bytes();
             SR_CHECK(out_->write(bytes, [this, number, frame, pixels = std::move(pixels)]() mutable {

@@ -175,6 +175,8 @@ Result<Json> camera_json(const Refinement& r, const RefinedCamera& c)
     if (r.settings.follows_surfaces()) {
         SR_TRY(const uint64_t depth, hash_pictures(c.buffers, {"depth"}, 0, c.range.last));
         camera["depth"] = hash_text(depth);
+        if (c.buffers.depth_unit != kMillimetre) // not there with it, so that runs of earlier versions go on
+            camera["depth_unit"] = c.buffers.depth_unit;
     }
     return camera;
 }

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/run_folder.h"
 
+#include "engine/shards/shard_set.h"
 #include "runtime/base/diagnostics.h"
 #include "runtime/base/quote.h"
 
@@ -135,6 +136,10 @@ Result<RunFolder> RunFolder::open(const Path& folder, const Json& settings, bool
     run.path_ = folder;
     run.settings_ = settings;
     run.contents_ = contents;
+    SR_TRY(const ShardsOrNone shards, open_if_shards(folder));
+    if (shards)
+        return fail(ErrorCode::usage, "{} is a shard set, which is read only: expected another output",
+                    quote_path(shards->folder()));
     SR_CHECK(make_folder(folder));
     SR_CHECK(run.refuse_links());
     SR_CHECK(run.lock());

@@ -75,7 +75,7 @@ class MissingPictures {
     {
         for (const Shard& shard : index_.shards)
             for (const ShardMember& member : shard.members) {
-                const PictureName name = *picture_name(member.path);
+                const ShardPicture name = *shard_picture(member.path);
                 visit(name.moment, Slot{Path(member.path).parent_path().string(), name.group, name.ending});
             }
     }
@@ -88,7 +88,7 @@ class MissingPictures {
 void check_member(const ShardSet& set, size_t shard, const ShardMember& m, std::vector<ShardFault>& faults)
 {
     const Bytes archive = set.archive(shard);
-    const TarHeader header = tar_header(member_name(set.index().key_prefix, *picture_name(m.path)), m.size);
+    const TarHeader header = tar_header(member_name(set.index().key_prefix, *shard_picture(m.path)), m.size);
     if (!std::ranges::equal(archive.subspan(m.offset - kTarBlock, kTarBlock), std::as_bytes(std::span(header))))
         faults.push_back({m.path, fmt::format("its header in {} is not that of the index", shard_name(shard))});
     if (hash_of(set.bytes(shard, m)) != m.hash)

@@ -43,7 +43,7 @@ Status add_file(const Path& path, std::string relative, const std::string& key_p
     if (found.pictures.size() + found.files.size() == kMostShardFiles)
         return fail(ErrorCode::bad_input, "{} is file {}, a set holds {}", quote_path(path), kMostShardFiles + 1,
                     kMostShardFiles);
-    const auto picture = picture_name(relative);
+    const auto picture = shard_picture(relative);
     if (!picture) {
         if (relative == kShardIndexName || is_shard_name(relative) || printable(relative, relative.size()) != relative)
             return fail(ErrorCode::bad_input, "{}: expected a printable name in UTF-8, and none of a set's own",

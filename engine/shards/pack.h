@@ -9,7 +9,7 @@
 namespace semrover {
 
 struct ShardOptions {
-    std::string key_prefix;              // in front of each moment's number: "SCENE_DRIVE_"
+    std::string key_prefix = {};         // in front of each moment's number: "SCENE_DRIVE_"
     uint64_t shard_bytes = 512ull << 20; // an archive ends before it has more, unless one moment alone has
     bool replace = false;                // a set that is there
     std::vector<std::string> skip = {};  // files and folders directly in the folder that are left out
@@ -22,7 +22,7 @@ struct ShardSetInfo {
     uint64_t files = 0; // beside them
 };
 
-// Packs a folder of pictures (picture_name()) into a shard set at `output`, with its other files beside the archives.
+// Packs a folder of pictures (shard_picture()) into a shard set at `output`, with its other files beside the archives.
 // Equal pictures and options give equal bytes. One picture is open at a time; the index comes last, so that a folder
 // in which this was stopped is no set and is packed anew. Memory: some 200 bytes a file.
 // Errors: usage for a set that is there, for other files in `output`, for one folder inside the other, for a key_prefix

@@ -96,7 +96,7 @@ Result<ShardMember> read_row(const Json& row, bool with_offset, std::string_view
 // Adds a member behind those of a shard, which end at `end`
 Status add_member(ShardMember member, std::string_view key_prefix, uint64_t& end, Shard& shard, std::string_view where)
 {
-    const auto name = picture_name(member.path);
+    const auto name = shard_picture(member.path);
     if (!name)
         return wrong(where, "expected a path [CAMERA/]KIND/NNNNNN.ENDING, found {}", quote(member.path));
     if (member_name(key_prefix, *name).size() > kMostTarName || member.size > kMostTarFile)
@@ -142,7 +142,7 @@ Status check_order(const ShardIndex& index, std::string_view file)
     for (const Shard& shard : index.shards) {
         const std::optional<uint32_t> split = before ? std::optional(before->first) : std::nullopt;
         for (const ShardMember& member : shard.members) {
-            const PictureName name = *picture_name(member.path);
+            const ShardPicture name = *shard_picture(member.path);
             std::pair<uint32_t, std::string> now{name.moment, member_name(index.key_prefix, name)};
             if (split == now.first)
                 return wrong(file, "moment {} is in two archives", now.first);
@@ -168,7 +168,7 @@ Status read_files(const Json& json, ShardIndex& index, std::string_view file)
     for (const Json& row : json) {
         const std::string place = fmt::format("{}: file {}", file, index.files.size());
         SR_TRY(ShardMember member, read_row(row, false, place));
-        if (!leads_inside(member.path) || picture_name(member.path))
+        if (!leads_inside(member.path) || shard_picture(member.path))
             return wrong(place, "expected the path of another file inside the folder, found {}", quote(member.path));
         if (!index.files.empty() && member.path <= index.files.back().path)
             return wrong(place, "{} is behind {}, expected files in order, each once", quote(member.path),
@@ -192,7 +192,7 @@ bool is_shard_name(std::string_view name)
            std::from_chars(name.data() + 7, name.data() + 12, number).ec == std::errc() && name == shard_name(number);
 }
 
-std::optional<PictureName> picture_name(std::string_view path)
+std::optional<ShardPicture> shard_picture(std::string_view path)
 {
     std::vector<std::string> folders;
     std::string_view file = path;
@@ -204,7 +204,7 @@ std::optional<PictureName> picture_name(std::string_view path)
     if (!moment || ending.size() > 16 || !are_alphanumeric(ending) || folders.size() > 3 ||
         !std::ranges::all_of(folders, is_camera_name))
         return std::nullopt;
-    PictureName name{*moment, Path(path).parent_path().string(), "", "", std::string(ending)};
+    ShardPicture name{*moment, Path(path).parent_path().string(), "", "", std::string(ending)};
     if (folders.size() > 1 && folders[0] == "buffers")
         folders.erase(folders.begin());
     if (folders.empty() || folders.size() > 2)
@@ -227,7 +227,7 @@ bool is_key_prefix(std::string_view prefix)
            });
 }
 
-std::string member_name(std::string_view key_prefix, const PictureName& p)
+std::string member_name(std::string_view key_prefix, const ShardPicture& p)
 {
     return fmt::format("{}{:06}.{}{}{}.{}", key_prefix, p.moment, p.camera, p.camera.empty() ? "" : ".", p.kind,
                        p.ending);

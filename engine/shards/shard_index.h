@@ -20,17 +20,17 @@ bool is_shard_name(std::string_view name);
 
 // What a picture's path in its folder says: [buffers/][CAMERA/]KIND/NNNNNN.ENDING, or
 // {frames,latents}/[CAMERA/]NNNNNN.ENDING, whose kind is `frame` or `latent`
-struct PictureName {
+struct ShardPicture {
     uint32_t moment = 0; // the number of its frame
     std::string group;   // the folder around it without its kind: "", "front", "frames", "frames/front"
     std::string camera, kind, ending;
 };
-std::optional<PictureName> picture_name(std::string_view path); // none: it is no picture
+std::optional<ShardPicture> shard_picture(std::string_view path); // none: it is no picture
 
 bool is_key_prefix(std::string_view prefix); // up to 48 letters, digits, '_' and '-'
 
 // the name in an archive: "SCENE_DRIVE_000012.front.color.png"
-std::string member_name(std::string_view key_prefix, const PictureName& picture);
+std::string member_name(std::string_view key_prefix, const ShardPicture& picture);
 
 struct ShardMember {
     std::string path;              // in the folder

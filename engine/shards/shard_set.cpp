@@ -21,6 +21,14 @@ OpenSets& open_sets()
     return all;
 }
 
+// whatever way a path is written
+Path key_path(const Path& folder)
+{
+    std::error_code ignored;
+    const Path whole = std::filesystem::absolute(folder, ignored).lexically_normal();
+    return whole.has_filename() ? whole : whole.parent_path(); // "set/"
+}
+
 // whether a folder's index.json is one of ours, whatever else is wrong with it
 bool has_shard_index(const Path& folder)
 {
@@ -37,10 +45,9 @@ bool has_shard_index(const Path& folder)
 
 Result<std::shared_ptr<const ShardSet>> ShardSet::open(const Path& folder)
 {
-    std::error_code ignored;
     OpenSets& all = open_sets();
     const std::lock_guard guard(all.mutex);
-    std::weak_ptr<const ShardSet>& known = all.sets[std::filesystem::absolute(folder, ignored).lexically_normal()];
+    std::weak_ptr<const ShardSet>& known = all.sets[key_path(folder)];
     if (std::shared_ptr<const ShardSet> set = known.lock())
         return set;
     SR_TRY(ShardIndex index, read_shard_index(folder));

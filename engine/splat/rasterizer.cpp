@@ -162,7 +162,7 @@ Status Rasterizer::build()
         z_scale_ = state_.slot(1, 2, DType::f32, "scale of the z-buffer", 2);
     }
     if (options_.pixels_over)
-        pixels_ = {state_.slot(pixels, 1, DType::u32, "seen", 1), state_.slot(pixels, 1, DType::u32, "ranges", 1),
+        pixels_ = {state_.slot(pixels, 1, DType::u32, "seen", 1), state_.slot(pixels, 1, DType::u32, "depths", 1),
                    state_.slot(pixels, 1, DType::u32, "normals", 1)};
     else
         declare_images(pixels);
@@ -186,9 +186,10 @@ Status Rasterizer::build()
         o.made[i] = options_.pixels_over || options_.formats[i].texels != Texels::none;
     const SplatImages y = splat(g, scene_.in(g, rows_), camera_table_.in(g), o);
     if (options_.pixels_over) {
-        const PixelWords pixels_of_files = splat_pixels(g, y, {*options_.pixels_over, options_.visible_alpha});
+        const PixelWords pixels_of_files =
+            splat_pixels(g, y, {*options_.pixels_over, options_.visible_alpha, options_.depth_units});
         g.keep(pixels_of_files.seen, pixels_.seen);
-        g.keep(pixels_of_files.ranges, pixels_.ranges);
+        g.keep(pixels_of_files.depths, pixels_.depths);
         g.keep(pixels_of_files.normals, pixels_.normals);
     } else {
         keep_images(g, y);
@@ -334,7 +335,7 @@ Result<uint32_t> Rasterizer::draw(std::span<const SplatCamera> cameras)
 SplatPixelSlots Rasterizer::pixels(uint32_t camera) const
 {
     const uint32_t pixels = width_ * height_, first = camera * pixels;
-    return {pixels_.seen.row_range(first, pixels), pixels_.ranges.row_range(first, pixels),
+    return {pixels_.seen.row_range(first, pixels), pixels_.depths.row_range(first, pixels),
             pixels_.normals.row_range(first, pixels)};
 }
 

@@ -57,6 +57,7 @@ struct RasterizerOptions {
     CameraModel model = CameraModel::pinhole; // of all cameras
     // keeps pixels as files have them, over this background, in place of images: draw() and pixels(), not render()
     std::optional<std::array<uint8_t, 3>> pixels_over = {};
+    float depth_units = 1000;  // of these, to a metre; 0: fp32 metres
     bool depth_tested = false; // against z_buffer(), of pinholes
     // of color, surface, depth and ids: how images() has them, and whether it has. render() needs them whole
     std::array<PictureFormat, 4> formats = {};
@@ -71,7 +72,7 @@ struct SplatSlots {
     std::array<Slot*, 4> all() { return {&color, &surface, &depth, &ids}; }
 };
 struct SplatPixelSlots {
-    Slot seen, ranges, normals;
+    Slot seen, depths, normals;
 };
 
 // Draws a scene from up to max_cameras cameras in one submit; more are drawn in turns. The graph is built once and

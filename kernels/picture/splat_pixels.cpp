@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// bytes, millimetres, labels and directions of what splats look like: [P, ..] -> three words a pixel
+// bytes, depths, labels and directions of what splats look like: [P, ..] -> three words a pixel
 #include "kernels/picture.h"
 
 #include "splat_pixels.spv.h"
@@ -14,16 +14,17 @@ PixelWords splat_pixels(Graph& g, const SplatImages& images, const SplatPixelsOp
                   images.surface.rows == pixels && images.depth.rows == pixels && images.ids.rows == pixels,
               "splat_pixels: {}, {}, {} and {} pixels", pixels, images.surface.rows, images.depth.rows,
               images.ids.rows);
-    const PixelWords y{g.array(pixels, DType::u32, "seen"), g.array(pixels, DType::u32, "ranges"),
+    const PixelWords y{g.array(pixels, DType::u32, "seen"), g.array(pixels, DType::u32, "depths"),
                        g.array(pixels, DType::u32, "normals")};
     const auto& [red, green, blue] = options.background;
     const SplatPixelsPush push{.pixels = pixels,
                                .red = float(red),
                                .green = float(green),
                                .blue = float(blue),
-                               .visible_alpha = options.visible_alpha};
+                               .visible_alpha = options.visible_alpha,
+                               .depth_units = options.depth_units};
     g.dispatch(kernel::splat_pixels,
-               {images.color, images.surface, images.depth, images.ids, y.seen, y.ranges, y.normals}, push,
+               {images.color, images.surface, images.depth, images.ids, y.seen, y.depths, y.normals}, push,
                threads(pixels));
     return y;
 }

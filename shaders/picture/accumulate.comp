@@ -19,19 +19,15 @@ layout(push_constant) uniform AccumulatePush {
 layout(binding = 0) readonly buffer Cameras { vec4 cameras[]; };       // [2, kCameraVectors] of the frame and the one before
 layout(binding = 1) readonly buffer Now { uint now[]; };               // [words] bytes
 layout(binding = 2) readonly buffer Past { uint past[]; };             // [words] bytes
-layout(binding = 3) readonly buffer DepthNow { uint depth_now[]; };    // [pixels] millimetres in the low 16 bits
-layout(binding = 4) readonly buffer DepthPast { uint depth_past[]; };  // [pixels]
+layout(binding = 3) readonly buffer DepthNow { float depth_now[]; };   // [pixels] metres; 0: nothing
+layout(binding = 4) readonly buffer DepthPast { float depth_past[]; }; // [pixels]
 layout(binding = 5) writeonly buffer Result { uint result[]; };        // [words] bytes
 
 #include "lib/splat_camera.glsl"
 
 const float kInfinity = 1e7; // metres
 
-float metres(uint word)
-{
-    const uint millimetres = word & 0xffffu;
-    return millimetres == 0 || millimetres == 65535 ? kInfinity : float(millimetres) * 1e-3;
-}
+float metres(float depth) { return depth > 0.0 ? depth : kInfinity; }
 
 // columns go on around a panorama, of which they leave two at most
 ivec2 inside(ivec2 at)

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
 """What other programs make of our files, and we of theirs. A program that is not installed skips its tests by name.
+Python's own tarfile is one of them.
 
 Programs: colmap and python3-skimage of Debian (tools/setup --programs); of npm, gltf-validator and
 @playcanvas/splat-transform in the folder NODE_MODULES.
@@ -11,6 +12,7 @@ import os
 import shutil
 import struct
 import subprocess
+import tarfile
 import tempfile
 import unittest
 from pathlib import Path
@@ -90,6 +92,35 @@ class Gltf(Case):
         run(SEMROVER, "fuse", "-q", frames, "--poses", path, "--fov-x", 73, "--tsdf-voxel", 0.3,
             "-o", self.folder / "fused")
         self.assertEqual(self.issues(self.folder / "fused" / "mesh.glb"), [])
+
+
+class Shards(Case):
+    def test_python_reads_the_archives_that_the_index_describes(self):
+        source, packed = self.folder / "in", self.folder / "set"
+        for moment in range(7):
+            for camera in "front", "left.up":
+                for kind in "color", "depth":
+                    path = source / camera / kind / f"{moment:06}.png"
+                    path.parent.mkdir(parents=True, exist_ok=True)
+                    path.write_bytes(os.urandom(moment * 511))
+        run(SEMROVER, "dataset", "pack", "-q", source, "-o", packed, "--key", "S_D_", "--shard-size", "12k")
+        index = json.loads((packed / "index.json").read_text())
+        self.assertGreater(len(index["shards"]), 1)
+        samples = {}  # as WebDataset takes them: the files of one name up to its first dot
+        for shard in index["shards"]:
+            with tarfile.open(packed / shard["file"], "r:") as archive:
+                members = archive.getmembers()
+                self.assertEqual(len(members), len(shard["members"]))
+                for found, (path, offset, size, _) in zip(members, shard["members"]):
+                    self.assertEqual((found.offset_data, found.size), (offset, size))
+                    self.assertEqual((found.type, found.mode, found.mtime, found.uid, found.gid, found.uname),
+                                     (tarfile.REGTYPE, 0o644, 0, 0, 0, ""))
+                    self.assertEqual(archive.extractfile(found).read(), (source / path).read_bytes())
+                    key, field = found.name.split(".", 1)
+                    self.assertEqual(samples.setdefault(key, shard["file"]), shard["file"])
+                    camera, kind, name = path.split("/")
+                    self.assertEqual((key, field), ("S_D_" + name[:6], f"{camera}.{kind}.png"))
+        self.assertEqual(sorted(samples), [f"S_D_{moment:06}" for moment in range(7)])
 
 
 class Viewers(Case):

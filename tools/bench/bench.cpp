@@ -148,6 +148,7 @@ void add_bench(CLI::App& app, const Globals& globals, Run& run)
     add_bench_sort(*bench, globals, run);
     add_bench_world(*bench, globals, run);
     add_bench_splat(*bench, globals, run);
+    add_bench_pictures(*bench, globals, run);
 }
 
 } // namespace semrover

@@ -12,6 +12,8 @@
 
 namespace semrover {
 
+struct Splats;
+
 // times of a measured piece of work, warm
 struct Timing {
     double ms_median = 0, ms_min = 0;
@@ -72,6 +74,9 @@ struct GemmShape {
 };
 Result<std::unique_ptr<Program>> gemm_program(Device& device, BenchInputs& inputs, const GemmShape& shape, DType dtype);
 
+// a street: ground, two facades and blobs between them, in front of a camera at the origin that looks along x
+Splats street_splats(uint32_t count, float sigma);
+
 void add_bench_gemm(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_conv(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_transformer(CLI::App& bench, const Globals& globals, Run& run);
@@ -83,5 +88,6 @@ void add_bench_regions(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_sort(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_world(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_splat(CLI::App& bench, const Globals& globals, Run& run);
+void add_bench_pictures(CLI::App& bench, const Globals& globals, Run& run);
 
 } // namespace semrover

@@ -46,36 +46,6 @@ Status bench_sort(const SortOptions& o, const Globals& globals)
     return write_profile(*device, o.profile);
 }
 
-// a street: ground, two facades and blobs between them, in front of a camera at the origin that looks along x
-Splats street_splats(uint32_t count, float sigma)
-{
-    Splats s;
-    uint32_t state = 777;
-    const auto random = [&] {
-        state = state * 1664525u + 1013904223u;
-        return float(state >> 8) / 16777216.f;
-    };
-    for (uint32_t i = 0; i < count; ++i) {
-        const float along = 1 + 60 * random(), a = random(), b = random();
-        std::array<float, 3> p{along, 16 * a - 8, -1.7f}, n{0, 0, 1};
-        if (i % 4 == 3) {
-            p = {along, 10 * a - 5, 3 * b - 1.7f};
-            n = {-1, 0, 0};
-        } else if (i % 4) {
-            p = {along, i % 4 == 1 ? 8.f : -8.f, 12 * a - 1.7f};
-            n = {0, i % 4 == 1 ? -1.f : 1.f, 0};
-        }
-        s.position.push_back(p);
-        s.normal.push_back(n);
-        s.color.push_back({a, b, random()});
-        s.sigma_u.push_back(sigma);
-        s.sigma_v.push_back(sigma);
-        s.opacity.push_back(1);
-        s.label.push_back(uint8_t(i % 20));
-    }
-    return s;
-}
-
 Intrinsics bench_camera(CameraModel model, uint32_t width, uint32_t height)
 {
     if (model == CameraModel::equirectangular)
@@ -112,6 +82,35 @@ Status bench_splat(const SplatBenchOptions& o, const Globals& globals)
 }
 
 } // namespace
+
+Splats street_splats(uint32_t count, float sigma)
+{
+    Splats s;
+    uint32_t state = 777;
+    const auto random = [&] {
+        state = state * 1664525u + 1013904223u;
+        return float(state >> 8) / 16777216.f;
+    };
+    for (uint32_t i = 0; i < count; ++i) {
+        const float along = 1 + 60 * random(), a = random(), b = random();
+        std::array<float, 3> p{along, 16 * a - 8, -1.7f}, n{0, 0, 1};
+        if (i % 4 == 3) {
+            p = {along, 10 * a - 5, 3 * b - 1.7f};
+            n = {-1, 0, 0};
+        } else if (i % 4) {
+            p = {along, i % 4 == 1 ? 8.f : -8.f, 12 * a - 1.7f};
+            n = {0, i % 4 == 1 ? -1.f : 1.f, 0};
+        }
+        s.position.push_back(p);
+        s.normal.push_back(n);
+        s.color.push_back({a, b, random()});
+        s.sigma_u.push_back(sigma);
+        s.sigma_v.push_back(sigma);
+        s.opacity.push_back(1);
+        s.label.push_back(uint8_t(i % 20));
+    }
+    return s;
+}
 
 void add_bench_sort(CLI::App& bench, const Globals& globals, Run& run)
 {

@@ -277,9 +277,11 @@ void add_depth_options(CLI::App& command, DepthEncoding& e)
                [&e](const std::string& word) {
                    e.kind = DepthKind(std::ranges::find(kDepthKinds, word) - kDepthKinds.begin());
                });
-    add_number(command, "--depth-scale", e.unit,
-               "metres of one unit of depth; 0.001 (TUM RGB-D: 0.0002, KITTI: 0.00390625), of fractions in .npy 1",
-               1e-6, 10.0);
+    add_number(
+        command, "--depth-scale", e.unit,
+        "metres of one unit of depth; what transforms.json says, else 0.001 (TUM RGB-D: 0.0002, KITTI: 0.00390625), of "
+        "fractions in .npy 1",
+        1e-6, 10.0);
 }
 
 } // namespace semrover

@@ -3,6 +3,7 @@
 #include "tools/commands/convert.h"
 
 #include "engine/format/labelled_points.h"
+#include "engine/shards/shard_set.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/print_stderr.h"
@@ -112,6 +113,7 @@ Result<Path> find_picture(const Path& folder, const std::string& camera, uint32_
 // Links, or copies where the file system has none. Also without folders: the first loader of 3DGS looks there.
 Status link_images(const Path& model, const CameraPath& path, const Path& from)
 {
+    SR_TRY(const ShardsOrNone shards, open_if_shards(from));
     std::map<std::string, uint32_t> counts;
     for (const CameraFrame& f : path.frames)
         counts[f.camera] = 0;
@@ -124,10 +126,10 @@ Status link_images(const Path& model, const CameraPath& path, const Path& from)
             std::error_code error;
             fs::remove(to, error);
             fs::create_hard_link(picture, to, error);
-            if (error)
-                fs::copy_file(picture, to, error);
-            if (error)
-                return fail(ErrorCode::bad_input, "cannot write {}: {}", quote_path(to), error.message());
+            if (error) {
+                SR_TRY(const MappedFile bytes, MappedFile::open(picture));
+                SR_CHECK(write_file_atomically(to, bytes.bytes()));
+            }
         }
     }
     return {};

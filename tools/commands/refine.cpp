@@ -9,7 +9,7 @@
 #include "tools/cli/run_job.h"
 #include "tools/cli/session.h"
 #include "tools/cli/value_options.h"
-#include "tools/commands/picture_options.h"
+#include "tools/cli/picture_options.h"
 #include "tools/commands/scene_input.h"
 #include "tools/commands/trajectory_options.h"
 #include "tools/commands/video.h"

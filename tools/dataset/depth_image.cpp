@@ -12,14 +12,13 @@ namespace semrover {
 namespace {
 
 constexpr uint64_t kMaxDepthBytes = 1u << 30;
-constexpr double kMillimetre = 0.001;
 constexpr uint32_t kCarlaFar = 0xffffff;
 constexpr double kCarlaMetres = 1000;
 
 Result<DepthImage> depth_of_npy(std::span<const std::byte> file, std::string_view where, const DepthEncoding& e)
 {
     SR_TRY(NpyImage image, decode_npy_image(file, where));
-    const auto unit = float(e.unit.value_or(image.whole ? kMillimetre : 1));
+    const auto unit = float(e.unit.value_or(image.whole ? e.usual_unit : 1));
     for (float& d : image.values)
         d = std::isfinite(d) && d > 0 && !(image.whole && d == 65535) ? d * unit : 0;
     return DepthImage{image.size, std::move(image.values), e.kind.value_or(DepthKind::z)};
@@ -30,7 +29,7 @@ Result<DepthImage> depth_of_gray(std::span<const std::byte> file, std::string_vi
     SR_TRY(const PngNumbers image, decode_png_numbers(file, where));
     DepthImage depth{image.info.size, {}, e.kind.value_or(DepthKind::z)};
     depth.metres.reserve(image.values.size());
-    const auto unit = float(e.unit.value_or(kMillimetre));
+    const auto unit = float(e.unit.value_or(e.usual_unit));
     for (const uint16_t d : image.values)
         depth.metres.push_back(d == 65535 ? 0 : float(d) * unit);
     return depth;

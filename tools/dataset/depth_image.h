@@ -3,7 +3,7 @@
 #pragma once
 
 #include "engine/camera/camera.h"
-#include "engine/format/image.h"
+#include "engine/format/depth_picture.h"
 
 namespace semrover {
 
@@ -15,7 +15,8 @@ enum class DepthKind : uint8_t {
 
 struct DepthEncoding {
     std::optional<DepthKind> kind; // none: carla for pictures in 8-bit colour, else z
-    std::optional<double> unit;    // metres of one unit; none: 0.001 of whole numbers, 1 of fractions
+    std::optional<double> unit;    // metres of one unit; none: as below of whole numbers, 1 of fractions
+    double usual_unit = kMillimetre;
 };
 
 struct DepthImage {

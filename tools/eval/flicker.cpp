@@ -36,19 +36,14 @@ std::optional<Taps> taps_at(double x, double y, uint32_t width, uint32_t height)
                 {(1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v}};
 }
 
-double metres(uint16_t depth, const FlowOptions& o) // 0: nothing
-{
-    return depth == 65535 ? 0 : depth * o.depth_scale;
-}
-
 // 1 / depth between pixels; 0 where one of them has none
-double inverse_depth(const Taps& taps, const ImageGray16& depth, const FlowOptions& o)
+double inverse_depth(const Taps& taps, const DepthPicture& depth)
 {
     double sum = 0;
     for (size_t i = 0; i < 4; ++i) {
         if (taps.weights[i] <= kRounding)
             continue;
-        const double d = metres(depth.pixels[taps.pixels[i]], o);
+        const double d = depth.pixels[taps.pixels[i]] * depth.unit;
         if (!(d > 0))
             return 0;
         sum += taps.weights[i] / d;
@@ -58,8 +53,8 @@ double inverse_depth(const Taps& taps, const ImageGray16& depth, const FlowOptio
 
 } // namespace
 
-Flow flow_between(const CameraFrame& from, const ImageGray16& from_depth, const CameraFrame& to,
-                  const ImageGray16& to_depth, const FlowOptions& o)
+Flow flow_between(const CameraFrame& from, const DepthPicture& from_depth, const CameraFrame& to,
+                  const DepthPicture& to_depth, const FlowOptions& o)
 {
     const uint32_t width = to.intrinsics.width, height = to.intrinsics.height;
     SR_ASSERT(to_depth.width == width && to_depth.height == height && from_depth.width == from.intrinsics.width &&
@@ -69,7 +64,7 @@ Flow flow_between(const CameraFrame& from, const ImageGray16& from_depth, const 
     Flow flow;
     flow.sources.resize(size_t(width) * height);
     for (size_t i = 0; i < flow.sources.size(); ++i) {
-        const double depth = metres(to_depth.pixels[i], o);
+        const double depth = to_depth.pixels[i] * to_depth.unit;
         if (!(depth > 0))
             continue;
         ++flow.with_depth;
@@ -77,7 +72,7 @@ Flow flow_between(const CameraFrame& from, const ImageGray16& from_depth, const 
         if (!seen)
             continue;
         const auto taps = taps_at(seen->x, seen->y, from_depth.width, from_depth.height);
-        if (taps && std::abs(seen->depth * inverse_depth(*taps, from_depth, o) - 1) <= o.tolerance)
+        if (taps && std::abs(seen->depth * inverse_depth(*taps, from_depth) - 1) <= o.tolerance)
             flow.sources[i] = {seen->x, seen->y};
     }
     return flow;

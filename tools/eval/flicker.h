@@ -3,15 +3,14 @@
 #pragma once
 
 #include "engine/camera/camera.h"
-#include "engine/format/image.h"
+#include "engine/format/depth_picture.h"
 
 #include <limits>
 
 namespace semrover {
 
 struct FlowOptions {
-    double depth_scale = 0.001; // metres of one unit of depth; 0 and 65535: nothing
-    double tolerance = 0.01;    // relative: by how much the depths of both frames may differ
+    double tolerance = 0.01; // relative: by how much the depths of both frames may differ
 };
 
 // where the pixels of one frame were in another one, in a scene in which nothing moves
@@ -27,8 +26,8 @@ struct Flow {
 // From the depth of `to`: its point in the world, seen by `from`. Valid where that lies between four pixel centres of
 // `from` whose depths, interpolated as 1 / depth (exact on a plane through a pinhole), agree with it. Depths are along
 // the optical axis or, where Lens::radial_depth says so, from the camera. Pictures have the cameras' sizes.
-Flow flow_between(const CameraFrame& from, const ImageGray16& from_depth, const CameraFrame& to,
-                  const ImageGray16& to_depth, const FlowOptions& options = {});
+Flow flow_between(const CameraFrame& from, const DepthPicture& from_depth, const CameraFrame& to,
+                  const DepthPicture& to_depth, const FlowOptions& options = {});
 
 // differences of a frame from what the one before it has there, bilinear, over valid pixels: sums over three channels
 struct WarpSums {

@@ -39,7 +39,7 @@ Result<FrameFiles> list_frames(const Path& folder, std::string_view kind)
         base = folder / "frames";
     else if (is_folder(folder / kind))
         base = folder / kind;
-    SR_TRY(std::vector<Path> paths, list_all_images(base, kind == "label"));
+    SR_TRY(std::vector<Path> paths, list_all_images(base, kind == "label" || kind == "depth"));
     const auto of_kind = [&](const Path& path) { return path.parent_path().filename() == kind; };
     if (std::ranges::any_of(paths, of_kind))
         std::erase_if(paths, [&](const Path& path) { return !of_kind(path); });
@@ -90,9 +90,9 @@ Result<ImageRgb8> read_color_frame(const Path& path, ImageSize size)
     return image;
 }
 
-Result<ImageGray16> read_depth_frame(const Path& path, ImageSize size)
+Result<DepthPicture> read_depth_frame(const Path& path, ImageSize size, double unit)
 {
-    SR_TRY(ImageGray16 image, read_png_gray16(path));
+    SR_TRY(DepthPicture image, read_depth_picture(path, unit));
     SR_CHECK(check_size(path, {image.width, image.height}, size));
     return image;
 }

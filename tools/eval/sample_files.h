@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/format/image.h"
+#include "engine/format/depth_picture.h"
 #include "engine/scene/scene_points.h"
 #include "engine/shards/shard_set.h"
 #include "runtime/base/file.h"
@@ -55,8 +55,8 @@ struct FrameFiles : std::map<std::string, Path> {
     ShardsOrNone shards; // that they are in
 };
 
-// The .png, .jpg and .jpeg files (of labels .npy, too) of a kind ("color", "depth", "label", "visible"): those in
-// FOLDER/KIND, or in CAMERA/KIND of folders of cameras, as `render` and `streets` write them; colour also in
+// The .png, .jpg and .jpeg files (of labels and depth .npy, too) of a kind ("color", "depth", "label", "visible"):
+// those in FOLDER/KIND, or in CAMERA/KIND of folders of cameras, as `render` and `streets` write them; colour also in
 // FOLDER/frames, as `refine` writes it; else all in FOLDER and below; FOLDER may be a shard set, or in one. Errors:
 // bad_input: no such folder, none in it, two of one name, and as open_if_shards()
 Result<FrameFiles> list_frames(const Path& folder, std::string_view kind);
@@ -70,6 +70,6 @@ Result<std::vector<uint8_t>> read_gray_frame(const Path& path, ImageSize size);
 // classes, or kNoLabel; `map` counts the numbers that it looks up
 Result<std::vector<uint8_t>> read_label_frame(const Path& path, ImageSize size, PictureClasses& map);
 Result<ImageRgb8> read_color_frame(const Path& path, ImageSize size); // likewise; a width of 0: any size
-Result<ImageGray16> read_depth_frame(const Path& path, ImageSize size);
+Result<DepthPicture> read_depth_frame(const Path& path, ImageSize size, double unit); // of read_depth_picture()
 
 } // namespace semrover

@@ -129,6 +129,7 @@ Result<FusionFolder> FusionFolder::open(const Path& folder, const FusionFolderOp
     SR_TRY(const Path poses, poses_of(folder, options.poses));
     f.folder_ = folder;
     f.encoding_ = options.depth;
+    SR_TRY(f.encoding_.usual_unit, read_depth_unit(folder));
     SR_TRY(f.classes_, PictureClasses::create(options.map));
     SR_CHECK(f.read_poses(poses, options));
     SR_CHECK(f.find_frames(poses, options));

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover eval flicker FRAMES --depth DIR --path P: what changes from frame to frame although nothing moves
+#include "engine/format/transforms.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/camera_options.h"
@@ -24,6 +25,7 @@ struct EvalFlickerArguments {
     LensOptions lens;
     PathOptions placement;
     FlowOptions flow;
+    std::optional<double> depth_unit; // metres; none: as the folder's transforms.json says
 };
 
 struct NamedCamera {
@@ -37,6 +39,7 @@ struct Step {
 
 struct FlickerInputs {
     FrameFiles frames, depth, truth; // the last may be empty
+    double depth_unit = kMillimetre;
     std::vector<Step> steps;
     std::vector<std::string> warnings;
 };
@@ -82,7 +85,10 @@ Result<FlickerInputs> read_inputs(const EvalFlickerArguments& o)
         SR_CHECK(check_names(in.frames, o.frames, in.truth, o.truth, false));
     }
     LensOptions lens = o.lens;
-    SR_TRY(const ImageGray16 first, read_depth_frame(in.depth.begin()->second, {}));
+    const Path depth = o.depth;
+    SR_TRY(const double said, read_depth_unit(depth.filename() == "depth" ? depth.parent_path() : depth));
+    in.depth_unit = o.depth_unit.value_or(said);
+    SR_TRY(const DepthPicture first, read_depth_frame(in.depth.begin()->second, {}, in.depth_unit));
     if (lens.width == 0)
         lens.width = first.width;
     if (lens.height == 0)
@@ -101,7 +107,7 @@ Result<FlickerInputs> read_inputs(const EvalFlickerArguments& o)
 // pictures of the frame that was read last, which is the first of the next step
 struct Pictures {
     std::string name;
-    ImageGray16 depth;
+    DepthPicture depth;
     ImageRgb8 frame, truth;
 };
 
@@ -111,7 +117,7 @@ Result<Pictures> read_pictures(const FlickerInputs& in, const NamedCamera& camer
     Pictures p;
     p.name = camera.name;
     const Path& depth = in.depth.at(camera.name);
-    SR_TRY(p.depth, read_depth_frame(depth, {}));
+    SR_TRY(p.depth, read_depth_frame(depth, {}, in.depth_unit));
     if (ImageSize{p.depth.width, p.depth.height} != size)
         return fail(ErrorCode::bad_input, "{} is {} x {} pixels, the camera of the path has {} x {}", quote_path(depth),
                     p.depth.width, p.depth.height, size.width, size.height);
@@ -216,10 +222,11 @@ void add_eval_flicker(CLI::App& eval, const Globals& globals, Run& run)
     CLI::App* c = eval.add_subcommand("flicker", "change from frame to frame that depth and poses do not explain");
     c->add_option("FRAMES", o->frames, "a folder of pictures 000000 and so on, or what `refine` or `render` wrote")
         ->required();
-    c->add_option("--depth", o->depth, "16-bit depth of these names; 0 and 65535: nothing")->required();
+    c->add_option("--depth", o->depth, "depth of these names: 16-bit PNG (0 and 65535: nothing) or .npy")->required();
     c->add_option("--path", o->path, "trajectory of the frames, in any format that `render` reads")->required();
     c->add_option("--truth", o->truth, "true pictures of these names: also their figure, which is the floor");
-    add_number(*c, "--depth-scale", o->flow.depth_scale, "metres of one unit of depth; 0.001", 1e-6, 10.0);
+    add_number(*c, "--depth-scale", o->depth_unit,
+               "metres of one unit of depth; what transforms.json in its folder says, else 0.001", 1e-6, 10.0);
     add_number(*c, "--tolerance", o->flow.tolerance, "relative, of the depths of both frames; 0.01", 1e-6, 1.0);
     add_lens_options(*c, o->lens);
     add_placement_options(*c, o->placement);

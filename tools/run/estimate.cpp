@@ -126,16 +126,15 @@ class Trial {
 Status Trial::try_scene(TaskRunner& runner, const JobScene& scene)
 {
     const Task task{&scene, nullptr};
+    SR_TRY(const Json expected, runner.expect(task));
+    device_bytes_ = std::max(device_bytes_, expected.value("peak_device_bytes", uint64_t(0)));
     std::erase_if(trial_.generate, [](const JobOption& o) { return o.first == "--steps" || o.first == "--preset"; });
     trial_.generate.emplace_back("--steps", "1");
     SR_CHECK(runner.run(task).map([](auto) {}));
     scene_ = rate_of(trial_.out / task.name());
-    trial_.generate = job_.generate;
-    SR_TRY(const Json expected, runner.expect(task));
     scene_.seconds = expected.value("seconds", 0.0);
-    device_bytes_ = std::max(device_bytes_, expected.value("peak_device_bytes", uint64_t(0)));
-    for (double* part : {&scene_.seconds, &scene_.bytes, &scene_.files})
-        *part /= part == &scene_.files ? 1.0 : double(std::max<uint64_t>(scene.weight, 1));
+    for (double* part : {&scene_.seconds, &scene_.bytes})
+        *part /= double(std::max<uint64_t>(scene.weight, 1));
     return {};
 }
 

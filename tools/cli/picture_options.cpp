@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/commands/picture_options.h"
+#include "tools/cli/picture_options.h"
 
 #include "tools/cli/value_options.h"
 

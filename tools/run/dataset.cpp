@@ -82,7 +82,7 @@ Json contents_json(const ShardIndex& index)
         bytes += shard.bytes;
         pictures += shard.members.size();
         for (const ShardMember& member : shard.members) {
-            const PictureName name = *picture_name(member.path);
+            const ShardPicture name = *shard_picture(member.path);
             CameraContents& c = cameras[name.camera];
             c.first = std::min(c.first, name.moment);
             c.last = std::max(c.last, name.moment);
