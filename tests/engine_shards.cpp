@@ -122,6 +122,8 @@ TEST_F(Shards, a_set_is_read_as_the_folder_it_was)
         EXPECT_EQ(tree(set).size(), 19u + 4u);
     }
     EXPECT_FALSE(is_there(set / "front"));
+    put("set/front/notes.txt", "a folder of the disk in it means the whole, too");
+    EXPECT_NE(open_if_shards(set / "front/color")->get(), nullptr);
     EXPECT_EQ(open_if_shards(in)->get(), nullptr);
     EXPECT_EQ(open_if_shards(folder_ / "none/at/all")->get(), nullptr);
 }
@@ -231,6 +233,26 @@ TEST_F(Shards, pictures_that_others_have_are_missed)
     ASSERT_TRUE(pack());
     expect_faults(
         {"front/depth/000001.png: is missing", "000002 to 000002: no pictures", "front/depth/000004.png: is missing"});
+}
+
+TEST(ShardPictures, are_known_by_their_paths)
+{
+    const auto name = [](std::string_view path) {
+        const auto picture = shard_picture(path);
+        return picture ? member_name("", *picture) + " " + picture->group : "";
+    };
+    EXPECT_EQ(name("color/000012.png"), "000012.color.png ");
+    EXPECT_EQ(name("front/depth_median/1234567.npy"), "1234567.front.depth_median.npy front");
+    EXPECT_EQ(name("frames/000012.jpg"), "000012.frame.jpg frames");
+    EXPECT_EQ(name("latents/front/000012.safetensors"), "000012.front.latent.safetensors latents/front");
+    EXPECT_EQ(name("buffers/color/000012.png"), "000012.color.png buffers");
+    EXPECT_EQ(name("buffers/front/color/000012.png"), "000012.front.color.png buffers/front");
+    EXPECT_EQ(name("shifted/color/000012.png"), "000012.shifted.color.png shifted");
+    for (const char* other :
+         {"000012.png", "color/12.png", "color/0000012.png", "color/000012", "color/000012.a.b", "color/000012.",
+          "color/x00012.png", "color/-00012.png", "a/b/color/000012.png", "frames/a/b/000012.png", ".hidden/000012.png",
+          "a//000012.png", "../000012.png", "/color/000012.png", "color/4294967296.png", "caf\xc3\xa9/000012.png", ""})
+        EXPECT_EQ(name(other), "") << other;
 }
 
 TEST_F(Shards, what_was_not_finished_is_no_set_and_is_packed_again)

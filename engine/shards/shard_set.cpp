@@ -68,17 +68,16 @@ Result<std::shared_ptr<const ShardSet>> ShardSet::open(const Path& folder)
 
 Result<ShardsOrNone> open_if_shards(const Path& folder)
 {
-    Path at = folder.lexically_normal();
-    std::error_code ignored;
-    while (!std::filesystem::exists(at, ignored) && at.has_relative_path())
-        at = at.parent_path();
-    if (at.empty())
-        at = ".";
-    if (has_shard_index(at) || (is_file(at / shard_name(0)) && is_file(at / kShardIndexName)))
-        return ShardSet::open(at);
-    if (is_file(at / shard_name(0)))
-        return fail(ErrorCode::bad_input, "{} holds archives without {}: what packed them did not come to its end",
-                    quote_path(at), kShardIndexName);
+    constexpr int kMostBelow = 3; // buffers/front/color
+    Path at = key_path(folder);
+    for (int below = 0; below <= kMostBelow; ++below, at = at.parent_path()) {
+        const bool has_archives = is_file(at / shard_name(0));
+        if (has_shard_index(at) || (has_archives && is_file(at / kShardIndexName)))
+            return ShardSet::open(at);
+        if (has_archives)
+            return fail(ErrorCode::bad_input, "{} holds archives without {}: what packed them did not come to its end",
+                        quote_path(at), kShardIndexName);
+    }
     return ShardsOrNone();
 }
 
