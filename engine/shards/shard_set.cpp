@@ -70,15 +70,15 @@ Result<ShardsOrNone> open_if_shards(const Path& folder)
 {
     constexpr int kMostBelow = 3; // buffers/front/color
     Path at = key_path(folder);
-    for (int below = 0; below <= kMostBelow; ++below, at = at.parent_path()) {
-        const bool has_archives = is_file(at / shard_name(0));
-        if (has_shard_index(at) || (has_archives && is_file(at / kShardIndexName)))
+    for (int below = 0; below <= kMostBelow; ++below, at = at.parent_path())
+        if (has_shard_index(at))
             return ShardSet::open(at);
-        if (has_archives)
-            return fail(ErrorCode::bad_input, "{} holds archives without {}: what packed them did not come to its end",
-                        quote_path(at), kShardIndexName);
-    }
-    return ShardsOrNone();
+    if (!is_file(folder / shard_name(0)))
+        return ShardsOrNone();
+    if (is_file(folder / kShardIndexName))
+        return ShardSet::open(folder); // to say what is wrong with it
+    return fail(ErrorCode::bad_input, "{} holds archives without {}: what packed them did not come to its end",
+                quote_path(folder), kShardIndexName);
 }
 
 } // namespace semrover
