@@ -215,7 +215,7 @@ std::optional<ShardPicture> shard_picture(std::string_view path)
         folders.pop_back();
         picture.group = Path(picture.group).parent_path().string();
     }
-    if (folders.size() > 1)
+    if (folders.size() > 1 || picture.kind.find('.') != std::string::npos) // else front.color would be front's color
         return std::nullopt;
     picture.camera = folders.empty() ? "" : folders[0];
     return picture;
