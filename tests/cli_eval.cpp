@@ -127,6 +127,10 @@ TEST(CliEval, folders_of_images_go_through_a_network_and_their_features_are_kept
     const ProgramResult mixed = eval("fid --json --batch 2 " + kept_a + " " + (folder / "b").string() + features);
     ASSERT_EQ(mixed.code, 0) << mixed.err;
     EXPECT_EQ(json_of(mixed.out)["value"], report["value"]);
+    const std::string set = (folder / "set").string(); // the same images in archives
+    EXPECT_EQ(semrover_program("dataset pack -q " + (folder / "a").string() + " -o " + set).code, 0);
+    for (const std::string& images : {set, set + "/front/color"})
+        EXPECT_EQ(json_of(eval("fid --json " + images + " " + kept_b + features).out)["value"], report["value"]);
     const ProgramResult same = eval("fid --json " + kept_a + " " + kept_a);
     EXPECT_NEAR(json_of(same.out)["value"].get<double>(), 0, 1e-6);
     expect_error(eval("fid " + sets + " --save-features " + (folder / "out").string()), 2,

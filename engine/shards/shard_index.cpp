@@ -201,23 +201,24 @@ std::optional<ShardPicture> shard_picture(std::string_view path)
     const size_t dot = file.find('.');
     const auto moment = moment_of(file.substr(0, dot));
     const std::string_view ending = dot == std::string_view::npos ? "" : file.substr(dot + 1);
-    if (!moment || ending.size() > 16 || !are_alphanumeric(ending) || folders.size() > 3 ||
+    if (!moment || ending.size() > 16 || !are_alphanumeric(ending) || folders.empty() || folders.size() > 3 ||
         !std::ranges::all_of(folders, is_camera_name))
         return std::nullopt;
-    ShardPicture name{*moment, Path(path).parent_path().string(), "", "", std::string(ending)};
+    ShardPicture picture{*moment, Path(path).parent_path().string(), "", "", std::string(ending)};
     if (folders.size() > 1 && folders[0] == "buffers")
         folders.erase(folders.begin());
-    if (folders.empty() || folders.size() > 2)
-        return std::nullopt;
     if (folders[0] == "frames" || folders[0] == "latents") {
-        name.kind = folders[0].substr(0, folders[0].size() - 1);
-        name.camera = folders.size() == 2 ? folders[1] : "";
+        picture.kind = folders[0].substr(0, folders[0].size() - 1);
+        folders.erase(folders.begin());
     } else {
-        name.kind = folders.back();
-        name.camera = folders.size() == 2 ? folders[0] : "";
-        name.group = Path(name.group).parent_path().string();
+        picture.kind = folders.back();
+        folders.pop_back();
+        picture.group = Path(picture.group).parent_path().string();
     }
-    return name;
+    if (folders.size() > 1 || picture.kind.find('.') != std::string::npos) // else front.color would be front's color
+        return std::nullopt;
+    picture.camera = folders.empty() ? "" : folders[0];
+    return picture;
 }
 
 bool is_key_prefix(std::string_view prefix)

@@ -19,7 +19,7 @@ std::string shard_name(size_t number); // "frames-00012.tar"
 bool is_shard_name(std::string_view name);
 
 // What a picture's path in its folder says: [buffers/][CAMERA/]KIND/NNNNNN.ENDING, or
-// {frames,latents}/[CAMERA/]NNNNNN.ENDING, whose kind is `frame` or `latent`
+// [buffers/]{frames,latents}/[CAMERA/]NNNNNN.ENDING, whose kind is `frame` or `latent`. KIND has no point
 struct ShardPicture {
     uint32_t moment = 0; // the number of its frame
     std::string group;   // the folder around it without its kind: "", "front", "frames", "frames/front"

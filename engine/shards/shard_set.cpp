@@ -68,18 +68,17 @@ Result<std::shared_ptr<const ShardSet>> ShardSet::open(const Path& folder)
 
 Result<ShardsOrNone> open_if_shards(const Path& folder)
 {
-    Path at = folder.lexically_normal();
-    std::error_code ignored;
-    while (!std::filesystem::exists(at, ignored) && at.has_relative_path())
-        at = at.parent_path();
-    if (at.empty())
-        at = ".";
-    if (has_shard_index(at) || (is_file(at / shard_name(0)) && is_file(at / kShardIndexName)))
-        return ShardSet::open(at);
-    if (is_file(at / shard_name(0)))
-        return fail(ErrorCode::bad_input, "{} holds archives without {}: what packed them did not come to its end",
-                    quote_path(at), kShardIndexName);
-    return ShardsOrNone();
+    constexpr int kMostBelow = 3; // buffers/front/color
+    Path at = key_path(folder);
+    for (int below = 0; below <= kMostBelow; ++below, at = at.parent_path())
+        if (has_shard_index(at))
+            return ShardSet::open(at);
+    if (!is_file(folder / shard_name(0)))
+        return ShardsOrNone();
+    if (is_file(folder / kShardIndexName))
+        return ShardSet::open(folder); // to say what is wrong with it
+    return fail(ErrorCode::bad_input, "{} holds archives without {}: what packed them did not come to its end",
+                quote_path(folder), kShardIndexName);
 }
 
 } // namespace semrover

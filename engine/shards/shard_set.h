@@ -31,8 +31,9 @@ class ShardSet {
     MemoryFolder folder_;
 };
 
-// What lets readers of a folder of pictures take a shard set in its place: the set that `folder` is, or that it would
-// lie in (SET/front/color). Null: there is none. Errors: bad_input as open(), and for archives without an index
+// What lets readers of a folder of pictures take a shard set in its place: the set that `folder` is, or lies up to
+// three folders deep in (SET/front/color). Null: there is none. Errors: bad_input as open(), and for archives without
+// an index
 using ShardsOrNone = std::shared_ptr<const ShardSet>;
 Result<ShardsOrNone> open_if_shards(const Path& folder);
 

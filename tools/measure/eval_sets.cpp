@@ -152,7 +152,6 @@ Status interrupted()
 Status image_features(const EvalOptions& o, size_t side, Device& device, const Inception& network,
                       const Globals& globals, EvalSet& set)
 {
-    SR_TRY(const ShardsOrNone shards, open_if_shards(o.sets[side]));
     SR_TRY(const std::vector<Path> files, list_images(o.sets[side]));
     if (files.size() < 2)
         return too_few(o.sets[side], files.size(), "image");
@@ -322,11 +321,12 @@ Result<EvalSets> load_eval_sets(const EvalOptions& o, std::optional<EvalNetwork>
 {
     SR_CHECK(check_outputs(o, globals));
     EvalSets y;
+    std::array<ShardsOrNone, 2> shards; // that the images are in
     bool compute = false;
     for (size_t side = 0; side < 2; ++side) {
         const std::string& path = o.sets[side];
-        std::error_code error;
-        if (!fs::exists(path, error))
+        SR_TRY(shards[side], open_if_shards(path));
+        if (!is_there(path))
             return fail(ErrorCode::bad_input, "{}: no such file or folder", quote_path(path));
         if (is_feature_file(path))
             SR_CHECK(read_feature_file(path, y.set[side]));
