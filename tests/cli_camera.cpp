@@ -10,6 +10,7 @@
 #include "tools/trajectory/camera_path.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <gtest/gtest.h>
 #include <map>
 #include <set>
@@ -345,6 +346,22 @@ TEST(CliCamera, files_and_their_order_do_not_depend_on_how_many_threads_make_the
     EXPECT_EQ(std::ranges::count(journal, '\n'), 7); // a line a frame, and one for top.png
 }
 
+TEST(CliCamera, files_of_a_moment_are_measured_and_nothing_stays)
+{
+    const ScratchFolder folder;
+    ::setenv("TMPDIR", folder.path().c_str(), 1);
+    const ProgramResult result =
+        semrover_program("bench pictures --cameras 2 -W 40 -H 30 --threads 3 --format jpeg --json");
+    ::unsetenv("TMPDIR");
+    ASSERT_EQ(result.code, 0) << result.err;
+    const Json report = json_of(result.out);
+    EXPECT_EQ(report["cameras"], 2);
+    EXPECT_EQ(report["threads"], 3);
+    EXPECT_EQ(report["format"], "jpg");
+    EXPECT_GT(report["ms_median"], 0);
+    EXPECT_EQ(folder.entries(), 0u);
+}
+
 TEST(CliCamera, colours_can_be_jpegs_and_pngs_smaller)
 {
     const RigDrive d;
@@ -402,6 +419,18 @@ TEST(CliCamera, a_drawing_that_was_killed_goes_on_to_the_same_bytes)
         EXPECT_TRUE(whole == bytes(out)) << pieces;
         EXPECT_EQ(contents(d.folder / "whole.mp4"), contents(video)) << pieces;
     }
+    // of JPEGs the video is of the colours as they were drawn, too
+    const Path out = d.folder / "jpeg", video = d.folder / "jpeg.mp4";
+    const std::string jpeg = line + video.string() + " --format jpeg";
+    {
+        ChildProgram child("render " + kGrid + " -q --splat-radius auto -o " + out.string() + " " + jpeg);
+        while (std::ranges::count(contents(out / "journal.jsonl"), '\n') < 8 && child.running())
+            usleep(500);
+        EXPECT_EQ(child.stop(SIGKILL), 128 + SIGKILL);
+    }
+    const ProgramResult resumed = render(out, jpeg);
+    EXPECT_EQ(resumed.code, 0) << resumed.err;
+    EXPECT_EQ(contents(d.folder / "whole.mp4"), contents(video));
 }
 
 // a wall whose nearest face is 58.2 m ahead at the left and 88.2 m at the right, and nothing else

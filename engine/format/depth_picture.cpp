@@ -11,7 +11,6 @@ namespace semrover {
 
 namespace {
 
-constexpr uint64_t kMaxBytes = 1u << 30;
 constexpr uint32_t kNothing = 65535;
 constexpr double kOfFractions = 1.0 / 16384; // metres; 32 bits of it are 262 km
 
@@ -32,12 +31,12 @@ DepthPicture depth_of_gray(const ImageGray16& image, double unit)
 
 Result<DepthPicture> read_depth_picture(const Path& path, double unit)
 {
-    SR_TRY(const std::vector<std::byte> file, read_file(path, kMaxBytes));
-    if (!is_npy(file)) {
+    SR_TRY(const MappedFile file, MappedFile::open(path));
+    if (!is_npy(file.bytes())) {
         SR_TRY(const ImageGray16 image, read_png_gray16(path));
         return depth_of_gray(image, unit);
     }
-    SR_TRY(const NpyImage image, decode_npy_image(file, quote_path(path)));
+    SR_TRY(const NpyImage image, decode_npy_image(file.bytes(), quote_path(path)));
     DepthPicture depth{image.size.width, image.size.height, {}, image.whole ? unit : kOfFractions};
     depth.pixels.reserve(image.values.size());
     for (const float value : image.values)
