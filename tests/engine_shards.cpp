@@ -1,12 +1,12 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/shards/check_shards.h"
-#include "engine/shards/pack.h"
 #include "engine/shards/ustar.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/json.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
+#include "tools/dataset/check_shards.h"
+#include "tools/dataset/pack_shards.h"
 
 #include <fstream>
 #include <gtest/gtest.h>

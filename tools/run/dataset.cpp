@@ -1,14 +1,14 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover dataset pack|list|verify|unpack: folders of pictures as archives of many moments each, and back
-#include "engine/shards/check_shards.h"
-#include "engine/shards/pack.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/output_folder.h"
 #include "tools/cli/progress.h"
 #include "tools/cli/value_options.h"
+#include "tools/dataset/check_shards.h"
+#include "tools/dataset/pack_shards.h"
 
 #include <CLI/CLI.hpp>
 #include <map>

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/run/task_runner.h"
 
-#include "engine/shards/pack.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/host_name.h"
 #include "runtime/base/quote.h"
@@ -11,6 +10,7 @@
 #include "tools/cli/open_device.h"
 #include "tools/cli/print_stderr.h"
 #include "tools/cli/value_options.h"
+#include "tools/dataset/pack_shards.h"
 #include "tools/run/command_options.h"
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/shards/check_shards.h"
+#include "tools/dataset/check_shards.h"
 
 #include "engine/shards/ustar.h"
 #include "runtime/base/hash.h"

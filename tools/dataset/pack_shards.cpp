@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/shards/pack.h"
+#include "tools/dataset/pack_shards.h"
 
 #include "engine/shards/shard_set.h"
 #include "engine/shards/ustar.h"
