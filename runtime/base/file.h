@@ -18,8 +18,8 @@ namespace semrover {
 
 using Path = std::filesystem::path;
 
-// Paths are of the disk, or of a folder in memory (memory_files.h), which can be read and not written. A folder may have
-// files of both; of two at one path the one in memory is read.
+// Paths are of the disk, or of a folder in memory (memory_files.h), which can be read and not written. A folder may
+// have files of both; of two at one path the one in memory is read.
 
 // false when it is absent, or cannot be examined
 bool is_there(const Path& path);
