@@ -10,6 +10,8 @@ if(TARGET semrover-view)
     list(APPEND debian_programs semrover-view)
 endif()
 install(TARGETS ${debian_programs} DESTINATION bin COMPONENT deb_program EXCLUDE_FROM_ALL)
+install(DIRECTORY tools/cluster DESTINATION share/semrover USE_SOURCE_PERMISSIONS
+    COMPONENT deb_program EXCLUDE_FROM_ALL)
 
 install(TARGETS semrover_c EXPORT semrover_debian LIBRARY DESTINATION ${debian_libdir}
     COMPONENT deb_library NAMELINK_COMPONENT deb_development EXCLUDE_FROM_ALL)
