@@ -332,6 +332,32 @@ TEST_F(CliRun, a_scene_that_has_points_is_drawn_as_it_is)
     EXPECT_FALSE(fs::exists(folder_ / "drawn/drives/street/drive/run.json"));
 }
 
+// under a batch system, which wants a GPU unless it is told otherwise
+TEST_F(CliRun, a_street_is_made_up_and_driven_through)
+{
+    folder_.put("made.toml", R"(out = "made"
+model = "model"
+[[scene]]
+streets = {seeds = 5, length = 30, spacing = 6, seen = true, reach = 4}
+[[drive]]
+made = true
+width = 56
+height = 40
+[generate]
+steps = 1
+)");
+    setenv("SLURM_JOB_ID", "1", 1);
+    const ProgramResult refused = run("", "made.toml");
+    const ProgramResult made = run("--require any --max-vram 4GiB", "made.toml");
+    unsetenv("SLURM_JOB_ID");
+    EXPECT_EQ(refused.code, 4) << refused.err;
+    EXPECT_EQ(made.code, 0) << made.err;
+    for (const char* file : {"scenes/street-000005/scene.sgrid", "scenes/street-000005/street/objects.json",
+                             "drives/street-000005/drive/color/000000.png"})
+        EXPECT_TRUE(fs::exists(folder_ / "made" / file)) << file;
+    EXPECT_FALSE(fs::exists(folder_ / "made/scenes/street-000005/street/mesh.glb"));
+}
+
 TEST_F(CliRun, json_is_the_same_job)
 {
     folder_.put("job.json", R"({"name": "three", "out": "out", "model": "model", "seed": 7,

@@ -40,6 +40,17 @@ void append(std::vector<std::string>& line, const std::vector<JobOption>& option
     }
 }
 
+// what another program is to know of the options that are not a command's own
+void append_device(std::vector<std::string>& line, const Globals& globals)
+{
+    if (!globals.device.empty())
+        line.insert(line.end(), {"--device", globals.device});
+    if (!globals.require.empty())
+        line.insert(line.end(), {"--require", globals.require});
+    if (globals.max_vram)
+        line.insert(line.end(), {"--max-vram", std::to_string(globals.max_vram) + "B"});
+}
+
 std::string utc_now()
 {
     const std::time_t now = std::time(nullptr);
@@ -194,6 +205,7 @@ Status TaskRunner::make_street(const JobScene& scene, const Path& folder) const
     fs::remove_all(making, error);
     std::vector<std::string> line{"streets", "-o", making.string(), "--quiet"};
     append(line, scene.streets);
+    append_device(line, globals_);
     SR_CHECK(run_neighbour_command("semrover-scenes", line));
     SR_CHECK(make_folder(folder));
     for (size_t i = std::size(kStreetFiles); i-- > 0;) // the labels last: they say that all is there
