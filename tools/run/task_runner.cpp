@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/run/task_runner.h"
 
+#include "engine/voxfield/voxfield_model.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/host_name.h"
 #include "runtime/base/quote.h"
@@ -222,9 +223,10 @@ std::vector<std::string> TaskRunner::scene_line(const Task& task, const Path& wo
     std::vector<std::string> line{"generate", (made ? work / "street" / "semantic.sgrid" : scene.file).string()};
     line.insert(line.end(), {"-m", job_.model.string(), "-o", (work / "scene.sgrid").string(), "--seed",
                              std::to_string(task_seed(job_, task))});
-    if (!scene.objects.empty() || made)
-        line.insert(line.end(),
-                    {"--objects", scene.objects.empty() ? (work / "street" / "objects.json").string() : scene.objects});
+    if (!scene.objects.empty())
+        line.insert(line.end(), {"--objects", scene.objects});
+    else if (const auto model = VoxfieldModel::open(job_.model); made && model && !model->config.condition.empty())
+        line.insert(line.end(), {"--objects", (work / "street" / "objects.json").string()});
     append(line, job_.generate);
     return line;
 }
