@@ -571,5 +571,25 @@ TEST_F(CliRefineRefuses, outputs_devices_and_options_that_cannot_be)
     EXPECT_TRUE(refined("stopped", "--seed 9 -y") == refined("other", "--seed 9"));
 }
 
+TEST_F(CliRefine, buffers_of_a_grid_have_the_depth_that_is_asked_for)
+{
+    const std::string drive = put_drive({0.5, 1.1});
+    refined("mm", drive, "street.sgrid");
+    refined("cm", drive + " --depth cm", "street.sgrid");
+    const auto mm = read_png_gray16(folder_ / "mm/buffers/depth/000001.png");
+    const auto cm = read_png_gray16(folder_ / "cm/buffers/depth/000001.png");
+    ASSERT_TRUE(mm && cm);
+    size_t seen = 0;
+    for (size_t i = 0; i < mm->pixels.size(); ++i)
+        if (mm->pixels[i] && mm->pixels[i] != 65535) {
+            ++seen;
+            EXPECT_NEAR(cm->pixels[i], mm->pixels[i] / 10.0, 0.56);
+        }
+    EXPECT_GT(seen, 100u);
+    const Json cameras = Json::parse(contents(folder_ / "cm/transforms.json"), nullptr, false);
+    EXPECT_EQ(cameras["depth_unit_scale_factor"], 0.01);
+    expect_error(refine("folder", " --depth cm"), 2, "--depth has a meaning for a grid");
+}
+
 } // namespace cli_refine_test
 } // namespace semrover

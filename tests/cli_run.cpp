@@ -287,13 +287,14 @@ TEST_F(CliRun, check_reads_every_byte)
 
 TEST_F(CliRun, only_the_buffers_that_are_asked_for_are_kept)
 {
-    put_job("[output]\nbuffers = [\"depth\"]\n");
+    put_job("[output]\nbuffers = [\"depth\"]\nrefine = true\ncolor = \"jpeg:95\"\ndepth = \"cm\"\n");
     EXPECT_EQ(run().code, 0);
     const fs::path drive = folder_ / "out/drives/a/ahead";
-    EXPECT_TRUE(fs::exists(drive / "frames/000002.png"));
+    EXPECT_TRUE(fs::exists(drive / "frames/000002.jpg"));
     EXPECT_TRUE(fs::exists(drive / "buffers/depth/000002.png"));
     EXPECT_FALSE(fs::exists(drive / "buffers/label"));
     const Json cameras = Json::parse(contents(drive / "transforms.json"), nullptr, false);
+    EXPECT_EQ(cameras["depth_unit_scale_factor"], 0.01);
     for (const Json& frame : cameras["frames"]) {
         EXPECT_TRUE(frame.contains("depth_file_path"));
         for (const auto& [key, value] : frame.items())

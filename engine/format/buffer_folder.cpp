@@ -123,12 +123,13 @@ Result<std::vector<BufferCamera>> open_buffers(const Path& folder)
     return cameras;
 }
 
-std::vector<BufferCamera> path_buffers(const Path& folder, const CameraPath& path)
+std::vector<BufferCamera> path_buffers(const Path& folder, const CameraPath& path, double depth_unit)
 {
     std::map<std::string, BufferCamera> cameras;
     for (const CameraFrame& frame : path.frames) {
         BufferCamera& c = cameras[frame.camera];
         c.name = frame.camera;
+        c.depth_unit = depth_unit;
         c.folder = frame.camera.empty() ? folder : folder / frame.camera;
         if (c.frames++ == 0)
             c.size = {frame.intrinsics.width, frame.intrinsics.height};

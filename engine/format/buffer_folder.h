@@ -37,7 +37,7 @@ Result<Path> find_picture(const Path& folder, const char* kind, uint32_t number)
 Result<std::vector<BufferCamera>> open_buffers(const Path& folder);
 
 // the cameras of a path, before their buffers exist
-std::vector<BufferCamera> path_buffers(const Path& folder, const CameraPath& path);
+std::vector<BufferCamera> path_buffers(const Path& folder, const CameraPath& path, double depth_unit);
 // bad_input where a folder's cameras, frames or sizes are not those of a path
 Status check_against_path(std::span<const BufferCamera> cameras, const CameraPath& path);
 

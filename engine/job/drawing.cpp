@@ -34,13 +34,6 @@ CameraFrame overview_camera(const Bounds& b, const ImageSize& size)
     return frame;
 }
 
-RasterizerOptions pixel_options(const DrawingOptions& o)
-{
-    RasterizerOptions options = o.draw.rasterizer();
-    options.depth_units = float(units_per_metre(o.encoding.depth));
-    return options;
-}
-
 RasterizerOptions float_options(const DrawOptions& o)
 {
     RasterizerOptions options = o.rasterizer();
@@ -64,8 +57,8 @@ class DrawingJob : public Job {
     DrawingJob(Device& device, DrawingOptions options, SplatScene scene, std::unique_ptr<DrawingStore> store,
                std::unique_ptr<Outgoing> out, const JobCallbacks& callbacks)
         : device_(device), o_(std::move(options)), scene_(std::move(scene)), callbacks_(callbacks),
-          drawing_(device, scene_, o_.path, pixel_options(o_)), floats_(device, scene_, {}, float_options(o_.draw)),
-          store_(std::move(store)), out_(std::move(out))
+          drawing_(device, scene_, o_.path, o_.draw.rasterizer(o_.encoding)),
+          floats_(device, scene_, {}, float_options(o_.draw)), store_(std::move(store)), out_(std::move(out))
     {
         if (drawing_.total()) {
             empty_.emplace(o_.path, o_.scene_name, o_.allow_empty);

@@ -25,11 +25,12 @@ size_t end_of_moment(const CameraPath& path, size_t first)
 
 } // namespace
 
-RasterizerOptions DrawOptions::rasterizer() const
+RasterizerOptions DrawOptions::rasterizer(const PictureEncoding& files) const
 {
     RasterizerOptions options;
     options.visible_alpha = visible_alpha.value_or(options.visible_alpha);
     options.pixels_over = background;
+    options.depth_units = float(units_per_metre(files.depth));
     return options;
 }
 

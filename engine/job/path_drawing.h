@@ -21,7 +21,7 @@ struct DrawOptions {
     std::optional<float> visible_alpha; // alpha from which a pixel counts as visible; 0.5, or what a model says
     bool semantic = false;              // in label colours; a grid without points as blocks
 
-    RasterizerOptions rasterizer() const; // that keeps pixels as files have them
+    RasterizerOptions rasterizer(const PictureEncoding& files = {}) const; // that keeps pixels as files have them
 };
 
 // Splats of a grid: points as generated, or as DrawOptions::semantic says. `name` is the grid's, for errors: bad_input

@@ -59,7 +59,7 @@ struct BufferDrawing {
     bool started = false; // the first moment is drawn
 
     BufferDrawing(Device& device, SplatScene s, const Refinement& r, const Bounds& bounds)
-        : scene(std::move(s)), drawing(device, scene, *r.options.path, r.options.draw.rasterizer()),
+        : scene(std::move(s)), drawing(device, scene, *r.options.path, r.options.draw.rasterizer(r.options.encoding)),
           empty(*r.options.path, r.options.input, r.options.allow_empty)
     {
         empty.set_scene(bounds);
@@ -200,7 +200,9 @@ class RefinementJob : public Job {
         const uint32_t number = drawing_->counts[camera]++;
         files_.give_buffer(camera, number, drawing_->seen[camera]);
         SR_CHECK(out_->read(slots, size, [this, frame, camera, number](FramePixels pixels) -> Status {
-            files_.give_depth(camera, number, depth_picture(pixels));
+            DepthPicture depth = depth_picture(pixels);
+            depth.unit = r_.options.encoding.depth_unit();
+            files_.give_depth(camera, number, std::move(depth));
             drawing_->empty.add(sees_nothing(pixels));
             const uint64_t bytes = pixels.bytes();
             SR_CHECK(out_->write(bytes, [this, number, frame, pixels = std::move(pixels)]() mutable {
@@ -217,7 +219,7 @@ class RefinementJob : public Job {
     {
         const auto files = std::make_shared<MadeFiles>();
         const Path folder = camera_folder(run_.path() / "buffers", camera);
-        SR_CHECK(make_frame_images(folder, number, pixels, {.png_level = r_.options.encoding.png_level}, *files));
+        SR_CHECK(make_frame_images(folder, number, pixels, r_.options.buffer_encoding(), *files));
         return [files] { return files->commit(); };
     }
     Status end_drawing()

@@ -39,7 +39,7 @@ Result<std::vector<BufferCamera>> cameras_of(const RefinementOptions& o)
     if (o.from_grid() && !o.path)
         return fail(ErrorCode::usage, "`path` is required to refine straight from a grid");
     if (o.from_grid())
-        return path_buffers(o.output / "buffers", *o.path);
+        return path_buffers(o.output / "buffers", *o.path, o.encoding.depth_unit());
     return open_buffers(o.input);
 }
 
@@ -223,6 +223,8 @@ Result<Refinement> resolve_refinement(RefinementOptions options, const JobCallba
 {
     Refinement r;
     r.options = std::move(options);
+    if (r.options.encoding.depth != DepthFormat::mm && !r.options.from_grid())
+        return fail(ErrorCode::usage, "`depth` has a meaning for a grid, whose buffers are drawn");
     SR_TRY(r.model, RendererModel::open(r.options.model, r.options.sampler));
     for (const std::string& warning : r.model.warnings)
         if (callbacks.warning)
@@ -280,12 +282,13 @@ Status write_frame_cameras(const Refinement& r)
             {},
             {}};
         if (o.from_grid()) {
-            const PictureNames drawn = rendered_pictures(camera, number);
+            const PictureNames drawn = rendered_pictures(camera, number, o.buffer_encoding());
             names.depth = "buffers/" + drawn.depth;
             names.label = "buffers/" + drawn.label;
         }
         return names;
     };
+    files.depth_unit = o.encoding.depth_unit();
     return write_transforms(o.output / "transforms.json", refined, files);
 }
 

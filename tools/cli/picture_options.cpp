@@ -4,6 +4,7 @@
 
 #include "tools/cli/value_options.h"
 
+#include <algorithm>
 #include <CLI/CLI.hpp>
 
 namespace semrover {
@@ -24,6 +25,16 @@ void add_picture_options(CLI::App& c, PictureEncoding& encoding, uint32_t& threa
         c, "--threads", threads,
         "that make files while the next are drawn; what the process may use, 16 at most, or $SLURM_CPUS_PER_TASK", 1u,
         kMostThreads);
+}
+
+void add_depth_option(CLI::App& c, DepthFormat& depth, std::vector<std::string> words, const std::string& more)
+{
+    add_choice(c, "--depth", std::move(words),
+               "of depth: 16-bit PNG of 1/1000 m (to 65.53 m), 1/100 m (655.34 m) or 1/256 m (255.99 m, KITTI's)" +
+                   more,
+               [&depth](const std::string& word) {
+                   depth = DepthFormat(std::ranges::find(kDepthFormats, word) - kDepthFormats);
+               });
 }
 
 } // namespace semrover

@@ -264,6 +264,7 @@ void add_options(CLI::App& c, RefineArguments& a)
     c.add_option("--from", o.from, "output of an earlier run: FIRST goes on from its latents of the frames before")
         ->needs(frames);
     add_picture_options(c, o.encoding, o.threads);
+    add_depth_option(c, o.encoding.depth, {"mm", "cm", "kitti256"}, "; of the buffers of a grid");
     c.add_option("--video", a.videos.frames, "also an MP4 of the frames, one per camera, through ffmpeg");
     c.add_option("--side-by-side", a.videos.side_by_side, "also an MP4 of label, buffer and frame");
     add_number(c, "--fps", a.videos.frames_per_second, "frames a second of the videos", 1, 240);

@@ -147,12 +147,8 @@ void add_render(CLI::App& app, const Globals& globals, Run& run)
                 "also float32 arrays {depth_expected,depth_median,alpha}/000000.npy, depths in metres");
     c->add_flag("--points", o->points, "also points.ply, the scene's points, which transforms.json names");
     add_picture_options(*c, o->encoding, o->threads);
-    add_choice(*c, "--depth", {std::begin(kDepthFormats), std::end(kDepthFormats)},
-               "of depth: 16-bit PNG of 1/1000 m (to 65.53 m), 1/100 m (655.34 m) or 1/256 m (255.99 m, KITTI's), or "
-               "float32 metres in .npy",
-               [o](const std::string& word) {
-                   o->encoding.depth = DepthFormat(std::ranges::find(kDepthFormats, word) - kDepthFormats);
-               });
+    add_depth_option(*c, o->encoding.depth, {std::begin(kDepthFormats), std::end(kDepthFormats)},
+                     ", or float32 metres in .npy");
     c->add_flag("--visible-depth", o->visible_depth, "depth pictures are 0 where a pixel is not visible");
     CLI::Option* video =
         c->add_option("--video", o->video, "also an MP4 of the colour frames (of the first camera), through ffmpeg");
