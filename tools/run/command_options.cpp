@@ -36,11 +36,11 @@ struct Child {
     int output = -1; // what it prints; -1: it goes to standard error
 };
 
-Result<Child> spawn(const char* program, const std::vector<std::string>& arguments, bool read_output)
+Result<Child> spawn_scenes(const std::vector<std::string>& arguments, bool read_output)
 {
     std::error_code error;
     Path file = std::filesystem::read_symlink("/proc/self/exe", error);
-    file.replace_filename(program);
+    file.replace_filename(kScenesProgram);
     std::vector<std::string> words{"semrover"};
     words.insert(words.end(), arguments.begin(), arguments.end());
     std::vector<char*> argv;
@@ -68,22 +68,22 @@ Result<Child> spawn(const char* program, const std::vector<std::string>& argumen
                 quote_path(file), std::strerror(failed));
 }
 
-Status wait_for(const Child& child, const char* program)
+Status wait_for(const Child& child)
 {
     int status = 0;
     while (::waitpid(child.pid, &status, 0) < 0)
         if (errno != EINTR)
-            return fail(ErrorCode::bad_input, "cannot wait for {}: {}", program, std::strerror(errno));
+            return fail(ErrorCode::bad_input, "cannot wait for {}: {}", kScenesProgram, std::strerror(errno));
     if (WIFEXITED(status) && WEXITSTATUS(status) == 0)
         return {};
     if (WIFEXITED(status))
-        return fail(ErrorCode(WEXITSTATUS(status)), "{} ended with code {}", program, WEXITSTATUS(status));
-    return fail(ErrorCode::interrupted, "{} was ended by signal {}", program, WTERMSIG(status));
+        return fail(ErrorCode(WEXITSTATUS(status)), "{} ended with code {}", kScenesProgram, WEXITSTATUS(status));
+    return fail(ErrorCode::interrupted, "{} was ended by signal {}", kScenesProgram, WTERMSIG(status));
 }
 
 Result<Json> facts_of_neighbour(const char* command)
 {
-    SR_TRY(const Child child, spawn(kScenesProgram, {command, "--help", "--json"}, true));
+    SR_TRY(const Child child, spawn_scenes({command, "--help", "--json"}, true));
     std::string text;
     char bytes[4096];
     for (ssize_t n; (n = ::read(child.output, bytes, sizeof bytes)) != 0;)
@@ -92,7 +92,7 @@ Result<Json> facts_of_neighbour(const char* command)
         else if (errno != EINTR)
             break;
     ::close(child.output);
-    SR_CHECK(wait_for(child, kScenesProgram));
+    SR_CHECK(wait_for(child));
     return parse_json(text, kScenesProgram);
 }
 
@@ -133,7 +133,6 @@ std::string found_text(const JobValue& value)
 Result<CommandOptions> CommandOptions::create(const char* command, std::vector<std::string> taken)
 {
     CommandOptions c;
-    c.command_ = command;
     SR_TRY(const Json facts, facts_of(command));
     taken.insert(taken.end(), {"help", "profile", "dry-run"});
     for (const Json& option : facts.value("options", Json::array()))
@@ -219,6 +218,15 @@ Status parse(CLI::App& app, const std::vector<std::string>& arguments)
 
 } // namespace
 
+void append_options(std::vector<std::string>& line, const std::vector<JobOption>& options)
+{
+    for (const auto& [option, value] : options) {
+        line.push_back(option);
+        if (!value.empty())
+            line.push_back(value);
+    }
+}
+
 Status check_command(const std::vector<std::string>& arguments)
 {
     const Globals globals;
@@ -237,10 +245,10 @@ Status run_command(const std::vector<std::string>& arguments, const Globals& glo
     return run.work();
 }
 
-Status run_neighbour_command(const char* program, const std::vector<std::string>& arguments)
+Status run_scenes_command(const std::vector<std::string>& arguments)
 {
-    SR_TRY(const Child child, spawn(program, arguments, false));
-    return wait_for(child, program);
+    SR_TRY(const Child child, spawn_scenes(arguments, false));
+    return wait_for(child);
 }
 
 } // namespace semrover

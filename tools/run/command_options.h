@@ -21,15 +21,15 @@ class CommandOptions {
     Result<std::optional<JobOption>> option(const Json& facts, std::string_view key, const JobValue& value) const;
 
   private:
-    std::string command_;
     std::map<std::string, Json> options_; // by name, without dashes
 };
 
+void append_options(std::vector<std::string>& line, const std::vector<JobOption>& options);
 // Whether a command of this program takes this command line. usage: why not
 Status check_command(const std::vector<std::string>& arguments);
 // Runs a command of this program in this process. Errors: the command's; usage for a command line that it refuses
 Status run_command(const std::vector<std::string>& arguments, const Globals& globals);
-// of the program beside this one, as a child that is waited for; what it prints goes to standard error
-Status run_neighbour_command(const char* program, const std::vector<std::string>& arguments);
+// of semrover-scenes beside this program, as a child that is waited for; what it prints goes to standard error
+Status run_scenes_command(const std::vector<std::string>& arguments);
 
 } // namespace semrover

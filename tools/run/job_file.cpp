@@ -21,7 +21,6 @@ namespace fs = std::filesystem;
 using Kind = JobValue::Kind;
 
 constexpr size_t kMostScenes = 1'000'000;
-constexpr const char* kBuffers[] = {"color", "depth", "normal", "label", "visible"};
 
 // how many letters have to be changed, added or left out
 size_t edit_distance(std::string_view a, std::string_view b)
@@ -245,8 +244,8 @@ Status JobReader::read_output(const JobValue* output)
         if (buffers->kind != Kind::list || buffers->items.empty())
             return wrong(*buffers, "buffers", "a list of kinds of pictures");
         for (const JobValue& item : buffers->items) {
-            if (item.kind != Kind::text || !std::ranges::count(kBuffers, item.text))
-                return wrong(item, "buffers", fmt::format("{}", fmt::join(kBuffers, ", ")));
+            if (item.kind != Kind::text || !std::ranges::count(kBufferKinds, item.text))
+                return wrong(item, "buffers", fmt::format("{}", fmt::join(kBufferKinds, ", ")));
             job_.buffers.push_back(item.text);
         }
     }
@@ -442,11 +441,7 @@ Status JobReader::check_together(const JobValue& root) const
 Status JobReader::check_line(const JobValue& at, std::vector<std::string> line,
                              const std::vector<JobOption>& options) const
 {
-    for (const auto& [option, value] : options) {
-        line.push_back(option);
-        if (!value.empty())
-            line.push_back(value);
-    }
+    append_options(line, options);
     const Status taken = check_command(line);
     return taken ? taken : refuse(at, taken.error().message);
 }

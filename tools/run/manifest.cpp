@@ -65,11 +65,15 @@ Status write_manifest(const Path& folder, const Manifest& m)
     return write_file_atomically(folder / kName, json.dump(1) + "\n");
 }
 
-Result<std::vector<Manifest::File>> list_contents(const Path& folder)
+Result<std::vector<Manifest::File>> list_contents(const Path& folder, std::span<const char* const> skip)
 {
     std::vector<Manifest::File> files;
     std::error_code error;
     for (fs::recursive_directory_iterator i(folder, error), end; i != end; i.increment(error)) {
+        if (i.depth() == 0 && std::ranges::count(skip, i->path().filename().string())) {
+            i.disable_recursion_pending();
+            continue;
+        }
         if (i->is_symlink(error) || (!i->is_regular_file(error) && !i->is_directory(error)))
             return fail(ErrorCode::bad_input, "{}: neither a file nor a folder", quote_path(i->path()));
         const std::string path = i->path().lexically_relative(folder).string();

@@ -27,8 +27,9 @@ struct Manifest {
 Result<Manifest> read_manifest(const Path& folder);
 Status write_manifest(const Path& folder, const Manifest& manifest); // on the disk when it returns
 
-// all files below a folder with their hashes, but the manifest. bad_input: links, devices
-Result<std::vector<Manifest::File>> list_contents(const Path& folder);
+// All files below a folder with their hashes, but the manifest, and the files and folders directly in it that `skip`
+// names. bad_input: links, devices
+Result<std::vector<Manifest::File>> list_contents(const Path& folder, std::span<const char* const> skip = {});
 // What is there in place of what the manifest says, a line each; empty: all is as it was
 std::vector<std::string> differences(const Path& folder, const Manifest& manifest);
 

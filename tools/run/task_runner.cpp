@@ -30,16 +30,6 @@ constexpr int kMostDevices = 3; // that are lost, before the error stands
 constexpr const char* kState[] = {"scene.sgrid.run", "latents", "encoded", "journal.jsonl", "lock", "run.json"};
 // of a street that is made up, what is of use to who has the scene
 constexpr const char* kStreetFiles[] = {"semantic.sgrid", "objects.json", "street.json", "drive.tum"};
-constexpr const char* kKinds[] = {"color", "depth", "normal", "label", "visible"};
-
-void append(std::vector<std::string>& line, const std::vector<JobOption>& options)
-{
-    for (const auto& [option, value] : options) {
-        line.push_back(option);
-        if (!value.empty())
-            line.push_back(value);
-    }
-}
 
 // what another program is to know of the options that are not a command's own
 void append_device(std::vector<std::string>& line, const Globals& globals)
@@ -93,7 +83,7 @@ Status drop_pictures(const Path& folder, const std::vector<std::string>& kept)
     std::error_code error;
     for (fs::recursive_directory_iterator i(folder, error), end; i != end; i.increment(error)) {
         const std::string name = i->path().filename().string();
-        if (i->is_directory(error) && std::ranges::count(kKinds, name) && !std::ranges::count(kept, name))
+        if (i->is_directory(error) && std::ranges::count(kBufferKinds, name) && !std::ranges::count(kept, name))
             dropped.push_back(i->path());
     }
     for (const Path& path : dropped)
@@ -205,9 +195,9 @@ Status TaskRunner::make_street(const JobScene& scene, const Path& folder) const
     std::error_code error;
     fs::remove_all(making, error);
     std::vector<std::string> line{"streets", "-o", making.string(), "--quiet"};
-    append(line, scene.streets);
+    append_options(line, scene.streets);
     append_device(line, globals_);
-    SR_CHECK(run_neighbour_command("semrover-scenes", line));
+    SR_CHECK(run_scenes_command(line));
     SR_CHECK(make_folder(folder));
     for (size_t i = std::size(kStreetFiles); i-- > 0;) // the labels last: they say that all is there
         fs::rename(making / kStreetFiles[i], folder / kStreetFiles[i], error);
@@ -223,11 +213,14 @@ std::vector<std::string> TaskRunner::scene_line(const Task& task, const Path& wo
     std::vector<std::string> line{"generate", (made ? work / "street" / "semantic.sgrid" : scene.file).string()};
     line.insert(line.end(), {"-m", job_.model.string(), "-o", (work / "scene.sgrid").string(), "--seed",
                              std::to_string(task_seed(job_, task))});
-    if (!scene.objects.empty())
+    if (!scene.objects.empty()) {
         line.insert(line.end(), {"--objects", scene.objects});
-    else if (const auto model = VoxfieldModel::open(job_.model); made && model && !model->config.condition.empty())
-        line.insert(line.end(), {"--objects", (work / "street" / "objects.json").string()});
-    append(line, job_.generate);
+    } else if (made) {
+        const auto model = VoxfieldModel::open(job_.model);
+        if (model && !model->config.condition.empty())
+            line.insert(line.end(), {"--objects", (work / "street" / "objects.json").string()});
+    }
+    append_options(line, job_.generate);
     return line;
 }
 
@@ -239,7 +232,7 @@ std::vector<std::string> TaskRunner::drive_line(const Task& task, const Path& wo
         line.insert(line.end(), {"-m", job_.model.string(), "--seed", std::to_string(task_seed(job_, task))});
     if (!task.drive->rig.empty())
         line.insert(line.end(), {"--rig", task.drive->rig.string()});
-    append(line, task.drive->options);
+    append_options(line, task.drive->options);
     return line;
 }
 
@@ -298,10 +291,7 @@ Status TaskRunner::seal(const Task& task, const Attempt& attempt, Manifest manif
         SR_CHECK(drop_pictures(attempt.work(), job_.buffers));
     if (task.drive && job_.layout == JobLayout::shards)
         return seal_shards(task, attempt, std::move(manifest));
-    SR_TRY(manifest.files, list_contents(attempt.work()));
-    std::erase_if(manifest.files, [](const Manifest::File& file) {
-        return std::ranges::count(kState, file.path.substr(0, file.path.find('/'))) > 0;
-    });
+    SR_TRY(manifest.files, list_contents(attempt.work(), kState));
     SR_CHECK(write_manifest(attempt.work(), manifest));
     std::error_code error;
     for (const char* name : kState)
