@@ -301,8 +301,12 @@ Status write_frame_record(const Refinement& r, const JobCallbacks& callbacks)
         return write_record_of(*o.path, o.encoding.depth_unit(), o.output, callbacks);
     if (!beside)
         return {};
-    SR_TRY(const DriveRecord record, read_drive_record(o.input));
-    return write_drive_record(o.output, record);
+    SR_CHECK(read_drive_record(o.input)); // what is wrong with it is said before anything is refined
+    for (const char* name : kDriveRecordFiles) {
+        SR_TRY(const MappedFile file, MappedFile::open(o.input / name));
+        SR_CHECK(write_file_atomically(o.output / name, file.bytes()));
+    }
+    return {};
 }
 
 Status Refinement::check_outputs(std::span<const Path> beside) const
