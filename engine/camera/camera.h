@@ -51,7 +51,7 @@ struct PathBody {
 
 // A camera of a rig. Vehicle axes: x forward, y left, z up; sensor axes are OpenCV's.
 struct Sensor {
-    std::string name; // is_camera_name, unique in the rig
+    std::string name; // is_camera_name, unique in the rig; an only one may have none
     Intrinsics intrinsics;
     Rigid sensor_to_vehicle = kIdentity;
 };

@@ -13,9 +13,6 @@ namespace {
 
 constexpr size_t kMaxSensors = 64;
 
-// vehicle axes (forward, left, up) to those of a camera that looks forward (right, down, forward)
-constexpr Rigid kVehicleToForwardCamera = {0, -1, 0, 0, 0, 0, -1, 0, 1, 0, 0, 0, 0, 0, 0, 1};
-
 Status check_keys(const Json& object, std::initializer_list<std::string_view> known, std::string_view where)
 {
     for (const auto& entry : object.items())
@@ -130,7 +127,8 @@ Result<Rigid> read_mounting(const Json& json, std::string_view where)
     return rigid_from_quaternion({t[0], t[1], t[2]}, {q[0], q[1], q[2], q[3]}, where);
 }
 
-Result<Sensor> read_sensor(const Json& json, std::string_view where)
+// alone: in its rig, where it needs no name
+Result<Sensor> read_sensor(const Json& json, bool alone, std::string_view where)
 {
     if (!json.is_object())
         return fail(ErrorCode::bad_input, "{}: expected an object, found {}", where, json.type_name());
@@ -138,13 +136,13 @@ Result<Sensor> read_sensor(const Json& json, std::string_view where)
                         {"name", "model", "width", "height", "fov", "fx", "fy", "cx", "cy", "distortion",
                          "sensor_to_vehicle", "comment"},
                         where));
-    if (!json.contains("name") || !json["name"].is_string() ||
-        !is_camera_name(json["name"].get_ref<const std::string&>()))
+    const Json name = json.value("name", Json());
+    if (!name.is_string() || !(is_camera_name(name.get_ref<const std::string&>()) || (alone && name == "")))
         return fail(ErrorCode::bad_input, "{}: expected a name of letters, digits, '.', '_' and '-'", where);
     if (!json.contains("sensor_to_vehicle"))
         return fail(ErrorCode::bad_input, "{}: sensor_to_vehicle is missing", where);
     Sensor sensor;
-    sensor.name = json["name"].get<std::string>();
+    sensor.name = name.get<std::string>();
     SR_TRY(sensor.intrinsics, read_intrinsics(json, where));
     SR_TRY(sensor.sensor_to_vehicle,
            read_mounting(json["sensor_to_vehicle"], fmt::format("{}: sensor_to_vehicle", where)));
@@ -165,8 +163,12 @@ Result<PathAxes> read_path_axes(const Json& file, std::string_view where)
 
 Result<Rig> read_rig(const Path& path)
 {
-    const std::string name = quote_path(path);
     SR_TRY(const Json file, read_json(path));
+    return parse_rig(file, quote_path(path));
+}
+
+Result<Rig> parse_rig(const Json& file, std::string_view name)
+{
     if (!file.is_object() || !file.contains("sensors") || !file["sensors"].is_array())
         return fail(ErrorCode::bad_input, "{}: expected an object with an array of sensors", name);
     SR_CHECK(check_keys(file, {"path_axes", "sensors", "comment"}, name));
@@ -176,7 +178,7 @@ Result<Rig> read_rig(const Path& path)
     Rig rig;
     SR_TRY(rig.path_axes, read_path_axes(file, name));
     for (size_t i = 0; i < sensors.size(); ++i) {
-        SR_TRY(Sensor sensor, read_sensor(sensors[i], fmt::format("{} sensor {}", name, i)));
+        SR_TRY(Sensor sensor, read_sensor(sensors[i], sensors.size() == 1, fmt::format("{} sensor {}", name, i)));
         if (std::ranges::find(rig.sensors, sensor.name, &Sensor::name) != rig.sensors.end())
             return fail(ErrorCode::bad_input, "{}: two sensors are called {}", name, quote(sensor.name));
         rig.sensors.push_back(std::move(sensor));
@@ -209,7 +211,7 @@ CameraPath expand_rig(const Rig& rig, const CameraPath& vehicle)
     for (size_t i = 0; i < vehicle.frames.size(); ++i) {
         const CameraFrame& pose = vehicle.frames[i];
         const Rigid world_to_vehicle = rig.path_axes == PathAxes::camera
-                                           ? compose(inverse(kVehicleToForwardCamera), pose.pose.world_to_camera)
+                                           ? compose(kForwardCamera, pose.pose.world_to_camera)
                                            : inverse(vehicle.file_pose(i));
         for (const Sensor& sensor : rig.sensors)
             cameras.frames.push_back({pose.time,

@@ -10,6 +10,7 @@
 #include "engine/job/empty_frames.h"
 #include "engine/job/input_hashes.h"
 #include "engine/job/outgoing.h"
+#include "engine/job/outputs.h"
 #include "engine/job/version.h"
 #include "engine/scene/palette.h"
 #include "engine/splat/bounds.h"
@@ -274,8 +275,10 @@ Result<std::unique_ptr<Job>> begin_drawing(Device& device, DrawingOptions option
                            .encoding = o.encoding};
     SR_TRY(auto store, DrawingStore::open(o.folder, settings, o.path, files, o.replace));
     if (!store->run().results()) {
-        if (!o.path.frames.empty())
+        if (!o.path.frames.empty()) {
             SR_CHECK(store->write_cameras(o.path));
+            SR_CHECK(write_record_of(o.path, o.encoding.depth_unit(), o.folder, callbacks));
+        }
         if (o.points)
             SR_CHECK(write_points(o.folder / "points.ply", o));
     }

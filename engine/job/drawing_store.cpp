@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/drawing_store.h"
 
+#include "engine/annotation/drive_record.h"
 #include "engine/format/buffer_folder.h"
 #include "engine/format/image.h"
 #include "engine/format/npy.h"
@@ -25,6 +26,14 @@ constexpr const char* kArrays[] = {"depth_expected", "depth_median", "alpha"};
 constexpr const char* kTop = "top.png";
 constexpr const char* kPoints = "points.ply";
 constexpr const char* kCameras = "transforms.json";
+
+// beside the pictures
+std::vector<std::string> single_files()
+{
+    std::vector<std::string> names{kTop, kPoints, kCameras};
+    names.insert(names.end(), std::begin(kDriveRecordFiles), std::end(kDriveRecordFiles));
+    return names;
+}
 
 std::set<std::string> cameras_of(const CameraPath& path)
 {
@@ -100,7 +109,7 @@ Status DrawingStore::check(const Path& folder, const CameraPath& path, bool repl
     if (replace || fs::exists(folder / "run.json")) // whether it may go on is known by its settings
         return {};
     std::vector<std::string> names = picture_folders(cameras_of(path));
-    names.insert(names.end(), {kTop, kPoints, kCameras});
+    std::ranges::copy(single_files(), std::back_inserter(names));
     for (const std::string& name : names)
         if (fs::exists(folder / name))
             return fail(ErrorCode::usage, "{} exists; `replace` replaces what is there", quote_path(folder / name));
@@ -116,7 +125,7 @@ Result<std::unique_ptr<DrawingStore>> DrawingStore::open(const Path& folder, con
     with_cameras["cameras"] = cameras;
     with_cameras["files"] = {{"npy", files.floats}, {"top", files.top}, {"points", files.points}};
     cameras.merge(cameras_before(folder));
-    const RunContents contents{{}, {kTop, kPoints, kCameras}, picture_folders(cameras)};
+    const RunContents contents{{}, single_files(), picture_folders(cameras)};
     SR_TRY(RunFolder run, open_run(folder, with_cameras, replace, contents, true));
     return std::unique_ptr<DrawingStore>(new DrawingStore(std::move(run), path, files));
 }
