@@ -23,7 +23,7 @@ namespace semrover {
 
 namespace {
 
-constexpr const char* kMade[] = {"kColor", "kSurface", "kDepth", "kIds"}; // of SplatOptions::made
+constexpr const char* kMade[] = {"kColor", "kSurface", "kDepth", "kIds", "kOwners"}; // of SplatOptions::made
 
 SplatPush make_push(const SplatTensors& scene, Tensor cameras, const SplatOptions& o)
 {
@@ -43,6 +43,8 @@ SplatPush make_push(const SplatTensors& scene, Tensor cameras, const SplatOption
     push.transmittance_min = o.transmittance_min;
     push.cutoff2 = o.cutoff > 0 ? o.cutoff * o.cutoff : 1e30f;
     push.filter_scale = o.screen_variance > 0 ? 1 / o.screen_variance : 1e30f;
+    push.movers = o.movers.rows / cameras.rows;
+    push.mover_numbers = o.mover_rows.rows;
     return push;
 }
 
@@ -50,7 +52,7 @@ void check(const SplatTensors& scene, Tensor cameras, const SplatOptions& o)
 {
     const uint32_t n = scene.positions.rows;
     SR_ASSERT(scene.positions.ld == 4 && scene.normals.ld == 4 && scene.colors.ld == 4 && scene.normals.rows == n &&
-                  scene.colors.rows == n && scene.labels.rows == n && scene.cells.rows == n,
+                  scene.colors.rows == n && scene.labels.rows == n && scene.cells.rows == n && scene.owners.rows == n,
               "splat: scene of {} splats with arrays of other sizes", n);
     SR_ASSERT(!scene.blocks.valid() || scene.blocks.rows == divide_up(n, 64), "splat: {} blocks of {} splats",
               scene.blocks.rows, n);
@@ -62,6 +64,9 @@ void check(const SplatTensors& scene, Tensor cameras, const SplatOptions& o)
     SR_ASSERT(!o.limits.valid() || (o.lens == SplatLens::pinhole && o.limits.ld == 1 &&
                                     o.limits.rows == o.width * o.height * cameras.rows),
               "splat: {} limits for {} x {} pixels", o.limits.rows, o.width, o.height);
+    SR_ASSERT(o.movers.valid() == o.mover_rows.valid() &&
+                  (!o.movers.valid() || (o.movers.ld == 12 && o.movers.rows % cameras.rows == 0)),
+              "splat: {} views of movers for {} cameras", o.movers.rows, cameras.rows);
     SR_ASSERT(uint64_t(n) * cameras.rows < 1ull << 32, "splat: {} splats in {} cameras", n, cameras.rows);
 }
 
@@ -73,16 +78,20 @@ struct Seen {
 Seen project(Graph& g, const SplatTensors& scene, Tensor cameras, const SplatOptions& o, const SplatPush& push)
 {
     const bool pinhole = o.lens == SplatLens::pinhole;
+    const Tensor movers = o.movers.valid() ? o.movers : cameras;
+    const Tensor mover_rows = o.movers.valid() ? o.mover_rows : scene.owners;
     const uint32_t views = push.splats * push.cameras;
     DispatchOptions lens;
+    lens.constants = {{"kMovers", o.movers.valid()}};
     if (!pinhole)
-        lens.constants = {{"kModel", uint32_t(o.lens)}};
+        lens.constants.push_back({"kModel", uint32_t(o.lens)});
     const Tensor keep = g.array(views, DType::u32, "keep");
     const bool by_blocks = scene.blocks.valid();
     DispatchOptions cull = lens;
     cull.constants.push_back({"kBlocks", by_blocks});
     g.dispatch(pinhole ? kernel::splat_cull : kernel::splat_lens_cull,
-               {cameras, scene.positions, scene.normals, scene.colors, keep, by_blocks ? scene.blocks : scene.labels},
+               {cameras, scene.positions, scene.normals, scene.colors, scene.owners, movers, mover_rows, keep,
+                by_blocks ? scene.blocks : scene.labels},
                push, threads(views), std::move(cull));
     const PrefixSum slots = prefix_sum(g, keep, {.non_zero = true});
     const uint32_t texels = splat_record_bytes(o.lens) / 16;
@@ -90,7 +99,8 @@ Seen project(Graph& g, const SplatTensors& scene, Tensor cameras, const SplatOpt
     const Tensor sources = g.array(push.max_visible, DType::u32, "splat sources");
     const Tensor depths = g.array(push.max_visible, DType::u32, "splat depths");
     g.dispatch(pinhole ? kernel::splat_project : kernel::splat_lens_project,
-               {cameras, scene.positions, scene.normals, scene.colors, keep, slots.sums, records, sources, depths},
+               {cameras, scene.positions, scene.normals, scene.colors, scene.owners, movers, mover_rows, keep,
+                slots.sums, records, sources, depths},
                push, threads(views), lens);
     return {records, sources, depths, slots.total};
 }
@@ -135,6 +145,7 @@ SplatImages splat(Graph& g, const SplatTensors& scene, Tensor cameras, const Spl
                            g.array(rows(1), DType::f32, "splat surface", 4),
                            g.array(rows(2), DType::f32, "splat depth", 2),
                            g.array(rows(3), DType::u32, "splat ids", 2),
+                           g.array(rows(4), DType::u32, "splat owners"),
                            seen.count,
                            by_tile.pairs};
     DispatchOptions blend;
@@ -147,7 +158,7 @@ SplatImages splat(Graph& g, const SplatTensors& scene, Tensor cameras, const Spl
         blend.constants.push_back({"kLimited", limited});
         g.dispatch(kernel::splat_blend,
                    {seen.records, by_tile.records, by_tile.starts, seen.sources, scene.labels, scene.cells, y.color,
-                    y.surface, y.depth, y.ids, limited ? options.limits : scene.positions},
+                    y.surface, y.depth, y.ids, limited ? options.limits : scene.positions, scene.owners, y.owners},
                    push, grid, std::move(blend));
         return y;
     }
@@ -157,7 +168,7 @@ SplatImages splat(Graph& g, const SplatTensors& scene, Tensor cameras, const Spl
     g.dispatch(kernel::splat_rays, {cameras, rays}, push, threads(pixels), {.constants = {model}});
     g.dispatch(kernel::splat_ray_blend,
                {seen.records, by_tile.records, by_tile.starts, seen.sources, scene.labels, scene.cells, y.color,
-                y.surface, y.depth, y.ids, rays},
+                y.surface, y.depth, y.ids, rays, scene.owners, y.owners},
                push, grid, std::move(blend));
     return y;
 }
