@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/camera/lens.h"
+#include "engine/camera/camera_view.h"
 #include "engine/camera/rig.h"
 #include "engine/deferred/frame_images.h"
 #include "tests/says.h"
@@ -9,6 +9,7 @@
 
 #include <cmath>
 #include <gtest/gtest.h>
+#include <numbers>
 #include <random>
 
 namespace semrover {
@@ -275,6 +276,29 @@ TEST(Rigid, an_inverse_undoes_and_a_quaternion_returns)
                     rigid_from_quaternion({}, q, "t").value(), 1e-15);
 }
 
+TEST(Rigid, between_two_poses_the_turn_is_even_and_the_shorter_way)
+{
+    const auto turned = [](double x, double radians) { // about an axis that leans
+        const double s = std::sin(radians / 2) / 3;
+        return rigid_from_quaternion({x, 2 * x, -x}, {s, 2 * s, 2 * s, std::cos(radians / 2)}, "t").value();
+    };
+    for (const double from : {-2.0, 0.0, 0.3, 3.0})
+        for (const double by : {-3.1, -1.0, -1e-7, 0.0, 1e-12, 0.5, 3.1})
+            for (const double share : {-0.5, 0.0, 0.25, 1 / 3.0, 0.5, 0.999, 1.0, 1.5})
+                expect_near(interpolate(turned(1, from), turned(5, from + by), share),
+                            turned(1 + 4 * share, from + by * share), 1e-14);
+    // more than half a turn is less than half of one the other way
+    expect_near(interpolate(turned(0, 0), turned(0, 4), 0.5), turned(0, (4 - 2 * std::numbers::pi) / 2), 1e-14);
+    for (const CameraFrame& frame : random_path(100).frames) {
+        const Rigid& a = frame.pose.world_to_camera;
+        const Rigid b = compose(a, turned(3, 1.5));
+        EXPECT_EQ(interpolate(a, b, 0), a);
+        EXPECT_EQ(interpolate(a, b, 1), b);
+        EXPECT_EQ(interpolate(a, a, 0.37), a);
+        expect_near(interpolate(a, b, 0.3), interpolate(b, a, 0.7), 1e-11);
+    }
+}
+
 constexpr const char* kRig = R"({"sensors":[
     {"name":"front","model":"pinhole","width":8,"height":8,"fov":90,
      "sensor_to_vehicle":{"translation":[1,0,0.5],"rotation":[-0.5,0.5,-0.5,0.5]}},
@@ -287,7 +311,7 @@ TEST(Rig, every_pose_of_the_path_gives_a_frame_of_every_sensor)
     const auto rig = read_rig(folder.put("rig.json", kRig));
     ASSERT_TRUE(rig) << rig.error().message;
     const auto drive = read_tum(folder.put("a.tum", "0 10 0 0 -0.5 0.5 -0.5 0.5\n1 20 0 0 -0.5 0.5 -0.5 0.5"), kView);
-    const CameraPath path = expand_rig(*rig, *drive);
+    const CameraPath path = *expand_rig(*rig, *drive);
     ASSERT_EQ(path.frames.size(), 4u);
     EXPECT_EQ(path.frames[2].camera, "front");
     EXPECT_EQ(path.frames[2].time, 1);
@@ -312,7 +336,7 @@ TEST(Rig, a_path_of_vehicle_poses_is_taken_as_such)
     const auto rig = read_rig(folder.put("rig.json", text));
     ASSERT_TRUE(rig) << rig.error().message;
     const auto drive = read_tum(folder.put("a.tum", "0 10 0 0 0 0 0 1"), kView);
-    EXPECT_NEAR(project(expand_rig(*rig, *drive).frames[0], {13, 0, 0.5})->depth, 2, 1e-12);
+    EXPECT_NEAR(project(expand_rig(*rig, *drive)->frames[0], {13, 0, 0.5})->depth, 2, 1e-12);
 }
 
 TEST(Rig, sensors_may_have_any_lens)
@@ -347,7 +371,7 @@ TEST(Rig, the_examples_look_where_their_names_say)
         const auto rig = read_rig(fmt::format("{}/assets/rigs/{}.json", SEMROVER_SOURCE_DIR, name));
         ASSERT_TRUE(rig) << rig.error().message;
         EXPECT_EQ(rig->sensors.size(), std::string_view(name) == "waymo" ? 5u : 6u);
-        const CameraPath path = expand_rig(*rig, *drive);
+        const CameraPath path = *expand_rig(*rig, *drive);
         const Point3 at = translation_of(drive->frames[0].pose.camera_to_world());
         for (size_t i = 0; i < rig->sensors.size(); ++i) {
             const std::string& camera = path.frames[i].camera;

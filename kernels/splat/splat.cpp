@@ -62,6 +62,7 @@ void check(const SplatTensors& scene, Tensor cameras, const SplatOptions& o)
     SR_ASSERT(!o.limits.valid() || (o.lens == SplatLens::pinhole && o.limits.ld == 1 &&
                                     o.limits.rows == o.width * o.height * cameras.rows),
               "splat: {} limits for {} x {} pixels", o.limits.rows, o.width, o.height);
+    SR_ASSERT(!o.moving || o.lens != SplatLens::pinhole, "splat: a pinhole that moves is an opencv lens");
     SR_ASSERT(uint64_t(n) * cameras.rows < 1ull << 32, "splat: {} splats in {} cameras", n, cameras.rows);
 }
 
@@ -76,7 +77,7 @@ Seen project(Graph& g, const SplatTensors& scene, Tensor cameras, const SplatOpt
     const uint32_t views = push.splats * push.cameras;
     DispatchOptions lens;
     if (!pinhole)
-        lens.constants = {{"kModel", uint32_t(o.lens)}};
+        lens.constants = {{"kModel", uint32_t(o.lens)}, {"kMoving", o.moving}};
     const Tensor keep = g.array(views, DType::u32, "keep");
     const bool by_blocks = scene.blocks.valid();
     DispatchOptions cull = lens;
@@ -85,7 +86,7 @@ Seen project(Graph& g, const SplatTensors& scene, Tensor cameras, const SplatOpt
                {cameras, scene.positions, scene.normals, scene.colors, keep, by_blocks ? scene.blocks : scene.labels},
                push, threads(views), std::move(cull));
     const PrefixSum slots = prefix_sum(g, keep, {.non_zero = true});
-    const uint32_t texels = splat_record_bytes(o.lens) / 16;
+    const uint32_t texels = splat_record_bytes(o.lens, o.moving) / 16;
     const Tensor records = g.array(push.max_visible * texels, DType::u32, "splat records", 4);
     const Tensor sources = g.array(push.max_visible, DType::u32, "splat sources");
     const Tensor depths = g.array(push.max_visible, DType::u32, "splat depths");
@@ -104,7 +105,7 @@ Tiled sort_into_tiles(Graph& g, const Seen& seen, const SplatOptions& o, const S
 {
     const uint32_t tiles_all = push.tiles_x * push.tiles_y * push.cameras;
     DispatchOptions lens;
-    lens.constants = {{"kRays", o.lens != SplatLens::pinhole}};
+    lens.constants = {{"kTexels", splat_record_bytes(o.lens, o.moving) / 16}};
     const Tensor order = radix_sort(g, seen.depths, {}, {.count = seen.count}).values;
     const Tensor touched = g.array(push.max_visible, DType::u32, "tiles touched");
     g.dispatch(kernel::splat_count, {seen.records, order, seen.count, touched}, push, threads(push.max_visible), lens);
@@ -153,8 +154,10 @@ SplatImages splat(Graph& g, const SplatTensors& scene, Tensor cameras, const Spl
     }
     const ConstantValue model{"kModel", uint32_t(options.lens)};
     blend.constants.push_back(model);
-    const Tensor rays = g.array(pixels, DType::f32, "rays", 4);
-    g.dispatch(kernel::splat_rays, {cameras, rays}, push, threads(pixels), {.constants = {model}});
+    blend.constants.push_back({"kTexels", splat_record_bytes(options.lens, options.moving) / 16});
+    const Tensor rays = g.array(options.moving ? 2 * pixels : pixels, DType::f32, "rays", 4);
+    g.dispatch(kernel::splat_rays, {cameras, rays}, push, threads(pixels),
+               {.constants = {model, {"kMoving", options.moving}}});
     g.dispatch(kernel::splat_ray_blend,
                {seen.records, by_tile.records, by_tile.starts, seen.sources, scene.labels, scene.cells, y.color,
                 y.surface, y.depth, y.ids, rays},
