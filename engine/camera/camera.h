@@ -56,7 +56,7 @@ struct Shutter {
 // a camera's poses at the start and at the end of its readout
 struct Readout {
     ShutterDirection direction = ShutterDirection::down;
-    Pose from, to;
+    Pose from = {}, to = {};
 
     // the same pose, to the bit, sees what a global shutter sees
     bool moves() const { return from.world_to_camera != to.world_to_camera; }
