@@ -248,7 +248,8 @@ TEST(Camera, sky_is_where_a_ray_goes_up_and_meets_nothing)
     for (const Intrinsics& k : lenses)
         for (const Quaternion& q : turns) {
             const CameraFrame frame{0, "", {inverse(*rigid_from_quaternion({1, 2, 3}, q, "turn"))}, k};
-            FramePixels pixels{k.width, k.height, {}, {}, std::vector<uint32_t>(k.width * k.height, 255u << 24 | 7)};
+            FramePixels pixels{.width = k.width, .height = k.height};
+            pixels.normals.assign(k.width * k.height, 255u << 24 | 7);
             for (size_t i = 0; i < pixels.normals.size(); i += 3)
                 pixels.normals[i] = 2u << 24; // a building
             mark_sky(pixels, frame);

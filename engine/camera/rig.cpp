@@ -15,9 +15,6 @@ namespace {
 
 constexpr size_t kMaxSensors = 64;
 
-// vehicle axes (forward, left, up) to those of a camera that looks forward (right, down, forward)
-constexpr Rigid kVehicleToForwardCamera = {0, -1, 0, 0, 0, 0, -1, 0, 1, 0, 0, 0, 0, 0, 0, 1};
-
 Status check_keys(const Json& object, std::initializer_list<std::string_view> known, std::string_view where)
 {
     for (const auto& entry : object.items())
@@ -171,7 +168,8 @@ Result<std::optional<Shutter>> read_shutter(const Json& json, std::string_view w
     return std::optional(shutter);
 }
 
-Result<Sensor> read_sensor(const Json& json, std::string_view where)
+// alone: in its rig, where it needs no name
+Result<Sensor> read_sensor(const Json& json, bool alone, std::string_view where)
 {
     if (!json.is_object())
         return fail(ErrorCode::bad_input, "{}: expected an object, found {}", where, json.type_name());
@@ -180,13 +178,13 @@ Result<Sensor> read_sensor(const Json& json, std::string_view where)
                          "principal_point", "reference_poly", "pixeldist_to_angle_poly", "angle_to_pixeldist_poly",
                          "max_angle", "linear_cde", "shutter", "sensor_to_vehicle", "comment"},
                         where));
-    if (!json.contains("name") || !json["name"].is_string() ||
-        !is_camera_name(json["name"].get_ref<const std::string&>()))
+    const Json name = json.value("name", Json());
+    if (!name.is_string() || !(is_camera_name(name.get_ref<const std::string&>()) || (alone && name == "")))
         return fail(ErrorCode::bad_input, "{}: expected a name of letters, digits, '.', '_' and '-'", where);
     if (!json.contains("sensor_to_vehicle"))
         return fail(ErrorCode::bad_input, "{}: sensor_to_vehicle is missing", where);
     Sensor sensor;
-    sensor.name = json["name"].get<std::string>();
+    sensor.name = name.get<std::string>();
     SR_TRY(sensor.intrinsics, read_intrinsics(json, where));
     if (json.contains("shutter")) {
         SR_TRY(sensor.shutter, read_shutter(json["shutter"], fmt::format("{}: shutter", where)));
@@ -242,7 +240,8 @@ Readout readout_of(const Sensor& sensor, const CameraFrame& frame, const Course&
         return Pose{compose(inverse(sensor.sensor_to_vehicle), inverse(vehicle))};
     };
     const Shutter& s = *sensor.shutter;
-    return {s.direction, pose_at(s.start), pose_at(s.start + s.readout)};
+    const int64_t end = s.start + s.readout;
+    return {s.direction, pose_at(s.start), pose_at(end), double(s.start) * 1e-6, double(end) * 1e-6};
 }
 
 // of a lens with distortion, those that it needs
@@ -266,8 +265,12 @@ Result<PathAxes> read_path_axes(const Json& file, std::string_view where)
 
 Result<Rig> read_rig(const Path& path)
 {
-    const std::string name = quote_path(path);
     SR_TRY(const Json file, read_json(path));
+    return parse_rig(file, quote_path(path));
+}
+
+Result<Rig> parse_rig(const Json& file, std::string_view name)
+{
     if (!file.is_object() || !file.contains("sensors") || !file["sensors"].is_array())
         return fail(ErrorCode::bad_input, "{}: expected an object with an array of sensors", name);
     SR_CHECK(check_keys(file, {"path_axes", "sensors", "comment"}, name));
@@ -277,7 +280,7 @@ Result<Rig> read_rig(const Path& path)
     Rig rig;
     SR_TRY(rig.path_axes, read_path_axes(file, name));
     for (size_t i = 0; i < sensors.size(); ++i) {
-        SR_TRY(Sensor sensor, read_sensor(sensors[i], fmt::format("{} sensor {}", name, i)));
+        SR_TRY(Sensor sensor, read_sensor(sensors[i], sensors.size() == 1, fmt::format("{} sensor {}", name, i)));
         if (std::ranges::find(rig.sensors, sensor.name, &Sensor::name) != rig.sensors.end())
             return fail(ErrorCode::bad_input, "{}: two sensors are called {}", name, quote(sensor.name));
         rig.sensors.push_back(std::move(sensor));
@@ -317,7 +320,7 @@ Result<CameraPath> expand_rig(const Rig& rig, const CameraPath& vehicle)
     for (size_t i = 0; i < vehicle.frames.size(); ++i) {
         const CameraFrame& pose = vehicle.frames[i];
         const Rigid world_to_vehicle = rig.path_axes == PathAxes::camera
-                                           ? compose(inverse(kVehicleToForwardCamera), pose.pose.world_to_camera)
+                                           ? compose(kForwardCamera, pose.pose.world_to_camera)
                                            : inverse(vehicle.file_pose(i));
         course.add(pose.time, inverse(world_to_vehicle));
         for (const Sensor& sensor : rig.sensors)

@@ -26,21 +26,14 @@ bool move(const CameraFrame& a, const CameraFrame& b)
     return a.moves() || b.moves();
 }
 
-// of both: a pinhole that moves is an opencv lens
-CameraModel model_of(const CameraFrame& now, const CameraFrame& past)
-{
-    const CameraModel model = now.intrinsics.model;
-    return model == CameraModel::pinhole && move(now, past) ? CameraModel::opencv : model;
-}
-
 // the world in the first one's own (still) frame, where numbers are small and fp32 is enough
-std::vector<float> camera_rows(CameraFrame now, CameraFrame past)
+std::vector<float> camera_rows(const CameraFrame& now, const CameraFrame& past)
 {
     std::vector<float> rows(2 * kLensCameraFloats);
     const Rigid between = compose(motion_of(past).middle.world_to_camera, motion_of(now).middle.camera_to_world());
-    now.intrinsics.model = past.intrinsics.model = model_of(now, past);
+    const bool moving = move(now, past);
     const auto write = [&](const CameraFrame& frame, const Rigid& world_to_camera, std::span<float> row) {
-        SplatCamera camera = splat_camera(frame);
+        SplatCamera camera = splat_camera(frame, moving);
         std::ranges::transform(std::span(world_to_camera).first(12), camera.world_to_camera.begin(),
                                [](double v) { return float(v); });
         write_row(camera, row);
@@ -136,8 +129,8 @@ Status FrameHistory::accumulate_now(const CameraFrame& camera, const DepthPictur
         SR_CHECK(memory_.cameras.write(device_, camera_rows(camera, camera_)));
     }
     SR_CHECK(memory_.now.depth.write(device_, metres_of(depth)));
-    const CameraModel model = model_of(camera, camera_);
     const bool moving = move(camera, camera_);
+    const CameraModel model = drawn_model(camera.intrinsics.model, moving);
     camera_ = camera;
     ++frames_;
     if (alone)

@@ -10,6 +10,7 @@
 #include "engine/job/empty_frames.h"
 #include "engine/job/input_hashes.h"
 #include "engine/job/outgoing.h"
+#include "engine/job/outputs.h"
 #include "engine/job/version.h"
 #include "engine/scene/palette.h"
 #include "engine/splat/bounds.h"
@@ -41,24 +42,20 @@ RasterizerOptions float_options(const DrawOptions& o)
     return options;
 }
 
-// splats are drawn as they are
-Result<SplatScene> load_scene(Device& device, DrawingOptions& o)
+Result<DrawnScene> load_scene(Device& device, const DrawingOptions& o)
 {
     if (const auto* grid = std::get_if<VoxelGrid>(&o.scene))
         return splats_of(device, *grid, o.scene_name, o.draw);
-    Splats& splats = std::get<Splats>(o.scene);
-    for (size_t i = 0; o.draw.semantic && i < splats.label.size(); ++i)
-        splats.color[i] = label_color(splats.label[i]);
-    return SplatScene::create(device, splats);
+    return splats_of(device, std::get<Splats>(o.scene), o.draw);
 }
 
 class DrawingJob : public Job {
   public:
-    DrawingJob(Device& device, DrawingOptions options, SplatScene scene, std::unique_ptr<DrawingStore> store,
+    DrawingJob(Device& device, DrawingOptions options, DrawnScene scene, std::unique_ptr<DrawingStore> store,
                std::unique_ptr<Outgoing> out, const JobCallbacks& callbacks)
         : device_(device), o_(std::move(options)), scene_(std::move(scene)), callbacks_(callbacks),
-          drawing_(device, scene_, o_.path, o_.draw.rasterizer(o_.encoding)),
-          floats_(device, scene_, {}, float_options(o_.draw)), store_(std::move(store)), out_(std::move(out))
+          drawing_(device, scene_, o_.path, o_.draw.rasterizer(o_.encoding), o_.encoding.flow.has_value()),
+          floats_(device, scene_, {}, float_options(o_.draw), false), store_(std::move(store)), out_(std::move(out))
     {
         if (drawing_.total()) {
             empty_.emplace(o_.path, o_.scene_name, o_.allow_empty);
@@ -84,8 +81,8 @@ class DrawingJob : public Job {
             return *store_->run().results();
         const Json results{{"output", o_.folder.string()},
                            {"frames", drawing_.total()},
-                           {"splats", scene_.size()},
-                           {"skipped", scene_.skipped()},
+                           {"splats", scene_.splats.size()},
+                           {"skipped", scene_.splats.skipped()},
                            {"empty_frames", empty_ ? empty_->count() : 0},
                            {"seconds", seconds_since(start_)},
                            {"file_wait_seconds", out_->file_wait_seconds()},
@@ -122,7 +119,7 @@ class DrawingJob : public Job {
                 done = drawing_.skip();
             } else {
                 drew_ = true;
-                SR_TRY(done, drawing_.step([this](const CameraFrame& frame, const SplatPixelSlots& pixels) {
+                SR_TRY(done, drawing_.step([this](const CameraFrame& frame, const FrameSlots& pixels) {
                     return take(frame, pixels);
                 }));
             }
@@ -166,7 +163,7 @@ class DrawingJob : public Job {
         }
         return {};
     }
-    Status take(const CameraFrame& frame, const SplatPixelSlots& slots)
+    Status take(const CameraFrame& frame, const FrameSlots& slots)
     {
         const ImageSize size{frame.intrinsics.width, frame.intrinsics.height};
         const uint32_t number = counts_[frame.camera]++;
@@ -196,7 +193,7 @@ class DrawingJob : public Job {
     {
         drew_ = true;
         const CameraFrame camera = overview_camera(bounds(), o_.top);
-        return drawing_.draw({&camera, 1}, [this](const CameraFrame&, const SplatPixelSlots& slots) {
+        return drawing_.draw({&camera, 1}, [this](const CameraFrame&, const FrameSlots& slots) {
             return out_->read(slots, o_.top, [this](const FramePixels& pixels) {
                 return out_->write(pixels.bytes(),
                                    [this, color = color_pixels(pixels)] { return store_->make_top(o_.top, color); });
@@ -206,7 +203,7 @@ class DrawingJob : public Job {
 
     Device& device_;
     DrawingOptions o_;
-    SplatScene scene_;
+    DrawnScene scene_;
     JobCallbacks callbacks_;
     PathDrawing drawing_;
     PathDrawing floats_; // what files of 8 and 16 bits round away
@@ -252,7 +249,7 @@ uint64_t largest_read(const DrawingOptions& o)
     uint64_t pixels = uint64_t(o.top.width) * o.top.height;
     for (const CameraFrame& f : o.path.frames)
         pixels = std::max(pixels, uint64_t(f.intrinsics.width) * f.intrinsics.height);
-    return pixels * 4;
+    return pixels * (o.encoding.flow ? 8 : 4);
 }
 
 } // namespace
@@ -267,15 +264,21 @@ Result<std::unique_ptr<Job>> begin_drawing(Device& device, DrawingOptions option
     DrawingOptions& o = options;
     SR_CHECK(check_drawing_outputs(o));
     const Json settings = drawing_settings(o, device);
-    SR_TRY(SplatScene scene, load_scene(device, o));
-    if (scene.skipped() && callbacks.warning)
-        callbacks.warning(fmt::format("{} of {} splats are degenerate and not drawn", scene.skipped(), scene.size()));
+    SR_TRY(DrawnScene scene, load_scene(device, o));
+    if (const SplatScene& splats = scene.splats; splats.skipped() && callbacks.warning)
+        callbacks.warning(fmt::format("{} of {} splats are degenerate and not drawn", splats.skipped(), splats.size()));
     SR_TRY(auto out, Outgoing::create(device, largest_read(o), o.threads));
-    const DrawnFiles files{.floats = o.floats, .top = o.top.width > 0, .points = o.points, .encoding = o.encoding};
+    const DrawnFiles files{.floats = o.floats,
+                           .top = o.top.width > 0,
+                           .points = o.points,
+                           .instances = o.draw.instances,
+                           .encoding = o.encoding};
     SR_TRY(auto store, DrawingStore::open(o.folder, settings, o.path, files, o.replace));
     if (!store->run().results()) {
-        if (!o.path.frames.empty())
+        if (!o.path.frames.empty()) {
             SR_CHECK(store->write_cameras(o.path));
+            SR_CHECK(write_record_of(o.path, o.encoding.depth_unit(), o.folder, callbacks));
+        }
         if (o.points)
             SR_CHECK(write_points(o.folder / "points.ply", o));
     }

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/drawing_store.h"
 
+#include "engine/annotation/drive_record.h"
 #include "engine/format/buffer_folder.h"
 #include "engine/format/image.h"
 #include "engine/format/npy.h"
@@ -20,10 +21,19 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kPictures[] = {"color", "depth", "normal", "label", "visible"};
+constexpr const char *kInstances = "instance", *kFlow = "flow", *kFlowStates = "flow_state";
 constexpr const char* kArrays[] = {"depth_expected", "depth_median", "alpha"};
 constexpr const char* kTop = "top.png";
 constexpr const char* kPoints = "points.ply";
 constexpr const char* kCameras = "transforms.json";
+
+// beside the pictures
+std::vector<std::string> single_files()
+{
+    std::vector<std::string> names{kTop, kPoints, kCameras};
+    names.insert(names.end(), std::begin(kDriveRecordFiles), std::end(kDriveRecordFiles));
+    return names;
+}
 
 std::set<std::string> cameras_of(const CameraPath& path)
 {
@@ -41,6 +51,8 @@ std::vector<std::string> picture_folders(const std::set<std::string>& cameras)
         for (const char* kind : kPictures)
             folders.push_back((camera_folder("", camera) / kind).string());
         for (const char* kind : kArrays)
+            folders.push_back((camera_folder("", camera) / kind).string());
+        for (const char* kind : {kInstances, kFlow, kFlowStates})
             folders.push_back((camera_folder("", camera) / kind).string());
     }
     return folders;
@@ -65,6 +77,20 @@ std::string piece_name(const std::string& camera, uint32_t number)
     return fmt::format("{}{}{:06}", camera, camera.empty() ? "" : "/", number);
 }
 
+std::set<std::string> pieces_with_flow(const CameraPath& path)
+{
+    std::set<std::string> pieces;
+    std::map<std::string, uint32_t> counts;
+    const std::vector<size_t> following = following_frames(path);
+    for (size_t i = 0; i < path.frames.size(); ++i) {
+        const std::string& camera = path.frames[i].camera;
+        const uint32_t number = counts[camera]++;
+        if (following[i] < path.frames.size())
+            pieces.insert(piece_name(camera, number));
+    }
+    return pieces;
+}
+
 Status make_float_images(const Path& folder, uint32_t number, const SplatImage& image, MadeFiles& files)
 {
     const std::vector<float>* const planes[] = {&image.depth_expected, &image.depth_median, &image.alpha};
@@ -83,7 +109,7 @@ Status DrawingStore::check(const Path& folder, const CameraPath& path, bool repl
     if (replace || fs::exists(folder / "run.json")) // whether it may go on is known by its settings
         return {};
     std::vector<std::string> names = picture_folders(cameras_of(path));
-    names.insert(names.end(), {kTop, kPoints, kCameras});
+    std::ranges::copy(single_files(), std::back_inserter(names));
     for (const std::string& name : names)
         if (fs::exists(folder / name))
             return fail(ErrorCode::usage, "{} exists; `replace` replaces what is there", quote_path(folder / name));
@@ -99,13 +125,15 @@ Result<std::unique_ptr<DrawingStore>> DrawingStore::open(const Path& folder, con
     with_cameras["cameras"] = cameras;
     with_cameras["files"] = {{"npy", files.floats}, {"top", files.top}, {"points", files.points}};
     cameras.merge(cameras_before(folder));
-    const RunContents contents{{}, {kTop, kPoints, kCameras}, picture_folders(cameras)};
+    const RunContents contents{{}, single_files(), picture_folders(cameras)};
     SR_TRY(RunFolder run, open_run(folder, with_cameras, replace, contents, true));
-    return std::unique_ptr<DrawingStore>(new DrawingStore(std::move(run), files));
+    return std::unique_ptr<DrawingStore>(new DrawingStore(std::move(run), path, files));
 }
 
-DrawingStore::DrawingStore(RunFolder run, const DrawnFiles& files)
-    : run_(std::move(run)), files_(files), record_(run_, [this](const std::string& piece) { return files_of(piece); })
+DrawingStore::DrawingStore(RunFolder run, const CameraPath& path, const DrawnFiles& files)
+    : run_(std::move(run)), files_(files),
+      with_flow_(files.encoding.flow ? pieces_with_flow(path) : std::set<std::string>()),
+      record_(run_, [this](const std::string& piece) { return files_of(piece); })
 {
 }
 
@@ -129,6 +157,13 @@ std::vector<Path> DrawingStore::files_of(const std::string& piece) const
     for (const char* kind : kArrays)
         if (files_.floats)
             files.push_back(name.parent_path() / kind / (name.filename().string() + ".npy"));
+    if (files_.instances)
+        files.push_back(name.parent_path() / kInstances / (name.filename().string() + ".png"));
+    if (with_flow_.contains(piece)) {
+        const std::string_view extension = kFlowFormats[size_t(*files_.encoding.flow)];
+        files.push_back(name.parent_path() / kFlow / fmt::format("{}.{}", name.filename().string(), extension));
+        files.push_back(name.parent_path() / kFlowStates / (name.filename().string() + ".png"));
+    }
     return files;
 }
 

@@ -2,62 +2,49 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/path_drawing.h"
 
-#include "engine/splat/blocks.h"
-#include "runtime/base/quote.h"
-
 namespace semrover {
 
-namespace {
-
-// end of the run of frames from `first` with the same time, size and camera model, all of which move or none
-size_t end_of_moment(const CameraPath& path, size_t first)
+PathDrawing::PathDrawing(Device& device, const DrawnScene& scene, CameraPath path, const RasterizerOptions& options,
+                         bool flow)
+    : device_(device), scene_(scene), path_(std::move(path)), options_(options)
 {
-    const CameraFrame& a = path.frames[first];
+    if (!flow)
+        return;
+    flow_.emplace(device, scene.splats, scene.actors, options);
+    following_ = following_frames(path_);
+}
+
+// end of the run of frames from `first` with the same time, size, camera model and kernels
+size_t PathDrawing::end_of_moment(size_t first) const
+{
+    const CameraFrame& a = path_.frames[first];
     size_t end = first + 1;
-    for (; end < path.frames.size(); ++end) {
-        const CameraFrame& b = path.frames[end];
+    for (; end < path_.frames.size(); ++end) {
+        const CameraFrame& b = path_.frames[end];
         if (b.time != a.time || b.camera == a.camera || b.intrinsics.width != a.intrinsics.width ||
             b.intrinsics.height != a.intrinsics.height || b.intrinsics.model != a.intrinsics.model ||
-            b.moves() != a.moves())
+            moving(b) != moving(a))
             break;
     }
     return end;
 }
 
-} // namespace
-
-RasterizerOptions DrawOptions::rasterizer(const PictureEncoding& files) const
+bool PathDrawing::moving(const CameraFrame& frame) const
 {
-    RasterizerOptions options;
-    options.visible_alpha = visible_alpha.value_or(options.visible_alpha);
-    options.pixels_over = background;
-    options.depth_units = float(units_per_metre(files.depth));
-    return options;
-}
-
-Result<SplatScene> splats_of(Device& device, const VoxelGrid& grid, const Path& name, const DrawOptions& o)
-{
-    ScenePoints points = points_of(grid);
-    if (points.size() == 0 && !o.semantic)
-        return fail(ErrorCode::bad_input, "{} has no points yet: generate them, or draw its labels with `semantic`",
-                    quote_path(name));
-    if (points.size() == 0)
-        return SplatScene::create(device, block_splats(grid));
-    if (o.semantic)
-        color_by_label(points);
-    return SplatScene::create(device, points, o.splats);
+    return frame.moves() || scene_.actors.move_in(frame);
 }
 
 Result<Rasterizer*> PathDrawing::rasterizer_of(const CameraFrame& like, uint32_t frames)
 {
     const Intrinsics& size = like.intrinsics;
-    const CameraModel model = drawn_model(like);
-    auto& rasterizer = rasterizers_[{size.width, size.height, model, like.moves()}];
+    const bool moves = moving(like);
+    const CameraModel model = drawn_model(size.model, moves);
+    auto& rasterizer = rasterizers_[{size.width, size.height, model, moves}];
     if (!rasterizer) {
         RasterizerOptions options = options_;
         options.model = model;
-        options.moving = like.moves();
-        SR_TRY(rasterizer, Rasterizer::create(device_, scene_, size.width, size.height, frames, options));
+        options.moving = moves;
+        SR_TRY(rasterizer, Rasterizer::create(device_, scene_.splats, size.width, size.height, frames, options));
     }
     return rasterizer.get();
 }
@@ -65,29 +52,47 @@ Result<Rasterizer*> PathDrawing::rasterizer_of(const CameraFrame& like, uint32_t
 Result<SplatImage> PathDrawing::image(const CameraFrame& frame)
 {
     SR_TRY(Rasterizer * rasterizer, rasterizer_of(frame, 1));
-    const SplatCamera camera = splat_camera(frame);
-    SR_TRY(std::vector<SplatImage> images, rasterizer->render({&camera, 1}));
+    const SplatCamera camera = splat_camera(frame, moving(frame));
+    const SplatMovers movers = scene_.actors.seen_by({&frame, 1}, moving(frame));
+    SR_TRY(std::vector<SplatImage> images, rasterizer->render({&camera, 1}, movers));
     return std::move(images.front());
 }
 
 Status PathDrawing::draw(std::span<const CameraFrame> frames, const Drawn& drawn)
 {
     SR_TRY(Rasterizer * rasterizer, rasterizer_of(frames.front(), uint32_t(frames.size())));
+    const bool moves = moving(frames.front());
     std::vector<SplatCamera> cameras;
     for (const CameraFrame& frame : frames)
-        cameras.push_back(splat_camera(frame));
+        cameras.push_back(splat_camera(frame, moves));
     for (size_t at = 0; at < cameras.size();) {
-        SR_TRY(const uint32_t together, rasterizer->draw(std::span(cameras).subspan(at)));
+        const SplatMovers movers = scene_.actors.seen_by(frames.subspan(at), moves);
+        SR_TRY(const uint32_t together, rasterizer->draw(std::span(cameras).subspan(at), movers));
         for (uint32_t i = 0; i < together; ++i, ++at)
-            SR_CHECK(drawn(frames[at], rasterizer->pixels(i)));
+            SR_CHECK(drawn(frames[at], {rasterizer->pixels(i)}));
     }
     return {};
+}
+
+// of a frame of the path
+Result<FlowSlots> PathDrawing::flow_of(size_t frame)
+{
+    if (!flow_ || following_[frame] == total())
+        return FlowSlots();
+    const CameraFrame &now = path_.frames[frame], &next = path_.frames[following_[frame]];
+    for (const CameraFrame& f : {now, next})
+        if (moving(f))
+            return fail(ErrorCode::bad_input,
+                        "the frame of {} at {} s is read out while it moves, or something in it does: `flow` is of "
+                        "frames with a global shutter",
+                        f.camera.empty() ? "the camera" : f.camera, f.time);
+    return flow_->flow(now, next);
 }
 
 std::span<const CameraFrame> PathDrawing::next() const
 {
     SR_ASSERT(done_ < total(), "all {} frames are drawn", total());
-    return std::span(path_.frames).subspan(done_, end_of_moment(path_, done_) - done_);
+    return std::span(path_.frames).subspan(done_, end_of_moment(done_) - done_);
 }
 
 bool PathDrawing::skip()
@@ -98,7 +103,11 @@ bool PathDrawing::skip()
 
 Result<bool> PathDrawing::step(const Drawn& drawn)
 {
-    SR_CHECK(draw(next(), drawn));
+    size_t at = done_;
+    SR_CHECK(draw(next(), [&](const CameraFrame& frame, FrameSlots slots) -> Status {
+        SR_TRY(slots.flow, flow_of(at++));
+        return drawn(frame, slots);
+    }));
     return skip();
 }
 

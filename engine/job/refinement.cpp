@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/refinement.h"
 
+#include "engine/annotation/drive_record.h"
 #include "engine/job/budget_meter.h"
 #include "engine/job/empty_frames.h"
 #include "engine/job/outputs.h"
@@ -49,7 +50,7 @@ uint64_t history_bytes(const Device& device, const Refinement& r)
 
 // a grid's pictures on their way into OUT/buffers, as `semrover render` would write them
 struct BufferDrawing {
-    SplatScene scene;
+    DrawnScene scene;
     PathDrawing drawing;
     State state;
     std::map<std::string, Slot> seen; // SplatPixelSlots::seen of each camera's last frame
@@ -58,8 +59,9 @@ struct BufferDrawing {
     EmptyFrames empty;
     bool started = false; // the first moment is drawn
 
-    BufferDrawing(Device& device, SplatScene s, const Refinement& r, const Bounds& bounds)
-        : scene(std::move(s)), drawing(device, scene, *r.options.path, r.options.draw.rasterizer(r.options.encoding)),
+    BufferDrawing(Device& device, DrawnScene s, const Refinement& r, const Bounds& bounds)
+        : scene(std::move(s)), drawing(device, scene, *r.options.path, r.options.draw.rasterizer(r.options.encoding),
+                                       r.options.encoding.flow.has_value()),
           empty(*r.options.path, r.options.input, r.options.allow_empty)
     {
         empty.set_scene(bounds);
@@ -174,14 +176,14 @@ class RefinementJob : public Job {
     {
         if (!drawing_) {
             SR_TRY(const VoxelGrid grid, r_.options.grid());
-            SR_TRY(SplatScene scene, splats_of(device_, grid, r_.options.input, r_.options.draw));
+            SR_TRY(DrawnScene scene, splats_of(device_, grid, r_.options.input, r_.options.draw));
             drawing_ = std::make_unique<BufferDrawing>(device_, std::move(scene), r_, bounds_of(grid));
             SR_CHECK(drawing_->allocate(device_));
         }
         SR_CHECK(out_->poll());
         const auto counts = drawing_->counts;
-        const Result<bool> last = drawing_->drawing.step(
-            [this](const CameraFrame& f, const SplatPixelSlots& pixels) { return take(f, pixels); });
+        const Result<bool> last =
+            drawing_->drawing.step([this](const CameraFrame& f, const FrameSlots& pixels) { return take(f, pixels); });
         if (!last) {
             drawing_->counts = counts; // where memory was short, the moment is drawn again as a whole
             return tl::make_unexpected(last.error());
@@ -192,7 +194,7 @@ class RefinementJob : public Job {
             say_drawn(*last);
         return *last ? end_drawing() : Status{};
     }
-    Status take(const CameraFrame& frame, const SplatPixelSlots& slots)
+    Status take(const CameraFrame& frame, const FrameSlots& slots)
     {
         const std::string& camera = frame.camera;
         SR_CHECK(drawing_->copies->copy(slots.seen, drawing_->seen[camera]).map([](uint64_t) {}));
@@ -435,12 +437,14 @@ Result<std::unique_ptr<Job>> begin_refinement(Device& device, Refinement r, cons
     }
     SR_TRY(const Json settings, refinement_settings(r, device));
     RunContents contents{{"encoded"}, {"latents", "frames", "transforms.json"}};
+    contents.results.insert(contents.results.end(), std::begin(kDriveRecordFiles), std::end(kDriveRecordFiles));
     if (r.options.from_grid())
         contents.results.push_back("buffers");
     SR_TRY(RunFolder run, open_run(r.options.output, settings, r.options.replace, contents, true));
     if (run.results())
         return finished_refinement(std::move(r), std::move(run), callbacks);
     SR_CHECK(write_frame_cameras(r));
+    SR_CHECK(write_frame_record(r, callbacks));
     auto out = Outgoing::create(device, largest_read(r), r.options.threads);
     if (!out) {
         run.drop_if_empty();

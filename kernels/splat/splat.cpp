@@ -23,7 +23,7 @@ namespace semrover {
 
 namespace {
 
-constexpr const char* kMade[] = {"kColor", "kSurface", "kDepth", "kIds"}; // of SplatOptions::made
+constexpr const char* kMade[] = {"kColor", "kSurface", "kDepth", "kIds", "kOwners"}; // of SplatOptions::made
 
 SplatPush make_push(const SplatTensors& scene, Tensor cameras, const SplatOptions& o)
 {
@@ -43,6 +43,8 @@ SplatPush make_push(const SplatTensors& scene, Tensor cameras, const SplatOption
     push.transmittance_min = o.transmittance_min;
     push.cutoff2 = o.cutoff > 0 ? o.cutoff * o.cutoff : 1e30f;
     push.filter_scale = o.screen_variance > 0 ? 1 / o.screen_variance : 1e30f;
+    push.movers = o.movers.rows / cameras.rows / (o.moving ? 2 : 1);
+    push.mover_numbers = o.mover_rows.rows;
     return push;
 }
 
@@ -50,7 +52,7 @@ void check(const SplatTensors& scene, Tensor cameras, const SplatOptions& o)
 {
     const uint32_t n = scene.positions.rows;
     SR_ASSERT(scene.positions.ld == 4 && scene.normals.ld == 4 && scene.colors.ld == 4 && scene.normals.rows == n &&
-                  scene.colors.rows == n && scene.labels.rows == n && scene.cells.rows == n,
+                  scene.colors.rows == n && scene.labels.rows == n && scene.cells.rows == n && scene.owners.rows == n,
               "splat: scene of {} splats with arrays of other sizes", n);
     SR_ASSERT(!scene.blocks.valid() || scene.blocks.rows == divide_up(n, 64), "splat: {} blocks of {} splats",
               scene.blocks.rows, n);
@@ -63,6 +65,10 @@ void check(const SplatTensors& scene, Tensor cameras, const SplatOptions& o)
                                     o.limits.rows == o.width * o.height * cameras.rows),
               "splat: {} limits for {} x {} pixels", o.limits.rows, o.width, o.height);
     SR_ASSERT(!o.moving || o.lens != SplatLens::pinhole, "splat: a pinhole that moves is an opencv lens");
+    SR_ASSERT(
+        o.movers.valid() == o.mover_rows.valid() &&
+            (!o.movers.valid() || (o.movers.ld == 12 && o.movers.rows % (cameras.rows * (o.moving ? 2 : 1)) == 0)),
+        "splat: {} views of movers for {} cameras", o.movers.rows, cameras.rows);
     SR_ASSERT(uint64_t(n) * cameras.rows < 1ull << 32, "splat: {} splats in {} cameras", n, cameras.rows);
 }
 
@@ -74,16 +80,20 @@ struct Seen {
 Seen project(Graph& g, const SplatTensors& scene, Tensor cameras, const SplatOptions& o, const SplatPush& push)
 {
     const bool pinhole = o.lens == SplatLens::pinhole;
+    const Tensor movers = o.movers.valid() ? o.movers : cameras;
+    const Tensor mover_rows = o.movers.valid() ? o.mover_rows : scene.owners;
     const uint32_t views = push.splats * push.cameras;
     DispatchOptions lens;
+    lens.constants = {{"kMovers", o.movers.valid()}};
     if (!pinhole)
-        lens.constants = {{"kModel", uint32_t(o.lens)}, {"kMoving", o.moving}};
+        lens.constants.insert(lens.constants.end(), {{"kModel", uint32_t(o.lens)}, {"kMoving", o.moving}});
     const Tensor keep = g.array(views, DType::u32, "keep");
     const bool by_blocks = scene.blocks.valid();
     DispatchOptions cull = lens;
     cull.constants.push_back({"kBlocks", by_blocks});
     g.dispatch(pinhole ? kernel::splat_cull : kernel::splat_lens_cull,
-               {cameras, scene.positions, scene.normals, scene.colors, keep, by_blocks ? scene.blocks : scene.labels},
+               {cameras, scene.positions, scene.normals, scene.colors, scene.owners, movers, mover_rows, keep,
+                by_blocks ? scene.blocks : scene.labels},
                push, threads(views), std::move(cull));
     const PrefixSum slots = prefix_sum(g, keep, {.non_zero = true});
     const uint32_t texels = splat_record_bytes(o.lens, o.moving) / 16;
@@ -91,7 +101,8 @@ Seen project(Graph& g, const SplatTensors& scene, Tensor cameras, const SplatOpt
     const Tensor sources = g.array(push.max_visible, DType::u32, "splat sources");
     const Tensor depths = g.array(push.max_visible, DType::u32, "splat depths");
     g.dispatch(pinhole ? kernel::splat_project : kernel::splat_lens_project,
-               {cameras, scene.positions, scene.normals, scene.colors, keep, slots.sums, records, sources, depths},
+               {cameras, scene.positions, scene.normals, scene.colors, scene.owners, movers, mover_rows, keep,
+                slots.sums, records, sources, depths},
                push, threads(views), lens);
     return {records, sources, depths, slots.total};
 }
@@ -136,6 +147,7 @@ SplatImages splat(Graph& g, const SplatTensors& scene, Tensor cameras, const Spl
                            g.array(rows(1), DType::f32, "splat surface", 4),
                            g.array(rows(2), DType::f32, "splat depth", 2),
                            g.array(rows(3), DType::u32, "splat ids", 2),
+                           g.array(rows(4), DType::u32, "splat owners"),
                            seen.count,
                            by_tile.pairs};
     DispatchOptions blend;
@@ -148,7 +160,7 @@ SplatImages splat(Graph& g, const SplatTensors& scene, Tensor cameras, const Spl
         blend.constants.push_back({"kLimited", limited});
         g.dispatch(kernel::splat_blend,
                    {seen.records, by_tile.records, by_tile.starts, seen.sources, scene.labels, scene.cells, y.color,
-                    y.surface, y.depth, y.ids, limited ? options.limits : scene.positions},
+                    y.surface, y.depth, y.ids, limited ? options.limits : scene.positions, scene.owners, y.owners},
                    push, grid, std::move(blend));
         return y;
     }
@@ -160,7 +172,7 @@ SplatImages splat(Graph& g, const SplatTensors& scene, Tensor cameras, const Spl
                {.constants = {model, {"kMoving", options.moving}}});
     g.dispatch(kernel::splat_ray_blend,
                {seen.records, by_tile.records, by_tile.starts, seen.sources, scene.labels, scene.cells, y.color,
-                y.surface, y.depth, y.ids, rays},
+                y.surface, y.depth, y.ids, rays, scene.owners, y.owners},
                push, grid, std::move(blend));
     return y;
 }

@@ -80,9 +80,9 @@ bool past_pixel(vec3 still, out vec2 source, out float depth)
     const float guesses[3] = {0.0, -0.5, 0.5};
     for (uint i = 0; i < 3; ++i) {
         float part = guesses[i];
-        if (!settle(kModel, lens, motion, still, -0.5, 0.5, part, source))
+        if (!settle(kModel, lens, motion, standing(), still, -0.5, 0.5, part, source))
             continue;
-        depth = camera_depth(1, seen_at(motion, part, still));
+        depth = camera_depth(1, seen_at(motion, standing(), part, still));
         return true;
     }
     return false;

@@ -65,7 +65,7 @@ struct VideoOfFrames {
 Result<DrawingOptions> drawing_options(const RenderArguments& o, const Globals& globals)
 {
     DrawingOptions d;
-    SR_TRY(d.draw, draw_options(o.trajectory));
+    SR_TRY(d.draw, draw_options(o.trajectory, o.grid));
     d.draw.semantic = o.semantic;
     d.floats = o.floats;
     d.points = o.points;
@@ -149,6 +149,7 @@ void add_render(CLI::App& app, const Globals& globals, Run& run)
     add_picture_options(*c, o->encoding, o->threads);
     add_depth_option(*c, o->encoding.depth, {std::begin(kDepthFormats), std::end(kDepthFormats)},
                      ", or float32 metres in .npy");
+    add_flow_option(*c, o->encoding);
     c->add_flag("--visible-depth", o->visible_depth, "depth pictures are 0 where a pixel is not visible");
     CLI::Option* video =
         c->add_option("--video", o->video, "also an MP4 of the colour frames (of the first camera), through ffmpeg");
