@@ -96,18 +96,12 @@ inline SplatPixels run_splats(const std::vector<HostSplat>& splats, const std::v
 inline SplatPixels run_splats(const std::vector<HostSplat>& splats, const std::vector<LensCamera>& cameras,
                               SplatOptions options = {}, const HostMovers& movers = {})
 {
-    std::vector<float> table;
-    for (const LensCamera& c : cameras) {
-        const Lens lens(c.intrinsics);
-        for (double v : {c.intrinsics.fx, c.intrinsics.fy, c.intrinsics.cx, c.intrinsics.cy})
-            table.push_back(float(v));
-        for (double v : c.view)
-            table.push_back(float(v));
-        for (double v : c.intrinsics.distortion)
-            table.push_back(float(v));
-        for (double v : {lens.limit(), lens.radial_depth() ? 1.0 : 0.0})
-            table.push_back(float(v));
-        table.resize(round_up(uint32_t(table.size()), kLensCameraFloats)); // none moves
+    std::vector<float> table(cameras.size() * kLensCameraFloats);
+    for (size_t i = 0; i < cameras.size(); ++i) {
+        Pose pose;
+        std::ranges::copy(cameras[i].view, pose.world_to_camera.begin());
+        write_row(splat_camera(cameras[i].intrinsics, pose),
+                  std::span(table).subspan(i * kLensCameraFloats, kLensCameraFloats));
     }
     const Intrinsics& k = cameras[0].intrinsics;
     options.width = k.width;

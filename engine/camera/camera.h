@@ -56,7 +56,7 @@ struct Shutter {
 // a camera's poses at the start and at the end of its readout
 struct Readout {
     ShutterDirection direction = ShutterDirection::down;
-    Pose from, to;
+    Pose from = {}, to = {};
     double start = 0, end = 0; // seconds from the frame's time; both 0 where that is not known
 
     // the same pose, to the bit, sees what a global shutter sees

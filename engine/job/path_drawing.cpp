@@ -6,15 +6,15 @@ namespace semrover {
 
 PathDrawing::PathDrawing(Device& device, const DrawnScene& scene, CameraPath path, const RasterizerOptions& options,
                          bool flow)
-    : device_(device), scene_(scene), path_(std::move(path)), options_(options)
+    : scene_(scene), path_(std::move(path)), rasterizers_(device, scene, options)
 {
     if (!flow)
         return;
-    flow_.emplace(device, scene.splats, scene.actors, options);
+    flow_.emplace(device, scene, options);
     following_ = following_frames(path_);
 }
 
-// end of the run of frames from `first` with the same time, size, camera model and kernels
+// end of the run of frames from `first` with the same time and of one kind
 size_t PathDrawing::end_of_moment(size_t first) const
 {
     const CameraFrame& a = path_.frames[first];
@@ -23,50 +23,31 @@ size_t PathDrawing::end_of_moment(size_t first) const
         const CameraFrame& b = path_.frames[end];
         if (b.time != a.time || b.camera == a.camera || b.intrinsics.width != a.intrinsics.width ||
             b.intrinsics.height != a.intrinsics.height || b.intrinsics.model != a.intrinsics.model ||
-            moving(b) != moving(a))
+            rasterizers_.moving(b) != rasterizers_.moving(a))
             break;
     }
     return end;
 }
 
-bool PathDrawing::moving(const CameraFrame& frame) const
-{
-    return frame.moves() || scene_.actors.move_in(frame);
-}
-
-Result<Rasterizer*> PathDrawing::rasterizer_of(const CameraFrame& like, uint32_t frames)
-{
-    const Intrinsics& size = like.intrinsics;
-    const bool moves = moving(like);
-    const CameraModel model = drawn_model(size.model, moves);
-    auto& rasterizer = rasterizers_[{size.width, size.height, model, moves}];
-    if (!rasterizer) {
-        RasterizerOptions options = options_;
-        options.model = model;
-        options.moving = moves;
-        SR_TRY(rasterizer, Rasterizer::create(device_, scene_.splats, size.width, size.height, frames, options));
-    }
-    return rasterizer.get();
-}
-
 Result<SplatImage> PathDrawing::image(const CameraFrame& frame)
 {
-    SR_TRY(Rasterizer * rasterizer, rasterizer_of(frame, 1));
-    const SplatCamera camera = splat_camera(frame, moving(frame));
-    const SplatMovers movers = scene_.actors.seen_by({&frame, 1}, moving(frame));
+    SR_TRY(Rasterizer * rasterizer, rasterizers_.of(frame, 1));
+    const bool moving = rasterizers_.moving(frame);
+    const SplatCamera camera = splat_camera(frame, moving);
+    const SplatMovers movers = scene_.actors.seen_by({&frame, 1}, moving);
     SR_TRY(std::vector<SplatImage> images, rasterizer->render({&camera, 1}, movers));
     return std::move(images.front());
 }
 
 Status PathDrawing::draw(std::span<const CameraFrame> frames, const Drawn& drawn)
 {
-    SR_TRY(Rasterizer * rasterizer, rasterizer_of(frames.front(), uint32_t(frames.size())));
-    const bool moves = moving(frames.front());
+    SR_TRY(Rasterizer * rasterizer, rasterizers_.of(frames.front(), uint32_t(frames.size())));
+    const bool moving = rasterizers_.moving(frames.front());
     std::vector<SplatCamera> cameras;
     for (const CameraFrame& frame : frames)
-        cameras.push_back(splat_camera(frame, moves));
+        cameras.push_back(splat_camera(frame, moving));
     for (size_t at = 0; at < cameras.size();) {
-        const SplatMovers movers = scene_.actors.seen_by(frames.subspan(at), moves);
+        const SplatMovers movers = scene_.actors.seen_by(frames.subspan(at), moving);
         SR_TRY(const uint32_t together, rasterizer->draw(std::span(cameras).subspan(at), movers));
         for (uint32_t i = 0; i < together; ++i, ++at)
             SR_CHECK(drawn(frames[at], {rasterizer->pixels(i)}));
@@ -79,14 +60,7 @@ Result<FlowSlots> PathDrawing::flow_of(size_t frame)
 {
     if (!flow_ || following_[frame] == total())
         return FlowSlots();
-    const CameraFrame &now = path_.frames[frame], &next = path_.frames[following_[frame]];
-    for (const CameraFrame& f : {now, next})
-        if (moving(f))
-            return fail(ErrorCode::bad_input,
-                        "the frame of {} at {} s is read out while it moves, or something in it does: `flow` is of "
-                        "frames with a global shutter",
-                        f.camera.empty() ? "the camera" : f.camera, f.time);
-    return flow_->flow(now, next);
+    return flow_->flow(path_.frames[frame], path_.frames[following_[frame]]);
 }
 
 std::span<const CameraFrame> PathDrawing::next() const

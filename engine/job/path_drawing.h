@@ -43,18 +43,14 @@ class PathDrawing {
 
   private:
     size_t end_of_moment(size_t first) const;
-    bool moving(const CameraFrame& frame) const; // the camera or an actor, while it is read out
-    Result<Rasterizer*> rasterizer_of(const CameraFrame& like, uint32_t frames);
     Result<FlowSlots> flow_of(size_t frame);
 
-    Device& device_;
     const DrawnScene& scene_;
     CameraPath path_;
-    RasterizerOptions options_;
+    FrameRasterizers rasterizers_;
     std::optional<FlowDrawing> flow_;
     std::vector<size_t> following_; // the next frame of each one's camera; their number: there is none
     size_t done_ = 0;
-    std::map<std::tuple<uint32_t, uint32_t, CameraModel, bool>, std::unique_ptr<Rasterizer>> rasterizers_;
 };
 
 // where the pictures of a camera go: those of one without a name into the folder itself

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/scene_actors.h"
 
+#include "engine/camera/camera_view.h"
+
 #include <cmath>
 #include <map>
 
