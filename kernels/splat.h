@@ -91,7 +91,9 @@ struct SplatOptions {
     Tensor limits = {};
     // [cameras * movers, 12] fp32 array, or none: things that move, as each camera sees them. A row takes what a
     // mover's splats are given in to the camera's frame, [3, 4] row-major; zeros hide it. Without them nothing has
-    // moved
+    // moved. Where cameras move while they are read out, [cameras * movers * 2, 12]: a row to the camera's frame in the
+    // middle of the readout, then in that frame a turn (axis times radians) and a shift from its start to its end, and
+    // the point that it turns about, at places 0, 4 and 8
     Tensor movers = {};
     // [numbers] u32, beside movers: by the number of a thing its mover + 1; 0, and beyond the end: it stands
     Tensor mover_rows = {};

@@ -307,7 +307,8 @@ TEST(PathFiles, keys_of_transforms_json_that_are_not_read_are_refused_by_name)
     EXPECT_TRUE(refused(kSize + R"("camera_model":"FISHEYE624","fl_x":4,)", "camera_model 'FISHEYE624' is not"));
     EXPECT_TRUE(refused(kSize + R"("fl_x":4,"ftheta_p0":1,)", "ftheta_p0 is not supported"));
     EXPECT_TRUE(refused(kSize + R"("fl_x":4,"latlong":true,)", "latlong is not supported"));
-    EXPECT_TRUE(refused(kSize + R"("fl_x":4,)", "rolling_shutter is not", R"("rolling_shutter":[0,0,0.1,0],)"));
+    EXPECT_TRUE(
+        refused(kSize + R"("fl_x":4,)", "a rolling shutter is three keys", R"("rolling_shutter":[0,0,0.1,0],)"));
     EXPECT_TRUE(refused(kSize, "intrinsic_matrix is not", R"("intrinsic_matrix":[[4,0,2],[0,4,2],[0,0,1]],)"));
     EXPECT_TRUE(refused(kSize + R"("camera_angle_x":3.2,)", "a field of view of 3.2 radians along x"));
     EXPECT_TRUE(refused(R"("w":800,"fl_x":4,)", "h is missing beside w"));

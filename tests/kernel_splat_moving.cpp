@@ -176,6 +176,38 @@ TEST(kernel_splat_moving, the_image_does_not_depend_on_tiles_nor_on_the_run)
     }
 }
 
+// two things that move among splats that stand: one comes towards the camera and turns, one passes
+TEST(kernel_splat_moving, things_move_while_a_picture_is_read_out)
+{
+    std::vector<HostSplat> splats = random_splats(1200, 19, 0.02, 0.1);
+    const auto pose = [](double x, double z, double yaw) {
+        return rigid_from_quaternion({x, 0.2, z}, {0, std::sin(yaw / 2), 0, std::cos(yaw / 2)}, "pose").value();
+    };
+    const HostMover kinds[] = {
+        {}, {pose(0.5, 0.8, 0.1), pose(0.4, 0.3, 0.12)}, {pose(-0.4, 1, -0.2), pose(0.2, 1, -0.21)}};
+    std::vector<HostMover> movers;
+    HostMovers table{.owners = {}, .rows = {0, 1, 2}, .views = {}};
+    for (uint32_t i = 0; i < splats.size(); ++i) {
+        splats[i].sigma_v = splats[i].sigma_u; // round: axes follow from the normal, which turns
+        table.owners.push_back(i % 4 == 3 ? 1 + (i % 8 == 7) : 0);
+        movers.push_back(kinds[table.owners.back()]);
+    }
+    for (const Intrinsics& k : views())
+        for (const double speed : {0.0, 12.0}) {
+            const MovingCamera camera = moving(k, ShutterDirection::down, {{0, 0, speed}, {0, speed / 30, 0}, 0.03});
+            HostMovers seen = table;
+            for (const HostMover& m : {kinds[1], kinds[2]})
+                for (const auto& row : moving_views(motion_of(camera.frame()), m.from, m.to, kIdentity))
+                    seen.views.insert(seen.views.end(), row.begin(), row.end());
+            const SplatPixels got = run_splats(splats, std::vector{camera}, {}, seen);
+            compare(got, render_reference(splats, camera, {}, movers), 0, table.owners);
+            EXPECT_GT(std::ranges::count(got.owners, 1u), 50) << name_of(k.model);
+            seen.views.assign(seen.views.size(), 0); // not there
+            const SplatPixels alone = run_splats(splats, std::vector{camera}, {}, seen);
+            EXPECT_EQ(std::ranges::count(alone.owners, 1u) + std::ranges::count(alone.owners, 2u), 0);
+        }
+}
+
 // a post in front of a camera that passes it: the line that is read later has it further along
 TEST(kernel_splat_moving, a_post_leans_when_a_camera_passes_it)
 {

@@ -96,18 +96,12 @@ inline SplatPixels run_splats(const std::vector<HostSplat>& splats, const std::v
 inline SplatPixels run_splats(const std::vector<HostSplat>& splats, const std::vector<LensCamera>& cameras,
                               SplatOptions options = {}, const HostMovers& movers = {})
 {
-    std::vector<float> table;
-    for (const LensCamera& c : cameras) {
-        const Lens lens(c.intrinsics);
-        for (double v : {c.intrinsics.fx, c.intrinsics.fy, c.intrinsics.cx, c.intrinsics.cy})
-            table.push_back(float(v));
-        for (double v : c.view)
-            table.push_back(float(v));
-        for (double v : c.intrinsics.distortion)
-            table.push_back(float(v));
-        for (double v : {lens.limit(), lens.radial_depth() ? 1.0 : 0.0})
-            table.push_back(float(v));
-        table.resize(round_up(uint32_t(table.size()), kLensCameraFloats)); // none moves
+    std::vector<float> table(cameras.size() * kLensCameraFloats);
+    for (size_t i = 0; i < cameras.size(); ++i) {
+        Pose pose;
+        std::ranges::copy(cameras[i].view, pose.world_to_camera.begin());
+        write_row(splat_camera(cameras[i].intrinsics, pose),
+                  std::span(table).subspan(i * kLensCameraFloats, kLensCameraFloats));
     }
     const Intrinsics& k = cameras[0].intrinsics;
     options.width = k.width;
@@ -118,17 +112,18 @@ inline SplatPixels run_splats(const std::vector<HostSplat>& splats, const std::v
 
 // cameras that move while they are read out, all of one model and size
 inline SplatPixels run_splats(const std::vector<HostSplat>& splats, const std::vector<MovingCamera>& cameras,
-                              SplatOptions options = {})
+                              SplatOptions options = {}, const HostMovers& movers = {})
 {
     std::vector<float> table(cameras.size() * kLensCameraFloats);
     for (size_t i = 0; i < cameras.size(); ++i)
-        write_row(splat_camera(cameras[i].frame()), std::span(table).subspan(i * kLensCameraFloats, kLensCameraFloats));
+        write_row(splat_camera(cameras[i].frame(), true),
+                  std::span(table).subspan(i * kLensCameraFloats, kLensCameraFloats));
     const CameraFrame frame = cameras[0].frame();
     options.width = frame.intrinsics.width;
     options.height = frame.intrinsics.height;
-    options.lens = lens_of(drawn_model(frame));
+    options.lens = lens_of(drawn_model(frame.intrinsics.model, true));
     options.moving = true;
-    return run_splats(splats, table, options);
+    return run_splats(splats, table, options, {}, movers);
 }
 
 // splats of all sizes in front of a camera that looks along +z, values as fp32 has them
@@ -197,7 +192,9 @@ struct Misses {
 };
 
 // docs/numerics.md §6.1: 2e-3, but for a thousandth of the values, where a threshold may flip
-inline void compare(const SplatPixels& got, const std::vector<ReferencePixel>& expect, size_t camera)
+// owners: of the splats
+inline void compare(const SplatPixels& got, const std::vector<ReferencePixel>& expect, size_t camera,
+                    const std::vector<uint32_t>& owners = {})
 {
     Misses misses;
     size_t ids_differ = 0;
@@ -217,7 +214,7 @@ inline void compare(const SplatPixels& got, const std::vector<ReferencePixel>& e
         misses.add(got.depth[at * 2 + 1], e.median, 2e-3 * deepest);
         const uint32_t cell = e.splat < 0 ? ~0u : 1000 + uint32_t(e.splat),
                        label = e.splat < 0 ? ~0u : uint32_t(e.splat % 20);
-        const uint32_t owner = e.splat < 0 ? 0 : 7 * uint32_t(e.splat);
+        const uint32_t owner = e.splat < 0 ? 0 : owners.empty() ? 7 * uint32_t(e.splat) : owners[size_t(e.splat)];
         ids_differ += got.ids[at * 2] != label || got.ids[at * 2 + 1] != cell || got.owners[at] != owner;
     }
     EXPECT_LE(misses.some, expect.size() * 10 / 1000);

@@ -41,12 +41,28 @@ struct MovingCamera {
     }
 };
 
+// how a thing goes during the readout: from what its splats are given in to the world
+struct HostMover {
+    Rigid from = kIdentity, to = kIdentity;
+
+    HostSplat at(HostSplat s, double share) const
+    {
+        const Rigid pose = interpolate(from, to, share);
+        const Point3 tip =
+            transform(pose, {s.position[0] + s.normal[0], s.position[1] + s.normal[1], s.position[2] + s.normal[2]});
+        s.position = transform(pose, s.position);
+        for (size_t a = 0; a < 3; ++a)
+            s.normal[a] = tip[a] - s.position[a];
+        return s;
+    }
+};
+
 // shares at which the line is read that shows the centre then; lines beyond the picture are read with the nearest
 inline std::vector<double> own_shares(const HostSplat& s, const MovingCamera& c, const Lens& lens,
-                                      const SplatRules& rules, int steps = 400)
+                                      const SplatRules& rules, const HostMover& mover = {}, int steps = 400)
 {
     const auto off = [&](double share) -> std::optional<double> {
-        const LensSplat placed = place(s, c.at(share), lens, rules);
+        const LensSplat placed = place(mover.at(s, share), c.at(share), lens, rules);
         if (!placed.pixel)
             return {};
         return std::clamp(c.share(c.by_rows() ? placed.pixel->y : placed.pixel->x), 0.0, 1.0) - share;
@@ -77,10 +93,12 @@ inline std::vector<double> own_shares(const HostSplat& s, const MovingCamera& c,
 }
 
 // what all lines take of a splat: its order, its dot
-inline LensSplat own_view(const HostSplat& s, const MovingCamera& c, const Lens& lens, const SplatRules& rules)
+inline LensSplat own_view(const HostSplat& s, const MovingCamera& c, const Lens& lens, const SplatRules& rules,
+                          const HostMover& mover)
 {
-    const std::vector<double> shares = own_shares(s, c, lens, rules);
-    LensSplat own = place(s, c.at(shares.empty() ? 0.5 : shares[0]), lens, rules);
+    const std::vector<double> shares = own_shares(s, c, lens, rules, mover);
+    const double share = shares.empty() ? 0.5 : shares[0];
+    LensSplat own = place(mover.at(s, share), c.at(share), lens, rules);
     if (shares.empty())
         own.pixel = {};
     own.key = std::max(own.key, 0.0);
@@ -98,22 +116,25 @@ inline LensSplat in_line(const HostSplat& s, const LensCamera& camera, const Len
 }
 
 inline std::vector<ReferencePixel> render_reference(const std::vector<HostSplat>& splats, const MovingCamera& camera,
-                                                    const SplatRules& rules = {})
+                                                    const SplatRules& rules = {},
+                                                    const std::vector<HostMover>& movers = {}) // of each splat, or none
 {
     const Lens lens(camera.intrinsics);
     std::vector<LensSplat> own;
     std::vector<size_t> order(splats.size());
-    for (const HostSplat& s : splats)
-        own.push_back(own_view(s, camera, lens, rules));
+    const auto mover_of = [&](size_t i) { return movers.empty() ? HostMover() : movers[i]; };
+    for (size_t i = 0; i < splats.size(); ++i)
+        own.push_back(own_view(splats[i], camera, lens, rules, mover_of(i)));
     std::iota(order.begin(), order.end(), 0);
     std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) { return own[a].key < own[b].key; });
     const uint32_t width = camera.intrinsics.width, height = camera.intrinsics.height;
     std::vector<ReferencePixel> image(size_t(width) * height);
     for (uint32_t line = 0; line < camera.lines(); ++line) {
-        const LensCamera still = camera.at(camera.share(line + 0.5));
+        const double share = camera.share(line + 0.5);
+        const LensCamera still = camera.at(share);
         std::vector<LensSplat> placed;
         for (size_t j = 0; j < splats.size(); ++j)
-            placed.push_back(in_line(splats[j], still, own[j], lens, rules));
+            placed.push_back(in_line(mover_of(j).at(splats[j], share), still, own[j], lens, rules));
         for (uint32_t across = 0; across < (camera.by_rows() ? width : height); ++across) {
             const uint32_t column = camera.by_rows() ? across : line, row = camera.by_rows() ? line : across;
             const double x = column + 0.5, y = row + 0.5;

@@ -57,6 +57,7 @@ struct Shutter {
 struct Readout {
     ShutterDirection direction = ShutterDirection::down;
     Pose from = {}, to = {};
+    double start = 0, end = 0; // seconds from the frame's time; both 0 where that is not known
 
     // the same pose, to the bit, sees what a global shutter sees
     bool moves() const { return from.world_to_camera != to.world_to_camera; }

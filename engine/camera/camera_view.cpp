@@ -33,6 +33,20 @@ Point3 turn_of(const Rigid& rotation)
     return {x * scale, y * scale, z * scale};
 }
 
+Point3 minus(const Point3& a, const Point3& b)
+{
+    return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+
+// a direction
+Point3 rotated(const Rigid& m, const Point3& v)
+{
+    Point3 out;
+    for (size_t row = 0; row < 3; ++row)
+        out[row] = m[4 * row] * v[0] + m[4 * row + 1] * v[1] + m[4 * row + 2] * v[2];
+    return out;
+}
+
 // part of a position, from -1/2 to 1/2 in the direction of the shutter
 void set_lines(CameraMotion& m, ShutterDirection direction, const Intrinsics& k)
 {
@@ -56,16 +70,27 @@ Point3 CameraMotion::still(double part, const Point3& direction) const
 
 CameraMotion motion_of(const CameraFrame& frame)
 {
-    if (!frame.moves())
-        return {.middle = frame.readout ? frame.readout->from : frame.pose};
-    const Rigid from = frame.readout->from.camera_to_world(), to = frame.readout->to.camera_to_world();
-    CameraMotion m{.middle = {inverse(interpolate(from, to, 0.5))}};
+    if (!frame.readout)
+        return {.middle = frame.pose};
+    const Readout& readout = *frame.readout;
+    const Rigid from = readout.from.camera_to_world(), to = readout.to.camera_to_world();
+    CameraMotion m{.middle = readout.from};
+    set_lines(m, readout.direction, frame.intrinsics);
+    if (!readout.moves())
+        return m;
+    m.middle.world_to_camera = inverse(interpolate(from, to, 0.5));
     m.turn = turn_of(compose(inverse(from), to));
-    const Rigid& view = m.middle.world_to_camera;
-    for (size_t row = 0; row < 3; ++row)
-        for (size_t i = 0; i < 3; ++i)
-            m.shift[row] += view[4 * row + i] * (to[4 * i + 3] - from[4 * i + 3]);
-    set_lines(m, frame.readout->direction, frame.intrinsics);
+    m.shift = rotated(m.middle.world_to_camera, minus(translation_of(to), translation_of(from)));
+    return m;
+}
+
+ThingMotion motion_of(const CameraMotion& camera, const Rigid& from, const Rigid& to)
+{
+    const Rigid& view = camera.middle.world_to_camera;
+    ThingMotion m{.view = compose(view, interpolate(from, to, 0.5))};
+    m.pivot = translation_of(m.view);
+    m.turn = rotated(m.view, turn_of(compose(inverse(from), to)));
+    m.shift = rotated(view, minus(translation_of(to), translation_of(from)));
     return m;
 }
 
@@ -126,11 +151,7 @@ std::optional<Point3> CameraView::direction(double x, double y) const
     const std::optional<Point3> ray = lens_.ray(x, y);
     if (!ray)
         return {};
-    const Point3 d = motion_.moves() ? motion_.still(part_of(x, y), *ray) : *ray;
-    Point3 world;
-    for (size_t row = 0; row < 3; ++row)
-        world[row] = to_world_[4 * row] * d[0] + to_world_[4 * row + 1] * d[1] + to_world_[4 * row + 2] * d[2];
-    return world;
+    return rotated(to_world_, motion_.moves() ? motion_.still(part_of(x, y), *ray) : *ray);
 }
 
 std::optional<Projection> project(const CameraFrame& frame, const Point3& world)

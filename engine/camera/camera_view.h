@@ -19,8 +19,16 @@ struct CameraMotion {
     Point3 seen_at(double part, const Point3& still) const;
     Point3 still(double part, const Point3& direction) const;
 };
-// of a frame without a readout, or one in which the camera stands: it does not move
+// one that stands, or of a frame without a readout, does not move
 CameraMotion motion_of(const CameraFrame& frame);
+
+// How a thing moves in the still frame of a camera during its readout: it turns about a pivot and is shifted
+struct ThingMotion {
+    Rigid view; // at part 0: from its own frame to the still frame
+    Point3 pivot{}, turn{}, shift{};
+};
+// of poses at the start and at the end of the readout; it turns about the origin of its own frame
+ThingMotion motion_of(const CameraMotion& camera, const Rigid& from, const Rigid& to);
 
 // A camera in its place, which changes while its picture is read out: its pixels and the world
 class CameraView {

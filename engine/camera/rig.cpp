@@ -240,7 +240,8 @@ Readout readout_of(const Sensor& sensor, const CameraFrame& frame, const Course&
         return Pose{compose(inverse(sensor.sensor_to_vehicle), inverse(vehicle))};
     };
     const Shutter& s = *sensor.shutter;
-    return {s.direction, pose_at(s.start), pose_at(s.start + s.readout)};
+    const int64_t end = s.start + s.readout;
+    return {s.direction, pose_at(s.start), pose_at(end), double(s.start) * 1e-6, double(end) * 1e-6};
 }
 
 // of a lens with distortion, those that it needs

@@ -91,8 +91,9 @@ Status FlowDrawing::draw(const CameraFrame& frame, View& view)
         SR_TRY(copies_, CopyRing::create(device_));
     }
     SR_TRY(Rasterizer * rasterizer, rasterizers_.of(frame, 1));
-    const SplatCamera camera = splat_camera(frame);
-    SR_CHECK(rasterizer->draw({&camera, 1}, scene_.actors.seen_by({&frame, 1})).map([](uint32_t) {}));
+    const bool moving = rasterizers_.moving(frame);
+    const SplatCamera camera = splat_camera(frame, moving);
+    SR_CHECK(rasterizer->draw({&camera, 1}, scene_.actors.seen_by({&frame, 1}, moving)).map([](uint32_t) {}));
     const SplatSlots images = rasterizer->images(0);
     SR_CHECK(copies_->copy(images.depth, view.depth).map([](uint64_t) {}));
     SR_CHECK(copies_->copy(images.owners, view.owners).map([](uint64_t) {}));

@@ -7,12 +7,13 @@ namespace semrover {
 Result<Rasterizer*> FrameRasterizers::of(const CameraFrame& like, uint32_t frames)
 {
     const Intrinsics& size = like.intrinsics;
-    const CameraModel model = drawn_model(like);
-    auto& rasterizer = rasterizers_[{size.width, size.height, model, like.moves()}];
+    const bool moves = moving(like);
+    const CameraModel model = drawn_model(size.model, moves);
+    auto& rasterizer = rasterizers_[{size.width, size.height, model, moves}];
     if (!rasterizer) {
         RasterizerOptions options = options_;
         options.model = model;
-        options.moving = like.moves();
+        options.moving = moves;
         SR_TRY(rasterizer, Rasterizer::create(device_, scene_.splats, size.width, size.height, frames, options));
     }
     return rasterizer.get();

@@ -9,7 +9,8 @@
 
 namespace semrover {
 
-// One rasterizer for each kind of frame: image size, camera model, and whether the camera moves while it is read out.
+// One rasterizer for each kind of frame: image size, camera model, and whether the camera, or an actor, moves while it
+// is read out.
 class FrameRasterizers {
   public:
     // the scene outlives it
@@ -18,6 +19,7 @@ class FrameRasterizers {
     {
     }
 
+    bool moving(const CameraFrame& frame) const { return frame.moves() || scene_.actors.move_in(frame); }
     // for up to as many frames of a kind at a time as the first call has
     Result<Rasterizer*> of(const CameraFrame& like, uint32_t frames);
 

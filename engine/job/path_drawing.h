@@ -35,13 +35,14 @@ class PathDrawing {
     size_t done() const { return done_; }      // frames so far
     size_t total() const { return path_.frames.size(); }
 
-    // frames of one size and camera model, which all move while they are read out, or none of which does; apart from
-    // the path
+    // frames of one size and camera model, in all of which something moves while they are read out, or in none; apart
+    // from the path
     Status draw(std::span<const CameraFrame> frames, const Drawn& drawn);
     // one frame's images on the host, where the options keep no pixels; waits for them
     Result<SplatImage> image(const CameraFrame& frame);
 
   private:
+    size_t end_of_moment(size_t first) const;
     Result<FlowSlots> flow_of(size_t frame);
 
     const DrawnScene& scene_;

@@ -14,6 +14,6 @@ struct CameraPair {
                              // are small and fp32 is enough
 };
 // both of one lens model
-CameraPair pair_of(CameraFrame first, CameraFrame second);
+CameraPair pair_of(const CameraFrame& first, const CameraFrame& second);
 
 } // namespace semrover

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/splat/rasterizer.h"
 
-#include "engine/camera/camera_view.h"
 #include "engine/splat/planes.h"
 #include "runtime/device/command.h"
 
@@ -123,16 +122,15 @@ SplatCamera splat_camera(const Intrinsics& i, const Pose& pose)
     return c;
 }
 
-CameraModel drawn_model(const CameraFrame& frame)
+CameraModel drawn_model(CameraModel model, bool moving)
 {
-    const CameraModel model = frame.intrinsics.model;
-    return model == CameraModel::pinhole && frame.moves() ? CameraModel::opencv : model;
+    return moving && model == CameraModel::pinhole ? CameraModel::opencv : model;
 }
 
-SplatCamera splat_camera(const CameraFrame& frame)
+SplatCamera splat_camera(const CameraFrame& frame, bool moving)
 {
     Intrinsics i = frame.intrinsics;
-    i.model = drawn_model(frame);
+    i.model = drawn_model(i.model, moving);
     const CameraMotion motion = motion_of(frame);
     SplatCamera c = splat_camera(i, motion.middle);
     const auto narrowed = [](double v) { return float(v); };
@@ -141,6 +139,20 @@ SplatCamera splat_camera(const CameraFrame& frame)
     std::ranges::transform(motion.across, c.across.begin(), narrowed);
     c.first = float(motion.first);
     return c;
+}
+
+std::array<std::array<float, 12>, 2> moving_views(const CameraMotion& camera, const Rigid& from, const Rigid& to,
+                                                  const Rigid& from_splats)
+{
+    const ThingMotion motion = motion_of(camera, from, to);
+    const Rigid view = compose(motion.view, from_splats);
+    std::array<std::array<float, 12>, 2> rows{};
+    const auto narrowed = [](double v) { return float(v); };
+    std::transform(view.begin(), view.begin() + 12, rows[0].begin(), narrowed);
+    std::ranges::transform(motion.turn, rows[1].begin(), narrowed);
+    std::ranges::transform(motion.shift, rows[1].begin() + 4, narrowed);
+    std::ranges::transform(motion.pivot, rows[1].begin() + 8, narrowed);
+    return rows;
 }
 
 Result<std::unique_ptr<Rasterizer>> Rasterizer::create(Device& device, const SplatScene& scene, uint32_t width,
@@ -189,7 +201,7 @@ Status Rasterizer::build()
         z_scale_ = state_.slot(1, 2, DType::f32, "scale of the z-buffer", 2);
     }
     if (options_.movers) {
-        movers_ = state_.slot(cameras_ * options_.movers, 12, DType::f32, "views of movers", 12);
+        movers_ = state_.slot(cameras_ * views_of_movers(), 12, DType::f32, "views of movers", 12);
         mover_rows_ = state_.slot(options_.mover_numbers, 1, DType::u32, "rows of movers", 1);
     }
     if (options_.pixels_over)
@@ -287,17 +299,17 @@ Status Rasterizer::make_room(uint32_t visible, uint32_t pairs)
 // the tables of movers: of `cameras` ones from the first on; those that are left see none
 Rasterizer::MoverTables Rasterizer::tables_of(const SplatMovers& movers, size_t first, size_t cameras) const
 {
-    const size_t each = movers.count;
+    const size_t each = movers.count * (options_.moving ? 2 : 1);
     MoverTables tables{movers.rows, {}};
-    SR_ASSERT(each <= options_.movers && movers.rows.size() <= options_.mover_numbers &&
+    SR_ASSERT(each <= views_of_movers() && movers.rows.size() <= options_.mover_numbers &&
                   movers.views.size() >= (first + cameras) * each,
               "{} movers with numbers below {}; this rasterizer has room for {} and {}", each, movers.rows.size(),
               options_.movers, options_.mover_numbers);
     tables.rows.resize(options_.mover_numbers);
-    tables.views.resize(size_t(cameras_) * options_.movers);
+    tables.views.resize(size_t(cameras_) * views_of_movers());
     for (size_t camera = 0; camera < cameras; ++camera)
         std::copy_n(movers.views.begin() + ptrdiff_t((first + camera) * each), each,
-                    tables.views.begin() + ptrdiff_t(camera * options_.movers));
+                    tables.views.begin() + ptrdiff_t(camera * views_of_movers()));
     return tables;
 }
 

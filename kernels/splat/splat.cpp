@@ -43,7 +43,7 @@ SplatPush make_push(const SplatTensors& scene, Tensor cameras, const SplatOption
     push.transmittance_min = o.transmittance_min;
     push.cutoff2 = o.cutoff > 0 ? o.cutoff * o.cutoff : 1e30f;
     push.filter_scale = o.screen_variance > 0 ? 1 / o.screen_variance : 1e30f;
-    push.movers = o.movers.rows / cameras.rows;
+    push.movers = o.movers.rows / cameras.rows / (o.moving ? 2 : 1);
     push.mover_numbers = o.mover_rows.rows;
     return push;
 }
@@ -64,10 +64,11 @@ void check(const SplatTensors& scene, Tensor cameras, const SplatOptions& o)
     SR_ASSERT(!o.limits.valid() || (o.lens == SplatLens::pinhole && o.limits.ld == 1 &&
                                     o.limits.rows == o.width * o.height * cameras.rows),
               "splat: {} limits for {} x {} pixels", o.limits.rows, o.width, o.height);
-    SR_ASSERT(o.movers.valid() == o.mover_rows.valid() &&
-                  (!o.movers.valid() || (o.movers.ld == 12 && o.movers.rows % cameras.rows == 0)),
-              "splat: {} views of movers for {} cameras", o.movers.rows, cameras.rows);
     SR_ASSERT(!o.moving || o.lens != SplatLens::pinhole, "splat: a pinhole that moves is an opencv lens");
+    SR_ASSERT(
+        o.movers.valid() == o.mover_rows.valid() &&
+            (!o.movers.valid() || (o.movers.ld == 12 && o.movers.rows % (cameras.rows * (o.moving ? 2 : 1)) == 0)),
+        "splat: {} views of movers for {} cameras", o.movers.rows, cameras.rows);
     SR_ASSERT(uint64_t(n) * cameras.rows < 1ull << 32, "splat: {} splats in {} cameras", n, cameras.rows);
 }
 
@@ -85,8 +86,7 @@ Seen project(Graph& g, const SplatTensors& scene, Tensor cameras, const SplatOpt
     DispatchOptions lens;
     lens.constants = {{"kMovers", o.movers.valid()}};
     if (!pinhole)
-        for (const ConstantValue& c : {ConstantValue{"kModel", uint32_t(o.lens)}, ConstantValue{"kMoving", o.moving}})
-            lens.constants.push_back(c);
+        lens.constants.insert(lens.constants.end(), {{"kModel", uint32_t(o.lens)}, {"kMoving", o.moving}});
     const Tensor keep = g.array(views, DType::u32, "keep");
     const bool by_blocks = scene.blocks.valid();
     DispatchOptions cull = lens;

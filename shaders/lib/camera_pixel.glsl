@@ -36,9 +36,9 @@ bool pixel_of(uint camera, vec3 point, out vec2 position, out float depth)
     const float guesses[3] = {0.0, -0.5, 0.5};
     for (uint i = 0; i < 3; ++i) {
         float part = guesses[i];
-        if (!settle(kModel, lens, motion, point, -0.5, 0.5, part, position))
+        if (!settle(kModel, lens, motion, standing(), point, -0.5, 0.5, part, position))
             continue;
-        depth = camera_depth(camera, seen_at(motion, part, point));
+        depth = camera_depth(camera, seen_at(motion, standing(), part, point));
         return true;
     }
     return false;

@@ -10,11 +10,11 @@ const float kSettled = 2e-5; // parts
 
 // the part at which the line is read that shows a point then, from a guess within [low, high], and its pixel; lines
 // before the first and after the last are read with those. False: none is found
-bool settle(uint model, Lens l, Motion m, vec3 point, float low, float high, inout float part, out vec2 pixel)
+bool settle(uint model, Lens l, Motion m, Course c, vec3 point, float low, float high, inout float part, out vec2 pixel)
 {
     float before = part, off_before = 0.0;
     for (uint i = 0; i < 8; ++i) {
-        if (!lens_project(model, l, seen_at(m, part, point), pixel))
+        if (!lens_project(model, l, seen_at(m, c, part, point), pixel))
             return false;
         const float off = clamp(part_of(m, pixel), low, high) - part;
         if (abs(off) <= kSettled)

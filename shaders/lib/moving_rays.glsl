@@ -24,5 +24,18 @@ vec3 turned(vec3 turn, float part, vec3 p)
     return p + accurate_sin(angle) * across + 2.0 * half_sine * half_sine * cross(axis, across);
 }
 
-// a point of the still frame as the camera has it in its own frame at a part
-vec3 seen_at(Motion m, float part, vec3 point) { return turned(m.turn, -part, point - part * m.shift); }
+// how a thing itself moves meanwhile, in the still frame: turn and shift as of the camera, about a pivot at part 0
+struct Course {
+    vec3 pivot, turn, shift;
+};
+
+Course standing() { return Course(vec3(0.0), vec3(0.0), vec3(0.0)); }
+
+// where a point of it is at a part, of its place at part 0
+vec3 place_at(Course c, float part, vec3 point) { return c.pivot + part * c.shift + turned(c.turn, part, point - c.pivot); }
+
+// such a point as the camera has it in its own frame at a part
+vec3 seen_at(Motion m, Course c, float part, vec3 point)
+{
+    return turned(m.turn, -part, place_at(c, part, point) - part * m.shift);
+}

@@ -195,10 +195,15 @@ bool view_splat(uint splat, uint camera, out LensView s)
         dot(normal.xyz, normal.xyz) < 1e-6 || !(position.w >= p.alpha_min) || !(normal.w > 0.0) || !(color.w > 0.0))
         return false;
     mat4x3 view = camera_view(camera);
+    Course course = standing();
     const uint row = kMovers ? mover_of(owners[splat], p.mover_numbers) : 0;
     if (row != 0) {
-        const uint at = (camera * p.movers + row - 1) * 3;
+        const uint at = (camera * p.movers + row - 1) * (kMoving ? 6 : 3);
         view = transpose(mat3x4(movers[at], movers[at + 1], movers[at + 2]));
+        if (kMoving) {
+            const vec4 turn = movers[at + 3], shift = movers[at + 4], pivot = movers[at + 5];
+            course = Course(pivot.xyz, turn.xyz, shift.xyz);
+        }
     }
     s.center = view * vec4(position.xyz, 1.0);
     vec3 t_u, t_v;
@@ -208,8 +213,8 @@ bool view_splat(uint splat, uint camera, out LensView s)
     s.normal = mat3(view) * normal.xyz;
     s.drift = vec3(0.0);
     const vec2 sigmas = vec2(normal.w, color.w);
-    if (kMoving)
-        return view_moving(lens, camera, position.w, sigmas, s);
+    if (kMoving) // a mover that is not there has a view of zeros
+        return dot(s.normal, s.normal) > 0.0 && view_moving(lens, camera, course, position.w, sigmas, s);
     s.away = length(s.center);
     s.nearness = kModel == kOpencv ? s.center.z : s.away;
     s.depth = camera_depth_is_radial(camera) ? s.away : s.center.z;
