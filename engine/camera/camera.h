@@ -89,6 +89,8 @@ Status check_intrinsics(const Intrinsics& intrinsics, std::string_view where);
 std::string_view name_of(CameraModel model);
 std::optional<CameraModel> camera_model_of(std::string_view name);
 
+int64_t microseconds_of(double seconds); // rounded: a time of a frame as files of times have it
+
 struct Projection {
     double x, y;  // pixels
     double depth; // metres along z; equirectangular: from the camera
