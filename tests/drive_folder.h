@@ -50,7 +50,7 @@ struct DriveFolder {
             vehicle.frames.push_back(
                 {2 + seconds_a_moment * double(i), "", {inverse(compose(pose, kForwardCamera))}, {}});
         }
-        return expand_rig({PathAxes::camera, sensors()}, vehicle);
+        return *expand_rig({PathAxes::camera, sensors()}, vehicle);
     }
     std::vector<PlacedObject> placed_at(size_t moment) const
     {

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/camera/lens.h"
+#include "engine/camera/camera_view.h"
 #include "engine/camera/rig.h"
 #include "engine/deferred/frame_images.h"
 #include "tests/says.h"
@@ -312,7 +312,7 @@ TEST(Rig, every_pose_of_the_path_gives_a_frame_of_every_sensor)
     const auto rig = read_rig(folder.put("rig.json", kRig));
     ASSERT_TRUE(rig) << rig.error().message;
     const auto drive = read_tum(folder.put("a.tum", "0 10 0 0 -0.5 0.5 -0.5 0.5\n1 20 0 0 -0.5 0.5 -0.5 0.5"), kView);
-    const CameraPath path = expand_rig(*rig, *drive);
+    const CameraPath path = *expand_rig(*rig, *drive);
     ASSERT_EQ(path.frames.size(), 4u);
     EXPECT_EQ(path.frames[2].camera, "front");
     EXPECT_EQ(path.frames[2].time, 1);
@@ -337,7 +337,7 @@ TEST(Rig, a_path_of_vehicle_poses_is_taken_as_such)
     const auto rig = read_rig(folder.put("rig.json", text));
     ASSERT_TRUE(rig) << rig.error().message;
     const auto drive = read_tum(folder.put("a.tum", "0 10 0 0 0 0 0 1"), kView);
-    EXPECT_NEAR(project(expand_rig(*rig, *drive).frames[0], {13, 0, 0.5})->depth, 2, 1e-12);
+    EXPECT_NEAR(project(expand_rig(*rig, *drive)->frames[0], {13, 0, 0.5})->depth, 2, 1e-12);
 }
 
 TEST(Rig, sensors_may_have_any_lens)
@@ -364,6 +364,152 @@ TEST(Rig, sensors_may_have_any_lens)
     EXPECT_EQ(rig->sensors[3].intrinsics, pinhole_from_fov(90, 100, 80)); // without distortion
 }
 
+constexpr const char* kRolling = R"({"path_axes":"vehicle","sensors":[
+    {"name":"a","width":80,"height":60,"fov":90,"shutter":{"direction":"up","start":-20000,"readout":30000},
+     "sensor_to_vehicle":{"translation":[1,0,2],"rotation":[-0.5,0.5,-0.5,0.5]}},
+    {"name":"b","width":80,"height":60,"fov":90,
+     "sensor_to_vehicle":{"translation":[1,0,2],"rotation":[-0.5,0.5,-0.5,0.5]}}]})";
+
+TEST(Rig, a_rolling_shutter_sees_from_where_the_vehicle_is_meanwhile)
+{
+    const ScratchFolder folder;
+    const auto rig = read_rig(folder.put("rig.json", kRolling));
+    ASSERT_TRUE(rig) << rig.error().message;
+    EXPECT_EQ(rig->sensors[0].shutter, (Shutter{ShutterDirection::up, -20000, 30000}));
+    EXPECT_FALSE(rig->sensors[1].shutter);
+    // turns at 1 rad/s while it goes at 10 m/s, then at 20; it stands at the end
+    std::string path;
+    for (const auto& [time, x, yaw] :
+         {std::tuple{5.0, 0.0, 0.0}, {5.1, 1.0, 0.1}, {5.2, 3.0, 0.2}, {5.3, 5.0, 0.2}, {5.4, 5.0, 0.2}})
+        path += fmt::format("{} {} 0 0 0 0 {} {}\n", time, x, std::sin(yaw / 2), std::cos(yaw / 2));
+    const auto drive = read_tum(folder.put("a.tum", path), kView);
+    const auto frames = expand_rig(*rig, *drive);
+    ASSERT_TRUE(frames) << frames.error().message;
+    const auto vehicle = [&](double x, double yaw) {
+        return rigid_from_quaternion({x, 0, 0}, {0, 0, std::sin(yaw / 2), std::cos(yaw / 2)}, "t").value();
+    };
+    const Rigid mounting = rig->sensors[0].sensor_to_vehicle;
+    const auto expect = [&](size_t i, const Rigid& from, const Rigid& to) {
+        ASSERT_TRUE(frames->frames[2 * i].readout);
+        const Readout& r = *frames->frames[2 * i].readout;
+        EXPECT_EQ(r.direction, ShutterDirection::up);
+        expect_near(r.from.camera_to_world(), compose(from, mounting), 1e-9);
+        expect_near(r.to.camera_to_world(), compose(to, mounting), 1e-9);
+        EXPECT_FALSE(frames->frames[2 * i + 1].readout);
+        EXPECT_EQ(frames->frames[2 * i].pose.world_to_camera, frames->frames[2 * i + 1].pose.world_to_camera);
+    };
+    expect(0, vehicle(-0.2, -0.02), vehicle(0.1, 0.01)); // goes on as from the first pose to the second
+    expect(1, vehicle(0.8, 0.08), vehicle(1.2, 0.11));   // faster after the pose
+    expect(2, vehicle(2.6, 0.18), vehicle(3.2, 0.2));
+    const CameraFrame& last = frames->frames[8];
+    EXPECT_FALSE(last.moves()); // to the bit
+    EXPECT_EQ(last.readout->from.world_to_camera, last.pose.world_to_camera);
+    EXPECT_EQ(last.readout->to.world_to_camera, last.pose.world_to_camera);
+    // one pose: it stands
+    const auto one = expand_rig(*rig, *read_tum(folder.put("b.tum", "5 1 2 3 0 0 0 1"), kView));
+    ASSERT_TRUE(one);
+    EXPECT_FALSE(one->frames[0].moves());
+    // written and read again
+    folder.put("again.json", rig_json(rig->sensors).dump());
+    EXPECT_EQ(read_rig(folder / "again.json")->sensors[0].shutter, rig->sensors[0].shutter);
+    EXPECT_TRUE(says(expand_rig(*rig, *read_tum(folder.put("c.tum", "5 0 0 0 0 0 0 1\n5 1 0 0 0 0 0 1"), kView)),
+                     "a rolling shutter needs poses at times that rise: pose 1 is at 5 s"));
+    CameraPath numbered = *drive;
+    numbered.numbered = true;
+    EXPECT_TRUE(says(expand_rig(*rig, numbered), "a rolling shutter needs poses with times"));
+}
+
+// each line as a camera that stands where this one is then
+TEST(CameraView, a_moving_camera_sees_a_point_in_the_line_that_is_read_then)
+{
+    std::mt19937 random(3);
+    std::uniform_real_distribution<double> unit(-1, 1);
+    size_t seen = 0;
+    for (const Intrinsics& k :
+         {pinhole_from_fov(80, 200, 150), fisheye_from_fov(190, 160, 160), whole_sphere(200, 100)})
+        for (int i = 0; i < 200; ++i) {
+            const auto pose = [&](double seconds) {
+                const double half = 0.4 * seconds;
+                return rigid_from_quaternion({15 * seconds, -3 * seconds, 2 * seconds},
+                                             {std::sin(half) * 0.6, std::sin(half) * 0.8, 0, std::cos(half)}, "t")
+                    .value();
+            };
+            CameraFrame frame;
+            frame.intrinsics = k;
+            const auto direction = ShutterDirection(i % 4);
+            frame.readout = Readout{direction, {inverse(pose(0))}, {inverse(pose(0.04))}};
+            const CameraView view(frame);
+            const double x = k.width * (0.5 + 0.5 * unit(random)), y = k.height * (0.5 + 0.5 * unit(random));
+            const auto place = view.surface(x, y, 6 + 4 * unit(random));
+            if (!place)
+                continue;
+            const auto at = view.project(*place);
+            ASSERT_TRUE(at) << i;
+            if (k.model == CameraModel::equirectangular && std::min(x, k.width - x) < 10)
+                continue; // seen on both sides
+            ++seen;
+            EXPECT_NEAR(at->x, x, 1e-6) << name_of(k.model) << " " << i;
+            EXPECT_NEAR(at->y, y, 1e-6) << name_of(k.model) << " " << i;
+            const double line = i % 4 < 2 ? y / k.height : x / k.width, share = i % 2 ? 1 - line : line;
+            CameraFrame still = frame;
+            still.readout.reset();
+            still.pose = {inverse(interpolate(pose(0), pose(0.04), share))};
+            const auto then = project(still, *place);
+            EXPECT_NEAR(then->x, x, 1e-6);
+            EXPECT_NEAR(then->y, y, 1e-6);
+            EXPECT_NEAR(then->depth, at->depth, 1e-9);
+        }
+    EXPECT_GT(seen, 450u);
+}
+
+TEST(Rig, ftheta_sensors_are_read_as_nvidia_writes_them)
+{
+    const ScratchFolder folder;
+    const std::string lens = R"("model":"ftheta","width":1280,"height":720,"principal_point":[639.25,359.5],
+        "reference_poly":"PIXELDIST_TO_ANGLE","pixeldist_to_angle_poly":[0,0.00192,2.1e-8,-3e-11,4e-14,-1e-17],
+        "angle_to_pixeldist_poly":[0,520,0,0,0,0],"max_angle":1.5,"linear_cde":[0.9985,-0.0011,0.0006],)";
+    const auto rig_of = [&](const std::string& text) {
+        return read_rig(
+            folder.put("r.json", R"({"sensors":[{"name":"a",)" + text +
+                                     R"("sensor_to_vehicle":[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}]})"));
+    };
+    const auto rig = rig_of(lens);
+    ASSERT_TRUE(rig) << rig.error().message;
+    const Intrinsics& k = rig->sensors[0].intrinsics;
+    EXPECT_EQ(k, (Intrinsics{1,
+                             1,
+                             639.75,
+                             360,
+                             1280,
+                             720,
+                             CameraModel::ftheta,
+                             {0.00192, 2.1e-8, -3e-11, 4e-14, -1e-17, 0.9985, -0.0011, 0.0006, 1.5, 1}}));
+    for (const Intrinsics& scaled : {k, scaled_to(k, 640, 360), scaled_to(k, 640, 720)}) {
+        std::vector<Sensor> sensors = rig->sensors;
+        sensors[0].intrinsics = scaled;
+        folder.put("again.json", rig_json(sensors).dump());
+        const auto again = read_rig(folder / "again.json");
+        ASSERT_TRUE(again) << again.error().message;
+        for (const Point3& p : {Point3{0.3, -0.4, 1}, {-2, 1, 0.5}, {0.1, 1, 2}}) {
+            const auto a = Lens(scaled).project(p), b = Lens(again->sensors[0].intrinsics).project(p);
+            EXPECT_NEAR(a->x, b->x, 1e-9);
+            EXPECT_NEAR(a->y, b->y, 1e-9);
+            EXPECT_NEAR(a->x / scaled.width, Lens(k).project(p)->x / k.width, 1e-12);
+        }
+    }
+    const auto changed = [&](std::string_view from, std::string_view to) {
+        std::string text = lens;
+        text.replace(text.find(from), from.size(), to);
+        return rig_of(text);
+    };
+    EXPECT_TRUE(says(changed("PIXELDIST_TO_ANGLE\"", "BACKWARD\""), "reference_poly: expected \"PIXELDIST_TO_ANGLE\""));
+    EXPECT_TRUE(says(changed("[0,0.00192", "[0.1,0.00192"), "expected 2 to 6 numbers, the first 0"));
+    EXPECT_TRUE(says(changed("\"max_angle\":1.5,", ""), "max_angle is missing"));
+    EXPECT_TRUE(says(changed("\"width\"", "\"fx\":3,\"width\""), "has a polynomial, without fov or fx"));
+    EXPECT_TRUE(says(changed("\"ftheta\"", "\"pinhole\""), "principal_point, which a sensor of model pinhole has not"));
+    EXPECT_TRUE(says(changed("[0.9985,-0.0011,0.0006]", "[1,0]"), "linear_cde: expected an array of 3 numbers"));
+}
+
 TEST(Rig, the_examples_look_where_their_names_say)
 {
     const auto drive = read_tum(SEMROVER_SOURCE_DIR "/assets/scenes/street.tum", kView); // along +x, +y to the left
@@ -372,7 +518,7 @@ TEST(Rig, the_examples_look_where_their_names_say)
         const auto rig = read_rig(fmt::format("{}/assets/rigs/{}.json", SEMROVER_SOURCE_DIR, name));
         ASSERT_TRUE(rig) << rig.error().message;
         EXPECT_EQ(rig->sensors.size(), std::string_view(name) == "waymo" ? 5u : 6u);
-        const CameraPath path = expand_rig(*rig, *drive);
+        const CameraPath path = *expand_rig(*rig, *drive);
         const Point3 at = translation_of(drive->frames[0].pose.camera_to_world());
         for (size_t i = 0; i < rig->sensors.size(); ++i) {
             const std::string& camera = path.frames[i].camera;
@@ -410,7 +556,15 @@ TEST(Rig, what_is_wrong_with_a_rig_is_named)
     EXPECT_TRUE(says(changed("\"pinhole\"", "\"ftheta\""), "sensor 0: model \"ftheta\" is not supported"));
     EXPECT_TRUE(says(changed("\"pinhole\"", "\"pinhole\",\"distortion\":[0.1,0,0,0]"),
                      "sensor 0: distortion: expected no numbers of model pinhole, found 4"));
-    EXPECT_TRUE(says(changed("\"pinhole\"", "\"opencv\",\"distortion\":[0.1,0,0]"), "expected 4, 5 or 8 numbers"));
+    const std::string rolling = R"("pinhole","shutter":)";
+    EXPECT_TRUE(says(changed("\"pinhole\"", rolling + "5"), "sensor 0: shutter: expected an object, found number"));
+    EXPECT_TRUE(says(changed("\"pinhole\"", rolling + R"({"readout":5})"), "shutter: direction: expected \"down\""));
+    EXPECT_TRUE(says(changed("\"pinhole\"", rolling + R"({"direction":"up"})"), "shutter: readout is missing"));
+    EXPECT_TRUE(says(changed("\"pinhole\"", rolling + R"({"direction":"up","readout":1.5})"),
+                     "readout: expected whole microseconds from 0 to 1000000, found 1.5"));
+    EXPECT_TRUE(says(changed("\"pinhole\"", rolling + R"({"direction":"up","readout":5,"lines":3})"),
+                     "shutter: unknown key \"lines\""));
+    EXPECT_TRUE(says(changed("\"pinhole\"", "\"opencv\",\"distortion\":[0.1,0,0]"), "expected 4, 5, 8 or 12 numbers"));
     EXPECT_TRUE(says(changed("\"pinhole\"", "\"fisheye\",\"distortion\":[0.1,0,0,0,0]"), "expected 4 numbers"));
     EXPECT_TRUE(says(changed("\"pinhole\"", "\"equirectangular\""), "an equirectangular sensor sees the whole sphere"));
     EXPECT_TRUE(

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/camera/lens.h"
+#include "engine/camera/camera_view.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
 #include "tools/trajectory/camera_path.h"
@@ -119,6 +119,42 @@ TEST(CameraFiles, a_byte_order_mark_is_skipped_in_every_format)
     EXPECT_TRUE(says(read_camera_path(folder.put("w.tum", std::string("\xff\xfe \0", 4)), kView), "UTF-16"));
 }
 
+// as instant-ngp has it: three keys of a frame
+TEST(CameraFiles, a_readout_comes_back_from_transforms)
+{
+    const ScratchFolder folder;
+    CameraPath path = random_path(5);
+    for (size_t i = 0; i < 4; ++i)
+        path.frames[i].readout =
+            Readout{ShutterDirection(i), path.frames[i].pose, i ? path.frames[i + 1].pose : path.frames[i].pose};
+    ASSERT_TRUE(write(PathFormat::transforms, folder / "a.json", path));
+    const auto read = read_camera_path(folder / "a.json", kView);
+    ASSERT_TRUE(read) << read.error().message;
+    expect_same(*read, path);
+    for (size_t i = 0; i < 4; ++i) {
+        ASSERT_TRUE(read->frames[i].readout);
+        EXPECT_EQ(read->frames[i].readout->direction, ShutterDirection(i));
+        EXPECT_EQ(read->frames[i].moves(), i > 0); // the same pose stays the same
+        for (size_t at = 0; at < 12; ++at)
+            EXPECT_NEAR(read->frames[i].readout->to.world_to_camera[at], path.frames[i].readout->to.world_to_camera[at],
+                        1e-9);
+    }
+    EXPECT_FALSE(read->frames[4].readout);
+    const auto changed = [&](std::string_view from, std::string_view to) {
+        Json file = Json::parse(contents(folder / "a.json"));
+        Json& frame = file["frames"][1];
+        if (to.empty())
+            frame.erase(std::string(from));
+        else
+            frame[std::string(from)] = Json::parse(to);
+        return read_camera_path(folder.put("b.json", file.dump()), kView);
+    };
+    EXPECT_TRUE(
+        says(changed("transform_matrix_end", ""), "transform_matrix_start and transform_matrix_end need each other"));
+    EXPECT_TRUE(says(changed("rolling_shutter", ""), "a rolling shutter is three keys"));
+    EXPECT_TRUE(says(changed("rolling_shutter", "[0,0,1,0.5]"), "rolling_shutter: [0, 0, 1, 0.5] is not supported"));
+}
+
 // every lens through every format that has a place for it
 TEST(CameraFiles, lenses_come_back)
 {
@@ -128,6 +164,19 @@ TEST(CameraFiles, lenses_come_back)
         fisheye{200, 201, 160, 120, 320, 240, CameraModel::fisheye, {0.1, -0.02, 0.003, -0.0004}};
     third.distortion[4] = 0.05;
     rational.distortion = {-0.1, 0.02, 0.003, -0.004, 0.05, 0.06, 0.07, 0.08};
+    Intrinsics prism = rational;
+    prism.distortion[9] = 0.01;
+    const Intrinsics ftheta{
+        1, 1, 160.5, 119.5, 320, 240, CameraModel::ftheta, {200, 1, -2, 0.5, 0.1, 1.01, 0.001, -0.002, 1.4, 0}};
+    for (const Intrinsics& k : {prism, ftheta}) { // no place in COLMAP's files
+        SCOPED_TRACE(name_of(k.model));
+        const CameraPath path = random_path(3, k);
+        ASSERT_TRUE(write(PathFormat::transforms, folder / "a.json", path));
+        const auto read = read_camera_path(folder / "a.json", kView);
+        ASSERT_TRUE(read) << read.error().message;
+        expect_same(*read, path);
+        EXPECT_TRUE(says(write(PathFormat::colmap, folder / "b", path), "COLMAP has no model of"));
+    }
     for (const Intrinsics& k : {plain, third, rational, fisheye, whole_sphere(64, 32)})
         for (const auto& [format, file] : {std::pair{PathFormat::transforms, "a.json"}, {PathFormat::colmap, "a"}}) {
             SCOPED_TRACE(fmt::format("{} {}", name_of(k.model), file));

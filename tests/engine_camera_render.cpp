@@ -1,10 +1,11 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/camera/lens.h"
+#include "engine/camera/rig.h"
 #include "engine/splat/rasterizer.h"
 #include "tests/kernel_case.h"
 #include "tests/scratch_folder.h"
 #include "tools/trajectory/camera_path.h"
+#include "tools/trajectory/camera_text.h"
 
 namespace semrover {
 namespace engine_camera_render_test {
@@ -115,11 +116,80 @@ TEST(engine_camera_render, a_cube_stands_where_each_lens_says)
     opencv.distortion = {-0.2, 0.04, 0.003, -0.002};
     fisheye.distortion = {0.02, -0.01};
     const Path pose = folder.put("a.tum", "0 0 2.5 2 -0.5 0.5 -0.5 0.5\n");
-    for (const Intrinsics& k : {pinhole_from_fov(90, 160, 120), opencv, fisheye, whole_sphere(300, 150)}) {
+    Intrinsics prism = opencv;
+    prism.distortion = {-0.2, 0.04, 0.003, -0.002, 0, 0, 0, 0, 0.01, -0.004, -0.02, 0.005};
+    const Intrinsics ftheta{
+        1, 1, 80.5, 59.5, 160, 120, CameraModel::ftheta, {1 / 70.0, 0, 1e-7, 0, 0, 1.01, 0.003, -0.004, 1.3, 1}};
+    for (const Intrinsics& k :
+         {pinhole_from_fov(90, 160, 120), opencv, prism, ftheta, fisheye, whole_sphere(300, 150)}) {
         SCOPED_TRACE(name_of(k.model));
         const auto path = read_camera_path(pose, k);
         ASSERT_TRUE(path) << path.error().message;
         expect_cube(render(scene, path->frames[0]), path->frames[0]);
+    }
+}
+
+// a vehicle that turns and goes at 20 m/s, a shutter of 50 ms each way: the middle of each face is where the line is
+// that sees it
+TEST(engine_camera_render, a_cube_leans_as_a_rolling_shutter_has_it)
+{
+    const SplatScene scene = make_scene(test_device(), cube());
+    for (const Intrinsics& k :
+         {pinhole_from_fov(90, 160, 120), fisheye_from_fov(200, 160, 160), whole_sphere(300, 150)})
+        for (const ShutterDirection direction :
+             {ShutterDirection::down, ShutterDirection::up, ShutterDirection::right}) {
+            SCOPED_TRACE(fmt::format("{} {}", name_of(k.model), name_of(direction)));
+            CameraFrame frame;
+            frame.intrinsics = k;
+            const Rigid look = {0, 0, 1, 0, -1, 0, 0, 2.5, 0, -1, 0, 2, 0, 0, 0, 1};
+            const auto pose = [&](double s) {
+                const double yaw = 0.5 * s;
+                return compose(Rigid{std::cos(yaw), -std::sin(yaw), 0, 20 * s, std::sin(yaw), std::cos(yaw), 0, 0, 0, 0,
+                                     1, 0, 0, 0, 0, 1},
+                               look);
+            };
+            frame.readout = Readout{direction, {inverse(pose(-0.025))}, {inverse(pose(0.025))}};
+            auto rasterizer = Rasterizer::create(test_device(), scene, k.width, k.height, 1,
+                                                 {.model = drawn_model(k.model, true), .moving = true});
+            ASSERT_TRUE(rasterizer) << rasterizer.error().message;
+            const SplatCamera camera = splat_camera(frame, true);
+            const auto images = (*rasterizer)->render({&camera, 1});
+            ASSERT_TRUE(images) << images.error().message;
+            expect_cube(images->front(), frame);
+        }
+}
+
+// docs/method.md §5.4: at no speed a rolling shutter gives the bytes of a global one
+TEST(engine_camera_render, a_rolling_shutter_that_stands_is_a_global_one)
+{
+    const ScratchFolder folder;
+    const SplatScene scene = make_scene(test_device(), cube());
+    const Path drive = folder.put("a.tum", "0 0.1 2.2 1.7 0.01 0.02 0.3 0.95\n1 0.1 2.2 1.7 0.01 0.02 0.3 0.95\n");
+    for (const std::string lens :
+         {R"("width":160,"height":120,"fov":90)", R"("width":160,"height":160,"fov":200,"model":"fisheye")"}) {
+        std::vector<std::vector<float>> colors;
+        for (const std::string shutter : {"", R"("shutter":{"direction":"down","start":-5000,"readout":30000},)"}) {
+            const auto rig =
+                read_rig(folder.put("rig.json", R"({"path_axes":"vehicle","sensors":[{"name":"a",)" + shutter + lens +
+                                                    R"(,"sensor_to_vehicle":{"translation":[0.3,0.1,
+                0.2],"rotation":[-0.51,0.49,-0.5,0.5]}}]})"));
+            ASSERT_TRUE(rig) << rig.error().message;
+            const auto path = expand_rig(*rig, *read_tum(drive, pinhole_from_fov(90, 8, 8)));
+            ASSERT_TRUE(path) << path.error().message;
+            for (const CameraFrame& frame : path->frames) {
+                EXPECT_EQ(frame.readout.has_value(), !shutter.empty());
+                ASSERT_FALSE(frame.moves());
+                const Intrinsics& k = frame.intrinsics;
+                auto rasterizer = Rasterizer::create(test_device(), scene, k.width, k.height, 1, {.model = k.model});
+                ASSERT_TRUE(rasterizer);
+                const SplatCamera camera = splat_camera(frame, false);
+                const auto images = (*rasterizer)->render({&camera, 1});
+                ASSERT_TRUE(images);
+                colors.push_back(images->front().color);
+            }
+        }
+        for (const auto& c : colors)
+            EXPECT_EQ(c, colors[0]);
     }
 }
 

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 #include <limits>
 #include <random>
+#include <span>
 
 namespace semrover {
 namespace engine_lens_test {
@@ -22,6 +23,32 @@ const Intrinsics kOpencv{812.5,
                          {-0.28, 0.09, 0.0012, -0.0007, -0.011, 0.05, -0.02, 0.004}};
 const Intrinsics kFisheye{
     301.5, 299.75, 512.25, 480.5, 1024, 960, CameraModel::fisheye, {0.021, -0.013, 0.0041, -0.0006}};
+
+const Intrinsics kPrism{kOpencv.fx,
+                        kOpencv.fy,
+                        kOpencv.cx,
+                        kOpencv.cy,
+                        1280,
+                        720,
+                        CameraModel::opencv,
+                        {-0.28, 0.09, 0.0012, -0.0007, -0.011, 0.05, -0.02, 0.004, 0.0031, -0.0012, -0.0024, 0.0008}};
+// polynomial, c d e, max_angle, from pixels to angles?
+const Intrinsics kForward{1,
+                          1,
+                          639.75,
+                          362.25,
+                          1280,
+                          720,
+                          CameraModel::ftheta,
+                          {520.5, -6.25, 3.5, -14.0, 2.0, 1.002, 0.0015, -0.0007, 1.75, 0}};
+const Intrinsics kBackward{1,
+                           1,
+                           640.5,
+                           360,
+                           1280,
+                           720,
+                           CameraModel::ftheta,
+                           {1.92e-3, 2.1e-8, -3.0e-11, 4.0e-14, -1.0e-17, 0.9985, -0.0011, 0.0006, 1.8, 1}};
 
 struct Golden {
     Point3 point;
@@ -44,6 +71,51 @@ TEST(Lens, opencv_is_what_its_formula_gives)
     }
     EXPECT_FALSE(Lens(kOpencv).project({0.1, 0, -1}));
     EXPECT_FALSE(Lens(kOpencv).project({0.1, 0, 0}));
+}
+
+// the same, and s1 r^2 + s2 r^4 beside x'', s3 r^2 + s4 r^4 beside y''
+TEST(Lens, thin_prisms_are_what_their_formula_gives)
+{
+    const Golden golden[] = {{{0.4, -0.2, 1.5}, 851.288898185515, 256.652907518428},
+                             {{1.2, 0.9, 2.0}, 1055.976183734868, 670.743637863228},
+                             {{-0.7, 0.35, 1.0}, 163.047844403192, 599.456392526273}};
+    for (const Golden& g : golden) {
+        const auto pixel = Lens(kPrism).project(g.point);
+        ASSERT_TRUE(pixel);
+        EXPECT_NEAR(pixel->x, g.x, 1e-9);
+        EXPECT_NEAR(pixel->y, g.y, 1e-9);
+    }
+}
+
+// FThetaCameraModelParameters of NVIDIA's NCore: delta = polynomial of theta, or theta of delta; [c d; e 1] times
+// delta (x, y) / hypot(x, y), from the principal point; evaluated in Python, the second with numpy.roots
+TEST(Lens, ftheta_is_what_its_polynomial_gives)
+{
+    const Golden forward[] = {{{0.4, -0.2, 1.5}, 774.333952955307, 294.947942327368},
+                              {{2.0, 1.0, 0.3}, 1265.927348582390, 674.042919618237},
+                              {{-1.0, 0.5, -0.2}, -86.807904283552, 725.583375954831}};
+    const Golden backward[] = {{{0.4, -0.2, 1.5}, 775.168441585033, 292.682628769766},
+                               {{2.0, 1.0, 0.3}, 1304.453777702870, 693.058030079720},
+                               {{-1.0, 0.5, -0.2}, -165.685088538236, 762.991675307537}};
+    for (const auto& [k, golden] : {std::pair{kForward, std::span(forward)}, {kBackward, std::span(backward)}})
+        for (const Golden& g : golden) {
+            const auto pixel = Lens(k).project(g.point);
+            ASSERT_TRUE(pixel);
+            EXPECT_NEAR(pixel->x, g.x, 1e-8);
+            EXPECT_NEAR(pixel->y, g.y, 1e-8);
+            EXPECT_EQ(Lens(k).project({0, 0, 2})->x, k.cx);
+        }
+    for (const Intrinsics& k : {kForward, kBackward}) { // ends at max_angle
+        const double limit = k.distortion[8];
+        EXPECT_NEAR(Lens(k).limit(), limit, 1e-9);
+        EXPECT_TRUE(Lens(k).project({std::sin(limit - 1e-6), 0, std::cos(limit - 1e-6)}));
+        EXPECT_FALSE(Lens(k).project({std::sin(limit + 1e-6), 0, std::cos(limit + 1e-6)}));
+        EXPECT_TRUE(Lens(k).radial_depth());
+    }
+    Intrinsics turns = kForward; // 520.5 t - 200 t^3 rises up to t = 0.931
+    turns.distortion = {520.5, 0, -200, 0, 0, 1, 0, 0, 3, 0};
+    EXPECT_NEAR(Lens(turns).limit(), std::sqrt(520.5 / 600), 1e-9);
+    EXPECT_FALSE(Lens(turns).radial_depth());
 }
 
 // docs.opencv.org, calib3d/fisheye: theta_d = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8), with
@@ -101,6 +173,9 @@ std::vector<Intrinsics> lenses()
             tangential,
             strong,
             pincushion,
+            kPrism,
+            kForward,
+            kBackward,
             kFisheye,
             barrel,
             fisheye_from_fov(220, 500, 400),
@@ -220,6 +295,9 @@ TEST(Lens, intrinsics_that_no_camera_has_are_told)
         says(changed(whole_sphere(8, 4), [](auto& k) { k.fx *= 2; }), "expected a panorama of the whole sphere"));
     EXPECT_TRUE(
         says(changed(whole_sphere(8, 4), [](auto& k) { k.cy += 1; }), "expected a panorama of the whole sphere"));
+    EXPECT_TRUE(says(changed(kBackward, [](auto& k) { k.distortion[0] = 0; }), "a polynomial that does not rise at 0"));
+    EXPECT_TRUE(says(changed(kForward, [](auto& k) { k.distortion[5] = 0; }), "linear_cde 0, 0.0015, -0.0007"));
+    EXPECT_TRUE(says(changed(kForward, [](auto& k) { k.distortion[8] = 0; }), "expected a max_angle above 0"));
     EXPECT_TRUE(says(changed(kFisheye, [](auto& k) { k.fy = 0; }), "expected focal lengths above 0"));
     EXPECT_TRUE(says(changed(kFisheye, [](auto& k) { k.cx = kNaN; }), "is not finite"));
     EXPECT_TRUE(says(changed(kFisheye, [](auto& k) { k.width = 0; }), "an image of 0 x 960 pixels"));
@@ -230,7 +308,8 @@ TEST(Lens, models_have_names)
     for (const CameraModel model :
          {CameraModel::pinhole, CameraModel::opencv, CameraModel::fisheye, CameraModel::equirectangular})
         EXPECT_EQ(camera_model_of(name_of(model)), model);
-    EXPECT_FALSE(camera_model_of("ftheta"));
+    EXPECT_EQ(camera_model_of("ftheta"), CameraModel::ftheta);
+    EXPECT_FALSE(camera_model_of("f-theta"));
 }
 
 TEST(Lens, depth_is_from_the_camera_where_z_cannot_tell)

@@ -51,6 +51,29 @@ TEST(engine_noise_trail, begins_with_every_pixel_its_own)
         EXPECT_EQ(trail.keys()[i], (NoiseKey{i, 0}));
 }
 
+// the camera goes 1 m to the right, 8 m from a wall, in the time in which a picture is read out: lines of the first
+// frame are as far apart as those of the second, so keys stay where they are; from a still frame the last lines are a
+// pixel off, the first ones not
+TEST(engine_noise_trail, follows_the_lines_of_a_rolling_shutter)
+{
+    const auto rolling = [&](double from, double to) {
+        CameraFrame c = camera(from, 0, 0);
+        c.readout = Readout{ShutterDirection::down, c.pose, camera(to, 0, 0).pose};
+        return c;
+    };
+    NoiseTrail trail(kSize);
+    trail.follow(rolling(0, 1), depth_of(8000));
+    trail.follow(rolling(0, 1), depth_of(8000));
+    for (uint32_t i = 0; i < kSize.pixels(); ++i)
+        EXPECT_EQ(trail.keys()[i], (NoiseKey{i, 0})) << i;
+    NoiseTrail from_still(kSize);
+    from_still.follow(camera(0, 0, 0), depth_of(8000));
+    from_still.follow(rolling(0, 1), depth_of(8000));
+    const uint32_t last = kSize.height() - 1;
+    EXPECT_EQ(from_still.keys()[pixel(3, 0)], (NoiseKey{pixel(3, 0), 0}));
+    EXPECT_EQ(from_still.keys()[pixel(3, last)], (NoiseKey{pixel(4, last), 0}));
+}
+
 TEST(engine_noise_trail, stays_on_a_wall_that_moves_past)
 {
     NoiseTrail trail(kSize);

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // trajectories that other programs and data sets write
+#include "engine/camera/camera_view.h"
 #include "engine/camera/rig.h"
 #include "engine/format/image.h"
 #include "tests/says.h"
@@ -213,9 +214,9 @@ TEST_F(DataSetPaths, carry_rigs)
 {
     const CameraPath imu = read("poses.txt", "3 1 0 0 1 0 -1 0 2 0 0 -1 3\n");
     Rig rig{PathAxes::vehicle, {{"front", kView, {0, 0, 1, 0, 1, 0, 0, 0, 0, 1, 0, -0.5, 0, 0, 0, 1}}}};
-    expect_looking_along_x(expand_rig(rig, imu), 0, {1, 2, 3.5}); // in the IMU's axes, up is -z
+    expect_looking_along_x(*expand_rig(rig, imu), 0, {1, 2, 3.5}); // in the IMU's axes, up is -z
     rig = {PathAxes::camera, {{"front", kView, {0, 0, 1, 0, -1, 0, 0, 0, 0, -1, 0, 0.5, 0, 0, 0, 1}}}};
-    expect_looking_along_x(expand_rig(rig, imu), 0, {1, 2, 3.5}); // x forward, y left, z up
+    expect_looking_along_x(*expand_rig(rig, imu), 0, {1, 2, 3.5}); // x forward, y left, z up
 }
 
 TEST(PathFiles, a_placement_applies_in_its_order)
@@ -306,7 +307,8 @@ TEST(PathFiles, keys_of_transforms_json_that_are_not_read_are_refused_by_name)
     EXPECT_TRUE(refused(kSize + R"("camera_model":"FISHEYE624","fl_x":4,)", "camera_model 'FISHEYE624' is not"));
     EXPECT_TRUE(refused(kSize + R"("fl_x":4,"ftheta_p0":1,)", "ftheta_p0 is not supported"));
     EXPECT_TRUE(refused(kSize + R"("fl_x":4,"latlong":true,)", "latlong is not supported"));
-    EXPECT_TRUE(refused(kSize + R"("fl_x":4,)", "rolling_shutter is not", R"("rolling_shutter":[0,0,0.1,0],)"));
+    EXPECT_TRUE(
+        refused(kSize + R"("fl_x":4,)", "a rolling shutter is three keys", R"("rolling_shutter":[0,0,0.1,0],)"));
     EXPECT_TRUE(refused(kSize, "intrinsic_matrix is not", R"("intrinsic_matrix":[[4,0,2],[0,4,2],[0,0,1]],)"));
     EXPECT_TRUE(refused(kSize + R"("camera_angle_x":3.2,)", "a field of view of 3.2 radians along x"));
     EXPECT_TRUE(refused(R"("w":800,"fl_x":4,)", "h is missing beside w"));

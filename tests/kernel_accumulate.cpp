@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // accumulate() against docs/method.md §6.5 in double, for every lens
 #include "engine/camera/lens.h"
-#include "engine/splat/rasterizer.h"
+#include "engine/splat/camera_pair.h"
 #include "kernels/picture.h"
 #include "tests/kernel_case.h"
 
@@ -61,9 +61,20 @@ double street_depth(const Lens& lens, const Pose& pose, const Point3& ray)
     return nearest == kFar ? kFar : nearest * lens.depth(ray);
 }
 
-View view(const Intrinsics& k, const Pose& pose, uint32_t seed)
+// where a camera is when a pixel is read
+Pose pose_of(const CameraFrame& frame, double x, double y)
 {
-    View v{{0, {}, pose, k}, {}, {}};
+    if (!frame.readout)
+        return frame.pose;
+    const Readout& r = *frame.readout;
+    const double down = y / frame.intrinsics.height, share = r.direction == ShutterDirection::down ? down : 1 - down;
+    return {inverse(interpolate(r.from.camera_to_world(), r.to.camera_to_world(), share))};
+}
+
+View view(const CameraFrame& frame, uint32_t seed)
+{
+    const Intrinsics& k = frame.intrinsics;
+    View v{frame, {}, {}};
     std::mt19937 random(seed);
     const Lens lens(k);
     for (uint32_t y = 0; y < k.height; ++y)
@@ -71,17 +82,25 @@ View view(const Intrinsics& k, const Pose& pose, uint32_t seed)
             for (int c = 0; c < 3; ++c)
                 v.pixels.push_back(uint8_t(128 + 90 * std::sin(0.2 * x + 0.13 * y + c) + double(random() % 60) - 30));
             const auto ray = lens.ray(x + 0.5, y + 0.5);
-            const double depth = ray ? street_depth(lens, pose, *ray) : kFar;
+            const double depth = ray ? street_depth(lens, pose_of(frame, x + 0.5, y + 0.5), *ray) : kFar;
             v.depth.push_back(depth < 65 ? float(depth) : 0.f);
         }
     return v;
 }
 
-struct Reference {
+View view(const Intrinsics& k, const Pose& pose, uint32_t seed)
+{
+    CameraFrame frame;
+    frame.pose = pose;
+    frame.intrinsics = k;
+    return view(frame, seed);
+}
+
+struct Reference { // of cameras that stand, or move while they are read out
     const View &now, &past;
     AccumulateOptions o;
     int width = int(o.width), height = int(o.height);
-    Lens to{now.camera.intrinsics}, from{past.camera.intrinsics};
+    CameraView to{now.camera}, from{past.camera};
 
     uint32_t at(int x, int y) const
     {
@@ -152,19 +171,16 @@ struct Reference {
         const uint32_t pixel = at(x, y);
         std::array<double, 3> own{double(now.pixels[3 * pixel]), double(now.pixels[3 * pixel + 1]),
                                   double(now.pixels[3 * pixel + 2])};
-        const auto ray = to.ray(x + 0.5, y + 0.5);
-        if (!ray || !(to.depth(*ray) > 0))
+        const auto point = to.surface(x + 0.5, y + 0.5, metres(now.depth[pixel]));
+        if (!point)
             return own;
-        const double far = metres(now.depth[pixel]) / to.depth(*ray);
-        const Point3 point{(*ray)[0] * far, (*ray)[1] * far, (*ray)[2] * far};
-        const Point3 seen = transform(past.camera.pose.world_to_camera, point);
-        const auto source = from.project(seen);
+        const auto source = from.project(*point);
         const double edge = source ? std::min({source->x, source->y, width - source->x, height - source->y}) : -1.0;
         if (source && std::abs(edge) < 2e-3)
             return {};
         if (!source || edge < 0)
             return own;
-        const auto shared = is_shared(*source, from.depth(seen));
+        const auto shared = is_shared(*source, source->depth);
         if (!shared)
             return {};
         for (int c = 0; *shared && c < 3; ++c)
@@ -185,10 +201,7 @@ std::vector<uint8_t> accumulated(const View& now, const View& past, const Accumu
 {
     KernelCase k(test_device());
     const size_t count = picture_words(o.width, o.height);
-    std::vector<float> cameras(2 * kLensCameraFloats);
-    write_row(splat_camera(now.camera.intrinsics, now.camera.pose), std::span(cameras).first(kLensCameraFloats));
-    write_row(splat_camera(past.camera.intrinsics, past.camera.pose), std::span(cameras).last(kLensCameraFloats));
-    const Tensor y = accumulate(k.graph, k.input(cameras, kLensCameraFloats),
+    const Tensor y = accumulate(k.graph, k.input(pair_of(now.camera, past.camera).rows, kLensCameraFloats),
                                 {k.input(words(now.pixels, count)), k.input(now.depth)},
                                 {k.input(words(past.pixels, count)), k.input(past.depth)}, o);
     const Tensor kept = k.graph.keep(y, k.output(uint32_t(count), 1, DType::u32, 1));
@@ -200,11 +213,12 @@ std::vector<uint8_t> accumulated(const View& now, const View& past, const Accumu
     return pixels;
 }
 
-void expect_reference(CameraModel model, uint32_t width, uint32_t height, const Pose& past_pose, float share)
+void expect_reference(const View& now, const View& past, float share)
 {
-    const Intrinsics k = lens(model, width, height);
-    const View now = view(k, kHere, 1), past = view(k, past_pose, 2);
-    const AccumulateOptions o{.width = width, .height = height, .lens = lens_of(model), .share = share};
+    const auto [width, height] = std::pair(now.camera.intrinsics.width, now.camera.intrinsics.height);
+    const CameraPair pair = pair_of(now.camera, past.camera);
+    const AccumulateOptions o{
+        .width = width, .height = height, .lens = lens_of(pair.model), .moving = pair.moving, .share = share};
     const std::vector<uint8_t> got = accumulated(now, past, o);
     const Reference reference{now, past, o};
     size_t undecided = 0, changed = 0;
@@ -228,9 +242,31 @@ TEST(kernel_accumulate, takes_a_share_of_what_the_frame_before_saw_of_the_same_s
          {CameraModel::pinhole, CameraModel::opencv, CameraModel::fisheye, CameraModel::equirectangular})
         for (const auto& [width, height] : {std::pair{131u, 67u}, {64u, 48u}}) {
             SCOPED_TRACE(fmt::format("lens {}, {} x {}", int(model), width, height));
-            expect_reference(model, width, height, moved(-0.31, 0.07, 0.013), 0.6f);
-            expect_reference(model, width, height, moved(0.8, -0.2, -0.05), 0.95f);
+            const Intrinsics k = lens(model, width, height);
+            expect_reference(view(k, kHere, 1), view(k, moved(-0.31, 0.07, 0.013), 2), 0.6f);
+            expect_reference(view(k, kHere, 1), view(k, moved(0.8, -0.2, -0.05), 2), 0.95f);
         }
+}
+
+TEST(kernel_accumulate, follows_the_lines_of_rolling_shutters)
+{
+    for (const CameraModel model :
+         {CameraModel::pinhole, CameraModel::opencv, CameraModel::fisheye, CameraModel::equirectangular}) {
+        SCOPED_TRACE(name_of(model));
+        const auto rolling = [&](const Pose& from, const Pose& to, ShutterDirection direction) {
+            CameraFrame frame;
+            frame.pose = from;
+            frame.intrinsics = lens(model, 131, 67);
+            frame.readout = Readout{direction, from, to};
+            return frame;
+        };
+        const View now = view(rolling(kHere, moved(0.4, 0.05, 0.02), ShutterDirection::down), 1),
+                   past = view(rolling(moved(-0.6, -0.1, -0.03), moved(-0.3, -0.05, 0), ShutterDirection::up), 2),
+                   still = view(lens(model, 131, 67), moved(-0.5, 0.1, 0.01), 3);
+        expect_reference(now, past, 0.6f);
+        expect_reference(now, still, 0.6f);
+        expect_reference(still, past, 0.9f);
+    }
 }
 
 TEST(kernel_accumulate, leaves_a_frame_alone_where_nothing_is_shared)

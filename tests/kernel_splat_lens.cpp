@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+#include "lens_trip.spv.h"
 #include "tests/splat_case.h"
 
 namespace semrover {
@@ -7,10 +8,7 @@ namespace kernel_splat_lens_test {
 
 constexpr std::array<double, 12> kStraight = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
 
-double narrowed(double v)
-{
-    return double(float(v));
-}
+using semrover::narrowed;
 
 // numbers as fp32 has them
 Intrinsics narrowed(Intrinsics k)
@@ -22,7 +20,7 @@ Intrinsics narrowed(Intrinsics k)
     return k;
 }
 
-Intrinsics lens(CameraModel model, uint32_t width, uint32_t height, std::array<double, 8> distortion = {},
+Intrinsics lens(CameraModel model, uint32_t width, uint32_t height, std::array<double, 12> distortion = {},
                 double focal = 0.6)
 {
     if (model == CameraModel::equirectangular)
@@ -31,9 +29,21 @@ Intrinsics lens(CameraModel model, uint32_t width, uint32_t height, std::array<d
         {focal * width, 1.04 * focal * width, width / 2.0 + 1.3, height / 2.0 - 0.7, width, height, model, distortion});
 }
 
-const std::array<double, 8> kBarrel = {-0.3, 0.1, 0.002, -0.001, -0.01};
-const std::array<double, 8> kRational = {0.4, -0.05, 0.001, 0.0015, 0.01, 0.75, 0.1, 0.02};
-const std::array<double, 8> kKannala = {-0.03, 0.012, -0.006, 0.0009};
+const std::array<double, 12> kBarrel = {-0.3, 0.1, 0.002, -0.001, -0.01};
+const std::array<double, 12> kRational = {0.4, -0.05, 0.001, 0.0015, 0.01, 0.75, 0.1, 0.02};
+const std::array<double, 12> kKannala = {-0.03, 0.012, -0.006, 0.0009};
+
+const std::array<double, 12> kPrism = {-0.25, 0.08, 0.002, -0.001, 0, 0, 0, 0, 0.02, -0.01, -0.015, 0.005};
+
+// an f-theta lens that sees up to an angle, with its polynomial from angles to pixels or back
+Intrinsics ftheta(uint32_t width, uint32_t height, bool backward, double angle)
+{
+    const double f = 0.5 * width / angle;
+    Distortion d = {f, 0.02 * f, -0.03 * f, 0, 0.002 * f, 1.01, 0.004, -0.003, angle, 0};
+    if (backward)
+        d = {1 / f, 0, 0.02 / (f * f * f), 0, 0, 0.99, -0.003, 0.005, angle, 1};
+    return narrowed(Intrinsics{1, 1, width / 2.0 + 0.4, height / 2.0 - 0.6, width, height, CameraModel::ftheta, d});
+}
 
 std::array<double, 12> turned(double yaw, double pitch, double shift)
 {
@@ -42,22 +52,6 @@ std::array<double, 12> turned(double yaw, double pitch, double shift)
     for (double& v : view)
         v = narrowed(v);
     return view;
-}
-
-// splats all around the origin, 0.5 to 9 m away
-std::vector<HostSplat> splats_around(uint32_t n, uint32_t seed, double smallest = 0.01, double largest = 0.35)
-{
-    std::vector<HostSplat> splats = random_splats(n, seed, smallest, largest);
-    std::mt19937 random(seed + 1);
-    std::normal_distribution<double> normal;
-    std::uniform_real_distribution<double> unit(0, 1);
-    for (HostSplat& s : splats) {
-        Vector p = {normal(random), normal(random), normal(random)};
-        const double length = std::sqrt(dot(p, p)), away = 0.5 + 8.5 * unit(random);
-        for (size_t a = 0; a < 3; ++a)
-            s.position[a] = narrowed(p[a] / length * away);
-    }
-    return splats;
 }
 
 struct LensCase {
@@ -70,6 +64,9 @@ std::vector<LensCase> lens_cases()
     return {{lens(CameraModel::opencv, 1, 1, kBarrel), 40, 1},
             {lens(CameraModel::opencv, 96, 64, kBarrel), 300, 1},
             {lens(CameraModel::opencv, 77, 53, kRational, 0.35), 200, 3},
+            {lens(CameraModel::opencv, 90, 70, kPrism, 0.5), 300, 1},
+            {ftheta(90, 70, false, 1.2), 300, 1},
+            {ftheta(64, 64, true, 1.9), 300, 2},
             {lens(CameraModel::fisheye, 1, 1), 40, 1},
             {lens(CameraModel::fisheye, 90, 70, kKannala, 0.4), 300, 1},
             {lens(CameraModel::fisheye, 61, 67, {}, 0.2), 300, 2}, // sees behind itself
@@ -96,10 +93,14 @@ TEST(kernel_splat_lens, matches_a_ray_caster_in_double)
 // docs/method.md §5.4, bounds: one splat, seen from anywhere, no pixel with alpha >= 1/255 is lost
 TEST(kernel_splat_lens, bounds_hold_every_pixel)
 {
-    const Intrinsics models[] = {
-        lens(CameraModel::opencv, 80, 60, kBarrel), lens(CameraModel::opencv, 80, 60, kRational, 0.35),
-        lens(CameraModel::fisheye, 64, 64, kKannala, 0.25), lens(CameraModel::fisheye, 64, 64, {}, 0.17),
-        lens(CameraModel::equirectangular, 96, 48)};
+    const Intrinsics models[] = {lens(CameraModel::opencv, 80, 60, kBarrel),
+                                 lens(CameraModel::opencv, 80, 60, kRational, 0.35),
+                                 lens(CameraModel::fisheye, 64, 64, kKannala, 0.25),
+                                 lens(CameraModel::fisheye, 64, 64, {}, 0.17),
+                                 lens(CameraModel::equirectangular, 96, 48),
+                                 lens(CameraModel::opencv, 80, 60, kPrism, 0.5),
+                                 ftheta(80, 60, false, 1.3),
+                                 ftheta(64, 64, true, 2.2)};
     std::vector<HostSplat> splats = splats_around(60, 11, 0.01, 0.8);
     for (size_t i = 0; i < splats.size(); ++i) {
         if (i % 3 == 0) // close, so that the camera may be within the splat's sphere
@@ -131,6 +132,56 @@ TEST(kernel_splat_lens, bounds_hold_every_pixel)
                     << ", not " << alpha;
             }
         }
+    }
+}
+
+// pixels of pictures of 1920 x 1200: their rays as the host has them, and their way there and back
+TEST(kernel_splat_lens, the_device_finds_rays_and_pixels_as_the_host_does)
+{
+    const uint32_t width = 1920, height = 1200;
+    struct {
+        Intrinsics k;
+        double pixels, rays; // tolerances
+    } const cases[] = {{lens(CameraModel::opencv, width, height, kBarrel), 1e-3, 1e-6},
+                       {lens(CameraModel::opencv, width, height, kRational, 0.35), 1e-3, 1e-6},
+                       {lens(CameraModel::opencv, width, height, kPrism, 0.5), 1e-3, 1e-6},
+                       {lens(CameraModel::fisheye, width, height, kKannala, 0.25), 1e-3, 1e-6},
+                       {lens(CameraModel::equirectangular, width, height), 1e-3, 1e-6},
+                       {ftheta(width, height, false, 1.2), 1e-3, 1e-6},
+                       {ftheta(width, height, true, 1.9), 1e-3, 1e-6}};
+    for (const auto& [k, pixel_tolerance, ray_tolerance] : cases) {
+        std::vector<float> pixels, table(kLensCameraFloats);
+        for (uint32_t y = 0; y < height; y += 13)
+            for (uint32_t x = 0; x < width; x += 7)
+                pixels.insert(pixels.end(), {float(x) + 0.5f, float(y) + 0.5f});
+        write_row(splat_camera(k, {}), table);
+        KernelCase c(test_device());
+        const LensTripPush push{.count = uint32_t(pixels.size() / 2)};
+        const Tensor y = c.output(push.count * 2, 4, DType::f32, 4);
+        c.graph.dispatch(kernel::lens_trip, {c.input(table, kLensCameraFloats), c.input(pixels, 2), y}, push,
+                         threads(push.count), {.constants = {{"kModel", uint32_t(k.model)}}});
+        const Status status = c.compile_and_run();
+        ASSERT_TRUE(status) << status.error().message;
+        const auto got = c.read_array<float>(y);
+        const Lens host(k);
+        double trip = 0, ray = 0;
+        size_t seen = 0, differ = 0;
+        for (size_t i = 0; i < push.count; ++i) {
+            const auto expect = host.ray(pixels[2 * i], pixels[2 * i + 1]);
+            differ += expect.has_value() != (got[8 * i + 3] != 0);
+            if (!expect || got[8 * i + 3] == 0)
+                continue;
+            ++seen;
+            for (size_t a = 0; a < 3; ++a)
+                ray = std::max(ray, std::abs(got[8 * i + a] - (*expect)[a]));
+            for (size_t a = 0; a < 2; ++a)
+                trip = std::max(trip, std::abs(double(got[8 * i + 4 + a]) - pixels[2 * i + a]));
+        }
+        fmt::print("{}: {} rays, off by {:.2g}; there and back by {:.2g} pixels\n", name_of(k.model), seen, ray, trip);
+        EXPECT_GT(seen, push.count / 3u);
+        EXPECT_LE(differ, push.count / 500u); // at the edge of the lens
+        EXPECT_LT(ray, ray_tolerance) << name_of(k.model);
+        EXPECT_LT(trip, pixel_tolerance) << name_of(k.model);
     }
 }
 

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/deferred/frame_history.h"
 
-#include "engine/splat/rasterizer.h"
+#include "engine/splat/camera_pair.h"
 #include "kernels/picture.h"
 
 #include <algorithm>
@@ -17,17 +17,6 @@ std::vector<float> metres_of(const DepthPicture& depth)
     std::ranges::transform(depth.pixels, metres.begin(),
                            [unit = float(depth.unit)](uint32_t d) { return float(d) * unit; });
     return metres;
-}
-
-// the world in the first one's own frame, where numbers are small and fp32 is enough
-std::vector<float> camera_rows(const CameraFrame& now, const CameraFrame& past)
-{
-    std::vector<float> rows(2 * kLensCameraFloats);
-    const Pose between{compose(past.pose.world_to_camera, now.pose.camera_to_world())};
-    const std::span<float> table(rows);
-    write_row(splat_camera(now.intrinsics, Pose{}), table.first(kLensCameraFloats));
-    write_row(splat_camera(past.intrinsics, between), table.last(kLensCameraFloats));
-    return rows;
 }
 
 } // namespace
@@ -46,11 +35,11 @@ FrameHistory::Memory::Memory(const LatentSize& latent_size) : size(latent_size)
     made = bytes("accumulated frame");
 }
 
-Graph FrameHistory::Memory::graph(SplatLens lens, float share) const
+Graph FrameHistory::Memory::graph(SplatLens lens, bool moving, float share) const
 {
     Graph g;
     const AccumulateOptions options{
-        .width = size.image_width, .height = size.image_height, .lens = lens, .share = share};
+        .width = size.image_width, .height = size.image_height, .lens = lens, .moving = moving, .share = share};
     g.keep(
         accumulate(g, cameras.in(g), {now.bytes.in(g), now.depth.in(g)}, {past.bytes.in(g), past.depth.in(g)}, options),
         made);
@@ -63,16 +52,17 @@ Result<std::unique_ptr<FrameHistory>> FrameHistory::create(Device& device, const
     std::unique_ptr<FrameHistory> h(new FrameHistory(device, size, share));
     SR_CHECK(h->memory_.state.allocate(device, "the frame before"));
     SR_TRY(h->copies_, CopyRing::create(device));
-    SR_CHECK(h->use_lens(model));
+    SR_CHECK(h->use_lens(model, false));
     return h;
 }
 
-Status FrameHistory::use_lens(CameraModel model)
+Status FrameHistory::use_lens(CameraModel model, bool moving)
 {
-    if (program_ && model_ == model)
+    if (program_ && model_ == model && moving_ == moving)
         return {};
-    SR_TRY(program_, Program::create(device_, memory_.graph(lens_of(model), share_)));
+    SR_TRY(program_, Program::create(device_, memory_.graph(lens_of(model), moving, share_)));
     model_ = model;
+    moving_ = moving;
     return {};
 }
 
@@ -109,17 +99,19 @@ Status FrameHistory::write_pixels(std::span<const uint8_t> pixels)
 Status FrameHistory::accumulate_now(const CameraFrame& camera, const DepthPicture& depth)
 {
     const bool alone = frames_ == 0 || camera.intrinsics.model != camera_.intrinsics.model;
+    CameraPair pair;
     if (!alone) {
         SR_CHECK(copy(memory_.made, memory_.past.bytes));
         SR_CHECK(copy(memory_.now.depth, memory_.past.depth));
-        SR_CHECK(memory_.cameras.write(device_, camera_rows(camera, camera_)));
+        pair = pair_of(camera, camera_);
+        SR_CHECK(memory_.cameras.write(device_, pair.rows));
     }
     SR_CHECK(memory_.now.depth.write(device_, metres_of(depth)));
     camera_ = camera;
     ++frames_;
     if (alone)
         return copy(memory_.now.bytes, memory_.made);
-    SR_CHECK(use_lens(camera.intrinsics.model));
+    SR_CHECK(use_lens(pair.model, pair.moving));
     return program_->run();
 }
 

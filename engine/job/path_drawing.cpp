@@ -4,61 +4,50 @@
 
 namespace semrover {
 
-namespace {
-
-// end of the run of frames from `first` with the same time, size and camera model
-size_t end_of_moment(const CameraPath& path, size_t first)
+PathDrawing::PathDrawing(Device& device, const DrawnScene& scene, CameraPath path, const RasterizerOptions& options,
+                         bool flow)
+    : scene_(scene), path_(std::move(path)), rasterizers_(device, scene, options)
 {
-    const CameraFrame& a = path.frames[first];
+    if (!flow)
+        return;
+    flow_.emplace(device, scene, options);
+    following_ = following_frames(path_);
+}
+
+// end of the run of frames from `first` with the same time and of one kind
+size_t PathDrawing::end_of_moment(size_t first) const
+{
+    const CameraFrame& a = path_.frames[first];
     size_t end = first + 1;
-    for (; end < path.frames.size(); ++end) {
-        const CameraFrame& b = path.frames[end];
+    for (; end < path_.frames.size(); ++end) {
+        const CameraFrame& b = path_.frames[end];
         if (b.time != a.time || b.camera == a.camera || b.intrinsics.width != a.intrinsics.width ||
-            b.intrinsics.height != a.intrinsics.height || b.intrinsics.model != a.intrinsics.model)
+            b.intrinsics.height != a.intrinsics.height || b.intrinsics.model != a.intrinsics.model ||
+            rasterizers_.moving(b) != rasterizers_.moving(a))
             break;
     }
     return end;
 }
 
-} // namespace
-
-PathDrawing::PathDrawing(Device& device, const DrawnScene& scene, CameraPath path, const RasterizerOptions& options,
-                         bool flow)
-    : device_(device), scene_(scene), path_(std::move(path)), options_(options)
-{
-    if (!flow)
-        return;
-    flow_.emplace(device, scene.splats, scene.actors, options);
-    following_ = following_frames(path_);
-}
-
-Result<Rasterizer*> PathDrawing::rasterizer_of(const Intrinsics& size, uint32_t frames)
-{
-    auto& rasterizer = rasterizers_[{size.width, size.height, size.model}];
-    if (!rasterizer) {
-        RasterizerOptions options = options_;
-        options.model = size.model;
-        SR_TRY(rasterizer, Rasterizer::create(device_, scene_.splats, size.width, size.height, frames, options));
-    }
-    return rasterizer.get();
-}
-
 Result<SplatImage> PathDrawing::image(const CameraFrame& frame)
 {
-    SR_TRY(Rasterizer * rasterizer, rasterizer_of(frame.intrinsics, 1));
-    const SplatCamera camera = splat_camera(frame.intrinsics, frame.pose);
-    SR_TRY(std::vector<SplatImage> images, rasterizer->render({&camera, 1}, scene_.actors.seen_by({&frame, 1})));
+    SR_TRY(Rasterizer * rasterizer, rasterizers_.of(frame, 1));
+    const bool moving = rasterizers_.moving(frame);
+    const SplatCamera camera = splat_camera(frame, moving);
+    const SplatMovers movers = scene_.actors.seen_by({&frame, 1}, moving);
+    SR_TRY(std::vector<SplatImage> images, rasterizer->render({&camera, 1}, movers));
     return std::move(images.front());
 }
 
 Status PathDrawing::draw(std::span<const CameraFrame> frames, const Drawn& drawn)
 {
-    SR_TRY(Rasterizer * rasterizer, rasterizer_of(frames.front().intrinsics, uint32_t(frames.size())));
+    SR_TRY(Rasterizer * rasterizer, rasterizers_.of(frames.front(), uint32_t(frames.size())));
+    const bool moving = rasterizers_.moving(frames.front());
     std::vector<SplatCamera> cameras;
     for (const CameraFrame& frame : frames)
-        cameras.push_back(splat_camera(frame.intrinsics, frame.pose));
+        cameras.push_back(splat_camera(frame, moving));
     for (size_t at = 0; at < cameras.size();) {
-        const SplatMovers movers = scene_.actors.seen_by(frames.subspan(at));
+        const SplatMovers movers = scene_.actors.seen_by(frames.subspan(at), moving);
         SR_TRY(const uint32_t together, rasterizer->draw(std::span(cameras).subspan(at), movers));
         for (uint32_t i = 0; i < together; ++i, ++at)
             SR_CHECK(drawn(frames[at], {rasterizer->pixels(i)}));
@@ -77,7 +66,7 @@ Result<FlowSlots> PathDrawing::flow_of(size_t frame)
 std::span<const CameraFrame> PathDrawing::next() const
 {
     SR_ASSERT(done_ < total(), "all {} frames are drawn", total());
-    return std::span(path_.frames).subspan(done_, end_of_moment(path_, done_) - done_);
+    return std::span(path_.frames).subspan(done_, end_of_moment(done_) - done_);
 }
 
 bool PathDrawing::skip()

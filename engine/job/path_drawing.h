@@ -35,23 +35,22 @@ class PathDrawing {
     size_t done() const { return done_; }      // frames so far
     size_t total() const { return path_.frames.size(); }
 
-    // frames of one size and camera model, apart from the path
+    // frames of one size and camera model, in all of which something moves while they are read out, or in none; apart
+    // from the path
     Status draw(std::span<const CameraFrame> frames, const Drawn& drawn);
     // one frame's images on the host, where the options keep no pixels; waits for them
     Result<SplatImage> image(const CameraFrame& frame);
 
   private:
-    Result<Rasterizer*> rasterizer_of(const Intrinsics& size, uint32_t frames);
+    size_t end_of_moment(size_t first) const;
     Result<FlowSlots> flow_of(size_t frame);
 
-    Device& device_;
     const DrawnScene& scene_;
     CameraPath path_;
-    RasterizerOptions options_;
+    FrameRasterizers rasterizers_;
     std::optional<FlowDrawing> flow_;
     std::vector<size_t> following_; // the next frame of each one's camera; their number: there is none
     size_t done_ = 0;
-    std::map<std::tuple<uint32_t, uint32_t, CameraModel>, std::unique_ptr<Rasterizer>> rasterizers_;
 };
 
 // where the pictures of a camera go: those of one without a name into the folder itself

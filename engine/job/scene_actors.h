@@ -23,8 +23,10 @@ class SceneActors {
     // by the number of a thing in pictures: its actor + 1, 0 of what stands (SplatOptions::mover_rows)
     const std::vector<uint32_t>& rows() const { return rows_; }
 
-    // as these cameras see them at their times
-    SplatMovers seen_by(std::span<const CameraFrame> frames) const;
+    // does one move while the frame is read out?
+    bool move_in(const CameraFrame& frame) const;
+    // as these cameras see them at their times; moving: as RasterizerOptions has it, during their readouts
+    SplatMovers seen_by(std::span<const CameraFrame> frames, bool moving = false) const;
     // from the frame of one camera to that of the next: of what stands, then of each actor (splat_flow)
     std::vector<std::array<float, 12>> moves(const CameraFrame& now, const CameraFrame& next) const;
 

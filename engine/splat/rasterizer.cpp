@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/splat/rasterizer.h"
 
-#include "engine/camera/lens.h"
 #include "engine/splat/planes.h"
 #include "runtime/device/command.h"
 
@@ -86,6 +85,8 @@ SplatLens lens_of(CameraModel model)
         return SplatLens::fisheye;
     case CameraModel::equirectangular:
         return SplatLens::equirectangular;
+    case CameraModel::ftheta:
+        return SplatLens::ftheta;
     case CameraModel::pinhole:
         break;
     }
@@ -99,9 +100,10 @@ void write_row(const SplatCamera& c, std::span<float> row)
     std::copy_n(c.world_to_camera.data(), 12, row.begin() + 4);
     if (row.size() == 16)
         return;
-    std::copy_n(c.distortion.data(), 8, row.begin() + 16);
-    row[24] = c.limit;
-    row[25] = c.radial_depth;
+    std::copy_n(c.distortion.data(), 12, row.begin() + 16);
+    const float rest[] = {c.limit,   float(c.radial_depth), c.first,    c.reach,    c.turn[0],  c.turn[1],
+                          c.turn[2], c.across[0],           c.shift[0], c.shift[1], c.shift[2], c.across[1]};
+    std::ranges::copy(rest, row.begin() + 28);
 }
 
 SplatCamera splat_camera(const Intrinsics& i, const Pose& pose)
@@ -114,9 +116,43 @@ SplatCamera splat_camera(const Intrinsics& i, const Pose& pose)
         const Lens lens(i);
         std::ranges::transform(i.distortion, c.distortion.begin(), narrowed);
         c.limit = float(lens.limit());
+        c.reach = float(lens.reach());
         c.radial_depth = lens.radial_depth();
     }
     return c;
+}
+
+CameraModel drawn_model(CameraModel model, bool moving)
+{
+    return moving && model == CameraModel::pinhole ? CameraModel::opencv : model;
+}
+
+SplatCamera splat_camera(const CameraFrame& frame, bool moving)
+{
+    Intrinsics i = frame.intrinsics;
+    i.model = drawn_model(i.model, moving);
+    const CameraMotion motion = motion_of(frame);
+    SplatCamera c = splat_camera(i, motion.middle);
+    const auto narrowed = [](double v) { return float(v); };
+    std::ranges::transform(motion.turn, c.turn.begin(), narrowed);
+    std::ranges::transform(motion.shift, c.shift.begin(), narrowed);
+    std::ranges::transform(motion.across, c.across.begin(), narrowed);
+    c.first = float(motion.first);
+    return c;
+}
+
+std::array<std::array<float, 12>, 2> moving_views(const CameraMotion& camera, const Rigid& from, const Rigid& to,
+                                                  const Rigid& from_splats)
+{
+    const ThingMotion motion = motion_of(camera, from, to);
+    const Rigid view = compose(motion.view, from_splats);
+    std::array<std::array<float, 12>, 2> rows{};
+    const auto narrowed = [](double v) { return float(v); };
+    std::transform(view.begin(), view.begin() + 12, rows[0].begin(), narrowed);
+    std::ranges::transform(motion.turn, rows[1].begin(), narrowed);
+    std::ranges::transform(motion.shift, rows[1].begin() + 4, narrowed);
+    std::ranges::transform(motion.pivot, rows[1].begin() + 8, narrowed);
+    return rows;
 }
 
 Result<std::unique_ptr<Rasterizer>> Rasterizer::create(Device& device, const SplatScene& scene, uint32_t width,
@@ -140,8 +176,8 @@ Result<std::unique_ptr<Rasterizer>> Rasterizer::create(Device& device, const Spl
                     "{} x {} pixels of {} splats need {} bytes in one tensor; this device takes {}", width, height,
                     rows, per_camera, limit);
     r->cameras_ = uint32_t(std::min<uint64_t>(max_cameras, limit / per_camera));
-    r->max_visible_ =
-        uint32_t(std::min<uint64_t>(std::max(rows, 1024u), limit / splat_record_bytes(lens_of(options.model))));
+    r->max_visible_ = uint32_t(
+        std::min<uint64_t>(std::max(rows, 1024u), limit / splat_record_bytes(lens_of(options.model), options.moving)));
     // A street of a million splats has 1.5 pairs a splat at 616 x 424 and 2.8 at 1920 x 1080. More room makes the
     // blending seem longer than a submit may last, and then it is cut.
     const uint64_t pairs = options.max_pairs ? options.max_pairs : std::max<uint64_t>(4ull * rows, 65536);
@@ -165,7 +201,7 @@ Status Rasterizer::build()
         z_scale_ = state_.slot(1, 2, DType::f32, "scale of the z-buffer", 2);
     }
     if (options_.movers) {
-        movers_ = state_.slot(cameras_ * options_.movers, 12, DType::f32, "views of movers", 12);
+        movers_ = state_.slot(cameras_ * views_of_movers(), 12, DType::f32, "views of movers", 12);
         mover_rows_ = state_.slot(options_.mover_numbers, 1, DType::u32, "rows of movers", 1);
     }
     if (options_.pixels_over)
@@ -179,6 +215,7 @@ Status Rasterizer::build()
     SplatOptions o{.width = width_,
                    .height = height_,
                    .lens = lens,
+                   .moving = options_.moving,
                    .max_visible = max_visible_,
                    .max_pairs = max_pairs_,
                    .tile = options_.tile};
@@ -249,8 +286,8 @@ void Rasterizer::keep_images(Graph& g, const SplatImages& y)
 Status Rasterizer::make_room(uint32_t visible, uint32_t pairs)
 {
     if (visible > max_visible_) {
-        SR_TRY(max_visible_,
-               room_for(visible, splat_record_bytes(lens_of(options_.model)), device_.limits(), "visible splats"));
+        SR_TRY(max_visible_, room_for(visible, splat_record_bytes(lens_of(options_.model), options_.moving),
+                                      device_.limits(), "visible splats"));
     }
     if (pairs > max_pairs_) {
         SR_TRY(max_pairs_, room_for(pairs, kPairBytes, device_.limits(), "pairs of splat and tile"));
@@ -262,17 +299,17 @@ Status Rasterizer::make_room(uint32_t visible, uint32_t pairs)
 // the tables of movers: of `cameras` ones from the first on; those that are left see none
 Rasterizer::MoverTables Rasterizer::tables_of(const SplatMovers& movers, size_t first, size_t cameras) const
 {
-    const size_t each = movers.count;
+    const size_t each = movers.count * (options_.moving ? 2 : 1);
     MoverTables tables{movers.rows, {}};
-    SR_ASSERT(each <= options_.movers && movers.rows.size() <= options_.mover_numbers &&
+    SR_ASSERT(each <= views_of_movers() && movers.rows.size() <= options_.mover_numbers &&
                   movers.views.size() >= (first + cameras) * each,
               "{} movers with numbers below {}; this rasterizer has room for {} and {}", each, movers.rows.size(),
               options_.movers, options_.mover_numbers);
     tables.rows.resize(options_.mover_numbers);
-    tables.views.resize(size_t(cameras_) * options_.movers);
+    tables.views.resize(size_t(cameras_) * views_of_movers());
     for (size_t camera = 0; camera < cameras; ++camera)
         std::copy_n(movers.views.begin() + ptrdiff_t((first + camera) * each), each,
-                    tables.views.begin() + ptrdiff_t(camera * options_.movers));
+                    tables.views.begin() + ptrdiff_t(camera * views_of_movers()));
     return tables;
 }
 

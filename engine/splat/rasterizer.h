@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/camera/camera.h"
+#include "engine/camera/camera_view.h"
 #include "engine/splat/splat_scene.h"
 #include "kernels/picture.h"
 #include "runtime/device/program.h"
@@ -20,12 +20,20 @@ struct SplatCamera {
     float fx = 0, fy = 0, cx = 0, cy = 0;    // pixels
     std::array<float, 12> world_to_camera{}; // [3, 4], row-major, metres
     // of a lens that is no pinhole: engine/camera/lens.h
-    std::array<float, 8> distortion{};
-    float limit = 0;
+    std::array<float, 12> distortion{};
+    float limit = 0, reach = 0;
     bool radial_depth = false; // depth is the distance from the camera, not along z
+    // of one that moves while it is read out: CameraMotion (engine/camera/camera_view.h), and lines as it has them
+    std::array<float, 3> turn{}, shift{};
+    std::array<float, 2> across{};
+    float first = 0;
 };
 SplatCamera splat_camera(const Intrinsics& intrinsics, const Pose& pose);
+// moving: for a rasterizer of cameras that move while they are read out, or look at what moves meanwhile
+SplatCamera splat_camera(const CameraFrame& frame, bool moving);
 SplatLens lens_of(CameraModel model);
+// pinholes are drawn there as opencv lenses without distortion
+CameraModel drawn_model(CameraModel model, bool moving);
 // as kernels take it: splat_camera_floats() numbers
 void write_row(const SplatCamera& camera, std::span<float> row);
 
@@ -56,6 +64,7 @@ struct RasterizerOptions {
     uint32_t max_pairs = 0;                   // to begin with; 0: from the number of splats
     std::optional<uint32_t> rows = {};        // the scene's first ones at least; none: all of it
     CameraModel model = CameraModel::pinhole; // of all cameras
+    bool moving = false;                      // cameras or movers move during a readout; no pinholes
     // keeps pixels as files have them, over this background, in place of images: draw() and pixels(), not render()
     std::optional<std::array<uint8_t, 3>> pixels_over = {};
     float depth_units = 1000;   // of these, to a metre; 0: fp32 metres
@@ -84,8 +93,11 @@ struct SplatPixelSlots {
 struct SplatMovers {
     uint32_t count = 0;
     std::vector<uint32_t> rows = {};               // by the number of a thing, as SplatOptions::mover_rows
-    std::vector<std::array<float, 12>> views = {}; // [cameras, movers], as SplatOptions::movers
+    std::vector<std::array<float, 12>> views = {}; // [cameras, movers], as SplatOptions::movers; moving: two of each
 };
+// the two of a thing with poses at the start and at the end of a readout; `from_splats` to its own frame
+std::array<std::array<float, 12>, 2> moving_views(const CameraMotion& camera, const Rigid& from, const Rigid& to,
+                                                  const Rigid& from_splats);
 
 // Draws a scene from up to max_cameras cameras in one submit; more are drawn in turns. The graph is built once and
 // replayed; when a frame has more splats or tiles than it has room for, it is built again with more, and the frame
@@ -142,6 +154,7 @@ class Rasterizer {
         std::vector<std::array<float, 12>> views;
     };
     Rasterizer(Device& device, const SplatScene& scene) : device_(device), scene_(scene) {}
+    uint32_t views_of_movers() const { return options_.movers * (options_.moving ? 2 : 1); } // a camera
     Status build();
     void declare_images(uint32_t pixels);
     void keep_images(Graph& g, const SplatImages& images);

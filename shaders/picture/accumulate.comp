@@ -3,12 +3,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // a frame and the one before it where both see the same surface, four pixels a thread (docs/method.md §6.5)
 #extension GL_GOOGLE_include_directive : require
-#include "lib/lens.glsl"
+#include "lib/moving_pixel.glsl"
 #include "lib/rounding.glsl"
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint kModel = 0; // CameraModel
+layout(constant_id = 1) const bool kMoving = false; // a camera moves while its picture is read out
 layout(push_constant) uniform AccumulatePush {
     uint width, height;
     uint words;      // of a picture
@@ -24,6 +25,7 @@ layout(binding = 4) readonly buffer DepthPast { float depth_past[]; }; // [pixel
 layout(binding = 5) writeonly buffer Result { uint result[]; };        // [words] bytes
 
 #include "lib/splat_camera.glsl"
+#include "lib/camera_pixel.glsl"
 
 const float kInfinity = 1e7; // metres
 
@@ -62,22 +64,13 @@ vec3 color_past(ivec2 at)
     return color_of(past[word], past[min(word + 1, p.words - 1)], byte % 4);
 }
 
-float camera_depth(uint camera, vec3 point)
-{
-    return camera_depth_is_radial(camera) ? length(point) : point.z;
-}
-
 // where the frame before saw what this pixel shows; its depth there
 bool find_source(ivec2 pixel, out vec2 source, out float depth)
 {
-    vec3 ray;
-    if (!lens_unproject(kModel, camera_lens(0), vec2(pixel) + 0.5, ray) || !(camera_depth(0, ray) > 0.0))
-        return false;
-    const vec3 point = ray * (metres(depth_now[index_of(pixel)]) / camera_depth(0, ray));
-    const vec3 before = camera_view(1) * vec4(point, 1.0);
-    depth = camera_depth(1, before);
-    return lens_project(kModel, camera_lens(1), before, source) && depth > 0.0 && source.x >= 0.0 && source.y >= 0.0 &&
-           source.x < float(p.width) && source.y < float(p.height);
+    vec3 point;
+    return point_of(0, vec2(pixel) + 0.5, metres(depth_now[index_of(pixel)]), point) &&
+           pixel_of(1, camera_view(1) * vec4(point, 1.0), source, depth) && depth > 0.0 && source.x >= 0.0 &&
+           source.y >= 0.0 && source.x < float(p.width) && source.y < float(p.height);
 }
 
 // the four pixels around it have the depth between them

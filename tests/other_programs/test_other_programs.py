@@ -3,8 +3,8 @@
 """What other programs make of our files, and we of theirs. A program that is not installed skips its tests by name.
 Python's own tarfile is one of them.
 
-Programs: colmap, python3-opencv, python3-open3d and python3-skimage of Debian (tools/setup --programs); of npm, gltf-validator and
-@playcanvas/splat-transform in the folder NODE_MODULES.
+Programs: colmap, python3-opencv, python3-open3d and python3-skimage of Debian (tools/setup --programs); of npm,
+gltf-validator and @playcanvas/splat-transform in the folder NODE_MODULES.
 """
 import importlib
 import json
@@ -308,6 +308,35 @@ class Skimage(Case):
             self.assertAlmostEqual(ours["psnr"], psnr, places=6)
             self.assertAlmostEqual(ours["ssim"], ssim, places=6)
             self.assertTrue(math.isfinite(psnr))
+
+
+class OpenCv(Case):
+    @needs_python("cv2")
+    def test_dots_are_where_it_projects_them_through_a_thin_prism(self):
+        import numpy
+        places = [(5, y, z) for y in (-2.4, -0.9, 0.7, 2.2) for z in (-1.3, 0.1, 1.4)]  # ahead: x forward, y left, z up
+        source = self.folder / "dots.splat"
+        source.write_bytes(b"".join(splat(p, (1e-3, 1e-3, 1e-4), (255, 255, 255, 255)) for p in places))
+        k = (-0.28, 0.09, 0.0012, -0.0007, -0.011, 0.05, -0.02, 0.004, 0.0031, -0.0012, -0.0024, 0.0008)
+        rig = {"sensors": [{"name": "a", "model": "opencv", "width": 640, "height": 480, "fx": 400, "fy": 410,
+                            "cx": 322.5, "cy": 237.25, "distortion": k,
+                            "sensor_to_vehicle": {"rotation": (-0.5, 0.5, -0.5, 0.5)}}]}
+        (self.folder / "rig.json").write_text(json.dumps(rig))
+        (self.folder / "path.tum").write_text("0 0 0 0 -0.5 0.5 -0.5 0.5\n")
+        run(SEMROVER, "render", "-q", source, "--path", self.folder / "path.tum", "--rig", self.folder / "rig.json", "-o",
+            self.folder / "out")
+        image = python_module("cv2").imread(str(self.folder / "out/a/color/000000.png"))[:, :, 0].astype(float)
+        points = numpy.array([(-y, -z, x) for x, y, z in places], dtype=float)
+        # the centre of OpenCV's first pixel is at (0, 0), ours at (0.5, 0.5)
+        matrix = numpy.array([[400, 0, 322.5 - 0.5], [0, 410, 237.25 - 0.5], [0, 0, 1]])
+        expected, _ = python_module("cv2").projectPoints(points, numpy.zeros(3), numpy.zeros(3), matrix, numpy.array(k))
+        for x, y in expected.reshape(-1, 2):
+            left, top = round(x) - 6, round(y) - 6
+            block = image[top:top + 13, left:left + 13]
+            rows, columns = numpy.mgrid[top:top + 13, left:left + 13]
+            self.assertGreater(block.sum(), 100)
+            self.assertAlmostEqual((columns * block).sum() / block.sum(), x, delta=0.03)
+            self.assertAlmostEqual((rows * block).sum() / block.sum(), y, delta=0.03)
 
 
 if __name__ == "__main__":

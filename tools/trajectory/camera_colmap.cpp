@@ -160,6 +160,11 @@ Status write_colmap(const Path& folder, const CameraPath& cameras, const Splats&
         counts[frame.camera] = 0;
     size_t image = 0;
     for (const CameraFrame& frame : cameras.frames) {
+        const Intrinsics& k = frame.intrinsics;
+        if (k.model == CameraModel::ftheta ||
+            std::ranges::any_of(std::span(k.distortion).subspan(8), [](double v) { return v != 0; }))
+            return fail(ErrorCode::bad_input, "{}: COLMAP has no model of {} lenses", quote_path(folder),
+                        k.model == CameraModel::ftheta ? "ftheta" : "opencv thin prism");
         size_t id = size_t(std::ranges::find(distinct, frame.intrinsics) - distinct.begin()) + 1;
         if (id > distinct.size()) {
             distinct.push_back(frame.intrinsics);
