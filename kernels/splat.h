@@ -61,8 +61,9 @@ struct SplatTensors {
     Tensor cells;       // [N] u32
     Tensor blocks = {}; // [N / 64, rounded up] u32, or none: splats of a block that has 0 are skipped
 };
-// how rays become pixels, of all cameras of one call: engine/camera/lens.h
-enum class SplatLens : uint32_t { pinhole, opencv, fisheye, equirectangular };
+// how rays become pixels, of all cameras of one call: engine/camera/lens.h; spinning: a part of a lidar's sweep, of
+// less than a turn (SweepPicture, engine/camera/lidar.h)
+enum class SplatLens : uint32_t { pinhole, opencv, fisheye, equirectangular, spinning };
 constexpr uint32_t kLensCameraFloats = 28;
 constexpr uint32_t splat_camera_floats(SplatLens lens)
 {
@@ -87,6 +88,7 @@ struct SplatOptions {
     float cutoff = 0;             // sigmas; 0: as far as alpha_min
     // [cameras * height * width] fp32 array, or none, of pinholes: metres along z, what lies farther is not seen
     Tensor limits = {};
+    Tensor rows = {}; // [height, 4] fp32 array of a sweep: shaders/splat/splat.h
     // which of color, surface, depth and ids are made; the others are [1] and nothing is written to them
     std::array<bool, 4> made = {true, true, true, true};
 };

@@ -6,6 +6,7 @@
 #include "runtime/base/quote.h"
 
 #include <algorithm>
+#include <set>
 
 namespace semrover {
 
@@ -130,22 +131,42 @@ Result<Rigid> read_mounting(const Json& json, std::string_view where)
     return rigid_from_quaternion({t[0], t[1], t[2]}, {q[0], q[1], q[2], q[3]}, where);
 }
 
-Result<Sensor> read_sensor(const Json& json, std::string_view where)
+Result<std::string> read_name(const Json& json, std::string_view where)
 {
-    if (!json.is_object())
-        return fail(ErrorCode::bad_input, "{}: expected an object, found {}", where, json.type_name());
-    SR_CHECK(check_keys(json,
-                        {"name", "model", "width", "height", "fov", "fx", "fy", "cx", "cy", "distortion",
-                         "sensor_to_vehicle", "comment"},
-                        where));
     if (!json.contains("name") || !json["name"].is_string() ||
         !is_camera_name(json["name"].get_ref<const std::string&>()))
         return fail(ErrorCode::bad_input, "{}: expected a name of letters, digits, '.', '_' and '-'", where);
     if (!json.contains("sensor_to_vehicle"))
         return fail(ErrorCode::bad_input, "{}: sensor_to_vehicle is missing", where);
+    return json["name"].get<std::string>();
+}
+
+Result<Sensor> read_sensor(const Json& json, std::string_view where)
+{
+    SR_CHECK(check_keys(json,
+                        {"name", "model", "width", "height", "fov", "fx", "fy", "cx", "cy", "distortion",
+                         "sensor_to_vehicle", "comment"},
+                        where));
     Sensor sensor;
-    sensor.name = json["name"].get<std::string>();
+    SR_TRY(sensor.name, read_name(json, where));
     SR_TRY(sensor.intrinsics, read_intrinsics(json, where));
+    SR_TRY(sensor.sensor_to_vehicle,
+           read_mounting(json["sensor_to_vehicle"], fmt::format("{}: sensor_to_vehicle", where)));
+    return sensor;
+}
+
+// folder: of the rig's file
+Result<LidarSensor> read_lidar_sensor(const Json& json, const Path& folder, std::string_view where)
+{
+    SR_CHECK(check_keys(json, {"name", "lidar", "sensor_to_vehicle", "comment"}, where));
+    LidarSensor sensor;
+    SR_TRY(sensor.name, read_name(json, where));
+    if (!json["lidar"].is_string())
+        return fail(ErrorCode::bad_input, "{}: lidar: expected the name of a lidar or a file, found {}", where,
+                    json["lidar"].type_name());
+    const std::string& lidar = json["lidar"].get_ref<const std::string&>();
+    SR_TRY(Lidar read, lidar.ends_with(".json") ? read_lidar(folder / lidar) : named_lidar(lidar));
+    sensor.lidar = std::make_shared<const Lidar>(std::move(read));
     SR_TRY(sensor.sensor_to_vehicle,
            read_mounting(json["sensor_to_vehicle"], fmt::format("{}: sensor_to_vehicle", where)));
     return sensor;
@@ -174,12 +195,22 @@ Result<Rig> read_rig(const Path& path)
     if (sensors.empty() || sensors.size() > kMaxSensors)
         return fail(ErrorCode::bad_input, "{}: expected 1 to {} sensors, found {}", name, kMaxSensors, sensors.size());
     Rig rig;
+    std::set<std::string> names;
     SR_TRY(rig.path_axes, read_path_axes(file, name));
     for (size_t i = 0; i < sensors.size(); ++i) {
-        SR_TRY(Sensor sensor, read_sensor(sensors[i], fmt::format("{} sensor {}", name, i)));
-        if (std::ranges::find(rig.sensors, sensor.name, &Sensor::name) != rig.sensors.end())
-            return fail(ErrorCode::bad_input, "{}: two sensors are called {}", name, quote(sensor.name));
-        rig.sensors.push_back(std::move(sensor));
+        const std::string where = fmt::format("{} sensor {}", name, i);
+        if (!sensors[i].is_object())
+            return fail(ErrorCode::bad_input, "{}: expected an object, found {}", where, sensors[i].type_name());
+        if (sensors[i].contains("lidar")) {
+            SR_TRY(LidarSensor sensor, read_lidar_sensor(sensors[i], path.parent_path(), where));
+            rig.lidars.push_back(std::move(sensor));
+        } else {
+            SR_TRY(Sensor sensor, read_sensor(sensors[i], where));
+            rig.sensors.push_back(std::move(sensor));
+        }
+        const std::string called = sensors[i]["name"].get<std::string>();
+        if (!names.insert(called).second)
+            return fail(ErrorCode::bad_input, "{}: two sensors are called {}", name, quote(called));
     }
     return rig;
 }
@@ -204,8 +235,11 @@ Json rig_json(std::span<const Sensor> sensors)
 
 CameraPath expand_rig(const Rig& rig, const CameraPath& vehicle)
 {
-    CameraPath cameras{
-        .frames = {}, .sensors = rig.sensors, .numbered = vehicle.numbered, .warnings = vehicle.warnings};
+    CameraPath cameras{.frames = {},
+                       .sensors = rig.sensors,
+                       .lidars = rig.lidars,
+                       .numbered = vehicle.numbered,
+                       .warnings = vehicle.warnings};
     for (size_t i = 0; i < vehicle.frames.size(); ++i) {
         const CameraFrame& pose = vehicle.frames[i];
         const Rigid world_to_vehicle = rig.path_axes == PathAxes::camera
@@ -216,6 +250,10 @@ CameraPath expand_rig(const Rig& rig, const CameraPath& vehicle)
                                       sensor.name,
                                       {compose(inverse(sensor.sensor_to_vehicle), world_to_vehicle)},
                                       sensor.intrinsics});
+        for (const LidarSensor& sensor : rig.lidars) {
+            const Rigid to_world = compose(inverse(world_to_vehicle), sensor.sensor_to_vehicle);
+            cameras.sweeps.push_back({pose.time, sensor.name, sensor.lidar, to_world, to_world});
+        }
     }
     return cameras;
 }

@@ -18,6 +18,7 @@ enum class PathAxes {
 struct Rig {
     PathAxes path_axes = PathAxes::camera;
     std::vector<Sensor> sensors;
+    std::vector<LidarSensor> lidars;
 };
 
 // rig.json:
@@ -28,7 +29,9 @@ struct Rig {
 //                 "fov": 90 | "fx": .., "fy": .., "cx": .., "cy": ..,    fov: degrees across the width; none of them
 //                                                                        for equirectangular, always the whole sphere
 //                 "distortion": [k1, k2, p1, p2, k3, k4, k5, k6],        opencv, 4, 5 or 8 numbers; fisheye: k1 .. k4
-//                 "sensor_to_vehicle": 4x4 | {"translation": [x, y, z], "rotation": [qx, qy, qz, qw]}}]}
+//                 "sensor_to_vehicle": 4x4 | {"translation": [x, y, z], "rotation": [qx, qy, qz, qw]}},
+//                {"name": "lidar_top", "lidar": "ot128",           of assets/lidar, or a file beside this one (.json)
+//                 "sensor_to_vehicle": as above}]}
 // A key "comment" of text is allowed beside the others. bad_input for anything else, unknown keys included; at most 64
 // sensors, 16 MiB
 Result<Rig> read_rig(const Path& path);
@@ -36,7 +39,8 @@ Result<Rig> read_rig(const Path& path);
 // the sensors as an object that read_rig reads
 Json rig_json(std::span<const Sensor> sensors);
 
-// the frames of all sensors at every pose of the vehicle: pose by pose, sensors in the rig's order
+// the frames of all sensors at every pose of the vehicle: pose by pose, sensors in the rig's order; a sweep of each
+// lidar ends there
 CameraPath expand_rig(const Rig& rig, const CameraPath& vehicle);
 
 } // namespace semrover

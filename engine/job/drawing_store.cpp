@@ -11,6 +11,7 @@
 #include "runtime/base/quote.h"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 namespace semrover {
@@ -21,16 +22,42 @@ namespace fs = std::filesystem;
 
 constexpr const char* kPictures[] = {"color", "depth", "normal", "label", "visible"};
 constexpr const char* kArrays[] = {"depth_expected", "depth_median", "alpha"};
+constexpr const char* kPointsOf = "points"; // of sweeps
+constexpr const char* kSweeps = "sweeps.json";
 constexpr const char* kTop = "top.png";
 constexpr const char* kPoints = "points.ply";
 constexpr const char* kCameras = "transforms.json";
 
+// lidars, too
 std::set<std::string> cameras_of(const CameraPath& path)
 {
     std::set<std::string> cameras;
     for (const CameraFrame& f : path.frames)
         cameras.insert(f.camera);
+    for (const LidarSweep& s : path.sweeps)
+        cameras.insert(s.sensor);
     return cameras;
+}
+
+Json matrix_of(const Rigid& pose)
+{
+    Json rows = Json::array();
+    for (size_t row = 0; row < 4; ++row)
+        rows.push_back(std::span(pose).subspan(4 * row, 4));
+    return rows;
+}
+
+// where a lidar was: {"format", "version", "sweeps": [{"time", "begin", "end"}]}, its poses to the world
+Json sweeps_json(const CameraPath& path, const std::string& lidar)
+{
+    Json sweeps = Json::array();
+    for (const LidarSweep& s : path.sweeps)
+        if (s.sensor == lidar)
+            sweeps.push_back({{"time", std::llround(s.time * 1e6)},
+                              {"duration", std::llround(s.lidar->sweep_seconds() * 1e6)},
+                              {"begin", matrix_of(s.begin)},
+                              {"end", matrix_of(s.end)}});
+    return {{"format", "semrover.sweeps"}, {"version", 1}, {"sweeps", std::move(sweeps)}};
 }
 
 // the folders of these cameras' pictures, from the run's folder on
@@ -42,6 +69,8 @@ std::vector<std::string> picture_folders(const std::set<std::string>& cameras)
             folders.push_back((camera_folder("", camera) / kind).string());
         for (const char* kind : kArrays)
             folders.push_back((camera_folder("", camera) / kind).string());
+        if (!camera.empty())
+            folders.push_back((camera_folder("", camera) / kPointsOf).string());
     }
     return folders;
 }
@@ -63,6 +92,11 @@ std::set<std::string> cameras_before(const Path& folder)
 std::string piece_name(const std::string& camera, uint32_t number)
 {
     return fmt::format("{}{}{:06}", camera, camera.empty() ? "" : "/", number);
+}
+
+std::string sweep_name(const std::string& lidar, uint32_t number)
+{
+    return fmt::format("{}/{}/{:06}", lidar, kPointsOf, number);
 }
 
 Status make_float_images(const Path& folder, uint32_t number, const SplatImage& image, MadeFiles& files)
@@ -98,8 +132,13 @@ Result<std::unique_ptr<DrawingStore>> DrawingStore::open(const Path& folder, con
     Json with_cameras = settings;
     with_cameras["cameras"] = cameras;
     with_cameras["files"] = {{"npy", files.floats}, {"top", files.top}, {"points", files.points}};
+    if (!path.sweeps.empty())
+        with_cameras["files"]["lidar"] = kLidarFormats[size_t(files.lidar)];
     cameras.merge(cameras_before(folder));
-    const RunContents contents{{}, {kTop, kPoints, kCameras}, picture_folders(cameras)};
+    RunContents contents{{}, {kTop, kPoints, kCameras}, picture_folders(cameras)};
+    for (const std::string& camera : cameras)
+        if (!camera.empty())
+            contents.results.push_back((camera_folder("", camera) / kSweeps).string());
     SR_TRY(RunFolder run, open_run(folder, with_cameras, replace, contents, true));
     return std::unique_ptr<DrawingStore>(new DrawingStore(std::move(run), files));
 }
@@ -119,6 +158,8 @@ std::vector<Path> DrawingStore::files_of(const std::string& piece) const
     if (piece == kTop)
         return {run_.path() / kTop};
     const Path name = run_.path() / piece;
+    if (std::ranges::count(piece, '/') == 2) // sweep_name()
+        return {name.string() + fmt::format(".{}", kLidarEndings[size_t(files_.lidar)])};
     std::vector<Path> files;
     for (const std::string kind : kPictures) {
         const std::string_view extension = kind == "color"   ? files_.encoding.color_extension()
@@ -135,6 +176,11 @@ std::vector<Path> DrawingStore::files_of(const std::string& piece) const
 bool DrawingStore::has(const std::string& camera, uint32_t number) const
 {
     return record_.has(piece_name(camera, number));
+}
+
+bool DrawingStore::has_sweep(const std::string& lidar, uint32_t number) const
+{
+    return record_.has(sweep_name(lidar, number));
 }
 
 bool DrawingStore::has_top() const
@@ -161,6 +207,15 @@ Result<FileQueue::Commit> DrawingStore::make(const std::string& camera, uint32_t
     return [this, piece = piece_name(camera, number), files] { return record_.add(piece, *files); };
 }
 
+Result<FileQueue::Commit> DrawingStore::make_sweep(const std::string& lidar, uint32_t number,
+                                                   std::span<const LidarPoint> points)
+{
+    const auto files = std::make_shared<MadeFiles>();
+    const std::string piece = sweep_name(lidar, number);
+    SR_CHECK(files->add(files_of(piece).front(), encode_lidar(points, files_.lidar)));
+    return [this, piece, files] { return record_.add(piece, *files); };
+}
+
 Result<FileQueue::Commit> DrawingStore::make_top(const ImageSize& size, std::span<const uint8_t> color)
 {
     const auto files = std::make_shared<MadeFiles>();
@@ -172,6 +227,14 @@ Result<FileQueue::Commit> DrawingStore::make_top(const ImageSize& size, std::spa
 
 Status DrawingStore::write_cameras(const CameraPath& path) const
 {
+    MadeFiles files;
+    for (const LidarSensor& lidar : path.lidars) {
+        const std::string text = sweeps_json(path, lidar.name).dump() + "\n";
+        SR_CHECK(files.add(run_.path() / lidar.name / kSweeps, std::as_bytes(std::span(text))));
+    }
+    SR_CHECK(files.commit());
+    if (path.frames.empty())
+        return {};
     const auto pictures = [this](const std::string& camera, uint32_t number) {
         return rendered_pictures(camera, number, files_.encoding);
     };

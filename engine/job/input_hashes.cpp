@@ -17,6 +17,17 @@ uint64_t hash_arrays(std::string_view first, const Arrays&... arrays)
     return hash.value();
 }
 
+void add_lidar(Hash& hash, const Lidar& l)
+{
+    const double numbers[] = {double(l.columns), l.rate,     double(l.clockwise), l.start,
+                              l.nearest,         l.farthest, l.farthest_at_tenth, double(l.first_ring_on_top)};
+    hash.add(std::as_bytes(std::span(numbers)));
+    for (const LidarBeam& b : l.beams) {
+        const double beam[] = {b.elevation, b.azimuth, b.delay, double(b.every)};
+        hash.add(std::as_bytes(std::span(beam)));
+    }
+}
+
 } // namespace
 
 uint64_t hash_grid(const VoxelGrid& grid)
@@ -40,6 +51,13 @@ uint64_t hash_cameras(const CameraPath& path)
         hash.add(std::as_bytes(std::span(view)));
         hash.add(std::as_bytes(std::span(k.distortion)));
         hash.add(std::as_bytes(std::span(f.pose.world_to_camera)));
+    }
+    for (const LidarSweep& s : path.sweeps) {
+        hash.add(s.sensor);
+        hash.add(std::as_bytes(std::span(&s.time, 1)));
+        hash.add(std::as_bytes(std::span(s.begin)));
+        hash.add(std::as_bytes(std::span(s.end)));
+        add_lidar(hash, *s.lidar);
     }
     return hash.value();
 }

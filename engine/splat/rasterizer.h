@@ -55,6 +55,8 @@ struct RasterizerOptions {
     uint32_t max_pairs = 0;                   // to begin with; 0: from the number of splats
     std::optional<uint32_t> rows = {};        // the scene's first ones at least; none: all of it
     CameraModel model = CameraModel::pinhole; // of all cameras
+    // of a lidar's sweep, one a row of the images (shaders/splat/splat.h): cameras are parts of sweeps
+    std::vector<std::array<float, 4>> sweep_rows = {};
     // keeps pixels as files have them, over this background, in place of images: draw() and pixels(), not render()
     std::optional<std::array<uint8_t, 3>> pixels_over = {};
     float depth_units = 1000;  // of these, to a metre; 0: fp32 metres
@@ -125,6 +127,7 @@ class Rasterizer {
 
   private:
     Rasterizer(Device& device, const SplatScene& scene) : device_(device), scene_(scene) {}
+    SplatLens lens() const;
     Status build();
     void declare_images(uint32_t pixels);
     void keep_images(Graph& g, const SplatImages& images);
@@ -139,7 +142,7 @@ class Rasterizer {
     uint32_t width_ = 0, height_ = 0, cameras_ = 0, rows_ = 0;
     uint32_t max_visible_ = 0, max_pairs_ = 0, rebuilds_ = 0;
     State state_;
-    Slot camera_table_, visible_, pairs_, z_buffer_, z_scale_, format_scale_;
+    Slot camera_table_, sweep_rows_, visible_, pairs_, z_buffer_, z_scale_, format_scale_;
     std::unique_ptr<Buffer> recorded_; // [kRecordings] u32: pairs of what was recorded, where the host sees them
     uint32_t recording_ = 0;
     SplatSlots images_;      // of all cameras, or

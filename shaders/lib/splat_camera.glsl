@@ -2,7 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // a row of the table of cameras with lenses: fx fy cx cy; world to camera [3, 4]; k1 k2 p1 p2 (fisheye: k1 k2 k3 k4);
-// k3 k4 k5 k6; limit of the lens, 1 where depth is the distance from the camera instead of along z, 0, 0
+// k3 k4 k5 k6; limit of the lens, 1 where depth is the distance from the camera instead of along z, 0, 0. A part of a
+// sweep: fx is pixels a radian of azimuth, below 0 where it runs against the clock, fy 1, cy 0; in place of k1 k2 the column of
+// pixel 0 and the columns of the sweep
 const uint kCameraVectors = 7;
 
 Lens camera_lens(uint camera)

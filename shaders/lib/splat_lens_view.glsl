@@ -11,6 +11,7 @@ layout(binding = 0) readonly buffer Cameras { vec4 cameras[]; };     // [cameras
 layout(binding = 1) readonly buffer Positions { vec4 positions[]; }; // [splats] xyz, opacity
 layout(binding = 2) readonly buffer Normals { vec4 normals[]; };     // [splats] xyz, sigma_u
 layout(binding = 3) readonly buffer Colors { vec4 colors[]; };       // [splats] rgb, sigma_v
+layout(binding = 4) readonly buffer Rows { vec4 rows[]; };           // [height] of a sweep: splat.h; else anything
 
 #include "lib/splat_camera.glsl"
 
@@ -37,6 +38,35 @@ ivec2 wrapped_range(float low, float high)
         return ivec2(0, -1);
     return ivec2(first < 0 ? first + width : first >= width ? first - width : first,
                  last < 0 ? last + width : last >= width ? last - width : last);
+}
+
+// Pixels across a part of a sweep whose rays may lie within [low, high], which may be any number of turns away. A part is
+// less than a turn. A row's rays are up to half a pixel beside the centres of its pixels.
+ivec2 turning_range(Lens l, float low, float high)
+{
+    const float turn = 2.0 * kPi * abs(l.focal.x), margin = 0.55 + 1e-3 * (high - low), across = high - low + 2.0 * margin;
+    const int end = int(p.width) - 1;
+    float from = low - margin - 0.5;
+    from -= turn * floor(from / turn);
+    const float to = from + across;
+    const bool begins = from <= float(end), ends = to >= turn; // within the part; beyond the part's other side
+    if (across >= turn || (begins && ends))
+        return ivec2(0, end);
+    return ends ? ivec2(0, min(int(to - turn), end)) : ivec2(int(ceil(from)), begins ? min(int(to), end) : -1);
+}
+
+// rows of a sweep that look above an angle below the horizon; the angles rise
+int rows_above(float angle)
+{
+    uint first = 0, end = p.height;
+    while (first < end) {
+        const uint middle = (first + end) / 2;
+        if (rows[middle].x < angle)
+            first = middle + 1;
+        else
+            end = middle;
+    }
+    return int(first);
 }
 
 // the largest x of radii [inner, outer] and directions within `spread` of `angle`
@@ -112,7 +142,7 @@ bool find_bounds(inout LensView s, Lens l, float opacity, vec2 sigmas)
     const float c = sqrt(min(p.cutoff2, 2.0 * log(opacity / p.alpha_min)));
     const vec2 reach = 1.0001 * c * sigmas;
     const float sphere = max(reach.x, reach.y) / s.away; // 1 and more: the camera is within
-    const bool panorama = kModel == kEquirectangular;
+    const bool panorama = kModel == kEquirectangular || kModel == kSpinning;
     vec3 axis = vec3(0.0, 0.0, 1.0); // note: Mesa 22 gets a choice of vectors wrong where the condition is a constant
     if (panorama)
         axis = vec3(0.0, 1.0, 0.0);
@@ -129,6 +159,11 @@ bool find_bounds(inout LensView s, Lens l, float opacity, vec2 sigmas)
                    : vec4(s.pixel - dot_radius, s.pixel + dot_radius);
     } else if (!disc) {
         return false;
+    }
+    if (kModel == kSpinning) {
+        const vec2 across = vec2(min(box.x, box.z), max(box.x, box.z)); // columns may run against the azimuth
+        s.bounds = ivec4(turning_range(l, across.x, across.y), rows_above(box.y - 1e-6), rows_above(box.w + 1e-6) - 1);
+        return s.bounds.x <= s.bounds.y && s.bounds.z <= s.bounds.w;
     }
     s.bounds = ivec4(panorama ? wrapped_range(box.x, box.z) : pixel_range(box.x, box.z, p.width), pixel_range(box.y, box.w, p.height));
     return (panorama ? s.bounds.y >= 0 : s.bounds.x <= s.bounds.y) && s.bounds.z <= s.bounds.w;
@@ -154,7 +189,7 @@ bool view_splat(uint splat, uint camera, out LensView s)
     s.normal = mat3(view) * normal.xyz;
     if (dot(s.normal, s.center) > 0.0)
         s.normal = -s.normal;
-    if (!lens_project(kModel, lens, s.center, s.pixel))
+    if (kModel == kSpinning || !lens_project(kModel, lens, s.center, s.pixel)) // no screen filter
         s.pixel = vec2(kNowhere);
     return is_finite(vec4(s.pixel, s.away, 0.0)) && find_bounds(s, lens, position.w, vec2(normal.w, color.w));
 }

@@ -8,7 +8,7 @@
 layout(constant_id = 2) const uint kModel = 1;                 // CameraModel
 layout(binding = 10) readonly buffer Rays { vec4 rays[]; };    // [cameras, height, width] unit ray, depth at 1
 
-const uint kOpencv = 1, kEquirectangular = 3;
+const uint kOpencv = 1, kEquirectangular = 3, kSpinning = 4;
 
 struct RaySplat {
     vec2 center;
@@ -45,7 +45,7 @@ void blend(inout Pixel pixel, RaySplat s, vec4 ray, vec2 at, uint record)
     const float den = dot(s.normal, ray.xyz), scale = 1.0 / (abs(den) < 1e-20 ? 1e-20 : den);
     const vec2 uv = vec2(dot(s.a, ray.xyz), dot(s.b, ray.xyz)) * scale;
     const float r2_surface = s.plane == 0.0 ? 1e30 : dot(uv, uv), r2_screen = dot(d, d) * p.filter_scale;
-    const bool hit = r2_surface <= r2_screen;
+    const bool hit = kModel == kSpinning || r2_surface <= r2_screen; // a sweep has no screen filter
     const float r2 = hit ? r2_surface : r2_screen, distance = s.plane * scale;
     const float z = hit ? distance * ray.w : s.depth;
     const bool in_front = !hit || (kModel == kOpencv ? z : distance) >= p.near;

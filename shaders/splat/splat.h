@@ -22,4 +22,8 @@ struct SplatPush {
     float filter_scale;      // 1 / variance of the screen filter in pixels^2
 };
 
+// The table of a lidar's rows (engine/camera/lidar.h), by rising angle: angle below the horizon; of its rays from their
+// column's, clockwise, both radians; what is added to a pixel's column for the column in which it is fired; it fires in
+// multiples of this
+
 #endif

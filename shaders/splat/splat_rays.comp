@@ -12,8 +12,20 @@ layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint kModel = 1;
 layout(push_constant) uniform Push { SplatPush p; };
 layout(binding = 0) readonly buffer Cameras { vec4 cameras[]; }; // [cameras, kCameraVectors]
-layout(binding = 1) writeonly buffer Rays { vec4 rays[]; };      // [cameras, height, width]
+layout(binding = 1) readonly buffer Rows { vec4 rows[]; };       // [height] of a sweep: splat.h; else anything
+layout(binding = 2) writeonly buffer Rays { vec4 rays[]; };      // [cameras, height, width]
 #include "lib/splat_camera.glsl"
+
+// of a sweep; false where nothing is fired
+bool firing(Lens l, uvec2 at, out vec3 ray)
+{
+    const vec4 row = rows[at.y];
+    const float azimuth = (float(at.x) + 0.5 - l.focal.z) / l.focal.x + row.y;
+    const float ring = accurate_cos(row.x);
+    const int column = int(at.x) + int(l.first.x + row.z);
+    ray = vec3(accurate_sin(azimuth) * ring, accurate_sin(row.x), accurate_cos(azimuth) * ring);
+    return column >= 0 && column < int(l.first.y) && uint(column) % uint(row.w) == 0;
+}
 
 void main()
 {
@@ -23,6 +35,11 @@ void main()
     const uint camera = i / image, at = i % image;
     const Lens lens = camera_lens(camera);
     vec3 ray = vec3(0.0);
-    const bool seen = lens.focal.x != 0.0 && lens_unproject(kModel, lens, vec2(at % p.width, at / p.width) + 0.5, ray);
+    const uvec2 pixel = uvec2(at % p.width, at / p.width);
+    bool seen = lens.focal.x != 0.0;
+    if (kModel == kSpinning)
+        seen = seen && firing(lens, pixel, ray);
+    else
+        seen = seen && lens_unproject(kModel, lens, vec2(pixel) + 0.5, ray);
     rays[i] = seen ? vec4(ray, camera_depth_is_radial(camera) ? 1.0 : ray.z) : vec4(0.0);
 }
