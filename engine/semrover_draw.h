@@ -55,6 +55,8 @@ typedef struct sr_depth_image {
  * - label: of the splat with most weight, SR_NO_CELL for none; low bits of its voxel: 12 of i, 12 of j above them, then
  *   8 of k. The voxel is the nearest with these to where the depth says. R32G32_UINT; the label alone: R32_UINT, or
  *   R8_UINT with 255 for none.
+ * - instance: number of the thing that the splat with most weight is of: the id + 1 of one of the world's objects or
+ *   actors; 0 for none. R32_UINT.
  * Numbers of SFLOAT are rounded to the nearest, ties to even. UNORM has 255 v and SNORM 127 v of numbers that are cut
  * to 0..1 and -1..1, rounded to the nearest, halves away from 0. */
 typedef struct sr_draw_desc {
@@ -68,6 +70,7 @@ typedef struct sr_draw_desc {
     sr_target color, normal, depth, label;
     sr_depth_image depth_test;
     double depth_scale, depth_offset; /* 0, 0: metres. D32_SFLOAT needs a scale, R32G32_SFLOAT has none */
+    sr_target instance;
 } sr_draw_desc;
 
 /* The render thread. Shows what is new, and draws what targets ask for. Waits for the device; for the compiler, the
@@ -83,7 +86,7 @@ SR_API sr_status sr_world_draws(sr_world* world, const sr_draw_desc* draws, uint
 
 typedef struct sr_pick {
     uint32_t struct_size;
-    uint32_t reserved;
+    uint32_t instance; /* number of the thing, as a picture of instances has it */
     sr_cell cell; /* voxel and class of the splat with most weight. Label SR_NO_CELL: there is none, all else is 0. A
                      splat that stands for several voxels (sr_world_desc.detail_distance) names one of them.
                      Where splats of several surfaces meet, it need not lie at `position` */

@@ -112,6 +112,38 @@ struct AccumulateOptions {
                                 const FrameAndDepth& now, const FrameAndDepth& past,
                                 const AccumulateOptions& options); // -> [picture_words()] u32 array
 
+// Optical flow from one picture of splats to the next (docs/method.md §5.5): where the surface that a pixel shows at
+// its median depth is then. What moves is moved.
+enum class FlowState : uint32_t {
+    nothing, // the pixel shows nothing
+    seen,
+    hidden, // something else is nearer then, or it is not there any more
+    outside // it leaves the picture
+};
+constexpr float kUnknownFlow = 1e10f; // of both numbers: the next lens cannot see it, or there is nothing
+struct FlowSource {
+    Tensor depth;  // [height * width, 2] fp32, of SplatImages
+    Tensor owners; // [height * width] u32, likewise
+};
+// from this camera's frame to the next's
+struct FlowMoves {
+    Tensor moves;     // [1 + movers, 12] fp32: of what stands, then of each mover; zeros: it is not there then
+    Tensor rows = {}; // [numbers] u32, or none: SplatOptions::mover_rows
+};
+struct FlowOptions {
+    uint32_t width = 0, height = 0;
+    SplatLens lens = SplatLens::pinhole; // of both cameras
+    float tolerance = 0.02f;             // relative, by which a hidden surface is farther than what is seen there
+};
+struct FlowTensors {
+    Tensor flow;   // [height * width, 2] fp32: pixels to the right and down
+    Tensor states; // [height * width] u32: FlowState
+};
+[[nodiscard]] FlowTensors splat_flow(Graph& g,
+                                     Tensor cameras, // [2, kLensCameraFloats] fp32: lenses of this picture and the next
+                                     const FlowMoves& moves, const FlowSource& now, Tensor next_depth,
+                                     const FlowOptions& options);
+
 // index of the first number that is NaN or infinite, 2^32 - 1 for none: counted over the picture's own pixels
 [[nodiscard]] Tensor first_non_finite(Graph& g,
                                       Tensor x,                   // [padded pixels, N] fp32

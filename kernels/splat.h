@@ -59,6 +59,7 @@ struct SplatTensors {
     Tensor colors;      // [N, 4] fp32: rgb, sigma_v in metres
     Tensor labels;      // [N] u32
     Tensor cells;       // [N] u32
+    Tensor owners;      // [N] u32: number of the thing that a splat is of, 0 of none
     Tensor blocks = {}; // [N / 64, rounded up] u32, or none: splats of a block that has 0 are skipped
 };
 // how rays become pixels, of all cameras of one call: engine/camera/lens.h; spinning: a part of a lidar's sweep, of
@@ -89,14 +90,21 @@ struct SplatOptions {
     // [cameras * height * width] fp32 array, or none, of pinholes: metres along z, what lies farther is not seen
     Tensor limits = {};
     Tensor rows = {}; // [height, 4] fp32 array of a sweep: shaders/splat/splat.h
-    // which of color, surface, depth and ids are made; the others are [1] and nothing is written to them
-    std::array<bool, 4> made = {true, true, true, true};
+    // [cameras * movers, 12] fp32 array, or none: things that move, as each camera sees them. A row takes what a
+    // mover's splats are given in to the camera's frame, [3, 4] row-major; zeros hide it. Without them nothing has
+    // moved
+    Tensor movers = {};
+    // [numbers] u32, beside movers: by the number of a thing its mover + 1; 0, and beyond the end: it stands
+    Tensor mover_rows = {};
+    // which of color, surface, depth, ids and owners are made; the others are [1] and nothing is written to them
+    std::array<bool, 5> made = {true, true, true, true, true};
 };
 struct SplatImages { // [cameras * height * width] rows; w = weight of a splat in a pixel
     Tensor color;    // [.., 4] fp32: sum of w rgb; alpha = sum of w
     Tensor surface;  // [.., 4] fp32: sum of w normal, camera frame, towards the camera; sum of w depth
     Tensor depth;    // [.., 2] fp32: expected (sum of w depth / alpha), median (of the splat that passes one half)
     Tensor ids;      // [.., 2] u32: label and voxel of the splat with the largest w, 2^32 - 1 for none
+    Tensor owners;   // [..] u32: what that splat is of, as SplatTensors has it; 0 for none
     Tensor visible, pairs; // [1] u32: the numbers that had to fit the two maxima
 };
 // such limits of z-buffers: scale / (z - offset); infinite where that is not above 0

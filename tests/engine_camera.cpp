@@ -9,6 +9,7 @@
 
 #include <cmath>
 #include <gtest/gtest.h>
+#include <numbers>
 #include <random>
 
 namespace semrover {
@@ -247,7 +248,8 @@ TEST(Camera, sky_is_where_a_ray_goes_up_and_meets_nothing)
     for (const Intrinsics& k : lenses)
         for (const Quaternion& q : turns) {
             const CameraFrame frame{0, "", {inverse(*rigid_from_quaternion({1, 2, 3}, q, "turn"))}, k};
-            FramePixels pixels{k.width, k.height, {}, {}, std::vector<uint32_t>(k.width * k.height, 255u << 24 | 7)};
+            FramePixels pixels{.width = k.width, .height = k.height};
+            pixels.normals.assign(k.width * k.height, 255u << 24 | 7);
             for (size_t i = 0; i < pixels.normals.size(); i += 3)
                 pixels.normals[i] = 2u << 24; // a building
             mark_sky(pixels, frame);
@@ -273,6 +275,29 @@ TEST(Rigid, an_inverse_undoes_and_a_quaternion_returns)
     for (const Quaternion& q : {Quaternion{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}) // half turns
         expect_near(rigid_from_quaternion({}, quaternion_of(rigid_from_quaternion({}, q, "t").value()), "t").value(),
                     rigid_from_quaternion({}, q, "t").value(), 1e-15);
+}
+
+TEST(Rigid, between_two_poses_the_turn_is_even_and_the_shorter_way)
+{
+    const auto turned = [](double x, double radians) { // about an axis that leans
+        const double s = std::sin(radians / 2) / 3;
+        return rigid_from_quaternion({x, 2 * x, -x}, {s, 2 * s, 2 * s, std::cos(radians / 2)}, "t").value();
+    };
+    for (const double from : {-2.0, 0.0, 0.3, 3.0})
+        for (const double by : {-3.1, -1.0, -1e-7, 0.0, 1e-12, 0.5, 3.1})
+            for (const double share : {-0.5, 0.0, 0.25, 1 / 3.0, 0.5, 0.999, 1.0, 1.5})
+                expect_near(interpolate(turned(1, from), turned(5, from + by), share),
+                            turned(1 + 4 * share, from + by * share), 1e-14);
+    // more than half a turn is less than half of one the other way
+    expect_near(interpolate(turned(0, 0), turned(0, 4), 0.5), turned(0, (4 - 2 * std::numbers::pi) / 2), 1e-14);
+    for (const CameraFrame& frame : random_path(100).frames) {
+        const Rigid& a = frame.pose.world_to_camera;
+        const Rigid b = compose(a, turned(3, 1.5));
+        EXPECT_EQ(interpolate(a, b, 0), a);
+        EXPECT_EQ(interpolate(a, b, 1), b);
+        EXPECT_EQ(interpolate(a, a, 0.37), a);
+        expect_near(interpolate(a, b, 0.3), interpolate(b, a, 0.7), 1e-11);
+    }
 }
 
 constexpr const char* kRig = R"({"sensors":[

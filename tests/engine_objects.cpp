@@ -54,6 +54,21 @@ TEST(engine_objects, what_is_written_is_read_and_written_again_with_the_same_byt
     EXPECT_TRUE(read_objects(folder / "none.json")->empty());
 }
 
+TEST(engine_objects, a_box_has_its_front_along_the_heading)
+{
+    for (const double heading : {-3.0, -0.5, 0.0, 1.0, 4.0}) {
+        const SceneObject o = car(1, 20, -7, heading);
+        const Rigid to_world = box_to_world(o);
+        const Point3 front = transform(to_world, {2, 0, 0.5});
+        EXPECT_NEAR(front[0], 20 + 2 * std::cos(heading), 1e-14);
+        EXPECT_NEAR(front[1], -7 + 2 * std::sin(heading), 1e-14);
+        EXPECT_EQ(front[2], 1.25);
+        const Point3 there = place_in(o, transform(to_world, {1, 2, 3}));
+        for (size_t a = 0; a < 3; ++a)
+            EXPECT_NEAR(there[a], 1 + double(a), 1e-13);
+    }
+}
+
 TEST(engine_objects, a_tint_may_be_a_hexadecimal_colour_and_may_be_missing)
 {
     const auto read = parse(kOne + R"(, "tint": "#ff8000"}, {"id": 4, "class": "traffic light", "center": [0, 0, 0],

@@ -215,5 +215,81 @@ TEST(kernel_splat, what_did_not_fit_is_counted)
     EXPECT_EQ(few_splats.visible, whole.visible);
 }
 
+// a turn about an axis of the scene and a shift, [3, 4] row-major
+using Motion = std::array<double, 12>;
+
+Vector turned(const Motion& m, const Vector& v)
+{
+    return {m[0] * v[0] + m[1] * v[1] + m[2] * v[2], m[4] * v[0] + m[5] * v[1] + m[6] * v[2],
+            m[8] * v[0] + m[9] * v[1] + m[10] * v[2]};
+}
+
+HostSplat moved(HostSplat s, const Motion& m)
+{
+    const Vector p = turned(m, s.position);
+    s.position = {p[0] + m[3], p[1] + m[7], p[2] + m[11]};
+    s.normal = turned(m, s.normal);
+    return s;
+}
+
+// camera after motion, as the table has it
+void append_view(std::vector<float>& views, const std::array<double, 12>& camera, const Motion& m)
+{
+    for (size_t row = 0; row < 3; ++row)
+        for (size_t column = 0; column < 4; ++column) {
+            double sum = column == 3 ? camera[row * 4 + 3] : 0;
+            for (size_t i = 0; i < 3; ++i)
+                sum += camera[row * 4 + i] * m[i * 4 + column];
+            views.push_back(float(sum));
+        }
+}
+
+// two movers among splats that stand, for two cameras; the second one is not there for the second camera
+TEST(kernel_splat, things_that_move_are_drawn_where_they_are_and_others_stay)
+{
+    const uint32_t width = 96, height = 64;
+    std::vector<HostSplat> splats = random_splats(400, 19, 0.05, 0.3);
+    const std::vector<HostCamera> cameras = {camera_for(width, height), camera_for(width, height, 0.2, -0.3)};
+    const double c = std::cos(0.4), s = std::sin(0.4);
+    const Motion motions[2] = {{c, 0, s, -0.8, 0, 1, 0, 0.3, -s, 0, c, 0.9},
+                               {c, -s, 0, 0.2, s, c, 0, -0.4, 0, 0, 1, 0.5}};
+    HostMovers movers;
+    for (uint32_t i = 0; i < splats.size(); ++i) {
+        splats[i].sigma_v = splats[i].sigma_u; // round: axes follow from the normal, which turns
+        movers.owners.push_back(i % 4 == 3 ? 5 + (i % 8 == 7) : 7 * i);
+    }
+    movers.rows = {0, 0, 0, 0, 0, 1, 2};
+    for (size_t camera = 0; camera < 2; ++camera) {
+        append_view(movers.views, cameras[camera].view, motions[0]);
+        if (camera == 0)
+            append_view(movers.views, cameras[camera].view, motions[1]);
+        else
+            movers.views.insert(movers.views.end(), 12, 0.f);
+    }
+    const SplatPixels got = run_splats(splats, cameras, {.width = width, .height = height}, {}, movers);
+    for (size_t camera = 0; camera < 2; ++camera) {
+        std::vector<HostSplat> there;
+        for (uint32_t i = 0; i < splats.size(); ++i) {
+            there.push_back(i % 4 == 3 ? moved(splats[i], motions[i % 8 == 7]) : splats[i]);
+            if (camera == 1 && i % 8 == 7)
+                there.back().opacity = 0;
+        }
+        const std::vector<ReferencePixel> expect = render_reference(there, cameras[camera], width, height);
+        Misses misses;
+        size_t owners_differ = 0, of_movers = 0;
+        for (size_t i = 0; i < expect.size(); ++i) {
+            const size_t at = camera * expect.size() + i;
+            for (size_t a = 0; a < 3; ++a)
+                misses.add(got.color[at * 4 + a], expect[i].color[a], 2e-3);
+            const uint32_t owner = expect[i].splat < 0 ? 0 : movers.owners[size_t(expect[i].splat)];
+            owners_differ += got.owners[at] != owner;
+            of_movers += owner == 5 || owner == 6;
+        }
+        EXPECT_LE(misses.some, expect.size() * 3 / 1000) << camera;
+        EXPECT_LE(owners_differ, expect.size() / 200 + 1) << camera;
+        EXPECT_GT(of_movers, expect.size() / 20) << camera;
+    }
+}
+
 } // namespace kernel_splat_test
 } // namespace semrover

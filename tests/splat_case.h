@@ -10,15 +10,17 @@ namespace semrover {
 
 struct SplatPixels {
     std::vector<float> color, surface, depth;
-    std::vector<uint32_t> ids;
+    std::vector<uint32_t> ids, owners;
     uint32_t visible = 0, pairs = 0;
 };
 
-// label of splat i is i % 20, its voxel 1000 + i
-inline SplatTensors scene_of(KernelCase& k, const std::vector<HostSplat>& splats)
+// label of splat i is i % 20, its voxel 1000 + i; what it is of, as `owners` says, else 7 i
+inline SplatTensors scene_of(KernelCase& k, const std::vector<HostSplat>& splats, std::vector<uint32_t> owners = {})
 {
     std::vector<float> positions, normals, colors;
     std::vector<uint32_t> labels, cells;
+    for (uint32_t i = uint32_t(owners.size()); i < splats.size(); ++i)
+        owners.push_back(7 * i);
     for (const HostSplat& s : splats) {
         for (size_t a = 0; a < 3; ++a) {
             positions.push_back(float(s.position[a]));
@@ -31,7 +33,8 @@ inline SplatTensors scene_of(KernelCase& k, const std::vector<HostSplat>& splats
         cells.push_back(1000 + uint32_t(labels.size()));
         labels.push_back(uint32_t(labels.size() % 20));
     }
-    return {k.input(positions, 4), k.input(normals, 4), k.input(colors, 4), k.input(labels), k.input(cells)};
+    return {k.input(positions, 4), k.input(normals, 4), k.input(colors, 4),
+            k.input(labels),       k.input(cells),      k.input(owners)};
 }
 
 // runs the op on splats of the host and a table of cameras; room for all unless the options say otherwise. z: what
@@ -39,12 +42,21 @@ inline SplatTensors scene_of(KernelCase& k, const std::vector<HostSplat>& splats
 struct HostDepth {
     std::vector<float> z, scale;
 };
+// what each splat is of, which of that moves, and how each camera sees each mover
+struct HostMovers {
+    std::vector<uint32_t> owners, rows;
+    std::vector<float> views; // [cameras, movers, 12]
+};
 inline SplatPixels run_splats(const std::vector<HostSplat>& splats, const std::vector<float>& table,
-                              SplatOptions options, const HostDepth& depth_test = {})
+                              SplatOptions options, const HostDepth& depth_test = {}, const HostMovers& movers = {})
 {
     KernelCase k(test_device());
     const uint32_t floats = splat_camera_floats(options.lens);
-    const SplatTensors scene = scene_of(k, splats);
+    const SplatTensors scene = scene_of(k, splats, movers.owners);
+    if (!movers.views.empty()) {
+        options.movers = k.input(movers.views, 12);
+        options.mover_rows = k.input(movers.rows);
+    }
     if (!options.max_visible)
         options.max_visible = uint32_t(splats.size() * table.size() / floats);
     if (!options.max_pairs)
@@ -58,15 +70,17 @@ inline SplatPixels run_splats(const std::vector<HostSplat>& splats, const std::v
         return out;
     };
     const Tensor color = keep(y.color), surface = keep(y.surface), depth = keep(y.depth), ids = keep(y.ids),
-                 visible = keep(y.visible), pairs = keep(y.pairs);
+                 owners = keep(y.owners), visible = keep(y.visible), pairs = keep(y.pairs);
     const Status status = k.compile_and_run();
     EXPECT_TRUE(status) << status.error().message;
-    return {k.read_array<float>(color),  k.read_array<float>(surface),       k.read_array<float>(depth),
-            k.read_array<uint32_t>(ids), k.read_array<uint32_t>(visible)[0], k.read_array<uint32_t>(pairs)[0]};
+    return {k.read_array<float>(color),      k.read_array<float>(surface),   k.read_array<float>(depth),
+            k.read_array<uint32_t>(ids),     k.read_array<uint32_t>(owners), k.read_array<uint32_t>(visible)[0],
+            k.read_array<uint32_t>(pairs)[0]};
 }
 
 inline SplatPixels run_splats(const std::vector<HostSplat>& splats, const std::vector<HostCamera>& cameras,
-                              const SplatOptions& options, const HostDepth& depth_test = {})
+                              const SplatOptions& options, const HostDepth& depth_test = {},
+                              const HostMovers& movers = {})
 {
     std::vector<float> table;
     for (const HostCamera& c : cameras) {
@@ -75,12 +89,12 @@ inline SplatPixels run_splats(const std::vector<HostSplat>& splats, const std::v
         for (double v : c.view)
             table.push_back(float(v));
     }
-    return run_splats(splats, table, options, depth_test);
+    return run_splats(splats, table, options, depth_test, movers);
 }
 
 // cameras with lenses, all of one model and size
 inline SplatPixels run_splats(const std::vector<HostSplat>& splats, const std::vector<LensCamera>& cameras,
-                              SplatOptions options = {})
+                              SplatOptions options = {}, const HostMovers& movers = {})
 {
     std::vector<float> table;
     for (const LensCamera& c : cameras) {
@@ -98,7 +112,7 @@ inline SplatPixels run_splats(const std::vector<HostSplat>& splats, const std::v
     options.width = k.width;
     options.height = k.height;
     options.lens = SplatLens(uint32_t(k.model));
-    return run_splats(splats, table, options);
+    return run_splats(splats, table, options, {}, movers);
 }
 
 // splats of all sizes in front of a camera that looks along +z, values as fp32 has them
@@ -166,7 +180,8 @@ inline void compare(const SplatPixels& got, const std::vector<ReferencePixel>& e
         misses.add(got.depth[at * 2 + 1], e.median, 2e-3 * deepest);
         const uint32_t cell = e.splat < 0 ? ~0u : 1000 + uint32_t(e.splat),
                        label = e.splat < 0 ? ~0u : uint32_t(e.splat % 20);
-        ids_differ += got.ids[at * 2] != label || got.ids[at * 2 + 1] != cell;
+        const uint32_t owner = e.splat < 0 ? 0 : 7 * uint32_t(e.splat);
+        ids_differ += got.ids[at * 2] != label || got.ids[at * 2 + 1] != cell || got.owners[at] != owner;
     }
     EXPECT_LE(misses.some, expect.size() * 10 / 1000);
     EXPECT_LE(misses.gross, expect.size() * 10 / 10000);
@@ -175,7 +190,7 @@ inline void compare(const SplatPixels& got, const std::vector<ReferencePixel>& e
 
 inline bool same(const SplatPixels& a, const SplatPixels& b)
 {
-    return a.color == b.color && a.surface == b.surface && a.depth == b.depth && a.ids == b.ids;
+    return a.color == b.color && a.surface == b.surface && a.depth == b.depth && a.ids == b.ids && a.owners == b.owners;
 }
 
 } // namespace semrover

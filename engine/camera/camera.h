@@ -70,6 +70,8 @@ struct LidarSweep {
     std::string sensor;
     std::shared_ptr<const Lidar> lidar;
     Rigid begin = kIdentity, end = kIdentity; // sensor to world
+
+    Rigid at(uint32_t) const { return begin; } // of a column
 };
 
 // The frames that a run renders, in order. Readers return at least one. A file of a body's poses has frames of a camera

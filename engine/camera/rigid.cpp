@@ -42,6 +42,21 @@ Rigid from_columns(const Point3& x, const Point3& y, const Point3& z, const Poin
     return {x[0], y[0], z[0], t[0], x[1], y[1], z[1], t[1], x[2], y[2], z[2], t[2], 0, 0, 0, 1};
 }
 
+Rigid from_quaternion(const Quaternion& unit, const Point3& translation)
+{
+    const auto [x, y, z, w] = unit;
+    return from_columns({1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)},
+                        {2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)},
+                        {2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)}, translation);
+}
+
+bool same_rotation(const Rigid& a, const Rigid& b)
+{
+    return std::ranges::equal(std::span(a).first(3), std::span(b).first(3)) &&
+           std::ranges::equal(std::span(a).subspan(4, 3), std::span(b).subspan(4, 3)) &&
+           std::ranges::equal(std::span(a).subspan(8, 3), std::span(b).subspan(8, 3));
+}
+
 // beyond it nothing is drawn with any precision; earth-centred and map coordinates are within
 constexpr double kMostMetres = 1e8;
 
@@ -107,6 +122,23 @@ Quaternion quaternion_of(const Rigid& a)
     return q;
 }
 
+Rigid interpolate(const Rigid& a, const Rigid& b, double share)
+{
+    if (share == 0 || share == 1)
+        return share == 0 ? a : b;
+    Rigid c = a;
+    // a turned by a share of the turn from a to b
+    const Quaternion q = quaternion_of(compose(inverse(a), b));
+    const double sine = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]), half = share * std::atan2(sine, q[3]);
+    if (sine > 0 && !same_rotation(a, b)) {
+        const double part = std::sin(half) / sine;
+        c = compose(a, from_quaternion({q[0] * part, q[1] * part, q[2] * part, std::cos(half)}, {}));
+    }
+    for (const size_t i : {3, 7, 11})
+        c[i] = a[i] + share * (b[i] - a[i]);
+    return c;
+}
+
 Result<Rigid> rigid_from_quaternion(const Point3& translation, const Quaternion& rotation, std::string_view where)
 {
     if (!all_finite(translation) || !all_finite(rotation))
@@ -121,9 +153,7 @@ Result<Rigid> rigid_from_quaternion(const Point3& translation, const Quaternion&
     y /= norm;
     z /= norm;
     w /= norm;
-    return from_columns({1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)},
-                        {2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)},
-                        {2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)}, translation);
+    return from_quaternion({x, y, z, w}, translation);
 }
 
 Result<Rigid> rigid_from_matrix(std::span<const double> values, std::string_view where)

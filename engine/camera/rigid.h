@@ -28,6 +28,11 @@ inline Point3 translation_of(const Rigid& a)
 }
 Quaternion quaternion_of(const Rigid& a); // unit, w >= 0
 
+// Between two poses: the position linear, the rotation at even speed about one axis, the shorter way (slerp). `share` 0
+// gives a, 1 gives b, to the bit; between equal poses all are equal. Beyond 0..1 the motion goes on. Of two rotations
+// half a turn apart either way may be taken.
+Rigid interpolate(const Rigid& a, const Rigid& b, double share);
+
 // bad_input, with `where` in front, unless all numbers are finite and the quaternion's norm is in [0.9, 1.1] (it is
 // then normalised)
 Result<Rigid> rigid_from_quaternion(const Point3& translation, const Quaternion& rotation, std::string_view where);

@@ -89,7 +89,7 @@ sr_draw_desc camera_of(const sr_gl_draw_desc& d)
 PictureFormats formats_of(const sr_gl_draw_desc& d)
 {
     const auto format = [](GlName texture) { return PictureFormat{texture ? Texels::whole : Texels::none}; };
-    return {format(d.color), format(d.normal), format(d.depth), format(d.label)};
+    return {format(d.color), format(d.normal), format(d.depth), format(d.label), {Texels::none}};
 }
 
 // a picture, the room that it goes through, and the texture that wants it
@@ -197,7 +197,7 @@ Status send_splats(sr_gl& gl, const SplatPool& pool)
 {
     GlLink& link = *gl.link;
     const uint64_t rows = pool.end(), room = pool.scene().size();
-    const auto [positions, normals, colors, labels, cells] = pool.scene().arrays();
+    const auto [positions, normals, colors, labels, cells, owners] = pool.scene().arrays();
     const Slot arrays[] = {positions, normals, colors, labels, pool.scene().blocks()};
     std::vector<GlLink::Piece> pieces;
     for (size_t i = 0; i < std::size(gl.splats); ++i) {

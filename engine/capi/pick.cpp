@@ -32,6 +32,7 @@ Result<sr_pick> pick(sr_world& world, sr_draw_desc d, uint32_t x, uint32_t y)
     d.depth_test.image = nullptr;
     PictureFormats formats;
     formats[1].texels = Texels::none;
+    formats[4].texels = Texels::word;
     SR_CHECK(splats_of(world, "sr_world_pick").map([](SplatPool*) {}));
     SR_CHECK(show_updates(world, true));
     SR_TRY(const std::vector<SplatSlots> images, draw_splats(world, {&d, 1}, formats, "sr_world_pick"));
@@ -39,6 +40,7 @@ Result<sr_pick> pick(sr_world& world, sr_draw_desc d, uint32_t x, uint32_t y)
     SR_TRY(const std::vector<float> color, images[0].color.read<float>(device));
     SR_TRY(const std::vector<float> depth, images[0].depth.read<float>(device));
     SR_TRY(const std::vector<uint32_t> ids, images[0].ids.read<uint32_t>(device));
+    SR_TRY(const std::vector<uint32_t> instances, images[0].owners.read<uint32_t>(device));
     sr_pick found{};
     found.cell.label = ids[0];
     if (ids[0] == SR_NO_CELL)
@@ -48,6 +50,7 @@ Result<sr_pick> pick(sr_world& world, sr_draw_desc d, uint32_t x, uint32_t y)
     const auto [i, j, k] = cell_of_number(ids[1], cell_at(position, world.world->voxel_size()));
     found.cell = {i, j, k, ids[0]};
     found.alpha = color[3];
+    found.instance = instances[0];
     return found;
 }
 

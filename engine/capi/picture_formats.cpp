@@ -13,9 +13,9 @@ struct KnownFormat {
     uint32_t format; // VkFormat
     Texels texels;
 };
-constexpr const char* kNames[] = {"color", "normal", "depth", "label"};
+constexpr const char* kNames[] = {"color", "normal", "depth", "label", "instance"};
 // what each picture can have, the first of them for 0
-const std::array<std::vector<KnownFormat>, 4> kFormats = {{
+const std::array<std::vector<KnownFormat>, 5> kFormats = {{
     {{VK_FORMAT_R32G32B32A32_SFLOAT, Texels::whole},
      {VK_FORMAT_R16G16B16A16_SFLOAT, Texels::half4},
      {VK_FORMAT_R8G8B8A8_UNORM, Texels::unorm8},
@@ -28,6 +28,7 @@ const std::array<std::vector<KnownFormat>, 4> kFormats = {{
      {VK_FORMAT_R16_SFLOAT, Texels::half1},
      {VK_FORMAT_D32_SFLOAT, Texels::float1}},
     {{VK_FORMAT_R32G32_UINT, Texels::whole}, {VK_FORMAT_R32_UINT, Texels::word}, {VK_FORMAT_R8_UINT, Texels::byte}},
+    {{VK_FORMAT_R32_UINT, Texels::word}},
 }};
 
 Result<Texels> texels_of(const sr_target& target, size_t picture)
@@ -37,7 +38,7 @@ Result<Texels> texels_of(const sr_target& target, size_t picture)
     if (!target.memory && !target.buffer && !target.image)
         return Texels::none;
     if (!target.format)
-        return Texels::whole;
+        return kFormats[picture].front().texels;
     for (const KnownFormat& known : kFormats[picture])
         if (known.format == target.format)
             return known.texels;

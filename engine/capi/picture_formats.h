@@ -8,11 +8,11 @@
 // what targets of a draw ask for
 namespace semrover::capi {
 
-using PictureFormats = std::array<PictureFormat, 4>; // of color, normal, depth and label
+using PictureFormats = std::array<PictureFormat, 5>; // of color, normal, depth, label and instance
 
-inline std::array<const sr_target*, 4> targets_of(const sr_draw_desc& draw)
+inline std::array<const sr_target*, 5> targets_of(const sr_draw_desc& draw)
 {
-    return {&draw.color, &draw.normal, &draw.depth, &draw.label};
+    return {&draw.color, &draw.normal, &draw.depth, &draw.label, &draw.instance};
 }
 
 // none where nobody wants a picture. Errors: usage for formats that the picture cannot have, and what does not go with

@@ -157,4 +157,4 @@ sr_status sr_world_draws(sr_world* world, const sr_draw_desc* draws, uint32_t co
 } // extern "C"
 
 static_assert(sizeof(sr_array) == 24 && sizeof(sr_splats) == 136 && sizeof(sr_target) == 48);
-static_assert(sizeof(sr_depth_image) == 40 && sizeof(sr_draw_desc) == 400);
+static_assert(sizeof(sr_depth_image) == 40 && sizeof(sr_draw_desc) == 448);

@@ -71,9 +71,10 @@ auto between(const Items& items, std::pair<double, double> extent, double size, 
 
 class OwnerSearch {
   public:
-    OwnerSearch(const VoxelGrid& grid, double reach, uint64_t most)
-        : grid_(grid), owners_(grid.cells.size(), kNoObject), depths_(grid.cells.size(), -reach), reach_(reach),
-          most_(most)
+    // by_points: of each point of a voxel, else of its centre
+    OwnerSearch(const VoxelGrid& grid, bool by_points, double reach, uint64_t most)
+        : grid_(grid), places_(by_points ? size_t(grid.points_per_voxel) : 1), by_points_(by_points),
+          owners_(grid.cells.size() * places_, kNoObject), depths_(owners_.size(), -reach), reach_(reach), most_(most)
     {
         for (uint32_t v = 0; v < grid.cells.size(); ++v)
             classes_[grid.labels[v]].add(v, grid.cells[v][0]);
@@ -106,15 +107,23 @@ class OwnerSearch {
     {
         const double size = double(grid_.voxel_size);
         const Cell& c = grid_.cells[v];
-        const double depth = turned.depth({(c[0] + 0.5) * size, (c[1] + 0.5) * size, (c[2] + 0.5) * size});
-        if (depth > depths_[v]) {
-            depths_[v] = depth;
-            owners_[v] = index;
+        const std::array<double, 3> center = {(c[0] + 0.5) * size, (c[1] + 0.5) * size, (c[2] + 0.5) * size};
+        for (size_t i = v * places_; i < (v + 1) * places_; ++i) {
+            std::array<double, 3> place = center;
+            for (size_t a = 0; by_points_ && a < 3; ++a)
+                place[a] += double(half_to_float(grid_.points[3 * i + a]));
+            const double depth = turned.depth(place);
+            if (depth > depths_[i]) {
+                depths_[i] = depth;
+                owners_[i] = index;
+            }
         }
     }
 
     const VoxelGrid& grid_;
     std::array<ClassCells, 256> classes_;
+    size_t places_; // of a voxel
+    bool by_points_;
     std::vector<int32_t> owners_;
     std::vector<double> depths_;
     double reach_;
@@ -122,9 +131,9 @@ class OwnerSearch {
 };
 
 Result<std::vector<int32_t>> owners_among(const VoxelGrid& grid, std::span<const SceneObject> objects, bool parts,
-                                          uint64_t most)
+                                          uint64_t most, bool by_points = false)
 {
-    OwnerSearch search(grid, parts ? kPartReach : kObjectReach, most);
+    OwnerSearch search(grid, by_points, parts ? kPartReach : kObjectReach, most);
     for (size_t o = 0; o < objects.size(); ++o)
         if (objects[o].part == parts && !search.add(objects[o], int32_t(o)))
             return fail(ErrorCode::bad_input,
@@ -225,6 +234,18 @@ void each_owner(const VoxelGrid& grid, std::span<const int32_t> owners, const Of
 std::array<double, 3> place_in(const SceneObject& object, const std::array<double, 3>& point)
 {
     return Turned{object}.place(point);
+}
+
+Result<std::vector<uint32_t>> instances_of_points(const VoxelGrid& grid, std::span<const SceneObject> objects,
+                                                  uint64_t most)
+{
+    SR_TRY(const std::vector<int32_t> owners, owners_among(grid, objects, false, most, grid.has_points()));
+    const size_t places = grid.has_points() ? size_t(grid.points_per_voxel) : 1;
+    std::vector<uint32_t> numbers;
+    for (size_t i = 0; i < owners.size(); ++i)
+        if (!grid.has_points() || grid.generated[i / places])
+            numbers.push_back(owners[i] == kNoObject ? 0 : instance_number(objects[size_t(owners[i])]));
+    return numbers;
 }
 
 Result<std::vector<int32_t>> objects_of_cells(const VoxelGrid& grid, std::span<const SceneObject> objects,

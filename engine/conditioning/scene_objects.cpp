@@ -3,6 +3,7 @@
 #include "engine/conditioning/scene_objects.h"
 
 #include "engine/scene/palette.h"
+#include "engine/scene/scene_fields.h"
 #include "runtime/base/json_fields.h"
 #include "runtime/base/json_numbers.h"
 #include "runtime/base/quote.h"
@@ -21,21 +22,14 @@ constexpr const char* kFormat = "semrover.objects";
 constexpr std::array<std::string_view, 4> kFileKeys = {"format", "version", "objects", "comment"};
 constexpr std::array<std::string_view, 8> kObjectKeys = {"id",      "class", "center", "size",
                                                          "heading", "tint",  "part",   "comment"};
-constexpr double kFarthest = 1e6, kShortest = 1e-3, kLongest = 1e4, kLargestAngle = 1e3;
+constexpr double kLargestAngle = 1e3;
 
-Status check_within(double value, double low, double high, std::string_view where)
+Status check_heading(double heading, std::string_view where)
 {
-    if (value < low || value > high)
-        return fail(ErrorCode::bad_input, "{}: expected a number from {} to {}, found {}", where, low, high, value);
+    if (!(std::abs(heading) <= kLargestAngle))
+        return fail(ErrorCode::bad_input, "{}: heading: expected a number from {} to {}, found {}", where,
+                    -kLargestAngle, kLargestAngle, heading);
     return {};
-}
-
-Result<Triple> triple_of(const Json& object, const char* key, double low, double high, std::string_view where)
-{
-    SR_TRY(const Triple values, numbers_at<3>(object, key, where));
-    for (double value : values)
-        SR_CHECK(check_within(value, low, high, fmt::format("{}: {}", where, key)));
-    return values;
 }
 
 Result<std::optional<Triple>> tint_of(const Json& object, std::string_view where)
@@ -47,20 +41,8 @@ Result<std::optional<Triple>> tint_of(const Json& object, std::string_view where
         SR_TRY(const Triple color, parse_tint(entry->get_ref<const std::string&>(), where));
         return std::optional(color);
     }
-    SR_TRY(const Triple color, triple_of(object, "tint", 0, 1, where));
+    SR_TRY(const Triple color, triple_at(object, "tint", 0, 1, where));
     return std::optional(color);
-}
-
-Result<uint8_t> class_of(const Json& object, std::string_view where)
-{
-    const auto entry = object.find("class");
-    if (entry == object.end() || !entry->is_string())
-        return fail(ErrorCode::bad_input, "{}: class: expected the name of a class", where);
-    const std::string& name = entry->get_ref<const std::string&>();
-    const auto label = class_of_name(name);
-    if (!label)
-        return fail(ErrorCode::bad_input, "{}: class: there is no class {}", where, quote(name));
-    return *label;
 }
 
 Result<SceneObject> parse_object(const Json& json, std::string_view where)
@@ -69,18 +51,15 @@ Result<SceneObject> parse_object(const Json& json, std::string_view where)
         return fail(ErrorCode::bad_input, "{}: expected an object, found {}", where, json.type_name());
     SR_CHECK(check_keys(json, kObjectKeys, where));
     SceneObject o;
-    const auto id = json.find("id");
-    if (id == json.end() || !id->is_number_unsigned() || id->get<uint64_t>() > UINT32_MAX)
-        return fail(ErrorCode::bad_input, "{}: id: expected a whole number from 0 to {}", where, UINT32_MAX);
-    o.id = id->get<uint32_t>();
-    SR_TRY(o.label, class_of(json, where));
-    SR_TRY(o.center, triple_of(json, "center", -kFarthest, kFarthest, where));
-    SR_TRY(o.size, triple_of(json, "size", kShortest, kLongest, where));
+    SR_TRY(o.id, id_at(json, where));
+    SR_TRY(o.label, class_at(json, where));
+    SR_TRY(o.center, triple_at(json, "center", -kFarthestThing, kFarthestThing, where));
+    SR_TRY(o.size, triple_at(json, "size", kShortestSide, kLongestSide, where));
     const auto heading = json.find("heading");
     if (heading == json.end())
         return fail(ErrorCode::bad_input, "{}: heading is missing", where);
     SR_TRY(o.heading, finite_number(*heading, fmt::format("{}: heading", where)));
-    SR_CHECK(check_within(o.heading, -kLargestAngle, kLargestAngle, fmt::format("{}: heading", where)));
+    SR_CHECK(check_heading(o.heading, where));
     SR_TRY(o.tint, tint_of(json, where));
     if (const auto part = json.find("part"); part != json.end()) {
         if (!part->is_boolean())
@@ -90,12 +69,7 @@ Result<SceneObject> parse_object(const Json& json, std::string_view where)
     return o;
 }
 
-double rounded(double value, double per_unit)
-{
-    return std::round(value * per_unit) / per_unit + 0.0; // no -0
-}
-
-constexpr double kPerMetre = 1e4, kPerRadian = 1e5, kPerTint = 1e3;
+constexpr double kPerRadian = 1e5, kPerTint = 1e3;
 
 Json object_json(const SceneObject& object)
 {
@@ -113,6 +87,12 @@ Json object_json(const SceneObject& object)
 }
 
 } // namespace
+
+Rigid box_to_world(const SceneObject& o)
+{
+    const double c = std::cos(o.heading), s = std::sin(o.heading);
+    return {c, -s, 0, o.center[0], s, c, 0, o.center[1], 0, 0, 1, o.center[2], 0, 0, 0, 1};
+}
 
 Result<Triple> parse_tint(std::string_view text, std::string_view where)
 {
@@ -162,12 +142,12 @@ Result<std::vector<SceneObject>> read_objects(const Path& path)
 SceneObject as_written(SceneObject o)
 {
     for (size_t a = 0; a < 3; ++a) {
-        o.center[a] = rounded(o.center[a], kPerMetre);
-        o.size[a] = rounded(o.size[a], kPerMetre);
+        o.center[a] = rounded_to(o.center[a], kPerMetre);
+        o.size[a] = rounded_to(o.size[a], kPerMetre);
         if (o.tint)
-            (*o.tint)[a] = rounded((*o.tint)[a], kPerTint);
+            (*o.tint)[a] = rounded_to((*o.tint)[a], kPerTint);
     }
-    o.heading = rounded(o.heading, kPerRadian);
+    o.heading = rounded_to(o.heading, kPerRadian);
     return o;
 }
 
@@ -179,17 +159,14 @@ Path objects_beside(const Path& grid)
 Status check_object(const SceneObject& object, std::string_view where)
 {
     for (double v : object.center)
-        if (!(std::abs(v) <= kFarthest))
-            return fail(ErrorCode::bad_input, "{}: center: expected numbers from {} to {}, found {}", where, -kFarthest,
-                        kFarthest, v);
+        if (!(std::abs(v) <= kFarthestThing))
+            return fail(ErrorCode::bad_input, "{}: center: expected numbers from {} to {}, found {}", where,
+                        -kFarthestThing, kFarthestThing, v);
     for (double v : object.size)
-        if (!(v >= kShortest && v <= kLongest))
-            return fail(ErrorCode::bad_input, "{}: size: expected numbers from {} to {}, found {}", where, kShortest,
-                        kLongest, v);
-    if (!(std::abs(object.heading) <= kLargestAngle))
-        return fail(ErrorCode::bad_input, "{}: heading: expected a number from {} to {}, found {}", where,
-                    -kLargestAngle, kLargestAngle, object.heading);
-    return {};
+        if (!(v >= kShortestSide && v <= kLongestSide))
+            return fail(ErrorCode::bad_input, "{}: size: expected numbers from {} to {}, found {}", where,
+                        kShortestSide, kLongestSide, v);
+    return check_heading(object.heading, where);
 }
 
 Status write_objects(const Path& path, std::span<const SceneObject> objects)

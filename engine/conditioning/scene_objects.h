@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/camera/rigid.h"
 #include "runtime/base/json.h"
 
 #include <array>
@@ -22,6 +23,9 @@ struct SceneObject {
     std::optional<std::array<double, 3>> tint = {}; // its colour, sRGB 0..1
     bool part = false;                              // of an object of its class: a window of a house. Owns no voxels
 };
+
+// from the axes of its box (along the heading, to the left, up, from its middle) to the world
+Rigid box_to_world(const SceneObject& object);
 
 constexpr size_t kMaxObjects = 1 << 20;
 

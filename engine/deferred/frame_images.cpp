@@ -136,7 +136,15 @@ Status make_frame_images(const Path& folder, uint32_t number, const FramePixels&
     SR_CHECK(add("depth", encoding.depth_extension(), encode_depth(pixels, encoding)));
     SR_CHECK(add("normal", "png", encode_png_rgb8(w, h, normal_pixels(pixels), level)));
     SR_CHECK(add("label", "png", encode_png_gray8(w, h, label_pixels(pixels), level)));
-    return add("visible", "png", encode_png_gray8(w, h, visible_pixels(pixels), level));
+    SR_CHECK(add("visible", "png", encode_png_gray8(w, h, visible_pixels(pixels), level)));
+    if (!pixels.instances.empty())
+        SR_CHECK(add("instance", "png", encode_png_gray16(w, h, shifted<uint16_t>(pixels.instances, 0), level)));
+    if (!encoding.flow || pixels.flow.empty())
+        return {};
+    std::vector<float> flow(pixels.flow.size());
+    std::memcpy(flow.data(), pixels.flow.data(), flow.size() * sizeof(float));
+    SR_CHECK(add("flow", kFlowFormats[size_t(*encoding.flow)], encode_flow(*encoding.flow, w, h, flow, level)));
+    return add("flow_state", "png", encode_png_gray8(w, h, shifted<uint8_t>(pixels.flow_states, 0), level));
 }
 
 } // namespace semrover

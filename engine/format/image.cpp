@@ -32,6 +32,7 @@ constexpr Format kRgb8{PNG_COLOR_TYPE_RGB, 8, 3};
 constexpr Format kRgba8{PNG_COLOR_TYPE_RGBA, 8, 4};
 constexpr Format kGray8{PNG_COLOR_TYPE_GRAY, 8, 1};
 constexpr Format kGray16{PNG_COLOR_TYPE_GRAY, 16, 1};
+constexpr Format kRgb16{PNG_COLOR_TYPE_RGB, 16, 3};
 
 // libpng reports errors by a callback that must not return: it keeps the message and jumps back into `run`. No object
 // with a destructor lives in a frame that is jumped over.
@@ -343,6 +344,12 @@ Result<std::vector<std::byte>> encode_png_gray16(uint32_t width, uint32_t height
                                                  int level)
 {
     return encode_png("a PNG", kGray16, width, height, std::as_bytes(pixels), level);
+}
+
+Result<std::vector<std::byte>> encode_png_rgb16(uint32_t width, uint32_t height, std::span<const uint16_t> pixels,
+                                                int level)
+{
+    return encode_png("a PNG", kRgb16, width, height, std::as_bytes(pixels), level);
 }
 
 Status check_pixels(ImageSize size, uint64_t max_pixels, std::string_view where)

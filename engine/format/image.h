@@ -33,6 +33,8 @@ Result<std::vector<std::byte>> encode_png_gray8(uint32_t width, uint32_t height,
                                                 int level = kPngLevel);
 Result<std::vector<std::byte>> encode_png_gray16(uint32_t width, uint32_t height, std::span<const uint16_t> pixels,
                                                  int level = kPngLevel);
+Result<std::vector<std::byte>> encode_png_rgb16(uint32_t width, uint32_t height, std::span<const uint16_t> pixels,
+                                                int level = kPngLevel);
 
 // any PNG as 8-bit RGB: palettes and gray are expanded, 16 bits cut to 8, alpha dropped. Untrusted input: the size is
 // limited, and nothing is allocated that the file is too short to fill.

@@ -2,7 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/format/flow_picture.h"
 #include "engine/format/image.h"
+
+#include <optional>
 
 namespace semrover {
 
@@ -21,6 +24,7 @@ struct PictureEncoding {
     int quality = 92;          // of JPEG, 1 to 100
     int png_level = kPngLevel; // 0 to 9
     DepthFormat depth = DepthFormat::mm;
+    std::optional<FlowFormat> flow = {}; // none: no flow
 
     std::string_view color_extension() const { return jpeg ? "jpg" : "png"; }
     std::string_view depth_extension() const { return depth == DepthFormat::npy ? "npy" : "png"; }

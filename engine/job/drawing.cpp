@@ -42,24 +42,20 @@ RasterizerOptions float_options(const DrawOptions& o)
     return options;
 }
 
-// splats are drawn as they are
-Result<SplatScene> load_scene(Device& device, DrawingOptions& o)
+Result<DrawnScene> load_scene(Device& device, const DrawingOptions& o)
 {
     if (const auto* grid = std::get_if<VoxelGrid>(&o.scene))
         return splats_of(device, *grid, o.scene_name, o.draw);
-    Splats& splats = std::get<Splats>(o.scene);
-    for (size_t i = 0; o.draw.semantic && i < splats.label.size(); ++i)
-        splats.color[i] = label_color(splats.label[i]);
-    return SplatScene::create(device, splats);
+    return splats_of(device, std::get<Splats>(o.scene), o.draw);
 }
 
 class DrawingJob : public Job {
   public:
-    DrawingJob(Device& device, DrawingOptions options, SplatScene scene, std::unique_ptr<DrawingStore> store,
+    DrawingJob(Device& device, DrawingOptions options, DrawnScene scene, std::unique_ptr<DrawingStore> store,
                std::unique_ptr<Outgoing> out, const JobCallbacks& callbacks)
         : device_(device), o_(std::move(options)), scene_(std::move(scene)), callbacks_(callbacks),
-          drawing_(device, scene_, o_.path, o_.draw.rasterizer(o_.encoding)),
-          floats_(device, scene_, {}, float_options(o_.draw)), store_(std::move(store)), out_(std::move(out))
+          drawing_(device, scene_, o_.path, o_.draw.rasterizer(o_.encoding), o_.encoding.flow.has_value()),
+          floats_(device, scene_, {}, float_options(o_.draw), false), store_(std::move(store)), out_(std::move(out))
     {
         if (drawing_.total()) {
             empty_.emplace(o_.path, o_.scene_name, o_.allow_empty);
@@ -86,8 +82,8 @@ class DrawingJob : public Job {
         const Json results{{"output", o_.folder.string()},
                            {"frames", drawing_.total()},
                            {"sweeps", o_.path.sweeps.size()},
-                           {"splats", scene_.size()},
-                           {"skipped", scene_.skipped()},
+                           {"splats", scene_.splats.size()},
+                           {"skipped", scene_.splats.skipped()},
                            {"empty_frames", empty_ ? empty_->count() : 0},
                            {"seconds", seconds_since(start_)},
                            {"file_wait_seconds", out_->file_wait_seconds()},
@@ -144,8 +140,7 @@ class DrawingJob : public Job {
             return {};
         }
         drew_ = true;
-        return drawing_
-            .step([this](const CameraFrame& frame, const SplatPixelSlots& pixels) { return take(frame, pixels); })
+        return drawing_.step([this](const CameraFrame& frame, const FrameSlots& pixels) { return take(frame, pixels); })
             .map([](bool) {});
     }
     Status draw_sweep(const LidarSweep& sweep)
@@ -155,9 +150,9 @@ class DrawingJob : public Job {
         if (store_->has_sweep(sweep.sensor, number))
             return {};
         drew_ = true;
-        std::unique_ptr<SweepRasterizer>& sweeps = lidars_[sweep.lidar.get()];
+        std::unique_ptr<SweepDrawing>& sweeps = lidars_[sweep.lidar.get()];
         if (!sweeps) {
-            SR_TRY(sweeps, SweepRasterizer::create(device_, scene_, sweep.lidar));
+            SR_TRY(sweeps, SweepDrawing::create(device_, scene_, sweep.lidar, o_.draw.rasterizer()));
         }
         const auto image = std::make_shared<SweepImage>(sweeps->image());
         const auto write = [this, sweep, number, image] {
@@ -205,7 +200,7 @@ class DrawingJob : public Job {
         }
         return {};
     }
-    Status take(const CameraFrame& frame, const SplatPixelSlots& slots)
+    Status take(const CameraFrame& frame, const FrameSlots& slots)
     {
         const ImageSize size{frame.intrinsics.width, frame.intrinsics.height};
         const uint32_t number = counts_[frame.camera]++;
@@ -235,7 +230,7 @@ class DrawingJob : public Job {
     {
         drew_ = true;
         const CameraFrame camera = overview_camera(bounds(), o_.top);
-        return drawing_.draw({&camera, 1}, [this](const CameraFrame&, const SplatPixelSlots& slots) {
+        return drawing_.draw({&camera, 1}, [this](const CameraFrame&, const FrameSlots& slots) {
             return out_->read(slots, o_.top, [this](const FramePixels& pixels) {
                 return out_->write(pixels.bytes(),
                                    [this, color = color_pixels(pixels)] { return store_->make_top(o_.top, color); });
@@ -245,7 +240,7 @@ class DrawingJob : public Job {
 
     Device& device_;
     DrawingOptions o_;
-    SplatScene scene_;
+    DrawnScene scene_;
     JobCallbacks callbacks_;
     PathDrawing drawing_;
     PathDrawing floats_; // what files of 8 and 16 bits round away
@@ -253,7 +248,7 @@ class DrawingJob : public Job {
     std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
     std::optional<EmptyFrames> empty_;       // of a path
     std::map<std::string, uint32_t> counts_; // frames so far, per camera; sweeps, per lidar
-    std::map<const Lidar*, std::unique_ptr<SweepRasterizer>> lidars_;
+    std::map<const Lidar*, std::unique_ptr<SweepDrawing>> lidars_;
     size_t sweep_ = 0;        // the next of the path
     std::vector<bool> whole_; // of each frame of the path
     size_t before_ = 0;       // how many of them
@@ -293,9 +288,9 @@ uint64_t largest_read(const DrawingOptions& o)
     uint64_t pixels = uint64_t(o.top.width) * o.top.height;
     for (const CameraFrame& f : o.path.frames)
         pixels = std::max(pixels, uint64_t(f.intrinsics.width) * f.intrinsics.height);
-    uint64_t bytes = pixels * 4;
+    uint64_t bytes = pixels * (o.encoding.flow ? 8 : 4);
     for (const LidarSensor& lidar : o.path.lidars)
-        bytes = std::max(bytes, SweepRasterizer::largest_read(*lidar.lidar));
+        bytes = std::max(bytes, SweepDrawing::largest_read(*lidar.lidar));
     return bytes;
 }
 
@@ -311,12 +306,16 @@ Result<std::unique_ptr<Job>> begin_drawing(Device& device, DrawingOptions option
     DrawingOptions& o = options;
     SR_CHECK(check_drawing_outputs(o));
     const Json settings = drawing_settings(o, device);
-    SR_TRY(SplatScene scene, load_scene(device, o));
-    if (scene.skipped() && callbacks.warning)
-        callbacks.warning(fmt::format("{} of {} splats are degenerate and not drawn", scene.skipped(), scene.size()));
+    SR_TRY(DrawnScene scene, load_scene(device, o));
+    if (const SplatScene& splats = scene.splats; splats.skipped() && callbacks.warning)
+        callbacks.warning(fmt::format("{} of {} splats are degenerate and not drawn", splats.skipped(), splats.size()));
     SR_TRY(auto out, Outgoing::create(device, largest_read(o), o.threads));
-    const DrawnFiles files{
-        .floats = o.floats, .top = o.top.width > 0, .points = o.points, .encoding = o.encoding, .lidar = o.lidar};
+    const DrawnFiles files{.floats = o.floats,
+                           .top = o.top.width > 0,
+                           .points = o.points,
+                           .instances = o.draw.instances,
+                           .encoding = o.encoding,
+                           .lidar = o.lidar};
     SR_TRY(auto store, DrawingStore::open(o.folder, settings, o.path, files, o.replace));
     if (!store->run().results()) {
         SR_CHECK(store->write_cameras(o.path));

@@ -21,6 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kPictures[] = {"color", "depth", "normal", "label", "visible"};
+constexpr const char *kInstances = "instance", *kFlow = "flow", *kFlowStates = "flow_state";
 constexpr const char* kArrays[] = {"depth_expected", "depth_median", "alpha"};
 constexpr const char* kPointsOf = "points"; // of sweeps
 constexpr const char* kSweeps = "sweeps.json";
@@ -71,6 +72,8 @@ std::vector<std::string> picture_folders(const std::set<std::string>& cameras)
             folders.push_back((camera_folder("", camera) / kind).string());
         if (!camera.empty())
             folders.push_back((camera_folder("", camera) / kPointsOf).string());
+        for (const char* kind : {kInstances, kFlow, kFlowStates})
+            folders.push_back((camera_folder("", camera) / kind).string());
     }
     return folders;
 }
@@ -97,6 +100,20 @@ std::string piece_name(const std::string& camera, uint32_t number)
 std::string sweep_name(const std::string& lidar, uint32_t number)
 {
     return fmt::format("{}/{}/{:06}", lidar, kPointsOf, number);
+}
+
+std::set<std::string> pieces_with_flow(const CameraPath& path)
+{
+    std::set<std::string> pieces;
+    std::map<std::string, uint32_t> counts;
+    const std::vector<size_t> following = following_frames(path);
+    for (size_t i = 0; i < path.frames.size(); ++i) {
+        const std::string& camera = path.frames[i].camera;
+        const uint32_t number = counts[camera]++;
+        if (following[i] < path.frames.size())
+            pieces.insert(piece_name(camera, number));
+    }
+    return pieces;
 }
 
 Status make_float_images(const Path& folder, uint32_t number, const SplatImage& image, MadeFiles& files)
@@ -140,11 +157,13 @@ Result<std::unique_ptr<DrawingStore>> DrawingStore::open(const Path& folder, con
         if (!camera.empty())
             contents.results.push_back((camera_folder("", camera) / kSweeps).string());
     SR_TRY(RunFolder run, open_run(folder, with_cameras, replace, contents, true));
-    return std::unique_ptr<DrawingStore>(new DrawingStore(std::move(run), files));
+    return std::unique_ptr<DrawingStore>(new DrawingStore(std::move(run), path, files));
 }
 
-DrawingStore::DrawingStore(RunFolder run, const DrawnFiles& files)
-    : run_(std::move(run)), files_(files), record_(run_, [this](const std::string& piece) { return files_of(piece); })
+DrawingStore::DrawingStore(RunFolder run, const CameraPath& path, const DrawnFiles& files)
+    : run_(std::move(run)), files_(files),
+      with_flow_(files.encoding.flow ? pieces_with_flow(path) : std::set<std::string>()),
+      record_(run_, [this](const std::string& piece) { return files_of(piece); })
 {
 }
 
@@ -170,6 +189,13 @@ std::vector<Path> DrawingStore::files_of(const std::string& piece) const
     for (const char* kind : kArrays)
         if (files_.floats)
             files.push_back(name.parent_path() / kind / (name.filename().string() + ".npy"));
+    if (files_.instances)
+        files.push_back(name.parent_path() / kInstances / (name.filename().string() + ".png"));
+    if (with_flow_.contains(piece)) {
+        const std::string_view extension = kFlowFormats[size_t(*files_.encoding.flow)];
+        files.push_back(name.parent_path() / kFlow / fmt::format("{}.{}", name.filename().string(), extension));
+        files.push_back(name.parent_path() / kFlowStates / (name.filename().string() + ".png"));
+    }
     return files;
 }
 

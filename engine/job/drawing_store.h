@@ -9,6 +9,8 @@
 #include "engine/job/file_queue.h"
 #include "engine/job/piece_record.h"
 
+#include <set>
+
 namespace semrover {
 
 // what a drawing writes, beside the path's pictures
@@ -16,8 +18,9 @@ struct DrawnFiles {
     // {depth_expected,depth_median,alpha}/000000.npy of float32, [height, width]: depths are metres, measured as
     // SplatCamera::radial_depth says, 0 where nothing is drawn (docs/formats.md §6)
     bool floats = false;
-    bool top = false;    // top.png
-    bool points = false; // points.ply
+    bool top = false;       // top.png
+    bool points = false;    // points.ply
+    bool instances = false; // instance/000000.png
     PictureEncoding encoding = {};
     LidarFormat lidar = LidarFormat::npy; // of LIDAR/points/000000.npy, .. of sweeps
 };
@@ -51,11 +54,12 @@ class DrawingStore {
     void drop_if_empty() { run_.drop_if_empty(); }
 
   private:
-    DrawingStore(RunFolder run, const DrawnFiles& files);
+    DrawingStore(RunFolder run, const CameraPath& path, const DrawnFiles& files);
     std::vector<Path> files_of(const std::string& piece) const;
 
     RunFolder run_;
     DrawnFiles files_;
+    std::set<std::string> with_flow_; // pieces
     PieceRecord record_;
 };
 

@@ -28,6 +28,36 @@ void add_lidar(Hash& hash, const Lidar& l)
     }
 }
 
+// of what pictures of instances show, and actors are made of
+uint64_t hash_objects(std::span<const SceneObject> objects)
+{
+    Hash hash;
+    for (const SceneObject& o : objects) {
+        const std::array<double, 10> values = {double(o.id), double(o.label), o.center[0], o.center[1], o.center[2],
+                                               o.size[0],    o.size[1],       o.size[2],   o.heading,   double(o.part)};
+        hash.add(std::as_bytes(std::span(values)));
+    }
+    return hash.value();
+}
+
+// note: of an actor's file its name; what is in it counts where it is drawn
+uint64_t hash_actors(std::span<const Actor> actors)
+{
+    Hash hash;
+    for (const Actor& a : actors) {
+        hash.add(fmt::format("{} {} {} {}", a.id, a.label, a.from.index(), a.poses.size()));
+        if (const auto* grid = std::get_if<GridOfActor>(&a.from))
+            hash.add(grid->path.string());
+        if (const auto* splats = std::get_if<SplatsOfActor>(&a.from))
+            hash.add(splats->path.string());
+        for (const ActorPose& p : a.poses) {
+            hash.add(std::as_bytes(std::span(&p.time, 1)));
+            hash.add(std::as_bytes(std::span(p.to_world)));
+        }
+    }
+    return hash.value();
+}
+
 } // namespace
 
 uint64_t hash_grid(const VoxelGrid& grid)
@@ -65,10 +95,17 @@ uint64_t hash_cameras(const CameraPath& path)
 Json drawing_json(const DrawOptions& o)
 {
     const PointSplatOptions& s = o.splats;
-    return {{"splat_radius", s.auto_sigma ? "auto" : fmt::format("{}", s.sigma)},
-            {"opacity", s.opacity},
-            {"visible_alpha", o.rasterizer().visible_alpha},
-            {"background", fmt::format("{}", fmt::join(o.background, ","))}};
+    Json drive{{"splat_radius", s.auto_sigma ? "auto" : fmt::format("{}", s.sigma)},
+               {"opacity", s.opacity},
+               {"visible_alpha", o.rasterizer().visible_alpha},
+               {"background", fmt::format("{}", fmt::join(o.background, ","))}};
+    if (o.instances || !o.actors.empty())
+        drive["objects"] = hash_text(hash_objects(o.objects));
+    if (o.instances)
+        drive["instances"] = true;
+    if (!o.actors.empty())
+        drive["actors"] = hash_text(hash_actors(o.actors));
+    return drive;
 }
 
 Json encoding_json(const PictureEncoding& e)
@@ -80,6 +117,8 @@ Json encoding_json(const PictureEncoding& e)
         settings["png_level"] = e.png_level;
     if (e.depth != DepthFormat::mm)
         settings["depth"] = kDepthFormats[size_t(e.depth)];
+    if (e.flow)
+        settings["flow"] = kFlowFormats[size_t(*e.flow)];
     return settings;
 }
 

@@ -68,7 +68,7 @@ std::vector<LidarPoint> lidar_returns(const LidarSweep& sweep, const SweepImage&
                 continue;
             points.push_back({float(range * ray[0]), float(range * ray[1]), float(range * ray[2]), float(intensity),
                               uint16_t(lidar.ring(beam)), uint16_t(image.label[at]),
-                              uint32_t(std::llround(lidar.firing_microseconds(beam, column))), 0});
+                              uint32_t(std::llround(lidar.firing_microseconds(beam, column))), image.instance[at]});
         }
     return points;
 }

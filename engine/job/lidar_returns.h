@@ -3,7 +3,7 @@
 #pragma once
 
 #include "engine/format/lidar_points.h"
-#include "engine/splat/sweep_rasterizer.h"
+#include "engine/job/sweep_drawing.h"
 
 namespace semrover {
 

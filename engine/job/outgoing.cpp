@@ -32,9 +32,9 @@ uint64_t Outgoing::planned_bytes(const DeviceLimits& limits, uint64_t bytes)
     return ReadbackRing::planned_bytes(limits, bytes, kReads);
 }
 
-Status Outgoing::read(const SplatPixelSlots& slots, const ImageSize& size, std::function<Status(FramePixels)> sink)
+Status Outgoing::read(const FrameSlots& slots, const ImageSize& size, std::function<Status(FramePixels)> sink)
 {
-    const auto pixels = std::make_shared<FramePixels>(FramePixels{size.width, size.height, {}, {}, {}});
+    const auto pixels = std::make_shared<FramePixels>(FramePixels{.width = size.width, .height = size.height});
     const auto into = [&](std::vector<uint32_t> FramePixels::*part) {
         return [pixels, part](std::span<const std::byte> bytes) -> Status {
             (*pixels).*part = words_of(bytes);
@@ -43,6 +43,12 @@ Status Outgoing::read(const SplatPixelSlots& slots, const ImageSize& size, std::
     };
     SR_CHECK(ring_->read(slots.seen, into(&FramePixels::seen)));
     SR_CHECK(ring_->read(slots.depths, into(&FramePixels::depths)));
+    if (slots.instances.valid())
+        SR_CHECK(ring_->read(slots.instances, into(&FramePixels::instances)));
+    if (slots.flow.flow.valid()) {
+        SR_CHECK(ring_->read(slots.flow.flow, into(&FramePixels::flow)));
+        SR_CHECK(ring_->read(slots.flow.states, into(&FramePixels::flow_states)));
+    }
     return ring_->read(slots.normals, [pixels, sink = std::move(sink)](std::span<const std::byte> bytes) {
         pixels->normals = words_of(bytes);
         return sink(std::move(*pixels));

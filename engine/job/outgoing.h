@@ -5,6 +5,7 @@
 #include "engine/camera/image_size.h"
 #include "engine/deferred/frame_images.h"
 #include "engine/job/file_queue.h"
+#include "engine/job/path_drawing.h"
 #include "runtime/device/readback_ring.h"
 
 namespace semrover {
@@ -19,7 +20,7 @@ class Outgoing {
 
     // `sink` is called on the thread of a later call here
     Status read(const Slot& slot, ReadbackRing::Sink sink) { return ring_->read(slot, std::move(sink)); }
-    Status read(const SplatPixelSlots& slots, const ImageSize& size, std::function<Status(FramePixels)> sink);
+    Status read(const FrameSlots& slots, const ImageSize& size, std::function<Status(FramePixels)> sink);
     // bytes: of host memory that `file` holds
     Status write(uint64_t bytes, FileQueue::Make file) { return files_.push(bytes, std::move(file)); }
 

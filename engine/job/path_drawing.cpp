@@ -2,9 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/path_drawing.h"
 
-#include "engine/splat/blocks.h"
-#include "runtime/base/quote.h"
-
 namespace semrover {
 
 namespace {
@@ -25,26 +22,14 @@ size_t end_of_moment(const CameraPath& path, size_t first)
 
 } // namespace
 
-RasterizerOptions DrawOptions::rasterizer(const PictureEncoding& files) const
+PathDrawing::PathDrawing(Device& device, const DrawnScene& scene, CameraPath path, const RasterizerOptions& options,
+                         bool flow)
+    : device_(device), scene_(scene), path_(std::move(path)), options_(options)
 {
-    RasterizerOptions options;
-    options.visible_alpha = visible_alpha.value_or(options.visible_alpha);
-    options.pixels_over = background;
-    options.depth_units = float(units_per_metre(files.depth));
-    return options;
-}
-
-Result<SplatScene> splats_of(Device& device, const VoxelGrid& grid, const Path& name, const DrawOptions& o)
-{
-    ScenePoints points = points_of(grid);
-    if (points.size() == 0 && !o.semantic)
-        return fail(ErrorCode::bad_input, "{} has no points yet: generate them, or draw its labels with `semantic`",
-                    quote_path(name));
-    if (points.size() == 0)
-        return SplatScene::create(device, block_splats(grid));
-    if (o.semantic)
-        color_by_label(points);
-    return SplatScene::create(device, points, o.splats);
+    if (!flow)
+        return;
+    flow_.emplace(device, scene.splats, scene.actors, options);
+    following_ = following_frames(path_);
 }
 
 Result<Rasterizer*> PathDrawing::rasterizer_of(const Intrinsics& size, uint32_t frames)
@@ -53,7 +38,7 @@ Result<Rasterizer*> PathDrawing::rasterizer_of(const Intrinsics& size, uint32_t 
     if (!rasterizer) {
         RasterizerOptions options = options_;
         options.model = size.model;
-        SR_TRY(rasterizer, Rasterizer::create(device_, scene_, size.width, size.height, frames, options));
+        SR_TRY(rasterizer, Rasterizer::create(device_, scene_.splats, size.width, size.height, frames, options));
     }
     return rasterizer.get();
 }
@@ -62,7 +47,7 @@ Result<SplatImage> PathDrawing::image(const CameraFrame& frame)
 {
     SR_TRY(Rasterizer * rasterizer, rasterizer_of(frame.intrinsics, 1));
     const SplatCamera camera = splat_camera(frame.intrinsics, frame.pose);
-    SR_TRY(std::vector<SplatImage> images, rasterizer->render({&camera, 1}));
+    SR_TRY(std::vector<SplatImage> images, rasterizer->render({&camera, 1}, scene_.actors.seen_by({&frame, 1})));
     return std::move(images.front());
 }
 
@@ -73,11 +58,20 @@ Status PathDrawing::draw(std::span<const CameraFrame> frames, const Drawn& drawn
     for (const CameraFrame& frame : frames)
         cameras.push_back(splat_camera(frame.intrinsics, frame.pose));
     for (size_t at = 0; at < cameras.size();) {
-        SR_TRY(const uint32_t together, rasterizer->draw(std::span(cameras).subspan(at)));
+        const SplatMovers movers = scene_.actors.seen_by(frames.subspan(at));
+        SR_TRY(const uint32_t together, rasterizer->draw(std::span(cameras).subspan(at), movers));
         for (uint32_t i = 0; i < together; ++i, ++at)
-            SR_CHECK(drawn(frames[at], rasterizer->pixels(i)));
+            SR_CHECK(drawn(frames[at], {rasterizer->pixels(i)}));
     }
     return {};
+}
+
+// of a frame of the path
+Result<FlowSlots> PathDrawing::flow_of(size_t frame)
+{
+    if (!flow_ || following_[frame] == total())
+        return FlowSlots();
+    return flow_->flow(path_.frames[frame], path_.frames[following_[frame]]);
 }
 
 std::span<const CameraFrame> PathDrawing::next() const
@@ -94,7 +88,11 @@ bool PathDrawing::skip()
 
 Result<bool> PathDrawing::step(const Drawn& drawn)
 {
-    SR_CHECK(draw(next(), drawn));
+    size_t at = done_;
+    SR_CHECK(draw(next(), [&](const CameraFrame& frame, FrameSlots slots) -> Status {
+        SR_TRY(slots.flow, flow_of(at++));
+        return drawn(frame, slots);
+    }));
     return skip();
 }
 

@@ -2,10 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/camera/camera.h"
 #include "engine/deferred/frame_images.h"
-#include "engine/scene/grid.h"
-#include "engine/splat/rasterizer.h"
+#include "engine/job/drawn_scene.h"
+#include "engine/job/flow_drawing.h"
 
 #include <functional>
 #include <map>
@@ -14,32 +13,20 @@
 
 namespace semrover {
 
-// how points become pictures
-struct DrawOptions {
-    PointSplatOptions splats;
-    std::array<uint8_t, 3> background{};
-    std::optional<float> visible_alpha; // alpha from which a pixel counts as visible; 0.5, or what a model says
-    bool semantic = false;              // in label colours; a grid without points as blocks
-
-    RasterizerOptions rasterizer(const PictureEncoding& files = {}) const; // that keeps pixels as files have them
+// what is known of a frame on the device
+struct FrameSlots : SplatPixelSlots {
+    FlowSlots flow = {}; // not valid where there is none
 };
-
-// Splats of a grid: points as generated, or as DrawOptions::semantic says. `name` is the grid's, for errors: bad_input
-// for a grid without points, out_of_memory
-Result<SplatScene> splats_of(Device& device, const VoxelGrid& grid, const Path& name, const DrawOptions& options);
 
 // Draws a camera path in order, a moment a step: what the cameras of a rig see at one time is drawn in one submit, with
 // one rasterizer for each image size and camera model. Pictures stay on the device, as files have them.
 class PathDrawing {
   public:
     // the pixels are there until it returns; a read of a ring that it starts is in time
-    using Drawn = std::function<Status(const CameraFrame&, const SplatPixelSlots&)>;
+    using Drawn = std::function<Status(const CameraFrame&, const FrameSlots&)>;
 
-    // the scene must outlive it
-    PathDrawing(Device& device, const SplatScene& scene, CameraPath path, const RasterizerOptions& options)
-        : device_(device), scene_(scene), path_(std::move(path)), options_(options)
-    {
-    }
+    // The scene must outlive it. flow: of every frame but a camera's last one
+    PathDrawing(Device& device, const DrawnScene& scene, CameraPath path, const RasterizerOptions& options, bool flow);
 
     // `drawn` gets every frame of the next moment; true when that was the last one. At least one frame must be left.
     Result<bool> step(const Drawn& drawn);
@@ -55,11 +42,14 @@ class PathDrawing {
 
   private:
     Result<Rasterizer*> rasterizer_of(const Intrinsics& size, uint32_t frames);
+    Result<FlowSlots> flow_of(size_t frame);
 
     Device& device_;
-    const SplatScene& scene_;
+    const DrawnScene& scene_;
     CameraPath path_;
     RasterizerOptions options_;
+    std::optional<FlowDrawing> flow_;
+    std::vector<size_t> following_; // the next frame of each one's camera; their number: there is none
     size_t done_ = 0;
     std::map<std::tuple<uint32_t, uint32_t, CameraModel>, std::unique_ptr<Rasterizer>> rasterizers_;
 };

@@ -49,7 +49,7 @@ uint64_t history_bytes(const Device& device, const Refinement& r)
 
 // a grid's pictures on their way into OUT/buffers, as `semrover render` would write them
 struct BufferDrawing {
-    SplatScene scene;
+    DrawnScene scene;
     PathDrawing drawing;
     State state;
     std::map<std::string, Slot> seen; // SplatPixelSlots::seen of each camera's last frame
@@ -58,8 +58,9 @@ struct BufferDrawing {
     EmptyFrames empty;
     bool started = false; // the first moment is drawn
 
-    BufferDrawing(Device& device, SplatScene s, const Refinement& r, const Bounds& bounds)
-        : scene(std::move(s)), drawing(device, scene, *r.options.path, r.options.draw.rasterizer(r.options.encoding)),
+    BufferDrawing(Device& device, DrawnScene s, const Refinement& r, const Bounds& bounds)
+        : scene(std::move(s)), drawing(device, scene, *r.options.path, r.options.draw.rasterizer(r.options.encoding),
+                                       r.options.encoding.flow.has_value()),
           empty(*r.options.path, r.options.input, r.options.allow_empty)
     {
         empty.set_scene(bounds);
@@ -174,14 +175,14 @@ class RefinementJob : public Job {
     {
         if (!drawing_) {
             SR_TRY(const VoxelGrid grid, r_.options.grid());
-            SR_TRY(SplatScene scene, splats_of(device_, grid, r_.options.input, r_.options.draw));
+            SR_TRY(DrawnScene scene, splats_of(device_, grid, r_.options.input, r_.options.draw));
             drawing_ = std::make_unique<BufferDrawing>(device_, std::move(scene), r_, bounds_of(grid));
             SR_CHECK(drawing_->allocate(device_));
         }
         SR_CHECK(out_->poll());
         const auto counts = drawing_->counts;
-        const Result<bool> last = drawing_->drawing.step(
-            [this](const CameraFrame& f, const SplatPixelSlots& pixels) { return take(f, pixels); });
+        const Result<bool> last =
+            drawing_->drawing.step([this](const CameraFrame& f, const FrameSlots& pixels) { return take(f, pixels); });
         if (!last) {
             drawing_->counts = counts; // where memory was short, the moment is drawn again as a whole
             return tl::make_unexpected(last.error());
@@ -192,7 +193,7 @@ class RefinementJob : public Job {
             say_drawn(*last);
         return *last ? end_drawing() : Status{};
     }
-    Status take(const CameraFrame& frame, const SplatPixelSlots& slots)
+    Status take(const CameraFrame& frame, const FrameSlots& slots)
     {
         const std::string& camera = frame.camera;
         SR_CHECK(drawing_->copies->copy(slots.seen, drawing_->seen[camera]).map([](uint64_t) {}));

@@ -29,7 +29,10 @@ struct RefinementOptions {
 
     bool from_grid() const { return is_file(input); }
     // of the buffers that are drawn of a grid: their colours, which are the renderer's input, have no loss
-    PictureEncoding buffer_encoding() const { return {.png_level = encoding.png_level, .depth = encoding.depth}; }
+    PictureEncoding buffer_encoding() const
+    {
+        return {.png_level = encoding.png_level, .depth = encoding.depth, .flow = encoding.flow};
+    }
 };
 
 // what a run will do, as far as it can be known without a device

@@ -39,13 +39,15 @@ namespace {
 // of the points in a cube
 struct PointSums {
     std::array<double, 3> position{}, color{};
-    uint32_t cell = 0; // of the first
+    uint32_t cell = 0, owner = 0; // of the first
     uint32_t count = 0;
 
     void add(const ScenePoints& points, size_t i)
     {
-        if (count++ == 0)
+        if (count++ == 0) {
             cell = points.cells[i];
+            owner = points.owners.empty() ? 0 : points.owners[i];
+        }
         for (size_t a = 0; a < 3; ++a) {
             position[a] += points.positions[i][a];
             color[a] += points.colors[i][a];
@@ -73,6 +75,7 @@ ScenePoints thinned(const ScenePoints& points, float edge)
         out.colors.push_back(sums.mean(sums.color));
         out.labels.push_back(key.second);
         out.cells.push_back(sums.cell);
+        out.owners.push_back(sums.owner);
     }
     return out;
 }

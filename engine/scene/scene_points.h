@@ -11,12 +11,13 @@ struct ScenePoints {
     std::vector<std::array<float, 3>> positions; // metres
     std::vector<std::array<float, 3>> colors;    // sRGB, 0..1
     std::vector<uint32_t> labels;
-    std::vector<uint32_t> cells; // index of the voxel in the grid
+    std::vector<uint32_t> cells;       // index of the voxel in the grid
+    std::vector<uint32_t> owners = {}; // number of the thing that a point is of, 0 of none; empty: of none
 
     size_t size() const { return positions.size(); }
 };
 
-// points of the voxels that have them
+// points of the voxels that have them, of nothing
 ScenePoints points_of(const VoxelGrid& grid);
 
 // One point of each label and cube of the lattice whose cubes have edges of `edge` metres, at the mean place and with

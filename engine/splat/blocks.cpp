@@ -17,8 +17,9 @@ float shade(int axis, int side)
     return axis == 2 ? (side > 0 ? 1.f : 0.6f) : axis == 0 ? 0.8f : 0.9f;
 }
 
-void add_face(Splats& out, const VoxelGrid& grid, size_t cell, int axis, int side)
+void add_face(Blocks& blocks, const VoxelGrid& grid, size_t cell, int axis, int side)
 {
+    Splats& out = blocks.splats;
     const std::array<float, 3> center = cell_center(grid.cells[cell], grid.voxel_size),
                                color = label_color(grid.labels[cell]);
     const float spacing = grid.voxel_size / kPerSide;
@@ -38,14 +39,15 @@ void add_face(Splats& out, const VoxelGrid& grid, size_t cell, int axis, int sid
             out.sigma_v.push_back(kOverlap * spacing);
             out.opacity.push_back(1);
             out.label.push_back(grid.labels[cell]);
+            blocks.cells.push_back(uint32_t(cell));
         }
 }
 
 } // namespace
 
-Splats block_splats(const VoxelGrid& grid)
+Blocks block_splats(const VoxelGrid& grid)
 {
-    Splats out;
+    Blocks out;
     for (size_t cell = 0; cell < grid.cells.size(); ++cell)
         for (int axis = 0; axis < 3; ++axis)
             for (int side : {-1, 1}) {

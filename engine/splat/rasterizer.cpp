@@ -16,7 +16,7 @@ namespace semrover {
 namespace {
 
 constexpr uint32_t kPairBytes = 4;
-constexpr const char* kImageNames[] = {"splat colour", "splat surface", "splat depth", "splat ids"};
+constexpr const char* kImageNames[] = {"splat colour", "splat surface", "splat depth", "splat ids", "splat owners"};
 
 Status check_camera(const SplatCamera& c, size_t index)
 {
@@ -49,11 +49,11 @@ uint32_t stepped(uint32_t rows, uint32_t most)
 }
 
 // some texels of what SplatSlots has, in that order
-void take_apart(const ReadPiece& piece, SplatImage& image, float visible_alpha)
+void take_apart(const ReadPiece& piece, size_t pictures, SplatImage& image, float visible_alpha)
 {
     if (piece.bytes.empty())
         return;
-    const size_t which = piece.slice % 4, first = piece.at / (which < 2 ? 16 : 8);
+    const size_t which = piece.slice % pictures, first = piece.at / (which < 2 ? 16 : which < 4 ? 8 : 4);
     const std::span numbers(reinterpret_cast<const float*>(piece.bytes.data()), piece.bytes.size() / sizeof(float));
     const std::span words(reinterpret_cast<const uint32_t*>(piece.bytes.data()), numbers.size());
     switch (which) {
@@ -67,8 +67,11 @@ void take_apart(const ReadPiece& piece, SplatImage& image, float visible_alpha)
     case 2:
         split_pairs(numbers, &image.depth_expected[first], &image.depth_median[first]);
         break;
-    default:
+    case 3:
         split_pairs(words, &image.label[first], &image.cell[first]);
+        break;
+    default:
+        std::ranges::copy(words, image.owner.begin() + ptrdiff_t(first));
     }
 }
 
@@ -168,9 +171,14 @@ Status Rasterizer::build()
         z_buffer_ = state_.slot(pixels, 1, DType::f32, "z-buffer", 1);
         z_scale_ = state_.slot(1, 2, DType::f32, "scale of the z-buffer", 2);
     }
+    if (options_.movers) {
+        movers_ = state_.slot(cameras_ * options_.movers, 12, DType::f32, "views of movers", 12);
+        mover_rows_ = state_.slot(options_.mover_numbers, 1, DType::u32, "rows of movers", 1);
+    }
     if (options_.pixels_over)
         pixels_ = {state_.slot(pixels, 1, DType::u32, "seen", 1), state_.slot(pixels, 1, DType::u32, "depths", 1),
-                   state_.slot(pixels, 1, DType::u32, "normals", 1)};
+                   state_.slot(pixels, 1, DType::u32, "normals", 1),
+                   options_.instances ? state_.slot(pixels, 1, DType::u32, "instances", 1) : Slot()};
     else
         declare_images(pixels);
     SR_CHECK(state_.allocate(device_, "splat images"));
@@ -193,18 +201,14 @@ Status Rasterizer::build()
         o.limits = splat_limits(g, z_buffer_.in(g), z_scale_.in(g));
     if (sweep_rows_.valid())
         o.rows = sweep_rows_.in(g);
-    for (size_t i = 0; i < o.made.size(); ++i)
-        o.made[i] = options_.pixels_over || options_.formats[i].texels != Texels::none;
-    const SplatImages y = splat(g, scene_.in(g, rows_), camera_table_.in(g), o);
-    if (options_.pixels_over) {
-        const PixelWords pixels_of_files =
-            splat_pixels(g, y, {*options_.pixels_over, options_.visible_alpha, options_.depth_units});
-        g.keep(pixels_of_files.seen, pixels_.seen);
-        g.keep(pixels_of_files.depths, pixels_.depths);
-        g.keep(pixels_of_files.normals, pixels_.normals);
-    } else {
-        keep_images(g, y);
+    if (options_.movers) {
+        o.movers = movers_.in(g);
+        o.mover_rows = mover_rows_.in(g);
     }
+    for (size_t i = 0; i < o.made.size(); ++i)
+        o.made[i] = options_.pixels_over ? i < 4 || options_.instances : options_.formats[i].texels != Texels::none;
+    const SplatImages y = splat(g, scene_.in(g, rows_), camera_table_.in(g), o);
+    options_.pixels_over ? keep_pixels(g, y) : keep_images(g, y);
     g.keep(y.visible, visible_);
     g.keep(y.pairs, pairs_);
     SR_TRY(program_, Program::create(device_, g));
@@ -214,14 +218,14 @@ Status Rasterizer::build()
 // slots of what is wanted
 void Rasterizer::declare_images(uint32_t pixels)
 {
-    const std::array<Slot*, 4> slots = images_.all();
+    const auto slots = images_.all();
     for (size_t i = 0; i < slots.size(); ++i) {
         const auto& [texels, linear, scaled] = options_.formats[i];
-        const uint32_t numbers = i < 2 ? 4 : 2;
+        const uint32_t numbers = i < 2 ? 4 : i < 4 ? 2 : 1;
         if (texels == Texels::none)
             *slots[i] = {};
         else if (texels == Texels::whole)
-            *slots[i] = state_.slot(pixels, numbers, i == 3 ? DType::u32 : DType::f32, kImageNames[i], numbers);
+            *slots[i] = state_.slot(pixels, numbers, i >= 3 ? DType::u32 : DType::f32, kImageNames[i], numbers);
         else
             *slots[i] = state_.slot(texel_words(texels, width_ * height_) * cameras_, 1, DType::u32, kImageNames[i], 1);
         if (scaled)
@@ -229,10 +233,20 @@ void Rasterizer::declare_images(uint32_t pixels)
     }
 }
 
+void Rasterizer::keep_pixels(Graph& g, const SplatImages& y)
+{
+    const PixelWords made = splat_pixels(g, y, {*options_.pixels_over, options_.visible_alpha, options_.depth_units});
+    g.keep(made.seen, pixels_.seen);
+    g.keep(made.depths, pixels_.depths);
+    g.keep(made.normals, pixels_.normals);
+    if (options_.instances)
+        g.keep(y.owners, pixels_.instances);
+}
+
 void Rasterizer::keep_images(Graph& g, const SplatImages& y)
 {
-    const std::array<Slot*, 4> slots = images_.all();
-    const std::array<Tensor, 4> made = {y.color, y.surface, y.depth, y.ids};
+    const auto slots = images_.all();
+    const std::array<Tensor, 5> made = {y.color, y.surface, y.depth, y.ids, y.owners};
     for (size_t i = 0; i < slots.size(); ++i) {
         const PictureFormat& format = options_.formats[i];
         if (format.texels == Texels::none)
@@ -255,8 +269,25 @@ Status Rasterizer::make_room(uint32_t visible, uint32_t pairs)
     return build();
 }
 
-// the frames of at most cameras_ cameras
-Status Rasterizer::draw_together(std::span<const SplatCamera> cameras)
+// the tables of movers: of `cameras` ones from the first on; those that are left see none
+Rasterizer::MoverTables Rasterizer::tables_of(const SplatMovers& movers, size_t first, size_t cameras) const
+{
+    const size_t each = movers.count;
+    MoverTables tables{movers.rows, {}};
+    SR_ASSERT(each <= options_.movers && movers.rows.size() <= options_.mover_numbers &&
+                  movers.views.size() >= (first + cameras) * each,
+              "{} movers with numbers below {}; this rasterizer has room for {} and {}", each, movers.rows.size(),
+              options_.movers, options_.mover_numbers);
+    tables.rows.resize(options_.mover_numbers);
+    tables.views.resize(size_t(cameras_) * options_.movers);
+    for (size_t camera = 0; camera < cameras; ++camera)
+        std::copy_n(movers.views.begin() + ptrdiff_t((first + camera) * each), each,
+                    tables.views.begin() + ptrdiff_t(camera * options_.movers));
+    return tables;
+}
+
+// the frames of at most cameras_ cameras, the first of which is number `first` of those with movers
+Status Rasterizer::draw_together(std::span<const SplatCamera> cameras, const SplatMovers& movers, size_t first)
 {
     const uint32_t floats = splat_camera_floats(lens());
     std::vector<float> table(size_t(cameras_) * floats);
@@ -266,6 +297,11 @@ Status Rasterizer::draw_together(std::span<const SplatCamera> cameras)
         SR_CHECK(build());
     for (;;) {
         SR_CHECK(camera_table_.write(device_, table));
+        if (options_.movers) {
+            const MoverTables tables = tables_of(movers, first, cameras.size());
+            SR_CHECK(mover_rows_.write(device_, tables.rows));
+            SR_CHECK(movers_.write(device_, tables.views));
+        }
         SR_CHECK(program_->run());
         const BufferSlice slices[] = {visible_.slice(), pairs_.slice()};
         uint32_t counts[2] = {};
@@ -280,7 +316,7 @@ Status Rasterizer::draw_together(std::span<const SplatCamera> cameras)
 }
 
 Status Rasterizer::record(VkCommandBuffer commands, const SplatCamera& camera, std::array<float, 2> z_scale,
-                          std::array<float, 2> format_scale)
+                          std::array<float, 2> format_scale, const SplatMovers& movers)
 {
     SR_CHECK(check_camera(camera, 0));
     if (!program_) // there was no memory for it the last time
@@ -301,6 +337,12 @@ Status Rasterizer::record(VkCommandBuffer commands, const SplatCamera& camera, s
         const BufferSlice scale = slot->slice();
         record_update(vk, commands, scale.buffer->handle(), scale.offset, std::as_bytes(std::span(*numbers)));
     }
+    if (options_.movers) {
+        const MoverTables tables = tables_of(movers, 0, 1);
+        const BufferSlice rows = mover_rows_.slice(), views = movers_.slice();
+        record_update(vk, commands, rows.buffer->handle(), rows.offset, std::as_bytes(std::span(tables.rows)));
+        record_update(vk, commands, views.buffer->handle(), views.offset, std::as_bytes(std::span(tables.views)));
+    }
     program_->record_into(commands);
     const BufferSlice pairs = pairs_.slice();
     const uint64_t at = recording_++ % kRecordings * sizeof(uint32_t);
@@ -319,11 +361,11 @@ uint32_t Rasterizer::recorded_pairs() const
     return most;
 }
 
-Result<uint32_t> Rasterizer::draw_some(std::span<const SplatCamera> cameras)
+Result<uint32_t> Rasterizer::draw_some(std::span<const SplatCamera> cameras, const SplatMovers& movers, size_t first)
 {
     for (;;) {
         const auto some = cameras.first(std::min<size_t>(cameras_, cameras.size()));
-        const Status status = draw_together(some);
+        const Status status = draw_together(some, movers, first);
         if (status)
             return uint32_t(some.size());
         if (status.error().code != ErrorCode::out_of_memory || some.size() == 1)
@@ -334,19 +376,20 @@ Result<uint32_t> Rasterizer::draw_some(std::span<const SplatCamera> cameras)
     }
 }
 
-Result<uint32_t> Rasterizer::draw(std::span<const SplatCamera> cameras)
+Result<uint32_t> Rasterizer::draw(std::span<const SplatCamera> cameras, const SplatMovers& movers)
 {
     SR_ASSERT(!cameras.empty(), "no camera to draw");
     for (size_t i = 0; i < cameras.size(); ++i)
         SR_CHECK(check_camera(cameras[i], i));
-    return draw_some(cameras);
+    return draw_some(cameras, movers, 0);
 }
 
 SplatPixelSlots Rasterizer::pixels(uint32_t camera) const
 {
     const uint32_t pixels = width_ * height_, first = camera * pixels;
     return {pixels_.seen.row_range(first, pixels), pixels_.depths.row_range(first, pixels),
-            pixels_.normals.row_range(first, pixels)};
+            pixels_.normals.row_range(first, pixels),
+            options_.instances ? pixels_.instances.row_range(first, pixels) : Slot()};
 }
 
 SplatSlots Rasterizer::images(uint32_t camera) const
@@ -361,7 +404,8 @@ SplatSlots Rasterizer::images(uint32_t camera) const
 Status Rasterizer::read_images(std::span<SplatImage> images)
 {
     const size_t pixels = size_t(width_) * height_;
-    std::vector<BufferSlice> slices; // four a camera
+    std::vector<BufferSlice> slices; // as many a camera
+    const bool owners = images_.owners.valid();
     for (uint32_t camera = 0; camera < images.size(); ++camera) {
         SplatImage& image = images[camera];
         image.width = width_;
@@ -373,33 +417,39 @@ Status Rasterizer::read_images(std::span<SplatImage> images)
         image.label.resize(pixels);
         image.cell.resize(pixels);
         image.visible.resize(pixels);
-        const SplatSlots slots = this->images(camera);
-        for (const Slot* slot : {&slots.color, &slots.surface, &slots.depth, &slots.ids})
-            slices.push_back(slot->slice());
+        image.owner.resize(owners ? pixels : 0);
+        SplatSlots slots = this->images(camera);
+        for (const Slot* slot : slots.all())
+            if (slot->valid())
+                slices.push_back(slot->slice());
     }
-    return device_.read(
-        slices, [&](const ReadPiece& piece) { take_apart(piece, images[piece.slice / 4], options_.visible_alpha); });
+    const size_t pictures = owners ? 5 : 4;
+    return device_.read(slices, [&](const ReadPiece& piece) {
+        take_apart(piece, pictures, images[piece.slice / pictures], options_.visible_alpha);
+    });
 }
 
-Status Rasterizer::render(std::span<const SplatCamera> cameras, std::vector<SplatImage>& images)
+Status Rasterizer::render(std::span<const SplatCamera> cameras, std::vector<SplatImage>& images,
+                          const SplatMovers& movers)
 {
-    SR_ASSERT(!options_.pixels_over && options_.formats == RasterizerOptions().formats,
+    const auto whole = [](const PictureFormat& format) { return format == PictureFormat(); };
+    SR_ASSERT(!options_.pixels_over && std::all_of(options_.formats.begin(), options_.formats.begin() + 4, whole),
               "this rasterizer does not keep whole images");
     for (size_t i = 0; i < cameras.size(); ++i)
         SR_CHECK(check_camera(cameras[i], i));
     images.resize(cameras.size());
     for (size_t done = 0; done < cameras.size();) {
-        SR_TRY(const uint32_t drawn, draw_some(cameras.subspan(done)));
+        SR_TRY(const uint32_t drawn, draw_some(cameras.subspan(done), movers, done));
         SR_CHECK(read_images(std::span(images).subspan(done, drawn)));
         done += drawn;
     }
     return {};
 }
 
-Result<std::vector<SplatImage>> Rasterizer::render(std::span<const SplatCamera> cameras)
+Result<std::vector<SplatImage>> Rasterizer::render(std::span<const SplatCamera> cameras, const SplatMovers& movers)
 {
     std::vector<SplatImage> images;
-    SR_CHECK(render(cameras, images));
+    SR_CHECK(render(cameras, images, movers));
     return images;
 }
 

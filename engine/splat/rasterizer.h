@@ -39,6 +39,7 @@ struct SplatImage {
     std::vector<float> depth_expected = {}; // depth_sum / alpha, 0 where alpha is
     std::vector<float> depth_median = {}; // of the splat with which alpha passes one half, else of the last; 0 for none
     std::vector<uint32_t> label = {}, cell = {}; // of the splat with the largest w; kNothing for none
+    std::vector<uint32_t> owner = {};            // of that splat, as SplatImages has it; where formats ask for it
     std::vector<uint8_t> visible = {};           // 1 where alpha reaches the threshold
 
     static constexpr uint32_t kNothing = 0xffffffffu;
@@ -59,10 +60,14 @@ struct RasterizerOptions {
     std::vector<std::array<float, 4>> sweep_rows = {};
     // keeps pixels as files have them, over this background, in place of images: draw() and pixels(), not render()
     std::optional<std::array<uint8_t, 3>> pixels_over = {};
-    float depth_units = 1000;  // of these, to a metre; 0: fp32 metres
-    bool depth_tested = false; // against z_buffer(), of pinholes
-    // of color, surface, depth and ids: how images() has them, and whether it has. render() needs them whole
-    std::array<PictureFormat, 4> formats = {};
+    float depth_units = 1000;   // of these, to a metre; 0: fp32 metres
+    bool instances = false;     // pixels have the numbers of things, too
+    uint32_t movers = 0;        // room for things that move,
+    uint32_t mover_numbers = 0; // with numbers below this
+    bool depth_tested = false;  // against z_buffer(), of pinholes
+    // of color, surface, depth, ids and owners: how images() has them, and whether it has. render() needs the first
+    // four whole. Owners that are whole are as SplatImages has them; in another format, numbers of things
+    std::array<PictureFormat, 5> formats = {{{}, {}, {}, {}, {Texels::none}}};
 
     bool operator==(const RasterizerOptions&) const = default;
 };
@@ -70,11 +75,18 @@ struct RasterizerOptions {
 // what one camera sees, on the device: as SplatImages (kernels/splat.h) has it, a row a pixel, or in words, where
 // another format was asked for, or nothing; or as files have it (PixelWords, kernels/picture.h)
 struct SplatSlots {
-    Slot color, surface, depth, ids;
-    std::array<Slot*, 4> all() { return {&color, &surface, &depth, &ids}; }
+    Slot color, surface, depth, ids, owners;
+    std::array<Slot*, 5> all() { return {&color, &surface, &depth, &ids, &owners}; }
 };
 struct SplatPixelSlots {
-    Slot seen, depths, normals;
+    Slot seen, depths, normals, instances; // the last where it is asked for
+};
+
+// Things that move at the moment of a draw
+struct SplatMovers {
+    uint32_t count = 0;
+    std::vector<uint32_t> rows = {};               // by the number of a thing, as SplatOptions::mover_rows
+    std::vector<std::array<float, 12>> views = {}; // [cameras, movers], as SplatOptions::movers
 };
 
 // Draws a scene from up to max_cameras cameras in one submit; more are drawn in turns. The graph is built once and
@@ -88,14 +100,15 @@ class Rasterizer {
                                                       const RasterizerOptions& options = {});
 
     // errors: bad_input for a camera that is not finite or without focal length; out_of_memory, device_lost
-    Result<std::vector<SplatImage>> render(std::span<const SplatCamera> cameras);
+    Result<std::vector<SplatImage>> render(std::span<const SplatCamera> cameras, const SplatMovers& movers = {});
     // The same into `images`, whose memory is used again where it fits. For frame after frame: to allocate new memory
     // takes the host longer than to read the images back.
-    Status render(std::span<const SplatCamera> cameras, std::vector<SplatImage>& images);
+    Status render(std::span<const SplatCamera> cameras, std::vector<SplatImage>& images,
+                  const SplatMovers& movers = {});
 
     // the same on the device: draws as many of the first cameras as it has room for, and says how many; what they see
     // stays until the next call
-    Result<uint32_t> draw(std::span<const SplatCamera> cameras);
+    Result<uint32_t> draw(std::span<const SplatCamera> cameras, const SplatMovers& movers = {});
     SplatSlots images(uint32_t camera) const;
     SplatPixelSlots pixels(uint32_t camera) const;
 
@@ -111,7 +124,7 @@ class Rasterizer {
     // rasterizer. z_scale, format_scale: where there are such slots; z_buffer() is filled by what was recorded before.
     // Errors: bad_input as render()'s
     Status record(VkCommandBuffer commands, const SplatCamera& camera, std::array<float, 2> z_scale = {},
-                  std::array<float, 2> format_scale = {});
+                  std::array<float, 2> format_scale = {}, const SplatMovers& movers = {});
     // The most pairs that one of the last kRecordings had, of those that have been executed: where they are more than
     // max_pairs(), it lacks the farthest splats. Does not wait
     uint32_t recorded_pairs() const;
@@ -126,14 +139,20 @@ class Rasterizer {
     uint32_t rebuilds() const { return rebuilds_; } // how often there was not enough room
 
   private:
+    struct MoverTables { // as the device has them
+        std::vector<uint32_t> rows;
+        std::vector<std::array<float, 12>> views;
+    };
     Rasterizer(Device& device, const SplatScene& scene) : device_(device), scene_(scene) {}
     SplatLens lens() const;
     Status build();
     void declare_images(uint32_t pixels);
     void keep_images(Graph& g, const SplatImages& images);
+    void keep_pixels(Graph& g, const SplatImages& images);
     Status make_room(uint32_t visible, uint32_t pairs);
-    Result<uint32_t> draw_some(std::span<const SplatCamera> cameras);
-    Status draw_together(std::span<const SplatCamera> cameras);
+    Result<uint32_t> draw_some(std::span<const SplatCamera> cameras, const SplatMovers& movers, size_t first);
+    Status draw_together(std::span<const SplatCamera> cameras, const SplatMovers& movers, size_t first);
+    MoverTables tables_of(const SplatMovers& movers, size_t first, size_t cameras) const;
     Status read_images(std::span<SplatImage> images);
 
     Device& device_;
@@ -142,7 +161,7 @@ class Rasterizer {
     uint32_t width_ = 0, height_ = 0, cameras_ = 0, rows_ = 0;
     uint32_t max_visible_ = 0, max_pairs_ = 0, rebuilds_ = 0;
     State state_;
-    Slot camera_table_, sweep_rows_, visible_, pairs_, z_buffer_, z_scale_, format_scale_;
+    Slot camera_table_, visible_, pairs_, z_buffer_, z_scale_, format_scale_, movers_, mover_rows_, sweep_rows_;
     std::unique_ptr<Buffer> recorded_; // [kRecordings] u32: pairs of what was recorded, where the host sees them
     uint32_t recording_ = 0;
     SplatSlots images_;      // of all cameras, or

@@ -17,7 +17,7 @@ namespace semrover {
 // nothing on the device can look at them any more.
 class SplatPool {
   public:
-    static constexpr uint32_t kSplatBytes = 56; // in five arrays
+    static constexpr uint32_t kSplatBytes = 60; // in six arrays
 
     // bytes: of device memory, for bytes / kSplatBytes splats, rounded up to a block. Errors: usage where not one
     // fits, or an array is larger than the device can bind; out_of_memory

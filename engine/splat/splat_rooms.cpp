@@ -12,7 +12,7 @@ namespace semrover {
 namespace {
 
 constexpr uint32_t kLeastRows = 256;
-constexpr uint32_t kRowBytes = 40; // of the arrays that are uploaded
+constexpr uint32_t kRowBytes = 44; // of the arrays that are uploaded
 
 // where no point is: high above the first one, each beyond the reach of all others
 std::array<float, 4> nowhere(const ScenePoints& points, size_t row)
@@ -38,9 +38,10 @@ void write_rows(const ScenePoints& points, size_t shown, float opacity, uint32_t
         std::memcpy(colors + i * 16, color.data(), 16);
     }
     std::byte* words = colors + size_t(rows) * 16;
-    for (const std::vector<uint32_t>* values : {&points.labels, &points.cells}) {
-        std::memcpy(words, values->data(), n * 4);
-        std::memset(words + n * 4, 0, (rows - n) * 4);
+    for (const std::vector<uint32_t>* values : {&points.labels, &points.cells, &points.owners}) {
+        const size_t known = values->size(); // of owners there may be none
+        std::memcpy(words, values->data(), known * 4);
+        std::memset(words + known * 4, 0, (rows - known) * 4);
         words += size_t(rows) * 4;
     }
 }
@@ -77,10 +78,10 @@ Result<const SplatScene*> SplatRooms::record(VkCommandBuffer commands, const Sce
     SR_TRY(Room * room, room_for(points.size(), options));
     SR_CHECK(device_.wait(room->busy_until));
     write_rows(points, shown, options.opacity, room->scene.size(), room->upload->mapped());
-    const auto [positions, normals, colors, labels, cells] = room->scene.arrays();
+    const auto [positions, normals, colors, labels, cells, owners] = room->scene.arrays();
     record_entry_barrier(device_.vk(), commands); // the splats of the tile before have been copied
     uint64_t at = 0;
-    for (const Slot& slot : {positions, colors, labels, cells}) {
+    for (const Slot& slot : {positions, colors, labels, cells, owners}) {
         const BufferSlice to = slot.slice();
         record_copy(device_.vk(), commands, room->upload->handle(), at, to.buffer->handle(), to.offset, to.bytes);
         at += to.bytes;

@@ -4,6 +4,7 @@
 
 #include "engine/scene/palette.h"
 #include "runtime/device/command.h"
+#include "runtime/device/command_ring.h"
 #include "runtime/device/program.h"
 
 #include <cmath>
@@ -14,7 +15,7 @@ namespace semrover {
 struct SplatScene::Host {
     using Row = std::array<float, 4>;
     std::vector<Row> positions = {}, normals = {}, colors = {};
-    std::vector<uint32_t> labels = {}, cells = {};
+    std::vector<uint32_t> labels = {}, cells = {}, owners = {};
     bool complete = false; // normals are known
 
     size_t skipped() const
@@ -71,7 +72,8 @@ uint32_t label_bits(std::initializer_list<std::string_view> names)
 
 Status check_points(const ScenePoints& points)
 {
-    return check_count(points.size(), {points.colors.size(), points.labels.size(), points.cells.size()});
+    const size_t owners = points.owners.empty() ? points.size() : points.owners.size();
+    return check_count(points.size(), {points.colors.size(), points.labels.size(), points.cells.size(), owners});
 }
 
 Status check_point_splat_options(const PointSplatOptions& options)
@@ -88,7 +90,8 @@ Result<SplatScene> SplatScene::create(Device& device, const ScenePoints& points,
     SR_CHECK(check_points(points));
     SR_CHECK(check_point_splat_options(options));
     const size_t n = points.size();
-    Host host{.labels = points.labels, .cells = points.cells};
+    Host host{.labels = points.labels, .cells = points.cells, .owners = points.owners};
+    host.owners.resize(n);
     for (size_t i = 0; i < n; ++i) {
         host.positions.push_back(row_of(points.positions[i], options.opacity));
         host.normals.push_back({0, 0, 0, options.sigma});
@@ -105,12 +108,13 @@ Result<SplatScene> SplatScene::create(Device& device, const ScenePoints& points,
     return scene;
 }
 
-Result<SplatScene> SplatScene::create(Device& device, const Splats& s)
+Result<SplatScene> SplatScene::create(Device& device, const Splats& s, std::span<const uint32_t> owners)
 {
     const size_t n = s.position.size();
-    SR_CHECK(check_count(
-        n, {s.normal.size(), s.color.size(), s.sigma_u.size(), s.sigma_v.size(), s.opacity.size(), s.label.size()}));
-    Host host{.labels = {s.label.begin(), s.label.end()}, .complete = true};
+    SR_CHECK(check_count(n, {s.normal.size(), s.color.size(), s.sigma_u.size(), s.sigma_v.size(), s.opacity.size(),
+                             s.label.size(), owners.empty() ? n : owners.size()}));
+    Host host{.labels = {s.label.begin(), s.label.end()}, .owners = {owners.begin(), owners.end()}, .complete = true};
+    host.owners.resize(n);
     for (size_t i = 0; i < n; ++i) {
         host.positions.push_back(row_of(s.position[i], s.opacity[i]));
         host.normals.push_back(row_of(s.normal[i], s.sigma_u[i]));
@@ -134,11 +138,32 @@ Result<SplatScene> SplatScene::reserve(Device& device, uint32_t size, bool by_bl
     return scene;
 }
 
+Result<SplatScene> SplatScene::joined(Device& device, std::span<const SplatScene> parts)
+{
+    size_t size = 0;
+    for (const SplatScene& part : parts)
+        size += part.size();
+    SR_CHECK(check_count(size, {}));
+    SR_TRY(SplatScene scene, reserve(device, uint32_t(size), false));
+    SR_TRY(const auto ring, CommandRing::create(device));
+    SR_TRY(const VkCommandBuffer commands, ring->begin());
+    uint32_t first = 0;
+    for (const SplatScene& part : parts) {
+        if (part.size())
+            scene.record_put(commands, first, part, part.size());
+        first += part.size();
+        scene.skipped_ += part.skipped();
+    }
+    SR_TRY(const uint64_t ticket, ring->submit());
+    SR_CHECK(device.wait(ticket));
+    return scene;
+}
+
 void SplatScene::record_put(VkCommandBuffer commands, uint32_t first, const SplatScene& from, uint32_t count)
 {
     SR_ASSERT(first + count <= size_ && count <= from.size_, "{} of {} splats from {} on in a scene of {}", count,
               from.size_, first, size_);
-    const std::array<Slot, 5> to_arrays = arrays(), from_arrays = from.arrays();
+    const auto to_arrays = arrays(), from_arrays = from.arrays();
     for (size_t a = 0; a < to_arrays.size(); ++a) {
         const BufferSlice to = to_arrays[a].row_range(first, count).slice(), slice = from_arrays[a].slice();
         record_copy(device_->vk(), commands, slice.buffer->handle(), slice.offset, to.buffer->handle(), to.offset,
@@ -154,6 +179,7 @@ Status SplatScene::allocate(bool by_blocks)
     colors_ = state_.slot(rows, 4, DType::f32, "colours", 4);
     labels_ = state_.slot(rows, 1, DType::u32, "labels", 1);
     cells_ = state_.slot(rows, 1, DType::u32, "cells", 1);
+    owners_ = state_.slot(rows, 1, DType::u32, "owners", 1);
     if (by_blocks)
         blocks_ = state_.slot(divide_up(rows, kBlock), 1, DType::u32, "blocks of splats", 1);
     return state_.allocate(*device_, "splats");
@@ -173,7 +199,8 @@ Status SplatScene::upload(const Host& host)
     SR_CHECK(normals_.write(*device_, host.normals));
     SR_CHECK(colors_.write(*device_, host.colors));
     SR_CHECK(labels_.write(*device_, host.labels));
-    return cells_.write(*device_, host.cells);
+    SR_CHECK(cells_.write(*device_, host.cells));
+    return owners_.write(*device_, host.owners);
 }
 
 void SplatScene::derive(Graph& g, const PointSplatOptions& options) const
@@ -196,7 +223,8 @@ void SplatScene::derive(Graph& g, const PointSplatOptions& options) const
 SplatTensors SplatScene::in(Graph& g, uint32_t rows) const
 {
     const auto first = [&](const Slot& slot) { return slot.row_range(0, std::max(rows, 1u)).in(g); };
-    SplatTensors scene{first(positions_), first(normals_), first(colors_), first(labels_), first(cells_)};
+    SplatTensors scene{first(positions_), first(normals_), first(colors_),
+                       first(labels_),    first(cells_),   first(owners_)};
     if (blocks_.valid())
         scene.blocks = blocks_.row_range(0, divide_up(rows, kBlock)).in(g);
     return scene;

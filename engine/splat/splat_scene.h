@@ -28,15 +28,19 @@ struct PointSplatOptions {
 Status check_point_splat_options(const PointSplatOptions& options);
 Status check_points(const ScenePoints& points);
 
-// Splats on the device, ready to be drawn: positions, normals, colours, sigmas, opacities, labels, voxels.
+// Splats on the device, ready to be drawn: positions, normals, colours, sigmas, opacities, labels, voxels, and
+// what each is of.
 class SplatScene {
   public:
     // of points: normals by PCA over the nearest ones, sigma and opacity by the options
     // errors: of check_points() and check_point_splat_options(); out_of_memory
     static Result<SplatScene> create(Device& device, const ScenePoints& points, const PointSplatOptions& options = {});
 
-    // of splats that are complete; the voxel of each is its index
-    static Result<SplatScene> create(Device& device, const Splats& splats);
+    // Of splats that are complete; the voxel of each is its index. owners: SplatTensors::owners; empty: of nothing
+    static Result<SplatScene> create(Device& device, const Splats& splats, std::span<const uint32_t> owners = {});
+
+    // One after the other, with memory of its own. Errors: bad_input for too many splats; out_of_memory
+    static Result<SplatScene> joined(Device& device, std::span<const SplatScene> parts);
 
     // Room for splats, all without opacity at first: not drawn. by_blocks: and none are drawn of a block of kBlock
     // whose word in blocks() is 0, as all are at first
@@ -48,7 +52,7 @@ class SplatScene {
     void derive(Graph& g, const PointSplatOptions& options) const;
 
     // the whole arrays, of which in() gives rows, in its order
-    std::array<Slot, 5> arrays() const { return {positions_, normals_, colors_, labels_, cells_}; }
+    std::array<Slot, 6> arrays() const { return {positions_, normals_, colors_, labels_, cells_, owners_}; }
 
     const Slot& blocks() const { return blocks_; } // one that is not valid: there are none
 
@@ -71,7 +75,7 @@ class SplatScene {
     Device* device_;
     uint32_t size_ = 0, skipped_ = 0;
     State state_;
-    Slot positions_, normals_, colors_, labels_, cells_, blocks_; // as SplatTensors has them
+    Slot positions_, normals_, colors_, labels_, cells_, owners_, blocks_; // as SplatTensors has them
 };
 
 } // namespace semrover

@@ -23,7 +23,7 @@ namespace semrover {
 
 namespace {
 
-constexpr const char* kMade[] = {"kColor", "kSurface", "kDepth", "kIds"}; // of SplatOptions::made
+constexpr const char* kMade[] = {"kColor", "kSurface", "kDepth", "kIds", "kOwners"}; // of SplatOptions::made
 
 SplatPush make_push(const SplatTensors& scene, Tensor cameras, const SplatOptions& o)
 {
@@ -43,6 +43,8 @@ SplatPush make_push(const SplatTensors& scene, Tensor cameras, const SplatOption
     push.transmittance_min = o.transmittance_min;
     push.cutoff2 = o.cutoff > 0 ? o.cutoff * o.cutoff : 1e30f;
     push.filter_scale = o.screen_variance > 0 ? 1 / o.screen_variance : 1e30f;
+    push.movers = o.movers.rows / cameras.rows;
+    push.mover_numbers = o.mover_rows.rows;
     return push;
 }
 
@@ -50,7 +52,7 @@ void check(const SplatTensors& scene, Tensor cameras, const SplatOptions& o)
 {
     const uint32_t n = scene.positions.rows;
     SR_ASSERT(scene.positions.ld == 4 && scene.normals.ld == 4 && scene.colors.ld == 4 && scene.normals.rows == n &&
-                  scene.colors.rows == n && scene.labels.rows == n && scene.cells.rows == n,
+                  scene.colors.rows == n && scene.labels.rows == n && scene.cells.rows == n && scene.owners.rows == n,
               "splat: scene of {} splats with arrays of other sizes", n);
     SR_ASSERT(!scene.blocks.valid() || scene.blocks.rows == divide_up(n, 64), "splat: {} blocks of {} splats",
               scene.blocks.rows, n);
@@ -65,6 +67,9 @@ void check(const SplatTensors& scene, Tensor cameras, const SplatOptions& o)
     SR_ASSERT((o.lens == SplatLens::spinning) == o.rows.valid() &&
                   (!o.rows.valid() || (o.rows.rows == o.height && o.rows.ld == 4)),
               "splat: a table of {} rows for {}", o.rows.rows, o.height);
+    SR_ASSERT(o.movers.valid() == o.mover_rows.valid() &&
+                  (!o.movers.valid() || (o.movers.ld == 12 && o.movers.rows % cameras.rows == 0)),
+              "splat: {} views of movers for {} cameras", o.movers.rows, cameras.rows);
     SR_ASSERT(uint64_t(n) * cameras.rows < 1ull << 32, "splat: {} splats in {} cameras", n, cameras.rows);
 }
 
@@ -76,20 +81,27 @@ struct Seen {
 Seen project(Graph& g, const SplatTensors& scene, Tensor cameras, const SplatOptions& o, const SplatPush& push)
 {
     const bool pinhole = o.lens == SplatLens::pinhole;
+    const Tensor movers = o.movers.valid() ? o.movers : cameras;
+    const Tensor mover_rows = o.movers.valid() ? o.mover_rows : scene.owners;
     const uint32_t views = push.splats * push.cameras;
     DispatchOptions lens;
+    lens.constants = {{"kMovers", o.movers.valid()}};
     if (!pinhole)
-        lens.constants = {{"kModel", uint32_t(o.lens)}};
+        lens.constants.push_back({"kModel", uint32_t(o.lens)});
     const Tensor keep = g.array(views, DType::u32, "keep");
     const bool by_blocks = scene.blocks.valid();
     DispatchOptions cull = lens;
     cull.constants.push_back({"kBlocks", by_blocks});
     const Tensor blocks = by_blocks ? scene.blocks : scene.labels, rows = o.rows.valid() ? o.rows : scene.positions;
     if (pinhole)
-        g.dispatch(kernel::splat_cull, {cameras, scene.positions, scene.normals, scene.colors, keep, blocks}, push,
-                   threads(views), std::move(cull));
+        g.dispatch(
+            kernel::splat_cull,
+            {cameras, scene.positions, scene.normals, scene.colors, scene.owners, movers, mover_rows, keep, blocks},
+            push, threads(views), std::move(cull));
     else
-        g.dispatch(kernel::splat_lens_cull, {cameras, scene.positions, scene.normals, scene.colors, rows, keep, blocks},
+        g.dispatch(kernel::splat_lens_cull,
+                   {cameras, scene.positions, scene.normals, scene.colors, scene.owners, movers, mover_rows, keep,
+                    blocks, rows},
                    push, threads(views), std::move(cull));
     const PrefixSum slots = prefix_sum(g, keep, {.non_zero = true});
     const uint32_t texels = splat_record_bytes(o.lens) / 16;
@@ -98,13 +110,14 @@ Seen project(Graph& g, const SplatTensors& scene, Tensor cameras, const SplatOpt
     const Tensor depths = g.array(push.max_visible, DType::u32, "splat depths");
     if (pinhole)
         g.dispatch(kernel::splat_project,
-                   {cameras, scene.positions, scene.normals, scene.colors, keep, slots.sums, records, sources, depths},
+                   {cameras, scene.positions, scene.normals, scene.colors, scene.owners, movers, mover_rows, keep,
+                    slots.sums, records, sources, depths},
                    push, threads(views), lens);
     else
-        g.dispatch(
-            kernel::splat_lens_project,
-            {cameras, scene.positions, scene.normals, scene.colors, rows, keep, slots.sums, records, sources, depths},
-            push, threads(views), lens);
+        g.dispatch(kernel::splat_lens_project,
+                   {cameras, scene.positions, scene.normals, scene.colors, scene.owners, movers, mover_rows, keep,
+                    slots.sums, records, sources, depths, rows},
+                   push, threads(views), lens);
     return {records, sources, depths, slots.total};
 }
 
@@ -148,6 +161,7 @@ SplatImages splat(Graph& g, const SplatTensors& scene, Tensor cameras, const Spl
                            g.array(rows(1), DType::f32, "splat surface", 4),
                            g.array(rows(2), DType::f32, "splat depth", 2),
                            g.array(rows(3), DType::u32, "splat ids", 2),
+                           g.array(rows(4), DType::u32, "splat owners"),
                            seen.count,
                            by_tile.pairs};
     DispatchOptions blend;
@@ -160,18 +174,18 @@ SplatImages splat(Graph& g, const SplatTensors& scene, Tensor cameras, const Spl
         blend.constants.push_back({"kLimited", limited});
         g.dispatch(kernel::splat_blend,
                    {seen.records, by_tile.records, by_tile.starts, seen.sources, scene.labels, scene.cells, y.color,
-                    y.surface, y.depth, y.ids, limited ? options.limits : scene.positions},
+                    y.surface, y.depth, y.ids, limited ? options.limits : scene.positions, scene.owners, y.owners},
                    push, grid, std::move(blend));
         return y;
     }
     const ConstantValue model{"kModel", uint32_t(options.lens)};
     blend.constants.push_back(model);
     const Tensor rays = g.array(pixels, DType::f32, "rays", 4);
-    g.dispatch(kernel::splat_rays, {cameras, options.rows.valid() ? options.rows : scene.positions, rays}, push,
+    g.dispatch(kernel::splat_rays, {cameras, rays, options.rows.valid() ? options.rows : scene.positions}, push,
                threads(pixels), {.constants = {model}});
     g.dispatch(kernel::splat_ray_blend,
                {seen.records, by_tile.records, by_tile.starts, seen.sources, scene.labels, scene.cells, y.color,
-                y.surface, y.depth, y.ids, rays},
+                y.surface, y.depth, y.ids, rays, scene.owners, y.owners},
                push, grid, std::move(blend));
     return y;
 }

@@ -151,7 +151,11 @@ void record_fill(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer buffe
 void record_update(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer to, uint64_t at,
                    std::span<const std::byte> bytes)
 {
-    vk.CmdUpdateBuffer(commands, to, at, bytes.size(), bytes.data());
+    constexpr size_t kMost = 65536; // of a call
+    for (size_t done = 0; done < bytes.size(); done += kMost) {
+        const auto part = bytes.subspan(done, std::min(kMost, bytes.size() - done));
+        vk.CmdUpdateBuffer(commands, to, at + done, part.size(), part.data());
+    }
     barrier(vk, commands, kTransfer, VK_ACCESS_TRANSFER_WRITE_BIT, kCompute | kTransfer, kShader | kCopy);
 }
 

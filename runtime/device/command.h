@@ -41,7 +41,7 @@ void record_exit_barrier(const VulkanCalls& vk, VkCommandBuffer commands);
 // words of one value, without a barrier
 void record_fill(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer buffer, uint64_t at, uint64_t bytes,
                  uint32_t value);
-// bytes of the command itself: a multiple of 4, at most 65536; with the barrier that lets shaders follow
+// bytes of the command itself: a multiple of 4; with the barrier that lets shaders follow
 void record_update(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer to, uint64_t at,
                    std::span<const std::byte> bytes);
 // a buffer goes to another API (MemoryKind::shared), with all that was written to it; what overwrites it takes it back

@@ -32,7 +32,7 @@ struct DeviceLimits {
     uint64_t max_allocation = 1ull << 30;
     uint32_t offset_alignment = 256; // of storage ranges and texel views
     uint32_t max_push_bytes = 128;
-    uint32_t max_storage_buffers = 16; // of a shader; Vulkan promises 4, kernels have up to 11
+    uint32_t max_storage_buffers = 16; // of a shader; Vulkan promises 4, kernels have up to 13
     double submit_seconds = 0.1;       // work of one submit; zero: no limit (CPU devices have no watchdog)
     bool side_by_side = false;         // memory is shared so that independent passes need no barrier between them
     std::string force_variant;         // "", or a kernel variant to prefer wherever it exists

@@ -6,12 +6,17 @@
 #include "lib/splat_tangents.glsl"
 
 layout(constant_id = 0) const uint kModel = 1;
+layout(constant_id = 2) const bool kMovers = false;
 layout(push_constant) uniform Push { SplatPush p; };
 layout(binding = 0) readonly buffer Cameras { vec4 cameras[]; };     // [cameras, kCameraVectors]
 layout(binding = 1) readonly buffer Positions { vec4 positions[]; }; // [splats] xyz, opacity
 layout(binding = 2) readonly buffer Normals { vec4 normals[]; };     // [splats] xyz, sigma_u
 layout(binding = 3) readonly buffer Colors { vec4 colors[]; };       // [splats] rgb, sigma_v
-layout(binding = 4) readonly buffer Rows { vec4 rows[]; };           // [height] of a sweep: splat.h; else anything
+layout(binding = 4) readonly buffer Owners { uint owners[]; };       // [splats]
+layout(binding = 5) readonly buffer Movers { vec4 movers[]; };       // [cameras, movers, 3] if kMovers: camera from mover
+layout(binding = 6) readonly buffer MoverRows { uint mover_rows[]; }; // [mover_numbers] likewise
+
+#include "lib/splat_mover.glsl"
 
 #include "lib/splat_camera.glsl"
 
@@ -177,7 +182,12 @@ bool view_splat(uint splat, uint camera, out LensView s)
     if (lens.focal.x == 0.0 || !is_finite(position) || !is_finite(normal) || !is_finite(color) ||
         dot(normal.xyz, normal.xyz) < 1e-6 || !(position.w >= p.alpha_min) || !(normal.w > 0.0) || !(color.w > 0.0))
         return false;
-    const mat4x3 view = camera_view(camera);
+    mat4x3 view = camera_view(camera);
+    const uint row = kMovers ? mover_of(owners[splat], p.mover_numbers) : 0;
+    if (row != 0) {
+        const uint at = (camera * p.movers + row - 1) * 3;
+        view = transpose(mat3x4(movers[at], movers[at + 1], movers[at + 2]));
+    }
     s.center = view * vec4(position.xyz, 1.0);
     s.away = length(s.center);
     if (!((kModel == kOpencv ? s.center.z : s.away) > p.near))

@@ -8,6 +8,7 @@ layout(constant_id = 3) const bool kColor = true; // made, and so on
 layout(constant_id = 4) const bool kSurface = true;
 layout(constant_id = 5) const bool kDepth = true;
 layout(constant_id = 6) const bool kIds = true;
+layout(constant_id = 7) const bool kOwners = true;
 layout(push_constant) uniform Push { SplatPush p; };
 layout(binding = 1) readonly buffer Pairs { uint pairs[]; };      // [max_pairs] records by tile, nearest first
 layout(binding = 2) readonly buffer Starts { uint starts[]; };    // [tiles + 1] first pair of each tile
@@ -18,6 +19,8 @@ layout(binding = 6) writeonly buffer Color { vec4 color[]; };     // [cameras, h
 layout(binding = 7) writeonly buffer Surface { vec4 surface[]; }; // sum of w normal, camera frame; sum of w depth
 layout(binding = 8) writeonly buffer Depth { vec2 depth[]; };     // expected, median
 layout(binding = 9) writeonly buffer Ids { uvec2 ids[]; };        // label and voxel of the largest w
+layout(binding = 11) readonly buffer Owners { uint owners[]; };   // [splats]
+layout(binding = 12) writeonly buffer Owner { uint owner[]; };    // of the largest w
 
 const uint kNone = 0xffffffffu;
 
@@ -60,8 +63,12 @@ void store(Pixel pixel, uvec2 at, uint camera)
         surface[i] = vec4(pixel.normal, pixel.depth);
     if (kDepth)
         depth[i] = vec2(alpha > 0.0 ? pixel.depth / alpha : 0.0, pixel.median);
-    if (!kIds)
+    if (!kIds && !kOwners)
         return;
-    const uint splat = pixel.record == kNone ? 0 : sources[pixel.record] % p.splats;
-    ids[i] = pixel.record == kNone ? uvec2(kNone) : uvec2(labels[splat], cells[splat]);
+    const bool none = pixel.record == kNone;
+    const uint splat = none ? 0 : sources[pixel.record] % p.splats;
+    if (kIds)
+        ids[i] = none ? uvec2(kNone) : uvec2(labels[splat], cells[splat]);
+    if (kOwners)
+        owner[i] = none ? 0 : owners[splat];
 }

@@ -4,11 +4,17 @@
 // a splat as a camera sees it, and the pixels that it can reach (docs/method.md §5.3)
 #include "lib/splat_tangents.glsl"
 
+layout(constant_id = 2) const bool kMovers = false;
 layout(push_constant) uniform Push { SplatPush p; };
 layout(binding = 0) readonly buffer Cameras { vec4 cameras[]; };     // [cameras, 4] fx fy cx cy; world to camera
 layout(binding = 1) readonly buffer Positions { vec4 positions[]; }; // [splats] xyz, opacity
 layout(binding = 2) readonly buffer Normals { vec4 normals[]; };     // [splats] xyz, sigma_u
 layout(binding = 3) readonly buffer Colors { vec4 colors[]; };       // [splats] rgb, sigma_v
+layout(binding = 4) readonly buffer Owners { uint owners[]; };       // [splats]
+layout(binding = 5) readonly buffer Movers { vec4 movers[]; };       // [cameras, movers, 3] if kMovers: camera from mover
+layout(binding = 6) readonly buffer MoverRows { uint mover_rows[]; }; // [mover_numbers] likewise
+
+#include "lib/splat_mover.glsl"
 
 struct SplatView {
     vec3 center; // camera frame, metres
@@ -44,7 +50,14 @@ bool view_splat(uint splat, uint camera, out SplatView s)
     if (lens.x == 0.0 || !is_finite(position) || !is_finite(normal) || !is_finite(color) || dot(normal.xyz, normal.xyz) < 1e-6 ||
         !(position.w >= p.alpha_min) || !(normal.w > 0.0) || !(color.w > 0.0))
         return false;
-    const vec4 x = cameras[camera * 4 + 1], y = cameras[camera * 4 + 2], z = cameras[camera * 4 + 3];
+    vec4 x = cameras[camera * 4 + 1], y = cameras[camera * 4 + 2], z = cameras[camera * 4 + 3];
+    const uint row = kMovers ? mover_of(owners[splat], p.mover_numbers) : 0;
+    if (row != 0) {
+        const uint at = (camera * p.movers + row - 1) * 3;
+        x = movers[at];
+        y = movers[at + 1];
+        z = movers[at + 2];
+    }
     const mat3 turn = transpose(mat3(x.xyz, y.xyz, z.xyz));
     s.center = turn * position.xyz + vec3(x.w, y.w, z.w);
     if (!(s.center.z > p.near))

@@ -20,6 +20,8 @@ struct SplatPush {
     float transmittance_min; // a pixel is done before it falls below
     float cutoff2;           // square of the largest distance from the centre, in sigmas
     float filter_scale;      // 1 / variance of the screen filter in pixels^2
+    uint movers;             // rows of the table of views, a camera
+    uint mover_numbers;      // entries of the table of rows
 };
 
 // The table of a lidar's rows (engine/camera/lidar.h), by rising angle: angle below the horizon; of its rays from their

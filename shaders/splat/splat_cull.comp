@@ -9,8 +9,8 @@
 
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const bool kBlocks = false;
-layout(binding = 4) writeonly buffer Keep { uint keep[]; };   // [cameras, splats]
-layout(binding = 5) readonly buffer Blocks { uint blocks[]; }; // [splats / 64], or anything without kBlocks
+layout(binding = 7) writeonly buffer Keep { uint keep[]; };   // [cameras, splats]
+layout(binding = 8) readonly buffer Blocks { uint blocks[]; }; // [splats / 64], or anything without kBlocks
 
 void main()
 {

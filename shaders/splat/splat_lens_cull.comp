@@ -4,13 +4,15 @@
 // keep[camera][splat] = can it be seen?
 #extension GL_GOOGLE_include_directive : require
 #include "splat.h"
+
+layout(binding = 9) readonly buffer Rows { vec4 rows[]; }; // [height] of a sweep: splat.h; else anything
 #include "lib/splat_lens_view.glsl"
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
 layout(constant_id = 1) const bool kBlocks = false;
-layout(binding = 5) writeonly buffer Keep { uint keep[]; };   // [cameras, splats]
-layout(binding = 6) readonly buffer Blocks { uint blocks[]; }; // [splats / 64], or anything without kBlocks
+layout(binding = 7) writeonly buffer Keep { uint keep[]; };   // [cameras, splats]
+layout(binding = 8) readonly buffer Blocks { uint blocks[]; }; // [splats / 64], or anything without kBlocks
 
 void main()
 {

@@ -5,16 +5,18 @@
 // of the depth (opencv: along z; others: from the camera), which rise with it
 #extension GL_GOOGLE_include_directive : require
 #include "splat.h"
+
+layout(binding = 12) readonly buffer Rows { vec4 rows[]; }; // [height] of a sweep: splat.h; else anything
 #include "lib/splat_lens_view.glsl"
 #include "lib/splat_record.glsl"
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
-layout(binding = 5) readonly buffer Keep { uint keep[]; };         // [cameras, splats]
-layout(binding = 6) readonly buffer Slots { uint slots[]; };       // [cameras, splats] kept ones before this one
-layout(binding = 7) writeonly buffer Records { uvec4 records[]; }; // [max_visible, kRayRecord]
-layout(binding = 8) writeonly buffer Sources { uint sources[]; };  // [max_visible] camera * splats + splat
-layout(binding = 9) writeonly buffer Depths { uint depths[]; };    // [max_visible]
+layout(binding = 7) readonly buffer Keep { uint keep[]; };         // [cameras, splats]
+layout(binding = 8) readonly buffer Slots { uint slots[]; };       // [cameras, splats] kept ones before this one
+layout(binding = 9) writeonly buffer Records { uvec4 records[]; }; // [max_visible, kRayRecord]
+layout(binding = 10) writeonly buffer Sources { uint sources[]; };  // [max_visible] camera * splats + splat
+layout(binding = 11) writeonly buffer Depths { uint depths[]; };    // [max_visible]
 
 void main()
 {

@@ -10,11 +10,11 @@
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
-layout(binding = 4) readonly buffer Keep { uint keep[]; };          // [cameras, splats]
-layout(binding = 5) readonly buffer Slots { uint slots[]; };        // [cameras, splats] kept ones before this one
-layout(binding = 6) writeonly buffer Records { uvec4 records[]; };  // [max_visible, kRecord]
-layout(binding = 7) writeonly buffer Sources { uint sources[]; };   // [max_visible] camera * splats + splat
-layout(binding = 8) writeonly buffer Depths { uint depths[]; };     // [max_visible]
+layout(binding = 7) readonly buffer Keep { uint keep[]; };          // [cameras, splats]
+layout(binding = 8) readonly buffer Slots { uint slots[]; };        // [cameras, splats] kept ones before this one
+layout(binding = 9) writeonly buffer Records { uvec4 records[]; };  // [max_visible, kRecord]
+layout(binding = 10) writeonly buffer Sources { uint sources[]; };   // [max_visible] camera * splats + splat
+layout(binding = 11) writeonly buffer Depths { uint depths[]; };     // [max_visible]
 
 void main()
 {

@@ -12,8 +12,8 @@ layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint kModel = 1;
 layout(push_constant) uniform Push { SplatPush p; };
 layout(binding = 0) readonly buffer Cameras { vec4 cameras[]; }; // [cameras, kCameraVectors]
-layout(binding = 1) readonly buffer Rows { vec4 rows[]; };       // [height] of a sweep: splat.h; else anything
-layout(binding = 2) writeonly buffer Rays { vec4 rays[]; };      // [cameras, height, width]
+layout(binding = 1) writeonly buffer Rays { vec4 rays[]; };      // [cameras, height, width]
+layout(binding = 2) readonly buffer Rows { vec4 rows[]; };       // [height] of a sweep: splat.h; else anything
 #include "lib/splat_camera.glsl"
 
 // of a sweep; false where nothing is fired

@@ -67,7 +67,7 @@ Result<std::vector<FramePixels>> draw(Device& device, const PicturesBenchOptions
         const SplatCamera seen = look(camera, o);
         SR_CHECK(rasterizer->draw({&seen, 1}).map([](uint32_t) {}));
         const SplatPixelSlots slots = rasterizer->pixels(0);
-        FramePixels& p = pictures.emplace_back(FramePixels{o.width, o.height, {}, {}, {}});
+        FramePixels& p = pictures.emplace_back(FramePixels{.width = o.width, .height = o.height});
         SR_TRY(p.seen, slots.seen.read<uint32_t>(device));
         SR_TRY(p.depths, slots.depths.read<uint32_t>(device));
         SR_TRY(p.normals, slots.normals.read<uint32_t>(device));

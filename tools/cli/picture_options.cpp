@@ -37,4 +37,15 @@ void add_depth_option(CLI::App& c, DepthFormat& depth, std::vector<std::string> 
                });
 }
 
+void add_flow_option(CLI::App& c, PictureEncoding& encoding)
+{
+    add_choice(
+        c, "--flow", {kFlowFormats.begin(), kFlowFormats.end()},
+        "also optical flow to the camera's next frame, flow/000000 in KITTI's 16-bit PNG or Middlebury's .flo, and "
+        "flow_state/000000.png: 1 seen there, 2 hidden, 3 outside, 0 nothing",
+        [&encoding](const std::string& word) {
+            encoding.flow = FlowFormat(std::ranges::find(kFlowFormats, word) - kFlowFormats.begin());
+        });
+}
+
 } // namespace semrover

@@ -13,4 +13,7 @@ void add_picture_options(CLI::App& command, PictureEncoding& encoding, uint32_t&
 // --depth: one of these words of kDepthFormats
 void add_depth_option(CLI::App& command, DepthFormat& depth, std::vector<std::string> words, const std::string& more);
 
+// --flow png|flo
+void add_flow_option(CLI::App& command, PictureEncoding& encoding);
+
 } // namespace semrover

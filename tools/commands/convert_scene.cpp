@@ -75,7 +75,7 @@ Result<Splats> splats_of(const ConvertSceneOptions& o, const VoxelGrid& grid, co
 {
     const ScenePoints points = points_of(grid);
     if (points.size() == 0)
-        return block_splats(grid);
+        return block_splats(grid).splats;
     SR_TRY(const PointSplatOptions options, point_splat_options(o.splat_radius, o.opacity));
     SR_TRY(const auto device, open_device(globals));
     SR_TRY(const SplatScene scene, SplatScene::create(*device, points, options));

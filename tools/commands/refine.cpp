@@ -136,7 +136,7 @@ Result<Refinement> resolve(const RefineArguments& o, const Globals& globals, con
         return fail(ErrorCode::usage, "-o/--output is required");
     RefinementOptions r = o.options;
     SR_CHECK(parse_frames(o.frames, r));
-    SR_TRY(r.draw, draw_options(o.trajectory));
+    SR_TRY(r.draw, draw_options(o.trajectory, o.options.input));
     r.radius_given = !o.trajectory.splat_radius.empty();
     if (o.size_given)
         r.size = ImageSize{o.trajectory.width, o.trajectory.height};
@@ -266,6 +266,7 @@ void add_options(CLI::App& c, RefineArguments& a)
         ->needs(frames);
     add_picture_options(c, o.encoding, o.threads);
     add_depth_option(c, o.encoding.depth, {"mm", "cm", "kitti256"}, "; of the buffers of a grid");
+    add_flow_option(c, o.encoding);
     c.add_option("--video", a.videos.frames, "also an MP4 of the frames, one per camera, through ffmpeg");
     c.add_option("--side-by-side", a.videos.side_by_side, "also an MP4 of label, buffer and frame");
     add_number(c, "--fps", a.videos.frames_per_second, "frames a second of the videos", 1, 240);

@@ -66,7 +66,7 @@ struct VideoOfFrames {
 Result<DrawingOptions> drawing_options(const RenderArguments& o, const Globals& globals)
 {
     DrawingOptions d;
-    SR_TRY(d.draw, draw_options(o.trajectory));
+    SR_TRY(d.draw, draw_options(o.trajectory, o.grid));
     d.draw.semantic = o.semantic;
     d.floats = o.floats;
     d.points = o.points;
@@ -153,6 +153,7 @@ void add_render(CLI::App& app, const Globals& globals, Run& run)
     add_picture_options(*c, o->encoding, o->threads);
     add_depth_option(*c, o->encoding.depth, {std::begin(kDepthFormats), std::end(kDepthFormats)},
                      ", or float32 metres in .npy");
+    add_flow_option(*c, o->encoding);
     add_choice(
         *c, "--lidar-format", {std::begin(kLidarFormats), std::end(kLidarFormats)},
         "of the points of a rig's lidars, in LIDAR/points/000000: .npy or .pcd of all fields, KITTI's .bin (x y z "

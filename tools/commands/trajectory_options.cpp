@@ -22,6 +22,23 @@ Result<std::array<uint8_t, 3>> background_of(const TrajectoryOptions& o)
     return std::array<uint8_t, 3>{uint8_t(r), uint8_t(g), uint8_t(b)};
 }
 
+bool is_of_object(const Actor& actor)
+{
+    return std::holds_alternative<ObjectOfScene>(actor.from);
+}
+
+// a file, or the one beside the grid
+Result<std::vector<SceneObject>> objects_of(const Path& file, const Path& grid)
+{
+    const Path path = file.empty() ? objects_beside(grid) : file;
+    if (file.empty() && !is_there(path))
+        return fail(ErrorCode::usage,
+                    "{} is not there, which --instances and actors need; --objects names another file, and `semrover "
+                    "convert {} NAME.objects.json -m MODEL` guesses them of the labels",
+                    quote_path(path), quote_path(grid));
+    return read_objects(path);
+}
+
 } // namespace
 
 void add_trajectory_options(CLI::App& c, TrajectoryOptions& o)
@@ -41,6 +58,10 @@ void add_trajectory_options(CLI::App& c, TrajectoryOptions& o)
     add_number(c, "--opacity", o.opacity, "of every splat", 0.01f, 1.f);
     add_number(c, "--visible-alpha", o.visible_alpha, "alpha from which a pixel counts as visible", 0.f, 1.f);
     c.add_option("--background", o.background, "R,G,B behind the splats");
+    c.add_flag("--instances", o.instances, "also pictures of which object a pixel shows: instance/000000.png");
+    c.add_option("--actors", o.actors, "actors.json: what moves (docs/formats.md §2.10)");
+    c.add_option("--objects", o.objects,
+                 "the scene's objects, for --instances and --actors; NAME.objects.json beside the grid by default");
 }
 
 Result<PointSplatOptions> point_splat_options(const std::string& splat_radius, float opacity)
@@ -57,7 +78,7 @@ Result<PointSplatOptions> point_splat_options(const std::string& splat_radius, f
     return s;
 }
 
-Result<DrawOptions> draw_options(const TrajectoryOptions& o)
+Result<DrawOptions> draw_options(const TrajectoryOptions& o, const Path& grid)
 {
     DrawOptions draw;
     draw.visible_alpha = o.visible_alpha;
@@ -70,6 +91,13 @@ Result<DrawOptions> draw_options(const TrajectoryOptions& o)
     if (o.equirect && o.width % 2)
         return fail(ErrorCode::usage, "--equirect draws W x W/2 pixels, and {} is odd", o.width);
     SR_TRY(draw.background, background_of(o));
+    draw.instances = o.instances;
+    if (!o.actors.empty()) {
+        SR_TRY(draw.actors, read_actors(o.actors));
+    }
+    if (o.instances || std::ranges::any_of(draw.actors, is_of_object)) {
+        SR_TRY(draw.objects, objects_of(o.objects, grid));
+    }
     return draw;
 }
 

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/splat/rasterizer.h"
+#include "engine/job/drawn_scene.h"
 
 #include <functional>
 
@@ -14,18 +14,18 @@ struct SweepImage {
     std::vector<float> alpha = {};  // sum of the weights of the splats on the ray
     std::vector<float> range = {};  // metres, to the splat with which alpha passes one half, else to the last
     std::vector<float> normal = {}; // [.., 3] weighted sum of normals in the sensor's axes, towards the sensor
-    std::vector<uint32_t> label = {};
+    std::vector<uint32_t> label = {}, instance = {};
 
-    uint64_t bytes() const { return 24 * uint64_t(alpha.size()); }
+    uint64_t bytes() const { return 28 * uint64_t(alpha.size()); }
 };
 
 // Draws the sweeps of one lidar. A sweep is drawn in parts of less than half a turn, each of which is a camera of a
 // rasterizer, without screen filter. The scene must outlive it.
-class SweepRasterizer {
+class SweepDrawing {
   public:
-    // errors: out_of_memory
-    static Result<std::unique_ptr<SweepRasterizer>> create(Device& device, const SplatScene& scene,
-                                                           std::shared_ptr<const Lidar> lidar);
+    // options: of the scene's pictures. Errors: out_of_memory
+    static Result<std::unique_ptr<SweepDrawing>> create(Device& device, const DrawnScene& scene,
+                                                        std::shared_ptr<const Lidar> lidar, RasterizerOptions options);
 
     // what a part has seen is on the device until `drawn` returns; a read of a ring that it starts is in time
     using Drawn = std::function<Status(uint32_t part, SplatSlots seen)>;
@@ -39,9 +39,11 @@ class SweepRasterizer {
     static uint64_t largest_read(const Lidar& lidar); // bytes of a slot
 
   private:
-    SweepRasterizer(std::shared_ptr<const Lidar> lidar);
-    std::vector<SplatCamera> cameras_of(const LidarSweep& sweep) const;
+    SweepDrawing(const DrawnScene& scene, std::shared_ptr<const Lidar> lidar);
+    CameraFrame frame_of(const LidarSweep& sweep, uint32_t part) const;
+    SplatCamera camera_of(const CameraFrame& frame, uint32_t part) const;
 
+    const DrawnScene& scene_;
     std::shared_ptr<const Lidar> lidar_;
     SweepPicture picture_;
     uint32_t part_width_ = 0, parts_ = 0;
