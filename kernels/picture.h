@@ -102,13 +102,14 @@ struct FrameAndDepth {
 struct AccumulateOptions {
     uint32_t width = 0, height = 0;
     SplatLens lens = SplatLens::pinhole; // of both cameras
+    bool moving = false;                 // one moves while it is read out, at least; no pinholes
     float share = 0;                     // of the frame before, 0..1
     float tolerance = 0.02f;             // relative, of the depth at which the frame before shows the surface
     float spread = 2; // the frame before is cut to this many standard deviations of the 3 x 3 pixels around
 };
 [[nodiscard]] Tensor accumulate(Graph& g,
                                 Tensor cameras, // [2, kLensCameraFloats] fp32 as of splat(): of `now`, where the world
-                                                // is its own frame, and of `past`
+                                                // is its own (still) frame, and of `past`
                                 const FrameAndDepth& now, const FrameAndDepth& past,
                                 const AccumulateOptions& options); // -> [picture_words()] u32 array
 

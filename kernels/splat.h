@@ -64,21 +64,22 @@ struct SplatTensors {
 };
 // how rays become pixels, of all cameras of one call: engine/camera/lens.h; spinning: a part of a lidar's sweep, of
 // less than a turn (SweepPicture, engine/camera/lidar.h)
-enum class SplatLens : uint32_t { pinhole, opencv, fisheye, equirectangular, spinning };
-constexpr uint32_t kLensCameraFloats = 28;
+enum class SplatLens : uint32_t { pinhole, opencv, fisheye, equirectangular, ftheta, spinning };
+constexpr uint32_t kLensCameraFloats = 40;
 constexpr uint32_t splat_camera_floats(SplatLens lens)
 {
     return lens == SplatLens::pinhole ? 16 : kLensCameraFloats;
 }
-constexpr uint32_t splat_record_bytes(SplatLens lens)
+constexpr uint32_t splat_record_bytes(SplatLens lens, bool moving)
 {
-    return lens == SplatLens::pinhole ? 64 : 80;
+    return lens == SplatLens::pinhole ? 64 : moving ? 96 : 80;
 }
 
 // rules where published rasterizers differ: docs/method.md §5.3; lenses but the pinhole: §5.4
 struct SplatOptions {
     uint32_t width = 0, height = 0; // pixels
     SplatLens lens = SplatLens::pinhole;
+    bool moving = false;      // cameras move while their pictures are read out; not of pinholes
     uint32_t max_visible = 0; // records of (camera, splat) that are kept; one too many and the image is wrong
     uint32_t max_pairs = 0;   // pairs of a record and a tile that it touches; likewise
     uint32_t tile = 16;       // pixels, a multiple of 16; the image does not depend on it
@@ -113,8 +114,11 @@ struct SplatImages { // [cameras * height * width] rows; w = weight of a splat i
                                   Tensor scale); // [1, 2] fp32: scale, offset -> [P] fp32 array
 [[nodiscard]] SplatImages
 splat(Graph& g, const SplatTensors& scene,
-      // [C, 16] fp32: fx fy cx cy, world to camera [3, 4]; fx = 0: sees nothing. With another lens [C, 28], then
-      // 8 numbers of distortion, limit of the lens, 1 where depth is from the camera instead of along z, 0, 0
+      // [C, 16] fp32: fx fy cx cy, world to camera [3, 4]; fx = 0: sees nothing. With another lens [C, 40], then
+      // 12 numbers of distortion; limit of the lens, 1 where depth is from the camera instead of along z, r, reach of
+      // the lens; turn of the camera during its readout (axis times radians), p; shift (metres), q. Turn and shift are
+      // of its frame in the middle of the readout, which is that of `world to camera`. The line of a pixel at (x, y) is
+      // read at the part p x + q y + r, from -1/2 to 1/2.
       Tensor cameras, const SplatOptions& options);
 
 } // namespace semrover

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/camera/lens.h"
+#include "engine/camera/camera_view.h"
 #include "engine/camera/rig.h"
 #include "engine/deferred/frame_images.h"
 #include "tests/says.h"
@@ -312,7 +312,7 @@ TEST(Rig, every_pose_of_the_path_gives_a_frame_of_every_sensor)
     const auto rig = read_rig(folder.put("rig.json", kRig));
     ASSERT_TRUE(rig) << rig.error().message;
     const auto drive = read_tum(folder.put("a.tum", "0 10 0 0 -0.5 0.5 -0.5 0.5\n1 20 0 0 -0.5 0.5 -0.5 0.5"), kView);
-    const CameraPath path = expand_rig(*rig, *drive);
+    const CameraPath path = *expand_rig(*rig, *drive);
     ASSERT_EQ(path.frames.size(), 4u);
     EXPECT_EQ(path.frames[2].camera, "front");
     EXPECT_EQ(path.frames[2].time, 1);
@@ -337,7 +337,7 @@ TEST(Rig, a_path_of_vehicle_poses_is_taken_as_such)
     const auto rig = read_rig(folder.put("rig.json", text));
     ASSERT_TRUE(rig) << rig.error().message;
     const auto drive = read_tum(folder.put("a.tum", "0 10 0 0 0 0 0 1"), kView);
-    EXPECT_NEAR(project(expand_rig(*rig, *drive).frames[0], {13, 0, 0.5})->depth, 2, 1e-12);
+    EXPECT_NEAR(project(expand_rig(*rig, *drive)->frames[0], {13, 0, 0.5})->depth, 2, 1e-12);
 }
 
 TEST(Rig, sensors_may_have_any_lens)
@@ -372,7 +372,7 @@ TEST(Rig, the_examples_look_where_their_names_say)
         const auto rig = read_rig(fmt::format("{}/assets/rigs/{}.json", SEMROVER_SOURCE_DIR, name));
         ASSERT_TRUE(rig) << rig.error().message;
         EXPECT_EQ(rig->sensors.size(), std::string_view(name) == "waymo" ? 5u : 6u);
-        const CameraPath path = expand_rig(*rig, *drive);
+        const CameraPath path = *expand_rig(*rig, *drive);
         const Point3 at = translation_of(drive->frames[0].pose.camera_to_world());
         for (size_t i = 0; i < rig->sensors.size(); ++i) {
             const std::string& camera = path.frames[i].camera;

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/camera/lens.h"
+#include "engine/camera/camera_view.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
 #include "tools/trajectory/camera_path.h"

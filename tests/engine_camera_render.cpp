@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/camera/lens.h"
+#include "engine/camera/camera_view.h"
 #include "engine/splat/rasterizer.h"
 #include "tests/kernel_case.h"
 #include "tests/scratch_folder.h"

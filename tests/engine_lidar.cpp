@@ -144,7 +144,7 @@ TEST(engine_lidar, a_rig_has_lidars_beside_cameras)
     CameraPath drive;
     for (const double x : {0.0, 2.0}) // a camera that looks along +x of the world
         drive.frames.push_back({x, "", {{0, -1, 0, 0, 0, 0, -1, 0, 1, 0, 0, -x, 0, 0, 0, 1}}, {}});
-    const CameraPath path = expand_rig(*rig, drive);
+    const CameraPath path = expand_rig(*rig, drive).value();
     ASSERT_EQ(path.frames.size(), 2u);
     ASSERT_EQ(path.sweeps.size(), 2u);
     EXPECT_EQ(path.sweeps[1].sensor, "top");
@@ -152,6 +152,17 @@ TEST(engine_lidar, a_rig_has_lidars_beside_cameras)
     const Point3 ahead = transform(path.sweeps[1].end, {1, 0, 0}); // it looks backwards
     EXPECT_NEAR(ahead[0], 2, 1e-12);
     EXPECT_NEAR(ahead[2], 2, 1e-12);
+    // a twentieth of a second at 1 m/s; before the first pose as after it
+    EXPECT_NEAR(translation_of(path.sweeps[1].begin)[0], 3 - 0.05, 1e-12);
+    EXPECT_NEAR(translation_of(path.sweeps[0].begin)[0], 1 - 0.05, 1e-12);
+    EXPECT_NEAR(translation_of(path.sweeps[1].at(0, 180))[0], 3 - 0.025, 1e-12);
+    drive.numbered = true;
+    const CameraPath numbered = expand_rig(*rig, drive).value();
+    EXPECT_EQ(numbered.sweeps[1].begin, numbered.sweeps[1].end);
+    EXPECT_EQ(numbered.warnings.size(), 1u);
+    drive.numbered = false;
+    drive.frames[1].time = 0;
+    EXPECT_TRUE(says(expand_rig(*rig, drive), "need poses at times that rise"));
 }
 
 // of a lidar that stands at the origin: every ray meets a wall of `label`, at right angles, `range` metres away
@@ -197,6 +208,20 @@ TEST(engine_lidar, returns_come_in_the_order_of_firing_where_their_rays_met_some
     }
     EXPECT_NEAR(first.x, -20 * std::cos(pi / 18), 1e-5);
     EXPECT_NEAR(first.z, 20 * std::sin(pi / 18), 1e-5);
+}
+
+TEST(engine_lidar, returns_lie_where_their_rays_met_something_as_seen_from_the_end_of_the_sweep)
+{
+    const Lidar lidar = made();
+    LidarSweep sweep{0, "top", std::make_shared<const Lidar>(lidar)};
+    sweep.end = rigid_from_quaternion({2, 0.3, 0}, {0, 0, 0.1, 0.995}, "end").value();
+    const std::vector<LidarPoint> points = lidar_returns(sweep, wall(lidar, 2, 20), 0.5f);
+    for (const LidarPoint& p : points) {
+        const double share = p.time * 1e-6 * lidar.rate; // what the file says is enough to go back
+        const Point3 world = transform(sweep.end, {p.x, p.y, p.z});
+        const Point3 then = transform(inverse(interpolate(sweep.begin, sweep.end, share)), world);
+        ASSERT_NEAR(std::hypot(then[0], then[1], then[2]), 20, 1e-4);
+    }
 }
 
 TEST(engine_lidar, returns_are_lost_where_too_little_light_comes_back)

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // trajectories that other programs and data sets write
+#include "engine/camera/camera_view.h"
 #include "engine/camera/rig.h"
 #include "engine/format/image.h"
 #include "tests/says.h"
@@ -213,9 +214,9 @@ TEST_F(DataSetPaths, carry_rigs)
 {
     const CameraPath imu = read("poses.txt", "3 1 0 0 1 0 -1 0 2 0 0 -1 3\n");
     Rig rig{PathAxes::vehicle, {{"front", kView, {0, 0, 1, 0, 1, 0, 0, 0, 0, 1, 0, -0.5, 0, 0, 0, 1}}}};
-    expect_looking_along_x(expand_rig(rig, imu), 0, {1, 2, 3.5}); // in the IMU's axes, up is -z
+    expect_looking_along_x(*expand_rig(rig, imu), 0, {1, 2, 3.5}); // in the IMU's axes, up is -z
     rig = {PathAxes::camera, {{"front", kView, {0, 0, 1, 0, -1, 0, 0, 0, 0, -1, 0, 0.5, 0, 0, 0, 1}}}};
-    expect_looking_along_x(expand_rig(rig, imu), 0, {1, 2, 3.5}); // x forward, y left, z up
+    expect_looking_along_x(*expand_rig(rig, imu), 0, {1, 2, 3.5}); // x forward, y left, z up
 }
 
 TEST(PathFiles, a_placement_applies_in_its_order)

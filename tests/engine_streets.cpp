@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+#include "engine/camera/camera_view.h"
 #include "engine/conditioning/cell_objects.h"
 #include "engine/scene/palette.h"
 #include "runtime/base/hash.h"

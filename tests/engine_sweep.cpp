@@ -79,7 +79,7 @@ Met cast(const std::vector<HostSplat>& splats, const LidarSweep& sweep, uint32_t
     static const Intrinsics sphere = whole_sphere(2, 1); // depths from the camera
     static const Lens lens(sphere);
     const SplatRules rules{.near = 0.05};
-    const Rigid world_to_sensor = inverse(sweep.at(column));
+    const Rigid world_to_sensor = inverse(sweep.at(beam, column));
     LensCamera camera{sphere, {}};
     std::ranges::copy(std::span(world_to_sensor).first(12), camera.view.begin());
     const Point3 ray = sweep.lidar->ray(beam, column);
@@ -173,6 +173,18 @@ TEST(engine_sweep, matches_it_for_tables_of_sensors_and_of_the_least_size)
     expect_as_cast(splats, sweep_of(lidar_of(5, false, {{0, 0}}), kStill, kStill));
 }
 
+TEST(engine_sweep, matches_it_where_the_sensor_moves)
+{
+    const std::vector<HostSplat> splats = splats_around(400, 21);
+    Lidar lidar = lidar_of(240, true, {{0.5, 0.3, 300}, {0.1, -0.2}, {0, 0.1, 5000}, {-0.15, 0, 0, 2}, {-0.4, -0.3}});
+    for (const auto& [x, yaw] : {std::pair{0.5, 0.0}, {3.0, 0.1}, {0.0, 0.6}, {-2.0, -0.3}}) {
+        const Rigid move =
+            rigid_from_quaternion({x, 0.1 * x, -0.02}, {0.01, 0, std::sin(yaw / 2), std::cos(yaw / 2)}, "move").value();
+        SCOPED_TRACE(fmt::format("{} m, {} radians", x, yaw));
+        expect_as_cast(splats, sweep_of(lidar, kStill, compose(kStill, move)));
+    }
+}
+
 // splats that a part may lose: as wide as the sky, on a part's edges, around and above the sensor
 TEST(engine_sweep, no_ray_loses_a_splat)
 {
@@ -186,7 +198,8 @@ TEST(engine_sweep, no_ray_loses_a_splat)
         s.sigma_v = double(float(s.sigma_v * scale));
         if (i % 5 == 4)
             s.position = {double(float(0.02 * normal(random))), 0.01, i % 2 ? 2.0 : -2.0};
-        const LidarSweep sweep = sweep_of(lidar, kIdentity, kIdentity);
+        const Rigid move = rigid_from_quaternion({1.5, -0.2, 0}, {0, 0, 0.1, 0.995}, "move").value();
+        const LidarSweep sweep = sweep_of(lidar, kIdentity, i % 2 ? move : kIdentity);
         const SweepImage image = draw(scene_on_device({s}), sweep);
         const SweepPicture picture(lidar);
         for (uint32_t beam = 0; beam < lidar.beams.size(); ++beam)

@@ -7,10 +7,7 @@ namespace kernel_splat_lens_test {
 
 constexpr std::array<double, 12> kStraight = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
 
-double narrowed(double v)
-{
-    return double(float(v));
-}
+using semrover::narrowed;
 
 // numbers as fp32 has them
 Intrinsics narrowed(Intrinsics k)
@@ -22,7 +19,7 @@ Intrinsics narrowed(Intrinsics k)
     return k;
 }
 
-Intrinsics lens(CameraModel model, uint32_t width, uint32_t height, std::array<double, 8> distortion = {},
+Intrinsics lens(CameraModel model, uint32_t width, uint32_t height, std::array<double, 12> distortion = {},
                 double focal = 0.6)
 {
     if (model == CameraModel::equirectangular)
@@ -31,9 +28,9 @@ Intrinsics lens(CameraModel model, uint32_t width, uint32_t height, std::array<d
         {focal * width, 1.04 * focal * width, width / 2.0 + 1.3, height / 2.0 - 0.7, width, height, model, distortion});
 }
 
-const std::array<double, 8> kBarrel = {-0.3, 0.1, 0.002, -0.001, -0.01};
-const std::array<double, 8> kRational = {0.4, -0.05, 0.001, 0.0015, 0.01, 0.75, 0.1, 0.02};
-const std::array<double, 8> kKannala = {-0.03, 0.012, -0.006, 0.0009};
+const std::array<double, 12> kBarrel = {-0.3, 0.1, 0.002, -0.001, -0.01};
+const std::array<double, 12> kRational = {0.4, -0.05, 0.001, 0.0015, 0.01, 0.75, 0.1, 0.02};
+const std::array<double, 12> kKannala = {-0.03, 0.012, -0.006, 0.0009};
 
 std::array<double, 12> turned(double yaw, double pitch, double shift)
 {
@@ -42,22 +39,6 @@ std::array<double, 12> turned(double yaw, double pitch, double shift)
     for (double& v : view)
         v = narrowed(v);
     return view;
-}
-
-// splats all around the origin, 0.5 to 9 m away
-std::vector<HostSplat> splats_around(uint32_t n, uint32_t seed, double smallest = 0.01, double largest = 0.35)
-{
-    std::vector<HostSplat> splats = random_splats(n, seed, smallest, largest);
-    std::mt19937 random(seed + 1);
-    std::normal_distribution<double> normal;
-    std::uniform_real_distribution<double> unit(0, 1);
-    for (HostSplat& s : splats) {
-        Vector p = {normal(random), normal(random), normal(random)};
-        const double length = std::sqrt(dot(p, p)), away = 0.5 + 8.5 * unit(random);
-        for (size_t a = 0; a < 3; ++a)
-            s.position[a] = narrowed(p[a] / length * away);
-    }
-    return splats;
 }
 
 struct LensCase {

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "kernels/splat.h"
+#include "engine/splat/rasterizer.h"
 #include "tests/kernel_case.h"
-#include "tests/splat_lens_reference.h"
+#include "tests/splat_moving_reference.h"
 
 namespace semrover {
 
@@ -105,14 +105,30 @@ inline SplatPixels run_splats(const std::vector<HostSplat>& splats, const std::v
             table.push_back(float(v));
         for (double v : c.intrinsics.distortion)
             table.push_back(float(v));
-        for (double v : {lens.limit(), lens.radial_depth() ? 1.0 : 0.0, 0.0, 0.0})
+        for (double v : {lens.limit(), lens.radial_depth() ? 1.0 : 0.0})
             table.push_back(float(v));
+        table.resize(round_up(uint32_t(table.size()), kLensCameraFloats)); // none moves
     }
     const Intrinsics& k = cameras[0].intrinsics;
     options.width = k.width;
     options.height = k.height;
     options.lens = SplatLens(uint32_t(k.model));
     return run_splats(splats, table, options, {}, movers);
+}
+
+// cameras that move while they are read out, all of one model and size
+inline SplatPixels run_splats(const std::vector<HostSplat>& splats, const std::vector<MovingCamera>& cameras,
+                              SplatOptions options = {})
+{
+    std::vector<float> table(cameras.size() * kLensCameraFloats);
+    for (size_t i = 0; i < cameras.size(); ++i)
+        write_row(splat_camera(cameras[i].frame()), std::span(table).subspan(i * kLensCameraFloats, kLensCameraFloats));
+    const CameraFrame frame = cameras[0].frame();
+    options.width = frame.intrinsics.width;
+    options.height = frame.intrinsics.height;
+    options.lens = lens_of(drawn_model(frame));
+    options.moving = true;
+    return run_splats(splats, table, options);
 }
 
 // splats of all sizes in front of a camera that looks along +z, values as fp32 has them
@@ -136,6 +152,27 @@ inline std::vector<HostSplat> random_splats(uint32_t n, uint32_t seed, double sm
         out.push_back(s);
     }
     return out;
+}
+
+inline double narrowed(double v)
+{
+    return double(float(v));
+}
+
+// splats all around the origin, 0.5 to 9 m away
+inline std::vector<HostSplat> splats_around(uint32_t n, uint32_t seed, double smallest = 0.01, double largest = 0.35)
+{
+    std::vector<HostSplat> splats = random_splats(n, seed, smallest, largest);
+    std::mt19937 random(seed + 1);
+    std::normal_distribution<double> normal;
+    std::uniform_real_distribution<double> unit(0, 1);
+    for (HostSplat& s : splats) {
+        Vector p = {normal(random), normal(random), normal(random)};
+        const double length = std::sqrt(dot(p, p)), away = 0.5 + 8.5 * unit(random);
+        for (size_t a = 0; a < 3; ++a)
+            s.position[a] = narrowed(p[a] / length * away);
+    }
+    return splats;
 }
 
 // moved sideways and turned about y by `yaw`; the numbers as fp32 has them

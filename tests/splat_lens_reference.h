@@ -17,6 +17,7 @@ struct LensCamera {
 struct LensSplat {
     Vector center, u, v, normal; // camera frame; u and v unit
     double key;                  // of the sort
+    double depth;                // of the centre
     bool kept;
     std::optional<Projection> pixel;
 };
@@ -29,13 +30,14 @@ inline LensSplat place(const HostSplat& s, const LensCamera& c, const Lens& lens
                       c.view[8] * v[0] + c.view[9] * v[1] + c.view[10] * v[2]};
     };
     const auto [u, v] = tangents(s.normal);
-    LensSplat r{turn(s.position), turn(u), turn(v), turn(s.normal), 0, false, {}};
+    LensSplat r{turn(s.position), turn(u), turn(v), turn(s.normal), 0, 0, false, {}};
     for (size_t a = 0; a < 3; ++a)
         r.center[a] += c.view[4 * a + 3];
     if (dot(r.normal, r.center) > 0)
         for (double& x : r.normal)
             x = -x;
     r.key = c.intrinsics.model == CameraModel::opencv ? r.center[2] : std::sqrt(dot(r.center, r.center));
+    r.depth = lens.radial_depth() ? std::sqrt(dot(r.center, r.center)) : r.center[2];
     r.kept = r.key > rules.near;
     r.pixel = lens.project(r.center);
     return r;
@@ -59,8 +61,7 @@ inline double alpha_at(const LensSplat& s, const HostSplat& splat, const LensCam
         r2 = (across * across + std::pow(y - s.pixel->y, 2)) / rules.screen_variance;
     }
     const bool surface = r3 <= r2, axial = c.intrinsics.model == CameraModel::opencv;
-    const double away = std::sqrt(dot(s.center, s.center));
-    z = lens.radial_depth() ? (surface ? distance : away) : (surface ? distance * r[2] : s.center[2]);
+    z = !surface ? s.depth : lens.radial_depth() ? distance : distance * r[2];
     const bool near = surface && (axial ? distance * r[2] : distance) < rules.near;
     const double nearest = std::min(r3, r2);
     const double alpha = std::min(rules.alpha_max, splat.opacity * std::exp(-0.5 * nearest));

@@ -3,7 +3,6 @@
 #include "engine/camera/camera.h"
 
 #include "engine/camera/image_size.h"
-#include "engine/camera/lens.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,12 +12,29 @@ namespace semrover {
 
 namespace {
 
-constexpr std::string_view kModelNames[] = {"pinhole", "opencv", "fisheye", "equirectangular"};
+constexpr std::string_view kModelNames[] = {"pinhole", "opencv", "fisheye", "equirectangular", "ftheta"};
+constexpr std::string_view kDirectionNames[] = {"down", "up", "right", "left"};
 constexpr double kMostDistortion = 1e6; // beyond any lens, and squares are finite in fp32
+
+Status check_ftheta(const Distortion& k, std::string_view where)
+{
+    if (!(k[0] > 0))
+        return fail(ErrorCode::bad_input, "{}: a polynomial that does not rise at 0, its second coefficient is {}",
+                    where, k[0]);
+    if (!(k[5] - k[6] * k[7] > 1e-3))
+        return fail(ErrorCode::bad_input, "{}: linear_cde {}, {}, {} turns pictures over or folds them", where, k[5],
+                    k[6], k[7]);
+    if (!(k[8] > 0))
+        return fail(ErrorCode::bad_input, "{}: expected a max_angle above 0 radians, found {}", where, k[8]);
+    return {};
+}
 
 Status check_model(const Intrinsics& k, std::string_view where)
 {
-    const size_t coefficients = k.model == CameraModel::opencv ? 8 : k.model == CameraModel::fisheye ? 4 : 0;
+    const size_t coefficients = k.model == CameraModel::opencv    ? 12
+                                : k.model == CameraModel::fisheye ? 4
+                                : k.model == CameraModel::ftheta  ? 10
+                                                                  : 0;
     for (size_t i = 0; i < k.distortion.size(); ++i) {
         if (!std::isfinite(k.distortion[i]) || std::abs(k.distortion[i]) > kMostDistortion)
             return fail(ErrorCode::bad_input, "{}: expected distortion coefficients of at most {:g}, found {}", where,
@@ -27,6 +43,8 @@ Status check_model(const Intrinsics& k, std::string_view where)
             return fail(ErrorCode::bad_input, "{}: a camera of model {} has no distortion coefficient {}, found {}",
                         where, name_of(k.model), i + 1, k.distortion[i]);
     }
+    if (k.model == CameraModel::ftheta)
+        return check_ftheta(k.distortion, where);
     if (k.model != CameraModel::equirectangular)
         return {};
     const Intrinsics whole = whole_sphere(k.width, k.height);
@@ -77,7 +95,7 @@ Intrinsics whole_sphere(uint32_t width, uint32_t height)
 
 Intrinsics simplified(Intrinsics intrinsics)
 {
-    if (intrinsics.model == CameraModel::opencv && intrinsics.distortion == std::array<double, 8>{})
+    if (intrinsics.model == CameraModel::opencv && intrinsics.distortion == Distortion{})
         intrinsics.model = CameraModel::pinhole;
     return intrinsics;
 }
@@ -108,9 +126,22 @@ std::optional<CameraModel> camera_model_of(std::string_view name)
     return CameraModel(found - std::begin(kModelNames));
 }
 
-std::optional<Projection> project(const CameraFrame& frame, const Point3& world)
+std::string_view name_of(ShutterDirection direction)
 {
-    return Lens(frame.intrinsics).project(transform(frame.pose.world_to_camera, world));
+    return kDirectionNames[size_t(direction)];
+}
+
+std::optional<ShutterDirection> shutter_direction_of(std::string_view name)
+{
+    const auto found = std::ranges::find(kDirectionNames, name);
+    if (found == std::end(kDirectionNames))
+        return std::nullopt;
+    return ShutterDirection(found - std::begin(kDirectionNames));
+}
+
+Rigid LidarSweep::at(uint32_t beam, uint32_t column) const
+{
+    return interpolate(begin, end, lidar->firing_microseconds(beam, column) * 1e-6 * lidar->rate);
 }
 
 Rigid CameraPath::file_pose(size_t frame) const

@@ -58,14 +58,14 @@ Status read_beams(const Json& json, Lidar& lidar, std::string_view where)
 {
     SR_TRY(const std::vector<double> elevations, read_elevations(json, where));
     const size_t n = elevations.size();
-    const double column = 1e6 / lidar.rate / lidar.columns; // microseconds
     SR_TRY(const std::vector<double> azimuths, beam_numbers(json, "azimuths", n, -90, 90, 0, where));
     SR_TRY(const std::vector<double> delays, beam_numbers(json, "times", n, 0, 1e6 / lidar.rate, 0, where));
     SR_TRY(const std::vector<double> every, beam_numbers(json, "every", n, 1, lidar.columns, 1, where));
     for (size_t i = 0; i < n; ++i) {
         if (every[i] != std::floor(every[i]))
             return fail(ErrorCode::bad_input, "{}: every: expected whole numbers, found {}", where, every[i]);
-        lidar.beams.push_back({elevations[i] * kRadians, azimuths[i] * kRadians + delays[i] / column * lidar.step(),
+        lidar.beams.push_back({elevations[i] * kRadians,
+                               azimuths[i] * kRadians + delays[i] / lidar.column_microseconds() * lidar.step(),
                                delays[i], uint32_t(every[i])});
     }
     return {};
@@ -110,7 +110,7 @@ double Lidar::step() const
 
 double Lidar::firing_microseconds(uint32_t beam, uint32_t column) const
 {
-    return 1e6 / rate * column / columns + beams[beam].delay;
+    return column_microseconds() * column + beams[beam].delay;
 }
 
 uint32_t Lidar::ring(uint32_t beam) const

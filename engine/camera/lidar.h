@@ -33,6 +33,7 @@ struct Lidar {
 
     double step() const; // from a column to the next, radians clockwise
     double sweep_seconds() const { return 1 / rate; }
+    double column_microseconds() const { return 1e6 / rate / columns; }
     double firing_microseconds(uint32_t beam, uint32_t column) const; // after the sweep begins
     uint32_t ring(uint32_t beam) const;
     Point3 ray(uint32_t beam, uint32_t column) const; // unit, in the sensor's axes

@@ -2,10 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/camera/rig.h"
 
+#include "engine/camera/ftheta_json.h"
 #include "runtime/base/json_numbers.h"
 #include "runtime/base/quote.h"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 namespace semrover {
@@ -42,8 +44,8 @@ Result<CameraModel> read_model(const Json& json, std::string_view where)
     const auto found = model.is_string() ? camera_model_of(model.get_ref<const std::string&>()) : std::nullopt;
     if (!found)
         return fail(ErrorCode::bad_input,
-                    "{}: model {} is not supported, expected \"pinhole\", \"opencv\", \"fisheye\" or "
-                    "\"equirectangular\"",
+                    "{}: model {} is not supported, expected \"pinhole\", \"opencv\", \"fisheye\", "
+                    "\"equirectangular\" or \"ftheta\"",
                     where, printable(model.dump(-1, ' ', true), 60));
     return *found;
 }
@@ -67,12 +69,12 @@ Status read_distortion(const Json& json, Intrinsics& k, std::string_view where)
     const std::string what = fmt::format("{}: distortion", where);
     SR_TRY(const std::vector<double> values, numbers_of(json["distortion"], what));
     const size_t n = values.size();
-    const bool fits = k.model == CameraModel::opencv    ? n == 4 || n == 5 || n == 8
+    const bool fits = k.model == CameraModel::opencv    ? n == 4 || n == 5 || n == 8 || n == 12
                       : k.model == CameraModel::fisheye ? n == 4
                                                         : n == 0;
     if (!fits)
         return fail(ErrorCode::bad_input, "{}: expected {} of model {}, found {}", what,
-                    k.model == CameraModel::opencv    ? "4, 5 or 8 numbers"
+                    k.model == CameraModel::opencv    ? "4, 5, 8 or 12 numbers"
                     : k.model == CameraModel::fisheye ? "4 numbers"
                                                       : "no numbers",
                     name_of(k.model), n);
@@ -89,12 +91,21 @@ Result<Intrinsics> read_intrinsics(const Json& json, std::string_view where)
     SR_TRY(k.height, image_side(height, fmt::format("{}: height", where)));
     SR_TRY(k.model, read_model(json, where));
     SR_TRY(const std::optional<double> fov, optional_number(json, "fov", where));
+    for (const std::string_view key : kFthetaKeys)
+        if (k.model != CameraModel::ftheta && json.contains(key))
+            return fail(ErrorCode::bad_input, "{}: {}, which a sensor of model {} has not", where, key,
+                        name_of(k.model));
     const bool focal = json.contains("fx") || json.contains("fy") || json.contains("cx") || json.contains("cy");
     if (k.model == CameraModel::equirectangular) {
         if (fov || focal)
             return fail(ErrorCode::bad_input, "{}: an equirectangular sensor sees the whole sphere, without fov or fx",
                         where);
         k = whole_sphere(k.width, k.height);
+    } else if (k.model == CameraModel::ftheta) {
+        if (fov || focal)
+            return fail(ErrorCode::bad_input, "{}: a sensor of model ftheta has a polynomial, without fov or fx",
+                        where);
+        SR_CHECK(read_ftheta(json, k, where));
     } else if (fov) {
         if (focal)
             return fail(ErrorCode::bad_input, "{}: expected fov or fx, fy, cx, cy, found both", where);
@@ -131,6 +142,36 @@ Result<Rigid> read_mounting(const Json& json, std::string_view where)
     return rigid_from_quaternion({t[0], t[1], t[2]}, {q[0], q[1], q[2], q[3]}, where);
 }
 
+// microseconds, whole ones
+Result<int64_t> read_microseconds(const Json& json, const char* key, int64_t low, std::string_view where)
+{
+    constexpr int64_t kMost = 1'000'000;
+    SR_TRY(const double value, required_number(json, key, where));
+    if (value != std::floor(value) || value < double(low) || value > kMost)
+        return fail(ErrorCode::bad_input, "{}: {}: expected whole microseconds from {} to {}, found {}", where, key,
+                    low, kMost, value);
+    return int64_t(value);
+}
+
+Result<std::optional<Shutter>> read_shutter(const Json& json, std::string_view where)
+{
+    if (!json.is_object())
+        return fail(ErrorCode::bad_input, "{}: expected an object, found {}", where, json.type_name());
+    SR_CHECK(check_keys(json, {"direction", "start", "readout", "comment"}, where));
+    const Json direction = json.value("direction", Json());
+    const auto found =
+        direction.is_string() ? shutter_direction_of(direction.get_ref<const std::string&>()) : std::nullopt;
+    if (!found)
+        return fail(ErrorCode::bad_input, "{}: direction: expected \"down\", \"up\", \"right\" or \"left\", found {}",
+                    where, printable(direction.dump(-1, ' ', true), 60));
+    Shutter shutter{.direction = *found};
+    if (json.contains("start")) {
+        SR_TRY(shutter.start, read_microseconds(json, "start", -1'000'000, where));
+    }
+    SR_TRY(shutter.readout, read_microseconds(json, "readout", 0, where));
+    return std::optional(shutter);
+}
+
 Result<std::string> read_name(const Json& json, std::string_view where)
 {
     if (!json.contains("name") || !json["name"].is_string() ||
@@ -145,11 +186,15 @@ Result<Sensor> read_sensor(const Json& json, std::string_view where)
 {
     SR_CHECK(check_keys(json,
                         {"name", "model", "width", "height", "fov", "fx", "fy", "cx", "cy", "distortion",
-                         "sensor_to_vehicle", "comment"},
+                         "principal_point", "reference_poly", "pixeldist_to_angle_poly", "angle_to_pixeldist_poly",
+                         "max_angle", "linear_cde", "shutter", "sensor_to_vehicle", "comment"},
                         where));
     Sensor sensor;
     SR_TRY(sensor.name, read_name(json, where));
     SR_TRY(sensor.intrinsics, read_intrinsics(json, where));
+    if (json.contains("shutter")) {
+        SR_TRY(sensor.shutter, read_shutter(json["shutter"], fmt::format("{}: shutter", where)));
+    }
     SR_TRY(sensor.sensor_to_vehicle,
            read_mounting(json["sensor_to_vehicle"], fmt::format("{}: sensor_to_vehicle", where)));
     return sensor;
@@ -170,6 +215,63 @@ Result<LidarSensor> read_lidar_sensor(const Json& json, const Path& folder, std:
     SR_TRY(sensor.sensor_to_vehicle,
            read_mounting(json["sensor_to_vehicle"], fmt::format("{}: sensor_to_vehicle", where)));
     return sensor;
+}
+
+// where the vehicle is at any time
+class Course {
+  public:
+    void add(double time, const Rigid& vehicle_to_world)
+    {
+        times_.push_back(time);
+        poses_.push_back(vehicle_to_world);
+    }
+    const Rigid& pose(size_t i) const { return poses_[i]; }
+
+    // bad_input unless times rise
+    Status check() const
+    {
+        for (size_t i = 1; i < times_.size(); ++i)
+            if (!(times_[i] > times_[i - 1]))
+                return fail(
+                    ErrorCode::bad_input,
+                    "rolling shutters and lidars need poses at times that rise: pose {} is at {} s, the one before at "
+                    "{} s",
+                    i, times_[i], times_[i - 1]);
+        return {};
+    }
+
+    Rigid at(double time) const
+    {
+        if (poses_.size() == 1)
+            return poses_[0];
+        const auto after = std::upper_bound(times_.begin() + 1, times_.end() - 1, time) - times_.begin();
+        const double since = time - times_[after - 1], between = times_[after] - times_[after - 1];
+        return interpolate(poses_[after - 1], poses_[after], since / between);
+    }
+
+  private:
+    std::vector<double> times_;
+    std::vector<Rigid> poses_;
+};
+
+// of a frame at pose i of the vehicle
+Readout readout_of(const Sensor& sensor, const CameraFrame& frame, const Course& course, size_t i)
+{
+    const auto pose_at = [&](int64_t microseconds) {
+        const Rigid vehicle = course.at(frame.time + double(microseconds) * 1e-6);
+        if (vehicle == course.pose(i)) // to the bit, as without a shutter
+            return frame.pose;
+        return Pose{compose(inverse(sensor.sensor_to_vehicle), inverse(vehicle))};
+    };
+    const Shutter& s = *sensor.shutter;
+    return {s.direction, pose_at(s.start), pose_at(s.start + s.readout)};
+}
+
+// of a lens with distortion, those that it needs
+size_t coefficients_of(const Intrinsics& k)
+{
+    const bool prism = std::ranges::any_of(std::span(k.distortion).subspan(8), [](double v) { return v != 0; });
+    return k.model == CameraModel::fisheye ? 4 : prism ? 12 : 8;
 }
 
 Result<PathAxes> read_path_axes(const Json& file, std::string_view where)
@@ -222,10 +324,16 @@ Json rig_json(std::span<const Sensor> sensors)
         const Intrinsics& k = s.intrinsics;
         Json sensor{
             {"name", s.name}, {"model", std::string(name_of(k.model))}, {"width", k.width}, {"height", k.height}};
-        if (k.model != CameraModel::equirectangular)
+        if (k.model == CameraModel::ftheta)
+            put_ftheta(sensor, k);
+        else if (k.model != CameraModel::equirectangular)
             sensor.update({{"fx", k.fx}, {"fy", k.fy}, {"cx", k.cx}, {"cy", k.cy}});
         if (k.model == CameraModel::opencv || k.model == CameraModel::fisheye)
-            sensor["distortion"] = std::span(k.distortion).first(k.model == CameraModel::opencv ? 8 : 4);
+            sensor["distortion"] = std::span(k.distortion).first(coefficients_of(k));
+        if (s.shutter)
+            sensor["shutter"] = {{"direction", std::string(name_of(s.shutter->direction))},
+                                 {"start", s.shutter->start},
+                                 {"readout", s.shutter->readout}};
         for (size_t row = 0; row < 4; ++row)
             sensor["sensor_to_vehicle"].push_back(std::span(s.sensor_to_vehicle).subspan(4 * row, 4));
         list.push_back(std::move(sensor));
@@ -233,18 +341,20 @@ Json rig_json(std::span<const Sensor> sensors)
     return {{"sensors", list}};
 }
 
-CameraPath expand_rig(const Rig& rig, const CameraPath& vehicle)
+Result<CameraPath> expand_rig(const Rig& rig, const CameraPath& vehicle)
 {
     CameraPath cameras{.frames = {},
                        .sensors = rig.sensors,
                        .lidars = rig.lidars,
                        .numbered = vehicle.numbered,
                        .warnings = vehicle.warnings};
+    Course course;
     for (size_t i = 0; i < vehicle.frames.size(); ++i) {
         const CameraFrame& pose = vehicle.frames[i];
         const Rigid world_to_vehicle = rig.path_axes == PathAxes::camera
                                            ? compose(inverse(kVehicleToForwardCamera), pose.pose.world_to_camera)
                                            : inverse(vehicle.file_pose(i));
+        course.add(pose.time, inverse(world_to_vehicle));
         for (const Sensor& sensor : rig.sensors)
             cameras.frames.push_back({pose.time,
                                       sensor.name,
@@ -254,6 +364,27 @@ CameraPath expand_rig(const Rig& rig, const CameraPath& vehicle)
             const Rigid to_world = compose(inverse(world_to_vehicle), sensor.sensor_to_vehicle);
             cameras.sweeps.push_back({pose.time, sensor.name, sensor.lidar, to_world, to_world});
         }
+    }
+    const bool shutters = std::ranges::any_of(rig.sensors, [](const Sensor& s) { return s.shutter.has_value(); });
+    if (!shutters && rig.lidars.empty())
+        return cameras;
+    if (vehicle.numbered && shutters)
+        return fail(ErrorCode::bad_input, "a rolling shutter needs poses with times; these have numbers");
+    if (vehicle.numbered) {
+        cameras.warnings.push_back("the poses have numbers in place of times: lidars stand during their sweeps");
+        return cameras;
+    }
+    SR_CHECK(course.check());
+    for (size_t i = 0; i < cameras.frames.size(); ++i) {
+        const Sensor& sensor = rig.sensors[i % rig.sensors.size()];
+        if (sensor.shutter)
+            cameras.frames[i].readout = readout_of(sensor, cameras.frames[i], course, i / rig.sensors.size());
+    }
+    for (size_t i = 0; i < cameras.sweeps.size(); ++i) {
+        LidarSweep& sweep = cameras.sweeps[i];
+        const Rigid vehicle_then = course.at(sweep.time - sweep.lidar->sweep_seconds());
+        if (vehicle_then != course.pose(i / rig.lidars.size())) // to the bit, as if it stood
+            sweep.begin = compose(vehicle_then, rig.lidars[i % rig.lidars.size()].sensor_to_vehicle);
     }
     return cameras;
 }

@@ -24,11 +24,18 @@ struct Rig {
 // rig.json:
 //   {"path_axes": "camera" | "vehicle",                       default "camera"
 //    "sensors": [{"name": "front",
-//                 "model": "pinhole" | "opencv" | "fisheye" | "equirectangular",    default "pinhole"
+//                 "model": "pinhole" | "opencv" | "fisheye" | "equirectangular" | "ftheta",    default "pinhole"
 //                 "width": 616, "height": 424,
 //                 "fov": 90 | "fx": .., "fy": .., "cx": .., "cy": ..,    fov: degrees across the width; none of them
-//                                                                        for equirectangular, always the whole sphere
-//                 "distortion": [k1, k2, p1, p2, k3, k4, k5, k6],        opencv, 4, 5 or 8 numbers; fisheye: k1 .. k4
+//                                                                        for equirectangular, always the whole sphere,
+//                                                                        and ftheta: engine/camera/ftheta_json.h
+//                 "distortion": [k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4],    opencv, 4, 5, 8 or 12 numbers;
+//                                                                                    fisheye: k1 .. k4
+//                 "shutter": {"direction": "down" | "up" | "right" | "left",     where the lines after the first one
+//                 are
+//                             "start": -15000,                                   microseconds from the frame's time;
+//                                                                                default 0
+//                             "readout": 30000},                                 microseconds of all lines
 //                 "sensor_to_vehicle": 4x4 | {"translation": [x, y, z], "rotation": [qx, qy, qz, qw]}},
 //                {"name": "lidar_top", "lidar": "ot128",           of assets/lidar, or a file beside this one (.json)
 //                 "sensor_to_vehicle": as above}]}
@@ -39,8 +46,10 @@ Result<Rig> read_rig(const Path& path);
 // the sensors as an object that read_rig reads
 Json rig_json(std::span<const Sensor> sensors);
 
-// the frames of all sensors at every pose of the vehicle: pose by pose, sensors in the rig's order; a sweep of each
-// lidar ends there
-CameraPath expand_rig(const Rig& rig, const CameraPath& vehicle);
+// The frames of all sensors at every pose of the vehicle: pose by pose, sensors in the rig's order; a sweep of each
+// lidar ends there. Where the vehicle is during a sweep, and while a picture is read out, is interpolated between its
+// poses; before the first and after the last one its motion goes on, and one with a single pose stands. Where times are
+// numbers lidars stand, with a warning. bad_input for a shutter then, and where times do not rise
+Result<CameraPath> expand_rig(const Rig& rig, const CameraPath& vehicle);
 
 } // namespace semrover

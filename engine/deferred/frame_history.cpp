@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/deferred/frame_history.h"
 
+#include "engine/camera/camera_view.h"
 #include "engine/splat/rasterizer.h"
 #include "kernels/picture.h"
 
@@ -19,14 +20,33 @@ std::vector<float> metres_of(const DepthPicture& depth)
     return metres;
 }
 
-// the world in the first one's own frame, where numbers are small and fp32 is enough
-std::vector<float> camera_rows(const CameraFrame& now, const CameraFrame& past)
+// does one of them move while it is read out?
+bool move(const CameraFrame& a, const CameraFrame& b)
+{
+    return a.moves() || b.moves();
+}
+
+// of both: a pinhole that moves is an opencv lens
+CameraModel model_of(const CameraFrame& now, const CameraFrame& past)
+{
+    const CameraModel model = now.intrinsics.model;
+    return model == CameraModel::pinhole && move(now, past) ? CameraModel::opencv : model;
+}
+
+// the world in the first one's own (still) frame, where numbers are small and fp32 is enough
+std::vector<float> camera_rows(CameraFrame now, CameraFrame past)
 {
     std::vector<float> rows(2 * kLensCameraFloats);
-    const Pose between{compose(past.pose.world_to_camera, now.pose.camera_to_world())};
-    const std::span<float> table(rows);
-    write_row(splat_camera(now.intrinsics, Pose{}), table.first(kLensCameraFloats));
-    write_row(splat_camera(past.intrinsics, between), table.last(kLensCameraFloats));
+    const Rigid between = compose(motion_of(past).middle.world_to_camera, motion_of(now).middle.camera_to_world());
+    now.intrinsics.model = past.intrinsics.model = model_of(now, past);
+    const auto write = [&](const CameraFrame& frame, const Rigid& world_to_camera, std::span<float> row) {
+        SplatCamera camera = splat_camera(frame);
+        std::ranges::transform(std::span(world_to_camera).first(12), camera.world_to_camera.begin(),
+                               [](double v) { return float(v); });
+        write_row(camera, row);
+    };
+    write(now, kIdentity, std::span(rows).first(kLensCameraFloats));
+    write(past, between, std::span(rows).last(kLensCameraFloats));
     return rows;
 }
 
@@ -46,11 +66,11 @@ FrameHistory::Memory::Memory(const LatentSize& latent_size) : size(latent_size)
     made = bytes("accumulated frame");
 }
 
-Graph FrameHistory::Memory::graph(SplatLens lens, float share) const
+Graph FrameHistory::Memory::graph(SplatLens lens, bool moving, float share) const
 {
     Graph g;
     const AccumulateOptions options{
-        .width = size.image_width, .height = size.image_height, .lens = lens, .share = share};
+        .width = size.image_width, .height = size.image_height, .lens = lens, .moving = moving, .share = share};
     g.keep(
         accumulate(g, cameras.in(g), {now.bytes.in(g), now.depth.in(g)}, {past.bytes.in(g), past.depth.in(g)}, options),
         made);
@@ -63,16 +83,17 @@ Result<std::unique_ptr<FrameHistory>> FrameHistory::create(Device& device, const
     std::unique_ptr<FrameHistory> h(new FrameHistory(device, size, share));
     SR_CHECK(h->memory_.state.allocate(device, "the frame before"));
     SR_TRY(h->copies_, CopyRing::create(device));
-    SR_CHECK(h->use_lens(model));
+    SR_CHECK(h->use_lens(model, false));
     return h;
 }
 
-Status FrameHistory::use_lens(CameraModel model)
+Status FrameHistory::use_lens(CameraModel model, bool moving)
 {
-    if (program_ && model_ == model)
+    if (program_ && model_ == model && moving_ == moving)
         return {};
-    SR_TRY(program_, Program::create(device_, memory_.graph(lens_of(model), share_)));
+    SR_TRY(program_, Program::create(device_, memory_.graph(lens_of(model), moving, share_)));
     model_ = model;
+    moving_ = moving;
     return {};
 }
 
@@ -115,11 +136,13 @@ Status FrameHistory::accumulate_now(const CameraFrame& camera, const DepthPictur
         SR_CHECK(memory_.cameras.write(device_, camera_rows(camera, camera_)));
     }
     SR_CHECK(memory_.now.depth.write(device_, metres_of(depth)));
+    const CameraModel model = model_of(camera, camera_);
+    const bool moving = move(camera, camera_);
     camera_ = camera;
     ++frames_;
     if (alone)
         return copy(memory_.now.bytes, memory_.made);
-    SR_CHECK(use_lens(camera.intrinsics.model));
+    SR_CHECK(use_lens(model, moving));
     return program_->run();
 }
 

@@ -48,10 +48,10 @@ class FrameHistory {
         Frame now, past;
 
         explicit Memory(const LatentSize& size);
-        Graph graph(SplatLens lens, float share) const;
+        Graph graph(SplatLens lens, bool moving, float share) const;
     };
     FrameHistory(Device& device, const LatentSize& size, float share) : device_(device), memory_(size), share_(share) {}
-    Status use_lens(CameraModel model);
+    Status use_lens(CameraModel model, bool moving);
     Status copy(const Slot& from, const Slot& to);
     Status write_pixels(std::span<const uint8_t> pixels);
     Status accumulate_now(const CameraFrame& camera, const DepthPicture& depth);
@@ -60,6 +60,7 @@ class FrameHistory {
     Memory memory_;
     float share_;
     CameraModel model_ = CameraModel::pinhole; // of the program
+    bool moving_ = false;                      // likewise
     std::unique_ptr<Program> program_;
     std::unique_ptr<CopyRing> copies_;
     CameraFrame camera_; // of the last frame

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/deferred/frame_images.h"
 
-#include "engine/camera/lens.h"
+#include "engine/camera/camera_view.h"
 #include "engine/format/npy.h"
 
 #include <algorithm>
@@ -21,13 +21,13 @@ constexpr uint32_t kSkyBlock = 16; // pixels
 // which way the rays of a camera go; a lens takes long to ask for every pixel
 class SkySide {
   public:
-    explicit SkySide(const CameraFrame& frame) : lens_(frame.intrinsics), m_(frame.pose.world_to_camera) {}
+    explicit SkySide(const CameraFrame& frame) : view_(frame) {}
 
     // how far up the unit ray through a position goes; NaN where the lens does not look
     double up(double x, double y) const
     {
-        const auto ray = lens_.ray(x, y); // the third column of the rotation is the world's z axis
-        return ray ? m_[2] * (*ray)[0] + m_[6] * (*ray)[1] + m_[10] * (*ray)[2] : std::nan("");
+        const auto ray = view_.direction(x, y);
+        return ray ? (*ray)[2] : std::nan("");
     }
     // of all rays of a block, where they are farther from the horizon than its corners are apart
     std::optional<bool> of_block(uint32_t left, uint32_t top, uint32_t right, uint32_t bottom) const
@@ -41,8 +41,7 @@ class SkySide {
     }
 
   private:
-    Lens lens_;
-    Rigid m_;
+    CameraView view_;
 };
 
 std::vector<uint8_t> three_bytes(std::span<const uint32_t> words)

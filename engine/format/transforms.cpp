@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/format/transforms.h"
 
+#include "engine/camera/ftheta_json.h"
 #include "engine/format/image.h"
 #include "runtime/base/json_numbers.h"
 #include "runtime/base/quote.h"
@@ -71,26 +72,19 @@ const TransformsModel kTransformsModels[] = {
     {"RADIAL_FISHEYE", CameraModel::fisheye, {"k1", "k2"}},
     {"FISHEYE", CameraModel::fisheye, {}},
     {"SIMPLE_FISHEYE", CameraModel::fisheye, {}},
+    // ours, for lenses that nerfstudio has no name for
+    {"OPENCV_THIN_PRISM",
+     CameraModel::opencv,
+     {"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4"}},
+    {"FTHETA", CameraModel::ftheta, {}},
 };
-constexpr size_t kFullOpencv = 5, kOpencvFisheye = 6, kEquirectangular = 7;
+constexpr size_t kFullOpencv = 5, kOpencvFisheye = 6, kEquirectangular = 7, kThinPrism = 12, kFtheta = 13;
 
 // what other programs write of lenses and cameras that are not read here
-constexpr const char* kForeignKeys[] = {"ftheta_p0",
-                                        "latlong",
-                                        "equirectangular",
-                                        "rolling_shutter",
-                                        "from_mitsuba",
-                                        "K",
-                                        "intrinsics",
-                                        "intrinsic_matrix",
-                                        "camera_matrix",
-                                        "camera_intrinsics",
-                                        "transform_matrix_start",
-                                        "transform_matrix_end",
-                                        "distortion_params",
-                                        "distortion",
-                                        "shift_x",
-                                        "shift_y"};
+constexpr const char* kForeignKeys[] = {
+    "ftheta_p0",  "latlong",          "equirectangular", "from_mitsuba",      "K",
+    "intrinsics", "intrinsic_matrix", "camera_matrix",   "camera_intrinsics", "distortion_params",
+    "distortion", "shift_x",          "shift_y"};
 
 // false, null, 0 and zeros say that there is none
 bool says_nothing(const Json& value)
@@ -134,7 +128,7 @@ Result<const TransformsModel*> read_model(const Settings& settings)
 Status read_lens(const Settings& settings, const TransformsModel& model, Intrinsics& k)
 {
     k.model = model.model;
-    for (const char* key : {"k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"}) {
+    for (const char* key : {"k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2", "s1", "s2", "s3", "s4"}) {
         SR_TRY(const std::optional<double> value, settings.number(key));
         const auto at = std::ranges::find(model.coefficients, std::string_view(key));
         if (at != model.coefficients.end())
@@ -267,6 +261,12 @@ Result<Intrinsics> read_intrinsics(const Settings& settings, TransformsSource& s
     SR_CHECK(read_lens(settings, *model, k));
     if (k.model == CameraModel::equirectangular)
         return read_panorama(settings, k);
+    if (k.model == CameraModel::ftheta) {
+        SR_CHECK(read_ftheta(settings.frame().contains("reference_poly") ? settings.frame() : settings.file(), k,
+                             settings.where()));
+        SR_CHECK(check_intrinsics(k, settings.where()));
+        return k;
+    }
     SR_TRY(const auto f, focal_lengths(settings, k));
     SR_TRY(const std::optional<double> cx, settings.number("cx"));
     SR_TRY(const std::optional<double> cy, settings.number("cy"));
@@ -285,6 +285,48 @@ Result<Intrinsics> read_intrinsics(const Settings& settings, TransformsSource& s
     return simplified(k);
 }
 
+Result<Pose> read_pose(const Json& json, const char* key, std::string_view where)
+{
+    const std::string what = fmt::format("{}: {}", where, key);
+    SR_TRY(const std::vector<double> values, numbers_of(json[key], what));
+    SR_TRY(const Rigid camera_to_world, rigid_from_matrix(values, what));
+    return Pose{inverse(compose(camera_to_world, kFlipYZ))};
+}
+
+// instant-ngp's: the share of the readout of a position (u, v) of the picture, 0 to 1 each way, is a + b u + c v. Its
+// fourth number, of motion blur, has to be 0
+constexpr std::array<double, 4> kRollingShutters[] = {{0, 0, 1, 0}, {1, 0, -1, 0}, {0, 1, 0, 0}, {1, -1, 0, 0}};
+
+Result<std::optional<Readout>> read_readout(const Settings& settings)
+{
+    const Json* shutter = settings.find("rolling_shutter");
+    const Json& frame = settings.frame();
+    const bool poses = frame.contains("transform_matrix_start") && frame.contains("transform_matrix_end");
+    if (!poses && (frame.contains("transform_matrix_start") || frame.contains("transform_matrix_end")))
+        return fail(ErrorCode::bad_input, "{}: transform_matrix_start and transform_matrix_end need each other",
+                    settings.where());
+    if ((!shutter || says_nothing(*shutter)) && !poses)
+        return std::optional<Readout>();
+    const std::string what = fmt::format("{}: rolling_shutter", settings.where());
+    if (!shutter || !poses)
+        return fail(ErrorCode::bad_input,
+                    "{}: a rolling shutter is three keys: rolling_shutter, "
+                    "transform_matrix_start and transform_matrix_end",
+                    settings.where());
+    SR_TRY(const std::vector<double> numbers, numbers_of(*shutter, what));
+    const auto found =
+        std::ranges::find_if(kRollingShutters, [&](const auto& known) { return std::ranges::equal(known, numbers); });
+    if (found == std::end(kRollingShutters))
+        return fail(ErrorCode::bad_input,
+                    "{}: [{}] is not supported, expected [0, 0, 1, 0] of rows from the top, [1, 0, -1, 0] from the "
+                    "bottom, [0, 1, 0, 0] of columns from the left or [1, -1, 0, 0] from the right",
+                    what, fmt::join(numbers, ", "));
+    Readout readout{.direction = ShutterDirection(found - std::begin(kRollingShutters))};
+    SR_TRY(readout.from, read_pose(frame, "transform_matrix_start", settings.where()));
+    SR_TRY(readout.to, read_pose(frame, "transform_matrix_end", settings.where()));
+    return std::optional(readout);
+}
+
 Result<CameraFrame> read_frame(const Json& file, const Json& json, size_t index, std::string_view where,
                                TransformsSource& source)
 {
@@ -293,10 +335,8 @@ Result<CameraFrame> read_frame(const Json& file, const Json& json, size_t index,
     if (!json.is_object() || !json.contains("transform_matrix"))
         return fail(ErrorCode::bad_input, "{}: expected an object with a transform_matrix", where);
     CameraFrame frame;
-    const std::string what = fmt::format("{}: transform_matrix", where);
-    SR_TRY(const std::vector<double> values, numbers_of(json["transform_matrix"], what));
-    SR_TRY(const Rigid camera_to_world, rigid_from_matrix(values, what));
-    frame.pose.world_to_camera = inverse(compose(camera_to_world, kFlipYZ));
+    SR_TRY(frame.pose, read_pose(json, "transform_matrix", where));
+    SR_TRY(frame.readout, read_readout(Settings(file, json, where)));
     SR_TRY(frame.intrinsics, read_intrinsics(Settings(file, json, where), source));
     SR_TRY(const std::optional<double> time, optional_number(json, "time", where));
     frame.time = time.value_or(static_cast<double>(index));
@@ -345,12 +385,16 @@ const TransformsModel& transforms_model_of(const Intrinsics& k)
 {
     switch (k.model) {
     case CameraModel::opencv:
+        if (std::ranges::any_of(std::span(k.distortion).subspan(8), [](double v) { return v != 0; }))
+            return kTransformsModels[kThinPrism];
         return kTransformsModels[k.distortion[5] != 0 || k.distortion[6] != 0 || k.distortion[7] != 0 ? kFullOpencv
                                                                                                       : 0];
     case CameraModel::fisheye:
         return kTransformsModels[kOpencvFisheye];
     case CameraModel::equirectangular:
         return kTransformsModels[kEquirectangular];
+    case CameraModel::ftheta:
+        return kTransformsModels[kFtheta];
     case CameraModel::pinhole:
         break;
     }
@@ -377,6 +421,10 @@ void put_intrinsics(nlohmann::ordered_json& object, const Intrinsics& k, const T
     const bool panorama = k.model == CameraModel::equirectangular;
     object["w"] = k.width;
     object["h"] = k.height;
+    if (k.model == CameraModel::ftheta) {
+        put_ftheta(object, k);
+        return;
+    }
     object["fl_x"] = panorama ? k.width / 2.0 : k.fx;
     object["fl_y"] = panorama ? double(k.height) : k.fy;
     object["cx"] = k.cx;
@@ -399,9 +447,17 @@ void put_pose(nlohmann::ordered_json& entry, const CameraFrame& frame)
     if (!frame.camera.empty())
         entry["camera"] = frame.camera;
     entry["time"] = frame.time;
-    const Rigid m = compose(frame.pose.camera_to_world(), kFlipYZ);
-    for (size_t row = 0; row < 4; ++row)
-        entry["transform_matrix"].push_back({m[row * 4], m[row * 4 + 1], m[row * 4 + 2], m[row * 4 + 3]});
+    const auto put = [&](const char* key, const Pose& pose) {
+        const Rigid m = compose(pose.camera_to_world(), kFlipYZ);
+        for (size_t row = 0; row < 4; ++row)
+            entry[key].push_back({m[row * 4], m[row * 4 + 1], m[row * 4 + 2], m[row * 4 + 3]});
+    };
+    put("transform_matrix", frame.pose);
+    if (!frame.readout)
+        return;
+    entry["rolling_shutter"] = kRollingShutters[size_t(frame.readout->direction)];
+    put("transform_matrix_start", frame.readout->from);
+    put("transform_matrix_end", frame.readout->to);
 }
 
 } // namespace

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/fusion/surface_error.h"
 
+#include "engine/camera/camera_view.h"
 #include "engine/mesh/nearest.h"
 #include "engine/mesh/transparency.h"
 

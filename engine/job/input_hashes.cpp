@@ -81,6 +81,11 @@ uint64_t hash_cameras(const CameraPath& path)
         hash.add(std::as_bytes(std::span(view)));
         hash.add(std::as_bytes(std::span(k.distortion)));
         hash.add(std::as_bytes(std::span(f.pose.world_to_camera)));
+        if (!f.readout)
+            continue;
+        hash.add(name_of(f.readout->direction));
+        hash.add(std::as_bytes(std::span(f.readout->from.world_to_camera)));
+        hash.add(std::as_bytes(std::span(f.readout->to.world_to_camera)));
     }
     for (const LidarSweep& s : path.sweeps) {
         hash.add(s.sensor);

@@ -54,6 +54,8 @@ std::vector<LidarPoint> lidar_returns(const LidarSweep& sweep, const SweepImage&
 {
     const Lidar& lidar = *sweep.lidar;
     const SweepPicture picture(lidar);
+    const bool moves = sweep.begin != sweep.end;
+    const Rigid to_end = inverse(sweep.end);
     std::vector<LidarPoint> points;
     for (uint32_t column = 0; column < lidar.columns; ++column)
         for (uint32_t beam = 0; beam < lidar.beams.size(); ++beam) {
@@ -66,7 +68,9 @@ std::vector<LidarPoint> lidar_returns(const LidarSweep& sweep, const SweepImage&
             const double intensity = lidar_reflectance(image.label[at]) * facing(ray, &image.normal[at * 3]);
             if (range > lidar.farthest_at_tenth * std::sqrt(intensity / 0.1))
                 continue;
-            points.push_back({float(range * ray[0]), float(range * ray[1]), float(range * ray[2]), float(intensity),
+            const Point3 met = {range * ray[0], range * ray[1], range * ray[2]};
+            const Point3 at_end = moves ? transform(compose(to_end, sweep.at(beam, column)), met) : met;
+            points.push_back({float(at_end[0]), float(at_end[1]), float(at_end[2]), float(intensity),
                               uint16_t(lidar.ring(beam)), uint16_t(image.label[at]),
                               uint32_t(std::llround(lidar.firing_microseconds(beam, column))), image.instance[at]});
         }

@@ -6,7 +6,7 @@ namespace semrover {
 
 namespace {
 
-// end of the run of frames from `first` with the same time, size and camera model
+// end of the run of frames from `first` with the same time, size and camera model, all of which move or none
 size_t end_of_moment(const CameraPath& path, size_t first)
 {
     const CameraFrame& a = path.frames[first];
@@ -14,7 +14,8 @@ size_t end_of_moment(const CameraPath& path, size_t first)
     for (; end < path.frames.size(); ++end) {
         const CameraFrame& b = path.frames[end];
         if (b.time != a.time || b.camera == a.camera || b.intrinsics.width != a.intrinsics.width ||
-            b.intrinsics.height != a.intrinsics.height || b.intrinsics.model != a.intrinsics.model)
+            b.intrinsics.height != a.intrinsics.height || b.intrinsics.model != a.intrinsics.model ||
+            b.moves() != a.moves())
             break;
     }
     return end;
@@ -32,12 +33,15 @@ PathDrawing::PathDrawing(Device& device, const DrawnScene& scene, CameraPath pat
     following_ = following_frames(path_);
 }
 
-Result<Rasterizer*> PathDrawing::rasterizer_of(const Intrinsics& size, uint32_t frames)
+Result<Rasterizer*> PathDrawing::rasterizer_of(const CameraFrame& like, uint32_t frames)
 {
-    auto& rasterizer = rasterizers_[{size.width, size.height, size.model}];
+    const Intrinsics& size = like.intrinsics;
+    const CameraModel model = drawn_model(like);
+    auto& rasterizer = rasterizers_[{size.width, size.height, model, like.moves()}];
     if (!rasterizer) {
         RasterizerOptions options = options_;
-        options.model = size.model;
+        options.model = model;
+        options.moving = like.moves();
         SR_TRY(rasterizer, Rasterizer::create(device_, scene_.splats, size.width, size.height, frames, options));
     }
     return rasterizer.get();
@@ -45,18 +49,18 @@ Result<Rasterizer*> PathDrawing::rasterizer_of(const Intrinsics& size, uint32_t 
 
 Result<SplatImage> PathDrawing::image(const CameraFrame& frame)
 {
-    SR_TRY(Rasterizer * rasterizer, rasterizer_of(frame.intrinsics, 1));
-    const SplatCamera camera = splat_camera(frame.intrinsics, frame.pose);
+    SR_TRY(Rasterizer * rasterizer, rasterizer_of(frame, 1));
+    const SplatCamera camera = splat_camera(frame);
     SR_TRY(std::vector<SplatImage> images, rasterizer->render({&camera, 1}, scene_.actors.seen_by({&frame, 1})));
     return std::move(images.front());
 }
 
 Status PathDrawing::draw(std::span<const CameraFrame> frames, const Drawn& drawn)
 {
-    SR_TRY(Rasterizer * rasterizer, rasterizer_of(frames.front().intrinsics, uint32_t(frames.size())));
+    SR_TRY(Rasterizer * rasterizer, rasterizer_of(frames.front(), uint32_t(frames.size())));
     std::vector<SplatCamera> cameras;
     for (const CameraFrame& frame : frames)
-        cameras.push_back(splat_camera(frame.intrinsics, frame.pose));
+        cameras.push_back(splat_camera(frame));
     for (size_t at = 0; at < cameras.size();) {
         const SplatMovers movers = scene_.actors.seen_by(frames.subspan(at));
         SR_TRY(const uint32_t together, rasterizer->draw(std::span(cameras).subspan(at), movers));

@@ -35,13 +35,14 @@ class PathDrawing {
     size_t done() const { return done_; }      // frames so far
     size_t total() const { return path_.frames.size(); }
 
-    // frames of one size and camera model, apart from the path
+    // frames of one size and camera model, which all move while they are read out, or none of which does; apart from
+    // the path
     Status draw(std::span<const CameraFrame> frames, const Drawn& drawn);
     // one frame's images on the host, where the options keep no pixels; waits for them
     Result<SplatImage> image(const CameraFrame& frame);
 
   private:
-    Result<Rasterizer*> rasterizer_of(const Intrinsics& size, uint32_t frames);
+    Result<Rasterizer*> rasterizer_of(const CameraFrame& like, uint32_t frames);
     Result<FlowSlots> flow_of(size_t frame);
 
     Device& device_;
@@ -51,7 +52,7 @@ class PathDrawing {
     std::optional<FlowDrawing> flow_;
     std::vector<size_t> following_; // the next frame of each one's camera; their number: there is none
     size_t done_ = 0;
-    std::map<std::tuple<uint32_t, uint32_t, CameraModel>, std::unique_ptr<Rasterizer>> rasterizers_;
+    std::map<std::tuple<uint32_t, uint32_t, CameraModel, bool>, std::unique_ptr<Rasterizer>> rasterizers_;
 };
 
 // where the pictures of a camera go: those of one without a name into the folder itself

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/sweep_drawing.h"
 
+#include "engine/camera/camera_view.h"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -33,24 +35,30 @@ Result<std::unique_ptr<SweepDrawing>> SweepDrawing::create(Device& device, const
     options.near = kNear;
     options.screen_variance = 0;
     options.pixels_over.reset();
+    options.moving = true;
     options.formats = {};
     for (size_t i = 0; i < d->lidar_->beams.size(); ++i) {
         const LidarBeam& beam = d->lidar_->beams[i];
         options.sweep_rows.push_back({float(-beam.elevation), float(d->picture_.rests[i]),
-                                      float(d->picture_.first - d->picture_.shifts[i]), float(beam.every)});
+                                      float(d->picture_.first - d->picture_.shifts[i]),
+                                      float(beam.delay / d->lidar_->column_microseconds())});
     }
     SR_TRY(d->rasterizer_, Rasterizer::create(device, scene.splats, d->part_width_, uint32_t(d->lidar_->beams.size()),
                                               d->parts_, options));
     return d;
 }
 
-// of the middle of a part; its intrinsics are not used
+// its time is that of a part's middle, its readout the whole sweep's; its intrinsics are not used
 CameraFrame SweepDrawing::frame_of(const LidarSweep& sweep, uint32_t part) const
 {
     const double middle = (part + 0.5) * part_width_ / picture_.width; // of the sweep
+    const auto view = [](const Rigid& sensor_to_world) {
+        return Pose{compose(kSensorToCamera, inverse(sensor_to_world))};
+    };
     CameraFrame frame;
     frame.time = sweep.time - (1 - middle) * lidar_->sweep_seconds();
-    frame.pose.world_to_camera = compose(kSensorToCamera, inverse(sweep.begin));
+    frame.readout = Readout{ShutterDirection::right, view(sweep.begin), view(sweep.end)};
+    frame.pose = motion_of(frame).middle;
     return frame;
 }
 
@@ -60,11 +68,20 @@ SplatCamera SweepDrawing::camera_of(const CameraFrame& frame, uint32_t part) con
     // within half a turn of straight ahead, where floats are dense
     const double azimuth = std::remainder(lidar_->start + step * (first + picture_.first), 2 * std::numbers::pi);
     SplatCamera c{float(1 / step), 1, float(0.5 - azimuth / step), 0};
-    std::transform(frame.pose.world_to_camera.begin(), frame.pose.world_to_camera.begin() + 12,
-                   c.world_to_camera.begin(), [](double v) { return float(v); });
-    c.distortion[0] = float(first);
-    c.distortion[1] = float(lidar_->columns);
+    const auto narrowed = [](double v) { return float(v); };
+    const CameraMotion motion = motion_of(frame);
+    const Rigid& view = motion.middle.world_to_camera;
+    std::transform(view.begin(), view.begin() + 12, c.world_to_camera.begin(), narrowed);
+    std::ranges::transform(motion.turn, c.turn.begin(), narrowed);
+    std::ranges::transform(motion.shift, c.shift.begin(), narrowed);
     c.radial_depth = true;
+    double least = 0, most = 0; // that a row adds to a pixel's number
+    for (size_t i = 0; i < picture_.shifts.size(); ++i) {
+        const double added = double(picture_.first - picture_.shifts[i]);
+        least = std::min(least, added);
+        most = std::max(most, added + lidar_->beams[i].delay / lidar_->column_microseconds());
+    }
+    std::ranges::transform(std::array{first, double(lidar_->columns), least, most}, c.distortion.begin(), narrowed);
     return c;
 }
 

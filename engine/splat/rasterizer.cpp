@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/splat/rasterizer.h"
 
-#include "engine/camera/lens.h"
+#include "engine/camera/camera_view.h"
 #include "engine/splat/planes.h"
 #include "runtime/device/command.h"
 
@@ -86,6 +86,8 @@ SplatLens lens_of(CameraModel model)
         return SplatLens::fisheye;
     case CameraModel::equirectangular:
         return SplatLens::equirectangular;
+    case CameraModel::ftheta:
+        return SplatLens::ftheta;
     case CameraModel::pinhole:
         break;
     }
@@ -99,9 +101,10 @@ void write_row(const SplatCamera& c, std::span<float> row)
     std::copy_n(c.world_to_camera.data(), 12, row.begin() + 4);
     if (row.size() == 16)
         return;
-    std::copy_n(c.distortion.data(), 8, row.begin() + 16);
-    row[24] = c.limit;
-    row[25] = c.radial_depth;
+    std::copy_n(c.distortion.data(), 12, row.begin() + 16);
+    const float rest[] = {c.limit,   float(c.radial_depth), c.first,    c.reach,    c.turn[0],  c.turn[1],
+                          c.turn[2], c.across[0],           c.shift[0], c.shift[1], c.shift[2], c.across[1]};
+    std::ranges::copy(rest, row.begin() + 28);
 }
 
 SplatCamera splat_camera(const Intrinsics& i, const Pose& pose)
@@ -114,8 +117,29 @@ SplatCamera splat_camera(const Intrinsics& i, const Pose& pose)
         const Lens lens(i);
         std::ranges::transform(i.distortion, c.distortion.begin(), narrowed);
         c.limit = float(lens.limit());
+        c.reach = float(lens.reach());
         c.radial_depth = lens.radial_depth();
     }
+    return c;
+}
+
+CameraModel drawn_model(const CameraFrame& frame)
+{
+    const CameraModel model = frame.intrinsics.model;
+    return model == CameraModel::pinhole && frame.moves() ? CameraModel::opencv : model;
+}
+
+SplatCamera splat_camera(const CameraFrame& frame)
+{
+    Intrinsics i = frame.intrinsics;
+    i.model = drawn_model(frame);
+    const CameraMotion motion = motion_of(frame);
+    SplatCamera c = splat_camera(i, motion.middle);
+    const auto narrowed = [](double v) { return float(v); };
+    std::ranges::transform(motion.turn, c.turn.begin(), narrowed);
+    std::ranges::transform(motion.shift, c.shift.begin(), narrowed);
+    std::ranges::transform(motion.across, c.across.begin(), narrowed);
+    c.first = float(motion.first);
     return c;
 }
 
@@ -142,7 +166,8 @@ Result<std::unique_ptr<Rasterizer>> Rasterizer::create(Device& device, const Spl
                     "{} x {} pixels of {} splats need {} bytes in one tensor; this device takes {}", width, height,
                     rows, per_camera, limit);
     r->cameras_ = uint32_t(std::min<uint64_t>(max_cameras, limit / per_camera));
-    r->max_visible_ = uint32_t(std::min<uint64_t>(std::max(rows, 1024u), limit / splat_record_bytes(r->lens())));
+    r->max_visible_ =
+        uint32_t(std::min<uint64_t>(std::max(rows, 1024u), limit / splat_record_bytes(r->lens(), options.moving)));
     // A street of a million splats has 1.5 pairs a splat at 616 x 424 and 2.8 at 1920 x 1080. More room makes the
     // blending seem longer than a submit may last, and then it is cut.
     const uint64_t pairs = options.max_pairs ? options.max_pairs : std::max<uint64_t>(4ull * rows, 65536);
@@ -188,6 +213,7 @@ Status Rasterizer::build()
     SplatOptions o{.width = width_,
                    .height = height_,
                    .lens = lens(),
+                   .moving = options_.moving,
                    .max_visible = max_visible_,
                    .max_pairs = max_pairs_,
                    .tile = options_.tile};
@@ -260,7 +286,8 @@ void Rasterizer::keep_images(Graph& g, const SplatImages& y)
 Status Rasterizer::make_room(uint32_t visible, uint32_t pairs)
 {
     if (visible > max_visible_) {
-        SR_TRY(max_visible_, room_for(visible, splat_record_bytes(lens()), device_.limits(), "visible splats"));
+        SR_TRY(max_visible_,
+               room_for(visible, splat_record_bytes(lens(), options_.moving), device_.limits(), "visible splats"));
     }
     if (pairs > max_pairs_) {
         SR_TRY(max_pairs_, room_for(pairs, kPairBytes, device_.limits(), "pairs of splat and tile"));

@@ -20,12 +20,19 @@ struct SplatCamera {
     float fx = 0, fy = 0, cx = 0, cy = 0;    // pixels
     std::array<float, 12> world_to_camera{}; // [3, 4], row-major, metres
     // of a lens that is no pinhole: engine/camera/lens.h
-    std::array<float, 8> distortion{};
-    float limit = 0;
+    std::array<float, 12> distortion{};
+    float limit = 0, reach = 0;
     bool radial_depth = false; // depth is the distance from the camera, not along z
+    // of one that moves while it is read out: CameraMotion (engine/camera/camera_view.h), and lines as it has them
+    std::array<float, 3> turn{}, shift{};
+    std::array<float, 2> across{};
+    float first = 0;
 };
 SplatCamera splat_camera(const Intrinsics& intrinsics, const Pose& pose);
+SplatCamera splat_camera(const CameraFrame& frame); // in its readout, where it has one
 SplatLens lens_of(CameraModel model);
+// A pinhole that moves while it is read out is drawn as an opencv lens without distortion.
+CameraModel drawn_model(const CameraFrame& frame);
 // as kernels take it: splat_camera_floats() numbers
 void write_row(const SplatCamera& camera, std::span<float> row);
 
@@ -56,6 +63,7 @@ struct RasterizerOptions {
     uint32_t max_pairs = 0;                   // to begin with; 0: from the number of splats
     std::optional<uint32_t> rows = {};        // the scene's first ones at least; none: all of it
     CameraModel model = CameraModel::pinhole; // of all cameras
+    bool moving = false;                      // cameras move while they are read out; no pinholes
     // of a lidar's sweep, one a row of the images (shaders/splat/splat.h): cameras are parts of sweeps
     std::vector<std::array<float, 4>> sweep_rows = {};
     // keeps pixels as files have them, over this background, in place of images: draw() and pixels(), not render()

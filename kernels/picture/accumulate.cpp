@@ -24,7 +24,7 @@ Tensor accumulate(Graph& g, Tensor cameras, const FrameAndDepth& now, const Fram
                               .tolerance = o.tolerance,
                               .spread = o.spread};
     g.dispatch(kernel::accumulate, {cameras, now.bytes, past.bytes, now.depth, past.depth, y}, push,
-               threads(divide_up(pixels, 4u)), {.constants = {{"kModel", uint32_t(o.lens)}}});
+               threads(divide_up(pixels, 4u)), {.constants = {{"kModel", uint32_t(o.lens)}, {"kMoving", o.moving}}});
     return y;
 }
 

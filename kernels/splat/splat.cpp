@@ -70,6 +70,7 @@ void check(const SplatTensors& scene, Tensor cameras, const SplatOptions& o)
     SR_ASSERT(o.movers.valid() == o.mover_rows.valid() &&
                   (!o.movers.valid() || (o.movers.ld == 12 && o.movers.rows % cameras.rows == 0)),
               "splat: {} views of movers for {} cameras", o.movers.rows, cameras.rows);
+    SR_ASSERT(!o.moving || o.lens != SplatLens::pinhole, "splat: a pinhole that moves is an opencv lens");
     SR_ASSERT(uint64_t(n) * cameras.rows < 1ull << 32, "splat: {} splats in {} cameras", n, cameras.rows);
 }
 
@@ -87,7 +88,7 @@ Seen project(Graph& g, const SplatTensors& scene, Tensor cameras, const SplatOpt
     DispatchOptions lens;
     lens.constants = {{"kMovers", o.movers.valid()}};
     if (!pinhole)
-        lens.constants.push_back({"kModel", uint32_t(o.lens)});
+        lens.constants.insert(lens.constants.end(), {{"kModel", uint32_t(o.lens)}, {"kMoving", o.moving}});
     const Tensor keep = g.array(views, DType::u32, "keep");
     const bool by_blocks = scene.blocks.valid();
     DispatchOptions cull = lens;
@@ -104,7 +105,7 @@ Seen project(Graph& g, const SplatTensors& scene, Tensor cameras, const SplatOpt
                     blocks, rows},
                    push, threads(views), std::move(cull));
     const PrefixSum slots = prefix_sum(g, keep, {.non_zero = true});
-    const uint32_t texels = splat_record_bytes(o.lens) / 16;
+    const uint32_t texels = splat_record_bytes(o.lens, o.moving) / 16;
     const Tensor records = g.array(push.max_visible * texels, DType::u32, "splat records", 4);
     const Tensor sources = g.array(push.max_visible, DType::u32, "splat sources");
     const Tensor depths = g.array(push.max_visible, DType::u32, "splat depths");
@@ -130,7 +131,7 @@ Tiled sort_into_tiles(Graph& g, const Seen& seen, const SplatOptions& o, const S
 {
     const uint32_t tiles_all = push.tiles_x * push.tiles_y * push.cameras;
     DispatchOptions lens;
-    lens.constants = {{"kRays", o.lens != SplatLens::pinhole}};
+    lens.constants = {{"kTexels", splat_record_bytes(o.lens, o.moving) / 16}};
     const Tensor order = radix_sort(g, seen.depths, {}, {.count = seen.count}).values;
     const Tensor touched = g.array(push.max_visible, DType::u32, "tiles touched");
     g.dispatch(kernel::splat_count, {seen.records, order, seen.count, touched}, push, threads(push.max_visible), lens);
@@ -180,9 +181,10 @@ SplatImages splat(Graph& g, const SplatTensors& scene, Tensor cameras, const Spl
     }
     const ConstantValue model{"kModel", uint32_t(options.lens)};
     blend.constants.push_back(model);
-    const Tensor rays = g.array(pixels, DType::f32, "rays", 4);
+    blend.constants.push_back({"kTexels", splat_record_bytes(options.lens, options.moving) / 16});
+    const Tensor rays = g.array(options.moving ? 2 * pixels : pixels, DType::f32, "rays", 4);
     g.dispatch(kernel::splat_rays, {cameras, rays, options.rows.valid() ? options.rows : scene.positions}, push,
-               threads(pixels), {.constants = {model}});
+               threads(pixels), {.constants = {model, {"kMoving", options.moving}}});
     g.dispatch(kernel::splat_ray_blend,
                {seen.records, by_tile.records, by_tile.starts, seen.sources, scene.labels, scene.cells, y.color,
                 y.surface, y.depth, y.ids, rays, scene.owners, y.owners},

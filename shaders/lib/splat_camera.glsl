@@ -1,16 +1,19 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 
-// a row of the table of cameras with lenses: fx fy cx cy; world to camera [3, 4]; k1 k2 p1 p2 (fisheye: k1 k2 k3 k4);
-// k3 k4 k5 k6; limit of the lens, 1 where depth is the distance from the camera instead of along z, 0, 0. A part of a
-// sweep: fx is pixels a radian of azimuth, below 0 where it runs against the clock, fy 1, cy 0; in place of k1 k2 the column of
-// pixel 0 and the columns of the sweep
-const uint kCameraVectors = 7;
+// a row of the table of cameras with lenses: fx fy cx cy; world to camera [3, 4], in the middle of the readout; 12
+// numbers of distortion (engine/camera/camera.h); limit of the lens, 1 where depth is the distance from the camera
+// instead of along z, Motion::first, reach of the lens; Motion::turn, across.x; Motion::shift, across.y. A
+// part of a sweep: fx is pixels a radian of azimuth, below 0 where it runs against the clock, fy 1, cy 0; of distortion
+// the number of its first pixel, the columns of the sweep, and the least and the most that a row adds to a pixel's number
+// for the column, and the delay, in which it is fired
+const uint kCameraVectors = 10;
 
 Lens camera_lens(uint camera)
 {
     const uint at = camera * kCameraVectors;
-    return Lens(cameras[at], cameras[at + 4], cameras[at + 5], cameras[at + 6].x);
+    const vec4 ends = cameras[at + 7];
+    return Lens(cameras[at], cameras[at + 4], cameras[at + 5], cameras[at + 6], ends.x, ends.w);
 }
 
 mat4x3 camera_view(uint camera)
@@ -19,4 +22,10 @@ mat4x3 camera_view(uint camera)
     return mat4x3(x.x, y.x, z.x, x.y, y.y, z.y, x.z, y.z, z.z, x.w, y.w, z.w);
 }
 
-bool camera_depth_is_radial(uint camera) { return cameras[camera * kCameraVectors + 6].y != 0.0; }
+bool camera_depth_is_radial(uint camera) { return cameras[camera * kCameraVectors + 7].y != 0.0; }
+
+Motion camera_motion(uint camera)
+{
+    const vec4 turn = cameras[camera * kCameraVectors + 8], shift = cameras[camera * kCameraVectors + 9];
+    return Motion(turn.xyz, shift.xyz, vec2(turn.w, shift.w), cameras[camera * kCameraVectors + 7].z);
+}

@@ -2,11 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // a splat as a camera with a lens sees it, and the pixels that it can reach (docs/method.md §5.4)
-#include "lib/lens.glsl"
+#include "lib/moving_pixel.glsl"
 #include "lib/splat_tangents.glsl"
 
 layout(constant_id = 0) const uint kModel = 1;
 layout(constant_id = 2) const bool kMovers = false;
+layout(constant_id = 3) const bool kMoving = false; // cameras move during their readout
 layout(push_constant) uniform Push { SplatPush p; };
 layout(binding = 0) readonly buffer Cameras { vec4 cameras[]; };     // [cameras, kCameraVectors]
 layout(binding = 1) readonly buffer Positions { vec4 positions[]; }; // [splats] xyz, opacity
@@ -21,12 +22,15 @@ layout(binding = 6) readonly buffer MoverRows { uint mover_rows[]; }; // [mover_
 #include "lib/splat_camera.glsl"
 
 struct LensView {
-    vec3 center;   // camera frame, metres
+    vec3 center;   // camera frame, metres; moving: from the camera at part 0, in its still frame, as are axes and normal
     float away;    // |center|
     vec3 t_u, t_v; // unit
     vec3 normal;   // towards the camera
+    float nearness; // of the centre, by which splats are sorted
+    float depth;    // of the centre
     vec2 pixel;    // of the centre; far off where the lens does not see it
     ivec4 bounds;  // first and last pixel in x, then in y; in a panorama first > last: from there on around to here
+    vec3 drift;     // moving: of the centre from the camera, metres a part
 };
 
 const float kNowhere = -1e9;
@@ -87,9 +91,25 @@ struct Cap {
     float inner, outer, spread;
 };
 
+// how far a disc gets while it moves in the camera's frame, from where it is in the middle
+struct Sweep {
+    vec3 across; // of its centre, from the first place to the last
+    vec3 off;    // from the middle between those two to the place in the middle
+    float rest;  // what that leaves out, and what turning adds
+};
+
+Sweep no_sweep() { return Sweep(vec3(0.0), vec3(0.0), 0.0); }
+
+// of a disc with the half axes `reach`, in one direction
+float extent(LensView s, Sweep w, vec2 reach, vec3 along)
+{
+    const float still = length(reach * vec2(dot(s.t_u, along), dot(s.t_v, along)));
+    return kMoving ? still + 0.5 * abs(dot(w.across, along)) + abs(dot(w.off, along)) + w.rest : still;
+}
+
 // both of the sphere around the disc, seen at `half_angle`, and of the disc's extents outwards, around and along the
-// axis; `reach` is the disc's half axes
-Cap find_cap(LensView s, vec3 axis, vec2 reach, float half_angle)
+// axis
+Cap find_cap(LensView s, Sweep w, vec3 axis, vec2 reach, float half_angle)
 {
     const float along = dot(s.center, axis);
     const vec3 from_axis = s.center - along * axis;
@@ -98,10 +118,9 @@ Cap find_cap(LensView s, vec3 axis, vec2 reach, float half_angle)
     if (angle > half_angle && angle + half_angle < kPi)
         cap.spread = accurate_asin(min(accurate_sin(half_angle) / accurate_sin(angle), 1.0));
     const vec3 outwards = from_axis / max(ring, 1e-20), around = cross(axis, outwards);
-    const float out_by = length(reach * vec2(dot(s.t_u, outwards), dot(s.t_v, outwards)));
+    const float out_by = extent(s, w, reach, outwards);
     if (ring > 1e-5 * s.away && ring > out_by) {
-        const float around_by = length(reach * vec2(dot(s.t_u, around), dot(s.t_v, around)));
-        const float along_by = length(reach * vec2(dot(s.t_u, axis), dot(s.t_v, axis)));
+        const float around_by = extent(s, w, reach, around), along_by = extent(s, w, reach, axis);
         const float close = ring - out_by, far = length(vec2(ring + out_by, around_by));
         const float low = along - along_by, high = along + along_by;
         cap.spread = min(cap.spread, accurate_atan2(around_by, close));
@@ -123,15 +142,24 @@ bool sector_bounds(Lens l, LensView s, Cap cap, out vec4 box)
         return false;
     inner = lens_distance(kModel, l, min(inner, l.limit)).x;
     outer = min(outer, l.limit);
-    // p1 and p2 move a pixel by at most this much (|2 a b| <= r^2, r^2 + 2 a^2 <= 3 r^2)
+    // p1 and p2 move a pixel by at most this much (|2 a b| <= r^2, r^2 + 2 a^2 <= 3 r^2), and s1 to s4
     vec2 moved = vec2(0.0);
-    if (kModel == kOpencv)
-        moved = outer * outer * (abs(l.first.zw) + 3.0 * abs(l.first.wz));
+    if (kModel == kOpencv) {
+        const float s = outer * outer;
+        moved = s * (abs(l.first.zw) + 3.0 * abs(l.first.wz) + abs(l.prism.xz) + s * abs(l.prism.yw));
+    }
     outer = lens_distance(kModel, l, outer).x;
-    const float to = accurate_atan2(s.center.y, s.center.x), spread = cap.spread;
-    const vec2 high = vec2(sector_end(to, spread, inner, outer), sector_end(to - 0.5 * kPi, spread, inner, outer));
-    const vec2 low = -vec2(sector_end(to - kPi, spread, inner, outer), sector_end(to + 0.5 * kPi, spread, inner, outer));
-    box = vec4(low - moved, high + moved) * l.focal.xyxy + l.focal.zwzw;
+    const float toward = accurate_atan2(s.center.y, s.center.x), spread = cap.spread;
+    const vec2 high = vec2(sector_end(toward, spread, inner, outer), sector_end(toward - 0.5 * kPi, spread, inner, outer));
+    const vec2 low = -vec2(sector_end(toward - kPi, spread, inner, outer), sector_end(toward + 0.5 * kPi, spread, inner, outer));
+    box = vec4(low - moved, high + moved);
+    if (kModel == kFtheta) { // its linear part
+        const vec2 middle = 0.5 * (low + high), half_size = 0.5 * (high - low);
+        const vec2 to = vec2(l.last.y * middle.x + l.last.z * middle.y, l.last.w * middle.x + middle.y);
+        const vec2 reach = vec2(abs(l.last.y) * half_size.x + abs(l.last.z) * half_size.y, abs(l.last.w) * half_size.x + half_size.y);
+        box = vec4(to - reach, to + reach);
+    }
+    box = box * l.focal.xyxy + l.focal.zwzw;
     return true;
 }
 
@@ -142,22 +170,44 @@ vec4 panorama_bounds(Lens l, LensView s, Cap cap)
     return vec4(to - cap.spread, 0.5 * kPi - cap.outer, to + cap.spread, 0.5 * kPi - cap.inner) * l.focal.xyxy + l.focal.zwzw;
 }
 
-bool find_bounds(inout LensView s, Lens l, float opacity, vec2 sigmas)
+// low x and y, high x and y of what the disc covers on the image; false: wholly beyond the lens
+bool disc_bounds(Lens l, LensView s, Sweep w, vec2 reach, out vec4 box)
 {
-    const float c = sqrt(min(p.cutoff2, 2.0 * log(opacity / p.alpha_min)));
-    const vec2 reach = 1.0001 * c * sigmas;
-    const float sphere = max(reach.x, reach.y) / s.away; // 1 and more: the camera is within
+    const float widest = max(reach.x, reach.y) + (kMoving ? 0.5 * length(w.across) + length(w.off) + w.rest : 0.0);
+    const float sphere = widest / s.away; // 1 and more: the camera is within
     const bool panorama = kModel == kEquirectangular || kModel == kSpinning;
     vec3 axis = vec3(0.0, 0.0, 1.0); // note: Mesa 22 gets a choice of vectors wrong where the condition is a constant
     if (panorama)
         axis = vec3(0.0, 1.0, 0.0);
-    const Cap cap = find_cap(s, axis, reach, sphere < 0.999 ? accurate_asin(sphere) : kPi);
-    vec4 box = vec4(0.0);
-    bool disc = true;
-    if (panorama)
-        box = panorama_bounds(l, s, cap);
-    else
-        disc = sector_bounds(l, s, cap, box);
+    const Cap cap = find_cap(s, w, axis, reach, sphere < 0.999 ? accurate_asin(sphere) : kPi);
+    box = vec4(0.0);
+    if (!panorama)
+        return sector_bounds(l, s, cap, box);
+    box = panorama_bounds(l, s, cap);
+    return true;
+}
+
+// the pixels of a box; false: there are none
+bool pixels_within(Lens l, inout LensView s, vec4 box)
+{
+    if (kModel == kSpinning) { // columns may run against the azimuth
+        const ivec2 across = turning_range(l, min(box.x, box.z), max(box.x, box.z));
+        s.bounds = ivec4(across, rows_above(box.y - 1e-6), rows_above(box.w + 1e-6) - 1);
+        return s.bounds.x <= s.bounds.y && s.bounds.z <= s.bounds.w;
+    }
+    const bool panorama = kModel == kEquirectangular;
+    s.bounds = ivec4(panorama ? wrapped_range(box.x, box.z) : pixel_range(box.x, box.z, p.width), pixel_range(box.y, box.w, p.height));
+    return (panorama ? s.bounds.y >= 0 : s.bounds.x <= s.bounds.y) && s.bounds.z <= s.bounds.w;
+}
+
+// how far a splat is seen, in sigmas
+float sigmas_seen(float opacity) { return sqrt(min(p.cutoff2, 2.0 * log(opacity / p.alpha_min))); }
+
+bool find_bounds(inout LensView s, Lens l, float opacity, vec2 sigmas)
+{
+    const float c = sigmas_seen(opacity);
+    vec4 box;
+    const bool disc = disc_bounds(l, s, no_sweep(), 1.0001 * c * sigmas, box);
     if (s.pixel.x > kNowhere) { // the screen filter's dot
         const float dot_radius = c / sqrt(p.filter_scale);
         box = disc ? vec4(min(box.xy, s.pixel - dot_radius), max(box.zw, s.pixel + dot_radius))
@@ -165,14 +215,10 @@ bool find_bounds(inout LensView s, Lens l, float opacity, vec2 sigmas)
     } else if (!disc) {
         return false;
     }
-    if (kModel == kSpinning) {
-        const vec2 across = vec2(min(box.x, box.z), max(box.x, box.z)); // columns may run against the azimuth
-        s.bounds = ivec4(turning_range(l, across.x, across.y), rows_above(box.y - 1e-6), rows_above(box.w + 1e-6) - 1);
-        return s.bounds.x <= s.bounds.y && s.bounds.z <= s.bounds.w;
-    }
-    s.bounds = ivec4(panorama ? wrapped_range(box.x, box.z) : pixel_range(box.x, box.z, p.width), pixel_range(box.y, box.w, p.height));
-    return (panorama ? s.bounds.y >= 0 : s.bounds.x <= s.bounds.y) && s.bounds.z <= s.bounds.w;
+    return pixels_within(l, s, box);
 }
+
+#include "lib/splat_readout.glsl"
 
 // false: nothing of it can be seen, or it is not a splat
 bool view_splat(uint splat, uint camera, out LensView s)
@@ -189,17 +235,23 @@ bool view_splat(uint splat, uint camera, out LensView s)
         view = transpose(mat3x4(movers[at], movers[at + 1], movers[at + 2]));
     }
     s.center = view * vec4(position.xyz, 1.0);
-    s.away = length(s.center);
-    if (!((kModel == kOpencv ? s.center.z : s.away) > p.near))
-        return false;
     vec3 t_u, t_v;
     tangents(normal.xyz, t_u, t_v);
     s.t_u = mat3(view) * t_u;
     s.t_v = mat3(view) * t_v;
     s.normal = mat3(view) * normal.xyz;
+    s.drift = vec3(0.0);
+    const vec2 sigmas = vec2(normal.w, color.w);
+    if (kMoving)
+        return view_moving(lens, camera, position.w, sigmas, s);
+    s.away = length(s.center);
+    s.nearness = kModel == kOpencv ? s.center.z : s.away;
+    s.depth = camera_depth_is_radial(camera) ? s.away : s.center.z;
+    if (!(s.nearness > p.near))
+        return false;
     if (dot(s.normal, s.center) > 0.0)
         s.normal = -s.normal;
     if (kModel == kSpinning || !lens_project(kModel, lens, s.center, s.pixel)) // no screen filter
         s.pixel = vec2(kNowhere);
-    return is_finite(vec4(s.pixel, s.away, 0.0)) && find_bounds(s, lens, position.w, vec2(normal.w, color.w));
+    return is_finite(vec4(s.pixel, s.away, 0.0)) && find_bounds(s, lens, position.w, sigmas);
 }

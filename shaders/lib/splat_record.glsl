@@ -9,6 +9,11 @@ const uint kRecord = 4;
 // normal, depth of the centre; colour. Bounds in x whose first is beyond their last run around a panorama's seam.
 const uint kRayRecord = 5;
 
+// six where the camera moves during its readout, lengths in its still frame (moving_rays.glsl): pixel of the centre,
+// bounds; u axis / sigma_u, opacity; centre from the camera at part 0, sigma_u / sigma_v; normal, depth of the centre;
+// colour; drift of the centre from the camera, a part
+const uint kMovingRecord = 6;
+
 float sign_of(float v) { return v < 0.0 ? -1.0 : 1.0; }
 
 // a unit vector in 32 bits, to about 1e-4: Cigolle et al. 2014, octahedral

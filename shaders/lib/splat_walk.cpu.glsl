@@ -3,7 +3,7 @@
 
 // how a block of 8 x 8 pixels walks the list of its tile on a CPU: the lanes of a subgroup look at as many records at
 // once, in a loop of its own, because there a branch that nobody takes still costs; no more than 8 lanes run.
-// Needs Records, kStride (texels of a record), overlaps(bounds, corner) and the lane's pixels[kRows].
+// Needs Records, kTexels (texels of a record), overlaps(bounds, corner) and the lane's pixels[kRows].
 struct Walk {
     uint first, end; // of the list, what is left
     uint candidate;  // record of this lane
@@ -20,7 +20,7 @@ bool find_hits(inout Walk w, uvec2 corner)
     do {
         const uint at = w.first + gl_SubgroupInvocationID;
         w.candidate = pairs[min(at, w.end - 1)];
-        const uvec2 bounds = texelFetch(Records, int(w.candidate * kStride)).zw;
+        const uvec2 bounds = texelFetch(Records, int(w.candidate * kTexels)).zw;
         w.hits = subgroupBallot(at < w.end && overlaps(bounds, corner)).x;
         w.first += min(gl_SubgroupSize, 8);
     } while (w.hits == 0 && w.first < w.end);
@@ -35,7 +35,7 @@ uint take_hit(inout Walk w)
     return record;
 }
 
-vec4 texel_of(uint record, uint i) { return uintBitsToFloat(texelFetch(Records, int(record * kStride + i))); }
+vec4 texel_of(uint record, uint i) { return uintBitsToFloat(texelFetch(Records, int(record * kTexels + i))); }
 
 // is a pixel of the subgroup not done?
 bool any_left()

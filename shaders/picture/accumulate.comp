@@ -3,12 +3,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // a frame and the one before it where both see the same surface, four pixels a thread (docs/method.md §6.5)
 #extension GL_GOOGLE_include_directive : require
-#include "lib/lens.glsl"
+#include "lib/moving_pixel.glsl"
 #include "lib/rounding.glsl"
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint kModel = 0; // CameraModel
+layout(constant_id = 1) const bool kMoving = false; // a camera moves while its picture is read out
 layout(push_constant) uniform AccumulatePush {
     uint width, height;
     uint words;      // of a picture
@@ -67,17 +68,41 @@ float camera_depth(uint camera, vec3 point)
     return camera_depth_is_radial(camera) ? length(point) : point.z;
 }
 
+// where the frame before, seen from its place at a part of its readout, has a point of its still frame
+bool past_pixel(vec3 still, out vec2 source, out float depth)
+{
+    const Lens lens = camera_lens(1);
+    if (!kMoving) {
+        depth = camera_depth(1, still);
+        return lens_project(kModel, lens, still, source);
+    }
+    const Motion motion = camera_motion(1);
+    const float guesses[3] = {0.0, -0.5, 0.5};
+    for (uint i = 0; i < 3; ++i) {
+        float part = guesses[i];
+        if (!settle(kModel, lens, motion, still, -0.5, 0.5, part, source))
+            continue;
+        depth = camera_depth(1, seen_at(motion, part, still));
+        return true;
+    }
+    return false;
+}
+
 // where the frame before saw what this pixel shows; its depth there
 bool find_source(ivec2 pixel, out vec2 source, out float depth)
 {
+    const vec2 position = vec2(pixel) + 0.5;
     vec3 ray;
-    if (!lens_unproject(kModel, camera_lens(0), vec2(pixel) + 0.5, ray) || !(camera_depth(0, ray) > 0.0))
+    if (!lens_unproject(kModel, camera_lens(0), position, ray) || !(camera_depth(0, ray) > 0.0))
         return false;
-    const vec3 point = ray * (metres(depth_now[index_of(pixel)]) / camera_depth(0, ray));
-    const vec3 before = camera_view(1) * vec4(point, 1.0);
-    depth = camera_depth(1, before);
-    return lens_project(kModel, camera_lens(1), before, source) && depth > 0.0 && source.x >= 0.0 && source.y >= 0.0 &&
-           source.x < float(p.width) && source.y < float(p.height);
+    vec3 point = ray * (metres(depth_now[index_of(pixel)]) / camera_depth(0, ray));
+    if (kMoving) {
+        const Motion motion = camera_motion(0);
+        const float part = part_of(motion, position);
+        point = turned(motion.turn, part, point) + part * motion.shift;
+    }
+    return past_pixel(camera_view(1) * vec4(point, 1.0), source, depth) && depth > 0.0 && source.x >= 0.0 &&
+           source.y >= 0.0 && source.x < float(p.width) && source.y < float(p.height);
 }
 
 // the four pixels around it have the depth between them

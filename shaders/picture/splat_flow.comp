@@ -4,6 +4,7 @@
 // where the surface of a pixel is in the next picture, and whether it is seen there (docs/method.md §5.5)
 #extension GL_GOOGLE_include_directive : require
 #include "lib/lens.glsl"
+#include "lib/moving_rays.glsl"
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;

@@ -25,7 +25,7 @@ struct SplatPush {
 };
 
 // The table of a lidar's rows (engine/camera/lidar.h), by rising angle: angle below the horizon; of its rays from their
-// column's, clockwise, both radians; what is added to a pixel's column for the column in which it is fired; it fires in
-// multiples of this
+// column's, clockwise, both radians; what is added to a pixel's number for the column in which it is fired; how many
+// columns after that one begins
 
 #endif

@@ -17,7 +17,7 @@ layout(constant_id = 1) const uint kTileN = 8; // and columns
 layout(binding = 0) uniform usamplerBuffer Records; // [max_visible, kRecord]
 #include "lib/splat_blend.glsl"
 
-const uint kRows = 8, kStride = kRecord;
+const uint kRows = 8, kTexels = kRecord;
 
 Pixel pixels[kRows];
 

@@ -9,9 +9,9 @@
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
-layout(constant_id = 0) const bool kRays = false; // records of cameras with lenses
+layout(constant_id = 0) const uint kTexels = kRecord; // of a record; more than kRecord: of cameras with lenses
 layout(push_constant) uniform Push { SplatPush p; };
-layout(binding = 0) readonly buffer Records { uvec4 records[]; };      // [max_visible, kRecord or kRayRecord]
+layout(binding = 0) readonly buffer Records { uvec4 records[]; };      // [max_visible, kTexels]
 layout(binding = 1) readonly buffer Sources { uint sources[]; };       // [max_visible]
 layout(binding = 2) readonly buffer Order { uint order[]; };           // [max_visible] records, nearest first
 layout(binding = 3) readonly buffer Count { uint count[]; };           // [1] visible splats
@@ -35,14 +35,14 @@ void main()
     const uint slot = order[i];
     const uint camera = sources[slot] / p.splats;
     uint to = first[i];
-    if (kRays) {
-        const uvec4 span = tile_span(records[slot * kRayRecord].zw, p.tile, p.tiles_x);
+    if (kTexels != kRecord) {
+        const uvec4 span = tile_span(records[slot * kTexels].zw, p.tile, p.tiles_x);
         for (uint y = 0; y < span.w; ++y)
             for (uint x = 0; x < span.y; ++x, ++to)
                 put(to, (camera * p.tiles_y + span.z + y) * p.tiles_x + (span.x + x) % p.tiles_x, slot);
         return;
     }
-    const uvec4 range = tile_range(records[slot * kRecord].zw, p.tile);
+    const uvec4 range = tile_range(records[slot * kTexels].zw, p.tile);
     for (uint y = range.z; y <= range.w; ++y)
         for (uint x = range.x; x <= range.y; ++x, ++to)
             put(to, (camera * p.tiles_y + y) * p.tiles_x + x, slot);

@@ -14,9 +14,11 @@ layout(binding = 12) readonly buffer Rows { vec4 rows[]; }; // [height] of a swe
 layout(local_size_x = 64) in;
 layout(binding = 7) readonly buffer Keep { uint keep[]; };         // [cameras, splats]
 layout(binding = 8) readonly buffer Slots { uint slots[]; };       // [cameras, splats] kept ones before this one
-layout(binding = 9) writeonly buffer Records { uvec4 records[]; }; // [max_visible, kRayRecord]
+layout(binding = 9) writeonly buffer Records { uvec4 records[]; }; // [max_visible, kTexels]
 layout(binding = 10) writeonly buffer Sources { uint sources[]; };  // [max_visible] camera * splats + splat
 layout(binding = 11) writeonly buffer Depths { uint depths[]; };    // [max_visible]
+
+const uint kTexels = kMoving ? kMovingRecord : kRayRecord;
 
 void main()
 {
@@ -26,16 +28,23 @@ void main()
     const uint splat = i % p.splats, camera = i / p.splats, slot = slots[i];
     LensView s;
     view_splat(splat, camera, s);
-    // of a ray r: u = a . r / n . r, v = b . r / n . r, at the distance n . center / n . r
-    const vec3 a = cross(s.t_v, s.center) / normals[splat].w, b = cross(s.center, s.t_u) / colors[splat].w;
-    const float plane = dot(s.normal, s.center), edge = abs(plane) > 1e-5 * s.away ? plane : 0.0;
-    const float depth = camera_depth_is_radial(camera) ? s.away : s.center.z;
     const uvec2 bounds = uvec2(s.bounds.x | s.bounds.y << 16, s.bounds.z | s.bounds.w << 16);
-    records[slot * kRayRecord] = uvec4(floatBitsToUint(s.pixel), bounds);
-    records[slot * kRayRecord + 1] = floatBitsToUint(vec4(a, positions[splat].w));
-    records[slot * kRayRecord + 2] = floatBitsToUint(vec4(b, edge));
-    records[slot * kRayRecord + 3] = floatBitsToUint(vec4(s.normal, depth));
-    records[slot * kRayRecord + 4] = floatBitsToUint(vec4(colors[splat].rgb, 0.0));
+    // of a ray r: u = a . r / n . r, v = b . r / n . r, at the distance n . center / n . r
+    vec4 a = vec4(cross(s.t_v, s.center) / normals[splat].w, positions[splat].w);
+    const float plane = dot(s.normal, s.center), edge = abs(plane) > 1e-5 * s.away ? plane : 0.0;
+    vec4 b = vec4(cross(s.center, s.t_u) / colors[splat].w, edge);
+    if (kMoving) {
+        a.xyz = s.t_u / normals[splat].w;
+        b = vec4(s.center, normals[splat].w / colors[splat].w);
+    }
+    const uint at = slot * kTexels;
+    records[at] = uvec4(floatBitsToUint(s.pixel), bounds);
+    records[at + 1] = floatBitsToUint(a);
+    records[at + 2] = floatBitsToUint(b);
+    records[at + 3] = floatBitsToUint(vec4(s.normal, s.depth));
+    records[at + 4] = floatBitsToUint(vec4(colors[splat].rgb, 0.0));
+    if (kMoving)
+        records[at + 5] = floatBitsToUint(vec4(s.drift, 0.0));
     sources[slot] = i;
-    depths[slot] = floatBitsToUint(kModel == kOpencv ? s.center.z : s.away);
+    depths[slot] = floatBitsToUint(s.nearness);
 }

@@ -12,10 +12,10 @@
 layout(local_size_x = 8) in;
 layout(constant_id = 0) const uint kTileM = 8; // pixel rows of a workgroup
 layout(constant_id = 1) const uint kTileN = 8; // and columns
-layout(binding = 0) uniform usamplerBuffer Records; // [max_visible, kRayRecord]
+layout(binding = 0) uniform usamplerBuffer Records; // [max_visible, kTexels]
 #include "lib/splat_ray.glsl"
 
-const uint kRows = 8, kStride = kRayRecord;
+const uint kRows = 8;
 
 Pixel pixels[kRows];
 
@@ -32,7 +32,7 @@ void main()
 {
     const uint camera = gl_WorkGroupID.z, column = gl_LocalInvocationID.x;
     const uvec2 corner = gl_WorkGroupID.yx * 8, tile_at = corner / p.tile;
-    vec4 ray[kRows];
+    Ray ray[kRows];
     [[unroll]] for (uint y = 0; y < kRows; ++y) {
         ray[y] = pixel_ray(corner + uvec2(column, y), camera);
         pixels[y] = pixel_of_ray(ray[y]);
@@ -41,12 +41,15 @@ void main()
     while (any_left() && find_hits(walk, corner)) {
         do {
             const uint record = take_hit(walk);
+            vec4 drift = vec4(0.0);
+            if (kMoving)
+                drift = texel_of(record, 5);
             const RaySplat s = read_splat(texel_of(record, 0), texel_of(record, 1), texel_of(record, 2), texel_of(record, 3),
-                                          texel_of(record, 4));
+                                          texel_of(record, 4), drift);
             [[unroll]] for (uint y = 0; y < kRows; ++y)
                 blend(pixels[y], s, ray[y], vec2(corner + uvec2(column, y)) + 0.5, record);
         } while (walk.hits != 0);
     }
     [[unroll]] for (uint y = 0; y < kRows; ++y)
-        store(pixels[y], corner + uvec2(column, y), camera);
+        store_ray(pixels[y], corner + uvec2(column, y), camera);
 }

@@ -9,12 +9,12 @@
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint kTileM = 16; // pixel rows of a workgroup
 layout(constant_id = 1) const uint kTileN = 16; // and columns
-layout(binding = 0) readonly buffer Records { uvec4 records[]; }; // [max_visible, kRayRecord]
+layout(binding = 0) readonly buffer Records { uvec4 records[]; }; // [max_visible, kTexels]
 #include "lib/splat_ray.glsl"
 
 const uint kOwn = 4;    // pixels of a thread, four rows apart
 const uint kBatch = 64; // records in shared memory
-shared uvec4 batch[kBatch * kRayRecord];
+shared uvec4 batch[kBatch * kTexels];
 shared uint batch_record[kBatch];
 shared uint living[2]; // threads with a pixel that is not done: of this batch and of the next, by turns
 
@@ -24,8 +24,8 @@ void load(uint i, uint end)
     if (i + t < end) {
         const uint record = pairs[i + t];
         batch_record[t] = record;
-        [[unroll]] for (uint j = 0; j < kRayRecord; ++j)
-            batch[t * kRayRecord + j] = records[record * kRayRecord + j];
+        [[unroll]] for (uint j = 0; j < kTexels; ++j)
+            batch[t * kTexels + j] = records[record * kTexels + j];
     }
 }
 
@@ -35,7 +35,7 @@ void main()
     const uvec2 corner = gl_WorkGroupID.yx * 16, own = corner + uvec2(t % 16, t / 16), tile_at = corner / p.tile;
     const uint tile = (camera * p.tiles_y + tile_at.y) * p.tiles_x + tile_at.x, end = starts[tile + 1];
     Pixel pixels[kOwn];
-    vec4 ray[kOwn];
+    Ray ray[kOwn];
     [[unroll]] for (uint y = 0; y < kOwn; ++y) {
         ray[y] = pixel_ray(own + uvec2(0, 4 * y), camera);
         pixels[y] = pixel_of_ray(ray[y]);
@@ -51,9 +51,12 @@ void main()
             living[turn ^ 1] = 0;
         barrier();
         for (uint j = 0; j < min(end - i, kBatch); ++j) {
-            const uint at = j * kRayRecord;
+            const uint at = j * kTexels;
+            vec4 drift = vec4(0.0);
+            if (kMoving)
+                drift = uintBitsToFloat(batch[at + 5]);
             const RaySplat s = read_splat(uintBitsToFloat(batch[at]), uintBitsToFloat(batch[at + 1]), uintBitsToFloat(batch[at + 2]),
-                                          uintBitsToFloat(batch[at + 3]), uintBitsToFloat(batch[at + 4]));
+                                          uintBitsToFloat(batch[at + 3]), uintBitsToFloat(batch[at + 4]), drift);
             [[unroll]] for (uint y = 0; y < kOwn; ++y)
                 blend(pixels[y], s, ray[y], vec2(own + uvec2(0, 4 * y)) + 0.5, batch_record[j]);
         }
@@ -65,5 +68,5 @@ void main()
         barrier();
     }
     [[unroll]] for (uint y = 0; y < kOwn; ++y)
-        store(pixels[y], own + uvec2(0, 4 * y), camera);
+        store_ray(pixels[y], own + uvec2(0, 4 * y), camera);
 }

@@ -41,12 +41,12 @@ Status put_distortion(const LensOptions& o, Intrinsics& k)
         return {};
     SR_TRY(const std::vector<double> values, numbers_in(o.distortion));
     const size_t n = values.size();
-    if (!(k.model == CameraModel::opencv && (n == 4 || n == 5 || n == 8)) &&
+    if (!(k.model == CameraModel::opencv && (n == 4 || n == 5 || n == 8 || n == 12)) &&
         !(k.model == CameraModel::fisheye && n == 4))
         return fail(
             ErrorCode::usage,
-            "--distortion takes k1,k2,p1,p2[,k3[,k4,k5,k6]] of --camera-model opencv or k1,k2,k3,k4 of fisheye, "
-            "not {} numbers of {}",
+            "--distortion takes k1,k2,p1,p2[,k3[,k4,k5,k6[,s1,s2,s3,s4]]] of --camera-model opencv or k1,k2,k3,k4 of "
+            "fisheye, not {} numbers of {}",
             n, name_of(k.model));
     std::ranges::copy(values, k.distortion.begin());
     return {};
@@ -131,7 +131,8 @@ void add_lens_options(CLI::App& c, LensOptions& o)
     add_choice(c, "--camera-model", {"pinhole", "opencv", "fisheye", "equirectangular"},
                "lens, where the path has no intrinsics",
                [set = set(o.camera_model, o.lens_given)](const std::string& model) { set(model); });
-    c.add_option("--distortion", o.distortion, "k1,k2,p1,p2[,k3[,k4,k5,k6]] of opencv, k1,k2,k3,k4 of fisheye");
+    c.add_option("--distortion", o.distortion,
+                 "k1,k2,p1,p2[,k3[,k4,k5,k6[,s1,s2,s3,s4]]] of opencv, k1,k2,k3,k4 of fisheye");
 }
 
 std::span<const std::string_view> lens_options()
@@ -175,7 +176,7 @@ Result<CameraPath> read_cameras(const Path& file, const Path& rig_file, const Le
     if (!rig_file.empty()) {
         SR_CHECK(refuse_lens(o, quote_path(rig_file)));
         SR_TRY(const Rig rig, read_rig(rig_file));
-        path = expand_rig(rig, path);
+        SR_TRY(path, expand_rig(rig, path));
     } else if (std::ranges::any_of(path.frames, own)) {
         SR_CHECK(refuse_lens(o, quote_path(file)));
     } else if (path.frames[0].intrinsics.width == o.width && path.frames[0].intrinsics.height == o.height) {

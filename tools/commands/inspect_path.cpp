@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/commands/inspect_path.h"
 
+#include "engine/camera/camera_view.h"
 #include "engine/job/empty_frames.h"
 #include "runtime/base/quote.h"
 #include "tools/trajectory/path_format.h"

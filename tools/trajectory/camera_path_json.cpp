@@ -97,7 +97,7 @@ Status check_writable(const CameraPath& cameras, std::string_view where)
                         frame);
         if (k.model == CameraModel::equirectangular)
             continue;
-        if (k.model == CameraModel::opencv || k.distortion != std::array<double, 8>{})
+        if (k.model == CameraModel::opencv || k.distortion != Distortion{})
             return fail(ErrorCode::bad_input, "{} has lens distortion, and a camera_path.json has none", frame);
         if (std::abs(k.fx - k.fy) > 1e-6 * k.fx || std::abs(k.cx - k.width / 2.0) > 1e-6 * k.width ||
             std::abs(k.cy - k.height / 2.0) > 1e-6 * k.height)

@@ -152,6 +152,7 @@ const ColmapModel& colmap_model_for(const Intrinsics& k)
     case CameraModel::equirectangular:
         return *colmap_model_of_name("EQUIRECTANGULAR");
     case CameraModel::pinhole:
+    case CameraModel::ftheta: // which writers refuse
         break;
     }
     return *colmap_model_of_name("PINHOLE");

@@ -1,0 +1,92 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+
+// a splat as a camera sees it that moves during its readout (docs/method.md §5.4): the pixels that it can reach, and
+// when the line that shows its centre is read. Needs splat_lens_view.glsl.
+
+// the disc as the camera has it in the middle of the parts [low, high], and how far it gets in them
+Sweep sweep_of(LensView still, Motion m, float low, float high, float reach, out LensView s)
+{
+    const float middle = 0.5 * (low + high), time = high - low;
+    s = still;
+    s.center = seen_at(m, middle, still.center);
+    s.t_u = turned(m.turn, -middle, still.t_u);
+    s.t_v = turned(m.turn, -middle, still.t_v);
+    s.away = length(s.center);
+    const vec3 first = seen_at(m, low, still.center), last = seen_at(m, high, still.center);
+    // what is quadratic in time lies within `across` and `off`. The third derivative is at most
+    // turn^3 distance + 3 turn^2 shift, of which a quadratic through three points leaves 1 / 124.7.
+    const float turn = length(m.turn) * time, shift = length(m.shift) * time;
+    const float rest = turn * turn * (turn * (s.away + shift) + 3.0 * shift) / 124.0 + 0.5 * turn * reach + 1e-6 * s.away;
+    return Sweep(last - first, s.center - 0.5 * (first + last), rest);
+}
+
+// The parts within [low, high] at which lines are read that a box touches. Around a panorama's seam: all of them.
+// bounds: of a sweep, the pixels in the box
+vec2 parts_of(Lens l, Motion m, vec4 box, ivec4 bounds, float low, float high)
+{
+    if (kModel == kSpinning) {
+        const vec2 columns = l.first.x + vec2(bounds.xy) + l.first.zw;
+        return clamp(columns / l.first.y - 0.5 + vec2(-1e-5, 1e-5), vec2(low), vec2(high));
+    }
+    if (kModel == kEquirectangular && m.across.x != 0.0 && (box.x < 1.0 || box.z > float(p.width) - 1.0))
+        return vec2(low, high);
+    const vec2 margin = 0.5 + 1e-3 * (box.zw - box.xy);
+    const float a = part_of(m, box.xy - margin), b = part_of(m, box.zw + margin);
+    return clamp(vec2(min(a, b), max(a, b)), vec2(low), vec2(high));
+}
+
+// finds s.pixel; the part of the line that shows the centre, the middle one where none does
+float part_of_center(Lens l, Motion m, float low, float high, inout LensView s)
+{
+    const float guesses[3] = {0.5 * (low + high), low, high};
+    if (kModel == kSpinning) { // a few columns, and no screen filter
+        s.pixel = vec2(kNowhere);
+        return guesses[0];
+    }
+    for (uint i = 0; i < 3; ++i) {
+        float part = guesses[i];
+        if (settle(kModel, l, m, s.center, low, high, part, s.pixel))
+            return part;
+    }
+    s.pixel = vec2(kNowhere);
+    return 0.0;
+}
+
+float nearness_of(vec3 seen) { return kModel == kOpencv ? seen.z : length(seen); }
+
+// s: center, axes and normal in the still frame. Bounds are found for the whole readout first, then for the parts of
+// the lines that are within them. Whether the centre is too near is asked for each pixel.
+bool view_moving(Lens l, uint camera, float opacity, vec2 sigmas, inout LensView s)
+{
+    const Motion m = camera_motion(camera);
+    const float c = sigmas_seen(opacity), dot_radius = c / sqrt(p.filter_scale);
+    const vec2 reach = 1.0001 * c * sigmas;
+    float low = -0.5, high = 0.5;
+    vec4 box;
+    for (uint i = 0; i < 3; ++i) {
+        LensView middle;
+        const Sweep w = sweep_of(s, m, low, high, max(reach.x, reach.y), middle);
+        const float moves = 0.5 * length(w.across) + length(w.off) + w.rest;
+        if (!is_finite(vec4(middle.away)) || nearness_of(middle.center) + moves <= p.near || !disc_bounds(l, middle, w, reach, box) ||
+            !pixels_within(l, s, vec4(box.xy - dot_radius, box.zw + dot_radius)))
+            return false;
+        const vec2 parts = parts_of(l, m, box, s.bounds, low, high);
+        if (parts.y - parts.x > 0.7 * (high - low))
+            break;
+        low = parts.x;
+        high = parts.y;
+    }
+    const float part = part_of_center(l, m, low, high, s);
+    const vec3 seen = seen_at(m, part, s.center);
+    s.away = length(seen);
+    s.nearness = max(nearness_of(seen), 0.0);
+    s.depth = camera_depth_is_radial(camera) ? s.away : seen.z;
+    s.drift = -m.shift;
+    vec2 pixel = s.pixel;
+    if (kModel == kEquirectangular) // on the side of the seam that the box is on
+        pixel.x -= float(p.width) * floor((pixel.x - 0.5 * (box.x + box.z)) / float(p.width) + 0.5);
+    if (s.pixel.x > kNowhere)
+        box = vec4(min(box.xy, pixel - dot_radius), max(box.zw, pixel + dot_radius));
+    return is_finite(vec4(s.pixel, s.away, 0.0)) && pixels_within(l, s, box);
+}
