@@ -355,11 +355,12 @@ typedef struct sr_world_desc {
                           of other seeds, settings or edits; one that cannot be written is read. NULL: none. One
                           world at a time */
     const sr_generation* generation; /* NULL: as the model says */
-    const sr_object* objects;        /* SR_CONDITIONING_GIVEN */
+    const sr_object* objects;        /* SR_CONDITIONING_GIVEN. Splats know which of them they are of: pictures of
+                                        instances, sr_world_set_actors. Without a model they do that alone */
     uint64_t object_count;
     uint64_t seed;
     uint64_t host_bytes;    /* for tiles in memory; 0: no budget */
-    uint64_t splat_bytes;   /* for splats on the device, 56 bytes each, 20 a voxel; allocated here. 0: no splats */
+    uint64_t splat_bytes;   /* for splats on the device, 60 bytes each, 20 a voxel; allocated here. 0: no splats */
     double tile_size;       /* metres; 0: 9.6. Another size gives another world */
     double splat_radius;    /* metres; 0: from the distance of the points */
     uint32_t tiles_at_once; /* generated together; 0: as suits the device. Does not change the bytes */

@@ -84,6 +84,20 @@ SR_API sr_status sr_world_draw(sr_world* world, const sr_draw_desc* draw);
  * so are errors; SR_ERR_USAGE: a count of 0, too. After an error some of them may be drawn. */
 SR_API sr_status sr_world_draws(sr_world* world, const sr_draw_desc* draws, uint32_t count);
 
+/* A thing that moves: an object of the world (sr_world_desc.objects), whose splats are drawn somewhere else. */
+typedef struct sr_actor {
+    uint32_t object; /* its id, below 65535 */
+    uint32_t reserved;
+    double pose[12]; /* [3, 4] row by row, a rotation and metres: to the world from the object's own frame, which has x
+                        along its heading, z up, and its origin in the middle of the box */
+} sr_actor;
+
+/* Where these objects are from the next draw on; others stand where the world has them. actors: `count` of them,
+ * copied; 0: all stand. No splat is made anew. The render thread; does not wait. SR_ERR_USAGE: a world without
+ * splat_bytes; SR_ERR_BAD_INPUT: an object that the world does not have, or twice, a pose that is no rotation; nothing
+ * is changed then. */
+SR_API sr_status sr_world_set_actors(sr_world* world, const sr_actor* actors, uint32_t count);
+
 typedef struct sr_pick {
     uint32_t struct_size;
     uint32_t instance; /* number of the thing, as a picture of instances has it */

@@ -126,7 +126,7 @@ struct FlowSource {
     Tensor depth;  // [height * width, 2] fp32, of SplatImages
     Tensor owners; // [height * width] u32, likewise
 };
-// from this camera's frame to the next's
+// from this camera's (still) frame to the next's
 struct FlowMoves {
     Tensor moves;     // [1 + movers, 12] fp32: of what stands, then of each mover; zeros: it is not there then
     Tensor rows = {}; // [numbers] u32, or none: SplatOptions::mover_rows
@@ -134,6 +134,7 @@ struct FlowMoves {
 struct FlowOptions {
     uint32_t width = 0, height = 0;
     SplatLens lens = SplatLens::pinhole; // of both cameras
+    bool moving = false;                 // one moves while it is read out, at least; no pinholes
     float tolerance = 0.02f;             // relative, by which a hidden surface is farther than what is seen there
 };
 struct FlowTensors {

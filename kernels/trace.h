@@ -10,8 +10,8 @@ namespace semrover {
 // a triangle mesh that rays are sent through: a tree of boxes (engine/mesh/bvh.h) and its triangles in the tree's order
 struct TraceScene {
     Tensor nodes;     // [nodes, 16] u32 array
-    Tensor triangles; // [T, 12] fp32 array: corner, edges to the other two; the fourth numbers hold face, material and
-                      // label as bits
+    Tensor triangles; // [T, 12] fp32 array: corner, edges to the other two; the fourth numbers hold face, material, and
+                      // label | thing << 8 as bits
     Tensor corners;   // [T, 12] u32 array: shaders/lib/surface.glsl; trace_rays does without it and what follows
     Tensor materials; // [M, 8] u32 array
     Tensor texels;    // [texels] u32
@@ -32,10 +32,10 @@ struct ShadeOptions {
     uint32_t ambient_rays = 2; // of a sample
     uint32_t seed = 0;
 };
-[[nodiscard]] Tensor
-shade(Graph& g, const TraceScene& scene,
-      Tensor view,                  // [8, 4] fp32 array: shaders/lib/view.glsl
-      const ShadeOptions& options); // [pixels, 4] u32: sRGB bytes; depth as bits, 0 for sky; normal
-                                    // as signed bytes, camera frame; label, sky where nothing is
+[[nodiscard]] Tensor shade(Graph& g, const TraceScene& scene,
+                           Tensor view,                  // [8, 4] fp32 array: shaders/lib/view.glsl
+                           const ShadeOptions& options); // [pixels, 4] u32: sRGB bytes; depth as bits, 0 for sky;
+                                                         // normal as signed bytes, camera frame; label | thing << 8,
+                                                         // sky where nothing is
 
 } // namespace semrover

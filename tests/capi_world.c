@@ -11,7 +11,7 @@
 
 enum { WIDTH = 64, HEIGHT = 40, PIXELS = WIDTH * HEIGHT };
 
-static const char* model;
+static const char *model, *conditioned;
 
 static sr_grid* street(void)
 {
@@ -532,6 +532,75 @@ static sr_status calls_back(void* user, const sr_cell_rect* rect, sr_grid* grid)
     return labels(&calls, rect, grid);
 }
 
+/* of a picture of instances: how many pixels have the number, and the mean column and row of these */
+static uint32_t seen_of(const uint32_t* instances, uint32_t number, double at[2])
+{
+    uint32_t i, count = 0;
+    at[0] = at[1] = 0;
+    for (i = 0; i < WIDTH * HEIGHT; ++i)
+        if (instances[i] == number) {
+            ++count;
+            at[0] += i % WIDTH;
+            at[1] += i / WIDTH;
+        }
+    at[0] /= count ? count : 1;
+    at[1] /= count ? count : 1;
+    return count;
+}
+
+/* the wall beside the road is an object: pictures have its number, and it stands elsewhere while it is an actor */
+static void objects_are_seen_and_moved(sr_context* context)
+{
+    static uint32_t still[WIDTH * HEIGHT], moved[WIDTH * HEIGHT], again[WIDTH * HEIGHT];
+    static float before[WIDTH * HEIGHT * 4], after[WIDTH * HEIGHT * 4];
+    sr_object wall = {.id = 41, .label = 2, .center = {2, 3.9, 1.2}, .size = {40, 0.6, 2.4}};
+    sr_actor actors[2] = {{.object = 41, .pose = {1, 0, 0, 2, 0, 1, 0, 2.4, 0, 0, 1, 1.8}}};
+    sr_world_desc desc = street_world();
+    sr_draw_desc draw = camera_at(0, WIDTH, HEIGHT);
+    sr_pick found = SR_INIT(sr_pick);
+    sr_world* world = NULL;
+    double at[2], then[2];
+    uint32_t i, count;
+    desc.conditioning = SR_CONDITIONING_GIVEN;
+    desc.objects = &wall;
+    desc.object_count = 1;
+    CHECK_OK(context, create_world(context, conditioned, &desc, &world));
+    walk(context, world, 4, 8);
+    draw.color.memory = before;
+    draw.instance.memory = still;
+    CHECK_OK(context, sr_world_draw(world, &draw));
+    count = seen_of(still, 42, at);
+    CHECK(count > 20 && seen_of(still, 0, then) + count == WIDTH * HEIGHT);
+    for (i = 0; still[i] != 42; ++i) {
+    }
+    CHECK_OK(context, sr_world_pick(world, &draw, i % WIDTH, i / WIDTH, &found));
+    CHECK(found.instance == 42 && found.cell.label == 2);
+    /* 1.5 m to the right, which is nearer, and 0.6 m up */
+    CHECK_OK(context, sr_world_set_actors(world, actors, 1));
+    draw.color.memory = after;
+    draw.instance.memory = moved;
+    CHECK_OK(context, sr_world_draw(world, &draw));
+    CHECK(seen_of(moved, 42, then) > 20 && then[0] > at[0] + 1 && memcmp(before, after, sizeof before) != 0);
+    CHECK_OK(context, sr_world_set_actors(world, NULL, 0));
+    draw.color.memory = after;
+    draw.instance.memory = again;
+    CHECK_OK(context, sr_world_draw(world, &draw));
+    CHECK(memcmp(before, after, sizeof before) == 0 && memcmp(still, again, sizeof still) == 0);
+    /* what cannot be leaves all as it is */
+    actors[1] = actors[0];
+    CHECK(sr_world_set_actors(world, actors, 2) == SR_ERR_BAD_INPUT && says(context, "object 41 is an actor already"));
+    actors[0].object = 7;
+    CHECK(sr_world_set_actors(world, actors, 1) == SR_ERR_BAD_INPUT && says(context, "no object 7"));
+    actors[0].object = 41;
+    actors[0].pose[0] = 2;
+    CHECK(sr_world_set_actors(world, actors, 1) == SR_ERR_BAD_INPUT && says(context, "actor 0"));
+    CHECK(sr_world_set_actors(world, NULL, 1) == SR_ERR_USAGE && says(context, "actors is NULL"));
+    CHECK(sr_world_set_actors(NULL, NULL, 0) == SR_ERR_USAGE && says(NULL, "world is NULL"));
+    CHECK_OK(context, sr_world_draw(world, &draw));
+    CHECK(memcmp(still, again, sizeof still) == 0);
+    sr_world_destroy(world);
+}
+
 static void calls_of_callbacks_are_refused(sr_context* context)
 {
     sr_world_desc desc = street_world();
@@ -556,6 +625,8 @@ int main(int argc, char** argv)
     labels_of_a_grid_and_of_a_callback_give_the_same_points(context);
     settings_decide_the_points(context);
     objects_condition_the_points(context, argv[2], argv[3]);
+    conditioned = argv[2];
+    objects_are_seen_and_moved(context);
     several_foci_are_generated_at_once(context);
     an_edit_makes_its_place_anew(context);
     a_world_without_a_model_has_the_splats_of_its_grid(context);

@@ -3,12 +3,14 @@
 #include "engine/conditioning/cell_objects.h"
 #include "engine/format/image.h"
 #include "engine/mesh/mesh_files.h"
+#include "engine/scene/actors.h"
 #include "runtime/base/json.h"
 #include "tests/json_text.h"
 #include "tests/program.h"
 #include "tools/trajectory/camera_path.h"
 
 #include <algorithm>
+#include <cmath>
 #include <gtest/gtest.h>
 #include <numeric>
 
@@ -67,16 +69,65 @@ TEST(CliStreets, a_street_comes_with_mesh_grids_drive_and_pictures_that_agree)
         const auto color = read_png_rgb8(at / "color/000000.png");
         const auto depth = read_png_gray16(at / "depth/000000.png");
         const auto label = read_png_rgb8(at / "label/000000.png"), visible = read_png_rgb8(at / "visible/000000.png");
-        ASSERT_TRUE(color && depth && label && visible && read_png_rgb8(at / "normal/000000.png"));
+        const auto instance = read_png_gray16(at / "instance/000000.png");
+        ASSERT_TRUE(color && depth && label && visible && instance && read_png_rgb8(at / "normal/000000.png"));
         EXPECT_EQ(color->width, 48u);
-        size_t road = 0;
+        size_t road = 0, things = 0;
         for (size_t i = 0; i < depth->pixels.size(); ++i) {
             EXPECT_EQ(visible->pixels[3 * i] == 0, label->pixels[3 * i] == 10);
             EXPECT_TRUE(visible->pixels[3 * i] || depth->pixels[i] == 0);
+            if (const uint16_t thing = instance->pixels[i]) {
+                EXPECT_EQ((*objects)[thing - 1u].label, label->pixels[3 * i]);
+                ++things;
+            }
             road += label->pixels[3 * i] == 0;
         }
         EXPECT_GT(road, 100u);
+        EXPECT_GT(things, depth->pixels.size() / 2);
     }
+}
+
+// A pixel's point lies in the box of the thing that the picture of instances names, where the thing is at the time.
+TEST(CliStreets, pictures_show_traffic_where_actors_json_has_it)
+{
+    const ScratchFolder folder;
+    const std::string common = "--seed 1 --length 90 --spacing 10 --images --samples 1 --ambient-rays 1 -W 160 -H 110 ";
+    const Path out = folder / "street";
+    const ProgramResult made = streets(out, common + "--no-grids --traffic");
+    ASSERT_EQ(made.code, 0) << made.err;
+    const auto actors = read_actors(out / "actors.json");
+    const auto objects = read_objects(out / "objects.json");
+    const auto path = read_transforms(out / "transforms.json");
+    ASSERT_TRUE(actors && objects && path);
+    size_t moving = 0, standing = 0;
+    for (size_t i = 0; i < path->frames.size(); ++i) {
+        const std::string name = fmt::format("{:06}.png", i);
+        const auto depth = read_png_gray16(out / "depth" / name), instance = read_png_gray16(out / "instance" / name);
+        ASSERT_TRUE(depth && instance);
+        const CameraFrame& frame = path->frames[i];
+        const Intrinsics& k = frame.intrinsics;
+        for (size_t p = 0; p < depth->pixels.size(); ++p) {
+            if (instance->pixels[p] == 0 || depth->pixels[p] == 0)
+                continue;
+            const double z = depth->pixels[p] * 1e-3;
+            const Point3 seen =
+                transform(frame.pose.camera_to_world(), {(double(p % k.width) + 0.5 - k.cx) / k.fx * z,
+                                                         (double(p / k.width) + 0.5 - k.cy) / k.fy * z, z});
+            const SceneObject& object = (*objects)[instance->pixels[p] - 1u];
+            const auto actor = std::ranges::find(*actors, object.id, &Actor::id);
+            const bool moves = actor != actors->end();
+            if (!moves && object.label != 13 && object.label != 9) // of houses and trees parts stand out
+                continue;
+            const auto pose = moves ? pose_at(*actor, std::llround(frame.time * 1e6)) : box_to_world(object);
+            ASSERT_TRUE(pose);
+            const Point3 at = transform(inverse(*pose), seen);
+            for (size_t a = 0; a < 3; ++a)
+                ASSERT_LE(std::abs(at[a]), object.size[a] / 2 + 0.01) << "frame " << i << " pixel " << p;
+            ++(moves ? moving : standing);
+        }
+    }
+    EXPECT_GT(moving, 100u);
+    EXPECT_GT(standing, 1000u);
 }
 
 // A house that is plaster towards the street and brick behind is told as plaster, where nothing behind is in the grid.
@@ -155,6 +206,22 @@ TEST(CliStreets, the_same_seed_gives_the_same_files)
     for (const char* file :
          {"mesh.glb", "truth.sgrid", "semantic.sgrid", "drive.tum", "transforms.json", "street.json", "objects.json"})
         EXPECT_TRUE(contents(folder / "a" / file) == contents(folder / "b" / file)) << file;
+}
+
+TEST(CliStreets, traffic_changes_neither_grids_nor_what_stands)
+{
+    const ScratchFolder folder;
+    ASSERT_EQ(streets(folder / "a", "--seed 2").code, 0);
+    ASSERT_EQ(streets(folder / "b", "--seed 2 --traffic").code, 0);
+    for (const char* file : {"mesh.glb", "truth.sgrid", "semantic.sgrid", "drive.tum", "objects.json"})
+        EXPECT_TRUE(contents(folder / "a" / file) == contents(folder / "b" / file)) << file;
+    EXPECT_FALSE(fs::exists(folder / "a/actors.json"));
+    const auto actors = read_actors(folder / "b/actors.json");
+    ASSERT_TRUE(actors) << actors.error().message;
+    EXPECT_EQ(json_of(contents(folder / "b/street.json"))["actors"], actors->size());
+    expect_error(
+        semrover_program("streets --length 20000 --spacing 10 --no-grids --traffic -o " + (folder / "x").string()), 2,
+        "--traffic: what moves in this street has");
 }
 
 TEST(CliStreets, what_exists_is_replaced_only_when_asked_and_other_files_stay)

@@ -205,6 +205,158 @@ TEST(engine_streets, objects_are_boxes_around_what_was_drawn)
     EXPECT_EQ(count[label::kPerson], street.objects.at("person"));
 }
 
+TEST(engine_streets, faces_belong_to_the_object_that_they_were_drawn_for)
+{
+    const Street street = make_street({.seed = 1, .length = 90});
+    ASSERT_EQ(street.owners.size(), street.mesh.faces.size());
+    std::vector<size_t> owned(kClassCount), all(kClassCount);
+    for (size_t f = 0; f < street.mesh.faces.size(); ++f) {
+        const uint8_t l = street.mesh.face_labels[f];
+        ++all[l];
+        if (street.owners[f] == 0)
+            continue;
+        ++owned[l];
+        const SceneObject& o = street.boxes.at(street.owners[f] - 1);
+        ASSERT_EQ(o.id, street.owners[f] - 1);
+        ASSERT_EQ(o.label, l);
+        const double around = l == label::kBuilding ? 4 : 0.001; // balconies and eaves stand out of a plot
+        for (const uint32_t v : street.mesh.faces[f]) {
+            const auto& p = street.mesh.positions[v];
+            const std::array<double, 3> at = place_in(o, {p[0], p[1], p[2]});
+            for (size_t a = 0; a < 3; ++a)
+                ASSERT_LE(std::abs(at[a]), o.size[a] / 2 + around) << "object " << o.id << " " << label_name(l);
+        }
+    }
+    for (uint8_t l : {label::kCar, label::kPerson, label::kVegetation, label::kTrafficSign})
+        EXPECT_EQ(owned[l], all[l]) << label_name(l);
+    EXPECT_GT(double(owned[label::kBuilding]), 0.9 * double(all[label::kBuilding]));
+    for (uint8_t l : {label::kRoad, label::kSidewalk, label::kTerrain, label::kRoadLane})
+        EXPECT_EQ(owned[l], 0u) << label_name(l);
+}
+
+// height of the lowest point of an actor's box over the road below its middle
+double above_road(const RoadNetwork& road, const Rigid& pose, const std::array<double, 3>& size, double d)
+{
+    double nearest = INFINITY, height = 0;
+    for (double s = -18; s < road.length() + 20; s += 0.05) {
+        const Vector3 p = road.at(s, d);
+        if (const double away = std::hypot(p.x - pose[3], p.y - pose[7]); away < nearest) {
+            nearest = away;
+            height = p.z;
+        }
+    }
+    EXPECT_LT(nearest, 2.0); // two who walk together are one thing
+    return pose[11] - size[2] / 2 - height;
+}
+
+TEST(engine_streets, what_moves_starts_where_it_was_made_and_stays_on_the_road)
+{
+    constexpr double kSeconds = 12;
+    for (const uint64_t seed : {0u, 1u, 4u}) {
+        const Street street = make_street({.seed = seed, .length = 150});
+        const std::vector<Actor> actors = moving_actors(street, kSeconds);
+        ASSERT_GT(actors.size(), 10u) << seed;
+        std::map<uint32_t, const Actor*> by_id;
+        std::set<uint32_t> ids;
+        for (const SceneObject& o : street.boxes)
+            ids.insert(o.id);
+        EXPECT_TRUE(check_actor_ids(actors, ids, "traffic"));
+        for (const Actor& a : actors) {
+            ASSERT_TRUE(by_id.empty() || by_id.rbegin()->first < a.id);
+            by_id[a.id] = &a;
+            const SceneObject box = as_written(street.boxes[a.id]);
+            EXPECT_EQ(a.label, box.label);
+            EXPECT_EQ(a.size, box.size);
+            ASSERT_GT(a.poses.size(), 1u);
+            EXPECT_EQ(a.poses[0].time, 0);
+            const Rigid made = box_to_world(box);
+            for (size_t n = 0; n < 16; ++n)
+                EXPECT_NEAR(a.poses[0].to_world[n], made[n], n % 4 == 3 ? 0 : 4e-9) << a.id;
+            for (size_t i = 1; i < a.poses.size(); ++i) {
+                const double seconds = double(a.poses[i].time - a.poses[i - 1].time) * 1e-6;
+                const Point3 p = translation_of(a.poses[i - 1].to_world), q = translation_of(a.poses[i].to_world);
+                ASSERT_GT(seconds, 0);
+                EXPECT_LE(std::hypot(q[0] - p[0], q[1] - p[1]) / seconds, 12.5) << a.id;
+            }
+        }
+        size_t vehicles = 0, stayed = 0;
+        for (const MovingThing& thing : street.moving)
+            for (const uint32_t id : thing.objects) {
+                const Actor& a = *by_id.at(id);
+                vehicles += a.label != label::kPerson;
+                stayed += a.poses.back().time >= int64_t(kSeconds * 1e6);
+                const double first = above_road(street.road, a.poses[0].to_world, a.size, thing.d);
+                for (size_t i = 0; i < a.poses.size(); i += 7)
+                    EXPECT_NEAR(above_road(street.road, a.poses[i].to_world, a.size, thing.d), first, 0.05)
+                        << "seed " << seed << " " << label_name(a.label) << " " << id << " pose " << i;
+            }
+        EXPECT_GE(vehicles, 3u) << seed;
+        EXPECT_GT(stayed, actors.size() / 2) << seed;
+    }
+}
+
+TEST(engine_streets, nobody_drives_into_who_is_ahead)
+{
+    for (const uint64_t seed : {1u, 2u, 3u, 4u}) {
+        const Street street = make_street({.seed = seed, .length = 250});
+        const std::vector<Actor> actors = moving_actors(street, 30);
+        size_t pairs = 0;
+        for (const MovingThing& thing : street.moving)
+            for (const MovingThing& other : street.moving) {
+                if (thing.lane == MovingThing::kOwnWay || thing.lane != other.lane || thing.s >= other.s)
+                    continue;
+                ++pairs;
+                const auto of = [&](const MovingThing& t) {
+                    return std::ranges::find(actors, t.objects[0], &Actor::id);
+                };
+                const double room = (of(thing)->size[0] + of(other)->size[0]) / 2;
+                for (int64_t time = 0; time <= 30000000; time += 100000) {
+                    const auto p = pose_at(*of(thing), time), q = pose_at(*of(other), time);
+                    if (p && q) { // the road is no shorter than the chord
+                        EXPECT_GT(std::hypot((*p)[3] - (*q)[3], (*p)[7] - (*q)[7]), room) << seed << " at " << time;
+                    }
+                }
+            }
+        EXPECT_GT(pairs, 5u) << seed;
+    }
+}
+
+TEST(engine_streets, a_mesh_with_actors_has_them_where_they_are)
+{
+    const Street street = make_street({.seed = 1, .length = 90});
+    const std::vector<Actor> actors = moving_actors(street, 20);
+    Mesh mesh = street.mesh;
+    std::vector<bool> absent = move_actors(mesh, street, actors, 0);
+    EXPECT_EQ(std::ranges::count(absent, true), 0);
+    for (size_t v = 0; v < mesh.positions.size(); ++v)
+        for (size_t a = 0; a < 3; ++a)
+            ASSERT_NEAR(mesh.positions[v][a], street.mesh.positions[v][a], 1e-6);
+    size_t moved = 0, gone = 0;
+    for (const int64_t time : {3700000, 18250000}) {
+        absent = move_actors(mesh, street, actors, time);
+        for (size_t f = 0; f < mesh.faces.size(); ++f) {
+            const auto actor =
+                street.owners[f] == 0 ? actors.end() : std::ranges::find(actors, street.owners[f] - 1, &Actor::id);
+            const auto& p = mesh.positions[mesh.faces[f][0]];
+            if (actor == actors.end()) {
+                ASSERT_EQ(p, street.mesh.positions[mesh.faces[f][0]]);
+                continue;
+            }
+            const auto pose = pose_at(*actor, time);
+            ASSERT_EQ(!pose, absent[actor->id]);
+            gone += !pose;
+            if (!pose)
+                continue;
+            const Point3 at = transform(inverse(*pose), {p[0], p[1], p[2]});
+            for (size_t a = 0; a < 3; ++a)
+                ASSERT_LE(std::abs(at[a]), actor->size[a] / 2 + 0.001);
+            moved += p != street.mesh.positions[mesh.faces[f][0]];
+        }
+    }
+    EXPECT_GT(moved, 1000u);
+    EXPECT_GT(gone, 100u); // who has left the street
+}
+
 // the box of a class in which a point lies deepest; null: in none
 const SceneObject* deepest_box(std::span<const SceneObject> boxes, uint8_t label, const std::array<double, 3>& point)
 {

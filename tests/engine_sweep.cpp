@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/job/sweep_drawing.h"
+#include "engine/job/lidar_returns.h"
 #include "tests/splat_case.h"
+#include "tests/sweep_case.h"
 
 #include <numbers>
 
@@ -47,27 +48,6 @@ DrawnScene scene_on_device(const std::vector<HostSplat>& host)
     return {SplatScene::create(test_device(), splats, owners).value()};
 }
 
-SweepImage draw(const DrawnScene& scene, const LidarSweep& sweep)
-{
-    auto drawing = SweepDrawing::create(test_device(), scene, sweep.lidar, {});
-    EXPECT_TRUE(drawing) << drawing.error().message;
-    SweepImage image = (*drawing)->image();
-    const Status status = (*drawing)->draw(sweep, [&](uint32_t part, SplatSlots seen) -> Status {
-        std::vector<BufferSlice> slices;
-        for (const Slot* slot : seen.all())
-            slices.push_back(slot->slice());
-        std::vector<std::vector<std::byte>> bytes(slices.size());
-        SR_CHECK(test_device().read(slices, [&](const ReadPiece& piece) {
-            bytes[piece.slice].insert(bytes[piece.slice].end(), piece.bytes.begin(), piece.bytes.end());
-        }));
-        for (size_t slot = 0; slot < bytes.size(); ++slot)
-            (*drawing)->put(part, slot, bytes[slot], image);
-        return {};
-    });
-    EXPECT_TRUE(status) << status.error().message;
-    return image;
-}
-
 // what a ray meets, in double: every splat, nearest first from the sensor's place then (docs/method.md §5.6)
 struct Met {
     double alpha = 0, range = 0;
@@ -106,13 +86,13 @@ void expect_as_cast(const std::vector<HostSplat>& splats, const LidarSweep& swee
 {
     const Lidar& lidar = *sweep.lidar;
     const SweepPicture picture(lidar);
-    const SweepImage image = draw(scene_on_device(splats), sweep);
+    const SweepImage image = draw_sweep(scene_on_device(splats), sweep);
     Misses misses;
     size_t rays = 0, met = 0, others = 0;
     for (uint32_t beam = 0; beam < lidar.beams.size(); ++beam)
         for (uint32_t column = 0; column < lidar.columns; column += lidar.beams[beam].every) {
             const Met expect = cast(splats, sweep, beam, column);
-            const size_t at = beam * picture.width + size_t(int(column) + picture.shifts[beam] - picture.first);
+            const size_t at = pixel_of(picture, beam, column);
             misses.add(image.alpha[at], expect.alpha, 2e-3);
             misses.add(image.range[at], expect.range, 1e-3 + 2e-4 * expect.range);
             for (size_t axis = 0; axis < 3; ++axis) // the reference has them in the sensor's axes then
@@ -185,6 +165,35 @@ TEST(engine_sweep, matches_it_where_the_sensor_moves)
     }
 }
 
+// y = 4, from x = -10 to 20
+std::vector<HostSplat> wall()
+{
+    std::vector<HostSplat> splats;
+    for (double x = -10; x < 20; x += 0.2)
+        for (double z = -2; z < 3; z += 0.2)
+            splats.push_back({{double(float(x)), 4, double(float(z))}, {0, -1, 0}, {0.5, 0.5, 0.5}, 0.2, 0.2, 1});
+    return splats;
+}
+
+TEST(engine_sweep, points_of_a_wall_stay_on_it_while_the_sensor_moves)
+{
+    const Lidar lidar = lidar_of(720, true, {{0.2, 0.1, 40}, {0, -0.1}, {-0.2, 0.05, 100}});
+    const Rigid begin = rigid_from_quaternion({0, 0, 0}, {0, 0, 0.05, 0.9987}, "begin").value();
+    const Rigid end = rigid_from_quaternion({3, -0.5, 0.1}, {0.01, -0.01, -0.1, 0.995}, "end").value();
+    const LidarSweep sweep = sweep_of(lidar, begin, end);
+    const std::vector<LidarPoint> points = lidar_returns(sweep, draw_sweep(scene_on_device(wall()), sweep), 0.5f);
+    EXPECT_GT(points.size(), 600u);
+    double skewed = 0;
+    for (const LidarPoint& p : points) {
+        ASSERT_NEAR(transform(end, {p.x, p.y, p.z})[1], 4, 2e-4) << "at " << p.time << " us";
+        // what a sensor would say that knew nothing of its motion
+        const Point3 then =
+            transform(inverse(interpolate(begin, end, p.time * 1e-6 * lidar.rate)), transform(end, {p.x, p.y, p.z}));
+        skewed = std::max(skewed, std::abs(transform(end, then)[1] - 4));
+    }
+    EXPECT_GT(skewed, 0.3);
+}
+
 // splats that a part may lose: as wide as the sky, on a part's edges, around and above the sensor
 TEST(engine_sweep, no_ray_loses_a_splat)
 {
@@ -200,13 +209,12 @@ TEST(engine_sweep, no_ray_loses_a_splat)
             s.position = {double(float(0.02 * normal(random))), 0.01, i % 2 ? 2.0 : -2.0};
         const Rigid move = rigid_from_quaternion({1.5, -0.2, 0}, {0, 0, 0.1, 0.995}, "move").value();
         const LidarSweep sweep = sweep_of(lidar, kIdentity, i % 2 ? move : kIdentity);
-        const SweepImage image = draw(scene_on_device({s}), sweep);
+        const SweepImage image = draw_sweep(scene_on_device({s}), sweep);
         const SweepPicture picture(lidar);
         for (uint32_t beam = 0; beam < lidar.beams.size(); ++beam)
             for (uint32_t column = 0; column < lidar.columns; ++column) {
                 const double expect = cast({s}, sweep, beam, column).alpha;
-                const double found =
-                    image.alpha[beam * picture.width + size_t(int(column) + picture.shifts[beam] - picture.first)];
+                const double found = image.alpha[pixel_of(picture, beam, column)];
                 const bool threshold = std::abs(std::max(expect, found) - 1.0 / 255) < 2e-5;
                 ASSERT_TRUE(threshold || std::abs(found - expect) < 2e-3)
                     << "splat " << i << ", beam " << beam << ", column " << column << ": " << found << ", not "

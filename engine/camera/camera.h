@@ -57,7 +57,7 @@ struct Shutter {
 // a camera's poses at the start and at the end of its readout
 struct Readout {
     ShutterDirection direction = ShutterDirection::down;
-    Pose from, to;
+    Pose from = {}, to = {};
 
     // the same pose, to the bit, sees what a global shutter sees
     bool moves() const { return from.world_to_camera != to.world_to_camera; }
@@ -82,7 +82,7 @@ struct PathBody {
 
 // A camera of a rig. Vehicle axes: x forward, y left, z up; sensor axes are OpenCV's.
 struct Sensor {
-    std::string name; // is_camera_name, unique in the rig
+    std::string name; // is_camera_name, unique in the rig; an only one may have none
     Intrinsics intrinsics;
     Rigid sensor_to_vehicle = kIdentity;
     std::optional<Shutter> shutter = {}; // none: all lines are seen at the frame's time

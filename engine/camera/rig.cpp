@@ -16,9 +16,6 @@ namespace {
 
 constexpr size_t kMaxSensors = 64;
 
-// vehicle axes (forward, left, up) to those of a camera that looks forward (right, down, forward)
-constexpr Rigid kVehicleToForwardCamera = {0, -1, 0, 0, 0, 0, -1, 0, 1, 0, 0, 0, 0, 0, 0, 1};
-
 Status check_keys(const Json& object, std::initializer_list<std::string_view> known, std::string_view where)
 {
     for (const auto& entry : object.items())
@@ -172,17 +169,18 @@ Result<std::optional<Shutter>> read_shutter(const Json& json, std::string_view w
     return std::optional(shutter);
 }
 
-Result<std::string> read_name(const Json& json, std::string_view where)
+// alone: in its rig, where it needs no name
+Result<std::string> read_name(const Json& json, bool alone, std::string_view where)
 {
-    if (!json.contains("name") || !json["name"].is_string() ||
-        !is_camera_name(json["name"].get_ref<const std::string&>()))
+    const Json name = json.value("name", Json());
+    if (!name.is_string() || !(is_camera_name(name.get_ref<const std::string&>()) || (alone && name == "")))
         return fail(ErrorCode::bad_input, "{}: expected a name of letters, digits, '.', '_' and '-'", where);
     if (!json.contains("sensor_to_vehicle"))
         return fail(ErrorCode::bad_input, "{}: sensor_to_vehicle is missing", where);
-    return json["name"].get<std::string>();
+    return name.get<std::string>();
 }
 
-Result<Sensor> read_sensor(const Json& json, std::string_view where)
+Result<Sensor> read_sensor(const Json& json, bool alone, std::string_view where)
 {
     SR_CHECK(check_keys(json,
                         {"name", "model", "width", "height", "fov", "fx", "fy", "cx", "cy", "distortion",
@@ -190,7 +188,7 @@ Result<Sensor> read_sensor(const Json& json, std::string_view where)
                          "max_angle", "linear_cde", "shutter", "sensor_to_vehicle", "comment"},
                         where));
     Sensor sensor;
-    SR_TRY(sensor.name, read_name(json, where));
+    SR_TRY(sensor.name, read_name(json, alone, where));
     SR_TRY(sensor.intrinsics, read_intrinsics(json, where));
     if (json.contains("shutter")) {
         SR_TRY(sensor.shutter, read_shutter(json["shutter"], fmt::format("{}: shutter", where)));
@@ -205,7 +203,7 @@ Result<LidarSensor> read_lidar_sensor(const Json& json, const Path& folder, std:
 {
     SR_CHECK(check_keys(json, {"name", "lidar", "sensor_to_vehicle", "comment"}, where));
     LidarSensor sensor;
-    SR_TRY(sensor.name, read_name(json, where));
+    SR_TRY(sensor.name, read_name(json, false, where));
     if (!json["lidar"].is_string())
         return fail(ErrorCode::bad_input, "{}: lidar: expected the name of a lidar or a file, found {}", where,
                     json["lidar"].type_name());
@@ -288,8 +286,12 @@ Result<PathAxes> read_path_axes(const Json& file, std::string_view where)
 
 Result<Rig> read_rig(const Path& path)
 {
-    const std::string name = quote_path(path);
     SR_TRY(const Json file, read_json(path));
+    return parse_rig(file, quote_path(path), path.parent_path());
+}
+
+Result<Rig> parse_rig(const Json& file, std::string_view name, const Path& folder)
+{
     if (!file.is_object() || !file.contains("sensors") || !file["sensors"].is_array())
         return fail(ErrorCode::bad_input, "{}: expected an object with an array of sensors", name);
     SR_CHECK(check_keys(file, {"path_axes", "sensors", "comment"}, name));
@@ -304,10 +306,10 @@ Result<Rig> read_rig(const Path& path)
         if (!sensors[i].is_object())
             return fail(ErrorCode::bad_input, "{}: expected an object, found {}", where, sensors[i].type_name());
         if (sensors[i].contains("lidar")) {
-            SR_TRY(LidarSensor sensor, read_lidar_sensor(sensors[i], path.parent_path(), where));
+            SR_TRY(LidarSensor sensor, read_lidar_sensor(sensors[i], folder, where));
             rig.lidars.push_back(std::move(sensor));
         } else {
-            SR_TRY(Sensor sensor, read_sensor(sensors[i], where));
+            SR_TRY(Sensor sensor, read_sensor(sensors[i], sensors.size() == 1, where));
             rig.sensors.push_back(std::move(sensor));
         }
         const std::string called = sensors[i]["name"].get<std::string>();
@@ -352,7 +354,7 @@ Result<CameraPath> expand_rig(const Rig& rig, const CameraPath& vehicle)
     for (size_t i = 0; i < vehicle.frames.size(); ++i) {
         const CameraFrame& pose = vehicle.frames[i];
         const Rigid world_to_vehicle = rig.path_axes == PathAxes::camera
-                                           ? compose(inverse(kVehicleToForwardCamera), pose.pose.world_to_camera)
+                                           ? compose(kForwardCamera, pose.pose.world_to_camera)
                                            : inverse(vehicle.file_pose(i));
         course.add(pose.time, inverse(world_to_vehicle));
         for (const Sensor& sensor : rig.sensors)

@@ -39,9 +39,14 @@ struct Rig {
 //                 "sensor_to_vehicle": 4x4 | {"translation": [x, y, z], "rotation": [qx, qy, qz, qw]}},
 //                {"name": "lidar_top", "lidar": "ot128",           of assets/lidar, or a file beside this one (.json)
 //                 "sensor_to_vehicle": as above}]}
-// A key "comment" of text is allowed beside the others. bad_input for anything else, unknown keys included; at most 64
-// sensors, 16 MiB
+// The name of an only sensor may be "": its pictures are in no folder of their own. A key "comment" of text is allowed
+// beside the others. bad_input for anything else, unknown keys included; at most 64 sensors, 16 MiB
 Result<Rig> read_rig(const Path& path);
+// folder: where the files of lidars are
+Result<Rig> parse_rig(const Json& file, std::string_view where, const Path& folder = {});
+
+// where a camera sits that is at the vehicle's origin and looks forward
+constexpr Rigid kForwardCamera = {0, 0, 1, 0, -1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 0, 1};
 
 // the sensors as an object that read_rig reads
 Json rig_json(std::span<const Sensor> sensors);

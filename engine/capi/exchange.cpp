@@ -38,10 +38,9 @@ CameraFrame camera_frame(const double (&pinhole)[4], const double (&world_to_cam
     return frame;
 }
 
-SplatCamera pinhole_camera(const sr_draw_desc& d, const ImageSize& size)
+CameraFrame frame_of(const sr_draw_desc& d)
 {
-    const CameraFrame frame = camera_frame({d.fx, d.fy, d.cx, d.cy}, d.world_to_camera, size);
-    return splat_camera(frame.intrinsics, frame.pose);
+    return camera_frame({d.fx, d.fy, d.cx, d.cy}, d.world_to_camera, {d.width, d.height});
 }
 
 Status check_camera(const CameraFrame& frame, const char* name)

@@ -12,9 +12,12 @@ namespace semrover::capi {
 constexpr uint32_t kMostPixels = 16384; // of a side
 
 // fx, fy, cx, cy in pixels and [3, 4] row by row
+// options of a rasterizer that draws the world's actors, too
+RasterizerOptions with_actors(const sr_world& world, RasterizerOptions options);
+
 CameraFrame camera_frame(const double (&pinhole)[4], const double (&world_to_camera)[12], const ImageSize& size);
 
-SplatCamera pinhole_camera(const sr_draw_desc& draw, const ImageSize& size);
+CameraFrame frame_of(const sr_draw_desc& draw);
 
 // Errors: bad_input for numbers that are not finite, and focal lengths that are not above 0. name: of the structure
 Status check_camera(const CameraFrame& frame, const char* name);

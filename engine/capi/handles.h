@@ -5,6 +5,7 @@
 #include "engine/capi/camera_renderer.h"
 #include "engine/capi/rasterizers.h"
 #include "engine/job/model.h"
+#include "engine/job/scene_actors.h"
 #include "engine/scene/label_edits.h"
 #include "engine/semrover_vulkan.h"
 #include "engine/world/world.h"
@@ -57,6 +58,7 @@ struct sr_world {
     std::vector<semrover::CellWindow> labels_ready;
     sr_world_info info = {}; // as the last call left it
     // of the thread that draws
+    semrover::SceneActors actors;
     semrover::capi::Rasterizers pixels;              // of renderers that draw
     semrover::capi::Rasterizers images, recorded;    // of draws
     std::unique_ptr<semrover::CommandRing> commands; // of our own submits, from the first on

@@ -86,8 +86,8 @@ Result<SplatSlots> record_splats(sr_world& world, const sr_draw_desc& d, const P
     SR_CHECK(check_size(size, "sr_draw_desc"));
     const bool tested = d.depth_test.image;
     Rasterizers::Retired retired;
-    const auto found =
-        world.recorded.of(device, *splats, size, {.depth_tested = tested, .formats = formats}, 1, &retired);
+    const RasterizerOptions options = with_actors(world, {.depth_tested = tested, .formats = formats});
+    const auto found = world.recorded.of(device, *splats, size, options, 1, &retired);
     for (std::shared_ptr<Rasterizer>& last : retired)
         world.retired.emplace_back(world.done, std::move(last));
     SR_TRY(Rasterizer * rasterizer, found);
@@ -96,7 +96,9 @@ Result<SplatSlots> record_splats(sr_world& world, const sr_draw_desc& d, const P
         const BufferSlice z = rasterizer->z_buffer().slice();
         record_image_fetch(device.vk(), commands, depth, z.buffer->handle(), z.offset);
     }
-    SR_CHECK(rasterizer->record(commands, pinhole_camera(d, size), z_scale(d.depth_test), depth_scale(d)));
+    const CameraFrame frame = frame_of(d);
+    SR_CHECK(rasterizer->record(commands, splat_camera(frame.intrinsics, frame.pose), z_scale(d.depth_test),
+                                depth_scale(d), world.actors.seen_by({&frame, 1})));
     return rasterizer->images(0);
 }
 

@@ -86,9 +86,9 @@ Result<DepthPicture> draw_world(sr_renderer& renderer, sr_world& world, const Ca
     RasterizerOptions options;
     options.visible_alpha = r.model().defaults.visible_threshold;
     options.pixels_over = std::array<uint8_t, 3>{};
-    SR_TRY(Rasterizer * rasterizer, world.pixels.of(device, *splats, renderer.size, options));
+    SR_TRY(Rasterizer * rasterizer, world.pixels.of(device, *splats, renderer.size, with_actors(world, options)));
     const SplatCamera seen_by = splat_camera(camera.intrinsics, camera.pose);
-    SR_CHECK(rasterizer->draw({&seen_by, 1}).map([](uint32_t) {}));
+    SR_CHECK(rasterizer->draw({&seen_by, 1}, world.actors.seen_by({&camera, 1})).map([](uint32_t) {}));
     const SplatPixelSlots pixels = rasterizer->pixels(0);
     SR_CHECK(r.fill(pixels.seen));
     DepthPicture depth{renderer.size.width, renderer.size.height, {}};

@@ -90,20 +90,24 @@ Result<std::vector<SplatSlots>> draw_splats(sr_world& world, std::span<const sr_
     SR_CHECK(check_size(size, "sr_draw_desc"));
     sr_context& context = *world.context;
     const bool tested = d.depth_test.image;
-    const RasterizerOptions options{.depth_tested = tested, .formats = formats};
+    const RasterizerOptions options = with_actors(world, {.depth_tested = tested, .formats = formats});
     SR_TRY(Rasterizer * rasterizer, world.images.of(*context.drawing, *splats, size, options, uint32_t(draws.size())));
     HostImage z;
     if (tested) {
         SR_TRY(z, host_depth(d.depth_test, size));
     }
     std::vector<SplatCamera> cameras;
-    for (const sr_draw_desc& draw : draws)
-        cameras.push_back(pinhole_camera(draw, size));
+    std::vector<CameraFrame> frames;
+    for (const sr_draw_desc& draw : draws) {
+        frames.push_back(frame_of(draw));
+        cameras.push_back(splat_camera(frames.back().intrinsics, frames.back().pose));
+    }
+    const SplatMovers movers = world.actors.seen_by(frames);
     uint32_t drawn = 0;
     for (uint32_t rebuilds = ~0u; rebuilds != rasterizer->rebuilds();) { // with what is filled in memory of its own
         rebuilds = rasterizer->rebuilds();
         SR_CHECK(fill_inputs(context, *rasterizer, d, z));
-        SR_TRY(drawn, rasterizer->draw(cameras));
+        SR_TRY(drawn, rasterizer->draw(cameras, movers));
     }
     std::vector<SplatSlots> images;
     for (uint32_t camera = 0; camera < drawn; ++camera)

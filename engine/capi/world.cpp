@@ -178,7 +178,7 @@ Result<std::unique_ptr<sr_world>> make_world(sr_context& context, const sr_world
             return fail(ErrorCode::usage, "sr_world_desc: the model has no voxfield transformer");
         SR_TRY(request.settings, settings_of(d, *world->model));
         request.transformer = world->model->transformer();
-    } else if (d.labels || d.cache || d.object_count) {
+    } else if (d.labels || d.cache) {
         return fail(ErrorCode::usage, "sr_world_desc: without a model a world shows the points of a grid or a folder");
     }
     SR_TRY(auto labels, labels_of(d, request.settings.model.config.voxel_size));

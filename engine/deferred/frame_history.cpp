@@ -2,8 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/deferred/frame_history.h"
 
-#include "engine/camera/camera_view.h"
-#include "engine/splat/rasterizer.h"
+#include "engine/splat/camera_pair.h"
 #include "kernels/picture.h"
 
 #include <algorithm>
@@ -18,36 +17,6 @@ std::vector<float> metres_of(const DepthPicture& depth)
     std::ranges::transform(depth.pixels, metres.begin(),
                            [unit = float(depth.unit)](uint32_t d) { return float(d) * unit; });
     return metres;
-}
-
-// does one of them move while it is read out?
-bool move(const CameraFrame& a, const CameraFrame& b)
-{
-    return a.moves() || b.moves();
-}
-
-// of both: a pinhole that moves is an opencv lens
-CameraModel model_of(const CameraFrame& now, const CameraFrame& past)
-{
-    const CameraModel model = now.intrinsics.model;
-    return model == CameraModel::pinhole && move(now, past) ? CameraModel::opencv : model;
-}
-
-// the world in the first one's own (still) frame, where numbers are small and fp32 is enough
-std::vector<float> camera_rows(CameraFrame now, CameraFrame past)
-{
-    std::vector<float> rows(2 * kLensCameraFloats);
-    const Rigid between = compose(motion_of(past).middle.world_to_camera, motion_of(now).middle.camera_to_world());
-    now.intrinsics.model = past.intrinsics.model = model_of(now, past);
-    const auto write = [&](const CameraFrame& frame, const Rigid& world_to_camera, std::span<float> row) {
-        SplatCamera camera = splat_camera(frame);
-        std::ranges::transform(std::span(world_to_camera).first(12), camera.world_to_camera.begin(),
-                               [](double v) { return float(v); });
-        write_row(camera, row);
-    };
-    write(now, kIdentity, std::span(rows).first(kLensCameraFloats));
-    write(past, between, std::span(rows).last(kLensCameraFloats));
-    return rows;
 }
 
 } // namespace
@@ -130,19 +99,19 @@ Status FrameHistory::write_pixels(std::span<const uint8_t> pixels)
 Status FrameHistory::accumulate_now(const CameraFrame& camera, const DepthPicture& depth)
 {
     const bool alone = frames_ == 0 || camera.intrinsics.model != camera_.intrinsics.model;
+    CameraPair pair;
     if (!alone) {
         SR_CHECK(copy(memory_.made, memory_.past.bytes));
         SR_CHECK(copy(memory_.now.depth, memory_.past.depth));
-        SR_CHECK(memory_.cameras.write(device_, camera_rows(camera, camera_)));
+        pair = pair_of(camera, camera_);
+        SR_CHECK(memory_.cameras.write(device_, pair.rows));
     }
     SR_CHECK(memory_.now.depth.write(device_, metres_of(depth)));
-    const CameraModel model = model_of(camera, camera_);
-    const bool moving = move(camera, camera_);
     camera_ = camera;
     ++frames_;
     if (alone)
         return copy(memory_.now.bytes, memory_.made);
-    SR_CHECK(use_lens(model, moving));
+    SR_CHECK(use_lens(pair.model, pair.moving));
     return program_->run();
 }
 

@@ -11,6 +11,7 @@
 #include "engine/job/input_hashes.h"
 #include "engine/job/lidar_returns.h"
 #include "engine/job/outgoing.h"
+#include "engine/job/outputs.h"
 #include "engine/job/version.h"
 #include "engine/scene/palette.h"
 #include "engine/splat/bounds.h"
@@ -319,6 +320,8 @@ Result<std::unique_ptr<Job>> begin_drawing(Device& device, DrawingOptions option
     SR_TRY(auto store, DrawingStore::open(o.folder, settings, o.path, files, o.replace));
     if (!store->run().results()) {
         SR_CHECK(store->write_cameras(o.path));
+        if (!o.path.frames.empty())
+            SR_CHECK(write_record_of(o.path, o.encoding.depth_unit(), o.folder, callbacks));
         if (o.points)
             SR_CHECK(write_points(o.folder / "points.ply", o));
     }

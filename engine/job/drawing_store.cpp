@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/drawing_store.h"
 
+#include "engine/annotation/drive_record.h"
 #include "engine/format/buffer_folder.h"
 #include "engine/format/image.h"
 #include "engine/format/npy.h"
@@ -28,6 +29,14 @@ constexpr const char* kSweeps = "sweeps.json";
 constexpr const char* kTop = "top.png";
 constexpr const char* kPoints = "points.ply";
 constexpr const char* kCameras = "transforms.json";
+
+// beside the pictures
+std::vector<std::string> single_files()
+{
+    std::vector<std::string> names{kTop, kPoints, kCameras};
+    names.insert(names.end(), std::begin(kDriveRecordFiles), std::end(kDriveRecordFiles));
+    return names;
+}
 
 // lidars, too
 std::set<std::string> cameras_of(const CameraPath& path)
@@ -134,7 +143,7 @@ Status DrawingStore::check(const Path& folder, const CameraPath& path, bool repl
     if (replace || fs::exists(folder / "run.json")) // whether it may go on is known by its settings
         return {};
     std::vector<std::string> names = picture_folders(cameras_of(path));
-    names.insert(names.end(), {kTop, kPoints, kCameras});
+    std::ranges::copy(single_files(), std::back_inserter(names));
     for (const std::string& name : names)
         if (fs::exists(folder / name))
             return fail(ErrorCode::usage, "{} exists; `replace` replaces what is there", quote_path(folder / name));
@@ -152,7 +161,7 @@ Result<std::unique_ptr<DrawingStore>> DrawingStore::open(const Path& folder, con
     if (!path.sweeps.empty())
         with_cameras["files"]["lidar"] = kLidarFormats[size_t(files.lidar)];
     cameras.merge(cameras_before(folder));
-    RunContents contents{{}, {kTop, kPoints, kCameras}, picture_folders(cameras)};
+    RunContents contents{{}, single_files(), picture_folders(cameras)};
     for (const std::string& camera : cameras)
         if (!camera.empty())
             contents.results.push_back((camera_folder("", camera) / kSweeps).string());

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/camera/image_size.h"
-#include "engine/job/scene_actors.h"
+#include "engine/job/frame_rasterizers.h"
+#include "engine/splat/camera_pair.h"
 #include "runtime/device/copy_ring.h"
 
 namespace semrover {
@@ -21,35 +21,34 @@ std::vector<size_t> following_frames(const CameraPath& path);
 // is used again when that is the frame.
 class FlowDrawing {
   public:
-    // scene and actors outlive it
-    FlowDrawing(Device& device, const SplatScene& scene, const SceneActors& actors, const RasterizerOptions& options);
+    // the scene outlives it
+    FlowDrawing(Device& device, const DrawnScene& scene, const RasterizerOptions& options);
 
     // The flow stays until the next call; a read of a ring that begins before is in time. Frames of one camera model
     // and size. Errors: out_of_memory; device errors
     Result<FlowSlots> flow(const CameraFrame& now, const CameraFrame& next);
 
   private:
+    using Place = std::pair<double, Rigid>; // time and pose
     struct View {
         Slot depth, owners;
-        std::optional<std::pair<double, Rigid>> of; // time and pose of the frame that it has
+        std::optional<Place> of; // the frame that it has
     };
     struct Camera {
         State state;
-        View now, next;
-        CameraModel model = CameraModel::pinhole;
-        Slot lenses, moves, rows, flow, flow_states;
-        std::unique_ptr<Rasterizer> rasterizer;
-        std::unique_ptr<Program> forward, backward; // from now to next, and from next to now
+        std::array<View, 2> views;
+        Slot cameras, moves, rows, flow, flow_states;
+        CameraModel model = CameraModel::pinhole; // that the programs are for
+        bool moving = false;
+        std::array<std::unique_ptr<Program>, 2> programs; // from each view to the other
     };
-    Status make(Camera& camera, const Intrinsics& intrinsics);
-    Result<std::unique_ptr<Program>> make_program(const Camera& c, const View& from, const View& to,
-                                                  const Intrinsics& intrinsics);
-    Status draw(Camera& camera, const CameraFrame& frame, View& view);
+    Status allocate(Camera& camera, uint32_t pixels);
+    Status compile(Camera& camera, const CameraPair& pair, const ImageSize& size);
+    Status draw(const CameraFrame& frame, View& view);
 
     Device& device_;
-    const SplatScene& scene_;
-    const SceneActors& actors_;
-    RasterizerOptions options_;
+    const DrawnScene& scene_;
+    FrameRasterizers rasterizers_;
     std::unique_ptr<CopyRing> copies_;
     std::map<std::string, Camera> cameras_;
 };

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/outputs.h"
 
+#include "engine/annotation/drive_record.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/quote.h"
 
@@ -33,6 +34,17 @@ std::optional<Json> finished_results(const Path& folder, const Json& settings, c
     if (!hash || results->value("xxh64", Json()) != hash_text(*hash))
         results.reset();
     return results;
+}
+
+Status write_record_of(const CameraPath& path, double depth_unit, const Path& folder, const JobCallbacks& callbacks)
+{
+    const auto record = drive_record_of(path, depth_unit);
+    if (record)
+        return write_drive_record(folder, *record);
+    if (callbacks.warning)
+        callbacks.warning(
+            fmt::format("no {} of this path: {}", fmt::join(kDriveRecordFiles, ", "), record.error().message));
+    return {};
 }
 
 Result<RunFolder> open_run(const Path& folder, const Json& settings, bool replace, const RunContents& contents,

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/camera/camera.h"
+#include "engine/job/job.h"
 #include "engine/job/run_folder.h"
 
 namespace semrover {
@@ -14,6 +16,9 @@ Status check_writable(const Path& path, bool replace);
 std::optional<Json> finished_results(const Path& folder, const Json& settings);
 // the same of a run that wrote `output`; none where that has other bytes than the run gave it (`xxh64`)
 std::optional<Json> finished_results(const Path& folder, const Json& settings, const Path& output);
+
+// The DriveRecord of a path beside its pictures; where it can have none, a warning says why
+Status write_record_of(const CameraPath& path, double depth_unit, const Path& folder, const JobCallbacks& callbacks);
 
 // The run folder of an output. With `replace`, a finished or different run there is started over, while an interrupted
 // one with the same settings goes on. A finished one with the same settings starts over, too, unless `keep_finished`:

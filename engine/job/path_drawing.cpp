@@ -25,31 +25,17 @@ size_t end_of_moment(const CameraPath& path, size_t first)
 
 PathDrawing::PathDrawing(Device& device, const DrawnScene& scene, CameraPath path, const RasterizerOptions& options,
                          bool flow)
-    : device_(device), scene_(scene), path_(std::move(path)), options_(options)
+    : scene_(scene), path_(std::move(path)), rasterizers_(device, scene, options)
 {
     if (!flow)
         return;
-    flow_.emplace(device, scene.splats, scene.actors, options);
+    flow_.emplace(device, scene, options);
     following_ = following_frames(path_);
-}
-
-Result<Rasterizer*> PathDrawing::rasterizer_of(const CameraFrame& like, uint32_t frames)
-{
-    const Intrinsics& size = like.intrinsics;
-    const CameraModel model = drawn_model(like);
-    auto& rasterizer = rasterizers_[{size.width, size.height, model, like.moves()}];
-    if (!rasterizer) {
-        RasterizerOptions options = options_;
-        options.model = model;
-        options.moving = like.moves();
-        SR_TRY(rasterizer, Rasterizer::create(device_, scene_.splats, size.width, size.height, frames, options));
-    }
-    return rasterizer.get();
 }
 
 Result<SplatImage> PathDrawing::image(const CameraFrame& frame)
 {
-    SR_TRY(Rasterizer * rasterizer, rasterizer_of(frame, 1));
+    SR_TRY(Rasterizer * rasterizer, rasterizers_.of(frame, 1));
     const SplatCamera camera = splat_camera(frame);
     SR_TRY(std::vector<SplatImage> images, rasterizer->render({&camera, 1}, scene_.actors.seen_by({&frame, 1})));
     return std::move(images.front());
@@ -57,7 +43,7 @@ Result<SplatImage> PathDrawing::image(const CameraFrame& frame)
 
 Status PathDrawing::draw(std::span<const CameraFrame> frames, const Drawn& drawn)
 {
-    SR_TRY(Rasterizer * rasterizer, rasterizer_of(frames.front(), uint32_t(frames.size())));
+    SR_TRY(Rasterizer * rasterizer, rasterizers_.of(frames.front(), uint32_t(frames.size())));
     std::vector<SplatCamera> cameras;
     for (const CameraFrame& frame : frames)
         cameras.push_back(splat_camera(frame));

@@ -42,17 +42,14 @@ class PathDrawing {
     Result<SplatImage> image(const CameraFrame& frame);
 
   private:
-    Result<Rasterizer*> rasterizer_of(const CameraFrame& like, uint32_t frames);
     Result<FlowSlots> flow_of(size_t frame);
 
-    Device& device_;
     const DrawnScene& scene_;
     CameraPath path_;
-    RasterizerOptions options_;
+    FrameRasterizers rasterizers_;
     std::optional<FlowDrawing> flow_;
     std::vector<size_t> following_; // the next frame of each one's camera; their number: there is none
     size_t done_ = 0;
-    std::map<std::tuple<uint32_t, uint32_t, CameraModel, bool>, std::unique_ptr<Rasterizer>> rasterizers_;
 };
 
 // where the pictures of a camera go: those of one without a name into the folder itself

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/refinement.h"
 
+#include "engine/annotation/drive_record.h"
 #include "engine/job/budget_meter.h"
 #include "engine/job/empty_frames.h"
 #include "engine/job/outputs.h"
@@ -436,12 +437,14 @@ Result<std::unique_ptr<Job>> begin_refinement(Device& device, Refinement r, cons
     }
     SR_TRY(const Json settings, refinement_settings(r, device));
     RunContents contents{{"encoded"}, {"latents", "frames", "transforms.json"}};
+    contents.results.insert(contents.results.end(), std::begin(kDriveRecordFiles), std::end(kDriveRecordFiles));
     if (r.options.from_grid())
         contents.results.push_back("buffers");
     SR_TRY(RunFolder run, open_run(r.options.output, settings, r.options.replace, contents, true));
     if (run.results())
         return finished_refinement(std::move(r), std::move(run), callbacks);
     SR_CHECK(write_frame_cameras(r));
+    SR_CHECK(write_frame_record(r, callbacks));
     auto out = Outgoing::create(device, largest_read(r), r.options.threads);
     if (!out) {
         run.drop_if_empty();

@@ -53,6 +53,8 @@ struct Refinement {
 
 // transforms.json of the frames that a run makes, in its output. Nothing where their cameras are not known
 Status write_frame_cameras(const Refinement& r);
+// likewise the DriveRecord: that of the buffers where one lies beside them
+Status write_frame_record(const Refinement& r, const JobCallbacks& callbacks);
 
 // Opens the model, settles how it draws and denoises, and looks at the buffers. Errors: bad_input, usage
 Result<Refinement> resolve_refinement(RefinementOptions options, const JobCallbacks& callbacks);

@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+#include "engine/annotation/drive_record.h"
 #include "engine/format/transforms.h"
 #include "engine/job/input_hashes.h"
 #include "engine/job/outputs.h"
@@ -290,6 +291,22 @@ Status write_frame_cameras(const Refinement& r)
     };
     files.depth_unit = o.encoding.depth_unit();
     return write_transforms(o.output / "transforms.json", refined, files);
+}
+
+Status write_frame_record(const Refinement& r, const JobCallbacks& callbacks)
+{
+    const RefinementOptions& o = r.options;
+    const bool beside = !o.from_grid() && is_file(o.input / kDriveRecordFiles[0]);
+    if (!beside && o.path)
+        return write_record_of(*o.path, o.encoding.depth_unit(), o.output, callbacks);
+    if (!beside)
+        return {};
+    SR_CHECK(read_drive_record(o.input)); // what is wrong with it is said before anything is refined
+    for (const char* name : kDriveRecordFiles) {
+        SR_TRY(const MappedFile file, MappedFile::open(o.input / name));
+        SR_CHECK(write_file_atomically(o.output / name, file.bytes()));
+    }
+    return {};
 }
 
 Status Refinement::check_outputs(std::span<const Path> beside) const

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/scene_actors.h"
 
+#include "engine/camera/camera_view.h"
+
 #include <cmath>
 #include <map>
 
@@ -53,18 +55,20 @@ Result<SceneActors> SceneActors::create(std::vector<Actor> actors, std::span<con
 SplatMovers SceneActors::seen_by(std::span<const CameraFrame> frames) const
 {
     SplatMovers movers{size(), rows_, {}};
-    for (const CameraFrame& frame : frames)
+    for (const CameraFrame& frame : frames) {
+        const Rigid world_to_camera = motion_of(frame).middle.world_to_camera;
         for (size_t i = 0; i < actors_.size(); ++i) {
             const auto pose = pose_at(actors_[i], microseconds_of(frame.time));
-            movers.views.push_back(pose ? row_of(compose(frame.pose.world_to_camera, compose(*pose, from_splats_[i])))
+            movers.views.push_back(pose ? row_of(compose(world_to_camera, compose(*pose, from_splats_[i])))
                                         : std::array<float, 12>{});
         }
+    }
     return movers;
 }
 
 std::vector<std::array<float, 12>> SceneActors::moves(const CameraFrame& now, const CameraFrame& next) const
 {
-    const Rigid from = now.pose.camera_to_world(), &to = next.pose.world_to_camera;
+    const Rigid from = motion_of(now).middle.camera_to_world(), to = motion_of(next).middle.world_to_camera;
     std::vector<std::array<float, 12>> rows = {row_of(compose(to, from))};
     for (const Actor& a : actors_) {
         const auto before = pose_at(a, microseconds_of(now.time)), after = pose_at(a, microseconds_of(next.time));

@@ -75,7 +75,8 @@ ScenePoints thinned(const ScenePoints& points, float edge)
         out.colors.push_back(sums.mean(sums.color));
         out.labels.push_back(key.second);
         out.cells.push_back(sums.cell);
-        out.owners.push_back(sums.owner);
+        if (!points.owners.empty())
+            out.owners.push_back(sums.owner);
     }
     return out;
 }

@@ -120,9 +120,15 @@ Status World::warm_up()
                                          .points = request_.splats,
                                          .detail_distance = request_.detail_distance,
                                          .voxel_size = voxel_size(),
-                                         .edge = edge()}));
+                                         .edge = edge(),
+                                         .objects = objects()}));
     grid.generated.assign(grid.cells.size(), 1); // points in the middle of their voxels
     return splats_->pool().prepare(points_of(grid).size(), request_.splats);
+}
+
+std::span<const SceneObject> World::objects() const
+{
+    return request_.objects ? std::span<const SceneObject>(*request_.objects) : std::span<const SceneObject>();
 }
 
 Status World::focus(const WorldFoci& foci)

@@ -86,6 +86,8 @@ class World {
     const VoxelGrid* tile(const TileIndex& tile) const;
     // copies of the finished voxels of a window that are in memory; all of them
     VoxelGrid cells(const CellWindow& window) const;
+    // those that were given: splats know which of them they are of
+    std::span<const SceneObject> objects() const;
     // the order of the scene: the grid, filled as far as it is done
     const VoxelGrid& scene() const { return scene_->grid; }
     int32_t tile_cells() const { return request_.settings.regions.tile_cells; }

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/world/world_splats.h"
 
+#include "engine/conditioning/cell_objects.h"
 #include "engine/scene/cell_number.h"
 
 #include <cmath>
@@ -157,6 +158,8 @@ void WorldSplats::append_neighbours(const TileIndex& tile, float reach, float th
             points.colors.push_back(all.colors[i]);
             points.labels.push_back(all.labels[i]);
             points.cells.push_back(0);
+            if (!options_.objects.empty())
+                points.owners.push_back(0);
         }
     }
 }
@@ -165,6 +168,9 @@ void WorldSplats::append_neighbours(const TileIndex& tile, float reach, float th
 Result<SplatPool::Room> WorldSplats::add(const TileIndex& index, const VoxelGrid& cells, uint32_t detail)
 {
     ScenePoints points = points_of(cells);
+    if (!options_.objects.empty()) {
+        SR_TRY(points.owners, instances_of_points(cells, options_.objects));
+    }
     PointSplatOptions options = options_.points;
     const float cube =
         detail ? std::ldexp(options_.voxel_size, int(detail) - 2) : 0; // half a voxel, a voxel, two voxels

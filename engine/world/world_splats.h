@@ -11,9 +11,10 @@ namespace semrover {
 struct WorldSplatOptions {
     uint64_t bytes = 0; // of device memory
     PointSplatOptions points = {.auto_sigma = true};
-    double detail_distance = 0; // as in WorldRequest
-    float voxel_size = 0;       // metres
-    double edge = 0;            // of a tile, metres
+    double detail_distance = 0;                // as in WorldRequest
+    float voxel_size = 0;                      // metres
+    double edge = 0;                           // of a tile, metres
+    std::span<const SceneObject> objects = {}; // that splats are of; outlives this
 };
 
 // Which finished tiles of a world have splats, and of which detail. A tile's are made anew when neighbours have come

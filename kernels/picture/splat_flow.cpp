@@ -26,7 +26,7 @@ FlowTensors splat_flow(Graph& g, Tensor cameras, const FlowMoves& moves, const F
     g.dispatch(kernel::splat_flow,
                {cameras, moves.moves, now.depth, now.owners, next_depth, moves.rows.valid() ? moves.rows : now.owners,
                 y.flow, y.states},
-               push, threads(pixels), {.constants = {{"kModel", uint32_t(o.lens)}}});
+               push, threads(pixels), {.constants = {{"kModel", uint32_t(o.lens)}, {"kMoving", o.moving}}});
     return y;
 }
 

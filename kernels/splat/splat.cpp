@@ -88,7 +88,8 @@ Seen project(Graph& g, const SplatTensors& scene, Tensor cameras, const SplatOpt
     DispatchOptions lens;
     lens.constants = {{"kMovers", o.movers.valid()}};
     if (!pinhole)
-        lens.constants.insert(lens.constants.end(), {{"kModel", uint32_t(o.lens)}, {"kMoving", o.moving}});
+        for (const ConstantValue& c : {ConstantValue{"kModel", uint32_t(o.lens)}, ConstantValue{"kMoving", o.moving}})
+            lens.constants.push_back(c);
     const Tensor keep = g.array(views, DType::u32, "keep");
     const bool by_blocks = scene.blocks.valid();
     DispatchOptions cull = lens;

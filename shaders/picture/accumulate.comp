@@ -25,6 +25,7 @@ layout(binding = 4) readonly buffer DepthPast { float depth_past[]; }; // [pixel
 layout(binding = 5) writeonly buffer Result { uint result[]; };        // [words] bytes
 
 #include "lib/splat_camera.glsl"
+#include "lib/camera_pixel.glsl"
 
 const float kInfinity = 1e7; // metres
 
@@ -63,45 +64,12 @@ vec3 color_past(ivec2 at)
     return color_of(past[word], past[min(word + 1, p.words - 1)], byte % 4);
 }
 
-float camera_depth(uint camera, vec3 point)
-{
-    return camera_depth_is_radial(camera) ? length(point) : point.z;
-}
-
-// where the frame before, seen from its place at a part of its readout, has a point of its still frame
-bool past_pixel(vec3 still, out vec2 source, out float depth)
-{
-    const Lens lens = camera_lens(1);
-    if (!kMoving) {
-        depth = camera_depth(1, still);
-        return lens_project(kModel, lens, still, source);
-    }
-    const Motion motion = camera_motion(1);
-    const float guesses[3] = {0.0, -0.5, 0.5};
-    for (uint i = 0; i < 3; ++i) {
-        float part = guesses[i];
-        if (!settle(kModel, lens, motion, still, -0.5, 0.5, part, source))
-            continue;
-        depth = camera_depth(1, seen_at(motion, part, still));
-        return true;
-    }
-    return false;
-}
-
 // where the frame before saw what this pixel shows; its depth there
 bool find_source(ivec2 pixel, out vec2 source, out float depth)
 {
-    const vec2 position = vec2(pixel) + 0.5;
-    vec3 ray;
-    if (!lens_unproject(kModel, camera_lens(0), position, ray) || !(camera_depth(0, ray) > 0.0))
-        return false;
-    vec3 point = ray * (metres(depth_now[index_of(pixel)]) / camera_depth(0, ray));
-    if (kMoving) {
-        const Motion motion = camera_motion(0);
-        const float part = part_of(motion, position);
-        point = turned(motion.turn, part, point) + part * motion.shift;
-    }
-    return past_pixel(camera_view(1) * vec4(point, 1.0), source, depth) && depth > 0.0 && source.x >= 0.0 &&
+    vec3 point;
+    return point_of(0, vec2(pixel) + 0.5, metres(depth_now[index_of(pixel)]), point) &&
+           pixel_of(1, camera_view(1) * vec4(point, 1.0), source, depth) && depth > 0.0 && source.x >= 0.0 &&
            source.y >= 0.0 && source.x < float(p.width) && source.y < float(p.height);
 }
 

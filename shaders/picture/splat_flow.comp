@@ -3,12 +3,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // where the surface of a pixel is in the next picture, and whether it is seen there (docs/method.md §5.5)
 #extension GL_GOOGLE_include_directive : require
-#include "lib/lens.glsl"
-#include "lib/moving_rays.glsl"
+#include "lib/moving_pixel.glsl"
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint kModel = 0; // CameraModel
+layout(constant_id = 1) const bool kMoving = false; // a camera moves while its picture is read out
 layout(push_constant) uniform SplatFlowPush {
     uint width, height;
     uint mover_numbers;
@@ -24,12 +24,11 @@ layout(binding = 6) writeonly buffer Flow { vec2 flow[]; };       // [pixels] x,
 layout(binding = 7) writeonly buffer States { uint states[]; };   // [pixels] FlowState of kernels/picture.h
 
 #include "lib/splat_camera.glsl"
+#include "lib/camera_pixel.glsl"
 #include "lib/splat_mover.glsl"
 
 const uint kNothing = 0, kSeen = 1, kHidden = 2, kOutside = 3;
 const float kUnknown = 1e10; // as .flo has it
-
-float camera_depth(uint camera, vec3 point) { return camera_depth_is_radial(camera) ? length(point) : point.z; }
 
 // the farthest of the four pixels around a position; nothing is farther than all
 float farthest_around(vec2 at)
@@ -51,17 +50,17 @@ uint follow(uint pixel, out vec2 to)
     const vec2 at = vec2(pixel % p.width, pixel / p.width) + 0.5;
     to = vec2(kUnknown);
     const float metres = depth[pixel].y;
-    vec3 ray;
-    if (!(metres > 0.0) || !lens_unproject(kModel, camera_lens(0), at, ray) || !(camera_depth(0, ray) > 0.0))
+    vec3 here;
+    if (!(metres > 0.0) || !point_of(0, at, metres, here))
         return kNothing;
     const uint first = 3 * mover_of(owners[pixel], p.mover_numbers);
-    const vec4 point = vec4(ray * (metres / camera_depth(0, ray)), 1.0);
+    const vec4 point = vec4(here, 1.0);
     const vec3 next = vec3(dot(move_rows[first], point), dot(move_rows[first + 1], point), dot(move_rows[first + 2], point));
     if (next == vec3(0.0)) // it is not there any more
         return kHidden;
     vec2 there;
-    const float away = camera_depth(1, next);
-    if (!lens_project(kModel, camera_lens(1), next, there) || !(away > 0.0))
+    float away;
+    if (!pixel_of(1, next, there, away) || !(away > 0.0))
         return kOutside;
     to = there - at;
     if (kModel == kEquirectangular) // the shorter way around

@@ -19,7 +19,7 @@ struct SortOptions {
 };
 
 struct SplatBenchOptions {
-    uint32_t splats = 200000, width = 616, height = 424;
+    uint32_t splats = 200000, width = 616, height = 424, movers = 0;
     float sigma = 0.04f;
     std::string model = "pinhole", profile;
 };
@@ -56,20 +56,43 @@ Intrinsics bench_camera(CameraModel model, uint32_t width, uint32_t height)
     return k;
 }
 
+// A tenth of the splats are of things that move, in turns, and are where they were: the picture is the same. 0: none
+std::vector<uint32_t> owners_of(const SplatBenchOptions& o)
+{
+    std::vector<uint32_t> owners(o.splats);
+    for (uint32_t i = 0; o.movers && i < o.splats; i += 10)
+        owners[i] = 1 + i / 10 % o.movers;
+    return owners;
+}
+
+SplatMovers movers_of(const SplatBenchOptions& o, const SplatCamera& camera)
+{
+    SplatMovers movers{o.movers, {0}, {}};
+    for (uint32_t i = 0; i < o.movers; ++i) {
+        movers.rows.push_back(i + 1);
+        movers.views.push_back(camera.world_to_camera);
+    }
+    return movers;
+}
+
 Status bench_splat(const SplatBenchOptions& o, const Globals& globals)
 {
     SR_TRY(const auto device, open_device(globals, o.profile));
-    SR_TRY(const SplatScene scene, SplatScene::create(*device, street_splats(o.splats, o.sigma)));
+    SR_TRY(const SplatScene scene, SplatScene::create(*device, street_splats(o.splats, o.sigma), owners_of(o)));
     const CameraModel model = camera_model_of(o.model).value_or(CameraModel::pinhole);
-    SR_TRY(const auto rasterizer, Rasterizer::create(*device, scene, o.width, o.height, 1, {.model = model}));
+    SR_TRY(const auto rasterizer,
+           Rasterizer::create(*device, scene, o.width, o.height, 1,
+                              {.model = model, .movers = o.movers, .mover_numbers = o.movers + 1}));
     const SplatCamera camera =
         splat_camera(bench_camera(model, o.width, o.height), {{0, -1, 0, 0, 0, 0, -1, 0, 1, 0, 0, 0, 0, 0, 0, 1}});
     std::vector<SplatImage> images;
-    SR_CHECK(rasterizer->render({&camera, 1}, images)); // finds how much room the pairs need
+    const SplatMovers movers = movers_of(o, camera);
+    SR_CHECK(rasterizer->render({&camera, 1}, images, movers)); // finds how much room the pairs need
     device->reset_peak();
-    SR_TRY(const Timing timing, measure([&] { return rasterizer->render({&camera, 1}, images); }));
+    SR_TRY(const Timing timing, measure([&] { return rasterizer->render({&camera, 1}, images, movers); }));
     Json report = bench_report("splat", *device, DType::f32, timing, scene.bytes() + rasterizer->planned_bytes());
     report["splats"] = o.splats;
+    report["movers"] = o.movers;
     report["camera_model"] = o.model;
     report["width"] = o.width;
     report["height"] = o.height;
@@ -126,6 +149,7 @@ void add_bench_splat(CLI::App& bench, const Globals& globals, Run& run)
     auto o = std::make_shared<SplatBenchOptions>();
     CLI::App* c = bench.add_subcommand("splat", "one frame of 2D Gaussian splats, images read back");
     add_number(*c, "--splats", o->splats, "splats of the scene", 1u, 50000000u);
+    add_number(*c, "--movers", o->movers, "things that move, a tenth of the splats", 0u, 65534u);
     add_number(*c, "-W,--width", o->width, "pixels", 1u, 16384u);
     add_number(*c, "-H,--height", o->height, "pixels", 1u, 16384u);
     add_number(*c, "--splat-radius", o->sigma, "metres", 0.001f, 10.f);

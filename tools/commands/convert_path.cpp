@@ -110,9 +110,11 @@ Result<Path> find_picture(const Path& folder, const std::string& camera, uint32_
                 quote_path(refined));
 }
 
-// Links, or copies where the file system has none. Also without folders: the first loader of 3DGS looks there.
-Status link_images(const Path& model, const CameraPath& path, const Path& from)
+// Links, or copies where the file system has none. Also without folders: the first loader of 3DGS looks there. What the
+// pictures' names end in
+Result<std::string> link_images(const Path& model, const CameraPath& path, const Path& from)
 {
+    std::string extension;
     SR_TRY(const ShardsOrNone shards, open_if_shards(from));
     std::map<std::string, uint32_t> counts;
     for (const CameraFrame& f : path.frames)
@@ -120,7 +122,12 @@ Status link_images(const Path& model, const CameraPath& path, const Path& from)
     for (const CameraFrame& f : path.frames) {
         const uint32_t number = counts[f.camera]++;
         SR_TRY(const Path picture, find_picture(from, f.camera, number));
-        const Path name = colmap_picture_name(f.camera, number, counts.size());
+        const std::string own = picture.extension().string().substr(1);
+        if (!extension.empty() && own != extension)
+            return fail(ErrorCode::bad_input, "--images: {} is no .{} as those before it are", quote_path(picture),
+                        extension);
+        extension = own;
+        const Path name = colmap_picture_name(f.camera, number, counts.size(), extension);
         for (const Path& to : {images_folder(model) / name, images_folder(model) / name.filename()}) {
             SR_CHECK(make_folder(to.parent_path()));
             std::error_code error;
@@ -132,7 +139,7 @@ Status link_images(const Path& model, const CameraPath& path, const Path& from)
             }
         }
     }
-    return {};
+    return extension;
 }
 
 Status write_with_points(const Path& out, const CameraPath& path, const ConvertPathOptions& o, PathFormat format,
@@ -151,9 +158,11 @@ Status write_with_points(const Path& out, const CameraPath& path, const ConvertP
         SR_CHECK(write_points_ply(out.parent_path() / "points.ply", points));
         return write_transforms(out, path, {{}, "points.ply"});
     }
-    if (!o.images.empty())
-        SR_CHECK(link_images(out, path, o.images));
-    return write_colmap(out, path, points);
+    std::string extension = "png";
+    if (!o.images.empty()) {
+        SR_TRY(extension, link_images(out, path, o.images));
+    }
+    return write_colmap(out, path, points, extension);
 }
 
 Status write_output(const Path& out, const CameraPath& path, PathFormat format)

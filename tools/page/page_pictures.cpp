@@ -102,6 +102,34 @@ bool is_flat(const ImageRgb8& image)
     return double(most) >= kFlat * double(colors.size());
 }
 
+// neighbours in number are far apart in hue; nothing is dark
+std::array<uint8_t, 3> instance_color(uint16_t number)
+{
+    if (number == 0)
+        return {50, 50, 50};
+    const double turns = 0.618034 * number, light = 0.6 + 0.4 * std::fmod(0.381966 * number, 1.0);
+    std::array<uint8_t, 3> color{};
+    for (size_t c = 0; c < 3; ++c) {
+        const double away = std::abs(std::fmod(turns + double(3 - c) / 3, 1.0) * 6 - 3);
+        color[c] = uint8_t(255 * light * (0.3 + 0.7 * std::clamp(away - 1, 0.0, 1.0)));
+    }
+    return color;
+}
+
+// a picture as people see it: numbers of instances have colours
+Result<ImageRgb8> read_shown(const Path& file)
+{
+    if (file.parent_path().filename() != "instance")
+        return read_image_rgb8(file);
+    SR_TRY(const ImageGray16 numbers, read_png_gray16(file));
+    ImageRgb8 image{numbers.width, numbers.height, {}};
+    for (const uint16_t number : numbers.pixels) {
+        const auto color = instance_color(number);
+        image.pixels.insert(image.pixels.end(), color.begin(), color.end());
+    }
+    return image;
+}
+
 Result<Picture> encode(const ImageRgb8& image, int quality)
 {
     SR_TRY(std::vector<std::byte> png, encode_png_rgb8(image.width, image.height, image.pixels));
@@ -172,7 +200,7 @@ Result<PictureTable> read_pictures(const std::vector<PictureSet>& sets, const Pi
         std::vector<Picture>& row = t.pictures.emplace_back();
         for (const uint32_t moment : t.moments) {
             const Path& file = files[s][moment];
-            SR_TRY(const ImageRgb8 image, read_image_rgb8(file));
+            SR_TRY(const ImageRgb8 image, read_shown(file));
             if (row.empty())
                 t.sizes.emplace_back(image.width, image.height);
             SR_CHECK(check_size(t, file, image, s));

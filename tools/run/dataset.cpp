@@ -1,14 +1,17 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// semrover dataset pack|list|verify|unpack: folders of pictures as archives of many moments each, and back
+// semrover dataset pack|list|verify|unpack: folders of pictures as archives of many moments each, and back;
+// semrover dataset export: drives in the layouts of other programs
 #include "runtime/base/hash.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/output_folder.h"
+#include "tools/cli/print_stderr.h"
 #include "tools/cli/progress.h"
 #include "tools/cli/value_options.h"
 #include "tools/dataset/check_shards.h"
 #include "tools/dataset/pack_shards.h"
+#include "tools/export/exporters.h"
 
 #include <CLI/CLI.hpp>
 #include <map>
@@ -181,6 +184,56 @@ Status unpack(const std::string& folder, const std::string& output, const Global
     return out.commit();
 }
 
+// ---- export
+
+struct ExportArguments {
+    std::vector<std::string> sets;
+    std::string layout, output;
+    ExportOptions options;
+};
+
+Status export_sets(const ExportArguments& o, const Globals& globals)
+{
+    const auto layout = std::ranges::find(kExporters, std::string_view(o.layout), &NamedExporter::name);
+    if (o.sets.size() > 1 && !layout->several)
+        return fail(ErrorCode::usage, "--to {} is of one drive, not of {}", o.layout, o.sets.size());
+    std::vector<DriveInput> drives;
+    for (const std::string& set : o.sets) {
+        SR_TRY(drives.emplace_back(), open_drive(set));
+    }
+    SR_TRY(OutputFolder out, OutputFolder::create(o.output, globals.yes));
+    SR_TRY(const ExportReport report, layout->run(drives, out.path(), o.options));
+    SR_CHECK(out.commit());
+    print_warnings(report.warnings, globals);
+    if (globals.json)
+        fmt::print("{}\n",
+                   Json{{"pictures", report.pictures}, {"boxes", report.boxes}, {"left_out", report.left_out}}.dump());
+    else if (!globals.quiet) {
+        fmt::print("{}: {} drives, {} pictures, {} boxes as {}\n", quote_path(o.output), drives.size(), report.pictures,
+                   report.boxes, o.layout);
+        for (const auto& [name, count] : report.left_out)
+            fmt::print("  left out, as {} has no class for it: {} of {}\n", o.layout, count, name);
+    }
+    return {};
+}
+
+void add_export(CLI::App& dataset, const Globals& globals, Run& run)
+{
+    auto o = std::make_shared<ExportArguments>();
+    CLI::App* c = dataset.add_subcommand("export", "drives in the layout of another program");
+    c->add_option("SET", o->sets, "what `render` or `refine` wrote, or shard sets of it")->required();
+    std::vector<std::string> names;
+    for (const NamedExporter& exporter : kExporters)
+        names.push_back(exporter.name);
+    add_choice(*c, "--to", names, "the layout", o->layout)->required();
+    c->add_option("-o,--output", o->output, "folder of the data set")->required();
+    c->add_option("--camera", o->options.camera, "of kitti: the camera that image_2 is of; by default the first");
+    add_number(*c, "--val", o->options.val, "of kitti and nuscenes: how many of the sets, the last ones, validate", 0u,
+               100000u);
+    add_number(*c, "--quality", o->options.quality, "of JPEGs that are made of PNGs", 1, 100);
+    c->callback([o, &globals, &run] { run = [o, &globals] { return export_sets(*o, globals); }; });
+}
+
 } // namespace
 
 void add_dataset(CLI::App& app, const Globals& globals, Run& run)
@@ -207,6 +260,8 @@ void add_dataset(CLI::App& app, const Globals& globals, Run& run)
     c->callback([o, &globals, &run] { run = [o, &globals] { return pack(*o, globals); }; });
 
     auto set = std::make_shared<std::string>(), output = std::make_shared<std::string>();
+    add_export(*dataset, globals, run);
+
     c = dataset->add_subcommand("list", "moments, cameras, kinds of pictures and archives of a shard set");
     c->add_option("SET", *set, "folder of a shard set")->required();
     c->callback([set, &globals, &run] { run = [set, &globals] { return list(*set, globals); }; });

@@ -11,6 +11,7 @@
 #include "tools/cli/progress.h"
 #include "tools/cli/value_options.h"
 #include "tools/scenes/placement_option.h"
+#include "tools/streets/ground_objects.h"
 #include "tools/streets/street.h"
 #include "tools/streets/street_grid.h"
 #include "tools/trace/tracer.h"
@@ -53,38 +54,76 @@ double apart(const CameraFrame& a, const CameraFrame& b)
     return std::hypot(p[0] - q[0], p[1] - q[1]);
 }
 
-std::vector<uint32_t> faces_around(const Mesh& mesh, const CameraFrame& frame, double radius)
+// what of a street is there at a moment, within a radius of a camera
+std::vector<uint32_t> faces_around(const Street& street, const Mesh& mesh, const std::vector<bool>& absent,
+                                   const CameraFrame& frame, double radius)
 {
     const Point3 o = translation_of(frame.pose.camera_to_world());
     std::vector<uint32_t> faces;
     for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
         const auto& p = mesh.positions[mesh.faces[f][0]];
-        if (std::hypot(p[0] - o[0], p[1] - o[1]) < radius)
+        const uint32_t owner = street.owners[f];
+        const bool there = owner == 0 || absent.empty() || !absent[owner - 1];
+        if (there && std::hypot(p[0] - o[0], p[1] - o[1]) < radius)
             faces.push_back(f);
     }
     return faces;
 }
 
-// pictures of a drive through a street, FOLDER/{color,depth,normal,label,visible}/NNNNNN.png, in daylight of the seed
-// where `images` does not say another
-Status draw_street(Device& device, const Street& street, const CameraPath& path, uint64_t seed,
-                   const StreetImages& images, const Path& folder, const Globals& globals)
+// What a street looks like at a moment; the mesh changes with time where there are actors.
+class StreetMoments {
+  public:
+    StreetMoments(const Street& street, std::span<const Actor> actors) : street_(street), actors_(actors)
+    {
+        if (!actors.empty())
+            moved_ = street.mesh;
+    }
+
+    // what cameras near this frame see, at its time; `whole`: all of it
+    Result<DeviceTraceScene> scene(Device& device, const CameraFrame& frame, bool whole)
+    {
+        std::vector<bool> absent;
+        if (!actors_.empty())
+            absent = move_actors(moved_, street_, actors_, microseconds(frame));
+        const Mesh& mesh = actors_.empty() ? street_.mesh : moved_;
+        std::vector<uint32_t> faces;
+        if (!whole || !actors_.empty())
+            faces = faces_around(street_, mesh, absent, frame, whole ? INFINITY : kReach + kStretch);
+        return DeviceTraceScene::create(device, trace_tables(mesh, street_.gloss, faces, street_.owners));
+    }
+    bool same(const CameraFrame& a, const CameraFrame& b) const
+    {
+        return actors_.empty() || microseconds(a) == microseconds(b);
+    }
+
+  private:
+    static int64_t microseconds(const CameraFrame& frame) { return std::llround(frame.time * 1e6); }
+
+    const Street& street_;
+    std::span<const Actor> actors_;
+    Mesh moved_;
+};
+
+// pictures of a drive through a street, FOLDER/{color,depth,normal,label,instance,visible}/NNNNNN.png, in daylight of
+// the seed where `images` does not say another
+Status draw_street(Device& device, const Street& street, std::span<const Actor> actors, const CameraPath& path,
+                   uint64_t seed, const StreetImages& images, const Path& folder, const Globals& globals)
 {
     Progress progress(progress_to_stderr(globals), "trace", "frames", path.frames.size());
     const Daylight light = daylight(images, seed);
     const ShadeOptions options{
         .width = images.width, .height = images.height, .samples = images.samples, .ambient_rays = images.ambient_rays};
     const bool whole = street.mesh.faces.size() <= kWholeScene;
+    StreetMoments moments(street, actors);
     for (size_t i = 0; i < path.frames.size();) {
         const CameraFrame& first = path.frames[i];
-        std::vector<uint32_t> faces;
-        if (!whole)
-            faces = faces_around(street.mesh, first, kReach + kStretch);
-        SR_TRY(const DeviceTraceScene scene,
-               DeviceTraceScene::create(device, trace_tables(street.mesh, street.gloss, faces)));
+        SR_TRY(const DeviceTraceScene scene, moments.scene(device, first, whole));
         SR_TRY(const auto tracer, Tracer::create(device, scene, options));
-        for (; i < path.frames.size() && (whole || apart(first, path.frames[i]) < kStretch); ++i) {
-            SR_TRY(const TracedImage image, tracer->render(path.frames[i], light));
+        for (; i < path.frames.size() && (whole || apart(first, path.frames[i]) < kStretch) &&
+               moments.same(first, path.frames[i]);
+             ++i) {
+            SR_TRY(TracedImage image, tracer->render(path.frames[i], light));
+            number_ground(image, path.frames[i], street.boxes);
             SR_CHECK(write_traced_image(folder, uint32_t(i), image));
             progress.update(i + 1, device.allocated_bytes());
             if (interrupt_requested())
@@ -103,7 +142,7 @@ struct StreetsArguments {
     StreetImages images;
     VoxelizeOptions voxels;
     SeenOptions sight;
-    bool pictures = false, no_grids = false, seen = false;
+    bool pictures = false, no_grids = false, seen = false, traffic = false;
 };
 
 Json street_json(const StreetsArguments& o, const Street& street, const CameraPath& path)
@@ -150,16 +189,16 @@ Status write_grids(const StreetsArguments& o, Device& device, Street& street, st
     return write_grid(out / "semantic.sgrid", grids.semantic);
 }
 
-Status draw(const StreetsArguments& o, const Globals& globals, Device& device, Street& street, const CameraPath& path,
-            const CameraPath& shifted, const OutputFolder& out)
+Status draw(const StreetsArguments& o, const Globals& globals, Device& device, Street& street,
+            std::span<const Actor> actors, const CameraPath& path, const CameraPath& shifted, const OutputFolder& out)
 {
     if (!o.no_grids)
         SR_CHECK(write_grids(o, device, street, std::array{path, shifted}, out));
     if (!o.pictures)
         return {};
-    SR_CHECK(draw_street(device, street, path, o.street.seed, o.images, out.path(), globals));
+    SR_CHECK(draw_street(device, street, actors, path, o.street.seed, o.images, out.path(), globals));
     if (o.shift != 0)
-        SR_CHECK(draw_street(device, street, shifted, o.street.seed, o.images, out / "shifted", globals));
+        SR_CHECK(draw_street(device, street, actors, shifted, o.street.seed, o.images, out / "shifted", globals));
     return {};
 }
 
@@ -183,6 +222,19 @@ Status check_drive(const StreetsArguments& o)
     return {};
 }
 
+// for the drive and a second more: a sensor may measure for a while after its frame's time
+Result<std::vector<Actor>> traffic_of(const Street& street, const CameraPath& path)
+{
+    std::vector<Actor> actors = moving_actors(street, path.frames.back().time + 1);
+    size_t poses = 0;
+    for (const Actor& actor : actors)
+        poses += actor.poses.size();
+    if (poses > kMaxActorPoses)
+        return fail(ErrorCode::usage, "--traffic: what moves in this street has {} poses, at most {} are possible",
+                    poses, kMaxActorPoses);
+    return actors;
+}
+
 Status streets(const StreetsArguments& o, const Globals& globals)
 {
     SR_CHECK(check_drive(o));
@@ -199,11 +251,17 @@ Status streets(const StreetsArguments& o, const Globals& globals)
     std::error_code error;
     std::filesystem::create_directory(out / "shifted", error);
     SR_CHECK(write_transforms(out / "shifted/transforms.json", shifted, files_of(o.pictures && o.shift != 0)));
-    const Json about = street_json(o, street, path);
+    Json about = street_json(o, street, path);
+    std::vector<Actor> actors;
+    if (o.traffic) {
+        SR_TRY(actors, traffic_of(street, path));
+        SR_CHECK(write_actors(out / "actors.json", actors));
+        about["actors"] = actors.size();
+    }
     SR_CHECK(write_file_atomically(out / "street.json", about.dump(2) + "\n"));
     if (o.pictures || !o.no_grids) {
         SR_TRY(const auto device, open_device(globals));
-        SR_CHECK(draw(o, globals, *device, street, path, shifted, out));
+        SR_CHECK(draw(o, globals, *device, street, actors, path, shifted, out));
     }
     SR_CHECK(write_objects(out / "objects.json", street.boxes));
     SR_CHECK(out.commit());
@@ -229,6 +287,7 @@ void add_streets(CLI::App& app, const Globals& globals, Run& run)
     add_number(*c, "--end-margin", o->drive.end_margin, "metres before the end where it stops", 0.0, 20000.0);
     add_number(*c, "--camera-height", o->drive.height, "of the camera, metres", 0.2, 50.0);
     add_number(*c, "--yaw", o->drive.yaw, "radians to the left of the street", -6.3, 6.3);
+    c->add_flag("--traffic", o->traffic, "vehicles drive and people walk: actors.json, and so in the pictures");
     add_number(*c, "--shift", o->shift, "metres to the left of the second, novel drive", -100, 100);
     CLI::Option* no_grids = c->add_flag("--no-grids", o->no_grids, "without truth.sgrid and semantic.sgrid");
     CLI::Option* seen = c->add_flag("--seen", o->seen, "of the grids only what the drives see, as a recording would");
@@ -237,8 +296,9 @@ void add_streets(CLI::App& app, const Globals& globals, Run& run)
     add_number(*c, "--voxel-size", o->voxels.voxel_size, "metres", 0.05f, 10.f)->excludes(no_grids);
     add_number(*c, "--points", o->voxels.points_per_voxel, "points of a voxel", 1, 4096)->excludes(no_grids);
     add_placement(*c, o->voxels)->excludes(no_grids);
-    CLI::Option* images = c->add_flag("--images", o->pictures,
-                                      "also pictures of both drives: {color,depth,normal,label,visible}/000000.png");
+    CLI::Option* images =
+        c->add_flag("--images", o->pictures,
+                    "also pictures of both drives: {color,depth,normal,label,instance,visible}/000000.png");
     add_number(*c, "--samples", o->images.samples, "rays a pixel", 1u, 256u)->needs(images);
     add_number(*c, "--ambient-rays", o->images.ambient_rays, "rays for the light from around, a sample", 1u, 64u)
         ->needs(images);

@@ -11,7 +11,7 @@ namespace semrover {
 
 namespace {
 
-enum FurnishingKey : uint64_t { kTrees = 40, kLights, kThings, kPeople, kSigns, kBollards };
+enum FurnishingKey : uint64_t { kTrees = 40, kLights, kThings, kPeople, kSigns, kBollards, kWalks };
 
 class Furnishing {
   public:
@@ -150,13 +150,36 @@ class Furnishing {
             if (!free(s, 0.5))
                 continue;
             const Frame f = place(s, side, in).turned(turn + own.uniform(-0.3, 0.3));
+            const size_t first = m_.objects().size();
             add_person(m_, f, own);
             ++site_.objects["person"];
             if (own.chance(0.25) && c_.sidewalk - in > 1.2) { // two walk together
                 add_person(m_, f.moved(0.1, side * (turn > 0 ? -0.65 : 0.65), 0), own);
                 ++site_.objects["person"];
             }
+            walk(b, first, s, side, in, turn > 0);
         }
+    }
+    // whoever was added since object `first` walks as far as the kerb is high, and stands there
+    void walk(const Block& b, size_t first, double s, int side, double in, bool back)
+    {
+        constexpr double kLook = 0.25;
+        KeyedRandom r(site_.seed, {kWalks, b.index, uint64_t(side > 0), uint64_t(s * 16)});
+        MovingThing thing{.s = s,
+                          .d = side * (c_.kerb() + in),
+                          .way = (side > 0) != back ? -1 : 1, // the traffic on the left comes
+                          .speed = r.uniform(1.0, 1.6),
+                          .low = s,
+                          .high = s,
+                          .stays = true,
+                          .upright = true};
+        while (free(thing.low - kLook, 0.5))
+            thing.low -= kLook;
+        while (free(thing.high + kLook, 0.5))
+            thing.high += kLook;
+        for (size_t id = first; id < m_.objects().size(); ++id)
+            thing.objects.push_back(uint32_t(id));
+        site_.moving.push_back(std::move(thing));
     }
 
     void junction(const Junction& j)

@@ -1,11 +1,14 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/streets/street_parts.h"
+#include "tools/streets/ground_objects.h"
 
+#include "engine/conditioning/cell_objects.h"
+#include "engine/scene/palette.h"
 #include "tools/streets/class_label.h"
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 namespace semrover {
 
@@ -102,7 +105,57 @@ class Pieces {
     std::vector<SceneObject>& objects_;
 };
 
+struct GroundPiece {
+    const SceneObject* object;
+    Rigid from_world;
+
+    double depth(const Point3& point) const // below the nearest face, along the axes
+    {
+        const Point3 p = transform(from_world, point);
+        double least = object->size[0] / 2 - std::abs(p[0]);
+        for (size_t a = 1; a < 3; ++a)
+            least = std::min(least, object->size[a] / 2 - std::abs(p[a]));
+        return least;
+    }
+};
+
+uint32_t number_of(const std::vector<GroundPiece>& pieces, const Point3& point)
+{
+    uint32_t number = 0;
+    double deepest = -kObjectReach;
+    for (const GroundPiece& piece : pieces)
+        if (const double depth = piece.depth(point); depth > deepest) {
+            deepest = depth;
+            number = piece.object->id + 1;
+        }
+    return number;
+}
+
 } // namespace
+
+void number_ground(TracedImage& image, const CameraFrame& frame, std::span<const SceneObject> objects)
+{
+    const Rigid to_world = frame.pose.camera_to_world();
+    const Point3 eye = translation_of(to_world);
+    double farthest = 0;
+    for (const float depth : image.depth)
+        farthest = std::max(farthest, double(depth));
+    const Intrinsics& k = frame.intrinsics;
+    const double wide = std::hypot(1, k.width / k.fx, k.height / k.fy); // of the ray through a corner, at most
+    std::map<uint8_t, std::vector<GroundPiece>> pieces;                 // that may be seen
+    for (const SceneObject& o : objects)
+        if (is_ground(o.label) && std::hypot(o.center[0] - eye[0], o.center[1] - eye[1]) < farthest * wide + 2 * kPiece)
+            pieces[o.label].push_back({&o, inverse(box_to_world(o))});
+    for (size_t i = 0; i < image.label.size(); ++i) {
+        const auto ground = pieces.find(image.label[i]);
+        if (image.instance[i] != 0 || ground == pieces.end())
+            continue;
+        const double z = double(image.depth[i]);
+        const Point3 seen = {(double(i % image.width) + 0.5 - k.cx) / k.fx * z,
+                             (double(i / image.width) + 0.5 - k.cy) / k.fy * z, z};
+        image.instance[i] = number_of(ground->second, transform(to_world, seen));
+    }
+}
 
 void add_ground_objects(const RoadNetwork& road, std::vector<SceneObject>& objects)
 {

@@ -233,9 +233,12 @@ void MeshBuilder::note_object(uint8_t label, const Frame& frame, size_t first)
     const Frame upright = upright_frame({}, std::atan2(frame.x.y, frame.x.x));
     std::array<double, 3> low{}, high{};
     bool any = false;
+    owners_.resize(mesh_.faces.size());
     for (size_t f = first; f < mesh_.faces.size(); ++f) {
         if (mesh_.face_labels[f] != label)
             continue;
+        if (owners_[f] == 0)
+            owners_[f] = uint32_t(objects_.size()) + 1;
         for (uint32_t v : mesh_.faces[f]) {
             const Vector3 at{mesh_.positions[v][0], mesh_.positions[v][1], mesh_.positions[v][2]};
             const std::array<double, 3> p = {dot(at, upright.x), dot(at, upright.y), at.z};
@@ -254,6 +257,13 @@ void MeshBuilder::note_object(uint8_t label, const Frame& frame, size_t first)
         o.size[a] = std::max(high[a] - low[a], 0.01);
     o.heading = std::atan2(upright.x.y, upright.x.x);
     objects_.push_back(o);
+}
+
+std::vector<uint32_t> MeshBuilder::owners() const
+{
+    std::vector<uint32_t> all = owners_;
+    all.resize(mesh_.faces.size());
+    return all;
 }
 
 Mesh MeshBuilder::take() &&

@@ -64,11 +64,13 @@ class MeshBuilder {
                int section = 5);
 
     // Adds an object: the upright box, along the frame's x, of the faces from number `first` on that have this label.
-    // Nothing where there are none. Its id is its number.
+    // Nothing where there are none. Its id is its number. Those faces are its own, but for those that were another's.
     void note_object(uint8_t label, const Frame& frame, size_t first);
     std::vector<SceneObject>& objects() { return objects_; }
 
     size_t faces() const { return mesh_.faces.size(); }
+    // of each face the id of its object + 1, 0: none
+    std::vector<uint32_t> owners() const;
     // smoothness of materials, 0..1 (what they mirror of the sky at right angles), by number
     const std::vector<float>& gloss() const { return gloss_; }
     Mesh take() &&;
@@ -80,6 +82,7 @@ class MeshBuilder {
 
     Mesh mesh_;
     std::vector<SceneObject> objects_;
+    std::vector<uint32_t> owners_; // of faces, up to the last that has one
     std::vector<float> gloss_;
     std::vector<double> size_; // metres a picture, by material
     std::map<Pattern, uint32_t> textures_;

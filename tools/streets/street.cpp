@@ -3,6 +3,7 @@
 #include "tools/streets/street.h"
 
 #include "engine/scene/palette.h"
+#include "tools/streets/ground_objects.h"
 #include "tools/streets/street_parts.h"
 
 #include <algorithm>
@@ -43,15 +44,16 @@ CameraPath drive_along(const RoadNetwork& road, const DriveShape& d, const Intri
 
 Street make_street(const StreetOptions& options)
 {
-    Street street{RoadNetwork(options.seed, options.length), {}, {}, {}, {}};
+    Street street{RoadNetwork(options.seed, options.length), {}, {}, {}, {}, {}, {}};
     MeshBuilder mesh;
-    Site site{mesh, street.road, options.seed, street.objects};
+    Site site{mesh, street.road, options.seed, street.objects, street.moving};
     add_road_surface(mesh, street.road, options.seed);
     add_plots(site);
     add_furnishing(site);
     add_traffic(site);
     street.gloss = mesh.gloss();
     street.boxes = std::move(mesh.objects());
+    street.owners = mesh.owners();
     add_ground_objects(street.road, street.boxes);
     street.mesh = std::move(mesh).take();
     return street;

@@ -5,6 +5,7 @@
 #include "engine/conditioning/scene_objects.h"
 #include "engine/mesh/mesh.h"
 #include "engine/scene/grid.h"
+#include "tools/streets/moving.h"
 #include "tools/streets/road_network.h"
 #include "tools/trajectory/camera_path.h"
 
@@ -24,7 +25,9 @@ struct Street {
     Mesh mesh;                             // every face has a label and a textured material
     std::vector<float> gloss;              // of each material, 0..1 (engine/trace)
     std::map<std::string, size_t> objects; // how many of each kind stand in it
-    std::vector<SceneObject> boxes;        // of vehicles, houses, trees, pieces of ground, ..., without tints
+    std::vector<SceneObject> boxes;        // of vehicles, houses, trees, pieces of ground, ..., without tints; by id
+    std::vector<uint32_t> owners;          // of each face the id of the object that it is of + 1; 0: none, or ground
+    std::vector<MovingThing> moving;       // what could move
 };
 
 // The same seed gives the same street on every run; a longer one begins like a shorter one, as far as 60 m before the

@@ -4,6 +4,7 @@
 
 #include "engine/conditioning/scene_objects.h"
 #include "tools/streets/mesh_builder.h"
+#include "tools/streets/moving.h"
 #include "tools/streets/road_network.h"
 
 #include <map>
@@ -30,6 +31,7 @@ struct Site {
     const RoadNetwork& road;
     uint64_t seed;
     std::map<std::string, size_t>& objects;
+    std::vector<MovingThing>& moving;
 };
 
 // houses, gardens and parks on both sides of the blocks, along the side streets, and what closes the view at their
@@ -40,9 +42,5 @@ void add_plots(Site& site);
 void add_furnishing(Site& site);
 // what stands on the carriageway: parked and waiting vehicles, two-wheelers with riders, a tram where there are rails
 void add_traffic(Site& site);
-
-// Appends pieces of what is paved alike, some ten metres long: of the lanes, of cycle lanes, of parking bays, of
-// sidewalks, and of side streets. Without tints. Ids go on from those of `objects`.
-void add_ground_objects(const RoadNetwork& road, std::vector<SceneObject>& objects);
 
 } // namespace semrover

@@ -10,7 +10,8 @@ namespace semrover {
 
 namespace {
 
-enum TrafficKey : uint64_t { kParked = 60, kOncoming, kSideCars, kTram };
+enum TrafficKey : uint64_t { kParked = 60, kOncoming, kSideCars, kTram, kSpeeds };
+enum Lane : uint32_t { kOncomingLane = MovingThing::kOwnWay + 1, kLeftCycleLane, kRightCycleLane };
 
 class Traffic {
   public:
@@ -56,6 +57,25 @@ class Traffic {
         f.y = normalized(cross({0, 0, 1}, f.x));
         f.z = cross(f.x, f.y);
         return f;
+    }
+
+    // Everything since object `first` is one thing that may move. What comes is gone when even a tram has left the
+    // street's beginning; what goes waits at the end.
+    void may_move(size_t first, double s, double d, int way, Lane lane, double slowest, double fastest)
+    {
+        constexpr double kBehind = 14, kBeforeEnd = 2;
+        KeyedRandom r(site_.seed, {kSpeeds, lane, uint64_t(s * 16)});
+        MovingThing thing{.s = s,
+                          .d = d,
+                          .way = way,
+                          .lane = lane,
+                          .speed = r.uniform(slowest, fastest),
+                          .low = -kBehind,
+                          .high = road_.length() - kBeforeEnd,
+                          .stays = way > 0};
+        for (size_t id = first; id < m_.objects().size(); ++id)
+            thing.objects.push_back(uint32_t(id));
+        site_.moving.push_back(std::move(thing));
     }
 
     void parked(int side)
@@ -118,7 +138,9 @@ class Traffic {
             KeyedRandom r(site_.seed, {kTram});
             s = r.uniform(40, 62);
             if (s + 16 < road_.length()) {
+                const size_t first = m_.objects().size();
                 add_tram(m_, place(s, c_.lane / 2, true), r);
+                may_move(first, s, c_.lane / 2, -1, kOncomingLane, 7, 9);
                 ++site_.objects["tram"];
             }
             s += 20;
@@ -131,6 +153,7 @@ class Traffic {
                 break;
             const Frame f = place(s, d, true);
             const double kind = r.uniform();
+            const size_t first = m_.objects().size();
             if (kind < 0.45)
                 car(f, r);
             else if (kind < 0.58)
@@ -141,6 +164,8 @@ class Traffic {
             } else {
                 ride(f, kind < 0.88, r);
             }
+            const bool bicycle = kind >= 0.88, heavy = kind >= 0.45 && kind < 0.76;
+            may_move(first, s, d, -1, kOncomingLane, bicycle ? 4.5 : 7, bicycle ? 6.5 : heavy ? 9.5 : 12);
             s += half;
         }
     }
@@ -157,8 +182,12 @@ class Traffic {
             for (int side : {1, -1}) {
                 KeyedRandom r(site_.seed, {kOncoming, 1000 + i, uint64_t(side > 0)});
                 const double s = double(i) * 31 + 12 + r.uniform(0, 14);
-                if (r.chance(0.6) && s < road_.length() - 3)
-                    ride(place(s, side * (c_.lane + c_.cycle / 2), side > 0), false, r);
+                if (!r.chance(0.6) || s >= road_.length() - 3)
+                    continue;
+                const double d = side * (c_.lane + c_.cycle / 2);
+                const size_t first = m_.objects().size();
+                ride(place(s, d, side > 0), false, r);
+                may_move(first, s, d, -side, side > 0 ? kLeftCycleLane : kRightCycleLane, 3.5, 6.5);
             }
     }
 

@@ -110,15 +110,16 @@ float texture_density(const std::array<std::array<float, 2>, 3>& uv, float area2
     return area2 > 0 ? std::sqrt(std::abs(u1 * v2 - u2 * v1) / area2) : 0;
 }
 
-// source: the face's number in tables
-void add_triangle(TraceTables& t, const Mesh& m, const Neighbours& around, uint32_t face, uint32_t source)
+// source: the face's number in tables; owner: of the thing
+void add_triangle(TraceTables& t, const Mesh& m, const Neighbours& around, uint32_t face, uint32_t source,
+                  uint32_t owner)
 {
     const auto& f = m.faces[face];
     const Float3 a = m.positions[f[0]], e1 = minus(m.positions[f[1]], a), e2 = minus(m.positions[f[2]], a);
     const uint32_t material = m.face_materials.empty() ? 0 : m.face_materials[face];
     const uint32_t label = m.face_labels.empty() ? kNoLabel : m.face_labels[face];
     t.triangles.push_back({bits(a[0]), bits(a[1]), bits(a[2]), source, bits(e1[0]), bits(e1[1]), bits(e1[2]), material,
-                           bits(e2[0]), bits(e2[1]), bits(e2[2]), label});
+                           bits(e2[0]), bits(e2[1]), bits(e2[2]), label | owner << 8});
     const Float3 area = area_normal(m, face), flat = unit(area);
     std::array<std::array<float, 2>, 3> uv{};
     if (!m.uvs.empty())
@@ -204,7 +205,8 @@ void add_materials(TraceTables& t, const Mesh& mesh, std::span<const float> glos
 
 } // namespace
 
-TraceTables trace_tables(const Mesh& whole, std::span<const float> gloss, std::span<const uint32_t> faces)
+TraceTables trace_tables(const Mesh& whole, std::span<const float> gloss, std::span<const uint32_t> faces,
+                         std::span<const uint32_t> owners)
 {
     std::vector<uint32_t> chosen(faces.begin(), faces.end());
     const bool all = chosen.empty();
@@ -227,8 +229,10 @@ TraceTables trace_tables(const Mesh& whole, std::span<const float> gloss, std::s
     TraceTables t{.nodes = std::move(bvh.nodes)};
     t.triangles.reserve(chosen.size());
     t.corners.reserve(chosen.size());
-    for (uint32_t i : bvh.order)
-        add_triangle(t, mesh, around, chosen[i], cut ? parts.sources[chosen[i]] : chosen[i]);
+    for (uint32_t i : bvh.order) {
+        const uint32_t source = cut ? parts.sources[chosen[i]] : chosen[i];
+        add_triangle(t, mesh, around, chosen[i], source, owners.empty() ? 0 : owners[source]);
+    }
     add_materials(t, mesh, gloss);
     return t;
 }

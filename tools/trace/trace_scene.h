@@ -22,8 +22,10 @@ struct TraceTables {
     std::vector<uint32_t> texels = {}; // all levels of all pictures
 };
 
-// the faces that are named, all if none are; gloss: of each material, 0 if empty. The mesh must pass check_mesh.
-TraceTables trace_tables(const Mesh& mesh, std::span<const float> gloss, std::span<const uint32_t> faces = {});
+// the faces that are named, all if none are; gloss: of each material, 0 if empty; owners: of each face of the mesh the
+// number of the thing that it is of, below 2^22 (its bits are never a NaN), 0 if empty. The mesh must pass check_mesh.
+TraceTables trace_tables(const Mesh& mesh, std::span<const float> gloss, std::span<const uint32_t> faces = {},
+                         std::span<const uint32_t> owners = {});
 
 // the same on a device
 class DeviceTraceScene {

@@ -61,12 +61,22 @@ Daylight daylight_of_seed(uint64_t seed)
 Status write_traced_image(const Path& folder, uint32_t number, const TracedImage& t)
 {
     const std::string name = fmt::format("{:06}.png", number);
-    for (const char* kind : {"color", "depth", "normal", "label", "visible"})
+    for (const char* kind : {"color", "depth", "normal", "label", "instance", "visible"})
         SR_CHECK(make_folder(folder / kind));
+    std::vector<uint16_t> depth, instance;
+    for (const float metres : t.depth) // what 16 bits cannot hold is not measured
+        depth.push_back(metres < 65.5345f ? uint16_t(std::lround(metres * 1000.f)) : uint16_t(0));
+    for (const uint32_t thing : t.instance) {
+        if (thing > UINT16_MAX)
+            return fail(ErrorCode::bad_input, "{}: a picture of instances holds numbers up to {}, found {}",
+                        quote_path(folder / "instance" / name), UINT16_MAX, thing);
+        instance.push_back(uint16_t(thing));
+    }
     SR_CHECK(write_png_rgb8(folder / "color" / name, t.width, t.height, t.color));
-    SR_CHECK(write_png_gray16(folder / "depth" / name, t.width, t.height, t.depth));
+    SR_CHECK(write_png_gray16(folder / "depth" / name, t.width, t.height, depth));
     SR_CHECK(write_png_rgb8(folder / "normal" / name, t.width, t.height, t.normal));
     SR_CHECK(write_png_gray8(folder / "label" / name, t.width, t.height, t.label));
+    SR_CHECK(write_png_gray16(folder / "instance" / name, t.width, t.height, instance));
     return write_png_gray8(folder / "visible" / name, t.width, t.height, t.visible);
 }
 
@@ -98,9 +108,9 @@ Result<TracedImage> Tracer::render(const CameraFrame& frame, const Daylight& lig
             image.color.push_back(uint8_t(color >> (8 * c)));
             image.normal.push_back(direction_byte(normal, c));
         }
-        // what 16 bits cannot hold is not measured
-        image.depth.push_back(depth < 65.5345f ? uint16_t(std::lround(depth * 1000.f)) : uint16_t(0));
+        image.depth.push_back(depth);
         image.label.push_back(uint8_t(label));
+        image.instance.push_back(label >> 8);
         image.visible.push_back(depth > 0 ? 255 : 0);
     }
     return image;

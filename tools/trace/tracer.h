@@ -23,15 +23,16 @@ struct Daylight {
 // a daylight for a seed: from morning to evening, more or less cloudy
 Daylight daylight_of_seed(uint64_t seed);
 
-// one frame, in the encodings that `render` writes (engine/deferred/frame_images.h); where there is sky: depth 0,
-// normal 128, label 10, visible 0
+// one frame, but for depth in the encodings that `render` writes (engine/deferred/frame_images.h); where there is sky:
+// depth 0, normal 128, label 10, visible 0
 struct TracedImage {
     uint32_t width = 0, height = 0;
     std::vector<uint8_t> color = {}, normal = {}, label = {}, visible = {}; // color and normal [height, width, 3]
-    std::vector<uint16_t> depth = {};                                       // millimetres
+    std::vector<float> depth = {};                                          // metres along the axis
+    std::vector<uint32_t> instance = {};                                    // number of the thing, 0: none
 };
 
-// FOLDER/{color,depth,normal,label,visible}/NNNNNN.png; folders are made. Errors: bad_input
+// FOLDER/{color,depth,normal,label,instance,visible}/NNNNNN.png; folders are made. Errors: bad_input
 Status write_traced_image(const Path& folder, uint32_t number, const TracedImage& image);
 
 // Pictures of one size of a scene, which must outlive it.

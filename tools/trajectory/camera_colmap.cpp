@@ -139,12 +139,13 @@ Result<CameraPath> read_colmap(const Path& folder)
     return path;
 }
 
-std::string colmap_picture_name(const std::string& camera, uint32_t number, size_t cameras)
+std::string colmap_picture_name(const std::string& camera, uint32_t number, size_t cameras, std::string_view extension)
 {
-    return cameras > 1 ? fmt::format("{0}/{0}_{1:06}.png", camera, number) : picture_name(camera, "color", number);
+    return cameras > 1 ? fmt::format("{0}/{0}_{1:06}.{2}", camera, number, extension)
+                       : picture_name(camera, "color", number, extension);
 }
 
-Status write_colmap(const Path& folder, const CameraPath& cameras, const Splats& points)
+Status write_colmap(const Path& folder, const CameraPath& cameras, const Splats& points, std::string_view extension)
 {
     SR_ASSERT(!cameras.frames.empty(), "a trajectory without frames");
     if (is_there(folder / "cameras.bin"))
@@ -168,7 +169,7 @@ Status write_colmap(const Path& folder, const CameraPath& cameras, const Splats&
         fmt::format_to(std::back_inserter(image_text), "{} {} {} {} {} {}\n\n", ++image, q[3],
                        fmt::join(std::span(q).first(3), " "),
                        fmt::join(translation_of(frame.pose.world_to_camera), " "), id,
-                       colmap_picture_name(frame.camera, counts[frame.camera]++, counts.size()));
+                       colmap_picture_name(frame.camera, counts[frame.camera]++, counts.size(), extension));
     }
     std::error_code error;
     const bool made = std::filesystem::create_directories(folder, error);

@@ -67,9 +67,11 @@ Status write_camera_path_json(const Path& path, const CameraPath& cameras);
 Result<CameraPath> read_colmap(const Path& folder);
 // The text model; bad_input where a binary model is in the folder. Pictures of one camera are named as `render` names
 // them; of several, front/front_000000.png: loaders that take the last part of a name keep them apart. Of `points`,
-// positions and colours go to points3D.txt, where training begins.
-Status write_colmap(const Path& folder, const CameraPath& cameras, const Splats& points = {});
-std::string colmap_picture_name(const std::string& camera, uint32_t number, size_t cameras);
+// positions and colours go to points3D.txt, where training begins. extension: of the pictures, png or jpg
+Status write_colmap(const Path& folder, const CameraPath& cameras, const Splats& points = {},
+                    std::string_view extension = "png");
+std::string colmap_picture_name(const std::string& camera, uint32_t number, size_t cameras,
+                                std::string_view extension = "png");
 // bad_input for a file of such a model, which is read as a folder; its names are cameras.bin, images.txt and the like
 Status refuse_colmap_file(const Path& path);
 

@@ -30,6 +30,7 @@ Status Picture::make_buffers()
     SR_TRY(depth_, gpu_.buffer(pixels * 8, usage, false));
     SR_TRY(label_, gpu_.buffer(pixels * 8, usage, false));
     SR_TRY(refined_, gpu_.buffer(pixels * 4, usage, false));
+    SR_TRY(instance_, gpu_.buffer(pixels * 4, usage, false));
     SR_TRY(copied_, gpu_.buffer(pixels * 4, usage, true));
     SR_TRY(palette_, gpu_.buffer(SR_CLASSES * 16, usage, true));
     auto* colors = static_cast<float*>(palette_->mapped);
@@ -40,7 +41,7 @@ Status Picture::make_buffers()
             colors[4 * label + c] = float(rgb[c]) / 255;
     }
     SR_TRY(set_, shading_.set({color_->handle, normal_->handle, depth_->handle, label_->handle, refined_->handle,
-                               palette_->handle}));
+                               palette_->handle, instance_->handle}));
     return {};
 }
 
@@ -66,6 +67,7 @@ void Picture::aim(sr_draw_desc& draw) const
     draw.normal.buffer = normal_->handle;
     draw.depth.buffer = depth_->handle;
     draw.label.buffer = label_->handle;
+    draw.instance.buffer = instance_->handle;
 }
 
 sr_target Picture::refined() const

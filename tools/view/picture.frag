@@ -19,9 +19,10 @@ layout(binding = 2) readonly buffer Depth { vec2 depth[]; };
 layout(binding = 3) readonly buffer Label { uvec2 label[]; };
 layout(binding = 4) readonly buffer Refined { uint refined[]; };
 layout(binding = 5) readonly buffer Palette { vec4 palette[]; };
+layout(binding = 6) readonly buffer Instance { uint instance[]; };
 layout(location = 0) out vec4 picture;
 
-const uint kColor = 0, kDepth = 1, kNormal = 2, kLabels = 3, kCells = 4, kRefined = 5;
+const uint kColor = 0, kDepth = 1, kNormal = 2, kLabels = 3, kCells = 4, kRefined = 5, kInstances = 6;
 const vec3 kSky = vec3(0.62, 0.74, 0.86), kMark = vec3(1, 0.85, 0.1);
 
 vec3 to_world(vec3 v)
@@ -51,6 +52,14 @@ vec3 class_color(uint n)
     return label[n].x < palette.length() ? palette[label[n].x].rgb : kSky;
 }
 
+// neighbours in number are far apart in hue
+vec3 instance_color(uint n)
+{
+    const float hue = fract(0.618034 * float(instance[n]));
+    const vec3 c = clamp(abs(fract(hue + vec3(0, 2, 1) / 3) * 6 - 3) - 1, 0, 1);
+    return instance[n] == 0 ? vec3(0.2) : mix(vec3(1), c, 0.7) * (0.6 + 0.4 * fract(0.381966 * float(instance[n])));
+}
+
 vec3 shade(uint n, vec3 place, vec3 facing)
 {
     const bool seen = depth[n].y > 0;
@@ -61,6 +70,8 @@ vec3 shade(uint n, vec3 place, vec3 facing)
         return seen ? normalize(normal[n].xyz) * vec3(0.5, -0.5, -0.5) + 0.5 : vec3(0);
     case kLabels:
         return class_color(n);
+    case kInstances:
+        return instance_color(n);
     case kCells:
         const float border = smoothstep(0.01, 0.04, border_of(place, facing));
         return seen ? class_color(n) * mix(0.45, 0.7 + 0.3 * abs(facing.z), border) : kSky;

@@ -43,7 +43,7 @@ class Picture {
     Gpu& gpu_;
     Shading& shading_;
     uint32_t width_, height_;
-    std::unique_ptr<Buffer> color_, normal_, depth_, label_, refined_, palette_, copied_;
+    std::unique_ptr<Buffer> color_, normal_, depth_, label_, instance_, refined_, palette_, copied_;
     std::unique_ptr<Image> image_;
     VkFramebuffer framebuffer_ = VK_NULL_HANDLE;
     VkDescriptorSet set_ = VK_NULL_HANDLE;

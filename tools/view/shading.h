@@ -9,8 +9,9 @@
 
 namespace semrover::view {
 
-enum class Shown : uint32_t { color, depth, normal, labels, cells, refined }; // numbers as in picture.frag
-constexpr std::array<const char*, 6> kShownNames = {"color", "depth", "normal", "labels", "cells", "refined"};
+enum class Shown : uint32_t { color, depth, normal, labels, cells, refined, instances }; // numbers as in picture.frag
+constexpr std::array<const char*, 7> kShownNames = {"color", "depth",   "normal",   "labels",
+                                                    "cells", "refined", "instances"};
 
 // push constants of picture.frag
 struct Look {
@@ -25,7 +26,7 @@ struct Look {
 };
 
 // The buffers that picture.frag reads, by binding.
-constexpr uint32_t kShadedBuffers = 6;
+constexpr uint32_t kShadedBuffers = 7;
 
 // How a picture is made of what the library draws: render pass and pipeline, for pictures of any size.
 class Shading {

@@ -180,7 +180,7 @@ void add_picture_options(CLI::App& c, ViewArguments& o)
     add_number(c, "--yaw", o.yaw, "degrees to the left of x that the camera looks", -360., 360.);
     add_number(c, "--pitch", o.pitch, "degrees upwards that the camera looks", -88., 88.);
     add_number(c, "--fov-x", o.fov, "degrees across; 73", 5., 150.);
-    add_choice(c, "--show", {"color", "depth", "normal", "labels", "cells"}, "what the picture shows",
+    add_choice(c, "--show", {"color", "depth", "normal", "labels", "cells", "instances"}, "what the picture shows",
                [&r](const auto& word) {
                    r.shown = view::Shown(std::ranges::find(view::kShownNames, word) - view::kShownNames.begin());
                });

@@ -1,0 +1,31 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/job/drawn_scene.h"
+
+#include <map>
+#include <tuple>
+
+namespace semrover {
+
+// One rasterizer for each kind of frame: image size, camera model, and whether the camera moves while it is read out.
+class FrameRasterizers {
+  public:
+    // the scene outlives it
+    FrameRasterizers(Device& device, const DrawnScene& scene, const RasterizerOptions& options)
+        : device_(device), scene_(scene), options_(options)
+    {
+    }
+
+    // for up to as many frames of a kind at a time as the first call has
+    Result<Rasterizer*> of(const CameraFrame& like, uint32_t frames);
+
+  private:
+    Device& device_;
+    const DrawnScene& scene_;
+    RasterizerOptions options_;
+    std::map<std::tuple<uint32_t, uint32_t, CameraModel, bool>, std::unique_ptr<Rasterizer>> rasterizers_;
+};
+
+} // namespace semrover

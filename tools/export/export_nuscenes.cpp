@@ -1,0 +1,250 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+// nuScenes v1.0: v1.0-trainval/*.json, samples/CHANNEL, sweeps/CHANNEL, maps. Every drive is a scene of one of
+// nuScenes' own names, in a log of its own, in a world that is moved so that its map begins at the origin.
+#include "engine/format/image.h"
+#include "engine/scene/palette.h"
+#include "runtime/base/quote.h"
+#include "tools/export/map_mask.h"
+#include "tools/export/nuscenes_scenes.h"
+#include "tools/export/nuscenes_tables.h"
+
+#include <algorithm>
+
+namespace semrover {
+
+namespace {
+
+using OrderedJson = nlohmann::ordered_json;
+
+constexpr int64_t kKeyEvery = 500000, kNearly = 1000; // microseconds between samples, which have annotations
+constexpr double kMapMetres = 0.1;                    // a pixel
+constexpr double kMovingFrom = 0.2;                   // m/s
+
+std::string channel_of(const std::string& camera)
+{
+    std::string name = camera.empty() ? "FRONT" : camera;
+    std::ranges::transform(name, name.begin(),
+                           [](unsigned char c) { return std::isalnum(c) ? char(std::toupper(c)) : '_'; });
+    return "CAM_" + name;
+}
+
+std::array<double, 4> w_first(const Rigid& pose)
+{
+    const Quaternion q = quaternion_of(pose);
+    return {q[3], q[0], q[1], q[2]};
+}
+
+// tokens of the record before and behind, in a row of records
+OrderedJson with_neighbours(OrderedJson record, const std::string& before, const std::string& behind)
+{
+    record["prev"] = before;
+    record["next"] = behind;
+    return record;
+}
+
+class NuscenesScene {
+  public:
+    NuscenesScene(const DriveInput& drive, std::string name, const Path& out, const ExportOptions& options,
+                  NuscenesTables& tables, ExportReport& report)
+        : drive_(drive), name_(std::move(name)), out_(out), options_(options), tables_(tables), report_(report)
+    {
+        for (size_t m = 0; m < drive.record.moments.size(); ++m)
+            if (keys_.empty() ||
+                drive.record.moments[m].time + kNearly >= drive.record.moments[keys_.back()].time + kKeyEvery)
+                keys_.push_back(m);
+    }
+
+    Status write()
+    {
+        for (const Sensor& sensor : drive_.record.sensors)
+            SR_CHECK(check_pinhole(sensor, "nuScenes"));
+        SR_CHECK(add_map());
+        add_scene();
+        for (size_t m = 0; m < drive_.record.moments.size(); ++m)
+            add_pose(m);
+        for (const Sensor& sensor : drive_.record.sensors)
+            SR_CHECK(add_sensor(sensor));
+        add_annotations();
+        return {};
+    }
+
+  private:
+    std::string key(size_t number) const { return fmt::format("{}/{}", name_, number); }
+    std::string sample_token(size_t key_number) const { return NuscenesTables::token("sample", key(key_number)); }
+
+    Status add_map()
+    {
+        SR_TRY(const MapMask mask, map_mask_of(drive_, kMapMetres));
+        moved_[3] = -mask.left;
+        moved_[7] = -mask.bottom;
+        if (!mask.known)
+            report_.warnings.push_back(
+                fmt::format("{} has no labels and depths: its map is empty", quote_path(drive_.folder)));
+        SR_TRY(const auto png, encode_png_gray8(mask.width, mask.height, mask.pixels));
+        const std::string log = tables_.add("log", name_,
+                                            {{"logfile", drive_.name},
+                                             {"vehicle", "semrover"},
+                                             {"date_captured", "1970-01-01"},
+                                             {"location", "semrover"}});
+        const std::string file = fmt::format("maps/{}.png", NuscenesTables::token("map", name_));
+        tables_.add("map", name_,
+                    {{"category", "semantic_prior"}, {"filename", file}, {"log_tokens", OrderedJson::array({log})}});
+        return put_file(out_ / file, png);
+    }
+    void add_scene()
+    {
+        tables_.add(
+            "scene", name_,
+            {{"log_token", NuscenesTables::token("log", name_)},
+             {"nbr_samples", keys_.size()},
+             {"first_sample_token", sample_token(0)},
+             {"last_sample_token", sample_token(keys_.size() - 1)},
+             {"name", name_},
+             {"description", fmt::format("{}, its world moved by {:g}, {:g} m", drive_.name, moved_[3], moved_[7])}});
+        for (size_t i = 0; i < keys_.size(); ++i)
+            tables_.add("sample", key(i),
+                        with_neighbours({{"timestamp", drive_.record.moments[keys_[i]].time},
+                                         {"scene_token", NuscenesTables::token("scene", name_)}},
+                                        i ? sample_token(i - 1) : "", i + 1 < keys_.size() ? sample_token(i + 1) : ""));
+    }
+    void add_pose(size_t moment)
+    {
+        const Rigid pose = compose(moved_, drive_.record.moments[moment].vehicle_to_world);
+        tables_.add("ego_pose", key(moment),
+                    {{"timestamp", drive_.record.moments[moment].time},
+                     {"rotation", w_first(pose)},
+                     {"translation", translation_of(pose)}});
+    }
+    // of a moment: the sample itself, or the next one; behind the last one the last
+    size_t sample_of(size_t moment) const
+    {
+        const auto found = std::ranges::lower_bound(keys_, moment);
+        return std::min(size_t(found - keys_.begin()), keys_.size() - 1);
+    }
+    Status add_sensor(const Sensor& sensor)
+    {
+        const std::string channel = channel_of(sensor.name);
+        const Intrinsics& k = sensor.intrinsics;
+        if (channels_.insert(channel).second == false)
+            return fail(ErrorCode::bad_input, "two cameras of {} would both be {}", quote_path(drive_.folder), channel);
+        tables_.add_once("sensor", channel, {{"channel", channel}, {"modality", "camera"}});
+        tables_.add("calibrated_sensor", name_ + channel,
+                    {{"sensor_token", NuscenesTables::token("sensor", channel)},
+                     {"translation", translation_of(sensor.sensor_to_vehicle)},
+                     {"rotation", w_first(sensor.sensor_to_vehicle)},
+                     {"camera_intrinsic", OrderedJson::array({{k.fx, 0, k.cx}, {0, k.fy, k.cy}, {0, 0, 1}})}});
+        std::vector<std::pair<size_t, size_t>> pictures; // and their moments
+        for (size_t m = 0; m < drive_.of_moments.size(); ++m)
+            for (const size_t picture : drive_.of_moments[m])
+                if (drive_.path.frames[picture].camera == sensor.name)
+                    pictures.emplace_back(picture, m);
+        const auto token = [&](size_t i) { return NuscenesTables::token("sample_data", data_key(channel, i)); };
+        for (size_t i = 0; i < pictures.size(); ++i) {
+            SR_TRY(OrderedJson record, picture_record(pictures[i].first, pictures[i].second, channel, k));
+            tables_.add(
+                "sample_data", data_key(channel, i),
+                with_neighbours(std::move(record), i ? token(i - 1) : "", i + 1 < pictures.size() ? token(i + 1) : ""));
+        }
+        return {};
+    }
+    std::string data_key(const std::string& channel, size_t number) const
+    {
+        return fmt::format("{}/{}/{}", name_, channel, number);
+    }
+    Result<OrderedJson> picture_record(size_t picture, size_t moment, const std::string& channel, const Intrinsics& k)
+    {
+        const int64_t time = drive_.record.moments[moment].time;
+        const bool is_key = std::ranges::binary_search(keys_, moment);
+        const std::string file =
+            fmt::format("{0}/{1}/{2}__{1}__{3:016}.jpg", is_key ? "samples" : "sweeps", channel, name_, time);
+        SR_TRY(const auto color, color_file(drive_, picture, true, options_.quality));
+        SR_CHECK(put_file(out_ / file, color));
+        ++report_.pictures;
+        return OrderedJson{{"sample_token", sample_token(sample_of(moment))},
+                           {"ego_pose_token", NuscenesTables::token("ego_pose", key(moment))},
+                           {"calibrated_sensor_token", NuscenesTables::token("calibrated_sensor", name_ + channel)},
+                           {"timestamp", time},
+                           {"fileformat", "jpg"},
+                           {"is_key_frame", is_key},
+                           {"height", k.height},
+                           {"width", k.width},
+                           {"filename", file}};
+    }
+    // of what cameras see at samples
+    void add_annotations()
+    {
+        for (const Track& track : drive_.tracks()) {
+            const char* category = nuscenes_category(track.label);
+            std::vector<size_t> places;
+            for (size_t i = 0; i < track.places.size(); ++i)
+                if (std::ranges::binary_search(keys_, track.places[i].moment))
+                    places.push_back(i);
+            if (!category)
+                report_.left_out[label_name(track.label)] += places.size();
+            if (!category || places.empty())
+                continue;
+            const auto token = [&](size_t i) {
+                return NuscenesTables::token("sample_annotation", fmt::format("{}/{}/{}", name_, track.id, i));
+            };
+            const std::string instance = tables_.add("instance", key(track.id),
+                                                     {{"category_token", NuscenesTables::token("category", category)},
+                                                      {"nbr_annotations", places.size()},
+                                                      {"first_annotation_token", token(0)},
+                                                      {"last_annotation_token", token(places.size() - 1)}});
+            for (size_t i = 0; i < places.size(); ++i)
+                tables_.add("sample_annotation", fmt::format("{}/{}/{}", name_, track.id, i),
+                            with_neighbours(annotation(track, places[i], instance), i ? token(i - 1) : "",
+                                            i + 1 < places.size() ? token(i + 1) : ""));
+            report_.boxes += places.size();
+        }
+    }
+    OrderedJson annotation(const Track& track, size_t place, const std::string& instance) const
+    {
+        const Track::Place& at = track.places[place];
+        const Rigid pose = compose(moved_, at.pose);
+        const bool moves_now = drive_.speed(track, place) > kMovingFrom;
+        const char* attribute = nuscenes_attribute(track.label, moves_now, track.moves());
+        return {{"sample_token", sample_token(sample_of(at.moment))},
+                {"instance_token", instance},
+                {"visibility_token", nuscenes_visibility(at.shown)},
+                {"attribute_tokens", OrderedJson::array({NuscenesTables::token("attribute", attribute)})},
+                {"translation", translation_of(pose)},
+                {"size", {track.size[1], track.size[0], track.size[2]}},
+                {"rotation", w_first(pose)},
+                {"num_lidar_pts", 0},
+                {"num_radar_pts", 0}};
+    }
+
+    const DriveInput& drive_;
+    std::string name_;
+    const Path& out_;
+    const ExportOptions& options_;
+    NuscenesTables& tables_;
+    ExportReport& report_;
+    std::vector<size_t> keys_; // moments that are samples
+    std::set<std::string> channels_;
+    Rigid moved_ = kIdentity; // the drive's world to that of the map
+};
+
+} // namespace
+
+Result<ExportReport> export_nuscenes(std::span<const DriveInput> drives, const Path& out, const ExportOptions& options)
+{
+    const std::vector<std::string> train = nuscenes_train_scenes(), val = nuscenes_val_scenes();
+    const size_t test = std::min<size_t>(options.val, drives.size()), most = train.size();
+    if (drives.size() - test > most || test > val.size())
+        return fail(ErrorCode::usage, "{} drives and {} for `val`: nuScenes has {} and {} scenes", drives.size() - test,
+                    test, most, val.size());
+    ExportReport report;
+    NuscenesTables tables;
+    for (size_t i = 0; i < drives.size(); ++i) {
+        const size_t trained = drives.size() - test;
+        const std::string& name = i < trained ? train[i] : val[i - trained];
+        SR_CHECK(NuscenesScene(drives[i], name, out, options, tables, report).write());
+    }
+    SR_CHECK(tables.write(out / "v1.0-trainval"));
+    return report;
+}
+
+} // namespace semrover
