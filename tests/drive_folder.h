@@ -3,9 +3,12 @@
 #pragma once
 
 #include "engine/annotation/box_lines.h"
+#include "engine/format/npy.h"
 #include "engine/format/transforms.h"
+#include "engine/scene/palette.h"
 
 #include <cmath>
+#include <gtest/gtest.h>
 #include <numbers>
 
 namespace semrover {
@@ -21,7 +24,10 @@ struct DriveFolder {
     };
     double meters_a_moment = 0.5; // of object 7, along x
     double seconds_a_moment = 0.1;
-    bool jpeg = false;
+    bool jpeg = false, lidar = false;
+
+    // 0.4 m above the cameras, turned
+    static Rigid lidar_mount() { return {0, 1, 0, 0.9, -1, 0, 0, 0, 0, 0, 1, 2, 0, 0, 0, 1}; }
 
     static std::vector<Sensor> sensors()
     {
@@ -44,7 +50,7 @@ struct DriveFolder {
             vehicle.frames.push_back(
                 {2 + seconds_a_moment * double(i), "", {inverse(compose(pose, kForwardCamera))}, {}});
         }
-        return expand_rig({PathAxes::camera, sensors()}, vehicle);
+        return *expand_rig({PathAxes::camera, sensors()}, vehicle);
     }
     std::vector<PlacedObject> placed_at(size_t moment) const
     {
@@ -62,15 +68,69 @@ struct DriveFolder {
         const CameraPath cameras = path(moments);
         const DriveRecord record = drive_record_of(cameras, kMillimetre).value();
         std::filesystem::create_directories(folder);
-        write_drive_record(folder, record).value();
-        write_transforms(folder / "transforms.json", cameras).value();
+        must(write_drive_record(folder, record));
+        must(write_transforms(folder / "transforms.json", cameras));
         std::string boxes;
         for (size_t i = 0; i < cameras.frames.size(); ++i)
             boxes += write_pictures(folder, cameras.frames[i], record.pictures[i], i / sensors().size(), record) + "\n";
-        write_file_atomically(folder / kBoxesName, boxes).value();
+        must(write_file_atomically(folder / kBoxesName, boxes));
+        if (lidar)
+            write_lidar(folder / "top", record);
     }
 
   private:
+    static void must(const Status& status) { EXPECT_TRUE(status) << status.error().message; }
+    // rays 1.5 degrees apart, as far as 40 m
+    void write_lidar(const Path& folder, const DriveRecord& record) const
+    {
+        Json sweeps = Json::array();
+        std::filesystem::create_directories(folder / "points");
+        for (size_t m = 0; m < record.moments.size(); ++m) {
+            const Rigid to_world = compose(record.moments[m].vehicle_to_world, lidar_mount());
+            std::vector<float> rows;
+            for (int ring = 0; ring < 12; ++ring)
+                for (int column = 0; column < 240; ++column) {
+                    const double up = -0.025 * ring, turn = column * std::numbers::pi / 120;
+                    const Point3 ray = {std::cos(up) * std::cos(turn), std::cos(up) * std::sin(turn), std::sin(up)};
+                    const auto [far, number] = cast(to_world, ray, placed_at(m));
+                    if (far < 40)
+                        for (const double v :
+                             {ray[0] * far, ray[1] * far, ray[2] * far, 0.5, double(ring), 0.0, 0.0, double(number)})
+                            rows.push_back(float(v));
+                }
+            const auto bytes = std::as_bytes(std::span(rows));
+            must(write_file_atomically(folder / "points" / fmt::format("{:06}.npy", m),
+                                       encode_npy({DType::f32, {rows.size() / 8, 8}, {bytes.begin(), bytes.end()}})));
+            sweeps.push_back(
+                {{"time", record.moments[m].time}, {"duration", 100000}, {"begin", to_world}, {"end", to_world}});
+        }
+        must(write_file_atomically(folder / "sweeps.json",
+                                   Json{{"format", "semrover.sweeps"}, {"version", 1}, {"sweeps", sweeps}}.dump()));
+    }
+    // metres to the first thing, and its number
+    static std::pair<double, uint32_t> cast(const Rigid& to_world, const Point3& ray,
+                                            std::span<const PlacedObject> there)
+    {
+        const Point3 from = translation_of(to_world), at = transform(to_world, ray);
+        std::pair<double, uint32_t> first{at[2] < from[2] ? from[2] / (from[2] - at[2]) : INFINITY, 0};
+        for (const PlacedObject& o : there)
+            if (const auto met = meets(compose(inverse(to_world), o.box.pose), o.box.size, ray); met < first.first)
+                first = {met, o.id + 1};
+        return first;
+    }
+    static double meets(const Rigid& box, const std::array<double, 3>& size, const Point3& ray)
+    {
+        const Rigid to_box = inverse(box);
+        const Point3 from = translation_of(to_box), at = transform(to_box, ray);
+        double enter = 0, leave = INFINITY;
+        for (size_t a = 0; a < 3; ++a) {
+            const double step = at[a] - from[a], low = (-size[a] / 2 - from[a]) / step,
+                         high = (size[a] / 2 - from[a]) / step;
+            enter = std::max(enter, std::min(low, high));
+            leave = std::min(leave, std::max(low, high));
+        }
+        return enter < leave ? enter : INFINITY;
+    }
     std::string write_pictures(const Path& folder, const CameraFrame& frame, const DriveRecord::Picture& picture,
                                size_t moment, const DriveRecord& record) const
     {
@@ -120,14 +180,13 @@ struct DriveFolder {
         std::vector<uint16_t> millimetres, instances(numbers.begin(), numbers.end());
         for (const double metres : depths)
             millimetres.push_back(uint16_t(std::lround(metres * 1000)));
-        write_png_gray16(file("depth", "png"), k.width, k.height, millimetres).value();
-        write_png_gray16(file("instance", "png"), k.width, k.height, instances).value();
-        write_png_gray8(file("label", "png"), k.width, k.height, labels).value();
+        must(write_png_gray16(file("depth", "png"), k.width, k.height, millimetres));
+        must(write_png_gray16(file("instance", "png"), k.width, k.height, instances));
+        must(write_png_gray8(file("label", "png"), k.width, k.height, labels));
         if (jpeg)
-            write_file_atomically(file("color", "jpg"), encode_jpeg_rgb8(k.width, k.height, colors, 90).value())
-                .value();
+            must(write_file_atomically(file("color", "jpg"), encode_jpeg_rgb8(k.width, k.height, colors, 90).value()));
         else
-            write_png_rgb8(file("color", "png"), k.width, k.height, colors).value();
+            must(write_png_rgb8(file("color", "png"), k.width, k.height, colors));
     }
 };
 

@@ -50,7 +50,7 @@ double largest_difference(const Rigid& a, const Rigid& b)
 TEST(engine_drive_record, comes_back_from_its_files_with_the_same_lenses_places_and_times)
 {
     const ScratchFolder folder;
-    const CameraPath path = expand_rig(two_cameras(), forward_path(7));
+    const CameraPath path = *expand_rig(two_cameras(), forward_path(7));
     const DriveRecord record = *drive_record_of(path, 0.01);
     ASSERT_TRUE(write_drive_record(folder.path(), record));
     const auto back = read_drive_record(folder.path());
@@ -99,7 +99,7 @@ TEST(engine_drive_record, has_the_vehicle_where_a_camera_without_a_rig_is)
 TEST(engine_drive_record, finds_where_cameras_sit_from_their_poses)
 {
     const Rig rig = two_cameras();
-    CameraPath path = expand_rig(rig, forward_path(4));
+    CameraPath path = *expand_rig(rig, forward_path(4));
     path.sensors.clear();
     const auto record = drive_record_of(path, 0.001);
     ASSERT_TRUE(record) << record.error().message;
@@ -121,7 +121,7 @@ TEST(engine_drive_record, says_what_it_cannot_hold)
     path = forward_path(3);
     path.frames[2].time = path.frames[1].time;
     EXPECT_EQ(refusal(path), "times do not ascend: 1000200000 us of the camera come after 1000200000");
-    path = expand_rig(two_cameras(), forward_path(3));
+    path = *expand_rig(two_cameras(), forward_path(3));
     path.frames[3].pose.world_to_camera[3] += 0.01;
     EXPECT_EQ(refusal(path), "camera 'wide' changes its place on the vehicle");
 }

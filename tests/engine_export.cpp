@@ -28,14 +28,16 @@ class Export : public testing::Test {
   protected:
     Export()
     {
-        DriveFolder().write(folder_ / "one", kMoments);
+        DriveFolder first;
+        first.lidar = true;
+        first.write(folder_ / "one", kMoments);
         DriveFolder second;
         second.jpeg = true;
         second.meters_a_moment = 0;
         second.write(folder_ / "second", kMoments);
         EXPECT_TRUE(pack_shards(folder_ / "second", folder_ / "two"));
     }
-    ExportReport run(Exporter exporter, const Path& out, size_t drives = 2, ExportOptions options = {}) const
+    ExportReport run(Exporter exporter, const std::string& out, size_t drives = 2, ExportOptions options = {}) const
     {
         std::vector<DriveInput> inputs;
         for (const char* name : {"one", "two"}) {
@@ -49,7 +51,7 @@ class Export : public testing::Test {
         EXPECT_TRUE(report) << report.error().message;
         return report ? std::move(*report) : ExportReport{};
     }
-    std::map<std::string, std::string> files(const Path& out) const
+    std::map<std::string, std::string> files(const std::string& out) const
     {
         std::map<std::string, std::string> all;
         for (const Path& path : list_tree(folder_ / out).value())
@@ -97,10 +99,10 @@ TEST_F(Export, nuscenes_is_as_its_schema_says)
     const Path tables = folder_ / "nu" / "v1.0-trainval";
     const Json scenes = NuscenesSchema::table(tables, "scene");
     ASSERT_EQ(scenes.size(), 2u);
-    EXPECT_EQ(scenes[0]["name"], "scene-0001"); // of train
-    EXPECT_EQ(scenes[1]["name"], "scene-0003"); // of val
-    EXPECT_EQ(scenes[0]["nbr_samples"], 3);     // at 0, 0.5 and 1 s
-    EXPECT_EQ(NuscenesSchema::table(tables, "sensor").size(), 2u);
+    EXPECT_EQ(scenes[0]["name"], "scene-0001");                    // of train
+    EXPECT_EQ(scenes[1]["name"], "scene-0003");                    // of val
+    EXPECT_EQ(scenes[0]["nbr_samples"], 3);                        // at 0, 0.5 and 1 s
+    EXPECT_EQ(NuscenesSchema::table(tables, "sensor").size(), 3u); // with the lidar of the first drive
     EXPECT_EQ(report.left_out, (std::map<std::string, size_t>{{"building", 6}}));
 }
 
@@ -381,6 +383,67 @@ TEST_F(Export, folders_to_train_from_name_the_pictures_that_are_there)
         EXPECT_TRUE(frame.picture.ends_with(".jpg")) << frame.picture; // as its bytes are
         EXPECT_TRUE(fs::exists(folder_ / "co/images" / frame.picture));
     }
+}
+
+// points of scans: in the boxes of what they are of, in every layout's own axes
+TEST_F(Export, puts_a_lidars_points_where_things_are)
+{
+    const DriveFolder drive;
+    run(export_nuscenes, "nu", 1);
+    run(export_kitti, "kitti", 1);
+    run(export_drivestudio, "ds", 1);
+    const auto floats = [](const Path& path, size_t columns) {
+        const std::string bytes = contents(path);
+        EXPECT_EQ(bytes.size() % (4 * columns), 0u) << path;
+        std::vector<float> values(bytes.size() / 4);
+        std::memcpy(values.data(), bytes.data(), bytes.size());
+        return values;
+    };
+    // the devkit's way: of a key frame, with numbers of the tables alone
+    const Path tables = folder_ / "nu" / "v1.0-trainval";
+    size_t in_boxes = 0;
+    for (const Json& a : NuscenesSchema::table(tables, "sample_annotation"))
+        in_boxes += a["num_lidar_pts"].get<size_t>();
+    size_t of_objects = 0;
+    for (const size_t moment : {0, 5, 10}) {
+        const auto ours = read_scan(folder_ / "one/top/points" / fmt::format("{:06}.npy", moment)).value();
+        for (const ScanPoint& p : ours)
+            of_objects += p[7] == 4 || p[7] == 8 || p[7] == 13; // two cars and a person
+        const auto theirs = floats(folder_ / "nu/samples/LIDAR_TOP" /
+                                       fmt::format("scene-0001__LIDAR_TOP__{:016}.pcd.bin", 2000000 + moment * 100000),
+                                   5);
+        ASSERT_EQ(theirs.size(), 5 * ours.size());
+        EXPECT_EQ(theirs[3], 127.5f);
+    }
+    EXPECT_GT(in_boxes, 20u);
+    EXPECT_NEAR(double(in_boxes), double(of_objects), 0.1 * double(of_objects)); // on a box' face: either side
+    // KITTI: through the calibration to the picture
+    const std::string calib = contents(folder_ / "kitti/training/calib/000003.txt");
+    const auto line = [&](const char* key) {
+        const size_t at = calib.find(key) + std::string(key).size();
+        return numbers_in(calib.substr(at, calib.find('\n', at) - at));
+    };
+    const std::vector<double> p = line("P2: "), tr = line("Tr_velo_to_cam: ");
+    const Rigid to_camera = rigid_from_matrix(tr, "Tr").value();
+    const auto depth = read_png_gray16(folder_ / "one/front/depth/000003.png");
+    const auto velodyne = floats(folder_ / "kitti/training/velodyne/000003.bin", 4);
+    const auto ego = matrix_in(contents(folder_ / "ds/000/ego_pose/003.txt"));
+    const auto studio = floats(folder_ / "ds/000/lidar/003.bin", 14);
+    ASSERT_EQ(studio.size() / 14, velodyne.size() / 4);
+    size_t compared = 0, near = 0;
+    for (size_t i = 0; i < velodyne.size() / 4; ++i) {
+        const Point3 at = transform(to_camera, {velodyne[4 * i], velodyne[4 * i + 1], velodyne[4 * i + 2]});
+        const Point3 world = transform(ego, {studio[14 * i + 3], studio[14 * i + 4], studio[14 * i + 5]});
+        EXPECT_GT(world[2], -1e-3); // nothing lies below the road
+        const double x = (p[0] * at[0] + p[2] * at[2]) / at[2] + 0.5, y = (p[5] * at[1] + p[6] * at[2]) / at[2] + 0.5;
+        if (at[2] < 1 || x < 1 || y < 1 || x > 158 || y > 94)
+            continue;
+        ++compared;
+        const double seen = depth->pixels[size_t(y) * 160 + size_t(x)] * 0.001;
+        near += std::abs(seen - at[2]) < 0.05 * at[2];
+    }
+    EXPECT_GT(compared, 200u);
+    EXPECT_GT(double(near), 0.9 * double(compared)); // others lie where the camera does not see
 }
 
 TEST_F(Export, refuses_what_a_layout_has_no_place_for)

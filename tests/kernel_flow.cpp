@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/camera/lens.h"
 #include "engine/format/flow_picture.h"
+#include "engine/format/image.h"
 #include "engine/splat/rasterizer.h"
 #include "kernels/picture.h"
 #include "tests/kernel_case.h"
@@ -160,7 +161,7 @@ TEST(kernel_flow, matches_every_pixel_in_double_through_every_lens)
         }
         EXPECT_LE(worst, 1e-3);
         for (size_t state = 0; state < states.size(); ++state)
-            EXPECT_GT(states[state], 20u) << state;
+            EXPECT_EQ(states[state] > 20, !(panorama && state == 3)) << state; // nothing leaves a panorama
     }
 }
 

@@ -51,7 +51,7 @@ SplatImages on_device(KernelCase& k, const SplatImage& image)
         depth.insert(depth.end(), {image.depth_expected[i], 0});
         ids.insert(ids.end(), {image.label[i], 5});
     }
-    return {k.input(color, 4), k.input(surface, 4), k.input(depth, 2), k.input(ids, 2), {}, {}};
+    return {k.input(color, 4), k.input(surface, 4), k.input(depth, 2), k.input(ids, 2), {}, {}, {}};
 }
 
 TEST(kernel_picture, splats_become_the_bytes_that_files_of_them_hold)

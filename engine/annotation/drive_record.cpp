@@ -164,11 +164,6 @@ const DriveRecord::Moment* DriveRecord::moment(int64_t time) const
     return found == moments.end() || found->time != time ? nullptr : &*found;
 }
 
-int64_t microseconds(double seconds)
-{
-    return std::llround(seconds * 1e6);
-}
-
 Result<DriveRecord> drive_record_of(const CameraPath& path, double depth_unit)
 {
     DriveRecord record;
@@ -180,7 +175,7 @@ Result<DriveRecord> drive_record_of(const CameraPath& path, double depth_unit)
     for (const CameraFrame& frame : path.frames) {
         if (!(std::abs(frame.time) <= kLatest))
             return fail(ErrorCode::bad_input, "{} s are no microseconds of 64 bits", frame.time);
-        const int64_t time = microseconds(frame.time);
+        const int64_t time = microseconds_of(frame.time);
         const bool begins = record.moments.empty() || time != record.moments.back().time;
         const auto [before, none] = last.try_emplace(frame.camera, time);
         if ((begins && !record.moments.empty() && time < record.moments.back().time) ||

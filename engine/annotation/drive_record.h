@@ -31,8 +31,6 @@ struct DriveRecord {
     const Moment* moment(int64_t time) const;
 };
 
-int64_t microseconds(double seconds); // rounded
-
 // Of a path through a rig, or of cameras without one: the vehicle then is where the first camera of a moment is, and
 // looks where it looks. bad_input for what such a record cannot hold: times that do not ascend, cameras that change
 // their lens or their place on the vehicle

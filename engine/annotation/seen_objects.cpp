@@ -75,9 +75,7 @@ double occlusion_of(const SeenObject& object, const PlacedBox& box, const BoxPro
 
 PlacedObject placed(const SceneObject& o)
 {
-    const double c = std::cos(o.heading), s = std::sin(o.heading);
-    const auto& at = o.center;
-    return {o.id, o.label, {{c, -s, 0, at[0], s, c, 0, at[1], 0, 0, 1, at[2], 0, 0, 0, 1}, o.size}};
+    return {o.id, o.label, {box_to_world(o), o.size}};
 }
 
 std::vector<SeenObject> seen_objects(const CameraFrame& frame, const InstancePicture& picture,

@@ -154,4 +154,9 @@ bool is_camera_name(std::string_view name)
     return !name.empty() && name.size() <= 64 && name[0] != '.' && std::ranges::all_of(name, allowed);
 }
 
+int64_t microseconds_of(double seconds)
+{
+    return std::llround(seconds * 1e6);
+}
+
 } // namespace semrover

@@ -123,6 +123,7 @@ std::optional<CameraModel> camera_model_of(std::string_view name);
 
 std::string_view name_of(ShutterDirection direction);
 std::optional<ShutterDirection> shutter_direction_of(std::string_view name);
+int64_t microseconds_of(double seconds); // rounded: a time of a frame as files of times have it
 
 struct Projection {
     double x, y;  // pixels

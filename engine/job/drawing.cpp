@@ -51,11 +51,12 @@ Result<DrawnScene> load_scene(Device& device, const DrawingOptions& o)
 
 class DrawingJob : public Job {
   public:
-    DrawingJob(Device& device, DrawingOptions options, DrawnScene scene, std::unique_ptr<DrawingStore> store,
-               std::unique_ptr<Outgoing> out, const JobCallbacks& callbacks)
+    DrawingJob(Device& device, DrawingOptions options, DrawnScene scene, std::unique_ptr<FrameBoxes> boxes,
+               std::unique_ptr<DrawingStore> store, std::unique_ptr<Outgoing> out, const JobCallbacks& callbacks)
         : device_(device), o_(std::move(options)), scene_(std::move(scene)), callbacks_(callbacks),
           drawing_(device, scene_, o_.path, o_.draw.rasterizer(o_.encoding), o_.encoding.flow.has_value()),
-          floats_(device, scene_, {}, float_options(o_.draw), false), store_(std::move(store)), out_(std::move(out))
+          floats_(device, scene_, {}, float_options(o_.draw), false), boxes_(std::move(boxes)),
+          store_(std::move(store)), out_(std::move(out))
     {
         if (drawing_.total()) {
             empty_.emplace(o_.path, o_.scene_name, o_.allow_empty);
@@ -77,8 +78,10 @@ class DrawingJob : public Job {
 
     Result<Json> finish() override
     {
-        if (store_->run().results() && !drew_)
+        if (store_->run().results() && !drew_) {
+            SR_CHECK(store_->restore_boxes());
             return *store_->run().results();
+        }
         const Json results{{"output", o_.folder.string()},
                            {"frames", drawing_.total()},
                            {"splats", scene_.splats.size()},
@@ -181,7 +184,7 @@ class DrawingJob : public Job {
             const uint64_t bytes = pixels.bytes() * (floats ? kFloatsMore : 1);
             return out_->write(bytes, [this, frame, number, floats, pixels = std::move(pixels)]() mutable {
                 mark_sky(pixels, frame);
-                return store_->make(frame.camera, number, pixels, floats.get());
+                return store_->make(frame, number, pixels, floats.get());
             });
         });
     }
@@ -214,6 +217,7 @@ class DrawingJob : public Job {
     std::vector<bool> whole_;                // of each frame of the path
     size_t before_ = 0;                      // how many of them
     bool top_left_ = false, drew_ = false;
+    std::unique_ptr<FrameBoxes> boxes_; // what the store keeps its lines in
     std::unique_ptr<DrawingStore> store_;
     std::unique_ptr<Outgoing> out_; // last: what it writes is of the others
 };
@@ -268,10 +272,15 @@ Result<std::unique_ptr<Job>> begin_drawing(Device& device, DrawingOptions option
     if (const SplatScene& splats = scene.splats; splats.skipped() && callbacks.warning)
         callbacks.warning(fmt::format("{} of {} splats are degenerate and not drawn", splats.skipped(), splats.size()));
     SR_TRY(auto out, Outgoing::create(device, largest_read(o), o.threads));
+    std::unique_ptr<FrameBoxes> boxes;
+    if (o.draw.boxes) {
+        SR_TRY(boxes, FrameBoxes::create(o.path, o.draw, o.encoding));
+    }
     const DrawnFiles files{.floats = o.floats,
                            .top = o.top.width > 0,
                            .points = o.points,
                            .instances = o.draw.instances,
+                           .boxes = boxes.get(),
                            .encoding = o.encoding};
     SR_TRY(auto store, DrawingStore::open(o.folder, settings, o.path, files, o.replace));
     if (!store->run().results()) {
@@ -282,8 +291,8 @@ Result<std::unique_ptr<Job>> begin_drawing(Device& device, DrawingOptions option
         if (o.points)
             SR_CHECK(write_points(o.folder / "points.ply", o));
     }
-    return std::make_unique<DrawingJob>(device, std::move(options), std::move(scene), std::move(store), std::move(out),
-                                        callbacks);
+    return std::make_unique<DrawingJob>(device, std::move(options), std::move(scene), std::move(boxes),
+                                        std::move(store), std::move(out), callbacks);
 }
 
 } // namespace semrover

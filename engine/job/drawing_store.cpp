@@ -24,10 +24,11 @@ constexpr const char* kPictures[] = {"color", "depth", "normal", "label", "visib
 constexpr const char *kInstances = "instance", *kFlow = "flow", *kFlowStates = "flow_state";
 constexpr const char* kArrays[] = {"depth_expected", "depth_median", "alpha"};
 constexpr const char* kTop = "top.png";
+constexpr const char* kBoxes = "boxes"; // of a frame's entry in the journal
 constexpr const char* kPoints = "points.ply";
 constexpr const char* kCameras = "transforms.json";
 
-// beside the pictures
+// beside the pictures; not those of boxes, as a scene's folder has an objects.json of its own
 std::vector<std::string> single_files()
 {
     std::vector<std::string> names{kTop, kPoints, kCameras};
@@ -72,11 +73,6 @@ std::set<std::string> cameras_before(const Path& folder)
     return cameras;
 }
 
-std::string piece_name(const std::string& camera, uint32_t number)
-{
-    return fmt::format("{}{}{:06}", camera, camera.empty() ? "" : "/", number);
-}
-
 std::set<std::string> pieces_with_flow(const CameraPath& path)
 {
     std::set<std::string> pieces;
@@ -86,9 +82,17 @@ std::set<std::string> pieces_with_flow(const CameraPath& path)
         const std::string& camera = path.frames[i].camera;
         const uint32_t number = counts[camera]++;
         if (following[i] < path.frames.size())
-            pieces.insert(piece_name(camera, number));
+            pieces.insert(frame_key(camera, number));
     }
     return pieces;
+}
+
+bool had_boxes_before(const Path& folder)
+{
+    const auto run = read_json(folder / "run.json");
+    const Json settings = run && run->is_object() ? run->value("settings", Json()) : Json();
+    const Json drive = settings.is_object() ? settings.value("drive", Json()) : Json();
+    return drive.is_object() && drive.value("boxes", Json()) == true;
 }
 
 Status make_float_images(const Path& folder, uint32_t number, const SplatImage& image, MadeFiles& files)
@@ -120,12 +124,17 @@ Result<std::unique_ptr<DrawingStore>> DrawingStore::open(const Path& folder, con
                                                          const CameraPath& path, const DrawnFiles& files, bool replace)
 {
     SR_CHECK(check(folder, path, replace));
+    for (const char* name : {kBoxesName, kObjectsName})
+        if (files.boxes && !replace && !is_file(folder / "run.json") && is_there(folder / name))
+            return fail(ErrorCode::usage, "{} exists; `replace` replaces what is there", quote_path(folder / name));
     std::set<std::string> cameras = cameras_of(path);
     Json with_cameras = settings;
     with_cameras["cameras"] = cameras;
     with_cameras["files"] = {{"npy", files.floats}, {"top", files.top}, {"points", files.points}};
     cameras.merge(cameras_before(folder));
-    const RunContents contents{{}, single_files(), picture_folders(cameras)};
+    RunContents contents{{}, single_files(), picture_folders(cameras)};
+    if (files.boxes || had_boxes_before(folder))
+        contents.results.insert(contents.results.end(), {kBoxesName, kObjectsName});
     SR_TRY(RunFolder run, open_run(folder, with_cameras, replace, contents, true));
     return std::unique_ptr<DrawingStore>(new DrawingStore(std::move(run), path, files));
 }
@@ -135,6 +144,9 @@ DrawingStore::DrawingStore(RunFolder run, const CameraPath& path, const DrawnFil
       with_flow_(files.encoding.flow ? pieces_with_flow(path) : std::set<std::string>()),
       record_(run_, [this](const std::string& piece) { return files_of(piece); })
 {
+    for (const Json& entry : run_.entries())
+        if (files_.boxes && entry.is_object() && entry.contains("piece") && entry.value(kBoxes, Json()).is_string())
+            files_.boxes->keep(entry.value("piece", ""), entry.value(kBoxes, ""));
 }
 
 Path DrawingStore::folder(const std::string& camera) const
@@ -169,7 +181,7 @@ std::vector<Path> DrawingStore::files_of(const std::string& piece) const
 
 bool DrawingStore::has(const std::string& camera, uint32_t number) const
 {
-    return record_.has(piece_name(camera, number));
+    return record_.has(frame_key(camera, number));
 }
 
 bool DrawingStore::has_top() const
@@ -186,14 +198,20 @@ Result<bool> DrawingStore::saw_nothing(const std::string& camera, uint32_t numbe
     return std::ranges::all_of(depth.pixels, is_zero) && std::ranges::all_of(visible.pixels, is_zero);
 }
 
-Result<FileQueue::Commit> DrawingStore::make(const std::string& camera, uint32_t number, const FramePixels& pixels,
+Result<FileQueue::Commit> DrawingStore::make(const CameraFrame& frame, uint32_t number, const FramePixels& pixels,
                                              const SplatImage* floats)
 {
     const auto files = std::make_shared<MadeFiles>();
-    SR_CHECK(make_frame_images(folder(camera), number, pixels, files_.encoding, *files));
+    SR_CHECK(make_frame_images(folder(frame.camera), number, pixels, files_.encoding, *files));
     if (floats)
-        SR_CHECK(make_float_images(folder(camera), number, *floats, *files));
-    return [this, piece = piece_name(camera, number), files] { return record_.add(piece, *files); };
+        SR_CHECK(make_float_images(folder(frame.camera), number, *floats, *files));
+    const std::string piece = frame_key(frame.camera, number);
+    if (!files_.boxes)
+        return [this, piece, files] { return record_.add(piece, *files); };
+    return [this, piece, files, boxes = files_.boxes->line(frame, number, pixels)] {
+        files_.boxes->keep(piece, boxes);
+        return record_.add(piece, *files, {{kBoxes, boxes}});
+    };
 }
 
 Result<FileQueue::Commit> DrawingStore::make_top(const ImageSize& size, std::span<const uint8_t> color)
@@ -212,6 +230,18 @@ Status DrawingStore::write_cameras(const CameraPath& path) const
     };
     return write_transforms(run_.path() / kCameras, path,
                             {pictures, files_.points ? kPoints : "", files_.encoding.depth_unit()});
+}
+
+Status DrawingStore::finish(const Json& results)
+{
+    if (files_.boxes)
+        SR_CHECK(files_.boxes->write(run_.path()));
+    return run_.finish(results);
+}
+
+Status DrawingStore::restore_boxes() const
+{
+    return files_.boxes && !is_file(run_.path() / kBoxesName) ? files_.boxes->write(run_.path()) : Status();
 }
 
 } // namespace semrover

@@ -6,6 +6,7 @@
 #include "engine/camera/image_size.h"
 #include "engine/deferred/frame_images.h"
 #include "engine/job/file_queue.h"
+#include "engine/job/frame_boxes.h"
 #include "engine/job/piece_record.h"
 
 #include <set>
@@ -17,9 +18,10 @@ struct DrawnFiles {
     // {depth_expected,depth_median,alpha}/000000.npy of float32, [height, width]: depths are metres, measured as
     // SplatCamera::radial_depth says, 0 where nothing is drawn (docs/formats.md §6)
     bool floats = false;
-    bool top = false;       // top.png
-    bool points = false;    // points.ply
-    bool instances = false; // instance/000000.png
+    bool top = false;            // top.png
+    bool points = false;         // points.ply
+    bool instances = false;      // instance/000000.png
+    FrameBoxes* boxes = nullptr; // boxes.jsonl and objects.json, of lines that it keeps; outlives the drawing
     PictureEncoding encoding = {};
 };
 
@@ -40,13 +42,15 @@ class DrawingStore {
     // whether the pictures of a frame that is there show nothing of the scene
     Result<bool> saw_nothing(const std::string& camera, uint32_t number) const;
     // On any thread; what they return is called on another one than has(), or after the last call of it.
-    // floats: of the frame, where DrawnFiles has them
-    Result<FileQueue::Commit> make(const std::string& camera, uint32_t number, const FramePixels& pixels,
+    // number: of the frame among its camera's; floats: of the frame, where DrawnFiles has them
+    Result<FileQueue::Commit> make(const CameraFrame& frame, uint32_t number, const FramePixels& pixels,
                                    const SplatImage* floats);
     Result<FileQueue::Commit> make_top(const ImageSize& size, std::span<const uint8_t> color);
     // transforms.json of the path
     Status write_cameras(const CameraPath& path) const;
-    Status finish(const Json& results) { return run_.finish(results); }
+    Status finish(const Json& results); // with the boxes, where they are asked for
+    // a finished drawing's boxes that are not there any more
+    Status restore_boxes() const;
     void drop_if_empty() { run_.drop_if_empty(); }
 
   private:

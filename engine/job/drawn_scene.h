@@ -16,6 +16,7 @@ struct DrawOptions {
     std::optional<float> visible_alpha;    // alpha from which a pixel counts as visible; 0.5, or what a model says
     bool semantic = false;                 // in label colours; a grid without points as blocks
     bool instances = false;                // pictures of which object a pixel shows, too
+    bool boxes = false;                    // and boxes of them, with `instances`
     std::vector<SceneObject> objects = {}; // of the scene, for instances and actors
     std::vector<Actor> actors = {};        // what moves
 

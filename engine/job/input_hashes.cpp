@@ -90,6 +90,8 @@ Json drawing_json(const DrawOptions& o)
         drive["objects"] = hash_text(hash_objects(o.objects));
     if (o.instances)
         drive["instances"] = true;
+    if (o.boxes)
+        drive["boxes"] = true;
     if (!o.actors.empty())
         drive["actors"] = hash_text(hash_actors(o.actors));
     return drive;

@@ -23,10 +23,12 @@ bool PieceRecord::has(const std::string& piece) const
     return found != done_.end() && found->second;
 }
 
-Status PieceRecord::add(const std::string& piece, MadeFiles& files)
+Status PieceRecord::add(const std::string& piece, MadeFiles& files, const Json& more)
 {
     SR_CHECK(files.commit());
-    SR_CHECK(run_.append({{"piece", piece}, {"xxh64", hash_text(files.hash())}}));
+    Json entry{{"piece", piece}, {"xxh64", hash_text(files.hash())}};
+    entry.update(more);
+    SR_CHECK(run_.append(entry));
     done_[piece] = true;
     return {};
 }

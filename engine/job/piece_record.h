@@ -18,8 +18,8 @@ class PieceRecord {
     PieceRecord(RunFolder& run, const FilesOf& files); // reads the journal, and the files that it names
 
     bool has(const std::string& piece) const;
-    // Names its files, in the order of FilesOf, then it is in the journal.
-    Status add(const std::string& piece, MadeFiles& files);
+    // Names its files, in the order of FilesOf, then it is in the journal, with more that is known of it.
+    Status add(const std::string& piece, MadeFiles& files, const Json& more = Json::object());
 
   private:
     RunFolder& run_;

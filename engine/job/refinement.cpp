@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/refinement.h"
 
-#include "engine/annotation/drive_record.h"
 #include "engine/job/budget_meter.h"
 #include "engine/job/empty_frames.h"
+#include "engine/job/frame_boxes.h"
 #include "engine/job/outputs.h"
 #include "engine/job/refine_schedule.h"
 #include "runtime/base/quote.h"
@@ -79,11 +79,12 @@ struct BufferDrawing {
 
 class RefinementJob : public Job {
   public:
-    RefinementJob(Device& device, Refinement refinement, RunFolder run, std::unique_ptr<Outgoing> out,
-                  const RefinementCallbacks& callbacks)
+    RefinementJob(Device& device, Refinement refinement, RunFolder run, std::unique_ptr<FrameBoxes> boxes,
+                  std::unique_ptr<Outgoing> out, const RefinementCallbacks& callbacks)
         : device_(device), r_(std::move(refinement)), run_(std::move(run)), callbacks_(callbacks),
-          networks_(networks_of(device, r_)), store_(run_, r_.options.encoding, r_.model.vae.latent_channels),
-          files_(device, store_, *out), out_(std::move(out))
+          boxes_(std::move(boxes)), networks_(networks_of(device, r_)),
+          store_(run_, r_.options.encoding, r_.model.vae.latent_channels), files_(device, store_, *out),
+          out_(std::move(out))
     {
         drawn_ = !r_.options.from_grid() || was_drawn();
         host_bytes_ = device.host_bytes();
@@ -209,7 +210,7 @@ class RefinementJob : public Job {
             const uint64_t bytes = pixels.bytes();
             SR_CHECK(out_->write(bytes, [this, number, frame, pixels = std::move(pixels)]() mutable {
                 mark_sky(pixels, frame);
-                return make_buffer(frame.camera, number, pixels);
+                return make_buffer(frame, number, pixels);
             }));
             ++arrived_;
             return note_drawn();
@@ -217,12 +218,17 @@ class RefinementJob : public Job {
         ++taken_;
         return {};
     }
-    Result<FileQueue::Commit> make_buffer(const std::string& camera, uint32_t number, const FramePixels& pixels) const
+    Result<FileQueue::Commit> make_buffer(const CameraFrame& frame, uint32_t number, const FramePixels& pixels) const
     {
         const auto files = std::make_shared<MadeFiles>();
-        const Path folder = camera_folder(run_.path() / "buffers", camera);
+        const Path folder = camera_folder(run_.path() / "buffers", frame.camera);
         SR_CHECK(make_frame_images(folder, number, pixels, r_.options.buffer_encoding(), *files));
-        return [files] { return files->commit(); };
+        if (!boxes_)
+            return [files] { return files->commit(); };
+        return [this, files, key = frame_key(frame.camera, number), line = boxes_->line(frame, number, pixels)] {
+            boxes_->keep(key, line);
+            return files->commit();
+        };
     }
     Status end_drawing()
     {
@@ -241,7 +247,11 @@ class RefinementJob : public Job {
             return {};
         SR_CHECK(drawing_->empty.report(callbacks_));
         return out_->write(0, [this]() -> Result<FileQueue::Commit> {
-            return [this] { return run_.append({{"rendered", r_.options.path->frames.size()}}); };
+            return [this]() -> Status {
+                if (boxes_)
+                    SR_CHECK(boxes_->write(run_.path()));
+                return run_.append({{"rendered", r_.options.path->frames.size()}});
+            };
         });
     }
     void say_drawn(bool ended)
@@ -354,6 +364,7 @@ class RefinementJob : public Job {
     SubmitCost cost_;
     std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 
+    std::unique_ptr<FrameBoxes> boxes_;      // of the buffers that are drawn
     std::unique_ptr<BufferDrawing> drawing_; // while there is something to draw
     bool drawn_ = false, refined_ = false;   // all of it
     bool said_drawn_ = false;
@@ -438,11 +449,17 @@ Result<std::unique_ptr<Job>> begin_refinement(Device& device, Refinement r, cons
     SR_TRY(const Json settings, refinement_settings(r, device));
     RunContents contents{{"encoded"}, {"latents", "frames", "transforms.json"}};
     contents.results.insert(contents.results.end(), std::begin(kDriveRecordFiles), std::end(kDriveRecordFiles));
+    if (r.options.draw.boxes || is_file(r.options.input / kBoxesName))
+        contents.results.insert(contents.results.end(), {kBoxesName, kObjectsName});
     if (r.options.from_grid())
         contents.results.push_back("buffers");
     SR_TRY(RunFolder run, open_run(r.options.output, settings, r.options.replace, contents, true));
     if (run.results())
         return finished_refinement(std::move(r), std::move(run), callbacks);
+    std::unique_ptr<FrameBoxes> boxes;
+    if (r.options.from_grid() && r.options.draw.boxes) {
+        SR_TRY(boxes, FrameBoxes::create(*r.options.path, r.options.draw, r.options.encoding));
+    }
     SR_CHECK(write_frame_cameras(r));
     SR_CHECK(write_frame_record(r, callbacks));
     auto out = Outgoing::create(device, largest_read(r), r.options.threads);
@@ -450,7 +467,8 @@ Result<std::unique_ptr<Job>> begin_refinement(Device& device, Refinement r, cons
         run.drop_if_empty();
         return tl::make_unexpected(out.error());
     }
-    return std::make_unique<RefinementJob>(device, std::move(r), std::move(run), std::move(*out), callbacks);
+    return std::make_unique<RefinementJob>(device, std::move(r), std::move(run), std::move(boxes), std::move(*out),
+                                           callbacks);
 }
 
 } // namespace semrover

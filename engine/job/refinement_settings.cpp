@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/annotation/drive_record.h"
 #include "engine/format/transforms.h"
+#include "engine/job/frame_boxes.h"
 #include "engine/job/input_hashes.h"
 #include "engine/job/outputs.h"
 #include "engine/job/refinement.h"
@@ -302,7 +302,11 @@ Status write_frame_record(const Refinement& r, const JobCallbacks& callbacks)
     if (!beside)
         return {};
     SR_CHECK(read_drive_record(o.input)); // what is wrong with it is said before anything is refined
-    for (const char* name : kDriveRecordFiles) {
+    std::vector<const char*> names(std::begin(kDriveRecordFiles), std::end(kDriveRecordFiles));
+    names.insert(names.end(), {kBoxesName, kObjectsName});
+    for (const char* name : names) {
+        if (!is_file(o.input / name))
+            continue;
         SR_TRY(const MappedFile file, MappedFile::open(o.input / name));
         SR_CHECK(write_file_atomically(o.output / name, file.bytes()));
     }

@@ -39,11 +39,6 @@ Rigid object_to_world(const SceneObject& o)
 
 } // namespace
 
-int64_t microseconds_of(double seconds)
-{
-    return std::llround(seconds * 1e6);
-}
-
 Result<SceneActors> SceneActors::create(std::vector<Actor> actors, std::span<const SceneObject> objects)
 {
     std::map<uint32_t, const SceneObject*> by_id;

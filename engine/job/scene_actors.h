@@ -9,9 +9,6 @@
 
 namespace semrover {
 
-// a time of a camera's frame as actors have it: microseconds
-int64_t microseconds_of(double seconds);
-
 // The actors of a scene as its splats have them: splats of one made of an object lie where the object is, those of
 // others in the actor's own frame.
 class SceneActors {

@@ -3,9 +3,10 @@
 """What other programs make of our files, and we of theirs. A program that is not installed skips its tests by name.
 Python's own tarfile is one of them.
 
-Programs: colmap, python3-opencv and python3-skimage of Debian (tools/setup --programs); of npm, gltf-validator and
-@playcanvas/splat-transform in the folder NODE_MODULES.
+Programs: colmap, python3-opencv, python3-open3d and python3-skimage of Debian (tools/setup --programs); of npm,
+gltf-validator and @playcanvas/splat-transform in the folder NODE_MODULES.
 """
+import importlib
 import json
 import math
 import os
@@ -52,12 +53,15 @@ def skimage_metrics():
         return None
 
 
-def opencv():
+def python_module(name):
     try:
-        import cv2
-        return cv2
+        return importlib.import_module(name)
     except ImportError:
         return None
+
+
+def needs_python(name):
+    return unittest.skipUnless(python_module(name), f"{name} is not installed")
 
 
 class Case(unittest.TestCase):
@@ -194,6 +198,94 @@ class Colmap(Case):
                         self.assertAlmostEqual(x, y, places=9)
 
 
+RIG = {"sensors": [
+    {"name": "front", "width": 320, "height": 200, "fov": 90,
+     "sensor_to_vehicle": {"translation": [0.3, 0, 0], "rotation": [-0.5, 0.5, -0.5, 0.5]}},
+    {"name": "left", "width": 240, "height": 200, "fov": 80,
+     "sensor_to_vehicle": {"translation": [0, 0.2, 0], "rotation": [-0.270598, 0.653281, -0.653281, 0.270598]}}]}
+
+
+class DataSets(Case):
+    """A drive as `dataset export` writes it, read by others"""
+    def setUp(self):
+        super().setUp()
+        scene, drive = SCENES / "avenue.truth.sgrid", self.folder / "drive"
+        lines = [line for line in (SCENES / "avenue.tum").read_text().splitlines() if not line.startswith("#")]
+        (self.folder / "path.tum").write_text("\n".join(lines[::8]) + "\n")
+        (self.folder / "rig.json").write_text(json.dumps(RIG))
+        run(SEMROVER, "convert", "-q", scene, self.folder / "guessed.objects.json", "-m", SCENES.parent / "model")
+        run(SEMROVER, "render", "-q", scene, "--path", self.folder / "path.tum", "--rig", self.folder / "rig.json",
+            "--splat-radius", "auto", "--objects", self.folder / "guessed.objects.json", "--boxes", "--points",
+            "-o", drive)
+        self.drive, self.poses = drive, len(lines[::8])
+
+    def export(self, layout, *more):
+        run(SEMROVER, "dataset", "export", "-q", self.drive, "--to", layout, "-o", self.folder / layout, *more)
+        return self.folder / layout
+
+    @needs_python("cv2")
+    def test_opencv_projects_kittis_boxes_to_where_labels_say(self):
+        import cv2
+        import numpy as np
+        training = self.export("kitti") / "training"
+        compared = 0
+        for label in sorted((training / "label_2").glob("*.txt")):
+            image = cv2.imread(str(training / "image_2" / label.with_suffix(".png").name))
+            self.assertEqual(image.shape, (200, 320, 3))
+            calibration = dict(line.split(": ") for line in (training / "calib" / label.name).read_text().splitlines())
+            p2 = np.array(calibration["P2"].split(), float).reshape(3, 4)
+            for line in label.read_text().splitlines():
+                v = np.array(line.split()[1:], float)
+                (h, w, l), place, turn = v[7:10], v[10:13], v[13]
+                x = np.array([1, 1, -1, -1] * 2) * l / 2
+                y = np.array([0] * 4 + [-h] * 4)
+                z = np.array([1, -1, -1, 1] * 2) * w / 2
+                rotation = cv2.Rodrigues(np.array([0, turn, 0]))[0]
+                corners = (rotation @ np.array([x, y, z])).T + place
+                if corners[:, 2].min() < 0.3:
+                    continue
+                found = cv2.projectPoints(corners, np.zeros(3), np.zeros(3), p2[:, :3], None)[0].reshape(-1, 2)
+                box = np.concatenate([found.min(0), found.max(0)]).clip(0, [319, 199] * 2)
+                self.assertLess(np.abs(box - v[3:7]).max(), 0.1, line)  # both rounded to what files have
+                compared += 1
+        self.assertGreater(compared, 5)
+
+    @needs_python("open3d")
+    def test_open3d_makes_the_scene_of_depths_lenses_and_poses(self):
+        import numpy as np
+        import open3d as o3d
+        folder = self.export("transforms")
+        cameras = json.loads((folder / "transforms.json").read_text())
+        scene = o3d.io.read_point_cloud(str(folder / cameras["ply_file_path"]))
+        tree = o3d.geometry.KDTreeFlann(scene)
+        distances = []
+        for frame in cameras["frames"]:
+            # Open3D counts pixels from the centre of the first
+            lens = o3d.camera.PinholeCameraIntrinsic(frame["w"], frame["h"], frame["fl_x"], frame["fl_y"],
+                                                     frame["cx"] - 0.5, frame["cy"] - 0.5)
+            to_world = np.array(frame["transform_matrix"]) @ np.diag([1, -1, -1, 1])
+            depth = o3d.io.read_image(str(folder / frame["depth_file_path"]))
+            points = o3d.geometry.PointCloud.create_from_depth_image(
+                depth, lens, np.linalg.inv(to_world), depth_scale=1 / cameras["depth_unit_scale_factor"],
+                depth_trunc=20.0, stride=7)
+            for point in np.asarray(points.points):
+                distances.append(math.sqrt(tree.search_knn_vector_3d(point, 1)[2][0]))
+        self.assertGreater(len(distances), 5000)
+        self.assertLess(np.median(distances), 0.06)  # points of the scene are 0.1 m apart
+
+    @needs_program("colmap")
+    def test_colmap_reads_the_model_and_finds_its_pictures(self):
+        folder = self.export("colmap")
+        (self.folder / "binary").mkdir()
+        run("colmap", "model_converter", "--input_path", folder / "sparse" / "0", "--output_path",
+            self.folder / "binary", "--output_type", "BIN")
+        lines = (folder / "sparse" / "0" / "images.txt").read_text().splitlines()
+        names = [line.split()[9] for line in lines if len(line.split()) == 10 and not line.startswith("#")]
+        self.assertEqual(len(names), 2 * self.poses)
+        for name in names:
+            self.assertTrue((folder / "images" / name).is_file())
+
+
 class Skimage(Case):
     @unittest.skipUnless(skimage_metrics(), "skimage is not installed")
     def test_psnr_and_ssim_are_the_same(self):
@@ -219,7 +311,7 @@ class Skimage(Case):
 
 
 class OpenCv(Case):
-    @unittest.skipUnless(opencv(), "python3-opencv is not installed")
+    @needs_python("cv2")
     def test_dots_are_where_it_projects_them_through_a_thin_prism(self):
         import numpy
         places = [(5, y, z) for y in (-2.4, -0.9, 0.7, 2.2) for z in (-1.3, 0.1, 1.4)]  # ahead: x forward, y left, z up
@@ -233,11 +325,11 @@ class OpenCv(Case):
         (self.folder / "path.tum").write_text("0 0 0 0 -0.5 0.5 -0.5 0.5\n")
         run(SEMROVER, "render", "-q", source, "--path", self.folder / "path.tum", "--rig", self.folder / "rig.json", "-o",
             self.folder / "out")
-        image = opencv().imread(str(self.folder / "out/a/color/000000.png"))[:, :, 0].astype(float)
+        image = python_module("cv2").imread(str(self.folder / "out/a/color/000000.png"))[:, :, 0].astype(float)
         points = numpy.array([(-y, -z, x) for x, y, z in places], dtype=float)
         # the centre of OpenCV's first pixel is at (0, 0), ours at (0.5, 0.5)
         matrix = numpy.array([[400, 0, 322.5 - 0.5], [0, 410, 237.25 - 0.5], [0, 0, 1]])
-        expected, _ = opencv().projectPoints(points, numpy.zeros(3), numpy.zeros(3), matrix, numpy.array(k))
+        expected, _ = python_module("cv2").projectPoints(points, numpy.zeros(3), numpy.zeros(3), matrix, numpy.array(k))
         for x, y in expected.reshape(-1, 2):
             left, top = round(x) - 6, round(y) - 6
             block = image[top:top + 13, left:left + 13]

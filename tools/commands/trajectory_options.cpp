@@ -32,10 +32,11 @@ Result<std::vector<SceneObject>> objects_of(const Path& file, const Path& grid)
 {
     const Path path = file.empty() ? objects_beside(grid) : file;
     if (file.empty() && !is_there(path))
-        return fail(ErrorCode::usage,
-                    "{} is not there, which --instances and actors need; --objects names another file, and `semrover "
-                    "convert {} NAME.objects.json -m MODEL` guesses them of the labels",
-                    quote_path(path), quote_path(grid));
+        return fail(
+            ErrorCode::usage,
+            "{} is not there, which --instances, --boxes and actors need; --objects names another file, and `semrover "
+            "convert {} NAME.objects.json -m MODEL` guesses them of the labels",
+            quote_path(path), quote_path(grid));
     return read_objects(path);
 }
 
@@ -59,6 +60,9 @@ void add_trajectory_options(CLI::App& c, TrajectoryOptions& o)
     add_number(c, "--visible-alpha", o.visible_alpha, "alpha from which a pixel counts as visible", 0.f, 1.f);
     c.add_option("--background", o.background, "R,G,B behind the splats");
     c.add_flag("--instances", o.instances, "also pictures of which object a pixel shows: instance/000000.png");
+    c.add_flag(
+        "--boxes", o.boxes,
+        "with --instances, also boxes.jsonl: where each object is, what pictures show of it, how much is hidden");
     c.add_option("--actors", o.actors, "actors.json: what moves (docs/formats.md §2.10)");
     c.add_option("--objects", o.objects,
                  "the scene's objects, for --instances and --actors; NAME.objects.json beside the grid by default");
@@ -91,11 +95,12 @@ Result<DrawOptions> draw_options(const TrajectoryOptions& o, const Path& grid)
     if (o.equirect && o.width % 2)
         return fail(ErrorCode::usage, "--equirect draws W x W/2 pixels, and {} is odd", o.width);
     SR_TRY(draw.background, background_of(o));
-    draw.instances = o.instances;
+    draw.instances = o.instances || o.boxes;
+    draw.boxes = o.boxes;
     if (!o.actors.empty()) {
         SR_TRY(draw.actors, read_actors(o.actors));
     }
-    if (o.instances || std::ranges::any_of(draw.actors, is_of_object)) {
+    if (draw.instances || std::ranges::any_of(draw.actors, is_of_object)) {
         SR_TRY(draw.objects, objects_of(o.objects, grid));
     }
     return draw;

@@ -15,7 +15,7 @@ struct TrajectoryOptions : LensOptions {
     std::string splat_radius; // empty: not given
     Path objects;             // empty: those beside the grid
     Path actors;              // empty: none
-    bool instances = false;
+    bool instances = false, boxes = false;
     bool equirect = false; // panoramas of width x width / 2 in place of the path's cameras
     float opacity = 1;
     bool allow_empty = false; // frames that all see nothing are no error

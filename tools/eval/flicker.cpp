@@ -54,7 +54,7 @@ double inverse_depth(const Taps& taps, const DepthPicture& depth)
 } // namespace
 
 Flow flow_between(const CameraFrame& from, const DepthPicture& from_depth, const CameraFrame& to,
-                  const DepthPicture& to_depth, const FlowOptions& o)
+                  const DepthPicture& to_depth, const WarpOptions& o)
 {
     const uint32_t width = to.intrinsics.width, height = to.intrinsics.height;
     SR_ASSERT(to_depth.width == width && to_depth.height == height && from_depth.width == from.intrinsics.width &&

@@ -9,7 +9,7 @@
 
 namespace semrover {
 
-struct FlowOptions {
+struct WarpOptions {
     double tolerance = 0.01; // relative: by how much the depths of both frames may differ
 };
 
@@ -27,7 +27,7 @@ struct Flow {
 // `from` whose depths, interpolated as 1 / depth (exact on a plane through a pinhole), agree with it. Depths are along
 // the optical axis or, where Lens::radial_depth says so, from the camera. Pictures have the cameras' sizes.
 Flow flow_between(const CameraFrame& from, const DepthPicture& from_depth, const CameraFrame& to,
-                  const DepthPicture& to_depth, const FlowOptions& options = {});
+                  const DepthPicture& to_depth, const WarpOptions& options = {});
 
 // differences of a frame from what the one before it has there, bilinear, over valid pixels: sums over three channels
 struct WarpSums {

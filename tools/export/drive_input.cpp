@@ -152,6 +152,7 @@ Result<DriveInput> open_drive(const Path& folder)
         const DriveRecord::Moment* moment = drive.record.moment(drive.record.pictures[i].time);
         drive.of_moments[size_t(moment - drive.record.moments.data())].push_back(i);
     }
+    SR_TRY(drive.lidar, read_lidar_scans(folder, drive.record));
     SR_CHECK(read_boxes(folder / kBoxesName, drive));
     return drive;
 }

@@ -5,6 +5,7 @@
 #include "engine/annotation/box_lines.h"
 #include "engine/format/image.h"
 #include "engine/shards/shard_set.h"
+#include "tools/export/lidar_scans.h"
 
 #include <map>
 
@@ -34,6 +35,7 @@ struct DriveInput {
     CameraPath path;                             // of it, a frame a picture
     std::vector<SeenPicture> boxes;              // one a picture, or none at all
     std::vector<std::vector<size_t>> of_moments; // pictures of each moment
+    LidarScans lidar;
 
     // a frame that was refined, or else what splats look like; bad_input: it is not there
     Result<Path> color(size_t picture) const;

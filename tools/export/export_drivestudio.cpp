@@ -49,6 +49,8 @@ class DriveStudioScene {
                               matrix_text(drive_.record.moments[t].vehicle_to_world)));
             for (const size_t picture : drive_.of_moments[t])
                 SR_CHECK(write_picture(picture, t));
+            if (drive_.lidar.there())
+                SR_CHECK(write_scan(t));
         }
         return drive_.boxes.empty() ? Status() : write_instances();
     }
@@ -88,6 +90,33 @@ class DriveStudioScene {
             return {};
         SR_TRY(const ImageGray16 image, read_png_gray16(*file));
         return write_dynamic_masks(image, name, moment);
+    }
+    // 14 numbers a point, in the vehicle's axes: origin, place, flow (unknown: 0), its class (-1: none), ground,
+    // intensity, elongation, laser
+    Status write_scan(size_t moment)
+    {
+        SR_TRY(const auto points, read_scan(drive_.lidar.scans[moment].points));
+        const Rigid& mount = drive_.lidar.sensor_to_vehicle;
+        const auto bytes = scan_rows(points, [&](const ScanPoint& p) {
+            const Point3 at = transform(mount, {p[0], p[1], p[2]});
+            const uint32_t label = uint32_t(p[6]);
+            return std::array{float(mount[3]),
+                              float(mount[7]),
+                              float(mount[11]),
+                              float(at[0]),
+                              float(at[1]),
+                              float(at[2]),
+                              0.f,
+                              0.f,
+                              0.f,
+                              -1.f,
+                              label < kClassCount && is_ground(uint8_t(label)) ? 1.f : 0.f,
+                              p[3],
+                              0.f,
+                              0.f};
+        });
+        ++report_.scans;
+        return put_file(folder_ / "lidar" / fmt::format("{:03}.bin", moment), bytes);
     }
     template <typename Chosen>
     Status write_mask(const Path& kind, const std::string& name, const ImageSize& size,

@@ -30,8 +30,10 @@ Result<std::vector<std::byte>> color_file(const DriveInput& drive, size_t pictur
                 : encode_png_rgb8(image.width, image.height, image.pixels);
 }
 
-std::string rows_text(const Rigid& matrix, size_t rows)
+std::string rows_text(Rigid matrix, size_t rows)
 {
+    for (double& v : matrix)
+        v += 0.0; // no -0
     return fmt::format("{}", fmt::join(std::span(matrix).first(4 * rows), " "));
 }
 

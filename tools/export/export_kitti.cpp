@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// KITTI's data set of objects, of one camera: training/{image_2,calib,label_2}/NNNNNN, ImageSets/{train,val}.txt, and
-// of each drive sequences/NN/{poses,times,calib}.txt as odometry has them. Source: the readme files of the devkits for
-// objects and odometry, https://www.cvlibs.net/datasets/kitti
+// KITTI's data set of objects, of one camera: training/{image_2,calib,label_2,velodyne}/NNNNNN,
+// ImageSets/{train,val}.txt, and of each drive sequences/NN/{poses,times,calib}.txt as odometry has them. Source: the
+// readme files of the devkits for objects and odometry, https://www.cvlibs.net/datasets/kitti
 #include "engine/scene/palette.h"
 #include "runtime/base/quote.h"
 #include "tools/export/export_files.h"
@@ -63,8 +63,8 @@ std::string kitti_line(const SeenObject& o, const CameraFrame& frame, const char
                        o.box.size[2], o.box.size[1], o.box.size[0], foot[0], foot[1], foot[2], turn);
 }
 
-// the lidar is where the vehicle's axes are
-std::string calibration_text(const Sensor& sensor)
+// a lidar that is not there is where the vehicle's axes are
+std::string calibration_text(const Sensor& sensor, const Rigid& lidar_to_vehicle)
 {
     const Intrinsics& k = sensor.intrinsics;
     const Rigid projection = {k.fx, 0, k.cx - kKittiPixel, 0, 0, k.fy, k.cy - kKittiPixel, 0, 0, 0, 1, 0, 0, 0, 0, 1};
@@ -72,8 +72,9 @@ std::string calibration_text(const Sensor& sensor)
     for (int i = 0; i < 4; ++i)
         text += fmt::format("P{}: {}\n", i, rows_text(projection, 3));
     text += "R0_rect: 1 0 0 0 1 0 0 0 1\n";
-    text += fmt::format("Tr_velo_to_cam: {}\n", rows_text(inverse(sensor.sensor_to_vehicle), 3));
-    return text + fmt::format("Tr_imu_to_velo: {}\n", rows_text(kIdentity, 3));
+    text +=
+        fmt::format("Tr_velo_to_cam: {}\n", rows_text(compose(inverse(sensor.sensor_to_vehicle), lidar_to_vehicle), 3));
+    return text + fmt::format("Tr_imu_to_velo: {}\n", rows_text(inverse(lidar_to_vehicle), 3));
 }
 
 class KittiExport {
@@ -114,8 +115,18 @@ class KittiExport {
         const std::string name = fmt::format("{:06}", number_);
         SR_TRY(const auto color, color_file(drive, picture, false, options_.quality));
         SR_CHECK(put_file(training / "image_2" / (name + ".png"), color));
-        SR_CHECK(put_file(training / "calib" / (name + ".txt"), calibration_text(sensor)));
+        SR_CHECK(
+            put_file(training / "calib" / (name + ".txt"), calibration_text(sensor, drive.lidar.sensor_to_vehicle)));
         ++report_.pictures;
+        if (drive.lidar.there()) {
+            const DriveRecord::Moment* moment = drive.record.moment(drive.record.pictures[picture].time);
+            const size_t scan = size_t(moment - drive.record.moments.data());
+            SR_TRY(const auto points, read_scan(drive.lidar.scans[scan].points));
+            SR_CHECK(put_file(training / "velodyne" / (name + ".bin"), scan_rows(points, [](const ScanPoint& p) {
+                                  return std::array{p[0], p[1], p[2], p[3]};
+                              })));
+            ++report_.scans;
+        }
         if (drive.boxes.empty())
             return {};
         std::string lines;

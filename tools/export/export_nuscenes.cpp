@@ -10,6 +10,7 @@
 #include "tools/export/nuscenes_tables.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace semrover {
 
@@ -65,8 +66,9 @@ class NuscenesScene {
             add_pose(m);
         for (const Sensor& sensor : drive_.record.sensors)
             SR_CHECK(add_sensor(sensor));
-        add_annotations();
-        return {};
+        if (drive_.lidar.there())
+            SR_CHECK(add_lidar());
+        return add_annotations();
     }
 
   private:
@@ -128,23 +130,41 @@ class NuscenesScene {
         const Intrinsics& k = sensor.intrinsics;
         if (channels_.insert(channel).second == false)
             return fail(ErrorCode::bad_input, "two cameras of {} would both be {}", quote_path(drive_.folder), channel);
-        tables_.add_once("sensor", channel, {{"channel", channel}, {"modality", "camera"}});
-        tables_.add("calibrated_sensor", name_ + channel,
-                    {{"sensor_token", NuscenesTables::token("sensor", channel)},
-                     {"translation", translation_of(sensor.sensor_to_vehicle)},
-                     {"rotation", w_first(sensor.sensor_to_vehicle)},
-                     {"camera_intrinsic", OrderedJson::array({{k.fx, 0, k.cx}, {0, k.fy, k.cy}, {0, 0, 1}})}});
+        add_calibration(channel, "camera", sensor.sensor_to_vehicle,
+                        OrderedJson::array({{k.fx, 0, k.cx}, {0, k.fy, k.cy}, {0, 0, 1}}));
         std::vector<std::pair<size_t, size_t>> pictures; // and their moments
         for (size_t m = 0; m < drive_.of_moments.size(); ++m)
             for (const size_t picture : drive_.of_moments[m])
                 if (drive_.path.frames[picture].camera == sensor.name)
                     pictures.emplace_back(picture, m);
-        const auto token = [&](size_t i) { return NuscenesTables::token("sample_data", data_key(channel, i)); };
         for (size_t i = 0; i < pictures.size(); ++i) {
-            SR_TRY(OrderedJson record, picture_record(pictures[i].first, pictures[i].second, channel, k));
-            tables_.add(
-                "sample_data", data_key(channel, i),
-                with_neighbours(std::move(record), i ? token(i - 1) : "", i + 1 < pictures.size() ? token(i + 1) : ""));
+            SR_TRY(const auto color, color_file(drive_, pictures[i].first, true, options_.quality));
+            SR_CHECK(add_data({channel, "jpg", i, pictures.size(), pictures[i].second, k.width, k.height}, color));
+            ++report_.pictures;
+        }
+        return {};
+    }
+    void add_calibration(const std::string& channel, const char* modality, const Rigid& mount, OrderedJson intrinsic)
+    {
+        tables_.add_once("sensor", channel, {{"channel", channel}, {"modality", modality}});
+        tables_.add("calibrated_sensor", name_ + channel,
+                    {{"sensor_token", NuscenesTables::token("sensor", channel)},
+                     {"translation", translation_of(mount)},
+                     {"rotation", w_first(mount)},
+                     {"camera_intrinsic", std::move(intrinsic)}});
+    }
+    Status add_lidar()
+    {
+        const std::string channel = "LIDAR_TOP";
+        add_calibration(channel, "lidar", drive_.lidar.sensor_to_vehicle, OrderedJson::array());
+        const size_t count = drive_.lidar.scans.size();
+        for (size_t i = 0; i < count; ++i) {
+            SR_TRY(const auto points, read_scan(drive_.lidar.scans[i].points));
+            const auto bytes = scan_rows(points, [](const ScanPoint& p) {
+                return std::array{p[0], p[1], p[2], 255 * p[3], p[4]};
+            });
+            SR_CHECK(add_data({channel, "pcd", i, count, i, 0, 0}, bytes));
+            ++report_.scans;
         }
         return {};
     }
@@ -152,52 +172,94 @@ class NuscenesScene {
     {
         return fmt::format("{}/{}/{}", name_, channel, number);
     }
-    Result<OrderedJson> picture_record(size_t picture, size_t moment, const std::string& channel, const Intrinsics& k)
+    struct Data {
+        const std::string& channel;
+        const char* format;
+        size_t number, count; // of its channel's
+        size_t moment;
+        uint32_t width, height; // of a picture
+    };
+    Status add_data(const Data& d, std::span<const std::byte> bytes)
     {
-        const int64_t time = drive_.record.moments[moment].time;
-        const bool is_key = std::ranges::binary_search(keys_, moment);
-        const std::string file =
-            fmt::format("{0}/{1}/{2}__{1}__{3:016}.jpg", is_key ? "samples" : "sweeps", channel, name_, time);
-        SR_TRY(const auto color, color_file(drive_, picture, true, options_.quality));
-        SR_CHECK(put_file(out_ / file, color));
-        ++report_.pictures;
-        return OrderedJson{{"sample_token", sample_token(sample_of(moment))},
-                           {"ego_pose_token", NuscenesTables::token("ego_pose", key(moment))},
-                           {"calibrated_sensor_token", NuscenesTables::token("calibrated_sensor", name_ + channel)},
+        const int64_t time = drive_.record.moments[d.moment].time;
+        const bool is_key = std::ranges::binary_search(keys_, d.moment);
+        const std::string file = fmt::format("{0}/{1}/{2}__{1}__{3:016}.{4}", is_key ? "samples" : "sweeps", d.channel,
+                                             name_, time, std::string_view(d.format) == "pcd" ? "pcd.bin" : d.format);
+        SR_CHECK(put_file(out_ / file, bytes));
+        const auto token = [&](size_t i) { return NuscenesTables::token("sample_data", data_key(d.channel, i)); };
+        OrderedJson record{{"sample_token", sample_token(sample_of(d.moment))},
+                           {"ego_pose_token", NuscenesTables::token("ego_pose", key(d.moment))},
+                           {"calibrated_sensor_token", NuscenesTables::token("calibrated_sensor", name_ + d.channel)},
                            {"timestamp", time},
-                           {"fileformat", "jpg"},
+                           {"fileformat", d.format},
                            {"is_key_frame", is_key},
-                           {"height", k.height},
-                           {"width", k.width},
+                           {"height", d.height},
+                           {"width", d.width},
                            {"filename", file}};
+        tables_.add("sample_data", data_key(d.channel, d.number),
+                    with_neighbours(std::move(record), d.number ? token(d.number - 1) : "",
+                                    d.number + 1 < d.count ? token(d.number + 1) : ""));
+        return {};
     }
     // of what cameras see at samples
-    void add_annotations()
+    Status add_annotations()
     {
-        for (const Track& track : drive_.tracks()) {
+        const std::vector<Track> tracks = drive_.tracks();
+        SR_TRY(const auto points, points_in(tracks));
+        for (const Track& track : tracks) {
             const char* category = nuscenes_category(track.label);
             std::vector<size_t> places;
             for (size_t i = 0; i < track.places.size(); ++i)
                 if (std::ranges::binary_search(keys_, track.places[i].moment))
                     places.push_back(i);
-            if (!category)
+            if (!category && !places.empty())
                 report_.left_out[label_name(track.label)] += places.size();
-            if (!category || places.empty())
-                continue;
-            const auto token = [&](size_t i) {
-                return NuscenesTables::token("sample_annotation", fmt::format("{}/{}/{}", name_, track.id, i));
-            };
-            const std::string instance = tables_.add("instance", key(track.id),
-                                                     {{"category_token", NuscenesTables::token("category", category)},
-                                                      {"nbr_annotations", places.size()},
-                                                      {"first_annotation_token", token(0)},
-                                                      {"last_annotation_token", token(places.size() - 1)}});
-            for (size_t i = 0; i < places.size(); ++i)
-                tables_.add("sample_annotation", fmt::format("{}/{}/{}", name_, track.id, i),
-                            with_neighbours(annotation(track, places[i], instance), i ? token(i - 1) : "",
-                                            i + 1 < places.size() ? token(i + 1) : ""));
-            report_.boxes += places.size();
+            if (category && !places.empty())
+                add_instance(track, places, category, points);
         }
+        return {};
+    }
+    using PointCounts = std::map<std::pair<uint32_t, size_t>, size_t>; // of an object and moment
+    // points of the lidar in boxes at samples
+    Result<PointCounts> points_in(std::span<const Track> tracks) const
+    {
+        PointCounts counts;
+        for (const size_t moment : drive_.lidar.there() ? keys_ : std::vector<size_t>()) {
+            const LidarScans::Scan& scan = drive_.lidar.scans[moment];
+            SR_TRY(const auto points, read_scan(scan.points));
+            for (const Track& track : tracks) {
+                const auto place = std::ranges::find(track.places, moment, &Track::Place::moment);
+                if (place == track.places.end() || !nuscenes_category(track.label))
+                    continue;
+                const Rigid to_box = compose(inverse(place->pose), scan.sensor_to_world);
+                counts[{track.id, moment}] = size_t(std::ranges::count_if(points, [&](const ScanPoint& p) {
+                    const Point3 at = transform(to_box, {p[0], p[1], p[2]});
+                    return std::abs(at[0]) <= track.size[0] / 2 && std::abs(at[1]) <= track.size[1] / 2 &&
+                           std::abs(at[2]) <= track.size[2] / 2;
+                }));
+            }
+        }
+        return counts;
+    }
+    void add_instance(const Track& track, std::span<const size_t> places, const char* category,
+                      const PointCounts& points)
+    {
+        const auto number = [&](size_t i) { return fmt::format("{}/{}/{}", name_, track.id, i); };
+        const auto token = [&](size_t i) { return NuscenesTables::token("sample_annotation", number(i)); };
+        const std::string instance = tables_.add("instance", key(track.id),
+                                                 {{"category_token", NuscenesTables::token("category", category)},
+                                                  {"nbr_annotations", places.size()},
+                                                  {"first_annotation_token", token(0)},
+                                                  {"last_annotation_token", token(places.size() - 1)}});
+        for (size_t i = 0; i < places.size(); ++i) {
+            OrderedJson record = annotation(track, places[i], instance);
+            const auto count = points.find({track.id, track.places[places[i]].moment});
+            record["num_lidar_pts"] = count == points.end() ? 0 : count->second;
+            tables_.add(
+                "sample_annotation", number(i),
+                with_neighbours(std::move(record), i ? token(i - 1) : "", i + 1 < places.size() ? token(i + 1) : ""));
+        }
+        report_.boxes += places.size();
     }
     OrderedJson annotation(const Track& track, size_t place, const std::string& instance) const
     {

@@ -7,9 +7,9 @@
 namespace semrover {
 
 struct ExportOptions {
-    std::string camera; // of layouts that have one; empty: the first
-    int quality = 95;   // of JPEGs that are made of PNGs, 1 to 100
-    uint32_t val = 0;   // how many of the drives, the last ones, are for validation
+    std::string camera = {}; // of layouts that have one; empty: the first
+    int quality = 95;        // of JPEGs that are made of PNGs, 1 to 100
+    uint32_t val = 0;        // how many of the drives, the last ones, are for validation
 };
 
 // what was written, and what had no place

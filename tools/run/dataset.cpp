@@ -206,8 +206,11 @@ Status export_sets(const ExportArguments& o, const Globals& globals)
     SR_CHECK(out.commit());
     print_warnings(report.warnings, globals);
     if (globals.json)
-        fmt::print("{}\n",
-                   Json{{"pictures", report.pictures}, {"boxes", report.boxes}, {"left_out", report.left_out}}.dump());
+        fmt::print("{}\n", Json{{"pictures", report.pictures},
+                                {"boxes", report.boxes},
+                                {"scans", report.scans},
+                                {"left_out", report.left_out}}
+                               .dump());
     else if (!globals.quiet) {
         fmt::print("{}: {} drives, {} pictures, {} boxes as {}\n", quote_path(o.output), drives.size(), report.pictures,
                    report.boxes, o.layout);

@@ -9,7 +9,8 @@
 
 namespace semrover {
 
-constexpr const char* kBufferKinds[] = {"color", "depth", "normal", "label", "visible"};
+constexpr const char* kBufferKinds[] = {"color",   "depth",    "normal", "label",
+                                        "visible", "instance", "flow",   "flow_state"};
 
 // An option of a command as the job gives it: "--steps", "20"; a flag has no value
 using JobOption = std::pair<std::string, std::string>;

@@ -1,0 +1,29 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/annotation/drive_record.h"
+
+namespace semrover {
+
+// The sweeps of a drive's first lidar, by name: LIDAR/sweeps.json and LIDAR/points/NNNNNN.npy of 8 columns
+struct LidarScans {
+    struct Scan {
+        Path points;
+        Rigid sensor_to_world = kIdentity; // of its points
+    };
+    std::string sensor; // its folder; empty: there is none
+    Rigid sensor_to_vehicle = kIdentity;
+    std::vector<Scan> scans; // one a moment of the record
+
+    bool there() const { return !scans.empty(); }
+};
+
+// bad_input for sweeps that are not at the moments of the record, and for lidars that change their place on the vehicle
+Result<LidarScans> read_lidar_scans(const Path& folder, const DriveRecord& record);
+
+// x y z (metres, the sensor's axes) intensity (0..1) ring time label instance
+using ScanPoint = std::array<float, 8>;
+Result<std::vector<ScanPoint>> read_scan(const Path& points);
+
+} // namespace semrover
