@@ -110,7 +110,10 @@ TEST(Lens, ftheta_is_what_its_polynomial_gives)
         EXPECT_NEAR(Lens(k).limit(), limit, 1e-9);
         EXPECT_TRUE(Lens(k).project({std::sin(limit - 1e-6), 0, std::cos(limit - 1e-6)}));
         EXPECT_FALSE(Lens(k).project({std::sin(limit + 1e-6), 0, std::cos(limit + 1e-6)}));
-        EXPECT_TRUE(Lens(k).radial_depth());
+        EXPECT_FALSE(Lens(k).radial_depth()); // whose corners are less than 90 degrees away
+        Intrinsics wide = k;
+        wide.width = 1800;
+        EXPECT_TRUE(Lens(wide).radial_depth());
     }
     Intrinsics turns = kForward; // 520.5 t - 200 t^3 rises up to t = 0.931
     turns.distortion = {520.5, 0, -200, 0, 0, 1, 0, 0, 3, 0};

@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "kernels/trace.h"
-#include "tests/kernel_case.h"
+#include "tests/splat_case.h"
+#include "tools/streets/street.h"
 #include "tools/trace/trace_scene.h"
 
 #include <bit>
@@ -10,21 +11,15 @@
 namespace semrover {
 namespace kernel_trace_rays_test {
 
+using semrover::cross;
+using semrover::dot;
+
 using Vec = std::array<double, 3>;
 
 Vec minus(const Vec& a, const Vec& b)
 {
     return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
 }
-Vec cross(const Vec& a, const Vec& b)
-{
-    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-double dot(const Vec& a, const Vec& b)
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 struct RayCase {
     std::array<float, 3> origin;
     float near;
@@ -222,6 +217,92 @@ TEST(kernel_trace_rays, an_empty_scene_is_missed)
     for (bool any : {false, true})
         for (const auto& hit : trace(empty, list, any).hits)
             ASSERT_EQ(hit[3], ~0u);
+}
+
+// splats on the faces of a street, 5 cm apart, within 22 m of a place
+std::vector<HostSplat> splats_on(const Mesh& mesh, const Point3& place)
+{
+    constexpr double kApart = 0.05;
+    std::vector<HostSplat> splats;
+    for (const auto& face : mesh.faces) {
+        Vec corners[3];
+        for (size_t c = 0; c < 3; ++c)
+            for (size_t a = 0; a < 3; ++a)
+                corners[c][a] = mesh.positions[face[c]][a];
+        const Vec u = minus(corners[1], corners[0]), v = minus(corners[2], corners[0]);
+        Vec n = cross(u, v);
+        const double area = std::sqrt(dot(n, n));
+        if (area < 1e-6)
+            continue;
+        for (double& x : n)
+            x /= area;
+        const int across = int(std::ceil(std::sqrt(dot(u, u)) / kApart)),
+                  down = int(std::ceil(std::sqrt(dot(v, v)) / kApart));
+        for (int i = 0; i < across; ++i)
+            for (int j = 0; j < down; ++j) {
+                const double s = (i + 0.5) / across, t = (j + 0.5) / down;
+                if (s + t > 1)
+                    continue;
+                HostSplat splat{{}, n, {0.5, 0.5, 0.5}, 0.03, 0.03, 1};
+                for (size_t a = 0; a < 3; ++a)
+                    splat.position[a] = corners[0][a] + s * u[a] + t * v[a];
+                const Vec away = minus(splat.position, place);
+                if (dot(away, away) < 22 * 22)
+                    splats.push_back(splat);
+            }
+    }
+    return splats;
+}
+
+// a drive through a street with a rolling shutter: depths of splats on its faces, and of the rays of the same pixels,
+// each from where the camera is when its line is read
+TEST(kernel_trace_rays, a_rolling_shutter_has_the_depths_of_rays_through_the_mesh_of_a_street)
+{
+    const Street street = make_street({.seed = 3, .length = 70});
+    const Intrinsics pinhole = pinhole_from_fov(80, 160, 100), fisheye = fisheye_from_fov(170, 128, 128);
+    const CameraPath drive = drive_along(street.road, {.first = 8}, pinhole);
+    const Rigid start = drive.frames[1].pose.camera_to_world();
+    const std::vector<HostSplat> splats = splats_on(street.mesh, translation_of(start));
+    for (const Intrinsics& k : {pinhole, fisheye})
+        for (const double speed : {0.0, 15.0, 40.0}) {
+            const double seconds = 0.05, half = 0.5 * speed / 40 * seconds; // up to 1 rad/s
+            MovingCamera camera{k, start, start, ShutterDirection::down};
+            if (speed > 0)
+                camera.to = compose(start, rigid_from_quaternion({0.1 * speed * seconds, 0, speed * seconds},
+                                                                 {0, std::sin(half), 0, std::cos(half)}, "t")
+                                               .value());
+            const SplatPixels got = run_splats(splats, std::vector{camera}, {.max_pairs = 1u << 22});
+            const CameraView view(camera.frame());
+            const Lens lens(k);
+            std::vector<RayCase> rays;
+            for (uint32_t i = 0; i < k.width * k.height; ++i) {
+                const double x = i % k.width + 0.5, y = i / k.width + 0.5;
+                const Rigid pose = interpolate(camera.from, camera.to, camera.share(y));
+                const Point3 from = translation_of(pose), ray = lens.ray(x, y).value_or(Point3{0, 0, 1});
+                const Vec to = minus(transform(pose, ray), from);
+                RayCase r{{}, 0.2f, {}, 60};
+                for (size_t a = 0; a < 3; ++a) {
+                    r.origin[a] = float(from[a]);
+                    r.direction[a] = float(to[a]);
+                }
+                rays.push_back(r);
+            }
+            const Traced traced = trace(street.mesh, rays, false);
+            std::vector<double> errors;
+            for (uint32_t i = 0; i < rays.size(); ++i) {
+                const auto ray = lens.ray(i % k.width + 0.5, i / k.width + 0.5);
+                const double far = double(std::bit_cast<float>(traced.hits[i][0]));
+                if (ray && traced.hits[i][3] != ~0u && far < 20 && got.color[i * 4 + 3] > 0.5)
+                    errors.push_back(std::abs(got.depth[i * 2 + 1] - far * lens.depth(*ray)));
+            }
+            std::ranges::sort(errors);
+            ASSERT_GT(errors.size(), rays.size() / 3);
+            const double median = errors[errors.size() / 2], most = errors[errors.size() * 95 / 100];
+            fmt::print("{} {} m/s: {} splats, {} pixels, depth off by {:.2g} m (median), {:.2g} m (95 %)\n",
+                       name_of(k.model), speed, splats.size(), errors.size(), median, most);
+            EXPECT_LT(median, 0.01);
+            EXPECT_LT(most, 0.1);
+        }
 }
 
 } // namespace kernel_trace_rays_test
