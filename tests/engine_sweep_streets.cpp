@@ -200,7 +200,7 @@ TEST(engine_sweep_streets, points_and_depth_pictures_agree_on_planes)
     frame.intrinsics = pinhole_from_fov(90, 640, 400);
     frame.pose.world_to_camera = compose({0, -1, 0, 0, 0, 0, -1, 0, 1, 0, 0, 0, 0, 0, 0, 1}, inverse(sensor));
     auto rasterizer = Rasterizer::create(test_device(), made().scene->splats, 640, 400, 1).value();
-    const SplatCamera camera = splat_camera(frame);
+    const SplatCamera camera = splat_camera(frame, false);
     const SplatImage seen = rasterizer->render({&camera, 1}).value().front();
     const CameraView view(frame);
     std::vector<double> apart;

@@ -18,7 +18,7 @@ enum class PathAxes {
 struct Rig {
     PathAxes path_axes = PathAxes::camera;
     std::vector<Sensor> sensors;
-    std::vector<LidarSensor> lidars;
+    std::vector<LidarSensor> lidars = {};
 };
 
 // rig.json:
