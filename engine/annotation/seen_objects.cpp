@@ -82,7 +82,7 @@ std::vector<SeenObject> seen_objects(const CameraFrame& frame, const InstancePic
                                      std::span<const PlacedObject> objects)
 {
     const auto pixels = count_pixels(picture);
-    const BoxProjection projection(frame.intrinsics, kNear);
+    const BoxProjection projection(frame, kNear);
     std::vector<SeenObject> seen;
     for (const PlacedObject& o : objects) {
         const auto found = pixels.find(o.id + 1);
