@@ -59,8 +59,9 @@ TEST_F(Boxes, are_those_of_the_pixels_of_instance_pictures)
     EXPECT_EQ((*lines)[3].picture.number, 1u);
     EXPECT_EQ((*lines)[3].picture.time, 500000);
     std::set<uint32_t> ids;
-    const auto listed = read_objects(folder_ / "drive/objects.json");
-    for (const SceneObject& o : listed.value())
+    const auto objects = read_objects(folder_ / "drive/objects.json");
+    ASSERT_TRUE(objects);
+    for (const SceneObject& o : *objects)
         ids.insert(o.id);
     size_t seen = 0;
     for (const SeenPicture& line : *lines) {

@@ -54,8 +54,9 @@ class Export : public testing::Test {
     std::map<std::string, std::string> files(const std::string& out) const
     {
         std::map<std::string, std::string> all;
-        const auto listed = list_tree(folder_ / out);
-        for (const Path& path : listed.value())
+        const auto paths = list_tree(folder_ / out);
+        EXPECT_TRUE(paths);
+        for (const Path& path : *paths)
             all[path.lexically_relative(folder_ / out).string()] = contents(path);
         return all;
     }
@@ -293,8 +294,9 @@ TEST_F(Export, drivestudio_poses_and_lenses_put_pixels_where_they_are)
     EXPECT_EQ(info["1"]["class_name"], "Vehicle");
     const auto masks = [&](const char* kind, const char* scene_name) {
         size_t set = 0;
-        const auto listed = list_files(folder_ / "ds" / scene_name / "dynamic_masks" / kind);
-        for (const Path& file : listed.value()) {
+        const auto paths = list_files(folder_ / "ds" / scene_name / "dynamic_masks" / kind);
+        EXPECT_TRUE(paths);
+        for (const Path& file : *paths) {
             const ImageRgb8 mask = read_png_rgb8(file).value();
             set += size_t(std::ranges::count(mask.pixels, 255)) / 3;
         }

@@ -232,13 +232,14 @@ class NuscenesSchema {
     void check_data()
     {
         std::map<std::pair<std::string, std::string>, int> key_frames; // of a sample and channel
-        std::set<std::string> files, channels;
+        std::set<std::string> files;
+        std::map<std::string, std::set<std::string>> channels; // of each scene
         for (const auto& [token, data] : all("sample_data")) {
             const Json& sample = *find("sample", data["sample_token"]);
             const Json& calibrated = *find("calibrated_sensor", data["calibrated_sensor_token"]);
             const Json& sensor = *find("sensor", calibrated["sensor_token"]);
             const std::string channel = sensor["channel"], file = data["filename"];
-            channels.insert(channel);
+            channels[sample["scene_token"]].insert(channel);
             if (!files.insert(file).second || !std::filesystem::is_regular_file(root_ / file))
                 fault("sample_data {}: {} is missing, or there twice", token, file);
             const std::string folder = std::string(data["is_key_frame"] ? "samples/" : "sweeps/") + channel + "/";
@@ -256,7 +257,7 @@ class NuscenesSchema {
                 check_picture(token, data, calibrated);
         }
         for (const auto& [token, sample] : all("sample"))
-            for (const std::string& channel : channels)
+            for (const std::string& channel : channels[sample["scene_token"]])
                 if (key_frames[{token, channel}] != 1)
                     fault("sample {}: {} key frames of {}", token, key_frames[{token, channel}], channel);
     }

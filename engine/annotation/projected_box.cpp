@@ -85,11 +85,11 @@ class BoxProjection::Outline {
 
     void add_edge(const Point3& a, const Point3& b)
     {
-        const int steps = of_.intrinsics_.model == CameraModel::pinhole ? 1 : kSteps;
+        const int steps = of_.intrinsics_.model == CameraModel::pinhole && !of_.moving_ ? 1 : kSteps;
         std::optional<Projection> last;
         for (int i = 0; i <= steps; ++i) {
             const double t = double(i) / steps;
-            const auto now = of_.lens_.project(between(a, b, t));
+            const auto now = of_.project(between(a, b, t));
             if (i > 0 && now.has_value() != last.has_value())
                 add(end_of_seen(a, b, last ? t - 1.0 / steps : t, last ? t : t - 1.0 / steps));
             if (now && last && std::abs(now->x - last->x) > of_.intrinsics_.width / 2.0)
@@ -106,11 +106,11 @@ class BoxProjection::Outline {
         const double limit = of_.lens_.limit() * kJustInside;
         for (int i = 0; i < kDirections; ++i) {
             const double turn = 2 * std::numbers::pi * i / kDirections;
-            const double across = k.model == CameraModel::fisheye ? std::sin(limit) : limit;
-            const double ahead = k.model == CameraModel::fisheye ? std::cos(limit) : 1;
+            const double across = k.model == CameraModel::opencv ? limit : std::sin(limit);
+            const double ahead = k.model == CameraModel::opencv ? 1 : std::cos(limit);
             const Point3 ray = {across * std::cos(turn), across * std::sin(turn), ahead};
             if (meets(box, ray))
-                add(of_.lens_.project(ray));
+                add(of_.project(ray));
         }
     }
     // the whole width of a panorama, from or to a pole or both
@@ -131,9 +131,9 @@ class BoxProjection::Outline {
     {
         for (int i = 0; i < kHalvings; ++i) {
             const double middle = (seen + unseen) / 2;
-            (of_.lens_.project(between(a, b, middle)) ? seen : unseen) = middle;
+            (of_.project(between(a, b, middle)) ? seen : unseen) = middle;
         }
-        return of_.lens_.project(between(a, b, seen));
+        return of_.project(between(a, b, seen));
     }
     void add(const std::optional<Projection>& p)
     {

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/camera/lens.h"
+#include "engine/camera/camera_view.h"
 
 namespace semrover {
 
@@ -27,10 +27,18 @@ class BoxProjection {
     BoxProjection(const Intrinsics& intrinsics, double near) : intrinsics_(intrinsics), lens_(intrinsics), near_(near)
     {
     }
+    // also of a camera that moves while its picture is read out: what stands is seen in the lines that see it. What is
+    // cut off, and depths(), are as at the frame's time
+    BoxProjection(const CameraFrame& frame, double near) : BoxProjection(frame.intrinsics, near)
+    {
+        if (frame.moves())
+            moving_.emplace(frame);
+        to_world_ = frame.pose.camera_to_world();
+    }
 
     // The smallest area around all that the lens shows of the box; of a pinhole exact, else to 0.02 pixels, as edges
     // are followed in steps. A panorama's is as wide as the picture where the box is on both sides of its seam. none
-    // where the lens shows nothing of it. `box` is in the camera's frame
+    // where the lens shows nothing of it. `box` is in the camera's frame at the frame's time
     std::optional<PictureBox> amodal(const PlacedBox& box) const;
 
     // depths, as Lens::depth has them, at which the ray through a pixel's centre enters and leaves the box; none where
@@ -44,10 +52,16 @@ class BoxProjection {
 
   private:
     class Outline;
+    std::optional<Projection> project(const Point3& point) const
+    {
+        return moving_ ? moving_->project(transform(to_world_, point)) : lens_.project(point);
+    }
 
     Intrinsics intrinsics_;
     Lens lens_;
     double near_;
+    std::optional<CameraView> moving_;
+    Rigid to_world_ = kIdentity;
 };
 
 } // namespace semrover

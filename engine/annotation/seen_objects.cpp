@@ -57,15 +57,15 @@ double occlusion_of(const SeenObject& object, const PlacedBox& box, const BoxPro
     for (uint32_t y = top; y < bottom; y += step)
         for (uint32_t x = left; x < right; x += step) {
             const size_t pixel = size_t(y) * picture.width + x;
+            const auto depths = projection.depths(box, x, y);
+            if (!depths)
+                continue;
             if (picture.numbers[pixel] == object.id + 1) {
                 ++shown;
                 continue;
             }
-            const auto depths = projection.depths(box, x, y);
-            if (!depths)
-                continue;
-            const double depth = picture.depth(pixel);
-            ++(depth > 0 && depth < (*depths)[0] ? hidden : empty);
+            const double depth = picture.depth(pixel), middle = ((*depths)[0] + (*depths)[1]) / 2;
+            ++(depth > 0 && depth < middle ? hidden : empty);
         }
     const double fill = (shown + kUsualPixels * kUsualFill) / (shown + empty + kUsualPixels);
     return shown + hidden > 0 ? fill * hidden / (shown + fill * hidden) : 0;
@@ -82,7 +82,7 @@ std::vector<SeenObject> seen_objects(const CameraFrame& frame, const InstancePic
                                      std::span<const PlacedObject> objects)
 {
     const auto pixels = count_pixels(picture);
-    const BoxProjection projection(frame.intrinsics, kNear);
+    const BoxProjection projection(frame, kNear);
     std::vector<SeenObject> seen;
     for (const PlacedObject& o : objects) {
         const auto found = pixels.find(o.id + 1);

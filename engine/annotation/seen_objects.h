@@ -32,10 +32,10 @@ struct InstancePicture {
 };
 
 // The objects that have a pixel, by id, and numbers that no object has left out. Occlusion is estimated: of the pixels
-// whose rays meet the object's box, V show it; O show what is nearer than the box, and E anything else. Where nothing
-// is in front, V / (V + E) of the box is filled, and so as much of O is taken for the object's:
+// whose rays meet the object's box, V show it; O show what is nearer than its middle, and E anything else. Where
+// nothing is in front, V / (V + E) of the box is filled, and so as much of O is taken for the object's:
 //   f = (V + 8 * 0.7) / (V + E + 8), occlusion = f O / (V + f O)
-// docs/method.md §5.6 says how far that is from outlines that are drawn alone.
+// docs/method.md §5.7 says how far that is from outlines that are drawn alone.
 std::vector<SeenObject> seen_objects(const CameraFrame& frame, const InstancePicture& picture,
                                      std::span<const PlacedObject> objects);
 

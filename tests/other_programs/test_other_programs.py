@@ -264,14 +264,15 @@ class DataSets(Case):
     def setUp(self):
         super().setUp()
         scene, drive = SCENES / "avenue.truth.sgrid", self.folder / "drive"
-        lines = [line for line in (SCENES / "avenue.tum").read_text().splitlines() if not line.startswith("#")]
-        (self.folder / "path.tum").write_text("\n".join(lines[::8]) + "\n")
+        # level: KITTI's boxes turn about the camera's y axis alone
+        path = "".join(f"{i / 2} {8 + 3 * i} -1.5 1.75 -0.5 0.5 -0.5 0.5\n" for i in range(3))
+        (self.folder / "path.tum").write_text(path)
         (self.folder / "rig.json").write_text(json.dumps(RIG))
         run(SEMROVER, "convert", "-q", scene, self.folder / "guessed.objects.json", "-m", SCENES.parent / "model")
         run(SEMROVER, "render", "-q", scene, "--path", self.folder / "path.tum", "--rig", self.folder / "rig.json",
             "--splat-radius", "auto", "--objects", self.folder / "guessed.objects.json", "--boxes", "--points",
             "-o", drive)
-        self.drive, self.poses = drive, len(lines[::8])
+        self.drive = drive
 
     def export(self, layout, *more):
         run(SEMROVER, "dataset", "export", "-q", self.drive, "--to", layout, "-o", self.folder / layout, *more)
@@ -325,7 +326,7 @@ class DataSets(Case):
             for point in np.asarray(points.points):
                 distances.append(math.sqrt(tree.search_knn_vector_3d(point, 1)[2][0]))
         self.assertGreater(len(distances), 5000)
-        self.assertLess(np.median(distances), 0.06)  # points of the scene are 0.1 m apart
+        self.assertLess(np.median(distances), 0.08)  # 0.067: points of the scene are about 0.13 m apart
 
     @needs_program("colmap")
     def test_colmap_reads_the_model_and_finds_its_pictures(self):
@@ -335,7 +336,7 @@ class DataSets(Case):
             self.folder / "binary", "--output_type", "BIN")
         lines = (folder / "sparse" / "0" / "images.txt").read_text().splitlines()
         names = [line.split()[9] for line in lines if len(line.split()) == 10 and not line.startswith("#")]
-        self.assertEqual(len(names), 2 * self.poses)
+        self.assertEqual(len(names), 2 * 3)
         for name in names:
             self.assertTrue((folder / "images" / name).is_file())
 

@@ -62,7 +62,8 @@ class DriveStudioScene {
         const Intrinsics& k = sensor.intrinsics;
         const auto& d = k.distortion;
         const bool fits =
-            k.model == CameraModel::pinhole || (k.model == CameraModel::opencv && d[5] == 0 && d[6] == 0 && d[7] == 0);
+            k.model == CameraModel::pinhole ||
+            (k.model == CameraModel::opencv && std::all_of(d.begin() + 5, d.end(), [](double v) { return v == 0; }));
         if (!fits)
             return fail(ErrorCode::bad_input, "camera {}: drivestudio holds pinholes with up to k1 k2 p1 p2 k3, not {}",
                         quote(sensor.name), name_of(k.model));
