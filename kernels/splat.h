@@ -62,8 +62,9 @@ struct SplatTensors {
     Tensor owners;      // [N] u32: number of the thing that a splat is of, 0 of none
     Tensor blocks = {}; // [N / 64, rounded up] u32, or none: splats of a block that has 0 are skipped
 };
-// how rays become pixels, of all cameras of one call: engine/camera/lens.h
-enum class SplatLens : uint32_t { pinhole, opencv, fisheye, equirectangular, ftheta };
+// how rays become pixels, of all cameras of one call: engine/camera/lens.h; spinning: a part of a lidar's sweep, of
+// less than a turn (SweepPicture, engine/camera/lidar.h)
+enum class SplatLens : uint32_t { pinhole, opencv, fisheye, equirectangular, ftheta, spinning };
 constexpr uint32_t kLensCameraFloats = 40;
 constexpr uint32_t splat_camera_floats(SplatLens lens)
 {
@@ -89,6 +90,7 @@ struct SplatOptions {
     float cutoff = 0;             // sigmas; 0: as far as alpha_min
     // [cameras * height * width] fp32 array, or none, of pinholes: metres along z, what lies farther is not seen
     Tensor limits = {};
+    Tensor rows = {}; // [height, 4] fp32 array of a sweep: shaders/splat/splat.h
     // [cameras * movers, 12] fp32 array, or none: things that move, as each camera sees them. A row takes what a
     // mover's splats are given in to the camera's frame, [3, 4] row-major; zeros hide it. Without them nothing has
     // moved. Where cameras move while they are read out, [cameras * movers * 2, 12]: a row to the camera's frame in the

@@ -59,7 +59,8 @@ TEST_F(Boxes, are_those_of_the_pixels_of_instance_pictures)
     EXPECT_EQ((*lines)[3].picture.number, 1u);
     EXPECT_EQ((*lines)[3].picture.time, 500000);
     std::set<uint32_t> ids;
-    for (const SceneObject& o : read_objects(folder_ / "drive/objects.json").value())
+    const auto listed = read_objects(folder_ / "drive/objects.json");
+    for (const SceneObject& o : listed.value())
         ids.insert(o.id);
     size_t seen = 0;
     for (const SeenPicture& line : *lines) {

@@ -54,7 +54,8 @@ class Export : public testing::Test {
     std::map<std::string, std::string> files(const std::string& out) const
     {
         std::map<std::string, std::string> all;
-        for (const Path& path : list_tree(folder_ / out).value())
+        const auto listed = list_tree(folder_ / out);
+        for (const Path& path : listed.value())
             all[path.lexically_relative(folder_ / out).string()] = contents(path);
         return all;
     }
@@ -292,7 +293,8 @@ TEST_F(Export, drivestudio_poses_and_lenses_put_pixels_where_they_are)
     EXPECT_EQ(info["1"]["class_name"], "Vehicle");
     const auto masks = [&](const char* kind, const char* scene_name) {
         size_t set = 0;
-        for (const Path& file : list_files(folder_ / "ds" / scene_name / "dynamic_masks" / kind).value()) {
+        const auto listed = list_files(folder_ / "ds" / scene_name / "dynamic_masks" / kind);
+        for (const Path& file : listed.value()) {
             const ImageRgb8 mask = read_png_rgb8(file).value();
             set += size_t(std::ranges::count(mask.pixels, 255)) / 3;
         }

@@ -62,7 +62,7 @@ double street_depth(const Lens& lens, const Pose& pose, const Point3& ray)
 }
 
 // where a camera is when a pixel is read
-Pose pose_of(const CameraFrame& frame, double x, double y)
+Pose pose_of(const CameraFrame& frame, double y)
 {
     if (!frame.readout)
         return frame.pose;
@@ -82,7 +82,7 @@ View view(const CameraFrame& frame, uint32_t seed)
             for (int c = 0; c < 3; ++c)
                 v.pixels.push_back(uint8_t(128 + 90 * std::sin(0.2 * x + 0.13 * y + c) + double(random() % 60) - 30));
             const auto ray = lens.ray(x + 0.5, y + 0.5);
-            const double depth = ray ? street_depth(lens, pose_of(frame, x + 0.5, y + 0.5), *ray) : kFar;
+            const double depth = ray ? street_depth(lens, pose_of(frame, y + 0.5), *ray) : kFar;
             v.depth.push_back(depth < 65 ? float(depth) : 0.f);
         }
     return v;

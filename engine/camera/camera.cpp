@@ -139,6 +139,11 @@ std::optional<ShutterDirection> shutter_direction_of(std::string_view name)
     return ShutterDirection(found - std::begin(kDirectionNames));
 }
 
+Rigid LidarSweep::at(uint32_t beam, uint32_t column) const
+{
+    return interpolate(begin, end, lidar->firing_microseconds(beam, column) * 1e-6 * lidar->rate);
+}
+
 Rigid CameraPath::file_pose(size_t frame) const
 {
     const Rigid camera = frames[frame].pose.camera_to_world();

@@ -2,12 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/camera/rigid.h"
+#include "engine/camera/lidar.h"
 #include "runtime/base/file.h"
 #include "runtime/base/result.h"
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -88,11 +89,30 @@ struct Sensor {
     std::optional<Shutter> shutter = {}; // none: all lines are seen at the frame's time
 };
 
+// A lidar of a rig, in its own axes (engine/camera/lidar.h)
+struct LidarSensor {
+    std::string name; // as a camera's
+    std::shared_ptr<const Lidar> lidar;
+    Rigid sensor_to_vehicle = kIdentity;
+};
+
+// One turn of a lidar. It ends at a pose of the path.
+struct LidarSweep {
+    double time = 0; // of its end, seconds
+    std::string sensor;
+    std::shared_ptr<const Lidar> lidar;
+    Rigid begin = kIdentity, end = kIdentity; // sensor to world
+
+    Rigid at(uint32_t beam, uint32_t column) const; // when it is fired
+};
+
 // The frames that a run renders, in order. Readers return at least one. A file of a body's poses has frames of a camera
 // at the body's origin that looks forward.
 struct CameraPath {
     std::vector<CameraFrame> frames;
     std::vector<Sensor> sensors = {};       // of the rig that the frames are of, if they are of one
+    std::vector<LidarSensor> lidars = {};   // likewise; a rig may have no others
+    std::vector<LidarSweep> sweeps = {};    // pose by pose
     bool numbered = false;                  // the times are numbers that the file gives its frames
     std::optional<PathBody> body = {};      // of the file's poses; none: a camera
     std::vector<std::string> warnings = {}; // of the reader
@@ -123,6 +143,7 @@ std::optional<CameraModel> camera_model_of(std::string_view name);
 
 std::string_view name_of(ShutterDirection direction);
 std::optional<ShutterDirection> shutter_direction_of(std::string_view name);
+
 int64_t microseconds_of(double seconds); // rounded: a time of a frame as files of times have it
 
 struct Projection {

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 namespace semrover {
 
@@ -169,26 +170,46 @@ Result<std::optional<Shutter>> read_shutter(const Json& json, std::string_view w
 }
 
 // alone: in its rig, where it needs no name
-Result<Sensor> read_sensor(const Json& json, bool alone, std::string_view where)
+Result<std::string> read_name(const Json& json, bool alone, std::string_view where)
 {
-    if (!json.is_object())
-        return fail(ErrorCode::bad_input, "{}: expected an object, found {}", where, json.type_name());
-    SR_CHECK(check_keys(json,
-                        {"name", "model", "width", "height", "fov", "fx", "fy", "cx", "cy", "distortion",
-                         "principal_point", "reference_poly", "pixeldist_to_angle_poly", "angle_to_pixeldist_poly",
-                         "max_angle", "linear_cde", "shutter", "sensor_to_vehicle", "comment"},
-                        where));
     const Json name = json.value("name", Json());
     if (!name.is_string() || !(is_camera_name(name.get_ref<const std::string&>()) || (alone && name == "")))
         return fail(ErrorCode::bad_input, "{}: expected a name of letters, digits, '.', '_' and '-'", where);
     if (!json.contains("sensor_to_vehicle"))
         return fail(ErrorCode::bad_input, "{}: sensor_to_vehicle is missing", where);
+    return name.get<std::string>();
+}
+
+Result<Sensor> read_sensor(const Json& json, bool alone, std::string_view where)
+{
+    SR_CHECK(check_keys(json,
+                        {"name", "model", "width", "height", "fov", "fx", "fy", "cx", "cy", "distortion",
+                         "principal_point", "reference_poly", "pixeldist_to_angle_poly", "angle_to_pixeldist_poly",
+                         "max_angle", "linear_cde", "shutter", "sensor_to_vehicle", "comment"},
+                        where));
     Sensor sensor;
-    sensor.name = name.get<std::string>();
+    SR_TRY(sensor.name, read_name(json, alone, where));
     SR_TRY(sensor.intrinsics, read_intrinsics(json, where));
     if (json.contains("shutter")) {
         SR_TRY(sensor.shutter, read_shutter(json["shutter"], fmt::format("{}: shutter", where)));
     }
+    SR_TRY(sensor.sensor_to_vehicle,
+           read_mounting(json["sensor_to_vehicle"], fmt::format("{}: sensor_to_vehicle", where)));
+    return sensor;
+}
+
+// folder: of the rig's file
+Result<LidarSensor> read_lidar_sensor(const Json& json, const Path& folder, std::string_view where)
+{
+    SR_CHECK(check_keys(json, {"name", "lidar", "sensor_to_vehicle", "comment"}, where));
+    LidarSensor sensor;
+    SR_TRY(sensor.name, read_name(json, false, where));
+    if (!json["lidar"].is_string())
+        return fail(ErrorCode::bad_input, "{}: lidar: expected the name of a lidar or a file, found {}", where,
+                    json["lidar"].type_name());
+    const std::string& lidar = json["lidar"].get_ref<const std::string&>();
+    SR_TRY(Lidar read, lidar.ends_with(".json") ? read_lidar(folder / lidar) : named_lidar(lidar));
+    sensor.lidar = std::make_shared<const Lidar>(std::move(read));
     SR_TRY(sensor.sensor_to_vehicle,
            read_mounting(json["sensor_to_vehicle"], fmt::format("{}: sensor_to_vehicle", where)));
     return sensor;
@@ -209,10 +230,11 @@ class Course {
     {
         for (size_t i = 1; i < times_.size(); ++i)
             if (!(times_[i] > times_[i - 1]))
-                return fail(ErrorCode::bad_input,
-                            "a rolling shutter needs poses at times that rise: pose {} is at {} s, the one before at "
-                            "{} s",
-                            i, times_[i], times_[i - 1]);
+                return fail(
+                    ErrorCode::bad_input,
+                    "rolling shutters and lidars need poses at times that rise: pose {} is at {} s, the one before at "
+                    "{} s",
+                    i, times_[i], times_[i - 1]);
         return {};
     }
 
@@ -266,10 +288,10 @@ Result<PathAxes> read_path_axes(const Json& file, std::string_view where)
 Result<Rig> read_rig(const Path& path)
 {
     SR_TRY(const Json file, read_json(path));
-    return parse_rig(file, quote_path(path));
+    return parse_rig(file, quote_path(path), path.parent_path());
 }
 
-Result<Rig> parse_rig(const Json& file, std::string_view name)
+Result<Rig> parse_rig(const Json& file, std::string_view name, const Path& folder)
 {
     if (!file.is_object() || !file.contains("sensors") || !file["sensors"].is_array())
         return fail(ErrorCode::bad_input, "{}: expected an object with an array of sensors", name);
@@ -278,12 +300,22 @@ Result<Rig> parse_rig(const Json& file, std::string_view name)
     if (sensors.empty() || sensors.size() > kMaxSensors)
         return fail(ErrorCode::bad_input, "{}: expected 1 to {} sensors, found {}", name, kMaxSensors, sensors.size());
     Rig rig;
+    std::set<std::string> names;
     SR_TRY(rig.path_axes, read_path_axes(file, name));
     for (size_t i = 0; i < sensors.size(); ++i) {
-        SR_TRY(Sensor sensor, read_sensor(sensors[i], sensors.size() == 1, fmt::format("{} sensor {}", name, i)));
-        if (std::ranges::find(rig.sensors, sensor.name, &Sensor::name) != rig.sensors.end())
-            return fail(ErrorCode::bad_input, "{}: two sensors are called {}", name, quote(sensor.name));
-        rig.sensors.push_back(std::move(sensor));
+        const std::string where = fmt::format("{} sensor {}", name, i);
+        if (!sensors[i].is_object())
+            return fail(ErrorCode::bad_input, "{}: expected an object, found {}", where, sensors[i].type_name());
+        if (sensors[i].contains("lidar")) {
+            SR_TRY(LidarSensor sensor, read_lidar_sensor(sensors[i], folder, where));
+            rig.lidars.push_back(std::move(sensor));
+        } else {
+            SR_TRY(Sensor sensor, read_sensor(sensors[i], sensors.size() == 1, where));
+            rig.sensors.push_back(std::move(sensor));
+        }
+        const std::string called = sensors[i]["name"].get<std::string>();
+        if (!names.insert(called).second)
+            return fail(ErrorCode::bad_input, "{}: two sensors are called {}", name, quote(called));
     }
     return rig;
 }
@@ -314,8 +346,11 @@ Json rig_json(std::span<const Sensor> sensors)
 
 Result<CameraPath> expand_rig(const Rig& rig, const CameraPath& vehicle)
 {
-    CameraPath cameras{
-        .frames = {}, .sensors = rig.sensors, .numbered = vehicle.numbered, .warnings = vehicle.warnings};
+    CameraPath cameras{.frames = {},
+                       .sensors = rig.sensors,
+                       .lidars = rig.lidars,
+                       .numbered = vehicle.numbered,
+                       .warnings = vehicle.warnings};
     Course course;
     for (size_t i = 0; i < vehicle.frames.size(); ++i) {
         const CameraFrame& pose = vehicle.frames[i];
@@ -328,16 +363,31 @@ Result<CameraPath> expand_rig(const Rig& rig, const CameraPath& vehicle)
                                       sensor.name,
                                       {compose(inverse(sensor.sensor_to_vehicle), world_to_vehicle)},
                                       sensor.intrinsics});
+        for (const LidarSensor& sensor : rig.lidars) {
+            const Rigid to_world = compose(inverse(world_to_vehicle), sensor.sensor_to_vehicle);
+            cameras.sweeps.push_back({pose.time, sensor.name, sensor.lidar, to_world, to_world});
+        }
     }
-    if (std::ranges::none_of(rig.sensors, [](const Sensor& s) { return s.shutter.has_value(); }))
+    const bool shutters = std::ranges::any_of(rig.sensors, [](const Sensor& s) { return s.shutter.has_value(); });
+    if (!shutters && rig.lidars.empty())
         return cameras;
-    if (vehicle.numbered)
+    if (vehicle.numbered && shutters)
         return fail(ErrorCode::bad_input, "a rolling shutter needs poses with times; these have numbers");
+    if (vehicle.numbered) {
+        cameras.warnings.push_back("the poses have numbers in place of times: lidars stand during their sweeps");
+        return cameras;
+    }
     SR_CHECK(course.check());
     for (size_t i = 0; i < cameras.frames.size(); ++i) {
         const Sensor& sensor = rig.sensors[i % rig.sensors.size()];
         if (sensor.shutter)
             cameras.frames[i].readout = readout_of(sensor, cameras.frames[i], course, i / rig.sensors.size());
+    }
+    for (size_t i = 0; i < cameras.sweeps.size(); ++i) {
+        LidarSweep& sweep = cameras.sweeps[i];
+        const Rigid vehicle_then = course.at(sweep.time - sweep.lidar->sweep_seconds());
+        if (vehicle_then != course.pose(i / rig.lidars.size())) // to the bit, as if it stood
+            sweep.begin = compose(vehicle_then, rig.lidars[i % rig.lidars.size()].sensor_to_vehicle);
     }
     return cameras;
 }

@@ -18,6 +18,7 @@ enum class PathAxes {
 struct Rig {
     PathAxes path_axes = PathAxes::camera;
     std::vector<Sensor> sensors;
+    std::vector<LidarSensor> lidars;
 };
 
 // rig.json:
@@ -35,11 +36,14 @@ struct Rig {
 //                             "start": -15000,                                   microseconds from the frame's time;
 //                                                                                default 0
 //                             "readout": 30000},                                 microseconds of all lines
-//                 "sensor_to_vehicle": 4x4 | {"translation": [x, y, z], "rotation": [qx, qy, qz, qw]}}]}
+//                 "sensor_to_vehicle": 4x4 | {"translation": [x, y, z], "rotation": [qx, qy, qz, qw]}},
+//                {"name": "lidar_top", "lidar": "ot128",           of assets/lidar, or a file beside this one (.json)
+//                 "sensor_to_vehicle": as above}]}
 // The name of an only sensor may be "": its pictures are in no folder of their own. A key "comment" of text is allowed
 // beside the others. bad_input for anything else, unknown keys included; at most 64 sensors, 16 MiB
 Result<Rig> read_rig(const Path& path);
-Result<Rig> parse_rig(const Json& file, std::string_view where);
+// folder: where the files of lidars are
+Result<Rig> parse_rig(const Json& file, std::string_view where, const Path& folder = {});
 
 // where a camera sits that is at the vehicle's origin and looks forward
 constexpr Rigid kForwardCamera = {0, 0, 1, 0, -1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 0, 1};
@@ -47,9 +51,10 @@ constexpr Rigid kForwardCamera = {0, 0, 1, 0, -1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 0,
 // the sensors as an object that read_rig reads
 Json rig_json(std::span<const Sensor> sensors);
 
-// The frames of all sensors at every pose of the vehicle: pose by pose, sensors in the rig's order. Where the vehicle
-// is while a picture is read out is interpolated between its poses; before the first and after the last one its motion
-// goes on, and one with a single pose stands. bad_input for a shutter where times do not rise, or are numbers
+// The frames of all sensors at every pose of the vehicle: pose by pose, sensors in the rig's order; a sweep of each
+// lidar ends there. Where the vehicle is during a sweep, and while a picture is read out, is interpolated between its
+// poses; before the first and after the last one its motion goes on, and one with a single pose stands. Where times are
+// numbers lidars stand, with a warning. bad_input for a shutter then, and where times do not rise
 Result<CameraPath> expand_rig(const Rig& rig, const CameraPath& vehicle);
 
 } // namespace semrover

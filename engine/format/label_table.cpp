@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/format/label_map.h"
 
-#include "label_maps.h"
+#include "label_maps_json.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
 

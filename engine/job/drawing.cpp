@@ -9,6 +9,7 @@
 #include "engine/job/drawing_store.h"
 #include "engine/job/empty_frames.h"
 #include "engine/job/input_hashes.h"
+#include "engine/job/lidar_returns.h"
 #include "engine/job/outgoing.h"
 #include "engine/job/outputs.h"
 #include "engine/job/version.h"
@@ -84,6 +85,7 @@ class DrawingJob : public Job {
         }
         const Json results{{"output", o_.folder.string()},
                            {"frames", drawing_.total()},
+                           {"sweeps", o_.path.sweeps.size()},
                            {"splats", scene_.splats.size()},
                            {"skipped", scene_.splats.skipped()},
                            {"empty_frames", empty_ ? empty_->count() : 0},
@@ -107,30 +109,22 @@ class DrawingJob : public Job {
         for (const CameraFrame& f : o_.path.frames)
             whole_.push_back(store_->has(f.camera, counts[f.camera]++) && !draw_all);
         before_ = size_t(std::ranges::count(whole_, true));
+        for (const LidarSweep& s : o_.path.sweeps)
+            before_ += store_->has_sweep(s.sensor, counts[s.sensor]++);
         top_left_ = o_.top.width && !store_->has_top();
     }
     Result<bool> advance(const JobBudget& budget)
     {
         BudgetMeter meter(budget, cost_);
-        bool done = drawing_.total() == 0;
-        while (!done) {
+        while (!all_drawn()) {
             SR_CHECK(out_->poll());
-            const auto moment = drawing_.next();
-            const auto whole = whole_.begin() + ptrdiff_t(drawing_.done());
-            if (std::all_of(whole, whole + ptrdiff_t(moment.size()), [](bool w) { return w; })) {
-                SR_CHECK(pass_on(moment));
-                done = drawing_.skip();
-            } else {
-                drew_ = true;
-                SR_TRY(done, drawing_.step([this](const CameraFrame& frame, const FrameSlots& pixels) {
-                    return take(frame, pixels);
-                }));
-            }
-            say(done);
+            SR_CHECK(drawing_.done() < drawing_.total() ? draw_moment() : draw_sweep(o_.path.sweeps[sweep_]));
+            say(all_drawn());
             meter.submitted();
             if (!meter.room())
                 break;
         }
+        const bool done = all_drawn();
         if (done && top_left_)
             SR_CHECK(draw_overview());
         if (done)
@@ -139,13 +133,57 @@ class DrawingJob : public Job {
             SR_CHECK(empty_->report(callbacks_));
         return done;
     }
+    bool all_drawn() const { return drawing_.done() == drawing_.total() && sweep_ == o_.path.sweeps.size(); }
+    Status draw_moment()
+    {
+        const auto moment = drawing_.next();
+        const auto whole = whole_.begin() + ptrdiff_t(drawing_.done());
+        if (std::all_of(whole, whole + ptrdiff_t(moment.size()), [](bool w) { return w; })) {
+            SR_CHECK(pass_on(moment));
+            drawing_.skip();
+            return {};
+        }
+        drew_ = true;
+        return drawing_.step([this](const CameraFrame& frame, const FrameSlots& pixels) { return take(frame, pixels); })
+            .map([](bool) {});
+    }
+    Status draw_sweep(const LidarSweep& sweep)
+    {
+        ++sweep_;
+        const uint32_t number = counts_[sweep.sensor]++;
+        if (store_->has_sweep(sweep.sensor, number))
+            return {};
+        drew_ = true;
+        std::unique_ptr<SweepDrawing>& sweeps = lidars_[sweep.lidar.get()];
+        if (!sweeps) {
+            SR_TRY(sweeps, SweepDrawing::create(device_, scene_, sweep.lidar, o_.draw.rasterizer()));
+        }
+        const auto image = std::make_shared<SweepImage>(sweeps->image());
+        const auto write = [this, sweep, number, image] {
+            return out_->write(image->bytes(), [this, sweep, number, image] {
+                const float least_alpha = o_.draw.rasterizer().visible_alpha;
+                return store_->make_sweep(sweep.sensor, number, lidar_returns(sweep, *image, least_alpha));
+            });
+        };
+        return sweeps->draw(sweep, [&, rasterizer = sweeps.get()](uint32_t part, SplatSlots seen) -> Status {
+            for (size_t slot = 0; slot < seen.all().size(); ++slot) {
+                const bool last = part + 1 == rasterizer->parts() && slot + 1 == seen.all().size();
+                SR_CHECK(out_->read(*seen.all()[slot], [=](std::span<const std::byte> bytes) -> Status {
+                    rasterizer->put(part, slot, bytes, *image);
+                    return last ? write() : Status();
+                }));
+            }
+            return {};
+        });
+    }
     void say(bool ended)
     {
-        if (callbacks_.progress && drawing_.total())
+        const size_t total = drawing_.total() + o_.path.sweeps.size();
+        if (callbacks_.progress && total)
             callbacks_.progress({.stage = "render",
                                  .unit = "frames",
-                                 .done = drawing_.done(),
-                                 .total = drawing_.total(),
+                                 .done = drawing_.done() + sweep_,
+                                 .total = total,
                                  .done_before = before_,
                                  .device_bytes = device_.allocated_bytes(),
                                  .ended = ended});
@@ -213,9 +251,11 @@ class DrawingJob : public Job {
     SubmitCost cost_;
     std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
     std::optional<EmptyFrames> empty_;       // of a path
-    std::map<std::string, uint32_t> counts_; // frames so far, per camera
-    std::vector<bool> whole_;                // of each frame of the path
-    size_t before_ = 0;                      // how many of them
+    std::map<std::string, uint32_t> counts_; // frames so far, per camera; sweeps, per lidar
+    std::map<const Lidar*, std::unique_ptr<SweepDrawing>> lidars_;
+    size_t sweep_ = 0;        // the next of the path
+    std::vector<bool> whole_; // of each frame of the path
+    size_t before_ = 0;       // how many of them
     bool top_left_ = false, drew_ = false;
     std::unique_ptr<FrameBoxes> boxes_; // what the store keeps its lines in
     std::unique_ptr<DrawingStore> store_;
@@ -253,7 +293,10 @@ uint64_t largest_read(const DrawingOptions& o)
     uint64_t pixels = uint64_t(o.top.width) * o.top.height;
     for (const CameraFrame& f : o.path.frames)
         pixels = std::max(pixels, uint64_t(f.intrinsics.width) * f.intrinsics.height);
-    return pixels * (o.encoding.flow ? 8 : 4);
+    uint64_t bytes = pixels * (o.encoding.flow ? 8 : 4);
+    for (const LidarSensor& lidar : o.path.lidars)
+        bytes = std::max(bytes, SweepDrawing::largest_read(*lidar.lidar));
+    return bytes;
 }
 
 } // namespace
@@ -281,13 +324,13 @@ Result<std::unique_ptr<Job>> begin_drawing(Device& device, DrawingOptions option
                            .points = o.points,
                            .instances = o.draw.instances,
                            .boxes = boxes.get(),
-                           .encoding = o.encoding};
+                           .encoding = o.encoding,
+                           .lidar = o.lidar};
     SR_TRY(auto store, DrawingStore::open(o.folder, settings, o.path, files, o.replace));
     if (!store->run().results()) {
-        if (!o.path.frames.empty()) {
-            SR_CHECK(store->write_cameras(o.path));
+        SR_CHECK(store->write_cameras(o.path));
+        if (!o.path.frames.empty())
             SR_CHECK(write_record_of(o.path, o.encoding.depth_unit(), o.folder, callbacks));
-        }
         if (o.points)
             SR_CHECK(write_points(o.folder / "points.ply", o));
     }

@@ -12,6 +12,7 @@
 #include "runtime/base/quote.h"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 namespace semrover {
@@ -23,6 +24,8 @@ namespace fs = std::filesystem;
 constexpr const char* kPictures[] = {"color", "depth", "normal", "label", "visible"};
 constexpr const char *kInstances = "instance", *kFlow = "flow", *kFlowStates = "flow_state";
 constexpr const char* kArrays[] = {"depth_expected", "depth_median", "alpha"};
+constexpr const char* kPointsOf = "points"; // of sweeps
+constexpr const char* kSweeps = "sweeps.json";
 constexpr const char* kTop = "top.png";
 constexpr const char* kBoxes = "boxes"; // of a frame's entry in the journal
 constexpr const char* kPoints = "points.ply";
@@ -36,12 +39,36 @@ std::vector<std::string> single_files()
     return names;
 }
 
+// lidars, too
 std::set<std::string> cameras_of(const CameraPath& path)
 {
     std::set<std::string> cameras;
     for (const CameraFrame& f : path.frames)
         cameras.insert(f.camera);
+    for (const LidarSweep& s : path.sweeps)
+        cameras.insert(s.sensor);
     return cameras;
+}
+
+Json matrix_of(const Rigid& pose)
+{
+    Json rows = Json::array();
+    for (size_t row = 0; row < 4; ++row)
+        rows.push_back(std::span(pose).subspan(4 * row, 4));
+    return rows;
+}
+
+// where a lidar was: {"format", "version", "sweeps": [{"time", "begin", "end"}]}, its poses to the world
+Json sweeps_json(const CameraPath& path, const std::string& lidar)
+{
+    Json sweeps = Json::array();
+    for (const LidarSweep& s : path.sweeps)
+        if (s.sensor == lidar)
+            sweeps.push_back({{"time", std::llround(s.time * 1e6)},
+                              {"duration", std::llround(s.lidar->sweep_seconds() * 1e6)},
+                              {"begin", matrix_of(s.begin)},
+                              {"end", matrix_of(s.end)}});
+    return {{"format", "semrover.sweeps"}, {"version", 1}, {"sweeps", std::move(sweeps)}};
 }
 
 // the folders of these cameras' pictures, from the run's folder on
@@ -53,6 +80,8 @@ std::vector<std::string> picture_folders(const std::set<std::string>& cameras)
             folders.push_back((camera_folder("", camera) / kind).string());
         for (const char* kind : kArrays)
             folders.push_back((camera_folder("", camera) / kind).string());
+        if (!camera.empty())
+            folders.push_back((camera_folder("", camera) / kPointsOf).string());
         for (const char* kind : {kInstances, kFlow, kFlowStates})
             folders.push_back((camera_folder("", camera) / kind).string());
     }
@@ -71,6 +100,11 @@ std::set<std::string> cameras_before(const Path& folder)
         if (camera.is_string() && (camera == "" || is_camera_name(camera.get_ref<const std::string&>())))
             cameras.insert(camera.get<std::string>());
     return cameras;
+}
+
+std::string sweep_name(const std::string& lidar, uint32_t number)
+{
+    return fmt::format("{}/{}/{:06}", lidar, kPointsOf, number);
 }
 
 std::set<std::string> pieces_with_flow(const CameraPath& path)
@@ -131,10 +165,15 @@ Result<std::unique_ptr<DrawingStore>> DrawingStore::open(const Path& folder, con
     Json with_cameras = settings;
     with_cameras["cameras"] = cameras;
     with_cameras["files"] = {{"npy", files.floats}, {"top", files.top}, {"points", files.points}};
+    if (!path.sweeps.empty())
+        with_cameras["files"]["lidar"] = kLidarFormats[size_t(files.lidar)];
     cameras.merge(cameras_before(folder));
     RunContents contents{{}, single_files(), picture_folders(cameras)};
     if (files.boxes || had_boxes_before(folder))
         contents.results.insert(contents.results.end(), {kBoxesName, kObjectsName});
+    for (const std::string& camera : cameras)
+        if (!camera.empty())
+            contents.results.push_back((camera_folder("", camera) / kSweeps).string());
     SR_TRY(RunFolder run, open_run(folder, with_cameras, replace, contents, true));
     return std::unique_ptr<DrawingStore>(new DrawingStore(std::move(run), path, files));
 }
@@ -159,6 +198,8 @@ std::vector<Path> DrawingStore::files_of(const std::string& piece) const
     if (piece == kTop)
         return {run_.path() / kTop};
     const Path name = run_.path() / piece;
+    if (std::ranges::count(piece, '/') == 2) // sweep_name()
+        return {name.string() + fmt::format(".{}", kLidarEndings[size_t(files_.lidar)])};
     std::vector<Path> files;
     for (const std::string kind : kPictures) {
         const std::string_view extension = kind == "color"   ? files_.encoding.color_extension()
@@ -182,6 +223,11 @@ std::vector<Path> DrawingStore::files_of(const std::string& piece) const
 bool DrawingStore::has(const std::string& camera, uint32_t number) const
 {
     return record_.has(frame_key(camera, number));
+}
+
+bool DrawingStore::has_sweep(const std::string& lidar, uint32_t number) const
+{
+    return record_.has(sweep_name(lidar, number));
 }
 
 bool DrawingStore::has_top() const
@@ -214,6 +260,15 @@ Result<FileQueue::Commit> DrawingStore::make(const CameraFrame& frame, uint32_t 
     };
 }
 
+Result<FileQueue::Commit> DrawingStore::make_sweep(const std::string& lidar, uint32_t number,
+                                                   std::span<const LidarPoint> points)
+{
+    const auto files = std::make_shared<MadeFiles>();
+    const std::string piece = sweep_name(lidar, number);
+    SR_CHECK(files->add(files_of(piece).front(), encode_lidar(points, files_.lidar)));
+    return [this, piece, files] { return record_.add(piece, *files); };
+}
+
 Result<FileQueue::Commit> DrawingStore::make_top(const ImageSize& size, std::span<const uint8_t> color)
 {
     const auto files = std::make_shared<MadeFiles>();
@@ -225,6 +280,14 @@ Result<FileQueue::Commit> DrawingStore::make_top(const ImageSize& size, std::spa
 
 Status DrawingStore::write_cameras(const CameraPath& path) const
 {
+    MadeFiles files;
+    for (const LidarSensor& lidar : path.lidars) {
+        const std::string text = sweeps_json(path, lidar.name).dump() + "\n";
+        SR_CHECK(files.add(run_.path() / lidar.name / kSweeps, std::as_bytes(std::span(text))));
+    }
+    SR_CHECK(files.commit());
+    if (path.frames.empty())
+        return {};
     const auto pictures = [this](const std::string& camera, uint32_t number) {
         return rendered_pictures(camera, number, files_.encoding);
     };

@@ -5,6 +5,7 @@
 #include "engine/camera/camera.h"
 #include "engine/camera/image_size.h"
 #include "engine/deferred/frame_images.h"
+#include "engine/format/lidar_points.h"
 #include "engine/job/file_queue.h"
 #include "engine/job/frame_boxes.h"
 #include "engine/job/piece_record.h"
@@ -23,6 +24,7 @@ struct DrawnFiles {
     bool instances = false;      // instance/000000.png
     FrameBoxes* boxes = nullptr; // boxes.jsonl and objects.json, of lines that it keeps; outlives the drawing
     PictureEncoding encoding = {};
+    LidarFormat lidar = LidarFormat::npy; // of LIDAR/points/000000.npy, .. of sweeps
 };
 
 // The pictures of a drawing in its folder, and which of them are done. A piece is a frame, with all its files.
@@ -39,14 +41,16 @@ class DrawingStore {
     Path folder(const std::string& camera) const; // of its pictures
     bool has(const std::string& camera, uint32_t number) const;
     bool has_top() const;
+    bool has_sweep(const std::string& lidar, uint32_t number) const;
     // whether the pictures of a frame that is there show nothing of the scene
     Result<bool> saw_nothing(const std::string& camera, uint32_t number) const;
     // On any thread; what they return is called on another one than has(), or after the last call of it.
     // number: of the frame among its camera's; floats: of the frame, where DrawnFiles has them
     Result<FileQueue::Commit> make(const CameraFrame& frame, uint32_t number, const FramePixels& pixels,
                                    const SplatImage* floats);
+    Result<FileQueue::Commit> make_sweep(const std::string& lidar, uint32_t number, std::span<const LidarPoint> points);
     Result<FileQueue::Commit> make_top(const ImageSize& size, std::span<const uint8_t> color);
-    // transforms.json of the path
+    // transforms.json of the path's frames, LIDAR/sweeps.json of its sweeps
     Status write_cameras(const CameraPath& path) const;
     Status finish(const Json& results); // with the boxes, where they are asked for
     // a finished drawing's boxes that are not there any more

@@ -17,6 +17,17 @@ uint64_t hash_arrays(std::string_view first, const Arrays&... arrays)
     return hash.value();
 }
 
+void add_lidar(Hash& hash, const Lidar& l)
+{
+    const double numbers[] = {double(l.columns), l.rate,     double(l.clockwise), l.start,
+                              l.nearest,         l.farthest, l.farthest_at_tenth, double(l.first_ring_on_top)};
+    hash.add(std::as_bytes(std::span(numbers)));
+    for (const LidarBeam& b : l.beams) {
+        const double beam[] = {b.elevation, b.azimuth, b.delay, double(b.every)};
+        hash.add(std::as_bytes(std::span(beam)));
+    }
+}
+
 // of what pictures of instances show, and actors are made of
 uint64_t hash_objects(std::span<const SceneObject> objects)
 {
@@ -75,6 +86,13 @@ uint64_t hash_cameras(const CameraPath& path)
         hash.add(name_of(f.readout->direction));
         hash.add(std::as_bytes(std::span(f.readout->from.world_to_camera)));
         hash.add(std::as_bytes(std::span(f.readout->to.world_to_camera)));
+    }
+    for (const LidarSweep& s : path.sweeps) {
+        hash.add(s.sensor);
+        hash.add(std::as_bytes(std::span(&s.time, 1)));
+        hash.add(std::as_bytes(std::span(s.begin)));
+        hash.add(std::as_bytes(std::span(s.end)));
+        add_lidar(hash, *s.lidar);
     }
     return hash.value();
 }

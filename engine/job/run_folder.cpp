@@ -90,16 +90,16 @@ tl::unexpected<Error> other_settings(const Path& folder, bool finished)
                 quote_path(folder));
 }
 
-// NNNNNN.png, .jpg and .npy, then the folder and the camera's around it if there is nothing else. The run's own folder
-// holds its lock.
+// NNNNNN.png, .jpg, .npy and points of lidars, then the folder and the camera's around it if there is nothing else. The
+// run's own folder holds its lock.
 void remove_numbered(const Path& folder)
 {
     std::error_code ignored;
     std::vector<Path> files;
     for (const auto& entry : fs::directory_iterator(folder, ignored)) {
-        const std::string stem = entry.path().stem().string();
-        const std::string extension = entry.path().extension().string();
-        const bool ours = extension == ".png" || extension == ".jpg" || extension == ".npy";
+        const std::string name = entry.path().filename().string(), stem = name.substr(0, name.find('.'));
+        static constexpr std::string_view kEndings[] = {".png", ".jpg", ".npy", ".bin", ".pcd", ".pcd.bin"};
+        const bool ours = std::ranges::count(kEndings, name.substr(stem.size())) > 0;
         if (ours && stem.size() == 6 && std::ranges::all_of(stem, ::isdigit))
             files.push_back(entry.path());
     }

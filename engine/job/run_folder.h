@@ -11,7 +11,7 @@ namespace semrover {
 
 // Files and folders inside a run's folder. Pieces are removed when the run is finished, results are kept; a restart
 // removes both. `numbered` are folders of results which a restart must not take for its own: of the files there it
-// removes NNNNNN.png, .jpg and .npy.
+// removes NNNNNN.png, .jpg and .npy, and points of lidars.
 struct RunContents {
     std::vector<std::string> pieces = {"regions"}, results = {}, numbered = {};
 };

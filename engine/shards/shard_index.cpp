@@ -19,6 +19,8 @@ namespace {
 constexpr uint32_t kVersion = 1;
 constexpr JsonLimits kIndexLimits{.bytes = 256u << 20, .depth = 8, .values = 8u << 20, .containers = 2u << 20};
 
+constexpr std::string_view kNuscenesPoints = "pcd.bin"; // as nuScenes calls them
+
 bool are_alphanumeric(std::string_view text)
 {
     return !text.empty() && std::ranges::all_of(text, [](unsigned char c) {
@@ -201,7 +203,8 @@ std::optional<ShardPicture> shard_picture(std::string_view path)
     const size_t dot = file.find('.');
     const auto moment = moment_of(file.substr(0, dot));
     const std::string_view ending = dot == std::string_view::npos ? "" : file.substr(dot + 1);
-    if (!moment || ending.size() > 16 || !are_alphanumeric(ending) || folders.empty() || folders.size() > 3 ||
+    const bool is_ending = are_alphanumeric(ending) || ending == kNuscenesPoints;
+    if (!moment || ending.size() > 16 || !is_ending || folders.empty() || folders.size() > 3 ||
         !std::ranges::all_of(folders, is_camera_name))
         return std::nullopt;
     ShardPicture picture{*moment, Path(path).parent_path().string(), "", "", std::string(ending)};

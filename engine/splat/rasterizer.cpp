@@ -161,6 +161,8 @@ Result<std::unique_ptr<Rasterizer>> Rasterizer::create(Device& device, const Spl
 {
     if (width < 1 || height < 1 || width > 65535 || height > 65535)
         return fail(ErrorCode::usage, "an image of {} x {} pixels; 1 to 65535 are supported", width, height);
+    SR_ASSERT(options.sweep_rows.empty() || options.sweep_rows.size() == height, "{} rows of a sweep in {}",
+              options.sweep_rows.size(), height);
     if (max_cameras < 1 || options.tile < 16 || options.tile % 16)
         return fail(ErrorCode::usage, "{} cameras, tiles of {} pixels", max_cameras, options.tile);
     std::unique_ptr<Rasterizer> r(new Rasterizer(device, scene));
@@ -176,8 +178,8 @@ Result<std::unique_ptr<Rasterizer>> Rasterizer::create(Device& device, const Spl
                     "{} x {} pixels of {} splats need {} bytes in one tensor; this device takes {}", width, height,
                     rows, per_camera, limit);
     r->cameras_ = uint32_t(std::min<uint64_t>(max_cameras, limit / per_camera));
-    r->max_visible_ = uint32_t(
-        std::min<uint64_t>(std::max(rows, 1024u), limit / splat_record_bytes(lens_of(options.model), options.moving)));
+    r->max_visible_ =
+        uint32_t(std::min<uint64_t>(std::max(rows, 1024u), limit / splat_record_bytes(r->lens(), options.moving)));
     // A street of a million splats has 1.5 pairs a splat at 616 x 424 and 2.8 at 1920 x 1080. More room makes the
     // blending seem longer than a submit may last, and then it is cut.
     const uint64_t pairs = options.max_pairs ? options.max_pairs : std::max<uint64_t>(4ull * rows, 65536);
@@ -186,16 +188,22 @@ Result<std::unique_ptr<Rasterizer>> Rasterizer::create(Device& device, const Spl
     return r;
 }
 
+SplatLens Rasterizer::lens() const
+{
+    return options_.sweep_rows.empty() ? lens_of(options_.model) : SplatLens::spinning;
+}
+
 Status Rasterizer::build()
 {
     program_.reset();
     state_ = State();
     const uint32_t pixels = width_ * height_ * cameras_;
-    const SplatLens lens = lens_of(options_.model);
-    const uint32_t camera_floats = splat_camera_floats(lens);
+    const uint32_t camera_floats = splat_camera_floats(lens());
     camera_table_ = state_.slot(cameras_, camera_floats, DType::f32, "cameras", camera_floats);
     visible_ = state_.slot(1, 1, DType::u32, "visible splats", 1);
     pairs_ = state_.slot(1, 1, DType::u32, "splat pairs", 1);
+    if (!options_.sweep_rows.empty())
+        sweep_rows_ = state_.slot(height_, 4, DType::f32, "rows of a sweep", 4);
     if (options_.depth_tested) {
         z_buffer_ = state_.slot(pixels, 1, DType::f32, "z-buffer", 1);
         z_scale_ = state_.slot(1, 2, DType::f32, "scale of the z-buffer", 2);
@@ -211,10 +219,12 @@ Status Rasterizer::build()
     else
         declare_images(pixels);
     SR_CHECK(state_.allocate(device_, "splat images"));
+    if (sweep_rows_.valid())
+        SR_CHECK(sweep_rows_.write(device_, options_.sweep_rows));
     Graph g;
     SplatOptions o{.width = width_,
                    .height = height_,
-                   .lens = lens,
+                   .lens = lens(),
                    .moving = options_.moving,
                    .max_visible = max_visible_,
                    .max_pairs = max_pairs_,
@@ -227,6 +237,8 @@ Status Rasterizer::build()
     o.cutoff = options_.cutoff;
     if (options_.depth_tested)
         o.limits = splat_limits(g, z_buffer_.in(g), z_scale_.in(g));
+    if (sweep_rows_.valid())
+        o.rows = sweep_rows_.in(g);
     if (options_.movers) {
         o.movers = movers_.in(g);
         o.mover_rows = mover_rows_.in(g);
@@ -286,8 +298,8 @@ void Rasterizer::keep_images(Graph& g, const SplatImages& y)
 Status Rasterizer::make_room(uint32_t visible, uint32_t pairs)
 {
     if (visible > max_visible_) {
-        SR_TRY(max_visible_, room_for(visible, splat_record_bytes(lens_of(options_.model), options_.moving),
-                                      device_.limits(), "visible splats"));
+        SR_TRY(max_visible_,
+               room_for(visible, splat_record_bytes(lens(), options_.moving), device_.limits(), "visible splats"));
     }
     if (pairs > max_pairs_) {
         SR_TRY(max_pairs_, room_for(pairs, kPairBytes, device_.limits(), "pairs of splat and tile"));
@@ -316,7 +328,7 @@ Rasterizer::MoverTables Rasterizer::tables_of(const SplatMovers& movers, size_t 
 // the frames of at most cameras_ cameras, the first of which is number `first` of those with movers
 Status Rasterizer::draw_together(std::span<const SplatCamera> cameras, const SplatMovers& movers, size_t first)
 {
-    const uint32_t floats = splat_camera_floats(lens_of(options_.model));
+    const uint32_t floats = splat_camera_floats(lens());
     std::vector<float> table(size_t(cameras_) * floats);
     for (size_t i = 0; i < cameras.size(); ++i)
         write_row(cameras[i], std::span(table).subspan(i * floats, floats));
@@ -352,7 +364,7 @@ Status Rasterizer::record(VkCommandBuffer commands, const SplatCamera& camera, s
         SR_TRY(recorded_, Buffer::create(device_, kRecordings * sizeof(uint32_t), MemoryKind::staging, "counts"));
         std::memset(recorded_->mapped(), 0, kRecordings * sizeof(uint32_t));
     }
-    std::vector<float> table(size_t(cameras_) * splat_camera_floats(lens_of(options_.model)));
+    std::vector<float> table(size_t(cameras_) * splat_camera_floats(lens()));
     write_row(camera, std::span(table).first(table.size() / cameras_));
     const VulkanCalls& vk = device_.vk();
     const BufferSlice cameras = camera_table_.slice();

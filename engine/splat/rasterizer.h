@@ -65,6 +65,8 @@ struct RasterizerOptions {
     std::optional<uint32_t> rows = {};        // the scene's first ones at least; none: all of it
     CameraModel model = CameraModel::pinhole; // of all cameras
     bool moving = false;                      // cameras or movers move during a readout; no pinholes
+    // of a lidar's sweep, one a row of the images (shaders/splat/splat.h): cameras are parts of sweeps
+    std::vector<std::array<float, 4>> sweep_rows = {};
     // keeps pixels as files have them, over this background, in place of images: draw() and pixels(), not render()
     std::optional<std::array<uint8_t, 3>> pixels_over = {};
     float depth_units = 1000;   // of these, to a metre; 0: fp32 metres
@@ -155,6 +157,7 @@ class Rasterizer {
     };
     Rasterizer(Device& device, const SplatScene& scene) : device_(device), scene_(scene) {}
     uint32_t views_of_movers() const { return options_.movers * (options_.moving ? 2 : 1); } // a camera
+    SplatLens lens() const;
     Status build();
     void declare_images(uint32_t pixels);
     void keep_images(Graph& g, const SplatImages& images);
@@ -171,7 +174,7 @@ class Rasterizer {
     uint32_t width_ = 0, height_ = 0, cameras_ = 0, rows_ = 0;
     uint32_t max_visible_ = 0, max_pairs_ = 0, rebuilds_ = 0;
     State state_;
-    Slot camera_table_, visible_, pairs_, z_buffer_, z_scale_, format_scale_, movers_, mover_rows_;
+    Slot camera_table_, visible_, pairs_, z_buffer_, z_scale_, format_scale_, movers_, mover_rows_, sweep_rows_;
     std::unique_ptr<Buffer> recorded_; // [kRecordings] u32: pairs of what was recorded, where the host sees them
     uint32_t recording_ = 0;
     SplatSlots images_;      // of all cameras, or

@@ -64,6 +64,9 @@ void check(const SplatTensors& scene, Tensor cameras, const SplatOptions& o)
     SR_ASSERT(!o.limits.valid() || (o.lens == SplatLens::pinhole && o.limits.ld == 1 &&
                                     o.limits.rows == o.width * o.height * cameras.rows),
               "splat: {} limits for {} x {} pixels", o.limits.rows, o.width, o.height);
+    SR_ASSERT((o.lens == SplatLens::spinning) == o.rows.valid() &&
+                  (!o.rows.valid() || (o.rows.rows == o.height && o.rows.ld == 4)),
+              "splat: a table of {} rows for {}", o.rows.rows, o.height);
     SR_ASSERT(!o.moving || o.lens != SplatLens::pinhole, "splat: a pinhole that moves is an opencv lens");
     SR_ASSERT(
         o.movers.valid() == o.mover_rows.valid() &&
@@ -91,19 +94,32 @@ Seen project(Graph& g, const SplatTensors& scene, Tensor cameras, const SplatOpt
     const bool by_blocks = scene.blocks.valid();
     DispatchOptions cull = lens;
     cull.constants.push_back({"kBlocks", by_blocks});
-    g.dispatch(pinhole ? kernel::splat_cull : kernel::splat_lens_cull,
-               {cameras, scene.positions, scene.normals, scene.colors, scene.owners, movers, mover_rows, keep,
-                by_blocks ? scene.blocks : scene.labels},
-               push, threads(views), std::move(cull));
+    const Tensor blocks = by_blocks ? scene.blocks : scene.labels, rows = o.rows.valid() ? o.rows : scene.positions;
+    if (pinhole)
+        g.dispatch(
+            kernel::splat_cull,
+            {cameras, scene.positions, scene.normals, scene.colors, scene.owners, movers, mover_rows, keep, blocks},
+            push, threads(views), std::move(cull));
+    else
+        g.dispatch(kernel::splat_lens_cull,
+                   {cameras, scene.positions, scene.normals, scene.colors, scene.owners, movers, mover_rows, keep,
+                    blocks, rows},
+                   push, threads(views), std::move(cull));
     const PrefixSum slots = prefix_sum(g, keep, {.non_zero = true});
     const uint32_t texels = splat_record_bytes(o.lens, o.moving) / 16;
     const Tensor records = g.array(push.max_visible * texels, DType::u32, "splat records", 4);
     const Tensor sources = g.array(push.max_visible, DType::u32, "splat sources");
     const Tensor depths = g.array(push.max_visible, DType::u32, "splat depths");
-    g.dispatch(pinhole ? kernel::splat_project : kernel::splat_lens_project,
-               {cameras, scene.positions, scene.normals, scene.colors, scene.owners, movers, mover_rows, keep,
-                slots.sums, records, sources, depths},
-               push, threads(views), lens);
+    if (pinhole)
+        g.dispatch(kernel::splat_project,
+                   {cameras, scene.positions, scene.normals, scene.colors, scene.owners, movers, mover_rows, keep,
+                    slots.sums, records, sources, depths},
+                   push, threads(views), lens);
+    else
+        g.dispatch(kernel::splat_lens_project,
+                   {cameras, scene.positions, scene.normals, scene.colors, scene.owners, movers, mover_rows, keep,
+                    slots.sums, records, sources, depths, rows},
+                   push, threads(views), lens);
     return {records, sources, depths, slots.total};
 }
 
@@ -168,8 +184,8 @@ SplatImages splat(Graph& g, const SplatTensors& scene, Tensor cameras, const Spl
     blend.constants.push_back(model);
     blend.constants.push_back({"kTexels", splat_record_bytes(options.lens, options.moving) / 16});
     const Tensor rays = g.array(options.moving ? 2 * pixels : pixels, DType::f32, "rays", 4);
-    g.dispatch(kernel::splat_rays, {cameras, rays}, push, threads(pixels),
-               {.constants = {model, {"kMoving", options.moving}}});
+    g.dispatch(kernel::splat_rays, {cameras, rays, options.rows.valid() ? options.rows : scene.positions}, push,
+               threads(pixels), {.constants = {model, {"kMoving", options.moving}}});
     g.dispatch(kernel::splat_ray_blend,
                {seen.records, by_tile.records, by_tile.starts, seen.sources, scene.labels, scene.cells, y.color,
                 y.surface, y.depth, y.ids, rays, scene.owners, y.owners},

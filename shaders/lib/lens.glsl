@@ -6,6 +6,7 @@
 #include "lib/trigonometry.glsl"
 
 const uint kOpencv = 1, kFisheye = 2, kEquirectangular = 3, kFtheta = 4; // CameraModel; 0: pinhole
+const uint kSpinning = 5;                                                // a sweep of a lidar, whose rows have a table
 
 const float kPi = 3.14159265359;
 

@@ -3,7 +3,10 @@
 
 // a row of the table of cameras with lenses: fx fy cx cy; world to camera [3, 4], in the middle of the readout; 12
 // numbers of distortion (engine/camera/camera.h); limit of the lens, 1 where depth is the distance from the camera
-// instead of along z, Motion::first, reach of the lens; Motion::turn, across.x; Motion::shift, across.y
+// instead of along z, Motion::first, reach of the lens; Motion::turn, across.x; Motion::shift, across.y. A
+// part of a sweep: fx is pixels a radian of azimuth, below 0 where it runs against the clock, fy 1, cy 0; of distortion
+// the number of its first pixel, the columns of the sweep, and the least and the most that a row adds to a pixel's number
+// for the column, and the delay, in which it is fired
 const uint kCameraVectors = 10;
 
 Lens camera_lens(uint camera)

@@ -49,6 +49,35 @@ ivec2 wrapped_range(float low, float high)
                  last < 0 ? last + width : last >= width ? last - width : last);
 }
 
+// Pixels across a part of a sweep whose rays may lie within [low, high], which may be any number of turns away. A part is
+// less than a turn. A row's rays are up to half a pixel beside the centres of its pixels.
+ivec2 turning_range(Lens l, float low, float high)
+{
+    const float turn = 2.0 * kPi * abs(l.focal.x), margin = 0.55 + 1e-3 * (high - low), across = high - low + 2.0 * margin;
+    const int end = int(p.width) - 1;
+    float from = low - margin - 0.5;
+    from -= turn * floor(from / turn);
+    const float to = from + across;
+    const bool begins = from <= float(end), ends = to >= turn; // within the part; beyond the part's other side
+    if (across >= turn || (begins && ends))
+        return ivec2(0, end);
+    return ends ? ivec2(0, min(int(to - turn), end)) : ivec2(int(ceil(from)), begins ? min(int(to), end) : -1);
+}
+
+// rows of a sweep that look above an angle below the horizon; the angles rise
+int rows_above(float angle)
+{
+    uint first = 0, end = p.height;
+    while (first < end) {
+        const uint middle = (first + end) / 2;
+        if (rows[middle].x < angle)
+            first = middle + 1;
+        else
+            end = middle;
+    }
+    return int(first);
+}
+
 // the largest x of radii [inner, outer] and directions within `spread` of `angle`
 float sector_end(float angle, float spread, float inner, float outer)
 {
@@ -146,7 +175,7 @@ bool disc_bounds(Lens l, LensView s, Sweep w, vec2 reach, out vec4 box)
 {
     const float widest = max(reach.x, reach.y) + (kMoving ? 0.5 * length(w.across) + length(w.off) + w.rest : 0.0);
     const float sphere = widest / s.away; // 1 and more: the camera is within
-    const bool panorama = kModel == kEquirectangular;
+    const bool panorama = kModel == kEquirectangular || kModel == kSpinning;
     vec3 axis = vec3(0.0, 0.0, 1.0); // note: Mesa 22 gets a choice of vectors wrong where the condition is a constant
     if (panorama)
         axis = vec3(0.0, 1.0, 0.0);
@@ -159,8 +188,13 @@ bool disc_bounds(Lens l, LensView s, Sweep w, vec2 reach, out vec4 box)
 }
 
 // the pixels of a box; false: there are none
-bool pixels_within(inout LensView s, vec4 box)
+bool pixels_within(Lens l, inout LensView s, vec4 box)
 {
+    if (kModel == kSpinning) { // columns may run against the azimuth
+        const ivec2 across = turning_range(l, min(box.x, box.z), max(box.x, box.z));
+        s.bounds = ivec4(across, rows_above(box.y - 1e-6), rows_above(box.w + 1e-6) - 1);
+        return s.bounds.x <= s.bounds.y && s.bounds.z <= s.bounds.w;
+    }
     const bool panorama = kModel == kEquirectangular;
     s.bounds = ivec4(panorama ? wrapped_range(box.x, box.z) : pixel_range(box.x, box.z, p.width), pixel_range(box.y, box.w, p.height));
     return (panorama ? s.bounds.y >= 0 : s.bounds.x <= s.bounds.y) && s.bounds.z <= s.bounds.w;
@@ -181,7 +215,7 @@ bool find_bounds(inout LensView s, Lens l, float opacity, vec2 sigmas)
     } else if (!disc) {
         return false;
     }
-    return pixels_within(s, box);
+    return pixels_within(l, s, box);
 }
 
 #include "lib/splat_readout.glsl"
@@ -222,7 +256,7 @@ bool view_splat(uint splat, uint camera, out LensView s)
         return false;
     if (dot(s.normal, s.center) > 0.0)
         s.normal = -s.normal;
-    if (!lens_project(kModel, lens, s.center, s.pixel))
+    if (kModel == kSpinning || !lens_project(kModel, lens, s.center, s.pixel)) // no screen filter
         s.pixel = vec2(kNowhere);
     return is_finite(vec4(s.pixel, s.away, 0.0)) && find_bounds(s, lens, position.w, sigmas);
 }

@@ -12,7 +12,7 @@ layout(binding = 10) readonly buffer Rays { vec4 rays[]; };    // [cameras, heig
 #include "lib/trigonometry.glsl"
 #include "lib/moving_rays.glsl"
 
-const uint kOpencv = 1, kEquirectangular = 3;
+const uint kOpencv = 1, kEquirectangular = 3, kSpinning = 5;
 const bool kMoving = kTexels == kMovingRecord; // rays have origins of their own
 
 struct RaySplat {
@@ -86,7 +86,7 @@ void blend(inout Pixel pixel, RaySplat s, Ray ray, vec2 at, uint record)
         d.x -= float(p.width) * floor(d.x / float(p.width) + 0.5);
     const Hit on = hit_of(s, ray);
     const float r2_surface = on.edge_on ? 1e30 : dot(on.uv, on.uv), r2_screen = dot(d, d) * p.filter_scale;
-    const bool hit = r2_surface <= r2_screen;
+    const bool hit = kModel == kSpinning || r2_surface <= r2_screen; // a sweep has no screen filter
     const float r2 = hit ? r2_surface : r2_screen, z = hit ? on.distance * ray.to.w : s.depth;
     const bool in_front = !hit || (kModel == kOpencv ? z : on.distance) >= p.near;
     const float alpha = min(p.alpha_max, s.opacity * exp(-0.5 * r2));

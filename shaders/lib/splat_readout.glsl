@@ -23,8 +23,13 @@ Sweep sweep_of(LensView still, Motion m, Course c, float low, float high, float 
 }
 
 // The parts within [low, high] at which lines are read that a box touches. Around a panorama's seam: all of them.
-vec2 parts_of(Motion m, vec4 box, float low, float high)
+// bounds: of a sweep, the pixels in the box
+vec2 parts_of(Lens l, Motion m, vec4 box, ivec4 bounds, float low, float high)
 {
+    if (kModel == kSpinning) {
+        const vec2 columns = l.first.x + vec2(bounds.xy) + l.first.zw;
+        return clamp(columns / l.first.y - 0.5 + vec2(-1e-5, 1e-5), vec2(low), vec2(high));
+    }
     if (kModel == kEquirectangular && m.across.x != 0.0 && (box.x < 1.0 || box.z > float(p.width) - 1.0))
         return vec2(low, high);
     const vec2 margin = 0.5 + 1e-3 * (box.zw - box.xy);
@@ -36,6 +41,10 @@ vec2 parts_of(Motion m, vec4 box, float low, float high)
 float part_of_center(Lens l, Motion m, Course c, float low, float high, inout LensView s)
 {
     const float guesses[3] = {0.5 * (low + high), low, high};
+    if (kModel == kSpinning) { // a few columns, and no screen filter
+        s.pixel = vec2(kNowhere);
+        return guesses[0];
+    }
     for (uint i = 0; i < 3; ++i) {
         float part = guesses[i];
         if (settle(kModel, l, m, c, s.center, low, high, part, s.pixel))
@@ -61,9 +70,9 @@ bool view_moving(Lens l, uint camera, Course course, float opacity, vec2 sigmas,
         const Sweep w = sweep_of(s, m, course, low, high, max(reach.x, reach.y), middle);
         const float moves = 0.5 * length(w.across) + length(w.off) + w.rest;
         if (!is_finite(vec4(middle.away)) || nearness_of(middle.center) + moves <= p.near || !disc_bounds(l, middle, w, reach, box) ||
-            !pixels_within(s, vec4(box.xy - dot_radius, box.zw + dot_radius)))
+            !pixels_within(l, s, vec4(box.xy - dot_radius, box.zw + dot_radius)))
             return false;
-        const vec2 parts = parts_of(m, box, low, high);
+        const vec2 parts = parts_of(l, m, box, s.bounds, low, high);
         if (parts.y - parts.x > 0.7 * (high - low))
             break;
         low = parts.x;
@@ -85,5 +94,5 @@ bool view_moving(Lens l, uint camera, Course course, float opacity, vec2 sigmas,
         pixel.x -= float(p.width) * floor((pixel.x - 0.5 * (box.x + box.z)) / float(p.width) + 0.5);
     if (s.pixel.x > kNowhere)
         box = vec4(min(box.xy, pixel - dot_radius), max(box.zw, pixel + dot_radius));
-    return is_finite(vec4(s.pixel, s.away, 0.0)) && pixels_within(s, box);
+    return is_finite(vec4(s.pixel, s.away, 0.0)) && pixels_within(l, s, box);
 }

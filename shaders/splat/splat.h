@@ -24,4 +24,8 @@ struct SplatPush {
     uint mover_numbers;      // entries of the table of rows
 };
 
+// The table of a lidar's rows (engine/camera/lidar.h), by rising angle: angle below the horizon; of its rays from their
+// column's, clockwise, both radians; what is added to a pixel's number for the column in which it is fired; how many
+// columns after that one begins
+
 #endif

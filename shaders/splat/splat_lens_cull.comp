@@ -4,6 +4,8 @@
 // keep[camera][splat] = can it be seen?
 #extension GL_GOOGLE_include_directive : require
 #include "splat.h"
+
+layout(binding = 9) readonly buffer Rows { vec4 rows[]; }; // [height] of a sweep: splat.h; else anything
 #include "lib/splat_lens_view.glsl"
 #include "lib/thread.glsl"
 

@@ -5,6 +5,8 @@
 // of the depth (opencv: along z; others: from the camera), which rise with it
 #extension GL_GOOGLE_include_directive : require
 #include "splat.h"
+
+layout(binding = 12) readonly buffer Rows { vec4 rows[]; }; // [height] of a sweep: splat.h; else anything
 #include "lib/splat_lens_view.glsl"
 #include "lib/splat_record.glsl"
 #include "lib/thread.glsl"

@@ -3,8 +3,8 @@
 """What other programs make of our files, and we of theirs. A program that is not installed skips its tests by name.
 Python's own tarfile is one of them.
 
-Programs: colmap, python3-opencv, python3-open3d and python3-skimage of Debian (tools/setup --programs); of npm,
-gltf-validator and @playcanvas/splat-transform in the folder NODE_MODULES.
+Programs: colmap, pcl-tools, python3-opencv, python3-open3d and python3-skimage of Debian (tools/setup --programs); of
+npm, gltf-validator and @playcanvas/splat-transform in the folder NODE_MODULES.
 """
 import importlib
 import json
@@ -133,6 +133,60 @@ class Shards(Case):
                     camera, kind, name = path.split("/")
                     self.assertEqual((key, field), ("S_D_" + name[:6], f"{camera}.{kind}.png"))
         self.assertEqual(sorted(samples), [f"S_D_{moment:06}" for moment in range(7)])
+
+
+class Lidar(Case):
+    """a sweep in each format, against the array of all fields"""
+
+    def setUp(self):
+        super().setUp()
+        path, rig = self.folder / "two.tum", self.folder / "rig.json"
+        path.write_text("0 8 0 1.7 -0.5 0.5 -0.5 0.5\n0.1 9 0.1 1.7 -0.5 0.5 -0.5 0.5\n")
+        rig.write_text(json.dumps({"sensors": [{"name": "top", "lidar": "xt32", "sensor_to_vehicle": {
+            "translation": [0, 0, 0.3], "rotation": [0, 0, 0, 1]}}]}))
+        for name in "npy", "pcd", "kitti", "nuscenes":
+            run(SEMROVER, "render", "-q", SCENES / "street.truth.sgrid", "--path", path, "--rig", rig, "--splat-radius",
+                "auto", "--lidar-format", name, "-o", self.folder / name)
+
+    def points(self, name, ending):
+        return self.folder / name / "top" / "points" / f"000001.{ending}"
+
+    @needs_python("numpy")
+    def test_numpy_reads_them(self):
+        import numpy
+        own = numpy.load(self.points("npy", "npy"))
+        self.assertEqual((own.dtype, own.shape[1]), (numpy.float32, 8))
+        self.assertGreater(len(own), 10000)
+        kitti = numpy.fromfile(self.points("kitti", "bin"), dtype=numpy.float32).reshape(-1, 4)
+        self.assertTrue((kitti == own[:, :4]).all())
+        # as nuscenes-devkit's LidarPointCloud.from_file does
+        nuscenes = numpy.fromfile(self.points("nuscenes", "pcd.bin"), dtype=numpy.float32).reshape(-1, 5)
+        self.assertTrue((nuscenes[:, [0, 1, 2, 4]] == own[:, [0, 1, 2, 4]]).all())
+        self.assertTrue(numpy.allclose(nuscenes[:, 3], own[:, 3] * 255))
+
+    @needs_python("open3d")
+    def test_open3d_reads_all_fields_of_pcd(self):
+        import numpy
+        import open3d
+        own = numpy.load(self.points("npy", "npy"))
+        cloud = open3d.t.io.read_point_cloud(str(self.points("pcd", "pcd"))).point
+        self.assertTrue((cloud["positions"].numpy() == own[:, :3]).all())
+        for column, name in enumerate(("intensity", "ring", "t", "label", "instance"), 3):
+            self.assertTrue((cloud[name].numpy().ravel() == own[:, column]).all(), name)
+        plain = open3d.io.read_point_cloud(str(self.points("pcd", "pcd")))
+        self.assertTrue((numpy.asarray(plain.points) == own[:, :3]).all())
+
+    @needs_program("pcl_convert_pcd_ascii_binary")
+    @needs_python("numpy")
+    def test_pcl_reads_pcd(self):
+        import numpy
+        own = numpy.load(self.points("npy", "npy"))
+        text = self.folder / "text.pcd"
+        run("pcl_convert_pcd_ascii_binary", self.points("pcd", "pcd"), text, 0)
+        lines = text.read_text().splitlines()
+        self.assertIn("FIELDS x y z intensity ring label t instance", lines)
+        rows = numpy.array([line.split() for line in lines[lines.index("DATA ascii") + 1:]], dtype=numpy.float64)
+        self.assertTrue(numpy.allclose(rows[:, [0, 1, 2, 3, 4, 6, 5, 7]], own, rtol=1e-4, atol=1e-4))
 
 
 class Viewers(Case):

@@ -191,6 +191,13 @@ Result<CameraPath> read_cameras(const Path& file, const Path& rig_file, const Le
     return path;
 }
 
+Status need_cameras(const CameraPath& path, std::string_view what)
+{
+    if (path.frames.empty())
+        return fail(ErrorCode::usage, "{} needs cameras, and the sensors of the rig are lidars", what);
+    return {};
+}
+
 void add_placement_options(CLI::App& c, PathOptions& o)
 {
     const std::string group = "Where the trajectory lies in the grid's world, in the order that they apply";

@@ -39,6 +39,8 @@ Result<PathLens> path_lens_of(const LensOptions& options);    // the same, and w
 // readers say
 Result<CameraPath> read_cameras(const Path& path, const Path& rig, const LensOptions& options,
                                 const PathPlacement& placement);
+// usage: its rig has lidars only, and `what` is of cameras
+Status need_cameras(const CameraPath& path, std::string_view what);
 
 // How a trajectory comes into the grid's world: one group of options of every command that reads a path.
 // docs/formats.md §7.4

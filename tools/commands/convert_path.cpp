@@ -218,6 +218,7 @@ Status convert_path(const Path& in, const Path& out, const ConvertPathOptions& o
     SR_CHECK(check_output(in, to, o, format, globals));
     SR_TRY(const PathPlacement placement, placement_of(o.placement));
     SR_TRY(CameraPath path, read_cameras(in, o.rig, o.lens, placement));
+    SR_CHECK(need_cameras(path, "convert"));
     SR_CHECK(choose_camera(path, in, o, format));
     const bool more = !o.points.empty() || !o.images.empty();
     if (!dry_run)

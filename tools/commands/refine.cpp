@@ -143,6 +143,7 @@ Result<Refinement> resolve(const RefineArguments& o, const Globals& globals, con
     r.allow_empty = o.trajectory.allow_empty;
     if (!o.trajectory.path.empty()) {
         SR_TRY(r.path, load_cameras(o.trajectory));
+        SR_CHECK(need_cameras(*r.path, "refine"));
     }
     r.grid = [&o, &globals]() -> Result<VoxelGrid> {
         Result<VoxelGrid> grid = load_grid(o.options.input, {}, globals);

@@ -26,6 +26,7 @@ struct RenderArguments {
     TrajectoryOptions trajectory;
     SceneInputOptions input;
     PictureEncoding encoding;
+    LidarFormat lidar = LidarFormat::npy;
     uint32_t threads = 0;
     int frames_per_second = 10;
     bool top = false, semantic = false, floats = false, points = false, visible_depth = false;
@@ -71,6 +72,7 @@ Result<DrawingOptions> drawing_options(const RenderArguments& o, const Globals& 
     d.points = o.points;
     d.visible_depth = o.visible_depth;
     d.encoding = o.encoding;
+    d.lidar = o.lidar;
     d.threads = o.threads;
     d.folder = o.output;
     d.replace = globals.yes;
@@ -90,6 +92,8 @@ Result<DrawingOptions> drawing_options(const RenderArguments& o, const Globals& 
     if (!o.trajectory.path.empty()) {
         SR_TRY(d.path, load_cameras(trajectory));
     }
+    if (!o.video.empty())
+        SR_CHECK(need_cameras(d.path, "--video"));
     SR_CHECK(check_drawing_outputs(d));
     if (o.top)
         d.top = {o.trajectory.width, o.trajectory.height};
@@ -150,6 +154,13 @@ void add_render(CLI::App& app, const Globals& globals, Run& run)
     add_depth_option(*c, o->encoding.depth, {std::begin(kDepthFormats), std::end(kDepthFormats)},
                      ", or float32 metres in .npy");
     add_flow_option(*c, o->encoding);
+    add_choice(
+        *c, "--lidar-format", {std::begin(kLidarFormats), std::end(kLidarFormats)},
+        "of the points of a rig's lidars, in LIDAR/points/000000: .npy or .pcd of all fields, KITTI's .bin (x y z "
+        "intensity) or nuScenes' .pcd.bin (x y z intensity ring)",
+        [o](const std::string& word) {
+            o->lidar = LidarFormat(std::ranges::find(kLidarFormats, word) - std::begin(kLidarFormats));
+        });
     c->add_flag("--visible-depth", o->visible_depth, "depth pictures are 0 where a pixel is not visible");
     CLI::Option* video =
         c->add_option("--video", o->video, "also an MP4 of the colour frames (of the first camera), through ffmpeg");

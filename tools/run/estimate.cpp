@@ -50,6 +50,7 @@ Result<Cameras> cameras_of(const JobFile& job, const Task& task)
     std::ranges::reverse(line);
     app.parse(line); // as read_job_file() has done
     SR_TRY(cameras.path, load_cameras(options));
+    SR_CHECK(need_cameras(cameras.path, "an estimate"));
     return cameras;
 }
 
