@@ -135,7 +135,7 @@ TEST(engine_camera_render, a_cube_leans_as_a_rolling_shutter_has_it)
 {
     const SplatScene scene = make_scene(test_device(), cube());
     for (const Intrinsics& k :
-         {pinhole_from_fov(90, 160, 120), fisheye_from_fov(200, 160, 160), whole_sphere(300, 150)})
+         {pinhole_from_fov(90, 160, 120), fisheye_from_fov(200, 320, 320), whole_sphere(600, 300)})
         for (const ShutterDirection direction :
              {ShutterDirection::down, ShutterDirection::up, ShutterDirection::right}) {
             SCOPED_TRACE(fmt::format("{} {}", name_of(k.model), name_of(direction)));
