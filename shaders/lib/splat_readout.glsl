@@ -39,12 +39,12 @@ vec2 parts_of(Lens l, Motion m, vec4 box, ivec4 bounds, float low, float high)
 
 // of a sweep: the part at which a column looks at a point, with the middle of what rows add to it. Beside a part of the
 // sweep it is the turn that is nearer to it.
-float part_of_column(Lens l, Motion m, vec3 point)
+float part_of_column(Lens l, Motion m, Course c, vec3 point)
 {
     const float turn = 2.0 * kPi * abs(l.focal.x), added = l.first.x + 0.5 * (l.first.z + l.first.w);
     float part = 0.0;
     for (uint i = 0; i < 4; ++i) {
-        const vec3 seen = seen_at(m, part, point);
+        const vec3 seen = seen_at(m, c, part, point);
         float x = l.focal.x * accurate_atan2(seen.x, seen.z) + l.focal.z - 0.5;
         x -= turn * floor((x - 0.5 * float(p.width)) / turn + 0.5);
         part = clamp((x + added) / l.first.y - 0.5, -0.5, 0.5);
@@ -58,7 +58,7 @@ float part_of_center(Lens l, Motion m, Course c, float low, float high, inout Le
     const float guesses[3] = {0.5 * (low + high), low, high};
     if (kModel == kSpinning) { // no screen filter
         s.pixel = vec2(kNowhere);
-        return part_of_column(l, m, s.center);
+        return part_of_column(l, m, c, s.center);
     }
     for (uint i = 0; i < 3; ++i) {
         float part = guesses[i];
