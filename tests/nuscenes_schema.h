@@ -22,11 +22,13 @@ class NuscenesSchema {
         NuscenesSchema schema(root);
         if (schema.load(root / version)) {
             schema.check_keys();
-            schema.check_rows();
-            schema.check_scenes();
-            schema.check_data();
-            schema.check_annotations();
-            schema.check_maps();
+            if (schema.faults_.empty()) { // what follows goes along keys
+                schema.check_rows();
+                schema.check_scenes();
+                schema.check_data();
+                schema.check_annotations();
+                schema.check_maps();
+            }
         }
         return schema.faults_;
     }

@@ -20,6 +20,7 @@ using OrderedJson = nlohmann::ordered_json;
 
 constexpr int64_t kKeyEvery = 500000, kNearly = 1000; // microseconds between samples, which have annotations
 constexpr double kMapMetres = 0.1;                    // a pixel
+constexpr double kSurface = 0.01;                     // metres: a point on a box' face is in it
 constexpr double kMovingFrom = 0.2;                   // m/s
 
 std::string channel_of(const std::string& camera)
@@ -234,8 +235,9 @@ class NuscenesScene {
                 const Rigid to_box = compose(inverse(place->pose), scan.sensor_to_world);
                 counts[{track.id, moment}] = size_t(std::ranges::count_if(points, [&](const ScanPoint& p) {
                     const Point3 at = transform(to_box, {p[0], p[1], p[2]});
-                    return std::abs(at[0]) <= track.size[0] / 2 && std::abs(at[1]) <= track.size[1] / 2 &&
-                           std::abs(at[2]) <= track.size[2] / 2;
+                    return std::abs(at[0]) <= track.size[0] / 2 + kSurface &&
+                           std::abs(at[1]) <= track.size[1] / 2 + kSurface &&
+                           std::abs(at[2]) <= track.size[2] / 2 + kSurface;
                 }));
             }
         }
