@@ -175,12 +175,12 @@ TEST(engine_sweep, matches_a_ray_caster_in_double)
 
 TEST(engine_sweep, matches_it_for_tables_of_sensors_and_of_the_least_size)
 {
-    const std::vector<HostSplat> splats = splats_around(40, 8);
+    const std::vector<HostSplat> splats = splats_around(40, 8), more = splats_around(300, 9);
     Lidar xt32 = named_lidar("xt32").value();
     xt32.columns = 1100; // three parts
     expect_as_cast(splats, sweep_of(xt32, kStill, kStill));
-    expect_as_cast(splats, sweep_of(lidar_of(4, true, {{0.1, 0.9}, {-0.1, -0.7}}), kStill, kStill));
-    expect_as_cast(splats, sweep_of(lidar_of(5, false, {{0, 0}}), kStill, kStill));
+    expect_as_cast(more, sweep_of(lidar_of(4, true, {{0.1, 0.9}, {-0.1, -0.7}}), kStill, kStill));
+    expect_as_cast(more, sweep_of(lidar_of(5, false, {{0, 0}}), kStill, kStill));
 }
 
 TEST(engine_sweep, matches_it_where_the_sensor_moves)
