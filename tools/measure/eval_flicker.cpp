@@ -24,7 +24,7 @@ struct EvalFlickerArguments {
     std::string frames, depth, path, truth;
     LensOptions lens;
     PathOptions placement;
-    FlowOptions flow;
+    WarpOptions flow;
     std::optional<double> depth_unit; // metres; none: as the folder's transforms.json says
 };
 
@@ -134,7 +134,7 @@ struct Flicker {
 
 class StepReader {
   public:
-    StepReader(const FlickerInputs& in, const FlowOptions& flow) : in_(in), flow_(flow) {}
+    StepReader(const FlickerInputs& in, const WarpOptions& flow) : in_(in), flow_(flow) {}
 
     Result<Flicker> measure(const Step& step)
     {
@@ -153,7 +153,7 @@ class StepReader {
 
   private:
     const FlickerInputs& in_;
-    FlowOptions flow_;
+    WarpOptions flow_;
     std::map<std::string, Pictures> last_; // of each camera
 };
 
