@@ -11,6 +11,8 @@ namespace semrover {
 
 namespace {
 
+constexpr float kUnknownFlow = 1e10f;
+
 // 64 v + 2^15; 0: it does not fit
 uint16_t kitti_number(float v)
 {
@@ -45,6 +47,17 @@ Result<std::vector<std::byte>> encode_flow(FlowFormat format, uint32_t width, ui
         pixels.insert(pixels.end(), {uint16_t(known ? u : 0), uint16_t(known ? v : 0), uint16_t(known)});
     }
     return encode_png_rgb16(width, height, pixels, png_level);
+}
+
+Result<FlowPicture> read_flow_png(const Path& path)
+{
+    SR_TRY(const ImageRgb16 image, read_png_rgb16(path));
+    FlowPicture picture{image.width, image.height, {}};
+    picture.flow.reserve(image.pixels.size() / 3 * 2);
+    for (size_t i = 0; i < image.pixels.size(); i += 3)
+        for (size_t c = 0; c < 2; ++c)
+            picture.flow.push_back(image.pixels[i + 2] ? (float(image.pixels[i + c]) - 32768) / 64 : kUnknownFlow);
+    return picture;
 }
 
 } // namespace semrover

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "runtime/base/file.h"
 #include "runtime/base/result.h"
 
 #include <array>
@@ -22,5 +23,12 @@ constexpr std::array<std::string_view, 2> kFlowFormats = {"png", "flo"}; // whic
 // flow: [height, width, 2], pixels to the right and down; 1e9 and more: not known. Errors: bad_input for sizes
 Result<std::vector<std::byte>> encode_flow(FlowFormat format, uint32_t width, uint32_t height,
                                            std::span<const float> flow, int png_level);
+
+struct FlowPicture {
+    uint32_t width = 0, height = 0;
+    std::vector<float> flow; // [height, width, 2], as encode_flow takes it
+};
+// of KITTI's format. Errors: bad_input
+Result<FlowPicture> read_flow_png(const Path& path);
 
 } // namespace semrover

@@ -236,8 +236,10 @@ Status decode_png(std::span<const std::byte> file, std::string_view where, const
 {
     Png p;
     SR_TRY(const PngInfo info, open_png(p, file, where));
-    if (format.bit_depth == 16 && (info.bits != 16 || info.kind != PngKind::gray))
-        return fail(ErrorCode::bad_input, "{}: expected a PNG of 16-bit gray, found another kind", where);
+    const bool gray = format.channels == 1;
+    if (format.bit_depth == 16 && (info.bits != 16 || info.kind != (gray ? PngKind::gray : PngKind::rgb)))
+        return fail(ErrorCode::bad_input, "{}: expected a PNG of 16-bit {}, found another kind", where,
+                    gray ? "gray" : "RGB");
     return decode_rows(p, info, file, where, format, max_pixels, std::forward<Allocate>(allocate));
 }
 
@@ -445,16 +447,31 @@ Result<PngNumbers> decode_png_numbers(std::span<const std::byte> file, std::stri
     return image;
 }
 
-Result<ImageGray16> read_png_gray16(const Path& path)
+namespace {
+
+template <typename Image>
+Result<Image> read_png_16(const Path& path, const Format& format)
 {
-    ImageGray16 image;
-    SR_CHECK(read_png(path, kGray16, [&](uint32_t width, uint32_t height) {
+    Image image;
+    SR_CHECK(read_png(path, format, [&](uint32_t width, uint32_t height) {
         image.width = width;
         image.height = height;
-        image.pixels.resize(size_t(width) * height);
+        image.pixels.resize(size_t(width) * height * format.channels);
         return reinterpret_cast<uint8_t*>(image.pixels.data());
     }));
     return image;
+}
+
+} // namespace
+
+Result<ImageGray16> read_png_gray16(const Path& path)
+{
+    return read_png_16<ImageGray16>(path, kGray16);
+}
+
+Result<ImageRgb16> read_png_rgb16(const Path& path)
+{
+    return read_png_16<ImageRgb16>(path, kRgb16);
 }
 
 } // namespace semrover

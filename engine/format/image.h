@@ -100,5 +100,11 @@ struct ImageGray16 {
     std::vector<uint16_t> pixels; // [height, width]
 };
 Result<ImageGray16> read_png_gray16(const Path& path);
+// likewise three numbers of 16 bits a pixel
+struct ImageRgb16 {
+    uint32_t width = 0, height = 0;
+    std::vector<uint16_t> pixels; // [height, width, 3]
+};
+Result<ImageRgb16> read_png_rgb16(const Path& path);
 
 } // namespace semrover

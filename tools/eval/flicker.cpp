@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/eval/flicker.h"
 
-#include "engine/camera/camera_view.h"
+#include "engine/camera/lens.h"
 
 #include <algorithm>
 #include <cmath>
@@ -54,13 +54,20 @@ double inverse_depth(const Taps& taps, const DepthPicture& depth)
 } // namespace
 
 Flow flow_between(const CameraFrame& from, const DepthPicture& from_depth, const CameraFrame& to,
-                  const DepthPicture& to_depth, const WarpOptions& o)
+                  const DepthPicture& to_depth, const WarpOptions& o, const ThingMotions& moving)
 {
     const uint32_t width = to.intrinsics.width, height = to.intrinsics.height;
     SR_ASSERT(to_depth.width == width && to_depth.height == height && from_depth.width == from.intrinsics.width &&
                   from_depth.height == from.intrinsics.height,
               "depth of {}x{} pixels, a camera of {}x{}", to_depth.width, to_depth.height, width, height);
-    const Reprojection motion(from, to);
+    const Reprojection still(from, to);
+    std::map<uint16_t, std::optional<Reprojection>> moved;
+    for (const auto& [thing, motion] : moving.motions) {
+        CameraFrame other = from; // a thing moves, or else the camera the other way
+        if (motion)
+            other.pose.world_to_camera = compose(from.pose.world_to_camera, *motion);
+        moved.emplace(thing, motion ? std::optional(Reprojection(other, to)) : std::nullopt);
+    }
     Flow flow;
     flow.sources.resize(size_t(width) * height);
     for (size_t i = 0; i < flow.sources.size(); ++i) {
@@ -68,6 +75,10 @@ Flow flow_between(const CameraFrame& from, const DepthPicture& from_depth, const
         if (!(depth > 0))
             continue;
         ++flow.with_depth;
+        const auto own = moving.things.empty() ? moved.end() : moved.find(moving.things[i]);
+        if (own != moved.end() && !own->second)
+            continue;
+        const Reprojection& motion = own == moved.end() ? still : *own->second;
         const auto seen = motion.source(double(i % width) + 0.5, double(i / width) + 0.5, depth);
         if (!seen)
             continue;

@@ -83,6 +83,13 @@ Result<std::vector<uint8_t>> read_label_frame(const Path& path, ImageSize size, 
     return labels;
 }
 
+Result<std::vector<uint16_t>> read_instance_frame(const Path& path, ImageSize size)
+{
+    SR_TRY(ImageGray16 image, read_png_gray16(path));
+    SR_CHECK(check_size(path, {image.width, image.height}, size));
+    return std::move(image.pixels);
+}
+
 Result<ImageRgb8> read_color_frame(const Path& path, ImageSize size)
 {
     SR_TRY(ImageRgb8 image, read_image_rgb8(path));

@@ -55,7 +55,7 @@ struct FrameFiles : std::map<std::string, Path> {
     ShardsOrNone shards; // that they are in
 };
 
-// The .png, .jpg and .jpeg files (of labels and depth .npy, too) of a kind ("color", "depth", "label", "visible"):
+// The .png, .jpg and .jpeg files (of labels and depth .npy, too) of a kind ("color", "depth", "label", "flow", ...):
 // those in FOLDER/KIND, or in CAMERA/KIND of folders of cameras, as `render` and `streets` write them; colour also in
 // FOLDER/frames, as `refine` writes it; else all in FOLDER and below; FOLDER may be a shard set, or in one. Errors:
 // bad_input: no such folder, none in it, two of one name, and as open_if_shards()
@@ -70,6 +70,8 @@ Result<std::vector<uint8_t>> read_gray_frame(const Path& path, ImageSize size);
 // classes, or kNoLabel; `map` counts the numbers that it looks up
 Result<std::vector<uint8_t>> read_label_frame(const Path& path, ImageSize size, PictureClasses& map);
 Result<ImageRgb8> read_color_frame(const Path& path, ImageSize size); // likewise; a width of 0: any size
+// numbers of things, 0: none; a PNG of 16-bit gray
+Result<std::vector<uint16_t>> read_instance_frame(const Path& path, ImageSize size);
 Result<DepthPicture> read_depth_frame(const Path& path, ImageSize size, double unit); // of read_depth_picture()
 
 } // namespace semrover

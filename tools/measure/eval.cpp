@@ -18,6 +18,7 @@ void add_eval(CLI::App& app, const Globals& globals, Run& run)
     add_eval_fid(*eval, globals, run);
     add_eval_flicker(*eval, globals, run);
     add_eval_frames(*eval, globals, run);
+    add_eval_instances(*eval, globals, run);
     add_eval_kid(*eval, globals, run);
     add_eval_mmd(*eval, globals, run);
     add_eval_points(*eval, globals, run);

@@ -12,6 +12,7 @@ void add_eval_f3d(CLI::App& eval, const Globals& globals, Run& run);
 void add_eval_fid(CLI::App& eval, const Globals& globals, Run& run);
 void add_eval_flicker(CLI::App& eval, const Globals& globals, Run& run);
 void add_eval_frames(CLI::App& eval, const Globals& globals, Run& run);
+void add_eval_instances(CLI::App& eval, const Globals& globals, Run& run);
 void add_eval_kid(CLI::App& eval, const Globals& globals, Run& run);
 void add_eval_mmd(CLI::App& eval, const Globals& globals, Run& run);
 void add_eval_points(CLI::App& eval, const Globals& globals, Run& run);
