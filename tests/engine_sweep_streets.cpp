@@ -83,11 +83,14 @@ class Made {
     TraceTables tables_;
 };
 
-const Made& made()
-{
-    static const Made street;
-    return street;
-}
+class engine_sweep_streets : public testing::Test {
+  protected:
+    static void SetUpTestSuite() { street.emplace(); }
+    static void TearDownTestSuite() { street.reset(); } // before the device goes
+    static const Made& made() { return *street; }
+
+    static inline std::optional<Made> street;
+};
 
 Point3 along(const Ray& ray, double range)
 {
@@ -105,7 +108,7 @@ struct Truth {
     std::vector<Hit> hits;
     std::vector<bool> flat; // with the rays around it on one plane
 };
-Truth truth_of(const LidarSweep& sweep)
+Truth truth_of(const Made& made, const LidarSweep& sweep)
 {
     const Lidar& lidar = *sweep.lidar;
     const uint32_t beams = uint32_t(lidar.beams.size());
@@ -116,7 +119,7 @@ Truth truth_of(const LidarSweep& sweep)
             const Point3 from = translation_of(pose), ahead = transform(pose, lidar.ray(beam, column));
             t.rays.push_back({from, {ahead[0] - from[0], ahead[1] - from[1], ahead[2] - from[2]}});
         }
-    t.hits = made().trace(t.rays);
+    t.hits = made.trace(t.rays);
     t.flat.resize(t.rays.size());
     for (uint32_t beam = 1; beam + 1 < beams; ++beam)
         for (uint32_t column = 1; column + 1 < lidar.columns; ++column) {
@@ -147,12 +150,11 @@ double median(std::vector<double>& values, double share = 0.5)
     return *at;
 }
 
-TEST(engine_sweep_streets, ranges_on_flat_faces_are_those_of_the_ray_tracer)
+TEST_F(engine_sweep_streets, ranges_on_flat_faces_are_those_of_the_ray_tracer)
 {
     for (const double metres : {0.0, 2.0}) {
-        const LidarSweep sweep =
-            sweep_from(made().sensor_at(-10, -1.5, 0.05), made().sensor_at(metres - 10, -1.5, 0.1));
-        const Truth truth = truth_of(sweep);
+        const LidarSweep sweep = sweep_from(made().sensor_at(15, -1.5, 0.05), made().sensor_at(15 + metres, -1.5, 0.1));
+        const Truth truth = truth_of(made(), sweep);
         const SweepImage image = draw_sweep(*made().scene, sweep);
         const SweepPicture picture(*sweep.lidar);
         std::map<uint32_t, std::vector<double>> errors; // by class
@@ -189,11 +191,11 @@ TEST(engine_sweep_streets, ranges_on_flat_faces_are_those_of_the_ray_tracer)
 }
 
 // what a camera at the same place sees of planes
-TEST(engine_sweep_streets, points_and_depth_pictures_agree_on_planes)
+TEST_F(engine_sweep_streets, points_and_depth_pictures_agree_on_planes)
 {
-    const Rigid sensor = made().sensor_at(-10, -1.5, 0.05);
+    const Rigid sensor = made().sensor_at(15, -1.5, 0.05);
     const LidarSweep sweep = sweep_from(sensor, sensor);
-    const Truth truth = truth_of(sweep);
+    const Truth truth = truth_of(made(), sweep);
     const SweepImage image = draw_sweep(*made().scene, sweep);
     const SweepPicture picture(*sweep.lidar);
     CameraFrame frame;
