@@ -79,9 +79,10 @@ struct Scene {
     }
     ProgramResult render(const char* out, const std::string& more) const
     {
-        return semrover_program(fmt::format("render {} --path {} -W {} -H {} --fov-x 73 --splat-radius auto -q -o {} {}",
-                                            (folder / "scene.sgrid").string(), (folder / "path.tum").string(), kWidth,
-                                            kHeight, (folder / out).string(), more));
+        return semrover_program(
+            fmt::format("render {} --path {} -W {} -H {} --fov-x 73 --splat-radius auto -q -o {} {}",
+                        (folder / "scene.sgrid").string(), (folder / "path.tum").string(), kWidth, kHeight,
+                        (folder / out).string(), more));
     }
 };
 

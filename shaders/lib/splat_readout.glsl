@@ -71,8 +71,8 @@ float part_of_center(Lens l, Motion m, Course c, float low, float high, inout Le
 
 float nearness_of(vec3 seen) { return kModel == kOpencv ? seen.z : length(seen); }
 
-// s: center, axes and normal at part 0, in the still frame. Bounds are found for the whole readout first, then for the parts of
-// the lines that are within them. Whether the centre is too near is asked for each pixel.
+// s: center, axes and normal at part 0, in the still frame. Bounds are found for the whole readout first, then for the
+// parts of the lines that are within them. Whether the centre is too near is asked for each pixel.
 bool view_moving(Lens l, uint camera, Course course, float opacity, vec2 sigmas, inout LensView s)
 {
     const Motion m = camera_motion(camera);

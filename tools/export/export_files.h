@@ -27,7 +27,7 @@ std::vector<std::byte> scan_rows(std::span<const ScanPoint> points, const Row& r
 }
 
 std::string rows_text(Rigid matrix, size_t rows); // of 4 numbers, with blanks between all
-std::string matrix_text(const Rigid& matrix);            // a line a row
+std::string matrix_text(const Rigid& matrix);     // a line a row
 
 // bad_input unless it is a pinhole: what layout `where` holds
 Status check_pinhole(const Sensor& sensor, std::string_view where);
