@@ -3,6 +3,7 @@
 #include "engine/conditioning/cell_objects.h"
 #include "engine/format/image.h"
 #include "engine/scene/actors.h"
+#include "runtime/base/dtype.h"
 #include "tests/json_text.h"
 #include "tests/program.h"
 #include "tests/scratch_folder.h"

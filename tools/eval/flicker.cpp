@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/eval/flicker.h"
 
+#include "engine/camera/camera_view.h"
 #include "engine/camera/lens.h"
 
 #include <algorithm>
