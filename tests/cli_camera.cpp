@@ -342,7 +342,7 @@ TEST(CliCamera, files_and_their_order_do_not_depend_on_how_many_threads_make_the
         EXPECT_TRUE(bytes(out) == whole) << threads;
         EXPECT_EQ(contents(out / "journal.jsonl"), journal) << threads;
     }
-    EXPECT_EQ(whole.size(), 6u * 8 + 2);
+    EXPECT_EQ(whole.size(), 6u * 8 + 5);
     EXPECT_EQ(std::ranges::count(journal, '\n'), 7); // a line a frame, and one for top.png
 }
 
@@ -398,7 +398,7 @@ TEST(CliCamera, a_drawing_that_was_killed_goes_on_to_the_same_bytes)
     const std::string line = d.options + "--npy --video ";
     ASSERT_EQ(render(d.folder / "whole", line + (d.folder / "whole.mp4").string()).code, 0);
     const auto whole = bytes(d.folder / "whole");
-    EXPECT_EQ(whole.size(), 12u * 3 * 8 + 1);
+    EXPECT_EQ(whole.size(), 12u * 3 * 8 + 4);
     for (const size_t pieces : {0, 1, 8, 30}) {
         const Path out = d.folder / fmt::format("killed{}", pieces), video = out.string() + ".mp4";
         {

@@ -413,7 +413,7 @@ TEST(Rig, a_rolling_shutter_sees_from_where_the_vehicle_is_meanwhile)
     folder.put("again.json", rig_json(rig->sensors).dump());
     EXPECT_EQ(read_rig(folder / "again.json")->sensors[0].shutter, rig->sensors[0].shutter);
     EXPECT_TRUE(says(expand_rig(*rig, *read_tum(folder.put("c.tum", "5 0 0 0 0 0 0 1\n5 1 0 0 0 0 0 1"), kView)),
-                     "a rolling shutter needs poses at times that rise: pose 1 is at 5 s"));
+                     "rolling shutters and lidars need poses at times that rise: pose 1 is at 5 s"));
     CameraPath numbered = *drive;
     numbered.numbered = true;
     EXPECT_TRUE(says(expand_rig(*rig, numbered), "a rolling shutter needs poses with times"));

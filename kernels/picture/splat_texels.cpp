@@ -34,7 +34,7 @@ uint32_t texel_bytes(Texels texels)
 Tensor splat_texels(Graph& g, Tensor x, uint32_t cameras, const PictureFormat& format, Tensor scale)
 {
     const uint32_t pixels = x.rows / cameras, words = texel_words(format.texels, pixels);
-    SR_ASSERT(words && x.rows % cameras == 0 && (x.ld == 4 || x.ld == 2) && scale.valid() == format.scaled,
+    SR_ASSERT(words && x.rows % cameras == 0 && (x.ld == 4 || x.ld == 2 || x.ld == 1) && scale.valid() == format.scaled,
               "splat_texels: [{}, {}] of {} cameras", x.rows, x.ld, cameras);
     const Tensor y = g.array(cameras * words, DType::u32, "texels");
     DispatchOptions options;

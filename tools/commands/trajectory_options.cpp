@@ -65,7 +65,7 @@ void add_trajectory_options(CLI::App& c, TrajectoryOptions& o)
         "with --instances, also boxes.jsonl: where each object is, what pictures show of it, how much is hidden");
     c.add_option("--actors", o.actors, "actors.json: what moves (docs/formats.md §2.10)");
     c.add_option("--objects", o.objects,
-                 "the scene's objects, for --instances and --actors; NAME.objects.json beside the grid by default");
+                 "the scene's objects, for --instances, --boxes and --actors; NAME.objects.json beside the grid by default");
 }
 
 Result<PointSplatOptions> point_splat_options(const std::string& splat_radius, float opacity)
@@ -100,7 +100,10 @@ Result<DrawOptions> draw_options(const TrajectoryOptions& o, const Path& grid)
     if (!o.actors.empty()) {
         SR_TRY(draw.actors, read_actors(o.actors));
     }
-    if (draw.instances || std::ranges::any_of(draw.actors, is_of_object)) {
+    const bool needs_objects = draw.instances || std::ranges::any_of(draw.actors, is_of_object);
+    if (!needs_objects && !o.objects.empty())
+        return fail(ErrorCode::usage, "--objects is for --instances, --boxes and --actors that are made of objects");
+    if (needs_objects) {
         SR_TRY(draw.objects, objects_of(o.objects, grid));
     }
     return draw;
