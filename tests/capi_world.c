@@ -462,7 +462,7 @@ static void draws_into_host_memory(sr_context* context)
     CHECK_OK(context, sr_world_get_splats(world, &splats));
     CHECK(splats.count >= world_info(world).splats && splats.count % 64 == 0 && splats.version > version);
     CHECK(world_info(world).splats > 5000);
-    CHECK(splats.positions.bytes / 16 == ((2u << 20) / 56 + 63) / 64 * 64 && splats.positions.bytes % 16 == 0);
+    CHECK(splats.positions.bytes / 16 == ((2u << 20) / 60 + 63) / 64 * 64 && splats.positions.bytes % 16 == 0);
     CHECK(splats.labels.bytes * 4 == splats.positions.bytes && splats.blocks.bytes * 64 == splats.labels.bytes);
     draw.fx = NAN;
     CHECK(sr_world_draw(world, &draw) == SR_ERR_BAD_INPUT && says(context, "not finite"));
