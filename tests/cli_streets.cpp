@@ -93,7 +93,8 @@ TEST(CliStreets, pictures_show_traffic_where_actors_json_has_it)
     const ScratchFolder folder;
     const std::string common = "--seed 1 --length 90 --spacing 10 --images --samples 1 --ambient-rays 1 -W 160 -H 110 ";
     const Path out = folder / "street";
-    const ProgramResult made = streets(out, common + "--no-grids --traffic");
+    const ProgramResult made =
+        semrover_program("streets -q -o " + out.string() + " " + common + "--no-grids --traffic");
     ASSERT_EQ(made.code, 0) << made.err;
     const auto actors = read_actors(out / "actors.json");
     const auto objects = read_objects(out / "objects.json");
