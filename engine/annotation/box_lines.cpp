@@ -4,6 +4,7 @@
 
 #include "engine/annotation/json_lines.h"
 #include "engine/scene/palette.h"
+#include "engine/scene/scene_fields.h"
 #include "runtime/base/json_numbers.h"
 
 #include <algorithm>
@@ -14,15 +15,10 @@ namespace {
 
 using OrderedJson = nlohmann::ordered_json;
 
-constexpr double kPerMetre = 1e4, kPerPixel = 1e2, kPerUnit = 1e6;
-
-double rounded_to(double value, double per_unit)
-{
-    return std::round(value * per_unit) / per_unit + 0.0; // no -0
-}
+constexpr double kPerPixel = 1e2, kPerUnit = 1e6;
 
 template <size_t N>
-std::array<double, N> rounded_to(std::array<double, N> values, double per_unit)
+std::array<double, N> all_rounded(std::array<double, N> values, double per_unit)
 {
     for (double& v : values)
         v = rounded_to(v, per_unit);
@@ -31,20 +27,20 @@ std::array<double, N> rounded_to(std::array<double, N> values, double per_unit)
 
 OrderedJson pose_json(const Rigid& pose)
 {
-    return {{"center", rounded_to(translation_of(pose), kPerMetre)},
-            {"rotation", rounded_to(quaternion_of(pose), kPerUnit)}};
+    return {{"center", all_rounded(translation_of(pose), kPerMetre)},
+            {"rotation", all_rounded(quaternion_of(pose), kPerUnit)}};
 }
 
 std::array<double, 4> corners_of(const PictureBox& box)
 {
-    return rounded_to(std::array{box.left, box.top, box.right, box.bottom}, kPerPixel);
+    return all_rounded(std::array{box.left, box.top, box.right, box.bottom}, kPerPixel);
 }
 
 OrderedJson object_line(const SeenObject& o, const Rigid& world_to_vehicle, const Rigid& world_to_camera)
 {
     return {{"id", o.id},
             {"class", std::string(kPalette[o.label].name)},
-            {"size", rounded_to(o.box.size, kPerMetre)},
+            {"size", all_rounded(o.box.size, kPerMetre)},
             {"world", pose_json(o.box.pose)},
             {"ego", pose_json(compose(world_to_vehicle, o.box.pose))},
             {"camera", pose_json(compose(world_to_camera, o.box.pose))},

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/annotation/seen_objects.h"
 
+#include "engine/scene/scene_fields.h"
+
 #include <algorithm>
 #include <cmath>
 #include <unordered_map>
@@ -60,7 +62,7 @@ double occlusion_of(const SeenObject& object, const PlacedBox& box, const BoxPro
             const auto depths = projection.depths(box, x, y);
             if (!depths)
                 continue;
-            if (picture.numbers[pixel] == object.id + 1) {
+            if (picture.numbers[pixel] == instance_number(object.id)) {
                 ++shown;
                 continue;
             }
@@ -85,7 +87,7 @@ std::vector<SeenObject> seen_objects(const CameraFrame& frame, const InstancePic
     const BoxProjection projection(frame, kNear);
     std::vector<SeenObject> seen;
     for (const PlacedObject& o : objects) {
-        const auto found = pixels.find(o.id + 1);
+        const auto found = pixels.find(instance_number(o.id));
         if (found == pixels.end())
             continue;
         const Pixels& p = found->second;

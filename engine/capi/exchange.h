@@ -11,10 +11,10 @@ namespace semrover::capi {
 
 constexpr uint32_t kMostPixels = 16384; // of a side
 
-// fx, fy, cx, cy in pixels and [3, 4] row by row
 // options of a rasterizer that draws the world's actors, too
 RasterizerOptions with_actors(const sr_world& world, RasterizerOptions options);
 
+// fx, fy, cx, cy in pixels and [3, 4] row by row
 CameraFrame camera_frame(const double (&pinhole)[4], const double (&world_to_camera)[12], const ImageSize& size);
 
 CameraFrame frame_of(const sr_draw_desc& draw);

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/conditioning/cell_objects.h"
 
+#include "engine/scene/scene_fields.h"
+
 #include "runtime/base/dtype.h"
 
 #include <algorithm>
@@ -244,7 +246,7 @@ Result<std::vector<uint32_t>> instances_of_points(const VoxelGrid& grid, std::sp
     std::vector<uint32_t> numbers;
     for (size_t i = 0; i < owners.size(); ++i)
         if (!grid.has_points() || grid.generated[i / places])
-            numbers.push_back(owners[i] == kNoObject ? 0 : instance_number(objects[size_t(owners[i])]));
+            numbers.push_back(owners[i] == kNoObject ? 0 : instance_number(objects[size_t(owners[i])].id));
     return numbers;
 }
 

@@ -26,12 +26,6 @@ std::array<double, 3> place_in(const SceneObject& object, const std::array<doubl
 Result<std::vector<int32_t>> objects_of_cells(const VoxelGrid& grid, std::span<const SceneObject> objects,
                                               uint64_t most = kMaxObjectPairs);
 
-// The number of an object in pictures of instances, of 16 bits; 0 is nothing
-constexpr uint32_t kMostInstances = 65535;
-inline uint32_t instance_number(const SceneObject& object)
-{
-    return object.id + 1;
-}
 // The instance numbers of a grid's points, as points_of() has them, by the same rule at the place of the point in place
 // of the voxel's centre; of a grid without points, of its voxels. Errors: as objects_of_cells
 Result<std::vector<uint32_t>> instances_of_points(const VoxelGrid& grid, std::span<const SceneObject> objects,

@@ -112,15 +112,7 @@ std::string tint_text(const Triple& tint)
 
 Result<std::vector<SceneObject>> parse_objects(const Json& json, std::string_view where)
 {
-    if (!json.is_object() || json.value("format", Json()) != kFormat)
-        return fail(ErrorCode::bad_input, "{}: expected an object with \"format\": \"{}\"", where, kFormat);
-    if (json.value("version", Json()) != 1)
-        return fail(ErrorCode::bad_input, "{}: version: expected 1, found {}", where,
-                    json.value("version", Json()).dump());
-    SR_CHECK(check_keys(json, kFileKeys, where));
-    const auto list = json.find("objects");
-    if (list == json.end() || !list->is_array() || list->size() > kMaxObjects)
-        return fail(ErrorCode::bad_input, "{}: objects: expected an array of at most {}", where, kMaxObjects);
+    SR_TRY(const Json* list, things_in(json, kFormat, kFileKeys, "objects", kMaxObjects, where));
     std::vector<SceneObject> objects;
     std::set<uint32_t> ids;
     for (const Json& item : *list) {

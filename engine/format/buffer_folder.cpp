@@ -72,6 +72,11 @@ Result<BufferCamera> open_camera(const Path& folder, std::string name)
 
 } // namespace
 
+Path camera_folder(const Path& folder, const std::string& camera)
+{
+    return camera.empty() ? folder : folder / camera;
+}
+
 Path frame_path(const Path& folder, const char* kind, uint32_t number, std::string_view extension)
 {
     return folder / kind / fmt::format("{:06}.{}", number, extension);

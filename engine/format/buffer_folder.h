@@ -27,6 +27,8 @@ struct BufferFrame {
     std::vector<uint8_t> visible; // [height, width] 0: not
 };
 
+// where the pictures of a camera go: those of one without a name into the folder itself
+Path camera_folder(const Path& folder, const std::string& camera);
 Path frame_path(const Path& folder, const char* kind, uint32_t number, std::string_view extension = "png");
 // the one that is there of the formats a picture may have, else its path as a PNG. bad_input: it is there twice
 Result<Path> find_picture(const Path& folder, const char* kind, uint32_t number);

@@ -64,8 +64,8 @@ Json sweeps_json(const CameraPath& path, const std::string& lidar)
     Json sweeps = Json::array();
     for (const LidarSweep& s : path.sweeps)
         if (s.sensor == lidar)
-            sweeps.push_back({{"time", std::llround(s.time * 1e6)},
-                              {"duration", std::llround(s.lidar->sweep_seconds() * 1e6)},
+            sweeps.push_back({{"time", microseconds_of(s.time)},
+                              {"duration", microseconds_of(s.lidar->sweep_seconds())},
                               {"begin", matrix_of(s.begin)},
                               {"end", matrix_of(s.end)}});
     return {{"format", "semrover.sweeps"}, {"version", 1}, {"sweeps", std::move(sweeps)}};

@@ -5,6 +5,7 @@
 #include "engine/conditioning/cell_objects.h"
 #include "engine/format/splat_file.h"
 #include "engine/scene/palette.h"
+#include "engine/scene/scene_fields.h"
 #include "engine/splat/blocks.h"
 #include "runtime/base/quote.h"
 
@@ -90,7 +91,7 @@ Result<DrawnScene> with_actors(Device& device, SplatScene scene, SceneActors act
     std::vector<SplatScene> parts;
     parts.push_back(std::move(scene));
     for (const Actor& actor : actors.all()) {
-        SR_TRY(std::optional<SplatScene> own, scene_of(device, actor, o, actor.id + 1));
+        SR_TRY(std::optional<SplatScene> own, scene_of(device, actor, o, instance_number(actor.id)));
         if (own)
             parts.push_back(std::move(*own));
     }

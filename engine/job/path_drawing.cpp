@@ -85,9 +85,4 @@ Result<bool> PathDrawing::step(const Drawn& drawn)
     return skip();
 }
 
-Path camera_folder(const Path& folder, const std::string& camera)
-{
-    return camera.empty() ? folder : folder / camera;
-}
-
 } // namespace semrover

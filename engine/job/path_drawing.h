@@ -53,7 +53,4 @@ class PathDrawing {
     size_t done_ = 0;
 };
 
-// where the pictures of a camera go: those of one without a name into the folder itself
-Path camera_folder(const Path& folder, const std::string& camera);
-
 } // namespace semrover

@@ -3,6 +3,7 @@
 #include "engine/job/scene_actors.h"
 
 #include "engine/camera/camera_view.h"
+#include "engine/scene/scene_fields.h"
 
 #include <cmath>
 #include <map>
@@ -30,13 +31,6 @@ std::optional<std::pair<Rigid, Rigid>> poses_in(const Actor& a, const CameraFram
     return std::pair(at(frame.time + frame.readout->start), at(frame.time + frame.readout->end));
 }
 
-// the object's own frame: x along its heading, the origin in the middle of its box
-Rigid object_to_world(const SceneObject& o)
-{
-    const double c = std::cos(o.heading), s = std::sin(o.heading);
-    return {c, -s, 0, o.center[0], s, c, 0, o.center[1], 0, 0, 1, o.center[2], 0, 0, 0, 1};
-}
-
 } // namespace
 
 Result<SceneActors> SceneActors::create(std::vector<Actor> actors, std::span<const SceneObject> objects)
@@ -51,9 +45,10 @@ Result<SceneActors> SceneActors::create(std::vector<Actor> actors, std::span<con
     SceneActors scene;
     for (const Actor& a : actors) {
         const bool cut_out = std::holds_alternative<ObjectOfScene>(a.from);
-        scene.from_splats_.push_back(cut_out ? inverse(object_to_world(*by_id.at(a.id))) : kIdentity);
-        scene.rows_.resize(std::max<size_t>(scene.rows_.size(), a.id + 2));
-        scene.rows_[a.id + 1] = uint32_t(scene.from_splats_.size());
+        scene.from_splats_.push_back(cut_out ? inverse(box_to_world(*by_id.at(a.id))) : kIdentity);
+        const uint32_t number = instance_number(a.id);
+        scene.rows_.resize(std::max<size_t>(scene.rows_.size(), number + 1));
+        scene.rows_[number] = uint32_t(scene.from_splats_.size());
     }
     scene.actors_ = std::move(actors);
     return scene;

@@ -3,6 +3,7 @@
 #include "engine/job/sweep_drawing.h"
 
 #include "engine/camera/camera_view.h"
+#include "engine/camera/rig.h"
 
 #include <algorithm>
 #include <cmath>
@@ -14,9 +15,6 @@ namespace {
 
 constexpr uint32_t kPartWidth = 512; // pixels, at most
 constexpr float kNear = 0.05f;       // metres
-
-// axes of a sensor (forward, left, up) to those of a camera that looks forward (right, down, forward)
-constexpr Rigid kSensorToCamera = {0, -1, 0, 0, 0, 0, -1, 0, 1, 0, 0, 0, 0, 0, 0, 1};
 
 } // namespace
 
@@ -53,7 +51,7 @@ CameraFrame SweepDrawing::frame_of(const LidarSweep& sweep, uint32_t part) const
 {
     const double middle = (part + 0.5) * part_width_ / picture_.width; // of the sweep
     const auto view = [](const Rigid& sensor_to_world) {
-        return Pose{compose(kSensorToCamera, inverse(sensor_to_world))};
+        return Pose{inverse(compose(sensor_to_world, kForwardCamera))};
     };
     CameraFrame frame;
     frame.time = sweep.time - (1 - middle) * lidar_->sweep_seconds();

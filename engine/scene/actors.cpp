@@ -153,15 +153,7 @@ std::optional<Rigid> pose_at(const Actor& actor, int64_t time)
 
 Result<std::vector<Actor>> parse_actors(const Json& json, const Path& folder, std::string_view where)
 {
-    if (!json.is_object() || json.value("format", Json()) != kActorFormat)
-        return fail(ErrorCode::bad_input, "{}: expected an object with \"format\": \"{}\"", where, kActorFormat);
-    if (json.value("version", Json()) != 1)
-        return fail(ErrorCode::bad_input, "{}: version: expected 1, found {}", where,
-                    json.value("version", Json()).dump());
-    SR_CHECK(check_keys(json, kActorFileKeys, where));
-    const auto list = json.find("actors");
-    if (list == json.end() || !list->is_array() || list->size() > kMaxActors)
-        return fail(ErrorCode::bad_input, "{}: actors: expected an array of at most {}", where, kMaxActors);
+    SR_TRY(const Json* list, things_in(json, kActorFormat, kActorFileKeys, "actors", kMaxActors, where));
     std::vector<Actor> actors;
     std::set<uint32_t> ids;
     size_t left = kMaxActorPoses;

@@ -3,10 +3,26 @@
 #include "engine/scene/scene_fields.h"
 
 #include "engine/scene/palette.h"
+#include "runtime/base/json_fields.h"
 #include "runtime/base/json_numbers.h"
 #include "runtime/base/quote.h"
 
 namespace semrover {
+
+Result<const Json*> things_in(const Json& file, const char* format, std::span<const std::string_view> keys,
+                              const char* name, size_t most, std::string_view where)
+{
+    if (!file.is_object() || file.value("format", Json()) != format)
+        return fail(ErrorCode::bad_input, "{}: expected an object with \"format\": \"{}\"", where, format);
+    if (file.value("version", Json()) != 1)
+        return fail(ErrorCode::bad_input, "{}: version: expected 1, found {}", where,
+                    file.value("version", Json()).dump());
+    SR_CHECK(check_keys(file, keys, where));
+    const auto list = file.find(name);
+    if (list == file.end() || !list->is_array() || list->size() > most)
+        return fail(ErrorCode::bad_input, "{}: {}: expected an array of at most {}", where, name, most);
+    return &*list;
+}
 
 Result<uint32_t> id_at(const Json& thing, std::string_view where)
 {

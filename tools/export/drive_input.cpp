@@ -39,11 +39,6 @@ std::string plain_name(const Path& folder)
     return name;
 }
 
-Path with_camera(const Path& folder, const std::string& camera)
-{
-    return camera.empty() ? folder : folder / camera;
-}
-
 Status read_boxes(const Path& file, DriveInput& drive)
 {
     if (!is_file(file))
@@ -74,7 +69,7 @@ Result<Path> DriveInput::color(size_t picture) const
 {
     const DriveRecord::Picture& p = record.pictures[picture];
     std::vector<Path> missing;
-    for (const Path& kind : {with_camera(folder / "frames", p.camera), with_camera(folder, p.camera) / "color"}) {
+    for (const Path& kind : {camera_folder(folder / "frames", p.camera), camera_folder(folder, p.camera) / "color"}) {
         SR_TRY(Path found, find_picture(kind.parent_path(), kind.filename().c_str(), p.number));
         if (is_file(found))
             return found;
@@ -87,7 +82,7 @@ std::optional<Path> DriveInput::other(size_t picture, const char* kind) const
 {
     const DriveRecord::Picture& p = record.pictures[picture];
     for (const Path& base : {folder / "buffers", folder}) {
-        const auto found = find_picture(with_camera(base, p.camera), kind, p.number);
+        const auto found = find_picture(camera_folder(base, p.camera), kind, p.number);
         if (found && is_file(*found))
             return *found;
     }

@@ -6,6 +6,7 @@
 // https://github.com/ziyc/drivestudio
 #include "engine/format/number_image.h"
 #include "engine/scene/palette.h"
+#include "engine/scene/scene_fields.h"
 #include "runtime/base/quote.h"
 #include "tools/export/export_files.h"
 
@@ -135,7 +136,8 @@ class DriveStudioScene {
         for (const Track& track : tracks_) {
             const auto place = std::ranges::find(track.places, moment, &Track::Place::moment);
             if (place != track.places.end() && drive_.speed(track, size_t(place - track.places.begin())) > kDynamicFrom)
-                (track.label == 11 || track.label == 12 ? people : vehicles).insert(uint16_t(track.id + 1));
+                (track.label == 11 || track.label == 12 ? people : vehicles)
+                    .insert(uint16_t(instance_number(track.id)));
         }
         const ImageSize size{image.width, image.height};
         const auto is_person = [&](uint16_t n) { return people.contains(n); };

@@ -3,6 +3,7 @@
 // semrover eval instances FRAMES TRUTH: whether pixels show the things that they should, and flow goes where it should
 #include "engine/format/transforms.h"
 #include "engine/scene/actors.h"
+#include "engine/scene/scene_fields.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/progress.h"
@@ -97,12 +98,12 @@ Result<InstanceInputs> read_inputs(const EvalInstancesArguments& o)
 
 ThingMotions motions_between(std::span<const Actor> actors, const CameraFrame& now, const CameraFrame& next)
 {
-    const auto microseconds = [](const CameraFrame& frame) { return std::llround(frame.time * 1e6); };
     ThingMotions y;
     for (const Actor& actor : actors)
-        if (const auto here = pose_at(actor, microseconds(now)); here && actor.id < UINT16_MAX) {
-            const auto there = pose_at(actor, microseconds(next));
-            y.motions[uint16_t(actor.id + 1)] = there ? std::optional(compose(*there, inverse(*here))) : std::nullopt;
+        if (const auto here = pose_at(actor, microseconds_of(now.time)); here && actor.id < UINT16_MAX) {
+            const auto there = pose_at(actor, microseconds_of(next.time));
+            y.motions[uint16_t(instance_number(actor.id))] =
+                there ? std::optional(compose(*there, inverse(*here))) : std::nullopt;
         }
     return y;
 }

@@ -84,7 +84,7 @@ class StreetMoments {
     {
         std::vector<bool> absent;
         if (!actors_.empty())
-            absent = move_actors(moved_, street_, actors_, microseconds(frame));
+            absent = move_actors(moved_, street_, actors_, microseconds_of(frame.time));
         const Mesh& mesh = actors_.empty() ? street_.mesh : moved_;
         std::vector<uint32_t> faces;
         if (!whole || !actors_.empty())
@@ -93,12 +93,10 @@ class StreetMoments {
     }
     bool same(const CameraFrame& a, const CameraFrame& b) const
     {
-        return actors_.empty() || microseconds(a) == microseconds(b);
+        return actors_.empty() || microseconds_of(a.time) == microseconds_of(b.time);
     }
 
   private:
-    static int64_t microseconds(const CameraFrame& frame) { return std::llround(frame.time * 1e6); }
-
     const Street& street_;
     std::span<const Actor> actors_;
     Mesh moved_;

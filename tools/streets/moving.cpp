@@ -96,7 +96,7 @@ std::vector<ActorPose> poses_of(const Runner& runner, const RoadNetwork& road, c
         if (i > 0 && !last && runner.places[i] == runner.places[i - 1] && runner.places[i] == runner.places[i + 1])
             continue;
         const Rigid pose = i == 0 ? box : compose(on_road(road, runner.places[i], *runner.thing), made);
-        poses.push_back({std::llround(double(i) * kPoseSpacing * 1e6), pose});
+        poses.push_back({microseconds_of(double(i) * kPoseSpacing), pose});
     }
     return poses;
 }
