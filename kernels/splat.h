@@ -106,7 +106,8 @@ struct SplatImages { // [cameras * height * width] rows; w = weight of a splat i
     Tensor color;    // [.., 4] fp32: sum of w rgb; alpha = sum of w
     Tensor surface;  // [.., 4] fp32: sum of w normal, camera frame, towards the camera; sum of w depth
     Tensor depth;    // [.., 2] fp32: expected (sum of w depth / alpha), median (of the splat that passes one half)
-    Tensor ids;      // [.., 2] u32: label and voxel of the splat with the largest w, 2^32 - 1 for none
+    Tensor ids;      // [.., 2] u32: label and voxel of the splat with the largest w, 2^32 - 1 for none. In a sweep of
+                     // that of the median depth
     Tensor owners;   // [..] u32: what that splat is of, as SplatTensors has it; 0 for none
     Tensor visible, pairs; // [1] u32: the numbers that had to fit the two maxima
 };

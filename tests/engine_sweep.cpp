@@ -108,7 +108,7 @@ Met cast(const std::vector<HostSplat>& splats, const LidarSweep& sweep, uint32_t
         if (!cover(pixel, t, splats[i], placed.normal, alpha, z, i, rules))
             break;
     }
-    return {1 - t, pixel.median, pixel.normal, pixel.splat};
+    return {1 - t, pixel.median, pixel.normal, pixel.median_splat};
 }
 
 void expect_as_cast(const std::vector<HostSplat>& splats, const LidarSweep& sweep)

@@ -31,7 +31,7 @@ struct SplatRules {
 struct ReferencePixel {
     std::array<double, 3> color{}, normal{};
     double alpha = 0, depth = 0, median = 0, largest = 0;
-    int64_t splat = -1;
+    int64_t splat = -1, median_splat = -1; // of the largest weight, of the median
 };
 
 using Vector = std::array<double, 3>;
@@ -125,7 +125,10 @@ inline bool cover(ReferencePixel& pixel, double& t, const HostSplat& s, const Ve
         pixel.normal[a] += w * normal[a];
     }
     pixel.depth += w * z;
-    pixel.median = t > 0.5 ? z : pixel.median;
+    if (t > 0.5) {
+        pixel.median = z;
+        pixel.median_splat = int64_t(index);
+    }
     if (w > pixel.largest) {
         pixel.largest = w;
         pixel.splat = int64_t(index);

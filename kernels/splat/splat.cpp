@@ -182,6 +182,7 @@ SplatImages splat(Graph& g, const SplatTensors& scene, Tensor cameras, const Spl
     }
     const ConstantValue model{"kModel", uint32_t(options.lens)};
     blend.constants.push_back(model);
+    blend.constants.push_back({"kMedianIds", options.lens == SplatLens::spinning});
     blend.constants.push_back({"kTexels", splat_record_bytes(options.lens, options.moving) / 16});
     const Tensor rays = g.array(options.moving ? 2 * pixels : pixels, DType::f32, "rays", 4);
     g.dispatch(kernel::splat_rays, {cameras, rays, options.rows.valid() ? options.rows : scene.positions}, push,

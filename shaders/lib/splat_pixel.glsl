@@ -9,6 +9,7 @@ layout(constant_id = 4) const bool kSurface = true;
 layout(constant_id = 5) const bool kDepth = true;
 layout(constant_id = 6) const bool kIds = true;
 layout(constant_id = 7) const bool kOwners = true;
+layout(constant_id = 9) const bool kMedianIds = false; // ids and owners are those of the median depth's splat
 layout(push_constant) uniform Push { SplatPush p; };
 layout(binding = 1) readonly buffer Pairs { uint pairs[]; };      // [max_pairs] records by tile, nearest first
 layout(binding = 2) readonly buffer Starts { uint starts[]; };    // [tiles + 1] first pair of each tile
@@ -31,7 +32,7 @@ struct Pixel {
     float depth;
     float median;
     float largest; // weight so far
-    uint record;   // that had it
+    uint record;   // that had it, or the median
 };
 
 Pixel empty_pixel() { return Pixel(1.0, vec3(0.0), vec3(0.0), 0.0, 0.0, 0.0, kNone); }
@@ -45,8 +46,9 @@ void cover(inout Pixel pixel, vec3 color, vec3 normal, float alpha, float z, boo
     pixel.color += w * color;
     pixel.normal += w * normal;
     pixel.depth += w * depth;
-    pixel.median = add && t > 0.5 ? depth : pixel.median;
-    pixel.record = w > pixel.largest ? record : pixel.record;
+    const bool median = add && t > 0.5;
+    pixel.median = median ? depth : pixel.median;
+    pixel.record = (kMedianIds ? median : w > pixel.largest) ? record : pixel.record;
     pixel.largest = max(w, pixel.largest);
     pixel.transmittance = done ? -t : add ? next : t;
 }

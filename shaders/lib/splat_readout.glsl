@@ -71,8 +71,44 @@ float part_of_center(Lens l, Motion m, Course c, float low, float high, inout Le
 
 float nearness_of(vec3 seen) { return kModel == kOpencv ? seen.z : length(seen); }
 
+// what a disc covers that is near enough in the parts [low, high], middle: as sweep_of has it
+bool readout_bounds(Lens l, Motion m, Course c, LensView still, float low, float high, vec2 reach,
+                    out LensView middle, out vec4 box)
+{
+    const Sweep w = sweep_of(still, m, c, low, high, max(reach.x, reach.y), middle);
+    const float moves = 0.5 * length(w.across) + length(w.off) + w.rest;
+    box = vec4(0.0);
+    return is_finite(vec4(middle.away)) && nearness_of(middle.center) + moves > p.near &&
+           disc_bounds(l, middle, w, reach, box);
+}
+
+const uint kSlices = 8;
+
+// The same of flat pictures, tighter where a disc passes close by: of each slice of the readout what its own lines
+// show. None: low above high
+vec4 sliced_bounds(Lens l, Motion m, Course c, LensView still, float low, float high, vec2 reach)
+{
+    vec4 all = vec4(1e9, 1e9, -1e9, -1e9);
+    for (uint i = 0; i < kSlices; ++i) {
+        const vec2 parts = mix(vec2(low), vec2(high), vec2(i, i + 1) / float(kSlices));
+        LensView middle;
+        vec4 box;
+        if (!readout_bounds(l, m, c, still, parts.x, parts.y, reach, middle, box))
+            continue;
+        const bool down = m.across.y != 0.0; // else lines are columns
+        const vec2 ends = (parts - m.first) / (down ? m.across.y : m.across.x);
+        const vec2 lines = vec2(min(ends.x, ends.y) - 0.05, max(ends.x, ends.y) + 0.05);
+        box = down ? vec4(box.x, max(box.y, lines.x), box.z, min(box.w, lines.y))
+                   : vec4(max(box.x, lines.x), box.y, min(box.z, lines.y), box.w);
+        if (box.x <= box.z && box.y <= box.w)
+            all = vec4(min(all.xy, box.xy), max(all.zw, box.zw));
+    }
+    return all;
+}
+
 // s: center, axes and normal at part 0, in the still frame. Bounds are found for the whole readout first, then for the
-// parts of the lines that are within them. Whether the centre is too near is asked for each pixel.
+// parts of the lines that are within them, and in slices if those are still many. Whether the centre is too near is
+// asked for each pixel.
 bool view_moving(Lens l, uint camera, Course course, float opacity, vec2 sigmas, inout LensView s)
 {
     const Motion m = camera_motion(camera);
@@ -82,9 +118,7 @@ bool view_moving(Lens l, uint camera, Course course, float opacity, vec2 sigmas,
     vec4 box;
     for (uint i = 0; i < 3; ++i) {
         LensView middle;
-        const Sweep w = sweep_of(s, m, course, low, high, max(reach.x, reach.y), middle);
-        const float moves = 0.5 * length(w.across) + length(w.off) + w.rest;
-        if (!is_finite(vec4(middle.away)) || nearness_of(middle.center) + moves <= p.near || !disc_bounds(l, middle, w, reach, box) ||
+        if (!readout_bounds(l, m, course, s, low, high, reach, middle, box) ||
             !pixels_within(l, s, vec4(box.xy - dot_radius, box.zw + dot_radius)))
             return false;
         const vec2 parts = parts_of(l, m, box, s.bounds, low, high);
@@ -93,6 +127,8 @@ bool view_moving(Lens l, uint camera, Course course, float opacity, vec2 sigmas,
         low = parts.x;
         high = parts.y;
     }
+    if (kModel != kEquirectangular && kModel != kSpinning && high - low > 1.0 / float(kSlices))
+        box = sliced_bounds(l, m, course, s, low, high, reach);
     const float part = part_of_center(l, m, course, low, high, s);
     const vec3 seen = seen_at(m, course, part, s.center);
     s.away = length(seen);

@@ -120,7 +120,7 @@ class Slurm(unittest.TestCase):
         whole = job.run(out="whole")
         self.assertEqual(whole.returncode, 0, whole.stderr)
         expected = job.published("whole")
-        self.assertEqual(len(expected), 6 * (1 + 1) + 6 * (2 + 3 * 5))
+        self.assertEqual(len(expected), 6 * (1 + 1) + 6 * (5 + 3 * 5))  # four files a drive, a manifest
         for parts in (3, 7):
             for part in range(parts):
                 done = job.run("--part", f"{part}/{parts}", out=f"in{parts}")
