@@ -280,5 +280,34 @@ TEST(CliEvalFlicker, what_does_not_fit_together_is_one_clear_line)
     expect_error(flicker(made + " --depth " + drive + " --path " + (p / "short.json")), 3, "short.json");
 }
 
+// the picture's step is between columns 11 and 12, those of labels are beside it
+TEST(CliEvalFrames, edges_by_hand)
+{
+    const Pictures p;
+    const auto put_labels = [&](std::string_view name, uint32_t first) {
+        std::vector<uint8_t> classes;
+        for (uint32_t i = 0; i < kWidth * kHeight; ++i)
+            classes.push_back(i % kWidth < first ? 2 : 13);
+        std::filesystem::create_directories((p.folder / "labels"));
+        EXPECT_TRUE(write_png_gray8(p.folder / "labels" / name, kWidth, kHeight, classes));
+    };
+    p.put("frames/000000.png", 100, 140);
+    put_labels("000000.png", 12); // there
+    p.put("frames/000001.png", 100, 140);
+    put_labels("000001.png", 14); // two pixels away
+    p.put("frames/000002.png", 100, 105);
+    put_labels("000002.png", 12); // no edge
+    const ProgramResult result = eval("edges --json " + p / "frames" + " " + p / "labels");
+    ASSERT_EQ(result.code, 0) << result.err;
+    const Json report = Json::parse(result.out);
+    EXPECT_EQ(report["borders"], 3 * kHeight);
+    for (const auto& [pixels, edges] : {std::pair{0, 1.0}, {1, 1.0}, {2, 2.0}, {8, 2.0}})
+        EXPECT_NEAR(report["within"][pixels].get<double>(), edges / 3, 1e-12);
+    EXPECT_NEAR(report["step"].get<double>(), (40.0 + 0 + 5) / 3, 1e-9);
+    EXPECT_NEAR(report["step_beside"].get<double>(), (40.0 + 40 + 5) / 3 / 17, 1e-9);
+    EXPECT_EQ(report["labels"]["building"]["borders"], 3 * kHeight);
+    EXPECT_EQ(report["labels"].size(), 2u);
+}
+
 } // namespace cli_eval_frames_test
 } // namespace semrover

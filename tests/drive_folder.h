@@ -66,7 +66,9 @@ struct DriveFolder {
     void write(const Path& folder, size_t moments) const
     {
         const CameraPath cameras = path(moments);
-        const DriveRecord record = drive_record_of(cameras, kMillimetre).value();
+        DriveRecord record = drive_record_of(cameras, kMillimetre).value();
+        if (lidar)
+            record.lidars.push_back({"top", std::make_shared<const Lidar>(named_lidar("xt32").value()), lidar_mount()});
         std::filesystem::create_directories(folder);
         must(write_drive_record(folder, record));
         must(write_transforms(folder / "transforms.json", cameras));

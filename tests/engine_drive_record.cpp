@@ -50,7 +50,10 @@ double largest_difference(const Rigid& a, const Rigid& b)
 TEST(engine_drive_record, comes_back_from_its_files_with_the_same_lenses_places_and_times)
 {
     const ScratchFolder folder;
-    const CameraPath path = *expand_rig(two_cameras(), forward_path(7));
+    Rig rig = two_cameras();
+    const Rigid mount = {0, 1, 0, 0.9, -1, 0, 0, 0.1, 0, 0, 1, 2, 0, 0, 0, 1};
+    rig.lidars.push_back({"top", std::make_shared<const Lidar>(*named_lidar("ot128")), mount});
+    const CameraPath path = *expand_rig(rig, forward_path(7));
     const DriveRecord record = *drive_record_of(path, 0.01);
     ASSERT_TRUE(write_drive_record(folder.path(), record));
     const auto back = read_drive_record(folder.path());
@@ -62,6 +65,10 @@ TEST(engine_drive_record, comes_back_from_its_files_with_the_same_lenses_places_
         EXPECT_EQ(back->sensors[i].intrinsics, path.sensors[i].intrinsics);
         EXPECT_LT(largest_difference(back->sensors[i].sensor_to_vehicle, path.sensors[i].sensor_to_vehicle), 1e-15);
     }
+    ASSERT_EQ(back->lidars.size(), 1u);
+    EXPECT_EQ(back->lidars[0].name, "top");
+    EXPECT_EQ(back->lidars[0].lidar->table, path.lidars[0].lidar->table);
+    EXPECT_EQ(back->lidars[0].sensor_to_vehicle, mount);
     const CameraPath again = path_of(*back);
     ASSERT_EQ(again.frames.size(), path.frames.size());
     for (size_t i = 0; i < path.frames.size(); ++i) {

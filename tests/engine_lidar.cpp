@@ -138,7 +138,7 @@ TEST(engine_lidar, a_rig_has_lidars_beside_cameras)
     EXPECT_EQ(rig->lidars[0].lidar->columns, 360u);
     EXPECT_EQ(rig_of("\"xt32\"").value().lidars[0].lidar->columns, 2000u);
     EXPECT_TRUE(says(rig_of("\"none\""), "expected a file, or one of"));
-    EXPECT_TRUE(says(rig_of("3"), "lidar: expected the name of a lidar or a file, found number"));
+    EXPECT_TRUE(says(rig_of("3"), "lidar: expected the name of a lidar, a file or a table, found number"));
     EXPECT_TRUE(says(rig_of("\"xt32\",\"width\":3"), "unknown key 'width'"));
     CameraPath drive;
     for (const double x : {0.0, 2.0}) // a camera that looks along +x of the world

@@ -76,7 +76,7 @@ Json along_rays(const DriveRecord& record)
 
 Json calibration_json(const DriveRecord& record)
 {
-    Json rig = rig_json(record.sensors);
+    Json rig = rig_json(record.sensors, record.lidars);
     rig["path_axes"] = "vehicle";
     return {{"format", kCalibrationFormat},
             {"version", 1},
@@ -107,6 +107,7 @@ Status read_calibration(const Path& path, DriveRecord& record)
     record.depth_unit = unit->get<double>();
     SR_TRY(Rig rig, parse_rig(file.value("rig", Json()), where + ": rig"));
     record.sensors = std::move(rig.sensors);
+    record.lidars = std::move(rig.lidars);
     return {};
 }
 
@@ -191,6 +192,7 @@ Result<DriveRecord> drive_record_of(const CameraPath& path, double depth_unit)
         record.pictures.push_back({time, frame.camera, counts[frame.camera]++});
     }
     record.sensors = mountings.take();
+    record.lidars = path.lidars;
     return record;
 }
 

@@ -22,10 +22,11 @@ struct DriveRecord {
         uint32_t number = 0; // of the camera's pictures
     };
 
-    double depth_unit = 0.001;     // metres of what depth pictures hold
-    std::vector<Sensor> sensors;   // as they were drawn; one may have no name
-    std::vector<Moment> moments;   // ascending
-    std::vector<Picture> pictures; // in the path's order, ascending for each camera
+    double depth_unit = 0.001;            // metres of what depth pictures hold
+    std::vector<Sensor> sensors;          // as they were drawn; one may have no name
+    std::vector<LidarSensor> lidars = {}; // whose sweeps lie in folders of their own
+    std::vector<Moment> moments;          // ascending
+    std::vector<Picture> pictures;        // in the path's order, ascending for each camera
 
     const Sensor* sensor(std::string_view name) const; // nullptr: there is none
     const Moment* moment(int64_t time) const;

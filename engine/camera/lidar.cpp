@@ -71,36 +71,6 @@ Status read_beams(const Json& json, Lidar& lidar, std::string_view where)
     return {};
 }
 
-Result<Lidar> lidar_of(const Json& json, const std::string& where)
-{
-    if (!json.is_object())
-        return fail(ErrorCode::bad_input, "{}: expected an object, found {}", where, json.type_name());
-    SR_CHECK(check_keys(json, kKeys, where));
-    for (const char* key : {"columns", "rate", "range"})
-        if (!json.contains(key))
-            return fail(ErrorCode::bad_input, "{}: {} is missing", where, key);
-    Lidar lidar;
-    double start = 180;
-    SR_TRY(const auto range, numbers_at<2>(json, "range", where));
-    std::tie(lidar.nearest, lidar.farthest) = std::pair(range[0], range[1]);
-    lidar.farthest_at_tenth = lidar.farthest;
-    JsonFields fields(json, where);
-    fields.integer("columns", 4u, kMostColumns, lidar.columns);
-    fields.number("rate", 0.1, 1000.0, lidar.rate);
-    fields.choice("direction", {{"clockwise", true}, {"counterclockwise", false}}, lidar.clockwise);
-    fields.number("start", -360.0, 360.0, start);
-    fields.number("range_at_10_percent", 0.01, 1e5, lidar.farthest_at_tenth);
-    fields.choice("first_ring", {{"top", true}, {"bottom", false}}, lidar.first_ring_on_top);
-    std::vector<std::string> unread;
-    SR_CHECK(fields.finish(unread));
-    if (!(lidar.nearest >= 0.01 && lidar.nearest < lidar.farthest && lidar.farthest <= 1e5))
-        return fail(ErrorCode::bad_input, "{}: range: expected metres from 0.01 to 100000, the nearest first, found {}",
-                    where, fmt::join(range, ", "));
-    lidar.start = start * kRadians;
-    SR_CHECK(read_beams(json, lidar, where));
-    return lidar;
-}
-
 } // namespace
 
 double Lidar::step() const
@@ -124,10 +94,41 @@ Point3 Lidar::ray(uint32_t beam, uint32_t column) const
     return {std::cos(up) * std::cos(azimuth), -std::cos(up) * std::sin(azimuth), std::sin(up)};
 }
 
+Result<Lidar> parse_lidar(const Json& json, std::string_view where)
+{
+    if (!json.is_object())
+        return fail(ErrorCode::bad_input, "{}: expected an object, found {}", where, json.type_name());
+    SR_CHECK(check_keys(json, kKeys, where));
+    for (const char* key : {"columns", "rate", "range"})
+        if (!json.contains(key))
+            return fail(ErrorCode::bad_input, "{}: {} is missing", where, key);
+    Lidar lidar;
+    double start = 180;
+    SR_TRY(const auto range, numbers_at<2>(json, "range", where));
+    std::tie(lidar.nearest, lidar.farthest) = std::pair(range[0], range[1]);
+    lidar.farthest_at_tenth = lidar.farthest;
+    JsonFields fields(json, std::string(where));
+    fields.integer("columns", 4u, kMostColumns, lidar.columns);
+    fields.number("rate", 0.1, 1000.0, lidar.rate);
+    fields.choice("direction", {{"clockwise", true}, {"counterclockwise", false}}, lidar.clockwise);
+    fields.number("start", -360.0, 360.0, start);
+    fields.number("range_at_10_percent", 0.01, 1e5, lidar.farthest_at_tenth);
+    fields.choice("first_ring", {{"top", true}, {"bottom", false}}, lidar.first_ring_on_top);
+    std::vector<std::string> unread;
+    SR_CHECK(fields.finish(unread));
+    if (!(lidar.nearest >= 0.01 && lidar.nearest < lidar.farthest && lidar.farthest <= 1e5))
+        return fail(ErrorCode::bad_input, "{}: range: expected metres from 0.01 to 100000, the nearest first, found {}",
+                    where, fmt::join(range, ", "));
+    lidar.start = start * kRadians;
+    SR_CHECK(read_beams(json, lidar, where));
+    lidar.table = json;
+    return lidar;
+}
+
 Result<Lidar> read_lidar(const Path& path)
 {
     SR_TRY(const Json json, read_json(path));
-    return lidar_of(json, quote_path(path));
+    return parse_lidar(json, quote_path(path));
 }
 
 Result<Lidar> named_lidar(std::string_view name)
@@ -141,7 +142,7 @@ Result<Lidar> named_lidar(std::string_view name)
                     fmt::join(names, ", "));
     }
     SR_TRY(const Json json, parse_json(found->json, name));
-    return lidar_of(json, std::string(name));
+    return parse_lidar(json, name);
 }
 
 SweepPicture::SweepPicture(const Lidar& lidar)

@@ -4,6 +4,7 @@
 
 #include "engine/camera/rigid.h"
 #include "runtime/base/file.h"
+#include "runtime/base/json.h"
 
 #include <cstdint>
 #include <string>
@@ -30,6 +31,7 @@ struct Lidar {
     double farthest_at_tenth = 0;     // of a surface that reflects a tenth, at right angles
     bool first_ring_on_top = true;
     std::vector<LidarBeam> beams; // by falling elevation
+    Json table = {};              // that it was read from
 
     double step() const; // from a column to the next, radians clockwise
     double sweep_seconds() const { return 1 / rate; }
@@ -53,6 +55,7 @@ struct Lidar {
 // and "comment". Unknown keys are refused. bad_input, with the file in front
 Result<Lidar> read_lidar(const Path& path);
 Result<Lidar> named_lidar(std::string_view name);
+Result<Lidar> parse_lidar(const Json& table, std::string_view where);
 
 // A sweep as a picture: a row a beam, from the top. Pixel x of row i holds what beam i fires in column x + first -
 // shift(i), so that a column of pixels looks into almost one direction: column x + first's, and rest(i) from there.

@@ -199,16 +199,23 @@ Result<Sensor> read_sensor(const Json& json, bool alone, std::string_view where)
 }
 
 // folder: of the rig's file
+Result<Lidar> read_table(const Json& json, const Path& folder, const std::string& where)
+{
+    if (json.is_object())
+        return parse_lidar(json, where);
+    if (!json.is_string())
+        return fail(ErrorCode::bad_input, "{}: expected the name of a lidar, a file or a table, found {}", where,
+                    json.type_name());
+    const std::string& name = json.get_ref<const std::string&>();
+    return name.ends_with(".json") ? read_lidar(folder / name) : named_lidar(name);
+}
+
 Result<LidarSensor> read_lidar_sensor(const Json& json, const Path& folder, std::string_view where)
 {
     SR_CHECK(check_keys(json, {"name", "lidar", "sensor_to_vehicle", "comment"}, where));
     LidarSensor sensor;
     SR_TRY(sensor.name, read_name(json, false, where));
-    if (!json["lidar"].is_string())
-        return fail(ErrorCode::bad_input, "{}: lidar: expected the name of a lidar or a file, found {}", where,
-                    json["lidar"].type_name());
-    const std::string& lidar = json["lidar"].get_ref<const std::string&>();
-    SR_TRY(Lidar read, lidar.ends_with(".json") ? read_lidar(folder / lidar) : named_lidar(lidar));
+    SR_TRY(Lidar read, read_table(json["lidar"], folder, fmt::format("{}: lidar", where)));
     sensor.lidar = std::make_shared<const Lidar>(std::move(read));
     SR_TRY(sensor.sensor_to_vehicle,
            read_mounting(json["sensor_to_vehicle"], fmt::format("{}: sensor_to_vehicle", where)));
@@ -320,7 +327,15 @@ Result<Rig> parse_rig(const Json& file, std::string_view name, const Path& folde
     return rig;
 }
 
-Json rig_json(std::span<const Sensor> sensors)
+Json matrix_json(const Rigid& pose)
+{
+    Json rows = Json::array();
+    for (size_t row = 0; row < 4; ++row)
+        rows.push_back(std::span(pose).subspan(4 * row, 4));
+    return rows;
+}
+
+Json rig_json(std::span<const Sensor> sensors, std::span<const LidarSensor> lidars)
 {
     Json list = Json::array();
     for (const Sensor& s : sensors) {
@@ -337,10 +352,12 @@ Json rig_json(std::span<const Sensor> sensors)
             sensor["shutter"] = {{"direction", std::string(name_of(s.shutter->direction))},
                                  {"start", s.shutter->start},
                                  {"readout", s.shutter->readout}};
-        for (size_t row = 0; row < 4; ++row)
-            sensor["sensor_to_vehicle"].push_back(std::span(s.sensor_to_vehicle).subspan(4 * row, 4));
+        sensor["sensor_to_vehicle"] = matrix_json(s.sensor_to_vehicle);
         list.push_back(std::move(sensor));
     }
+    for (const LidarSensor& s : lidars)
+        list.push_back(
+            {{"name", s.name}, {"lidar", s.lidar->table}, {"sensor_to_vehicle", matrix_json(s.sensor_to_vehicle)}});
     return {{"sensors", list}};
 }
 

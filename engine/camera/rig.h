@@ -31,13 +31,13 @@ struct Rig {
 //                                                                        and ftheta: engine/camera/ftheta_json.h
 //                 "distortion": [k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4],    opencv, 4, 5, 8 or 12 numbers;
 //                                                                                    fisheye: k1 .. k4
-//                 "shutter": {"direction": "down" | "up" | "right" | "left",     where the lines after the first one
-//                 are
+//                 "shutter": {"direction": "down" | "up" | "right" | "left",     where lines go
 //                             "start": -15000,                                   microseconds from the frame's time;
 //                                                                                default 0
 //                             "readout": 30000},                                 microseconds of all lines
 //                 "sensor_to_vehicle": 4x4 | {"translation": [x, y, z], "rotation": [qx, qy, qz, qw]}},
-//                {"name": "lidar_top", "lidar": "ot128",           of assets/lidar, or a file beside this one (.json)
+//                {"name": "lidar_top", "lidar": "ot128",           of assets/lidar, or a file beside this one (.json),
+//                                                            or such a table itself
 //                 "sensor_to_vehicle": as above}]}
 // The name of an only sensor may be "": its pictures are in no folder of their own. A key "comment" of text is allowed
 // beside the others. bad_input for anything else, unknown keys included; at most 64 sensors, 16 MiB
@@ -48,8 +48,10 @@ Result<Rig> parse_rig(const Json& file, std::string_view where, const Path& fold
 // where a camera sits that is at the vehicle's origin and looks forward
 constexpr Rigid kForwardCamera = {0, 0, 1, 0, -1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 0, 1};
 
-// the sensors as an object that read_rig reads
-Json rig_json(std::span<const Sensor> sensors);
+Json matrix_json(const Rigid& pose); // 4x4
+
+// the sensors as an object that read_rig reads; of lidars the tables
+Json rig_json(std::span<const Sensor> sensors, std::span<const LidarSensor> lidars = {});
 
 // The frames of all sensors at every pose of the vehicle: pose by pose, sensors in the rig's order; a sweep of each
 // lidar ends there. Where the vehicle is during a sweep, and while a picture is read out, is interpolated between its

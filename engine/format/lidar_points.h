@@ -27,6 +27,9 @@ enum class LidarFormat : uint8_t { npy, pcd, kitti, nuscenes };
 constexpr std::string_view kLidarFormats[] = {"npy", "pcd", "kitti", "nuscenes"};
 constexpr std::string_view kLidarEndings[] = {"npy", "pcd", "bin", "pcd.bin"};
 
+// a lidar's folder: its poses, and files of points
+constexpr const char *kSweepsName = "sweeps.json", *kSweepsFormat = "semrover.sweeps", *kSweepPoints = "points";
+
 std::vector<std::byte> encode_lidar(std::span<const LidarPoint> points, LidarFormat format);
 
 } // namespace semrover

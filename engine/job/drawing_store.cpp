@@ -24,8 +24,6 @@ namespace fs = std::filesystem;
 constexpr const char* kPictures[] = {"color", "depth", "normal", "label", "visible"};
 constexpr const char *kInstances = "instance", *kFlow = "flow", *kFlowStates = "flow_state";
 constexpr const char* kArrays[] = {"depth_expected", "depth_median", "alpha"};
-constexpr const char* kPointsOf = "points"; // of sweeps
-constexpr const char* kSweeps = "sweeps.json";
 constexpr const char* kTop = "top.png";
 constexpr const char* kBoxes = "boxes"; // of a frame's entry in the journal
 constexpr const char* kPoints = "points.ply";
@@ -50,14 +48,6 @@ std::set<std::string> cameras_of(const CameraPath& path)
     return cameras;
 }
 
-Json matrix_of(const Rigid& pose)
-{
-    Json rows = Json::array();
-    for (size_t row = 0; row < 4; ++row)
-        rows.push_back(std::span(pose).subspan(4 * row, 4));
-    return rows;
-}
-
 // where a lidar was: {"format", "version", "sweeps": [{"time", "begin", "end"}]}, its poses to the world
 Json sweeps_json(const CameraPath& path, const std::string& lidar)
 {
@@ -66,9 +56,9 @@ Json sweeps_json(const CameraPath& path, const std::string& lidar)
         if (s.sensor == lidar)
             sweeps.push_back({{"time", microseconds_of(s.time)},
                               {"duration", microseconds_of(s.lidar->sweep_seconds())},
-                              {"begin", matrix_of(s.begin)},
-                              {"end", matrix_of(s.end)}});
-    return {{"format", "semrover.sweeps"}, {"version", 1}, {"sweeps", std::move(sweeps)}};
+                              {"begin", matrix_json(s.begin)},
+                              {"end", matrix_json(s.end)}});
+    return {{"format", kSweepsFormat}, {"version", 1}, {"sweeps", std::move(sweeps)}};
 }
 
 // the folders of these cameras' pictures, from the run's folder on
@@ -81,7 +71,7 @@ std::vector<std::string> picture_folders(const std::set<std::string>& cameras)
         for (const char* kind : kArrays)
             folders.push_back((camera_folder("", camera) / kind).string());
         if (!camera.empty())
-            folders.push_back((camera_folder("", camera) / kPointsOf).string());
+            folders.push_back((camera_folder("", camera) / kSweepPoints).string());
         for (const char* kind : {kInstances, kFlow, kFlowStates})
             folders.push_back((camera_folder("", camera) / kind).string());
     }
@@ -104,7 +94,7 @@ std::set<std::string> cameras_before(const Path& folder)
 
 std::string sweep_name(const std::string& lidar, uint32_t number)
 {
-    return fmt::format("{}/{}/{:06}", lidar, kPointsOf, number);
+    return fmt::format("{}/{}/{:06}", lidar, kSweepPoints, number);
 }
 
 std::set<std::string> pieces_with_flow(const CameraPath& path)
@@ -173,7 +163,7 @@ Result<std::unique_ptr<DrawingStore>> DrawingStore::open(const Path& folder, con
         contents.results.insert(contents.results.end(), {kBoxesName, kObjectsName});
     for (const std::string& camera : cameras)
         if (!camera.empty())
-            contents.results.push_back((camera_folder("", camera) / kSweeps).string());
+            contents.results.push_back((camera_folder("", camera) / kSweepsName).string());
     SR_TRY(RunFolder run, open_run(folder, with_cameras, replace, contents, true));
     return std::unique_ptr<DrawingStore>(new DrawingStore(std::move(run), path, files));
 }
@@ -283,7 +273,7 @@ Status DrawingStore::write_cameras(const CameraPath& path) const
     MadeFiles files;
     for (const LidarSensor& lidar : path.lidars) {
         const std::string text = sweeps_json(path, lidar.name).dump() + "\n";
-        SR_CHECK(files.add(run_.path() / lidar.name / kSweeps, std::as_bytes(std::span(text))));
+        SR_CHECK(files.add(run_.path() / lidar.name / kSweepsName, std::as_bytes(std::span(text))));
     }
     SR_CHECK(files.commit());
     if (path.frames.empty())

@@ -84,51 +84,58 @@ bool readout_bounds(Lens l, Motion m, Course c, LensView still, float low, float
 
 const uint kSlices = 8;
 
-// The same of flat pictures, tighter where a disc passes close by: of each slice of the readout what its own lines
-// show. None: low above high
-vec4 sliced_bounds(Lens l, Motion m, Course c, LensView still, float low, float high, vec2 reach)
+// what of a box in a flat picture is on the lines that are read in [parts.x, parts.y]
+vec4 on_lines(Motion m, vec4 box, vec2 parts)
 {
-    vec4 all = vec4(1e9, 1e9, -1e9, -1e9);
-    for (uint i = 0; i < kSlices; ++i) {
-        const vec2 parts = mix(vec2(low), vec2(high), vec2(i, i + 1) / float(kSlices));
-        LensView middle;
-        vec4 box;
-        if (!readout_bounds(l, m, c, still, parts.x, parts.y, reach, middle, box))
-            continue;
-        const bool down = m.across.y != 0.0; // else lines are columns
-        const vec2 ends = (parts - m.first) / (down ? m.across.y : m.across.x);
-        const vec2 lines = vec2(min(ends.x, ends.y) - 0.05, max(ends.x, ends.y) + 0.05);
-        box = down ? vec4(box.x, max(box.y, lines.x), box.z, min(box.w, lines.y))
-                   : vec4(max(box.x, lines.x), box.y, min(box.z, lines.y), box.w);
-        if (box.x <= box.z && box.y <= box.w)
-            all = vec4(min(all.xy, box.xy), max(all.zw, box.zw));
-    }
-    return all;
+    const bool down = m.across.y != 0.0; // else lines are columns
+    const vec2 ends = (parts - m.first) / (down ? m.across.y : m.across.x);
+    const vec2 lines = vec2(min(ends.x, ends.y) - 0.05, max(ends.x, ends.y) + 0.05);
+    return down ? vec4(box.x, max(box.y, lines.x), box.z, min(box.w, lines.y))
+                : vec4(max(box.x, lines.x), box.y, min(box.z, lines.y), box.w);
 }
 
 // s: center, axes and normal at part 0, in the still frame. Bounds are found for the whole readout first, then for the
-// parts of the lines that are within them, and in slices if those are still many. Whether the centre is too near is
-// asked for each pixel.
+// parts of the lines that are within them. Where those are still many of a flat picture, as of a disc that passes close
+// by, they are those of slices: of each what its own lines show. Whether the centre is too near is asked for each
+// pixel.
 bool view_moving(Lens l, uint camera, Course course, float opacity, vec2 sigmas, inout LensView s)
 {
     const Motion m = camera_motion(camera);
     const float c = sigmas_seen(opacity), dot_radius = c / sqrt(p.filter_scale);
     const vec2 reach = 1.0001 * c * sigmas;
     float low = -0.5, high = 0.5;
-    vec4 box;
-    for (uint i = 0; i < 3; ++i) {
+    vec4 box, sliced = vec4(1e9, 1e9, -1e9, -1e9);
+    bool slices = false;
+    // note: one loop for both, as compilers take long for its body
+    for (uint round = 0; round < (slices ? kSlices : 3u); ++round) {
+        vec2 parts = vec2(low, high);
+        if (slices)
+            parts = mix(vec2(low), vec2(high), vec2(round, round + 1) / float(kSlices));
         LensView middle;
-        if (!readout_bounds(l, m, course, s, low, high, reach, middle, box) ||
-            !pixels_within(l, s, vec4(box.xy - dot_radius, box.zw + dot_radius)))
+        const bool seen = readout_bounds(l, m, course, s, parts.x, parts.y, reach, middle, box);
+        if (slices) {
+            box = on_lines(m, box, parts);
+            if (seen && box.x <= box.z && box.y <= box.w)
+                sliced = vec4(min(sliced.xy, box.xy), max(sliced.zw, box.zw));
+            continue;
+        }
+        if (!seen || !pixels_within(l, s, vec4(box.xy - dot_radius, box.zw + dot_radius)))
             return false;
-        const vec2 parts = parts_of(l, m, box, s.bounds, low, high);
-        if (parts.y - parts.x > 0.7 * (high - low))
+        const vec2 left = parts_of(l, m, box, s.bounds, low, high);
+        const bool narrower = left.y - left.x <= 0.7 * (high - low);
+        if (narrower) {
+            low = left.x;
+            high = left.y;
+        }
+        if (narrower && round < 2)
+            continue;
+        slices = kModel != kEquirectangular && kModel != kSpinning && high - low > 1.0 / float(kSlices);
+        if (!slices)
             break;
-        low = parts.x;
-        high = parts.y;
+        round = ~0u;
     }
-    if (kModel != kEquirectangular && kModel != kSpinning && high - low > 1.0 / float(kSlices))
-        box = sliced_bounds(l, m, course, s, low, high, reach);
+    if (slices)
+        box = sliced;
     const float part = part_of_center(l, m, course, low, high, s);
     const vec3 seen = seen_at(m, course, part, s.center);
     s.away = length(seen);

@@ -3,6 +3,7 @@
 #include "tools/export/lidar_scans.h"
 
 #include "engine/annotation/json_lines.h"
+#include "engine/format/lidar_points.h"
 #include "engine/format/npy.h"
 #include "runtime/base/json_numbers.h"
 #include "runtime/base/quote.h"
@@ -26,10 +27,10 @@ Result<Rigid> end_of(const Json& sweep, std::string_view where)
 
 Status read_sweeps(const Path& folder, const DriveRecord& record, LidarScans& lidar)
 {
-    const Path path = folder / "sweeps.json";
+    const Path path = folder / kSweepsName;
     const std::string name = quote_path(path);
     SR_TRY(const Json file, read_json(path, {.bytes = 256u << 20, .values = 32u << 20, .containers = 4u << 20}));
-    if (!file.is_object() || file.value("format", Json()) != "semrover.sweeps" ||
+    if (!file.is_object() || file.value("format", Json()) != kSweepsFormat ||
         !file.value("sweeps", Json()).is_array() || file["sweeps"].size() != record.moments.size())
         return fail(ErrorCode::bad_input, "{}: expected the {} sweeps of the drive's moments", name,
                     record.moments.size());
@@ -39,13 +40,11 @@ Status read_sweeps(const Path& folder, const DriveRecord& record, LidarScans& li
         SR_TRY(const Rigid to_world, end_of(sweep, where));
         SR_TRY(const int64_t time, whole_number(sweep, "time", where));
         const Rigid mount = compose(inverse(record.moments[i].vehicle_to_world), to_world);
-        if (i == 0)
-            lidar.sensor_to_vehicle = mount;
         for (size_t k = 0; k < mount.size(); ++k)
             if (time != record.moments[i].time || std::abs(mount[k] - lidar.sensor_to_vehicle[k]) > kSameMount)
                 return fail(ErrorCode::bad_input, "{}: another time than its moment's, or another place on the vehicle",
                             where);
-        lidar.scans.push_back({folder / "points" / fmt::format("{:06}.npy", i), to_world});
+        lidar.scans.push_back({folder / kSweepPoints / fmt::format("{:06}.npy", i), to_world});
         if (!is_file(lidar.scans.back().points))
             return fail(ErrorCode::bad_input, "{} is missing: points are read from .npy",
                         quote_path(lidar.scans.back().points));
@@ -58,14 +57,11 @@ Status read_sweeps(const Path& folder, const DriveRecord& record, LidarScans& li
 Result<LidarScans> read_lidar_scans(const Path& folder, const DriveRecord& record)
 {
     LidarScans lidar;
-    SR_TRY(const std::vector<Path> inside, list_folders(folder));
-    for (const Path& at : inside) {
-        if (!is_file(at / "sweeps.json"))
-            continue;
-        lidar.sensor = at.filename().string();
-        SR_CHECK(read_sweeps(at, record, lidar));
-        break;
-    }
+    if (record.lidars.empty())
+        return lidar;
+    lidar.sensor = record.lidars.front().name;
+    lidar.sensor_to_vehicle = record.lidars.front().sensor_to_vehicle;
+    SR_CHECK(read_sweeps(folder / lidar.sensor, record, lidar));
     return lidar;
 }
 

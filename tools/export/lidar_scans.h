@@ -6,7 +6,7 @@
 
 namespace semrover {
 
-// The sweeps of a drive's first lidar, by name: LIDAR/sweeps.json and LIDAR/points/NNNNNN.npy of 8 columns
+// The sweeps of a drive's first lidar: LIDAR/sweeps.json and LIDAR/points/NNNNNN.npy of 8 columns
 struct LidarScans {
     struct Scan {
         Path points;
@@ -19,7 +19,8 @@ struct LidarScans {
     bool there() const { return !scans.empty(); }
 };
 
-// bad_input for sweeps that are not at the moments of the record, and for lidars that change their place on the vehicle
+// bad_input for sweeps that are not at the moments of the record, and for a lidar that is not where the record has it on the
+// vehicle
 Result<LidarScans> read_lidar_scans(const Path& folder, const DriveRecord& record);
 
 // x y z (metres, the sensor's axes) intensity (0..1) ring time label instance

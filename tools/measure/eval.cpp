@@ -14,6 +14,7 @@ void add_eval(CLI::App& app, const Globals& globals, Run& run)
     eval->require_subcommand(1);
     eval->fallthrough();
     add_eval_chamfer(*eval, globals, run);
+    add_eval_edges(*eval, globals, run);
     add_eval_f3d(*eval, globals, run);
     add_eval_fid(*eval, globals, run);
     add_eval_flicker(*eval, globals, run);

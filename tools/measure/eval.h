@@ -8,6 +8,7 @@ namespace semrover {
 
 // subcommands of `semrover eval`
 void add_eval_chamfer(CLI::App& eval, const Globals& globals, Run& run);
+void add_eval_edges(CLI::App& eval, const Globals& globals, Run& run);
 void add_eval_f3d(CLI::App& eval, const Globals& globals, Run& run);
 void add_eval_fid(CLI::App& eval, const Globals& globals, Run& run);
 void add_eval_flicker(CLI::App& eval, const Globals& globals, Run& run);

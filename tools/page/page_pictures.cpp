@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/page/page.h"
 
+#include "engine/format/flow_picture.h"
 #include "engine/format/image.h"
 #include "engine/shards/shard_set.h"
 #include "runtime/base/quote.h"
@@ -10,6 +11,7 @@
 #include <charconv>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <optional>
 
 namespace semrover {
@@ -22,6 +24,8 @@ constexpr double kPngMayBe = 1.25; // times as large as a JPEG: edges of labels 
 constexpr size_t kFewColors = 64;
 constexpr double kFlat = 0.65; // share of the pixels: drawn labels have 0.8, pictures and splats 0.25 to 0.5
 constexpr double kSameShape = 0.01;
+constexpr std::array<uint8_t, 3> kNothing = {50, 50, 50};
+constexpr double kFullColor = 32; // pixels of flow
 
 std::optional<uint32_t> number_of(const Path& file)
 {
@@ -102,31 +106,52 @@ bool is_flat(const ImageRgb8& image)
     return double(most) >= kFlat * double(colors.size());
 }
 
-// neighbours in number are far apart in hue; nothing is dark
-std::array<uint8_t, 3> instance_color(uint16_t number)
+// hue: turns from red, at least 0
+std::array<uint8_t, 3> color_of(double hue, double saturation, double light)
 {
-    if (number == 0)
-        return {50, 50, 50};
-    const double turns = 0.618034 * number, light = 0.6 + 0.4 * std::fmod(0.381966 * number, 1.0);
     std::array<uint8_t, 3> color{};
     for (size_t c = 0; c < 3; ++c) {
-        const double away = std::abs(std::fmod(turns + double(3 - c) / 3, 1.0) * 6 - 3);
-        color[c] = uint8_t(255 * light * (0.3 + 0.7 * std::clamp(away - 1, 0.0, 1.0)));
+        const double away = std::abs(std::fmod(hue + double(3 - c) / 3, 1.0) * 6 - 3);
+        color[c] = uint8_t(255 * light * (1 - saturation + saturation * std::clamp(away - 1, 0.0, 1.0)));
     }
     return color;
 }
 
-// a picture as people see it: numbers of instances have colours
+// neighbours in number are far apart in hue; nothing is dark
+std::array<uint8_t, 3> instance_color(uint16_t number)
+{
+    return number ? color_of(0.618034 * number, 0.7, 0.6 + 0.4 * std::fmod(0.381966 * number, 1.0)) : kNothing;
+}
+
+// hue is the direction, saturation the length: what stands is white
+std::array<uint8_t, 3> flow_color(float u, float v)
+{
+    if (!(u < 1e9f))
+        return kNothing;
+    const double turns = std::atan2(v, u) / (2 * std::numbers::pi);
+    return color_of(turns + 1, std::sqrt(std::min(std::hypot(u, v) / kFullColor, 1.0)), 1);
+}
+
+// a picture as people see it: numbers of instances and flow have colours
 Result<ImageRgb8> read_shown(const Path& file)
 {
-    if (file.parent_path().filename() != "instance")
-        return read_image_rgb8(file);
-    SR_TRY(const ImageGray16 numbers, read_png_gray16(file));
-    ImageRgb8 image{numbers.width, numbers.height, {}};
-    for (const uint16_t number : numbers.pixels) {
-        const auto color = instance_color(number);
+    ImageRgb8 image;
+    const auto put = [&](const std::array<uint8_t, 3>& color) {
         image.pixels.insert(image.pixels.end(), color.begin(), color.end());
+    };
+    if (file.parent_path().filename() == "instance") {
+        SR_TRY(const ImageGray16 numbers, read_png_gray16(file));
+        std::tie(image.width, image.height) = std::pair(numbers.width, numbers.height);
+        for (const uint16_t number : numbers.pixels)
+            put(instance_color(number));
+        return image;
     }
+    if (file.parent_path().filename() != "flow")
+        return read_image_rgb8(file);
+    SR_TRY(const FlowPicture flow, read_flow_png(file));
+    std::tie(image.width, image.height) = std::pair(flow.width, flow.height);
+    for (size_t i = 0; i < flow.flow.size(); i += 2)
+        put(flow_color(flow.flow[i], flow.flow[i + 1]));
     return image;
 }
 
