@@ -34,7 +34,7 @@ Result<SceneActors> actors_of(const sr_world& world, const sr_actor* given, uint
         if (!ids.insert(actors.back().id).second)
             return fail(ErrorCode::bad_input, "{}: object {} is an actor already", where, actors.back().id);
     }
-    return SceneActors::create(std::move(actors), objects);
+    return SceneActors::create(std::move(actors), by_id(objects));
 }
 
 } // namespace
