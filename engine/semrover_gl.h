@@ -79,8 +79,8 @@ typedef struct sr_gl_info {
 /* does not block */
 SR_API sr_status sr_gl_get_info(sr_gl* gl, sr_gl_info* info);
 
-/* The camera is that of sr_draw_desc. Textures are names of GL_TEXTURE_2D textures of the application's with width x
- * height texels at level 0; 0: not wanted. Their first row of texels (texture coordinate t = 0) is the top row of the
+/* The camera is a pinhole of sr_draw_desc. Textures are names of GL_TEXTURE_2D textures of the application's with width
+ * x height texels at level 0; 0: not wanted. Their first row of texels (texture coordinate t = 0) is the top row of the
  * picture. What the pictures hold is said at sr_draw_desc. */
 typedef struct sr_gl_draw_desc {
     uint32_t struct_size;
@@ -94,6 +94,7 @@ typedef struct sr_gl_draw_desc {
     uint32_t normal;            /* GL_RGBA32F */
     uint32_t depth;             /* GL_RG32F: metres along z, mean and median of the splats; 0 where nothing is */
     uint32_t label;             /* GL_RG32UI: label, SR_NO_CELL for none; low bits of its voxel */
+    double time;                /* as sr_draw_desc has it */
 } sr_gl_draw_desc;
 
 /* Draws the splats that are there into the textures. GL commands that the application issues from then on see the

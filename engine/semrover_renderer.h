@@ -51,8 +51,8 @@ typedef struct sr_source {
 } sr_source;
 
 /* What the next frame is made of: splats of a world, drawn here without leaving the device, or buffers of the
- * application's. Row by row from the top, without padding. The camera is as in sr_draw_desc; it is needed for a world,
- * and for noise on surfaces. */
+ * application's. Row by row from the top, without padding. The camera is a pinhole of sr_draw_desc; it is needed for a
+ * world, and for noise on surfaces. */
 typedef struct sr_frame_desc {
     uint32_t struct_size;
     uint32_t reserved;
@@ -62,6 +62,7 @@ typedef struct sr_frame_desc {
     sr_source depth;            /* uint16 a pixel: millimetres along z, 0 for nothing. Not read with fresh noise */
     double fx, fy, cx, cy;      /* pixels */
     double world_to_camera[12]; /* [3, 4] row by row: a rotation and metres */
+    double time;                /* as sr_draw_desc has it, for a world */
 } sr_frame_desc;
 
 /* Waits for the device. Begins a frame: draws the world, or copies the buffers, which the application may change once

@@ -10,7 +10,8 @@
 #include <png.h>
 
 /* without a jump buffer of ours libpng aborts where something is wrong */
-static void write_png(const char* path, uint32_t width, uint32_t height, int color_type, int bits, const void* pixels)
+static inline void write_png(const char* path, uint32_t width, uint32_t height, int color_type, int bits,
+                             const void* pixels)
 {
     const size_t row = (size_t)width * (color_type == PNG_COLOR_TYPE_RGB ? 3 : 1) * (size_t)bits / 8;
     png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, NULL, NULL, NULL);
@@ -31,9 +32,11 @@ static void write_png(const char* path, uint32_t width, uint32_t height, int col
     CHECK(fclose(file) == 0);
 }
 
-/* red, green and blue of a file that has 8 bits of each */
-static void read_png(const char* path, uint32_t width, uint32_t height, uint8_t* pixels)
+/* a file of this type and as many bits; 16 bits as the machine has them */
+static inline void read_png_of(const char* path, uint32_t width, uint32_t height, int color_type, int bits,
+                               void* pixels)
 {
+    const size_t row = (size_t)width * (color_type == PNG_COLOR_TYPE_RGB ? 3 : 1) * (size_t)bits / 8;
     png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, NULL, NULL, NULL);
     png_infop info = png_create_info_struct(png);
     FILE* file = fopen(path, "rb");
@@ -42,11 +45,18 @@ static void read_png(const char* path, uint32_t width, uint32_t height, uint8_t*
     png_init_io(png, file);
     png_read_info(png, info);
     CHECK(png_get_image_width(png, info) == width && png_get_image_height(png, info) == height);
-    CHECK(png_get_color_type(png, info) == PNG_COLOR_TYPE_RGB && png_get_bit_depth(png, info) == 8);
+    CHECK(png_get_color_type(png, info) == color_type && png_get_bit_depth(png, info) == bits);
+    if (bits == 16)
+        png_set_swap(png);
     for (y = 0; y < height; ++y)
-        png_read_row(png, pixels + (size_t)y * width * 3, NULL);
+        png_read_row(png, (png_bytep)pixels + y * row, NULL);
     png_destroy_read_struct(&png, &info, NULL);
     fclose(file);
+}
+/* red, green and blue of a file that has 8 bits of each */
+static inline void read_png(const char* path, uint32_t width, uint32_t height, uint8_t* pixels)
+{
+    read_png_of(path, width, height, PNG_COLOR_TYPE_RGB, 8, pixels);
 }
 
 #endif

@@ -554,7 +554,8 @@ static void objects_are_seen_and_moved(sr_context* context)
     static uint32_t still[WIDTH * HEIGHT], moved[WIDTH * HEIGHT], again[WIDTH * HEIGHT];
     static float before[WIDTH * HEIGHT * 4], after[WIDTH * HEIGHT * 4];
     sr_object wall = {.id = 41, .label = 2, .center = {2, 3.9, 1.2}, .size = {40, 0.6, 2.4}};
-    sr_actor actors[2] = {{.object = 41, .pose = {1, 0, 0, 2, 0, 1, 0, 2.4, 0, 0, 1, 1.8}}};
+    sr_actor_pose pose = {.pose = {1, 0, 0, 2, 0, 1, 0, 2.4, 0, 0, 1, 1.8}};
+    sr_actor actors[2] = {{.object = 41, .pose_count = 1, .poses = &pose}};
     sr_world_desc desc = street_world();
     sr_draw_desc draw = camera_at(0, WIDTH, HEIGHT);
     sr_pick found = SR_INIT(sr_pick);
@@ -592,7 +593,7 @@ static void objects_are_seen_and_moved(sr_context* context)
     actors[0].object = 7;
     CHECK(sr_world_set_actors(world, actors, 1) == SR_ERR_BAD_INPUT && says(context, "no object 7"));
     actors[0].object = 41;
-    actors[0].pose[0] = 2;
+    pose.pose[0] = 2;
     CHECK(sr_world_set_actors(world, actors, 1) == SR_ERR_BAD_INPUT && says(context, "actor 0"));
     CHECK(sr_world_set_actors(world, NULL, 1) == SR_ERR_USAGE && says(context, "actors is NULL"));
     CHECK(sr_world_set_actors(NULL, NULL, 0) == SR_ERR_USAGE && says(NULL, "world is NULL"));

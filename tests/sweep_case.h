@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/job/drawn_scene.h"
 #include "engine/job/sweep_drawing.h"
 #include "tests/kernel_case.h"
 
@@ -10,23 +11,11 @@ namespace semrover {
 // what a sweep of a scene sees, read back
 inline SweepImage draw_sweep(const DrawnScene& scene, const LidarSweep& sweep)
 {
-    auto drawing = SweepDrawing::create(test_device(), scene, sweep.lidar, {});
+    auto drawing = SweepDrawing::create(test_device(), scene.splats, scene.actors, sweep.lidar, {});
     EXPECT_TRUE(drawing) << drawing.error().message;
-    SweepImage image = (*drawing)->image();
-    const Status status = (*drawing)->draw(sweep, [&](uint32_t part, SplatSlots seen) -> Status {
-        std::vector<BufferSlice> slices;
-        for (const Slot* slot : seen.all())
-            slices.push_back(slot->slice());
-        std::vector<std::vector<std::byte>> bytes(slices.size());
-        SR_CHECK(test_device().read(slices, [&](const ReadPiece& piece) {
-            bytes[piece.slice].insert(bytes[piece.slice].end(), piece.bytes.begin(), piece.bytes.end());
-        }));
-        for (size_t slot = 0; slot < bytes.size(); ++slot)
-            (*drawing)->put(part, slot, bytes[slot], image);
-        return {};
-    });
-    EXPECT_TRUE(status) << status.error().message;
-    return image;
+    Result<SweepImage> image = (*drawing)->render(sweep);
+    EXPECT_TRUE(image) << image.error().message;
+    return std::move(*image);
 }
 
 // where a ray is in it

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/capi/exchange.h"
 
-#include <cmath>
 #include <limits>
 
 namespace semrover::capi {
@@ -22,33 +21,6 @@ Result<HostCopies*> copies_of(sr_context& context)
         SR_TRY(context.copies, HostCopies::create(*context.drawing));
     }
     return context.copies.get();
-}
-
-CameraFrame camera_frame(const double (&pinhole)[4], const double (&world_to_camera)[12], const ImageSize& size)
-{
-    CameraFrame frame;
-    Intrinsics& i = frame.intrinsics;
-    i.fx = pinhole[0];
-    i.fy = pinhole[1];
-    i.cx = pinhole[2];
-    i.cy = pinhole[3];
-    i.width = size.width;
-    i.height = size.height;
-    std::copy_n(world_to_camera, 12, frame.pose.world_to_camera.begin());
-    return frame;
-}
-
-CameraFrame frame_of(const sr_draw_desc& d)
-{
-    return camera_frame({d.fx, d.fy, d.cx, d.cy}, d.world_to_camera, {d.width, d.height});
-}
-
-Status check_camera(const CameraFrame& frame, const char* name)
-{
-    for (const double v : frame.pose.world_to_camera)
-        if (!std::isfinite(v))
-            return fail(ErrorCode::bad_input, "{}: a number of world_to_camera is not finite", name);
-    return check_intrinsics(frame.intrinsics, name);
 }
 
 JobBudget timed_budget(uint64_t microseconds)

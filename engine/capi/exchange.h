@@ -11,17 +11,6 @@ namespace semrover::capi {
 
 constexpr uint32_t kMostPixels = 16384; // of a side
 
-// options of a rasterizer that draws the world's actors, too
-RasterizerOptions with_actors(const sr_world& world, RasterizerOptions options);
-
-// fx, fy, cx, cy in pixels and [3, 4] row by row
-CameraFrame camera_frame(const double (&pinhole)[4], const double (&world_to_camera)[12], const ImageSize& size);
-
-CameraFrame frame_of(const sr_draw_desc& draw);
-
-// Errors: bad_input for numbers that are not finite, and focal lengths that are not above 0. name: of the structure
-Status check_camera(const CameraFrame& frame, const char* name);
-
 // of microseconds; beyond some thousand years it is none
 JobBudget timed_budget(uint64_t microseconds);
 
@@ -50,16 +39,7 @@ Status hand_over(sr_context& context, std::span<const WantedPicture> pictures); 
 // and buffer. name: of the member
 Status take_in(sr_context& context, const sr_source& from, const Slot& to, uint64_t bytes, const char* name);
 
-// What cameras see, on the device, until the next draw of the world: at once, or by commands that are being recorded.
-// Targets are not looked at. draws: they differ in camera and targets alone; as many of the first are drawn as there is
-// room for, one at least. What is new is shown before, by show_updates(). Errors: as sr_world_draw has them. name: of
-// the call
-Result<std::vector<SplatSlots>> draw_splats(sr_world& world, std::span<const sr_draw_desc> draws,
-                                            const PictureFormats& formats, const char* name);
-Result<SplatSlots> record_splats(sr_world& world, const sr_draw_desc& draw, const PictureFormats& formats,
-                                 VkCommandBuffer commands, const char* name);
-
-// What is wanted of it. kept: as draw_splats() returns it
+// What is wanted of a draw. kept: as draw_splats() returns it
 std::vector<WantedPicture> wanted_pictures(const sr_draw_desc& draw, const PictureFormats& formats, SplatSlots kept);
 
 // Errors: usage for a world without splat_bytes. name: of the call

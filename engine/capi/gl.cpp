@@ -83,6 +83,7 @@ sr_draw_desc camera_of(const sr_gl_draw_desc& d)
     draw.cx = d.cx;
     draw.cy = d.cy;
     std::copy_n(d.world_to_camera, 12, draw.world_to_camera);
+    draw.time = d.time;
     return draw;
 }
 
@@ -153,17 +154,17 @@ Status draw(sr_gl& gl, sr_world& world, const sr_gl_draw_desc& d)
     const bool unwaited = d.unwaited && link.way() == SR_GL_SHARED;
     SR_CHECK(splats_of(world, "sr_gl_draw").map([](SplatPool*) {}));
     SR_CHECK(show_updates(world, !unwaited));
-    const sr_draw_desc camera = camera_of(d);
+    SR_TRY(const WorldDraw camera, draw_of(world, camera_of(d), formats_of(d)));
     if (unwaited) {
         SR_TRY(const VkCommandBuffer commands, link.begin());
         world.done = gl.context->drawing->next_point();
-        SR_TRY(const SplatSlots images, record_splats(world, camera, formats_of(d), commands, "sr_gl_draw"));
+        SR_TRY(const SplatSlots images, record_splats(world, camera, commands, "sr_gl_draw"));
         const std::vector<Wanted> wanted = wanted_of(gl, d, images);
         SR_TRY(const std::vector<GlLink::Piece> pieces, pieces_of(link, wanted));
         SR_CHECK(link.finish(commands, pieces));
         return upload(link, wanted);
     }
-    SR_TRY(const std::vector<SplatSlots> images, draw_splats(world, {&camera, 1}, formats_of(d), "sr_gl_draw"));
+    SR_TRY(const std::vector<SplatSlots> images, draw_splats(world, {&camera, 1}, "sr_gl_draw"));
     const std::vector<Wanted> wanted = wanted_of(gl, d, images[0]);
     SR_TRY(const std::vector<GlLink::Piece> pieces, pieces_of(link, wanted));
     SR_CHECK(link.send(pieces));
@@ -297,5 +298,5 @@ sr_status sr_gl_get_splats(sr_gl* gl, sr_world* world, sr_gl_splats* splats)
 
 } // extern "C"
 
-static_assert(sizeof(sr_gl_desc) == 24 && sizeof(sr_gl_info) == 296 && sizeof(sr_gl_draw_desc) == 168);
+static_assert(sizeof(sr_gl_desc) == 24 && sizeof(sr_gl_info) == 296 && sizeof(sr_gl_draw_desc) == 176);
 static_assert(sizeof(sr_gl_array) == 16 && sizeof(sr_gl_splats) == 96);

@@ -4,8 +4,10 @@
 
 #include "engine/capi/camera_renderer.h"
 #include "engine/capi/rasterizers.h"
+#include "engine/job/flow_drawing.h"
 #include "engine/job/model.h"
 #include "engine/job/scene_actors.h"
+#include "engine/job/sweep_drawing.h"
 #include "engine/scene/label_edits.h"
 #include "engine/semrover_vulkan.h"
 #include "engine/world/world.h"
@@ -45,6 +47,17 @@ struct sr_model {
     std::shared_ptr<semrover::Model> model;
 };
 
+namespace semrover::capi {
+
+// a lidar of a world's, and what draws its sweeps
+struct WorldLidar {
+    std::shared_ptr<const Lidar> table;
+    RasterizerOptions options = {};
+    std::unique_ptr<SweepDrawing> drawing = {};
+};
+
+} // namespace semrover::capi
+
 struct sr_world {
     sr_context* context = nullptr;
     uint64_t number = 0; // of the context's worlds, from 1 on
@@ -58,6 +71,7 @@ struct sr_world {
     std::vector<semrover::CellWindow> labels_ready;
     sr_world_info info = {}; // as the last call left it
     // of the thread that draws
+    semrover::ObjectsById objects; // that it was given
     semrover::SceneActors actors;
     semrover::capi::Rasterizers pixels;              // of renderers that draw
     semrover::capi::Rasterizers images, recorded;    // of draws
@@ -65,6 +79,8 @@ struct sr_world {
     bool updated_by_application = false;             // by sr_world_record_updates
     semrover::TimelinePoint done;                    // when all that was recorded so far has been executed
     std::vector<std::pair<semrover::TimelinePoint, std::shared_ptr<semrover::Rasterizer>>> retired;
+    std::unique_ptr<semrover::FlowDrawing> flow;              // from the first call on
+    std::map<std::string, semrover::capi::WorldLidar> lidars; // by name
 };
 
 struct sr_renderer {

@@ -16,7 +16,7 @@ namespace semrover::capi {
 class Rasterizers {
   public:
     using Retired = std::vector<std::shared_ptr<Rasterizer>>;
-    static constexpr size_t kMost = 4;
+    static constexpr size_t kMost = 8;
 
     // errors: as Rasterizer has them
     Result<Rasterizer*> of(Device& device, const SplatPool& splats, const ImageSize& size,

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // draws that nobody waits for: in a command buffer of the application's, or submitted between semaphores of its own
-#include "engine/capi/exchange.h"
+#include "engine/capi/draws.h"
 
 using namespace semrover;
 using namespace semrover::capi;
@@ -39,7 +39,8 @@ Status record(sr_world& world, const sr_draw_desc& d, VkCommandBuffer commands, 
     SR_CHECK(check_device(world, name));
     SR_CHECK(check_targets(d));
     SR_TRY(const PictureFormats formats, formats_of(d));
-    SR_TRY(const SplatSlots images, record_splats(world, d, formats, commands, name));
+    SR_TRY(const WorldDraw draw, draw_of(world, d, formats));
+    SR_TRY(const SplatSlots images, record_splats(world, draw, commands, name));
     for (const auto& [pixels, target, size] : wanted_pictures(d, formats, images))
         record_host_target(device, commands, pixels, host_target(*target, size));
     return {};
@@ -77,28 +78,22 @@ Status submit(sr_world& world, const sr_draw_desc& d, const sr_sync& sync)
 
 namespace semrover::capi {
 
-Result<SplatSlots> record_splats(sr_world& world, const sr_draw_desc& d, const PictureFormats& formats,
-                                 VkCommandBuffer commands, const char* name)
+Result<SplatSlots> record_splats(sr_world& world, const WorldDraw& draw, VkCommandBuffer commands, const char* name)
 {
     Device& device = *world.context->drawing;
     SR_TRY(const SplatPool* splats, splats_of(world, name));
-    const ImageSize size{d.width, d.height};
-    SR_CHECK(check_size(size, "sr_draw_desc"));
-    const bool tested = d.depth_test.image;
     Rasterizers::Retired retired;
-    const RasterizerOptions options = with_actors(world, {.depth_tested = tested, .formats = formats});
-    const auto found = world.recorded.of(device, *splats, size, options, 1, &retired);
+    const auto found = world.recorded.of(device, *splats, draw.size(), draw.options, 1, &retired);
     for (std::shared_ptr<Rasterizer>& last : retired)
         world.retired.emplace_back(world.done, std::move(last));
     SR_TRY(Rasterizer * rasterizer, found);
-    if (tested) {
-        SR_TRY(const HostImage depth, host_depth(d.depth_test, size));
+    if (draw.options.depth_tested) {
+        SR_TRY(const HostImage depth, host_depth(draw.depth_test, draw.size()));
         const BufferSlice z = rasterizer->z_buffer().slice();
         record_image_fetch(device.vk(), commands, depth, z.buffer->handle(), z.offset);
     }
-    const CameraFrame frame = frame_of(d);
-    SR_CHECK(rasterizer->record(commands, splat_camera(frame.intrinsics, frame.pose), z_scale(d.depth_test),
-                                depth_scale(d), world.actors.seen_by({&frame, 1})));
+    SR_CHECK(rasterizer->record(commands, draw.camera(), z_scale(draw.depth_test), draw.depth_scale,
+                                world.actors.seen_by({&draw.frame, 1}, draw.options.moving)));
     return rasterizer->images(0);
 }
 

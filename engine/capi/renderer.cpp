@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // renderers: frames of splat buffers of one camera, one after the other
-#include "engine/capi/exchange.h"
+#include "engine/capi/draws.h"
 #include "engine/deferred/frame_images.h"
 
 using namespace semrover;
@@ -135,7 +135,7 @@ Status begin_frame(sr_renderer& renderer, const sr_frame_desc& d)
         return fail(ErrorCode::usage, "sr_renderer_begin: a frame is at work; finish or cancel it");
     if (d.world && (d.seen.memory || d.seen.buffer || d.depth.memory || d.depth.buffer))
         return fail(ErrorCode::usage, "sr_frame_desc: one of world and seen must be given");
-    const CameraFrame camera = camera_frame({d.fx, d.fy, d.cx, d.cy}, d.world_to_camera, renderer.size);
+    const CameraFrame camera = camera_frame({d.fx, d.fy, d.cx, d.cy}, d.world_to_camera, renderer.size, d.time);
     if (d.world || r.settings().follows_surfaces())
         SR_CHECK(check_camera(camera, "sr_frame_desc"));
     SR_TRY(DepthPicture depth, d.world ? draw_world(renderer, *d.world, camera) : take_buffers(renderer, d));
@@ -236,5 +236,5 @@ sr_status sr_renderer_get_info(sr_renderer* renderer, sr_renderer_info* info)
 
 } // extern "C"
 
-static_assert(sizeof(sr_source) == 24 && sizeof(sr_frame_desc) == 200);
+static_assert(sizeof(sr_source) == 24 && sizeof(sr_frame_desc) == 208);
 static_assert(sizeof(sr_renderer_desc) == 72 && sizeof(sr_renderer_info) == 48);

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // splats of a world, and pictures of them in host memory
-#include "engine/capi/exchange.h"
+#include "engine/capi/draws.h"
 
 using namespace semrover;
 using namespace semrover::capi;
@@ -15,41 +15,34 @@ sr_array array_of(const Slot& slot)
 }
 
 // what a draw reads beside splats and camera. z: of depth_test, with the layout that it has
-Status fill_inputs(sr_context& context, Rasterizer& rasterizer, const sr_draw_desc& d, HostImage& z)
+Status fill_inputs(sr_context& context, Rasterizer& rasterizer, const WorldDraw& draw, HostImage& z)
 {
     if (rasterizer.format_scale().valid())
-        SR_CHECK(rasterizer.format_scale().write(*context.drawing, depth_scale(d)));
+        SR_CHECK(rasterizer.format_scale().write(*context.drawing, draw.depth_scale));
     if (!z.image)
         return {};
     SR_TRY(HostCopies * copies, copies_of(context));
     SR_CHECK(copies->fetch(z, rasterizer.z_buffer().slice()));
     z.before = z.after;
-    return rasterizer.z_scale().write(*context.drawing, z_scale(d.depth_test));
+    return rasterizer.z_scale().write(*context.drawing, z_scale(draw.depth_test));
 }
 
-// what cameras that are drawn together have in common
-bool go_together(const sr_draw_desc& a, const PictureFormats& a_formats, const sr_draw_desc& b,
-                 const PictureFormats& b_formats)
+Status draw_world(sr_world& world, std::span<const sr_draw_desc> descs, const char* name)
 {
-    return a.width == b.width && a.height == b.height && a_formats == b_formats && !a.depth_test.image &&
-           !b.depth_test.image && depth_scale(a) == depth_scale(b);
-}
-
-Status draw_world(sr_world& world, std::span<const sr_draw_desc> draws, const char* name)
-{
-    std::vector<PictureFormats> formats(draws.size());
-    for (size_t i = 0; i < draws.size(); ++i) {
-        SR_TRY(formats[i], formats_of(draws[i]));
-    }
     SR_CHECK(splats_of(world, name).map([](SplatPool*) {}));
+    std::vector<WorldDraw> draws;
+    for (const sr_draw_desc& desc : descs) {
+        SR_TRY(const PictureFormats formats, formats_of(desc));
+        SR_TRY(draws.emplace_back(), draw_of(world, desc, formats));
+    }
     SR_CHECK(show_updates(world, true));
     for (size_t i = 0, end = 0; i < draws.size();) {
-        for (end = i + 1; end < draws.size() && go_together(draws[i], formats[i], draws[end], formats[end]);)
+        for (end = i + 1; end < draws.size() && draws[i].goes_with(draws[end]);)
             ++end;
-        SR_TRY(const std::vector<SplatSlots> drawn, draw_splats(world, draws.subspan(i, end - i), formats[i], name));
+        SR_TRY(const std::vector<SplatSlots> drawn, draw_splats(world, std::span(draws).subspan(i, end - i), name));
         std::vector<WantedPicture> pictures;
         for (const SplatSlots& images : drawn) {
-            const std::vector<WantedPicture> wanted = wanted_pictures(draws[i], formats[i], images);
+            const std::vector<WantedPicture> wanted = wanted_pictures(descs[i], draws[i].options.formats, images);
             pictures.insert(pictures.end(), wanted.begin(), wanted.end());
             ++i;
         }
@@ -81,32 +74,28 @@ Result<std::vector<sr_draw_desc>> read_draws(const sr_draw_desc* draws, uint32_t
 
 namespace semrover::capi {
 
-Result<std::vector<SplatSlots>> draw_splats(sr_world& world, std::span<const sr_draw_desc> draws,
-                                            const PictureFormats& formats, const char* name)
+Result<std::vector<SplatSlots>> draw_splats(sr_world& world, std::span<const WorldDraw> draws, const char* name)
 {
     SR_TRY(const SplatPool* splats, splats_of(world, name));
-    const sr_draw_desc& d = draws[0];
-    const ImageSize size{d.width, d.height};
-    SR_CHECK(check_size(size, "sr_draw_desc"));
+    const WorldDraw& first = draws[0];
     sr_context& context = *world.context;
-    const bool tested = d.depth_test.image;
-    const RasterizerOptions options = with_actors(world, {.depth_tested = tested, .formats = formats});
-    SR_TRY(Rasterizer * rasterizer, world.images.of(*context.drawing, *splats, size, options, uint32_t(draws.size())));
+    SR_TRY(Rasterizer * rasterizer,
+           world.images.of(*context.drawing, *splats, first.size(), first.options, uint32_t(draws.size())));
     HostImage z;
-    if (tested) {
-        SR_TRY(z, host_depth(d.depth_test, size));
+    if (first.options.depth_tested) {
+        SR_TRY(z, host_depth(first.depth_test, first.size()));
     }
     std::vector<SplatCamera> cameras;
     std::vector<CameraFrame> frames;
-    for (const sr_draw_desc& draw : draws) {
-        frames.push_back(frame_of(draw));
-        cameras.push_back(splat_camera(frames.back().intrinsics, frames.back().pose));
+    for (const WorldDraw& draw : draws) {
+        frames.push_back(draw.frame);
+        cameras.push_back(draw.camera());
     }
-    const SplatMovers movers = world.actors.seen_by(frames);
+    const SplatMovers movers = world.actors.seen_by(frames, first.options.moving);
     uint32_t drawn = 0;
     for (uint32_t rebuilds = ~0u; rebuilds != rasterizer->rebuilds();) { // with what is filled in memory of its own
         rebuilds = rasterizer->rebuilds();
-        SR_CHECK(fill_inputs(context, *rasterizer, d, z));
+        SR_CHECK(fill_inputs(context, *rasterizer, first, z));
         SR_TRY(drawn, rasterizer->draw(cameras, movers));
     }
     std::vector<SplatSlots> images;
@@ -161,4 +150,4 @@ sr_status sr_world_draws(sr_world* world, const sr_draw_desc* draws, uint32_t co
 } // extern "C"
 
 static_assert(sizeof(sr_array) == 24 && sizeof(sr_splats) == 136 && sizeof(sr_target) == 48);
-static_assert(sizeof(sr_depth_image) == 40 && sizeof(sr_draw_desc) == 448);
+static_assert(sizeof(sr_depth_image) == 40 && sizeof(sr_draw_desc) == 768);

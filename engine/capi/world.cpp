@@ -198,6 +198,7 @@ Result<std::unique_ptr<sr_world>> make_world(sr_context& context, const sr_world
             message(user, std::string(line).c_str());
         };
     SR_TRY(world->world, open_world(*context.device, std::move(request), std::move(labels), callbacks));
+    world->objects = by_id(world->world->objects());
     return world;
 }
 

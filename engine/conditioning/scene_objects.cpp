@@ -94,6 +94,14 @@ Rigid box_to_world(const SceneObject& o)
     return {c, -s, 0, o.center[0], s, c, 0, o.center[1], 0, 0, 1, o.center[2], 0, 0, 0, 1};
 }
 
+ObjectsById by_id(std::span<const SceneObject> objects)
+{
+    ObjectsById all;
+    for (const SceneObject& object : objects)
+        all.emplace(object.id, &object);
+    return all;
+}
+
 Result<Triple> parse_tint(std::string_view text, std::string_view where)
 {
     uint32_t bits = 0;

@@ -8,6 +8,7 @@
 #include <array>
 #include <optional>
 #include <span>
+#include <unordered_map>
 #include <vector>
 
 namespace semrover {
@@ -28,6 +29,10 @@ struct SceneObject {
 Rigid box_to_world(const SceneObject& object);
 
 constexpr size_t kMaxObjects = 1 << 20;
+
+// by id; they outlive it
+using ObjectsById = std::unordered_map<uint32_t, const SceneObject*>;
+ObjectsById by_id(std::span<const SceneObject> objects);
 
 // "#7a1f1c" -> sRGB 0..1. Errors: bad_input, with `where` in front
 Result<std::array<double, 3>> parse_tint(std::string_view text, std::string_view where);

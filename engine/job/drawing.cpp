@@ -156,7 +156,8 @@ class DrawingJob : public Job {
         drew_ = true;
         std::unique_ptr<SweepDrawing>& sweeps = lidars_[sweep.lidar.get()];
         if (!sweeps) {
-            SR_TRY(sweeps, SweepDrawing::create(device_, scene_, sweep.lidar, o_.draw.rasterizer()));
+            SR_TRY(sweeps,
+                   SweepDrawing::create(device_, scene_.splats, scene_.actors, sweep.lidar, o_.draw.rasterizer()));
         }
         const auto image = std::make_shared<SweepImage>(sweeps->image());
         const auto write = [this, sweep, number, image] {

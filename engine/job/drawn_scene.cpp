@@ -27,7 +27,7 @@ Result<SceneActors> actors_of(const DrawOptions& o, std::span<const SceneObject>
             SR_CHECK(check_instance(object.id, "object"));
     for (const Actor& actor : o.actors)
         SR_CHECK(check_instance(actor.id, "actor"));
-    return SceneActors::create(o.actors, objects);
+    return SceneActors::create(o.actors, by_id(objects));
 }
 
 // of points, or of voxels where there are none; empty where nobody asks

@@ -8,14 +8,6 @@ namespace semrover {
 
 namespace {
 
-RasterizerOptions surface_options(RasterizerOptions options)
-{
-    constexpr PictureFormat none{Texels::none};
-    options.pixels_over.reset();
-    options.formats = {none, none, {}, none, {}};
-    return options;
-}
-
 std::pair<double, Rigid> place_of(const CameraFrame& frame)
 {
     return {frame.time, frame.pose.world_to_camera};
@@ -40,9 +32,24 @@ std::vector<size_t> following_frames(const CameraPath& path)
     return following;
 }
 
-FlowDrawing::FlowDrawing(Device& device, const DrawnScene& scene, const RasterizerOptions& options)
-    : device_(device), scene_(scene), rasterizers_(device, scene, surface_options(options))
+RasterizerOptions FlowDrawing::surface_options(RasterizerOptions options)
 {
+    constexpr PictureFormat none{Texels::none};
+    options.pixels_over.reset();
+    options.formats = {none, none, {}, none, {}};
+    return options;
+}
+
+FlowDrawing::FlowDrawing(Device& device, const SceneActors& actors, Draw draw)
+    : device_(device), actors_(actors), draw_(std::move(draw))
+{
+}
+
+void FlowDrawing::forget()
+{
+    for (auto& [name, camera] : cameras_)
+        for (View& view : camera.views)
+            view.of.reset();
 }
 
 Status FlowDrawing::allocate(Camera& c, uint32_t pixels)
@@ -52,15 +59,13 @@ Status FlowDrawing::allocate(Camera& c, uint32_t pixels)
         view.depth = c.state.slot(pixels, 2, DType::f32, "depth of a frame", 2);
         view.owners = c.state.slot(pixels, 1, DType::u32, "owners of a frame", 1);
     }
-    const SceneActors& actors = scene_.actors;
     c.cameras = c.state.slot(2, kLensCameraFloats, DType::f32, "cameras", kLensCameraFloats);
-    c.moves = c.state.slot(1 + actors.size(), 12, DType::f32, "moves", 12);
-    if (actors.size())
-        c.rows = c.state.slot(uint32_t(actors.rows().size()), 1, DType::u32, "rows of movers", 1);
+    c.moves = c.state.slot(1 + actors_.size(), 12, DType::f32, "moves", 12);
+    if (actors_.size())
+        c.rows = c.state.slot(uint32_t(actors_.rows().size()), 1, DType::u32, "rows of movers", 1);
     c.flow = c.state.slot(pixels, 2, DType::f32, "flow", 2);
     c.flow_states = c.state.slot(pixels, 1, DType::u32, "flow states", 1);
-    SR_CHECK(c.state.allocate(device_, "flow"));
-    return actors.size() ? c.rows.write(device_, actors.rows()) : Status();
+    return c.state.allocate(device_, "flow");
 }
 
 Status FlowDrawing::compile(Camera& c, const CameraPair& pair, const ImageSize& size)
@@ -90,11 +95,7 @@ Status FlowDrawing::draw(const CameraFrame& frame, View& view)
     if (!copies_) {
         SR_TRY(copies_, CopyRing::create(device_));
     }
-    SR_TRY(Rasterizer * rasterizer, rasterizers_.of(frame, 1));
-    const bool moving = rasterizers_.moving(frame);
-    const SplatCamera camera = splat_camera(frame, moving);
-    SR_CHECK(rasterizer->draw({&camera, 1}, scene_.actors.seen_by({&frame, 1}, moving)).map([](uint32_t) {}));
-    const SplatSlots images = rasterizer->images(0);
+    SR_TRY(const SplatSlots images, draw_(frame));
     SR_CHECK(copies_->copy(images.depth, view.depth).map([](uint64_t) {}));
     SR_CHECK(copies_->copy(images.owners, view.owners).map([](uint64_t) {}));
     view.of = place_of(frame);
@@ -105,7 +106,8 @@ Result<FlowSlots> FlowDrawing::flow(const CameraFrame& now, const CameraFrame& n
 {
     Camera& c = cameras_[now.camera];
     const ImageSize size{now.intrinsics.width, now.intrinsics.height};
-    if (!c.flow.valid() || c.flow.rows() != size.width * size.height)
+    if (!c.flow.valid() || c.flow.rows() != size.width * size.height || c.moves.rows() != 1 + actors_.size() ||
+        c.rows.rows() != actors_.rows().size())
         SR_CHECK(allocate(c, size.width * size.height));
     const CameraPair pair = pair_of(now, next);
     if (!c.programs[1] || c.model != pair.model || c.moving != pair.moving)
@@ -114,7 +116,9 @@ Result<FlowSlots> FlowDrawing::flow(const CameraFrame& now, const CameraFrame& n
     SR_CHECK(draw(now, c.views[from]));
     SR_CHECK(draw(next, c.views[1 - from]));
     SR_CHECK(c.cameras.write(device_, pair.rows));
-    SR_CHECK(c.moves.write(device_, scene_.actors.moves(now, next)));
+    SR_CHECK(c.moves.write(device_, actors_.moves(now, next)));
+    if (c.rows.valid())
+        SR_CHECK(c.rows.write(device_, actors_.rows()));
     SR_CHECK(c.programs[from]->run());
     return FlowSlots{c.flow, c.flow_states};
 }

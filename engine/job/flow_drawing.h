@@ -2,9 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/job/frame_rasterizers.h"
+#include "engine/job/scene_actors.h"
 #include "engine/splat/camera_pair.h"
 #include "runtime/device/copy_ring.h"
+
+#include <functional>
+#include <map>
 
 namespace semrover {
 
@@ -17,16 +20,21 @@ struct FlowSlots {
 // none: after the last, and where lens model or size change
 std::vector<size_t> following_frames(const CameraPath& path);
 
-// Draws what optical flow needs of a frame and of the next: depths and owners. What was drawn of a camera's next frame
-// is used again when that is the frame.
+// Optical flow needs depths and owners of a frame and of the next. What was drawn of a camera's next frame is used
+// again when that is the frame.
 class FlowDrawing {
   public:
-    // the scene outlives it
-    FlowDrawing(Device& device, const DrawnScene& scene, const RasterizerOptions& options);
+    // draws a frame: depths and owners, whole, as surface_options() has them; they stay until it draws the next one
+    using Draw = std::function<Result<SplatSlots>(const CameraFrame&)>;
+    static RasterizerOptions surface_options(RasterizerOptions options);
+
+    // actors: they outlive it, and may become others
+    FlowDrawing(Device& device, const SceneActors& actors, Draw draw);
 
     // The flow stays until the next call; a read of a ring that begins before is in time. Frames of one camera model
     // and size. Errors: out_of_memory; device errors
     Result<FlowSlots> flow(const CameraFrame& now, const CameraFrame& next);
+    void forget(); // what was drawn: the scene is another one
 
   private:
     using Place = std::pair<double, Rigid>; // time and pose
@@ -47,8 +55,8 @@ class FlowDrawing {
     Status draw(const CameraFrame& frame, View& view);
 
     Device& device_;
-    const DrawnScene& scene_;
-    FrameRasterizers rasterizers_;
+    const SceneActors& actors_;
+    Draw draw_;
     std::unique_ptr<CopyRing> copies_;
     std::map<std::string, Camera> cameras_;
 };

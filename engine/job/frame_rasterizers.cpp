@@ -19,4 +19,12 @@ Result<Rasterizer*> FrameRasterizers::of(const CameraFrame& like, uint32_t frame
     return rasterizer.get();
 }
 
+Result<SplatSlots> FrameRasterizers::draw(const CameraFrame& frame)
+{
+    SR_TRY(Rasterizer * rasterizer, of(frame, 1));
+    const SplatCamera camera = splat_camera(frame, moving(frame));
+    SR_CHECK(rasterizer->draw({&camera, 1}, scene_.actors.seen_by({&frame, 1}, moving(frame))).map([](uint32_t) {}));
+    return rasterizer->images(0);
+}
+
 } // namespace semrover

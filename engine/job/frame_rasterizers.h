@@ -19,9 +19,11 @@ class FrameRasterizers {
     {
     }
 
-    bool moving(const CameraFrame& frame) const { return frame.moves() || scene_.actors.move_in(frame); }
+    bool moving(const CameraFrame& frame) const { return scene_.actors.moving(frame); }
     // for up to as many frames of a kind at a time as the first call has
     Result<Rasterizer*> of(const CameraFrame& like, uint32_t frames);
+    // one frame, where the options keep no pixels; its images stay until the next of its kind
+    Result<SplatSlots> draw(const CameraFrame& frame);
 
   private:
     Device& device_;

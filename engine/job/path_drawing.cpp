@@ -10,7 +10,8 @@ PathDrawing::PathDrawing(Device& device, const DrawnScene& scene, CameraPath pat
 {
     if (!flow)
         return;
-    flow_.emplace(device, scene, options);
+    const auto surfaces = std::make_shared<FrameRasterizers>(device, scene, FlowDrawing::surface_options(options));
+    flow_.emplace(device, scene.actors, [surfaces](const CameraFrame& frame) { return surfaces->draw(frame); });
     following_ = following_frames(path_);
 }
 

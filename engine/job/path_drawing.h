@@ -5,6 +5,7 @@
 #include "engine/deferred/frame_images.h"
 #include "engine/job/drawn_scene.h"
 #include "engine/job/flow_drawing.h"
+#include "engine/job/frame_rasterizers.h"
 
 #include <functional>
 #include <map>

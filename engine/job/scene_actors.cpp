@@ -5,9 +5,6 @@
 #include "engine/camera/camera_view.h"
 #include "engine/scene/scene_fields.h"
 
-#include <cmath>
-#include <map>
-
 namespace semrover {
 
 namespace {
@@ -33,19 +30,17 @@ std::optional<std::pair<Rigid, Rigid>> poses_in(const Actor& a, const CameraFram
 
 } // namespace
 
-Result<SceneActors> SceneActors::create(std::vector<Actor> actors, std::span<const SceneObject> objects)
+Result<SceneActors> SceneActors::create(std::vector<Actor> actors, const ObjectsById& objects)
 {
-    std::map<uint32_t, const SceneObject*> by_id;
-    std::set<uint32_t> ids;
-    for (const SceneObject& o : objects) {
-        by_id[o.id] = &o;
-        ids.insert(o.id);
-    }
+    std::set<uint32_t> ids; // of objects, as far as actors have them
+    for (const Actor& a : actors)
+        if (objects.contains(a.id))
+            ids.insert(a.id);
     SR_CHECK(check_actor_ids(actors, ids, "actors"));
     SceneActors scene;
     for (const Actor& a : actors) {
         const bool cut_out = std::holds_alternative<ObjectOfScene>(a.from);
-        scene.from_splats_.push_back(cut_out ? inverse(box_to_world(*by_id.at(a.id))) : kIdentity);
+        scene.from_splats_.push_back(cut_out ? inverse(box_to_world(*objects.at(a.id))) : kIdentity);
         const uint32_t number = instance_number(a.id);
         scene.rows_.resize(std::max<size_t>(scene.rows_.size(), number + 1));
         scene.rows_[number] = uint32_t(scene.from_splats_.size());
@@ -54,12 +49,13 @@ Result<SceneActors> SceneActors::create(std::vector<Actor> actors, std::span<con
     return scene;
 }
 
-bool SceneActors::move_in(const CameraFrame& frame) const
+bool SceneActors::moving(const CameraFrame& frame) const
 {
-    return frame.readout && std::ranges::any_of(actors_, [&](const Actor& a) {
-               const auto poses = poses_in(a, frame);
-               return poses && poses->first != poses->second;
-           });
+    const auto moves = [&](const Actor& a) {
+        const auto poses = poses_in(a, frame);
+        return poses && poses->first != poses->second;
+    };
+    return frame.moves() || (frame.readout && std::ranges::any_of(actors_, moves));
 }
 
 SplatMovers SceneActors::seen_by(std::span<const CameraFrame> frames, bool moving) const

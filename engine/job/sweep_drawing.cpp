@@ -18,18 +18,19 @@ constexpr float kNear = 0.05f;       // metres
 
 } // namespace
 
-SweepDrawing::SweepDrawing(const DrawnScene& scene, std::shared_ptr<const Lidar> lidar)
-    : scene_(scene), lidar_(std::move(lidar)), picture_(*lidar_)
+SweepDrawing::SweepDrawing(Device& device, const SceneActors& actors, std::shared_ptr<const Lidar> lidar)
+    : device_(device), actors_(actors), lidar_(std::move(lidar)), picture_(*lidar_)
 {
     parts_ = divide_up(picture_.width, std::min(kPartWidth, lidar_->columns / 2));
     part_width_ = divide_up(picture_.width, parts_);
 }
 
-Result<std::unique_ptr<SweepDrawing>> SweepDrawing::create(Device& device, const DrawnScene& scene,
+Result<std::unique_ptr<SweepDrawing>> SweepDrawing::create(Device& device, const SplatScene& splats,
+                                                           const SceneActors& actors,
                                                            std::shared_ptr<const Lidar> lidar,
                                                            RasterizerOptions options)
 {
-    std::unique_ptr<SweepDrawing> d(new SweepDrawing(scene, std::move(lidar)));
+    std::unique_ptr<SweepDrawing> d(new SweepDrawing(device, actors, std::move(lidar)));
     options.near = kNear;
     options.screen_variance = 0;
     options.pixels_over.reset();
@@ -41,8 +42,8 @@ Result<std::unique_ptr<SweepDrawing>> SweepDrawing::create(Device& device, const
                                       float(d->picture_.first - d->picture_.shifts[i]),
                                       float(beam.delay / d->lidar_->column_microseconds())});
     }
-    SR_TRY(d->rasterizer_, Rasterizer::create(device, scene.splats, d->part_width_, uint32_t(d->lidar_->beams.size()),
-                                              d->parts_, options));
+    SR_TRY(d->rasterizer_,
+           Rasterizer::create(device, splats, d->part_width_, uint32_t(d->lidar_->beams.size()), d->parts_, options));
     return d;
 }
 
@@ -93,12 +94,30 @@ Status SweepDrawing::draw(const LidarSweep& sweep, const Drawn& drawn)
         cameras.push_back(camera_of(frames.back(), part));
     }
     for (uint32_t part = 0; part < parts_;) {
-        const SplatMovers movers = scene_.actors.seen_by(std::span(frames).subspan(part), true);
+        const SplatMovers movers = actors_.seen_by(std::span(frames).subspan(part), true);
         SR_TRY(const uint32_t together, rasterizer_->draw(std::span(cameras).subspan(part), movers));
         for (uint32_t i = 0; i < together; ++i, ++part)
             SR_CHECK(drawn(part, rasterizer_->images(i)));
     }
     return {};
+}
+
+Result<SweepImage> SweepDrawing::render(const LidarSweep& sweep)
+{
+    SweepImage seen = image();
+    SR_CHECK(draw(sweep, [&](uint32_t part, SplatSlots slots) -> Status {
+        std::vector<BufferSlice> slices;
+        for (const Slot* slot : slots.all())
+            slices.push_back(slot->slice());
+        std::vector<std::vector<std::byte>> bytes(slices.size());
+        SR_CHECK(device_.read(slices, [&](const ReadPiece& piece) {
+            bytes[piece.slice].insert(bytes[piece.slice].end(), piece.bytes.begin(), piece.bytes.end());
+        }));
+        for (size_t slot = 0; slot < bytes.size(); ++slot)
+            put(part, slot, bytes[slot], seen);
+        return {};
+    }));
+    return seen;
 }
 
 uint64_t SweepDrawing::largest_read(const Lidar& lidar)
