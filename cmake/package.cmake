@@ -25,7 +25,10 @@ install(FILES ${CMAKE_CURRENT_BINARY_DIR}/semroverConfigVersion.cmake DESTINATIO
 write_pkgconfig(debian/semrover.pc ${debian_libdir})
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/debian/semrover.pc DESTINATION ${debian_libdir}/pkgconfig
     COMPONENT deb_development EXCLUDE_FROM_ALL)
-foreach(package "program;semrover" "library;libsemrover0" "development;libsemrover-dev")
+install(DIRECTORY tools/python/semrover DESTINATION lib/python3/dist-packages COMPONENT deb_python EXCLUDE_FROM_ALL
+    PATTERN "__pycache__" EXCLUDE)
+install(DIRECTORY tools/python/examples DESTINATION share/doc/python3-semrover COMPONENT deb_python EXCLUDE_FROM_ALL)
+foreach(package "program;semrover" "library;libsemrover0" "development;libsemrover-dev" "python;python3-semrover")
     list(GET package 0 component)
     list(GET package 1 name)
     install(FILES LICENSE DESTINATION share/doc/${name} RENAME copyright COMPONENT deb_${component} EXCLUDE_FROM_ALL)
@@ -42,7 +45,7 @@ set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_COMPONENTS_GROUPING IGNORE)
-set(CPACK_COMPONENTS_ALL deb_program deb_library deb_development)
+set(CPACK_COMPONENTS_ALL deb_program deb_library deb_development deb_python)
 
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${CMAKE_BINARY_DIR}) # where libsemrover.so is
@@ -51,6 +54,10 @@ set(CPACK_DEBIAN_DEB_LIBRARY_PACKAGE_SECTION libs)
 set(CPACK_DEBIAN_DEB_DEVELOPMENT_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEB_DEVELOPMENT_PACKAGE_DEPENDS "libsemrover0 (= ${PROJECT_VERSION})")
 set(CPACK_DEBIAN_DEB_DEVELOPMENT_PACKAGE_SUGGESTS libvulkan-dev) # semrover_vulkan.h includes vulkan_core.h
+set(CPACK_DEBIAN_DEB_PYTHON_PACKAGE_SECTION python)
+set(CPACK_DEBIAN_DEB_PYTHON_PACKAGE_ARCHITECTURE all)
+set(CPACK_DEBIAN_DEB_PYTHON_PACKAGE_DEPENDS "libsemrover0 (= ${PROJECT_VERSION}), python3, python3-numpy")
+set(CPACK_DEBIAN_DEB_PYTHON_PACKAGE_SUGGESTS "python3-pil, python3-torch")
 set(CPACK_DEBIAN_DEB_PROGRAM_PACKAGE_SECTION graphics)
 if(TARGET semrover-view)
     set(CPACK_DEBIAN_DEB_PROGRAM_PACKAGE_DEPENDS "libsemrover0 (= ${PROJECT_VERSION})")
@@ -65,4 +72,6 @@ Turns labelled voxels into coloured points and splats inside a host program,
 on any Vulkan 1.2 device.")
 set(CPACK_COMPONENT_DEB_DEVELOPMENT_DESCRIPTION "streets that are generated around a camera: development files
 Header, CMake and pkg-config files of libsemrover, and sample hosts.")
+set(CPACK_COMPONENT_DEB_PYTHON_DESCRIPTION "streets that are generated around a camera: Python
+The interface of libsemrover as numpy arrays, and readers of drives on disk.")
 include(CPack)
