@@ -262,6 +262,42 @@ static void sweeps_are_those_of_render(sr_context* context, sr_world* world, int
     CHECK(says(context, "room for 5"));
 }
 
+/* a street that grows: returns from beyond 7 m, of a lidar that stands */
+static uint64_t far_returns(sr_context* context, sr_world* world)
+{
+    static sr_lidar_return returns[240 * 8];
+    char lidar[1024];
+    sr_sweep_desc sweep = SR_INIT(sr_sweep_desc);
+    uint64_t count = 240 * 8, far = 0, i;
+    snprintf(lidar, sizeof lidar, "%s/small.json", folder);
+    sweep.lidar = lidar;
+    sensor_pose(0, sweep.sensor_to_world_begin);
+    sweep.sensor_to_world_begin[7] = 0; /* in the middle of the road */
+    memcpy(sweep.sensor_to_world_end, sweep.sensor_to_world_begin, sizeof sweep.sensor_to_world_end);
+    CHECK_OK(context, sr_world_sweep(world, &sweep, returns, &count));
+    for (i = 0; i < count; ++i)
+        far += returns[i].x > 7;
+    return far;
+}
+
+static void a_sweep_sees_what_is_made_later(sr_context* context, const char* model)
+{
+    sr_world_desc desc = street_world();
+    sr_world* world = NULL;
+    uint64_t splats, far;
+    desc.splat_radius = kSplatRadius;
+    CHECK_OK(context, create_world(context, model, &desc, &world));
+    CHECK(far_returns(context, world) == 0);
+    walk(context, world, 0, 1);
+    splats = world_info(world).splats;
+    far = far_returns(context, world);
+    walk(context, world, 10, 8);
+    CHECK(splats > 0 && splats < 8192 && world_info(world).splats > 2 * 8192); /* more than it looked at */
+    printf("%u far returns before, %u after\n", (unsigned)far, (unsigned)far_returns(context, world));
+    CHECK(far == 0 && far_returns(context, world) > 30);
+    sr_world_destroy(world);
+}
+
 static void refuses_wrong_sweeps(sr_context* context, sr_world* world)
 {
     sr_sweep_desc sweep = SR_INIT(sr_sweep_desc);
@@ -314,6 +350,7 @@ int main(int argc, char** argv)
     for (number = 0; number < FRAMES; ++number)
         sweeps_are_those_of_render(context, world, number);
     refuses_wrong_sweeps(context, world);
+    a_sweep_sees_what_is_made_later(context, argv[1]);
     sr_world_destroy(world);
     sr_grid_destroy(grid);
     sr_context_destroy(context);
