@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/input_hashes.h"
 
-#include "runtime/base/file.h"
 #include "runtime/base/hash.h"
 
 #include <map>
@@ -43,25 +42,15 @@ uint64_t hash_objects(std::span<const SceneObject> objects)
     return hash.value();
 }
 
-// of a file's bytes; of one that cannot be read its name, as who draws it will say so
-uint64_t hash_file(const Path& path)
-{
-    Hash hash;
-    if (const auto file = MappedFile::open(path))
-        hash.add(file->bytes());
-    else
-        hash.add(path.string());
-    return hash.value();
-}
-
 uint64_t hash_actors(std::span<const Actor> actors)
 {
     Hash hash;
     std::map<Path, uint64_t> files; // that many may be made of
     const auto add_file = [&](const Path& path) {
         const auto [file, first] = files.try_emplace(path);
-        if (first)
-            file->second = hash_file(path);
+        if (first) // of a file that is not there who draws it will say so
+            file->second = hash_file(path).value_or(0);
+        hash.add(path.filename().string());
         hash.add(std::as_bytes(std::span(&file->second, 1)));
     };
     for (const Actor& a : actors) {
