@@ -98,21 +98,14 @@ static inline sr_world* car_world(sr_context* context, const sr_grid* grid)
 /* from the vehicle at x, 1.5 m above the road, along x */
 static inline void look_ahead(double x, double world_to_camera[12])
 {
-    const double to_camera[12] = {0, -1, 0, 4.75, 0, 0, -1, 1.5, 1, 0, 0, 0};
-    memcpy(world_to_camera, to_camera, sizeof to_camera);
-    world_to_camera[11] = -x;
+    look(x, world_to_camera);
+    world_to_camera[3] = 4.75;
 }
 
 /* a pinhole of the drive; with `shutter` it is read out from an eighth of a second before its time to one after it */
 static inline sr_draw_desc ahead(double time, uint32_t width, uint32_t height, uint32_t shutter)
 {
-    sr_draw_desc draw;
-    memset(&draw, 0, sizeof draw);
-    draw.struct_size = sizeof draw;
-    draw.width = width;
-    draw.height = height;
-    draw.fx = draw.fy = draw.cx = width / 2;
-    draw.cy = height / 2;
+    sr_draw_desc draw = camera_at(drive(time), width, height);
     draw.time = time;
     look_ahead(drive(time), draw.world_to_camera);
     draw.shutter = shutter;

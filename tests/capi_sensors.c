@@ -262,6 +262,43 @@ static void sweeps_are_those_of_render(sr_context* context, sr_world* world, int
     CHECK(says(context, "room for 5"));
 }
 
+/* of a lidar that stands in the middle of a road */
+static uint64_t standing_sweep(sr_context* context, sr_world* world, const char* table, sr_lidar_return* returns)
+{
+    char lidar[1024];
+    sr_sweep_desc sweep = SR_INIT(sr_sweep_desc);
+    uint64_t count = 240 * 8;
+    snprintf(lidar, sizeof lidar, "%s/%s", folder, table);
+    sweep.lidar = lidar;
+    sensor_pose(0, sweep.sensor_to_world_begin);
+    sweep.sensor_to_world_begin[7] = 0;
+    memcpy(sweep.sensor_to_world_end, sweep.sensor_to_world_begin, sizeof sweep.sensor_to_world_end);
+    CHECK_OK(context, sr_world_sweep(world, &sweep, returns, &count));
+    return count;
+}
+
+/* a street grows: the lidar that was there before sees what one sees that comes now */
+static void a_sweep_sees_what_is_made_later(sr_context* context, const char* model)
+{
+    static sr_lidar_return known[240 * 8], fresh[240 * 8];
+    sr_world_desc desc = street_world();
+    sr_world* world = NULL;
+    uint64_t before, count;
+    desc.splat_radius = kSplatRadius;
+    CHECK_OK(context, create_world(context, model, &desc, &world));
+    CHECK(standing_sweep(context, world, "small.json", known) == 0);
+    walk(context, world, 0, 1);
+    before = standing_sweep(context, world, "small.json", known);
+    walk(context, world, 4, 12);
+    count = standing_sweep(context, world, "small.json", known);
+    printf("%u returns of %u splats, before %u\n", (unsigned)count, (unsigned)world_info(world).splats,
+           (unsigned)before);
+    CHECK(before > 100 && count > before + 100);
+    CHECK(standing_sweep(context, world, "./small.json", fresh) == count);
+    CHECK(memcmp(known, fresh, count * sizeof *known) == 0);
+    sr_world_destroy(world);
+}
+
 static void refuses_wrong_sweeps(sr_context* context, sr_world* world)
 {
     sr_sweep_desc sweep = SR_INIT(sr_sweep_desc);
@@ -314,6 +351,7 @@ int main(int argc, char** argv)
     for (number = 0; number < FRAMES; ++number)
         sweeps_are_those_of_render(context, world, number);
     refuses_wrong_sweeps(context, world);
+    a_sweep_sees_what_is_made_later(context, argv[1]);
     sr_world_destroy(world);
     sr_grid_destroy(grid);
     sr_context_destroy(context);

@@ -49,7 +49,7 @@ class Boxes : public testing::Test {
     std::string render_;
 };
 
-TEST_F(Boxes, are_those_of_the_pixels_of_instance_pictures)
+TEST_F(Boxes, are_those_of_the_visible_pixels_of_instance_pictures)
 {
     run(render_ + at("drive"));
     const auto lines = read_box_lines(folder_ / "drive/boxes.jsonl");
@@ -65,19 +65,22 @@ TEST_F(Boxes, are_those_of_the_pixels_of_instance_pictures)
         ids.insert(o.id);
     size_t seen = 0;
     for (const SeenPicture& line : *lines) {
-        const auto picture = read_png_gray16(folder_ / "drive" / line.picture.camera /
-                                             fmt::format("instance/{:06}.png", line.picture.number));
-        ASSERT_TRUE(picture);
+        const Path camera = folder_ / "drive" / line.picture.camera;
+        const auto picture = read_png_gray16(camera / fmt::format("instance/{:06}.png", line.picture.number));
+        const auto visible = read_png_rgb8(camera / fmt::format("visible/{:06}.png", line.picture.number));
+        ASSERT_TRUE(picture && visible);
         std::map<uint32_t, std::pair<PictureBox, uint32_t>> found; // by id
         for (uint32_t y = 0; y < picture->height; ++y)
-            for (uint32_t x = 0; x < picture->width; ++x)
-                if (const uint16_t number = picture->pixels[size_t(y) * picture->width + x]) {
+            for (uint32_t x = 0; x < picture->width; ++x) {
+                const size_t i = size_t(y) * picture->width + x;
+                if (const uint16_t number = visible->pixels[3 * i] ? picture->pixels[i] : 0) {
                     const PictureBox pixel{double(x), double(y), x + 1.0, y + 1.0};
                     auto& [box, count] = found.try_emplace(number - 1u, pixel, 0).first->second;
                     box = {std::min(box.left, pixel.left), std::min(box.top, pixel.top),
                            std::max(box.right, pixel.right), std::max(box.bottom, pixel.bottom)};
                     ++count;
                 }
+            }
         ASSERT_EQ(line.objects.size(), found.size());
         for (const SeenObject& o : line.objects) {
             EXPECT_TRUE(ids.contains(o.id));

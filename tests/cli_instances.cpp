@@ -224,6 +224,9 @@ TEST(CliInstances, an_actor_may_have_a_grid_of_its_own)
     ASSERT_TRUE(instance);
     EXPECT_GT(std::ranges::count(instance->pixels, 78), 20);
     EXPECT_GT(std::ranges::count(instance->pixels, 5), 60);
+    std::ranges::fill(box.colors, uint8_t(7));
+    ASSERT_TRUE(write_grid(s.folder / "car.sgrid", box));
+    EXPECT_EQ(s.render("own", "--instances --actors " + (s.folder / "own.json").string()).code, 2);
 }
 
 TEST(CliInstances, what_is_missing_or_does_not_fit_is_said)

@@ -26,7 +26,8 @@ struct Hit {
 // a made street, and what rays meet of its mesh
 class Made {
   public:
-    Made() : street_(make_street({.seed = 5, .length = 60})), tables_(trace_tables(street_.mesh, {}))
+    // note: of 60 m kNN needs more than a binding has with lowered limits
+    Made() : street_(make_street({.seed = 5, .length = 45})), tables_(trace_tables(street_.mesh, {}))
     {
         const StreetGrids grids = street_grids(test_device(), street_, {}).value();
         const ScenePoints points = points_of(grids.truth);

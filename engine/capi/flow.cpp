@@ -21,7 +21,7 @@ Result<bool> check_flow_target(const sr_target* target, uint32_t format, const c
 
 FlowDrawing& flow_of(sr_world& world)
 {
-    if (!world.flow)
+    if (!world.flow || world.flow->cameras() > Rasterizers::kMost)
         world.flow = std::make_unique<FlowDrawing>(
             *world.context->drawing, world.actors, [&world](const CameraFrame& frame) -> Result<SplatSlots> {
                 const WorldDraw draw{frame, drawing_options(world, frame, FlowDrawing::surface_options({}))};
@@ -39,12 +39,14 @@ Status draw_flow(sr_world& world, const sr_draw_desc& now, const sr_draw_desc& n
     if (!want_flow && !want_states)
         return fail(ErrorCode::usage, "sr_world_flow: neither flow nor states has a target");
     SR_CHECK(splats_of(world, "sr_world_flow").map([](SplatPool*) {}));
-    SR_TRY(const CameraFrame from, frame_of(now));
-    SR_TRY(const CameraFrame to, frame_of(next));
+    SR_TRY(CameraFrame from, frame_of(now));
+    SR_TRY(CameraFrame to, frame_of(next));
     const ImageSize size{now.width, now.height};
     if (size != ImageSize{next.width, next.height} || from.intrinsics.model != to.intrinsics.model)
         return fail(ErrorCode::usage, "sr_world_flow: both pictures must have one size and one camera model");
     SR_CHECK(show_updates(world, true));
+    from.camera = to.camera = // memory and programs are of a kind
+        fmt::format("{} x {} {}", size.width, size.height, name_of(from.intrinsics.model));
     FlowDrawing& drawing = flow_of(world);
     drawing.forget(); // splats and actors may be others than those of the last call
     SR_TRY(const FlowSlots made, drawing.flow(from, to));

@@ -34,7 +34,8 @@ class FlowDrawing {
     // The flow stays until the next call; a read of a ring that begins before is in time. Frames of one camera model
     // and size. Errors: out_of_memory; device errors
     Result<FlowSlots> flow(const CameraFrame& now, const CameraFrame& next);
-    void forget(); // what was drawn: the scene is another one
+    void forget();                                     // what was drawn: the scene is another one
+    size_t cameras() const { return cameras_.size(); } // that it has memory and programs for, by name
 
   private:
     using Place = std::pair<double, Rigid>; // time and pose

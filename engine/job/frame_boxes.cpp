@@ -41,7 +41,11 @@ std::string FrameBoxes::line(const CameraFrame& frame, uint32_t number, const Fr
             there.push_back({actor.id, actor.label, {*pose, actor.size}});
     const double unit = encoding_.depth_unit();
     const bool floats = encoding_.depth == DepthFormat::npy;
-    const InstancePicture picture{pixels.width, pixels.height, pixels.instances, [&](size_t i) {
+    std::vector<uint32_t> instances = pixels.instances;
+    for (size_t i = 0; i < instances.size(); ++i) // outlines of splats fade over some pixels
+        if (pixels.seen[i] >> 24 == 0)
+            instances[i] = 0;
+    const InstancePicture picture{pixels.width, pixels.height, instances, [&](size_t i) {
                                       const uint32_t word = pixels.depths[i];
                                       return floats ? double(std::bit_cast<float>(word)) : word * unit;
                                   }};

@@ -4,6 +4,8 @@
 
 #include "runtime/base/hash.h"
 
+#include <map>
+
 namespace semrover {
 
 namespace {
@@ -40,16 +42,23 @@ uint64_t hash_objects(std::span<const SceneObject> objects)
     return hash.value();
 }
 
-// note: of an actor's file its name; what is in it counts where it is drawn
 uint64_t hash_actors(std::span<const Actor> actors)
 {
     Hash hash;
+    std::map<Path, uint64_t> files; // that many may be made of
+    const auto add_file = [&](const Path& path) {
+        const auto [file, first] = files.try_emplace(path);
+        if (first) // of a file that is not there who draws it will say so
+            file->second = hash_file(path).value_or(0);
+        hash.add(path.filename().string());
+        hash.add(std::as_bytes(std::span(&file->second, 1)));
+    };
     for (const Actor& a : actors) {
         hash.add(fmt::format("{} {} {} {}", a.id, a.label, a.from.index(), a.poses.size()));
         if (const auto* grid = std::get_if<GridOfActor>(&a.from))
-            hash.add(grid->path.string());
+            add_file(grid->path);
         if (const auto* splats = std::get_if<SplatsOfActor>(&a.from))
-            hash.add(splats->path.string());
+            add_file(splats->path);
         for (const ActorPose& p : a.poses) {
             hash.add(std::as_bytes(std::span(&p.time, 1)));
             hash.add(std::as_bytes(std::span(p.to_world)));

@@ -17,9 +17,8 @@ float part_of(Motion m, vec2 position) { return dot(m.across, position) + m.firs
 vec3 turned(vec3 turn, float part, vec3 p)
 {
     const float whole = length(turn);
-    if (!(whole > 0.0))
-        return p;
-    const vec3 axis = turn / whole, across = cross(axis, p);
+    const bool turns = whole > 0.0;
+    const vec3 axis = turn / (turns ? whole : 1.0), across = cross(axis, p);
     const float angle = whole * part, half_sine = accurate_sin(0.5 * angle);
     return p + accurate_sin(angle) * across + 2.0 * half_sine * half_sine * cross(axis, across);
 }

@@ -39,9 +39,10 @@ void blend(inout Pixel pixel, Splat s, vec2 at, uint record, float limit)
     const vec2 uv = vec2(dot(s.m.xy, d), dot(s.m.zw, d)) * scale;
     const float r2_surface = dot(uv, uv), r2_screen = dot(d, d) * p.filter_scale;
     const bool hit = r2_surface <= r2_screen;
-    const float r2 = hit ? r2_surface : r2_screen, z = hit ? s.z * scale : s.z;
+    const float z_surface = s.z * scale, z_screen = s.z, r2 = hit ? r2_surface : r2_screen, z = hit ? z_surface : z_screen;
     const float alpha = min(p.alpha_max, s.opacity * exp(-0.5 * r2));
-    const bool seen = alpha >= p.alpha_min && z >= p.near && r2 <= p.cutoff2 && pixel.transmittance > 0.0 &&
-                      (!kLimited || z <= limit);
+    const bool within = z <= limit, open = pixel.transmittance > 0.0, bright = alpha >= p.alpha_min, ahead = z >= p.near;
+    const bool near_enough = kLimited ? within : true, covered = r2 <= p.cutoff2;
+    const bool seen = bright && ahead && covered && open && near_enough;
     cover(pixel, s.color, s.normal, alpha, z, seen, record);
 }

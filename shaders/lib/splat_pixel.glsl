@@ -37,20 +37,23 @@ struct Pixel {
 
 Pixel empty_pixel() { return Pixel(1.0, vec3(0.0), vec3(0.0), 0.0, 0.0, 0.0, kNone); }
 
-// a splat's colour, seen normal and depth over a pixel
+// a splat's colour, seen normal and depth over a pixel. Choices are between names: trigonometry.glsl says why
 void cover(inout Pixel pixel, vec3 color, vec3 normal, float alpha, float z, bool seen, uint record)
 {
-    const float t = pixel.transmittance, next = t * (1.0 - alpha);
-    const bool done = seen && next < p.transmittance_min, add = seen && !done;
-    const float w = add ? alpha * t : 0.0, depth = add ? z : 0.0;
+    const float t = pixel.transmittance, next = t * (1.0 - alpha), given = alpha * t;
+    const bool last = next < p.transmittance_min, done = seen && last, add = seen && !last;
+    const float w = add ? given : 0.0, depth = add ? z : 0.0;
     pixel.color += w * color;
     pixel.normal += w * normal;
     pixel.depth += w * depth;
-    const bool median = add && t > 0.5;
-    pixel.median = median ? depth : pixel.median;
-    pixel.record = (kMedianIds ? median : w > pixel.largest) ? record : pixel.record;
+    const bool front = t > 0.5, median = add && front, largest = w > pixel.largest;
+    const bool taken = kMedianIds ? median : largest;
+    const float median_depth = pixel.median, end = -t, left = add ? next : t;
+    const uint before = pixel.record;
+    pixel.median = median ? depth : median_depth;
+    pixel.record = taken ? record : before;
     pixel.largest = max(w, pixel.largest);
-    pixel.transmittance = done ? -t : add ? next : t;
+    pixel.transmittance = done ? end : left;
 }
 
 void store(Pixel pixel, uvec2 at, uint camera)

@@ -1,6 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 
+// Choices are between names, so that they compile to a select: these are inlined often, and some drivers take minutes for
+// many branches.
+
 // sin and cos to about 1 ulp for |x| <= 1e4: Vulkan only asks for an absolute error of 2^-11 within [-pi, pi].
 // Cody-Waite reduction by pi/2 in three parts, then minimax polynomials on [-pi/4, pi/4] (Cephes sinf, cosf).
 float sin_quarter(float r)
@@ -22,8 +25,10 @@ float sin_quadrant(float x, int shift)
     r = r - n * 4.837512969970703125e-4;
     r = r - n * 7.549789948768648e-8;
     const int quadrant = (int(n) + shift) & 3;
-    const float value = (quadrant & 1) == 0 ? sin_quarter(r) : cos_quarter(r);
-    return quadrant < 2 ? value : -value;
+    const float sine = sin_quarter(r), cosine = cos_quarter(r);
+    const bool even = (quadrant & 1) == 0, positive = quadrant < 2;
+    const float value = even ? sine : cosine, negated = -value;
+    return positive ? value : negated;
 }
 
 float accurate_sin(float x) { return sin_quadrant(x, 0); }
@@ -33,19 +38,21 @@ float accurate_cos(float x) { return sin_quadrant(x, 1); }
 float atan_octant(float x)
 {
     const bool upper = x > 0.41421356;
-    const float t = upper ? (x - 1.0) / (x + 1.0) : x, z = t * t;
+    const float moved = (x - 1.0) / (x + 1.0), t = upper ? moved : x, z = t * t;
     const float value = t + t * z * (-3.33329491539e-1 + z * (1.99777106478e-1 + z * (-1.38776856032e-1 + z * 8.05374449538e-2)));
-    return upper ? 0.78539816339 + value : value;
+    const float above = 0.78539816339 + value;
+    return upper ? above : value;
 }
 
 // Vulkan only asks for 4096 ulp of atan; 0 at the origin
 float accurate_atan2(float y, float x)
 {
     const float ax = abs(x), ay = abs(y), high = max(ax, ay);
-    const float octant = atan_octant(high > 0.0 ? min(ax, ay) / high : 0.0);
-    const float quadrant = ay > ax ? 1.57079632679 - octant : octant;
-    const float upper = x < 0.0 ? 3.14159265359 - quadrant : quadrant;
-    return y < 0.0 ? -upper : upper;
+    const bool away = high > 0.0, steep = ay > ax, behind = x < 0.0, below = y < 0.0;
+    const float ratio = min(ax, ay) / high, octant = atan_octant(away ? ratio : 0.0), rest = 1.57079632679 - octant;
+    const float quadrant = steep ? rest : octant, beyond = 3.14159265359 - quadrant;
+    const float upper = behind ? beyond : quadrant, lower = -upper;
+    return below ? lower : upper;
 }
 
 float accurate_asin(float x) { return accurate_atan2(x, sqrt(max((1.0 - x) * (1.0 + x), 0.0))); }
