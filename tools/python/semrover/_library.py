@@ -123,6 +123,16 @@ def guarded(function, failed):
     return call
 
 
+def lines_to(kind, function):
+    """a callback of a C type that hands lines of text to a function"""
+    return kind(guarded(lambda user, line: function(line.decode("utf-8", "replace")), None))
+
+
+def fields_of(kind, structure):
+    """a dataclass of the members of a structure that have its names"""
+    return kind(**{name: getattr(structure, name) for name in kind.__dataclass_fields__})
+
+
 class Handle:
     """What the library made, closed before what it was made with. A context manager; closing twice is fine."""
 
@@ -150,6 +160,9 @@ class Handle:
         for child in list(self._children):
             child.close()
         self._finalizer()
+
+    def _check(self, status):  # of a call about what was made with a context
+        check(status, self._parent._pointer)
 
     def __enter__(self):
         return self

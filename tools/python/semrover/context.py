@@ -5,7 +5,7 @@ import ctypes
 from dataclasses import dataclass
 
 from . import _abi
-from ._library import Handle, check, guarded, lib, made
+from ._library import Handle, check, lib, lines_to, made
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,6 @@ def on_diagnostic(function):
     """function(line) gets the lines that no call returns, of the whole process; None: nobody."""
     global _diagnostics
     kind = _abi.FUNCTIONS["sr_set_diagnostic_callback"][1][0]
-    callback = kind() if function is None else kind(
-        guarded(lambda user, line: function(line.decode("utf-8", "replace")), None))
+    callback = kind() if function is None else lines_to(kind, function)
     lib.sr_set_diagnostic_callback(callback, None)
     _diagnostics = callback

@@ -6,7 +6,7 @@ import os
 from dataclasses import dataclass
 
 from . import _abi
-from ._library import Handle, check, guarded, lib, made
+from ._library import Handle, fields_of, guarded, lib, made
 
 VOXFIELD, RENDERER = _abi.SR_MODEL_VOXFIELD, _abi.SR_MODEL_RENDERER
 _PRECISIONS = {"fp16": _abi.SR_FP16, "fp32": _abi.SR_FP32}
@@ -51,13 +51,13 @@ class Model(Handle):
     def info(self):
         """ModelInfo"""
         info = made(_abi.sr_model_info)
-        check(lib.sr_model_get_info(self.handle, info), self.context._pointer)
-        return ModelInfo(**{name: getattr(info, name) for name in ModelInfo.__dataclass_fields__})
+        self._check(lib.sr_model_get_info(self.handle, info))
+        return fields_of(ModelInfo, info)
 
     def generation(self, **changes):
         """sr_generation of the model's settings with some changed, for World(generation=..)"""
         settings = made(_abi.sr_generation)
-        check(lib.sr_model_get_generation(self.handle, settings), self.context._pointer)
+        self._check(lib.sr_model_get_generation(self.handle, settings))
         for name, value in changes.items():
             if name not in dict(settings._fields_):
                 raise TypeError(f"generation: no setting is called {name!r}")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy
 
 from . import _abi
-from ._library import Handle, check, guarded, lib, made
+from ._library import Handle, fields_of, lib, lines_to, made
 
 NOISES = ("model", "fresh", "surfaces")
 _RGBA8 = 37  # VK_FORMAT_R8G8B8A8_UNORM
@@ -39,15 +39,11 @@ class Renderer(Handle):
         desc = made(_abi.sr_renderer_desc, model=model.handle, width=width, height=height, steps=steps, seed=seed,
                     camera=None if camera is None else camera.encode(), noise=NOISES.index(noise))
         if message is not None:
-            desc.message = type(desc.message)(
-                guarded(lambda user, line: message(line.decode("utf-8", "replace")), None))
+            desc.message = lines_to(type(desc.message), message)
         pointer = ctypes.c_void_p()
         context._check(lib.sr_renderer_create(context.handle, desc, pointer))
         super().__init__(pointer, lib.sr_renderer_destroy, context, (desc.message,))
         self.context, self.width, self.height = context, width, height
-
-    def _check(self, status):
-        check(status, self.context._pointer)
 
     def frame(self, world, camera, seconds=0.1):
         """The next frame, uint8 [H, W, 3], sRGB, of a world's splats. Ctrl-C gives it up."""
@@ -101,4 +97,4 @@ class Renderer(Handle):
         """RendererInfo"""
         info = made(_abi.sr_renderer_info)
         self._check(lib.sr_renderer_get_info(self.handle, info))
-        return RendererInfo(**{name: getattr(info, name) for name in RendererInfo.__dataclass_fields__})
+        return fields_of(RendererInfo, info)

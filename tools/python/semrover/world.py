@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy
 
 from . import _abi
-from ._library import Handle, check, guarded, lib, made
+from ._library import Handle, check, fields_of, guarded, lib, lines_to, made
 from .camera import Camera, rows_of
 from .grid import CELL, Grid, cell_pointer, cells_of
 
@@ -147,12 +147,8 @@ class World(Handle):
                 return lib.sr_grid_set_cells(grid, cell_pointer(cells), len(cells))
             desc.labels = type(desc.labels)(guarded(give, _abi.SR_ERR_INTERRUPTED))
         if message is not None:
-            desc.message = type(desc.message)(
-                guarded(lambda user, line: message(line.decode("utf-8", "replace")), None))
+            desc.message = lines_to(type(desc.message), message)
         return desc.labels, desc.message
-
-    def _check(self, status):
-        check(status, self.context._pointer)
 
     # ---- making
 
@@ -218,7 +214,7 @@ class World(Handle):
         """WorldInfo"""
         info = made(_abi.sr_world_info)
         self._check(lib.sr_world_get_info(self.handle, info))
-        return WorldInfo(**{name: getattr(info, name) for name in WorldInfo.__dataclass_fields__})
+        return fields_of(WorldInfo, info)
 
     def copy_cells(self, low=(-2**20, -2**20), high=(2**20, 2**20)):
         """A Grid of the finished voxels of low <= (i, j) <= high that are in memory, with their points."""
