@@ -12,9 +12,9 @@ namespace semrover {
 // how points become pictures
 struct DrawOptions {
     PointSplatOptions splats;
+    float screen_variance = RasterizerOptions().screen_variance;
     std::array<uint8_t, 3> background{};
     std::optional<float> visible_alpha;    // alpha from which a pixel counts as visible; 0.5, or what a model says
-    float screen_variance = RasterizerOptions().screen_variance;
     bool semantic = false;                 // in label colours; a grid without points as blocks
     bool instances = false;                // pictures of which object a pixel shows, too
     bool boxes = false;                    // and boxes of them, with `instances`
