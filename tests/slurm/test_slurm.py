@@ -104,7 +104,7 @@ class Slurm(unittest.TestCase):
         first = self.submit(job.file, self.program("real", REAL % SEMROVER), VK_DRIVER_FILES="/nonexistent",
                             VK_ICD_FILENAMES="/nonexistent")[0] + "_0"
         cluster.wait_until(lambda: self.cluster.field(first, "ExcNodeList") in cluster.NODES, 20, "a node excluded")
-        self.assertEqual(self.cluster.field(first, "JobState"), "PENDING")
+        cluster.wait_until(lambda: self.cluster.field(first, "JobState") == "PENDING", 20, "it waits once more")
         self.assertIn("no Vulkan", (self.folder / f"{first}.out").read_text())
 
     def running(self):
