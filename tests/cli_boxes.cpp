@@ -49,6 +49,26 @@ class Boxes : public testing::Test {
     std::string render_;
 };
 
+uint64_t visible_pixels(const Path& boxes)
+{
+    const auto lines = read_box_lines(boxes);
+    EXPECT_TRUE(lines) << lines.error().message;
+    uint64_t pixels = 0;
+    for (const SeenPicture& line : *lines)
+        for (const SeenObject& object : line.objects)
+            pixels += object.pixels;
+    return pixels;
+}
+
+TEST_F(Boxes, are_smaller_with_less_of_the_screen_filter)
+{
+    run(render_ + at("default"));
+    run(render_ + at("default") + " --screen-filter 0.5"); // it is the default: the same drawing
+    EXPECT_EQ(semrover_program(render_ + at("default") + " --screen-filter 0.05").code, 2);
+    run(render_ + at("sharp") + " --screen-filter 0.05");
+    EXPECT_LT(visible_pixels(folder_ / "sharp/boxes.jsonl"), visible_pixels(folder_ / "default/boxes.jsonl"));
+}
+
 TEST_F(Boxes, are_those_of_the_visible_pixels_of_instance_pictures)
 {
     run(render_ + at("drive"));

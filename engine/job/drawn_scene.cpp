@@ -107,6 +107,7 @@ RasterizerOptions DrawOptions::rasterizer(const PictureEncoding& files) const
 {
     RasterizerOptions options;
     options.visible_alpha = visible_alpha.value_or(options.visible_alpha);
+    options.screen_variance = screen_variance;
     options.pixels_over = background;
     options.depth_units = float(units_per_metre(files.depth));
     options.instances = instances;

@@ -14,6 +14,7 @@ struct DrawOptions {
     PointSplatOptions splats;
     std::array<uint8_t, 3> background{};
     std::optional<float> visible_alpha;    // alpha from which a pixel counts as visible; 0.5, or what a model says
+    float screen_variance = 0.5f;          // pixels^2, of the screen filter; 0: none
     bool semantic = false;                 // in label colours; a grid without points as blocks
     bool instances = false;                // pictures of which object a pixel shows, too
     bool boxes = false;                    // and boxes of them, with `instances`

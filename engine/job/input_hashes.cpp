@@ -113,6 +113,8 @@ Json drawing_json(const DrawOptions& o)
                {"opacity", s.opacity},
                {"visible_alpha", o.rasterizer().visible_alpha},
                {"background", fmt::format("{}", fmt::join(o.background, ","))}};
+    if (o.screen_variance != 0.5f) // not there with it, so that runs of earlier versions go on
+        drive["screen_variance"] = o.screen_variance;
     if (o.instances || !o.actors.empty())
         drive["objects"] = hash_text(hash_objects(o.objects));
     if (o.instances)

@@ -14,15 +14,21 @@ trap 'rm -rf "$folder"' EXIT
 
 version=$("$build/semrover" --version | sed 's/[^0-9]*\([0-9.]*\).*/\1/')
 machine=$(dpkg --print-architecture)
-say() { dpkg-deb -f "$folder/$1_${version}_$machine.deb" "$2"; }
+file() { # of a package
+    case "$1" in
+    python3-*) echo "$folder/$1_${version}_all.deb" ;;
+    *) echo "$folder/$1_${version}_$machine.deb" ;;
+    esac
+}
+say() { dpkg-deb -f "$(file "$1")" "$2"; }
 holds() {
-    dpkg-deb -c "$folder/$1_${version}_$machine.deb" >"$folder/list"
+    dpkg-deb -c "$(file "$1")" >"$folder/list"
     grep -E "\\./$2( -> .*)?\$" "$folder/list"
 }
 lacks() { if holds "$@"; then return 1; fi; }
 expect() { echo "$1" | grep -E "$2" || { echo "no $2 in: $1"; exit 1; }; }
 
-test "$(ls "$folder"/*.deb | wc -l)" = 3
+test "$(ls "$folder"/*.deb | wc -l)" = 4
 libdir=usr/lib/[^/]+
 for program in semrover semrover-eval semrover-scenes; do holds semrover "usr/bin/$program"; done
 holds libsemrover0 "$libdir/libsemrover.so.0"
@@ -32,11 +38,12 @@ holds libsemrover-dev usr/include/semrover.h
 holds libsemrover-dev "$libdir/pkgconfig/semrover.pc"
 holds libsemrover-dev "$libdir/cmake/semrover/semroverConfig.cmake"
 holds libsemrover-dev usr/share/semrover/host/vulkan_host.c
-for package in semrover libsemrover0 libsemrover-dev; do
+holds python3-semrover usr/lib/python3/dist-packages/semrover/__init__.py
+for package in semrover libsemrover0 libsemrover-dev python3-semrover; do
     holds "$package" "usr/share/doc/$package/copyright"
-    dpkg-deb -I "$folder/${package}_${version}_$machine.deb" >"$folder/info"
+    dpkg-deb -I "$(file "$package")" >"$folder/info"
     expect "$(say "$package" Version)" "^$version\$"
-    expect "$(say "$package" Architecture)" "^$machine\$"
+    expect "$(say "$package" Architecture)" "^($machine|all)\$"
     expect "$(say "$package" Maintainer)" authors
     expect "$(say "$package" Description)" street
 done
@@ -45,6 +52,8 @@ lacks libsemrover-dev 'usr/bin/.+'
 expect "$(say libsemrover0 Depends)" 'libc6 \(>=.*libvulkan1'
 expect "$(say semrover Depends)" 'libpng16-16.*libvulkan1|libvulkan1.*libpng16-16'
 expect "$(say libsemrover-dev Depends)" "libsemrover0 \\(= $version\\)"
+expect "$(say python3-semrover Depends)" "libsemrover0 \\(= $version\\).*python3-numpy"
+lacks python3-semrover '.*__pycache__.*'
 if test -x "$build/semrover-view"; then
     holds semrover usr/bin/semrover-view
     expect "$(say semrover Depends)" "libsemrover0 \\(= $version\\)"
@@ -57,6 +66,7 @@ LD_LIBRARY_PATH=$pc/.. && export LD_LIBRARY_PATH
 "$folder/root/usr/bin/semrover" --version
 "$folder/root/usr/bin/semrover" bench --help >/dev/null # of another program beside it
 test ! -x "$build/semrover-view" || "$folder/root/usr/bin/semrover" view --help >/dev/null
+PYTHONPATH=$folder/root/usr/lib/python3/dist-packages /usr/bin/python3 -B -c 'import semrover; semrover.Context().close()'
 mkdir "$folder/host"
 cp "$here/CMakeLists.txt" "$folder/host"
 cp "$source" "$folder/host/host.c"

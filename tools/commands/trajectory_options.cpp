@@ -58,14 +58,17 @@ void add_trajectory_options(CLI::App& c, TrajectoryOptions& o)
         "the points");
     add_number(c, "--opacity", o.opacity, "of every splat", 0.01f, 1.f);
     add_number(c, "--visible-alpha", o.visible_alpha, "alpha from which a pixel counts as visible", 0.f, 1.f);
+    add_number(c, "--screen-filter", o.screen_variance,
+               "variance in pixels^2 of the dot that each splat is at least; less: sharper borders", 0.f, 10.f);
     c.add_option("--background", o.background, "R,G,B behind the splats");
     c.add_flag("--instances", o.instances, "also pictures of which object a pixel shows: instance/000000.png");
     c.add_flag(
         "--boxes", o.boxes,
         "with --instances, also boxes.jsonl: where each object is, what pictures show of it, how much is hidden");
     c.add_option("--actors", o.actors, "actors.json: what moves (docs/formats.md §2.10)");
-    c.add_option("--objects", o.objects,
-                 "the scene's objects, for --instances, --boxes and --actors; NAME.objects.json beside the grid by default");
+    c.add_option(
+        "--objects", o.objects,
+        "the scene's objects, for --instances, --boxes and --actors; NAME.objects.json beside the grid by default");
 }
 
 Result<PointSplatOptions> point_splat_options(const std::string& splat_radius, float opacity)
@@ -86,6 +89,7 @@ Result<DrawOptions> draw_options(const TrajectoryOptions& o, const Path& grid)
 {
     DrawOptions draw;
     draw.visible_alpha = o.visible_alpha;
+    draw.screen_variance = o.screen_variance;
     SR_TRY(draw.splats, point_splat_options(o.splat_radius, o.opacity));
     SR_CHECK(intrinsics_of(o).map([](const auto&) {}));
     if (o.path.empty() && o.placement.any())

@@ -17,7 +17,7 @@ struct TrajectoryOptions : LensOptions {
     Path actors;              // empty: none
     bool instances = false, boxes = false;
     bool equirect = false; // panoramas of width x width / 2 in place of the path's cameras
-    float opacity = 1;
+    float opacity = 1, screen_variance = 0.5f;
     bool allow_empty = false; // frames that all see nothing are no error
     std::optional<float> visible_alpha;
 };

@@ -19,8 +19,8 @@ namespace {
 namespace fs = std::filesystem;
 
 // of how splats are drawn, not of where cameras are
-constexpr std::string_view kOfDrawing[] = {"--allow-empty", "--splat-radius", "--opacity", "--visible-alpha",
-                                           "--background"};
+constexpr std::string_view kOfDrawing[] = {"--allow-empty",   "--splat-radius", "--opacity",
+                                           "--visible-alpha", "--background",   "--screen-filter"};
 
 // the cameras of a drive, and those of its options that are not about them
 struct Cameras {
