@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // GL contexts: pictures into textures, splats into buffer objects
+#include "engine/capi/draws.h"
 #include "engine/capi/exchange.h"
 #include "engine/capi/gl_link.h"
 

@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/capi/gl_link.h"
 
+#include "runtime/base/system.h"
+
 #include <algorithm>
-#include <unistd.h>
 
 namespace semrover::capi {
 
@@ -152,7 +153,7 @@ Status GlLink::import_semaphore(std::unique_ptr<SharedSemaphore>& semaphore, GlN
     gl_.ImportSemaphoreFdEXT(name, gl::kHandleTypeOpaqueFd, descriptor); // which is GL's now
     Status imported = gl_.take_errors("importing a semaphore");
     if (!imported)
-        ::close(descriptor);
+        system::close_descriptor(descriptor);
     return imported;
 }
 
@@ -189,7 +190,7 @@ Status GlLink::import_memory(GlRoom& room, uint64_t bytes, const char* name)
     gl_.ImportMemoryFdEXT(room.memory, buffer.memory_bytes(), gl::kHandleTypeOpaqueFd, descriptor); // GL's now
     Status imported = gl_.take_errors("importing memory");
     if (!imported) {
-        ::close(descriptor);
+        system::close_descriptor(descriptor);
         return imported;
     }
     gl_.GenBuffers(1, &room.buffer);

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cstdlib>
-#include <sched.h>
 #include <string_view>
 
 namespace semrover {
@@ -112,8 +111,7 @@ void FileQueue::commit_first(Lock& lock)
 
 uint32_t usable_threads()
 {
-    cpu_set_t set;
-    uint32_t count = ::sched_getaffinity(0, sizeof set, &set) == 0 ? uint32_t(CPU_COUNT(&set)) : 1;
+    uint32_t count = system::usable_processors();
     if (const char* text = std::getenv("SLURM_CPUS_PER_TASK")) {
         const std::string_view given(text);
         uint32_t task = 0;

@@ -8,12 +8,7 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstring>
-#include <fcntl.h>
 #include <mutex>
-#include <sys/file.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 namespace semrover {
 
@@ -23,9 +18,9 @@ namespace fs = std::filesystem;
 
 constexpr uint64_t kMaxJournalBytes = 1ull << 30;
 
-tl::unexpected<Error> system_failure(const char* what, const Path& path)
+tl::unexpected<Error> system_failure(const char* what, const Path& path, int error)
 {
-    return fail(ErrorCode::bad_input, "cannot {} {}: {}", what, quote_path(path), std::strerror(errno));
+    return fail(ErrorCode::bad_input, "cannot {} {}: {}", what, quote_path(path), system::message_of(error));
 }
 
 tl::unexpected<Error> is_a_link(const Path& path)
@@ -34,25 +29,17 @@ tl::unexpected<Error> is_a_link(const Path& path)
                 quote_path(path));
 }
 
-// note: what others put there may be a link to any file of the user's, or a pipe that nobody writes to
-Result<int> open_own(const Path& path, int flags)
+Result<system::File> open_own(const Path& path, system::FileUse use)
 {
-    const int fd = ::open(path.c_str(), flags | O_CREAT | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0666);
-    if (fd < 0 && errno == ELOOP)
-        return is_a_link(path);
-    struct stat status;
-    if (fd < 0 || ::fstat(fd, &status) != 0)
-        return system_failure("open", path);
-    if (S_ISREG(status.st_mode))
-        return fd;
-    ::close(fd);
-    return fail(ErrorCode::bad_input, "cannot open {}: expected a file, found a device or pipe", quote_path(path));
-}
-
-// of flock: the file system has none, as NFS and Lustre often are mounted
-bool says_no_locks(int error)
-{
-    return error == ENOLCK || error == ENOSYS || error == EOPNOTSUPP || error == EBADF;
+    auto file = system::File::open(path, use);
+    if (!file)
+        return file.error() == ELOOP ? is_a_link(path) : system_failure("open", path, file.error());
+    const auto facts = file->facts();
+    if (!facts)
+        return system_failure("open", path, facts.error());
+    if (!facts->regular)
+        return fail(ErrorCode::bad_input, "cannot open {}: expected a file, found a device or pipe", quote_path(path));
+    return std::move(*file);
 }
 
 void warn_without_locks(const Path& folder, int error)
@@ -62,7 +49,7 @@ void warn_without_locks(const Path& folder, int error)
         diagnose(
             fmt::format("semrover: warning: {} is on a file system without locks ({}): a second process that works "
                         "there at the same time is not noticed",
-                        quote_path(folder), std::strerror(error)));
+                        quote_path(folder), system::message_of(error)));
     });
 }
 
@@ -111,22 +98,11 @@ void remove_numbered(const Path& folder)
 
 } // namespace
 
-RunFolder::RunFolder(RunFolder&& other) noexcept
-    : path_(std::move(other.path_)), settings_(std::move(other.settings_)), contents_(std::move(other.contents_)),
-      entries_(std::move(other.entries_)), results_(std::move(other.results_)), appended_(other.appended_),
-      lock_(std::exchange(other.lock_, -1)), journal_(std::exchange(other.journal_, -1))
-{
-}
-
 RunFolder::~RunFolder()
 {
-    if (journal_ >= 0)
-        ::close(journal_);
     std::error_code ignored;
-    if (lock_ >= 0 && results_) // finish() removed it before
+    if (lock_ && results_) // finish() removed it before
         fs::remove(path_ / "lock", ignored);
-    if (lock_ >= 0)
-        ::close(lock_); // the kernel drops the lock, also when the process is killed
 }
 
 Result<RunFolder> RunFolder::open(const Path& folder, const Json& settings, bool restart, const RunContents& contents,
@@ -156,7 +132,7 @@ Result<RunFolder> RunFolder::open(const Path& folder, const Json& settings, bool
     }
     for (const std::string& name : run.names())
         remove_temporary_files(folder / name);
-    SR_TRY(run.journal_, open_own(folder / "journal.jsonl", O_WRONLY | O_APPEND));
+    SR_TRY(run.journal_, open_own(folder / "journal.jsonl", system::FileUse::append));
     return run;
 }
 
@@ -179,14 +155,14 @@ Status RunFolder::refuse_links() const
 Status RunFolder::lock()
 {
     const Path path = path_ / "lock";
-    SR_TRY(lock_, open_own(path, O_RDWR));
-    if (::flock(lock_, LOCK_EX | LOCK_NB) == 0)
-        return {};
-    if (errno == EWOULDBLOCK)
+    SR_TRY(lock_, open_own(path, system::FileUse::lock));
+    const int error = lock_.lock();
+    if (error == EWOULDBLOCK)
         return fail(ErrorCode::busy, "another process works in {}", quote_path(path_));
-    if (!says_no_locks(errno))
-        return system_failure("lock", path);
-    warn_without_locks(path_, errno);
+    if (error && !system::says_no_locks(error))
+        return system_failure("lock", path, error);
+    if (error)
+        warn_without_locks(path_, error);
     return {};
 }
 
@@ -231,23 +207,20 @@ Status RunFolder::read_journal()
         entries_.push_back(std::move(*entry));
         at = end + 1;
     }
-    if (at < text.size() && ::truncate(path.c_str(), off_t(at)) != 0)
-        return system_failure("cut", path);
+    const int error = at < text.size() ? system::cut(path, at) : 0;
+    if (error)
+        return system_failure("cut", path, error);
     return {};
 }
 
 Status RunFolder::append(const Json& entry)
 {
     const std::string line = entry.dump() + "\n";
-    size_t written = 0;
-    while (written < line.size()) {
-        const ssize_t n = ::write(journal_, line.data() + written, line.size() - written);
-        if (n < 0 && errno != EINTR)
-            return system_failure("write", path_ / "journal.jsonl");
-        written += n > 0 ? size_t(n) : 0;
-    }
-    if (::fdatasync(journal_) != 0)
-        return system_failure("write", path_ / "journal.jsonl");
+    int error = journal_.write(std::as_bytes(std::span(line)));
+    if (!error)
+        error = journal_.flush();
+    if (error)
+        return system_failure("write", path_ / "journal.jsonl", error);
     appended_ = true;
     return {};
 }

@@ -29,7 +29,7 @@ class RunFolder {
     // links; usage for other settings of a run that is finished
     static Result<RunFolder> open(const Path& folder, const Json& settings, bool restart,
                                   const RunContents& contents = {}, bool keep_finished = false);
-    RunFolder(RunFolder&& other) noexcept;
+    RunFolder(RunFolder&& other) noexcept = default;
     RunFolder& operator=(RunFolder&&) = delete;
     ~RunFolder();
 
@@ -60,7 +60,7 @@ class RunFolder {
     std::vector<Json> entries_;
     std::optional<Json> results_;
     bool appended_ = false;
-    int lock_ = -1, journal_ = -1;
+    system::File lock_, journal_;
 };
 
 } // namespace semrover

@@ -4,18 +4,13 @@
 
 #include "runtime/base/memory_files.h"
 #include "runtime/base/quote.h"
-#include "runtime/base/renaming.h"
+#include "runtime/base/system.h"
 #include "runtime/base/text_start.h"
 
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <fcntl.h>
 #include <functional>
-#include <sys/mman.h>
-#include <sys/stat.h>
-#include <system_error>
-#include <unistd.h>
 
 namespace semrover {
 
@@ -23,49 +18,28 @@ namespace {
 
 constexpr size_t kMostListed = size_t(1) << 22; // of one folder
 
-std::string system_message(int error)
-{
-    return std::generic_category().message(error);
-}
-
-class Descriptor {
-  public:
-    explicit Descriptor(int fd) : fd_(fd) {}
-    Descriptor(Descriptor&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
-    Descriptor& operator=(Descriptor&& other) noexcept
-    {
-        std::swap(fd_, other.fd_);
-        return *this;
-    }
-    ~Descriptor()
-    {
-        if (fd_ >= 0)
-            ::close(fd_);
-    }
-    int get() const { return fd_; }
-
-  private:
-    int fd_;
-};
-
 struct OpenFile {
-    Descriptor descriptor;
+    system::File file;
     uint64_t size;
 };
 
+tl::unexpected<Error> cannot_read(const Path& path, int error)
+{
+    return fail(ErrorCode::bad_input, "cannot read {}: {}", quote_path(path), system::message_of(error));
+}
+
 Result<OpenFile> open_regular(const Path& path)
 {
-    // note: O_NONBLOCK so that a pipe without a writer is refused instead of waited for
-    Descriptor descriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
-    if (descriptor.get() < 0)
-        return fail(ErrorCode::bad_input, "cannot read {}: {}", quote_path(path), system_message(errno));
-    struct stat status;
-    if (::fstat(descriptor.get(), &status) != 0)
-        return fail(ErrorCode::bad_input, "cannot read {}: {}", quote_path(path), system_message(errno));
-    if (!S_ISREG(status.st_mode))
+    auto file = system::File::open(path, system::FileUse::read);
+    if (!file)
+        return cannot_read(path, file.error());
+    const auto facts = file->facts();
+    if (!facts)
+        return cannot_read(path, facts.error());
+    if (!facts->regular)
         return fail(ErrorCode::bad_input, "cannot read {}: expected a file, found {}", quote_path(path),
-                    S_ISDIR(status.st_mode) ? "a folder" : "a device or pipe");
-    return OpenFile{std::move(descriptor), static_cast<uint64_t>(status.st_size)};
+                    facts->folder ? "a folder" : "a device or pipe");
+    return OpenFile{std::move(*file), facts->bytes};
 }
 
 Status check_length(const Path& path, uint64_t bytes, uint64_t max_bytes)
@@ -96,19 +70,18 @@ Result<Buffer> read_whole(const Path& path, uint64_t max_bytes)
             std::memcpy(buffer.data(), bytes.data(), bytes.size());
         return buffer;
     }
-    SR_TRY(const OpenFile file, open_regular(path));
-    SR_CHECK(check_length(path, file.size, max_bytes));
-    buffer.resize(file.size);
-    for (uint64_t done = 0; done < file.size;) {
-        const ssize_t n = ::read(file.descriptor.get(), buffer.data() + done, file.size - done);
-        if (n < 0 && errno == EINTR)
-            continue;
-        if (n < 0)
-            return fail(ErrorCode::bad_input, "cannot read {}: {}", quote_path(path), system_message(errno));
-        if (n == 0)
+    SR_TRY(OpenFile open, open_regular(path));
+    SR_CHECK(check_length(path, open.size, max_bytes));
+    buffer.resize(open.size);
+    const auto all = std::as_writable_bytes(std::span(buffer));
+    for (uint64_t done = 0; done < open.size;) {
+        const auto n = open.file.read(all.subspan(done));
+        if (!n)
+            return cannot_read(path, n.error());
+        if (*n == 0)
             return fail(ErrorCode::bad_input, "cannot read {}: it was cut from {} to {} bytes while being read",
-                        quote_path(path), file.size, done);
-        done += static_cast<uint64_t>(n);
+                        quote_path(path), open.size, done);
+        done += *n;
     }
     return buffer;
 }
@@ -119,18 +92,9 @@ Path folder_of(const Path& path)
     return folder.empty() ? Path(".") : folder;
 }
 
-// makes the rename itself survive a power cut; a file system that cannot flush folders says EINVAL
-Status flush_folder(const Path& folder)
-{
-    const Descriptor descriptor(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-    if (descriptor.get() < 0 || (::fsync(descriptor.get()) != 0 && errno != EINVAL))
-        return fail(ErrorCode::bad_input, "cannot flush folder {}: {}", quote_path(folder), system_message(errno));
-    return {};
-}
-
 tl::unexpected<Error> cannot_write(const Path& path, int error)
 {
-    return fail(ErrorCode::bad_input, "cannot write {}: {}", quote_path(path), system_message(error));
+    return fail(ErrorCode::bad_input, "cannot write {}: {}", quote_path(path), system::message_of(error));
 }
 
 // Paths in a folder that pass the test, sorted: what an iterator finds on the disk, and what `part` makes of the names
@@ -228,15 +192,15 @@ Result<std::string> read_text_file(const Path& path, uint64_t max_bytes)
     return bytes;
 }
 
-AtomicFile::AtomicFile(Path path, Path temporary, int descriptor, std::unique_ptr<Unfinished> unfinished)
-    : path_(std::move(path)), temporary_(std::move(temporary)), descriptor_(descriptor),
+AtomicFile::AtomicFile(Path path, Path temporary, system::File file, std::unique_ptr<Unfinished> unfinished)
+    : path_(std::move(path)), temporary_(std::move(temporary)), file_(std::move(file)),
       unfinished_(std::move(unfinished))
 {
 }
 
 AtomicFile::AtomicFile(AtomicFile&& other) noexcept
-    : path_(std::move(other.path_)), temporary_(std::exchange(other.temporary_, {})),
-      descriptor_(std::exchange(other.descriptor_, -1)), unfinished_(std::move(other.unfinished_))
+    : path_(std::move(other.path_)), temporary_(std::exchange(other.temporary_, {})), file_(std::move(other.file_)),
+      unfinished_(std::move(other.unfinished_))
 {
 }
 
@@ -247,11 +211,9 @@ AtomicFile::~AtomicFile()
 
 void AtomicFile::discard() noexcept
 {
-    if (descriptor_ >= 0)
-        ::close(descriptor_);
+    (void)file_.close();
     if (!temporary_.empty())
-        ::unlink(temporary_.c_str());
-    descriptor_ = -1;
+        system::remove_file(temporary_);
     temporary_.clear();
     unfinished_.reset();
 }
@@ -260,49 +222,39 @@ Result<AtomicFile> AtomicFile::create(const Path& path)
 {
     if (path.filename().empty())
         return fail(ErrorCode::bad_input, "cannot write {}: it names no file", quote_path(path));
-    struct stat status;
-    if (::stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode))
+    if (const auto facts = system::facts_of(path); facts && !facts->regular)
         return fail(ErrorCode::bad_input, "cannot write {}: it is {}, not a file", quote_path(path),
-                    S_ISDIR(status.st_mode) ? "a folder" : "a device or pipe");
+                    facts->folder ? "a folder" : "a device or pipe");
     for (int attempt = 0; attempt < 100; ++attempt) { // a killed run with the same pid may have left its name
         // the name is short whatever the length of the final one (NAME_MAX is 255)
         Path temporary = folder_of(path) / unfinished_name();
         const Together created_and_known;
-        const int fd = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-        if (fd >= 0) {
+        auto file = system::File::open(temporary, system::FileUse::create);
+        if (file) {
             auto unfinished = std::make_unique<Unfinished>(temporary);
-            return AtomicFile(path, std::move(temporary), fd, std::move(unfinished));
+            return AtomicFile(path, std::move(temporary), std::move(*file), std::move(unfinished));
         }
-        if (errno != EEXIST)
-            return cannot_write(path, errno);
+        if (file.error() != EEXIST)
+            return cannot_write(path, file.error());
     }
     return cannot_write(path, EEXIST);
 }
 
 Status AtomicFile::write(std::span<const std::byte> bytes)
 {
-    SR_ASSERT(descriptor_ >= 0, "write to {} after commit, move or error", path_.native());
-    for (size_t done = 0; done < bytes.size();) {
-        const ssize_t n = ::write(descriptor_, bytes.data() + done, bytes.size() - done);
-        if (n < 0 && errno == EINTR)
-            continue;
-        if (n < 0) {
-            const int error = errno;
-            discard();
-            return cannot_write(path_, error);
-        }
-        done += static_cast<size_t>(n);
-    }
-    return {};
+    SR_ASSERT(bool(file_), "write to {} after commit, move or error", path_.string());
+    const int error = file_.write(bytes);
+    if (!error)
+        return {};
+    discard();
+    return cannot_write(path_, error);
 }
 
 Status AtomicFile::flush()
 {
-    SR_ASSERT(descriptor_ >= 0, "flush of {} after flush, commit, move or error", path_.native());
+    SR_ASSERT(bool(file_), "flush of {} after flush, commit, move or error", path_.string());
     // note: close may report a late write error (NFS, quota), so it is checked before the rename
-    int error = ::fsync(descriptor_) == 0 || errno == EINVAL ? 0 : errno;
-    if (::close(std::exchange(descriptor_, -1)) != 0 && !error)
-        error = errno;
+    const int flushed = file_.flush(), closed = file_.close(), error = flushed ? flushed : closed;
     if (!error)
         return {};
     discard();
@@ -311,17 +263,20 @@ Status AtomicFile::flush()
 
 Status AtomicFile::commit()
 {
-    SR_ASSERT(!temporary_.empty(), "commit of {} after commit, move or error", path_.native());
-    if (descriptor_ >= 0)
+    SR_ASSERT(!temporary_.empty(), "commit of {} after commit, move or error", path_.string());
+    if (file_)
         SR_CHECK(flush());
     const Together renamed_and_forgotten;
-    if (const int error = rename_surely(temporary_, path_)) {
+    if (const int error = system::rename_surely(temporary_, path_)) {
         discard();
         return cannot_write(path_, error);
     }
     temporary_.clear();
     unfinished_.reset();
-    return flush_folder(folder_of(path_));
+    const Path folder = folder_of(path_);
+    if (const int error = system::flush_folder(folder)) // makes the rename itself survive a power cut
+        return fail(ErrorCode::bad_input, "cannot flush folder {}: {}", quote_path(folder), system::message_of(error));
+    return {};
 }
 
 Status write_file_atomically(const Path& path, std::span<const std::byte> bytes)
@@ -341,7 +296,7 @@ void remove_temporary_files(const Path& folder)
     std::error_code error;
     for (std::filesystem::recursive_directory_iterator i(folder, error), end; !error && i != end; i.increment(error)) {
         if (is_abandoned(i->path()))
-            ::unlink(i->path().c_str());
+            system::remove_file(i->path());
     }
 }
 
@@ -355,15 +310,15 @@ Result<MappedFile> MappedFile::open(const Path& path)
         mapped.borrowed_ = true;
         return mapped;
     }
-    SR_TRY(const OpenFile file, open_regular(path));
-    if (file.size == 0) // mmap refuses length 0
+    SR_TRY(const OpenFile open, open_regular(path));
+    if (open.size == 0) // mapping refuses length 0
         return mapped;
-    void* data = ::mmap(nullptr, file.size, PROT_READ, MAP_PRIVATE, file.descriptor.get(), 0);
-    if (data == MAP_FAILED)
-        return fail(ErrorCode::bad_input, "cannot map {} ({} bytes): {}", quote_path(path), file.size,
-                    system_message(errno));
-    mapped.data_ = static_cast<const std::byte*>(data);
-    mapped.size_ = file.size;
+    const auto data = open.file.map(open.size);
+    if (!data)
+        return fail(ErrorCode::bad_input, "cannot map {} ({} bytes): {}", quote_path(path), open.size,
+                    system::message_of(data.error()));
+    mapped.data_ = *data;
+    mapped.size_ = open.size;
     return mapped;
 }
 
@@ -392,7 +347,7 @@ MappedFile::~MappedFile()
 void MappedFile::unmap() noexcept
 {
     if (data_ && !borrowed_)
-        ::munmap(const_cast<std::byte*>(data_), size_);
+        system::unmap(data_, size_);
 }
 
 } // namespace semrover

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "runtime/base/result.h"
+#include "runtime/base/system.h"
 #include "runtime/base/unfinished.h"
 
 #include <cstddef>
@@ -64,12 +65,12 @@ class AtomicFile {
     Status commit(); // once, after the last write
 
   private:
-    AtomicFile(Path path, Path temporary, int descriptor, std::unique_ptr<Unfinished> unfinished);
+    AtomicFile(Path path, Path temporary, system::File file, std::unique_ptr<Unfinished> unfinished);
     void discard() noexcept;
 
     Path path_;
-    Path temporary_;      // empty when there is nothing to remove
-    int descriptor_ = -1; // none from flush() on
+    Path temporary_;    // empty when there is nothing to remove
+    system::File file_; // none from flush() on
     std::unique_ptr<Unfinished> unfinished_;
 };
 

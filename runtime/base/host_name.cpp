@@ -2,22 +2,24 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/base/host_name.h"
 
+#include "runtime/base/system.h"
+
 #include <algorithm>
 #include <cctype>
 #include <cstdlib>
-#include <unistd.h>
 
 namespace semrover {
 
 namespace {
 
-constexpr size_t kMostLength = 64; // as much as Linux allows
+constexpr size_t kMostLength = 64;
 
 std::string read_host_name()
 {
-    char name[kMostLength + 1] = {};
     const char* given = std::getenv("SEMROVER_HOST");
-    std::string host = given && *given ? given : ::gethostname(name, kMostLength) == 0 && *name ? name : "unknown";
+    std::string host = given && *given ? given : system::host_name();
+    if (host.empty())
+        host = "unknown";
     host.resize(std::min(host.size(), kMostLength));
     const auto unsafe = [](unsigned char c) { return !std::isalnum(c) && c != '_'; };
     std::ranges::replace_if(host, unsafe, '-');

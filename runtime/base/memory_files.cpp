@@ -28,7 +28,7 @@ AllFiles& all_files()
 
 bool is_ours(const Path& path)
 {
-    return path.native().starts_with(kPrefix);
+    return path.generic_string().starts_with(kPrefix);
 }
 
 // whatever way a path is written
@@ -68,7 +68,7 @@ MemoryFolder::~MemoryFolder()
 Status MemoryFolder::add(std::string_view path, std::span<const std::byte> bytes)
 {
     const Path inner = Path(path).lexically_normal();
-    if (path.empty() || inner.is_absolute() || inner.begin()->native() == ".." || !inner.has_filename() || inner == ".")
+    if (path.empty() || inner.is_absolute() || *inner.begin() == ".." || !inner.has_filename() || inner == ".")
         return fail(ErrorCode::usage, "a file in memory has the path {}, expected one below its folder",
                     quote_path(path));
     AllFiles& all = all_files();

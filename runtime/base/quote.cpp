@@ -70,7 +70,7 @@ std::string quote(std::string_view text, size_t limit)
 
 std::string quote_path(const std::filesystem::path& path)
 {
-    return quote(path.native(), 4096);
+    return quote(path.string(), 4096);
 }
 
 } // namespace semrover

@@ -23,7 +23,7 @@ struct Index {
 bool is_pickle(const Path& path)
 {
     static constexpr std::string_view kPickles[] = {".bin", ".pt", ".pth", ".ckpt", ".pkl"};
-    return std::ranges::find(kPickles, path.extension().native()) != std::end(kPickles);
+    return std::ranges::find(kPickles, path.extension().string()) != std::end(kPickles);
 }
 
 tl::unexpected<Error> refuse_pickle(const Path& path)
@@ -33,7 +33,7 @@ tl::unexpected<Error> refuse_pickle(const Path& path)
                 "torch, safetensors.torch as s; d = torch.load(FILE, map_location='cpu', weights_only=True); "
                 "s.save_file({{k: v.contiguous().clone() for k, v in d.get('state_dict', d).items() if "
                 "torch.is_tensor(v)}}, '{}.safetensors')",
-                quote_path(path), path.extension().native(), printable(path.stem().native(), 100));
+                quote_path(path), path.extension().string(), printable(path.stem().string(), 100));
 }
 
 // [A-Za-z0-9._-]+\.safetensors, so that no shard lies outside the index's folder

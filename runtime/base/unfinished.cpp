@@ -3,17 +3,15 @@
 #include "runtime/base/unfinished.h"
 
 #include "runtime/base/host_name.h"
+#include "runtime/base/system.h"
 
 #include <atomic>
-#include <cerrno>
 #include <charconv>
 #include <chrono>
 #include <condition_variable>
-#include <csignal>
 #include <fmt/format.h>
 #include <mutex>
 #include <string_view>
-#include <unistd.h>
 
 namespace semrover {
 
@@ -51,11 +49,11 @@ bool process_is_gone(std::string_view middle)
     if (!middle.starts_with(host) || middle.substr(host.size(), 1) != "-")
         return false;
     const std::string_view numbers = middle.substr(host.size() + 1);
-    pid_t pid = 0;
+    int32_t pid = 0;
     const auto [end, error] = std::from_chars(numbers.data(), numbers.data() + numbers.size(), pid);
     if (error != std::errc() || pid <= 0 || end == numbers.data() + numbers.size() || *end != '-')
         return false; // of a host whose name begins with this one's
-    return ::kill(pid, 0) != 0 && errno == ESRCH;
+    return system::process_is_gone(pid);
 }
 
 } // namespace
@@ -63,7 +61,7 @@ bool process_is_gone(std::string_view middle)
 std::string unfinished_name()
 {
     static std::atomic<unsigned> count = 0;
-    return fmt::format("{}{}-{}-{}{}", kBefore, host_name(), ::getpid(), count++, kAfter);
+    return fmt::format("{}{}-{}-{}{}", kBefore, host_name(), system::process_number(), count++, kAfter);
 }
 
 bool is_abandoned(const std::filesystem::path& path)

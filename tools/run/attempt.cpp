@@ -5,7 +5,7 @@
 #include "runtime/base/hash.h"
 #include "runtime/base/host_name.h"
 #include "runtime/base/quote.h"
-#include "runtime/base/renaming.h"
+#include "runtime/base/system.h"
 
 #include <algorithm>
 #include <cerrno>
@@ -204,7 +204,7 @@ Result<Attempt::Published> Attempt::publish(const std::string& name, const std::
 {
     const Path to = out_ / name;
     SR_CHECK(make_folder(to.parent_path()));
-    const int failed = rename_surely(files_, to);
+    const int failed = system::rename_surely(files_, to);
     flush_folder(to.parent_path());
     const auto there = read_manifest(to);
     std::error_code ignored;
@@ -222,7 +222,7 @@ Result<Attempt::Published> Attempt::publish(const std::string& name, const std::
     if (there)
         return fail(ErrorCode::bad_input, "{} was made with other settings; -y moves it aside", quote_path(to));
     return fail(ErrorCode::bad_input, "cannot rename {} to {}: {}", quote_path(files_), quote_path(to),
-                std::strerror(failed ? failed : ENOENT));
+                system::message_of(failed ? failed : ENOENT));
 }
 
 size_t Attempt::clean(const Path& out, double seconds, const std::function<bool(const std::string& key)>& is_done)
