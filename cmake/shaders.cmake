@@ -4,10 +4,19 @@
 # <folder>/<op>[.<variant>].comp -> SPIR-V -> <build>/generated/<op>.spv.h, one header per op with all its variants. Debian
 # 12's compiler does not know cooperative matrices: SPIR-V of .coopmat variants lies in shaders/spirv (tools/dev/spirv)
 find_program(GLSLANG glslangValidator REQUIRED)
-add_executable(reflect cmake/reflect/main.cpp cmake/reflect/module.cpp cmake/reflect/protocol.cpp)
-target_include_directories(reflect PRIVATE ${CMAKE_SOURCE_DIR})
-target_link_libraries(reflect PRIVATE fmt::fmt)
-target_compile_options(reflect PRIVATE "${cold_options}")
+set(reflect_sources cmake/reflect/main.cpp cmake/reflect/module.cpp cmake/reflect/protocol.cpp)
+list(TRANSFORM reflect_sources PREPEND ${CMAKE_SOURCE_DIR}/)
+if(CMAKE_CROSSCOMPILING) # it runs here
+    set(reflect ${CMAKE_BINARY_DIR}/reflect)
+    add_custom_command(OUTPUT ${reflect} DEPENDS ${reflect_sources} VERBATIM
+        COMMAND c++ -std=c++20 -O1 -I${CMAKE_SOURCE_DIR} -o ${reflect} ${reflect_sources} -lfmt)
+else()
+    set(reflect reflect)
+    add_executable(reflect ${reflect_sources})
+    target_include_directories(reflect PRIVATE ${CMAKE_SOURCE_DIR})
+    target_link_libraries(reflect PRIVATE fmt::fmt)
+    target_compile_options(reflect PRIVATE "${cold_options}")
+endif()
 
 # add_shader_headers(TARGET FOLDER...): an interface target with the headers of the ops in these folders; their names are
 # left in TARGET_ops
@@ -41,8 +50,8 @@ function(add_shader_headers target)
     set(headers)
     foreach(op ${ops})
         set(header ${generated}/${op}.spv.h)
-        add_custom_command(OUTPUT ${header} COMMAND reflect ${header} ${op} ${modules_${op}}
-            DEPENDS reflect ${modules_${op}} COMMENT "reflect ${op}" VERBATIM)
+        add_custom_command(OUTPUT ${header} COMMAND ${reflect} ${header} ${op} ${modules_${op}}
+            DEPENDS ${reflect} ${modules_${op}} COMMENT "reflect ${op}" VERBATIM)
         list(APPEND headers ${header})
     endforeach()
     set(${target}_ops ${ops} PARENT_SCOPE)

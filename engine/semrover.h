@@ -49,7 +49,13 @@ extern "C" {
 #endif
 
 #ifndef SR_API
+#if !defined(_WIN32)
 #define SR_API __attribute__((visibility("default")))
+#elif defined(SR_LIBRARY)
+#define SR_API __declspec(dllexport)
+#else
+#define SR_API __declspec(dllimport)
+#endif
 #endif
 
 #define SR_VERSION 100u /* 10000 major + 100 minor + patch, of this header */

@@ -12,6 +12,7 @@
 #include <cmath>
 #include <cstring>
 #include <gtest/gtest.h>
+#include <numbers>
 
 namespace semrover {
 namespace cli_instances_test {
@@ -141,8 +142,8 @@ TEST(CliInstances, flow_follows_the_street_and_what_drives_on_it)
     const Scene s;
     s.write_actors_file();
     ASSERT_EQ(s.render("a", "--instances --flow flo --actors " + (s.folder / "actors.json").string()).code, 0);
-    EXPECT_FALSE(fs::exists(s.folder / "a/flow/000002.flo"));      // the last frame has none
-    const double focal = kWidth / 2.0 / std::tan(73 * M_PI / 360); // checked below by the wall's flow
+    EXPECT_FALSE(fs::exists(s.folder / "a/flow/000002.flo"));                  // the last frame has none
+    const double focal = kWidth / 2.0 / std::tan(73 * std::numbers::pi / 360); // checked below by the wall's flow
     for (int frame = 0; frame < 2; ++frame) {
         const FlowFile flow = read_flow(s.folder / "a", frame);
         const auto instance = read_png_gray16(s.folder / fmt::format("a/instance/{:06}.png", frame));

@@ -357,7 +357,7 @@ TEST(Rig, sensors_may_have_any_lens)
     a.distortion = {0.1, 0, 0, 0.2};
     b.model = CameraModel::opencv;
     b.distortion = {0.1, 0.2, 0.3, 0.4, 0.5};
-    EXPECT_NEAR(a.fx, 100 / M_PI, 1e-12);
+    EXPECT_NEAR(a.fx, 100 / std::numbers::pi, 1e-12);
     EXPECT_EQ(rig->sensors[0].intrinsics, a);
     EXPECT_EQ(rig->sensors[1].intrinsics, b);
     EXPECT_EQ(rig->sensors[2].intrinsics, whole_sphere(100, 50));
@@ -535,7 +535,8 @@ TEST(Rig, the_examples_look_where_their_names_say)
                                                                                 : 0;
             const double ahead = camera == "back" ? -1 : camera.starts_with("front") ? 1 : 0;
             const double expected = std::atan2(sideways, ahead);
-            EXPECT_NEAR(std::remainder(std::atan2(forward[1], forward[0]) - expected, 2 * M_PI), 0, 0.3) << camera;
+            EXPECT_NEAR(std::remainder(std::atan2(forward[1], forward[0]) - expected, 2 * std::numbers::pi), 0, 0.3)
+                << camera;
         }
     }
 }

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <filesystem>
 #include <gtest/gtest.h>
+#include <numbers>
 #include <random>
 
 namespace semrover {
@@ -352,7 +353,7 @@ TEST(CameraFiles, a_broken_camera_path_is_named)
     const auto timed = whole(R"({"fps":10,"render_width":8,"render_height":6,"camera_path":[{)" + pose +
                              R"("fov":50},{)" + pose + R"("fov":40}]})");
     EXPECT_DOUBLE_EQ(timed->frames[1].time, 0.1);
-    EXPECT_NEAR(timed->frames[1].intrinsics.fy, 3 / std::tan(20 * M_PI / 180), 1e-12);
+    EXPECT_NEAR(timed->frames[1].intrinsics.fy, 3 / std::tan(20 * std::numbers::pi / 180), 1e-12);
 }
 
 TEST(CameraFiles, a_camera_path_is_not_written_for_what_it_has_no_place_for)

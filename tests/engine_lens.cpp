@@ -6,6 +6,7 @@
 #include <cmath>
 #include <gtest/gtest.h>
 #include <limits>
+#include <numbers>
 #include <random>
 #include <span>
 
@@ -216,11 +217,12 @@ TEST(Lens, a_point_becomes_a_pixel_becomes_its_ray_up_to_the_limit)
         const Lens lens(k);
         const bool plane = k.model == CameraModel::opencv || k.model == CameraModel::pinhole;
         const double limit = k.model == CameraModel::pinhole           ? 5
-                             : k.model == CameraModel::equirectangular ? M_PI
+                             : k.model == CameraModel::equirectangular ? std::numbers::pi
                                                                        : std::min(lens.limit(), 50.0);
         for (int i = 0; i < 2000; ++i) {
             const double away = 0.99 * limit * double(random()) / 4294967296.0;
-            const double around = 2 * M_PI * double(random()) / 4294967296.0, angle = plane ? std::atan(away) : away;
+            const double around = 2 * std::numbers::pi * double(random()) / 4294967296.0,
+                         angle = plane ? std::atan(away) : away;
             const Point3 p = {std::sin(angle) * std::cos(around), std::sin(angle) * std::sin(around), std::cos(angle)};
             const auto pixel = lens.project(p);
             ASSERT_TRUE(pixel) << name_of(k.model) << " " << angle;
@@ -247,7 +249,7 @@ TEST(Lens, a_lens_ends_where_its_mapping_turns_back)
     const Lens fisheye({100, 100, 50, 50, 100, 100, CameraModel::fisheye, {-0.2}});
     EXPECT_NEAR(fisheye.limit(), 1 / std::sqrt(0.6), 1e-9);
     EXPECT_FALSE(fisheye.project({1, 0, 0.1}));
-    EXPECT_NEAR(Lens(fisheye_from_fov(360, 100, 100)).limit(), M_PI, 1e-12);
+    EXPECT_NEAR(Lens(fisheye_from_fov(360, 100, 100)).limit(), std::numbers::pi, 1e-12);
     // a denominator that becomes 0 at r = 2
     EXPECT_LT(Lens({100, 100, 50, 50, 100, 100, CameraModel::opencv, {0, 0, 0, 0, 0, -0.25}}).limit(), 2);
     // p1 turns the mapping over on one side first

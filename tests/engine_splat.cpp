@@ -9,6 +9,8 @@
 #include "tools/verify/splat_cases.cpp"
 #include "tools/verify/splat_cases.h"
 
+#include <numbers>
+
 namespace semrover {
 namespace engine_splat_test {
 
@@ -156,7 +158,7 @@ TEST(engine_splat, a_road_is_as_opaque_as_its_density_says)
         return sum / (200 * 200);
     };
     for (float sigma : {0.04f, 0.08f}) {
-        const double expect = 1 - std::exp(-density * 2 * M_PI * sigma * sigma);
+        const double expect = 1 - std::exp(-density * 2 * std::numbers::pi * sigma * sigma);
         EXPECT_NEAR(mean_alpha({.sigma = sigma}), expect, 0.03 * expect);
     }
     EXPECT_GT(mean_alpha({.auto_sigma = true}), 0.85);

@@ -3,6 +3,7 @@
 #include "tests/kernel_case.h"
 
 #include <cmath>
+#include <numbers>
 
 namespace semrover {
 namespace kernel_gemm_test {
@@ -21,7 +22,7 @@ const GemmCase kCases[] = {
 
 double gelu_reference(double v)
 {
-    return 0.5 * v * (1 + std::tanh(std::sqrt(2 / M_PI) * (v + 0.044715 * v * v * v)));
+    return 0.5 * v * (1 + std::tanh(std::sqrt(2 / std::numbers::pi) * (v + 0.044715 * v * v * v)));
 }
 
 void check(Device& device, const GemmCase& c, DType dtype)

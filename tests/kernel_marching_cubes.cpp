@@ -8,6 +8,7 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <numbers>
 #include <set>
 
 namespace semrover {
@@ -296,7 +297,8 @@ TEST(kernel_marching_cubes, a_sphere_is_closed_and_turned_outwards)
                    p[2] * (q[0] * r[1] - q[1] * r[0])) /
                   6;
     }
-    EXPECT_NEAR(volume, 4.0 / 3 * M_PI * std::pow(radius, 3), 0.02 * 4.0 / 3 * M_PI * std::pow(radius, 3));
+    EXPECT_NEAR(volume, 4.0 / 3 * std::numbers::pi * std::pow(radius, 3),
+                0.02 * 4.0 / 3 * std::numbers::pi * std::pow(radius, 3));
     for (const Position& p : s.positions)
         ASSERT_NEAR(std::hypot(p[0] - middle[0], p[1] - middle[1], p[2] - middle[2]), radius, 0.03);
 }

@@ -3,6 +3,7 @@
 #include "tests/kernel_case.h"
 
 #include <cmath>
+#include <numbers>
 
 namespace semrover {
 namespace kernel_modulate_test {
@@ -163,7 +164,7 @@ TEST(kernel_add, adds_in_either_precision_and_writes_where_it_is_told)
 
 double gelu_reference(double v)
 {
-    return 0.5 * v * (1 + std::tanh(std::sqrt(2 / M_PI) * (v + 0.044715 * v * v * v)));
+    return 0.5 * v * (1 + std::tanh(std::sqrt(2 / std::numbers::pi) * (v + 0.044715 * v * v * v)));
 }
 double silu_reference(double v)
 {

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cmath>
+#include <numbers>
 
 namespace semrover {
 namespace kernel_pca_normal_test {
@@ -145,7 +146,7 @@ TEST(kernel_pca_normal, a_thin_pole_points_outwards_and_too_few_neighbours_point
     std::mt19937 random(3);
     std::uniform_real_distribution<double> unit;
     for (uint32_t i = 0; i < n; ++i) { // radius 5 cm, 2 m high
-        const double angle = 2 * M_PI * unit(random);
+        const double angle = 2 * std::numbers::pi * unit(random);
         p.insert(p.end(), {float(3 + 0.05 * std::cos(angle)), float(0.05 * std::sin(angle)), float(2 * unit(random))});
     }
     std::vector<uint32_t> neighbors;

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/splat_case.h"
 
+#include <numbers>
+
 namespace semrover {
 namespace kernel_splat_test {
 
@@ -68,7 +70,7 @@ std::array<int64_t, 2> sampled_tiles(const ReferenceSplat& s, const Vector& row,
 {
     const double c = std::sqrt(2 * std::log(255 * opacity));
     double low = center - c * std::sqrt(0.5), high = center + c * std::sqrt(0.5);
-    for (double angle = 0; angle < 2 * M_PI; angle += 0.01) {
+    for (double angle = 0; angle < 2 * std::numbers::pi; angle += 0.01) {
         const Vector uv = {c * std::cos(angle), c * std::sin(angle), 1};
         low = std::min(low, dot(row, uv) / dot(s.tw, uv));
         high = std::max(high, dot(row, uv) / dot(s.tw, uv));

@@ -3,6 +3,8 @@
 #include "lens_trip.spv.h"
 #include "tests/splat_case.h"
 
+#include <numbers>
+
 namespace semrover {
 namespace kernel_splat_lens_test {
 
@@ -245,7 +247,7 @@ TEST(kernel_splat_lens, a_splat_on_the_seam_of_a_panorama_appears_on_both_sides)
     EXPECT_LE(got.pairs, 2u * 4u); // tiles on both sides, not those between
     const auto alpha = [&](uint32_t x) { return got.color[(height / 2 * width + x) * 4 + 3]; };
     // half a pixel away in both directions, 3 m off
-    const double across = 3 * M_PI / width / 0.3, down = 3 * M_PI / height / 2 / 0.3;
+    const double across = 3 * std::numbers::pi / width / 0.3, down = 3 * std::numbers::pi / height / 2 / 0.3;
     EXPECT_NEAR(alpha(0), 0.9 * std::exp(-(across * across + down * down) / 2), 2e-3);
     for (uint32_t x = 0; x < width / 2; ++x)
         EXPECT_NEAR(alpha(x), alpha(width - 1 - x), 1e-5) << x;

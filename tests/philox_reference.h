@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <numbers>
 
 // Philox4x32-10 and Box-Muller as the paper and textbooks give them, in integers and double
 namespace semrover {
@@ -29,7 +30,7 @@ inline std::array<double, 4> normals_reference(const Words4& words)
     std::array<double, 4> z{};
     for (int pair = 0; pair < 2; ++pair) {
         const double u = ((words[2 * pair] >> 8) + 1) / 16777216.0, turn = (words[2 * pair + 1] >> 8) / 16777216.0;
-        const double radius = std::sqrt(-2 * std::log(u)), angle = 2 * M_PI * turn;
+        const double radius = std::sqrt(-2 * std::log(u)), angle = 2 * std::numbers::pi * turn;
         z[2 * pair] = radius * std::cos(angle);
         z[2 * pair + 1] = radius * std::sin(angle);
     }

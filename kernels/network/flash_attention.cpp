@@ -7,6 +7,7 @@
 #include "flash_attention.spv.h"
 
 #include <cmath>
+#include <numbers>
 
 namespace semrover {
 
@@ -49,7 +50,7 @@ Tensor flash_attention(Graph& g, Tensor q, Tensor kv, const FlashAttentionOption
     push.k_col = o.k_col;
     push.v_col = o.v_col;
     push.chunks = chunks;
-    push.scale = float(M_LOG2E * (o.scale > 0 ? o.scale : 1 / std::sqrt(double(o.head_dim))));
+    push.scale = float(std::numbers::log2e * (o.scale > 0 ? o.scale : 1 / std::sqrt(double(o.head_dim))));
     DispatchOptions dispatch;
     dispatch.constants = {{"kChunks", chunks}, {"kMostChunks", chunks <= 20 ? 20u : 64u}};
     dispatch.flops = 4.0 * o.batch * o.query_rows * o.keys * o.heads * o.head_dim;

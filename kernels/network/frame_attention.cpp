@@ -7,6 +7,7 @@
 #include "frame_attention.spv.h"
 
 #include <cmath>
+#include <numbers>
 
 namespace semrover {
 
@@ -24,7 +25,7 @@ Tensor frame_attention(Graph& g, Tensor qkv, const FrameAttentionOptions& o)
     push.chunks = o.head_dim / 8;
     push.qkv_ld = qkv.ld;
     push.y_ld = y.ld;
-    push.scale = float(M_LOG2E * (o.scale > 0 ? o.scale : 1 / std::sqrt(double(o.head_dim))));
+    push.scale = float(std::numbers::log2e * (o.scale > 0 ? o.scale : 1 / std::sqrt(double(o.head_dim))));
     // a dispatch a video: a device that binds few bytes at once needs to bind one of them only
     for (uint32_t video = 0; video < o.videos; ++video) {
         DispatchOptions dispatch;

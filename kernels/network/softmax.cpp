@@ -6,6 +6,7 @@
 #include "softmax.spv.h"
 
 #include <cmath>
+#include <numbers>
 
 namespace semrover {
 
@@ -19,7 +20,7 @@ Tensor softmax(Graph& g, Tensor x, const SoftmaxOptions& options)
     push.width = round_up(x.cols, kRowPadding);
     push.x_ld = x.ld;
     push.y_ld = y.ld;
-    push.scale = float(M_LOG2E * double(options.scale));
+    push.scale = float(std::numbers::log2e * double(options.scale));
     DispatchOptions dispatch;
     dispatch.banded = {"X", "Y"};
     g.dispatch(kernel::softmax, {x, y}, push, row_tiles(x.rows), std::move(dispatch));

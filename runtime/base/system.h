@@ -31,6 +31,8 @@ enum class FileUse {
     lock    // likewise, for File::lock()
 };
 
+class Process;
+
 // An open file, which other processes may rename and remove meanwhile. Child processes do not get it.
 class File {
   public:
@@ -56,6 +58,7 @@ class File {
     OrError<const std::byte*> map(uint64_t bytes) const; // for reading, not 0 bytes; stays when the file is closed
 
   private:
+    friend class Process;
     explicit File(int number) : number_(number) {}
 
     int number_ = -1;
@@ -75,6 +78,7 @@ int rename_surely(const Path& from, const Path& to);
 int64_t process_number();
 bool process_is_gone(int64_t number); // no process of this machine has the number
 std::string host_name();              // empty: unknown
+Path user_cache_folder();             // empty: none
 uint32_t usable_processors();         // of this process, at least 1
 void close_descriptor(int descriptor);
 

@@ -6,6 +6,7 @@
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <fcntl.h>
 #include <sched.h>
 #include <sys/file.h>
@@ -173,6 +174,12 @@ std::string host_name()
 {
     char name[65] = {}; // as much as Linux allows
     return ::gethostname(name, sizeof name - 1) == 0 ? name : "";
+}
+
+Path user_cache_folder()
+{
+    const char *cache = std::getenv("XDG_CACHE_HOME"), *home = std::getenv("HOME");
+    return cache && *cache ? Path(cache) : home && *home ? Path(home) / ".cache" : Path();
 }
 
 uint32_t usable_processors()

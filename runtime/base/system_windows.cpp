@@ -119,7 +119,7 @@ OrError<size_t> File::read(std::span<std::byte> bytes)
 {
     DWORD n = 0;
     if (!::ReadFile(handle_of(number_), bytes.data(), DWORD(std::min<size_t>(bytes.size(), 1u << 30)), &n, nullptr))
-        return tl::unexpected(last_error());
+        return ::GetLastError() == ERROR_BROKEN_PIPE ? OrError<size_t>(0) : tl::unexpected(last_error());
     return size_t(n);
 }
 
@@ -229,6 +229,12 @@ std::string host_name()
     char name[MAX_COMPUTERNAME_LENGTH + 1] = {};
     DWORD length = sizeof name;
     return ::GetComputerNameA(name, &length) ? std::string(name, length) : "";
+}
+
+Path user_cache_folder()
+{
+    const wchar_t* local = ::_wgetenv(L"LOCALAPPDATA");
+    return local ? Path(local) : Path();
 }
 
 uint32_t usable_processors()

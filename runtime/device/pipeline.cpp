@@ -4,6 +4,7 @@
 
 #include "runtime/base/file.h"
 #include "runtime/base/hash.h"
+#include "runtime/base/system.h"
 #include "runtime/device/device.h"
 
 #include <algorithm>
@@ -26,10 +27,9 @@ constexpr double kSaveAfterSeconds = 2; // of compiling: writing the file takes 
 
 std::string cache_path(Device& device)
 {
-    const char *cache = std::getenv("XDG_CACHE_HOME"), *home = std::getenv("HOME");
-    if (!(cache && *cache) && !(home && *home))
+    const fs::path root = system::user_cache_folder();
+    if (root.empty())
         return "";
-    const fs::path root = cache && *cache ? fs::path(cache) : fs::path(home) / ".cache";
     VkPhysicalDeviceProperties p;
     device.vk().GetPhysicalDeviceProperties(device.physical(), &p);
     std::string name = fmt::format("pipelines-{:x}-{:x}-{:x}-", p.vendorID, p.deviceID, p.driverVersion);

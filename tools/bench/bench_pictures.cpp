@@ -13,7 +13,6 @@
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <numbers>
-#include <unistd.h>
 
 namespace semrover {
 
@@ -31,7 +30,8 @@ struct PicturesBenchOptions {
 class TemporaryFolder {
   public:
     TemporaryFolder()
-        : path_(std::filesystem::temp_directory_path() / fmt::format(".semrover-{}-bench.tmp", ::getpid())),
+        : path_(std::filesystem::temp_directory_path() /
+                fmt::format(".semrover-{}-bench.tmp", system::process_number())),
           unfinished_(path_)
     {
     }

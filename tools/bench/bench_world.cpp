@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // semrover bench world: a flight down a street without end that grows ahead of the camera, a budget at a time
 #include "engine/world/world.h"
-#include "runtime/base/host_memory.h"
+#include "runtime/base/process.h"
 #include "tools/bench/bench.h"
 #include "tools/bench/call_times.h"
 #include "tools/cli/open_device.h"
@@ -52,7 +52,7 @@ Json memory_at(double metres, const World& world, const Device& device)
     const WorldFigures f = world.figures();
     return {{"metres", metres},
             {"device_bytes", device.allocated_bytes()},
-            {"process_bytes", host_memory().resident},
+            {"process_bytes", system::host_memory().resident},
             {"tile_bytes", f.host_bytes},
             {"tiles_in_memory", f.in_memory},
             {"tiles_generated", f.generated},

@@ -4,9 +4,6 @@
 
 #include "runtime/base/quote.h"
 
-#include <cerrno>
-#include <sys/stat.h>
-
 namespace semrover {
 
 namespace fs = std::filesystem;
@@ -25,16 +22,16 @@ Result<OutputFolder> OutputFolder::create(const Path& path, bool replace)
     for (int attempt = 0; attempt < 100; ++attempt) { // a killed run with the same pid may have left its name
         const Path name = f.path_.parent_path() / unfinished_name();
         const Together created_and_known;
-        if (mkdir(name.c_str(), 0777) == 0) { // the umask decides, as for files
+        if (fs::create_directory(name, error)) { // the umask decides, as for files
             f.temporary_ = name;
             f.unfinished_ = std::make_unique<Unfinished>(name);
             return f;
         }
-        if (errno != EEXIST)
+        if (error)
             break;
     }
     return fail(ErrorCode::bad_input, "cannot create a folder in {}: {}", quote_path(f.path_.parent_path()),
-                std::error_code(errno, std::generic_category()).message());
+                error ? error.message() : "a file of each name is there");
 }
 
 OutputFolder::OutputFolder(OutputFolder&& other) noexcept

@@ -5,23 +5,20 @@
 #include "engine/job/version.h"
 #include "runtime/base/diagnostics.h"
 #include "runtime/base/file.h"
+#include "runtime/base/process.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/interrupt.h"
 #include "tools/cli/option_facts.h"
 #include "tools/cli/print_stderr.h"
 #include "tools/cli/value_options.h"
 
-#include <cerrno>
 #include <CLI/CLI.hpp>
-#include <csignal>
 #include <cstdio>
-#include <cstring>
-#include <fcntl.h>
 #include <iostream>
 #include <new>
 #include <optional>
 #include <system_error>
-#include <unistd.h>
+#include <vector>
 
 namespace semrover {
 
@@ -30,16 +27,6 @@ namespace {
 void print_diagnostic(void*, const char* line)
 {
     print_stderr("{}\n", line);
-}
-
-// A descriptor that the caller closed would be that of the next file we open, and messages would go there.
-void fill_standard_streams()
-{
-    // note: standard output is opened for reading, so that writing to it fails as it does on a closed one
-    for (const auto& [fd, flags] :
-         {std::pair{STDIN_FILENO, O_RDONLY}, {STDOUT_FILENO, O_RDONLY}, {STDERR_FILENO, O_WRONLY}})
-        if (fcntl(fd, F_GETFD) < 0 && errno == EBADF)
-            (void)!open("/dev/null", flags); // gets the lowest number that is free, which is fd
 }
 
 void add_globals(CLI::App& app, Globals& globals)
@@ -85,27 +72,25 @@ int report_output()
 
 // This command belongs to another program of ours, which lies beside this one and takes the same command line. Returns
 // only if that program cannot be started.
-Status run_neighbour(const Command& command, char** argv)
+Status run_neighbour(const Command& command, const std::vector<std::string>& words)
 {
-    std::error_code error;
-    Path program = std::filesystem::read_symlink("/proc/self/exe", error);
-    program.replace_filename(command.program);
-    block_signals(); // what comes from here on reaches that program; what came before would be forgotten
+    const Path program = system::own_program().replace_filename(command.program);
+    system::hold_stop_requests(); // what comes from here on reaches that program; what came before would be forgotten
     if (interrupt_requested())
         return fail(ErrorCode::interrupted, "interrupted");
-    execv(program.c_str(), argv);
+    const int error = system::become(program, words);
     return fail(ErrorCode::bad_input, "{} is run by {}, which cannot be started ({}): {}", command.name,
-                quote_path(program), std::strerror(errno),
+                quote_path(program), system::message_of(error),
                 command.advice ? command.advice : "cmake --build --preset release --target programs builds it");
 }
 
-void add_neighbour(CLI::App& app, const Command& command, char** argv, Run& run)
+void add_neighbour(CLI::App& app, const Command& command, const std::vector<std::string>& words, Run& run)
 {
     CLI::App* c = app.add_subcommand(command.name, command.help);
     c->prefix_command(); // what follows is the other program's
     c->fallthrough(false);
     c->set_help_flag();
-    c->callback([&command, argv, &run] { run = Run([&command, argv] { return run_neighbour(command, argv); }); });
+    c->callback([&command, &words, &run] { run = Run([&command, &words] { return run_neighbour(command, words); }); });
 }
 
 // an empty text is a variable that was not set, in a script: it names no file and means nothing
@@ -138,10 +123,10 @@ int show_help(const CLI::App& app, const CLI::ParseError& request)
 }
 
 // the exit code of a command line that names nothing to run: help, or a mistake
-std::optional<int> parse(CLI::App& app, int argc, char** argv, const Run& run)
+std::optional<int> parse(CLI::App& app, const std::vector<std::string>& words, const Run& run)
 {
     try {
-        app.parse(argc, argv);
+        app.parse(std::vector(words.rbegin(), words.rend() - 1)); // the last first, without the program's name
     } catch (const CLI::ParseError& e) {
         if (e.get_exit_code() == 0)
             return show_help(app, e);
@@ -160,14 +145,15 @@ constexpr int kMostDevices = 3; // that are lost, before the error stands
 // nothing thrown by the standard library or fmt leaves the program without a line and a code
 int run_program(int argc, char** argv, std::initializer_list<Command> commands)
 {
-    fill_standard_streams();
-    std::signal(SIGPIPE, SIG_IGN); // a reader that is gone is an error of the write
+    system::prepare_streams();
     set_diagnostic_callback(print_diagnostic);
-    watch_signals();
+    watch_interrupts();
     try {
+        const std::vector<std::string> words = system::arguments(argc, argv);
         CLI::App app("turn a semantic voxel grid into a coloured 3D street scene, and drive a camera rig through it",
                      "semrover");
         app.set_version_flag("--version", kProgram);
+        app.allow_windows_style_options(false); // a path may begin with a slash
         app.fallthrough(); // global options may follow the subcommand
         Globals globals;
         add_globals(app, globals);
@@ -176,9 +162,9 @@ int run_program(int argc, char** argv, std::initializer_list<Command> commands)
             if (command.add)
                 command.add(app, globals, run);
             else
-                add_neighbour(app, command, argv, run);
+                add_neighbour(app, command, words, run);
         refuse_empty_values(app);
-        if (const std::optional<int> code = parse(app, argc, argv, run))
+        if (const std::optional<int> code = parse(app, words, run))
             return *code;
         Status status = run.work();
         for (int lost = 1;

@@ -2,11 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/cli/progress.h"
 
+#include "runtime/base/process.h"
+
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
-#include <unistd.h>
 
 namespace semrover {
 
@@ -47,7 +48,7 @@ ProgressOutput progress_to_stderr(const Globals& globals)
         std::fwrite(text.data(), 1, text.size(), stderr);
         std::fflush(stderr);
     };
-    return {progress_style(globals, isatty(STDERR_FILENO) != 0), seconds, write};
+    return {progress_style(globals, system::standard_error_is_terminal()), seconds, write};
 }
 
 Progress::Progress(ProgressOutput output, std::string stage, std::string unit, uint64_t total, uint64_t done)

@@ -229,7 +229,7 @@ class StagingFolder {
             if (entry.is_regular_file())
                 files.push_back(entry.path().lexically_relative(path_));
         for (const Path& file : files)
-            if (!error && file.filename().native().starts_with("diffusion_pytorch_model"))
+            if (!error && file.filename().string().starts_with("diffusion_pytorch_model"))
                 remove_weights(out_ / file.parent_path(), error);
         for (const Path& file : files) {
             if (!error)
@@ -244,7 +244,7 @@ class StagingFolder {
         std::vector<Path> old;
         std::error_code ignored; // the folder need not exist
         for (const auto& entry : fs::directory_iterator(folder, ignored))
-            if (entry.path().filename().native().starts_with("diffusion_pytorch_model") ||
+            if (entry.path().filename().string().starts_with("diffusion_pytorch_model") ||
                 entry.path().filename() == kAdapterFile)
                 old.push_back(entry.path());
         for (const Path& path : old)

@@ -3,6 +3,7 @@
 // semrover doctor: one page on what works here, what is missing and how to get it
 #include "engine/job/version.h"
 #include "runtime/base/json.h"
+#include "runtime/base/process.h"
 #include "runtime/device/driver_gaps.h"
 #include "runtime/device/loader.h"
 #include "runtime/device/pipeline.h"
@@ -13,8 +14,6 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdlib>
-#include <sstream>
-#include <unistd.h>
 
 namespace semrover {
 
@@ -33,8 +32,10 @@ Finding loader_finding(const LoaderSummary& loader)
     return {"Vulkan loader", !loader.api.empty(), loader.api.empty() ? "does not answer" : loader.api, "libvulkan1"};
 }
 
-Finding driver_finding(const LoaderSummary& loader)
+Finding driver_finding(const LoaderSummary& loader, bool works)
 {
+    if (loader.drivers.empty() && works) // Windows keeps them in its registry
+        return {"Vulkan drivers", true, "known to the loader", ""};
     if (loader.drivers.empty())
         return {"Vulkan drivers", false, "none installed", "mesa-vulkan-drivers"};
     return {"Vulkan drivers", true, fmt::format("{}", fmt::join(loader.drivers, " ")), ""};
@@ -69,19 +70,9 @@ Finding cache_finding(Device& device)
     return {"pipeline cache", true, fmt::format("{}, {}", file, missing ? "not written yet" : bytes_text(bytes)), ""};
 }
 
-bool on_path(const char* program)
-{
-    const char* path = std::getenv("PATH");
-    std::stringstream folders(path ? path : "");
-    for (std::string folder; std::getline(folders, folder, ':');)
-        if (::access((Path(folder) / program).c_str(), X_OK) == 0)
-            return true;
-    return false;
-}
-
 Finding ffmpeg_finding()
 {
-    const bool found = on_path("ffmpeg");
+    const bool found = system::on_path("ffmpeg");
     return {"ffmpeg", found, found ? "found" : "--video needs it", "ffmpeg"};
 }
 
@@ -102,7 +93,7 @@ void print_page(const std::vector<Finding>& findings)
         if (!f.ok && !f.package.empty() && packages.find(f.package) == std::string::npos)
             packages += " " + f.package;
     }
-    if (!packages.empty())
+    if (!packages.empty() && system::on_path("apt-get"))
         fmt::print("to mend it: apt-get install{}\n", packages);
 }
 
@@ -121,8 +112,8 @@ Status doctor(const Globals& globals)
 {
     const LoaderSummary loader = describe_loader();
     const auto device = open_device(globals);
-    std::vector<Finding> findings{loader_finding(loader), driver_finding(loader), validation_finding(loader),
-                                  device_finding(device, globals.device)};
+    std::vector<Finding> findings{loader_finding(loader), driver_finding(loader, device.has_value()),
+                                  validation_finding(loader), device_finding(device, globals.device)};
     for (Finding& gap : gap_findings(loader))
         findings.push_back(std::move(gap));
     if (device)

@@ -8,7 +8,7 @@
 #include "engine/job/version.h"
 #include "engine/splat/splat_scene.h"
 #include "runtime/base/hash.h"
-#include "runtime/base/host_memory.h"
+#include "runtime/base/process.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/option_facts.h"
@@ -372,7 +372,7 @@ Result<Json> TilesRun::write()
     results["cells"] = tiles.cell_count();
     results["metres"] = length_of(track_);
     results["seconds"] = seconds_now() - begun_;
-    results["peak_host_bytes"] = host_memory().peak;
+    results["peak_host_bytes"] = system::host_memory().peak;
     return results;
 }
 

@@ -196,7 +196,7 @@ Result<std::optional<SafetensorsSet>> open_weights(const Path& folder)
     if (files.empty() && !pickle)
         return std::optional<SafetensorsSet>();
     const bool diffusers = std::ranges::any_of(
-        files, [](const Path& file) { return file.filename().native().starts_with("diffusion_pytorch_model"); });
+        files, [](const Path& file) { return file.filename().string().starts_with("diffusion_pytorch_model"); });
     if (files.empty() || diffusers) {
         SR_TRY(SafetensorsSet set, SafetensorsSet::open_folder(folder));
         return std::optional(std::move(set));

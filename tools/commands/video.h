@@ -3,11 +3,11 @@
 #pragma once
 
 #include "runtime/base/file.h"
+#include "runtime/base/process.h"
 
-#include <cstdio>
+#include <memory>
 #include <span>
 #include <string>
-#include <sys/types.h>
 
 namespace semrover {
 
@@ -28,8 +28,7 @@ class Video {
     Video() = default;
 
     Path path_, temporary_;
-    pid_t child_ = -1;
-    int input_ = -1;
+    std::unique_ptr<system::Process> child_; // while ffmpeg runs
     std::unique_ptr<Unfinished> unfinished_;
 };
 

@@ -30,7 +30,7 @@ struct PackedFolder {
 
 bool is_temporary(const Path& file)
 {
-    return file.filename().native().starts_with(".semrover-") && file.extension() == ".tmp";
+    return file.filename().string().starts_with(".semrover-") && file.extension() == ".tmp";
 }
 
 Status add_file(const Path& path, std::string relative, const std::string& key_prefix, PackedFolder& found)

@@ -70,7 +70,7 @@ Result<Path> DriveInput::color(size_t picture) const
     const DriveRecord::Picture& p = record.pictures[picture];
     std::vector<Path> missing;
     for (const Path& kind : {camera_folder(folder / "frames", p.camera), camera_folder(folder, p.camera) / "color"}) {
-        SR_TRY(Path found, find_picture(kind.parent_path(), kind.filename().c_str(), p.number));
+        SR_TRY(Path found, find_picture(kind.parent_path(), kind.filename().string().c_str(), p.number));
         if (is_file(found))
             return found;
         missing.push_back(std::move(found));

@@ -10,11 +10,8 @@
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
-#include <csignal>
 #include <cstring>
-#include <fcntl.h>
 #include <random>
-#include <unistd.h>
 
 namespace semrover {
 
@@ -48,7 +45,7 @@ std::optional<AttemptName> parse_name(const std::string& name)
 bool is_known_dead(const Path& attempt)
 {
     const auto name = parse_name(attempt.filename().string());
-    return name && name->host == host_name() && name->pid > 0 && ::kill(pid_t(name->pid), 0) != 0 && errno == ESRCH;
+    return name && name->host == host_name() && name->pid > 0 && system::process_is_gone(name->pid);
 }
 
 // a hard link, or a copy where the file system has none
@@ -90,15 +87,6 @@ void take_run(const Path& from, const Path& to)
         (void)take_file(file, to / file.lexically_relative(from));
 }
 
-void flush_folder(const Path& folder)
-{
-    const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (fd < 0)
-        return;
-    (void)::fsync(fd);
-    ::close(fd);
-}
-
 double seconds_since_change(const Path& folder)
 {
     std::error_code error;
@@ -130,7 +118,7 @@ Result<Attempt> Attempt::create(const Path& out, const std::string& key)
 {
     std::random_device random;
     const uint64_t number = uint64_t(random()) << 32 | random();
-    Attempt attempt(out, fmt::format("{}.{}.{}.{}", key, host_name(), ::getpid(), hash_text(number)));
+    Attempt attempt(out, fmt::format("{}.{}.{}.{}", key, host_name(), system::process_number(), hash_text(number)));
     SR_CHECK(make_folder(attempt.folder_));
     return attempt;
 }
@@ -205,7 +193,7 @@ Result<Attempt::Published> Attempt::publish(const std::string& name, const std::
     const Path to = out_ / name;
     SR_CHECK(make_folder(to.parent_path()));
     const int failed = system::rename_surely(files_, to);
-    flush_folder(to.parent_path());
+    (void)system::flush_folder(to.parent_path());
     const auto there = read_manifest(to);
     std::error_code ignored;
     if (there && there->attempt == name_) {

@@ -2,20 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/run/command_options.h"
 
+#include "runtime/base/process.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/option_facts.h"
 #include "tools/cli/value_options.h"
 
+#include <array>
 #include <CLI/CLI.hpp>
-#include <csignal>
-#include <cstdio>
-#include <cstring>
-#include <fcntl.h>
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
-extern char** environ;
+#include <span>
 
 namespace semrover {
 
@@ -31,67 +25,40 @@ void add_task_commands(CLI::App& app, const Globals& globals, Run& run)
     add_refine(app, globals, run);
 }
 
-struct Child {
-    pid_t pid = -1;
-    int output = -1; // what it prints; -1: it goes to standard error
-};
-
-Result<Child> spawn_scenes(const std::vector<std::string>& arguments, bool read_output)
+Result<system::Process> start_scenes(std::vector<std::string> arguments, system::Process::Pipe pipe)
 {
-    std::error_code error;
-    Path file = std::filesystem::read_symlink("/proc/self/exe", error);
-    file.replace_filename(kScenesProgram);
-    std::vector<std::string> words{"semrover"};
-    words.insert(words.end(), arguments.begin(), arguments.end());
-    std::vector<char*> argv;
-    for (std::string& word : words)
-        argv.push_back(word.data());
-    argv.push_back(nullptr);
-    int ends[2] = {-1, -1};
-    if (read_output && ::pipe2(ends, O_CLOEXEC) != 0)
-        return fail(ErrorCode::bad_input, "cannot make a pipe: {}", std::strerror(errno));
-    posix_spawn_file_actions_t actions;
-    posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_adddup2(&actions, read_output ? ends[1] : STDERR_FILENO, STDOUT_FILENO);
-    Child child{.output = ends[0]};
-    const int failed = posix_spawn(&child.pid, file.c_str(), &actions, nullptr, argv.data(), environ);
-    posix_spawn_file_actions_destroy(&actions);
-    if (read_output)
-        ::close(ends[1]);
-    if (!failed)
-        return child;
-    if (read_output)
-        ::close(ends[0]);
-    return fail(ErrorCode::bad_input,
-                "{} cannot be started ({}): cmake --build --preset release --target programs "
-                "builds it",
-                quote_path(file), std::strerror(failed));
+    const Path file = system::own_program().replace_filename(kScenesProgram);
+    arguments.insert(arguments.begin(), "semrover");
+    auto child = system::Process::start(file, arguments, pipe);
+    if (!child)
+        return fail(ErrorCode::bad_input,
+                    "{} cannot be started ({}): cmake --build --preset release --target programs "
+                    "builds it",
+                    quote_path(file), system::message_of(child.error()));
+    return std::move(*child);
 }
 
-Status wait_for(const Child& child)
+Status wait_for(system::Process& child)
 {
-    int status = 0;
-    while (::waitpid(child.pid, &status, 0) < 0)
-        if (errno != EINTR)
-            return fail(ErrorCode::bad_input, "cannot wait for {}: {}", kScenesProgram, std::strerror(errno));
-    if (WIFEXITED(status) && WEXITSTATUS(status) == 0)
+    const int code = child.wait();
+    if (code == 0)
         return {};
-    if (WIFEXITED(status))
-        return fail(ErrorCode(WEXITSTATUS(status)), "{} ended with code {}", kScenesProgram, WEXITSTATUS(status));
-    return fail(ErrorCode::interrupted, "{} was ended by signal {}", kScenesProgram, WTERMSIG(status));
+    if (code > 128)
+        return fail(ErrorCode::interrupted, "{} was ended by signal {}", kScenesProgram, code - 128);
+    return fail(ErrorCode(code), "{} ended with code {}", kScenesProgram, code);
 }
 
 Result<Json> facts_of_neighbour(const char* command)
 {
-    SR_TRY(const Child child, spawn_scenes({command, "--help", "--json"}, true));
+    SR_TRY(system::Process child, start_scenes({command, "--help", "--json"}, system::Process::Pipe::output));
     std::string text;
-    char bytes[4096];
-    for (ssize_t n; (n = ::read(child.output, bytes, sizeof bytes)) != 0;)
-        if (n > 0)
-            text.append(bytes, size_t(n));
-        else if (errno != EINTR)
+    std::array<char, 4096> bytes;
+    for (;;) {
+        const auto n = child.pipe.read(std::as_writable_bytes(std::span(bytes)));
+        if (!n || *n == 0)
             break;
-    ::close(child.output);
+        text.append(bytes.data(), *n);
+    }
     SR_CHECK(wait_for(child));
     return parse_json(text, kScenesProgram);
 }
@@ -247,7 +214,7 @@ Status run_command(const std::vector<std::string>& arguments, const Globals& glo
 
 Status run_scenes_command(const std::vector<std::string>& arguments)
 {
-    SR_TRY(const Child child, spawn_scenes(arguments, false));
+    SR_TRY(system::Process child, start_scenes(arguments, system::Process::Pipe::none));
     return wait_for(child);
 }
 

@@ -4,13 +4,13 @@
 
 #include "engine/format/transforms.h"
 #include "runtime/base/host_name.h"
+#include "runtime/base/system.h"
 #include "tools/commands/trajectory_options.h"
 #include "tools/run/command_options.h"
 #include "tools/run/task_runner.h"
 
 #include <algorithm>
 #include <CLI/CLI.hpp>
-#include <unistd.h>
 
 namespace semrover {
 
@@ -91,7 +91,7 @@ class Trial {
         : job_(job), tasks_(tasks), globals_(globals)
     {
         trial_ = job;
-        trial_.out = job.out / ".work" / fmt::format("trial-{}-{}", host_name(), ::getpid());
+        trial_.out = job.out / ".work" / fmt::format("trial-{}-{}", host_name(), system::process_number());
     }
     ~Trial()
     {

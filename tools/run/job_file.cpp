@@ -7,10 +7,9 @@
 #include "runtime/base/quote.h"
 #include "tools/cli/value_options.h"
 #include "tools/run/command_options.h"
+#include "tools/run/wildcard.h"
 
 #include <algorithm>
-#include <fnmatch.h>
-#include <glob.h>
 #include <set>
 
 namespace semrover {
@@ -284,16 +283,13 @@ Status JobReader::add_files(const JobValue& table, std::string_view key, JobScen
         if (!is_file(objects))
             return refuse(*table.find("objects"), fmt::format("'objects': {} is not there", quote(objects)));
     }
-    glob_t found{};
-    const int none = ::glob(resolve(pattern).c_str(), 0, nullptr, &found);
-    const std::vector<std::string> files(found.gl_pathv, found.gl_pathv + (none ? 0 : found.gl_pathc));
-    ::globfree(&found);
+    const std::vector<Path> files = paths_like(resolve(pattern));
     if (files.empty())
         return refuse(at, fmt::format("{}: no file is {}", quote(key), quote_path(resolve(pattern))));
     if (!name.empty() && files.size() > 1)
         return refuse(*table.find("name"), fmt::format("'name': {} files have one name", files.size()));
-    for (const std::string& file : files) {
-        std::string own = Path(file).filename().string();
+    for (const Path& file : files) {
+        std::string own = file.filename().string();
         own = name.empty() ? own.substr(0, own.find('.')) : name;
         std::error_code error;
         const uint64_t bytes = fs::is_directory(file, error) ? 0 : fs::file_size(file, error);
@@ -368,7 +364,7 @@ Status JobReader::check_paths(const JobValue& at, const JobDrive& drive) const
 {
     bool any = false;
     for (const JobScene& scene : job_.scenes) {
-        if (!drive.scenes.empty() && ::fnmatch(drive.scenes.c_str(), scene.name.c_str(), 0) != 0)
+        if (!drive.scenes.empty() && !matches(drive.scenes, scene.name))
             continue;
         any = true;
         if (drive.made && scene.source != JobScene::Source::street)

@@ -4,9 +4,9 @@
 
 #include "engine/job/version.h"
 #include "runtime/base/hash.h"
+#include "tools/run/wildcard.h"
 
 #include <algorithm>
-#include <fnmatch.h>
 #include <queue>
 
 namespace semrover {
@@ -20,7 +20,7 @@ constexpr std::string_view kWithoutEffect[] = {"--batch", "--threads"};
 
 bool leads_through(const JobDrive& drive, const JobScene& scene)
 {
-    return drive.scenes.empty() || ::fnmatch(drive.scenes.c_str(), scene.name.c_str(), 0) == 0;
+    return drive.scenes.empty() || matches(drive.scenes, scene.name);
 }
 
 // Largest first, each to the part that has least

@@ -17,6 +17,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstring>
+#include <fmt/chrono.h>
 #include <thread>
 
 namespace semrover {
@@ -44,12 +45,7 @@ void append_device(std::vector<std::string>& line, const Globals& globals)
 
 std::string utc_now()
 {
-    const std::time_t now = std::time(nullptr);
-    std::tm parts{};
-    (void)::gmtime_r(&now, &parts);
-    char text[32];
-    (void)std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &parts);
-    return text;
+    return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
 }
 
 Path run_state(const Task& task)
