@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/base/host_name.h"
+#include "runtime/system/host_name.h"
 #include "tests/child_program.h"
 #include "tests/jpeg_file.h"
 #include "tests/json_text.h"

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/base/file.h"
 
-#include "runtime/base/host_name.h"
 #include "runtime/base/quote.h"
+#include "runtime/system/host_name.h"
 #include "tests/says.h"
 #include "tests/scratch_folder.h"
 

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/capi/gl_link.h"
 
-#include "runtime/base/system.h"
+#include "runtime/system/system.h"
 
 #include <algorithm>
 

@@ -4,8 +4,8 @@
 
 #include "runtime/base/memory_files.h"
 #include "runtime/base/quote.h"
-#include "runtime/base/system.h"
 #include "runtime/base/text_start.h"
+#include "runtime/system/system.h"
 
 #include <algorithm>
 #include <cerrno>

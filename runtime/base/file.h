@@ -3,8 +3,8 @@
 #pragma once
 
 #include "runtime/base/result.h"
-#include "runtime/base/system.h"
 #include "runtime/base/unfinished.h"
+#include "runtime/system/system.h"
 
 #include <cstddef>
 #include <cstdint>

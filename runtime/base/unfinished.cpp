@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/base/unfinished.h"
 
-#include "runtime/base/host_name.h"
-#include "runtime/base/system.h"
+#include "runtime/system/host_name.h"
+#include "runtime/system/system.h"
 
 #include <atomic>
 #include <charconv>

@@ -4,8 +4,8 @@
 
 #include "runtime/base/file.h"
 #include "runtime/base/hash.h"
-#include "runtime/base/system.h"
 #include "runtime/device/device.h"
+#include "runtime/system/system.h"
 
 #include <algorithm>
 #include <array>

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // semrover bench world: a flight down a street without end that grows ahead of the camera, a budget at a time
 #include "engine/world/world.h"
-#include "runtime/base/process.h"
+#include "runtime/system/process.h"
 #include "tools/bench/bench.h"
 #include "tools/bench/call_times.h"
 #include "tools/cli/open_device.h"

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/cli/interrupt.h"
 
-#include "runtime/base/process.h"
 #include "runtime/base/result.h"
 #include "runtime/base/unfinished.h"
+#include "runtime/system/process.h"
 #include "tools/cli/print_stderr.h"
 
 #include <atomic>

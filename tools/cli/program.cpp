@@ -5,8 +5,8 @@
 #include "engine/job/version.h"
 #include "runtime/base/diagnostics.h"
 #include "runtime/base/file.h"
-#include "runtime/base/process.h"
 #include "runtime/base/quote.h"
+#include "runtime/system/process.h"
 #include "tools/cli/interrupt.h"
 #include "tools/cli/option_facts.h"
 #include "tools/cli/print_stderr.h"
@@ -154,7 +154,7 @@ int run_program(int argc, char** argv, std::initializer_list<Command> commands)
                      "semrover");
         app.set_version_flag("--version", kProgram);
         app.allow_windows_style_options(false); // a path may begin with a slash
-        app.fallthrough(); // global options may follow the subcommand
+        app.fallthrough();                      // global options may follow the subcommand
         Globals globals;
         add_globals(app, globals);
         Run run;

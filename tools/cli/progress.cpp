@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/cli/progress.h"
 
-#include "runtime/base/process.h"
+#include "runtime/system/process.h"
 
 #include <chrono>
 #include <cmath>

@@ -3,10 +3,10 @@
 // semrover doctor: one page on what works here, what is missing and how to get it
 #include "engine/job/version.h"
 #include "runtime/base/json.h"
-#include "runtime/base/process.h"
 #include "runtime/device/driver_gaps.h"
 #include "runtime/device/loader.h"
 #include "runtime/device/pipeline.h"
+#include "runtime/system/process.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/print_stderr.h"

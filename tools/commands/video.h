@@ -3,7 +3,7 @@
 #pragma once
 
 #include "runtime/base/file.h"
-#include "runtime/base/process.h"
+#include "runtime/system/process.h"
 
 #include <memory>
 #include <span>

@@ -3,9 +3,9 @@
 #include "tools/run/attempt.h"
 
 #include "runtime/base/hash.h"
-#include "runtime/base/host_name.h"
 #include "runtime/base/quote.h"
-#include "runtime/base/system.h"
+#include "runtime/system/host_name.h"
+#include "runtime/system/system.h"
 
 #include <algorithm>
 #include <cerrno>

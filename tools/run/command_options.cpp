@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/run/command_options.h"
 
-#include "runtime/base/process.h"
 #include "runtime/base/quote.h"
+#include "runtime/system/process.h"
 #include "tools/cli/option_facts.h"
 #include "tools/cli/value_options.h"
 

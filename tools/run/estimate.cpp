@@ -3,8 +3,8 @@
 #include "tools/run/estimate.h"
 
 #include "engine/format/transforms.h"
-#include "runtime/base/host_name.h"
-#include "runtime/base/system.h"
+#include "runtime/system/host_name.h"
+#include "runtime/system/system.h"
 #include "tools/commands/trajectory_options.h"
 #include "tools/run/command_options.h"
 #include "tools/run/task_runner.h"

@@ -4,9 +4,9 @@
 
 #include "engine/voxfield/voxfield_model.h"
 #include "runtime/base/hash.h"
-#include "runtime/base/host_name.h"
 #include "runtime/base/quote.h"
-#include "runtime/base/system.h"
+#include "runtime/system/host_name.h"
+#include "runtime/system/system.h"
 #include "tools/cli/interrupt.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/print_stderr.h"
@@ -293,7 +293,8 @@ Status TaskRunner::seal(const Task& task, const Attempt& attempt, Manifest manif
     for (const char* name : kState)
         fs::remove_all(attempt.work() / name, error);
     if (const int failed = system::rename_surely(attempt.work(), attempt.files()))
-        return fail(ErrorCode::bad_input, "cannot rename {}: {}", quote_path(attempt.work()), system::message_of(failed));
+        return fail(ErrorCode::bad_input, "cannot rename {}: {}", quote_path(attempt.work()),
+                    system::message_of(failed));
     return {};
 }
 

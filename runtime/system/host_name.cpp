@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/base/host_name.h"
+#include "runtime/system/host_name.h"
 
-#include "runtime/base/system.h"
+#include "runtime/system/system.h"
 
 #include <algorithm>
 #include <cctype>

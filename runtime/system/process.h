@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "runtime/base/system.h"
+#include "runtime/system/system.h"
 
 #include <optional>
 #include <vector>

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #ifndef _WIN32
-#include "runtime/base/process.h"
+#include "runtime/system/process.h"
 
 #include <cerrno>
 #include <csignal>
