@@ -8,6 +8,8 @@ include(CMakePackageConfigHelpers)
 set_target_properties(semrover_c PROPERTIES EXPORT_NAME semrover)
 target_include_directories(semrover_c INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
 install(TARGETS semrover_c EXPORT semrover COMPONENT library
+    RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT library
+    ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library
     LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT library)
 install(DIRECTORY tools/host DESTINATION ${CMAKE_INSTALL_DATADIR}/semrover COMPONENT library)
 install(FILES engine/semrover.h engine/semrover_draw.h engine/semrover_renderer.h engine/semrover_vulkan.h engine/semrover_gl.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT library)

@@ -1,15 +1,41 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-# `cpack -G DEB` in a build folder where everything is built: packages of the program, the library, and what programs
-# need to be built against it. Places are Debian's, below /usr.
+# `cpack` in a build folder where everything is built: an archive to unpack anywhere, with the programs, the library,
+# headers, sample hosts, the Python package and the default model. -G DEB: Debian's packages of these, without the model.
+set(CPACK_PACKAGE_NAME semrover)
+set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})
+set(CPACK_PACKAGE_CONTACT "semrover authors")
+set(CPACK_STRIP_FILES ON)
+set(CPACK_COMPONENTS_GROUPING ALL_COMPONENTS_IN_ONE)
+set(CPACK_ARCHIVE_COMPONENT_INSTALL ON)
+set(CPACK_COMPONENTS_ALL library archive)
+
+set(packed_programs semrover semrover-eval semrover-scenes)
+if(TARGET semrover-view)
+    list(APPEND packed_programs semrover-view)
+    set_target_properties(semrover-view PROPERTIES INSTALL_RPATH "$ORIGIN/../lib")
+endif()
+install(TARGETS ${packed_programs} DESTINATION bin COMPONENT archive EXCLUDE_FROM_ALL)
+install(DIRECTORY assets/model DESTINATION share/semrover COMPONENT archive EXCLUDE_FROM_ALL)
+install(FILES assets/scenes/street.semantic.sgrid assets/scenes/street.tum DESTINATION share/semrover COMPONENT archive EXCLUDE_FROM_ALL)
+install(DIRECTORY tools/python/semrover tools/python/examples DESTINATION share/semrover/python
+    COMPONENT archive EXCLUDE_FROM_ALL PATTERN "__pycache__" EXCLUDE)
+install(FILES LICENSE DESTINATION . COMPONENT archive EXCLUDE_FROM_ALL)
+if(WIN32)
+    set(CPACK_GENERATOR ZIP)
+    set(CPACK_SYSTEM_NAME windows-x86_64)
+    include(CPack)
+    return()
+endif()
+set(CPACK_GENERATOR TGZ)
+set(CPACK_SYSTEM_NAME linux-${CMAKE_SYSTEM_PROCESSOR})
+set(CPACK_PROJECT_CONFIG_FILE ${CMAKE_CURRENT_SOURCE_DIR}/cmake/package_debian.cmake)
+
+# ---- Debian's: places below /usr
 set(debian_libdir lib/${CMAKE_LIBRARY_ARCHITECTURE})
 set(debian_cmake ${debian_libdir}/cmake/semrover)
 
-set(debian_programs semrover semrover-eval semrover-scenes)
-if(TARGET semrover-view)
-    list(APPEND debian_programs semrover-view)
-endif()
-install(TARGETS ${debian_programs} DESTINATION bin COMPONENT deb_program EXCLUDE_FROM_ALL)
+install(TARGETS ${packed_programs} DESTINATION bin COMPONENT deb_program EXCLUDE_FROM_ALL)
 install(DIRECTORY tools/cluster DESTINATION share/semrover USE_SOURCE_PERMISSIONS
     COMPONENT deb_program EXCLUDE_FROM_ALL)
 
@@ -37,15 +63,7 @@ foreach(package "program;semrover" "library;libsemrover0" "development;libsemrov
     set(CPACK_DEBIAN_${variable}_FILE_NAME DEB-DEFAULT)
 endforeach()
 
-set(CPACK_GENERATOR DEB)
-set(CPACK_PACKAGE_NAME semrover)
-set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})
-set(CPACK_PACKAGE_CONTACT "semrover authors")
-set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
-set(CPACK_STRIP_FILES ON)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
-set(CPACK_COMPONENTS_GROUPING IGNORE)
-set(CPACK_COMPONENTS_ALL deb_program deb_library deb_development deb_python)
 
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${CMAKE_BINARY_DIR}) # where libsemrover.so is

@@ -96,19 +96,21 @@ TEST(MeshTextures, a_texture_is_found_by_its_last_name_and_in_any_case_beside_th
         folder.put("scene/m.mtl", "newmtl wall\nmap_Kd " + name + "\n");
         return read_mesh(folder.put("scene/m.obj", square("m.mtl")));
     };
+    const bool any_case = std::filesystem::exists(folder / "scene/TEX.PNG"); // of the disk, as on Windows
     for (const char* name : {"C:\\Users\\me\\Desktop\\tex.png", "/home/me/tex.png", "../tex.png", "TEX.png",
                              "textures/Tex.PNG", "maps\\wall.png"}) {
         const auto m = with(name);
         ASSERT_TRUE(m) << m.error().message;
         EXPECT_EQ(m->textures.size(), 1u) << name;
-        EXPECT_TRUE(warns(*m, "is taken")) << name;
+        EXPECT_TRUE(any_case || warns(*m, "is taken")) << name;
     }
     EXPECT_TRUE(with("tex.png")->warnings.empty());
     EXPECT_TRUE(says(with("../outside.png"), "refers to '../outside.png', expected a file within its own folder"));
     EXPECT_TRUE(says(with("D:\\none.png"), "expected a file within its own folder; put the file beside the mesh"));
     EXPECT_TRUE(says(with("wall.png"), "which is missing")); // not beside the mesh
-    std::filesystem::create_symlink(folder / "outside.png", folder / "scene" / "link.png");
-    EXPECT_TRUE(says(with("LINK.png"), "leads out of its folder"));
+    if (folder.link("scene/link.png", folder / "outside.png")) {
+        EXPECT_TRUE(says(with("LINK.png"), "leads out of its folder"));
+    }
 }
 
 TEST(MeshTextures, a_mesh_can_be_read_without_textures_that_are_missing_or_broken)

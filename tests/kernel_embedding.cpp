@@ -3,6 +3,7 @@
 #include "tests/kernel_case.h"
 
 #include <cmath>
+#include <numbers>
 
 namespace semrover {
 namespace kernel_embedding_test {
@@ -101,7 +102,7 @@ TEST(kernel_sinusoid, is_right_around_every_multiple_of_a_quarter_turn)
     std::vector<float> x;
     for (int quarter = -640; quarter <= 640; ++quarter)
         for (float near : {-1e-3f, -1e-6f, 0.f, 1e-6f, 1e-3f})
-            x.push_back(float(quarter * M_PI_2) + near);
+            x.push_back(float(quarter * std::numbers::pi / 2) + near);
     const HostMatrix got = k.run(sinusoid(k.graph, k.input(x), k.input(std::vector<float>{1}), false, DType::f32));
     for (uint32_t r = 0; r < x.size(); ++r) {
         ASSERT_NEAR(got.at(r, 0), std::sin(double(x[r])), 1e-6) << "sin " << x[r];

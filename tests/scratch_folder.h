@@ -22,6 +22,9 @@ class ScratchFolder {
     // writes `text` to `name` and returns its path
     std::filesystem::path put(std::string_view name, std::string_view text) const;
 
+    // false: not on Windows, where a process needs a right to make links
+    bool link(std::string_view name, const std::filesystem::path& target) const;
+
     size_t entries() const;
 
   private:

@@ -67,13 +67,13 @@ std::vector<std::string> picture_folders(const std::set<std::string>& cameras)
     std::vector<std::string> folders;
     for (const std::string& camera : cameras) {
         for (const char* kind : kPictures)
-            folders.push_back((camera_folder("", camera) / kind).string());
+            folders.push_back((camera_folder("", camera) / kind).generic_string());
         for (const char* kind : kArrays)
-            folders.push_back((camera_folder("", camera) / kind).string());
+            folders.push_back((camera_folder("", camera) / kind).generic_string());
         if (!camera.empty())
-            folders.push_back((camera_folder("", camera) / kSweepPoints).string());
+            folders.push_back((camera_folder("", camera) / kSweepPoints).generic_string());
         for (const char* kind : {kInstances, kFlow, kFlowStates})
-            folders.push_back((camera_folder("", camera) / kind).string());
+            folders.push_back((camera_folder("", camera) / kind).generic_string());
     }
     return folders;
 }
@@ -163,7 +163,7 @@ Result<std::unique_ptr<DrawingStore>> DrawingStore::open(const Path& folder, con
         contents.results.insert(contents.results.end(), {kBoxesName, kObjectsName});
     for (const std::string& camera : cameras)
         if (!camera.empty())
-            contents.results.push_back((camera_folder("", camera) / kSweepsName).string());
+            contents.results.push_back((camera_folder("", camera) / kSweepsName).generic_string());
     SR_TRY(RunFolder run, open_run(folder, with_cameras, replace, contents, true));
     return std::unique_ptr<DrawingStore>(new DrawingStore(std::move(run), path, files));
 }
@@ -189,7 +189,7 @@ std::vector<Path> DrawingStore::files_of(const std::string& piece) const
         return {run_.path() / kTop};
     const Path name = run_.path() / piece;
     if (std::ranges::count(piece, '/') == 2) // sweep_name()
-        return {name.string() + fmt::format(".{}", kLidarEndings[size_t(files_.lidar)])};
+        return {name.generic_string() + fmt::format(".{}", kLidarEndings[size_t(files_.lidar)])};
     std::vector<Path> files;
     for (const std::string kind : kPictures) {
         const std::string_view extension = kind == "color"   ? files_.encoding.color_extension()

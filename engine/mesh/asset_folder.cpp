@@ -33,7 +33,7 @@ std::optional<Path> relative_path(std::string_view name)
     const std::string text = with_slashes(name);
     const Path relative = text;
     const bool climbs = std::ranges::find(relative, Path("..")) != relative.end();
-    if (text.empty() || relative.is_absolute() || climbs || text.find('\0') != std::string::npos ||
+    if (text.empty() || relative.has_root_path() || climbs || text.find('\0') != std::string::npos ||
         (text.size() > 1 && text[1] == ':'))
         return std::nullopt;
     return relative;

@@ -160,7 +160,7 @@ Status check_order(const ShardIndex& index, std::string_view file)
 bool leads_inside(const std::string& path)
 {
     const Path p(path);
-    return !path.empty() && path.find('\0') == std::string::npos && p.is_relative() && p == p.lexically_normal() &&
+    return !path.empty() && path.find('\0') == std::string::npos && !p.has_root_path() && p == p.lexically_normal() &&
            p.has_filename() && *p.begin() != ".." && p != "." && p != kShardIndexName && !is_shard_name(path);
 }
 
@@ -207,7 +207,7 @@ std::optional<ShardPicture> shard_picture(std::string_view path)
     if (!moment || ending.size() > 16 || !is_ending || folders.empty() || folders.size() > 3 ||
         !std::ranges::all_of(folders, is_camera_name))
         return std::nullopt;
-    ShardPicture picture{*moment, Path(path).parent_path().string(), "", "", std::string(ending)};
+    ShardPicture picture{*moment, Path(path).parent_path().generic_string(), "", "", std::string(ending)};
     if (folders.size() > 1 && folders[0] == "buffers")
         folders.erase(folders.begin());
     if (folders[0] == "frames" || folders[0] == "latents") {
@@ -216,7 +216,7 @@ std::optional<ShardPicture> shard_picture(std::string_view path)
     } else {
         picture.kind = folders.back();
         folders.pop_back();
-        picture.group = Path(picture.group).parent_path().string();
+        picture.group = Path(picture.group).parent_path().generic_string();
     }
     if (folders.size() > 1 || picture.kind.find('.') != std::string::npos) // else front.color would be front's color
         return std::nullopt;

@@ -68,7 +68,7 @@ MemoryFolder::~MemoryFolder()
 Status MemoryFolder::add(std::string_view path, std::span<const std::byte> bytes)
 {
     const Path inner = Path(path).lexically_normal();
-    if (path.empty() || inner.is_absolute() || *inner.begin() == ".." || !inner.has_filename() || inner == ".")
+    if (path.empty() || inner.has_root_path() || *inner.begin() == ".." || !inner.has_filename() || inner == ".")
         return fail(ErrorCode::usage, "a file in memory has the path {}, expected one below its folder",
                     quote_path(path));
     AllFiles& all = all_files();

@@ -148,6 +148,13 @@ void remove_file(const Path& file)
     ::unlink(file.c_str());
 }
 
+int copy_file(const Path& from, const Path& to)
+{
+    std::error_code error;
+    std::filesystem::copy_file(from, to, std::filesystem::copy_options::overwrite_existing, error);
+    return error.value();
+}
+
 int rename_surely(const Path& from, const Path& to)
 {
     struct stat before, after;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cwchar>
 #include <fcntl.h>
 #include <io.h>
 #include <limits>
@@ -196,6 +197,11 @@ void remove_file(const Path& file)
     ::DeleteFileW(file.c_str());
 }
 
+int copy_file(const Path& from, const Path& to)
+{
+    return ::CopyFileW(from.c_str(), to.c_str(), FALSE) ? 0 : last_error();
+}
+
 // A virus scanner or an indexer may have either open for a moment.
 int rename_surely(const Path& from, const Path& to)
 {
@@ -250,4 +256,44 @@ void close_descriptor(int descriptor)
 }
 
 } // namespace semrover::system
+
+// In place of the C library's (-Wl,--wrap=mbrtowc): narrow text of a path is UTF-8 here, as path::string() makes it,
+// and whatever the code page. libstdc++ takes it apart with this: one UTF-16 unit a call, of a character outside the
+// first plane the second from its last byte.
+extern "C" size_t __wrap_mbrtowc(wchar_t* to, const char* from, size_t bytes, std::mbstate_t* state);
+extern "C" size_t __wrap_mbrtowc(wchar_t* to, const char* from, size_t bytes, std::mbstate_t* state)
+{
+    constexpr size_t kInvalid = size_t(-1), kTooShort = size_t(-2);
+    if (bytes == 0)
+        return kTooShort;
+    if (*state) {
+        *to = wchar_t(std::exchange(*state, 0));
+        return 1;
+    }
+    const auto byte = [&](size_t i) { return uint32_t(static_cast<unsigned char>(from[i])); };
+    const uint32_t first = byte(0);
+    const size_t size = first < 0x80   ? 1
+                        : first < 0xc2 ? 0
+                        : first < 0xe0 ? 2
+                        : first < 0xf0 ? 3
+                        : first < 0xf5 ? 4
+                                       : 0;
+    if (size == 0)
+        return kInvalid;
+    uint32_t character = size == 1 ? first : first & (0x7f >> size);
+    for (size_t i = 1; i < size; ++i) {
+        if (i == bytes)
+            return kTooShort;
+        if ((byte(i) & 0xc0) != 0x80)
+            return kInvalid;
+        character = character << 6 | (byte(i) & 0x3f);
+    }
+    if (size < 4) {
+        *to = wchar_t(character);
+        return character ? size : 0;
+    }
+    *to = wchar_t(0xd7c0 + (character >> 10));
+    *state = 0xdc00 | (character & 0x3ff);
+    return 3;
+}
 #endif

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
 """The Python package against the program and the C headers. Variables: SEMROVER, the program; SEMROVER_LIBRARY; MODEL,
-a small one of points; RENDERER, a small one of frames; PYTHONPATH: of the package"""
+a small one of points; RENDERER, a small one of frames"""
 import ctypes
 import gc
 import json

@@ -2,18 +2,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/scratch_folder.h"
 
-#include <cstdlib>
 #include <fstream>
 #include <iterator>
+#include <random>
 
 namespace semrover {
 
 ScratchFolder::ScratchFolder()
 {
-    std::string name = (std::filesystem::temp_directory_path() / "semrover-test-XXXXXX").string();
-    if (!mkdtemp(name.data()))
-        std::abort();
-    path_ = name;
+    std::random_device random;
+    do
+        path_ = std::filesystem::temp_directory_path() / ("semrover-test-" + std::to_string(random()));
+    while (!std::filesystem::create_directory(path_));
 }
 
 ScratchFolder::~ScratchFolder()
@@ -26,6 +26,16 @@ std::filesystem::path ScratchFolder::put(std::string_view name, std::string_view
     std::filesystem::path file = path_ / name;
     std::ofstream(file, std::ios::binary).write(text.data(), static_cast<std::streamsize>(text.size()));
     return file;
+}
+
+bool ScratchFolder::link([[maybe_unused]] std::string_view name,
+                         [[maybe_unused]] const std::filesystem::path& target) const
+{
+#ifndef _WIN32
+    std::filesystem::create_symlink(target, path_ / name);
+    return true;
+#endif
+    return false;
 }
 
 size_t ScratchFolder::entries() const

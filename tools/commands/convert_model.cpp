@@ -139,7 +139,7 @@ Status plan_copies(const Path& in, Conversion& plan)
         if (!is_there(in / file))
             continue;
         plan.copies[file] = in / file;
-        const std::string component = Path(file).parent_path().string();
+        const std::string component = Path(file).parent_path().generic_string();
         if (index.is_object() && index.contains(component))
             plan.index[component] = index[component];
     }

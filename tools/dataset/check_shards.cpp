@@ -76,7 +76,7 @@ class MissingPictures {
         for (const Shard& shard : index_.shards)
             for (const ShardMember& member : shard.members) {
                 const ShardPicture name = *shard_picture(member.path);
-                visit(name.moment, Slot{Path(member.path).parent_path().string(), name.group, name.ending});
+                visit(name.moment, Slot{Path(member.path).parent_path().generic_string(), name.group, name.ending});
             }
     }
 

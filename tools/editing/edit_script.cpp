@@ -130,7 +130,7 @@ Result<EditOperation> parse_operation(const Json& json, const Path& folder, std:
     SR_TRY(const std::string stamp, text_of(json, "stamp", where));
     if (!stamp.empty()) {
         // a script may come from elsewhere, and what it names is read
-        const Path given = stamp, path = given.is_absolute() ? given.lexically_relative(folder) : given;
+        const Path given = stamp, path = given.has_root_path() ? given.lexically_relative(folder) : given;
         if (path.empty() || std::ranges::find(path, "..") != path.end())
             return fail(ErrorCode::bad_input, "{}: stamp: expected a file in the script's folder, found {}", where,
                         quote(stamp));

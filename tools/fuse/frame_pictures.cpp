@@ -116,7 +116,7 @@ Status check_count(const std::vector<FramePictures>& pictures, const Path& poses
 Result<Path> path_inside(const Path& folder, std::string_view text, std::string_view where)
 {
     const Path relative = Path(text).lexically_normal();
-    if (text.empty() || text.find('\0') != std::string::npos || relative.is_absolute() || *relative.begin() == "..")
+    if (text.empty() || text.find('\0') != std::string::npos || relative.has_root_path() || *relative.begin() == "..")
         return fail(ErrorCode::bad_input, "{}: expected a path inside the folder, found {}", where, quote(text));
     return folder / relative;
 }

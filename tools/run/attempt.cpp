@@ -54,9 +54,7 @@ bool take_file(const Path& from, const Path& to)
     std::error_code error;
     fs::create_directories(to.parent_path(), error);
     fs::create_hard_link(from, to, error);
-    if (error)
-        fs::copy_file(from, to, fs::copy_options::overwrite_existing, error);
-    return !error;
+    return !error || system::copy_file(from, to) == 0;
 }
 
 bool is_state(const std::string& name)
@@ -78,7 +76,7 @@ void take_run(const Path& from, const Path& to)
         if (is_state(name)) {
             std::error_code ignored;
             fs::create_directories(target.parent_path(), ignored);
-            fs::copy_file(i->path(), target, fs::copy_options::overwrite_existing, ignored);
+            (void)system::copy_file(i->path(), target);
         } else {
             files.push_back(i->path());
         }

@@ -19,7 +19,7 @@ constexpr const char* kFormat = "semrover.manifest";
 bool stays_inside(const std::string& path)
 {
     const Path normal = Path(path).lexically_normal();
-    return !path.empty() && normal.is_relative() && *normal.begin() != ".." && normal == Path(path);
+    return !path.empty() && !normal.has_root_path() && *normal.begin() != ".." && normal == Path(path);
 }
 
 } // namespace
@@ -76,7 +76,7 @@ Result<std::vector<Manifest::File>> list_contents(const Path& folder, std::span<
         }
         if (i->is_symlink(error) || (!i->is_regular_file(error) && !i->is_directory(error)))
             return fail(ErrorCode::bad_input, "{}: neither a file nor a folder", quote_path(i->path()));
-        const std::string path = i->path().lexically_relative(folder).string();
+        const std::string path = i->path().lexically_relative(folder).generic_string();
         if (i->is_directory(error) || path == kName)
             continue;
         SR_TRY(const uint64_t hash, hash_file(i->path()));

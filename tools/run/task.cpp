@@ -61,7 +61,7 @@ Result<std::string> hash_tree(const Path& path)
     Hash all;
     for (const Path& file : files) {
         SR_TRY(const uint64_t one, hash_file(file));
-        all.add(file.lexically_relative(path).string());
+        all.add(file.lexically_relative(path).generic_string());
         all.add(hash_text(one));
     }
     return hash_text(all.value());
@@ -128,7 +128,7 @@ Result<Json> TaskKeys::options_json(const std::vector<JobOption>& options)
         if (std::ranges::count(kWithoutEffect, option))
             continue;
         values[option] = value;
-        if (value.starts_with('/') && is_file(value)) {
+        if (Path(value).is_absolute() && is_file(value)) {
             SR_TRY(values[option], hash(value));
         }
     }
@@ -144,7 +144,7 @@ Result<Json> TaskKeys::scene_json(const JobScene& scene)
     if (!scene.file.empty()) {
         SR_TRY(labels, hash(scene.file));
     }
-    if (objects.starts_with('/')) {
+    if (Path(objects).is_absolute()) {
         SR_TRY(objects, hash(objects));
     }
     return Json{{"model", model},   {"generate", generate}, {"streets", streets},
