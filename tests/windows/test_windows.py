@@ -210,4 +210,4 @@ class Programs(WithFolder):
 
 
 if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1], verbosity=2)
+    unittest.main(argv=sys.argv[:1] + [w for w in sys.argv[3:] if w != "--library"], verbosity=2)
