@@ -111,6 +111,7 @@ int main(int argc, char** argv)
     using namespace semrover;
     Options o;
     CLI::App app("write a deferred renderer with random weights");
+    app.allow_windows_style_options(false);
     app.add_option("OUT", o.out, "folder, or .safetensors file for --layout ldm")->required();
     app.add_option("--config", o.unet, "the UNet's config.json, or a golden layout")->required();
     app.add_option("--vae", o.vae, "the VAE's")->required();

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cwchar>
 #include <fcntl.h>
 #include <io.h>
@@ -295,5 +296,42 @@ extern "C" size_t __wrap_mbrtowc(wchar_t* to, const char* from, size_t bytes, st
     *to = wchar_t(0xd7c0 + (character >> 10));
     *state = 0xdc00 | (character & 0x3ff);
     return 3;
+}
+
+// Likewise: mingw-w64's round up what lies just below a half, so that bytes of pictures were others than elsewhere.
+// What is cut off is exact.
+namespace {
+
+template <typename Real>
+Real rounded(Real x)
+{
+    const Real whole = std::trunc(x);
+    return std::abs(x - whole) >= Real(0.5) ? whole + std::copysign(Real(1), x) : whole;
+}
+
+} // namespace
+
+extern "C" double __wrap_round(double x);
+extern "C" double __wrap_round(double x)
+{
+    return rounded(x);
+}
+
+extern "C" float __wrap_roundf(float x);
+extern "C" float __wrap_roundf(float x)
+{
+    return rounded(x);
+}
+
+extern "C" long __wrap_lround(double x);
+extern "C" long __wrap_lround(double x)
+{
+    return long(rounded(x));
+}
+
+extern "C" long __wrap_lroundf(float x);
+extern "C" long __wrap_lroundf(float x)
+{
+    return long(rounded(x));
 }
 #endif
