@@ -8,6 +8,7 @@ set(CPACK_PACKAGE_CONTACT "semrover authors")
 set(CPACK_STRIP_FILES ON)
 set(CPACK_COMPONENTS_GROUPING ALL_COMPONENTS_IN_ONE)
 set(CPACK_ARCHIVE_COMPONENT_INSTALL ON)
+set(CPACK_COMPONENT_INCLUDE_TOPLEVEL_DIRECTORY ON)
 set(CPACK_COMPONENTS_ALL library archive)
 
 set(packed_programs semrover semrover-eval semrover-scenes)

@@ -2,7 +2,7 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
 # Makes Debian packages, looks at what they say and hold, unpacks them beside each other, runs the program there, and
-# builds a host against what is there. Without dpkg's tools it says so.
+# builds a host against what is there; likewise the archive. Without dpkg's tools it says so.
 # packages.sh CPACK CMAKE BUILD HOST.c
 set -eu
 cpack=$1 cmake=$2 build=$3 source=$4
@@ -67,11 +67,28 @@ LD_LIBRARY_PATH=$pc/.. && export LD_LIBRARY_PATH
 "$folder/root/usr/bin/semrover" bench --help >/dev/null # of another program beside it
 test ! -x "$build/semrover-view" || "$folder/root/usr/bin/semrover" view --help >/dev/null
 PYTHONPATH=$folder/root/usr/lib/python3/dist-packages /usr/bin/python3 -B -c 'import semrover; semrover.Context().close()'
-mkdir "$folder/host"
-cp "$here/CMakeLists.txt" "$folder/host"
-cp "$source" "$folder/host/host.c"
-"$cmake" -S "$folder/host" -B "$folder/build" -DCMAKE_PREFIX_PATH="$folder/root/usr" >"$folder/configure.log"
-"$cmake" --build "$folder/build" >"$folder/build.log" || { cat "$folder/build.log"; exit 1; }
-"$folder/build/host" 2>&1 | grep usage
+host_against() { # PREFIX
+    mkdir -p "$folder/host"
+    cp "$here/CMakeLists.txt" "$folder/host"
+    cp "$source" "$folder/host/host.c"
+    rm -rf "$folder/build"
+    "$cmake" -S "$folder/host" -B "$folder/build" -DCMAKE_PREFIX_PATH="$1" >"$folder/configure.log"
+    "$cmake" --build "$folder/build" >"$folder/build.log" || { cat "$folder/build.log"; exit 1; }
+    "$folder/build/host" 2>&1 | grep usage
+}
+host_against "$folder/root/usr"
 cc -std=c99 -o "$folder/by_hand" "$source" $(PKG_CONFIG_PATH=$pc pkg-config --cflags --libs semrover)
 "$folder/by_hand" 2>&1 | grep usage
+
+# the archive, which finds its own library
+unset LD_LIBRARY_PATH
+(cd "$build" && "$cpack" -G TGZ -B "$folder/tar") >"$folder/cpack.log" 2>&1 || { cat "$folder/cpack.log"; exit 1; }
+tar -xzf "$folder/tar/semrover-$version-linux-$(uname -m).tar.gz" -C "$folder/tar"
+unpacked=$folder/tar/semrover-$version-linux-$(uname -m)
+"$unpacked/bin/semrover" --version
+"$unpacked/bin/semrover" bench --help >/dev/null
+test ! -x "$build/semrover-view" || "$unpacked/bin/semrover" view --help >/dev/null
+"$unpacked/bin/semrover" inspect "$unpacked/share/semrover/model" >/dev/null
+PYTHONPATH=$unpacked/share/semrover/python SEMROVER_LIBRARY=$unpacked/lib/libsemrover.so.0 \
+    /usr/bin/python3 -B -c 'import semrover; semrover.Context().close()'
+host_against "$unpacked"
