@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/mesh/asset_folder.h"
 
+#include "runtime/base/inner_path.h"
 #include "runtime/base/quote.h"
 
 #include <algorithm>
@@ -33,8 +34,7 @@ std::optional<Path> relative_path(std::string_view name)
     const std::string text = with_slashes(name);
     const Path relative = text;
     const bool climbs = std::ranges::find(relative, Path("..")) != relative.end();
-    if (text.empty() || relative.has_root_path() || climbs || text.find('\0') != std::string::npos ||
-        (text.size() > 1 && text[1] == ':'))
+    if (!leads_inside(text) || climbs || (text.size() > 1 && text[1] == ':'))
         return std::nullopt;
     return relative;
 }

@@ -5,6 +5,7 @@
 #include "engine/format/label_map.h"
 #include "engine/mesh/texture_atlas.h"
 #include "runtime/base/quote.h"
+#include "runtime/base/star_pattern.h"
 
 #include <algorithm>
 #include <functional>
@@ -46,27 +47,14 @@ std::string folded_text(std::string_view text)
     return out;
 }
 
-// '*' stands for any text; greedy with one point to come back to, so that it takes no more than size times size
+// '*' stands for any text
 bool matches(std::string_view pattern, std::string_view text)
 {
-    size_t p = 0, t = 0, star = std::string_view::npos, resume = 0;
-    while (t < text.size()) {
-        if (p < pattern.size() && pattern[p] == '*') {
-            star = p++;
-            resume = t;
-        } else if (p < pattern.size() && pattern[p] == text[t]) {
-            ++p;
-            ++t;
-        } else if (star != std::string_view::npos) {
-            p = star + 1;
-            t = ++resume;
-        } else {
-            return false;
-        }
-    }
-    while (p < pattern.size() && pattern[p] == '*')
-        ++p;
-    return p == pattern.size();
+    return matches_stars(pattern, text, [](std::string_view& rest, char c) {
+        const bool same = rest[0] == c;
+        rest.remove_prefix(1);
+        return same;
+    });
 }
 
 // The numbers of a label texture become classes, as the map says, or kNoLabel; colours of classes stay what they are.

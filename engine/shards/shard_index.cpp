@@ -5,6 +5,7 @@
 #include "engine/camera/camera.h"
 #include "engine/shards/ustar.h"
 #include "runtime/base/hash.h"
+#include "runtime/base/inner_path.h"
 #include "runtime/base/json_fields.h"
 #include "runtime/base/quote.h"
 
@@ -157,11 +158,11 @@ Status check_order(const ShardIndex& index, std::string_view file)
     return {};
 }
 
-bool leads_inside(const std::string& path)
+bool is_member_path(const std::string& path)
 {
     const Path p(path);
-    return !path.empty() && path.find('\0') == std::string::npos && !p.has_root_path() && p == p.lexically_normal() &&
-           p.has_filename() && *p.begin() != ".." && p != "." && p != kShardIndexName && !is_shard_name(path);
+    return leads_inside(path) && p == p.lexically_normal() && p.has_filename() && p != "." && p != kShardIndexName &&
+           !is_shard_name(path);
 }
 
 Status read_files(const Json& json, ShardIndex& index, std::string_view file)
@@ -170,7 +171,7 @@ Status read_files(const Json& json, ShardIndex& index, std::string_view file)
     for (const Json& row : json) {
         const std::string place = fmt::format("{}: file {}", file, index.files.size());
         SR_TRY(ShardMember member, read_row(row, false, place));
-        if (!leads_inside(member.path) || shard_picture(member.path))
+        if (!is_member_path(member.path) || shard_picture(member.path))
             return wrong(place, "expected the path of another file inside the folder, found {}", quote(member.path));
         if (!index.files.empty() && member.path <= index.files.back().path)
             return wrong(place, "{} is behind {}, expected files in order, each once", quote(member.path),

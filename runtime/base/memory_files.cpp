@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/base/memory_files.h"
 
+#include "runtime/base/inner_path.h"
 #include "runtime/base/quote.h"
 
 #include <atomic>
@@ -68,7 +69,7 @@ MemoryFolder::~MemoryFolder()
 Status MemoryFolder::add(std::string_view path, std::span<const std::byte> bytes)
 {
     const Path inner = Path(path).lexically_normal();
-    if (path.empty() || inner.has_root_path() || *inner.begin() == ".." || !inner.has_filename() || inner == ".")
+    if (!leads_inside(path) || !inner.has_filename() || inner == ".")
         return fail(ErrorCode::usage, "a file in memory has the path {}, expected one below its folder",
                     quote_path(path));
     AllFiles& all = all_files();

@@ -52,7 +52,6 @@ class Process {
     Process(Process&& other) noexcept : pipe(std::move(other.pipe)), id_(std::exchange(other.id_, 0)) {}
     Process& operator=(Process&&) = delete;
     ~Process(); // ends it
-    explicit operator bool() const { return id_ != 0; }
 
     int64_t id() const { return id_; }
     static void kill(int64_t id); // at once

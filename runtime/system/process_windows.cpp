@@ -32,11 +32,6 @@ BOOL WINAPI on_control(DWORD event)
     return TRUE;
 }
 
-std::string utf8(const wchar_t* text)
-{
-    return Path(text).string();
-}
-
 // as CommandLineToArgvW takes it apart
 std::wstring command_line(const std::vector<std::string>& words)
 {
@@ -114,7 +109,7 @@ std::vector<std::string> arguments(int, char**)
     wchar_t** const words = ::CommandLineToArgvW(::GetCommandLineW(), &count);
     std::vector<std::string> found;
     for (int i = 0; words && i < count; ++i)
-        found.push_back(utf8(words[i]));
+        found.push_back(Path(words[i]).string());
     ::LocalFree(words);
     return found;
 }

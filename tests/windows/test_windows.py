@@ -1,8 +1,7 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""What is built for Windows, under Wine, beside the same of this machine, on the same driver: test_windows.py LINUX_BUILD
-WINDOWS_BUILD [--library]. With --library nothing of the programs."""
-import ctypes
+"""What is built for Windows, under Wine, beside the same of this machine, on the same driver: test_windows.py
+LINUX_BUILD WINDOWS_BUILD [--library]. With --library nothing of the programs."""
 import importlib.util
 import os
 import pathlib
@@ -20,7 +19,8 @@ LINUX, WINDOWS = (pathlib.Path(p).resolve() for p in sys.argv[1:3])
 LIBRARY_ONLY = "--library" in sys.argv[3:]
 os.environ["LC_ALL"] = "C.UTF-8"  # else Wine takes what it is called with for Latin-1
 os.environ["SEMROVER"] = "unused"  # by the class below, which runs other programs here
-sys.path.insert(0, str(SOURCES / "tests/slurm"))
+sys.path[:0] = [str(SOURCES / "tests/abi"), str(SOURCES / "tests/slurm")]
+import structures  # noqa: E402
 from small_job import SmallJob, write_labels  # noqa: E402
 
 MODEL = SOURCES / "tests/golden/sampling_ddpm/model"
@@ -73,18 +73,10 @@ class Library(WithFolder):
         spec = importlib.util.spec_from_file_location("abi", SOURCES / "tools/python/semrover/_abi.py")
         abi = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(abi)
-        kinds = [k for k in vars(abi).values()
-                 if isinstance(k, type) and issubclass(k, ctypes.Structure) and k is not ctypes.Structure]
-        self.assertGreater(len(kinds), 20)
-        checks = []
-        for kind in kinds:
-            name = kind.__name__
-            checks.append(f"_Static_assert(sizeof({name}) == {ctypes.sizeof(kind)}, \"{name}\");")
-            checks += [f"_Static_assert(offsetof({name}, {f}) == {getattr(kind, f).offset}, \"{name}.{f}\");"
-                       for f, *_ in kind._fields_]
         source = self.folder / "sizes.c"
-        source.write_text('#include "semrover.h"\n#include <stddef.h>\n' + "\n".join(checks) + "\n")
-        run_well([MINGW + "gcc-posix", "-std=c11", "-I", SOURCES / "engine", "-c", source, "-o", self.folder / "sizes.o"])
+        source.write_text(structures.checks(abi))
+        run_well([MINGW + "gcc-posix", "-std=c11", "-I", SOURCES / "engine", "-c", source, "-o",
+                  self.folder / "sizes.o"])
 
     def test_the_example_draws_the_same_picture(self):
         scene = SOURCES / "assets/scenes/street.semantic.sgrid"

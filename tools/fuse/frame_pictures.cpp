@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/fuse/frame_pictures.h"
 
+#include "runtime/base/inner_path.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
 
@@ -115,10 +116,9 @@ Status check_count(const std::vector<FramePictures>& pictures, const Path& poses
 
 Result<Path> path_inside(const Path& folder, std::string_view text, std::string_view where)
 {
-    const Path relative = Path(text).lexically_normal();
-    if (text.empty() || text.find('\0') != std::string::npos || relative.has_root_path() || *relative.begin() == "..")
+    if (!leads_inside(text))
         return fail(ErrorCode::bad_input, "{}: expected a path inside the folder, found {}", where, quote(text));
-    return folder / relative;
+    return folder / Path(text).lexically_normal();
 }
 
 Path with_ending(Path picture)

@@ -3,6 +3,7 @@
 #include "tools/run/manifest.h"
 
 #include "runtime/base/hash.h"
+#include "runtime/base/inner_path.h"
 #include "runtime/base/quote.h"
 
 #include <algorithm>
@@ -18,8 +19,7 @@ constexpr const char* kFormat = "semrover.manifest";
 
 bool stays_inside(const std::string& path)
 {
-    const Path normal = Path(path).lexically_normal();
-    return !path.empty() && !normal.has_root_path() && *normal.begin() != ".." && normal == Path(path);
+    return leads_inside(path) && Path(path).lexically_normal() == Path(path);
 }
 
 } // namespace

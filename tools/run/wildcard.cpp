@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/run/wildcard.h"
 
+#include "runtime/base/star_pattern.h"
+
 #include <algorithm>
 #include <optional>
 
@@ -50,29 +52,9 @@ bool take_one(std::string_view& pattern, char c)
 
 } // namespace
 
-// greedy with one point to come back to, so that it takes no more than size times size
 bool matches(std::string_view pattern, std::string_view text)
 {
-    std::optional<std::string_view> after_star;
-    std::string_view from;
-    while (!text.empty()) {
-        if (pattern.starts_with('*')) {
-            pattern.remove_prefix(1);
-            after_star = pattern;
-            from = text;
-            continue;
-        }
-        if (!pattern.empty() && take_one(pattern, text[0])) {
-            text.remove_prefix(1);
-            continue;
-        }
-        if (!after_star)
-            return false;
-        pattern = *after_star;
-        from.remove_prefix(1);
-        text = from;
-    }
-    return pattern.find_first_not_of('*') == pattern.npos;
+    return matches_stars(pattern, text, take_one);
 }
 
 std::vector<Path> paths_like(const Path& pattern)
