@@ -132,7 +132,7 @@ class Programs(WithFolder):
             run_well([*start, "--quiet", "render", out / "out.sgrid", "-o", out / "frames", "--path",
                       self.folder / "ahead.tum", "--width", 56, "--height", 40])
             run_well([*start, "--quiet", "refine", out / "frames", "-o", out / "refined", "-m",
-                      LINUX / "tests/capi_renderer", "--steps", 2])
+                      WINDOWS / "tests/capi_renderer", "--steps", 2])
         names = [sorted(p.relative_to(folder) for p in folder.rglob("*.*") if p.suffix in (".sgrid", ".png"))
                  for folder in folders.values()]
         self.assertEqual(names[0], names[1])
