@@ -1,9 +1,15 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
 
-# <folder>/<op>[.<variant>].comp -> SPIR-V -> <build>/generated/<op>.spv.h, one header per op with all its variants. Debian
-# 12's compiler does not know cooperative matrices: SPIR-V of .coopmat variants lies in shaders/spirv (tools/dev/spirv)
+# <folder>/<op>[.<variant>].comp -> SPIR-V -> <build>/generated/<op>.spv.h, one header per op with all its variants.
+# Compilers before version 14, such as Debian 12's, do not know cooperative matrices: for them SPIR-V of .coopmat variants
+# lies in shaders/spirv (tools/dev/spirv)
 find_program(GLSLANG glslangValidator REQUIRED)
+execute_process(COMMAND ${GLSLANG} --version OUTPUT_VARIABLE glslang_version)
+set(knows_coopmat FALSE)
+if(glslang_version MATCHES "Glslang Version: [0-9]+:([0-9]+)" AND CMAKE_MATCH_1 GREATER_EQUAL 14)
+    set(knows_coopmat TRUE)
+endif()
 set(reflect_sources cmake/reflect/main.cpp cmake/reflect/module.cpp cmake/reflect/protocol.cpp)
 list(TRANSFORM reflect_sources PREPEND ${CMAKE_SOURCE_DIR}/)
 if(CMAKE_CROSSCOMPILING) # it runs here
@@ -35,7 +41,7 @@ function(add_shader_headers target)
         string(REGEX REPLACE "\\.comp$" "" module ${file})
         string(REGEX REPLACE "\\..*$" "" op ${module})
         list(APPEND ops ${op})
-        if(module MATCHES "\\.coopmat$")
+        if(module MATCHES "\\.coopmat$" AND NOT knows_coopmat)
             list(APPEND modules_${op} ${CMAKE_SOURCE_DIR}/shaders/spirv/${module}.spv)
             continue()
         endif()

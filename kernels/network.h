@@ -180,6 +180,9 @@ struct ConvAddends {
                                          Tensor u,    // winograd_weight()
                                          Tensor bias, // [1, N] fp32, or none
                                          const ConvOptions& options = {}, const ConvAddends& addends = {});
+// the same by Winograd's algorithm or by conv2d, channel_shift and add, as the device prefers
+[[nodiscard]] FeatureMap convolution(Graph& g, FeatureMap x, Tensor w, Tensor bias, const ConvOptions& options = {},
+                                     const ConvAddends& addends = {});
 // True where winograd_conv2d fits the device's limits and is expected to be faster than conv2d, although it transforms
 // the weights in every run: on CPUs, as measured on lavapipe. GPUs have more multiplications for a byte and use conv2d.
 [[nodiscard]] bool prefers_winograd(const DeviceLimits& limits, const FeatureMap& x, uint32_t outputs,
@@ -230,6 +233,13 @@ struct FlashAttentionOptions {
                                      Tensor q,  // [batch * query_rows, q_col + heads * head_dim or more]
                                      Tensor kv, // [(batch *) key_rows, ..] with keys and values; may be q itself
                                      const FlashAttentionOptions& options); // [batch * query_rows, heads * head_dim]
+
+// y = softmax(q k^T scale) v of the pixels of each image, one head as wide as q, with q, k and v = x w^T + bias: flash
+// attention, or products, as the device prefers
+[[nodiscard]] FeatureMap image_attention(Graph& g, FeatureMap x,
+                                         Tensor weight, // [3 * dim, C]: of q, k and v
+                                         Tensor bias,   // [1, 3 * dim] fp32
+                                         float scale);  // -> [.., dim]
 
 // y = softmax(scale x) over the first columns of each row; zeros behind them
 struct SoftmaxOptions {

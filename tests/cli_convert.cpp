@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/model/renderer_model.h"
+#include "tests/checkpoint_values.h"
 #include "tests/json_text.h"
 #include "tests/program.h"
 #include "tests/renderer_weights.h"
@@ -23,14 +24,13 @@ void expect_seeded(const Checkpoint& checkpoint, std::span<const TensorSpec> sch
 {
     const Status status = checkpoint.require(schema);
     ASSERT_TRUE(status) << status.error().message;
-    std::vector<float> expected, got;
+    std::vector<float> expected;
     std::vector<std::byte> bytes;
     for (const TensorSpec& spec : schema) {
         random_tensor(1, spec, expected);
         ASSERT_TRUE(encode_floats(expected, dtype, spec.name, bytes));
         to_float(bytes, dtype, expected.data());
-        ASSERT_TRUE(checkpoint.read(spec, got));
-        EXPECT_EQ(got, expected) << spec.name;
+        EXPECT_EQ(values_of(checkpoint, spec), expected) << spec.name;
         EXPECT_EQ(checkpoint.stream(spec).dtype, dtype) << spec.name;
     }
 }
@@ -126,9 +126,9 @@ TEST(CliConvert, asd_init_widens_the_input_with_zeros)
         const auto m = RendererModel::open(folder / "out");
         ASSERT_TRUE(m) << m.error().message;
         EXPECT_EQ(m->unet.in_channels, 13u);
-        std::vector<float> plain, wide;
+        std::vector<float> plain;
         random_tensor(1, {"conv_in.weight", {32, 4, 3, 3}}, plain);
-        ASSERT_TRUE(m->open_unet()->read({"conv_in.weight", {32, 13, 3, 3}}, wide));
+        const std::vector<float> wide = values_of(*m->open_unet(), {"conv_in.weight", {32, 13, 3, 3}});
         for (size_t i = 0; i < wide.size(); ++i) {
             const size_t row = i / (13 * 9), column = i % (13 * 9);
             ASSERT_EQ(wide[i], column < 4 * 9 ? plain[row * 4 * 9 + column] : 0.f) << i;
@@ -164,8 +164,8 @@ TEST(CliConvert, a_single_file_of_stable_video_diffusion_becomes_a_renderer_of_v
     expect_seeded(*m->open_unet(), unet_schema(m->unet), DType::f32);
     EXPECT_EQ(m->scheduler.sampler, Sampler::euler);
     EXPECT_TRUE(m->vae.video);
-    std::vector<float> quant; // the file has none, the folder one that changes nothing
-    ASSERT_TRUE(m->open_vae()->read({"quant_conv.weight", {8, 8, 1, 1}}, quant));
+    // the file has none, the folder one that changes nothing
+    const std::vector<float> quant = values_of(*m->open_vae(), {"quant_conv.weight", {8, 8, 1, 1}});
     for (size_t i = 0; i < quant.size(); ++i)
         EXPECT_EQ(quant[i], i / 8 == i % 8 ? 1.f : 0.f);
     const Json index = *read_json(folder / "plain/model_index.json");
@@ -191,9 +191,9 @@ TEST(CliConvert, vsd_init_keeps_the_images_weights_for_the_buffer_and_adds_visib
         EXPECT_EQ(m->unet.in_channels, 9u);
         EXPECT_EQ(m->defaults.video.window_frames, 12u);
         EXPECT_EQ(m->defaults.video.window_overlap, 4u);
-        std::vector<float> plain, wide;
+        std::vector<float> plain;
         random_tensor(1, {"conv_in.weight", {32, 8, 3, 3}}, plain);
-        ASSERT_TRUE(m->open_unet()->read({"conv_in.weight", {32, 9, 3, 3}}, wide));
+        const std::vector<float> wide = values_of(*m->open_unet(), {"conv_in.weight", {32, 9, 3, 3}});
         for (size_t i = 0; i < wide.size(); ++i) {
             const size_t row = i / (9 * 9), column = i % (9 * 9);
             ASSERT_EQ(wide[i], column < 8 * 9 ? plain[row * 8 * 9 + column] : 0.f) << i;

@@ -201,7 +201,7 @@ TEST(engine_asd, a_network_of_other_channels_is_refused)
 {
     UnetConfig config = unet().config();
     config.in_channels = 4;
-    const auto plain = Unet::plan(config, DType::f16, device().limits());
+    const auto plain = Unet::plan(config, DType::f16);
     const auto refused = AsdRenderer::create(device(), *plain, plan(), {5, text()}, kSize, options());
     ASSERT_FALSE(refused);
     EXPECT_EQ(refused.error().code, ErrorCode::bad_input);

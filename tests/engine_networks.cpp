@@ -63,10 +63,10 @@ double largest_difference(const HostImages& a, const HostImages& b)
 TEST(engine_networks, have_the_parameters_of_stable_diffusion)
 {
     UnetConfig unet;
-    EXPECT_EQ(Unet::plan(unet, DType::f16, {})->parameters(), 859520964u);
+    EXPECT_EQ(Unet::plan(unet, DType::f16)->parameters(), 859520964u);
     unet.in_channels = 13;
-    EXPECT_EQ(Unet::plan(unet, DType::f16, {})->parameters(), 859520964u + 9 * 9 * 320);
-    EXPECT_EQ(Vae::plan({}, DType::f16, {})->parameters(), 83653863u);
+    EXPECT_EQ(Unet::plan(unet, DType::f16)->parameters(), 859520964u + 9 * 9 * 320);
+    EXPECT_EQ(Vae::plan({}, DType::f16)->parameters(), 83653863u);
 }
 
 TEST(engine_networks, decode_the_same_image_in_bands_of_rows)
@@ -221,9 +221,9 @@ TEST(engine_networks, of_videos_have_the_parameters_of_stable_video_diffusion)
         return (*read_json(SEMROVER_SOURCE_DIR "/tests/golden/layouts/" + std::string(name)))["config"];
     };
     const UnetConfig unet = *parse_video_unet_config(config("svd_vsd_unet.json"));
-    EXPECT_EQ(Unet::plan(unet, DType::f16, {})->parameters(), 1524625962u);
+    EXPECT_EQ(Unet::plan(unet, DType::f16)->parameters(), 1524625962u);
     const VaeConfig vae = *parse_video_vae_config(config("svd_vae.json"));
-    EXPECT_EQ(Vae::plan(vae, DType::f16, {})->parameters(), 97742847u);
+    EXPECT_EQ(Vae::plan(vae, DType::f16)->parameters(), 97742847u);
 }
 
 TEST(engine_networks, evaluate_every_video_of_a_batch_alike)

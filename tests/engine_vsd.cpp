@@ -305,9 +305,9 @@ TEST(engine_vsd, refuses_networks_and_options_that_do_not_fit)
     EXPECT_TRUE(says(create(unet(), kAdded, kFrames, options(-1)), "guidance scale -1 is not in 0..1000"));
     UnetConfig config = unet().config();
     config.in_channels = 8;
-    const auto other = Unet::plan(config, DType::f16, device().limits());
+    const auto other = Unet::plan(config, DType::f16);
     EXPECT_TRUE(says(create(*other, kAdded, kFrames, options()), "takes 8 channels, the video renderer gives it 9"));
-    const auto image = Unet::plan({}, DType::f16, device().limits());
+    const auto image = Unet::plan({}, DType::f16);
     EXPECT_TRUE(says(create(*image, kAdded, kFrames, options()), "one of single images"));
 }
 

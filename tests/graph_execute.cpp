@@ -13,12 +13,17 @@ class ExternalMemory {
   public:
     Tensor add(Graph& g, uint32_t rows, uint32_t cols, DType dtype = DType::f32)
     {
-        const uint64_t bytes = uint64_t(rows) * round_up(cols, kRowPadding) * dtype_bytes(dtype);
+        if (next_ == buffers_.size())
+            allocate(uint64_t(rows) * round_up(cols, kRowPadding) * dtype_bytes(dtype), dtype);
+        return g.external(buffers_[next_++]->slice(), rows, cols, dtype, "external");
+    }
+    void again() { next_ = 0; } // the same memory for another graph that asks for the same
+    void allocate(uint64_t bytes, DType dtype)
+    {
         auto buffer = Buffer::create(test_device(), bytes, MemoryKind::device, "test");
         SR_ASSERT(bool(buffer), "{}", buffer.error().message);
         buffers_.push_back(std::move(*buffer));
         dtypes_.push_back(dtype);
-        return g.external(buffers_.back()->slice(), rows, cols, dtype, "external");
     }
     void fill()
     {
@@ -53,13 +58,22 @@ class ExternalMemory {
   private:
     std::vector<std::unique_ptr<Buffer>> buffers_;
     std::vector<DType> dtypes_;
+    size_t next_ = 0;
 };
 
-Plan plan_of(const Graph& g, const DeviceLimits& limits = test_device().limits())
+Plan plan_of(const Graph& g)
 {
-    auto plan = make_plan(g.desc(), limits);
+    auto plan = make_plan(g);
     SR_ASSERT(bool(plan), "{}", plan.error().message);
     return *plan;
+}
+
+Plan random_plan(ExternalMemory& memory, uint32_t seed, const DeviceLimits& limits)
+{
+    memory.again();
+    Graph g(limits);
+    const RandomGraph made(g, seed, [&](uint32_t rows, uint32_t cols) { return memory.add(g, rows, cols); });
+    return plan_of(g);
 }
 
 Bytes run(ExternalMemory& memory, Plan plan, int times = 1)
@@ -94,12 +108,10 @@ TEST(graph_execute, gives_the_same_bytes_as_one_pass_per_submit_without_aliasing
     for (uint32_t seed = 0; seed < 30; ++seed) {
         SCOPED_TRACE(seed);
         ExternalMemory memory;
-        Graph g;
-        const RandomGraph made(g, seed, [&](uint32_t rows, uint32_t cols) { return memory.add(g, rows, cols); });
         DeviceLimits limits = test_device().limits();
         for (bool side_by_side : {false, true}) {
             limits.side_by_side = side_by_side;
-            const Plan plan = plan_of(g, limits);
+            const Plan plan = random_plan(memory, seed, limits);
             EXPECT_LT(plan.levels, plan.passes.size() + 1);
             ASSERT_TRUE(run(memory, plan) == run(memory, one_after_the_other(plan)));
         }
@@ -117,33 +129,38 @@ TEST(graph_execute, gives_the_same_bytes_in_bands_in_parts_and_in_folded_groups)
     for (uint32_t seed = 100; seed < 115; ++seed) {
         SCOPED_TRACE(seed);
         ExternalMemory memory;
-        Graph g;
-        const RandomGraph made(g, seed, [&](uint32_t rows, uint32_t cols) { return memory.add(g, rows, cols); });
-        const Plan cut = plan_of(g, limits);
+        const Plan cut = random_plan(memory, seed, limits), whole = random_plan(memory, seed, test_device().limits());
         submits += cut.submits - 1;
-        bands += uint32_t(cut.passes.size() - plan_of(g).passes.size());
+        bands += uint32_t(cut.passes.size() - whole.passes.size());
         parts += uint32_t(cut.dispatches.size() - cut.passes.size());
-        ASSERT_TRUE(run(memory, plan_of(g)) == run(memory, cut));
+        ASSERT_TRUE(run(memory, whole) == run(memory, cut));
     }
     EXPECT_GT(submits, 100u);
     EXPECT_GT(bands, 5u);
     EXPECT_GT(parts, 100u);
 }
 
+Plan fused_product(ExternalMemory& memory, DType dtype, const DeviceLimits& limits)
+{
+    memory.again();
+    Graph g(limits);
+    const uint32_t rows = 333;
+    const Tensor x = memory.add(g, rows, 72, dtype), w = memory.add(g, 65, 72, dtype), bias = memory.add(g, 1, 65);
+    const Tensor residual = memory.add(g, rows, 65, dtype), out = memory.add(g, rows, 65, dtype);
+    const Tensor y = gelu(g, gemm(g, x, w, bias, {.dtype = dtype}));
+    g.keep(add(g, y, residual), out);
+    return plan_of(g);
+}
+
 TEST(graph_execute, slices_a_gemm_without_changing_a_bit)
 {
+    DeviceLimits limits = test_device().limits();
+    limits.max_storage_range = 32768;
+    limits.max_texel_elements = 32768 / 16;
     for (DType dtype : {DType::f32, DType::f16}) {
         ExternalMemory memory;
-        Graph g;
-        const uint32_t rows = 333;
-        const Tensor x = memory.add(g, rows, 72, dtype), w = memory.add(g, 65, 72, dtype), bias = memory.add(g, 1, 65);
-        const Tensor residual = memory.add(g, rows, 65, dtype), out = memory.add(g, rows, 65, dtype);
-        const Tensor y = gelu(g, gemm(g, x, w, bias, {.dtype = dtype}));
-        g.keep(add(g, y, residual), out);
-        DeviceLimits limits = test_device().limits();
-        limits.max_storage_range = 32768;
-        limits.max_texel_elements = 32768 / 16;
-        const Plan whole = plan_of(g), cut = plan_of(g, limits);
+        const Plan whole = fused_product(memory, dtype, test_device().limits()),
+                   cut = fused_product(memory, dtype, limits);
         ASSERT_EQ(whole.passes.size(), 1u);
         ASSERT_GT(cut.passes.size(), 1u);
         ASSERT_TRUE(run(memory, whole) == run(memory, cut));
@@ -153,7 +170,7 @@ TEST(graph_execute, slices_a_gemm_without_changing_a_bit)
 TEST(graph_execute, replays_a_program_with_the_same_bytes)
 {
     ExternalMemory memory;
-    Graph g;
+    Graph g(test_device().limits());
     Tensor t = memory.add(g, 64, 64);
     const Tensor w = memory.add(g, 64, 64), out = memory.add(g, 64, 64);
     for (int i = 0; i < 4; ++i)
@@ -185,7 +202,7 @@ TEST(graph_execute, cuts_submits_anew_after_the_first_run)
     auto y = Buffer::create(**device, bytes, MemoryKind::device, "y");
     ASSERT_TRUE(x && y);
     ASSERT_TRUE((*device)->write((*x)->slice(), std::as_bytes(std::span(numbers))));
-    Graph g;
+    Graph g((*device)->limits());
     const Tensor w = g.external((*x)->slice(), 256, 256, DType::f32, "x");
     Tensor t = w;
     for (int i = 0; i < 4; ++i)
@@ -213,7 +230,7 @@ TEST(graph_execute, cuts_submits_anew_after_the_first_run)
 TEST(graph_execute, keeps_runs_in_order_that_nobody_waits_for)
 {
     ExternalMemory memory;
-    Graph g;
+    Graph g(test_device().limits());
     const Tensor x = memory.add(g, 8, 64), sum = memory.add(g, 8, 64);
     add(g, sum, x, {sum}); // each run reads what the last one wrote
     memory.fill();
@@ -231,9 +248,7 @@ TEST(graph_execute, uses_exactly_the_memory_that_the_plan_predicts)
 {
     for (uint32_t seed = 300; seed < 310; ++seed) {
         ExternalMemory memory;
-        Graph g;
-        const RandomGraph made(g, seed, [&](uint32_t rows, uint32_t cols) { return memory.add(g, rows, cols); });
-        const Plan plan = plan_of(g);
+        const Plan plan = random_plan(memory, seed, test_device().limits());
         const uint64_t before = test_device().allocated_bytes();
         test_device().reset_peak();
         auto program = Program::create(test_device(), plan);

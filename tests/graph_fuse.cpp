@@ -9,14 +9,14 @@ namespace graph_fuse_test {
 
 // externals of one shape, and ops on them
 struct FuseCase {
-    Graph g;
+    Graph g{test_limits()};
     Tensor x = fake_external(g, 16, 64), w = fake_external(g, 64, 64), residual = fake_external(g, 16, 64);
 
     Tensor product() { return gemm(g, x, w, {}, {.dtype = DType::f32}); }
     Tensor gated(Tensor t, Tensor onto) { return gated_add(g, t, {fake_external(g, 3, 64), fake_array(g, 16)}, onto); }
     std::string levels()
     {
-        auto plan = make_plan(g.desc(), test_limits());
+        auto plan = make_plan(g);
         EXPECT_TRUE(plan) << plan.error().message;
         return plan ? levels_text(*plan) : "";
     }
@@ -121,12 +121,12 @@ TEST(graph_fuse, does_not_let_a_gemm_overwrite_what_its_other_tiles_still_read)
 
 TEST(graph_fuse, cuts_a_fused_pass_in_all_its_bindings_or_not_at_all)
 {
-    Graph g;
-    const Tensor x = fake_external(g, 128, 64), w = fake_external(g, 128, 64), residual = fake_external(g, 128, 64);
-    (void)add(g, gemm(g, x, w, {}, {.groups = 2, .dtype = DType::f32}), residual);
     DeviceLimits limits = test_limits();
     limits.max_storage_range = 16384; // half of each
-    const auto plan = make_plan(g.desc(), limits);
+    Graph g(limits);
+    const Tensor x = fake_external(g, 128, 64), w = fake_external(g, 128, 64), residual = fake_external(g, 128, 64);
+    (void)add(g, gemm(g, x, w, {}, {.groups = 2, .dtype = DType::f32}), residual);
+    const auto plan = make_plan(g);
     ASSERT_FALSE(plan); // two groups lie one after the other: no band of rows serves both
     EXPECT_EQ(plan.error().code, ErrorCode::out_of_memory) << plan.error().message;
 }

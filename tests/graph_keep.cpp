@@ -12,9 +12,9 @@ namespace graph_keep_test {
 struct KeepCase {
     State state;
     Slot x = state.slot(16, 64, DType::f32, "x"), y = state.slot(16, 64, DType::f32, "y");
-    Graph g;
+    Graph g{test_limits()};
 
-    std::string levels() const { return levels_text(*make_plan(g.desc(), test_limits())); }
+    std::string levels() const { return levels_text(*make_plan(g)); }
 };
 
 TEST(graph_keep, a_slot_is_one_resource_of_a_graph_however_often_it_is_asked_for)
@@ -26,7 +26,7 @@ TEST(graph_keep, a_slot_is_one_resource_of_a_graph_however_often_it_is_asked_for
     EXPECT_EQ(part.resource, a.resource);
     EXPECT_EQ(part.offset, 4u * 64 * 4);
     EXPECT_EQ(part.rows, 8u);
-    EXPECT_EQ(c.g.desc().resources.size(), 2u);
+    EXPECT_EQ(c.g.resources().size(), 2u);
     EXPECT_FALSE(Slot().in(c.g).valid());
 }
 
@@ -62,7 +62,7 @@ TEST(graph_keep, what_is_kept_takes_no_memory_of_the_graph_and_may_be_read_on)
     EXPECT_EQ(kept.resource, c.y.in(c.g).resource);
     (void)silu(c.g, made); // by either name
     (void)silu(c.g, kept);
-    const Plan plan = *make_plan(c.g.desc(), test_limits());
+    const Plan plan = *make_plan(c.g);
     EXPECT_EQ(levels_text(plan), "gelu | silu | silu");
     EXPECT_EQ(plan.passes[1].bindings.front().resource, kept.resource);
     EXPECT_EQ(plan.passes[2].bindings.front().resource, kept.resource);
@@ -82,23 +82,23 @@ TEST(graph_keep, a_part_of_a_slot_is_kept_beside_what_another_part_holds)
 {
     State state;
     const Slot both = state.slot(32, 64, DType::f32, "both"), x = state.slot(16, 64, DType::f32, "x");
-    Graph g;
+    Graph g{test_limits()};
     const Tensor lower = silu(g, x.in(g)), upper = gelu(g, both.row_range(0, 16).in(g));
     g.keep(lower, both.row_range(16, 16));
     (void)upper;
-    EXPECT_EQ(levels_text(*make_plan(g.desc(), test_limits())), "silu gelu"); // they touch other rows
+    EXPECT_EQ(levels_text(*make_plan(g)), "silu gelu"); // they touch other rows
 }
 
 TEST(graph_keep, two_externals_of_the_same_memory_are_ordered_too)
 {
-    Graph g;
+    Graph g{test_limits()};
     const BufferSlice memory = fake_memory(16 * 64 * 4);
     const Tensor read = g.external(memory, 16, 64, DType::f32, "read"),
                  written = g.external(memory, 16, 64, DType::f32, "written");
     (void)silu(g, read);
     g.keep(gelu(g, fake_external(g, 16, 64)), written);
-    EXPECT_EQ(levels_text(*make_plan(g.desc(), test_limits())), "silu | gelu");
-    Graph wrong;
+    EXPECT_EQ(levels_text(*make_plan(g)), "silu | gelu");
+    Graph wrong(test_limits());
     const Tensor a = wrong.external(memory, 16, 64, DType::f32, "a"),
                  b = wrong.external(memory, 16, 64, DType::f32, "b");
     const Tensor made = gelu(wrong, fake_external(wrong, 16, 64));

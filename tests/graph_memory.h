@@ -39,9 +39,9 @@ inline Tensor fake_array(Graph& g, uint32_t count, std::string_view name = "arra
     return g.external(fake_memory(uint64_t(count) * 4), count, 1, DType::u32, name, 1);
 }
 
-inline Plan planned(const Graph& g, const DeviceLimits& limits = test_limits())
+inline Plan planned(const Graph& g)
 {
-    auto plan = make_plan(g.desc(), limits);
+    auto plan = make_plan(g);
     EXPECT_TRUE(plan) << plan.error().message;
     return plan ? *plan : Plan{};
 }

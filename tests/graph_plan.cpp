@@ -10,7 +10,7 @@ namespace graph_plan_test {
 
 TEST(graph_plan, puts_no_barrier_between_passes_that_read_the_same)
 {
-    Graph g;
+    Graph g(test_limits());
     const Tensor x = fake_external(g, 16, 64);
     const Tensor a = gelu(g, x), b = silu(g, x), c = gelu(g, x);
     add(g, a, b, {fake_external(g, 16, 64)});
@@ -20,7 +20,7 @@ TEST(graph_plan, puts_no_barrier_between_passes_that_read_the_same)
 
 TEST(graph_plan, lets_independent_branches_share_a_level)
 {
-    Graph g;
+    Graph g(test_limits());
     const Tensor x = fake_external(g, 16, 64), y = fake_external(g, 16, 64), z = fake_external(g, 16, 64);
     const Tensor a = gelu(g, x), b = gelu(g, y), c = silu(g, x);
     add(g, a, b, {z});
@@ -30,7 +30,7 @@ TEST(graph_plan, lets_independent_branches_share_a_level)
 
 TEST(graph_plan, orders_a_write_after_the_reads_before_it)
 {
-    Graph g;
+    Graph g(test_limits());
     const Tensor x = fake_external(g, 16, 64), y = fake_external(g, 16, 64);
     (void)gelu(g, x);
     add(g, y, y, {x});
@@ -40,7 +40,7 @@ TEST(graph_plan, orders_a_write_after_the_reads_before_it)
 
 TEST(graph_plan, orders_writes_to_the_same_bytes_and_not_to_different_rows)
 {
-    Graph g;
+    Graph g(test_limits());
     const Tensor x = fake_external(g, 16, 64), y = fake_external(g, 32, 64);
     add(g, x, x, {y, 0});
     add(g, x, x, {y, 16});
@@ -51,7 +51,7 @@ TEST(graph_plan, orders_writes_to_the_same_bytes_and_not_to_different_rows)
 
 TEST(graph_plan, knows_two_tensors_in_the_same_memory)
 {
-    Graph g;
+    Graph g(test_limits());
     const BufferSlice memory = fake_memory(16 * 64 * 4);
     const Tensor a = g.external(memory, 16, 64, DType::f32, "a"), b = g.external(memory, 16, 64, DType::f32, "b");
     add(g, fake_external(g, 16, 64), fake_external(g, 16, 64), {a});
@@ -61,7 +61,7 @@ TEST(graph_plan, knows_two_tensors_in_the_same_memory)
 
 TEST(graph_plan, separates_passes_that_only_meet_in_aliased_memory)
 {
-    Graph g;
+    Graph g(test_limits());
     const Tensor x = fake_external(g, 16, 64);
     Tensor t = x;
     for (int i = 0; i < 5; ++i)
@@ -80,32 +80,38 @@ DeviceLimits side_by_side()
 }
 
 // two chains that meet: in the least memory the second one waits for bytes of the first
-TEST(graph_plan, lets_branches_run_side_by_side_on_gpus)
+Plan chains_that_meet(const DeviceLimits& limits)
 {
-    Graph g;
+    Graph g(limits);
     const Tensor x = fake_external(g, 16, 64), y = fake_external(g, 16, 64);
     const Tensor a = silu(g, gelu(g, silu(g, x))), b = silu(g, gelu(g, silu(g, y)));
     add(g, a, b, {fake_external(g, 16, 64)});
-    EXPECT_EQ(levels_text(planned(g, side_by_side())), "silu silu | gelu gelu | silu silu | add");
-    EXPECT_EQ(planned(g, side_by_side()).arena_bytes(), 4 * 16 * 64 * 4u);
-    EXPECT_GT(planned(g).levels, 4u);
-    EXPECT_EQ(planned(g).arena_bytes(), 3 * 16 * 64 * 4u);
+    return planned(g);
+}
+
+TEST(graph_plan, lets_branches_run_side_by_side_on_gpus)
+{
+    const Plan branches = chains_that_meet(side_by_side()), row = chains_that_meet(test_limits());
+    EXPECT_EQ(levels_text(branches), "silu silu | gelu gelu | silu silu | add");
+    EXPECT_EQ(branches.arena_bytes(), 4 * 16 * 64 * 4u);
+    EXPECT_GT(row.levels, 4u);
+    EXPECT_EQ(row.arena_bytes(), 3 * 16 * 64 * 4u);
 }
 
 TEST(graph_plan, keeps_the_order_of_passes_where_that_is_wanted)
 {
-    Graph g;
+    Graph g(side_by_side());
     const Tensor x = fake_external(g, 16, 64), y = fake_external(g, 16, 64);
     g.keep(silu(g, gelu(g, silu(g, x))), fake_external(g, 16, 64));
     g.keep(silu(g, gelu(g, silu(g, y))), fake_external(g, 16, 64));
-    EXPECT_EQ(planned(g, side_by_side()).arena_bytes(), 4 * 16 * 64 * 4u);
+    EXPECT_EQ(planned(g).arena_bytes(), 4 * 16 * 64 * 4u);
     g.keep_order();
-    EXPECT_EQ(planned(g, side_by_side()).arena_bytes(), 2 * 16 * 64 * 4u);
+    EXPECT_EQ(planned(g).arena_bytes(), 2 * 16 * 64 * 4u);
 }
 
 TEST(graph_plan, runs_what_can_wait_as_late_as_it_may)
 {
-    Graph g;
+    Graph g(side_by_side());
     Tensor t = fake_external(g, 16, 64);
     std::vector<Tensor> keys; // of external memory, so each could be made at once
     for (int i = 0; i < 6; ++i)
@@ -113,7 +119,7 @@ TEST(graph_plan, runs_what_can_wait_as_late_as_it_may)
     for (int i = 0; i < 6; ++i)
         t = add(g, gelu(g, t), keys[size_t(i)]);
     g.keep(t, fake_external(g, 16, 64));
-    const Plan plan = planned(g, side_by_side());
+    const Plan plan = planned(g);
     EXPECT_EQ(plan.levels, 12u);
     EXPECT_LE(plan.arena_bytes(), 4 * 16 * 64 * 4u);
 }
@@ -128,7 +134,7 @@ void expect_owned_reads(const Plan& plan)
     for (size_t i = 0; i < plan.passes.size(); ++i)
         for (Access wanted : {Access::read, Access::write}) // a pass reads before it writes
             for (const PassBinding& b : plan.passes[i].bindings) {
-                if (plan.resources[b.resource].external || !(uint8_t(b.access) & uint8_t(wanted)))
+                if (!b.given() || plan.resources[b.resource].external || !(uint8_t(b.access) & uint8_t(wanted)))
                     continue;
                 const Placement& p = plan.placements[b.resource];
                 for (uint64_t at = (p.offset + b.offset) / 16; at < (p.offset + b.offset + b.bytes) / 16; ++at) {
@@ -170,9 +176,9 @@ uint64_t most_alive(const Plan& plan)
 void check_random(uint32_t seed, const DeviceLimits& limits)
 {
     SCOPED_TRACE(seed);
-    Graph g;
+    Graph g(limits);
     const RandomGraph made(g, seed, [&](uint32_t rows, uint32_t cols) { return fake_external(g, rows, cols); });
-    const Plan plan = planned(g, limits);
+    const Plan plan = planned(g);
     ASSERT_FALSE(plan.passes.empty());
     expect_owned_reads(plan);
     expect_no_hazard_within_a_level(plan);
@@ -202,7 +208,7 @@ TEST(graph_plan, never_does_so_either_over_several_blocks_bands_and_submits)
 
 TEST(graph_plan, saves_memory_on_deep_graphs)
 {
-    Graph g;
+    Graph g(test_limits());
     Tensor t = fake_external(g, 256, 64);
     for (int i = 0; i < 50; ++i)
         t = silu(g, gelu(g, t));

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/graph/measurements.h"
+#include "runtime/graph/autotuner.h"
 #include "tests/graph_memory.h"
 
 namespace semrover {
@@ -16,37 +16,39 @@ DeviceLimits simt_limits()
 // two products that take alike
 Plan products(uint32_t rows = 4096, DType dtype = DType::f32)
 {
-    Graph g;
+    Graph g(simt_limits());
     const Tensor x = fake_external(g, rows, 512, dtype), w = fake_external(g, 512, 512, dtype);
     (void)gemm(g, gemm(g, x, w, {}, {.dtype = dtype}), w, {}, {.dtype = dtype});
-    return planned(g, simt_limits());
+    return planned(g);
 }
 
 std::vector<uint32_t> tiles(const Plan& plan)
 {
     std::vector<uint32_t> sizes;
-    for (const Pass& pass : plan.passes)
-        if (tiles_of(pass, simt_limits()).size() > 1) {
-            EXPECT_EQ(pass.tile_rows, pass.tile_cols);
-            EXPECT_EQ(pass.group_count[0], divide_up(pass.grid.x, *pass.tile_rows));
-            EXPECT_EQ(pass.group_count[1], divide_up(pass.grid.y, *pass.tile_cols));
-            sizes.push_back(*pass.tile_rows);
-        }
+    for (const Pass& pass : plan.passes) {
+        EXPECT_EQ(pass.options.alternatives.size(), 2u);
+        const Tile tile = pass.grid.tile;
+        EXPECT_EQ(tile, pass.options.alternatives.at(pass.alternative).tile);
+        EXPECT_EQ(tile.rows, tile.cols);
+        EXPECT_EQ(pass.group_count[0], divide_up(pass.grid.x, tile.rows));
+        EXPECT_EQ(pass.group_count[1], divide_up(pass.grid.y, tile.cols));
+        sizes.push_back(tile.rows);
+    }
     return sizes;
 }
 
 // runs until nothing is tried any more; seconds of a pass with a tile of 64, and of 32
-std::vector<std::vector<uint32_t>> try_all(Plan& plan, TileChoices& choices, double of_64, double of_32)
+std::vector<std::vector<uint32_t>> try_all(Plan& plan, TuningCache& cache, double of_64, double of_32)
 {
-    auto trial = TileTrial::begin(plan, simt_limits(), choices);
+    auto trial = Autotuner::begin(plan, simt_limits(), cache);
     EXPECT_TRUE(trial);
     std::vector<std::vector<uint32_t>> tried;
     while (trial->running() && tried.size() < 20) {
         tried.push_back(tiles(plan));
         std::vector<double> seconds;
         for (const Pass& pass : plan.passes)
-            seconds.push_back(pass.tile_rows == 64u ? of_64 : of_32);
-        EXPECT_TRUE(trial->next(plan, seconds, simt_limits(), choices));
+            seconds.push_back(pass.grid.tile.rows == 64 ? of_64 : of_32);
+        EXPECT_TRUE(trial->next(plan, seconds, simt_limits(), cache));
     }
     return tried;
 }
@@ -57,69 +59,69 @@ TEST(graph_tiles, are_each_tried_twice_and_the_fastest_is_kept)
 {
     Plan plan = products();
     ASSERT_EQ(tiles(plan), (std::vector<uint32_t>{64, 64})); // 512 workgroups
-    TileChoices choices;
-    EXPECT_EQ(try_all(plan, choices, 2e-3, 1e-3), (Tried{{64, 64}, {32, 32}, {64, 64}, {32, 32}}));
+    TuningCache cache;
+    EXPECT_EQ(try_all(plan, cache, 2e-3, 1e-3), (Tried{{64, 64}, {32, 32}, {64, 64}, {32, 32}}));
     EXPECT_EQ(tiles(plan), (std::vector<uint32_t>{32, 32}));
-    EXPECT_EQ(choices.best(TileChoices::key(plan.passes[0])), 32u);
+    EXPECT_EQ(cache.best(TuningCache::key(plan.passes[0])), 1u); // the second of 64 and 32
 }
 
-TEST(graph_tiles, stay_the_planners_where_no_other_is_clearly_faster_or_nothing_was_measured)
+TEST(graph_tiles, stay_the_first_where_no_other_is_clearly_faster_or_nothing_was_measured)
 {
     for (const auto& [of_64, of_32] : {std::pair{1e-3, 0.99e-3}, {1e-3, 1.2e-3}, {0., 0.}}) {
         Plan plan = products();
-        TileChoices choices;
-        (void)try_all(plan, choices, of_64, of_32);
+        TuningCache cache;
+        (void)try_all(plan, cache, of_64, of_32);
         EXPECT_EQ(tiles(plan), (std::vector<uint32_t>{64, 64})) << of_64 << ' ' << of_32;
     }
     Plan small = products(64);
     ASSERT_EQ(tiles(small), (std::vector<uint32_t>{32, 32}));
-    TileChoices choices;
-    EXPECT_EQ(try_all(small, choices, 1e-3, 2e-3).front(), (std::vector<uint32_t>{32, 32}));
+    TuningCache cache;
+    EXPECT_EQ(try_all(small, cache, 1e-3, 2e-3).front(), (std::vector<uint32_t>{32, 32}));
     EXPECT_EQ(tiles(small), (std::vector<uint32_t>{64, 64}));
 }
 
 TEST(graph_tiles, that_are_known_are_not_tried_again)
 {
     Plan first = products(), other = products(2048);
-    TileChoices choices;
-    (void)try_all(first, choices, 2e-3, 1e-3);
+    TuningCache cache;
+    (void)try_all(first, cache, 2e-3, 1e-3);
     Plan second = products();
-    const auto trial = TileTrial::begin(second, simt_limits(), choices);
+    const auto trial = Autotuner::begin(second, simt_limits(), cache);
     ASSERT_TRUE(trial);
     EXPECT_FALSE(trial->running());
     EXPECT_TRUE(trial->changed());
     EXPECT_EQ(tiles(second), (std::vector<uint32_t>{32, 32}));
-    EXPECT_EQ(try_all(other, choices, 2e-3, 1e-3).size(), 4u);
+    EXPECT_EQ(try_all(other, cache, 2e-3, 1e-3).size(), 4u);
     // one that this pass cannot have: kept by another version, or made up
     Plan third = products();
-    choices.set(TileChoices::key(third.passes[0]), 48);
-    EXPECT_EQ(try_all(third, choices, 2e-3, 1e-3).size(), 4u);
+    cache.set(TuningCache::key(third.passes[0]), 2);
+    EXPECT_EQ(try_all(third, cache, 2e-3, 1e-3).size(), 4u);
     EXPECT_EQ(tiles(third), (std::vector<uint32_t>{32, 32}));
 }
 
-TEST(graph_tiles, are_known_by_what_a_pass_does_but_for_its_tile)
+TEST(graph_tiles, are_known_by_what_a_pass_does_and_could_but_not_by_its_tile)
 {
     Plan plan = products();
     Pass& pass = plan.passes[0];
-    const TileChoices::Key key = TileChoices::key(pass);
-    pass.set_tile(32, simt_limits());
-    EXPECT_EQ(TileChoices::key(pass), key);
-    EXPECT_EQ(TileChoices::key(plan.passes.back()), key);
-    EXPECT_NE(TileChoices::key(products(4032).passes[0]), key);
-    EXPECT_NE(TileChoices::key(products(4096, DType::f16).passes[0]), key);
+    const TuningCache::Key key = TuningCache::key(pass);
+    pass.take(1);
+    EXPECT_EQ(TuningCache::key(pass), key);
+    EXPECT_EQ(TuningCache::key(plan.passes.back()), key);
+    EXPECT_NE(TuningCache::key(products(4032).passes[0]), key);
+    EXPECT_NE(TuningCache::key(products(4096, DType::f16).passes[0]), key);
 }
 
 TEST(graph_tiles, are_read_from_what_was_written)
 {
-    TileChoices choices;
-    choices.set(0x1, 64);
-    choices.set(0xfedcba9876543210, 32);
-    const std::string text = choices.text();
+    TuningCache cache;
+    cache.set(0x1, 64);
+    cache.set(0xfedcba9876543210, 32);
+    const std::string text = cache.text();
     EXPECT_EQ(text, "0000000000000001 64\nfedcba9876543210 32\n");
-    TileChoices again;
+    TuningCache again;
     again.read(text);
     EXPECT_EQ(again.text(), text);
-    TileChoices odd;
+    TuningCache odd;
     odd.read("\n \n1\n1 \n x\n2 32x\ng 32\n3 32 4\n11112222333344445 32\n4 -1\n5 64\n6 64");
     EXPECT_EQ(odd.text(), "0000000000000005 64\n");
 }

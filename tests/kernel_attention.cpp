@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "attention.spv.h"
+#include "runtime/graph/variant.h"
 #include "tests/attention_sets.h"
 #include "tests/softmax_sum.h"
 

@@ -23,7 +23,7 @@ TEST(kernel_bounds, what_lies_behind_a_tensor_in_its_buffer_is_neither_read_nor_
     KernelCase k(test_device());
     const Tensor x = k.graph.external(whole.part(0, push.count * 4), push.count, 1, DType::u32, "x", 1);
     const Tensor y = k.output(push.count, 1, DType::u32, 1);
-    k.graph.dispatch(kernel::beyond, {x, y}, push, threads(push.count), {});
+    k.graph.dispatch(kernel::beyond, {{"X", x}, {"Y", y}}, push, threads(push.count), {});
     const Status status = k.compile_and_run();
     ASSERT_TRUE(status) << status.error().message;
 

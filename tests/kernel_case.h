@@ -35,7 +35,7 @@ struct HostMatrix {
 
 class KernelCase {
   public:
-    explicit KernelCase(Device& device, uint32_t seed = 1) : device_(device), random_(seed) {}
+    explicit KernelCase(Device& device, uint32_t seed = 1) : graph(device.limits()), device_(device), random_(seed) {}
 
     Graph graph;
 

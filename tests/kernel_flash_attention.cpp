@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "flash_attention.spv.h"
+#include "runtime/graph/cost_model.h"
 #include "tests/softmax_sum.h"
 
 namespace semrover {
@@ -182,8 +183,9 @@ TEST(kernel_flash_attention, gives_the_same_bits_in_parts)
     k.graph.keep(y, out);
     DeviceLimits limits = test_device().limits();
     limits.submit_seconds = 2 * 4.0 * 64 * 32 * 150 / 5e11;
-    auto plan = make_plan(k.graph.desc(), limits);
+    auto plan = make_plan(k.graph);
     ASSERT_TRUE(plan) << plan.error().message;
+    stage::submits(*plan, limits, CostModel().seconds(*plan));
     EXPECT_GT(plan->submits, 1u);
     auto program = Program::create(test_device(), std::move(*plan));
     ASSERT_TRUE(program) << program.error().message;

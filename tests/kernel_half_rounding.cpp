@@ -48,7 +48,7 @@ TEST(kernel_half_rounding, is_to_nearest_even_where_the_device_rounds_toward_zer
     KernelCase k(test_device());
     const HalfRoundingPush push{.count = uint32_t(x.size() / 2)};
     const Tensor y = k.output(push.count, 4, DType::u32, 4);
-    k.graph.dispatch(kernel::half_rounding, {k.input(x), y}, push, threads(push.count), {});
+    k.graph.dispatch(kernel::half_rounding, {{"X", k.input(x)}, {"Y", y}}, push, threads(push.count), {});
     const Status status = k.compile_and_run();
     ASSERT_TRUE(status) << status.error().message;
     const auto words = k.read_array<uint32_t>(y);

@@ -161,8 +161,9 @@ TEST(kernel_splat_lens, the_device_finds_rays_and_pixels_as_the_host_does)
         KernelCase c(test_device());
         const LensTripPush push{.count = uint32_t(pixels.size() / 2)};
         const Tensor y = c.output(push.count * 2, 4, DType::f32, 4);
-        c.graph.dispatch(kernel::lens_trip, {c.input(table, kLensCameraFloats), c.input(pixels, 2), y}, push,
-                         threads(push.count), {.constants = {{"kModel", uint32_t(k.model)}}});
+        c.graph.dispatch(kernel::lens_trip,
+                         {{"Cameras", c.input(table, kLensCameraFloats)}, {"Pixels", c.input(pixels, 2)}, {"Y", y}},
+                         push, threads(push.count), {.constants = {{"kModel", uint32_t(k.model)}}});
         const Status status = c.compile_and_run();
         ASSERT_TRUE(status) << status.error().message;
         const auto got = c.read_array<float>(y);

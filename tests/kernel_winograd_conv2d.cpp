@@ -133,7 +133,7 @@ TEST(kernel_winograd_conv2d, is_chosen_by_the_image_and_not_by_how_many_there_ar
     for (uint32_t height = 4; height <= 40; ++height)
         for (uint32_t width = 4; width <= 40; width += 3) {
             const auto prefers = [&](uint32_t images) {
-                Graph g;
+                Graph g(limits);
                 return prefers_winograd(limits, feature_map(g, images, height, width, 128, DType::f16, "x"), 128, o);
             };
             for (uint32_t images : {2u, 3u, 8u})

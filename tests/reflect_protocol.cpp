@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// the build tool that reads shaders refuses those that break runtime/graph/protocol.h
+// the build tool that reads shaders refuses those that break runtime/graph/shader_interface.h
 #include "tests/program_result.h"
 
 #include <gtest/gtest.h>
@@ -69,12 +69,6 @@ TEST(Protocol, names_that_belong_to_no_binding_are_refused)
 TEST(Protocol, what_the_planner_needs_together_is_declared_together)
 {
     EXPECT_TRUE(says(fault({.push = "uint first_row;"}), "first_row without rows"));
-    const std::string lanes = "layout(constant_id = 0) const uint kColLanes = 4;\n";
-    const std::string tile = "layout(constant_id = 1) const uint kTileM = 16;\n"
-                             "layout(constant_id = 2) const uint kTileN = 16;\n";
-    EXPECT_TRUE(says(fault({.constants = lanes}), "kColLanes without kTileM"));
-    EXPECT_TRUE(says(fault({.constants = lanes + tile}), "kColLanes without push member col_lanes"));
-    EXPECT_EQ(fault({.constants = lanes + tile, .push = "uint rows; uint col_lanes;"}), "");
 }
 
 TEST(Protocol, what_vulkan_leaves_open_is_refused)
@@ -90,6 +84,11 @@ TEST(Protocol, variants_of_an_op_declare_the_same)
                      "variant simt: a push struct of 8 bytes, in the first variant 4"));
     EXPECT_TRUE(says(fault_of({{"cpu", plain}, {"simt", {.y = "writeonly buffer Z { uint y[]; }"}}}),
                      "variant simt: binding 1 is called Z, in the first variant Y"));
+    EXPECT_TRUE(says(fault_of({{"cpu", plain}, {"simt", {.y = "buffer Y { uint y[]; }"}}}),
+                     "variant simt: binding Y has another number or access than in the first variant"));
+    EXPECT_TRUE(
+        says(fault_of({{"cpu", {.push = "uint rows; uint x_ld;"}}, {"simt", {.push = "uint x_ld; uint rows;"}}}),
+             "variant simt: push member x_ld at byte 0, in the first variant rows at byte 0"));
     const Declarations first{.constants = "layout(constant_id = 0) const uint kTileM = 16;"},
         second{.constants = "layout(constant_id = 1) const uint kTileM = 16;"};
     EXPECT_TRUE(says(fault_of({{"cpu", first}, {"simt", second}}),

@@ -38,7 +38,7 @@ class Product {
                 number = normal(random);
             EXPECT_TRUE(device.write((*buffer)->slice(), std::as_bytes(std::span(numbers))));
         }
-        Graph g;
+        Graph g(device.limits());
         const auto matrix = [&](const Buffer& b) { return g.external(b.slice(), kSize, kSize, DType::f32, "test"); };
         const Tensor w = matrix(*w_);
         (void)gemm(g, gemm(g, matrix(*x_), w, {}, {.dtype = DType::f32}), w, {},
@@ -54,7 +54,7 @@ class Product {
         EXPECT_TRUE(device_.read(y_->slice(), bytes));
         return bytes;
     }
-    uint32_t tile() const { return *program_->plan().passes[0].tile_rows; }
+    uint32_t tile() const { return program_->plan().passes[0].grid.tile.rows; }
 
   private:
     Device& device_;
@@ -74,7 +74,7 @@ TEST(runtime_autotune, tries_tiles_with_the_same_bytes_and_keeps_one)
         EXPECT_EQ(product.run(), first) << i;
     }
     EXPECT_EQ(std::vector(tried.begin(), tried.begin() + 4), (std::vector<uint32_t>{32, 64, 32, 64}));
-    ASSERT_EQ(device->tiles().size(), 1u); // both products take alike
+    ASSERT_EQ(device->tuning().size(), 1u); // both products take alike
     EXPECT_EQ(tried[5], tried[7]);
     EXPECT_EQ(Product(*device).tile(), tried[7]);
 }
@@ -89,17 +89,17 @@ TEST(runtime_autotune, keeps_what_it_found_in_the_pipeline_cache)
         Product product(*device);
         for (int i = 0; i < 5; ++i)
             (void)product.run();
-        found = device->tiles().text();
+        found = device->tuning().text();
         blob = *device->pipelines().blob();
     }
     ASSERT_FALSE(found.empty());
-    EXPECT_EQ(make_device(kLikeAGpu)->tiles().text(), found);
+    EXPECT_EQ(make_device(kLikeAGpu)->tuning().text(), found);
     DeviceOptions with_blob = kLikeAGpu;
     with_blob.pipeline_cache = std::as_bytes(std::span(blob));
-    EXPECT_EQ(make_device(with_blob)->tiles().text(), found);
+    EXPECT_EQ(make_device(with_blob)->tuning().text(), found);
     blob[20] ^= 1; // of the text: the checksum is of all
     with_blob.pipeline_cache = std::as_bytes(std::span(blob));
-    EXPECT_EQ(make_device(with_blob)->tiles().text(), "");
+    EXPECT_EQ(make_device(with_blob)->tuning().text(), "");
 }
 
 TEST(runtime_autotune, tries_nothing_where_it_is_off_or_nothing_is_timed)
@@ -118,7 +118,7 @@ TEST(runtime_autotune, tries_nothing_where_it_is_off_or_nothing_is_timed)
             (void)product.run();
             EXPECT_EQ(product.tile(), tile);
         }
-        EXPECT_EQ(device->tiles().size(), 0u);
+        EXPECT_EQ(device->tuning().size(), 0u);
     }
 }
 

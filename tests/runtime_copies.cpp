@@ -26,7 +26,7 @@ struct Counter {
     // x is 100 i everywhere
     Status set(uint32_t i)
     {
-        Graph g;
+        Graph g(test_device().limits());
         g.keep(fill(g, kSize, 100 * i), x);
         SR_TRY(program, Program::create(test_device(), g));
         return program->submit().map([](uint64_t) {});

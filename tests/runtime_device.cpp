@@ -44,9 +44,9 @@ Bytes pattern(size_t bytes)
 }
 
 // x + x, then gelu, then x + that: two passes between levels, into `out`
-Graph small_graph(const Buffer& x, const Buffer& out)
+Graph small_graph(const DeviceLimits& limits, const Buffer& x, const Buffer& out)
 {
-    Graph g;
+    Graph g(limits);
     const Tensor a = g.external(x.slice(), 16, 64, DType::f32, "x"),
                  b = g.external(out.slice(), 16, 64, DType::f32, "out");
     add(g, gelu(g, add(g, a, a)), a, {.whole = b});
@@ -58,7 +58,7 @@ void run_small_graph(Device& device)
     const auto x = make_buffer(device, 4096), out = make_buffer(device, 4096);
     const std::vector<float> ones(1024, 1.f);
     ASSERT_TRUE(device.write(x->slice(), std::as_bytes(std::span(ones))));
-    auto program = Program::create(device, small_graph(*x, *out));
+    auto program = Program::create(device, small_graph(device.limits(), *x, *out));
     ASSERT_TRUE(program) << program.error().message;
     const Status status = (*program)->run();
     ASSERT_TRUE(status) << status.error().message;
@@ -157,7 +157,7 @@ TEST(runtime_device, refuses_memory_beyond_the_budget_with_numbers)
     EXPECT_TRUE(says(more, fmt::format("weights: 900096 bytes do not fit: {} in use, `max_bytes` 1048576", used)));
     EXPECT_EQ(more.error().code, ErrorCode::out_of_memory);
     EXPECT_EQ(device->allocated_bytes(), used);
-    Graph g;
+    Graph g(device->limits());
     const Tensor x = g.external(some->slice(), 64, 1024, DType::f32, "x");
     (void)gelu(g, silu(g, gelu(g, x))); // two of 262144 bytes at a time fit, but not three
     EXPECT_TRUE(Program::create(*device, g));
@@ -405,7 +405,7 @@ std::string run_half_gemm(Device& device)
     const auto x = make_buffer(device, size * size * 2), y = make_buffer(device, size * size * 4);
     const std::vector<uint16_t> ones(size * size, 0x3c00);
     EXPECT_TRUE(device.write(x->slice(), std::as_bytes(std::span(ones))));
-    Graph g;
+    Graph g(device.limits());
     const Tensor a = g.external(x->slice(), size, size, DType::f16, "x");
     g.keep(gemm(g, a, a, {}, {.dtype = DType::f32}), g.external(y->slice(), size, size, DType::f32, "y"));
     auto program = Program::create(device, g);
@@ -426,7 +426,6 @@ TEST(runtime_device, uses_matrix_units_of_a_host_device_where_the_host_enabled_t
     for (const HostVulkan* vulkan : {&with, &without}) {
         const auto device = Device::adopt(host_of(*vulkan), {.limits = "variant=coopmat"});
         ASSERT_TRUE(device) << device.error().message;
-        EXPECT_EQ(has_matrix_units((*device)->limits()), vulkan->has_matrices);
         EXPECT_EQ(run_half_gemm(**device) == "coopmat", vulkan->has_matrices);
         EXPECT_EQ(vulkan->messages, 0);
     }

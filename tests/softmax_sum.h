@@ -3,6 +3,7 @@
 #pragma once
 
 #include "runtime/graph/plan.h"
+#include "runtime/graph/variant.h"
 #include "tests/kernel_case.h"
 
 #include <cmath>

@@ -2,14 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "protocol.h"
 
-#include "runtime/graph/protocol.h"
+#include "runtime/graph/shader_interface.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <stdexcept>
 
-namespace protocol = semrover::protocol;
+namespace protocol = semrover::shader_interface;
 
 namespace {
 
@@ -45,17 +45,7 @@ void check_constants(const Variant& v)
         if (c.name.starts_with(protocol::kHalfPrefix) &&
             !find(v.module.bindings, c.name.substr(protocol::kHalfPrefix.size())))
             refuse(v, "constant {} belongs to no binding", c.name);
-        for (const auto tile : {protocol::kTileRows, protocol::kTileCols, protocol::kColLanes})
-            if (c.name == tile && c.value == 0)
-                refuse(v, "constant {} is 0", c.name);
     }
-    if (!find(v.module.constants, protocol::kColLanes))
-        return;
-    for (const auto needed : {protocol::kTileRows, protocol::kTileCols})
-        if (!find(v.module.constants, needed))
-            refuse(v, "{} without {}", protocol::kColLanes, needed);
-    if (!find(v.module.push, protocol::kColLanesMember))
-        refuse(v, "{} without push member {}", protocol::kColLanes, protocol::kColLanesMember);
 }
 
 void check_push(const Variant& v)
@@ -77,11 +67,19 @@ void check_alike(const Variant& first, const Variant& v)
     const Module &a = first.module, &b = v.module;
     if (a.bindings.size() != b.bindings.size())
         refuse(v, "{} bindings, the first variant has {}", b.bindings.size(), a.bindings.size());
-    for (size_t i = 0; i < a.bindings.size(); ++i)
-        if (a.bindings[i].name != b.bindings[i].name)
-            refuse(v, "binding {} is called {}, in the first variant {}", i, b.bindings[i].name, a.bindings[i].name);
-    if (a.push_bytes != b.push_bytes)
+    for (size_t i = 0; i < a.bindings.size(); ++i) {
+        const Binding &one = a.bindings[i], &other = b.bindings[i];
+        if (one.name != other.name)
+            refuse(v, "binding {} is called {}, in the first variant {}", i, other.name, one.name);
+        if (one.binding != other.binding || one.writable != other.writable || one.readable != other.readable)
+            refuse(v, "binding {} has another number or access than in the first variant", other.name);
+    }
+    if (a.push_bytes != b.push_bytes || a.push.size() != b.push.size())
         refuse(v, "a push struct of {} bytes, in the first variant {}", b.push_bytes, a.push_bytes);
+    for (size_t i = 0; i < a.push.size(); ++i)
+        if (a.push[i].name != b.push[i].name || a.push[i].offset != b.push[i].offset)
+            refuse(v, "push member {} at byte {}, in the first variant {} at byte {}", b.push[i].name, b.push[i].offset,
+                   a.push[i].name, a.push[i].offset);
     for (const Constant& c : b.constants)
         if (const Constant* same = find(a.constants, c.name); same && same->id != c.id)
             refuse(v, "constant {} has id {}, in the first variant {}", c.name, c.id, same->id);

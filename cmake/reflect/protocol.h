@@ -10,6 +10,6 @@ struct Variant {
     Module module;
 };
 
-// Checks the variants of an op against runtime/graph/protocol.h, and against each other: the planner takes what the
-// first one declares for all. Throws std::runtime_error with what is wrong.
+// Checks the variants of an op against runtime/graph/shader_interface.h, and against each other: the planner takes what
+// the first one declares for all. Throws std::runtime_error with what is wrong.
 void check_protocol(const std::vector<Variant>& variants);

@@ -21,5 +21,5 @@ set(ENV{PKG_CONFIG_LIBDIR} ${windows_libraries}/lib/pkgconfig)
 set(ZLIB_LIBRARY /usr/${mingw}/lib/libz.a CACHE FILEPATH "")
 
 # what is built needs no libraries of the compiler's beside it
-set(CMAKE_EXE_LINKER_FLAGS_INIT -static)
+set(CMAKE_EXE_LINKER_FLAGS_INIT "-static -Wl,--stack,8388608") # as much as on Linux
 set(CMAKE_SHARED_LINKER_FLAGS_INIT -static)

@@ -43,7 +43,7 @@ Status CameraRenderer::make(std::shared_ptr<LoadedNetworks> networks, RendererSe
                                           state_.planned_bytes(device_.limits()) + history));
     SR_CHECK(state_.allocate(device_, "a camera's pictures"));
     SR_TRY(copies_, CopyRing::create(device_));
-    Graph g;
+    Graph g(device_.limits());
     g.keep(picture_texels(g, bytes_.in(g), size.image_width * size.image_height), texels_);
     SR_TRY(to_texels_, Program::create(device_, g));
     const CameraChain* chain = &chain_;

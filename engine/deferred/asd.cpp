@@ -28,9 +28,9 @@ struct AsdRenderer::FrameMemory : Denoiser::Memory {
         }
     }
     // the first state, and the noise on the previous latent
-    Graph begin_graph() const override
+    Graph begin_graph(const DeviceLimits& limits) const override
     {
-        Graph g;
+        Graph g(limits);
         const StepTable s = tables.in(g);
         step_renoise(g, s, first_noise.valid() ? first_noise.in(g) : normals(g, s), x.in(g));
         step_advance(g, s.clock);
@@ -38,9 +38,9 @@ struct AsdRenderer::FrameMemory : Denoiser::Memory {
         step_advance(g, s.clock);
         return g;
     }
-    Graph step_graph() const override
+    Graph step_graph(const DeviceLimits& limits) const override
     {
-        Graph g;
+        Graph g(limits);
         const StepTable s = tables.in(g);
         const Tensor state_x = x.in(g);
         const RendererFrame frame{previous.in(g), buffer.in(g), visible.in(g)};

@@ -348,8 +348,8 @@ Result<MemoryPlan> plan_renderer(Device& device, const LoadedNetworks& networks,
                                  std::span<const RendererWork> work, uint64_t beside)
 {
     const RendererModel& m = networks.model();
-    const auto unet = Unet::plan(m.unet, networks.precision(), device.limits());
-    const auto vae = Vae::plan(m.vae, networks.precision(), device.limits());
+    const auto unet = Unet::plan(m.unet, networks.precision());
+    const auto vae = Vae::plan(m.vae, networks.precision());
     SR_TRY(RendererBytes parts,
            renderer_bytes(
                device.limits(),

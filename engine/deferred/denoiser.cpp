@@ -76,16 +76,16 @@ Tensor Denoiser::Memory::normals(Graph& g, StepTable steps) const
     return step_noise(g, steps, cells.in(g), known.in(g), channels, seed);
 }
 
-Graph Denoiser::Memory::tables_graph() const
+Graph Denoiser::Memory::tables_graph(const DeviceLimits& limits) const
 {
-    Graph g;
+    Graph g(limits);
     tables.add(g, unet);
     return g;
 }
 
-Graph Denoiser::Memory::check_graph() const
+Graph Denoiser::Memory::check_graph(const DeviceLimits& limits) const
 {
-    Graph g;
+    Graph g(limits);
     check_frames(g, x, frames, {width, height, width, height}, bad);
     return g;
 }
@@ -93,8 +93,8 @@ Graph Denoiser::Memory::check_graph() const
 Result<PartBytes> Denoiser::Memory::planned(const DeviceLimits& limits) const
 {
     PartBytes bytes{state.planned_bytes(limits), {}};
-    for (const Graph& g : {tables_graph(), begin_graph(), step_graph(), check_graph()}) {
-        SR_TRY(const Plan plan, make_plan(g.desc(), limits));
+    for (const Graph& g : {tables_graph(limits), begin_graph(limits), step_graph(limits), check_graph(limits)}) {
+        SR_TRY(const Plan plan, make_plan(g));
         bytes.arena.cover({plan.blocks});
     }
     return bytes;
@@ -116,11 +116,11 @@ Status Denoiser::make(std::unique_ptr<Memory> memory, std::span<const StepRow> b
     SR_CHECK(m.known.clear(device_));
     SR_CHECK(write_tables());
     arena_ = std::move(arena);
-    SR_TRY(const auto tables, arena_->program(m.tables_graph()));
+    SR_TRY(const auto tables, arena_->program(m.tables_graph(device_.limits())));
     SR_CHECK(tables->run());
-    SR_TRY(begin_, arena_->program(m.begin_graph()));
-    SR_TRY(step_, arena_->program(m.step_graph()));
-    SR_TRY(check_, arena_->program(m.check_graph()));
+    SR_TRY(begin_, arena_->program(m.begin_graph(device_.limits())));
+    SR_TRY(step_, arena_->program(m.step_graph(device_.limits())));
+    SR_TRY(check_, arena_->program(m.check_graph(device_.limits())));
     replay_.emplace(device_, plan_.rows.size(), [this](size_t) -> Result<Program*> { return step_.get(); });
     return {};
 }

@@ -116,10 +116,11 @@ class Denoiser {
         Slot latent(const char* name) { return state.slot(rows(), channels, DType::f32, name); }
         Tensor normals(Graph& g, StepTable steps) const;
 
-        virtual Graph tables_graph() const;    // once: what depends on the timestep or the text only
-        virtual Graph begin_graph() const = 0; // once a window: the first state
-        virtual Graph step_graph() const = 0;
-        Graph check_graph() const;
+        virtual Graph
+        tables_graph(const DeviceLimits& limits) const; // once: what depends on the timestep or the text only
+        virtual Graph begin_graph(const DeviceLimits& limits) const = 0; // once a window: the first state
+        virtual Graph step_graph(const DeviceLimits& limits) const = 0;
+        Graph check_graph(const DeviceLimits& limits) const;
         Result<PartBytes> planned(const DeviceLimits& limits) const;
     };
     Denoiser(Device& device, const SamplingPlan& plan) : device_(device), plan_(plan) {}

@@ -49,9 +49,9 @@ struct FrameEncoder::Ends {
         seen = state.slot(picture.width * picture.height, 1, DType::u32, "seen", 1);
         shares = state.slot(rows(size.pixels()), 1, DType::f32, "shares", 1);
     }
-    Graph graph() const
+    Graph graph(const DeviceLimits& limits) const
     {
-        Graph g;
+        Graph g(limits);
         const uint32_t channels = vae.config().latent_channels;
         const FeatureMap moments = vae.encode(g, {image.in(g), 1, picture.padded_height, picture.padded_width});
         expect(moments, size.width(), size.height(), 2 * channels);
@@ -61,9 +61,9 @@ struct FrameEncoder::Ends {
         return g;
     }
     // a picture and its visibility, for the network and the denoiser
-    Graph intake_graph() const
+    Graph intake_graph(const DeviceLimits& limits) const
     {
-        Graph g;
+        Graph g(limits);
         const Tensor words = seen.in(g);
         g.keep(picture_input(g, words, picture).data, image);
         g.keep(block_shares(g, words, picture, size.downscale), shares);
@@ -72,10 +72,10 @@ struct FrameEncoder::Ends {
     Result<PartBytes> planned(const DeviceLimits& limits) const
     {
         PartBytes bytes{state.planned_bytes(limits), {}};
-        SR_TRY(const Plan plan, make_plan(graph().desc(), limits));
+        SR_TRY(const Plan plan, make_plan(graph(limits)));
         bytes.arena.cover({plan.blocks});
         if (seen.valid()) {
-            SR_TRY(const Plan intake, make_plan(intake_graph().desc(), limits));
+            SR_TRY(const Plan intake, make_plan(intake_graph(limits)));
             bytes.arena.cover({intake.blocks});
         }
         return bytes;
@@ -95,9 +95,9 @@ Result<std::unique_ptr<FrameEncoder>> FrameEncoder::create(Device& device, const
         SR_TRY(arena, Arena::create(device, planned.arena));
     }
     e->arena_ = std::move(arena);
-    SR_TRY(e->program_, e->arena_->program(e->ends_->graph()));
+    SR_TRY(e->program_, e->arena_->program(e->ends_->graph(device.limits())));
     if (e->seen().valid()) {
-        SR_TRY(e->intake_, e->arena_->program(e->ends_->intake_graph()));
+        SR_TRY(e->intake_, e->arena_->program(e->ends_->intake_graph(device.limits())));
     }
     return e;
 }
@@ -169,9 +169,9 @@ struct FrameDecoder::Ends {
             bytes = frame_words(state, frames, words(), "bytes");
     }
     uint32_t words() const { return picture_words(picture.width, picture.height); }
-    Graph graph() const
+    Graph graph(const DeviceLimits& limits) const
     {
-        Graph g;
+        Graph g(limits);
         const VaeConfig& c = vae.config();
         const Tensor z = latents.in(g);
         const uint32_t pixels = frames == 1 ? size.pixels() : z.rows;
@@ -187,7 +187,7 @@ struct FrameDecoder::Ends {
     }
     Result<PartBytes> planned(const DeviceLimits& limits) const
     {
-        SR_TRY(const Plan plan, make_plan(graph().desc(), limits));
+        SR_TRY(const Plan plan, make_plan(graph(limits)));
         return PartBytes{state.planned_bytes(limits), {plan.blocks}};
     }
 };
@@ -205,7 +205,7 @@ Result<std::unique_ptr<FrameDecoder>> FrameDecoder::create(Device& device, const
         SR_TRY(arena, Arena::create(device, planned.arena));
     }
     d->arena_ = std::move(arena);
-    SR_TRY(d->program_, d->arena_->program(d->ends_->graph()));
+    SR_TRY(d->program_, d->arena_->program(d->ends_->graph(device.limits())));
     return d;
 }
 

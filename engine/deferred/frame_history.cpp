@@ -35,9 +35,9 @@ FrameHistory::Memory::Memory(const LatentSize& latent_size) : size(latent_size)
     made = bytes("accumulated frame");
 }
 
-Graph FrameHistory::Memory::graph(SplatLens lens, bool moving, float share) const
+Graph FrameHistory::Memory::graph(const DeviceLimits& limits, SplatLens lens, bool moving, float share) const
 {
-    Graph g;
+    Graph g(limits);
     const AccumulateOptions options{
         .width = size.image_width, .height = size.image_height, .lens = lens, .moving = moving, .share = share};
     g.keep(
@@ -60,7 +60,7 @@ Status FrameHistory::use_lens(CameraModel model, bool moving)
 {
     if (program_ && model_ == model && moving_ == moving)
         return {};
-    SR_TRY(program_, Program::create(device_, memory_.graph(lens_of(model), moving, share_)));
+    SR_TRY(program_, Program::create(device_, memory_.graph(device_.limits(), lens_of(model), moving, share_)));
     model_ = model;
     moving_ = moving;
     return {};

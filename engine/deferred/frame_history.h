@@ -48,7 +48,7 @@ class FrameHistory {
         Frame now, past;
 
         explicit Memory(const LatentSize& size);
-        Graph graph(SplatLens lens, bool moving, float share) const;
+        Graph graph(const DeviceLimits& limits, SplatLens lens, bool moving, float share) const;
     };
     FrameHistory(Device& device, const LatentSize& size, float share) : device_(device), memory_(size), share_(share) {}
     Status use_lens(CameraModel model, bool moving);

@@ -48,16 +48,16 @@ struct VsdRenderer::WindowMemory : Denoiser::Memory {
     bool apart() const { return options.halves_apart && halves > 1; }
 
     // also what depends on the frame's number only
-    Graph tables_graph() const override
+    Graph tables_graph(const DeviceLimits& limits) const override
     {
-        Graph g = Memory::tables_graph();
+        Graph g = Memory::tables_graph(limits);
         g.keep(unet.frame_table(g, numbers.in(g)), frame_table);
         return g;
     }
     // the first state
-    Graph begin_graph() const override
+    Graph begin_graph(const DeviceLimits& limits) const override
     {
-        Graph g;
+        Graph g(limits);
         const StepTable s = tables.in(g);
         const Tensor state_x = x.in(g);
         step_hold(g, known.in(g), fixed.in(g), state_x);
@@ -86,9 +86,9 @@ struct VsdRenderer::WindowMemory : Denoiser::Memory {
             g.keep(forward(g, in.row_range(half * rows(), rows()), 1), velocity.row_range(half * rows(), rows()));
         return velocity.in(g);
     }
-    Graph step_graph() const override
+    Graph step_graph(const DeviceLimits& limits) const override
     {
-        Graph g;
+        Graph g(limits);
         const StepTable s = tables.in(g);
         const Tensor state_x = x.in(g), row = table_row.in(g);
         const RendererFrame seen{{}, buffer.in(g), visible.in(g)};

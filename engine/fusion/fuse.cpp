@@ -67,7 +67,7 @@ Status Extraction::count()
     faces_ = array(1, "faces");
     SR_CHECK(state_.allocate(device_, "marching cubes"));
     SR_CHECK(table_.write(device_, table));
-    Graph g;
+    Graph g(device_.limits());
     marching_cubes_count(g, volume_.in(g), table_.in(g), counts_in(g));
     SR_TRY(const auto program, Program::create(device_, g));
     SR_CHECK(program->run());
@@ -107,7 +107,7 @@ Status Extraction::write_range(uint32_t first, uint32_t last, FusedSurface& surf
     const Slot positions = out.slot(std::max(vertices, 1u), 4, DType::f32, "vertices", 4);
     const Slot corners = out.slot(std::max(faces, 1u), 3, DType::u32, "faces", 3);
     SR_CHECK(out.allocate(device_, "surface"));
-    Graph g;
+    Graph g(device_.limits());
     const MarchingCubesField field = volume_.in(g);
     const MarchingCubesCounts counts = counts_in(g);
     marching_cubes_vertices(g, field, counts, range, positions.in(g));

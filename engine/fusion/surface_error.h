@@ -19,7 +19,8 @@ struct SurfaceError {
     size_t beyond = 0;            // with no true face within the radius
     double labelled = 0;          // m^2 of faces whose nearest true face (to the face's middle) has a label
     double right = 0;             // of these, with the same label
-    std::array<std::array<double, 256>, 256> confusion{}; // [true label][label] m^2
+    // [true label][label] m^2; half a MiB, too much for the stack of a thread
+    std::vector<std::array<double, 256>> confusion = std::vector<std::array<double, 256>>(256);
 
     double percentile(double share) const;                // of the distances
     double percentile(double share, uint8_t label) const; // where the true face has this class

@@ -132,7 +132,7 @@ Status TsdfVolume::touch(const DepthFrames& frames, FrameBatch& batch, const Fus
     total_ = box_state_.slot(1, 1, DType::u32, "blocks", 1);
     SR_CHECK(box_state_.allocate(*device_, "blocks of the box"));
     SR_CHECK(bitmap_.clear(*device_));
-    Graph g;
+    Graph g(device_->limits());
     const TsdfFrames table = batch.in(g);
     tsdf_touch(g, table.frames, tsdf_planes(g, table, options), options, bitmap_.in(g));
     SR_TRY(const auto program, Program::create(*device_, g));
@@ -150,7 +150,7 @@ Status TsdfVolume::touch(const DepthFrames& frames, FrameBatch& batch, const Fus
 
 Status TsdfVolume::list_blocks()
 {
-    Graph count;
+    Graph count(device_->limits());
     const PrefixSum ranked = tsdf_rank(count, bitmap_.in(count));
     count.keep(ranked.sums, ranks_);
     count.keep(ranked.total, total_);
@@ -174,7 +174,7 @@ Status TsdfVolume::list_blocks()
     distances_ = field_.slot(blocks * kTsdfBlockVoxels, 1, DType::f32, "distances", 1);
     attributes_ = field_.slot(blocks * kTsdfBlockVoxels, 1, DType::u32, "attributes", 1);
     SR_CHECK(field_.allocate(*device_, "distance field"));
-    Graph g;
+    Graph g(device_->limits());
     tsdf_list(g, bitmap_.in(g), ranks_.in(g), block_ids_.in(g));
     SR_TRY(program, Program::create(*device_, g));
     SR_CHECK(program->run());
@@ -246,7 +246,7 @@ Status TsdfVolume::integrate_chunk(const DepthFrames& frames, FrameBatch& batch,
 {
     const TsdfOptions options = kernel_options();
     const uint32_t at = first * kTsdfBlockVoxels, voxels = count * kTsdfBlockVoxels;
-    Graph g;
+    Graph g(device_->limits());
     const TsdfFrames table = batch.in(g);
     tsdf_integrate(g, table.frames, tsdf_planes(g, table, options), options, state.in(g, count));
     SR_TRY(auto program, Program::create(*device_, g));
@@ -261,7 +261,7 @@ Status TsdfVolume::integrate_chunk(const DepthFrames& frames, FrameBatch& batch,
         next += fitting;
         SR_CHECK(added(order[next - 1] + 1));
     }
-    Graph finish;
+    Graph finish(device_->limits());
     tsdf_finish(finish, state.in(finish, count), options, distances_.row_range(at, voxels).in(finish),
                 attributes_.row_range(at, voxels).in(finish));
     SR_TRY(program, Program::create(*device_, finish));

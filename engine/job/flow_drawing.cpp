@@ -76,7 +76,7 @@ Status FlowDrawing::compile(Camera& c, const CameraPair& pair, const ImageSize& 
         .width = size.width, .height = size.height, .lens = lens_of(pair.model), .moving = pair.moving};
     for (size_t from = 0; from < 2; ++from) {
         const View &now = c.views[from], &next = c.views[1 - from];
-        Graph g;
+        Graph g(device_.limits());
         const FlowMoves moves{c.moves.in(g), c.rows.valid() ? c.rows.in(g) : Tensor{}};
         const FlowTensors y =
             splat_flow(g, c.cameras.in(g), moves, {now.depth.in(g), now.owners.in(g)}, next.depth.in(g), options);

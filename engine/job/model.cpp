@@ -46,8 +46,8 @@ Status Model::open(Device& device)
     }
     if (request_.renderer && (all || has_renderer(path))) {
         SR_TRY(RendererModel renderer, RendererModel::open(path));
-        renderer_bytes_ = Unet::plan(renderer.unet, precision(), device.limits())->device_bytes(device.limits()) +
-                          Vae::plan(renderer.vae, precision(), device.limits())->device_bytes(device.limits());
+        renderer_bytes_ = Unet::plan(renderer.unet, precision())->device_bytes(device.limits()) +
+                          Vae::plan(renderer.vae, precision())->device_bytes(device.limits());
         bytes_ += renderer_bytes_;
         renderer_ = std::make_shared<LoadedNetworks>(device, std::move(renderer), precision());
     }

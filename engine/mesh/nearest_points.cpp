@@ -30,7 +30,7 @@ Status search_batch(Device& device, std::span<const PointRow> queries, std::span
     SR_CHECK(state.allocate(device, "points"));
     SR_CHECK(points.write(device, batch));
     SR_CHECK(samples.write(device, queries));
-    Graph g;
+    Graph g(device.limits());
     KnnOptions options{.neighbors = 1, .cell_size = cell_size, .radius = radius};
     options.queries = samples.in(g);
     g.keep(knn(g, points.in(g), options), nearest);

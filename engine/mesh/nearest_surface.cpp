@@ -91,7 +91,7 @@ Status NearestSurface::search(std::span<const std::array<float, 4>> points, std:
     SR_CHECK(state.allocate(*device_, "points"));
     SR_CHECK(queries.write(*device_, points));
     SR_CHECK(results.write(*device_, nearest));
-    Graph g;
+    Graph g(device_->limits());
     for (const Tree& tree : trees_)
         surface_distance(g, queries.in(g), {tree.nodes.in(g), tree.triangles.in(g)}, results.in(g));
     SR_TRY(const auto program, Program::create(*device_, g));

@@ -160,7 +160,7 @@ Result<Voxelizer::ChunkMemory> Voxelizer::upload(const SurfaceChunk& chunk)
 // pairs by voxel, their areas, areas and labels of voxels
 Status Voxelizer::measure(const ChunkMemory& m)
 {
-    Graph g;
+    Graph g(device_.limits());
     const SurfaceTriangles surface = m.in(g, atlas_);
     const SurfacePairs found = triangle_cells(g, surface.records, m.pairs);
     // within a voxel along a curve, so that samples that follow each other in area lie beside each other
@@ -213,7 +213,7 @@ Status Voxelizer::sample(const ChunkMemory& m, std::span<const CellRow> cells)
     const Slot results = state.slot(uint32_t(cells.size()) * n, 4, DType::u32, "samples", 4);
     SR_CHECK(state.allocate(device_, "samples"));
     SR_CHECK(rows.write(device_, cells));
-    Graph g;
+    Graph g(device_.limits());
     const SurfaceSamples points =
         sample_surface(g, m.in(g, atlas_), m.triangles.in(g), m.sums.in(g), m.starts.in(g), rows.in(g), n,
                        options_.seed, options_.placement == PointPlacement::canonical);

@@ -143,18 +143,15 @@ Status Checkpoint::require(std::span<const TensorSpec> schema) const
     return set_->require(in_file, Unexpected::refuse, prefix_);
 }
 
-Status Checkpoint::read(const TensorSpec& spec, std::vector<float>& values) const
+Result<TensorValues> Checkpoint::values(const TensorSpec& spec, std::vector<float>& scratch) const
 {
     if (!set_) {
-        random_tensor(seed_, spec, values);
-        return {};
+        random_tensor(seed_, spec, scratch);
+        return TensorValues{std::as_bytes(std::span(scratch)), DType::f32, {}, spec.name};
     }
     const TensorInfo* tensor = find(spec);
     SR_ASSERT(tensor && same_matrix(tensor->shape, spec.shape), "{} was not required", spec.name);
-    SR_CHECK(check_finite(*set_, *tensor));
-    values.resize(tensor->elements());
-    to_float(set_->bytes(*tensor), tensor->dtype, values.data());
-    return {};
+    return TensorValues{set_->bytes(*tensor), tensor->dtype, set_->path(), tensor->name};
 }
 
 TensorStream Checkpoint::stream(const TensorSpec& spec, std::optional<DType> dtype) const

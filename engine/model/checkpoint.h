@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/model/weight_loader.h"
 #include "runtime/base/safetensors.h"
 
 #include <map>
@@ -28,8 +29,9 @@ class Checkpoint {
     // Checks that the checkpoint has what the network needs. bad_input: one line lists all missing, misshapen and
     // unexpected tensors by their names in the file.
     Status require(std::span<const TensorSpec> schema) const;
-    // the values of a tensor that require() accepted, as fp32, in the order of `shape`; bad_input if one is no number
-    Status read(const TensorSpec& spec, std::vector<float>& values) const;
+    // the values of a tensor that require() accepted, in the order of `shape`: as the file has them, or random ones in
+    // `scratch`
+    Result<TensorValues> values(const TensorSpec& spec, std::vector<float>& scratch) const;
 
     // the tensor, to be written under the spec's name and shape: in `dtype`, else as it is stored (random numbers: F32)
     TensorStream stream(const TensorSpec& spec, std::optional<DType> dtype = {}) const;

@@ -78,17 +78,15 @@ Status LowRankAdapter::require(std::span<const TensorSpec> schema) const
     return {};
 }
 
-void LowRankAdapter::add(const std::string& name, uint32_t first, uint32_t cols, std::span<float> values) const
+void LowRankAdapter::add(const std::string& name, std::span<float> values) const
 {
-    const auto found = pairs_.find(name);
-    if (found == pairs_.end())
-        return;
-    const Pair& pair = found->second;
+    const Pair& pair = pairs_.at(name);
+    const size_t cols = pair.down.size() / pair.rank;
     for (size_t row = 0; row < values.size() / cols; ++row)
         for (uint32_t r = 0; r < pair.rank; ++r) {
-            const float up = pair.up[(first + row) * pair.rank + r];
-            for (uint32_t c = 0; c < cols; ++c)
-                values[row * cols + c] += up * pair.down[size_t(r) * cols + c];
+            const float up = pair.up[row * pair.rank + r];
+            for (size_t c = 0; c < cols; ++c)
+                values[row * cols + c] += up * pair.down[r * cols + c];
         }
 }
 

@@ -21,9 +21,9 @@ class LowRankAdapter {
     // bad_input: one line lists tensors that are no such pair, and what belongs to no matrix of the schema or does not
     // fit it
     Status require(std::span<const TensorSpec> schema) const;
-    // adds to rows `first` and following of a matrix of `cols` columns, called `name`, if the adapter has any; values
-    // are these rows. Call after require()
-    void add(const std::string& name, uint32_t first, uint32_t cols, std::span<float> values) const;
+    bool has(const std::string& name) const { return pairs_.contains(name); }
+    // adds to all of a matrix that it has. Call after require()
+    void add(const std::string& name, std::span<float> values) const;
 
   private:
     struct Pair {

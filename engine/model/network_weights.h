@@ -3,11 +3,7 @@
 #pragma once
 
 #include "engine/model/checkpoint.h"
-#include "engine/model/load_progress.h"
-#include "runtime/device/device.h"
-#include "runtime/device/state.h"
-
-#include <functional>
+#include "engine/model/weight_loader.h"
 
 namespace semrover {
 
@@ -20,18 +16,10 @@ struct Layer {
 // are read from a checkpoint; what is declared decides the device bytes.
 class NetworkWeights {
   public:
-    // limits: of the device that the graphs are for, which decide how they convolve
-    NetworkWeights(DType precision, const DeviceLimits& limits) : precision_(precision), limits_(limits) {}
+    explicit NetworkWeights(DType precision) : precision_(precision) {}
 
     DType precision() const { return precision_; }
-    const DeviceLimits& limits() const { return limits_; }
 
-    // The share of what a video's frames make together, against what each makes alone: sigmoid(mix) or, as diffusers'
-    // AlphaBlender has it unless it is switched, 1 - sigmoid(mix)
-    struct FrameShare {
-        std::string mix_factor; // the tensor's name
-        bool switched = false;
-    };
     Slot share(const FrameShare& share); // [1, 1] fp32
 
     // convolution over C channels, or C and C2 that come as two inputs: [N, kernel^2 * (C + C2)], tap by tap, each
@@ -66,37 +54,17 @@ class NetworkWeights {
     Layer norm(const std::string& name, uint32_t channels);            // weight and bias, [1, channels] fp32
     Slot table(const std::string& name, uint32_t rows, uint32_t cols); // an embedding, fp32
 
-    uint64_t parameters() const; // as in the file
+    uint64_t parameters() const { return parameters_of(weights_); } // as in the file
     uint64_t device_bytes(const DeviceLimits& limits) const { return state_.planned_bytes(limits); }
     Status load(Device& device, const Checkpoint& checkpoint, std::span<const TensorSpec> schema,
                 const LoadProgress& progress = {});
 
   private:
-    // one tensor of the checkpoint and its way into a weight's rows
-    struct Source {
-        TensorSpec spec;
-        std::function<void(std::span<const float> values, float* rows, uint32_t ld)> pack;
-        std::optional<FrameShare> share = {}; // what the values are multiplied by
-    };
-    struct Entry {
-        Slot weight;
-        std::vector<Source> sources;
-    };
-    Entry& add(const std::string& name, uint32_t rows, uint32_t cols, DType dtype);
-    void add_vector(Entry& entry, const std::string& name, uint32_t size, uint32_t first, uint32_t heads, bool geglu,
-                    float gain);
-    // kept from weight to weight: new memory costs more than what is written to it
-    struct Scratch {
-        std::vector<float> values, rows;
-        std::vector<std::byte> bytes;
-    };
-    Status upload(Device& device, const Checkpoint& checkpoint, const Entry& entry, Scratch& scratch) const;
-    Status read(const Checkpoint& checkpoint, const Source& source, std::vector<float>& values) const;
+    WeightLayout& add(const std::string& name, uint32_t rows, uint32_t cols, DType dtype);
 
     DType precision_;
-    DeviceLimits limits_;
     State state_;
-    std::vector<Entry> entries_;
+    std::vector<WeightLayout> weights_;
 };
 
 // rows of heads after padding each

@@ -2,9 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/model/transformer_weights.h"
 
-#include <cmath>
-#include <cstring>
-#include <map>
+#include "engine/model/checkpoint.h"
 
 namespace semrover {
 
@@ -13,8 +11,8 @@ TransformerWeights::TransformerWeights(const TransformerConfig& config, DType pr
 {
     const uint32_t d = config.dim(), c = config.channels(), p = config.pos_embed_dim;
     const auto linear = [&](const std::string& name, uint32_t out, uint32_t in, DType dtype, Slot& w, Slot& b) {
-        w = state_.slot(out, in, dtype, name);
-        b = state_.slot(1, out, DType::f32, name + ".bias");
+        w = add(out, in, dtype, name);
+        b = add(1, out, DType::f32, name + ".bias");
         place(name, w, b, 0, out);
     };
     linear("proj_in", d, c, precision, proj_in, proj_in_bias);
@@ -22,32 +20,54 @@ TransformerWeights::TransformerWeights(const TransformerConfig& config, DType pr
     linear("time_embed.linear_1", d, 256, DType::f32, time_in, time_in_bias);
     linear("time_embed.linear_2", d, d, DType::f32, time_out, time_out_bias);
     linear("proj_out", c, d, precision, proj_out, proj_out_bias);
-    semantic_embed = state_.slot(config.num_classes + 1, d, precision, "semantic_embed");
-    parts_.push_back(
-        {"semantic_embed.weight", config.num_classes + 1, d, false, 0, config.num_classes + 1, semantic_embed, 0, 0});
+    semantic_embed = add(config.num_classes + 1, d, precision, "semantic_embed");
+    place("semantic_embed", semantic_embed);
     if (const uint32_t width = config.condition_width()) {
-        condition_in = state_.slot(d, width, precision, "condition_embed.linear_1");
-        condition_out = state_.slot(d, d, precision, "condition_embed.linear_2");
-        parts_.push_back({"condition_embed.linear_1.weight", d, width, false, 0, d, condition_in, 0, 0});
-        parts_.push_back({"condition_embed.linear_2.weight", d, d, false, 0, d, condition_out, 0, 0});
+        condition_in = add(d, width, precision, "condition_embed.linear_1");
+        condition_out = add(d, d, precision, "condition_embed.linear_2");
+        place("condition_embed.linear_1", condition_in);
+        place("condition_embed.linear_2", condition_out);
     }
     if (config.condition_voxels) {
-        condition_voxels = state_.slot(d, d, precision, "condition_embed.linear_voxels");
-        parts_.push_back({"condition_embed.linear_voxels.weight", d, d, false, 0, d, condition_voxels, 0, 0});
+        condition_voxels = add(d, d, precision, "condition_embed.linear_voxels");
+        place("condition_embed.linear_voxels", condition_voxels);
     }
-    norm_out = state_.slot(2 * d, d, precision, "norm_out");
-    norm_out_bias = state_.slot(1, 2 * d, DType::f32, "norm_out.bias");
+    norm_out = add(2 * d, d, precision, "norm_out");
+    norm_out_bias = add(1, 2 * d, DType::f32, "norm_out.bias");
     place_swapped("norm_out.linear", norm_out, norm_out_bias, 0, 2 * d);
     blocks.resize(config.num_layers);
     for (uint32_t i = 0; i < config.num_layers; ++i)
         add_block(i, i + 1 == config.num_layers);
 }
 
+Slot TransformerWeights::add(uint32_t rows, uint32_t cols, DType dtype, std::string_view name)
+{
+    weights_.push_back({state_.slot(rows, cols, dtype, name), {}});
+    return weights_.back().weight;
+}
+
+void TransformerWeights::put(const Slot& slot, WeightPart part)
+{
+    for (WeightLayout& w : weights_)
+        if (w.weight.same_as(slot))
+            w.parts.push_back(std::move(part));
+}
+
+// all of a matrix
+void TransformerWeights::place(const std::string& name, const Slot& weight)
+{
+    put(weight, {{name + ".weight", {weight.rows(), weight.cols()}},
+                 weight.cols(),
+                 straight(weight.rows()),
+                 straight(weight.cols())});
+}
+
 void TransformerWeights::place(const std::string& name, const Slot& weight, const Slot& bias, uint32_t row,
                                uint32_t rows, uint32_t bias_row, uint32_t bias_col)
 {
-    parts_.push_back({name + ".weight", rows, weight.cols(), false, 0, rows, weight, row, 0});
-    parts_.push_back({name + ".bias", 1, rows, true, 0, rows, bias, bias_row, bias_col});
+    put(weight,
+        {{name + ".weight", {rows, weight.cols()}}, weight.cols(), straight(rows, row), straight(weight.cols())});
+    put(bias, {{name + ".bias", {rows}}, rows, straight(1, bias_row), straight(rows, bias_col)});
 }
 
 // AdaLayerNormContinuous stores scale before shift; the kernels want shift before scale
@@ -55,37 +75,37 @@ void TransformerWeights::place_swapped(const std::string& name, const Slot& weig
                                        uint32_t rows)
 {
     const uint32_t half = rows / 2;
-    for (uint32_t part = 0; part < 2; ++part) {
-        const uint32_t to = row + (1 - part) * half;
-        parts_.push_back({name + ".weight", rows, weight.cols(), false, part * half, half, weight, to, 0});
-        parts_.push_back({name + ".bias", 1, rows, true, part * half, half, bias, 0, to});
-    }
+    const IndexRanges swapped{{0, row + half, half}, {half, row, half}};
+    put(weight, {{name + ".weight", {rows, weight.cols()}}, weight.cols(), swapped, straight(weight.cols())});
+    put(bias, {{name + ".bias", {rows}}, rows, straight(1), swapped});
 }
 
 void TransformerWeights::add_block(uint32_t index, bool last)
 {
     BlockWeights& b = blocks[index];
     const uint32_t d = config_.dim(), streams = last ? 1 : 2, modulations = last ? 8 * d : 12 * d;
-    b.qkv = state_.slot(6 * d, d, precision_, "qkv");
-    b.qkv_bias = state_.slot(2, 3 * d, DType::f32, "qkv.bias");
-    b.out = state_.slot(streams * d, d, precision_, "out");
-    b.out_bias = state_.slot(streams, d, DType::f32, "out.bias");
-    b.ff_in = state_.slot(streams * 4 * d, d, precision_, "ff_in");
-    b.ff_in_bias = state_.slot(streams, 4 * d, DType::f32, "ff_in.bias");
-    b.ff_out = state_.slot(streams * d, 4 * d, precision_, "ff_out");
-    b.ff_out_bias = state_.slot(streams, d, DType::f32, "ff_out.bias");
-    b.modulation = state_.slot(modulations, d, precision_, "modulation");
-    b.modulation_bias = state_.slot(1, modulations, DType::f32, "modulation.bias");
+    b.qkv = add(6 * d, d, precision_, "qkv");
+    b.qkv_bias = add(2, 3 * d, DType::f32, "qkv.bias");
+    b.out = add(streams * d, d, precision_, "out");
+    b.out_bias = add(streams, d, DType::f32, "out.bias");
+    b.ff_in = add(streams * 4 * d, d, precision_, "ff_in");
+    b.ff_in_bias = add(streams, 4 * d, DType::f32, "ff_in.bias");
+    b.ff_out = add(streams * d, 4 * d, precision_, "ff_out");
+    b.ff_out_bias = add(streams, d, DType::f32, "ff_out.bias");
+    b.modulation = add(modulations, d, precision_, "modulation");
+    b.modulation_bias = add(1, modulations, DType::f32, "modulation.bias");
     const std::string block = fmt::format("transformer_blocks.{}.", index);
     for (uint32_t stream = 0; stream < 2; ++stream)
         add_stream(block, b, stream, last);
     if (!config_.qk_norm)
         return;
-    b.head_norms = state_.slot(4, config_.attention_head_dim, DType::f32, "head_norms");
+    b.head_norms = add(4, config_.attention_head_dim, DType::f32, "head_norms");
     const char* norms[] = {"norm_q", "norm_k", "norm_added_q", "norm_added_k"};
     for (uint32_t i = 0; i < 4; ++i)
-        parts_.push_back({block + "attn." + norms[i] + ".weight", 1, config_.attention_head_dim, true, 0,
-                          config_.attention_head_dim, b.head_norms, i, 0});
+        put(b.head_norms, {{block + "attn." + norms[i] + ".weight", {config_.attention_head_dim}},
+                           config_.attention_head_dim,
+                           straight(1, i),
+                           straight(config_.attention_head_dim)});
 }
 
 void TransformerWeights::add_stream(const std::string& block, const BlockWeights& b, uint32_t stream, bool last)
@@ -107,83 +127,34 @@ void TransformerWeights::add_stream(const std::string& block, const BlockWeights
     place(ff + ".net.2", b.ff_out, b.ff_out_bias, stream * d, d, stream);
 }
 
-uint64_t TransformerWeights::parameters() const
-{
-    uint64_t sum = 0;
-    for (const Part& p : parts_)
-        sum += uint64_t(p.count) * (p.vector ? 1 : p.cols);
-    return sum;
-}
-
-// values: the part's rows, unpadded; written in rows of the target with zero padding
-Status TransformerWeights::upload(Device& device, const Part& part, const float* values)
-{
-    const uint32_t rows = part.vector ? 1 : part.count, cols = part.vector ? part.count : part.cols;
-    const uint32_t ld = part.target.ld(), bytes = uint32_t(dtype_bytes(part.target.dtype()));
-    const uint32_t width = part.vector ? cols : ld; // a vector may be a piece of a row that others share
-    std::vector<std::byte> packed(size_t(rows) * width * bytes);
-    for (uint32_t r = 0; r < rows; ++r)
-        for (uint32_t c = 0; c < cols; ++c) {
-            const size_t at = (size_t(r) * width + c) * bytes;
-            const float v = values[size_t(r) * cols + c];
-            const uint16_t half = float_to_half(v);
-            std::memcpy(&packed[at], bytes == 2 ? static_cast<const void*>(&half) : &v, bytes);
-        }
-    const uint64_t at = (uint64_t(part.target_row) * ld + part.target_col) * bytes;
-    const BufferSlice memory = part.target.slice();
-    return device.write(memory.part(at, memory.bytes - at), packed);
-}
-
 Status TransformerWeights::load(Device& device, const SafetensorsSet& file, const LowRankAdapter& adapter,
                                 const LoadProgress& progress)
 {
-    std::map<std::string, TensorSpec> specs;
-    for (const Part& p : parts_) {
-        std::vector<uint64_t> shape{p.file_rows, p.cols};
-        if (p.vector)
-            shape = {p.cols};
-        specs[p.name] = {p.name, shape};
-    }
-    std::vector<TensorSpec> schema;
-    for (auto& [name, spec] : specs)
-        schema.push_back(std::move(spec));
+    const std::vector<TensorSpec> schema = schema_of(weights_);
     SR_CHECK(file.require(schema));
     SR_CHECK(adapter.require(schema));
     SR_CHECK(state_.allocate(device, "transformer weights"));
-    std::vector<float> values;
-    for (const Part& p : parts_) {
-        const TensorInfo* info = file.find(p.name);
-        if (!p.first)
-            SR_CHECK(check_finite(file, *info));
-        const uint64_t row = (p.vector ? 1 : p.cols) * dtype_bytes(info->dtype);
-        const auto bytes = file.bytes(*info).subspan(p.first * row, p.count * row);
-        values.resize(bytes.size() / dtype_bytes(info->dtype));
-        to_float(bytes, info->dtype, values.data());
-        adapter.add(p.name, p.first, p.cols, values);
-        SR_CHECK(upload(device, p, values.data()));
-        if (progress)
-            SR_CHECK(progress(values.size() * dtype_bytes(p.target.dtype())));
-    }
-    return {};
+    const auto values = [&](const TensorSpec& spec, std::vector<float>& scratch) -> Result<TensorValues> {
+        const TensorInfo* info = file.find(spec.name);
+        const TensorValues in_file{file.bytes(*info), info->dtype, file.path(), spec.name};
+        if (!adapter.has(spec.name))
+            return in_file;
+        SR_CHECK(check_finite(file, *info));
+        scratch.resize(info->elements());
+        to_float(in_file.bytes, info->dtype, scratch.data());
+        adapter.add(spec.name, scratch);
+        return TensorValues{std::as_bytes(std::span(scratch)), DType::f32, file.path(), spec.name};
+    };
+    return load_weights(device, weights_, values, progress);
 }
 
 Status TransformerWeights::randomize(Device& device, uint64_t seed)
 {
     SR_CHECK(state_.allocate(device, "transformer weights"));
-    uint64_t state = seed * 0x9e3779b97f4a7c15ull + 1;
-    std::vector<float> values;
-    for (const Part& p : parts_) {
-        values.resize(size_t(p.count) * (p.vector ? 1 : p.cols));
-        const float scale = p.vector ? 0.02f : 1.f / std::sqrt(float(p.cols));
-        for (float& v : values) {
-            state ^= state << 13;
-            state ^= state >> 7;
-            state ^= state << 17;
-            v = scale * 1.7320508f * (float(state >> 40) / 8388608.f - 1); // uniform, variance scale^2
-        }
-        SR_CHECK(upload(device, p, values.data()));
-    }
-    return {};
+    return load_weights(device, weights_, [&](const TensorSpec& spec, std::vector<float>& scratch) {
+        random_tensor(seed, spec, scratch);
+        return Result<TensorValues>({std::as_bytes(std::span(scratch)), DType::f32, {}, spec.name});
+    });
 }
 
 } // namespace semrover

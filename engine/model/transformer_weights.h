@@ -2,12 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "engine/model/load_progress.h"
 #include "engine/model/low_rank.h"
 #include "engine/model/transformer_config.h"
-#include "runtime/base/safetensors.h"
-#include "runtime/device/device.h"
-#include "runtime/device/state.h"
+#include "engine/model/weight_loader.h"
 
 namespace semrover {
 
@@ -29,7 +26,7 @@ class TransformerWeights {
     TransformerWeights(const TransformerConfig& config, DType precision);
 
     uint64_t device_bytes(const DeviceLimits& limits) const { return state_.planned_bytes(limits); }
-    uint64_t parameters() const;
+    uint64_t parameters() const { return parameters_of(weights_); }
 
     // checks every name and shape, then uploads, with what the adapter adds. Errors: bad_input, out_of_memory
     Status load(Device& device, const SafetensorsSet& file, const LowRankAdapter& adapter,
@@ -47,26 +44,19 @@ class TransformerWeights {
     uint32_t streams(size_t block) const { return block + 1 < blocks.size() ? 2 : 1; }
 
   private:
-    // rows of one file tensor and where they go
-    struct Part {
-        std::string name;
-        uint32_t file_rows, cols; // the tensor in the file; a vector has one row
-        bool vector;
-        uint32_t first, count; // rows (or elements of a vector) taken
-        Slot target;
-        uint32_t target_row, target_col;
-    };
+    Slot add(uint32_t rows, uint32_t cols, DType dtype, std::string_view name);
+    void put(const Slot& slot, WeightPart part);
+    void place(const std::string& name, const Slot& weight);
     void place(const std::string& name, const Slot& weight, const Slot& bias, uint32_t row, uint32_t rows,
                uint32_t bias_row = 0, uint32_t bias_col = 0);
     void place_swapped(const std::string& name, const Slot& weight, const Slot& bias, uint32_t row, uint32_t rows);
     void add_block(uint32_t index, bool last);
     void add_stream(const std::string& block, const BlockWeights& b, uint32_t stream, bool last);
-    Status upload(Device& device, const Part& part, const float* values);
 
     TransformerConfig config_;
     DType precision_;
     State state_;
-    std::vector<Part> parts_;
+    std::vector<WeightLayout> weights_; // in the order of their declaration
 };
 
 } // namespace semrover

@@ -53,13 +53,7 @@ FeatureMap convolve(Graph& g, const NetworkWeights& w, const Layer& layer, Featu
                     const ConvAddends& addends)
 {
     options.dtype = w.precision();
-    const Tensor weight = layer.weight.in(g), bias = layer.bias.in(g);
-    if (prefers_winograd(w.limits(), x, weight.rows, options))
-        return winograd_conv2d(g, x, winograd_weight(g, weight), bias, options, addends);
-    FeatureMap y = conv2d(g, x, {}, weight, bias, options);
-    if (addends.shift.table.valid())
-        y = channel_shift(g, y, addends.shift);
-    return addends.residual.valid() ? y.with(add(g, y.data, addends.residual.data)) : y;
+    return convolution(g, x, layer.weight.in(g), layer.bias.in(g), options, addends);
 }
 
 Tensor project(Graph& g, const NetworkWeights& w, const Layer& layer, Tensor x)

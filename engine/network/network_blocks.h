@@ -27,7 +27,7 @@ ResnetBlock declare_resnet(NetworkWeights& weights, const std::string& name, con
 [[nodiscard]] FeatureMap resnet(Graph& g, const NetworkWeights& weights, const ResnetBlock& block, NormInput x,
                                 NormInput x2, const ChannelShift& shift = {});
 
-// y = conv(x) + shift + residual, by Winograd's algorithm or directly, whichever the device prefers
+// y = conv(x) + shift + residual, as convolution()
 [[nodiscard]] FeatureMap convolve(Graph& g, const NetworkWeights& weights, const Layer& layer, FeatureMap x,
                                   ConvOptions options = {}, const ConvAddends& addends = {});
 // y = x w^T + b
@@ -48,7 +48,7 @@ struct FrameResnet {
 struct FrameResnetShape {
     uint32_t channels, groups;
     float eps = 1e-5f, stream = 1;
-    bool switched = false; // the time mixer's share: NetworkWeights::FrameShare
+    bool switched = false; // the time mixer's share: FrameShare
 };
 // name: of the SpatioTemporalResBlock
 FrameResnet declare_frame_resnet(NetworkWeights& weights, const std::string& name, const FrameResnetShape& shape);

@@ -44,7 +44,7 @@ struct Unet::Impl {
     Slot frequencies, added_frequencies;
     std::map<uint32_t, Slot> frame_frequencies; // by the channels of a transformer
 
-    Impl(const UnetConfig& c, DType precision, const DeviceLimits& limits) : config(c), weights(precision, limits)
+    Impl(const UnetConfig& c, DType precision) : config(c), weights(precision)
     {
         std::vector<NetworkWeights::Part> shifts, context_parts;
         declare_ends();
@@ -293,15 +293,15 @@ struct Unet::Impl {
 Unet::Unet(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Unet::~Unet() = default;
 
-std::unique_ptr<Unet> Unet::plan(const UnetConfig& config, DType precision, const DeviceLimits& limits)
+std::unique_ptr<Unet> Unet::plan(const UnetConfig& config, DType precision)
 {
-    return std::unique_ptr<Unet>(new Unet(std::make_unique<Impl>(config, precision, limits)));
+    return std::unique_ptr<Unet>(new Unet(std::make_unique<Impl>(config, precision)));
 }
 
 Result<std::unique_ptr<Unet>> Unet::load(Device& device, const UnetConfig& config, const Checkpoint& weights,
                                          DType precision, const LoadProgress& progress)
 {
-    std::unique_ptr<Unet> unet = plan(config, precision, device.limits());
+    std::unique_ptr<Unet> unet = plan(config, precision);
     SR_CHECK(unet->impl_->weights.load(device, weights, unet_schema(config), progress));
     SR_CHECK(unet->impl_->upload_frequencies(device));
     return unet;

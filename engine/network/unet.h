@@ -21,7 +21,7 @@ class Unet {
     static Result<std::unique_ptr<Unet>> load(Device& device, const UnetConfig& config, const Checkpoint& weights,
                                               DType precision, const LoadProgress& progress = {});
     // lays out the weights without loading them, to plan memory
-    static std::unique_ptr<Unet> plan(const UnetConfig& config, DType precision, const DeviceLimits& limits);
+    static std::unique_ptr<Unet> plan(const UnetConfig& config, DType precision);
 
     const UnetConfig& config() const;
     DType precision() const;

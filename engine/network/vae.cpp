@@ -41,8 +41,8 @@ struct VaeHalf {
     MidBlock mid;
     std::vector<VaeLevel> levels; // in the order in which they run
 
-    VaeHalf(const VaeConfig& config, DType precision, const DeviceLimits& limits)
-        : weights(precision, limits), stream(precision == DType::f16 && config.force_upcast ? kHalfStream : 1.f)
+    VaeHalf(const VaeConfig& config, DType precision)
+        : weights(precision), stream(precision == DType::f16 && config.force_upcast ? kHalfStream : 1.f)
     {
     }
 };
@@ -61,8 +61,8 @@ struct Vae::Impl {
     VaeHalf encoder, decoder;
     Layer quant_conv, post_quant_conv;
 
-    Impl(const VaeConfig& c, DType precision, const DeviceLimits& limits)
-        : config(c), encoder(c, encoder_precision(c, precision), limits), decoder(c, precision, limits)
+    Impl(const VaeConfig& c, DType precision)
+        : config(c), encoder(c, encoder_precision(c, precision)), decoder(c, precision)
     {
         const uint32_t latent = config.latent_channels;
         declare_encoder();
@@ -180,55 +180,13 @@ struct Vae::Impl {
         return o;
     }
 
-    // softmax(q k^T) v of one wide head by GEMMs, which matrix units are made for. Values are made transposed, as the
-    // second GEMM wants them; their bias is added behind it, since the weights of a query add up to 1.
-    Tensor attention_by_products(Graph& g, const VaeHalf& half, const FeatureMap& n) const
-    {
-        constexpr uint32_t kMostScores = 1u << 22; // at a time, each in fp32
-        const Tensor weight = half.mid.qkv.weight.in(g), bias = half.mid.qkv.bias.in(g);
-        const uint32_t dim = weight.rows / 3, rows = n.image_rows();
-        const uint32_t piece = std::max(round_up(kMostScores / rows, kImageRowPadding), kImageRowPadding);
-        const DType dtype = half.weights.precision();
-        const Tensor qk = gemm(g, n.data, weight.row_range(0, 2 * dim), bias.col_range(0, 2 * dim), {.dtype = dtype});
-        const Tensor y = g.matrix(n.data.rows, dim, dtype, "attention");
-        const SoftmaxOptions options{n.pixels(), 1 / std::sqrt(float(config.block_out_channels.back())), dtype};
-        for (uint32_t image = 0; image < n.batch; ++image) {
-            const Tensor keys = qk.col_range(dim, dim).row_range(image * rows, rows);
-            const Tensor values = gemm(g, weight.row_range(2 * dim, dim), n.data.row_range(image * rows, rows), {},
-                                       {.dtype = dtype}); // [dim, rows]
-            for (uint32_t first = 0; first < rows; first += piece) {
-                const uint32_t at = image * rows + first, count = std::min(piece, rows - first);
-                const Tensor q = qk.col_range(0, dim).row_range(at, count);
-                const Tensor shares = softmax(g, gemm(g, q, keys, {}, {.dtype = DType::f32}), options);
-                (void)gemm(g, shares, values, bias.col_range(2 * dim, dim),
-                           {.dtype = dtype, .part = {.whole = y, .row = at}});
-            }
-        }
-        return y;
-    }
-
-    Tensor attention_by_blocks(Graph& g, const VaeHalf& half, const FeatureMap& n) const
-    {
-        const Tensor qkv = project(g, half.weights, half.mid.qkv, n.data);
-        FlashAttentionOptions o;
-        o.head_dim = qkv.cols / 3;
-        o.scale = 1 / std::sqrt(float(config.block_out_channels.back()));
-        o.batch = n.batch;
-        o.queries = o.keys = n.pixels();
-        o.query_rows = o.key_rows = n.image_rows();
-        o.k_col = o.head_dim;
-        o.v_col = 2 * o.head_dim;
-        return flash_attention(g, qkv, qkv, o);
-    }
-
     FeatureMap attention(Graph& g, const VaeHalf& half, NormInput x) const
     {
         const FeatureMap n = normalize(g, half.mid.norm, norm_options(half, false), x);
-        const DeviceLimits& limits = half.weights.limits();
-        const bool aligned = n.channels() * dtype_bytes(DType::f16) % limits.offset_alignment == 0; // parts of q, k, v
-        const bool products = aligned && half.weights.precision() == DType::f16 && has_matrix_units(limits);
-        const Tensor y = products ? attention_by_products(g, half, n) : attention_by_blocks(g, half, n);
-        return x.x.with(add(g, project(g, half.weights, half.mid.out, y), x.x.data));
+        const Layer& qkv = half.mid.qkv;
+        const float scale = 1 / std::sqrt(float(config.block_out_channels.back()));
+        const FeatureMap y = image_attention(g, n, qkv.weight.in(g), qkv.bias.in(g), scale);
+        return x.x.with(add(g, project(g, half.weights, half.mid.out, y.data), x.x.data));
     }
 
     // the images of a video are its frames
@@ -283,15 +241,15 @@ struct Vae::Impl {
 Vae::Vae(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Vae::~Vae() = default;
 
-std::unique_ptr<Vae> Vae::plan(const VaeConfig& config, DType precision, const DeviceLimits& limits)
+std::unique_ptr<Vae> Vae::plan(const VaeConfig& config, DType precision)
 {
-    return std::unique_ptr<Vae>(new Vae(std::make_unique<Impl>(config, precision, limits)));
+    return std::unique_ptr<Vae>(new Vae(std::make_unique<Impl>(config, precision)));
 }
 
 Result<std::unique_ptr<Vae>> Vae::load(Device& device, const VaeConfig& config, const Checkpoint& weights,
                                        DType precision, const LoadProgress& progress)
 {
-    std::unique_ptr<Vae> vae = plan(config, precision, device.limits());
+    std::unique_ptr<Vae> vae = plan(config, precision);
     for (VaeHalf* half : {&vae->impl_->encoder, &vae->impl_->decoder})
         SR_CHECK(half->weights.load(device, weights, vae_schema(config), progress));
     return vae;

@@ -21,7 +21,7 @@ class Vae {
     static Result<std::unique_ptr<Vae>> load(Device& device, const VaeConfig& config, const Checkpoint& weights,
                                              DType precision, const LoadProgress& progress = {});
     // lays out the weights without loading them, to plan memory
-    static std::unique_ptr<Vae> plan(const VaeConfig& config, DType precision, const DeviceLimits& limits);
+    static std::unique_ptr<Vae> plan(const VaeConfig& config, DType precision);
 
     const VaeConfig& config() const;
     uint64_t parameters() const;

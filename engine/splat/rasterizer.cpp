@@ -221,7 +221,7 @@ Status Rasterizer::build()
     SR_CHECK(state_.allocate(device_, "splat images"));
     if (sweep_rows_.valid())
         SR_CHECK(sweep_rows_.write(device_, options_.sweep_rows));
-    Graph g;
+    Graph g(device_.limits());
     SplatOptions o{.width = width_,
                    .height = height_,
                    .lens = lens(),

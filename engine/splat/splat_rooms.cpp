@@ -57,7 +57,7 @@ Result<SplatRooms::Room*> SplatRooms::room_for(size_t points, const PointSplatOp
     SR_TRY(SplatScene scene, SplatScene::reserve(device_, rows, false));
     auto room = std::make_unique<Room>(Room{options, std::move(scene), nullptr, nullptr});
     SR_TRY(room->upload, Buffer::create(device_, uint64_t(rows) * kRowBytes, MemoryKind::staging, "points of a tile"));
-    Graph g;
+    Graph g(device_.limits());
     room->scene.derive(g, options);
     SR_TRY(room->program, Program::create(device_, g));
     return rooms_.emplace_back(std::move(room)).get();

@@ -101,7 +101,7 @@ Result<SplatScene> SplatScene::create(Device& device, const ScenePoints& points,
     SR_CHECK(scene.upload(host));
     if (!n)
         return scene;
-    Graph g;
+    Graph g(device.limits());
     scene.derive(g, options);
     SR_TRY(const auto program, Program::create(device, g));
     SR_CHECK(program->run());

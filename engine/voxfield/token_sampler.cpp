@@ -62,7 +62,7 @@ struct TokenSampler::Batch {
     }
     Graph prepare_graph(const TokenSampler& s) const
     {
-        Graph g;
+        Graph g(s.device_.limits());
         const Transformer& t = s.transformer_;
         const TokenContext c = context(g, s.halves_);
         g.keep(t.neighbors(g, c, rows, s.options_.guidance.radius), mask);
@@ -85,7 +85,7 @@ struct TokenSampler::Batch {
     }
     Graph step_graph(const TokenSampler& s, uint32_t halves) const
     {
-        Graph g;
+        Graph g(s.device_.limits());
         const Transformer& t = s.transformer_;
         const StepTable steps = s.step_table(g);
         const Tensor state_x = x.in(g), current = table_row.row_range(0, 2 * rows * halves).in(g);
@@ -99,7 +99,7 @@ struct TokenSampler::Batch {
     }
     Graph undo_graph(const TokenSampler& s) const
     {
-        Graph g;
+        Graph g(s.device_.limits());
         const StepTable steps = s.step_table(g);
         step_renoise(g, steps, noise(g, s, steps), x.in(g));
         if (s.plan_.known == KnownTokens::clean)
@@ -109,7 +109,7 @@ struct TokenSampler::Batch {
     }
     Graph decode_graph(const TokenSampler& s) const
     {
-        Graph g;
+        Graph g(s.device_.limits());
         g.keep(decode_tokens(g, x.in(g), s.normalization_.in(g), s.transformer_.config().voxel_size / 2), points);
         return g;
     }
@@ -188,7 +188,7 @@ Status TokenSampler::upload_normalization()
 
 Status TokenSampler::make_modulations()
 {
-    Graph g;
+    Graph g(device_.limits());
     transformer_.modulations(g, timesteps_.in(g), table_.in(g));
     SR_TRY(modulations_, Program::create(device_, g));
     return {};
@@ -247,7 +247,7 @@ Result<uint64_t> TokenSampler::planned_bytes(uint32_t regions, uint32_t cells) c
     if (halves_ == 2 && unguided_steps_)
         graphs.push_back(b.step_graph(*this, 1));
     for (const Graph& g : graphs) {
-        SR_TRY(const Plan plan, make_plan(g.desc(), device_.limits()));
+        SR_TRY(const Plan plan, make_plan(g));
         bytes += plan.arena_bytes();
     }
     return bytes;

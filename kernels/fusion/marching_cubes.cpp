@@ -38,13 +38,26 @@ void marching_cubes_count(Graph& g, const MarchingCubesField& f, Tensor table, c
                   counts.first_face.rows == blocks,
               "marching_cubes_count: cases of {} voxels, first vertices of {} blocks", counts.cases.rows,
               counts.first_vertex.rows);
-    g.dispatch(kernel::marching_cubes_classify, {f.bitmap, f.ranks, f.blocks, f.distances, f.attributes, counts.cases},
+    g.dispatch(kernel::marching_cubes_classify,
+               {{"Bitmap", f.bitmap},
+                {"Ranks", f.ranks},
+                {"Blocks", f.blocks},
+                {"Distances", f.distances},
+                {"Attributes", f.attributes},
+                {"Cases", counts.cases}},
                make_push(f, voxels), threads(voxels));
     const Tensor vertices = g.array(blocks, DType::u32, "vertices of blocks");
     const Tensor faces = g.array(blocks, DType::u32, "faces of blocks");
     g.dispatch(kernel::marching_cubes_count,
-               {f.bitmap, f.ranks, f.blocks, counts.cases, table, counts.edges, vertices, faces}, make_push(f, blocks),
-               threads(blocks * 64));
+               {{"Bitmap", f.bitmap},
+                {"Ranks", f.ranks},
+                {"Blocks", f.blocks},
+                {"Cases", counts.cases},
+                {"Table", table},
+                {"Edges", counts.edges},
+                {"Vertices", vertices},
+                {"Faces", faces}},
+               make_push(f, blocks), threads(blocks * 64));
     for (const auto& [sizes, first, total] :
          {std::tuple{vertices, counts.first_vertex, counts.vertices}, {faces, counts.first_face, counts.faces}}) {
         const PrefixSum sums = prefix_sum(g, sizes);
@@ -58,7 +71,14 @@ void marching_cubes_vertices(Graph& g, const MarchingCubesField& f, const Marchi
 {
     SR_ASSERT(vertices.ld == 4, "marching_cubes_vertices: rows of {} numbers", vertices.ld);
     g.dispatch(kernel::marching_cubes_vertices,
-               {f.bitmap, f.ranks, f.blocks, f.distances, f.attributes, counts.edges, counts.first_vertex, vertices},
+               {{"Bitmap", f.bitmap},
+                {"Ranks", f.ranks},
+                {"Blocks", f.blocks},
+                {"Distances", f.distances},
+                {"Attributes", f.attributes},
+                {"Edges", counts.edges},
+                {"First", counts.first_vertex},
+                {"Vertices", vertices}},
                make_push(f, range.count, range), threads(range.count * kTsdfBlockVoxels));
 }
 
@@ -66,10 +86,17 @@ void marching_cubes_faces(Graph& g, const MarchingCubesField& f, const MarchingC
                           const MarchingCubesRange& range, Tensor faces)
 {
     SR_ASSERT(faces.ld == 3, "marching_cubes_faces: rows of {} numbers", faces.ld);
-    g.dispatch(
-        kernel::marching_cubes_faces,
-        {f.bitmap, f.ranks, f.blocks, counts.cases, counts.edges, table, counts.first_vertex, counts.first_face, faces},
-        make_push(f, range.count, range), threads(range.count * 64));
+    g.dispatch(kernel::marching_cubes_faces,
+               {{"Bitmap", f.bitmap},
+                {"Ranks", f.ranks},
+                {"Blocks", f.blocks},
+                {"Cases", counts.cases},
+                {"Edges", counts.edges},
+                {"Table", table},
+                {"FirstVertex", counts.first_vertex},
+                {"FirstFace", counts.first_face},
+                {"Faces", faces}},
+               make_push(f, range.count, range), threads(range.count * 64));
 }
 
 } // namespace semrover

@@ -50,7 +50,7 @@ Tensor tsdf_planes(Graph& g, const TsdfFrames& frames, const TsdfOptions& option
               frames.frames.ld);
     const uint32_t rows = frames.pixels.rows;
     const Tensor planes = g.array(rows, DType::u32, "pixel planes", 4);
-    g.dispatch(kernel::tsdf_planes, {frames.frames, frames.pixels, planes},
+    g.dispatch(kernel::tsdf_planes, {{"Frames", frames.frames}, {"Pixels", frames.pixels}, {"Planes", planes}},
                make_push(options, rows, frames.frames.rows), threads(rows));
     return planes;
 }
@@ -59,21 +59,23 @@ void tsdf_touch(Graph& g, Tensor frames, Tensor planes, const TsdfOptions& optio
 {
     SR_ASSERT(bitmap.rows >= options.bitmap_words(), "tsdf_touch: a bitmap of {} words for {} x {} x {} blocks",
               bitmap.rows, options.blocks_x, options.blocks_y, options.blocks_z);
-    g.dispatch(kernel::tsdf_touch, {frames, planes, bitmap}, make_push(options, planes.rows, frames.rows),
-               threads(planes.rows));
+    g.dispatch(kernel::tsdf_touch, {{"Frames", frames}, {"Planes", planes}, {"Bitmap", bitmap}},
+               make_push(options, planes.rows, frames.rows), threads(planes.rows));
 }
 
 PrefixSum tsdf_rank(Graph& g, Tensor bitmap)
 {
     const Tensor counts = g.array(bitmap.rows, DType::u32, "bits of words");
-    g.dispatch(kernel::tsdf_count, {bitmap, counts}, make_push({}, bitmap.rows, 0), threads(bitmap.rows));
+    g.dispatch(kernel::tsdf_count, {{"Bitmap", bitmap}, {"Counts", counts}}, make_push({}, bitmap.rows, 0),
+               threads(bitmap.rows));
     return prefix_sum(g, counts);
 }
 
 void tsdf_list(Graph& g, Tensor bitmap, Tensor ranks, Tensor blocks)
 {
     SR_ASSERT(ranks.rows == bitmap.rows, "tsdf_list: {} ranks for {} words", ranks.rows, bitmap.rows);
-    g.dispatch(kernel::tsdf_list, {bitmap, ranks, blocks}, make_push({}, bitmap.rows, 0), threads(bitmap.rows));
+    g.dispatch(kernel::tsdf_list, {{"Bitmap", bitmap}, {"Ranks", ranks}, {"Blocks", blocks}},
+               make_push({}, bitmap.rows, 0), threads(bitmap.rows));
 }
 
 void tsdf_integrate(Graph& g, Tensor frames, Tensor planes, const TsdfOptions& options, const TsdfState& state)
@@ -82,7 +84,12 @@ void tsdf_integrate(Graph& g, Tensor frames, Tensor planes, const TsdfOptions& o
     const uint32_t voxels = state.blocks.rows * kTsdfBlockVoxels;
     DispatchOptions dispatch;
     dispatch.most_operations = 60.0 * voxels * frames.rows; // all voxels in front of the camera
-    g.dispatch(kernel::tsdf_integrate, {frames, planes, state.blocks, state.state, state.votes},
+    g.dispatch(kernel::tsdf_integrate,
+               {{"Frames", frames},
+                {"Planes", planes},
+                {"Blocks", state.blocks},
+                {"State", state.state},
+                {"Votes", state.votes}},
                make_push(options, voxels, frames.rows), threads(voxels), std::move(dispatch));
 }
 
@@ -92,8 +99,9 @@ void tsdf_finish(Graph& g, const TsdfState& state, const TsdfOptions& options, T
     const uint32_t voxels = state.blocks.rows * kTsdfBlockVoxels;
     SR_ASSERT(distances.rows == voxels && attributes.rows == voxels, "tsdf_finish: {} distances of {} voxels",
               distances.rows, voxels);
-    g.dispatch(kernel::tsdf_finish, {state.state, state.votes, distances, attributes}, make_push(options, voxels, 0),
-               threads(voxels));
+    g.dispatch(kernel::tsdf_finish,
+               {{"State", state.state}, {"Votes", state.votes}, {"Distances", distances}, {"Attributes", attributes}},
+               make_push(options, voxels, 0), threads(voxels));
 }
 
 } // namespace semrover

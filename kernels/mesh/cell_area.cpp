@@ -13,7 +13,14 @@ CellAreas cell_area(Graph& g, Tensor areas, Tensor labels, Tensor starts, uint32
               areas.rows, labels.rows, starts.rows);
     const CellAreas y{g.array(areas.rows, DType::f32, "area sums"), g.array(cells, DType::f32, "voxel areas"),
                       g.array(cells, DType::u32, "voxel labels"), g.array(cells, DType::f32, "unlabelled areas")};
-    g.dispatch(kernel::cell_area, {areas, labels, starts, y.sums, y.areas, y.labels, y.unlabelled},
+    g.dispatch(kernel::cell_area,
+               {{"Areas", areas},
+                {"Labels", labels},
+                {"Starts", starts},
+                {"Sums", y.sums},
+                {"Cells", y.areas},
+                {"CellLabels", y.labels},
+                {"Unlabelled", y.unlabelled}},
                CellAreaPush{.cells = cells}, threads(cells));
     return y;
 }

@@ -11,7 +11,7 @@ Tensor pair_cells(Graph& g, Tensor keys)
 {
     SR_ASSERT(keys.dtype == DType::u32 && keys.ld == 1, "pair_cells: keys [{}, {}]", keys.rows, keys.cols);
     const Tensor y = g.array(keys.rows, DType::u32, "pair voxels");
-    g.dispatch(kernel::pair_cells, {keys, y}, PairCellsPush{.size = keys.rows}, threads(keys.rows));
+    g.dispatch(kernel::pair_cells, {{"X", keys}, {"Y", y}}, PairCellsPush{.size = keys.rows}, threads(keys.rows));
     return y;
 }
 

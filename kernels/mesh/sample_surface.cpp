@@ -24,8 +24,17 @@ SurfaceSamples sample_surface(Graph& g, const SurfaceTriangles& s, Tensor triang
     const SampleSurfacePush push{
         .cells = cells.rows, .samples = samples, .seed_low = uint32_t(seed), .seed_high = uint32_t(seed >> 32)};
     g.dispatch(kernel::sample_surface,
-               {s.records, s.attributes, s.materials, s.textures, triangles, sums, starts, cells, y.points, y.addresses,
-                s.alphas},
+               {{"Triangles", s.records},
+                {"Attributes", s.attributes},
+                {"Materials", s.materials},
+                {"Textures", s.textures},
+                {"Values", triangles},
+                {"Sums", sums},
+                {"Starts", starts},
+                {"Cells", cells},
+                {"Samples", y.points},
+                {"Addresses", y.addresses},
+                {"Alphas", s.alphas}},
                push, threads(size),
                {.constants = {{"kCanonical", canonical}, {"kMasked", s.masked}},
                 .most_operations = size * kOperationsPerSample * (s.masked ? kMaskedAttempts : 1)});
@@ -37,8 +46,8 @@ void gather_texels(Graph& g, Tensor addresses, Tensor page, uint32_t first, Tens
     SR_ASSERT(addresses.rows * addresses.ld == y.rows * y.ld, "gather_texels: {} addresses, {} results",
               addresses.rows * addresses.ld, y.rows * y.ld);
     const GatherTexelsPush push{.size = addresses.rows * addresses.ld, .first = first, .texels = page.rows};
-    g.dispatch(kernel::gather_texels, {addresses, page, count.valid() ? count : addresses, y}, push, threads(push.size),
-               {.constants = {{"kCounted", count.valid()}}});
+    g.dispatch(kernel::gather_texels, {{"Addresses", addresses}, {"Page", page}, {"Count", count}, {"Y", y}}, push,
+               threads(push.size), {.constants = {{"kCounted", count.valid()}}});
 }
 
 Tensor surface_color(Graph& g, const SurfaceSamples& samples, Tensor texels, Tensor linear)
@@ -47,8 +56,8 @@ Tensor surface_color(Graph& g, const SurfaceSamples& samples, Tensor texels, Ten
               "surface_color: {} texels for {} samples, {} linear values", texels.rows * texels.ld, samples.points.rows,
               linear.rows);
     const Tensor y = g.array(samples.points.rows, DType::u32, "coloured samples", 4);
-    g.dispatch(kernel::surface_color, {samples.points, texels, linear, y}, SurfaceColorPush{.size = y.rows},
-               threads(y.rows));
+    g.dispatch(kernel::surface_color, {{"Samples", samples.points}, {"Texels", texels}, {"Linear", linear}, {"Y", y}},
+               SurfaceColorPush{.size = y.rows}, threads(y.rows));
     return y;
 }
 

@@ -14,7 +14,8 @@ void surface_distance(Graph& g, Tensor points, const SurfaceTree& tree, Tensor y
     SR_ASSERT(points.dtype == DType::f32 && points.cols >= 3 && y.rows == points.rows && tree.nodes.ld == 16 &&
                   tree.triangles.ld == 10 && y.ld == 2,
               "surface_distance: points [{}, {}], {} results", points.rows, points.cols, y.rows);
-    g.dispatch(kernel::surface_distance, {points, tree.nodes, tree.triangles, y},
+    g.dispatch(kernel::surface_distance,
+               {{"Points", points}, {"Nodes", tree.nodes}, {"Triangles", tree.triangles}, {"Y", y}},
                SurfaceDistancePush{.size = points.rows, .points_ld = points.ld}, threads(points.rows),
                {.most_operations = points.rows * kOperationsPerPoint});
 }

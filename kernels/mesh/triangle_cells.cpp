@@ -15,11 +15,12 @@ SurfacePairs triangle_cells(Graph& g, Tensor records, uint32_t capacity)
               records.rows, records.ld, dtype_name(records.dtype));
     const TriangleCellsPush push{.size = records.rows, .capacity = capacity};
     const Tensor counts = g.array(records.rows, DType::u32, "voxels of triangles");
-    g.dispatch(kernel::triangle_cells_count, {records, counts}, push, threads(records.rows));
+    g.dispatch(kernel::triangle_cells_count, {{"Triangles", records}, {"Counts", counts}}, push, threads(records.rows));
     const PrefixSum first = prefix_sum(g, counts);
     SurfacePairs pairs{g.array(capacity, DType::u32, "pair voxels"), g.array(capacity, DType::u32, "pair triangles"),
                        first.total};
-    g.dispatch(kernel::triangle_cells_emit, {records, first.sums, pairs.keys, pairs.triangles}, push,
+    g.dispatch(kernel::triangle_cells_emit,
+               {{"Triangles", records}, {"First", first.sums}, {"Keys", pairs.keys}, {"Values", pairs.triangles}}, push,
                threads(records.rows));
     return pairs;
 }

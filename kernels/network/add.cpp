@@ -16,7 +16,8 @@ Tensor add(Graph& g, Tensor x, Tensor residual, const PartOf& part)
     DispatchOptions options;
     options.absorbed_as = "kAdd";
     options.banded = {"X", "Residual", "Y"};
-    g.dispatch(kernel::add, {x, residual, y}, push, threads(x.rows * divide_up(x.cols, 8)), std::move(options));
+    g.dispatch(kernel::add, {{"X", x}, {"Residual", residual}, {"Y", y}}, push, threads(x.rows * divide_up(x.cols, 8)),
+               std::move(options));
     return y;
 }
 

@@ -5,6 +5,7 @@
 #include "kernels/network.h"
 
 #include "attention.spv.h"
+#include "kernels/network/matmul_tiles.h"
 #include "shaders/network/attention.h"
 
 #include <cmath>
@@ -33,12 +34,14 @@ Tensor attention(Graph& g, Tensor qkv, Tensor tiles, Tensor mask, uint32_t heads
     push.words = mask.cols;
     push.scale = 1.f / std::sqrt(float(head_dim));
     DispatchOptions options;
-    options.constants = {{"kChunks", head_dim / 8}};
-    if (head_dim > kMostMatrixDim)
-        options.without_needs = kNeedsCooperativeMatrix;
+    options.constants = matrix_constants(g.limits());
+    options.constants.push_back({"kChunks", head_dim / 8});
+    const uint32_t excluded = head_dim > kMostMatrixDim ? kNeedsCooperativeMatrix : 0u;
+    options.variant = &g.variant(kernel::attention, options.constants, std::vector{qkv}, excluded);
     options.flops =
         4.0 * streams * rows * (64.0 * mask.cols) * heads * head_dim; // an upper bound: masked blocks are skipped
-    g.dispatch(kernel::attention, {qkv, tiles, mask, y}, push, groups(tiles.rows, heads, streams), std::move(options));
+    g.dispatch(kernel::attention, {{"Qkv", qkv}, {"Tiles", tiles}, {"Mask", mask}, {"Y", y}}, push,
+               groups(tiles.rows, heads, streams), std::move(options));
     return y;
 }
 

@@ -15,7 +15,8 @@ Tensor blend(Graph& g, Tensor x, Tensor z, Tensor share)
     const BlendPush push{.rows = x.rows, .cols = x.cols, .x_ld = x.ld, .z_ld = z.ld, .y_ld = y.ld};
     DispatchOptions options;
     options.banded = {"X", "Z", "Y"};
-    g.dispatch(kernel::blend, {x, z, share, y}, push, threads(x.rows * divide_up(x.cols, 8)), std::move(options));
+    g.dispatch(kernel::blend, {{"X", x}, {"Z", z}, {"Share", share}, {"Y", y}}, push,
+               threads(x.rows * divide_up(x.cols, 8)), std::move(options));
     return y;
 }
 

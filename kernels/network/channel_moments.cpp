@@ -23,7 +23,8 @@ Tensor channel_moments(Graph& g, FeatureMap x)
     options.absorbed_as = "kMoments";
     options.keeps_x = true;
     options.banded = {"X", {"Moments", kImageRowPadding}};
-    g.dispatch(kernel::channel_moments, {x.data, moments}, push, threads(chunks * (width / 8)), std::move(options));
+    g.dispatch(kernel::channel_moments, {{"X", x.data}, {"Moments", moments}}, push, threads(chunks * (width / 8)),
+               std::move(options));
     return moments;
 }
 

@@ -25,7 +25,8 @@ FeatureMap channel_shift(Graph& g, FeatureMap x, const ChannelShift& shift)
     DispatchOptions options;
     options.absorbed_as = "kShift";
     options.banded = {"X", "Y"};
-    g.dispatch(kernel::channel_shift, {x.data, shift.table, shift.table_row, y.data}, push,
+    g.dispatch(kernel::channel_shift,
+               {{"X", x.data}, {"Shift", shift.table}, {"ShiftRow", shift.table_row}, {"Y", y.data}}, push,
                threads(x.data.rows * divide_up(x.channels(), 8)), std::move(options));
     return y;
 }

@@ -5,7 +5,10 @@
 #include "kernels/network.h"
 
 #include "conv2d.spv.h"
-#include "kernels/network/depth_step.h"
+#include "kernels/network/matmul_tiles.h"
+#include "split_k_reduce.spv.h"
+
+#include <bit>
 
 namespace semrover {
 
@@ -46,6 +49,41 @@ RowWindow window_of(FeatureMap x, const ConvOptions& o)
     w.out_width = (seen_width - taps.width) / o.stride + 1;
     w.out_image_rows = round_up(w.out_height * w.out_width, kImageRowPadding);
     return w;
+}
+
+// Sums over a long K by several workgroups, where few outputs would leave a large GPU idle: into how many slices K is
+// cut. By the size of an image, and not by how many there are: an image has the same bits in any batch.
+uint32_t slices_of(const KernelVariant& variant, const FeatureMap& y, uint32_t depth)
+{
+    constexpr uint32_t kTile = 64;           // of the output
+    constexpr uint32_t kEnoughTiles = 128;   // of an image: from here on nothing is gained
+    constexpr uint32_t kWantedTiles = 320;   // with slices
+    constexpr uint32_t kLeastColumns = 1024; // of K, in a slice
+    constexpr uint32_t kMostSlices = 16;
+    if (!variant.constant("kSlices"))
+        return 1;
+    const uint32_t tiles = divide_up(y.image_rows(), kTile) * divide_up(y.channels(), kTile);
+    if (tiles >= kEnoughTiles)
+        return 1;
+    const uint32_t most = std::min({kWantedTiles / tiles, depth / kLeastColumns, kMostSlices});
+    return most ? std::bit_floor(most) : 1;
+}
+
+// y = epilogue(sum of the slices): sums [images, H', W', slices * N], one after the other in a row
+void split_k_reduce(Graph& g, Tensor sums, uint32_t slices, Tensor bias, const FeatureMap& y)
+{
+    SplitKReducePush push{};
+    push.rows = y.data.rows;
+    push.cols = y.channels();
+    push.image_rows = y.image_rows();
+    push.x_ld = sums.ld;
+    push.y_ld = y.data.ld;
+    DispatchOptions dispatch;
+    dispatch.constants = {{"kSlices", slices}, {"kBias", bias.valid()}};
+    dispatch.banded = {"X", "Y"};
+    dispatch.variant = &g.variant(kernel::split_k_reduce);
+    g.dispatch(kernel::split_k_reduce, {{"X", sums}, {"Bias", bias}, {"Y", y.data}}, push,
+               tiles(push.rows, push.cols, 1, fixed_tile(*dispatch.variant)), std::move(dispatch));
 }
 
 } // namespace
@@ -102,21 +140,30 @@ FeatureMap conv2d(Graph& g, FeatureMap x, FeatureMap x2, Tensor w, Tensor bias, 
     DispatchOptions dispatch;
     dispatch.flops = 2.0 * x.batch * y.pixels() * w.rows * taps.height * taps.width *
                      (x.channels() + (x2.valid() ? x2.channels() : 0));
-    dispatch.constants = {{"kKernelHeight", taps.height},
-                          {"kKernelWidth", taps.width},
-                          {"kTwoInputs", x2.valid()},
-                          {"kBias", bias.valid()}};
-    dispatch.depth = depth;
-    dispatch.image_rows = y.image_rows();
-    dispatch.depth_step = depth_step({push.x_cols, push.x2_cols});
+    dispatch.variant = &g.variant(kernel::conv2d, {}, std::vector{x.data, w});
+    const uint32_t slices = slices_of(*dispatch.variant, y, depth);
+    const Tensor sums = slices > 1 ? g.matrix(y.data.rows, slices * y.data.ld, DType::f32, "slices") : Tensor{};
+    MatmulTiles made =
+        matmul_tiles(*dispatch.variant, g.limits(), {push.rows, push.cols, slices, {push.x_cols, push.x2_cols}});
+    push.col_lanes = made.col_lanes;
+    dispatch.alternatives = std::move(made.alternatives);
+    dispatch.constants = matrix_constants(g.limits());
+    for (const ConstantValue& c : {ConstantValue{"kKernelHeight", taps.height},
+                                   {"kKernelWidth", taps.width},
+                                   {"kTwoInputs", x2.valid()},
+                                   {"kBias", bias.valid() && slices == 1},
+                                   {"kSlices", slices}})
+        dispatch.constants.push_back(c);
     dispatch.banded = {{"X", window}, "Y"};
     if (x2.valid())
         dispatch.banded.push_back({"X2", window});
-    const Tensor unused = w.row_range(0, 1), second = x2.valid() ? x2.data : x.data.row_range(0, 1);
-    g.dispatch(
-        kernel::conv2d,
-        {x.data, w, bias.valid() ? bias : unused, unused, y.data.row_range(0, 1), y.data, unused, unused, second}, push,
-        tiles(push.rows, push.cols), std::move(dispatch));
+    if (slices > 1)
+        push.y_ld = sums.ld;
+    g.dispatch(kernel::conv2d,
+               {{"X", x.data}, {"X2", x2.data}, {"W", w}, {"Bias", bias}, {"Y", slices > 1 ? sums : y.data}}, push,
+               tiles(push.rows, push.cols, slices), std::move(dispatch));
+    if (slices > 1)
+        split_k_reduce(g, sums, slices, bias, y);
     return y;
 }
 

@@ -18,7 +18,7 @@ Tensor elementwise(Graph& g, const Kernel& kernel, Tensor x, const char* absorbe
     DispatchOptions options;
     options.absorbed_as = absorbed_as;
     options.banded = {"X", "Y"};
-    g.dispatch(kernel, {x, y}, push, threads(x.rows * (width / 8)), std::move(options));
+    g.dispatch(kernel, {{"X", x}, {"Y", y}}, push, threads(x.rows * (width / 8)), std::move(options));
     return y;
 }
 

@@ -26,7 +26,7 @@ Tensor embedding(Graph& g, Tensor index, Tensor table, Tensor x, DType dtype, co
         options.constants = {{"kAddX", 1}};
         options.banded.push_back("X");
     }
-    g.dispatch(kernel::embedding, {index, table, x.valid() ? x : table, y}, push,
+    g.dispatch(kernel::embedding, {{"Index", index}, {"Table", table}, {"X", x}, {"Y", y}}, push,
                threads(index.rows * divide_up(table.cols, 8)), std::move(options));
     return y;
 }

@@ -5,6 +5,7 @@
 #include "kernels/network.h"
 
 #include "flash_attention.spv.h"
+#include "kernels/network/matmul_tiles.h"
 
 #include <cmath>
 #include <numbers>
@@ -52,13 +53,16 @@ Tensor flash_attention(Graph& g, Tensor q, Tensor kv, const FlashAttentionOption
     push.chunks = chunks;
     push.scale = float(std::numbers::log2e * (o.scale > 0 ? o.scale : 1 / std::sqrt(double(o.head_dim))));
     DispatchOptions dispatch;
-    dispatch.constants = {{"kChunks", chunks}, {"kMostChunks", chunks <= 20 ? 20u : 64u}};
+    dispatch.constants = matrix_constants(g.limits());
+    dispatch.constants.push_back({"kChunks", chunks});
+    dispatch.constants.push_back({"kMostChunks", chunks <= 20 ? 20u : 64u});
     dispatch.flops = 4.0 * o.batch * o.query_rows * o.keys * o.heads * o.head_dim;
-    if (o.head_dim > kMostFlashMatrixDim)
-        dispatch.without_needs = kNeedsCooperativeMatrix;
+    const uint32_t excluded = o.head_dim > kMostFlashMatrixDim ? kNeedsCooperativeMatrix : 0u;
+    dispatch.variant = &g.variant(kernel::flash_attention, dispatch.constants, std::vector{q, kv}, excluded);
     if (o.batch == 1)
         dispatch.banded = {"Q", "Y"};
-    g.dispatch(kernel::flash_attention, {q, kv, y}, push, tiles(o.query_rows, o.heads, o.batch), std::move(dispatch));
+    g.dispatch(kernel::flash_attention, {{"Q", q}, {"Kv", kv}, {"Y", y}}, push,
+               tiles(o.query_rows, o.heads, o.batch, fixed_tile(*dispatch.variant)), std::move(dispatch));
     return y;
 }
 

@@ -31,7 +31,8 @@ Tensor frame_attention(Graph& g, Tensor qkv, const FrameAttentionOptions& o)
         DispatchOptions dispatch;
         dispatch.constants = {{"kFrames", o.frames}};
         dispatch.flops = 4.0 * o.frames * rows * width;
-        g.dispatch(kernel::frame_attention, {qkv.row_range(video * rows, rows), y.row_range(video * rows, rows)}, push,
+        g.dispatch(kernel::frame_attention,
+                   {{"Qkv", qkv.row_range(video * rows, rows)}, {"Y", y.row_range(video * rows, rows)}}, push,
                    threads(rows * o.heads), std::move(dispatch));
     }
     return y;

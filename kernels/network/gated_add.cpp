@@ -28,7 +28,8 @@ Tensor gated_add(Graph& g, Tensor x, Modulation gate, Tensor residual, uint32_t 
     options.absorbed_as = "kGatedAdd";
     if (groups == 1)
         options.banded = {"X", "GateRow", "Residual", "Y"};
-    g.dispatch(kernel::gated_add, {x, gate.table, gate.table_row, residual, y}, push,
+    g.dispatch(kernel::gated_add,
+               {{"X", x}, {"Gate", gate.table}, {"GateRow", gate.table_row}, {"Residual", residual}, {"Y", y}}, push,
                threads(x.rows * divide_up(x.cols, 8)), std::move(options));
     return y;
 }

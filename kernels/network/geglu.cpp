@@ -15,7 +15,7 @@ Tensor geglu(Graph& g, Tensor x)
     DispatchOptions options;
     options.absorbed_as = "kGeglu";
     options.banded = {"X", "Y"};
-    g.dispatch(kernel::geglu, {x, y}, push, threads(x.rows * (y.cols / 8)), std::move(options));
+    g.dispatch(kernel::geglu, {{"X", x}, {"Y", y}}, push, threads(x.rows * (y.cols / 8)), std::move(options));
     return y;
 }
 

@@ -4,7 +4,7 @@
 #include "kernels/network.h"
 
 #include "gemm.spv.h"
-#include "kernels/network/depth_step.h"
+#include "kernels/network/matmul_tiles.h"
 #include "shaders/network/gemm.h"
 
 namespace semrover {
@@ -30,15 +30,18 @@ Tensor gemm(Graph& g, Tensor x, Tensor w, Tensor bias, const GemmOptions& option
     SR_ASSERT(y.dtype == options.dtype, "gemm: {} written to {}", dtype_name(options.dtype), dtype_name(y.dtype));
     push.y_ld = y.ld;
     DispatchOptions dispatch;
+    dispatch.variant = &g.variant(kernel::gemm, {}, std::vector{x, w});
+    MatmulTiles made = matmul_tiles(*dispatch.variant, g.limits(), {push.rows, push.cols, groups, {push.depth}});
+    push.col_lanes = made.col_lanes;
+    dispatch.alternatives = std::move(made.alternatives);
     dispatch.flops = 2.0 * x.rows * push.cols * x.cols;
-    dispatch.depth_step = depth_step({push.depth});
+    dispatch.constants = matrix_constants(g.limits());
     if (bias.valid())
         dispatch.constants.push_back({"kBias", 1});
     if (groups == 1)
         dispatch.banded = {"X", "Y"};
-    const Tensor unused = w.row_range(0, 1); // of epilogues that are off
-    g.dispatch(kernel::gemm, {x, w, bias.valid() ? bias : unused, unused, y.row_range(0, 1), y, unused, unused}, push,
-               tiles(push.rows, push.cols, groups), std::move(dispatch));
+    g.dispatch(kernel::gemm, {{"X", x}, {"W", w}, {"Bias", bias}, {"Y", y}}, push, tiles(push.rows, push.cols, groups),
+               std::move(dispatch));
     return y;
 }
 

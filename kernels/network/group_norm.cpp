@@ -36,7 +36,7 @@ Tensor merge_chunks(Graph& g, NormInput x)
     push.cols = x.x.channels();
     push.moments_ld = x.moments.ld;
     push.merged_ld = y.ld;
-    g.dispatch(kernel::group_norm_merge, {x.moments, y}, push, threads(y.rows * push.cols));
+    g.dispatch(kernel::group_norm_merge, {{"Moments", x.moments}, {"Merged", y}}, push, threads(y.rows * push.cols));
     return y;
 }
 
@@ -69,7 +69,8 @@ Tensor channel_scale(Graph& g, NormInput x, NormInput x2, Tensor weight, const G
     push.scale_ld = scale.ld;
     push.group_cols = group_cols;
     push.eps = options.eps;
-    g.dispatch(kernel::group_norm_scale, {moments.x, moments.x2.valid() ? moments.x2 : moments.x, weight, scale}, push,
+    g.dispatch(kernel::group_norm_scale,
+               {{"Moments", moments.x}, {"Moments2", moments.x2}, {"Weight", weight}, {"Scale", scale}}, push,
                groups(options.groups, sets));
     return scale;
 }
@@ -105,8 +106,8 @@ FeatureMap group_norm(Graph& g, NormInput x, NormInput x2, Tensor weight, Tensor
     if (x2.x.valid())
         dispatch.banded.push_back("X2");
     g.dispatch(kernel::group_norm_apply,
-               {x.x.data, x2.x.valid() ? x2.x.data : x.x.data.row_range(0, 1), scale, bias, y.data}, push,
-               threads(divide_up(y.data.rows, kApplyRows) * divide_up(cols, 8)), std::move(dispatch));
+               {{"X", x.x.data}, {"X2", x2.x.data}, {"Scale", scale}, {"Bias", bias}, {"Y", y.data}}, push,
+               threads(divide_up(y.data.rows, kApplyRows) * divide_up(cols, 8), kApplyRows), std::move(dispatch));
     return y;
 }
 

@@ -22,7 +22,7 @@ Tensor head_rms_norm(Graph& g, Tensor qkv, Tensor weights, uint32_t heads, float
     push.y_ld = y.ld;
     push.weight_ld = weights.ld;
     push.eps = eps;
-    g.dispatch(kernel::head_rms_norm, {qkv, weights, y}, push, threads(qkv.rows * 3 * heads));
+    g.dispatch(kernel::head_rms_norm, {{"X", qkv}, {"Weight", weights}, {"Y", y}}, push, threads(qkv.rows * 3 * heads));
     return y;
 }
 

@@ -16,9 +16,11 @@ Tensor layer_norm(Graph& g, Tensor x, Tensor weight, Tensor bias, float eps)
     const Tensor y = g.matrix(x.rows, x.cols, x.dtype, "layer_norm");
     const LayerNormPush push{.rows = x.rows, .cols = x.cols, .x_ld = x.ld, .y_ld = y.ld, .eps = eps};
     DispatchOptions options;
+    options.variant = &g.variant(kernel::layer_norm);
     options.constants = {{"kKept", kept_sweeps(x.cols)}};
     options.banded = {"X", "Y"};
-    g.dispatch(kernel::layer_norm, {x, weight, bias, y}, push, row_tiles(x.rows), std::move(options));
+    g.dispatch(kernel::layer_norm, {{"X", x}, {"Weight", weight}, {"Bias", bias}, {"Y", y}}, push,
+               row_tiles(x.rows, options.variant->value("kTileM")), std::move(options));
     return y;
 }
 

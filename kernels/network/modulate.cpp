@@ -27,10 +27,12 @@ Tensor modulate(Graph& g, Tensor x, Modulation shift, uint32_t scale_col, float 
     push.eps = eps;
     const bool aligned = (shift.table.ld | shift.col | scale_col | shift.step) % 4 == 0;
     DispatchOptions options;
+    options.variant = &g.variant(kernel::modulate);
     options.constants = {{"kKept", kept_sweeps(x.cols)}, {"kAligned", aligned}};
     if (groups == 1)
         options.banded = {"X", "TableRow", "Y"};
-    g.dispatch(kernel::modulate, {x, shift.table, shift.table_row, y}, push, row_tiles(x.rows), std::move(options));
+    g.dispatch(kernel::modulate, {{"X", x}, {"Table", shift.table}, {"TableRow", shift.table_row}, {"Y", y}}, push,
+               row_tiles(x.rows, options.variant->value("kTileM")), std::move(options));
     return y;
 }
 

@@ -16,7 +16,8 @@ Tensor neighbor_mask(Graph& g, Tensor cells, Tensor sets, uint32_t longest_set, 
                                 .radius2 = radius.radius2,
                                 .near_row = radius.near_row,
                                 .near_radius2 = radius.near_radius2};
-    g.dispatch(kernel::neighbor_mask, {cells, sets, mask}, push, threads(cells.rows * words));
+    g.dispatch(kernel::neighbor_mask, {{"Cells", cells}, {"Sets", sets}, {"Mask", mask}}, push,
+               threads(cells.rows * words));
     return mask;
 }
 

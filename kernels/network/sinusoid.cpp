@@ -19,7 +19,8 @@ Tensor sinusoid(Graph& g, Tensor x, Tensor frequencies, bool cosines_lead, DType
     push.cosines_lead = cosines_lead;
     DispatchOptions options;
     options.banded = {"X", "Y"};
-    g.dispatch(kernel::sinusoid, {x, frequencies, y}, push, threads(x.rows * (y.ld / 2)), std::move(options));
+    g.dispatch(kernel::sinusoid, {{"X", x}, {"Frequencies", frequencies}, {"Y", y}}, push, threads(x.rows * (y.ld / 2)),
+               std::move(options));
     return y;
 }
 

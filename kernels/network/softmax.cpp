@@ -23,7 +23,7 @@ Tensor softmax(Graph& g, Tensor x, const SoftmaxOptions& options)
     push.scale = float(std::numbers::log2e * double(options.scale));
     DispatchOptions dispatch;
     dispatch.banded = {"X", "Y"};
-    g.dispatch(kernel::softmax, {x, y}, push, row_tiles(x.rows), std::move(dispatch));
+    g.dispatch(kernel::softmax, {{"X", x}, {"Y", y}}, push, row_tiles(x.rows, 1), std::move(dispatch));
     return y;
 }
 

@@ -1,11 +1,13 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // y[n] = bias[n] + sum over 3 x 3 taps and channels, from 36 products per channel and tile of 4 x 4 pixels:
+// U = G w G^T [36 * N, C],
 // V = B^T x B [36 * tiles, C], m = V U^T per product [36 * tiles, N], y = A^T m A + bias + shift + residual
 #include "kernels/network.h"
 
 #include "winograd_input.spv.h"
 #include "winograd_output.spv.h"
+#include "winograd_weight.spv.h"
 
 namespace semrover {
 
@@ -68,7 +70,7 @@ Tensor transform_input(Graph& g, const FeatureMap& x, const ConvOptions& o, cons
     push.cols = v.cols;
     push.x_ld = x.data.ld;
     push.v_ld = v.ld;
-    g.dispatch(kernel::winograd_input, {x.data, v}, push, threads(count * (v.cols / 4)));
+    g.dispatch(kernel::winograd_input, {{"X", x.data}, {"V", v}}, push, threads(count * (v.cols / 4)));
     return v;
 }
 
@@ -93,14 +95,27 @@ void transform_output(Graph& g, Tensor m, Tensor bias, const ConvAddends& add, c
     const bool shifted = add.shift.table.valid(), added = add.residual.valid();
     DispatchOptions options;
     options.constants = {{"kBias", bias.valid()}, {"kShift", shifted}, {"kAdd", added}};
-    const Tensor unused = m.row_range(0, 1);
     g.dispatch(kernel::winograd_output,
-               {m, bias.valid() ? bias : unused, y.data, shifted ? add.shift.table : unused,
-                shifted ? add.shift.table_row : unused, added ? add.residual.data : unused},
+               {{"M", m},
+                {"Bias", bias},
+                {"Y", y.data},
+                {"Shift", add.shift.table},
+                {"ShiftRow", add.shift.table_row},
+                {"Residual", add.residual.data}},
                push, threads(count * (push.cols / 4)), std::move(options));
 }
 
 } // namespace
+
+Tensor winograd_weight(Graph& g, Tensor w)
+{
+    const uint32_t cols = w.cols / 9;
+    SR_ASSERT(w.cols % (9 * kRowPadding) == 0, "winograd_weight: {} columns for nine taps", w.cols);
+    const Tensor u = g.matrix(36 * w.rows, cols, DType::f32, "winograd_weight");
+    const WinogradWeightPush push{.outputs = w.rows, .cols = cols, .w_ld = w.ld, .u_ld = u.ld};
+    g.dispatch(kernel::winograd_weight, {{"W", w}, {"U", u}}, push, threads(w.rows * (cols / 4)));
+    return u;
+}
 
 FeatureMap winograd_conv2d(Graph& g, FeatureMap x, Tensor u, Tensor bias, const ConvOptions& o, const ConvAddends& add)
 {

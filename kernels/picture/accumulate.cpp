@@ -23,8 +23,15 @@ Tensor accumulate(Graph& g, Tensor cameras, const FrameAndDepth& now, const Fram
                               .share = o.share,
                               .tolerance = o.tolerance,
                               .spread = o.spread};
-    g.dispatch(kernel::accumulate, {cameras, now.bytes, past.bytes, now.depth, past.depth, y}, push,
-               threads(divide_up(pixels, 4u)), {.constants = {{"kModel", uint32_t(o.lens)}, {"kMoving", o.moving}}});
+    g.dispatch(kernel::accumulate,
+               {{"Cameras", cameras},
+                {"Now", now.bytes},
+                {"Past", past.bytes},
+                {"DepthNow", now.depth},
+                {"DepthPast", past.depth},
+                {"Result", y}},
+               push, threads(divide_up(pixels, 4u)),
+               {.constants = {{"kModel", uint32_t(o.lens)}, {"kMoving", o.moving}}});
     return y;
 }
 

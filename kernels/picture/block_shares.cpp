@@ -21,7 +21,7 @@ Tensor block_shares(Graph& g, Tensor seen, const PictureShape& s, uint32_t block
     push.height = s.height;
     push.block = block;
     const Tensor y = g.array(push.rows, DType::f32, "shares");
-    g.dispatch(kernel::block_shares, {seen, y}, push, threads(push.rows));
+    g.dispatch(kernel::block_shares, {{"Pixels", seen}, {"Y", y}}, push, threads(push.rows));
     return y;
 }
 

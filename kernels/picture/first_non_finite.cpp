@@ -20,7 +20,7 @@ Tensor first_non_finite(Graph& g, Tensor x, const PictureShape& s)
                                   .width = s.width,
                                   .x_width = s.padded_width,
                                   .x_ld = x.ld};
-    g.dispatch(kernel::first_non_finite, {x, first}, push, threads(push.elements));
+    g.dispatch(kernel::first_non_finite, {{"X", x}, {"First", first}}, push, threads(push.elements));
     return first;
 }
 

@@ -16,7 +16,7 @@ Tensor picture_bytes(Graph& g, Tensor x, const PictureShape& s)
     const Tensor y = g.array(picture_words(s.width, s.height), DType::u32, "bytes");
     const PictureBytesPush push{
         .words = y.rows, .width = s.width, .height = s.height, .x_width = s.padded_width, .x_ld = x.ld};
-    g.dispatch(kernel::picture_bytes, {x, y}, push, threads(y.rows));
+    g.dispatch(kernel::picture_bytes, {{"X", x}, {"Bytes", y}}, push, threads(y.rows));
     return y;
 }
 

@@ -20,7 +20,7 @@ FeatureMap picture_input(Graph& g, Tensor seen, const PictureShape& s)
                                 .y_width = s.padded_width,
                                 .y_height = s.padded_height,
                                 .y_ld = y.data.ld};
-    g.dispatch(kernel::picture_input, {seen, y.data}, push, threads(push.rows));
+    g.dispatch(kernel::picture_input, {{"Pixels", seen}, {"Y", y.data}}, push, threads(push.rows));
     return y;
 }
 

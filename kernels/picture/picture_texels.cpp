@@ -12,7 +12,8 @@ Tensor picture_texels(Graph& g, Tensor bytes, uint32_t pixels)
     SR_ASSERT(bytes.dtype == DType::u32 && bytes.ld == 1 && bytes.rows == picture_words(pixels, 1),
               "picture_texels: {} words for {} pixels", bytes.rows, pixels);
     const Tensor y = g.array(pixels, DType::u32, "texels");
-    g.dispatch(kernel::picture_texels, {bytes, y}, PictureTexelsPush{.pixels = pixels}, threads(pixels));
+    g.dispatch(kernel::picture_texels, {{"Bytes", bytes}, {"Texels", y}}, PictureTexelsPush{.pixels = pixels},
+               threads(pixels));
     return y;
 }
 

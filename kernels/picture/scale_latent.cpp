@@ -22,7 +22,7 @@ Tensor scale_latent(Graph& g, Tensor x, uint32_t pixels, uint32_t cols, const La
                                .shift = scale.shift};
     DispatchOptions options;
     options.constants = {{"kBack", scale.back}};
-    g.dispatch(kernel::scale_latent, {x, y}, push, threads(y.rows * y.ld), std::move(options));
+    g.dispatch(kernel::scale_latent, {{"X", x}, {"Y", y}}, push, threads(y.rows * y.ld), std::move(options));
     return y;
 }
 

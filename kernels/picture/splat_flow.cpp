@@ -24,8 +24,14 @@ FlowTensors splat_flow(Graph& g, Tensor cameras, const FlowMoves& moves, const F
                              .mover_numbers = moves.rows.valid() ? moves.rows.rows : 0,
                              .tolerance = o.tolerance};
     g.dispatch(kernel::splat_flow,
-               {cameras, moves.moves, now.depth, now.owners, next_depth, moves.rows.valid() ? moves.rows : now.owners,
-                y.flow, y.states},
+               {{"Cameras", cameras},
+                {"Moves", moves.moves},
+                {"Depth", now.depth},
+                {"Owners", now.owners},
+                {"NextDepth", next_depth},
+                {"MoverRows", moves.rows},
+                {"Flow", y.flow},
+                {"States", y.states}},
                push, threads(pixels), {.constants = {{"kModel", uint32_t(o.lens)}, {"kMoving", o.moving}}});
     return y;
 }

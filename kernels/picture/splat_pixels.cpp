@@ -24,8 +24,14 @@ PixelWords splat_pixels(Graph& g, const SplatImages& images, const SplatPixelsOp
                                .visible_alpha = options.visible_alpha,
                                .depth_units = options.depth_units};
     g.dispatch(kernel::splat_pixels,
-               {images.color, images.surface, images.depth, images.ids, y.seen, y.depths, y.normals}, push,
-               threads(pixels));
+               {{"Color", images.color},
+                {"Surface", images.surface},
+                {"Depth", images.depth},
+                {"Ids", images.ids},
+                {"Seen", y.seen},
+                {"Depths", y.depths},
+                {"Normals", y.normals}},
+               push, threads(pixels));
     return y;
 }
 

@@ -39,7 +39,7 @@ Tensor splat_texels(Graph& g, Tensor x, uint32_t cameras, const PictureFormat& f
     const Tensor y = g.array(cameras * words, DType::u32, "texels");
     DispatchOptions options;
     options.constants = {{"kTexels", uint32_t(format.texels)}, {"kLinear", format.linear}, {"kScaled", format.scaled}};
-    g.dispatch(kernel::splat_texels, {x, format.scaled ? scale : x, y},
+    g.dispatch(kernel::splat_texels, {{"X", x}, {"Scale", scale}, {"Y", y}},
                SplatTexelsPush{.pixels = pixels, .numbers = x.ld, .words = words, .cameras = cameras}, threads(y.rows),
                std::move(options));
     return y;

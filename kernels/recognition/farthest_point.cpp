@@ -28,7 +28,9 @@ PointSamples farthest_point(Graph& g, Tensor points, uint32_t sets, uint32_t sam
     const uint32_t at_once = std::max(kMaxRounds / rounds, 2u) - 1; // the first of a dispatch is looked for once more
     for (; push.end < samples; push.first = push.end) {
         push.end = std::min(push.end + at_once, samples);
-        g.dispatch(kernel::farthest_point, {points, distances, y.index, y.points}, push, groups(sets));
+        g.dispatch(kernel::farthest_point,
+                   {{"Points", points}, {"Distances", distances}, {"Index", y.index}, {"Centers", y.points}}, push,
+                   groups(sets));
     }
     return y;
 }

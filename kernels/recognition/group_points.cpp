@@ -23,8 +23,9 @@ Tensor group_points(Graph& g, Tensor points, Tensor centers, Tensor features, Te
                                .y_ld = y.ld};
     DispatchOptions dispatch;
     dispatch.banded = {"Index", "Y"};
-    g.dispatch(kernel::group_points, {points, centers, features, index, y}, push, threads(y.rows * (y.ld / 8)),
-               std::move(dispatch));
+    g.dispatch(kernel::group_points,
+               {{"Points", points}, {"Centers", centers}, {"Features", features}, {"Index", index}, {"Y", y}}, push,
+               threads(y.rows * (y.ld / 8)), std::move(dispatch));
     return y;
 }
 

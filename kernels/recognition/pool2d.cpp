@@ -51,7 +51,8 @@ FeatureMap pool2d(Graph& g, FeatureMap x, const PoolOptions& o, const PartOf& pa
     DispatchOptions dispatch;
     dispatch.constants = {{"kMean", o.mean}};
     dispatch.banded = {{"X", window}, "Y"};
-    g.dispatch(kernel::pool2d, {x.data, y.data}, push, threads(push.rows * (push.width / 8)), std::move(dispatch));
+    g.dispatch(kernel::pool2d, {{"X", x.data}, {"Y", y.data}}, push, threads(push.rows * (push.width / 8)),
+               std::move(dispatch));
     return y;
 }
 

@@ -17,7 +17,7 @@ Tensor relu(Graph& g, Tensor x, const PartOf& part)
     DispatchOptions options;
     options.absorbed_as = "kRelu";
     options.banded = {"X", "Y"};
-    g.dispatch(kernel::relu, {x, y}, push, threads(x.rows * (width / 8)), std::move(options));
+    g.dispatch(kernel::relu, {{"X", x}, {"Y", y}}, push, threads(x.rows * (width / 8)), std::move(options));
     return y;
 }
 

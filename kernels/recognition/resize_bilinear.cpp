@@ -24,7 +24,8 @@ FeatureMap resize_bilinear(Graph& g, Tensor pixels, const ResizeOptions& o)
     push.y_ld = y.data.ld;
     DispatchOptions dispatch;
     dispatch.banded = {"Y"};
-    g.dispatch(kernel::resize_bilinear, {pixels, y.data}, push, threads(push.rows), std::move(dispatch));
+    g.dispatch(kernel::resize_bilinear, {{"Pixels", pixels}, {"Y", y.data}}, push, threads(push.rows),
+               std::move(dispatch));
     return y;
 }
 

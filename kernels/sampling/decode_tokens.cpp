@@ -16,7 +16,8 @@ Tensor decode_tokens(Graph& g, Tensor tokens, Tensor normalization, float half_v
     const uint32_t points = tokens.cols / 6;
     const Tensor y = g.array(tokens.rows, DType::u32, "points", 3 * points);
     const DecodeTokensPush push{.rows = tokens.rows, .ld = tokens.ld, .points = points, .half_voxel = half_voxel};
-    g.dispatch(kernel::decode_tokens, {tokens, normalization, y}, push, threads(tokens.rows * points));
+    g.dispatch(kernel::decode_tokens, {{"Tokens", tokens}, {"Normalization", normalization}, {"Y", y}}, push,
+               threads(tokens.rows * points));
     return y;
 }
 

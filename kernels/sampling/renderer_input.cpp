@@ -25,9 +25,15 @@ Tensor renderer_input(Graph& g, StepTable steps, Tensor x, const RendererFrame& 
     push.visible_ld = frame.visible.ld;
     push.y_ld = y.ld;
     push.latents = previous ? 3 : 2;
-    const Tensor second = previous ? frame.previous : frame.buffer.row_range(0, 1);
-    g.dispatch(kernel::renderer_input, {steps.clock, steps.rows, x, second, frame.buffer, frame.visible, y}, push,
-               threads(y.rows * (y.ld / 8)));
+    g.dispatch(kernel::renderer_input,
+               {{"Clock", steps.clock},
+                {"Steps", steps.rows},
+                {"X", x},
+                {"Previous", frame.previous},
+                {"Latent", frame.buffer},
+                {"Visible", frame.visible},
+                {"Y", y}},
+               push, threads(y.rows * (y.ld / 8)));
     return y;
 }
 

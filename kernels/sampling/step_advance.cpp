@@ -9,7 +9,7 @@ namespace semrover {
 
 void step_advance(Graph& g, Tensor clock)
 {
-    g.dispatch(kernel::step_advance, {clock}, groups(1));
+    g.dispatch(kernel::step_advance, {{"Clock", clock}}, groups(1));
 }
 
 } // namespace semrover

@@ -18,8 +18,15 @@ void step_carry(Graph& g, StepTable steps, const FrameWeights& weights, Tensor k
               "step_carry: {} known, fixed [{}, {}], x [{}, {}]", known.rows, fixed.rows, fixed.ld, x.rows, x.ld);
     const StepCarryPush push{
         .rows = x.rows, .ld = x.ld, .frames = frames, .frame_rows = x.rows / frames, .first_row = weights.first_row};
-    g.dispatch(kernel::step_carry, {steps.clock, steps.rows, weights.table, known, fixed, x, x0}, push,
-               threads(x.rows * (x.ld / 4)));
+    g.dispatch(kernel::step_carry,
+               {{"Clock", steps.clock},
+                {"Steps", steps.rows},
+                {"Weights", weights.table},
+                {"Known", known},
+                {"Fixed", fixed},
+                {"X", x},
+                {"X0", x0}},
+               push, threads(x.rows * (x.ld / 4)));
 }
 
 } // namespace semrover

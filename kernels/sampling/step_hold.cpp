@@ -12,7 +12,7 @@ void step_hold(Graph& g, Tensor known, Tensor fixed, Tensor x)
     SR_ASSERT(fixed.rows == x.rows && fixed.ld == x.ld && known.rows == x.rows,
               "step_hold: {} known, [{}, {}], [{}, {}]", known.rows, fixed.rows, fixed.ld, x.rows, x.ld);
     const StepHoldPush push{.rows = x.rows, .ld = x.ld};
-    g.dispatch(kernel::step_hold, {known, fixed, x}, push, threads(x.rows * (x.ld / 4)));
+    g.dispatch(kernel::step_hold, {{"Known", known}, {"Fixed", fixed}, {"X", x}}, push, threads(x.rows * (x.ld / 4)));
 }
 
 } // namespace semrover

@@ -17,7 +17,9 @@ Tensor step_noise(Graph& g, StepTable steps, Tensor cells, Tensor known, uint32_
     push.z_ld = z.ld;
     push.seed_low = uint32_t(seed);
     push.seed_high = uint32_t(seed >> 32);
-    g.dispatch(kernel::step_noise, {steps.clock, steps.rows, cells, known, z}, push, threads(z.rows * (z.ld / 4)));
+    g.dispatch(kernel::step_noise,
+               {{"Clock", steps.clock}, {"Steps", steps.rows}, {"Cells", cells}, {"Known", known}, {"Z", z}}, push,
+               threads(z.rows * (z.ld / 4)));
     return z;
 }
 

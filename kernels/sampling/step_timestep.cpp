@@ -10,7 +10,8 @@ namespace semrover {
 void step_timestep(Graph& g, StepTable steps, Tensor table_row)
 {
     const StepTimestepPush push{.rows = table_row.rows};
-    g.dispatch(kernel::step_timestep, {steps.clock, steps.rows, table_row}, push, threads(table_row.rows));
+    g.dispatch(kernel::step_timestep, {{"Clock", steps.clock}, {"Steps", steps.rows}, {"TableRow", table_row}}, push,
+               threads(table_row.rows));
 }
 
 } // namespace semrover

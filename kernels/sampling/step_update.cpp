@@ -24,8 +24,16 @@ void step_update(Graph& g, StepTable steps, Tensor m, Tensor z, Tensor known, Te
     push.guidance_step = guidance.frames > 1 ? (guidance.last - guidance.first) / float(guidance.frames - 1) : 0.f;
     push.frame_rows = x.rows / guidance.frames;
     push.clip = clip;
-    g.dispatch(kernel::step_update, {steps.clock, steps.rows, m, z, known, fixed, x, x0}, push,
-               threads(x.rows * (x.ld / 4)));
+    g.dispatch(kernel::step_update,
+               {{"Clock", steps.clock},
+                {"Steps", steps.rows},
+                {"M", m},
+                {"Z", z},
+                {"Known", known},
+                {"Fixed", fixed},
+                {"X", x},
+                {"X0", x0}},
+               push, threads(x.rows * (x.ld / 4)));
 }
 
 } // namespace semrover

@@ -13,7 +13,7 @@ Tensor bucket_starts(Graph& g, Tensor keys, uint32_t buckets, Tensor count)
     const Tensor starts = g.array(buckets + 1, DType::u32, "bucket starts");
     DispatchOptions options;
     options.constants = {{"kCounted", count.valid()}};
-    g.dispatch(kernel::bucket_starts, {keys, count.valid() ? count : keys, starts},
+    g.dispatch(kernel::bucket_starts, {{"Keys", keys}, {"Count", count}, {"Starts", starts}},
                BucketStartsPush{.size = keys.rows, .buckets = buckets}, threads(buckets + 1), std::move(options));
     return starts;
 }

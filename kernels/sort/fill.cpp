@@ -10,7 +10,7 @@ namespace semrover {
 Tensor fill(Graph& g, uint32_t size, uint32_t value)
 {
     const Tensor y = g.array(size, DType::u32, "fill");
-    g.dispatch(kernel::fill, {y}, FillPush{.size = size, .value = value}, threads(size));
+    g.dispatch(kernel::fill, {{"Y", y}}, FillPush{.size = size, .value = value}, threads(size));
     return y;
 }
 

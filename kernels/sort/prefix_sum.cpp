@@ -27,12 +27,16 @@ PrefixSum prefix_sum(Graph& g, Tensor x, const PrefixSumOptions& options)
     const Tensor first = g.array(push.workers, DType::u32, "sums before chunks");
     const Tensor total = g.array(1, DType::u32, "total");
     const Tensor y = g.array(x.rows, DType::u32, "prefix sums");
-    const Tensor count = options.count.valid() ? options.count : x;
     DispatchOptions dispatch;
     dispatch.constants = {{"kCounted", options.count.valid()}, {"kNonZero", options.non_zero}};
-    g.dispatch(kernel::prefix_sum_reduce, {x, count, partial}, push, tiles(push.workers, 1), dispatch);
-    g.dispatch(kernel::prefix_sum_spine, {partial, first, total}, push, groups(1));
-    g.dispatch(kernel::prefix_sum_apply, {x, count, first, y}, push, tiles(push.workers, 1), dispatch);
+    const auto workgroups = [&](const Kernel& kernel) {
+        return groups(divide_up(push.workers, g.variant(kernel).value("kWorkers")));
+    };
+    g.dispatch(kernel::prefix_sum_reduce, {{"X", x}, {"Count", options.count}, {"Partial", partial}}, push,
+               workgroups(kernel::prefix_sum_reduce), dispatch);
+    g.dispatch(kernel::prefix_sum_spine, {{"Partial", partial}, {"First", first}, {"Total", total}}, push, groups(1));
+    g.dispatch(kernel::prefix_sum_apply, {{"X", x}, {"Count", options.count}, {"First", first}, {"Y", y}}, push,
+               workgroups(kernel::prefix_sum_apply), dispatch);
     return {y, total};
 }
 

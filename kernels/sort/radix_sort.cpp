@@ -34,7 +34,10 @@ SortedPairs radix_sort(Graph& g, Tensor keys, Tensor values, const RadixSortOpti
               values.rows, keys.rows);
     const uint32_t passes = divide_up(options.bits, kDigitBits), digit = divide_up(options.bits, passes);
     RadixSortPush push{.size = keys.rows, .workers = workers_for(keys.rows), .shift = 0, .buckets = 0};
-    const Tensor count = options.count.valid() ? options.count : keys;
+    const Tensor count = options.count; // or none
+    const auto workgroups = [&](const Kernel& kernel) {
+        return groups(divide_up(push.workers, g.variant(kernel).value("kWorkers")));
+    };
     for (uint32_t pass = 0; pass < passes; ++pass) {
         push.shift = pass * digit;
         push.buckets = 1u << std::min(digit, options.bits - push.shift);
@@ -43,10 +46,17 @@ SortedPairs radix_sort(Graph& g, Tensor keys, Tensor values, const RadixSortOpti
                                 g.array(keys.rows, DType::u32, "sorted values")};
         DispatchOptions dispatch;
         dispatch.constants = {{"kCounted", options.count.valid()}, {"kIota", !values.valid()}};
-        g.dispatch(kernel::radix_sort_count, {keys, count, counters}, push, tiles(push.workers, 1), dispatch);
+        g.dispatch(kernel::radix_sort_count, {{"Keys", keys}, {"Count", count}, {"Counters", counters}}, push,
+                   workgroups(kernel::radix_sort_count), dispatch);
         const Tensor first = prefix_sum(g, counters).sums;
-        g.dispatch(kernel::radix_sort_scatter, {keys, count, values.valid() ? values : keys, first, to.keys, to.values},
-                   push, tiles(push.workers, 1), dispatch);
+        g.dispatch(kernel::radix_sort_scatter,
+                   {{"Keys", keys},
+                    {"Count", count},
+                    {"Values", values},
+                    {"First", first},
+                    {"SortedKeys", to.keys},
+                    {"SortedValues", to.values}},
+                   push, workgroups(kernel::radix_sort_scatter), dispatch);
         keys = to.keys;
         values = to.values;
     }

@@ -39,18 +39,27 @@ Tensor knn(Graph& g, Tensor points, const KnnOptions& options)
                        .min_same_label = labelled ? options.min_same_label : 0};
     const ConstantValue has_labels{"kLabels", labelled};
     const Tensor keys = g.array(rows, DType::u32, "cell hashes");
-    g.dispatch(kernel::knn_hash, {points, keys}, push, threads(rows));
+    g.dispatch(kernel::knn_hash, {{"Points", points}, {"Keys", keys}}, push, threads(rows));
     const SortedPairs order = radix_sort(g, keys, {}, {.bits = bits});
     const Tensor starts = bucket_starts(g, order.keys, 1u << bits);
     const Tensor sorted = g.array(rows, DType::f32, "sorted points", 4);
     const Tensor sorted_labels = g.array(rows, DType::u32, "sorted labels");
     g.dispatch(kernel::knn_gather,
-               {points, labelled ? options.labels : order.values, order.values, sorted, sorted_labels}, push,
-               threads(rows), {.constants = {has_labels}});
+               {{"Points", points},
+                {"Labels", options.labels},
+                {"Order", order.values},
+                {"Sorted", sorted},
+                {"SortedLabels", sorted_labels}},
+               push, threads(rows), {.constants = {has_labels}});
     const uint32_t sought = others ? push.queries : rows;
     const Tensor neighbors = g.array(sought, DType::u32, "neighbours", options.neighbors);
-    g.dispatch(kernel::knn_search, {sorted, sorted_labels, starts, others ? options.queries : sorted, neighbors}, push,
-               threads(sought),
+    g.dispatch(kernel::knn_search,
+               {{"Sorted", sorted},
+                {"SortedLabels", sorted_labels},
+                {"Starts", starts},
+                {"Queries", options.queries},
+                {"Neighbors", neighbors}},
+               push, threads(sought),
                {.constants = {{"kNeighbors", options.neighbors}, has_labels, {"kQueries", others}},
                 .most_operations = double(sought) * kCandidates * (16 + 6 * options.neighbors)});
     return neighbors;

@@ -21,7 +21,12 @@ PcaNormals pca_normal(Graph& g, Tensor points, Tensor neighbors, const PcaNormal
     const PcaNormals y = {g.array(rows, DType::f32, "normals", 4), g.array(rows, DType::f32, "eigenvalues", 4)};
     DispatchOptions dispatch;
     dispatch.constants = {{"kFallbacks", options.fallbacks}, {"kLabels", labelled}};
-    g.dispatch(kernel::pca_normal, {points, neighbors, labelled ? options.labels : neighbors, y.normals, y.eigenvalues},
+    g.dispatch(kernel::pca_normal,
+               {{"Points", points},
+                {"Neighbors", neighbors},
+                {"Labels", options.labels},
+                {"Normals", y.normals},
+                {"Eigenvalues", y.eigenvalues}},
                push, threads(rows), std::move(dispatch));
     return y;
 }

@@ -83,27 +83,38 @@ struct Seen {
 Seen project(Graph& g, const SplatTensors& scene, Tensor cameras, const SplatOptions& o, const SplatPush& push)
 {
     const bool pinhole = o.lens == SplatLens::pinhole;
-    const Tensor movers = o.movers.valid() ? o.movers : cameras;
-    const Tensor mover_rows = o.movers.valid() ? o.mover_rows : scene.owners;
     const uint32_t views = push.splats * push.cameras;
     DispatchOptions lens;
     lens.constants = {{"kMovers", o.movers.valid()}};
     if (!pinhole)
         lens.constants.insert(lens.constants.end(), {{"kModel", uint32_t(o.lens)}, {"kMoving", o.moving}});
     const Tensor keep = g.array(views, DType::u32, "keep");
-    const bool by_blocks = scene.blocks.valid();
     DispatchOptions cull = lens;
-    cull.constants.push_back({"kBlocks", by_blocks});
-    const Tensor blocks = by_blocks ? scene.blocks : scene.labels, rows = o.rows.valid() ? o.rows : scene.positions;
+    cull.constants.push_back({"kBlocks", scene.blocks.valid()});
     if (pinhole)
-        g.dispatch(
-            kernel::splat_cull,
-            {cameras, scene.positions, scene.normals, scene.colors, scene.owners, movers, mover_rows, keep, blocks},
-            push, threads(views), std::move(cull));
+        g.dispatch(kernel::splat_cull,
+                   {{"Cameras", cameras},
+                    {"Positions", scene.positions},
+                    {"Normals", scene.normals},
+                    {"Colors", scene.colors},
+                    {"Owners", scene.owners},
+                    {"Movers", o.movers},
+                    {"MoverRows", o.mover_rows},
+                    {"Keep", keep},
+                    {"Blocks", scene.blocks}},
+                   push, threads(views), std::move(cull));
     else
         g.dispatch(kernel::splat_lens_cull,
-                   {cameras, scene.positions, scene.normals, scene.colors, scene.owners, movers, mover_rows, keep,
-                    blocks, rows},
+                   {{"Cameras", cameras},
+                    {"Positions", scene.positions},
+                    {"Normals", scene.normals},
+                    {"Colors", scene.colors},
+                    {"Owners", scene.owners},
+                    {"Movers", o.movers},
+                    {"MoverRows", o.mover_rows},
+                    {"Keep", keep},
+                    {"Blocks", scene.blocks},
+                    {"Rows", o.rows}},
                    push, threads(views), std::move(cull));
     const PrefixSum slots = prefix_sum(g, keep, {.non_zero = true});
     const uint32_t texels = splat_record_bytes(o.lens, o.moving) / 16;
@@ -112,13 +123,34 @@ Seen project(Graph& g, const SplatTensors& scene, Tensor cameras, const SplatOpt
     const Tensor depths = g.array(push.max_visible, DType::u32, "splat depths");
     if (pinhole)
         g.dispatch(kernel::splat_project,
-                   {cameras, scene.positions, scene.normals, scene.colors, scene.owners, movers, mover_rows, keep,
-                    slots.sums, records, sources, depths},
+                   {{"Cameras", cameras},
+                    {"Positions", scene.positions},
+                    {"Normals", scene.normals},
+                    {"Colors", scene.colors},
+                    {"Owners", scene.owners},
+                    {"Movers", o.movers},
+                    {"MoverRows", o.mover_rows},
+                    {"Keep", keep},
+                    {"Slots", slots.sums},
+                    {"Records", records},
+                    {"Sources", sources},
+                    {"Depths", depths}},
                    push, threads(views), lens);
     else
         g.dispatch(kernel::splat_lens_project,
-                   {cameras, scene.positions, scene.normals, scene.colors, scene.owners, movers, mover_rows, keep,
-                    slots.sums, records, sources, depths, rows},
+                   {{"Cameras", cameras},
+                    {"Positions", scene.positions},
+                    {"Normals", scene.normals},
+                    {"Colors", scene.colors},
+                    {"Owners", scene.owners},
+                    {"Movers", o.movers},
+                    {"MoverRows", o.mover_rows},
+                    {"Keep", keep},
+                    {"Slots", slots.sums},
+                    {"Records", records},
+                    {"Sources", sources},
+                    {"Depths", depths},
+                    {"Rows", o.rows}},
                    push, threads(views), lens);
     return {records, sources, depths, slots.total};
 }
@@ -135,15 +167,23 @@ Tiled sort_into_tiles(Graph& g, const Seen& seen, const SplatOptions& o, const S
     lens.constants = {{"kTexels", splat_record_bytes(o.lens, o.moving) / 16}};
     const Tensor order = radix_sort(g, seen.depths, {}, {.count = seen.count}).values;
     const Tensor touched = g.array(push.max_visible, DType::u32, "tiles touched");
-    g.dispatch(kernel::splat_count, {seen.records, order, seen.count, touched}, push, threads(push.max_visible), lens);
+    g.dispatch(kernel::splat_count,
+               {{"Records", seen.records}, {"Order", order}, {"Count", seen.count}, {"Tiles", touched}}, push,
+               threads(push.max_visible), lens);
     const PrefixSum first = prefix_sum(g, touched, {.count = seen.count});
     const SortedPairs pairs = {g.array(push.max_pairs, DType::u32, "pair tiles"),
                                g.array(push.max_pairs, DType::u32, "pair records")};
     DispatchOptions emit = lens;
     emit.most_operations = 60.0 * push.max_pairs;
     g.dispatch(kernel::splat_emit,
-               {seen.records, seen.sources, order, seen.count, first.sums, pairs.keys, pairs.values}, push,
-               threads(push.max_visible), std::move(emit));
+               {{"Records", seen.records},
+                {"Sources", seen.sources},
+                {"Order", order},
+                {"Count", seen.count},
+                {"First", first.sums},
+                {"PairTiles", pairs.keys},
+                {"PairRecords", pairs.values}},
+               push, threads(push.max_visible), std::move(emit));
     const uint32_t bits = std::max(1, int(std::bit_width(tiles_all - 1)));
     const SortedPairs by_tile = radix_sort(g, pairs.keys, pairs.values, {.bits = bits, .count = first.total});
     return {by_tile.values, bucket_starts(g, by_tile.keys, tiles_all, first.total), first.total};
@@ -170,14 +210,28 @@ SplatImages splat(Graph& g, const SplatTensors& scene, Tensor cameras, const Spl
     blend.most_operations = 40.0 * push.max_pairs * options.tile * options.tile; // no pixel is done early
     for (size_t picture = 0; picture < options.made.size(); ++picture)
         blend.constants.push_back({kMade[picture], options.made[picture]});
-    const Grid grid = tiles(options.height, options.width, push.cameras);
+    const auto grid = [&](const Kernel& kernel) {
+        const KernelVariant& v = g.variant(kernel);
+        return tiles(options.height, options.width, push.cameras, {v.value("kTileM"), v.value("kTileN")});
+    };
     if (options.lens == SplatLens::pinhole) {
         const bool limited = options.limits.valid();
         blend.constants.push_back({"kLimited", limited});
         g.dispatch(kernel::splat_blend,
-                   {seen.records, by_tile.records, by_tile.starts, seen.sources, scene.labels, scene.cells, y.color,
-                    y.surface, y.depth, y.ids, limited ? options.limits : scene.positions, scene.owners, y.owners},
-                   push, grid, std::move(blend));
+                   {{"Records", seen.records},
+                    {"Pairs", by_tile.records},
+                    {"Starts", by_tile.starts},
+                    {"Sources", seen.sources},
+                    {"Labels", scene.labels},
+                    {"Cells", scene.cells},
+                    {"Color", y.color},
+                    {"Surface", y.surface},
+                    {"Depth", y.depth},
+                    {"Ids", y.ids},
+                    {"Limits", options.limits},
+                    {"Owners", scene.owners},
+                    {"Owner", y.owners}},
+                   push, grid(kernel::splat_blend), std::move(blend));
         return y;
     }
     const ConstantValue model{"kModel", uint32_t(options.lens)};
@@ -185,12 +239,23 @@ SplatImages splat(Graph& g, const SplatTensors& scene, Tensor cameras, const Spl
     blend.constants.push_back({"kMedianIds", options.lens == SplatLens::spinning});
     blend.constants.push_back({"kTexels", splat_record_bytes(options.lens, options.moving) / 16});
     const Tensor rays = g.array(options.moving ? 2 * pixels : pixels, DType::f32, "rays", 4);
-    g.dispatch(kernel::splat_rays, {cameras, rays, options.rows.valid() ? options.rows : scene.positions}, push,
+    g.dispatch(kernel::splat_rays, {{"Cameras", cameras}, {"Rays", rays}, {"Rows", options.rows}}, push,
                threads(pixels), {.constants = {model, {"kMoving", options.moving}}});
     g.dispatch(kernel::splat_ray_blend,
-               {seen.records, by_tile.records, by_tile.starts, seen.sources, scene.labels, scene.cells, y.color,
-                y.surface, y.depth, y.ids, rays, scene.owners, y.owners},
-               push, grid, std::move(blend));
+               {{"Records", seen.records},
+                {"Pairs", by_tile.records},
+                {"Starts", by_tile.starts},
+                {"Sources", seen.sources},
+                {"Labels", scene.labels},
+                {"Cells", scene.cells},
+                {"Color", y.color},
+                {"Surface", y.surface},
+                {"Depth", y.depth},
+                {"Ids", y.ids},
+                {"Rays", rays},
+                {"Owners", scene.owners},
+                {"Owner", y.owners}},
+               push, grid(kernel::splat_ray_blend), std::move(blend));
     return y;
 }
 

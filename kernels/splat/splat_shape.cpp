@@ -21,7 +21,10 @@ Tensor splat_shape(Graph& g, Tensor points, Tensor colors, Tensor neighbors, Ten
                               .smallest = size.smallest,
                               .largest = size.largest};
     const Tensor normals = g.array(rows, DType::f32, "splat normals", 4);
-    g.dispatch(kernel::splat_shape, {points, colors, neighbors, planes, normals}, push, threads(rows));
+    g.dispatch(
+        kernel::splat_shape,
+        {{"Points", points}, {"Colors", colors}, {"Neighbors", neighbors}, {"Planes", planes}, {"Normals", normals}},
+        push, threads(rows));
     return normals;
 }
 

@@ -28,12 +28,21 @@ Tensor shade(Graph& g, const TraceScene& scene, Tensor view, const ShadeOptions&
     DispatchOptions dispatch;
     dispatch.banded = {"Light", "Ambient", "Surfaces"};
     dispatch.most_operations = double(pixels) * options.samples * (2.5 + options.ambient_rays) * kOperationsPerRay;
-    g.dispatch(
-        kernel::shade,
-        {scene.nodes, scene.triangles, scene.corners, scene.materials, scene.texels, view, light, ambient, surfaces},
-        push, threads(pixels), std::move(dispatch));
+    g.dispatch(kernel::shade,
+               {{"Nodes", scene.nodes},
+                {"Triangles", scene.triangles},
+                {"Corners", scene.corners},
+                {"Materials", scene.materials},
+                {"Texels", scene.texels},
+                {"View", view},
+                {"Light", light},
+                {"Ambient", ambient},
+                {"Surfaces", surfaces}},
+               push, threads(pixels), std::move(dispatch));
     const Tensor picture = g.array(pixels, DType::u32, "picture", 4);
-    g.dispatch(kernel::shade_resolve, {light, ambient, surfaces, view, picture}, push, threads(pixels));
+    g.dispatch(kernel::shade_resolve,
+               {{"Light", light}, {"Ambient", ambient}, {"Surfaces", surfaces}, {"View", view}, {"Picture", picture}},
+               push, threads(pixels));
     return picture;
 }
 

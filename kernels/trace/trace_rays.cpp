@@ -16,8 +16,9 @@ Tensor trace_rays(Graph& g, const TraceScene& scene, Tensor rays, bool any)
     options.constants = {{"kAny", any}};
     options.banded = {"Rays", "Hits"};
     options.most_operations = rays.rows * kOperationsPerRay;
-    g.dispatch(kernel::trace_rays, {scene.nodes, scene.triangles, rays, hits}, push, threads(rays.rows),
-               std::move(options));
+    g.dispatch(kernel::trace_rays,
+               {{"Nodes", scene.nodes}, {"Triangles", scene.triangles}, {"Rays", rays}, {"Hits", hits}}, push,
+               threads(rays.rows), std::move(options));
     return hits;
 }
 

@@ -32,7 +32,7 @@ Result<std::shared_ptr<const Arena>> Arena::create(Device& device, const ArenaSi
 // transients become memory of the caller's, as slots are
 Result<std::unique_ptr<Program>> Arena::program(const Graph& graph) const
 {
-    SR_TRY(Plan plan, make_plan(graph.desc(), device_.limits(), device_.rates()));
+    SR_TRY(Plan plan, make_plan(graph, device_.costs()));
     for (size_t i = 0; i < plan.resources.size(); ++i) {
         Resource& r = plan.resources[i];
         const Placement& p = plan.placements[i];

@@ -5,13 +5,13 @@
 #include "runtime/base/diagnostics.h"
 #include "runtime/device/command.h"
 #include "runtime/device/cooperative_matrix.h"
-#include "runtime/device/copy_ring.h"
 #include "runtime/device/device_choice.h"
 #include "runtime/device/device_fault.h"
 #include "runtime/device/physical_device.h"
 #include "runtime/device/pipeline.h"
 #include "runtime/device/profile.h"
 #include "runtime/device/sharing.h"
+#include "runtime/device/staging.h"
 #include "runtime/graph/kernel.h"
 
 #include <algorithm>
@@ -88,6 +88,9 @@ Result<std::unique_ptr<Device>> Device::adopt(const HostDevice& host, const Devi
     d->take_allocation(options);
     SR_CHECK(d->vk_.load_instance(host.get_instance_proc_addr, host.instance));
     SR_CHECK(d->vk_.load_device(host.device));
+    d->vk_.SetDebugUtilsObjectNameEXT = nullptr; // the application does not say whether it enabled debug names
+    d->vk_.CmdBeginDebugUtilsLabelEXT = nullptr;
+    d->vk_.CmdEndDebugUtilsLabelEXT = nullptr;
     if (!is_compute_family(d->vk_, host.physical, host.queue_family))
         return fail(ErrorCode::usage, "queue family {} of the application's device has no compute", host.queue_family);
     if (host.work_queue && !is_compute_family(d->vk_, host.physical, host.work_queue_family))
@@ -277,14 +280,6 @@ Status Device::make_objects()
     type.semaphoreType = VK_SEMAPHORE_TYPE_TIMELINE;
     auto semaphore = vk_struct<VkSemaphoreCreateInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO, &type);
     SR_VK(vk_.CreateSemaphore(device_, &semaphore, vk_.allocator(), &timeline_));
-    auto pool = vk_struct<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
-    pool.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
-    pool.queueFamilyIndex = queue_.family;
-    SR_VK(vk_.CreateCommandPool(device_, &pool, vk_.allocator(), &copy_pool_));
-    auto commands = vk_struct<VkCommandBufferAllocateInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO);
-    commands.commandPool = copy_pool_;
-    commands.commandBufferCount = 1;
-    SR_VK(vk_.AllocateCommandBuffers(device_, &commands, &copy_commands_));
     return {};
 }
 
@@ -294,8 +289,6 @@ Device::~Device()
         (void)wait(ticket_); // a lost device has nothing left to wait for
     pipelines_.reset();
     staging_.reset();
-    if (copy_pool_)
-        vk_.DestroyCommandPool(device_, copy_pool_, vk_.allocator());
     if (timeline_)
         vk_.DestroySemaphore(device_, timeline_, vk_.allocator());
     if (!owned_)
@@ -398,7 +391,35 @@ Status Device::write(const BufferSlice& to, std::span<const std::byte> bytes)
         return {};
     }
     SR_TRY(Staging * window, staging());
-    return window->write(to, bytes);
+    SR_CHECK(window->write(to, bytes));
+    return wait(ticket_);
+}
+
+uint64_t Device::most_room() const
+{
+    return std::min(kStagingBytes, limits_.max_allocation) / 2;
+}
+
+Result<std::span<std::byte>> Device::room(const BufferSlice& to)
+{
+    host_bytes_.written += to.bytes;
+    if (std::byte* mapped = to.buffer->mapped())
+        return std::span(mapped + to.offset, to.bytes);
+    SR_TRY(Staging * window, staging());
+    return window->room(to);
+}
+
+Status Device::finish_writes()
+{
+    if (staging_)
+        SR_CHECK(staging_->flush());
+    return wait(ticket_);
+}
+
+void Device::drop_writes()
+{
+    if (staging_)
+        staging_->drop();
 }
 
 Status Device::read(const BufferSlice& from, std::span<std::byte> bytes)
@@ -435,19 +456,9 @@ Status Device::clear(const BufferSlice& slice)
         std::memset(mapped + slice.offset, 0, slice.bytes);
         return {};
     }
-    // fills are whole words: the bytes before and after them are copied
-    static constexpr std::byte kZeros[4]{};
-    const uint64_t end = slice.offset + slice.bytes, begin = std::min(round_up64(slice.offset, 4), end);
-    const uint64_t tail = std::max(end / 4 * 4, begin);
-    SR_CHECK(write(slice.part(0, begin - slice.offset), {kZeros, begin - slice.offset}));
-    SR_CHECK(write(slice.part(tail - slice.offset, end - tail), {kZeros, end - tail}));
-    if (begin == tail)
-        return {};
-    SR_CHECK(begin_commands(vk_, copy_commands_, true));
-    record_clear(vk_, copy_commands_, slice.buffer->handle(), begin, tail - begin);
-    SR_VK(vk_.EndCommandBuffer(copy_commands_));
-    SR_TRY(const uint64_t ticket, submit({&copy_commands_, 1}));
-    return wait(ticket);
+    SR_TRY(Staging * window, staging());
+    SR_CHECK(window->clear(slice));
+    return wait(ticket_);
 }
 
 } // namespace semrover

@@ -4,8 +4,9 @@
 
 #include "runtime/device/memory.h"
 #include "runtime/device/vulkan_calls.h"
+#include "runtime/graph/autotuner.h"
+#include "runtime/graph/cost_model.h"
 #include "runtime/graph/limits.h"
-#include "runtime/graph/measurements.h"
 
 #include <atomic>
 #include <functional>
@@ -35,7 +36,7 @@ struct DeviceOptions {
     std::span<const std::byte> pipeline_cache = {};
     // for every Vulkan object, read while the device is made; null: the driver's own
     const VkAllocationCallbacks* allocation = nullptr;
-    bool autotune = true;     // programs try tiles in their first runs, where a device has a watchdog
+    bool autotune = true;     // programs try alternatives in their first runs, where a device has a watchdog
     bool share_by_fd = false; // enables what Sharing needs, where there is it; an application's device says what it has
 };
 
@@ -127,13 +128,20 @@ class Device {
     double timestamp_ns() const { return timestamp_ns_; } // of a unit; 0: the queue has none
     const Sharing& sharing() const { return sharing_; }
     const MemorySource& memory_source() const { return memory_source_; }
-    WorkRates& rates() { return rates_; }
-    TileChoices& tiles() { return tiles_; } // kept with the pipeline cache
+    CostModel& costs() { return costs_; }
+    TuningCache& tuning() { return tuning_; } // kept with the pipeline cache
     bool autotunes() const { return autotunes_; }
     PipelineStore& pipelines() { return *pipelines_; }
 
     // synchronous copies, after everything submitted so far; through staging where the host cannot see the memory
     Status write(const BufferSlice& to, std::span<const std::byte> bytes);
+    // The same piecewise, for memory that nothing has used yet: where the caller puts all of `to`, of most_room() bytes at
+    // most, until the next call. Waits for nothing but room; finish_writes() for all of it. drop_writes(): what was put
+    // and not finished is not written.
+    Result<std::span<std::byte>> room(const BufferSlice& to);
+    uint64_t most_room() const;
+    Status finish_writes();
+    void drop_writes();
     Status read(const BufferSlice& from, std::span<std::byte> bytes);
     // Hands the slices to the sink, one after the other, in pieces that are good until it returns. The sink takes them
     // from memory that the device wrote, so this saves a copy, and the device copies the next piece meanwhile.
@@ -197,15 +205,13 @@ class Device {
     std::function<bool()> cancelled_;
     VkSemaphore timeline_ = VK_NULL_HANDLE;
     uint64_t ticket_ = 0;
-    VkCommandPool copy_pool_ = VK_NULL_HANDLE;
-    VkCommandBuffer copy_commands_ = VK_NULL_HANDLE;
     std::unique_ptr<Staging> staging_;
     std::unique_ptr<PipelineStore> pipelines_;
     std::shared_ptr<Profile> profile_;
     HostBytes host_bytes_;
     DeviceLimits limits_;
-    WorkRates rates_;
-    TileChoices tiles_;
+    CostModel costs_;
+    TuningCache tuning_;
     bool autotunes_ = true;
     std::string name_, driver_;
     double timestamp_ns_ = 1;

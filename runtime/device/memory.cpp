@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/device/memory.h"
 
+#include "runtime/device/debug_names.h"
 #include "runtime/device/device.h"
 #include "runtime/device/sharing.h"
 
@@ -42,6 +43,7 @@ Result<std::unique_ptr<Buffer>> Buffer::create(Device& device, uint64_t bytes, M
     b->shared_ = kind == MemoryKind::shared;
     SR_CHECK(b->make_handle(kind));
     SR_CHECK(b->make_memory(kind, name));
+    name_object(device.vk(), device.handle(), VK_OBJECT_TYPE_BUFFER, reinterpret_cast<uint64_t>(b->buffer_), name);
     return b;
 }
 

@@ -4,16 +4,21 @@
 
 #include "runtime/base/file.h"
 #include "runtime/base/hash.h"
+#include "runtime/device/debug_names.h"
 #include "runtime/device/device.h"
 #include "runtime/system/system.h"
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <bit>
 #include <chrono>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <set>
+#include <system_error>
+#include <thread>
 #include <vector>
 
 namespace fs = std::filesystem;
@@ -47,10 +52,10 @@ Checksum checksum(std::string_view bytes)
     return std::bit_cast<Checksum>(hash.value());
 }
 
-// A file, or an application's blob: a checksum, and under it the bytes of the tiles' text, that text, and the driver's
-// data.
+// A file, or an application's blob: a checksum, and under it the bytes of the tuning's text, that text, and the
+// driver's data.
 struct Kept {
-    std::string_view tiles, data; // empty: none, or none that can be used
+    std::string_view tuning, data; // empty: none, or none that can be used
 };
 
 bool is_ours(std::string_view data, Device& device)
@@ -69,18 +74,18 @@ bool is_ours(std::string_view data, Device& device)
 Kept parse(std::string_view blob, Device& device)
 {
     Checksum sum;
-    uint64_t tile_bytes = 0;
-    if (blob.size() < sizeof sum + sizeof tile_bytes)
+    uint64_t tuning_bytes = 0;
+    if (blob.size() < sizeof sum + sizeof tuning_bytes)
         return {};
     std::memcpy(sum.data(), blob.data(), sizeof sum);
     blob.remove_prefix(sizeof sum);
     if (checksum(blob) != sum)
         return {};
-    std::memcpy(&tile_bytes, blob.data(), sizeof tile_bytes);
-    blob.remove_prefix(sizeof tile_bytes);
-    if (tile_bytes > blob.size())
+    std::memcpy(&tuning_bytes, blob.data(), sizeof tuning_bytes);
+    blob.remove_prefix(sizeof tuning_bytes);
+    if (tuning_bytes > blob.size())
         return {};
-    const Kept kept{blob.substr(0, tile_bytes), blob.substr(tile_bytes)};
+    const Kept kept{blob.substr(0, tuning_bytes), blob.substr(tuning_bytes)};
     return is_ours(kept.data, device) ? kept : Kept{};
 }
 
@@ -96,8 +101,8 @@ Result<std::unique_ptr<PipelineStore>> PipelineStore::create(Device& device, std
         file = read_text_file(store->cache_path_, kMaxCacheBytes).value_or(""); // what is no file is no cache
     const std::string_view given(reinterpret_cast<const char*>(blob.data()), blob.size());
     const Kept kept = parse(store->cache_path_.empty() ? given : file, device);
-    device.tiles().read(kept.tiles);
-    store->saved_tiles_ = device.tiles().size();
+    device.tuning().read(kept.tuning);
+    store->saved_tuning_ = device.tuning().size();
     auto info = vk_struct<VkPipelineCacheCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO);
     info.initialDataSize = kept.data.size();
     info.pInitialData = kept.data.data();
@@ -116,13 +121,15 @@ std::unique_ptr<PipelineStore> PipelineStore::beside(Device& device, PipelineSto
 
 PipelineStore::~PipelineStore()
 {
-    for (auto& [key, p] : pipelines_)
-        destroy(p);
+    for (const auto& [key, p] : pipelines_)
+        device_.vk().DestroyPipeline(device_.handle(), p.pipeline, device_.vk().allocator());
+    for (const auto& [variant, s] : shaders_)
+        destroy(s);
     if (first_) {
         first_->unsaved_seconds_ += unsaved_seconds_;
         return;
     }
-    if (unsaved_seconds_ > 0 || device_.tiles().size() != saved_tiles_)
+    if (unsaved_seconds_ > 0 || device_.tuning().size() != saved_tuning_)
         save();
     if (cache_)
         device_.vk().DestroyPipelineCache(device_.handle(), cache_, device_.vk().allocator());
@@ -132,10 +139,10 @@ Result<std::vector<char>> PipelineStore::blob() const
 {
     size_t bytes = 0;
     SR_VK(device_.vk().GetPipelineCacheData(device_.handle(), cache_, &bytes, nullptr));
-    const std::string tiles = device_.tiles().text();
-    const uint64_t tile_bytes = tiles.size();
-    std::string kept(reinterpret_cast<const char*>(&tile_bytes), sizeof tile_bytes);
-    kept += tiles;
+    const std::string tuning = device_.tuning().text();
+    const uint64_t tuning_bytes = tuning.size();
+    std::string kept(reinterpret_cast<const char*>(&tuning_bytes), sizeof tuning_bytes);
+    kept += tuning;
     const size_t before = kept.size();
     kept.resize(before + bytes);
     SR_VK(device_.vk().GetPipelineCacheData(device_.handle(), cache_, &bytes, kept.data() + before));
@@ -154,23 +161,61 @@ void PipelineStore::save()
     const auto bytes = blob();
     if (bytes && make_folder(fs::path(cache_path_).parent_path()))
         (void)write_file_atomically(cache_path_, std::as_bytes(std::span(*bytes)));
-    saved_tiles_ = device_.tiles().size();
+    saved_tuning_ = device_.tuning().size();
 }
 
-Result<const Pipeline*> PipelineStore::get(const KernelVariant& variant, const std::map<uint32_t, uint32_t>& constants)
+Result<std::vector<const Pipeline*>> PipelineStore::get(std::span<const Pass> passes)
 {
-    const auto key = std::make_pair(&variant, constants);
-    if (const auto it = pipelines_.find(key); it != pipelines_.end())
-        return &it->second;
-    SR_CHECK(device_.check_cancelled());
-    Pipeline p;
-    const auto begin = std::chrono::steady_clock::now();
-    if (Status made = make(variant, constants, p); !made) {
-        destroy(p);
-        return tl::make_unexpected(std::move(made).error());
+    std::vector<Missing> missing;
+    std::set<Key> asked;
+    for (const Pass& pass : passes) {
+        const Key key{pass.variant, pass.constants};
+        if (pipelines_.contains(key) || !asked.insert(key).second)
+            continue;
+        SR_TRY(const Shader* of_variant, shader(*pass.variant));
+        missing.push_back({&pass, of_variant});
     }
-    save_by_and_by(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
-    return &(pipelines_[key] = p);
+    SR_CHECK(compile(missing));
+    std::vector<const Pipeline*> found;
+    for (const Pass& pass : passes)
+        found.push_back(&pipelines_.at({pass.variant, pass.constants}));
+    return found;
+}
+
+// What was made before a failure stays. An application's allocator is called from its own thread only.
+Status PipelineStore::compile(std::span<Missing> missing)
+{
+    std::atomic<size_t> next = 0;
+    const auto make_next = [&] {
+        const size_t i = next++;
+        if (i < missing.size())
+            missing[i].status = make(missing[i]);
+        return i + 1 < missing.size();
+    };
+    const size_t most = device_.vk().allocator() ? 1 : std::max(std::thread::hardware_concurrency(), 1u);
+    std::vector<std::jthread> others;
+    try {
+        while (others.size() + 1 < std::min(most, missing.size()))
+            others.emplace_back([&] {
+                while (make_next()) {
+                }
+            });
+    } catch (const std::system_error&) { // no more threads: those that are there do it
+    }
+    Status status = device_.check_cancelled();
+    for (auto begin = std::chrono::steady_clock::now(); status && make_next(); status = device_.check_cancelled()) {
+        const auto now = std::chrono::steady_clock::now();
+        save_by_and_by(std::chrono::duration<double>(now - begin).count());
+        begin = now;
+    }
+    next = missing.size();
+    others.clear();
+    for (Missing& m : missing)
+        if (m.made.pipeline)
+            pipelines_[{m.pass->variant, m.pass->constants}] = m.made;
+        else if (status)
+            status = std::move(m.status);
+    return status;
 }
 
 void PipelineStore::save_by_and_by(double seconds)
@@ -185,14 +230,26 @@ void PipelineStore::save_by_and_by(double seconds)
     unsaved_seconds_ = 0;
 }
 
-void PipelineStore::destroy(const Pipeline& p)
+Result<const Shader*> PipelineStore::shader(const KernelVariant& variant)
 {
-    device_.vk().DestroyPipeline(device_.handle(), p.pipeline, device_.vk().allocator());
-    device_.vk().DestroyPipelineLayout(device_.handle(), p.layout, device_.vk().allocator());
-    device_.vk().DestroyDescriptorSetLayout(device_.handle(), p.set_layout, device_.vk().allocator());
+    if (const auto at = shaders_.find(&variant); at != shaders_.end())
+        return &at->second;
+    Shader made;
+    if (Status status = make_shader(variant, made); !status) {
+        destroy(made);
+        return tl::make_unexpected(std::move(status).error());
+    }
+    return &(shaders_[&variant] = made);
 }
 
-Status PipelineStore::make_layout(const KernelVariant& variant, Pipeline& out)
+void PipelineStore::destroy(const Shader& s)
+{
+    device_.vk().DestroyShaderModule(device_.handle(), s.module, device_.vk().allocator());
+    device_.vk().DestroyPipelineLayout(device_.handle(), s.layout, device_.vk().allocator());
+    device_.vk().DestroyDescriptorSetLayout(device_.handle(), s.set_layout, device_.vk().allocator());
+}
+
+Status PipelineStore::make_shader(const KernelVariant& variant, Shader& out)
 {
     std::vector<VkDescriptorSetLayoutBinding> bindings;
     for (const BindingInfo& b : variant.bindings)
@@ -211,20 +268,19 @@ Status PipelineStore::make_layout(const KernelVariant& variant, Pipeline& out)
     layout.pushConstantRangeCount = variant.push_bytes ? 1 : 0;
     layout.pPushConstantRanges = &range;
     SR_VK(device_.vk().CreatePipelineLayout(device_.handle(), &layout, device_.vk().allocator(), &out.layout));
-    return {};
-}
-
-Status PipelineStore::make(const KernelVariant& variant, const std::map<uint32_t, uint32_t>& constants, Pipeline& out)
-{
-    SR_CHECK(make_layout(variant, out));
     auto code = vk_struct<VkShaderModuleCreateInfo>(VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO);
     code.codeSize = variant.code.size_bytes();
     code.pCode = variant.code.data();
-    VkShaderModule module;
-    SR_VK(device_.vk().CreateShaderModule(device_.handle(), &code, device_.vk().allocator(), &module));
+    SR_VK(device_.vk().CreateShaderModule(device_.handle(), &code, device_.vk().allocator(), &out.module));
+    return {};
+}
+
+Status PipelineStore::make(Missing& m) const
+{
+    const KernelVariant& variant = *m.pass->variant;
     std::vector<VkSpecializationMapEntry> entries;
     std::vector<uint32_t> values;
-    for (const auto& [id, value] : constants) {
+    for (const auto& [id, value] : m.pass->constants) {
         entries.push_back({id, uint32_t(values.size() * 4), 4});
         values.push_back(value);
     }
@@ -240,19 +296,20 @@ Status PipelineStore::make(const KernelVariant& variant, const std::map<uint32_t
         matrices ? &subgroup : nullptr,
         matrices ? VkPipelineShaderStageCreateFlags(VK_PIPELINE_SHADER_STAGE_CREATE_REQUIRE_FULL_SUBGROUPS_BIT) : 0,
         VK_SHADER_STAGE_COMPUTE_BIT,
-        module,
+        m.shader->module,
         "main",
         &specialization};
-    info.layout = out.layout;
+    info.layout = m.shader->layout;
     info.flags = VK_PIPELINE_CREATE_DISPATCH_BASE_BIT; // long passes are cut
     auto robust = vk_struct<VkPipelineRobustnessCreateInfoEXT>(VK_STRUCTURE_TYPE_PIPELINE_ROBUSTNESS_CREATE_INFO_EXT);
     robust.storageBuffers = robust.uniformBuffers = VK_PIPELINE_ROBUSTNESS_BUFFER_BEHAVIOR_ROBUST_BUFFER_ACCESS_EXT;
     if (device_.pipeline_robustness())
         info.pNext = &robust;
-    const VkResult result = device_.vk().CreateComputePipelines(device_.handle(), cache_, 1, &info,
-                                                                device_.vk().allocator(), &out.pipeline);
-    device_.vk().DestroyShaderModule(device_.handle(), module, device_.vk().allocator());
-    SR_VK(result);
+    m.made = {VK_NULL_HANDLE, m.shader->layout, m.shader->set_layout};
+    SR_VK(device_.vk().CreateComputePipelines(device_.handle(), cache_, 1, &info, device_.vk().allocator(),
+                                              &m.made.pipeline));
+    name_object(device_.vk(), device_.handle(), VK_OBJECT_TYPE_PIPELINE, reinterpret_cast<uint64_t>(m.made.pipeline),
+                m.pass->name());
     return {};
 }
 

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "runtime/device/vulkan.h"
-#include "runtime/graph/kernel.h"
+#include "runtime/graph/pass.h"
 
 #include <map>
 #include <memory>
@@ -15,16 +15,23 @@ namespace semrover {
 
 class Device;
 
-struct Pipeline {
-    VkPipeline pipeline = VK_NULL_HANDLE;
+// what the pipelines of a variant share
+struct Shader {
+    VkShaderModule module = VK_NULL_HANDLE;
     VkPipelineLayout layout = VK_NULL_HANDLE;
     VkDescriptorSetLayout set_layout = VK_NULL_HANDLE;
 };
 
-// Compute pipelines by (variant, constants), made on first use, over a VkPipelineCache kept on disk in
+struct Pipeline {
+    VkPipeline pipeline = VK_NULL_HANDLE;
+    VkPipelineLayout layout = VK_NULL_HANDLE; // its shader's
+    VkDescriptorSetLayout set_layout = VK_NULL_HANDLE;
+};
+
+// Compute pipelines by (variant, constants), made when a program needs them, over a VkPipelineCache kept on disk in
 // $XDG_CACHE_HOME/semrover (safe to delete; a file of another driver is ignored). It is saved as pipelines are made: a
-// run that is killed, or whose device is lost, leaves what it compiled to the next. The tiles that the device's
-// programs chose (TileChoices) are kept with it.
+// run that is killed, or whose device is lost, leaves what it compiled to the next. The alternatives that the device's
+// programs chose (TuningCache) are kept with it.
 class PipelineStore {
   public:
     // blob: of an earlier process, in place of the file; with an application's device there is no file either way
@@ -40,13 +47,23 @@ class PipelineStore {
 
     // bytes of an earlier run's cache that this one started with; 0: none, or none that is whole and this driver's
     size_t reused_bytes() const { return reused_bytes_; }
-    Result<const Pipeline*> get(const KernelVariant& variant, const std::map<uint32_t, uint32_t>& constants);
+    // one a pass; those that are missing are compiled on several threads
+    Result<std::vector<const Pipeline*>> get(std::span<const Pass> passes);
 
   private:
     explicit PipelineStore(Device& device) : device_(device) {}
-    Status make(const KernelVariant& variant, const std::map<uint32_t, uint32_t>& constants, Pipeline& out);
-    Status make_layout(const KernelVariant& variant, Pipeline& out);
-    void destroy(const Pipeline& pipeline);
+    using Key = std::pair<const KernelVariant*, std::map<uint32_t, uint32_t>>;
+    struct Missing {
+        const Pass* pass;
+        const Shader* shader;
+        Pipeline made = {};
+        Status status = {};
+    };
+    Status compile(std::span<Missing> missing);
+    Status make(Missing& missing) const;
+    Result<const Shader*> shader(const KernelVariant& variant);
+    Status make_shader(const KernelVariant& variant, Shader& out);
+    void destroy(const Shader& shader);
     void save();
     void save_by_and_by(double seconds);
 
@@ -56,8 +73,9 @@ class PipelineStore {
     std::string cache_path_; // empty: nowhere to keep it
     size_t reused_bytes_ = 0;
     double unsaved_seconds_ = 0; // of compiling
-    size_t saved_tiles_ = 0;     // how many were chosen then
-    std::map<std::pair<const KernelVariant*, std::map<uint32_t, uint32_t>>, Pipeline> pipelines_;
+    size_t saved_tuning_ = 0;    // how many were chosen then
+    std::map<const KernelVariant*, Shader> shaders_;
+    std::map<Key, Pipeline> pipelines_;
 };
 
 } // namespace semrover

@@ -19,7 +19,7 @@ class Profile {
         double begin_us, duration_us;
         std::array<uint32_t, 3> groups = {}; // workgroups
         double flops = 0;                    // as its op counts them, 0 where it does not
-        std::array<uint32_t, 2> tile = {};   // rows and columns of the output that a workgroup makes, where it says so
+        std::array<uint32_t, 2> tile = {};   // rows and columns of the output that a workgroup makes, 1 x 1 where it does not say
     };
     void add(Event event) { events_.push_back(std::move(event)); }
     Status write(const std::string& path) const;

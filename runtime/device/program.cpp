@@ -3,6 +3,7 @@
 #include "runtime/device/program.h"
 
 #include "runtime/device/command.h"
+#include "runtime/device/debug_names.h"
 #include "runtime/device/pipeline.h"
 #include "runtime/device/profile.h"
 
@@ -12,7 +13,7 @@ namespace semrover {
 
 Result<std::unique_ptr<Program>> Program::create(Device& device, const Graph& graph)
 {
-    SR_TRY(Plan plan, make_plan(graph.desc(), device.limits(), device.rates()));
+    SR_TRY(Plan plan, make_plan(graph, device.costs()));
     return create(device, std::move(plan));
 }
 
@@ -20,7 +21,7 @@ Result<std::unique_ptr<Program>> Program::create(Device& device, Plan plan)
 {
     std::unique_ptr<Program> p(new Program(device, std::move(plan)));
     p->measuring_ = device.limits().submit_seconds > 0 && device.timestamp_ns() > 0 && !p->plan_.passes.empty();
-    SR_CHECK(p->choose_tiles());
+    SR_CHECK(p->choose_alternatives());
     SR_CHECK(p->allocate());
     SR_CHECK(p->get_pipelines());
     SR_CHECK(p->make_sets());
@@ -42,13 +43,13 @@ Program::~Program()
         device_.vk().DestroyCommandPool(device_.handle(), commands_pool_, device_.vk().allocator());
 }
 
-Status Program::choose_tiles()
+Status Program::choose_alternatives()
 {
     if (!measuring_ || !device_.autotunes())
         return {};
-    SR_TRY(trial_, TileTrial::begin(plan_, device_.limits(), device_.tiles()));
-    if (trial_.changed())
-        stage::schedule(plan_, device_.limits(), device_.rates().seconds(plan_));
+    SR_TRY(autotuner_, Autotuner::begin(plan_, device_.limits(), device_.tuning()));
+    if (autotuner_.changed())
+        stage::submits(plan_, device_.limits(), device_.costs().seconds(plan_));
     return {};
 }
 
@@ -59,6 +60,15 @@ Status Program::allocate()
         blocks_.push_back(std::move(block));
     }
     return {};
+}
+
+// Vulkan wants a buffer at every binding, also at one that the shader does not use: of those that are given, one that
+// is read or written as it
+const PassBinding& Program::stand_in(const Pass& pass, size_t binding)
+{
+    const auto alike = [&](const PassBinding& b) { return b.given() && b.access == pass.bindings[binding].access; };
+    const auto found = std::ranges::find_if(pass.bindings, alike);
+    return found == pass.bindings.end() ? *std::ranges::find_if(pass.bindings, &PassBinding::given) : *found;
 }
 
 std::pair<VkBuffer, uint64_t> Program::locate(const PassBinding& b) const
@@ -73,11 +83,7 @@ std::pair<VkBuffer, uint64_t> Program::locate(const PassBinding& b) const
 
 Status Program::get_pipelines()
 {
-    pipelines_.clear();
-    for (const Pass& pass : plan_.passes) {
-        SR_TRY(const Pipeline* pipeline, device_.pipelines().get(*pass.variant, pass.constants));
-        pipelines_.push_back(pipeline);
-    }
+    SR_TRY(pipelines_, device_.pipelines().get(plan_.passes));
     return {};
 }
 
@@ -118,14 +124,14 @@ Status Program::bind(const Pass& pass, VkDescriptorSet set)
     std::vector<VkDescriptorBufferInfo> buffers(n);
     std::vector<VkBufferView> views(n);
     for (size_t i = 0; i < n; ++i) {
-        const PassBinding& b = pass.bindings[i];
+        const PassBinding& b = pass.bindings[i].given() ? pass.bindings[i] : stand_in(pass, i);
         const auto [buffer, offset] = locate(b);
         SR_ASSERT(offset % device_.limits().offset_alignment == 0, "{}: '{}' starts at byte {}", pass.kernel->name,
                   b.name, offset);
         writes[i].dstSet = set;
         writes[i].dstBinding = pass.variant->bindings[i].binding;
         writes[i].descriptorCount = 1;
-        if (b.kind == BindingKind::texel) {
+        if (pass.bindings[i].kind == BindingKind::texel) {
             auto info = vk_struct<VkBufferViewCreateInfo>(VK_STRUCTURE_TYPE_BUFFER_VIEW_CREATE_INFO);
             info.buffer = buffer;
             info.format = VK_FORMAT_R32G32B32A32_UINT;
@@ -203,11 +209,22 @@ void Program::record_passes(VkCommandBuffer commands, uint32_t submit, bool time
     record_final_barrier(device_.vk(), commands);
 }
 
+// a pass, and what it reads and writes outside of the graph, such as its weights
+std::string Program::label_of(const Pass& pass) const
+{
+    std::string label = pass.name();
+    for (const PassBinding& b : pass.bindings)
+        if (b.given() && plan_.resources[b.resource].external)
+            label += fmt::format(" {}", plan_.resources[b.resource].name);
+    return label;
+}
+
 void Program::record_dispatch(VkCommandBuffer commands, size_t index, bool timed) const
 {
     const Dispatch& d = plan_.dispatches[index];
     const Pass& pass = plan_.passes[d.pass];
     const Pipeline& pipeline = *pipelines_[d.pass];
+    const DebugLabel label(device_.vk(), commands, label_of(pass));
     device_.vk().CmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline.pipeline);
     device_.vk().CmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline.layout, 0, 1, &sets_[d.pass],
                                        0, nullptr);
@@ -257,7 +274,7 @@ Result<std::vector<uint64_t>> Program::stamps() const
     return out;
 }
 
-// by what the run before took, with the next tiles to try
+// by what the run before took, with the next alternatives to try
 Status Program::schedule_again()
 {
     SR_CHECK(device_.wait(device_.last_ticket()));
@@ -269,20 +286,20 @@ Status Program::schedule_again()
                 double(stamps[2 * i + 1] - stamps[2 * i]) * device_.timestamp_ns() / 1e9;
     for (size_t i = 0; i < plan_.passes.size(); ++i) {
         const Pass& pass = plan_.passes[i];
-        device_.rates().learn(pass, seconds[i]);
+        device_.costs().learn(pass, seconds[i]);
         if (pass.options.most_operations > 0)
-            seconds[i] = std::max(seconds[i], device_.rates().seconds(pass));
+            seconds[i] = std::max(seconds[i], device_.costs().seconds(pass));
     }
-    if (trial_.running()) {
-        SR_CHECK(trial_.next(plan_, seconds, device_.limits(), device_.tiles()));
+    if (autotuner_.running()) {
+        SR_CHECK(autotuner_.next(plan_, seconds, device_.limits(), device_.tuning()));
         SR_CHECK(get_pipelines());
     }
-    stage::schedule(plan_, device_.limits(), seconds);
+    stage::submits(plan_, device_.limits(), seconds);
     device_.vk().DestroyCommandPool(device_.handle(), commands_pool_, device_.vk().allocator());
     device_.vk().DestroyQueryPool(device_.handle(), queries_, device_.vk().allocator());
     commands_pool_ = VK_NULL_HANDLE; // what follows may fail
     queries_ = VK_NULL_HANDLE;
-    measuring_ = trial_.running();
+    measuring_ = autotuner_.running();
     SR_CHECK(make_queries());
     return record();
 }
@@ -297,17 +314,14 @@ Status Program::collect_profile()
         const Pass& pass = plan_.passes[d.pass];
         const double begin = double(stamps[2 * i]) * device_.timestamp_ns() / 1e3;
         const double end = double(stamps[2 * i + 1]) * device_.timestamp_ns() / 1e3;
-        std::string name(pass.kernel->name);
-        if (!pass.variant->name.empty())
-            name += fmt::format(".{}", pass.variant->name);
         const double part = double(d.count[0]) * d.count[1] * d.count[2] /
                             (double(pass.group_count[0]) * pass.group_count[1] * pass.group_count[2]);
-        device_.profile()->add({std::move(name),
+        device_.profile()->add({pass.name(),
                                 begin,
                                 end - begin,
                                 std::to_array(d.count),
                                 pass.options.flops * part,
-                                {pass.tile_rows.value_or(0), pass.tile_cols.value_or(0)}});
+                                {pass.grid.tile.rows, pass.grid.tile.cols}});
     }
     return {};
 }

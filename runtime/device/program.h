@@ -3,7 +3,7 @@
 #pragma once
 
 #include "runtime/device/device.h"
-#include "runtime/graph/measurements.h"
+#include "runtime/graph/autotuner.h"
 #include "runtime/graph/plan.h"
 
 #include <memory>
@@ -13,8 +13,8 @@ namespace semrover {
 
 // A compiled graph on a device: arena, pipelines, descriptor sets and recorded command buffers; run any number of
 // times, each run one submit, or several short ones where the device has a watchdog. The first run is measured then,
-// and the second waits for it once and cuts submits by what passes really took. A program with tiles to try measures
-// some more (TileTrial).
+// and the second waits for it once and cuts submits by what passes really took. One with alternatives to try
+// measures some more (Autotuner).
 class Program {
   public:
     static Result<std::unique_ptr<Program>> create(Device& device, const Graph& graph);
@@ -35,7 +35,7 @@ class Program {
 
   private:
     Program(Device& device, Plan plan) : device_(device), plan_(std::move(plan)) {}
-    Status choose_tiles();
+    Status choose_alternatives();
     Status allocate();
     Status get_pipelines();
     Status make_sets();
@@ -44,9 +44,11 @@ class Program {
     Status record();
     Status record_submit(uint32_t index);
     void record_passes(VkCommandBuffer commands, uint32_t submit, bool timed) const;
+    std::string label_of(const Pass& pass) const;
     void record_dispatch(VkCommandBuffer commands, size_t index, bool timed) const;
     Result<std::vector<uint64_t>> stamps() const; // two a dispatch, in units of the device
     Status schedule_again();
+    static const PassBinding& stand_in(const Pass& pass, size_t binding);
     std::pair<VkBuffer, uint64_t> locate(const PassBinding& binding) const;
 
     Device& device_;
@@ -59,8 +61,8 @@ class Program {
     std::vector<VkDescriptorSet> sets_;             // one per pass
     std::vector<VkBufferView> views_;
     std::vector<VkCommandBuffer> commands_; // one per submit
-    bool measuring_ = false;                // the first run, or one of a trial: its passes are timed
-    TileTrial trial_;
+    bool measuring_ = false;                // the first run, or one of the autotuner: its passes are timed
+    Autotuner autotuner_;
     double host_us_ = 0;
     uint64_t runs_ = 0;
 };

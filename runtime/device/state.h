@@ -29,6 +29,7 @@ class Slot {
     DType dtype() const { return shape_.dtype; }
     uint64_t bytes() const { return shape_.bytes(); }
     const std::string& name() const;
+    bool same_as(const Slot& other) const { return memory_ == other.memory_ && item_ == other.item_; } // or its rows
 
     // the tensor in a graph: of one resource, however often it is asked for; none of none
     Tensor in(Graph& g) const;

@@ -74,8 +74,11 @@
     X(WaitSemaphores)
 // calls of extensions: null where a device does not have them
 #define SR_EXTENSION_CALLS(X)                                                                                          \
+    X(CmdBeginDebugUtilsLabelEXT)                                                                                      \
+    X(CmdEndDebugUtilsLabelEXT)                                                                                        \
     X(GetMemoryFdKHR)                                                                                                  \
-    X(GetSemaphoreFdKHR)
+    X(GetSemaphoreFdKHR)                                                                                               \
+    X(SetDebugUtilsObjectNameEXT)
 
 namespace semrover {
 

@@ -2,57 +2,42 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/graph/graph.h"
 
-#include "runtime/graph/protocol.h"
-
-#include <algorithm>
+#include "runtime/graph/shader_interface.h"
+#include "runtime/graph/variant.h"
 
 namespace semrover {
-
-std::pair<uint64_t, uint64_t> RowWindow::input_rows(uint64_t first, uint64_t count) const
-{
-    const auto row_of = [&](uint64_t row) { // of the image; its padding belongs to the last one
-        return int64_t(std::min<uint64_t>(row % out_image_rows / out_width, out_height - 1)) * stride -
-               int64_t(padding);
-    };
-    const auto input_row = [&](uint64_t row, int64_t y) {
-        const uint64_t clamped = uint64_t(std::clamp<int64_t>(y, 0, in_height - 1));
-        return row / out_image_rows * in_image_rows + (clamped >> shift) * in_width;
-    };
-    const uint64_t last = first + count - 1;
-    return {input_row(first, row_of(first)), input_row(last, row_of(last) + kernel - 1) + in_width};
-}
 
 Tensor Graph::matrix(uint32_t rows, uint32_t cols, DType dtype, std::string_view name)
 {
     SR_ASSERT(rows > 0 && cols > 0, "tensor '{}' is empty: {} x {}", name, rows, cols);
-    Tensor t{uint32_t(desc_.resources.size()), dtype, rows, cols, round_up(cols, kRowPadding), 0};
-    desc_.resources.push_back({std::string(name), t.bytes(), false, {}});
+    Tensor t{uint32_t(resources_.size()), dtype, rows, cols, round_up(cols, kRowPadding), 0};
+    resources_.push_back({std::string(name), t.bytes(), false, {}});
     return t;
 }
 
 Tensor Graph::array(uint32_t count, DType dtype, std::string_view name, uint32_t width)
 {
     SR_ASSERT(count > 0 && width > 0, "array '{}' is empty", name);
-    Tensor t{uint32_t(desc_.resources.size()), dtype, count, width, width, 0};
-    desc_.resources.push_back({std::string(name), t.bytes(), false, {}});
+    Tensor t{uint32_t(resources_.size()), dtype, count, width, width, 0};
+    resources_.push_back({std::string(name), t.bytes(), false, {}});
     return t;
 }
 
 Tensor Graph::external(const BufferSlice& memory, uint32_t rows, uint32_t cols, DType dtype, std::string_view name,
                        uint32_t ld)
 {
-    Tensor t{uint32_t(desc_.resources.size()), dtype, rows, cols, ld ? ld : round_up(cols, kRowPadding), 0};
+    Tensor t{uint32_t(resources_.size()), dtype, rows, cols, ld ? ld : round_up(cols, kRowPadding), 0};
     SR_ASSERT(t.bytes() <= memory.bytes, "tensor '{}' of {} bytes in {} bytes of memory", name, t.bytes(),
               memory.bytes);
-    desc_.resources.push_back({std::string(name), t.bytes(), true, memory});
+    resources_.push_back({std::string(name), t.bytes(), true, memory});
     return t;
 }
 
 uint32_t Graph::outside(const void* owner, uint32_t item, const BufferSlice& memory, std::string_view name)
 {
-    const auto [at, fresh] = owned_.try_emplace({owner, item}, uint32_t(desc_.resources.size()));
+    const auto [at, fresh] = owned_.try_emplace({owner, item}, uint32_t(resources_.size()));
     if (fresh)
-        desc_.resources.push_back({std::string(name), memory.bytes, true, memory});
+        resources_.push_back({std::string(name), memory.bytes, true, memory});
     return at->second;
 }
 
@@ -69,7 +54,9 @@ Tensor Graph::placed(Tensor t) const
 // do two tensors lie in the same bytes? Before memory is allocated, only resources show it.
 bool Graph::share_bytes(const Tensor& a, const Tensor& b) const
 {
-    const Resource &ra = desc_.resources[a.resource], &rb = desc_.resources[b.resource];
+    if (!a.valid() || !b.valid())
+        return false;
+    const Resource &ra = resources_[a.resource], &rb = resources_[b.resource];
     if (a.resource != b.resource && !(ra.memory.buffer && ra.memory.buffer == rb.memory.buffer))
         return false;
     const uint64_t at_a = ra.memory.offset + a.offset, at_b = rb.memory.offset + b.offset;
@@ -78,12 +65,12 @@ bool Graph::share_bytes(const Tensor& a, const Tensor& b) const
 
 void Graph::check_keep(const Tensor& made, const Tensor& memory) const
 {
-    SR_ASSERT(made.resource < desc_.resources.size() && memory.resource < desc_.resources.size(),
+    SR_ASSERT(made.resource < resources_.size() && memory.resource < resources_.size(),
               "keep: a tensor of another graph, or none");
-    const Resource &from = desc_.resources[made.resource], &to = desc_.resources[memory.resource];
+    const Resource &from = resources_[made.resource], &to = resources_[memory.resource];
     const auto before = kept_.find(made.resource);
     SR_ASSERT(before == kept_.end(), "'{}' is kept in '{}' already", from.name,
-              desc_.resources[before->second.resource].name);
+              resources_[before->second.resource].name);
     SR_ASSERT(!from.external, "'{}' is kept, but lies outside the graph already", from.name);
     SR_ASSERT(to.external, "'{}' is kept in '{}', which is memory of the graph", from.name, to.name);
     SR_ASSERT(made.offset == 0 && made.bytes() == from.bytes, "a part of '{}' is kept, not all of it", from.name);
@@ -94,14 +81,14 @@ void Graph::check_keep(const Tensor& made, const Tensor& memory) const
               dtype_name(memory.dtype), memory.ld);
     for (const auto& [resource, other] : kept_)
         SR_ASSERT(!share_bytes(other, memory), "'{}' is kept in '{}', and so is '{}'", from.name, to.name,
-                  desc_.resources[resource].name);
+                  resources_[resource].name);
     bool begun = false; // what comes before the pass that makes it may use the memory
-    for (const Node& node : desc_.nodes) {
-        for (const Tensor& t : node.tensors)
+    for (const Pass& pass : passes_) {
+        for (const Tensor& t : pass.tensors)
             begun = begun || t.resource == made.resource;
-        for (const Tensor& t : node.tensors)
+        for (const Tensor& t : pass.tensors)
             SR_ASSERT(!begun || !share_bytes(t, memory), "'{}' is kept in '{}', which {} uses after it is made",
-                      from.name, to.name, node.kernel->name);
+                      from.name, to.name, pass.kernel->name);
     }
 }
 
@@ -109,34 +96,67 @@ Tensor Graph::keep(Tensor made, Tensor memory)
 {
     check_keep(made, memory);
     kept_[made.resource] = memory;
-    for (Node& node : desc_.nodes)
-        for (Tensor& t : node.tensors)
+    for (Pass& pass : passes_)
+        for (Tensor& t : pass.tensors)
             t = placed(t);
     return memory;
 }
 
-void Graph::add(const Kernel& kernel, std::initializer_list<Tensor> tensors, std::vector<uint8_t> push, Grid grid,
+const KernelVariant& Graph::variant(const Kernel& kernel, std::span<const ConstantValue> constants,
+                                    std::span<const Tensor> tensors, uint32_t excluded)
+{
+    DeviceLimits allowed = limits_;
+    allowed.needs_supported &= ~excluded;
+    if (const KernelVariant* chosen = choose_variant(kernel, allowed, constants, tensors))
+        return *chosen;
+    if (status_)
+        status_ = fail(ErrorCode::no_device,
+                       "no variant of kernel '{}' runs on this device ({} bytes of shared memory, {} threads a group, "
+                       "{} storage buffers a shader)",
+                       kernel.name, limits_.max_shared_bytes, limits_.max_group_threads, limits_.max_storage_buffers);
+    return kernel.variants.front();
+}
+
+std::vector<Tensor> Graph::by_binding(const Kernel& kernel, std::initializer_list<NamedTensor> tensors) const
+{
+    const KernelVariant& any = kernel.variants.front(); // all have the same bindings
+    std::vector<Tensor> bound(any.bindings.size());
+    for (const NamedTensor& t : tensors) {
+        const std::optional<size_t> b = any.binding(t.binding);
+        SR_ASSERT(b, "{}: no binding {}", kernel.name, t.binding);
+        if (!t.tensor.valid())
+            continue;
+        SR_ASSERT(t.tensor.resource < resources_.size(), "{}: a tensor of another graph at {}", kernel.name, t.binding);
+        bound[*b] = placed(t.tensor);
+    }
+    return bound;
+}
+
+void Graph::add(const Kernel& kernel, std::initializer_list<NamedTensor> tensors, std::vector<uint8_t> push, Grid grid,
                 DispatchOptions options)
 {
-    const KernelVariant& any = kernel.variants.front();
-    SR_ASSERT(tensors.size() == any.bindings.size(), "{}: {} tensors for {} bindings", kernel.name, tensors.size(),
-              any.bindings.size());
-    SR_ASSERT(push.size() == any.push_bytes, "{}: push struct of {} bytes, the shader declares {}", kernel.name,
-              push.size(), any.push_bytes);
-    SR_ASSERT(options.banded.empty() || any.push_member(protocol::kRows), "{}: cut into bands without push member {}",
-              kernel.name, protocol::kRows);
+    Pass pass;
+    pass.kernel = &kernel;
+    pass.tensors = by_binding(kernel, tensors);
+    pass.variant = options.variant ? options.variant : &variant(kernel, options.constants, pass.tensors);
+    const KernelVariant& v = *pass.variant;
+    SR_ASSERT(push.size() == v.push_bytes, "{}: push struct of {} bytes, the shader declares {}", kernel.name,
+              push.size(), v.push_bytes);
+    SR_ASSERT(options.banded.empty() || v.push_member(shader_interface::kRows),
+              "{}: cut into bands without push member {}", kernel.name, shader_interface::kRows);
     for (const BandedBinding& band : options.banded) {
-        SR_ASSERT(std::ranges::any_of(any.bindings, [&](const BindingInfo& b) { return b.name == band.name; }),
-                  "{}: no binding {} to cut into bands", kernel.name, band.name);
-        SR_ASSERT(!band.window.out_width || any.push_member(protocol::first_member(band.name)), "{}: no push member {}",
-                  kernel.name, protocol::first_member(band.name));
+        SR_ASSERT(v.binding(band.name), "{}: no binding {} to cut into bands", kernel.name, band.name);
+        SR_ASSERT(!band.window.out_width || v.push_member(shader_interface::first_member(band.name)),
+                  "{}: no push member {}", kernel.name, shader_interface::first_member(band.name));
     }
-    std::vector<Tensor> where;
-    for (const Tensor& t : tensors) {
-        SR_ASSERT(t.resource < desc_.resources.size(), "{}: a tensor of another graph, or none", kernel.name);
-        where.push_back(placed(t));
-    }
-    desc_.nodes.push_back({&kernel, std::move(where), std::move(push), grid, std::move(options)});
+    pass.push = std::move(push);
+    pass.grid = grid;
+    pass.options = std::move(options);
+    for (const ConstantValue& c : pass.options.constants)
+        pass.set_constant(c.name, c.value);
+    if (!pass.options.alternatives.empty())
+        pass.take(0);
+    passes_.push_back(std::move(pass));
 }
 
 } // namespace semrover

@@ -22,7 +22,7 @@ struct BindingInfo {
 };
 
 struct ConstantInfo {
-    std::string_view name; // kTileM, kHalfX, ...
+    std::string_view name; // kHalfX, ...
     uint32_t id;
     uint32_t value; // default, as 32 bits
 };
@@ -59,6 +59,10 @@ struct KernelVariant {
             if (c.name == constant_name)
                 return &c;
         return nullptr;
+    }
+    uint32_t value(std::string_view constant_name) const // the default of one that it has
+    {
+        return constant(constant_name)->value;
     }
     std::optional<size_t> binding(std::string_view binding_name) const // its index
     {

@@ -78,13 +78,6 @@ Status apply(DeviceLimits& limits, const std::string& key, const std::string& te
 
 } // namespace
 
-bool has_matrix_units(const DeviceLimits& limits)
-{
-    const bool wanted =
-        limits.force_variant == "coopmat" || (limits.force_variant.empty() && limits.type != DeviceType::cpu);
-    return wanted && (limits.needs_supported & kNeedsCooperativeMatrix);
-}
-
 Status override_limits(DeviceLimits& limits, const std::string& text)
 {
     std::stringstream in(text);

@@ -39,9 +39,6 @@ struct DeviceLimits {
     bool force_staging = false;        // upload through staging even where memory is host-visible
 };
 
-// are products of fp16 factors made by cooperative matrices?
-bool has_matrix_units(const DeviceLimits& limits);
-
 // Lowers limits for tests:
 // "shared=16384,range=67108864,alloc=536870912,fp16=0,coopmat=0,variant=simt,staging=1,branches=1,submit=0.001".
 // Raising one above what the device has is refused.

@@ -2,51 +2,34 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/graph/plan.h"
 
-#include "runtime/graph/measurements.h"
+#include "runtime/graph/cost_model.h"
 
 #include <numeric>
 
 namespace semrover {
 
-namespace {
-
-Plan from_desc(const GraphDesc& graph)
+Result<Plan> make_plan(const Graph& graph)
 {
+    return make_plan(graph, CostModel());
+}
+
+Result<Plan> make_plan(const Graph& graph, const CostModel& costs)
+{
+    SR_CHECK(graph.status());
+    const DeviceLimits& limits = graph.limits();
     Plan plan;
-    plan.resources = graph.resources;
-    plan.placements.resize(graph.resources.size());
-    for (const Node& node : graph.nodes) {
-        Pass pass;
-        pass.kernel = node.kernel;
-        pass.tensors = node.tensors;
-        pass.push = node.push;
-        pass.grid = node.grid;
-        pass.options = node.options;
-        plan.passes.push_back(std::move(pass));
-    }
-    return plan;
-}
-
-} // namespace
-
-Result<Plan> make_plan(const GraphDesc& graph, const DeviceLimits& limits)
-{
-    return make_plan(graph, limits, WorkRates());
-}
-
-Result<Plan> make_plan(const GraphDesc& graph, const DeviceLimits& limits, const WorkRates& rates)
-{
-    Plan plan = from_desc(graph);
+    plan.resources = graph.resources();
+    plan.passes = graph.passes();
+    plan.placements.resize(plan.resources.size());
     SR_CHECK(stage::check(plan));
     SR_CHECK(stage::fuse(plan));
-    SR_CHECK(stage::pick_variants(plan, limits));
-    stage::split(plan, limits);
-    stage::arrange(plan, limits.side_by_side && !graph.in_order);
-    SR_CHECK(stage::lifetimes(plan));
+    for (Pass& pass : plan.passes)
+        pass.bind();
+    stage::levels(plan, limits.side_by_side && !graph.in_order());
     SR_CHECK(stage::place(plan, limits));
-    SR_CHECK(stage::slice(plan, limits));
-    SR_CHECK(stage::order(plan));
-    stage::schedule(plan, limits, rates.seconds(plan));
+    SR_CHECK(stage::bands(plan, limits));
+    stage::barriers(plan);
+    stage::submits(plan, limits, costs.seconds(plan));
     return plan;
 }
 
@@ -66,6 +49,8 @@ uint64_t Plan::transient_bytes() const
 
 bool overlaps(const Plan& plan, const PassBinding& a, const PassBinding& b)
 {
+    if (!a.given() || !b.given())
+        return false;
     const Resource &ra = plan.resources[a.resource], &rb = plan.resources[b.resource];
     if (ra.external != rb.external)
         return false;

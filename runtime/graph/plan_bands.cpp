@@ -1,15 +1,21 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/graph/plan_bands.h"
+// stage 5: cuts passes into bands of rows where a binding exceeds what the device can bind; then counts workgroups.
+// A band has the rows of the bindings that it needs (DispatchOptions::banded).
+#include "runtime/graph/plan.h"
 
-#include "runtime/graph/protocol.h"
+#include "runtime/graph/shader_interface.h"
 
 #include <algorithm>
+#include <iterator>
 #include <numeric>
 
 namespace semrover {
 
 namespace {
+
+// of a row, where one dimension does not hold all workgroups: short, as rows are what a schedule can cut then
+constexpr uint32_t kFoldedGroups = 4096;
 
 uint64_t range_limit(const PassBinding& b, const DeviceLimits& limits)
 {
@@ -84,19 +90,18 @@ Pass band_of(const Pass& whole, uint32_t first, uint32_t count, uint32_t total, 
         pass.bindings[b].offset = pass.tensors[b].offset;
         pass.bindings[b].bytes = pass.tensors[b].bytes();
         if (band->window.out_width)
-            pass.set_push(protocol::first_member(band->name), uint32_t(begin));
+            pass.set_push(shader_interface::first_member(band->name), uint32_t(begin));
     }
-    pass.set_push(protocol::kRows, count);
-    if (pass.variant->push_member(protocol::kFirstRow))
-        pass.set_push(protocol::kFirstRow, first);
+    pass.set_push(shader_interface::kRows, count);
+    if (pass.variant->push_member(shader_interface::kFirstRow))
+        pass.set_push(shader_interface::kFirstRow, first);
     pass.grid.x = pass.grid.unit == Grid::Unit::tiles ? count : uint32_t(uint64_t(whole.grid.x) * count / total);
     pass.options.flops = whole.options.flops * count / total;
     pass.options.most_operations = whole.options.most_operations * count / total;
     return pass;
 }
 
-} // namespace
-
+// rows of the output; 0: it cannot be cut
 uint32_t rows_of(const Pass& pass)
 {
     for (size_t b = 0; b < pass.bindings.size(); ++b)
@@ -106,6 +111,7 @@ uint32_t rows_of(const Pass& pass)
     return 0;
 }
 
+// rows of the output of which every banded binding starts aligned; windows align themselves
 uint64_t aligned_rows(const Pass& pass, const DeviceLimits& limits)
 {
     uint64_t step = 1;
@@ -115,11 +121,8 @@ uint64_t aligned_rows(const Pass& pass, const DeviceLimits& limits)
     return step;
 }
 
-bool binds(const Pass& pass, const DeviceLimits& limits)
-{
-    return std::ranges::all_of(pass.bindings, [&](const auto& b) { return b.bytes <= range_limit(b, limits); });
-}
-
+// Rows per band that satisfy every limit; rows_of(pass) when nothing has to be cut. out_of_memory: a binding that
+// cannot be cut, or of which not even the fewest rows fit.
 Result<uint32_t> band_rows(const Plan& plan, const Pass& pass, const DeviceLimits& limits)
 {
     const uint32_t rows = rows_of(pass);
@@ -140,11 +143,12 @@ Result<uint32_t> band_rows(const Plan& plan, const Pass& pass, const DeviceLimit
     }
     if (band >= rows)
         return rows;
-    const uint64_t whole_tiles = std::lcm(step, uint64_t(pass.tile_rows.value_or(1))); // no half-empty ones
+    const uint64_t whole_tiles = std::lcm(step, uint64_t(pass.grid.tile.rows)); // no half-empty ones
     const uint64_t unit = whole_tiles <= band ? whole_tiles : step;
     return uint32_t(std::max(band / unit * unit, unit));
 }
 
+// the pass in bands of `rows` rows, the last of which may have fewer
 std::vector<Pass> bands_of(const Pass& whole, uint32_t rows, const DeviceLimits& limits)
 {
     std::vector<Pass> bands;
@@ -152,6 +156,47 @@ std::vector<Pass> bands_of(const Pass& whole, uint32_t rows, const DeviceLimits&
     for (uint32_t first = 0; first < total; first += rows)
         bands.push_back(band_of(whole, first, std::min(rows, total - first), total, limits));
     return bands;
+}
+
+} // namespace
+
+Status stage::count_groups(Pass& pass, const DeviceLimits& limits)
+{
+    uint32_t* n = pass.group_count;
+    n[0] = pass.grid.x;
+    n[1] = pass.grid.y;
+    n[2] = pass.grid.z;
+    if (pass.grid.unit == Grid::Unit::tiles) {
+        n[0] = divide_up(pass.grid.x, pass.grid.tile.rows);
+        n[1] = divide_up(pass.grid.y, pass.grid.tile.cols);
+    } else if (pass.grid.unit != Grid::Unit::groups) {
+        const bool threads = pass.grid.unit == Grid::Unit::threads;
+        n[0] = divide_up(pass.grid.x, threads ? pass.variant->local_size[0] : pass.grid.tile.rows);
+        if (n[0] > limits.max_groups)
+            n[1] = divide_up(n[0], std::min(limits.max_groups, kFoldedGroups)); // the shader's linear_group() undoes it
+        n[0] = divide_up(n[0], n[1]);
+    }
+    for (int i = 0; i < 3; ++i)
+        if (n[i] == 0 || n[i] > limits.max_groups)
+            return fail(ErrorCode::out_of_memory, "{}: {} workgroups in dimension {}, the device takes 1..{}",
+                        pass.kernel->name, n[i], i, limits.max_groups);
+    return {};
+}
+
+Status stage::bands(Plan& plan, const DeviceLimits& limits)
+{
+    std::vector<Pass> passes;
+    for (const Pass& pass : plan.passes) {
+        SR_TRY(const uint32_t band, band_rows(plan, pass, limits));
+        if (band == rows_of(pass))
+            passes.push_back(pass);
+        else
+            std::ranges::move(bands_of(pass, band, limits), std::back_inserter(passes));
+    }
+    for (Pass& pass : passes)
+        SR_CHECK(count_groups(pass, limits));
+    plan.passes = std::move(passes);
+    return {};
 }
 
 } // namespace semrover

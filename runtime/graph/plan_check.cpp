@@ -37,9 +37,11 @@ Status check(Plan& plan)
     std::vector<Written> written(plan.resources.size());
     for (size_t i = 0; i < plan.passes.size(); ++i) {
         const Pass& pass = plan.passes[i];
-        const auto& declared = pass.kernel->variants.front().bindings;
+        const auto& declared = pass.variant->bindings;
         for (size_t b = 0; b < declared.size(); ++b) {
             const Tensor& t = pass.tensors[b];
+            if (!t.valid())
+                continue;
             const Resource& r = plan.resources[t.resource];
             if (t.offset + t.bytes() > r.bytes)
                 return fail(ErrorCode::internal, "pass {} ({}): binding {} reaches byte {} of '{}', which has {}", i,
@@ -50,10 +52,8 @@ Status check(Plan& plan)
                             pass.kernel->name, declared[b].name, r.name);
         }
         for (size_t b = 0; b < declared.size(); ++b)
-            if (uint8_t(declared[b].access) & uint8_t(Access::write)) {
-                const Tensor& t = pass.tensors[b];
+            if (const Tensor& t = pass.tensors[b]; t.valid() && uint8_t(declared[b].access) & uint8_t(Access::write))
                 written[t.resource].add(t.offset, t.offset + t.bytes());
-            }
     }
     return {};
 }

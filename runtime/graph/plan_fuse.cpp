@@ -5,7 +5,7 @@
 // keeps X only adds an output (statistics of X).
 #include "runtime/graph/plan.h"
 
-#include "runtime/graph/protocol.h"
+#include "runtime/graph/shader_interface.h"
 
 #include <algorithm>
 #include <cstring>
@@ -21,15 +21,29 @@ bool same(const Tensor& a, const Tensor& b)
 
 bool writes(const Pass& pass, size_t binding)
 {
-    return uint8_t(pass.kernel->variants.front().bindings[binding].access) & uint8_t(Access::write);
+    return pass.tensors[binding].valid() && uint8_t(pass.variant->bindings[binding].access) & uint8_t(Access::write);
+}
+
+// what an epilogue takes over from its producer; where its shader has none, it is never taken over
+const Tensor* input_of(const Pass& pass)
+{
+    const std::optional<size_t> x = pass.variant->binding(shader_interface::kInput);
+    return x && pass.tensors[*x].valid() ? &pass.tensors[*x] : nullptr;
+}
+
+bool is_input(const Pass& pass, size_t binding)
+{
+    return pass.variant->bindings[binding].name == shader_interface::kInput;
 }
 
 // could two tensors share bytes? by resource, and two externals by where their memory is
 bool may_share(const Plan& plan, const Tensor& a, const Tensor& b)
 {
-    const Resource &ra = plan.resources[a.resource], &rb = plan.resources[b.resource];
+    if (!a.valid() || !b.valid())
+        return false;
     if (a.resource == b.resource)
         return true;
+    const Resource &ra = plan.resources[a.resource], &rb = plan.resources[b.resource];
     return ra.external && rb.external && ra.memory.buffer && ra.memory.buffer == rb.memory.buffer &&
            ra.memory.offset < rb.memory.offset + rb.bytes && rb.memory.offset < ra.memory.offset + ra.bytes;
 }
@@ -45,10 +59,9 @@ bool touches(const Pass& pass, uint32_t resource)
 // the only pass that writes consumer's X, if consumer is also its only reader, and reads it once
 Pass* sole_producer(Plan& plan, size_t consumer)
 {
-    const std::vector<Tensor>& read = plan.passes[consumer].tensors;
-    const Tensor& x = read.front();
+    const Tensor& x = *input_of(plan.passes[consumer]);
     if (plan.resources[x.resource].external ||
-        std::any_of(read.begin() + 1, read.end(), [&](const Tensor& t) { return t.resource == x.resource; }))
+        std::ranges::count(plan.passes[consumer].tensors, x.resource, &Tensor::resource) > 1)
         return nullptr;
     Pass* producer = nullptr;
     for (size_t i = 0; i < plan.passes.size(); ++i) {
@@ -64,7 +77,7 @@ Pass* sole_producer(Plan& plan, size_t consumer)
 // the pass that last wrote consumer's X, all of it; others may read it
 Pass* last_writer(Plan& plan, size_t consumer)
 {
-    const Tensor& x = plan.passes[consumer].tensors.front();
+    const Tensor& x = *input_of(plan.passes[consumer]);
     for (size_t i = consumer; i-- > 0;) {
         bool whole = false, part = false;
         for (size_t b = 0; b < plan.passes[i].tensors.size(); ++b)
@@ -84,8 +97,8 @@ bool can_move_up(const Plan& plan, const Pass* producer, size_t consumer)
     const Pass& c = plan.passes[consumer];
     for (const Pass* p = producer + 1; p != &c; ++p)
         for (size_t b = 0; b < p->tensors.size(); ++b)
-            for (size_t k = 1; k < c.tensors.size(); ++k)
-                if ((writes(*p, b) || writes(c, k)) && may_share(plan, p->tensors[b], c.tensors[k]))
+            for (size_t k = 0; k < c.tensors.size(); ++k)
+                if (!is_input(c, k) && (writes(*p, b) || writes(c, k)) && may_share(plan, p->tensors[b], c.tensors[k]))
                     return false;
     return true;
 }
@@ -93,82 +106,88 @@ bool can_move_up(const Plan& plan, const Pass* producer, size_t consumer)
 // does the consumer write what the producer reads? other workgroups of the producer may not have read it yet
 bool overwrites_input(const Plan& plan, const Pass& producer, const Pass& c)
 {
-    for (size_t k = 1; k < c.tensors.size(); ++k)
+    for (size_t k = 0; k < c.tensors.size(); ++k)
         for (size_t b = 0; b < producer.tensors.size(); ++b)
-            if (writes(c, k) && !writes(producer, b) && may_share(plan, c.tensors[k], producer.tensors[b]))
+            if (!is_input(c, k) && writes(c, k) && !writes(producer, b) &&
+                may_share(plan, c.tensors[k], producer.tensors[b]))
                 return true;
     return false;
 }
 
 // push members named after a binding that moves ("gate_ld" of Gate, "y_ld" of Y) move with it
-void move_push(const Pass& from, Pass& to)
+Status move_push(const Pass& from, Pass& to)
 {
-    const KernelVariant &source = from.kernel->variants.front(), &target = to.kernel->variants.front();
-    for (size_t b = 1; b < source.bindings.size(); ++b) {
-        const std::string prefix = protocol::member_prefix(source.bindings[b].name);
-        for (const PushMember& m : source.push)
-            if (const PushMember* same_name = target.push_member(m.name); same_name && m.name.starts_with(prefix))
-                std::memcpy(&to.push[same_name->offset], &from.push[m.offset], 4);
+    for (const BindingInfo& b : from.variant->bindings) {
+        if (b.name == shader_interface::kInput)
+            continue;
+        const std::string prefix = shader_interface::member_prefix(b.name);
+        for (const PushMember& m : from.variant->push) {
+            if (!m.name.starts_with(prefix))
+                continue;
+            const PushMember* same_name = to.variant->push_member(m.name);
+            if (!same_name)
+                return fail(ErrorCode::internal, "{} cannot take over {}: it has no push member {}", to.kernel->name,
+                            from.kernel->name, m.name);
+            std::memcpy(&to.push[same_name->offset], &from.push[m.offset], 4);
+        }
     }
+    return {};
 }
 
-// outputs of epilogues that are off are bound to a row of Y; they follow it, or Y's old memory would stay
-void move_unused_outputs(Pass& producer, size_t y, uint32_t old_resource)
+// where the producer binds what the consumer's binding b does; X aside, which is no more
+std::optional<size_t> slot_of(const Pass& consumer, size_t b, const Pass& producer)
 {
-    for (size_t b = 0; b < producer.tensors.size(); ++b)
-        if (b != y && writes(producer, b) && producer.tensors[b].resource == old_resource)
-            producer.tensors[b] = producer.tensors[y].row_range(0, 1);
+    return producer.variant->binding(consumer.variant->bindings[b].name);
 }
 
-// where a producer binds what its consumer does, X aside; empty: not all of it
-std::vector<size_t> slots_of(const Pass& consumer, const KernelVariant& taking)
+// does the producer bind all that the consumer does, and no other epilogue of it the same?
+bool has_slots(const Pass& consumer, const Pass& producer)
 {
-    std::vector<size_t> slots(consumer.tensors.size());
-    for (size_t b = 1; b < slots.size(); ++b) {
-        const std::optional<size_t> slot = taking.binding(consumer.kernel->variants.front().bindings[b].name);
-        if (!slot)
-            return {};
-        slots[b] = *slot;
+    for (size_t b = 0; b < consumer.tensors.size(); ++b) {
+        if (is_input(consumer, b))
+            continue;
+        const std::optional<size_t> slot = slot_of(consumer, b, producer);
+        if (!slot || (consumer.variant->bindings[b].name != shader_interface::kOutput &&
+                      std::ranges::count(producer.slots, *slot)))
+            return false;
     }
-    return slots;
+    return true;
 }
 
-bool absorb(Plan& plan, size_t consumer)
+// the pass into whose epilogue a consumer can go
+Pass* find_producer(Plan& plan, size_t consumer)
 {
-    Pass& c = plan.passes[consumer];
+    const Pass& c = plan.passes[consumer];
+    if (c.options.absorbed_as.empty() || !input_of(c))
+        return nullptr;
     Pass* producer = c.options.keeps_x ? last_writer(plan, consumer) : sole_producer(plan, consumer);
     if (!producer)
-        return false;
-    const KernelVariant& taking = producer->kernel->variants.front();
-    const ConstantInfo* absorbing = taking.constant(c.options.absorbed_as);
-    const std::optional<size_t> y = taking.binding(protocol::kOutput);
-    if (!absorbing || !y || !same(producer->tensors[*y], c.tensors.front()))
-        return false;
-    const std::vector<size_t> slots = slots_of(c, taking);
-    if (slots.empty())
-        return false;
-    if (!producer->absorbed.empty() && producer->absorbed.back() >= absorbing->id)
-        return false; // the shader applies its epilogues in the order of their ids
-    for (size_t b = 1; b < c.tensors.size(); ++b)
-        if (slots[b] != *y && std::count(producer->slots.begin(), producer->slots.end(), slots[b]))
-            return false; // another epilogue uses that binding
-    if (!can_move_up(plan, producer, consumer) || overwrites_input(plan, *producer, c))
-        return false;
-    const uint32_t old_y = producer->tensors[*y].resource;
-    for (size_t b = 1; b < c.tensors.size(); ++b) {
-        producer->tensors[slots[b]] = c.tensors[b];
-        producer->slots.push_back(slots[b]);
+        return nullptr;
+    const ConstantInfo* absorbing = producer->variant->constant(c.options.absorbed_as);
+    const std::optional<size_t> y = producer->variant->binding(shader_interface::kOutput);
+    const bool takes = absorbing && y && same(producer->tensors[*y], *input_of(c)) && has_slots(c, *producer) &&
+                       // the shader applies its epilogues in the order of their ids
+                       (producer->absorbed.empty() || producer->absorbed.back() < absorbing->id) &&
+                       can_move_up(plan, producer, consumer) && !overwrites_input(plan, *producer, c);
+    return takes ? producer : nullptr;
+}
+
+Status absorb(const Pass& c, Pass& producer)
+{
+    for (size_t b = 0; b < c.tensors.size(); ++b) {
+        if (is_input(c, b))
+            continue;
+        const size_t slot = *slot_of(c, b, producer);
+        producer.tensors[slot] = c.tensors[b];
+        producer.slots.push_back(slot);
     }
-    if (!c.options.keeps_x)
-        move_unused_outputs(*producer, *y, old_y);
-    producer->absorbed.push_back(absorbing->id);
-    move_push(c, *producer);
-    producer->options.constants.push_back({c.options.absorbed_as, 1});
-    if (!producer->options.banded.empty()) // else its rows cannot be cut, and neither can these
+    producer.absorbed.push_back(producer.variant->constant(c.options.absorbed_as)->id);
+    producer.set_constant(c.options.absorbed_as, 1);
+    if (!producer.options.banded.empty()) // else its rows cannot be cut, and neither can these
         for (const BandedBinding& band : c.options.banded)
-            if (band.name != protocol::kInput && band.name != protocol::kOutput)
-                producer->options.banded.push_back(band);
-    return true;
+            if (band.name != shader_interface::kInput && band.name != shader_interface::kOutput)
+                producer.options.banded.push_back(band);
+    return move_push(c, producer);
 }
 
 } // namespace
@@ -176,13 +195,14 @@ bool absorb(Plan& plan, size_t consumer)
 Status fuse(Plan& plan)
 {
     for (size_t i = 0; i < plan.passes.size();) {
-        const Pass& pass = plan.passes[i];
-        if (!pass.options.absorbed_as.empty() && absorb(plan, i)) {
-            plan.passes.erase(plan.passes.begin() + int64_t(i));
-            ++plan.fused;
-        } else {
+        Pass* producer = find_producer(plan, i);
+        if (!producer) {
             ++i;
+            continue;
         }
+        SR_CHECK(absorb(plan.passes[i], *producer));
+        plan.passes.erase(plan.passes.begin() + int64_t(i));
+        ++plan.fused;
     }
     return {};
 }

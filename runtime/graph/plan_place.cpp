@@ -1,24 +1,26 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// stages 5 and 6: lifetimes of transients, and offsets in an arena where lives that do not overlap share bytes
+// stage 4: lifetimes of transients, and offsets in an arena where lives that do not overlap share bytes
 #include "runtime/graph/plan.h"
 
 #include <algorithm>
 
 namespace semrover::stage {
 
-Status lifetimes(Plan& plan)
+namespace {
+
+// first and last level of each transient
+void find_lifetimes(Plan& plan)
 {
     for (const Pass& pass : plan.passes)
         for (const PassBinding& b : pass.bindings) {
+            if (!b.given())
+                continue;
             Placement& p = plan.placements[b.resource];
             p.first_use = std::min(p.first_use, pass.level);
             p.last_use = std::max(p.last_use, pass.level);
         }
-    return {};
 }
-
-namespace {
 
 bool alive_together(const Placement& a, const Placement& b)
 {
@@ -47,6 +49,7 @@ uint64_t first_fit(const Plan& plan, const std::vector<uint32_t>& residents, con
 // greedy by size: large tensors first, each at the lowest offset that is free during its life
 Status place(Plan& plan, const DeviceLimits& limits)
 {
+    find_lifetimes(plan);
     std::vector<uint32_t> order;
     for (uint32_t r = 0; r < plan.resources.size(); ++r)
         if (!plan.resources[r].external && plan.placements[r].first_use != ~0u) {

@@ -64,25 +64,18 @@ void multiply()
     }
 }
 
-// slices of K, each summed by workgroups of its own, which write fp32 to Y; then a pass adds them up, in order
-#ifdef SLICES
-layout(constant_id = 36) const uint kSlices = 1;
-layout(constant_id = 37) const bool kAddSlices = false; // X are such sums, [slices * rows, cols] fp32
-const bool kSumsOnly = kSlices > 1 && !kAddSlices;
-#else
-const bool kAddSlices = false, kSumsOnly = false;
-#endif
-
 // eight columns of a row of the slab; with GEGLU the eight after them are their gates
 void finish_slab_row(uint slab_at, uint item, uint first_row, uint first_col)
 {
     const uint row = first_row + item / 2, col = first_col + item % 2 * 8;
     const uint at = slab_at + item / 2 * kSlabPitch + item % 2 * 2;
     vec4 lo = slab[at], hi = slab[at + 1];
-    if (kSumsOnly && row < p.rows && col < p.cols)
-        STORE8(y, false, (epilogue_group * p.rows + row) * p.y_ld + col, lo, hi);
-    if (kSumsOnly || row >= p.rows || col >= p.cols || (kGeglu && item % 2 != 0))
+    if (row >= p.rows || col >= p.cols || (kGeglu && item % 2 != 0))
         return;
+    if (kSlices > 1) { // beside each other in a row: split_k_reduce adds them
+        STORE8(y, false, row * p.y_ld + gl_WorkGroupID.z * (p.y_ld / kSlices) + col, lo, hi);
+        return;
+    }
     activate8(row, col, lo, hi);
     if (kGeglu) {
         vec4 gate_lo = slab[at + 2], gate_hi = slab[at + 3];
@@ -143,26 +136,6 @@ void put_slab(uint s, uint at)
     }
 }
 
-#ifdef SLICES
-void add_slices(uint at, uint first_row, uint first_col)
-{
-    for (uint item = gl_SubgroupInvocationID; item < 2 * kSlab; item += gl_SubgroupSize) {
-        const uint row = min(first_row + item / 2, p.rows - 1), col = first_col + item % 2 * 8;
-        vec4 lo = vec4(0.0), hi = vec4(0.0);
-        if (col < p.cols)
-            for (uint slice = 0; slice < kSlices; ++slice) {
-                const uint from = ((slice * p.rows + row) * p.x_ld + col) / 4;
-                lo += uintBitsToFloat(x[from]);
-                hi += uintBitsToFloat(x[from + 1]);
-            }
-        slab[at + item / 2 * kSlabPitch + item % 2 * 2] = lo;
-        slab[at + item / 2 * kSlabPitch + item % 2 * 2 + 1] = hi;
-    }
-}
-#else
-void add_slices(uint at, uint first_row, uint first_col) {}
-#endif
-
 // Through the slab, as the extension does not say which lane holds which sum. note: unrolled for each slab the epilogue
 // would be many times as long.
 void store_tile(uint tile_row, uint tile_col)
@@ -172,14 +145,11 @@ void store_tile(uint tile_row, uint tile_col)
         const uint row = tile_row + part_row() + s / across * kSlab;
         const uint col = tile_col + part_col() + s % across * kSlab;
         own_barrier();
-        if (kAddSlices)
-            add_slices(at, row, col);
-        else
-            put_slab(s, at);
+        put_slab(s, at);
         own_barrier();
         for (uint item = gl_SubgroupInvocationID; item < 2 * kSlab; item += gl_SubgroupSize)
             finish_slab_row(at, item, row, col);
-        if (kMoments && !kSumsOnly) {
+        if (kMoments) {
             own_barrier();
             make_slab_moments(at, row);
             own_barrier();

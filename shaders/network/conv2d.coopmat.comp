@@ -24,7 +24,7 @@ layout(binding = 1) readonly buffer W { uvec4 w[]; };   // [cols, taps * (x_cols
 layout(binding = 8) readonly buffer X2 { uvec4 x2[]; }; // as x, x2_cols
 #include "lib/conv_shift.glsl"
 #include "lib/gemm_epilogue.glsl"
-#define SLICES
+layout(constant_id = 36) const uint kSlices = 1; // of K, each summed by workgroups of its own, which write fp32 sums to Y
 #include "lib/gemm_tile.coopmat.glsl"
 #include "lib/conv_taps.glsl"
 
@@ -84,12 +84,8 @@ void load(uint tile_col, Cursor c)
 
 void main()
 {
-    epilogue_group = gl_WorkGroupID.z; // the slice, whose sums lie below those of the slice before it
+    epilogue_group = 0;
     const uint row = gl_WorkGroupID.x * kTileM, col = gl_WorkGroupID.y * kTileN;
-    if (kAddSlices) {
-        store_tile(row, col);
-        return;
-    }
     [[unroll]] for (uint i = 0; i < kLoadsX; ++i)
         pixels[i] = conv_pixel(row + load_row(i));
     clear_tile();

@@ -18,6 +18,7 @@ layout(binding = 0) readonly buffer X { uvec4 x[]; }; // [groups * rows, depth],
 layout(binding = 1) readonly buffer W { uvec4 w[]; }; // [groups * cols, depth], fp16
 #include "lib/gemm_gate.glsl"
 #include "lib/gemm_epilogue.glsl"
+const uint kSlices = 1; // of K
 #include "lib/gemm_tile.coopmat.glsl"
 
 // kStep columns of the tile's rows of x and of w, k the first

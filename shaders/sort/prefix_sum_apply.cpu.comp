@@ -6,8 +6,7 @@
 #include "prefix_sum.h"
 
 layout(local_size_x = 8) in;
-layout(constant_id = 0) const uint kTileM = 8; // workers of a workgroup
-layout(constant_id = 1) const uint kTileN = 1;
+layout(constant_id = 0) const uint kWorkers = 8; // workers of a workgroup
 #include "lib/prefix_sum.glsl"
 layout(binding = 2) readonly buffer First { uint first[]; }; // [workers]
 layout(binding = 3) writeonly buffer Y { uint y[]; };        // [size]

@@ -7,8 +7,7 @@
 #include "prefix_sum.h"
 
 layout(local_size_x = 64) in;
-layout(constant_id = 0) const uint kTileM = 1; // workers of a workgroup
-layout(constant_id = 1) const uint kTileN = 1;
+layout(constant_id = 0) const uint kWorkers = 1; // workers of a workgroup
 #include "lib/prefix_sum.glsl"
 #include "lib/workgroup_scan.glsl"
 layout(binding = 2) readonly buffer First { uint first[]; }; // [workers]

@@ -7,8 +7,7 @@
 #include "radix_sort.h"
 
 layout(local_size_x = 8) in;
-layout(constant_id = 0) const uint kTileM = 8; // workers of a workgroup
-layout(constant_id = 1) const uint kTileN = 1;
+layout(constant_id = 0) const uint kWorkers = 8; // workers of a workgroup
 #include "lib/radix_sort.glsl"
 layout(binding = 2) readonly buffer Values { uint values[]; };
 layout(binding = 3) buffer First { uint first[]; }; // [buckets, workers]

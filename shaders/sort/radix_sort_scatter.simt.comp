@@ -13,8 +13,7 @@
 #include "radix_sort.h"
 
 layout(local_size_x = 256) in;
-layout(constant_id = 0) const uint kTileM = 1; // workers of a workgroup
-layout(constant_id = 1) const uint kTileN = 1;
+layout(constant_id = 0) const uint kWorkers = 1; // workers of a workgroup
 #define CHUNK_OF_TILES
 #include "lib/radix_sort.glsl"
 layout(binding = 2) readonly buffer Values { uint values[]; };

@@ -131,7 +131,7 @@ BufferSlice KernelCase::upload(const std::vector<std::byte>& bytes)
 std::vector<std::byte> KernelCase::read_bytes(const Tensor& t)
 {
     std::vector<std::byte> bytes(t.bytes());
-    const BufferSlice& memory = graph.desc().resources[t.resource].memory;
+    const BufferSlice& memory = graph.resources()[t.resource].memory;
     const Status status = device_.read(memory.part(t.offset, bytes.size()), bytes);
     EXPECT_TRUE(status) << status.error().message;
     return bytes;

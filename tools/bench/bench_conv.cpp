@@ -27,7 +27,7 @@ Status bench_conv(const BenchConvArguments& o, const Globals& globals)
     const Slot x = inputs.add(map.image_rows(), o.channels, dtype);
     const Slot w = inputs.add(o.outputs, 9 * round_up(o.channels, kRowPadding), dtype);
     SR_CHECK(inputs.allocate());
-    Graph g;
+    Graph g(device->limits());
     map.data = x.in(g);
     ConvOptions options;
     options.dtype = dtype;

@@ -41,7 +41,7 @@ Result<std::unique_ptr<Program>> gemm_program(Device& device, BenchInputs& input
 {
     const Slot x = inputs.add(s.m, s.k, dtype), w = inputs.add(s.n, s.k, dtype), y = inputs.add(s.m, s.n, dtype);
     SR_CHECK(inputs.allocate());
-    Graph g;
+    Graph g(device.limits());
     g.keep(gemm(g, x.in(g), w.in(g), {}, {.dtype = dtype}), y.in(g));
     return Program::create(device, g);
 }

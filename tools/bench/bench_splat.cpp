@@ -31,7 +31,7 @@ Status bench_sort(const SortOptions& o, const Globals& globals)
     const Slot keys = inputs.add(o.pairs, 1, DType::u32), values = inputs.add(o.pairs, 1, DType::u32);
     const uint64_t predicted = inputs.bytes();
     SR_CHECK(inputs.allocate());
-    Graph g;
+    Graph g(device->limits());
     (void)radix_sort(g, keys.in(g), values.in(g));
     SR_TRY(const auto program, Program::create(*device, g));
     SR_TRY(const Timing timing, measure([&] { return program->run(); }));

@@ -32,7 +32,7 @@ Status bench_unet(const BenchUnetArguments& o, const Globals& globals)
     const Slot table = inputs.add(1, unet->time_width(), DType::f32), row = inputs.add(o.batch, 1, DType::u32);
     const Slot text = inputs.add(o.tokens, std::max(unet->context_width(), 1u), dtype);
     SR_CHECK(inputs.allocate());
-    Graph g;
+    Graph g(device->limits());
     x.data = sample.in(g);
     const Tensor table_row = row.in(g);
     SR_CHECK(row.clear(*device));

@@ -30,7 +30,7 @@ Status bench_vae(const BenchVaeArguments& o, const Globals& globals)
     BenchInputs inputs(*device);
     const Slot in = inputs.add(x.image_rows(), o.encode ? config.in_channels : config.latent_channels, DType::f32);
     SR_CHECK(inputs.allocate());
-    Graph g;
+    Graph g(device->limits());
     x.data = in.in(g);
     (void)(o.encode ? vae->encode(g, x) : vae->decode(g, x));
     want_profile(*device, o.profile);

@@ -4,7 +4,7 @@
 #include "kernels/catalogue.h"
 #include "runtime/base/json.h"
 #include "runtime/device/device.h"
-#include "runtime/graph/plan.h"
+#include "runtime/graph/variant.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/progress.h"
 

@@ -330,7 +330,7 @@ Result<VoxFile> Parser::parse()
 
 // ---- writing
 
-class Bytes {
+class VoxWriter {
   public:
     void u32(uint64_t value) { put(static_cast<uint32_t>(value)); }
     void text(std::string_view text)
@@ -343,7 +343,7 @@ class Bytes {
         const auto* first = reinterpret_cast<const std::byte*>(text.data());
         bytes.insert(bytes.end(), first, first + text.size());
     }
-    void chunk(std::string_view id, const Bytes& content)
+    void chunk(std::string_view id, const VoxWriter& content)
     {
         raw(id);
         u32(content.bytes.size());
@@ -361,9 +361,9 @@ class Bytes {
     }
 };
 
-Bytes transform_node(size_t id, size_t child, const std::string& translation)
+VoxWriter transform_node(size_t id, size_t child, const std::string& translation)
 {
-    Bytes b;
+    VoxWriter b;
     b.u32(id);
     b.u32(0); // attributes
     b.u32(child);
@@ -378,9 +378,9 @@ Bytes transform_node(size_t id, size_t child, const std::string& translation)
     return b;
 }
 
-void append_model(Bytes& main, const VoxModel& model)
+void append_model(VoxWriter& main, const VoxModel& model)
 {
-    Bytes size, voxels;
+    VoxWriter size, voxels;
     for (const uint32_t side : model.size)
         size.u32(side);
     voxels.u32(model.voxels.size());
@@ -444,7 +444,7 @@ std::vector<std::byte> encode_vox(std::span<const VoxModel> models,
                                   std::span<const std::array<int64_t, 3>> translations,
                                   std::span<const std::array<uint8_t, 3>> palette)
 {
-    Bytes main, group, colors;
+    VoxWriter main, group, colors;
     for (const VoxModel& model : models)
         append_model(main, model);
     main.chunk("nTRN", transform_node(0, 1, ""));
@@ -457,7 +457,7 @@ std::vector<std::byte> encode_vox(std::span<const VoxModel> models,
     for (size_t i = 0; i < models.size(); ++i) {
         const auto& t = translations[i];
         main.chunk("nTRN", transform_node(2 + 2 * i, 3 + 2 * i, fmt::format("{} {} {}", t[0], t[1], t[2])));
-        Bytes shape;
+        VoxWriter shape;
         for (const uint64_t value : {uint64_t(3 + 2 * i), uint64_t(0), uint64_t(1), uint64_t(i), uint64_t(0)})
             shape.u32(value);
         main.chunk("nSHP", shape);
@@ -467,7 +467,7 @@ std::vector<std::byte> encode_vox(std::span<const VoxModel> models,
         colors.u32(c[0] | c[1] << 8 | c[2] << 16 | 255u << 24);
     }
     main.chunk("RGBA", colors);
-    Bytes file;
+    VoxWriter file;
     file.raw("VOX ");
     file.u32(150);
     file.raw("MAIN");

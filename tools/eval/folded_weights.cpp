@@ -67,9 +67,17 @@ Status FoldedWeights::load(Device& device, std::string_view prefix)
         if (!spec.optional)
             SR_CHECK(check_finite(file_, *file_.find(spec.name)));
     SR_CHECK(state_.allocate(device, "network weights"));
+    std::vector<WeightLayout> weights;
     for (const Layer& layer : layers_)
-        SR_CHECK(upload(device, layer));
-    return {};
+        for (WeightLayout& w : layouts_of(layer))
+            weights.push_back(std::move(w));
+    size_t next = 0; // each layer's weight, then its bias
+    return load_weights(device, weights, [&](const TensorSpec& spec, std::vector<float>& scratch) {
+        const size_t part = next++;
+        return fold(layers_[part / 2], part % 2, scratch).map([&] {
+            return TensorValues{std::as_bytes(std::span(scratch)), DType::f32, file_.path(), spec.name};
+        });
+    });
 }
 
 Result<std::vector<double>> FoldedWeights::read(const std::string& name) const
@@ -80,38 +88,56 @@ Result<std::vector<double>> FoldedWeights::read(const std::string& name) const
     return std::vector<double>(values.begin(), values.end());
 }
 
-Status FoldedWeights::upload(Device& device, const Layer& layer) const
+std::array<WeightLayout, 2> FoldedWeights::layouts_of(const Layer& layer)
 {
     const Shape& s = layer.shape;
-    SR_TRY(const auto weight, read(layer.convolution + ".weight"));
-    SR_TRY(const auto gain, read(layer.norm + ".weight"));
-    SR_TRY(const auto beta, read(layer.norm + ".bias"));
-    SR_TRY(const auto mean, read(layer.norm + ".running_mean"));
-    SR_TRY(const auto variance, read(layer.norm + ".running_var"));
-    std::vector<double> bias(s.outputs);
-    if (s.bias) {
-        SR_TRY(bias, read(layer.convolution + ".bias"));
-    }
-    const uint32_t taps = s.taps.height * s.taps.width, width = padded(s.inputs);
     const uint32_t channels = std::accumulate(s.inputs.begin(), s.inputs.end(), 0u);
-    std::vector<float> rows(size_t(s.outputs) * layer.weight.cols()), shifts(round_up(s.outputs, kRowPadding));
+    WeightPart weight{{layer.convolution + ".weight", {s.outputs, channels, s.taps.height, s.taps.width}},
+                      channels,
+                      straight(s.outputs),
+                      {}};
+    weight.taps = s.taps.height * s.taps.width;
+    weight.tap_width = padded(s.inputs);
+    uint32_t from = 0, to = 0;
+    for (const uint32_t of_branch : s.inputs) {
+        weight.cols.push_back({from, to, of_branch});
+        from += of_branch;
+        to += round_up(of_branch, kRowPadding);
+    }
+    const WeightPart bias{{layer.convolution + ".bias", {s.outputs}}, s.outputs, straight(1), straight(s.outputs)};
+    return {WeightLayout{layer.weight, {weight}}, {layer.bias, {bias}}};
+}
+
+Status FoldedWeights::fold(const Layer& layer, bool of_bias, std::vector<float>& values) const
+{
+    const Shape& s = layer.shape;
+    SR_TRY(const auto gain, read(layer.norm + ".weight"));
+    SR_TRY(const auto variance, read(layer.norm + ".running_var"));
+    std::vector<double> scale(s.outputs);
     for (uint32_t n = 0; n < s.outputs; ++n) {
         if (variance[n] < 0)
             return fail(ErrorCode::bad_input, "{}: tensor '{}.running_var' holds {} at element {}",
                         quote_path(file_.path()), printable(layer.norm), variance[n], n);
-        const double scale = gain[n] / std::sqrt(variance[n] + s.eps);
-        shifts[n] = float((bias[n] - mean[n]) * scale + beta[n]);
-        uint32_t channel = 0, first = 0;
-        for (const uint32_t of_branch : s.inputs) {
-            for (uint32_t c = 0; c < of_branch; ++c, ++channel)
-                for (uint32_t tap = 0; tap < taps; ++tap)
-                    rows[size_t(n) * layer.weight.cols() + tap * width + first + c] =
-                        float(weight[(size_t(n) * channels + channel) * taps + tap] * scale);
-            first += round_up(of_branch, kRowPadding);
-        }
+        scale[n] = gain[n] / std::sqrt(variance[n] + s.eps);
     }
-    SR_CHECK(layer.weight.write(device, rows));
-    return layer.bias.write(device, shifts);
+    if (of_bias) {
+        SR_TRY(const auto beta, read(layer.norm + ".bias"));
+        SR_TRY(const auto mean, read(layer.norm + ".running_mean"));
+        std::vector<double> bias(s.outputs);
+        if (s.bias) {
+            SR_TRY(bias, read(layer.convolution + ".bias"));
+        }
+        values.resize(s.outputs);
+        for (uint32_t n = 0; n < s.outputs; ++n)
+            values[n] = float((bias[n] - mean[n]) * scale[n] + beta[n]);
+        return {};
+    }
+    SR_TRY(const auto weight, read(layer.convolution + ".weight"));
+    values.resize(weight.size());
+    const size_t of_output = weight.size() / s.outputs;
+    for (size_t i = 0; i < weight.size(); ++i)
+        values[i] = float(weight[i] * scale[i / of_output]);
+    return {};
 }
 
 } // namespace semrover

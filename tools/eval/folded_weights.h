@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/model/weight_loader.h"
 #include "kernels/network.h"
-#include "runtime/base/safetensors.h"
-#include "runtime/device/device.h"
-#include "runtime/device/state.h"
+
+#include <array>
 
 namespace semrover {
 
@@ -46,7 +46,9 @@ class FoldedWeights {
         Slot weight, bias;
     };
     Result<std::vector<double>> read(const std::string& name) const;
-    Status upload(Device& device, const Layer& layer) const;
+    static std::array<WeightLayout, 2> layouts_of(const Layer& layer); // weight, bias
+    // the values of one of them, in the order of the file
+    Status fold(const Layer& layer, bool of_bias, std::vector<float>& values) const;
 
     SafetensorsSet file_;
     std::vector<Layer> layers_;

@@ -23,7 +23,7 @@ struct ImageFeatures::Impl {
     Impl(Device& d, const Inception& n, ImageSize s, uint32_t b) : device(d), network(n), size(s), batch(b)
     {
         pixels = state.slot(batch, words(), DType::u32, "images", words());
-        Graph sizes; // to know how large the result is
+        Graph sizes(device.limits()); // to know how large the result is
         const Tensor y = forward(sizes);
         features = state.slot(y.rows, y.cols, DType::f32, "features");
     }
@@ -35,14 +35,14 @@ struct ImageFeatures::Impl {
     }
     Graph graph() const
     {
-        Graph g;
+        Graph g(device.limits());
         g.keep(forward(g), features);
         return g;
     }
     // arrays and transients; nothing is allocated yet
     Result<uint64_t> planned_bytes() const
     {
-        SR_TRY(const Plan plan, make_plan(graph().desc(), device.limits()));
+        SR_TRY(const Plan plan, make_plan(graph()));
         return state.planned_bytes(device.limits()) + plan.arena_bytes();
     }
     Status allocate()

@@ -26,13 +26,13 @@ struct PointFeatures::Impl {
     }
     Graph graph() const
     {
-        Graph g;
+        Graph g(device.limits());
         g.keep(network.forward(g, positions.in(g), inputs.in(g), batch), features);
         return g;
     }
     Result<uint64_t> planned_bytes() const
     {
-        SR_TRY(const Plan plan, make_plan(graph().desc(), device.limits()));
+        SR_TRY(const Plan plan, make_plan(graph()));
         return state.planned_bytes(device.limits()) + plan.arena_bytes();
     }
     Status allocate()

@@ -137,7 +137,7 @@ Result<std::vector<uint32_t>> seen_cells(Device& device, const Mesh& mesh, const
     const Slot cast = memory.slot(options.rays, 8, DType::f32, "rays", 8);
     const Slot hits = memory.slot(options.rays, 4, DType::u32, "hits", 4);
     SR_CHECK(memory.allocate(device, "rays"));
-    Graph g;
+    Graph g(device.limits());
     g.keep(trace_rays(g, scene.in(g), cast.in(g)), hits);
     SR_TRY(const auto program, Program::create(device, g));
 

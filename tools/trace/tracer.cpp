@@ -88,7 +88,7 @@ Result<std::unique_ptr<Tracer>> Tracer::create(Device& device, const DeviceTrace
     t->view_ = t->memory_.slot(sizeof(View) / 16, 4, DType::f32, "view", 4);
     t->picture_ = t->memory_.slot(options.width * options.height, 4, DType::u32, "picture", 4);
     SR_CHECK(t->memory_.allocate(device, "traced picture"));
-    Graph g;
+    Graph g(device.limits());
     g.keep(shade(g, scene.in(g), t->view_.in(g), options), t->picture_);
     SR_TRY(t->program_, Program::create(device, g));
     return t;

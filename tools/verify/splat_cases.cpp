@@ -55,7 +55,7 @@ Result<PcaNormalsResult> run_pca_normals(Device& device, std::span<const float> 
     const Slot eigenvalues = memory.slot(n, 4, DType::f32, "eigenvalues", 4);
     SR_CHECK(memory.allocate(device, "points"));
     SR_CHECK(points.write(device, positions));
-    Graph g;
+    Graph g(device.limits());
     const Tensor x = points.in(g);
     const PcaNormals y = pca_normal(g, x, knn(g, x, {.neighbors = neighbors}));
     g.keep(y.normals, normals);

@@ -192,9 +192,9 @@ struct VideoSlots {
         SR_CHECK(image.write(device, in.image));
         return number.write(device, in.number);
     }
-    Graph tables_graph(const Unet& unet) const
+    Graph tables_graph(const DeviceLimits& limits, const Unet& unet) const
     {
-        Graph g;
+        Graph g(limits);
         g.keep(unet.time_table(g, steps.in(g), {}, added.in(g)), times);
         g.keep(unet.frame_table(g, numbers.in(g)), frames);
         g.keep(unet.context_table(g, text.in(g)), keys);
@@ -226,11 +226,11 @@ Result<GoldenOutputs> run_vae(Device& device, const GoldenCase& c, const VaeConf
     SR_CHECK(pixels.write_rows(device, to_rows(c.floats("input.image"), image)));
     SR_CHECK(values.write_rows(device, to_rows(c.floats("input.latent"), latent)));
     GoldenOutputs out;
-    Graph encode;
+    Graph encode(device.limits());
     const FeatureMap in = input_map(encode, pixels, image);
     SR_TRY(const auto moments, run_and_read(device, encode, vae->encode(encode, in)));
     add_moments(moments, latent, out);
-    Graph decode;
+    Graph decode(device.limits());
     const FeatureMap z = input_map(decode, values, latent);
     SR_TRY(out.floats["image"], run_and_read(device, decode, vae->decode(decode, z)));
     return out;
@@ -256,7 +256,7 @@ Result<GoldenOutputs> run_unet_2d_condition(Device& device, const GoldenCase& c,
     SR_CHECK(text.write_rows(device, input.text));
     SR_CHECK(steps.write(device, input.timesteps));
     SR_CHECK(rows.write(device, input.table_row));
-    Graph g;
+    Graph g(device.limits());
     const Tensor table = unet->time_table(g, steps.in(g));
     Unet::Context context{{}, input.tokens, input.tokens};
     if (unet->context_width())
@@ -277,9 +277,9 @@ Result<GoldenOutputs> run_unet_spatio_temporal_condition(Device& device, const G
     VideoSlots slots(*unet, in);
     SR_CHECK(slots.state.allocate(device, "golden case"));
     SR_CHECK(slots.write(device, in));
-    SR_TRY(const auto tables, Program::create(device, slots.tables_graph(*unet)));
+    SR_TRY(const auto tables, Program::create(device, slots.tables_graph(device.limits(), *unet)));
     SR_CHECK(tables->run());
-    Graph g;
+    Graph g(device.limits());
     const Unet::Context context{slots.keys.in(g), in.tokens, in.tokens};
     const Unet::Videos videos{{in.frames, slots.frames.in(g), slots.number.in(g)}, slots.video.in(g)};
     const FeatureMap y =

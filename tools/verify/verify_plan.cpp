@@ -49,7 +49,7 @@ class StepRunner {
     explicit StepRunner(Device& device) : device_(device) {}
     Result<std::unique_ptr<Program>> build(float clip)
     {
-        Graph g;
+        Graph g(device_.limits());
         const StepTable table{steps_.in(g), clock_.in(g)};
         step_update(g, table, m_.in(g), z_.in(g), known_.in(g), fixed_.in(g), x_.in(g), x0_.in(g), 1, clip);
         step_advance(g, table.clock);

@@ -87,7 +87,7 @@ Result<std::vector<float>> evaluate(Device& device, const Transformer& t, const 
     if (condition.valid())
         SR_CHECK(condition.write_rows(device, in.condition));
 
-    Graph g;
+    Graph g(device.limits());
     TokenContext context{labels.in(g), cells.in(g),    sets.in(g),         tiles.in(g),
                          coords.in(g), pos.in(g),      conditioning.in(g), voxel_conditioning.in(g),
                          mask.in(g),   in.sets.longest};

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// stage 4: which passes may run side by side, from what they read and write, before any memory is shared
+// stage 3: which passes may run side by side, from what they read and write, before any memory is shared
 #include "runtime/graph/plan.h"
 
 #include <algorithm>
@@ -34,7 +34,7 @@ void defer(std::vector<uint32_t>& level, const std::vector<std::vector<uint32_t>
 
 } // namespace
 
-void arrange(Plan& plan, bool side_by_side)
+void levels(Plan& plan, bool side_by_side)
 {
     for (uint32_t i = 0; i < plan.passes.size(); ++i)
         plan.passes[i].level = i;

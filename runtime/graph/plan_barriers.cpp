@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// stage 8: hazards from access x byte range, after aliasing. A pass runs one level after the last pass that it
+// stage 6: hazards from access x byte range, after aliasing. A pass runs one level after the last pass that it
 // conflicts with; one barrier stands between levels, none for read after read.
 #include "runtime/graph/plan.h"
 
@@ -8,7 +8,7 @@
 
 namespace semrover::stage {
 
-Status order(Plan& plan)
+void barriers(Plan& plan)
 {
     for (size_t i = 0; i < plan.passes.size(); ++i) {
         uint32_t level = 0;
@@ -22,7 +22,6 @@ Status order(Plan& plan)
     }
     std::stable_sort(plan.passes.begin(), plan.passes.end(),
                      [](const Pass& a, const Pass& b) { return a.level < b.level; });
-    return {};
 }
 
 } // namespace semrover::stage

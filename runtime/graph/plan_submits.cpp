@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// stage 9: what goes to the device at a time. GPUs are taken away from whoever keeps them for too long, by a watchdog,
+// stage 7: what goes to the device at a time. GPUs are taken away from whoever keeps them for too long, by a watchdog,
 // so submits are short: passes share one until its time is used up, and a long pass is cut into ranges of its
 // workgroups.
 #include "runtime/graph/plan.h"
@@ -9,17 +9,6 @@
 #include <cmath>
 
 namespace semrover {
-
-// rates that no supported GPU falls short of by much
-constexpr double kSlowOperations = 5e11, kSlowBytes = 2e10; // a second
-
-double estimated_seconds(const Pass& pass)
-{
-    double bytes = 0;
-    for (const PassBinding& b : pass.bindings)
-        bytes += double(b.bytes);
-    return std::max(std::max(pass.options.flops, pass.options.most_operations) / kSlowOperations, bytes / kSlowBytes);
-}
 
 namespace {
 
@@ -41,7 +30,7 @@ uint32_t parts_of(const Pass& pass, int dimension, double seconds, double limit)
 
 } // namespace
 
-void stage::schedule(Plan& plan, const DeviceLimits& limits, std::span<const double> seconds)
+void stage::submits(Plan& plan, const DeviceLimits& limits, std::span<const double> seconds)
 {
     const double limit = limits.submit_seconds;
     double filled = 0; // seconds of the submit so far

@@ -1,0 +1,20 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "runtime/graph/pass.h"
+
+#include <span>
+
+namespace semrover {
+
+// bytes of shared memory that a variant takes with these constants, of those that it has; others have their defaults
+uint32_t shared_bytes(const KernelVariant& variant, std::span<const ConstantValue> constants);
+
+// The variant of `kernel` for a device, among those its limits allow with these constants and tensors (none: fp16
+// ones): the forced one, else cpu, coopmat or simt by device type. nullptr: none runs on it.
+const KernelVariant* choose_variant(const Kernel& kernel, const DeviceLimits& limits,
+                                    std::span<const ConstantValue> constants = {},
+                                    std::span<const Tensor> tensors = {});
+
+} // namespace semrover
