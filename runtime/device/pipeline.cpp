@@ -162,6 +162,7 @@ void PipelineStore::save()
     if (bytes && make_folder(fs::path(cache_path_).parent_path()))
         (void)write_file_atomically(cache_path_, std::as_bytes(std::span(*bytes)));
     saved_tuning_ = device_.tuning().size();
+    saved_ = true;
 }
 
 Result<std::vector<const Pipeline*>> PipelineStore::get(std::span<const Pass> passes)
@@ -188,9 +189,10 @@ Status PipelineStore::compile(std::span<Missing> missing)
     std::atomic<size_t> next = 0;
     const auto make_next = [&] {
         const size_t i = next++;
-        if (i < missing.size())
-            missing[i].status = make(missing[i]);
-        return i + 1 < missing.size();
+        if (i >= missing.size())
+            return false;
+        missing[i].status = make(missing[i]);
+        return true;
     };
     const size_t most = device_.vk().allocator() ? 1 : std::max(std::thread::hardware_concurrency(), 1u);
     std::vector<std::jthread> others;
@@ -223,8 +225,7 @@ void PipelineStore::save_by_and_by(double seconds)
     unsaved_seconds_ += seconds;
     if (first_) // which is another thread's
         return;
-    const bool first = pipelines_.empty() && reused_bytes_ == 0;
-    if (!first && unsaved_seconds_ < kSaveAfterSeconds)
+    if ((saved_ || reused_bytes_) && unsaved_seconds_ < kSaveAfterSeconds)
         return;
     save();
     unsaved_seconds_ = 0;

@@ -72,6 +72,7 @@ class PipelineStore {
     VkPipelineCache cache_ = VK_NULL_HANDLE;
     std::string cache_path_; // empty: nowhere to keep it
     size_t reused_bytes_ = 0;
+    bool saved_ = false;         // in this process
     double unsaved_seconds_ = 0; // of compiling
     size_t saved_tuning_ = 0;    // how many were chosen then
     std::map<const KernelVariant*, Shader> shaders_;

@@ -83,6 +83,11 @@ void add_profile(CLI::App& command, std::string& path)
     command.add_option("--profile", path, "write device times as a Chrome trace, and their sums to stderr");
 }
 
+void add_plan(CLI::App& command, bool& plan)
+{
+    command.add_flag("--plan", plan, "write to stderr what is done, in which order: passes, barriers, submits");
+}
+
 void want_profile(Device& device, const std::string& path)
 {
     if (!path.empty())

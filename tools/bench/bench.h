@@ -49,6 +49,7 @@ Status read_config(const std::string& path, Parse parse, Config& config)
 
 // device times where --profile asked for them: a Chrome trace, and their sums to stderr
 void add_profile(CLI::App& command, std::string& path);
+void add_plan(CLI::App& command, bool& plan);
 void want_profile(Device& device, const std::string& path);
 Status write_profile(Device& device, const std::string& path);
 void print_report(const Json& report, const Globals& globals);

@@ -3,7 +3,9 @@
 // semrover bench conv: one 3x3 convolution
 #include "kernels/network.h"
 #include "tools/bench/bench.h"
+#include "tools/bench/plan_text.h"
 #include "tools/cli/open_device.h"
+#include "tools/cli/print_stderr.h"
 #include "tools/cli/value_options.h"
 
 #include <CLI/CLI.hpp>
@@ -15,6 +17,7 @@ namespace {
 struct BenchConvArguments {
     uint32_t width = 77, height = 53, channels = 320, outputs = 320;
     std::string precision = "fp16", profile;
+    bool plan = false;
     bool winograd = false;
 };
 
@@ -35,6 +38,8 @@ Status bench_conv(const BenchConvArguments& o, const Globals& globals)
     (void)(o.winograd ? winograd_conv2d(g, map, winograd_weight(g, weight), {}, options)
                       : conv2d(g, map, {}, weight, {}, options));
     SR_TRY(const auto program, Program::create(*device, g));
+    if (o.plan)
+        print_stderr("{}", plan_text(program->plan()));
     SR_TRY(const Timing timing, measure([&] { return program->run(); }));
     Json report = bench_report("conv", *device, dtype, timing, inputs.bytes() + program->plan().arena_bytes());
     report["width"] = o.width;
@@ -62,6 +67,7 @@ void add_bench_conv(CLI::App& bench, const Globals& globals, Run& run)
     c->add_flag("--winograd", o->winograd, "by Winograd's algorithm, weights transformed in every run");
     add_choice(*c, "--precision", {"fp16", "fp32"}, "storage", o->precision);
     add_profile(*c, o->profile);
+    add_plan(*c, o->plan);
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_conv(*o, globals); }; });
 }
 

@@ -3,7 +3,9 @@
 // semrover bench gemm: y = x w^T, x [m, k], w [n, k]
 #include "kernels/network.h"
 #include "tools/bench/bench.h"
+#include "tools/bench/plan_text.h"
 #include "tools/cli/open_device.h"
+#include "tools/cli/print_stderr.h"
 #include "tools/cli/value_options.h"
 
 #include <CLI/CLI.hpp>
@@ -15,6 +17,7 @@ namespace {
 struct BenchGemmArguments {
     GemmShape shape;
     std::string precision = "fp16", profile;
+    bool plan = false;
 };
 
 Status bench_gemm(const BenchGemmArguments& o, const Globals& globals)
@@ -23,6 +26,8 @@ Status bench_gemm(const BenchGemmArguments& o, const Globals& globals)
     const DType dtype = o.precision == "fp32" ? DType::f32 : DType::f16;
     BenchInputs inputs(*device);
     SR_TRY(const auto program, gemm_program(*device, inputs, o.shape, dtype));
+    if (o.plan)
+        print_stderr("{}", plan_text(program->plan()));
     SR_TRY(const Timing timing, measure([&] { return program->run(); }));
     Json report = bench_report("gemm", *device, dtype, timing, inputs.bytes() + program->plan().arena_bytes());
     report["m"] = o.shape.m;
@@ -55,6 +60,7 @@ void add_bench_gemm(CLI::App& bench, const Globals& globals, Run& run)
     add_number(*c, "--k", o->shape.k, "columns of both", 1, 65536);
     add_choice(*c, "--precision", {"fp16", "fp32"}, "storage", o->precision);
     add_profile(*c, o->profile);
+    add_plan(*c, o->plan);
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_gemm(*o, globals); }; });
 }
 

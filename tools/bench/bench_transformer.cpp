@@ -3,7 +3,9 @@
 // semrover bench transformer: one denoising step of a batch of regions, both guidance halves, random weights
 #include "engine/voxfield/token_sampler.h"
 #include "tools/bench/bench.h"
+#include "tools/bench/plan_text.h"
 #include "tools/cli/open_device.h"
+#include "tools/cli/print_stderr.h"
 #include "tools/cli/value_options.h"
 
 #include <CLI/CLI.hpp>
@@ -15,6 +17,7 @@ namespace {
 
 struct BenchTransformerArguments {
     std::string config, precision = "fp16", profile;
+    bool plan = false;
     uint32_t cells = 128, batch = 1, steps = 2;
     bool unguided = false;
 };
@@ -50,6 +53,8 @@ Status bench_transformer(const BenchTransformerArguments& o, const Globals& glob
     const uint64_t predicted = transformer->device_bytes(device->limits()) + planned;
     const std::vector<RegionInput> regions = make_regions(o, config.num_classes);
     SR_TRY(Timing timing, measure([&] { return sampler->run(regions).map([](const auto&) {}); }));
+    if (o.plan)
+        print_stderr("{}", plan_text(sampler->step_program().plan()));
     timing.ms_median /= o.steps;
     timing.ms_min /= o.steps;
     Json report = bench_report("transformer", *device, dtype, timing, predicted);
@@ -76,6 +81,7 @@ void add_bench_transformer(CLI::App& bench, const Globals& globals, Run& run)
     add_number(*c, "--steps", o->steps, "of a measured run, which sets up and reads back once", 1u, 1000u);
     c->add_flag("--unguided", o->unguided, "without the unconditional half");
     add_profile(*c, o->profile);
+    add_plan(*c, o->plan);
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_transformer(*o, globals); }; });
 }
 

@@ -3,7 +3,9 @@
 // semrover bench unet: one evaluation of a renderer's UNet, random weights
 #include "engine/network/unet.h"
 #include "tools/bench/bench.h"
+#include "tools/bench/plan_text.h"
 #include "tools/cli/open_device.h"
+#include "tools/cli/print_stderr.h"
 #include "tools/cli/value_options.h"
 
 #include <CLI/CLI.hpp>
@@ -14,6 +16,7 @@ namespace {
 
 struct BenchUnetArguments {
     std::string config, precision = "fp16", profile;
+    bool plan = false;
     uint32_t width = 77, height = 53, batch = 1, tokens = 77;
 };
 
@@ -39,6 +42,8 @@ Status bench_unet(const BenchUnetArguments& o, const Globals& globals)
     (void)unet->forward(g, x, table.in(g), table_row, {text.in(g), o.tokens, 0});
     want_profile(*device, o.profile);
     SR_TRY(const auto program, Program::create(*device, g));
+    if (o.plan)
+        print_stderr("{}", plan_text(program->plan()));
     SR_TRY(const Timing timing, measure([&] { return program->run(); }));
     const uint64_t predicted = unet->device_bytes(device->limits()) + inputs.bytes() + program->plan().arena_bytes();
     Json report = bench_report("unet", *device, dtype, timing, predicted);
@@ -63,6 +68,7 @@ void add_bench_unet(CLI::App& bench, const Globals& globals, Run& run)
     add_number(*c, "--tokens", o->tokens, "tokens of the text", 1u, 4096u);
     add_choice(*c, "--precision", {"fp16", "fp32"}, "storage", o->precision);
     add_profile(*c, o->profile);
+    add_plan(*c, o->plan);
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_unet(*o, globals); }; });
 }
 

@@ -3,7 +3,9 @@
 // semrover bench vae: one picture through the decoder, or the encoder, of a VAE with random weights
 #include "engine/network/vae.h"
 #include "tools/bench/bench.h"
+#include "tools/bench/plan_text.h"
 #include "tools/cli/open_device.h"
+#include "tools/cli/print_stderr.h"
 #include "tools/cli/value_options.h"
 
 #include <CLI/CLI.hpp>
@@ -14,6 +16,7 @@ namespace {
 
 struct BenchVaeArguments {
     std::string config, precision = "fp16", profile;
+    bool plan = false;
     uint32_t width = 616, height = 424;
     bool encode = false;
 };
@@ -35,6 +38,8 @@ Status bench_vae(const BenchVaeArguments& o, const Globals& globals)
     (void)(o.encode ? vae->encode(g, x) : vae->decode(g, x));
     want_profile(*device, o.profile);
     SR_TRY(const auto program, Program::create(*device, g));
+    if (o.plan)
+        print_stderr("{}", plan_text(program->plan()));
     SR_TRY(const Timing timing, measure([&] { return program->run(); }));
     const uint64_t weights = vae->device_bytes(device->limits());
     Json report = bench_report("vae", *device, dtype, timing, weights + inputs.bytes() + program->plan().arena_bytes());
@@ -59,6 +64,7 @@ void add_bench_vae(CLI::App& bench, const Globals& globals, Run& run)
     add_choice(*c, "--precision", {"fp16", "fp32"}, "storage", o->precision);
     c->add_flag("--encode", o->encode, "through the encoder instead");
     add_profile(*c, o->profile);
+    add_plan(*c, o->plan);
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_vae(*o, globals); }; });
 }
 
