@@ -273,6 +273,16 @@ VKAPI_ATTR void VKAPI_CALL bind_sets(VkCommandBuffer, VkPipelineBindPoint, VkPip
 {
 }
 
+// of objects that the driver does not know
+VKAPI_ATTR VkResult VKAPI_CALL set_name(VkDevice, const VkDebugUtilsObjectNameInfoEXT*)
+{
+    return VK_SUCCESS;
+}
+
+VKAPI_ATTR void VKAPI_CALL begin_label(VkCommandBuffer, const VkDebugUtilsLabelEXT*) {}
+
+VKAPI_ATTR void VKAPI_CALL end_label(VkCommandBuffer) {}
+
 VKAPI_ATTR void VKAPI_CALL push_constants(VkCommandBuffer, VkPipelineLayout, VkShaderStageFlags, uint32_t, uint32_t,
                                           const void*)
 {
@@ -473,6 +483,9 @@ PFN_vkVoidFunction ours(std::string_view name)
         {"vkWaitSemaphores", any(wait_semaphores)},
         {"vkGetSemaphoreCounterValue", any(get_counter)},
         {"vkGetQueryPoolResults", any(get_query_results)},
+        {"vkSetDebugUtilsObjectNameEXT", any(set_name)},
+        {"vkCmdBeginDebugUtilsLabelEXT", any(begin_label)},
+        {"vkCmdEndDebugUtilsLabelEXT", any(end_label)},
         {"vkCmdBindPipeline", any(bind_pipeline)},
         {"vkCmdBindDescriptorSets", any(bind_sets)},
         {"vkCmdPushConstants", any(push_constants)},
