@@ -161,6 +161,14 @@ conv2d(Graph& g, FeatureMap x,
        Tensor bias,   // [1, N] fp32, or none
        const ConvOptions& options = {});
 
+// y = sum over slices of K + bias: what workgroups of conv2d summed apart, where it cuts K; epilogues of a convolution
+// run in that of this one
+void split_k_reduce(Graph& g,
+                    Tensor sums, // [batch * image_rows, slices * ld of y] fp32, a row's slices one after the other
+                    uint32_t slices,
+                    Tensor bias, // [1, N] fp32, or none
+                    const FeatureMap& y);
+
 // y = x + table[table_row[image]][col + channel]; runs in the epilogue of the convolution that makes x
 struct ChannelShift {
     Tensor table;     // [T, width] fp32

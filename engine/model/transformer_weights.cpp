@@ -4,6 +4,8 @@
 
 #include "engine/model/checkpoint.h"
 
+#include <algorithm>
+
 namespace semrover {
 
 TransformerWeights::TransformerWeights(const TransformerConfig& config, DType precision)
@@ -48,9 +50,8 @@ Slot TransformerWeights::add(uint32_t rows, uint32_t cols, DType dtype, std::str
 
 void TransformerWeights::put(const Slot& slot, WeightPart part)
 {
-    for (WeightLayout& w : weights_)
-        if (w.weight.same_as(slot))
-            w.parts.push_back(std::move(part));
+    const auto at = std::ranges::find_if(weights_, [&](const WeightLayout& w) { return w.weight.same_as(slot); });
+    at->parts.push_back(std::move(part));
 }
 
 // all of a matrix

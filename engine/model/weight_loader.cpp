@@ -246,14 +246,6 @@ IndexRanges interleaved(uint32_t count, uint32_t to)
     return runs;
 }
 
-uint32_t end_of(const IndexRanges& runs)
-{
-    uint32_t end = 0;
-    for (const IndexRange& run : runs)
-        end = std::max(end, run.to + run.count);
-    return end;
-}
-
 Status load_weights(Device& device, std::span<const WeightLayout> weights, const TensorSource& source,
                     const LoadProgress& progress)
 {

@@ -26,7 +26,6 @@ IndexRanges straight(uint32_t count, uint32_t to = 0);
 IndexRanges of_heads(uint32_t count, uint32_t heads, uint32_t to = 0);
 // GEGLU: values, then gates, as many of each, interleaved in blocks of eight
 IndexRanges interleaved(uint32_t count, uint32_t to = 0);
-uint32_t end_of(const IndexRanges& runs); // after the last one, where they go
 
 // The share of what a video's frames make together, against what each makes alone: sigmoid(mix) or, as diffusers'
 // AlphaBlender has it unless it is switched, 1 - sigmoid(mix)

@@ -69,23 +69,6 @@ uint32_t slices_of(const KernelVariant& variant, const FeatureMap& y, uint32_t d
     return most ? std::bit_floor(most) : 1;
 }
 
-// y = epilogue(sum of the slices): sums [images, H', W', slices * N], one after the other in a row
-void split_k_reduce(Graph& g, Tensor sums, uint32_t slices, Tensor bias, const FeatureMap& y)
-{
-    SplitKReducePush push{};
-    push.rows = y.data.rows;
-    push.cols = y.channels();
-    push.image_rows = y.image_rows();
-    push.x_ld = sums.ld;
-    push.y_ld = y.data.ld;
-    DispatchOptions dispatch;
-    dispatch.constants = {{"kSlices", slices}, {"kBias", bias.valid()}};
-    dispatch.banded = {"X", "Y"};
-    dispatch.variant = &g.variant(kernel::split_k_reduce);
-    g.dispatch(kernel::split_k_reduce, {{"X", sums}, {"Bias", bias}, {"Y", y.data}}, push,
-               tiles(push.rows, push.cols, 1, fixed_tile(*dispatch.variant)), std::move(dispatch));
-}
-
 } // namespace
 
 FeatureMap feature_map(Graph& g, uint32_t batch, uint32_t height, uint32_t width, uint32_t channels, DType dtype,
@@ -100,6 +83,25 @@ FeatureMap frames_as_rows(const FeatureMap& x, uint32_t frames)
 {
     SR_ASSERT(frames > 0 && x.batch % frames == 0, "{} images are no videos of {} frames", x.batch, frames);
     return {x.data, x.batch / frames, frames, x.image_rows()};
+}
+
+void split_k_reduce(Graph& g, Tensor sums, uint32_t slices, Tensor bias, const FeatureMap& y)
+{
+    SR_ASSERT(sums.rows == y.data.rows && sums.cols == slices * y.data.ld && sums.dtype == DType::f32,
+              "split_k_reduce: [{}, {}] {} for {} slices of [{}, {}]", sums.rows, sums.cols, dtype_name(sums.dtype),
+              slices, y.data.rows, y.data.ld);
+    SplitKReducePush push{};
+    push.rows = y.data.rows;
+    push.cols = y.channels();
+    push.image_rows = y.image_rows();
+    push.x_ld = sums.ld;
+    push.y_ld = y.data.ld;
+    DispatchOptions dispatch;
+    dispatch.constants = {{"kSlices", slices}, {"kBias", bias.valid()}};
+    dispatch.banded = {"X", "Y"};
+    dispatch.variant = &g.variant(kernel::split_k_reduce);
+    g.dispatch(kernel::split_k_reduce, {{"X", sums}, {"Bias", bias}, {"Y", y.data}}, push,
+               tiles(push.rows, push.cols, 1, fixed_tile(*dispatch.variant)), std::move(dispatch));
 }
 
 FeatureMap conv2d(Graph& g, FeatureMap x, FeatureMap x2, Tensor w, Tensor bias, const ConvOptions& options)
@@ -124,7 +126,6 @@ FeatureMap conv2d(Graph& g, FeatureMap x, FeatureMap x2, Tensor w, Tensor bias, 
     push.x_ld = x.data.ld;
     push.x_cols = round_up(x.channels(), kRowPadding);
     push.w_ld = w.ld;
-    push.y_ld = y.data.ld;
     if (x2.valid()) {
         SR_ASSERT(x2.batch == x.batch && x2.height == x.height && x2.width == x.width && x2.data.dtype == x.data.dtype,
                   "conv2d: inputs of {} x {}x{} and {} x {}x{}", x.batch, x.height, x.width, x2.batch, x2.height,
@@ -142,28 +143,25 @@ FeatureMap conv2d(Graph& g, FeatureMap x, FeatureMap x2, Tensor w, Tensor bias, 
                      (x.channels() + (x2.valid() ? x2.channels() : 0));
     dispatch.variant = &g.variant(kernel::conv2d, {}, std::vector{x.data, w});
     const uint32_t slices = slices_of(*dispatch.variant, y, depth);
-    const Tensor sums = slices > 1 ? g.matrix(y.data.rows, slices * y.data.ld, DType::f32, "slices") : Tensor{};
+    const bool sliced = slices > 1;
+    const Tensor out = sliced ? g.matrix(y.data.rows, slices * y.data.ld, DType::f32, "slices") : y.data;
+    push.y_ld = out.ld;
     MatmulTiles made =
         matmul_tiles(*dispatch.variant, g.limits(), {push.rows, push.cols, slices, {push.x_cols, push.x2_cols}});
     push.col_lanes = made.col_lanes;
     dispatch.alternatives = std::move(made.alternatives);
-    dispatch.constants = matrix_constants(g.limits());
-    for (const ConstantValue& c : {ConstantValue{"kKernelHeight", taps.height},
-                                   {"kKernelWidth", taps.width},
-                                   {"kTwoInputs", x2.valid()},
-                                   {"kBias", bias.valid() && slices == 1},
-                                   {"kSlices", slices}})
-        dispatch.constants.push_back(c);
+    dispatch.constants = matrix_constants(g.limits(), {{"kKernelHeight", taps.height},
+                                                       {"kKernelWidth", taps.width},
+                                                       {"kTwoInputs", x2.valid()},
+                                                       {"kBias", bias.valid() && !sliced},
+                                                       {"kSlices", slices}});
     dispatch.banded = {{"X", window}, "Y"};
     if (x2.valid())
         dispatch.banded.push_back({"X2", window});
-    if (slices > 1)
-        push.y_ld = sums.ld;
-    g.dispatch(kernel::conv2d,
-               {{"X", x.data}, {"X2", x2.data}, {"W", w}, {"Bias", bias}, {"Y", slices > 1 ? sums : y.data}}, push,
+    g.dispatch(kernel::conv2d, {{"X", x.data}, {"X2", x2.data}, {"W", w}, {"Bias", bias}, {"Y", out}}, push,
                tiles(push.rows, push.cols, slices), std::move(dispatch));
-    if (slices > 1)
-        split_k_reduce(g, sums, slices, bias, y);
+    if (sliced)
+        split_k_reduce(g, out, slices, bias, y);
     return y;
 }
 

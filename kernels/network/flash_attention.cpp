@@ -53,9 +53,7 @@ Tensor flash_attention(Graph& g, Tensor q, Tensor kv, const FlashAttentionOption
     push.chunks = chunks;
     push.scale = float(std::numbers::log2e * (o.scale > 0 ? o.scale : 1 / std::sqrt(double(o.head_dim))));
     DispatchOptions dispatch;
-    dispatch.constants = matrix_constants(g.limits());
-    dispatch.constants.push_back({"kChunks", chunks});
-    dispatch.constants.push_back({"kMostChunks", chunks <= 20 ? 20u : 64u});
+    dispatch.constants = matrix_constants(g.limits(), {{"kChunks", chunks}, {"kMostChunks", chunks <= 20 ? 20u : 64u}});
     dispatch.flops = 4.0 * o.batch * o.query_rows * o.keys * o.heads * o.head_dim;
     const uint32_t excluded = o.head_dim > kMostFlashMatrixDim ? kNeedsCooperativeMatrix : 0u;
     dispatch.variant = &g.variant(kernel::flash_attention, dispatch.constants, std::vector{q, kv}, excluded);

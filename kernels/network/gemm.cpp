@@ -35,9 +35,7 @@ Tensor gemm(Graph& g, Tensor x, Tensor w, Tensor bias, const GemmOptions& option
     push.col_lanes = made.col_lanes;
     dispatch.alternatives = std::move(made.alternatives);
     dispatch.flops = 2.0 * x.rows * push.cols * x.cols;
-    dispatch.constants = matrix_constants(g.limits());
-    if (bias.valid())
-        dispatch.constants.push_back({"kBias", 1});
+    dispatch.constants = matrix_constants(g.limits(), {{"kBias", bias.valid()}});
     if (groups == 1)
         dispatch.banded = {"X", "Y"};
     g.dispatch(kernel::gemm, {{"X", x}, {"W", w}, {"Bias", bias}, {"Y", y}}, push, tiles(push.rows, push.cols, groups),

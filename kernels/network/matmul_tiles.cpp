@@ -92,12 +92,11 @@ size_t largest_that_fills(std::span<const SquareTile> tiles, const MatmulShape& 
 
 } // namespace
 
-std::vector<ConstantValue> matrix_constants(const DeviceLimits& limits)
+std::vector<ConstantValue> matrix_constants(const DeviceLimits& limits, std::vector<ConstantValue> others)
 {
-    const MatrixShape& m = limits.matrix;
-    if (!m.m)
-        return {};
-    return {{"kMatM", m.m}, {"kMatN", m.n}, {"kMatK", m.k}, {"kThreads", 4 * m.subgroup}};
+    if (const MatrixShape& m = limits.matrix; m.m)
+        others.insert(others.end(), {{"kMatM", m.m}, {"kMatN", m.n}, {"kMatK", m.k}, {"kThreads", 4 * m.subgroup}});
+    return others;
 }
 
 MatmulTiles matmul_tiles(const KernelVariant& variant, const DeviceLimits& limits, const MatmulShape& shape)

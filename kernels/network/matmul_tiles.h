@@ -28,7 +28,7 @@ inline Tile fixed_tile(const KernelVariant& variant)
 MatmulTiles matmul_tiles(const KernelVariant& variant, const DeviceLimits& limits, const MatmulShape& shape);
 
 // of every variant for cooperative matrices: shape of the device's, and threads of four subgroups; others have none of
-// these constants
-std::vector<ConstantValue> matrix_constants(const DeviceLimits& limits);
+// these constants; and others
+std::vector<ConstantValue> matrix_constants(const DeviceLimits& limits, std::vector<ConstantValue> others);
 
 } // namespace semrover

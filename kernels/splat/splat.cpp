@@ -75,6 +75,12 @@ void check(const SplatTensors& scene, Tensor cameras, const SplatOptions& o)
     SR_ASSERT(uint64_t(n) * cameras.rows < 1ull << 32, "splat: {} splats in {} cameras", n, cameras.rows);
 }
 
+std::vector<NamedTensor> with(std::vector<NamedTensor> tensors, std::initializer_list<NamedTensor> more)
+{
+    tensors.insert(tensors.end(), more);
+    return tensors;
+}
+
 // what cameras can see
 struct Seen {
     Tensor records, sources, depths, count;
@@ -91,67 +97,21 @@ Seen project(Graph& g, const SplatTensors& scene, Tensor cameras, const SplatOpt
     const Tensor keep = g.array(views, DType::u32, "keep");
     DispatchOptions cull = lens;
     cull.constants.push_back({"kBlocks", scene.blocks.valid()});
-    if (pinhole)
-        g.dispatch(kernel::splat_cull,
-                   {{"Cameras", cameras},
-                    {"Positions", scene.positions},
-                    {"Normals", scene.normals},
-                    {"Colors", scene.colors},
-                    {"Owners", scene.owners},
-                    {"Movers", o.movers},
-                    {"MoverRows", o.mover_rows},
-                    {"Keep", keep},
-                    {"Blocks", scene.blocks}},
-                   push, threads(views), std::move(cull));
-    else
-        g.dispatch(kernel::splat_lens_cull,
-                   {{"Cameras", cameras},
-                    {"Positions", scene.positions},
-                    {"Normals", scene.normals},
-                    {"Colors", scene.colors},
-                    {"Owners", scene.owners},
-                    {"Movers", o.movers},
-                    {"MoverRows", o.mover_rows},
-                    {"Keep", keep},
-                    {"Blocks", scene.blocks},
-                    {"Rows", o.rows}},
-                   push, threads(views), std::move(cull));
+    std::vector<NamedTensor> read{
+        {"Cameras", cameras},     {"Positions", scene.positions}, {"Normals", scene.normals},  {"Colors", scene.colors},
+        {"Owners", scene.owners}, {"Movers", o.movers},           {"MoverRows", o.mover_rows}, {"Keep", keep}};
+    if (!pinhole)
+        read.push_back({"Rows", o.rows});
+    g.dispatch(pinhole ? kernel::splat_cull : kernel::splat_lens_cull, with(read, {{"Blocks", scene.blocks}}), push,
+               threads(views), std::move(cull));
     const PrefixSum slots = prefix_sum(g, keep, {.non_zero = true});
     const uint32_t texels = splat_record_bytes(o.lens, o.moving) / 16;
     const Tensor records = g.array(push.max_visible * texels, DType::u32, "splat records", 4);
     const Tensor sources = g.array(push.max_visible, DType::u32, "splat sources");
     const Tensor depths = g.array(push.max_visible, DType::u32, "splat depths");
-    if (pinhole)
-        g.dispatch(kernel::splat_project,
-                   {{"Cameras", cameras},
-                    {"Positions", scene.positions},
-                    {"Normals", scene.normals},
-                    {"Colors", scene.colors},
-                    {"Owners", scene.owners},
-                    {"Movers", o.movers},
-                    {"MoverRows", o.mover_rows},
-                    {"Keep", keep},
-                    {"Slots", slots.sums},
-                    {"Records", records},
-                    {"Sources", sources},
-                    {"Depths", depths}},
-                   push, threads(views), lens);
-    else
-        g.dispatch(kernel::splat_lens_project,
-                   {{"Cameras", cameras},
-                    {"Positions", scene.positions},
-                    {"Normals", scene.normals},
-                    {"Colors", scene.colors},
-                    {"Owners", scene.owners},
-                    {"Movers", o.movers},
-                    {"MoverRows", o.mover_rows},
-                    {"Keep", keep},
-                    {"Slots", slots.sums},
-                    {"Records", records},
-                    {"Sources", sources},
-                    {"Depths", depths},
-                    {"Rows", o.rows}},
-                   push, threads(views), lens);
+    g.dispatch(pinhole ? kernel::splat_project : kernel::splat_lens_project,
+               with(read, {{"Slots", slots.sums}, {"Records", records}, {"Sources", sources}, {"Depths", depths}}),
+               push, threads(views), lens);
     return {records, sources, depths, slots.total};
 }
 
@@ -214,24 +174,17 @@ SplatImages splat(Graph& g, const SplatTensors& scene, Tensor cameras, const Spl
         const KernelVariant& v = g.variant(kernel);
         return tiles(options.height, options.width, push.cameras, {v.value("kTileM"), v.value("kTileN")});
     };
+    const std::vector<NamedTensor> tensors{{"Records", seen.records},  {"Pairs", by_tile.records},
+                                           {"Starts", by_tile.starts}, {"Sources", seen.sources},
+                                           {"Labels", scene.labels},   {"Cells", scene.cells},
+                                           {"Color", y.color},         {"Surface", y.surface},
+                                           {"Depth", y.depth},         {"Ids", y.ids},
+                                           {"Owners", scene.owners},   {"Owner", y.owners}};
     if (options.lens == SplatLens::pinhole) {
         const bool limited = options.limits.valid();
         blend.constants.push_back({"kLimited", limited});
-        g.dispatch(kernel::splat_blend,
-                   {{"Records", seen.records},
-                    {"Pairs", by_tile.records},
-                    {"Starts", by_tile.starts},
-                    {"Sources", seen.sources},
-                    {"Labels", scene.labels},
-                    {"Cells", scene.cells},
-                    {"Color", y.color},
-                    {"Surface", y.surface},
-                    {"Depth", y.depth},
-                    {"Ids", y.ids},
-                    {"Limits", options.limits},
-                    {"Owners", scene.owners},
-                    {"Owner", y.owners}},
-                   push, grid(kernel::splat_blend), std::move(blend));
+        g.dispatch(kernel::splat_blend, with(tensors, {{"Limits", options.limits}}), push, grid(kernel::splat_blend),
+                   std::move(blend));
         return y;
     }
     const ConstantValue model{"kModel", uint32_t(options.lens)};
@@ -241,21 +194,8 @@ SplatImages splat(Graph& g, const SplatTensors& scene, Tensor cameras, const Spl
     const Tensor rays = g.array(options.moving ? 2 * pixels : pixels, DType::f32, "rays", 4);
     g.dispatch(kernel::splat_rays, {{"Cameras", cameras}, {"Rays", rays}, {"Rows", options.rows}}, push,
                threads(pixels), {.constants = {model, {"kMoving", options.moving}}});
-    g.dispatch(kernel::splat_ray_blend,
-               {{"Records", seen.records},
-                {"Pairs", by_tile.records},
-                {"Starts", by_tile.starts},
-                {"Sources", seen.sources},
-                {"Labels", scene.labels},
-                {"Cells", scene.cells},
-                {"Color", y.color},
-                {"Surface", y.surface},
-                {"Depth", y.depth},
-                {"Ids", y.ids},
-                {"Rays", rays},
-                {"Owners", scene.owners},
-                {"Owner", y.owners}},
-               push, grid(kernel::splat_ray_blend), std::move(blend));
+    g.dispatch(kernel::splat_ray_blend, with(tensors, {{"Rays", rays}}), push, grid(kernel::splat_ray_blend),
+               std::move(blend));
     return y;
 }
 

@@ -105,9 +105,7 @@ Tensor Graph::keep(Tensor made, Tensor memory)
 const KernelVariant& Graph::variant(const Kernel& kernel, std::span<const ConstantValue> constants,
                                     std::span<const Tensor> tensors, uint32_t excluded)
 {
-    DeviceLimits allowed = limits_;
-    allowed.needs_supported &= ~excluded;
-    if (const KernelVariant* chosen = choose_variant(kernel, allowed, constants, tensors))
+    if (const KernelVariant* chosen = choose_variant(kernel, limits_, constants, tensors, excluded))
         return *chosen;
     if (status_)
         status_ = fail(ErrorCode::no_device,
@@ -117,7 +115,7 @@ const KernelVariant& Graph::variant(const Kernel& kernel, std::span<const Consta
     return kernel.variants.front();
 }
 
-std::vector<Tensor> Graph::by_binding(const Kernel& kernel, std::initializer_list<NamedTensor> tensors) const
+std::vector<Tensor> Graph::by_binding(const Kernel& kernel, const std::vector<NamedTensor>& tensors) const
 {
     const KernelVariant& any = kernel.variants.front(); // all have the same bindings
     std::vector<Tensor> bound(any.bindings.size());
@@ -132,7 +130,7 @@ std::vector<Tensor> Graph::by_binding(const Kernel& kernel, std::initializer_lis
     return bound;
 }
 
-void Graph::add(const Kernel& kernel, std::initializer_list<NamedTensor> tensors, std::vector<uint8_t> push, Grid grid,
+void Graph::add(const Kernel& kernel, const std::vector<NamedTensor>& tensors, std::vector<uint8_t> push, Grid grid,
                 DispatchOptions options)
 {
     Pass pass;

@@ -6,7 +6,6 @@
 #include "runtime/graph/buffer_slice.h"
 #include "runtime/graph/pass.h"
 
-#include <initializer_list>
 #include <map>
 #include <string>
 #include <string_view>
@@ -46,13 +45,13 @@ class Graph {
     // Tensors by the names of the shader's bindings, which say what is read and what is written. A binding without a
     // tensor, or with one that is not valid, is one that the shader does not use with these constants.
     template <typename Push>
-    void dispatch(const Kernel& kernel, std::initializer_list<NamedTensor> tensors, const Push& push, Grid grid,
+    void dispatch(const Kernel& kernel, const std::vector<NamedTensor>& tensors, const Push& push, Grid grid,
                   DispatchOptions options = {})
     {
         const auto* bytes = reinterpret_cast<const uint8_t*>(&push);
         add(kernel, tensors, {bytes, bytes + sizeof(Push)}, grid, std::move(options));
     }
-    void dispatch(const Kernel& kernel, std::initializer_list<NamedTensor> tensors, Grid grid,
+    void dispatch(const Kernel& kernel, const std::vector<NamedTensor>& tensors, Grid grid,
                   DispatchOptions options = {})
     {
         add(kernel, tensors, {}, grid, std::move(options));
@@ -83,9 +82,9 @@ class Graph {
     const Status& status() const { return status_; } // no_device: a kernel that has no variant for it
 
   private:
-    void add(const Kernel& kernel, std::initializer_list<NamedTensor> tensors, std::vector<uint8_t> push, Grid grid,
+    void add(const Kernel& kernel, const std::vector<NamedTensor>& tensors, std::vector<uint8_t> push, Grid grid,
              DispatchOptions options);
-    std::vector<Tensor> by_binding(const Kernel& kernel, std::initializer_list<NamedTensor> tensors) const;
+    std::vector<Tensor> by_binding(const Kernel& kernel, const std::vector<NamedTensor>& tensors) const;
     Tensor placed(Tensor t) const; // where it is now, if it was kept
     bool share_bytes(const Tensor& a, const Tensor& b) const;
     void check_keep(const Tensor& made, const Tensor& memory) const;

@@ -126,7 +126,7 @@ struct Pass {
     uint32_t level = 0;       // passes of one level run without a barrier between them
     uint32_t alternative = 0; // the one that is taken
 
-    std::string name() const; // "gemm.coopmat"
+    std::string name() const;                                 // "gemm.coopmat"
     void set_constant(std::string_view name, uint32_t value); // where the shader has one
     void set_push(std::string_view name, uint32_t value);     // the shader has such a member
     void take(uint32_t index); // one of options.alternatives; workgroups are counted later

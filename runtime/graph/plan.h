@@ -4,9 +4,7 @@
 
 #include "runtime/graph/graph.h"
 
-#include <map>
-#include <optional>
-#include <string>
+#include <span>
 #include <vector>
 
 // What compiling a graph decides, before anything is allocated. The stages run in this order; each is a function over

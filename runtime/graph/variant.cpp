@@ -60,11 +60,12 @@ uint32_t shared_bytes(const KernelVariant& variant, std::span<const ConstantValu
 }
 
 const KernelVariant* choose_variant(const Kernel& kernel, const DeviceLimits& limits,
-                                    std::span<const ConstantValue> constants, std::span<const Tensor> tensors)
+                                    std::span<const ConstantValue> constants, std::span<const Tensor> tensors,
+                                    uint32_t excluded)
 {
     const KernelVariant* best = nullptr;
     for (const KernelVariant& v : kernel.variants)
-        if (runs_on(v, limits, constants) && takes(kernel, v, tensors) &&
+        if (!(v.needs & excluded) && runs_on(v, limits, constants) && takes(kernel, v, tensors) &&
             (!best || preference(v.name, limits) < preference(best->name, limits)))
             best = &v;
     return best;

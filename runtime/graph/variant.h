@@ -12,9 +12,10 @@ namespace semrover {
 uint32_t shared_bytes(const KernelVariant& variant, std::span<const ConstantValue> constants);
 
 // The variant of `kernel` for a device, among those its limits allow with these constants and tensors (none: fp16
-// ones): the forced one, else cpu, coopmat or simt by device type. nullptr: none runs on it.
+// ones), but for those that need what is excluded: the forced one, else cpu, coopmat or simt by device type. nullptr:
+// none runs on it.
 const KernelVariant* choose_variant(const Kernel& kernel, const DeviceLimits& limits,
-                                    std::span<const ConstantValue> constants = {},
-                                    std::span<const Tensor> tensors = {});
+                                    std::span<const ConstantValue> constants = {}, std::span<const Tensor> tensors = {},
+                                    uint32_t excluded = 0);
 
 } // namespace semrover
