@@ -11,6 +11,8 @@
 // Storage is fp32 or fp16, arithmetic and statistics fp32.
 namespace semrover {
 
+struct MatmulTile; // kernels/network/matmul_tiles.h
+
 // Where an op writes that joins tensors: rows or columns of a larger matrix, in place of a new one. A whole output that
 // outlives the graph is kept with Graph::keep.
 struct PartOf {
@@ -28,6 +30,7 @@ struct GemmOptions {
     uint32_t groups = 1;
     DType dtype = DType::f16; // of y
     PartOf part = {};
+    const MatmulTile* tile = nullptr; // in place of those that suit: for experiments
 };
 [[nodiscard]] Tensor gemm(Graph& g,
                           Tensor x,    // [groups * M, K] fp32 or fp16
@@ -153,6 +156,7 @@ struct ConvOptions {
         uint32_t height = 0, width = 0;
         uint32_t padding_y = 0, padding_x = 0; // on both sides
     } taps = {};                               // any rectangle instead of `kernel` and its padding
+    const MatmulTile* tile = nullptr;          // in place of those that suit: for experiments
 };
 [[nodiscard]] FeatureMap
 conv2d(Graph& g, FeatureMap x,

@@ -269,11 +269,14 @@ class Reader {
         throw std::runtime_error("a shared array's size uses an unknown constant");
     }
 
-    // sums, products and quotients of constants
+    // sums, products, quotients and choices of constants
     std::string operation(const Id& c) const
     {
-        const std::map<uint32_t, std::string> kOperators = {
-            {128, " + "}, {130, " - "}, {132, " * "}, {134, " / "}, {135, " / "}}; // OpIAdd, ISub, IMul, UDiv, SDiv
+        const std::map<uint32_t, std::string> kOperators = {// OpIAdd, ISub, IMul, UDiv, SDiv, UGreaterThan
+                                                            {128, " + "}, {130, " - "}, {132, " * "},
+                                                            {134, " / "}, {135, " / "}, {172, " > "}};
+        if (c.operands[0] == 169) // OpSelect
+            return length(c.operands.at(1)) + " ? " + length(c.operands.at(2)) + " : " + length(c.operands.at(3));
         const auto found = kOperators.find(c.operands[0]);
         if (found == kOperators.end())
             throw std::runtime_error("a shared array's size uses an operation the reflector does not know");

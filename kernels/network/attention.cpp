@@ -34,7 +34,7 @@ Tensor attention(Graph& g, Tensor qkv, Tensor tiles, Tensor mask, uint32_t heads
     push.words = mask.cols;
     push.scale = 1.f / std::sqrt(float(head_dim));
     DispatchOptions options;
-    options.constants = matrix_constants(g.limits(), {{"kChunks", head_dim / 8}});
+    options.constants = group_constants(g.limits(), {{"kChunks", head_dim / 8}});
     const uint32_t excluded = head_dim > kMostMatrixDim ? kNeedsCooperativeMatrix : 0u;
     options.variant = &g.variant(kernel::attention, options.constants, std::vector{qkv}, excluded);
     options.flops =

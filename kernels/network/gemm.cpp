@@ -31,11 +31,12 @@ Tensor gemm(Graph& g, Tensor x, Tensor w, Tensor bias, const GemmOptions& option
     push.y_ld = y.ld;
     DispatchOptions dispatch;
     dispatch.variant = &g.variant(kernel::gemm, {}, std::vector{x, w});
-    MatmulTiles made = matmul_tiles(*dispatch.variant, g.limits(), {push.rows, push.cols, groups, {push.depth}});
+    MatmulTiles made =
+        matmul_tiles(*dispatch.variant, g.limits(), {push.rows, push.cols, groups, {push.depth}}, options.tile);
     push.col_lanes = made.col_lanes;
     dispatch.alternatives = std::move(made.alternatives);
     dispatch.flops = 2.0 * x.rows * push.cols * x.cols;
-    dispatch.constants = matrix_constants(g.limits(), {{"kBias", bias.valid()}});
+    dispatch.constants = group_constants(g.limits(), {{"kBias", bias.valid()}});
     if (groups == 1)
         dispatch.banded = {"X", "Y"};
     g.dispatch(kernel::gemm, {{"X", x}, {"W", w}, {"Bias", bias}, {"Y", y}}, push, tiles(push.rows, push.cols, groups),

@@ -10,13 +10,18 @@ namespace semrover {
 
 namespace {
 
-// a square tile, and the workgroups from which a large GPU has enough to do with it
-struct SquareTile {
-    uint32_t size, enough;
-    uint32_t subgroups = 4, step = 32; // of cooperative matrices, where the device has room: kSubgroups, kStep
+// a tile, and how fast a large one is made where all units have some, relative to 128 x 128
+// source: shares of an H200's measured rates of 128 x 128 and 64 x 64, between them by what each loads for a product
+struct RatedTile {
+    MatmulTile tile;
+    double rate;
 };
-constexpr SquareTile kMatrixTiles[] = {{128, 256, 8, 64}, {64, 128, 4, 64}, {32, 0, 4, 128}};
-constexpr SquareTile kSimtTiles[] = {{64, 128}, {32, 0}};
+constexpr RatedTile kMatrixTiles[] = {
+    {{128, 160, 4, 8, 64}, 1.04}, {{128, 128, 2, 8, 64, 1, false, 32}, 1},   {{128, 80, 4, 4, 64}, 0.97},
+    {{64, 160, 2, 4, 64}, 0.93},  {{128, 64, 2, 4, 64, 1, false, 32}, 0.87}, {{64, 64, 2, 4, 64, 1, false, 32}, 0.65},
+    {{32, 32, 2, 4, 128}, 0.36}};
+constexpr RatedTile kSimtTiles[] = {{{64, 64}, 1}, {{32, 32}, 0.6}};
+constexpr size_t kMostAlternatives = 4; // that runs on a device try
 
 // Columns of K, of 128, 64 or 32, that a workgroup should have at a time: as many as leave an eighth of the steps empty
 // at most.
@@ -36,81 +41,102 @@ uint32_t step_of(const std::vector<uint32_t>& runs)
 
 // Where the lanes of a workgroup may lie otherwise, so many of them side by side, as few outputs as can be are computed
 // beyond the last row and column.
-MatmulTiles lane_tiles(const KernelVariant& variant, const MatmulShape& shape)
+MatmulTiles lane_tiles(const DeviceLimits& limits, const MatmulShape& shape)
 {
-    const Tile declared = fixed_tile(variant);
-    const uint32_t all = variant.local_size[0], lanes = variant.value("kColLanes");
-    const uint32_t lane_rows = declared.rows * lanes / all, lane_cols = declared.cols / lanes;
+    constexpr uint32_t kLaneRows = 16, kLaneCols = 16;
+    const uint32_t all = cpu_lanes(limits);
+    const auto tile = [&](uint32_t across) { return Tile{kLaneRows * (all / across), kLaneCols * across}; };
     const auto outputs = [&](uint32_t across) {
-        return uint64_t(round_up(shape.rows, lane_rows * (all / across))) * round_up(shape.cols, lane_cols * across);
+        return uint64_t(round_up(shape.rows, tile(across).rows)) * round_up(shape.cols, tile(across).cols);
     };
-    uint32_t best = lanes;
+    uint32_t best = 4; // outputs of a workgroup that are as many rows as columns, or half
     for (uint32_t across = all; across >= 1; across /= 2)
         if (outputs(across) < outputs(best))
             best = across;
-    return {{{{lane_rows * (all / best), lane_cols * best}, {}}}, best};
+    return {{{tile(best), {}}}, best};
 }
 
-// how many subgroups share a tile, and how much of K they have at a time: as much as there is room for
-std::vector<ConstantValue> shared_by(const KernelVariant& variant, const DeviceLimits& limits, const SquareTile& tile,
-                                     uint32_t step_that_suits)
+// constants of a tile that has `step` columns of K at a time
+std::vector<ConstantValue> constants_of(const MatmulTile& t, const DeviceLimits& limits, const MatmulShape& shape)
 {
-    std::vector<ConstantValue> constants;
-    const auto fits = [&](uint32_t subgroups, uint32_t step) {
-        const uint32_t threads = subgroups * limits.matrix.subgroup;
-        constants = {{"kTileM", tile.size},
-                     {"kTileN", tile.size},
-                     {"kSubgroups", subgroups},
-                     {"kStep", step},
-                     {"kThreads", threads}};
-        return threads <= limits.max_group_threads && shared_bytes(variant, constants) <= limits.max_shared_bytes;
-    };
-    for (const uint32_t subgroups : {tile.subgroups, 4u})
-        for (uint32_t step = std::min(tile.step, step_that_suits); step >= 32; step /= 2)
-            if (fits(subgroups, step))
-                return constants;
-    return constants;
+    const bool whole = std::ranges::all_of(shape.runs, [&](uint32_t run) { return run % t.step == 0; });
+    return {{"kTileM", t.rows},
+            {"kTileN", t.cols},
+            {"kDown", t.down},
+            {"kSubgroups", t.subgroups},
+            {"kThreads", t.subgroups * limits.matrix.subgroup},
+            {"kStep", t.step},
+            {"kStages", t.stages},
+            {"kAhead", t.ahead},
+            {"kWholeSteps", whole},
+            {"kStrip", t.strip},
+            {"kRowsOfTiles", t.rows_of_tiles}};
 }
 
-// of cooperative matrices: a lane holds 128 sums at most, and has something to load
-std::span<const SquareTile> matrix_tiles(const DeviceLimits& limits)
+// tiles that a device has room for, with as many columns of K at a time as suit and fit
+std::vector<RatedTile> matrix_tiles(const KernelVariant& variant, const DeviceLimits& limits, const MatmulShape& shape)
 {
-    constexpr uint32_t kMostSums = 128, kLoadsOfSmall = 32 * 32 / 8;
-    const uint32_t threads = 4 * limits.matrix.subgroup;
-    const size_t first = kMatrixTiles[0].size * kMatrixTiles[0].size / threads > kMostSums;
-    const size_t last = threads <= kLoadsOfSmall ? 3 : 2;
-    return std::span(kMatrixTiles).subspan(first, last - first);
+    std::vector<RatedTile> tiles;
+    for (RatedTile rated : kMatrixTiles) {
+        rated.tile.step = std::min(rated.tile.step, step_of(shape.runs));
+        while (rated.tile.step > 32 && !has_room_for(variant, limits, rated.tile))
+            rated.tile.step /= 2;
+        if (has_room_for(variant, limits, rated.tile))
+            tiles.push_back(rated);
+    }
+    return tiles;
 }
 
-size_t largest_that_fills(std::span<const SquareTile> tiles, const MatmulShape& s)
+// Time of all workgroups, each unit of a device with one at a time: a last round of few takes as long as a full one.
+double time_of(const RatedTile& rated, const DeviceLimits& limits, const MatmulShape& s)
 {
-    for (size_t i = 0; i < tiles.size(); ++i)
-        if (uint64_t(divide_up(s.rows, tiles[i].size)) * divide_up(s.cols, tiles[i].size) * s.groups >= tiles[i].enough)
-            return i;
-    return tiles.size() - 1;
+    const Tile tile{rated.tile.rows, rated.tile.cols};
+    const uint64_t all = uint64_t(divide_up(s.rows, tile.rows)) * divide_up(s.cols, tile.cols) * s.groups;
+    const uint64_t rounds = (all + limits.compute_units - 1) / limits.compute_units;
+    return double(rounds * tile.rows * tile.cols) / rated.rate;
 }
 
 } // namespace
 
-std::vector<ConstantValue> matrix_constants(const DeviceLimits& limits, std::vector<ConstantValue> others)
+uint32_t cpu_lanes(const DeviceLimits& limits)
 {
+    return limits.subgroup_size >= 16 ? 16 : 8;
+}
+
+std::vector<ConstantValue> group_constants(const DeviceLimits& limits, std::vector<ConstantValue> others)
+{
+    others.push_back({"kLanes", cpu_lanes(limits)});
     if (const MatrixShape& m = limits.matrix; m.m)
         others.insert(others.end(), {{"kMatM", m.m}, {"kMatN", m.n}, {"kMatK", m.k}, {"kThreads", 4 * m.subgroup}});
     return others;
 }
 
-MatmulTiles matmul_tiles(const KernelVariant& variant, const DeviceLimits& limits, const MatmulShape& shape)
+bool has_room_for(const KernelVariant& variant, const DeviceLimits& limits, const MatmulTile& t)
 {
-    if (variant.constant("kColLanes"))
-        return lane_tiles(variant, shape);
+    constexpr uint32_t kMostSums = 128; // of a lane, or a GPU keeps them in memory
+    const uint32_t threads = t.subgroups * limits.matrix.subgroup;
+    return t.step % limits.matrix.k == 0 && threads <= limits.max_group_threads &&
+           (t.rows * t.cols <= kMostSums * threads || limits.type == DeviceType::cpu) &&
+           shared_bytes(variant, constants_of(t, limits, {})) <= limits.max_shared_bytes;
+}
+
+MatmulTiles matmul_tiles(const KernelVariant& variant, const DeviceLimits& limits, const MatmulShape& shape,
+                         const MatmulTile* wanted)
+{
+    if (variant.constant("kLanes"))
+        return lane_tiles(limits, shape);
     const bool matrices = variant.needs & kNeedsCooperativeMatrix;
-    const std::span<const SquareTile> tiles = matrices ? matrix_tiles(limits) : std::span(kSimtTiles);
+    std::vector<RatedTile> tiles =
+        matrices ? matrix_tiles(variant, limits, shape) : std::vector(std::begin(kSimtTiles), std::end(kSimtTiles));
+    if (wanted && matrices)
+        tiles = {{*wanted, 1}};
+    std::ranges::stable_sort(tiles, {}, [&](const RatedTile& t) { return time_of(t, limits, shape); });
+    tiles.resize(std::min(tiles.size(), kMostAlternatives));
     MatmulTiles made;
-    for (const SquareTile& t : tiles)
-        made.alternatives.push_back({{t.size, t.size},
-                                     matrices ? shared_by(variant, limits, t, step_of(shape.runs))
-                                              : std::vector<ConstantValue>{{"kTileM", t.size}, {"kTileN", t.size}}});
-    std::ranges::iter_swap(made.alternatives.begin(), made.alternatives.begin() + largest_that_fills(tiles, shape));
+    for (const auto& [t, rate] : tiles)
+        made.alternatives.push_back({{t.rows, t.cols},
+                                     matrices ? constants_of(t, limits, shape)
+                                              : std::vector<ConstantValue>{{"kTileM", t.rows}, {"kTileN", t.cols}}});
     return made;
 }
 

@@ -15,20 +15,39 @@ struct MatmulShape {
     std::vector<uint32_t> runs;  // columns of K that follow each other; each run begins a step of its own
 };
 
-struct MatmulTiles {
-    std::vector<Alternative> alternatives; // all give the same bits; the first is the largest that fills a large GPU
-    uint32_t col_lanes = 0;                // of a variant for CPUs: lanes side by side, pushed to the shader
+// A tile, and how a workgroup makes it with cooperative matrices (shaders/lib/gemm_tile.coopmat.glsl). All give the
+// same bits.
+struct MatmulTile {
+    uint32_t rows = 0, cols = 0;
+    uint32_t down = 2, subgroups = 4; // one below the other, and all
+    uint32_t step = 32;               // columns of K at a time: 16, 32, 64 or 128
+    uint32_t stages = 1;              // of shared memory
+    bool ahead = false;               // factors are loaded before those in front of them are multiplied
+    uint32_t strip = 16;              // columns that a subgroup finishes at once
+    uint32_t rows_of_tiles = 1;       // that workgroups go through together
 };
+
 // what a workgroup of a variant makes that has one tile only
 inline Tile fixed_tile(const KernelVariant& variant)
 {
     return {variant.value("kTileM"), variant.value("kTileN")};
 }
 
-MatmulTiles matmul_tiles(const KernelVariant& variant, const DeviceLimits& limits, const MatmulShape& shape);
+struct MatmulTiles {
+    std::vector<Alternative> alternatives; // all give the same bits; the first is the fastest by a model of the device
+    uint32_t col_lanes = 0;                // of a variant for CPUs: lanes side by side, pushed to the shader
+};
+// wanted: this tile and no other, of a variant for cooperative matrices on a device that has room for it
+MatmulTiles matmul_tiles(const KernelVariant& variant, const DeviceLimits& limits, const MatmulShape& shape,
+                         const MatmulTile* wanted = nullptr);
+// does a device have the shared memory, threads and registers?
+bool has_room_for(const KernelVariant& variant, const DeviceLimits& limits, const MatmulTile& tile);
 
-// of every variant for cooperative matrices: shape of the device's, and threads of four subgroups; others have none of
-// these constants; and others
-std::vector<ConstantValue> matrix_constants(const DeviceLimits& limits, std::vector<ConstantValue> others);
+// lanes of a workgroup of a variant for CPUs: a subgroup, or vectors of 512 bits would be half empty
+uint32_t cpu_lanes(const DeviceLimits& limits);
+
+// of every variant whose workgroups depend on the device: those for cooperative matrices (their shape, and threads of
+// four subgroups) and for CPUs (lanes); and others
+std::vector<ConstantValue> group_constants(const DeviceLimits& limits, std::vector<ConstantValue> others);
 
 } // namespace semrover

@@ -276,6 +276,28 @@ std::string pci_text(const VulkanCalls& vk, VkPhysicalDevice physical)
     return fmt::format("{:04x}:{:02x}:{:02x}.{}", pci.pciDomain, pci.pciBus, pci.pciDevice, pci.pciFunction);
 }
 
+// multiprocessors, compute units or cores, by what a vendor calls them; 0: it does not say
+uint32_t compute_units(const VulkanCalls& vk, VkPhysicalDevice physical)
+{
+    const auto query = [&](const char* extension, auto& properties) {
+        if (!has_extension(vk, physical, extension))
+            return;
+        auto p = vk_struct<VkPhysicalDeviceProperties2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2, &properties);
+        vk.GetPhysicalDeviceProperties2(physical, &p);
+    };
+    auto nv = vk_struct<VkPhysicalDeviceShaderSMBuiltinsPropertiesNV>(
+        VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SHADER_SM_BUILTINS_PROPERTIES_NV);
+    auto amd = vk_struct<VkPhysicalDeviceShaderCorePropertiesAMD>(
+        VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SHADER_CORE_PROPERTIES_AMD);
+    auto arm = vk_struct<VkPhysicalDeviceShaderCoreBuiltinsPropertiesARM>(
+        VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SHADER_CORE_BUILTINS_PROPERTIES_ARM);
+    query(VK_NV_SHADER_SM_BUILTINS_EXTENSION_NAME, nv);
+    query(VK_AMD_SHADER_CORE_PROPERTIES_EXTENSION_NAME, amd);
+    query(VK_ARM_SHADER_CORE_BUILTINS_EXTENSION_NAME, arm);
+    return nv.shaderSMCount + amd.shaderEngineCount * amd.shaderArraysPerEngineCount * amd.computeUnitsPerShaderArray +
+           arm.shaderCoreCount;
+}
+
 } // namespace
 
 DeviceSummary summarize(const VulkanCalls& vk, VkInstance instance, VkPhysicalDevice physical, uint32_t index)
@@ -298,6 +320,8 @@ DeviceSummary summarize(const VulkanCalls& vk, VkInstance instance, VkPhysicalDe
     s.refusal = refusal(vk, physical, p.properties);
     s.limits = limits_of(vk, physical, p.properties, p11);
     s.limits.matrix = matrix_shape(vk, instance, physical);
+    if (const uint32_t units = compute_units(vk, physical))
+        s.limits.compute_units = units;
     if (s.limits.matrix.m)
         s.limits.needs_supported |= kNeedsCooperativeMatrix;
     if (s.limits.matrix.half_sums)

@@ -25,80 +25,97 @@ layout(binding = 8) readonly buffer X2 { uvec4 x2[]; }; // as x, x2_cols
 #include "lib/conv_shift.glsl"
 #include "lib/gemm_epilogue.glsl"
 layout(constant_id = 36) const uint kSlices = 1; // of K, each summed by workgroups of its own, which write fp32 sums to Y
-#include "lib/gemm_tile.coopmat.glsl"
 #include "lib/conv_taps.glsl"
+#include "lib/gemm_tile.coopmat.glsl"
 
-ConvPixel pixels[kLoadsX]; // of the rows that this thread brings
-
-// position in K: a tap, then channels of the first input and the second one's after them
+// position in K: a tap, then channels of the first input and, from a step of their own on, the second one's
 struct Cursor {
     uint tap, channel;
 };
 
+Cursor cursor, end;          // of the next step, and behind the last one
+ConvPixel pixels[kLoadsX];   // of the rows that this thread brings
+uint aimed_tap = ~0u, aimed_input = 0; // that x_at are of
+uint x_at[kLoadsX], w_at[kLoadsW];     // these rows, from its columns on
+uint inside_image;                     // bit i: load i of x reads a pixel, else zeros
+
 const uint kRun = 128; // channels, or the last ones of an input: slices of K are cut there, whatever kStep is
+
+uint second_begins() { return (p.x_cols + kStep - 1) / kStep * kStep; }
 
 Cursor start_of(uint slice)
 {
     const uint runs = (p.x_cols + kRun - 1) / kRun, all = runs + (p.x2_cols + kRun - 1) / kRun;
     const uint run = slice * (kKernelHeight * kKernelWidth * all) / kSlices, in_tap = run % all;
-    const uint first = (p.x_cols + kStep - 1) / kStep * kStep;
-    return Cursor(run / all, in_tap < runs ? in_tap * kRun : first + (in_tap - runs) * kRun);
+    return Cursor(run / all, in_tap < runs ? in_tap * kRun : second_begins() + (in_tap - runs) * kRun);
 }
 
 bool before(Cursor a, Cursor b) { return a.tap < b.tap || (a.tap == b.tap && a.channel < b.channel); }
 
-void advance(inout Cursor c)
+void advance()
 {
-    c.channel += kStep;
-    const uint first = (p.x_cols + kStep - 1) / kStep * kStep; // the second input starts a step of its own
-    const uint end = kTwoInputs ? first + p.x2_cols : p.x_cols;
-    if (c.channel >= end) {
-        c.channel = 0;
-        ++c.tap;
+    cursor.channel += kStep;
+    if (cursor.channel >= (kTwoInputs ? second_begins() + p.x2_cols : p.x_cols)) {
+        cursor.channel = 0;
+        ++cursor.tap;
     }
 }
 
-// kStep channels of the tile's rows of x and of w; what lies beyond an input's channels is zero
-void load(uint tile_col, Cursor c)
+// at the pixels of a tap: once for all of its channels of an input
+void aim(uint tap, uint second)
 {
-    const uint first = (p.x_cols + kStep - 1) / kStep * kStep;
-    const bool second = kTwoInputs && c.channel >= first;
-    const uint channel = (second ? c.channel - first : c.channel) + load_k();
-    const bool inside = c.tap < kKernelHeight * kKernelWidth && channel < (second ? p.x2_cols : p.x_cols);
+    aimed_tap = tap;
+    aimed_input = second;
+    inside_image = 0;
     [[unroll]] for (uint i = 0; i < kLoadsX; ++i) {
         uint row;
+        if (conv_tap(pixels[i], tap / kKernelWidth, tap % kKernelWidth, row))
+            inside_image |= 1u << i;
+        const uint in_x = (row - p.x_first) * p.x_ld, in_x2 = (row - p.x2_first) * p.x2_ld;
+        x_at[i] = ((second != 0 ? in_x2 : in_x) + load_k()) / 8;
+    }
+}
+
+void start_loads(uint tile_row, uint tile_col, uint slice)
+{
+    [[unroll]] for (uint i = 0; i < kLoadsX; ++i)
+        pixels[i] = conv_pixel(tile_row + load_row(i));
+    [[unroll]] for (uint i = 0; i < kLoadsW; ++i)
+        w_at[i] = (min(tile_col + load_row(i), p.cols - 1) * p.w_ld + load_k()) / 8;
+    cursor = start_of(slice);
+    end = start_of(slice + 1);
+}
+
+bool load_next()
+{
+    if (!before(cursor, end))
+        return false;
+    const uint second = uint(kTwoInputs && cursor.channel >= second_begins());
+    if (cursor.tap != aimed_tap || second != aimed_input)
+        aim(cursor.tap, second);
+    const uint channel = cursor.channel - second * second_begins();
+    const bool inside = kWholeSteps || channel + load_k() < (second != 0 ? p.x2_cols : p.x_cols);
+    [[unroll]] for (uint i = 0; i < kLoadsX; ++i) {
         next_x[i] = uvec4(0);
-        if (!conv_tap(pixels[i], c.tap / kKernelWidth, c.tap % kKernelWidth, row) || !inside)
+        if (!inside || (inside_image >> i & 1) == 0)
             continue;
-        if (second)
-            next_x[i] = x2[((row - p.x2_first) * p.x2_ld + channel) / 8];
+        if (second != 0)
+            next_x[i] = x2[x_at[i] + channel / 8];
         else
-            next_x[i] = x[((row - p.x_first) * p.x_ld + channel) / 8];
+            next_x[i] = x[x_at[i] + channel / 8];
     }
-    const uint w_at = c.tap * (p.x_cols + p.x2_cols) + (second ? p.x_cols : 0) + channel;
-    [[unroll]] for (uint i = 0; i < kLoadsW; ++i) {
-        const uint row = min(tile_col + load_row(i), p.cols - 1);
-        next_w[i] = inside ? w[(row * p.w_ld + w_at) / 8] : uvec4(0);
-    }
+    const uint w_from = (cursor.tap * (p.x_cols + p.x2_cols) + second * p.x_cols + channel) / 8;
+    [[unroll]] for (uint i = 0; i < kLoadsW; ++i)
+        next_w[i] = inside ? w[w_at[i] + w_from] : uvec4(0);
+    advance();
+    return true;
 }
 
 void main()
 {
     epilogue_group = 0;
-    const uint row = gl_WorkGroupID.x * kTileM, col = gl_WorkGroupID.y * kTileN;
-    [[unroll]] for (uint i = 0; i < kLoadsX; ++i)
-        pixels[i] = conv_pixel(row + load_row(i));
-    clear_tile();
-    Cursor cursor = start_of(gl_WorkGroupID.z);
-    const Cursor end = start_of(gl_WorkGroupID.z + 1);
-    load(col, cursor);
-    while (before(cursor, end)) {
-        barrier();
-        stage();
-        barrier();
-        advance(cursor);
-        load(col, cursor);
-        multiply();
-    }
-    store_tile(row, col);
+    const uvec2 first = tile_place() * uvec2(kTileM, kTileN);
+    start_loads(first.x, first.y, gl_WorkGroupID.z);
+    sum_tile();
+    store_tile(first.x, first.y);
 }

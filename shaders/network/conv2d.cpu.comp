@@ -8,14 +8,12 @@
 #extension GL_EXT_control_flow_attributes : require
 #include "conv2d.h"
 
-layout(local_size_x = 8) in;
-layout(constant_id = 0) const uint kTileM = 32;
-layout(constant_id = 1) const uint kTileN = 64;
+layout(local_size_x = 8, local_size_x_id = 33) in; // kLanes
+layout(constant_id = 33) const uint kLanes = 8; // a subgroup: 8, or 16 where vectors have 512 bits
 layout(constant_id = 2) const bool kHalfX = false; // w and x2 have the type of x
 layout(constant_id = 3) const uint kKernelHeight = 3;
 layout(constant_id = 5) const uint kKernelWidth = 3;
 layout(constant_id = 4) const bool kTwoInputs = false;
-layout(constant_id = 6) const uint kColLanes = 4; // of that tile; p.col_lanes is what runs
 layout(push_constant) uniform Push { Conv2dPush p; };
 layout(binding = 0) uniform usamplerBuffer X;  // [images * in_image_rows, x_cols]
 layout(binding = 1) uniform usamplerBuffer W;  // [cols, taps * (x_cols + x2_cols)]
@@ -52,7 +50,7 @@ void main()
 {
     const uint lane = gl_LocalInvocationID.x;
     epilogue_group = 0;
-    const uint first_row = gl_WorkGroupID.x * (8 / p.col_lanes * kRows) + lane / p.col_lanes * kRows;
+    const uint first_row = gl_WorkGroupID.x * (kLanes / p.col_lanes * kRows) + lane / p.col_lanes * kRows;
     const uint col = gl_WorkGroupID.y * (p.col_lanes * kCols) + lane % p.col_lanes * kCols;
     const uint width = kHalfX ? 8 : 4; // elements of a texel
     ConvPixel pixel[kRows];

@@ -10,13 +10,12 @@
 #include "flash_attention.h"
 #include "lib/pack.glsl"
 
-layout(local_size_x = 8) in;
+layout(local_size_x = 8, local_size_x_id = 33) in; // kLanes
 layout(constant_id = 0) const bool kHalfQ = false;
 layout(constant_id = 1) const bool kHalfKv = false;
 layout(constant_id = 2) const bool kHalfY = false;
 layout(constant_id = 3) const uint kMostChunks = 20; // room for head_dim / 8, in few sizes: compiling takes seconds
-layout(constant_id = 4) const uint kTileM = 128;
-layout(constant_id = 5) const uint kTileN = 1;
+layout(constant_id = 33) const uint kLanes = 8; // a subgroup: 8, or 16 where vectors have 512 bits
 layout(push_constant) uniform Push { FlashAttentionPush p; };
 layout(binding = 0) uniform usamplerBuffer Q;          // [batch * query_rows, q_ld]
 layout(binding = 1) uniform usamplerBuffer Kv;         // [batch * key_rows, kv_ld]
@@ -123,7 +122,7 @@ void add_values(uint v_at[kKeys])
 void main()
 {
     const uint head = gl_WorkGroupID.y * p.chunks * 8, image = gl_WorkGroupID.z;
-    const uint first_query = gl_WorkGroupID.x * kTileM + gl_LocalInvocationID.x * kQueries;
+    const uint first_query = (gl_WorkGroupID.x * kLanes + gl_LocalInvocationID.x) * kQueries;
     const uint last_query = max(p.queries, p.first_row + 1) - p.first_row - 1; // rows behind it repeat it
     uint q_at[kQueries];
     [[unroll]] for (uint q = 0; q < kQueries; ++q) {

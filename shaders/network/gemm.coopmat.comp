@@ -21,33 +21,35 @@ layout(binding = 1) readonly buffer W { uvec4 w[]; }; // [groups * cols, depth],
 const uint kSlices = 1; // of K
 #include "lib/gemm_tile.coopmat.glsl"
 
-// kStep columns of the tile's rows of x and of w, k the first
-void load(uint tile_row, uint tile_col, uint k)
+uint k = 0;                        // of the next step
+uint x_at[kLoadsX], w_at[kLoadsW]; // the rows that this thread brings, from its columns on
+
+void start_loads(uint tile_row, uint tile_col)
 {
-    const uint from = k + load_k();
-    const bool inside = from < p.depth;
-    [[unroll]] for (uint i = 0; i < kLoadsX; ++i) {
-        const uint row = epilogue_group * p.rows + min(tile_row + load_row(i), p.rows - 1);
-        next_x[i] = inside ? x[(row * p.x_ld + from) / 8] : uvec4(0);
-    }
-    [[unroll]] for (uint i = 0; i < kLoadsW; ++i) {
-        const uint row = epilogue_group * p.cols + min(tile_col + load_row(i), p.cols - 1);
-        next_w[i] = inside ? w[(row * p.w_ld + from) / 8] : uvec4(0);
-    }
+    [[unroll]] for (uint i = 0; i < kLoadsX; ++i)
+        x_at[i] = ((epilogue_group * p.rows + min(tile_row + load_row(i), p.rows - 1)) * p.x_ld + load_k()) / 8;
+    [[unroll]] for (uint i = 0; i < kLoadsW; ++i)
+        w_at[i] = ((epilogue_group * p.cols + min(tile_col + load_row(i), p.cols - 1)) * p.w_ld + load_k()) / 8;
+}
+
+bool load_next()
+{
+    if (k >= p.depth)
+        return false;
+    const bool inside = kWholeSteps || k + load_k() < p.depth;
+    [[unroll]] for (uint i = 0; i < kLoadsX; ++i)
+        next_x[i] = inside ? x[x_at[i] + k / 8] : uvec4(0);
+    [[unroll]] for (uint i = 0; i < kLoadsW; ++i)
+        next_w[i] = inside ? w[w_at[i] + k / 8] : uvec4(0);
+    k += kStep;
+    return true;
 }
 
 void main()
 {
     epilogue_group = gate_group = gl_WorkGroupID.z;
-    const uint row = gl_WorkGroupID.x * kTileM, col = gl_WorkGroupID.y * kTileN;
-    clear_tile();
-    load(row, col, 0);
-    for (uint k = 0; k < p.depth; k += kStep) {
-        barrier();
-        stage();
-        barrier();
-        load(row, col, k + kStep);
-        multiply();
-    }
-    store_tile(row, col);
+    const uvec2 first = tile_place() * uvec2(kTileM, kTileN);
+    start_loads(first.x, first.y);
+    sum_tile();
+    store_tile(first.x, first.y);
 }

@@ -2,17 +2,15 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // y = epilogue(x w^T), for devices that are CPUs: no shared memory, no barrier; x and w come through texel buffers,
-// the fastest loads of lavapipe (docs/lab/benchmarks.md); K unrolled by a texel; each of 8 lanes owns 16 x 16 outputs, and
+// the fastest loads of lavapipe (docs/lab/benchmarks.md); K unrolled by a texel; each lane owns 16 x 16 outputs, and
 // p.col_lanes of them lie side by side. Correct at any subgroup size.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 #include "gemm.h"
 
-layout(local_size_x = 8) in;
-layout(constant_id = 0) const uint kTileM = 32;
-layout(constant_id = 1) const uint kTileN = 64;
+layout(local_size_x = 8, local_size_x_id = 33) in; // kLanes
+layout(constant_id = 33) const uint kLanes = 8; // a subgroup: 8, or 16 where vectors have 512 bits
 layout(constant_id = 2) const bool kHalfX = false; // w has the type of x
-layout(constant_id = 6) const uint kColLanes = 4; // of that tile; p.col_lanes is what runs
 layout(push_constant) uniform Push { GemmPush p; };
 layout(binding = 0) uniform usamplerBuffer X; // [groups * rows, depth]
 layout(binding = 1) uniform usamplerBuffer W; // [groups * cols, depth]
@@ -24,7 +22,7 @@ void main()
 {
     const uint lane = gl_LocalInvocationID.x;
     epilogue_group = gate_group = gl_WorkGroupID.z;
-    const uint row = gl_WorkGroupID.x * (8 / p.col_lanes * kRows) + lane / p.col_lanes * kRows;
+    const uint row = gl_WorkGroupID.x * (kLanes / p.col_lanes * kRows) + lane / p.col_lanes * kRows;
     const uint col = gl_WorkGroupID.y * (p.col_lanes * kCols) + lane % p.col_lanes * kCols;
     const uint width = kHalfX ? 8 : 4; // elements of a texel
     uint x_at[kRows], w_at[kCols];

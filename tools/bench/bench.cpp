@@ -144,6 +144,7 @@ void add_bench(CLI::App& app, const Globals& globals, Run& run)
     bench->fallthrough();
     add_bench_gemm(*bench, globals, run);
     add_bench_conv(*bench, globals, run);
+    add_bench_tiles(*bench, globals, run);
     add_bench_transformer(*bench, globals, run);
     add_bench_unet(*bench, globals, run);
     add_bench_vae(*bench, globals, run);

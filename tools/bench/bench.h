@@ -80,6 +80,7 @@ Splats street_splats(uint32_t count, float sigma);
 
 void add_bench_gemm(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_conv(CLI::App& bench, const Globals& globals, Run& run);
+void add_bench_tiles(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_transformer(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_unet(CLI::App& bench, const Globals& globals, Run& run);
 void add_bench_vae(CLI::App& bench, const Globals& globals, Run& run);

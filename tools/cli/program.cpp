@@ -7,6 +7,7 @@
 #include "runtime/base/file.h"
 #include "runtime/base/quote.h"
 #include "runtime/system/process.h"
+#include "runtime/system/system.h"
 #include "tools/cli/interrupt.h"
 #include "tools/cli/option_facts.h"
 #include "tools/cli/print_stderr.h"
@@ -27,6 +28,16 @@ namespace {
 void print_diagnostic(void*, const char* line)
 {
     print_stderr("{}\n", line);
+}
+
+// Mesa's lavapipe computes with 256 bits at a time unless it is told otherwise; matrix products gain half with 512
+void prefer_wide_vectors()
+{
+#ifdef __x86_64__
+    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&
+        __builtin_cpu_supports("avx512vl"))
+        system::set_default_variable("LP_NATIVE_VECTOR_WIDTH", "512");
+#endif
 }
 
 void add_globals(CLI::App& app, Globals& globals)
@@ -145,6 +156,7 @@ constexpr int kMostDevices = 3; // that are lost, before the error stands
 // nothing thrown by the standard library or fmt leaves the program without a line and a code
 int run_program(int argc, char** argv, std::initializer_list<Command> commands)
 {
+    prefer_wide_vectors();
     system::prepare_streams();
     set_diagnostic_callback(print_diagnostic);
     watch_interrupts();
