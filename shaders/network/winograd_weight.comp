@@ -8,7 +8,7 @@
 #include "lib/winograd.glsl"
 
 layout(local_size_x = 64) in;
-layout(constant_id = 0) const bool kHalfW = false;
+layout(constant_id = 0) const uint kTypeW = kF16;
 layout(push_constant) uniform WinogradWeightPush {
     uint outputs;
     uint cols; // channels, padded
@@ -28,7 +28,7 @@ void main()
     [[unroll]] for (uint j = 0; j < 3; ++j) {
         vec4 g[3], column[kSamples];
         [[unroll]] for (uint i = 0; i < 3; ++i)
-            g[i] = FETCH4(W, kHalfW, n * p.w_ld + (i * 3 + j) * p.cols + col);
+            g[i] = FETCH4(W, kTypeW, n * p.w_ld + (i * 3 + j) * p.cols + col);
         WINOGRAD_WEIGHT(g[0], g[1], g[2], column)
         [[unroll]] for (uint i = 0; i < kSamples; ++i)
             rows[i][j] = column[i];
