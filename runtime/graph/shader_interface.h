@@ -42,7 +42,7 @@ inline std::string type_constant(std::string_view binding)
 // what kType<B> is of a tensor's type; none: no shader takes it where it has a choice
 inline std::optional<uint32_t> type_number(DType t)
 {
-    static constexpr DType kTypes[] = {DType::f32, DType::f16};
+    static constexpr DType kTypes[] = {DType::f32, DType::f16, DType::q8_0};
     for (uint32_t i = 0; i < std::size(kTypes); ++i)
         if (kTypes[i] == t)
             return i;

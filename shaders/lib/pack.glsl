@@ -6,7 +6,7 @@
 #include "lib/half.glsl"
 
 // types of elements, which the runtime gives to constants kType<B>; the default of one is the last that its shader takes
-const uint kF32 = 0, kF16 = 1;
+const uint kF32 = 0, kF16 = 1, kQ8_0 = 2; // q8_0: lib/weight.glsl
 
 // storage is 32-bit words: fp32, or two fp16 each, so that fp16 needs no device feature
 void unpack8(uvec4 w, out vec4 lo, out vec4 hi)

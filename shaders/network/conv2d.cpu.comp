@@ -14,7 +14,7 @@ layout(constant_id = 0) const uint kTileM = 32;
 layout(constant_id = 1) const uint kTileN = 64;
 layout(constant_id = 2) const uint kTypeX = kF16;
 layout(constant_id = 8) const uint kTypeX2 = kF16;
-layout(constant_id = 7) const uint kTypeW = kF16;
+layout(constant_id = 7) const uint kTypeW = kQ8_0;
 layout(constant_id = 3) const uint kKernelHeight = 3;
 layout(constant_id = 5) const uint kKernelWidth = 3;
 layout(constant_id = 4) const bool kTwoInputs = false;
@@ -57,7 +57,7 @@ void main()
     [[unroll]] for (uint i = 0; i < kRows; ++i)
         pixel[i] = conv_pixel(first_row + i);
     [[unroll]] for (uint j = 0; j < kCols; ++j)
-        w_at[j] = weight_row(min(col + j, p.cols - 1), p.w_ld);
+        w_at[j] = weight_row(min(col + j, p.cols - 1));
     clear_tile();
     const uint columns = p.x_cols + p.x2_cols; // of a tap
     for (uint tap = 0; tap < kKernelHeight * kKernelWidth; ++tap) {

@@ -14,7 +14,7 @@ layout(constant_id = 0) const uint kTileM = 64;
 layout(constant_id = 1) const uint kTileN = 64;
 layout(constant_id = 2) const uint kTypeX = kF16;
 layout(constant_id = 8) const uint kTypeX2 = kF16;
-layout(constant_id = 7) const uint kTypeW = kF16;
+layout(constant_id = 7) const uint kTypeW = kQ8_0;
 layout(constant_id = 3) const uint kKernelHeight = 3;
 layout(constant_id = 5) const uint kKernelWidth = 3;
 layout(constant_id = 4) const bool kTwoInputs = false;
@@ -79,7 +79,7 @@ void main()
     epilogue_group = 0;
     const uint row = gl_WorkGroupID.x * kTileM, col = gl_WorkGroupID.y * kTileN;
     const ConvPixel pixel = conv_pixel(row + bring_row());
-    const uint w_row = weight_row(min(col + bring_row(), p.cols - 1), p.w_ld);
+    const uint w_row = weight_row(min(col + bring_row(), p.cols - 1));
     clear_tile();
     Cursor cursor = Cursor(0, 0);
     vec4 a[4], b[4];

@@ -13,7 +13,7 @@ layout(local_size_x = 8) in;
 layout(constant_id = 0) const uint kTileM = 32;
 layout(constant_id = 1) const uint kTileN = 64;
 layout(constant_id = 2) const uint kTypeX = kF16;
-layout(constant_id = 3) const uint kTypeW = kF16;
+layout(constant_id = 3) const uint kTypeW = kQ8_0;
 layout(constant_id = 6) const uint kColLanes = 4; // of that tile; p.col_lanes is what runs
 layout(push_constant) uniform Push { GemmPush p; };
 layout(binding = 0) uniform usamplerBuffer X; // [groups * rows, depth]
@@ -34,7 +34,7 @@ void main()
     [[unroll]] for (uint i = 0; i < kRows; ++i)
         x_at[i] = (epilogue_group * p.rows + min(row + i, p.rows - 1)) * p.x_ld;
     [[unroll]] for (uint j = 0; j < kCols; ++j)
-        w_at[j] = weight_row(epilogue_group * p.cols + min(col + j, p.cols - 1), p.w_ld);
+        w_at[j] = weight_row(epilogue_group * p.cols + min(col + j, p.cols - 1));
     clear_tile();
     for (uint k = 0; k < p.depth; k += 8) {
         vec4 lo[kRows], hi[kRows];

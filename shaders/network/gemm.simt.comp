@@ -13,7 +13,7 @@ layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint kTileM = 64;
 layout(constant_id = 1) const uint kTileN = 64;
 layout(constant_id = 2) const uint kTypeX = kF16;
-layout(constant_id = 3) const uint kTypeW = kF16;
+layout(constant_id = 3) const uint kTypeW = kQ8_0;
 layout(push_constant) uniform Push { GemmPush p; };
 layout(binding = 0) readonly buffer X { uvec4 x[]; }; // [groups * rows, depth]
 layout(binding = 1) readonly buffer W { uvec4 w[]; }; // [groups * cols, depth]
@@ -42,7 +42,7 @@ void main()
     epilogue_group = gate_group = gl_WorkGroupID.z;
     const uint row = gl_WorkGroupID.x * kTileM, col = gl_WorkGroupID.y * kTileN;
     const uint x_row = (epilogue_group * p.rows + min(row + bring_row(), p.rows - 1)) * p.x_ld;
-    const uint w_row = weight_row(epilogue_group * p.cols + min(col + bring_row(), p.cols - 1), p.w_ld);
+    const uint w_row = weight_row(epilogue_group * p.cols + min(col + bring_row(), p.cols - 1));
     clear_tile();
     vec4 a[4], b[4];
     load(x_row, w_row, 0, a, b);
