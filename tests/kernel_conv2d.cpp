@@ -120,8 +120,8 @@ void check(const ConvCase& c, DType dtype, DType w_dtype)
     const HostImages got{y.height, y.width, k.run(y.data)};
     const bool slices = k.plan().passes[0].variant->constant("kSlices") && c.channels >= 256;
     EXPECT_EQ(k.plan().passes.size(), slices ? 2u : 1u); // everything is in the epilogue
-    // matrix units take fp16: what a block stands for is rounded to it
-    const bool rounded = w_dtype == DType::q8_0 && k.plan().passes[0].variant->name == "coopmat";
+    // matrix units take fp16: others are rounded to it
+    const bool rounded = w_dtype != DType::f16 && k.plan().passes[0].variant->name == "coopmat";
     for (uint32_t image = 0; image < y.batch; ++image)
         for (uint32_t p = 0; p < y.pixels(); ++p)
             for (uint32_t n = 0; n < c.outputs; ++n) {

@@ -11,21 +11,25 @@
 #extension GL_KHR_memory_scope_semantics : require
 #extension GL_KHR_shader_subgroup_basic : require
 #include "conv2d.h"
+#include "lib/pack.glsl"
 
 layout(local_size_x = 128, local_size_x_id = 33) in; // kThreads
 layout(constant_id = 0) const uint kTileM = 128;
 layout(constant_id = 1) const uint kTileN = 128;
+layout(constant_id = 7) const uint kTypeW = kQ8_0;
 layout(constant_id = 3) const uint kKernelHeight = 3;
 layout(constant_id = 5) const uint kKernelWidth = 3;
 layout(constant_id = 4) const bool kTwoInputs = false;
 layout(push_constant) uniform Push { Conv2dPush p; };
 layout(binding = 0) readonly buffer X { uvec4 x[]; };   // [images * in_image_rows, x_cols], fp16
-layout(binding = 1) readonly buffer W { uvec4 w[]; };   // [cols, taps * (x_cols + x2_cols)], fp16
+layout(binding = 1) readonly buffer W { uvec4 w[]; };   // [cols, taps * (x_cols + x2_cols)]
 layout(binding = 8) readonly buffer X2 { uvec4 x2[]; }; // as x, x2_cols
 #include "lib/conv_shift.glsl"
 #include "lib/gemm_epilogue.glsl"
 layout(constant_id = 36) const uint kSlices = 1; // of K, each summed by workgroups of its own, which write fp32 sums to Y
 #include "lib/gemm_tile.coopmat.glsl"
+#define WEIGHT(i) w[i]
+#include "lib/weight.coopmat.glsl"
 #include "lib/conv_taps.glsl"
 
 ConvPixel pixels[kLoadsX]; // of the rows that this thread brings
@@ -78,7 +82,7 @@ void load(uint tile_col, Cursor c)
     const uint w_at = c.tap * (p.x_cols + p.x2_cols) + (second ? p.x_cols : 0) + channel;
     [[unroll]] for (uint i = 0; i < kLoadsW; ++i) {
         const uint row = min(tile_col + load_row(i), p.cols - 1);
-        next_w[i] = inside ? w[(row * p.w_ld + w_at) / 8] : uvec4(0);
+        next_w[i] = inside ? load_weight_halves(weight_row(row), w_at) : uvec4(0);
     }
 }
 

@@ -9,17 +9,21 @@
 #extension GL_KHR_memory_scope_semantics : require
 #extension GL_KHR_shader_subgroup_basic : require
 #include "gemm.h"
+#include "lib/pack.glsl"
 
 layout(local_size_x = 128, local_size_x_id = 33) in; // kThreads
 layout(constant_id = 0) const uint kTileM = 128;
 layout(constant_id = 1) const uint kTileN = 128;
+layout(constant_id = 3) const uint kTypeW = kQ8_0;
 layout(push_constant) uniform Push { GemmPush p; };
 layout(binding = 0) readonly buffer X { uvec4 x[]; }; // [groups * rows, depth], fp16
-layout(binding = 1) readonly buffer W { uvec4 w[]; }; // [groups * cols, depth], fp16
+layout(binding = 1) readonly buffer W { uvec4 w[]; }; // [groups * cols, depth]
 #include "lib/gemm_gate.glsl"
 #include "lib/gemm_epilogue.glsl"
 const uint kSlices = 1; // of K
 #include "lib/gemm_tile.coopmat.glsl"
+#define WEIGHT(i) w[i]
+#include "lib/weight.coopmat.glsl"
 
 // kStep columns of the tile's rows of x and of w, k the first
 void load(uint tile_row, uint tile_col, uint k)
@@ -32,7 +36,7 @@ void load(uint tile_row, uint tile_col, uint k)
     }
     [[unroll]] for (uint i = 0; i < kLoadsW; ++i) {
         const uint row = epilogue_group * p.cols + min(tile_col + load_row(i), p.cols - 1);
-        next_w[i] = inside ? w[(row * p.w_ld + from) / 8] : uvec4(0);
+        next_w[i] = inside ? load_weight_halves(weight_row(row), from) : uvec4(0);
     }
 }
 
