@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/model/renderer_model.h"
+#include "engine/model/weight_blocks.h"
 #include "tests/checkpoint_values.h"
 #include "tests/json_text.h"
 #include "tests/program.h"
@@ -238,6 +239,92 @@ TEST(CliConvert, a_number_beyond_half_precision_is_an_error_that_names_the_tenso
     EXPECT_FALSE(fs::exists(folder / "out"));
     EXPECT_EQ(folder.entries(), 1u);
     EXPECT_EQ(convert(folder / "in.safetensors", folder / "out", "--dtype bf16").code, 0);
+}
+
+// heads of 8 channels
+UnetConfig unet_for_blocks()
+{
+    UnetConfig unet = small_unet();
+    unet.heads = {4, 8, 8};
+    return unet;
+}
+
+TEST(CliConvert, weights_of_a_networks_blocks_become_int8_with_scales)
+{
+    const ScratchFolder folder;
+    put_diffusers(folder / "in", unet_for_blocks());
+    const ProgramResult result = convert(folder / "in", folder / "out", "--weights q8_0 --json");
+    ASSERT_EQ(result.code, 0) << result.err;
+    const auto m = RendererModel::open(folder / "out");
+    ASSERT_TRUE(m) << m.error().message;
+    EXPECT_TRUE(m->unet.q8_0);
+    EXPECT_EQ((*read_json(folder / "out/renderer/config.json"))["sample_size"], 53);
+    const Checkpoint checkpoint = *m->open_unet();
+    std::vector<float> expected, got, scratch;
+    uint64_t in_blocks = 0, parameters = 0;
+    for (const TensorSpec& spec : unet_schema(unet_for_blocks())) {
+        random_tensor(1, spec, expected);
+        parameters += expected.size();
+        const auto values = checkpoint.values(spec, scratch);
+        ASSERT_TRUE(values);
+        if (values->dtype == DType::f32) {
+            EXPECT_EQ(values_of(checkpoint, spec), expected) << spec.name;
+            continue;
+        }
+        const auto scales = checkpoint.values(scales_of(spec), scratch);
+        ASSERT_TRUE(scales);
+        const uint32_t taps = spec.shape.size() == 4 ? uint32_t(spec.shape[2] * spec.shape[3]) : 1;
+        from_blocks(values->bytes, scales->bytes, uint32_t(spec.shape[1]), taps, got);
+        float largest = 0;
+        for (const float v : expected)
+            largest = std::max(largest, std::abs(v));
+        for (size_t i = 0; i < got.size(); ++i)
+            ASSERT_NEAR(got[i], expected[i], largest / 250) << spec.name << ' ' << i;
+        in_blocks += got.size();
+    }
+    EXPECT_GT(in_blocks, parameters * 9 / 10);
+    EXPECT_EQ(json_of(result.out)["components"]["renderer"]["parameters"], parameters);
+    expect_seeded(*m->open_vae(), vae_schema(m->vae), DType::f32);
+    ASSERT_EQ(convert(folder / "out", folder / "again").code, 0); // as it is
+    EXPECT_EQ(contents(folder / "again/renderer" / kFile), contents(folder / "out/renderer" / kFile));
+}
+
+TEST(CliConvert, blocks_that_are_not_whole_are_refused)
+{
+    const ScratchFolder folder;
+    put_diffusers(folder / "narrow");
+    expect_error(convert(folder / "narrow", folder / "none", "--weights q8_0"), 3,
+                 "want channels and heads of multiples of 8, found 32 channels at level 0, heads of 4");
+    put_diffusers(folder / "in", unet_for_blocks());
+    ASSERT_EQ(convert(folder / "in", folder / "out", "--weights q8_0").code, 0);
+    const Path file = folder / "out/renderer" / kFile;
+    const std::string name = "mid_block.resnets.0.conv1.weight_scale", whole = contents(file);
+    const auto error_with = [&](const std::function<bool(TensorData&)>& keep) {
+        folder.put("out/renderer/" + kFile, whole);
+        const SafetensorsSet set = *SafetensorsSet::open(file);
+        std::vector<TensorData> tensors;
+        for (const TensorInfo& t : set.tensors())
+            if (TensorData data{t.name, t.dtype, t.shape, set.bytes(t)}; keep(data))
+                tensors.push_back(data);
+        EXPECT_TRUE(write_safetensors(folder / "changed", tensors));
+        fs::rename(folder / "changed", file);
+        const auto m = RendererModel::open(folder / "out");
+        return m ? std::string() : m.error().message;
+    };
+    EXPECT_NE(error_with([&](TensorData& t) { return t.name != name; }).find("missing 1: " + name), std::string::npos)
+        << error_with([&](TensorData& t) { return t.name != name; });
+    const auto reshaped = error_with([&](TensorData& t) {
+        if (t.name == name)
+            t.shape = {2, 64, 3, 3};
+        return true;
+    });
+    EXPECT_NE(reshaped.find(name + " expected [64, 2, 3, 3] found [2, 64, 3, 3]"), std::string::npos) << reshaped;
+    const auto retyped = error_with([&](TensorData& t) {
+        if (t.name == name)
+            t.dtype = DType::bf16;
+        return true;
+    });
+    EXPECT_NE(retyped.find(name + " expected F16 found BF16"), std::string::npos) << retyped;
 }
 
 TEST(CliConvert, what_exists_is_replaced_only_when_asked)

@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+#include "engine/format/image.h"
 #include "runtime/system/host_name.h"
 #include "tests/child_program.h"
 #include "tests/jpeg_file.h"
@@ -9,6 +10,7 @@
 #include "tools/trajectory/camera_path.h"
 
 #include <algorithm>
+#include <cmath>
 #include <csignal>
 #include <fstream>
 #include <limits>
@@ -272,6 +274,43 @@ TEST_F(CliRefine, the_planned_memory_is_the_memory_that_was_used)
     EXPECT_EQ(told.code, 0) << told.err;
     EXPECT_NE(told.out.find("planned device memory "), std::string::npos) << told.out;
     EXPECT_NE(told.out.find("peak device memory "), std::string::npos) << told.out;
+}
+
+// dB between two pictures
+double psnr(const Path& a, const Path& b)
+{
+    const auto one = read_png_rgb8(a), other = read_png_rgb8(b);
+    EXPECT_TRUE(one && other && one->pixels.size() == other->pixels.size());
+    double squares = 0;
+    for (size_t i = 0; i < one->pixels.size(); ++i)
+        squares += std::pow(double(one->pixels[i]) - other->pixels[i], 2);
+    return 10 * std::log10(255.0 * 255.0 * double(one->pixels.size()) / squares);
+}
+
+// the default model, 38 to 41 dB (docs/numerics.md §6.3)
+TEST_F(CliRefine, weights_of_8_bits_take_half_the_memory_and_give_nearly_the_same_frames)
+{
+    const std::string model = SEMROVER_SOURCE_DIR "/assets/model", scene = SEMROVER_SOURCE_DIR "/assets/scenes/street";
+    const ProgramResult converted = semrover_program("convert -q " + model + " " + path("q8") + " --weights q8_0");
+    ASSERT_EQ(converted.code, 0) << converted.err;
+    Json weights[2];
+    uint64_t peak[2];
+    for (const auto& [i, which] : {std::pair{0, model}, {1, path("q8")}}) {
+        const Json inspected = json_of(semrover_program("inspect --json " + which).out);
+        weights[i] = inspected["components"]["renderer"]["weights"];
+        const ProgramResult run = semrover_program(
+            fmt::format("refine {0}.truth.sgrid --path {0}.tum -m {1} -o {2}{3} -W 112 -H 80 --frames 0:1 --steps 4 "
+                        "--quiet --json",
+                        scene, which, path("out"), i));
+        ASSERT_EQ(run.code, 0) << run.err;
+        peak[i] = json_of(run.out)["peak_device_bytes"];
+        EXPECT_EQ(json_of(run.out)["planned_device_bytes"], peak[i]);
+    }
+    EXPECT_EQ(weights[0]["parameters"], weights[1]["parameters"]);
+    EXPECT_LT(weights[1]["bytes"].get<uint64_t>(), weights[0]["bytes"].get<uint64_t>() * 6 / 10);
+    EXPECT_LT(peak[1] + weights[0]["bytes"].get<uint64_t>() * 4 / 10, peak[0]);
+    for (const char* frame : {"frames/000000.png", "frames/000001.png"})
+        EXPECT_GT(psnr(folder_ / "out0" / frame, folder_ / "out1" / frame), 30) << frame;
 }
 
 TEST_F(CliRefine, frames_can_be_jpegs_and_videos)

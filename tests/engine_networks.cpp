@@ -69,6 +69,28 @@ TEST(engine_networks, have_the_parameters_of_stable_diffusion)
     EXPECT_EQ(Vae::plan({}, DType::f16)->parameters(), 83653863u);
 }
 
+// bytes on the device in fp16, and in blocks where they can be
+std::pair<uint64_t, uint64_t> planned_bytes(UnetConfig config)
+{
+    const uint64_t half = Unet::plan(config, DType::f16)->device_bytes({});
+    config.q8_0 = true;
+    return {half, Unet::plan(config, DType::f16)->device_bytes({})};
+}
+
+// 8.5 bits a weight of the blocks
+TEST(engine_networks, need_about_half_the_memory_with_weights_of_8_bits)
+{
+    UnetConfig unet;
+    unet.in_channels = 13;
+    const auto [half, blocks] = planned_bytes(unet);
+    EXPECT_NEAR(double(half), 1.724e9, 0.005e9);
+    EXPECT_NEAR(double(blocks), 0.9215e9, 0.005e9);
+    const auto svd = *read_json(SEMROVER_SOURCE_DIR "/tests/golden/layouts/svd_vsd_unet.json");
+    const auto [video_half, video_blocks] = planned_bytes(*parse_video_unet_config(svd["config"]));
+    EXPECT_NEAR(double(video_half), 3.259e9, 0.005e9);
+    EXPECT_NEAR(double(video_blocks), 1.639e9, 0.005e9);
+}
+
 TEST(engine_networks, decode_the_same_image_in_bands_of_rows)
 {
     size_t whole = 0, banded = 0;

@@ -262,6 +262,30 @@ TEST(RendererConfigs, channels_must_divide_into_groups_and_heads)
     EXPECT_TRUE(says(parse_vae_config(vae_with("norm_num_groups", 3)), "128 channels do not divide into 3 groups"));
 }
 
+TEST(RendererConfigs, weights_of_8_bits_belong_to_blocks_of_whole_channels)
+{
+    const UnetConfig unet = *parse_unet_config(unet_with("weights", "q8_0"));
+    EXPECT_TRUE(unet.q8_0);
+    EXPECT_TRUE(parse_any_unet_config(unet_config_json(unet))->q8_0);
+    EXPECT_TRUE(
+        parse_any_unet_config(unet_config_json(*parse_video_unet_config(video_unet_with("weights", "q8_0"))))->q8_0);
+    EXPECT_FALSE(parse_unet_config(unet_with("weights", "q4_0")));
+    Json config = unet_with("weights", "q8_0");
+    config["attention_head_dim"] = 20; // of 16 channels, at the first level
+    EXPECT_TRUE(parse_unet_config(config));
+    config["attention_head_dim"] = 16;
+    const auto refused = parse_unet_config(config);
+    ASSERT_FALSE(refused);
+    EXPECT_NE(refused.error().message.find("found 320 channels at level 0, heads of 20"), std::string::npos)
+        << refused.error().message;
+    const Shapes shapes = shapes_of(unet_schema(unet));
+    EXPECT_EQ(shapes.at("down_blocks.0.resnets.0.conv1.weight_scale"), (std::vector<uint64_t>{320, 10, 3, 3}));
+    EXPECT_EQ(shapes.at("mid_block.attentions.0.transformer_blocks.0.attn2.to_k.weight_scale"),
+              (std::vector<uint64_t>{1280, 24}));
+    for (const char* whole : {"conv_in", "conv_out", "time_embedding.linear_1", "down_blocks.0.resnets.0.norm1"})
+        EXPECT_FALSE(shapes.contains(std::string(whole) + ".weight_scale")) << whole;
+}
+
 TEST(RendererConfigs, an_unknown_field_warns)
 {
     EXPECT_EQ(parse_unet_config(unet_with("novelty", 1))->warnings,

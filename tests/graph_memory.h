@@ -30,8 +30,7 @@ inline BufferSlice fake_memory(uint64_t bytes)
 inline Tensor fake_external(Graph& g, uint32_t rows, uint32_t cols, DType dtype = DType::f32,
                             std::string_view name = "input")
 {
-    return g.external(fake_memory(uint64_t(rows) * round_up(cols, kRowPadding) * dtype_bytes(dtype)), rows, cols, dtype,
-                      name);
+    return g.external(fake_memory(rows * row_bytes_of(dtype, round_up(cols, kRowPadding))), rows, cols, dtype, name);
 }
 
 inline Tensor fake_array(Graph& g, uint32_t count, std::string_view name = "array")

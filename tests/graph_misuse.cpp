@@ -25,6 +25,20 @@ TEST(graph_misuse, names_pass_and_tensor_that_is_read_before_it_is_written)
     EXPECT_EQ(e.message, "pass 1 (silu): binding X reads 'nowhere', which nothing has written");
 }
 
+TEST(graph_misuse, names_a_tensor_whose_type_a_shader_does_not_take)
+{
+    Graph g(test_limits());
+    (void)gelu(g, fake_external(g, 16, 64, DType::bf16, "activations"));
+    EXPECT_EQ(error_of(g).message, "pass 0 (gelu): binding X does not take BF16, the type of 'activations'");
+    Graph h(test_limits());
+    (void)gemm(h, fake_external(h, 16, 64), fake_external(h, 8, 64, DType::bf16, "weight"), {}, {.dtype = DType::f32});
+    EXPECT_EQ(error_of(h).message, "pass 0 (gemm): binding W does not take BF16, the type of 'weight'");
+    Graph k(test_limits()); // a binding that leaves no choice
+    const Tensor index = k.external(fake_memory(256), 16, 1, DType::f16, "indices", 1);
+    (void)embedding(k, index, fake_external(k, 16, 64), {}, DType::f32);
+    EXPECT_EQ(error_of(k).message, "pass 0 (embedding): binding Index does not take F16, the type of 'indices'");
+}
+
 TEST(graph_misuse, wants_every_byte_written_that_is_read)
 {
     Graph g(test_limits());

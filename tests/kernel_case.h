@@ -19,7 +19,8 @@ Device& test_device();
 struct HostMatrix {
     uint32_t rows = 0, cols = 0, ld = 0;
     DType dtype = DType::f32;
-    std::vector<float> values; // [rows, ld]
+    std::vector<float> values;     // [rows, ld]
+    std::vector<std::byte> blocks; // of q8_0 alone: what the values are made of, as it lies on the device
 
     HostMatrix() = default;
     HostMatrix(uint32_t r, uint32_t c, DType t)
@@ -39,7 +40,7 @@ class KernelCase {
 
     Graph graph;
 
-    HostMatrix random(uint32_t rows, uint32_t cols, DType dtype, float scale = 1);
+    HostMatrix random(uint32_t rows, uint32_t cols, DType dtype, float scale = 1); // normal, but of q8_0 uniform
     std::vector<uint32_t> indices(uint32_t count, uint32_t below);
 
     Tensor input(const HostMatrix& m);
@@ -73,6 +74,7 @@ class KernelCase {
     void expect_zero_padding(const HostMatrix& m);
 
   private:
+    HostMatrix random_blocks(uint32_t rows, uint32_t cols, float scale);
     BufferSlice upload(const std::vector<std::byte>& bytes);
     std::vector<std::byte> read_bytes(const Tensor& t);
 

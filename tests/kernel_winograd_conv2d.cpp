@@ -26,13 +26,13 @@ struct Convolution {
     uint32_t bands = 0;
 };
 
-Convolution convolve(const WinogradCase& c, DType dtype)
+Convolution convolve(const WinogradCase& c, DType dtype, DType w_dtype)
 {
     KernelCase k(test_device());
     Convolution r;
     r.x = {{}, c.batch, c.height, c.width};
     r.data = k.random(c.batch * r.x.image_rows(), c.channels, dtype);
-    r.w = k.random(c.outputs, 9 * round_up(c.channels, kRowPadding), dtype);
+    r.w = k.random(c.outputs, 9 * round_up(c.channels, kRowPadding), w_dtype);
     r.bias = k.random(1, c.outputs, DType::f32);
     ConvOptions o;
     o.upsampled_height = c.up_height;
@@ -108,8 +108,10 @@ TEST(kernel_winograd_conv2d, matches_a_convolution_in_double)
         for (DType dtype : {DType::f32, DType::f16}) {
             SCOPED_TRACE(fmt::format("{} x {}x{}x{} -> {} {}", c.batch, c.height, c.width, c.channels, c.outputs,
                                      dtype_name(dtype)));
-            check(c, convolve(c, dtype), dtype, 1);
+            check(c, convolve(c, dtype, dtype), dtype, 1);
         }
+    for (const WinogradCase& c : {WinogradCase{1, 9, 13, 32, 72}, WinogradCase{2, 5, 7, 96, 20}})
+        check(c, convolve(c, DType::f16, DType::q8_0), DType::f16, 1);
 }
 
 TEST(kernel_winograd_conv2d, does_large_images_in_bands_of_tiles)
@@ -117,7 +119,7 @@ TEST(kernel_winograd_conv2d, does_large_images_in_bands_of_tiles)
     if (test_device().limits().max_texel_elements < 4u << 20)
         GTEST_SKIP() << "bands are of 64 MiB, which this device cannot bind as texels";
     const WinogradCase c{1, 259, 261, 64, 64};
-    const Convolution r = convolve(c, DType::f16);
+    const Convolution r = convolve(c, DType::f16, DType::f16);
     EXPECT_GT(r.bands, 1u);
     check(c, r, DType::f16, 997);
 }

@@ -53,7 +53,7 @@ bool says(const std::string& text, std::string_view part)
 TEST(Protocol, a_shader_that_keeps_it_is_taken)
 {
     EXPECT_EQ(fault(Declarations{}), "");
-    EXPECT_EQ(fault({.constants = "layout(constant_id = 0) const bool kHalfX = false;\n"
+    EXPECT_EQ(fault({.constants = "layout(constant_id = 0) const uint kTypeX = 1;\n"
                                   "layout(constant_id = 1) const uint kTileM = 16;",
                      .push = "uint rows; uint first_row; uint x_first; uint x_ld;"}),
               "");
@@ -61,8 +61,10 @@ TEST(Protocol, a_shader_that_keeps_it_is_taken)
 
 TEST(Protocol, names_that_belong_to_no_binding_are_refused)
 {
-    EXPECT_TRUE(says(fault({.constants = "layout(constant_id = 0) const bool kHalfZ = false;"}),
-                     "constant kHalfZ belongs to no binding"));
+    EXPECT_TRUE(says(fault({.constants = "layout(constant_id = 0) const uint kTypeZ = 1;"}),
+                     "constant kTypeZ belongs to no binding"));
+    EXPECT_TRUE(
+        says(fault({.constants = "layout(constant_id = 0) const bool kTypeX = false;"}), "constant kTypeX is a bool"));
     EXPECT_TRUE(says(fault({.push = "uint rows; uint z_first;"}), "push member z_first belongs to no binding"));
 }
 

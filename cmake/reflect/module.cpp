@@ -303,8 +303,9 @@ class Reader {
         for (const Id& id : ids_) {
             if (!id.spec_set || id.op == 0 || id.name.empty()) // local_size_x_id declares one without a name
                 continue;
-            const uint32_t value = id.op == kOpSpecConstant ? id.operands[0] : id.op == kOpSpecConstantTrue;
-            module_.constants.push_back({id.name, id.spec_id, value});
+            const bool is_bool = id.op != kOpSpecConstant;
+            const uint32_t value = is_bool ? id.op == kOpSpecConstantTrue : id.operands[0];
+            module_.constants.push_back({id.name, id.spec_id, value, is_bool});
         }
     }
 

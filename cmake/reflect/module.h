@@ -17,6 +17,7 @@ struct Binding {
 struct Constant {
     std::string name;
     uint32_t id = 0, value = 0;
+    bool is_bool = false;
 };
 
 struct Member {

@@ -42,9 +42,12 @@ void check_bindings(const Variant& v)
 void check_constants(const Variant& v)
 {
     for (const Constant& c : v.module.constants) {
-        if (c.name.starts_with(protocol::kHalfPrefix) &&
-            !find(v.module.bindings, c.name.substr(protocol::kHalfPrefix.size())))
+        if (!c.name.starts_with(protocol::kTypePrefix))
+            continue;
+        if (!find(v.module.bindings, c.name.substr(protocol::kTypePrefix.size())))
             refuse(v, "constant {} belongs to no binding", c.name);
+        if (c.is_bool)
+            refuse(v, "constant {} is a bool, and there are more types than two", c.name);
     }
 }
 

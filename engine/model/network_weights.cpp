@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/model/network_weights.h"
 
+#include "engine/model/weight_blocks.h"
+
 namespace semrover {
 
 namespace {
@@ -25,6 +27,11 @@ WeightPart vector_part(const std::string& name, uint32_t size, IndexRanges cols,
 
 } // namespace
 
+DType NetworkWeights::type_of(const TensorSpec& weight, std::optional<DType> other) const
+{
+    return blocks_ && stored_in_blocks(weight.name, weight.shape) ? DType::q8_0 : other.value_or(precision_);
+}
+
 WeightLayout& NetworkWeights::add(const std::string& name, uint32_t rows, uint32_t cols, DType dtype)
 {
     weights_.push_back({state_.slot(rows, cols, dtype, name), {}});
@@ -46,7 +53,7 @@ Layer NetworkWeights::conv(const std::string& name, const ConvShape& s)
     part.gain = s.gain;
     part.share = s.share;
     Layer layer;
-    WeightLayout& weight = add(name + ".weight", s.outputs, taps * width, s.dtype.value_or(precision_));
+    WeightLayout& weight = add(name + ".weight", s.outputs, taps * width, type_of(part.spec, s.dtype));
     layer.weight = weight.weight;
     weight.parts.push_back(std::move(part));
     WeightLayout& bias = add(name + ".bias", 1, s.outputs, DType::f32);
@@ -62,8 +69,9 @@ Layer NetworkWeights::linear(const std::vector<Part>& parts, const LinearShape& 
     for (const Part& p : parts)
         rows += packed_rows(p);
     Layer layer;
-    WeightLayout& weight = add(parts.front().name + ".weight", rows,
-                               s.col_heads ? padded_heads(s.cols, s.col_heads) : s.cols, s.dtype.value_or(precision_));
+    const std::string name = parts.front().name + ".weight";
+    WeightLayout& weight = add(name, rows, s.col_heads ? padded_heads(s.cols, s.col_heads) : s.cols,
+                               type_of({name, {rows, s.cols}}, s.dtype));
     layer.weight = weight.weight;
     uint32_t first = 0;
     for (const Part& p : parts) {

@@ -16,7 +16,8 @@ struct Layer {
 // are read from a checkpoint; what is declared decides the device bytes.
 class NetworkWeights {
   public:
-    explicit NetworkWeights(DType precision) : precision_(precision) {}
+    // blocks: weights that can be are q8_0 (weight_blocks.h), as in the file
+    explicit NetworkWeights(DType precision, bool blocks = false) : precision_(precision), blocks_(blocks) {}
 
     DType precision() const { return precision_; }
 
@@ -24,7 +25,7 @@ class NetworkWeights {
 
     // convolution over C channels, or C and C2 that come as two inputs: [N, kernel^2 * (C + C2)], tap by tap, each
     // input padded to kRowPadding. `gain` multiplies weights, `bias_gain` biases. Without a dtype: the network's
-    // precision.
+    // precision. What can be in blocks is, whatever the dtype.
     struct ConvShape {
         uint32_t outputs, channels, channels2 = 0, kernel = 3;
         float gain = 1, bias_gain = 1;
@@ -62,7 +63,10 @@ class NetworkWeights {
   private:
     WeightLayout& add(const std::string& name, uint32_t rows, uint32_t cols, DType dtype);
 
+    DType type_of(const TensorSpec& weight, std::optional<DType> other) const;
+
     DType precision_;
+    bool blocks_;
     State state_;
     std::vector<WeightLayout> weights_;
 };

@@ -65,6 +65,7 @@ Result<TransformerConfig> parse_transformer_config(const Json& json)
     fields.number("attention_radius", 0.f, 1e5f, c.attention_radius);
     fields.flag("context_pos_embed", c.context_pos_embed);
     fields.choice<bool>("qk_norm", {{"rms_norm", true}}, c.qk_norm);
+    fields.choice<bool>("weights", {{"q8_0", true}}, c.q8_0);
     fields.choices<ConditionPart>(
         "condition", {{"object", ConditionPart::object}, {"tint", ConditionPart::tint}, {"part", ConditionPart::part}},
         c.condition);

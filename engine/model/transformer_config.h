@@ -34,6 +34,7 @@ struct TransformerConfig {
     uint32_t pos_embed_dim = 128; // sinusoids per axis, even
     bool context_pos_embed = true;
     bool qk_norm = false; // rms_norm
+    bool q8_0 = false;    // weights of its blocks are (weight_blocks.h)
     std::vector<ConditionPart> condition;
     bool condition_voxels = false;     // of voxel tokens too, not only of semantic tokens
     std::string placement = "shifted"; // of the points that it was trained on: shifted, canonical, mixed

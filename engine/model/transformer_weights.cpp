@@ -3,6 +3,7 @@
 #include "engine/model/transformer_weights.h"
 
 #include "engine/model/checkpoint.h"
+#include "engine/model/weight_blocks.h"
 
 #include <algorithm>
 
@@ -48,6 +49,17 @@ Slot TransformerWeights::add(uint32_t rows, uint32_t cols, DType dtype, std::str
     return weights_.back().weight;
 }
 
+DType TransformerWeights::type_of(const std::string& weight, uint32_t cols) const
+{
+    return config_.q8_0 && stored_in_blocks(weight, std::array<uint64_t, 2>{1, cols}) ? DType::q8_0 : precision_;
+}
+
+std::vector<TensorSpec> TransformerWeights::schema() const
+{
+    std::vector<TensorSpec> specs = schema_of(weights_);
+    return config_.q8_0 ? with_scales(std::move(specs)) : specs;
+}
+
 void TransformerWeights::put(const Slot& slot, WeightPart part)
 {
     const auto at = std::ranges::find_if(weights_, [&](const WeightLayout& w) { return w.weight.same_as(slot); });
@@ -85,17 +97,18 @@ void TransformerWeights::add_block(uint32_t index, bool last)
 {
     BlockWeights& b = blocks[index];
     const uint32_t d = config_.dim(), streams = last ? 1 : 2, modulations = last ? 8 * d : 12 * d;
-    b.qkv = add(6 * d, d, precision_, "qkv");
-    b.qkv_bias = add(2, 3 * d, DType::f32, "qkv.bias");
-    b.out = add(streams * d, d, precision_, "out");
-    b.out_bias = add(streams, d, DType::f32, "out.bias");
-    b.ff_in = add(streams * 4 * d, d, precision_, "ff_in");
-    b.ff_in_bias = add(streams, 4 * d, DType::f32, "ff_in.bias");
-    b.ff_out = add(streams * d, 4 * d, precision_, "ff_out");
-    b.ff_out_bias = add(streams, d, DType::f32, "ff_out.bias");
-    b.modulation = add(modulations, d, precision_, "modulation");
-    b.modulation_bias = add(1, modulations, DType::f32, "modulation.bias");
     const std::string block = fmt::format("transformer_blocks.{}.", index);
+    const DType type = type_of(block + "attn.to_q.weight", d), wide = type_of(block + "ff.net.2.weight", 4 * d);
+    b.qkv = add(6 * d, d, type, "qkv");
+    b.qkv_bias = add(2, 3 * d, DType::f32, "qkv.bias");
+    b.out = add(streams * d, d, type, "out");
+    b.out_bias = add(streams, d, DType::f32, "out.bias");
+    b.ff_in = add(streams * 4 * d, d, type, "ff_in");
+    b.ff_in_bias = add(streams, 4 * d, DType::f32, "ff_in.bias");
+    b.ff_out = add(streams * d, 4 * d, wide, "ff_out");
+    b.ff_out_bias = add(streams, d, DType::f32, "ff_out.bias");
+    b.modulation = add(modulations, d, type, "modulation");
+    b.modulation_bias = add(1, modulations, DType::f32, "modulation.bias");
     for (uint32_t stream = 0; stream < 2; ++stream)
         add_stream(block, b, stream, last);
     if (!config_.qk_norm)
@@ -131,9 +144,8 @@ void TransformerWeights::add_stream(const std::string& block, const BlockWeights
 Status TransformerWeights::load(Device& device, const SafetensorsSet& file, const LowRankAdapter& adapter,
                                 const LoadProgress& progress)
 {
-    const std::vector<TensorSpec> schema = schema_of(weights_);
-    SR_CHECK(file.require(schema));
-    SR_CHECK(adapter.require(schema));
+    SR_CHECK(file.require(schema()));
+    SR_CHECK(adapter.require(schema_of(weights_)));
     SR_CHECK(state_.allocate(device, "transformer weights"));
     const auto values = [&](const TensorSpec& spec, std::vector<float>& scratch) -> Result<TensorValues> {
         const TensorInfo* info = file.find(spec.name);
@@ -141,8 +153,14 @@ Status TransformerWeights::load(Device& device, const SafetensorsSet& file, cons
         if (!adapter.has(spec.name))
             return in_file;
         SR_CHECK(check_finite(file, *info));
-        scratch.resize(info->elements());
-        to_float(in_file.bytes, info->dtype, scratch.data());
+        if (info->dtype == DType::i8) {
+            const TensorInfo& scales = *file.find(scales_of(spec).name);
+            SR_CHECK(check_finite(file, scales));
+            from_blocks(in_file.bytes, file.bytes(scales), uint32_t(info->shape[1]), 1, scratch);
+        } else {
+            scratch.resize(info->elements());
+            to_float(in_file.bytes, info->dtype, scratch.data());
+        }
         adapter.add(spec.name, scratch);
         return TensorValues{std::as_bytes(std::span(scratch)), DType::f32, file.path(), spec.name};
     };

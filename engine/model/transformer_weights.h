@@ -45,6 +45,8 @@ class TransformerWeights {
 
   private:
     Slot add(uint32_t rows, uint32_t cols, DType dtype, std::string_view name);
+    DType type_of(const std::string& weight, uint32_t cols) const;
+    std::vector<TensorSpec> schema() const; // of the file
     void put(const Slot& slot, WeightPart part);
     void place(const std::string& name, const Slot& weight);
     void place(const std::string& name, const Slot& weight, const Slot& bias, uint32_t row, uint32_t rows,

@@ -3,7 +3,9 @@
 #include "engine/model/unet_config.h"
 
 #include "engine/model/schema.h"
+#include "engine/model/weight_blocks.h"
 #include "runtime/base/json_fields.h"
+#include "runtime/graph/tensor.h"
 
 #include <algorithm>
 
@@ -78,6 +80,13 @@ Status check_channels(const UnetConfig& c, std::string_view what, std::string_vi
         if (has_attention(c, i) && channels % c.heads[i])
             return fail(ErrorCode::bad_input, "{}: {} channels at level {} do not divide into {} heads{}", what,
                         channels, i, c.heads[i], of_heads);
+        // else blocks would be torn apart by what the kernels pad
+        if (const uint32_t head = has_attention(c, i) ? channels / c.heads[i] : channels;
+            c.q8_0 && (channels % kRowPadding || head % kRowPadding))
+            return fail(ErrorCode::bad_input,
+                        "{}: weights \"q8_0\" want channels and heads of multiples of {}, "
+                        "found {} channels at level {}, heads of {}",
+                        what, kRowPadding, channels, i, head);
     }
     return {};
 }
@@ -174,6 +183,27 @@ Json video_unet_config_json(const UnetConfig& c)
             {"num_frames", c.num_frames}};
 }
 
+Json image_unet_config_json(const UnetConfig& c)
+{
+    return {{"_class_name", "UNet2DConditionModel"},
+            {"in_channels", c.in_channels},
+            {"out_channels", c.out_channels},
+            {"block_out_channels", c.block_out_channels},
+            {"layers_per_block", per_level_json(c.layers_per_block)},
+            {"down_block_types", block_types_json(c.down_attention, "DownBlock2D")},
+            {"mid_block_type", c.mid_attention ? "UNetMidBlock2DCrossAttn" : "UNetMidBlock2D"},
+            {"up_block_types", block_types_json(c.up_attention, "UpBlock2D")},
+            {"attention_head_dim", per_level_json(c.heads)},
+            {"transformer_layers_per_block", per_level_json(c.transformer_layers)},
+            {"cross_attention_dim", c.cross_attention_dim},
+            {"norm_num_groups", c.norm_num_groups},
+            {"norm_eps", short_number(c.norm_eps)},
+            {"use_linear_projection", c.use_linear_projection},
+            {"flip_sin_to_cos", c.flip_sin_to_cos},
+            {"freq_shift", short_number(c.freq_shift)},
+            {"num_class_embeds", c.num_class_embeds ? Json(c.num_class_embeds) : Json()}};
+}
+
 // ---- the weights
 
 void add_resnet(Schema& s, const std::string& name, const UnetConfig& c, uint32_t in, uint32_t out)
@@ -264,6 +294,7 @@ Result<UnetConfig> parse_unet_config(const Json& json)
     fields.refuse_null("norm_num_groups", "a whole number");
     fields.integer("norm_num_groups", 1u, kMaxChannels, c.norm_num_groups);
     fields.number("norm_eps", 1e-12f, 1.f, c.norm_eps);
+    fields.choice<bool>("weights", {{"q8_0", true}}, c.q8_0);
     fields.flag("flip_sin_to_cos", c.flip_sin_to_cos);
     fields.number("freq_shift", -16.f, 16.f, c.freq_shift);
     fields.integer("num_class_embeds", 0u, kMaxChannels, c.num_class_embeds);
@@ -290,6 +321,7 @@ Result<UnetConfig> parse_video_unet_config(const Json& json)
     read_video_attention(fields, c);
     read_added_numbers(fields, c);
     fields.integer("num_frames", 1u, 4096u, c.num_frames);
+    fields.choice<bool>("weights", {{"q8_0", true}}, c.q8_0);
     fields.ignore({"sample_size", "dropout"});
     SR_CHECK(fields.finish(c.warnings));
     SR_CHECK(check_channels(c, "video unet config", ""));
@@ -304,25 +336,10 @@ Result<UnetConfig> parse_any_unet_config(const Json& json)
 
 Json unet_config_json(const UnetConfig& c)
 {
-    if (c.video)
-        return video_unet_config_json(c);
-    return {{"_class_name", "UNet2DConditionModel"},
-            {"in_channels", c.in_channels},
-            {"out_channels", c.out_channels},
-            {"block_out_channels", c.block_out_channels},
-            {"layers_per_block", per_level_json(c.layers_per_block)},
-            {"down_block_types", block_types_json(c.down_attention, "DownBlock2D")},
-            {"mid_block_type", c.mid_attention ? "UNetMidBlock2DCrossAttn" : "UNetMidBlock2D"},
-            {"up_block_types", block_types_json(c.up_attention, "UpBlock2D")},
-            {"attention_head_dim", per_level_json(c.heads)},
-            {"transformer_layers_per_block", per_level_json(c.transformer_layers)},
-            {"cross_attention_dim", c.cross_attention_dim},
-            {"norm_num_groups", c.norm_num_groups},
-            {"norm_eps", short_number(c.norm_eps)},
-            {"use_linear_projection", c.use_linear_projection},
-            {"flip_sin_to_cos", c.flip_sin_to_cos},
-            {"freq_shift", short_number(c.freq_shift)},
-            {"num_class_embeds", c.num_class_embeds ? Json(c.num_class_embeds) : Json()}};
+    Json json = c.video ? video_unet_config_json(c) : image_unet_config_json(c);
+    if (c.q8_0)
+        json["weights"] = "q8_0";
+    return json;
 }
 
 std::vector<TensorSpec> unet_schema(const UnetConfig& c)
@@ -349,7 +366,7 @@ std::vector<TensorSpec> unet_schema(const UnetConfig& c)
         add_up_block(s, c, i);
     s.norm("conv_norm_out", first);
     s.conv("conv_out", c.out_channels, first, 3);
-    return std::move(s.specs);
+    return c.q8_0 ? with_scales(std::move(s.specs)) : std::move(s.specs);
 }
 
 } // namespace semrover

@@ -31,6 +31,7 @@ struct UnetConfig {
     bool use_linear_projection = false;
     bool flip_sin_to_cos = true;
     float freq_shift = 0;
+    bool q8_0 = false;                 // weights of its blocks are (weight_blocks.h)
     uint32_t num_class_embeds = 0;     // rows of class_embedding; 0: none
     bool video = false;                // UNetSpatioTemporalConditionModel
     uint32_t added_embed_dim = 0;      // of a video: of each number that comes with it, such as frames a second

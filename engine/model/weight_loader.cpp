@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/model/weight_loader.h"
 
+#include "engine/model/weight_blocks.h"
 #include "runtime/base/quote.h"
 
 #include <algorithm>
@@ -41,6 +42,8 @@ struct Opened {
     TensorValues values;
     std::vector<float> scratch; // that `values` may lie in
     float share = 1;
+    WeightPart blocks;   // of a weight in blocks: where the part's blocks go, one by one
+    TensorValues scales; // of such a file
 
     uint32_t elements() const { return part->cols_of_row * part->taps; } // of a row
     std::span<const std::byte> row(uint32_t r, uint32_t count = 1) const
@@ -48,7 +51,8 @@ struct Opened {
         const size_t bytes = elements() * dtype_bytes(values.dtype);
         return values.bytes.subspan(r * bytes, count * bytes);
     }
-    bool converts(DType to) const { return values.dtype != to || part->gain != 1 || share != 1; }
+    bool scaled() const { return part->gain != 1 || share != 1; }
+    bool converts(DType to) const { return values.dtype != to || scaled(); }
     // are its rows those of the weight, byte for byte?
     bool lies_as(const Slot& weight) const
     {
@@ -56,6 +60,35 @@ struct Opened {
                part->cols[0].count == weight.ld();
     }
 };
+
+// ranges that follow each other on both sides as one
+IndexRanges joined(const IndexRanges& runs)
+{
+    IndexRanges all;
+    for (const IndexRange& run : runs)
+        if (!all.empty() && all.back().from + all.back().count == run.from &&
+            all.back().to + all.back().count == run.to)
+            all.back().count += run.count;
+        else
+            all.push_back(run);
+    return all;
+}
+
+// a part whose columns are blocks
+WeightPart in_blocks(WeightPart p)
+{
+    constexpr uint32_t kBlock = block_of(DType::q8_0).elements;
+    const auto whole = [&](uint32_t n) {
+        SR_ASSERT(n % kBlock == 0, "'{}' does not lie in whole blocks", p.spec.name);
+        return n / kBlock;
+    };
+    p.cols_of_row = whole(p.cols_of_row);
+    p.tap_width = whole(p.tap_width);
+    p.cols = joined(p.cols);
+    for (IndexRange& run : p.cols)
+        run = {whole(run.from), whole(run.to), whole(run.count)};
+    return p;
+}
 
 // elements of a row, [cols, taps], to where they go
 template <typename Word>
@@ -88,7 +121,7 @@ class Packer {
         const std::vector<Piece> pieces = pieces_of(w);
         SR_ASSERT(!pieces.empty() && pieces.back().to < w.weight.rows(), "rows beyond those of '{}'", w.weight.name());
         const Slot& weight = w.weight;
-        const uint64_t row_bytes = weight.ld() * dtype_bytes(weight.dtype());
+        const uint64_t row_bytes = row_bytes_of(weight.dtype(), weight.ld());
         const uint32_t at_once = uint32_t(std::max<uint64_t>(device_.most_room() / row_bytes, 1));
         auto next = pieces.begin();
         for (uint32_t first = 0; first < weight.rows(); first += at_once) {
@@ -116,6 +149,8 @@ class Packer {
             } else {
                 SR_TRY(o.values, source_(o.part->spec, o.scratch));
             }
+            if (w.weight.dtype() == DType::q8_0)
+                SR_CHECK(open_blocks(o));
             if (!o.part->share)
                 continue;
             std::vector<float> scratch;
@@ -128,9 +163,19 @@ class Packer {
         return {};
     }
 
+    Status open_blocks(Opened& o) const
+    {
+        o.blocks = in_blocks(*o.part);
+        std::vector<float> none; // numbers that are computed have no scales
+        if (o.values.dtype == DType::i8) {
+            SR_TRY(o.scales, source_(scales_of(o.part->spec), none));
+        }
+        return {};
+    }
+
     Status pack_rows(const Slot& weight, std::span<const Piece> pieces, uint32_t first, std::span<std::byte> room)
     {
-        const uint64_t row_bytes = weight.ld() * dtype_bytes(weight.dtype());
+        const uint64_t row_bytes = row_bytes_of(weight.dtype(), weight.ld());
         uint32_t done = first; // rows that are packed or empty
         for (size_t i = 0; i < pieces.size();) {
             const Opened& o = opened_[pieces[i].part];
@@ -145,7 +190,8 @@ class Packer {
                 std::memcpy(to, from.data(), from.size());
             } else {
                 clear(room, (done - first) * row_bytes, (pieces[i].to + 1 - first) * row_bytes);
-                SR_CHECK(pack_row(weight, o, pieces[i], to));
+                SR_CHECK(weight.dtype() == DType::q8_0 ? pack_blocks(weight, o, pieces[i], to)
+                                                       : pack_row(weight, o, pieces[i], to));
             }
             done = pieces[i].to + uint32_t(count);
             i += count;
@@ -165,22 +211,61 @@ class Packer {
             std::memset(room.data() + begin, 0, end - begin);
     }
 
+    // a part's numbers, in words_, as another type or multiplied; element: the number of the first one in the tensor
+    Status convert(const Opened& o, const TensorValues& values, std::span<const std::byte> row, uint64_t element,
+                   DType dtype)
+    {
+        read_numbers(o, values, row);
+        words_.resize(numbers_.size() * dtype_bytes(dtype));
+        from_float(numbers_, dtype, words_.data());
+        if (!first_non_finite(words_, dtype))
+            return {};
+        SR_CHECK(check(row, values, element));
+        return too_large(o, dtype);
+    }
+
+    void read_numbers(const Opened& o, const TensorValues& values, std::span<const std::byte> row)
+    {
+        numbers_.resize(row.size() / dtype_bytes(values.dtype));
+        to_float(row, values.dtype, numbers_.data());
+        for (float& v : numbers_)
+            v = o.part->gain * (v * o.share);
+    }
+
+    // int8 and, behind the row's last, the scales of its blocks
+    Status pack_blocks(const Slot& weight, const Opened& o, const Piece& piece, std::byte* to)
+    {
+        const uint64_t element = uint64_t(piece.from) * o.elements();
+        std::span<const std::byte> row = o.row(piece.from), scales;
+        if (o.values.dtype == DType::i8) {
+            const size_t bytes = o.elements() / block_of(DType::q8_0).elements * 2;
+            scales = o.scales.bytes.subspan(piece.from * bytes, bytes);
+            SR_CHECK(check(scales, o.scales, piece.from * bytes / 2));
+            if (o.scaled()) {
+                SR_CHECK(convert(o, o.scales, scales, piece.from * bytes / 2, DType::f16));
+                scales = words_;
+            }
+        } else {
+            SR_CHECK(check(row, o.values, element));
+            read_numbers(o, o.values, row);
+            to_blocks(numbers_, o.part->cols_of_row, o.part->taps, blocks_);
+            row = std::as_bytes(std::span(blocks_.values));
+            scales = std::as_bytes(std::span(blocks_.scales));
+            if (first_non_finite(scales, DType::f16))
+                return too_large(o, DType::q8_0);
+        }
+        scatter<uint8_t>(*o.part, row.data(), to);
+        scatter<uint16_t>(o.blocks, scales.data(), to + weight.ld());
+        return {};
+    }
+
     Status pack_row(const Slot& weight, const Opened& o, const Piece& piece, std::byte* to)
     {
         const DType dtype = weight.dtype();
         std::span<const std::byte> row = o.row(piece.from);
         const uint64_t element = uint64_t(piece.from) * o.elements();
         if (o.converts(dtype)) {
-            numbers_.resize(o.elements());
-            to_float(row, o.values.dtype, numbers_.data());
-            for (float& v : numbers_)
-                v = o.part->gain * (v * o.share);
-            words_.resize(numbers_.size() * dtype_bytes(dtype));
-            from_float(numbers_, dtype, words_.data());
-            if (first_non_finite(words_, dtype)) {
-                SR_CHECK(check(row, o.values, element));
-                return too_large(o, dtype);
-            }
+            SR_CHECK(convert(o, o.values, row, element, dtype));
             row = words_;
         } else {
             SR_CHECK(check(row, o.values, element));
@@ -215,6 +300,7 @@ class Packer {
     std::vector<Opened> opened_; // kept from weight to weight: new memory costs more than what is written to it
     std::vector<float> numbers_;
     std::vector<std::byte> words_;
+    WeightBlocks blocks_;
 };
 
 } // namespace
@@ -230,6 +316,8 @@ IndexRanges of_heads(uint32_t count, uint32_t heads, uint32_t to)
         return straight(count, to);
     IndexRanges runs;
     const uint32_t size = count / heads, padded = round_up(size, kRowPadding);
+    if (size == padded)
+        return straight(count, to);
     for (uint32_t h = 0; h < heads; ++h)
         runs.push_back({h * size, to + h * padded, size});
     return runs;

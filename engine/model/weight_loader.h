@@ -51,7 +51,7 @@ struct WeightLayout {
 
 struct TensorValues {
     std::span<const std::byte> bytes; // all of the tensor
-    DType dtype = DType::f32;         // f32, f16 or bf16
+    DType dtype = DType::f32;         // f32, f16 or bf16; of a weight in blocks also i8, with scales (weight_blocks.h)
     Path file = {};                   // for errors: where they are, if in a file,
     std::string name = {};            // under which name
 };
@@ -59,7 +59,8 @@ struct TensorValues {
 using TensorSource = std::function<Result<TensorValues>(const TensorSpec& spec, std::vector<float>& scratch)>;
 
 // Packs and uploads weights whose memory is allocated. Host memory: a window of some MiB, and what the source computes.
-// Equal types and rows as they lie are one copy; everything else is one pass over a row at a time. Errors: bad_input
+// Equal types and rows as they lie are one copy; everything else is one pass over a row at a time. Weights of type q8_0
+// take their blocks from the file, whose scales a gain multiplies, or make them of numbers. Errors: bad_input
 // where a number is none, or is one that the weight's type cannot hold; those of the source, the device and `progress`
 Status load_weights(Device& device, std::span<const WeightLayout> weights, const TensorSource& source,
                     const LoadProgress& progress = {});

@@ -44,7 +44,7 @@ struct Unet::Impl {
     Slot frequencies, added_frequencies;
     std::map<uint32_t, Slot> frame_frequencies; // by the channels of a transformer
 
-    Impl(const UnetConfig& c, DType precision) : config(c), weights(precision)
+    Impl(const UnetConfig& c, DType precision) : config(c), weights(precision, c.q8_0)
     {
         std::vector<NetworkWeights::Part> shifts, context_parts;
         declare_ends();

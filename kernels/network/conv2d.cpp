@@ -134,8 +134,7 @@ FeatureMap conv2d(Graph& g, FeatureMap x, FeatureMap x2, Tensor w, Tensor bias, 
         push.x2_cols = round_up(x2.channels(), kRowPadding);
     }
     const uint32_t depth = taps.height * taps.width * (push.x_cols + push.x2_cols);
-    SR_ASSERT(w.cols == depth && w.dtype == x.data.dtype, "conv2d: w [{}, {}] {} for {} columns {}", w.rows, w.cols,
-              dtype_name(w.dtype), depth, dtype_name(x.data.dtype));
+    SR_ASSERT(w.cols == depth, "conv2d: w [{}, {}] for {} columns", w.rows, w.cols, depth);
     SR_ASSERT(!bias.valid() || (bias.cols == w.rows && bias.dtype == DType::f32), "conv2d: bias [{}, {}] for {}",
               bias.rows, bias.cols, w.rows);
     DispatchOptions dispatch;

@@ -12,7 +12,7 @@ namespace semrover {
 const char* dtype_name(DType t)
 {
     static constexpr const char* kNames[] = {"F32", "F16", "BF16", "I64",  "I32", "U32", "I16",
-                                             "U16", "I8",  "U8",   "BOOL", "F64", "U64"};
+                                             "U16", "I8",  "U8",   "BOOL", "F64", "U64", "Q8_0"};
     return kNames[static_cast<int>(t)];
 }
 

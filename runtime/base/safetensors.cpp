@@ -110,7 +110,11 @@ Status SafetensorsSet::require(std::span<const TensorSpec> schema, Unexpected un
             misshapen.add(fmt::format("{} expected {} found {}", printable(spec.name), shape_text(spec.shape),
                                       shape_text(tensor->shape)));
         } else if (std::ranges::find(spec.dtypes, tensor->dtype) == spec.dtypes.end()) {
-            mistyped.add(fmt::format("{} ({})", printable(spec.name), dtype_name(tensor->dtype)));
+            const std::string found = dtype_name(tensor->dtype);
+            mistyped.add(printable(spec.name) +
+                         (spec.dtypes.size() == 1
+                              ? fmt::format(" expected {} found {}", dtype_name(spec.dtypes[0]), found)
+                              : fmt::format(" ({})", found)));
         }
     }
     std::ranges::sort(known);

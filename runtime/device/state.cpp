@@ -116,6 +116,8 @@ Slot State::slot(uint32_t rows, uint32_t cols, DType dtype, std::string_view nam
     SR_ASSERT(memory_->blocks.empty(), "'{}' is declared after the state was allocated", name);
     SR_ASSERT(rows > 0 && cols > 0 && (!ld || ld >= cols), "slot '{}' is [{}, {}] with rows {} apart", name, rows, cols,
               ld);
+    SR_ASSERT(cols % block_of(dtype).elements == 0, "slot '{}' has {} columns, not whole blocks of {}", name, cols,
+              dtype_name(dtype));
     const Tensor shape{Tensor::kNone, dtype, rows, cols, ld ? ld : round_up(cols, kRowPadding), 0};
     memory_->items.push_back({std::string(name), shape.bytes()});
     return {memory_.get(), uint32_t(memory_->items.size() - 1), shape};

@@ -22,7 +22,7 @@ struct BindingInfo {
 };
 
 struct ConstantInfo {
-    std::string_view name; // kHalfX, ...
+    std::string_view name; // kTypeX, ...
     uint32_t id;
     uint32_t value; // default, as 32 bits
 };

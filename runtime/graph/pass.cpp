@@ -60,8 +60,8 @@ void Pass::bind()
     bindings.clear();
     for (size_t b = 0; b < declared.size(); ++b) {
         const Tensor& t = tensors[b];
-        if (t.valid())
-            set_constant(shader_interface::half_constant(declared[b].name), t.dtype == DType::f16);
+        if (const auto type = shader_interface::type_number(t.dtype); t.valid() && type)
+            set_constant(shader_interface::type_constant(declared[b].name), *type);
         bindings.push_back({t.resource, t.offset, t.bytes(), declared[b].access, declared[b].kind, declared[b].name});
     }
 }

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // stage 1: misuse of the graph, reported with the pass and the tensor before anything else is decided
 #include "runtime/graph/plan.h"
+#include "runtime/graph/variant.h"
 
 namespace semrover::stage {
 
@@ -46,6 +47,9 @@ Status check(Plan& plan)
             if (t.offset + t.bytes() > r.bytes)
                 return fail(ErrorCode::internal, "pass {} ({}): binding {} reaches byte {} of '{}', which has {}", i,
                             pass.kernel->name, declared[b].name, t.offset + t.bytes(), r.name, r.bytes);
+            if (!takes(*pass.kernel, *pass.variant, b, t.dtype))
+                return fail(ErrorCode::internal, "pass {} ({}): binding {} does not take {}, the type of '{}'", i,
+                            pass.kernel->name, declared[b].name, dtype_name(t.dtype), r.name);
             const bool reads = uint8_t(declared[b].access) & uint8_t(Access::read);
             if (reads && !r.external && !written[t.resource].covers(t.offset, t.offset + t.bytes()))
                 return fail(ErrorCode::internal, "pass {} ({}): binding {} reads '{}', which nothing has written", i,

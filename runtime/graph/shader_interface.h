@@ -2,6 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "runtime/base/dtype.h"
+
+#include <iterator>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -14,8 +18,9 @@
 // |-------------|--------------|-------------------------------------------------------------------------------------|
 // | binding     | X            | input of an op that its producer may do in its epilogue                             |
 // | binding     | Y            | what a pass makes; an epilogue that it takes over writes here                       |
-// | constant    | kHalf<B>     | the tensor bound to B is fp16; a variant for cooperative matrices without it takes  |
-// |             |              | nothing else there                                                                  |
+// | constant    | kType<B>     | type of the elements of the tensor bound to B, a uint of lib/pack.glsl; its default |
+// |             |              | is the last type that the shader takes. A variant without it, where another has it, |
+// |             |              | takes fp16                                                                          |
 // | push member | rows         | rows of the output in this pass; a pass that may be cut into bands has it           |
 // | push member | first_row    | which row of the whole output comes first                                           |
 // | push member | <b>_first    | which row of B comes first, where a band reads rows around it                       |
@@ -24,14 +29,24 @@
 namespace semrover::shader_interface {
 
 inline constexpr std::string_view kInput = "X", kOutput = "Y";
-inline constexpr std::string_view kHalfPrefix = "kHalf";
+inline constexpr std::string_view kTypePrefix = "kType";
 inline constexpr std::string_view kRows = "rows", kFirstRow = "first_row";
 inline constexpr std::string_view kFirstSuffix = "_first";
 
-// "kHalfX" of X
-inline std::string half_constant(std::string_view binding)
+// "kTypeX" of X
+inline std::string type_constant(std::string_view binding)
 {
-    return std::string(kHalfPrefix).append(binding);
+    return std::string(kTypePrefix).append(binding);
+}
+
+// what kType<B> is of a tensor's type; none: no shader takes it where it has a choice
+inline std::optional<uint32_t> type_number(DType t)
+{
+    static constexpr DType kTypes[] = {DType::f32, DType::f16, DType::q8_0};
+    for (uint32_t i = 0; i < std::size(kTypes); ++i)
+        if (kTypes[i] == t)
+            return i;
+    return std::nullopt;
 }
 
 // "x_" of X: what push members that belong to a binding begin with

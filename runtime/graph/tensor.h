@@ -38,12 +38,12 @@ struct Tensor {
     uint64_t offset = 0; // bytes from the start of the resource
 
     bool valid() const { return resource != kNone; }
-    uint64_t row_bytes() const { return uint64_t(ld) * dtype_bytes(dtype); }
+    uint64_t row_bytes() const { return row_bytes_of(dtype, ld); }
     // from the first element to the end of the last row, its padding included
     uint64_t bytes() const
     {
         const uint32_t padded = round_up(cols, kRowPadding), last = padded < ld ? padded : ld;
-        return rows ? (rows - 1) * row_bytes() + uint64_t(last) * dtype_bytes(dtype) : 0;
+        return rows ? (rows - 1) * row_bytes() + row_bytes_of(dtype, last) : 0;
     }
 
     // rows [first, first + count) of this tensor
@@ -54,7 +54,7 @@ struct Tensor {
         t.offset += first * row_bytes();
         return t;
     }
-    // columns [first, first + count); where they start must be aligned for the device
+    // columns [first, first + count), not of blocks; where they start must be aligned for the device
     Tensor col_range(uint32_t first, uint32_t count) const
     {
         Tensor t = *this;

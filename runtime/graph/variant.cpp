@@ -20,17 +20,14 @@ bool runs_on(const KernelVariant& v, const DeviceLimits& limits, std::span<const
            uint64_t(buffers) <= limits.max_storage_buffers;
 }
 
-// a variant without kHalf<B>, which another one has, takes fp16 there
-bool takes(const Kernel& kernel, const KernelVariant& v, std::span<const Tensor> tensors)
+// those for cooperative matrices are passed over for their types, as there are others; others say what they do not take
+bool suits(const Kernel& kernel, const KernelVariant& v, std::span<const Tensor> tensors)
 {
     if (!(v.needs & kNeedsCooperativeMatrix))
         return true;
-    for (size_t b = 0; b < std::min(tensors.size(), v.bindings.size()); ++b) {
-        const std::string name = shader_interface::half_constant(v.bindings[b].name);
-        const bool either = std::ranges::any_of(kernel.variants, [&](const auto& o) { return o.constant(name); });
-        if (tensors[b].valid() && either && !v.constant(name) && tensors[b].dtype != DType::f16)
+    for (size_t b = 0; b < std::min(tensors.size(), v.bindings.size()); ++b)
+        if (tensors[b].valid() && !takes(kernel, v, b, tensors[b].dtype))
             return false;
-    }
     return true;
 }
 
@@ -59,13 +56,24 @@ uint32_t shared_bytes(const KernelVariant& variant, std::span<const ConstantValu
     return variant.shared_bytes(values.data());
 }
 
+bool takes(const Kernel& kernel, const KernelVariant& variant, size_t binding, DType type)
+{
+    const std::string name = shader_interface::type_constant(variant.bindings[binding].name);
+    const std::optional<uint32_t> number = shader_interface::type_number(type);
+    if (const ConstantInfo* last = variant.constant(name))
+        return number && *number <= last->value;
+    if (std::ranges::any_of(kernel.variants, [&](const KernelVariant& v) { return v.constant(name); }))
+        return type == DType::f16;
+    return type == DType::f32 || type == DType::u32 || type == DType::i32;
+}
+
 const KernelVariant* choose_variant(const Kernel& kernel, const DeviceLimits& limits,
                                     std::span<const ConstantValue> constants, std::span<const Tensor> tensors,
                                     uint32_t excluded)
 {
     const KernelVariant* best = nullptr;
     for (const KernelVariant& v : kernel.variants)
-        if (!(v.needs & excluded) && runs_on(v, limits, constants) && takes(kernel, v, tensors) &&
+        if (!(v.needs & excluded) && runs_on(v, limits, constants) && suits(kernel, v, tensors) &&
             (!best || preference(v.name, limits) < preference(best->name, limits)))
             best = &v;
     return best;

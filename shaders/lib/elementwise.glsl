@@ -6,8 +6,8 @@
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
-layout(constant_id = 0) const bool kHalfX = false;
-layout(constant_id = 1) const bool kHalfY = false;
+layout(constant_id = 0) const uint kTypeX = kF16;
+layout(constant_id = 1) const uint kTypeY = kF16;
 layout(push_constant) uniform ElementwisePush {
     uint rows;
     uint x_ld; // elements, a multiple of 8
@@ -25,8 +25,8 @@ void main()
     if (row >= p.rows)
         return;
     vec4 lo, hi;
-    LOAD8(x, kHalfX, row * p.x_ld + col, lo, hi);
+    LOAD8(x, kTypeX, row * p.x_ld + col, lo, hi);
     lo = FUNCTION(lo);
     hi = FUNCTION(hi);
-    STORE8(y, kHalfY, row * p.y_ld + p.y_col + col, lo, hi);
+    STORE8(y, kTypeY, row * p.y_ld + p.y_col + col, lo, hi);
 }

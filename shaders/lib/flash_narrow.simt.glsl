@@ -18,7 +18,7 @@ void stage_narrow(uint first, uint head)
         const uint row = gl_WorkGroupID.z * p.key_rows + min(first + key, p.keys - 1);
         const uint column = (of_values != 0 ? p.v_col : p.k_col) + head;
         vec4 lo, hi;
-        LOAD8(kv, kHalfKv, row * p.kv_ld + column + c * 8, lo, hi);
+        LOAD8(kv, kTypeKv, row * p.kv_ld + column + c * 8, lo, hi);
         const uint at = of_values * 2 * kNarrowSlab + key * kNarrowPitch + c;
         slabs[at] = lo;
         slabs[at + kNarrowSlab] = hi;
@@ -35,7 +35,7 @@ void narrow_scores(uint first, uint q_at[kOwn], uint part, out float s[kOwn][kOw
     [[dont_unroll]] for (uint c = 0; c < kChunks; ++c) {
         vec4 lo[kOwn], hi[kOwn];
         [[unroll]] for (uint n = 0; n < kOwn; ++n)
-            LOAD8(q, kHalfQ, q_at[n] + c * 8, lo[n], hi[n]);
+            LOAD8(q, kTypeQ, q_at[n] + c * 8, lo[n], hi[n]);
         [[unroll]] for (uint j = 0; j < kOwnKeys; ++j) {
             const uint at = (part + j * kParts) * kNarrowPitch + c;
             [[unroll]] for (uint n = 0; n < kOwn; ++n)
@@ -123,7 +123,7 @@ void attend_narrow(uint first_query)
                 lo += slabs[own * kJoinPitch + i];
                 hi += slabs[(kQueries + own) * kJoinPitch + i];
             }
-            STORE8(y, kHalfY, (image * p.query_rows + row) * p.y_ld + head + c * 8, lo, hi);
+            STORE8(y, kTypeY, (image * p.query_rows + row) * p.y_ld + head + c * 8, lo, hi);
         }
     }
 }

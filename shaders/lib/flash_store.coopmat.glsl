@@ -33,7 +33,7 @@ void store(uint first_query, uint y_at)
                     continue;
                 const vec4 lo = uintBitsToFloat(weights[at]) * inverse[r];
                 const vec4 hi = uintBitsToFloat(weights[at + 1]) * inverse[r];
-                STORE8(y, kHalfY, y_at + row * p.y_ld + c * 8, lo, hi);
+                STORE8(y, kTypeY, y_at + row * p.y_ld + c * 8, lo, hi);
             }
         }
     }

@@ -18,8 +18,8 @@ layout(constant_id = 15) const bool kGeglu = false;
 layout(constant_id = 16) const bool kGatedAdd = false;
 layout(constant_id = 17) const bool kAdd = false;
 layout(constant_id = 18) const bool kMoments = false;
-layout(constant_id = 20) const bool kHalfY = false;
-layout(constant_id = 21) const bool kHalfResidual = false;
+layout(constant_id = 20) const uint kTypeY = kF16;
+layout(constant_id = 21) const uint kTypeResidual = kF16;
 
 layout(binding = 2) readonly buffer Bias { vec4 bias[]; };          // [groups, cols]
 layout(binding = 3) readonly buffer Residual { uvec4 residual[]; }; // [groups * rows, cols]
@@ -57,7 +57,7 @@ void finish8(uint row, uint col, uint cols, inout vec4 lo, inout vec4 hi)
     row += epilogue_group * p.rows;
     if (kGatedAdd || kAdd) {
         vec4 r_lo, r_hi;
-        LOAD8(residual, kHalfResidual, row * p.residual_ld + col, r_lo, r_hi);
+        LOAD8(residual, kTypeResidual, row * p.residual_ld + col, r_lo, r_hi);
         if (kGatedAdd)
             scale_by_gate(row, col, lo, hi);
         lo += r_lo;
@@ -65,8 +65,8 @@ void finish8(uint row, uint col, uint cols, inout vec4 lo, inout vec4 hi)
     }
     if (col + 8 > cols)
         clear_padding(col, cols, lo, hi);
-    STORE8(y, kHalfY, row * p.y_ld + p.y_col + col, lo, hi);
-    if (kMoments && kHalfY)
+    STORE8(y, kTypeY, row * p.y_ld + p.y_col + col, lo, hi);
+    if (kMoments && kTypeY == kF16)
         unpack8(pack8(lo, hi), lo, hi); // statistics are of what is stored: the mean of a single pixel is that pixel
 }
 

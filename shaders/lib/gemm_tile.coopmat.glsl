@@ -115,7 +115,7 @@ void finish_slab_row(uint slab_at, uint item, uint first_row, uint first_col)
     if (row >= p.rows || col >= p.cols || (kGeglu && eight % 2 != 0))
         return;
     if (kSlices > 1) { // beside each other in a row: split_k_reduce adds them
-        STORE8(y, false, row * p.y_ld + gl_WorkGroupID.z * (p.y_ld / kSlices) + col, lo, hi);
+        STORE8(y, kF32, row * p.y_ld + gl_WorkGroupID.z * (p.y_ld / kSlices) + col, lo, hi);
         return;
     }
     activate8(row, col, lo, hi);

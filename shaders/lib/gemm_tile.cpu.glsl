@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 
-// the 16 x 16 outputs of a lane, their products over eight (or four) columns of K, and what becomes of them
+// the 16 x 16 outputs of a lane, their products over eight columns of K, and what becomes of them
 const uint kRows = 16;
 const uint kCols = 16;
 
@@ -14,12 +14,12 @@ void clear_tile()
             acc[i][j] = 0.0;
 }
 
-// a: 16 rows of x; the texels of w lie at w_at[column] + k
-void multiply_half(vec4 a_lo[kRows], vec4 a_hi[kRows], uint w_at[kCols], uint k)
+// eight columns of 16 rows of x, and of the rows of w that begin at these texels, from k on
+void multiply(vec4 a_lo[kRows], vec4 a_hi[kRows], uint w_at[kCols], uint k)
 {
     [[unroll]] for (uint j = 0; j < kCols; ++j) {
         vec4 lo, hi;
-        unpack8(texelFetch(W, int(w_at[j] + k)), lo, hi);
+        load_weight8(w_at[j], k, lo, hi);
         [[unroll]] for (uint i = 0; i < kRows; ++i) {
             float s = acc[i][j];
             s += a_lo[i].x * lo.x;
@@ -30,21 +30,6 @@ void multiply_half(vec4 a_lo[kRows], vec4 a_hi[kRows], uint w_at[kCols], uint k)
             s += a_hi[i].y * hi.y;
             s += a_hi[i].z * hi.z;
             s += a_hi[i].w * hi.w;
-            acc[i][j] = s;
-        }
-    }
-}
-
-void multiply_float(vec4 a[kRows], uint w_at[kCols], uint k)
-{
-    [[unroll]] for (uint j = 0; j < kCols; ++j) {
-        const vec4 b = uintBitsToFloat(texelFetch(W, int(w_at[j] + k)));
-        [[unroll]] for (uint i = 0; i < kRows; ++i) {
-            float s = acc[i][j];
-            s += a[i].x * b.x;
-            s += a[i].y * b.y;
-            s += a[i].z * b.z;
-            s += a[i].w * b.w;
             acc[i][j] = s;
         }
     }

@@ -2,15 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // mean and 1 / sqrt(var + eps) of a row of X, one row a lane; the mean is taken out before squaring
-void load_x(uint at, out vec4 lo, out vec4 hi)
-{
-    if (kHalfX) {
-        unpack8(texelFetch(X, int(at / 8)), lo, hi);
-    } else {
-        lo = uintBitsToFloat(texelFetch(X, int(at / 4)));
-        hi = uintBitsToFloat(texelFetch(X, int(at / 4 + 1)));
-    }
-}
+void load_x(uint at, out vec4 lo, out vec4 hi) { FETCH8(X, kTypeX, at, lo, hi) }
 
 float sum4(vec4 v) { return (v.x + v.y) + (v.z + v.w); }
 

@@ -4,7 +4,7 @@
 // mean and 1 / sqrt(var + eps) of a row of X: 16 threads a row, four rows a workgroup. The first kKept sweeps of a row
 // are read once and stay in registers; the mean is taken out before squaring.
 // note: kKept <= divide_up(cols, kSweep), so of the sweeps that are kept only the last one may go beyond a row
-const uint kRowThreads = 16, kSweep = kRowThreads * 8, kKeptWords = kHalfX ? 1 : 2;
+const uint kRowThreads = 16, kSweep = kRowThreads * 8, kKeptWords = kTypeX == kF16 ? 1 : 2;
 
 uvec4 kept[kKept * kKeptWords];
 shared float partial[2][64];
@@ -18,7 +18,7 @@ bool in_row(uint sweep) { return sweep + 1 < kKept || sweep_col(sweep) < p.cols;
 
 void load_kept(uint sweep, out vec4 lo, out vec4 hi)
 {
-    LOAD8(kept, kHalfX, sweep * kKeptWords * (kHalfX ? 8 : 4), lo, hi);
+    LOAD8(kept, kTypeX, sweep * kKeptWords * (kTypeX == kF16 ? 8 : 4), lo, hi);
 }
 
 // every thread of a row adds the same numbers in the same order
@@ -59,7 +59,7 @@ void row_statistics(uint first, out float mean, out float inverse)
 {
     vec4 lo, hi;
     [[unroll]] for (uint i = 0; i < kKept; ++i) {
-        const uint at = (first + sweep_col(i)) / (kHalfX ? 8 : 4);
+        const uint at = (first + sweep_col(i)) / (kTypeX == kF16 ? 8 : 4);
         [[unroll]] for (uint w = 0; w < kKeptWords; ++w) {
             kept[i * kKeptWords + w] = uvec4(0);
             if (in_row(i))
@@ -72,7 +72,7 @@ void row_statistics(uint first, out float mean, out float inverse)
         sum += sum8(lo, hi);
     }
     for (uint i = kKept; in_row(i); ++i) {
-        LOAD8(x, kHalfX, first + sweep_col(i), lo, hi);
+        LOAD8(x, kTypeX, first + sweep_col(i), lo, hi);
         sum += sum8(lo, hi);
     }
     mean = reduce(0, sum) / float(p.cols);
@@ -82,7 +82,7 @@ void row_statistics(uint first, out float mean, out float inverse)
         sum += squares(i, lo, hi, mean);
     }
     for (uint i = kKept; in_row(i); ++i) {
-        LOAD8(x, kHalfX, first + sweep_col(i), lo, hi);
+        LOAD8(x, kTypeX, first + sweep_col(i), lo, hi);
         sum += squares(i, lo, hi, mean);
     }
     inverse = inversesqrt(reduce(1, sum) / float(p.cols) + p.eps);

@@ -4,6 +4,7 @@
 // Winograd's F(4, 3), a correlation of six samples with three taps from six products: y = A^T ((G g) * (B^T d)), twice
 // for two dimensions. Points 0, +-sqrt(1/2), +-sqrt(2) and infinity (Toom-Cook): over 320 channels in fp32 the error
 // is 1.8e-7 of the result's size, half of that of the usual 0, +-1, +-2; operands stored in fp16 would make it 1.2e-3.
+#include "lib/pack.glsl"
 const uint kOutputs = 4;             // of a tile, per dimension
 const uint kSamples = 6;             // that they see
 const float kA = 0.7071067811865476; // sqrt(1/2)
@@ -46,9 +47,9 @@ const float kB = 1.4142135623730951; // sqrt(2)
     }
 
 // four elements of row-major words behind a texel buffer, at an element index that is a multiple of 4
-#define FETCH4(words, is_half, at)                                                                                     \
-    (is_half ? half4(texelFetch(words, int((at) / 8)), (at) % 8 != 0)                                                  \
-             : uintBitsToFloat(texelFetch(words, int((at) / 4))))
+#define FETCH4(words, type, at)                                                                                        \
+    (type == kF16 ? half4(texelFetch(words, int((at) / 8)), (at) % 8 != 0)                                                  \
+                  : uintBitsToFloat(texelFetch(words, int((at) / 4))))
 vec4 half4(uvec4 w, bool upper)
 {
     const uvec2 v = upper ? w.zw : w.xy;

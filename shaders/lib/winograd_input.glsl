@@ -9,7 +9,7 @@
 #include "lib/winograd.glsl"
 
 layout(local_size_x = 64) in;
-layout(constant_id = 0) const bool kHalfX = false;
+layout(constant_id = 0) const uint kTypeX = kF16;
 layout(push_constant) uniform WinogradInputPush {
     uint first_tile; // of the band
     uint tiles;      // of the band
@@ -49,7 +49,7 @@ void main()
                     const uint x = uint(left + int(j)), pixel = image + (y >> p.shift) * p.width + (x >> p.shift);
                     const bool inside = x < p.seen_width;
                     const uint from = inside ? pixel * p.x_ld + col : 0;
-                    const vec4 value = FETCH4(X, kHalfX, from);
+                    const vec4 value = FETCH4(X, kTypeX, from);
                     const CHANNELS own = PART(value, part);
                     d[i][j] = inside ? own : d[i][j];
                 }

@@ -16,7 +16,7 @@
 #include "lib/pack.glsl"
 
 layout(local_size_x = 128, local_size_x_id = 33) in; // kThreads
-layout(constant_id = 1) const bool kHalfY = false;
+layout(constant_id = 1) const uint kTypeY = kF16;
 layout(constant_id = 2) const uint kChunks = 8; // head_dim / 8
 layout(push_constant) uniform Push { AttentionPush p; };
 layout(binding = 0) readonly buffer Qkv { uvec4 qkv[]; };     // [2 * rows, 3 * heads * head_dim], fp16
@@ -85,7 +85,7 @@ void store(uint stream, uint head)
             const vec4 their_lo = uintBitsToFloat(scores[other_at + at]);
             const vec4 their_hi = uintBitsToFloat(scores[other_at + at + 1]);
             const vec4 lo = (our_lo * a + their_lo * b) * inverse, hi = (our_hi * a + their_hi * b) * inverse;
-            STORE8(y, kHalfY, (stream * p.rows + query_row(own)) * p.y_ld + head + c * 8, lo, hi);
+            STORE8(y, kTypeY, (stream * p.rows + query_row(own)) * p.y_ld + head + c * 8, lo, hi);
         }
     }
 }

@@ -10,8 +10,8 @@
 #include "lib/pack.glsl"
 
 layout(local_size_x = 8) in;
-layout(constant_id = 0) const bool kHalfQkv = false;
-layout(constant_id = 1) const bool kHalfY = false;
+layout(constant_id = 0) const uint kTypeQkv = kF16;
+layout(constant_id = 1) const uint kTypeY = kF16;
 layout(constant_id = 2) const uint kChunks = 8; // head_dim / 8
 layout(push_constant) uniform Push { AttentionPush p; };
 layout(binding = 0) uniform usamplerBuffer Qkv;              // [2 * rows, 3 * heads * head_dim]: voxel, semantic stream
@@ -22,15 +22,7 @@ layout(binding = 3) writeonly buffer Y { uvec4 y[]; };       // [streams * rows,
 const uint kQueries = 4;
 const uint kKeys = 8;
 
-void load(uint at, out vec4 lo, out vec4 hi)
-{
-    if (kHalfQkv) {
-        unpack8(texelFetch(Qkv, int(at / 8)), lo, hi);
-    } else {
-        lo = uintBitsToFloat(texelFetch(Qkv, int(at / 4)));
-        hi = uintBitsToFloat(texelFetch(Qkv, int(at / 4 + 1)));
-    }
-}
+void load(uint at, out vec4 lo, out vec4 hi) { FETCH8(Qkv, kTypeQkv, at, lo, hi) }
 
 float s[kQueries][kKeys];
 float largest[kQueries], total[kQueries];
@@ -120,6 +112,6 @@ void main()
             continue;
         const uint to = (stream * p.rows + local[q]) * p.y_ld + head * p.head_dim;
         [[unroll]] for (uint c = 0; c < kChunks; ++c)
-            STORE8(y, kHalfY, to + c * 8, (o_lo[q][c] / total[q]), (o_hi[q][c] / total[q]));
+            STORE8(y, kTypeY, to + c * 8, (o_lo[q][c] / total[q]), (o_hi[q][c] / total[q]));
     }
 }

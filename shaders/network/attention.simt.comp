@@ -10,8 +10,8 @@
 #include "lib/pack.glsl"
 
 layout(local_size_x = 64) in;
-layout(constant_id = 0) const bool kHalfQkv = false;
-layout(constant_id = 1) const bool kHalfY = false;
+layout(constant_id = 0) const uint kTypeQkv = kF16;
+layout(constant_id = 1) const uint kTypeY = kF16;
 layout(constant_id = 2) const uint kChunks = 8; // head_dim / 8
 layout(push_constant) uniform Push { AttentionPush p; };
 layout(binding = 0) readonly buffer Qkv { uvec4 qkv[]; };     // [2 * rows, 3 * heads * head_dim]: voxel, semantic stream
@@ -33,7 +33,7 @@ void stage(uint side, uint set_first, uint first, uint set_rows, uint column)
     for (uint i = gl_LocalInvocationID.x; i < kKeys * kChunks; i += 64) {
         const uint key = min(first + i / kChunks, set_rows - 1);
         vec4 lo, hi;
-        LOAD8(qkv, kHalfQkv, (side * p.rows + set_first + key) * p.qkv_ld + column + i % kChunks * 8, lo, hi);
+        LOAD8(qkv, kTypeQkv, (side * p.rows + set_first + key) * p.qkv_ld + column + i % kChunks * 8, lo, hi);
         const uint at = i / kChunks * kPitch + i % kChunks * 2;
         block[at] = lo;
         block[at + 1] = hi;
@@ -62,7 +62,7 @@ void main()
                 s[j] = 0.0;
             for (uint c = 0; c < kChunks; ++c) {
                 vec4 lo, hi;
-                LOAD8(qkv, kHalfQkv, q_at + c * 8, lo, hi);
+                LOAD8(qkv, kTypeQkv, q_at + c * 8, lo, hi);
                 [[unroll]] for (uint j = 0; j < kKeys / 2; ++j) {
                     const uint at = (2 * j + part) * kPitch + 2 * c;
                     s[j] += dot(lo, block[at]) + dot(hi, block[at + 1]);
@@ -102,5 +102,5 @@ void main()
     const uint to = (stream * p.rows + row) * p.y_ld + head * p.head_dim;
     [[unroll]] for (uint c = 0; c < kOwned; ++c)
         if (2 * c + part < kChunks)
-            STORE8(y, kHalfY, to + (2 * c + part) * 8, (o_lo[c] / total), (o_hi[c] / total));
+            STORE8(y, kTypeY, to + (2 * c + part) * 8, (o_lo[c] / total), (o_hi[c] / total));
 }

@@ -7,9 +7,9 @@
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
-layout(constant_id = 0) const bool kHalfX = false;
-layout(constant_id = 1) const bool kHalfZ = false;
-layout(constant_id = 2) const bool kHalfY = false;
+layout(constant_id = 0) const uint kTypeX = kF16;
+layout(constant_id = 1) const uint kTypeZ = kF16;
+layout(constant_id = 2) const uint kTypeY = kF16;
 layout(push_constant) uniform BlendPush {
     uint rows;
     uint cols;
@@ -29,10 +29,10 @@ void main()
     if (row >= p.rows)
         return;
     vec4 lo, hi, z_lo, z_hi;
-    LOAD8(x, kHalfX, row * p.x_ld + col, lo, hi);
-    LOAD8(z, kHalfZ, row * p.z_ld + col, z_lo, z_hi);
+    LOAD8(x, kTypeX, row * p.x_ld + col, lo, hi);
+    LOAD8(z, kTypeZ, row * p.z_ld + col, z_lo, z_hi);
     lo += share[0] * (z_lo - lo);
     hi += share[0] * (z_hi - hi);
     clear_padding(col, p.cols, lo, hi);
-    STORE8(y, kHalfY, row * p.y_ld + col, lo, hi);
+    STORE8(y, kTypeY, row * p.y_ld + col, lo, hi);
 }

@@ -9,7 +9,7 @@
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
-layout(constant_id = 0) const bool kHalfX = false;
+layout(constant_id = 0) const uint kTypeX = kF16;
 layout(push_constant) uniform ChannelMomentsPush {
     uint rows;
     uint cols;
@@ -34,7 +34,7 @@ void main()
         if ((row + p.first_row) % p.moments_image_rows >= p.moments_pixels)
             break;
         vec4 lo, hi;
-        LOAD8(x, kHalfX, row * p.x_ld + col, lo, hi);
+        LOAD8(x, kTypeX, row * p.x_ld + col, lo, hi);
         add_moments(m, lo, hi);
     }
     vec4 mean[2], m2[2];

@@ -7,8 +7,8 @@
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
-layout(constant_id = 0) const bool kHalfX = false;
-layout(constant_id = 1) const bool kHalfY = false;
+layout(constant_id = 0) const uint kTypeX = kF16;
+layout(constant_id = 1) const uint kTypeY = kF16;
 layout(push_constant) uniform ChannelShiftPush {
     uint rows;
     uint cols;
@@ -31,11 +31,11 @@ void main()
     if (row >= p.rows)
         return;
     vec4 lo, hi;
-    LOAD8(x, kHalfX, row * p.x_ld + col, lo, hi);
+    LOAD8(x, kTypeX, row * p.x_ld + col, lo, hi);
     const uint at = (shift_row[(row + p.first_row) / p.image_rows] * p.shift_ld + p.shift_col + col) / 4;
     lo += shift[at];
     hi += shift[at + 1];
     if (col + 8 > p.cols)
         clear_padding(col, p.cols, lo, hi);
-    STORE8(y, kHalfY, row * p.y_ld + col, lo, hi);
+    STORE8(y, kTypeY, row * p.y_ld + col, lo, hi);
 }

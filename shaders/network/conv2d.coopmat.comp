@@ -11,20 +11,24 @@
 #extension GL_KHR_memory_scope_semantics : require
 #extension GL_KHR_shader_subgroup_basic : require
 #include "conv2d.h"
+#include "lib/pack.glsl"
 
 layout(local_size_x = 128, local_size_x_id = 33) in; // kThreads
 layout(constant_id = 0) const uint kTileM = 128;
 layout(constant_id = 1) const uint kTileN = 128;
+layout(constant_id = 7) const uint kTypeW = kQ8_0;
 layout(constant_id = 3) const uint kKernelHeight = 3;
 layout(constant_id = 5) const uint kKernelWidth = 3;
 layout(constant_id = 4) const bool kTwoInputs = false;
 layout(push_constant) uniform Push { Conv2dPush p; };
 layout(binding = 0) readonly buffer X { uvec4 x[]; };   // [images * in_image_rows, x_cols], fp16
-layout(binding = 1) readonly buffer W { uvec4 w[]; };   // [cols, taps * (x_cols + x2_cols)], fp16
+layout(binding = 1) readonly buffer W { uvec4 w[]; };   // [cols, taps * (x_cols + x2_cols)]
 layout(binding = 8) readonly buffer X2 { uvec4 x2[]; }; // as x, x2_cols
 #include "lib/conv_shift.glsl"
 #include "lib/gemm_epilogue.glsl"
 layout(constant_id = 36) const uint kSlices = 1; // of K, each summed by workgroups of its own, which write fp32 sums to Y
+#define WEIGHT(i) w[i]
+#include "lib/weight.coopmat.glsl"
 #include "lib/conv_taps.glsl"
 #include "lib/gemm_tile.coopmat.glsl"
 
@@ -36,7 +40,7 @@ struct Cursor {
 Cursor cursor, end;          // of the next step, and behind the last one
 ConvPixel pixels[kLoadsX];   // of the rows that this thread brings
 uint aimed_tap = ~0u, aimed_input = 0; // that x_at are of
-uint x_at[kLoadsX], w_at[kLoadsW];     // these rows, from its columns on
+uint x_at[kLoadsX], w_at[kLoadsW];     // texels of these rows: x from its columns on
 uint inside_image;                     // bit i: load i of x reads a pixel, else zeros
 
 const uint kRun = 128; // channels, or the last ones of an input: slices of K are cut there, whatever kStep is
@@ -81,7 +85,7 @@ void start_loads(uint tile_row, uint tile_col, uint slice)
     [[unroll]] for (uint i = 0; i < kLoadsX; ++i)
         pixels[i] = conv_pixel(tile_row + load_row(i));
     [[unroll]] for (uint i = 0; i < kLoadsW; ++i)
-        w_at[i] = (min(tile_col + load_row(i), p.cols - 1) * p.w_ld + load_k()) / 8;
+        w_at[i] = weight_row(min(tile_col + load_row(i), p.cols - 1));
     cursor = start_of(slice);
     end = start_of(slice + 1);
 }
@@ -104,9 +108,9 @@ bool load_next()
         else
             next_x[i] = x[x_at[i] + channel / 8];
     }
-    const uint w_from = (cursor.tap * (p.x_cols + p.x2_cols) + second * p.x_cols + channel) / 8;
+    const uint w_from = cursor.tap * (p.x_cols + p.x2_cols) + second * p.x_cols + channel + load_k();
     [[unroll]] for (uint i = 0; i < kLoadsW; ++i)
-        next_w[i] = inside ? w[w_at[i] + w_from] : uvec4(0);
+        next_w[i] = inside ? load_weight_halves(w_at[i], w_from) : uvec4(0);
     advance();
     return true;
 }

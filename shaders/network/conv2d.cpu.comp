@@ -7,10 +7,13 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 #include "conv2d.h"
+#include "lib/pack.glsl"
 
 layout(local_size_x = 8, local_size_x_id = 33) in; // kLanes
 layout(constant_id = 33) const uint kLanes = 8; // a subgroup: 8, or 16 where vectors have 512 bits
-layout(constant_id = 2) const bool kHalfX = false; // w and x2 have the type of x
+layout(constant_id = 2) const uint kTypeX = kF16;
+layout(constant_id = 8) const uint kTypeX2 = kF16;
+layout(constant_id = 7) const uint kTypeW = kQ8_0;
 layout(constant_id = 3) const uint kKernelHeight = 3;
 layout(constant_id = 5) const uint kKernelWidth = 3;
 layout(constant_id = 4) const bool kTwoInputs = false;
@@ -20,29 +23,24 @@ layout(binding = 1) uniform usamplerBuffer W;  // [cols, taps * (x_cols + x2_col
 layout(binding = 8) uniform usamplerBuffer X2; // as x, x2_cols
 #include "lib/conv_shift.glsl"
 #include "lib/gemm_epilogue.glsl"
+#define WEIGHT(i) texelFetch(W, int(i))
+#include "lib/weight.glsl"
 #include "lib/gemm_tile.cpu.glsl"
 #include "lib/conv_taps.glsl"
 
-// one input of one tap; a texel is 8 or 4 channels
-#define MULTIPLY(IMAGE, ld, first, channels, w_first)                                                                  \
+// one input of one tap, whose channels begin at column w_first of a row of w
+#define MULTIPLY(IMAGE, type, ld, first, channels, w_first)                                                            \
     {                                                                                                                  \
         uint at[kRows];                                                                                                \
         [[unroll]] for (uint i = 0; i < kRows; ++i)                                                                    \
-            at[i] = inside[i] != 0 ? (row[i] - (first)) * ((ld) / width) : 0;                                          \
-        if (kHalfX) {                                                                                                  \
-            for (uint k = 0; k < (channels) / 8; ++k) {                                                                \
-                vec4 lo[kRows], hi[kRows];                                                                             \
-                [[unroll]] for (uint i = 0; i < kRows; ++i)                                                            \
-                    unpack8(texelFetch(IMAGE, int(at[i] + k)) & inside[i], lo[i], hi[i]);                              \
-                multiply_half(lo, hi, w_at, (w_first) + k);                                                            \
-            }                                                                                                          \
-        } else {                                                                                                       \
-            for (uint k = 0; k < (channels) / 4; ++k) {                                                                \
-                vec4 a[kRows];                                                                                         \
-                [[unroll]] for (uint i = 0; i < kRows; ++i)                                                            \
-                    a[i] = uintBitsToFloat(texelFetch(IMAGE, int(at[i] + k)) & inside[i]);                             \
-                multiply_float(a, w_at, (w_first) + k);                                                                \
-            }                                                                                                          \
+            at[i] = inside[i] != 0 ? (row[i] - (first)) * (ld) : 0;                                                    \
+        for (uint k = 0; k < (channels); k += 8) {                                                                     \
+            vec4 lo[kRows], hi[kRows];                                                                                 \
+            [[unroll]] for (uint i = 0; i < kRows; ++i)                                                                \
+                UNPACK8(type, texelFetch(IMAGE, int((at[i] + k) / 8)) & inside[i],                                     \
+                        texelFetch(IMAGE, int((at[i] + k) / 4)) & inside[i],                                           \
+                        texelFetch(IMAGE, int((at[i] + k) / 4 + 1)) & inside[i], lo[i], hi[i])                         \
+            multiply(lo, hi, w_at, (w_first) + k);                                                                     \
         }                                                                                                              \
     }
 
@@ -52,22 +50,21 @@ void main()
     epilogue_group = 0;
     const uint first_row = gl_WorkGroupID.x * (kLanes / p.col_lanes * kRows) + lane / p.col_lanes * kRows;
     const uint col = gl_WorkGroupID.y * (p.col_lanes * kCols) + lane % p.col_lanes * kCols;
-    const uint width = kHalfX ? 8 : 4; // elements of a texel
     ConvPixel pixel[kRows];
     uint w_at[kCols];
     [[unroll]] for (uint i = 0; i < kRows; ++i)
         pixel[i] = conv_pixel(first_row + i);
     [[unroll]] for (uint j = 0; j < kCols; ++j)
-        w_at[j] = min(col + j, p.cols - 1) * (p.w_ld / width);
+        w_at[j] = weight_row(min(col + j, p.cols - 1));
     clear_tile();
-    const uint texels = (p.x_cols + p.x2_cols) / width;
+    const uint columns = p.x_cols + p.x2_cols; // of a tap
     for (uint tap = 0; tap < kKernelHeight * kKernelWidth; ++tap) {
         uint row[kRows], inside[kRows]; // inside: all ones, or zero
         [[unroll]] for (uint i = 0; i < kRows; ++i)
             inside[i] = conv_tap(pixel[i], tap / kKernelWidth, tap % kKernelWidth, row[i]) ? 0xffffffffu : 0;
-        MULTIPLY(X, p.x_ld, p.x_first, p.x_cols, tap * texels)
+        MULTIPLY(X, kTypeX, p.x_ld, p.x_first, p.x_cols, tap * columns)
         if (kTwoInputs)
-            MULTIPLY(X2, p.x2_ld, p.x2_first, p.x2_cols, tap * texels + p.x_cols / width)
+            MULTIPLY(X2, kTypeX2, p.x2_ld, p.x2_first, p.x2_cols, tap * columns + p.x_cols)
     }
     store_tile(first_row, col);
 }

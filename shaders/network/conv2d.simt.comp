@@ -7,11 +7,14 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 #include "conv2d.h"
+#include "lib/pack.glsl"
 
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint kTileM = 64;
 layout(constant_id = 1) const uint kTileN = 64;
-layout(constant_id = 2) const bool kHalfX = false; // w and x2 have the type of x
+layout(constant_id = 2) const uint kTypeX = kF16;
+layout(constant_id = 8) const uint kTypeX2 = kF16;
+layout(constant_id = 7) const uint kTypeW = kQ8_0;
 layout(constant_id = 3) const uint kKernelHeight = 3;
 layout(constant_id = 5) const uint kKernelWidth = 3;
 layout(constant_id = 4) const bool kTwoInputs = false;
@@ -21,6 +24,8 @@ layout(binding = 1) readonly buffer W { uvec4 w[]; };   // [cols, taps * (x_cols
 layout(binding = 8) readonly buffer X2 { uvec4 x2[]; }; // as x, x2_cols
 #include "lib/conv_shift.glsl"
 #include "lib/gemm_epilogue.glsl"
+#define WEIGHT(i) w[i]
+#include "lib/weight.glsl"
 #include "lib/gemm_tile.simt.glsl"
 #include "lib/conv_taps.glsl"
 
@@ -53,18 +58,18 @@ void load(ConvPixel pixel, uint w_row, Cursor c, out vec4 a[4], out vec4 b[4])
     const bool second = kTwoInputs && c.channel >= first;
     const uint channel = second ? c.channel - first : c.channel, cols = second ? p.x2_cols : p.x_cols;
     const uint x_at = second ? (row - p.x2_first) * p.x2_ld : (row - p.x_first) * p.x_ld;
-    const uint w_at = w_row + c.tap * (p.x_cols + p.x2_cols) + (second ? p.x_cols : 0);
+    const uint w_col = c.tap * (p.x_cols + p.x2_cols) + (second ? p.x_cols : 0);
     [[unroll]] for (uint i = 0; i < kBring / 2; ++i) {
         const uint k = channel + bring_k() + 8 * i;
         if (k >= cols)
             continue;
-        LOAD8(w, kHalfX, w_at + k, b[2 * i], b[2 * i + 1]);
+        load_weight8(w_row, w_col + k, b[2 * i], b[2 * i + 1]);
         if (!inside)
             continue;
         if (second) {
-            LOAD8(x2, kHalfX, x_at + k, a[2 * i], a[2 * i + 1]);
+            LOAD8(x2, kTypeX2, x_at + k, a[2 * i], a[2 * i + 1]);
         } else {
-            LOAD8(x, kHalfX, x_at + k, a[2 * i], a[2 * i + 1]);
+            LOAD8(x, kTypeX, x_at + k, a[2 * i], a[2 * i + 1]);
         }
     }
 }
@@ -74,7 +79,7 @@ void main()
     epilogue_group = 0;
     const uint row = gl_WorkGroupID.x * kTileM, col = gl_WorkGroupID.y * kTileN;
     const ConvPixel pixel = conv_pixel(row + bring_row());
-    const uint w_row = min(col + bring_row(), p.cols - 1) * p.w_ld;
+    const uint w_row = weight_row(min(col + bring_row(), p.cols - 1));
     clear_tile();
     Cursor cursor = Cursor(0, 0);
     vec4 a[4], b[4];

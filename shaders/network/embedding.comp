@@ -7,9 +7,9 @@
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
-layout(constant_id = 0) const bool kHalfTable = false;
-layout(constant_id = 1) const bool kHalfX = false;
-layout(constant_id = 2) const bool kHalfY = false;
+layout(constant_id = 0) const uint kTypeTable = kF16;
+layout(constant_id = 1) const uint kTypeX = kF16;
+layout(constant_id = 2) const uint kTypeY = kF16;
 layout(constant_id = 3) const bool kAddX = false;
 layout(push_constant) uniform EmbeddingPush {
     uint rows;
@@ -31,13 +31,13 @@ void main()
     if (row >= p.rows)
         return;
     vec4 lo, hi;
-    LOAD8(table, kHalfTable, min(index[row], p.table_rows - 1) * p.table_ld + col, lo, hi);
+    LOAD8(table, kTypeTable, min(index[row], p.table_rows - 1) * p.table_ld + col, lo, hi);
     if (kAddX) {
         vec4 x_lo, x_hi;
-        LOAD8(x, kHalfX, row * p.x_ld + col, x_lo, x_hi);
+        LOAD8(x, kTypeX, row * p.x_ld + col, x_lo, x_hi);
         lo += x_lo;
         hi += x_hi;
     }
     clear_padding(col, p.cols, lo, hi);
-    STORE8(y, kHalfY, row * p.y_ld + col, lo, hi);
+    STORE8(y, kTypeY, row * p.y_ld + col, lo, hi);
 }

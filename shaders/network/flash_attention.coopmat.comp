@@ -20,7 +20,7 @@
 #include "lib/pack.glsl"
 
 layout(local_size_x = 128, local_size_x_id = 33) in; // kThreads
-layout(constant_id = 2) const bool kHalfY = false;
+layout(constant_id = 2) const uint kTypeY = kF16;
 layout(constant_id = 3) const uint kChunks = 10; // head_dim / 8
 layout(constant_id = 4) const uint kTileM = 128;
 layout(constant_id = 5) const uint kTileN = 1;

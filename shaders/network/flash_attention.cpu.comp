@@ -11,9 +11,9 @@
 #include "lib/pack.glsl"
 
 layout(local_size_x = 8, local_size_x_id = 33) in; // kLanes
-layout(constant_id = 0) const bool kHalfQ = false;
-layout(constant_id = 1) const bool kHalfKv = false;
-layout(constant_id = 2) const bool kHalfY = false;
+layout(constant_id = 0) const uint kTypeQ = kF16;
+layout(constant_id = 1) const uint kTypeKv = kF16;
+layout(constant_id = 2) const uint kTypeY = kF16;
 layout(constant_id = 3) const uint kMostChunks = 20; // room for head_dim / 8, in few sizes: compiling takes seconds
 layout(constant_id = 33) const uint kLanes = 8; // a subgroup: 8, or 16 where vectors have 512 bits
 layout(push_constant) uniform Push { FlashAttentionPush p; };
@@ -28,25 +28,9 @@ float s[kQueries][kKeys]; // scores of a block, then their exponentials
 float largest[kQueries], total[kQueries], shrink[kQueries];
 vec4 o_lo[kMostChunks][kQueries], o_hi[kMostChunks][kQueries];
 
-void load_q(uint at, out vec4 lo, out vec4 hi)
-{
-    if (kHalfQ) {
-        unpack8(texelFetch(Q, int(at / 8)), lo, hi);
-    } else {
-        lo = uintBitsToFloat(texelFetch(Q, int(at / 4)));
-        hi = uintBitsToFloat(texelFetch(Q, int(at / 4 + 1)));
-    }
-}
+void load_q(uint at, out vec4 lo, out vec4 hi) { FETCH8(Q, kTypeQ, at, lo, hi) }
 
-void load_kv(uint at, out vec4 lo, out vec4 hi)
-{
-    if (kHalfKv) {
-        unpack8(texelFetch(Kv, int(at / 8)), lo, hi);
-    } else {
-        lo = uintBitsToFloat(texelFetch(Kv, int(at / 4)));
-        hi = uintBitsToFloat(texelFetch(Kv, int(at / 4 + 1)));
-    }
-}
+void load_kv(uint at, out vec4 lo, out vec4 hi) { FETCH8(Kv, kTypeKv, at, lo, hi) }
 
 void scores(uint q_at[kQueries], uint k_at[kKeys])
 {
@@ -149,7 +133,7 @@ void main()
     [[dont_unroll]] for (uint i = 0; i < kQueries * p.chunks; ++i) {
         const uint q = i / p.chunks, c = i % p.chunks, row = first_query + q;
         if (row < p.rows)
-            STORE8(y, kHalfY, (image * p.query_rows + row) * p.y_ld + head + c * 8, (o_lo[c][q] * inverse[q]),
+            STORE8(y, kTypeY, (image * p.query_rows + row) * p.y_ld + head + c * 8, (o_lo[c][q] * inverse[q]),
                    (o_hi[c][q] * inverse[q]));
     }
 }

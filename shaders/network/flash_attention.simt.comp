@@ -11,9 +11,9 @@
 #include "lib/pack.glsl"
 
 layout(local_size_x = 128) in;
-layout(constant_id = 0) const bool kHalfQ = false;
-layout(constant_id = 1) const bool kHalfKv = false;
-layout(constant_id = 2) const bool kHalfY = false;
+layout(constant_id = 0) const uint kTypeQ = kF16;
+layout(constant_id = 1) const uint kTypeKv = kF16;
+layout(constant_id = 2) const uint kTypeY = kF16;
 layout(constant_id = 3) const uint kChunks = 64; // head_dim / 8
 layout(constant_id = 4) const uint kTileM = 32;
 layout(constant_id = 5) const uint kTileN = 1;
@@ -56,7 +56,7 @@ void stage(uint first, uint column, uint slab)
         const uint key = i / chunks, c = i % chunks;
         const uint row = gl_WorkGroupID.z * p.key_rows + min(first + key, p.keys - 1);
         vec4 lo, hi;
-        LOAD8(kv, kHalfKv, row * p.kv_ld + column + (slab * kSlab + c) * 8, lo, hi);
+        LOAD8(kv, kTypeKv, row * p.kv_ld + column + (slab * kSlab + c) * 8, lo, hi);
         slabs[key * kPitch + c] = lo;
         slabs[kUpper + key * kPitch + c] = hi;
     }
@@ -73,7 +73,7 @@ void scores(uint first, uint column, uint q_at[kOwn], uint part, out float s[kOw
         for (uint c = 0; c < min(kSlab, kChunks - slab * kSlab); ++c) {
             vec4 lo[kOwn], hi[kOwn];
             [[unroll]] for (uint n = 0; n < kOwn; ++n)
-                LOAD8(q, kHalfQ, q_at[n] + (slab * kSlab + c) * 8, lo[n], hi[n]);
+                LOAD8(q, kTypeQ, q_at[n] + (slab * kSlab + c) * 8, lo[n], hi[n]);
             [[unroll]] for (uint j = 0; j < kOwnKeys; ++j) {
                 const uint at = (part + j * kParts) * kPitch + c;
                 [[unroll]] for (uint n = 0; n < kOwn; ++n)
@@ -166,7 +166,7 @@ void attend(uint first_query)
         [[unroll]] for (uint slab = 0; slab < kSlabs; ++slab) {
             const uint c = slab * kSlab + part;
             if (row < p.rows && c < kChunks)
-                STORE8(y, kHalfY, (image * p.query_rows + row) * p.y_ld + head + c * 8, (o_lo[slab][n] * inverse),
+                STORE8(y, kTypeY, (image * p.query_rows + row) * p.y_ld + head + c * 8, (o_lo[slab][n] * inverse),
                        (o_hi[slab][n] * inverse));
         }
     }

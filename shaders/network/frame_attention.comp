@@ -9,8 +9,8 @@
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
-layout(constant_id = 0) const bool kHalfQkv = false;
-layout(constant_id = 1) const bool kHalfY = false;
+layout(constant_id = 0) const uint kTypeQkv = kF16;
+layout(constant_id = 1) const uint kTypeY = kF16;
 layout(constant_id = 2) const uint kFrames = 1;
 layout(push_constant) uniform FrameAttentionPush {
     uint image_rows; // from one frame to the next
@@ -37,9 +37,9 @@ void main()
         s[j] = 0.0;
     for (uint c = 0; c < p.chunks; ++c) {
         vec4 q_lo, q_hi, k_lo, k_hi;
-        LOAD8(qkv, kHalfQkv, q_at + c * 8, q_lo, q_hi);
+        LOAD8(qkv, kTypeQkv, q_at + c * 8, q_lo, q_hi);
         for (uint j = 0; j < kFrames; ++j) {
-            LOAD8(qkv, kHalfQkv, k_at + j * step + c * 8, k_lo, k_hi);
+            LOAD8(qkv, kTypeQkv, k_at + j * step + c * 8, k_lo, k_hi);
             s[j] += dot(q_lo, k_lo) + dot(q_hi, k_hi);
         }
     }
@@ -54,10 +54,10 @@ void main()
     for (uint c = 0; c < p.chunks; ++c) {
         vec4 lo = vec4(0.0), hi = vec4(0.0), v_lo, v_hi;
         for (uint j = 0; j < kFrames; ++j) {
-            LOAD8(qkv, kHalfQkv, v_at + j * step + c * 8, v_lo, v_hi);
+            LOAD8(qkv, kTypeQkv, v_at + j * step + c * 8, v_lo, v_hi);
             lo += s[j] * v_lo;
             hi += s[j] * v_hi;
         }
-        STORE8(y, kHalfY, row * p.y_ld + head + c * 8, (lo * inverse), (hi * inverse));
+        STORE8(y, kTypeY, row * p.y_ld + head + c * 8, (lo * inverse), (hi * inverse));
     }
 }

@@ -7,9 +7,9 @@
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
-layout(constant_id = 0) const bool kHalfX = false;
-layout(constant_id = 1) const bool kHalfY = false;
-layout(constant_id = 2) const bool kHalfResidual = false;
+layout(constant_id = 0) const uint kTypeX = kF16;
+layout(constant_id = 1) const uint kTypeY = kF16;
+layout(constant_id = 2) const uint kTypeResidual = kF16;
 layout(push_constant) uniform GatedAddPush {
     uint rows; // of one group
     uint cols;
@@ -34,11 +34,11 @@ void main()
     if (row >= p.rows * p.groups)
         return;
     vec4 lo, hi, r_lo, r_hi;
-    LOAD8(x, kHalfX, row * p.x_ld + col, lo, hi);
-    LOAD8(residual, kHalfResidual, row * p.residual_ld + col, r_lo, r_hi);
+    LOAD8(x, kTypeX, row * p.x_ld + col, lo, hi);
+    LOAD8(residual, kTypeResidual, row * p.residual_ld + col, r_lo, r_hi);
     const uint g = gate_row[row] * p.gate_ld + p.gate_col + row / p.rows * p.gate_step + col;
     lo = r_lo + vec4(gate[g], gate[g + 1], gate[g + 2], gate[g + 3]) * lo;
     hi = r_hi + vec4(gate[g + 4], gate[g + 5], gate[g + 6], gate[g + 7]) * hi;
     clear_padding(col, p.cols, lo, hi);
-    STORE8(y, kHalfY, row * p.y_ld + col, lo, hi);
+    STORE8(y, kTypeY, row * p.y_ld + col, lo, hi);
 }

@@ -8,8 +8,8 @@
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
-layout(constant_id = 0) const bool kHalfX = false;
-layout(constant_id = 1) const bool kHalfY = false;
+layout(constant_id = 0) const uint kTypeX = kF16;
+layout(constant_id = 1) const uint kTypeY = kF16;
 layout(push_constant) uniform GegluPush {
     uint rows;
     uint cols; // of y, a multiple of 8
@@ -27,9 +27,9 @@ void main()
         return;
     vec4 lo, hi, gate_lo, gate_hi;
     const uint at = row * p.x_ld + 2 * col;
-    LOAD8(x, kHalfX, at, lo, hi);
-    LOAD8(x, kHalfX, at + 8, gate_lo, gate_hi);
+    LOAD8(x, kTypeX, at, lo, hi);
+    LOAD8(x, kTypeX, at + 8, gate_lo, gate_hi);
     lo *= gelu_erf(gate_lo);
     hi *= gelu_erf(gate_hi);
-    STORE8(y, kHalfY, row * p.y_ld + col, lo, hi);
+    STORE8(y, kTypeY, row * p.y_ld + col, lo, hi);
 }

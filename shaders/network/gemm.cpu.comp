@@ -7,15 +7,20 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 #include "gemm.h"
+#include "lib/pack.glsl"
 
 layout(local_size_x = 8, local_size_x_id = 33) in; // kLanes
 layout(constant_id = 33) const uint kLanes = 8; // a subgroup: 8, or 16 where vectors have 512 bits
-layout(constant_id = 2) const bool kHalfX = false; // w has the type of x
+layout(constant_id = 2) const uint kTypeX = kF16;
+layout(constant_id = 3) const uint kTypeW = kQ8_0;
+layout(constant_id = 6) const uint kColLanes = 4; // of that tile; p.col_lanes is what runs
 layout(push_constant) uniform Push { GemmPush p; };
 layout(binding = 0) uniform usamplerBuffer X; // [groups * rows, depth]
 layout(binding = 1) uniform usamplerBuffer W; // [groups * cols, depth]
 #include "lib/gemm_gate.glsl"
 #include "lib/gemm_epilogue.glsl"
+#define WEIGHT(i) texelFetch(W, int(i))
+#include "lib/weight.glsl"
 #include "lib/gemm_tile.cpu.glsl"
 
 void main()
@@ -24,27 +29,17 @@ void main()
     epilogue_group = gate_group = gl_WorkGroupID.z;
     const uint row = gl_WorkGroupID.x * (kLanes / p.col_lanes * kRows) + lane / p.col_lanes * kRows;
     const uint col = gl_WorkGroupID.y * (p.col_lanes * kCols) + lane % p.col_lanes * kCols;
-    const uint width = kHalfX ? 8 : 4; // elements of a texel
     uint x_at[kRows], w_at[kCols];
     [[unroll]] for (uint i = 0; i < kRows; ++i)
-        x_at[i] = (epilogue_group * p.rows + min(row + i, p.rows - 1)) * (p.x_ld / width);
+        x_at[i] = (epilogue_group * p.rows + min(row + i, p.rows - 1)) * p.x_ld;
     [[unroll]] for (uint j = 0; j < kCols; ++j)
-        w_at[j] = (epilogue_group * p.cols + min(col + j, p.cols - 1)) * (p.w_ld / width);
+        w_at[j] = weight_row(epilogue_group * p.cols + min(col + j, p.cols - 1));
     clear_tile();
-    if (kHalfX) {
-        for (uint k = 0; k < p.depth / 8; ++k) {
-            vec4 lo[kRows], hi[kRows];
-            [[unroll]] for (uint i = 0; i < kRows; ++i)
-                unpack8(texelFetch(X, int(x_at[i] + k)), lo[i], hi[i]);
-            multiply_half(lo, hi, w_at, k);
-        }
-    } else {
-        for (uint k = 0; k < p.depth / 4; ++k) {
-            vec4 a[kRows];
-            [[unroll]] for (uint i = 0; i < kRows; ++i)
-                a[i] = uintBitsToFloat(texelFetch(X, int(x_at[i] + k)));
-            multiply_float(a, w_at, k);
-        }
+    for (uint k = 0; k < p.depth; k += 8) {
+        vec4 lo[kRows], hi[kRows];
+        [[unroll]] for (uint i = 0; i < kRows; ++i)
+            FETCH8(X, kTypeX, x_at[i] + k, lo[i], hi[i])
+        multiply(lo, hi, w_at, k);
     }
     store_tile(row, col);
 }

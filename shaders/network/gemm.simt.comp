@@ -7,16 +7,20 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 #include "gemm.h"
+#include "lib/pack.glsl"
 
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint kTileM = 64;
 layout(constant_id = 1) const uint kTileN = 64;
-layout(constant_id = 2) const bool kHalfX = false; // w has the type of x
+layout(constant_id = 2) const uint kTypeX = kF16;
+layout(constant_id = 3) const uint kTypeW = kQ8_0;
 layout(push_constant) uniform Push { GemmPush p; };
 layout(binding = 0) readonly buffer X { uvec4 x[]; }; // [groups * rows, depth]
 layout(binding = 1) readonly buffer W { uvec4 w[]; }; // [groups * cols, depth]
 #include "lib/gemm_gate.glsl"
 #include "lib/gemm_epilogue.glsl"
+#define WEIGHT(i) w[i]
+#include "lib/weight.glsl"
 #include "lib/gemm_tile.simt.glsl"
 
 // this thread's columns of the 16 from k on, of one row of x and one of w
@@ -25,20 +29,11 @@ void load(uint x_row, uint w_row, uint k, out vec4 a[4], out vec4 b[4])
     k += bring_k();
     [[unroll]] for (uint i = 0; i < 4; ++i)
         a[i] = b[i] = vec4(0.0);
-    if (kHalfX) {
-        [[unroll]] for (uint i = 0; i < kBring / 2; ++i) {
-            if (k + 8 * i >= p.depth)
-                continue;
-            unpack8(x[(x_row + k) / 8 + i], a[2 * i], a[2 * i + 1]);
-            unpack8(w[(w_row + k) / 8 + i], b[2 * i], b[2 * i + 1]);
-        }
-    } else {
-        [[unroll]] for (uint i = 0; i < kBring; ++i) {
-            if (k + 4 * i >= p.depth)
-                continue;
-            a[i] = uintBitsToFloat(x[(x_row + k) / 4 + i]);
-            b[i] = uintBitsToFloat(w[(w_row + k) / 4 + i]);
-        }
+    [[unroll]] for (uint i = 0; i < kBring / 2; ++i) {
+        if (k + 8 * i >= p.depth)
+            continue;
+        LOAD8(x, kTypeX, x_row + k + 8 * i, a[2 * i], a[2 * i + 1]);
+        load_weight8(w_row, k + 8 * i, b[2 * i], b[2 * i + 1]);
     }
 }
 
@@ -47,7 +42,7 @@ void main()
     epilogue_group = gate_group = gl_WorkGroupID.z;
     const uint row = gl_WorkGroupID.x * kTileM, col = gl_WorkGroupID.y * kTileN;
     const uint x_row = (epilogue_group * p.rows + min(row + bring_row(), p.rows - 1)) * p.x_ld;
-    const uint w_row = (epilogue_group * p.cols + min(col + bring_row(), p.cols - 1)) * p.w_ld;
+    const uint w_row = weight_row(epilogue_group * p.cols + min(col + bring_row(), p.cols - 1));
     clear_tile();
     vec4 a[4], b[4];
     load(x_row, w_row, 0, a, b);

@@ -13,8 +13,9 @@
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
-layout(constant_id = 0) const bool kHalfX = false; // x2 has the type of x
-layout(constant_id = 1) const bool kHalfY = false;
+layout(constant_id = 0) const uint kTypeX = kF16;
+layout(constant_id = 4) const uint kTypeX2 = kF16;
+layout(constant_id = 1) const uint kTypeY = kF16;
 layout(constant_id = 2) const bool kSilu = false;
 layout(constant_id = 3) const uint kTileM = 4; // rows of a thread; images and bands start at multiples of it
 layout(push_constant) uniform Push { GroupNormApplyPush p; };
@@ -34,9 +35,9 @@ void main()
     [[unroll]] for (uint i = 0; i < kTileM; ++i) {
         const uint row = min(first + i, p.rows - 1);
         if (col < p.x_cols) {
-            LOAD8(x, kHalfX, row * p.x_ld + col, lo[i], hi[i]);
+            LOAD8(x, kTypeX, row * p.x_ld + col, lo[i], hi[i]);
         } else {
-            LOAD8(x2, kHalfX, row * p.x2_ld + col - p.x_cols, lo[i], hi[i]);
+            LOAD8(x2, kTypeX2, row * p.x2_ld + col - p.x_cols, lo[i], hi[i]);
         }
     }
     const uint set = (first + p.first_row) / p.image_rows;
@@ -52,7 +53,7 @@ void main()
         if (col + 8 > cols)
             clear_padding(col, cols, y_lo, y_hi);
         if (first + i < p.rows) {
-            STORE8(y, kHalfY, (first + i) * p.y_ld + col, y_lo, y_hi);
+            STORE8(y, kTypeY, (first + i) * p.y_ld + col, y_lo, y_hi);
         }
     }
 }

@@ -8,8 +8,8 @@
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
-layout(constant_id = 0) const bool kHalfX = false;
-layout(constant_id = 1) const bool kHalfY = false;
+layout(constant_id = 0) const uint kTypeX = kF16;
+layout(constant_id = 1) const uint kTypeY = kF16;
 layout(push_constant) uniform HeadRmsNormPush {
     uint rows; // of one group
     uint groups;
@@ -34,17 +34,17 @@ void main()
     vec4 lo, hi;
     float sum = 0.0;
     for (uint c = 0; c < p.head_dim; c += 8) {
-        LOAD8(x, kHalfX, from + c, lo, hi);
+        LOAD8(x, kTypeX, from + c, lo, hi);
         sum += dot(lo, lo) + dot(hi, hi);
     }
     const float inverse = inversesqrt(sum / float(p.head_dim) + p.eps);
     const uint w = (row / p.rows * 2 + min(part, 1u)) * p.weight_ld;
     for (uint c = 0; c < p.head_dim; c += 8) {
-        LOAD8(x, kHalfX, from + c, lo, hi);
+        LOAD8(x, kTypeX, from + c, lo, hi);
         if (part < 2) {
             lo *= inverse * vec4(weight[w + c], weight[w + c + 1], weight[w + c + 2], weight[w + c + 3]);
             hi *= inverse * vec4(weight[w + c + 4], weight[w + c + 5], weight[w + c + 6], weight[w + c + 7]);
         }
-        STORE8(y, kHalfY, to + c, lo, hi);
+        STORE8(y, kTypeY, to + c, lo, hi);
     }
 }

@@ -9,8 +9,8 @@
 #include "lib/thread.glsl"
 
 layout(local_size_x = 8) in;
-layout(constant_id = 0) const bool kHalfX = false;
-layout(constant_id = 1) const bool kHalfY = false;
+layout(constant_id = 0) const uint kTypeX = kF16;
+layout(constant_id = 1) const uint kTypeY = kF16;
 layout(constant_id = 2) const uint kTileM = 8;
 layout(push_constant) uniform Push { LayerNormPush p; };
 layout(binding = 0) uniform usamplerBuffer X;          // [rows, cols]
@@ -33,6 +33,6 @@ void main()
         lo = (lo - mean) * inverse * uintBitsToFloat(texelFetch(Weight, at)) + uintBitsToFloat(texelFetch(Bias, at));
         hi = (hi - mean) * inverse * uintBitsToFloat(texelFetch(Weight, at + 1)) + uintBitsToFloat(texelFetch(Bias, at + 1));
         clear_padding(c, p.cols, lo, hi);
-        STORE8(y, kHalfY, row * p.y_ld + c, lo, hi);
+        STORE8(y, kTypeY, row * p.y_ld + c, lo, hi);
     }
 }

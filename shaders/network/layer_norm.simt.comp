@@ -9,8 +9,8 @@
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
-layout(constant_id = 0) const bool kHalfX = false;
-layout(constant_id = 1) const bool kHalfY = false;
+layout(constant_id = 0) const uint kTypeX = kF16;
+layout(constant_id = 1) const uint kTypeY = kF16;
 layout(constant_id = 2) const uint kTileM = 4;
 layout(constant_id = 3) const uint kKept = 1;
 layout(push_constant) uniform Push { LayerNormPush p; };
@@ -26,7 +26,7 @@ void write(uint row, uint sweep, vec4 lo, vec4 hi, float mean, float inverse)
     lo = (lo - mean) * inverse * weight[c / 4] + bias[c / 4];
     hi = (hi - mean) * inverse * weight[c / 4 + 1] + bias[c / 4 + 1];
     clear_beyond(sweep, lo, hi);
-    STORE8(y, kHalfY, row * p.y_ld + c, lo, hi);
+    STORE8(y, kTypeY, row * p.y_ld + c, lo, hi);
 }
 
 void main()
@@ -43,7 +43,7 @@ void main()
             write(row, i, lo, hi, mean, inverse);
     }
     for (uint i = kKept; in_row(i); ++i) {
-        LOAD8(x, kHalfX, from + sweep_col(i), lo, hi);
+        LOAD8(x, kTypeX, from + sweep_col(i), lo, hi);
         write(row, i, lo, hi, mean, inverse);
     }
 }

@@ -9,8 +9,8 @@
 #include "lib/thread.glsl"
 
 layout(local_size_x = 8) in;
-layout(constant_id = 0) const bool kHalfX = false;
-layout(constant_id = 1) const bool kHalfY = false;
+layout(constant_id = 0) const uint kTypeX = kF16;
+layout(constant_id = 1) const uint kTypeY = kF16;
 layout(constant_id = 2) const uint kTileM = 8;
 layout(push_constant) uniform Push { ModulatePush p; };
 layout(binding = 0) uniform usamplerBuffer X;                       // [groups * rows, cols]
@@ -46,6 +46,6 @@ void main()
         lo = (lo - mean) * inverse * (1.0 + load_table(scale)) + load_table(shift);
         hi = (hi - mean) * inverse * (1.0 + load_table(scale + 4)) + load_table(shift + 4);
         clear_padding(c, p.cols, lo, hi);
-        STORE8(y, kHalfY, row * p.y_ld + c, lo, hi);
+        STORE8(y, kTypeY, row * p.y_ld + c, lo, hi);
     }
 }

@@ -9,8 +9,8 @@
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
-layout(constant_id = 0) const bool kHalfX = false;
-layout(constant_id = 1) const bool kHalfY = false;
+layout(constant_id = 0) const uint kTypeX = kF16;
+layout(constant_id = 1) const uint kTypeY = kF16;
 layout(constant_id = 2) const uint kTileM = 4;
 layout(constant_id = 3) const uint kKept = 1;
 layout(constant_id = 4) const bool kAligned = false; // columns and rows of the table start at multiples of 4
@@ -36,7 +36,7 @@ void write(uint row, uint sweep, vec4 lo, vec4 hi, float mean, float inverse, ui
     lo = (lo - mean) * inverse * (1.0 + load_table(scale)) + load_table(shift);
     hi = (hi - mean) * inverse * (1.0 + load_table(scale + 4)) + load_table(shift + 4);
     clear_beyond(sweep, lo, hi);
-    STORE8(y, kHalfY, row * p.y_ld + c, lo, hi);
+    STORE8(y, kTypeY, row * p.y_ld + c, lo, hi);
 }
 
 void main()
@@ -54,7 +54,7 @@ void main()
             write(row, i, lo, hi, mean, inverse, modulation);
     }
     for (uint i = kKept; in_row(i); ++i) {
-        LOAD8(x, kHalfX, from * p.x_ld + sweep_col(i), lo, hi);
+        LOAD8(x, kTypeX, from * p.x_ld + sweep_col(i), lo, hi);
         write(row, i, lo, hi, mean, inverse, modulation);
     }
 }

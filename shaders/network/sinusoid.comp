@@ -3,12 +3,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // y = per axis [sin(x w_0), sin(x w_1), .., cos(x w_0), cos(x w_1), ..], or cosines first; one element a thread pair
 #extension GL_GOOGLE_include_directive : require
-#include "lib/half.glsl"
+#include "lib/pack.glsl"
 #include "lib/thread.glsl"
 #include "lib/trigonometry.glsl"
 
 layout(local_size_x = 64) in;
-layout(constant_id = 0) const bool kHalfY = false;
+layout(constant_id = 0) const uint kTypeY = kF16;
 layout(push_constant) uniform SinusoidPush {
     uint rows;
     uint axes;        // values of a row of x
@@ -38,7 +38,7 @@ void main()
         return;
     const vec2 pair = vec2(element(row, col), element(row, col + 1));
     const uint at = row * p.y_ld + col;
-    if (kHalfY) {
+    if (kTypeY == kF16) {
         y[at / 2] = pack_halves(pair);
     } else {
         y[at] = floatBitsToUint(pair.x);

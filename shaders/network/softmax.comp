@@ -7,8 +7,8 @@
 #include "lib/thread.glsl"
 
 layout(local_size_x = 128) in;
-layout(constant_id = 0) const bool kHalfX = false;
-layout(constant_id = 1) const bool kHalfY = false;
+layout(constant_id = 0) const uint kTypeX = kF16;
+layout(constant_id = 1) const uint kTypeY = kF16;
 layout(constant_id = 2) const uint kTileM = 1;
 layout(push_constant) uniform SoftmaxPush {
     uint rows;
@@ -54,7 +54,7 @@ float sum_of_all(float v)
 // eight logits times log2(e); what does not count is as small as can be
 void load(uint row, uint col, out vec4 lo, out vec4 hi)
 {
-    LOAD8(x, kHalfX, row * p.x_ld + col, lo, hi);
+    LOAD8(x, kTypeX, row * p.x_ld + col, lo, hi);
     const uvec4 i = uvec4(0, 1, 2, 3) + col;
     lo = mix(vec4(-1e30), lo * p.scale, lessThan(i, uvec4(p.cols)));
     hi = mix(vec4(-1e30), hi * p.scale, lessThan(i + 4, uvec4(p.cols)));
@@ -84,6 +84,6 @@ void main()
             lo = exp2(lo - largest) * inverse;
             hi = exp2(hi - largest) * inverse;
         }
-        STORE8(y, kHalfY, row * p.y_ld + c, lo, hi);
+        STORE8(y, kTypeY, row * p.y_ld + c, lo, hi);
     }
 }

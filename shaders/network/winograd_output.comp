@@ -4,16 +4,16 @@
 // y = A^T m A + bias + shift + residual per tile of 4 x 4 pixels and channel, four channels a thread
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
-#include "lib/half.glsl"
+#include "lib/pack.glsl"
 #include "lib/thread.glsl"
 #include "lib/winograd.glsl"
 
 layout(local_size_x = 64) in;
-layout(constant_id = 0) const bool kHalfY = false;
+layout(constant_id = 0) const uint kTypeY = kF16;
 layout(constant_id = 1) const bool kBias = false;
 layout(constant_id = 2) const bool kShift = false;
 layout(constant_id = 3) const bool kAdd = false;
-layout(constant_id = 4) const bool kHalfResidual = false;
+layout(constant_id = 4) const uint kTypeResidual = kF16;
 layout(push_constant) uniform WinogradOutputPush {
     uint first_tile; // of the band
     uint tiles;      // of the band
@@ -39,7 +39,7 @@ layout(binding = 5) readonly buffer Residual { uvec2 residual[]; }; // as y
 
 void store(uint at, vec4 v)
 {
-    if (kHalfY) {
+    if (kTypeY == kF16) {
         y[at / 4] = uvec2(pack_halves(v.xy), pack_halves(v.zw));
     } else {
         y[at / 2] = floatBitsToUint(v.xy);
@@ -49,7 +49,7 @@ void store(uint at, vec4 v)
 
 vec4 load_residual(uint at)
 {
-    if (kHalfResidual)
+    if (kTypeResidual == kF16)
         return vec4(unpackHalf2x16(residual[at / 4].x), unpackHalf2x16(residual[at / 4].y));
     return uintBitsToFloat(uvec4(residual[at / 2], residual[at / 2 + 1]));
 }

@@ -8,7 +8,7 @@
 #include "lib/winograd.glsl"
 
 layout(local_size_x = 64) in;
-layout(constant_id = 0) const bool kHalfW = false;
+layout(constant_id = 0) const uint kTypeW = kQ8_0;
 layout(push_constant) uniform WinogradWeightPush {
     uint outputs;
     uint cols; // channels, padded
@@ -17,6 +17,17 @@ layout(push_constant) uniform WinogradWeightPush {
 } p;
 layout(binding = 0) uniform usamplerBuffer W;         // [outputs, 9 * cols]
 layout(binding = 1) writeonly buffer U { vec4 u[]; }; // [36 * outputs, cols]
+#define WEIGHT(i) texelFetch(W, int(i))
+#include "lib/weight.glsl"
+
+// four elements of a row from k on, a multiple of 4
+vec4 load_weight4(uint row, uint k)
+{
+    if (kTypeW != kQ8_0)
+        return FETCH4(W, kTypeW, row * p.w_ld + k);
+    const uint row_at = weight_row(row);
+    return block_scale(row_at, k) * signed_bytes(WEIGHT(row_at + k / 16)[k / 4 % 4]);
+}
 
 void main()
 {
@@ -28,7 +39,7 @@ void main()
     [[unroll]] for (uint j = 0; j < 3; ++j) {
         vec4 g[3], column[kSamples];
         [[unroll]] for (uint i = 0; i < 3; ++i)
-            g[i] = FETCH4(W, kHalfW, n * p.w_ld + (i * 3 + j) * p.cols + col);
+            g[i] = load_weight4(n, (i * 3 + j) * p.cols + col);
         WINOGRAD_WEIGHT(g[0], g[1], g[2], column)
         [[unroll]] for (uint i = 0; i < kSamples; ++i)
             rows[i][j] = column[i];

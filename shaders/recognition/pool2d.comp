@@ -7,8 +7,8 @@
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
-layout(constant_id = 0) const bool kHalfX = false;
-layout(constant_id = 1) const bool kHalfY = false;
+layout(constant_id = 0) const uint kTypeX = kF16;
+layout(constant_id = 1) const uint kTypeY = kF16;
 layout(constant_id = 2) const bool kMean = false;
 layout(push_constant) uniform Pool2dPush {
     uint rows; // of the output, all images, padding included
@@ -51,7 +51,7 @@ void main()
         for (int i = begin.x; i < end.x; ++i)
             for (int j = begin.y; j < end.y; ++j) {
                 vec4 a, b;
-                LOAD8(x, kHalfX, (base + uint(i) * p.in_width + uint(j)) * p.x_ld + col, a, b);
+                LOAD8(x, kTypeX, (base + uint(i) * p.in_width + uint(j)) * p.x_ld + col, a, b);
                 const bool first = i == begin.x && j == begin.y;
                 lo = kMean ? lo + a : first ? a : max(lo, a);
                 hi = kMean ? hi + b : first ? b : max(hi, b);
@@ -62,5 +62,5 @@ void main()
             hi *= share;
         }
     }
-    STORE8(y, kHalfY, row * p.y_ld + p.y_col + col, lo, hi);
+    STORE8(y, kTypeY, row * p.y_ld + p.y_col + col, lo, hi);
 }

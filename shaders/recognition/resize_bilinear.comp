@@ -8,7 +8,7 @@
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
-layout(constant_id = 1) const bool kHalfY = false;
+layout(constant_id = 1) const uint kTypeY = kF16;
 layout(push_constant) uniform ResizeBilinearPush {
     uint rows; // of the output, all images, padding included
     uint first_row;
@@ -59,5 +59,5 @@ void main()
         const vec3 bottom = mix(texel(image, v.high, u.low), texel(image, v.high, u.high), u.share);
         rgb = mix(top, bottom, v.share) / 127.5 - 1.0;
     }
-    STORE8(y, kHalfY, row * p.y_ld, vec4(rgb, 0.0), vec4(0.0));
+    STORE8(y, kTypeY, row * p.y_ld, vec4(rgb, 0.0), vec4(0.0));
 }

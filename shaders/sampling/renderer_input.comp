@@ -9,7 +9,7 @@
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
-layout(constant_id = 0) const bool kHalfY = false;
+layout(constant_id = 0) const uint kTypeY = kF16;
 layout(push_constant) uniform RendererInputPush {
     uint rows; // of y
     uint x_rows;
@@ -53,5 +53,5 @@ void main()
         lo[i] = value(from, col + i, conditional, scale);
         hi[i] = value(from, col + 4 + i, conditional, scale);
     }
-    STORE8(y, kHalfY, row * p.y_ld + col, lo, hi);
+    STORE8(y, kTypeY, row * p.y_ld + col, lo, hi);
 }

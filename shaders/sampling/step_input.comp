@@ -8,7 +8,7 @@
 #include "lib/thread.glsl"
 
 layout(local_size_x = 64) in;
-layout(constant_id = 0) const bool kHalfY = false;
+layout(constant_id = 0) const uint kTypeY = kF16;
 layout(push_constant) uniform StepInputPush {
     uint rows; // of y
     uint cols;
@@ -31,5 +31,5 @@ void main()
     const float scale = steps[clock.row].in_scale;
     vec4 lo = scale * x[from / 4], hi = scale * x[from / 4 + 1];
     clear_padding(col, p.cols, lo, hi);
-    STORE8(y, kHalfY, row * p.y_ld + col, lo, hi);
+    STORE8(y, kTypeY, row * p.y_ld + col, lo, hi);
 }

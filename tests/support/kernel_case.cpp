@@ -40,8 +40,32 @@ Device& test_device()
     return kTestDevice->get();
 }
 
+// any int8, and scales of either sign
+HostMatrix KernelCase::random_blocks(uint32_t rows, uint32_t cols, float scale)
+{
+    HostMatrix m(rows, cols, DType::q8_0);
+    const size_t row_bytes = (cols + cols / 16 + 15) / 16 * 16;
+    m.blocks.resize(rows * row_bytes);
+    for (uint32_t r = 0; r < rows; ++r)
+        for (uint32_t c = 0; c < cols; ++c) {
+            std::byte* row = &m.blocks[r * row_bytes];
+            if (c % 32 == 0) {
+                const uint16_t half = float_to_half((float(random_() % 2001) - 1000) * scale / 64000);
+                std::memcpy(row + cols + c / 16, &half, 2);
+            }
+            uint16_t half = 0;
+            std::memcpy(&half, row + cols + c / 32 * 2, 2);
+            const int8_t q = int8_t(random_() % 256);
+            row[c] = std::byte(q);
+            m.values[size_t(r) * m.ld + c] = float(q) * half_to_float(half);
+        }
+    return m;
+}
+
 HostMatrix KernelCase::random(uint32_t rows, uint32_t cols, DType dtype, float scale)
 {
+    if (dtype == DType::q8_0)
+        return random_blocks(rows, cols, scale);
     HostMatrix m(rows, cols, dtype);
     std::normal_distribution<float> normal(0, scale);
     for (uint32_t r = 0; r < rows; ++r)
@@ -60,6 +84,8 @@ std::vector<uint32_t> KernelCase::indices(uint32_t count, uint32_t below)
 
 Tensor KernelCase::input(const HostMatrix& m)
 {
+    if (m.dtype == DType::q8_0)
+        return graph.external(upload(m.blocks), m.rows, m.cols, m.dtype, "input", m.ld);
     std::vector<std::byte> bytes(m.values.size() * dtype_bytes(m.dtype));
     for (size_t i = 0; i < m.values.size(); ++i) {
         const uint16_t half = float_to_half(m.values[i]);

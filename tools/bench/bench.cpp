@@ -3,9 +3,11 @@
 // semrover bench KIND: one object of figures per kind, measured warm with synthetic data of real shapes
 #include "tools/bench/bench.h"
 
+#include "engine/model/unet_config.h"
 #include "runtime/device/profile.h"
 #include "tools/bench/call_times.h"
 #include "tools/cli/print_stderr.h"
+#include "tools/cli/value_options.h"
 
 #include <algorithm>
 #include <CLI/CLI.hpp>
@@ -83,6 +85,22 @@ void add_profile(CLI::App& command, std::string& path)
     command.add_option("--profile", path, "write device times as a Chrome trace, and their sums to stderr");
 }
 
+void add_weights(CLI::App& command, std::string& weights)
+{
+    add_choice(command, "--weights", {"q8_0"}, "of 8 bits; default: as the activations, or as the config says",
+               weights);
+}
+
+Status store_as(const std::string& weights, UnetConfig& config)
+{
+    if (weights.empty())
+        return {};
+    Json json = unet_config_json(config);
+    json["weights"] = weights;
+    SR_TRY(config, parse_any_unet_config(json));
+    return {};
+}
+
 void add_plan(CLI::App& command, bool& plan)
 {
     command.add_flag("--plan", plan, "write to stderr what is done, in which order: passes, barriers, submits");
@@ -131,6 +149,8 @@ Status BenchInputs::allocate()
                 __builtin_memcpy(&w, &v, 4);
             else if (slot.dtype() == DType::f16)
                 w = uint32_t(float_to_half(v)) | uint32_t(float_to_half(v * 0.5f)) << 16;
+            else if (slot.dtype() == DType::q8_0)
+                w &= 0x1f1f1f1f; // small int8, and scales that are numbers
         }
         SR_CHECK(slot.write(device_, words));
     }

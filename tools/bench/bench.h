@@ -8,11 +8,13 @@
 #include "tools/cli/commands.h"
 
 #include <functional>
+#include <optional>
 #include <span>
 
 namespace semrover {
 
 struct Splats;
+struct UnetConfig;
 
 // times of a measured piece of work, warm
 struct Timing {
@@ -47,6 +49,11 @@ Status read_config(const std::string& path, Parse parse, Config& config)
     return {};
 }
 
+// --weights: q8_0, or in the precision
+void add_weights(CLI::App& command, std::string& weights);
+// a UNet's config with such weights, where they are given. bad_input: one that cannot have them
+Status store_as(const std::string& weights, UnetConfig& config);
+
 // device times where --profile asked for them: a Chrome trace, and their sums to stderr
 void add_profile(CLI::App& command, std::string& path);
 void add_plan(CLI::App& command, bool& plan);
@@ -58,7 +65,7 @@ void print_report(const Json& report, const Globals& globals);
 class BenchInputs {
   public:
     explicit BenchInputs(Device& device) : device_(device) {}
-    // normal-ish values as fp32 or fp16 matrices, or uniform words for u32
+    // normal-ish values as fp32 or fp16 matrices, small ones as q8_0, or uniform words for u32
     Slot add(uint32_t rows, uint32_t cols, DType dtype);
     Status allocate();
     uint64_t bytes() const { return state_.planned_bytes(device_.limits()); }
@@ -73,7 +80,9 @@ class BenchInputs {
 struct GemmShape {
     uint32_t m = 384, n = 4096, k = 1024;
 };
-Result<std::unique_ptr<Program>> gemm_program(Device& device, BenchInputs& inputs, const GemmShape& shape, DType dtype);
+// w of another type: whole blocks of K
+Result<std::unique_ptr<Program>> gemm_program(Device& device, BenchInputs& inputs, const GemmShape& shape, DType dtype,
+                                              std::optional<DType> w_dtype = {});
 
 // a street: ground, two facades and blobs between them, in front of a camera at the origin that looks along x
 Splats street_splats(uint32_t count, float sigma);

@@ -17,7 +17,7 @@ namespace semrover {
 namespace {
 
 struct BenchAsdArguments {
-    std::string unet, vae, precision = "fp16";
+    std::string unet, vae, precision = "fp16", weights;
     uint32_t width = 616, height = 424, tokens = 77;
     float cfg_scale = 1.5f;
 };
@@ -43,6 +43,7 @@ Status bench_asd(const BenchAsdArguments& o, const Globals& globals)
     UnetConfig unet_config;
     unet_config.in_channels = renderer_channels(vae_config);
     SR_CHECK(read_config(o.unet, parse_unet_config, unet_config));
+    SR_CHECK(store_as(o.weights, unet_config));
     SR_CHECK(read_config(o.vae, parse_vae_config, vae_config));
     SR_TRY(const auto device, open_device(globals));
     const DType dtype = o.precision == "fp32" ? DType::f32 : DType::f16;
@@ -89,6 +90,7 @@ void add_bench_asd(CLI::App& bench, const Globals& globals, Run& run)
     add_number(*c, "--tokens", o->tokens, "tokens of the text", 1u, 4096u);
     add_number(*c, "--cfg-scale", o->cfg_scale, "guidance; 1: no unconditional half", 0, 1000);
     add_choice(*c, "--precision", {"fp16", "fp32"}, "storage", o->precision);
+    add_weights(*c, o->weights);
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_asd(*o, globals); }; });
 }
 

@@ -16,7 +16,7 @@ namespace {
 
 struct BenchGemmArguments {
     GemmShape shape;
-    std::string precision = "fp16", profile;
+    std::string precision = "fp16", weights, profile;
     bool plan = false;
 };
 
@@ -24,8 +24,12 @@ Status bench_gemm(const BenchGemmArguments& o, const Globals& globals)
 {
     SR_TRY(const auto device, open_device(globals, o.profile));
     const DType dtype = o.precision == "fp32" ? DType::f32 : DType::f16;
+    const DType w_dtype = o.weights.empty() ? dtype : DType::q8_0;
+    if (o.shape.k % block_of(w_dtype).elements)
+        return fail(ErrorCode::usage, "--weights q8_0: --k is {}, no multiple of {}", o.shape.k,
+                    block_of(w_dtype).elements);
     BenchInputs inputs(*device);
-    SR_TRY(const auto program, gemm_program(*device, inputs, o.shape, dtype));
+    SR_TRY(const auto program, gemm_program(*device, inputs, o.shape, dtype, w_dtype));
     if (o.plan)
         print_stderr("{}", plan_text(program->plan()));
     SR_TRY(const Timing timing, measure([&] { return program->run(); }));
@@ -42,9 +46,11 @@ Status bench_gemm(const BenchGemmArguments& o, const Globals& globals)
 
 } // namespace
 
-Result<std::unique_ptr<Program>> gemm_program(Device& device, BenchInputs& inputs, const GemmShape& s, DType dtype)
+Result<std::unique_ptr<Program>> gemm_program(Device& device, BenchInputs& inputs, const GemmShape& s, DType dtype,
+                                              std::optional<DType> w_dtype)
 {
-    const Slot x = inputs.add(s.m, s.k, dtype), w = inputs.add(s.n, s.k, dtype), y = inputs.add(s.m, s.n, dtype);
+    const Slot x = inputs.add(s.m, s.k, dtype), w = inputs.add(s.n, s.k, w_dtype.value_or(dtype));
+    const Slot y = inputs.add(s.m, s.n, dtype);
     SR_CHECK(inputs.allocate());
     Graph g(device.limits());
     g.keep(gemm(g, x.in(g), w.in(g), {}, {.dtype = dtype}), y.in(g));
@@ -59,6 +65,7 @@ void add_bench_gemm(CLI::App& bench, const Globals& globals, Run& run)
     add_number(*c, "--n", o->shape.n, "rows of w", 1, 65536);
     add_number(*c, "--k", o->shape.k, "columns of both", 1, 65536);
     add_choice(*c, "--precision", {"fp16", "fp32"}, "storage", o->precision);
+    add_weights(*c, o->weights);
     add_profile(*c, o->profile);
     add_plan(*c, o->plan);
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_gemm(*o, globals); }; });

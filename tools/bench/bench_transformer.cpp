@@ -16,7 +16,7 @@ namespace semrover {
 namespace {
 
 struct BenchTransformerArguments {
-    std::string config, precision = "fp16", profile;
+    std::string config, precision = "fp16", weights, profile;
     bool plan = false;
     uint32_t cells = 128, batch = 1, steps = 2;
     bool unguided = false;
@@ -41,6 +41,7 @@ Status bench_transformer(const BenchTransformerArguments& o, const Globals& glob
 {
     TransformerConfig config;
     SR_CHECK(read_config(o.config, parse_transformer_config, config));
+    config.q8_0 = config.q8_0 || !o.weights.empty();
     SR_TRY(const auto device, open_device(globals, o.profile));
     const DType dtype = o.precision == "fp32" ? DType::f32 : DType::f16;
     SR_TRY(const auto transformer, Transformer::random(*device, config, dtype));
@@ -78,6 +79,7 @@ void add_bench_transformer(CLI::App& bench, const Globals& globals, Run& run)
     add_number(*c, "--cells", o->cells, "voxels of a region", 1u, 4096u);
     add_number(*c, "--batch", o->batch, "regions", 1u, 1024u);
     add_choice(*c, "--precision", {"fp16", "fp32"}, "storage", o->precision);
+    add_weights(*c, o->weights);
     add_number(*c, "--steps", o->steps, "of a measured run, which sets up and reads back once", 1u, 1000u);
     c->add_flag("--unguided", o->unguided, "without the unconditional half");
     add_profile(*c, o->profile);

@@ -15,7 +15,7 @@ namespace semrover {
 namespace {
 
 struct BenchUnetArguments {
-    std::string config, precision = "fp16", profile;
+    std::string config, precision = "fp16", weights, profile;
     bool plan = false;
     uint32_t width = 77, height = 53, batch = 1, tokens = 77;
 };
@@ -25,6 +25,7 @@ Status bench_unet(const BenchUnetArguments& o, const Globals& globals)
     UnetConfig config; // Stable Diffusion 1.5's, with the channels of the deferred renderer
     config.in_channels = 13;
     SR_CHECK(read_config(o.config, parse_unet_config, config));
+    SR_CHECK(store_as(o.weights, config));
     SR_TRY(const auto device, open_device(globals));
     const DType dtype = o.precision == "fp32" ? DType::f32 : DType::f16;
     SR_TRY(const auto unet, Unet::load(*device, config, Checkpoint::random(1), dtype));
@@ -67,6 +68,7 @@ void add_bench_unet(CLI::App& bench, const Globals& globals, Run& run)
     add_number(*c, "--batch", o->batch, "images; 2 is one step with guidance", 1u, 64u);
     add_number(*c, "--tokens", o->tokens, "tokens of the text", 1u, 4096u);
     add_choice(*c, "--precision", {"fp16", "fp32"}, "storage", o->precision);
+    add_weights(*c, o->weights);
     add_profile(*c, o->profile);
     add_plan(*c, o->plan);
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_unet(*o, globals); }; });

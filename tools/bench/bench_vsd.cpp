@@ -18,7 +18,7 @@ namespace semrover {
 namespace {
 
 struct BenchVsdArguments {
-    std::string unet, vae, precision = "fp16", profile;
+    std::string unet, vae, precision = "fp16", weights, profile;
     uint32_t width = 576, height = 384, frames = VideoDefaults().window_frames;
     uint32_t decode_frames = VideoDefaults().decode_frames, tokens = 1, evaluations = 6;
     float cfg_scale = 3;
@@ -41,6 +41,7 @@ Result<VideoNetworks> read_video_networks(const BenchVsdArguments& o)
     }
     VideoNetworks n;
     SR_TRY(n.unet, parse_video_unet_config(unet));
+    SR_CHECK(store_as(o.weights, n.unet));
     SR_TRY(n.vae, parse_video_vae_config(vae));
     return n;
 }
@@ -171,6 +172,7 @@ void add_bench_vsd(CLI::App& bench, const Globals& globals, Run& run)
                0, 1000);
     add_number(*c, "--evaluations", o->evaluations, "runs of each part, the first to warm up; 0: memory only", 0, 1000);
     add_choice(*c, "--precision", {"fp16", "fp32"}, "storage", o->precision);
+    add_weights(*c, o->weights);
     add_profile(*c, o->profile);
     c->callback([o, &globals, &run] { run = [o, &globals] { return bench_vsd(*o, globals); }; });
 }

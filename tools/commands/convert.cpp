@@ -27,7 +27,7 @@ using Names = std::span<const std::string_view>;
 constexpr std::array<std::string_view, 1> kDryRun = {"--dry-run"};
 constexpr std::array<std::string_view, 7> kBoxNames = {"--from",  "--map",    "--origin",       "--calib",
                                                        "--frame", "--sample", "--vehicle-frame"};
-constexpr std::array<std::string_view, 3> kModelNames = {"--dtype", "--asd-init", "--vsd-init"};
+constexpr std::array<std::string_view, 4> kModelNames = {"--dtype", "--weights", "--asd-init", "--vsd-init"};
 constexpr std::array<std::string_view, 12> kPathNames = {"--path-format", "--camera", "--rig",          "--width",
                                                          "--height",      "--fov-x",  "--camera-model", "--distortion",
                                                          "--calib",       "--origin", "--points",       "--images"};
@@ -124,6 +124,9 @@ void add_convert(CLI::App& app, const Globals& globals, Run& run)
         ->required();
     c->add_option("OUT", o->model.out, "folder to write; or the scene's file, its format by the extension")->required();
     add_choice(*c, "--dtype", {"f32", "f16", "bf16"}, "precision of the weights; by default as in IN", o->model.dtype);
+    add_choice(*c, "--weights", {"q8_0"},
+               "store the weights of a UNet's and a transformer's blocks as int8 with a scale for 32: half the memory",
+               o->model.weights);
     c->add_flag("--asd-init", o->model.asd_init,
                 "make a plain UNet the start of a deferred renderer: 9 more input channels, with zero weights");
     c->add_flag("--vsd-init", o->model.vsd_init,

@@ -24,7 +24,7 @@ Status convert_scene(const ConvertSceneOptions& options, const Globals& globals)
 // a model in the diffusers layout, from a single-file LDM checkpoint or from another folder, with weights of another
 // precision or with a deferred renderer's input channels: asd_init for one of images, vsd_init for one of videos
 struct ConvertModelOptions {
-    std::string in, out, dtype;
+    std::string in, out, dtype, weights; // weights: "q8_0", or as they are
     bool asd_init = false, vsd_init = false, dry_run = false;
 };
 // whether a file or folder has weights of a network, or says that it does

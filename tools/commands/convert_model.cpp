@@ -4,6 +4,7 @@
 
 #include "engine/model/low_rank.h"
 #include "engine/model/renderer_model.h"
+#include "engine/model/weight_blocks.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/print_stderr.h"
 #include "tools/cli/progress.h"
@@ -44,6 +45,21 @@ std::vector<TensorStream> streams_of(const Checkpoint& checkpoint, std::span<con
     return streams;
 }
 
+// with --weights, int8 and scales in place of what can be stored in blocks
+void put_in_blocks(const ConvertModelOptions& o, ComponentFiles& files)
+{
+    if (o.weights.empty())
+        return;
+    files.config["weights"] = o.weights;
+    for (size_t i = 0, count = files.tensors.size(); i < count; ++i) {
+        const TensorStream tensor = files.tensors[i];
+        if (tensor.dtype == DType::i8 || !stored_in_blocks(tensor.name, tensor.shape))
+            continue;
+        files.tensors[i] = block_values(tensor);
+        files.tensors.push_back(block_scales(tensor));
+    }
+}
+
 // The input channels that a renderer lacks, with zero weights. A video's has those of the noisy latent and of the
 // image, which comes unscaled, as splat buffers do: the buffer takes the image's, and visibility is new.
 Status widen(const ConvertModelOptions& o, const RendererModel& m, ComponentFiles& files)
@@ -75,6 +91,8 @@ Status plan_unet(const ConvertModelOptions& o, const RendererModel& m, Conversio
     }
     if (o.asd_init || o.vsd_init)
         SR_CHECK(widen(o, m, files));
+    put_in_blocks(o, files);
+    SR_CHECK(parse_any_unet_config(files.config)); // not every network can be in blocks
     plan.index["renderer"] = {"diffusers", m.video() ? "UNetSpatioTemporalConditionModel" : "UNet2DConditionModel"};
     plan.components["renderer"] = std::move(files);
     return {};
@@ -119,6 +137,7 @@ Status plan_transformer(const ConvertModelOptions& o, const Path& folder, Conver
     const auto shared = std::make_shared<const SafetensorsSet>(std::move(set));
     for (const TensorInfo& tensor : shared->tensors())
         files.tensors.push_back(stream_tensor(shared, tensor, dtype_option(o)));
+    put_in_blocks(o, files);
     plan.index["voxfield_transformer"] = {"semrover", "VoxfieldTransformer"};
     plan.components["voxfield_transformer"] = std::move(files);
     if (is_there(folder / kAdapterFile))
@@ -324,7 +343,7 @@ void report(const Conversion& plan, const ConvertModelOptions& o, const Globals&
             uint64_t elements = 1;
             for (const uint64_t dim : tensor.shape)
                 elements *= dim;
-            parameters += elements;
+            parameters += is_scales(tensor.name) ? 0 : elements;
             bytes += elements * dtype_bytes(tensor.dtype);
         }
         components[name] = {{"tensors", files.tensors.size()}, {"parameters", parameters}, {"bytes", bytes}};

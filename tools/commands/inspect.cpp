@@ -6,6 +6,7 @@
 #include "engine/model/ldm_config.h"
 #include "engine/model/low_rank.h"
 #include "engine/model/renderer_model.h"
+#include "engine/model/weight_blocks.h"
 #include "engine/scene/palette.h"
 #include "engine/scene/tiles.h"
 #include "engine/splat/bounds.h"
@@ -83,7 +84,7 @@ uint64_t parameters_of(const SafetensorsSet& set, std::string_view prefix)
 {
     uint64_t sum = 0;
     for (const TensorInfo& t : set.tensors())
-        if (t.name.starts_with(prefix))
+        if (t.name.starts_with(prefix) && !is_scales(t.name))
             sum += t.elements();
     return sum;
 }
@@ -152,7 +153,7 @@ Report describe_weights(const SafetensorsSet& set, bool with_tensors, Totals& to
     Totals own;
     std::map<std::string, uint64_t> dtypes;
     for (const TensorInfo& t : set.tensors()) {
-        own.parameters += t.elements();
+        own.parameters += is_scales(t.name) ? 0 : t.elements();
         own.bytes += t.bytes();
         ++dtypes[dtype_name(t.dtype)];
     }

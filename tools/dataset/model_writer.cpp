@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/dataset/model_writer.h"
 
+#include "engine/model/weight_blocks.h"
 #include "runtime/base/quote.h"
 
 #include <algorithm>
@@ -41,7 +42,48 @@ Status write_shards(const Path& folder, std::span<const TensorStream> tensors, u
                       {{"metadata", {{"total_size", total}}}, {"weight_map", map}});
 }
 
+Status make_blocks(const TensorStream& weight, WeightBlocks& blocks)
+{
+    std::vector<std::byte> scratch;
+    SR_TRY(const std::span<const std::byte> bytes, weight.bytes(scratch));
+    std::vector<float> numbers(bytes.size() / dtype_bytes(weight.dtype));
+    to_float(bytes, weight.dtype, numbers.data());
+    uint32_t taps = 1;
+    for (size_t i = 2; i < weight.shape.size(); ++i)
+        taps *= uint32_t(weight.shape[i]);
+    to_blocks(numbers, uint32_t(weight.shape[1]), taps, blocks);
+    if (const auto bad = first_non_finite(std::as_bytes(std::span(blocks.scales)), DType::f16))
+        return fail(ErrorCode::bad_input, "tensor {} is too large for fp16 scales, at block {}", quote(weight.name),
+                    *bad);
+    return {};
+}
+
 } // namespace
+
+TensorStream block_values(const TensorStream& weight)
+{
+    const auto make = [weight](std::vector<std::byte>& scratch) -> Result<std::span<const std::byte>> {
+        WeightBlocks blocks;
+        SR_CHECK(make_blocks(weight, blocks));
+        const auto bytes = std::as_bytes(std::span(blocks.values));
+        scratch.assign(bytes.begin(), bytes.end());
+        return std::span<const std::byte>(scratch);
+    };
+    return {weight.name, DType::i8, weight.shape, make};
+}
+
+TensorStream block_scales(const TensorStream& weight)
+{
+    const auto make = [weight](std::vector<std::byte>& scratch) -> Result<std::span<const std::byte>> {
+        WeightBlocks blocks;
+        SR_CHECK(make_blocks(weight, blocks));
+        const auto bytes = std::as_bytes(std::span(blocks.scales));
+        scratch.assign(bytes.begin(), bytes.end());
+        return std::span<const std::byte>(scratch);
+    };
+    const TensorSpec scales = scales_of({weight.name, weight.shape});
+    return {scales.name, DType::f16, scales.shape, make};
+}
 
 Status write_json(const Path& path, const Json& json)
 {
