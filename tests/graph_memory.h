@@ -5,6 +5,7 @@
 #include "kernels/network.h"
 #include "runtime/graph/plan.h"
 
+#include <cctype>
 #include <cstring>
 #include <gtest/gtest.h>
 
@@ -54,14 +55,24 @@ inline uint32_t pushed(const Pass& pass, std::string_view member)
     return value;
 }
 
-// kernels in the order they run, with a bar for every barrier: "gelu silu | add"
+// the kernel of a pass, or which function an activation is
+inline std::string op_name(const Pass& pass)
+{
+    if (pass.kernel->name != "activation")
+        return std::string(pass.kernel->name);
+    std::string function(pass.options.absorbed_as.substr(1)); // "kGelu"
+    function[0] = char(std::tolower(function[0]));
+    return function;
+}
+
+// ops in the order they run, with a bar for every barrier: "gelu silu | add"
 inline std::string levels_text(const Plan& plan)
 {
     std::string out;
     for (size_t i = 0; i < plan.passes.size(); ++i) {
         if (i)
             out += plan.passes[i].level == plan.passes[i - 1].level ? " " : " | ";
-        out += plan.passes[i].kernel->name;
+        out += op_name(plan.passes[i]);
     }
     return out;
 }

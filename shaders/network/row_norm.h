@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#ifndef SEMROVER_MODULATE_H
-#define SEMROVER_MODULATE_H
+#ifndef SEMROVER_ROW_NORM_H
+#define SEMROVER_ROW_NORM_H
 #include "shaders/lib/types.h"
 
-struct ModulatePush {
+struct RowNormPush {
     uint rows; // of one group
     uint cols;
     uint groups;
