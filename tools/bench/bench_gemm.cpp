@@ -26,9 +26,9 @@ Status bench_gemm(const BenchGemmArguments& o, const Globals& globals)
     const DType dtype = o.precision == "fp32" ? DType::f32 : DType::f16;
     BenchInputs inputs(*device);
     SR_TRY(const auto program, gemm_program(*device, inputs, o.shape, dtype));
+    SR_TRY(const Timing timing, measure([&] { return program->run(); }));
     if (o.plan)
         print_stderr("{}", plan_text(program->plan()));
-    SR_TRY(const Timing timing, measure([&] { return program->run(); }));
     Json report = bench_report("gemm", *device, dtype, timing, inputs.bytes() + program->plan().arena_bytes());
     report["m"] = o.shape.m;
     report["n"] = o.shape.n;
