@@ -205,14 +205,19 @@ Status PipelineStore::compile(std::span<Missing> missing)
             });
     } catch (const std::system_error&) { // no more threads: those that are there do it
     }
-    Status status = device_.check_cancelled();
-    for (auto begin = std::chrono::steady_clock::now(); status && make_next(); status = device_.check_cancelled()) {
+    auto begin = std::chrono::steady_clock::now();
+    const auto save = [&] {
         const auto now = std::chrono::steady_clock::now();
         save_by_and_by(std::chrono::duration<double>(now - begin).count());
         begin = now;
-    }
+    };
+    Status status = device_.check_cancelled();
+    for (; status && make_next(); status = device_.check_cancelled())
+        save();
     next = missing.size();
     others.clear();
+    if (!missing.empty()) // what the other threads made last, or all of it
+        save();
     for (Missing& m : missing)
         if (m.made.pipeline)
             pipelines_[{m.pass->variant, m.pass->constants}] = m.made;
