@@ -3,7 +3,7 @@
 #include "kernels/network.h"
 #include "kernels/sort.h"
 #include "runtime/graph/cost_model.h"
-#include "tests/graph_memory.h"
+#include "tests/support/graph_memory.h"
 
 #include <gtest/gtest.h>
 

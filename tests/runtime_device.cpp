@@ -1,16 +1,17 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device posix
 #include "kernels/network.h"
 #include "runtime/device/device.h"
 #include "runtime/device/pipeline.h"
 #include "runtime/device/profile.h"
 #include "runtime/device/program.h"
 #include "runtime/device/state.h"
-#include "tests/cache_home.h"
-#include "tests/host_vulkan.h"
-#include "tests/json_text.h"
-#include "tests/says.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/cache_home.h"
+#include "tests/support/host_vulkan.h"
+#include "tests/support/json_text.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch_folder.h"
 
 #include <algorithm>
 #include <cstring>

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "tests/state_dict.h"
+#include "tests/support/state_dict.h"
 
 #include <algorithm>
 

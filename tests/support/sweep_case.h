@@ -4,7 +4,7 @@
 
 #include "engine/job/drawn_scene.h"
 #include "engine/job/sweep_drawing.h"
-#include "tests/kernel_case.h"
+#include "tests/support/kernel_case.h"
 
 namespace semrover {
 

@@ -5,7 +5,7 @@
 #ifndef SEMROVER_TESTS_CAPI_MEMORY_H
 #define SEMROVER_TESTS_CAPI_MEMORY_H
 
-#include "tests/capi_vulkan.h"
+#include "tests/support/capi_vulkan.h"
 
 static inline sr_context* adopt(const sr_vulkan_device* vulkan)
 {

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "runtime/base/json.h"
-#include "tests/state_dict.h"
+#include "tests/support/state_dict.h"
 #include "tools/eval/pointnet.h"
 
 #include <fstream>

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "engine/world/world.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/scratch_folder.h"
 
 #include <algorithm>
 #include <gtest/gtest.h>

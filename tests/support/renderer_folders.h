@@ -5,7 +5,7 @@
 #include "engine/format/image.h"
 #include "engine/scene/grid.h"
 #include "runtime/base/safetensors.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/scratch_folder.h"
 
 #include <gtest/gtest.h>
 

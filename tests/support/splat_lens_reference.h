@@ -3,7 +3,7 @@
 #pragma once
 
 #include "engine/camera/lens.h"
-#include "tests/splat_reference.h"
+#include "tests/support/splat_reference.h"
 
 // the splat rasteriser of cameras with lenses in double, every splat against the ray of every pixel, after
 // docs/method.md §5.4; engine_lens tests the lenses themselves

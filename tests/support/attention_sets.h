@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "tests/kernel_case.h"
+#include "tests/support/kernel_case.h"
 
 #include <array>
 

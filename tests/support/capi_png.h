@@ -5,7 +5,7 @@
 #ifndef SEMROVER_TESTS_CAPI_PNG_H
 #define SEMROVER_TESTS_CAPI_PNG_H
 
-#include "tests/capi_vulkan.h"
+#include "tests/support/capi_vulkan.h"
 
 #include <png.h>
 

@@ -6,7 +6,7 @@
 #include "engine/scene/grid.h"
 #include "runtime/base/dtype.h"
 #include "runtime/base/json.h"
-#include "tests/program.h"
+#include "tests/support/program.h"
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 
 #include "runtime/graph/plan.h"
 #include "runtime/graph/variant.h"
-#include "tests/kernel_case.h"
+#include "tests/support/kernel_case.h"
 
 #include <cmath>
 

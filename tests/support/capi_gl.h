@@ -5,8 +5,8 @@
 #ifndef SEMROVER_TESTS_CAPI_GL_H
 #define SEMROVER_TESTS_CAPI_GL_H
 
-#include "tests/capi_egl.h"
-#include "tests/capi_street.h"
+#include "tests/support/capi_egl.h"
+#include "tests/support/capi_street.h"
 
 enum { WIDTH = 52, HEIGHT = 40, PIXELS = WIDTH * HEIGHT };
 

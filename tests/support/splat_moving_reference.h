@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "tests/splat_lens_reference.h"
+#include "tests/support/splat_lens_reference.h"
 
 // the splat rasteriser of cameras that move while they are read out, in double, after docs/method.md §5.4: a line of
 // the picture is that line of a still camera's picture from where the camera is then; a splat's dot is where the line

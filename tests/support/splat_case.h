@@ -3,8 +3,8 @@
 #pragma once
 
 #include "engine/splat/rasterizer.h"
-#include "tests/kernel_case.h"
-#include "tests/splat_moving_reference.h"
+#include "tests/support/kernel_case.h"
+#include "tests/support/splat_moving_reference.h"
 
 namespace semrover {
 

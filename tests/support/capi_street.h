@@ -5,7 +5,7 @@
 #ifndef SEMROVER_TESTS_CAPI_STREET_H
 #define SEMROVER_TESTS_CAPI_STREET_H
 
-#include "tests/capi_vulkan.h"
+#include "tests/support/capi_vulkan.h"
 
 enum { MOST_CELLS = 4096 };
 

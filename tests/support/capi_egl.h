@@ -7,7 +7,7 @@
 #define SEMROVER_TESTS_CAPI_EGL_H
 
 #include "engine/semrover_gl.h"
-#include "tests/capi_vulkan.h"
+#include "tests/support/capi_vulkan.h"
 
 #include <EGL/egl.h>
 #include <EGL/eglext.h>

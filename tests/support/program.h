@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "tests/program_result.h"
+#include "tests/support/program_result.h"
 
 #include <gtest/gtest.h>
 #include <string>

@@ -5,7 +5,7 @@
 #ifndef SEMROVER_TESTS_CAPI_CAR_H
 #define SEMROVER_TESTS_CAPI_CAR_H
 
-#include "tests/capi_street.h"
+#include "tests/support/capi_street.h"
 
 enum { CAR = 17, CAR_LABEL = 13 };
 static const double kCarCenter[3] = {6, 3.9, 1.2}, kCarSize[3] = {2.4, 1.8, 1.2}, kSplatRadius = 0.1;
